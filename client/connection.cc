@@ -1,0 +1,291 @@
+#include "client/connection.h"
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <optional>
+#include <string_view>
+#include <thread>
+#include <utility>
+
+#include "client/exit_code.h"
+#include "client/interruption.h"
+#include "client/progress_view.h"
+#include "render/base/clock.h"
+#include "render/base/mutex.h"
+#include "render/wire/channel.h"
+#include "render/wire/chunks.h"
+#include "render/wire/grpc_status.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::chrono::seconds kConnectTime{3};
+// A large scene is parsed before a submission is answered.
+constexpr std::chrono::seconds kSubmitTime{300};
+// A blob or an image of gigabytes over a slow line.
+constexpr std::chrono::seconds kStreamTime{1800};
+// A watch that lasts longer is opened again.
+constexpr std::chrono::seconds kWatchTime{3600};
+constexpr std::chrono::milliseconds kFirstPause{100};
+constexpr std::chrono::milliseconds kLongestPause{2000};
+constexpr int kAttempts = 7;  // about six seconds of pauses in all
+// A coordinator that is being restarted needs longer than one that is only slow.
+constexpr Duration kWatchSilence = std::chrono::seconds(30);
+constexpr std::chrono::milliseconds kTick{100};
+constexpr std::uint64_t kMaxImageBytes = std::uint64_t{8} << 30;
+
+Status Interrupted() {
+  return Failure(ExitCode::kInterrupted, "interrupted");
+}
+
+bool IsWorthAnotherAttempt(grpc::StatusCode code) {
+  // CANCELLED comes from a call that raced the coordinator's shutdown.
+  return code == grpc::StatusCode::UNAVAILABLE || code == grpc::StatusCode::CANCELLED;
+}
+
+void SetDeadline(grpc::ClientContext& context, Duration time) {
+  context.set_deadline(std::chrono::time_point_cast<std::chrono::system_clock::duration>(
+      SystemClock().Wall() + time));
+}
+
+// One open Watch: a thread reads, the owner takes the newest.
+class WatchStream {
+ public:
+  WatchStream(v1::JobService::Stub& jobs, const std::string& job_id) {
+    SetDeadline(context_, kWatchTime);
+    v1::WatchJobRequest request;
+    request.set_job_id(job_id);
+    reader_ = jobs.Watch(&context_, request);
+    thread_ = std::thread([this] { ReadAll(); });
+  }
+  ~WatchStream() {
+    context_.TryCancel();
+    thread_.join();
+  }
+  WatchStream(const WatchStream&) = delete;
+  WatchStream& operator=(const WatchStream&) = delete;
+
+  struct News {
+    std::optional<v1::Job> job;
+    std::optional<grpc::Status> ended;
+  };
+  // Waits up to one tick for news.
+  [[nodiscard]] News Next() {
+    const MutexLock lock(mutex_);
+    if (!news_.job && !news_.ended) changed_.WaitFor(mutex_, kTick);
+    return std::exchange(news_, {});
+  }
+
+ private:
+  void ReadAll() {
+    v1::Job job;
+    while (reader_->Read(&job)) {
+      const MutexLock lock(mutex_);
+      news_.job = job;
+      changed_.NotifyAll();
+    }
+    const grpc::Status status = reader_->Finish();
+    const MutexLock lock(mutex_);
+    news_.ended = status;
+    changed_.NotifyAll();
+  }
+
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReader<v1::Job>> reader_;
+  Mutex mutex_;
+  Condition changed_;
+  News news_ LUCERNA_GUARDED_BY(mutex_);
+  std::thread thread_;
+};
+
+}  // namespace
+
+ClientConnection::ClientConnection(std::string address,
+                                   const std::shared_ptr<grpc::Channel>& channel)
+    : address_(std::move(address)),
+      assets_(v1::AssetService::NewStub(channel)),
+      jobs_(v1::JobService::NewStub(channel)),
+      images_(v1::ImageService::NewStub(channel)) {}
+
+StatusOr<std::unique_ptr<ClientConnection>> ClientConnection::Open(const std::string& address) {
+  const std::shared_ptr<grpc::Channel> channel = MakeChannel(address);
+  auto connection = std::unique_ptr<ClientConnection>(new ClientConnection(address, channel));
+  const WallTime give_up = SystemClock().Wall() + kConnectTime;
+  while (!channel->WaitForConnected(SystemClock().Wall() + kTick)) {
+    if (IsInterrupted()) return Interrupted();
+    if (SystemClock().Wall() > give_up) return connection->Unreachable();
+  }
+  return connection;
+}
+
+Status ClientConnection::Unreachable() const {
+  return Failure(ExitCode::kUnreachable, absl::StrCat("cannot reach the coordinator at ", address_,
+                                                      "; is lucerna-server running there?"));
+}
+
+Status ClientConnection::Retry(std::chrono::seconds time_for_one,
+                               const std::function<grpc::Status(grpc::ClientContext&)>& call) {
+  std::chrono::milliseconds pause = kFirstPause;
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    if (IsInterrupted()) return Interrupted();
+    grpc::ClientContext context;
+    SetDeadline(context, time_for_one);
+    const grpc::Status status = call(context);
+    if (status.ok()) return absl::OkStatus();
+    if (IsInterrupted()) return Interrupted();
+    if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) return Unreachable();
+    const bool again = IsWorthAnotherAttempt(status.error_code()) ||
+                       status.error_code() == grpc::StatusCode::DATA_LOSS;
+    if (!again) return FromGrpc(status);
+    SleepUnlessInterrupted(pause);
+    pause = std::min(2 * pause, kLongestPause);
+  }
+  return IsInterrupted() ? Interrupted() : Unreachable();
+}
+
+Status ClientConnection::Upload(const SceneManifest& manifest, SceneFiles& files) {
+  // Two files may be the same bytes; they travel once.
+  std::map<Digest, std::string> path_of;
+  for (const auto& [path, entry] : manifest.entries)
+    path_of.emplace(entry.digest, path);
+  v1::FindMissingRequest request;
+  for (const auto& [digest, path] : path_of)
+    request.add_digests(std::string(digest.Bytes()));
+  v1::FindMissingResponse response;
+  LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
+    return assets_->FindMissing(&context, request, &response);
+  }));
+
+  for (const std::string& missing : response.missing()) {
+    LUCERNA_ASSIGN_OR_RETURN(const Digest digest, Digest::FromBytes(missing));
+    const auto found = path_of.find(digest);
+    if (found == path_of.end()) {
+      return absl::InternalError("the coordinator asks for a file that is not of this scene");
+    }
+    LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, files.Read(found->second));
+    if (Sha256(bytes) != digest) {
+      return absl::FailedPreconditionError(
+          absl::StrCat(found->second, ": the file changed while it was being sent; try again"));
+    }
+    LUCERNA_RETURN_IF_ERROR(UploadBlob(digest, bytes));
+  }
+  return absl::OkStatus();
+}
+
+Status ClientConnection::UploadBlob(const Digest& digest, std::string_view bytes) {
+  return Retry(kStreamTime, [&](grpc::ClientContext& context) {
+    v1::UploadResponse response;
+    const auto writer = assets_->Upload(&context, &response);
+    v1::UploadRequest request;
+    request.mutable_header()->set_digest(std::string(digest.Bytes()));
+    request.mutable_header()->set_size_bytes(bytes.size());
+    bool is_open = writer->Write(request);
+    std::string_view rest = bytes;
+    while (is_open && !rest.empty()) {
+      if (IsInterrupted()) context.TryCancel();
+      request.set_bytes(std::string(NextChunk(rest)));
+      // Waits while the other side is busy; false when the call is over, and Finish says why.
+      is_open = writer->Write(request);
+    }
+    writer->WritesDone();
+    return writer->Finish();
+  });
+}
+
+StatusOr<v1::SubmitResponse> ClientConnection::Submit(const v1::SubmitRequest& request) {
+  v1::SubmitResponse response;
+  LUCERNA_RETURN_IF_ERROR(Retry(kSubmitTime, [&](grpc::ClientContext& context) {
+    return jobs_->Submit(&context, request, &response);
+  }));
+  return response;
+}
+
+StatusOr<std::vector<v1::Job>> ClientConnection::List() {
+  std::vector<v1::Job> jobs;
+  v1::ListJobsRequest request;
+  request.set_page_size(200);
+  for (;;) {
+    v1::ListJobsResponse response;
+    LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
+      return jobs_->List(&context, request, &response);
+    }));
+    for (v1::Job& job : *response.mutable_jobs())
+      jobs.push_back(std::move(job));
+    // A page that leads back to itself would never end.
+    if (response.next_page_token().empty() || response.next_page_token() == request.page_token()) {
+      return jobs;
+    }
+    request.set_page_token(response.next_page_token());
+  }
+}
+
+StatusOr<v1::Job> ClientConnection::Cancel(const std::string& job_id) {
+  v1::CancelJobRequest request;
+  request.set_job_id(job_id);
+  v1::Job job;
+  // Also called to clean up after an interruption, so it does not ask whether there was one.
+  grpc::ClientContext context;
+  SetDeadline(context, kCallTime);
+  const grpc::Status status = jobs_->Cancel(&context, request, &job);
+  if (status.error_code() == grpc::StatusCode::UNAVAILABLE ||
+      status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
+    return Unreachable();
+  }
+  LUCERNA_RETURN_IF_ERROR(FromGrpc(status));
+  return job;
+}
+
+StatusOr<v1::Job> ClientConnection::Watch(const std::string& job_id, const OnJob& on_job) {
+  v1::Job newest;
+  SteadyTime last_news = SystemClock().Steady();
+  std::chrono::milliseconds pause = kFirstPause;
+  for (;;) {
+    WatchStream stream(*jobs_, job_id);
+    for (;;) {
+      const WatchStream::News news = stream.Next();
+      if (news.job) {
+        newest = *news.job;
+        last_news = SystemClock().Steady();
+        pause = kFirstPause;
+      }
+      LUCERNA_RETURN_IF_ERROR(on_job(newest));
+      if (HasEnded(newest.state())) return newest;
+      if (IsInterrupted()) return Interrupted();
+      if (!news.ended) continue;
+      const grpc::StatusCode code = news.ended->error_code();
+      if (!news.ended->ok() && code != grpc::StatusCode::DEADLINE_EXCEEDED &&
+          !IsWorthAnotherAttempt(code)) {
+        return FromGrpc(*news.ended);
+      }
+      break;
+    }
+    if (SystemClock().Steady() - last_news > kWatchSilence) return Unreachable();
+    SleepUnlessInterrupted(pause);
+    pause = std::min(2 * pause, kLongestPause);
+  }
+}
+
+StatusOr<std::string> ClientConnection::GetImage(const std::string& job_id) {
+  v1::GetImageRequest request;
+  request.set_job_id(job_id);
+  std::string bytes;
+  bool is_too_long = false;
+  const Status status = Retry(kStreamTime, [&](grpc::ClientContext& context) {
+    bytes.clear();
+    const auto reader = images_->GetImage(&context, request);
+    v1::Chunk chunk;
+    while (!is_too_long && reader->Read(&chunk)) {
+      bytes += chunk.bytes();
+      is_too_long = bytes.size() > kMaxImageBytes;
+      if (is_too_long || IsInterrupted()) context.TryCancel();
+    }
+    const grpc::Status ended = reader->Finish();
+    return is_too_long ? grpc::Status::OK : ended;
+  });
+  if (is_too_long) return absl::ResourceExhaustedError("the image is longer than 8 GiB");
+  LUCERNA_RETURN_IF_ERROR(status);
+  return bytes;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,64 @@
+// How does the client talk to the coordinator?
+//
+// Every call has a deadline. Calls that may be made twice (all of them: a submission carries its
+// own request_id) are tried again with growing pauses when the coordinator is starting, draining
+// or out of reach for a moment; a broken Watch is opened again.
+//
+// Errors of every call: Failure(kUnreachable) when the coordinator stays silent,
+// Failure(kInterrupted) when the user ended the program, else what the coordinator said.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <grpcpp/grpcpp.h>
+
+#include "proto/lucerna/v1/assets.grpc.pb.h"
+#include "proto/lucerna/v1/images.grpc.pb.h"
+#include "proto/lucerna/v1/jobs.grpc.pb.h"
+#include "render/base/status.h"
+#include "render/scene/scene_files.h"
+
+namespace lucerna {
+
+class ClientConnection {
+ public:
+  // Connects to `address` ("host:port"), and waits a few seconds for it.
+  [[nodiscard]] static StatusOr<std::unique_ptr<ClientConnection>> Open(const std::string& address);
+
+  // Brings the files of `manifest` that the coordinator does not have. `files` reads them anew.
+  // Errors: FAILED_PRECONDITION when a file is no longer what the manifest says.
+  [[nodiscard]] Status Upload(const SceneManifest& manifest, SceneFiles& files);
+
+  [[nodiscard]] StatusOr<v1::SubmitResponse> Submit(const v1::SubmitRequest& request);
+  // All jobs, newest first.
+  [[nodiscard]] StatusOr<std::vector<v1::Job>> List();
+  [[nodiscard]] StatusOr<v1::Job> Cancel(const std::string& job_id);
+
+  // Called with the newest state of the job, several times a second. A failure ends the watch.
+  using OnJob = std::function<Status(const v1::Job& job)>;
+  // Follows the job until it has ended; returns its last state. `on_job` runs in the calling
+  // thread; before the first news it is called with an empty Job, state UNSPECIFIED.
+  [[nodiscard]] StatusOr<v1::Job> Watch(const std::string& job_id, const OnJob& on_job);
+
+  // The bytes of the job's EXR file.
+  [[nodiscard]] StatusOr<std::string> GetImage(const std::string& job_id);
+
+ private:
+  ClientConnection(std::string address, const std::shared_ptr<grpc::Channel>& channel);
+
+  // Makes `call` until it succeeds or trying again makes no sense.
+  [[nodiscard]] Status Retry(std::chrono::seconds time_for_one,
+                             const std::function<grpc::Status(grpc::ClientContext&)>& call);
+  [[nodiscard]] Status UploadBlob(const Digest& digest, std::string_view bytes);
+  [[nodiscard]] Status Unreachable() const;
+
+  std::string address_;
+  std::unique_ptr<v1::AssetService::Stub> assets_;
+  std::unique_ptr<v1::JobService::Stub> jobs_;
+  std::unique_ptr<v1::ImageService::Stub> images_;
+};
+
+}  // namespace lucerna

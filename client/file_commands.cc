@@ -1,0 +1,94 @@
+#include "client/file_commands.h"
+
+#include <array>
+#include <cstdio>
+
+#include "absl/strings/str_format.h"
+
+#include "client/report.h"
+#include "client/scene_reading.h"
+#include "render/base/files.h"
+#include "render/film/exr_file.h"
+#include "render/film/png_file.h"
+
+namespace lucerna {
+namespace {
+
+StatusOr<Image> ReadImage(const std::string& path) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
+  StatusOr<Image> image = DecodeExr(bytes);
+  if (image.ok()) return image;
+  return absl::InvalidArgumentError(absl::StrCat(path, ": ", image.status().message()));
+}
+
+std::string Counted(std::size_t count, const std::string& word) {
+  return absl::StrCat(count, " ", word, count == 1 ? "" : "s");
+}
+
+}  // namespace
+
+Status Validate(const std::string& scene_path, bool strict, const Voice& voice) {
+  const ScenePath place = SplitScenePath(scene_path);
+  DirectoryFiles files(place.folder);
+  const ParsedScene parsed = ParsePbrt(files, place.main);
+  std::array<std::size_t, 3> counts{};
+  for (const Diagnostic& diagnostic : parsed.diagnostics) {
+    ++counts[static_cast<std::size_t>(diagnostic.severity)];
+    const bool is_error = diagnostic.severity == Diagnostic::Severity::kError;
+    // As JSON they are the result itself.
+    if (voice.json || (voice.quiet && !is_error)) continue;
+    std::fprintf(stderr, "%s\n", diagnostic.ToString().c_str());
+  }
+  const bool is_ok = parsed.ok() && !(strict && counts[1] > 0);
+  if (voice.json) std::fputs(SceneReport(parsed.diagnostics, is_ok).c_str(), stdout);
+  const std::string summary =
+      absl::StrCat(scene_path, ": ", Counted(counts[0], "error"), ", ",
+                   Counted(counts[1], "warning"), ", ", Counted(counts[2], "note"));
+  if (!is_ok) return absl::InvalidArgumentError(summary);
+  if (!voice.json && !voice.quiet) std::printf("%s\n", summary.c_str());
+  return absl::OkStatus();
+}
+
+Status Diff(const std::string& image_path, const std::string& reference_path,
+            const std::string& mask_path, MetricsOptions options, const Voice& voice) {
+  LUCERNA_ASSIGN_OR_RETURN(const Image image, ReadImage(image_path));
+  LUCERNA_ASSIGN_OR_RETURN(const Image reference, ReadImage(reference_path));
+  Image mask;
+  if (!mask_path.empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(mask, ReadImage(mask_path));
+    options.mask = &mask;
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const ImageMetrics metrics, Compare(image, reference, options));
+  if (voice.json) {
+    std::fputs(MetricsReport(metrics).c_str(), stdout);
+    return absl::OkStatus();
+  }
+  const std::string text = absl::StrFormat(
+      "pixels compared  %d\n"
+      "RMSE             %.6g\n"
+      "relMSE           %.6g\n"
+      "means            %.6g and %.6g\n"
+      "mean ratio       %.6f  (R %.6f, G %.6f, B %.6f)\n",
+      metrics.pixels, metrics.rmse, metrics.rel_mse, metrics.mean_a, metrics.mean_b,
+      metrics.mean_ratio, metrics.channel_mean_ratio[0], metrics.channel_mean_ratio[1],
+      metrics.channel_mean_ratio[2]);
+  std::fputs(text.c_str(), stdout);
+  return absl::OkStatus();
+}
+
+Status PrintDigest(const std::string& exr_path, const Voice& voice) {
+  LUCERNA_ASSIGN_OR_RETURN(const Image image, ReadImage(exr_path));
+  const std::string text =
+      voice.json ? DigestReport(image) : absl::StrCat(image.PixelDigest().Hex(), "\n");
+  std::fputs(text.c_str(), stdout);
+  return absl::OkStatus();
+}
+
+Status ConvertToPng(const std::string& exr_path, const std::string& png_path,
+                    double exposure_stops) {
+  LUCERNA_ASSIGN_OR_RETURN(const Image image, ReadImage(exr_path));
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, EncodePng(image, exposure_stops));
+  return WriteFile(png_path, bytes);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,57 @@
+// What can a user ask of a coordinator?
+//
+// One function a command. Results go to stdout, everything else to stderr; the Status says how
+// the program ends (client/exit_code.h). An image is written whole or not at all.
+#pragma once
+
+#include <string>
+
+#include "client/local_cluster.h"
+#include "client/render_flags.h"
+#include "render/base/status.h"
+
+namespace lucerna {
+
+// How a command speaks.
+struct Voice {
+  bool json = false;   // results as one JSON value
+  bool quiet = false;  // no progress, no summary, no warnings
+};
+
+// Where an image goes; empty: not there.
+struct OutputPaths {
+  std::string exr;
+  std::string png;
+
+  [[nodiscard]] bool empty() const { return exr.empty() && png.empty(); }
+};
+
+struct RenderRequest {
+  std::string scene_path;
+  RenderFlags flags;
+  OutputPaths outputs;
+};
+
+// Renders on a coordinator and workers of its own; an interruption cancels the job.
+[[nodiscard]] Status Render(const RenderRequest& request, const ClusterOptions& cluster,
+                            const Voice& voice);
+
+// Sends the job and prints its id; with outputs it waits and fetches too. An interruption leaves
+// the job running.
+[[nodiscard]] Status Submit(const RenderRequest& request, const std::string& server,
+                            const Voice& voice);
+
+[[nodiscard]] Status ListJobs(const std::string& server, const Voice& voice);
+
+// Waits until the job has ended, with or without showing its progress.
+// Errors: FAILED_PRECONDITION when it did not succeed.
+[[nodiscard]] Status Follow(const std::string& job_id, bool shows_progress,
+                            const std::string& server, const Voice& voice);
+
+[[nodiscard]] Status Fetch(const std::string& job_id, const OutputPaths& outputs,
+                           const std::string& server, const Voice& voice);
+
+[[nodiscard]] Status Cancel(const std::string& job_id, const std::string& server,
+                            const Voice& voice);
+
+}  // namespace lucerna

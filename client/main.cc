@@ -1,0 +1,188 @@
+// What did the user type, and which command answers it?
+//
+// Only wires: flags in, one command called, its Status out as a message and an exit code.
+#include <cstdio>
+#include <functional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "client/exit_code.h"
+#include "client/file_commands.h"
+#include "client/interruption.h"
+#include "client/job_commands.h"
+#include "client/local_cluster.h"
+
+namespace lucerna {
+namespace {
+
+int End(ExitCode code) {
+  return static_cast<int>(code);
+}
+
+int Run(int argc, char** argv) {
+  CLI::App app(
+      "Lucerna renders light that path tracers do not find, by progressive photon mapping.",
+      "lucerna");
+  app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 coordinator unreachable, 130 interrupted.");
+
+  Voice voice;
+  RenderRequest request;
+  ClusterOptions cluster;
+  OutputPaths fetched;
+  std::string server = "127.0.0.1:7400";
+  std::string job_id;
+  std::string scene_path;
+  std::string image_path;
+  std::string reference_path;
+  std::string mask_path;
+  std::string png_path;
+  MetricsOptions metrics;
+  double exposure_stops = 0;
+  bool strict = false;
+  bool crops = false;
+  bool scales = false;
+  std::function<Status()> chosen;
+
+  const auto command = [&](const char* name, const char* description,
+                           std::function<Status()> answer) {
+    CLI::App* added = app.add_subcommand(name, description);
+    added->callback([&chosen, answer = std::move(answer)] { chosen = answer; });
+    return added;
+  };
+  const auto add_json = [&](CLI::App* to) {
+    to->add_flag("--json", voice.json, "print the result as one JSON value");
+  };
+  const auto add_quiet = [&](CLI::App* to) {
+    to->add_flag("--quiet", voice.quiet, "print nothing but errors and what was asked for");
+  };
+  const auto add_server = [&](CLI::App* to) {
+    to->add_option("--server", server, "the coordinator, as host:port")
+        ->envname("LUCERNA_SERVER")
+        ->capture_default_str();
+  };
+  const auto add_render_flags = [&](CLI::App* to) {
+    RenderFlags& flags = request.flags;
+    to->add_option("SCENE", request.scene_path, "pbrt-v4 scene file")->required();
+    to->add_option("-o,--output", request.outputs.exr, "EXR file to write");
+    to->add_option("--png", request.outputs.png, "PNG preview to write");
+    to->add_option("--size", flags.size, "width and height in pixels, like 640x480");
+    to->add_option("--passes", flags.passes, "stop after so many passes");
+    to->add_option("--photons-per-pass", flags.photons_per_pass, "photons of one pass");
+    to->add_option("--time", flags.time_s, "stop after so many seconds");
+    to->add_option("--seed", flags.seed, "another seed, other noise");
+    to->add_option("--radius-controller", flags.radius_controller, "ppm or pppm");
+    to->add_option("--alpha", flags.alpha, "share of new photons kept, between 0 and 1");
+    to->add_option("--kernel", flags.kernel, "constant or epanechnikov");
+    to->add_option("--initial-radius", flags.initial_radius, "in scene units, or auto");
+    to->add_option("--max-depth", flags.max_depth, "scattering events of a path");
+  };
+
+  CLI::App* render = command("render", "render a scene on this machine", [&] {
+    StatusOr<std::string> folder = ProgramFolder();
+    if (!folder.ok()) return folder.status();
+    cluster.program_folder = *folder;
+    return Render(request, cluster, voice);
+  });
+  add_render_flags(render);
+  render->add_option("--workers", cluster.workers, "worker processes")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  render->add_option("--threads", cluster.threads, "threads of each worker (default: all in all)")
+      ->check(CLI::Range(1, 4096));
+  add_json(render);
+  add_quiet(render);
+
+  CLI::App* submit = command("submit", "send a scene to a coordinator",
+                             [&] { return Submit(request, server, voice); });
+  add_render_flags(submit);
+  add_server(submit);
+  add_json(submit);
+  add_quiet(submit);
+
+  CLI::App* jobs =
+      command("jobs", "list the jobs of a coordinator", [&] { return ListJobs(server, voice); });
+  add_server(jobs);
+  add_json(jobs);
+
+  CLI::App* watch = command("watch", "show a job's progress until it has ended",
+                            [&] { return Follow(job_id, true, server, voice); });
+  CLI::App* wait = command("wait", "wait until a job has ended",
+                           [&] { return Follow(job_id, false, server, voice); });
+  CLI::App* fetch = command("fetch", "fetch a job's image, also of one that still runs",
+                            [&] { return Fetch(job_id, fetched, server, voice); });
+  fetch->add_option("-o,--output", fetched.exr, "EXR file to write");
+  fetch->add_option("--png", fetched.png, "PNG preview to write");
+  CLI::App* cancel = command("cancel", "end a job and drop its image",
+                             [&] { return Cancel(job_id, server, voice); });
+  for (CLI::App* about_job : {watch, wait, fetch, cancel}) {
+    about_job->add_option("JOB", job_id, "the job's id")->required();
+    add_server(about_job);
+    add_json(about_job);
+    add_quiet(about_job);
+  }
+
+  CLI::App* validate = command("validate", "say what is wrong with a scene",
+                               [&] { return Validate(scene_path, strict, voice); });
+  validate->add_option("SCENE", scene_path, "pbrt-v4 scene file")->required();
+  validate->add_flag("--strict", strict, "warnings are errors");
+  add_json(validate);
+  add_quiet(validate);
+
+  CLI::App* diff = command("diff", "say how far an image is from a reference", [&] {
+    if (crops) metrics.fit = MetricsOptions::Fit::kCrop;
+    if (scales) metrics.fit = MetricsOptions::Fit::kScale;
+    return Diff(image_path, reference_path, mask_path, metrics, voice);
+  });
+  diff->add_option("A", image_path, "EXR file")->required();
+  diff->add_option("B", reference_path, "EXR file to compare with")->required();
+  CLI::Option* crop = diff->add_flag("--crop", crops, "compare the common top-left part");
+  diff->add_flag("--scale", scales, "average both to the smaller size")->excludes(crop);
+  diff->add_option("--clip", metrics.clip, "clip every channel of both at this value first")
+      ->check(CLI::PositiveNumber);
+  diff->add_option("--trim", metrics.trim_share, "leave out this share of the worst pixels");
+  diff->add_option("--mask", mask_path, "EXR file; pixels that are 0 in it are left out");
+  add_json(diff);
+
+  CLI::App* digest = command("digest", "print the digest of an image's pixels and settings",
+                             [&] { return PrintDigest(image_path, voice); });
+  digest->add_option("FILE", image_path, "EXR file")->required();
+  add_json(digest);
+
+  CLI::App* png = command("png", "turn an EXR file into a PNG file",
+                          [&] { return ConvertToPng(image_path, png_path, exposure_stops); });
+  png->add_option("FILE", image_path, "EXR file")->required();
+  png->add_option("OUT", png_path, "PNG file to write")->required();
+  png->add_option("--exposure", exposure_stops, "brighter by so many stops");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    // Help is asked for by an exception too, with code 0.
+    return End(app.exit(error) == 0 ? ExitCode::kDone : ExitCode::kUsage);
+  }
+  const bool needs_output = (*render && request.outputs.empty()) || (*fetch && fetched.empty());
+  if (needs_output) {
+    std::fputs("lucerna: say where the image goes, with -o FILE.exr or --png FILE.png\n", stderr);
+    return End(ExitCode::kUsage);
+  }
+
+  CatchInterruptions();
+  Status status = chosen();
+  if (std::fflush(stdout) != 0 && status.ok()) {
+    status = absl::ResourceExhaustedError("cannot write to the standard output");
+  }
+  if (!status.ok()) {
+    std::fprintf(stderr, "lucerna: %s\n", std::string(status.message()).c_str());
+  }
+  return End(ExitCodeOf(status));
+}
+
+}  // namespace
+}  // namespace lucerna
+
+int main(int argc, char** argv) {
+  return lucerna::Run(argc, argv);
+}

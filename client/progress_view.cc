@@ -1,0 +1,181 @@
+#include "client/progress_view.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "absl/strings/str_format.h"
+
+#include "render/wire/messages.h"
+
+namespace lucerna {
+namespace {
+
+constexpr Duration kPlainLineEvery = std::chrono::seconds(2);
+
+double PhotonsInAll(const v1::RenderSettings& settings) {
+  return static_cast<double>(settings.passes()) * static_cast<double>(settings.photons_per_pass());
+}
+
+std::string Bar(double share) {
+  constexpr int kWidth = 20;
+  const int full = static_cast<int>(share * kWidth);
+  return absl::StrCat("[", std::string(static_cast<std::size_t>(full), '#'),
+                      std::string(static_cast<std::size_t>(kWidth - full), '-'), "]");
+}
+
+std::string Passes(const v1::Job& job) {
+  const std::int64_t passes = job.progress().passes();
+  const std::int64_t wanted = job.settings().passes();
+  return wanted > 0 ? absl::StrCat("pass ", passes, "/", wanted) : absl::StrCat("pass ", passes);
+}
+
+std::string WithoutPrefix(const std::string& name, const std::string& prefix) {
+  return name.starts_with(prefix) ? name.substr(prefix.size()) : name;
+}
+
+}  // namespace
+
+std::string ShortCount(double count) {
+  constexpr std::array<const char*, 5> kUnits = {"", " k", " M", " G", " T"};
+  std::size_t unit = 0;
+  // 999.5 would be printed as "1e+03".
+  while (count >= 999.5 && unit + 1 < kUnits.size()) {
+    count /= 1000;
+    ++unit;
+  }
+  if (unit == 0) return absl::StrFormat("%.0f", count);
+  const int decimals = count < 9.995 ? 2 : count < 99.95 ? 1 : 0;
+  return absl::StrFormat("%.*f%s", decimals, count, kUnits[unit]);
+}
+
+std::string ShortTime(Duration duration) {
+  const double seconds = Seconds(duration);
+  if (seconds < 9.995) return absl::StrFormat("%.2f s", seconds);
+  if (seconds < 59.95) return absl::StrFormat("%.1f s", seconds);
+  const auto whole = static_cast<std::int64_t>(std::llround(seconds));
+  if (whole < 3600) return absl::StrFormat("%d:%02d", whole / 60, whole % 60);
+  return absl::StrFormat("%d:%02d:%02d", whole / 3600, whole / 60 % 60, whole % 60);
+}
+
+std::string NameOf(v1::JobState state) {
+  return WithoutPrefix(v1::JobState_Name(state), "JOB_STATE_");
+}
+
+std::string NameOf(v1::StopReason reason) {
+  return WithoutPrefix(v1::StopReason_Name(reason), "STOP_REASON_");
+}
+
+bool HasEnded(v1::JobState state) {
+  return state == v1::JOB_STATE_SUCCEEDED || state == v1::JOB_STATE_CANCELLED ||
+         state == v1::JOB_STATE_FAILED;
+}
+
+std::optional<double> ShareDone(const v1::Job& job) {
+  if (job.state() == v1::JOB_STATE_SUCCEEDED) return 1.0;
+  if (!job.has_settings()) return std::nullopt;
+  double share = 0;
+  if (job.settings().time_s() > 0) {
+    share = Seconds(FromProto(job.progress().running())) / job.settings().time_s();
+  }
+  if (PhotonsInAll(job.settings()) > 0) {
+    share = std::max(share,
+                     static_cast<double>(job.progress().photons()) / PhotonsInAll(job.settings()));
+  }
+  return std::clamp(share, 0.0, 1.0);
+}
+
+std::optional<Duration> TimeLeft(const v1::Job& job) {
+  if (job.state() != v1::JOB_STATE_RUNNING) return std::nullopt;
+  std::optional<double> left_s;
+  if (job.settings().time_s() > 0) {
+    left_s = job.settings().time_s() - Seconds(FromProto(job.progress().running()));
+  }
+  const double rate = job.progress().photons_per_second();
+  if (PhotonsInAll(job.settings()) > 0 && rate > 0) {
+    const double photons =
+        PhotonsInAll(job.settings()) - static_cast<double>(job.progress().photons());
+    left_s = left_s ? std::min(*left_s, photons / rate) : photons / rate;
+  }
+  if (!left_s) return std::nullopt;
+  // A rate near zero must not overflow the clock: ten years are as good as for ever.
+  constexpr double kLongest = 10.0 * 365 * 86400;
+  return std::chrono::duration_cast<Duration>(
+      std::chrono::duration<double>(std::clamp(*left_s, 0.0, kLongest)));
+}
+
+std::string ProgressLine(const v1::Job& job) {
+  switch (job.state()) {
+    case v1::JOB_STATE_QUEUED:
+      return "queued";
+    case v1::JOB_STATE_PREPARING:
+      return "reading the scene";
+    case v1::JOB_STATE_SUCCEEDED:
+    case v1::JOB_STATE_CANCELLED:
+    case v1::JOB_STATE_FAILED:
+      return SummaryLine(job);
+    default:
+      break;
+  }
+  const double share = ShareDone(job).value_or(0);
+  std::string line =
+      absl::StrFormat("%s %3.0f %%  %s  %s photons", Bar(share), std::floor(100 * share),
+                      Passes(job), ShortCount(static_cast<double>(job.progress().photons())));
+  if (job.no_workers()) return line + "  no worker is connected; waiting for one";
+  absl::StrAppendFormat(&line, "  %s/s  %s", ShortCount(job.progress().photons_per_second()),
+                        ShortTime(FromProto(job.progress().running())));
+  if (const auto left = TimeLeft(job)) absl::StrAppend(&line, "  ETA ", ShortTime(*left));
+  return line;
+}
+
+std::string SummaryLine(const v1::Job& job) {
+  const v1::Progress& progress = job.progress();
+  const Duration running = FromProto(progress.running());
+  std::string line =
+      absl::StrFormat("%d passes, %s photons in %s", progress.passes(),
+                      ShortCount(static_cast<double>(progress.photons())), ShortTime(running));
+  switch (job.state()) {
+    case v1::JOB_STATE_SUCCEEDED:
+      return line + (job.stop_reason() == v1::STOP_REASON_TIME ? ", stopped by its time limit"
+                                                               : ", all passes done");
+    case v1::JOB_STATE_CANCELLED:
+      return line + ", cancelled";
+    case v1::JOB_STATE_FAILED:
+      return line + ", failed: " + job.failure();
+    default:
+      return line;
+  }
+}
+
+std::string TableHead() {
+  return absl::StrFormat("%-24s %-10s %6s %10s %9s  %s", "JOB", "STATE", "PASSES", "PHOTONS",
+                         "TIME", "NAME");
+}
+
+std::string TableLine(const v1::Job& job) {
+  return absl::StrFormat("%-24s %-10s %6d %10s %9s  %s", job.job_id(), NameOf(job.state()),
+                         job.progress().passes(),
+                         ShortCount(static_cast<double>(job.progress().photons())),
+                         ShortTime(FromProto(job.progress().running())), job.name());
+}
+
+std::string ProgressPrinter::Update(const v1::Job& job, SteadyTime now) {
+  const std::string line = ProgressLine(job);
+  if (line == last_line_) return {};
+  const bool is_due = job.state() != last_state_ || !last_written_.has_value() ||
+                      now - *last_written_ >= kPlainLineEvery;
+  if (!redraws_ && !is_due) return {};
+  last_line_ = line;
+  last_written_ = now;
+  last_state_ = job.state();
+  // To the beginning of the line, and away with what is left of a longer one.
+  return redraws_ ? absl::StrCat("\r", line, "\x1b[K") : absl::StrCat(line, "\n");
+}
+
+std::string ProgressPrinter::Finish() {
+  const bool has_open_line = redraws_ && !last_line_.empty();
+  last_line_.clear();
+  return has_open_line ? "\n" : "";
+}
+
+}  // namespace lucerna

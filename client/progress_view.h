@@ -1,0 +1,63 @@
+// How does a job's progress read?
+//
+// Pure: a Job and a time in, text out. Redrawn in place on a terminal; elsewhere plain lines, few
+// enough to be kept in a log.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "proto/lucerna/v1/jobs.pb.h"
+#include "render/base/clock.h"
+
+namespace lucerna {
+
+// "13.9 M", "512", "2.05 k".
+[[nodiscard]] std::string ShortCount(double count);
+
+// "0.35 s", "12.5 s", "4:05", "1:02:03".
+[[nodiscard]] std::string ShortTime(Duration duration);
+
+// "RUNNING", "PASSES": the names of the protocol without their prefix.
+[[nodiscard]] std::string NameOf(v1::JobState state);
+[[nodiscard]] std::string NameOf(v1::StopReason reason);
+
+[[nodiscard]] bool HasEnded(v1::JobState state);
+
+// How much of the job is done, in [0, 1], by photons or by time, whichever stops it first; absent
+// before the job runs.
+[[nodiscard]] std::optional<double> ShareDone(const v1::Job& job);
+
+// How long until it stops at the rate of the last seconds; absent when nothing tells.
+[[nodiscard]] std::optional<Duration> TimeLeft(const v1::Job& job);
+
+// One line without its end: "[#####-----]  50 %  pass 8/16  4.2 M photons  1.1 M/s  4.1 s  ETA 4
+// s".
+[[nodiscard]] std::string ProgressLine(const v1::Job& job);
+
+// One line without its end, about a job that has ended.
+[[nodiscard]] std::string SummaryLine(const v1::Job& job);
+
+// The job on one line of a table; TableHead is the line above.
+[[nodiscard]] std::string TableHead();
+[[nodiscard]] std::string TableLine(const v1::Job& job);
+
+// What to write as a job moves on.
+class ProgressPrinter {
+ public:
+  // redraws: the lines go to a terminal and replace one another.
+  explicit ProgressPrinter(bool redraws) : redraws_(redraws) {}
+
+  // What to write now; often nothing.
+  [[nodiscard]] std::string Update(const v1::Job& job, SteadyTime now);
+  // What to write before anything else is written.
+  [[nodiscard]] std::string Finish();
+
+ private:
+  bool redraws_;
+  std::string last_line_;
+  std::optional<SteadyTime> last_written_;
+  v1::JobState last_state_ = v1::JOB_STATE_UNSPECIFIED;
+};
+
+}  // namespace lucerna

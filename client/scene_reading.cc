@@ -1,0 +1,39 @@
+#include "client/scene_reading.h"
+
+#include <cstdio>
+
+#include "client/exit_code.h"
+
+namespace lucerna {
+
+ScenePath SplitScenePath(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  if (slash == std::string::npos) return {".", path};
+  return {slash == 0 ? "/" : path.substr(0, slash), path.substr(slash + 1)};
+}
+
+StatusOr<SceneManifest> ReadScene(const std::string& path, const RenderOverrides& overrides,
+                                  bool quiet) {
+  const ScenePath place = SplitScenePath(path);
+  DirectoryFiles files(place.folder);
+  const ParsedScene parsed = ParsePbrt(files, place.main);
+  std::size_t errors = 0;
+  for (const Diagnostic& diagnostic : parsed.diagnostics) {
+    const bool is_error = diagnostic.severity == Diagnostic::Severity::kError;
+    errors += is_error ? 1 : 0;
+    if (!is_error && (quiet || diagnostic.severity == Diagnostic::Severity::kNote)) continue;
+    std::fprintf(stderr, "%s\n", diagnostic.ToString().c_str());
+  }
+  if (!parsed.ok()) {
+    return absl::InvalidArgumentError(absl::StrCat(path, " has ", errors,
+                                                   errors == 1 ? " error" : " errors",
+                                                   "; correct the scene and try again"));
+  }
+  const auto settings = ResolveSettings(overrides, parsed.scene);
+  if (!settings.ok()) {
+    return Failure(ExitCode::kUsage, std::string(settings.status().message()));
+  }
+  return files.Manifest(place.main);
+}
+
+}  // namespace lucerna

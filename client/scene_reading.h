@@ -1,0 +1,28 @@
+// What is the scene on the user's disk, and what is wrong with it?
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "client/render_flags.h"
+#include "render/scene/pbrt_parser.h"
+#include "render/scene/scene_files.h"
+
+namespace lucerna {
+
+// Where a scene lies.
+struct ScenePath {
+  std::string folder;  // "." when the path names none
+  std::string main;    // the main file's name in it
+};
+
+[[nodiscard]] ScenePath SplitScenePath(const std::string& path);
+
+// Parses the scene here, so that its errors come before anything is started or sent, and writes
+// every error and warning to stderr (warnings not when `quiet`). Also checks the flags against the
+// scene. Returns its manifest.
+// Errors: INVALID_ARGUMENT when the scene has errors, Failure(kUsage) for a flag out of range.
+[[nodiscard]] StatusOr<SceneManifest> ReadScene(const std::string& path,
+                                                const RenderOverrides& overrides, bool quiet);
+
+}  // namespace lucerna

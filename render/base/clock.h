@@ -1,0 +1,34 @@
+// What time is it?
+//
+// The only file that asks the machine for the time. Everything that decides by time takes a
+// Clock, so that a test can set it to the nanosecond.
+#pragma once
+
+#include <chrono>
+
+namespace lucerna {
+
+using Duration = std::chrono::nanoseconds;
+// A moment on the steady clock, which no administrator can turn back.
+using SteadyTime = std::chrono::time_point<std::chrono::steady_clock, Duration>;
+// A moment on the calendar, for people to read.
+using WallTime = std::chrono::time_point<std::chrono::system_clock, Duration>;
+
+[[nodiscard]] inline double Seconds(Duration duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+class Clock {
+ public:
+  virtual ~Clock() = default;
+  [[nodiscard]] virtual SteadyTime Steady() const = 0;
+  [[nodiscard]] virtual WallTime Wall() const = 0;
+};
+
+// The machine's own clock. Threads: any.
+[[nodiscard]] const Clock& SystemClock();
+
+// Processor time used so far by this process, all threads together.
+[[nodiscard]] Duration ProcessCpuTime();
+
+}  // namespace lucerna

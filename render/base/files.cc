@@ -1,0 +1,153 @@
+#include "render/base/files.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace lucerna {
+namespace {
+
+Status FromErrno(int error, const std::string& path, const char* doing) {
+  const std::string message = absl::StrCat(path, ": ", doing, ": ", std::strerror(error));
+  switch (error) {
+    case ENOENT:
+    case ENOTDIR:
+      return absl::NotFoundError(message);
+    case EACCES:
+    case EPERM:
+    case EROFS:
+      return absl::PermissionDeniedError(message);
+    case ENOSPC:
+    case EDQUOT:
+    case EFBIG:
+      return absl::ResourceExhaustedError(message);
+    case EISDIR:
+    case EINVAL:
+      return absl::InvalidArgumentError(message);
+    default:
+      return absl::UnavailableError(message);
+  }
+}
+
+// An open descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int number) : number_(number) {}
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  [[nodiscard]] int number() const { return number_; }
+  // Closing can be the call that reports a full disk.
+  [[nodiscard]] int Close() { return ::close(std::exchange(number_, -1)); }
+
+ private:
+  int number_;
+};
+
+std::string FolderOf(const std::string& path) {
+  const std::size_t slash = path.rfind('/');
+  if (slash == std::string::npos) return ".";
+  return slash == 0 ? "/" : path.substr(0, slash);
+}
+
+// Two writers of one path in one process do not share a temporary name.
+std::string TemporaryBeside(const std::string& path) {
+  static std::atomic<unsigned> serial = 0;
+  return absl::StrCat(path, ".", ::getpid(), ".", serial++, ".tmp");
+}
+
+Status WriteAll(int descriptor, std::string_view bytes, const std::string& path) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0) {
+      if (errno == EINTR) continue;
+      return FromErrno(errno, path, "cannot write");
+    }
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  if (::fsync(descriptor) != 0) return FromErrno(errno, path, "cannot write");
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+StatusOr<std::string> ReadFile(const std::string& path, std::uint64_t max_size_bytes) {
+  // Not blocking, so that a pipe in place of a file is refused below instead of waited for.
+  Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (file.number() < 0) return FromErrno(errno, path, "cannot open");
+  struct stat status {};
+  if (::fstat(file.number(), &status) != 0) return FromErrno(errno, path, "cannot read");
+  if (!S_ISREG(status.st_mode)) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ": not a regular file"));
+  }
+  const auto size = static_cast<std::uint64_t>(status.st_size);
+  if (size > max_size_bytes) {
+    return absl::ResourceExhaustedError(absl::StrCat(path, ": ", size, " bytes, more than the ",
+                                                     max_size_bytes, " that are allowed"));
+  }
+  std::string bytes(size, '\0');
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t got = ::read(file.number(), bytes.data() + done, bytes.size() - done);
+    if (got < 0) {
+      if (errno == EINTR) continue;
+      return FromErrno(errno, path, "cannot read");
+    }
+    if (got == 0) break;
+    done += static_cast<std::size_t>(got);
+  }
+  bytes.resize(done);
+  return bytes;
+}
+
+Status WriteFile(const std::string& path, std::string_view bytes) {
+  // A device or a pipe cannot be replaced by a rename; it takes the bytes as they come.
+  struct stat existing {};
+  if (::stat(path.c_str(), &existing) == 0 && !S_ISREG(existing.st_mode)) {
+    Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+    if (device.number() < 0) return FromErrno(errno, path, "cannot open");
+    while (!bytes.empty()) {
+      const ssize_t written = ::write(device.number(), bytes.data(), bytes.size());
+      if (written < 0) return FromErrno(errno, path, "cannot write");
+      bytes.remove_prefix(static_cast<std::size_t>(written));
+    }
+    return absl::OkStatus();
+  }
+
+  const std::string temporary = TemporaryBeside(path);
+  Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (file.number() < 0) return FromErrno(errno, path, "cannot create");
+  Status status = WriteAll(file.number(), bytes, path);
+  if (file.Close() != 0 && status.ok()) status = FromErrno(errno, path, "cannot write");
+  if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
+    status = FromErrno(errno, path, "cannot replace");
+  }
+  if (!status.ok()) {
+    ::unlink(temporary.c_str());
+    return status;
+  }
+  // The rename itself is on the disk only when the folder is.
+  Descriptor folder(::open(FolderOf(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (folder.number() >= 0) ::fsync(folder.number());
+  return absl::OkStatus();
+}
+
+Status CheckWritable(const std::string& path) {
+  struct stat existing {};
+  if (::stat(path.c_str(), &existing) == 0) {
+    if (S_ISDIR(existing.st_mode)) return FromErrno(EISDIR, path, "cannot write");
+    if (!S_ISREG(existing.st_mode)) return absl::OkStatus();
+  }
+  const std::string folder = FolderOf(path);
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) return FromErrno(errno, path, "cannot create");
+  return absl::OkStatus();
+}
+
+}  // namespace lucerna

@@ -1,0 +1,28 @@
+// How do bytes get from a disk and onto it?
+//
+// The only file that opens a file to write. A file is written whole or not at all: a reader sees
+// the old bytes or the new ones, also after a crash or on a full disk.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "render/base/status.h"
+
+namespace lucerna {
+
+// The bytes of the regular file at `path`.
+// Errors: NOT_FOUND, PERMISSION_DENIED, INVALID_ARGUMENT for a folder, RESOURCE_EXHAUSTED when it
+// has more than `max_size_bytes`; each message begins with the path.
+[[nodiscard]] StatusOr<std::string> ReadFile(const std::string& path,
+                                             std::uint64_t max_size_bytes = std::uint64_t{8} << 30);
+
+// Writes `bytes` beside `path`, syncs them, and renames them over it.
+// Errors: what the system said, with the path; then no file of ours is left behind.
+[[nodiscard]] Status WriteFile(const std::string& path, std::string_view bytes);
+
+// Errors: as WriteFile would fail at `path`, found out before hours of rendering.
+[[nodiscard]] Status CheckWritable(const std::string& path);
+
+}  // namespace lucerna

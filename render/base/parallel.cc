@@ -1,0 +1,65 @@
+#include "render/base/parallel.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+#include <xmmintrin.h>
+
+#include <algorithm>
+#include <thread>
+
+namespace lucerna {
+namespace {
+
+// Flush-to-zero and denormals-are-zero for as long as it lives; a thread lent by someone else
+// gets its own mode back.
+class FlushDenormals {
+ public:
+  FlushDenormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040U); }
+  ~FlushDenormals() { _mm_setcsr(saved_); }
+  FlushDenormals(const FlushDenormals&) = delete;
+  FlushDenormals& operator=(const FlushDenormals&) = delete;
+
+ private:
+  unsigned int saved_;
+};
+
+int ThreadsOrAll(int threads) {
+  if (threads > 0) return threads;
+  return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+}
+
+}  // namespace
+
+struct ThreadTeam::State {
+  explicit State(int threads) : arena(threads) {}
+  tbb::task_arena arena;
+};
+
+ThreadTeam::ThreadTeam(int threads)
+    : threads_(ThreadsOrAll(threads)), state_(std::make_unique<State>(threads_)) {}
+
+ThreadTeam::~ThreadTeam() = default;
+
+void ThreadTeam::For(std::size_t count, std::size_t grain,
+                     const std::function<void(std::size_t, std::size_t)>& body) {
+  if (count == 0) return;
+  if (threads_ == 1) {
+    const FlushDenormals flush;
+    for (std::size_t begin = 0; begin < count; begin += grain) {
+      body(begin, std::min(count, begin + grain));
+    }
+    return;
+  }
+  state_->arena.execute([&] {
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, count, grain),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          const FlushDenormals flush;
+          body(range.begin(), range.end());
+        },
+        tbb::simple_partitioner());
+  });
+}
+
+}  // namespace lucerna

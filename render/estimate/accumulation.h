@@ -1,0 +1,70 @@
+// What does one batch of photons add to the hitpoints?
+//
+// A photon count and, per channel, the sum of kernel-weighted flux as a 64-bit fixed-point
+// integer. Every photon's contribution is rounded once (math/fixed_point.h); after that there is
+// only integer addition, so accumulations can be merged, and taken out again, in any order with
+// the same result to the last bit.
+//
+// Sparse: only hitpoints that a photon touched are listed.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "render/base/status.h"
+
+namespace lucerna {
+
+// The books of a batch, for progress and for checking energy. Sums, so they merge like the rest.
+struct BatchTally {
+  std::uint64_t photons = 0;        // photon paths emitted
+  std::uint64_t rays = 0;           // rays traced for them
+  std::uint64_t deposits = 0;       // landings offered to the hitpoints
+  std::uint64_t pairs = 0;          // (photon, hitpoint) contributions
+  std::uint64_t dropped = 0;        // photons given up because a number was not finite
+
+  BatchTally& operator+=(const BatchTally& other);
+  bool operator==(const BatchTally&) const = default;
+};
+
+struct Accumulation {
+  // Rows of the hitpoint block, strictly increasing.
+  std::vector<std::uint32_t> hitpoints;
+  std::vector<std::uint32_t> counts;                  // [hitpoints] photons, each >= 1
+  std::array<std::vector<std::int64_t>, 3> flux;      // [3][hitpoints] in quanta, per channel
+  BatchTally tally;
+
+  [[nodiscard]] std::size_t size() const { return hitpoints.size(); }
+  bool operator==(const Accumulation&) const = default;
+};
+
+// The sum of all batches of one pass, one row per hitpoint of the block.
+class PassSums {
+ public:
+  explicit PassSums(std::size_t hitpoints);
+
+  // Adds every row. All or nothing.
+  // Errors: INVALID_ARGUMENT when the accumulation breaks its own promises or names a hitpoint
+  // that does not exist, OUT_OF_RANGE when a sum would not fit in 64 bits.
+  [[nodiscard]] Status Add(const Accumulation& accumulation);
+  // Takes out exactly what Add put in. Errors: as Add.
+  [[nodiscard]] Status Subtract(const Accumulation& accumulation);
+
+  [[nodiscard]] std::size_t size() const { return counts_.size(); }
+  [[nodiscard]] const std::vector<std::uint64_t>& counts() const { return counts_; }
+  // [hitpoints] in quanta.
+  [[nodiscard]] const std::vector<std::int64_t>& flux(int channel) const {
+    return flux_[static_cast<std::size_t>(channel)];
+  }
+  [[nodiscard]] const BatchTally& tally() const { return tally_; }
+
+ private:
+  [[nodiscard]] Status Check(const Accumulation& accumulation, bool adding) const;
+
+  std::vector<std::uint64_t> counts_;
+  std::array<std::vector<std::int64_t>, 3> flux_;
+  BatchTally tally_;
+};
+
+}  // namespace lucerna

@@ -1,0 +1,46 @@
+// Where do the eye paths of one pass wait for photons?
+//
+// A HitpointBlock is what the workers need to know of one pass's hitpoints, as columns: position
+// and normal for all, and for glossy ones the direction to the eye and the material. A diffuse
+// hitpoint travels without a BSDF: the worker adds up irradiance and the coordinator multiplies
+// by albedo/π and the path's weight. Radii are a column of their own (RadiusColumn), because they
+// become known later than the hitpoints do.
+//
+// Which pixel a hitpoint belongs to is the coordinator's secret; a worker does not need it.
+//
+// Invariants
+//   H1  All columns that are present have `size()` rows; glossy columns have glossy.size() rows.
+//   H2  Positions are finite; normals are unit length up to the 2 × 16 bit octahedral rounding.
+//   H3  Glossy rows are in increasing order of hitpoint.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render/math/vector.h"
+
+namespace lucerna {
+
+// One glossy hitpoint: photons count by the BSDF towards `to_eye`.
+struct GlossyHitpoint {
+  std::uint32_t hitpoint = 0;   // row in the block
+  std::uint32_t material = 0;   // index into Scene::materials
+  std::uint32_t to_eye_oct = 0;  // direction to the eye, octahedral
+  std::uint32_t shading_normal_oct = 0;
+
+  bool operator==(const GlossyHitpoint&) const = default;
+};
+
+struct HitpointBlock {
+  std::vector<Vec3> positions;             // [hitpoints]
+  std::vector<std::uint32_t> normals_oct;  // [hitpoints] geometric, on the eye's side
+  std::vector<GlossyHitpoint> glossy;      // [glossy hitpoints]
+
+  [[nodiscard]] std::size_t size() const { return positions.size(); }
+  bool operator==(const HitpointBlock&) const = default;
+};
+
+// The radius of every hitpoint of a pass [scene units]: finite and > 0.
+using RadiusColumn = std::vector<float>;
+
+}  // namespace lucerna

@@ -1,0 +1,68 @@
+// What is known about every pixel after the passes so far?
+//
+// Per pixel: the shared radius and photon count, and sums over passes of radiance densities.
+// Storing the density flux/r² of each pass, rather than flux that is rescaled with every change of
+// radius, makes merging a plain sum and lets radii lag behind (the two are the same number in
+// exact arithmetic).
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/estimate/accumulation.h"
+#include "render/estimate/hitpoint_block.h"
+#include "render/estimate/kernel.h"
+#include "render/estimate/radius_controller.h"
+#include "render/math/fixed_point.h"
+#include "render/math/rgb.h"
+
+namespace lucerna {
+
+// Sums of a colour over passes, in double.
+using RgbSum = std::array<double, 3>;
+
+// The hitpoints of one pass and what belongs to each of them.
+struct HitpointRows {
+  std::span<const std::uint32_t> pixels;   // row -> pixel; a pixel has at most one row
+  std::span<const Rgb> weights;            // from gathered flux density to radiance
+  std::span<const float> unit_radii;       // length of a radius of 1 [scene units]
+};
+
+class PixelStatistics {
+ public:
+  // `initial_radius` in unit radii.
+  PixelStatistics(std::size_t pixels, float initial_radius);
+
+  // The radius of each hitpoint of a pass [scene units], from the statistics as they are now.
+  [[nodiscard]] RadiusColumn Radii(const HitpointRows& rows) const;
+
+  // Takes in the merged photons of a pass that were gathered with `radii`.
+  void AddPhotons(const HitpointRows& rows, const RadiusColumn& radii, const PassSums& sums,
+                  const FluxScale& scale, const Kernel& kernel, std::int64_t photons_per_pass,
+                  const RadiusController& controller);
+
+  [[nodiscard]] std::int64_t passes() const { return passes_; }
+  // Sum over passes of each pass's estimate of photon radiance [pixels].
+  [[nodiscard]] const std::vector<RgbSum>& radiance_sum() const { return radiance_sum_; }
+  // Sum over passes of the squared luminance of those estimates [pixels]: with the sum itself,
+  // the variance of the mean.
+  [[nodiscard]] const std::vector<double>& squared_luminance_sum() const {
+    return squared_luminance_sum_;
+  }
+  // Photons gathered over all passes [pixels].
+  [[nodiscard]] const std::vector<std::uint64_t>& photon_count() const { return photon_count_; }
+  // The radius that the pixel's last hitpoint used [scene units]; 0 before the first.
+  [[nodiscard]] const std::vector<float>& last_radius() const { return last_radius_; }
+
+ private:
+  std::int64_t passes_ = 0;
+  std::vector<PixelRadius> radius_;
+  std::vector<RgbSum> radiance_sum_;
+  std::vector<double> squared_luminance_sum_;
+  std::vector<std::uint64_t> photon_count_;
+  std::vector<float> last_radius_;
+};
+
+}  // namespace lucerna

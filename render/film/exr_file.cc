@@ -1,0 +1,286 @@
+#include "render/film/exr_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfStringAttribute.h>
+
+namespace lucerna {
+namespace {
+
+constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
+// Also bounds the memory of an image with very many channels: 4 GiB.
+constexpr std::uint64_t kMaxSamples = std::uint64_t{1} << 30;
+// No compression of the format puts more lines than this into one block.
+constexpr std::uint64_t kMaxLinesPerBlock = 256;
+constexpr std::size_t kMaxAttributeName = 255;
+
+class MemoryOutput final : public Imf::OStream {
+ public:
+  MemoryOutput() : Imf::OStream("image") {}
+
+  void write(const char bytes[], int count) override {
+    const auto size = static_cast<std::size_t>(count);
+    if (position_ + size > bytes_.size()) bytes_.resize(position_ + size);
+    std::memcpy(bytes_.data() + position_, bytes, size);
+    position_ += size;
+  }
+  std::uint64_t tellp() override { return position_; }
+  // The library goes back once, to fill in the table of block offsets.
+  void seekp(std::uint64_t position) override { position_ = position; }
+
+  [[nodiscard]] std::string Take() { return std::move(bytes_); }
+
+ private:
+  std::string bytes_;
+  std::size_t position_ = 0;
+};
+
+class MemoryInput final : public Imf::IStream {
+ public:
+  explicit MemoryInput(std::string_view bytes) : Imf::IStream("image"), bytes_(bytes) {}
+
+  bool read(char bytes[], int count) override {
+    const auto size = static_cast<std::uint64_t>(std::max(count, 0));
+    if (position_ > bytes_.size() || size > bytes_.size() - position_) {
+      throw std::runtime_error("the file ends too early");
+    }
+    std::memcpy(bytes, bytes_.data() + position_, size);
+    position_ += size;
+    return position_ < bytes_.size();
+  }
+  std::uint64_t tellg() override { return position_; }
+  void seekg(std::uint64_t position) override { position_ = position; }
+
+ private:
+  std::string_view bytes_;
+  std::uint64_t position_ = 0;
+};
+
+// Reads little-endian values off the front of bytes that may end anywhere.
+class HeaderReader {
+ public:
+  explicit HeaderReader(std::string_view bytes) : bytes_(bytes) {}
+
+  [[nodiscard]] std::optional<std::uint32_t> Number() {
+    if (bytes_.size() < 4) return std::nullopt;
+    std::uint32_t value = 0;
+    std::memcpy(&value, bytes_.data(), 4);
+    bytes_.remove_prefix(4);
+    return value;
+  }
+  [[nodiscard]] std::optional<std::string_view> Text() {
+    const std::size_t end = bytes_.substr(0, kMaxAttributeName + 1).find('\0');
+    if (end == std::string_view::npos) return std::nullopt;
+    const std::string_view text = bytes_.substr(0, end);
+    bytes_.remove_prefix(end + 1);
+    return text;
+  }
+  [[nodiscard]] std::optional<std::string_view> Bytes(std::uint64_t size) {
+    if (size > bytes_.size()) return std::nullopt;
+    const std::string_view piece = bytes_.substr(0, size);
+    bytes_.remove_prefix(size);
+    return piece;
+  }
+
+ private:
+  std::string_view bytes_;
+};
+
+struct Extent {
+  std::int64_t width = 0, height = 0;            // [pixels]
+  std::int64_t tile_width = 0, tile_height = 0;  // 0: scanlines
+};
+
+Status Garbage(const std::string& what) {
+  return absl::InvalidArgumentError(absl::StrCat("not a usable EXR file: ", what));
+}
+
+// What the header promises, read before OpenEXR sees the bytes: the library allocates whatever
+// the attribute sizes, the data window and the tile size ask for.
+StatusOr<Extent> CheckHeader(std::string_view bytes) {
+  constexpr std::uint32_t kMagic = 20000630;
+  constexpr std::uint32_t kNotAnImage = 0x800;  // deep pixels
+  constexpr std::uint32_t kMultiPart = 0x1000;
+  HeaderReader reader(bytes);
+  const auto magic = reader.Number();
+  const auto version = reader.Number();
+  if (!magic || !version || *magic != kMagic) return Garbage("it does not begin like one");
+  if ((*version & (kNotAnImage | kMultiPart)) != 0) {
+    return Garbage("deep and multi-part files are not read; save a single flat part");
+  }
+
+  Extent extent;
+  bool has_window = false;
+  for (;;) {
+    const auto name = reader.Text();
+    if (!name) return Garbage("its header is cut off");
+    if (name->empty()) break;
+    const auto type = reader.Text();
+    const auto size = reader.Number();
+    if (!type || !size) return Garbage("its header is cut off");
+    const auto value = reader.Bytes(*size);
+    if (!value)
+      return Garbage(absl::StrCat("its attribute \"", std::string(*name), "\" is cut off"));
+    HeaderReader fields(*value);
+    if (*name == "dataWindow") {
+      std::array<std::int64_t, 4> corners{};  // x0 y0 x1 y1, both ends inside
+      for (std::int64_t& corner : corners) {
+        const auto field = fields.Number();
+        if (!field) return Garbage("its data window is cut off");
+        corner = static_cast<std::int32_t>(*field);
+      }
+      extent.width = corners[2] - corners[0] + 1;
+      extent.height = corners[3] - corners[1] + 1;
+      has_window = true;
+    } else if (*name == "tiles") {
+      const auto tile_width = fields.Number();
+      const auto tile_height = fields.Number();
+      if (!tile_width || !tile_height || *tile_width == 0 || *tile_height == 0) {
+        return Garbage("its tile size is not one");
+      }
+      extent.tile_width = *tile_width;
+      extent.tile_height = *tile_height;
+    }
+  }
+  if (!has_window) return Garbage("it has no data window");
+  if (extent.width <= 0 || extent.height <= 0) return Garbage("its data window is empty");
+  constexpr auto kMaxSide = static_cast<std::int64_t>(kMaxPixels);
+  if (extent.width > kMaxSide || extent.height > kMaxSide / extent.width) {
+    return Garbage(absl::StrCat("it has ", extent.width, " x ", extent.height,
+                                " pixels, more than the 2^28 that are allowed"));
+  }
+  // Every block has eight bytes in the table of offsets; a file too short for its own table is
+  // refused before that table is allocated.
+  const auto width = static_cast<std::uint64_t>(extent.width);
+  const auto height = static_cast<std::uint64_t>(extent.height);
+  std::uint64_t blocks = (height + kMaxLinesPerBlock - 1) / kMaxLinesPerBlock;
+  if (extent.tile_width > 0) {
+    const auto tile_width = static_cast<std::uint64_t>(extent.tile_width);
+    const auto tile_height = static_cast<std::uint64_t>(extent.tile_height);
+    if (tile_width * tile_height > kMaxPixels) return Garbage("its tiles are too large");
+    blocks = ((width + tile_width - 1) / tile_width) * ((height + tile_height - 1) / tile_height);
+  }
+  if (blocks * 8 > bytes.size()) return Garbage("it is too short for its size in pixels");
+  return extent;
+}
+
+}  // namespace
+
+StatusOr<std::string> EncodeExr(const Image& image) {
+  if (image.width <= 0 || image.height <= 0 || image.channels.empty()) {
+    return absl::InvalidArgumentError("an image without pixels cannot be written as EXR");
+  }
+  const auto pixels =
+      static_cast<std::uint64_t>(image.width) * static_cast<std::uint64_t>(image.height);
+  if (pixels > kMaxPixels || pixels * image.channels.size() > kMaxSamples) {
+    return absl::InvalidArgumentError(absl::StrCat("an image of ", image.width, " x ", image.height,
+                                                   " pixels and ", image.channels.size(),
+                                                   " channels is too large for EXR here"));
+  }
+  try {
+    Imf::Header header(image.width, image.height);
+    header.compression() = Imf::ZIP_COMPRESSION;
+    for (const auto& [key, value] : image.metadata) {
+      if (key.empty() || key.size() > kMaxAttributeName || key.find('\0') != std::string::npos) {
+        return absl::InvalidArgumentError(
+            absl::StrCat("\"", key, "\" cannot be the name of an EXR attribute"));
+      }
+      header.insert(key, Imf::StringAttribute(value));
+    }
+
+    Imf::FrameBuffer planes;
+    for (const ImageChannel& channel : image.channels) {
+      LUCERNA_CHECK(channel.pixels.size() == pixels);
+      LUCERNA_CHECK(planes.findSlice(channel.name) == nullptr);
+      header.channels().insert(channel.name, Imf::Channel(Imf::FLOAT));
+      // The library reads through this pointer and never writes; its type is shared with reading.
+      auto* base = reinterpret_cast<char*>(const_cast<float*>(channel.pixels.data()));
+      planes.insert(channel.name,
+                    Imf::Slice(Imf::FLOAT, base, sizeof(float),
+                               sizeof(float) * static_cast<std::size_t>(image.width)));
+    }
+
+    MemoryOutput output;
+    {
+      // Its destructor writes the table of offsets.
+      Imf::OutputFile file(output, header, /*numThreads=*/0);
+      file.setFrameBuffer(planes);
+      file.writePixels(image.height);
+    }
+    return output.Take();
+  } catch (const std::exception& error) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot write as EXR: ", error.what()));
+  }
+}
+
+StatusOr<Image> DecodeExr(std::string_view bytes) {
+  LUCERNA_ASSIGN_OR_RETURN(const Extent extent, CheckHeader(bytes));
+  try {
+    MemoryInput input(bytes);
+    Imf::InputFile file(input, /*numThreads=*/0);
+    const Imf::Header& header = file.header();
+    const auto& window = header.dataWindow();
+    Image image;
+    image.width = window.max.x - window.min.x + 1;
+    image.height = window.max.y - window.min.y + 1;
+    // A header can name its window twice; the library then believes one of them.
+    if (image.width != extent.width || image.height != extent.height) {
+      return Garbage("its data window is ambiguous");
+    }
+
+    for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel) {
+      if (channel.channel().xSampling != 1 || channel.channel().ySampling != 1) {
+        return Garbage(absl::StrCat("its channel \"", channel.name(), "\" is subsampled"));
+      }
+      image.channels.push_back({channel.name(), {}});
+    }
+    const auto width = static_cast<std::size_t>(image.width);
+    const auto height = static_cast<std::size_t>(image.height);
+    if (image.channels.empty()) return Garbage("it has no channels");
+    if (width * height * image.channels.size() > kMaxSamples) {
+      return Garbage(absl::StrCat("it has ", image.channels.size(),
+                                  " channels, too many for its size in pixels"));
+    }
+    for (auto attribute = header.begin(); attribute != header.end(); ++attribute) {
+      const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute.attribute());
+      if (text != nullptr) image.metadata.emplace(attribute.name(), text->value());
+    }
+
+    // Memory grows band by band, as pixels really arrive: a short file that promises a large
+    // image fails before much is allocated. Bands are whole rows of tiles, each read once.
+    const auto tile_height =
+        static_cast<std::size_t>(std::max<std::int64_t>(1, extent.tile_height));
+    const std::size_t band = (kMaxLinesPerBlock + tile_height - 1) / tile_height * tile_height;
+    for (std::size_t first = 0; first < height; first += band) {
+      const std::size_t end = std::min(height, first + band);
+      Imf::FrameBuffer planes;
+      for (ImageChannel& channel : image.channels) {
+        channel.pixels.resize(end * width);
+        planes.insert(channel.name, Imf::Slice::Make(Imf::FLOAT, channel.pixels.data(), window,
+                                                     sizeof(float), sizeof(float) * width));
+      }
+      file.setFrameBuffer(planes);
+      file.readPixels(window.min.y + static_cast<int>(first),
+                      window.min.y + static_cast<int>(end) - 1);
+    }
+    return image;
+  } catch (const std::exception& error) {
+    return Garbage(error.what());
+  }
+}
+
+}  // namespace lucerna

@@ -1,0 +1,21 @@
+// How does an Image become an EXR, and back? The only file that knows OpenEXR.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "render/base/status.h"
+#include "render/film/image.h"
+
+namespace lucerna {
+
+// EXR bytes: scanline, 32-bit float channels, ZIP compression, metadata as string attributes.
+// The same Image gives the same bytes.
+[[nodiscard]] StatusOr<std::string> EncodeExr(const Image& image);
+
+// Reads any scanline or tiled single-part EXR with half, float or uint channels.
+// Errors: INVALID_ARGUMENT when the bytes are not such a file, are truncated, or hold more than
+// 2^28 pixels.
+[[nodiscard]] StatusOr<Image> DecodeExr(std::string_view bytes);
+
+}  // namespace lucerna

@@ -1,0 +1,39 @@
+// What comes out of a render: named layers of pixels and what is known about them.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render/base/digest.h"
+#include "render/base/status.h"
+
+namespace lucerna {
+
+// One channel of pixels. Row 0 is the top of the image.
+struct ImageChannel {
+  std::string name;           // as EXR names it: "R", "direct.G", "N.X", "radius"
+  std::vector<float> pixels;  // [height × width]
+};
+
+// The channels of one picture plus text metadata.
+//
+// Layers that a render has: R G B (beauty, radiance [W·m⁻²·sr⁻¹] times exposure), direct.R/G/B,
+// photons.R/G/B (beauty = direct + photons), albedo.R/G/B, N.X/Y/Z (world), Z (distance from the
+// camera [scene units]; +inf where nothing was hit), radius [scene units], photon_count.
+struct Image {
+  int width = 0, height = 0;           // [pixels]
+  std::vector<ImageChannel> channels;  // sorted by name once written
+  // Keys beginning with "lucerna." are ours. Those beginning with "lucerna.run." tell of one run
+  // (seconds, machine names) and are left out of the digest; all others are in it.
+  std::map<std::string, std::string> metadata;
+
+  // nullptr when there is no such channel.
+  [[nodiscard]] const ImageChannel* Find(std::string_view name) const;
+  // The digest of size, channels and metadata except "lucerna.run.*": equal exactly when two
+  // renders gave the same bits. Does not depend on the order of the channels.
+  [[nodiscard]] Digest PixelDigest() const;
+};
+
+}  // namespace lucerna

@@ -1,0 +1,41 @@
+// How far is one image from another?
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "render/base/status.h"
+#include "render/film/image.h"
+
+namespace lucerna {
+
+struct MetricsOptions {
+  enum class Fit { kExact, kCrop, kScale };
+
+  // kExact: sizes must agree. kCrop: the common top-left part. kScale: both are box-averaged to
+  // the smaller width and height.
+  Fit fit = Fit::kExact;
+  double clip = HUGE_VAL;  // every channel of both images is clipped to this first
+  double epsilon = 0.01;   // of relMSE
+  double trim_share = 0;   // share of the pixels with the largest relative error left out
+  // Pixels whose R (or Y, or first channel) is 0 in it are left out. As large as the comparison;
+  // a larger one is cropped or averaged as the images are.
+  const Image* mask = nullptr;
+};
+
+struct ImageMetrics {
+  std::uint64_t pixels = 0;       // compared
+  double rmse = 0;                // sqrt of the mean over pixels and channels of (a - b)²
+  double rel_mse = 0;             // mean over pixels and channels of (a - b)² / (b² + epsilon)
+  double mean_a = 0, mean_b = 0;  // over pixels and channels
+  double mean_ratio = 0;          // mean_a / mean_b
+  std::array<double, 3> channel_mean_ratio{};
+};
+
+// Compares R, G, B of `image` with those of `reference`.
+// Errors: INVALID_ARGUMENT for missing channels, sizes that do not fit, or non-finite pixels.
+[[nodiscard]] StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
+                                             const MetricsOptions& options = {});
+
+}  // namespace lucerna

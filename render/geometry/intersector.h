@@ -1,0 +1,82 @@
+// What does a ray meet first? The only floor that knows Embree.
+//
+// Triangles are Embree's; spheres and disks are exact (solved in double, never tessellated). The
+// instruction set is pinned, and only single rays are traced, so that equal rays have equal hits
+// in every process of one numeric profile.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "render/base/status.h"
+#include "render/math/vector.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+struct Ray {
+  Vec3 origin;
+  Vec3 direction;  // unit
+  float t_max = HUGE_VALF;
+};
+
+// Geometry numbers: meshes in scene order, then one for all spheres, then one for all disks.
+struct Hit {
+  float t = 0;
+  float u = 0, v = 0;  // barycentric, of the triangle's second and third corner
+  std::uint32_t geometry = 0;
+  std::uint32_t primitive = 0;  // triangle, sphere or disk
+};
+
+// A point on a surface, ready for scattering.
+struct SurfacePoint {
+  Vec3 position;
+  Vec3 geometric_normal;  // unit, outward
+  Vec3 shading_normal;    // unit, in the hemisphere of the geometric one
+  std::uint32_t material = 0;
+  std::int32_t area_light = kNoAreaLight;
+  std::uint32_t geometry = 0, primitive = 0;
+  // How far off the surface `position` may lie from rounding [scene units]; rays leave from a
+  // point so far off that they do not meet the surface again.
+  float clearance = 0;
+  bool has_shading_normal = false;  // the two normals may differ
+};
+
+class Intersector {
+ public:
+  // Keeps a reference to `scene`, which must outlive it and not change.
+  // Errors: RESOURCE_EXHAUSTED or INTERNAL with Embree's words.
+  [[nodiscard]] static StatusOr<std::unique_ptr<Intersector>> Create(const Scene& scene);
+  ~Intersector();
+  Intersector(const Intersector&) = delete;
+  Intersector& operator=(const Intersector&) = delete;
+
+  // True and `hit` when something is met before ray.t_max. Threads: any.
+  [[nodiscard]] bool Intersect(const Ray& ray, Hit& hit) const;
+  // True when anything is met before ray.t_max. Threads: any.
+  [[nodiscard]] bool Occluded(const Ray& ray) const;
+
+  [[nodiscard]] SurfacePoint SurfaceAt(const Ray& ray, const Hit& hit) const;
+
+  [[nodiscard]] const Bounds& bounds() const { return bounds_; }
+  [[nodiscard]] std::uint32_t sphere_geometry() const { return sphere_geometry_; }
+  [[nodiscard]] std::uint32_t disk_geometry() const { return sphere_geometry_ + 1; }
+
+ private:
+  explicit Intersector(const Scene& scene);
+  struct EmbreeScene;
+
+  const Scene& scene_;
+  std::unique_ptr<EmbreeScene> embree_;
+  std::uint32_t sphere_geometry_;
+  Bounds bounds_;
+};
+
+// Where a ray that leaves `point` towards `direction` starts.
+[[nodiscard]] inline Vec3 LeavingPoint(const SurfacePoint& point, Vec3 direction) {
+  const float side = Dot(direction, point.geometric_normal) < 0 ? -1.0F : 1.0F;
+  return point.position + point.geometric_normal * (side * point.clearance);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,48 @@
+// How is a photon's contribution rounded to an integer?
+//
+// A contribution is counted in quanta. The quantum of a channel is a power of two, about 2^-18 of
+// the power that the whole scene emits in it: a photon carries about that power, so its
+// contribution has 18 bits and a sum has room for 2^44 of them.
+//
+// Rounding is up or down at random with the odds that make it exact on average, by random bits
+// that belong to the (photon, hitpoint) pair. So a channel in which a photon carries far less
+// than a quantum still adds up right, and no sum is biased, however many terms it has.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "render/math/rgb.h"
+
+namespace lucerna {
+
+inline constexpr int kFluxBits = 18;
+
+// 2^-kFluxBits times the smallest power of two that is >= `power` [W]; for no power at all, 1.
+[[nodiscard]] inline float QuantumFor(float power_w) {
+  if (!(power_w > 0)) return 1;
+  int exponent = 0;
+  const float mantissa = std::frexp(power_w, &exponent);  // in [0.5, 1)
+  return std::ldexp(1.0F, (mantissa == 0.5F ? exponent - 1 : exponent) - kFluxBits);
+}
+
+// Quanta per watt, and back, per channel. Both are exact powers of two.
+struct FluxScale {
+  Rgb quanta_per_watt;
+  Rgb watts_per_quantum;
+
+  [[nodiscard]] static FluxScale ForPower(Rgb power_w) {
+    const Rgb quantum = {QuantumFor(power_w.r), QuantumFor(power_w.g), QuantumFor(power_w.b)};
+    return {{1 / quantum.r, 1 / quantum.g, 1 / quantum.b}, quantum};
+  }
+};
+
+// `value` (in quanta, >= 0, < 2^62) rounded with 21 random bits `dither` in [0, 2^21).
+[[nodiscard]] inline std::int64_t RoundDithered(float value, std::uint32_t dither) {
+  // value + dither can lose the dither's bits when value is large: rounding is then to nearest,
+  // a relative error of 2^-24.
+  const float offset = static_cast<float>(dither) * 0x1p-21F;
+  return static_cast<std::int64_t>(value + offset);
+}
+
+}  // namespace lucerna

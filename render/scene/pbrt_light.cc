@@ -1,0 +1,133 @@
+// What light do a type and its parameters describe?
+//
+// Units are pbrt-v4's: an rgb is radiance, intensity or irradiance as it stands; power and
+// illuminance set the luminance that a colour of luminance 1 and a scale of 1 would have.
+#include <cmath>
+#include <numbers>
+
+#include "render/scene/scene_builder.h"
+
+namespace lucerna {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+// S1: colours are finite, also after scaling.
+Rgb Scaled(ParameterList& parameters, Rgb color, double scale) {
+  const Rgb scaled = color * static_cast<float>(scale);
+  if (IsFinite(scaled)) return scaled;
+  parameters.Error("is too bright for single precision");
+  return {};
+}
+
+Vec3 FinitePoint(ParameterList& parameters, const Transform& to_world, Vec3 point) {
+  const Vec3 world = to_world.Point(point);
+  if (IsFinite(world)) return world;
+  parameters.Error("is moved out of the finite numbers by its transform");
+  return {};
+}
+
+// The unit direction from `from` to `to`.
+Vec3 Direction(ParameterList& parameters, const Transform& to_world, Vec3 from, Vec3 to) {
+  // Scaled to about unit length before squaring, which could overflow or vanish.
+  const Vec3 local = to - from;
+  const float local_size = MaxAbs(local);
+  if (local_size > 0 && std::isfinite(local_size)) {
+    const Vec3 world = to_world.Vector(local / local_size);
+    const float size = MaxAbs(world);
+    if (size > 0 && std::isfinite(size)) return Normalize(world / size);
+  }
+  parameters.Error("has no direction: \"from\" and \"to\" are the same, or too far apart");
+  return {0, 0, 1};
+}
+
+}  // namespace
+
+AreaEmission MakeAreaEmission(std::string_view type, ParameterList& parameters) {
+  AreaEmission emission;
+  if (type != "diffuse") {
+    parameters.Error("is not supported; there is diffuse");
+    return emission;
+  }
+  if (parameters.Has("filename")) {
+    parameters.Error("filename", "is not supported: give L, the colour of the light");
+    parameters.Ignore("filename");
+  }
+  const Rgb color = parameters.FindEmission("L").value_or(Gray(1));
+  emission.radiance = Scaled(parameters, color, parameters.Float("scale", 1, kZeroOrMore));
+  emission.two_sided = parameters.Bool("twosided", false);
+  const double power_w = parameters.Float("power", -1);
+  if (power_w > 0) emission.power_w = power_w;
+  parameters.WarnOfUnread();
+  return emission;
+}
+
+AreaLight MakeAreaLight(const AreaEmission& emission, double area_m2) {
+  AreaLight light = {emission.radiance, emission.two_sided};
+  if (emission.power_w.has_value()) {
+    const double sides = emission.two_sided ? 2 : 1;
+    light.radiance *= static_cast<float>(*emission.power_w / (sides * kPi * area_m2));
+  }
+  return light;
+}
+
+void AddLight(std::string_view type, ParameterList& parameters, const Transform& to_world,
+              Scene& scene) {
+  if (type == "point" || type == "spot") {
+    const Rgb color = parameters.FindEmission("I").value_or(Gray(1));
+    double scale = parameters.Float("scale", 1, kZeroOrMore);
+    const double power_w = parameters.Float("power", -1);
+    const Vec3 from = parameters.Point("from", {0, 0, 0});
+    if (type == "point") {
+      if (power_w > 0) scale *= power_w / (4 * kPi);
+      scene.point_lights.push_back(
+          {FinitePoint(parameters, to_world, from), Scaled(parameters, color, scale)});
+    } else {
+      const Vec3 to = parameters.Point("to", {0, 0, 1});
+      const double width_deg = parameters.Float("coneangle", 30, {0, 180, false});
+      const double falloff_deg = parameters.Float("conedeltaangle", 5, {0, 180});
+      if (falloff_deg > width_deg) parameters.Error("conedeltaangle", "is wider than coneangle");
+      SpotLight light;
+      const double cos_width = std::cos(width_deg * kPi / 180);
+      const double cos_start = std::cos((width_deg - falloff_deg) * kPi / 180);
+      if (power_w > 0) {
+        // The integral of the smoothstep over its part of the cone is half of the part.
+        scale *= power_w / (2 * kPi * ((1 - cos_start) + (cos_start - cos_width) / 2));
+      }
+      light.cos_total_width = static_cast<float>(cos_width);
+      light.cos_falloff_start = static_cast<float>(cos_start);
+      light.position = FinitePoint(parameters, to_world, from);
+      light.direction = Direction(parameters, to_world, from, to);
+      light.intensity = Scaled(parameters, color, scale);
+      scene.spot_lights.push_back(light);
+    }
+  } else if (type == "distant") {
+    const Rgb color = parameters.FindEmission("L").value_or(Gray(1));
+    double scale = parameters.Float("scale", 1, kZeroOrMore);
+    const double illuminance = parameters.Float("illuminance", -1);
+    if (illuminance > 0) scale *= illuminance;
+    const Vec3 from = parameters.Point("from", {0, 0, 0});
+    const Vec3 to = parameters.Point("to", {0, 0, 1});
+    scene.distant_lights.push_back(
+        {Direction(parameters, to_world, from, to), Scaled(parameters, color, scale)});
+  } else if (type == "infinite") {
+    if (parameters.Has("filename") || parameters.Has("portal")) {
+      const std::string_view name = parameters.Has("filename") ? "filename" : "portal";
+      parameters.Error(name, "is not supported: only an infinite light of constant L is");
+      parameters.Ignore("filename");
+      parameters.Ignore("portal");
+    }
+    const Rgb color = parameters.FindEmission("L").value_or(Gray(1));
+    double scale = parameters.Float("scale", 1, kZeroOrMore);
+    const double illuminance = parameters.Float("illuminance", -1);
+    // A surface that sees constant radiance L over its hemisphere receives pi L.
+    if (illuminance > 0) scale *= illuminance / kPi;
+    scene.infinite_lights.push_back({Scaled(parameters, color, scale)});
+  } else {
+    parameters.Error("is not supported; there are point, spot, distant and infinite");
+    return;
+  }
+  parameters.WarnOfUnread();
+}
+
+}  // namespace lucerna

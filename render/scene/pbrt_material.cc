@@ -1,0 +1,94 @@
+// What material do a type and its parameters describe?
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "render/scene/optical_constants.h"
+#include "render/scene/scene_builder.h"
+#include "render/scene/text.h"
+
+namespace lucerna {
+namespace {
+
+// Below this width pbrt-v4 renders a surface as perfectly smooth.
+constexpr double kSmoothAlpha = 1e-3;
+constexpr Range kRoughness = {0, 1e3};
+constexpr Range kIndexRange = {0.01, 100};
+
+void ReadRoughness(ParameterList& parameters, Material& material) {
+  const double roughness = parameters.Float("roughness", 0, kRoughness);
+  const double u = parameters.Float("uroughness", roughness, kRoughness);
+  const double v = parameters.Float("vroughness", roughness, kRoughness);
+  const bool remap = parameters.Bool("remaproughness", true);
+  const double alpha_u = remap ? std::sqrt(u) : u;
+  const double alpha_v = remap ? std::sqrt(v) : v;
+  if (std::max(alpha_u, alpha_v) < kSmoothAlpha) return;
+  // A width of zero in one direction only would divide by zero.
+  constexpr double kSmallestAlpha = 1e-4;
+  material.alpha_u = static_cast<float>(std::max(alpha_u, kSmallestAlpha));
+  material.alpha_v = static_cast<float>(std::max(alpha_v, kSmallestAlpha));
+}
+
+void ReadConductor(ParameterList& parameters, Material& material) {
+  const std::optional<Rgb> reflectance = parameters.FindReflectance("reflectance");
+  if (reflectance.has_value()) {
+    if (parameters.Has("eta") || parameters.Has("k")) {
+      parameters.Error("reflectance", "and eta or k exclude each other; give one or the other");
+    }
+    parameters.Ignore("eta");
+    parameters.Ignore("k");
+    // The metal of index 1 that reflects this share at right angles: pbrt-v4, with its cap.
+    const auto k_of = [](float r) {
+      const float capped = std::min(r, 0.9999F);
+      return 2 * std::sqrt(capped) / std::sqrt(1 - capped);
+    };
+    material.eta = Gray(1);
+    material.k = {k_of(reflectance->r), k_of(reflectance->g), k_of(reflectance->b)};
+  } else {
+    const MetalConstants copper = MetalNamed("Cu").value();
+    material.eta = parameters.FindOpticalConstant("eta", kIndexRange).value_or(copper.eta);
+    material.k = parameters.FindOpticalConstant("k", {0, 1000}).value_or(copper.k);
+  }
+  ReadRoughness(parameters, material);
+}
+
+}  // namespace
+
+bool IsPbrtV3Material(std::string_view type) {
+  constexpr std::array<std::string_view, 11> kTypes = {
+      "matte",       "plastic",   "uber",   "glass",   "mirror",      "metal",
+      "translucent", "substrate", "disney", "fourier", "kdsubsurface"};
+  return std::find(kTypes.begin(), kTypes.end(), type) != kTypes.end();
+}
+
+Material MakeMaterial(std::string_view type, ParameterList& parameters) {
+  Material material;
+  if (type == "diffuse") {
+    material.kind = Material::Kind::kDiffuse;
+    material.reflectance = parameters.FindReflectance("reflectance").value_or(Gray(0.5F));
+  } else if (type == "conductor") {
+    material.kind = Material::Kind::kConductor;
+    ReadConductor(parameters, material);
+  } else if (type == "dielectric") {
+    material.kind = Material::Kind::kDielectric;
+    material.ior =
+        static_cast<float>(parameters.FindRefractiveIndex("eta", kIndexRange).value_or(1.5));
+    ReadRoughness(parameters, material);
+  } else {
+    parameters.Error(Concat(type.empty() || type == "interface" || type == "none"
+                                ? "lets light through unchanged, which is not supported"
+                                : "is not supported",
+                            "; there are diffuse, conductor and dielectric"));
+    return material;
+  }
+  if (parameters.Has("displacement") || parameters.Has("normalmap")) {
+    parameters.Warning(parameters.Has("normalmap") ? "normalmap" : "displacement",
+                       "is ignored: bumps are not rendered");
+    parameters.Ignore("displacement");
+    parameters.Ignore("normalmap");
+  }
+  parameters.WarnOfUnread();
+  return material;
+}
+
+}  // namespace lucerna

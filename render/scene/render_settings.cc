@@ -1,0 +1,146 @@
+#include "render/scene/render_settings.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "render/scene/text.h"
+
+namespace lucerna {
+namespace {
+
+constexpr int kMaxSide = 65536;
+constexpr std::int64_t kMaxPhotonsPerPass = 1'000'000'000'000;
+constexpr int kMaxDepth = 10'000;
+constexpr std::int64_t kDefaultPasses = 16;
+constexpr int kDefaultDepth = 5;
+
+constexpr std::array<std::pair<std::string_view, RadiusControllerKind>, 2> kControllers = {{
+    {"ppm", RadiusControllerKind::kPpm},
+    {"pppm", RadiusControllerKind::kPppm},
+}};
+constexpr std::array<std::pair<std::string_view, KernelKind>, 2> kKernels = {{
+    {"constant", KernelKind::kConstant},
+    {"epanechnikov", KernelKind::kEpanechnikov},
+}};
+
+template <typename Names>
+StatusOr<typename Names::value_type::second_type> ParseName(const Names& names,
+                                                            std::string_view what,
+                                                            std::string_view given) {
+  std::string all;
+  for (const auto& [name, kind] : names) {
+    if (name == given) return kind;
+    all += Concat(all.empty() ? "" : ", ", name);
+  }
+  return absl::InvalidArgumentError(Concat("unknown ", what, " \"", given, "\"; there are ", all));
+}
+
+template <typename Names, typename Kind>
+std::string_view NameIn(const Names& names, Kind wanted) {
+  for (const auto& [name, kind] : names) {
+    if (kind == wanted) return name;
+  }
+  LUCERNA_CHECK(!"a kind without a name");
+  return {};
+}
+
+template <typename Number>
+Status CheckRange(std::string_view flag, Number value, Number low, Number high) {
+  if (value >= low && value <= high) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      Concat(flag, " must be from ", low, " to ", high, ", not ", value));
+}
+
+// Pixel `x` of `old_size` in an image of `new_size`. Rounded up as pbrt rounds a crop window, so
+// that windows which meet still do.
+int ScalePixel(int x, int old_size, int new_size) {
+  const std::int64_t scaled = std::int64_t{x} * new_size;
+  return static_cast<int>((scaled + old_size - 1) / old_size);
+}
+
+}  // namespace
+
+std::string_view NameOf(RadiusControllerKind kind) {
+  return NameIn(kControllers, kind);
+}
+std::string_view NameOf(KernelKind kind) {
+  return NameIn(kKernels, kind);
+}
+
+StatusOr<RadiusControllerKind> ParseRadiusController(std::string_view name) {
+  return ParseName(kControllers, "radius controller", name);
+}
+
+StatusOr<KernelKind> ParseKernel(std::string_view name) {
+  return ParseName(kKernels, "kernel", name);
+}
+
+StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const Scene& scene) {
+  const IntegratorSettings& asked = scene.integrator;
+  const FilmSettings& film = scene.film;
+  RenderSettings settings;
+
+  if (overrides.width.has_value() != overrides.height.has_value()) {
+    return absl::InvalidArgumentError("--size needs both a width and a height, as in 640x480");
+  }
+  settings.width = overrides.width.value_or(film.width);
+  settings.height = overrides.height.value_or(film.height);
+  LUCERNA_RETURN_IF_ERROR(CheckRange("--size: the width", settings.width, 1, kMaxSide));
+  LUCERNA_RETURN_IF_ERROR(CheckRange("--size: the height", settings.height, 1, kMaxSide));
+  settings.crop_x0 = ScalePixel(film.crop_x0, film.width, settings.width);
+  settings.crop_y0 = ScalePixel(film.crop_y0, film.height, settings.height);
+  // A crop window of a small image can vanish between two pixels; it keeps one then.
+  settings.crop_x0 = std::min(settings.crop_x0, settings.width - 1);
+  settings.crop_y0 = std::min(settings.crop_y0, settings.height - 1);
+  settings.crop_x1 =
+      std::max(ScalePixel(film.crop_x1, film.width, settings.width), settings.crop_x0 + 1);
+  settings.crop_y1 =
+      std::max(ScalePixel(film.crop_y1, film.height, settings.height), settings.crop_y0 + 1);
+
+  if (overrides.time_s.has_value()) {
+    if (!(*overrides.time_s > 0) || !std::isfinite(*overrides.time_s)) {
+      return absl::InvalidArgumentError(
+          Concat("--time must be a number of seconds above 0, not ", *overrides.time_s));
+    }
+    settings.time_s = *overrides.time_s;
+  }
+  if (overrides.passes.has_value()) {
+    settings.passes = *overrides.passes;
+    if (settings.passes < 0 || (settings.passes == 0 && !overrides.time_s.has_value())) {
+      return absl::InvalidArgumentError(
+          Concat("--passes must be at least 1, or 0 together with --time, not ", settings.passes));
+    }
+  } else if (overrides.time_s.has_value()) {
+    settings.passes = 0;
+  } else {
+    settings.passes = asked.pixel_samples.value_or(kDefaultPasses);
+  }
+
+  const std::int64_t pixels =
+      std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()};
+  settings.photons_per_pass =
+      overrides.photons_per_pass.value_or(asked.photons_per_pass.value_or(pixels));
+  LUCERNA_RETURN_IF_ERROR(CheckRange("--photons-per-pass", settings.photons_per_pass,
+                                     std::int64_t{1}, kMaxPhotonsPerPass));
+
+  settings.seed = overrides.seed.value_or(static_cast<std::uint64_t>(asked.seed.value_or(0)));
+  settings.radius_controller = overrides.radius_controller.value_or(settings.radius_controller);
+  settings.kernel = overrides.kernel.value_or(settings.kernel);
+  settings.alpha = overrides.alpha.value_or(settings.alpha);
+  if (!(settings.alpha > 0 && settings.alpha < 1)) {
+    return absl::InvalidArgumentError(
+        Concat("--alpha must be above 0 and below 1, not ", settings.alpha));
+  }
+  settings.initial_radius = overrides.initial_radius.value_or(asked.initial_radius.value_or(0));
+  if (!(settings.initial_radius >= 0) || !std::isfinite(settings.initial_radius)) {
+    return absl::InvalidArgumentError(
+        Concat("--initial-radius must be auto or a length above 0, not ", settings.initial_radius));
+  }
+  settings.max_depth = overrides.max_depth.value_or(asked.max_depth.value_or(kDefaultDepth));
+  LUCERNA_RETURN_IF_ERROR(CheckRange("--max-depth", settings.max_depth, 1, kMaxDepth));
+  return settings;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,65 @@
+// How is the scene to be rendered?
+//
+// What the user gives (RenderOverrides), else what the scene file says, else a documented
+// default, becomes one RenderSettings: complete, checked, and together with the scene's digest
+// all that the image depends on.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "render/base/status.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+enum class RadiusControllerKind : std::uint8_t { kPpm, kPppm };
+enum class KernelKind : std::uint8_t { kConstant, kEpanechnikov };
+
+[[nodiscard]] std::string_view NameOf(RadiusControllerKind kind);
+[[nodiscard]] std::string_view NameOf(KernelKind kind);
+// Errors: INVALID_ARGUMENT that lists the names there are.
+[[nodiscard]] StatusOr<RadiusControllerKind> ParseRadiusController(std::string_view name);
+[[nodiscard]] StatusOr<KernelKind> ParseKernel(std::string_view name);
+
+// What a user may say about one job; absent means "as the scene file has it, else the default".
+struct RenderOverrides {
+  std::optional<int> width, height;  // both or neither; the crop window is scaled along
+  std::optional<std::int64_t> passes;
+  std::optional<std::int64_t> photons_per_pass;
+  std::optional<double> time_s;
+  std::optional<std::uint64_t> seed;
+  std::optional<RadiusControllerKind> radius_controller;
+  std::optional<double> alpha;
+  std::optional<KernelKind> kernel;
+  // A radius in scene units, or 0 for "auto".
+  std::optional<double> initial_radius;
+  std::optional<int> max_depth;
+};
+
+struct RenderSettings {
+  int width = 0, height = 0;  // [pixels]
+  int crop_x0 = 0, crop_y0 = 0, crop_x1 = 0, crop_y1 = 0;
+  std::int64_t passes = 16;  // stop after so many; 0: no limit
+  double time_s = 0;         // stop after so long; 0: no limit
+  std::int64_t photons_per_pass = 0;
+  std::uint64_t seed = 0;
+  RadiusControllerKind radius_controller = RadiusControllerKind::kPpm;
+  double alpha = 2.0 / 3;  // share of new photons kept by ppm and pppm, in (0, 1)
+  KernelKind kernel = KernelKind::kEpanechnikov;
+  double initial_radius = 0;  // scene units; 0: auto, from each pixel's footprint
+  int max_depth = 5;          // scattering events of an eye path, and of a photon path
+
+  [[nodiscard]] int crop_width() const { return crop_x1 - crop_x0; }
+  [[nodiscard]] int crop_height() const { return crop_y1 - crop_y0; }
+  bool operator==(const RenderSettings&) const = default;
+};
+
+// Fills in what `overrides` leaves open. When the user gives a time and no passes, passes is 0.
+// Errors: INVALID_ARGUMENT for a value out of its range, naming the flag and the range.
+[[nodiscard]] StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides,
+                                                       const Scene& scene);
+
+}  // namespace lucerna

@@ -1,0 +1,80 @@
+// What does one pbrt directive add to the scene?
+//
+// One function for each directive that describes a part of the scene; the parser owns the order
+// of directives and the graphics state, these own types, parameters and defaults. Each asks
+// `parameters` for what it knows, reports what is wrong, and does its best to go on; after an
+// error its outcome is never rendered.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render/base/status.h"
+#include "render/math/transform.h"
+#include "render/scene/parameter_list.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+// True for the types of material that pbrt-v3 had and pbrt-v4 renamed.
+[[nodiscard]] bool IsPbrtV3Material(std::string_view type);
+[[nodiscard]] Material MakeMaterial(std::string_view type, ParameterList& parameters);
+
+// An AreaLightSource: what it makes of a shape depends on the shape's area when a power is given.
+struct AreaEmission {
+  Rgb radiance;  // at scale 1 and, where there is one, power 1 over an emitting area of 1 m²
+  bool two_sided = false;
+  std::optional<double> power_w;  // luminous, of the whole shape
+};
+[[nodiscard]] AreaEmission MakeAreaEmission(std::string_view type, ParameterList& parameters);
+[[nodiscard]] AreaLight MakeAreaLight(const AreaEmission& emission, double area_m2);
+
+// A LightSource, with the transform from its space to the world.
+void AddLight(std::string_view type, ParameterList& parameters, const Transform& to_world,
+              Scene& scene);
+
+// Shapes in world space, or in the space of an object that is instanced later. Their traits are
+// those of the Shape directive that made them.
+struct ShapeSet {
+  std::vector<TriangleMesh> meshes;
+  std::vector<Sphere> spheres;
+  std::vector<Disk> disks;
+
+  // What it costs to keep: triangles, every other shape as one, and vertices that no triangle
+  // needs as a third of one.
+  [[nodiscard]] std::uint64_t Cost() const;
+  // [m²], of one side.
+  [[nodiscard]] double Area() const;
+};
+
+struct ShapePlacement {
+  Transform to_world;
+  bool reverse_orientation = false;
+  ShapeTraits traits;
+};
+
+// Reads the file that a plymesh names; the parser counts what it reads.
+using MeshReader = std::function<StatusOr<TriangleMesh>(const std::string& file)>;
+
+[[nodiscard]] ShapeSet MakeShapes(std::string_view type, ParameterList& parameters,
+                                  const ShapePlacement& placement, const MeshReader& read_mesh);
+
+// The shapes of an object where an instance of it stands. Errors: INVALID_ARGUMENT when the
+// transform moves a position out of the finite numbers, or makes an ellipsoid of a sphere.
+[[nodiscard]] StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world);
+
+// The directives before WorldBegin. `exposure_time_s` is shutterclose - shutteropen; the film's
+// own share of the exposure is iso / 100, and the parser multiplies the two.
+void ReadCamera(std::string_view type, ParameterList& parameters, Camera& camera,
+                double& exposure_time_s);
+void ReadFilm(std::string_view type, ParameterList& parameters, FilmSettings& film);
+void ReadPixelFilter(std::string_view type, ParameterList& parameters, PixelFilter& filter);
+void ReadIntegrator(std::string_view type, ParameterList& parameters,
+                    IntegratorSettings& integrator);
+void ReadSampler(std::string_view type, ParameterList& parameters, IntegratorSettings& integrator);
+
+}  // namespace lucerna

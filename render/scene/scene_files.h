@@ -1,0 +1,85 @@
+// Where does a scene's text come from?
+//
+// A scene is the closure of its main file over Include, Import and meshes. The parser reads all
+// of them through SceneFiles, by logical path, so the same parse runs on the user's disk and on
+// bytes that came over the wire; and what it read is the scene's manifest.
+//
+// A logical path is relative, uses '/' only, and has no "..", ".", empty or control-character
+// component. It is relative to the folder of the main file.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "render/base/digest.h"
+#include "render/base/status.h"
+
+namespace lucerna {
+
+// The files of one scene: logical path -> digest and size.
+struct SceneManifest {
+  struct Entry {
+    Digest digest;
+    std::uint64_t size_bytes = 0;
+    bool operator==(const Entry&) const = default;
+  };
+
+  std::string main_path;
+  std::map<std::string, Entry> entries;
+
+  // The name of the whole scene: changes with any path or byte, and with nothing else.
+  [[nodiscard]] Digest SceneDigest() const;
+  bool operator==(const SceneManifest&) const = default;
+};
+
+// Limits on what a scene may bring. All are reported when exceeded.
+struct SceneLimits {
+  std::uint64_t max_files = 20'000;
+  std::uint64_t max_total_bytes = std::uint64_t{8} << 30;
+  int max_include_depth = 32;
+  std::uint64_t max_triangles = 400'000'000;  // after instances are laid out
+};
+
+// Errors: INVALID_ARGUMENT with the reason when `path` is not a logical path.
+[[nodiscard]] Status CheckLogicalPath(std::string_view path);
+
+class SceneFiles {
+ public:
+  virtual ~SceneFiles() = default;
+  // The bytes of one file. Errors: NOT_FOUND, INVALID_ARGUMENT (not a logical path), or what the
+  // source says.
+  [[nodiscard]] virtual StatusOr<std::string> Read(const std::string& logical_path) = 0;
+};
+
+// A folder on disk. Remembers what was read: the manifest of the parse that ran on it.
+class DirectoryFiles final : public SceneFiles {
+ public:
+  explicit DirectoryFiles(std::string folder, SceneLimits limits = {});
+  [[nodiscard]] StatusOr<std::string> Read(const std::string& logical_path) override;
+  // What was read so far, named by `main_path`.
+  [[nodiscard]] SceneManifest Manifest(std::string main_path) const;
+
+ private:
+  std::string folder_;
+  SceneLimits limits_;
+  std::uint64_t total_bytes_ = 0;
+  std::map<std::string, SceneManifest::Entry> entries_;
+};
+
+// Bytes found by the digest that a manifest gives. `fetch` returns the bytes of a digest; what it
+// returns is checked against the digest and size.
+class ManifestFiles final : public SceneFiles {
+ public:
+  using Fetch = std::function<StatusOr<std::string>(const Digest& digest)>;
+  ManifestFiles(SceneManifest manifest, Fetch fetch);
+  [[nodiscard]] StatusOr<std::string> Read(const std::string& logical_path) override;
+
+ private:
+  SceneManifest manifest_;
+  Fetch fetch_;
+};
+
+}  // namespace lucerna

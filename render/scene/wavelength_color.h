@@ -1,0 +1,44 @@
+// What colour is light, or a surface, that is described by wavelength?
+//
+// Through the CIE 1931 observer to linear Rec. 709. Colours outside Rec. 709 are cut off at zero.
+//
+// Source: Wyman, Sloan and Shirley 2013, "Simple Analytic Approximations to the CIE XYZ Color
+// Matching Functions" (the multi-lobe fit, within about 1 % of the observer); CIE 15 for the
+// daylight illuminant D65.
+#pragma once
+
+#include <vector>
+
+#include "render/math/rgb.h"
+
+namespace lucerna {
+
+// Values at wavelengths, linear between them and zero outside.
+struct WavelengthCurve {
+  std::vector<double> wavelength_nm;  // strictly increasing
+  std::vector<double> value;          // one for each wavelength
+
+  // The value at `nm`, zero outside the curve.
+  [[nodiscard]] double At(double nm) const;
+  // The value at `nm`, outside the curve that of its nearer end. Requires a curve of one or more.
+  [[nodiscard]] double AtClamped(double nm) const;
+};
+
+// The wavelengths that stand for red, green and blue where a quantity is sampled, not seen: the
+// optical constants of metals.
+inline constexpr double kRedNm = 630, kGreenNm = 532, kBlueNm = 465;
+
+// Light with this curve, scaled to luminance 1, as pbrt-v4 scales every light; black when the
+// curve holds no visible light.
+[[nodiscard]] Rgb EmissionColor(const WavelengthCurve& curve);
+
+// A black body [K], scaled to luminance 1. Requires kMinBlackbodyK <= temperature_k <=
+// kMaxBlackbodyK: outside, single precision has no room for the curve.
+inline constexpr double kMinBlackbodyK = 500, kMaxBlackbodyK = 1e6;
+[[nodiscard]] Rgb BlackbodyColor(double temperature_k);
+
+// A surface that reflects by this curve, in daylight D65; a curve that is 1 everywhere is white.
+// Every channel is in [0, 1].
+[[nodiscard]] Rgb ReflectanceColor(const WavelengthCurve& curve);
+
+}  // namespace lucerna

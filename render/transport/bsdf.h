@@ -1,0 +1,65 @@
+// How does a surface scatter?
+//
+// All directions are in the shading frame: unit, away from the surface, z along the shading
+// normal. `wo` goes to where radiance is asked for (the eye) or where a photon came from; Sample
+// returns `wi` for both. z > 0 is the outside of a dielectric.
+//
+// The microfacet model is GGX (Trowbridge-Reitz) with the height-correlated shadowing of Smith.
+// Sources: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces" (W07);
+// Heitz 2018, "Sampling the GGX Distribution of Visible Normals" (H18).
+#pragma once
+
+#include "render/math/rgb.h"
+#include "render/math/vector.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+// Whether a path carries radiance (from the eye) or flux (from a light). Refraction into a denser
+// medium compresses radiance and leaves flux alone.
+enum class Carried : bool { kRadiance, kFlux };
+
+struct BsdfSample {
+  Vec3 wi;
+  Rgb weight;      // f·|cosθi| / pdf; includes the choice of lobe
+  float pdf = 0;   // pdf_solid_angle [sr⁻¹]; meaningless when is_delta
+  bool is_delta = false;
+};
+
+// False when nothing is scattered. u_lobe, u1, u2 in [0, 1).
+[[nodiscard]] bool SampleBsdf(const Material& material, Vec3 wo, float u_lobe, float u1, float u2,
+                              Carried carried, BsdfSample& sample);
+
+// f(wo, wi) [sr⁻¹] without the cosine; zero for smooth lobes.
+[[nodiscard]] Rgb EvaluateBsdf(const Material& material, Vec3 wo, Vec3 wi, Carried carried);
+
+// The density with which SampleBsdf draws `wi` [sr⁻¹]; zero for smooth lobes.
+[[nodiscard]] float PdfBsdf(const Material& material, Vec3 wo, Vec3 wi);
+
+// The reflectance that feature layers show.
+[[nodiscard]] Rgb AlbedoOf(const Material& material);
+
+// Smooth: all scattering goes into single directions.
+[[nodiscard]] constexpr bool IsSmooth(const Material& material) {
+  return material.kind != Material::Kind::kDiffuse && material.alpha_u == 0 &&
+         material.alpha_v == 0;
+}
+
+// Rougher than this, photons are gathered; smoother, eye paths go on. A narrow lobe accepts few of
+// the photons around it, while a direction drawn from it is a good guess.
+inline constexpr float kGatherAlpha = 0.2F;
+
+// Where eye paths stop and photons are kept. Black surfaces need none.
+[[nodiscard]] constexpr bool Gathers(const Material& material) {
+  if (material.kind == Material::Kind::kDiffuse) return !IsBlack(material.reflectance);
+  return std::max(material.alpha_u, material.alpha_v) >= kGatherAlpha;
+}
+
+// Fresnel reflectance of unpolarised light. cos_i in [-1, 1], negative from inside; `eta` =
+// inside over outside. cos_t: of the refracted direction, in [0, 1]; 0 with total reflection.
+[[nodiscard]] float FresnelDielectric(float cos_i, float eta, float& cos_t);
+// For a metal with index eta + i·k, cos_i in [0, 1]; in the space of the indices (Rec. 709), while
+// all other colours here are in the working space.
+[[nodiscard]] Rgb FresnelConductor(float cos_i, Rgb eta, Rgb k);
+
+}  // namespace lucerna

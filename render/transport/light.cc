@@ -1,0 +1,378 @@
+#include "render/transport/light.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/math/warp.h"
+
+namespace lucerna {
+namespace {
+
+constexpr float kClearance = 0x1p-20F;  // as the intersector's, relative to the coordinates
+
+// Smoothstep of the cosine between the two cones, as pbrt has it.
+float SpotFalloff(const SpotLight& spot, float cosine) {
+  if (cosine >= spot.cos_falloff_start) return 1;
+  if (cosine <= spot.cos_total_width) return 0;
+  const float x = (cosine - spot.cos_total_width) / (spot.cos_falloff_start - spot.cos_total_width);
+  return x * x * (3 - 2 * x);
+}
+
+// 1 - cosine of the cone in which a sphere appears from outside, without cancellation.
+float OneMinusCosine(float sin2_max) {
+  return sin2_max < 1e-3F ? 0.5F * sin2_max * (1 + 0.25F * sin2_max)
+                          : 1 - std::sqrt(std::max(0.0F, 1 - sin2_max));
+}
+
+}  // namespace
+
+LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(scene) {
+  const Bounds& bounds = intersector.bounds();
+  if (!bounds.empty()) {
+    center_ = bounds.Center();
+    radius_ = 0.5F * bounds.Diagonal();
+  }
+  first_emitter_.assign(scene.meshes.size(), -1);
+  sphere_emitter_.assign(scene.spheres.size(), -1);
+  disk_emitter_.assign(scene.disks.size(), -1);
+
+  const auto area_emitter = [&](Kind kind, const ShapeTraits& traits, float area) {
+    const AreaLight& light = scene.area_lights[static_cast<std::size_t>(traits.area_light)];
+    Emitter emitter;
+    emitter.kind = kind;
+    emitter.two_sided = light.two_sided;
+    emitter.area = area;
+    emitter.radiance = light.radiance;
+    emitter.power = light.radiance * (kPi * area * (light.two_sided ? 2.0F : 1.0F));
+    return emitter;
+  };
+  for (std::uint32_t m = 0; m < scene.meshes.size(); ++m) {
+    const TriangleMesh& mesh = scene.meshes[m];
+    if (mesh.traits.area_light == kNoAreaLight) continue;
+    first_emitter_[m] = static_cast<std::int64_t>(emitters_.size());
+    for (std::uint32_t t = 0; t < mesh.indices.size() / 3; ++t) {
+      const std::uint32_t* corner = &mesh.indices[std::size_t{3} * t];
+      const Vec3 p0 = mesh.positions[corner[0]];
+      const float area =
+          0.5F * Length(Cross(mesh.positions[corner[1]] - p0, mesh.positions[corner[2]] - p0));
+      Emitter emitter = area_emitter(Kind::kTriangle, mesh.traits, area);
+      emitter.geometry = m;
+      emitter.primitive = t;
+      Add(emitter);
+    }
+  }
+  for (std::uint32_t i = 0; i < scene.spheres.size(); ++i) {
+    const Sphere& sphere = scene.spheres[i];
+    if (sphere.traits.area_light == kNoAreaLight) continue;
+    sphere_emitter_[i] = static_cast<std::int32_t>(emitters_.size());
+    Emitter emitter =
+        area_emitter(Kind::kSphere, sphere.traits, 4 * kPi * sphere.radius * sphere.radius);
+    emitter.primitive = i;
+    Add(emitter);
+  }
+  for (std::uint32_t i = 0; i < scene.disks.size(); ++i) {
+    const Disk& disk = scene.disks[i];
+    if (disk.traits.area_light == kNoAreaLight) continue;
+    disk_emitter_[i] = static_cast<std::int32_t>(emitters_.size());
+    Emitter emitter = area_emitter(
+        Kind::kDisk, disk.traits,
+        kPi * (disk.radius * disk.radius - disk.inner_radius * disk.inner_radius));
+    emitter.primitive = i;
+    Add(emitter);
+  }
+  only_delta_ = emitters_.empty();
+  for (std::uint32_t i = 0; i < scene.point_lights.size(); ++i) {
+    Emitter emitter;
+    emitter.kind = Kind::kPoint;
+    emitter.primitive = i;
+    emitter.radiance = scene.point_lights[i].intensity;
+    emitter.power = emitter.radiance * (4 * kPi);
+    Add(emitter);
+  }
+  for (std::uint32_t i = 0; i < scene.spot_lights.size(); ++i) {
+    const SpotLight& spot = scene.spot_lights[i];
+    Emitter emitter;
+    emitter.kind = Kind::kSpot;
+    emitter.primitive = i;
+    emitter.radiance = spot.intensity;
+    // The smoothstep's mean is one half.
+    emitter.power = emitter.radiance * (2 * kPi * ((1 - spot.cos_falloff_start) +
+                                        0.5F * (spot.cos_falloff_start - spot.cos_total_width)));
+    Add(emitter);
+  }
+  for (std::uint32_t i = 0; i < scene.distant_lights.size(); ++i) {
+    Emitter emitter;
+    emitter.kind = Kind::kDistant;
+    emitter.primitive = i;
+    emitter.radiance = scene.distant_lights[i].irradiance;
+    emitter.power = emitter.radiance * (kPi * radius_ * radius_);
+    Add(emitter);
+  }
+  for (const InfiniteLight& light : scene.infinite_lights) infinite_radiance_ += light.radiance;
+  if (!IsBlack(infinite_radiance_)) {
+    only_delta_ = false;
+    infinite_emitter_ = static_cast<std::int64_t>(emitters_.size());
+    Emitter emitter;
+    emitter.kind = Kind::kInfinite;
+    emitter.radiance = infinite_radiance_;
+    emitter.power = emitter.radiance * (4 * kPi * kPi * radius_ * radius_);
+    Add(emitter);
+  }
+
+  double total = 0;
+  for (const Emitter& emitter : emitters_) {
+    total += static_cast<double>(Luminance(emitter.power));
+    cumulative_.push_back(total);
+    total_power_ += emitter.power;
+  }
+  if (!(total > 0)) {
+    // No light at all: nothing is ever drawn.
+    emitters_.clear();
+    cumulative_.clear();
+    return;
+  }
+  for (std::size_t i = 0; i < emitters_.size(); ++i) {
+    cumulative_[i] /= total;
+    emitters_[i].choice =
+        static_cast<float>(static_cast<double>(Luminance(emitters_[i].power)) / total);
+  }
+}
+
+void LightSet::Add(Emitter emitter) { emitters_.push_back(emitter); }
+
+const LightSet::Emitter& LightSet::Choose(float u) const {
+  const auto wanted = static_cast<double>(u);
+  auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), wanted);
+  if (found == cumulative_.end()) --found;
+  return emitters_[static_cast<std::size_t>(found - cumulative_.begin())];
+}
+
+void LightSet::PointOn(const Emitter& emitter, float u1, float u2, Vec3& position, Vec3& normal,
+                       float& clearance) const {
+  switch (emitter.kind) {
+    case Kind::kTriangle: {
+      const TriangleMesh& mesh = scene_.meshes[emitter.geometry];
+      const std::uint32_t* corner = &mesh.indices[std::size_t{3} * emitter.primitive];
+      const Vec3 p0 = mesh.positions[corner[0]];
+      const Vec3 e1 = mesh.positions[corner[1]] - p0;
+      const Vec3 e2 = mesh.positions[corner[2]] - p0;
+      float b1 = 0;
+      float b2 = 0;
+      SquareToTriangle(u1, u2, b1, b2);
+      position = p0 + e1 * b1 + e2 * b2;
+      normal = Normalize(Cross(e1 * (1 / MaxAbs(e1)), e2 * (1 / MaxAbs(e2))));
+      clearance = kClearance * (MaxAbs(p0) + MaxAbs(e1) + MaxAbs(e2));
+      return;
+    }
+    case Kind::kSphere: {
+      const Sphere& sphere = scene_.spheres[emitter.primitive];
+      const Vec3 outward = SquareToSphere(u1, u2);
+      position = sphere.center + outward * sphere.radius;
+      normal = sphere.inward ? -outward : outward;
+      clearance = kClearance * (MaxAbs(sphere.center) + sphere.radius);
+      return;
+    }
+    default: {
+      const Disk& disk = scene_.disks[emitter.primitive];
+      const Frame frame(disk.normal);
+      Vec3 on_unit = SquareToDisk(u1, u2);
+      if (disk.inner_radius > 0) {
+        // Squared radii are uniform on a disc; squeeze them into the ring.
+        const float squared = LengthSquared(on_unit);
+        const float inner2 = disk.inner_radius * disk.inner_radius / (disk.radius * disk.radius);
+        if (squared > 0) on_unit = on_unit * std::sqrt((inner2 + squared * (1 - inner2)) / squared);
+      }
+      position = disk.center + frame.s * (on_unit.x * disk.radius) + frame.t * (on_unit.y * disk.radius);
+      normal = disk.normal;
+      clearance = kClearance * (MaxAbs(disk.center) + disk.radius);
+      return;
+    }
+  }
+}
+
+bool LightSet::SampleEmission(float u_choice, float u_place1, float u_place2, float u_direction1,
+                              float u_direction2, Emission& emission) const {
+  if (emitters_.empty()) return false;
+  const Emitter& emitter = Choose(u_choice);
+  emission.ray.t_max = HUGE_VALF;
+  emission.flux = emitter.power / emitter.choice;
+  switch (emitter.kind) {
+    case Kind::kTriangle:
+    case Kind::kSphere:
+    case Kind::kDisk: {
+      Vec3 position;
+      Vec3 normal;
+      float clearance = 0;
+      PointOn(emitter, u_place1, u_place2, position, normal, clearance);
+      if (emitter.two_sided) {
+        if (u_direction1 < 0.5F) {
+          u_direction1 *= 2;
+        } else {
+          u_direction1 = 2 * u_direction1 - 1;
+          normal = -normal;
+        }
+      }
+      const Vec3 local = SquareToCosineHemisphere(u_direction1, u_direction2);
+      emission.ray.direction = Frame(normal).ToWorld(local);
+      emission.ray.origin = position + normal * clearance;
+      return local.z > 0;
+    }
+    case Kind::kPoint:
+      emission.ray.origin = scene_.point_lights[emitter.primitive].position;
+      emission.ray.direction = SquareToSphere(u_direction1, u_direction2);
+      return true;
+    case Kind::kSpot: {
+      const SpotLight& spot = scene_.spot_lights[emitter.primitive];
+      emission.ray.origin = spot.position;
+      // Uniform in the outer cone, weighted by the falloff over its mean.
+      const float cone = 1 - spot.cos_total_width;
+      const Vec3 local = SquareToCone(u_direction1, u_direction2, cone);
+      emission.ray.direction = Frame(spot.direction).ToWorld(local);
+      const float falloff = SpotFalloff(spot, local.z);
+      emission.flux = emitter.radiance * (falloff * 2 * kPi * cone / emitter.choice);
+      return falloff > 0;
+    }
+    case Kind::kDistant: {
+      const Vec3 direction = scene_.distant_lights[emitter.primitive].direction;
+      const Frame frame(direction);
+      const Vec3 disk = SquareToDisk(u_place1, u_place2) * radius_;
+      emission.ray.origin =
+          center_ - direction * radius_ + frame.s * disk.x + frame.t * disk.y;
+      emission.ray.direction = direction;
+      return true;
+    }
+    case Kind::kInfinite: {
+      const Vec3 direction = SquareToSphere(u_direction1, u_direction2);
+      const Frame frame(direction);
+      const Vec3 disk = SquareToDisk(u_place1, u_place2) * radius_;
+      emission.ray.origin =
+          center_ - direction * radius_ + frame.s * disk.x + frame.t * disk.y;
+      emission.ray.direction = direction;
+      return true;
+    }
+  }
+  return false;
+}
+
+bool LightSet::SampleDirect(Vec3 from, float u_choice, float u1, float u2,
+                            LightSample& sample) const {
+  if (emitters_.empty()) return false;
+  const Emitter& emitter = Choose(u_choice);
+  switch (emitter.kind) {
+    case Kind::kSphere: {
+      const Sphere& sphere = scene_.spheres[emitter.primitive];
+      const Vec3 to_center = sphere.center - from;
+      const float distance2 = LengthSquared(to_center);
+      const float sin2_max = sphere.radius * sphere.radius / distance2;
+      if (!sphere.inward && sin2_max < 0.9999F) {
+        // Uniform in the cone in which the sphere appears.
+        const float distance = std::sqrt(distance2);
+        const float one_minus_cos = OneMinusCosine(sin2_max);
+        const Vec3 local = SquareToCone(u1, u2, one_minus_cos);
+        sample.wi = Frame(to_center / distance).ToWorld(local);
+        const float sin2 = std::max(0.0F, 1 - local.z * local.z);
+        sample.distance =
+            distance * local.z -
+            std::sqrt(std::max(0.0F, sphere.radius * sphere.radius - distance2 * sin2));
+        const float pdf = emitter.choice / (2 * kPi * one_minus_cos);
+        sample.pdf = pdf;
+        sample.radiance_over_pdf = emitter.radiance / pdf;
+        return true;
+      }
+      break;
+    }
+    case Kind::kPoint: {
+      const Vec3 to = scene_.point_lights[emitter.primitive].position - from;
+      const float distance2 = LengthSquared(to);
+      sample.distance = std::sqrt(distance2);
+      sample.wi = to / sample.distance;
+      sample.radiance_over_pdf = emitter.radiance / (distance2 * emitter.choice);
+      sample.pdf = 0;
+      return distance2 > 0;
+    }
+    case Kind::kSpot: {
+      const SpotLight& spot = scene_.spot_lights[emitter.primitive];
+      const Vec3 to = spot.position - from;
+      const float distance2 = LengthSquared(to);
+      sample.distance = std::sqrt(distance2);
+      sample.wi = to / sample.distance;
+      const float falloff = SpotFalloff(spot, -Dot(sample.wi, spot.direction));
+      sample.radiance_over_pdf = emitter.radiance * (falloff / (distance2 * emitter.choice));
+      sample.pdf = 0;
+      return distance2 > 0 && falloff > 0;
+    }
+    case Kind::kDistant:
+      sample.wi = -scene_.distant_lights[emitter.primitive].direction;
+      sample.distance = HUGE_VALF;
+      sample.radiance_over_pdf = emitter.radiance / emitter.choice;
+      sample.pdf = 0;
+      return true;
+    case Kind::kInfinite:
+      sample.wi = SquareToSphere(u1, u2);
+      sample.distance = HUGE_VALF;
+      sample.pdf = emitter.choice / (4 * kPi);
+      sample.radiance_over_pdf = emitter.radiance / sample.pdf;
+      return true;
+    default:
+      break;
+  }
+  // By area.
+  Vec3 position;
+  Vec3 normal;
+  float clearance = 0;
+  PointOn(emitter, u1, u2, position, normal, clearance);
+  const Vec3 to = position - from;
+  const float distance2 = LengthSquared(to);
+  if (!(distance2 > 0)) return false;
+  sample.distance = std::sqrt(distance2);
+  sample.wi = to / sample.distance;
+  float cosine = -Dot(sample.wi, normal);
+  if (emitter.two_sided) cosine = std::abs(cosine);
+  if (!(cosine > 0)) return false;
+  sample.pdf = emitter.choice * distance2 / (cosine * emitter.area);
+  sample.radiance_over_pdf = emitter.radiance / sample.pdf;
+  return true;
+}
+
+Rgb LightSet::EmittedRadiance(const SurfacePoint& point, Vec3 wo) const {
+  if (point.area_light == kNoAreaLight) return {};
+  const AreaLight& light = scene_.area_lights[static_cast<std::size_t>(point.area_light)];
+  return light.two_sided || Dot(point.geometric_normal, wo) > 0 ? light.radiance : Rgb{};
+}
+
+const LightSet::Emitter* LightSet::EmitterOf(const SurfacePoint& point) const {
+  if (point.area_light == kNoAreaLight || emitters_.empty()) return nullptr;
+  std::int64_t number = -1;
+  if (point.geometry < first_emitter_.size()) {
+    number = first_emitter_[point.geometry] + point.primitive;
+  } else if (point.geometry == first_emitter_.size()) {
+    number = sphere_emitter_[point.primitive];
+  } else {
+    number = disk_emitter_[point.primitive];
+  }
+  return &emitters_[static_cast<std::size_t>(number)];
+}
+
+float LightSet::PdfDirect(Vec3 from, const SurfacePoint& point) const {
+  const Emitter* emitter = EmitterOf(point);
+  if (emitter == nullptr) return 0;
+  if (emitter->kind == Kind::kSphere) {
+    const Sphere& sphere = scene_.spheres[emitter->primitive];
+    const float sin2_max = sphere.radius * sphere.radius / LengthSquared(sphere.center - from);
+    if (!sphere.inward && sin2_max < 0.9999F) {
+      return emitter->choice / (2 * kPi * OneMinusCosine(sin2_max));
+    }
+  }
+  const Vec3 to = point.position - from;
+  const float distance2 = LengthSquared(to);
+  const float cosine = std::abs(Dot(to, point.geometric_normal)) / std::sqrt(distance2);
+  if (!(cosine > 0)) return 0;
+  return emitter->choice * distance2 / (cosine * emitter->area);
+}
+
+float LightSet::PdfDirectInfinite() const {
+  if (infinite_emitter_ < 0 || emitters_.empty()) return 0;
+  return emitters_[static_cast<std::size_t>(infinite_emitter_)].choice / (4 * kPi);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,97 @@
+// Which lights are there, how strong is each, and where does their light go?
+//
+// Every emitting triangle, sphere, disk and every other light is one emitter. Emitters are chosen
+// in proportion to their power (luminance), so that all photons carry about the same flux.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render/geometry/intersector.h"
+#include "render/math/rgb.h"
+#include "render/math/vector.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+// A photon as it leaves its light.
+struct Emission {
+  Ray ray;
+  Rgb flux;  // [W]: of all photons together, so an estimate divides by their number
+};
+
+// Light that arrives at a point from one emitter.
+struct LightSample {
+  Vec3 wi;                  // from the point to the light, unit
+  float distance = 0;       // HUGE_VALF for lights at infinity
+  Rgb radiance_over_pdf;    // [W·m⁻²·sr⁻¹ / (choice × solid angle)]; for delta lights irradiance
+                            // on a plane facing the light, over the choice
+  float pdf = 0;            // choice × pdf_solid_angle [sr⁻¹]; 0 for delta lights
+};
+
+class LightSet {
+ public:
+  // Keeps references to both.
+  LightSet(const Scene& scene, const Intersector& intersector);
+
+  [[nodiscard]] bool empty() const { return emitters_.empty(); }
+  // [W] per channel, of all emitters.
+  [[nodiscard]] Rgb TotalPower() const { return total_power_; }
+  // True when all emitters are points or single directions, which no ray can hit.
+  [[nodiscard]] bool OnlyDelta() const { return only_delta_; }
+
+  // Draws a photon. u_choice picks the emitter; uv_place and uv_direction the rest. False when
+  // the numbers give nothing (outside a spot's cone).
+  [[nodiscard]] bool SampleEmission(float u_choice, float u_place1, float u_place2,
+                                    float u_direction1, float u_direction2,
+                                    Emission& emission) const;
+
+  // Draws light arriving at `from`, without asking whether anything is in the way. False when the
+  // drawn emitter sends nothing there.
+  [[nodiscard]] bool SampleDirect(Vec3 from, float u_choice, float u1, float u2,
+                                  LightSample& sample) const;
+
+  // Radiance that `point` sends towards `wo`.
+  [[nodiscard]] Rgb EmittedRadiance(const SurfacePoint& point, Vec3 wo) const;
+  // The density with which SampleDirect, seen from `from`, draws the emitting `point`
+  // [choice × sr⁻¹].
+  [[nodiscard]] float PdfDirect(Vec3 from, const SurfacePoint& point) const;
+
+  // Radiance from where no shape is.
+  [[nodiscard]] Rgb InfiniteRadiance() const { return infinite_radiance_; }
+  [[nodiscard]] float PdfDirectInfinite() const;
+
+ private:
+  enum class Kind : std::uint8_t { kTriangle, kSphere, kDisk, kPoint, kSpot, kDistant, kInfinite };
+  struct Emitter {
+    Kind kind = Kind::kPoint;
+    std::uint32_t geometry = 0;   // kTriangle: the mesh
+    std::uint32_t primitive = 0;  // triangle, sphere, disk, or index among lights of its kind
+    bool two_sided = false;
+    float area = 0;
+    float choice = 0;  // probability
+    Rgb radiance;      // or intensity, or irradiance
+    Rgb power;
+  };
+
+  void Add(Emitter emitter);
+  [[nodiscard]] const Emitter& Choose(float u) const;
+  [[nodiscard]] const Emitter* EmitterOf(const SurfacePoint& point) const;
+  void PointOn(const Emitter& emitter, float u1, float u2, Vec3& position, Vec3& normal,
+               float& clearance) const;
+
+  const Scene& scene_;
+  Vec3 center_;
+  float radius_ = 0;  // of the scene's bounding sphere
+  std::vector<Emitter> emitters_;
+  std::vector<double> cumulative_;  // [emitters] of the choice
+  // [geometry]: number of its first emitter, or -1.
+  std::vector<std::int64_t> first_emitter_;
+  std::vector<std::int32_t> sphere_emitter_, disk_emitter_;
+  Rgb total_power_;
+  Rgb infinite_radiance_;
+  std::int64_t infinite_emitter_ = -1;
+  bool only_delta_ = true;
+};
+
+}  // namespace lucerna

@@ -1,0 +1,142 @@
+#include "render/wire/block_codec.h"
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "render/wire/bytes.h"
+
+namespace lucerna {
+namespace {
+
+// The last character is the version.
+constexpr std::string_view kBlockMagic = "LHB1";
+constexpr std::string_view kRadiiMagic = "LRC1";
+constexpr std::uint32_t kLargestOctahedralHalf = 65534;
+
+using Column = std::vector<std::uint32_t>;
+
+// Each value as its difference to the one before, wrapping, so that any 32 bits come back.
+template <typename ValueAt>
+void WriteDeltas(ByteWriter& writer, std::size_t rows, const ValueAt& value_at) {
+  Column deltas(rows);
+  std::uint32_t before = 0;
+  for (std::size_t i = 0; i < rows; ++i) {
+    const std::uint32_t value = value_at(i);
+    deltas[i] = ZigZag(static_cast<std::int32_t>(value - before));
+    before = value;
+  }
+  writer.Planes(deltas);
+}
+
+Column ReadDeltas(ByteReader& reader, std::size_t rows) {
+  Column column = reader.Planes32(rows);
+  std::uint32_t before = 0;
+  for (std::uint32_t& value : column) {
+    value = before + static_cast<std::uint32_t>(UnZigZag(value));
+    before = value;
+  }
+  return column;
+}
+
+bool IsOctahedral(std::uint32_t code) {
+  return (code >> 16) <= kLargestOctahedralHalf && (code & 0xFFFFU) <= kLargestOctahedralHalf;
+}
+
+Status Malformed(std::string_view what) {
+  return absl::InvalidArgumentError(absl::StrCat("malformed hitpoint block: ", std::string(what)));
+}
+
+}  // namespace
+
+std::string EncodeHitpointBlock(const HitpointBlock& block) {
+  ByteWriter writer;
+  writer.Bytes(kBlockMagic);
+  writer.Varint(block.size());
+  writer.Varint(block.glossy.size());
+  for (int axis = 0; axis < 3; ++axis) {
+    WriteDeltas(writer, block.size(), [&](std::size_t i) {
+      return std::bit_cast<std::uint32_t>(block.positions[i][axis]);
+    });
+  }
+  WriteDeltas(writer, block.size(), [&](std::size_t i) { return block.normals_oct[i]; });
+  const auto& glossy = block.glossy;
+  if (!glossy.empty()) {
+    WriteDeltas(writer, glossy.size(), [&](std::size_t i) { return glossy[i].hitpoint; });
+    WriteDeltas(writer, glossy.size(), [&](std::size_t i) { return glossy[i].material; });
+    WriteDeltas(writer, glossy.size(), [&](std::size_t i) { return glossy[i].to_eye_oct; });
+    WriteDeltas(writer, glossy.size(), [&](std::size_t i) { return glossy[i].shading_normal_oct; });
+  }
+  return writer.Take();
+}
+
+StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t max_hitpoints) {
+  ByteReader reader(bytes);
+  if (reader.Bytes(kBlockMagic.size()) != kBlockMagic) return Malformed("wrong magic or version");
+  const std::uint64_t rows = reader.Varint();
+  const std::uint64_t glossy_rows = reader.Varint();
+  if (rows > max_hitpoints || glossy_rows > rows) return Malformed("more rows than there can be");
+
+  const Column x = ReadDeltas(reader, rows);
+  const Column y = ReadDeltas(reader, rows);
+  const Column z = ReadDeltas(reader, rows);
+  HitpointBlock block;
+  block.normals_oct = ReadDeltas(reader, rows);
+  if (!reader.ok()) return Malformed("truncated or damaged columns");
+  block.positions.resize(rows);
+  for (std::size_t i = 0; i < rows; ++i) {
+    block.positions[i] = {std::bit_cast<float>(x[i]), std::bit_cast<float>(y[i]),
+                          std::bit_cast<float>(z[i])};
+    if (!IsFinite(block.positions[i])) return Malformed("a position is not finite");
+    if (!IsOctahedral(block.normals_oct[i])) return Malformed("a normal is not a direction");
+  }
+
+  if (glossy_rows > 0) {
+    const Column hitpoints = ReadDeltas(reader, glossy_rows);
+    const Column materials = ReadDeltas(reader, glossy_rows);
+    const Column to_eye = ReadDeltas(reader, glossy_rows);
+    const Column shading_normals = ReadDeltas(reader, glossy_rows);
+    if (!reader.ok()) return Malformed("truncated or damaged glossy columns");
+    block.glossy.resize(glossy_rows);
+    for (std::size_t i = 0; i < glossy_rows; ++i) {
+      block.glossy[i] = {hitpoints[i], materials[i], to_eye[i], shading_normals[i]};
+      if (hitpoints[i] >= rows || (i > 0 && hitpoints[i] <= hitpoints[i - 1])) {
+        return Malformed("glossy rows are out of order or out of range");
+      }
+      if (!IsOctahedral(to_eye[i]) || !IsOctahedral(shading_normals[i])) {
+        return Malformed("a glossy direction is not a direction");
+      }
+    }
+  }
+  if (!reader.finished()) return Malformed("bytes are left over");
+  return block;
+}
+
+std::string EncodeRadii(const RadiusColumn& radii) {
+  ByteWriter writer;
+  writer.Bytes(kRadiiMagic);
+  writer.Varint(radii.size());
+  WriteDeltas(writer, radii.size(),
+              [&](std::size_t i) { return std::bit_cast<std::uint32_t>(radii[i]); });
+  return writer.Take();
+}
+
+StatusOr<RadiusColumn> DecodeRadii(std::string_view bytes, std::size_t hitpoints) {
+  ByteReader reader(bytes);
+  if (reader.Bytes(kRadiiMagic.size()) != kRadiiMagic || reader.Varint() != hitpoints) {
+    return absl::InvalidArgumentError("malformed radii: wrong magic, version or count");
+  }
+  const Column bits = ReadDeltas(reader, hitpoints);
+  if (!reader.finished()) return absl::InvalidArgumentError("malformed radii: damaged column");
+  RadiusColumn radii(hitpoints);
+  for (std::size_t i = 0; i < hitpoints; ++i) {
+    radii[i] = std::bit_cast<float>(bits[i]);
+    if (!(radii[i] > 0) || !std::isfinite(radii[i])) {
+      return absl::InvalidArgumentError("malformed radii: a radius is not finite and positive");
+    }
+  }
+  return radii;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,31 @@
+// How do two processes of the house hold their connection?
+//
+// Both sides ping a silent connection, so that a machine that vanished is noticed within about
+// half a minute, and both bound what they receive. Traffic is not encrypted: a coordinator
+// listens on loopback unless its administrator says otherwise.
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <string>
+
+#include <grpcpp/grpcpp.h>
+
+namespace lucerna {
+
+// A manifest of 20,000 files is about 3 MiB; everything longer is cut into chunks.
+inline constexpr int kMaxMessageBytes = 16 << 20;
+
+// The deadline of a call that needs no waiting on the other side.
+inline constexpr std::chrono::seconds kCallTime{30};
+
+// A channel to `address` ("host:port"). Does not connect yet, and connects again by itself.
+[[nodiscard]] std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address);
+
+// The same agreement for a server.
+void SetUpConnections(grpc::ServerBuilder& builder);
+
+// Whether `address` ("host:port") can be reached from this machine only.
+[[nodiscard]] bool IsLoopback(const std::string& address);
+
+}  // namespace lucerna

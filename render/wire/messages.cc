@@ -1,0 +1,210 @@
+#include "render/wire/messages.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace lucerna {
+namespace {
+
+constexpr int kLargestSide = 65'536;                      // [pixels]
+constexpr std::int64_t kMostPhotons = 1'000'000'000'000;  // per pass
+constexpr int kLargestDepth = 10'000;
+constexpr std::int64_t kLongestSeconds = 9'000'000'000;  // fits in Duration
+constexpr std::int64_t kNanosPerSecond = 1'000'000'000;
+
+Status Outside(std::string_view field) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("the settings' ", std::string(field), " is out of range"));
+}
+
+bool IsBetween(double value, double low, double high) {
+  return value >= low && value <= high;
+}
+
+}  // namespace
+
+v1::SceneManifest ToProto(const SceneManifest& manifest) {
+  v1::SceneManifest message;
+  message.set_main_path(manifest.main_path);
+  for (const auto& [path, entry] : manifest.entries) {
+    v1::SceneManifest::Entry& item = *message.add_entries();
+    item.set_path(path);
+    item.set_digest(std::string(entry.digest.Bytes()));
+    item.set_size_bytes(entry.size_bytes);
+  }
+  return message;
+}
+
+StatusOr<SceneManifest> FromProto(const v1::SceneManifest& message, const SceneLimits& limits) {
+  if (static_cast<std::uint64_t>(message.entries_size()) > limits.max_files) {
+    return absl::InvalidArgumentError(absl::StrCat("a scene of ", message.entries_size(),
+                                                   " files has more than the ", limits.max_files,
+                                                   " that are allowed"));
+  }
+  SceneManifest manifest;
+  manifest.main_path = message.main_path();
+  std::uint64_t total_bytes = 0;
+  for (const v1::SceneManifest::Entry& item : message.entries()) {
+    LUCERNA_RETURN_IF_ERROR(CheckLogicalPath(item.path()));
+    LUCERNA_ASSIGN_OR_RETURN(const Digest digest, Digest::FromBytes(item.digest()));
+    if (item.size_bytes() > limits.max_total_bytes - total_bytes) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "the scene has more than the ", limits.max_total_bytes, " bytes that are allowed"));
+    }
+    total_bytes += item.size_bytes();
+    if (!manifest.entries.emplace(item.path(), SceneManifest::Entry{digest, item.size_bytes()})
+             .second) {
+      return absl::InvalidArgumentError(absl::StrCat("the scene lists ", item.path(), " twice"));
+    }
+  }
+  if (!manifest.entries.contains(manifest.main_path)) {
+    return absl::InvalidArgumentError("the scene's main file is not among its files");
+  }
+  return manifest;
+}
+
+v1::RenderOverrides ToProto(const RenderOverrides& overrides) {
+  v1::RenderOverrides message;
+  if (overrides.width) message.set_width(*overrides.width);
+  if (overrides.height) message.set_height(*overrides.height);
+  if (overrides.passes) message.set_passes(*overrides.passes);
+  if (overrides.photons_per_pass) message.set_photons_per_pass(*overrides.photons_per_pass);
+  if (overrides.time_s) message.set_time_s(*overrides.time_s);
+  if (overrides.seed) message.set_seed(*overrides.seed);
+  if (overrides.radius_controller) {
+    message.set_radius_controller(std::string(NameOf(*overrides.radius_controller)));
+  }
+  if (overrides.alpha) message.set_alpha(*overrides.alpha);
+  if (overrides.kernel) message.set_kernel(std::string(NameOf(*overrides.kernel)));
+  if (overrides.initial_radius) message.set_initial_radius(*overrides.initial_radius);
+  if (overrides.max_depth) message.set_max_depth(*overrides.max_depth);
+  return message;
+}
+
+StatusOr<RenderOverrides> FromProto(const v1::RenderOverrides& message) {
+  RenderOverrides overrides;
+  if (message.has_width()) overrides.width = message.width();
+  if (message.has_height()) overrides.height = message.height();
+  if (message.has_passes()) overrides.passes = message.passes();
+  if (message.has_photons_per_pass()) overrides.photons_per_pass = message.photons_per_pass();
+  if (message.has_seed()) overrides.seed = message.seed();
+  if (message.has_max_depth()) overrides.max_depth = message.max_depth();
+  if (message.has_time_s()) {
+    if (!std::isfinite(message.time_s())) return Outside("time");
+    overrides.time_s = message.time_s();
+  }
+  if (message.has_alpha()) {
+    if (!std::isfinite(message.alpha())) return Outside("alpha");
+    overrides.alpha = message.alpha();
+  }
+  if (message.has_initial_radius()) {
+    if (!std::isfinite(message.initial_radius())) return Outside("initial radius");
+    overrides.initial_radius = message.initial_radius();
+  }
+  if (message.has_radius_controller()) {
+    LUCERNA_ASSIGN_OR_RETURN(overrides.radius_controller,
+                             ParseRadiusController(message.radius_controller()));
+  }
+  if (message.has_kernel()) {
+    LUCERNA_ASSIGN_OR_RETURN(overrides.kernel, ParseKernel(message.kernel()));
+  }
+  return overrides;
+}
+
+v1::RenderSettings ToProto(const RenderSettings& settings) {
+  v1::RenderSettings message;
+  message.set_width(settings.width);
+  message.set_height(settings.height);
+  message.set_crop_x0(settings.crop_x0);
+  message.set_crop_y0(settings.crop_y0);
+  message.set_crop_x1(settings.crop_x1);
+  message.set_crop_y1(settings.crop_y1);
+  message.set_passes(settings.passes);
+  message.set_time_s(settings.time_s);
+  message.set_photons_per_pass(settings.photons_per_pass);
+  message.set_seed(settings.seed);
+  message.set_radius_controller(std::string(NameOf(settings.radius_controller)));
+  message.set_alpha(settings.alpha);
+  message.set_kernel(std::string(NameOf(settings.kernel)));
+  message.set_initial_radius(settings.initial_radius);
+  message.set_max_depth(settings.max_depth);
+  return message;
+}
+
+StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message) {
+  RenderSettings settings;
+  settings.width = message.width();
+  settings.height = message.height();
+  if (!IsBetween(settings.width, 1, kLargestSide)) return Outside("width");
+  if (!IsBetween(settings.height, 1, kLargestSide)) return Outside("height");
+  settings.crop_x0 = message.crop_x0();
+  settings.crop_y0 = message.crop_y0();
+  settings.crop_x1 = message.crop_x1();
+  settings.crop_y1 = message.crop_y1();
+  if (settings.crop_x0 < 0 || settings.crop_x0 >= settings.crop_x1 ||
+      settings.crop_x1 > settings.width || settings.crop_y0 < 0 ||
+      settings.crop_y0 >= settings.crop_y1 || settings.crop_y1 > settings.height) {
+    return Outside("crop window");
+  }
+  settings.passes = message.passes();
+  if (settings.passes < 0) return Outside("number of passes");
+  settings.time_s = message.time_s();
+  if (!(settings.time_s >= 0) || !std::isfinite(settings.time_s)) return Outside("time");
+  settings.photons_per_pass = message.photons_per_pass();
+  if (settings.photons_per_pass < 1 || settings.photons_per_pass > kMostPhotons) {
+    return Outside("number of photons per pass");
+  }
+  settings.seed = message.seed();
+  LUCERNA_ASSIGN_OR_RETURN(settings.radius_controller,
+                           ParseRadiusController(message.radius_controller()));
+  settings.alpha = message.alpha();
+  if (!(settings.alpha > 0 && settings.alpha < 1)) return Outside("alpha");
+  LUCERNA_ASSIGN_OR_RETURN(settings.kernel, ParseKernel(message.kernel()));
+  settings.initial_radius = message.initial_radius();
+  if (!(settings.initial_radius >= 0) || !std::isfinite(settings.initial_radius)) {
+    return Outside("initial radius");
+  }
+  settings.max_depth = message.max_depth();
+  if (!IsBetween(settings.max_depth, 1, kLargestDepth)) return Outside("depth");
+  return settings;
+}
+
+v1::Tally ToProto(const BatchTally& tally) {
+  v1::Tally message;
+  message.set_photons(tally.photons);
+  message.set_rays(tally.rays);
+  message.set_deposits(tally.deposits);
+  message.set_pairs(tally.pairs);
+  message.set_dropped(tally.dropped);
+  return message;
+}
+
+BatchTally FromProto(const v1::Tally& message) {
+  return {message.photons(), message.rays(), message.deposits(), message.pairs(),
+          message.dropped()};
+}
+
+google::protobuf::Duration ToProto(Duration duration) {
+  google::protobuf::Duration message;
+  message.set_seconds(duration.count() / kNanosPerSecond);
+  message.set_nanos(static_cast<std::int32_t>(duration.count() % kNanosPerSecond));
+  return message;
+}
+
+Duration FromProto(const google::protobuf::Duration& message) {
+  if (message.seconds() < 0 || message.nanos() < 0) return Duration::zero();
+  return std::chrono::seconds(std::min(message.seconds(), kLongestSeconds)) +
+         std::chrono::nanoseconds(
+             std::min(message.nanos(), static_cast<std::int32_t>(kNanosPerSecond - 1)));
+}
+
+google::protobuf::Timestamp ToProto(WallTime time) {
+  const Duration since_epoch = time.time_since_epoch();
+  google::protobuf::Timestamp message;
+  message.set_seconds(since_epoch.count() / kNanosPerSecond);
+  message.set_nanos(static_cast<std::int32_t>(since_epoch.count() % kNanosPerSecond));
+  return message;
+}
+
+}  // namespace lucerna

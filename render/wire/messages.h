@@ -1,0 +1,38 @@
+// What do our values look like as messages, and may this message be believed?
+//
+// ToProto never fails. FromProto checks every field and gives back a value that keeps all promises
+// of its type, or INVALID_ARGUMENT with one sentence.
+#pragma once
+
+#include "proto/lucerna/v1/jobs.pb.h"
+#include "proto/lucerna/v1/values.pb.h"
+#include "render/base/clock.h"
+#include "render/base/status.h"
+#include "render/estimate/accumulation.h"
+#include "render/scene/render_settings.h"
+#include "render/scene/scene_files.h"
+
+namespace lucerna {
+
+[[nodiscard]] v1::SceneManifest ToProto(const SceneManifest& manifest);
+// Also holds the manifest to `limits`, and its main file to be one of its files.
+[[nodiscard]] StatusOr<SceneManifest> FromProto(const v1::SceneManifest& message,
+                                                const SceneLimits& limits = {});
+
+[[nodiscard]] v1::RenderOverrides ToProto(const RenderOverrides& overrides);
+// Ranges are for ResolveSettings to check; here numbers are finite and names are known.
+[[nodiscard]] StatusOr<RenderOverrides> FromProto(const v1::RenderOverrides& message);
+
+[[nodiscard]] v1::RenderSettings ToProto(const RenderSettings& settings);
+[[nodiscard]] StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message);
+
+[[nodiscard]] v1::Tally ToProto(const BatchTally& tally);
+[[nodiscard]] BatchTally FromProto(const v1::Tally& message);
+
+[[nodiscard]] google::protobuf::Duration ToProto(Duration duration);
+// Negative durations and such as do not fit become 0 and the longest there is.
+[[nodiscard]] Duration FromProto(const google::protobuf::Duration& message);
+
+[[nodiscard]] google::protobuf::Timestamp ToProto(WallTime time);
+
+}  // namespace lucerna

@@ -1,0 +1,83 @@
+#include "server/asset_service.h"
+
+#include <optional>
+#include <utility>
+
+#include "render/scene/scene_files.h"
+#include "render/wire/chunks.h"
+#include "render/wire/grpc_status.h"
+
+namespace lucerna {
+namespace {
+
+class UploadReactor final : public grpc::ServerReadReactor<v1::UploadRequest> {
+ public:
+  explicit UploadReactor(BlobStore& blobs) : blobs_(blobs) { StartRead(&part_); }
+
+  void OnReadDone(bool ok) override {
+    if (!ok) {
+      Finish(ToGrpc(Keep()));
+      return;
+    }
+    if (const Status status = Take(); !status.ok()) {
+      Finish(ToGrpc(status));
+      return;
+    }
+    StartRead(&part_);
+  }
+  void OnDone() override { delete this; }
+
+ private:
+  Status Take() {
+    if (part_.has_header() == collector_.has_value()) {
+      return absl::InvalidArgumentError("an upload is one header and then bytes");
+    }
+    if (collector_) return collector_->Add(part_.bytes());
+    LUCERNA_ASSIGN_OR_RETURN(digest_, Digest::FromBytes(part_.header().digest()));
+    if (part_.header().size_bytes() > SceneLimits().max_total_bytes) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("a file of ", part_.header().size_bytes(), " bytes is larger than the ",
+                       SceneLimits().max_total_bytes, " that are allowed"));
+    }
+    collector_.emplace(digest_, part_.header().size_bytes());
+    return absl::OkStatus();
+  }
+
+  Status Keep() {
+    if (!collector_) return absl::InvalidArgumentError("an upload begins with a header");
+    LUCERNA_ASSIGN_OR_RETURN(std::string bytes, collector_->Finish());
+    return blobs_.Put(digest_, std::move(bytes));
+  }
+
+  BlobStore& blobs_;
+  v1::UploadRequest part_;
+  Digest digest_;
+  std::optional<ChunkCollector> collector_;
+};
+
+}  // namespace
+
+grpc::ServerUnaryReactor* AssetService::FindMissing(grpc::CallbackServerContext* context,
+                                                    const v1::FindMissingRequest* request,
+                                                    v1::FindMissingResponse* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  Status status;
+  if (static_cast<std::uint64_t>(request->digests_size()) > SceneLimits().max_files) {
+    status = absl::InvalidArgumentError(
+        absl::StrCat("more than ", SceneLimits().max_files, " digests in one question"));
+  }
+  for (int i = 0; status.ok() && i < request->digests_size(); ++i) {
+    const StatusOr<Digest> digest = Digest::FromBytes(request->digests(i));
+    status = digest.status();
+    if (digest.ok() && !blobs_.Has(*digest)) response->add_missing(request->digests(i));
+  }
+  reactor->Finish(ToGrpc(status));
+  return reactor;
+}
+
+grpc::ServerReadReactor<v1::UploadRequest>* AssetService::Upload(
+    grpc::CallbackServerContext* /*context*/, v1::UploadResponse* /*response*/) {
+  return new UploadReactor(blobs_);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,30 @@
+// The door through which the files of a scene come in.
+//
+// Turns bytes into blobs of the store. Nothing is decided here.
+//
+// Threads: gRPC calls in from its own pool. Handlers never wait.
+#pragma once
+
+#include <grpcpp/grpcpp.h>
+
+#include "proto/lucerna/v1/assets.grpc.pb.h"
+#include "server/blob_store.h"
+
+namespace lucerna {
+
+class AssetService final : public v1::AssetService::CallbackService {
+ public:
+  // The store outlives the service.
+  explicit AssetService(BlobStore& blobs) : blobs_(blobs) {}
+
+  grpc::ServerUnaryReactor* FindMissing(grpc::CallbackServerContext* context,
+                                        const v1::FindMissingRequest* request,
+                                        v1::FindMissingResponse* response) override;
+  grpc::ServerReadReactor<v1::UploadRequest>* Upload(grpc::CallbackServerContext* context,
+                                                     v1::UploadResponse* response) override;
+
+ private:
+  BlobStore& blobs_;
+};
+
+}  // namespace lucerna

@@ -1,0 +1,108 @@
+#include "server/blob_store.h"
+
+#include <utility>
+
+namespace lucerna {
+
+Status BlobStore::Put(const Digest& digest, std::string bytes) {
+  const MutexLock lock(mutex_);
+  return PutLocked(digest, std::move(bytes), 0);
+}
+
+Status BlobStore::PutPinned(const Digest& digest, std::string bytes) {
+  const MutexLock lock(mutex_);
+  return PutLocked(digest, std::move(bytes), 1);
+}
+
+Status BlobStore::PutLocked(const Digest& digest, std::string bytes, int pins) {
+  if (const auto found = entries_.find(digest); found != entries_.end()) {
+    if (pins > 0) PinLocked(found->second);
+    return absl::OkStatus();
+  }
+  const std::uint64_t size = bytes.size();
+  if (!MakeRoom(size)) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "the coordinator's store of ", max_bytes_, " bytes is full: ", pinned_bytes_,
+        " are in use and ", size, " more do not fit; start it with a larger --max-store-bytes"));
+  }
+  Entry entry;
+  entry.bytes = std::make_shared<const std::string>(std::move(bytes));
+  entry.pins = pins;
+  if (pins == 0) {
+    entry.place = unpinned_.insert(unpinned_.end(), digest);
+  } else {
+    pinned_bytes_ += size;
+  }
+  size_bytes_ += size;
+  entries_.emplace(digest, std::move(entry));
+  return absl::OkStatus();
+}
+
+bool BlobStore::MakeRoom(std::uint64_t bytes) {
+  if (bytes > max_bytes_ || pinned_bytes_ > max_bytes_ - bytes) return false;
+  while (size_bytes_ > max_bytes_ - bytes) {
+    const auto oldest = entries_.find(unpinned_.front());
+    size_bytes_ -= oldest->second.bytes->size();
+    entries_.erase(oldest);
+    unpinned_.pop_front();
+  }
+  return true;
+}
+
+StatusOr<Blob> BlobStore::Get(const Digest& digest) {
+  const MutexLock lock(mutex_);
+  const auto found = entries_.find(digest);
+  if (found == entries_.end()) {
+    return absl::NotFoundError(absl::StrCat("there are no bytes named ", digest.Hex()));
+  }
+  Entry& entry = found->second;
+  if (entry.pins == 0) unpinned_.splice(unpinned_.end(), unpinned_, entry.place);
+  return entry.bytes;
+}
+
+bool BlobStore::Has(const Digest& digest) const {
+  const MutexLock lock(mutex_);
+  return entries_.contains(digest);
+}
+
+Status BlobStore::Pin(const Digest& digest) {
+  const MutexLock lock(mutex_);
+  const auto found = entries_.find(digest);
+  if (found == entries_.end()) {
+    return absl::NotFoundError(absl::StrCat("there are no bytes named ", digest.Hex()));
+  }
+  PinLocked(found->second);
+  return absl::OkStatus();
+}
+
+void BlobStore::PinLocked(Entry& entry) {
+  if (entry.pins++ > 0) return;
+  unpinned_.erase(entry.place);
+  pinned_bytes_ += entry.bytes->size();
+}
+
+void BlobStore::Unpin(const Digest& digest) {
+  const MutexLock lock(mutex_);
+  const auto found = entries_.find(digest);
+  LUCERNA_CHECK(found != entries_.end() && found->second.pins > 0);
+  if (--found->second.pins > 0) return;
+  pinned_bytes_ -= found->second.bytes->size();
+  found->second.place = unpinned_.insert(unpinned_.end(), digest);
+}
+
+void BlobStore::UnpinAndDrop(const Digest& digest) {
+  const MutexLock lock(mutex_);
+  const auto found = entries_.find(digest);
+  LUCERNA_CHECK(found != entries_.end() && found->second.pins > 0);
+  if (--found->second.pins > 0) return;
+  pinned_bytes_ -= found->second.bytes->size();
+  size_bytes_ -= found->second.bytes->size();
+  entries_.erase(found);
+}
+
+std::uint64_t BlobStore::size_bytes() const {
+  const MutexLock lock(mutex_);
+  return size_bytes_;
+}
+
+}  // namespace lucerna

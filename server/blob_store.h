@@ -1,0 +1,68 @@
+// Which bytes does the coordinator hold, by their digest?
+//
+// Scene files, hitpoint blocks and radii, in memory, within a bound. Bytes that something needs
+// are pinned, once for every need. Bytes nobody needs stay for the next job until the room is
+// wanted, least recently used first.
+//
+// Threads: any; what Get returned stays valid for as long as it is held.
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <string>
+#include <unordered_map>
+
+#include "render/base/digest.h"
+#include "render/base/mutex.h"
+#include "render/base/status.h"
+
+namespace lucerna {
+
+using Blob = std::shared_ptr<const std::string>;
+
+class BlobStore {
+ public:
+  explicit BlobStore(std::uint64_t max_bytes) : max_bytes_(max_bytes) {}
+
+  // Keeps `bytes`, whose digest the caller has made sure of. Bytes already there are kept once.
+  // Errors: RESOURCE_EXHAUSTED when they do not fit beside what is pinned.
+  [[nodiscard]] Status Put(const Digest& digest, std::string bytes);
+  // As Put, and pinned in the same breath.
+  [[nodiscard]] Status PutPinned(const Digest& digest, std::string bytes);
+
+  // Errors: NOT_FOUND.
+  [[nodiscard]] StatusOr<Blob> Get(const Digest& digest);
+  [[nodiscard]] bool Has(const Digest& digest) const;
+
+  // Errors: NOT_FOUND.
+  [[nodiscard]] Status Pin(const Digest& digest);
+  // Requires a Pin that was not yet undone. The bytes stay while there is room.
+  void Unpin(const Digest& digest);
+  // As Unpin, and the bytes go with the last pin: nobody will ask for them again.
+  void UnpinAndDrop(const Digest& digest);
+
+  [[nodiscard]] std::uint64_t size_bytes() const;
+
+ private:
+  struct Entry {
+    Blob bytes;
+    int pins = 0;
+    // Its place in unpinned_; meaningful only when pins == 0.
+    std::list<Digest>::iterator place;
+  };
+  using Entries = std::unordered_map<Digest, Entry>;
+
+  Status PutLocked(const Digest& digest, std::string bytes, int pins) LUCERNA_REQUIRES(mutex_);
+  void PinLocked(Entry& entry) LUCERNA_REQUIRES(mutex_);
+  bool MakeRoom(std::uint64_t bytes) LUCERNA_REQUIRES(mutex_);
+
+  const std::uint64_t max_bytes_;
+  mutable Mutex mutex_;
+  Entries entries_ LUCERNA_GUARDED_BY(mutex_);
+  std::list<Digest> unpinned_ LUCERNA_GUARDED_BY(mutex_);  // least recently used first
+  std::uint64_t size_bytes_ LUCERNA_GUARDED_BY(mutex_) = 0;
+  std::uint64_t pinned_bytes_ LUCERNA_GUARDED_BY(mutex_) = 0;
+};
+
+}  // namespace lucerna

@@ -1,0 +1,46 @@
+#include "server/direct_light.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lucerna {
+
+float PowerHeuristic(float drawn, float other) {
+  if (drawn >= other) {
+    if (!(drawn > 0)) return 0;
+    const float ratio = other / drawn;
+    return 1 / (1 + ratio * ratio);
+  }
+  const float ratio = drawn / other;
+  return ratio * ratio / (1 + ratio * ratio);
+}
+
+bool SidesAgree(const SurfacePoint& surface, Vec3 wo, Vec3 wi, bool transmits) {
+  if (!surface.has_shading_normal) return true;
+  const bool same_side =
+      Dot(wo, surface.geometric_normal) * Dot(wi, surface.geometric_normal) > 0;
+  return same_side != transmits;
+}
+
+Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
+                         const ShadingPoint& point, const SobolPoint& u, int& rays) {
+  LightSample light;
+  if (!lights.SampleDirect(point.surface.position, u[3], u[4], u[5], light)) return {};
+  const Vec3 wo = point.frame.ToLocal(point.wo);
+  const Vec3 wi = point.frame.ToLocal(light.wi);
+  const Rgb bsdf = EvaluateBsdf(point.material, wo, wi, Carried::kRadiance);
+  if (IsBlack(bsdf)) return {};
+  if (!SidesAgree(point.surface, point.wo, light.wi, wo.z * wi.z < 0)) return {};
+  Rgb radiance = bsdf * light.radiance_over_pdf * std::abs(wi.z);
+  if (light.pdf > 0) {
+    radiance *= PowerHeuristic(light.pdf, PdfBsdf(point.material, wo, wi));
+  }
+  if (IsBlack(radiance)) return {};
+  ++rays;
+  // Short of the light by more than the light's own rounding.
+  const Ray shadow = {LeavingPoint(point.surface, light.wi), light.wi,
+                      light.distance * (1 - 1e-4F)};
+  return intersector.Occluded(shadow) ? Rgb{} : radiance;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,39 @@
+// How much light reaches a point straight from the lights?
+//
+// One sample of the lights and one of the BSDF, weighted by the power heuristic (Veach 1997,
+// section 9.2.4). The same integral that photons arriving straight from a light would estimate;
+// those are therefore never kept.
+#pragma once
+
+#include "render/geometry/intersector.h"
+#include "render/math/rgb.h"
+#include "render/math/sobol.h"
+#include "render/transport/bsdf.h"
+#include "render/transport/light.h"
+
+namespace lucerna {
+
+// A point where direct light is asked for.
+struct ShadingPoint {
+  const SurfacePoint& surface;
+  const Material& material;
+  const Frame& frame;  // around the shading normal, on the outside
+  Vec3 wo;             // towards the eye, world
+};
+
+// The weight of a sample drawn with density `drawn` beside one that could have been drawn with
+// `other`. Densities are divided by the larger one first, so that squares neither overflow nor
+// vanish.
+[[nodiscard]] float PowerHeuristic(float drawn, float other);
+
+// Radiance towards wo of light drawn from the lights: BSDF × light × MIS weight, zero when
+// something is in the way. `rays` counts what was traced.
+[[nodiscard]] Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
+                                       const ShadingPoint& point, const SobolPoint& u, int& rays);
+
+// True when wi leaves on the side of the surface that the BSDF means: reflection on wo's side of
+// the geometric normal too, transmission on the other. Keeps light from leaking through surfaces
+// whose shading normals bend far.
+[[nodiscard]] bool SidesAgree(const SurfacePoint& surface, Vec3 wo, Vec3 wi, bool transmits);
+
+}  // namespace lucerna

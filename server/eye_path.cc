@@ -1,0 +1,230 @@
+#include "server/eye_path.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/math/warp.h"
+#include "render/transport/bsdf.h"
+#include "server/direct_light.h"
+
+namespace lucerna {
+namespace {
+
+// Eye paths weaker than this end by roulette more often than they go on.
+constexpr float kRouletteWeight = 0.5F;
+// Branches of the specular tree weaker than this end by roulette. A lamp seen by way of two inner
+// reflections of a glass surface (about 0.04 each) is then still found by one path in ten.
+constexpr float kBranchWeight = 0.01F;
+
+}  // namespace
+
+EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
+                             const Intersector& intersector, const LightSet& lights)
+    : scene_(scene),
+      settings_(settings),
+      intersector_(intersector),
+      lights_(lights),
+      filter_x_(scene.filter, scene.filter.radius_x),
+      filter_y_(scene.filter, scene.filter.radius_y) {
+  const Window window = ScreenWindow(scene.camera, settings.width, settings.height);
+  window_low_x_ = window.low_x;
+  window_high_y_ = window.high_y;
+  pixel_width_ = (window.high_x - window.low_x) / settings.width;
+  pixel_height_ = (window.high_y - window.low_y) / settings.height;
+}
+
+Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const {
+  const SobolPoint u = sampler.ForCamera();
+  const double film_x = settings_.crop_x0 + x + 0.5 +
+                        static_cast<double>(filter_x_.Sample(u[0], weight));
+  const double film_y = settings_.crop_y0 + y + 0.5 +
+                        static_cast<double>(filter_y_.Sample(u[1], weight));
+  const Camera& camera = scene_.camera;
+  Vec3 origin;
+  Vec3 direction = {static_cast<float>(window_low_x_ + film_x * pixel_width_),
+                    static_cast<float>(window_high_y_ - film_y * pixel_height_), 1};
+  if (camera.lens_radius > 0) {
+    // A thin lens: all rays of one film point meet on the plane of focus.
+    const Vec3 focus = direction * static_cast<float>(camera.focal_distance);
+    origin = SquareToDisk(u[2], u[3]) * static_cast<float>(camera.lens_radius);
+    direction = focus - origin;
+  }
+  return {camera.camera_to_world.Point(origin),
+          Normalize(camera.camera_to_world.Vector(direction)), HUGE_VALF};
+}
+
+EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass) const {
+  const auto pixel = static_cast<std::uint64_t>(settings_.crop_y0 + y) *
+                         static_cast<std::uint64_t>(settings_.width) +
+                     static_cast<std::uint64_t>(settings_.crop_x0 + x);
+  const PixelSampler sampler(settings_.seed, pixel, pass);
+  // The filter's weight is kept out of the walk, because it can be negative.
+  float filter_weight = 1;
+  EyePath path = Walk(CameraRay(sampler, x, y, filter_weight), sampler);
+  path.direct *= filter_weight;
+  path.weight *= filter_weight;
+  return path;
+}
+
+Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, KeyedRng rng,
+                                   int& rays) const {
+  struct Branch {
+    Ray ray;
+    Rgb weight;
+    int vertex;
+  };
+  // A pair at each vertex, of which one is followed at once: the stack grows by one a vertex.
+  std::vector<Branch> branches;
+  const auto branch_at = [&](const SurfacePoint& surface, Vec3 wo, Rgb weight, int vertex) {
+    if (vertex >= settings_.max_depth) return;
+    const Material& material = scene_.materials[surface.material];
+    if (!IsSmooth(material)) return;
+    const Frame frame(surface.shading_normal);
+    // Lobe 0 is the reflection and lobe 1 - ulp the refraction, with the weight of its share.
+    const Vec3 wo_local = frame.ToLocal(wo);
+    float cos_t = 0;
+    const bool is_dielectric = material.kind == Material::Kind::kDielectric;
+    const float reflectance =
+        is_dielectric ? FresnelDielectric(wo_local.z, material.ior, cos_t) : 1.0F;
+    for (const float lobe : {0.0F, 0x1.fffffep-1F}) {
+      const float share = lobe == 0 ? reflectance : 1 - reflectance;
+      if (!(share > 0)) continue;
+      BsdfSample sample;
+      if (!SampleBsdf(material, wo_local, lobe, 0, 0, Carried::kRadiance, sample)) continue;
+      const Vec3 wi = frame.ToWorld(sample.wi);
+      if (!SidesAgree(surface, wo, wi, wo_local.z * sample.wi.z < 0)) continue;
+      Rgb next = weight * sample.weight * share;
+      const float strength = MaxChannel(next);
+      if (strength < kBranchWeight) {
+        if (!(rng.Uniform() * kBranchWeight < strength)) continue;
+        next *= kBranchWeight / strength;
+      }
+      branches.push_back({{LeavingPoint(surface, wi), wi, HUGE_VALF}, next, vertex + 1});
+    }
+  };
+  Rgb seen;
+  branch_at(first, first_wo, Gray(1), 0);
+  while (!branches.empty()) {
+    const Branch branch = branches.back();
+    branches.pop_back();
+    Hit hit;
+    ++rays;
+    if (!intersector_.Intersect(branch.ray, hit)) {
+      seen += branch.weight * lights_.InfiniteRadiance();
+      continue;
+    }
+    const SurfacePoint surface = intersector_.SurfaceAt(branch.ray, hit);
+    const Vec3 wo = -branch.ray.direction;
+    seen += branch.weight * lights_.EmittedRadiance(surface, wo);
+    branch_at(surface, wo, branch.weight, branch.vertex);
+  }
+  return seen;
+}
+
+EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
+  EyePath path;
+  Rgb weight = Gray(1);
+  float length = 0;
+  // The density of the last scattering [sr⁻¹] when the lights were sampled there too, and where.
+  float scatter_pdf = 0;
+  Vec3 scatter_position;
+  // Emission at the end of a chain of smooth surfaces from the camera is collected from the whole
+  // tree of their branches: a small lamp seen in glass would otherwise be one bright speck in
+  // thousands of passes.
+  bool emission_was_collected = false;
+
+  for (int vertex = 0;; ++vertex) {
+    Hit hit;
+    ++path.rays;
+    if (!intersector_.Intersect(ray, hit)) {
+      if (emission_was_collected) return path;
+      const float mis =
+          scatter_pdf > 0 ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite()) : 1;
+      path.direct += weight * lights_.InfiniteRadiance() * mis;
+      return path;
+    }
+    const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+    const Vec3 wo = -ray.direction;
+    length += hit.t;
+    const Rgb emitted = lights_.EmittedRadiance(surface, wo);
+    if (!IsBlack(emitted) && !emission_was_collected) {
+      const float mis =
+          scatter_pdf > 0
+              ? PowerHeuristic(scatter_pdf, lights_.PdfDirect(scatter_position, surface))
+              : 1;
+      path.direct += weight * emitted * mis;
+    }
+    const Material& material = scene_.materials[surface.material];
+    if (vertex == 0 || Gathers(material)) {
+      path.features = {AlbedoOf(material), FaceForward(surface.shading_normal, wo), length};
+    }
+    if (vertex >= settings_.max_depth) return path;
+
+    const Frame frame(surface.shading_normal);
+    const SobolPoint u = sampler.ForVertex(vertex);
+    if (IsSmooth(material)) {
+      if (vertex == 0 && !lights_.OnlyDelta()) {
+        path.direct += EmissionThrough(surface, wo, sampler.ForBranches(), path.rays);
+        emission_was_collected = true;
+      }
+    } else {
+      emission_was_collected = false;
+      const ShadingPoint point = {surface, material, frame, wo};
+      path.direct += weight * LightSampledRadiance(intersector_, lights_, point, u, path.rays);
+    }
+
+    BsdfSample sample;
+    bool scattered = SampleBsdf(material, frame.ToLocal(wo), u[0], u[1], u[2], Carried::kRadiance,
+                                sample);
+    Vec3 wi;
+    if (scattered) {
+      wi = frame.ToWorld(sample.wi);
+      const bool transmits = sample.wi.z * Dot(frame.n, wo) < 0;
+      scattered = SidesAgree(surface, wo, wi, transmits);
+    }
+
+    if (Gathers(material)) {
+      // Half of the direct light: what a scattered ray finds of the lights themselves.
+      if (scattered && !lights_.OnlyDelta()) {
+        const Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
+        ++path.rays;
+        if (!intersector_.Intersect(probe, hit)) {
+          path.direct += weight * sample.weight * lights_.InfiniteRadiance() *
+                         PowerHeuristic(sample.pdf, lights_.PdfDirectInfinite());
+        } else {
+          const SurfacePoint light = intersector_.SurfaceAt(probe, hit);
+          const Rgb radiance = lights_.EmittedRadiance(light, -wi);
+          if (!IsBlack(radiance)) {
+            path.direct +=
+                weight * sample.weight * radiance *
+                PowerHeuristic(sample.pdf, lights_.PdfDirect(surface.position, light));
+          }
+        }
+      }
+      path.has_hitpoint = true;
+      path.position = surface.position;
+      path.normal = FaceForward(surface.geometric_normal, wo);
+      path.is_glossy = material.kind != Material::Kind::kDiffuse;
+      path.material = surface.material;
+      path.to_eye = wo;
+      path.shading_normal = surface.shading_normal;
+      path.weight = path.is_glossy ? weight : weight * material.reflectance * kInversePi;
+      path.footprint = length * static_cast<float>(std::sqrt(pixel_width_ * pixel_height_));
+      return path;
+    }
+
+    if (!scattered) return path;
+    weight *= sample.weight;
+    scatter_pdf = sample.is_delta ? 0 : sample.pdf;
+    scatter_position = surface.position;
+    const float strength = MaxChannel(weight);
+    if (!(strength > 0)) return path;
+    if (vertex > 3 && strength < kRouletteWeight) {
+      if (!(u[6] < strength)) return path;
+      weight *= 1 / strength;
+    }
+    ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
+  }
+}
+
+}  // namespace lucerna

@@ -1,0 +1,67 @@
+// What does one eye path see?
+#pragma once
+
+#include <cstdint>
+
+#include "render/geometry/intersector.h"
+#include "render/math/rgb.h"
+#include "render/math/vector.h"
+#include "render/scene/render_settings.h"
+#include "render/scene/scene.h"
+#include "render/transport/light.h"
+#include "server/pixel_sampler.h"
+
+namespace lucerna {
+
+// What an eye path saw at its first gathering surface, for the feature layers.
+struct EyeFeatures {
+  Rgb albedo;
+  Vec3 normal;                 // world, shading normal on the eye's side
+  float distance = HUGE_VALF;  // along the path [scene units]
+};
+
+// The end of one eye path.
+struct EyePath {
+  Rgb direct;  // radiance that needs no photons
+  EyeFeatures features;
+  bool has_hitpoint = false;
+  // Of the hitpoint; meaningful when there is one.
+  Vec3 position;
+  Vec3 normal;  // geometric, on the eye's side
+  bool is_glossy = false;
+  std::uint32_t material = 0;
+  Vec3 to_eye, shading_normal;  // glossy only
+  Rgb weight;                   // from gathered flux density to radiance
+  float footprint = 0;          // width of the pixel at the hitpoint [scene units]
+  int rays = 0;
+};
+
+class EyePathTracer {
+ public:
+  // Keeps references to all.
+  EyePathTracer(const Scene& scene, const RenderSettings& settings, const Intersector& intersector,
+                const LightSet& lights);
+
+  // The eye path of a pixel of the crop window in one pass. Threads: any.
+  [[nodiscard]] EyePath Trace(int x, int y, std::uint64_t pass) const;
+
+  [[nodiscard]] const RenderSettings& settings() const { return settings_; }
+
+ private:
+  [[nodiscard]] Ray CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const;
+  [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler) const;
+  // Radiance that leaves a smooth surface towards `first_wo` and was emitted where a chain of
+  // smooth surfaces ends: reflections and refractions are all followed, not drawn.
+  [[nodiscard]] Rgb EmissionThrough(const SurfacePoint& first, Vec3 first_wo, KeyedRng rng,
+                                    int& rays) const;
+
+  const Scene& scene_;
+  const RenderSettings& settings_;
+  const Intersector& intersector_;
+  const LightSet& lights_;
+  FilterSampler filter_x_, filter_y_;
+  double window_low_x_, window_high_y_;  // of the whole image on the plane z = 1
+  double pixel_width_, pixel_height_;    // on that plane
+};
+
+}  // namespace lucerna

@@ -1,0 +1,39 @@
+// Where do the eye paths of one pass end, and what light do they bring without photons?
+//
+// One eye path per pixel and pass goes from the camera through smooth surfaces until it meets one
+// where photons can be gathered; that is its hitpoint. Emission seen on the way and direct light
+// at the hitpoint are added here; photons later bring the rest.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render/base/parallel.h"
+#include "render/estimate/hitpoint_block.h"
+#include "render/estimate/statistics.h"
+#include "render/math/rgb.h"
+#include "render/math/vector.h"
+#include "server/eye_path.h"
+
+namespace lucerna {
+
+struct EyePass {
+  std::uint64_t pass = 0;
+  HitpointBlock block;
+  // Per hitpoint, in the block's order (see HitpointRows).
+  std::vector<std::uint32_t> pixels;  // row-major in the crop window
+  std::vector<Rgb> weights;
+  std::vector<float> unit_radii;
+  // Per pixel of the crop window.
+  std::vector<Rgb> direct;
+  std::vector<EyeFeatures> features;
+  std::uint64_t rays = 0;
+
+  [[nodiscard]] HitpointRows rows() const { return {pixels, weights, unit_radii}; }
+};
+
+// Traces one eye path for every pixel. Depends on the tracer's job and `pass` alone.
+[[nodiscard]] EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass,
+                                        ThreadTeam& team);
+
+}  // namespace lucerna

@@ -1,0 +1,88 @@
+#include "server/job.h"
+
+#include <algorithm>
+#include <charconv>
+
+namespace lucerna {
+namespace {
+
+// The shortest text that reads back as the same number.
+std::string NumberText(double value) {
+  std::string text(32, '\0');
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
+  text.resize(static_cast<std::size_t>(end - text.data()));
+  return text;
+}
+
+}  // namespace
+
+bool JobLife::Prepare() {
+  if (state_ != JobState::kQueued) return false;
+  state_ = JobState::kPreparing;
+  return true;
+}
+
+bool JobLife::Run(SteadyTime now) {
+  if (state_ != JobState::kPreparing) return false;
+  state_ = JobState::kRunning;
+  started_at_ = now;
+  return true;
+}
+
+bool JobLife::End(JobState state, SteadyTime now) {
+  if (has_ended()) return false;
+  state_ = state;
+  ended_at_ = now;
+  return true;
+}
+
+bool JobLife::Succeed(StopReason reason, SteadyTime now) {
+  if (state_ != JobState::kRunning) return false;
+  stop_reason_ = reason;
+  return End(JobState::kSucceeded, now);
+}
+
+bool JobLife::Cancel(SteadyTime now) {
+  return End(JobState::kCancelled, now);
+}
+
+bool JobLife::Fail(std::string failure, SteadyTime now) {
+  if (!End(JobState::kFailed, now)) return false;
+  failure_ = std::move(failure);
+  return true;
+}
+
+Duration JobLife::Running(SteadyTime now) const {
+  if (!started_at_) return Duration::zero();
+  return (ended_at_ ? *ended_at_ : now) - *started_at_;
+}
+
+void SlidingRate::Add(std::uint64_t events, SteadyTime now) {
+  events_.emplace_back(now, events);
+  while (events_.front().first + window_ < now)
+    events_.pop_front();
+}
+
+double SlidingRate::PerSecond(SteadyTime since, SteadyTime now) const {
+  const Duration span = std::min(window_, now - since);
+  if (span <= Duration::zero()) return 0;
+  std::uint64_t sum = 0;
+  for (const auto& [when, events] : events_) {
+    if (when + span >= now) sum += events;
+  }
+  return static_cast<double>(sum) / Seconds(span);
+}
+
+std::string SettingsText(const RenderSettings& settings) {
+  return absl::StrCat(
+      "size=", settings.width, "x", settings.height, " crop=", settings.crop_x0, ",",
+      settings.crop_y0, ",", settings.crop_x1, ",", settings.crop_y1,
+      " photons-per-pass=", settings.photons_per_pass, " seed=", settings.seed,
+      " radius-controller=", std::string(NameOf(settings.radius_controller)),
+      " alpha=", NumberText(settings.alpha), " kernel=", std::string(NameOf(settings.kernel)),
+      " initial-radius=",
+      settings.initial_radius == 0 ? std::string("auto") : NumberText(settings.initial_radius),
+      " max-depth=", settings.max_depth);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,111 @@
+// Where does a job stand, and what has it cost so far?
+//
+// A job's life is a small state machine that only moves forward:
+//
+//   queued -> preparing -> running -> succeeded
+//   any of the first three -> cancelled or failed
+//
+// An ended job never changes again. Pure values: moments come in as arguments.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "render/base/clock.h"
+#include "render/base/digest.h"
+#include "render/estimate/accumulation.h"
+#include "render/scene/render_settings.h"
+#include "render/scene/scene_files.h"
+
+namespace lucerna {
+
+enum class JobState : std::uint8_t {
+  kQueued,
+  kPreparing,
+  kRunning,
+  kSucceeded,
+  kCancelled,
+  kFailed,
+};
+enum class StopReason : std::uint8_t { kNone, kPasses, kTime };
+
+class JobLife {
+ public:
+  JobLife() = default;
+  explicit JobLife(SteadyTime submitted_at) : submitted_at_(submitted_at) {}
+
+  // Each returns whether the job could go there; if not, nothing has changed.
+  bool Prepare();
+  bool Run(SteadyTime now);
+  bool Succeed(StopReason reason, SteadyTime now);
+  bool Cancel(SteadyTime now);
+  bool Fail(std::string failure, SteadyTime now);
+
+  [[nodiscard]] JobState state() const { return state_; }
+  [[nodiscard]] StopReason stop_reason() const { return stop_reason_; }
+  [[nodiscard]] const std::string& failure() const { return failure_; }
+  [[nodiscard]] bool has_ended() const { return state_ >= JobState::kSucceeded; }
+  [[nodiscard]] SteadyTime submitted_at() const { return submitted_at_; }
+  // Since the job began to run; stands still when it has ended; zero before.
+  [[nodiscard]] Duration Running(SteadyTime now) const;
+
+ private:
+  bool End(JobState state, SteadyTime now);
+
+  JobState state_ = JobState::kQueued;
+  StopReason stop_reason_ = StopReason::kNone;
+  std::string failure_;
+  SteadyTime submitted_at_;
+  std::optional<SteadyTime> started_at_;
+  std::optional<SteadyTime> ended_at_;
+};
+
+// Events per second over the last few seconds.
+class SlidingRate {
+ public:
+  explicit SlidingRate(Duration window) : window_(window) {}
+  // Requires that `now` does not go back.
+  void Add(std::uint64_t events, SteadyTime now);
+  // `since` is when counting began: a window that is not full yet is not divided by its length.
+  [[nodiscard]] double PerSecond(SteadyTime since, SteadyTime now) const;
+
+ private:
+  Duration window_;
+  std::deque<std::pair<SteadyTime, std::uint64_t>> events_;
+};
+
+// What a job has cost and brought.
+struct JobBooks {
+  std::int64_t passes = 0;                   // merged into the image
+  std::uint64_t photons = 0;                 // merged, also of a pass that is not complete
+  std::optional<Duration> to_first_photons;  // from submission
+  Duration coordinator_cpu{};
+  Duration worker_cpu{};
+  BatchTally tally;
+  std::uint64_t bytes_sent = 0, bytes_received = 0;          // blocks and radii; accumulations
+  std::uint64_t hitpoints_sent = 0, hitpoints_returned = 0;  // rows in them
+  SlidingRate rate{std::chrono::seconds(5)};
+};
+
+struct Job {
+  std::string id;
+  std::string name;
+  SceneManifest manifest;
+  Digest scene_digest;
+  RenderSettings settings;
+  std::vector<std::string> warnings;
+  WallTime submitted_at;
+  JobLife life;
+  JobBooks books;
+  int most_workers = 0;  // connected at one time while it ran
+};
+
+// All settings that decide the pixels, as one line that is the same whenever they are. Passes are
+// not among them: how many were merged is known only at the end.
+[[nodiscard]] std::string SettingsText(const RenderSettings& settings);
+
+}  // namespace lucerna

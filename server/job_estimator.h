@@ -1,0 +1,57 @@
+// What is the image, given the photons so far?
+//
+// The coordinator's side of the estimator for one job, without any knowledge of workers: it
+// traces the eye paths of a pass, says which radii its hitpoints use, takes in the pass's merged
+// sums, and turns statistics into an image.
+//
+// Order of calls for pass p (passes count from 0)
+//   1. TraceEyePaths(p): any time, also ahead of other passes; depends on p alone.
+//   2. Radii(pass): after Apply of pass p-2 and before Apply of pass p-1. So workers trace p while
+//      stragglers finish p-1, and the result does not depend on when they do.
+//   3. Apply(pass, radii, sums): in pass order, each pass once, with the radii that 2 gave.
+//
+// Threads: one caller at a time, except that TraceEyePaths may run beside the others.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "render/base/status.h"
+#include "render/estimate/accumulation.h"
+#include "render/estimate/hitpoint_block.h"
+#include "render/film/image.h"
+#include "render/scene/render_settings.h"
+#include "render/scene/scene.h"
+#include "server/hitpoint_pass.h"
+
+namespace lucerna {
+
+class JobEstimator {
+ public:
+  // Keeps `scene`. Builds what eye paths need; may take seconds for big scenes. threads = 0: all
+  // the machine has.
+  // Errors: RESOURCE_EXHAUSTED when memory runs out, INTERNAL when Embree refuses the scene.
+  [[nodiscard]] static StatusOr<std::unique_ptr<JobEstimator>> Create(Scene scene,
+                                                                      RenderSettings settings,
+                                                                      int threads);
+  ~JobEstimator();
+
+  [[nodiscard]] EyePass TraceEyePaths(std::uint64_t pass) const;
+  [[nodiscard]] RadiusColumn Radii(const EyePass& pass) const;
+  // Requires radii and sums of pass.block.size() rows, and pass.pass == passes_applied().
+  void Apply(const EyePass& pass, const RadiusColumn& radii, const PassSums& sums);
+
+  [[nodiscard]] std::int64_t passes_applied() const;
+  // Rays traced for the passes applied so far.
+  [[nodiscard]] std::uint64_t eye_rays() const;
+  // The image of the passes applied so far, without metadata. Requires passes_applied() > 0.
+  [[nodiscard]] Image MakeImage() const;
+
+ private:
+  struct State;
+  explicit JobEstimator(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace lucerna

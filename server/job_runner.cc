@@ -1,0 +1,223 @@
+#include "server/job_runner.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "render/wire/block_codec.h"
+
+namespace lucerna {
+
+JobRunner::JobRunner(std::string job_id, RenderSettings settings, int threads,
+                     Surroundings surroundings)
+    : job_id_(std::move(job_id)),
+      settings_(std::move(settings)),
+      threads_(threads),
+      surroundings_(std::move(surroundings)) {}
+
+JobRunner::~JobRunner() = default;
+
+StatusOr<JobRunner::Result> JobRunner::Run(Scene scene) {
+  LUCERNA_ASSIGN_OR_RETURN(estimator_, JobEstimator::Create(std::move(scene), settings_, threads_));
+  LUCERNA_RETURN_IF_ERROR(why_stopped());
+  is_running_ = true;
+  surroundings_.when_running();
+  StatusOr<Result> result = RunPasses();
+  // Whatever ended it: workers must not go on with passes that nobody will take in.
+  while (!open_.empty()) {
+    surroundings_.scheduler.ClosePass(KeyOf(open_.front().traced.eye.pass));
+    surroundings_.merger.Drop(KeyOf(open_.front().traced.eye.pass));
+    Close(open_.front());
+    open_.pop_front();
+  }
+  if (ahead_) surroundings_.blobs.UnpinAndDrop(ahead_->block_digest);
+  ahead_.reset();
+  return result;
+}
+
+StatusOr<JobRunner::Result> JobRunner::RunPasses() {
+  std::optional<SteadyTime> time_is_up;
+  if (settings_.time_s > 0) {
+    // A limit beyond a century is no limit, and would not fit.
+    const double seconds = std::min(settings_.time_s, 3.2e9);
+    time_is_up = surroundings_.clock.Steady() +
+                 std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+  }
+  const auto passes_limit = static_cast<std::uint64_t>(settings_.passes);
+  std::uint64_t next_pass = 0;  // to be opened
+
+  while (true) {
+    LUCERNA_RETURN_IF_ERROR(why_stopped());
+    const auto applied = static_cast<std::uint64_t>(estimator_->passes_applied());
+    const bool is_time_up = time_is_up && surroundings_.clock.Steady() >= *time_is_up;
+    if (applied > 0 && (is_time_up || (passes_limit > 0 && applied == passes_limit))) {
+      const MutexLock lock(estimator_mutex_);
+      return MakeResult(passes_limit > 0 && applied == passes_limit ? StopReason::kPasses
+                                                                    : StopReason::kTime);
+    }
+    const bool wants_more =
+        (passes_limit == 0 || next_pass < passes_limit) && !(is_time_up && next_pass > 0);
+
+    // Radii of a pass follow from the passes up to two before it: it must be opened now, before
+    // the pass before it is taken in.
+    if (wants_more && next_pass <= applied + 1) {
+      TracedPass traced;
+      if (ahead_) {
+        traced = std::move(*ahead_);
+        ahead_.reset();
+      } else {
+        LUCERNA_ASSIGN_OR_RETURN(traced, Trace(next_pass));
+      }
+      LUCERNA_RETURN_IF_ERROR(Open(std::move(traced)));
+      ++next_pass;
+      continue;
+    }
+    if (!open_.empty() && IsComplete(open_.front())) {
+      OpenPass complete = std::move(open_.front());
+      open_.pop_front();
+      TakeIn(std::move(complete));
+      continue;
+    }
+    if (wants_more && !ahead_) {
+      LUCERNA_ASSIGN_OR_RETURN(ahead_, Trace(next_pass));
+      continue;
+    }
+    // When time is up and nothing has been taken in, the first pass is waited for all the same.
+    if (!WaitForChange(applied > 0 ? time_is_up : std::nullopt)) return why_stopped();
+  }
+}
+
+StatusOr<JobRunner::TracedPass> JobRunner::Trace(std::uint64_t pass) {
+  TracedPass traced;
+  traced.eye = estimator_->TraceEyePaths(pass);
+  std::string bytes = EncodeHitpointBlock(traced.eye.block);
+  traced.block_digest = Sha256(bytes);
+  LUCERNA_RETURN_IF_ERROR(surroundings_.blobs.PutPinned(traced.block_digest, std::move(bytes)));
+  return traced;
+}
+
+Status JobRunner::Open(TracedPass traced) {
+  OpenPass open;
+  {
+    const MutexLock lock(estimator_mutex_);
+    open.radii = estimator_->Radii(traced.eye);
+  }
+  std::string bytes = EncodeRadii(open.radii);
+  open.blobs = {traced.block_digest, Sha256(bytes), traced.eye.block.size()};
+  if (Status status = surroundings_.blobs.PutPinned(open.blobs.radii, std::move(bytes));
+      !status.ok()) {
+    surroundings_.blobs.UnpinAndDrop(traced.block_digest);
+    return status;
+  }
+  const std::uint64_t pass = traced.eye.pass;
+  open.traced = std::move(traced);
+  {
+    const MutexLock lock(mutex_);
+    blobs_[pass] = open.blobs;
+  }
+  // A camera that sees nothing needs no photons: such a pass is complete as it is.
+  if (open.blobs.hitpoints > 0) {
+    const auto photons = static_cast<std::uint64_t>(settings_.photons_per_pass);
+    surroundings_.merger.Open(KeyOf(pass), open.blobs.hitpoints, photons);
+    surroundings_.scheduler.OpenPass(KeyOf(pass), photons);
+  }
+  open_.push_back(std::move(open));
+  surroundings_.when_pass_opened();
+  return absl::OkStatus();
+}
+
+bool JobRunner::IsComplete(const OpenPass& open) const {
+  return open.blobs.hitpoints == 0 || surroundings_.merger.IsComplete(KeyOf(open.traced.eye.pass));
+}
+
+void JobRunner::TakeIn(OpenPass open) {
+  const PassKey key = KeyOf(open.traced.eye.pass);
+  PassSums sums(0);
+  if (open.blobs.hitpoints > 0) {
+    surroundings_.scheduler.ClosePass(key);
+    sums = surroundings_.merger.Take(key);
+  }
+  std::int64_t passes = 0;
+  {
+    const MutexLock lock(estimator_mutex_);
+    estimator_->Apply(open.traced.eye, open.radii, sums);
+    photons_applied_ += sums.tally().photons;
+    passes = estimator_->passes_applied();
+  }
+  Close(open);
+  surroundings_.when_pass_merged(passes);
+}
+
+void JobRunner::Close(const OpenPass& open) {
+  {
+    const MutexLock lock(mutex_);
+    blobs_.erase(open.traced.eye.pass);
+  }
+  surroundings_.blobs.UnpinAndDrop(open.blobs.block);
+  surroundings_.blobs.UnpinAndDrop(open.blobs.radii);
+}
+
+bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {
+  // Now and then without a reason, so that a wake that is lost costs a moment and not the job.
+  constexpr Duration kLongest = std::chrono::seconds(1);
+  Duration longest = kLongest;
+  if (until)
+    longest = std::clamp(*until - surroundings_.clock.Steady(), Duration::zero(), kLongest);
+  const MutexLock lock(mutex_);
+  if (!was_woken_ && !why_stopped_ && longest > Duration::zero()) {
+    changed_.WaitFor(mutex_, longest);
+  }
+  was_woken_ = false;
+  return !why_stopped_;
+}
+
+Status JobRunner::why_stopped() const {
+  const MutexLock lock(mutex_);
+  return why_stopped_.value_or(absl::OkStatus());
+}
+
+void JobRunner::Stop(Status why) {
+  const MutexLock lock(mutex_);
+  if (!why_stopped_) why_stopped_ = std::move(why);
+  changed_.NotifyAll();
+}
+
+void JobRunner::Wake() {
+  const MutexLock lock(mutex_);
+  was_woken_ = true;
+  changed_.NotifyAll();
+}
+
+std::optional<PassBlobs> JobRunner::BlobsOf(std::uint64_t pass) const {
+  const MutexLock lock(mutex_);
+  const auto found = blobs_.find(pass);
+  if (found == blobs_.end()) return std::nullopt;
+  return found->second;
+}
+
+std::optional<std::size_t> JobRunner::HitpointsIn(const Digest& digest) const {
+  const MutexLock lock(mutex_);
+  for (const auto& [pass, blobs] : blobs_) {
+    if (blobs.block == digest) return blobs.hitpoints;
+    if (blobs.radii == digest) return std::size_t{0};
+  }
+  return std::nullopt;
+}
+
+JobRunner::Result JobRunner::MakeResult(StopReason reason) const {
+  Result result;
+  result.reason = reason;
+  result.image = estimator_->MakeImage();
+  result.passes = estimator_->passes_applied();
+  result.photons = photons_applied_;
+  return result;
+}
+
+StatusOr<JobRunner::Result> JobRunner::ImageSoFar() const {
+  if (is_running_) {
+    const MutexLock lock(estimator_mutex_);
+    if (estimator_->passes_applied() > 0) return MakeResult(StopReason::kNone);
+  }
+  return absl::FailedPreconditionError("no pass has been merged yet; ask again in a moment");
+}
+
+}  // namespace lucerna

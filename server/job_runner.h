@@ -1,0 +1,129 @@
+// How does a job get from its scene to its image?
+//
+// The pass loop of one job, on a thread of its own: trace eye paths, publish hitpoints and radii,
+// open the pass for workers, take in its sums when every photon has come back, and again. Two
+// passes may be open at once, and the eye paths of a third are traced while workers are busy.
+//
+// What a pass's radii are computed from is fixed (the passes up to two before it), so the image
+// does not depend on when batches come back.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "render/base/clock.h"
+#include "render/base/mutex.h"
+#include "render/base/status.h"
+#include "render/film/image.h"
+#include "render/scene/render_settings.h"
+#include "render/scene/scene.h"
+#include "server/blob_store.h"
+#include "server/job.h"
+#include "server/job_estimator.h"
+#include "server/pass_merger.h"
+#include "server/scheduler.h"
+
+namespace lucerna {
+
+// What a worker must fetch for a pass.
+struct PassBlobs {
+  Digest block;
+  Digest radii;
+  std::size_t hitpoints = 0;
+};
+
+class JobRunner {
+ public:
+  struct Surroundings {
+    BlobStore& blobs;
+    Scheduler& scheduler;
+    PassMerger& merger;
+    const Clock& clock;
+    // Called on the runner's thread, never under a lock.
+    std::function<void()> when_running;
+    std::function<void()> when_pass_opened;
+    std::function<void(std::int64_t passes)> when_pass_merged;
+  };
+
+  JobRunner(std::string job_id, RenderSettings settings, int threads, Surroundings surroundings);
+  ~JobRunner();
+
+  struct Result {
+    StopReason reason = StopReason::kNone;
+    Image image;  // without metadata
+    std::int64_t passes = 0;
+    std::uint64_t photons = 0;  // in the image
+  };
+  // Renders to the end. Once only.
+  // Errors: what JobEstimator says of the scene, RESOURCE_EXHAUSTED when blobs do not fit, or what
+  // Stop was given.
+  [[nodiscard]] StatusOr<Result> Run(Scene scene);
+
+  // Threads: all of the following, any.
+
+  // Ends Run soon with `why`. The first call counts.
+  void Stop(Status why);
+  // A batch was merged, or time has passed: look again.
+  void Wake();
+  // What workers need for an open pass; absent when it is not open.
+  [[nodiscard]] std::optional<PassBlobs> BlobsOf(std::uint64_t pass) const;
+  // How many hitpoints the bytes named `digest` describe: those of a block, 0 for radii; absent
+  // when they belong to no open pass.
+  [[nodiscard]] std::optional<std::size_t> HitpointsIn(const Digest& digest) const;
+  // The image of the passes merged so far, without metadata.
+  // Errors: FAILED_PRECONDITION before the first one.
+  [[nodiscard]] StatusOr<Result> ImageSoFar() const;
+
+ private:
+  struct TracedPass {
+    EyePass eye;
+    Digest block_digest;
+  };
+  struct OpenPass {
+    TracedPass traced;
+    RadiusColumn radii;
+    PassBlobs blobs;
+  };
+
+  StatusOr<Result> RunPasses();
+  StatusOr<TracedPass> Trace(std::uint64_t pass);
+  Status Open(TracedPass traced);
+  bool IsComplete(const OpenPass& open) const;
+  void TakeIn(OpenPass open);
+  // Ends a pass for workers and forgets what they needed for it.
+  void Close(const OpenPass& open);
+  // Waits for a wake, until `until` if there is one. False when Run must end now.
+  bool WaitForChange(std::optional<SteadyTime> until);
+  Status why_stopped() const;
+  PassKey KeyOf(std::uint64_t pass) const { return {job_id_, pass}; }
+  Result MakeResult(StopReason reason) const LUCERNA_REQUIRES(estimator_mutex_);
+
+  const std::string job_id_;
+  const RenderSettings settings_;
+  const int threads_;
+  const Surroundings surroundings_;
+
+  // Held for one step of the estimator at a time, except its eye paths.
+  mutable Mutex estimator_mutex_;
+  std::unique_ptr<JobEstimator> estimator_;  // set once, before any other thread may ask
+  std::atomic<bool> is_running_ = false;
+  std::uint64_t photons_applied_ LUCERNA_GUARDED_BY(estimator_mutex_) = 0;
+
+  // The runner's thread only.
+  std::deque<OpenPass> open_;
+  std::optional<TracedPass> ahead_;
+
+  mutable Mutex mutex_;
+  Condition changed_;
+  bool was_woken_ LUCERNA_GUARDED_BY(mutex_) = false;
+  std::optional<Status> why_stopped_ LUCERNA_GUARDED_BY(mutex_);
+  std::map<std::uint64_t, PassBlobs> blobs_ LUCERNA_GUARDED_BY(mutex_);
+};
+
+}  // namespace lucerna

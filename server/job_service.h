@@ -1,0 +1,55 @@
+// The door through which users ask for images and follow them.
+//
+// Turns messages into values, asks the coordinator, and turns the answer back. Nothing is decided
+// here except when a watcher hears of a change: at most ten times a second, at least every five
+// seconds, and at once when the job's state is another.
+//
+// Threads: gRPC calls in from its own pool. Handlers never wait; Submit reads the scene.
+#pragma once
+
+#include <set>
+
+#include <grpcpp/grpcpp.h>
+
+#include "proto/lucerna/v1/jobs.grpc.pb.h"
+#include "render/base/clock.h"
+#include "render/base/mutex.h"
+#include "server/coordinator.h"
+
+namespace lucerna {
+
+class JobService final : public v1::JobService::CallbackService {
+ public:
+  // Both outlive the service.
+  JobService(Coordinator& coordinator, const Clock& clock)
+      : coordinator_(coordinator), clock_(clock) {}
+
+  grpc::ServerUnaryReactor* Submit(grpc::CallbackServerContext* context,
+                                   const v1::SubmitRequest* request,
+                                   v1::SubmitResponse* response) override;
+  grpc::ServerUnaryReactor* Get(grpc::CallbackServerContext* context,
+                                const v1::GetJobRequest* request, v1::Job* response) override;
+  grpc::ServerUnaryReactor* List(grpc::CallbackServerContext* context,
+                                 const v1::ListJobsRequest* request,
+                                 v1::ListJobsResponse* response) override;
+  grpc::ServerUnaryReactor* Cancel(grpc::CallbackServerContext* context,
+                                   const v1::CancelJobRequest* request, v1::Job* response) override;
+  grpc::ServerWriteReactor<v1::Job>* Watch(grpc::CallbackServerContext* context,
+                                           const v1::WatchJobRequest* request) override;
+
+  // To be called every 50 ms or so: tells watchers what has changed.
+  void Tick();
+  // Ends all watches with UNAVAILABLE.
+  void Close();
+
+ private:
+  class WatchReactor;
+
+  Coordinator& coordinator_;
+  const Clock& clock_;
+  Mutex mutex_;
+  bool is_closed_ LUCERNA_GUARDED_BY(mutex_) = false;
+  std::set<WatchReactor*> watches_ LUCERNA_GUARDED_BY(mutex_);
+};
+
+}  // namespace lucerna

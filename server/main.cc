@@ -1,0 +1,142 @@
+// The coordinator: takes jobs from users, lends batches to workers, and keeps the images.
+//
+// Says "listening on ADDRESS:PORT" on stdout once it accepts calls; everything else it has to say
+// is a log line on stderr. SIGTERM and SIGINT end it in order.
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <grpcpp/ext/proto_server_reflection_plugin.h>
+#include <grpcpp/grpcpp.h>
+#include <grpcpp/health_check_service_interface.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include "render/base/clock.h"
+#include "render/geometry/numeric_profile.h"
+#include "render/wire/channel.h"
+#include "server/asset_service.h"
+#include "server/coordinator.h"
+#include "server/image_service.h"
+#include "server/job_service.h"
+#include "server/worker_service.h"
+
+namespace lucerna {
+namespace {
+
+constexpr int kExitUsage = 2;
+constexpr int kExitCannotListen = 3;
+constexpr long kTickNanos = 50'000'000;
+
+struct Flags {
+  std::string listen = "127.0.0.1:7400";
+  bool allow_insecure_network = false;
+  std::string log_level = "info";
+  Coordinator::Options coordinator;
+};
+
+// Both signals wait to be asked for, in this thread and in every thread it starts.
+sigset_t BlockEndSignals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  return signals;
+}
+
+int Serve(const Flags& flags) {
+  const sigset_t end_signals = BlockEndSignals();
+  Coordinator coordinator(flags.coordinator, SystemClock());
+  AssetService assets(coordinator.blobs());
+  JobService jobs(coordinator, SystemClock());
+  ImageService images(coordinator);
+  WorkerService workers(coordinator);
+
+  grpc::EnableDefaultHealthCheckService(true);
+  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  grpc::ServerBuilder builder;
+  SetUpConnections(builder);
+  int port = 0;
+  builder.AddListeningPort(flags.listen, grpc::InsecureServerCredentials(), &port);
+  builder.RegisterService(&assets);
+  builder.RegisterService(&jobs);
+  builder.RegisterService(&images);
+  builder.RegisterService(&workers);
+  const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
+  if (!server || port == 0) {
+    std::fprintf(stderr,
+                 "lucerna-server: cannot listen on %s; is the port in use, or the address not of "
+                 "this machine?\n",
+                 flags.listen.c_str());
+    return kExitCannotListen;
+  }
+  std::printf("listening on %s:%d\n", flags.listen.substr(0, flags.listen.rfind(':')).c_str(),
+              port);
+  std::fflush(stdout);
+  spdlog::info("numeric profile: {}", flags.coordinator.numeric_profile);
+
+  const timespec tick = {0, kTickNanos};
+  while (sigtimedwait(&end_signals, nullptr, &tick) < 0) {
+    coordinator.Tick();
+    jobs.Tick();
+  }
+  spdlog::info("ending");
+  coordinator.Close();
+  jobs.Close();
+  server->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(1));
+  server->Wait();
+  return 0;
+}
+
+int Main(int argc, char** argv) {
+  Flags flags;
+  flags.coordinator.numeric_profile = NumericProfile();
+  CLI::App app("Lucerna's coordinator: takes jobs, lends batches to workers, keeps images.");
+  app.add_option("--listen", flags.listen, "HOST:PORT to listen on; port 0 picks a free one")
+      ->capture_default_str();
+  app.add_flag("--allow-insecure-network", flags.allow_insecure_network,
+               "listen beyond this machine although traffic is not encrypted");
+  app.add_option("--threads", flags.coordinator.threads, "threads for eye paths; 0: all")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  app.add_option("--max-store-bytes", flags.coordinator.max_store_bytes,
+                 "memory for scene files and hitpoints [bytes]")
+      ->capture_default_str();
+  app.add_option("--batch-photons", flags.coordinator.batch_photons,
+                 "photons in every batch; 0: by the number of workers")
+      ->capture_default_str();
+  app.add_option("--log-level", flags.log_level, "debug, info, warn, error or off")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitUsage;
+  }
+  if (flags.listen.rfind(':') == std::string::npos) {
+    std::fprintf(stderr, "lucerna-server: --listen %s: give HOST:PORT, such as 127.0.0.1:7400\n",
+                 flags.listen.c_str());
+    return kExitUsage;
+  }
+  if (!flags.allow_insecure_network && !IsLoopback(flags.listen)) {
+    std::fprintf(stderr,
+                 "lucerna-server: --listen %s can be reached from other machines and traffic is "
+                 "not encrypted; give --allow-insecure-network if the network is trusted\n",
+                 flags.listen.c_str());
+    return kExitUsage;
+  }
+  spdlog::set_default_logger(spdlog::stderr_color_mt("lucerna-server"));
+  spdlog::set_level(spdlog::level::from_str(flags.log_level));
+  return Serve(flags);
+}
+
+}  // namespace
+}  // namespace lucerna
+
+int main(int argc, char** argv) {
+  return lucerna::Main(argc, argv);
+}

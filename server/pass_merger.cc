@@ -1,0 +1,84 @@
+#include "server/pass_merger.h"
+
+#include <iterator>
+#include <utility>
+
+namespace lucerna {
+
+void PassMerger::Open(const PassKey& key, std::size_t hitpoints, std::uint64_t photons) {
+  LUCERNA_CHECK(photons > 0);
+  auto pass = std::make_shared<OpenPass>(hitpoints, photons);
+  const MutexLock lock(mutex_);
+  LUCERNA_CHECK(passes_.emplace(key, std::move(pass)).second);
+}
+
+std::shared_ptr<PassMerger::OpenPass> PassMerger::Find(const PassKey& key) const {
+  const MutexLock lock(mutex_);
+  const auto found = passes_.find(key);
+  return found == passes_.end() ? nullptr : found->second;
+}
+
+std::optional<std::size_t> PassMerger::Hitpoints(const PassKey& key) const {
+  const std::shared_ptr<OpenPass> pass = Find(key);
+  if (pass == nullptr) return std::nullopt;
+  return pass->hitpoints;
+}
+
+StatusOr<PassMerger::Outcome> PassMerger::Merge(const PassKey& key, PhotonRange range,
+                                                const Accumulation& accumulation) {
+  const std::shared_ptr<OpenPass> pass = Find(key);
+  if (pass == nullptr) return Outcome::kSuperseded;
+  if (range.first >= range.last || range.last > pass->photons) {
+    return absl::InvalidArgumentError(absl::StrCat("photons ", range.first, " to ", range.last,
+                                                   " are not a range of a pass of ",
+                                                   pass->photons));
+  }
+  if (accumulation.tally.photons != range.size()) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "a batch of ", range.size(), " photons has a tally of ", accumulation.tally.photons));
+  }
+  const MutexLock lock(pass->mutex);
+  const auto next = pass->merged.lower_bound(range.first);
+  if (next != pass->merged.end() && next->first == range.first && next->second == range.last) {
+    return Outcome::kDuplicate;
+  }
+  const bool meets_next = next != pass->merged.end() && next->first < range.last;
+  const bool meets_previous = next != pass->merged.begin() && std::prev(next)->second > range.first;
+  if (meets_next || meets_previous) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("photons ", range.first, " to ", range.last, " were never lent as one batch"));
+  }
+  LUCERNA_RETURN_IF_ERROR(pass->sums.Add(accumulation));
+  pass->merged.emplace(range.first, range.last);
+  pass->photons_merged += range.size();
+  return Outcome::kAccepted;
+}
+
+bool PassMerger::IsComplete(const PassKey& key) const {
+  const std::shared_ptr<OpenPass> pass = Find(key);
+  if (pass == nullptr) return false;
+  const MutexLock lock(pass->mutex);
+  return pass->photons_merged == pass->photons;
+}
+
+PassSums PassMerger::Take(const PassKey& key) {
+  std::shared_ptr<OpenPass> pass;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = passes_.find(key);
+    LUCERNA_CHECK(found != passes_.end());
+    pass = std::move(found->second);
+    passes_.erase(found);
+  }
+  // A duplicate may still hold the pass; it changes nothing, but it looks.
+  const MutexLock lock(pass->mutex);
+  LUCERNA_CHECK(pass->photons_merged == pass->photons);
+  return std::move(pass->sums);
+}
+
+void PassMerger::Drop(const PassKey& key) {
+  const MutexLock lock(mutex_);
+  passes_.erase(key);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,63 @@
+// Which random numbers does the eye path of a pixel use?
+//
+// Every pixel has its own low-discrepancy sequences, and a pass is the next point of each: after
+// n passes a pixel has n well-spread samples of its filter, of its lights and of its scattering.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "render/math/rng.h"
+#include "render/math/sobol.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+class PixelSampler {
+ public:
+  // Vertices beyond this use independent numbers.
+  static constexpr int kStratifiedVertices = 4;
+
+  PixelSampler(std::uint64_t seed, std::uint64_t pixel, std::uint64_t pass)
+      : key_(CombineKeys(CombineKeys(seed, 0x4559455041544853ULL), pixel)), pass_(pass) {}
+
+  // Film position (0, 1) and lens position (2, 3).
+  [[nodiscard]] SobolPoint ForCamera() const { return OwenSobol(pass_, key_); }
+
+  // For the path's vertex number `vertex`: scattering (0 lobe, 1, 2), light (3 choice, 4, 5),
+  // roulette (6).
+  [[nodiscard]] SobolPoint ForVertex(int vertex) const {
+    const std::uint64_t key = CombineKeys(key_, static_cast<std::uint64_t>(vertex) + 1);
+    if (vertex < kStratifiedVertices) return ShuffledOwenSobol(pass_, key);
+    KeyedRng rng(CombineKeys(key, pass_));
+    SobolPoint point;
+    for (float& u : point) u = rng.Uniform();
+    return point;
+  }
+
+  // Independent numbers for the tree of specular branches.
+  [[nodiscard]] KeyedRng ForBranches() const { return KeyedRng(CombineKeys(~key_, pass_)); }
+
+ private:
+  std::uint64_t key_;
+  std::uint64_t pass_;
+};
+
+// Draws offsets along one axis in proportion to the absolute value of a pixel filter.
+class FilterSampler {
+ public:
+  FilterSampler(const PixelFilter& filter, float radius);
+
+  // The offset from the pixel's centre [pixels], in [-radius, radius], and the factor that makes
+  // the mean of weighted samples the filtered value (1 for filters that are nowhere negative, up
+  // to the fit of the table).
+  [[nodiscard]] float Sample(float u, float& weight) const;
+
+ private:
+  static constexpr std::size_t kCells = 128;
+  float radius_;
+  std::array<float, kCells + 1> cumulative_{};
+  std::array<float, kCells> weight_{};
+};
+
+}  // namespace lucerna

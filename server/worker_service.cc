@@ -1,0 +1,201 @@
+#include "server/worker_service.h"
+
+#include <optional>
+#include <utility>
+
+#include "render/wire/accumulation_codec.h"
+#include "render/wire/chunks.h"
+#include "render/wire/grpc_status.h"
+#include "render/wire/messages.h"
+
+namespace lucerna {
+namespace {
+
+constexpr Duration kSyncEvery = std::chrono::seconds(3);
+// An accumulation has up to 40 bytes a hitpoint before compression, which cannot double it.
+constexpr std::uint64_t kAccumulationHeadBytes = 4096;
+constexpr std::uint64_t kAccumulationBytesPerHitpoint = 64;
+constexpr int kMostLeases = 64;  // that one worker may speak of
+
+v1::Lease LoanToProto(const Coordinator::Loan& loan) {
+  v1::Lease message;
+  message.set_lease_id(loan.lease.id);
+  message.set_job_id(loan.lease.pass.job_id);
+  *message.mutable_scene() = ToProto(loan.scene);
+  *message.mutable_settings() = ToProto(loan.settings);
+  message.set_pass(loan.lease.pass.pass);
+  message.set_first_photon(loan.lease.range.first);
+  message.set_last_photon(loan.lease.range.last);
+  message.set_block_digest(std::string(loan.blobs.block.Bytes()));
+  message.set_radii_digest(std::string(loan.blobs.radii.Bytes()));
+  return message;
+}
+
+v1::CommitOutcome OutcomeToProto(PassMerger::Outcome outcome) {
+  switch (outcome) {
+    case PassMerger::Outcome::kAccepted:
+      return v1::COMMIT_OUTCOME_ACCEPTED;
+    case PassMerger::Outcome::kDuplicate:
+      return v1::COMMIT_OUTCOME_DUPLICATE;
+    case PassMerger::Outcome::kSuperseded:
+      return v1::COMMIT_OUTCOME_SUPERSEDED;
+  }
+  return v1::COMMIT_OUTCOME_UNSPECIFIED;
+}
+
+class SyncReactor final : public grpc::ServerUnaryReactor {
+ public:
+  explicit SyncReactor(Coordinator& coordinator) : coordinator_(coordinator) {}
+
+  // Before the handler returns: neither OnCancel nor OnDone can come earlier.
+  void set_ticket(std::uint64_t ticket) { ticket_ = ticket; }
+  void OnCancel() override { coordinator_.SyncBroke(ticket_); }
+  void OnDone() override { delete this; }
+
+ private:
+  Coordinator& coordinator_;
+  std::uint64_t ticket_ = 0;
+};
+
+class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchRequest> {
+ public:
+  CommitReactor(Coordinator& coordinator, v1::CommitBatchResponse* response)
+      : coordinator_(coordinator), response_(response) {
+    StartRead(&part_);
+  }
+
+  void OnReadDone(bool ok) override {
+    if (!ok) {
+      Finish(ToGrpc(Merge()));
+      return;
+    }
+    if (const Status status = Take(); !status.ok()) {
+      Finish(ToGrpc(status));
+      return;
+    }
+    if (is_superseded_) {
+      // Nobody needs the bytes: the answer goes out before they come.
+      response_->set_outcome(v1::COMMIT_OUTCOME_SUPERSEDED);
+      Finish(grpc::Status::OK);
+      return;
+    }
+    StartRead(&part_);
+  }
+  void OnDone() override { delete this; }
+
+ private:
+  Status Take() {
+    if (part_.has_header() == collector_.has_value()) {
+      return absl::InvalidArgumentError("a commit is one header and then bytes");
+    }
+    if (collector_) return collector_->Add(part_.bytes());
+    const v1::CommitBatchRequest::Header& header = part_.header();
+    delivery_.pass = {header.job_id(), header.pass()};
+    delivery_.range = {header.first_photon(), header.last_photon()};
+    delivery_.cpu = FromProto(header.cpu());
+    delivery_.size_bytes = header.size_bytes();
+    LUCERNA_ASSIGN_OR_RETURN(const Digest digest, Digest::FromBytes(header.digest()));
+    const std::optional<std::size_t> hitpoints = coordinator_.HitpointsOf(delivery_.pass);
+    is_superseded_ = !hitpoints;
+    if (is_superseded_) return absl::OkStatus();
+    if (header.size_bytes() > kAccumulationHeadBytes + kAccumulationBytesPerHitpoint * *hitpoints) {
+      return absl::InvalidArgumentError(absl::StrCat("an accumulation of ", header.size_bytes(),
+                                                     " bytes is too large for ", *hitpoints,
+                                                     " hitpoints"));
+    }
+    collector_.emplace(digest, header.size_bytes());
+    return absl::OkStatus();
+  }
+
+  Status Merge() {
+    if (!collector_) return absl::InvalidArgumentError("a commit begins with a header");
+    LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, collector_->Finish());
+    const std::optional<std::size_t> hitpoints = coordinator_.HitpointsOf(delivery_.pass);
+    if (!hitpoints) {
+      response_->set_outcome(v1::COMMIT_OUTCOME_SUPERSEDED);
+      return absl::OkStatus();
+    }
+    LUCERNA_ASSIGN_OR_RETURN(const Accumulation accumulation,
+                             DecodeAccumulation(bytes, *hitpoints));
+    LUCERNA_ASSIGN_OR_RETURN(const PassMerger::Outcome outcome,
+                             coordinator_.Commit(delivery_, accumulation));
+    response_->set_outcome(OutcomeToProto(outcome));
+    return absl::OkStatus();
+  }
+
+  Coordinator& coordinator_;
+  v1::CommitBatchResponse* const response_;
+  v1::CommitBatchRequest part_;
+  Coordinator::Delivery delivery_;
+  bool is_superseded_ = false;
+  std::optional<ChunkCollector> collector_;
+};
+
+}  // namespace
+
+grpc::ServerUnaryReactor* WorkerService::Register(grpc::CallbackServerContext* context,
+                                                  const v1::RegisterRequest* request,
+                                                  v1::RegisterResponse* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const StatusOr<std::string> id =
+      coordinator_.Register(request->name(), request->threads(), request->numeric_profile());
+  if (id.ok()) {
+    response->set_worker_id(*id);
+    *response->mutable_sync_every() = ToProto(kSyncEvery);
+  }
+  reactor->Finish(ToGrpc(id.status()));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* WorkerService::Sync(grpc::CallbackServerContext* context,
+                                              const v1::SyncRequest* request,
+                                              v1::SyncResponse* response) {
+  if (request->held_lease_ids_size() > kMostLeases || request->failures_size() > kMostLeases) {
+    grpc::ServerUnaryReactor* refusal = context->DefaultReactor();
+    refusal->Finish(ToGrpc(absl::InvalidArgumentError("a worker holds only a few leases")));
+    return refusal;
+  }
+  Scheduler::Report report;
+  report.held.assign(request->held_lease_ids().begin(), request->held_lease_ids().end());
+  for (const v1::SyncRequest::Failure& failure : request->failures()) {
+    report.failures.emplace_back(failure.lease_id(), failure.reason().substr(0, 1024));
+  }
+  report.wants_lease = request->wants_lease();
+
+  auto* const reactor = new SyncReactor(coordinator_);
+  reactor->set_ticket(
+      coordinator_.Sync(request->worker_id(), std::move(report), FromProto(request->wait_at_most()),
+                        [reactor, response](StatusOr<Coordinator::SyncAnswer> answer) {
+                          if (answer.ok()) {
+                            if (answer->loan)
+                              *response->mutable_lease() = LoanToProto(*answer->loan);
+                            for (const std::string& id : answer->revoked)
+                              response->add_revoked_lease_ids(id);
+                          }
+                          reactor->Finish(ToGrpc(answer.status()));
+                        }));
+  return reactor;
+}
+
+grpc::ServerWriteReactor<v1::Chunk>* WorkerService::FetchBlob(
+    grpc::CallbackServerContext* /*context*/, const v1::FetchBlobRequest* request) {
+  const StatusOr<Digest> digest = Digest::FromBytes(request->digest());
+  if (!digest.ok()) return new BytesReactor(digest.status());
+  return new BytesReactor(coordinator_.Fetch(*digest));
+}
+
+grpc::ServerReadReactor<v1::CommitBatchRequest>* WorkerService::CommitBatch(
+    grpc::CallbackServerContext* /*context*/, v1::CommitBatchResponse* response) {
+  return new CommitReactor(coordinator_, response);
+}
+
+grpc::ServerUnaryReactor* WorkerService::Goodbye(grpc::CallbackServerContext* context,
+                                                 const v1::GoodbyeRequest* request,
+                                                 v1::GoodbyeResponse* /*response*/) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  coordinator_.Goodbye(request->worker_id());
+  reactor->Finish(grpc::Status::OK);
+  return reactor;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,257 @@
+// How fast are the parts that a render spends its time in?
+//
+// One thread each, so that numbers are per core. Scenes: the house's own, and water-caustic and
+// cornell-box where they lie beside the project.
+//   photon_paths    photon paths per second, tracing and keeping deposits
+//   photon_rays     the same rays again, intersection only: the ceiling
+//   eye_paths       eye paths per second with direct light
+//   gather          ns per (photon, hitpoint) pair, sorting the photons included
+//   wire            bytes a hitpoint sent and a touched hitpoint returned, and codec speed
+//   merge           touched hitpoints merged per second
+// Run: build/release/bin/lucerna-bench --benchmark_repetitions=10 --benchmark_report_aggregates_only=true
+#include <atomic>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "benchmark/benchmark.h"
+#include "render/base/parallel.h"
+#include "render/wire/accumulation_codec.h"
+#include "render/wire/block_codec.h"
+#include "server/hitpoint_pass.h"
+#include "server/job_estimator.h"
+#include "tests/support/local_render.h"
+#include "worker/batch_tracer.h"
+#include "worker/gather.h"
+#include "worker/photon_grid.h"
+#include "worker/photon_path.h"
+
+namespace lucerna {
+namespace {
+
+// Everything that the benchmarks of one scene share: one pass at 256 × 256 pixels.
+struct Bench {
+  explicit Bench(const std::string& path) : scene(LoadScene(path)) {
+    RenderOverrides overrides;
+    overrides.width = 256;
+    overrides.height = 256;
+    overrides.photons_per_pass = 1 << 20;
+    overrides.initial_radius = 0;
+    overrides.max_depth = 32;
+    settings = SettingsFor(scene, overrides);
+    intersector = Intersector::Create(scene).value();
+    lights = std::make_unique<LightSet>(scene, *intersector);
+    estimator = JobEstimator::Create(scene, settings, 1).value();
+    eye = estimator->TraceEyePaths(0);
+    radii = estimator->Radii(eye);
+    for (std::size_t row = 0; row < radii.size(); ++row) {
+      const Vec3 reach = {radii[row], radii[row], radii[row]};
+      region.Add(eye.block.positions[row] - reach);
+      region.Add(eye.block.positions[row] + reach);
+    }
+    photons = std::make_unique<PhotonPathTracer>(scene, *intersector, *lights, settings, region);
+    scale = FluxScale::ForPower(lights->TotalPower());
+  }
+
+  Scene scene;
+  RenderSettings settings;
+  std::unique_ptr<Intersector> intersector;
+  std::unique_ptr<LightSet> lights;
+  std::unique_ptr<JobEstimator> estimator;
+  EyePass eye;
+  RadiusColumn radii;
+  Bounds region;
+  std::unique_ptr<PhotonPathTracer> photons;
+  FluxScale scale;
+};
+
+using Counter = benchmark::Counter;
+
+void PhotonPaths(benchmark::State& state, const Bench& bench) {
+  std::uint64_t index = 0;
+  std::uint64_t rays = 0;
+  std::uint64_t deposits = 0;
+  std::uint64_t dropped = 0;
+  std::vector<Deposit> out;
+  for (auto _ : state) {
+    out.clear();
+    for (int i = 0; i < 4096; ++i) {
+      rays += static_cast<std::uint64_t>(bench.photons->Trace(0, index++, out, dropped));
+    }
+    deposits += out.size();
+  }
+  const auto paths = static_cast<double>(index);
+  state.counters["photon_paths/s"] = Counter(paths, Counter::kIsRate);
+  state.counters["rays/path"] = static_cast<double>(rays) / paths;
+  state.counters["deposits/path"] = static_cast<double>(deposits) / paths;
+}
+
+// Rays like those of photon paths, intersection only.
+void PhotonRays(benchmark::State& state, const Bench& bench) {
+  std::vector<Ray> rays;
+  std::uint64_t paths = 0;
+  for (std::uint64_t index = 0; rays.size() < (1U << 18); ++index, ++paths) {
+    KeyedRng rng(CombineKeys(7, index));
+    Emission emission;
+    if (!bench.lights->SampleEmission(rng.Uniform(), rng.Uniform(), rng.Uniform(), rng.Uniform(),
+                                      rng.Uniform(), emission)) {
+      continue;
+    }
+    Ray ray = emission.ray;
+    Hit hit;
+    for (int depth = 0; depth < 32; ++depth) {
+      rays.push_back(ray);
+      if (!bench.intersector->Intersect(ray, hit)) break;
+      const SurfacePoint surface = bench.intersector->SurfaceAt(ray, hit);
+      const Material& material = bench.scene.materials[surface.material];
+      const Frame frame(surface.shading_normal);
+      BsdfSample sample;
+      if (!SampleBsdf(material, frame.ToLocal(-ray.direction), rng.Uniform(), rng.Uniform(),
+                      rng.Uniform(), Carried::kFlux, sample) ||
+          !(rng.Uniform() < MaxChannel(sample.weight))) {
+        break;
+      }
+      const Vec3 wi = frame.ToWorld(sample.wi);
+      ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
+    }
+  }
+  std::size_t i = 0;
+  std::uint64_t done = 0;
+  for (auto _ : state) {
+    Hit hit;
+    for (int k = 0; k < 4096; ++k) {
+      benchmark::DoNotOptimize(bench.intersector->Intersect(rays[i], hit));
+      i = (i + 1) % rays.size();
+    }
+    done += 4096;
+  }
+  state.counters["rays/s"] = Counter(static_cast<double>(done), Counter::kIsRate);
+  state.counters["paths_ceiling/s"] =
+      Counter(static_cast<double>(done) * static_cast<double>(paths) /
+                  static_cast<double>(rays.size()),
+              Counter::kIsRate);
+}
+
+void EyePaths(benchmark::State& state, const Bench& bench) {
+  std::uint64_t pass = 1;
+  std::uint64_t rays = 0;
+  for (auto _ : state) rays += bench.estimator->TraceEyePaths(pass++).rays;
+  const double paths = static_cast<double>(pass - 1) * 65536;
+  state.counters["eye_paths/s"] = Counter(paths, Counter::kIsRate);
+  state.counters["rays/path"] = static_cast<double>(rays) / paths;
+}
+
+std::vector<std::vector<Deposit>> TraceDeposits(const Bench& bench, std::uint64_t photons) {
+  std::vector<std::vector<Deposit>> deposits;
+  std::uint64_t dropped = 0;
+  for (std::uint64_t index = 0; index < photons; ++index) {
+    if (index % 2048 == 0) deposits.emplace_back();
+    bench.photons->Trace(0, index, deposits.back(), dropped);
+  }
+  return deposits;
+}
+
+Accumulation GatherOnce(const Bench& bench, const std::vector<std::vector<Deposit>>& deposits,
+                        ThreadTeam& team) {
+  RadiusColumn sorted = bench.radii;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                   sorted.end());
+  const PhotonGrid grid(deposits, bench.region, 2 * sorted[sorted.size() / 2], team);
+  return Gather(bench.eye.block, bench.radii, grid, bench.scene.materials,
+                Kernel{bench.settings.kernel}, bench.scale, team);
+}
+
+void GatherPairs(benchmark::State& state, const Bench& bench) {
+  const auto deposits = TraceDeposits(bench, static_cast<std::uint64_t>(state.range(0)));
+  ThreadTeam team(1);
+  std::uint64_t pairs = 0;
+  std::uint64_t landed = 0;
+  for (auto _ : state) {
+    pairs += GatherOnce(bench, deposits, team).tally.pairs;
+    for (const auto& chunk : deposits) landed += chunk.size();
+  }
+  state.counters["s/pair"] =
+      Counter(static_cast<double>(pairs), Counter::kIsRate | Counter::kInvert);
+  state.counters["s/deposit"] =
+      Counter(static_cast<double>(landed), Counter::kIsRate | Counter::kInvert);
+  state.counters["pairs/hitpoint"] = static_cast<double>(pairs) /
+                                     static_cast<double>(state.iterations()) /
+                                     static_cast<double>(bench.eye.block.size());
+}
+
+void BlockOnTheWire(benchmark::State& state, const Bench& bench) {
+  std::size_t size_bytes = 0;
+  for (auto _ : state) {
+    size_bytes = EncodeHitpointBlock(bench.eye.block).size() + EncodeRadii(bench.radii).size();
+  }
+  const auto rows = static_cast<double>(bench.eye.block.size());
+  state.counters["bytes/hitpoint"] = static_cast<double>(size_bytes) / rows;
+  state.counters["hitpoints/s"] =
+      Counter(rows * static_cast<double>(state.iterations()), Counter::kIsRate);
+}
+
+void AccumulationOnTheWire(benchmark::State& state, const Bench& bench) {
+  ThreadTeam team(1);
+  const Accumulation accumulation = GatherOnce(
+      bench, TraceDeposits(bench, static_cast<std::uint64_t>(state.range(0))), team);
+  std::size_t size_bytes = 0;
+  for (auto _ : state) {
+    const std::string bytes = EncodeAccumulation(accumulation, bench.eye.block.size());
+    size_bytes = bytes.size();
+    benchmark::DoNotOptimize(DecodeAccumulation(bytes, bench.eye.block.size()));
+  }
+  const auto rows = static_cast<double>(accumulation.size());
+  state.counters["bytes/touched"] = static_cast<double>(size_bytes) / rows;
+  state.counters["touched"] = rows;
+  state.counters["touched/s"] =
+      Counter(rows * static_cast<double>(state.iterations()), Counter::kIsRate);
+}
+
+void Merge(benchmark::State& state, const Bench& bench) {
+  ThreadTeam team(1);
+  const Accumulation accumulation =
+      GatherOnce(bench, TraceDeposits(bench, 1 << 16), team);
+  PassSums sums(bench.eye.block.size());
+  for (auto _ : state) {
+    if (!sums.Add(accumulation).ok()) state.SkipWithError("overflow");
+  }
+  state.counters["touched/s"] =
+      Counter(static_cast<double>(accumulation.size()) * static_cast<double>(state.iterations()),
+              Counter::kIsRate);
+}
+
+void Register(const std::string& name, const std::string& path) {
+  // Lives as long as the benchmarks that refer to it.
+  const auto* bench = new Bench(path);
+  const auto add = [&](const char* what, auto function) {
+    return benchmark::RegisterBenchmark(
+        (std::string(what) + "/" + name).c_str(),
+        [bench, function](benchmark::State& state) { function(state, *bench); });
+  };
+  add("photon_paths", PhotonPaths)->Unit(benchmark::kMillisecond);
+  add("photon_rays", PhotonRays)->Unit(benchmark::kMillisecond);
+  add("eye_paths", EyePaths)->Unit(benchmark::kMillisecond);
+  add("gather", GatherPairs)->Arg(1 << 16)->Arg(1 << 18)->Unit(benchmark::kMillisecond);
+  add("block_on_the_wire", BlockOnTheWire)->Unit(benchmark::kMillisecond);
+  add("accumulation_on_the_wire", AccumulationOnTheWire)
+      ->Arg(1 << 16)
+      ->Arg(1 << 20)
+      ->Unit(benchmark::kMillisecond);
+  add("merge", Merge)->Unit(benchmark::kMillisecond);
+}
+
+}  // namespace
+}  // namespace lucerna
+
+int main(int argc, char** argv) {
+  lucerna::Register("glass-box", "glass-box.pbrt");
+  const std::string outside = std::string(LUCERNA_SOURCE_DIR) + "/../shared/scenes/";
+  for (const char* name : {"cornell-box", "water-caustic"}) {
+    const std::string path =
+        std::filesystem::weakly_canonical(outside + name + "/scene-v4.pbrt").string();
+    if (std::filesystem::exists(path)) lucerna::Register(name, path);
+  }
+  benchmark::Initialize(&argc, argv);
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

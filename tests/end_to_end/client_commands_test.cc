@@ -1,0 +1,304 @@
+// A user types a command, and image, words and exit code must be what the manual says: with the
+// real programs, from the first flag to the last byte on disk.
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gtest/gtest.h"
+#include <nlohmann/json.hpp>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "client/local_cluster.h"
+#include "render/base/files.h"
+#include "render/film/exr_file.h"
+
+namespace lucerna {
+namespace {
+
+using nlohmann::json;
+
+struct Ran {
+  int code = 0;
+  std::string out;
+  std::string err;
+};
+
+class ClientCommandsTest : public testing::Test {
+ protected:
+  ClientCommandsTest() {
+    std::string pattern = testing::TempDir() + "clientXXXXXX";
+    folder_ = mkdtemp(pattern.data());
+  }
+  ~ClientCommandsTest() override { std::filesystem::remove_all(folder_); }
+
+  [[nodiscard]] std::string In(const std::string& name) const { return folder_ + "/" + name; }
+  static std::string SceneOfTests(const std::string& name) {
+    return std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/" + name;
+  }
+  static std::string Contents(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+  // The files in the test's folder that are or could become an image.
+  [[nodiscard]] std::vector<std::string> Images() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+      const std::string name = entry.path().filename();
+      if (name.find(".exr") != std::string::npos || name.find(".png") != std::string::npos) {
+        names.push_back(name);
+      }
+    }
+    return names;
+  }
+
+  // Starts `lucerna` with the words; its output goes to files of the test's folder.
+  [[nodiscard]] pid_t Start(std::vector<std::string> words) const {
+    words.insert(words.begin(), std::string(LUCERNA_BIN_DIR) + "/lucerna");
+    std::vector<char*> argv;
+    for (std::string& word : words)
+      argv.push_back(word.data());
+    argv.push_back(nullptr);
+    const std::string out = In("stdout.txt");
+    const std::string err = In("stderr.txt");
+    // A test that waits for words must not find those of the program before.
+    std::filesystem::remove(err);
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+      if (std::freopen(out.c_str(), "w", stdout) == nullptr ||
+          std::freopen(err.c_str(), "w", stderr) == nullptr) {
+        ::_exit(125);
+      }
+      ::execv(argv[0], argv.data());
+      ::_exit(127);
+    }
+    return pid;
+  }
+  [[nodiscard]] Ran Finish(pid_t pid) const {
+    int status = 0;
+    ::waitpid(pid, &status, 0);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), Contents(In("stdout.txt")),
+            Contents(In("stderr.txt"))};
+  }
+  [[nodiscard]] Ran Run(const std::vector<std::string>& words) const {
+    return Finish(Start(words));
+  }
+
+  // A render of a second or less.
+  [[nodiscard]] std::vector<std::string> SmallRender(const std::vector<std::string>& more) const {
+    std::vector<std::string> words = {
+        "render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--passes",
+        "3",      "--photons-per-pass",         "20000"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+
+  std::string folder_;
+};
+
+// Processes that the program `parent` has started and that still run.
+std::vector<pid_t> ChildrenOf(pid_t parent) {
+  std::vector<pid_t> children;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    std::ifstream file(entry.path() / "stat");
+    pid_t pid = 0;
+    std::string name;
+    std::string state;
+    pid_t of = 0;
+    if (file >> pid >> name >> state >> of && of == parent) children.push_back(pid);
+  }
+  return children;
+}
+
+TEST_F(ClientCommandsTest, RenderLeavesAnImageAPreviewAndTheFigures) {
+  const Ran ran = Run(SmallRender({"-o", In("a.exr"), "--png", In("a.png"), "--json"}));
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const json report = json::parse(ran.out);
+  EXPECT_EQ(report["state"], "SUCCEEDED");
+  EXPECT_EQ(report["stop_reason"], "PASSES");
+  EXPECT_EQ(report["passes"], 3);
+  EXPECT_EQ(report["photons"], 60000);
+  EXPECT_GT(report["running_s"].get<double>(), 0);
+  EXPECT_GT(report["to_first_photons_s"].get<double>(), 0);
+
+  const StatusOr<Image> image = DecodeExr(Contents(In("a.exr")));
+  ASSERT_TRUE(image.ok()) << image.status();
+  EXPECT_EQ(image->width, 32);
+  EXPECT_EQ(image->height, 24);
+  for (const char* layer :
+       {"R", "direct.G", "photons.B", "albedo.R", "N.X", "Z", "radius", "photon_count"}) {
+    EXPECT_NE(image->Find(layer), nullptr) << layer;
+  }
+  EXPECT_EQ(report["image_digest"], image->PixelDigest().Hex());
+  EXPECT_EQ(Contents(In("a.png")).substr(1, 3), "PNG");
+  EXPECT_EQ(Run({"digest", In("a.exr")}).out, image->PixelDigest().Hex() + "\n");
+  EXPECT_EQ(Images().size(), 2U) << "and nothing else";
+}
+
+TEST_F(ClientCommandsTest, TheDigestDoesNotDependOnWorkersOrThreadsAndDoesOnTheSeed) {
+  ASSERT_EQ(Run(SmallRender({"-o", In("a.exr"), "--workers", "1", "--threads", "1"})).code, 0);
+  ASSERT_EQ(Run(SmallRender({"-o", In("b.exr"), "--workers", "3", "--threads", "2"})).code, 0);
+  ASSERT_EQ(Run(SmallRender({"-o", In("c.exr"), "--seed", "5"})).code, 0);
+  const std::string digest = Run({"digest", In("a.exr")}).out;
+  EXPECT_EQ(Run({"digest", In("b.exr")}).out, digest);
+  EXPECT_NE(Run({"digest", In("c.exr")}).out, digest);
+  const Ran diff = Run({"diff", In("a.exr"), In("b.exr"), "--json"});
+  ASSERT_EQ(diff.code, 0) << diff.err;
+  EXPECT_EQ(json::parse(diff.out)["rmse"], 0);
+}
+
+TEST_F(ClientCommandsTest, SpeaksOneLineAndIsQuietWhenTold) {
+  const Ran plain = Run(SmallRender({"-o", In("a.exr")}));
+  ASSERT_EQ(plain.code, 0) << plain.err;
+  EXPECT_EQ(plain.out.find("3 passes, 60.0 k photons in "), 0U) << plain.out;
+  EXPECT_NE(plain.out.find(In("a.exr") + "\n"), std::string::npos) << plain.out;
+  EXPECT_EQ(plain.err.find('\r'), std::string::npos) << "not a terminal: plain lines";
+  const Ran quiet = Run(SmallRender({"-o", In("a.exr"), "--quiet"}));
+  EXPECT_EQ(quiet.code, 0);
+  EXPECT_EQ(quiet.out + quiet.err, "");
+}
+
+TEST_F(ClientCommandsTest, AllErrorsOfASceneComeAtOnceAndNothingIsLeftBehind) {
+  std::ofstream(In("bad.pbrt")) << "Camera \"perspective\"\nWorldBegin\nShape \"hair\"\nNonsense\n";
+  const Ran ran = Run({"render", In("bad.pbrt"), "-o", In("a.exr")});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_NE(ran.err.find("bad.pbrt:3:"), std::string::npos) << ran.err;
+  EXPECT_NE(ran.err.find("bad.pbrt:4:"), std::string::npos) << ran.err;
+  EXPECT_TRUE(Images().empty());
+  EXPECT_EQ(Run({"validate", In("bad.pbrt")}).code, 1);
+  const Ran report = Run({"validate", In("bad.pbrt"), "--json"});
+  EXPECT_EQ(report.code, 1);
+  EXPECT_EQ(json::parse(report.out)["ok"], false);
+  EXPECT_EQ(Run({"validate", SceneOfTests("caustic.pbrt")}).code, 0);
+}
+
+TEST_F(ClientCommandsTest, AMissingSceneIsNamed) {
+  const Ran ran = Run({"render", In("none.pbrt"), "-o", In("a.exr")});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_NE(ran.err.find("none.pbrt"), std::string::npos) << ran.err;
+}
+
+TEST_F(ClientCommandsTest, MisuseIsRefusedWithCodeTwo) {
+  EXPECT_EQ(Run({}).code, 2);
+  EXPECT_EQ(Run({"paint"}).code, 2);
+  EXPECT_EQ(Run({"render", SceneOfTests("caustic.pbrt")}).code, 2) << "no output";
+  EXPECT_EQ(Run(SmallRender({"-o", In("a.exr"), "--workers", "0"})).code, 2);
+  EXPECT_EQ(Run(SmallRender({"-o", In("a.exr"), "--alpha", "1.5"})).code, 2);
+  EXPECT_EQ(Run({"diff", "a", "b", "--crop", "--scale"}).code, 2);
+  EXPECT_EQ(Run({"render", "--help"}).code, 0);
+}
+
+TEST_F(ClientCommandsTest, AnOutputThatCannotBeWrittenIsFoundBeforeRendering) {
+  const Ran ran = Run(SmallRender({"-o", In("no/such/folder/a.exr"), "--time", "1000"}));
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_NE(ran.err.find("no/such/folder"), std::string::npos) << ran.err;
+}
+
+TEST_F(ClientCommandsTest, AFullDiskIsReported) {
+  const Ran ran = Run(SmallRender({"-o", "/dev/full"}));
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_NE(ran.err.find("/dev/full: cannot write: No space left"), std::string::npos) << ran.err;
+}
+
+TEST_F(ClientCommandsTest, AnUnreachableCoordinatorIsNamedWithCodeThree) {
+  const std::vector<std::vector<std::string>> commands = {
+      {"jobs"}, {"fetch", "j", "-o", In("a.exr")}, {"submit", SceneOfTests("caustic.pbrt")}};
+  for (std::vector<std::string> words : commands) {
+    words.insert(words.end(), {"--server", "127.0.0.1:1"});
+    const Ran ran = Run(words);
+    EXPECT_EQ(ran.code, 3) << words[0];
+    EXPECT_NE(ran.err.find("cannot reach the coordinator at 127.0.0.1:1"), std::string::npos)
+        << words[0] << ": " << ran.err;
+  }
+}
+
+TEST_F(ClientCommandsTest, AnInterruptionCancelsCleansUpAndLeavesNothing) {
+  for (const int number : {SIGINT, SIGTERM}) {
+    const pid_t client = Start({"render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--time",
+                                "1000", "-o", In("a.exr")});
+    std::vector<pid_t> children;
+    for (int i = 0; i < 1000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    children = ChildrenOf(client);
+    EXPECT_EQ(children.size(), 2U) << "a coordinator and a worker";
+    ::kill(client, number);
+    const Ran ran = Finish(client);
+    EXPECT_EQ(ran.code, 130) << ran.err;
+    for (const pid_t child : children)
+      EXPECT_NE(::kill(child, 0), 0) << "left running";
+    EXPECT_TRUE(Images().empty());
+  }
+}
+
+TEST_F(ClientCommandsTest, ADeadCoordinatorEndsTheRenderWithASentence) {
+  const pid_t client = Start({"render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--time",
+                              "1000", "-o", In("a.exr")});
+  for (int i = 0; i < 1000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  for (const pid_t child : ChildrenOf(client)) {
+    std::error_code error;
+    const auto program =
+        std::filesystem::read_symlink("/proc/" + std::to_string(child) + "/exe", error);
+    if (program.filename() == "lucerna-server") ::kill(child, SIGKILL);
+  }
+  const Ran ran = Finish(client);
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_NE(ran.err.find("the coordinator was ended by signal 9"), std::string::npos) << ran.err;
+  EXPECT_TRUE(Images().empty());
+}
+
+TEST_F(ClientCommandsTest, AJobIsSubmittedListedFollowedFetchedAndCancelled) {
+  const auto cluster = LocalCluster::Start({LUCERNA_BIN_DIR, 1, 1});
+  ASSERT_TRUE(cluster.ok()) << cluster.status();
+  const std::string server = (*cluster)->address();
+  const std::vector<std::string> small = {
+      "submit", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--server", server, "--passes",
+      "3",      "--photons-per-pass",         "20000"};
+  const Ran submitted = Run(small);
+  ASSERT_EQ(submitted.code, 0) << submitted.err;
+  const std::string job = submitted.out.substr(0, submitted.out.find('\n'));
+  EXPECT_EQ(submitted.out, job + "\n");
+
+  EXPECT_EQ(Run({"wait", job, "--server", server}).code, 0);
+  const Ran watched = Run({"watch", job, "--server", server, "--json"});
+  EXPECT_EQ(watched.code, 0) << watched.err;
+  EXPECT_EQ(json::parse(watched.out)["state"], "SUCCEEDED");
+  ASSERT_EQ(Run({"fetch", job, "-o", In("a.exr"), "--server", server}).code, 0);
+
+  // The same image as by `render`, and as by a submission that waits.
+  ASSERT_EQ(Run(SmallRender({"-o", In("b.exr")})).code, 0);
+  EXPECT_EQ(Run({"digest", In("a.exr")}).out, Run({"digest", In("b.exr")}).out);
+  std::vector<std::string> waiting = small;
+  waiting.insert(waiting.end(), {"-o", In("c.exr")});
+  ASSERT_EQ(Run(waiting).code, 0);
+  EXPECT_EQ(Run({"digest", In("c.exr")}).out, Run({"digest", In("b.exr")}).out);
+
+  const Ran endless = Run({"submit", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--server",
+                           server, "--time", "1000"});
+  ASSERT_EQ(endless.code, 0) << endless.err;
+  const std::string second = endless.out.substr(0, endless.out.find('\n'));
+  EXPECT_EQ(Run({"cancel", second, "--server", server}).code, 0);
+  EXPECT_EQ(Run({"wait", second, "--server", server}).code, 1) << "it did not succeed";
+  EXPECT_EQ(Run({"fetch", second, "-o", In("d.exr"), "--server", server}).code, 1);
+  EXPECT_FALSE(std::filesystem::exists(In("d.exr")));
+
+  const json jobs = json::parse(Run({"jobs", "--json", "--server", server}).out);
+  ASSERT_EQ(jobs.size(), 3U);
+  EXPECT_EQ(jobs[0]["job_id"], second) << "newest first";
+  EXPECT_EQ(jobs[0]["state"], "CANCELLED");
+  EXPECT_EQ(jobs[2]["job_id"], job);
+
+  const Ran unknown = Run({"watch", "no-such-job", "--server", server});
+  EXPECT_EQ(unknown.code, 1);
+  EXPECT_NE(unknown.err.find("no-such-job"), std::string::npos) << unknown.err;
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,305 @@
+// Workers may be killed, replaced, told to go, or be of the wrong build, and the coordinator may
+// be absent: the image is the same to the last bit, or there is one clear message.
+//
+// Real processes on loopback.
+#include <chrono>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gtest/gtest.h"
+#include <grpcpp/grpcpp.h>
+#include <signal.h>
+
+#include "proto/lucerna/v1/assets.grpc.pb.h"
+#include "proto/lucerna/v1/images.grpc.pb.h"
+#include "proto/lucerna/v1/jobs.grpc.pb.h"
+#include "proto/lucerna/v1/work.grpc.pb.h"
+#include "render/base/files.h"
+#include "render/film/exr_file.h"
+#include "render/scene/pbrt_parser.h"
+#include "render/scene/scene_files.h"
+#include "render/wire/channel.h"
+#include "render/wire/chunks.h"
+#include "render/wire/grpc_status.h"
+#include "render/wire/messages.h"
+#include "tests/support/process.h"
+
+namespace lucerna {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+const std::string kBin = LUCERNA_BIN_DIR;
+const std::string kScenes = LUCERNA_SOURCE_DIR "/tests/scenes";
+
+class Coordinator {
+ public:
+  explicit Coordinator(std::vector<std::string> flags = {}) {
+    std::vector<std::string> command = {kBin + "/lucerna-server", "--listen", "127.0.0.1:0"};
+    command.insert(command.end(), flags.begin(), flags.end());
+    process_ = std::make_unique<ChildProcess>(command);
+    EXPECT_TRUE(process_->WaitForText("\n", seconds(20)));
+    const std::string line = process_->Output();
+    const std::string begin = "listening on ";
+    EXPECT_EQ(line.rfind(begin, 0), 0U) << line << process_->Errors();
+    if (line.size() > begin.size()) {
+      address_ = line.substr(begin.size(), line.find('\n') - begin.size());
+    }
+    channel_ = MakeChannel(address_);
+  }
+
+  [[nodiscard]] const std::string& address() const { return address_; }
+  [[nodiscard]] ChildProcess& process() { return *process_; }
+  [[nodiscard]] const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
+
+  [[nodiscard]] std::unique_ptr<ChildProcess> StartWorker() const {
+    return std::make_unique<ChildProcess>(
+        std::vector<std::string>{kBin + "/lucerna-worker", "--server", address_, "--threads", "1"});
+  }
+
+  // Uploads and submits a scene of ours; the job's id.
+  std::string Submit(const std::string& scene, int passes, std::int64_t photons) {
+    DirectoryFiles files(kScenes);
+    const ParsedScene parsed = ParsePbrt(files, scene);
+    EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+    const SceneManifest manifest = files.Manifest(scene);
+    const auto assets = v1::AssetService::NewStub(channel_);
+    for (const auto& [path, entry] : manifest.entries) {
+      grpc::ClientContext context;
+      v1::UploadResponse response;
+      const auto writer = assets->Upload(&context, &response);
+      v1::UploadRequest part;
+      part.mutable_header()->set_digest(std::string(entry.digest.Bytes()));
+      part.mutable_header()->set_size_bytes(entry.size_bytes);
+      writer->Write(part);
+      part.set_bytes(ReadFile(kScenes + "/" + path).value());
+      writer->Write(part);
+      writer->WritesDone();
+      EXPECT_TRUE(writer->Finish().ok());
+    }
+    v1::SubmitRequest request;
+    request.set_request_id("the only one");
+    *request.mutable_scene() = ToProto(manifest);
+    request.mutable_overrides()->set_passes(passes);
+    request.mutable_overrides()->set_photons_per_pass(photons);
+    request.mutable_overrides()->set_width(64);
+    request.mutable_overrides()->set_height(64);
+    v1::SubmitResponse response;
+    grpc::ClientContext context;
+    const grpc::Status status =
+        v1::JobService::NewStub(channel_)->Submit(&context, request, &response);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return response.job_id();
+  }
+
+  v1::Job Get(const std::string& job_id) {
+    v1::GetJobRequest request;
+    request.set_job_id(job_id);
+    v1::Job job;
+    grpc::ClientContext context;
+    const grpc::Status status = v1::JobService::NewStub(channel_)->Get(&context, request, &job);
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    return job;
+  }
+
+  // The job when it has ended, or as it is after a minute.
+  v1::Job Wait(const std::string& job_id) {
+    v1::WatchJobRequest request;
+    request.set_job_id(job_id);
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + seconds(60));
+    const auto reader = v1::JobService::NewStub(channel_)->Watch(&context, request);
+    v1::Job job;
+    while (reader->Read(&job)) {
+    }
+    return job;
+  }
+
+  Digest ImageDigest(const std::string& job_id) {
+    v1::GetImageRequest request;
+    request.set_job_id(job_id);
+    grpc::ClientContext context;
+    const auto reader = v1::ImageService::NewStub(channel_)->GetImage(&context, request);
+    std::string bytes;
+    v1::Chunk chunk;
+    while (reader->Read(&chunk))
+      bytes += chunk.bytes();
+    const grpc::Status status = reader->Finish();
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    const StatusOr<Image> image = DecodeExr(bytes);
+    EXPECT_TRUE(image.ok()) << image.status();
+    return image.ok() ? image->PixelDigest() : Digest();
+  }
+
+ private:
+  std::unique_ptr<ChildProcess> process_;
+  std::string address_;
+  std::shared_ptr<grpc::Channel> channel_;
+};
+
+constexpr int kPasses = 6;
+constexpr std::int64_t kPhotons = 400'000;
+const char* const kScene = "glass-box.pbrt";
+const std::vector<std::string> kSmallBatches = {"--batch-photons", "50000"};
+
+Digest UnfaultedDigest() {
+  static const Digest digest = [] {
+    Coordinator coordinator;
+    const auto worker = coordinator.StartWorker();
+    const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+    EXPECT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
+    return coordinator.ImageDigest(job);
+  }();
+  return digest;
+}
+
+// Waits until the job has merged so many photons; false when it ended or a minute passed.
+bool WaitForPhotons(Coordinator& coordinator, const std::string& job, std::uint64_t photons) {
+  for (int i = 0; i < 6000; ++i) {
+    const v1::Job now = coordinator.Get(job);
+    if (now.state() > v1::JOB_STATE_RUNNING) return false;
+    if (now.progress().photons() >= photons) return true;
+    std::this_thread::sleep_for(milliseconds(10));
+  }
+  return false;
+}
+
+class KilledWorkerTest : public testing::TestWithParam<int> {};
+
+TEST_P(KilledWorkerTest, IsReplacedAndTheImageIsTheSame) {
+  Coordinator coordinator(kSmallBatches);
+  auto worker = coordinator.StartWorker();
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  ASSERT_TRUE(
+      WaitForPhotons(coordinator, job, static_cast<std::uint64_t>(GetParam() * kPhotons / 2 + 1)));
+  worker->Signal(SIGKILL);
+  ASSERT_EQ(worker->WaitForExit(seconds(5)), 128 + SIGKILL);
+  const auto replacement = coordinator.StartWorker();
+  const v1::Job ended = coordinator.Wait(job);
+  ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
+  EXPECT_EQ(ended.progress().tally().photons(), static_cast<std::uint64_t>(kPasses * kPhotons))
+      << "each photon once";
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest().Hex());
+}
+
+INSTANTIATE_TEST_SUITE_P(AtSeveralMoments, KilledWorkerTest, testing::Values(0, 3, 7));
+
+TEST(WorkerFaultsTest, ABatchOfAKilledWorkerGoesBackAtOnceAndNotAfterTenSeconds) {
+  Coordinator coordinator;
+  auto worker = coordinator.StartWorker();
+  const auto begin = std::chrono::steady_clock::now();
+  const std::string job = coordinator.Submit(kScene, 2, 3'000'000);
+  for (int i = 0; i < 1000 && coordinator.Get(job).state() < v1::JOB_STATE_RUNNING; ++i) {
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  std::this_thread::sleep_for(milliseconds(200));
+  ASSERT_EQ(coordinator.Get(job).progress().photons(), 0U) << "killed in its first batch";
+  worker->Signal(SIGKILL);
+  EXPECT_TRUE(coordinator.process().WaitForText("vanished", seconds(3)));
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, seconds(8));
+}
+
+TEST(WorkerFaultsTest, AWorkerToldToGoLeavesWithinTwoSecondsAndItsBatchIsDoneByAnother) {
+  Coordinator coordinator;
+  auto worker = coordinator.StartWorker();
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  ASSERT_TRUE(WaitForPhotons(coordinator, job, 1));
+  const auto begin = std::chrono::steady_clock::now();
+  worker->Signal(SIGTERM);
+  EXPECT_EQ(worker->WaitForExit(seconds(10)), 0) << worker->Errors();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, seconds(2));
+  EXPECT_TRUE(coordinator.process().WaitForText("left", seconds(1)));
+  const auto other = coordinator.StartWorker();
+  ASSERT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest().Hex());
+}
+
+TEST(WorkerFaultsTest, AnIdleWorkerLeavesWithinTwoSeconds) {
+  Coordinator coordinator;
+  auto worker = coordinator.StartWorker();
+  ASSERT_TRUE(worker->WaitForText("joined", seconds(10)));
+  const auto begin = std::chrono::steady_clock::now();
+  worker->Signal(SIGTERM);
+  EXPECT_EQ(worker->WaitForExit(seconds(10)), 0);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, seconds(2));
+}
+
+TEST(WorkerFaultsTest, AnotherNumericProfileIsRefusedWithBothNames) {
+  Coordinator coordinator;
+  v1::RegisterRequest request;
+  request.set_name("stranger");
+  request.set_numeric_profile("another build");
+  v1::RegisterResponse response;
+  grpc::ClientContext context;
+  const grpc::Status status =
+      v1::WorkerService::NewStub(coordinator.channel())->Register(&context, request, &response);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
+  EXPECT_NE(status.error_message().find("another build"), std::string::npos);
+  EXPECT_NE(status.error_message().find("embree"), std::string::npos) << status.error_message();
+}
+
+TEST(WorkerFaultsTest, AnAbsentCoordinatorIsOneClearMessage) {
+  const Finished finished = RunProgram(
+      {kBin + "/lucerna-worker", "--server", "127.0.0.1:1", "--connect-timeout", "1"}, seconds(20));
+  EXPECT_EQ(finished.exit_code, 3);
+  EXPECT_NE(finished.errors.find("no coordinator answers at 127.0.0.1:1"), std::string::npos)
+      << finished.errors;
+  EXPECT_EQ(finished.output, "");
+}
+
+TEST(WorkerFaultsTest, AWorkerComesBackToACoordinatorThatWasStartedAnew) {
+  auto coordinator = std::make_unique<Coordinator>();
+  const std::string address = coordinator->address();
+  auto worker = coordinator->StartWorker();
+  ASSERT_TRUE(worker->WaitForText("joined", seconds(10)));
+  coordinator->process().Signal(SIGKILL);
+  ASSERT_TRUE(coordinator->process().WaitForExit(seconds(5)));
+  ASSERT_TRUE(worker->WaitForText("lost the coordinator", seconds(10))) << worker->Errors();
+  ChildProcess anew({kBin + "/lucerna-server", "--listen", address});
+  EXPECT_TRUE(anew.WaitForText("joined", seconds(10))) << anew.Errors();
+}
+
+TEST(WorkerFaultsTest, AnUnencryptedListenerBeyondThisMachineMustBeAskedFor) {
+  const Finished finished =
+      RunProgram({kBin + "/lucerna-server", "--listen", "0.0.0.0:0"}, seconds(10));
+  EXPECT_EQ(finished.exit_code, 2);
+  EXPECT_NE(finished.errors.find("--allow-insecure-network"), std::string::npos);
+}
+
+TEST(WorkerFaultsTest, AForgedAccumulationIsRefusedAndChangesNothing) {
+  Coordinator coordinator;
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  for (int i = 0; i < 1000 && coordinator.Get(job).state() != v1::JOB_STATE_RUNNING; ++i) {
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+  // The pass opens a moment after the job begins to run.
+  std::this_thread::sleep_for(milliseconds(500));
+  const std::string garbage = "LAC1 and then nothing of sense";
+  v1::CommitBatchResponse response;
+  grpc::ClientContext context;
+  const auto writer =
+      v1::WorkerService::NewStub(coordinator.channel())->CommitBatch(&context, &response);
+  v1::CommitBatchRequest part;
+  part.mutable_header()->set_job_id(job);
+  part.mutable_header()->set_last_photon(kPhotons);
+  part.mutable_header()->set_digest(std::string(Sha256(garbage).Bytes()));
+  part.mutable_header()->set_size_bytes(garbage.size());
+  writer->Write(part);
+  part.set_bytes(garbage);
+  writer->Write(part);
+  writer->WritesDone();
+  const grpc::Status status = writer->Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << status.error_message();
+  EXPECT_EQ(coordinator.Get(job).progress().photons(), 0U);
+  EXPECT_TRUE(coordinator.Get(job).no_workers());
+
+  const auto worker = coordinator.StartWorker();
+  ASSERT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest().Hex());
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,156 @@
+// Whatever the bytes of a scene or a mesh are, reading them ends, in bounded memory, with a sound
+// value or with errors that name a place. The bad files of corpus/ stay refused.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "render/base/files.h"
+#include "render/scene/pbrt_parser.h"
+#include "render/scene/ply_file.h"
+#include "tests/fuzz/mutation.h"
+#include "tests/fuzz/sound_scene.h"
+#include "tests/support/memory_files.h"
+
+namespace lucerna {
+namespace {
+
+struct NamedBytes {
+  std::string name, bytes;
+};
+
+std::vector<NamedBytes> FilesOf(const std::string& folder) {
+  std::vector<NamedBytes> files;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(LUCERNA_SOURCE_DIR) + "/tests/" + folder)) {
+    files.push_back({entry.path().filename().string(), ReadFile(entry.path().string()).value()});
+  }
+  std::sort(files.begin(), files.end(),
+            [](const NamedBytes& a, const NamedBytes& b) { return a.name < b.name; });
+  return files;
+}
+
+// Every directive and most parameters in one small scene.
+std::string WholeScene() {
+  return FilesOf("fuzz/seeds/pbrt").at(0).bytes;
+}
+
+ParsedScene ParseBytes(const std::string& bytes) {
+  MemoryFiles files({{"fuzz.pbrt", bytes},
+                     {"part.pbrt", "Shape \"sphere\"\n"},
+                     {"mesh.ply", FilesOf("fuzz/seeds/ply").at(0).bytes}});
+  SceneLimits limits;
+  limits.max_files = 50;
+  limits.max_total_bytes = 1 << 20;
+  limits.max_triangles = 10'000;
+  return ParsePbrt(files, "fuzz.pbrt", limits);
+}
+
+void ExpectSoundOrRefused(const ParsedScene& parsed) {
+  if (parsed.ok()) {
+    EXPECT_EQ(WhatIsUnsound(parsed.scene), "");
+  } else {
+    EXPECT_FALSE(parsed.ToStatus().ok());
+  }
+  EXPECT_LE(parsed.diagnostics.size(), 300U);
+}
+
+TEST(SceneBytesTest, TheSeedsAreGood) {
+  const ParsedScene parsed = ParseBytes(WholeScene());
+  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+  EXPECT_EQ(WhatIsUnsound(parsed.scene), "");
+  for (const NamedBytes& seed : FilesOf("fuzz/seeds/ply")) {
+    EXPECT_TRUE(ParsePly(seed.bytes).ok()) << seed.name;
+  }
+}
+
+TEST(SceneBytesTest, TheCorpusOfBadScenesIsRefused) {
+  const std::vector<NamedBytes> corpus = FilesOf("fuzz/corpus/pbrt");
+  EXPECT_GE(corpus.size(), 10U);
+  for (const NamedBytes& bad : corpus) {
+    const ParsedScene parsed = ParseBytes(bad.bytes);
+    EXPECT_FALSE(parsed.ok()) << bad.name;
+    EXPECT_LE(parsed.diagnostics.size(), 300U) << bad.name;
+  }
+}
+
+TEST(SceneBytesTest, TheCorpusOfBadMeshesIsRefused) {
+  const std::vector<NamedBytes> corpus = FilesOf("fuzz/corpus/ply");
+  EXPECT_GE(corpus.size(), 10U);
+  for (const NamedBytes& bad : corpus)
+    EXPECT_FALSE(ParsePly(bad.bytes).ok()) << bad.name;
+}
+
+TEST(SceneBytesTest, ASceneCutOffAnywhereIsSoundOrRefused) {
+  const std::string whole = WholeScene();
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    SCOPED_TRACE(size);
+    ExpectSoundOrRefused(ParseBytes(whole.substr(0, size)));
+  }
+}
+
+TEST(SceneBytesTest, AMeshCutOffAnywhereIsRefused) {
+  for (const NamedBytes& seed : FilesOf("fuzz/seeds/ply")) {
+    // The last line's end is not needed, nor are the last digits of an ASCII index.
+    const bool is_text = seed.name == "ascii.ply";
+    for (std::size_t size = 0; size + (is_text ? 2 : 0) < seed.bytes.size(); ++size) {
+      EXPECT_FALSE(ParsePly(seed.bytes.substr(0, size)).ok()) << seed.name << " " << size;
+    }
+  }
+}
+
+TEST(SceneBytesTest, MutatedScenesAreSoundOrRefused) {
+  const std::string whole = WholeScene();
+  int accepted = 0;
+  for (std::uint64_t key = 0; key < 20'000; ++key) {
+    SCOPED_TRACE(key);
+    const ParsedScene parsed = ParseBytes(Mutated(whole, key));
+    ExpectSoundOrRefused(parsed);
+    accepted += parsed.ok() ? 1 : 0;
+  }
+  // Were none accepted, the mutations would be too coarse to reach beyond the first checks.
+  EXPECT_GT(accepted, 100);
+}
+
+TEST(SceneBytesTest, MutatedMeshesAreSoundOrRefused) {
+  for (const NamedBytes& seed : FilesOf("fuzz/seeds/ply")) {
+    for (std::uint64_t key = 0; key < 20'000; ++key) {
+      const StatusOr<TriangleMesh> mesh = ParsePly(Mutated(seed.bytes, key));
+      if (!mesh.ok()) continue;
+      // A mesh has no more than its bytes can pay for: 200 times, when packed.
+      EXPECT_LE(mesh->positions.size(), 200 * (seed.bytes.size() + 1024)) << seed.name << key;
+      for (const std::uint32_t index : mesh->indices) {
+        ASSERT_LT(index, mesh->positions.size()) << seed.name << " " << key;
+      }
+      for (const Vec3 position : mesh->positions) {
+        ASSERT_TRUE(IsFinite(position)) << seed.name << " " << key;
+      }
+    }
+  }
+}
+
+TEST(SceneBytesTest, HostileNestingAndListsEnd) {
+  const auto repeated = [](const std::string& text, int count) {
+    std::string all = "Camera \"perspective\" WorldBegin\n";
+    for (int i = 0; i < count; ++i)
+      all += text;
+    return all;
+  };
+  EXPECT_FALSE(ParseBytes(repeated("AttributeBegin\n", 50'000)).ok());
+  EXPECT_FALSE(ParseBytes(repeated("Attribute \"shape\" \"float a\" 1\n", 10'000)).ok());
+  EXPECT_FALSE(ParseBytes(repeated("Scale 1e-30 1e-30 1e-30\n", 100)).ok());
+  EXPECT_FALSE(ParseBytes(repeated("Include \"fuzz.pbrt\"\n", 100)).ok());
+  EXPECT_FALSE(ParseBytes(repeated("unknown [ \"words\" ]\n", 40'000)).ok());
+  // Warned of, and at most a hundred times.
+  std::string parameters = "Shape \"sphere\"";
+  for (int i = 0; i < 40'000; ++i)
+    parameters += " \"float p" + std::to_string(i) + "\" 1";
+  const ParsedScene parsed = ParseBytes(repeated(parameters, 1));
+  EXPECT_TRUE(parsed.ok());
+  EXPECT_LE(parsed.diagnostics.size(), 102U);
+}
+
+}  // namespace
+}  // namespace lucerna

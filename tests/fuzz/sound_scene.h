@@ -1,0 +1,84 @@
+// Does a scene keep the invariants S1 to S4 of render/scene/scene.h?
+#pragma once
+
+#include <cmath>
+#include <string>
+
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+// Empty when it does, else the first thing that is wrong.
+[[nodiscard]] inline std::string WhatIsUnsound(const Scene& scene) {
+  const auto traits_are_sound = [&](const ShapeTraits& traits) {
+    return traits.material >= 0 &&
+           static_cast<std::size_t>(traits.material) < scene.materials.size() &&
+           traits.area_light >= kNoAreaLight &&
+           traits.area_light < static_cast<std::int32_t>(scene.area_lights.size());
+  };
+  const auto is_unit = [](Vec3 v) { return std::abs(Length(v) - 1) < 1e-4F; };
+  const auto is_light = [](Rgb c) { return IsFinite(c) && c.r >= 0 && c.g >= 0 && c.b >= 0; };
+  for (const TriangleMesh& mesh : scene.meshes) {
+    if (!traits_are_sound(mesh.traits)) return "the traits of a mesh";
+    if (mesh.indices.empty() || mesh.indices.size() % 3 != 0) return "the indices of a mesh";
+    for (const std::uint32_t index : mesh.indices) {
+      if (index >= mesh.positions.size()) return "an index";
+    }
+    for (const Vec3 position : mesh.positions) {
+      if (!IsFinite(position)) return "a position";
+    }
+    if (!mesh.normals.empty() && mesh.normals.size() != mesh.positions.size()) return "normals";
+    for (const Vec3 normal : mesh.normals) {
+      if (normal != Vec3() && !is_unit(normal)) return "a normal";
+    }
+  }
+  for (const Sphere& sphere : scene.spheres) {
+    if (!traits_are_sound(sphere.traits) || !IsFinite(sphere.center) || !(sphere.radius > 0) ||
+        !std::isfinite(sphere.radius)) {
+      return "a sphere";
+    }
+  }
+  for (const Disk& disk : scene.disks) {
+    if (!traits_are_sound(disk.traits) || !IsFinite(disk.center) || !is_unit(disk.normal) ||
+        !(disk.radius > disk.inner_radius) || !(disk.inner_radius >= 0) ||
+        !std::isfinite(disk.radius)) {
+      return "a disk";
+    }
+  }
+  for (const Material& material : scene.materials) {
+    for (int c = 0; c < 3; ++c) {
+      if (!(material.reflectance[c] >= 0 && material.reflectance[c] <= 1)) return "a reflectance";
+      if (!(material.eta[c] > 0) || !(material.k[c] >= 0)) return "a metal";
+    }
+    if (!(material.ior > 0) || !(material.alpha_u >= 0) || !(material.alpha_v >= 0) ||
+        (material.alpha_u == 0) != (material.alpha_v == 0)) {
+      return "a material";
+    }
+  }
+  for (const AreaLight& light : scene.area_lights) {
+    if (!is_light(light.radiance)) return "an area light";
+  }
+  for (const PointLight& light : scene.point_lights) {
+    if (!is_light(light.intensity) || !IsFinite(light.position)) return "a point light";
+  }
+  for (const SpotLight& light : scene.spot_lights) {
+    if (!is_light(light.intensity) || !IsFinite(light.position) || !is_unit(light.direction)) {
+      return "a spot light";
+    }
+  }
+  for (const DistantLight& light : scene.distant_lights) {
+    if (!is_light(light.irradiance) || !is_unit(light.direction)) return "a distant light";
+  }
+  for (const InfiniteLight& light : scene.infinite_lights) {
+    if (!is_light(light.radiance)) return "an infinite light";
+  }
+  const FilmSettings& film = scene.film;
+  if (!(0 <= film.crop_x0 && film.crop_x0 < film.crop_x1 && film.crop_x1 <= film.width &&
+        0 <= film.crop_y0 && film.crop_y0 < film.crop_y1 && film.crop_y1 <= film.height)) {
+    return "the crop window";
+  }
+  if (!scene.camera.camera_to_world.IsFinite()) return "the camera";
+  return "";
+}
+
+}  // namespace lucerna

@@ -1,0 +1,49 @@
+// A whole render in one process, without the wire: what the coordinator and a worker compute,
+// called in turn. For tests and benchmarks of the estimator.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "render/base/status.h"
+#include "render/film/image.h"
+#include "render/scene/render_settings.h"
+#include "render/scene/scene.h"
+#include "server/job_estimator.h"
+#include "worker/batch_tracer.h"
+
+namespace lucerna {
+
+class LocalRender {
+ public:
+  // Aborts when the scene cannot be prepared.
+  LocalRender(const Scene& scene, const RenderSettings& settings, int threads = 0);
+
+  // Adds one pass, its photons in `batches` ranges.
+  void AddPass(int batches = 1);
+  [[nodiscard]] Image MakeImage() const { return estimator_->MakeImage(); }
+  // Over all passes.
+  [[nodiscard]] const BatchTally& tally() const { return tally_; }
+
+ private:
+  RenderSettings settings_;
+  std::unique_ptr<JobEstimator> estimator_;
+  std::unique_ptr<BatchTracer> tracer_;
+  // Radii lag by two passes: those of the next pass are taken before the current one is applied.
+  RadiusColumn next_radii_;
+  EyePass next_;
+  std::uint64_t pass_ = 0;
+  BatchTally tally_;
+};
+
+// Renders `passes` passes.
+[[nodiscard]] Image RenderLocally(const Scene& scene, const RenderSettings& settings, int passes,
+                                  int threads = 0);
+
+// Parses a scene of tests/scenes or an absolute path; aborts with its errors.
+[[nodiscard]] Scene LoadScene(const std::string& path);
+
+// Settings of a scene with `overrides`; aborts when they are wrong.
+[[nodiscard]] RenderSettings SettingsFor(const Scene& scene, const RenderOverrides& overrides = {});
+
+}  // namespace lucerna

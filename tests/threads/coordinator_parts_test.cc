@@ -1,0 +1,137 @@
+// The scheduler, the merger and the store are asked by many threads at once. Whatever the
+// interleaving: every photon is merged exactly once, the sums are those of one thread, and no
+// bytes are lost. Links no gRPC, so that ThreadSanitizer can be believed.
+#include <atomic>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "server/blob_store.h"
+#include "server/pass_merger.h"
+#include "server/scheduler.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::size_t kHitpoints = 64;
+constexpr std::uint64_t kPhotons = 20'000;
+const PassKey kPass = {"job", 0};
+
+// What a batch brings depends on its range alone.
+Accumulation BatchOf(PhotonRange range) {
+  Accumulation accumulation;
+  for (std::uint32_t i = 0; i < kHitpoints; ++i) {
+    accumulation.hitpoints.push_back(i);
+    accumulation.counts.push_back(static_cast<std::uint32_t>(range.size()));
+    for (std::size_t c = 0; c < 3; ++c) {
+      accumulation.flux[c].push_back(static_cast<std::int64_t>(range.first * (i + 1) + c));
+    }
+  }
+  accumulation.tally.photons = range.size();
+  return accumulation;
+}
+
+void RunThreads(int count, const std::function<void(int)>& body) {
+  std::vector<std::thread> threads;
+  for (int t = 0; t < count; ++t)
+    threads.emplace_back(body, t);
+  for (std::thread& thread : threads)
+    thread.join();
+}
+
+TEST(CoordinatorPartsTest, FaultyWorkersTogetherMergeEveryPhotonOnce) {
+  SchedulerOptions options;
+  options.fixed_batch = 100;
+  // Some workers here fail on purpose, again and again.
+  options.poison_workers = 1'000'000;
+  options.poison_losses = 1'000'000;
+  Scheduler scheduler(options);
+  PassMerger merger;
+  merger.Open(kPass, kHitpoints, kPhotons);
+  scheduler.OpenPass(kPass, kPhotons);
+  std::atomic<std::uint64_t> accepted = 0;
+  std::atomic<std::int64_t> now_ms = 0;
+  const auto now = [&] { return SteadyTime(std::chrono::milliseconds(now_ms++)); };
+
+  RunThreads(4, [&](int thread) {
+    std::string worker = scheduler.AddWorker("w", now());
+    for (int round = 0; !merger.IsComplete(kPass); ++round) {
+      Scheduler::Report report;
+      report.wants_lease = true;
+      if (!scheduler.Hear(worker, report, now()).ok()) {
+        worker = scheduler.AddWorker("w", now());
+        continue;
+      }
+      const auto answer = scheduler.Tell(worker, report, now());
+      if (!answer.ok() || !answer->lease) {
+        scheduler.Expire(now());
+        std::this_thread::yield();
+        continue;
+      }
+      const BatchLease& lease = *answer->lease;
+      const bool is_late = round % 5 == thread;
+      // Loses its connection first and delivers all the same.
+      if (is_late) scheduler.LoseWorker(worker);
+      if (round % 7 == thread) continue;  // drops the batch
+      const auto outcome = merger.Merge(lease.pass, lease.range, BatchOf(lease.range));
+      ASSERT_TRUE(outcome.ok()) << outcome.status();
+      if (*outcome == PassMerger::Outcome::kAccepted) {
+        accepted += lease.range.size();
+        scheduler.Commit(lease.pass, lease.range, now());
+      }
+    }
+  });
+
+  EXPECT_EQ(accepted, kPhotons);
+  const PassSums sums = merger.Take(kPass);
+  PassSums expected(kHitpoints);
+  for (std::uint64_t first = 0; first < kPhotons; first += 100) {
+    ASSERT_TRUE(expected.Add(BatchOf({first, first + 100})).ok());
+  }
+  EXPECT_EQ(sums.counts(), expected.counts());
+  for (int c = 0; c < 3; ++c)
+    EXPECT_EQ(sums.flux(c), expected.flux(c));
+  EXPECT_EQ(sums.tally(), expected.tally());
+}
+
+TEST(CoordinatorPartsTest, ABatchThatManyDeliverAtOnceIsAcceptedOnce) {
+  for (int round = 0; round < 50; ++round) {
+    PassMerger merger;
+    merger.Open(kPass, kHitpoints, 100);
+    std::atomic<int> accepted = 0;
+    RunThreads(4, [&](int) {
+      const auto outcome = merger.Merge(kPass, {0, 100}, BatchOf({0, 100}));
+      ASSERT_TRUE(outcome.ok());
+      if (*outcome == PassMerger::Outcome::kAccepted) ++accepted;
+    });
+    EXPECT_EQ(accepted, 1);
+    EXPECT_EQ(merger.Take(kPass).tally().photons, 100U);
+  }
+}
+
+TEST(CoordinatorPartsTest, ThePinnedBytesOfEveryThreadStay) {
+  BlobStore blobs(10'000);
+  RunThreads(4, [&](int thread) {
+    for (int i = 0; i < 500; ++i) {
+      const std::string mine = absl::StrCat("radii of pass ", i, " of ", thread);
+      const std::string shared = absl::StrCat("mesh ", i % 7);
+      const Digest digest = Sha256(mine);
+      ASSERT_TRUE(blobs.PutPinned(digest, mine).ok());
+      ASSERT_TRUE(blobs.PutPinned(Sha256(shared), shared).ok());
+      const auto blob = blobs.Get(digest);
+      ASSERT_TRUE(blob.ok());
+      EXPECT_EQ(**blob, mine);
+      ASSERT_TRUE(blobs.Get(Sha256(shared)).ok());
+      blobs.Unpin(Sha256(shared));
+      blobs.UnpinAndDrop(digest);
+      EXPECT_FALSE(blobs.Has(digest));
+    }
+  });
+  EXPECT_LE(blobs.size_bytes(), 10'000U);
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,68 @@
+// What is pinned must stay, what is not must make room, and the bound must hold.
+#include "server/blob_store.h"
+
+#include "gtest/gtest.h"
+
+namespace lucerna {
+namespace {
+
+Digest Put(BlobStore& blobs, const std::string& bytes) {
+  const Digest digest = Sha256(bytes);
+  EXPECT_TRUE(blobs.Put(digest, bytes).ok());
+  return digest;
+}
+
+TEST(BlobStoreTest, GivesBackWhatWasPut) {
+  BlobStore blobs(100);
+  const Digest digest = Put(blobs, "hello");
+  EXPECT_EQ(**blobs.Get(digest), "hello");
+  EXPECT_TRUE(absl::IsNotFound(blobs.Get(Sha256("other")).status()));
+  Put(blobs, "hello");
+  EXPECT_EQ(blobs.size_bytes(), 5U) << "kept once";
+}
+
+TEST(BlobStoreTest, ForgetsTheLeastRecentlyUsedFirst) {
+  BlobStore blobs(10);
+  const Digest a = Put(blobs, "aaaa");
+  const Digest b = Put(blobs, "bbbb");
+  ASSERT_TRUE(blobs.Get(a).ok());
+  const Digest c = Put(blobs, "cccc");
+  EXPECT_TRUE(blobs.Has(a));
+  EXPECT_FALSE(blobs.Has(b));
+  EXPECT_TRUE(blobs.Has(c));
+  EXPECT_LE(blobs.size_bytes(), 10U);
+}
+
+TEST(BlobStoreTest, KeepsWhatIsPinnedAndSaysWhenItIsFull) {
+  BlobStore blobs(10);
+  const Digest a = Put(blobs, "aaaa");
+  ASSERT_TRUE(blobs.Pin(a).ok());
+  ASSERT_TRUE(blobs.Pin(a).ok());
+  const Digest b = Sha256("bbbb");
+  ASSERT_TRUE(blobs.PutPinned(b, "bbbb").ok());
+  EXPECT_TRUE(absl::IsResourceExhausted(blobs.Put(Sha256("cccc"), "cccc")));
+  blobs.Unpin(a);
+  EXPECT_TRUE(absl::IsResourceExhausted(blobs.Put(Sha256("cccc"), "cccc"))) << "pinned twice";
+  blobs.Unpin(a);
+  EXPECT_TRUE(blobs.Has(a)) << "stays while there is room";
+  EXPECT_TRUE(blobs.Put(Sha256("cccc"), "cccc").ok());
+  EXPECT_FALSE(blobs.Has(a));
+  EXPECT_TRUE(absl::IsNotFound(blobs.Pin(a)));
+}
+
+TEST(BlobStoreTest, DropsWithTheLastPin) {
+  BlobStore blobs(10);
+  const Digest a = Sha256("aaaa");
+  ASSERT_TRUE(blobs.PutPinned(a, "aaaa").ok());
+  ASSERT_TRUE(blobs.PutPinned(a, "aaaa").ok());
+  blobs.UnpinAndDrop(a);
+  EXPECT_TRUE(blobs.Has(a)) << "another pass has the same radii";
+  const Blob held = *blobs.Get(a);
+  blobs.UnpinAndDrop(a);
+  EXPECT_FALSE(blobs.Has(a));
+  EXPECT_EQ(blobs.size_bytes(), 0U);
+  EXPECT_EQ(*held, "aaaa") << "what is being sent stays valid";
+}
+
+}  // namespace
+}  // namespace lucerna

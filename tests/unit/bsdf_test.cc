@@ -1,0 +1,265 @@
+// Surfaces scatter by their own density, both ways alike, and never more light than they get.
+#include "render/transport/bsdf.h"
+
+#include <cmath>
+#include <complex>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/math/rng.h"
+#include "render/math/warp.h"
+#include "tests/support/chi_square.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+Vec3 Direction(double theta_deg, double phi_deg) {
+  const double theta = theta_deg * std::numbers::pi / 180;
+  const double phi = phi_deg * std::numbers::pi / 180;
+  return {static_cast<float>(std::sin(theta) * std::cos(phi)),
+          static_cast<float>(std::sin(theta) * std::sin(phi)), static_cast<float>(std::cos(theta))};
+}
+
+Material Anisotropic(Material material, float alpha_u, float alpha_v) {
+  material.alpha_u = alpha_u;
+  material.alpha_v = alpha_v;
+  return material;
+}
+
+const Rgb kGoldEta = {0.15F, 0.4F, 1.4F};
+const Rgb kGoldK = {3.5F, 2.4F, 1.8F};
+
+std::vector<Material> RoughMaterials() {
+  return {DiffuseMaterial(0.7F),
+          ConductorMaterial(kGoldEta, kGoldK, 0.15F, 0.15F),
+          ConductorMaterial(kGoldEta, kGoldK, 0.5F, 0.5F),
+          ConductorMaterial(kGoldEta, kGoldK, 0.6F, 0.2F),
+          DielectricMaterial(1.5F, 0.2F),
+          DielectricMaterial(1.5F, 0.6F),
+          DielectricMaterial(0.75F, 0.4F),
+          Anisotropic(DielectricMaterial(1.33F), 0.5F, 0.2F)};
+}
+
+const std::vector<Vec3> kViews = {Direction(0, 0),    Direction(30, 20),   Direction(60, 200),
+                                  Direction(85, 70),  Direction(110, 300), Direction(150, 10),
+                                  Direction(135, 45), Direction(179, 0)};
+
+TEST(BsdfTest, SamplesByItsOwnDensity) {
+  const auto materials = RoughMaterials();
+  const double level = SidakLevel(1e-3, static_cast<int>(materials.size() * kViews.size()));
+  std::uint64_t key = 100;
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    for (std::size_t v = 0; v < kViews.size(); ++v) {
+      const Material& material = materials[m];
+      const Vec3 wo = kViews[v];
+      const double p_value = DirectionsPValue(
+          [&](float u_lobe, float u1, float u2, Vec3& direction) {
+            BsdfSample sample;
+            if (!SampleBsdf(material, wo, u_lobe, u1, u2, Carried::kFlux, sample)) return false;
+            direction = sample.wi;
+            return true;
+          },
+          [&](Vec3 wi) { return static_cast<double>(PdfBsdf(material, wo, wi)); }, 100000, ++key);
+      EXPECT_GT(p_value, level) << "material " << m << ", view " << v;
+    }
+  }
+}
+
+TEST(BsdfTest, ADensityOfAnotherRoughnessIsRefused) {
+  const Material material = DielectricMaterial(1.5F, 0.3F);
+  const Material other = DielectricMaterial(1.5F, 0.32F);
+  const Vec3 wo = Direction(40, 0);
+  EXPECT_LT(DirectionsPValue(
+                [&](float u_lobe, float u1, float u2, Vec3& direction) {
+                  BsdfSample sample;
+                  if (!SampleBsdf(material, wo, u_lobe, u1, u2, Carried::kFlux, sample)) {
+                    return false;
+                  }
+                  direction = sample.wi;
+                  return true;
+                },
+                [&](Vec3 wi) { return static_cast<double>(PdfBsdf(other, wo, wi)); }, 200000, 1),
+            1e-6);
+}
+
+TEST(BsdfTest, WeighsASampleByValueOverDensity) {
+  KeyedRng rng(9);
+  const auto materials = RoughMaterials();
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    for (const Vec3 wo : kViews) {
+      for (const Carried carried : {Carried::kRadiance, Carried::kFlux}) {
+        for (int i = 0; i < 300; ++i) {
+          const float u_lobe = rng.Uniform();
+          const float u1 = rng.Uniform();
+          const float u2 = rng.Uniform();
+          BsdfSample sample;
+          if (!SampleBsdf(materials[m], wo, u_lobe, u1, u2, carried, sample)) continue;
+          ASSERT_NEAR(Length(sample.wi), 1, 1e-5);
+          // At the horizon float leaves few digits of the cosine.
+          if (std::abs(sample.wi.z) < 0.02F) continue;
+          const float pdf = PdfBsdf(materials[m], wo, sample.wi);
+          ASSERT_NEAR(pdf / sample.pdf, 1, 5e-3) << "material " << m;
+          const Rgb f = EvaluateBsdf(materials[m], wo, sample.wi, carried);
+          for (int c = 0; c < 3; ++c) {
+            ASSERT_NEAR(f[c] * std::abs(sample.wi.z) / pdf, sample.weight[c],
+                        5e-3F * sample.weight[c])
+                << "material " << m;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(BsdfTest, IsReciprocal) {
+  KeyedRng rng(10);
+  const auto materials = RoughMaterials();
+  int transmitted = 0;
+  for (std::size_t m = 0; m < materials.size(); ++m) {
+    for (int i = 0; i < 5000; ++i) {
+      const float a1 = rng.Uniform();
+      const float a2 = rng.Uniform();
+      const float b1 = rng.Uniform();
+      const float b2 = rng.Uniform();
+      const Vec3 a = SquareToSphere(a1, a2);
+      const Vec3 b = SquareToSphere(b1, b2);
+      if (std::abs(a.z) < 0.02F || std::abs(b.z) < 0.02F) continue;
+      const float there = EvaluateBsdf(materials[m], a, b, Carried::kRadiance).g;
+      const float back = EvaluateBsdf(materials[m], b, a, Carried::kRadiance).g;
+      // Radiance over the squared index is what is conserved: f(a→b) / η_a² is symmetric.
+      float expected = back;
+      if (materials[m].kind == Material::Kind::kDielectric && a.z * b.z < 0) {
+        const float squared = materials[m].ior * materials[m].ior;
+        expected *= b.z < 0 ? 1 / squared : squared;
+        if (back > 0) ++transmitted;
+        // Flux and radiance are each other's adjoint.
+        const float flux = EvaluateBsdf(materials[m], b, a, Carried::kFlux).g;
+        ASSERT_NEAR(there, flux, 2e-3F * flux + 1e-7F);
+      }
+      ASSERT_NEAR(there, expected, 2e-3F * expected + 1e-7F) << "material " << m;
+    }
+  }
+  EXPECT_GT(transmitted, 1000);
+}
+
+// What a sample carries on average, of flux 1 that falls in.
+double MeanWeight(const Material& material, Vec3 wo, Carried carried) {
+  KeyedRng rng(12);
+  constexpr int kSamples = 20000;
+  double sum = 0;
+  for (int i = 0; i < kSamples; ++i) {
+    const float u_lobe = rng.Uniform();
+    const float u1 = rng.Uniform();
+    const float u2 = rng.Uniform();
+    BsdfSample sample;
+    if (SampleBsdf(material, wo, u_lobe, u1, u2, carried, sample)) {
+      sum += static_cast<double>(MaxChannel(sample.weight));
+    }
+  }
+  return sum / kSamples;
+}
+
+TEST(BsdfTest, NeverScattersMoreThanItGets) {
+  for (const Vec3 wo : kViews) {
+    for (const float alpha : {0.05F, 0.3F, 0.8F}) {
+      EXPECT_LE(MeanWeight(DielectricMaterial(1.5F, alpha), wo, Carried::kFlux), 1 + 1e-5);
+      EXPECT_LE(MeanWeight(ConductorMaterial({0, 0, 0}, Gray(1), alpha, alpha), wo, Carried::kFlux),
+                1 + 1e-5);
+    }
+    EXPECT_EQ(MeanWeight(DielectricMaterial(1.5F), wo, Carried::kFlux), 1);
+    EXPECT_EQ(MeanWeight(DiffuseMaterial(1), wo, Carried::kFlux), 1);
+  }
+  // A smooth-enough rough one loses next to nothing, seen from above.
+  EXPECT_GT(MeanWeight(DielectricMaterial(1.5F, 0.05F), Direction(10, 0), Carried::kFlux), 0.995);
+  // A perfect metal reflects all but what its facets hide.
+  EXPECT_GT(MeanWeight(ConductorMaterial({0, 0, 0}, Gray(1), 0.1F, 0.1F), Direction(10, 0),
+                       Carried::kFlux),
+            0.99);
+}
+
+TEST(SmoothDielectricTest, BendsBySnellAndCompressesRadianceOnly) {
+  for (const Vec3 wo : kViews) {
+    const Material glass = DielectricMaterial(1.5F);
+    BsdfSample sample;
+    ASSERT_TRUE(SampleBsdf(glass, wo, 0.9999F, 0, 0, Carried::kRadiance, sample));
+    EXPECT_TRUE(sample.is_delta);
+    const float eta = wo.z > 0 ? 1.5F : 1 / 1.5F;
+    const float sine = std::hypot(wo.x, wo.y);
+    if (sine / eta >= 1) {  // total reflection
+      EXPECT_GT(sample.wi.z * wo.z, 0);
+      EXPECT_EQ(sample.weight.g, 1);
+      continue;
+    }
+    EXPECT_LT(sample.wi.z * wo.z, 0);
+    EXPECT_NEAR(std::hypot(sample.wi.x, sample.wi.y), sine / eta, 1e-6);
+    EXPECT_NEAR(sample.weight.g, 1 / (eta * eta), 1e-6);
+    ASSERT_TRUE(SampleBsdf(glass, wo, 0.9999F, 0, 0, Carried::kFlux, sample));
+    EXPECT_EQ(sample.weight.g, 1);
+    ASSERT_TRUE(SampleBsdf(glass, wo, 0, 0, 0, Carried::kRadiance, sample));
+    EXPECT_EQ(sample.wi, (Vec3{-wo.x, -wo.y, wo.z}));
+  }
+}
+
+TEST(FresnelTest, DielectricHasItsClosedForms) {
+  float cos_t = 0;
+  EXPECT_NEAR(FresnelDielectric(1, 1.5F, cos_t), 0.04F, 1e-6);
+  EXPECT_NEAR(FresnelDielectric(-1, 1.5F, cos_t), 0.04F, 1e-6);
+  EXPECT_EQ(FresnelDielectric(0, 1.5F, cos_t), 1);
+  // At Brewster's angle, tan θ = η, only perpendicular light is reflected: ((η²-1)/(η²+1))².
+  const float brewster = std::cos(std::atan(1.5F));
+  const float rs = (1.5F * 1.5F - 1) / (1.5F * 1.5F + 1);
+  EXPECT_NEAR(FresnelDielectric(brewster, 1.5F, cos_t), 0.5F * rs * rs, 1e-6);
+  const float critical = std::sqrt(1 - 1 / (1.5F * 1.5F));
+  EXPECT_EQ(FresnelDielectric(-(critical - 1e-3F), 1.5F, cos_t), 1);
+  EXPECT_EQ(cos_t, 0);
+  EXPECT_LT(FresnelDielectric(-(critical + 1e-3F), 1.5F, cos_t), 1);
+  EXPECT_EQ(FresnelDielectric(0.3F, 1, cos_t), 0);
+  // The same crossing from its two sides.
+  for (const float c : {0.1F, 0.5F, 0.9F}) {
+    const float outside = FresnelDielectric(c, 1.5F, cos_t);
+    float back = 0;
+    EXPECT_NEAR(FresnelDielectric(-cos_t, 1.5F, back), outside, 2e-6);
+    EXPECT_NEAR(back, c, 2e-6);
+  }
+}
+
+TEST(FresnelTest, ConductorIsTheComplexFormula) {
+  using Complex = std::complex<double>;
+  for (const double n : {0.1, 0.4, 1.0, 2.9}) {
+    for (const double k : {0.0, 0.5, 3.5, 7.0}) {
+      for (const double c : {0.01, 0.2, 0.5, 0.8, 1.0}) {
+        const Complex index(n, k);
+        const Complex cos_t = std::sqrt(1.0 - (1 - c * c) / (index * index));
+        const double expected = 0.5 * (std::norm((c - index * cos_t) / (c + index * cos_t)) +
+                                       std::norm((index * c - cos_t) / (index * c + cos_t)));
+        const Rgb actual = FresnelConductor(static_cast<float>(c), Gray(static_cast<float>(n)),
+                                            Gray(static_cast<float>(k)));
+        EXPECT_NEAR(static_cast<double>(actual.g), expected, 3e-5) << n << " " << k << " " << c;
+      }
+    }
+  }
+}
+
+TEST(FresnelTest, ConductorIsANumberAtTheHorizon) {
+  for (const float c : {0.0F, 1e-20F, 1e-10F, 1e-4F}) {
+    for (const float k : {0.0F, 1e-6F, 3.0F}) {
+      const Rgb reflectance = FresnelConductor(c, Gray(1), Gray(k));
+      EXPECT_TRUE(reflectance.g >= 0 && reflectance.g <= 1) << c << " " << k << " " << reflectance.g;
+    }
+  }
+}
+
+TEST(GathersTest, SeparatesWhatPhotonsFindFromWhatEyePathsFind) {
+  EXPECT_TRUE(Gathers(DiffuseMaterial(0.1F)));
+  EXPECT_FALSE(Gathers(DiffuseMaterial(0)));
+  EXPECT_FALSE(Gathers(DielectricMaterial(1.5F)));
+  EXPECT_FALSE(Gathers(DielectricMaterial(1.5F, kGatherAlpha / 2)));
+  EXPECT_TRUE(Gathers(DielectricMaterial(1.5F, kGatherAlpha)));
+}
+
+}  // namespace
+}  // namespace lucerna

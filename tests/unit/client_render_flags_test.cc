@@ -1,0 +1,91 @@
+// A flag must mean exactly what was typed, or be refused by name with the exit code for misuse.
+#include <optional>
+#include <string>
+
+#include "gtest/gtest.h"
+
+#include "client/exit_code.h"
+#include "client/render_flags.h"
+
+namespace lucerna {
+namespace {
+
+TEST(RenderFlagsTest, WhatIsNotGivenStaysOpen) {
+  const auto overrides = ToOverrides({});
+  ASSERT_TRUE(overrides.ok());
+  EXPECT_FALSE(overrides->width || overrides->height || overrides->passes ||
+               overrides->photons_per_pass || overrides->time_s || overrides->seed ||
+               overrides->radius_controller || overrides->alpha || overrides->kernel ||
+               overrides->initial_radius || overrides->max_depth);
+}
+
+TEST(RenderFlagsTest, EveryFlagArrives) {
+  RenderFlags flags;
+  flags.size = "640x360";
+  flags.passes = 3;
+  flags.photons_per_pass = 4;
+  flags.time_s = 5.5;
+  flags.seed = 18'446'744'073'709'551'615U;
+  flags.radius_controller = "pppm";
+  flags.alpha = 0.7;
+  flags.kernel = "constant";
+  flags.initial_radius = "0.25";
+  flags.max_depth = 8;
+  const auto overrides = ToOverrides(flags);
+  ASSERT_TRUE(overrides.ok()) << overrides.status();
+  EXPECT_EQ(overrides->width, 640);
+  EXPECT_EQ(overrides->height, 360);
+  EXPECT_EQ(overrides->passes, 3);
+  EXPECT_EQ(overrides->photons_per_pass, 4);
+  EXPECT_EQ(overrides->time_s, 5.5);
+  EXPECT_EQ(overrides->seed, 18'446'744'073'709'551'615U);
+  EXPECT_EQ(overrides->radius_controller, RadiusControllerKind::kPppm);
+  EXPECT_EQ(overrides->alpha, 0.7);
+  EXPECT_EQ(overrides->kernel, KernelKind::kConstant);
+  EXPECT_EQ(overrides->initial_radius, 0.25);
+  EXPECT_EQ(overrides->max_depth, 8);
+}
+
+TEST(RenderFlagsTest, AutoIsARadiusOfZero) {
+  RenderFlags flags;
+  flags.initial_radius = "auto";
+  const auto overrides = ToOverrides(flags);
+  ASSERT_TRUE(overrides.ok());
+  EXPECT_EQ(overrides->initial_radius, 0);
+}
+
+void ExpectMisuse(std::optional<std::string> RenderFlags::*flag, const char* typed,
+                  const std::string& name) {
+  RenderFlags flags;
+  flags.*flag = typed;
+  const Status status = ToOverrides(flags).status();
+  EXPECT_EQ(ExitCodeOf(status), ExitCode::kUsage) << typed << ": " << status;
+  EXPECT_NE(std::string(status.message()).find(name), std::string::npos) << status;
+}
+
+TEST(RenderFlagsTest, RefusesWhatMakesNoSense) {
+  for (const char* size : {"", "x", "640", "640x", "x480", "640*480", "0x1", "-1x5", "1x1x1",
+                           "1 x 1", "99999999999x1"}) {
+    ExpectMisuse(&RenderFlags::size, size, "--size");
+  }
+  for (const char* radius : {"", "automatic", "0", "-1", "nan", "inf", "1m"}) {
+    ExpectMisuse(&RenderFlags::initial_radius, radius, "--initial-radius");
+  }
+  ExpectMisuse(&RenderFlags::radius_controller, "sppm", "--radius-controller");
+  ExpectMisuse(&RenderFlags::kernel, "box", "--kernel");
+}
+
+TEST(ExitCodeTest, AFailureKeepsItsCodeAndOthersAreOne) {
+  for (const ExitCode code :
+       {ExitCode::kFailed, ExitCode::kUsage, ExitCode::kUnreachable, ExitCode::kInterrupted}) {
+    const Status status = Failure(code, "why");
+    EXPECT_EQ(ExitCodeOf(status), code);
+    EXPECT_EQ(status.message(), "why");
+  }
+  EXPECT_EQ(ExitCodeOf(absl::OkStatus()), ExitCode::kDone);
+  // A disk can be "unavailable" too; that is not an unreachable coordinator.
+  EXPECT_EQ(ExitCodeOf(absl::UnavailableError("disk")), ExitCode::kFailed);
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,129 @@
+// The figures of a comparison must be the ones worked out by hand, whatever is cropped, scaled,
+// clipped, trimmed or masked first.
+#include "render/film/image_metrics.h"
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+namespace lucerna {
+namespace {
+
+Image Gray(int width, int height, std::vector<float> pixels) {
+  Image image;
+  image.width = width;
+  image.height = height;
+  image.channels = {{"B", pixels}, {"G", pixels}, {"R", pixels}};
+  return image;
+}
+
+ImageMetrics Compared(const Image& a, const Image& b, const MetricsOptions& options = {}) {
+  const StatusOr<ImageMetrics> metrics = Compare(a, b, options);
+  EXPECT_TRUE(metrics.ok()) << metrics.status();
+  return metrics.ok() ? *metrics : ImageMetrics{};
+}
+
+TEST(ImageMetricsTest, WorkedByHand) {
+  // Differences 1 and -2 against a reference of 1 and 4.
+  const ImageMetrics metrics = Compared(Gray(2, 1, {2, 2}), Gray(2, 1, {1, 4}));
+  EXPECT_EQ(metrics.pixels, 2U);
+  EXPECT_DOUBLE_EQ(metrics.rmse, std::sqrt(2.5));
+  EXPECT_DOUBLE_EQ(metrics.rel_mse, (1 / 1.01 + 4 / 16.01) / 2);
+  EXPECT_DOUBLE_EQ(metrics.mean_a, 2);
+  EXPECT_DOUBLE_EQ(metrics.mean_b, 2.5);
+  EXPECT_DOUBLE_EQ(metrics.mean_ratio, 0.8);
+}
+
+TEST(ImageMetricsTest, ChannelsAreToldApart) {
+  Image image = Gray(1, 1, {1});
+  Image reference = Gray(1, 1, {1});
+  image.channels[2].pixels = {3};      // R
+  reference.channels[0].pixels = {4};  // B
+  const ImageMetrics metrics = Compared(image, reference);
+  EXPECT_DOUBLE_EQ(metrics.channel_mean_ratio[0], 3);
+  EXPECT_DOUBLE_EQ(metrics.channel_mean_ratio[1], 1);
+  EXPECT_DOUBLE_EQ(metrics.channel_mean_ratio[2], 0.25);
+}
+
+TEST(ImageMetricsTest, EqualImagesAreAtDistanceZeroAlsoWhenBlack) {
+  const ImageMetrics metrics = Compared(Gray(2, 1, {0, 0}), Gray(2, 1, {0, 0}));
+  EXPECT_EQ(metrics.rmse, 0);
+  EXPECT_EQ(metrics.rel_mse, 0);
+  EXPECT_EQ(metrics.mean_ratio, 1);
+}
+
+TEST(ImageMetricsTest, SizesMustAgreeUnlessToldOtherwise) {
+  const Image large = Gray(3, 2, {1, 2, 9, 3, 4, 9});
+  const Image small = Gray(2, 2, {1, 2, 3, 4});
+  EXPECT_EQ(Compare(large, small).status().code(), absl::StatusCode::kInvalidArgument);
+  const ImageMetrics cropped = Compared(large, small, {.fit = MetricsOptions::Fit::kCrop});
+  EXPECT_EQ(cropped.pixels, 4U);
+  EXPECT_EQ(cropped.rmse, 0);
+}
+
+TEST(ImageMetricsTest, ScalingAveragesBoxesAndKeepsTheMean) {
+  // 4 -> 2 columns, 2 -> 1 rows.
+  const Image large = Gray(4, 2, {1, 2, 3, 4, 5, 6, 7, 8});
+  EXPECT_EQ(Compared(large, Gray(2, 1, {3.5F, 5.5F}), {.fit = MetricsOptions::Fit::kScale}).rmse,
+            0);
+  // 3 -> 2 columns: the middle one is shared.
+  const ImageMetrics shared =
+      Compared(Gray(3, 1, {3, 6, 12}), Gray(2, 1, {4, 10}), {.fit = MetricsOptions::Fit::kScale});
+  EXPECT_NEAR(shared.rmse, 0, 1e-12);
+  // Each axis goes to the smaller of the two.
+  EXPECT_EQ(
+      Compared(Gray(2, 1, {2, 4}), Gray(1, 2, {1, 5}), {.fit = MetricsOptions::Fit::kScale}).pixels,
+      1U);
+}
+
+TEST(ImageMetricsTest, ClipsBothImagesFirst) {
+  const ImageMetrics metrics = Compared(Gray(2, 1, {100, 1}), Gray(2, 1, {7, 1}), {.clip = 5});
+  EXPECT_EQ(metrics.rmse, 0);
+  EXPECT_DOUBLE_EQ(metrics.mean_a, 3);
+}
+
+TEST(ImageMetricsTest, TrimsTheWorstPixels) {
+  const Image image = Gray(4, 1, {1, 1, 1, 50});
+  const Image reference = Gray(4, 1, {1, 1, 2, 1});
+  const ImageMetrics metrics = Compared(image, reference, {.trim_share = 0.25});
+  EXPECT_EQ(metrics.pixels, 3U);
+  EXPECT_DOUBLE_EQ(metrics.rel_mse, 1 / 4.01 / 3);
+  EXPECT_EQ(Compare(image, reference, {.trim_share = 1}).status().code(),
+            absl::StatusCode::kInvalidArgument);
+}
+
+TEST(ImageMetricsTest, LeavesOutWhatTheMaskBlackens) {
+  const Image mask = Gray(2, 1, {0, 0.5F});
+  const ImageMetrics metrics = Compared(Gray(2, 1, {9, 2}), Gray(2, 1, {1, 2}), {.mask = &mask});
+  EXPECT_EQ(metrics.pixels, 1U);
+  EXPECT_EQ(metrics.rmse, 0);
+  const Image small = Gray(1, 1, {1});
+  EXPECT_EQ(Compare(Gray(2, 1, {9, 2}), Gray(2, 1, {1, 2}), {.mask = &small}).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  const Image nothing = Gray(2, 1, {0, 0});
+  EXPECT_EQ(Compare(Gray(2, 1, {9, 2}), Gray(2, 1, {1, 2}), {.mask = &nothing}).status().code(),
+            absl::StatusCode::kInvalidArgument);
+}
+
+TEST(ImageMetricsTest, RefusesWhatIsNotANumberAndSaysWhere) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const Status status = Compare(Gray(2, 1, {1, 1}), Gray(2, 1, {1, nan})).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_NE(std::string(status.message()).find("reference is not finite at pixel (1, 0)"),
+            std::string::npos)
+      << status;
+  // An infinite pixel is refused also where clipping would hide it.
+  const float inf = std::numeric_limits<float>::infinity();
+  EXPECT_FALSE(Compare(Gray(1, 1, {inf}), Gray(1, 1, {1}), {.clip = 5}).ok());
+}
+
+TEST(ImageMetricsTest, RefusesAnImageWithoutColour) {
+  Image image = Gray(1, 1, {1});
+  image.channels.erase(image.channels.begin());
+  EXPECT_EQ(Compare(image, Gray(1, 1, {1})).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace lucerna

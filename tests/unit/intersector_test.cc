@@ -1,0 +1,280 @@
+// Rays meet spheres and disks where algebra says, and never the surface that they leave.
+#include "render/geometry/intersector.h"
+
+#include <cmath>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/base/parallel.h"
+#include "render/math/rng.h"
+#include "render/math/warp.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+Vec3 RandomDirection(KeyedRng& rng) {
+  const float u1 = rng.Uniform();
+  const float u2 = rng.Uniform();
+  return SquareToSphere(u1, u2);
+}
+
+Vec3 RandomPoint(KeyedRng& rng, float extent) {
+  const float x = rng.Uniform();
+  const float y = rng.Uniform();
+  const float z = rng.Uniform();
+  return Vec3{x - 0.5F, y - 0.5F, z - 0.5F} * (2 * extent);
+}
+
+// The distances at which a line meets a sphere, in long double; false when it misses.
+bool SphereRoots(const Ray& ray, const Sphere& sphere, long double& near, long double& far) {
+  using Long = long double;
+  const Long o[3] = {Long{ray.origin.x} - Long{sphere.center.x},
+                     Long{ray.origin.y} - Long{sphere.center.y},
+                     Long{ray.origin.z} - Long{sphere.center.z}};
+  const Long d[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
+  Long a = 0;
+  Long b = 0;
+  Long c = -Long{sphere.radius} * Long{sphere.radius};
+  for (int i = 0; i < 3; ++i) {
+    a += d[i] * d[i];
+    b += o[i] * d[i];
+    c += o[i] * o[i];
+  }
+  const Long discriminant = b * b - a * c;
+  if (discriminant < 0) return false;
+  near = (-b - std::sqrt(discriminant)) / a;
+  far = (-b + std::sqrt(discriminant)) / a;
+  return true;
+}
+
+struct SphereCase {
+  float radius;
+  float from_radii;  // distance of the origin from the centre, in radii
+  Vec3 center;
+};
+
+class SphereTest : public testing::TestWithParam<SphereCase> {};
+
+TEST_P(SphereTest, IsMetWhereTheQuadraticSays) {
+  const auto [radius, from_radii, center] = GetParam();
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddSphere(scene, center, radius, 0);
+  const auto intersector = Intersector::Create(scene).value();
+  KeyedRng rng(11);
+  int hits = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Vec3 origin = center + RandomDirection(rng) * (radius * from_radii);
+    // Towards a point in a ball a little larger than the sphere: hits, misses, near-tangents.
+    const Vec3 target = center + RandomDirection(rng) * (radius * 1.2F * rng.Uniform());
+    const Ray ray = {origin, Normalize(target - origin), HUGE_VALF};
+    long double near = 0;
+    long double far = 0;
+    const bool crosses = SphereRoots(ray, scene.spheres[0], near, far);
+    const long double expected = near > 0 ? near : far;
+    Hit hit;
+    const bool met = intersector->Intersect(ray, hit);
+    ASSERT_EQ(met, crosses && expected > 0);
+    ASSERT_EQ(intersector->Occluded(ray), met);
+    if (!met) continue;
+    ++hits;
+    // The one rounding is that of t itself to float.
+    ASSERT_NEAR(static_cast<double>(hit.t / expected), 1, 1.3e-7);
+    const SurfacePoint surface = intersector->SurfaceAt(ray, hit);
+    ASSERT_NEAR(Length(surface.position - center) / radius, 1,
+                1e-6F * (1 + MaxAbs(center) / radius));
+    ASSERT_NEAR(Length(surface.geometric_normal), 1, 1e-6);
+  }
+  EXPECT_GT(hits, 1000);
+}
+INSTANTIATE_TEST_SUITE_P(Places, SphereTest,
+                         testing::Values(SphereCase{1, 0, {}}, SphereCase{1, 0.5F, {}},
+                                         SphereCase{1, 0.999F, {}}, SphereCase{1, 1.001F, {}},
+                                         SphereCase{1, 3, {5, -7, 2}}, SphereCase{1e-3F, 1e3F, {}},
+                                         SphereCase{1, 1e6F, {}}, SphereCase{1e4F, 2, {}},
+                                         SphereCase{1e5F, 0.9F, {1e5F, 0, 0}}));
+
+TEST(SphereTest, TurnsItsNormalInwardWhenAsked) {
+  for (const bool inward : {false, true}) {
+    Scene scene;
+    AddMaterial(scene, DiffuseMaterial(0.5F));
+    AddSphere(scene, {1, 2, 3}, 2, 0, kNoAreaLight, inward);
+    const auto intersector = Intersector::Create(scene).value();
+    const Ray ray = {{1, 2, -9}, {0, 0, 1}, HUGE_VALF};
+    Hit hit;
+    ASSERT_TRUE(intersector->Intersect(ray, hit));
+    EXPECT_FLOAT_EQ(hit.t, 10);
+    EXPECT_EQ(intersector->SurfaceAt(ray, hit).geometric_normal, (Vec3{0, 0, inward ? 1.0F : -1.0F}));
+    EXPECT_FALSE(intersector->Intersect({ray.origin, ray.direction, 9.99F}, hit));
+  }
+}
+
+TEST(DiskTest, HasItsHoleAndItsRim) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddDisk(scene, {1, 1, 1}, {0, 0, 1}, 2, 0);
+  scene.disks[0].inner_radius = 1;
+  const auto intersector = Intersector::Create(scene).value();
+  Hit hit;
+  for (const float side : {-1.0F, 1.0F}) {
+    const auto meets = [&](float x) {
+      return intersector->Intersect({{1 + x, 1, 1 + 3 * side}, {0, 0, -side}, HUGE_VALF}, hit);
+    };
+    EXPECT_FALSE(meets(0));
+    EXPECT_FALSE(meets(0.999F));
+    EXPECT_TRUE(meets(1.001F));
+    EXPECT_FLOAT_EQ(hit.t, 3);
+    EXPECT_TRUE(meets(1.999F));
+    EXPECT_FALSE(meets(2.001F));
+    EXPECT_FALSE(meets(-0.999F));
+    EXPECT_TRUE(meets(-1.5F));
+  }
+  EXPECT_FALSE(intersector->Intersect({{-5, 1, 1}, {1, 0, 0}, HUGE_VALF}, hit));
+}
+
+TEST(TriangleTest, GivesBarycentricsNormalsAndNumbers) {
+  Scene scene;
+  const std::int32_t first = AddMaterial(scene, DiffuseMaterial(0.5F));
+  const std::int32_t second = AddMaterial(scene, DiffuseMaterial(0.6F));
+  AddQuad(scene, {0, 0, 5}, {1, 0, 0}, {0, 1, 0}, first);
+  AddQuad(scene, {0, 0, 7}, {1, 0, 0}, {0, 1, 0}, second);
+  scene.meshes[1].normals.assign(4, Normalize({0.6F, 0, 0.8F}));
+  const auto intersector = Intersector::Create(scene).value();
+  Hit hit;
+  const Ray down = {{0.75F, 0.25F, 10}, {0, 0, -1}, HUGE_VALF};
+  ASSERT_TRUE(intersector->Intersect(down, hit));
+  EXPECT_FLOAT_EQ(hit.t, 3);
+  EXPECT_EQ(hit.geometry, 1U);
+  const SurfacePoint top = intersector->SurfaceAt(down, hit);
+  EXPECT_NEAR(Length(top.position - Vec3{0.75F, 0.25F, 7}), 0, 1e-6);
+  EXPECT_EQ(top.geometric_normal, (Vec3{0, 0, 1}));
+  EXPECT_NEAR(top.shading_normal.x, 0.6F, 1e-6);
+  EXPECT_TRUE(top.has_shading_normal);
+  EXPECT_EQ(top.material, 1U);
+  const Ray up = {{0.25F, 0.75F, 0}, {0, 0, 1}, HUGE_VALF};
+  ASSERT_TRUE(intersector->Intersect(up, hit));
+  const SurfacePoint bottom = intersector->SurfaceAt(up, hit);
+  EXPECT_EQ(bottom.geometry, 0U);
+  EXPECT_EQ(bottom.primitive, 1U);
+  EXPECT_FALSE(bottom.has_shading_normal);
+}
+
+// A mesh can lose all its triangles on the way; that is no reason to refuse the scene.
+TEST(IntersectorTest, TakesEmptyMeshesAndEmptyScenes) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  Hit hit;
+  const auto empty = Intersector::Create(scene);
+  ASSERT_TRUE(empty.ok());
+  EXPECT_FALSE((*empty)->Intersect({{0, 0, 0}, {0, 0, 1}, HUGE_VALF}, hit));
+  scene.meshes.emplace_back();
+  AddSphere(scene, {0, 0, 3}, 1, 0);
+  const auto with_empty_mesh = Intersector::Create(scene);
+  ASSERT_TRUE(with_empty_mesh.ok()) << with_empty_mesh.status();
+  EXPECT_TRUE((*with_empty_mesh)->Intersect({{0, 0, 0}, {0, 0, 1}, HUGE_VALF}, hit));
+}
+
+struct Leaving {
+  float scale;
+  float offset;  // of the centre from the origin, in scales
+};
+
+class LeavingPointTest : public testing::TestWithParam<Leaving> {};
+
+// A random shape is met by a ray, and random rays leave on both sides. A triangle and a disk may
+// never be met again; nor a sphere from outside; and from inside only across a chord.
+TEST_P(LeavingPointTest, IsOffTheSurface) {
+  const auto [scale, offset] = GetParam();
+  constexpr int kShapes = 300;
+  constexpr int kRays = 400;
+  KeyedRng rng(23);
+  for (int shape = 0; shape < kShapes; ++shape) {
+    Scene scene;
+    AddMaterial(scene, DiffuseMaterial(0.5F));
+    const Vec3 center = RandomDirection(rng) * (scale * offset);
+    const int kind = shape % 3;
+    if (kind == 0) {
+      TriangleMesh mesh;
+      for (int i = 0; i < 3; ++i) mesh.positions.push_back(center + RandomPoint(rng, scale));
+      mesh.indices = {0, 1, 2};
+      scene.meshes.push_back(mesh);
+    } else if (kind == 1) {
+      AddSphere(scene, center, scale, 0);
+    } else {
+      AddDisk(scene, center, RandomDirection(rng), scale, 0);
+    }
+    const auto intersector = Intersector::Create(scene).value();
+    for (int i = 0; i < kRays; ++i) {
+      Vec3 target = center;
+      if (kind == 0) {
+        const float u1 = rng.Uniform();
+        const float u2 = rng.Uniform();
+        float b1 = 0;
+        float b2 = 0;
+        SquareToTriangle(u1, u2, b1, b2);
+        const std::vector<Vec3>& p = scene.meshes[0].positions;
+        target = p[0] * (1 - b1 - b2) + p[1] * b1 + p[2] * b2;
+      }
+      const Vec3 origin = center + RandomDirection(rng) * (3 * scale);
+      const Ray ray = {origin, Normalize(target - origin), HUGE_VALF};
+      Hit hit;
+      if (!intersector->Intersect(ray, hit)) continue;
+      const SurfacePoint surface = intersector->SurfaceAt(ray, hit);
+      const Vec3 direction = RandomDirection(rng);
+      const Ray leaving = {LeavingPoint(surface, direction), direction, HUGE_VALF};
+      const bool met = intersector->Intersect(leaving, hit);
+      const float cosine = Dot(direction, surface.geometric_normal);
+      if (kind == 1 && cosine < 0) {
+        ASSERT_TRUE(met || cosine > -1e-3F);
+        if (!met) continue;
+        // The chord of the sphere, within what the offset moves its ends.
+        const float slack = 40 * surface.clearance / -cosine;
+        ASSERT_NEAR(hit.t, -2 * scale * cosine, slack) << "sphere " << shape;
+      } else {
+        ASSERT_FALSE(met) << "shape " << shape << " of kind " << kind << ", cosine " << cosine;
+      }
+    }
+  }
+}
+INSTANTIATE_TEST_SUITE_P(Scales, LeavingPointTest,
+                         testing::Values(Leaving{1, 0}, Leaving{1, 10}, Leaving{1, 1000},
+                                         Leaving{1e-3F, 0}, Leaving{1e-3F, 1000},
+                                         Leaving{1e5F, 0}, Leaving{1e5F, 10}));
+
+TEST(IntersectorTest, GivesEveryThreadTheSameHits) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  KeyedRng rng(31);
+  for (int i = 0; i < 200; ++i) {
+    AddSphere(scene, RandomPoint(rng, 5), 0.3F, 0);
+    AddQuad(scene, RandomPoint(rng, 5), RandomDirection(rng), RandomDirection(rng), 0);
+  }
+  const auto intersector = Intersector::Create(scene).value();
+  const auto again = Intersector::Create(scene).value();
+  constexpr std::size_t kRays = 20000;
+  const auto trace = [&](const Intersector& with, int threads) {
+    std::vector<Hit> hits(kRays);
+    ThreadTeam team(threads);
+    team.For(kRays, 64, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        KeyedRng own(i);
+        const Vec3 origin = RandomPoint(own, 6);
+        if (!with.Intersect({origin, RandomDirection(own), HUGE_VALF}, hits[i])) hits[i].t = -1;
+      }
+    });
+    return hits;
+  };
+  const std::vector<Hit> one = trace(*intersector, 1);
+  const std::vector<Hit> three = trace(*again, 3);
+  for (std::size_t i = 0; i < kRays; ++i) {
+    ASSERT_EQ(one[i].t, three[i].t);
+    ASSERT_EQ(one[i].u, three[i].u);
+    ASSERT_EQ(one[i].geometry, three[i].geometry);
+    ASSERT_EQ(one[i].primitive, three[i].primitive);
+  }
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,92 @@
+// A job only moves forward, an ended one never changes, and its rate is that of the last seconds.
+#include "server/job.h"
+
+#include <cmath>
+
+#include "gtest/gtest.h"
+
+namespace lucerna {
+namespace {
+
+SteadyTime At(double s) {
+  return SteadyTime(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(s)));
+}
+
+TEST(JobLifeTest, RunsToItsEnd) {
+  JobLife life(At(10));
+  EXPECT_FALSE(life.Run(At(11))) << "not prepared yet";
+  EXPECT_FALSE(life.Succeed(StopReason::kPasses, At(11)));
+  ASSERT_TRUE(life.Prepare());
+  EXPECT_FALSE(life.Prepare());
+  EXPECT_EQ(life.Running(At(12)), Duration::zero());
+  ASSERT_TRUE(life.Run(At(12)));
+  EXPECT_EQ(life.Running(At(15)), std::chrono::seconds(3));
+  ASSERT_TRUE(life.Succeed(StopReason::kTime, At(17)));
+  EXPECT_EQ(life.state(), JobState::kSucceeded);
+  EXPECT_EQ(life.stop_reason(), StopReason::kTime);
+  EXPECT_EQ(life.Running(At(100)), std::chrono::seconds(5)) << "stands still";
+}
+
+TEST(JobLifeTest, CanBeCancelledOrFailAnywhereBeforeTheEndAndNeverAfter) {
+  for (int steps = 0; steps < 4; ++steps) {
+    JobLife cancelled(At(0));
+    JobLife failed(At(0));
+    for (JobLife* life : {&cancelled, &failed}) {
+      ASSERT_TRUE(steps < 1 || life->Prepare());
+      ASSERT_TRUE(steps < 2 || life->Run(At(1)));
+      ASSERT_TRUE(steps < 3 || life->Succeed(StopReason::kPasses, At(2)));
+    }
+    EXPECT_EQ(cancelled.Cancel(At(3)), steps < 3);
+    EXPECT_EQ(failed.Fail("why", At(3)), steps < 3);
+    EXPECT_TRUE(cancelled.has_ended());
+    EXPECT_FALSE(cancelled.Fail("late", At(4)));
+    EXPECT_FALSE(cancelled.Prepare());
+    EXPECT_FALSE(failed.Cancel(At(4)));
+    EXPECT_EQ(failed.failure(), steps < 3 ? "why" : "");
+  }
+}
+
+TEST(SlidingRateTest, ForgetsWhatIsOlderThanTheWindow) {
+  SlidingRate rate(std::chrono::seconds(5));
+  for (int s = 1; s <= 10; ++s)
+    rate.Add(100, At(s));
+  EXPECT_NEAR(rate.PerSecond(At(0), At(10)), 120, 1e-9);  // at 5, 6, 7, 8, 9 and 10
+  EXPECT_NEAR(rate.PerSecond(At(0), At(14.5)), 20, 1e-9);
+  EXPECT_EQ(rate.PerSecond(At(0), At(16)), 0);
+}
+
+TEST(SlidingRateTest, DividesByTheTimeThereWas) {
+  SlidingRate rate(std::chrono::seconds(5));
+  rate.Add(100, At(1));
+  EXPECT_NEAR(rate.PerSecond(At(0), At(2)), 50, 1e-9);
+  EXPECT_EQ(rate.PerSecond(At(2), At(2)), 0) << "no time at all";
+}
+
+TEST(SettingsTextTest, NamesWhatDecidesThePixelsAndNothingElse) {
+  RenderSettings settings;
+  settings.width = settings.crop_x1 = 64;
+  settings.height = settings.crop_y1 = 32;
+  settings.photons_per_pass = 1000;
+  const std::string text = SettingsText(settings);
+  RenderSettings same = settings;
+  same.time_s = 7;
+  same.passes = 3;
+  EXPECT_EQ(SettingsText(same), text);
+  const auto differs = [&](auto change) {
+    RenderSettings other = settings;
+    change(other);
+    return SettingsText(other) != text;
+  };
+  EXPECT_TRUE(differs([](RenderSettings& s) { s.alpha = std::nextafter(s.alpha, 1.0); }));
+  EXPECT_TRUE(differs([](RenderSettings& s) { s.seed = 1; }));
+  EXPECT_TRUE(differs([](RenderSettings& s) { s.crop_x0 = 1; }));
+  EXPECT_TRUE(differs([](RenderSettings& s) { s.max_depth = 6; }));
+  EXPECT_TRUE(differs([](RenderSettings& s) { s.initial_radius = 1e-30; }));
+  EXPECT_TRUE(differs([](RenderSettings& s) { s.kernel = KernelKind::kConstant; }));
+  EXPECT_TRUE(
+      differs([](RenderSettings& s) { s.radius_controller = RadiusControllerKind::kPppm; }));
+  EXPECT_TRUE(differs([](RenderSettings& s) { s.photons_per_pass = 1001; }));
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,309 @@
+// Lights send the power they have, where they should, and are drawn by the density they say.
+#include "render/transport/light.h"
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <utility>
+
+#include "gtest/gtest.h"
+
+#include "render/math/rng.h"
+#include "render/math/warp.h"
+#include "tests/support/chi_square.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+constexpr double kPiD = std::numbers::pi;
+
+struct Lit {
+  explicit Lit(Scene s)
+      : scene(std::make_unique<Scene>(std::move(s))),
+        intersector(Intersector::Create(*scene).value()),
+        lights(*scene, *intersector) {}
+
+  std::unique_ptr<Scene> scene;
+  std::unique_ptr<Intersector> intersector;
+  LightSet lights;
+};
+
+Scene BlackRoom() {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0));
+  return scene;
+}
+
+Scene QuadLamp() {
+  Scene scene = BlackRoom();
+  AddQuad(scene, {1, 0, 2}, {1, 0, 0}, {0, 0.5F, 0.5F}, 0, AddAreaLight(scene, 3));
+  return scene;
+}
+Scene SphereLamp() {
+  Scene scene = BlackRoom();
+  AddSphere(scene, {1, -1, 2}, 0.7F, 0, AddAreaLight(scene, 3));
+  return scene;
+}
+Scene InwardSphereLamp() {
+  Scene scene = BlackRoom();
+  AddSphere(scene, {0.2F, 0, 0}, 2, 0, AddAreaLight(scene, 3), /*inward=*/true);
+  return scene;
+}
+Scene RingLamp() {
+  Scene scene = BlackRoom();
+  AddDisk(scene, {1, 1, 1}, Normalize({-1, -1, -1}), 1, 0, AddAreaLight(scene, 3));
+  scene.disks[0].inner_radius = 0.5F;
+  return scene;
+}
+Scene TwoSidedLamp() {
+  Scene scene = BlackRoom();
+  AddDisk(scene, {0, 0.3F, 1}, Normalize({0, 1, 0.2F}), 1, 0, AddAreaLight(scene, 3, true));
+  return scene;
+}
+Scene Sky() {
+  Scene scene = BlackRoom();
+  AddDisk(scene, {0, 0, -1}, {0, 0, 1}, 0.5F, 0);
+  scene.infinite_lights.push_back({Gray(2)});
+  return scene;
+}
+Scene Mixed() {
+  Scene scene = QuadLamp();
+  AddSphere(scene, {-2, 0, 1}, 0.3F, 0, AddAreaLight(scene, 20));
+  scene.infinite_lights.push_back({{0.1F, 0.2F, 0.4F}});
+  return scene;
+}
+
+const std::vector<std::pair<const char*, Scene (*)()>> kLamps = {
+    {"quad", &QuadLamp},      {"sphere", &SphereLamp},        {"inside a sphere", &InwardSphereLamp},
+    {"ring", &RingLamp},      {"two-sided disk", &TwoSidedLamp}, {"sky", &Sky},
+    {"several", &Mixed}};
+
+// The density of drawing `wi` from the origin, by asking what lies there.
+double PdfToward(const Lit& lit, Vec3 wi) {
+  const Ray ray = {{0, 0, 0}, wi, HUGE_VALF};
+  Hit hit;
+  if (!lit.intersector->Intersect(ray, hit)) {
+    return static_cast<double>(lit.lights.PdfDirectInfinite());
+  }
+  const SurfacePoint surface = lit.intersector->SurfaceAt(ray, hit);
+  if (IsBlack(lit.lights.EmittedRadiance(surface, -wi))) return 0;
+  return static_cast<double>(lit.lights.PdfDirect({0, 0, 0}, surface));
+}
+
+TEST(SampleDirectTest, DrawsByTheDensityThatItsSightGives) {
+  const double level = SidakLevel(1e-3, 6);
+  std::uint64_t key = 40;
+  for (const auto& [name, make] : kLamps) {
+    if (make == &Mixed) continue;  // emitters in each other's way: density is choice × visibility
+    const Lit lit(make());
+    const double p_value = DirectionsPValue(
+        [&](float u_lobe, float u1, float u2, Vec3& direction) {
+          LightSample sample;
+          if (!lit.lights.SampleDirect({0, 0, 0}, u_lobe, u1, u2, sample)) return false;
+          direction = sample.wi;
+          // A point behind its own lamp is drawn and then found hidden.
+          return !lit.intersector->Occluded(
+              {{0, 0, 0}, sample.wi, sample.distance * (1 - 1e-3F)});
+        },
+        [&](Vec3 wi) { return PdfToward(lit, wi); }, 200000, ++key);
+    // The sky is drawn through the disk too, where sight finds the disk.
+    if (make != &Sky) {
+      EXPECT_GT(p_value, level) << name;
+    }
+  }
+}
+
+TEST(SampleDirectTest, AgreesWithSightPointByPoint) {
+  KeyedRng rng(50);
+  for (const auto& [name, make] : kLamps) {
+    const Lit lit(make());
+    int compared = 0;
+    for (int i = 0; i < 20000; ++i) {
+      const float u_choice = rng.Uniform();
+      const float u1 = rng.Uniform();
+      const float u2 = rng.Uniform();
+      LightSample sample;
+      if (!lit.lights.SampleDirect({0, 0, 0}, u_choice, u1, u2, sample)) continue;
+      const Ray ray = {{0, 0, 0}, sample.wi, HUGE_VALF};
+      Hit hit;
+      const bool met = lit.intersector->Intersect(ray, hit);
+      if (sample.distance == HUGE_VALF) {
+        if (met) continue;
+        ASSERT_FLOAT_EQ(sample.pdf, lit.lights.PdfDirectInfinite()) << name;
+        ++compared;
+        continue;
+      }
+      // Light of another lamp, or a rim that rounding decides.
+      if (!met || std::abs(hit.t / sample.distance - 1) > 1e-3F) continue;
+      const SurfacePoint surface = lit.intersector->SurfaceAt(ray, hit);
+      const float cosine = std::abs(Dot(surface.geometric_normal, sample.wi));
+      if (cosine < 0.05F) continue;
+      ASSERT_NEAR(lit.lights.PdfDirect({0, 0, 0}, surface) / sample.pdf, 1, 1e-3) << name;
+      const Rgb radiance = lit.lights.EmittedRadiance(surface, -sample.wi);
+      ASSERT_NEAR(sample.radiance_over_pdf.g * sample.pdf / radiance.g, 1, 1e-5) << name;
+      ++compared;
+    }
+    EXPECT_GT(compared, 3000) << name;
+  }
+}
+
+TEST(SampleDirectTest, GivesDeltaLightsTheirIrradiance) {
+  Scene scene = BlackRoom();
+  AddSphere(scene, {0, 0, 50}, 1, 0);
+  scene.point_lights.push_back({{0, 3, 4}, Gray(10)});
+  LightSample sample;
+  {
+    const Lit lit(scene);
+    ASSERT_TRUE(lit.lights.SampleDirect({0, 0, 0}, 0.5F, 0.1F, 0.2F, sample));
+    EXPECT_TRUE(lit.lights.OnlyDelta());
+    EXPECT_EQ(sample.pdf, 0);
+    EXPECT_FLOAT_EQ(sample.distance, 5);
+    EXPECT_FLOAT_EQ(sample.radiance_over_pdf.r, 10.0F / 25);
+  }
+  scene.point_lights.clear();
+  scene.distant_lights.push_back({Normalize({0, -1, -1}), Gray(7)});
+  const Lit lit(scene);
+  ASSERT_TRUE(lit.lights.SampleDirect({0, 0, 0}, 0.5F, 0.1F, 0.2F, sample));
+  EXPECT_FLOAT_EQ(sample.radiance_over_pdf.r, 7);
+  EXPECT_NEAR(Length(sample.wi - Normalize({0, 1, 1})), 0, 1e-6);
+  EXPECT_EQ(sample.distance, HUGE_VALF);
+}
+
+// Mean flux of emissions, per channel.
+std::array<double, 3> MeanFlux(const LightSet& lights, std::uint64_t key, double& error) {
+  KeyedRng rng(key);
+  constexpr int kPhotons = 400000;
+  std::array<double, 3> sum{};
+  double squares = 0;
+  for (int i = 0; i < kPhotons; ++i) {
+    const float u_choice = rng.Uniform();
+    const float a = rng.Uniform();
+    const float b = rng.Uniform();
+    const float c = rng.Uniform();
+    const float d = rng.Uniform();
+    Emission emission;
+    if (!lights.SampleEmission(u_choice, a, b, c, d, emission)) continue;
+    for (int channel = 0; channel < 3; ++channel) {
+      sum[static_cast<std::size_t>(channel)] += static_cast<double>(emission.flux[channel]) / kPhotons;
+    }
+    squares += static_cast<double>(MaxChannel(emission.flux)) *
+               static_cast<double>(MaxChannel(emission.flux)) / kPhotons;
+  }
+  // A bound on the standard error of each channel.
+  error = std::sqrt(squares / kPhotons);
+  return sum;
+}
+
+TEST(SampleEmissionTest, SendsTheTotalPower) {
+  Scene scene = Mixed();
+  scene.area_lights[1].radiance = {20, 2, 0.2F};
+  scene.point_lights.push_back({{0, 0, 5}, {1, 3, 0}});
+  scene.spot_lights.push_back({{0, 0, 3}, {0, 0, -1}, {5, 5, 50}, 0.9F, 0.5F});
+  scene.distant_lights.push_back({{0, 0, -1}, {0.1F, 0.5F, 0.1F}});
+  const Lit lit(scene);
+  double error = 0;
+  const auto mean = MeanFlux(lit.lights, 60, error);
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_NEAR(mean[static_cast<std::size_t>(c)],
+                static_cast<double>(lit.lights.TotalPower()[c]), 4.5 * error)
+        << c;
+  }
+}
+
+TEST(SampleEmissionTest, HasThePowerOfEachLightInClosedForm) {
+  const auto power = [](const Scene& scene) {
+    return static_cast<double>(Lit(scene).lights.TotalPower().g);
+  };
+  EXPECT_NEAR(power(SphereLamp()), 3 * kPiD * 4 * kPiD * 0.49, 1e-3);
+  EXPECT_NEAR(power(RingLamp()), 3 * kPiD * kPiD * 0.75, 1e-4);
+  EXPECT_NEAR(power(TwoSidedLamp()), 2 * 3 * kPiD * kPiD, 1e-4);
+  Scene scene = BlackRoom();
+  scene.point_lights.push_back({{}, Gray(2)});
+  EXPECT_NEAR(power(scene), 8 * kPiD, 1e-5);
+  scene.point_lights.clear();
+  // The integral of the intensity over the sphere, by midpoints.
+  const SpotLight spot = {{}, {0, 0, 1}, Gray(4), 0.95F, 0.6F};
+  scene.spot_lights.push_back(spot);
+  double expected = 0;
+  constexpr int kSteps = 100000;
+  for (int i = 0; i < kSteps; ++i) {
+    const double cosine = 0.6 + 0.4 * (i + 0.5) / kSteps;
+    const double x = std::min(1.0, (cosine - 0.6) / 0.35);
+    expected += 4 * 2 * kPiD * x * x * (3 - 2 * x) * 0.4 / kSteps;
+  }
+  EXPECT_NEAR(power(scene), expected, 1e-4);
+  double error = 0;
+  const Lit lit(scene);
+  EXPECT_NEAR(MeanFlux(lit.lights, 61, error)[1], expected, 4.5 * error);
+}
+
+TEST(SampleEmissionTest, LeavesSurfacesByTheCosine) {
+  const double level = SidakLevel(1e-3, 2);
+  for (const bool two_sided : {false, true}) {
+    Scene scene = BlackRoom();
+    AddDisk(scene, {0, 0, 0}, {0, 0, 1}, 1, 0, AddAreaLight(scene, 1, two_sided));
+    const Lit lit(scene);
+    const double p_value = DirectionsPValue(
+        [&](float u_lobe, float u1, float u2, Vec3& direction) {
+          Emission emission;
+          if (!lit.lights.SampleEmission(0.5F, u_lobe, u2, u1, u2, emission)) return false;
+          EXPECT_GT(emission.ray.origin.z * emission.ray.direction.z, 0);
+          direction = emission.ray.direction;
+          return true;
+        },
+        [&](Vec3 d) {
+          const auto cosine = static_cast<double>(d.z);
+          return two_sided ? std::abs(cosine) / (2 * kPiD) : std::max(0.0, cosine) / kPiD;
+        },
+        200000, 70);
+    EXPECT_GT(p_value, level) << two_sided;
+  }
+}
+
+// Light from infinity fills the room's bounding sphere evenly: what it sends through a disk in
+// the room is radiance × π × area, whichever way the disk looks.
+TEST(SampleEmissionTest, FillsTheSceneFromInfinity) {
+  const Lit lit(Sky());
+  KeyedRng rng(80);
+  constexpr int kPhotons = 1000000;
+  double through = 0;
+  double squares = 0;
+  for (int i = 0; i < kPhotons; ++i) {
+    const float a = rng.Uniform();
+    const float b = rng.Uniform();
+    const float c = rng.Uniform();
+    const float d = rng.Uniform();
+    Emission emission;
+    ASSERT_TRUE(lit.lights.SampleEmission(0.5F, a, b, c, d, emission));
+    Hit hit;
+    if (!lit.intersector->Intersect(emission.ray, hit)) continue;
+    const auto flux = static_cast<double>(emission.flux.g);
+    through += flux / kPhotons;
+    squares += flux * flux / kPhotons;
+  }
+  // Both faces of the disk of radius 0.5.
+  const double expected = 2 * kPiD * (2 * kPiD * 0.25);
+  EXPECT_NEAR(through, expected, 4 * std::sqrt(squares / kPhotons));
+}
+
+// A lamp may be a hundred million times weaker than the sun beside it, and still is all the light
+// that a closed room has.
+TEST(ChooseTest, DrawsWeakLightsAsOftenAsTheirPowerSays) {
+  Scene scene = BlackRoom();
+  scene.point_lights.push_back({{0, 0, 0}, Gray(1)});
+  scene.point_lights.push_back({{5, 0, 0}, Gray(4e-8F)});
+  const Lit lit(scene);
+  // All 2^24 values that a random number has.
+  double weak = 0;
+  for (std::uint32_t i = 0; i < (1U << 24); ++i) {
+    Emission emission;
+    ASSERT_TRUE(lit.lights.SampleEmission(static_cast<float>(i) * 0x1p-24F, 0, 0, 0.3F, 0.4F,
+                                          emission));
+    if (emission.ray.origin.x > 1) weak += static_cast<double>(emission.flux.g) * 0x1p-24;
+  }
+  EXPECT_NEAR(weak / (4 * kPiD * 4e-8), 1, 0.1);
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,546 @@
+// What a pbrt-v4 text means: defaults, units, scopes and orientation are pbrt-v4's, and everything
+// wrong is said at once, each at its place.
+#include "render/scene/pbrt_parser.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "tests/support/memory_files.h"
+
+namespace lucerna {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr float kPi = std::numbers::pi_v<float>;
+
+ParsedScene Parse(const std::string& text, std::map<std::string, std::string> others = {},
+                  const SceneLimits& limits = {}) {
+  others["s.pbrt"] = text;
+  MemoryFiles files(std::move(others));
+  return ParsePbrt(files, "s.pbrt", limits);
+}
+
+// A scene whose world is `world`; it must be right.
+Scene World(const std::string& world, std::map<std::string, std::string> others = {}) {
+  const ParsedScene parsed = Parse("Camera \"perspective\" WorldBegin " + world, std::move(others));
+  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+  return parsed.scene;
+}
+
+// All that is said, one to a line.
+std::string Said(const std::string& text, std::map<std::string, std::string> others = {},
+                 const SceneLimits& limits = {}) {
+  std::string all;
+  for (const Diagnostic& diagnostic : Parse(text, std::move(others), limits).diagnostics) {
+    all += diagnostic.ToString() + "\n";
+  }
+  return all;
+}
+std::string SaidOfWorld(const std::string& world) {
+  return Said("Camera \"perspective\" WorldBegin\n" + world);
+}
+
+void ExpectNear(Vec3 a, Vec3 b) {
+  EXPECT_LT(MaxAbs(a - b), 1e-5F) << a.x << " " << a.y << " " << a.z;
+}
+void ExpectNear(Rgb a, Rgb b, float tolerance = 1e-5F) {
+  EXPECT_NEAR(a.r, b.r, tolerance);
+  EXPECT_NEAR(a.g, b.g, tolerance);
+  EXPECT_NEAR(a.b, b.b, tolerance);
+}
+
+// ---- camera, film, filter, integrator
+
+TEST(PbrtParserTest, DefaultsArePbrts) {
+  const Scene scene = World("");
+  EXPECT_EQ(scene.camera.fov_deg, 90);
+  EXPECT_EQ(scene.camera.lens_radius, 0);
+  EXPECT_EQ(scene.camera.focal_distance, 1e6);
+  EXPECT_EQ(scene.film.width, 1280);
+  EXPECT_EQ(scene.film.height, 720);
+  EXPECT_EQ(scene.film.crop_x1, 1280);
+  EXPECT_EQ(scene.film.exposure, 1);
+  EXPECT_TRUE(std::isinf(scene.film.max_component));
+  EXPECT_EQ(scene.filter.kind, PixelFilter::Kind::kGaussian);
+  EXPECT_EQ(scene.filter.radius_x, 1.5F);
+  EXPECT_FALSE(scene.integrator.initial_radius.has_value());
+  EXPECT_EQ(scene.materials[0], Material());
+}
+
+TEST(PbrtParserTest, TheFieldOfViewSpansTheShorterSide) {
+  Camera camera;
+  const Window wide = ScreenWindow(camera, 200, 100);
+  EXPECT_NEAR(wide.high_y, 1, 1e-12);
+  EXPECT_NEAR(wide.high_x, 2, 1e-12);
+  const Window tall = ScreenWindow(camera, 100, 200);
+  EXPECT_NEAR(tall.low_x, -1, 1e-12);
+  EXPECT_NEAR(tall.low_y, -2, 1e-12);
+  camera.fov_deg = 60;
+  camera.screen_window = Window{0, 1, -1, 3};
+  const Window set = ScreenWindow(camera, 100, 200);
+  EXPECT_NEAR(set.low_x, 0, 1e-12);
+  EXPECT_NEAR(set.high_y, 3 * std::tan(std::numbers::pi / 6), 1e-12);
+}
+
+TEST(PbrtParserTest, LookAtAndAMirrorPlaceTheCamera) {
+  const ParsedScene parsed = Parse(
+      "Scale -1 1 1 LookAt 1 2 3  1 2 10  0 1 0 Camera \"perspective\" \"float fov\" 40 "
+      "WorldBegin");
+  const Transform& camera_to_world = parsed.scene.camera.camera_to_world;
+  ExpectNear(camera_to_world.Point({0, 0, 0}), {1, 2, 3});
+  ExpectNear(camera_to_world.Vector({0, 0, 1}), {0, 0, 1});
+  ExpectNear(camera_to_world.Vector({0, 1, 0}), {0, 1, 0});
+  ExpectNear(camera_to_world.Vector({1, 0, 0}), {-1, 0, 0});
+  EXPECT_EQ(parsed.scene.camera.fov_deg, 40);
+}
+
+TEST(PbrtParserTest, MatricesAreWrittenColumnByColumn) {
+  const Scene scene = World(
+      "Transform [1 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1] ConcatTransform [2 0 0 0 0 2 0 0 0 0 2 0 0 0 "
+      "0 1] Shape \"sphere\"");
+  ExpectNear(scene.spheres[0].center, {5, 6, 7});
+  EXPECT_EQ(scene.spheres[0].radius, 2);
+}
+
+TEST(PbrtParserTest, FilmCropAndExposure) {
+  const Scene scene =
+      Parse(
+          "Film \"rgb\" \"integer xresolution\" [100] \"integer yresolution\" 50 \"float iso\" 200 "
+          "\"float cropwindow\" [0.25 0.5 0 0.1] \"string filename\" \"a b.exr\"\n"
+          "Camera \"perspective\" \"float shutterclose\" 0.5 WorldBegin")
+          .scene;
+  EXPECT_EQ(scene.film.crop_x0, 25);
+  EXPECT_EQ(scene.film.crop_x1, 50);
+  EXPECT_EQ(scene.film.crop_y0, 0);
+  EXPECT_EQ(scene.film.crop_y1, 5);
+  EXPECT_DOUBLE_EQ(scene.film.exposure, 1);  // half the time at twice the speed
+  EXPECT_EQ(scene.film.filename, "a b.exr");
+  const Scene bounds = Parse(
+                           "Film \"rgb\" \"integer pixelbounds\" [3 9 4 2000] Camera "
+                           "\"perspective\" WorldBegin")
+                           .scene;
+  EXPECT_EQ(bounds.film.crop_x0, 3);
+  EXPECT_EQ(bounds.film.crop_x1, 9);
+  EXPECT_EQ(bounds.film.crop_y0, 4);
+  EXPECT_EQ(bounds.film.crop_y1, 720);
+}
+
+TEST(PbrtParserTest, IntegratorAndSampler) {
+  const Scene scene =
+      Parse(
+          "Integrator \"sppm\" \"integer maxdepth\" 9 \"float radius\" 0.01 "
+          "\"integer photonsperiteration\" 1000 \"integer seed\" 3\n"
+          "Sampler \"halton\" \"integer pixelsamples\" 32 Camera \"perspective\" WorldBegin")
+          .scene;
+  EXPECT_EQ(scene.integrator.max_depth, 9);
+  EXPECT_EQ(scene.integrator.initial_radius, 0.01);
+  EXPECT_EQ(scene.integrator.photons_per_pass, 1000);
+  EXPECT_EQ(scene.integrator.seed, 3);
+  EXPECT_EQ(scene.integrator.pixel_samples, 32);
+  const Scene path = Parse(
+                         "Integrator \"path\" \"integer maxdepth\" 4 \"float radius\" 1 Camera "
+                         "\"perspective\" WorldBegin")
+                         .scene;
+  EXPECT_EQ(path.integrator.max_depth, 4);
+  EXPECT_FALSE(path.integrator.initial_radius.has_value());
+}
+
+TEST(PbrtParserTest, Filters) {
+  const auto filter = [](const std::string& text) {
+    return Parse("PixelFilter " + text + " Camera \"perspective\" WorldBegin").scene.filter;
+  };
+  EXPECT_EQ(filter("\"box\"").radius_x, 0.5F);
+  EXPECT_EQ(filter("\"triangle\"").radius_y, 2);
+  EXPECT_EQ(filter("\"mitchell\"").b, 1.0F / 3);
+  EXPECT_EQ(filter("\"gaussian\" \"float sigma\" 0.3").sigma, 0.3F);
+}
+
+// ---- shapes and which way they face
+
+constexpr char kTriangle[] = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] ";
+
+Vec3 Outward(const Scene& scene) {
+  const TriangleMesh& mesh = scene.meshes.at(0);
+  const auto p = [&](std::size_t i) { return mesh.positions[mesh.indices[i]]; };
+  return Normalize(Cross(p(1) - p(0), p(2) - p(0)));
+}
+
+TEST(PbrtParserTest, AMeshWithoutNormalsFacesByItsWinding) {
+  ExpectNear(Outward(World(kTriangle)), {0, 0, 1});
+  ExpectNear(Outward(World(std::string("ReverseOrientation ") + kTriangle)), {0, 0, -1});
+  // In world space the mirror image is wound the other way; pbrt-v4 turns it over.
+  ExpectNear(Outward(World(std::string("Scale -1 1 1 ") + kTriangle)), {0, 0, 1});
+  ExpectNear(Outward(World(std::string("Scale 1 1 -1 ") + kTriangle)), {0, 0, -1});
+  ExpectNear(Outward(World(std::string("Scale -1 1 1 ReverseOrientation ") + kTriangle)),
+             {0, 0, -1});
+}
+
+TEST(PbrtParserTest, AMeshWithNormalsFacesWithThem) {
+  const std::string down = std::string(kTriangle) + "\"normal N\" [0 0 -2 0 0 -2 0 0 -2] ";
+  const Scene scene = World(down);
+  ExpectNear(Outward(scene), {0, 0, -1});
+  ExpectNear(scene.meshes[0].normals[0], {0, 0, -1});
+  const Scene reversed = World("ReverseOrientation " + down);
+  ExpectNear(Outward(reversed), {0, 0, 1});
+  ExpectNear(reversed.meshes[0].normals[0], {0, 0, 1});
+  ExpectNear(Outward(World("Scale -1 1 1 " + down)), {0, 0, -1});
+  // Normals of zero leave the choice to the winding.
+  ExpectNear(Outward(World(std::string(kTriangle) + "\"normal N\" [0 0 0 0 0 0 0 0 0] ")),
+             {0, 0, 1});
+}
+
+TEST(PbrtParserTest, NormalsAreMappedAsNormals) {
+  const Scene scene = World(
+      "Scale 1 2 1 Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 -1 0 0 0 1] "
+      "\"normal N\" [1 1 0 1 1 0 1 1 0]");
+  ExpectNear(scene.meshes[0].normals[0], Normalize({2, 1, 0}));
+}
+
+TEST(PbrtParserTest, SpheresAndDisks) {
+  const Scene scene = World(
+      "Translate 1 2 3 Scale 2 2 2 Shape \"sphere\" \"float radius\" 3 "
+      "Rotate 90 1 0 0 Shape \"disk\" \"float height\" 1 \"float innerradius\" 0.5 "
+      "ReverseOrientation Shape \"sphere\" Shape \"disk\"");
+  ExpectNear(scene.spheres[0].center, {1, 2, 3});
+  EXPECT_EQ(scene.spheres[0].radius, 6);
+  EXPECT_FALSE(scene.spheres[0].inward);
+  EXPECT_TRUE(scene.spheres[1].inward);
+  ExpectNear(scene.disks[0].normal, {0, -1, 0});
+  ExpectNear(scene.disks[0].center, {1, 0, 3});
+  EXPECT_EQ(scene.disks[0].inner_radius, 1);
+  ExpectNear(scene.disks[1].normal, {0, 1, 0});
+}
+
+TEST(PbrtParserTest, DegenerateTrianglesAreDroppedAndCounted) {
+  const std::string world =
+      "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 2 0 0] "
+      "\"integer indices\" [0 1 1  0 1 2  0 1 3]";
+  EXPECT_THAT(World(world).meshes[0].indices, ElementsAre(0, 1, 2));
+  EXPECT_THAT(SaidOfWorld(world), HasSubstr("2 of 3 triangles have no area"));
+}
+
+TEST(PbrtParserTest, InstancesAreLaidOut) {
+  const Scene scene =
+      World(std::string("ObjectBegin \"o\" Translate 1 0 0 Shape \"sphere\" ") + kTriangle +
+            "ObjectEnd ObjectInstance \"o\" Translate 0 5 0 Scale -2 2 2 ObjectInstance \"o\"");
+  ASSERT_EQ(scene.spheres.size(), 2U);
+  ExpectNear(scene.spheres[0].center, {1, 0, 0});
+  ExpectNear(scene.spheres[1].center, {-2, 5, 0});
+  EXPECT_EQ(scene.spheres[1].radius, 2);
+  ASSERT_EQ(scene.meshes.size(), 2U);
+  // A mirrored instance keeps its outward side outward.
+  const TriangleMesh& mirrored = scene.meshes[1];
+  const auto p = [&](std::size_t i) { return mirrored.positions[mirrored.indices[i]]; };
+  EXPECT_GT(Cross(p(1) - p(0), p(2) - p(0)).z, 0);
+  EXPECT_THAT(
+      SaidOfWorld("ObjectBegin \"o\" AreaLightSource \"diffuse\" Shape \"sphere\" ObjectEnd"),
+      HasSubstr("emits light inside an object"));
+}
+
+TEST(PbrtParserTest, InstancesCountAgainstTheLimit) {
+  SceneLimits limits;
+  limits.max_triangles = 10;
+  std::string text =
+      "Camera \"perspective\" WorldBegin ObjectBegin \"o\" Shape \"sphere\" Shape "
+      "\"disk\" ObjectEnd ";
+  for (int i = 0; i < 4; ++i)
+    text += "ObjectInstance \"o\" ";
+  EXPECT_TRUE(Parse(text, {}, limits).ok());  // with the object itself
+  EXPECT_THAT(Said(text + "ObjectInstance \"o\"", {}, limits), HasSubstr("more than 10 triangles"));
+}
+
+// ---- materials
+
+Material MaterialOf(const std::string& text) {
+  const Scene scene = World("Material " + text + " Shape \"sphere\"");
+  return scene.materials.at(static_cast<std::size_t>(scene.spheres.at(0).traits.material));
+}
+
+TEST(PbrtParserTest, Materials) {
+  EXPECT_EQ(MaterialOf("\"diffuse\" \"rgb reflectance\" [0.1 0.2 0.3]").reflectance,
+            (Rgb{0.1F, 0.2F, 0.3F}));
+  const Material copper = MaterialOf("\"conductor\"");
+  ExpectNear(copper.eta, {0.200438F, 0.924033F, 1.102212F});
+  EXPECT_EQ(copper.alpha_u, 0);
+  const Material gold =
+      MaterialOf("\"conductor\" \"spectrum eta\" \"metal-Au-eta\" \"spectrum k\" [\"metal-Au-k\"]");
+  ExpectNear(gold.eta, {0.143119F, 0.374957F, 1.442479F});
+  ExpectNear(gold.k, {3.983160F, 2.385721F, 1.603215F});
+  const Material reflecting = MaterialOf("\"conductor\" \"rgb reflectance\" [0.5 0 1]");
+  EXPECT_EQ(reflecting.eta, Gray(1));
+  EXPECT_NEAR(reflecting.k.r, 2, 1e-5);
+  EXPECT_EQ(reflecting.k.g, 0);
+  EXPECT_NEAR(reflecting.k.b, 2 * std::sqrt(0.9999 / 0.0001), 0.1);
+  const Material listed = MaterialOf("\"conductor\" \"spectrum eta\" [400 1 700 4] \"float k\" 3");
+  EXPECT_NEAR(listed.eta.r, 3.3F, 1e-5);
+  EXPECT_EQ(listed.k, Gray(3));
+  EXPECT_EQ(MaterialOf("\"dielectric\"").ior, 1.5F);
+  EXPECT_EQ(MaterialOf("\"dielectric\" \"spectrum eta\" \"glass-BK7\"").ior, 1.5168F);
+}
+
+TEST(PbrtParserTest, RoughnessIsRemappedUnlessToldNotTo) {
+  EXPECT_FLOAT_EQ(MaterialOf("\"conductor\" \"float roughness\" 0.04").alpha_u, 0.2F);
+  const Material direct = MaterialOf(
+      "\"dielectric\" \"float uroughness\" 0.1 \"float vroughness\" 0.3 \"bool remaproughness\" "
+      "false");
+  EXPECT_FLOAT_EQ(direct.alpha_u, 0.1F);
+  EXPECT_FLOAT_EQ(direct.alpha_v, 0.3F);
+  // Below a width of 0.001 pbrt-v4 renders a smooth surface.
+  EXPECT_EQ(MaterialOf("\"dielectric\" \"float roughness\" 9e-7").alpha_u, 0);
+  EXPECT_GT(MaterialOf("\"dielectric\" \"float roughness\" 2e-6").alpha_u, 0);
+}
+
+TEST(PbrtParserTest, ReflectanceByWavelength) {
+  ExpectNear(MaterialOf("\"diffuse\" \"spectrum reflectance\" [300 0.5 900 0.5]").reflectance,
+             Gray(0.5F), 1e-4F);
+  const Rgb red =
+      MaterialOf("\"diffuse\" \"spectrum reflectance\" [300 0 599 0 600 1 900 1]").reflectance;
+  EXPECT_GT(red.r, 0.6F);
+  EXPECT_LT(red.g, 0.1F);
+}
+
+TEST(PbrtParserTest, NamedMaterialsMayComeLaterAndScopesEnd) {
+  const Scene scene = World(
+      "NamedMaterial \"late\" Shape \"sphere\" AttributeBegin Material \"dielectric\" Shape "
+      "\"sphere\" AttributeEnd Shape \"sphere\" "
+      "MakeNamedMaterial \"late\" \"string type\" \"conductor\"");
+  const auto kind = [&](std::size_t i) {
+    return scene.materials[static_cast<std::size_t>(scene.spheres[i].traits.material)].kind;
+  };
+  EXPECT_EQ(kind(0), Material::Kind::kConductor);
+  EXPECT_EQ(kind(1), Material::Kind::kDielectric);
+  EXPECT_EQ(kind(2), Material::Kind::kConductor);
+  EXPECT_THAT(SaidOfWorld("NamedMaterial \"none\""), HasSubstr("s.pbrt:2:1: error: there is no "
+                                                               "material \"none\""));
+}
+
+// ---- lights
+
+TEST(PbrtParserTest, AreaLightsBelongToTheShapesOfTheirScope) {
+  const Scene scene = World(
+      "Shape \"sphere\" AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] \"float "
+      "scale\" "
+      "2 \"bool twosided\" true Shape \"sphere\" Shape \"disk\" AttributeEnd Shape \"sphere\"");
+  EXPECT_EQ(scene.spheres[0].traits.area_light, kNoAreaLight);
+  EXPECT_EQ(scene.spheres[1].traits.area_light, 0);
+  EXPECT_EQ(scene.disks[0].traits.area_light, 0);
+  EXPECT_EQ(scene.spheres[2].traits.area_light, kNoAreaLight);
+  EXPECT_EQ(scene.area_lights[0], (AreaLight{{2, 4, 6}, true}));
+}
+
+TEST(PbrtParserTest, PowerIsWhatTheLightEmits) {
+  const Scene scene = World(
+      "AreaLightSource \"diffuse\" \"float power\" 100 Shape \"sphere\" \"float radius\" 2 "
+      "Shape \"disk\" \"float innerradius\" 0.5 Shape \"trianglemesh\" \"point3 P\" [0 0 0 2 0 0 0 "
+      "2 "
+      "0] LightSource \"point\" \"float power\" 60 LightSource \"spot\" \"float power\" 30");
+  const auto power = [&](const ShapeTraits& traits, float area) {
+    return scene.area_lights[static_cast<std::size_t>(traits.area_light)].radiance.g * area * kPi;
+  };
+  EXPECT_NEAR(power(scene.spheres[0].traits, 4 * kPi * 4), 100, 1e-3);
+  EXPECT_NEAR(power(scene.disks[0].traits, kPi * 0.75F), 100, 1e-3);
+  EXPECT_NEAR(power(scene.meshes[0].traits, 2), 100, 1e-3);
+  EXPECT_NEAR(scene.point_lights[0].intensity.g * 4 * kPi, 60, 1e-3);
+  // The spot by numbers: 2 pi times the integral over the cosine.
+  const SpotLight& spot = scene.spot_lights[0];
+  double sum = 0;
+  constexpr int kSteps = 100'000;
+  for (int i = 0; i < kSteps; ++i) {
+    const double c = (i + 0.5) / kSteps;
+    const double t =
+        std::clamp((c - static_cast<double>(spot.cos_total_width)) /
+                       static_cast<double>(spot.cos_falloff_start - spot.cos_total_width),
+                   0.0, 1.0);
+    sum += t * t * (3 - 2 * t) / kSteps;
+  }
+  EXPECT_NEAR(2 * std::numbers::pi * sum * static_cast<double>(spot.intensity.g), 30, 0.01);
+}
+
+TEST(PbrtParserTest, OtherLights) {
+  const Scene scene = World(
+      "Translate 0 0 5 LightSource \"point\" \"rgb I\" [1 2 3] \"point3 from\" [1 0 0] "
+      "LightSource \"spot\" \"point3 from\" [0 0 0] \"point3 to\" [0 2 0] \"float coneangle\" 60 "
+      "LightSource \"distant\" \"point3 from\" [0 1 0] \"point3 to\" [0 0 0] \"float illuminance\" "
+      "4 "
+      "LightSource \"infinite\" \"rgb L\" [0.5 0.5 0.5] \"float scale\" 2");
+  ExpectNear(scene.point_lights[0].position, {1, 0, 5});
+  EXPECT_EQ(scene.point_lights[0].intensity, (Rgb{1, 2, 3}));
+  ExpectNear(scene.spot_lights[0].direction, {0, 1, 0});
+  EXPECT_NEAR(scene.spot_lights[0].cos_total_width, 0.5F, 1e-6);
+  EXPECT_NEAR(scene.spot_lights[0].cos_falloff_start, std::cos(55 * kPi / 180), 1e-6);
+  ExpectNear(scene.distant_lights[0].direction, {0, -1, 0});
+  EXPECT_EQ(scene.distant_lights[0].irradiance, Gray(4));
+  EXPECT_EQ(scene.infinite_lights[0].radiance, Gray(1));
+}
+
+TEST(PbrtParserTest, ColoursByTemperatureAndWavelengthHaveLuminanceOne) {
+  const auto intensity = [](const std::string& text) {
+    return World("LightSource \"point\" " + text).point_lights.at(0).intensity;
+  };
+  const Rgb warm = intensity("\"blackbody I\" 2700");
+  EXPECT_NEAR(Luminance(warm), 1, 1e-5);
+  EXPECT_GT(warm.r, 1.5F);
+  EXPECT_LT(warm.b, 0.4F);
+  // The Planckian at 6504 K is close to D65, which is white.
+  ExpectNear(intensity("\"blackbody I\" [6504]"), Gray(1), 0.06F);
+  EXPECT_NEAR(Luminance(intensity("\"spectrum I\" [400 7 700 9]")), 1, 1e-5);
+  EXPECT_NEAR(Luminance(intensity("\"spectrum I\" [600 1 610 1]")), 1, 1e-5);
+}
+
+// ---- scopes, files
+
+TEST(PbrtParserTest, AttributesAreDefaultsThatAShapeMayOverride) {
+  const Scene scene = World(
+      "AttributeBegin Attribute \"shape\" \"float radius\" 3 Attribute \"light\" \"float scale\" 2 "
+      "Shape \"sphere\" Shape \"sphere\" \"float radius\" 4 LightSource \"point\" AttributeEnd "
+      "Shape \"sphere\"");
+  EXPECT_EQ(scene.spheres[0].radius, 3);
+  EXPECT_EQ(scene.spheres[1].radius, 4);
+  EXPECT_EQ(scene.spheres[2].radius, 1);
+  EXPECT_EQ(scene.point_lights[0].intensity, Gray(2));
+}
+
+TEST(PbrtParserTest, CoordinateSystems) {
+  const Scene scene =
+      Parse(
+          "Translate 0 0 -4 Camera \"perspective\" WorldBegin Translate 1 0 0 CoordinateSystem "
+          "\"there\" Identity Shape \"sphere\" CoordSysTransform \"there\" Shape \"sphere\" "
+          "CoordSysTransform \"camera\" Shape \"sphere\"")
+          .scene;
+  ExpectNear(scene.spheres[0].center, {0, 0, 0});
+  ExpectNear(scene.spheres[1].center, {1, 0, 0});
+  ExpectNear(scene.spheres[2].center, {0, 0, 4});
+}
+
+TEST(PbrtParserTest, IncludeAndImport) {
+  const Scene scene =
+      World("Include \"parts/a.pbrt\" Shape \"sphere\" Import \"b.pbrt\" Shape \"sphere\"",
+            {{"parts/a.pbrt", "Translate 1 0 0 Include \"parts/c.pbrt\""},  // from the main folder
+             {"parts/c.pbrt", "Translate 0 1 0"},
+             {"b.pbrt", "Translate 0 0 1 Shape \"sphere\""}});
+  ExpectNear(scene.spheres[0].center, {1, 1, 0});
+  ExpectNear(scene.spheres[1].center, {1, 1, 1});
+  ExpectNear(scene.spheres[2].center, {1, 1, 0});  // an import leaves no trace
+}
+
+TEST(PbrtParserTest, IncludesEnd) {
+  EXPECT_THAT(Said("Include \"s.pbrt\""), HasSubstr("include one another more than 32 deep"));
+  SceneLimits limits;
+  limits.max_files = 100;
+  // Doubles with every level: 2^32 readings, were they not counted.
+  EXPECT_THAT(Said("Include \"s.pbrt\" Include \"s.pbrt\"", {}, limits),
+              HasSubstr("more than 100 files"));
+}
+
+TEST(PbrtParserTest, PlyMeshesAreReadAndTheirErrorsPlaced) {
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+      "z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 0 1 0 3 "
+      "0 ";
+  const std::string world = "Translate 0 0 2 Shape \"plymesh\" \"string filename\" \"m.ply\"";
+  ExpectNear(World(world, {{"m.ply", ply + "1 2\n"}}).meshes.at(0).positions[1], {1, 0, 2});
+  EXPECT_THAT(Said("WorldBegin " + world, {{"m.ply", ply + "1 3\n"}}),
+              HasSubstr("s.pbrt:1:44: error: \"filename\" of Shape \"plymesh\" cannot be read: bad "
+                        "PLY file: face 0 refers to vertex 3 of 3"));
+  EXPECT_THAT(Said("WorldBegin " + world), HasSubstr("m.ply: no such file"));
+}
+
+// ---- what is refused
+
+TEST(PbrtParserTest, AllErrorsAreSaidAtOnceEachAtItsPlace) {
+  const std::string said = Said(
+      "Camera \"perspective\" \"float fov\" [ 200 ]\n"
+      "WorldBegin\n"
+      "Sahpe \"sphere\"\n"
+      "Shape \"cone\"\n"
+      "  Material \"diffuse\" \"rgb reflectance\" [0.5 1.5 0]\n"
+      "Shape \"sphere\" \"float radius\" [1 2] \"float raduis\" 1\n"
+      "Translate 1 2 Shape \"sphere\" \"integer radius\" 1\n"
+      "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 nan 0 1 0]\n"
+      "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] \"integer indices\" [0 1 3]\n"
+      "AttributeEnd\n"
+      "AttributeBegin\n");
+  EXPECT_THAT(said, HasSubstr("s.pbrt:1:22: error: \"fov\" of Camera \"perspective\" must be at "
+                              "least 0.001 and at most 179.999, not 200\n"));
+  EXPECT_THAT(said,
+              HasSubstr("s.pbrt:3:1: error: unknown directive \"Sahpe\"; did you mean Shape?"));
+  EXPECT_THAT(said, HasSubstr("s.pbrt:4:1: error: Shape \"cone\" is not supported; there are"));
+  EXPECT_THAT(said,
+              HasSubstr("s.pbrt:5:22: error: \"reflectance\" of Material \"diffuse\" must be"));
+  EXPECT_THAT(said,
+              HasSubstr("s.pbrt:6:16: error: \"radius\" of Shape \"sphere\" must have 1 value"));
+  EXPECT_THAT(said, HasSubstr("s.pbrt:6:37: warning: unknown parameter \"raduis\" of Shape "
+                              "\"sphere\" is ignored; did you mean \"radius\"?"));
+  EXPECT_THAT(said,
+              HasSubstr("s.pbrt:7:15: error: Translate takes 3 finite numbers, not \"Shape\""));
+  EXPECT_THAT(said, HasSubstr("s.pbrt:7:30: error: \"radius\" of Shape \"sphere\" must be of type "
+                              "float, not integer"));
+  EXPECT_THAT(said, HasSubstr("s.pbrt:8:44: error: \"P\" of Shape takes finite numbers"));
+  EXPECT_THAT(said, HasSubstr("refers to vertex 3 of 3"));
+  EXPECT_THAT(said, HasSubstr("s.pbrt:10:1: error: AttributeEnd without AttributeBegin"));
+  EXPECT_THAT(said, HasSubstr("s.pbrt:11:1: error: AttributeBegin is never closed"));
+  // Each mistake once: nothing is said of what only follows from another error.
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 12);
+}
+
+TEST(PbrtParserTest, OlderDialectsAreRefusedByNameAndByThatAlone) {
+  for (const char* sign :
+       {"Film \"image\" \"integer xresolution\" 9", "WorldBegin Material \"matte\"",
+        "WorldBegin MakeNamedMaterial \"m\" \"string type\" \"uber\"", "WorldBegin WorldEnd",
+        "SurfaceIntegrator \"path\""}) {
+    const ParsedScene parsed = Parse(std::string("Nonsense\n") + sign);
+    ASSERT_EQ(parsed.diagnostics.size(), 1U) << sign;
+    EXPECT_EQ(parsed.diagnostics[0].message,
+              "this is a pbrt-v3 file; convert it with \"pbrt --upgrade\"");
+    EXPECT_EQ(parsed.diagnostics[0].line, 2);
+  }
+}
+
+TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
+  const auto expect = [](const std::string& world, const std::string& part) {
+    const std::string said = SaidOfWorld(world);
+    EXPECT_THAT(said, HasSubstr("error: "));
+    EXPECT_THAT(said, HasSubstr(part));
+  };
+  expect("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.png\"", "textures");
+  expect("Material \"diffuse\" \"texture reflectance\" \"t\"", "is a texture");
+  expect("MakeNamedMedium \"m\"", "participating media");
+  expect("MediumInterface \"m\" \"\"", "participating media");
+  expect("Material \"coateddiffuse\"", "there are diffuse, conductor and dielectric");
+  expect("Material \"interface\"", "lets light through unchanged");
+  expect("MakeNamedMaterial \"m\" \"string type\" \"mix\"", "\"mix\"");
+  expect("LightSource \"goniometric\"", "there are point, spot, distant and infinite");
+  expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "constant L");
+  expect("Scale 1 2 1 Shape \"sphere\"", "ellipsoid");
+  expect("Shape \"sphere\" \"float zmax\" 0.5", "part of a sphere");
+  expect("Shape \"disk\" \"float phimax\" 90", "part of a disk");
+  expect("ActiveTransform StartTime", "motion blur");
+  expect("Scale 0 1 1", "cannot be inverted");
+  expect("Camera \"perspective\"", "before WorldBegin");
+}
+
+TEST(PbrtParserTest, NeedsAWorldAndACamera) {
+  EXPECT_EQ(Said(""),
+            "s.pbrt: error: the scene has no WorldBegin\ns.pbrt: error: the scene has no "
+            "camera\ns.pbrt: warning: the scene has no shapes\ns.pbrt: warning: the scene "
+            "has no light: the image will be black\n");
+  EXPECT_THAT(Said("Shape \"sphere\""), HasSubstr("Shape must come after WorldBegin"));
+}
+
+TEST(PbrtParserTest, BinaryFilesAndMissingFiles) {
+  EXPECT_EQ(Said(std::string("PNG\0\0", 5)),
+            "s.pbrt: error: this is not a pbrt text file: it holds binary data\n");
+  MemoryFiles none({});
+  EXPECT_EQ(ParsePbrt(none, "s.pbrt").ToStatus().code(), absl::StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace lucerna

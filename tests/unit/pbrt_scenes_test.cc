@@ -1,0 +1,124 @@
+// The scenes that this version promises to read are read without an error, those that need more
+// say what they need, and the project's own scenes hold what their first lines say.
+#include <filesystem>
+#include <string>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "render/scene/pbrt_parser.h"
+#include "render/scene/render_settings.h"
+
+namespace lucerna {
+namespace {
+
+using ::testing::HasSubstr;
+
+ParsedScene ParseAt(const std::string& path) {
+  const std::filesystem::path whole(path);
+  DirectoryFiles files(whole.parent_path().string());
+  return ParsePbrt(files, whole.filename().string());
+}
+
+ParsedScene ParseOwn(const std::string& name) {
+  return ParseAt(std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/" + name);
+}
+
+class SharedScenesTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(folder_))
+      GTEST_SKIP() << "the shared scenes are not beside the source folder";
+  }
+  ParsedScene Parse(const std::string& path) { return ParseAt(folder_ + path); }
+
+  const std::string folder_ = std::string(LUCERNA_SOURCE_DIR) + "/../shared/scenes/";
+};
+
+TEST_F(SharedScenesTest, ReadsWhatIsPromised) {
+  const struct {
+    const char* path;
+    std::size_t triangles, spheres, area_lights;
+  } kExpected[] = {
+      {"cornell-box/scene-v4.pbrt", 36, 0, 1},
+      {"cornell-box-variants/cornell-box.pbrt", 32, 0, 1},
+      {"cornell-box-variants/cornell-box-instance.pbrt", 12, 2, 1},
+      {"cornell-box-variants/cornell-box-silver.pbrt", 32, 0, 1},
+      {"cornell-box-variants/cornell-box-specular.pbrt", 22, 1, 1},
+      {"cornell-box-variants/smallpt.pbrt", 10, 3, 1},
+      {"water-caustic/scene-v4.pbrt", 103487, 0, 1},
+      {"veach-bidir/scene-v4.pbrt", 11544, 0, 2},
+      {"veach-mis/scene-v4.pbrt", 52, 3, 3},
+      {"sphere-box/scene.pbrt", 12, 2, 1},
+      {"sphere-caustic/scene.pbrt", 4, 1, 1},
+  };
+  for (const auto& expected : kExpected) {
+    const ParsedScene parsed = Parse(expected.path);
+    EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+    EXPECT_EQ(parsed.scene.TriangleCount(), expected.triangles) << expected.path;
+    EXPECT_EQ(parsed.scene.spheres.size(), expected.spheres) << expected.path;
+    EXPECT_EQ(parsed.scene.area_lights.size(), expected.area_lights) << expected.path;
+    EXPECT_TRUE(ResolveSettings({}, parsed.scene).ok()) << expected.path;
+  }
+}
+
+TEST_F(SharedScenesTest, LampsFaceTheRoom) {
+  // The lamp under the ceiling of the Cornell box shines down.
+  const Scene scene = Parse("cornell-box/scene-v4.pbrt").scene;
+  for (const TriangleMesh& mesh : scene.meshes) {
+    if (mesh.traits.area_light == kNoAreaLight) continue;
+    const auto p = [&](std::size_t i) { return mesh.positions[mesh.indices[i]]; };
+    EXPECT_LT(Normalize(Cross(p(1) - p(0), p(2) - p(0))).y, -0.99F);
+  }
+}
+
+TEST_F(SharedScenesTest, SaysWhatItCannotRead) {
+  const auto errors = [this](const char* path) {
+    return std::string(Parse(path).ToStatus().message());
+  };
+  EXPECT_THAT(errors("cornell-box-variants/cornell-box-volume.pbrt"),
+              HasSubstr("participating media are not supported"));
+  EXPECT_THAT(errors("volumetric-caustic/scene-v4.pbrt"), HasSubstr("participating media"));
+  EXPECT_THAT(errors("coffee/scene-v4.pbrt"), HasSubstr("\"coateddiffuse\""));
+  EXPECT_THAT(errors("classroom/scene-v4.pbrt"), HasSubstr("textures are not supported"));
+}
+
+TEST(OwnScenesTest, AllAreReadWithoutErrorsOrWarnings) {
+  int count = 0;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes")) {
+    if (entry.path().extension() != ".pbrt") continue;
+    ++count;
+    for (const Diagnostic& diagnostic : ParseAt(entry.path().string()).diagnostics) {
+      EXPECT_EQ(diagnostic.severity, Diagnostic::Severity::kNote) << diagnostic.ToString();
+    }
+  }
+  EXPECT_GE(count, 4);
+}
+
+TEST(OwnScenesTest, TheFurnaceEmitsInward) {
+  const Scene scene = ParseOwn("furnace.pbrt").scene;
+  ASSERT_EQ(scene.spheres.size(), 1U);
+  EXPECT_TRUE(scene.spheres[0].inward);
+  EXPECT_EQ(scene.area_lights.at(0).radiance, Gray(1));
+  EXPECT_FALSE(scene.area_lights.at(0).two_sided);
+}
+
+TEST(OwnScenesTest, TheLampIsInsideItsGlass) {
+  const Scene scene = ParseOwn("lamp-in-glass.pbrt").scene;
+  ASSERT_EQ(scene.spheres.size(), 2U);
+  EXPECT_EQ(scene.spheres[0].center, scene.spheres[1].center);
+  EXPECT_GT(scene.spheres[0].radius, scene.spheres[1].radius);
+  EXPECT_EQ(scene.spheres[1].traits.area_light, 0);
+}
+
+TEST(OwnScenesTest, TheLampOfTheCausticFacesTheRing) {
+  const Scene scene = ParseOwn("caustic.pbrt").scene;
+  const TriangleMesh& lamp = scene.meshes.at(0);
+  ASSERT_EQ(lamp.traits.area_light, 0);
+  const auto p = [&](std::size_t i) { return lamp.positions[lamp.indices[i]]; };
+  EXPECT_GT(Dot(Normalize(Cross(p(1) - p(0), p(2) - p(0))), Normalize(-p(0))), 0.9F);
+}
+
+}  // namespace
+}  // namespace lucerna

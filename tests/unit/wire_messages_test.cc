@@ -1,0 +1,149 @@
+// A value must survive the journey through a message, and a message that no program of ours would
+// send must be refused.
+#include <cmath>
+#include <limits>
+
+#include "gtest/gtest.h"
+
+#include "render/wire/channel.h"
+#include "render/wire/grpc_status.h"
+#include "render/wire/messages.h"
+
+namespace lucerna {
+namespace {
+
+RenderSettings SomeSettings() {
+  RenderSettings settings;
+  settings.width = 640;
+  settings.height = 480;
+  settings.crop_x0 = 10;
+  settings.crop_y0 = 20;
+  settings.crop_x1 = 630;
+  settings.crop_y1 = 460;
+  settings.passes = 7;
+  settings.time_s = 2.5;
+  settings.photons_per_pass = 123'456;
+  settings.seed = ~std::uint64_t{0};
+  settings.radius_controller = RadiusControllerKind::kPppm;
+  settings.alpha = 0.7;
+  settings.kernel = KernelKind::kConstant;
+  settings.initial_radius = 0.01;
+  settings.max_depth = 12;
+  return settings;
+}
+
+SceneManifest SomeManifest() {
+  SceneManifest manifest;
+  manifest.main_path = "scene.pbrt";
+  manifest.entries["scene.pbrt"] = {Sha256("scene"), 5};
+  manifest.entries["models/a mesh.ply"] = {Sha256("mesh"), 4};
+  return manifest;
+}
+
+TEST(MessagesTest, SettingsComeBack) {
+  const auto settings = FromProto(ToProto(SomeSettings()));
+  ASSERT_TRUE(settings.ok()) << settings.status();
+  EXPECT_EQ(*settings, SomeSettings());
+}
+
+TEST(MessagesTest, HostileSettingsAreRefused) {
+  const auto is_refused = [](auto change) {
+    v1::RenderSettings message = ToProto(SomeSettings());
+    change(message);
+    return absl::IsInvalidArgument(FromProto(message).status());
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_width(0); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_height(65'537); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_crop_x1(641); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_crop_x0(-1); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_crop_y0(460); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_passes(-1); }));
+  EXPECT_TRUE(is_refused([&](auto& m) { m.set_time_s(nan); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_time_s(HUGE_VAL); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_photons_per_pass(0); }));
+  EXPECT_TRUE(is_refused([&](auto& m) { m.set_alpha(nan); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_alpha(1); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_kernel("cubic"); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_radius_controller(""); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_initial_radius(-1); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_max_depth(0); }));
+}
+
+TEST(MessagesTest, OverridesComeBackWithWhatIsAbsent) {
+  RenderOverrides overrides;
+  overrides.passes = 0;
+  overrides.kernel = KernelKind::kConstant;
+  overrides.initial_radius = 0;
+  const auto back = FromProto(ToProto(overrides));
+  ASSERT_TRUE(back.ok());
+  EXPECT_EQ(back->passes, overrides.passes);
+  EXPECT_EQ(back->kernel, overrides.kernel);
+  EXPECT_EQ(back->initial_radius, overrides.initial_radius);
+  EXPECT_FALSE(back->width || back->height || back->photons_per_pass || back->time_s ||
+               back->seed || back->radius_controller || back->alpha || back->max_depth);
+  v1::RenderOverrides hostile;
+  hostile.set_alpha(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_FALSE(FromProto(hostile).ok());
+}
+
+TEST(MessagesTest, AManifestComesBack) {
+  const auto manifest = FromProto(ToProto(SomeManifest()));
+  ASSERT_TRUE(manifest.ok()) << manifest.status();
+  EXPECT_EQ(*manifest, SomeManifest());
+  EXPECT_EQ(manifest->SceneDigest(), SomeManifest().SceneDigest());
+}
+
+TEST(MessagesTest, HostileManifestsAreRefused) {
+  const auto is_refused = [](auto change) {
+    v1::SceneManifest message = ToProto(SomeManifest());
+    change(message);
+    return !FromProto(message).ok();
+  };
+  EXPECT_TRUE(is_refused([](auto& m) { m.mutable_entries(0)->set_path("../secret"); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.mutable_entries(0)->set_path("/etc/passwd"); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.mutable_entries(0)->set_digest("short"); }));
+  EXPECT_TRUE(is_refused([](auto& m) { *m.add_entries() = m.entries(0); })) << "twice";
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_main_path("other.pbrt"); }));
+  EXPECT_TRUE(is_refused([](auto& m) {
+    for (int i = 0; i < 2; ++i)
+      m.mutable_entries(i)->set_size_bytes(~std::uint64_t{0} / 2 + 1);
+  })) << "the sum of the sizes wraps";
+}
+
+TEST(MessagesTest, DurationsComeBackAndHostileOnesAreBounded) {
+  for (const std::int64_t ns : {0L, 1L, 999'999'999L, 1'000'000'000L, 123'456'789'012'345L}) {
+    EXPECT_EQ(FromProto(ToProto(Duration(ns))), Duration(ns));
+  }
+  google::protobuf::Duration hostile;
+  hostile.set_seconds(std::numeric_limits<std::int64_t>::max());
+  hostile.set_nanos(std::numeric_limits<std::int32_t>::max());
+  EXPECT_GT(FromProto(hostile), Duration::zero());
+  hostile.set_seconds(-5);
+  EXPECT_EQ(FromProto(hostile), Duration::zero());
+}
+
+TEST(MessagesTest, AStatusCrossesWithItsMessageAndALongOneIsCutAtALine) {
+  const Status status = absl::FailedPreconditionError("a sentence");
+  EXPECT_EQ(FromGrpc(ToGrpc(status)), status);
+  EXPECT_TRUE(FromGrpc(ToGrpc(absl::OkStatus())).ok());
+  std::string many;
+  for (int i = 0; i < 1000; ++i)
+    many += "scene.pbrt:1:1: error: wrong\n";
+  const grpc::Status cut = ToGrpc(absl::InvalidArgumentError(many));
+  EXPECT_LT(cut.error_message().size(), 7000U);
+  EXPECT_TRUE(cut.error_message().ends_with("wrong\n(and more)"));
+}
+
+TEST(ChannelTest, KnowsWhatStaysOnThisMachine) {
+  for (const char* address : {"127.0.0.1:7400", "127.1.2.3:0", "localhost:7400", "[::1]:7400"}) {
+    EXPECT_TRUE(IsLoopback(address)) << address;
+  }
+  for (const char* address : {"0.0.0.0:7400", "192.168.1.1:7400", "[::]:7400", "example.org:7400",
+                              ":7400", "127.0.0.1.example.org:7400"}) {
+    EXPECT_FALSE(IsLoopback(address)) << address;
+  }
+}
+
+}  // namespace
+}  // namespace lucerna

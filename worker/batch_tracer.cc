@@ -1,0 +1,159 @@
+#include "worker/batch_tracer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "render/base/parallel.h"
+#include "render/geometry/intersector.h"
+#include "render/math/fixed_point.h"
+#include "render/transport/light.h"
+#include "render/transport/working_space.h"
+#include "worker/gather.h"
+#include "worker/photon_grid.h"
+#include "worker/photon_path.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::uint64_t kPhotonsPerChunk = 2048;
+// A range is worked off in parts of so many photons, which bounds memory (about 100 bytes a
+// deposit) and is large enough for the sort to pay.
+constexpr std::uint64_t kPhotonsPerPart = std::uint64_t{1} << 20;
+
+Status CheckBlock(const HitpointBlock& block, const RadiusColumn& radii, const Scene& scene) {
+  if (block.normals_oct.size() != block.size() || radii.size() != block.size()) {
+    return absl::InvalidArgumentError("hitpoint columns and radii differ in length");
+  }
+  for (const float radius : radii) {
+    if (!(radius > 0) || !std::isfinite(radius)) {
+      return absl::InvalidArgumentError("a hitpoint's radius is not a positive number");
+    }
+  }
+  std::int64_t previous = -1;
+  for (const GlossyHitpoint& glossy : block.glossy) {
+    if (glossy.hitpoint >= block.size() || static_cast<std::int64_t>(glossy.hitpoint) <= previous ||
+        glossy.material >= scene.materials.size()) {
+      return absl::InvalidArgumentError("a glossy hitpoint is out of order or out of range");
+    }
+    previous = glossy.hitpoint;
+  }
+  return absl::OkStatus();
+}
+
+// The box in which a photon can be found by some hitpoint.
+Bounds RegionOf(const HitpointBlock& block, const RadiusColumn& radii) {
+  Bounds region;
+  for (std::size_t row = 0; row < block.size(); ++row) {
+    const Vec3 reach = {radii[row], radii[row], radii[row]};
+    region.Add(block.positions[row] - reach);
+    region.Add(block.positions[row] + reach);
+  }
+  return region;
+}
+
+// Cells twice as wide as the middle radius: a hitpoint meets two to three of them along an axis,
+// and a few very large or small radii do not spoil the grid for the others.
+float CellWidth(RadiusColumn radii) {
+  const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
+  std::nth_element(radii.begin(), middle, radii.end());
+  return 2 * *middle;
+}
+
+// `more` summed into `sum`, row by row.
+Accumulation Merge(const Accumulation& sum, const Accumulation& more) {
+  Accumulation out;
+  out.tally = sum.tally;
+  out.tally += more.tally;
+  const std::size_t upper = sum.size() + more.size();
+  out.hitpoints.reserve(upper);
+  out.counts.reserve(upper);
+  for (auto& channel : out.flux) channel.reserve(upper);
+  std::size_t a = 0;
+  std::size_t b = 0;
+  while (a < sum.size() || b < more.size()) {
+    const bool from_a =
+        b == more.size() || (a < sum.size() && sum.hitpoints[a] <= more.hitpoints[b]);
+    const bool from_b =
+        a == sum.size() || (b < more.size() && more.hitpoints[b] <= sum.hitpoints[a]);
+    out.hitpoints.push_back(from_a ? sum.hitpoints[a] : more.hitpoints[b]);
+    out.counts.push_back((from_a ? sum.counts[a] : 0) + (from_b ? more.counts[b] : 0));
+    for (std::size_t c = 0; c < 3; ++c) {
+      out.flux[c].push_back((from_a ? sum.flux[c][a] : 0) + (from_b ? more.flux[c][b] : 0));
+    }
+    a += from_a ? 1 : 0;
+    b += from_b ? 1 : 0;
+  }
+  return out;
+}
+
+}  // namespace
+
+struct BatchTracer::State {
+  State(Scene s, int threads) : scene(InWorkingSpace(std::move(s))), team(threads) {}
+
+  Scene scene;
+  ThreadTeam team;
+  std::unique_ptr<Intersector> intersector;
+  std::unique_ptr<LightSet> lights;
+  FluxScale scale;
+};
+
+BatchTracer::BatchTracer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+BatchTracer::~BatchTracer() = default;
+
+StatusOr<std::unique_ptr<BatchTracer>> BatchTracer::Create(Scene scene, int threads) {
+  auto state = std::make_unique<State>(std::move(scene), threads);
+  LUCERNA_ASSIGN_OR_RETURN(state->intersector, Intersector::Create(state->scene));
+  state->lights = std::make_unique<LightSet>(state->scene, *state->intersector);
+  state->scale = FluxScale::ForPower(state->lights->TotalPower());
+  return std::unique_ptr<BatchTracer>(new BatchTracer(std::move(state)));
+}
+
+StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uint64_t pass,
+                                        std::uint64_t first, std::uint64_t last,
+                                        const HitpointBlock& block, const RadiusColumn& radii,
+                                        const std::atomic<bool>& stop) {
+  LUCERNA_RETURN_IF_ERROR(CheckBlock(block, radii, state_->scene));
+  Accumulation sum;
+  if (block.size() == 0 || first >= last) {
+    sum.tally.photons = last > first ? last - first : 0;
+    return sum;
+  }
+  const Bounds region = RegionOf(block, radii);
+  const float cell = CellWidth(radii);
+  const PhotonPathTracer tracer(state_->scene, *state_->intersector, *state_->lights, settings,
+                                region);
+  for (std::uint64_t part = first; part < last; part += kPhotonsPerPart) {
+    const std::uint64_t part_end = std::min(last, part + kPhotonsPerPart);
+    const std::size_t chunks =
+        static_cast<std::size_t>((part_end - part + kPhotonsPerChunk - 1) / kPhotonsPerChunk);
+    std::vector<std::vector<Deposit>> deposits(chunks);
+    std::vector<BatchTally> tallies(chunks);
+    state_->team.For(chunks, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t chunk = begin; chunk < end && !stop.load(std::memory_order_relaxed);
+           ++chunk) {
+        const std::uint64_t chunk_first = part + chunk * kPhotonsPerChunk;
+        const std::uint64_t chunk_last = std::min(part_end, chunk_first + kPhotonsPerChunk);
+        deposits[chunk].reserve(2 * kPhotonsPerChunk);
+        for (std::uint64_t index = chunk_first; index < chunk_last; ++index) {
+          tallies[chunk].rays += static_cast<std::uint64_t>(
+              tracer.Trace(pass, index, deposits[chunk], tallies[chunk].dropped));
+        }
+        tallies[chunk].photons = chunk_last - chunk_first;
+        tallies[chunk].deposits = deposits[chunk].size();
+      }
+    });
+    if (stop) return absl::CancelledError("the batch was given up");
+    const PhotonGrid grid(deposits, region, cell, state_->team);
+    Accumulation accumulation = Gather(block, radii, grid, state_->scene.materials,
+                                       Kernel{settings.kernel}, state_->scale, state_->team);
+    for (const BatchTally& tally : tallies) accumulation.tally += tally;
+    sum = part == first ? std::move(accumulation) : Merge(sum, accumulation);
+    if (stop) return absl::CancelledError("the batch was given up");
+  }
+  return sum;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,146 @@
+#include "worker/connection.h"
+
+#include <string_view>
+
+#include "render/wire/channel.h"
+#include "render/wire/chunks.h"
+#include "render/wire/grpc_status.h"
+#include "render/wire/messages.h"
+
+namespace lucerna {
+namespace {
+
+// A coordinator that is to answer at once and does not within this has gone.
+constexpr std::chrono::seconds kGoodbyeTime{1};
+constexpr std::chrono::minutes kTransferTime{10};
+
+}  // namespace
+
+// One call's context, which BreakOff can reach for as long as it lives.
+class Connection::Call {
+ public:
+  Call(Connection& connection, Duration time) : connection_(connection) {
+    context_.set_deadline(std::chrono::system_clock::now() +
+                          std::chrono::duration_cast<std::chrono::system_clock::duration>(time));
+    const MutexLock lock(connection_.mutex_);
+    if (connection_.is_broken_off_) context_.TryCancel();
+    connection_.calls_.insert(&context_);
+  }
+  ~Call() {
+    const MutexLock lock(connection_.mutex_);
+    connection_.calls_.erase(&context_);
+  }
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
+
+  [[nodiscard]] grpc::ClientContext* context() { return &context_; }
+
+ private:
+  Connection& connection_;
+  grpc::ClientContext context_;
+};
+
+Connection::Connection(const std::string& address)
+    : channel_(MakeChannel(address)), stub_(v1::WorkerService::NewStub(channel_)) {}
+
+bool Connection::WaitUntilConnected(Duration wait) {
+  return channel_->WaitForConnected(
+      std::chrono::system_clock::now() +
+      std::chrono::duration_cast<std::chrono::system_clock::duration>(wait));
+}
+
+StatusOr<v1::RegisterResponse> Connection::Register(const v1::RegisterRequest& request) {
+  Call call(*this, kCallTime);
+  v1::RegisterResponse response;
+  LUCERNA_RETURN_IF_ERROR(FromGrpc(stub_->Register(call.context(), request, &response)));
+  return response;
+}
+
+StatusOr<v1::SyncResponse> Connection::Sync(const v1::SyncRequest& request, Duration wait) {
+  Call call(*this, wait + kCallTime);
+  v1::SyncRequest waiting = request;
+  *waiting.mutable_wait_at_most() = ToProto(wait);
+  v1::SyncResponse response;
+  LUCERNA_RETURN_IF_ERROR(FromGrpc(stub_->Sync(call.context(), waiting, &response)));
+  return response;
+}
+
+StatusOr<std::string> Connection::Fetch(const Digest& digest, std::uint64_t max_bytes) {
+  Call call(*this, kTransferTime);
+  v1::FetchBlobRequest request;
+  request.set_digest(std::string(digest.Bytes()));
+  const auto reader = stub_->FetchBlob(call.context(), request);
+  std::string bytes;
+  v1::Chunk chunk;
+  while (reader->Read(&chunk)) {
+    if (chunk.bytes().size() > max_bytes - bytes.size()) {
+      call.context()->TryCancel();
+      return absl::InvalidArgumentError(
+          absl::StrCat("blob ", digest.Hex(), " has more than ", max_bytes, " bytes"));
+    }
+    bytes += chunk.bytes();
+  }
+  LUCERNA_RETURN_IF_ERROR(FromGrpc(reader->Finish()));
+  if (Sha256(bytes) != digest) {
+    return absl::DataLossError(absl::StrCat("bytes arrived that are not ", digest.Hex()));
+  }
+  return bytes;
+}
+
+StatusOr<v1::CommitOutcome> Connection::Commit(v1::CommitBatchRequest::Header header,
+                                               const std::string& bytes) {
+  Call call(*this, kTransferTime);
+  v1::CommitBatchResponse response;
+  const auto writer = stub_->CommitBatch(call.context(), &response);
+  v1::CommitBatchRequest part;
+  header.set_digest(std::string(Sha256(bytes).Bytes()));
+  header.set_size_bytes(bytes.size());
+  *part.mutable_header() = std::move(header);
+  // A write fails when the answer is there already; Finish then brings it.
+  bool is_open = writer->Write(part);
+  std::string_view rest = bytes;
+  for (std::string_view chunk = NextChunk(rest); is_open && !chunk.empty();
+       chunk = NextChunk(rest)) {
+    part.set_bytes(chunk.data(), chunk.size());
+    is_open = writer->Write(part);
+  }
+  writer->WritesDone();
+  LUCERNA_RETURN_IF_ERROR(FromGrpc(writer->Finish()));
+  return response.outcome();
+}
+
+Status Connection::Goodbye(const std::string& worker_id) {
+  grpc::ClientContext context;
+  context.set_deadline(std::chrono::system_clock::now() + kGoodbyeTime);
+  v1::GoodbyeRequest request;
+  request.set_worker_id(worker_id);
+  v1::GoodbyeResponse response;
+  return FromGrpc(stub_->Goodbye(&context, request, &response));
+}
+
+void Connection::BreakOff() {
+  const MutexLock lock(mutex_);
+  is_broken_off_ = true;
+  for (grpc::ClientContext* const context : calls_)
+    context->TryCancel();
+}
+
+StatusOr<LentBatch> ReadLease(const v1::Lease& message) {
+  LentBatch batch;
+  batch.lease_id = message.lease_id();
+  batch.job_id = message.job_id();
+  LUCERNA_ASSIGN_OR_RETURN(batch.scene, FromProto(message.scene()));
+  LUCERNA_ASSIGN_OR_RETURN(batch.settings, FromProto(message.settings()));
+  batch.pass = message.pass();
+  batch.first_photon = message.first_photon();
+  batch.last_photon = message.last_photon();
+  if (batch.first_photon >= batch.last_photon ||
+      batch.last_photon > static_cast<std::uint64_t>(batch.settings.photons_per_pass)) {
+    return absl::InvalidArgumentError("a lease's photons are not a range of its pass");
+  }
+  LUCERNA_ASSIGN_OR_RETURN(batch.block, Digest::FromBytes(message.block_digest()));
+  LUCERNA_ASSIGN_OR_RETURN(batch.radii, Digest::FromBytes(message.radii_digest()));
+  return batch;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,22 @@
+// What do the hitpoints find among the photons?
+#pragma once
+
+#include "render/base/parallel.h"
+#include "render/estimate/accumulation.h"
+#include "render/estimate/hitpoint_block.h"
+#include "render/estimate/kernel.h"
+#include "render/math/fixed_point.h"
+#include "render/scene/scene.h"
+#include "worker/photon_grid.h"
+
+namespace lucerna {
+
+// Every hitpoint adds up the photons within its radius that landed on its side of the surface:
+// kernel-weighted flux for diffuse ones, times BSDF × π for glossy ones. Fills everything of the
+// accumulation but the tally, of which it adds `pairs`. Pairs are independent of each other, so
+// neither threads nor the order of photons can be seen in the result.
+[[nodiscard]] Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
+                                  const PhotonGrid& grid, const std::vector<Material>& materials,
+                                  const Kernel& kernel, const FluxScale& scale, ThreadTeam& team);
+
+}  // namespace lucerna

@@ -1,0 +1,108 @@
+// A worker: asks its coordinator for batches of photons, traces them, and hands back what they
+// brought. Keeps nothing that cannot be fetched again.
+//
+// Exit: 0 after SIGTERM or SIGINT, 2 for wrong flags, 3 when no coordinator answers, 4 when the
+// coordinator refuses this worker, 1 for anything else.
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <string>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include "render/base/clock.h"
+#include "render/geometry/numeric_profile.h"
+#include "worker/session.h"
+
+namespace lucerna {
+namespace {
+
+constexpr int kExitFailed = 1;
+constexpr int kExitUsage = 2;
+constexpr int kExitUnreachable = 3;
+constexpr int kExitRefused = 4;
+constexpr long kSignalLookNanos = 100'000'000;
+
+int ExitCodeFor(const Status& status) {
+  if (status.ok()) return 0;
+  if (absl::IsUnavailable(status)) return kExitUnreachable;
+  if (absl::IsFailedPrecondition(status)) return kExitRefused;
+  return kExitFailed;
+}
+
+std::string WorkerName() {
+  char host[256] = "";
+  gethostname(host, sizeof(host) - 1);
+  return absl::StrCat(host, ":", getpid());
+}
+
+int Work(Session::Options options) {
+  // Both signals wait to be asked for, in this thread and in every thread it starts.
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+
+  Session session(std::move(options), SystemClock());
+  std::atomic<bool> has_ended = false;
+  std::thread listener([&] {
+    const timespec look = {0, kSignalLookNanos};
+    while (!has_ended) {
+      if (sigtimedwait(&signals, nullptr, &look) < 0) continue;
+      spdlog::info("ending");
+      session.Stop();
+      return;
+    }
+  });
+  const Status status = session.Run();
+  has_ended = true;
+  listener.join();
+  if (!status.ok()) {
+    std::fprintf(stderr, "lucerna-worker: %s\n", std::string(status.message()).c_str());
+  }
+  return ExitCodeFor(status);
+}
+
+int Main(int argc, char** argv) {
+  Session::Options options;
+  options.name = WorkerName();
+  options.numeric_profile = NumericProfile();
+  std::string log_level = "info";
+  double connect_timeout_s = 60;
+  options.server = "127.0.0.1:7400";
+  CLI::App app("Lucerna's worker: traces batches of photons for a coordinator.");
+  app.add_option("--server", options.server, "HOST:PORT of the coordinator")->capture_default_str();
+  app.add_option("--threads", options.threads, "threads to trace with; 0: all")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  app.add_option("--connect-timeout", connect_timeout_s,
+                 "how long to wait for a coordinator that does not answer [s]")
+      ->check(CLI::Range(0.0, 1e6))
+      ->capture_default_str();
+  app.add_option("--log-level", log_level, "debug, info, warn, error or off")
+      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitUsage;
+  }
+  options.connect_timeout =
+      std::chrono::duration_cast<Duration>(std::chrono::duration<double>(connect_timeout_s));
+  spdlog::set_default_logger(spdlog::stderr_color_mt("lucerna-worker"));
+  spdlog::set_level(spdlog::level::from_str(log_level));
+  return Work(std::move(options));
+}
+
+}  // namespace
+}  // namespace lucerna
+
+int main(int argc, char** argv) {
+  return lucerna::Main(argc, argv);
+}

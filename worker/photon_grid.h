@@ -1,0 +1,59 @@
+// Which photons are near a point?
+//
+// Deposits are sorted into the cells of a uniform grid (a counting sort), so that a hitpoint finds
+// its neighbours as a few runs of consecutive photons: cells along x are neighbours in memory.
+// The order inside a cell is that of the input.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render/base/parallel.h"
+#include "render/math/rgb.h"
+#include "render/math/vector.h"
+#include "worker/photon_path.h"
+
+namespace lucerna {
+
+// What a photon brings once it is known to be near: 32 bytes, half a cache line.
+struct alignas(32) PhotonRecord {
+  Rgb flux;
+  Vec3 normal;
+  std::uint32_t arrival_oct = 0;
+  std::uint32_t key = 0;
+};
+
+class PhotonGrid {
+ public:
+  // `region` holds all deposits. Cells are about `cell` wide [scene units], wider when there would
+  // be far more of them than deposits.
+  PhotonGrid(const std::vector<std::vector<Deposit>>& deposits, const Bounds& region, float cell,
+             ThreadTeam& team);
+
+  [[nodiscard]] std::size_t size() const { return records_.size(); }
+  [[nodiscard]] const PhotonRecord& record(std::size_t photon) const { return records_[photon]; }
+  [[nodiscard]] Vec3 position(std::size_t photon) const {
+    return {x_[photon], y_[photon], z_[photon]};
+  }
+
+  // Calls visit(photon, squared distance) for every photon closer to `center` than `radius`.
+  template <typename Visit>
+  void ForEachWithin(Vec3 center, float radius, const Visit& visit) const;
+
+ private:
+  [[nodiscard]] int CellOf(float offset, int cells) const {
+    const float cell = offset * inverse_cell_;
+    return cell > 0 ? std::min(static_cast<int>(std::min(cell, 1e9F)), cells - 1) : 0;
+  }
+
+  Vec3 low_;
+  float inverse_cell_ = 1;
+  int nx_ = 1, ny_ = 1, nz_ = 1;
+  std::vector<std::uint32_t> first_;  // [cells + 1] photon of each cell
+  std::vector<float> x_, y_, z_;      // [photons + 8], the rest far away
+  std::vector<PhotonRecord> records_;
+};
+
+}  // namespace lucerna
+
+#include "worker/photon_grid_inl.h"

@@ -1,0 +1,114 @@
+#include "worker/photon_path.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/math/octahedral.h"
+#include "render/math/rng.h"
+#include "render/math/sobol.h"
+
+namespace lucerna {
+namespace {
+
+// Flux is per true surface area, while the BSDF is meant for the smoothed surface: their ratio of
+// cosines keeps light and eye paths on equal terms (Veach 1997, section 5.3.2). It is bounded,
+// because a facet seen edge-on from one side only would carry it without end.
+constexpr float kMaxCosineRatio = 16;
+
+float CosineRatio(float shading_cosine, float geometric_cosine) {
+  return std::min(kMaxCosineRatio, std::abs(shading_cosine) /
+                                       std::max(std::abs(geometric_cosine), 1e-12F));
+}
+
+bool Inside(const Bounds& region, Vec3 p) {
+  return p.x >= region.low.x && p.x <= region.high.x && p.y >= region.low.y &&
+         p.y <= region.high.y && p.z >= region.low.z && p.z <= region.high.z;
+}
+
+}  // namespace
+
+PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& intersector,
+                                   const LightSet& lights, const RenderSettings& settings,
+                                   const Bounds& region)
+    : scene_(scene),
+      intersector_(intersector),
+      lights_(lights),
+      settings_(settings),
+      region_(region) {
+  for (const Material& material : scene.materials) {
+    gathers_.push_back(Gathers(material) ? 1 : 0);
+  }
+}
+
+int PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index,
+                            std::vector<Deposit>& deposits, std::uint64_t& dropped) const {
+  constexpr std::uint64_t kPhotonKey = 0x50484F544F4E5321ULL;
+  const std::uint64_t job_key = CombineKeys(settings_.seed, kPhotonKey);
+  // One sequence over all passes: they share a job's photons out evenly between them.
+  const std::uint64_t number =
+      pass * static_cast<std::uint64_t>(settings_.photons_per_pass) + index;
+  const SobolPoint u = OwenSobol(number, job_key);
+  KeyedRng rng(CombineKeys(job_key, number));
+
+  Emission emission;
+  if (!lights_.SampleEmission(u[4], u[0], u[1], u[2], u[3], emission)) return 0;
+  Ray ray = emission.ray;
+  Rgb flux = emission.flux;
+  int rays = 0;
+  for (int landing = 0; landing < settings_.max_depth; ++landing) {
+    Hit hit;
+    ++rays;
+    if (!intersector_.Intersect(ray, hit)) return rays;
+    const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+    const Material& material = scene_.materials[surface.material];
+    const Vec3 wo = -ray.direction;
+    if (surface.has_shading_normal) {
+      flux *= CosineRatio(Dot(wo, surface.shading_normal), Dot(wo, surface.geometric_normal));
+    }
+    if (!(MaxChannel(flux) < HUGE_VALF) || !IsFinite(surface.position)) {
+      ++dropped;
+      return rays;
+    }
+    if (landing > 0 && gathers_[surface.material] != 0 && Inside(region_, surface.position)) {
+      deposits.push_back({surface.position, flux, FaceForward(surface.geometric_normal, wo),
+                          EncodeOctahedral(wo), static_cast<std::uint32_t>(rng.Bits() >> 32)});
+    }
+    if (landing + 1 == settings_.max_depth) return rays;
+
+    float u_lobe = u[7];
+    float u1 = u[5];
+    float u2 = u[6];
+    if (landing > 0) {
+      u_lobe = rng.Uniform();
+      u1 = rng.Uniform();
+      u2 = rng.Uniform();
+    }
+    const Frame frame(surface.shading_normal);
+    BsdfSample sample;
+    if (!SampleBsdf(material, frame.ToLocal(wo), u_lobe, u1, u2, Carried::kFlux, sample)) {
+      return rays;
+    }
+    const Vec3 wi = frame.ToWorld(sample.wi);
+    Rgb scattered = flux * sample.weight;
+    if (surface.has_shading_normal) {
+      const float geometric = Dot(wi, surface.geometric_normal);
+      const bool transmits = Dot(wo, frame.n) * sample.wi.z < 0;
+      const bool crosses = Dot(wo, surface.geometric_normal) * geometric < 0;
+      if (transmits != crosses) return rays;
+      scattered *= 1 / std::max(CosineRatio(sample.wi.z, geometric), 1 / kMaxCosineRatio);
+    }
+    // Survives with the share of flux that is left, and then has the flux it came with.
+    const float before = MaxChannel(flux);
+    const float survival = MaxChannel(scattered) / before;
+    if (!(survival > 0)) return rays;
+    if (survival < 1) {
+      if (!(rng.Uniform() < survival)) return rays;
+      scattered *= 1 / survival;
+    }
+    flux = scattered;
+    ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
+  }
+  return rays;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,70 @@
+#include "worker/scene_cache.h"
+
+#include <algorithm>
+
+#include "render/scene/pbrt_parser.h"
+#include "render/wire/block_codec.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::size_t kTracersKept = 2;
+// Two passes may be open, and workers fetch one ahead.
+constexpr std::size_t kBlocksKept = 3;
+// What a hitpoint and its radius may need at most before compression, which cannot double it.
+constexpr std::uint64_t kBytesPerHitpoint = 80;
+constexpr std::uint64_t kHeadBytes = 4096;
+
+// The value kept for `digest`, moved to the front; nullptr when there is none.
+template <typename Kept>
+auto Find(Kept& kept, const Digest& digest) {
+  const auto found = std::find_if(kept.begin(), kept.end(),
+                                  [&](const auto& entry) { return entry.first == digest; });
+  if (found == kept.end()) return typename Kept::value_type::second_type();
+  std::rotate(kept.begin(), found, found + 1);
+  return kept.front().second;
+}
+
+}  // namespace
+
+StatusOr<std::shared_ptr<BatchTracer>> SceneCache::TracerFor(const SceneManifest& scene) {
+  const Digest digest = scene.SceneDigest();
+  if (auto tracer = Find(tracers_, digest)) return tracer;
+  // The oldest goes first: three scenes at once may be more than memory holds.
+  while (tracers_.size() >= kTracersKept)
+    tracers_.pop_back();
+  // The parser would report a broken connection as an error of the scene.
+  Status fetched;
+  ManifestFiles files(scene, [&](const Digest& file) {
+    StatusOr<std::string> bytes = fetch_(file, SceneLimits().max_total_bytes);
+    fetched.Update(bytes.status());
+    return bytes;
+  });
+  ParsedScene parsed = ParsePbrt(files, scene.main_path);
+  LUCERNA_RETURN_IF_ERROR(fetched);
+  LUCERNA_RETURN_IF_ERROR(parsed.ToStatus());
+  LUCERNA_ASSIGN_OR_RETURN(std::shared_ptr<BatchTracer> tracer,
+                           BatchTracer::Create(std::move(parsed.scene), threads_));
+  tracers_.emplace_front(digest, tracer);
+  return tracer;
+}
+
+StatusOr<std::shared_ptr<const HitpointBlock>> SceneCache::BlockFor(const Digest& digest,
+                                                                    std::size_t max_hitpoints) {
+  if (auto block = Find(blocks_, digest)) return block;
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes,
+                           fetch_(digest, kHeadBytes + kBytesPerHitpoint * max_hitpoints));
+  LUCERNA_ASSIGN_OR_RETURN(HitpointBlock decoded, DecodeHitpointBlock(bytes, max_hitpoints));
+  std::shared_ptr<const HitpointBlock> block = std::make_shared<HitpointBlock>(std::move(decoded));
+  blocks_.emplace_front(digest, block);
+  if (blocks_.size() > kBlocksKept) blocks_.pop_back();
+  return block;
+}
+
+StatusOr<RadiusColumn> SceneCache::RadiiFor(const Digest& digest, std::size_t hitpoints) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes,
+                           fetch_(digest, kHeadBytes + kBytesPerHitpoint * hitpoints));
+  return DecodeRadii(bytes, hitpoints);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,50 @@
+// Which scenes and hitpoint blocks does this worker still hold?
+//
+// Everything a batch needs is named by digest, and what a worker holds is only a cache: the
+// tracers of the last two scenes, each with its acceleration structure, and the last hitpoint
+// blocks.
+//
+// Threads: one; what it returns may be used by another for as long as it is held.
+#pragma once
+
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "render/base/digest.h"
+#include "render/base/status.h"
+#include "render/estimate/hitpoint_block.h"
+#include "render/scene/scene_files.h"
+#include "worker/batch_tracer.h"
+
+namespace lucerna {
+
+class SceneCache {
+ public:
+  // The bytes of a digest, at most so many.
+  using Fetch = std::function<StatusOr<std::string>(const Digest& digest, std::uint64_t max_bytes)>;
+
+  SceneCache(int threads, Fetch fetch) : threads_(threads), fetch_(std::move(fetch)) {}
+
+  // Errors: what fetching, reading the scene or building the tracer said.
+  [[nodiscard]] StatusOr<std::shared_ptr<BatchTracer>> TracerFor(const SceneManifest& scene);
+  // Errors: what fetching said, INVALID_ARGUMENT for bytes that are no block.
+  [[nodiscard]] StatusOr<std::shared_ptr<const HitpointBlock>> BlockFor(const Digest& digest,
+                                                                        std::size_t max_hitpoints);
+  // Radii are used once and not kept.
+  [[nodiscard]] StatusOr<RadiusColumn> RadiiFor(const Digest& digest, std::size_t hitpoints);
+
+ private:
+  template <typename Value>
+  using Kept = std::deque<std::pair<Digest, std::shared_ptr<Value>>>;  // newest first
+
+  const int threads_;
+  const Fetch fetch_;
+  Kept<BatchTracer> tracers_;
+  Kept<const HitpointBlock> blocks_;
+};
+
+}  // namespace lucerna
