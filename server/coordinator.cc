@@ -1,7 +1,6 @@
 #include "server/coordinator.h"
 
 #include <algorithm>
-#include <charconv>
 #include <ctime>
 #include <utility>
 

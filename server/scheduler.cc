@@ -190,11 +190,12 @@ std::optional<BatchLease> Scheduler::Lend(const std::string& worker_id, SteadyTi
   for (auto& [key, pass] : passes_) {
     if (!pass.returned.empty()) {
       // One that this worker has not failed at, if there is one.
-      auto choice =
-          std::find_if(pass.returned.begin(), pass.returned.end(), [&](const PhotonRange& range) {
-            const auto losses = pass.losses.find(range);
-            return losses == pass.losses.end() || !losses->second.workers.contains(worker_id);
-          });
+      const std::map<PhotonRange, Losses>& losses = pass.losses;
+      const auto is_new_to_worker = [&](const PhotonRange& range) {
+        const auto found = losses.find(range);
+        return found == losses.end() || !found->second.workers.contains(worker_id);
+      };
+      auto choice = std::find_if(pass.returned.begin(), pass.returned.end(), is_new_to_worker);
       if (choice == pass.returned.end()) choice = pass.returned.begin();
       const PhotonRange range = *choice;
       pass.returned.erase(choice);

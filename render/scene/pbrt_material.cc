@@ -5,7 +5,7 @@
 
 #include "render/scene/optical_constants.h"
 #include "render/scene/scene_builder.h"
-#include "render/scene/text.h"
+#include "render/base/text.h"
 
 namespace lucerna {
 namespace {

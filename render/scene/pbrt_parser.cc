@@ -17,7 +17,7 @@
 #include "render/scene/parameter_list.h"
 #include "render/scene/ply_file.h"
 #include "render/scene/scene_builder.h"
-#include "render/scene/text.h"
+#include "render/base/text.h"
 #include "render/scene/tokenizer.h"
 
 namespace lucerna {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "render/scene/scene_builder.h"
-#include "render/scene/text.h"
+#include "render/base/text.h"
 
 namespace lucerna {
 namespace {

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "render/scene/scene_builder.h"
-#include "render/scene/text.h"
+#include "render/base/text.h"
 
 namespace lucerna {
 namespace {

@@ -16,7 +16,7 @@
 #include "absl/strings/numbers.h"
 #include <zlib.h>
 
-#include "render/scene/text.h"
+#include "render/base/text.h"
 
 namespace lucerna {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "render/scene/text.h"
+#include "render/base/text.h"
 
 namespace lucerna {
 namespace {

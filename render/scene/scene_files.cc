@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "render/base/files.h"
-#include "render/scene/text.h"
+#include "render/base/text.h"
 
 namespace lucerna {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "render/scene/text.h"
+#include "render/base/text.h"
 
 namespace lucerna {
 namespace {

@@ -26,9 +26,9 @@ TEST(DigestTest, DoesNotDependOnThePieces) {
 TEST(DigestTest, ComesBackFromHexAndBytes) {
   const Digest digest = Sha256("abc");
   EXPECT_EQ(Digest::FromHex(digest.Hex()).value(), digest);
-  EXPECT_EQ(Digest::FromHex("BA7816BF8F01CFEA414140DE5DAE2223B00361A396177A9CB410FF61F20015AD")
-                .value(),
-            digest);
+  EXPECT_EQ(
+      Digest::FromHex("BA7816BF8F01CFEA414140DE5DAE2223B00361A396177A9CB410FF61F20015AD").value(),
+      digest);
   EXPECT_EQ(Digest::FromBytes(digest.Bytes()).value(), digest);
 }
 

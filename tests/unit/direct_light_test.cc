@@ -34,7 +34,8 @@ double VisibleShare(const Scene& scene, Vec3 from) {
   int rays = 0;
   for (int i = 0; i < kSamples; ++i) {
     SobolPoint u{};
-    for (float& number : u) number = rng.Uniform();
+    for (float& number : u)
+      number = rng.Uniform();
     seen += IsBlack(LightSampledRadiance(*intersector, lights, point, u, rays)) ? 0 : 1;
   }
   return static_cast<double>(seen) / kSamples;

@@ -1,14 +1,13 @@
 // A file is written whole or not at all, and every failure names the file and the reason.
 #include "render/base/files.h"
 
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cstdlib>
 #include <filesystem>
 #include <string>
 
 #include "gtest/gtest.h"
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace lucerna {
 namespace {
@@ -25,7 +24,8 @@ class FilesTest : public testing::Test {
   [[nodiscard]] std::string Path(const std::string& name) const { return folder_ + "/" + name; }
   [[nodiscard]] std::size_t FilesInFolder() const {
     std::size_t count = 0;
-    for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder_)) ++count;
+    for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder_))
+      ++count;
     return count;
   }
 

@@ -106,7 +106,8 @@ TEST(SphereTest, TurnsItsNormalInwardWhenAsked) {
     Hit hit;
     ASSERT_TRUE(intersector->Intersect(ray, hit));
     EXPECT_FLOAT_EQ(hit.t, 10);
-    EXPECT_EQ(intersector->SurfaceAt(ray, hit).geometric_normal, (Vec3{0, 0, inward ? 1.0F : -1.0F}));
+    EXPECT_EQ(intersector->SurfaceAt(ray, hit).geometric_normal,
+              (Vec3{0, 0, inward ? 1.0F : -1.0F}));
     EXPECT_FALSE(intersector->Intersect({ray.origin, ray.direction, 9.99F}, hit));
   }
 }
@@ -197,7 +198,8 @@ TEST_P(LeavingPointTest, IsOffTheSurface) {
     const int kind = shape % 3;
     if (kind == 0) {
       TriangleMesh mesh;
-      for (int i = 0; i < 3; ++i) mesh.positions.push_back(center + RandomPoint(rng, scale));
+      for (int i = 0; i < 3; ++i)
+        mesh.positions.push_back(center + RandomPoint(rng, scale));
       mesh.indices = {0, 1, 2};
       scene.meshes.push_back(mesh);
     } else if (kind == 1) {
@@ -240,8 +242,8 @@ TEST_P(LeavingPointTest, IsOffTheSurface) {
 }
 INSTANTIATE_TEST_SUITE_P(Scales, LeavingPointTest,
                          testing::Values(Leaving{1, 0}, Leaving{1, 10}, Leaving{1, 1000},
-                                         Leaving{1e-3F, 0}, Leaving{1e-3F, 1000},
-                                         Leaving{1e5F, 0}, Leaving{1e5F, 10}));
+                                         Leaving{1e-3F, 0}, Leaving{1e-3F, 1000}, Leaving{1e5F, 0},
+                                         Leaving{1e5F, 10}));
 
 TEST(IntersectorTest, GivesEveryThreadTheSameHits) {
   Scene scene;

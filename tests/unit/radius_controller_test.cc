@@ -51,8 +51,8 @@ TEST(PpmTest, KeepsTheDensityOverManyPasses) {
     const float r = pixel.radius;
     pixel = ppm->Next(pixel, {100.0 * static_cast<double>(r) * static_cast<double>(r), r}, pass);
     ASSERT_LT(pixel.radius, r);
-    const double density =
-        static_cast<double>(pixel.photons) / (static_cast<double>(pixel.radius) * static_cast<double>(pixel.radius));
+    const double density = static_cast<double>(pixel.photons) /
+                           (static_cast<double>(pixel.radius) * static_cast<double>(pixel.radius));
     ASSERT_NEAR(density / (100.0 * static_cast<double>(pass + 1)), 1, 1e-4) << pass;
   }
 }

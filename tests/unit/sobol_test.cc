@@ -20,7 +20,8 @@ using PointFunction = SobolPoint (*)(std::uint64_t, std::uint64_t);
 std::vector<SobolPoint> FirstPoints(PointFunction point, std::uint64_t begin, int k,
                                     std::uint64_t key) {
   std::vector<SobolPoint> points;
-  for (std::uint64_t i = 0; i < (std::uint64_t{1} << k); ++i) points.push_back(point(begin + i, key));
+  for (std::uint64_t i = 0; i < (std::uint64_t{1} << k); ++i)
+    points.push_back(point(begin + i, key));
   return points;
 }
 
@@ -63,8 +64,8 @@ TEST_P(SobolTest, StratifiesThePairsThatAreUsedTogether) {
     std::size_t a, b;
     int t;
   };
-  for (const Pair pair : {Pair{0, 1, 0}, Pair{2, 3, 2}, Pair{4, 5, 3}, Pair{5, 6, 3},
-                          Pair{1, 2, 1}}) {
+  for (const Pair pair :
+       {Pair{0, 1, 0}, Pair{2, 3, 2}, Pair{4, 5, 3}, Pair{5, 6, 3}, Pair{1, 2, 1}}) {
     for (int k = pair.t; k <= 12; ++k) {
       const auto points = FirstPoints(GetParam(), 0, k, 99);
       for (int along = 0; along <= k - pair.t; ++along) {
@@ -92,7 +93,8 @@ TEST_P(SobolTest, KeysAreStrangers) {
   constexpr std::size_t kSide = 16;
   const double level = SidakLevel(1e-3, 8 * 7 / 2 + 8);
   std::vector<SobolPoint> points;
-  for (std::uint64_t key = 0; key <= kKeys; ++key) points.push_back(GetParam()(3, key));
+  for (std::uint64_t key = 0; key <= kKeys; ++key)
+    points.push_back(GetParam()(3, key));
   const auto p_value = [&](std::size_t a, std::size_t b, std::size_t shift) {
     std::vector<double> observed(kSide * kSide);
     const std::vector<double> expected(kSide * kSide, static_cast<double>(kKeys) / (kSide * kSide));

@@ -36,7 +36,8 @@ TEST(PixelStatisticsTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
     if (m > 0) {
       accumulation.hitpoints = {0};
       accumulation.counts = {m};
-      for (auto& channel : accumulation.flux) channel = {quanta};
+      for (auto& channel : accumulation.flux)
+        channel = {quanta};
     }
     PassSums sums(1);
     ASSERT_TRUE(sums.Add(accumulation).ok());
@@ -66,7 +67,8 @@ TEST(PixelStatisticsTest, CountsAPassWithoutHitpointAsDark) {
   Accumulation accumulation;
   accumulation.hitpoints = {0};
   accumulation.counts = {3};
-  for (auto& channel : accumulation.flux) channel = {8};
+  for (auto& channel : accumulation.flux)
+    channel = {8};
   ASSERT_TRUE(sums.Add(accumulation).ok());
   const RadiusColumn radii = statistics.Radii(rows);
   ASSERT_EQ(radii[0], 0.5F);
@@ -90,7 +92,8 @@ TEST(PassSumsTest, TakesOutWhatItTookInAndRefusesWhatBreaksItsPromises) {
   Accumulation a;
   a.hitpoints = {0, 2};
   a.counts = {1, 2};
-  for (auto& channel : a.flux) channel = {5, -7};
+  for (auto& channel : a.flux)
+    channel = {5, -7};
   a.tally.pairs = 3;
   PassSums sums(3);
   ASSERT_TRUE(sums.Add(a).ok());

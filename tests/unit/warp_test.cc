@@ -29,8 +29,8 @@ TEST(WarpTest, DiskIsUniform) {
     const double squared = static_cast<double>(LengthSquared(p));
     ASSERT_LT(squared, 1 + 1e-6);
     ASSERT_EQ(p.z, 0);
-    const double turn = (std::atan2(static_cast<double>(p.y), static_cast<double>(p.x)) + kPiD) /
-                        (2 * kPiD);
+    const double turn =
+        (std::atan2(static_cast<double>(p.y), static_cast<double>(p.x)) + kPiD) / (2 * kPiD);
     const auto ring = std::min(kSide - 1, static_cast<std::size_t>(squared * kSide));
     const auto sector = std::min(kSide - 1, static_cast<std::size_t>(turn * kSide));
     observed[ring * kSide + sector] += 1;
@@ -44,10 +44,10 @@ TEST(WarpTest, CosineHemisphereFollowsTheCosine) {
     d = SquareToCosineHemisphere(u1, u2);
     return true;
   };
-  EXPECT_GT(DirectionsPValue(
-                draw, [](Vec3 d) { return std::max(0.0, static_cast<double>(d.z)) / kPiD; },
-                kSamples, 2),
-            kLevel);
+  EXPECT_GT(
+      DirectionsPValue(
+          draw, [](Vec3 d) { return std::max(0.0, static_cast<double>(d.z)) / kPiD; }, kSamples, 2),
+      kLevel);
   // A uniform hemisphere must be refused.
   EXPECT_LT(DirectionsPValue(
                 draw, [](Vec3 d) { return d.z > 0 ? 1 / (2 * kPiD) : 0; }, kSamples, 2),
@@ -80,13 +80,12 @@ TEST_P(ConeTest, IsUniformAndUnit) {
     // 1 - cosine, by the sine: the cosine of a narrow cone has no digits left.
     const double sine2 = static_cast<double>(d.x) * static_cast<double>(d.x) +
                          static_cast<double>(d.y) * static_cast<double>(d.y);
-    const double cosine = std::copysign(std::sqrt(std::max(0.0, 1 - sine2)),
-                                        static_cast<double>(d.z));
+    const double cosine =
+        std::copysign(std::sqrt(std::max(0.0, 1 - sine2)), static_cast<double>(d.z));
     const double height = d.z > 0 ? sine2 / (1 + cosine) : 1 - cosine;
-    const double turn = (std::atan2(static_cast<double>(d.y), static_cast<double>(d.x)) + kPiD) /
-                        (2 * kPiD);
-    const auto ring =
-        std::min(kSide - 1, static_cast<std::size_t>(height / GetParam() * kSide));
+    const double turn =
+        (std::atan2(static_cast<double>(d.y), static_cast<double>(d.x)) + kPiD) / (2 * kPiD);
+    const auto ring = std::min(kSide - 1, static_cast<std::size_t>(height / GetParam() * kSide));
     const auto sector = std::min(kSide - 1, static_cast<std::size_t>(turn * kSide));
     observed[ring * kSide + sector] += 1;
   }
@@ -110,8 +109,8 @@ TEST(WarpTest, TriangleIsUniform) {
     ASSERT_LE(b1 + b2, 1 + 1e-6F);
     const int column = std::min(kRows - 1, static_cast<int>(b1 * kRows));
     const int row = std::min(kRows - 1, static_cast<int>(b2 * kRows));
-    const bool upper = b1 * kRows - static_cast<float>(column) +
-                           (b2 * kRows - static_cast<float>(row)) > 1;
+    const bool upper =
+        b1 * kRows - static_cast<float>(column) + (b2 * kRows - static_cast<float>(row)) > 1;
     // Lower triangles lie on and under the diagonal, upper ones strictly under it: both kinds
     // together are kRows² of one area. They are numbered row by row.
     const int before = row * (2 * kRows - row);

@@ -1,7 +1,7 @@
 // How are words put together and taken apart?
 //
-// Debian's Abseil has a string_view of its own that std::string_view does not turn into, so what
-// the scene floor needs of absl/strings goes through here.
+// Debian's Abseil has a string_view of its own that std::string_view does not turn into; where
+// views meet absl/strings, they go through here.
 #pragma once
 
 #include <string>

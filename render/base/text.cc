@@ -1,4 +1,4 @@
-#include "render/scene/text.h"
+#include "render/base/text.h"
 
 #include <cstddef>
 

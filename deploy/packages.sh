@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Installs what Lucerna is built from and runs on, on Debian 12. Packages that are there already
+# cost nothing: without a missing one, apt-get is not even asked.
+set -euo pipefail
+
+packages=(
+  g++ cmake ninja-build ccache mold pkg-config
+  libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc libssl-dev
+  libembree-dev libtbb-dev
+  libopenexr-dev libstb-dev zlib1g-dev
+  libspdlog-dev libzstd-dev libcli11-dev nlohmann-json3-dev
+)
+if [ "${1:-}" = tests ]; then
+  packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3)
+fi
+
+missing=()
+for package in "${packages[@]}"; do
+  dpkg-query --show --showformat '${db:Status-Status}\n' "$package" 2>/dev/null |
+    grep --quiet '^installed$' || missing+=("$package")
+done
+if [ ${#missing[@]} -gt 0 ]; then
+  as_root=()
+  [ "$(id -u)" = 0 ] || as_root=(sudo)
+  echo "installing ${#missing[@]} packages: ${missing[*]}"
+  "${as_root[@]}" apt-get update --quiet
+  DEBIAN_FRONTEND=noninteractive "${as_root[@]}" apt-get install --yes --quiet \
+    --no-install-recommends "${missing[@]}"
+fi

@@ -1,0 +1,13 @@
+#!/usr/bin/env bash
+# Builds everything and runs every test, on a fresh Debian 12 machine too:
+#   bash tests/run.sh [flags of ctest]
+# Fails when anything fails. Tests that use the scenes beside the project are skipped, and say so,
+# where those are absent.
+set -euo pipefail
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+bash "$root/deploy/packages.sh" tests
+cd "$root"
+cmake --preset release -D LUCERNA_BUILD_TESTS=ON
+cmake --build --preset release
+# Tests that start processes share the machine's cores with nobody.
+exec ctest --preset release --parallel 1 "$@"

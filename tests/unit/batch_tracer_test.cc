@@ -1,0 +1,163 @@
+// What a batch brings depends on its photons alone: not on threads, nor on how a range is cut.
+#include "worker/batch_tracer.h"
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "gtest/gtest.h"
+
+#include "render/base/clock.h"
+#include "render/math/octahedral.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+// A lamp in a glass ball in a white box.
+Scene GlassLamp() {
+  Scene scene;
+  const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.7F));
+  const std::int32_t glass = AddMaterial(scene, DielectricMaterial(1.5F));
+  const std::int32_t black = AddMaterial(scene, DiffuseMaterial(0));
+  AddBox(scene, {-1, -1, -1}, {1, 1, 1}, white);
+  AddSphere(scene, {0.1F, 0, 0.2F}, 0.3F, glass);
+  AddSphere(scene, {0.1F, 0, 0.2F}, 0.1F, black, AddAreaLight(scene, 10));
+  SetCamera(scene, {0, 0, 0.9}, {0, 0, 0}, {0, 1, 0}, 60, 8);
+  return scene;
+}
+
+// A lattice of hitpoints on the floor z = -1.
+HitpointBlock FloorBlock(int side) {
+  HitpointBlock block;
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const auto at = [&](int i) {
+        return 2 * (static_cast<float>(i) + 0.5F) / static_cast<float>(side) - 1;
+      };
+      block.positions.push_back({at(x), at(y), -1});
+      block.normals_oct.push_back(EncodeOctahedral({0, 0, 1}));
+    }
+  }
+  return block;
+}
+
+struct Fixture {
+  Scene scene = GlassLamp();
+  RenderSettings settings = TestSettings(scene, 20000, 0.1, 6);
+  HitpointBlock block = FloorBlock(40);
+  RadiusColumn radii = RadiusColumn(block.size(), 0.07F);
+  std::atomic<bool> stop = false;
+
+  Accumulation Run(int threads, std::uint64_t pass, std::uint64_t first, std::uint64_t last) {
+    const auto tracer = BatchTracer::Create(scene, threads).value();
+    return tracer->Run(settings, pass, first, last, block, radii, stop).value();
+  }
+};
+
+TEST(BatchTracerTest, GivesTheSameForAnyThreadsAndCuts) {
+  Fixture f;
+  PassSums whole(f.block.size());
+  const Accumulation one = f.Run(1, 3, 0, 20000);
+  ASSERT_TRUE(whole.Add(one).ok());
+  EXPECT_EQ(f.Run(3, 3, 0, 20000), one);
+  EXPECT_EQ(one.tally.photons, 20000U);
+  EXPECT_GT(one.size(), f.block.size() / 2);
+  EXPECT_GT(one.tally.deposits, 0U);
+  EXPECT_GT(one.tally.rays, 20000U);
+  EXPECT_EQ(one.tally.dropped, 0U);
+
+  PassSums parts(f.block.size());
+  const std::uint64_t cuts[] = {0, 1, 2049, 7000, 7000, 19999, 20000};
+  for (std::size_t i = 0; i + 1 < std::size(cuts); ++i) {
+    ASSERT_TRUE(parts.Add(f.Run(i % 2 == 0 ? 2 : 1, 3, cuts[i], cuts[i + 1])).ok());
+  }
+  EXPECT_EQ(parts.counts(), whole.counts());
+  for (int c = 0; c < 3; ++c)
+    EXPECT_EQ(parts.flux(c), whole.flux(c));
+  EXPECT_EQ(parts.tally(), whole.tally());
+}
+
+TEST(BatchTracerTest, GivesOtherPhotonsToOtherPassesAndSeeds) {
+  Fixture f;
+  const Accumulation first = f.Run(1, 0, 0, 5000);
+  EXPECT_NE(f.Run(1, 1, 0, 5000), first);
+  f.settings.seed = 77;
+  EXPECT_NE(f.Run(1, 0, 0, 5000), first);
+}
+
+// Parts of 2^20 photons are merged inside one call.
+TEST(BatchTracerTest, MergesTheLargePartsOfARange) {
+  Fixture f;
+  f.settings.photons_per_pass = 1 << 21;
+  constexpr std::uint64_t kPart = std::uint64_t{1} << 20;
+  PassSums whole(f.block.size());
+  PassSums parts(f.block.size());
+  ASSERT_TRUE(whole.Add(f.Run(2, 0, kPart - 1000, 2 * kPart + 500)).ok());
+  ASSERT_TRUE(parts.Add(f.Run(2, 0, kPart - 1000, kPart + 100)).ok());
+  ASSERT_TRUE(parts.Add(f.Run(2, 0, kPart + 100, 2 * kPart + 500)).ok());
+  EXPECT_EQ(parts.counts(), whole.counts());
+  for (int c = 0; c < 3; ++c)
+    EXPECT_EQ(parts.flux(c), whole.flux(c));
+}
+
+TEST(BatchTracerTest, TakesEmptyRangesAndBlocks) {
+  Fixture f;
+  EXPECT_EQ(f.Run(1, 0, 5, 5).size(), 0U);
+  f.block = {};
+  f.radii = {};
+  const Accumulation nothing = f.Run(1, 0, 0, 100);
+  EXPECT_EQ(nothing.size(), 0U);
+  EXPECT_EQ(nothing.tally.photons, 100U);
+}
+
+TEST(BatchTracerTest, RefusesColumnsThatDoNotFit) {
+  Fixture f;
+  const auto tracer = BatchTracer::Create(f.scene, 1).value();
+  const auto code = [&](const HitpointBlock& block, const RadiusColumn& radii) {
+    return tracer->Run(f.settings, 0, 0, 10, block, radii, f.stop).status().code();
+  };
+  RadiusColumn radii = f.radii;
+  radii.pop_back();
+  EXPECT_EQ(code(f.block, radii), absl::StatusCode::kInvalidArgument);
+  for (const float bad : {0.0F, -1.0F, HUGE_VALF, NAN}) {
+    radii = f.radii;
+    radii[7] = bad;
+    EXPECT_EQ(code(f.block, radii), absl::StatusCode::kInvalidArgument) << bad;
+  }
+  HitpointBlock block = f.block;
+  block.glossy = {{5, 0, 0, 0}, {5, 0, 0, 0}};
+  EXPECT_EQ(code(block, f.radii), absl::StatusCode::kInvalidArgument);
+  block.glossy = {{5, 99, 0, 0}};
+  EXPECT_EQ(code(block, f.radii), absl::StatusCode::kInvalidArgument);
+}
+
+TEST(BatchTracerTest, GivesUpWhenStoppedBeforeItStarts) {
+  Fixture f;
+  f.stop = true;
+  const auto tracer = BatchTracer::Create(f.scene, 2).value();
+  EXPECT_EQ(tracer->Run(f.settings, 0, 0, 20000, f.block, f.radii, f.stop).status().code(),
+            absl::StatusCode::kCancelled);
+}
+
+// With radii as large as the room every photon meets every hitpoint, and gathering takes far
+// longer than tracing: a worker that is asked to leave must not finish it first.
+TEST(BatchTracerTest, GivesUpSoonAlsoWhileHitpointsGather) {
+  Fixture f;
+  f.block = FloorBlock(300);
+  f.radii.assign(f.block.size(), 4);
+  const auto tracer = BatchTracer::Create(f.scene, 2).value();
+  std::thread stopper([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(400));
+    f.stop = true;
+  });
+  const SteadyTime before = SystemClock().Steady();
+  const auto result = tracer->Run(f.settings, 0, 0, 20000, f.block, f.radii, f.stop);
+  const double waited_s = Seconds(SystemClock().Steady() - before);
+  stopper.join();
+  EXPECT_EQ(result.status().code(), absl::StatusCode::kCancelled);
+  EXPECT_LT(waited_s, 1.5);
+}
+
+}  // namespace
+}  // namespace lucerna

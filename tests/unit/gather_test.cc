@@ -1,0 +1,201 @@
+// Hitpoints add up exactly the photons that reach them, to the last bit.
+//
+// The oracle goes over all pairs, in the other order (photons first), with the same rounding of
+// each pair. Equality is exact, because integers are added.
+#include "worker/gather.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/math/octahedral.h"
+#include "render/math/rng.h"
+#include "render/math/warp.h"
+#include "render/transport/bsdf.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+struct Case {
+  std::vector<std::vector<Deposit>> deposits;
+  HitpointBlock block;
+  RadiusColumn radii;
+  Bounds region;
+  std::vector<Material> materials = {DiffuseMaterial(0.5F),
+                                     ConductorMaterial(Gray(0.2F), Gray(3), 0.4F, 0.3F),
+                                     DielectricMaterial(1.5F, 0.5F)};
+};
+
+Vec3 RandomDirection(KeyedRng& rng) {
+  const float u1 = rng.Uniform();
+  const float u2 = rng.Uniform();
+  return SquareToSphere(u1, u2);
+}
+
+Case RandomCase(int photons, int hitpoints, bool glossy, std::uint64_t key) {
+  Case out;
+  KeyedRng rng(key);
+  const auto point = [&] {
+    const float x = rng.Uniform();
+    const float y = rng.Uniform();
+    return Vec3{x, y, 0.05F * rng.Uniform()};
+  };
+  out.deposits.resize(4);
+  for (int i = 0; i < photons; ++i) {
+    Deposit deposit{};
+    deposit.position = point();
+    deposit.flux = {rng.Uniform(), 1e-4F * rng.Uniform(), 10};
+    deposit.normal = RandomDirection(rng);
+    deposit.arrival_oct = EncodeOctahedral(RandomDirection(rng));
+    deposit.key = static_cast<std::uint32_t>(rng.Bits());
+    out.region.Add(deposit.position);
+    out.deposits[static_cast<std::size_t>(i % 4)].push_back(deposit);
+  }
+  for (int i = 0; i < hitpoints; ++i) {
+    out.block.positions.push_back(point());
+    out.block.normals_oct.push_back(EncodeOctahedral(RandomDirection(rng)));
+    out.radii.push_back(std::pow(10.0F, -4 + 4 * rng.Uniform()));
+    if (glossy && i % 3 != 0) {
+      out.block.glossy.push_back({static_cast<std::uint32_t>(i), static_cast<std::uint32_t>(i % 3),
+                                  EncodeOctahedral(RandomDirection(rng)),
+                                  EncodeOctahedral(RandomDirection(rng))});
+    }
+  }
+  return out;
+}
+
+Accumulation GatherAll(const Case& input, const Kernel& kernel, const FluxScale& scale,
+                       int threads) {
+  ThreadTeam team(threads);
+  const PhotonGrid grid(input.deposits, input.region, 0.02F, team);
+  return Gather(input.block, input.radii, grid, input.materials, kernel, scale, team);
+}
+
+std::uint64_t PairBits(std::uint32_t key, std::uint32_t hitpoint) {
+  std::uint64_t x = (std::uint64_t{key} << 32 | hitpoint) * 0x9E3779B97F4A7C15ULL;
+  x = (x ^ (x >> 32)) * 0xD6E8FEB86659FD93ULL;
+  return x ^ (x >> 32);
+}
+
+// The sums of all hitpoints [counts, r, g, b], touched or not.
+std::vector<std::array<std::int64_t, 4>> Oracle(const Case& input, const Kernel& kernel,
+                                                const FluxScale& scale) {
+  std::vector<std::array<std::int64_t, 4>> sums(input.block.size());
+  std::vector<const GlossyHitpoint*> glossy(input.block.size());
+  for (const GlossyHitpoint& g : input.block.glossy)
+    glossy[g.hitpoint] = &g;
+  for (const auto& chunk : input.deposits) {
+    for (const Deposit& photon : chunk) {
+      for (std::size_t row = 0; row < sums.size(); ++row) {
+        const float radius = input.radii[row];
+        const float squared = LengthSquared(photon.position - input.block.positions[row]);
+        if (!(squared < radius * radius)) continue;
+        const Vec3 normal = DecodeOctahedral(input.block.normals_oct[row]);
+        const Vec3 to_photon = photon.position - input.block.positions[row];
+        Vec3 side = normal;
+        Rgb bsdf = Gray(1);
+        if (glossy[row] != nullptr) {
+          const Material& material = input.materials[glossy[row]->material];
+          if (material.kind == Material::Kind::kDielectric && Dot(photon.normal, normal) < 0) {
+            side = -normal;
+          }
+          const Frame frame(DecodeOctahedral(glossy[row]->shading_normal_oct));
+          bsdf =
+              EvaluateBsdf(material, frame.ToLocal(DecodeOctahedral(glossy[row]->to_eye_oct)),
+                           frame.ToLocal(DecodeOctahedral(photon.arrival_oct)), Carried::kRadiance);
+        }
+        const float cosine = Dot(photon.normal, side);
+        const bool hollow = Dot(to_photon, side) > 0 && Dot(to_photon, photon.normal) < 0;
+        if (cosine < (hollow ? -0.2F : 0.7F)) continue;
+        const float shape = kernel.Shape(squared * (1 / (radius * radius)));
+        const std::uint64_t bits = PairBits(photon.key, static_cast<std::uint32_t>(row));
+        ++sums[row][0];
+        for (int c = 0; c < 3; ++c) {
+          const float quanta = photon.flux[c] * bsdf[c] * scale.quanta_per_watt[c] * shape;
+          sums[row][static_cast<std::size_t>(c) + 1] += RoundDithered(
+              quanta, static_cast<std::uint32_t>((bits >> (21 * c)) & ((1U << 21) - 1)));
+        }
+      }
+    }
+  }
+  return sums;
+}
+
+void ExpectEqualsOracle(const Case& input, const Kernel& kernel) {
+  const FluxScale scale = FluxScale::ForPower({1, 1e-3F, 300});
+  const auto expected = Oracle(input, kernel, scale);
+  const Accumulation actual = GatherAll(input, kernel, scale, 1);
+  std::size_t i = 0;
+  std::uint64_t pairs = 0;
+  for (std::size_t row = 0; row < expected.size(); ++row) {
+    if (expected[row][0] == 0) continue;
+    ASSERT_LT(i, actual.size());
+    ASSERT_EQ(actual.hitpoints[i], row);
+    ASSERT_EQ(actual.counts[i], expected[row][0]);
+    for (std::size_t c = 0; c < 3; ++c)
+      ASSERT_EQ(actual.flux[c][i], expected[row][c + 1]) << row;
+    pairs += actual.counts[i];
+    ++i;
+  }
+  EXPECT_EQ(i, actual.size());
+  EXPECT_EQ(actual.tally.pairs, pairs);
+  EXPECT_EQ(GatherAll(input, kernel, scale, 3), actual);
+}
+
+TEST(GatherTest, EqualsTheSumOverAllPairs) {
+  for (const KernelKind kind : {KernelKind::kConstant, KernelKind::kEpanechnikov}) {
+    ExpectEqualsOracle(RandomCase(2000, 5000, /*glossy=*/false, 1), Kernel{kind});
+    ExpectEqualsOracle(RandomCase(1000, 2500, /*glossy=*/true, 2), Kernel{kind});
+  }
+}
+
+TEST(GatherTest, HandlesOnePhotonNoneAndFarHitpoints) {
+  ExpectEqualsOracle(RandomCase(1, 200, false, 3), Kernel{});
+  ExpectEqualsOracle(RandomCase(0, 200, true, 4), Kernel{});
+  Case far = RandomCase(500, 200, false, 5);
+  for (std::size_t i = 0; i < far.block.size(); i += 2) {
+    far.block.positions[i] = far.block.positions[i] + Vec3{100, -50, 3};
+    if (i % 4 == 0) far.radii[i] = 1000;
+  }
+  ExpectEqualsOracle(far, Kernel{});
+}
+
+TEST(GatherTest, DoesNotSeeTheOrderOfPhotons) {
+  Case forward = RandomCase(3000, 500, true, 6);
+  Case backward = forward;
+  std::ranges::reverse(backward.deposits);
+  for (auto& chunk : backward.deposits)
+    std::ranges::reverse(chunk);
+  const FluxScale scale = FluxScale::ForPower(Gray(1));
+  EXPECT_EQ(GatherAll(forward, Kernel{}, scale, 1), GatherAll(backward, Kernel{}, scale, 2));
+}
+
+// A wall's back keeps its photons to itself; the walls of a hollow corner share theirs, those of
+// an outward edge do not.
+TEST(GatherTest, TellsHollowCornersFromEdgesAndThinWalls) {
+  const auto count = [](Vec3 photon_position, Vec3 photon_normal) {
+    Case input;
+    Deposit deposit{};
+    deposit.position = photon_position;
+    deposit.flux = Gray(1);
+    deposit.normal = photon_normal;
+    input.deposits = {{deposit}};
+    input.region.Add(photon_position);
+    input.block.positions = {{0, 0, 0}};
+    input.block.normals_oct = {EncodeOctahedral({0, 0, 1})};
+    input.radii = {1};
+    return GatherAll(input, Kernel{}, FluxScale::ForPower(Gray(1)), 1).size();
+  };
+  EXPECT_EQ(count({0.1F, 0, 0}, {0, 0, 1}), 1U);
+  EXPECT_EQ(count({0.1F, 0, 0.1F}, {-1, 0, 0}), 1U) << "a wall that rises from the floor";
+  EXPECT_EQ(count({0.1F, 0, -0.1F}, {1, 0, 0}), 0U) << "the side of a box under its top";
+  EXPECT_EQ(count({0.1F, 0, 0.1F}, {1, 0, 0}), 0U) << "the back of a wall";
+  EXPECT_EQ(count({0.1F, 0, -0.01F}, {0, 0, -1}), 0U) << "the far side of a thin floor";
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,117 @@
+// A pixel draws its positions from its filter, and its numbers from sequences of its own.
+#include "server/pixel_sampler.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "tests/support/chi_square.h"
+
+namespace lucerna {
+namespace {
+
+PixelFilter Filter(PixelFilter::Kind kind, float radius) {
+  PixelFilter filter;
+  filter.kind = kind;
+  filter.radius_x = radius;
+  filter.radius_y = radius;
+  return filter;
+}
+
+// The weighted mean of g over the samples, and over the filter itself by midpoints.
+template <typename Shape, typename Test>
+void ExpectFilteredMean(const PixelFilter& filter, double radius, const Shape& shape,
+                        const Test& g) {
+  const FilterSampler sampler(filter, filter.radius_x);
+  constexpr int kSteps = 1 << 18;
+  double sampled = 0;
+  double expected = 0;
+  double norm = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    float weight = 1;
+    const float offset = sampler.Sample((static_cast<float>(i) + 0.5F) / kSteps, weight);
+    ASSERT_LE(std::abs(offset), filter.radius_x);
+    sampled += static_cast<double>(weight) * g(static_cast<double>(offset)) / kSteps;
+    const double x = radius * (2 * (i + 0.5) / kSteps - 1);
+    expected += shape(x) * g(x);
+    norm += shape(x);
+  }
+  EXPECT_NEAR(sampled, expected / norm, 2e-3);
+}
+
+TEST(FilterSamplerTest, HasTheMomentsOfItsFilter) {
+  const auto tests = {+[](double) { return 1.0; }, +[](double x) { return x; },
+                      +[](double x) { return x * x; }, +[](double x) { return std::exp(x); }};
+  for (const auto& g : tests) {
+    ExpectFilteredMean(
+        Filter(PixelFilter::Kind::kBox, 0.5F), 0.5, [](double) { return 1.0; }, g);
+    ExpectFilteredMean(
+        Filter(PixelFilter::Kind::kTriangle, 2), 2, [](double x) { return 2 - std::abs(x); }, g);
+    ExpectFilteredMean(
+        Filter(PixelFilter::Kind::kGaussian, 1.5F), 1.5,
+        [](double x) { return std::exp(-2 * x * x) - std::exp(-4.5); }, g);
+    // B = C = 1/3 over a radius of 2.
+    ExpectFilteredMean(
+        Filter(PixelFilter::Kind::kMitchell, 2), 2,
+        [](double x) {
+          x = std::abs(x);
+          return x < 1 ? 7 * x * x * x - 12 * x * x + 16.0 / 3
+                       : -7.0 / 3 * x * x * x + 12 * x * x - 20 * x + 32.0 / 3;
+        },
+        g);
+  }
+}
+
+TEST(FilterSamplerTest, TakesTheEndsOfItsRange) {
+  const FilterSampler sampler(Filter(PixelFilter::Kind::kGaussian, 1.5F), 1.5F);
+  float weight = 1;
+  EXPECT_GE(sampler.Sample(0, weight), -1.5F);
+  EXPECT_LE(sampler.Sample(std::nextafter(1.0F, 0.0F), weight), 1.5F);
+  EXPECT_TRUE(std::isfinite(weight));
+}
+
+TEST(PixelSamplerTest, StratifiesThePassesOfAPixel) {
+  constexpr int kPasses = 64;
+  std::vector<int> film(kPasses);
+  std::vector<int> light(kPasses);
+  for (std::uint64_t pass = 0; pass < kPasses; ++pass) {
+    const PixelSampler sampler(1, 17, pass);
+    ++film[static_cast<std::size_t>(sampler.ForCamera()[0] * kPasses)];
+    ++light[static_cast<std::size_t>(sampler.ForVertex(2)[4] * kPasses)];
+  }
+  EXPECT_EQ(*std::ranges::max_element(film), 1);
+  EXPECT_EQ(*std::ranges::max_element(light), 1);
+}
+
+// The numbers of one vertex against the same ones of another, and of the camera.
+TEST(PixelSamplerTest, KeepsVerticesAndPixelsApart) {
+  constexpr int kPasses = 16384;
+  constexpr std::size_t kSide = 16;
+  const std::vector<double> expected(kSide * kSide, static_cast<double>(kPasses) / (kSide * kSide));
+  const double level = SidakLevel(1e-3, 30);
+  const auto p_value = [&](const auto& first, const auto& second) {
+    std::vector<double> observed(kSide * kSide);
+    for (std::uint64_t pass = 0; pass < kPasses; ++pass) {
+      observed[static_cast<std::size_t>(first(pass) * kSide) * kSide +
+               static_cast<std::size_t>(second(pass) * kSide)] += 1;
+    }
+    return ChiSquarePValue(observed, expected);
+  };
+  const auto vertex = [](int number, std::uint64_t pixel) {
+    return [=](std::uint64_t pass) { return PixelSampler(1, pixel, pass).ForVertex(number)[1]; };
+  };
+  const auto camera = [](std::uint64_t pixel) {
+    return [=](std::uint64_t pass) { return PixelSampler(1, pixel, pass).ForCamera()[1]; };
+  };
+  for (int a = 0; a < 6; ++a) {
+    EXPECT_GT(p_value(camera(3), vertex(a, 3)), level) << a;
+    EXPECT_GT(p_value(vertex(a, 3), vertex(a, 4)), level) << a;
+    for (int b = a + 1; b < 6; ++b)
+      EXPECT_GT(p_value(vertex(a, 3), vertex(b, 3)), level) << a << b;
+  }
+}
+
+}  // namespace
+}  // namespace lucerna
