@@ -44,16 +44,11 @@ bool IsWorthAnotherAttempt(grpc::StatusCode code) {
   return code == grpc::StatusCode::UNAVAILABLE || code == grpc::StatusCode::CANCELLED;
 }
 
-void SetDeadline(grpc::ClientContext& context, Duration time) {
-  context.set_deadline(std::chrono::time_point_cast<std::chrono::system_clock::duration>(
-      SystemClock().Wall() + time));
-}
-
 // One open Watch: a thread reads, the owner takes the newest.
 class WatchStream {
  public:
   WatchStream(v1::JobService::Stub& jobs, const std::string& job_id) {
-    SetDeadline(context_, kWatchTime);
+    context_.set_deadline(DeadlineIn(kWatchTime));
     v1::WatchJobRequest request;
     request.set_job_id(job_id);
     reader_ = jobs.Watch(&context_, request);
@@ -130,7 +125,7 @@ Status ClientConnection::Retry(std::chrono::seconds time_for_one,
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     if (IsInterrupted()) return Interrupted();
     grpc::ClientContext context;
-    SetDeadline(context, time_for_one);
+    context.set_deadline(DeadlineIn(time_for_one));
     const grpc::Status status = call(context);
     if (status.ok()) return absl::OkStatus();
     if (IsInterrupted()) return Interrupted();
@@ -226,7 +221,7 @@ StatusOr<v1::Job> ClientConnection::Cancel(const std::string& job_id) {
   v1::Job job;
   // Also called to clean up after an interruption, so it does not ask whether there was one.
   grpc::ClientContext context;
-  SetDeadline(context, kCallTime);
+  context.set_deadline(DeadlineIn(kCallTime));
   const grpc::Status status = jobs_->Cancel(&context, request, &job);
   if (status.error_code() == grpc::StatusCode::UNAVAILABLE ||
       status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/math/rng.h"
+
 namespace lucerna {
 
 float PowerHeuristic(float drawn, float other) {
@@ -25,7 +27,7 @@ bool SidesAgree(const SurfacePoint& surface, Vec3 wo, Vec3 wi, bool transmits) {
 Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
                          const ShadingPoint& point, const SobolPoint& u, int& rays) {
   LightSample light;
-  if (!lights.SampleDirect(point.surface.position, u[3], u[4], u[5], light)) return {};
+  if (!lights.SampleDirect(point.surface.position, FineChoice(u[3], u[7]), u[4], u[5], light)) return {};
   const Vec3 wo = point.frame.ToLocal(point.wo);
   const Vec3 wi = point.frame.ToLocal(light.wi);
   const Rgb bsdf = EvaluateBsdf(point.material, wo, wi, Carried::kRadiance);
@@ -37,9 +39,10 @@ Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
   }
   if (IsBlack(radiance)) return {};
   ++rays;
-  // Short of the light by more than the light's own rounding.
-  const Ray shadow = {LeavingPoint(point.surface, light.wi), light.wi,
-                      light.distance * (1 - 1e-4F)};
+  // Both ends are clear of their surfaces, so nothing but a third surface can be met.
+  const Vec3 origin = LeavingPoint(point.surface, light.wi);
+  const Ray shadow = light.is_distant ? Ray{origin, light.wi, HUGE_VALF}
+                                      : Ray{origin, light.target - origin, 1};
   return intersector.Occluded(shadow) ? Rgb{} : radiance;
 }
 

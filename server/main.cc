@@ -87,7 +87,7 @@ int Serve(const Flags& flags) {
   spdlog::info("ending");
   coordinator.Close();
   jobs.Close();
-  server->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(1));
+  server->Shutdown(DeadlineIn(std::chrono::seconds(1)));
   server->Wait();
   return 0;
 }

@@ -25,7 +25,7 @@ class PixelSampler {
   [[nodiscard]] SobolPoint ForCamera() const { return OwenSobol(pass_, key_); }
 
   // For the path's vertex number `vertex`: scattering (0 lobe, 1, 2), light (3 choice, 4, 5),
-  // roulette (6).
+  // roulette (6), the finer part of the light's choice (7).
   [[nodiscard]] SobolPoint ForVertex(int vertex) const {
     const std::uint64_t key = CombineKeys(key_, static_cast<std::uint64_t>(vertex) + 1);
     if (vertex < kStratifiedVertices) return ShuffledOwenSobol(pass_, key);

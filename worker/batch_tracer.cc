@@ -61,8 +61,8 @@ float CellWidth(RadiusColumn radii) {
   return 2 * *middle;
 }
 
-// `more` summed into `sum`, row by row.
-Accumulation Merge(const Accumulation& sum, const Accumulation& more) {
+// The sum of both, row by row. Errors: OUT_OF_RANGE when a count does not fit.
+StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) {
   Accumulation out;
   out.tally = sum.tally;
   out.tally += more.tally;
@@ -78,7 +78,12 @@ Accumulation Merge(const Accumulation& sum, const Accumulation& more) {
     const bool from_b =
         a == sum.size() || (b < more.size() && more.hitpoints[b] <= sum.hitpoints[a]);
     out.hitpoints.push_back(from_a ? sum.hitpoints[a] : more.hitpoints[b]);
-    out.counts.push_back((from_a ? sum.counts[a] : 0) + (from_b ? more.counts[b] : 0));
+    const std::uint64_t count = (from_a ? std::uint64_t{sum.counts[a]} : 0) +
+                                (from_b ? std::uint64_t{more.counts[b]} : 0);
+    if (count > UINT32_MAX) {
+      return absl::OutOfRangeError("a hitpoint has more photons than a batch can count");
+    }
+    out.counts.push_back(static_cast<std::uint32_t>(count));
     for (std::size_t c = 0; c < 3; ++c) {
       out.flux[c].push_back((from_a ? sum.flux[c][a] : 0) + (from_b ? more.flux[c][b] : 0));
     }
@@ -148,9 +153,13 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
     if (stop) return absl::CancelledError("the batch was given up");
     const PhotonGrid grid(deposits, region, cell, state_->team);
     Accumulation accumulation = Gather(block, radii, grid, state_->scene.materials,
-                                       Kernel{settings.kernel}, state_->scale, state_->team);
+                                       Kernel{settings.kernel}, state_->scale, state_->team, stop);
     for (const BatchTally& tally : tallies) accumulation.tally += tally;
-    sum = part == first ? std::move(accumulation) : Merge(sum, accumulation);
+    if (part == first) {
+      sum = std::move(accumulation);
+    } else {
+      LUCERNA_ASSIGN_OR_RETURN(sum, Merge(sum, accumulation));
+    }
     if (stop) return absl::CancelledError("the batch was given up");
   }
   return sum;

@@ -20,8 +20,7 @@ constexpr std::chrono::minutes kTransferTime{10};
 class Connection::Call {
  public:
   Call(Connection& connection, Duration time) : connection_(connection) {
-    context_.set_deadline(std::chrono::system_clock::now() +
-                          std::chrono::duration_cast<std::chrono::system_clock::duration>(time));
+    context_.set_deadline(DeadlineIn(time));
     const MutexLock lock(connection_.mutex_);
     if (connection_.is_broken_off_) context_.TryCancel();
     connection_.calls_.insert(&context_);
@@ -44,9 +43,7 @@ Connection::Connection(const std::string& address)
     : channel_(MakeChannel(address)), stub_(v1::WorkerService::NewStub(channel_)) {}
 
 bool Connection::WaitUntilConnected(Duration wait) {
-  return channel_->WaitForConnected(
-      std::chrono::system_clock::now() +
-      std::chrono::duration_cast<std::chrono::system_clock::duration>(wait));
+  return channel_->WaitForConnected(DeadlineIn(wait));
 }
 
 StatusOr<v1::RegisterResponse> Connection::Register(const v1::RegisterRequest& request) {
@@ -111,7 +108,7 @@ StatusOr<v1::CommitOutcome> Connection::Commit(v1::CommitBatchRequest::Header he
 
 Status Connection::Goodbye(const std::string& worker_id) {
   grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kGoodbyeTime);
+  context.set_deadline(DeadlineIn(kGoodbyeTime));
   v1::GoodbyeRequest request;
   request.set_worker_id(worker_id);
   v1::GoodbyeResponse response;

@@ -44,7 +44,7 @@ std::uint64_t PairBits(std::uint32_t photon_key, std::uint32_t hitpoint) {
 
 Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii, const PhotonGrid& grid,
                     const std::vector<Material>& materials, const Kernel& kernel,
-                    const FluxScale& scale, ThreadTeam& team) {
+                    const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
   const std::size_t rows = block.size();
   const std::size_t piece_count = (rows + kRowsPerPiece - 1) / kRowsPerPiece;
   std::vector<Piece> pieces(piece_count);
@@ -56,7 +56,7 @@ Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii, const
       auto glossy = std::lower_bound(
           block.glossy.begin(), block.glossy.end(), first,
           [](const GlossyHitpoint& g, std::size_t row) { return g.hitpoint < row; });
-      for (std::size_t row = first; row < last; ++row) {
+      for (std::size_t row = first; row < last && !stop.load(std::memory_order_relaxed); ++row) {
         const auto hitpoint = static_cast<std::uint32_t>(row);
         const Vec3 normal = DecodeOctahedral(block.normals_oct[row]);
         const float radius = radii[row];

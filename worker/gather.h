@@ -1,6 +1,8 @@
 // What do the hitpoints find among the photons?
 #pragma once
 
+#include <atomic>
+
 #include "render/base/parallel.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/hitpoint_block.h"
@@ -12,11 +14,13 @@
 namespace lucerna {
 
 // Every hitpoint adds up the photons within its radius that landed on its side of the surface:
-// kernel-weighted flux for diffuse ones, times BSDF × π for glossy ones. Fills everything of the
+// kernel-weighted flux for diffuse ones, times the BSDF for glossy ones. Fills everything of the
 // accumulation but the tally, of which it adds `pairs`. Pairs are independent of each other, so
-// neither threads nor the order of photons can be seen in the result.
+// neither threads nor the order of photons can be seen in the result. Once `stop` is true it ends
+// soon, with a result of no use.
 [[nodiscard]] Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
                                   const PhotonGrid& grid, const std::vector<Material>& materials,
-                                  const Kernel& kernel, const FluxScale& scale, ThreadTeam& team);
+                                  const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,
+                                  const std::atomic<bool>& stop);
 
 }  // namespace lucerna

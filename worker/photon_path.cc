@@ -51,7 +51,7 @@ int PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index,
   KeyedRng rng(CombineKeys(job_key, number));
 
   Emission emission;
-  if (!lights_.SampleEmission(u[4], u[0], u[1], u[2], u[3], emission)) return 0;
+  if (!lights_.SampleEmission(FineChoice(u[4], rng.Uniform()), u[0], u[1], u[2], u[3], emission)) return 0;
   Ray ray = emission.ray;
   Rgb flux = emission.flux;
   int rays = 0;
@@ -63,9 +63,13 @@ int PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index,
     const Material& material = scene_.materials[surface.material];
     const Vec3 wo = -ray.direction;
     if (surface.has_shading_normal) {
-      flux *= CosineRatio(Dot(wo, surface.shading_normal), Dot(wo, surface.geometric_normal));
+      const float shading = Dot(wo, surface.shading_normal);
+      const float geometric = Dot(wo, surface.geometric_normal);
+      // Below the smoothed surface's horizon: that surface would not have been met here.
+      if (!(shading * geometric > 0)) return rays;
+      flux *= CosineRatio(shading, geometric);
     }
-    if (!(MaxChannel(flux) < HUGE_VALF) || !IsFinite(surface.position)) {
+    if (!IsFinite(flux) || !IsFinite(surface.position)) {
       ++dropped;
       return rays;
     }

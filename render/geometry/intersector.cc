@@ -8,10 +8,6 @@
 namespace lucerna {
 namespace {
 
-// Positions computed from three corners or a centre and a radius are off by a few units in the
-// last place of the largest number involved; sixteen leave room for Embree's own rounding.
-constexpr float kClearanceUlps = 0x1p-20F;
-
 struct Double3 {
   double x, y, z;
 };
@@ -67,7 +63,7 @@ bool DiskRoot(const Disk& disk, Vec3 origin, Vec3 direction, float t_near, float
 void SphereBounds(const RTCBoundsFunctionArguments* arguments) {
   const Sphere& sphere = static_cast<const Scene*>(arguments->geometryUserPtr)->spheres[arguments->primID];
   // A little outwards, for the rounding of centre ± radius.
-  const float r = sphere.radius + kClearanceUlps * (MaxAbs(sphere.center) + sphere.radius);
+  const float r = sphere.radius + kClearance * (MaxAbs(sphere.center) + sphere.radius);
   RTCBounds* box = arguments->bounds_o;
   box->lower_x = sphere.center.x - r;
   box->lower_y = sphere.center.y - r;
@@ -79,7 +75,7 @@ void SphereBounds(const RTCBoundsFunctionArguments* arguments) {
 
 void DiskBounds(const RTCBoundsFunctionArguments* arguments) {
   const Disk& disk = static_cast<const Scene*>(arguments->geometryUserPtr)->disks[arguments->primID];
-  const float slack = kClearanceUlps * (MaxAbs(disk.center) + disk.radius);
+  const float slack = kClearance * (MaxAbs(disk.center) + disk.radius);
   const auto reach = [&](float n) {
     return disk.radius * std::sqrt(std::max(0.0F, 1 - n * n)) + slack;
   };
@@ -278,7 +274,7 @@ SurfacePoint Intersector::SurfaceAt(const Ray& ray, const Hit& hit) const {
     const Vec3 e2 = mesh.positions[corner[2]] - p0;
     // From the corners, not along the ray: the error then has the size of the triangle.
     point.position = p0 + e1 * hit.u + e2 * hit.v;
-    point.clearance = kClearanceUlps * (MaxAbs(p0) + MaxAbs(e1) + MaxAbs(e2));
+    point.clearance = kClearance * (MaxAbs(p0) + MaxAbs(e1) + MaxAbs(e2));
     // The longest edges' lengths are taken out first, so that tiny triangles keep a normal.
     const float s1 = MaxAbs(e1);
     const float s2 = MaxAbs(e2);
@@ -300,7 +296,7 @@ SurfacePoint Intersector::SurfaceAt(const Ray& ray, const Hit& hit) const {
     const Vec3 outward = Normalize(from_center);
     // Put back onto the sphere: whatever t lost, the point is on the surface.
     point.position = sphere.center + outward * sphere.radius;
-    point.clearance = kClearanceUlps * (MaxAbs(sphere.center) + sphere.radius);
+    point.clearance = kClearance * (MaxAbs(sphere.center) + sphere.radius);
     point.geometric_normal = sphere.inward ? -outward : outward;
     point.shading_normal = point.geometric_normal;
     traits = &sphere.traits;
@@ -308,7 +304,7 @@ SurfacePoint Intersector::SurfaceAt(const Ray& ray, const Hit& hit) const {
     const Disk& disk = scene_.disks[hit.primitive];
     const Vec3 p = ray.origin + ray.direction * hit.t;
     point.position = p - disk.normal * Dot(p - disk.center, disk.normal);
-    point.clearance = kClearanceUlps * (MaxAbs(disk.center) + disk.radius);
+    point.clearance = kClearance * (MaxAbs(disk.center) + disk.radius);
     point.geometric_normal = disk.normal;
     point.shading_normal = disk.normal;
     traits = &disk.traits;

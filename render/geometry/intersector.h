@@ -1,6 +1,6 @@
 // What does a ray meet first? The only floor that knows Embree.
 //
-// Triangles are Embree's; spheres and disks are exact (solved in double, never tessellated). The
+// Triangles are Embree's; spheres (solved in double) and disks are exact, never tessellated. The
 // instruction set is pinned, and only single rays are traced, so that equal rays have equal hits
 // in every process of one numeric profile.
 #pragma once
@@ -17,9 +17,14 @@ namespace lucerna {
 
 struct Ray {
   Vec3 origin;
-  Vec3 direction;  // unit
+  Vec3 direction;  // unit, except where only occlusion is asked for
   float t_max = HUGE_VALF;
 };
+
+// How far off a surface rays start and end, relative to the largest numbers that its points are
+// computed from. Positions computed from three corners or a centre and a radius are off by one or
+// two units in the last place; four leave room for Embree's own rounding.
+inline constexpr float kClearance = 0x1p-22F;
 
 // Geometry numbers: meshes in scene order, then one for all spheres, then one for all disks.
 struct Hit {

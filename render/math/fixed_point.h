@@ -9,6 +9,7 @@
 // than a quantum still adds up right, and no sum is biased, however many terms it has.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 
@@ -19,11 +20,14 @@ namespace lucerna {
 inline constexpr int kFluxBits = 18;
 
 // 2^-kFluxBits times the smallest power of two that is >= `power` [W]; for no power at all, 1.
+// At the ends of the float range the exponent is held where the quantum and its inverse are both
+// normal numbers.
 [[nodiscard]] inline float QuantumFor(float power_w) {
   if (!(power_w > 0)) return 1;
   int exponent = 0;
-  const float mantissa = std::frexp(power_w, &exponent);  // in [0.5, 1)
-  return std::ldexp(1.0F, (mantissa == 0.5F ? exponent - 1 : exponent) - kFluxBits);
+  const float mantissa = std::frexp(std::min(power_w, 0x1.fffffep127F), &exponent);  // in [0.5, 1)
+  const int wanted = (mantissa == 0.5F ? exponent - 1 : exponent) - kFluxBits;
+  return std::ldexp(1.0F, std::clamp(wanted, -126, 126));
 }
 
 // Quanta per watt, and back, per channel. Both are exact powers of two.

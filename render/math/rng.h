@@ -26,6 +26,11 @@ namespace lucerna {
   return static_cast<float>(bits >> 8) * 0x1p-24F;
 }
 
+// In [0, 1) with 48 bits: `coarse`, refined by another number.
+[[nodiscard]] constexpr double FineChoice(float coarse, float fine) {
+  return static_cast<double>(coarse) + 0x1p-24 * static_cast<double>(fine);
+}
+
 // A stream of independent numbers under one key.
 class KeyedRng {
  public:

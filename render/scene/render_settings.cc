@@ -134,9 +134,12 @@ StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const
         Concat("--alpha must be above 0 and below 1, not ", settings.alpha));
   }
   settings.initial_radius = overrides.initial_radius.value_or(asked.initial_radius.value_or(0));
-  if (!(settings.initial_radius >= 0) || !std::isfinite(settings.initial_radius)) {
+  // The square of a radius is a float.
+  if (settings.initial_radius != 0 &&
+      !(settings.initial_radius >= 1e-18 && settings.initial_radius <= 1e18)) {
     return absl::InvalidArgumentError(
-        Concat("--initial-radius must be auto or a length above 0, not ", settings.initial_radius));
+        Concat("--initial-radius must be auto or a length from 1e-18 to 1e18, not ",
+               settings.initial_radius));
   }
   settings.max_depth = overrides.max_depth.value_or(asked.max_depth.value_or(kDefaultDepth));
   LUCERNA_RETURN_IF_ERROR(CheckRange("--max-depth", settings.max_depth, 1, kMaxDepth));

@@ -244,9 +244,12 @@ Rgb FresnelConductor(float cos_i, Rgb eta, Rgb k) {
     const float t = n2 - k2 - s2;
     const float a2_plus_b2 = std::sqrt(std::max(0.0F, t * t + 4 * n2 * k2));
     const float a = std::sqrt(std::max(0.0F, 0.5F * (a2_plus_b2 + t)));
-    const float rs = (a2_plus_b2 + c2 - 2 * c * a) / (a2_plus_b2 + c2 + 2 * c * a);
+    // Both denominators vanish only together with their numerators.
+    constexpr float kLeast = 1e-30F;
+    const float rs =
+        (a2_plus_b2 + c2 - 2 * c * a) / std::max(kLeast, a2_plus_b2 + c2 + 2 * c * a);
     const float rp = rs * (c2 * a2_plus_b2 + s2 * s2 - 2 * c * a * s2) /
-                     (c2 * a2_plus_b2 + s2 * s2 + 2 * c * a * s2);
+                     std::max(kLeast, c2 * a2_plus_b2 + s2 * s2 + 2 * c * a * s2);
     return std::clamp(0.5F * (rs + rp), 0.0F, 1.0F);
   };
   return {channel(eta.r, k.r), channel(eta.g, k.g), channel(eta.b, k.b)};

@@ -8,8 +8,6 @@
 namespace lucerna {
 namespace {
 
-constexpr float kClearance = 0x1p-20F;  // as the intersector's, relative to the coordinates
-
 // Smoothstep of the cosine between the two cones, as pbrt has it.
 float SpotFalloff(const SpotLight& spot, float cosine) {
   if (cosine >= spot.cos_falloff_start) return 1;
@@ -20,8 +18,7 @@ float SpotFalloff(const SpotLight& spot, float cosine) {
 
 // 1 - cosine of the cone in which a sphere appears from outside, without cancellation.
 float OneMinusCosine(float sin2_max) {
-  return sin2_max < 1e-3F ? 0.5F * sin2_max * (1 + 0.25F * sin2_max)
-                          : 1 - std::sqrt(std::max(0.0F, 1 - sin2_max));
+  return sin2_max / (1 + std::sqrt(std::max(0.0F, 1 - sin2_max)));
 }
 
 }  // namespace
@@ -140,9 +137,8 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
 
 void LightSet::Add(Emitter emitter) { emitters_.push_back(emitter); }
 
-const LightSet::Emitter& LightSet::Choose(float u) const {
-  const auto wanted = static_cast<double>(u);
-  auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), wanted);
+const LightSet::Emitter& LightSet::Choose(double u) const {
+  auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), u);
   if (found == cumulative_.end()) --found;
   return emitters_[static_cast<std::size_t>(found - cumulative_.begin())];
 }
@@ -190,7 +186,7 @@ void LightSet::PointOn(const Emitter& emitter, float u1, float u2, Vec3& positio
   }
 }
 
-bool LightSet::SampleEmission(float u_choice, float u_place1, float u_place2, float u_direction1,
+bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, float u_direction1,
                               float u_direction2, Emission& emission) const {
   if (emitters_.empty()) return false;
   const Emitter& emitter = Choose(u_choice);
@@ -254,7 +250,7 @@ bool LightSet::SampleEmission(float u_choice, float u_place1, float u_place2, fl
   return false;
 }
 
-bool LightSet::SampleDirect(Vec3 from, float u_choice, float u1, float u2,
+bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
                             LightSample& sample) const {
   if (emitters_.empty()) return false;
   const Emitter& emitter = Choose(u_choice);
@@ -270,10 +266,17 @@ bool LightSet::SampleDirect(Vec3 from, float u_choice, float u1, float u2,
         const float one_minus_cos = OneMinusCosine(sin2_max);
         const Vec3 local = SquareToCone(u1, u2, one_minus_cos);
         sample.wi = Frame(to_center / distance).ToWorld(local);
-        const float sin2 = std::max(0.0F, 1 - local.z * local.z);
-        sample.distance =
+        // Where the direction meets the sphere. The sine is taken from the sides: near the rim of
+        // a small sphere, the cosine alone would not tell hit from miss.
+        const float sin2 = local.x * local.x + local.y * local.y;
+        const float along =
             distance * local.z -
             std::sqrt(std::max(0.0F, sphere.radius * sphere.radius - distance2 * sin2));
+        const Vec3 outward = Normalize(sample.wi * along - to_center);
+        sample.is_distant = false;
+        sample.target =
+            sphere.center + outward * (sphere.radius +
+                                       kClearance * (MaxAbs(sphere.center) + sphere.radius));
         const float pdf = emitter.choice / (2 * kPi * one_minus_cos);
         sample.pdf = pdf;
         sample.radiance_over_pdf = emitter.radiance / pdf;
@@ -284,8 +287,9 @@ bool LightSet::SampleDirect(Vec3 from, float u_choice, float u1, float u2,
     case Kind::kPoint: {
       const Vec3 to = scene_.point_lights[emitter.primitive].position - from;
       const float distance2 = LengthSquared(to);
-      sample.distance = std::sqrt(distance2);
-      sample.wi = to / sample.distance;
+      sample.is_distant = false;
+      sample.target = scene_.point_lights[emitter.primitive].position;
+      sample.wi = to / std::sqrt(distance2);
       sample.radiance_over_pdf = emitter.radiance / (distance2 * emitter.choice);
       sample.pdf = 0;
       return distance2 > 0;
@@ -294,8 +298,9 @@ bool LightSet::SampleDirect(Vec3 from, float u_choice, float u1, float u2,
       const SpotLight& spot = scene_.spot_lights[emitter.primitive];
       const Vec3 to = spot.position - from;
       const float distance2 = LengthSquared(to);
-      sample.distance = std::sqrt(distance2);
-      sample.wi = to / sample.distance;
+      sample.is_distant = false;
+      sample.target = spot.position;
+      sample.wi = to / std::sqrt(distance2);
       const float falloff = SpotFalloff(spot, -Dot(sample.wi, spot.direction));
       sample.radiance_over_pdf = emitter.radiance * (falloff / (distance2 * emitter.choice));
       sample.pdf = 0;
@@ -303,13 +308,13 @@ bool LightSet::SampleDirect(Vec3 from, float u_choice, float u1, float u2,
     }
     case Kind::kDistant:
       sample.wi = -scene_.distant_lights[emitter.primitive].direction;
-      sample.distance = HUGE_VALF;
+      sample.is_distant = true;
       sample.radiance_over_pdf = emitter.radiance / emitter.choice;
       sample.pdf = 0;
       return true;
     case Kind::kInfinite:
       sample.wi = SquareToSphere(u1, u2);
-      sample.distance = HUGE_VALF;
+      sample.is_distant = true;
       sample.pdf = emitter.choice / (4 * kPi);
       sample.radiance_over_pdf = emitter.radiance / sample.pdf;
       return true;
@@ -324,11 +329,15 @@ bool LightSet::SampleDirect(Vec3 from, float u_choice, float u1, float u2,
   const Vec3 to = position - from;
   const float distance2 = LengthSquared(to);
   if (!(distance2 > 0)) return false;
-  sample.distance = std::sqrt(distance2);
-  sample.wi = to / sample.distance;
+  sample.wi = to / std::sqrt(distance2);
   float cosine = -Dot(sample.wi, normal);
-  if (emitter.two_sided) cosine = std::abs(cosine);
+  if (emitter.two_sided && cosine < 0) {
+    cosine = -cosine;
+    normal = -normal;
+  }
   if (!(cosine > 0)) return false;
+  sample.is_distant = false;
+  sample.target = position + normal * clearance;
   sample.pdf = emitter.choice * distance2 / (cosine * emitter.area);
   sample.radiance_over_pdf = emitter.radiance / sample.pdf;
   return true;

@@ -23,7 +23,8 @@ struct Emission {
 // Light that arrives at a point from one emitter.
 struct LightSample {
   Vec3 wi;                  // from the point to the light, unit
-  float distance = 0;       // HUGE_VALF for lights at infinity
+  bool is_distant = false;  // the light is at infinity
+  Vec3 target;              // else: where the light comes from, just off the light's own surface
   Rgb radiance_over_pdf;    // [W·m⁻²·sr⁻¹ / (choice × solid angle)]; for delta lights irradiance
                             // on a plane facing the light, over the choice
   float pdf = 0;            // choice × pdf_solid_angle [sr⁻¹]; 0 for delta lights
@@ -40,15 +41,16 @@ class LightSet {
   // True when all emitters are points or single directions, which no ray can hit.
   [[nodiscard]] bool OnlyDelta() const { return only_delta_; }
 
-  // Draws a photon. u_choice picks the emitter; uv_place and uv_direction the rest. False when
+  // Draws a photon. u_choice picks the emitter, in double because a lamp may have less than 2^-24
+  // of the power; u_place and u_direction the rest. False when
   // the numbers give nothing (outside a spot's cone).
-  [[nodiscard]] bool SampleEmission(float u_choice, float u_place1, float u_place2,
+  [[nodiscard]] bool SampleEmission(double u_choice, float u_place1, float u_place2,
                                     float u_direction1, float u_direction2,
                                     Emission& emission) const;
 
   // Draws light arriving at `from`, without asking whether anything is in the way. False when the
   // drawn emitter sends nothing there.
-  [[nodiscard]] bool SampleDirect(Vec3 from, float u_choice, float u1, float u2,
+  [[nodiscard]] bool SampleDirect(Vec3 from, double u_choice, float u1, float u2,
                                   LightSample& sample) const;
 
   // Radiance that `point` sends towards `wo`.
@@ -75,7 +77,7 @@ class LightSet {
   };
 
   void Add(Emitter emitter);
-  [[nodiscard]] const Emitter& Choose(float u) const;
+  [[nodiscard]] const Emitter& Choose(double u) const;
   [[nodiscard]] const Emitter* EmitterOf(const SurfacePoint& point) const;
   void PointOn(const Emitter& emitter, float u1, float u2, Vec3& position, Vec3& normal,
                float& clearance) const;

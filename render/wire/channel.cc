@@ -30,6 +30,11 @@ std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address) {
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
 
+std::chrono::system_clock::time_point DeadlineIn(Duration time) {
+  return std::chrono::time_point_cast<std::chrono::system_clock::duration>(SystemClock().Wall() +
+                                                                           time);
+}
+
 void SetUpConnections(grpc::ServerBuilder& builder) {
   builder.SetMaxReceiveMessageSize(kMaxMessageBytes);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kPingEveryMs);

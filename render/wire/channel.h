@@ -11,6 +11,8 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include "render/base/clock.h"
+
 namespace lucerna {
 
 // A manifest of 20,000 files is about 3 MiB; everything longer is cut into chunks.
@@ -18,6 +20,9 @@ inline constexpr int kMaxMessageBytes = 16 << 20;
 
 // The deadline of a call that needs no waiting on the other side.
 inline constexpr std::chrono::seconds kCallTime{30};
+
+// `time` from now, as gRPC asks for it.
+[[nodiscard]] std::chrono::system_clock::time_point DeadlineIn(Duration time);
 
 // A channel to `address` ("host:port"). Does not connect yet, and connects again by itself.
 [[nodiscard]] std::shared_ptr<grpc::Channel> MakeChannel(const std::string& address);

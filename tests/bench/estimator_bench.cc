@@ -158,7 +158,7 @@ Accumulation GatherOnce(const Bench& bench, const std::vector<std::vector<Deposi
                    sorted.end());
   const PhotonGrid grid(deposits, bench.region, 2 * sorted[sorted.size() / 2], team);
   return Gather(bench.eye.block, bench.radii, grid, bench.scene.materials,
-                Kernel{bench.settings.kernel}, bench.scale, team);
+                Kernel{bench.settings.kernel}, bench.scale, team, std::atomic<bool>(false));
 }
 
 void GatherPairs(benchmark::State& state, const Bench& bench) {

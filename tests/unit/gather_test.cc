@@ -72,7 +72,8 @@ Accumulation GatherAll(const Case& input, const Kernel& kernel, const FluxScale&
                        int threads) {
   ThreadTeam team(threads);
   const PhotonGrid grid(input.deposits, input.region, 0.02F, team);
-  return Gather(input.block, input.radii, grid, input.materials, kernel, scale, team);
+  return Gather(input.block, input.radii, grid, input.materials, kernel, scale, team,
+                std::atomic<bool>(false));
 }
 
 std::uint64_t PairBits(std::uint32_t key, std::uint32_t hitpoint) {

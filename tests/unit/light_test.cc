@@ -105,7 +105,8 @@ TEST(SampleDirectTest, DrawsByTheDensityThatItsSightGives) {
           if (!lit.lights.SampleDirect({0, 0, 0}, u_lobe, u1, u2, sample)) return false;
           direction = sample.wi;
           // A point behind its own lamp is drawn and then found hidden.
-          return !lit.intersector->Occluded({{0, 0, 0}, sample.wi, sample.distance * (1 - 1e-3F)});
+          return !lit.intersector->Occluded(
+              {{0, 0, 0}, sample.wi, sample.is_distant ? HUGE_VALF : 0.999F * Length(sample.target)});
         },
         [&](Vec3 wi) { return PdfToward(lit, wi); }, 200000, ++key);
     // The sky is drawn through the disk too, where sight finds the disk.
@@ -129,14 +130,14 @@ TEST(SampleDirectTest, AgreesWithSightPointByPoint) {
       const Ray ray = {{0, 0, 0}, sample.wi, HUGE_VALF};
       Hit hit;
       const bool met = lit.intersector->Intersect(ray, hit);
-      if (sample.distance == HUGE_VALF) {
+      if (sample.is_distant) {
         if (met) continue;
         ASSERT_FLOAT_EQ(sample.pdf, lit.lights.PdfDirectInfinite()) << name;
         ++compared;
         continue;
       }
       // Light of another lamp, or a rim that rounding decides.
-      if (!met || std::abs(hit.t / sample.distance - 1) > 1e-3F) continue;
+      if (!met || std::abs(hit.t / Length(sample.target) - 1) > 1e-3F) continue;
       const SurfacePoint surface = lit.intersector->SurfaceAt(ray, hit);
       const float cosine = std::abs(Dot(surface.geometric_normal, sample.wi));
       if (cosine < 0.05F) continue;
@@ -159,7 +160,7 @@ TEST(SampleDirectTest, GivesDeltaLightsTheirIrradiance) {
     ASSERT_TRUE(lit.lights.SampleDirect({0, 0, 0}, 0.5F, 0.1F, 0.2F, sample));
     EXPECT_TRUE(lit.lights.OnlyDelta());
     EXPECT_EQ(sample.pdf, 0);
-    EXPECT_FLOAT_EQ(sample.distance, 5);
+    EXPECT_EQ(sample.target, (Vec3{0, 3, 4}));
     EXPECT_FLOAT_EQ(sample.radiance_over_pdf.r, 10.0F / 25);
   }
   scene.point_lights.clear();
@@ -168,7 +169,7 @@ TEST(SampleDirectTest, GivesDeltaLightsTheirIrradiance) {
   ASSERT_TRUE(lit.lights.SampleDirect({0, 0, 0}, 0.5F, 0.1F, 0.2F, sample));
   EXPECT_FLOAT_EQ(sample.radiance_over_pdf.r, 7);
   EXPECT_NEAR(Length(sample.wi - Normalize({0, 1, 1})), 0, 1e-6);
-  EXPECT_EQ(sample.distance, HUGE_VALF);
+  EXPECT_TRUE(sample.is_distant);
 }
 
 // Mean flux of emissions, per channel.
