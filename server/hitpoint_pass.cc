@@ -24,11 +24,20 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, Threa
   out.direct.resize(pixels);
   out.features.resize(pixels);
 
-  struct Ended {
+  // A hitpoint as a row, until all tiles are known.
+  struct Row {
     std::uint32_t pixel;
-    EyePath path;
+    Vec3 position;
+    std::uint32_t normal_oct;
+    Rgb weight;
+    float unit_radius;
   };
-  std::vector<std::vector<Ended>> per_tile(tiles);
+  struct Tile {
+    std::vector<Row> rows;
+    std::vector<GlossyHitpoint> glossy;  // by row of the tile
+  };
+  const bool automatic = tracer.settings().initial_radius == 0;
+  std::vector<Tile> per_tile(tiles);
   std::vector<std::uint64_t> rays(tiles);
   team.For(tiles, 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t tile = begin; tile < end; ++tile) {
@@ -42,15 +51,21 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, Threa
           out.direct[pixel] = path.direct;
           out.features[pixel] = path.features;
           rays[tile] += static_cast<std::uint64_t>(path.rays);
-          if (path.has_hitpoint && !IsBlack(path.weight)) per_tile[tile].push_back({pixel, path});
+          if (!path.has_hitpoint || IsBlack(path.weight)) continue;
+          if (path.is_glossy) {
+            per_tile[tile].glossy.push_back(
+                {static_cast<std::uint32_t>(per_tile[tile].rows.size()), path.material,
+                 EncodeOctahedral(path.to_eye), EncodeOctahedral(path.shading_normal)});
+          }
+          per_tile[tile].rows.push_back({pixel, path.position, EncodeOctahedral(path.normal),
+                                         path.weight, automatic ? path.footprint : 1.0F});
         }
       }
     }
   });
 
-  const bool automatic = tracer.settings().initial_radius == 0;
   std::size_t count = 0;
-  for (const auto& tile : per_tile) count += tile.size();
+  for (const Tile& tile : per_tile) count += tile.rows.size();
   out.block.positions.reserve(count);
   out.block.normals_oct.reserve(count);
   out.pixels.reserve(count);
@@ -58,18 +73,19 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, Threa
   out.unit_radii.reserve(count);
   for (std::size_t tile = 0; tile < tiles; ++tile) {
     out.rays += rays[tile];
-    for (const auto& [pixel, path] : per_tile[tile]) {
-      const auto row = static_cast<std::uint32_t>(out.block.size());
-      out.block.positions.push_back(path.position);
-      out.block.normals_oct.push_back(EncodeOctahedral(path.normal));
-      if (path.is_glossy) {
-        out.block.glossy.push_back({row, path.material, EncodeOctahedral(path.to_eye),
-                                    EncodeOctahedral(path.shading_normal)});
-      }
-      out.pixels.push_back(pixel);
-      out.weights.push_back(path.weight);
-      out.unit_radii.push_back(automatic ? path.footprint : 1.0F);
+    const auto first = static_cast<std::uint32_t>(out.block.size());
+    for (GlossyHitpoint glossy : per_tile[tile].glossy) {
+      glossy.hitpoint += first;
+      out.block.glossy.push_back(glossy);
     }
+    for (const Row& row : per_tile[tile].rows) {
+      out.block.positions.push_back(row.position);
+      out.block.normals_oct.push_back(row.normal_oct);
+      out.pixels.push_back(row.pixel);
+      out.weights.push_back(row.weight);
+      out.unit_radii.push_back(row.unit_radius);
+    }
+    per_tile[tile] = {};
   }
   return out;
 }
