@@ -48,11 +48,15 @@ struct BsdfSample {
 // Rougher than this, photons are gathered; smoother, eye paths go on. A narrow lobe accepts few of
 // the photons around it, while a direction drawn from it is a good guess.
 inline constexpr float kGatherAlpha = 0.2F;
+// The same for dielectrics: refraction bends less than reflection, so their lobes are narrower, and
+// what is seen through frosted glass has passed two of them.
+inline constexpr float kGatherAlphaDielectric = 0.5F;
 
 // Where eye paths stop and photons are kept. Black surfaces need none.
 [[nodiscard]] constexpr bool Gathers(const Material& material) {
   if (material.kind == Material::Kind::kDiffuse) return !IsBlack(material.reflectance);
-  return std::max(material.alpha_u, material.alpha_v) >= kGatherAlpha;
+  return std::max(material.alpha_u, material.alpha_v) >=
+         (material.kind == Material::Kind::kConductor ? kGatherAlpha : kGatherAlphaDielectric);
 }
 
 // Fresnel reflectance of unpolarised light. cos_i in [-1, 1], negative from inside; `eta` =

@@ -7,6 +7,7 @@
 // of these means is below 0.1 % and is not allowed for. And more photons must bring the image
 // closer to the reference, not just its mean.
 #include <filesystem>
+#include <ostream>
 #include <string>
 
 #include "gtest/gtest.h"
@@ -24,6 +25,9 @@ struct Case {
   int width, height, max_depth, passes;
   bool has_mask;
 };
+
+// What gtest shows of a case.
+void PrintTo(const Case& c, std::ostream* out) { *out << c.folder; }
 
 class ReferenceImageTest : public testing::TestWithParam<Case> {};
 

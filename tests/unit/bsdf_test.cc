@@ -258,8 +258,14 @@ TEST(GathersTest, SeparatesWhatPhotonsFindFromWhatEyePathsFind) {
   EXPECT_TRUE(Gathers(DiffuseMaterial(0.1F)));
   EXPECT_FALSE(Gathers(DiffuseMaterial(0)));
   EXPECT_FALSE(Gathers(DielectricMaterial(1.5F)));
-  EXPECT_FALSE(Gathers(DielectricMaterial(1.5F, kGatherAlpha / 2)));
-  EXPECT_TRUE(Gathers(DielectricMaterial(1.5F, kGatherAlpha)));
+  EXPECT_FALSE(Gathers(DielectricMaterial(1.5F, kGatherAlpha)));
+  EXPECT_TRUE(Gathers(DielectricMaterial(1.5F, kGatherAlphaDielectric)));
+  Material metal;
+  metal.kind = Material::Kind::kConductor;
+  metal.alpha_u = kGatherAlpha / 2;
+  EXPECT_FALSE(Gathers(metal));
+  metal.alpha_v = kGatherAlpha;
+  EXPECT_TRUE(Gathers(metal));
 }
 
 }  // namespace
