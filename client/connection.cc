@@ -104,6 +104,10 @@ ClientConnection::ClientConnection(std::string address,
       images_(v1::ImageService::NewStub(channel)) {}
 
 StatusOr<std::unique_ptr<ClientConnection>> ClientConnection::Open(const std::string& address) {
+  if (!IsAddress(address)) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat("--server \"", address, "\": give host:port, like 127.0.0.1:7400"));
+  }
   const std::shared_ptr<grpc::Channel> channel = MakeChannel(address);
   auto connection = std::unique_ptr<ClientConnection>(new ClientConnection(address, channel));
   const WallTime give_up = SystemClock().Wall() + kConnectTime;

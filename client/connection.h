@@ -26,6 +26,7 @@ namespace lucerna {
 class ClientConnection {
  public:
   // Connects to `address` ("host:port"), and waits a few seconds for it.
+  // Errors: also Failure(kUsage) for an address that is none.
   [[nodiscard]] static StatusOr<std::unique_ptr<ClientConnection>> Open(const std::string& address);
 
   // Brings the files of `manifest` that the coordinator does not have. `files` reads them anew.

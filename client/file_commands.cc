@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_format.h"
 
+#include "client/exit_code.h"
 #include "client/report.h"
 #include "client/scene_reading.h"
 #include "render/base/files.h"
@@ -28,6 +29,7 @@ std::string Counted(std::size_t count, const std::string& word) {
 }  // namespace
 
 Status Validate(const std::string& scene_path, bool strict, const Voice& voice) {
+  LUCERNA_RETURN_IF_ERROR(CheckNamesFile(scene_path));
   const ScenePath place = SplitScenePath(scene_path);
   DirectoryFiles files(place.folder);
   const ParsedScene parsed = ParsePbrt(files, place.main);
@@ -86,6 +88,10 @@ Status PrintDigest(const std::string& exr_path, const Voice& voice) {
 
 Status ConvertToPng(const std::string& exr_path, const std::string& png_path,
                     double exposure_stops) {
+  if (IsSameFile(exr_path, png_path)) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat(png_path, ": the PNG would replace the EXR; give it another name"));
+  }
   LUCERNA_ASSIGN_OR_RETURN(const Image image, ReadImage(exr_path));
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, EncodePng(image, exposure_stops));
   return WriteFile(png_path, bytes);

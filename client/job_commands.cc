@@ -28,6 +28,11 @@ void Print(const std::string& text) {
 }
 
 Status CheckOutputs(const OutputPaths& outputs) {
+  if (!outputs.exr.empty() && !outputs.png.empty() && IsSameFile(outputs.exr, outputs.png)) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat("-o and --png both name ", outputs.exr,
+                                "; give the EXR and the PNG a file of its own each"));
+  }
   for (const std::string& path : {outputs.exr, outputs.png}) {
     if (!path.empty()) LUCERNA_RETURN_IF_ERROR(CheckWritable(path));
   }

@@ -246,7 +246,9 @@ Status LocalCluster::Check() {
   LUCERNA_RETURN_IF_ERROR(coordinator_->Check());
   const bool one_lives =
       std::ranges::any_of(workers_, [](const auto& worker) { return !worker->HasEnded(); });
-  return one_lives ? absl::OkStatus() : workers_.front()->Check();
+  if (one_lives) return absl::OkStatus();
+  return absl::InternalError(
+      absl::StrCat("no worker is left to render: ", workers_.back()->Check().message()));
 }
 
 void LocalCluster::Stop() {

@@ -73,9 +73,13 @@ int Run(int argc, char** argv) {
     to->add_option("--photons-per-pass", flags.photons_per_pass, "photons of one pass");
     to->add_option("--time", flags.time_s, "stop after so many seconds");
     to->add_option("--seed", flags.seed, "another seed, other noise");
-    to->add_option("--radius-controller", flags.radius_controller, "ppm or pppm");
+    to->add_option("--radius-controller", flags.radius_controller,
+                   "ppm, pppm, cppm, frequency, frequency-consistent or frequency-mse");
     to->add_option("--alpha", flags.alpha, "share of new photons kept, between 0 and 1");
-    to->add_option("--kernel", flags.kernel, "constant or epanechnikov");
+    to->add_option("--kernel", flags.kernel, "constant, epanechnikov, biweight or gaussian");
+    to->add_option("--bias", flags.bias, "frequency controllers: bias a pixel may have, like 2%");
+    to->add_option("--frequency-share", flags.frequency_share,
+                   "frequency controllers: share of frequency photons, like 10%");
     to->add_option("--initial-radius", flags.initial_radius, "in scene units, or auto");
     to->add_option("--max-depth", flags.max_depth, "scattering events of a path");
   };

@@ -131,9 +131,9 @@ std::string ProgressLine(const v1::Job& job) {
 std::string SummaryLine(const v1::Job& job) {
   const v1::Progress& progress = job.progress();
   const Duration running = FromProto(progress.running());
-  std::string line =
-      absl::StrFormat("%d passes, %s photons in %s", progress.passes(),
-                      ShortCount(static_cast<double>(progress.photons())), ShortTime(running));
+  std::string line = absl::StrFormat(
+      "%d %s, %s photons in %s", progress.passes(), progress.passes() == 1 ? "pass" : "passes",
+      ShortCount(static_cast<double>(progress.photons())), ShortTime(running));
   switch (job.state()) {
     case v1::JOB_STATE_SUCCEEDED:
       return line + (job.stop_reason() == v1::STOP_REASON_TIME ? ", stopped by its time limit"

@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 #include <string_view>
+#include <tuple>
 
 #include "client/exit_code.h"
 
@@ -61,6 +62,19 @@ StatusOr<RenderOverrides> ToOverrides(const RenderFlags& flags) {
                                  ": give a radius above 0 in scene units, or auto"));
     }
     overrides.initial_radius = radius;
+  }
+  for (const auto& [flag, given, wanted] :
+       {std::tuple{"--bias", &flags.bias, &overrides.bias},
+        std::tuple{"--frequency-share", &flags.frequency_share, &overrides.frequency_share}}) {
+    if (!*given) continue;
+    std::string_view text = **given;
+    const bool is_percent = text.ends_with('%');
+    if (is_percent) text.remove_suffix(1);
+    const auto number = ToNumber<double>(text);
+    if (!number) {
+      return Misuse(absl::StrCat(flag, " ", **given, ": give a share, like 2% or 0.02"));
+    }
+    *wanted = is_percent ? *number / 100 : *number;
   }
   overrides.passes = flags.passes;
   overrides.photons_per_pass = flags.photons_per_pass;

@@ -22,7 +22,8 @@ struct RenderFlags {
   std::optional<std::string> radius_controller;
   std::optional<double> alpha;
   std::optional<std::string> kernel;
-  std::optional<std::string> initial_radius;  // scene units, or "auto"
+  std::optional<std::string> bias, frequency_share;  // "2%" or "0.02"
+  std::optional<std::string> initial_radius;         // scene units, or "auto"
   std::optional<int> max_depth;
 };
 

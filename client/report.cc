@@ -33,6 +33,8 @@ Json SettingsOf(const v1::RenderSettings& settings) {
       {"radius_controller", settings.radius_controller()},
       {"alpha", settings.alpha()},
       {"kernel", settings.kernel()},
+      {"bias", settings.bias()},
+      {"frequency_share", settings.frequency_share()},
       {"initial_radius", settings.initial_radius()},
       {"max_depth", settings.max_depth()},
   };

@@ -12,8 +12,15 @@ ScenePath SplitScenePath(const std::string& path) {
   return {slash == 0 ? "/" : path.substr(0, slash), path.substr(slash + 1)};
 }
 
+Status CheckNamesFile(const std::string& path) {
+  if (!path.empty() && !path.ends_with('/')) return absl::OkStatus();
+  return Failure(ExitCode::kUsage,
+                 absl::StrCat("\"", path, "\" is not a scene file; name its .pbrt file"));
+}
+
 StatusOr<SceneManifest> ReadScene(const std::string& path, const RenderOverrides& overrides,
                                   bool quiet) {
+  LUCERNA_RETURN_IF_ERROR(CheckNamesFile(path));
   const ScenePath place = SplitScenePath(path);
   DirectoryFiles files(place.folder);
   const ParsedScene parsed = ParsePbrt(files, place.main);

@@ -18,6 +18,9 @@ struct ScenePath {
 
 [[nodiscard]] ScenePath SplitScenePath(const std::string& path);
 
+// Errors: Failure(kUsage) when `path` is empty or ends as only a folder's does.
+[[nodiscard]] Status CheckNamesFile(const std::string& path);
+
 // Parses the scene here, so that its errors come before anything is started or sent, and writes
 // every error and warning to stderr (warnings not when `quiet`). Also checks the flags against the
 // scene. Returns its manifest.

@@ -9,6 +9,11 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 scene=$root/tests/scenes/caustic.pbrt
 if [ $# -gt 0 ] && [ "${1#-}" = "$1" ]; then
+  # Before anything is installed or built: the script's first look is at what the user typed.
+  if [ ! -f "$1" ]; then
+    echo "$1: there is no such scene file" >&2
+    exit 1
+  fi
   scene=$(realpath -- "$1")
   shift
 fi

@@ -16,6 +16,7 @@ namespace {
 constexpr std::size_t kMostWaitingJobs = 256;
 constexpr std::size_t kJobsRemembered = 1000;  // ended ones
 constexpr std::size_t kImagesRemembered = 64;
+constexpr std::size_t kImageBytesRemembered = std::size_t{2} << 30;  // the newest counts as none
 constexpr Duration kLongestSync = std::chrono::seconds(5);
 
 std::string UtcText(WallTime time) {
@@ -423,11 +424,16 @@ void Coordinator::EndJob(const std::shared_ptr<JobEntry>& entry, const Status& f
 void Coordinator::ForgetOldJobs() {
   std::size_t ended = 0;
   std::size_t images = 0;
+  std::size_t image_bytes = 0;
   std::vector<std::uint64_t> forgotten;
   for (auto entry = jobs_.rbegin(); entry != jobs_.rend(); ++entry) {
     if (!entry->second->job.life.has_ended()) continue;
     if (++ended > kJobsRemembered) forgotten.push_back(entry->first);
-    if (entry->second->image && ++images > kImagesRemembered) entry->second->image = nullptr;
+    if (!entry->second->image) continue;
+    if (++images > 1) image_bytes += entry->second->image->size();
+    if (images > kImagesRemembered || image_bytes > kImageBytesRemembered) {
+      entry->second->image = nullptr;
+    }
   }
   for (const std::uint64_t serial : forgotten)
     jobs_.erase(serial);

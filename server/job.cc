@@ -82,7 +82,11 @@ std::string SettingsText(const RenderSettings& settings) {
       " alpha=", NumberText(settings.alpha), " kernel=", std::string(NameOf(settings.kernel)),
       " initial-radius=",
       settings.initial_radius == 0 ? std::string("auto") : NumberText(settings.initial_radius),
-      " max-depth=", settings.max_depth);
+      " max-depth=", settings.max_depth,
+      UsesFrequency(settings.radius_controller)
+          ? absl::StrCat(" bias=", NumberText(settings.bias),
+                         " frequency-share=", NumberText(settings.frequency_share))
+          : std::string());
 }
 
 }  // namespace lucerna

@@ -45,14 +45,15 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   state->lights = std::make_unique<LightSet>(state->scene, *state->intersector);
   state->tracer = std::make_unique<EyePathTracer>(state->scene, state->settings,
                                                   *state->intersector, *state->lights);
-  state->controller = MakeRadiusController(state->settings);
   state->scale = FluxScale::ForPower(state->lights->TotalPower());
   const int width = settings.crop_width();
   const int height = settings.crop_height();
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const float initial = settings.initial_radius > 0 ? static_cast<float>(settings.initial_radius)
                                                     : kInitialFootprints;
-  state->statistics = std::make_unique<PixelStatistics>(pixels, initial);
+  state->controller = MakeRadiusController(state->settings, initial);
+  state->statistics =
+      std::make_unique<PixelStatistics>(pixels, initial, state->controller->MemoryPerPixel());
   state->film = std::make_unique<Film>(width, height, state->scene.film.exposure,
                                        state->scene.film.max_component);
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));
@@ -69,8 +70,8 @@ RadiusColumn JobEstimator::Radii(const EyePass& pass) const {
 void JobEstimator::Apply(const EyePass& pass, const RadiusColumn& radii, const PassSums& sums) {
   LUCERNA_CHECK(static_cast<std::int64_t>(pass.pass) == passes_applied());
   state_->statistics->AddPhotons(pass.rows(), radii, sums, state_->scale,
-                                 Kernel{state_->settings.kernel},
-                                 state_->settings.photons_per_pass, *state_->controller);
+                                 Kernel{state_->settings.kernel}, state_->settings.photons_per_pass,
+                                 *state_->controller);
   for (std::size_t pixel = 0; pixel < pass.direct.size(); ++pixel) {
     const EyeFeatures& features = pass.features[pixel];
     state_->film->Add(pixel, pass.direct[pixel], features.albedo, features.normal,
@@ -79,10 +80,17 @@ void JobEstimator::Apply(const EyePass& pass, const RadiusColumn& radii, const P
   state_->eye_rays += pass.rays;
 }
 
-std::int64_t JobEstimator::passes_applied() const { return state_->statistics->passes(); }
+std::int64_t JobEstimator::passes_applied() const {
+  return state_->statistics->passes();
+}
 
-std::uint64_t JobEstimator::eye_rays() const { return state_->eye_rays; }
+std::uint64_t JobEstimator::eye_rays() const {
+  return state_->eye_rays;
+}
 
-Image JobEstimator::MakeImage() const { return state_->film->MakeImage(*state_->statistics); }
+Image JobEstimator::MakeImage() const {
+  return state_->film->MakeImage(*state_->statistics, *state_->controller,
+                                 Kernel{state_->settings.kernel});
+}
 
 }  // namespace lucerna

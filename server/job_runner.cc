@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "render/estimate/evidence.h"
 #include "render/wire/block_codec.h"
 
 namespace lucerna {
@@ -117,7 +118,8 @@ Status JobRunner::Open(TracedPass traced) {
   // A camera that sees nothing needs no photons: such a pass is complete as it is.
   if (open.blobs.hitpoints > 0) {
     const auto photons = static_cast<std::uint64_t>(settings_.photons_per_pass);
-    surroundings_.merger.Open(KeyOf(pass), open.blobs.hitpoints, photons);
+    surroundings_.merger.Open(KeyOf(pass), open.blobs.hitpoints, photons,
+                              EvidenceColumns(EvidenceOf(settings_.radius_controller)));
     surroundings_.scheduler.OpenPass(KeyOf(pass), photons);
   }
   open_.push_back(std::move(open));
@@ -131,7 +133,7 @@ bool JobRunner::IsComplete(const OpenPass& open) const {
 
 void JobRunner::TakeIn(OpenPass open) {
   const PassKey key = KeyOf(open.traced.eye.pass);
-  PassSums sums(0);
+  PassSums sums(0, EvidenceColumns(EvidenceOf(settings_.radius_controller)));
   if (open.blobs.hitpoints > 0) {
     surroundings_.scheduler.ClosePass(key);
     sums = surroundings_.merger.Take(key);

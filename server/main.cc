@@ -117,7 +117,7 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
-  if (flags.listen.rfind(':') == std::string::npos) {
+  if (!IsAddress(flags.listen)) {
     std::fprintf(stderr, "lucerna-server: --listen %s: give HOST:PORT, such as 127.0.0.1:7400\n",
                  flags.listen.c_str());
     return kExitUsage;

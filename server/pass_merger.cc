@@ -5,9 +5,10 @@
 
 namespace lucerna {
 
-void PassMerger::Open(const PassKey& key, std::size_t hitpoints, std::uint64_t photons) {
+void PassMerger::Open(const PassKey& key, std::size_t hitpoints, std::uint64_t photons,
+                      std::size_t evidence_columns) {
   LUCERNA_CHECK(photons > 0);
-  auto pass = std::make_shared<OpenPass>(hitpoints, photons);
+  auto pass = std::make_shared<OpenPass>(hitpoints, photons, evidence_columns);
   const MutexLock lock(mutex_);
   LUCERNA_CHECK(passes_.emplace(key, std::move(pass)).second);
 }

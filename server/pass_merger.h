@@ -27,7 +27,8 @@ class PassMerger {
   enum class Outcome : std::uint8_t { kAccepted, kDuplicate, kSuperseded };
 
   // Requires that the pass is not open, and photons > 0.
-  void Open(const PassKey& key, std::size_t hitpoints, std::uint64_t photons);
+  void Open(const PassKey& key, std::size_t hitpoints, std::uint64_t photons,
+            std::size_t evidence_columns = 0);
 
   // The rows of the pass's hitpoint block; absent when it is not open.
   [[nodiscard]] std::optional<std::size_t> Hitpoints(const PassKey& key) const;
@@ -48,8 +49,10 @@ class PassMerger {
 
  private:
   struct OpenPass {
-    OpenPass(std::size_t hitpoint_count, std::uint64_t photon_count)
-        : hitpoints(hitpoint_count), photons(photon_count), sums(hitpoint_count) {}
+    OpenPass(std::size_t hitpoint_count, std::uint64_t photon_count, std::size_t evidence_columns)
+        : hitpoints(hitpoint_count),
+          photons(photon_count),
+          sums(hitpoint_count, evidence_columns) {}
 
     const std::size_t hitpoints;
     const std::uint64_t photons;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "render/base/parallel.h"
+#include "render/estimate/evidence.h"
 #include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
 #include "render/transport/light.h"
@@ -66,10 +67,12 @@ StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) 
   Accumulation out;
   out.tally = sum.tally;
   out.tally += more.tally;
+  out.evidence.resize(sum.evidence.size());
   const std::size_t upper = sum.size() + more.size();
   out.hitpoints.reserve(upper);
   out.counts.reserve(upper);
-  for (auto& channel : out.flux) channel.reserve(upper);
+  for (auto& channel : out.flux)
+    channel.reserve(upper);
   std::size_t a = 0;
   std::size_t b = 0;
   while (a < sum.size() || b < more.size()) {
@@ -78,14 +81,18 @@ StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) 
     const bool from_b =
         a == sum.size() || (b < more.size() && more.hitpoints[b] <= sum.hitpoints[a]);
     out.hitpoints.push_back(from_a ? sum.hitpoints[a] : more.hitpoints[b]);
-    const std::uint64_t count = (from_a ? std::uint64_t{sum.counts[a]} : 0) +
-                                (from_b ? std::uint64_t{more.counts[b]} : 0);
+    const std::uint64_t count =
+        (from_a ? std::uint64_t{sum.counts[a]} : 0) + (from_b ? std::uint64_t{more.counts[b]} : 0);
     if (count > UINT32_MAX) {
       return absl::OutOfRangeError("a hitpoint has more photons than a batch can count");
     }
     out.counts.push_back(static_cast<std::uint32_t>(count));
     for (std::size_t c = 0; c < 3; ++c) {
       out.flux[c].push_back((from_a ? sum.flux[c][a] : 0) + (from_b ? more.flux[c][b] : 0));
+    }
+    for (std::size_t c = 0; c < out.evidence.size(); ++c) {
+      out.evidence[c].push_back((from_a ? sum.evidence[c][a] : 0) +
+                                (from_b ? more.evidence[c][b] : 0));
     }
     a += from_a ? 1 : 0;
     b += from_b ? 1 : 0;
@@ -103,6 +110,8 @@ struct BatchTracer::State {
   std::unique_ptr<Intersector> intersector;
   std::unique_ptr<LightSet> lights;
   FluxScale scale;
+  // Made when a job asks for it.
+  std::unique_ptr<SpectrumTracer> spectra;
 };
 
 BatchTracer::BatchTracer(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -124,37 +133,54 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
   Accumulation sum;
   if (block.size() == 0 || first >= last) {
     sum.tally.photons = last > first ? last - first : 0;
+    sum.evidence.resize(EvidenceColumns(EvidenceOf(settings.radius_controller)));
     return sum;
   }
   const Bounds region = RegionOf(block, radii);
   const float cell = CellWidth(radii);
+  const Evidence evidence = EvidenceOf(settings.radius_controller);
+  if (evidence == Evidence::kFrequency &&
+      (state_->spectra == nullptr || !state_->spectra->Suits(settings))) {
+    LUCERNA_ASSIGN_OR_RETURN(
+        state_->spectra,
+        SpectrumTracer::Create(state_->scene, settings, *state_->intersector, *state_->lights));
+  }
+  const SpectrumTracer* spectra =
+      evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
   const PhotonPathTracer tracer(state_->scene, *state_->intersector, *state_->lights, settings,
-                                region);
+                                spectra, region);
   for (std::uint64_t part = first; part < last; part += kPhotonsPerPart) {
     const std::uint64_t part_end = std::min(last, part + kPhotonsPerPart);
     const std::size_t chunks =
         static_cast<std::size_t>((part_end - part + kPhotonsPerChunk - 1) / kPhotonsPerChunk);
     std::vector<std::vector<Deposit>> deposits(chunks);
+    std::vector<std::vector<float>> traces(spectra == nullptr ? 0 : chunks);
     std::vector<BatchTally> tallies(chunks);
     state_->team.For(chunks, 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t chunk = begin; chunk < end && !stop.load(std::memory_order_relaxed);
            ++chunk) {
         const std::uint64_t chunk_first = part + chunk * kPhotonsPerChunk;
         const std::uint64_t chunk_last = std::min(part_end, chunk_first + kPhotonsPerChunk);
-        deposits[chunk].reserve(2 * kPhotonsPerChunk);
+        PhotonPathTracer::Landed landed;
+        landed.deposits.reserve(2 * kPhotonsPerChunk);
         for (std::uint64_t index = chunk_first; index < chunk_last; ++index) {
-          tallies[chunk].rays += static_cast<std::uint64_t>(
-              tracer.Trace(pass, index, deposits[chunk], tallies[chunk].dropped));
+          tracer.Trace(pass, index, landed);
         }
         tallies[chunk].photons = chunk_last - chunk_first;
-        tallies[chunk].deposits = deposits[chunk].size();
+        tallies[chunk].rays = landed.rays;
+        tallies[chunk].dropped = landed.dropped;
+        tallies[chunk].deposits = landed.deposits.size();
+        deposits[chunk] = std::move(landed.deposits);
+        if (spectra != nullptr) traces[chunk] = std::move(landed.traces);
       }
     });
     if (stop) return absl::CancelledError("the batch was given up");
-    const PhotonGrid grid(deposits, region, cell, state_->team);
-    Accumulation accumulation = Gather(block, radii, grid, state_->scene.materials,
-                                       Kernel{settings.kernel}, state_->scale, state_->team, stop);
-    for (const BatchTally& tally : tallies) accumulation.tally += tally;
+    const PhotonGrid grid(deposits, traces, region, cell, state_->team);
+    Accumulation accumulation =
+        Gather(block, radii, grid, state_->scene.materials, Kernel{settings.kernel}, state_->scale,
+               state_->team, stop, evidence);
+    for (const BatchTally& tally : tallies)
+      accumulation.tally += tally;
     if (part == first) {
       sum = std::move(accumulation);
     } else {

@@ -30,101 +30,225 @@ struct Piece {
   std::vector<std::uint32_t> hitpoints;
   std::vector<std::uint32_t> counts;
   std::array<std::vector<std::int64_t>, 3> flux;
+  std::vector<std::vector<std::int64_t>> evidence;
   std::uint64_t pairs = 0;
 };
 
 // 64 random bits that belong to a (photon, hitpoint) pair.
 std::uint64_t PairBits(std::uint32_t photon_key, std::uint32_t hitpoint) {
-  std::uint64_t x = (static_cast<std::uint64_t>(photon_key) << 32 | hitpoint) * 0x9E3779B97F4A7C15ULL;
+  std::uint64_t x =
+      (static_cast<std::uint64_t>(photon_key) << 32 | hitpoint) * 0x9E3779B97F4A7C15ULL;
   x = (x ^ (x >> 32)) * 0xD6E8FEB86659FD93ULL;
   return x ^ (x >> 32);
 }
 
-}  // namespace
+// What a photon that counts adds to the columns of evidence, one class for each kind: chosen once
+// per batch, so that a job pays for no other kind than its own.
 
-Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii, const PhotonGrid& grid,
-                    const std::vector<Material>& materials, const Kernel& kernel,
-                    const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
+struct NoEvidence {
+  static constexpr std::size_t kColumns = 0;
+  NoEvidence(Vec3 /*normal*/, const FluxScale& /*scale*/) {}
+  void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 /*to_photon*/,
+           float /*squared*/, float /*squared_radius*/, float /*weight*/) {}
+  void Store(std::vector<std::vector<std::int64_t>>& /*columns*/) const {}
+};
+
+// Counts by cell of the disc (see kSectors).
+struct SectorEvidence {
+  static constexpr std::size_t kColumns = kSectors;
+  SectorEvidence(Vec3 normal, const FluxScale& /*scale*/) : frame(normal) {}
+  void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 to_photon, float squared,
+           float squared_radius, float /*weight*/) {
+    constexpr float kSqrt3 = 1.7320508F;
+    const float x = Dot(to_photon, frame.s);
+    const float y = Dot(to_photon, frame.t);
+    // Sixths of a turn by the sides of two lines at 60 degrees and the x axis, without an arc
+    // tangent.
+    const bool above = y >= 0;
+    const float side = std::abs(y);
+    const std::size_t third = side < kSqrt3 * x ? 0 : side < -kSqrt3 * x ? 2 : 1;
+    const std::size_t sector = above ? third : 5 - third;
+    const std::size_t ring = 2 * squared < squared_radius ? 0 : 6;
+    ++counts[ring + sector];
+  }
+  void Store(std::vector<std::vector<std::int64_t>>& columns) const {
+    for (std::size_t i = 0; i < kColumns; ++i)
+      columns[i].push_back(counts[i]);
+  }
+
+  Frame frame;
+  std::array<std::int64_t, kColumns> counts{};
+};
+
+// Sums over the frequency photons (see FrequencyColumn).
+struct FrequencyEvidence {
+  static constexpr std::size_t kColumns = kFrequencyColumns;
+  FrequencyEvidence(Vec3 /*normal*/, const FluxScale& scale)
+      : weight_scale(1 / (Luminance(scale.watts_per_quantum) * (1 << kFluxBits))) {}
+  void Add(const PhotonGrid& grid, std::size_t photon, Vec3 /*to_photon*/, float /*squared*/,
+           float squared_radius, float weight) {
+    const float trace = grid.trace(photon);
+    if (!(trace >= 0)) return;
+    // In double: the terms span ten decades, and each is rounded once.
+    const auto w = static_cast<double>(std::min(weight * weight_scale, 256.0F));
+    const auto x = static_cast<double>(std::min(trace * squared_radius, kLargestTrace));
+    constexpr double kUnits = 1 / kFrequencyUnit;
+    ++sums[kFrequencyCount];
+    sums[kFrequencyWeight] += std::llrint(w * kUnits);
+    sums[kFrequencyWeight2] += std::llrint(w * w * kUnits);
+    sums[kFrequencyTrace] += std::llrint(w * x * kUnits);
+    sums[kFrequencyTrace2] += std::llrint(w * x * x * kUnits);
+  }
+  void Store(std::vector<std::vector<std::int64_t>>& columns) const {
+    for (std::size_t i = 0; i < kColumns; ++i)
+      columns[i].push_back(sums[i]);
+  }
+
+  float weight_scale;
+  std::array<std::int64_t, kColumns> sums{};
+};
+
+template <KernelKind kKernel, typename EvidenceSums>
+void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const PhotonGrid& grid,
+               const GlossyHitpoint* glossy, const std::vector<Material>& materials,
+               const FluxScale& scale, Piece& piece) {
+  const auto hitpoint = static_cast<std::uint32_t>(row);
+  const Vec3 position = block.positions[row];
+  const Vec3 normal = DecodeOctahedral(block.normals_oct[row]);
+  const float squared_radius = radius * radius;
+  const float inverse_squared = 1 / squared_radius;
+  std::uint32_t count = 0;
+  std::int64_t sum_r = 0;
+  std::int64_t sum_g = 0;
+  std::int64_t sum_b = 0;
+  EvidenceSums evidence(normal, scale);
+  const auto add = [&](const PhotonRecord& photon, Rgb quanta) {
+    const std::uint64_t bits = PairBits(photon.key, hitpoint);
+    constexpr std::uint64_t kMask = (1U << 21) - 1;
+    sum_r += RoundDithered(quanta.r, static_cast<std::uint32_t>(bits & kMask));
+    sum_g += RoundDithered(quanta.g, static_cast<std::uint32_t>((bits >> 21) & kMask));
+    sum_b += RoundDithered(quanta.b, static_cast<std::uint32_t>((bits >> 42) & kMask));
+    ++count;
+  };
+  if (glossy == nullptr) {
+    grid.ForEachWithin(position, radius, [&](std::size_t i, float squared) {
+      const PhotonRecord& photon = grid.record(i);
+      const Vec3 to_photon = grid.position(i) - position;
+      if (!Counts(photon, normal, to_photon)) return;
+      add(photon,
+          photon.flux * scale.quanta_per_watt * KernelShape<kKernel>(squared * inverse_squared));
+      evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux));
+    });
+  } else {
+    const Material& material = materials[glossy->material];
+    const Frame frame(DecodeOctahedral(glossy->shading_normal_oct));
+    const Vec3 wo = frame.ToLocal(DecodeOctahedral(glossy->to_eye_oct));
+    const bool transmits = material.kind == Material::Kind::kDielectric;
+    grid.ForEachWithin(position, radius, [&](std::size_t i, float squared) {
+      const PhotonRecord& photon = grid.record(i);
+      const Vec3 to_photon = grid.position(i) - position;
+      // Photons on the far side of a rough dielectric count too.
+      const bool is_behind = transmits && Dot(photon.normal, normal) < 0;
+      if (!Counts(photon, is_behind ? -normal : normal, to_photon)) return;
+      const Vec3 wi = frame.ToLocal(DecodeOctahedral(photon.arrival_oct));
+      const Rgb scattered = photon.flux * EvaluateBsdf(material, wo, wi, Carried::kRadiance);
+      add(photon,
+          scattered * scale.quanta_per_watt * KernelShape<kKernel>(squared * inverse_squared));
+      evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(scattered));
+    });
+  }
+  if (count == 0) return;
+  piece.hitpoints.push_back(hitpoint);
+  piece.counts.push_back(count);
+  piece.flux[0].push_back(sum_r);
+  piece.flux[1].push_back(sum_g);
+  piece.flux[2].push_back(sum_b);
+  evidence.Store(piece.evidence);
+  piece.pairs += count;
+}
+
+template <KernelKind kKernel, typename EvidenceSums>
+Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
+                       const PhotonGrid& grid, const std::vector<Material>& materials,
+                       const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
   const std::size_t rows = block.size();
   const std::size_t piece_count = (rows + kRowsPerPiece - 1) / kRowsPerPiece;
   std::vector<Piece> pieces(piece_count);
   team.For(piece_count, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       Piece& piece = pieces[p];
+      piece.evidence.resize(EvidenceSums::kColumns);
       const std::size_t first = p * kRowsPerPiece;
       const std::size_t last = std::min(rows, first + kRowsPerPiece);
       auto glossy = std::lower_bound(
           block.glossy.begin(), block.glossy.end(), first,
           [](const GlossyHitpoint& g, std::size_t row) { return g.hitpoint < row; });
       for (std::size_t row = first; row < last && !stop.load(std::memory_order_relaxed); ++row) {
-        const auto hitpoint = static_cast<std::uint32_t>(row);
-        const Vec3 normal = DecodeOctahedral(block.normals_oct[row]);
-        const float radius = radii[row];
-        const float inverse_squared = 1 / (radius * radius);
-        std::uint32_t count = 0;
-        std::int64_t sum_r = 0;
-        std::int64_t sum_g = 0;
-        std::int64_t sum_b = 0;
-        const auto add = [&](const PhotonRecord& photon, Rgb quanta) {
-          const std::uint64_t bits = PairBits(photon.key, hitpoint);
-          constexpr std::uint64_t kMask = (1U << 21) - 1;
-          sum_r += RoundDithered(quanta.r, static_cast<std::uint32_t>(bits & kMask));
-          sum_g += RoundDithered(quanta.g, static_cast<std::uint32_t>((bits >> 21) & kMask));
-          sum_b += RoundDithered(quanta.b, static_cast<std::uint32_t>((bits >> 42) & kMask));
-          ++count;
-        };
-        if (glossy == block.glossy.end() || glossy->hitpoint != row) {
-          grid.ForEachWithin(block.positions[row], radius, [&](std::size_t i, float squared) {
-            const PhotonRecord& photon = grid.record(i);
-            if (!Counts(photon, normal, grid.position(i) - block.positions[row])) return;
-            add(photon, photon.flux * scale.quanta_per_watt *
-                            kernel.Shape(squared * inverse_squared));
-          });
-        } else {
-          const Material& material = materials[glossy->material];
-          const Frame frame(DecodeOctahedral(glossy->shading_normal_oct));
-          const Vec3 wo = frame.ToLocal(DecodeOctahedral(glossy->to_eye_oct));
-          const bool transmits = material.kind == Material::Kind::kDielectric;
-          ++glossy;
-          grid.ForEachWithin(block.positions[row], radius, [&](std::size_t i, float squared) {
-            const PhotonRecord& photon = grid.record(i);
-            const Vec3 to_photon = grid.position(i) - block.positions[row];
-            // Photons on the far side of a rough dielectric count too.
-            const bool is_behind = transmits && Dot(photon.normal, normal) < 0;
-            if (!Counts(photon, is_behind ? -normal : normal, to_photon)) return;
-            const Vec3 wi = frame.ToLocal(DecodeOctahedral(photon.arrival_oct));
-            const Rgb bsdf = EvaluateBsdf(material, wo, wi, Carried::kRadiance);
-            add(photon, photon.flux * bsdf * scale.quanta_per_watt *
-                            kernel.Shape(squared * inverse_squared));
-          });
-        }
-        if (count == 0) continue;
-        piece.hitpoints.push_back(hitpoint);
-        piece.counts.push_back(count);
-        piece.flux[0].push_back(sum_r);
-        piece.flux[1].push_back(sum_g);
-        piece.flux[2].push_back(sum_b);
-        piece.pairs += count;
+        const bool is_glossy = glossy != block.glossy.end() && glossy->hitpoint == row;
+        GatherRow<kKernel, EvidenceSums>(block, row, radii[row], grid,
+                                         is_glossy ? &*glossy++ : nullptr, materials, scale, piece);
       }
     }
   });
 
   Accumulation accumulation;
   std::size_t touched = 0;
-  for (const Piece& piece : pieces) touched += piece.hitpoints.size();
-  accumulation.hitpoints.reserve(touched);
-  accumulation.counts.reserve(touched);
-  for (auto& channel : accumulation.flux) channel.reserve(touched);
-  const auto append = [](auto& to, const auto& from) {
+  for (const Piece& piece : pieces)
+    touched += piece.hitpoints.size();
+  const auto append = [touched](auto& to, const auto& from) {
+    to.reserve(touched);
     to.insert(to.end(), from.begin(), from.end());
   };
+  accumulation.evidence.resize(EvidenceSums::kColumns);
   for (const Piece& piece : pieces) {
     append(accumulation.hitpoints, piece.hitpoints);
     append(accumulation.counts, piece.counts);
-    for (std::size_t c = 0; c < 3; ++c) append(accumulation.flux[c], piece.flux[c]);
+    for (std::size_t c = 0; c < 3; ++c)
+      append(accumulation.flux[c], piece.flux[c]);
+    for (std::size_t c = 0; c < piece.evidence.size(); ++c) {
+      append(accumulation.evidence[c], piece.evidence[c]);
+    }
     accumulation.tally.pairs += piece.pairs;
   }
   return accumulation;
+}
+
+using GatherFunction = decltype(&GatherAll<KernelKind::kConstant, NoEvidence>);
+
+template <typename EvidenceSums>
+GatherFunction ForKernel(KernelKind kernel) {
+  switch (kernel) {
+    case KernelKind::kConstant:
+      return &GatherAll<KernelKind::kConstant, EvidenceSums>;
+    case KernelKind::kEpanechnikov:
+      return &GatherAll<KernelKind::kEpanechnikov, EvidenceSums>;
+    case KernelKind::kBiweight:
+      return &GatherAll<KernelKind::kBiweight, EvidenceSums>;
+    case KernelKind::kGaussian:
+      return &GatherAll<KernelKind::kGaussian, EvidenceSums>;
+  }
+  return nullptr;
+}
+
+GatherFunction Specialised(KernelKind kernel, Evidence evidence) {
+  switch (evidence) {
+    case Evidence::kNone:
+      return ForKernel<NoEvidence>(kernel);
+    case Evidence::kSectors:
+      return ForKernel<SectorEvidence>(kernel);
+    case Evidence::kFrequency:
+      return ForKernel<FrequencyEvidence>(kernel);
+  }
+  return nullptr;
+}
+
+}  // namespace
+
+Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii, const PhotonGrid& grid,
+                    const std::vector<Material>& materials, const Kernel& kernel,
+                    const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop,
+                    Evidence evidence) {
+  return Specialised(kernel.kind, evidence)(block, radii, grid, materials, scale, team, stop);
 }
 
 }  // namespace lucerna

@@ -5,6 +5,7 @@
 
 #include "render/base/parallel.h"
 #include "render/estimate/accumulation.h"
+#include "render/estimate/evidence.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/estimate/kernel.h"
 #include "render/math/fixed_point.h"
@@ -14,13 +15,14 @@
 namespace lucerna {
 
 // Every hitpoint adds up the photons within its radius that landed on its side of the surface:
-// kernel-weighted flux for diffuse ones, times the BSDF for glossy ones. Fills everything of the
-// accumulation but the tally, of which it adds `pairs`. Pairs are independent of each other, so
-// neither threads nor the order of photons can be seen in the result. Once `stop` is true it ends
-// soon, with a result of no use.
+// kernel-weighted flux for diffuse ones, times the BSDF for glossy ones, and what `evidence` names.
+// Fills everything of the accumulation but the tally, of which it adds `pairs`. Pairs are
+// independent of each other, so neither threads nor the order of photons can be seen in the result.
+// Once `stop` is true it ends soon, with a result of no use.
 [[nodiscard]] Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
                                   const PhotonGrid& grid, const std::vector<Material>& materials,
                                   const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,
-                                  const std::atomic<bool>& stop);
+                                  const std::atomic<bool>& stop,
+                                  Evidence evidence = Evidence::kNone);
 
 }  // namespace lucerna

@@ -17,6 +17,7 @@
 
 #include "render/base/clock.h"
 #include "render/geometry/numeric_profile.h"
+#include "render/wire/channel.h"
 #include "worker/session.h"
 
 namespace lucerna {
@@ -92,6 +93,12 @@ int Main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
+  }
+  if (!IsAddress(options.server)) {
+    std::fprintf(stderr,
+                 "lucerna-worker: --server \"%s\": give HOST:PORT, such as 127.0.0.1:7400\n",
+                 options.server.c_str());
+    return kExitUsage;
   }
   options.connect_timeout =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(connect_timeout_s));

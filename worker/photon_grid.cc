@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace lucerna {
 namespace {
@@ -12,7 +13,8 @@ constexpr double kFewestCells = 4096;
 
 }  // namespace
 
-PhotonGrid::PhotonGrid(const std::vector<std::vector<Deposit>>& deposits, const Bounds& region,
+PhotonGrid::PhotonGrid(const std::vector<std::vector<Deposit>>& deposits,
+                       const std::vector<std::vector<float>>& traces, const Bounds& region,
                        float cell, ThreadTeam& team)
     : low_(region.low) {
   std::size_t count = 0;
@@ -33,7 +35,8 @@ PhotonGrid::PhotonGrid(const std::vector<std::vector<Deposit>>& deposits, const 
            (std::floor(static_cast<double>(extent.y) / w) + 1) *
            (std::floor(static_cast<double>(extent.z) / w) + 1);
   };
-  while (cells_at(width) > most_cells) width *= 1.25;
+  while (cells_at(width) > most_cells)
+    width *= 1.25;
   inverse_cell_ = static_cast<float>(1 / width);
   nx_ = static_cast<int>(static_cast<double>(extent.x) / width) + 1;
   ny_ = static_cast<int>(static_cast<double>(extent.y) / width) + 1;
@@ -81,20 +84,29 @@ PhotonGrid::PhotonGrid(const std::vector<std::vector<Deposit>>& deposits, const 
   y_.assign(count + 8, HUGE_VALF);
   z_.assign(count + 8, HUGE_VALF);
   records_.resize(count);
-  team.For(groups, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t group = begin; group < end; ++group) {
-      for (std::size_t c = chunk_of_group(group); c < chunk_of_group(group + 1); ++c) {
-        std::size_t in = start[c];
-        for (const Deposit& deposit : deposits[c]) {
-          const std::size_t out = counts[group][cell_of[in++]]++;
-          x_[out] = deposit.position.x;
-          y_[out] = deposit.position.y;
-          z_[out] = deposit.position.z;
-          records_[out] = {deposit.flux, deposit.normal, deposit.arrival_oct, deposit.key};
+  const auto place_all = [&](auto with_traces) {
+    team.For(groups, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t group = begin; group < end; ++group) {
+        for (std::size_t c = chunk_of_group(group); c < chunk_of_group(group + 1); ++c) {
+          for (std::size_t i = 0; i < deposits[c].size(); ++i) {
+            const Deposit& deposit = deposits[c][i];
+            const std::size_t out = counts[group][cell_of[start[c] + i]]++;
+            x_[out] = deposit.position.x;
+            y_[out] = deposit.position.y;
+            z_[out] = deposit.position.z;
+            records_[out] = {deposit.flux, deposit.normal, deposit.arrival_oct, deposit.key};
+            if constexpr (decltype(with_traces)::value) traces_[out] = traces[c][i];
+          }
         }
       }
-    }
-  });
+    });
+  };
+  if (traces.empty()) {
+    place_all(std::false_type{});
+  } else {
+    traces_.resize(count);
+    place_all(std::true_type{});
+  }
 }
 
 }  // namespace lucerna

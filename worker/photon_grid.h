@@ -26,12 +26,17 @@ struct alignas(32) PhotonRecord {
 class PhotonGrid {
  public:
   // `region` holds all deposits. Cells are about `cell` wide [scene units], wider when there would
-  // be far more of them than deposits.
-  PhotonGrid(const std::vector<std::vector<Deposit>>& deposits, const Bounds& region, float cell,
+  // be far more of them than deposits. `traces` are the deposits' spectral traces, chunk by chunk;
+  // empty when the job has no frequency photons.
+  PhotonGrid(const std::vector<std::vector<Deposit>>& deposits,
+             const std::vector<std::vector<float>>& traces, const Bounds& region, float cell,
              ThreadTeam& team);
 
   [[nodiscard]] std::size_t size() const { return records_.size(); }
   [[nodiscard]] const PhotonRecord& record(std::size_t photon) const { return records_[photon]; }
+  // The photon's spectral trace [1/length²]; below 0 for photons without a spectrum. Requires
+  // traces.
+  [[nodiscard]] float trace(std::size_t photon) const { return traces_[photon]; }
   [[nodiscard]] Vec3 position(std::size_t photon) const {
     return {x_[photon], y_[photon], z_[photon]};
   }
@@ -52,6 +57,7 @@ class PhotonGrid {
   std::vector<std::uint32_t> first_;  // [cells + 1] photon of each cell
   std::vector<float> x_, y_, z_;      // [photons + 8], the rest far away
   std::vector<PhotonRecord> records_;
+  std::vector<float> traces_;  // [photons] or empty
 };
 
 }  // namespace lucerna

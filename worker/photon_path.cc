@@ -16,8 +16,8 @@ namespace {
 constexpr float kMaxCosineRatio = 16;
 
 float CosineRatio(float shading_cosine, float geometric_cosine) {
-  return std::min(kMaxCosineRatio, std::abs(shading_cosine) /
-                                       std::max(std::abs(geometric_cosine), 1e-12F));
+  return std::min(kMaxCosineRatio,
+                  std::abs(shading_cosine) / std::max(std::abs(geometric_cosine), 1e-12F));
 }
 
 bool Inside(const Bounds& region, Vec3 p) {
@@ -29,55 +29,74 @@ bool Inside(const Bounds& region, Vec3 p) {
 
 PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& intersector,
                                    const LightSet& lights, const RenderSettings& settings,
-                                   const Bounds& region)
+                                   const SpectrumTracer* spectra, const Bounds& region)
     : scene_(scene),
       intersector_(intersector),
       lights_(lights),
       settings_(settings),
+      spectra_(spectra),
       region_(region) {
   for (const Material& material : scene.materials) {
     gathers_.push_back(Gathers(material) ? 1 : 0);
   }
 }
 
-int PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index,
-                            std::vector<Deposit>& deposits, std::uint64_t& dropped) const {
+void PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index, Landed& landed) const {
   constexpr std::uint64_t kPhotonKey = 0x50484F544F4E5321ULL;
   const std::uint64_t job_key = CombineKeys(settings_.seed, kPhotonKey);
   // One sequence over all passes: they share a job's photons out evenly between them.
   const std::uint64_t number =
       pass * static_cast<std::uint64_t>(settings_.photons_per_pass) + index;
+  if (spectra_ == nullptr) return Walk<false>(number, job_key, landed);
+  constexpr std::uint64_t kShareKey = 0x4652455155454E43ULL;
+  const auto bits = static_cast<std::uint32_t>(CombineKeys(job_key ^ kShareKey, number) >> 32);
+  if (static_cast<double>(UnitFloat(bits)) < settings_.frequency_share) {
+    return Walk<true>(number, job_key, landed);
+  }
+  Walk<false>(number, job_key, landed);
+  landed.traces.resize(landed.deposits.size(), -1.0F);
+}
+
+template <bool kHasSpectrum>
+void PhotonPathTracer::Walk(std::uint64_t number, std::uint64_t job_key, Landed& landed) const {
   const SobolPoint u = OwenSobol(number, job_key);
   KeyedRng rng(CombineKeys(job_key, number));
 
   Emission emission;
-  if (!lights_.SampleEmission(FineChoice(u[4], rng.Uniform()), u[0], u[1], u[2], u[3], emission)) return 0;
+  if (!lights_.SampleEmission(FineChoice(u[4], rng.Uniform()), u[0], u[1], u[2], u[3], emission))
+    return;
   Ray ray = emission.ray;
   Rgb flux = emission.flux;
-  int rays = 0;
+  [[maybe_unused]] SpectrumTracer::Carried carried;
+  if constexpr (kHasSpectrum) carried = spectra_->Leave(emission);
   for (int landing = 0; landing < settings_.max_depth; ++landing) {
     Hit hit;
-    ++rays;
-    if (!intersector_.Intersect(ray, hit)) return rays;
+    ++landed.rays;
+    if (!intersector_.Intersect(ray, hit)) return;
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
     const Material& material = scene_.materials[surface.material];
     const Vec3 wo = -ray.direction;
+    if constexpr (kHasSpectrum) spectra_->Fly(carried, ray, hit.t);
     if (surface.has_shading_normal) {
       const float shading = Dot(wo, surface.shading_normal);
       const float geometric = Dot(wo, surface.geometric_normal);
       // Below the smoothed surface's horizon: that surface would not have been met here.
-      if (!(shading * geometric > 0)) return rays;
+      if (!(shading * geometric > 0)) return;
       flux *= CosineRatio(shading, geometric);
     }
     if (!IsFinite(flux) || !IsFinite(surface.position)) {
-      ++dropped;
-      return rays;
+      ++landed.dropped;
+      return;
     }
     if (landing > 0 && gathers_[surface.material] != 0 && Inside(region_, surface.position)) {
-      deposits.push_back({surface.position, flux, FaceForward(surface.geometric_normal, wo),
-                          EncodeOctahedral(wo), static_cast<std::uint32_t>(rng.Bits() >> 32)});
+      landed.deposits.push_back({surface.position, flux, FaceForward(surface.geometric_normal, wo),
+                                 EncodeOctahedral(wo),
+                                 static_cast<std::uint32_t>(rng.Bits() >> 32)});
+      if constexpr (kHasSpectrum) {
+        landed.traces.push_back(spectra_->Received(carried, surface, wo));
+      }
     }
-    if (landing + 1 == settings_.max_depth) return rays;
+    if (landing + 1 == settings_.max_depth) return;
 
     float u_lobe = u[7];
     float u1 = u[5];
@@ -90,7 +109,7 @@ int PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index,
     const Frame frame(surface.shading_normal);
     BsdfSample sample;
     if (!SampleBsdf(material, frame.ToLocal(wo), u_lobe, u1, u2, Carried::kFlux, sample)) {
-      return rays;
+      return;
     }
     const Vec3 wi = frame.ToWorld(sample.wi);
     Rgb scattered = flux * sample.weight;
@@ -98,21 +117,22 @@ int PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index,
       const float geometric = Dot(wi, surface.geometric_normal);
       const bool transmits = Dot(wo, frame.n) * sample.wi.z < 0;
       const bool crosses = Dot(wo, surface.geometric_normal) * geometric < 0;
-      if (transmits != crosses) return rays;
+      if (transmits != crosses) return;
       scattered *= 1 / std::max(CosineRatio(sample.wi.z, geometric), 1 / kMaxCosineRatio);
     }
     // Survives with the share of flux that is left, and then has the flux it came with.
     const float before = MaxChannel(flux);
     const float survival = MaxChannel(scattered) / before;
-    if (!(survival > 0)) return rays;
+    if (!(survival > 0)) return;
     if (survival < 1) {
-      if (!(rng.Uniform() < survival)) return rays;
+      if (!(rng.Uniform() < survival)) return;
       scattered *= 1 / survival;
     }
     flux = scattered;
+    if constexpr (kHasSpectrum) spectra_->Scatter(carried, surface, material, wo, wi);
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
   }
-  return rays;
+  return;
 }
 
 }  // namespace lucerna

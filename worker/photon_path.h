@@ -16,6 +16,7 @@
 #include "render/scene/scene.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/light.h"
+#include "worker/photon_spectrum.h"
 
 namespace lucerna {
 
@@ -31,19 +32,36 @@ struct Deposit {
 class PhotonPathTracer {
  public:
   // Keeps references to all. Deposits outside `region` are not kept.
+  // `spectra`: for jobs with frequency photons, else nullptr.
   PhotonPathTracer(const Scene& scene, const Intersector& intersector, const LightSet& lights,
-                   const RenderSettings& settings, const Bounds& region);
+                   const RenderSettings& settings, const SpectrumTracer* spectra,
+                   const Bounds& region);
 
-  // Traces photon `index` of `pass` and appends its deposits. Returns the rays traced; `dropped`
-  // counts photons given up because a number was not finite. Threads: any.
-  int Trace(std::uint64_t pass, std::uint64_t index, std::vector<Deposit>& deposits,
-            std::uint64_t& dropped) const;
+  // What the photons of a range left.
+  struct Landed {
+    std::vector<Deposit> deposits;
+    // [deposits] the spectral trace of each [1/length²], below 0 for photons without a spectrum;
+    // empty unless the job traces frequency photons.
+    std::vector<float> traces;
+    std::uint64_t rays = 0;
+    // Photons given up because a number was not finite.
+    std::uint64_t dropped = 0;
+  };
+
+  // Traces photon `index` of `pass`. Threads: any, each with its own `landed`.
+  void Trace(std::uint64_t pass, std::uint64_t index, Landed& landed) const;
 
  private:
+  // The walk of one photon; with a spectrum only where the job and the photon have one, so that
+  // other photons pay nothing for it.
+  template <bool kHasSpectrum>
+  void Walk(std::uint64_t number, std::uint64_t job_key, Landed& landed) const;
+
   const Scene& scene_;
   const Intersector& intersector_;
   const LightSet& lights_;
   const RenderSettings& settings_;
+  const SpectrumTracer* spectra_;  // nullptr: no frequency photons
   Bounds region_;
   std::vector<std::uint8_t> gathers_;  // [materials]
 };

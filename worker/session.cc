@@ -5,6 +5,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "render/base/parallel.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {
@@ -75,7 +76,7 @@ StatusOr<v1::RegisterResponse> Session::Join() {
   Duration pause = kFirstPause;
   v1::RegisterRequest request;
   request.set_name(options_.name);
-  request.set_threads(options_.threads);
+  request.set_threads(ThreadTeam(options_.threads).threads());
   request.set_numeric_profile(options_.numeric_profile);
   while (true) {
     const auto connection = std::make_shared<Connection>(options_.server);

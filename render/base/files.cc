@@ -1,13 +1,15 @@
 #include "render/base/files.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 #include <utility>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace lucerna {
 namespace {
@@ -55,6 +57,14 @@ std::string FolderOf(const std::string& path) {
   const std::size_t slash = path.rfind('/');
   if (slash == std::string::npos) return ".";
   return slash == 0 ? "/" : path.substr(0, slash);
+}
+
+// The file behind a link, so that it is the file that is replaced and not the link: /dev/stdout
+// is one, and would be lost to the whole machine.
+std::string BehindLinks(const std::string& path) {
+  std::error_code error;
+  const std::filesystem::path target = std::filesystem::canonical(path, error);
+  return error ? path : target.string();
 }
 
 // Two writers of one path in one process do not share a temporary name.
@@ -115,18 +125,20 @@ Status WriteFile(const std::string& path, std::string_view bytes) {
     if (device.number() < 0) return FromErrno(errno, path, "cannot open");
     while (!bytes.empty()) {
       const ssize_t written = ::write(device.number(), bytes.data(), bytes.size());
+      if (written < 0 && errno == EINTR) continue;
       if (written < 0) return FromErrno(errno, path, "cannot write");
       bytes.remove_prefix(static_cast<std::size_t>(written));
     }
     return absl::OkStatus();
   }
 
-  const std::string temporary = TemporaryBeside(path);
+  const std::string target = BehindLinks(path);
+  const std::string temporary = TemporaryBeside(target);
   Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (file.number() < 0) return FromErrno(errno, path, "cannot create");
   Status status = WriteAll(file.number(), bytes, path);
   if (file.Close() != 0 && status.ok()) status = FromErrno(errno, path, "cannot write");
-  if (status.ok() && ::rename(temporary.c_str(), path.c_str()) != 0) {
+  if (status.ok() && ::rename(temporary.c_str(), target.c_str()) != 0) {
     status = FromErrno(errno, path, "cannot replace");
   }
   if (!status.ok()) {
@@ -134,9 +146,19 @@ Status WriteFile(const std::string& path, std::string_view bytes) {
     return status;
   }
   // The rename itself is on the disk only when the folder is.
-  Descriptor folder(::open(FolderOf(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  Descriptor folder(::open(FolderOf(target).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.number() >= 0) ::fsync(folder.number());
   return absl::OkStatus();
+}
+
+bool IsSameFile(const std::string& a, const std::string& b) {
+  const auto real = [](const std::string& path) {
+    std::error_code error;
+    std::filesystem::path absolute = std::filesystem::absolute(path, error);
+    std::filesystem::path found = std::filesystem::weakly_canonical(absolute, error);
+    return error ? absolute : found;
+  };
+  return real(a) == real(b);
 }
 
 Status CheckWritable(const std::string& path) {
@@ -145,7 +167,7 @@ Status CheckWritable(const std::string& path) {
     if (S_ISDIR(existing.st_mode)) return FromErrno(EISDIR, path, "cannot write");
     if (!S_ISREG(existing.st_mode)) return absl::OkStatus();
   }
-  const std::string folder = FolderOf(path);
+  const std::string folder = FolderOf(BehindLinks(path));
   if (::access(folder.c_str(), W_OK | X_OK) != 0) return FromErrno(errno, path, "cannot create");
   return absl::OkStatus();
 }

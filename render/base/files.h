@@ -18,9 +18,14 @@ namespace lucerna {
 [[nodiscard]] StatusOr<std::string> ReadFile(const std::string& path,
                                              std::uint64_t max_size_bytes = std::uint64_t{8} << 30);
 
-// Writes `bytes` beside `path`, syncs them, and renames them over it.
+// Writes `bytes` beside `path`, syncs them, and renames them over it. A link stays a link, to the
+// new bytes.
 // Errors: what the system said, with the path; then no file of ours is left behind.
 [[nodiscard]] Status WriteFile(const std::string& path, std::string_view bytes);
+
+// Whether both paths lead to one place, be there a file or not: writing one would replace the
+// other.
+[[nodiscard]] bool IsSameFile(const std::string& a, const std::string& b);
 
 // Errors: as WriteFile would fail at `path`, found out before hours of rendering.
 [[nodiscard]] Status CheckWritable(const std::string& path);

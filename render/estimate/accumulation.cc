@@ -29,7 +29,8 @@ BatchTally& BatchTally::operator+=(const BatchTally& other) {
   return *this;
 }
 
-PassSums::PassSums(std::size_t hitpoints) : counts_(hitpoints, 0) {
+PassSums::PassSums(std::size_t hitpoints, std::size_t evidence_columns)
+    : counts_(hitpoints, 0), evidence_(evidence_columns, std::vector<std::int64_t>(hitpoints, 0)) {
   for (std::vector<std::int64_t>& channel : flux_)
     channel.assign(hitpoints, 0);
 }
@@ -42,6 +43,16 @@ Status PassSums::Check(const Accumulation& accumulation, bool adding) const {
   }
   for (const std::vector<std::int64_t>& channel : accumulation.flux) {
     if (channel.size() != rows) {
+      return absl::InvalidArgumentError("an accumulation's columns differ in length");
+    }
+  }
+  if (accumulation.evidence.size() != evidence_.size()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("an accumulation has ", accumulation.evidence.size(),
+                     " columns of evidence where the job asks for ", evidence_.size()));
+  }
+  for (const std::vector<std::int64_t>& column : accumulation.evidence) {
+    if (column.size() != rows) {
       return absl::InvalidArgumentError("an accumulation's columns differ in length");
     }
   }
@@ -70,6 +81,9 @@ Status PassSums::Check(const Accumulation& accumulation, bool adding) const {
     for (std::size_t channel = 0; channel < 3; ++channel) {
       fits = fits && SumFits(flux_[channel][row], accumulation.flux[channel][i], adding);
     }
+    for (std::size_t column = 0; column < evidence_.size(); ++column) {
+      fits = fits && SumFits(evidence_[column][row], accumulation.evidence[column][i], adding);
+    }
     if (!fits) {
       return absl::OutOfRangeError(
           absl::StrCat("the sum of hitpoint ", row, " would not fit in 64 bits"));
@@ -88,6 +102,11 @@ Status PassSums::Add(const Accumulation& accumulation) {
       flux_[channel][accumulation.hitpoints[i]] += accumulation.flux[channel][i];
     }
   }
+  for (std::size_t column = 0; column < evidence_.size(); ++column) {
+    for (std::size_t i = 0; i < accumulation.size(); ++i) {
+      evidence_[column][accumulation.hitpoints[i]] += accumulation.evidence[column][i];
+    }
+  }
   tally_ += accumulation.tally;
   return absl::OkStatus();
 }
@@ -100,6 +119,11 @@ Status PassSums::Subtract(const Accumulation& accumulation) {
   for (std::size_t channel = 0; channel < 3; ++channel) {
     for (std::size_t i = 0; i < accumulation.size(); ++i) {
       flux_[channel][accumulation.hitpoints[i]] -= accumulation.flux[channel][i];
+    }
+  }
+  for (std::size_t column = 0; column < evidence_.size(); ++column) {
+    for (std::size_t i = 0; i < accumulation.size(); ++i) {
+      evidence_[column][accumulation.hitpoints[i]] -= accumulation.evidence[column][i];
     }
   }
   const BatchTally& other = accumulation.tally;

@@ -18,11 +18,11 @@ namespace lucerna {
 
 // The books of a batch, for progress and for checking energy. Sums, so they merge like the rest.
 struct BatchTally {
-  std::uint64_t photons = 0;        // photon paths emitted
-  std::uint64_t rays = 0;           // rays traced for them
-  std::uint64_t deposits = 0;       // landings offered to the hitpoints
-  std::uint64_t pairs = 0;          // (photon, hitpoint) contributions
-  std::uint64_t dropped = 0;        // photons given up because a number was not finite
+  std::uint64_t photons = 0;   // photon paths emitted
+  std::uint64_t rays = 0;      // rays traced for them
+  std::uint64_t deposits = 0;  // landings offered to the hitpoints
+  std::uint64_t pairs = 0;     // (photon, hitpoint) contributions
+  std::uint64_t dropped = 0;   // photons given up because a number was not finite
 
   BatchTally& operator+=(const BatchTally& other);
   bool operator==(const BatchTally&) const = default;
@@ -31,8 +31,11 @@ struct BatchTally {
 struct Accumulation {
   // Rows of the hitpoint block, strictly increasing.
   std::vector<std::uint32_t> hitpoints;
-  std::vector<std::uint32_t> counts;                  // [hitpoints] photons, each >= 1
-  std::array<std::vector<std::int64_t>, 3> flux;      // [3][hitpoints] in quanta, per channel
+  std::vector<std::uint32_t> counts;              // [hitpoints] photons, each >= 1
+  std::array<std::vector<std::int64_t>, 3> flux;  // [3][hitpoints] in quanta, per channel
+  // [columns][hitpoints] what the job's radius controller asks for besides (estimate/evidence.h);
+  // no columns for most.
+  std::vector<std::vector<std::int64_t>> evidence;
   BatchTally tally;
 
   [[nodiscard]] std::size_t size() const { return hitpoints.size(); }
@@ -42,7 +45,7 @@ struct Accumulation {
 // The sum of all batches of one pass, one row per hitpoint of the block.
 class PassSums {
  public:
-  explicit PassSums(std::size_t hitpoints);
+  explicit PassSums(std::size_t hitpoints, std::size_t evidence_columns = 0);
 
   // Adds every row. All or nothing.
   // Errors: INVALID_ARGUMENT when the accumulation breaks its own promises or names a hitpoint
@@ -57,6 +60,7 @@ class PassSums {
   [[nodiscard]] const std::vector<std::int64_t>& flux(int channel) const {
     return flux_[static_cast<std::size_t>(channel)];
   }
+  [[nodiscard]] const std::vector<std::vector<std::int64_t>>& evidence() const { return evidence_; }
   [[nodiscard]] const BatchTally& tally() const { return tally_; }
 
  private:
@@ -64,6 +68,7 @@ class PassSums {
 
   std::vector<std::uint64_t> counts_;
   std::array<std::vector<std::int64_t>, 3> flux_;
+  std::vector<std::vector<std::int64_t>> evidence_;
   BatchTally tally_;
 };
 

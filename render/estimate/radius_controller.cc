@@ -1,7 +1,13 @@
 #include "render/estimate/radius_controller.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
+
+#include "render/estimate/evidence.h"
+#include "render/estimate/kernel.h"
+#include "render/frequency/bandwidth.h"
 
 namespace lucerna {
 namespace {
@@ -12,8 +18,8 @@ class Ppm final : public RadiusController {
  public:
   explicit Ppm(double alpha) : alpha_(alpha) {}
 
-  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence,
-                   std::uint64_t /*pass*/) const override {
+  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
+                   std::span<double> /*memory*/) const override {
     if (!(evidence.photons > 0)) return now;
     // The photons were gathered in a disc that may be larger than today's: count those that
     // today's would have held.
@@ -35,11 +41,10 @@ class Pppm final : public RadiusController {
  public:
   explicit Pppm(double alpha) : alpha_(alpha) {}
 
-  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence,
-                   std::uint64_t pass) const override {
+  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t pass,
+                   std::span<double> /*memory*/) const override {
     const auto i = static_cast<double>(pass + 1);
-    return {static_cast<float>(static_cast<double>(now.radius) *
-                               std::sqrt((i + alpha_) / (i + 1))),
+    return {static_cast<float>(static_cast<double>(now.radius) * std::sqrt((i + alpha_) / (i + 1))),
             now.photons + static_cast<float>(evidence.photons)};
   }
 
@@ -47,14 +52,209 @@ class Pppm final : public RadiusController {
   double alpha_;
 };
 
+// Of the consistent frequency controller, below the predicted radius.
+constexpr double kConsistentAlpha = 0.95;
+
+// Keeps the radius while the photons in the disc look uniform, and shrinks it where a chi-square
+// test over twelve cells refuses that.
+// Source: Lin, Li, Zeng, Zhang, Jia, Wang & Zhang 2020, "CPPM: Chi-Squared Progressive Photon
+// Mapping".
+class Cppm final : public RadiusController {
+ public:
+  std::size_t MemoryPerPixel() const override { return kSectors + 1; }
+
+  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
+                   std::span<double> memory) const override {
+    PixelRadius next = {now.radius, now.photons + static_cast<float>(evidence.photons)};
+    // Photons of a disc that has been left behind say nothing about today's cells.
+    if (evidence.radius > now.radius) return next;
+    double total = 0;
+    for (std::size_t i = 0; i < kSectors; ++i) {
+      memory[i] += static_cast<double>(evidence.columns[i]);
+      total += memory[i];
+    }
+    double& wanted = memory[kSectors];
+    if (wanted == 0) wanted = kFirstTest;
+    if (total < wanted) return next;
+    // Quantiles of chi-square at 95 % with 11 and 5 degrees of freedom.
+    if (Statistic(memory.first(kSectors)) >= 19.675) {
+      const bool inner_is_even = Statistic(memory.first(kSectors / 2)) < 11.070;
+      next.radius *= std::sqrt(inner_is_even ? 0.5F : 0.8F);
+    }
+    for (double& count : memory.first(kSectors))
+      count = 0;
+    wanted *= kTestGrowth;
+    return next;
+  }
+
+ private:
+  static constexpr double kFirstTest = 50;
+  static constexpr double kTestGrowth = 1.5625;
+
+  // Pearson's statistic of counts that should be equal.
+  static double Statistic(std::span<const double> counts) {
+    double sum = 0;
+    double squares = 0;
+    for (const double count : counts) {
+      sum += count;
+      squares += count * count;
+    }
+    return sum > 0 ? static_cast<double>(counts.size()) * squares / sum - sum : 0;
+  }
+};
+
+// What frequency photons say of a pixel, kept over passes as FrequencySums in the controller's
+// memory. Lengths in unit radii.
+class FrequencyBelief {
+ public:
+  static constexpr std::size_t kNumbers = kFrequencyColumns;
+
+  FrequencyBelief(const RenderSettings& settings, float initial_radius)
+      : bias_(settings.bias),
+        moments_(Kernel{settings.kernel}.Moments()),
+        range_{kSmallestShare * static_cast<double>(initial_radius),
+               static_cast<double>(initial_radius)} {}
+
+  [[nodiscard]] const KernelMoments& moments() const { return moments_; }
+
+  // Takes in a pass, then lets what is older fade with the disc's area.
+  static void Add(const PassEvidence& evidence, std::span<double> memory) {
+    const auto radius = static_cast<double>(evidence.radius);
+    // Columns hold x = trace · radius²; memory holds traces, so that radii can change.
+    const double to_trace = 1 / (radius * radius);
+    const auto column = [&](FrequencyColumn c) { return static_cast<double>(evidence.columns[c]); };
+    Store(Sums(memory) +
+              FrequencySums{kFrequencyUnit * column(kFrequencyWeight),
+                            kFrequencyUnit * column(kFrequencyWeight2),
+                            kFrequencyUnit * to_trace * column(kFrequencyTrace),
+                            kFrequencyUnit * to_trace * to_trace * column(kFrequencyTrace2),
+                            column(kFrequencyCount)},
+          memory);
+  }
+  static void Fade(double area_ratio, std::span<double> memory) {
+    Store(Sums(memory).Faded(area_ratio), memory);
+  }
+
+  [[nodiscard]] std::optional<BandwidthPrediction> Predict(std::span<const double> memory) const {
+    const auto predicted = PredictTrace(Sums(memory), range_, bias_, moments_);
+    if (!predicted) return std::nullopt;
+    return BandwidthPrediction{predicted->trace, RadiusFor(bias_, predicted->trace, moments_)};
+  }
+
+ private:
+  // Predictions are held above this share of the first radius.
+  static constexpr double kSmallestShare = 0.01;
+
+  static FrequencySums Sums(std::span<const double> memory) {
+    return {memory[kFrequencyWeight], memory[kFrequencyWeight2], memory[kFrequencyTrace],
+            memory[kFrequencyTrace2], memory[kFrequencyCount]};
+  }
+  static void Store(const FrequencySums& sums, std::span<double> memory) {
+    memory[kFrequencyWeight] = sums.weight;
+    memory[kFrequencyWeight2] = sums.weight2;
+    memory[kFrequencyTrace] = sums.weighted_trace;
+    memory[kFrequencyTrace2] = sums.weighted_trace2;
+    memory[kFrequencyCount] = sums.photons;
+  }
+
+  double bias_;
+  KernelMoments moments_;
+  RadiusRange range_;
+};
+
+// Shrinks as PPM does until the radius that the frequency photons predict to keep the bias within
+// the tolerance; from there a share `floor_alpha` of the photons is kept. With 1 the radius stays
+// (the published rule: all photons kept, a bias within the tolerance for ever); below 1 the
+// estimate is consistent. Source: Belcour & Soler 2011, "Frequency Based Kernel Estimation for
+// Progressive Photon Mapping".
+class FrequencyFloor final : public RadiusController {
+ public:
+  FrequencyFloor(const RenderSettings& settings, float initial_radius, double floor_alpha)
+      : alpha_(settings.alpha), floor_alpha_(floor_alpha), belief_(settings, initial_radius) {}
+
+  std::size_t MemoryPerPixel() const override { return FrequencyBelief::kNumbers; }
+
+  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
+                   std::span<double> memory) const override {
+    FrequencyBelief::Add(evidence, memory);
+    if (!(evidence.photons > 0)) return now;
+    const std::optional<BandwidthPrediction> prediction = belief_.Predict(memory);
+    const auto radius = static_cast<double>(now.radius);
+    const double shrink = radius / static_cast<double>(evidence.radius);
+    const RadiusStep step =
+        ShrinkToPrediction(static_cast<double>(now.photons), evidence.photons * shrink * shrink,
+                           radius, prediction ? prediction->min_radius : 0, alpha_, floor_alpha_);
+    FrequencyBelief::Fade(step.kept_share, memory);
+    return {static_cast<float>(step.radius), static_cast<float>(step.photons)};
+  }
+
+  bool Predicts() const override { return true; }
+  std::optional<BandwidthPrediction> Predict(std::span<const double> memory) const override {
+    return belief_.Predict(memory);
+  }
+
+ private:
+  double alpha_;
+  double floor_alpha_;
+  FrequencyBelief belief_;
+};
+
+// Takes the radius that makes noise and predicted bias together least, never below the one that
+// keeps the bias within the tolerance.
+class FrequencyMse final : public RadiusController {
+ public:
+  FrequencyMse(const RenderSettings& settings, float initial_radius)
+      : belief_(settings, initial_radius) {}
+
+  std::size_t MemoryPerPixel() const override { return FrequencyBelief::kNumbers + 1; }
+
+  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
+                   std::span<double> memory) const override {
+    FrequencyBelief::Add(evidence, memory);
+    const auto gathered = static_cast<double>(evidence.radius);
+    double& photon_density = memory[FrequencyBelief::kNumbers];
+    photon_density += evidence.photons / (std::numbers::pi * gathered * gathered);
+    const auto radius = static_cast<double>(now.radius);
+    const std::optional<BandwidthPrediction> prediction = belief_.Predict(memory);
+    // Until there is evidence the radius stays: at a photon or two a pass, tens of passes go by
+    // before eight frequency photons have come, and a radius that shrank meanwhile could not grow
+    // back.
+    double next = radius;
+    if (prediction && photon_density > 0) {
+      next =
+          StepToLeastError(radius, prediction->min_radius,
+                           LeastErrorRadius(photon_density, prediction->trace, belief_.moments()));
+    }
+    FrequencyBelief::Fade(next * next / (radius * radius), memory);
+    return {static_cast<float>(next), now.photons + static_cast<float>(evidence.photons)};
+  }
+
+  bool Predicts() const override { return true; }
+  std::optional<BandwidthPrediction> Predict(std::span<const double> memory) const override {
+    return belief_.Predict(memory);
+  }
+
+ private:
+  FrequencyBelief belief_;
+};
+
 }  // namespace
 
-std::unique_ptr<RadiusController> MakeRadiusController(const RenderSettings& settings) {
+std::unique_ptr<RadiusController> MakeRadiusController(const RenderSettings& settings,
+                                                       float initial_radius) {
   switch (settings.radius_controller) {
     case RadiusControllerKind::kPpm:
       return std::make_unique<Ppm>(settings.alpha);
     case RadiusControllerKind::kPppm:
       return std::make_unique<Pppm>(settings.alpha);
+    case RadiusControllerKind::kCppm:
+      return std::make_unique<Cppm>();
+    case RadiusControllerKind::kFrequency:
+      return std::make_unique<FrequencyFloor>(settings, initial_radius, 1);
+    case RadiusControllerKind::kFrequencyConsistent:
+      return std::make_unique<FrequencyFloor>(settings, initial_radius, kConsistentAlpha);
+    case RadiusControllerKind::kFrequencyMse:
+      return std::make_unique<FrequencyMse>(settings, initial_radius);
   }
   return nullptr;
 }

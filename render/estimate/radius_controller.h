@@ -1,11 +1,15 @@
 // From what a pixel's photons were, how large is its next radius?
 //
 // A controller is a pure rule, applied to every pixel that had a hitpoint after each pass, in
-// pass order. Radii are in units that the pass fixes per hitpoint (see EyePass::unit_radii).
+// pass order. Radii are in units that the pass fixes per hitpoint (see HitpointRows::unit_radii).
+// It asks for the columns of evidence it uses (estimate/evidence.h) and for as many numbers of
+// memory a pixel as it needs; most use neither.
 #pragma once
 
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <span>
 
 #include "render/scene/render_settings.h"
 
@@ -22,17 +26,35 @@ struct PixelRadius {
 struct PassEvidence {
   double photons = 0;  // M, gathered with the radius below
   float radius = 0;    // in unit radii; at least PixelRadius::radius, since radii lag by a pass
+  // One number a column, in the controller's order of columns.
+  std::span<const std::int64_t> columns;
+};
+
+// What a frequency controller believes of a pixel.
+struct BandwidthPrediction {
+  double trace = 0;       // of the spatial spectral covariance [1/unit radius²]
+  double min_radius = 0;  // that keeps the bias within the tolerance [unit radii]
 };
 
 class RadiusController {
  public:
   virtual ~RadiusController() = default;
+  // Numbers of memory a pixel, zero before the first pass.
+  [[nodiscard]] virtual std::size_t MemoryPerPixel() const { return 0; }
   // The state after `pass` (from 0) brought `evidence`. A radius never grows.
   [[nodiscard]] virtual PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence,
-                                         std::uint64_t pass) const = 0;
+                                         std::uint64_t pass, std::span<double> memory) const = 0;
+  // Whether Predict ever says anything.
+  [[nodiscard]] virtual bool Predicts() const { return false; }
+  // Absent when the controller makes none, or has too little evidence for the pixel yet.
+  [[nodiscard]] virtual std::optional<BandwidthPrediction> Predict(
+      std::span<const double> /*memory*/) const {
+    return std::nullopt;
+  }
 };
 
-[[nodiscard]] std::unique_ptr<RadiusController> MakeRadiusController(
-    const RenderSettings& settings);
+// `initial_radius` in unit radii.
+[[nodiscard]] std::unique_ptr<RadiusController> MakeRadiusController(const RenderSettings& settings,
+                                                                     float initial_radius);
 
 }  // namespace lucerna

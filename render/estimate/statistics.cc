@@ -4,12 +4,16 @@
 
 namespace lucerna {
 
-PixelStatistics::PixelStatistics(std::size_t pixels, float initial_radius)
+PixelStatistics::PixelStatistics(std::size_t pixels, float initial_radius,
+                                 std::size_t memory_per_pixel)
     : radius_(pixels, PixelRadius{initial_radius, 0}),
       radiance_sum_(pixels),
       squared_luminance_sum_(pixels),
       photon_count_(pixels),
-      last_radius_(pixels) {}
+      last_radius_(pixels),
+      last_unit_radius_(pixels),
+      memory_per_pixel_(memory_per_pixel),
+      memory_(pixels * memory_per_pixel) {}
 
 RadiusColumn PixelStatistics::Radii(const HitpointRows& rows) const {
   RadiusColumn radii(rows.pixels.size());
@@ -20,11 +24,12 @@ RadiusColumn PixelStatistics::Radii(const HitpointRows& rows) const {
 }
 
 void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& radii,
-                                 const PassSums& sums, const FluxScale& scale,
-                                 const Kernel& kernel, std::int64_t photons_per_pass,
+                                 const PassSums& sums, const FluxScale& scale, const Kernel& kernel,
+                                 std::int64_t photons_per_pass,
                                  const RadiusController& controller) {
   LUCERNA_CHECK(rows.pixels.size() == sums.size() && radii.size() == sums.size());
   const auto pass = static_cast<std::uint64_t>(passes_);
+  std::vector<std::int64_t> columns(sums.evidence().size());
   const double per_photon = kernel.Norm() / static_cast<double>(photons_per_pass);
   for (std::size_t row = 0; row < radii.size(); ++row) {
     const std::uint32_t pixel = rows.pixels[row];
@@ -44,9 +49,14 @@ void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& r
     squared_luminance_sum_[pixel] += luminance * luminance;
     photon_count_[pixel] += sums.counts()[row];
     last_radius_[pixel] = radii[row];
+    last_unit_radius_[pixel] = rows.unit_radii[row];
+    for (std::size_t column = 0; column < columns.size(); ++column) {
+      columns[column] = sums.evidence()[column][row];
+    }
     radius_[pixel] = controller.Next(
         radius_[pixel],
-        {static_cast<double>(sums.counts()[row]), radii[row] / rows.unit_radii[row]}, pass);
+        {static_cast<double>(sums.counts()[row]), radii[row] / rows.unit_radii[row], columns}, pass,
+        std::span<double>(memory_).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
   }
   ++passes_;
 }

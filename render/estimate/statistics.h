@@ -25,15 +25,15 @@ using RgbSum = std::array<double, 3>;
 
 // The hitpoints of one pass and what belongs to each of them.
 struct HitpointRows {
-  std::span<const std::uint32_t> pixels;   // row -> pixel; a pixel has at most one row
-  std::span<const Rgb> weights;            // from gathered flux density to radiance
-  std::span<const float> unit_radii;       // length of a radius of 1 [scene units]
+  std::span<const std::uint32_t> pixels;  // row -> pixel; a pixel has at most one row
+  std::span<const Rgb> weights;           // from gathered flux density to radiance
+  std::span<const float> unit_radii;      // length of a radius of 1 [scene units]
 };
 
 class PixelStatistics {
  public:
-  // `initial_radius` in unit radii.
-  PixelStatistics(std::size_t pixels, float initial_radius);
+  // `initial_radius` in unit radii; `memory_per_pixel` as the radius controller asks.
+  PixelStatistics(std::size_t pixels, float initial_radius, std::size_t memory_per_pixel = 0);
 
   // The radius of each hitpoint of a pass [scene units], from the statistics as they are now.
   [[nodiscard]] RadiusColumn Radii(const HitpointRows& rows) const;
@@ -53,6 +53,12 @@ class PixelStatistics {
   }
   // Photons gathered over all passes [pixels].
   [[nodiscard]] const std::vector<std::uint64_t>& photon_count() const { return photon_count_; }
+  // The radius controller's own numbers for a pixel.
+  [[nodiscard]] std::span<const double> memory(std::size_t pixel) const {
+    return std::span<const double>(memory_).subspan(pixel * memory_per_pixel_, memory_per_pixel_);
+  }
+  // The unit radius of the pixel's last hitpoint [scene units]; 0 before the first.
+  [[nodiscard]] const std::vector<float>& last_unit_radius() const { return last_unit_radius_; }
   // The radius that the pixel's last hitpoint used [scene units]; 0 before the first.
   [[nodiscard]] const std::vector<float>& last_radius() const { return last_radius_; }
 
@@ -63,6 +69,9 @@ class PixelStatistics {
   std::vector<double> squared_luminance_sum_;
   std::vector<std::uint64_t> photon_count_;
   std::vector<float> last_radius_;
+  std::vector<float> last_unit_radius_;
+  std::size_t memory_per_pixel_;
+  std::vector<double> memory_;  // [pixels × memory_per_pixel]
 };
 
 }  // namespace lucerna

@@ -30,7 +30,8 @@ void Film::Add(std::size_t pixel, Rgb direct, Rgb albedo, Vec3 normal, float dis
   ++features.hits;
 }
 
-Image Film::MakeImage(const PixelStatistics& statistics) const {
+Image Film::MakeImage(const PixelStatistics& statistics, const RadiusController& controller,
+                      const Kernel& kernel) const {
   LUCERNA_CHECK(statistics.passes() > 0);
   Image image;
   image.width = width_;
@@ -80,9 +81,9 @@ Image Film::MakeImage(const PixelStatistics& statistics) const {
     }
     const Features& features = feature_sum_[pixel];
     const double per_hit = features.hits == 0 ? 0 : 1.0 / features.hits;
-    const RgbSum albedo_sum = ToRec709({static_cast<double>(features.albedo.r),
-                                        static_cast<double>(features.albedo.g),
-                                        static_cast<double>(features.albedo.b)});
+    const RgbSum albedo_sum =
+        ToRec709({static_cast<double>(features.albedo.r), static_cast<double>(features.albedo.g),
+                  static_cast<double>(features.albedo.b)});
     for (int c = 0; c < 3; ++c) {
       const auto offset = static_cast<std::size_t>(c);
       set(albedo + offset, pixel, albedo_sum[offset] * per_hit);
@@ -92,6 +93,20 @@ Image Film::MakeImage(const PixelStatistics& statistics) const {
         features.hits == 0 ? HUGE_VAL : static_cast<double>(features.distance) * per_hit);
     set(radius, pixel, static_cast<double>(statistics.last_radius()[pixel]));
     set(photon_count, pixel, static_cast<double>(statistics.photon_count()[pixel]));
+  }
+  if (controller.Predicts()) {
+    const std::size_t bandwidth = channel("bandwidth");
+    const std::size_t min_radius = channel("min_radius");
+    const std::size_t bias = channel("relative_bias");
+    for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+      const auto prediction = controller.Predict(statistics.memory(pixel));
+      const auto unit = static_cast<double>(statistics.last_unit_radius()[pixel]);
+      if (!prediction || !(unit > 0)) continue;
+      const double in_units = static_cast<double>(statistics.last_radius()[pixel]) / unit;
+      set(bandwidth, pixel, std::sqrt(prediction->trace) / unit);
+      set(min_radius, pixel, prediction->min_radius * unit);
+      set(bias, pixel, RelativeBiasBound(prediction->trace, in_units, kernel.Moments()));
+    }
   }
   return image;
 }

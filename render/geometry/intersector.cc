@@ -1,9 +1,11 @@
 #include "render/geometry/intersector.h"
 
-#include <embree3/rtcore.h>
-
 #include <cmath>
 #include <cstring>
+
+#include <embree3/rtcore.h>
+
+#include "render/geometry/embree_device.h"
 
 namespace lucerna {
 namespace {
@@ -14,7 +16,9 @@ struct Double3 {
 Double3 ToDouble(Vec3 v) {
   return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
 }
-double DotDouble(const Double3& a, const Double3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+double DotDouble(const Double3& a, const Double3& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 
 // The nearer root in (t_near, t_far), else the farther one; false without either. The roots are
 // found from the larger one, so that neither suffers cancellation.
@@ -61,7 +65,8 @@ bool DiskRoot(const Disk& disk, Vec3 origin, Vec3 direction, float t_near, float
 }
 
 void SphereBounds(const RTCBoundsFunctionArguments* arguments) {
-  const Sphere& sphere = static_cast<const Scene*>(arguments->geometryUserPtr)->spheres[arguments->primID];
+  const Sphere& sphere =
+      static_cast<const Scene*>(arguments->geometryUserPtr)->spheres[arguments->primID];
   // A little outwards, for the rounding of centre ± radius.
   const float r = sphere.radius + kClearance * (MaxAbs(sphere.center) + sphere.radius);
   RTCBounds* box = arguments->bounds_o;
@@ -74,7 +79,8 @@ void SphereBounds(const RTCBoundsFunctionArguments* arguments) {
 }
 
 void DiskBounds(const RTCBoundsFunctionArguments* arguments) {
-  const Disk& disk = static_cast<const Scene*>(arguments->geometryUserPtr)->disks[arguments->primID];
+  const Disk& disk =
+      static_cast<const Scene*>(arguments->geometryUserPtr)->disks[arguments->primID];
   const float slack = kClearance * (MaxAbs(disk.center) + disk.radius);
   const auto reach = [&](float n) {
     return disk.radius * std::sqrt(std::max(0.0F, 1 - n * n)) + slack;
@@ -98,7 +104,8 @@ bool RootOf(const Disk& shape, Vec3 o, Vec3 d, float t_near, float t_far, float&
 template <typename Shape, std::vector<Shape> Scene::*kShapes>
 void IntersectShape(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
-  const Shape& shape = (static_cast<const Scene*>(arguments->geometryUserPtr)->*kShapes)[arguments->primID];
+  const Shape& shape =
+      (static_cast<const Scene*>(arguments->geometryUserPtr)->*kShapes)[arguments->primID];
   auto* ray_hit = reinterpret_cast<RTCRayHit*>(arguments->rayhit);
   RTCRay& ray = ray_hit->ray;
   float t = 0;
@@ -117,7 +124,8 @@ void IntersectShape(const RTCIntersectFunctionNArguments* arguments) {
 template <typename Shape, std::vector<Shape> Scene::*kShapes>
 void OccludedByShape(const RTCOccludedFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
-  const Shape& shape = (static_cast<const Scene*>(arguments->geometryUserPtr)->*kShapes)[arguments->primID];
+  const Shape& shape =
+      (static_cast<const Scene*>(arguments->geometryUserPtr)->*kShapes)[arguments->primID];
   auto* ray = reinterpret_cast<RTCRay*>(arguments->ray);
   float t = 0;
   if (RootOf(shape, {ray->org_x, ray->org_y, ray->org_z}, {ray->dir_x, ray->dir_y, ray->dir_z},
@@ -165,10 +173,7 @@ Intersector::~Intersector() = default;
 StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene) {
   auto intersector = std::unique_ptr<Intersector>(new Intersector(scene));
   EmbreeScene& embree = *intersector->embree_;
-  embree.device = rtcNewDevice("isa=avx2");
-  if (embree.device == nullptr) {
-    return absl::InternalError("Embree cannot start: this processor has no AVX2");
-  }
+  LUCERNA_ASSIGN_OR_RETURN(embree.device, NewEmbreeDevice());
   embree.scene = rtcNewScene(embree.device);
   rtcSetSceneFlags(embree.scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(embree.scene, RTC_BUILD_QUALITY_MEDIUM);
@@ -177,7 +182,8 @@ StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene) {
   std::uint32_t number = 0;
   embree.padded_positions.reserve(scene.meshes.size());
   for (const TriangleMesh& mesh : scene.meshes) {
-    for (const Vec3& p : mesh.positions) bounds.Add(p);
+    for (const Vec3& p : mesh.positions)
+      bounds.Add(p);
     std::vector<Vec3>& padded = embree.padded_positions.emplace_back();
     padded.reserve(mesh.positions.size() + 1);
     padded.assign(mesh.positions.begin(), mesh.positions.end());
@@ -225,15 +231,8 @@ StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene) {
     bounds.Add(disk.center + reach);
   }
   rtcCommitScene(embree.scene);
-  switch (rtcGetDeviceError(embree.device)) {
-    case RTC_ERROR_NONE:
-      return intersector;
-    case RTC_ERROR_OUT_OF_MEMORY:
-      return absl::ResourceExhaustedError(
-          "not enough memory for the scene's acceleration structure");
-    default:
-      return absl::InternalError("Embree refuses the scene's geometry");
-  }
+  LUCERNA_RETURN_IF_ERROR(EmbreeStatus(embree.device));
+  return intersector;
 }
 
 bool Intersector::Intersect(const Ray& ray, Hit& hit) const {

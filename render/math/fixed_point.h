@@ -36,7 +36,10 @@ struct FluxScale {
   Rgb watts_per_quantum;
 
   [[nodiscard]] static FluxScale ForPower(Rgb power_w) {
-    const Rgb quantum = {QuantumFor(power_w.r), QuantumFor(power_w.g), QuantumFor(power_w.b)};
+    // A channel without power has the quantum of the strongest one.
+    const float most = MaxChannel(power_w);
+    const auto quantum_of = [most](float power) { return QuantumFor(power > 0 ? power : most); };
+    const Rgb quantum = {quantum_of(power_w.r), quantum_of(power_w.g), quantum_of(power_w.b)};
     return {{1 / quantum.r, 1 / quantum.g, 1 / quantum.b}, quantum};
   }
 };

@@ -14,10 +14,10 @@
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_join.h"
 
+#include "render/base/text.h"
 #include "render/scene/parameter_list.h"
 #include "render/scene/ply_file.h"
 #include "render/scene/scene_builder.h"
-#include "render/base/text.h"
 #include "render/scene/tokenizer.h"
 
 namespace lucerna {
@@ -279,7 +279,9 @@ StatusOr<std::string> PbrtParser::ReadCounted(const std::string& path) {
 
 StatusOr<TriangleMesh> PbrtParser::ReadMesh(const std::string& path) {
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadCounted(path));
-  return ParsePly(bytes);
+  StatusOr<TriangleMesh> mesh = ParsePly(bytes);
+  if (mesh.ok()) return mesh;
+  return absl::InvalidArgumentError(Concat(path, ": ", mesh.status().message()));
 }
 
 void PbrtParser::ParseFile(const std::string& path, const Place& place) {

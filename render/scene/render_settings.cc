@@ -11,18 +11,27 @@ namespace lucerna {
 namespace {
 
 constexpr int kMaxSide = 65536;
+// An image of 7680 x 4320 fits. The coordinator keeps some 560 bytes a pixel, and must not be
+// ended for want of memory by one job among many.
+constexpr std::int64_t kMaxPixels = std::int64_t{1} << 25;
 constexpr std::int64_t kMaxPhotonsPerPass = 1'000'000'000'000;
 constexpr int kMaxDepth = 10'000;
 constexpr std::int64_t kDefaultPasses = 16;
 constexpr int kDefaultDepth = 5;
 
-constexpr std::array<std::pair<std::string_view, RadiusControllerKind>, 2> kControllers = {{
+constexpr std::array<std::pair<std::string_view, RadiusControllerKind>, 6> kControllers = {{
     {"ppm", RadiusControllerKind::kPpm},
     {"pppm", RadiusControllerKind::kPppm},
+    {"cppm", RadiusControllerKind::kCppm},
+    {"frequency", RadiusControllerKind::kFrequency},
+    {"frequency-consistent", RadiusControllerKind::kFrequencyConsistent},
+    {"frequency-mse", RadiusControllerKind::kFrequencyMse},
 }};
-constexpr std::array<std::pair<std::string_view, KernelKind>, 2> kKernels = {{
+constexpr std::array<std::pair<std::string_view, KernelKind>, 4> kKernels = {{
     {"constant", KernelKind::kConstant},
     {"epanechnikov", KernelKind::kEpanechnikov},
+    {"biweight", KernelKind::kBiweight},
+    {"gaussian", KernelKind::kGaussian},
 }};
 
 template <typename Names>
@@ -42,7 +51,7 @@ std::string_view NameIn(const Names& names, Kind wanted) {
   for (const auto& [name, kind] : names) {
     if (kind == wanted) return name;
   }
-  LUCERNA_CHECK(!"a kind without a name");
+  LUCERNA_CHECK(false && "a kind without a name");
   return {};
 }
 
@@ -120,6 +129,12 @@ StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const
 
   const std::int64_t pixels =
       std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()};
+  if (pixels > kMaxPixels) {
+    return absl::InvalidArgumentError(
+        Concat("--size: ", settings.crop_width(), "x", settings.crop_height(), " are ", pixels,
+               " pixels, more than the ", kMaxPixels,
+               " of one job; render it in parts, with the film's cropwindow"));
+  }
   settings.photons_per_pass =
       overrides.photons_per_pass.value_or(asked.photons_per_pass.value_or(pixels));
   LUCERNA_RETURN_IF_ERROR(CheckRange("--photons-per-pass", settings.photons_per_pass,
@@ -134,6 +149,17 @@ StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const
         Concat("--alpha must be above 0 and below 1, not ", settings.alpha));
   }
   settings.initial_radius = overrides.initial_radius.value_or(asked.initial_radius.value_or(0));
+  settings.bias = overrides.bias.value_or(settings.bias);
+  if (!(settings.bias >= 1e-4 && settings.bias <= 1)) {
+    return absl::InvalidArgumentError(
+        Concat("--bias must be from 0.01% to 100%, not ", 100 * settings.bias, "%"));
+  }
+  settings.frequency_share = overrides.frequency_share.value_or(settings.frequency_share);
+  if (!(settings.frequency_share > 0 && settings.frequency_share <= 1)) {
+    return absl::InvalidArgumentError(
+        Concat("--frequency-share must be above 0% and at most 100%, not ",
+               100 * settings.frequency_share, "%"));
+  }
   // The square of a radius is a float.
   if (settings.initial_radius != 0 &&
       !(settings.initial_radius >= 1e-18 && settings.initial_radius <= 1e18)) {

@@ -15,8 +15,22 @@
 
 namespace lucerna {
 
-enum class RadiusControllerKind : std::uint8_t { kPpm, kPppm };
-enum class KernelKind : std::uint8_t { kConstant, kEpanechnikov };
+enum class RadiusControllerKind : std::uint8_t {
+  kPpm,
+  kPppm,
+  kCppm,
+  kFrequency,
+  kFrequencyConsistent,
+  kFrequencyMse,
+};
+enum class KernelKind : std::uint8_t { kConstant, kEpanechnikov, kBiweight, kGaussian };
+
+// Whether the job traces frequency photons.
+[[nodiscard]] constexpr bool UsesFrequency(RadiusControllerKind kind) {
+  return kind == RadiusControllerKind::kFrequency ||
+         kind == RadiusControllerKind::kFrequencyConsistent ||
+         kind == RadiusControllerKind::kFrequencyMse;
+}
 
 [[nodiscard]] std::string_view NameOf(RadiusControllerKind kind);
 [[nodiscard]] std::string_view NameOf(KernelKind kind);
@@ -34,6 +48,8 @@ struct RenderOverrides {
   std::optional<RadiusControllerKind> radius_controller;
   std::optional<double> alpha;
   std::optional<KernelKind> kernel;
+  std::optional<double> bias;
+  std::optional<double> frequency_share;
   // A radius in scene units, or 0 for "auto".
   std::optional<double> initial_radius;
   std::optional<int> max_depth;
@@ -49,6 +65,10 @@ struct RenderSettings {
   RadiusControllerKind radius_controller = RadiusControllerKind::kPpm;
   double alpha = 2.0 / 3;  // share of new photons kept by ppm and pppm, in (0, 1)
   KernelKind kernel = KernelKind::kEpanechnikov;
+  // Frequency controllers only: the relative bias that a pixel may have, and the share of photons
+  // that carry a spectrum.
+  double bias = 0.02;
+  double frequency_share = 0.05;
   double initial_radius = 0;  // scene units; 0: auto, from each pixel's footprint
   int max_depth = 5;          // scattering events of an eye path, and of a photon path
 

@@ -71,9 +71,9 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     const Disk& disk = scene.disks[i];
     if (disk.traits.area_light == kNoAreaLight) continue;
     disk_emitter_[i] = static_cast<std::int32_t>(emitters_.size());
-    Emitter emitter = area_emitter(
-        Kind::kDisk, disk.traits,
-        kPi * (disk.radius * disk.radius - disk.inner_radius * disk.inner_radius));
+    Emitter emitter =
+        area_emitter(Kind::kDisk, disk.traits,
+                     kPi * (disk.radius * disk.radius - disk.inner_radius * disk.inner_radius));
     emitter.primitive = i;
     Add(emitter);
   }
@@ -93,8 +93,10 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     emitter.primitive = i;
     emitter.radiance = spot.intensity;
     // The smoothstep's mean is one half.
-    emitter.power = emitter.radiance * (2 * kPi * ((1 - spot.cos_falloff_start) +
-                                        0.5F * (spot.cos_falloff_start - spot.cos_total_width)));
+    emitter.power =
+        emitter.radiance *
+        (2 * kPi *
+         ((1 - spot.cos_falloff_start) + 0.5F * (spot.cos_falloff_start - spot.cos_total_width)));
     Add(emitter);
   }
   for (std::uint32_t i = 0; i < scene.distant_lights.size(); ++i) {
@@ -105,7 +107,8 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     emitter.power = emitter.radiance * (kPi * radius_ * radius_);
     Add(emitter);
   }
-  for (const InfiniteLight& light : scene.infinite_lights) infinite_radiance_ += light.radiance;
+  for (const InfiniteLight& light : scene.infinite_lights)
+    infinite_radiance_ += light.radiance;
   if (!IsBlack(infinite_radiance_)) {
     only_delta_ = false;
     infinite_emitter_ = static_cast<std::int64_t>(emitters_.size());
@@ -135,9 +138,11 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
   }
 }
 
-void LightSet::Add(Emitter emitter) { emitters_.push_back(emitter); }
+void LightSet::Add(Emitter emitter) {
+  emitters_.push_back(emitter);
+}
 
-const LightSet::Emitter& LightSet::Choose(double u) const {
+const Emitter& LightSet::Choose(double u) const {
   auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), u);
   if (found == cumulative_.end()) --found;
   return emitters_[static_cast<std::size_t>(found - cumulative_.begin())];
@@ -178,7 +183,8 @@ void LightSet::PointOn(const Emitter& emitter, float u1, float u2, Vec3& positio
         const float inner2 = disk.inner_radius * disk.inner_radius / (disk.radius * disk.radius);
         if (squared > 0) on_unit = on_unit * std::sqrt((inner2 + squared * (1 - inner2)) / squared);
       }
-      position = disk.center + frame.s * (on_unit.x * disk.radius) + frame.t * (on_unit.y * disk.radius);
+      position =
+          disk.center + frame.s * (on_unit.x * disk.radius) + frame.t * (on_unit.y * disk.radius);
       normal = disk.normal;
       clearance = kClearance * (MaxAbs(disk.center) + disk.radius);
       return;
@@ -192,6 +198,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
   const Emitter& emitter = Choose(u_choice);
   emission.ray.t_max = HUGE_VALF;
   emission.flux = emitter.power / emitter.choice;
+  emission.emitter = static_cast<std::uint32_t>(&emitter - emitters_.data());
   switch (emitter.kind) {
     case Kind::kTriangle:
     case Kind::kSphere:
@@ -232,8 +239,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
       const Vec3 direction = scene_.distant_lights[emitter.primitive].direction;
       const Frame frame(direction);
       const Vec3 disk = SquareToDisk(u_place1, u_place2) * radius_;
-      emission.ray.origin =
-          center_ - direction * radius_ + frame.s * disk.x + frame.t * disk.y;
+      emission.ray.origin = center_ - direction * radius_ + frame.s * disk.x + frame.t * disk.y;
       emission.ray.direction = direction;
       return true;
     }
@@ -241,8 +247,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
       const Vec3 direction = SquareToSphere(u_direction1, u_direction2);
       const Frame frame(direction);
       const Vec3 disk = SquareToDisk(u_place1, u_place2) * radius_;
-      emission.ray.origin =
-          center_ - direction * radius_ + frame.s * disk.x + frame.t * disk.y;
+      emission.ray.origin = center_ - direction * radius_ + frame.s * disk.x + frame.t * disk.y;
       emission.ray.direction = direction;
       return true;
     }
@@ -275,8 +280,8 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
         const Vec3 outward = Normalize(sample.wi * along - to_center);
         sample.is_distant = false;
         sample.target =
-            sphere.center + outward * (sphere.radius +
-                                       kClearance * (MaxAbs(sphere.center) + sphere.radius));
+            sphere.center +
+            outward * (sphere.radius + kClearance * (MaxAbs(sphere.center) + sphere.radius));
         const float pdf = emitter.choice / (2 * kPi * one_minus_cos);
         sample.pdf = pdf;
         sample.radiance_over_pdf = emitter.radiance / pdf;
@@ -349,7 +354,7 @@ Rgb LightSet::EmittedRadiance(const SurfacePoint& point, Vec3 wo) const {
   return light.two_sided || Dot(point.geometric_normal, wo) > 0 ? light.radiance : Rgb{};
 }
 
-const LightSet::Emitter* LightSet::EmitterOf(const SurfacePoint& point) const {
+const Emitter* LightSet::EmitterOf(const SurfacePoint& point) const {
   if (point.area_light == kNoAreaLight || emitters_.empty()) return nullptr;
   std::int64_t number = -1;
   if (point.geometry < first_emitter_.size()) {

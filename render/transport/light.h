@@ -18,6 +18,28 @@ namespace lucerna {
 struct Emission {
   Ray ray;
   Rgb flux;  // [W]: of all photons together, so an estimate divides by their number
+  std::uint32_t emitter = 0;  // number of the light, for LightSet::emitter
+};
+
+enum class EmitterKind : std::uint8_t {
+  kTriangle,
+  kSphere,
+  kDisk,
+  kPoint,
+  kSpot,
+  kDistant,
+  kInfinite
+};
+
+struct Emitter {
+  EmitterKind kind = EmitterKind::kPoint;
+  std::uint32_t geometry = 0;   // kTriangle: the mesh
+  std::uint32_t primitive = 0;  // triangle, sphere, disk, or index among lights of its kind
+  bool two_sided = false;
+  float area = 0;
+  float choice = 0;  // probability
+  Rgb radiance;      // or intensity, or irradiance
+  Rgb power;
 };
 
 // Light that arrives at a point from one emitter.
@@ -25,9 +47,9 @@ struct LightSample {
   Vec3 wi;                  // from the point to the light, unit
   bool is_distant = false;  // the light is at infinity
   Vec3 target;              // else: where the light comes from, just off the light's own surface
-  Rgb radiance_over_pdf;    // [W·m⁻²·sr⁻¹ / (choice × solid angle)]; for delta lights irradiance
-                            // on a plane facing the light, over the choice
-  float pdf = 0;            // choice × pdf_solid_angle [sr⁻¹]; 0 for delta lights
+  Rgb radiance_over_pdf;  // [W·m⁻²·sr⁻¹ / (choice × solid angle)]; for delta lights irradiance
+                          // on a plane facing the light, over the choice
+  float pdf = 0;  // choice × pdf_solid_angle [sr⁻¹]; 0 for delta lights
 };
 
 class LightSet {
@@ -36,6 +58,7 @@ class LightSet {
   LightSet(const Scene& scene, const Intersector& intersector);
 
   [[nodiscard]] bool empty() const { return emitters_.empty(); }
+  [[nodiscard]] const Emitter& emitter(std::uint32_t number) const { return emitters_[number]; }
   // [W] per channel, of all emitters.
   [[nodiscard]] Rgb TotalPower() const { return total_power_; }
   // True when all emitters are points or single directions, which no ray can hit.
@@ -64,17 +87,7 @@ class LightSet {
   [[nodiscard]] float PdfDirectInfinite() const;
 
  private:
-  enum class Kind : std::uint8_t { kTriangle, kSphere, kDisk, kPoint, kSpot, kDistant, kInfinite };
-  struct Emitter {
-    Kind kind = Kind::kPoint;
-    std::uint32_t geometry = 0;   // kTriangle: the mesh
-    std::uint32_t primitive = 0;  // triangle, sphere, disk, or index among lights of its kind
-    bool two_sided = false;
-    float area = 0;
-    float choice = 0;  // probability
-    Rgb radiance;      // or intensity, or irradiance
-    Rgb power;
-  };
+  using Kind = EmitterKind;
 
   void Add(Emitter emitter);
   [[nodiscard]] const Emitter& Choose(double u) const;

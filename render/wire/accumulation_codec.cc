@@ -12,7 +12,9 @@ namespace {
 
 __extension__ using Wide = __int128;
 
-constexpr std::string_view kMagic = "LAC1";
+constexpr std::string_view kMagic = "LAC2";
+// More columns of evidence than any radius controller asks for.
+constexpr std::uint64_t kMostEvidence = 32;
 constexpr std::uint8_t kIndicesAsVarints = 0;
 constexpr std::uint8_t kIndicesAsBitmap = 1;
 // Colour ratios are fixed-point numbers with so many bits behind the point.
@@ -134,13 +136,20 @@ std::string EncodeAccumulation(const Accumulation& accumulation, std::size_t hit
   writer.Varint(ZigZag(guess.green_per_photon));
   writer.Varint(ZigZag(guess.red_over_green));
   writer.Varint(ZigZag(guess.blue_over_green));
-  const auto& [red, green, blue] = accumulation.flux;
+  // By name one after the other: clang 14 lets no lambda capture a structured binding.
+  const std::vector<std::int64_t>& red = accumulation.flux[0];
+  const std::vector<std::int64_t>& green = accumulation.flux[1];
+  const std::vector<std::int64_t>& blue = accumulation.flux[2];
   WriteRemainders(writer, green,
                   [&](std::size_t i) { return guess.Green(accumulation.counts[i]); });
   WriteRemainders(writer, red,
                   [&](std::size_t i) { return Guess::Scaled(green[i], guess.red_over_green); });
   WriteRemainders(writer, blue,
                   [&](std::size_t i) { return Guess::Scaled(green[i], guess.blue_over_green); });
+  writer.Varint(accumulation.evidence.size());
+  for (const std::vector<std::int64_t>& column : accumulation.evidence) {
+    WriteRemainders(writer, column, [](std::size_t) { return std::uint64_t{0}; });
+  }
   return writer.Take();
 }
 
@@ -202,7 +211,9 @@ StatusOr<Accumulation> DecodeAccumulation(std::string_view bytes, std::size_t hi
   guess.red_over_green = UnZigZag(reader.Varint());
   guess.blue_over_green = UnZigZag(reader.Varint());
   if (!reader.ok()) return Malformed("truncated");
-  auto& [red, green, blue] = accumulation.flux;
+  std::vector<std::int64_t>& red = accumulation.flux[0];
+  std::vector<std::int64_t>& green = accumulation.flux[1];
+  std::vector<std::int64_t>& blue = accumulation.flux[2];
   green = ReadRemainders(reader, rows,
                          [&](std::size_t i) { return guess.Green(accumulation.counts[i]); });
   if (!reader.ok()) return Malformed("its flux is truncated or damaged");
@@ -210,7 +221,13 @@ StatusOr<Accumulation> DecodeAccumulation(std::string_view bytes, std::size_t hi
       reader, rows, [&](std::size_t i) { return Guess::Scaled(green[i], guess.red_over_green); });
   blue = ReadRemainders(
       reader, rows, [&](std::size_t i) { return Guess::Scaled(green[i], guess.blue_over_green); });
-  if (!reader.finished()) return Malformed("its flux is damaged or bytes are left over");
+  const std::uint64_t columns = reader.Varint();
+  if (!reader.ok() || columns > kMostEvidence) return Malformed("its flux or evidence is damaged");
+  for (std::uint64_t column = 0; column < columns && reader.ok(); ++column) {
+    accumulation.evidence.push_back(
+        ReadRemainders(reader, rows, [](std::size_t) { return std::uint64_t{0}; }));
+  }
+  if (!reader.finished()) return Malformed("its columns are damaged or bytes are left over");
   return accumulation;
 }
 

@@ -1,5 +1,9 @@
 #include "render/wire/channel.h"
 
+#include <charconv>
+#include <cstdint>
+#include <system_error>
+
 #include <arpa/inet.h>
 
 namespace lucerna {
@@ -45,6 +49,15 @@ void SetUpConnections(grpc::ServerBuilder& builder) {
                              kPingAllowedEveryMs);
   // Two coordinators on one port would share the connections between them.
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+}
+
+bool IsAddress(const std::string& address) {
+  const std::size_t colon = address.rfind(':');
+  if (colon == std::string::npos || colon == 0) return false;
+  std::uint16_t port = 0;
+  const char* const end = address.data() + address.size();
+  const auto [stopped, error] = std::from_chars(address.data() + colon + 1, end, port);
+  return error == std::errc() && stopped == end;
 }
 
 bool IsLoopback(const std::string& address) {

@@ -30,6 +30,10 @@ inline constexpr std::chrono::seconds kCallTime{30};
 // The same agreement for a server.
 void SetUpConnections(grpc::ServerBuilder& builder);
 
+// Whether `address` is "host:port" with a host and a port from 0 to 65535. gRPC would take a larger
+// port for another one, and say of no port that the name is unknown.
+[[nodiscard]] bool IsAddress(const std::string& address);
+
 // Whether `address` ("host:port") can be reached from this machine only.
 [[nodiscard]] bool IsLoopback(const std::string& address);
 

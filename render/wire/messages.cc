@@ -77,6 +77,8 @@ v1::RenderOverrides ToProto(const RenderOverrides& overrides) {
   }
   if (overrides.alpha) message.set_alpha(*overrides.alpha);
   if (overrides.kernel) message.set_kernel(std::string(NameOf(*overrides.kernel)));
+  if (overrides.bias) message.set_bias(*overrides.bias);
+  if (overrides.frequency_share) message.set_frequency_share(*overrides.frequency_share);
   if (overrides.initial_radius) message.set_initial_radius(*overrides.initial_radius);
   if (overrides.max_depth) message.set_max_depth(*overrides.max_depth);
   return message;
@@ -109,6 +111,14 @@ StatusOr<RenderOverrides> FromProto(const v1::RenderOverrides& message) {
   if (message.has_kernel()) {
     LUCERNA_ASSIGN_OR_RETURN(overrides.kernel, ParseKernel(message.kernel()));
   }
+  if (message.has_bias()) {
+    if (!std::isfinite(message.bias())) return Outside("bias");
+    overrides.bias = message.bias();
+  }
+  if (message.has_frequency_share()) {
+    if (!std::isfinite(message.frequency_share())) return Outside("frequency_share");
+    overrides.frequency_share = message.frequency_share();
+  }
   return overrides;
 }
 
@@ -127,6 +137,8 @@ v1::RenderSettings ToProto(const RenderSettings& settings) {
   message.set_radius_controller(std::string(NameOf(settings.radius_controller)));
   message.set_alpha(settings.alpha);
   message.set_kernel(std::string(NameOf(settings.kernel)));
+  message.set_bias(settings.bias);
+  message.set_frequency_share(settings.frequency_share);
   message.set_initial_radius(settings.initial_radius);
   message.set_max_depth(settings.max_depth);
   return message;
@@ -161,6 +173,12 @@ StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message) {
   settings.alpha = message.alpha();
   if (!(settings.alpha > 0 && settings.alpha < 1)) return Outside("alpha");
   LUCERNA_ASSIGN_OR_RETURN(settings.kernel, ParseKernel(message.kernel()));
+  settings.bias = message.bias();
+  if (!(settings.bias > 0 && settings.bias <= 1)) return Outside("bias");
+  settings.frequency_share = message.frequency_share();
+  if (!(settings.frequency_share > 0 && settings.frequency_share <= 1)) {
+    return Outside("frequency_share");
+  }
   settings.initial_radius = message.initial_radius();
   if (!(settings.initial_radius >= 0) || !std::isfinite(settings.initial_radius)) {
     return Outside("initial radius");

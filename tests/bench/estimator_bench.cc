@@ -8,13 +8,16 @@
 //   gather          ns per (photon, hitpoint) pair, sorting the photons included
 //   wire            bytes a hitpoint sent and a touched hitpoint returned, and codec speed
 //   merge           touched hitpoints merged per second
-// Run: build/release/bin/lucerna-bench --benchmark_repetitions=10 --benchmark_report_aggregates_only=true
+// Run: build/release/bin/lucerna-bench --benchmark_repetitions=10
+// --benchmark_report_aggregates_only=true
 #include <atomic>
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "benchmark/benchmark.h"
+
 #include "render/base/parallel.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/block_codec.h"
@@ -49,7 +52,8 @@ struct Bench {
       region.Add(eye.block.positions[row] - reach);
       region.Add(eye.block.positions[row] + reach);
     }
-    photons = std::make_unique<PhotonPathTracer>(scene, *intersector, *lights, settings, region);
+    photons =
+        std::make_unique<PhotonPathTracer>(scene, *intersector, *lights, settings, nullptr, region);
     scale = FluxScale::ForPower(lights->TotalPower());
   }
 
@@ -69,17 +73,15 @@ using Counter = benchmark::Counter;
 
 void PhotonPaths(benchmark::State& state, const Bench& bench) {
   std::uint64_t index = 0;
-  std::uint64_t rays = 0;
   std::uint64_t deposits = 0;
-  std::uint64_t dropped = 0;
-  std::vector<Deposit> out;
+  PhotonPathTracer::Landed landed;
   for (auto _ : state) {
-    out.clear();
-    for (int i = 0; i < 4096; ++i) {
-      rays += static_cast<std::uint64_t>(bench.photons->Trace(0, index++, out, dropped));
-    }
-    deposits += out.size();
+    landed.deposits.clear();
+    for (int i = 0; i < 4096; ++i)
+      bench.photons->Trace(0, index++, landed);
+    deposits += landed.deposits.size();
   }
+  const std::uint64_t rays = landed.rays;
   const auto paths = static_cast<double>(index);
   state.counters["photon_paths/s"] = Counter(paths, Counter::kIsRate);
   state.counters["rays/path"] = static_cast<double>(rays) / paths;
@@ -126,16 +128,16 @@ void PhotonRays(benchmark::State& state, const Bench& bench) {
     done += 4096;
   }
   state.counters["rays/s"] = Counter(static_cast<double>(done), Counter::kIsRate);
-  state.counters["paths_ceiling/s"] =
-      Counter(static_cast<double>(done) * static_cast<double>(paths) /
-                  static_cast<double>(rays.size()),
-              Counter::kIsRate);
+  state.counters["paths_ceiling/s"] = Counter(
+      static_cast<double>(done) * static_cast<double>(paths) / static_cast<double>(rays.size()),
+      Counter::kIsRate);
 }
 
 void EyePaths(benchmark::State& state, const Bench& bench) {
   std::uint64_t pass = 1;
   std::uint64_t rays = 0;
-  for (auto _ : state) rays += bench.estimator->TraceEyePaths(pass++).rays;
+  for (auto _ : state)
+    rays += bench.estimator->TraceEyePaths(pass++).rays;
   const double paths = static_cast<double>(pass - 1) * 65536;
   state.counters["eye_paths/s"] = Counter(paths, Counter::kIsRate);
   state.counters["rays/path"] = static_cast<double>(rays) / paths;
@@ -143,10 +145,12 @@ void EyePaths(benchmark::State& state, const Bench& bench) {
 
 std::vector<std::vector<Deposit>> TraceDeposits(const Bench& bench, std::uint64_t photons) {
   std::vector<std::vector<Deposit>> deposits;
-  std::uint64_t dropped = 0;
+  PhotonPathTracer::Landed landed;
   for (std::uint64_t index = 0; index < photons; ++index) {
-    if (index % 2048 == 0) deposits.emplace_back();
-    bench.photons->Trace(0, index, deposits.back(), dropped);
+    bench.photons->Trace(0, index, landed);
+    if (index % 2048 == 2047 || index + 1 == photons) {
+      deposits.push_back(std::exchange(landed.deposits, {}));
+    }
   }
   return deposits;
 }
@@ -156,7 +160,7 @@ Accumulation GatherOnce(const Bench& bench, const std::vector<std::vector<Deposi
   RadiusColumn sorted = bench.radii;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
                    sorted.end());
-  const PhotonGrid grid(deposits, bench.region, 2 * sorted[sorted.size() / 2], team);
+  const PhotonGrid grid(deposits, {}, bench.region, 2 * sorted[sorted.size() / 2], team);
   return Gather(bench.eye.block, bench.radii, grid, bench.scene.materials,
                 Kernel{bench.settings.kernel}, bench.scale, team, std::atomic<bool>(false));
 }
@@ -168,7 +172,8 @@ void GatherPairs(benchmark::State& state, const Bench& bench) {
   std::uint64_t landed = 0;
   for (auto _ : state) {
     pairs += GatherOnce(bench, deposits, team).tally.pairs;
-    for (const auto& chunk : deposits) landed += chunk.size();
+    for (const auto& chunk : deposits)
+      landed += chunk.size();
   }
   state.counters["s/pair"] =
       Counter(static_cast<double>(pairs), Counter::kIsRate | Counter::kInvert);
@@ -192,8 +197,8 @@ void BlockOnTheWire(benchmark::State& state, const Bench& bench) {
 
 void AccumulationOnTheWire(benchmark::State& state, const Bench& bench) {
   ThreadTeam team(1);
-  const Accumulation accumulation = GatherOnce(
-      bench, TraceDeposits(bench, static_cast<std::uint64_t>(state.range(0))), team);
+  const Accumulation accumulation =
+      GatherOnce(bench, TraceDeposits(bench, static_cast<std::uint64_t>(state.range(0))), team);
   std::size_t size_bytes = 0;
   for (auto _ : state) {
     const std::string bytes = EncodeAccumulation(accumulation, bench.eye.block.size());
@@ -209,8 +214,7 @@ void AccumulationOnTheWire(benchmark::State& state, const Bench& bench) {
 
 void Merge(benchmark::State& state, const Bench& bench) {
   ThreadTeam team(1);
-  const Accumulation accumulation =
-      GatherOnce(bench, TraceDeposits(bench, 1 << 16), team);
+  const Accumulation accumulation = GatherOnce(bench, TraceDeposits(bench, 1 << 16), team);
   PassSums sums(bench.eye.block.size());
   for (auto _ : state) {
     if (!sums.Add(accumulation).ok()) state.SkipWithError("overflow");

@@ -115,6 +115,16 @@ std::vector<pid_t> ChildrenOf(pid_t parent) {
   return children;
 }
 
+// Kills the processes of `parent` that run the program.
+void KillProgram(const std::string& program, pid_t parent) {
+  for (const pid_t child : ChildrenOf(parent)) {
+    std::error_code error;
+    const auto runs =
+        std::filesystem::read_symlink("/proc/" + std::to_string(child) + "/exe", error);
+    if (runs.filename() == program) ::kill(child, SIGKILL);
+  }
+}
+
 TEST_F(ClientCommandsTest, RenderLeavesAnImageAPreviewAndTheFigures) {
   const Ran ran = Run(SmallRender({"-o", In("a.exr"), "--png", In("a.png"), "--json"}));
   ASSERT_EQ(ran.code, 0) << ran.err;
@@ -190,7 +200,26 @@ TEST_F(ClientCommandsTest, MisuseIsRefusedWithCodeTwo) {
   EXPECT_EQ(Run(SmallRender({"-o", In("a.exr"), "--workers", "0"})).code, 2);
   EXPECT_EQ(Run(SmallRender({"-o", In("a.exr"), "--alpha", "1.5"})).code, 2);
   EXPECT_EQ(Run({"diff", "a", "b", "--crop", "--scale"}).code, 2);
+  EXPECT_EQ(Run({"jobs", "--server", "no-port"}).code, 2);
+  EXPECT_EQ(Run({"validate", SceneOfTests("")}).code, 2) << "a folder";
+  const Ran too_large =
+      Run({"render", SceneOfTests("caustic.pbrt"), "-o", In("a.exr"), "--size", "50000x50000"});
+  EXPECT_EQ(too_large.code, 2);
+  EXPECT_NE(too_large.err.find("2500000000 pixels"), std::string::npos) << too_large.err;
   EXPECT_EQ(Run({"render", "--help"}).code, 0);
+}
+
+TEST_F(ClientCommandsTest, OneFileCannotBeBothImages) {
+  const std::string name = In("a.exr");
+  for (const std::string& other : {name, In("./a.exr"), In("no/../a.exr")}) {
+    const Ran ran = Run(SmallRender({"-o", name, "--png", other, "--time", "1000"}));
+    EXPECT_EQ(ran.code, 2) << other;
+    EXPECT_NE(ran.err.find("-o and --png both name " + name), std::string::npos) << ran.err;
+  }
+  EXPECT_TRUE(Images().empty());
+  ASSERT_EQ(Run(SmallRender({"-o", name})).code, 0);
+  EXPECT_EQ(Run({"png", name, In("./a.exr")}).code, 2);
+  EXPECT_EQ(Run({"digest", name}).code, 0) << "still an EXR";
 }
 
 TEST_F(ClientCommandsTest, AnOutputThatCannotBeWrittenIsFoundBeforeRendering) {
@@ -242,15 +271,25 @@ TEST_F(ClientCommandsTest, ADeadCoordinatorEndsTheRenderWithASentence) {
   for (int i = 0; i < 1000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  for (const pid_t child : ChildrenOf(client)) {
-    std::error_code error;
-    const auto program =
-        std::filesystem::read_symlink("/proc/" + std::to_string(child) + "/exe", error);
-    if (program.filename() == "lucerna-server") ::kill(child, SIGKILL);
-  }
+  KillProgram("lucerna-server", client);
   const Ran ran = Finish(client);
   EXPECT_EQ(ran.code, 1);
   EXPECT_NE(ran.err.find("the coordinator was ended by signal 9"), std::string::npos) << ran.err;
+  EXPECT_TRUE(Images().empty());
+}
+
+TEST_F(ClientCommandsTest, ADeadWorkerEndsTheRenderWithASentence) {
+  const pid_t client = Start({"render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--time",
+                              "1000", "-o", In("a.exr")});
+  for (int i = 0; i < 1000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  KillProgram("lucerna-worker", client);
+  const Ran ran = Finish(client);
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_NE(ran.err.find("no worker is left to render: the worker was ended by signal 9"),
+            std::string::npos)
+      << ran.err;
   EXPECT_TRUE(Images().empty());
 }
 

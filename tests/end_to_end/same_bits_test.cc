@@ -5,10 +5,12 @@
 // The scene has smooth glass and a mirror, the other has rough metal, whose hitpoints travel with
 // their BSDF.
 #include <memory>
+#include <ostream>
 #include <string>
 #include <vector>
 
 #include "gtest/gtest.h"
+
 #include "tests/support/process.h"
 
 namespace lucerna {
@@ -22,7 +24,7 @@ struct Fleet {
   int batch_photons;  // 0: the coordinator's choice
 };
 
-std::string DigestOf(const std::string& scene, const Fleet& fleet) {
+std::string DigestOf(const std::string& scene, const std::string& controller, const Fleet& fleet) {
   ChildProcess server({kBin + "/lucerna-server", "--listen", "127.0.0.1:0", "--batch-photons",
                        std::to_string(fleet.batch_photons)});
   const std::string greeting = "listening on ";
@@ -36,29 +38,40 @@ std::string DigestOf(const std::string& scene, const Fleet& fleet) {
                                  std::to_string(fleet.threads)}));
   }
   const std::string image = testing::TempDir() + "same_bits.exr";
-  const Finished submitted =
-      RunProgram({kBin + "/lucerna", "submit",
-                  std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/" + scene, "--server", address,
-                  "-o", image, "--passes", "4", "--size", "96x72", "--photons-per-pass", "60000",
-                  "--quiet"});
+  const Finished submitted = RunProgram(
+      {kBin + "/lucerna", "submit", std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/" + scene,
+       "--server", address, "-o", image, "--passes", "4", "--size", "96x72", "--photons-per-pass",
+       "60000", "--radius-controller", controller, "--quiet"});
   EXPECT_EQ(submitted.exit_code, 0) << submitted.errors;
   return RunProgram({kBin + "/lucerna", "digest", image}).output;
 }
 
-class SameBitsTest : public testing::TestWithParam<const char*> {};
+struct Case {
+  const char* scene;
+  const char* controller;
+};
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.scene << " " << c.controller;
+}
+
+class SameBitsTest : public testing::TestWithParam<Case> {};
 
 TEST_P(SameBitsTest, ForAnyWorkersThreadsAndBatches) {
-  const std::string expected = DigestOf(GetParam(), {1, 1, 0});
+  const std::string expected = DigestOf(GetParam().scene, GetParam().controller, {1, 1, 0});
   ASSERT_GE(expected.size(), 64U) << expected;
-  for (const Fleet& fleet : {Fleet{1, 2, 0}, Fleet{3, 1, 0}, Fleet{1, 1, 1000}, Fleet{3, 1, 7777},
-                             Fleet{2, 2, 60000}}) {
-    EXPECT_EQ(DigestOf(GetParam(), fleet), expected)
+  for (const Fleet& fleet :
+       {Fleet{1, 2, 0}, Fleet{3, 1, 0}, Fleet{1, 1, 1000}, Fleet{3, 1, 7777}, Fleet{2, 2, 60000}}) {
+    EXPECT_EQ(DigestOf(GetParam().scene, GetParam().controller, fleet), expected)
         << fleet.workers << " workers with " << fleet.threads << " threads, batches of "
         << fleet.batch_photons;
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, SameBitsTest, testing::Values("glass-box.pbrt", "rough-metal.pbrt"));
+INSTANTIATE_TEST_SUITE_P(Scenes, SameBitsTest,
+                         testing::Values(Case{"glass-box.pbrt", "ppm"},
+                                         Case{"rough-metal.pbrt", "ppm"},
+                                         Case{"rough-metal.pbrt", "cppm"},
+                                         Case{"glass-box.pbrt", "frequency-mse"}));
 
 }  // namespace
 }  // namespace lucerna

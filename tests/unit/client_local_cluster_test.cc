@@ -128,6 +128,7 @@ TEST_F(LocalClusterTest, SaysWhyItsOnlyWorkerEnded) {
     status = (*cluster)->Check();
     std::this_thread::sleep_for(milliseconds(10));
   }
+  EXPECT_EQ(std::string(status.message()).find("no worker is left"), 0U) << status;
   EXPECT_NE(std::string(status.message()).find("worker was ended by signal 9"), std::string::npos)
       << status;
   EXPECT_NE(std::string(status.message()).find("out of memory"), std::string::npos) << status;

@@ -95,6 +95,8 @@ TEST(ProgressViewTest, ASummaryNamesTheEnd) {
   EXPECT_EQ(SummaryLine(job), "3 passes, 4.00 M photons in 4.00 s, stopped by its time limit");
   job.set_stop_reason(v1::STOP_REASON_PASSES);
   EXPECT_EQ(SummaryLine(job), "3 passes, 4.00 M photons in 4.00 s, all passes done");
+  job.mutable_progress()->set_passes(1);
+  EXPECT_EQ(SummaryLine(job), "1 pass, 4.00 M photons in 4.00 s, all passes done");
   job.set_state(v1::JOB_STATE_FAILED);
   job.set_failure("a batch failed on three workers");
   EXPECT_NE(SummaryLine(job).find("failed: a batch failed on three workers"), std::string::npos);

@@ -45,6 +45,24 @@ TEST_F(FilesTest, ReadsWhatItWrote) {
   EXPECT_EQ(FilesInFolder(), 1U);
 }
 
+TEST_F(FilesTest, ALinkStaysALinkToTheNewBytes) {
+  ASSERT_EQ(::mkdir(Path("elsewhere").c_str(), 0700), 0);
+  ASSERT_TRUE(WriteFile(Path("elsewhere/a"), "first").ok());
+  ASSERT_EQ(::symlink("elsewhere/a", Path("link").c_str()), 0);
+  ASSERT_TRUE(WriteFile(Path("link"), "second").ok());
+  EXPECT_TRUE(std::filesystem::is_symlink(Path("link")));
+  EXPECT_EQ(ReadFile(Path("elsewhere/a")).value(), "second");
+}
+
+TEST_F(FilesTest, KnowsOnePlaceUnderSeveralNames) {
+  EXPECT_TRUE(IsSameFile(Path("new"), Path("./new")));
+  EXPECT_TRUE(IsSameFile("new", std::filesystem::current_path().string() + "/new"));
+  EXPECT_FALSE(IsSameFile(Path("new"), Path("newer")));
+  ASSERT_TRUE(WriteFile(Path("a"), "x").ok());
+  ASSERT_EQ(::symlink("a", Path("link").c_str()), 0);
+  EXPECT_TRUE(IsSameFile(Path("a"), Path("link")));
+}
+
 TEST_F(FilesTest, NamesTheFileThatIsMissingOrIsAFolder) {
   const Status missing = ReadFile(Path("none")).status();
   EXPECT_EQ(missing.code(), absl::StatusCode::kNotFound);

@@ -71,7 +71,7 @@ Case RandomCase(int photons, int hitpoints, bool glossy, std::uint64_t key) {
 Accumulation GatherAll(const Case& input, const Kernel& kernel, const FluxScale& scale,
                        int threads) {
   ThreadTeam team(threads);
-  const PhotonGrid grid(input.deposits, input.region, 0.02F, team);
+  const PhotonGrid grid(input.deposits, {}, input.region, 0.02F, team);
   return Gather(input.block, input.radii, grid, input.materials, kernel, scale, team,
                 std::atomic<bool>(false));
 }

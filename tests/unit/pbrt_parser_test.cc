@@ -448,8 +448,8 @@ TEST(PbrtParserTest, PlyMeshesAreReadAndTheirErrorsPlaced) {
   const std::string world = "Translate 0 0 2 Shape \"plymesh\" \"string filename\" \"m.ply\"";
   ExpectNear(World(world, {{"m.ply", ply + "1 2\n"}}).meshes.at(0).positions[1], {1, 0, 2});
   EXPECT_THAT(Said("WorldBegin " + world, {{"m.ply", ply + "1 3\n"}}),
-              HasSubstr("s.pbrt:1:44: error: \"filename\" of Shape \"plymesh\" cannot be read: bad "
-                        "PLY file: face 0 refers to vertex 3 of 3"));
+              HasSubstr("s.pbrt:1:44: error: \"filename\" of Shape \"plymesh\" cannot be read: "
+                        "m.ply: bad PLY file: face 0 refers to vertex 3 of 3"));
   EXPECT_THAT(Said("WorldBegin " + world), HasSubstr("m.ply: no such file"));
 }
 

@@ -59,7 +59,7 @@ std::vector<std::uint32_t> NearByGrid(const PhotonGrid& grid, Vec3 center, float
 void ExpectAgreement(const Cloud& cloud, float cell, float extent, std::uint64_t key) {
   for (const int threads : {1, 3}) {
     ThreadTeam team(threads);
-    const PhotonGrid grid(cloud.chunks, cloud.region, cell, team);
+    const PhotonGrid grid(cloud.chunks, {}, cloud.region, cell, team);
     ASSERT_EQ(grid.size(), cloud.all.size());
     KeyedRng rng(key);
     for (int i = 0; i < 300; ++i) {
@@ -111,7 +111,7 @@ TEST(PhotonGridTest, HandlesOnePhotonAndNone) {
   one.Add(2, {7, 8, 9});
   ExpectAgreement(one, 1, 10, 5);
   ThreadTeam team(2);
-  const PhotonGrid empty({{}, {}}, Bounds{}, 1, team);
+  const PhotonGrid empty({{}, {}}, {}, Bounds{}, 1, team);
   EXPECT_EQ(empty.size(), 0U);
   EXPECT_TRUE(NearByGrid(empty, {0, 0, 0}, 1e30F).empty());
 }

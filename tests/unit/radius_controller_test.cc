@@ -1,9 +1,14 @@
 // Radii shrink as the papers' formulas say, computed here by hand.
 #include "render/estimate/radius_controller.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <vector>
 
 #include "gtest/gtest.h"
+
+#include "render/estimate/evidence.h"
 
 namespace lucerna {
 namespace {
@@ -12,23 +17,23 @@ std::unique_ptr<RadiusController> Make(RadiusControllerKind kind, double alpha) 
   RenderSettings settings;
   settings.radius_controller = kind;
   settings.alpha = alpha;
-  return MakeRadiusController(settings);
+  return MakeRadiusController(settings, 1);
 }
 
 // Hachisuka et al. 2008: N' = N + αM, r' = r sqrt((N + αM) / (N + M)).
 TEST(PpmTest, KeepsAShareOfThePhotons) {
   const auto ppm = Make(RadiusControllerKind::kPpm, 2.0 / 3);
-  const PixelRadius first = ppm->Next({1, 0}, {100, 1}, 0);
+  const PixelRadius first = ppm->Next({1, 0}, {100, 1, {}}, 0, {});
   EXPECT_NEAR(first.photons, 66.66667, 1e-4);
   EXPECT_NEAR(first.radius, 0.8164966, 1e-6);
-  const PixelRadius next = ppm->Next({1, 100}, {50, 1}, 1);
+  const PixelRadius next = ppm->Next({1, 100}, {50, 1, {}}, 1, {});
   EXPECT_NEAR(next.photons, 133.33333, 1e-4);
   EXPECT_NEAR(next.radius, 0.942809, 1e-6);
 }
 
 TEST(PpmTest, KeepsItsRadiusWithoutPhotons) {
   const auto ppm = Make(RadiusControllerKind::kPpm, 0.7);
-  const PixelRadius still = ppm->Next({0.3F, 12}, {0, 0.4F}, 3);
+  const PixelRadius still = ppm->Next({0.3F, 12}, {0, 0.4F, {}}, 3, {});
   EXPECT_EQ(still.radius, 0.3F);
   EXPECT_EQ(still.photons, 12);
 }
@@ -36,8 +41,8 @@ TEST(PpmTest, KeepsItsRadiusWithoutPhotons) {
 // Gathered in a disc of twice the radius, a quarter of the photons belong to today's.
 TEST(PpmTest, CountsOnlyWhatTodaysDiscWouldHaveHeld) {
   const auto ppm = Make(RadiusControllerKind::kPpm, 2.0 / 3);
-  const PixelRadius lagging = ppm->Next({1, 100}, {200, 2}, 4);
-  const PixelRadius direct = ppm->Next({1, 100}, {50, 1}, 4);
+  const PixelRadius lagging = ppm->Next({1, 100}, {200, 2, {}}, 4, {});
+  const PixelRadius direct = ppm->Next({1, 100}, {50, 1, {}}, 4, {});
   EXPECT_FLOAT_EQ(lagging.radius, direct.radius);
   EXPECT_FLOAT_EQ(lagging.photons, direct.photons);
 }
@@ -49,7 +54,8 @@ TEST(PpmTest, KeepsTheDensityOverManyPasses) {
   PixelRadius pixel = {1, 0};
   for (std::uint64_t pass = 0; pass < 1000; ++pass) {
     const float r = pixel.radius;
-    pixel = ppm->Next(pixel, {100.0 * static_cast<double>(r) * static_cast<double>(r), r}, pass);
+    pixel = ppm->Next(pixel, {100.0 * static_cast<double>(r) * static_cast<double>(r), r, {}}, pass,
+                      {});
     ASSERT_LT(pixel.radius, r);
     const double density = static_cast<double>(pixel.photons) /
                            (static_cast<double>(pixel.radius) * static_cast<double>(pixel.radius));
@@ -63,11 +69,83 @@ TEST(PppmTest, FollowsTheProductWhateverThePhotons) {
   PixelRadius pixel = {2, 0};
   double squared = 4;
   for (std::uint64_t pass = 0; pass < 200; ++pass) {
-    pixel = pppm->Next(pixel, {pass % 3 == 0 ? 0.0 : 7.0, pixel.radius}, pass);
+    pixel = pppm->Next(pixel, {pass % 3 == 0 ? 0.0 : 7.0, pixel.radius, {}}, pass, {});
     const auto i = static_cast<double>(pass + 1);
     squared *= (i + 0.6) / (i + 1);
     ASSERT_NEAR(pixel.radius / std::sqrt(squared), 1, 1e-5) << pass;
   }
+}
+
+// Twelve cells of equal counts keep the radius; a slope across them, or a peak in the middle, does
+// not, and what was counted is forgotten after each test.
+TEST(CppmTest, ShrinksOnlyWhereCountsAreUneven) {
+  RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kCppm;
+  const auto cppm = MakeRadiusController(settings, 1);
+  std::vector<double> memory(cppm->MemoryPerPixel());
+  const auto next = [&](const std::array<std::int64_t, 12>& counts) {
+    return cppm->Next({1, 0}, {120, 1, counts}, 0, memory).radius;
+  };
+  EXPECT_EQ(next({10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10}), 1);
+  EXPECT_FLOAT_EQ(next({30, 25, 10, 0, 5, 10, 15, 10, 5, 5, 0, 5}), std::sqrt(0.8F));
+  std::fill(memory.begin(), memory.end(), 0);
+  EXPECT_FLOAT_EQ(next({20, 20, 20, 20, 20, 20, 0, 0, 0, 0, 0, 0}), std::sqrt(0.5F));
+  // Too few to say anything.
+  std::fill(memory.begin(), memory.end(), 0);
+  EXPECT_EQ(next({20, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}), 1);
+}
+
+// One frequency photon of weight 1 in every ten, all of one trace: the radius goes where that trace
+// says, and no further.
+PixelRadius RunFrequency(RadiusControllerKind kind, double trace, int passes) {
+  RenderSettings settings;
+  settings.radius_controller = kind;
+  settings.bias = 0.02;
+  const auto controller = MakeRadiusController(settings, 1);
+  std::vector<double> memory(controller->MemoryPerPixel());
+  PixelRadius pixel = {1, 0};
+  for (int pass = 0; pass < passes; ++pass) {
+    const auto r = static_cast<double>(pixel.radius);
+    const double photons = 50 * r * r;
+    const double frequency_photons = photons / 10;
+    const double x = trace * r * r;
+    const auto units = [&](double v) {
+      return static_cast<std::int64_t>(frequency_photons * v / kFrequencyUnit);
+    };
+    const std::array<std::int64_t, kFrequencyColumns> columns = {
+        static_cast<std::int64_t>(std::lround(frequency_photons)), units(1), units(1), units(x),
+        units(x * x)};
+    pixel = controller->Next(pixel, {photons, pixel.radius, columns},
+                             static_cast<std::uint64_t>(pass), memory);
+  }
+  return pixel;
+}
+
+TEST(FrequencyTest, StopsAtThePredictedRadius) {
+  // Epanechnikov: sqrt(12 · 0.02 / tr) = 0.5.
+  constexpr double kTrace = 12 * 0.02 / 0.25;
+  const float stopped = RunFrequency(RadiusControllerKind::kFrequency, kTrace, 400).radius;
+  EXPECT_NEAR(stopped, 0.5, 0.005);
+  EXPECT_EQ(RunFrequency(RadiusControllerKind::kFrequency, kTrace, 800).radius, stopped);
+  // The consistent variant goes on below it, but slower than PPM.
+  const float consistent =
+      RunFrequency(RadiusControllerKind::kFrequencyConsistent, kTrace, 800).radius;
+  EXPECT_LT(consistent, 0.495F);
+  EXPECT_GT(consistent, 0.4F);
+  // Even light: the radius stays, but for the first pass, whose five frequency photons say nothing
+  // yet.
+  EXPECT_FLOAT_EQ(RunFrequency(RadiusControllerKind::kFrequency, 0, 100).radius,
+                  std::sqrt(2.0F / 3));
+  EXPECT_EQ(RunFrequency(RadiusControllerKind::kFrequencyMse, 0, 100).radius, 1);
+}
+
+TEST(FrequencyMseTest, TakesTheRadiusOfLeastErrorAtOnceAndThenFollowsTheDensity) {
+  constexpr double kTrace = 40;  // tolerance at a radius of 0.077
+  const float early = RunFrequency(RadiusControllerKind::kFrequencyMse, kTrace, 20).radius;
+  const float late = RunFrequency(RadiusControllerKind::kFrequencyMse, kTrace, 2000).radius;
+  // r ~ (photons per area)^(-1/6).
+  EXPECT_NEAR(static_cast<double>(late / early), std::pow(100.0, -1.0 / 6), 0.06);
+  EXPECT_GT(late, 0.077F);
 }
 
 }  // namespace

@@ -118,6 +118,11 @@ TEST(RenderSettingsTest, RefusesWhatIsOutOfRangeByTheFlagsName) {
   user.width = 65537;
   user.height = 1;
   EXPECT_THAT(Why(user), HasSubstr("--size"));
+  user.width = 8192;
+  user.height = 4096;
+  EXPECT_EQ(Why(user), "");
+  user.height = 4097;
+  EXPECT_THAT(Why(user), HasSubstr("more than the 33554432 of one job"));
 }
 
 TEST(RenderSettingsTest, NamesAreReadBack) {

@@ -16,7 +16,7 @@ namespace {
 TEST(PixelStatisticsTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
   RenderSettings settings;
   settings.alpha = 0.7;
-  const auto ppm = MakeRadiusController(settings);
+  const auto ppm = MakeRadiusController(settings, 1);
   const Kernel kernel{KernelKind::kConstant};
   const FluxScale scale = FluxScale::ForPower({3, 5, 0.1F});
   constexpr std::int64_t kPhotons = 1000;
@@ -58,7 +58,7 @@ TEST(PixelStatisticsTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
 TEST(PixelStatisticsTest, CountsAPassWithoutHitpointAsDark) {
   PixelStatistics statistics(2, 1);
   RenderSettings settings;
-  const auto ppm = MakeRadiusController(settings);
+  const auto ppm = MakeRadiusController(settings, 1);
   const std::vector<std::uint32_t> pixels = {1};
   const std::vector<Rgb> weights = {{2, 0, -1}};
   const std::vector<float> units = {0.5F};

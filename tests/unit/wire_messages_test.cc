@@ -145,5 +145,15 @@ TEST(ChannelTest, KnowsWhatStaysOnThisMachine) {
   }
 }
 
+TEST(ChannelTest, AnAddressHasAHostAndAPortThatExists) {
+  for (const char* address : {"127.0.0.1:7400", "[::1]:0", "farm.example:65535"}) {
+    EXPECT_TRUE(IsAddress(address)) << address;
+  }
+  for (const char* address :
+       {"", "farm", ":7400", "farm:", "farm:65536", "farm:7400x", "farm:-1"}) {
+    EXPECT_FALSE(IsAddress(address)) << address;
+  }
+}
+
 }  // namespace
 }  // namespace lucerna

@@ -1,0 +1,41 @@
+// Vectors in double, where float would lose what is asked for: differences of nearly equal points
+// and normals.
+#pragma once
+
+#include <cmath>
+
+#include "render/math/vector.h"
+
+namespace lucerna {
+
+struct Double3 {
+  double x = 0, y = 0, z = 0;
+
+  Double3() = default;
+  constexpr Double3(double x_in, double y_in, double z_in) : x(x_in), y(y_in), z(z_in) {}
+  explicit constexpr Double3(Vec3 v) : x(v.x), y(v.y), z(v.z) {}
+};
+
+constexpr Double3 operator+(Double3 a, Double3 b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+constexpr Double3 operator-(Double3 a, Double3 b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+constexpr Double3 operator*(Double3 a, double s) {
+  return {a.x * s, a.y * s, a.z * s};
+}
+constexpr double Dot(Double3 a, Double3 b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+constexpr Double3 Cross(Double3 a, Double3 b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline double Length(Double3 a) {
+  return std::sqrt(Dot(a, a));
+}
+inline Vec3 ToFloat(Double3 a) {
+  return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
+}
+
+}  // namespace lucerna

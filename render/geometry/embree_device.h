@@ -1,0 +1,35 @@
+// How is Embree started, and what does it say when it fails?
+//
+// The instruction set is pinned: equal rays have equal hits in every process of one numeric
+// profile.
+#pragma once
+
+#include <embree3/rtcore.h>
+
+#include "render/base/status.h"
+
+namespace lucerna {
+
+// Errors: INTERNAL without AVX2. The caller releases the device.
+[[nodiscard]] inline StatusOr<RTCDevice> NewEmbreeDevice() {
+  RTCDevice device = rtcNewDevice("isa=avx2");
+  if (device == nullptr) {
+    return absl::InternalError("Embree cannot start: this processor has no AVX2");
+  }
+  return device;
+}
+
+// What went wrong since the last call. Errors: RESOURCE_EXHAUSTED, INTERNAL.
+[[nodiscard]] inline Status EmbreeStatus(RTCDevice device) {
+  switch (rtcGetDeviceError(device)) {
+    case RTC_ERROR_NONE:
+      return absl::OkStatus();
+    case RTC_ERROR_OUT_OF_MEMORY:
+      return absl::ResourceExhaustedError(
+          "not enough memory for the scene's acceleration structure");
+    default:
+      return absl::InternalError("Embree refuses the scene's geometry");
+  }
+}
+
+}  // namespace lucerna

@@ -1,0 +1,81 @@
+#include "render/geometry/mesh_edges.h"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <tuple>
+
+#include "render/base/status.h"
+#include "render/math/rng.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::uint32_t kEmpty = std::numeric_limits<std::uint32_t>::max();
+
+std::uint64_t KeyOf(Vec3 v) {
+  // Adding 0 turns -0 into 0, which are equal and must have equal keys.
+  const auto bits = [](float c) { return std::uint64_t{std::bit_cast<std::uint32_t>(c + 0.0F)}; };
+  return Mix64(Mix64(bits(v.x) << 32 | bits(v.y)) ^ bits(v.z));
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> WeldVertices(std::span<const Vec3> positions,
+                                        std::span<const Vec3> normals) {
+  LUCERNA_CHECK(positions.size() < kEmpty);
+  LUCERNA_CHECK(normals.empty() || normals.size() == positions.size());
+  // Open addressing, at most half full.
+  const std::size_t slots = std::bit_ceil(2 * positions.size() + 1);
+  std::vector<std::uint32_t> table(slots, kEmpty);
+  std::vector<std::uint32_t> first(positions.size());
+  for (std::uint32_t i = 0; i < positions.size(); ++i) {
+    std::uint64_t key = KeyOf(positions[i]);
+    if (!normals.empty()) key = CombineKeys(key, KeyOf(normals[i]));
+    std::size_t slot = key & (slots - 1);
+    const auto is_other = [&](std::uint32_t j) {
+      return j != kEmpty &&
+             !(positions[j] == positions[i] && (normals.empty() || normals[j] == normals[i]));
+    };
+    while (is_other(table[slot]))
+      slot = (slot + 1) & (slots - 1);
+    if (table[slot] == kEmpty) table[slot] = i;
+    first[i] = table[slot];
+  }
+  return first;
+}
+
+std::vector<TriangleSide> SidesByEdge(std::span<const std::uint32_t> corners,
+                                      std::size_t vertex_count) {
+  LUCERNA_CHECK(corners.size() < kEmpty);
+  const auto side_at = [&](std::size_t corner) {
+    const std::size_t first = corner / 3 * 3;
+    const std::uint32_t a = corners[first + (corner + 1) % 3];
+    const std::uint32_t b = corners[first + (corner + 2) % 3];
+    return TriangleSide{std::min(a, b), std::max(a, b), static_cast<std::uint32_t>(corner)};
+  };
+  // A counting sort by the lower end, then a sort of the few sides at each: several times faster
+  // than one sort of all.
+  std::vector<std::uint32_t> begin(vertex_count + 1, 0);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const TriangleSide side = side_at(i);
+    if (side.low != side.high) ++begin[side.low + 1];
+  }
+  for (std::size_t v = 0; v < vertex_count; ++v)
+    begin[v + 1] += begin[v];
+  std::vector<TriangleSide> sides(begin[vertex_count]);
+  std::vector<std::uint32_t> next(begin.begin(), begin.end() - 1);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const TriangleSide side = side_at(i);
+    if (side.low != side.high) sides[next[side.low]++] = side;
+  }
+  for (std::size_t v = 0; v < vertex_count; ++v) {
+    std::sort(sides.begin() + begin[v], sides.begin() + begin[v + 1],
+              [](const TriangleSide& a, const TriangleSide& b) {
+                return std::tie(a.high, a.opposite) < std::tie(b.high, b.opposite);
+              });
+  }
+  return sides;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,183 @@
+#include "worker/photon_spectrum.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "render/estimate/kernel.h"
+
+namespace lucerna {
+namespace {
+
+// Twice the largest radius that a job begins with: edges farther from a photon's leg than that are
+// farther than its kernel will ever reach. Follows from scene and settings alone, because every
+// worker must look equally far. With automatic radii it is judged for the middle of the scene.
+float ReachOf(const Scene& scene, const RenderSettings& settings, const Bounds& bounds) {
+  if (settings.initial_radius > 0) return 2 * static_cast<float>(settings.initial_radius);
+  constexpr float kInitialFootprints = 3;
+  const Window window = ScreenWindow(scene.camera, settings.width, settings.height);
+  const auto pixel = static_cast<float>((window.high_x - window.low_x) / settings.width);
+  const float distance = Length(scene.camera.camera_to_world.Point({}) - bounds.Center());
+  return 2 * kInitialFootprints * pixel * std::max(distance, 0.1F * bounds.Diagonal());
+}
+
+}  // namespace
+
+StatusOr<std::unique_ptr<SpectrumTracer>> SpectrumTracer::Create(const Scene& scene,
+                                                                 const RenderSettings& settings,
+                                                                 const Intersector& intersector,
+                                                                 const LightSet& lights) {
+  auto tracer = std::unique_ptr<SpectrumTracer>(
+      new SpectrumTracer(scene, settings, intersector.bounds(), lights));
+  LUCERNA_ASSIGN_OR_RETURN(tracer->edges_, SilhouetteEdges::Create(scene, tracer->reach_));
+  return tracer;
+}
+
+bool SpectrumTracer::Suits(const RenderSettings& settings) const {
+  return edge_strength_ == EdgeStrength(settings.bias, Kernel{settings.kernel}.Moments().mu2) &&
+         reach_ == ReachOf(scene_, settings, bounds_);
+}
+
+SpectrumTracer::SpectrumTracer(const Scene& scene, const RenderSettings& settings,
+                               const Bounds& bounds, const LightSet& lights)
+    : scene_(scene),
+      lights_(lights),
+      bounds_(bounds),
+      limits_(SpectrumLimits::ForDiagonal(static_cast<double>(bounds.Diagonal()))),
+      edge_strength_(EdgeStrength(settings.bias, Kernel{settings.kernel}.Moments().mu2)),
+      reach_(ReachOf(scene, settings, bounds)),
+      curvature_(scene, [](const Material&) { return true; }),
+      mesh_moments_(scene.meshes.size()) {
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    const TriangleMesh& mesh = scene.meshes[m];
+    if (mesh.traits.area_light == kNoAreaLight) continue;
+    EmitterMoments moments;
+    for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+      moments = Merge(moments, TriangleMoments(mesh.positions[mesh.indices[i]],
+                                               mesh.positions[mesh.indices[i + 1]],
+                                               mesh.positions[mesh.indices[i + 2]]));
+    }
+    mesh_moments_[m] = moments;
+  }
+}
+
+SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
+  const Emitter& emitter = lights_.emitter(emission.emitter);
+  const Vec3 direction = emission.ray.direction;
+  switch (emitter.kind) {
+    case EmitterKind::kTriangle:
+      return {AreaSource(*mesh_moments_[emitter.geometry], direction, limits_), false};
+    case EmitterKind::kSphere:
+      return {SphereSource(static_cast<double>(scene_.spheres[emitter.primitive].radius), limits_),
+              false};
+    case EmitterKind::kDisk: {
+      const Disk& disk = scene_.disks[emitter.primitive];
+      return {AreaSource(DiscMoments(disk.center, disk.normal, static_cast<double>(disk.radius)),
+                         direction, limits_),
+              false};
+    }
+    case EmitterKind::kPoint:
+      return {PointSource(limits_), false};
+    case EmitterKind::kSpot: {
+      const SpotLight& spot = scene_.spot_lights[emitter.primitive];
+      const double width = std::acos(static_cast<double>(spot.cos_total_width)) -
+                           std::acos(static_cast<double>(spot.cos_falloff_start));
+      const double relative = static_cast<double>(Luminance(emission.flux)) /
+                              std::max(1e-30, static_cast<double>(Luminance(emitter.power)));
+      const bool is_inside = Dot(direction, spot.direction) >= spot.cos_falloff_start;
+      return {SpotSource(std::min(relative, 1.0),
+                         is_inside || !(width > 0) ? 0 : SmoothFalloffCurvature(width), limits_),
+              false};
+    }
+    case EmitterKind::kDistant:
+      return {DirectionalSource(limits_), false};
+    case EmitterKind::kInfinite:
+      // Even light from everywhere: no structure in place or direction.
+      return {EnvironmentSource(0, 1, 1, 1, limits_), false};
+  }
+  return {};
+}
+
+void SpectrumTracer::Fly(Carried& carried, const Ray& ray, float distance) const {
+  const auto distance_m = static_cast<double>(distance);
+  if (carried.left_diffusely) {
+    carried.spectrum = LeaveDiffuse(carried.spectrum, distance_m, limits_);
+    carried.left_diffusely = false;
+  }
+  if (!(distance > 0)) return;
+  const NearbyEdges nearby = edges_->Find(ray.origin, ray.direction, distance);
+  std::array<PassedEdge, NearbyEdges::kCapacity> passed;
+  std::size_t count = 0;
+  for (const NearbyEdge& edge : nearby.all()) {
+    passed[count++] = {static_cast<double>(edge.distance_along),
+                       static_cast<double>(edge.distance_across)};
+  }
+  carried.spectrum = TravelPastEdges(carried.spectrum, distance_m, {passed.data(), count},
+                                     edge_strength_, limits_);
+}
+
+float SpectrumTracer::Received(const Carried& carried, const SurfacePoint& surface, Vec3 wo) const {
+  // Two equal principal curvatures with the sum of squares that the surface has.
+  const double bend = std::sqrt(0.5 * static_cast<double>(curvature_.SquaredPrincipals(surface)));
+  const double trace = ReceivedTrace(carried.spectrum,
+                                     static_cast<double>(std::abs(Dot(wo, surface.shading_normal))),
+                                     bend, bend, limits_);
+  // Held in the range of float; a trace that large asks for the smallest radius anyway.
+  return std::isfinite(trace) ? static_cast<float>(std::min(trace, 1e37)) : -1.0F;
+}
+
+SurfaceBend SpectrumTracer::BendAt(const SurfacePoint& surface, Vec3 wo) const {
+  const Vec3 normal = surface.shading_normal;
+  Vec3 tangential = wo - normal * Dot(wo, normal);
+  const float squared = LengthSquared(tangential);
+  tangential = squared > 1e-8F ? tangential * (1 / std::sqrt(squared)) : Frame(normal).s;
+  const NormalCurvature in_plane = curvature_.Along(surface, tangential);
+  const NormalCurvature across = curvature_.Along(surface, Cross(normal, tangential));
+  // Convex towards the light that comes in.
+  const double side = Dot(wo, surface.geometric_normal) < 0 ? -1 : 1;
+  return {side * static_cast<double>(in_plane.curvature),
+          side * static_cast<double>(across.curvature),
+          static_cast<double>(std::max(in_plane.gradient, across.gradient)),
+          static_cast<double>(std::max(in_plane.second_gradient, across.second_gradient))};
+}
+
+void SpectrumTracer::Scatter(Carried& carried, const SurfacePoint& surface,
+                             const Material& material, Vec3 wo, Vec3 wi) const {
+  const Vec3 normal = surface.shading_normal;
+  const auto diffuse = [&] {
+    const double bend = std::sqrt(0.5 * static_cast<double>(curvature_.SquaredPrincipals(surface)));
+    const double trace = ReceivedTrace(
+        carried.spectrum, static_cast<double>(std::abs(Dot(wo, normal))), bend, bend, limits_);
+    carried = {ScatterDiffusely(trace, 0, limits_), true};
+  };
+  if (material.kind == Material::Kind::kDiffuse) {
+    diffuse();
+    return;
+  }
+  const bool transmits = Dot(wo, normal) * Dot(wi, normal) < 0;
+  const bool from_outside = Dot(wo, normal) > 0;
+  const double ior = static_cast<double>(material.ior);
+  const double ior_ratio = from_outside ? 1 / ior : ior;  // n1 / n2
+  // A rough surface scatters at a facet; the lobe around it blurs.
+  Vec3 facet = normal;
+  if (!IsSmooth(material)) {
+    facet = transmits ? wo * static_cast<float>(ior_ratio) + wi : wo + wi;
+    const float squared = LengthSquared(facet);
+    if (!(squared > 0)) return diffuse();
+    facet = facet * (1 / std::sqrt(squared));
+  }
+  const double cosine = static_cast<double>(std::abs(Dot(wo, facet)));
+  double lobe = 0;
+  if (!IsSmooth(material)) {
+    const auto alpha = static_cast<double>(std::max(material.alpha_u, material.alpha_v));
+    lobe = ObliqueLobe(transmits ? RefractedLobe(alpha, ior_ratio, cosine) : ReflectedLobe(alpha),
+                       cosine);
+    if (lobe > kDiffuseLobe) return diffuse();
+  }
+  const SurfaceBend bend = BendAt(surface, wo);
+  carried.spectrum = transmits ? Refract(carried.spectrum, ior_ratio, cosine, bend, limits_)
+                               : Mirror(carried.spectrum, cosine, bend, limits_);
+  if (lobe > 0) carried.spectrum = Blur(carried.spectrum, lobe, limits_);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,65 @@
+// What does a frequency photon know of the light around it?
+//
+// Carries a photon's spectrum (render/frequency) past every event of its path, looking up in the
+// scene what the events need: how large its light is, how the surfaces bend. One for all photons of
+// a job; the spectrum itself travels with the photon.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "render/frequency/spectrum.h"
+#include "render/geometry/curvature.h"
+#include "render/geometry/intersector.h"
+#include "render/geometry/silhouette.h"
+#include "render/scene/render_settings.h"
+#include "render/scene/scene.h"
+#include "render/transport/bsdf.h"
+#include "render/transport/light.h"
+
+namespace lucerna {
+
+class SpectrumTracer {
+ public:
+  // Keeps references to scene and lights. Errors: as SilhouetteEdges::Create.
+  [[nodiscard]] static StatusOr<std::unique_ptr<SpectrumTracer>> Create(
+      const Scene& scene, const RenderSettings& settings, const Intersector& intersector,
+      const LightSet& lights);
+
+  // Whether it was made for settings that ask for the same.
+  [[nodiscard]] bool Suits(const RenderSettings& settings) const;
+
+  // A spectrum on its way. After diffuse scattering it is complete once the next leg is known.
+  struct Carried {
+    Spectrum spectrum;
+    bool left_diffusely = false;
+  };
+
+  [[nodiscard]] Carried Leave(const Emission& emission) const;
+  // A leg along `ray` of `distance` [scene units], past the silhouettes near it.
+  void Fly(Carried& carried, const Ray& ray, float distance) const;
+  // The trace of what arrives from `wo` at `surface` [1/length²], for a deposit; below 0 when it is
+  // not a number.
+  [[nodiscard]] float Received(const Carried& carried, const SurfacePoint& surface, Vec3 wo) const;
+  // Scattering from `wo` to `wi`, world.
+  void Scatter(Carried& carried, const SurfacePoint& surface, const Material& material, Vec3 wo,
+               Vec3 wi) const;
+
+ private:
+  SpectrumTracer(const Scene& scene, const RenderSettings& settings, const Bounds& bounds,
+                 const LightSet& lights);
+  [[nodiscard]] SurfaceBend BendAt(const SurfacePoint& surface, Vec3 wo) const;
+
+  const Scene& scene_;
+  const LightSet& lights_;
+  Bounds bounds_;
+  SpectrumLimits limits_;
+  double edge_strength_;
+  float reach_;
+  std::unique_ptr<SilhouetteEdges> edges_;
+  SurfaceCurvature curvature_;
+  std::vector<std::optional<EmitterMoments>> mesh_moments_;  // [meshes] that emit
+};
+
+}  // namespace lucerna
