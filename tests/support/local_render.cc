@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "render/estimate/evidence.h"
 #include "render/scene/pbrt_parser.h"
 #include "render/scene/scene_files.h"
 
@@ -37,7 +38,8 @@ void LocalRender::AddPass(int batches) {
   const RadiusColumn radii = std::move(next_radii_);
   next_ = estimator_->TraceEyePaths(pass_ + 1);
   next_radii_ = estimator_->Radii(next_);
-  PassSums sums(pass.block.size());
+  PassSums sums(pass.block.size(),
+                EvidenceColumns(EvidenceOf(settings_.radius_controller)));
   const std::atomic<bool> stop = false;
   const auto photons = static_cast<std::uint64_t>(settings_.photons_per_pass);
   for (int batch = 0; batch < batches; ++batch) {
