@@ -9,15 +9,6 @@
 #include "server/eye_path.h"
 
 namespace lucerna {
-namespace {
-
-// With automatic radii the first radius is this many pixel footprints. At one photon per pixel
-// and pass it holds about as many photons as a fixed radius chosen by hand for the scene would
-// (docs of the measurement: tests/bench).
-constexpr float kInitialFootprints = 3;
-
-}  // namespace
-
 struct JobEstimator::State {
   State(Scene s, RenderSettings r, int threads)
       : scene(InWorkingSpace(std::move(s))), settings(r), team(threads) {}

@@ -8,7 +8,6 @@ PixelStatistics::PixelStatistics(std::size_t pixels, float initial_radius,
                                  std::size_t memory_per_pixel)
     : radius_(pixels, PixelRadius{initial_radius, 0}),
       radiance_sum_(pixels),
-      squared_luminance_sum_(pixels),
       photon_count_(pixels),
       last_radius_(pixels),
       last_unit_radius_(pixels),
@@ -36,17 +35,12 @@ void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& r
     const auto radius = static_cast<double>(radii[row]);
     const double to_density = per_photon / (radius * radius);
     RgbSum& sum = radiance_sum_[pixel];
-    RgbSum pass_radiance{};
     for (int channel = 0; channel < 3; ++channel) {
       const auto c = static_cast<std::size_t>(channel);
       const double flux = static_cast<double>(sums.flux(channel)[row]) *
                           static_cast<double>(scale.watts_per_quantum[channel]);
-      pass_radiance[c] = static_cast<double>(rows.weights[row][channel]) * flux * to_density;
-      sum[c] += pass_radiance[c];
+      sum[c] += static_cast<double>(rows.weights[row][channel]) * flux * to_density;
     }
-    const double luminance =
-        0.2126 * pass_radiance[0] + 0.7152 * pass_radiance[1] + 0.0722 * pass_radiance[2];
-    squared_luminance_sum_[pixel] += luminance * luminance;
     photon_count_[pixel] += sums.counts()[row];
     last_radius_[pixel] = radii[row];
     last_unit_radius_[pixel] = rows.unit_radii[row];

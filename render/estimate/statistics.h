@@ -46,11 +46,6 @@ class PixelStatistics {
   [[nodiscard]] std::int64_t passes() const { return passes_; }
   // Sum over passes of each pass's estimate of photon radiance [pixels].
   [[nodiscard]] const std::vector<RgbSum>& radiance_sum() const { return radiance_sum_; }
-  // Sum over passes of the squared luminance of those estimates [pixels]: with the sum itself,
-  // the variance of the mean.
-  [[nodiscard]] const std::vector<double>& squared_luminance_sum() const {
-    return squared_luminance_sum_;
-  }
   // Photons gathered over all passes [pixels].
   [[nodiscard]] const std::vector<std::uint64_t>& photon_count() const { return photon_count_; }
   // The radius controller's own numbers for a pixel.
@@ -66,7 +61,6 @@ class PixelStatistics {
   std::int64_t passes_ = 0;
   std::vector<PixelRadius> radius_;
   std::vector<RgbSum> radiance_sum_;
-  std::vector<double> squared_luminance_sum_;
   std::vector<std::uint64_t> photon_count_;
   std::vector<float> last_radius_;
   std::vector<float> last_unit_radius_;

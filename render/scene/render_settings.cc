@@ -11,7 +11,7 @@ namespace lucerna {
 namespace {
 
 constexpr int kMaxSide = 65536;
-// An image of 7680 x 4320 fits. The coordinator keeps some 560 bytes a pixel, and must not be
+// An image of 7680 x 4320 fits. The coordinator keeps some 570 bytes a pixel, and must not be
 // ended for want of memory by one job among many.
 constexpr std::int64_t kMaxPixels = std::int64_t{1} << 25;
 constexpr std::int64_t kMaxPhotonsPerPass = 1'000'000'000'000;

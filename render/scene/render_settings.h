@@ -38,6 +38,10 @@ enum class KernelKind : std::uint8_t { kConstant, kEpanechnikov, kBiweight, kGau
 [[nodiscard]] StatusOr<RadiusControllerKind> ParseRadiusController(std::string_view name);
 [[nodiscard]] StatusOr<KernelKind> ParseKernel(std::string_view name);
 
+// With automatic radii the first radius is this many widths of a pixel at the hitpoint. At one photon
+// per pixel and pass it holds about as many photons as a radius chosen by hand for a scene would.
+inline constexpr float kInitialFootprints = 3;
+
 // What a user may say about one job; absent means "as the scene file has it, else the default".
 struct RenderOverrides {
   std::optional<int> width, height;  // both or neither; the crop window is scaled along
