@@ -74,7 +74,7 @@ int Run(int argc, char** argv) {
     to->add_option("--time", flags.time_s, "stop after so many seconds");
     to->add_option("--seed", flags.seed, "another seed, other noise");
     to->add_option("--radius-controller", flags.radius_controller,
-                   "ppm, pppm, cppm, frequency, frequency-consistent or frequency-mse");
+                   "ppm, pppm, appm, cppm, frequency, frequency-consistent or frequency-mse");
     to->add_option("--alpha", flags.alpha, "share of new photons kept, between 0 and 1");
     to->add_option("--kernel", flags.kernel, "constant, epanechnikov, biweight or gaussian");
     to->add_option("--bias", flags.bias, "frequency controllers: bias a pixel may have, like 2%");

@@ -119,7 +119,7 @@ Status JobRunner::Open(TracedPass traced) {
   if (open.blobs.hitpoints > 0) {
     const auto photons = static_cast<std::uint64_t>(settings_.photons_per_pass);
     surroundings_.merger.Open(KeyOf(pass), open.blobs.hitpoints, photons,
-                              EvidenceColumns(EvidenceOf(settings_.radius_controller)));
+                              EvidenceColumns(EvidenceOf(settings_.radius_controller, pass)));
     surroundings_.scheduler.OpenPass(KeyOf(pass), photons);
   }
   open_.push_back(std::move(open));
@@ -133,7 +133,7 @@ bool JobRunner::IsComplete(const OpenPass& open) const {
 
 void JobRunner::TakeIn(OpenPass open) {
   const PassKey key = KeyOf(open.traced.eye.pass);
-  PassSums sums(0, EvidenceColumns(EvidenceOf(settings_.radius_controller)));
+  PassSums sums(0, EvidenceColumns(EvidenceOf(settings_.radius_controller, key.pass)));
   if (open.blobs.hitpoints > 0) {
     surroundings_.scheduler.ClosePass(key);
     sums = surroundings_.merger.Take(key);

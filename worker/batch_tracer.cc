@@ -44,10 +44,11 @@ Status CheckBlock(const HitpointBlock& block, const RadiusColumn& radii, const S
 }
 
 // The box in which a photon can be found by some hitpoint.
-Bounds RegionOf(const HitpointBlock& block, const RadiusColumn& radii) {
+Bounds RegionOf(const HitpointBlock& block, const RadiusColumn& radii, float radii_reach) {
   Bounds region;
   for (std::size_t row = 0; row < block.size(); ++row) {
-    const Vec3 reach = {radii[row], radii[row], radii[row]};
+    const float r = radii_reach * radii[row];
+    const Vec3 reach = {r, r, r};
     region.Add(block.positions[row] - reach);
     region.Add(block.positions[row] + reach);
   }
@@ -130,15 +131,15 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
                                         const HitpointBlock& block, const RadiusColumn& radii,
                                         const std::atomic<bool>& stop) {
   LUCERNA_RETURN_IF_ERROR(CheckBlock(block, radii, state_->scene));
+  const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
   Accumulation sum;
   if (block.size() == 0 || first >= last) {
     sum.tally.photons = last > first ? last - first : 0;
-    sum.evidence.resize(EvidenceColumns(EvidenceOf(settings.radius_controller)));
+    sum.evidence.resize(EvidenceColumns(evidence));
     return sum;
   }
-  const Bounds region = RegionOf(block, radii);
+  const Bounds region = RegionOf(block, radii, ReachOf(evidence));
   const float cell = CellWidth(radii);
-  const Evidence evidence = EvidenceOf(settings.radius_controller);
   if (evidence == Evidence::kFrequency &&
       (state_->spectra == nullptr || !state_->spectra->Suits(settings))) {
     LUCERNA_ASSIGN_OR_RETURN(

@@ -47,6 +47,7 @@ std::uint64_t PairBits(std::uint32_t photon_key, std::uint32_t hitpoint) {
 
 struct NoEvidence {
   static constexpr std::size_t kColumns = 0;
+  static constexpr float kReach = 1;
   NoEvidence(Vec3 /*normal*/, const FluxScale& /*scale*/) {}
   void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 /*to_photon*/,
            float /*squared*/, float /*squared_radius*/, float /*weight*/) {}
@@ -56,6 +57,7 @@ struct NoEvidence {
 // Counts by cell of the disc (see kSectors).
 struct SectorEvidence {
   static constexpr std::size_t kColumns = kSectors;
+  static constexpr float kReach = 1;
   SectorEvidence(Vec3 normal, const FluxScale& /*scale*/) : frame(normal) {}
   void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 to_photon, float squared,
            float squared_radius, float /*weight*/) {
@@ -80,19 +82,48 @@ struct SectorEvidence {
   std::array<std::int64_t, kColumns> counts{};
 };
 
+// From luminance [W] to the weights of evidence, and where those are held.
+float WeightScale(const FluxScale& scale) {
+  return 1 / (Luminance(scale.watts_per_quantum) * (1 << kFluxBits));
+}
+constexpr float kLargestWeight = 256;
+
+// Sums over a wider disc (see CurvatureColumn).
+struct CurvatureEvidence {
+  static constexpr std::size_t kColumns = kCurvatureColumns;
+  static constexpr float kReach = kCurvatureReach;
+  CurvatureEvidence(Vec3 /*normal*/, const FluxScale& scale) : weight_scale(WeightScale(scale)) {}
+  void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 /*to_photon*/, float squared,
+           float squared_radius, float weight) {
+    constexpr float kPerRadius = 1 / (kReach * kReach);
+    constexpr auto kUnits = static_cast<float>(1 / kWeightUnit);
+    const float w = std::min(weight * weight_scale, kLargestWeight);
+    const float u = squared / squared_radius * kPerRadius;
+    sums[kCurvatureLaplacian] += std::llrint(w * (2 * u - 1) * kUnits);
+    sums[kCurvatureWeight2] += std::llrint(w * w * kUnits);
+  }
+  void Store(std::vector<std::vector<std::int64_t>>& columns) const {
+    for (std::size_t i = 0; i < kColumns; ++i)
+      columns[i].push_back(sums[i]);
+  }
+
+  float weight_scale;
+  std::array<std::int64_t, kColumns> sums{};
+};
+
 // Sums over the frequency photons (see FrequencyColumn).
 struct FrequencyEvidence {
   static constexpr std::size_t kColumns = kFrequencyColumns;
-  FrequencyEvidence(Vec3 /*normal*/, const FluxScale& scale)
-      : weight_scale(1 / (Luminance(scale.watts_per_quantum) * (1 << kFluxBits))) {}
+  static constexpr float kReach = 1;
+  FrequencyEvidence(Vec3 /*normal*/, const FluxScale& scale) : weight_scale(WeightScale(scale)) {}
   void Add(const PhotonGrid& grid, std::size_t photon, Vec3 /*to_photon*/, float /*squared*/,
            float squared_radius, float weight) {
     const float trace = grid.trace(photon);
     if (!(trace >= 0)) return;
     // In double: the terms span ten decades, and each is rounded once.
-    const auto w = static_cast<double>(std::min(weight * weight_scale, 256.0F));
+    const auto w = static_cast<double>(std::min(weight * weight_scale, kLargestWeight));
     const auto x = static_cast<double>(std::min(trace * squared_radius, kLargestTrace));
-    constexpr double kUnits = 1 / kFrequencyUnit;
+    constexpr double kUnits = 1 / kWeightUnit;
     ++sums[kFrequencyCount];
     sums[kFrequencyWeight] += std::llrint(w * kUnits);
     sums[kFrequencyWeight2] += std::llrint(w * w * kUnits);
@@ -122,6 +153,15 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
   std::int64_t sum_g = 0;
   std::int64_t sum_b = 0;
   EvidenceSums evidence(normal, scale);
+  // Photons beyond the radius, for evidence that reaches further, have no part in the estimate.
+  const auto shape = [&](float squared) {
+    const float t2 = squared * inverse_squared;
+    if constexpr (EvidenceSums::kReach > 1) {
+      if (!(t2 < 1)) return 0.0F;
+    }
+    return KernelShape<kKernel>(t2);
+  };
+  const float reach = radius * EvidenceSums::kReach;
   const auto add = [&](const PhotonRecord& photon, Rgb quanta) {
     const std::uint64_t bits = PairBits(photon.key, hitpoint);
     constexpr std::uint64_t kMask = (1U << 21) - 1;
@@ -131,12 +171,11 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
     ++count;
   };
   if (glossy == nullptr) {
-    grid.ForEachWithin(position, radius, [&](std::size_t i, float squared) {
+    grid.ForEachWithin(position, reach, [&](std::size_t i, float squared) {
       const PhotonRecord& photon = grid.record(i);
       const Vec3 to_photon = grid.position(i) - position;
       if (!Counts(photon, normal, to_photon)) return;
-      add(photon,
-          photon.flux * scale.quanta_per_watt * KernelShape<kKernel>(squared * inverse_squared));
+      add(photon, photon.flux * scale.quanta_per_watt * shape(squared));
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux));
     });
   } else {
@@ -144,7 +183,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
     const Frame frame(DecodeOctahedral(glossy->shading_normal_oct));
     const Vec3 wo = frame.ToLocal(DecodeOctahedral(glossy->to_eye_oct));
     const bool transmits = material.kind == Material::Kind::kDielectric;
-    grid.ForEachWithin(position, radius, [&](std::size_t i, float squared) {
+    grid.ForEachWithin(position, reach, [&](std::size_t i, float squared) {
       const PhotonRecord& photon = grid.record(i);
       const Vec3 to_photon = grid.position(i) - position;
       // Photons on the far side of a rough dielectric count too.
@@ -152,8 +191,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       if (!Counts(photon, is_behind ? -normal : normal, to_photon)) return;
       const Vec3 wi = frame.ToLocal(DecodeOctahedral(photon.arrival_oct));
       const Rgb scattered = photon.flux * EvaluateBsdf(material, wo, wi, Carried::kRadiance);
-      add(photon,
-          scattered * scale.quanta_per_watt * KernelShape<kKernel>(squared * inverse_squared));
+      add(photon, scattered * scale.quanta_per_watt * shape(squared));
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(scattered));
     });
   }
@@ -236,6 +274,8 @@ GatherFunction Specialised(KernelKind kernel, Evidence evidence) {
       return ForKernel<NoEvidence>(kernel);
     case Evidence::kSectors:
       return ForKernel<SectorEvidence>(kernel);
+    case Evidence::kCurvature:
+      return ForKernel<CurvatureEvidence>(kernel);
     case Evidence::kFrequency:
       return ForKernel<FrequencyEvidence>(kernel);
   }
@@ -243,6 +283,10 @@ GatherFunction Specialised(KernelKind kernel, Evidence evidence) {
 }
 
 }  // namespace
+
+float ReachOf(Evidence evidence) {
+  return evidence == Evidence::kCurvature ? kCurvatureReach : 1;
+}
 
 Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii, const PhotonGrid& grid,
                     const std::vector<Material>& materials, const Kernel& kernel,

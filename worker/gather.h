@@ -14,8 +14,12 @@
 
 namespace lucerna {
 
+// How far from a hitpoint photons are looked for, in radii.
+[[nodiscard]] float ReachOf(Evidence evidence);
+
 // Every hitpoint adds up the photons within its radius that landed on its side of the surface:
 // kernel-weighted flux for diffuse ones, times the BSDF for glossy ones, and what `evidence` names.
+// Counts are of the photons within reach, flux of those within the radius.
 // Fills everything of the accumulation but the tally, of which it adds `pairs`. Pairs are
 // independent of each other, so neither threads nor the order of photons can be seen in the result.
 // Once `stop` is true it ends soon, with a result of no use.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/estimate/evidence.h"
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "render/math/sobol.h"
@@ -50,7 +51,7 @@ void PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index, Landed& la
   if (spectra_ == nullptr) return Walk<false>(number, job_key, landed);
   constexpr std::uint64_t kShareKey = 0x4652455155454E43ULL;
   const auto bits = static_cast<std::uint32_t>(CombineKeys(job_key ^ kShareKey, number) >> 32);
-  if (static_cast<double>(UnitFloat(bits)) < settings_.frequency_share) {
+  if (static_cast<double>(UnitFloat(bits)) < FrequencyShareInPass(settings_)) {
     return Walk<true>(number, job_key, landed);
   }
   Walk<false>(number, job_key, landed);
@@ -76,7 +77,6 @@ void PhotonPathTracer::Walk(std::uint64_t number, std::uint64_t job_key, Landed&
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
     const Material& material = scene_.materials[surface.material];
     const Vec3 wo = -ray.direction;
-    if constexpr (kHasSpectrum) spectra_->Fly(carried, ray, hit.t);
     if (surface.has_shading_normal) {
       const float shading = Dot(wo, surface.shading_normal);
       const float geometric = Dot(wo, surface.geometric_normal);
@@ -88,7 +88,17 @@ void PhotonPathTracer::Walk(std::uint64_t number, std::uint64_t job_key, Landed&
       ++landed.dropped;
       return;
     }
-    if (landing > 0 && gathers_[surface.material] != 0 && Inside(region_, surface.position)) {
+    const bool is_found =
+        landing > 0 && gathers_[surface.material] != 0 && Inside(region_, surface.position);
+    if constexpr (kHasSpectrum) {
+      // A surface that scatters light broadly forgets the shadows on it: after a leg of length d at
+      // most 4/d² of any detail is left, of none at all 3/d² (see LeaveDiffuse).
+      const bool shadows_count = is_found || material.kind != Material::Kind::kDiffuse;
+      spectra_->Fly(
+          carried, ray, hit.t,
+          shadows_count ? SpectrumTracer::Shadows::kFound : SpectrumTracer::Shadows::kLeftOut);
+    }
+    if (is_found) {
       landed.deposits.push_back({surface.position, flux, FaceForward(surface.geometric_normal, wo),
                                  EncodeOctahedral(wo),
                                  static_cast<std::uint32_t>(rng.Bits() >> 32)});

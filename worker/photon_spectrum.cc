@@ -97,14 +97,16 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
   return {};
 }
 
-void SpectrumTracer::Fly(Carried& carried, const Ray& ray, float distance) const {
+void SpectrumTracer::Fly(Carried& carried, const Ray& ray, float distance, Shadows shadows) const {
   const auto distance_m = static_cast<double>(distance);
   if (carried.left_diffusely) {
     carried.spectrum = LeaveDiffuse(carried.spectrum, distance_m, limits_);
     carried.left_diffusely = false;
   }
   if (!(distance > 0)) return;
-  const NearbyEdges nearby = edges_->Find(ray.origin, ray.direction, distance);
+  const NearbyEdges nearby = shadows == Shadows::kFound
+                                 ? edges_->Find(ray.origin, ray.direction, distance)
+                                 : NearbyEdges();
   std::array<PassedEdge, NearbyEdges::kCapacity> passed;
   std::size_t count = 0;
   for (const NearbyEdge& edge : nearby.all()) {

@@ -37,8 +37,11 @@ class SpectrumTracer {
   };
 
   [[nodiscard]] Carried Leave(const Emission& emission) const;
-  // A leg along `ray` of `distance` [scene units], past the silhouettes near it.
-  void Fly(Carried& carried, const Ray& ray, float distance) const;
+  // Whether the silhouettes near a leg are looked for, which costs as much as some legs do.
+  enum class Shadows : std::uint8_t { kFound, kLeftOut };
+
+  // A leg along `ray` of `distance` [scene units].
+  void Fly(Carried& carried, const Ray& ray, float distance, Shadows shadows) const;
   // The trace of what arrives from `wo` at `surface` [1/length²], for a deposit; below 0 when it is
   // not a number.
   [[nodiscard]] float Received(const Carried& carried, const SurfacePoint& surface, Vec3 wo) const;

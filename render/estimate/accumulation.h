@@ -31,7 +31,7 @@ struct BatchTally {
 struct Accumulation {
   // Rows of the hitpoint block, strictly increasing.
   std::vector<std::uint32_t> hitpoints;
-  std::vector<std::uint32_t> counts;              // [hitpoints] photons, each >= 1
+  std::vector<std::uint32_t> counts;              // [hitpoints] photons found, each >= 1
   std::array<std::vector<std::int64_t>, 3> flux;  // [3][hitpoints] in quanta, per channel
   // [columns][hitpoints] what the job's radius controller asks for besides (estimate/evidence.h);
   // no columns for most.

@@ -12,15 +12,38 @@
 
 namespace lucerna {
 
-enum class Evidence : std::uint8_t { kNone, kSectors, kFrequency };
+enum class Evidence : std::uint8_t { kNone, kSectors, kCurvature, kFrequency };
 
-[[nodiscard]] constexpr Evidence EvidenceOf(RadiusControllerKind kind) {
-  if (UsesFrequency(kind)) return Evidence::kFrequency;
+// Frequency photons come in one pass of so many, and that many times as densely there: the same
+// share of all photons, while the passes between carry, send and merge no columns. The first pass
+// is one of them, for evidence is worth most before the radius has shrunk.
+inline constexpr std::uint64_t kFrequencyPeriod = 4;
+
+// What the photons of `pass` are asked for.
+[[nodiscard]] constexpr Evidence EvidenceOf(RadiusControllerKind kind, std::uint64_t pass) {
+  if (UsesFrequency(kind)) {
+    return pass % kFrequencyPeriod == 0 ? Evidence::kFrequency : Evidence::kNone;
+  }
+  if (kind == RadiusControllerKind::kAppm) return Evidence::kCurvature;
   return kind == RadiusControllerKind::kCppm ? Evidence::kSectors : Evidence::kNone;
+}
+
+// The share of the photons of a pass with Evidence::kFrequency that carry a spectrum.
+[[nodiscard]] constexpr double FrequencyShareInPass(const RenderSettings& settings) {
+  const double share = settings.frequency_share * static_cast<double>(kFrequencyPeriod);
+  return share < 1 ? share : 1;
 }
 
 // kSectors: photons in each of twelve cells of equal area: two rings of six sectors.
 inline constexpr std::size_t kSectors = 12;
+
+// kCurvature, over the photons within kCurvatureReach radii: sums of w·(2u - 1) and w², where w is
+// the photon's luminance flux relative to the scene's power and u the squared distance over that of
+// the reach. The first is the Laplacian of the biweight kernel of that radius h: 24/(π h⁴) times it
+// estimates the Laplacian of the flux density. The disc is wider than the kernel's because a second
+// derivative is noisier than a value: by h⁻⁶ against r⁻².
+enum CurvatureColumn : std::size_t { kCurvatureLaplacian, kCurvatureWeight2, kCurvatureColumns };
+inline constexpr float kCurvatureReach = 1.5F;
 
 // kFrequency, over the frequency photons: how many, and sums of w, w², w·x and w·x², where w is the
 // photon's luminance flux relative to the scene's power and x the spatial spectral trace
@@ -33,8 +56,8 @@ enum FrequencyColumn : std::size_t {
   kFrequencyTrace2,
   kFrequencyColumns,
 };
-// The last four are counted in units of 2^-16.
-inline constexpr double kFrequencyUnit = 0x1p-16;
+// Sums of weights are counted in units of 2^-16.
+inline constexpr double kWeightUnit = 0x1p-16;
 // Larger values of x ask for radii below a hundredth of the present one; they are held here.
 inline constexpr float kLargestTrace = 4096;
 
@@ -44,6 +67,8 @@ inline constexpr float kLargestTrace = 4096;
       return 0;
     case Evidence::kSectors:
       return kSectors;
+    case Evidence::kCurvature:
+      return kCurvatureColumns;
     case Evidence::kFrequency:
       return kFrequencyColumns;
   }

@@ -24,9 +24,9 @@ struct PixelRadius {
 
 // What one pass brought to one pixel.
 struct PassEvidence {
-  double photons = 0;  // M, gathered with the radius below
+  double photons = 0;  // M, found with the radius below
   float radius = 0;    // in unit radii; at least PixelRadius::radius, since radii lag by a pass
-  // One number a column, in the controller's order of columns.
+  // One number a column, in the controller's order of columns; none in a pass without evidence.
   std::span<const std::int64_t> columns;
 };
 

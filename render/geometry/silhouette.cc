@@ -101,14 +101,15 @@ bool OutermostWings(Double3 edge, std::span<const Double3> wings, Vec3 (&outermo
 // What one query has found so far: the nearest kKept, so that the result does not depend on the
 // order in which Embree shows them.
 struct SilhouetteEdges::Search {
+  // Without initial values: 64 of them are made for every segment, and few are used.
   struct Found {
-    double across = 0;
-    double along = 0;
-    std::uint32_t edge = 0;
-    int nearest_end = -1;  // of the edge: 0 or 1 when the nearest place is that end
+    double across;
+    double along;
+    std::uint32_t edge;
+    int nearest_end;  // of the edge: 0 or 1 when the nearest place is that end, else -1
     // The segment passes on the side where the faces are: no border of its light, but one that may
     // lead on to a nearer place of the outline.
-    bool is_covered = false;
+    bool is_covered;
 
     // Order of nearness. At a pointed corner one edge may be covered and the other a border, both
     // nearest at their shared end: the border comes first.
@@ -121,6 +122,7 @@ struct SilhouetteEdges::Search {
   RTCIntersectContext context;  // first, because Embree hands back its address
   const SilhouetteEdges* edges = nullptr;
   Double3 origin, direction;
+  Vec3 direction_f;
   double length = 0;
   std::array<Found, kKept> found;
   std::size_t count = 0;
@@ -140,6 +142,13 @@ struct SilhouetteEdges::Search {
 
   void Visit(std::uint32_t number) {
     const Edge& edge = edges->edges_[number];
+    // The same in float first, for what is far from the limit: nearly all edges end here.
+    const Vec3 along_f = edge.ends[1] - edge.ends[0];
+    const Vec3 sideways_f = Cross(along_f, direction_f);
+    const float one_f = Dot(edge.wings[0], sideways_f);
+    const float other_f = Dot(edge.wings[1], sideways_f);
+    const float limit = 1e-5F * MaxAbs(along_f);
+    if ((one_f > limit && other_f < -limit) || (one_f < -limit && other_f > limit)) return;
     // Sides of the plane through the edge along the segment's direction; first, because that
     // rejects nearly all. A face seen edge-on (0) lies on neither: light that falls straight along
     // the wall of a box still passes its edges.
@@ -346,6 +355,7 @@ NearbyEdges SilhouetteEdges::Find(Vec3 origin, Vec3 direction, float length) con
   search.edges = this;
   search.origin = Double3(origin);
   search.direction = Double3(direction);
+  search.direction_f = direction;
   search.length = static_cast<double>(length);
   RTCRay ray{};
   ray.org_x = origin.x;

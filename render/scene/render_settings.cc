@@ -19,9 +19,10 @@ constexpr int kMaxDepth = 10'000;
 constexpr std::int64_t kDefaultPasses = 16;
 constexpr int kDefaultDepth = 5;
 
-constexpr std::array<std::pair<std::string_view, RadiusControllerKind>, 6> kControllers = {{
+constexpr std::array<std::pair<std::string_view, RadiusControllerKind>, 7> kControllers = {{
     {"ppm", RadiusControllerKind::kPpm},
     {"pppm", RadiusControllerKind::kPppm},
+    {"appm", RadiusControllerKind::kAppm},
     {"cppm", RadiusControllerKind::kCppm},
     {"frequency", RadiusControllerKind::kFrequency},
     {"frequency-consistent", RadiusControllerKind::kFrequencyConsistent},

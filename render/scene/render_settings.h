@@ -18,6 +18,7 @@ namespace lucerna {
 enum class RadiusControllerKind : std::uint8_t {
   kPpm,
   kPppm,
+  kAppm,
   kCppm,
   kFrequency,
   kFrequencyConsistent,

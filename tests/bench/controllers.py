@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 
-CONTROLLERS = ["ppm", "pppm", "cppm", "frequency", "frequency-consistent", "frequency-mse"]
+CONTROLLERS = ["ppm", "pppm", "appm", "cppm", "frequency", "frequency-consistent", "frequency-mse"]
 COLOURS = ["#444444", "#1f77b4", "#2ca02c", "#d62728", "#ff7f0e", "#9467bd"]
 
 

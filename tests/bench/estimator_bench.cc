@@ -5,9 +5,10 @@
 //   photon_paths    photon paths per second, tracing and keeping deposits
 //   photon_rays     the same rays again, intersection only: the ceiling
 //   eye_paths       eye paths per second with direct light
-//   gather          ns per (photon, hitpoint) pair, sorting the photons included
-//   wire            bytes a hitpoint sent and a touched hitpoint returned, and codec speed
-//   merge           touched hitpoints merged per second
+//   batch           photons per second of a whole batch, for each kind of evidence, with the same
+//   radii gather          ns per (photon, hitpoint) pair, sorting the photons included wire bytes a
+//   hitpoint sent and a touched hitpoint returned, and codec speed merge           touched
+//   hitpoints merged per second
 // Run: build/release/bin/lucerna-bench --benchmark_repetitions=10
 // --benchmark_report_aggregates_only=true
 #include <atomic>
@@ -19,6 +20,8 @@
 #include "benchmark/benchmark.h"
 
 #include "render/base/parallel.h"
+#include "render/base/text.h"
+#include "render/estimate/evidence.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/block_codec.h"
 #include "server/hitpoint_pass.h"
@@ -184,6 +187,31 @@ void GatherPairs(benchmark::State& state, const Bench& bench) {
                                      static_cast<double>(bench.eye.block.size());
 }
 
+// A batch as a worker runs it, up to its answer's bytes. The radii are those of the first pass for
+// every controller, so all find the same pairs and differ by what their evidence costs.
+void Batch(benchmark::State& state, const Bench& bench, RadiusControllerKind controller) {
+  constexpr std::uint64_t kPhotons = 1 << 16;
+  RenderSettings settings = bench.settings;
+  settings.radius_controller = controller;
+  const auto tracer = BatchTracer::Create(bench.scene, 1).value();
+  const std::atomic<bool> stop = false;
+  // As many passes as it takes for evidence to come round.
+  const std::uint64_t passes = UsesFrequency(controller) ? kFrequencyPeriod : 1;
+  std::uint64_t photons = 0;
+  std::size_t size_bytes = 0;
+  for (auto _ : state) {
+    for (std::uint64_t pass = 0; pass < passes; ++pass) {
+      const Accumulation sums =
+          tracer->Run(settings, pass, 0, kPhotons, bench.eye.block, bench.radii, stop).value();
+      size_bytes += EncodeAccumulation(sums, bench.eye.block.size()).size();
+      photons += kPhotons;
+    }
+  }
+  const auto all = static_cast<double>(photons);
+  state.counters["photons/s"] = Counter(all, Counter::kIsRate);
+  state.counters["bytes/photon"] = static_cast<double>(size_bytes) / all;
+}
+
 void BlockOnTheWire(benchmark::State& state, const Bench& bench) {
   std::size_t size_bytes = 0;
   for (auto _ : state) {
@@ -236,6 +264,13 @@ void Register(const std::string& name, const std::string& path) {
   add("photon_rays", PhotonRays)->Unit(benchmark::kMillisecond);
   add("eye_paths", EyePaths)->Unit(benchmark::kMillisecond);
   add("gather", GatherPairs)->Arg(1 << 16)->Arg(1 << 18)->Unit(benchmark::kMillisecond);
+  for (const auto controller : {RadiusControllerKind::kPpm, RadiusControllerKind::kFrequencyMse,
+                                RadiusControllerKind::kAppm, RadiusControllerKind::kCppm}) {
+    add(Concat("batch/", NameOf(controller)).c_str(), [controller](benchmark::State& s,
+                                                                   const Bench& b) {
+      Batch(s, b, controller);
+    })->Unit(benchmark::kMillisecond);
+  }
   add("block_on_the_wire", BlockOnTheWire)->Unit(benchmark::kMillisecond);
   add("accumulation_on_the_wire", AccumulationOnTheWire)
       ->Arg(1 << 16)
@@ -250,10 +285,12 @@ void Register(const std::string& name, const std::string& path) {
 int main(int argc, char** argv) {
   lucerna::Register("glass-box", "glass-box.pbrt");
   const std::string outside = std::string(LUCERNA_SOURCE_DIR) + "/../shared/scenes/";
-  for (const char* name : {"cornell-box", "water-caustic"}) {
-    const std::string path =
-        std::filesystem::weakly_canonical(outside + name + "/scene-v4.pbrt").string();
-    if (std::filesystem::exists(path)) lucerna::Register(name, path);
+  for (const char* name : {"cornell-box", "water-caustic", "veach-bidir", "sphere-box"}) {
+    for (const char* file : {"scene-v4.pbrt", "scene.pbrt"}) {
+      const std::string path =
+          std::filesystem::weakly_canonical(outside + name + "/" + file).string();
+      if (std::filesystem::exists(path)) lucerna::Register(name, path);
+    }
   }
   benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();

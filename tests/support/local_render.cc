@@ -38,8 +38,7 @@ void LocalRender::AddPass(int batches) {
   const RadiusColumn radii = std::move(next_radii_);
   next_ = estimator_->TraceEyePaths(pass_ + 1);
   next_radii_ = estimator_->Radii(next_);
-  PassSums sums(pass.block.size(),
-                EvidenceColumns(EvidenceOf(settings_.radius_controller)));
+  PassSums sums(pass.block.size(), EvidenceColumns(EvidenceOf(settings_.radius_controller, pass_)));
   const std::atomic<bool> stop = false;
   const auto photons = static_cast<std::uint64_t>(settings_.photons_per_pass);
   for (int batch = 0; batch < batches; ++batch) {
@@ -56,7 +55,8 @@ void LocalRender::AddPass(int batches) {
 
 Image RenderLocally(const Scene& scene, const RenderSettings& settings, int passes, int threads) {
   LocalRender render(scene, settings, threads);
-  for (int pass = 0; pass < passes; ++pass) render.AddPass();
+  for (int pass = 0; pass < passes; ++pass)
+    render.AddPass();
   return render.MakeImage();
 }
 

@@ -81,12 +81,34 @@ TEST(EvidenceTest, FrequencyColumnsAreTheSumsTheySay) {
   // Flux and power are both 1 here, so every weight is 1 up to the luminance's own rounding.
   EXPECT_EQ(sum.evidence[kFrequencyCount][0], static_cast<std::int64_t>(count));
   const auto value = [&](FrequencyColumn c) {
-    return kFrequencyUnit * static_cast<double>(sum.evidence[c][0]);
+    return kWeightUnit * static_cast<double>(sum.evidence[c][0]);
   };
   EXPECT_NEAR(value(kFrequencyWeight), count, 1e-4 * count);
   EXPECT_NEAR(value(kFrequencyWeight2), count, 1e-4 * count);
   EXPECT_NEAR(value(kFrequencyTrace), trace, 1e-4 * trace);
   EXPECT_NEAR(value(kFrequencyTrace2), trace2, 1e-4 * trace2);
+}
+
+TEST(EvidenceTest, CurvatureColumnsReachFurtherThanTheFluxDoes) {
+  const Cloud cloud(4000);
+  const Accumulation sum = cloud.Sum(Evidence::kCurvature);
+  ASSERT_EQ(sum.evidence.size(), kCurvatureColumns);
+  const float reach2 = 0.25F * kCurvatureReach * kCurvatureReach;
+  double count = 0;
+  double laplacian = 0;
+  for (const Deposit& deposit : cloud.deposits[0]) {
+    const float squared = LengthSquared(deposit.position);
+    if (!(squared < reach2)) continue;
+    ++count;
+    laplacian += 2 * static_cast<double>(squared / reach2) - 1;
+  }
+  EXPECT_EQ(sum.counts[0], count);
+  const auto value = [&](CurvatureColumn c) {
+    return kWeightUnit * static_cast<double>(sum.evidence[c][0]);
+  };
+  EXPECT_NEAR(value(kCurvatureWeight2), count, 1e-4 * count);
+  EXPECT_NEAR(value(kCurvatureLaplacian), laplacian, 1e-4 * count);
+  EXPECT_EQ(sum.flux, cloud.Sum(Evidence::kNone).flux);
 }
 
 TEST(EvidenceTest, IsMergedCheckedAndCarriedOnTheWire) {
@@ -128,10 +150,10 @@ TEST(SpectrumTracerTest, SeesTheImageOfAPointLightInAMirror) {
   const SurfacePoint surface = intersector->SurfaceAt(emission.ray, hit);
   const Vec3 wo = -emission.ray.direction;
   const Vec3 wi = {-wo.x, -wo.y, wo.z};
-  tracer->Fly(carried, emission.ray, hit.t);
+  tracer->Fly(carried, emission.ray, hit.t, SpectrumTracer::Shadows::kFound);
   tracer->Scatter(carried, surface, scene.materials[0], wo, wi);
   const float second = 3;
-  tracer->Fly(carried, {surface.position, wi, HUGE_VALF}, second);
+  tracer->Fly(carried, {surface.position, wi, HUGE_VALF}, second, SpectrumTracer::Shadows::kFound);
   SurfacePoint floor = surface;
   floor.shading_normal = floor.geometric_normal = -wi;  // met head on
   const double distance = static_cast<double>(hit.t + second);

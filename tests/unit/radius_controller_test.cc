@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "gtest/gtest.h"
 
 #include "render/estimate/evidence.h"
+#include "render/math/rng.h"
 
 namespace lucerna {
 namespace {
@@ -95,6 +97,73 @@ TEST(CppmTest, ShrinksOnlyWhereCountsAreUneven) {
   EXPECT_EQ(next({20, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}), 1);
 }
 
+// What `photons` of weight 1 a unit of area, thinned by 1 - bend·|x|², add up to within the reach
+// of a hitpoint of this radius, in expectation: the Laplacian of the density is -4·bend.
+std::array<std::int64_t, kCurvatureColumns> ExpectedCurvature(double photons, double bend,
+                                                              double radius) {
+  const double h2 = std::pow(static_cast<double>(kCurvatureReach) * radius, 2);
+  const double pi = std::numbers::pi;
+  const auto units = [](double v) { return std::llrint(v / kWeightUnit); };
+  return {units(-4 * bend * photons * pi * h2 * h2 / 24),
+          units(photons * pi * h2 * (1 - bend * h2 / 2))};
+}
+
+// Kaplanyan & Dachsbacher 2013: the least of R2 E/(n ν r²) + (mu2 L r²/2)².
+TEST(AppmTest, TakesTheRadiusOfLeastErrorForTheLaplacianItSees) {
+  constexpr double kPhotons = 400;
+  constexpr double kBend = 0.2;
+  RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kAppm;
+  const auto appm = MakeRadiusController(settings, 1);
+  std::vector<double> memory(appm->MemoryPerPixel());
+  PixelRadius pixel = {1, 0};
+  int pass = 0;
+  for (; pass < 4000; ++pass) {
+    const auto r = static_cast<double>(pixel.radius);
+    const auto columns = ExpectedCurvature(kPhotons, kBend, r);
+    pixel =
+        appm->Next(pixel, {100, pixel.radius, columns}, static_cast<std::uint64_t>(pass), memory);
+  }
+  // Epanechnikov: R2 = 4/(3π), mu2 = 1/6. The density in the middle is 400; the wider disc sees a
+  // few percent less of it, of which the sixth root is taken, and the Laplacian's own noise.
+  const double laplacian = 4 * kBend * kPhotons;
+  const double expected = std::pow(
+      2 * 4 / (3 * std::numbers::pi) * kPhotons / (pass * laplacian * laplacian / 36), 1.0 / 6);
+  EXPECT_NEAR(static_cast<double>(pixel.radius) / expected, 1, 0.02);
+}
+
+// Photons thrown at random on even light: noise alone must not shrink the radius, though every
+// pass has a Laplacian of its own.
+TEST(AppmTest, KeepsItsRadiusInEvenLight) {
+  RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kAppm;
+  const auto appm = MakeRadiusController(settings, 1);
+  int shrunk = 0;
+  for (std::uint64_t trial = 0; trial < 100; ++trial) {
+    KeyedRng rng(CombineKeys(77, trial));
+    std::vector<double> memory(appm->MemoryPerPixel());
+    PixelRadius pixel = {1, 0};
+    for (std::uint64_t pass = 0; pass < 200; ++pass) {
+      // 20 photons in the disc of the reach at radius 1.
+      double laplacian = 0;
+      double weight2 = 0;
+      for (int photon = 0; photon < 20; ++photon) {
+        const double u = static_cast<double>(rng.Uniform()) /
+                         (static_cast<double>(pixel.radius) * static_cast<double>(pixel.radius));
+        if (u >= 1) continue;
+        laplacian += 2 * u - 1;
+        weight2 += 1;
+      }
+      const std::array<std::int64_t, kCurvatureColumns> columns = {
+          std::llrint(laplacian / kWeightUnit), std::llrint(weight2 / kWeightUnit)};
+      pixel = appm->Next(pixel, {weight2, pixel.radius, columns}, pass, memory);
+    }
+    if (pixel.radius < 0.9F) ++shrunk;
+  }
+  // With a Laplacian from the kernel's own disc (kCurvatureReach = 1) most would have shrunk.
+  EXPECT_LE(shrunk, 5);
+}
+
 // One frequency photon of weight 1 in every ten, all of one trace: the radius goes where that trace
 // says, and no further.
 PixelRadius RunFrequency(RadiusControllerKind kind, double trace, int passes) {
@@ -110,7 +179,7 @@ PixelRadius RunFrequency(RadiusControllerKind kind, double trace, int passes) {
     const double frequency_photons = photons / 10;
     const double x = trace * r * r;
     const auto units = [&](double v) {
-      return static_cast<std::int64_t>(frequency_photons * v / kFrequencyUnit);
+      return static_cast<std::int64_t>(frequency_photons * v / kWeightUnit);
     };
     const std::array<std::int64_t, kFrequencyColumns> columns = {
         static_cast<std::int64_t>(std::lround(frequency_photons)), units(1), units(1), units(x),
@@ -137,6 +206,37 @@ TEST(FrequencyTest, StopsAtThePredictedRadius) {
   EXPECT_FLOAT_EQ(RunFrequency(RadiusControllerKind::kFrequency, 0, 100).radius,
                   std::sqrt(2.0F / 3));
   EXPECT_EQ(RunFrequency(RadiusControllerKind::kFrequencyMse, 0, 100).radius, 1);
+}
+
+// Passes without frequency photons say nothing about the light, but their photons count.
+TEST(FrequencyTest, PassesWithoutEvidenceLeaveThePredictionAlone) {
+  RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kFrequency;
+  const auto controller = MakeRadiusController(settings, 1);
+  std::vector<double> memory(controller->MemoryPerPixel());
+  const auto units = [](double v) { return std::llrint(v / kWeightUnit); };
+  const std::array<std::int64_t, kFrequencyColumns> columns = {20, units(20), units(20), units(5),
+                                                               units(1.25)};
+  PixelRadius pixel = controller->Next({1, 0}, {100, 1, columns}, 0, memory);
+  const auto before = controller->Predict(memory);
+  ASSERT_TRUE(before.has_value());
+  for (std::uint64_t pass = 1; pass < 4; ++pass) {
+    pixel = controller->Next(pixel, {100, pixel.radius, {}}, pass, memory);
+  }
+  EXPECT_DOUBLE_EQ(controller->Predict(memory)->trace, before->trace);
+  EXPECT_GT(pixel.photons, 200);
+}
+
+TEST(EvidenceOfTest, FrequencyPhotonsKeepTheirShareOverAPeriod) {
+  RenderSettings settings;
+  settings.frequency_share = 0.05;
+  int passes_with = 0;
+  for (std::uint64_t pass = 0; pass < 4 * kFrequencyPeriod; ++pass) {
+    if (EvidenceOf(RadiusControllerKind::kFrequency, pass) == Evidence::kFrequency) ++passes_with;
+    EXPECT_EQ(EvidenceOf(RadiusControllerKind::kPpm, pass), Evidence::kNone);
+  }
+  EXPECT_EQ(EvidenceOf(RadiusControllerKind::kFrequency, 0), Evidence::kFrequency);
+  EXPECT_NEAR(passes_with * FrequencyShareInPass(settings), 16 * 0.05, 1e-12);
 }
 
 TEST(FrequencyMseTest, TakesTheRadiusOfLeastErrorAtOnceAndThenFollowsTheDensity) {
