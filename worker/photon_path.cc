@@ -103,7 +103,7 @@ void PhotonPathTracer::Walk(std::uint64_t number, std::uint64_t job_key, Landed&
                                  EncodeOctahedral(wo),
                                  static_cast<std::uint32_t>(rng.Bits() >> 32)});
       if constexpr (kHasSpectrum) {
-        landed.traces.push_back(spectra_->Received(carried, surface, wo));
+        landed.traces.push_back(spectra_->Received(carried, surface, material, wo));
       }
     }
     if (landing + 1 == settings_.max_depth) return;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "render/estimate/kernel.h"
+#include "render/geometry/mesh_edges.h"
 
 namespace lucerna {
 namespace {
@@ -45,18 +46,31 @@ SpectrumTracer::SpectrumTracer(const Scene& scene, const RenderSettings& setting
       limits_(SpectrumLimits::ForDiagonal(static_cast<double>(bounds.Diagonal()))),
       edge_strength_(EdgeStrength(settings.bias, Kernel{settings.kernel}.Moments().mu2)),
       reach_(ReachOf(scene, settings, bounds)),
-      curvature_(scene, [](const Material&) { return true; }),
-      mesh_moments_(scene.meshes.size()) {
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    const TriangleMesh& mesh = scene.meshes[m];
+      curvature_(scene, [](const Material&) { return true; }) {
+  MeasureEmitters();
+}
+
+void SpectrumTracer::MeasureEmitters() {
+  std::vector<Vec3> positions;
+  std::vector<std::uint32_t> corners;
+  for (const TriangleMesh& mesh : scene_.meshes) {
+    first_of_mesh_.push_back(corners.size() / 3);
     if (mesh.traits.area_light == kNoAreaLight) continue;
-    EmitterMoments moments;
-    for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
-      moments = Merge(moments, TriangleMoments(mesh.positions[mesh.indices[i]],
-                                               mesh.positions[mesh.indices[i + 1]],
-                                               mesh.positions[mesh.indices[i + 2]]));
-    }
-    mesh_moments_[m] = moments;
+    const auto first = static_cast<std::uint32_t>(positions.size());
+    positions.insert(positions.end(), mesh.positions.begin(), mesh.positions.end());
+    for (const std::uint32_t index : mesh.indices)
+      corners.push_back(first + index);
+  }
+  const std::vector<std::uint32_t> welded = WeldVertices(positions, {});
+  for (std::uint32_t& corner : corners)
+    corner = welded[corner];
+  surface_of_ = ConnectedSurfaces(corners, positions.size());
+  for (std::size_t i = 0; i < surface_of_.size(); ++i) {
+    if (surface_of_[i] == surface_moments_.size()) surface_moments_.emplace_back();
+    EmitterMoments& moments = surface_moments_[surface_of_[i]];
+    moments =
+        Merge(moments, TriangleMoments(positions[corners[3 * i]], positions[corners[3 * i + 1]],
+                                       positions[corners[3 * i + 2]]));
   }
 }
 
@@ -65,7 +79,11 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
   const Vec3 direction = emission.ray.direction;
   switch (emitter.kind) {
     case EmitterKind::kTriangle:
-      return {AreaSource(*mesh_moments_[emitter.geometry], direction, limits_), false};
+      return {
+          AreaSource(
+              surface_moments_[surface_of_[first_of_mesh_[emitter.geometry] + emitter.primitive]],
+              direction, limits_),
+          false};
     case EmitterKind::kSphere:
       return {SphereSource(static_cast<double>(scene_.spheres[emitter.primitive].radius), limits_),
               false};
@@ -83,10 +101,16 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
                            std::acos(static_cast<double>(spot.cos_falloff_start));
       const double relative = static_cast<double>(Luminance(emission.flux)) /
                               std::max(1e-30, static_cast<double>(Luminance(emitter.power)));
-      const bool is_inside = Dot(direction, spot.direction) >= spot.cos_falloff_start;
-      return {SpotSource(std::min(relative, 1.0),
-                         is_inside || !(width > 0) ? 0 : SmoothFalloffCurvature(width), limits_),
-              false};
+      // Inside the cone the light is even, but ends at the rim: as an edge seen from the lamp, and
+      // no harder than the falloff is.
+      double curvature = SmoothFalloffCurvature(width);
+      if (Dot(direction, spot.direction) >= spot.cos_falloff_start) {
+        const double to_rim =
+            std::acos(static_cast<double>(spot.cos_total_width)) -
+            std::acos(std::min(1.0, static_cast<double>(Dot(direction, spot.direction))));
+        curvature = std::min(curvature, edge_strength_ / std::max(to_rim * to_rim, 1e-12));
+      }
+      return {SpotSource(std::min(relative, 1.0), curvature, limits_), false};
     }
     case EmitterKind::kDistant:
       return {DirectionalSource(limits_), false};
@@ -117,12 +141,20 @@ void SpectrumTracer::Fly(Carried& carried, const Ray& ray, float distance, Shado
                                      edge_strength_, limits_);
 }
 
-float SpectrumTracer::Received(const Carried& carried, const SurfacePoint& surface, Vec3 wo) const {
+float SpectrumTracer::Received(const Carried& carried, const SurfacePoint& surface,
+                               const Material& material, Vec3 wo) const {
+  const double cosine = static_cast<double>(std::abs(Dot(wo, surface.shading_normal)));
+  Spectrum seen = carried.spectrum;
+  if (material.kind != Material::Kind::kDiffuse) {
+    const double lobe =
+        ReflectedLobe(static_cast<double>(std::max(material.alpha_u, material.alpha_v)));
+    if (lobe < kDiffuseLobe) {
+      seen = SeeGlossily(seen, cosine, BendAt(surface, wo), ObliqueLobe(lobe, cosine), limits_);
+    }
+  }
   // Two equal principal curvatures with the sum of squares that the surface has.
   const double bend = std::sqrt(0.5 * static_cast<double>(curvature_.SquaredPrincipals(surface)));
-  const double trace = ReceivedTrace(carried.spectrum,
-                                     static_cast<double>(std::abs(Dot(wo, surface.shading_normal))),
-                                     bend, bend, limits_);
+  const double trace = ReceivedTrace(seen, cosine, bend, bend, limits_);
   // Held in the range of float; a trace that large asks for the smallest radius anyway.
   return std::isfinite(trace) ? static_cast<float>(std::min(trace, 1e37)) : -1.0F;
 }

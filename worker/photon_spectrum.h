@@ -6,7 +6,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "render/frequency/spectrum.h"
@@ -43,8 +42,9 @@ class SpectrumTracer {
   // A leg along `ray` of `distance` [scene units].
   void Fly(Carried& carried, const Ray& ray, float distance, Shadows shadows) const;
   // The trace of what arrives from `wo` at `surface` [1/length²], for a deposit; below 0 when it is
-  // not a number.
-  [[nodiscard]] float Received(const Carried& carried, const SurfacePoint& surface, Vec3 wo) const;
+  // not a number. A glossy material's hitpoints see it through their lobe.
+  [[nodiscard]] float Received(const Carried& carried, const SurfacePoint& surface,
+                               const Material& material, Vec3 wo) const;
   // Scattering from `wo` to `wi`, world.
   void Scatter(Carried& carried, const SurfacePoint& surface, const Material& material, Vec3 wo,
                Vec3 wi) const;
@@ -52,6 +52,7 @@ class SpectrumTracer {
  private:
   SpectrumTracer(const Scene& scene, const RenderSettings& settings, const Bounds& bounds,
                  const LightSet& lights);
+  void MeasureEmitters();
   [[nodiscard]] SurfaceBend BendAt(const SurfacePoint& surface, Vec3 wo) const;
 
   const Scene& scene_;
@@ -62,7 +63,10 @@ class SpectrumTracer {
   float reach_;
   std::unique_ptr<SilhouetteEdges> edges_;
   SurfaceCurvature curvature_;
-  std::vector<std::optional<EmitterMoments>> mesh_moments_;  // [meshes] that emit
+  // Of emitting meshes, each connected surface as one emitter, in however many meshes it comes.
+  std::vector<EmitterMoments> surface_moments_;
+  std::vector<std::uint32_t> surface_of_;   // [triangles of emitting meshes]
+  std::vector<std::size_t> first_of_mesh_;  // [meshes] into surface_of_
 };
 
 }  // namespace lucerna

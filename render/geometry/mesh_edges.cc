@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
+#include <numeric>
 #include <tuple>
 
 #include "render/base/status.h"
@@ -43,6 +44,37 @@ std::vector<std::uint32_t> WeldVertices(std::span<const Vec3> positions,
     first[i] = table[slot];
   }
   return first;
+}
+
+std::vector<std::uint32_t> ConnectedSurfaces(std::span<const std::uint32_t> corners,
+                                             std::size_t vertex_count) {
+  // Union by the lowest vertex, with path halving.
+  std::vector<std::uint32_t> root(vertex_count);
+  std::iota(root.begin(), root.end(), 0U);
+  const auto find = [&](std::uint32_t vertex) {
+    while (root[vertex] != vertex) {
+      root[vertex] = root[root[vertex]];
+      vertex = root[vertex];
+    }
+    return vertex;
+  };
+  for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
+    for (std::size_t k = 1; k < 3; ++k) {
+      const std::uint32_t a = find(corners[i]);
+      const std::uint32_t b = find(corners[i + k]);
+      root[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  std::vector<std::uint32_t> number(vertex_count, kNone);
+  std::vector<std::uint32_t> surface_of;
+  std::uint32_t count = 0;
+  for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
+    std::uint32_t& surface = number[find(corners[i])];
+    if (surface == kNone) surface = count++;
+    surface_of.push_back(surface);
+  }
+  return surface_of;
 }
 
 std::vector<TriangleSide> SidesByEdge(std::span<const std::uint32_t> corners,

@@ -18,6 +18,12 @@ namespace lucerna {
 [[nodiscard]] std::vector<std::uint32_t> WeldVertices(std::span<const Vec3> positions,
                                                       std::span<const Vec3> normals);
 
+// For each triangle the number of the surface it belongs to, from 0 in order of their first
+// triangles: triangles that share a welded vertex are of one surface. `corners` [triangles × 3] as
+// for SidesByEdge.
+[[nodiscard]] std::vector<std::uint32_t> ConnectedSurfaces(std::span<const std::uint32_t> corners,
+                                                           std::size_t vertex_count);
+
 // One side of a triangle.
 struct TriangleSide {
   std::uint32_t low = 0, high = 0;  // the vertices at its ends, low < high

@@ -3,6 +3,8 @@
 
 #include <atomic>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include "gtest/gtest.h"
 
@@ -129,6 +131,101 @@ TEST(EvidenceTest, IsMergedCheckedAndCarriedOnTheWire) {
   EXPECT_EQ(*decoded, sum);
 }
 
+// A scene ready for spectra, with kernels of radius 0.01.
+struct SpectrumScene {
+  explicit SpectrumScene(Scene s) : scene(std::move(s)) {
+    intersector = Intersector::Create(scene).value();
+    lights = std::make_unique<LightSet>(scene, *intersector);
+    RenderSettings settings;
+    settings.width = settings.height = 64;
+    settings.initial_radius = 0.01;
+    tracer = SpectrumTracer::Create(scene, settings, *intersector, *lights).value();
+  }
+
+  // What of light number `emitter` arrives after `distance` on a surface facing it.
+  [[nodiscard]] double HeadOn(std::uint32_t emitter, Vec3 direction, float distance,
+                              const Material& material) const {
+    Emission emission;
+    emission.ray = {{0, 0, 0}, direction, HUGE_VALF};
+    emission.flux = lights->emitter(emitter).power;
+    emission.emitter = emitter;
+    auto carried = tracer->Leave(emission);
+    tracer->Fly(carried, emission.ray, distance, SpectrumTracer::Shadows::kLeftOut);
+    SurfacePoint receiver;
+    receiver.geometry = UINT32_MAX;  // no shape of the scene: flat
+    receiver.shading_normal = receiver.geometric_normal = -direction;
+    return static_cast<double>(tracer->Received(carried, receiver, material, -direction));
+  }
+
+  Scene scene;
+  std::unique_ptr<Intersector> intersector;
+  std::unique_ptr<LightSet> lights;
+  std::unique_ptr<SpectrumTracer> tracer;
+};
+
+TEST(SpectrumTracerTest, TakesAConnectedLampAsOneInHoweverManyMeshesItComes) {
+  Scene whole;
+  const std::int32_t material = AddMaterial(whole, DiffuseMaterial(0.5F));
+  AddQuad(whole, {0, 0, 0}, {0, 0.3F, 0}, {0.3F, 0, 0}, material, AddAreaLight(whole, 1));
+  AddQuad(whole, {5, 5, 0}, {0, 0.1F, 0}, {0.1F, 0, 0}, material, AddAreaLight(whole, 1));
+  // The first lamp's triangles as two meshes.
+  Scene split = whole;
+  TriangleMesh second = split.meshes[0];
+  split.meshes[0].indices.resize(3);
+  second.indices.erase(second.indices.begin(), second.indices.begin() + 3);
+  split.meshes.insert(split.meshes.begin() + 1, second);
+
+  const Material diffuse = DiffuseMaterial(0.5F);
+  const double one = SpectrumScene(whole).HeadOn(0, {0, 0, -1}, 0.01F, diffuse);
+  // Two axes of s = 12/side², after 0.01 along the ray s/(1 + s·0.01²/4).
+  const auto expected = [](double side) {
+    const double precision = 12 / (side * side);
+    return 2 * precision / (1 + precision * 0.01 * 0.01 / 4);
+  };
+  EXPECT_NEAR(one, expected(0.3), 1e-4 * one);
+  const SpectrumScene parts(split);
+  for (const std::uint32_t emitter : {0U, 1U}) {
+    EXPECT_DOUBLE_EQ(parts.HeadOn(emitter, {0, 0, -1}, 0.01F, diffuse), one);
+  }
+  // A lamp that does not touch it has its own size.
+  EXPECT_NEAR(parts.HeadOn(2, {0, 0, -1}, 0.01F, diffuse), expected(0.1), 1e-4 * expected(0.1));
+}
+
+// The rim of a hard cone at the angle a from the photon is an edge at the distance a·d, felt as
+// edges are: strength/(a·d)² in each axis, besides the falloff's own 3/d².
+TEST(SpectrumTracerTest, SeesTheRimOfAHardSpot) {
+  Scene scene;
+  AddQuad(scene, {-5, -5, -3}, {10, 0, 0}, {0, 10, 0}, AddMaterial(scene, DiffuseMaterial(0.5F)));
+  constexpr double kHalfAngle = 0.5;
+  const auto cosine = static_cast<float>(std::cos(kHalfAngle));
+  scene.spot_lights.push_back({{0, 0, 0}, {0, 0, -1}, Gray(1), cosine, cosine});
+  const SpectrumScene spot(scene);
+  const double strength = EdgeStrength(0.02, 1.0 / 6);
+  for (const double angle : {0.0, 0.3, 0.48}) {
+    const Vec3 direction = {static_cast<float>(std::sin(angle)), 0,
+                            static_cast<float>(-std::cos(angle))};
+    const double to_rim = kHalfAngle - angle;
+    const double expected = 2 * (3 + strength / (to_rim * to_rim)) / 4;
+    EXPECT_NEAR(spot.HeadOn(0, direction, 2, DiffuseMaterial(0.5F)), expected, 0.01 * expected)
+        << angle;
+  }
+}
+
+// A flat hitpoint that looks through a narrow lobe sees a point light's beam as its vergence makes
+// the direction change across the surface: s + v² q (1 + p q)⁻¹ in each axis, v = 1/d.
+TEST(SpectrumTracerTest, AGlossyHitpointSeesThroughItsLobe) {
+  Scene scene;
+  AddQuad(scene, {-5, -5, -3}, {10, 0, 0}, {0, 10, 0}, AddMaterial(scene, DiffuseMaterial(0.5F)));
+  scene.point_lights.push_back({{0, 0, 0}, Gray(1)});
+  const SpectrumScene point(scene);
+  constexpr double kAlpha = 0.25;
+  const double q = 1 / (1.2 * kAlpha * kAlpha);
+  const Material glossy = ConductorMaterial(Gray(0.2F), Gray(3), kAlpha, kAlpha);
+  const double expected = 2 * (3 + q) / 4;
+  EXPECT_NEAR(point.HeadOn(0, {0, 0, -1}, 2, glossy), expected, 0.01 * expected);
+  EXPECT_NEAR(point.HeadOn(0, {0, 0, -1}, 2, DiffuseMaterial(0.5F)), 1.5, 0.01);
+}
+
 // A point light over a mirror: what arrives is the light of its image, whose falloff is known.
 TEST(SpectrumTracerTest, SeesTheImageOfAPointLightInAMirror) {
   Scene scene;
@@ -157,7 +254,7 @@ TEST(SpectrumTracerTest, SeesTheImageOfAPointLightInAMirror) {
   SurfacePoint floor = surface;
   floor.shading_normal = floor.geometric_normal = -wi;  // met head on
   const double distance = static_cast<double>(hit.t + second);
-  EXPECT_NEAR(static_cast<double>(tracer->Received(carried, floor, -wi)),
+  EXPECT_NEAR(static_cast<double>(tracer->Received(carried, floor, DiffuseMaterial(0.5F), -wi)),
               2 * 3 / (distance * distance), 1e-3 / distance);
 }
 
