@@ -79,5 +79,5 @@ def write(name, mesh):
 
 
 if __name__ == "__main__":
-    write("water.ply.gz", water(size=1.8, cells=128))
-    write("cup.ply.gz", cup(radius=0.5, height=0.3, half_angle=math.radians(115), sides=256))
+    write("water.ply.gz", water(size=1.2, cells=96))
+    write("cup.ply.gz", cup(radius=0.5, height=0.3, half_angle=math.radians(115), sides=1800))
