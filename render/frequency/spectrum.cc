@@ -75,10 +75,12 @@ double MirrorSecondGradient(double v, double sine, double cosine, double curvatu
          16 * size * size * size + 2 * second_gradient / cosine;
 }
 
-// hs and gs of a refraction on one axis, by differences over a small turn of the incidence. The
-// sine and cosine of that turn are constants, so no trigonometric function enters.
+// How the vergence that leaves a refraction changes along the surface, on one axis, but for the
+// surface's own changes of curvature: by differences over a small turn of the incidence. The sine
+// and cosine of that turn are constants, so no trigonometric function enters.
 struct VergenceGradients {
-  double first, second;
+  double first;   // by the turning of the incidence, signed
+  double second;  // bound, changes of curvature included
 };
 VergenceGradients RefractGradients(const Bending& bending, double sine, double cosine, double cos2,
                                    double v, double curvature, const SurfaceBend& bend) {
@@ -90,45 +92,49 @@ VergenceGradients RefractGradients(const Bending& bending, double sine, double c
                                         cosine * kTurnCosine - sine * kTurnSine, v, curvature);
   const double less = RefractedVergence(bending, sine * kTurnCosine - cosine * kTurnSine,
                                         cosine * kTurnCosine + sine * kTurnSine, v, curvature);
-  const double rate = std::abs(curvature + v * cosine);
+  const double rate = curvature + v * cosine;
   const double power = std::abs(cos2 - bending.ratio * cosine) / (cos2 * cos2);
   const double size = std::abs(curvature);
-  return {std::abs(more - less) / (2 * kTurn) * rate + power * bend.gradient,
+  return {(more - less) / (2 * kTurn) * rate,
           std::abs((more - here) - (here - less)) / (kTurn * kTurn) * rate * rate +
               std::abs(1 - bending.ratio) * size * size * size + power * bend.second_gradient};
 }
 
 // The steps below take a spectrum within the limits, so that they can be chained unclamped.
 
+// At a slant, neighbouring rays meet the surface before or after the plane across the central ray,
+// by x tan θ, and the surface bends away from its own tangent. Both tilt the beam's density along x
+// and add to g; where signs are known the terms are summed before their size is taken, because they
+// cancel at flat surfaces: a plane mirror changes nothing, a plane window little.
+
 Spectrum MirrorStep(Spectrum in, double cosine, const SurfaceBend& bend) {
   const double sine = std::sqrt(1 - cosine * cosine);
   const double tangent = sine / cosine;
   const double kappa = bend.tangential;
-  const double rate = std::abs(kappa + in.v * cosine);
-  const double v = in.v + 2 * kappa / cosine;
-  const double gradient =
-      std::abs(2 * kappa * sine / (cosine * cosine)) * rate + 2 * bend.gradient / cosine;
-  // The reference planes before and after the mirror tilt in opposite senses.
-  return {in.s + Square(2 * tangent * (v + in.v)), v, in.p,
-          in.g + gradient / cosine + 2 * tangent * (v * v + in.v * in.v),
-          in.h + MirrorSecondGradient(in.v, sine, cosine, kappa, bend.second_gradient) /
-                     (cosine * cosine)};
+  const double inverse = 1 / (cosine * cosine);
+  return {in.s + Square(2 * tangent * kappa / cosine), in.v + 2 * kappa / cosine, in.p,
+          in.g + 2 * bend.gradient * inverse +
+              std::abs(6 * kappa * tangent * (kappa + in.v * cosine)) * inverse,
+          in.h + MirrorSecondGradient(in.v, sine, cosine, kappa, bend.second_gradient) * inverse};
 }
 
 Spectrum RefractStep(Spectrum in, const Bending& bending, const SurfaceBend& bend) {
   const double kappa = bend.tangential;
   const double c1 = bending.cos1;
   const double c2 = bending.cos2;
+  const double sin2 = bending.ratio * bending.sin1;
   const double v = RefractedVergence(bending, bending.sin1, c1, in.v, kappa);
   const VergenceGradients gradients =
       RefractGradients(bending, bending.sin1, c1, c2, in.v, kappa, bend);
   const double m = c2 / c1;
   const double q = bending.ratio * c1 * c1 / (c2 * c2);
   const double tangent1 = bending.sin1 / c1;
-  const double tangent2 = bending.ratio * bending.sin1 / c2;
-  return {in.s / (m * m) + Square(2 * (tangent2 * v - tangent1 * in.v / m)), v,
-          in.p * Square(bending.ratio / m),
-          in.g * q / m + gradients.first / c2 + 2 * (tangent2 * v * v + tangent1 * in.v * in.v),
+  const double tangent2 = sin2 / c2;
+  const double tilt = 2 * (tangent2 * v - tangent1 * in.v / m) + kappa * (tangent2 - tangent1) / c2;
+  const double power = std::abs(c2 - bending.ratio * c1) / (c2 * c2);
+  return {in.s / (m * m) + tilt * tilt, v, in.p * Square(bending.ratio / m),
+          in.g * q / m + power * bend.gradient / c2 +
+              std::abs(gradients.first + sin2 * v * v - q * bending.sin1 * in.v * in.v) / c2,
           in.h * q / (m * m) + gradients.second / (c2 * c2)};
 }
 
@@ -468,9 +474,6 @@ Spectrum SeeGlossily(const Spectrum& spectrum, double cosine, const SurfaceBend&
 
 Spectrum Mirror(const Spectrum& spectrum, double cosine, const SurfaceBend& bend,
                 const SpectrumLimits& limits) {
-  // A plane mirror shows the world as it is. The second-order bounds would add detail at a slant,
-  // because they do not see that their terms cancel there.
-  if (bend == SurfaceBend{} && !std::isnan(cosine)) return limits.Clamp(spectrum);
   const Spectrum in = limits.Clamp(spectrum);
   const SurfaceBend held = ClampBend(bend, limits);
   const double c = ClampCosine(cosine);

@@ -1,5 +1,6 @@
 // The scenes that this version promises to read are read without an error, those that need more
 // say what they need, and the project's own scenes hold what their first lines say.
+#include <algorithm>
 #include <filesystem>
 #include <string>
 
@@ -93,7 +94,7 @@ TEST(OwnScenesTest, AllAreReadWithoutErrorsOrWarnings) {
       EXPECT_EQ(diagnostic.severity, Diagnostic::Severity::kNote) << diagnostic.ToString();
     }
   }
-  EXPECT_GE(count, 4);
+  EXPECT_GE(count, 12);
 }
 
 TEST(OwnScenesTest, TheFurnaceEmitsInward) {
@@ -110,6 +111,35 @@ TEST(OwnScenesTest, TheLampIsInsideItsGlass) {
   EXPECT_EQ(scene.spheres[0].center, scene.spheres[1].center);
   EXPECT_GT(scene.spheres[0].radius, scene.spheres[1].radius);
   EXPECT_EQ(scene.spheres[1].traits.area_light, 0);
+}
+
+TEST(OwnScenesTest, MeshesOfTheScenesAreSmooth) {
+  for (const char* name : {"water-sun.pbrt", "water-lamp.pbrt", "cardioid.pbrt"}) {
+    const Scene scene = ParseOwn(name).scene;
+    const auto smooth = std::find_if(scene.meshes.begin(), scene.meshes.end(),
+                                     [](const TriangleMesh& m) { return !m.normals.empty(); });
+    ASSERT_NE(smooth, scene.meshes.end()) << name;
+    EXPECT_EQ(smooth->normals.size(), smooth->positions.size()) << name;
+  }
+}
+
+TEST(OwnScenesTest, TheLampsOfTheShadowsAreHiddenFromTheFloor) {
+  // In glass: the lamp is within the box that the fourth mesh is.
+  const Scene penumbra = ParseOwn("penumbra.pbrt").scene;
+  ASSERT_EQ(penumbra.meshes.size(), 4U);
+  const TriangleMesh& lamp = penumbra.meshes[2];
+  ASSERT_NE(lamp.traits.area_light, kNoAreaLight);
+  EXPECT_LT(Cross(lamp.positions[1] - lamp.positions[0], lamp.positions[2] - lamp.positions[0]).z,
+            0);
+  Bounds box;
+  for (const Vec3 p : penumbra.meshes[3].positions)
+    box.Add(p);
+  for (const Vec3 p : lamp.positions) {
+    EXPECT_GT(p.z, box.low.z);
+    EXPECT_LT(p.z, box.high.z);
+  }
+  // Turned away.
+  EXPECT_GT(ParseOwn("hard-shadow.pbrt").scene.spot_lights.at(0).direction.z, 0.99F);
 }
 
 TEST(OwnScenesTest, TheLampOfTheCausticFacesTheRing) {

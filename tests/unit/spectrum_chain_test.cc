@@ -104,13 +104,13 @@ Reference MirrorReference(const Reference& x, double cosine, const SurfaceBend& 
   const auto axis = [&](Tracked c, Tracked sn, double kappa) {
     const Tracked rate = Abs(Tracked(kappa) + x.v * c);
     const Tracked size = std::abs(kappa);
-    const Tracked gs = Tracked(2) * size * sn / (c * c) * rate + Tracked(2) * bend.gradient / c;
     const Tracked hs = Tracked(2) * size * (Tracked(1) + sn * sn) / (c * c * c) * rate * rate +
                        Tracked(16) * size * size * size + Tracked(2) * bend.second_gradient / c;
     const Tracked v2 = x.v + Tracked(2) * kappa / c;
     const Tracked t = sn / c;
-    const Tracked e = Tracked(2) * t * (v2 + x.v);
-    return Reference{x.s + e * e, v2, x.p, x.g + gs / c + Tracked(2) * t * (v2 * v2 + x.v * x.v),
+    const Tracked e = Tracked(2) * t * kappa / c;
+    const Tracked turn = Tracked(6) * kappa * t * (Tracked(kappa) + x.v * c);
+    return Reference{x.s + e * e, v2, x.p, x.g + (Tracked(2) * bend.gradient + Abs(turn)) / (c * c),
                      x.h + hs / (c * c)};
   };
   const Tracked c = cosine;
@@ -137,19 +137,20 @@ Reference RefractReference(const Reference& x, double ratio, double cosine,
     const Tracked v2 = f(sn, c, kappa);
     const Tracked more = f(sn * dl_cosine + c * dl_sine, c * dl_cosine - sn * dl_sine, kappa);
     const Tracked less = f(sn * dl_cosine - c * dl_sine, c * dl_cosine + sn * dl_sine, kappa);
-    const Tracked rate = Abs(Tracked(kappa) + x.v * c);
+    const Tracked rate = Tracked(kappa) + x.v * c;
     const Tracked a = Abs(c2 - Tracked(ratio) * c) / (c2 * c2);
     const Tracked size = std::abs(kappa);
-    const Tracked gs = Abs(more - less) / 0.04 * rate + a * bend.gradient;
+    const Tracked gs = (more - less) / 0.04 * rate;
     const Tracked hs = Abs(more - v2 - (v2 - less)) / (Tracked(0.02) * 0.02) * rate * rate +
                        Abs(Tracked(1) - ratio) * size * size * size + a * bend.second_gradient;
     const Tracked m = c2 / c;
     const Tracked q = Tracked(ratio) * c * c / (c2 * c2);
     const Tracked t1 = sn / c;
     const Tracked t2 = Tracked(ratio) * sn / c2;
-    const Tracked e = Tracked(2) * (t2 * v2 - t1 * x.v / m);
+    const Tracked e = Tracked(2) * (t2 * v2 - t1 * x.v / m) + Tracked(kappa) * (t2 - t1) / c2;
+    const Tracked slant = Tracked(ratio) * sn * v2 * v2 - q * sn * x.v * x.v;
     return Reference{x.s / (m * m) + e * e, v2, x.p * (ratio / m) * (ratio / m),
-                     x.g * q / m + gs / c2 + Tracked(2) * (t2 * v2 * v2 + t1 * x.v * x.v),
+                     x.g * q / m + a * bend.gradient / c2 + Abs(gs + slant) / c2,
                      x.h * q / (m * m) + hs / (c2 * c2)};
   };
   const Tracked c = cosine;
