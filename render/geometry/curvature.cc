@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include "render/geometry/curvature_change.h"
 #include "render/geometry/double3.h"
 #include "render/geometry/mesh_edges.h"
 
@@ -26,6 +27,10 @@ constexpr double kLargest = 1e30;
 double LargestCurvature(double clearance) {
   return std::min(0.1 / clearance, kLargest);
 }
+
+// Between the places where the change of curvature is fitted it may be larger, on a mesh with 16
+// sides to a wave by so much.
+constexpr double kSlack = 1.15;
 
 // A triangle's plane and the curvature fitted in it.
 struct Fit {
@@ -126,10 +131,21 @@ Fit FitTriangle(const std::array<Vec3, 3>& corners, std::array<Vec3, 3> corner_n
   return fit;
 }
 
+// Of the curvature per length.
+struct Change {
+  double largest = 0;
+  double certain = 0;  // what rounding alone does not explain
+
+  void Include(Change other) {
+    largest = std::max(largest, other.largest);
+    certain = std::max(certain, other.certain);
+  }
+};
+
 // How fast the curvature changes from one triangle to the next across the edge `along` (unit).
 // The tensors are compared in frames that share the edge, as if the two were unfolded into one
-// plane: so a sphere's do not differ. What rounding alone explains counts as no change.
-double ChangeAcross(const Fit& one, const Fit& other, Double3 along) {
+// plane: so a sphere's do not differ.
+Change ChangeAcross(const Fit& one, const Fit& other, Double3 along) {
   const Double3 across_one = Cross(one.normal, along);
   const Double3 across_other = Cross(other.normal, along);
   const double change =
@@ -137,13 +153,13 @@ double ChangeAcross(const Fit& one, const Fit& other, Double3 along) {
                    one.Along(along, across_one) - other.Along(along, across_other),
                    one.Along(across_one, across_one) - other.Along(across_other, across_other));
   const double distance = Length(one.center - other.center);
-  const double certain = change - one.rounding - other.rounding;
-  return certain > 0 && distance > 0 ? certain / distance : 0;
+  if (!(distance > 0)) return {};
+  return {change / distance, std::max(0.0, change - one.rounding - other.rounding) / distance};
 }
 
 // The sides around a vertex.
 struct Ring {
-  double change = 0;
+  Change change;
   double length_sum = 0;
   double length_count = 0;
 };
@@ -186,29 +202,31 @@ void SurfaceCurvature::AddMesh(const TriangleMesh& mesh) {
       corners[i] = first[mesh.indices[i]];
   }
   std::vector<Ring> rings(mesh.positions.size());
-  ForEachEdge(SidesByEdge(corners, mesh.positions.size()),
-              [&](std::span<const TriangleSide> sides) {
-                const std::uint32_t low = sides[0].low;
-                const std::uint32_t high = sides[0].high;
-                const Double3 edge = Double3(mesh.positions[high]) - Double3(mesh.positions[low]);
-                const double length = Length(edge);
-                if (!(length > 0)) return;
-                double change = 0;
-                if (sides.size() == 2) {
-                  const Fit& one = fits[sides[0].triangle()];
-                  const Fit& other = fits[sides[1].triangle()];
-                  if (one.is_curved && other.is_curved) {
-                    change = ChangeAcross(one, other, edge * (1 / length));
-                  }
-                }
-                for (const std::uint32_t vertex : {low, high}) {
-                  Ring& ring = rings[vertex];
-                  ring.change = std::max(ring.change, change);
-                  ring.length_sum += length;
-                  ring.length_count += 1;
-                }
-              });
+  const std::vector<TriangleSide> all_sides = SidesByEdge(corners, mesh.positions.size());
+  ForEachEdge(all_sides, [&](std::span<const TriangleSide> sides) {
+    const std::uint32_t low = sides[0].low;
+    const std::uint32_t high = sides[0].high;
+    const Double3 edge = Double3(mesh.positions[high]) - Double3(mesh.positions[low]);
+    const double length = Length(edge);
+    if (!(length > 0)) return;
+    Change change;
+    if (sides.size() == 2) {
+      const Fit& one = fits[sides[0].triangle()];
+      const Fit& other = fits[sides[1].triangle()];
+      if (one.is_curved && other.is_curved) {
+        change = ChangeAcross(one, other, edge * (1 / length));
+      }
+    }
+    for (const std::uint32_t vertex : {low, high}) {
+      Ring& ring = rings[vertex];
+      ring.change.Include(change);
+      ring.length_sum += length;
+      ring.length_count += 1;
+    }
+  });
 
+  const std::vector<CurvatureChange> changes =
+      CurvatureChanges(mesh.positions, mesh.normals, corners, all_sides);
   for (std::size_t i = 0; i < count; ++i) {
     const Fit& fit = fits[i];
     Bending& bending = bendings_.emplace_back();
@@ -219,24 +237,35 @@ void SurfaceCurvature::AddMesh(const TriangleMesh& mesh) {
     bending.xy = static_cast<float>(fit.xy);
     bending.xz = static_cast<float>(fit.xz);
     bending.yz = static_cast<float>(fit.yz);
-    double change = 0;
+    Change change;
     double length_sum = 0;
     double length_count = 0;
+    CurvatureChange fitted;
     for (std::size_t k = 0; k < 3; ++k) {
       const Ring& ring = rings[corners[3 * i + k]];
-      change = std::max(change, ring.change);
+      change.Include(ring.change);
       length_sum += ring.length_sum;
       length_count += ring.length_count;
+      const CurvatureChange& at_corner = changes[corners[3 * i + k]];
+      fitted.first = std::max(fitted.first, at_corner.first);
+      fitted.second = std::max(fitted.second, at_corner.second);
+      fitted.first_is_clear |= at_corner.first_is_clear;
+      fitted.second_is_clear |= at_corner.second_is_clear;
     }
-    // Neighbours lie in three directions, on a grid cut along its diagonals at most 72 degrees
-    // apart: the steepest way is up to 36 degrees from all of them.
-    const double gradient = change / std::cos(36 * std::numbers::pi / 180);
-    bending.gradient =
-        static_cast<float>(std::min({gradient, fit.largest * fit.largest, kLargest}));
+    // On a fine mesh rounding may explain any difference between neighbours: then only a change
+    // that is clear from farther away is one. Neighbours lie in three directions, on a grid cut
+    // along its diagonals at most 72 degrees apart: the steepest way is up to 36 degrees from all
+    // of them.
+    const double turned = 1 / std::cos(36 * std::numbers::pi / 180);
+    const double first = turned * (fitted.first_is_clear ? change.largest : change.certain);
+    bending.gradient = static_cast<float>(
+        std::min({first, kSlack * fitted.first, fit.largest * fit.largest, kLargest}));
     // At a crest of the curvature its derivative goes from one end of the bound to the other, and a
     // ring sees that over about the length of a side.
+    const double second = 2 * turned * (fitted.second_is_clear ? change.largest : change.certain) *
+                          length_count / length_sum;
     bending.second_gradient = static_cast<float>(
-        std::min({2 * gradient * length_count / length_sum, std::pow(fit.largest, 3), kLargest}));
+        std::min({second, kSlack * fitted.second, std::pow(fit.largest, 3), kLargest}));
   }
 }
 

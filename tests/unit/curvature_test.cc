@@ -246,6 +246,289 @@ TEST(SurfaceCurvatureTest, OfAWaveIsAnalyticAndItsGradientsAreBounds) {
   }
 }
 
+// What a mesh says of its gradients, over what they are.
+struct Ratios {
+  double least = 1e30, most = 0;
+  int low = 0, all = 0;  // triangles below 0.9 of the truth, and all
+
+  // `here` at the middle of the triangle, `nearby` the largest in its surroundings, `anywhere`.
+  void Add(double found, double here, double nearby, double anywhere) {
+    most = std::max(most, found / nearby);
+    ++all;
+    if (here < 0.2 * anywhere) return;  // near a zero only the surroundings count
+    least = std::min(least, found / here);
+    low += found < 0.9 * here ? 1 : 0;
+  }
+};
+
+// A function over [0, 1), repeated, and the largest of it around each place.
+class Periodic {
+ public:
+  Periodic(const std::function<double(double)>& value, double reach) {
+    constexpr int kCount = 1000;
+    std::vector<double> values;
+    for (int i = 0; i < kCount; ++i)
+      values.push_back(std::abs(value(static_cast<double>(i) / kCount)));
+    const int steps = static_cast<int>(reach * kCount);
+    for (int i = 0; i < kCount; ++i) {
+      double largest = 0;
+      for (int j = i - steps; j <= i + steps; ++j)
+        largest = std::max(largest, values[static_cast<std::size_t>((j + kCount) % kCount)]);
+      nearby_.push_back(largest);
+    }
+    here_ = values;
+  }
+  void Compare(double found, double x, Ratios& ratios) const {
+    const auto at = static_cast<std::size_t>((x - std::floor(x)) * 999.999);
+    ratios.Add(found, here_[at], nearby_[at], *std::max_element(here_.begin(), here_.end()));
+  }
+
+ private:
+  std::vector<double> here_, nearby_;
+};
+
+struct BothRatios {
+  Ratios first, second;
+};
+
+// Of z = A sin(2 pi x) with A k = 0.2, by arc length, away from the border. `jitter` [edges] moves
+// vertices over the surface, `noise` turns the normals, `shift` moves the mesh. `rows` 0: many.
+BothRatios RatiosOnAWave(std::uint32_t edges_per_wave, double jitter, float noise, float shift,
+                         std::uint32_t rows = 0) {
+  constexpr double k = 2 * pi;
+  constexpr double kSteepness = 0.2;
+  const auto arc = [](double x) { return std::hypot(1, kSteepness * std::cos(k * x)); };
+  const auto curvature_at = [&](double x) {
+    return kSteepness * k * std::sin(k * x) / std::pow(arc(x), 3);
+  };
+  constexpr double kStep = 1e-4;
+  const auto first_at = [&](double x) {
+    return (curvature_at(x + kStep) - curvature_at(x - kStep)) / (2 * kStep) / arc(x);
+  };
+  const auto second_at = [&](double x) {
+    return (first_at(x + kStep) - first_at(x - kStep)) / (2 * kStep) / arc(x);
+  };
+  // Noise is left behind only by looking farther.
+  const double reach = std::max(0.15, 4.0 / edges_per_wave);
+  const Periodic first(first_at, reach);
+  const Periodic second(second_at, reach);
+
+  KeyedRng rng(11);
+  const auto uniform = [&] { return 2 * rng.Uniform() - 1; };
+  const Surface wave = HeightField([&](double x, double) {
+    return std::array{kSteepness / k * std::sin(k * x), kSteepness * std::cos(k * x), 0.0};
+  });
+  const std::uint32_t columns = edges_per_wave * 3 / 2;
+  const bool is_ribbon = rows > 0;
+  if (!is_ribbon) rows = std::max(12U, edges_per_wave * 3 / 4);
+  const double edge = 1.0 / edges_per_wave;
+  TriangleMesh mesh = Tessellate(
+      [&](double x, double y) {
+        return wave(x + jitter * edge * static_cast<double>(uniform()),
+                    y + jitter * edge * static_cast<double>(uniform()));
+      },
+      {0, columns * edge}, {0, rows * edge}, columns, rows);
+  for (Vec3& n : mesh.normals)
+    n = Normalize(n + Vec3{uniform(), uniform(), uniform()} * noise);
+  for (Vec3& p : mesh.positions)
+    p = p + Vec3{shift, shift, shift};
+
+  const Scene scene = SceneOf(std::move(mesh));
+  const SurfaceCurvature curvature(scene, Any);
+  const double border = std::max(0.1, 4 * edge);
+  BothRatios ratios;
+  for (std::uint32_t i = 0; i < TriangleCount(scene); ++i) {
+    const SurfacePoint point = MiddleOf(scene, i);
+    const double x = static_cast<double>(point.position.x - shift);
+    const double y = static_cast<double>(point.position.y - shift);
+    if (x < border || x > columns * edge - border) continue;
+    if (!is_ribbon && (y < border || y > rows * edge - border)) continue;
+    const NormalCurvature found = curvature.Along(point, {1, 0, 0});
+    first.Compare(static_cast<double>(found.gradient), x, ratios.first);
+    second.Compare(static_cast<double>(found.second_gradient), x, ratios.second);
+  }
+  return ratios;
+}
+
+TEST(SurfaceCurvatureTest, GradientsOfAWaveDoNotGrowWithTheFinenessOfItsMesh) {
+  for (const std::uint32_t edges_per_wave : {16U, 64U, 256U}) {
+    for (const double jitter : {0.0, 0.3}) {
+      const auto [first, second] = RatiosOnAWave(edges_per_wave, jitter, 0, 0);
+      EXPECT_GE(first.least, 0.9) << edges_per_wave << " " << jitter;
+      EXPECT_LE(first.most, 1.3) << edges_per_wave << " " << jitter;
+      EXPECT_GE(second.least, 0.9) << edges_per_wave << " " << jitter;
+      EXPECT_LE(second.most, 1.5) << edges_per_wave << " " << jitter;
+    }
+  }
+}
+
+// Normals as a text file with six digits has them.
+TEST(SurfaceCurvatureTest, NoiseOfTheNormalsIsNotTakenForGradients) {
+  for (const std::uint32_t edges_per_wave : {16U, 64U, 256U}) {
+    for (const double jitter : {0.0, 0.3}) {
+      const auto [first, second] = RatiosOnAWave(edges_per_wave, jitter, 1e-6F, 0);
+      EXPECT_GE(first.least, 0.9) << edges_per_wave << " " << jitter;
+      EXPECT_LE(first.most, 1.3) << edges_per_wave << " " << jitter;
+      EXPECT_GE(second.least, 0.9) << edges_per_wave << " " << jitter;
+      EXPECT_LE(second.most, 1.6) << edges_per_wave << " " << jitter;
+    }
+  }
+}
+
+// Positions on a grid of 6e-5, at the finest 1/64 of an edge.
+TEST(SurfaceCurvatureTest, RoundingOfThePositionsIsNotTakenForGradients) {
+  for (const std::uint32_t edges_per_wave : {16U, 64U, 256U}) {
+    for (const double jitter : {0.0, 0.3}) {
+      const auto [first, second] = RatiosOnAWave(edges_per_wave, jitter, 0, 1000);
+      EXPECT_GE(first.least, 0.9) << edges_per_wave << " " << jitter;
+      EXPECT_LE(first.most, 1.3) << edges_per_wave << " " << jitter;
+      // The finest needs a look so wide that at a few places it reaches over the border.
+      EXPECT_LE(second.low, second.all / 50) << edges_per_wave << " " << jitter;
+      EXPECT_LE(second.most, 1.6) << edges_per_wave << " " << jitter;
+    }
+  }
+}
+
+// One row of cells has no y², and its xy² is not for the rounding of y to tell.
+TEST(SurfaceCurvatureTest, OfARibbonTheGradientsLengthwiseAreKnown) {
+  for (const std::uint32_t rows : {1U, 2U, 3U}) {
+    for (const double jitter : {0.0, 0.02}) {
+      const auto [first, second] = RatiosOnAWave(64, jitter, 0, 0, rows);
+      EXPECT_GE(first.least, 0.9) << rows << " " << jitter;
+      EXPECT_LE(first.most, 1.3) << rows << " " << jitter;
+      EXPECT_GE(second.least, 0.9) << rows << " " << jitter;
+      EXPECT_LE(second.most, 1.5) << rows << " " << jitter;
+    }
+  }
+}
+
+// An octahedron's faces cut into cells x cells triangles, blown up to a sphere.
+TriangleMesh SubdividedOctahedron(double radius, std::uint32_t cells) {
+  TriangleMesh mesh;
+  for (int face = 0; face < 8; ++face) {
+    const std::array<double, 3> sign = {face & 1 ? -1.0 : 1.0, face & 2 ? -1.0 : 1.0,
+                                        face & 4 ? -1.0 : 1.0};
+    std::vector<std::uint32_t> row_begin;
+    for (std::uint32_t i = 0; i <= cells; ++i) {
+      row_begin.push_back(static_cast<std::uint32_t>(mesh.positions.size()));
+      for (std::uint32_t j = 0; i + j <= cells; ++j) {
+        std::array<double, 3> n = {sign[0] * i, sign[1] * j, sign[2] * (cells - i - j)};
+        const double length = std::hypot(n[0], n[1], n[2]);
+        for (double& c : n)
+          c /= length;
+        mesh.normals.push_back(ToVec3(n));
+        mesh.positions.push_back(ToVec3({radius * n[0], radius * n[1], radius * n[2]}));
+      }
+    }
+    const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+      if (sign[0] * sign[1] * sign[2] < 0) std::swap(b, c);
+      for (const std::uint32_t index : {a, b, c})
+        mesh.indices.push_back(index);
+    };
+    for (std::uint32_t i = 0; i < cells; ++i) {
+      for (std::uint32_t j = 0; i + j < cells; ++j) {
+        const std::uint32_t here = row_begin[i] + j, next = row_begin[i + 1] + j;
+        add(here, next, here + 1);
+        if (i + j + 1 < cells) add(next, next + 1, here + 1);
+      }
+    }
+  }
+  return mesh;
+}
+
+TEST(SurfaceCurvatureTest, SpheresAndCylindersHaveNoGradientsWhereverTheyLie) {
+  for (const double radius : {0.01, 1.0, 300.0}) {
+    for (const std::uint32_t cells : {8U, 32U, 128U}) {
+      const Surface cylinder = [radius](double angle, double z) {
+        return Vertex{{radius * std::cos(angle), radius * std::sin(angle), radius * z},
+                      {std::cos(angle), std::sin(angle), 0}};
+      };
+      // Poles included, where sides meet by the hundred.
+      const std::array meshes = {
+          Tessellate(SphereSurface(radius), {0, 2 * pi}, {-pi / 2, pi / 2}, 2 * cells, cells),
+          SubdividedOctahedron(radius, cells),
+          Tessellate(cylinder, {0, 2 * pi}, {0, 6}, 2 * cells, cells),
+          // Sides 20 times as long as wide, at the finest.
+          Tessellate(cylinder, {0, 2 * pi}, {0, 8}, 2 * cells, 8)};
+      for (std::size_t which = 0; which < meshes.size(); ++which) {
+        for (const double distance : {0.0, 1.0, 10.0}) {  // radii
+          if (which == 3 && distance > 0) continue;
+          TriangleMesh mesh = meshes[which];
+          const auto moved = static_cast<float>(distance * radius);
+          for (Vec3& p : mesh.positions)
+            p = p + Vec3{moved, moved, moved};
+          const Scene scene = SceneOf(std::move(mesh));
+          const SurfaceCurvature curvature(scene, Any);
+          double first = 0, second = 0;
+          for (std::uint32_t i = 0; i < TriangleCount(scene); ++i) {
+            const NormalCurvature found = curvature.Along(MiddleOf(scene, i), {1, 0, 0});
+            first = std::max(first, static_cast<double>(found.gradient));
+            second = std::max(second, static_cast<double>(found.second_gradient));
+          }
+          EXPECT_EQ(first, 0) << which << " " << radius << " " << cells << " " << distance;
+          EXPECT_LE(second * std::pow(radius, 3), 2e-4)
+              << which << " " << radius << " " << cells << " " << distance;
+        }
+      }
+    }
+  }
+}
+
+// A torus of radii 2 and 1, in the frame of its circles at the angle b of the minor one: with
+// r = 2 + cos b, covariant derivatives of the second fundamental form, x around and y along b.
+//   h_xx;y = -2 sin b / r²; all others of the first order follow from symmetry or are 0
+//   h_xx;xx = 6 sin² b / r³, h_yy;xx = -4 sin² b / r³, h_xx;yy = -2 cos b / r² - 4 sin² b / r³
+double TorusFirst(double b) {
+  // 3 cos² t sin t h_xx;y, at its largest.
+  return 2 / std::sqrt(3) * 2 * std::abs(std::sin(b)) / std::pow(2 + std::cos(b), 2);
+}
+double TorusSecond(double b) {
+  const double r = 2 + std::cos(b), squared = std::pow(std::sin(b), 2) / std::pow(r, 3);
+  const double xx_xx = 6 * squared, yy_xx = -4 * squared;
+  const double xx_yy = -2 * std::cos(b) / (r * r) - 4 * squared;
+  double largest = 0;
+  for (int i = 0; i < 180; ++i) {
+    const double c = std::cos(i * pi / 180), s = std::sin(i * pi / 180);
+    const double along_x = xx_xx * c * c + xx_yy * s * s, along_y = yy_xx * c * c;
+    const double mixed = (xx_yy + yy_xx) * c * s;
+    largest = std::max(
+        largest, 0.5 * (std::abs(along_x + along_y) + std::hypot(along_x - along_y, 2 * mixed)));
+  }
+  return largest;
+}
+
+TEST(SurfaceCurvatureTest, GradientsOfATorusAreItsOwn) {
+  // Closed: a whole turn is none, to the bit.
+  const Surface torus = [](double major, double minor) {
+    if (major >= 2 * pi) major = 0;
+    if (minor >= 2 * pi) minor = 0;
+    const double c = std::cos(minor), s = std::sin(minor);
+    return Vertex{{(2 + c) * std::cos(major), (2 + c) * std::sin(major), s},
+                  {c * std::cos(major), c * std::sin(major), s}};
+  };
+  for (const std::uint32_t cells : {32U, 128U, 400U}) {
+    const Scene scene = SceneOf(Tessellate(torus, {0, 2 * pi}, {0, 2 * pi}, 2 * cells, cells));
+    const SurfaceCurvature curvature(scene, Any);
+    const double reach = std::max(0.1, 4.0 / cells);
+    const Periodic first([](double turn) { return TorusFirst(2 * pi * turn); }, reach);
+    const Periodic second([](double turn) { return TorusSecond(2 * pi * turn); }, reach);
+    BothRatios ratios;
+    for (std::uint32_t i = 0; i < TriangleCount(scene); ++i) {
+      const SurfacePoint point = MiddleOf(scene, i);
+      const double turn =
+          std::atan2(point.position.z, std::hypot(point.position.x, point.position.y) - 2) /
+          (2 * pi);
+      const NormalCurvature found = curvature.Along(point, {1, 0, 0});
+      first.Compare(static_cast<double>(found.gradient), turn, ratios.first);
+      second.Compare(static_cast<double>(found.second_gradient), turn, ratios.second);
+    }
+    EXPECT_GE(ratios.first.least, 1) << cells;
+    EXPECT_LE(ratios.first.most, 1.3) << cells;
+    EXPECT_GE(ratios.second.least, 1) << cells;
+    EXPECT_LE(ratios.second.most, 1.3) << cells;
+  }
+}
+
 TEST(SurfaceCurvatureTest, ScalesExactlyWithPowersOfTwo) {
   const TriangleMesh mesh = Tessellate(Wave(), {0, 1}, {0, 0.2}, 40, 8);
   const Scene scene = SceneOf(mesh);
