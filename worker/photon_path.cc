@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "render/math/sobol.h"
+#include "render/transport/material_at.h"
 
 namespace lucerna {
 namespace {
@@ -74,7 +76,8 @@ void PhotonPathTracer::Walk(std::uint64_t number, std::uint64_t job_key, Landed&
     ++landed.rays;
     if (!intersector_.Intersect(ray, hit)) return;
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
-    const Material& material = scene_.materials[surface.material];
+    std::optional<Material> textured;
+    const Material& material = MaterialAt(scene_, surface, textured);
     const Vec3 wo = -ray.direction;
     if constexpr (kHasSpectrum) spectra_->Fly(carried, ray, hit.t);
     if (surface.has_shading_normal) {

@@ -17,6 +17,8 @@
 #include "render/scene/scene.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/light.h"
+#include "worker/sky_detail.h"
+#include "worker/texture_detail.h"
 
 namespace lucerna {
 
@@ -50,6 +52,8 @@ class SpectrumTracer {
   SpectrumTracer(const Scene& scene, const RenderSettings& settings, const Bounds& bounds,
                  const LightSet& lights);
   [[nodiscard]] SurfaceBend BendAt(const SurfacePoint& surface, Vec3 wo) const;
+  // Of the surface's texture, along the surface [1/length²].
+  [[nodiscard]] double TextureDetailAt(const SurfacePoint& surface, const Material& material) const;
 
   const Scene& scene_;
   const LightSet& lights_;
@@ -60,6 +64,8 @@ class SpectrumTracer {
   std::unique_ptr<SilhouetteEdges> edges_;
   SurfaceCurvature curvature_;
   std::vector<std::optional<EmitterMoments>> mesh_moments_;  // [meshes] that emit
+  std::vector<TextureDetail> texture_details_;               // [textures]
+  std::vector<SkyDetail> sky_details_;                       // [environments of the lights]
 };
 
 }  // namespace lucerna

@@ -1,6 +1,6 @@
 // Where does a scene's text come from?
 //
-// A scene is the closure of its main file over Include, Import and meshes. The parser reads all
+// A scene is the closure of its main file over Include, Import, meshes and pictures. The parser reads all
 // of them through SceneFiles, by logical path, so the same parse runs on the user's disk and on
 // bytes that came over the wire; and what it read is the scene's manifest.
 //
@@ -41,6 +41,7 @@ struct SceneLimits {
   std::uint64_t max_total_bytes = std::uint64_t{8} << 30;
   int max_include_depth = 32;
   std::uint64_t max_triangles = 400'000'000;  // after instances are laid out
+  std::uint64_t max_picture_bytes = std::uint64_t{8} << 30;  // of all pixels in memory
 };
 
 // Errors: INVALID_ARGUMENT with the reason when `path` is not a logical path.

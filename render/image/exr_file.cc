@@ -1,4 +1,4 @@
-#include "render/film/exr_file.h"
+#include "render/image/exr_file.h"
 
 #include <algorithm>
 #include <array>
