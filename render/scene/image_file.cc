@@ -1,7 +1,8 @@
-// PNG, JPEG and TGA are stb_image's, each shown to it only when the bytes begin like that format:
-// the library has further decoders that nobody here has looked at. Its TGA and JPEG decoders go on
-// where a file is cut off, with whatever lies in memory, so that is checked first. HDR and PFM are
-// read here.
+// PNG, JPEG and TGA are stb_image's, compiled here with those decoders alone. It trusts its input
+// more than we may: what is cut off it makes up from whatever lies in memory, and a JPEG can make
+// it read and write beyond its tables. So its memory begins as zeros, which keeps pixels the same
+// in every process, and files are checked for all that it does not check. HDR and PFM are read
+// here.
 #include "render/scene/image_file.h"
 
 #include <algorithm>
@@ -10,13 +11,45 @@
 #include <charconv>
 #include <climits>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 
+// stb_image's implementation, in this file alone.
+#define STB_IMAGE_IMPLEMENTATION
+#define STB_IMAGE_STATIC
+#define STBI_ONLY_JPEG
+#define STBI_ONLY_PNG
+#define STBI_ONLY_TGA
+#define STBI_NO_STDIO
+#define STBI_NO_LINEAR
+#define STBI_ASSERT(condition) static_cast<void>(0)
+#define STBI_MALLOC(size) std::calloc(1, size)
+#define STBI_FREE(memory) std::free(memory)
+#define STBI_REALLOC_SIZED(memory, old_size, size) \
+  lucerna::image_file_internal::Grow(memory, old_size, size)
+
+namespace lucerna::image_file_internal {
+namespace {
+
+void* Grow(void* memory, std::size_t old_size, std::size_t size) {
+  void* grown = std::calloc(1, size);
+  if (grown == nullptr) return nullptr;
+  if (memory != nullptr) std::memcpy(grown, memory, std::min(old_size, size));
+  std::free(memory);
+  return grown;
+}
+
+}  // namespace
+}  // namespace lucerna::image_file_internal
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
 #include <stb/stb_image.h>
+#pragma GCC diagnostic pop
 
 #include "render/base/text.h"
 #include "render/image/exr_file.h"
@@ -33,19 +66,19 @@ Status CheckSize(std::uint64_t width, std::uint64_t height, std::uint64_t pixel_
                  std::uint64_t file_bytes, std::uint64_t max_size_bytes) {
   if (width == 0 || height == 0) return Bad("it has no pixels");
   if (width > kMaxPicturePixels || height > kMaxPicturePixels / width) {
-    return absl::ResourceExhaustedError(
-        Concat("the image has ", width, " x ", height,
-               " pixels, more than the 2^28 that are allowed"));
+    return absl::ResourceExhaustedError(Concat("the image has ", width, " x ", height,
+                                               " pixels, more than the 2^28 that are allowed"));
   }
   const std::uint64_t pixels = width * height;
   if (pixels * pixel_bytes > max_size_bytes) {
-    return absl::ResourceExhaustedError(
-        Concat("the image would take ", pixels * pixel_bytes, " bytes of memory, and ",
-               max_size_bytes, " are left for the scene's images"));
+    return absl::ResourceExhaustedError(Concat("the image would take ", pixels * pixel_bytes,
+                                               " bytes of memory, and ", max_size_bytes,
+                                               " are left for the scene's images"));
   }
   // No format here puts so many into a byte.
   constexpr std::uint64_t kMostPixelsPerByte = 16'384;
-  if (pixels / kMostPixelsPerByte > file_bytes) return Bad("it is too short for its size in pixels");
+  if (pixels / kMostPixelsPerByte > file_bytes)
+    return Bad("it is too short for its size in pixels");
   return absl::OkStatus();
 }
 
@@ -77,10 +110,62 @@ Status CheckJpeg(std::string_view bytes) {
   return Bad("it is cut off");
 }
 
+// Whether every Huffman table has as many codes as there is room for. Asked wherever a table may
+// begin, in a segment or not: which bytes the decoder comes by is its own affair.
+Status CheckHuffmanTables(std::string_view bytes) {
+  constexpr std::string_view kDefineTables = "\xFF\xC4";
+  constexpr std::size_t kCounts = 16;
+  for (std::size_t at = bytes.find(kDefineTables); at != std::string_view::npos;
+       at = bytes.find(kDefineTables, at + 1)) {
+    std::string_view rest = bytes.substr(at + 2);
+    if (rest.size() < 2) break;
+    int left = ByteAt(rest, 0) * 256 + ByteAt(rest, 1) - 2;
+    rest.remove_prefix(2);
+    while (left > 0 && rest.size() > kCounts) {
+      const std::uint8_t table = ByteAt(rest, 0);
+      if (table > 0x1F || (table & 0x0FU) > 3) break;  // which the decoder refuses
+      std::size_t codes = 0;
+      for (std::size_t i = 1; i <= kCounts; ++i)
+        codes += ByteAt(rest, i);
+      if (codes > 256) return Bad("one of its JPEG Huffman tables is too long");
+      left -= static_cast<int>(1 + kCounts + codes);
+      rest.remove_prefix(std::min(rest.size(), 1 + kCounts + codes));
+    }
+  }
+  return absl::OkStatus();
+}
+
+// The JPEG with all eight Huffman tables defined before anything else, each by one code: a scan
+// that refers to one that the file does not define finds no bounds otherwise.
+std::string WithHuffmanTables(std::string_view bytes) {
+  constexpr std::size_t kStart = 2;  // of the image
+  std::string with(bytes.substr(0, kStart));
+  constexpr int kTables = 8;
+  constexpr int kTableBytes = 18;
+  with += "\xFF\xC4";
+  with += '\0';
+  with += static_cast<char>(2 + kTables * kTableBytes);
+  for (int table = 0; table < kTables; ++table) {
+    with += static_cast<char>(table % 4 + (table / 4) * 16);
+    with += '\x01';
+    with.append(16, '\0');  // no longer codes, and the value 0
+  }
+  with += bytes.substr(kStart);
+  return with;
+}
+
 Status CheckPng(std::string_view bytes) {
   constexpr std::string_view kSignature = "\x89PNG\r\n\x1A\n";
+  constexpr std::size_t kSizeOffset = 16;  // of width and height in the first chunk
   if (!bytes.starts_with(kSignature)) return Bad("it does not begin like a PNG");
-  return absl::OkStatus();
+  if (bytes.size() < kSizeOffset + 8) return Bad("it is cut off");
+  const auto number = [&](std::size_t at) {
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+      value = value << 8 | ByteAt(bytes, at + i);
+    return value;
+  };
+  return CheckSize(number(kSizeOffset), number(kSizeOffset + 4), 1, bytes.size(), UINT64_MAX);
 }
 
 // Walks the packets: the decoder would not notice that they end early.
@@ -150,8 +235,8 @@ StatusOr<Picture> ReadByStb(std::string_view bytes, const PixelEncoding& encodin
                                     channels * (is_16_bit ? 4 : 1), bytes.size(), max_size_bytes));
   int decoded_width = 0;
   int decoded_height = 0;
-  const auto values = static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) *
-                      channels;
+  const auto values =
+      static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height) * channels;
   const auto is_as_promised = [&] { return decoded_width == width && decoded_height == height; };
   picture.width = width;
   picture.height = height;
@@ -327,7 +412,8 @@ StatusOr<Picture> ReadPfm(std::string_view bytes, std::uint64_t max_size_bytes) 
     float* to = &picture.linear[(*height - 1 - y) * row];
     std::memcpy(to, bytes.data() + y * row * sizeof(float), row * sizeof(float));
     for (std::size_t i = 0; i < row; ++i) {
-      if (scale > 0) to[i] = std::bit_cast<float>(__builtin_bswap32(std::bit_cast<std::uint32_t>(to[i])));
+      if (scale > 0)
+        to[i] = std::bit_cast<float>(__builtin_bswap32(std::bit_cast<std::uint32_t>(to[i])));
       to[i] *= static_cast<float>(std::abs(scale));
     }
   }
@@ -348,8 +434,7 @@ StatusOr<Picture> PictureOfExr(std::string_view bytes, std::uint64_t max_size_by
   picture.channels = static_cast<int>(channels.size());
   LUCERNA_RETURN_IF_ERROR(CheckSize(static_cast<std::uint64_t>(image.width),
                                     static_cast<std::uint64_t>(image.height),
-                                    channels.size() * sizeof(float), bytes.size(),
-                                    max_size_bytes));
+                                    channels.size() * sizeof(float), bytes.size(), max_size_bytes));
   const std::size_t pixels = channels[0]->pixels.size();
   picture.linear.resize(pixels * channels.size());
   for (std::size_t i = 0; i < pixels; ++i) {
@@ -387,7 +472,8 @@ StatusOr<Picture> ReadPicture(std::string_view bytes, std::string_view path,
   }
   if (extension == "jpg" || extension == "jpeg") {
     LUCERNA_RETURN_IF_ERROR(CheckJpeg(bytes));
-    return ReadByStb(bytes, {}, max_size_bytes);
+    LUCERNA_RETURN_IF_ERROR(CheckHuffmanTables(bytes));
+    return ReadByStb(WithHuffmanTables(bytes), {}, max_size_bytes);
   }
   if (extension == "tga") {
     LUCERNA_RETURN_IF_ERROR(CheckTga(bytes));

@@ -2,6 +2,7 @@
 //
 // Units are pbrt-v4's: an rgb is radiance, intensity or irradiance as it stands; power and
 // illuminance set the luminance that a colour of luminance 1 and a scale of 1 would have.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -47,16 +48,21 @@ Vec3 Direction(ParameterList& parameters, const Transform& to_world, Vec3 from, 
 // pixel by half its solid angle and so renders a map with an illuminance twice as bright; here it
 // means what it means for a constant light.
 double IlluminanceOf(const Picture& map) {
+  // A pixel of a small map is large, and the horizon runs through some.
+  constexpr int kFineSide = 512;
+  const int parts = std::max(1, kFineSide / map.width);
+  const int side = map.width * parts;
   double sum = 0;
-  for (int y = 0; y < map.height; ++y) {
-    for (int x = 0; x < map.width; ++x) {
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
       const Vec3 direction =
-          EqualAreaDirection({(static_cast<float>(x) + 0.5F) / static_cast<float>(map.width),
-                              (static_cast<float>(y) + 0.5F) / static_cast<float>(map.height)});
-      if (direction.z > 0) sum += static_cast<double>(Luminance(map.At(x, y)) * direction.z);
+          EqualAreaDirection({(static_cast<float>(x) + 0.5F) / static_cast<float>(side),
+                              (static_cast<float>(y) + 0.5F) / static_cast<float>(side)});
+      if (!(direction.z > 0)) continue;
+      sum += static_cast<double>(Luminance(map.At(x / parts, y / parts)) * direction.z);
     }
   }
-  return sum * 4 * kPiD / (static_cast<double>(map.width) * map.height);
+  return sum * 4 * kPiD / (static_cast<double>(side) * side);
 }
 
 void AddEnvironment(ParameterList& parameters, const Transform& to_world,

@@ -1095,7 +1095,8 @@ void PbrtParser::Finish() {
   for (const TriangleMesh& mesh : scene_.meshes) {
     const Material& material = scene_.materials[static_cast<std::size_t>(mesh.traits.material)];
     if (mesh.uvs.empty() && material.texture != kNoTexture) {
-      diagnostics_.Warning(whole, "a mesh with a texture has no uv: every triangle shows half of it");
+      diagnostics_.Warning(whole,
+                           "a mesh with a texture has no uv: every triangle shows half of it");
     }
   }
   if (!in_world_) diagnostics_.Error(whole, "the scene has no WorldBegin");

@@ -124,7 +124,8 @@ NamedTexture MakeScaled(ParameterList& parameters, const TextureNames& names,
   if (parameters.IsTexture("scale")) {
     parameters.Ignore("tex");
     parameters.Ignore("scale");
-    return Unusable("refers to a texture that is scaled by a float texture, which is not supported");
+    return Unusable(
+        "refers to a texture that is scaled by a float texture, which is not supported");
   }
   const NamedTexture part = Part("tex", 1, parameters, names, textures);
   Texture texture;

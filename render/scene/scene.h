@@ -52,7 +52,8 @@ struct Material {
   bool operator==(const Material&) const = default;
 };
 
-// A conductor given by its reflectance at right angles has eta = 1 and this k, capped as in pbrt-v4.
+// A conductor given by its reflectance at right angles has eta = 1 and this k, capped as in
+// pbrt-v4.
 [[nodiscard]] inline float AbsorptionFor(float reflectance) {
   const float capped = std::min(reflectance, 0.9999F);
   return 2 * std::sqrt(capped) / std::sqrt(1 - capped);
@@ -101,7 +102,7 @@ struct Sphere {
   float radius = 1;     // > 0
   bool inward = false;  // the outward normal points to the centre
   ShapeTraits traits;
-  ShapeAxes axes;
+  ShapeAxes axes = {};
 };
 
 struct Disk {
@@ -110,7 +111,7 @@ struct Disk {
   float radius = 1;
   float inner_radius = 0;
   ShapeTraits traits;
-  ShapeAxes axes;
+  ShapeAxes axes = {};
 };
 
 struct PointLight {

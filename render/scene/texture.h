@@ -30,10 +30,9 @@ struct Picture {
 
   // Requires a pixel of the picture.
   [[nodiscard]] Rgb At(int x, int y) const {
-    const std::size_t first =
-        (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-         static_cast<std::size_t>(x)) *
-        static_cast<std::size_t>(channels);
+    const std::size_t first = (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                               static_cast<std::size_t>(x)) *
+                              static_cast<std::size_t>(channels);
     const auto value = [&](std::size_t i) {
       return linear.empty() ? decoded[coded[first + i]] : linear[first + i];
     };
@@ -56,11 +55,11 @@ struct Texture {
   enum class Wrap : std::uint8_t { kRepeat, kClamp, kBlack };
 
   Kind kind = Kind::kConstant;
-  Wrap wrap = Wrap::kRepeat;   // picture: what lies beyond its edges
-  bool is_inverted = false;    // picture: 1 - colour, after `scale`
-  Rgb color;                   // constant, in [0, 1]
-  float scale = 1;             // picture, scaled; >= 0
-  UvMapping mapping;           // picture, checkerboard
+  Wrap wrap = Wrap::kRepeat;  // picture: what lies beyond its edges
+  bool is_inverted = false;   // picture: 1 - colour, after `scale`
+  Rgb color;                  // constant, in [0, 1]
+  float scale = 1;            // picture, scaled; >= 0
+  UvMapping mapping;          // picture, checkerboard
   // Numbers of other textures, below its own: of what is scaled, or of the squares where
   // floor(u) + floor(v) is even and where it is odd.
   std::array<std::int32_t, 2> parts = {-1, -1};

@@ -268,8 +268,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
       const Vec3 disk = SquareToDisk(u_place1, u_place2) * radius_;
       emission.ray.origin = center_ + towards * radius_ + frame.s * disk.x + frame.t * disk.y;
       emission.ray.direction = -towards;
-      emission.flux =
-          sky.Radiance(towards) * (kPi * radius_ * radius_ / (pdf * emitter.choice));
+      emission.flux = sky.Radiance(towards) * (kPi * radius_ * radius_ / (pdf * emitter.choice));
       return true;
     }
     case Kind::kInfinite: {
@@ -348,9 +347,8 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
       return true;
     case Kind::kInfinite:
     case Kind::kEnvironment:
-      sample.wi = emitter.kind == Kind::kInfinite
-                      ? SquareToSphere(u1, u2)
-                      : environments_[emitter.primitive].Sample(u1, u2);
+      sample.wi = emitter.kind == Kind::kInfinite ? SquareToSphere(u1, u2)
+                                                  : environments_[emitter.primitive].Sample(u1, u2);
       sample.is_distant = true;
       // Whichever drew it, light from this direction is that of all infinite lights.
       sample.pdf = PdfDirectInfinite(sample.wi);

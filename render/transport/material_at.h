@@ -10,8 +10,7 @@ namespace lucerna {
 
 namespace material_at_internal {
 [[nodiscard]] const Material& Textured(const Scene& scene, const SurfacePoint& point,
-                                       const Material& material,
-                                       std::optional<Material>& storage);
+                                       const Material& material, std::optional<Material>& storage);
 }  // namespace material_at_internal
 
 // The material of `scene`, or with a texture, looked up at the point, in `storage` (without the
@@ -19,7 +18,8 @@ namespace material_at_internal {
 [[nodiscard]] inline const Material& MaterialAt(const Scene& scene, const SurfacePoint& point,
                                                 std::optional<Material>& storage) {
   const Material& material = scene.materials[point.material];
-  if (material.texture == kNoTexture) [[likely]] return material;
+  if (material.texture == kNoTexture) [[likely]]
+    return material;
   return material_at_internal::Textured(scene, point, material, storage);
 }
 

@@ -40,7 +40,7 @@ OWNERS = {
     r"zstd\.h": ["render/wire/"],
     r"openssl/": ["render/base/"],
     r"tbb/": ["render/base/parallel"],
-    r"zlib\.h": ["render/scene/"],
+    r"zlib\.h": ["render/scene/", "render/image/"],
     r"sqlite3\.h": ["server/"],
     r"random>?$": [],
 }
