@@ -141,10 +141,9 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
     ++path.rays;
     if (!intersector_.Intersect(ray, hit)) {
       if (emission_was_collected) return path;
-      const float mis =
-          scatter_pdf > 0
-              ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(ray.direction))
-              : 1;
+      const float mis = scatter_pdf > 0
+                            ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(ray.direction))
+                            : 1;
       path.direct += weight * lights_.InfiniteRadiance(ray.direction) * mis;
       return path;
     }

@@ -76,8 +76,7 @@ bool IsPbrtV3Material(std::string_view type) {
   return std::find(kTypes.begin(), kTypes.end(), type) != kTypes.end();
 }
 
-Material MakeMaterial(std::string_view type, ParameterList& parameters,
-                      const TextureNames& names) {
+Material MakeMaterial(std::string_view type, ParameterList& parameters, const TextureNames& names) {
   Material material;
   if (type == "diffuse") {
     material.kind = Material::Kind::kDiffuse;
