@@ -9,8 +9,8 @@
 #include "client/report.h"
 #include "client/scene_reading.h"
 #include "render/base/files.h"
-#include "render/film/exr_file.h"
 #include "render/film/png_file.h"
+#include "render/image/exr_file.h"
 
 namespace lucerna {
 namespace {

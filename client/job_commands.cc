@@ -16,8 +16,8 @@
 #include "client/scene_reading.h"
 #include "render/base/clock.h"
 #include "render/base/files.h"
-#include "render/film/exr_file.h"
 #include "render/film/png_file.h"
+#include "render/image/exr_file.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {

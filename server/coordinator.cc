@@ -7,7 +7,7 @@
 #include "absl/strings/str_format.h"
 #include <spdlog/spdlog.h>
 
-#include "render/film/exr_file.h"
+#include "render/image/exr_file.h"
 #include "render/scene/pbrt_parser.h"
 
 namespace lucerna {

@@ -24,7 +24,7 @@
 #include "render/base/mutex.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
-#include "render/film/image.h"
+#include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/scene/scene_files.h"

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "render/math/warp.h"
 #include "render/transport/bsdf.h"
+#include "render/transport/material_at.h"
 #include "server/direct_light.h"
 
 namespace lucerna {
@@ -77,7 +79,8 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, Key
   std::vector<Branch> branches;
   const auto branch_at = [&](const SurfacePoint& surface, Vec3 wo, Rgb weight, int vertex) {
     if (vertex >= settings_.max_depth) return;
-    const Material& material = scene_.materials[surface.material];
+    std::optional<Material> textured;
+    const Material& material = MaterialAt(scene_, surface, textured);
     if (!IsSmooth(material)) return;
     const Frame frame(surface.shading_normal);
     // Lobe 0 is the reflection and lobe 1 - ulp the refraction, with the weight of its share.
@@ -110,7 +113,7 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, Key
     Hit hit;
     ++rays;
     if (!intersector_.Intersect(branch.ray, hit)) {
-      seen += branch.weight * lights_.InfiniteRadiance();
+      seen += branch.weight * lights_.InfiniteRadiance(branch.ray.direction);
       continue;
     }
     const SurfacePoint surface = intersector_.SurfaceAt(branch.ray, hit);
@@ -138,9 +141,10 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
     ++path.rays;
     if (!intersector_.Intersect(ray, hit)) {
       if (emission_was_collected) return path;
-      const float mis =
-          scatter_pdf > 0 ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite()) : 1;
-      path.direct += weight * lights_.InfiniteRadiance() * mis;
+      const float mis = scatter_pdf > 0
+                            ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(ray.direction))
+                            : 1;
+      path.direct += weight * lights_.InfiniteRadiance(ray.direction) * mis;
       return path;
     }
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
@@ -154,7 +158,8 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
               : 1;
       path.direct += weight * emitted * mis;
     }
-    const Material& material = scene_.materials[surface.material];
+    std::optional<Material> textured;
+    const Material& material = MaterialAt(scene_, surface, textured);
     if (vertex == 0 || Gathers(material)) {
       path.features = {AlbedoOf(material), FaceForward(surface.shading_normal, wo), length};
     }
@@ -189,8 +194,8 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
         const Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
         ++path.rays;
         if (!intersector_.Intersect(probe, hit)) {
-          path.direct += weight * sample.weight * lights_.InfiniteRadiance() *
-                         PowerHeuristic(sample.pdf, lights_.PdfDirectInfinite());
+          path.direct += weight * sample.weight * lights_.InfiniteRadiance(wi) *
+                         PowerHeuristic(sample.pdf, lights_.PdfDirectInfinite(wi));
         } else {
           const SurfacePoint light = intersector_.SurfaceAt(probe, hit);
           const Rgb radiance = lights_.EmittedRadiance(light, -wi);

@@ -20,7 +20,7 @@
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/hitpoint_block.h"
-#include "render/film/image.h"
+#include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "server/hitpoint_pass.h"

@@ -20,7 +20,7 @@
 #include "render/base/clock.h"
 #include "render/base/mutex.h"
 #include "render/base/status.h"
-#include "render/film/image.h"
+#include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "server/blob_store.h"

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "render/estimate/evidence.h"
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "render/math/sobol.h"
+#include "render/transport/material_at.h"
 
 namespace lucerna {
 namespace {
@@ -75,7 +77,8 @@ void PhotonPathTracer::Walk(std::uint64_t number, std::uint64_t job_key, Landed&
     ++landed.rays;
     if (!intersector_.Intersect(ray, hit)) return;
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
-    const Material& material = scene_.materials[surface.material];
+    std::optional<Material> textured;
+    const Material& material = MaterialAt(scene_, surface, textured);
     const Vec3 wo = -ray.direction;
     if (surface.has_shading_normal) {
       const float shading = Dot(wo, surface.shading_normal);

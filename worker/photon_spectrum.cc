@@ -6,6 +6,7 @@
 
 #include "render/estimate/kernel.h"
 #include "render/geometry/mesh_edges.h"
+#include "render/geometry/surface_uv.h"
 
 namespace lucerna {
 namespace {
@@ -46,7 +47,10 @@ SpectrumTracer::SpectrumTracer(const Scene& scene, const RenderSettings& setting
       limits_(SpectrumLimits::ForDiagonal(static_cast<double>(bounds.Diagonal()))),
       edge_strength_(EdgeStrength(settings.bias, Kernel{settings.kernel}.Moments().mu2)),
       reach_(ReachOf(scene, settings, bounds)),
-      curvature_(scene, [](const Material&) { return true; }) {
+      curvature_(scene, [](const Material&) { return true; }),
+      texture_details_(TextureDetails(scene.textures)) {
+  for (const EnvironmentMap& sky : lights.environments())
+    sky_details_.emplace_back(sky);
   MeasureEmitters();
 }
 
@@ -117,6 +121,8 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
     case EmitterKind::kInfinite:
       // Even light from everywhere: no structure in place or direction.
       return {EnvironmentSource(0, 1, 1, 1, limits_), false};
+    case EmitterKind::kEnvironment:
+      return {sky_details_[emitter.primitive].Source(-direction, limits_), false};
   }
   return {};
 }
@@ -159,6 +165,14 @@ float SpectrumTracer::Received(const Carried& carried, const SurfacePoint& surfa
   return std::isfinite(trace) ? static_cast<float>(std::min(trace, 1e37)) : -1.0F;
 }
 
+double SpectrumTracer::TextureDetailAt(const SurfacePoint& surface,
+                                       const Material& material) const {
+  if (material.texture == kNoTexture) return 0;
+  const TextureDetail& detail = texture_details_[static_cast<std::size_t>(material.texture)];
+  const UvSlopes slopes = UvSlopesAt(scene_, surface);
+  return detail.u * slopes.u + detail.v * slopes.v;
+}
+
 SurfaceBend SpectrumTracer::BendAt(const SurfacePoint& surface, Vec3 wo) const {
   const Vec3 normal = surface.shading_normal;
   Vec3 tangential = wo - normal * Dot(wo, normal);
@@ -181,7 +195,7 @@ void SpectrumTracer::Scatter(Carried& carried, const SurfacePoint& surface,
     const double bend = std::sqrt(0.5 * static_cast<double>(curvature_.SquaredPrincipals(surface)));
     const double trace = ReceivedTrace(
         carried.spectrum, static_cast<double>(std::abs(Dot(wo, normal))), bend, bend, limits_);
-    carried = {ScatterDiffusely(trace, 0, limits_), true};
+    carried = {ScatterDiffusely(trace, TextureDetailAt(surface, material), limits_), true};
   };
   if (material.kind == Material::Kind::kDiffuse) {
     diffuse();

@@ -16,6 +16,8 @@
 #include "render/scene/scene.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/light.h"
+#include "worker/sky_detail.h"
+#include "worker/texture_detail.h"
 
 namespace lucerna {
 
@@ -54,6 +56,8 @@ class SpectrumTracer {
                  const LightSet& lights);
   void MeasureEmitters();
   [[nodiscard]] SurfaceBend BendAt(const SurfacePoint& surface, Vec3 wo) const;
+  // Of the surface's texture, along the surface [1/length²].
+  [[nodiscard]] double TextureDetailAt(const SurfacePoint& surface, const Material& material) const;
 
   const Scene& scene_;
   const LightSet& lights_;
@@ -65,8 +69,10 @@ class SpectrumTracer {
   SurfaceCurvature curvature_;
   // Of emitting meshes, each connected surface as one emitter, in however many meshes it comes.
   std::vector<EmitterMoments> surface_moments_;
-  std::vector<std::uint32_t> surface_of_;   // [triangles of emitting meshes]
-  std::vector<std::size_t> first_of_mesh_;  // [meshes] into surface_of_
+  std::vector<std::uint32_t> surface_of_;       // [triangles of emitting meshes]
+  std::vector<std::size_t> first_of_mesh_;      // [meshes] into surface_of_
+  std::vector<TextureDetail> texture_details_;  // [textures]
+  std::vector<SkyDetail> sky_details_;          // [environments of the lights]
 };
 
 }  // namespace lucerna

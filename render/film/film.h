@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "render/estimate/statistics.h"
-#include "render/film/image.h"
+#include "render/image/image.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 

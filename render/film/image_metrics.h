@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "render/base/status.h"
-#include "render/film/image.h"
+#include "render/image/image.h"
 
 namespace lucerna {
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "render/base/status.h"
-#include "render/film/image.h"
+#include "render/image/image.h"
 
 namespace lucerna {
 

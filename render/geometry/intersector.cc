@@ -264,6 +264,8 @@ SurfacePoint Intersector::SurfaceAt(const Ray& ray, const Hit& hit) const {
   SurfacePoint point;
   point.geometry = hit.geometry;
   point.primitive = hit.primitive;
+  point.u = hit.u;
+  point.v = hit.v;
   const ShapeTraits* traits = nullptr;
   if (hit.geometry < sphere_geometry_) {
     const TriangleMesh& mesh = scene_.meshes[hit.geometry];

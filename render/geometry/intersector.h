@@ -42,6 +42,7 @@ struct SurfacePoint {
   std::uint32_t material = 0;
   std::int32_t area_light = kNoAreaLight;
   std::uint32_t geometry = 0, primitive = 0;
+  float u = 0, v = 0;  // barycentric, as in Hit
   // How far off the surface `position` may lie from rounding [scene units]; rays leave from a
   // point so far off that they do not meet the surface again.
   float clearance = 0;

@@ -6,6 +6,13 @@
 
 namespace lucerna {
 
+// A place on a texture.
+struct Vec2 {
+  float x = 0, y = 0;
+
+  constexpr bool operator==(const Vec2&) const = default;
+};
+
 struct Vec3 {
   float x = 0, y = 0, z = 0;
 

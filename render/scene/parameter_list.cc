@@ -14,6 +14,7 @@ constexpr std::array<std::string_view, 1> kFloat = {"float"};
 constexpr std::array<std::string_view, 1> kInteger = {"integer"};
 constexpr std::array<std::string_view, 1> kBool = {"bool"};
 constexpr std::array<std::string_view, 1> kString = {"string"};
+constexpr std::array<std::string_view, 1> kTexture = {"texture"};
 constexpr std::array<std::string_view, 2> kPoint = {"point3", "point"};
 constexpr std::array<std::string_view, 2> kReflectanceTypes = {"rgb", "spectrum"};
 constexpr std::array<std::string_view, 3> kEmissionTypes = {"rgb", "spectrum", "blackbody"};
@@ -95,7 +96,9 @@ const Parameter* ParameterList::Take(std::string_view name, std::span<const std:
     if (parameter->type == "texture") {
       diagnostics_.Error(parameter->place,
                          Concat(Called(*parameter), " is a texture; ",
-                                "textures are not supported, give a ", wanted, " instead"));
+                                "textures are supported for the reflectance of diffuse and "
+                                "conductor only, give a ",
+                                wanted, " instead"));
     } else {
       diagnostics_.Error(parameter->place, Concat(Called(*parameter), " must be of type ", wanted,
                                                   ", not ", parameter->type));
@@ -163,6 +166,17 @@ std::optional<std::string> ParameterList::FindString(std::string_view name) {
 
 std::string ParameterList::String(std::string_view name, std::string otherwise) {
   return FindString(name).value_or(std::move(otherwise));
+}
+
+bool ParameterList::IsTexture(std::string_view name) const {
+  const Parameter* parameter = Find(name);
+  return parameter != nullptr && parameter->type == "texture";
+}
+
+std::optional<std::string> ParameterList::FindTexture(std::string_view name) {
+  const Parameter* parameter = Take(name, kTexture, 1);
+  if (parameter == nullptr) return std::nullopt;
+  return parameter->strings[0];
 }
 
 Vec3 ParameterList::Point(std::string_view name, Vec3 otherwise) {

@@ -68,6 +68,9 @@ class ParameterList {
   std::span<const double> Numbers(std::string_view name, std::span<const std::string_view> types,
                                   std::size_t group);
 
+  // Whether a parameter of this name is of type texture, and the name of that texture.
+  [[nodiscard]] bool IsTexture(std::string_view name) const;
+  std::optional<std::string> FindTexture(std::string_view name);
   // A colour in [0, 1].
   std::optional<Rgb> FindReflectance(std::string_view name);
   // The colour of a light; rgb as it stands, everything else with luminance 1, as in pbrt-v4.

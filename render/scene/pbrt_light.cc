@@ -2,15 +2,18 @@
 //
 // Units are pbrt-v4's: an rgb is radiance, intensity or irradiance as it stands; power and
 // illuminance set the luminance that a colour of luminance 1 and a scale of 1 would have.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "render/base/text.h"
+#include "render/math/equal_area_square.h"
 #include "render/scene/scene_builder.h"
 
 namespace lucerna {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+constexpr double kPiD = std::numbers::pi;
 
 // S1: colours are finite, also after scaling.
 Rgb Scaled(ParameterList& parameters, Rgb color, double scale) {
@@ -41,7 +44,83 @@ Vec3 Direction(ParameterList& parameters, const Transform& to_world, Vec3 from, 
   return {0, 0, 1};
 }
 
+// [W·m⁻²] luminance of what falls onto a plane that looks along z of the map. pbrt-v4 weighs each
+// pixel by half its solid angle and so renders a map with an illuminance twice as bright; here it
+// means what it means for a constant light.
+double IlluminanceOf(const Picture& map) {
+  // A pixel of a small map is large, and the horizon runs through some.
+  constexpr int kFineSide = 512;
+  const int parts = std::max(1, kFineSide / map.width);
+  const int side = map.width * parts;
+  double sum = 0;
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const Vec3 direction =
+          EqualAreaDirection({(static_cast<float>(x) + 0.5F) / static_cast<float>(side),
+                              (static_cast<float>(y) + 0.5F) / static_cast<float>(side)});
+      if (!(direction.z > 0)) continue;
+      sum += static_cast<double>(Luminance(map.At(x / parts, y / parts)) * direction.z);
+    }
+  }
+  return sum * 4 * kPiD / (static_cast<double>(side) * side);
+}
+
+void AddEnvironment(ParameterList& parameters, const Transform& to_world,
+                    const PictureReader& read_picture, double scale, double illuminance,
+                    Scene& scene) {
+  if (parameters.Has("L")) {
+    parameters.Error("L", "and filename exclude each other; give one or the other");
+    parameters.Ignore("L");
+  }
+  const std::optional<std::string> file = parameters.FindString("filename");
+  if (!file.has_value()) return;
+  StatusOr<std::shared_ptr<const Picture>> map = read_picture(*file, {});
+  if (!map.ok()) {
+    parameters.Error("filename", Concat("cannot be read: ", map.status().message()));
+    return;
+  }
+  if ((*map)->width != (*map)->height) {
+    parameters.Error("filename", Concat("has ", (*map)->width, " x ", (*map)->height,
+                                        " pixels; an environment is an equal-area map, which is "
+                                        "square (pbrt-v4 converts others: imgtool makeequiarea)"));
+    return;
+  }
+  const StatusOr<ShapeAxes> axes = AxesOf(to_world);
+  if (!axes.ok()) {
+    parameters.Error("is stretched by its transform, which is not supported; scale all axes alike");
+    return;
+  }
+  if (illuminance > 0) {
+    const double given = IlluminanceOf(**map);
+    if (!(given > 0)) {
+      parameters.Error("illuminance", "cannot be reached: the upper half of the map is black");
+      return;
+    }
+    scale *= illuminance / given;
+  }
+  InfiniteLight light;
+  light.radiance = Gray(static_cast<float>(scale));
+  light.axes = *axes;
+  // Summed over all pixels in single precision.
+  if (!(scale * static_cast<double>((*map)->Largest()) < 1e30)) {
+    parameters.Error("is too bright for single precision");
+    return;
+  }
+  light.map = *std::move(map);
+  scene.infinite_lights.push_back(std::move(light));
+}
+
 }  // namespace
+
+StatusOr<ShapeAxes> AxesOf(const Transform& to_world) {
+  LUCERNA_ASSIGN_OR_RETURN(const double scale, to_world.UniformScale());
+  const auto axis = [&](Vec3 local) {
+    const Vec3 world = to_world.Vector(local * static_cast<float>(1 / scale));
+    const float size = MaxAbs(world);
+    return size > 0 && std::isfinite(size) ? Normalize(world / size) : local;
+  };
+  return ShapeAxes{axis({1, 0, 0}), axis({0, 1, 0}), axis({0, 0, 1})};
+}
 
 AreaEmission MakeAreaEmission(std::string_view type, ParameterList& parameters) {
   AreaEmission emission;
@@ -66,20 +145,20 @@ AreaLight MakeAreaLight(const AreaEmission& emission, double area_m2) {
   AreaLight light = {emission.radiance, emission.two_sided};
   if (emission.power_w.has_value()) {
     const double sides = emission.two_sided ? 2 : 1;
-    light.radiance *= static_cast<float>(*emission.power_w / (sides * kPi * area_m2));
+    light.radiance *= static_cast<float>(*emission.power_w / (sides * kPiD * area_m2));
   }
   return light;
 }
 
 void AddLight(std::string_view type, ParameterList& parameters, const Transform& to_world,
-              Scene& scene) {
+              const PictureReader& read_picture, Scene& scene) {
   if (type == "point" || type == "spot") {
     const Rgb color = parameters.FindEmission("I").value_or(Gray(1));
     double scale = parameters.Float("scale", 1, kZeroOrMore);
     const double power_w = parameters.Float("power", -1);
     const Vec3 from = parameters.Point("from", {0, 0, 0});
     if (type == "point") {
-      if (power_w > 0) scale *= power_w / (4 * kPi);
+      if (power_w > 0) scale *= power_w / (4 * kPiD);
       scene.point_lights.push_back(
           {FinitePoint(parameters, to_world, from), Scaled(parameters, color, scale)});
     } else {
@@ -88,11 +167,11 @@ void AddLight(std::string_view type, ParameterList& parameters, const Transform&
       const double falloff_deg = parameters.Float("conedeltaangle", 5, {0, 180});
       if (falloff_deg > width_deg) parameters.Error("conedeltaangle", "is wider than coneangle");
       SpotLight light;
-      const double cos_width = std::cos(width_deg * kPi / 180);
-      const double cos_start = std::cos((width_deg - falloff_deg) * kPi / 180);
+      const double cos_width = std::cos(width_deg * kPiD / 180);
+      const double cos_start = std::cos((width_deg - falloff_deg) * kPiD / 180);
       if (power_w > 0) {
         // The integral of the smoothstep over its part of the cone is half of the part.
-        scale *= power_w / (2 * kPi * ((1 - cos_start) + (cos_start - cos_width) / 2));
+        scale *= power_w / (2 * kPiD * ((1 - cos_start) + (cos_start - cos_width) / 2));
       }
       light.cos_total_width = static_cast<float>(cos_width);
       light.cos_falloff_start = static_cast<float>(cos_start);
@@ -111,18 +190,22 @@ void AddLight(std::string_view type, ParameterList& parameters, const Transform&
     scene.distant_lights.push_back(
         {Direction(parameters, to_world, from, to), Scaled(parameters, color, scale)});
   } else if (type == "infinite") {
-    if (parameters.Has("filename") || parameters.Has("portal")) {
-      const std::string_view name = parameters.Has("filename") ? "filename" : "portal";
-      parameters.Error(name, "is not supported: only an infinite light of constant L is");
-      parameters.Ignore("filename");
+    if (parameters.Has("portal")) {
+      parameters.Error("portal", "is not supported");
       parameters.Ignore("portal");
     }
-    const Rgb color = parameters.FindEmission("L").value_or(Gray(1));
     double scale = parameters.Float("scale", 1, kZeroOrMore);
     const double illuminance = parameters.Float("illuminance", -1);
-    // A surface that sees constant radiance L over its hemisphere receives pi L.
-    if (illuminance > 0) scale *= illuminance / kPi;
-    scene.infinite_lights.push_back({Scaled(parameters, color, scale)});
+    if (parameters.Has("filename")) {
+      AddEnvironment(parameters, to_world, read_picture, scale, illuminance, scene);
+    } else {
+      const Rgb color = parameters.FindEmission("L").value_or(Gray(1));
+      // A surface that sees constant radiance L over its hemisphere receives pi L.
+      if (illuminance > 0) scale *= illuminance / kPiD;
+      InfiniteLight light;
+      light.radiance = Scaled(parameters, color, scale);
+      scene.infinite_lights.push_back(light);
+    }
   } else {
     parameters.Error("is not supported; there are point, spot, distant and infinite");
     return;

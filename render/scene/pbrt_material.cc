@@ -29,21 +29,36 @@ void ReadRoughness(ParameterList& parameters, Material& material) {
   material.alpha_v = static_cast<float>(std::max(alpha_v, kSmallestAlpha));
 }
 
-void ReadConductor(ParameterList& parameters, Material& material) {
-  const std::optional<Rgb> reflectance = parameters.FindReflectance("reflectance");
+// The texture that `name` refers to, if it is one and can be used.
+std::int32_t FindTexture(std::string_view name, ParameterList& parameters,
+                         const TextureNames& names) {
+  if (!parameters.IsTexture(name)) return kNoTexture;
+  const std::optional<std::string> texture = parameters.FindTexture(name);
+  if (!texture.has_value()) return kNoTexture;
+  const auto named = names.find(*texture);
+  if (named == names.end()) {
+    parameters.Error(name, Concat("refers to the spectrum texture ", Quoted(*texture),
+                                  ", which is not defined before it"));
+    return kNoTexture;
+  }
+  if (named->second.number == kNoTexture) parameters.Error(name, named->second.why_not);
+  return named->second.number;
+}
+
+void ReadConductor(ParameterList& parameters, const TextureNames& names, Material& material) {
+  const bool is_textured = parameters.IsTexture("reflectance");
+  if (is_textured) material.texture = FindTexture("reflectance", parameters, names);
+  const std::optional<Rgb> reflectance =
+      is_textured ? Gray(0.5F) : parameters.FindReflectance("reflectance");
   if (reflectance.has_value()) {
     if (parameters.Has("eta") || parameters.Has("k")) {
       parameters.Error("reflectance", "and eta or k exclude each other; give one or the other");
     }
     parameters.Ignore("eta");
     parameters.Ignore("k");
-    // The metal of index 1 that reflects this share at right angles: pbrt-v4, with its cap.
-    const auto k_of = [](float r) {
-      const float capped = std::min(r, 0.9999F);
-      return 2 * std::sqrt(capped) / std::sqrt(1 - capped);
-    };
     material.eta = Gray(1);
-    material.k = {k_of(reflectance->r), k_of(reflectance->g), k_of(reflectance->b)};
+    material.k = {AbsorptionFor(reflectance->r), AbsorptionFor(reflectance->g),
+                  AbsorptionFor(reflectance->b)};
   } else {
     const MetalConstants copper = MetalNamed("Cu").value();
     material.eta = parameters.FindOpticalConstant("eta", kIndexRange).value_or(copper.eta);
@@ -61,14 +76,18 @@ bool IsPbrtV3Material(std::string_view type) {
   return std::find(kTypes.begin(), kTypes.end(), type) != kTypes.end();
 }
 
-Material MakeMaterial(std::string_view type, ParameterList& parameters) {
+Material MakeMaterial(std::string_view type, ParameterList& parameters, const TextureNames& names) {
   Material material;
   if (type == "diffuse") {
     material.kind = Material::Kind::kDiffuse;
-    material.reflectance = parameters.FindReflectance("reflectance").value_or(Gray(0.5F));
+    if (parameters.IsTexture("reflectance")) {
+      material.texture = FindTexture("reflectance", parameters, names);
+    } else {
+      material.reflectance = parameters.FindReflectance("reflectance").value_or(Gray(0.5F));
+    }
   } else if (type == "conductor") {
     material.kind = Material::Kind::kConductor;
-    ReadConductor(parameters, material);
+    ReadConductor(parameters, names, material);
   } else if (type == "dielectric") {
     material.kind = Material::Kind::kDielectric;
     material.ior =

@@ -69,9 +69,9 @@ class PbrtParser {
     std::int32_t material = 0;
     std::shared_ptr<const AreaEmission> area_emission;
     std::int32_t area_light = kNoAreaLight;  // of an emission without power: the same everywhere
-    std::array<Defaults, 3> defaults;        // for kShapeTarget and so on
+    std::array<Defaults, 4> defaults;        // for kShapeTarget and so on
   };
-  enum Target : std::uint8_t { kShapeTarget, kLightTarget, kMaterialTarget };
+  enum Target : std::uint8_t { kShapeTarget, kLightTarget, kMaterialTarget, kTextureTarget };
   struct Saved {
     std::string_view begun_by;
     Place place;
@@ -93,6 +93,13 @@ class PbrtParser {
   void SkipToDirective();
   StatusOr<std::string> ReadCounted(const std::string& path);
   StatusOr<TriangleMesh> ReadMesh(const std::string& path);
+  StatusOr<std::shared_ptr<const Picture>> ReadImage(const std::string& path,
+                                                     const PixelEncoding& encoding);
+  PictureReader ImageReader() {
+    return [this](const std::string& file, const PixelEncoding& encoding) {
+      return ReadImage(file, encoding);
+    };
+  }
 
   // Arguments.
   bool ReadNumbers(std::span<double> numbers);
@@ -181,6 +188,7 @@ class PbrtParser {
   std::uint64_t texts_read_ = 0;
   std::uint64_t bytes_read_ = 0;
   std::uint64_t shapes_cost_ = 0;
+  std::uint64_t picture_bytes_ = 0;
 
   GraphicsState state_;
   std::vector<Saved> saved_;
@@ -189,6 +197,13 @@ class PbrtParser {
   double exposure_time_s_ = 1;
   std::map<std::string, Transform> coordinate_systems_;
   std::map<std::string, NamedMaterial> named_materials_;
+  TextureNames textures_;
+  std::set<std::string> float_textures_;
+  struct KnownPicture {
+    PixelEncoding encoding;
+    std::shared_ptr<const Picture> picture;
+  };
+  std::multimap<std::string, KnownPicture> pictures_;  // by path: each is in memory once
   std::map<std::string, ShapeSet> objects_;
   ShapeSet* open_object_ = nullptr;  // between ObjectBegin and ObjectEnd
 };
@@ -282,6 +297,24 @@ StatusOr<TriangleMesh> PbrtParser::ReadMesh(const std::string& path) {
   StatusOr<TriangleMesh> mesh = ParsePly(bytes);
   if (mesh.ok()) return mesh;
   return absl::InvalidArgumentError(Concat(path, ": ", mesh.status().message()));
+}
+
+StatusOr<std::shared_ptr<const Picture>> PbrtParser::ReadImage(const std::string& path,
+                                                               const PixelEncoding& encoding) {
+  const auto [first, last] = pictures_.equal_range(path);
+  for (auto known = first; known != last; ++known) {
+    if (known->second.encoding == encoding) return known->second.picture;
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadCounted(path));
+  StatusOr<Picture> picture =
+      ReadPicture(bytes, path, encoding, limits_.max_picture_bytes - picture_bytes_);
+  if (!picture.ok()) {
+    return Status(picture.status().code(), Concat(path, ": ", picture.status().message()));
+  }
+  picture_bytes_ += SizeBytes(*picture);
+  auto shared = std::make_shared<const Picture>(*std::move(picture));
+  pictures_.emplace(path, KnownPicture{encoding, shared});
+  return shared;
 }
 
 void PbrtParser::ParseFile(const std::string& path, const Place& place) {
@@ -674,12 +707,13 @@ bool PbrtParser::DoAttribute() {
   if (target == "shape") known = kShapeTarget;
   if (target == "light") known = kLightTarget;
   if (target == "material") known = kMaterialTarget;
+  if (target == "texture") known = kTextureTarget;
   if (!known.has_value()) {
-    if (target != "medium" && target != "texture") {
+    if (target != "medium") {
       Error(Concat("Attribute takes shape, light, material, medium or texture, not ",
                    Quoted(target)));
     }
-    return true;  // media and textures are refused where they are made
+    return true;  // media are refused where they are made
   }
   // The newest first: of two defaults of one name the later counts.
   auto all = std::make_shared<std::vector<Parameter>>(std::move(parameters));
@@ -863,7 +897,7 @@ bool PbrtParser::DoMaterial() {
   if (IsPbrtV3Material(type)) return RefusePbrtV3();
   ParameterList list = ListFor(type, std::move(parameters), state_.defaults[kMaterialTarget]);
   state_.material = static_cast<std::int32_t>(scene_.materials.size());
-  scene_.materials.push_back(MakeMaterial(type, list));
+  scene_.materials.push_back(MakeMaterial(type, list, textures_));
   return true;
 }
 
@@ -893,12 +927,12 @@ bool PbrtParser::DoMakeNamedMaterial() {
   }
   Material material;
   if (*type == "diffuse" || *type == "conductor" || *type == "dielectric") {
-    material = MakeMaterial(*type, list);
+    material = MakeMaterial(*type, list, textures_);
   } else {
     // Names the type, which the subject of the list does not.
     ParameterList unsupported(Concat("the type ", Quoted(*type), " of ", list.subject()), place_,
                               {}, nullptr, diagnostics_);
-    material = MakeMaterial(*type, unsupported);
+    material = MakeMaterial(*type, unsupported, textures_);
   }
   material.name = name;
   scene_.materials[static_cast<std::size_t>(named.index)] = std::move(material);
@@ -936,7 +970,7 @@ bool PbrtParser::DoLightSource() {
   std::vector<Parameter> parameters;
   if (!ReadTyped(type, parameters)) return false;
   ParameterList list = ListFor(type, std::move(parameters), state_.defaults[kLightTarget]);
-  AddLight(type, list, state_.to_world, scene_);
+  AddLight(type, list, state_.to_world, ImageReader(), scene_);
   return true;
 }
 
@@ -999,8 +1033,27 @@ bool PbrtParser::DoTexture() {
       !ReadParameters(parameters)) {
     return false;
   }
-  Error(Concat("Texture ", Quoted(name), ": textures are not supported; give materials a ",
-               "constant colour"));
+  if (kind == "float") {
+    // Nothing here takes one: a parameter that refers to it is refused, whatever it is.
+    if (!float_textures_.insert(name).second) {
+      Error(Concat("the float texture ", Quoted(name), " is defined twice"));
+    }
+    return true;
+  }
+  if (kind == "color") return RefusePbrtV3();
+  if (kind != "spectrum") {
+    Error(Concat("Texture ", Quoted(name), " must be of spectrum or float, not ", Quoted(kind)));
+    return true;
+  }
+  if (textures_.contains(name)) {
+    Error(Concat("the texture ", Quoted(name), " is defined twice"));
+    return true;
+  }
+  ParameterList list(Concat("Texture ", Quoted(name)), place_, std::move(parameters),
+                     state_.defaults[kTextureTarget].get(), diagnostics_);
+  // Made first: a texture may not be a part of itself.
+  NamedTexture made = MakeTexture(type, list, textures_, ImageReader(), scene_.textures);
+  textures_.emplace(name, std::move(made));
   return true;
 }
 
@@ -1039,6 +1092,13 @@ void PbrtParser::Finish() {
   scene_.film.exposure *= exposure_time_s_;
   // After another error, what is missing may only have been skipped.
   if (diagnostics_.has_error()) return;
+  for (const TriangleMesh& mesh : scene_.meshes) {
+    const Material& material = scene_.materials[static_cast<std::size_t>(mesh.traits.material)];
+    if (mesh.uvs.empty() && material.texture != kNoTexture) {
+      diagnostics_.Warning(whole,
+                           "a mesh with a texture has no uv: every triangle shows half of it");
+    }
+  }
   if (!in_world_) diagnostics_.Error(whole, "the scene has no WorldBegin");
   if (!has_camera_) diagnostics_.Error(whole, "the scene has no camera");
   if (scene_.meshes.empty() && scene_.spheres.empty() && scene_.disks.empty()) {

@@ -21,6 +21,7 @@ constexpr double kPi = std::numbers::pi;
 
 constexpr std::array<std::string_view, 2> kPointTypes = {"point3", "point"};
 constexpr std::array<std::string_view, 2> kNormalTypes = {"normal", "normal3"};
+constexpr std::array<std::string_view, 4> kPoint2Types = {"point2", "vector2", "point", "float"};
 constexpr std::array<std::string_view, 1> kIntegerType = {"integer"};
 
 std::vector<Vec3> Triples(std::span<const double> numbers) {
@@ -116,8 +117,13 @@ void AddTriangleMesh(ParameterList& parameters, const ShapePlacement& placement,
   mesh.positions = Triples(parameters.Numbers("P", kPointTypes, 3));
   mesh.normals = Triples(parameters.Numbers("N", kNormalTypes, 3));
   const std::span<const double> indices = parameters.Numbers("indices", kIntegerType, 3);
-  for (const std::string_view name : {"uv", "S", "faceIndices"})
+  for (const std::string_view name : {"S", "faceIndices"})
     parameters.Ignore(name);
+  const std::string_view uv_name = parameters.Has("uv") ? "uv" : "st";
+  const std::span<const double> uvs = parameters.Numbers(uv_name, kPoint2Types, 2);
+  for (std::size_t i = 0; i + 1 < uvs.size(); i += 2) {
+    mesh.uvs.push_back({static_cast<float>(uvs[i]), static_cast<float>(uvs[i + 1])});
+  }
   if (mesh.positions.empty()) {
     if (!parameters.Has("P")) parameters.Error("needs vertex positions: \"point3 P\" [ ... ]");
     return;
@@ -125,6 +131,11 @@ void AddTriangleMesh(ParameterList& parameters, const ShapePlacement& placement,
   if (!mesh.normals.empty() && mesh.normals.size() != mesh.positions.size()) {
     parameters.Error("N", Concat("must have as many normals as P has vertices (",
                                  mesh.positions.size(), "), not ", mesh.normals.size()));
+    return;
+  }
+  if (!mesh.uvs.empty() && mesh.uvs.size() != mesh.positions.size()) {
+    parameters.Error(uv_name, Concat("must have as many pairs as P has vertices (",
+                                     mesh.positions.size(), "), not ", mesh.uvs.size()));
     return;
   }
   if (!parameters.Has("indices") && mesh.positions.size() == 3) {
@@ -185,6 +196,7 @@ void AddSphere(ParameterList& parameters, const ShapePlacement& placement, Shape
   sphere.radius = static_cast<float>(radius * *scale);
   sphere.inward = placement.reverse_orientation;
   sphere.traits = placement.traits;
+  sphere.axes = AxesOf(placement.to_world).value_or(ShapeAxes());
   if (!IsFinite(sphere.center) || !(sphere.radius >= FLT_MIN) || !std::isfinite(sphere.radius)) {
     parameters.Error("is moved or scaled out of single precision by its transform");
     return;
@@ -218,6 +230,7 @@ void AddDisk(ParameterList& parameters, const ShapePlacement& placement, ShapeSe
   disk.radius = static_cast<float>(radius * *scale);
   disk.inner_radius = static_cast<float>(inner_radius * *scale);
   disk.traits = placement.traits;
+  disk.axes = AxesOf(placement.to_world).value_or(ShapeAxes());
   if (!IsFinite(disk.center) || !(disk.radius >= FLT_MIN) || !std::isfinite(disk.radius)) {
     parameters.Error("is moved or scaled out of single precision by its transform");
     return;
@@ -298,9 +311,15 @@ StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world
         "which is not supported");
   }
   const auto factor = static_cast<float>(*scale);
+  const ShapeAxes turned = AxesOf(to_world).value_or(ShapeAxes());
+  const auto in_world = [&](Vec3 v) { return turned.x * v.x + turned.y * v.y + turned.z * v.z; };
+  const auto axes_in_world = [&](const ShapeAxes& axes) {
+    return ShapeAxes{in_world(axes.x), in_world(axes.y), in_world(axes.z)};
+  };
   for (Sphere sphere : object.spheres) {
     sphere.center = to_world.Point(sphere.center);
     sphere.radius *= factor;
+    sphere.axes = axes_in_world(sphere.axes);
     if (!IsFinite(sphere.center) || !(sphere.radius >= FLT_MIN) || !std::isfinite(sphere.radius)) {
       return moved_away;
     }
@@ -310,6 +329,7 @@ StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world
     disk.center = to_world.Point(disk.center);
     disk.normal = Normalize(to_world.Normal(disk.normal));
     disk.radius *= factor;
+    disk.axes = axes_in_world(disk.axes);
     disk.inner_radius *= factor;
     if (!IsFinite(disk.center) || !(disk.radius >= FLT_MIN) || !std::isfinite(disk.radius)) {
       return moved_away;

@@ -276,10 +276,11 @@ Status Broken(const Body& body, const Element& element, std::uint64_t index) {
 }
 
 Status ReadVertices(Body& body, Format format, const Element& element, TriangleMesh& mesh) {
-  constexpr std::array<std::string_view, 6> kColumns = {"x", "y", "z", "nx", "ny", "nz"};
+  constexpr std::array<std::string_view, 10> kColumns = {"x",  "y", "z", "nx", "ny",
+                                                         "nz", "u", "v", "s",  "t"};
   // Where each property goes: one of kColumns, or nowhere.
   std::vector<std::size_t> column_of(element.properties.size(), kColumns.size());
-  std::array<bool, 6> is_there{};
+  std::array<bool, kColumns.size()> is_there{};
   for (std::size_t i = 0; i < element.properties.size(); ++i) {
     for (std::size_t column = 0; column < kColumns.size(); ++column) {
       if (element.properties[i].name != kColumns[column] || element.properties[i].is_list) continue;
@@ -289,10 +290,13 @@ Status ReadVertices(Body& body, Format format, const Element& element, TriangleM
   }
   if (!(is_there[0] && is_there[1] && is_there[2])) return Bad("its vertices have no x, y and z");
   const bool has_normals = is_there[3] && is_there[4] && is_there[5];
+  const bool has_uv = is_there[6] && is_there[7];
+  const bool has_st = is_there[8] && is_there[9];
   mesh.positions.resize(element.count);
+  if (has_uv || has_st) mesh.uvs.resize(element.count);
   if (has_normals) mesh.normals.resize(element.count);
   for (std::uint64_t vertex = 0; vertex < element.count; ++vertex) {
-    std::array<float, 7> value{};  // the last takes what goes nowhere
+    std::array<float, kColumns.size() + 1> value{};  // the last takes what goes nowhere
     for (std::size_t i = 0; i < element.properties.size(); ++i) {
       const Property& property = element.properties[i];
       if (property.is_list) {
@@ -309,6 +313,10 @@ Status ReadVertices(Body& body, Format format, const Element& element, TriangleM
     if (has_normals) {
       const Vec3 normal = {value[3], value[4], value[5]};
       mesh.normals[vertex] = IsFinite(normal) ? normal : Vec3();
+    }
+    if (has_uv || has_st) {
+      const Vec2 uv = has_uv ? Vec2{value[6], value[7]} : Vec2{value[8], value[9]};
+      mesh.uvs[vertex] = std::isfinite(uv.x) && std::isfinite(uv.y) ? uv : Vec2();
     }
   }
   return absl::OkStatus();

@@ -9,15 +9,20 @@
 // radiance [W·m⁻²·sr⁻¹] in linear Rec. 709.
 //
 // Invariants, which the parser guarantees and everything above relies on
-//   S1  Every position, normal, transform and colour is finite.
-//   S2  Every index is in range: triangle -> vertex, shape -> material, shape -> area light.
+//   S1  Every position, normal, texture coordinate, transform, colour and pixel is finite.
+//   S2  Every index is in range: triangle -> vertex, shape -> material, shape -> area light,
+//       material -> texture; a texture is made of textures before it. A texture that needs a
+//       picture has one, and the picture of an infinite light is square.
 //   S3  Normals are unit length or zero (zero: use the geometric normal).
-//   S4  Reflectances are in [0, 1]; emitted quantities are >= 0.
+//   S4  Reflectances are in [0, 1], those of textures once they are looked up; emitted quantities,
+//       pixels and scales of textures are >= 0.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,6 +30,7 @@
 #include "render/math/rgb.h"
 #include "render/math/transform.h"
 #include "render/math/vector.h"
+#include "render/scene/texture.h"
 
 namespace lucerna {
 
@@ -39,10 +45,19 @@ struct Material {
   float ior = 1.5F;                      // dielectric: inside over outside
   float alpha_u = 0;                     // conductor, dielectric: GGX widths; 0 and 0 = smooth
   float alpha_v = 0;
+  // In place of the reflectance of a diffuse surface, and of a conductor's eta and k.
+  std::int32_t texture = kNoTexture;
   std::string name;  // for messages and the plan
 
   bool operator==(const Material&) const = default;
 };
+
+// A conductor given by its reflectance at right angles has eta = 1 and this k, capped as in
+// pbrt-v4.
+[[nodiscard]] inline float AbsorptionFor(float reflectance) {
+  const float capped = std::min(reflectance, 0.9999F);
+  return 2 * std::sqrt(capped) / std::sqrt(1 - capped);
+}
 
 // Emission of the surface of a shape.
 struct AreaLight {
@@ -71,7 +86,15 @@ struct TriangleMesh {
   std::vector<Vec3> positions;         // [vertices]
   std::vector<std::uint32_t> indices;  // [triangles × 3]
   std::vector<Vec3> normals;           // [vertices] or empty: shading normals
+  // [vertices], or empty: the corners of each triangle, as it is wound, are (0, 0), (1, 0), (1, 1).
+  std::vector<Vec2> uvs;
   ShapeTraits traits;
+};
+
+// Where the axes of a shape's own space point in the world: unit, at right angles. The texture
+// coordinate u of spheres and disks grows from x to y.
+struct ShapeAxes {
+  Vec3 x = {1, 0, 0}, y = {0, 1, 0}, z = {0, 0, 1};
 };
 
 struct Sphere {
@@ -79,6 +102,7 @@ struct Sphere {
   float radius = 1;     // > 0
   bool inward = false;  // the outward normal points to the centre
   ShapeTraits traits;
+  ShapeAxes axes = {};
 };
 
 struct Disk {
@@ -87,6 +111,7 @@ struct Disk {
   float radius = 1;
   float inner_radius = 0;
   ShapeTraits traits;
+  ShapeAxes axes = {};
 };
 
 struct PointLight {
@@ -109,9 +134,13 @@ struct DistantLight {
   Rgb irradiance;  // [W·m⁻²] on a plane facing it
 };
 
-// The same radiance from everywhere that no shape covers. Several of them add up.
+// Light from everywhere that no shape covers. Several of them add up.
 struct InfiniteLight {
-  Rgb radiance;
+  Rgb radiance;  // the same everywhere, or what the pixels of `map` are multiplied by
+  // A square: its equal-area octahedral map to the sphere of directions is that of
+  // math/equal_area_square.h, each pixel an even patch. Row 0 is v = 0.
+  std::shared_ptr<const Picture> map = nullptr;
+  ShapeAxes axes = {};  // of the map, in the world
 };
 
 // A rectangle, from left to right and from bottom to top of the image.
@@ -168,6 +197,7 @@ struct Scene {
   std::vector<Sphere> spheres;
   std::vector<Disk> disks;
   std::vector<Material> materials;
+  std::vector<Texture> textures;
   std::vector<AreaLight> area_lights;
   std::vector<PointLight> point_lights;
   std::vector<SpotLight> spot_lights;

@@ -8,6 +8,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,14 +17,35 @@
 
 #include "render/base/status.h"
 #include "render/math/transform.h"
+#include "render/scene/image_file.h"
 #include "render/scene/parameter_list.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
 
+// The spectrum textures that a text has declared, by name.
+struct NamedTexture {
+  std::int32_t number = kNoTexture;  // in Scene::textures
+  std::string why_not;               // when it has no number
+  float largest = 1;                 // no channel is larger anywhere
+  int depth = 1;                     // of textures made of textures
+};
+using TextureNames = std::map<std::string, NamedTexture>;
+
+// Reads the file that an imagemap or an infinite light names; the parser counts what it reads.
+using PictureReader = std::function<StatusOr<std::shared_ptr<const Picture>>(
+    const std::string& file, const PixelEncoding& encoding)>;
+
+// A spectrum texture of `type`; appends to `textures` what it is made of. One that is of an
+// unsupported type is an error only where something uses it.
+[[nodiscard]] NamedTexture MakeTexture(std::string_view type, ParameterList& parameters,
+                                       const TextureNames& names, const PictureReader& read_picture,
+                                       std::vector<Texture>& textures);
+
 // True for the types of material that pbrt-v3 had and pbrt-v4 renamed.
 [[nodiscard]] bool IsPbrtV3Material(std::string_view type);
-[[nodiscard]] Material MakeMaterial(std::string_view type, ParameterList& parameters);
+[[nodiscard]] Material MakeMaterial(std::string_view type, ParameterList& parameters,
+                                    const TextureNames& names);
 
 // An AreaLightSource: what it makes of a shape depends on the shape's area when a power is given.
 struct AreaEmission {
@@ -35,7 +58,10 @@ struct AreaEmission {
 
 // A LightSource, with the transform from its space to the world.
 void AddLight(std::string_view type, ParameterList& parameters, const Transform& to_world,
-              Scene& scene);
+              const PictureReader& read_picture, Scene& scene);
+
+// Where the axes of a space point. Errors: INVALID_ARGUMENT when it is stretched.
+[[nodiscard]] StatusOr<ShapeAxes> AxesOf(const Transform& to_world);
 
 // Shapes in world space, or in the space of an object that is instanced later. Their traits are
 // those of the Shape directive that made them.

@@ -1,8 +1,8 @@
 // Where does a scene's text come from?
 //
-// A scene is the closure of its main file over Include, Import and meshes. The parser reads all
-// of them through SceneFiles, by logical path, so the same parse runs on the user's disk and on
-// bytes that came over the wire; and what it read is the scene's manifest.
+// A scene is the closure of its main file over Include, Import, meshes and pictures. The parser
+// reads all of them through SceneFiles, by logical path, so the same parse runs on the user's disk
+// and on bytes that came over the wire; and what it read is the scene's manifest.
 //
 // A logical path is relative, uses '/' only, and has no "..", ".", empty or control-character
 // component. It is relative to the folder of the main file.
@@ -40,7 +40,8 @@ struct SceneLimits {
   std::uint64_t max_files = 20'000;
   std::uint64_t max_total_bytes = std::uint64_t{8} << 30;
   int max_include_depth = 32;
-  std::uint64_t max_triangles = 400'000'000;  // after instances are laid out
+  std::uint64_t max_triangles = 400'000'000;                 // after instances are laid out
+  std::uint64_t max_picture_bytes = std::uint64_t{8} << 30;  // of all pixels in memory
 };
 
 // Errors: INVALID_ARGUMENT with the reason when `path` is not a logical path.

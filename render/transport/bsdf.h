@@ -52,9 +52,11 @@ inline constexpr float kGatherAlpha = 0.2F;
 // what is seen through frosted glass has passed two of them.
 inline constexpr float kGatherAlphaDielectric = 0.5F;
 
-// Where eye paths stop and photons are kept. Black surfaces need none.
+// Where eye paths stop and photons are kept. Black surfaces need none. What a metal with a texture
+// reflects depends on the place, which hitpoints do not tell the workers: there, paths go on.
 [[nodiscard]] constexpr bool Gathers(const Material& material) {
   if (material.kind == Material::Kind::kDiffuse) return !IsBlack(material.reflectance);
+  if (material.texture != kNoTexture) return false;
   return std::max(material.alpha_u, material.alpha_v) >=
          (material.kind == Material::Kind::kConductor ? kGatherAlpha : kGatherAlphaDielectric);
 }

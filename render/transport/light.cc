@@ -107,14 +107,30 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     emitter.power = emitter.radiance * (kPi * radius_ * radius_);
     Add(emitter);
   }
-  for (const InfiniteLight& light : scene.infinite_lights)
-    infinite_radiance_ += light.radiance;
+  for (const InfiniteLight& light : scene.infinite_lights) {
+    if (light.map == nullptr) {
+      infinite_radiance_ += light.radiance;
+      continue;
+    }
+    EnvironmentMap environment(light);
+    if (!IsBlack(environment.MeanRadiance())) environments_.push_back(std::move(environment));
+  }
   if (!IsBlack(infinite_radiance_)) {
     only_delta_ = false;
     infinite_emitter_ = static_cast<std::int64_t>(emitters_.size());
     Emitter emitter;
     emitter.kind = Kind::kInfinite;
     emitter.radiance = infinite_radiance_;
+    emitter.power = emitter.radiance * (4 * kPi * kPi * radius_ * radius_);
+    Add(emitter);
+  }
+  first_environment_ = emitters_.size();
+  for (std::uint32_t i = 0; i < environments_.size(); ++i) {
+    only_delta_ = false;
+    Emitter emitter;
+    emitter.kind = Kind::kEnvironment;
+    emitter.primitive = i;
+    emitter.radiance = environments_[i].MeanRadiance();
     emitter.power = emitter.radiance * (4 * kPi * kPi * radius_ * radius_);
     Add(emitter);
   }
@@ -243,6 +259,18 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
       emission.ray.direction = direction;
       return true;
     }
+    case Kind::kEnvironment: {
+      const EnvironmentMap& sky = environments_[emitter.primitive];
+      const Vec3 towards = sky.Sample(u_direction1, u_direction2);
+      const float pdf = sky.PdfSolidAngle(towards);
+      if (!(pdf > 0)) return false;
+      const Frame frame(-towards);
+      const Vec3 disk = SquareToDisk(u_place1, u_place2) * radius_;
+      emission.ray.origin = center_ + towards * radius_ + frame.s * disk.x + frame.t * disk.y;
+      emission.ray.direction = -towards;
+      emission.flux = sky.Radiance(towards) * (kPi * radius_ * radius_ / (pdf * emitter.choice));
+      return true;
+    }
     case Kind::kInfinite: {
       const Vec3 direction = SquareToSphere(u_direction1, u_direction2);
       const Frame frame(direction);
@@ -318,10 +346,14 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
       sample.pdf = 0;
       return true;
     case Kind::kInfinite:
-      sample.wi = SquareToSphere(u1, u2);
+    case Kind::kEnvironment:
+      sample.wi = emitter.kind == Kind::kInfinite ? SquareToSphere(u1, u2)
+                                                  : environments_[emitter.primitive].Sample(u1, u2);
       sample.is_distant = true;
-      sample.pdf = emitter.choice / (4 * kPi);
-      sample.radiance_over_pdf = emitter.radiance / sample.pdf;
+      // Whichever drew it, light from this direction is that of all infinite lights.
+      sample.pdf = PdfDirectInfinite(sample.wi);
+      if (!(sample.pdf > 0)) return false;
+      sample.radiance_over_pdf = InfiniteRadiance(sample.wi) / sample.pdf;
       return true;
     default:
       break;
@@ -384,9 +416,23 @@ float LightSet::PdfDirect(Vec3 from, const SurfacePoint& point) const {
   return emitter->choice * distance2 / (cosine * emitter->area);
 }
 
-float LightSet::PdfDirectInfinite() const {
-  if (infinite_emitter_ < 0 || emitters_.empty()) return 0;
-  return emitters_[static_cast<std::size_t>(infinite_emitter_)].choice / (4 * kPi);
+Rgb LightSet::InfiniteRadiance(Vec3 direction) const {
+  Rgb radiance = infinite_radiance_;
+  for (const EnvironmentMap& sky : environments_)
+    radiance += sky.Radiance(direction);
+  return radiance;
+}
+
+float LightSet::PdfDirectInfinite(Vec3 direction) const {
+  if (emitters_.empty()) return 0;
+  float pdf = 0;
+  if (infinite_emitter_ >= 0) {
+    pdf = emitters_[static_cast<std::size_t>(infinite_emitter_)].choice / (4 * kPi);
+  }
+  for (std::size_t i = 0; i < environments_.size(); ++i) {
+    pdf += emitters_[first_environment_ + i].choice * environments_[i].PdfSolidAngle(direction);
+  }
+  return pdf;
 }
 
 }  // namespace lucerna

@@ -11,6 +11,7 @@
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
+#include "render/transport/environment_map.h"
 
 namespace lucerna {
 
@@ -28,13 +29,14 @@ enum class EmitterKind : std::uint8_t {
   kPoint,
   kSpot,
   kDistant,
-  kInfinite
+  kInfinite,    // the same from everywhere
+  kEnvironment  // a map
 };
 
 struct Emitter {
   EmitterKind kind = EmitterKind::kPoint;
   std::uint32_t geometry = 0;   // kTriangle: the mesh
-  std::uint32_t primitive = 0;  // triangle, sphere, disk, or index among lights of its kind
+  std::uint32_t primitive = 0;  // triangle, sphere, disk, or index among lights or maps
   bool two_sided = false;
   float area = 0;
   float choice = 0;  // probability
@@ -82,9 +84,11 @@ class LightSet {
   // [choice × sr⁻¹].
   [[nodiscard]] float PdfDirect(Vec3 from, const SurfacePoint& point) const;
 
-  // Radiance from where no shape is.
-  [[nodiscard]] Rgb InfiniteRadiance() const { return infinite_radiance_; }
-  [[nodiscard]] float PdfDirectInfinite() const;
+  // Radiance of all infinite lights from a direction in which no shape is.
+  [[nodiscard]] Rgb InfiniteRadiance(Vec3 direction) const;
+  // The density with which SampleDirect draws a direction by any of them [choice × sr⁻¹].
+  [[nodiscard]] float PdfDirectInfinite(Vec3 direction) const;
+  [[nodiscard]] const std::vector<EnvironmentMap>& environments() const { return environments_; }
 
  private:
   using Kind = EmitterKind;
@@ -104,8 +108,10 @@ class LightSet {
   std::vector<std::int64_t> first_emitter_;
   std::vector<std::int32_t> sphere_emitter_, disk_emitter_;
   Rgb total_power_;
-  Rgb infinite_radiance_;
+  Rgb infinite_radiance_;  // of the constant ones
   std::int64_t infinite_emitter_ = -1;
+  std::vector<EnvironmentMap> environments_;  // those that are not black
+  std::size_t first_environment_ = 0;         // emitter of the first
   bool only_delta_ = true;
 };
 

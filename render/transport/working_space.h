@@ -6,7 +6,8 @@
 namespace lucerna {
 
 // `scene` with every reflectance and every light in the working space (math/color_space.h). The
-// indices of metals stay as they are: their reflectance is converted where it is computed.
+// indices of metals and all pixels stay as they are: what follows from them is converted where it
+// is computed.
 [[nodiscard]] Scene InWorkingSpace(Scene scene);
 
 }  // namespace lucerna

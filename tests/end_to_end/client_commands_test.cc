@@ -16,7 +16,7 @@
 
 #include "client/local_cluster.h"
 #include "render/base/files.h"
-#include "render/film/exr_file.h"
+#include "render/image/exr_file.h"
 
 namespace lucerna {
 namespace {

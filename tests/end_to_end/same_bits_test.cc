@@ -71,6 +71,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, SameBitsTest,
                          testing::Values(Case{"glass-box.pbrt", "ppm"},
                                          Case{"rough-metal.pbrt", "ppm"},
                                          Case{"rough-metal.pbrt", "cppm"},
+                                         Case{"textured.pbrt", "frequency-mse"},
                                          Case{"glass-box.pbrt", "frequency-mse"}));
 
 }  // namespace

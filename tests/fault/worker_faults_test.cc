@@ -17,7 +17,7 @@
 #include "proto/lucerna/v1/jobs.grpc.pb.h"
 #include "proto/lucerna/v1/work.grpc.pb.h"
 #include "render/base/files.h"
-#include "render/film/exr_file.h"
+#include "render/image/exr_file.h"
 #include "render/scene/pbrt_parser.h"
 #include "render/scene/scene_files.h"
 #include "render/wire/channel.h"

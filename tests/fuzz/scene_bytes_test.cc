@@ -1,5 +1,5 @@
-// Whatever the bytes of a scene or a mesh are, reading them ends, in bounded memory, with a sound
-// value or with errors that name a place. The bad files of corpus/ stay refused.
+// Whatever the bytes of a scene, a mesh or an image are, reading them ends, in bounded memory, with
+// a sound value or with errors that name a place. The bad files of corpus/ stay refused.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -8,6 +8,7 @@
 #include "gtest/gtest.h"
 
 #include "render/base/files.h"
+#include "render/scene/image_file.h"
 #include "render/scene/pbrt_parser.h"
 #include "render/scene/ply_file.h"
 #include "tests/fuzz/mutation.h"
@@ -32,6 +33,14 @@ std::vector<NamedBytes> FilesOf(const std::string& folder) {
   return files;
 }
 
+std::string BytesOf(const std::string& file) {
+  return ReadFile(std::string(LUCERNA_SOURCE_DIR) + "/tests/" + file).value();
+}
+
+StatusOr<Picture> ReadNamed(const std::string& bytes, const std::string& name) {
+  return ReadPicture(bytes, name, {}, std::uint64_t{1} << 24);
+}
+
 // Every directive and most parameters in one small scene.
 std::string WholeScene() {
   return FilesOf("fuzz/seeds/pbrt").at(0).bytes;
@@ -40,9 +49,12 @@ std::string WholeScene() {
 ParsedScene ParseBytes(const std::string& bytes) {
   MemoryFiles files({{"fuzz.pbrt", bytes},
                      {"part.pbrt", "Shape \"sphere\"\n"},
-                     {"mesh.ply", FilesOf("fuzz/seeds/ply").at(0).bytes}});
+                     {"mesh.ply", FilesOf("fuzz/seeds/ply").at(0).bytes},
+                     {"sky.pfm", BytesOf("fuzz/seeds/image/square.pfm")},
+                     {"tiles.png", BytesOf("fuzz/seeds/image/rgb.png")}});
   SceneLimits limits;
   limits.max_files = 50;
+  limits.max_picture_bytes = 1 << 20;
   limits.max_total_bytes = 1 << 20;
   limits.max_triangles = 10'000;
   return ParsePbrt(files, "fuzz.pbrt", limits);
@@ -64,6 +76,10 @@ TEST(SceneBytesTest, TheSeedsAreGood) {
   for (const NamedBytes& seed : FilesOf("fuzz/seeds/ply")) {
     EXPECT_TRUE(ParsePly(seed.bytes).ok()) << seed.name;
   }
+  for (const NamedBytes& seed : FilesOf("fuzz/seeds/image")) {
+    const StatusOr<Picture> picture = ReadNamed(seed.bytes, seed.name);
+    EXPECT_TRUE(picture.ok()) << seed.name << " " << picture.status();
+  }
 }
 
 TEST(SceneBytesTest, TheCorpusOfBadScenesIsRefused) {
@@ -81,6 +97,41 @@ TEST(SceneBytesTest, TheCorpusOfBadMeshesIsRefused) {
   EXPECT_GE(corpus.size(), 10U);
   for (const NamedBytes& bad : corpus)
     EXPECT_FALSE(ParsePly(bad.bytes).ok()) << bad.name;
+}
+
+TEST(SceneBytesTest, TheCorpusOfBadImagesIsRefused) {
+  const std::vector<NamedBytes> corpus = FilesOf("fuzz/corpus/image");
+  EXPECT_GE(corpus.size(), 10U);
+  for (const NamedBytes& bad : corpus)
+    EXPECT_FALSE(ReadNamed(bad.bytes, bad.name).ok()) << bad.name;
+}
+
+TEST(SceneBytesTest, AnImageCutOffAnywhereIsRefused) {
+  for (const NamedBytes& seed : FilesOf("fuzz/seeds/image")) {
+    // The checksum of a PNG's last chunk is not asked for.
+    const std::size_t enough = seed.bytes.size() - (seed.name.ends_with(".png") ? 4 : 0);
+    for (std::size_t size = 0; size < enough; ++size) {
+      EXPECT_FALSE(ReadNamed(seed.bytes.substr(0, size), seed.name).ok()) << seed.name << size;
+    }
+  }
+}
+
+TEST(SceneBytesTest, MutatedImagesAreSoundOrRefused) {
+  int accepted = 0;
+  for (const NamedBytes& seed : FilesOf("fuzz/seeds/image")) {
+    for (std::uint64_t key = 0; key < 10'000; ++key) {
+      const std::string bytes = Mutated(seed.bytes, key);
+      const StatusOr<Picture> picture = ReadNamed(bytes, seed.name);
+      if (!picture.ok()) continue;
+      ++accepted;
+      ASSERT_TRUE(PictureIsSound(*picture)) << seed.name << " " << key;
+      // The same bytes give the same pixels: none come from elsewhere in memory.
+      const StatusOr<Picture> again = ReadNamed(bytes, seed.name);
+      ASSERT_TRUE(again.ok() && again->coded == picture->coded && again->linear == picture->linear)
+          << seed.name << " " << key;
+    }
+  }
+  EXPECT_GT(accepted, 1000);
 }
 
 TEST(SceneBytesTest, ASceneCutOffAnywhereIsSoundOrRefused) {

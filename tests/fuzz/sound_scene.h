@@ -1,4 +1,4 @@
-// Does a scene keep the invariants S1 to S4 of render/scene/scene.h?
+// Does a scene, and do its pictures, keep the invariants S1 to S4 of render/scene/scene.h?
 #pragma once
 
 #include <cmath>
@@ -7,6 +7,18 @@
 #include "render/scene/scene.h"
 
 namespace lucerna {
+
+[[nodiscard]] inline bool PictureIsSound(const Picture& picture) {
+  const auto values = static_cast<std::size_t>(picture.width) *
+                      static_cast<std::size_t>(picture.height) *
+                      static_cast<std::size_t>(picture.channels);
+  for (const float value : picture.linear) {
+    if (!(value >= 0) || !std::isfinite(value)) return false;
+  }
+  return values > 0 && (picture.channels == 1 || picture.channels == 3) &&
+         picture.coded.size() + picture.linear.size() == values &&
+         (picture.coded.empty() || picture.linear.empty());
+}
 
 // Empty when it does, else the first thing that is wrong.
 [[nodiscard]] inline std::string WhatIsUnsound(const Scene& scene) {
@@ -28,6 +40,10 @@ namespace lucerna {
       if (!IsFinite(position)) return "a position";
     }
     if (!mesh.normals.empty() && mesh.normals.size() != mesh.positions.size()) return "normals";
+    if (!mesh.uvs.empty() && mesh.uvs.size() != mesh.positions.size()) return "uvs";
+    for (const Vec2 uv : mesh.uvs) {
+      if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) return "a uv";
+    }
     for (const Vec3 normal : mesh.normals) {
       if (normal != Vec3() && !is_unit(normal)) return "a normal";
     }
@@ -54,6 +70,32 @@ namespace lucerna {
         (material.alpha_u == 0) != (material.alpha_v == 0)) {
       return "a material";
     }
+    if (material.texture < kNoTexture ||
+        material.texture >= static_cast<std::int32_t>(scene.textures.size())) {
+      return "the texture of a material";
+    }
+  }
+  for (std::size_t i = 0; i < scene.textures.size(); ++i) {
+    const Texture& texture = scene.textures[i];
+    const bool is_picture = texture.kind == Texture::Kind::kPicture;
+    if (is_picture && (texture.picture == nullptr || !PictureIsSound(*texture.picture))) {
+      return "the picture of a texture";
+    }
+    const std::size_t parts = texture.kind == Texture::Kind::kScaled         ? 1
+                              : texture.kind == Texture::Kind::kCheckerboard ? 2
+                                                                             : 0;
+    for (std::size_t part = 0; part < parts; ++part) {
+      if (texture.parts[part] < 0 || texture.parts[part] >= static_cast<std::int32_t>(i)) {
+        return "a part of a texture";
+      }
+    }
+    if (!(texture.scale >= 0) || !std::isfinite(texture.scale)) return "the scale of a texture";
+    for (const Vec2 uv : {Vec2{0, 0}, Vec2{0.3F, 17}, Vec2{-3e38F, 3e38F}}) {
+      const Rgb color = TextureColor(scene.textures, static_cast<std::int32_t>(i), uv);
+      for (int c = 0; c < 3; ++c) {
+        if (!(color[c] >= 0 && color[c] <= 1)) return "the colour of a texture";
+      }
+    }
   }
   for (const AreaLight& light : scene.area_lights) {
     if (!is_light(light.radiance)) return "an area light";
@@ -71,6 +113,11 @@ namespace lucerna {
   }
   for (const InfiniteLight& light : scene.infinite_lights) {
     if (!is_light(light.radiance)) return "an infinite light";
+    if (light.map != nullptr &&
+        (light.map->width != light.map->height || !PictureIsSound(*light.map) ||
+         !is_unit(light.axes.x) || !is_unit(light.axes.y) || !is_unit(light.axes.z))) {
+      return "an environment";
+    }
   }
   const FilmSettings& film = scene.film;
   if (!(0 <= film.crop_x0 && film.crop_x0 < film.crop_x1 && film.crop_x1 <= film.width &&

@@ -7,11 +7,13 @@
 // Every bound is also shown to be tight: a result two percent off would have been refused.
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <numbers>
 #include <string>
 
 #include "gtest/gtest.h"
 
+#include "render/math/equal_area_square.h"
 #include "render/math/rng.h"
 #include "render/math/warp.h"
 #include "render/transport/bsdf.h"
@@ -53,6 +55,19 @@ MeasuredMean FurnaceRadiance(float reflectance, int max_depth, KernelKind kernel
   RenderSettings settings = TestSettings(scene, 20000, 0.6, max_depth);
   settings.kernel = kernel;
   return Measure(scene, settings, 4, kParts, "G");
+}
+
+// Eye paths and photons both look the texture up: with the material's own 0.5 it would be 2.
+TEST(FurnaceTest, ReflectsWhatItsTextureSays) {
+  Scene scene = Furnace(0.5F);
+  Texture quarter;
+  quarter.color = Gray(0.25F);
+  Texture board;
+  board.kind = Texture::Kind::kCheckerboard;
+  board.parts = {0, 0};
+  scene.textures = {quarter, board};
+  scene.materials[0].texture = 1;
+  ExpectMean(Measure(scene, TestSettings(scene, 20000, 0.6, 40), 4, kParts, "G"), 4.0 / 3);
 }
 
 TEST(FurnaceTest, AddsUpItsReflections) {
@@ -159,6 +174,40 @@ TEST(IrradianceTest, FromInfinityIsTheClosedForm) {
   sky.infinite_lights.push_back({Gray(1.5F)});
   ExpectMean(Measure(sky, TestSettings(sky, 1, 0.01, 1), 4096, kParts, "direct.G"),
              1.5 * kPiD * albedo_over_pi);
+}
+
+// The same sky as a map, and one that is brighter here than there: drawn from the map and from the
+// surface, and joined.
+TEST(IrradianceTest, FromAnEnvironmentMapIsTheSumOverItsPatches) {
+  constexpr int kSide = 8;
+  for (const bool is_even : {true, false}) {
+    SCOPED_TRACE(is_even);
+    Picture picture;
+    picture.width = picture.height = kSide;
+    picture.channels = 1;
+    for (int i = 0; i < kSide * kSide; ++i)
+      picture.linear.push_back(is_even ? 1.5F : i == 29 ? 20.0F : 0.1F * static_cast<float>(i % 5));
+    double irradiance = 0;
+    constexpr int kLattice = 400 * kSide;
+    for (int y = 0; y < kLattice; ++y) {
+      for (int x = 0; x < kLattice; ++x) {
+        const float cosine =
+            EqualAreaDirection({(static_cast<float>(x) + 0.5F) / kLattice,
+                                (static_cast<float>(y) + 0.5F) / kLattice})
+                .z;
+        if (cosine <= 0) continue;
+        irradiance += static_cast<double>(picture.At(x / 400, y / 400).g * cosine) * 4 * kPiD /
+                      (static_cast<double>(kLattice) * kLattice);
+      }
+    }
+    Scene sky = Floor();
+    InfiniteLight light;
+    light.radiance = Gray(1);
+    light.map = std::make_shared<const Picture>(std::move(picture));
+    sky.infinite_lights.push_back(light);
+    ExpectMean(Measure(sky, TestSettings(sky, 1, 0.01, 1), 4096, kParts, "direct.G"),
+               irradiance * static_cast<double>(kFloorReflectance) / kPiD);
+  }
 }
 
 // The mean of the irradiance under an Epanechnikov kernel of `radius` around the origin.

@@ -12,7 +12,7 @@
 
 #include "gtest/gtest.h"
 #include "render/base/files.h"
-#include "render/film/exr_file.h"
+#include "render/image/exr_file.h"
 #include "render/film/image_metrics.h"
 #include "tests/support/local_render.h"
 

@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "render/base/status.h"
-#include "render/film/image.h"
+#include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "server/job_estimator.h"

@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "render/film/image.h"
+#include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "tests/support/chi_square.h"

@@ -16,13 +16,15 @@ import tempfile
 BELOW = {
     "render/base": [],
     "render/math": ["render/base"],
-    "render/scene": ["render/base", "render/math"],
+    "render/image": ["render/base"],
+    "render/scene": ["render/base", "render/math", "render/image"],
     "render/frequency": ["render/base", "render/math"],
 }
 LINE = ["render/geometry", "render/transport", "render/estimate", "render/film", "render/wire"]
 for number, floor in enumerate(LINE):
     BELOW[floor] = (
-        ["render/base", "render/math", "render/scene", "render/frequency"] + LINE[:number]
+        ["render/base", "render/math", "render/image", "render/scene", "render/frequency"]
+        + LINE[:number]
     )
 for program in ("server", "worker", "client"):
     BELOW[program] = list(BELOW) + ["proto"]
@@ -32,13 +34,13 @@ BELOW["render/wire"].append("proto")
 # Libraries that one place owns: header pattern -> path prefixes that may include it.
 OWNERS = {
     r"embree3/": ["render/geometry/"],
-    r"(Imf|Imath|Iex|OpenEXR/)": ["render/film/exr_file"],
+    r"(Imf|Imath|Iex|OpenEXR/)": ["render/image/exr_file"],
     r"stb": ["render/film/png_file", "render/scene/image_file"],
     r"(google/protobuf|grpcpp|grpc)/": ["render/wire/", "server/", "worker/", "client/"],
     r"zstd\.h": ["render/wire/"],
     r"openssl/": ["render/base/"],
     r"tbb/": ["render/base/parallel"],
-    r"zlib\.h": ["render/scene/"],
+    r"zlib\.h": ["render/scene/", "render/image/"],
     r"sqlite3\.h": ["server/"],
     r"random>?$": [],
 }
@@ -111,6 +113,7 @@ PLANTED = [
     ("worker/a.cc", '#include "client/report.h"'),
     ("render/transport/a.cc", "#include <embree3/rtcore.h>"),
     ("render/film/film.cc", "#include <ImfOutputFile.h>"),
+    ("render/image/a.cc", '#include "render/scene/scene.h"'),
     ("render/scene/a.cc", "#include <google/protobuf/message.h>"),
     ("worker/a.cc", "#include <tbb/parallel_for.h>"),
     ("render/math/a.cc", "#include <random>"),

@@ -1,7 +1,7 @@
 // An image must come back from its EXR bit for bit, the same image must give the same bytes, and
 // bytes that are not a whole EXR must be refused with a Status: no crash, no hang, no memory that
 // only a lying header asked for.
-#include "render/film/exr_file.h"
+#include "render/image/exr_file.h"
 
 #include <bit>
 #include <cmath>

@@ -86,7 +86,7 @@ double PdfToward(const Lit& lit, Vec3 wi) {
   const Ray ray = {{0, 0, 0}, wi, HUGE_VALF};
   Hit hit;
   if (!lit.intersector->Intersect(ray, hit)) {
-    return static_cast<double>(lit.lights.PdfDirectInfinite());
+    return static_cast<double>(lit.lights.PdfDirectInfinite({0, 0, 1}));
   }
   const SurfacePoint surface = lit.intersector->SurfaceAt(ray, hit);
   if (IsBlack(lit.lights.EmittedRadiance(surface, -wi))) return 0;
@@ -132,7 +132,7 @@ TEST(SampleDirectTest, AgreesWithSightPointByPoint) {
       const bool met = lit.intersector->Intersect(ray, hit);
       if (sample.is_distant) {
         if (met) continue;
-        ASSERT_FLOAT_EQ(sample.pdf, lit.lights.PdfDirectInfinite()) << name;
+        ASSERT_FLOAT_EQ(sample.pdf, lit.lights.PdfDirectInfinite(sample.wi)) << name;
         ++compared;
         continue;
       }

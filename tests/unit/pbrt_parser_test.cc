@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <map>
 #include <numbers>
 #include <string>
@@ -18,6 +19,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr float kPi = std::numbers::pi_v<float>;
 
@@ -504,21 +506,143 @@ TEST(PbrtParserTest, OlderDialectsAreRefusedByNameAndByThatAlone) {
   }
 }
 
+// ---- textures and environment maps
+
+// A PFM of grey `value`s, row by row from the bottom.
+std::string GreyPfm(int width, int height, float value) {
+  std::string bytes = "Pf\n" + std::to_string(width) + " " + std::to_string(height) + "\n-1\n";
+  char raw[4];
+  std::memcpy(raw, &value, 4);
+  for (int i = 0; i < width * height; ++i)
+    bytes.append(raw, 4);
+  return bytes;
+}
+
+TEST(PbrtTextureTest, ReadsWhatItIsMadeOf) {
+  const Scene scene = World(
+      "Texture \"a\" \"spectrum\" \"imagemap\" \"string filename\" \"./m/a.pfm\" "
+      "\"string wrap\" \"clamp\" \"float scale\" 2 \"bool invert\" true \"float uscale\" 3 "
+      "\"float vscale\" 4 \"float udelta\" 5 \"float vdelta\" 6 \"string filter\" \"ewa\"\n"
+      "Texture \"again\" \"spectrum\" \"imagemap\" \"string filename\" \"./m/a.pfm\"\n"
+      "Texture \"half\" \"spectrum\" \"scale\" \"texture tex\" \"a\" \"float scale\" 0.5\n"
+      "Texture \"board\" \"spectrum\" \"checkerboard\" \"texture tex1\" \"half\" "
+      "\"rgb tex2\" [0.1 0.2 0.3]\n"
+      "Texture \"flat\" \"spectrum\" \"constant\" \"rgb value\" [0.4 0.5 0.6]\n"
+      "Material \"diffuse\" \"texture reflectance\" \"board\" Shape \"sphere\"\n"
+      "Material \"conductor\" \"texture reflectance\" \"flat\" Shape \"sphere\"",
+      {{"m/a.pfm", GreyPfm(2, 1, 0.25F)}});
+  ASSERT_EQ(scene.textures.size(), 6U);
+  const Texture& a = scene.textures[0];
+  EXPECT_EQ(a.wrap, Texture::Wrap::kClamp);
+  EXPECT_EQ(a.scale, 2);
+  EXPECT_TRUE(a.is_inverted);
+  EXPECT_EQ(a.mapping, (UvMapping{3, 4, 5, 6}));
+  EXPECT_EQ(a.picture, scene.textures[1].picture);  // in memory once
+  const std::int32_t board =
+      scene.materials[static_cast<std::size_t>(scene.spheres[0].traits.material)].texture;
+  EXPECT_EQ(TextureColor(scene.textures, board, {0.5F, 0.5F}), Gray(0.25F));
+  EXPECT_EQ(TextureColor(scene.textures, board, {1.5F, 0.5F}), (Rgb{0.1F, 0.2F, 0.3F}));
+  const Material& metal =
+      scene.materials[static_cast<std::size_t>(scene.spheres[1].traits.material)];
+  EXPECT_EQ(TextureColor(scene.textures, metal.texture, {}), (Rgb{0.4F, 0.5F, 0.6F}));
+}
+
+TEST(PbrtTextureTest, SaysWhereATextureIsWrong) {
+  const auto said = [](const std::string& world) {
+    return Said("Camera \"perspective\" WorldBegin\n" + world, {{"a.pfm", GreyPfm(2, 1, 2)}});
+  };
+  const std::string image = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" ";
+  EXPECT_THAT(said(image + "\"b.pfm\""),
+              HasSubstr("s.pbrt:2:35: error: \"filename\" of Texture \"t\" cannot be read: b.pfm: "
+                        "no such file"));
+  EXPECT_THAT(said(image + "\"s.pbrt\""), HasSubstr("images are read as .png"));
+  EXPECT_THAT(said(image + "\"a.pfm\""), HasSubstr("s.pbrt:2:1: warning: Texture \"t\" is up to 2 "
+                                                   "and is held at 1"));
+  EXPECT_THAT(said(image + "\"a.pfm\" \"string wrap\" \"mirror\""),
+              HasSubstr("must be repeat, clamp or black"));
+  EXPECT_THAT(said(image + "\"a.pfm\" \"string mapping\" \"planar\""), HasSubstr("there is uv"));
+  EXPECT_THAT(said(image + "\"a.pfm\" \"string encoding\" \"gamma x\""),
+              HasSubstr("sRGB, linear or gamma"));
+  EXPECT_THAT(said("Material \"diffuse\" \"texture reflectance\" \"t\""),
+              HasSubstr("s.pbrt:2:20: error: \"reflectance\" of Material \"diffuse\" refers to the "
+                        "spectrum texture \"t\", which is not defined before it"));
+  EXPECT_THAT(said("Texture \"t\" \"spectrum\" \"scale\" \"texture tex\" \"t\""),
+              HasSubstr("not defined before it"));
+  EXPECT_THAT(said(image + "\"a.pfm\" " + image + "\"a.pfm\""), HasSubstr("defined twice"));
+}
+
+// Scenes declare more than they use.
+TEST(PbrtTextureTest, WhatIsNotSupportedIsRefusedOnlyWhereItIsUsed) {
+  const std::string declared =
+      "Texture \"f\" \"float\" \"imagemap\" \"string filename\" \"none.png\"\n"
+      "Texture \"m\" \"spectrum\" \"marble\"\n";
+  EXPECT_THAT(SaidOfWorld(declared), Not(HasSubstr("error")));
+  EXPECT_THAT(SaidOfWorld(declared + "Material \"diffuse\" \"texture reflectance\" \"m\""),
+              HasSubstr("s.pbrt:4:20: error: \"reflectance\" of Material \"diffuse\" refers to a "
+                        "texture of type \"marble\""));
+  const std::string float_used =
+      SaidOfWorld(declared + "Material \"conductor\" \"texture roughness\" \"f\"");
+  EXPECT_THAT(float_used,
+              HasSubstr("s.pbrt:4:22: error: \"roughness\" of Material \"conductor\" is "
+                        "a texture"));
+  EXPECT_EQ(std::count(float_used.begin(), float_used.end(), '\n'), 1);
+}
+
+TEST(PbrtTextureTest, PicturesTakeNoMoreMemoryThanTheLimit) {
+  SceneLimits limits;
+  limits.max_picture_bytes = 40;
+  EXPECT_THAT(
+      Said("Camera \"perspective\" WorldBegin\n"
+           "Texture \"a\" \"spectrum\" \"imagemap\" \"string filename\" \"a.pfm\"\n"
+           "Texture \"b\" \"spectrum\" \"imagemap\" \"string filename\" \"b.pfm\"\n",
+           {{"a.pfm", GreyPfm(4, 2, 1)}, {"b.pfm", GreyPfm(3, 1, 1)}}, limits),
+      HasSubstr("s.pbrt:3:35: error: \"filename\" of Texture \"b\" cannot be read: b.pfm: the "
+                "image would take 12 bytes of memory, and 8 are left"));
+}
+
+TEST(PbrtParserTest, EnvironmentMapsAreSquareAndPlaced) {
+  const std::map<std::string, std::string> files = {{"sky.pfm", GreyPfm(4, 4, 3)},
+                                                    {"wide.pfm", GreyPfm(4, 2, 3)}};
+  const Scene scene = World(
+      "Rotate 90 0 0 1 Scale 2 2 2 LightSource \"infinite\" \"string filename\" \"sky.pfm\" "
+      "\"float scale\" 0.5",
+      files);
+  ASSERT_EQ(scene.infinite_lights.size(), 1U);
+  EXPECT_EQ(scene.infinite_lights[0].map->width, 4);
+  EXPECT_EQ(scene.infinite_lights[0].radiance, Gray(0.5F));
+  ExpectNear(scene.infinite_lights[0].axes.x, {0, 1, 0});
+  ExpectNear(scene.infinite_lights[0].axes.y, {-1, 0, 0});
+  // As bright as a constant light of that illuminance: 3 times the scale is 1 / pi.
+  const Scene lux = World(
+      "LightSource \"infinite\" \"string filename\" \"sky.pfm\" \"float illuminance\" 1", files);
+  EXPECT_NEAR(lux.infinite_lights[0].radiance.g * 3 * kPi, 1, 1e-2);
+
+  const auto said = [&](const std::string& world) {
+    return Said("Camera \"perspective\" WorldBegin\n" + world, files);
+  };
+  EXPECT_THAT(
+      said("LightSource \"infinite\" \"string filename\" \"wide.pfm\""),
+      HasSubstr("s.pbrt:2:24: error: \"filename\" of LightSource \"infinite\" has 4 x 2 pixels"));
+  EXPECT_THAT(said("Scale 1 2 1 LightSource \"infinite\" \"string filename\" \"sky.pfm\""),
+              HasSubstr("is stretched by its transform"));
+  EXPECT_THAT(said("LightSource \"infinite\" \"string filename\" \"sky.pfm\" \"rgb L\" [1 1 1]"),
+              HasSubstr("exclude each other"));
+}
+
 TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
   const auto expect = [](const std::string& world, const std::string& part) {
     const std::string said = SaidOfWorld(world);
     EXPECT_THAT(said, HasSubstr("error: "));
     EXPECT_THAT(said, HasSubstr(part));
   };
-  expect("Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" \"a.png\"", "textures");
-  expect("Material \"diffuse\" \"texture reflectance\" \"t\"", "is a texture");
+  expect("Material \"dielectric\" \"texture roughness\" \"t\"", "is a texture");
   expect("MakeNamedMedium \"m\"", "participating media");
   expect("MediumInterface \"m\" \"\"", "participating media");
   expect("Material \"coateddiffuse\"", "there are diffuse, conductor and dielectric");
   expect("Material \"interface\"", "lets light through unchanged");
   expect("MakeNamedMaterial \"m\" \"string type\" \"mix\"", "\"mix\"");
   expect("LightSource \"goniometric\"", "there are point, spot, distant and infinite");
-  expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "constant L");
+  expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "no such file");
   expect("Scale 1 2 1 Shape \"sphere\"", "ellipsoid");
   expect("Shape \"sphere\" \"float zmax\" 0.5", "part of a sphere");
   expect("Shape \"disk\" \"float phimax\" 90", "part of a disk");

@@ -52,6 +52,7 @@ TEST_F(SharedScenesTest, ReadsWhatIsPromised) {
       {"veach-mis/scene-v4.pbrt", 52, 3, 3},
       {"sphere-box/scene.pbrt", 12, 2, 1},
       {"sphere-caustic/scene.pbrt", 4, 1, 1},
+      {"veach-ajar/scene-v4.pbrt", 382628, 0, 1},
   };
   for (const auto& expected : kExpected) {
     const ParsedScene parsed = Parse(expected.path);
@@ -81,7 +82,8 @@ TEST_F(SharedScenesTest, SaysWhatItCannotRead) {
               HasSubstr("participating media are not supported"));
   EXPECT_THAT(errors("volumetric-caustic/scene-v4.pbrt"), HasSubstr("participating media"));
   EXPECT_THAT(errors("coffee/scene-v4.pbrt"), HasSubstr("\"coateddiffuse\""));
-  EXPECT_THAT(errors("classroom/scene-v4.pbrt"), HasSubstr("textures are not supported"));
+  EXPECT_THAT(errors("classroom/scene-v4.pbrt"), HasSubstr("\"coateddiffuse\""));
+  EXPECT_THAT(errors("staircase2/scene-v4.pbrt"), HasSubstr("\"coateddiffuse\""));
 }
 
 TEST(OwnScenesTest, AllAreReadWithoutErrorsOrWarnings) {
@@ -95,6 +97,23 @@ TEST(OwnScenesTest, AllAreReadWithoutErrorsOrWarnings) {
     }
   }
   EXPECT_GE(count, 12);
+}
+
+// What a texture or a map names belongs to the scene, and is sent with it.
+TEST(OwnScenesTest, PicturesAreOfTheScenesFiles) {
+  DirectoryFiles files(std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes");
+  const Scene scene = ParsePbrt(files, "textured.pbrt").scene;
+  const SceneManifest manifest = files.Manifest("textured.pbrt");
+  EXPECT_EQ(manifest.entries.size(), 3U);
+  EXPECT_TRUE(manifest.entries.contains("textures/bricks.png"));
+  EXPECT_TRUE(manifest.entries.contains("textures/sky.pfm"));
+  ASSERT_EQ(scene.infinite_lights.size(), 1U);
+  EXPECT_EQ(scene.infinite_lights[0].map->At(9, 10), (Rgb{90, 75, 50}));
+  // The corner of the bricks that tells up from down: red at the top left.
+  const auto wall = static_cast<std::size_t>(scene.meshes.at(1).traits.material);
+  const Rgb corner = TextureColor(scene.textures, scene.materials[wall].texture, {0.05F, 0.95F});
+  EXPECT_GT(corner.r, 0.9F);
+  EXPECT_LT(corner.g, 0.05F);
 }
 
 TEST(OwnScenesTest, TheFurnaceEmitsInward) {

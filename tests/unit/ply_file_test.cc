@@ -101,6 +101,22 @@ TEST(PlyFileTest, ReadsOneMeshFromEveryFormat) {
   ExpectSquare(Gzip(BinarySquare(true)));
 }
 
+TEST(PlyFileTest, ReadsTextureCoordinatesByEitherName) {
+  const auto uvs = [](const std::string& names) {
+    return ParsePly("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n" + names +
+                    "property float y\nproperty float z\nelement face 1\n"
+                    "property list uchar int vertex_indices\nend_header\n"
+                    "0 0.5 0.25 0 0\n1 1e99 2 0 0\n0 3 4 1 0\n3 0 1 2\n")
+        .value()
+        .uvs;
+  };
+  const auto expected = ElementsAre(Vec2{0.5F, 0.25F}, Vec2{0, 0}, Vec2{3, 4});
+  EXPECT_THAT(uvs("property float u\nproperty float v\n"), expected);
+  EXPECT_THAT(uvs("property float s\nproperty float t\n"), expected);
+  // One alone is none.
+  EXPECT_TRUE(uvs("property float s\nproperty float v\n").empty());
+}
+
 TEST(PlyFileTest, RefusesACountThatTheFileCannotHold) {
   // Taken at its word, this file would need 48 GB.
   EXPECT_THAT(Why("ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n"

@@ -1,4 +1,4 @@
-#include "render/film/image.h"
+#include "render/image/image.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "render/film/exr_file.h"
+#include "render/image/exr_file.h"
 
 #include <algorithm>
 #include <array>
@@ -17,6 +17,7 @@
 #include <OpenEXR/ImfInputFile.h>
 #include <OpenEXR/ImfOutputFile.h>
 #include <OpenEXR/ImfStringAttribute.h>
+#include <zlib.h>
 
 namespace lucerna {
 namespace {
@@ -89,6 +90,7 @@ class HeaderReader {
     bytes_.remove_prefix(end + 1);
     return text;
   }
+  [[nodiscard]] std::size_t remaining() const { return bytes_.size(); }
   [[nodiscard]] std::optional<std::string_view> Bytes(std::uint64_t size) {
     if (size > bytes_.size()) return std::nullopt;
     const std::string_view piece = bytes_.substr(0, size);
@@ -103,6 +105,10 @@ class HeaderReader {
 struct Extent {
   std::int64_t width = 0, height = 0;            // [pixels]
   std::int64_t tile_width = 0, tile_height = 0;  // 0: scanlines
+  std::uint8_t compression = 0;
+  std::uint64_t pixel_bytes = 0;   // of all channels
+  std::uint64_t packed_bytes = 0;  // the same as PXR24 packs them
+  std::size_t header_bytes = 0;
 };
 
 Status Garbage(const std::string& what) {
@@ -146,6 +152,19 @@ StatusOr<Extent> CheckHeader(std::string_view bytes) {
       extent.width = corners[2] - corners[0] + 1;
       extent.height = corners[3] - corners[1] + 1;
       has_window = true;
+    } else if (*name == "compression") {
+      extent.compression = value->empty() ? 0 : static_cast<std::uint8_t>(value->front());
+    } else if (*name == "channels") {
+      extent.pixel_bytes = 0;
+      extent.packed_bytes = 0;
+      for (auto channel = fields.Text(); channel && !channel->empty(); channel = fields.Text()) {
+        constexpr std::uint32_t kHalf = 1;
+        constexpr std::uint32_t kFloat = 2;
+        const auto pixel_type = fields.Number();
+        if (!pixel_type || !fields.Bytes(12)) return Garbage("its channels are cut off");
+        extent.pixel_bytes += *pixel_type == kHalf ? 2 : 4;
+        extent.packed_bytes += *pixel_type == kHalf ? 2 : *pixel_type == kFloat ? 3 : 4;
+      }
     } else if (*name == "tiles") {
       const auto tile_width = fields.Number();
       const auto tile_height = fields.Number();
@@ -175,7 +194,75 @@ StatusOr<Extent> CheckHeader(std::string_view bytes) {
     blocks = ((width + tile_width - 1) / tile_width) * ((height + tile_height - 1) / tile_height);
   }
   if (blocks * 8 > bytes.size()) return Garbage("it is too short for its size in pixels");
+  extent.header_bytes = bytes.size() - reader.remaining();
   return extent;
+}
+
+// How many bytes a zlib stream unpacks to, at most `limit` + 1; nothing when it is damaged.
+std::optional<std::uint64_t> InflatedSize(std::string_view packed, std::uint64_t limit) {
+  std::array<unsigned char, 65536> scratch{};
+  z_stream stream{};
+  if (inflateInit(&stream) != Z_OK) return std::nullopt;
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(packed.data()));
+  stream.avail_in = static_cast<uInt>(packed.size());
+  int outcome = Z_OK;
+  while (outcome == Z_OK && stream.total_out <= limit) {
+    stream.next_out = scratch.data();
+    stream.avail_out = static_cast<uInt>(scratch.size());
+    outcome = inflate(&stream, Z_NO_FLUSH);
+  }
+  const std::uint64_t size = stream.total_out;
+  inflateEnd(&stream);
+  if (outcome != Z_STREAM_END && outcome != Z_OK) return std::nullopt;
+  return std::min(size, limit + 1);
+}
+
+// The same for OpenEXR's run lengths: a count below zero says how many bytes stand as they are.
+std::uint64_t RunsSize(std::string_view packed, std::uint64_t limit) {
+  std::uint64_t size = 0;
+  for (std::size_t at = 0; at < packed.size() && size <= limit;) {
+    const auto count = static_cast<signed char>(packed[at]);
+    size += static_cast<std::uint64_t>(count < 0 ? -count : count + 1);
+    at += count < 0 ? 1 + static_cast<std::size_t>(-count) : 2;
+  }
+  return size;
+}
+
+// Every block of scanlines unpacks to all of its pixels. The library does not ask: where one has
+// fewer, it would go on with whatever lies in memory.
+Status CheckBlocks(std::string_view bytes, const Extent& extent) {
+  enum : std::uint8_t { kNone, kRuns, kZips, kZip, kPiz, kPxr24 };
+  const std::uint8_t compression = extent.compression;
+  if (extent.tile_width > 0 || compression > kPxr24 || compression == kPiz) {
+    return absl::OkStatus();
+  }
+  const std::int64_t lines_per_block = compression == kZip || compression == kPxr24 ? 16 : 1;
+  const auto width = static_cast<std::uint64_t>(extent.width);
+  std::string_view table = bytes.substr(extent.header_bytes);
+  for (std::int64_t line = 0; line < extent.height; line += lines_per_block) {
+    const auto lines =
+        static_cast<std::uint64_t>(std::min(lines_per_block, extent.height - line));
+    const std::uint64_t plain_bytes = width * lines * extent.pixel_bytes;
+    const std::uint64_t expected =
+        compression == kPxr24 ? width * lines * extent.packed_bytes : plain_bytes;
+    std::uint64_t offset = 0;
+    if (table.size() < sizeof(offset)) return Garbage("its table of blocks is cut off");
+    std::memcpy(&offset, table.data(), sizeof(offset));
+    table.remove_prefix(sizeof(offset));
+    if (offset > bytes.size()) return Garbage("its table of blocks is damaged");
+    HeaderReader block(bytes.substr(offset));
+    const auto first_line = block.Number();
+    const auto size = block.Number();
+    const auto packed = size ? block.Bytes(*size) : std::nullopt;
+    if (!first_line || !packed) return Garbage("a block of its scanlines is cut off");
+    if (packed->size() == plain_bytes) continue;  // what does not get smaller is not packed
+    const std::optional<std::uint64_t> unpacked =
+        packed->size() > plain_bytes || compression == kNone ? std::nullopt
+        : compression == kRuns ? std::optional(RunsSize(*packed, expected))
+                               : InflatedSize(*packed, expected);
+    if (unpacked != expected) return Garbage("a block of its scanlines is damaged");
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -229,6 +316,7 @@ StatusOr<std::string> EncodeExr(const Image& image) {
 
 StatusOr<Image> DecodeExr(std::string_view bytes) {
   LUCERNA_ASSIGN_OR_RETURN(const Extent extent, CheckHeader(bytes));
+  LUCERNA_RETURN_IF_ERROR(CheckBlocks(bytes, extent));
   try {
     MemoryInput input(bytes);
     Imf::InputFile file(input, /*numThreads=*/0);

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "render/base/status.h"
-#include "render/film/image.h"
+#include "render/image/image.h"
 
 namespace lucerna {
 

@@ -1,0 +1,22 @@
+// Where on its texture does a point of a surface lie, and how fast does that change?
+//
+// Texture coordinates are pbrt-v4's: those of a mesh's corners; on a sphere u runs around z from x
+// to y and v from -z to z; on a disk u the same and v from the rim to the centre.
+#pragma once
+
+#include "render/geometry/intersector.h"
+#include "render/math/vector.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+[[nodiscard]] Vec2 UvAt(const Scene& scene, const SurfacePoint& point);
+
+// The squared lengths of the gradients of u and v along the surface [1/length²].
+struct UvSlopes {
+  double u = 0, v = 0;
+};
+// Zero where a triangle has no area.
+[[nodiscard]] UvSlopes UvSlopesAt(const Scene& scene, const SurfacePoint& point);
+
+}  // namespace lucerna

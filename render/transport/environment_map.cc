@@ -1,0 +1,100 @@
+#include "render/transport/environment_map.h"
+
+#include <algorithm>
+#include <array>
+#include <span>
+
+#include "render/base/status.h"
+#include "render/math/color_space.h"
+#include "render/math/equal_area_square.h"
+#include "render/math/warp.h"
+
+namespace lucerna {
+namespace {
+
+// The place of `u` in [0, 1) among cumulative shares that end at 1: in units of cells.
+template <typename Number>
+float PlaceIn(std::span<const Number> cumulative, float u) {
+  const auto value = static_cast<Number>(u);
+  // The first whose share ends beyond u; a cell without a share never is.
+  auto found = std::upper_bound(cumulative.begin(), cumulative.end(), value);
+  if (found == cumulative.end()) --found;
+  const auto cell = found - cumulative.begin();
+  const Number before = cell == 0 ? Number{0} : *(found - 1);
+  const Number within = *found > before ? (value - before) / (*found - before) : Number{0};
+  return static_cast<float>(cell) + std::min(static_cast<float>(within), 0x1.fffffep-1F);
+}
+
+}  // namespace
+
+EnvironmentMap::EnvironmentMap(const InfiniteLight& light)
+    : map_(light.map), scale_(light.radiance), axes_(light.axes), size_(light.map->width) {
+  LUCERNA_CHECK(map_->width == map_->height);
+  const auto size = static_cast<std::size_t>(size_);
+  columns_.reserve(size * size);
+  rows_.reserve(size);
+  std::array<double, 3> sum{};
+  double luminance = 0;
+  std::vector<double> row(size);
+  for (int y = 0; y < size_; ++y) {
+    double row_luminance = 0;
+    for (int x = 0; x < size_; ++x) {
+      const Rgb radiance = RadianceOf({x, y});
+      for (int c = 0; c < 3; ++c)
+        sum[static_cast<std::size_t>(c)] += static_cast<double>(radiance[c]);
+      row_luminance += static_cast<double>(Luminance(radiance));
+      row[static_cast<std::size_t>(x)] = row_luminance;
+    }
+    for (const double before : row) {
+      columns_.push_back(row_luminance > 0 ? static_cast<float>(before / row_luminance) : 1.0F);
+    }
+    luminance += row_luminance;
+    rows_.push_back(luminance);
+  }
+  const double texels = static_cast<double>(size) * static_cast<double>(size);
+  mean_ = {static_cast<float>(sum[0] / texels), static_cast<float>(sum[1] / texels),
+           static_cast<float>(sum[2] / texels)};
+  mean_luminance_ = luminance / texels;
+  if (luminance > 0) {
+    for (double& share : rows_)
+      share /= luminance;
+  }
+}
+
+Rgb EnvironmentMap::RadianceOf(Texel texel) const {
+  return ToWorking(map_->At(texel.x, texel.y)) * scale_;
+}
+
+Vec2 EnvironmentMap::PlaceOf(Vec3 direction) const {
+  return EqualAreaPlace(
+      {Dot(direction, axes_.x), Dot(direction, axes_.y), Dot(direction, axes_.z)});
+}
+
+EnvironmentMap::Texel EnvironmentMap::TexelOf(Vec3 direction) const {
+  const Vec2 place = PlaceOf(direction);
+  const auto index = [&](float coordinate) {
+    return std::min(static_cast<int>(coordinate * static_cast<float>(size_)), size_ - 1);
+  };
+  return {index(place.x), index(place.y)};
+}
+
+Rgb EnvironmentMap::Radiance(Vec3 direction) const {
+  return RadianceOf(TexelOf(direction));
+}
+
+float EnvironmentMap::PdfSolidAngle(Vec3 direction) const {
+  const double share = static_cast<double>(Luminance(Radiance(direction))) / mean_luminance_;
+  return static_cast<float>(share) / (4 * kPi);
+}
+
+Vec3 EnvironmentMap::Sample(float u1, float u2) const {
+  const auto size = static_cast<std::size_t>(size_);
+  const float y = PlaceIn<double>(rows_, u1);
+  const auto row = std::min(static_cast<std::size_t>(y), size - 1);
+  const float x = PlaceIn<float>(std::span(columns_).subspan(row * size, size), u2);
+  const auto side = static_cast<float>(size_);
+  const Vec3 local = EqualAreaDirection({x / side, y / side});
+  return axes_.x * local.x + axes_.y * local.y + axes_.z * local.z;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,57 @@
+// How bright is the sky in one direction, and where does its light come from?
+//
+// Each pixel of an infinite light's square is an even patch of sky. Directions are drawn in
+// proportion to the luminance of the patches, so all light that is drawn carries about the same
+// flux. Directions are unit, in the world, and point towards the sky.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "render/math/rgb.h"
+#include "render/math/vector.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+class EnvironmentMap {
+ public:
+  // Requires a light with a map.
+  explicit EnvironmentMap(const InfiniteLight& light);
+
+  // In the working space.
+  [[nodiscard]] Rgb Radiance(Vec3 direction) const;
+  // The mean over all directions.
+  [[nodiscard]] Rgb MeanRadiance() const { return mean_; }
+
+  // Zero where the sky is black. Requires a map that is not all black.
+  [[nodiscard]] float PdfSolidAngle(Vec3 direction) const;
+  // Draws a direction with that density. u1, u2 in [0, 1).
+  [[nodiscard]] Vec3 Sample(float u1, float u2) const;
+
+  // [pixels] of a side.
+  [[nodiscard]] int size() const { return size_; }
+  // Where on the square a direction lies, in [0, 1]².
+  [[nodiscard]] Vec2 PlaceOf(Vec3 direction) const;
+  [[nodiscard]] float TexelLuminance(int x, int y) const { return Luminance(RadianceOf({x, y})); }
+
+ private:
+  struct Texel {
+    int x, y;
+  };
+  [[nodiscard]] Texel TexelOf(Vec3 direction) const;
+  [[nodiscard]] Rgb RadianceOf(Texel texel) const;
+
+  std::shared_ptr<const Picture> map_;
+  Rgb scale_;
+  ShapeAxes axes_;
+  int size_;
+  Rgb mean_;
+  double mean_luminance_ = 0;
+  // Shares of the luminance before the end of each row in all rows, and of each pixel in its row.
+  std::vector<double> rows_;
+  std::vector<float> columns_;  // [rows × columns]
+};
+
+}  // namespace lucerna

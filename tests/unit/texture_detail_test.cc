@@ -1,0 +1,151 @@
+// The detail of textures and skies is that of patterns whose derivatives are known.
+#include "worker/texture_detail.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/math/equal_area_square.h"
+#include "worker/sky_detail.h"
+
+namespace lucerna {
+namespace {
+
+constexpr double kPiD = std::numbers::pi;
+
+template <typename Value>
+std::shared_ptr<const Picture> GreyPicture(int width, int height, Value&& value) {
+  Picture picture;
+  picture.width = width;
+  picture.height = height;
+  picture.channels = 1;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x)
+      picture.linear.push_back(static_cast<float>(value(x, y)));
+  }
+  return std::make_shared<const Picture>(std::move(picture));
+}
+
+Texture OfPicture(std::shared_ptr<const Picture> picture) {
+  Texture texture;
+  texture.kind = Texture::Kind::kPicture;
+  texture.picture = std::move(picture);
+  return texture;
+}
+
+// The mean of |A''| / (2 A) over a period of A = 1 + m cos kx.
+double WaveDetail(double m, double k) {
+  constexpr int kSteps = 100000;
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double wave = std::cos(2 * kPiD * (i + 0.5) / kSteps);
+    sum += m * std::abs(wave) / (1 + m * wave);
+  }
+  return k * k * sum / kSteps / 2;
+}
+
+TEST(TextureDetailTest, OfAWaveIsItsSecondDerivative) {
+  constexpr int kWidth = 512;
+  constexpr double kWaves = 8;
+  const double k = 2 * kPiD * kWaves;
+  for (const double m : {0.1, 0.5, 0.8}) {
+    Texture texture = OfPicture(GreyPicture(
+        kWidth, 3, [&](int x, int) { return 0.5 * (1 + m * std::cos(k * (x + 0.5) / kWidth)); }));
+    const TextureDetail plain = TextureDetails({texture})[0];
+    EXPECT_NEAR(plain.u / WaveDetail(m, k), 1, 2e-3) << m;
+    EXPECT_NEAR(plain.v, 0, 1e-6 * plain.u);
+    // Relative to the albedo: brightness does not matter, size does.
+    texture.scale = 0.5F;
+    texture.mapping.scale_u = 3;
+    EXPECT_NEAR(TextureDetails({texture})[0].u / (9 * plain.u), 1, 1e-4);
+  }
+}
+
+TEST(TextureDetailTest, OfFlatTexturesIsNone) {
+  const Texture constant;
+  const std::vector<TextureDetail> details =
+      TextureDetails({constant, OfPicture(GreyPicture(4, 4, [](int, int) { return 0.25; }))});
+  for (const TextureDetail& detail : details) {
+    EXPECT_EQ(detail.u, 0);
+    EXPECT_EQ(detail.v, 0);
+  }
+}
+
+TEST(TextureDetailTest, OfACheckerboardIsThatOfItsPicture) {
+  // Eight pixels a square, two squares: the board as a picture.
+  const auto picture =
+      GreyPicture(16, 16, [](int x, int y) { return (x / 8 + y / 8) % 2 == 0 ? 0.6 : 0.2; });
+  Texture even;
+  even.color = Gray(0.6F);
+  Texture odd;
+  odd.color = Gray(0.2F);
+  Texture board;
+  board.kind = Texture::Kind::kCheckerboard;
+  board.parts = {0, 1};
+  board.mapping.scale_u = 2;
+  board.mapping.scale_v = 2;
+  const std::vector<TextureDetail> details = TextureDetails({even, odd, board, OfPicture(picture)});
+  EXPECT_GT(details[2].u, 0);
+  EXPECT_NEAR(details[2].u / details[3].u, 1, 1e-5);
+  EXPECT_NEAR(details[2].v / details[3].v, 1, 1e-5);
+}
+
+// A sky of luminance 1 + a z: the Laplacian over the sphere is -2 a z.
+TEST(SkyDetailTest, OfASlopeIsItsLaplacian) {
+  constexpr int kSize = 64;
+  constexpr double kSlope = 0.6;
+  InfiniteLight light;
+  light.radiance = Gray(1);
+  light.map = GreyPicture(kSize, kSize, [](int x, int y) {
+    return 1 +
+           kSlope * static_cast<double>(EqualAreaDirection({(static_cast<float>(x) + 0.5F) / kSize,
+                                                            (static_cast<float>(y) + 0.5F) / kSize})
+                                            .z);
+  });
+  const EnvironmentMap sky(light);
+  const SkyDetail detail(sky);
+  const SpectrumLimits limits = SpectrumLimits::ForDiagonal(1);
+  // In the middle of those around a parallel: at the square's creases the map bends more.
+  for (const double z : {0.8, 0.6, -0.7}) {
+    std::vector<double> around;
+    constexpr int kAround = 400;
+    for (int i = 0; i < kAround; ++i) {
+      const double angle = 2 * kPiD * i / kAround;
+      const double r = std::sqrt(1 - z * z);
+      const Vec3 d = {static_cast<float>(r * std::cos(angle)),
+                      static_cast<float>(r * std::sin(angle)), static_cast<float>(z)};
+      around.push_back(1 / detail.Source(d, limits).p);
+    }
+    std::sort(around.begin(), around.end());
+    EXPECT_NEAR(around[kAround / 2] / (2 * kSlope * std::abs(z) / (1 + kSlope * z)), 1, 0.15) << z;
+  }
+}
+
+TEST(SkyDetailTest, OfAnEvenSkyIsNoneAndOfASunItsSize) {
+  InfiniteLight even;
+  even.radiance = Gray(2);
+  even.map = GreyPicture(7, 7, [](int, int) { return 1.0; });
+  const SpectrumLimits limits = SpectrumLimits::ForDiagonal(1);
+  {
+    const EnvironmentMap sky(even);
+    EXPECT_EQ(SkyDetail(sky).Source(Normalize({1, 2, 3}), limits).p, kLargestAngularVariance);
+  }
+  constexpr int kSize = 64;
+  InfiniteLight sun = even;
+  sun.map =
+      GreyPicture(kSize, kSize, [](int x, int y) { return x == 20 && y == 30 ? 1000.0 : 0.1; });
+  const EnvironmentMap sky(sun);
+  const Vec3 towards = EqualAreaDirection({20.5F / kSize, 30.5F / kSize});
+  const double texel = std::sqrt(4 * kPiD) / kSize;
+  const double p = SkyDetail(sky).Source(towards, limits).p;
+  EXPECT_GE(p, texel * texel / 12);
+  EXPECT_LE(p, texel * texel);
+}
+
+}  // namespace
+}  // namespace lucerna

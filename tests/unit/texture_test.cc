@@ -1,0 +1,125 @@
+// A texture shows the colour that pbrt-v4's rules give, at every place, however far.
+#include "render/scene/texture.h"
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+namespace lucerna {
+namespace {
+
+using Wrap = Texture::Wrap;
+
+// Two by two pixels, bytes: black and red above, green and white below.
+std::shared_ptr<const Picture> FourPixels() {
+  Picture picture;
+  picture.width = picture.height = 2;
+  picture.coded = {0, 0, 0, 2, 0, 0, 0, 2, 0, 2, 2, 2};
+  picture.decoded[2] = 0.5F;
+  return std::make_shared<const Picture>(picture);
+}
+
+Texture PictureTexture(Wrap wrap = Wrap::kRepeat) {
+  Texture texture;
+  texture.kind = Texture::Kind::kPicture;
+  texture.wrap = wrap;
+  texture.picture = FourPixels();
+  return texture;
+}
+
+Texture Constant(Rgb color) {
+  Texture texture;
+  texture.color = color;
+  return texture;
+}
+
+void ExpectColor(const std::vector<Texture>& textures, Vec2 uv, Rgb expected) {
+  const Rgb color = TextureColor(textures, static_cast<std::int32_t>(textures.size()) - 1, uv);
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(color[c], expected[c], 1e-6F) << "channel " << c << " at " << uv.x << " " << uv.y;
+}
+
+TEST(TextureTest, VGoesUpwardsAndRowsDownwards) {
+  const std::vector<Texture> textures = {PictureTexture()};
+  ExpectColor(textures, {0.25F, 0.75F}, {0, 0, 0});
+  ExpectColor(textures, {0.75F, 0.75F}, {0.5F, 0, 0});
+  ExpectColor(textures, {0.25F, 0.25F}, {0, 0.5F, 0});
+  ExpectColor(textures, {0.75F, 0.25F}, {0.5F, 0.5F, 0.5F});
+}
+
+TEST(TextureTest, BetweenCentresItIsBilinear) {
+  const std::vector<Texture> textures = {PictureTexture()};
+  ExpectColor(textures, {0.5F, 0.75F}, {0.25F, 0, 0});
+  ExpectColor(textures, {0.5F, 0.5F}, {0.25F, 0.25F, 0.125F});
+  ExpectColor(textures, {0.375F, 0.75F}, {0.125F, 0, 0});
+}
+
+TEST(TextureTest, EdgesRepeatClampOrAreBlack) {
+  // An eighth beyond the right edge of the upper row: half a pixel less a quarter from red.
+  const Vec2 beyond = {1.125F, 0.75F};
+  ExpectColor({PictureTexture(Wrap::kRepeat)}, beyond, {0.125F, 0, 0});
+  ExpectColor({PictureTexture(Wrap::kClamp)}, beyond, {0.5F, 0, 0});
+  ExpectColor({PictureTexture(Wrap::kBlack)}, beyond, {0.125F, 0, 0});
+  ExpectColor({PictureTexture(Wrap::kBlack)}, {2.5F, 0.75F}, {0, 0, 0});
+  ExpectColor({PictureTexture(Wrap::kClamp)}, {7, -3}, {0.5F, 0.5F, 0.5F});
+  ExpectColor({PictureTexture(Wrap::kRepeat)}, {-5.25F, 4.25F}, {0.5F, 0.5F, 0.5F});
+}
+
+TEST(TextureTest, MappingScaleAndInversionAreApplied) {
+  Texture texture = PictureTexture();
+  texture.mapping = {2, 4, 0.5F, 0.25F};
+  ExpectColor({texture}, {0.125F, 0}, {0.5F, 0.5F, 0.5F});  // at (0.75, 0.25)
+  texture.scale = 1.5F;
+  ExpectColor({texture}, {0.125F, 0}, {0.75F, 0.75F, 0.75F});
+  texture.is_inverted = true;
+  ExpectColor({texture}, {0.125F, 0}, {0.25F, 0.25F, 0.25F});
+  texture.is_inverted = false;
+  texture.scale = 3;
+  ExpectColor({texture}, {0.125F, 0}, {1, 1, 1});
+}
+
+TEST(TextureTest, ScaledAndCheckeredTexturesAreMadeOfOthers) {
+  Texture half;
+  half.kind = Texture::Kind::kScaled;
+  half.scale = 0.5F;
+  half.parts[0] = 0;
+  Texture checkers;
+  checkers.kind = Texture::Kind::kCheckerboard;
+  checkers.parts = {1, 0};
+  checkers.mapping.scale_u = 2;
+  const std::vector<Texture> textures = {Constant({0.8F, 0.4F, 0.2F}), half, checkers};
+  const Rgb whole = {0.8F, 0.4F, 0.2F};
+  ExpectColor(textures, {0.25F, 0.5F}, whole * 0.5F);
+  ExpectColor(textures, {0.75F, 0.5F}, whole);
+  ExpectColor(textures, {0.75F, 1.5F}, whole * 0.5F);
+  ExpectColor(textures, {-0.25F, 0.5F}, whole);
+  ExpectColor(textures, {-0.25F, -0.5F}, whole * 0.5F);
+}
+
+TEST(TextureTest, FarPlacesAndHugeScalesStayColours) {
+  Texture checkers;
+  checkers.kind = Texture::Kind::kCheckerboard;
+  checkers.parts = {0, 0};
+  Texture huge;
+  huge.kind = Texture::Kind::kScaled;
+  huge.scale = 3e38F;
+  for (const Wrap wrap : {Wrap::kRepeat, Wrap::kClamp, Wrap::kBlack}) {
+    Texture picture = PictureTexture(wrap);
+    picture.mapping = {3e38F, -3e38F, 3e38F, -3e38F};
+    std::vector<Texture> textures = {picture, checkers, huge, huge};
+    textures[2].parts[0] = 1;
+    textures[3].parts[0] = 2;
+    for (const float place : {0.0F, 1.0F, -1.0F, 1e30F, -3e38F, 5e8F}) {
+      for (std::int32_t number = 0; number < 4; ++number) {
+        const Rgb color = TextureColor(textures, number, {place, -place});
+        for (int c = 0; c < 3; ++c)
+          EXPECT_TRUE(color[c] >= 0 && color[c] <= 1) << place << " " << number << " " << color[c];
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lucerna

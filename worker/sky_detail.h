@@ -1,0 +1,31 @@
+// How fine is the detail of an environment map around one direction?
+#pragma once
+
+#include <vector>
+
+#include "render/frequency/spectrum.h"
+#include "render/math/vector.h"
+#include "render/transport/environment_map.h"
+
+namespace lucerna {
+
+class SkyDetail {
+ public:
+  // Keeps a reference to `sky`, and a blurred copy of its luminance.
+  explicit SkyDetail(const EnvironmentMap& sky);
+
+  // The spectrum of light that comes from `direction`, which points towards the sky.
+  [[nodiscard]] Spectrum Source(Vec3 direction, const SpectrumLimits& limits) const;
+
+ private:
+  // Interpolated between the centres of the pixels.
+  [[nodiscard]] double BlurredLuminance(Vec3 direction) const;
+
+  const EnvironmentMap& sky_;
+  int size_;
+  double mean_ = 0;
+  double texel_rad_;
+  std::vector<float> blurred_;  // [size × size]
+};
+
+}  // namespace lucerna
