@@ -144,7 +144,7 @@ struct Estimates {
   std::array<double, 2> noise{};
   bool is_rough = false;  // deviates from the fits by more than noise does
 
-  [[nodiscard]] bool is_known() const { return value[0] < kUnknown && value[1] < kUnknown; }
+  [[nodiscard]] bool IsKnown() const { return value[0] < kUnknown && value[1] < kUnknown; }
 };
 
 // The terms of the fits: x^a y^b for each of these a and b.
@@ -220,7 +220,7 @@ class CubicFit {
   }
 
   // Of what the fit leaves over, at each point and for each function.
-  [[nodiscard]] double variance() const { return variance_; }
+  [[nodiscard]] double Variance() const { return variance_; }
 
   // Of each of the two coefficients of x² and of all later terms, where it is 1 at each point.
   [[nodiscard]] std::array<double, kTerms> Variances() const {
@@ -269,7 +269,7 @@ class CubicFit {
 // Half a turn in sixteen steps. Between two of them a third harmonic may be larger by the inverse
 // of the cosine of 16.9 degrees, and no harmonic here is higher.
 constexpr double kBetweenDirections = 1.046;
-const std::array<std::array<double, 2>, 16> kDirections = [] {
+const std::array<std::array<double, 2>, 16> sixteen_directions = [] {
   std::array<std::array<double, 2>, 16> directions{};
   for (std::size_t i = 0; i < directions.size(); ++i) {
     const double angle = static_cast<double>(i) * std::numbers::pi / 16;
@@ -289,7 +289,7 @@ double LargestOfForm(double xxx, double xxy, double xyy, double yyy) {
   const double c1 = 0.75 * (xxx + xyy), s1 = 0.75 * (xxy + yyy);
   const double c3 = 0.25 * (xxx - 3 * xyy), s3 = 0.25 * (3 * xxy - yyy);
   double largest = 0;
-  for (const auto& [c, s] : kDirections) {
+  for (const auto& [c, s] : sixteen_directions) {
     // cos 3a + i sin 3a = (c + i s)³
     const double third = c3 * c * (c * c - 3 * s * s) + s3 * s * (3 * c * c - s * s);
     largest = std::max(largest, std::abs(c1 * c + s1 * s + third));
@@ -310,7 +310,7 @@ struct Symmetric {
 // The largest norm of even + cosine cos 2a + sine sin 2a over all angles a.
 double LargestNorm(const Symmetric& even, const Symmetric& cosine, const Symmetric& sine) {
   double largest = 0;
-  for (const auto& [c, s] : kDirections) {
+  for (const auto& [c, s] : sixteen_directions) {
     const double c2 = c * c - s * s, s2 = 2 * c * s;
     const Symmetric at = {even.a + cosine.a * c2 + sine.a * s2,
                           even.b + cosine.b * c2 + sine.b * s2,
@@ -430,7 +430,7 @@ class Surroundings {
     }
     const double bend = Symmetric{p[1], 0.5 * (p[2] + q[1]), q[2]}.Norm();
     const double shifted = bend * position_error;
-    const double variance = fit.variance() + kNormalRounding * kNormalRounding + shifted * shifted;
+    const double variance = fit.Variance() + kNormalRounding * kNormalRounding + shifted * shifted;
     std::array<double, kTerms> noise = fit.Variances();
     for (std::size_t i = 3; i < kTerms; ++i)
       noise[i] *= 2 * variance * scale[i] * scale[i];
@@ -448,7 +448,7 @@ class Surroundings {
                     {0.5 * (xx.a - yy.a), 0.5 * (xx.b - yy.b), 0.5 * (xx.c - yy.c)}, xy);
     estimates.noise[1] = std::sqrt(noise[6] + 3 * noise[7] + 3 * noise[8] + noise[9]);
     estimates.is_rough =
-        fit.variance() >
+        fit.Variance() >
         kLargestNoise * kLargestNoise + kLargestRounding * kLargestRounding * shifted * shifted;
     for (std::size_t order = 0; order < 2; ++order) {
       // Without noise there was no term to fit.
@@ -497,13 +497,13 @@ struct Level {
 // zeros.
 Bound BoundAround(const Level& level, std::uint32_t s, std::size_t order) {
   const Estimates& own = level.estimates[s];
-  if (!own.is_known()) return {};
+  if (!own.IsKnown()) return {};
   Bound bound = {own.value[order], own.noise[order]};
   bool is_rough = own.is_rough;
   double count = 1;
   for (const std::uint32_t other : level.selected.Around(s)) {
     const Estimates& estimates = level.estimates[other];
-    if (!estimates.is_known()) continue;
+    if (!estimates.IsKnown()) continue;
     bound.value = std::max(bound.value, estimates.value[order]);
     bound.noise += estimates.noise[order];
     is_rough |= estimates.is_rough;
