@@ -264,8 +264,8 @@ void SurfaceCurvature::AddMesh(const TriangleMesh& mesh) {
     // ring sees that over about the length of a side.
     const double second = 2 * turned * (fitted.second_is_clear ? change.largest : change.certain) *
                           length_count / length_sum;
-    bending.second_gradient = static_cast<float>(
-        std::min({second, kSlack * fitted.second, std::pow(fit.largest, 3), kLargest}));
+    bending.second_gradient = static_cast<float>(std::min(
+        {second, kSlack * fitted.second, fit.largest * fit.largest * fit.largest, kLargest}));
   }
 }
 

@@ -6,8 +6,9 @@
 //
 // Spheres are exact. A mesh has the curvature of its vertex normals, which is what mirrors and
 // lenses made of it show: one tensor per triangle, fitted to the differences of the normals along
-// its sides. Meshes without vertex normals, disks, and triangles without area or with a normal
-// missing are flat.
+// its sides. Its gradients do not grow with the fineness of the mesh (see curvature_change.h).
+// Meshes without vertex normals, disks, and triangles without area or with a normal missing are
+// flat.
 //
 // Promises: no result is NaN or infinite; a scene scaled by 2^n has curvatures scaled by 2^-n
 // exactly (within the range of float).

@@ -28,6 +28,12 @@ constexpr double kPositionRounding = 0x1p-24;
 constexpr double kClear = 6;
 constexpr double kDoubtful = 4;
 
+// What deviates from the fits by more than normals written with six digits do, or by more than so
+// many times the rounding of positions does, is not noise but detail too fine for the mesh. Light
+// sees it.
+constexpr double kLargestNoise = 4e-6;
+constexpr double kLargestRounding = 4;
+
 // Enough points for a fit, and a limit for the vertices where a great many sides meet.
 constexpr std::size_t kEnoughPoints = 14;
 constexpr std::size_t kMostPoints = 96;
@@ -105,17 +111,18 @@ Selection SelectFrom(const Graph& graph) {
 }
 
 // Two of the selected are next to each other where the nodes that they stand for are.
-Graph Coarsen(const Graph& graph, const Selection& selection) {
+Graph Coarsen(const Graph& graph, const std::vector<std::uint32_t>& nodes,
+              const std::vector<std::uint32_t>& of) {
   Graph coarse;
   coarse.begin.push_back(0);
-  std::vector<std::uint32_t> seen_by(selection.nodes.size(), kNone);
-  for (std::uint32_t s = 0; s < selection.nodes.size(); ++s) {
-    const std::uint32_t node = selection.nodes[s];
+  std::vector<std::uint32_t> seen_by(nodes.size(), kNone);
+  for (std::uint32_t s = 0; s < nodes.size(); ++s) {
+    const std::uint32_t node = nodes[s];
     coarse.vertex.push_back(graph.vertex[node]);
     seen_by[s] = s;
     const auto see_around = [&](std::uint32_t i) {
       for (const std::uint32_t j : graph.Around(i)) {
-        const std::uint32_t other = selection.of[j];
+        const std::uint32_t other = of[j];
         if (seen_by[other] == s) continue;
         seen_by[other] = s;
         coarse.neighbors.push_back(other);
@@ -123,7 +130,7 @@ Graph Coarsen(const Graph& graph, const Selection& selection) {
     };
     see_around(node);
     for (const std::uint32_t i : graph.Around(node)) {
-      if (selection.of[i] == s) see_around(i);
+      if (of[i] == s) see_around(i);
     }
     std::sort(coarse.neighbors.begin() + coarse.begin.back(), coarse.neighbors.end());
     coarse.begin.push_back(static_cast<std::uint32_t>(coarse.neighbors.size()));
@@ -131,29 +138,36 @@ Graph Coarsen(const Graph& graph, const Selection& selection) {
   return coarse;
 }
 
-// A derivative at a place, and the root mean square of what noise makes of it.
-struct Estimate {
-  double value = kUnknown;
-  double noise = 0;
+// The first and second derivative at a place, and the root mean square of what noise makes of them.
+struct Estimates {
+  std::array<double, 2> value = {kUnknown, kUnknown};
+  std::array<double, 2> noise{};
+  bool is_rough = false;  // deviates from the fits by more than noise does
+
+  [[nodiscard]] bool IsKnown() const { return value[0] < kUnknown && value[1] < kUnknown; }
 };
-using Estimates = std::array<Estimate, 2>;  // of the first and the second derivative
 
-constexpr std::size_t kTerms = 10;  // 1, x, y, x², xy, y², x³, x²y, xy², y³
-
-std::array<double, kTerms> TermsAt(double x, double y) {
-  return {1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y};
-}
+// The terms of the fits: x^a y^b for each of these a and b.
+constexpr std::size_t kTerms = 10;
+constexpr std::array<std::array<std::size_t, 2>, kTerms> kExponents = {
+    {{0, 0}, {1, 0}, {0, 1}, {2, 0}, {1, 1}, {0, 2}, {3, 0}, {2, 1}, {1, 2}, {0, 3}}};
 
 // A least squares fit of two functions of the plane at once.
 class CubicFit {
  public:
   void Add(double x, double y, double p, double q) {
-    const std::array<double, kTerms> terms = TermsAt(x, y);
-    for (std::size_t i = 0; i < kTerms; ++i) {
-      for (std::size_t j = 0; j <= i; ++j)
-        a_[i][j] += terms[i] * terms[j];
-      p_[i] += terms[i] * p;
-      q_[i] += terms[i] * q;
+    // Rows of lengths that suit the processor, of which a few entries are for nothing.
+    const double x2 = x * x, x3 = x2 * x, y2 = y * y;
+    const std::array<double, 4> low = {1, x, x2, x3};
+    const std::array<double, 4> high = {x2 * x2, x2 * x3, x3 * x3, 0};
+    const std::array<double, 7> y_powers = {1, y, y2, y2 * y, y2 * y2, y2 * y2 * y, y2 * y2 * y2};
+    for (std::size_t b = 0; b < 7; ++b)
+      Accumulate(low, y_powers[b], low_moments_[b]);
+    for (std::size_t b = 0; b < 3; ++b)
+      Accumulate(high, y_powers[b], high_moments_[b]);
+    for (std::size_t b = 0; b < 4; ++b) {
+      Accumulate(low, y_powers[b] * p, p_moments_[b]);
+      Accumulate(low, y_powers[b] * q, q_moments_[b]);
     }
     squares_ += p * p + q * q;
     ++count_;
@@ -162,34 +176,37 @@ class CubicFit {
   // Whether there are more points than terms. A term that the points leave open becomes 0: of a
   // ribbon one knows only how it bends lengthwise.
   bool Solve() {
+    std::array<double, kTerms> whole;
+    for (std::size_t i = 0; i < kTerms; ++i) {
+      const auto [a, b] = kExponents[i];
+      for (std::size_t j = 0; j < kTerms; ++j)
+        a_[i][j] = Moment(a + kExponents[j][0], b + kExponents[j][1]);
+      a_[i][kTerms] = p_moments_[b][a];
+      a_[i][kTerms + 1] = q_moments_[b][a];
+      whole[i] = a_[i][i];
+    }
+    // Cholesky's, by columns kept as rows. Whole rows go along, though only what is right of the
+    // diagonal counts: their length is known to the compiler.
     std::size_t terms = 0;
     double explained = 0;
     for (std::size_t i = 0; i < kTerms; ++i) {
-      for (std::size_t j = 0; j < i; ++j) {
-        double sum = a_[i][j];
-        for (std::size_t k = 0; k < j; ++k)
-          sum -= a_[i][k] * a_[j][k];
-        a_[i][j] = sum * inverse_[j];
-      }
-      double pivot = a_[i][i];
-      for (std::size_t k = 0; k < i; ++k)
-        pivot -= a_[i][k] * a_[i][k];
-      inverse_[i] = pivot > 1e-3 * a_[i][i] ? 1 / std::sqrt(pivot) : 0;
+      const double pivot = a_[i][i];
+      inverse_[i] = pivot > 1e-3 * whole[i] ? 1 / std::sqrt(pivot) : 0;
       if (inverse_[i] > 0) ++terms;
-      for (std::size_t k = 0; k < i; ++k) {
-        p_[i] -= a_[i][k] * p_[k];
-        q_[i] -= a_[i][k] * q_[k];
-      }
-      p_[i] *= inverse_[i];
-      q_[i] *= inverse_[i];
+      for (double& entry : a_[i])
+        entry *= inverse_[i];
+      p_[i] = a_[i][kTerms];
+      q_[i] = a_[i][kTerms + 1];
       explained += p_[i] * p_[i] + q_[i] * q_[i];
+      for (std::size_t k = i + 1; k < kTerms; ++k)
+        Accumulate(a_[i], -a_[i][k], a_[k]);
     }
     if (count_ < terms + 2) return false;
     variance_ = std::max(0.0, squares_ - explained) / static_cast<double>(2 * (count_ - terms));
     for (std::size_t i = kTerms; i-- > 0;) {
       for (std::size_t k = i + 1; k < kTerms; ++k) {
-        p_[i] -= a_[k][i] * p_[k];
-        q_[i] -= a_[k][i] * q_[k];
+        p_[i] -= a_[i][k] * p_[k];
+        q_[i] -= a_[i][k] * q_[k];
       }
       p_[i] *= inverse_[i];
       q_[i] *= inverse_[i];
@@ -203,30 +220,47 @@ class CubicFit {
   }
 
   // Of what the fit leaves over, at each point and for each function.
-  [[nodiscard]] double variance() const { return variance_; }
+  [[nodiscard]] double Variance() const { return variance_; }
 
   // Of each of the two coefficients of x² and of all later terms, where it is 1 at each point.
   [[nodiscard]] std::array<double, kTerms> Variances() const {
     std::array<double, kTerms> variances{};
     for (std::size_t j = 3; j < kTerms; ++j) {
       // A column of the inverse of the triangular matrix.
-      std::array<double, kTerms> column{};
-      column[j] = inverse_[j];
-      variances[j] = column[j] * column[j];
-      for (std::size_t i = j + 1; i < kTerms; ++i) {
-        double sum = 0;
-        for (std::size_t k = j; k < i; ++k)
-          sum -= a_[i][k] * column[k];
-        column[i] = sum * inverse_[i];
-        variances[j] += column[i] * column[i];
+      Row column{};
+      column[j] = 1;
+      for (std::size_t i = j; i < kTerms; ++i) {
+        const double entry = column[i] * inverse_[i];
+        variances[j] += entry * entry;
+        Accumulate(a_[i], -entry, column);
       }
     }
     return variances;
   }
 
  private:
-  std::array<std::array<double, kTerms>, kTerms> a_{};
-  std::array<double, kTerms> p_{}, q_{}, inverse_{};
+  using Row = std::array<double, kTerms + 2>;  // the right sides last
+
+  // Adds `row` so many times.
+  template <std::size_t kSize>
+  static void Accumulate(const std::array<double, kSize>& row, double times,
+                         std::array<double, kSize>& sum) {
+    for (std::size_t i = 0; i < kSize; ++i)
+      sum[i] += row[i] * times;
+  }
+
+  // The sum of x^a y^b.
+  [[nodiscard]] double Moment(std::size_t a, std::size_t b) const {
+    return a < 4 ? low_moments_[b][a] : high_moments_[b][a - 4];
+  }
+
+  // Sums of x^a y^b, of x^(a+4) y^b, and of the first times a function, at [b][a].
+  std::array<std::array<double, 4>, 7> low_moments_{};
+  std::array<std::array<double, 4>, 3> high_moments_{};
+  std::array<std::array<double, 4>, 4> p_moments_{}, q_moments_{};
+  std::array<Row, kTerms> a_;             // the triangular matrix, above its diagonal
+  std::array<double, kTerms> p_{}, q_{};  // the coefficients
+  std::array<double, kTerms> inverse_{};
   double squares_ = 0;
   double variance_ = 0;
   std::size_t count_ = 0;
@@ -235,7 +269,7 @@ class CubicFit {
 // Half a turn in sixteen steps. Between two of them a third harmonic may be larger by the inverse
 // of the cosine of 16.9 degrees, and no harmonic here is higher.
 constexpr double kBetweenDirections = 1.046;
-const std::array<std::array<double, 2>, 16> kDirections = [] {
+const std::array<std::array<double, 2>, 16> sixteen_directions = [] {
   std::array<std::array<double, 2>, 16> directions{};
   for (std::size_t i = 0; i < directions.size(); ++i) {
     const double angle = static_cast<double>(i) * std::numbers::pi / 16;
@@ -255,7 +289,7 @@ double LargestOfForm(double xxx, double xxy, double xyy, double yyy) {
   const double c1 = 0.75 * (xxx + xyy), s1 = 0.75 * (xxy + yyy);
   const double c3 = 0.25 * (xxx - 3 * xyy), s3 = 0.25 * (3 * xxy - yyy);
   double largest = 0;
-  for (const auto& [c, s] : kDirections) {
+  for (const auto& [c, s] : sixteen_directions) {
     // cos 3a + i sin 3a = (c + i s)³
     const double third = c3 * c * (c * c - 3 * s * s) + s3 * s * (3 * c * c - s * s);
     largest = std::max(largest, std::abs(c1 * c + s1 * s + third));
@@ -276,7 +310,7 @@ struct Symmetric {
 // The largest norm of even + cosine cos 2a + sine sin 2a over all angles a.
 double LargestNorm(const Symmetric& even, const Symmetric& cosine, const Symmetric& sine) {
   double largest = 0;
-  for (const auto& [c, s] : kDirections) {
+  for (const auto& [c, s] : sixteen_directions) {
     const double c2 = c * c - s * s, s2 = 2 * c * s;
     const Symmetric at = {even.a + cosine.a * c2 + sine.a * s2,
                           even.b + cosine.b * c2 + sine.b * s2,
@@ -396,25 +430,32 @@ class Surroundings {
     }
     const double bend = Symmetric{p[1], 0.5 * (p[2] + q[1]), q[2]}.Norm();
     const double shifted = bend * position_error;
-    const double variance = fit.variance() + kNormalRounding * kNormalRounding + shifted * shifted;
+    const double variance = fit.Variance() + kNormalRounding * kNormalRounding + shifted * shifted;
     std::array<double, kTerms> noise = fit.Variances();
     for (std::size_t i = 3; i < kTerms; ++i)
       noise[i] *= 2 * variance * scale[i] * scale[i];
 
     Estimates estimates;
-    estimates[0].value = LargestOfForm(p[3], (2 * p[4] + q[3]) / 3, (p[5] + 2 * q[4]) / 3, q[5]);
-    estimates[0].noise = std::sqrt(noise[3] + 2 * noise[4] + noise[5]);
+    estimates.value[0] = LargestOfForm(p[3], (2 * p[4] + q[3]) / 3, (p[5] + 2 * q[4]) / 3, q[5]);
+    estimates.noise[0] = std::sqrt(noise[3] + 2 * noise[4] + noise[5]);
     // With w and t unit, the second derivative towards t of the curvature along w is w' M w with
     // M = xx cos² + 2 xy cos sin + yy sin² of t's angle.
     const Symmetric xx = {p[6], 0.5 * (p[7] + q[6]), q[7]};
     const Symmetric xy = {p[7], 0.5 * (p[8] + q[7]), q[8]};
     const Symmetric yy = {p[8], 0.5 * (p[9] + q[8]), q[9]};
-    estimates[1].value =
+    estimates.value[1] =
         LargestNorm({0.5 * (xx.a + yy.a), 0.5 * (xx.b + yy.b), 0.5 * (xx.c + yy.c)},
                     {0.5 * (xx.a - yy.a), 0.5 * (xx.b - yy.b), 0.5 * (xx.c - yy.c)}, xy);
-    estimates[1].noise = std::sqrt(noise[6] + 3 * noise[7] + 3 * noise[8] + noise[9]);
-    for (const Estimate& estimate : estimates) {
-      if (!std::isfinite(estimate.value) || !std::isfinite(estimate.noise)) return {};
+    estimates.noise[1] = std::sqrt(noise[6] + 3 * noise[7] + 3 * noise[8] + noise[9]);
+    estimates.is_rough =
+        fit.Variance() >
+        kLargestNoise * kLargestNoise + kLargestRounding * kLargestRounding * shifted * shifted;
+    for (std::size_t order = 0; order < 2; ++order) {
+      // Without noise there was no term to fit.
+      if (!std::isfinite(estimates.value[order]) || !std::isfinite(estimates.noise[order]) ||
+          !(estimates.noise[order] > 0)) {
+        return {};
+      }
     }
     return estimates;
   }
@@ -426,17 +467,17 @@ class Surroundings {
   std::array<Point, kMostPoints> points_;
 };
 
-// The fits at the selected of one graph.
-struct Level {
-  std::vector<std::uint32_t> of;     // [nodes] the selected one that stands for it
-  Graph selected;                    // the graph of the selected
-  std::vector<Estimates> estimates;  // [selected]
-};
-
-// The largest change around a place, and the noise in it.
+// The largest change around a place.
 struct Bound {
+  enum class Trust : std::uint8_t {
+    kUnsure,  // it may be all noise
+    kRough,   // a bound for the detail of its selection, but what a coarser one says of it is
+              // blurred
+    kSure,
+  };
   double value = kUnknown;
-  double noise = kUnknown;
+  double noise = 0;
+  Trust trust = Trust::kUnsure;
 
   [[nodiscard]] bool IsClearBy(double factor) const {
     return value < kUnknown && value >= factor * noise;
@@ -444,33 +485,82 @@ struct Bound {
 };
 using BothBounds = std::array<Bound, 2>;
 
-// The neighbors count, since a derivative has its zeros.
+// The fits at the selected of one graph.
+struct Level {
+  std::vector<std::uint32_t> of;     // [nodes] the selected one that stands for it
+  Graph selected;                    // the graph of the selected
+  std::vector<Estimates> estimates;  // [selected]; unknown where nobody asks
+  std::vector<BothBounds> bounds;    // [selected] from these estimates alone
+};
+
+// What the estimates around a place say: those of the neighbors count, since a derivative has its
+// zeros.
 Bound BoundAround(const Level& level, std::uint32_t s, std::size_t order) {
-  const Estimate& own = level.estimates[s][order];
-  if (own.value == kUnknown) return {};
-  Bound bound = {own.value, own.noise};
+  const Estimates& own = level.estimates[s];
+  if (!own.IsKnown()) return {};
+  Bound bound = {own.value[order], own.noise[order]};
+  bool is_rough = own.is_rough;
   double count = 1;
   for (const std::uint32_t other : level.selected.Around(s)) {
-    const Estimate& estimate = level.estimates[other][order];
-    if (estimate.value == kUnknown) continue;
-    bound.value = std::max(bound.value, estimate.value);
-    bound.noise += estimate.noise;
+    const Estimates& estimates = level.estimates[other];
+    if (!estimates.IsKnown()) continue;
+    bound.value = std::max(bound.value, estimates.value[order]);
+    bound.noise += estimates.noise[order];
+    is_rough |= estimates.is_rough;
     count += 1;
   }
   bound.noise /= count;
+  if (bound.IsClearBy(kClear)) {
+    bound.trust = Bound::Trust::kSure;
+  } else if (is_rough) {
+    bound.trust = Bound::Trust::kRough;
+  }
   return bound;
 }
 
+// Between a bound and the one that was chosen from the coarser selections.
 Bound Choose(const Bound& fine, const Bound& coarse) {
-  if (fine.IsClearBy(kClear)) return fine;
-  // From one selection to the next noise falls to an eighth. Where it does not, it is detail that
-  // the coarse one blurs.
-  if (!(coarse.noise < 0.5 * fine.noise)) return fine;
-  if (coarse.IsClearBy(kClear)) return {std::min(fine.value, coarse.value), coarse.noise};
-  // Neither is sure. What is more noise than change may be anything smaller.
+  if (fine.trust != Bound::Trust::kUnsure || coarse.value == kUnknown) return fine;
+  if (coarse.trust == Bound::Trust::kRough) return {fine.value, fine.noise, Bound::Trust::kSure};
+  if (coarse.trust == Bound::Trust::kSure) {
+    return {std::min(fine.value, coarse.value), coarse.noise, Bound::Trust::kSure};
+  }
+  // Both may be all noise, and what is may be anything smaller.
   if (fine.IsClearBy(kDoubtful) && !coarse.IsClearBy(fine.value / fine.noise)) return fine;
   if (coarse.IsClearBy(kDoubtful)) return coarse;
   return {std::min(fine.value, coarse.value), coarse.noise};
+}
+
+// Whether no coarser selection is asked about a place.
+bool IsSettled(const BothBounds& bounds) {
+  return bounds[0].trust != Bound::Trust::kUnsure && bounds[1].trust != Bound::Trust::kUnsure;
+}
+
+// The level of `graph`, which is that of the selected of `finer`, if there is one.
+Level NextLevel(const Graph& graph, const Level* finer, Surroundings& surroundings) {
+  Level level;
+  Selection selection = SelectFrom(graph);
+  level.of = std::move(selection.of);
+  level.selected = Coarsen(graph, selection.nodes, level.of);
+  // With the neighbors of those that are asked.
+  std::vector<bool> is_wanted(selection.nodes.size(), finer == nullptr);
+  for (std::uint32_t i = 0; finer != nullptr && i < graph.size(); ++i) {
+    if (IsSettled(finer->bounds[i])) continue;
+    is_wanted[level.of[i]] = true;
+    for (const std::uint32_t other : level.selected.Around(level.of[i]))
+      is_wanted[other] = true;
+  }
+  surroundings.Prepare(graph);
+  level.estimates.resize(selection.nodes.size());
+  for (std::size_t s = 0; s < selection.nodes.size(); ++s) {
+    if (is_wanted[s]) level.estimates[s] = surroundings.At(selection.nodes[s]);
+  }
+  const Bound not_asked = {kUnknown, 0, Bound::Trust::kSure};
+  level.bounds.assign(selection.nodes.size(), {not_asked, not_asked});
+  for (std::uint32_t s = 0; s < level.bounds.size(); ++s) {
+    if (is_wanted[s]) level.bounds[s] = {BoundAround(level, s, 0), BoundAround(level, s, 1)};
+  }
+  return level;
 }
 
 }  // namespace
@@ -482,40 +572,29 @@ std::vector<CurvatureChange> CurvatureChanges(std::span<const Vec3> positions,
   const Graph all = GraphOf(normals, corners, sides);
   std::vector<Level> levels;
   Surroundings surroundings(positions, normals);
-  while (true) {
+  for (bool is_settled = false; !is_settled;) {
     const Graph& graph = levels.empty() ? all : levels.back().selected;
     if (graph.neighbors.empty()) break;
-    Selection selection = SelectFrom(graph);
-    Level level;
-    level.selected = Coarsen(graph, selection);
-    surroundings.Prepare(graph);
-    level.estimates.reserve(selection.nodes.size());
-    for (const std::uint32_t node : selection.nodes)
-      level.estimates.push_back(surroundings.At(node));
-    level.of = std::move(selection.of);
-    levels.push_back(std::move(level));
-  }
-
-  std::vector<BothBounds> chosen;  // of the level above, from the coarsest down
-  for (std::size_t l = levels.size(); l-- > 0;) {
-    const Level& level = levels[l];
-    std::vector<BothBounds> finer(level.estimates.size());
-    for (std::uint32_t s = 0; s < finer.size(); ++s) {
-      for (std::size_t order = 0; order < 2; ++order) {
-        finer[s][order] = BoundAround(level, s, order);
-        if (l + 1 == levels.size()) continue;
-        finer[s][order] = Choose(finer[s][order], chosen[levels[l + 1].of[s]][order]);
-      }
-    }
-    chosen = std::move(finer);
+    levels.push_back(NextLevel(graph, levels.empty() ? nullptr : &levels.back(), surroundings));
+    is_settled = std::ranges::all_of(levels.back().bounds, IsSettled);
   }
 
   std::vector<CurvatureChange> changes(positions.size(), {kUnknown, kUnknown, false, false});
   if (levels.empty()) return changes;
+  for (std::size_t l = levels.size() - 1; l-- > 0;) {
+    std::vector<BothBounds>& fine = levels[l].bounds;
+    for (std::uint32_t s = 0; s < fine.size(); ++s) {
+      for (std::size_t order = 0; order < 2; ++order) {
+        fine[s][order] = Choose(fine[s][order], levels[l + 1].bounds[levels[l + 1].of[s]][order]);
+      }
+    }
+  }
+  const auto is_clear = [](const Bound& bound) {
+    return bound.trust != Bound::Trust::kUnsure || bound.IsClearBy(kDoubtful);
+  };
   for (std::uint32_t i = 0; i < all.size(); ++i) {
-    const BothBounds& bounds = chosen[levels[0].of[i]];
-    changes[all.vertex[i]] = {bounds[0].value, bounds[1].value, bounds[0].IsClearBy(kDoubtful),
-                              bounds[1].IsClearBy(kDoubtful)};
+    const auto& [first, second] = levels[0].bounds[levels[0].of[i]];
+    changes[all.vertex[i]] = {first.value, second.value, is_clear(first), is_clear(second)};
   }
   return changes;
 }

@@ -8,8 +8,12 @@
 // Normals are rounded, and positions: what that makes of a third difference grows with the inverse
 // cube of the distance of vertices. So the same is done again on coarser and coarser selections of
 // the vertices, and a place takes the finest where the change stands clear of the noise, which
-// is measured by what the fits leave over. Work and memory are linear: every selection is about a
-// quarter of the one before.
+// is measured by what the fits leave over. That only as long as what they leave over may be the
+// rounding of normals written with six digits: anything rougher is detail that light sees.
+//
+// Where a mesh has eight sides to a wave or more, the second derivative is at least 0.85 of the
+// true one for gentle waves; for six about 0.7. Work and memory are linear: every selection is
+// about a quarter of the one before.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +30,7 @@ namespace lucerna {
 struct CurvatureChange {
   double first = 0;   // [1/unit²]
   double second = 0;  // [1/unit³]
-  // Whether they stand clear of what rounding and other noise explains.
+  // Whether there is such a change, beyond what noise explains.
   bool first_is_clear = false, second_is_clear = false;
 };
 
