@@ -67,7 +67,7 @@ struct RenderSettings {
   double time_s = 0;         // stop after so long; 0: no limit
   std::int64_t photons_per_pass = 0;
   std::uint64_t seed = 0;
-  RadiusControllerKind radius_controller = RadiusControllerKind::kPpm;
+  RadiusControllerKind radius_controller = RadiusControllerKind::kAppm;
   double alpha = 2.0 / 3;  // share of new photons kept by ppm and pppm, in (0, 1)
   KernelKind kernel = KernelKind::kEpanechnikov;
   // Frequency controllers only: the relative bias that a pixel may have, and the share of photons

@@ -17,7 +17,7 @@ import sys
 import tempfile
 
 CONTROLLERS = ["ppm", "pppm", "appm", "cppm", "frequency", "frequency-consistent", "frequency-mse"]
-COLOURS = ["#444444", "#1f77b4", "#2ca02c", "#d62728", "#ff7f0e", "#9467bd"]
+COLOURS = ["#444444", "#1f77b4", "#17becf", "#2ca02c", "#d62728", "#ff7f0e", "#9467bd"]
 
 
 def cpu_of_children():

@@ -68,7 +68,8 @@ TEST_P(SameBitsTest, ForAnyWorkersThreadsAndBatches) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, SameBitsTest,
-                         testing::Values(Case{"glass-box.pbrt", "ppm"},
+                         testing::Values(Case{"glass-box.pbrt", "appm"},
+                                         Case{"glass-box.pbrt", "ppm"},
                                          Case{"rough-metal.pbrt", "ppm"},
                                          Case{"rough-metal.pbrt", "cppm"},
                                          Case{"textured.pbrt", "frequency-mse"},

@@ -94,6 +94,7 @@ RenderSettings TestSettings(const Scene& scene, std::int64_t photons_per_pass,
   overrides.initial_radius = initial_radius;
   overrides.max_depth = max_depth;
   overrides.seed = seed;
+  overrides.radius_controller = RadiusControllerKind::kPpm;
   return SettingsFor(scene, overrides);
 }
 

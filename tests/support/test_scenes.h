@@ -37,7 +37,7 @@ void AddDisk(Scene& scene, Vec3 center, Vec3 normal, float radius, std::int32_t 
 void SetCamera(Scene& scene, const std::array<double, 3>& eye, const std::array<double, 3>& look,
                const std::array<double, 3>& up, double fov_deg, int size);
 
-// Settings of the scene with what most tests set.
+// Settings of the scene with what most tests set, and the radius controller with no evidence.
 [[nodiscard]] RenderSettings TestSettings(const Scene& scene, std::int64_t photons_per_pass,
                                           double initial_radius, int max_depth,
                                           std::uint64_t seed = 1);

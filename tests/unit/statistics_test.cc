@@ -15,6 +15,7 @@ namespace {
 // L = tau / (pi r^2 P passes), as in Hachisuka et al. 2008, against the sum that is kept here.
 TEST(PixelStatisticsTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
   RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kPpm;
   settings.alpha = 0.7;
   const auto ppm = MakeRadiusController(settings, 1);
   const Kernel kernel{KernelKind::kConstant};
@@ -58,6 +59,7 @@ TEST(PixelStatisticsTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
 TEST(PixelStatisticsTest, CountsAPassWithoutHitpointAsDark) {
   PixelStatistics statistics(2, 1);
   RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kPpm;
   const auto ppm = MakeRadiusController(settings, 1);
   const std::vector<std::uint32_t> pixels = {1};
   const std::vector<Rgb> weights = {{2, 0, -1}};
