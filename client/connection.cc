@@ -16,6 +16,7 @@
 #include "render/wire/channel.h"
 #include "render/wire/chunks.h"
 #include "render/wire/grpc_status.h"
+#include "render/wire/messages.h"
 
 namespace lucerna {
 namespace {
@@ -219,6 +220,44 @@ StatusOr<std::vector<v1::Job>> ClientConnection::List() {
   }
 }
 
+StatusOr<Digest> ClientConnection::UploadBytes(std::string_view bytes) {
+  const Digest digest = Sha256(bytes);
+  LUCERNA_RETURN_IF_ERROR(UploadBlob(digest, bytes));
+  return digest;
+}
+
+StatusOr<v1::Job> ClientConnection::Get(const std::string& job_id) {
+  v1::GetJobRequest request;
+  request.set_job_id(job_id);
+  v1::Job job;
+  LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
+    return jobs_->Get(&context, request, &job);
+  }));
+  return job;
+}
+
+StatusOr<v1::Job> ClientConnection::Stop(const std::string& job_id) {
+  v1::StopJobRequest request;
+  request.set_job_id(job_id);
+  v1::Job job;
+  LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
+    return jobs_->Stop(&context, request, &job);
+  }));
+  return job;
+}
+
+StatusOr<v1::Job> ClientConnection::Extend(const std::string& job_id,
+                                           const RenderOverrides& until) {
+  v1::ExtendJobRequest request;
+  request.set_job_id(job_id);
+  *request.mutable_until() = ToProto(until);
+  v1::Job job;
+  LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
+    return jobs_->Extend(&context, request, &job);
+  }));
+  return job;
+}
+
 StatusOr<v1::Job> ClientConnection::Cancel(const std::string& job_id) {
   v1::CancelJobRequest request;
   request.set_job_id(job_id);
@@ -265,21 +304,26 @@ StatusOr<v1::Job> ClientConnection::Watch(const std::string& job_id, const OnJob
   }
 }
 
-StatusOr<std::string> ClientConnection::GetImage(const std::string& job_id) {
+StatusOr<std::string> ClientConnection::GetImage(const std::string& job_id,
+                                                 const std::function<bool()>& gives_up) {
   v1::GetImageRequest request;
   request.set_job_id(job_id);
   std::string bytes;
   bool is_too_long = false;
   const Status status = Retry(kStreamTime, [&](grpc::ClientContext& context) {
+    // Not a code that is worth another attempt.
+    const grpc::Status given_up(grpc::StatusCode::ABORTED, "nobody waits for the image any more");
+    if (gives_up()) return given_up;
     bytes.clear();
     const auto reader = images_->GetImage(&context, request);
     v1::Chunk chunk;
     while (!is_too_long && reader->Read(&chunk)) {
       bytes += chunk.bytes();
       is_too_long = bytes.size() > kMaxImageBytes;
-      if (is_too_long || IsInterrupted()) context.TryCancel();
+      if (is_too_long || IsInterrupted() || gives_up()) context.TryCancel();
     }
     const grpc::Status ended = reader->Finish();
+    if (gives_up()) return given_up;
     return is_too_long ? grpc::Status::OK : ended;
   });
   if (is_too_long) return absl::ResourceExhaustedError("the image is longer than 8 GiB");

@@ -19,6 +19,7 @@
 #include "proto/lucerna/v1/images.grpc.pb.h"
 #include "proto/lucerna/v1/jobs.grpc.pb.h"
 #include "render/base/status.h"
+#include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 
 namespace lucerna {
@@ -33,10 +34,17 @@ class ClientConnection {
   // Errors: FAILED_PRECONDITION when a file is no longer what the manifest says.
   [[nodiscard]] Status Upload(const SceneManifest& manifest, SceneFiles& files);
 
+  // Brings bytes that are no file of a scene, unless they are there.
+  [[nodiscard]] StatusOr<Digest> UploadBytes(std::string_view bytes);
+
   [[nodiscard]] StatusOr<v1::SubmitResponse> Submit(const v1::SubmitRequest& request);
   // All jobs, newest first.
   [[nodiscard]] StatusOr<std::vector<v1::Job>> List();
+  [[nodiscard]] StatusOr<v1::Job> Get(const std::string& job_id);
   [[nodiscard]] StatusOr<v1::Job> Cancel(const std::string& job_id);
+  [[nodiscard]] StatusOr<v1::Job> Stop(const std::string& job_id);
+  // Only the stop criteria of `until` may be set.
+  [[nodiscard]] StatusOr<v1::Job> Extend(const std::string& job_id, const RenderOverrides& until);
 
   // Called with the newest state of the job, several times a second. A failure ends the watch.
   using OnJob = std::function<Status(const v1::Job& job)>;
@@ -44,8 +52,10 @@ class ClientConnection {
   // thread; before the first news it is called with an empty Job, state UNSPECIFIED.
   [[nodiscard]] StatusOr<v1::Job> Watch(const std::string& job_id, const OnJob& on_job);
 
-  // The bytes of the job's EXR file.
-  [[nodiscard]] StatusOr<std::string> GetImage(const std::string& job_id);
+  // The bytes of the job's EXR file. Whoever may lose interest says so by `gives_up`, which is
+  // asked at every piece that arrives; then ABORTED. Threads: any, beside other calls.
+  [[nodiscard]] StatusOr<std::string> GetImage(
+      const std::string& job_id, const std::function<bool()>& gives_up = [] { return false; });
 
  private:
   ClientConnection(std::string address, const std::shared_ptr<grpc::Channel>& channel);

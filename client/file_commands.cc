@@ -1,6 +1,7 @@
 #include "client/file_commands.h"
 
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 #include "absl/strings/str_format.h"
@@ -15,18 +16,18 @@
 namespace lucerna {
 namespace {
 
+std::string Counted(std::size_t count, const std::string& word) {
+  return absl::StrCat(count, " ", word, count == 1 ? "" : "s");
+}
+
+}  // namespace
+
 StatusOr<Image> ReadImage(const std::string& path) {
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(path));
   StatusOr<Image> image = DecodeExr(bytes);
   if (image.ok()) return image;
   return absl::InvalidArgumentError(absl::StrCat(path, ": ", image.status().message()));
 }
-
-std::string Counted(std::size_t count, const std::string& word) {
-  return absl::StrCat(count, " ", word, count == 1 ? "" : "s");
-}
-
-}  // namespace
 
 Status Validate(const std::string& scene_path, bool strict, const Voice& voice) {
   LUCERNA_RETURN_IF_ERROR(CheckNamesFile(scene_path));
@@ -75,6 +76,14 @@ Status Diff(const std::string& image_path, const std::string& reference_path,
       metrics.mean_ratio, metrics.channel_mean_ratio[0], metrics.channel_mean_ratio[1],
       metrics.channel_mean_ratio[2]);
   std::fputs(text.c_str(), stdout);
+  if (metrics.reference_rel_mse && metrics.reference_mse) {
+    const std::string of_reference = absl::StrFormat(
+        "the reference's noise: relMSE %.6g, RMSE %.6g\n"
+        "without it       relMSE %.6g\n",
+        *metrics.reference_rel_mse, std::sqrt(*metrics.reference_mse),
+        metrics.rel_mse - *metrics.reference_rel_mse);
+    std::fputs(of_reference.c_str(), stdout);
+  }
   return absl::OkStatus();
 }
 

@@ -9,6 +9,9 @@
 
 namespace lucerna {
 
+// The image in an EXR file. Errors begin with the path.
+[[nodiscard]] StatusOr<Image> ReadImage(const std::string& path);
+
 // Says everything there is to say about the scene.
 // Errors: INVALID_ARGUMENT when it has errors, or, if `strict`, warnings.
 [[nodiscard]] Status Validate(const std::string& scene_path, bool strict, const Voice& voice);

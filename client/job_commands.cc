@@ -1,24 +1,22 @@
 #include "client/job_commands.h"
 
 #include <cstdio>
-#include <functional>
-#include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_join.h"
-#include <unistd.h>
 
 #include "client/connection.h"
 #include "client/exit_code.h"
+#include "client/job_run.h"
 #include "client/progress_view.h"
 #include "client/report.h"
+#include "client/report_page.h"
 #include "client/scene_reading.h"
-#include "render/base/clock.h"
 #include "render/base/files.h"
 #include "render/film/png_file.h"
 #include "render/image/exr_file.h"
-#include "render/wire/messages.h"
 
 namespace lucerna {
 namespace {
@@ -39,74 +37,19 @@ Status CheckOutputs(const OutputPaths& outputs) {
   return absl::OkStatus();
 }
 
-// Unlike any other submission's, so that only a retry of this one finds its job.
-std::string NewRequestId(const SceneManifest& manifest) {
-  char host[65] = {};
-  ::gethostname(host, sizeof(host) - 1);
-  const Digest digest = Sha256(absl::StrCat(manifest.SceneDigest().Hex(), host, "/", ::getpid(),
-                                            "/", SystemClock().Wall().time_since_epoch().count()));
-  return digest.Hex();
-}
-
-StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, const std::string& scene_path,
-                                     const SceneManifest& manifest,
-                                     const RenderOverrides& overrides) {
-  DirectoryFiles files(SplitScenePath(scene_path).folder);
-  LUCERNA_RETURN_IF_ERROR(connection.Upload(manifest, files));
-  v1::SubmitRequest request;
-  request.set_request_id(NewRequestId(manifest));
-  *request.mutable_scene() = ToProto(manifest);
-  *request.mutable_overrides() = ToProto(overrides);
-  return connection.Submit(request);
-}
-
-// Follows the job to its end. `check` is asked several times a second.
-StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& job_id,
-                              bool shows_progress, const std::function<Status()>& check) {
-  ProgressPrinter printer(::isatty(STDERR_FILENO) == 1);
-  const auto write = [&](const std::string& text) {
-    if (!shows_progress) return;
-    std::fputs(text.c_str(), stderr);
-    std::fflush(stderr);
-  };
-  auto job = connection.Watch(job_id, [&](const v1::Job& newest) {
-    // Of the end tells the summary.
-    if (newest.state() != v1::JOB_STATE_UNSPECIFIED && !HasEnded(newest.state())) {
-      write(printer.Update(newest, SystemClock().Steady()));
-    }
-    return check();
-  });
-  write(printer.Finish());
-  return job;
-}
-
-Status CheckSucceeded(const v1::Job& job) {
-  if (job.state() == v1::JOB_STATE_SUCCEEDED) return absl::OkStatus();
-  if (job.state() == v1::JOB_STATE_CANCELLED) {
-    return absl::FailedPreconditionError(absl::StrCat("job ", job.job_id(), " was cancelled"));
-  }
-  return absl::FailedPreconditionError(
-      absl::StrCat("job ", job.job_id(), " failed: ", job.failure()));
-}
-
 // Fetches the image, makes sure that it is one, and writes it.
 StatusOr<SavedImage> Save(ClientConnection& connection, const std::string& job_id,
                           const OutputPaths& outputs) {
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, connection.GetImage(job_id));
-  const StatusOr<Image> image = DecodeExr(bytes);
-  if (!image.ok()) {
-    return absl::DataLossError(
-        absl::StrCat("the image of job ", job_id,
-                     " arrived damaged; fetch it again: ", image.status().message()));
-  }
+  LUCERNA_ASSIGN_OR_RETURN(const Image image, DecodeImageOf(job_id, bytes));
   SavedImage saved;
-  saved.digest = image->PixelDigest();
+  saved.digest = image.PixelDigest();
   if (!outputs.exr.empty()) {
     LUCERNA_RETURN_IF_ERROR(WriteFile(outputs.exr, bytes));
     saved.paths.push_back(outputs.exr);
   }
   if (!outputs.png.empty()) {
-    LUCERNA_ASSIGN_OR_RETURN(const std::string png, EncodePng(*image));
+    LUCERNA_ASSIGN_OR_RETURN(const std::string png, EncodePng(image));
     LUCERNA_RETURN_IF_ERROR(WriteFile(outputs.png, png));
     saved.paths.push_back(outputs.png);
   }
@@ -137,21 +80,10 @@ Status Render(const RenderRequest& request, const ClusterOptions& cluster_option
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene_path, overrides, voice.quiet));
-  LUCERNA_ASSIGN_OR_RETURN(const auto cluster, LocalCluster::Start(cluster_options));
-  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(cluster->address()));
-  LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
-                           SendJob(*connection, request.scene_path, manifest, overrides));
-  const auto job =
-      FollowToEnd(*connection, submitted.job_id(), !voice.quiet, [&] { return cluster->Check(); });
-  if (!job.ok()) {
-    // The coordinator ends with us; cancelling first lets the workers leave at once. Whether it
-    // still hears that makes no difference to the user.
-    if (ExitCodeOf(job.status()) == ExitCode::kInterrupted) {
-      connection->Cancel(submitted.job_id()).IgnoreError();
-    }
-    return job.status();
-  }
-  return SaveAndReport(*connection, *job, request.outputs, voice);
+  LUCERNA_ASSIGN_OR_RETURN(const auto runs,
+                           LocalRuns::Start(cluster_options, request.scene_path, manifest));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, runs->Run(overrides, request.reference, voice));
+  return SaveAndReport(runs->connection(), job, request.outputs, voice);
 }
 
 Status Submit(const RenderRequest& request, const std::string& server, const Voice& voice) {
@@ -160,13 +92,14 @@ Status Submit(const RenderRequest& request, const std::string& server, const Voi
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene_path, overrides, voice.quiet));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
-  LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
-                           SendJob(*connection, request.scene_path, manifest, overrides));
+  LUCERNA_ASSIGN_OR_RETURN(
+      const v1::SubmitResponse submitted,
+      SendJob(*connection, request.scene_path, manifest, overrides, request.reference));
   if (request.outputs.empty()) {
     Print(voice.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
     return absl::OkStatus();
   }
-  const auto job = FollowToEnd(*connection, submitted.job_id(), !voice.quiet, Nothing);
+  const auto job = FollowToEnd(*connection, submitted.job_id(), true, voice, Nothing);
   if (!job.ok()) {
     if (ExitCodeOf(job.status()) != ExitCode::kInterrupted) return job.status();
     return Failure(ExitCode::kInterrupted,
@@ -192,8 +125,8 @@ Status ListJobs(const std::string& server, const Voice& voice) {
 Status Follow(const std::string& job_id, bool shows_progress, const std::string& server,
               const Voice& voice) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
-  LUCERNA_ASSIGN_OR_RETURN(
-      const v1::Job job, FollowToEnd(*connection, job_id, shows_progress && !voice.quiet, Nothing));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job,
+                           FollowToEnd(*connection, job_id, shows_progress, voice, Nothing));
   if (voice.json) {
     Print(JobReport(job));
   } else if (!voice.quiet) {
@@ -215,15 +148,82 @@ Status Fetch(const std::string& job_id, const OutputPaths& outputs, const std::s
   return absl::OkStatus();
 }
 
-Status Cancel(const std::string& job_id, const std::string& server, const Voice& voice) {
+namespace {
+
+// The job's image for a page; absent when it has none.
+StatusOr<std::optional<PageImage>> ImageOf(ClientConnection& connection,
+                                           const std::string& job_id) {
+  const StatusOr<std::string> bytes = connection.GetImage(job_id);
+  // No pass is merged yet, or the image was dropped: the rest of the report is worth having.
+  if (absl::IsFailedPrecondition(bytes.status())) return std::optional<PageImage>();
+  LUCERNA_RETURN_IF_ERROR(bytes.status());
+  LUCERNA_ASSIGN_OR_RETURN(const Image image, DecodeExr(*bytes));
+  LUCERNA_ASSIGN_OR_RETURN(std::string png, EncodePng(image));
+  return std::optional<PageImage>({std::move(png), image.PixelDigest()});
+}
+
+}  // namespace
+
+Status Report(const std::string& job_id, const ReportPaths& paths, const std::string& server,
+              const Voice& voice) {
+  if (!paths.html.empty() && !paths.csv.empty() && IsSameFile(paths.html, paths.csv)) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat("-o and --csv both name ", paths.html,
+                                "; give the page and the table a file of its own each"));
+  }
+  for (const std::string& path : {paths.html, paths.csv}) {
+    if (!path.empty()) LUCERNA_RETURN_IF_ERROR(CheckWritable(path));
+  }
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
-  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, connection->Cancel(job_id));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, connection->Get(job_id));
+  std::vector<std::string> written;
+  if (!paths.html.empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(const auto image, ImageOf(*connection, job_id));
+    LUCERNA_RETURN_IF_ERROR(WriteFile(paths.html, ReportPage(job, image)));
+    written.push_back(paths.html);
+  }
+  if (!paths.csv.empty()) {
+    LUCERNA_RETURN_IF_ERROR(WriteFile(paths.csv, ConvergenceCsv(job)));
+    written.push_back(paths.csv);
+  }
   if (voice.json) {
-    Print(JobReport(job));
+    Print(ConvergenceReport(job));
   } else if (!voice.quiet) {
-    Print(absl::StrCat("job ", job.job_id(), " ", NameOf(job.state()), "\n"));
+    Print(absl::StrJoin(written, "\n") + "\n");
   }
   return absl::OkStatus();
+}
+
+namespace {
+
+// Says where a job stands after it was told something.
+Status Acknowledge(const StatusOr<v1::Job>& job, const Voice& voice) {
+  if (!job.ok()) return job.status();
+  if (voice.json) {
+    Print(JobReport(*job));
+  } else if (!voice.quiet) {
+    Print(absl::StrCat("job ", job->job_id(), " ", NameOf(job->state()), "\n"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+Status Cancel(const std::string& job_id, const std::string& server, const Voice& voice) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  return Acknowledge(connection->Cancel(job_id), voice);
+}
+
+Status StopJob(const std::string& job_id, const std::string& server, const Voice& voice) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  return Acknowledge(connection->Stop(job_id), voice);
+}
+
+Status Extend(const std::string& job_id, const RenderFlags& until, const std::string& server,
+              const Voice& voice) {
+  LUCERNA_ASSIGN_OR_RETURN(const RenderOverrides overrides, ToOverrides(until));
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  return Acknowledge(connection->Extend(job_id, overrides), voice);
 }
 
 }  // namespace lucerna

@@ -8,15 +8,10 @@
 
 #include "client/local_cluster.h"
 #include "client/render_flags.h"
+#include "client/voice.h"
 #include "render/base/status.h"
 
 namespace lucerna {
-
-// How a command speaks.
-struct Voice {
-  bool json = false;   // results as one JSON value
-  bool quiet = false;  // no progress, no summary, no warnings
-};
 
 // Where an image goes; empty: not there.
 struct OutputPaths {
@@ -29,6 +24,7 @@ struct OutputPaths {
 struct RenderRequest {
   std::string scene_path;
   RenderFlags flags;
+  std::string reference;  // EXR file to tell the true error by; empty: none
   OutputPaths outputs;
 };
 
@@ -50,6 +46,24 @@ struct RenderRequest {
 
 [[nodiscard]] Status Fetch(const std::string& job_id, const OutputPaths& outputs,
                            const std::string& server, const Voice& voice);
+
+// Where a report goes; empty: not there. As JSON it goes to stdout when the voice says so.
+struct ReportPaths {
+  std::string html;
+  std::string csv;
+};
+
+// Tells how a job went, be it over or not: image, error, workers.
+[[nodiscard]] Status Report(const std::string& job_id, const ReportPaths& paths,
+                            const std::string& server, const Voice& voice);
+
+// Ends the job with the image as it is.
+[[nodiscard]] Status StopJob(const std::string& job_id, const std::string& server,
+                             const Voice& voice);
+
+// Gives the job a new end (passes, photons, time, error) and lets it go on.
+[[nodiscard]] Status Extend(const std::string& job_id, const RenderFlags& until,
+                            const std::string& server, const Voice& voice);
 
 [[nodiscard]] Status Cancel(const std::string& job_id, const std::string& server,
                             const Voice& voice);

@@ -2,16 +2,20 @@
 //
 // Only wires: flags in, one command called, its Status out as a message and an exit code.
 #include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
+#include "client/compare_command.h"
 #include "client/exit_code.h"
 #include "client/file_commands.h"
 #include "client/interruption.h"
 #include "client/job_commands.h"
 #include "client/local_cluster.h"
+#include "client/preview.h"
+#include "client/reference_command.h"
 
 namespace lucerna {
 namespace {
@@ -32,6 +36,8 @@ int Run(int argc, char** argv) {
   RenderRequest request;
   ClusterOptions cluster;
   OutputPaths fetched;
+  ReportPaths report_paths;
+  RenderFlags until;
   std::string server = "127.0.0.1:7400";
   std::string job_id;
   std::string scene_path;
@@ -40,7 +46,10 @@ int Run(int argc, char** argv) {
   std::string mask_path;
   std::string png_path;
   MetricsOptions metrics;
+  CompareRequest comparison;
+  ReferenceRequest to_refer;
   double exposure_stops = 0;
+  bool hides_preview = false;
   bool strict = false;
   bool crops = false;
   bool scales = false;
@@ -58,36 +67,30 @@ int Run(int argc, char** argv) {
   const auto add_quiet = [&](CLI::App* to) {
     to->add_flag("--quiet", voice.quiet, "print nothing but errors and what was asked for");
   };
+  const auto add_no_preview = [&](CLI::App* to) {
+    to->add_flag("--no-preview", hides_preview, "do not show the image on a terminal with colours");
+  };
   const auto add_server = [&](CLI::App* to) {
     to->add_option("--server", server, "the coordinator, as host:port")
         ->envname("LUCERNA_SERVER")
         ->capture_default_str();
   };
   const auto add_render_flags = [&](CLI::App* to) {
-    RenderFlags& flags = request.flags;
     to->add_option("SCENE", request.scene_path, "pbrt-v4 scene file")->required();
     to->add_option("-o,--output", request.outputs.exr, "EXR file to write");
     to->add_option("--png", request.outputs.png, "PNG preview to write");
-    to->add_option("--size", flags.size, "width and height in pixels, like 640x480");
-    to->add_option("--passes", flags.passes, "stop after so many passes");
-    to->add_option("--photons-per-pass", flags.photons_per_pass, "photons of one pass");
-    to->add_option("--time", flags.time_s, "stop after so many seconds");
-    to->add_option("--seed", flags.seed, "another seed, other noise");
-    to->add_option("--radius-controller", flags.radius_controller,
-                   "ppm, pppm, appm, cppm, frequency, frequency-consistent or frequency-mse");
-    to->add_option("--alpha", flags.alpha, "share of new photons kept, between 0 and 1");
-    to->add_option("--kernel", flags.kernel, "constant, epanechnikov, biweight or gaussian");
-    to->add_option("--bias", flags.bias, "frequency controllers: bias a pixel may have, like 2%");
-    to->add_option("--frequency-share", flags.frequency_share,
-                   "frequency controllers: share of frequency photons, like 10%");
-    to->add_option("--initial-radius", flags.initial_radius, "in scene units, or auto");
-    to->add_option("--max-depth", flags.max_depth, "scattering events of a path");
+    AddImageFlags(*to, request.flags);
+    AddStopFlags(*to, request.flags);
+    to->add_option("--reference", request.reference, "EXR file to tell the true error by");
   };
 
-  CLI::App* render = command("render", "render a scene on this machine", [&] {
+  const auto find_programs = [&] {
     StatusOr<std::string> folder = ProgramFolder();
-    if (!folder.ok()) return folder.status();
-    cluster.program_folder = *folder;
+    if (folder.ok()) cluster.program_folder = *folder;
+    return folder.status();
+  };
+  CLI::App* render = command("render", "render a scene on this machine", [&]() -> Status {
+    LUCERNA_RETURN_IF_ERROR(find_programs());
     return Render(request, cluster, voice);
   });
   add_render_flags(render);
@@ -98,6 +101,7 @@ int Run(int argc, char** argv) {
       ->check(CLI::Range(1, 4096));
   add_json(render);
   add_quiet(render);
+  add_no_preview(render);
 
   CLI::App* submit = command("submit", "send a scene to a coordinator",
                              [&] { return Submit(request, server, voice); });
@@ -105,6 +109,7 @@ int Run(int argc, char** argv) {
   add_server(submit);
   add_json(submit);
   add_quiet(submit);
+  add_no_preview(submit);
 
   CLI::App* jobs =
       command("jobs", "list the jobs of a coordinator", [&] { return ListJobs(server, voice); });
@@ -121,7 +126,28 @@ int Run(int argc, char** argv) {
   fetch->add_option("--png", fetched.png, "PNG preview to write");
   CLI::App* cancel = command("cancel", "end a job and drop its image",
                              [&] { return Cancel(job_id, server, voice); });
-  for (CLI::App* about_job : {watch, wait, fetch, cancel}) {
+  add_no_preview(watch);
+  CLI::App* report =
+      command("report", "tell how a job went: image, error, workers, on a page of its own",
+              [&] { return Report(job_id, report_paths, server, voice); });
+  report->add_option("-o,--output", report_paths.html, "HTML file to write");
+  report->add_option("--csv", report_paths.csv, "file to write samples and workers to, as a table");
+  for (CLI::App* about_job : {watch, wait, fetch, report, cancel}) {
+    about_job->add_option("JOB", job_id, "the job's id")->required();
+    add_server(about_job);
+    add_json(about_job);
+    add_quiet(about_job);
+  }
+
+  CLI::App* stop = command("stop", "end a job and keep its image",
+                           [&] { return StopJob(job_id, server, voice); });
+  CLI::App* extend = command("extend", "go on with a job, from all its photons, to a new end",
+                             [&] { return Extend(job_id, until, server, voice); });
+  extend->add_option("--passes", until.passes, "stop after so many passes in all");
+  extend->add_option("--photons", until.photons, "stop after so many photons in all");
+  extend->add_option("--time", until.time_s, "stop after so many seconds in all");
+  extend->add_option("--error", until.error, "stop when the relative error is at most this");
+  for (CLI::App* about_job : {stop, extend}) {
     about_job->add_option("JOB", job_id, "the job's id")->required();
     add_server(about_job);
     add_json(about_job);
@@ -150,6 +176,45 @@ int Run(int argc, char** argv) {
   diff->add_option("--mask", mask_path, "EXR file; pixels that are 0 in it are left out");
   add_json(diff);
 
+  CLI::App* compare =
+      command("compare", "say which settings are ahead after equal time", [&]() -> Status {
+        LUCERNA_RETURN_IF_ERROR(find_programs());
+        return CompareSettings(comparison, cluster, voice);
+      });
+  compare->add_option("SCENE", comparison.scene_path, "pbrt-v4 scene file")->required();
+  compare->add_option("--reference", comparison.reference_path, "EXR file to measure errors by")
+      ->required();
+  compare->add_option("--mask", comparison.mask_path,
+                      "EXR file; pixels that are 0 in it are left out");
+  compare->add_option("--trim", comparison.trim_share, "leave out this share of the worst pixels");
+  compare->add_option("--times", comparison.times, "processor seconds over cores, like 1,2,5,10")
+      ->capture_default_str();
+  compare->add_option("--repetitions", comparison.repetitions, "runs of each setting")
+      ->capture_default_str();
+  compare
+      ->add_option("--settings", comparison.settings,
+                   "\"NAME: flags\", once for each (default: one for each radius controller)")
+      ->allow_extra_args(false);
+  compare->add_option("-o,--output", comparison.table_path, "table to write, as Markdown");
+  compare->add_option("--plot", comparison.plot_path, "plot to write, as SVG");
+  AddImageFlags(*compare, comparison.common);
+  add_json(compare);
+  add_quiet(compare);
+
+  CLI::App* reference =
+      command("reference", "render an image to measure others by", [&]() -> Status {
+        LUCERNA_RETURN_IF_ERROR(find_programs());
+        return RenderReference(to_refer, cluster, voice);
+      });
+  reference->add_option("SCENE", to_refer.scene_path, "pbrt-v4 scene file")->required();
+  reference->add_option("-o,--output", to_refer.output_path, "EXR file to write")->required();
+  reference->add_option("--time", to_refer.flags.time_s, "seconds, of both halves together");
+  reference->add_option("--passes", to_refer.flags.passes, "passes, of both halves together");
+  AddImageFlags(*reference, to_refer.flags);
+  add_no_preview(reference);
+  add_json(reference);
+  add_quiet(reference);
+
   CLI::App* digest = command("digest", "print the digest of an image's pixels and settings",
                              [&] { return PrintDigest(image_path, voice); });
   digest->add_option("FILE", image_path, "EXR file")->required();
@@ -172,6 +237,15 @@ int Run(int argc, char** argv) {
     std::fputs("lucerna: say where the image goes, with -o FILE.exr or --png FILE.png\n", stderr);
     return End(ExitCode::kUsage);
   }
+
+  if (*report && report_paths.html.empty() && report_paths.csv.empty() && !voice.json) {
+    std::fputs("lucerna: say where the report goes, with -o PAGE.html, --csv FILE or --json\n",
+               stderr);
+    return End(ExitCode::kUsage);
+  }
+  const char* term = std::getenv("TERM");
+  voice.redraws = term != nullptr && std::string(term) != "dumb";
+  voice.previews = !hides_preview && HasColors(std::getenv("COLORTERM"), term);
 
   CatchInterruptions();
   Status status = chosen();

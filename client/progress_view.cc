@@ -6,6 +6,8 @@
 
 #include "absl/strings/str_format.h"
 
+#include "client/convergence.h"
+#include "render/base/text.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {
@@ -13,8 +15,15 @@ namespace {
 
 constexpr Duration kPlainLineEvery = std::chrono::seconds(2);
 
+// After how many photons the job stops, by its passes or its photons; 0: no limit.
 double PhotonsInAll(const v1::RenderSettings& settings) {
-  return static_cast<double>(settings.passes()) * static_cast<double>(settings.photons_per_pass());
+  const double per_pass = static_cast<double>(settings.photons_per_pass());
+  const double of_passes = static_cast<double>(settings.passes()) * per_pass;
+  double of_photons = static_cast<double>(settings.photons());
+  // It ends with the pass that reaches them.
+  if (per_pass > 0) of_photons = per_pass * std::ceil(of_photons / per_pass);
+  if (of_passes > 0 && of_photons > 0) return std::min(of_passes, of_photons);
+  return std::max(of_passes, of_photons);
 }
 
 std::string Bar(double share) {
@@ -28,6 +37,23 @@ std::string Passes(const v1::Job& job) {
   const std::int64_t passes = job.progress().passes();
   const std::int64_t wanted = job.settings().passes();
   return wanted > 0 ? absl::StrCat("pass ", passes, "/", wanted) : absl::StrCat("pass ", passes);
+}
+
+std::string EndOf(v1::StopReason reason) {
+  switch (reason) {
+    case v1::STOP_REASON_PASSES:
+      return ", all passes done";
+    case v1::STOP_REASON_TIME:
+      return ", stopped by its time limit";
+    case v1::STOP_REASON_ERROR:
+      return ", its error target reached";
+    case v1::STOP_REASON_PHOTONS:
+      return ", all photons done";
+    case v1::STOP_REASON_USER:
+      return ", stopped by its user";
+    default:
+      return ", done";
+  }
 }
 
 std::string WithoutPrefix(const std::string& name, const std::string& prefix) {
@@ -82,6 +108,11 @@ std::optional<double> ShareDone(const v1::Job& job) {
     share = std::max(share,
                      static_cast<double>(job.progress().photons()) / PhotonsInAll(job.settings()));
   }
+  if (const auto left = TimeToTarget(job)) {
+    const double running_s = Seconds(FromProto(job.progress().running()));
+    const double whole_s = running_s + Seconds(*left);
+    share = std::max(share, whole_s > 0 ? running_s / whole_s : 1);
+  }
   return std::clamp(share, 0.0, 1.0);
 }
 
@@ -96,6 +127,9 @@ std::optional<Duration> TimeLeft(const v1::Job& job) {
     const double photons =
         PhotonsInAll(job.settings()) - static_cast<double>(job.progress().photons());
     left_s = left_s ? std::min(*left_s, photons / rate) : photons / rate;
+  }
+  if (const auto left = TimeToTarget(job)) {
+    left_s = left_s ? std::min(*left_s, Seconds(*left)) : Seconds(*left);
   }
   if (!left_s) return std::nullopt;
   // A rate near zero must not overflow the clock: ten years are as good as for ever.
@@ -136,15 +170,32 @@ std::string SummaryLine(const v1::Job& job) {
       ShortCount(static_cast<double>(progress.photons())), ShortTime(running));
   switch (job.state()) {
     case v1::JOB_STATE_SUCCEEDED:
-      return line + (job.stop_reason() == v1::STOP_REASON_TIME ? ", stopped by its time limit"
-                                                               : ", all passes done");
+      line += EndOf(job.stop_reason());
+      break;
     case v1::JOB_STATE_CANCELLED:
       return line + ", cancelled";
     case v1::JOB_STATE_FAILED:
       return line + ", failed: " + job.failure();
     default:
-      return line;
+      break;
   }
+  if (const auto error = NewestError(job)) {
+    absl::StrAppend(&line, ", error about ", ErrorWithInterval(*error));
+  }
+  return line;
+}
+
+std::string ErrorLine(const v1::Job& job) {
+  const auto error = NewestError(job);
+  if (!error) return {};
+  std::string line = Concat("error about ", ErrorWithInterval(*error));
+  if (const double target = job.settings().error(); target > 0) {
+    absl::StrAppend(&line, "  target ", ShortPercent(target));
+    if (const auto left = TimeToTarget(job); left && *left > Duration::zero()) {
+      absl::StrAppend(&line, " in about ", ShortTime(*left));
+    }
+  }
+  return line;
 }
 
 std::string TableHead() {
@@ -164,18 +215,11 @@ std::string ProgressPrinter::Update(const v1::Job& job, SteadyTime now) {
   if (line == last_line_) return {};
   const bool is_due = job.state() != last_state_ || !last_written_.has_value() ||
                       now - *last_written_ >= kPlainLineEvery;
-  if (!redraws_ && !is_due) return {};
+  if (!is_due) return {};
   last_line_ = line;
   last_written_ = now;
   last_state_ = job.state();
-  // To the beginning of the line, and away with what is left of a longer one.
-  return redraws_ ? absl::StrCat("\r", line, "\x1b[K") : absl::StrCat(line, "\n");
-}
-
-std::string ProgressPrinter::Finish() {
-  const bool has_open_line = redraws_ && !last_line_.empty();
-  last_line_.clear();
-  return has_open_line ? "\n" : "";
+  return line + "\n";
 }
 
 }  // namespace lucerna

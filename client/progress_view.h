@@ -1,7 +1,7 @@
 // How does a job's progress read?
 //
-// Pure: a Job and a time in, text out. Redrawn in place on a terminal; elsewhere plain lines, few
-// enough to be kept in a log.
+// Pure: a Job and a time in, text out. Plain lines, few enough to be kept in a log;
+// client/live_view.h makes more of them on a terminal.
 #pragma once
 
 #include <optional>
@@ -24,8 +24,8 @@ namespace lucerna {
 
 [[nodiscard]] bool HasEnded(v1::JobState state);
 
-// How much of the job is done, in [0, 1], by photons or by time, whichever stops it first; absent
-// before the job runs.
+// How much of the job is done, in [0, 1], by photons, time or the time that the error target is
+// expected to take, whichever stops it first; absent before the job runs.
 [[nodiscard]] std::optional<double> ShareDone(const v1::Job& job);
 
 // How long until it stops at the rate of the last seconds; absent when nothing tells.
@@ -38,23 +38,21 @@ namespace lucerna {
 // One line without its end, about a job that has ended.
 [[nodiscard]] std::string SummaryLine(const v1::Job& job);
 
+// One line without its end: "error about 1.83 % (95 %: 1.52 % to 2.11 %)  target 1.00 % in about
+// 4:05". Empty while nothing is known of the error.
+[[nodiscard]] std::string ErrorLine(const v1::Job& job);
+
 // The job on one line of a table; TableHead is the line above.
 [[nodiscard]] std::string TableHead();
 [[nodiscard]] std::string TableLine(const v1::Job& job);
 
-// What to write as a job moves on.
+// What to write as a job moves on, where nothing can be redrawn.
 class ProgressPrinter {
  public:
-  // redraws: the lines go to a terminal and replace one another.
-  explicit ProgressPrinter(bool redraws) : redraws_(redraws) {}
-
   // What to write now; often nothing.
   [[nodiscard]] std::string Update(const v1::Job& job, SteadyTime now);
-  // What to write before anything else is written.
-  [[nodiscard]] std::string Finish();
 
  private:
-  bool redraws_;
   std::string last_line_;
   std::optional<SteadyTime> last_written_;
   v1::JobState last_state_ = v1::JOB_STATE_UNSPECIFIED;

@@ -1,8 +1,17 @@
 #include "client/report.h"
 
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include <google/protobuf/util/time_util.h>
 #include <nlohmann/json.hpp>
 
+#include "client/convergence.h"
 #include "client/progress_view.h"
 #include "render/wire/messages.h"
 
@@ -28,6 +37,8 @@ Json SettingsOf(const v1::RenderSettings& settings) {
       {"crop", {settings.crop_x0(), settings.crop_y0(), settings.crop_x1(), settings.crop_y1()}},
       {"passes", settings.passes()},
       {"time_s", settings.time_s()},
+      {"error", settings.error()},
+      {"photons", settings.photons()},
       {"photons_per_pass", settings.photons_per_pass()},
       {"seed", settings.seed()},
       {"radius_controller", settings.radius_controller()},
@@ -36,6 +47,7 @@ Json SettingsOf(const v1::RenderSettings& settings) {
       {"bias", settings.bias()},
       {"frequency_share", settings.frequency_share()},
       {"initial_radius", settings.initial_radius()},
+      {"initial_footprints", settings.initial_footprints()},
       {"max_depth", settings.max_depth()},
   };
 }
@@ -76,6 +88,63 @@ Json JobOf(const v1::Job& job) {
   return json;
 }
 
+Json MeanJson(const MeanOfRuns& mean) {
+  Json json = {{"mean", mean.value}};
+  if (mean.standard_error) json["standard_error"] = *mean.standard_error;
+  return json;
+}
+
+Json SquaredErrorOf(const v1::SquaredError& error) {
+  return {{"mse", error.noise() + error.bias()},
+          {"noise", error.noise()},
+          {"bias", error.bias()},
+          {"low", error.low()},
+          {"high", error.high()}};
+}
+
+Json SampleOf(const v1::ErrorSample& sample) {
+  Json json = {{"passes", sample.passes()},
+               {"photons", sample.photons()},
+               {"running_s", Seconds(FromProto(sample.running()))},
+               {"cpu_s", Seconds(FromProto(sample.cpu()))},
+               {"relative", SquaredErrorOf(sample.relative())},
+               {"absolute", SquaredErrorOf(sample.absolute())}};
+  if (sample.has_true_relative()) json["true_relative_mse"] = sample.true_relative();
+  if (sample.has_true_absolute()) json["true_absolute_mse"] = sample.true_absolute();
+  return json;
+}
+
+Json ShareOf(const v1::WorkerShare& share) {
+  return {{"worker_id", share.worker_id()},
+          {"name", share.name()},
+          {"photons", share.photons()},
+          {"batches", share.batches()},
+          {"cpu_s", Seconds(FromProto(share.cpu()))}};
+}
+
+// A cell of a table: quoted when it has to be.
+std::string Cell(const std::string& text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + "\"";
+}
+
+// All digits, so that a program reads the same number.
+std::string Cell(double number) {
+  return absl::StrFormat("%.17g", number);
+}
+
+void AppendSquaredError(std::vector<std::string>& cells, const v1::SquaredError& error) {
+  for (const double number :
+       {error.noise() + error.bias(), error.noise(), error.bias(), error.low(), error.high()}) {
+    cells.push_back(Cell(number));
+  }
+}
+
 void AddSaved(Json& json, const SavedImage& saved) {
   json["paths"] = saved.paths;
   json["image_digest"] = saved.digest.Hex();
@@ -91,6 +160,79 @@ std::string JobReport(const v1::Job& job, const SavedImage& saved) {
   Json json = JobOf(job);
   AddSaved(json, saved);
   return ToText(json);
+}
+
+std::string ConvergenceReport(const v1::Job& job) {
+  Json json = JobOf(job);
+  json["has_reference"] = job.has_reference();
+  if (const auto error = NewestError(job)) {
+    json["relative_error"] = {
+        {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
+    if (error->truth) json["relative_error"]["true"] = *error->truth;
+  }
+  for (const auto& [name, against] : {std::pair{"mse_exponent_time", ErrorAgainst::kTime},
+                                      std::pair{"mse_exponent_photons", ErrorAgainst::kPhotons}}) {
+    if (const auto law = FitOfSquaredError(job, against)) json[name] = law->exponent;
+  }
+  json["convergence"] = Json::array();
+  for (const v1::ErrorSample& sample : job.convergence())
+    json["convergence"].push_back(SampleOf(sample));
+  json["worker_shares"] = Json::array();
+  for (const v1::WorkerShare& share : job.worker_shares())
+    json["worker_shares"].push_back(ShareOf(share));
+  return ToText(json);
+}
+
+std::string ConvergenceCsv(const v1::Job& job) {
+  const std::vector<std::string> head = {"row",
+                                         "worker_id",
+                                         "name",
+                                         "passes",
+                                         "batches",
+                                         "photons",
+                                         "running_s",
+                                         "cpu_s",
+                                         "relative_mse",
+                                         "relative_noise",
+                                         "relative_bias",
+                                         "relative_low",
+                                         "relative_high",
+                                         "absolute_mse",
+                                         "absolute_noise",
+                                         "absolute_bias",
+                                         "absolute_low",
+                                         "absolute_high",
+                                         "true_relative_mse",
+                                         "true_absolute_mse"};
+  std::string csv = absl::StrJoin(head, ",") + "\r\n";
+  for (const v1::ErrorSample& sample : job.convergence()) {
+    std::vector<std::string> cells = {"sample",
+                                      "",
+                                      "",
+                                      std::to_string(sample.passes()),
+                                      "",
+                                      std::to_string(sample.photons()),
+                                      Cell(Seconds(FromProto(sample.running()))),
+                                      Cell(Seconds(FromProto(sample.cpu())))};
+    AppendSquaredError(cells, sample.relative());
+    AppendSquaredError(cells, sample.absolute());
+    cells.push_back(sample.has_true_relative() ? Cell(sample.true_relative()) : "");
+    cells.push_back(sample.has_true_absolute() ? Cell(sample.true_absolute()) : "");
+    absl::StrAppend(&csv, absl::StrJoin(cells, ","), "\r\n");
+  }
+  for (const v1::WorkerShare& share : job.worker_shares()) {
+    std::vector<std::string> cells = {"worker",
+                                      Cell(share.worker_id()),
+                                      Cell(share.name()),
+                                      "",
+                                      std::to_string(share.batches()),
+                                      std::to_string(share.photons()),
+                                      "",
+                                      Cell(Seconds(FromProto(share.cpu())))};
+    cells.resize(head.size());
+    absl::StrAppend(&csv, absl::StrJoin(cells, ","), "\r\n");
+  }
+  return csv;
 }
 
 std::string JobsReport(const std::vector<v1::Job>& jobs) {
@@ -129,13 +271,76 @@ std::string SceneReport(const std::vector<Diagnostic>& diagnostics, bool is_ok) 
 }
 
 std::string MetricsReport(const ImageMetrics& metrics) {
-  return ToText({{"pixels", metrics.pixels},
-                 {"rmse", metrics.rmse},
-                 {"rel_mse", metrics.rel_mse},
-                 {"mean_a", metrics.mean_a},
-                 {"mean_b", metrics.mean_b},
-                 {"mean_ratio", metrics.mean_ratio},
-                 {"channel_mean_ratio", metrics.channel_mean_ratio}});
+  Json json = {{"pixels", metrics.pixels},
+               {"rmse", metrics.rmse},
+               {"rel_mse", metrics.rel_mse},
+               {"mean_a", metrics.mean_a},
+               {"mean_b", metrics.mean_b},
+               {"mean_ratio", metrics.mean_ratio},
+               {"channel_mean_ratio", metrics.channel_mean_ratio}};
+  if (metrics.reference_rel_mse && metrics.reference_mse) {
+    json["reference_rel_mse"] = *metrics.reference_rel_mse;
+    json["reference_rmse"] = std::sqrt(*metrics.reference_mse);
+    json["corrected_rel_mse"] = metrics.rel_mse - *metrics.reference_rel_mse;
+  }
+  return ToText(json);
+}
+
+std::string ComparisonReport(const Comparison& comparison, const ComparisonSubject& subject,
+                             const std::vector<ComparedRun>& runs) {
+  Json json = {{"scene", subject.scene},
+               {"reference", subject.reference},
+               {"cores", subject.cores},
+               {"repetitions", subject.repetitions}};
+  if (subject.reference_noise) json["reference_rel_mse"] = *subject.reference_noise;
+  if (!subject.left_out.empty()) json["left_out"] = subject.left_out;
+  json["times_s"] = comparison.times;
+  json["settings"] = Json::array();
+  for (std::size_t i = 0; i < comparison.settings.size(); ++i) {
+    const ComparedSetting& setting = comparison.settings[i];
+    Json one = {{"name", setting.name}};
+    if (i < subject.flags.size()) one["flags"] = subject.flags[i];
+    if (setting.slope_photons) one["exponent_photons"] = MeanJson(*setting.slope_photons);
+    if (setting.slope_seconds) one["exponent_time"] = MeanJson(*setting.slope_seconds);
+    if (setting.theory) {
+      one["theory"] = {{"noise", setting.theory->noise},
+                       {"squared_bias", setting.theory->squared_bias}};
+    }
+    one["at"] = Json::array();
+    for (const std::optional<ComparedCell>& cell : setting.cells) {
+      if (!cell) continue;
+      Json at = {{"time_s", cell->seconds},
+                 {"wall_s", cell->wall_s},
+                 {"photons", cell->photons},
+                 {"rel_mse", MeanJson(cell->rel_mse)},
+                 {"mostly_reference_noise", cell->is_mostly_reference}};
+      if (std::isfinite(cell->ratio.value)) at["ratio"] = MeanJson(cell->ratio);
+      one["at"].push_back(std::move(at));
+    }
+    one["runs"] = Json::array();
+    for (const ComparedRun& run : runs) {
+      if (run.setting != i) continue;
+      Json points = Json::array();
+      for (const ErrorPoint& point : run.points) {
+        points.push_back({{"time_s", point.seconds},
+                          {"wall_s", point.wall_s},
+                          {"photons", point.photons},
+                          {"measured_rel_mse", point.rel_mse},
+                          {"reference_rel_mse", point.reference_noise}});
+      }
+      one["runs"].push_back({{"seed", run.seed}, {"points", std::move(points)}});
+    }
+    json["settings"].push_back(std::move(one));
+  }
+  return ToText(json);
+}
+
+std::string ReferenceReport(const Image& reference, const std::string& path) {
+  return ToText({{"path", path},
+                 {"image_digest", reference.PixelDigest().Hex()},
+                 {"width", reference.width},
+                 {"height", reference.height},
+                 {"metadata", reference.metadata}});
 }
 
 std::string DigestReport(const Image& image) {

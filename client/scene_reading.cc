@@ -1,6 +1,7 @@
 #include "client/scene_reading.h"
 
 #include <cstdio>
+#include <utility>
 
 #include "client/exit_code.h"
 
@@ -20,6 +21,12 @@ Status CheckNamesFile(const std::string& path) {
 
 StatusOr<SceneManifest> ReadScene(const std::string& path, const RenderOverrides& overrides,
                                   bool quiet) {
+  LUCERNA_ASSIGN_OR_RETURN(SceneOfJobs scene, ReadSceneOfJobs(path, {&overrides, 1}, quiet));
+  return std::move(scene.manifest);
+}
+
+StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
+                                      std::span<const RenderOverrides> overrides, bool quiet) {
   LUCERNA_RETURN_IF_ERROR(CheckNamesFile(path));
   const ScenePath place = SplitScenePath(path);
   DirectoryFiles files(place.folder);
@@ -36,11 +43,16 @@ StatusOr<SceneManifest> ReadScene(const std::string& path, const RenderOverrides
                                                    errors == 1 ? " error" : " errors",
                                                    "; correct the scene and try again"));
   }
-  const auto settings = ResolveSettings(overrides, parsed.scene);
-  if (!settings.ok()) {
-    return Failure(ExitCode::kUsage, std::string(settings.status().message()));
+  SceneOfJobs scene;
+  for (const RenderOverrides& of_job : overrides) {
+    const auto settings = ResolveSettings(of_job, parsed.scene);
+    if (!settings.ok()) {
+      return Failure(ExitCode::kUsage, std::string(settings.status().message()));
+    }
+    scene.settings.push_back(*settings);
   }
-  return files.Manifest(place.main);
+  scene.manifest = files.Manifest(place.main);
+  return scene;
 }
 
 }  // namespace lucerna

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "client/render_flags.h"
 #include "render/scene/pbrt_parser.h"
@@ -27,5 +29,14 @@ struct ScenePath {
 // Errors: INVALID_ARGUMENT when the scene has errors, Failure(kUsage) for a flag out of range.
 [[nodiscard]] StatusOr<SceneManifest> ReadScene(const std::string& path,
                                                 const RenderOverrides& overrides, bool quiet);
+
+// The same for several jobs of one scene, which is read once.
+struct SceneOfJobs {
+  SceneManifest manifest;
+  std::vector<RenderSettings> settings;  // as many as there are overrides
+};
+[[nodiscard]] StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
+                                                    std::span<const RenderOverrides> overrides,
+                                                    bool quiet);
 
 }  // namespace lucerna

@@ -9,12 +9,16 @@
 
 #include "render/image/exr_file.h"
 #include "render/scene/pbrt_parser.h"
+#include "server/reference_image.h"
 
 namespace lucerna {
 namespace {
 
 constexpr std::size_t kMostWaitingJobs = 256;
 constexpr std::size_t kJobsRemembered = 1000;  // ended ones
+// Of ended jobs whose photons are kept, so that they can go on; the newest counts as none. At some
+// 700 bytes a pixel.
+constexpr std::int64_t kPixelsRemembered = std::int64_t{1} << 21;
 constexpr std::size_t kImagesRemembered = 64;
 constexpr std::size_t kImageBytesRemembered = std::size_t{2} << 30;  // the newest counts as none
 constexpr Duration kLongestSync = std::chrono::seconds(5);
@@ -142,6 +146,20 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
     unpin();
     return settings.status();
   }
+  if (submission.reference) {
+    if (!blobs_.Pin(*submission.reference).ok()) {
+      unpin();
+      return absl::FailedPreconditionError(
+          "the reference image is not here yet; upload it and submit again");
+    }
+    pinned.push_back(*submission.reference);
+    const StatusOr<Blob> bytes = blobs_.Get(*submission.reference);
+    const auto reference = bytes.ok() ? ReadReference(**bytes, *settings) : bytes.status();
+    if (!reference.ok()) {
+      unpin();
+      return reference.status();
+    }
+  }
   Submitted submitted;
   submitted.warnings = warnings;
   if (submission.validate_only) {
@@ -162,6 +180,7 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
         absl::StrCat(queue_.size(), " jobs are waiting already; try again later"));
   }
   const std::uint64_t serial = next_serial_++;
+  // Until Unpin.
   auto entry = std::make_shared<JobEntry>(JobEntry{
       .serial = serial,
       .request_id = submission.request_id,
@@ -173,10 +192,14 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
               .warnings = std::move(warnings),
               .submitted_at = clock_.Wall(),
               .life = JobLife(clock_.Steady()),
-              .books = {}},
+              .books = {},
+              .reference = submission.reference,
+              .convergence = {},
+              .workers = {}},
       .scene = std::nullopt,
       .runner = nullptr,
-      .image = nullptr});
+      .image = nullptr,
+      .pinned = std::move(pinned)});
   // A job that must wait is read again later, so that waiting jobs cost no memory.
   if (queue_.empty() && !current_) entry->scene = std::move(scene);
   submitted.job_id = entry->job.id;
@@ -256,6 +279,51 @@ StatusOr<Coordinator::Report> Coordinator::Cancel(const std::string& job_id) {
   return MakeReport(*entry);
 }
 
+StatusOr<Coordinator::Report> Coordinator::Stop(const std::string& job_id) {
+  const MutexLock lock(mutex_);
+  const auto entry = Find(job_id);
+  if (!entry) return UnknownJob(job_id);
+  if (!entry->job.life.has_ended()) {
+    if (!entry->runner) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "job ", job_id, " has not begun to run and has no image; cancel it instead"));
+    }
+    entry->runner->Finish();
+  }
+  return MakeReport(*entry);
+}
+
+StatusOr<Coordinator::Report> Coordinator::Extend(const std::string& job_id,
+                                                  const RenderOverrides& until) {
+  const MutexLock lock(mutex_);
+  const auto entry = Find(job_id);
+  if (!entry) return UnknownJob(job_id);
+  Job& job = entry->job;
+  RenderSettings settings = job.settings;
+  LUCERNA_RETURN_IF_ERROR(SetStopCriteria(until, settings));
+  if (job.life.has_ended()) {
+    if (job.life.state() != JobState::kSucceeded) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("job ", job_id, " was cancelled or failed; submit it again"));
+    }
+    if (!entry->runner || is_closed_) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "job ", job_id,
+          " ended so long ago that its photons are not kept any more; submit it again"));
+    }
+    job.life.Extend();
+    // The image grows from now on.
+    entry->image = nullptr;
+    queue_.push_back(entry);
+    job_waits_.NotifyAll();
+  }
+  job.settings = settings;
+  if (entry->runner) entry->runner->SetEnd(settings);
+  ++entry->version;
+  spdlog::info("job {} has a new end", job_id);
+  return MakeReport(*entry);
+}
+
 StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) {
   std::shared_ptr<JobRunner> runner;
   std::optional<Job> job;
@@ -321,53 +389,81 @@ void Coordinator::RunJobs() {
       ++entry->version;
     }
     RunJob(entry);
-    for (const auto& [path, file] : entry->job.manifest.entries)
-      blobs_.Unpin(file.digest);
+    const MutexLock lock(mutex_);
+    if (!entry->runner) Unpin(*entry);
   }
 }
 
 void Coordinator::RunJob(const std::shared_ptr<JobEntry>& entry) {
   std::optional<Scene> scene;
   RenderSettings settings;
+  std::optional<Digest> reference_digest;
+  std::shared_ptr<JobRunner> runner;
   {
     const MutexLock lock(mutex_);
     scene = std::exchange(entry->scene, std::nullopt);
     settings = entry->job.settings;
+    reference_digest = entry->job.reference;
+    runner = entry->runner;
+  }
+  if (runner) return Conclude(entry, runner->Resume());
+  ReferenceImage reference;
+  if (reference_digest) {
+    const StatusOr<Blob> bytes = blobs_.Get(*reference_digest);
+    auto read = bytes.ok() ? ReadReference(**bytes, settings) : bytes.status();
+    if (!read.ok()) return EndJob(entry, read.status());
+    reference = *std::move(read);
   }
   if (!scene) {
     auto read = ReadScene(entry->job.manifest);
     if (!read.ok()) return EndJob(entry, read.status());
     scene = std::move(read->first);
   }
-  const auto runner =
-      std::make_shared<JobRunner>(entry->job.id, settings, options_.threads,
-                                  JobRunner::Surroundings{
-                                      .blobs = blobs_,
-                                      .scheduler = scheduler_,
-                                      .merger = merger_,
-                                      .clock = clock_,
-                                      .when_running =
-                                          [this, entry] {
-                                            const MutexLock lock(mutex_);
-                                            entry->job.life.Run(clock_.Steady());
-                                            entry->cpu_at_start = ProcessCpuTime();
-                                            ++entry->version;
-                                          },
-                                      .when_pass_opened = [this] { AnswerWaiting(); },
-                                      .when_pass_merged =
-                                          [this, entry](std::int64_t passes) {
-                                            const MutexLock lock(mutex_);
-                                            entry->job.books.passes = passes;
-                                            ++entry->version;
-                                          },
-                                  });
+  runner = std::make_shared<JobRunner>(
+      entry->job.id, settings, options_.threads,
+      JobRunner::Surroundings{
+          .blobs = blobs_,
+          .scheduler = scheduler_,
+          .merger = merger_,
+          .clock = clock_,
+          .when_running =
+              [this, entry] {
+                const MutexLock lock(mutex_);
+                entry->job.life.Run(clock_.Steady());
+                entry->cpu_at_start = ProcessCpuTime() - entry->job.books.coordinator_cpu;
+                ++entry->version;
+              },
+          .when_pass_opened = [this] { AnswerWaiting(); },
+          .when_pass_merged =
+              [this, entry](std::int64_t passes) {
+                const MutexLock lock(mutex_);
+                entry->job.books.passes = passes;
+                ++entry->version;
+              },
+          .when_looked =
+              [this, entry](const JobRunner::Look& look) {
+                const MutexLock lock(mutex_);
+                const JobBooks& books = entry->job.books;
+                entry->job.convergence.push_back(
+                    {look.passes, look.photons, entry->job.life.Running(clock_.Steady()),
+                     ProcessCpuTime() - entry->cpu_at_start + books.worker_cpu, look.estimate,
+                     look.truth});
+                ++entry->version;
+              },
+      });
   {
     const MutexLock lock(mutex_);
     // A cancel or the end of the coordinator may have come before there was a runner to tell.
     if (entry->job.life.has_ended() || is_closed_) return;
+    // The end may have been changed since the settings were read.
+    runner->SetEnd(entry->job.settings);
     entry->runner = runner;
   }
-  StatusOr<JobRunner::Result> result = runner->Run(*std::move(scene));
+  Conclude(entry, runner->Run(*std::move(scene), std::move(reference)));
+}
+
+void Coordinator::Conclude(const std::shared_ptr<JobEntry>& entry,
+                           StatusOr<JobRunner::Result> result) {
   if (!result.ok()) return EndJob(entry, result.status());
 
   const StopReason reason = result->reason;
@@ -386,7 +482,6 @@ void Coordinator::RunJob(const std::shared_ptr<JobEntry>& entry) {
   if (!entry->job.life.Succeed(reason, clock_.Steady())) return;
   entry->job.books.coordinator_cpu = ProcessCpuTime() - entry->cpu_at_start;
   entry->image = *std::move(image);
-  entry->runner = nullptr;
   ++entry->version;
   ForgetOldJobs();
   spdlog::info("job {} succeeded after {} passes and {:.1f} s", entry->job.id,
@@ -394,7 +489,6 @@ void Coordinator::RunJob(const std::shared_ptr<JobEntry>& entry) {
 }
 
 void Coordinator::EndJob(const std::shared_ptr<JobEntry>& entry, const Status& failure) {
-  std::vector<Digest> unpin;
   {
     const MutexLock lock(mutex_);
     const bool was_waiting = entry->job.life.state() == JobState::kQueued;
@@ -411,24 +505,39 @@ void Coordinator::EndJob(const std::shared_ptr<JobEntry>& entry, const Status& f
     // One that was being rendered gives its files back when its thread is done with them.
     if (was_waiting) {
       std::erase(queue_, entry);
-      for (const auto& [path, file] : entry->job.manifest.entries)
-        unpin.push_back(file.digest);
+      Unpin(*entry);
     }
     ForgetOldJobs();
   }
-  for (const Digest& digest : unpin)
-    blobs_.Unpin(digest);
   spdlog::info("job {} ended: {}", entry->job.id, std::string(failure.message()));
+}
+
+void Coordinator::Unpin(JobEntry& entry) {
+  for (const Digest& digest : std::exchange(entry.pinned, {}))
+    blobs_.Unpin(digest);
 }
 
 void Coordinator::ForgetOldJobs() {
   std::size_t ended = 0;
+  std::size_t runners = 0;
+  std::int64_t pixels = 0;
   std::size_t images = 0;
   std::size_t image_bytes = 0;
   std::vector<std::uint64_t> forgotten;
   for (auto entry = jobs_.rbegin(); entry != jobs_.rend(); ++entry) {
     if (!entry->second->job.life.has_ended()) continue;
     if (++ended > kJobsRemembered) forgotten.push_back(entry->first);
+    if (entry->second->runner) {
+      const RenderSettings& settings = entry->second->job.settings;
+      if (++runners > 1) {
+        pixels += std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()};
+      }
+      // The one that has just ended is still in use by its thread, which then gives its files back.
+      if (pixels > kPixelsRemembered || ended > kJobsRemembered) {
+        entry->second->runner = nullptr;
+        if (entry->second != current_) Unpin(*entry->second);
+      }
+    }
     if (!entry->second->image) continue;
     if (++images > 1) image_bytes += entry->second->image->size();
     if (images > kImagesRemembered || image_bytes > kImageBytesRemembered) {
@@ -605,6 +714,11 @@ StatusOr<PassMerger::Outcome> Coordinator::Commit(const Delivery& delivery,
       books.bytes_received += delivery.size_bytes;
       books.hitpoints_returned += accumulation.size();
       books.rate.Add(accumulation.tally.photons, now);
+      WorkerShare& share = entry->job.workers[delivery.worker];
+      if (share.name.empty()) share.name = scheduler_.NameOf(delivery.worker);
+      share.photons += accumulation.tally.photons;
+      share.batches += 1;
+      share.cpu += delivery.cpu;
       ++entry->version;
       runner = entry->runner;
     }

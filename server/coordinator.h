@@ -4,7 +4,8 @@
 // scheduler, the merger, the store and the runner of the job that is being rendered. One job
 // renders at a time, the others wait in order.
 //
-// Ended jobs are remembered, with the images of the newest, until the coordinator ends.
+// Ended jobs are remembered until the coordinator ends, with the images of the newest; the very
+// newest also with all their photons, so that they can go on.
 //
 // Threads: any. Nothing here waits for the network; ImageSoFar of a running job waits for the step
 // that its estimator is in.
@@ -58,6 +59,7 @@ class Coordinator {
     SceneManifest manifest;
     RenderOverrides overrides;
     bool validate_only = false;
+    std::optional<Digest> reference;  // of an EXR image among the blobs
   };
   struct Submitted {
     std::string job_id;  // empty when only validated
@@ -84,6 +86,13 @@ class Coordinator {
                                                                    std::uint64_t before) const;
   // Errors: NOT_FOUND.
   [[nodiscard]] StatusOr<Report> Cancel(const std::string& job_id);
+  // Ends a job well, with the image as it is. Errors: NOT_FOUND, FAILED_PRECONDITION when it has
+  // not begun to run.
+  [[nodiscard]] StatusOr<Report> Stop(const std::string& job_id);
+  // Gives a job that has not ended, or that succeeded, the stop criteria of `until`.
+  // Errors: NOT_FOUND, INVALID_ARGUMENT (SetStopCriteria), FAILED_PRECONDITION when the job was
+  // cancelled, failed, or its photons are not kept any more.
+  [[nodiscard]] StatusOr<Report> Extend(const std::string& job_id, const RenderOverrides& until);
   // EXR bytes. Errors: NOT_FOUND, FAILED_PRECONDITION when there is no image (yet).
   [[nodiscard]] StatusOr<Blob> ImageOf(const std::string& job_id);
 
@@ -121,6 +130,7 @@ class Coordinator {
     return merger_.Hitpoints(pass);
   }
   struct Delivery {
+    std::string worker;
     PassKey pass;
     PhotonRange range;
     Duration cpu{};
@@ -148,7 +158,8 @@ class Coordinator {
     std::shared_ptr<JobRunner> runner;
     Blob image;
     std::uint64_t version = 0;
-    Duration cpu_at_start{};
+    Duration cpu_at_start{};  // less what earlier runs took
+    std::vector<Digest> pinned;
   };
   struct WaitingSync {
     std::string worker;
@@ -162,9 +173,13 @@ class Coordinator {
   StatusOr<std::pair<Scene, std::vector<std::string>>> ReadScene(const SceneManifest& manifest);
   void RunJobs();
   void RunJob(const std::shared_ptr<JobEntry>& entry);
+  // What becomes of a job whose runner has come back.
+  void Conclude(const std::shared_ptr<JobEntry>& entry, StatusOr<JobRunner::Result> result);
   StatusOr<Blob> Encode(const Job& job, JobRunner::Result result, Duration running,
                         Duration coordinator_cpu) const;
   void EndJob(const std::shared_ptr<JobEntry>& entry, const Status& failure);
+  // Gives the job's files back, unless it may still need them.
+  void Unpin(JobEntry& entry) LUCERNA_REQUIRES(mutex_);
   void ForgetOldJobs() LUCERNA_REQUIRES(mutex_);
   Report MakeReport(const JobEntry& entry) const LUCERNA_REQUIRES(mutex_);
   std::shared_ptr<JobEntry> Find(const std::string& job_id) const LUCERNA_REQUIRES(mutex_);

@@ -42,6 +42,16 @@ bool JobLife::Succeed(StopReason reason, SteadyTime now) {
   return End(JobState::kSucceeded, now);
 }
 
+bool JobLife::Extend() {
+  if (state_ != JobState::kSucceeded) return false;
+  ran_before_ = Running(*ended_at_);
+  started_at_.reset();
+  ended_at_.reset();
+  stop_reason_ = StopReason::kNone;
+  state_ = JobState::kQueued;
+  return true;
+}
+
 bool JobLife::Cancel(SteadyTime now) {
   return End(JobState::kCancelled, now);
 }
@@ -53,8 +63,8 @@ bool JobLife::Fail(std::string failure, SteadyTime now) {
 }
 
 Duration JobLife::Running(SteadyTime now) const {
-  if (!started_at_) return Duration::zero();
-  return (ended_at_ ? *ended_at_ : now) - *started_at_;
+  if (!started_at_) return ran_before_;
+  return ran_before_ + (ended_at_ ? *ended_at_ : now) - *started_at_;
 }
 
 void SlidingRate::Add(std::uint64_t events, SteadyTime now) {
@@ -73,20 +83,29 @@ double SlidingRate::PerSecond(SteadyTime since, SteadyTime now) const {
   return static_cast<double>(sum) / Seconds(span);
 }
 
+namespace {
+
+// "auto" alone is the default, as it was before another could be given.
+std::string RadiusText(const RenderSettings& settings) {
+  if (settings.initial_radius > 0) return NumberText(settings.initial_radius);
+  if (settings.initial_footprints == kInitialFootprints) return "auto";
+  return absl::StrCat(NumberText(settings.initial_footprints), "px");
+}
+
+}  // namespace
+
 std::string SettingsText(const RenderSettings& settings) {
-  return absl::StrCat(
-      "size=", settings.width, "x", settings.height, " crop=", settings.crop_x0, ",",
-      settings.crop_y0, ",", settings.crop_x1, ",", settings.crop_y1,
-      " photons-per-pass=", settings.photons_per_pass, " seed=", settings.seed,
-      " radius-controller=", std::string(NameOf(settings.radius_controller)),
-      " alpha=", NumberText(settings.alpha), " kernel=", std::string(NameOf(settings.kernel)),
-      " initial-radius=",
-      settings.initial_radius == 0 ? std::string("auto") : NumberText(settings.initial_radius),
-      " max-depth=", settings.max_depth,
-      UsesFrequency(settings.radius_controller)
-          ? absl::StrCat(" bias=", NumberText(settings.bias),
-                         " frequency-share=", NumberText(settings.frequency_share))
-          : std::string());
+  return absl::StrCat("size=", settings.width, "x", settings.height, " crop=", settings.crop_x0,
+                      ",", settings.crop_y0, ",", settings.crop_x1, ",", settings.crop_y1,
+                      " photons-per-pass=", settings.photons_per_pass, " seed=", settings.seed,
+                      " radius-controller=", std::string(NameOf(settings.radius_controller)),
+                      " alpha=", NumberText(settings.alpha),
+                      " kernel=", std::string(NameOf(settings.kernel)),
+                      " initial-radius=", RadiusText(settings), " max-depth=", settings.max_depth,
+                      UsesFrequency(settings.radius_controller)
+                          ? absl::StrCat(" bias=", NumberText(settings.bias),
+                                         " frequency-share=", NumberText(settings.frequency_share))
+                          : std::string());
 }
 
 }  // namespace lucerna

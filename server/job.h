@@ -5,11 +5,14 @@
 //   queued -> preparing -> running -> succeeded
 //   any of the first three -> cancelled or failed
 //
-// An ended job never changes again. Pure values: moments come in as arguments.
+//   succeeded -> queued, when it is given a new end
+//
+// An ended job otherwise never changes again. Pure values: moments come in as arguments.
 #pragma once
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -20,6 +23,7 @@
 #include "render/estimate/accumulation.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
+#include "server/job_estimator.h"
 
 namespace lucerna {
 
@@ -31,7 +35,7 @@ enum class JobState : std::uint8_t {
   kCancelled,
   kFailed,
 };
-enum class StopReason : std::uint8_t { kNone, kPasses, kTime };
+enum class StopReason : std::uint8_t { kNone, kPasses, kTime, kError, kPhotons, kUser };
 
 class JobLife {
  public:
@@ -42,6 +46,8 @@ class JobLife {
   bool Prepare();
   bool Run(SteadyTime now);
   bool Succeed(StopReason reason, SteadyTime now);
+  // Of a job that succeeded: it waits to go on.
+  bool Extend();
   bool Cancel(SteadyTime now);
   bool Fail(std::string failure, SteadyTime now);
 
@@ -50,7 +56,7 @@ class JobLife {
   [[nodiscard]] const std::string& failure() const { return failure_; }
   [[nodiscard]] bool has_ended() const { return state_ >= JobState::kSucceeded; }
   [[nodiscard]] SteadyTime submitted_at() const { return submitted_at_; }
-  // Since the job began to run; stands still when it has ended; zero before.
+  // In all its runs; stands still when it has ended; zero before.
   [[nodiscard]] Duration Running(SteadyTime now) const;
 
  private:
@@ -60,6 +66,7 @@ class JobLife {
   StopReason stop_reason_ = StopReason::kNone;
   std::string failure_;
   SteadyTime submitted_at_;
+  Duration ran_before_{};  // in runs before this one
   std::optional<SteadyTime> started_at_;
   std::optional<SteadyTime> ended_at_;
 };
@@ -91,6 +98,24 @@ struct JobBooks {
   SlidingRate rate{std::chrono::seconds(5)};
 };
 
+// What was known of a job's error at one moment.
+struct ErrorSample {
+  std::int64_t passes = 0;
+  std::uint64_t photons = 0;
+  Duration running{};
+  Duration cpu{};  // of coordinator and workers
+  ErrorEstimate estimate;
+  std::optional<TrueError> truth;  // when the job has a reference
+};
+
+// A worker's part in a job.
+struct WorkerShare {
+  std::string name;
+  std::uint64_t photons = 0;
+  std::uint64_t batches = 0;
+  Duration cpu{};
+};
+
 struct Job {
   std::string id;
   std::string name;
@@ -101,6 +126,9 @@ struct Job {
   WallTime submitted_at;
   JobLife life;
   JobBooks books;
+  std::optional<Digest> reference;          // of an EXR image
+  std::vector<ErrorSample> convergence;
+  std::map<std::string, WorkerShare> workers;  // by id
   int most_workers = 0;  // connected at one time while it ran
 };
 

@@ -1,10 +1,13 @@
 #include "server/job_estimator.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "render/base/parallel.h"
 #include "render/estimate/statistics.h"
 #include "render/film/film.h"
+#include "render/math/color_space.h"
 #include "render/transport/working_space.h"
 #include "server/eye_path.h"
 
@@ -23,7 +26,16 @@ struct JobEstimator::State {
   FluxScale scale;
   std::unique_ptr<PixelStatistics> statistics;
   std::unique_ptr<Film> film;
+  std::unique_ptr<ErrorStatistics> errors;
   std::uint64_t eye_rays = 0;
+
+  // Radiance over all passes, Rec. 709.
+  [[nodiscard]] RgbSum Sum(std::size_t pixel) const {
+    RgbSum sum = film->direct_sum()[pixel];
+    for (std::size_t c = 0; c < 3; ++c)
+      sum[c] += statistics->radiance_sum()[pixel][c];
+    return ToRec709(sum);
+  }
 };
 
 JobEstimator::JobEstimator(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -40,13 +52,14 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   const int width = settings.crop_width();
   const int height = settings.crop_height();
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  const float initial = settings.initial_radius > 0 ? static_cast<float>(settings.initial_radius)
-                                                    : kInitialFootprints;
+  const auto initial = static_cast<float>(
+      settings.initial_radius > 0 ? settings.initial_radius : settings.initial_footprints);
   state->controller = MakeRadiusController(state->settings, initial);
   state->statistics =
       std::make_unique<PixelStatistics>(pixels, initial, state->controller->MemoryPerPixel());
   state->film = std::make_unique<Film>(width, height, state->scene.film.exposure,
                                        state->scene.film.max_component);
+  state->errors = std::make_unique<ErrorStatistics>(pixels);
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));
 }
 
@@ -55,14 +68,26 @@ EyePass JobEstimator::TraceEyePaths(std::uint64_t pass) const {
 }
 
 RadiusColumn JobEstimator::Radii(const EyePass& pass) const {
-  return state_->statistics->Radii(pass.rows());
+  return state_->statistics->Radii(pass.rows(), pass.pass);
 }
 
 void JobEstimator::Apply(const EyePass& pass, const RadiusColumn& radii, const PassSums& sums) {
   LUCERNA_CHECK(static_cast<std::int64_t>(pass.pass) == passes_applied());
+  std::vector<RgbSum> photons(pass.direct.size());
+  std::vector<double> bias(photons.size());
   state_->statistics->AddPhotons(pass.rows(), radii, sums, state_->scale,
                                  Kernel{state_->settings.kernel}, state_->settings.photons_per_pass,
-                                 *state_->controller);
+                                 *state_->controller, photons, bias);
+  std::vector<RgbSum> radiance(photons.size());
+  for (std::size_t pixel = 0; pixel < radiance.size(); ++pixel) {
+    photons[pixel] = ToRec709(photons[pixel]);
+    const Rgb direct = pass.direct[pixel];
+    radiance[pixel] = ToRec709({static_cast<double>(direct.r), static_cast<double>(direct.g),
+                                static_cast<double>(direct.b)});
+    for (std::size_t c = 0; c < 3; ++c)
+      radiance[pixel][c] += photons[pixel][c];
+  }
+  state_->errors->AddPass(pass.pass, radiance, photons, bias);
   for (std::size_t pixel = 0; pixel < pass.direct.size(); ++pixel) {
     const EyeFeatures& features = pass.features[pixel];
     state_->film->Add(pixel, pass.direct[pixel], features.albedo, features.normal,
@@ -80,8 +105,69 @@ std::uint64_t JobEstimator::eye_rays() const {
 }
 
 Image JobEstimator::MakeImage() const {
-  return state_->film->MakeImage(*state_->statistics, *state_->controller,
-                                 Kernel{state_->settings.kernel});
+  Image image = state_->film->MakeImage(*state_->statistics, *state_->controller,
+                                        Kernel{state_->settings.kernel});
+  if (passes_applied() < 2) return image;
+  // Single pixels: their own variance over passes, made as large in all as the halves say it is.
+  const double factor = EstimateError(1).noise_factor;
+  const ErrorStatistics& errors = *state_->errors;
+  const auto passes = static_cast<double>(passes_applied());
+  const double exposure = state_->scene.film.exposure;
+  std::vector<float> noise(image.channels[0].pixels.size());
+  std::vector<float> bias(noise.size());
+  for (std::size_t pixel = 0; pixel < noise.size(); ++pixel) {
+    const RgbSum all = state_->Sum(pixel);
+    const double mean = LuminanceOf(all) / passes;
+    const double variance = std::max(0.0, errors.square_sum()[pixel] / passes - mean * mean);
+    noise[pixel] = static_cast<float>(exposure * std::sqrt(factor * variance / (passes - 1)));
+    bias[pixel] = static_cast<float>(
+        exposure * (errors.even_bias()[pixel] + errors.odd_bias()[pixel]) / passes);
+  }
+  image.channels.push_back({"noise", std::move(noise)});
+  image.channels.push_back({"bias", std::move(bias)});
+  return image;
+}
+
+ErrorEstimate JobEstimator::EstimateError(int look) const {
+  const ErrorStatistics& errors = *state_->errors;
+  const double exposure = state_->scene.film.exposure;
+  const auto sums_at = [&](std::size_t pixel) {
+    PixelSums sums;
+    const RgbSum all = state_->Sum(pixel);
+    // Bias is known as a luminance: it has the colour that the photons have.
+    RgbSum photons = state_->statistics->radiance_sum()[pixel];
+    const double luminance = LuminanceOf(photons);
+    photons = ToRec709(photons);
+    for (std::size_t c = 0; c < 3; ++c) {
+      sums.all[c] = exposure * all[c];
+      sums.even[c] = exposure * errors.even_sum()[pixel][c];
+      sums.photons[c] = exposure * photons[c];
+      sums.even_photons[c] = exposure * errors.even_photons()[pixel][c];
+      const double color = luminance > 0 ? exposure * photons[c] / luminance : 0;
+      sums.even_bias[c] = color * errors.even_bias()[pixel];
+      sums.odd_bias[c] = color * errors.odd_bias()[pixel];
+    }
+    sums.square = exposure * exposure * errors.square_sum()[pixel];
+    return sums;
+  };
+  return lucerna::EstimateError(state_->settings.crop_width(), state_->settings.crop_height(),
+                                passes_applied(), look, sums_at);
+}
+
+TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
+  const double to_pixel = state_->scene.film.exposure / static_cast<double>(passes_applied());
+  TrueError error;
+  for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
+    const RgbSum sum = state_->Sum(pixel);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto right = static_cast<double>(reference[pixel][static_cast<int>(c)]);
+      const double off = sum[c] * to_pixel - right;
+      error.absolute += off * off;
+      error.relative += off * off / (right * right + 0.01);
+    }
+  }
+  const double terms = 3 * static_cast<double>(reference.size());
+  return {error.relative / terms, error.absolute / terms};
 }
 
 }  // namespace lucerna

@@ -6,8 +6,10 @@
 //
 // Order of calls for pass p (passes count from 0)
 //   1. TraceEyePaths(p): any time, also ahead of other passes; depends on p alone.
-//   2. Radii(pass): after Apply of pass p-2 and before Apply of pass p-1. So workers trace p while
-//      stragglers finish p-1, and the result does not depend on when they do.
+//   2. Radii(pass): after Apply of pass p-2 and before Apply of pass p, and the same whether before
+//   or
+//      after that of pass p-1. So workers trace p while stragglers finish p-1, a job can go on
+//      after its end, and the result does not depend on when anything happens.
 //   3. Apply(pass, radii, sums): in pass order, each pass once, with the radii that 2 gave.
 //
 // Threads: one caller at a time, except that TraceEyePaths may run beside the others.
@@ -19,11 +21,13 @@
 
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
+#include "render/estimate/error_estimate.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "server/hitpoint_pass.h"
+#include "server/reference_image.h"
 
 namespace lucerna {
 
@@ -45,8 +49,13 @@ class JobEstimator {
   [[nodiscard]] std::int64_t passes_applied() const;
   // Rays traced for the passes applied so far.
   [[nodiscard]] std::uint64_t eye_rays() const;
-  // The image of the passes applied so far, without metadata. Requires passes_applied() > 0.
+  // The image of the passes applied so far, without metadata. Requires passes_applied() > 0. Layers
+  // `noise` and `bias` from the second pass on.
   [[nodiscard]] Image MakeImage() const;
+  // `look` counts the looks at this job, from 1. Requires passes_applied() >= 2.
+  [[nodiscard]] ErrorEstimate EstimateError(int look) const;
+  // Requires passes_applied() > 0 and a reference as large as the image.
+  [[nodiscard]] TrueError ErrorAgainst(const ReferenceImage& reference) const;
 
  private:
   struct State;

@@ -13,16 +13,44 @@ JobRunner::JobRunner(std::string job_id, RenderSettings settings, int threads,
     : job_id_(std::move(job_id)),
       settings_(std::move(settings)),
       threads_(threads),
-      surroundings_(std::move(surroundings)) {}
+      surroundings_(std::move(surroundings)),
+      end_(EndOf(settings_)) {}
 
 JobRunner::~JobRunner() = default;
 
-StatusOr<JobRunner::Result> JobRunner::Run(Scene scene) {
+JobRunner::End JobRunner::EndOf(const RenderSettings& settings) {
+  End end;
+  end.passes = static_cast<std::uint64_t>(settings.passes);
+  end.time_s = settings.time_s;
+  end.error = settings.error;
+  if (settings.photons > 0) {
+    const auto a_pass = static_cast<std::uint64_t>(settings.photons_per_pass);
+    const std::uint64_t passes = (settings.photons - 1) / a_pass + 1;
+    if (end.passes == 0 || passes < end.passes) {
+      end.passes = passes;
+      end.is_photons = true;
+    }
+  }
+  return end;
+}
+
+StatusOr<JobRunner::Result> JobRunner::Run(Scene scene, ReferenceImage reference) {
   LUCERNA_ASSIGN_OR_RETURN(estimator_, JobEstimator::Create(std::move(scene), settings_, threads_));
+  reference_ = std::move(reference);
+  return RunToEnd();
+}
+
+StatusOr<JobRunner::Result> JobRunner::Resume() {
+  return RunToEnd();
+}
+
+StatusOr<JobRunner::Result> JobRunner::RunToEnd() {
   LUCERNA_RETURN_IF_ERROR(why_stopped());
   is_running_ = true;
   surroundings_.when_running();
+  const SteadyTime started_at = surroundings_.clock.Steady();
   StatusOr<Result> result = RunPasses();
+  ran_before_ += surroundings_.clock.Steady() - started_at;
   // Whatever ended it: workers must not go on with passes that nobody will take in.
   while (!open_.empty()) {
     surroundings_.scheduler.ClosePass(KeyOf(open_.front().traced.eye.pass));
@@ -35,31 +63,52 @@ StatusOr<JobRunner::Result> JobRunner::Run(Scene scene) {
   return result;
 }
 
-StatusOr<JobRunner::Result> JobRunner::RunPasses() {
-  std::optional<SteadyTime> time_is_up;
-  if (settings_.time_s > 0) {
-    // A limit beyond a century is no limit, and would not fit.
-    const double seconds = std::min(settings_.time_s, 3.2e9);
-    time_is_up = surroundings_.clock.Steady() +
-                 std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+StopReason JobRunner::ReasonToStop(const End& end, bool is_time_up) const {
+  const auto applied = static_cast<std::uint64_t>(estimator_->passes_applied());
+  if (applied == 0) return StopReason::kNone;
+  if (end.passes > 0 && applied >= end.passes) {
+    return end.is_photons ? StopReason::kPhotons : StopReason::kPasses;
   }
-  const auto passes_limit = static_cast<std::uint64_t>(settings_.passes);
-  std::uint64_t next_pass = 0;  // to be opened
+  if (end.error > 0 && error_at_most_ <= end.error) return StopReason::kError;
+  if (is_time_up) return StopReason::kTime;
+  const MutexLock lock(mutex_);
+  return shall_finish_ ? StopReason::kUser : StopReason::kNone;
+}
+
+StatusOr<JobRunner::Result> JobRunner::RunPasses() {
+  const SteadyTime started_at = surroundings_.clock.Steady() - ran_before_;
+  {
+    const MutexLock lock(mutex_);
+    shall_finish_ = false;
+  }
+  auto next_pass = static_cast<std::uint64_t>(estimator_->passes_applied());  // to be opened
 
   while (true) {
     LUCERNA_RETURN_IF_ERROR(why_stopped());
-    const auto applied = static_cast<std::uint64_t>(estimator_->passes_applied());
-    const bool is_time_up = time_is_up && surroundings_.clock.Steady() >= *time_is_up;
-    if (applied > 0 && (is_time_up || (passes_limit > 0 && applied == passes_limit))) {
-      const MutexLock lock(estimator_mutex_);
-      return MakeResult(passes_limit > 0 && applied == passes_limit ? StopReason::kPasses
-                                                                    : StopReason::kTime);
+    End end;
+    {
+      const MutexLock lock(mutex_);
+      end = end_;
     }
+    std::optional<SteadyTime> time_is_up;
+    if (end.time_s > 0) {
+      // A limit beyond a century is no limit, and would not fit.
+      const double seconds = std::min(end.time_s, 3.2e9);
+      time_is_up =
+          started_at + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+    }
+    const bool is_time_up = time_is_up && surroundings_.clock.Steady() >= *time_is_up;
+    if (const StopReason reason = ReasonToStop(end, is_time_up); reason != StopReason::kNone) {
+      LookAtError(true);
+      const MutexLock lock(estimator_mutex_);
+      return MakeResult(reason);
+    }
+    const auto applied = static_cast<std::uint64_t>(estimator_->passes_applied());
     const bool wants_more =
-        (passes_limit == 0 || next_pass < passes_limit) && !(is_time_up && next_pass > 0);
+        (end.passes == 0 || next_pass < end.passes) && !(is_time_up && next_pass > 0);
 
-    // Radii of a pass follow from the passes up to two before it: it must be opened now, before
-    // the pass before it is taken in.
+    // Radii of a pass follow from the passes up to two before it: it may be opened while the pass
+    // before it is out.
     if (wants_more && next_pass <= applied + 1) {
       TracedPass traced;
       if (ahead_) {
@@ -76,6 +125,7 @@ StatusOr<JobRunner::Result> JobRunner::RunPasses() {
       OpenPass complete = std::move(open_.front());
       open_.pop_front();
       TakeIn(std::move(complete));
+      LookAtError(false);
       continue;
     }
     if (wants_more && !ahead_) {
@@ -85,6 +135,24 @@ StatusOr<JobRunner::Result> JobRunner::RunPasses() {
     // When time is up and nothing has been taken in, the first pass is waited for all the same.
     if (!WaitForChange(applied > 0 ? time_is_up : std::nullopt)) return why_stopped();
   }
+}
+
+void JobRunner::LookAtError(bool is_last) {
+  Look look;
+  {
+    const MutexLock lock(estimator_mutex_);
+    look.passes = estimator_->passes_applied();
+    if (look.passes < 2 || look.passes == looked_at_) return;
+    if (!is_last && look.passes < next_look_) return;
+    look.photons = photons_applied_;
+    look.estimate = estimator_->EstimateError(++looks_);
+    if (!reference_.empty()) look.truth = estimator_->ErrorAgainst(reference_);
+  }
+  looked_at_ = look.passes;
+  error_at_most_ = std::sqrt(look.estimate.relative.high);
+  // Fifteen or so to a decade of passes: the more looks, the wider each one's interval.
+  next_look_ = std::max(look.passes + 1, look.passes * 7 / 6);
+  surroundings_.when_looked(look);
 }
 
 StatusOr<JobRunner::TracedPass> JobRunner::Trace(std::uint64_t pass) {
@@ -175,6 +243,20 @@ bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {
 Status JobRunner::why_stopped() const {
   const MutexLock lock(mutex_);
   return why_stopped_.value_or(absl::OkStatus());
+}
+
+void JobRunner::SetEnd(const RenderSettings& settings) {
+  const MutexLock lock(mutex_);
+  end_ = EndOf(settings);
+  was_woken_ = true;
+  changed_.NotifyAll();
+}
+
+void JobRunner::Finish() {
+  const MutexLock lock(mutex_);
+  shall_finish_ = true;
+  was_woken_ = true;
+  changed_.NotifyAll();
 }
 
 void JobRunner::Stop(Status why) {

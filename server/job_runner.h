@@ -9,6 +9,7 @@
 #pragma once
 
 #include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -40,6 +41,14 @@ struct PassBlobs {
 
 class JobRunner {
  public:
+  // What a look at the error found.
+  struct Look {
+    std::int64_t passes = 0;
+    std::uint64_t photons = 0;
+    ErrorEstimate estimate;
+    std::optional<TrueError> truth;
+  };
+
   struct Surroundings {
     BlobStore& blobs;
     Scheduler& scheduler;
@@ -49,6 +58,7 @@ class JobRunner {
     std::function<void()> when_running;
     std::function<void()> when_pass_opened;
     std::function<void(std::int64_t passes)> when_pass_merged;
+    std::function<void(const Look& look)> when_looked;
   };
 
   JobRunner(std::string job_id, RenderSettings settings, int threads, Surroundings surroundings);
@@ -60,13 +70,19 @@ class JobRunner {
     std::int64_t passes = 0;
     std::uint64_t photons = 0;  // in the image
   };
-  // Renders to the end. Once only.
+  // Renders to the end. `reference` may be empty; else it is as large as the image. Once only.
   // Errors: what JobEstimator says of the scene, RESOURCE_EXHAUSTED when blobs do not fit, or what
   // Stop was given.
-  [[nodiscard]] StatusOr<Result> Run(Scene scene);
+  [[nodiscard]] StatusOr<Result> Run(Scene scene, ReferenceImage reference);
+  // Goes on after Run or Resume ended well, to the end as it is now. Errors: as Run.
+  [[nodiscard]] StatusOr<Result> Resume();
 
   // Threads: all of the following, any.
 
+  // A new end: passes, photons, time_s and error of `settings`.
+  void SetEnd(const RenderSettings& settings);
+  // Ends Run well as soon as there is an image.
+  void Finish();
   // Ends Run soon with `why`. The first call counts.
   void Stop(Status why);
   // A batch was merged, or time has passed: look again.
@@ -81,6 +97,9 @@ class JobRunner {
   [[nodiscard]] StatusOr<Result> ImageSoFar() const;
 
  private:
+  // Passes before the first look: halves of two passes each.
+  static constexpr std::int64_t kFirstLook = 4;
+
   struct TracedPass {
     EyePass eye;
     Digest block_digest;
@@ -91,7 +110,21 @@ class JobRunner {
     PassBlobs blobs;
   };
 
+  // When to stop.
+  struct End {
+    std::uint64_t passes = 0;  // 0: no limit; also that of the photons
+    double time_s = 0;
+    double error = 0;
+    bool is_photons = false;  // `passes` follows from a number of photons
+  };
+  static End EndOf(const RenderSettings& settings);
+
+  StatusOr<Result> RunToEnd();
   StatusOr<Result> RunPasses();
+  // Estimates the error, if it is time to look or `is_last`.
+  void LookAtError(bool is_last);
+  // Why to stop now; kNone: go on.
+  StopReason ReasonToStop(const End& end, bool is_time_up) const;
   StatusOr<TracedPass> Trace(std::uint64_t pass);
   Status Open(TracedPass traced);
   bool IsComplete(const OpenPass& open) const;
@@ -116,12 +149,20 @@ class JobRunner {
   std::uint64_t photons_applied_ LUCERNA_GUARDED_BY(estimator_mutex_) = 0;
 
   // The runner's thread only.
+  ReferenceImage reference_;
+  Duration ran_before_{};
+  std::int64_t next_look_ = kFirstLook;
+  int looks_ = 0;
+  std::int64_t looked_at_ = 0;       // passes
+  double error_at_most_ = HUGE_VAL;  // the upper end of the last look's interval
   std::deque<OpenPass> open_;
   std::optional<TracedPass> ahead_;
 
   mutable Mutex mutex_;
   Condition changed_;
   bool was_woken_ LUCERNA_GUARDED_BY(mutex_) = false;
+  End end_ LUCERNA_GUARDED_BY(mutex_);
+  bool shall_finish_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::optional<Status> why_stopped_ LUCERNA_GUARDED_BY(mutex_);
   std::map<std::uint64_t, PassBlobs> blobs_ LUCERNA_GUARDED_BY(mutex_);
 };

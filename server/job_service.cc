@@ -17,6 +17,7 @@ constexpr std::size_t kLargestPage = 1000;
 constexpr std::size_t kUsualPage = 100;
 // A job's warnings go with every message about it.
 constexpr std::size_t kMostWarnings = 200;
+constexpr std::size_t kMostShares = 1000;
 
 v1::JobState StateToProto(JobState state) {
   switch (state) {
@@ -44,6 +45,12 @@ v1::StopReason ReasonToProto(StopReason reason) {
       return v1::STOP_REASON_PASSES;
     case StopReason::kTime:
       return v1::STOP_REASON_TIME;
+    case StopReason::kError:
+      return v1::STOP_REASON_ERROR;
+    case StopReason::kPhotons:
+      return v1::STOP_REASON_PHOTONS;
+    case StopReason::kUser:
+      return v1::STOP_REASON_USER;
   }
   return v1::STOP_REASON_UNSPECIFIED;
 }
@@ -69,6 +76,47 @@ v1::Progress ProgressToProto(const Coordinator::Report& report) {
   return message;
 }
 
+v1::SquaredError ErrorToProto(const SquaredError& error) {
+  v1::SquaredError message;
+  message.set_noise(error.noise);
+  message.set_bias(error.bias);
+  message.set_low(error.low);
+  message.set_high(error.high);
+  return message;
+}
+
+v1::ErrorSample SampleToProto(const ErrorSample& sample) {
+  v1::ErrorSample message;
+  message.set_passes(sample.passes);
+  message.set_photons(sample.photons);
+  *message.mutable_running() = ToProto(sample.running);
+  *message.mutable_cpu() = ToProto(sample.cpu);
+  *message.mutable_relative() = ErrorToProto(sample.estimate.relative);
+  *message.mutable_absolute() = ErrorToProto(sample.estimate.absolute);
+  if (sample.truth) {
+    message.set_true_relative(sample.truth->relative);
+    message.set_true_absolute(sample.truth->absolute);
+  }
+  return message;
+}
+
+// The busiest first.
+void AddShares(const std::map<std::string, WorkerShare>& workers, v1::Job& message) {
+  std::vector<std::pair<std::string, WorkerShare>> shares(workers.begin(), workers.end());
+  std::stable_sort(shares.begin(), shares.end(), [](const auto& a, const auto& b) {
+    return a.second.photons > b.second.photons;
+  });
+  for (std::size_t i = 0; i < std::min(shares.size(), kMostShares); ++i) {
+    const auto& [id, share] = shares[i];
+    v1::WorkerShare& item = *message.add_worker_shares();
+    item.set_worker_id(id);
+    item.set_name(share.name);
+    item.set_photons(share.photons);
+    item.set_batches(share.batches);
+    *item.mutable_cpu() = ToProto(share.cpu);
+  }
+}
+
 v1::Job JobToProto(const Coordinator::Report& report) {
   const Job& job = report.job;
   const JobState state = job.life.state();
@@ -86,6 +134,10 @@ v1::Job JobToProto(const Coordinator::Report& report) {
   *message.mutable_progress() = ProgressToProto(report);
   *message.mutable_submitted_at() = ToProto(job.submitted_at);
   message.set_no_workers(state == JobState::kRunning && report.workers == 0);
+  for (const ErrorSample& sample : job.convergence)
+    *message.add_convergence() = SampleToProto(sample);
+  AddShares(job.workers, message);
+  message.set_has_reference(job.reference.has_value());
   return message;
 }
 
@@ -99,6 +151,9 @@ StatusOr<Coordinator::Submission> ReadSubmission(const v1::SubmitRequest& reques
   LUCERNA_ASSIGN_OR_RETURN(submission.manifest, FromProto(request.scene()));
   LUCERNA_ASSIGN_OR_RETURN(submission.overrides, FromProto(request.overrides()));
   submission.validate_only = request.validate_only();
+  if (!request.reference_digest().empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(submission.reference, Digest::FromBytes(request.reference_digest()));
+  }
   return submission;
 }
 
@@ -256,6 +311,23 @@ grpc::ServerUnaryReactor* JobService::Cancel(grpc::CallbackServerContext* contex
                                              v1::Job* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(Put(coordinator_.Cancel(request->job_id()), response));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* JobService::Stop(grpc::CallbackServerContext* context,
+                                           const v1::StopJobRequest* request, v1::Job* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(Put(coordinator_.Stop(request->job_id()), response));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* JobService::Extend(grpc::CallbackServerContext* context,
+                                             const v1::ExtendJobRequest* request,
+                                             v1::Job* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const StatusOr<RenderOverrides> until = FromProto(request->until());
+  reactor->Finish(until.ok() ? Put(coordinator_.Extend(request->job_id(), *until), response)
+                             : ToGrpc(until.status()));
   return reactor;
 }
 

@@ -1,7 +1,8 @@
 // Which random numbers does the eye path of a pixel use?
 //
-// Every pixel has its own low-discrepancy sequences, and a pass is the next point of each: after
-// n passes a pixel has n well-spread samples of its filter, of its lights and of its scattering.
+// Every pixel has its own low-discrepancy sequences, two sets of them: even passes are the points of
+// one, odd passes those of the other, so that after 2n passes a pixel has twice n well-spread samples
+// of its filter, of its lights and of its scattering, and two independent halves tell the noise.
 #pragma once
 
 #include <array>
@@ -19,7 +20,8 @@ class PixelSampler {
   static constexpr int kStratifiedVertices = 4;
 
   PixelSampler(std::uint64_t seed, std::uint64_t pixel, std::uint64_t pass)
-      : key_(CombineKeys(CombineKeys(seed, 0x4559455041544853ULL), pixel)), pass_(pass) {}
+      : key_(CombineKeys(CombineKeys(CombineKeys(seed, 0x4559455041544853ULL), pixel), pass % 2)),
+        pass_(pass / 2) {}
 
   // Film position (0, 1) and lens position (2, 3).
   [[nodiscard]] SobolPoint ForCamera() const { return OwenSobol(pass_, key_); }

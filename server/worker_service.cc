@@ -90,6 +90,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
     }
     if (collector_) return collector_->Add(part_.bytes());
     const v1::CommitBatchRequest::Header& header = part_.header();
+    delivery_.worker = header.worker_id();
     delivery_.pass = {header.job_id(), header.pass()};
     delivery_.range = {header.first_photon(), header.last_photon()};
     delivery_.cpu = FromProto(header.cpu());

@@ -42,7 +42,7 @@ std::uint64_t PairBits(std::uint32_t photon_key, std::uint32_t hitpoint) {
   return x ^ (x >> 32);
 }
 
-// What a photon that counts adds to the columns of evidence, one class for each kind: chosen once
+// What a photon that counts adds to the columns that its radius controller asks for, one class for each kind: chosen once
 // per batch, so that a job pays for no other kind than its own.
 
 struct NoEvidence {
@@ -75,7 +75,7 @@ struct SectorEvidence {
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
     for (std::size_t i = 0; i < kColumns; ++i)
-      columns[i].push_back(counts[i]);
+      columns[kCommonColumns + i].push_back(counts[i]);
   }
 
   Frame frame;
@@ -104,7 +104,7 @@ struct CurvatureEvidence {
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
     for (std::size_t i = 0; i < kColumns; ++i)
-      columns[i].push_back(sums[i]);
+      columns[kCommonColumns + i].push_back(sums[i]);
   }
 
   float weight_scale;
@@ -132,7 +132,7 @@ struct FrequencyEvidence {
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
     for (std::size_t i = 0; i < kColumns; ++i)
-      columns[i].push_back(sums[i]);
+      columns[kCommonColumns + i].push_back(sums[i]);
   }
 
   float weight_scale;
@@ -148,6 +148,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
   const Vec3 normal = DecodeOctahedral(block.normals_oct[row]);
   const float squared_radius = radius * radius;
   const float inverse_squared = 1 / squared_radius;
+  const float quanta_per_luminance = 1 / Luminance(scale.watts_per_quantum);
   std::uint32_t count = 0;
   std::int64_t sum_r = 0;
   std::int64_t sum_g = 0;
@@ -162,7 +163,17 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
     return KernelShape<kKernel>(t2);
   };
   const float reach = radius * EvidenceSums::kReach;
-  const auto add = [&](const PhotonRecord& photon, Rgb quanta) {
+  // What the inner kernel has more than the whole one: see kBlurColumn.
+  constexpr float kInnerArea = kInnerShare * kInnerShare;
+  const auto blurred = [&](float squared, float whole) {
+    const float t2 = squared * inverse_squared * (1 / kInnerArea);
+    return t2 < 1 ? whole - KernelShape<kKernel>(t2) * (1 / kInnerArea) : whole;
+  };
+  std::int64_t blur = 0;
+  const auto add = [&](const PhotonRecord& photon, Rgb flux, float squared) {
+    const float whole = shape(squared);
+    const Rgb quanta = flux * scale.quanta_per_watt * whole;
+    blur += std::llrint(Luminance(flux) * quanta_per_luminance * blurred(squared, whole));
     const std::uint64_t bits = PairBits(photon.key, hitpoint);
     constexpr std::uint64_t kMask = (1U << 21) - 1;
     sum_r += RoundDithered(quanta.r, static_cast<std::uint32_t>(bits & kMask));
@@ -175,7 +186,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       const PhotonRecord& photon = grid.record(i);
       const Vec3 to_photon = grid.position(i) - position;
       if (!Counts(photon, normal, to_photon)) return;
-      add(photon, photon.flux * scale.quanta_per_watt * shape(squared));
+      add(photon, photon.flux, squared);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux));
     });
   } else {
@@ -191,7 +202,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       if (!Counts(photon, is_behind ? -normal : normal, to_photon)) return;
       const Vec3 wi = frame.ToLocal(DecodeOctahedral(photon.arrival_oct));
       const Rgb scattered = photon.flux * EvaluateBsdf(material, wo, wi, Carried::kRadiance);
-      add(photon, scattered * scale.quanta_per_watt * shape(squared));
+      add(photon, scattered, squared);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(scattered));
     });
   }
@@ -201,6 +212,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
   piece.flux[0].push_back(sum_r);
   piece.flux[1].push_back(sum_g);
   piece.flux[2].push_back(sum_b);
+  piece.evidence[kBlurColumn].push_back(blur);
   evidence.Store(piece.evidence);
   piece.pairs += count;
 }
@@ -215,7 +227,7 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
   team.For(piece_count, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       Piece& piece = pieces[p];
-      piece.evidence.resize(EvidenceSums::kColumns);
+      piece.evidence.resize(kCommonColumns + EvidenceSums::kColumns);
       const std::size_t first = p * kRowsPerPiece;
       const std::size_t last = std::min(rows, first + kRowsPerPiece);
       auto glossy = std::lower_bound(
@@ -237,7 +249,7 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
     to.reserve(touched);
     to.insert(to.end(), from.begin(), from.end());
   };
-  accumulation.evidence.resize(EvidenceSums::kColumns);
+  accumulation.evidence.resize(kCommonColumns + EvidenceSums::kColumns);
   for (const Piece& piece : pieces) {
     append(accumulation.hitpoints, piece.hitpoints);
     append(accumulation.counts, piece.counts);

@@ -46,10 +46,11 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
 
 void PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index, Landed& landed) const {
   constexpr std::uint64_t kPhotonKey = 0x50484F544F4E5321ULL;
-  const std::uint64_t job_key = CombineKeys(settings_.seed, kPhotonKey);
-  // One sequence over all passes: they share a job's photons out evenly between them.
+  // One sequence over all even passes and one over all odd ones: each shares its photons out evenly,
+  // and the two halves are independent of each other (see estimate/error_estimate.h).
+  const std::uint64_t job_key = CombineKeys(CombineKeys(settings_.seed, kPhotonKey), pass % 2);
   const std::uint64_t number =
-      pass * static_cast<std::uint64_t>(settings_.photons_per_pass) + index;
+      pass / 2 * static_cast<std::uint64_t>(settings_.photons_per_pass) + index;
   if (spectra_ == nullptr) return Walk<false>(number, job_key, landed);
   constexpr std::uint64_t kShareKey = 0x4652455155454E43ULL;
   const auto bits = static_cast<std::uint32_t>(CombineKeys(job_key ^ kShareKey, number) >> 32);

@@ -19,7 +19,8 @@ float ReachOf(const Scene& scene, const RenderSettings& settings, const Bounds& 
   const Window window = ScreenWindow(scene.camera, settings.width, settings.height);
   const auto pixel = static_cast<float>((window.high_x - window.low_x) / settings.width);
   const float distance = Length(scene.camera.camera_to_world.Point({}) - bounds.Center());
-  return 2 * kInitialFootprints * pixel * std::max(distance, 0.1F * bounds.Diagonal());
+  return 2 * static_cast<float>(settings.initial_footprints) * pixel *
+         std::max(distance, 0.1F * bounds.Diagonal());
 }
 
 }  // namespace

@@ -33,8 +33,8 @@ struct Accumulation {
   std::vector<std::uint32_t> hitpoints;
   std::vector<std::uint32_t> counts;              // [hitpoints] photons found, each >= 1
   std::array<std::vector<std::int64_t>, 3> flux;  // [3][hitpoints] in quanta, per channel
-  // [columns][hitpoints] what the job's radius controller asks for besides (estimate/evidence.h);
-  // no columns for most.
+  // [columns][hitpoints] for the error estimate and the job's radius controller
+  // (estimate/evidence.h).
   std::vector<std::vector<std::int64_t>> evidence;
   BatchTally tally;
 

@@ -1,4 +1,4 @@
-// Which columns do accumulations carry for a radius controller, besides photons and flux?
+// Which columns do accumulations carry besides photons and flux, for errors and radii?
 //
 // Sums over the photons in a hitpoint's disc, as exact integers like everything else in an
 // accumulation. Lengths are relative to the hitpoint's radius, so the numbers have no unit and stay
@@ -12,6 +12,15 @@
 
 namespace lucerna {
 
+// Always the first column: what the error estimate needs (see estimate/error_estimate.h). Sums of
+// luminance flux times K(x) - K(x/a)/a², where K is the kernel's shape and a = kInnerShare, in units
+// of the luminance of a quantum of each channel.
+inline constexpr std::size_t kBlurColumn = 0;
+inline constexpr std::size_t kCommonColumns = 1;
+// Radius of the inner kernel over that of the whole one.
+inline constexpr float kInnerShare = 0.4F;
+
+// What a radius controller asks for behind it.
 enum class Evidence : std::uint8_t { kNone, kSectors, kCurvature, kFrequency };
 
 // Frequency photons come in one pass of so many, and that many times as densely there: the same
@@ -61,18 +70,19 @@ inline constexpr double kWeightUnit = 0x1p-16;
 // Larger values of x ask for radii below a hundredth of the present one; they are held here.
 inline constexpr float kLargestTrace = 4096;
 
+// All columns of an accumulation.
 [[nodiscard]] constexpr std::size_t EvidenceColumns(Evidence evidence) {
   switch (evidence) {
     case Evidence::kNone:
-      return 0;
+      return kCommonColumns;
     case Evidence::kSectors:
-      return kSectors;
+      return kCommonColumns + kSectors;
     case Evidence::kCurvature:
-      return kCurvatureColumns;
+      return kCommonColumns + kCurvatureColumns;
     case Evidence::kFrequency:
-      return kFrequencyColumns;
+      return kCommonColumns + kFrequencyColumns;
   }
-  return 0;
+  return kCommonColumns;
 }
 
 }  // namespace lucerna

@@ -1,12 +1,14 @@
 #include "render/estimate/statistics.h"
 
 #include "render/base/status.h"
+#include "render/estimate/evidence.h"
 
 namespace lucerna {
 
 PixelStatistics::PixelStatistics(std::size_t pixels, float initial_radius,
                                  std::size_t memory_per_pixel)
     : radius_(pixels, PixelRadius{initial_radius, 0}),
+      radius_before_(pixels, initial_radius),
       radiance_sum_(pixels),
       photon_count_(pixels),
       last_radius_(pixels),
@@ -14,10 +16,14 @@ PixelStatistics::PixelStatistics(std::size_t pixels, float initial_radius,
       memory_per_pixel_(memory_per_pixel),
       memory_(pixels * memory_per_pixel) {}
 
-RadiusColumn PixelStatistics::Radii(const HitpointRows& rows) const {
+RadiusColumn PixelStatistics::Radii(const HitpointRows& rows, std::uint64_t pass) const {
+  const auto passes = static_cast<std::uint64_t>(passes_);
+  LUCERNA_CHECK(passes <= pass && pass <= passes + 1);
   RadiusColumn radii(rows.pixels.size());
   for (std::size_t row = 0; row < radii.size(); ++row) {
-    radii[row] = radius_[rows.pixels[row]].radius * rows.unit_radii[row];
+    const std::uint32_t pixel = rows.pixels[row];
+    radii[row] = (pass == passes ? radius_before_[pixel] : radius_[pixel].radius) *
+                 rows.unit_radii[row];
   }
   return radii;
 }
@@ -25,10 +31,16 @@ RadiusColumn PixelStatistics::Radii(const HitpointRows& rows) const {
 void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& radii,
                                  const PassSums& sums, const FluxScale& scale, const Kernel& kernel,
                                  std::int64_t photons_per_pass,
-                                 const RadiusController& controller) {
-  LUCERNA_CHECK(rows.pixels.size() == sums.size() && radii.size() == sums.size());
+                                 const RadiusController& controller,
+                                 std::span<RgbSum> radiance, std::span<double> bias) {
+  LUCERNA_CHECK(rows.pixels.size() == sums.size() && radii.size() == sums.size() &&
+                sums.evidence().size() >= kCommonColumns);
   const auto pass = static_cast<std::uint64_t>(passes_);
+  for (std::size_t pixel = 0; pixel < radius_.size(); ++pixel)
+    radius_before_[pixel] = radius_[pixel].radius;
   std::vector<std::int64_t> columns(sums.evidence().size());
+  const double luminance_per_quantum = static_cast<double>(Luminance(scale.watts_per_quantum));
+  constexpr double kToBias = 1 / (1 - static_cast<double>(kInnerShare * kInnerShare));
   const double per_photon = kernel.Norm() / static_cast<double>(photons_per_pass);
   for (std::size_t row = 0; row < radii.size(); ++row) {
     const std::uint32_t pixel = rows.pixels[row];
@@ -39,7 +51,9 @@ void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& r
       const auto c = static_cast<std::size_t>(channel);
       const double flux = static_cast<double>(sums.flux(channel)[row]) *
                           static_cast<double>(scale.watts_per_quantum[channel]);
-      sum[c] += static_cast<double>(rows.weights[row][channel]) * flux * to_density;
+      const double value = static_cast<double>(rows.weights[row][channel]) * flux * to_density;
+      sum[c] += value;
+      radiance[pixel][c] += value;
     }
     photon_count_[pixel] += sums.counts()[row];
     last_radius_[pixel] = radii[row];
@@ -47,9 +61,13 @@ void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& r
     for (std::size_t column = 0; column < columns.size(); ++column) {
       columns[column] = sums.evidence()[column][row];
     }
+    bias[pixel] = static_cast<double>(columns[kBlurColumn]) * luminance_per_quantum * to_density *
+                  kToBias * static_cast<double>(Luminance(rows.weights[row]));
     radius_[pixel] = controller.Next(
         radius_[pixel],
-        {static_cast<double>(sums.counts()[row]), radii[row] / rows.unit_radii[row], columns}, pass,
+        {static_cast<double>(sums.counts()[row]), radii[row] / rows.unit_radii[row],
+         std::span<const std::int64_t>(columns).subspan(kCommonColumns)},
+        pass,
         std::span<double>(memory_).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
   }
   ++passes_;

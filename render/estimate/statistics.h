@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "render/estimate/accumulation.h"
+#include "render/estimate/error_estimate.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/estimate/kernel.h"
 #include "render/estimate/radius_controller.h"
@@ -19,9 +20,6 @@
 #include "render/math/rgb.h"
 
 namespace lucerna {
-
-// Sums of a colour over passes, in double.
-using RgbSum = std::array<double, 3>;
 
 // The hitpoints of one pass and what belongs to each of them.
 struct HitpointRows {
@@ -35,13 +33,16 @@ class PixelStatistics {
   // `initial_radius` in unit radii; `memory_per_pixel` as the radius controller asks.
   PixelStatistics(std::size_t pixels, float initial_radius, std::size_t memory_per_pixel = 0);
 
-  // The radius of each hitpoint of a pass [scene units], from the statistics as they are now.
-  [[nodiscard]] RadiusColumn Radii(const HitpointRows& rows) const;
+  // The radius of each hitpoint of pass number `pass` [scene units], from the statistics of the passes
+  // before the one before it. Requires passes() <= pass <= passes() + 1.
+  [[nodiscard]] RadiusColumn Radii(const HitpointRows& rows, std::uint64_t pass) const;
 
-  // Takes in the merged photons of a pass that were gathered with `radii`.
+  // Takes in the merged photons of a pass that were gathered with `radii`. Adds what they bring to
+  // `radiance` and sets `bias`, both [pixels], for ErrorStatistics.
   void AddPhotons(const HitpointRows& rows, const RadiusColumn& radii, const PassSums& sums,
                   const FluxScale& scale, const Kernel& kernel, std::int64_t photons_per_pass,
-                  const RadiusController& controller);
+                  const RadiusController& controller, std::span<RgbSum> radiance,
+                  std::span<double> bias);
 
   [[nodiscard]] std::int64_t passes() const { return passes_; }
   // Sum over passes of each pass's estimate of photon radiance [pixels].
@@ -60,6 +61,7 @@ class PixelStatistics {
  private:
   std::int64_t passes_ = 0;
   std::vector<PixelRadius> radius_;
+  std::vector<float> radius_before_;  // the last pass was taken in
   std::vector<RgbSum> radiance_sum_;
   std::vector<std::uint64_t> photon_count_;
   std::vector<float> last_radius_;

@@ -29,6 +29,9 @@ class Film {
   [[nodiscard]] Image MakeImage(const PixelStatistics& statistics,
                                 const RadiusController& controller, const Kernel& kernel) const;
 
+  // Sums over passes [pixels].
+  [[nodiscard]] const std::vector<RgbSum>& direct_sum() const { return direct_sum_; }
+
  private:
   struct Features {
     Rgb albedo;

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "render/film/reference.h"
+
 namespace lucerna {
 namespace {
 
@@ -75,15 +77,18 @@ Plane FitPlane(const ImageChannel& channel, Size from, Size to, const MetricsOpt
   return plane;
 }
 
-StatusOr<std::array<Plane, 3>> FitColour(const Image& image, const std::string& who, Size size,
+using ColourNames = std::array<const char*, 3>;
+constexpr ColourNames kColour = {"R", "G", "B"};
+
+StatusOr<std::array<Plane, 3>> FitColour(const Image& image, const ColourNames& names,
+                                         const std::string& who, Size size,
                                          const MetricsOptions& options) {
   std::array<Plane, 3> planes;
-  constexpr std::array<const char*, 3> kNames = {"R", "G", "B"};
   for (std::size_t channel = 0; channel < 3; ++channel) {
-    const ImageChannel* found = image.Find(kNames[channel]);
+    const ImageChannel* found = image.Find(names[channel]);
     if (found == nullptr) {
       return absl::InvalidArgumentError(
-          absl::StrCat("the ", who, " has no channel ", kNames[channel]));
+          absl::StrCat("the ", who, " has no channel ", names[channel]));
     }
     planes[channel] = FitPlane(*found, {image.width, image.height}, size, options);
   }
@@ -128,8 +133,13 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
   }
   const Size size = {std::min(image.width, reference.width),
                      std::min(image.height, reference.height)};
-  LUCERNA_ASSIGN_OR_RETURN(const auto a, FitColour(image, "image", size, options));
-  LUCERNA_ASSIGN_OR_RETURN(const auto b, FitColour(reference, "reference", size, options));
+  LUCERNA_ASSIGN_OR_RETURN(const auto a, FitColour(image, kColour, "image", size, options));
+  LUCERNA_ASSIGN_OR_RETURN(const auto b, FitColour(reference, kColour, "reference", size, options));
+  std::optional<std::array<Plane, 3>> noise;
+  const bool is_scaled = options.fit == MetricsOptions::Fit::kScale && reference_size != size;
+  if (TellsItsNoise(reference) && !is_scaled && options.clip == HUGE_VAL) {
+    LUCERNA_ASSIGN_OR_RETURN(noise, FitColour(reference, kNoiseLayer, "reference", size, options));
+  }
   Plane mask;
   if (options.mask != nullptr) {
     LUCERNA_ASSIGN_OR_RETURN(mask, FitMask(*options.mask, size, options));
@@ -175,12 +185,19 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
   std::array<double, 3> sum_a{};
   std::array<double, 3> sum_b{};
   double squares = 0;
+  double noise_squares = 0;
+  double relative_noise = 0;
   for (const Compared& one : compared) {
     metrics.rel_mse += one.relative_error;
     for (std::size_t channel = 0; channel < 3; ++channel) {
       const double va = a[channel][one.pixel];
       const double vb = b[channel][one.pixel];
       squares += (va - vb) * (va - vb);
+      if (noise) {
+        const double deviation = (*noise)[channel][one.pixel];
+        noise_squares += deviation * deviation;
+        relative_noise += deviation * deviation / (vb * vb + options.epsilon);
+      }
       sum_a[channel] += va;
       sum_b[channel] += vb;
     }
@@ -188,6 +205,13 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
   const double samples = 3 * static_cast<double>(kept);
   metrics.rmse = std::sqrt(squares / samples);
   metrics.rel_mse /= samples;
+  if (noise) {
+    metrics.reference_rel_mse = relative_noise / samples;
+    metrics.reference_mse = noise_squares / samples;
+    if (!std::isfinite(*metrics.reference_mse)) {
+      return absl::InvalidArgumentError("the noise layer of the reference is not finite");
+    }
+  }
   metrics.mean_a = (sum_a[0] + sum_a[1] + sum_a[2]) / samples;
   metrics.mean_b = (sum_b[0] + sum_b[1] + sum_b[2]) / samples;
   metrics.mean_ratio = Ratio(metrics.mean_a, metrics.mean_b);

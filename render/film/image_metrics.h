@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include "render/base/status.h"
 #include "render/image/image.h"
@@ -31,6 +32,9 @@ struct ImageMetrics {
   double mean_a = 0, mean_b = 0;  // over pixels and channels
   double mean_ratio = 0;          // mean_a / mean_b
   std::array<double, 3> channel_mean_ratio{};
+  // The part of rel_mse, and of the square of rmse, that is noise of the reference itself; where
+  // the reference tells its noise (film/reference.h), and neither clipping nor scaling changed it.
+  std::optional<double> reference_rel_mse, reference_mse;
 };
 
 // Compares R, G, B of `image` with those of `reference`.

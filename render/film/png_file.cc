@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <vector>
 
 #include <stb/stb_image_write.h>
 
@@ -26,7 +24,7 @@ void Append(void* target, void* bytes, int size_bytes) {
 
 }  // namespace
 
-StatusOr<std::string> EncodePng(const Image& image, double exposure_stops) {
+StatusOr<std::vector<std::uint8_t>> ScreenPixels(const Image& image, double exposure_stops) {
   const ImageChannel* planes[] = {image.Find("R"), image.Find("G"), image.Find("B")};
   const double gain = std::exp2(exposure_stops);
   std::vector<std::uint8_t> pixels;
@@ -41,6 +39,12 @@ StatusOr<std::string> EncodePng(const Image& image, double exposure_stops) {
       pixels[3 * i + channel] = EncodeSrgb(gain * static_cast<double>(plane[i]));
     }
   }
+  return pixels;
+}
+
+StatusOr<std::string> EncodePng(const Image& image, double exposure_stops) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::vector<std::uint8_t> pixels,
+                           ScreenPixels(image, exposure_stops));
   std::string bytes;
   if (stbi_write_png_to_func(Append, &bytes, image.width, image.height, 3, pixels.data(),
                              3 * image.width) == 0) {

@@ -79,12 +79,48 @@ std::string_view NameOf(KernelKind kind) {
   return NameIn(kKernels, kind);
 }
 
+std::vector<std::string_view> RadiusControllerNames() {
+  std::vector<std::string_view> names;
+  for (const auto& [name, kind] : kControllers)
+    names.push_back(name);
+  return names;
+}
+
 StatusOr<RadiusControllerKind> ParseRadiusController(std::string_view name) {
   return ParseName(kControllers, "radius controller", name);
 }
 
 StatusOr<KernelKind> ParseKernel(std::string_view name) {
   return ParseName(kKernels, "kernel", name);
+}
+
+Status SetStopCriteria(const RenderOverrides& until, RenderSettings& settings) {
+  const bool has_other_end = until.time_s || until.error || until.photons;
+  if (!has_other_end && !until.passes) {
+    return absl::InvalidArgumentError(
+        "say when to stop, with --passes, --photons, --time or --error");
+  }
+  if (until.time_s && (!(*until.time_s > 0) || !std::isfinite(*until.time_s))) {
+    return absl::InvalidArgumentError(
+        Concat("--time must be a number of seconds above 0, not ", *until.time_s));
+  }
+  if (until.error && !(*until.error >= 1e-6 && *until.error <= 10)) {
+    return absl::InvalidArgumentError(
+        Concat("--error must be from 0.0001% to 1000%, not ", 100 * *until.error, "%"));
+  }
+  if (until.photons && *until.photons == 0) {
+    return absl::InvalidArgumentError("--photons must be at least 1");
+  }
+  if (until.passes && (*until.passes < 0 || (*until.passes == 0 && !has_other_end))) {
+    return absl::InvalidArgumentError(
+        Concat("--passes must be at least 1, or 0 together with --time, --error or --photons, not ",
+               *until.passes));
+  }
+  settings.time_s = until.time_s.value_or(0);
+  settings.error = until.error.value_or(0);
+  settings.photons = until.photons.value_or(0);
+  settings.passes = until.passes.value_or(0);
+  return absl::OkStatus();
 }
 
 StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const Scene& scene) {
@@ -109,24 +145,10 @@ StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const
   settings.crop_y1 =
       std::max(ScalePixel(film.crop_y1, film.height, settings.height), settings.crop_y0 + 1);
 
-  if (overrides.time_s.has_value()) {
-    if (!(*overrides.time_s > 0) || !std::isfinite(*overrides.time_s)) {
-      return absl::InvalidArgumentError(
-          Concat("--time must be a number of seconds above 0, not ", *overrides.time_s));
-    }
-    settings.time_s = *overrides.time_s;
-  }
-  if (overrides.passes.has_value()) {
-    settings.passes = *overrides.passes;
-    if (settings.passes < 0 || (settings.passes == 0 && !overrides.time_s.has_value())) {
-      return absl::InvalidArgumentError(
-          Concat("--passes must be at least 1, or 0 together with --time, not ", settings.passes));
-    }
-  } else if (overrides.time_s.has_value()) {
-    settings.passes = 0;
-  } else {
-    settings.passes = asked.pixel_samples.value_or(kDefaultPasses);
-  }
+  RenderOverrides until = overrides;
+  const bool has_end = overrides.passes || overrides.time_s || overrides.error || overrides.photons;
+  if (!has_end) until.passes = asked.pixel_samples.value_or(kDefaultPasses);
+  LUCERNA_RETURN_IF_ERROR(SetStopCriteria(until, settings));
 
   const std::int64_t pixels =
       std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()};
@@ -150,6 +172,13 @@ StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const
         Concat("--alpha must be above 0 and below 1, not ", settings.alpha));
   }
   settings.initial_radius = overrides.initial_radius.value_or(asked.initial_radius.value_or(0));
+  settings.initial_footprints = overrides.initial_footprints.value_or(kInitialFootprints);
+  // Above that the disc of one pixel is the image.
+  if (!(settings.initial_footprints >= 1e-3 && settings.initial_footprints <= 1e4)) {
+    return absl::InvalidArgumentError(
+        Concat("--initial-radius must be from 0.001px to 10000px, not ",
+               settings.initial_footprints, "px"));
+  }
   settings.bias = overrides.bias.value_or(settings.bias);
   if (!(settings.bias >= 1e-4 && settings.bias <= 1)) {
     return absl::InvalidArgumentError(

@@ -71,6 +71,8 @@ v1::RenderOverrides ToProto(const RenderOverrides& overrides) {
   if (overrides.passes) message.set_passes(*overrides.passes);
   if (overrides.photons_per_pass) message.set_photons_per_pass(*overrides.photons_per_pass);
   if (overrides.time_s) message.set_time_s(*overrides.time_s);
+  if (overrides.error) message.set_error(*overrides.error);
+  if (overrides.photons) message.set_photons(*overrides.photons);
   if (overrides.seed) message.set_seed(*overrides.seed);
   if (overrides.radius_controller) {
     message.set_radius_controller(std::string(NameOf(*overrides.radius_controller)));
@@ -80,6 +82,9 @@ v1::RenderOverrides ToProto(const RenderOverrides& overrides) {
   if (overrides.bias) message.set_bias(*overrides.bias);
   if (overrides.frequency_share) message.set_frequency_share(*overrides.frequency_share);
   if (overrides.initial_radius) message.set_initial_radius(*overrides.initial_radius);
+  if (overrides.initial_footprints) {
+    message.set_initial_footprints(*overrides.initial_footprints);
+  }
   if (overrides.max_depth) message.set_max_depth(*overrides.max_depth);
   return message;
 }
@@ -96,6 +101,11 @@ StatusOr<RenderOverrides> FromProto(const v1::RenderOverrides& message) {
     if (!std::isfinite(message.time_s())) return Outside("time");
     overrides.time_s = message.time_s();
   }
+  if (message.has_error()) {
+    if (!std::isfinite(message.error())) return Outside("error");
+    overrides.error = message.error();
+  }
+  if (message.has_photons()) overrides.photons = message.photons();
   if (message.has_alpha()) {
     if (!std::isfinite(message.alpha())) return Outside("alpha");
     overrides.alpha = message.alpha();
@@ -103,6 +113,10 @@ StatusOr<RenderOverrides> FromProto(const v1::RenderOverrides& message) {
   if (message.has_initial_radius()) {
     if (!std::isfinite(message.initial_radius())) return Outside("initial radius");
     overrides.initial_radius = message.initial_radius();
+  }
+  if (message.has_initial_footprints()) {
+    if (!std::isfinite(message.initial_footprints())) return Outside("initial radius");
+    overrides.initial_footprints = message.initial_footprints();
   }
   if (message.has_radius_controller()) {
     LUCERNA_ASSIGN_OR_RETURN(overrides.radius_controller,
@@ -132,6 +146,8 @@ v1::RenderSettings ToProto(const RenderSettings& settings) {
   message.set_crop_y1(settings.crop_y1);
   message.set_passes(settings.passes);
   message.set_time_s(settings.time_s);
+  message.set_error(settings.error);
+  message.set_photons(settings.photons);
   message.set_photons_per_pass(settings.photons_per_pass);
   message.set_seed(settings.seed);
   message.set_radius_controller(std::string(NameOf(settings.radius_controller)));
@@ -140,6 +156,7 @@ v1::RenderSettings ToProto(const RenderSettings& settings) {
   message.set_bias(settings.bias);
   message.set_frequency_share(settings.frequency_share);
   message.set_initial_radius(settings.initial_radius);
+  message.set_initial_footprints(settings.initial_footprints);
   message.set_max_depth(settings.max_depth);
   return message;
 }
@@ -163,6 +180,9 @@ StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message) {
   if (settings.passes < 0) return Outside("number of passes");
   settings.time_s = message.time_s();
   if (!(settings.time_s >= 0) || !std::isfinite(settings.time_s)) return Outside("time");
+  settings.error = message.error();
+  if (!IsBetween(settings.error, 0, 10)) return Outside("error");
+  settings.photons = message.photons();
   settings.photons_per_pass = message.photons_per_pass();
   if (settings.photons_per_pass < 1 || settings.photons_per_pass > kMostPhotons) {
     return Outside("number of photons per pass");
@@ -181,6 +201,10 @@ StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message) {
   }
   settings.initial_radius = message.initial_radius();
   if (!(settings.initial_radius >= 0) || !std::isfinite(settings.initial_radius)) {
+    return Outside("initial radius");
+  }
+  settings.initial_footprints = message.initial_footprints();
+  if (!(settings.initial_footprints > 0) || !std::isfinite(settings.initial_footprints)) {
     return Outside("initial radius");
   }
   settings.max_depth = message.max_depth();

@@ -243,7 +243,7 @@ void AccumulationOnTheWire(benchmark::State& state, const Bench& bench) {
 void Merge(benchmark::State& state, const Bench& bench) {
   ThreadTeam team(1);
   const Accumulation accumulation = GatherOnce(bench, TraceDeposits(bench, 1 << 16), team);
-  PassSums sums(bench.eye.block.size());
+  PassSums sums(bench.eye.block.size(), kCommonColumns);
   for (auto _ : state) {
     if (!sums.Add(accumulation).ok()) state.SkipWithError("overflow");
   }

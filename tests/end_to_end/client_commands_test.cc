@@ -201,6 +201,7 @@ TEST_F(ClientCommandsTest, MisuseIsRefusedWithCodeTwo) {
   EXPECT_EQ(Run(SmallRender({"-o", In("a.exr"), "--alpha", "1.5"})).code, 2);
   EXPECT_EQ(Run({"diff", "a", "b", "--crop", "--scale"}).code, 2);
   EXPECT_EQ(Run({"jobs", "--server", "no-port"}).code, 2);
+  EXPECT_EQ(Run({"report", "j"}).code, 2) << "no output";
   EXPECT_EQ(Run({"validate", SceneOfTests("")}).code, 2) << "a folder";
   const Ran too_large =
       Run({"render", SceneOfTests("caustic.pbrt"), "-o", In("a.exr"), "--size", "50000x50000"});
@@ -311,6 +312,14 @@ TEST_F(ClientCommandsTest, AJobIsSubmittedListedFollowedFetchedAndCancelled) {
   EXPECT_EQ(json::parse(watched.out)["state"], "SUCCEEDED");
   ASSERT_EQ(Run({"fetch", job, "-o", In("a.exr"), "--server", server}).code, 0);
 
+  const Ran reported = Run({"report", job, "-o", In("page.html"), "--csv", In("error.csv"),
+                            "--json", "--server", server});
+  ASSERT_EQ(reported.code, 0) << reported.err;
+  EXPECT_TRUE(json::parse(reported.out)["convergence"].is_array());
+  EXPECT_NE(Contents(In("page.html")).find("data:image/png;base64,"), std::string::npos);
+  EXPECT_EQ(Contents(In("error.csv")).find("row,worker_id,"), 0U);
+  EXPECT_EQ(Run({"report", job, "-o", In("x"), "--csv", In("./x"), "--server", server}).code, 2);
+
   // The same image as by `render`, and as by a submission that waits.
   ASSERT_EQ(Run(SmallRender({"-o", In("b.exr")})).code, 0);
   EXPECT_EQ(Run({"digest", In("a.exr")}).out, Run({"digest", In("b.exr")}).out);
@@ -327,6 +336,9 @@ TEST_F(ClientCommandsTest, AJobIsSubmittedListedFollowedFetchedAndCancelled) {
   EXPECT_EQ(Run({"wait", second, "--server", server}).code, 1) << "it did not succeed";
   EXPECT_EQ(Run({"fetch", second, "-o", In("d.exr"), "--server", server}).code, 1);
   EXPECT_FALSE(std::filesystem::exists(In("d.exr")));
+  const Ran dropped = Run({"report", second, "-o", In("d.html"), "--server", server});
+  EXPECT_EQ(dropped.code, 0) << dropped.err;
+  EXPECT_NE(Contents(In("d.html")).find("There is no image."), std::string::npos);
 
   const json jobs = json::parse(Run({"jobs", "--json", "--server", server}).out);
   ASSERT_EQ(jobs.size(), 3U);
@@ -337,6 +349,141 @@ TEST_F(ClientCommandsTest, AJobIsSubmittedListedFollowedFetchedAndCancelled) {
   const Ran unknown = Run({"watch", "no-such-job", "--server", server});
   EXPECT_EQ(unknown.code, 1);
   EXPECT_NE(unknown.err.find("no-such-job"), std::string::npos) << unknown.err;
+}
+
+// Half a second of rendering in two halves.
+std::vector<std::string> SmallReference(const std::string& scene, const std::string& output) {
+  return {"reference",          scene,   "--size", "32x24", "--passes", "9",
+          "--photons-per-pass", "20000", "--seed", "7",     "-o",       output};
+}
+
+TEST_F(ClientCommandsTest, AReferenceTellsItsNoiseAndDiffTakesItOff) {
+  std::vector<std::string> words = SmallReference(SceneOfTests("caustic.pbrt"), In("ref.exr"));
+  words.emplace_back("--json");
+  const Ran ran = Run(words);
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const json report = json::parse(ran.out);
+  const json& metadata = report["metadata"];
+  EXPECT_EQ(metadata["lucerna.reference.seeds"], "7 8");
+  EXPECT_EQ(metadata["lucerna.reference.passes"], "5 5");
+  const std::string settings = metadata["lucerna.settings"];
+  EXPECT_NE(settings.find("initial-radius=0.5px"), std::string::npos) << settings;
+  EXPECT_NE(settings.find("radius-controller=pppm"), std::string::npos) << settings;
+  const StatusOr<Image> image = DecodeExr(Contents(In("ref.exr")));
+  ASSERT_TRUE(image.ok()) << image.status();
+  EXPECT_EQ(report["image_digest"], image->PixelDigest().Hex());
+  EXPECT_NE(image->Find("noise.G"), nullptr);
+  EXPECT_EQ(Images().size(), 1U) << "and nothing else";
+
+  ASSERT_EQ(Run(SmallRender({"-o", In("a.exr")})).code, 0);
+  const Ran diff = Run({"diff", In("a.exr"), In("ref.exr"), "--json"});
+  ASSERT_EQ(diff.code, 0) << diff.err;
+  const json figures = json::parse(diff.out);
+  const double noise = figures["reference_rel_mse"];
+  EXPECT_NEAR(noise, std::stod(metadata["lucerna.reference.rel_mse"].get<std::string>()),
+              1e-4 * noise)
+      << "of all pixels it is the same";
+  EXPECT_DOUBLE_EQ(figures["corrected_rel_mse"], figures["rel_mse"].get<double>() - noise);
+  EXPECT_NE(Run({"diff", In("a.exr"), In("ref.exr")}).out.find("the reference's noise"),
+            std::string::npos);
+}
+
+TEST_F(ClientCommandsTest, AnInterruptedReferenceLeavesNoFile) {
+  const pid_t client = Start({"reference", SceneOfTests("caustic.pbrt"), "--size", "32x24",
+                              "--time", "1000", "-o", In("ref.exr")});
+  for (int i = 0; i < 1000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  ::kill(client, SIGINT);
+  EXPECT_EQ(Finish(client).code, 130);
+  EXPECT_TRUE(Images().empty());
+}
+
+TEST_F(ClientCommandsTest, AReferenceNeedsAnEndAndAFileOfItsOwn) {
+  const std::string scene = SceneOfTests("caustic.pbrt");
+  EXPECT_EQ(Run({"reference", scene, "-o", In("ref.exr")}).code, 2);
+  EXPECT_EQ(Run({"reference", scene, "-o", In("ref.exr"), "--time", "1", "--passes", "2"}).code, 2);
+  EXPECT_EQ(Run({"reference", scene, "-o", In("ref.exr"), "--passes", "1"}).code, 2);
+  EXPECT_EQ(Run({"reference", scene, "-o", scene, "--time", "1"}).code, 2);
+}
+
+class CompareTest : public ClientCommandsTest {
+ protected:
+  // Two settings for a fifth of a second each time.
+  [[nodiscard]] std::vector<std::string> SmallComparison(
+      const std::vector<std::string>& more) const {
+    std::vector<std::string> words = {"compare",
+                                      SceneOfTests("caustic.pbrt"),
+                                      "--reference",
+                                      In("ref.exr"),
+                                      "--size",
+                                      "32x24",
+                                      "--photons-per-pass",
+                                      "5000",
+                                      "--times",
+                                      "0.1,0.4",
+                                      "--repetitions",
+                                      "2",
+                                      "--settings",
+                                      "wide: --initial-radius 4px",
+                                      "--settings",
+                                      "flat: --kernel constant --radius-controller pppm"};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+
+  // What both ways of measuring must give.
+  void ExpectComparison(const Ran& ran) const {
+    ASSERT_EQ(ran.code, 0) << ran.err;
+    const json report = json::parse(ran.out);
+    ASSERT_EQ(report["settings"].size(), 2U);
+    EXPECT_GT(report["reference_rel_mse"].get<double>(), 0);
+    for (const json& setting : report["settings"]) {
+      ASSERT_EQ(setting["runs"].size(), 2U);
+      EXPECT_NE(setting["runs"][0]["seed"], setting["runs"][1]["seed"]);
+      for (const json& run : setting["runs"]) {
+        ASSERT_GE(run["points"].size(), 2U);
+        for (const json& point : run["points"]) {
+          EXPECT_GT(point["measured_rel_mse"].get<double>(), 0);
+          EXPECT_GT(point["time_s"].get<double>(), 0);
+        }
+      }
+    }
+    EXPECT_EQ(report["settings"][0]["name"], "wide");
+    EXPECT_EQ(report["settings"][1]["flags"], "--kernel constant --radius-controller pppm");
+    // In turn: the second repetition begins when all settings had their first.
+    const std::size_t flat = ran.err.find("repetition 1 of 2, flat");
+    EXPECT_LT(ran.err.find("repetition 1 of 2, wide"), flat);
+    EXPECT_LT(flat, ran.err.find("repetition 2 of 2, wide")) << ran.err;
+    const std::string table = Contents(In("table.md"));
+    EXPECT_NE(table.find("| wide |"), std::string::npos) << table;
+    EXPECT_EQ(Contents(In("plot.svg")).find("<svg xmlns="), 0U);
+  }
+};
+
+TEST_F(CompareTest, SettingsAreComparedByTheirRecords) {
+  ASSERT_EQ(Run(SmallReference(SceneOfTests("caustic.pbrt"), In("ref.exr"))).code, 0);
+  ExpectComparison(
+      Run(SmallComparison({"-o", In("table.md"), "--plot", In("plot.svg"), "--json"})));
+}
+
+TEST_F(CompareTest, SettingsAreComparedByTheirImagesWhenPixelsAreLeftOut) {
+  ASSERT_EQ(Run(SmallReference(SceneOfTests("caustic.pbrt"), In("ref.exr"))).code, 0);
+  ExpectComparison(Run(SmallComparison(
+      {"-o", In("table.md"), "--plot", In("plot.svg"), "--json", "--trim", "0.01"})));
+  EXPECT_NE(Contents(In("table.md")).find("without the worst 1 % of pixels"), std::string::npos);
+}
+
+TEST_F(CompareTest, MisuseIsRefusedBeforeAnythingIsRendered) {
+  ASSERT_EQ(Run(SmallReference(SceneOfTests("caustic.pbrt"), In("ref.exr"))).code, 0);
+  EXPECT_EQ(Run(SmallComparison({"--settings", "wide: --alpha 0.5"})).code, 2)
+      << "the name is taken";
+  EXPECT_EQ(Run(SmallComparison({"--settings", "end: --passes 3"})).code, 2);
+  EXPECT_EQ(Run(SmallComparison({"-o", In("ref.exr")})).code, 2) << "the reference is not ours";
+  EXPECT_EQ(Run(SmallComparison({"--settings", "large: --size 64x48"})).code, 2);
+  std::vector<std::string> none = SmallComparison({});
+  none[3] = In("none.exr");
+  EXPECT_EQ(Run(none).code, 1);
 }
 
 }  // namespace

@@ -22,6 +22,9 @@ class LocalRender {
   // Adds one pass, its photons in `batches` ranges.
   void AddPass(int batches = 1);
   [[nodiscard]] Image MakeImage() const { return estimator_->MakeImage(); }
+  [[nodiscard]] ErrorEstimate EstimateError(int look) const {
+    return estimator_->EstimateError(look);
+  }
   // Over all passes.
   [[nodiscard]] const BatchTally& tally() const { return tally_; }
 

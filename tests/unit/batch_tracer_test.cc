@@ -7,6 +7,7 @@
 
 #include "gtest/gtest.h"
 
+#include "render/estimate/evidence.h"
 #include "render/base/clock.h"
 #include "render/math/octahedral.h"
 #include "tests/support/test_scenes.h"
@@ -57,7 +58,7 @@ struct Fixture {
 
 TEST(BatchTracerTest, GivesTheSameForAnyThreadsAndCuts) {
   Fixture f;
-  PassSums whole(f.block.size());
+  PassSums whole(f.block.size(), kCommonColumns);
   const Accumulation one = f.Run(1, 3, 0, 20000);
   ASSERT_TRUE(whole.Add(one).ok());
   EXPECT_EQ(f.Run(3, 3, 0, 20000), one);
@@ -67,7 +68,7 @@ TEST(BatchTracerTest, GivesTheSameForAnyThreadsAndCuts) {
   EXPECT_GT(one.tally.rays, 20000U);
   EXPECT_EQ(one.tally.dropped, 0U);
 
-  PassSums parts(f.block.size());
+  PassSums parts(f.block.size(), kCommonColumns);
   const std::uint64_t cuts[] = {0, 1, 2049, 7000, 7000, 19999, 20000};
   for (std::size_t i = 0; i + 1 < std::size(cuts); ++i) {
     ASSERT_TRUE(parts.Add(f.Run(i % 2 == 0 ? 2 : 1, 3, cuts[i], cuts[i + 1])).ok());
@@ -91,8 +92,8 @@ TEST(BatchTracerTest, MergesTheLargePartsOfARange) {
   Fixture f;
   f.settings.photons_per_pass = 1 << 21;
   constexpr std::uint64_t kPart = std::uint64_t{1} << 20;
-  PassSums whole(f.block.size());
-  PassSums parts(f.block.size());
+  PassSums whole(f.block.size(), kCommonColumns);
+  PassSums parts(f.block.size(), kCommonColumns);
   ASSERT_TRUE(whole.Add(f.Run(2, 0, kPart - 1000, 2 * kPart + 500)).ok());
   ASSERT_TRUE(parts.Add(f.Run(2, 0, kPart - 1000, kPart + 100)).ok());
   ASSERT_TRUE(parts.Add(f.Run(2, 0, kPart + 100, 2 * kPart + 500)).ok());

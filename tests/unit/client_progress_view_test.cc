@@ -1,9 +1,13 @@
 // What a user reads about a job must follow from the job alone, and an ETA must come from whichever
 // limit stops it first.
+#include <cmath>
+
 #include "gtest/gtest.h"
 
+#include "client/convergence.h"
 #include "client/progress_view.h"
 #include "render/wire/messages.h"
+#include "tests/support/converging_job.h"
 
 namespace lucerna {
 namespace {
@@ -102,8 +106,45 @@ TEST(ProgressViewTest, ASummaryNamesTheEnd) {
   EXPECT_NE(SummaryLine(job).find("failed: a batch failed on three workers"), std::string::npos);
 }
 
+TEST(ProgressViewTest, PhotonsAreALimitAtTheEndOfTheirPass) {
+  v1::Job job = Running();
+  job.mutable_settings()->set_photons(7'100'000);
+  EXPECT_DOUBLE_EQ(*ShareDone(job), 0.5) << "the eighth pass reaches them";
+  EXPECT_EQ(*TimeLeft(job), seconds(4));
+  job.mutable_settings()->set_photons(100'000'000);
+  EXPECT_DOUBLE_EQ(*ShareDone(job), 0.25) << "passes end it first";
+  job.mutable_settings()->set_passes(0);
+  EXPECT_DOUBLE_EQ(*ShareDone(job), 0.04);
+}
+
+TEST(ProgressViewTest, AnErrorTargetIsALimitToo) {
+  v1::Job job = ConvergingJob(10);
+  job.set_state(v1::JOB_STATE_RUNNING);
+  const double high = job.convergence(9).relative().high();
+  job.mutable_settings()->set_time_s(0);
+  // Half the error takes eight times as long.
+  job.mutable_settings()->set_error(std::sqrt(high) / 2);
+  EXPECT_NEAR(*ShareDone(job), 1.0 / 8, 1e-5);
+  EXPECT_EQ(*TimeLeft(job), *TimeToTarget(job));
+  job.mutable_settings()->set_time_s(2 * Seconds(FromProto(job.progress().running())));
+  EXPECT_NEAR(*ShareDone(job), 1.0 / 2, 1e-5) << "time ends it first";
+}
+
+TEST(ProgressViewTest, TheErrorIsSaidWithItsIntervalAndTarget) {
+  v1::Job job = ConvergingJob();
+  EXPECT_EQ(ErrorLine(job), "error about 2.96 % (95 %: 2.65 % to 3.38 %)  target 3.50 %");
+  EXPECT_NE(SummaryLine(job).find(
+                ", its error target reached, error about 2.96 % (95 %: 2.65 % to 3.38 %)"),
+            std::string::npos)
+      << SummaryLine(job);
+  job.mutable_settings()->set_error(0.03);
+  EXPECT_NE(ErrorLine(job).find("  target 3.00 % in about 1:"), std::string::npos)
+      << ErrorLine(job);
+  EXPECT_EQ(ErrorLine(Running()), "");
+}
+
 TEST(ProgressPrinterTest, PlainLinesComeAtMostEveryTwoSecondsAndAtEveryNewState) {
-  ProgressPrinter printer(/*redraws=*/false);
+  ProgressPrinter printer;
   v1::Job job = Running();
   job.set_state(v1::JOB_STATE_PREPARING);
   SteadyTime now{};
@@ -115,17 +156,6 @@ TEST(ProgressPrinterTest, PlainLinesComeAtMostEveryTwoSecondsAndAtEveryNewState)
   job.mutable_progress()->set_photons(5'000'000);
   EXPECT_EQ(printer.Update(job, now + milliseconds(1999)), "");
   EXPECT_EQ(printer.Update(job, now + milliseconds(2000)), ProgressLine(job) + "\n");
-  EXPECT_EQ(printer.Finish(), "");
-}
-
-TEST(ProgressPrinterTest, ATerminalLineReplacesTheOneBefore) {
-  ProgressPrinter printer(/*redraws=*/true);
-  v1::Job job = Running();
-  EXPECT_EQ(printer.Update(job, SteadyTime{}), "\r" + ProgressLine(job) + "\x1b[K");
-  job.mutable_progress()->set_photons(5'000'000);
-  EXPECT_EQ(printer.Update(job, SteadyTime{}), "\r" + ProgressLine(job) + "\x1b[K");
-  EXPECT_EQ(printer.Finish(), "\n");
-  EXPECT_EQ(printer.Finish(), "") << "only once";
 }
 
 }  // namespace

@@ -54,6 +54,32 @@ TEST(RenderFlagsTest, AutoIsARadiusOfZero) {
   EXPECT_EQ(overrides->initial_radius, 0);
 }
 
+TEST(RenderFlagsTest, ARadiusInPixelsIsAnAutomaticOneOfThatManyFootprints) {
+  RenderFlags flags;
+  flags.initial_radius = "1.5px";
+  const auto overrides = ToOverrides(flags);
+  ASSERT_TRUE(overrides.ok()) << overrides.status();
+  EXPECT_EQ(overrides->initial_radius, 0) << "also where the scene gives a radius";
+  EXPECT_EQ(overrides->initial_footprints, 1.5);
+}
+
+TEST(RenderFlagsTest, WordsChangeWhatTheyNameAndNothingElse) {
+  RenderFlags common;
+  common.seed = 7;
+  common.alpha = 0.5;
+  const auto flags = WithImageFlags(common, " --alpha 0.7 --bias 1% --initial-radius 2px ");
+  ASSERT_TRUE(flags.ok()) << flags.status();
+  EXPECT_EQ(flags->seed, 7U);
+  EXPECT_EQ(flags->alpha, 0.7);
+  EXPECT_EQ(flags->bias, "1%");
+  EXPECT_EQ(flags->initial_radius, "2px");
+  EXPECT_FALSE(flags->kernel);
+  EXPECT_EQ(WithImageFlags(common, "")->alpha, 0.5);
+  for (const char* words : {"--alpha", "--alpha x", "--unknown 3", "word", "--passes 3"}) {
+    EXPECT_EQ(ExitCodeOf(WithImageFlags(common, words).status()), ExitCode::kUsage) << words;
+  }
+}
+
 void ExpectMisuse(std::optional<std::string> RenderFlags::*flag, const char* typed,
                   const std::string& name) {
   RenderFlags flags;
@@ -68,7 +94,7 @@ TEST(RenderFlagsTest, RefusesWhatMakesNoSense) {
                            "1 x 1", "99999999999x1"}) {
     ExpectMisuse(&RenderFlags::size, size, "--size");
   }
-  for (const char* radius : {"", "automatic", "0", "-1", "nan", "inf", "1m"}) {
+  for (const char* radius : {"", "automatic", "0", "-1", "nan", "inf", "1m", "px", "0px", "-1px"}) {
     ExpectMisuse(&RenderFlags::initial_radius, radius, "--initial-radius");
   }
   ExpectMisuse(&RenderFlags::radius_controller, "sppm", "--radius-controller");

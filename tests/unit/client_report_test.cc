@@ -1,9 +1,13 @@
 // What programs read must be valid JSON that says what the job says, with units in the names.
+#include <algorithm>
+#include <cmath>
+
 #include "gtest/gtest.h"
 #include <nlohmann/json.hpp>
 
 #include "client/report.h"
 #include "render/wire/messages.h"
+#include "tests/support/converging_job.h"
 
 namespace lucerna {
 namespace {
@@ -39,6 +43,52 @@ TEST(ReportTest, AJobTellsItsFigures) {
   EXPECT_EQ(report["image_digest"], Digest().Hex());
   EXPECT_FALSE(report.contains("failure"));
   EXPECT_FALSE(report.contains("to_first_photons_s")) << "absent until a batch came back";
+}
+
+TEST(ReportTest, TheConvergenceRecordKeepsItsDigits) {
+  const v1::Job job = ConvergingJob(12);
+  const json report = json::parse(ConvergenceReport(job));
+  ASSERT_EQ(report["convergence"].size(), 12U);
+  const json& sample = report["convergence"][3];
+  EXPECT_EQ(sample["photons"], job.convergence(3).photons());
+  EXPECT_EQ(sample["relative"]["noise"].get<double>(), job.convergence(3).relative().noise());
+  EXPECT_EQ(sample["true_relative_mse"].get<double>(), job.convergence(3).true_relative());
+  EXPECT_NEAR(report["mse_exponent_photons"].get<double>(), -2.0 / 3, 1e-4);
+  EXPECT_DOUBLE_EQ(report["relative_error"]["high"].get<double>(),
+                   std::sqrt(job.convergence(11).relative().high()));
+  EXPECT_EQ(report["worker_shares"][2]["name"], "render-3:4213");
+  EXPECT_EQ(report["settings"]["error"], 0.035);
+
+  const json empty = json::parse(ConvergenceReport(v1::Job()));
+  EXPECT_EQ(empty["convergence"], json::array());
+  EXPECT_FALSE(empty.contains("relative_error"));
+  EXPECT_FALSE(empty.contains("mse_exponent_time"));
+}
+
+std::vector<std::string> Lines(const std::string& csv) {
+  std::vector<std::string> lines;
+  for (std::size_t at = 0; at < csv.size();) {
+    const std::size_t end = csv.find("\r\n", at);
+    lines.push_back(csv.substr(at, end - at));
+    at = end + 2;
+  }
+  return lines;
+}
+
+TEST(ReportTest, TheTableHasARowForEverySampleAndWorkerAndACellForEveryColumn) {
+  v1::Job job = ConvergingJob(2);
+  job.mutable_convergence(1)->clear_true_relative();
+  job.mutable_worker_shares(0)->set_name("a \"b\", c");
+  const std::vector<std::string> lines = Lines(ConvergenceCsv(job));
+  ASSERT_EQ(lines.size(), 6U);
+  EXPECT_EQ(lines[0].substr(0, 30), "row,worker_id,name,passes,batc");
+  EXPECT_EQ(lines[1].substr(0, 30), "sample,,,1,,300000,0.5,2.89999");
+  EXPECT_EQ(lines[3].substr(0, 22), "worker,w1,\"a \"\"b\"\", c\"");
+  for (const std::size_t i : {1U, 2U, 4U, 5U}) {
+    EXPECT_EQ(std::count(lines[i].begin(), lines[i].end(), ','),
+              std::count(lines[0].begin(), lines[0].end(), ','))
+        << lines[i];
+  }
 }
 
 TEST(ReportTest, NoJobsIsAnEmptyList) {

@@ -53,14 +53,14 @@ struct Cloud {
 
 TEST(EvidenceTest, SectorsAreTwelveCellsOfEqualAreaAndHoldEveryPhotonOnce) {
   const Accumulation sum = Cloud(120000).Sum(Evidence::kSectors);
-  ASSERT_EQ(sum.evidence.size(), kSectors);
+  ASSERT_EQ(sum.evidence.size(), kCommonColumns + kSectors);
   double total = 0;
-  for (const auto& column : sum.evidence)
+  for (const auto& column : std::span(sum.evidence).subspan(kCommonColumns))
     total += static_cast<double>(column[0]);
   EXPECT_EQ(total, sum.counts[0]);
   // Binomial counts: five standard deviations.
   const double expected = total / kSectors;
-  for (const auto& column : sum.evidence) {
+  for (const auto& column : std::span(sum.evidence).subspan(kCommonColumns)) {
     EXPECT_NEAR(static_cast<double>(column[0]), expected, 5 * std::sqrt(expected));
   }
 }
@@ -68,7 +68,7 @@ TEST(EvidenceTest, SectorsAreTwelveCellsOfEqualAreaAndHoldEveryPhotonOnce) {
 TEST(EvidenceTest, FrequencyColumnsAreTheSumsTheySay) {
   const Cloud cloud(4000);
   const Accumulation sum = cloud.Sum(Evidence::kFrequency);
-  ASSERT_EQ(sum.evidence.size(), kFrequencyColumns);
+  ASSERT_EQ(sum.evidence.size(), kCommonColumns + kFrequencyColumns);
   double count = 0;
   double trace = 0;
   double trace2 = 0;
@@ -81,9 +81,9 @@ TEST(EvidenceTest, FrequencyColumnsAreTheSumsTheySay) {
     trace2 += x * x;
   }
   // Flux and power are both 1 here, so every weight is 1 up to the luminance's own rounding.
-  EXPECT_EQ(sum.evidence[kFrequencyCount][0], static_cast<std::int64_t>(count));
+  EXPECT_EQ(sum.evidence[kCommonColumns + kFrequencyCount][0], static_cast<std::int64_t>(count));
   const auto value = [&](FrequencyColumn c) {
-    return kWeightUnit * static_cast<double>(sum.evidence[c][0]);
+    return kWeightUnit * static_cast<double>(sum.evidence[kCommonColumns + c][0]);
   };
   EXPECT_NEAR(value(kFrequencyWeight), count, 1e-4 * count);
   EXPECT_NEAR(value(kFrequencyWeight2), count, 1e-4 * count);
@@ -94,7 +94,7 @@ TEST(EvidenceTest, FrequencyColumnsAreTheSumsTheySay) {
 TEST(EvidenceTest, CurvatureColumnsReachFurtherThanTheFluxDoes) {
   const Cloud cloud(4000);
   const Accumulation sum = cloud.Sum(Evidence::kCurvature);
-  ASSERT_EQ(sum.evidence.size(), kCurvatureColumns);
+  ASSERT_EQ(sum.evidence.size(), kCommonColumns + kCurvatureColumns);
   const float reach2 = 0.25F * kCurvatureReach * kCurvatureReach;
   double count = 0;
   double laplacian = 0;
@@ -106,7 +106,7 @@ TEST(EvidenceTest, CurvatureColumnsReachFurtherThanTheFluxDoes) {
   }
   EXPECT_EQ(sum.counts[0], count);
   const auto value = [&](CurvatureColumn c) {
-    return kWeightUnit * static_cast<double>(sum.evidence[c][0]);
+    return kWeightUnit * static_cast<double>(sum.evidence[kCommonColumns + c][0]);
   };
   EXPECT_NEAR(value(kCurvatureWeight2), count, 1e-4 * count);
   EXPECT_NEAR(value(kCurvatureLaplacian), laplacian, 1e-4 * count);
@@ -116,15 +116,15 @@ TEST(EvidenceTest, CurvatureColumnsReachFurtherThanTheFluxDoes) {
 TEST(EvidenceTest, IsMergedCheckedAndCarriedOnTheWire) {
   const Cloud cloud(2000);
   const Accumulation sum = cloud.Sum(Evidence::kFrequency);
-  PassSums sums(1, kFrequencyColumns);
+  PassSums sums(1, kCommonColumns + kFrequencyColumns);
   ASSERT_TRUE(sums.Add(sum).ok());
   ASSERT_TRUE(sums.Add(sum).ok());
-  EXPECT_EQ(sums.evidence()[kFrequencyTrace][0], 2 * sum.evidence[kFrequencyTrace][0]);
+  EXPECT_EQ(sums.evidence()[kCommonColumns + kFrequencyTrace][0], 2 * sum.evidence[kCommonColumns + kFrequencyTrace][0]);
   ASSERT_TRUE(sums.Subtract(sum).ok());
-  EXPECT_EQ(sums.evidence()[kFrequencyTrace][0], sum.evidence[kFrequencyTrace][0]);
+  EXPECT_EQ(sums.evidence()[kCommonColumns + kFrequencyTrace][0], sum.evidence[kCommonColumns + kFrequencyTrace][0]);
   // A worker that thinks of another controller is refused.
   EXPECT_FALSE(sums.Add(cloud.Sum(Evidence::kNone)).ok());
-  EXPECT_FALSE(PassSums(1).Add(sum).ok());
+  EXPECT_FALSE(PassSums(1, kCommonColumns).Add(sum).ok());
 
   const auto decoded = DecodeAccumulation(EncodeAccumulation(sum, 1), 1);
   ASSERT_TRUE(decoded.ok()) << decoded.status();

@@ -6,6 +6,7 @@
 
 #include "gtest/gtest.h"
 
+#include "render/estimate/evidence.h"
 #include "tests/support/local_render.h"
 #include "tests/support/test_scenes.h"
 
@@ -51,7 +52,7 @@ TEST(JobEstimatorTest, TracesTheEyePathsOfAPassAtAnyTime) {
   const auto late = JobEstimator::Create(scene, settings, 3).value();
   for (int pass = 0; pass < 3; ++pass) {
     const EyePass now = late->TraceEyePaths(static_cast<std::uint64_t>(pass));
-    late->Apply(now, late->Radii(now), PassSums(now.block.size()));
+    late->Apply(now, late->Radii(now), PassSums(now.block.size(), kCommonColumns));
   }
   const EyePass a = early->TraceEyePaths(3);
   const EyePass b = late->TraceEyePaths(3);

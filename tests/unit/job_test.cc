@@ -82,6 +82,8 @@ TEST(SettingsTextTest, NamesWhatDecidesThePixelsAndNothingElse) {
   EXPECT_TRUE(differs([](RenderSettings& s) { s.crop_x0 = 1; }));
   EXPECT_TRUE(differs([](RenderSettings& s) { s.max_depth = 6; }));
   EXPECT_TRUE(differs([](RenderSettings& s) { s.initial_radius = 1e-30; }));
+  EXPECT_TRUE(differs([](RenderSettings& s) { s.initial_footprints = 1; }));
+  EXPECT_NE(text.find("initial-radius=auto"), std::string::npos) << "as old digests have it";
   EXPECT_TRUE(differs([](RenderSettings& s) { s.kernel = KernelKind::kConstant; }));
   EXPECT_TRUE(
       differs([](RenderSettings& s) { s.radius_controller = RadiusControllerKind::kPppm; }));

@@ -50,6 +50,7 @@ TEST(RenderSettingsTest, TheSceneWinsOverDefaultsAndTheUserOverTheScene) {
   user.max_depth = 8;
   user.photons_per_pass = 6000;
   user.initial_radius = 0;  // auto
+  user.initial_footprints = 1.5;
   user.seed = 10;
   user.passes = 4;
   user.kernel = KernelKind::kConstant;
@@ -59,6 +60,7 @@ TEST(RenderSettingsTest, TheSceneWinsOverDefaultsAndTheUserOverTheScene) {
   EXPECT_EQ(settings.max_depth, 8);
   EXPECT_EQ(settings.photons_per_pass, 6000);
   EXPECT_EQ(settings.initial_radius, 0);
+  EXPECT_EQ(settings.initial_footprints, 1.5);
   EXPECT_EQ(settings.seed, 10U);
   EXPECT_EQ(settings.passes, 4);
   EXPECT_EQ(settings.kernel, KernelKind::kConstant);
@@ -112,6 +114,7 @@ TEST(RenderSettingsTest, RefusesWhatIsOutOfRangeByTheFlagsName) {
   EXPECT_THAT(with(&RenderOverrides::alpha, 1.0), HasSubstr("--alpha"));
   EXPECT_THAT(with(&RenderOverrides::alpha, std::nan("")), HasSubstr("--alpha"));
   EXPECT_THAT(with(&RenderOverrides::initial_radius, -1.0), HasSubstr("--initial-radius"));
+  EXPECT_THAT(with(&RenderOverrides::initial_footprints, 0.0), HasSubstr("0.001px"));
   EXPECT_THAT(with(&RenderOverrides::max_depth, 0), HasSubstr("--max-depth"));
   EXPECT_THAT(with(&RenderOverrides::max_depth, 10'001), HasSubstr("--max-depth"));
   RenderOverrides user;

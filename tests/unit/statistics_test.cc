@@ -6,6 +6,7 @@
 
 #include "gtest/gtest.h"
 
+#include "render/estimate/evidence.h"
 #include "render/math/rng.h"
 
 namespace lucerna {
@@ -26,6 +27,8 @@ TEST(PixelStatisticsTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
   const std::vector<Rgb> weights = {{1, 1, 1}};
   const std::vector<float> units = {1};
   const HitpointRows rows = {pixels, weights, units};
+  std::vector<RgbSum> radiance(1);
+  std::vector<double> bias(1);
   KeyedRng rng(5);
   double tau = 0;
   double r = 0.25;
@@ -40,10 +43,11 @@ TEST(PixelStatisticsTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
       for (auto& channel : accumulation.flux)
         channel = {quanta};
     }
-    PassSums sums(1);
+    accumulation.evidence.assign(kCommonColumns, std::vector<std::int64_t>(accumulation.size()));
+    PassSums sums(1, kCommonColumns);
     ASSERT_TRUE(sums.Add(accumulation).ok());
-    const RadiusColumn radii = statistics.Radii(rows);
-    statistics.AddPhotons(rows, radii, sums, scale, kernel, kPhotons, *ppm);
+    const RadiusColumn radii = statistics.Radii(rows, static_cast<std::uint64_t>(pass + 1));
+    statistics.AddPhotons(rows, radii, sums, scale, kernel, kPhotons, *ppm, radiance, bias);
     if (m == 0) continue;
     tau += static_cast<double>(quanta) * static_cast<double>(scale.watts_per_quantum.g);
     const double ratio = (n + settings.alpha * m) / (n + m);
@@ -53,7 +57,7 @@ TEST(PixelStatisticsTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
   }
   const double hachisuka = tau / (std::numbers::pi * r * r * kPhotons);
   EXPECT_NEAR(statistics.radiance_sum()[0][1] / hachisuka, 1, 1e-6 * std::sqrt(300.0));
-  EXPECT_NEAR(static_cast<double>(statistics.Radii(rows)[0]) / r, 1, 1e-5);
+  EXPECT_NEAR(static_cast<double>(statistics.Radii(rows, 301)[0]) / r, 1, 1e-5);
 }
 
 TEST(PixelStatisticsTest, CountsAPassWithoutHitpointAsDark) {
@@ -65,18 +69,23 @@ TEST(PixelStatisticsTest, CountsAPassWithoutHitpointAsDark) {
   const std::vector<Rgb> weights = {{2, 0, -1}};
   const std::vector<float> units = {0.5F};
   const HitpointRows rows = {pixels, weights, units};
-  PassSums sums(1);
+  PassSums sums(1, kCommonColumns);
   Accumulation accumulation;
   accumulation.hitpoints = {0};
   accumulation.counts = {3};
   for (auto& channel : accumulation.flux)
     channel = {8};
+  accumulation.evidence = {{4}};
   ASSERT_TRUE(sums.Add(accumulation).ok());
-  const RadiusColumn radii = statistics.Radii(rows);
+  const RadiusColumn radii = statistics.Radii(rows, 0);
   ASSERT_EQ(radii[0], 0.5F);
   const FluxScale scale = {Gray(1), Gray(1)};
-  statistics.AddPhotons(rows, radii, sums, scale, Kernel{KernelKind::kEpanechnikov}, 4, *ppm);
-  statistics.AddPhotons({}, {}, PassSums(0), scale, Kernel{}, 4, *ppm);
+  std::vector<RgbSum> radiance(2, RgbSum{1, 1, 1});
+  std::vector<double> bias(2);
+  statistics.AddPhotons(rows, radii, sums, scale, Kernel{KernelKind::kEpanechnikov}, 4, *ppm,
+                        radiance, bias);
+  statistics.AddPhotons({}, {}, PassSums(0, kCommonColumns), scale, Kernel{}, 4, *ppm, radiance,
+                        bias);
   EXPECT_EQ(statistics.passes(), 2);
   EXPECT_EQ(statistics.radiance_sum()[0][0], 0);
   // weight × flux × 2/(π r²) / photons
@@ -84,6 +93,11 @@ TEST(PixelStatisticsTest, CountsAPassWithoutHitpointAsDark) {
   EXPECT_NEAR(statistics.radiance_sum()[1][0], 2 * density, 1e-12);
   EXPECT_EQ(statistics.radiance_sum()[1][1], 0);
   EXPECT_NEAR(statistics.radiance_sum()[1][2], -density, 1e-12);
+  EXPECT_NEAR(radiance[1][0], 1 + 2 * density, 1e-12);
+  EXPECT_EQ(radiance[0][0], 1);
+  // Half the flux is outside the inner kernel's share: (4/8) density, over what that kernel leaves.
+  const double luminance = 2 * 0.2126 - 0.0722;
+  EXPECT_NEAR(bias[1], luminance * density / 2 / (1 - 0.16), 1e-6);
   EXPECT_EQ(statistics.photon_count()[1], 3U);
   EXPECT_EQ(statistics.last_radius()[1], 0.5F);
 }

@@ -28,6 +28,7 @@ RenderSettings SomeSettings() {
   settings.alpha = 0.7;
   settings.kernel = KernelKind::kConstant;
   settings.initial_radius = 0.01;
+  settings.initial_footprints = 1.5;
   settings.max_depth = 12;
   return settings;
 }
@@ -67,6 +68,7 @@ TEST(MessagesTest, HostileSettingsAreRefused) {
   EXPECT_TRUE(is_refused([](auto& m) { m.set_kernel("cubic"); }));
   EXPECT_TRUE(is_refused([](auto& m) { m.set_radius_controller(""); }));
   EXPECT_TRUE(is_refused([](auto& m) { m.set_initial_radius(-1); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_initial_footprints(0); }));
   EXPECT_TRUE(is_refused([](auto& m) { m.set_max_depth(0); }));
 }
 
@@ -75,11 +77,13 @@ TEST(MessagesTest, OverridesComeBackWithWhatIsAbsent) {
   overrides.passes = 0;
   overrides.kernel = KernelKind::kConstant;
   overrides.initial_radius = 0;
+  overrides.initial_footprints = 1.5;
   const auto back = FromProto(ToProto(overrides));
   ASSERT_TRUE(back.ok());
   EXPECT_EQ(back->passes, overrides.passes);
   EXPECT_EQ(back->kernel, overrides.kernel);
   EXPECT_EQ(back->initial_radius, overrides.initial_radius);
+  EXPECT_EQ(back->initial_footprints, overrides.initial_footprints);
   EXPECT_FALSE(back->width || back->height || back->photons_per_pass || back->time_s ||
                back->seed || back->radius_controller || back->alpha || back->max_depth);
   v1::RenderOverrides hostile;

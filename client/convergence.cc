@@ -1,0 +1,128 @@
+#include "client/convergence.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "absl/strings/str_format.h"
+
+#include "render/base/text.h"
+#include "render/wire/messages.h"
+
+namespace lucerna {
+namespace {
+
+constexpr int kFewestFitted = 3;
+
+// An estimate of a square can come out a little below zero.
+double Root(double squared) {
+  return std::sqrt(std::max(0.0, squared));
+}
+
+std::vector<ChartPoint> LaterHalf(const v1::Job& job, ErrorAgainst against,
+                                  double (*value)(const v1::SquaredError&)) {
+  std::vector<ChartPoint> points;
+  for (int i = FirstFitted(job); i < job.convergence_size(); ++i) {
+    const v1::ErrorSample& sample = job.convergence(i);
+    points.push_back({Abscissa(sample, against), value(sample.relative())});
+  }
+  return points;
+}
+
+}  // namespace
+
+RelativeError ErrorOf(const v1::ErrorSample& sample) {
+  const v1::SquaredError& squared = sample.relative();
+  RelativeError error = {.value = Root(squared.noise() + squared.bias()),
+                         .low = Root(squared.low()),
+                         .high = Root(squared.high()),
+                         .noise = Root(squared.noise()),
+                         .bias = Root(squared.bias())};
+  if (sample.has_true_relative()) error.truth = Root(sample.true_relative());
+  return error;
+}
+
+std::optional<RelativeError> NewestError(const v1::Job& job) {
+  if (job.convergence().empty()) return std::nullopt;
+  return ErrorOf(*job.convergence().rbegin());
+}
+
+double PowerLaw::At(double x) const {
+  return factor * std::pow(x, exponent);
+}
+
+std::optional<PowerLaw> FitPowerLaw(const std::vector<ChartPoint>& points) {
+  std::vector<std::pair<double, double>> logs;
+  double mean_x = 0;
+  double mean_y = 0;
+  for (const ChartPoint& point : points) {
+    if (!(point.x > 0 && point.y > 0) || !std::isfinite(point.x) || !std::isfinite(point.y)) {
+      continue;
+    }
+    logs.emplace_back(std::log(point.x), std::log(point.y));
+    mean_x += logs.back().first;
+    mean_y += logs.back().second;
+  }
+  if (logs.size() < kFewestFitted) return std::nullopt;
+  mean_x /= static_cast<double>(logs.size());
+  mean_y /= static_cast<double>(logs.size());
+  double xx = 0;
+  double xy = 0;
+  for (const auto& [x, y] : logs) {
+    xx += (x - mean_x) * (x - mean_x);
+    xy += (x - mean_x) * (y - mean_y);
+  }
+  // Spread over less than a millionth of x is none: the slope would be rounding.
+  if (!(xx > 1e-12 * static_cast<double>(logs.size()))) return std::nullopt;
+  return PowerLaw{std::exp(mean_y - xy / xx * mean_x), xy / xx};
+}
+
+double Abscissa(const v1::ErrorSample& sample, ErrorAgainst against) {
+  return against == ErrorAgainst::kTime ? Seconds(FromProto(sample.running()))
+                                        : static_cast<double>(sample.photons());
+}
+
+int FirstFitted(const v1::Job& job) {
+  const int count = job.convergence_size();
+  return std::max(0, count - std::max(kFewestFitted, (count + 1) / 2));
+}
+
+std::optional<PowerLaw> FitOfSquaredError(const v1::Job& job, ErrorAgainst against) {
+  return FitPowerLaw(LaterHalf(
+      job, against, [](const v1::SquaredError& error) { return error.noise() + error.bias(); }));
+}
+
+std::optional<Duration> TimeToTarget(const v1::Job& job) {
+  const double target = job.settings().error();
+  if (!(target > 0) || job.convergence().empty()) return std::nullopt;
+  const v1::ErrorSample& newest = *job.convergence().rbegin();
+  const double high = newest.relative().high();
+  if (high <= target * target) return Duration::zero();
+  const auto law = FitPowerLaw(LaterHalf(
+      job, ErrorAgainst::kTime, [](const v1::SquaredError& error) { return error.high(); }));
+  // A curve this flat tells nothing about when it ends.
+  constexpr double kFlattest = -0.05;
+  if (!law || law->exponent > kFlattest) return std::nullopt;
+  // Through the newest sample, with the slope of the law.
+  const double end_s =
+      Abscissa(newest, ErrorAgainst::kTime) * std::pow(target * target / high, 1 / law->exponent);
+  const double left_s = end_s - Seconds(FromProto(job.progress().running()));
+  constexpr double kLongest = 10.0 * 365 * 86400;
+  // When the time has come and the error has not, the next sample knows more.
+  return std::chrono::duration_cast<Duration>(
+      std::chrono::duration<double>(std::clamp(left_s, 0.0, kLongest)));
+}
+
+std::string ShortPercent(double share) {
+  const double percent = 100 * share;
+  if (!std::isfinite(percent)) return "unknown";
+  if (percent <= 0) return "0 %";
+  const int decimals = std::clamp(2 - static_cast<int>(std::floor(std::log10(percent))), 0, 8);
+  return absl::StrFormat("%.*f %%", decimals, percent);
+}
+
+std::string ErrorWithInterval(const RelativeError& error) {
+  return Concat(ShortPercent(error.value), " (95 %: ", ShortPercent(error.low), " to ",
+                ShortPercent(error.high), ")");
+}
+
+}  // namespace lucerna

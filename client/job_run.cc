@@ -1,0 +1,151 @@
+#include "client/job_run.h"
+
+#include <cstdio>
+#include <optional>
+#include <utility>
+
+#include <unistd.h>
+
+#include "client/exit_code.h"
+#include "client/live_view.h"
+#include "client/preview_source.h"
+#include "client/progress_view.h"
+#include "client/scene_reading.h"
+#include "client/terminal.h"
+#include "render/base/clock.h"
+#include "render/base/files.h"
+#include "render/image/exr_file.h"
+#include "render/wire/messages.h"
+
+namespace lucerna {
+namespace {
+
+// Unlike any other submission's, so that only a retry of this one finds its job.
+std::string NewRequestId(const SceneManifest& manifest) {
+  char host[65] = {};
+  ::gethostname(host, sizeof(host) - 1);
+  const Digest digest = Sha256(absl::StrCat(manifest.SceneDigest().Hex(), host, "/", ::getpid(),
+                                            "/", SystemClock().Wall().time_since_epoch().count()));
+  return digest.Hex();
+}
+
+// Shows a job as it moves on: redrawn in place on a terminal, else as plain lines, on stderr.
+class Progress {
+ public:
+  Progress(ClientConnection& connection, const std::string& job_id, const Voice& voice)
+      : redraws_(voice.redraws && SizeOfTerminal(STDERR_FILENO).has_value()) {
+    if (!redraws_ || !voice.previews) return;
+    previews_.emplace([&connection, job_id](const std::function<bool()>& gives_up) {
+      return connection.GetImage(job_id, gives_up);
+    });
+  }
+
+  void Show(const v1::Job& job) {
+    if (!redraws_) return Write(lines_.Update(job, SystemClock().Steady()));
+    // The window may have a new size, or be gone.
+    const TerminalSize size = SizeOfTerminal(STDERR_FILENO).value_or(TerminalSize());
+    std::shared_ptr<const Image> image;
+    // There is none before the first pass.
+    if (previews_ && job.progress().passes() > 0) image = previews_->Newest();
+    Write(frames_.Paint(LiveLines(job, image.get(), size), size));
+  }
+  void Finish() { Write(frames_.Finish()); }
+
+ private:
+  static void Write(const std::string& text) {
+    std::fputs(text.c_str(), stderr);
+    std::fflush(stderr);
+  }
+
+  bool redraws_;
+  ProgressPrinter lines_;
+  FramePainter frames_;
+  std::optional<PreviewSource> previews_;
+};
+
+}  // namespace
+
+StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, const std::string& scene_path,
+                                     const SceneManifest& manifest,
+                                     const RenderOverrides& overrides,
+                                     const std::string& reference_path) {
+  DirectoryFiles files(SplitScenePath(scene_path).folder);
+  LUCERNA_RETURN_IF_ERROR(connection.Upload(manifest, files));
+  v1::SubmitRequest request;
+  if (!reference_path.empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(const std::string reference, ReadFile(reference_path));
+    LUCERNA_ASSIGN_OR_RETURN(const Digest digest, connection.UploadBytes(reference));
+    request.set_reference_digest(std::string(digest.Bytes()));
+  }
+  request.set_request_id(NewRequestId(manifest));
+  *request.mutable_scene() = ToProto(manifest);
+  *request.mutable_overrides() = ToProto(overrides);
+  return connection.Submit(request);
+}
+
+StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& job_id,
+                              bool shows_progress, const Voice& voice,
+                              const std::function<Status()>& check) {
+  std::optional<Progress> progress;
+  if (shows_progress && !voice.quiet) progress.emplace(connection, job_id, voice);
+  auto job = connection.Watch(job_id, [&](const v1::Job& newest) {
+    // Of the end tells the summary.
+    if (progress && newest.state() != v1::JOB_STATE_UNSPECIFIED && !HasEnded(newest.state())) {
+      progress->Show(newest);
+    }
+    return check();
+  });
+  if (progress) progress->Finish();
+  return job;
+}
+
+Status CheckSucceeded(const v1::Job& job) {
+  if (job.state() == v1::JOB_STATE_SUCCEEDED) return absl::OkStatus();
+  if (job.state() == v1::JOB_STATE_CANCELLED) {
+    return absl::FailedPreconditionError(absl::StrCat("job ", job.job_id(), " was cancelled"));
+  }
+  return absl::FailedPreconditionError(
+      absl::StrCat("job ", job.job_id(), " failed: ", job.failure()));
+}
+
+StatusOr<Image> DecodeImageOf(const std::string& job_id, const std::string& bytes) {
+  StatusOr<Image> image = DecodeExr(bytes);
+  if (image.ok()) return image;
+  return absl::DataLossError(absl::StrCat(
+      "the image of job ", job_id, " arrived damaged; fetch it again: ", image.status().message()));
+}
+
+StatusOr<std::unique_ptr<LocalRuns>> LocalRuns::Start(const ClusterOptions& options,
+                                                      std::string scene_path,
+                                                      SceneManifest manifest) {
+  auto runs = std::unique_ptr<LocalRuns>(new LocalRuns(std::move(scene_path), std::move(manifest)));
+  LUCERNA_ASSIGN_OR_RETURN(runs->cluster_, LocalCluster::Start(options));
+  LUCERNA_ASSIGN_OR_RETURN(runs->connection_, ClientConnection::Open(runs->cluster_->address()));
+  return runs;
+}
+
+StatusOr<v1::Job> LocalRuns::Run(const RenderOverrides& overrides,
+                                 const std::string& reference_path, const Voice& voice) {
+  LUCERNA_ASSIGN_OR_RETURN(
+      const v1::SubmitResponse submitted,
+      SendJob(*connection_, scene_path_, manifest_, overrides, reference_path));
+  auto job = FollowToEnd(*connection_, submitted.job_id(), true, voice,
+                         [this] { return cluster_->Check(); });
+  if (!job.ok()) {
+    // The coordinator ends with us; cancelling first lets the workers leave at once. Whether it
+    // still hears that makes no difference to the user.
+    if (ExitCodeOf(job.status()) == ExitCode::kInterrupted) {
+      connection_->Cancel(submitted.job_id()).IgnoreError();
+    }
+    return job;
+  }
+  LUCERNA_RETURN_IF_ERROR(CheckSucceeded(*job));
+  return job;
+}
+
+StatusOr<Image> LocalRuns::ImageOf(const v1::Job& job) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, connection_->GetImage(job.job_id()));
+  return DecodeImageOf(job.job_id(), bytes);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,66 @@
+// How does one job go from files on this machine to its end?
+//
+// `render` and `submit` run one job, `compare` and `reference` several on one local cluster.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "client/connection.h"
+#include "client/local_cluster.h"
+#include "client/voice.h"
+#include "render/base/status.h"
+#include "render/image/image.h"
+#include "render/scene/render_settings.h"
+#include "render/scene/scene_files.h"
+
+namespace lucerna {
+
+// Uploads what the coordinator does not have and submits. `reference_path` may be empty.
+[[nodiscard]] StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection,
+                                                   const std::string& scene_path,
+                                                   const SceneManifest& manifest,
+                                                   const RenderOverrides& overrides,
+                                                   const std::string& reference_path);
+
+// Follows the job to its end, and shows its progress unless told not to. `check` is asked several
+// times a second.
+[[nodiscard]] StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& job_id,
+                                            bool shows_progress, const Voice& voice,
+                                            const std::function<Status()>& check);
+
+// Errors: FAILED_PRECONDITION that says what became of the job instead.
+[[nodiscard]] Status CheckSucceeded(const v1::Job& job);
+
+// The bytes of an EXR file as an image.
+// Errors: DATA_LOSS when they are none.
+[[nodiscard]] StatusOr<Image> DecodeImageOf(const std::string& job_id, const std::string& bytes);
+
+// Jobs of one scene, one after the other, on a coordinator and workers of their own.
+class LocalRuns {
+ public:
+  // To be called by a thread that lives as long as the runs (LocalCluster::Start).
+  [[nodiscard]] static StatusOr<std::unique_ptr<LocalRuns>> Start(const ClusterOptions& options,
+                                                                  std::string scene_path,
+                                                                  SceneManifest manifest);
+
+  // Renders to the end; an interruption cancels the job. Returns a job that succeeded.
+  [[nodiscard]] StatusOr<v1::Job> Run(const RenderOverrides& overrides,
+                                      const std::string& reference_path, const Voice& voice);
+  // The image of a job that succeeded.
+  [[nodiscard]] StatusOr<Image> ImageOf(const v1::Job& job);
+
+  [[nodiscard]] ClientConnection& connection() { return *connection_; }
+
+ private:
+  LocalRuns(std::string scene_path, SceneManifest manifest)
+      : scene_path_(std::move(scene_path)), manifest_(std::move(manifest)) {}
+
+  std::string scene_path_;
+  SceneManifest manifest_;
+  std::unique_ptr<LocalCluster> cluster_;
+  std::unique_ptr<ClientConnection> connection_;
+};
+
+}  // namespace lucerna

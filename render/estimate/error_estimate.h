@@ -1,0 +1,110 @@
+// How wrong is the image, without knowing the right one?
+//
+// Noise. Even and odd passes draw from sequences that are independent of each other, so the two
+// halves of a render are two independent images, and a quarter of their squared difference is the
+// squared noise of their mean, whatever the stratification within a half. In one pixel that is one
+// number with one degree of freedom; over an image of thousands of pixels it is precise.
+//
+// Bias. The kernel blurs. Beside every sum with the whole kernel K goes one with the difference
+// between K and the same kernel at kInnerShare of the radius: what the outer part of the blur
+// changes, and, divided by 1 - kInnerShare², an estimate of all that it changes (exact for light
+// whose second derivative is even across the disc; an edge is underestimated, by a third of the
+// bias). The product of the two halves' estimates is free of their noise, so their squares are
+// known far below it. Source: Hachisuka, Jarosz & Jensen 2010, "A Progressive Error Estimation
+// Framework for Photon Density Estimation", with kernels' differences in place of derivatives.
+//
+// Relative errors are squares over (value² + 0.01), and the value is not known either. Where a
+// pixel of the sharp direct image differs between the halves, its own mean is the best guess.
+// Photons come to neighbours alike: where one half saw them and the other did not, the pixels
+// around tell what value they should have brought.
+//
+// Interval. Sums over tiles of the image vary; their spread gives the standard error of the sum,
+// and that of the true squared error around its own expectation is as large again. Intervals are
+// valid at all looks together: look j (from 1) spends 1/(j (j + 1)) of the error probability.
+// Source: the stitching of Howard, Ramdas, McAuliffe & Sekhon 2021, "Time-uniform, nonparametric,
+// nonasymptotic confidence sequences", with looks as the epochs and normal tails within one.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+namespace lucerna {
+
+// Sums of a colour over passes, in double.
+using RgbSum = std::array<double, 3>;
+[[nodiscard]] constexpr double LuminanceOf(const RgbSum& c) {
+  return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+}
+
+// What is kept of all passes, per pixel.
+class ErrorStatistics {
+ public:
+  explicit ErrorStatistics(std::size_t pixels);
+
+  // Takes in pass number `pass`: per pixel its radiance in all and that from photons, and the
+  // luminance of radiance by which its kernel is estimated to have changed it.
+  void AddPass(std::uint64_t pass, std::span<const RgbSum> radiance,
+               std::span<const RgbSum> photons, std::span<const double> bias);
+
+  [[nodiscard]] std::int64_t passes() const { return passes_; }
+  // Sums over the even passes [pixels].
+  [[nodiscard]] const std::vector<RgbSum>& even_sum() const { return even_sum_; }
+  [[nodiscard]] const std::vector<RgbSum>& even_photons() const { return even_photons_; }
+  // Sums over all passes of the squared luminance [pixels].
+  [[nodiscard]] const std::vector<double>& square_sum() const { return square_sum_; }
+  // Sums over even and odd passes of the bias [pixels].
+  [[nodiscard]] const std::vector<double>& even_bias() const { return bias_sum_[0]; }
+  [[nodiscard]] const std::vector<double>& odd_bias() const { return bias_sum_[1]; }
+
+ private:
+  std::int64_t passes_ = 0;
+  std::vector<RgbSum> even_sum_;
+  std::vector<RgbSum> even_photons_;
+  std::vector<double> square_sum_;
+  std::array<std::vector<double>, 2> bias_sum_;
+};
+
+// An expected squared error and its parts.
+struct SquaredError {
+  double noise = 0;
+  double bias = 0;
+  // Interval in which the true squared error of this image lies.
+  double low = 0, high = 0;
+
+  [[nodiscard]] double total() const { return noise + bias; }
+};
+
+struct ErrorEstimate {
+  // Mean over pixels and channels of error² / (value² + 0.01): what ImageMetrics calls rel_mse.
+  SquaredError relative;
+  // Mean over pixels and channels of error²: the square of rmse.
+  SquaredError absolute;
+  // True squared noise over what passes that knew nothing of each other would have: below 1 where
+  // stratification over passes helps. For the noise of single pixels.
+  double noise_factor = 1;
+};
+
+// Sums over passes of what one pixel is made of, in the colours and the exposure of the image.
+struct PixelSums {
+  RgbSum all{}, photons{};         // in all, and of photons
+  RgbSum even{}, even_photons{};   // the same of even passes
+  RgbSum even_bias{}, odd_bias{};  // of even passes and of odd ones
+  double square = 0;               // squared luminance
+};
+using PixelSumsAt = std::function<PixelSums(std::size_t pixel)>;
+
+// The share of runs in which the true error lies within the interval at all looks.
+inline constexpr double kConfidence = 0.95;
+
+// `sums_at` gives the sums of each pixel, row-major; `look` counts the looks at this render,
+// from 1. Requires passes >= 2.
+[[nodiscard]] ErrorEstimate EstimateError(int width, int height, std::int64_t passes, int look,
+                                          const PixelSumsAt& sums_at);
+
+// Returns z with P(|Z| > z) = probability for a standard normal Z. Requires 0 < probability < 1.
+[[nodiscard]] double TwoSidedNormalQuantile(double probability);
+
+}  // namespace lucerna

@@ -1,0 +1,111 @@
+// The exponent that a report states must be that of the samples, and a predicted time the one at
+// which the law reaches the target.
+#include <cmath>
+
+#include "gtest/gtest.h"
+
+#include "client/convergence.h"
+#include "render/wire/messages.h"
+#include "tests/support/converging_job.h"
+
+namespace lucerna {
+namespace {
+
+TEST(PowerLawTest, AnExactLawGivesItsExponent) {
+  std::vector<ChartPoint> points;
+  for (const double x : {1e-3, 0.5, 7.0, 2e4, 1e9})
+    points.push_back({x, 3 * std::pow(x, -2.0 / 3)});
+  const auto law = FitPowerLaw(points);
+  ASSERT_TRUE(law.has_value());
+  EXPECT_NEAR(law->exponent, -2.0 / 3, 1e-12);
+  EXPECT_NEAR(law->factor, 3, 1e-10);
+  EXPECT_NEAR(law->At(100), 3 * std::pow(100, -2.0 / 3), 1e-10);
+}
+
+TEST(PowerLawTest, LeastSquaresLiesBetween) {
+  // In logarithms to base e: (0, 0), (1, 1), (2, 0); the best line is level, at a third.
+  const auto law = FitPowerLaw({{1, 1}, {std::exp(1), std::exp(1)}, {std::exp(2), 1}});
+  ASSERT_TRUE(law.has_value());
+  EXPECT_NEAR(law->exponent, 0, 1e-12);
+  EXPECT_NEAR(law->factor, std::exp(1.0 / 3), 1e-12);
+}
+
+TEST(PowerLawTest, TooFewPointsOrNoSpreadGiveNone) {
+  EXPECT_FALSE(FitPowerLaw({}).has_value());
+  EXPECT_FALSE(FitPowerLaw({{1, 1}, {2, 2}}).has_value());
+  EXPECT_FALSE(FitPowerLaw({{1, 1}, {2, 2}, {0, 5}}).has_value()) << "no logarithm";
+  EXPECT_FALSE(FitPowerLaw({{1, 1}, {2, 2}, {3, -5}, {4, std::nan("")}}).has_value());
+  EXPECT_FALSE(FitPowerLaw({{5, 1}, {5, 2}, {5, 3}}).has_value());
+}
+
+TEST(ConvergenceTest, ErrorsAreRootsAndPartsAddUpSquared) {
+  const RelativeError error = *NewestError(ConvergingJob(1));
+  EXPECT_DOUBLE_EQ(error.value, std::sqrt(0.049));
+  EXPECT_DOUBLE_EQ(error.noise * error.noise + error.bias * error.bias, 0.049);
+  EXPECT_DOUBLE_EQ(error.low, std::sqrt(0.8 * 0.049));
+  EXPECT_DOUBLE_EQ(*error.truth, std::sqrt(0.049));
+  EXPECT_FALSE(NewestError(ConvergingJob(0)).has_value());
+  v1::ErrorSample below_zero;
+  below_zero.mutable_relative()->set_noise(-1e-9);
+  EXPECT_EQ(ErrorOf(below_zero).value, 0);
+  EXPECT_FALSE(ErrorOf(below_zero).truth.has_value());
+}
+
+TEST(ConvergenceTest, TheLaterHalfIsFitted) {
+  v1::Job job = ConvergingJob(24);
+  // Photons are whole numbers, 1e-6 of them at most.
+  EXPECT_NEAR(FitOfSquaredError(job, ErrorAgainst::kPhotons)->exponent, -2.0 / 3, 1e-5);
+  EXPECT_NEAR(FitOfSquaredError(job, ErrorAgainst::kTime)->exponent, -2.0 / 3, 1e-5);
+  // Whatever the first half was like.
+  for (int i = 0; i < 12; ++i)
+    job.mutable_convergence(i)->mutable_relative()->set_noise(5);
+  EXPECT_NEAR(FitOfSquaredError(job, ErrorAgainst::kTime)->exponent, -2.0 / 3, 1e-5);
+  job.mutable_convergence(12)->mutable_relative()->set_noise(5);
+  EXPECT_LT(FitOfSquaredError(job, ErrorAgainst::kTime)->exponent, -0.7);
+  EXPECT_EQ(FirstFitted(ConvergingJob(4)), 1) << "three at least";
+  EXPECT_FALSE(FitOfSquaredError(ConvergingJob(2), ErrorAgainst::kTime).has_value());
+}
+
+TEST(ConvergenceTest, TheTargetIsReachedWhenTheUpperEndIsThere) {
+  v1::Job job = ConvergingJob(10);
+  const double high = job.convergence(9).relative().high();
+  const double now_s = Seconds(FromProto(job.progress().running()));
+  // Half the error is a quarter of its square: 4^(3/2) = 8 times the time, of which one has passed.
+  job.mutable_settings()->set_error(std::sqrt(high) / 2);
+  EXPECT_NEAR(Seconds(*TimeToTarget(job)), 7 * now_s, 1e-4 * now_s);
+  // What has passed since the sample is not waited for again.
+  *job.mutable_progress()->mutable_running() =
+      ToProto(FromProto(job.progress().running()) + std::chrono::seconds(2));
+  EXPECT_NEAR(Seconds(*TimeToTarget(job)), 7 * now_s - 2, 1e-4 * now_s);
+  job.mutable_settings()->set_error(std::sqrt(high) * 1.0001);
+  EXPECT_EQ(*TimeToTarget(job), Duration::zero());
+}
+
+TEST(ConvergenceTest, WithoutATargetOrAFallThereIsNoTime) {
+  v1::Job job = ConvergingJob(10);
+  job.mutable_settings()->set_error(0);
+  EXPECT_FALSE(TimeToTarget(job).has_value());
+  job.mutable_settings()->set_error(0.01);
+  for (v1::ErrorSample& sample : *job.mutable_convergence())
+    sample.mutable_relative()->set_high(1);
+  EXPECT_FALSE(TimeToTarget(job).has_value()) << "level";
+  EXPECT_FALSE(TimeToTarget(ConvergingJob(2)).has_value()) << "too few";
+  EXPECT_FALSE(TimeToTarget(ConvergingJob(0)).has_value());
+  // One that hardly falls gives a long time, not an overflowed one.
+  job = ConvergingJob(10);
+  job.mutable_settings()->set_error(1e-12);
+  EXPECT_GT(*TimeToTarget(job), std::chrono::hours(24 * 365));
+}
+
+TEST(ConvergenceTest, PercentagesHaveThreeDigits) {
+  EXPECT_EQ(ShortPercent(0.0183), "1.83 %");
+  EXPECT_EQ(ShortPercent(0.02), "2.00 %");
+  EXPECT_EQ(ShortPercent(0.1234), "12.3 %");
+  EXPECT_EQ(ShortPercent(3.456), "346 %");
+  EXPECT_EQ(ShortPercent(0.000512), "0.0512 %");
+  EXPECT_EQ(ShortPercent(0), "0 %");
+  EXPECT_EQ(ShortPercent(std::nan("")), "unknown");
+}
+
+}  // namespace
+}  // namespace lucerna

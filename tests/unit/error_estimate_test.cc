@@ -1,0 +1,129 @@
+// The error estimate on images made of known noise and known bias.
+#include "render/estimate/error_estimate.h"
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/math/rng.h"
+
+namespace lucerna {
+namespace {
+
+constexpr int kSide = 96;
+constexpr std::size_t kPixels = static_cast<std::size_t>(kSide) * kSide;
+
+// A grey image of value 2 with independent noise of standard deviation `noise` a pass, and `bias`.
+struct Made {
+  ErrorStatistics statistics{kPixels};
+  std::vector<RgbSum> all = std::vector<RgbSum>(kPixels);
+  double true_square = 0;  // mean over pixels of (mean - 2)²
+
+  Made(int passes, double noise, double bias, std::uint64_t key) {
+    KeyedRng rng(key);
+    for (int pass = 0; pass < passes; ++pass) {
+      std::vector<RgbSum> radiance(kPixels);
+      std::vector<double> biases(kPixels);
+      for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
+        // Uniform, of unit variance.
+        const double u = (2 * static_cast<double>(rng.Uniform()) - 1) * std::sqrt(3.0);
+        const double value = 2 + bias + noise * u;
+        radiance[pixel] = {value, value, value};
+        // What is known of the bias is noisier than the image.
+        biases[pixel] = bias + 3 * noise * (2 * static_cast<double>(rng.Uniform()) - 1);
+        for (double& sum : all[pixel])
+          sum += value;
+      }
+      statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, radiance, biases);
+    }
+    for (const RgbSum& sum : all) {
+      const double off = sum[0] / passes - 2;
+      true_square += off * off / static_cast<double>(kPixels);
+    }
+  }
+
+  [[nodiscard]] ErrorEstimate Estimate(int look) const {
+    return EstimateError(kSide, kSide, statistics.passes(), look, [&](std::size_t pixel) {
+      PixelSums sums;
+      sums.all = sums.photons = all[pixel];
+      sums.even = sums.even_photons = statistics.even_sum()[pixel];
+      for (std::size_t c = 0; c < 3; ++c) {
+        sums.even_bias[c] = statistics.even_bias()[pixel];
+        sums.odd_bias[c] = statistics.odd_bias()[pixel];
+      }
+      sums.square = statistics.square_sum()[pixel];
+      return sums;
+    });
+  }
+};
+
+TEST(ErrorEstimateTest, FindsNoiseAndBias) {
+  for (const int passes : {4, 7, 30}) {
+    const Made made(passes, 0.5, 0.1, 11);
+    const ErrorEstimate estimate = made.Estimate(1);
+    // 9216 pixels of a squared normal number each: 1.5 % is a standard deviation.
+    EXPECT_NEAR(estimate.absolute.noise / (0.25 / passes), 1, 0.06) << passes;
+    // The product of two halves of deviation 3 · 0.5/√3 · √(2/passes), over 96 pixels' root.
+    const double half = 1.5 / std::sqrt(3.0) * std::sqrt(2.0 / passes);
+    EXPECT_NEAR(estimate.absolute.bias, 0.01, 4 * half * half / 96 + 4 * 0.1 * half / 96) << passes;
+    EXPECT_NEAR(estimate.relative.total() / (estimate.absolute.total() / (2.1 * 2.1 + 0.01)), 1,
+                0.15)
+        << passes;
+    EXPECT_NEAR(estimate.noise_factor, 1, 0.06) << passes;
+    EXPECT_LE(estimate.absolute.low, made.true_square);
+    EXPECT_GE(estimate.absolute.high, made.true_square);
+  }
+}
+
+TEST(ErrorEstimateTest, LaterLooksHaveWiderIntervals) {
+  const Made made(10, 0.5, 0, 5);
+  const SquaredError first = made.Estimate(1).absolute;
+  const SquaredError tenth = made.Estimate(10).absolute;
+  EXPECT_EQ(first.total(), tenth.total());
+  EXPECT_LT(tenth.low, first.low);
+  EXPECT_GT(tenth.high, first.high);
+  EXPECT_LT(first.low, first.total());
+}
+
+// Passes that repeat each other's errors with the other sign, as stratified ones do: what the
+// passes vary by says nothing of what the halves do.
+TEST(ErrorEstimateTest, NoiseFactorSeesStratification) {
+  ErrorStatistics statistics(kPixels);
+  std::vector<RgbSum> all(kPixels);
+  KeyedRng rng(9);
+  std::array<std::vector<double>, 2> shift = {std::vector<double>(kPixels),
+                                              std::vector<double>(kPixels)};
+  const std::vector<double> none(kPixels);
+  for (int pass = 0; pass < 16; ++pass) {
+    std::vector<RgbSum> radiance(kPixels);
+    std::vector<double>& half = shift[static_cast<std::size_t>(pass % 2)];
+    for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
+      // Of each half every other pass takes back what the one before brought.
+      half[pixel] = pass % 4 < 2 ? static_cast<double>(rng.Uniform()) - 0.5 : -half[pixel];
+      const double value = 1 + half[pixel] + 0.01 * static_cast<double>(rng.Uniform());
+      radiance[pixel] = {value, value, value};
+      for (double& sum : all[pixel])
+        sum += value;
+    }
+    statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, radiance, none);
+  }
+  const ErrorEstimate estimate = EstimateError(kSide, kSide, 16, 1, [&](std::size_t pixel) {
+    PixelSums sums;
+    sums.all = sums.photons = all[pixel];
+    sums.even = sums.even_photons = statistics.even_sum()[pixel];
+    sums.square = statistics.square_sum()[pixel];
+    return sums;
+  });
+  EXPECT_LT(estimate.noise_factor, 0.01);
+}
+
+TEST(TwoSidedNormalQuantileTest, KnowsTheTable) {
+  EXPECT_NEAR(TwoSidedNormalQuantile(0.05), 1.959964, 1e-6);
+  EXPECT_NEAR(TwoSidedNormalQuantile(0.3173105), 1, 1e-6);
+  EXPECT_NEAR(TwoSidedNormalQuantile(2e-9), 5.997807, 1e-5);
+}
+
+}  // namespace
+}  // namespace lucerna
