@@ -294,6 +294,37 @@ TEST_F(ClientCommandsTest, ADeadWorkerEndsTheRenderWithASentence) {
   EXPECT_TRUE(Images().empty());
 }
 
+// Ended after three passes and given a new end: the bits are those of one run to that end.
+TEST_F(ClientCommandsTest, AnExtendedJobIsTheOneThatNeverStopped) {
+  const auto cluster = LocalCluster::Start({LUCERNA_BIN_DIR, 1, 1});
+  ASSERT_TRUE(cluster.ok()) << cluster.status();
+  const std::string server = (*cluster)->address();
+  const std::vector<std::string> scene = {SceneOfTests("caustic.pbrt"), "--size", "32x24",
+                                          "--photons-per-pass", "5000"};
+  const auto with = [&](std::vector<std::string> words, const std::vector<std::string>& more) {
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  };
+  const Ran submitted = Run(with(with({"submit"}, scene), {"--passes", "3", "--server", server}));
+  ASSERT_EQ(submitted.code, 0) << submitted.err;
+  const std::string job = submitted.out.substr(0, submitted.out.find('\n'));
+  ASSERT_EQ(Run({"wait", job, "--server", server}).code, 0);
+  EXPECT_NE(Run({"extend", job, "--server", server}).code, 0);
+  ASSERT_EQ(Run({"extend", job, "--passes", "9", "--server", server}).code, 0);
+  const Ran waited = Run({"wait", job, "--server", server, "--json"});
+  ASSERT_EQ(waited.code, 0) << waited.err;
+  EXPECT_EQ(json::parse(waited.out)["passes"], 9);
+  ASSERT_EQ(Run({"fetch", job, "-o", In("extended.exr"), "--server", server}).code, 0);
+  ASSERT_EQ(Run(with(with({"render"}, scene), {"--passes", "9", "-o", In("once.exr")})).code, 0);
+  EXPECT_EQ(Run({"digest", In("extended.exr")}).out, Run({"digest", In("once.exr")}).out);
+
+  // The error so far as target: reached at the next look, or the photons' end.
+  ASSERT_EQ(Run({"extend", job, "--error", "1000%", "--passes", "40", "--server", server}).code, 0);
+  const Ran reached = Run({"wait", job, "--server", server, "--json"});
+  ASSERT_EQ(reached.code, 0) << reached.err;
+  EXPECT_EQ(json::parse(reached.out)["stop_reason"], "ERROR");
+}
+
 TEST_F(ClientCommandsTest, AJobIsSubmittedListedFollowedFetchedAndCancelled) {
   const auto cluster = LocalCluster::Start({LUCERNA_BIN_DIR, 1, 1});
   ASSERT_TRUE(cluster.ok()) << cluster.status();
