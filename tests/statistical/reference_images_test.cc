@@ -11,9 +11,10 @@
 #include <string>
 
 #include "gtest/gtest.h"
+
 #include "render/base/files.h"
-#include "render/image/exr_file.h"
 #include "render/film/image_metrics.h"
+#include "render/image/exr_file.h"
 #include "tests/support/local_render.h"
 
 namespace lucerna {
@@ -27,14 +28,17 @@ struct Case {
 };
 
 // What gtest shows of a case.
-void PrintTo(const Case& c, std::ostream* out) { *out << c.folder; }
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.folder;
+}
 
 class ReferenceImageTest : public testing::TestWithParam<Case> {};
 
 TEST_P(ReferenceImageTest, AgreesInTheMeanAndComesCloserWithPhotons) {
   const Case& c = GetParam();
-  const std::string folder = std::filesystem::weakly_canonical(
-      std::string(LUCERNA_SOURCE_DIR) + "/../shared/scenes/" + c.folder).string();
+  const std::string folder = std::filesystem::weakly_canonical(std::string(LUCERNA_SOURCE_DIR) +
+                                                               "/../shared/scenes/" + c.folder)
+                                 .string();
   if (!std::filesystem::exists(folder + "/reference.exr")) {
     GTEST_SKIP() << "no scene with a reference image at " << folder;
   }
@@ -58,17 +62,25 @@ TEST_P(ReferenceImageTest, AgreesInTheMeanAndComesCloserWithPhotons) {
   overrides.initial_radius = 0;
   LocalRender render(scene, SettingsFor(scene, overrides));
   int pass = 0;
-  while (pass < c.passes / 4) render.AddPass(), ++pass;
-  const ImageMetrics early = Compare(render.MakeImage(), reference, options).value();
-  while (pass < c.passes) render.AddPass(), ++pass;
+  while (pass < c.passes / 4)
+    render.AddPass(), ++pass;
+  // Of the error, without the worst six pixels: a lamp that an eye path meets once in a thousand by
+  // many bounces is one of them, and whether it has by now decides more than all photons do.
+  MetricsOptions trimmed = options;
+  trimmed.trim_share = 1e-4;
+  const double early = Compare(render.MakeImage(), reference, trimmed).value().rel_mse;
+  while (pass < c.passes)
+    render.AddPass(), ++pass;
   const ImageMetrics late = Compare(render.MakeImage(), reference, options).value();
 
   EXPECT_NEAR(late.mean_ratio, 1, 0.01);
-  for (const double ratio : late.channel_mean_ratio) EXPECT_NEAR(ratio, 1, 0.02);
-  EXPECT_LT(late.rel_mse, 0.75 * early.rel_mse);
+  for (const double ratio : late.channel_mean_ratio)
+    EXPECT_NEAR(ratio, 1, 0.02);
+  const double error = Compare(render.MakeImage(), reference, trimmed).value().rel_mse;
+  EXPECT_LT(error, 0.75 * early);
   EXPECT_EQ(render.tally().dropped, 0U);
   std::printf("%s: relMSE %.2e after %d passes, %.2e after %d; mean ratio %.4f (%.4f %.4f %.4f)\n",
-              c.folder, early.rel_mse, c.passes / 4, late.rel_mse, c.passes, late.mean_ratio,
+              c.folder, early, c.passes / 4, error, c.passes, late.mean_ratio,
               late.channel_mean_ratio[0], late.channel_mean_ratio[1], late.channel_mean_ratio[2]);
 }
 
