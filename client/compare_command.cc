@@ -122,8 +122,8 @@ class Comparer {
     std::vector<ErrorPoint> curve = CurveOf(job, Cores(), yardstick_.noise.value_or(0));
     if (curve.empty()) {
       return absl::InternalError(absl::StrCat("job ", job.job_id(),
-                                              " recorded no true errors; give it more time, or a "
-                                              "--trim of 0.001 to compare images instead"));
+                                              " recorded no true errors; give it more time, or "
+                                              "another --trim to compare images instead"));
     }
     return curve;
   }
@@ -318,7 +318,8 @@ Status CompareSettings(const CompareRequest& request, const ClusterOptions& clus
   LUCERNA_ASSIGN_OR_RETURN(const auto runs,
                            LocalRuns::Start(cluster, request.scene_path, scene.manifest));
 
-  const bool has_record = request.mask_path.empty() && request.trim_share == 0;
+  // The coordinator's own record measures so.
+  const bool has_record = request.mask_path.empty() && request.trim_share == kTrimmedShare;
   // One point makes no curve.
   std::vector<double> stops = times;
   if (stops.size() == 1) stops.insert(stops.begin(), stops[0] / 2);

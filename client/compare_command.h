@@ -3,7 +3,7 @@
 // Renders one scene with several settings in turn on a cluster of its own, repetition by repetition
 // and setting by setting, so that slow moments of the machine hit all of them, and compares with a
 // reference. Errors against time come from the convergence record of one long job a run; with a
-// mask or trimming, of which the coordinator knows nothing, from one job for each time.
+// mask or another trimming, of which the coordinator knows nothing, from one job for each time.
 #pragma once
 
 #include <optional>
@@ -16,6 +16,7 @@
 #include "client/render_flags.h"
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "render/base/status.h"
+#include "render/estimate/error_estimate.h"
 
 namespace lucerna {
 
@@ -25,7 +26,7 @@ struct CompareRequest {
   std::vector<std::string> settings;  // "NAME: flags"; empty: one for each radius controller
   std::string reference_path;
   std::string mask_path;  // empty: all pixels
-  double trim_share = 0;
+  double trim_share = kTrimmedShare;
   std::string times = "1,2,5,10";  // [s] of processor time over cores
   int repetitions = 3;
   std::string table_path;  // empty: to stdout, unless the result goes there as JSON

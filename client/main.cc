@@ -186,7 +186,8 @@ int Run(int argc, char** argv) {
       ->required();
   compare->add_option("--mask", comparison.mask_path,
                       "EXR file; pixels that are 0 in it are left out");
-  compare->add_option("--trim", comparison.trim_share, "leave out this share of the worst pixels");
+  compare->add_option("--trim", comparison.trim_share, "leave out this share of the worst pixels")
+      ->capture_default_str();
   compare->add_option("--times", comparison.times, "processor seconds over cores, like 1,2,5,10")
       ->capture_default_str();
   compare->add_option("--repetitions", comparison.repetitions, "runs of each setting")

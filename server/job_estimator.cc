@@ -87,7 +87,7 @@ void JobEstimator::Apply(const EyePass& pass, const RadiusColumn& radii, const P
     for (std::size_t c = 0; c < 3; ++c)
       radiance[pixel][c] += photons[pixel][c];
   }
-  state_->errors->AddPass(pass.pass, radiance, photons, bias);
+  state_->errors->AddPass(pass.pass, radiance, bias);
   for (std::size_t pixel = 0; pixel < pass.direct.size(); ++pixel) {
     const EyeFeatures& features = pass.features[pixel];
     state_->film->Add(pixel, pass.direct[pixel], features.albedo, features.normal,
@@ -141,12 +141,10 @@ ErrorEstimate JobEstimator::EstimateError(int look) const {
     for (std::size_t c = 0; c < 3; ++c) {
       sums.all[c] = exposure * all[c];
       sums.even[c] = exposure * errors.even_sum()[pixel][c];
-      sums.photons[c] = exposure * photons[c];
-      sums.even_photons[c] = exposure * errors.even_photons()[pixel][c];
-      const double color = luminance > 0 ? exposure * photons[c] / luminance : 0;
-      sums.even_bias[c] = color * errors.even_bias()[pixel];
-      sums.odd_bias[c] = color * errors.odd_bias()[pixel];
+      sums.bias_color[c] = luminance > 0 ? photons[c] / luminance : 0;
     }
+    sums.even_bias = exposure * errors.even_bias()[pixel];
+    sums.odd_bias = exposure * errors.odd_bias()[pixel];
     sums.square = exposure * exposure * errors.square_sum()[pixel];
     return sums;
   };
@@ -156,17 +154,27 @@ ErrorEstimate JobEstimator::EstimateError(int look) const {
 
 TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
   const double to_pixel = state_->scene.film.exposure / static_cast<double>(passes_applied());
-  TrueError error;
+  std::vector<TrueError> pixels(reference.size());
   for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
     const RgbSum sum = state_->Sum(pixel);
     for (std::size_t c = 0; c < 3; ++c) {
       const auto right = static_cast<double>(reference[pixel][static_cast<int>(c)]);
       const double off = sum[c] * to_pixel - right;
-      error.absolute += off * off;
-      error.relative += off * off / (right * right + 0.01);
+      pixels[pixel].absolute += off * off;
+      pixels[pixel].relative += off * off / (right * right + 0.01);
     }
   }
-  const double terms = 3 * static_cast<double>(reference.size());
+  const auto kept =
+      pixels.size() - static_cast<std::size_t>(kTrimmedShare * static_cast<double>(pixels.size()));
+  std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
+                           &TrueError::relative);
+  pixels.resize(kept);
+  TrueError error;
+  for (const TrueError& pixel : pixels) {
+    error.absolute += pixel.absolute;
+    error.relative += pixel.relative;
+  }
+  const double terms = 3 * static_cast<double>(kept);
   return {error.relative / terms, error.absolute / terms};
 }
 

@@ -150,8 +150,7 @@ void JobRunner::LookAtError(bool is_last) {
   }
   looked_at_ = look.passes;
   error_at_most_ = std::sqrt(look.estimate.relative.high);
-  // Fifteen or so to a decade of passes: the more looks, the wider each one's interval.
-  next_look_ = std::max(look.passes + 1, look.passes * 7 / 6);
+  next_look_ = NextLook(look.passes);
   surroundings_.when_looked(look);
 }
 

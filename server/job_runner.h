@@ -97,9 +97,6 @@ class JobRunner {
   [[nodiscard]] StatusOr<Result> ImageSoFar() const;
 
  private:
-  // Passes before the first look: halves of two passes each.
-  static constexpr std::int64_t kFirstLook = 4;
-
   struct TracedPass {
     EyePass eye;
     Digest block_digest;

@@ -13,7 +13,7 @@ namespace lucerna {
 // R, G, B [pixels], row-major in the crop window; finite.
 using ReferenceImage = std::vector<Rgb>;
 
-// Squared errors against it, as ErrorEstimate has them.
+// Squared errors against it, over the pixels and as ErrorEstimate has them.
 struct TrueError {
   double relative = 0;
   double absolute = 0;

@@ -8,21 +8,31 @@
 // Bias. The kernel blurs. Beside every sum with the whole kernel K goes one with the difference
 // between K and the same kernel at kInnerShare of the radius: what the outer part of the blur
 // changes, and, divided by 1 - kInnerShare², an estimate of all that it changes (exact for light
-// whose second derivative is even across the disc; an edge is underestimated, by a third of the
-// bias). The product of the two halves' estimates is free of their noise, so their squares are
-// known far below it. Source: Hachisuka, Jarosz & Jensen 2010, "A Progressive Error Estimation
-// Framework for Photon Density Estimation", with kernels' differences in place of derivatives.
+// whose second derivative is even across the disc). The product of the two halves' estimates is
+// free of their noise. As the inner kernels of neighbouring pixels hardly share photons and the
+// bias of neighbours is alike, one of the two is first smoothed over the pixels next to it, which
+// takes most of the chance out of the product and little of the bias (kSmoothedAway).
+// Source: Hachisuka, Jarosz & Jensen 2010, "A Progressive Error Estimation Framework for Photon
+// Density Estimation", with kernels' differences in place of derivatives.
 //
-// Relative errors are squares over (value² + 0.01), and the value is not known either. Where a
-// pixel of the sharp direct image differs between the halves, its own mean is the best guess.
-// Photons come to neighbours alike: where one half saw them and the other did not, the pixels
-// around tell what value they should have brought.
+// Relative errors are squares over (value² + 0.01), and the value is not known either. What two
+// halves and the pixels around agree on is one guess, the least of that and the pixel's own mean
+// another, and the mean of what they give is used.
 //
-// Interval. Sums over tiles of the image vary; their spread gives the standard error of the sum,
-// and that of the true squared error around its own expectation is as large again. Intervals are
-// valid at all looks together: look j (from 1) spends 1/(j (j + 1)) of the error probability.
-// Source: the stitching of Howard, Ramdas, McAuliffe & Sekhon 2021, "Time-uniform, nonparametric,
-// nonasymptotic confidence sequences", with looks as the epochs and normal tails within one.
+// Both errors leave out the kTrimmedShare of pixels in which the relative error is largest, of the
+// true error as of the estimated one: the mean of a squared relative error over an image is
+// otherwise decided by a handful of pixels whose light came by one path in a million, of which no
+// estimate knows anything until it has come.
+//
+// Interval. Squares vary by chance: that of a normal difference D by 2 E[D²]², which E[D⁴] tells,
+// the product of two independent halves' biases by at most its own mean square. Neighbours share
+// photons, so that the spread of a sum is larger by the area over which differences are alike
+// (sum of the squares of their correlations, found in the differences themselves). The true
+// squared error around its expectation spreads alike, and by its cross term of bias and noise. What
+// the models above leave open is kModelError. Intervals are valid at all looks together: look j
+// (from 1) spends 1/(j (j + 1)) of the error probability. Source: the stitching of Howard, Ramdas,
+// McAuliffe & Sekhon 2021, "Time-uniform, nonparametric, nonasymptotic confidence sequences", with
+// looks as the epochs and normal tails within one.
 #pragma once
 
 #include <array>
@@ -44,15 +54,13 @@ class ErrorStatistics {
  public:
   explicit ErrorStatistics(std::size_t pixels);
 
-  // Takes in pass number `pass`: per pixel its radiance in all and that from photons, and the
+  // Takes in pass number `pass`: per pixel its radiance and the
   // luminance of radiance by which its kernel is estimated to have changed it.
-  void AddPass(std::uint64_t pass, std::span<const RgbSum> radiance,
-               std::span<const RgbSum> photons, std::span<const double> bias);
+  void AddPass(std::uint64_t pass, std::span<const RgbSum> radiance, std::span<const double> bias);
 
   [[nodiscard]] std::int64_t passes() const { return passes_; }
   // Sums over the even passes [pixels].
   [[nodiscard]] const std::vector<RgbSum>& even_sum() const { return even_sum_; }
-  [[nodiscard]] const std::vector<RgbSum>& even_photons() const { return even_photons_; }
   // Sums over all passes of the squared luminance [pixels].
   [[nodiscard]] const std::vector<double>& square_sum() const { return square_sum_; }
   // Sums over even and odd passes of the bias [pixels].
@@ -62,7 +70,6 @@ class ErrorStatistics {
  private:
   std::int64_t passes_ = 0;
   std::vector<RgbSum> even_sum_;
-  std::vector<RgbSum> even_photons_;
   std::vector<double> square_sum_;
   std::array<std::vector<double>, 2> bias_sum_;
 };
@@ -78,9 +85,10 @@ struct SquaredError {
 };
 
 struct ErrorEstimate {
-  // Mean over pixels and channels of error² / (value² + 0.01): what ImageMetrics calls rel_mse.
+  // Mean over pixels and channels of error² / (value² + 0.01): what ImageMetrics calls rel_mse with
+  // a trim_share of kTrimmedShare.
   SquaredError relative;
-  // Mean over pixels and channels of error²: the square of rmse.
+  // Mean of error² over the same pixels: the square of its rmse.
   SquaredError absolute;
   // True squared noise over what passes that knew nothing of each other would have: below 1 where
   // stratification over passes helps. For the noise of single pixels.
@@ -89,12 +97,23 @@ struct ErrorEstimate {
 
 // Sums over passes of what one pixel is made of, in the colours and the exposure of the image.
 struct PixelSums {
-  RgbSum all{}, photons{};         // in all, and of photons
-  RgbSum even{}, even_photons{};   // the same of even passes
-  RgbSum even_bias{}, odd_bias{};  // of even passes and of odd ones
-  double square = 0;               // squared luminance
+  RgbSum all{}, even{};                // over all passes and the even ones
+  double even_bias = 0, odd_bias = 0;  // luminance, of even passes and of odd ones
+  RgbSum bias_color{};                 // of luminance 1
+  double square = 0;                   // squared luminance
 };
 using PixelSumsAt = std::function<PixelSums(std::size_t pixel)>;
+
+// The share of pixels, those with the largest relative errors, that errors of images leave out.
+inline constexpr double kTrimmedShare = 0.001;
+
+// Passes before the first look at the error: halves of two passes each.
+inline constexpr std::int64_t kFirstLook = 4;
+// After how many passes to look next. Fifteen looks or so to a decade of passes: the more looks,
+// the wider each one's interval.
+[[nodiscard]] constexpr std::int64_t NextLook(std::int64_t passes) {
+  return passes * 7 / 6 > passes ? passes * 7 / 6 : passes + 1;
+}
 
 // The share of runs in which the true error lies within the interval at all looks.
 inline constexpr double kConfidence = 0.95;

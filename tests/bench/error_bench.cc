@@ -1,46 +1,53 @@
 // How true is the error estimate?
 //
-// Renders a scene in one process and compares, at every look, the estimated relMSE with the true one
-// against a reference. The reference's own squared error may be given, to be taken off the truth.
-// Run: build/release/bin/lucerna-error-check SCENE REFERENCE.exr [passes [controller [noise]]]
+// Renders a scene many times, small, and prints how the estimate compares with the true error at
+// every look, in how many renders the intervals held it at all looks, and what comes of stopping
+// on it.
+// Run: build/release/bin/lucerna-error-check SCENE [side [renders [passes]]]
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <string>
 
-#include "render/base/files.h"
-#include "render/image/exr_file.h"
-#include "render/film/image_metrics.h"
+#include "tests/support/error_study.h"
 #include "tests/support/local_render.h"
 
 int main(int argc, char** argv) {
   using namespace lucerna;
-  if (argc < 3) {
-    std::fprintf(stderr, "usage: %s SCENE REFERENCE.exr [passes [controller [noise]]]\n", argv[0]);
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: %s SCENE [side [renders [passes]]]\n", argv[0]);
     return 2;
   }
+  StudySize size;
+  if (argc > 2) size.side = std::atoi(argv[2]);
+  if (argc > 3) size.renders = std::atoi(argv[3]);
+  if (argc > 4) size.passes = std::atoi(argv[4]);
   const Scene scene = LoadScene(argv[1]);
-  const Image reference = DecodeExr(ReadFile(argv[2]).value()).value();
-  const int passes = argc > 3 ? std::atoi(argv[3]) : 64;
-  RenderOverrides overrides;
-  overrides.width = reference.width;
-  overrides.height = reference.height;
-  overrides.photons_per_pass = reference.width * reference.height;
-  overrides.initial_radius = 0;
-  overrides.max_depth = 20;
-  overrides.radius_controller = ParseRadiusController(argc > 4 ? argv[4] : "appm").value();
-  const double own = argc > 5 ? std::atof(argv[5]) : 0;
-  LocalRender render(scene, SettingsFor(scene, overrides));
-  std::printf("| passes | true relMSE | estimate | noise | bias | low | high | estimate/true |\n");
-  int look = 0;
-  int next = 4;
-  for (int pass = 1; pass <= passes; ++pass) {
-    render.AddPass();
-    if (pass != next) continue;
-    next = std::max(next + 1, next * 3 / 2);
-    const ErrorEstimate e = render.EstimateError(++look);
-    const double truth = Compare(render.MakeImage(), reference, {}).value().rel_mse - own;
-    std::printf("| %d | %.3e | %.3e | %.3e | %.3e | %.3e | %.3e | %.2f |\n", pass, truth,
-                e.relative.total(), e.relative.noise, e.relative.bias, e.relative.low,
-                e.relative.high, e.relative.total() / truth);
+  const ErrorStudy study = StudyErrors(scene, StudyReference(scene, size.side), size);
+
+  std::printf("%s, %d x %d, %d renders\nintervals held the truth at all looks: %d\n", argv[1],
+              size.side, size.side, size.renders, study.Covered());
+  const std::vector<double> ratios = study.Ratios();
+  std::printf("| passes | true error | estimated over true | upper end over true |\n");
+  std::vector<double> truths;
+  for (std::size_t look = 0; look < ratios.size(); ++look) {
+    double truth = 0;
+    double high = 0;
+    for (const std::vector<StudiedLook>& looks : study.renders) {
+      truth += looks[look].truth / size.renders;
+      high += std::sqrt(looks[look].high / looks[look].truth) / size.renders;
+    }
+    truths.push_back(std::sqrt(truth));
+    std::printf("| %d | %.4f | %.2f | %.2f |\n", study.renders.front()[look].passes, truths.back(),
+                ratios[look], high);
+  }
+  // A target that is there to be reached: what was true after a third of the passes.
+  for (std::size_t look = 0; look < truths.size(); ++look) {
+    if (study.renders.front()[look].passes * 3 < size.passes) continue;
+    const StopOutcome outcome = StopAt(study, truths[look]);
+    std::printf(
+        "stop at %.4f: %d stopped, %d of them at or below it; spent %.2f times the photons "
+        "needed, %d at most twice\n",
+        outcome.target, outcome.stopped, outcome.kept, outcome.mean_spent, outcome.within_two);
+    break;
   }
 }

@@ -36,7 +36,7 @@ struct Made {
         for (double& sum : all[pixel])
           sum += value;
       }
-      statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, radiance, biases);
+      statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, biases);
     }
     for (const RgbSum& sum : all) {
       const double off = sum[0] / passes - 2;
@@ -47,12 +47,11 @@ struct Made {
   [[nodiscard]] ErrorEstimate Estimate(int look) const {
     return EstimateError(kSide, kSide, statistics.passes(), look, [&](std::size_t pixel) {
       PixelSums sums;
-      sums.all = sums.photons = all[pixel];
-      sums.even = sums.even_photons = statistics.even_sum()[pixel];
-      for (std::size_t c = 0; c < 3; ++c) {
-        sums.even_bias[c] = statistics.even_bias()[pixel];
-        sums.odd_bias[c] = statistics.odd_bias()[pixel];
-      }
+      sums.all = all[pixel];
+      sums.even = statistics.even_sum()[pixel];
+      sums.even_bias = statistics.even_bias()[pixel];
+      sums.odd_bias = statistics.odd_bias()[pixel];
+      sums.bias_color = {1, 1, 1};
       sums.square = statistics.square_sum()[pixel];
       return sums;
     });
@@ -65,9 +64,13 @@ TEST(ErrorEstimateTest, FindsNoiseAndBias) {
     const ErrorEstimate estimate = made.Estimate(1);
     // 9216 pixels of a squared normal number each: 1.5 % is a standard deviation.
     EXPECT_NEAR(estimate.absolute.noise / (0.25 / passes), 1, 0.06) << passes;
-    // The product of two halves of deviation 3 · 0.5/√3 · √(2/passes), over 96 pixels' root.
+    // A bias that is the same everywhere loses nothing by smoothing, but is made larger by what
+    // an edge's needs, 1/(1 - 0.4). The product of two halves of deviation 3 · 0.5/√3 ·
+    // √(2/passes), one of them smoothed to 3/8 of it, over 96 pixels' root.
     const double half = 1.5 / std::sqrt(3.0) * std::sqrt(2.0 / passes);
-    EXPECT_NEAR(estimate.absolute.bias, 0.01, 4 * half * half / 96 + 4 * 0.1 * half / 96) << passes;
+    EXPECT_NEAR(estimate.absolute.bias, 0.01 / 0.6,
+                4 / 0.6 * (3.0 / 8 * half * half + 0.1 * half) / 96)
+        << passes;
     EXPECT_NEAR(estimate.relative.total() / (estimate.absolute.total() / (2.1 * 2.1 + 0.01)), 1,
                 0.15)
         << passes;
@@ -107,12 +110,12 @@ TEST(ErrorEstimateTest, NoiseFactorSeesStratification) {
       for (double& sum : all[pixel])
         sum += value;
     }
-    statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, radiance, none);
+    statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, none);
   }
   const ErrorEstimate estimate = EstimateError(kSide, kSide, 16, 1, [&](std::size_t pixel) {
     PixelSums sums;
-    sums.all = sums.photons = all[pixel];
-    sums.even = sums.even_photons = statistics.even_sum()[pixel];
+    sums.all = all[pixel];
+    sums.even = statistics.even_sum()[pixel];
     sums.square = statistics.square_sum()[pixel];
     return sums;
   });
