@@ -14,6 +14,7 @@
 #include "client/interruption.h"
 #include "client/job_commands.h"
 #include "client/local_cluster.h"
+#include "client/plan_command.h"
 #include "client/preview.h"
 #include "client/reference_command.h"
 
@@ -38,6 +39,7 @@ int Run(int argc, char** argv) {
   OutputPaths fetched;
   ReportPaths report_paths;
   RenderFlags until;
+  RenderFlags planned;
   std::string server = "127.0.0.1:7400";
   std::string job_id;
   std::string scene_path;
@@ -160,6 +162,13 @@ int Run(int argc, char** argv) {
   validate->add_flag("--strict", strict, "warnings are errors");
   add_json(validate);
   add_quiet(validate);
+
+  CLI::App* plan = command("plan", "say what a job will use, what is left out, and why",
+                           [&] { return PrintPlan(scene_path, planned, voice); });
+  plan->add_option("SCENE", scene_path, "pbrt-v4 scene file")->required();
+  AddImageFlags(*plan, planned);
+  add_json(plan);
+  add_quiet(plan);
 
   CLI::App* diff = command("diff", "say how far an image is from a reference", [&] {
     if (crops) metrics.fit = MetricsOptions::Fit::kCrop;

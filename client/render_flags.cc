@@ -42,6 +42,8 @@ void AddImageFlags(CLI::App& command, RenderFlags& flags) {
   command.add_option("--initial-radius", flags.initial_radius,
                      "in scene units, in pixel widths like 1.5px, or auto (3px)");
   command.add_option("--max-depth", flags.max_depth, "scattering events of a path");
+  command.add_flag("--use-everything", flags.use_everything,
+                   "leave nothing out that the scene does not need, for comparison");
 }
 
 void AddStopFlags(CLI::App& command, RenderFlags& flags) {
@@ -127,6 +129,7 @@ StatusOr<RenderOverrides> ToOverrides(const RenderFlags& flags) {
   overrides.seed = flags.seed;
   overrides.alpha = flags.alpha;
   overrides.max_depth = flags.max_depth;
+  if (flags.use_everything) overrides.use_everything = true;
   return overrides;
 }
 

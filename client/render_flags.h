@@ -31,6 +31,7 @@ struct RenderFlags {
   std::optional<std::string> bias, frequency_share;  // "2%" or "0.02"
   std::optional<std::string> initial_radius;         // scene units, "1.5px", or "auto"
   std::optional<int> max_depth;
+  bool use_everything = false;
 };
 
 // Gives `command` the flags that decide what the pixels are, and those that say when to stop.

@@ -46,6 +46,7 @@ Json SettingsOf(const v1::RenderSettings& settings) {
       {"kernel", settings.kernel()},
       {"bias", settings.bias()},
       {"frequency_share", settings.frequency_share()},
+      {"use_everything", settings.use_everything()},
       {"initial_radius", settings.initial_radius()},
       {"initial_footprints", settings.initial_footprints()},
       {"max_depth", settings.max_depth()},
@@ -85,6 +86,11 @@ Json JobOf(const v1::Job& job) {
   json["warnings"] = Json::array();
   for (const std::string& warning : job.warnings())
     json["warnings"].push_back(warning);
+  json["parts"] = Json::array();
+  for (const v1::PartUse& use : job.parts()) {
+    json["parts"].push_back(
+        {{"part", use.part()}, {"is_used", use.is_used()}, {"reason", use.reason()}});
+  }
   return json;
 }
 
@@ -352,6 +358,22 @@ std::string DigestReport(const Image& image) {
                  {"height", image.height},
                  {"channels", channels},
                  {"metadata", image.metadata}});
+}
+
+std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost) {
+  Json parts = Json::array();
+  for (const Part part : AllParts()) {
+    parts.push_back({{"part", NameOf(part)},
+                     {"is_used", needs.Uses(part)},
+                     {"reason", needs.ReasonOf(part)}});
+  }
+  return ToText({{"parts", parts},
+                 {"eye_sample_sets", needs.eye_sample_sets()},
+                 {"expected",
+                  {{"coordinator_bytes", cost.coordinator_bytes},
+                   {"worker_bytes", cost.worker_bytes},
+                   {"first_pass_bytes_sent", cost.first_pass_bytes_sent},
+                   {"pass_bytes_sent", cost.pass_bytes_sent}}}});
 }
 
 }  // namespace lucerna

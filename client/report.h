@@ -11,6 +11,7 @@
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "render/base/digest.h"
 #include "render/film/image_metrics.h"
+#include "render/scene/needs.h"
 #include "render/scene/pbrt_parser.h"
 
 namespace lucerna {
@@ -40,5 +41,6 @@ struct SavedImage {
 // Of an image that MakeReference made.
 [[nodiscard]] std::string ReferenceReport(const Image& reference, const std::string& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
+[[nodiscard]] std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost);
 
 }  // namespace lucerna

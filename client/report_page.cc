@@ -374,6 +374,22 @@ std::string Warnings(const v1::Job& job) {
   return html + "</ul>\n</section>\n";
 }
 
+std::string Parts(const v1::Job& job) {
+  if (job.parts().empty()) return {};
+  std::string html = "<section>\n<h2>What was left out</h2>\n" +
+                     TableTop("What this job used of the machine, what it left out, and why.",
+                              {{"part", "name"}, {"used"}, {"reason", "name"}});
+  for (const bool is_used : {false, true}) {
+    for (const v1::PartUse& use : job.parts()) {
+      if (use.is_used() != is_used) continue;
+      absl::StrAppend(&html, "<tr><th scope=\"row\" class=\"name\">", EscapeMarkup(use.part()),
+                      "</th><td>", is_used ? "yes" : "no", "</td><td class=\"name\">",
+                      EscapeMarkup(use.reason()), "</td></tr>\n");
+    }
+  }
+  return html + "</tbody></table></div>\n</section>\n";
+}
+
 }  // namespace
 
 std::string ReportPage(const v1::Job& job, const std::optional<PageImage>& image) {
@@ -396,7 +412,7 @@ std::string ReportPage(const v1::Job& job, const std::optional<PageImage>& image
       "</style>\n</head>\n<body>\n<main>\n<header>\n<h1>", name, "</h1>\n<p class=\"muted\">",
       subtitle, "</p>\n</header>\n<div class=\"top\">\n", ImageFigure(job, image), "<div>\n",
       Headline(job), RunFacts(job), "</div>\n</div>\n", Convergence(job), Workers(job),
-      Samples(job), Warnings(job), SettingFacts(job, image),
+      Samples(job), Warnings(job), Parts(job), SettingFacts(job, image),
       "<footer>Made by <code>lucerna report</code>. Time is wall time since the job "
       "began to run.</footer>\n</main>\n</body>\n</html>\n");
 }

@@ -50,6 +50,7 @@ StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
       return Failure(ExitCode::kUsage, std::string(settings.status().message()));
     }
     scene.settings.push_back(*settings);
+    scene.needs.push_back(NeedsOf(parsed.scene, *settings));
   }
   scene.manifest = files.Manifest(place.main);
   return scene;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "client/render_flags.h"
+#include "render/scene/needs.h"
 #include "render/scene/pbrt_parser.h"
 #include "render/scene/scene_files.h"
 
@@ -34,6 +35,7 @@ struct ScenePath {
 struct SceneOfJobs {
   SceneManifest manifest;
   std::vector<RenderSettings> settings;  // as many as there are overrides
+  std::vector<SceneNeeds> needs;         // of each
 };
 [[nodiscard]] StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
                                                     std::span<const RenderOverrides> overrides,

@@ -190,6 +190,7 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
               .scene_digest = submission.manifest.SceneDigest(),
               .settings = *settings,
               .warnings = std::move(warnings),
+              .needs = NeedsOf(scene, *settings),
               .submitted_at = clock_.Wall(),
               .life = JobLife(clock_.Steady()),
               .books = {},

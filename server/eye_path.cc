@@ -21,9 +21,11 @@ constexpr float kBranchWeight = 0.01F;
 }  // namespace
 
 EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
+                             const SceneNeeds& needs,
                              const Intersector& intersector, const LightSet& lights)
     : scene_(scene),
       settings_(settings),
+      eye_sets_(needs.eye_sample_sets()),
       intersector_(intersector),
       lights_(lights),
       filter_x_(scene.filter, scene.filter.radius_x),
@@ -59,7 +61,7 @@ EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass) const {
   const auto pixel = static_cast<std::uint64_t>(settings_.crop_y0 + y) *
                          static_cast<std::uint64_t>(settings_.width) +
                      static_cast<std::uint64_t>(settings_.crop_x0 + x);
-  const PixelSampler sampler(settings_.seed, pixel, pass);
+  const PixelSampler sampler(settings_.seed, pixel, pass, EyeSetOf(pass, eye_sets_));
   // The filter's weight is kept out of the walk, because it can be negative.
   float filter_weight = 1;
   EyePath path = Walk(CameraRay(sampler, x, y, filter_weight), sampler);

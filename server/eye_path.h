@@ -6,6 +6,7 @@
 #include "render/geometry/intersector.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
+#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/transport/light.h"
@@ -39,8 +40,8 @@ struct EyePath {
 class EyePathTracer {
  public:
   // Keeps references to all.
-  EyePathTracer(const Scene& scene, const RenderSettings& settings, const Intersector& intersector,
-                const LightSet& lights);
+  EyePathTracer(const Scene& scene, const RenderSettings& settings, const SceneNeeds& needs,
+                const Intersector& intersector, const LightSet& lights);
 
   // The eye path of a pixel of the crop window in one pass. Threads: any.
   [[nodiscard]] EyePath Trace(int x, int y, std::uint64_t pass) const;
@@ -57,6 +58,7 @@ class EyePathTracer {
 
   const Scene& scene_;
   const RenderSettings& settings_;
+  const int eye_sets_;  // see EyeSetOf
   const Intersector& intersector_;
   const LightSet& lights_;
   FilterSampler filter_x_, filter_y_;

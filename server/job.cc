@@ -105,7 +105,8 @@ std::string SettingsText(const RenderSettings& settings) {
                       UsesFrequency(settings.radius_controller)
                           ? absl::StrCat(" bias=", NumberText(settings.bias),
                                          " frequency-share=", NumberText(settings.frequency_share))
-                          : std::string());
+                          : std::string(),
+                      settings.use_everything ? " use-everything" : "");
 }
 
 }  // namespace lucerna

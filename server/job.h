@@ -21,6 +21,7 @@
 #include "render/base/clock.h"
 #include "render/base/digest.h"
 #include "render/estimate/accumulation.h"
+#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 #include "server/job_estimator.h"
@@ -123,6 +124,7 @@ struct Job {
   Digest scene_digest;
   RenderSettings settings;
   std::vector<std::string> warnings;
+  SceneNeeds needs;
   WallTime submitted_at;
   JobLife life;
   JobBooks books;

@@ -14,10 +14,14 @@
 namespace lucerna {
 struct JobEstimator::State {
   State(Scene s, RenderSettings r, int threads)
-      : scene(InWorkingSpace(std::move(s))), settings(r), team(threads) {}
+      : scene(InWorkingSpace(std::move(s))),
+        settings(r),
+        needs(NeedsOf(scene, settings)),
+        team(threads) {}
 
   Scene scene;
   RenderSettings settings;
+  SceneNeeds needs;
   mutable ThreadTeam team;
   std::unique_ptr<Intersector> intersector;
   std::unique_ptr<LightSet> lights;
@@ -46,7 +50,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   auto state = std::make_unique<State>(std::move(scene), settings, threads);
   LUCERNA_ASSIGN_OR_RETURN(state->intersector, Intersector::Create(state->scene));
   state->lights = std::make_unique<LightSet>(state->scene, *state->intersector);
-  state->tracer = std::make_unique<EyePathTracer>(state->scene, state->settings,
+  state->tracer = std::make_unique<EyePathTracer>(state->scene, state->settings, state->needs,
                                                   *state->intersector, *state->lights);
   state->scale = FluxScale::ForPower(state->lights->TotalPower());
   const int width = settings.crop_width();
@@ -94,6 +98,10 @@ void JobEstimator::Apply(const EyePass& pass, const RadiusColumn& radii, const P
                       features.distance);
   }
   state_->eye_rays += pass.rays;
+}
+
+const SceneNeeds& JobEstimator::needs() const {
+  return state_->needs;
 }
 
 std::int64_t JobEstimator::passes_applied() const {

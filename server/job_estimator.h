@@ -24,6 +24,7 @@
 #include "render/estimate/error_estimate.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/image/image.h"
+#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "server/hitpoint_pass.h"
@@ -54,6 +55,7 @@ class JobEstimator {
   [[nodiscard]] Image MakeImage() const;
   // `look` counts the looks at this job, from 1. Requires passes_applied() >= 2.
   [[nodiscard]] ErrorEstimate EstimateError(int look) const;
+  [[nodiscard]] const SceneNeeds& needs() const;
   // Requires passes_applied() > 0 and a reference as large as the image.
   [[nodiscard]] TrueError ErrorAgainst(const ReferenceImage& reference) const;
 

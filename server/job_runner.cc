@@ -58,7 +58,7 @@ StatusOr<JobRunner::Result> JobRunner::RunToEnd() {
     Close(open_.front());
     open_.pop_front();
   }
-  if (ahead_) surroundings_.blobs.UnpinAndDrop(ahead_->block_digest);
+  if (ahead_) ReleaseBlock(ahead_->block_digest);
   ahead_.reset();
   return result;
 }
@@ -157,9 +157,23 @@ void JobRunner::LookAtError(bool is_last) {
 StatusOr<JobRunner::TracedPass> JobRunner::Trace(std::uint64_t pass) {
   TracedPass traced;
   traced.eye = estimator_->TraceEyePaths(pass);
+  // The hitpoints of a set are those of the pass that used it last.
+  const int sets = estimator_->needs().eye_sample_sets();
+  const std::uint64_t set = EyeSetOf(pass, sets);
+  if (const auto known = set_blocks_.find(set); known != set_blocks_.end()) {
+    if (surroundings_.blobs.Pin(known->second).ok()) {
+      traced.block_digest = known->second;
+      return traced;
+    }
+  }
   std::string bytes = EncodeHitpointBlock(traced.eye.block);
   traced.block_digest = Sha256(bytes);
   LUCERNA_RETURN_IF_ERROR(surroundings_.blobs.PutPinned(traced.block_digest, std::move(bytes)));
+  if (sets > 0) {
+    // Sets of an earlier round are not used again.
+    if (set_blocks_.size() >= static_cast<std::size_t>(sets)) set_blocks_.clear();
+    set_blocks_[set] = traced.block_digest;
+  }
   return traced;
 }
 
@@ -173,7 +187,7 @@ Status JobRunner::Open(TracedPass traced) {
   open.blobs = {traced.block_digest, Sha256(bytes), traced.eye.block.size()};
   if (Status status = surroundings_.blobs.PutPinned(open.blobs.radii, std::move(bytes));
       !status.ok()) {
-    surroundings_.blobs.UnpinAndDrop(traced.block_digest);
+    ReleaseBlock(traced.block_digest);
     return status;
   }
   const std::uint64_t pass = traced.eye.pass;
@@ -221,8 +235,16 @@ void JobRunner::Close(const OpenPass& open) {
     const MutexLock lock(mutex_);
     blobs_.erase(open.traced.eye.pass);
   }
-  surroundings_.blobs.UnpinAndDrop(open.blobs.block);
+  ReleaseBlock(open.blobs.block);
   surroundings_.blobs.UnpinAndDrop(open.blobs.radii);
+}
+
+void JobRunner::ReleaseBlock(const Digest& digest) {
+  if (estimator_->needs().eye_sample_sets() > 0) {
+    surroundings_.blobs.Unpin(digest);
+  } else {
+    surroundings_.blobs.UnpinAndDrop(digest);
+  }
 }
 
 bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {

@@ -128,6 +128,8 @@ class JobRunner {
   void TakeIn(OpenPass open);
   // Ends a pass for workers and forgets what they needed for it.
   void Close(const OpenPass& open);
+  // Undoes one pin of a block, which stays for its next turn if it has one.
+  void ReleaseBlock(const Digest& digest);
   // Waits for a wake, until `until` if there is one. False when Run must end now.
   bool WaitForChange(std::optional<SteadyTime> until);
   Status why_stopped() const;
@@ -154,6 +156,7 @@ class JobRunner {
   double error_at_most_ = HUGE_VAL;  // the upper end of the last look's interval
   std::deque<OpenPass> open_;
   std::optional<TracedPass> ahead_;
+  std::map<std::uint64_t, Digest> set_blocks_;  // by set of eye paths, where they take turns
 
   mutable Mutex mutex_;
   Condition changed_;

@@ -131,6 +131,12 @@ v1::Job JobToProto(const Coordinator::Report& report) {
   for (std::size_t i = 0; i < std::min(job.warnings.size(), kMostWarnings); ++i) {
     message.add_warnings(job.warnings[i]);
   }
+  for (const Part part : AllParts()) {
+    v1::PartUse& use = *message.add_parts();
+    use.set_part(std::string(NameOf(part)));
+    use.set_is_used(job.needs.Uses(part));
+    use.set_reason(job.needs.ReasonOf(part));
+  }
   *message.mutable_progress() = ProgressToProto(report);
   *message.mutable_submitted_at() = ToProto(job.submitted_at);
   message.set_no_workers(state == JobState::kRunning && report.workers == 0);

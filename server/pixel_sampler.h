@@ -19,12 +19,14 @@ class PixelSampler {
   // Vertices beyond this use independent numbers.
   static constexpr int kStratifiedVertices = 4;
 
-  PixelSampler(std::uint64_t seed, std::uint64_t pixel, std::uint64_t pass)
+  // `eye_set`: which of the sets of eye paths the pass uses (see EyeSetOf); even where it is.
+  PixelSampler(std::uint64_t seed, std::uint64_t pixel, std::uint64_t pass, std::uint64_t eye_set)
       : key_(CombineKeys(CombineKeys(CombineKeys(seed, 0x4559455041544853ULL), pixel), pass % 2)),
-        pass_(pass / 2) {}
+        pass_(pass / 2),
+        eye_set_(eye_set / 2) {}
 
   // Film position (0, 1) and lens position (2, 3).
-  [[nodiscard]] SobolPoint ForCamera() const { return OwenSobol(pass_, key_); }
+  [[nodiscard]] SobolPoint ForCamera() const { return OwenSobol(eye_set_, key_); }
 
   // For the path's vertex number `vertex`: scattering (0 lobe, 1, 2), light (3 choice, 4, 5),
   // roulette (6), the finer part of the light's choice (7).
@@ -43,6 +45,7 @@ class PixelSampler {
  private:
   std::uint64_t key_;
   std::uint64_t pass_;
+  std::uint64_t eye_set_;
 };
 
 // Draws offsets along one axis in proportion to the absolute value of a pixel filter.

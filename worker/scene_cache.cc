@@ -11,6 +11,9 @@ namespace {
 constexpr std::size_t kTracersKept = 2;
 // Two passes may be open, and workers fetch one ahead.
 constexpr std::size_t kBlocksKept = 3;
+// More of them while they have at most so many hitpoints together: where eye paths take turns, all
+// blocks come again (see scene/needs.h). 16 bytes each.
+constexpr std::size_t kHitpointsKept = std::size_t{1} << 24;
 // What a hitpoint and its radius may need at most before compression, which cannot double it.
 constexpr std::uint64_t kBytesPerHitpoint = 80;
 constexpr std::uint64_t kHeadBytes = 4096;
@@ -57,7 +60,13 @@ StatusOr<std::shared_ptr<const HitpointBlock>> SceneCache::BlockFor(const Digest
   LUCERNA_ASSIGN_OR_RETURN(HitpointBlock decoded, DecodeHitpointBlock(bytes, max_hitpoints));
   std::shared_ptr<const HitpointBlock> block = std::make_shared<HitpointBlock>(std::move(decoded));
   blocks_.emplace_front(digest, block);
-  if (blocks_.size() > kBlocksKept) blocks_.pop_back();
+  std::size_t hitpoints = 0;
+  for (const auto& [of, kept] : blocks_)
+    hitpoints += kept->size();
+  while (blocks_.size() > kBlocksKept && hitpoints > kHitpointsKept) {
+    hitpoints -= blocks_.back().second->size();
+    blocks_.pop_back();
+  }
   return block;
 }
 

@@ -13,15 +13,15 @@ namespace {
 // Of relMSE, as in film/image_metrics.h.
 constexpr double kEpsilon = 0.01;
 
-// What the estimate's models may be off by, in the logarithm of the squared error: an eighth of the
+// What the estimate's models may be off by, in the logarithm of the squared error: a seventh of the
 // error. (Their worst on the project's scenes is a fifth, where the step of a hard shadow is
 // blurred.)
-constexpr double kModelError = 0.25;
+constexpr double kModelError = 0.3;
 
 // The share of a blurred edge's squared relative bias that smoothing loses while the kernel is a
 // few pixels wide, and that is lost because the edge's dark side is not known to be so dark; and
 // the area of correlation [pixels] from which on kernels are wide and less is lost. Measured.
-constexpr double kSmoothedAway = 0.4;
+constexpr double kSmoothedAway = 1.0 / 3;
 constexpr double kWideKernel = 9;
 // Over how many more pixels products are alike once smoothed: the weights (1 2 1)/4 both ways have
 // squares that sum to 9/64, and the mean of the two ways to smooth one product varies by 13/128.

@@ -199,6 +199,7 @@ StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const
   }
   settings.max_depth = overrides.max_depth.value_or(asked.max_depth.value_or(kDefaultDepth));
   LUCERNA_RETURN_IF_ERROR(CheckRange("--max-depth", settings.max_depth, 1, kMaxDepth));
+  settings.use_everything = overrides.use_everything.value_or(false);
   return settings;
 }
 

@@ -66,6 +66,7 @@ struct RenderOverrides {
   // What "auto" is, in widths of a pixel at the hitpoint.
   std::optional<double> initial_footprints;
   std::optional<int> max_depth;
+  std::optional<bool> use_everything;
 };
 
 struct RenderSettings {
@@ -88,6 +89,8 @@ struct RenderSettings {
   double initial_radius = 0;  // scene units; 0: auto, from each pixel's footprint
   double initial_footprints = kInitialFootprints;  // the automatic radius, in footprints
   int max_depth = 5;  // scattering events of an eye path, and of a photon path
+  // Leave nothing out that the scene does not need (see needs.h): for comparison.
+  bool use_everything = false;
 
   [[nodiscard]] int crop_width() const { return crop_x1 - crop_x0; }
   [[nodiscard]] int crop_height() const { return crop_y1 - crop_y0; }

@@ -59,6 +59,28 @@ struct Material {
   return 2 * std::sqrt(capped) / std::sqrt(1 - capped);
 }
 
+// Smooth: all scattering goes into single directions.
+[[nodiscard]] inline bool IsSmooth(const Material& material) {
+  return material.kind != Material::Kind::kDiffuse && material.alpha_u == 0 &&
+         material.alpha_v == 0;
+}
+
+// Rougher than this, photons are gathered; smoother, eye paths go on. A narrow lobe accepts few of
+// the photons around it, while a direction drawn from it is a good guess.
+inline constexpr float kGatherAlpha = 0.2F;
+// The same for dielectrics: refraction bends less than reflection, so their lobes are narrower, and
+// what is seen through frosted glass has passed two of them.
+inline constexpr float kGatherAlphaDielectric = 0.5F;
+
+// Where eye paths stop and photons are kept. Black surfaces need none. What a metal with a texture
+// reflects depends on the place, which hitpoints do not tell the workers: there, paths go on.
+[[nodiscard]] inline bool Gathers(const Material& material) {
+  if (material.kind == Material::Kind::kDiffuse) return !IsBlack(material.reflectance);
+  if (material.texture != kNoTexture) return false;
+  return std::max(material.alpha_u, material.alpha_v) >=
+         (material.kind == Material::Kind::kConductor ? kGatherAlpha : kGatherAlphaDielectric);
+}
+
 // Emission of the surface of a shape.
 struct AreaLight {
   Rgb radiance;            // [W·m⁻²·sr⁻¹], scale and power already applied

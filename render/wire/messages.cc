@@ -86,6 +86,7 @@ v1::RenderOverrides ToProto(const RenderOverrides& overrides) {
     message.set_initial_footprints(*overrides.initial_footprints);
   }
   if (overrides.max_depth) message.set_max_depth(*overrides.max_depth);
+  if (overrides.use_everything) message.set_use_everything(*overrides.use_everything);
   return message;
 }
 
@@ -97,6 +98,7 @@ StatusOr<RenderOverrides> FromProto(const v1::RenderOverrides& message) {
   if (message.has_photons_per_pass()) overrides.photons_per_pass = message.photons_per_pass();
   if (message.has_seed()) overrides.seed = message.seed();
   if (message.has_max_depth()) overrides.max_depth = message.max_depth();
+  if (message.has_use_everything()) overrides.use_everything = message.use_everything();
   if (message.has_time_s()) {
     if (!std::isfinite(message.time_s())) return Outside("time");
     overrides.time_s = message.time_s();
@@ -158,6 +160,7 @@ v1::RenderSettings ToProto(const RenderSettings& settings) {
   message.set_initial_radius(settings.initial_radius);
   message.set_initial_footprints(settings.initial_footprints);
   message.set_max_depth(settings.max_depth);
+  message.set_use_everything(settings.use_everything);
   return message;
 }
 
@@ -209,6 +212,7 @@ StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message) {
   }
   settings.max_depth = message.max_depth();
   if (!IsBetween(settings.max_depth, 1, kLargestDepth)) return Outside("depth");
+  settings.use_everything = message.use_everything();
   return settings;
 }
 

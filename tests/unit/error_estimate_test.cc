@@ -65,11 +65,11 @@ TEST(ErrorEstimateTest, FindsNoiseAndBias) {
     // 9216 pixels of a squared normal number each: 1.5 % is a standard deviation.
     EXPECT_NEAR(estimate.absolute.noise / (0.25 / passes), 1, 0.06) << passes;
     // A bias that is the same everywhere loses nothing by smoothing, but is made larger by what
-    // an edge's needs, 1/(1 - 0.4). The product of two halves of deviation 3 · 0.5/√3 ·
+    // an edge's needs, 1/(1 - 1/3). The product of two halves of deviation 3 · 0.5/√3 ·
     // √(2/passes), one of them smoothed to 3/8 of it, over 96 pixels' root.
     const double half = 1.5 / std::sqrt(3.0) * std::sqrt(2.0 / passes);
-    EXPECT_NEAR(estimate.absolute.bias, 0.01 / 0.6,
-                4 / 0.6 * (3.0 / 8 * half * half + 0.1 * half) / 96)
+    EXPECT_NEAR(estimate.absolute.bias, 1.5 * 0.01,
+                4 * 1.5 * (3.0 / 8 * half * half + 0.1 * half) / 96)
         << passes;
     EXPECT_NEAR(estimate.relative.total() / (estimate.absolute.total() / (2.1 * 2.1 + 0.01)), 1,
                 0.15)

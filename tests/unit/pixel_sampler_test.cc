@@ -78,7 +78,7 @@ TEST(PixelSamplerTest, StratifiesThePassesOfAPixel) {
   std::vector<int> light(kPasses);
   // The odd passes; the even ones are another set of points.
   for (std::uint64_t pass = 1; pass < 2 * kPasses; pass += 2) {
-    const PixelSampler sampler(1, 17, pass);
+    const PixelSampler sampler(1, 17, pass, pass);
     ++film[static_cast<std::size_t>(sampler.ForCamera()[0] * kPasses)];
     ++light[static_cast<std::size_t>(sampler.ForVertex(2)[4] * kPasses)];
   }
@@ -101,10 +101,10 @@ TEST(PixelSamplerTest, KeepsVerticesAndPixelsApart) {
     return ChiSquarePValue(observed, expected);
   };
   const auto vertex = [](int number, std::uint64_t pixel) {
-    return [=](std::uint64_t i) { return PixelSampler(1, pixel, 2 * i).ForVertex(number)[1]; };
+    return [=](std::uint64_t i) { return PixelSampler(1, pixel, 2 * i, 2 * i).ForVertex(number)[1]; };
   };
   const auto camera = [](std::uint64_t pixel) {
-    return [=](std::uint64_t i) { return PixelSampler(1, pixel, 2 * i).ForCamera()[1]; };
+    return [=](std::uint64_t i) { return PixelSampler(1, pixel, 2 * i, 2 * i).ForCamera()[1]; };
   };
   for (int a = 0; a < 6; ++a) {
     EXPECT_GT(p_value(camera(3), vertex(a, 3)), level) << a;

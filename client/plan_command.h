@@ -1,0 +1,17 @@
+// What will a job use of the machine, what is left out, and why?
+#pragma once
+
+#include <string>
+
+#include "client/render_flags.h"
+#include "client/voice.h"
+#include "render/base/status.h"
+
+namespace lucerna {
+
+// Reads the scene and prints its plan; nothing is rendered.
+// Errors: as ReadSceneOfJobs.
+[[nodiscard]] Status PrintPlan(const std::string& scene_path, const RenderFlags& flags,
+                               const Voice& voice);
+
+}  // namespace lucerna

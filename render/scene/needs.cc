@@ -1,0 +1,206 @@
+#include "render/scene/needs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "render/base/text.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::array<std::string_view, kParts> kNames = {
+    "photons",         "specular-surfaces", "glossy-hitpoints", "shading-normals", "textures",
+    "round-shapes",    "environment",       "area-lights",      "delta-lights",    "lens",
+    "fresh-eye-paths", "frequency-photons", "occluder-edges",   "curvature",       "texture-detail",
+    "sky-detail",      "glossy-window",     "motion",           "media",           "alpha-masks",
+    "instances"};
+
+// Sets of eye paths: with fewer the edges of shapes would be seen not to be smooth.
+constexpr int kEyeSampleSets = 64;
+// All sets' hitpoints together; a worker keeps 16 bytes of each, the coordinator about 8.
+constexpr std::int64_t kHitpointsOfSets = std::int64_t{1} << 24;
+
+// Bytes a pixel, measured (docs/lean.md).
+constexpr double kCoordinatorBytes = 650;
+constexpr double kWorkerBytes = 311;
+
+std::string Quoted(const Material& material) {
+  return material.name.empty() ? std::string("a material without a name")
+                               : Concat("material \"", material.name, "\"");
+}
+
+// Which materials are on some shape.
+std::vector<std::uint8_t> MaterialsInUse(const Scene& scene) {
+  std::vector<std::uint8_t> in_use(scene.materials.size());
+  for (const TriangleMesh& mesh : scene.meshes)
+    in_use[static_cast<std::size_t>(mesh.traits.material)] = 1;
+  for (const Sphere& sphere : scene.spheres)
+    in_use[static_cast<std::size_t>(sphere.traits.material)] = 1;
+  for (const Disk& disk : scene.disks)
+    in_use[static_cast<std::size_t>(disk.traits.material)] = 1;
+  return in_use;
+}
+
+// The first material in use that `is_so`; nullptr without one.
+template <typename Predicate>
+const Material* FirstMaterial(const Scene& scene, const std::vector<std::uint8_t>& in_use,
+                              Predicate is_so) {
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    if (in_use[i] != 0 && is_so(scene.materials[i])) return &scene.materials[i];
+  }
+  return nullptr;
+}
+
+bool IsBlackDiffuse(const Material& material) {
+  return material.kind == Material::Kind::kDiffuse && material.texture == kNoTexture &&
+         IsBlack(material.reflectance);
+}
+
+}  // namespace
+
+std::string_view NameOf(Part part) {
+  return kNames[static_cast<std::size_t>(part)];
+}
+
+SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
+  SceneNeeds needs;
+  const std::vector<std::uint8_t> in_use = MaterialsInUse(scene);
+
+  const Material* gathers =
+      FirstMaterial(scene, in_use, [](const Material& m) { return Gathers(m); });
+  if (gathers != nullptr) {
+    needs.Set(Part::kPhotons, true, Concat("they are gathered on ", Quoted(*gathers)));
+  } else {
+    needs.Set(Part::kPhotons, false, "no surface is rough enough for photons to be gathered on");
+  }
+
+  const Material* specular = FirstMaterial(
+      scene, in_use, [](const Material& m) { return !Gathers(m) && !IsBlackDiffuse(m); });
+  if (specular != nullptr) {
+    needs.Set(Part::kSpecular, true, Concat("paths go on at ", Quoted(*specular)));
+  } else {
+    needs.Set(Part::kSpecular, false, "every surface gathers photons or is black");
+  }
+
+  const Material* glossy = FirstMaterial(scene, in_use, [](const Material& m) {
+    return Gathers(m) && m.kind != Material::Kind::kDiffuse;
+  });
+  if (glossy != nullptr) {
+    needs.Set(Part::kGlossy, true,
+              Concat("photons are gathered on ", Quoted(*glossy), ", which is not diffuse"));
+  } else {
+    needs.Set(Part::kGlossy, false, "all hitpoints are diffuse");
+  }
+
+  std::size_t smoothed = 0;
+  for (const TriangleMesh& mesh : scene.meshes)
+    smoothed += mesh.normals.empty() ? 0 : 1;
+  if (smoothed > 0) {
+    needs.Set(Part::kShadingNormals, true,
+              Concat(smoothed, smoothed == 1 ? " mesh has" : " meshes have", " vertex normals"));
+  } else {
+    needs.Set(Part::kShadingNormals, false, "no mesh has vertex normals");
+  }
+
+  const Material* textured =
+      FirstMaterial(scene, in_use, [](const Material& m) { return m.texture != kNoTexture; });
+  if (textured != nullptr) {
+    needs.Set(Part::kTextures, true, Concat(Quoted(*textured), " has one"));
+  } else {
+    needs.Set(Part::kTextures, false, "no surface has one");
+  }
+
+  const std::size_t round = scene.spheres.size() + scene.disks.size();
+  if (round > 0) {
+    needs.Set(Part::kRoundShapes, true, Concat("spheres and disks: ", round));
+  } else {
+    needs.Set(Part::kRoundShapes, false, "everything is made of triangles");
+  }
+
+  const bool has_sky = !scene.infinite_lights.empty();
+  needs.Set(Part::kEnvironment, has_sky,
+            has_sky ? Concat("infinite lights: ", scene.infinite_lights.size())
+                    : std::string("there is no infinite light"));
+  const bool has_area = !scene.area_lights.empty();
+  needs.Set(Part::kAreaLights, has_area,
+            has_area ? Concat("shapes that emit, of kinds: ", scene.area_lights.size())
+                     : std::string("no shape emits"));
+  const std::size_t delta =
+      scene.point_lights.size() + scene.spot_lights.size() + scene.distant_lights.size();
+  needs.Set(Part::kDeltaLights, delta > 0,
+            delta > 0 ? Concat("points, spots and distant lights: ", delta)
+                      : std::string("every light has an extent"));
+
+  const bool has_lens = scene.camera.lens_radius > 0;
+  needs.Set(Part::kLens, has_lens, has_lens ? "the camera has a lens" : "the camera is a pinhole");
+
+  const std::int64_t pixels =
+      std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()};
+  if (settings.use_everything) {
+    needs.Set(Part::kFreshEyePaths, true, "everything is forced on");
+  } else if (has_lens) {
+    needs.Set(Part::kFreshEyePaths, true, "the camera has a lens");
+  } else if (specular != nullptr) {
+    needs.Set(Part::kFreshEyePaths, true,
+              Concat("eye paths choose at random at ", Quoted(*specular)));
+  } else if (pixels * kEyeSampleSets > kHitpointsOfSets) {
+    needs.Set(Part::kFreshEyePaths, true,
+              Concat(kEyeSampleSets, " sets of ", pixels, " hitpoints are more than workers keep"));
+  } else {
+    needs.Set(Part::kFreshEyePaths, false,
+              Concat("nothing on an eye path is random but its place in the pixel: ",
+                     kEyeSampleSets, " sets of eye paths take turns"));
+    needs.eye_sample_sets_ = kEyeSampleSets;
+  }
+
+  const bool frequency = UsesFrequency(settings.radius_controller);
+  const std::string controller = Concat("radius controller ", NameOf(settings.radius_controller));
+  needs.Set(Part::kFrequency, frequency,
+            Concat(controller, frequency ? " asks for them" : " needs none"));
+  const auto set_frequency_part = [&](Part part, bool is_used, std::string_view why,
+                                      std::string_view why_not) {
+    needs.Set(part, frequency && is_used,
+              std::string(!frequency ? std::string_view("there are no frequency photons")
+                                     : (is_used ? why : why_not)));
+  };
+  const std::size_t shapes = scene.meshes.size() + round;
+  set_frequency_part(Part::kOccluderEdges, shapes > 1 || scene.TriangleCount() > 1,
+                     "shapes cast shadows on each other", "a single face shadows nothing");
+  set_frequency_part(Part::kCurvature, smoothed > 0 || !scene.spheres.empty(),
+                     "there are curved surfaces", "every surface is flat");
+  set_frequency_part(Part::kTextureDetail, textured != nullptr, "surfaces have textures",
+                     "no surface has a texture");
+  const bool has_map = std::ranges::any_of(scene.infinite_lights,
+                                           [](const auto& light) { return light.map != nullptr; });
+  set_frequency_part(Part::kSkyDetail, has_map, "an environment map lights the scene",
+                     "no environment map lights the scene");
+  set_frequency_part(Part::kGlossyWindow, glossy != nullptr, "there are glossy hitpoints",
+                     "all hitpoints are diffuse");
+
+  needs.Set(Part::kMotion, false, "scenes that move are not read");
+  needs.Set(Part::kMedia, false, "media are not read");
+  needs.Set(Part::kAlphaMasks, false, "alpha masks are not read");
+  needs.Set(Part::kInstances, false,
+            "instances are written out as shapes of their own: one level of acceleration");
+  return needs;
+}
+
+ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& settings) {
+  const auto pixels = static_cast<double>(settings.crop_width()) * settings.crop_height();
+  // Bytes a hitpoint, compressed.
+  constexpr double kBlock = 6.5;
+  constexpr double kGlossyBlock = 14;
+  constexpr double kRadius = 2;
+  ExpectedCost cost;
+  const double block = needs.Uses(Part::kGlossy) ? kGlossyBlock : kBlock;
+  const double sets = needs.eye_sample_sets();
+  cost.coordinator_bytes = pixels * (kCoordinatorBytes + sets * block);
+  cost.worker_bytes = pixels * (kWorkerBytes + sets * 16);
+  cost.first_pass_bytes_sent = pixels * (block + kRadius);
+  cost.pass_bytes_sent = sets > 0 ? pixels * kRadius : cost.first_pass_bytes_sent;
+  if (!needs.Uses(Part::kPhotons)) cost = {.coordinator_bytes = pixels * kCoordinatorBytes};
+  return cost;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,105 @@
+// What of the machine does this job use, and why?
+//
+// Derived once from the scene and the settings; everything downstream asks it. A part that is not
+// used costs nothing: no memory, no bytes on the wire, no branch in a loop over photons. With
+// `use_everything` all parts that can be forced are used, for comparison: the image is the same
+// within its noise, and to the bit where the arithmetic is the same.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "render/scene/render_settings.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+enum class Part : std::uint8_t {
+  kPhotons,         // photon passes at all
+  kSpecular,        // eye and photon paths through smooth and nearly smooth surfaces
+  kGlossy,          // BSDF columns of hitpoints, arrival directions of photons
+  kShadingNormals,  // vertex normals, and the horizon they bend
+  kTextures,        // look-ups of materials
+  kRoundShapes,     // spheres and disks beside triangles
+  kEnvironment,     // sampling of the sky
+  kAreaLights,      // emission of shapes, and scattered rays that look for it
+  kDeltaLights,     // points, spots, parallel light
+  kLens,            // depth of field
+  kFreshEyePaths,   // new eye paths in every pass, in place of a cycle of sample sets
+  kFrequency,       // frequency photons
+  kOccluderEdges,   // edges that photons pass, for their shadows' borders
+  kCurvature,       // second-order states at curved mirrors and glass
+  kTextureDetail,   // the spectrum of textures
+  kSkyDetail,       // the spectrum of environment maps
+  kGlossyWindow,    // what a glossy lobe hides of the spectrum
+  kMotion,
+  kMedia,
+  kAlphaMasks,
+  kInstances,  // a second level of the acceleration structure
+};
+inline constexpr std::size_t kParts = static_cast<std::size_t>(Part::kInstances) + 1;
+
+[[nodiscard]] constexpr std::array<Part, kParts> AllParts() {
+  std::array<Part, kParts> parts{};
+  for (std::size_t i = 0; i < kParts; ++i)
+    parts[i] = static_cast<Part>(i);
+  return parts;
+}
+
+// As users are told: "shading-normals".
+[[nodiscard]] std::string_view NameOf(Part part);
+
+class SceneNeeds {
+ public:
+  [[nodiscard]] bool Uses(Part part) const { return entries_[Index(part)].is_used; }
+  // A sentence: why it is used, or why not.
+  [[nodiscard]] const std::string& ReasonOf(Part part) const {
+    return entries_[Index(part)].reason;
+  }
+
+  // How many sets of eye paths there are, used in turn; 0: each pass has its own.
+  [[nodiscard]] int eye_sample_sets() const { return eye_sample_sets_; }
+
+  bool operator==(const SceneNeeds&) const = default;
+
+ private:
+  friend SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings);
+  struct Entry {
+    bool is_used = false;
+    std::string reason;
+    bool operator==(const Entry&) const = default;
+  };
+  static constexpr std::size_t Index(Part part) { return static_cast<std::size_t>(part); }
+  void Set(Part part, bool is_used, std::string reason) {
+    entries_[Index(part)] = {is_used, std::move(reason)};
+  }
+
+  std::array<Entry, kParts> entries_;
+  int eye_sample_sets_ = 0;
+};
+
+[[nodiscard]] SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings);
+
+// How many passes use the same sets before new ones are drawn. With fewer the sets would hardly be
+// worth keeping; without new ones the edges of shapes would never get smoother.
+inline constexpr std::uint64_t kRoundsOfSets = 16;
+
+// Which set of eye paths a pass uses, of all there will ever be.
+[[nodiscard]] constexpr std::uint64_t EyeSetOf(std::uint64_t pass, int sets) {
+  if (sets == 0) return pass;
+  const auto n = static_cast<std::uint64_t>(sets);
+  return pass / (n * kRoundsOfSets) * n + pass % n;
+}
+
+// What a job will take, roughly: from measured figures (docs/lean.md).
+struct ExpectedCost {
+  double coordinator_bytes = 0, worker_bytes = 0;  // memory, beside the scene itself
+  double first_pass_bytes_sent = 0;                // to each worker, while eye paths are new
+  double pass_bytes_sent = 0;                      // to each worker, later
+};
+[[nodiscard]] ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& settings);
+
+}  // namespace lucerna
