@@ -9,6 +9,7 @@
 
 #include "client/comparison.h"
 #include "proto/lucerna/v1/jobs.pb.h"
+#include "proto/lucerna/v1/photons.pb.h"
 #include "render/base/digest.h"
 #include "render/film/image_metrics.h"
 #include "render/scene/pbrt_parser.h"
@@ -39,6 +40,7 @@ struct SavedImage {
                                            const std::vector<ComparedRun>& runs);
 // Of an image that MakeReference made.
 [[nodiscard]] std::string ReferenceReport(const Image& reference, const std::string& path);
+[[nodiscard]] std::string PhotonReport(const v1::PhotonPath& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
 
 }  // namespace lucerna
