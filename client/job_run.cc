@@ -8,6 +8,7 @@
 
 #include "client/exit_code.h"
 #include "client/live_view.h"
+#include "client/photon_view.h"
 #include "client/preview_source.h"
 #include "client/progress_view.h"
 #include "client/scene_reading.h"
@@ -96,6 +97,10 @@ StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& j
     return check();
   });
   if (progress) progress->Finish();
+  if (job.ok() && !voice.quiet) {
+    const std::string dropped = DroppedLine(*job);
+    if (!dropped.empty()) std::fprintf(stderr, "lucerna: warning: %s\n", dropped.c_str());
+  }
   return job;
 }
 

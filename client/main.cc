@@ -14,6 +14,7 @@
 #include "client/interruption.h"
 #include "client/job_commands.h"
 #include "client/local_cluster.h"
+#include "client/photon_command.h"
 #include "client/plan_command.h"
 #include "client/preview.h"
 #include "client/reference_command.h"
@@ -39,6 +40,7 @@ int Run(int argc, char** argv) {
   OutputPaths fetched;
   ReportPaths report_paths;
   RenderFlags until;
+  PhotonRequest photon;
   RenderFlags planned;
   std::string server = "127.0.0.1:7400";
   std::string job_id;
@@ -140,6 +142,21 @@ int Run(int argc, char** argv) {
     add_json(about_job);
     add_quiet(about_job);
   }
+
+  CLI::App* trace_photon =
+      command("trace-photon", "trace one photon of a job again and show its way", [&]() -> Status {
+        LUCERNA_RETURN_IF_ERROR(find_programs());
+        photon.job_id = job_id;
+        photon.program_folder = cluster.program_folder;
+        return TracePhoton(photon, server, voice);
+      });
+  trace_photon->add_option("JOB", job_id, "the job's id; it may have ended")->required();
+  trace_photon->add_option("PHOTON", photon.photon, "PASS:INDEX, both from 0, or INDEX")
+      ->required();
+  trace_photon->add_option("--pass", photon.pass,
+                           "the pass, where PHOTON is an INDEX (default: 0)");
+  add_server(trace_photon);
+  add_json(trace_photon);
 
   CLI::App* stop = command("stop", "end a job and keep its image",
                            [&] { return StopJob(job_id, server, voice); });

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "client/convergence.h"
+#include "client/photon_view.h"
 #include "client/progress_view.h"
 #include "render/wire/messages.h"
 
@@ -53,6 +54,21 @@ Json SettingsOf(const v1::RenderSettings& settings) {
   };
 }
 
+// As shares of what was emitted. `balance` is what the books are off by, in their smallest unit.
+Json EnergyOf(const v1::Energy& energy) {
+  const auto share = [&](std::int64_t part) {
+    return static_cast<double>(part) / static_cast<double>(energy.emitted());
+  };
+  return {{"absorbed", share(energy.absorbed())},
+          {"escaped", share(energy.escaped())},
+          {"roulette_took", share(energy.roulette_took())},
+          {"roulette_gave", share(energy.roulette_gave())},
+          {"smoothing", share(energy.smoothing())},
+          {"cut_off", share(energy.cut_off())},
+          {"dropped", share(energy.dropped())},
+          {"balance", EnergyImbalance(energy)}};
+}
+
 Json JobOf(const v1::Job& job) {
   const v1::Progress& progress = job.progress();
   Json json = {{"job_id", job.job_id()}, {"name", job.name()}, {"state", NameOf(job.state())}};
@@ -72,11 +88,12 @@ Json JobOf(const v1::Job& job) {
   json["worker_cpu_s"] = Seconds(FromProto(progress.worker_cpu()));
   json["photons_per_second"] = progress.photons_per_second();
   json["workers"] = progress.workers();
-  json["tally"] = {{"photons", progress.tally().photons()},
-                   {"rays", progress.tally().rays()},
-                   {"deposits", progress.tally().deposits()},
-                   {"pairs", progress.tally().pairs()},
-                   {"dropped", progress.tally().dropped()}};
+  json["tally"] = {
+      {"photons", progress.tally().photons()},   {"rays", progress.tally().rays()},
+      {"deposits", progress.tally().deposits()}, {"pairs", progress.tally().pairs()},
+      {"dropped", progress.tally().dropped()},   {"excess", progress.tally().excess()}};
+  if (progress.tally().energy().emitted() != 0)
+    json["energy"] = EnergyOf(progress.tally().energy());
   json["sent_bytes"] = progress.bytes_sent();
   json["received_bytes"] = progress.bytes_received();
   json["hitpoints_sent"] = progress.hitpoints_sent();
@@ -90,6 +107,44 @@ Json JobOf(const v1::Job& job) {
   for (const v1::PartUse& use : job.parts()) {
     json["parts"].push_back(
         {{"part", use.part()}, {"is_used", use.is_used()}, {"reason", use.reason()}});
+  }
+  if (job.dropped_photons_size() > 0) json["dropped_photons"] = Json::array();
+  for (const v1::PhotonKey& key : job.dropped_photons())
+    json["dropped_photons"].push_back({{"pass", key.pass()}, {"index", key.index()}});
+  return json;
+}
+
+Json TripleOf(const v1::Triple& triple) {
+  return {triple.x(), triple.y(), triple.z()};
+}
+
+std::string WordOf(v1::PhotonEnd end) {
+  return v1::PhotonEnd_Name(end).substr(std::string("PHOTON_END_").size());
+}
+std::string WordOf(v1::DepositFate fate) {
+  return v1::DepositFate_Name(fate).substr(std::string("DEPOSIT_FATE_").size());
+}
+
+Json LandingOf(const v1::PhotonPath::Landing& landing) {
+  Json json = {{"shape", landing.shape()},
+               {"material", landing.material()},
+               {"distance", landing.distance()},
+               {"position", TripleOf(landing.position())},
+               {"geometric_normal", TripleOf(landing.geometric_normal())},
+               {"shading_normal", TripleOf(landing.shading_normal())},
+               {"flux_arriving_w", TripleOf(landing.flux_arriving())}};
+  if (landing.has_flux_landed()) {
+    json["flux_landed_w"] = TripleOf(landing.flux_landed());
+    json["deposit"] = WordOf(landing.deposit());
+  }
+  if (landing.has_scattering()) {
+    const v1::PhotonPath::Landing::Scattering& scattering = landing.scattering();
+    json["scattering"] = {{"chosen", scattering.chosen()},
+                          {"direction", TripleOf(scattering.direction())},
+                          {"flux_w", TripleOf(scattering.flux())},
+                          {"survival", scattering.survival()},
+                          {"survived", scattering.survived()},
+                          {"flux_leaving_w", TripleOf(scattering.flux_leaving())}};
   }
   return json;
 }
@@ -347,6 +402,21 @@ std::string ReferenceReport(const Image& reference, const std::string& path) {
                  {"width", reference.width},
                  {"height", reference.height},
                  {"metadata", reference.metadata}});
+}
+
+std::string PhotonReport(const v1::PhotonPath& path) {
+  Json json = {{"pass", path.key().pass()}, {"index", path.key().index()}};
+  if (path.has_emission()) {
+    json["emission"] = {{"light", path.emission().light()},
+                        {"position", TripleOf(path.emission().position())},
+                        {"direction", TripleOf(path.emission().direction())},
+                        {"flux_w", TripleOf(path.emission().flux())}};
+  }
+  json["landings"] = Json::array();
+  for (const v1::PhotonPath::Landing& landing : path.landings())
+    json["landings"].push_back(LandingOf(landing));
+  json["end"] = WordOf(path.end());
+  return ToText(json);
 }
 
 std::string DigestReport(const Image& image) {

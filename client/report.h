@@ -9,6 +9,7 @@
 
 #include "client/comparison.h"
 #include "proto/lucerna/v1/jobs.pb.h"
+#include "proto/lucerna/v1/photons.pb.h"
 #include "render/base/digest.h"
 #include "render/film/image_metrics.h"
 #include "render/scene/needs.h"
@@ -40,6 +41,7 @@ struct SavedImage {
                                            const std::vector<ComparedRun>& runs);
 // Of an image that MakeReference made.
 [[nodiscard]] std::string ReferenceReport(const Image& reference, const std::string& path);
+[[nodiscard]] std::string PhotonReport(const v1::PhotonPath& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
 [[nodiscard]] std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost);
 

@@ -11,6 +11,7 @@
 
 #include "client/chart.h"
 #include "client/convergence.h"
+#include "client/photon_view.h"
 #include "client/progress_view.h"
 #include "render/base/text.h"
 #include "render/wire/messages.h"
@@ -152,6 +153,9 @@ std::string RunFacts(const v1::Job& job) {
     facts.Add("To the first photons", ShortTime(FromProto(progress.to_first_photons())));
   }
   if (job.worker_shares_size() > 0) facts.Add("Workers", Concat(job.worker_shares_size()));
+  if (const std::string energy = EnergyInWords(progress.tally().energy()); !energy.empty()) {
+    facts.Add("Energy", energy);
+  }
   return facts.Html();
 }
 
@@ -272,7 +276,8 @@ std::string Convergence(const v1::Job& job) {
                   ErrorChart(job, ErrorAgainst::kPhotons), "</div>\n");
   html +=
       "<p class=\"muted\">The relative error is the root of relMSE, the mean of error² / (value² + "
-      "0.01) over pixels and channels, without the worst 0.1 % of pixels. Squared, noise and bias add up to it.";
+      "0.01) over pixels and channels, without the worst 0.1 % of pixels. Squared, noise and bias "
+      "add up to it.";
   if (job.has_reference()) {
     html += " The true error is that against the job's reference image.";
   }
@@ -367,8 +372,10 @@ std::string Workers(const v1::Job& job) {
 }
 
 std::string Warnings(const v1::Job& job) {
-  if (job.warnings().empty()) return {};
+  const std::string dropped = DroppedLine(job);
+  if (job.warnings().empty() && dropped.empty()) return {};
   std::string html = "<section>\n<h2>Warnings</h2>\n<ul class=\"warnings\">\n";
+  if (!dropped.empty()) absl::StrAppend(&html, "<li>", EscapeMarkup(dropped), "</li>\n");
   for (const std::string& warning : job.warnings())
     absl::StrAppend(&html, "<li>", EscapeMarkup(warning), "</li>\n");
   return html + "</ul>\n</section>\n";

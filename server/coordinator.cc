@@ -711,7 +711,8 @@ StatusOr<PassMerger::Outcome> Coordinator::Commit(const Delivery& delivery,
       if (!books.to_first_photons) books.to_first_photons = now - entry->job.life.submitted_at();
       books.photons += accumulation.tally.photons;
       books.tally += accumulation.tally;
-      books.worker_cpu += delivery.cpu;
+      books.NameDropped(delivery.pass.pass, accumulation.dropped_photons);
+      books.worker_cpu = SaturatingSum(books.worker_cpu, delivery.cpu);
       books.bytes_received += delivery.size_bytes;
       books.hitpoints_returned += accumulation.size();
       books.rate.Add(accumulation.tally.photons, now);
@@ -719,13 +720,27 @@ StatusOr<PassMerger::Outcome> Coordinator::Commit(const Delivery& delivery,
       if (share.name.empty()) share.name = scheduler_.NameOf(delivery.worker);
       share.photons += accumulation.tally.photons;
       share.batches += 1;
-      share.cpu += delivery.cpu;
+      share.cpu = SaturatingSum(share.cpu, delivery.cpu);
       ++entry->version;
       runner = entry->runner;
+      const BatchTally& tally = accumulation.tally;
+      if (tally.dropped > 0 || tally.excess > 0) {
+        spdlog::warn(
+            "job {}, pass {}: {} photons that were not finite and {} contributions that were too "
+            "bright are left out",
+            entry->job.id, delivery.pass.pass, tally.dropped, tally.excess);
+      }
     }
   }
   if (runner) runner->Wake();
   return outcome;
+}
+
+StatusOr<Coordinator::Description> Coordinator::Describe(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto entry = Find(job_id);
+  if (!entry) return UnknownJob(job_id);
+  return Description{entry->job.manifest, entry->job.settings, options_.numeric_profile};
 }
 
 void Coordinator::Goodbye(const std::string& worker) {

@@ -140,6 +140,15 @@ class Coordinator {
   [[nodiscard]] StatusOr<PassMerger::Outcome> Commit(const Delivery& delivery,
                                                      const Accumulation& accumulation);
 
+  // What a program must know to trace a job's photons again.
+  struct Description {
+    SceneManifest scene;
+    RenderSettings settings;
+    std::string numeric_profile;
+  };
+  // Errors: NOT_FOUND.
+  [[nodiscard]] StatusOr<Description> Describe(const std::string& job_id) const;
+
   void Goodbye(const std::string& worker);
 
   // Time ---------------------------------------------------------------------------------------

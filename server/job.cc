@@ -67,6 +67,14 @@ Duration JobLife::Running(SteadyTime now) const {
   return ran_before_ + (ended_at_ ? *ended_at_ : now) - *started_at_;
 }
 
+void JobBooks::NameDropped(std::uint64_t pass, const std::vector<std::uint64_t>& indices) {
+  for (const std::uint64_t index : indices) {
+    const PhotonKey key = {pass, index};
+    dropped_photons.insert(std::ranges::upper_bound(dropped_photons, key), key);
+    if (dropped_photons.size() > kDroppedNamed) dropped_photons.pop_back();
+  }
+}
+
 void SlidingRate::Add(std::uint64_t events, SteadyTime now) {
   events_.emplace_back(now, events);
   while (events_.front().first + window_ < now)

@@ -10,6 +10,7 @@
 // An ended job otherwise never changes again. Pure values: moments come in as arguments.
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -86,6 +87,13 @@ class SlidingRate {
   std::deque<std::pair<SteadyTime, std::uint64_t>> events_;
 };
 
+// What names one photon of a job.
+struct PhotonKey {
+  std::uint64_t pass = 0;
+  std::uint64_t index = 0;
+  auto operator<=>(const PhotonKey&) const = default;
+};
+
 // What a job has cost and brought.
 struct JobBooks {
   std::int64_t passes = 0;                   // merged into the image
@@ -94,9 +102,14 @@ struct JobBooks {
   Duration coordinator_cpu{};
   Duration worker_cpu{};
   BatchTally tally;
+  // The first of the photons that were dropped, in order, at most kDroppedNamed.
+  std::vector<PhotonKey> dropped_photons;
   std::uint64_t bytes_sent = 0, bytes_received = 0;          // blocks and radii; accumulations
   std::uint64_t hitpoints_sent = 0, hitpoints_returned = 0;  // rows in them
   SlidingRate rate{std::chrono::seconds(5)};
+
+  // Takes in which photons of `pass` a batch has dropped, in any order of batches.
+  void NameDropped(std::uint64_t pass, const std::vector<std::uint64_t>& indices);
 };
 
 // What was known of a job's error at one moment.
@@ -128,10 +141,10 @@ struct Job {
   WallTime submitted_at;
   JobLife life;
   JobBooks books;
-  std::optional<Digest> reference;          // of an EXR image
+  std::optional<Digest> reference;  // of an EXR image
   std::vector<ErrorSample> convergence;
   std::map<std::string, WorkerShare> workers;  // by id
-  int most_workers = 0;  // connected at one time while it ran
+  int most_workers = 0;                        // connected at one time while it ran
 };
 
 // All settings that decide the pixels, as one line that is the same whenever they are. Passes are

@@ -144,6 +144,11 @@ v1::Job JobToProto(const Coordinator::Report& report) {
     *message.add_convergence() = SampleToProto(sample);
   AddShares(job.workers, message);
   message.set_has_reference(job.reference.has_value());
+  for (const PhotonKey& key : job.books.dropped_photons) {
+    v1::PhotonKey& item = *message.add_dropped_photons();
+    item.set_pass(key.pass);
+    item.set_index(key.index);
+  }
   return message;
 }
 

@@ -1,9 +1,33 @@
 #include "server/pass_merger.h"
 
+#include <algorithm>
 #include <iterator>
 #include <utility>
 
 namespace lucerna {
+namespace {
+
+// Whoever is told to replay a photon must find it.
+Status CheckDropped(PhotonRange range, const Accumulation& accumulation) {
+  const std::vector<std::uint64_t>& named = accumulation.dropped_photons;
+  std::uint64_t least = range.first;
+  for (const std::uint64_t index : named) {
+    if (index < least || index >= range.last) {
+      return absl::InvalidArgumentError(absl::StrCat("a batch of photons ", range.first, " to ",
+                                                     range.last, " names dropped photon ", index,
+                                                     " out of order or out of range"));
+    }
+    least = index + 1;
+  }
+  const std::uint64_t all = accumulation.tally.dropped;
+  if (all > range.size() || named.size() != std::min<std::uint64_t>(all, kDroppedNamed)) {
+    return absl::InvalidArgumentError(absl::StrCat("a batch of ", range.size(), " photons dropped ",
+                                                   all, " and names ", named.size(), " of them"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
 
 void PassMerger::Open(const PassKey& key, std::size_t hitpoints, std::uint64_t photons,
                       std::size_t evidence_columns) {
@@ -38,6 +62,7 @@ StatusOr<PassMerger::Outcome> PassMerger::Merge(const PassKey& key, PhotonRange 
     return absl::InvalidArgumentError(absl::StrCat(
         "a batch of ", range.size(), " photons has a tally of ", accumulation.tally.photons));
   }
+  LUCERNA_RETURN_IF_ERROR(CheckDropped(range, accumulation));
   const MutexLock lock(pass->mutex);
   const auto next = pass->merged.lower_bound(range.first);
   if (next != pass->merged.end() && next->first == range.first && next->second == range.last) {

@@ -190,6 +190,20 @@ grpc::ServerReadReactor<v1::CommitBatchRequest>* WorkerService::CommitBatch(
   return new CommitReactor(coordinator_, response);
 }
 
+grpc::ServerUnaryReactor* WorkerService::DescribeJob(grpc::CallbackServerContext* context,
+                                                     const v1::DescribeJobRequest* request,
+                                                     v1::JobDescription* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const StatusOr<Coordinator::Description> job = coordinator_.Describe(request->job_id());
+  if (job.ok()) {
+    *response->mutable_scene() = ToProto(job->scene);
+    *response->mutable_settings() = ToProto(job->settings);
+    response->set_numeric_profile(job->numeric_profile);
+  }
+  reactor->Finish(ToGrpc(job.status()));
+  return reactor;
+}
+
 grpc::ServerUnaryReactor* WorkerService::Goodbye(grpc::CallbackServerContext* context,
                                                  const v1::GoodbyeRequest* request,
                                                  v1::GoodbyeResponse* /*response*/) {

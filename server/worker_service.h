@@ -30,6 +30,9 @@ class WorkerService final : public v1::WorkerService::CallbackService {
                                                  const v1::FetchBlobRequest* request) override;
   grpc::ServerReadReactor<v1::CommitBatchRequest>* CommitBatch(
       grpc::CallbackServerContext* context, v1::CommitBatchResponse* response) override;
+  grpc::ServerUnaryReactor* DescribeJob(grpc::CallbackServerContext* context,
+                                        const v1::DescribeJobRequest* request,
+                                        v1::JobDescription* response) override;
   grpc::ServerUnaryReactor* Goodbye(grpc::CallbackServerContext* context,
                                     const v1::GoodbyeRequest* request,
                                     v1::GoodbyeResponse* response) override;

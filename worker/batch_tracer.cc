@@ -63,9 +63,23 @@ float CellWidth(RadiusColumn radii) {
   return 2 * *middle;
 }
 
-// The sum of both, row by row. Errors: OUT_OF_RANGE when a count does not fit.
+// `fits` becomes false when the sum would wrap.
+std::int64_t SumOf(std::int64_t a, std::int64_t b, bool& fits) {
+  std::int64_t sum = 0;
+  if (__builtin_add_overflow(a, b, &sum)) fits = false;
+  return sum;
+}
+
+// The sum of both, row by row. Errors: OUT_OF_RANGE when a sum does not fit.
 StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) {
+  if (!sum.tally.Fits(more.tally)) {
+    return absl::OutOfRangeError("the tally of a batch would not fit in 64 bits");
+  }
   Accumulation out;
+  out.dropped_photons = sum.dropped_photons;
+  for (const std::uint64_t index : more.dropped_photons) {
+    if (out.dropped_photons.size() < kDroppedNamed) out.dropped_photons.push_back(index);
+  }
   out.tally = sum.tally;
   out.tally += more.tally;
   out.evidence.resize(sum.evidence.size());
@@ -88,17 +102,30 @@ StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) 
       return absl::OutOfRangeError("a hitpoint has more photons than a batch can count");
     }
     out.counts.push_back(static_cast<std::uint32_t>(count));
+    bool fits = true;
     for (std::size_t c = 0; c < 3; ++c) {
-      out.flux[c].push_back((from_a ? sum.flux[c][a] : 0) + (from_b ? more.flux[c][b] : 0));
+      out.flux[c].push_back(SumOf(from_a ? sum.flux[c][a] : 0, from_b ? more.flux[c][b] : 0, fits));
     }
     for (std::size_t c = 0; c < out.evidence.size(); ++c) {
-      out.evidence[c].push_back((from_a ? sum.evidence[c][a] : 0) +
-                                (from_b ? more.evidence[c][b] : 0));
+      out.evidence[c].push_back(
+          SumOf(from_a ? sum.evidence[c][a] : 0, from_b ? more.evidence[c][b] : 0, fits));
     }
+    if (!fits) return absl::OutOfRangeError("the sums of a batch would not fit in 64 bits");
     a += from_a ? 1 : 0;
     b += from_b ? 1 : 0;
   }
   return out;
+}
+
+// A photon path that leaves as many deposits as its greatest depth leaves few for others.
+Status CheckDeposits(const std::vector<BatchTally>& tallies) {
+  std::uint64_t deposits = 0;
+  for (const BatchTally& tally : tallies)
+    deposits += tally.deposits;
+  if (deposits <= kMostTerms) return absl::OkStatus();
+  return absl::OutOfRangeError(absl::StrCat("a batch has ", deposits, " deposits, more than the ",
+                                            kMostTerms,
+                                            " that sums have room for; give a lower maxdepth"));
 }
 
 }  // namespace
@@ -157,6 +184,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
     std::vector<std::vector<Deposit>> deposits(chunks);
     std::vector<std::vector<float>> traces(spectra == nullptr ? 0 : chunks);
     std::vector<BatchTally> tallies(chunks);
+    std::vector<std::vector<std::uint64_t>> dropped(chunks);
     state_->team.For(chunks, 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t chunk = begin; chunk < end && !stop.load(std::memory_order_relaxed);
            ++chunk) {
@@ -171,17 +199,27 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
         tallies[chunk].rays = landed.rays;
         tallies[chunk].dropped = landed.dropped;
         tallies[chunk].deposits = landed.deposits.size();
+        tallies[chunk].excess = landed.excess;
+        tallies[chunk].energy = landed.energy;
+        dropped[chunk] = std::move(landed.dropped_photons);
         deposits[chunk] = std::move(landed.deposits);
         if (spectra != nullptr) traces[chunk] = std::move(landed.traces);
       }
     });
     if (stop) return absl::CancelledError("the batch was given up");
+    LUCERNA_RETURN_IF_ERROR(CheckDeposits(tallies));
     const PhotonGrid grid(deposits, traces, region, cell, state_->team);
     Accumulation accumulation =
         Gather(block, radii, grid, state_->scene.materials, Kernel{settings.kernel}, state_->scale,
                state_->team, stop, evidence);
     for (const BatchTally& tally : tallies)
       accumulation.tally += tally;
+    for (const std::vector<std::uint64_t>& named : dropped) {
+      for (const std::uint64_t index : named) {
+        if (accumulation.dropped_photons.size() == kDroppedNamed) break;
+        accumulation.dropped_photons.push_back(index);
+      }
+    }
     if (part == first) {
       sum = std::move(accumulation);
     } else {

@@ -62,6 +62,15 @@ StatusOr<v1::SyncResponse> Connection::Sync(const v1::SyncRequest& request, Dura
   return response;
 }
 
+StatusOr<v1::JobDescription> Connection::DescribeJob(const std::string& job_id) {
+  Call call(*this, kCallTime);
+  v1::DescribeJobRequest request;
+  request.set_job_id(job_id);
+  v1::JobDescription response;
+  LUCERNA_RETURN_IF_ERROR(FromGrpc(stub_->DescribeJob(call.context(), request, &response)));
+  return response;
+}
+
 StatusOr<std::string> Connection::Fetch(const Digest& digest, std::uint64_t max_bytes) {
   Call call(*this, kTransferTime);
   v1::FetchBlobRequest request;

@@ -49,6 +49,7 @@ class Connection {
   // when the coordinator is gone or the call was broken off.
   [[nodiscard]] StatusOr<v1::RegisterResponse> Register(const v1::RegisterRequest& request);
   [[nodiscard]] StatusOr<v1::SyncResponse> Sync(const v1::SyncRequest& request, Duration wait);
+  [[nodiscard]] StatusOr<v1::JobDescription> DescribeJob(const std::string& job_id);
   // Errors: also DATA_LOSS when the bytes do not have that digest.
   [[nodiscard]] StatusOr<std::string> Fetch(const Digest& digest, std::uint64_t max_bytes);
   [[nodiscard]] StatusOr<v1::CommitOutcome> Commit(v1::CommitBatchRequest::Header header,

@@ -32,6 +32,7 @@ struct Piece {
   std::array<std::vector<std::int64_t>, 3> flux;
   std::vector<std::vector<std::int64_t>> evidence;
   std::uint64_t pairs = 0;
+  std::uint64_t excess = 0;
 };
 
 // 64 random bits that belong to a (photon, hitpoint) pair.
@@ -42,8 +43,8 @@ std::uint64_t PairBits(std::uint32_t photon_key, std::uint32_t hitpoint) {
   return x ^ (x >> 32);
 }
 
-// What a photon that counts adds to the columns that its radius controller asks for, one class for each kind: chosen once
-// per batch, so that a job pays for no other kind than its own.
+// What a photon that counts adds to the columns that its radius controller asks for, one class for
+// each kind: chosen once per batch, so that a job pays for no other kind than its own.
 
 struct NoEvidence {
   static constexpr std::size_t kColumns = 0;
@@ -114,6 +115,7 @@ struct CurvatureEvidence {
 // Sums over the frequency photons (see FrequencyColumn).
 struct FrequencyEvidence {
   static constexpr std::size_t kColumns = kFrequencyColumns;
+  static constexpr std::int64_t kMostTrace2 = std::int64_t{1} << 62;
   static constexpr float kReach = 1;
   FrequencyEvidence(Vec3 /*normal*/, const FluxScale& scale) : weight_scale(WeightScale(scale)) {}
   void Add(const PhotonGrid& grid, std::size_t photon, Vec3 /*to_photon*/, float /*squared*/,
@@ -128,7 +130,10 @@ struct FrequencyEvidence {
     sums[kFrequencyWeight] += std::llrint(w * kUnits);
     sums[kFrequencyWeight2] += std::llrint(w * w * kUnits);
     sums[kFrequencyTrace] += std::llrint(w * x * kUnits);
-    sums[kFrequencyTrace2] += std::llrint(w * x * x * kUnits);
+    // A term has up to 48 bits, so that here alone kMostTerms of them might not fit: the sum, which
+    // never falls, stays at kMostTrace2.
+    sums[kFrequencyTrace2] = std::min<std::int64_t>(
+        kMostTrace2, sums[kFrequencyTrace2] + std::llrint(w * x * x * kUnits));
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
     for (std::size_t i = 0; i < kColumns; ++i)
@@ -202,6 +207,10 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       if (!Counts(photon, is_behind ? -normal : normal, to_photon)) return;
       const Vec3 wi = frame.ToLocal(DecodeOctahedral(photon.arrival_oct));
       const Rgb scattered = photon.flux * EvaluateBsdf(material, wo, wi, Carried::kRadiance);
+      if (!scale.HasRoomFor(scattered)) {
+        ++piece.excess;
+        return;
+      }
       add(photon, scattered, squared);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(scattered));
     });
@@ -259,6 +268,7 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
       append(accumulation.evidence[c], piece.evidence[c]);
     }
     accumulation.tally.pairs += piece.pairs;
+    accumulation.tally.excess += piece.excess;
   }
   return accumulation;
 }

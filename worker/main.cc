@@ -18,6 +18,7 @@
 #include "render/base/clock.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
+#include "worker/replay.h"
 #include "worker/session.h"
 
 namespace lucerna {
@@ -70,8 +71,22 @@ int Work(Session::Options options) {
   return ExitCodeFor(status);
 }
 
+// Writes what a photon did to the standard output, as a message for `lucerna trace-photon`.
+int ReplayPhoton(const ReplayOptions& options) {
+  const StatusOr<v1::PhotonPath> path = Replay(options);
+  if (!path.ok()) {
+    std::fprintf(stderr, "lucerna-worker: %s\n", std::string(path.status().message()).c_str());
+    return ExitCodeFor(path.status());
+  }
+  const std::string bytes = path->SerializeAsString();
+  const bool is_written = std::fwrite(bytes.data(), 1, bytes.size(), stdout) == bytes.size() &&
+                          std::fflush(stdout) == 0;
+  return is_written ? 0 : kExitFailed;
+}
+
 int Main(int argc, char** argv) {
   Session::Options options;
+  ReplayOptions replay;
   options.name = WorkerName();
   options.numeric_profile = NumericProfile();
   std::string log_level = "info";
@@ -89,6 +104,12 @@ int Main(int argc, char** argv) {
   app.add_option("--log-level", log_level, "debug, info, warn, error or off")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  CLI::Option* job =
+      app.add_option("--replay", replay.job_id,
+                     "trace one photon of this job again, write its way to stdout, end");
+  app.add_option("--pass", replay.pass, "of the photon to replay, from 0")->needs(job);
+  app.add_option("--index", replay.index, "of the photon to replay in its pass, from 0")
+      ->needs(job);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -104,6 +125,12 @@ int Main(int argc, char** argv) {
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(connect_timeout_s));
   spdlog::set_default_logger(spdlog::stderr_color_mt("lucerna-worker"));
   spdlog::set_level(spdlog::level::from_str(log_level));
+  if (*job) {
+    replay.server = options.server;
+    replay.connect_timeout = options.connect_timeout;
+    replay.numeric_profile = options.numeric_profile;
+    return ReplayPhoton(replay);
+  }
   return Work(std::move(options));
 }
 

@@ -28,6 +28,66 @@ bool Inside(const Bounds& region, Vec3 p) {
          p.y <= region.high.y && p.z >= region.low.z && p.z <= region.high.z;
 }
 
+// A photon of more power than 2^16 times the scene's is booked as that: then the books of 2^20
+// photons of the greatest depth fit in 62 bits.
+constexpr float kLargestEnergy = 0x1p28F;
+
+// Sees nothing, for photons that nobody asks about.
+struct NoWatcher {
+  void Emitted(const Emission& /*emission*/) const {}
+  void Landed(const Hit& /*hit*/, const SurfacePoint& /*surface*/, const Material& /*material*/,
+              Rgb /*arriving*/) const {}
+  void Received(Rgb /*landed*/, bool /*gathers*/, bool /*is_indirect*/,
+                bool /*leaves_deposit*/) const {}
+  void Scattered(const BsdfSample& /*sample*/, float /*wo_z*/, Vec3 /*wi*/,
+                 Rgb /*scattered*/) const {}
+  void Played(Rgb /*scattered*/, float /*survival*/) const {}
+  void Left(Rgb /*flux*/) const {}
+};
+
+class HistoryWatcher {
+ public:
+  explicit HistoryWatcher(PhotonHistory& history) : history_(history) {}
+
+  void Emitted(const Emission& emission) { history_.emission = emission; }
+  void Landed(const Hit& hit, const SurfacePoint& surface, const Material& material, Rgb arriving) {
+    PhotonLanding& landing = history_.landings.emplace_back();
+    landing.surface = surface;
+    landing.material_kind = material.kind;
+    landing.distance = hit.t;
+    landing.arriving = arriving;
+  }
+  void Received(Rgb landed, bool gathers, bool is_indirect, bool leaves_deposit) {
+    PhotonLanding& landing = history_.landings.back();
+    landing.was_received = true;
+    landing.landed = landed;
+    landing.gathers = gathers;
+    landing.is_indirect = is_indirect;
+    landing.leaves_deposit = leaves_deposit;
+  }
+  void Scattered(const BsdfSample& sample, float wo_z, Vec3 wi, Rgb scattered) {
+    PhotonLanding& landing = history_.landings.back();
+    landing.was_scattered = true;
+    landing.transmits = wo_z * sample.wi.z < 0;
+    landing.is_smooth = sample.is_delta;
+    landing.leaving = wi;
+    landing.scattered = scattered;
+  }
+  void Played(Rgb scattered, float survival) {
+    PhotonLanding& landing = history_.landings.back();
+    landing.scattered = scattered;
+    landing.survival = survival;
+  }
+  void Left(Rgb flux) {
+    PhotonLanding& landing = history_.landings.back();
+    landing.went_on = true;
+    landing.leaving_flux = flux;
+  }
+
+ private:
+  PhotonHistory& history_;
+};
+
 }  // namespace
 
 PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& intersector,
@@ -38,79 +98,141 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       lights_(lights),
       settings_(settings),
       spectra_(spectra),
-      region_(region) {
+      region_(region),
+      scale_(FluxScale::ForPower(lights.TotalPower())) {
   for (const Material& material : scene.materials) {
     gathers_.push_back(Gathers(material) ? 1 : 0);
   }
+  const double power = static_cast<double>(Luminance(lights.TotalPower()));
+  // At the ends of the float range the scale is held where it is a normal number.
+  if (power > 0) {
+    energy_per_watt_ =
+        static_cast<float>(std::clamp((1 << kEnergyBits) / power, 0x1p-126, 0x1p126));
+  }
+}
+
+std::int64_t PhotonPathTracer::EnergyOf(Rgb flux) const {
+  // Halves go up: faster than to the even number, and the books are as exact.
+  return static_cast<std::int64_t>(
+      std::min(kLargestEnergy, Luminance(flux) * energy_per_watt_ + 0.5F));
+}
+
+PhotonPathTracer::Key PhotonPathTracer::KeyOf(std::uint64_t pass, std::uint64_t index) const {
+  constexpr std::uint64_t kPhotonKey = 0x50484F544F4E5321ULL;
+  // One sequence over all even passes and one over all odd ones: each shares its photons out
+  // evenly, and the two halves are independent of each other (see estimate/error_estimate.h).
+  return {pass / 2 * static_cast<std::uint64_t>(settings_.photons_per_pass) + index,
+          CombineKeys(CombineKeys(settings_.seed, kPhotonKey), pass % 2)};
 }
 
 void PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index, Landed& landed) const {
-  constexpr std::uint64_t kPhotonKey = 0x50484F544F4E5321ULL;
-  // One sequence over all even passes and one over all odd ones: each shares its photons out evenly,
-  // and the two halves are independent of each other (see estimate/error_estimate.h).
-  const std::uint64_t job_key = CombineKeys(CombineKeys(settings_.seed, kPhotonKey), pass % 2);
-  const std::uint64_t number =
-      pass / 2 * static_cast<std::uint64_t>(settings_.photons_per_pass) + index;
-  if (spectra_ == nullptr) return Walk<false>(number, job_key, landed);
+  const Key key = KeyOf(pass, index);
+  NoWatcher nobody;
+  const auto name_if_dropped = [&](PhotonEnd end) {
+    if (end != PhotonEnd::kNotFinite) return;
+    ++landed.dropped;
+    if (landed.dropped_photons.size() < kDroppedNamed) landed.dropped_photons.push_back(index);
+  };
+  if (spectra_ == nullptr) return name_if_dropped(Walk<false>(key, landed, nobody));
   constexpr std::uint64_t kShareKey = 0x4652455155454E43ULL;
-  const auto bits = static_cast<std::uint32_t>(CombineKeys(job_key ^ kShareKey, number) >> 32);
+  const auto bits =
+      static_cast<std::uint32_t>(CombineKeys(key.job_key ^ kShareKey, key.number) >> 32);
   if (static_cast<double>(UnitFloat(bits)) < FrequencyShareInPass(settings_)) {
-    return Walk<true>(number, job_key, landed);
+    return name_if_dropped(Walk<true>(key, landed, nobody));
   }
-  Walk<false>(number, job_key, landed);
+  name_if_dropped(Walk<false>(key, landed, nobody));
   landed.traces.resize(landed.deposits.size(), -1.0F);
 }
 
-template <bool kHasSpectrum>
-void PhotonPathTracer::Walk(std::uint64_t number, std::uint64_t job_key, Landed& landed) const {
-  const SobolPoint u = OwenSobol(number, job_key);
-  KeyedRng rng(CombineKeys(job_key, number));
+PhotonHistory PhotonPathTracer::Replay(std::uint64_t pass, std::uint64_t index) const {
+  PhotonHistory history;
+  HistoryWatcher watcher(history);
+  Landed landed;
+  // A spectrum follows the walk and never changes it.
+  history.end = Walk<false>(KeyOf(pass, index), landed, watcher);
+  return history;
+}
+
+template <bool kHasSpectrum, typename Watcher>
+PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watcher) const {
+  const SobolPoint u = OwenSobol(key.number, key.job_key);
+  KeyedRng rng(CombineKeys(key.job_key, key.number));
 
   Emission emission;
   if (!lights_.SampleEmission(FineChoice(u[4], rng.Uniform()), u[0], u[1], u[2], u[3], emission))
-    return;
+    return PhotonEnd::kNotEmitted;
+  watcher.Emitted(emission);
   Ray ray = emission.ray;
   Rgb flux = emission.flux;
-  [[maybe_unused]] SpectrumTracer::Carried carried;
-  if constexpr (kHasSpectrum) carried = spectra_->Leave(emission);
+  if (!IsFinite(flux)) return PhotonEnd::kNotFinite;
+  EnergyBooks& energy = landed.energy;
+  std::int64_t carried = EnergyOf(flux);
+  energy.emitted += carried;
+  // What the photon has more before than after goes to an account.
+  const auto book = [&](Rgb after, std::int64_t& account) {
+    const std::int64_t left = EnergyOf(after);
+    account += carried - left;
+    carried = left;
+  };
+  const auto end = [&](PhotonEnd why, std::int64_t& account) {
+    account += carried;
+    return why;
+  };
+  [[maybe_unused]] SpectrumTracer::Carried spectrum;
+  if constexpr (kHasSpectrum) spectrum = spectra_->Leave(emission);
   for (int landing = 0; landing < settings_.max_depth; ++landing) {
     Hit hit;
     ++landed.rays;
-    if (!intersector_.Intersect(ray, hit)) return;
+    if (!intersector_.Intersect(ray, hit)) {
+      // A ray that is not a number meets nothing either.
+      if (IsFinite(ray.origin) && IsFinite(ray.direction)) {
+        return end(PhotonEnd::kEscaped, energy.escaped);
+      }
+      return end(PhotonEnd::kNotFinite, energy.dropped);
+    }
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
     std::optional<Material> textured;
     const Material& material = MaterialAt(scene_, surface, textured);
+    watcher.Landed(hit, surface, material, flux);
     const Vec3 wo = -ray.direction;
     if (surface.has_shading_normal) {
       const float shading = Dot(wo, surface.shading_normal);
       const float geometric = Dot(wo, surface.geometric_normal);
       // Below the smoothed surface's horizon: that surface would not have been met here.
-      if (!(shading * geometric > 0)) return;
+      if (!(shading * geometric > 0)) return end(PhotonEnd::kSmoothing, energy.smoothing);
       flux *= CosineRatio(shading, geometric);
     }
     if (!IsFinite(flux) || !IsFinite(surface.position)) {
-      ++landed.dropped;
-      return;
+      return end(PhotonEnd::kNotFinite, energy.dropped);
     }
-    const bool is_found =
-        landing > 0 && gathers_[surface.material] != 0 && Inside(region_, surface.position);
+    if (surface.has_shading_normal) book(flux, energy.smoothing);
+    const bool gathers = landing > 0 && gathers_[surface.material] != 0;
+    const bool leaves_deposit = gathers && scale_.HasRoomFor(flux);
+    if (gathers && !leaves_deposit) ++landed.excess;
+    const bool is_found = leaves_deposit && Inside(region_, surface.position);
+    watcher.Received(flux, gathers_[surface.material] != 0, landing > 0, leaves_deposit);
     if constexpr (kHasSpectrum) {
       // A surface that scatters light broadly forgets the shadows on it: after a leg of length d at
       // most 4/d² of any detail is left, of none at all 3/d² (see LeaveDiffuse).
       const bool shadows_count = is_found || material.kind != Material::Kind::kDiffuse;
       spectra_->Fly(
-          carried, ray, hit.t,
+          spectrum, ray, hit.t,
           shadows_count ? SpectrumTracer::Shadows::kFound : SpectrumTracer::Shadows::kLeftOut);
     }
-    if (is_found) {
-      landed.deposits.push_back({surface.position, flux, FaceForward(surface.geometric_normal, wo),
-                                 EncodeOctahedral(wo),
-                                 static_cast<std::uint32_t>(rng.Bits() >> 32)});
-      if constexpr (kHasSpectrum) {
-        landed.traces.push_back(spectra_->Received(carried, surface, material, wo));
+    if (gathers) {
+      // Drawn wherever it lands: the walk must not depend on where hitpoints are, or nobody could
+      // replay it without them.
+      const auto deposit_key = static_cast<std::uint32_t>(rng.Bits() >> 32);
+      if (is_found) {
+        landed.deposits.push_back({surface.position, flux,
+                                   FaceForward(surface.geometric_normal, wo), EncodeOctahedral(wo),
+                                   deposit_key});
+        if constexpr (kHasSpectrum) {
+          landed.traces.push_back(spectra_->Received(spectrum, surface, material, wo));
+        }
       }
     }
-    if (landing + 1 == settings_.max_depth) return;
+    if (landing + 1 == settings_.max_depth) break;
 
     float u_lobe = u[7];
     float u1 = u[5];
@@ -122,31 +244,41 @@ void PhotonPathTracer::Walk(std::uint64_t number, std::uint64_t job_key, Landed&
     }
     const Frame frame(surface.shading_normal);
     BsdfSample sample;
-    if (!SampleBsdf(material, frame.ToLocal(wo), u_lobe, u1, u2, Carried::kFlux, sample)) {
-      return;
+    const Vec3 wo_local = frame.ToLocal(wo);
+    if (!SampleBsdf(material, wo_local, u_lobe, u1, u2, Carried::kFlux, sample)) {
+      return end(PhotonEnd::kAbsorbed, energy.absorbed);
     }
     const Vec3 wi = frame.ToWorld(sample.wi);
     Rgb scattered = flux * sample.weight;
+    watcher.Scattered(sample, wo_local.z, wi, scattered);
+    if (!IsFinite(scattered)) return end(PhotonEnd::kNotFinite, energy.dropped);
+    book(scattered, energy.absorbed);
     if (surface.has_shading_normal) {
       const float geometric = Dot(wi, surface.geometric_normal);
       const bool transmits = Dot(wo, frame.n) * sample.wi.z < 0;
       const bool crosses = Dot(wo, surface.geometric_normal) * geometric < 0;
-      if (transmits != crosses) return;
+      if (transmits != crosses) return end(PhotonEnd::kSmoothing, energy.smoothing);
       scattered *= 1 / std::max(CosineRatio(sample.wi.z, geometric), 1 / kMaxCosineRatio);
+      book(scattered, energy.smoothing);
     }
     // Survives with the share of flux that is left, and then has the flux it came with.
     const float before = MaxChannel(flux);
     const float survival = MaxChannel(scattered) / before;
-    if (!(survival > 0)) return;
+    watcher.Played(scattered, survival);
+    if (!(survival > 0)) return end(PhotonEnd::kAbsorbed, energy.absorbed);
     if (survival < 1) {
-      if (!(rng.Uniform() < survival)) return;
+      if (!(rng.Uniform() < survival)) return end(PhotonEnd::kRoulette, energy.roulette_took);
       scattered *= 1 / survival;
+      const std::int64_t heavier = EnergyOf(scattered);
+      energy.roulette_gave += heavier - carried;
+      carried = heavier;
     }
     flux = scattered;
-    if constexpr (kHasSpectrum) spectra_->Scatter(carried, surface, material, wo, wi);
+    watcher.Left(flux);
+    if constexpr (kHasSpectrum) spectra_->Scatter(spectrum, surface, material, wo, wi);
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
   }
-  return;
+  return end(PhotonEnd::kDepth, energy.cut_off);
 }
 
 }  // namespace lucerna

@@ -4,12 +4,18 @@
 // gathers, except at its first landing: that light is direct, and sampled at the coordinator.
 // Russian roulette keeps its flux near that of its emission, so that the density of photons, not
 // their flux, carries the signal.
+//
+// What becomes of a photon's power is booked at every change, and a photon that is not finite any
+// more is given up and named, so that it can be replayed: the walk of a photon is a function of
+// scene, settings, pass and index alone.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "render/estimate/accumulation.h"
 #include "render/geometry/intersector.h"
+#include "render/math/fixed_point.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "render/scene/render_settings.h"
@@ -29,6 +35,45 @@ struct Deposit {
   std::uint32_t key;          // random bits that belong to this deposit
 };
 
+// Why a photon's walk is over.
+enum class PhotonEnd : std::uint8_t {
+  kNotEmitted,  // its numbers fell where the light sends nothing
+  kEscaped,     // met nothing
+  kAbsorbed,
+  kSmoothing,  // came or left below the horizon of the smoothed surface
+  kRoulette,
+  kDepth,
+  kNotFinite,
+};
+
+// One landing of a replayed photon. What lies behind the end of its walk is not set.
+struct PhotonLanding {
+  SurfacePoint surface;
+  Material::Kind material_kind = Material::Kind::kDiffuse;
+  float distance = 0;         // flown [scene units]
+  Rgb arriving;               // flux [W]
+  Rgb landed;                 // the same after the ratio of cosines of shading normals
+  bool was_received = false;  // not below the horizon, and finite
+  bool gathers = false;       // the material
+  bool is_indirect = false;   // not the first landing
+  bool leaves_deposit = false;
+  bool was_scattered = false;
+  bool transmits = false;
+  bool is_smooth = false;  // scattered into a single direction
+  Vec3 leaving;            // direction
+  Rgb scattered;           // flux, before the roulette
+  float survival = 0;      // probability; 1 and above: no roulette
+  bool went_on = false;
+  Rgb leaving_flux;  // after the roulette
+};
+
+// All that a photon did.
+struct PhotonHistory {
+  Emission emission;  // meaningless when it was not emitted
+  std::vector<PhotonLanding> landings;
+  PhotonEnd end = PhotonEnd::kNotEmitted;
+};
+
 class PhotonPathTracer {
  public:
   // Keeps references to all. Deposits outside `region` are not kept.
@@ -44,18 +89,34 @@ class PhotonPathTracer {
     // empty unless the job traces frequency photons.
     std::vector<float> traces;
     std::uint64_t rays = 0;
-    // Photons given up because a number was not finite.
+    // Photons given up because a number was not finite, and the first kDroppedNamed of them by
+    // index, when photons are traced in order of their indices.
     std::uint64_t dropped = 0;
+    std::vector<std::uint64_t> dropped_photons;
+    // Landings of photons that are too bright to be a deposit (FluxScale::HasRoomFor).
+    std::uint64_t excess = 0;
+    EnergyBooks energy;
   };
 
   // Traces photon `index` of `pass`. Threads: any, each with its own `landed`.
   void Trace(std::uint64_t pass, std::uint64_t index, Landed& landed) const;
 
+  // What Trace does with that photon, step by step. Threads: any.
+  [[nodiscard]] PhotonHistory Replay(std::uint64_t pass, std::uint64_t index) const;
+
  private:
-  // The walk of one photon; with a spectrum only where the job and the photon have one, so that
-  // other photons pay nothing for it.
-  template <bool kHasSpectrum>
-  void Walk(std::uint64_t number, std::uint64_t job_key, Landed& landed) const;
+  // What names a photon's random numbers.
+  struct Key {
+    std::uint64_t number = 0;
+    std::uint64_t job_key = 0;
+  };
+  [[nodiscard]] Key KeyOf(std::uint64_t pass, std::uint64_t index) const;
+  // The walk of one photon; with a spectrum only where the job and the photon have one, and with a
+  // watcher only for a replay, so that other photons pay for neither.
+  template <bool kHasSpectrum, typename Watcher>
+  PhotonEnd Walk(const Key& key, Landed& landed, Watcher& watcher) const;
+  // In whole units of EnergyBooks.
+  [[nodiscard]] std::int64_t EnergyOf(Rgb flux) const;
 
   const Scene& scene_;
   const Intersector& intersector_;
@@ -64,6 +125,8 @@ class PhotonPathTracer {
   const SpectrumTracer* spectra_;  // nullptr: no frequency photons
   Bounds region_;
   std::vector<std::uint8_t> gathers_;  // [materials]
+  FluxScale scale_;
+  float energy_per_watt_ = 1;
 };
 
 }  // namespace lucerna

@@ -30,24 +30,29 @@ auto Find(Kept& kept, const Digest& digest) {
 
 }  // namespace
 
+StatusOr<Scene> FetchScene(const SceneManifest& manifest, const FetchBytes& fetch) {
+  // The parser would report a broken connection as an error of the scene.
+  Status fetched;
+  ManifestFiles files(manifest, [&](const Digest& file) {
+    StatusOr<std::string> bytes = fetch(file, SceneLimits().max_total_bytes);
+    fetched.Update(bytes.status());
+    return bytes;
+  });
+  ParsedScene parsed = ParsePbrt(files, manifest.main_path);
+  LUCERNA_RETURN_IF_ERROR(fetched);
+  LUCERNA_RETURN_IF_ERROR(parsed.ToStatus());
+  return std::move(parsed.scene);
+}
+
 StatusOr<std::shared_ptr<BatchTracer>> SceneCache::TracerFor(const SceneManifest& scene) {
   const Digest digest = scene.SceneDigest();
   if (auto tracer = Find(tracers_, digest)) return tracer;
   // The oldest goes first: three scenes at once may be more than memory holds.
   while (tracers_.size() >= kTracersKept)
     tracers_.pop_back();
-  // The parser would report a broken connection as an error of the scene.
-  Status fetched;
-  ManifestFiles files(scene, [&](const Digest& file) {
-    StatusOr<std::string> bytes = fetch_(file, SceneLimits().max_total_bytes);
-    fetched.Update(bytes.status());
-    return bytes;
-  });
-  ParsedScene parsed = ParsePbrt(files, scene.main_path);
-  LUCERNA_RETURN_IF_ERROR(fetched);
-  LUCERNA_RETURN_IF_ERROR(parsed.ToStatus());
+  LUCERNA_ASSIGN_OR_RETURN(Scene fetched, FetchScene(scene, fetch_));
   LUCERNA_ASSIGN_OR_RETURN(std::shared_ptr<BatchTracer> tracer,
-                           BatchTracer::Create(std::move(parsed.scene), threads_));
+                           BatchTracer::Create(std::move(fetched), threads_));
   tracers_.emplace_front(digest, tracer);
   return tracer;
 }

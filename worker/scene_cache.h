@@ -22,10 +22,16 @@
 
 namespace lucerna {
 
+// The bytes of a digest, at most so many.
+using FetchBytes =
+    std::function<StatusOr<std::string>(const Digest& digest, std::uint64_t max_bytes)>;
+
+// Errors: what fetching or reading the scene said.
+[[nodiscard]] StatusOr<Scene> FetchScene(const SceneManifest& manifest, const FetchBytes& fetch);
+
 class SceneCache {
  public:
-  // The bytes of a digest, at most so many.
-  using Fetch = std::function<StatusOr<std::string>(const Digest& digest, std::uint64_t max_bytes)>;
+  using Fetch = FetchBytes;
 
   SceneCache(int threads, Fetch fetch) : threads_(threads), fetch_(std::move(fetch)) {}
 

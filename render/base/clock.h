@@ -18,6 +18,13 @@ using WallTime = std::chrono::time_point<std::chrono::system_clock, Duration>;
   return std::chrono::duration<double>(duration).count();
 }
 
+// The sum of two durations that are not negative, at most 73 years: what others say of their time
+// may be anything, and a few such sums still add up.
+[[nodiscard]] inline Duration SaturatingSum(Duration a, Duration b) {
+  constexpr Duration kLongest = Duration::max() / 4;
+  return b >= kLongest || a >= kLongest - b ? kLongest : a + b;
+}
+
 class Clock {
  public:
   virtual ~Clock() = default;

@@ -1,7 +1,11 @@
 #include "render/estimate/accumulation.h"
 
+#include <limits>
+
 namespace lucerna {
 namespace {
+
+__extension__ using Wide = __int128;
 
 // Whether `a + b` (or `a - b`) leaves the range, without computing it.
 bool SumFits(std::int64_t a, std::int64_t b, bool adding) {
@@ -14,19 +18,54 @@ bool SumFits(std::uint64_t a, std::uint64_t b, bool adding) {
   return adding ? !__builtin_add_overflow(a, b, &sum) : !__builtin_sub_overflow(a, b, &sum);
 }
 
-std::array<std::uint64_t, 5> Books(const BatchTally& tally) {
-  return {tally.photons, tally.rays, tally.deposits, tally.pairs, tally.dropped};
+std::uint64_t SaturatingSum(std::uint64_t a, std::uint64_t b) {
+  std::uint64_t sum = 0;
+  return __builtin_add_overflow(a, b, &sum) ? std::numeric_limits<std::uint64_t>::max() : sum;
+}
+
+std::int64_t SaturatingSum(std::int64_t a, std::int64_t b) {
+  std::int64_t sum = 0;
+  if (!__builtin_add_overflow(a, b, &sum)) return sum;
+  using Limits = std::numeric_limits<std::int64_t>;
+  return a < 0 ? Limits::min() : Limits::max();
+}
+
+// Calls visit(ours, theirs) for every sum of two tallies.
+template <typename Ours, typename Visit>
+void ForEachSum(Ours& ours, const BatchTally& theirs, const Visit& visit) {
+  visit(ours.photons, theirs.photons);
+  visit(ours.rays, theirs.rays);
+  visit(ours.deposits, theirs.deposits);
+  visit(ours.pairs, theirs.pairs);
+  visit(ours.dropped, theirs.dropped);
+  visit(ours.excess, theirs.excess);
+  visit(ours.energy.emitted, theirs.energy.emitted);
+  visit(ours.energy.roulette_gave, theirs.energy.roulette_gave);
+  visit(ours.energy.roulette_took, theirs.energy.roulette_took);
+  visit(ours.energy.absorbed, theirs.energy.absorbed);
+  visit(ours.energy.escaped, theirs.energy.escaped);
+  visit(ours.energy.smoothing, theirs.energy.smoothing);
+  visit(ours.energy.cut_off, theirs.energy.cut_off);
+  visit(ours.energy.dropped, theirs.energy.dropped);
 }
 
 }  // namespace
 
+bool EnergyBooks::Balance() const {
+  return Wide{emitted} + roulette_gave ==
+         Wide{roulette_took} + absorbed + escaped + smoothing + cut_off + dropped;
+}
+
 BatchTally& BatchTally::operator+=(const BatchTally& other) {
-  photons += other.photons;
-  rays += other.rays;
-  deposits += other.deposits;
-  pairs += other.pairs;
-  dropped += other.dropped;
+  ForEachSum(*this, other, [](auto& ours, auto theirs) { ours = SaturatingSum(ours, theirs); });
   return *this;
+}
+
+bool BatchTally::Fits(const BatchTally& other, bool adding) const {
+  bool fits = true;
+  ForEachSum(*this, other,
+             [&](auto ours, auto theirs) { fits = fits && SumFits(ours, theirs, adding); });
+  return fits;
 }
 
 PassSums::PassSums(std::size_t hitpoints, std::size_t evidence_columns)
@@ -56,12 +95,11 @@ Status PassSums::Check(const Accumulation& accumulation, bool adding) const {
       return absl::InvalidArgumentError("an accumulation's columns differ in length");
     }
   }
-  const auto ours = Books(tally_);
-  const auto theirs = Books(accumulation.tally);
-  for (std::size_t i = 0; i < ours.size(); ++i) {
-    if (!SumFits(ours[i], theirs[i], adding)) {
-      return absl::OutOfRangeError("the tally of a pass would not fit in 64 bits");
-    }
+  if (!accumulation.tally.energy.Balance()) {
+    return absl::InvalidArgumentError("an accumulation's energy does not balance");
+  }
+  if (!tally_.Fits(accumulation.tally, adding)) {
+    return absl::OutOfRangeError("the tally of a pass would not fit in 64 bits");
   }
   std::uint64_t least = 0;  // the smallest row that may come next
   for (std::size_t i = 0; i < rows; ++i) {
@@ -126,12 +164,7 @@ Status PassSums::Subtract(const Accumulation& accumulation) {
       evidence_[column][accumulation.hitpoints[i]] -= accumulation.evidence[column][i];
     }
   }
-  const BatchTally& other = accumulation.tally;
-  tally_.photons -= other.photons;
-  tally_.rays -= other.rays;
-  tally_.deposits -= other.deposits;
-  tally_.pairs -= other.pairs;
-  tally_.dropped -= other.dropped;
+  ForEachSum(tally_, accumulation.tally, [](auto& ours, auto theirs) { ours -= theirs; });
   return absl::OkStatus();
 }
 

@@ -16,6 +16,26 @@
 
 namespace lucerna {
 
+// What became of the photons' power. In whole units, kEnergyBits of them to the power of the whole
+// scene, which is about what a photon carries (math/fixed_point.h): luminance, rounded once for
+// every change, so that what a photon loses here it has lost there, and sums balance to the unit.
+struct EnergyBooks {
+  std::int64_t emitted = 0;
+  // Survivors of the roulette are made heavier, and only on average by what the others had.
+  std::int64_t roulette_gave = 0;
+  std::int64_t roulette_took = 0;
+  std::int64_t absorbed = 0;   // less what a BSDF's sampling gave: below 0 is possible
+  std::int64_t escaped = 0;    // met nothing
+  std::int64_t smoothing = 0;  // lost to shading normals, less what they gave
+  std::int64_t cut_off = 0;    // still under way at the greatest depth
+  std::int64_t dropped = 0;    // with photons that were not finite any more
+
+  // emitted + roulette_gave = the sum of all others, exactly.
+  [[nodiscard]] bool Balance() const;
+  bool operator==(const EnergyBooks&) const = default;
+};
+inline constexpr int kEnergyBits = 12;
+
 // The books of a batch, for progress and for checking energy. Sums, so they merge like the rest.
 struct BatchTally {
   std::uint64_t photons = 0;   // photon paths emitted
@@ -23,10 +43,20 @@ struct BatchTally {
   std::uint64_t deposits = 0;  // landings offered to the hitpoints
   std::uint64_t pairs = 0;     // (photon, hitpoint) contributions
   std::uint64_t dropped = 0;   // photons given up because a number was not finite
+  // Landings, and contributions to hitpoints, left out because sums have no room for them
+  // (FluxScale::HasRoomFor).
+  std::uint64_t excess = 0;
+  EnergyBooks energy;
 
+  // A sum that would leave its range stays at its end.
   BatchTally& operator+=(const BatchTally& other);
+  // Whether no sum leaves its range when `other` is added (or taken out).
+  [[nodiscard]] bool Fits(const BatchTally& other, bool adding = true) const;
   bool operator==(const BatchTally&) const = default;
 };
+
+// So many of a batch's dropped photons are named.
+inline constexpr std::size_t kDroppedNamed = 8;
 
 struct Accumulation {
   // Rows of the hitpoint block, strictly increasing.
@@ -37,6 +67,9 @@ struct Accumulation {
   // (estimate/evidence.h).
   std::vector<std::vector<std::int64_t>> evidence;
   BatchTally tally;
+  // The first photons of the batch that were dropped, by index in their pass, strictly increasing,
+  // at most kDroppedNamed. Not part of any sum.
+  std::vector<std::uint64_t> dropped_photons;
 
   [[nodiscard]] std::size_t size() const { return hitpoints.size(); }
   bool operator==(const Accumulation&) const = default;
@@ -49,7 +82,8 @@ class PassSums {
 
   // Adds every row. All or nothing.
   // Errors: INVALID_ARGUMENT when the accumulation breaks its own promises or names a hitpoint
-  // that does not exist, OUT_OF_RANGE when a sum would not fit in 64 bits.
+  // that does not exist, or its energy does not balance; OUT_OF_RANGE when a sum would not fit in
+  // 64 bits.
   [[nodiscard]] Status Add(const Accumulation& accumulation);
   // Takes out exactly what Add put in. Errors: as Add.
   [[nodiscard]] Status Subtract(const Accumulation& accumulation);

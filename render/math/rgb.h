@@ -30,8 +30,7 @@ constexpr Rgb Gray(float v) { return {v, v, v}; }
 constexpr float Luminance(Rgb c) { return 0.2126F * c.r + 0.7152F * c.g + 0.0722F * c.b; }
 constexpr float MaxChannel(Rgb c) { return std::max(c.r, std::max(c.g, c.b)); }
 constexpr bool IsBlack(Rgb c) { return c.r == 0 && c.g == 0 && c.b == 0; }
-inline bool IsFinite(Rgb c) {
-  return std::isfinite(c.r) && std::isfinite(c.g) && std::isfinite(c.b);
-}
+// Zero times a number is zero, unless the number is infinite or none: one comparison for all three.
+constexpr bool IsFinite(Rgb c) { return c.r * 0 + c.g * 0 + c.b * 0 == 0; }
 
 }  // namespace lucerna

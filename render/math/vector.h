@@ -38,9 +38,8 @@ inline Vec3 Normalize(Vec3 a) { return a * (1.0F / Length(a)); }
 inline float MaxAbs(Vec3 a) {
   return std::max(std::abs(a.x), std::max(std::abs(a.y), std::abs(a.z)));
 }
-inline bool IsFinite(Vec3 a) {
-  return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z);
-}
+// Zero times a number is zero, unless the number is infinite or none: one comparison for all three.
+constexpr bool IsFinite(Vec3 a) { return a.x * 0 + a.y * 0 + a.z * 0 == 0; }
 // `n`, turned to the side that `towards` points to.
 constexpr Vec3 FaceForward(Vec3 n, Vec3 towards) { return Dot(n, towards) < 0 ? -n : n; }
 

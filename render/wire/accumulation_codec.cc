@@ -12,7 +12,7 @@ namespace {
 
 __extension__ using Wide = __int128;
 
-constexpr std::string_view kMagic = "LAC2";
+constexpr std::string_view kMagic = "LAC3";
 // More columns of evidence than any radius controller asks for.
 constexpr std::uint64_t kMostEvidence = 32;
 constexpr std::uint8_t kIndicesAsVarints = 0;
@@ -113,9 +113,18 @@ std::string EncodeAccumulation(const Accumulation& accumulation, std::size_t hit
   writer.Varint(accumulation.size());
   const BatchTally& tally = accumulation.tally;
   for (const std::uint64_t value :
-       {tally.photons, tally.rays, tally.deposits, tally.pairs, tally.dropped}) {
+       {tally.photons, tally.rays, tally.deposits, tally.pairs, tally.dropped, tally.excess}) {
     writer.Varint(value);
   }
+  const EnergyBooks& energy = tally.energy;
+  for (const std::int64_t value :
+       {energy.emitted, energy.roulette_gave, energy.roulette_took, energy.absorbed, energy.escaped,
+        energy.smoothing, energy.cut_off, energy.dropped}) {
+    writer.Varint(ZigZag(value));
+  }
+  writer.Varint(accumulation.dropped_photons.size());
+  for (const std::uint64_t index : accumulation.dropped_photons)
+    writer.Varint(index);
 
   // The two forms are compared before compression, which shortens both much alike.
   const std::size_t bitmap_size = (hitpoints + 7) / 8;
@@ -162,9 +171,21 @@ StatusOr<Accumulation> DecodeAccumulation(std::string_view bytes, std::size_t hi
 
   Accumulation accumulation;
   BatchTally& tally = accumulation.tally;
-  for (std::uint64_t* value :
-       {&tally.photons, &tally.rays, &tally.deposits, &tally.pairs, &tally.dropped}) {
+  for (std::uint64_t* value : {&tally.photons, &tally.rays, &tally.deposits, &tally.pairs,
+                               &tally.dropped, &tally.excess}) {
     *value = reader.Varint();
+  }
+  EnergyBooks& energy = tally.energy;
+  for (std::int64_t* value :
+       {&energy.emitted, &energy.roulette_gave, &energy.roulette_took, &energy.absorbed,
+        &energy.escaped, &energy.smoothing, &energy.cut_off, &energy.dropped}) {
+    *value = UnZigZag(reader.Varint());
+  }
+  if (!energy.Balance()) return Malformed("its energy does not balance");
+  const std::uint64_t named = reader.Varint();
+  if (named > kDroppedNamed) return Malformed("it names too many dropped photons");
+  for (std::uint64_t i = 0; i < named; ++i) {
+    accumulation.dropped_photons.push_back(reader.Varint());
   }
 
   const std::uint8_t form = reader.Byte();

@@ -223,12 +223,35 @@ v1::Tally ToProto(const BatchTally& tally) {
   message.set_deposits(tally.deposits);
   message.set_pairs(tally.pairs);
   message.set_dropped(tally.dropped);
+  message.set_excess(tally.excess);
+  v1::Energy& energy = *message.mutable_energy();
+  energy.set_emitted(tally.energy.emitted);
+  energy.set_roulette_gave(tally.energy.roulette_gave);
+  energy.set_roulette_took(tally.energy.roulette_took);
+  energy.set_absorbed(tally.energy.absorbed);
+  energy.set_escaped(tally.energy.escaped);
+  energy.set_smoothing(tally.energy.smoothing);
+  energy.set_cut_off(tally.energy.cut_off);
+  energy.set_dropped(tally.energy.dropped);
   return message;
 }
 
 BatchTally FromProto(const v1::Tally& message) {
-  return {message.photons(), message.rays(), message.deposits(), message.pairs(),
-          message.dropped()};
+  const v1::Energy& energy = message.energy();
+  return {.photons = message.photons(),
+          .rays = message.rays(),
+          .deposits = message.deposits(),
+          .pairs = message.pairs(),
+          .dropped = message.dropped(),
+          .excess = message.excess(),
+          .energy = {.emitted = energy.emitted(),
+                     .roulette_gave = energy.roulette_gave(),
+                     .roulette_took = energy.roulette_took(),
+                     .absorbed = energy.absorbed(),
+                     .escaped = energy.escaped(),
+                     .smoothing = energy.smoothing(),
+                     .cut_off = energy.cut_off(),
+                     .dropped = energy.dropped()}};
 }
 
 google::protobuf::Duration ToProto(Duration duration) {

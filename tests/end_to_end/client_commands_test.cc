@@ -438,6 +438,58 @@ TEST_F(ClientCommandsTest, AReferenceNeedsAnEndAndAFileOfItsOwn) {
   EXPECT_EQ(Run({"reference", scene, "-o", scene, "--time", "1"}).code, 2);
 }
 
+// A photon of a job that is over takes its way again, the same at every asking, and as the books of
+// all photons say.
+TEST_F(ClientCommandsTest, TracePhotonShowsTheWayOfAPhotonOfAJobThatIsOver) {
+  const auto cluster = LocalCluster::Start({LUCERNA_BIN_DIR, 1, 1});
+  ASSERT_TRUE(cluster.ok()) << cluster.status();
+  const std::string server = (*cluster)->address();
+  constexpr int kPhotons = 40;
+  constexpr int kDepth = 4;
+  const Ran submitted = Run({"submit", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--server",
+                             server, "--passes", "2", "--photons-per-pass",
+                             std::to_string(kPhotons), "--max-depth", std::to_string(kDepth)});
+  ASSERT_EQ(submitted.code, 0) << submitted.err;
+  const std::string job = submitted.out.substr(0, submitted.out.find('\n'));
+  const Ran waited = Run({"wait", job, "--server", server, "--json"});
+  ASSERT_EQ(waited.code, 0) << waited.err;
+  const json books = json::parse(waited.out);
+  EXPECT_EQ(books["tally"]["dropped"], 0);
+  EXPECT_EQ(books["energy"]["balance"], 0);
+  EXPECT_FALSE(books.contains("dropped_photons"));
+
+  // A ray for every landing, and one for every photon that met nothing.
+  std::uint64_t rays = 0;
+  for (int pass = 0; pass < 2; ++pass) {
+    for (int index = 0; index < kPhotons; ++index) {
+      const std::string key = std::to_string(pass) + ":" + std::to_string(index);
+      const Ran ran = Run({"trace-photon", job, key, "--server", server, "--json"});
+      ASSERT_EQ(ran.code, 0) << ran.err;
+      const json path = json::parse(ran.out);
+      EXPECT_EQ(path["pass"], pass);
+      EXPECT_EQ(path["index"], index);
+      EXPECT_LE(path["landings"].size(), std::size_t{kDepth});
+      rays += path["landings"].size() + (path["end"] == "ESCAPED" ? 1 : 0);
+    }
+  }
+  EXPECT_EQ(rays, books["tally"]["rays"].get<std::uint64_t>());
+
+  const Ran once = Run({"trace-photon", job, "1:7", "--server", server});
+  ASSERT_EQ(once.code, 0) << once.err;
+  EXPECT_EQ(once.out.rfind("photon 1:7 from ", 0), 0U) << once.out;
+  EXPECT_NE(once.out.find("landing 1 on "), std::string::npos) << once.out;
+  EXPECT_NE(once.out.find("\nthe photon "), std::string::npos) << once.out;
+  EXPECT_EQ(Run({"trace-photon", job, "7", "--pass", "1", "--server", server}).out, once.out);
+  EXPECT_NE(Run({"trace-photon", job, "1:8", "--server", server}).out, once.out);
+
+  for (const char* nothing : {"7:", ":7", "x", "-1", "1:40", "1:7:2"}) {
+    const Ran refused = Run({"trace-photon", job, nothing, "--server", server});
+    EXPECT_EQ(refused.code, 2) << nothing << refused.err;
+    EXPECT_EQ(refused.out, "");
+  }
+  EXPECT_EQ(Run({"trace-photon", "nobody", "1:7", "--server", server}).code, 1);
+}
+
 class CompareTest : public ClientCommandsTest {
  protected:
   // Two settings for a fifth of a second each time.

@@ -2,6 +2,7 @@
 // refuse as a whole what does not fit, changing nothing.
 #include "render/estimate/accumulation.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "gtest/gtest.h"
@@ -15,7 +16,9 @@ Accumulation Make(std::vector<std::uint32_t> rows, std::int64_t flux) {
   for (auto& channel : accumulation.flux)
     channel.assign(rows.size(), flux);
   accumulation.hitpoints = std::move(rows);
-  accumulation.tally = {10, 30, 20, 5, 1};
+  accumulation.tally.photons = 10;
+  accumulation.tally.rays = 30;
+  accumulation.tally.energy = {.emitted = 100, .roulette_gave = 7, .absorbed = 107};
   return accumulation;
 }
 
@@ -73,6 +76,79 @@ TEST(PassSumsTest, RefusesASumThatWouldWrap) {
   EXPECT_EQ(sums.flux(0), (std::vector<std::int64_t>{0, kMost}));
   EXPECT_EQ(sums.counts(), (std::vector<std::uint64_t>{0, 2}));
   EXPECT_TRUE(sums.Add(Make({0, 1}, -1)).ok());
+
+  PassSums with_evidence(2, 1);
+  Accumulation evidence = Make({1}, 0);
+  evidence.evidence = {{std::numeric_limits<std::int64_t>::min()}};
+  ASSERT_TRUE(with_evidence.Add(evidence).ok());
+  EXPECT_TRUE(absl::IsOutOfRange(with_evidence.Add(evidence)));
+  EXPECT_EQ(with_evidence.evidence()[0][1], std::numeric_limits<std::int64_t>::min());
+}
+
+// Every sum of the books, one after the other, at its end.
+TEST(PassSumsTest, RefusesATallyThatWouldWrap) {
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
+  constexpr std::int64_t kMostSigned = std::numeric_limits<std::int64_t>::max();
+  std::vector<BatchTally> full(13);
+  full[0].photons = kMost;
+  full[1].rays = kMost;
+  full[2].deposits = kMost;
+  full[3].pairs = kMost;
+  full[4].dropped = kMost;
+  full[5].excess = kMost;
+  // Each account of energy against the emitted one, which is at its end too, or against another.
+  full[6].energy = {.emitted = kMostSigned, .roulette_took = kMostSigned};
+  full[7].energy = {.emitted = kMostSigned, .absorbed = kMostSigned};
+  full[8].energy = {.emitted = kMostSigned, .escaped = kMostSigned};
+  full[9].energy = {.emitted = kMostSigned, .smoothing = kMostSigned};
+  full[10].energy = {.emitted = kMostSigned, .cut_off = kMostSigned};
+  full[11].energy = {.emitted = kMostSigned, .dropped = kMostSigned};
+  full[12].energy = {.roulette_gave = kMostSigned, .absorbed = kMostSigned};
+  for (const BatchTally& tally : full) {
+    Accumulation accumulation;
+    accumulation.tally = tally;
+    PassSums sums(1);
+    ASSERT_TRUE(sums.Add(accumulation).ok());
+    EXPECT_TRUE(absl::IsOutOfRange(sums.Add(accumulation)));
+    EXPECT_EQ(sums.tally(), tally) << "nothing has changed";
+    // Books that are only read stand still at the end.
+    BatchTally read = tally;
+    read += tally;
+    EXPECT_EQ(read, tally);
+  }
+}
+
+TEST(PassSumsTest, RefusesEnergyThatDoesNotBalance) {
+  PassSums sums(4);
+  Accumulation lost = Make({0}, 1);
+  --lost.tally.energy.absorbed;
+  EXPECT_TRUE(absl::IsInvalidArgument(sums.Add(lost)));
+  // Also where the difference is a multiple of 2^64.
+  constexpr std::int64_t kHalf = std::numeric_limits<std::int64_t>::min();
+  lost.tally.energy = {.absorbed = kHalf, .escaped = kHalf};
+  EXPECT_TRUE(absl::IsInvalidArgument(sums.Add(lost)));
+}
+
+// A pass of 1e12 photons that all reach one hitpoint, each with its 2^18 quanta, in batches as
+// large as can be counted: every bit of the sum is right, far beyond the 2^53 of a double.
+TEST(PassSumsTest, CountsATrillionPhotonsToTheLastQuantum) {
+  constexpr std::uint64_t kPhotons = 1'000'000'000'000;
+  PassSums sums(1);
+  std::uint64_t left = kPhotons;
+  while (left > 0) {
+    const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(left, UINT32_MAX));
+    Accumulation batch;
+    batch.hitpoints = {0};
+    batch.counts = {count};
+    for (auto& channel : batch.flux)
+      channel = {(std::int64_t{count} << 18) + 1};
+    batch.tally.photons = count;
+    ASSERT_TRUE(sums.Add(batch).ok());
+    left -= count;
+  }
+  constexpr std::int64_t kBatches = (kPhotons + UINT32_MAX - 1) / UINT32_MAX;
+  EXPECT_EQ(sums.counts()[0], kPhotons);
+  EXPECT_EQ(sums.flux(1)[0], (static_cast<std::int64_t>(kPhotons) << 18) + kBatches);
 }
 
 }  // namespace

@@ -44,6 +44,14 @@ TEST(RoundDitheredTest, GoesToANeighbourAndKeepsNothing) {
   }
 }
 
+TEST(RoundDitheredTest, IsExactAtTheLargestContributionAndItsSumsFit) {
+  const auto largest = static_cast<std::int64_t>(kLargestContribution);
+  EXPECT_EQ(RoundDithered(kLargestContribution, 0), largest);
+  EXPECT_EQ(RoundDithered(kLargestContribution, kDithers - 1), largest);
+  std::int64_t sum = 0;
+  EXPECT_FALSE(__builtin_mul_overflow(8 * largest, static_cast<std::int64_t>(kMostTerms), &sum));
+}
+
 TEST(QuantumForTest, IsThePowerOfTwoThatIsPromised) {
   EXPECT_EQ(QuantumFor(1), std::ldexp(1.0F, -kFluxBits));
   EXPECT_EQ(QuantumFor(std::nextafter(1.0F, 2.0F)), std::ldexp(1.0F, 1 - kFluxBits));

@@ -147,6 +147,42 @@ void ExpectEqualsOracle(const Case& input, const Kernel& kernel) {
   EXPECT_EQ(GatherAll(input, kernel, scale, 3), actual);
 }
 
+// On a glossy surface the BSDF may push a contribution beyond the range of the sums: it is left out
+// and counted, while those at its end stay.
+TEST(GatherTest, LeavesOutWhatHasNoRoomAndCountsIt) {
+  Case input;
+  input.block.positions = {{0, 0, 0}};
+  input.block.normals_oct = {EncodeOctahedral({0, 0, 1})};
+  input.radii = {1};
+  input.deposits.resize(1);
+  input.block.glossy = {{0, 1, EncodeOctahedral({0, 0, 1}), EncodeOctahedral({0, 0, 1})}};
+  const FluxScale scale = FluxScale::ForPower(Gray(1));
+  const auto add = [&](float flux) {
+    Deposit deposit{};
+    deposit.flux = {0, flux, 0};
+    deposit.normal = {0, 0, 1};
+    deposit.arrival_oct = EncodeOctahedral({0, 0, 1});
+    input.region.Add(deposit.position);
+    input.deposits[0].push_back(deposit);
+  };
+  const Vec3 up = {0, 0, 1};
+  const float bsdf = EvaluateBsdf(input.materials[1], up, up, Carried::kRadiance).g;
+  // A little below, for the rounding of the product.
+  const float largest = 0.999F * kLargestContribution * scale.watts_per_quantum.g / bsdf;
+  add(largest);
+  add(largest);
+  for (const float flux : {1.002F * largest, 3e38F, HUGE_VALF, NAN})
+    add(flux);
+  const Accumulation sum = GatherAll(input, Kernel{KernelKind::kConstant}, scale, 1);
+  ASSERT_EQ(sum.size(), 1U);
+  EXPECT_EQ(sum.counts[0], 2U);
+  EXPECT_NEAR(static_cast<double>(sum.flux[1][0]), 2 * 0.999 * 0x1p33, 0x1p34 * 0x1p-20);
+  EXPECT_EQ(sum.tally.pairs, 2U);
+  EXPECT_EQ(sum.tally.excess, 4U);
+  // The column of the error estimate has terms up to eight times as large.
+  EXPECT_LE(std::abs(sum.evidence[0][0]), 16 * static_cast<std::int64_t>(kLargestContribution));
+}
+
 TEST(GatherTest, EqualsTheSumOverAllPairs) {
   for (const KernelKind kind : {KernelKind::kConstant, KernelKind::kEpanechnikov}) {
     ExpectEqualsOracle(RandomCase(2000, 5000, /*glossy=*/false, 1), Kernel{kind});

@@ -245,6 +245,14 @@ INSTANTIATE_TEST_SUITE_P(Scales, LeavingPointTest,
                                          Leaving{1e-3F, 0}, Leaving{1e-3F, 1000}, Leaving{1e5F, 0},
                                          Leaving{1e5F, 10}));
 
+// Coordinates of 1e-6, 1 and 1e6 with sizes as large, and far below them: at 1e-5 of its
+// coordinates a shape is some hundred numbers wide.
+INSTANTIATE_TEST_SUITE_P(Coordinates, LeavingPointTest,
+                         testing::Values(Leaving{1e-6F, 0}, Leaving{1e-6F, 1}, Leaving{1e-9F, 1e3F},
+                                         Leaving{1e-11F, 1e5F}, Leaving{1e-5F, 1e5F},
+                                         Leaving{1e6F, 0}, Leaving{1e6F, 1}, Leaving{1e3F, 1e3F},
+                                         Leaving{10, 1e5F}));
+
 TEST(IntersectorTest, GivesEveryThreadTheSameHits) {
   Scene scene;
   AddMaterial(scene, DiffuseMaterial(0.5F));

@@ -12,6 +12,29 @@ SteadyTime At(double s) {
   return SteadyTime(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(s)));
 }
 
+TEST(JobBooksTest, NamesTheFirstDroppedPhotonsWhateverTheOrderOfBatches) {
+  JobBooks forward;
+  JobBooks backward;
+  for (std::uint64_t pass = 0; pass < 4; ++pass)
+    forward.NameDropped(pass, {10 - pass, 20, 30});
+  for (std::uint64_t pass = 4; pass-- > 0;)
+    backward.NameDropped(pass, {10 - pass, 20, 30});
+  const std::vector<PhotonKey> first = {{0, 10}, {0, 20}, {0, 30}, {1, 9},
+                                        {1, 20}, {1, 30}, {2, 8},  {2, 20}};
+  EXPECT_EQ(forward.dropped_photons, first);
+  EXPECT_EQ(backward.dropped_photons, first);
+}
+
+// A worker may say any time of a batch: a job's time stands still at its end and never wraps.
+TEST(SaturatingSumTest, StaysAtItsEnd) {
+  const Duration most = SaturatingSum(Duration::max(), Duration::max());
+  EXPECT_GT(most, std::chrono::hours(24 * 365 * 70));
+  EXPECT_EQ(SaturatingSum(most, std::chrono::nanoseconds(1)), most);
+  EXPECT_GT(most + most, most) << "a few of them can be added up";
+  EXPECT_EQ(SaturatingSum(std::chrono::seconds(2), std::chrono::seconds(3)),
+            std::chrono::seconds(5));
+}
+
 TEST(JobLifeTest, RunsToItsEnd) {
   JobLife life(At(10));
   EXPECT_FALSE(life.Run(At(11))) << "not prepared yet";

@@ -69,6 +69,26 @@ TEST(PassMergerTest, RefusesABatchWhoseTallyIsOfAnotherSizeAndForgetsIt) {
   EXPECT_EQ(*Merge(merger, range), Outcome::kAccepted) << "a refused batch may come again";
 }
 
+TEST(PassMergerTest, RefusesABatchThatNamesPhotonsItDidNotTrace) {
+  PassMerger merger;
+  merger.Open(kPass, 2, 100);
+  const PhotonRange range = {20, 50};
+  const auto merge = [&](std::uint64_t dropped, std::vector<std::uint64_t> named) {
+    Accumulation batch = Batch(range);
+    batch.tally.dropped = dropped;
+    batch.dropped_photons = std::move(named);
+    return merger.Merge(kPass, range, batch).status();
+  };
+  EXPECT_TRUE(absl::IsInvalidArgument(merge(1, {19})));
+  EXPECT_TRUE(absl::IsInvalidArgument(merge(1, {50})));
+  EXPECT_TRUE(absl::IsInvalidArgument(merge(2, {30, 30})));
+  EXPECT_TRUE(absl::IsInvalidArgument(merge(2, {31, 30})));
+  EXPECT_TRUE(absl::IsInvalidArgument(merge(2, {30})));
+  EXPECT_TRUE(absl::IsInvalidArgument(merge(0, {30})));
+  EXPECT_TRUE(absl::IsInvalidArgument(merge(31, {20, 21, 22, 23, 24, 25, 26, 27})));
+  EXPECT_TRUE(merge(30, {20, 21, 22, 23, 24, 25, 26, 49}).ok());
+}
+
 TEST(PassMergerTest, ADroppedPassIsSuperseded) {
   PassMerger merger;
   EXPECT_EQ(*Merge(merger, {0, 10}), Outcome::kSuperseded);

@@ -43,7 +43,21 @@ Accumulation RealisticAccumulation(std::size_t hitpoints, double touched_share) 
   std::uniform_real_distribution<double> tint(0.7, 1.0);
   std::bernoulli_distribution is_touched(touched_share);
   Accumulation accumulation;
-  accumulation.tally = {1000, 3000, 2000, 5000, 1};
+  accumulation.tally = {.photons = 1000,
+                        .rays = 3000,
+                        .deposits = 2000,
+                        .pairs = 5000,
+                        .dropped = 2,
+                        .excess = 2,
+                        .energy = {.emitted = 4'096'000,
+                                   .roulette_gave = 5,
+                                   .roulette_took = 1'000'000,
+                                   .absorbed = -6,
+                                   .escaped = 3'096'000,
+                                   .smoothing = -1,
+                                   .cut_off = 7,
+                                   .dropped = 5}};
+  accumulation.dropped_photons = {41, std::uint64_t{1} << 40};
   for (std::size_t i = 0; i < hitpoints; ++i) {
     if (!is_touched(random)) continue;
     const std::uint32_t count = std::max(1U, photons(random));

@@ -1,0 +1,235 @@
+// What photons carry away must be booked to the last unit, whatever becomes of them; a photon that
+// is not finite must be counted and named; and a replay must take the way that the photon took.
+#include "worker/photon_path.h"
+
+#include <cmath>
+#include <memory>
+
+#include "gtest/gtest.h"
+
+#include "tests/support/test_scenes.h"
+#include "worker/replay.h"
+
+namespace lucerna {
+namespace {
+
+constexpr Bounds kEverywhere{{-HUGE_VALF, -HUGE_VALF, -HUGE_VALF},
+                             {HUGE_VALF, HUGE_VALF, HUGE_VALF}};
+
+// A tracer of a scene, with all that it refers to.
+struct Traced {
+  explicit Traced(Scene s, int max_depth = 6, const Bounds& region = kEverywhere)
+      : scene(std::move(s)),
+        settings(TestSettings(scene, 20000, 0.1, max_depth)),
+        intersector(Intersector::Create(scene).value()),
+        lights(scene, *intersector),
+        tracer(scene, *intersector, lights, settings, nullptr, region) {}
+
+  [[nodiscard]] PhotonPathTracer::Landed Trace(std::uint64_t photons,
+                                               std::uint64_t pass = 0) const {
+    PhotonPathTracer::Landed landed;
+    for (std::uint64_t index = 0; index < photons; ++index)
+      tracer.Trace(pass, index, landed);
+    return landed;
+  }
+
+  Scene scene;
+  RenderSettings settings;
+  std::unique_ptr<Intersector> intersector;
+  LightSet lights;
+  PhotonPathTracer tracer;
+};
+
+// An open box with a lamp, glass, rough metal, and a floor whose shading normals are bent.
+Scene OpenBox(float reflectance = 0.7F) {
+  Scene scene;
+  const std::int32_t white = AddMaterial(scene, DiffuseMaterial(reflectance));
+  const std::int32_t glass = AddMaterial(scene, DielectricMaterial(1.5F));
+  const std::int32_t metal =
+      AddMaterial(scene, ConductorMaterial(Gray(0.2F), {3, 2, 1}, 0.4F, 0.3F));
+  AddQuad(scene, {-1, -1, -1}, {2, 0, 0}, {0, 2, 0}, white);
+  for (int i = 0; i < 4; ++i) {
+    scene.meshes.back().normals.push_back(
+        Normalize({i % 2 == 0 ? -0.9F : 0.9F, i < 2 ? -0.9F : 0.9F, 1}));
+  }
+  AddQuad(scene, {-1, -1, -1}, {0, 2, 0}, {0, 0, 2}, white);
+  AddSphere(scene, {0.4F, 0.4F, -0.5F}, 0.3F, glass);
+  AddSphere(scene, {-0.4F, -0.4F, -0.5F}, 0.3F, metal);
+  AddDisk(scene, {0, 0, 1}, {0, 0, -1}, 0.5F, white, AddAreaLight(scene, 10));
+  return scene;
+}
+
+TEST(PhotonEnergyTest, BalancesToTheUnitWithEveryAccountInUse) {
+  const Traced traced(OpenBox());
+  const PhotonPathTracer::Landed landed = traced.Trace(20000);
+  const EnergyBooks& energy = landed.energy;
+  EXPECT_TRUE(energy.Balance());
+  EXPECT_NE(energy.absorbed, 0);
+  EXPECT_NE(energy.escaped, 0);
+  EXPECT_NE(energy.roulette_took, 0);
+  EXPECT_NE(energy.roulette_gave, 0);
+  EXPECT_NE(energy.smoothing, 0);
+  EXPECT_NE(energy.cut_off, 0);
+  EXPECT_EQ(energy.dropped, 0);
+  EXPECT_EQ(landed.dropped, 0U);
+}
+
+// All photons of the one lamp carry its whole power, so each is booked as 2^kEnergyBits: that is
+// the unit, and half of it is the rounding of one photon.
+TEST(PhotonEnergyTest, CountsInShareOfTheScenesPower) {
+  const Traced traced(OpenBox());
+  EXPECT_EQ(traced.Trace(1000).energy.emitted, std::int64_t{1000} << kEnergyBits);
+}
+
+// In a closed box of reflectance rho every landing takes 1 - rho of what comes, and roulette only
+// moves power from photon to photon.
+TEST(PhotonEnergyTest, TellsHowMuchWallsAbsorb) {
+  constexpr float kRho = 0.6F;
+  constexpr int kDepth = 5;
+  Scene scene;
+  const std::int32_t white = AddMaterial(scene, DiffuseMaterial(kRho));
+  AddBox(scene, {-1, -1, -1}, {1, 1, 1}, white);
+  scene.point_lights.push_back({{0.1F, 0.2F, 0.3F}, Gray(1)});
+  const Traced traced(scene, kDepth);
+  constexpr std::uint64_t kPhotons = 20000;
+  const EnergyBooks energy = traced.Trace(kPhotons).energy;
+  EXPECT_TRUE(energy.Balance());
+  const double emitted = static_cast<double>(energy.emitted);
+  // Alive at the last landing: rho^4 of the photons, each with its first flux; five standard
+  // deviations of that binomial.
+  const double alive = std::pow(kRho, kDepth - 1);
+  const double bound = 5 * std::sqrt(alive * (1 - alive) / kPhotons);
+  EXPECT_NEAR(static_cast<double>(energy.cut_off) / emitted, alive, bound);
+  EXPECT_EQ(energy.escaped, 0);
+  // Absorbed at each landing but the last, by what arrives there: (1 - rho) (1 + rho + rho² + rho³)
+  // = 1 - rho^4 of it on average. The number of arrivals has a variance below that of a geometric
+  // distribution, 1 / (1 - rho)², so what they take of one photon has one below 1.
+  EXPECT_NEAR(static_cast<double>(energy.absorbed) / emitted, 1 - alive,
+              5 / std::sqrt(static_cast<double>(kPhotons)));
+}
+
+TEST(PhotonPathTest, NamesPhotonsThatAreNotFinite) {
+  Scene scene = OpenBox();
+  // Glass whose index is not a number: what it scatters goes nowhere.
+  scene.materials[1].ior = NAN;
+  const Traced traced(scene);
+  const PhotonPathTracer::Landed landed = traced.Trace(5000, 3);
+  ASSERT_GT(landed.dropped, kDroppedNamed);
+  ASSERT_EQ(landed.dropped_photons.size(), kDroppedNamed);
+  EXPECT_TRUE(landed.energy.Balance());
+  EXPECT_NE(landed.energy.dropped, 0);
+  std::uint64_t found = 0;
+  for (std::uint64_t index = 0; found < kDroppedNamed; ++index) {
+    if (traced.tracer.Replay(3, index).end != PhotonEnd::kNotFinite) continue;
+    EXPECT_EQ(landed.dropped_photons[found], index);
+    ++found;
+  }
+}
+
+// A landing with more than 2^15 times the scene's power has no room in the sums.
+TEST(PhotonPathTest, CountsLandingsThatAreTooBright) {
+  Scene scene = OpenBox();
+  // A mirror that gives back a million times what comes.
+  scene.materials[1] = DiffuseMaterial(1e6F);
+  scene.materials[2] = DiffuseMaterial(1e6F);
+  const Traced traced(scene);
+  const PhotonPathTracer::Landed landed = traced.Trace(5000);
+  EXPECT_GT(landed.excess, 0U);
+  EXPECT_EQ(landed.dropped, 0U);
+  EXPECT_TRUE(landed.energy.Balance());
+  const FluxScale scale = FluxScale::ForPower(traced.lights.TotalPower());
+  for (const Deposit& deposit : landed.deposits)
+    ASSERT_TRUE(scale.HasRoomFor(deposit.flux));
+}
+
+TEST(PhotonPathTest, DropsAPhotonThatIsBornInfinite) {
+  Scene scene = OpenBox();
+  const Traced traced(scene);
+  scene.area_lights[0].radiance = Gray(HUGE_VALF);
+  const Traced infinite(scene);
+  const PhotonPathTracer::Landed landed = infinite.Trace(10);
+  EXPECT_EQ(landed.dropped, 10U);
+  EXPECT_TRUE(landed.deposits.empty());
+  EXPECT_EQ(traced.Trace(10).dropped, 0U);
+}
+
+TEST(PhotonReplayTest, LeavesTheDepositsThatTheTraceLeft) {
+  const Traced traced(OpenBox());
+  for (std::uint64_t index = 0; index < 2000; ++index) {
+    PhotonPathTracer::Landed landed;
+    traced.tracer.Trace(7, index, landed);
+    const PhotonHistory history = traced.tracer.Replay(7, index);
+    std::size_t deposits = 0;
+    for (const PhotonLanding& landing : history.landings) {
+      if (!landing.leaves_deposit) continue;
+      ASSERT_LT(deposits, landed.deposits.size());
+      ASSERT_EQ(landing.surface.position, landed.deposits[deposits].position);
+      ASSERT_EQ(landing.landed, landed.deposits[deposits].flux);
+      ++deposits;
+    }
+    ASSERT_EQ(deposits, landed.deposits.size());
+  }
+}
+
+// A replay knows no hitpoints: where they are must not turn a photon.
+TEST(PhotonReplayTest, DoesNotDependOnWhereDepositsAreKept) {
+  const Traced everywhere(OpenBox());
+  const Traced nowhere(OpenBox(), 6, Bounds());
+  for (std::uint64_t index = 0; index < 500; ++index) {
+    const PhotonHistory a = everywhere.tracer.Replay(0, index);
+    const PhotonHistory b = nowhere.tracer.Replay(0, index);
+    ASSERT_EQ(a.end, b.end);
+    ASSERT_EQ(a.landings.size(), b.landings.size());
+    for (std::size_t i = 0; i < a.landings.size(); ++i) {
+      ASSERT_EQ(a.landings[i].surface.position, b.landings[i].surface.position);
+    }
+  }
+  EXPECT_EQ(everywhere.Trace(500).rays, nowhere.Trace(500).rays);
+  EXPECT_EQ(nowhere.Trace(500).deposits.size(), 0U);
+}
+
+// Numbers of photons do not wrap within the largest job that can be asked for.
+TEST(PhotonReplayTest, TellsPhotonsApartBeyondTwoToTheFiftyThird) {
+  Traced traced(OpenBox());
+  traced.settings.photons_per_pass = 1'000'000'000'000;
+  const std::uint64_t last = 999'999'999'999;
+  const auto place = [&](std::uint64_t pass, std::uint64_t index) {
+    return traced.tracer.Replay(pass, index).emission.ray.origin;
+  };
+  const std::uint64_t far = (std::uint64_t{1} << 24) - 2;  // photon 8.4e18 of its sequence
+  EXPECT_NE(place(far, last), place(far, last - 1));
+  EXPECT_NE(place(far, last), place(far - 2, last));
+  EXPECT_NE(place(far, last), place(0, last));
+}
+
+TEST(PhotonReplayTest, TellsEveryStepOfAMirroredPhoton) {
+  Scene scene;
+  const std::int32_t mirror =
+      AddMaterial(scene, ConductorMaterial(Gray(1), Gray(AbsorptionFor(0.5F)), 0, 0));
+  AddQuad(scene, {-10, -10, 0}, {20, 0, 0}, {0, 20, 0}, mirror);
+  scene.spot_lights.push_back({{0, 0, 2}, {0, 0, -1}, Gray(1), 0.9999F, 0.9998F});
+  scene.materials.push_back({});
+  const RenderSettings settings = TestSettings(scene, 100, 0.1, 4);
+  const auto path = ReplayInScene(scene, settings, 0, 5);
+  ASSERT_TRUE(path.ok()) << path.status();
+  EXPECT_EQ(path->emission().light(), "spot light 0");
+  EXPECT_EQ(path->emission().position().z(), 2);
+  ASSERT_EQ(path->landings_size(), 1);
+  const v1::PhotonPath::Landing& landing = path->landings(0);
+  EXPECT_EQ(landing.material(), "0 (conductor)");
+  EXPECT_NEAR(landing.distance(), 2, 1e-3) << "the cone is 1.2 degrees wide";
+  EXPECT_EQ(landing.position().z(), 0);
+  EXPECT_EQ(landing.deposit(), v1::DEPOSIT_FATE_NOT_GATHERED);
+  EXPECT_EQ(landing.scattering().chosen(), "smooth reflection");
+  EXPECT_NEAR(landing.scattering().survival(), 0.5, 1e-3);
+  EXPECT_EQ(landing.scattering().direction().z(), -path->emission().direction().z());
+  EXPECT_EQ(path->end(),
+            landing.scattering().survived() ? v1::PHOTON_END_ESCAPED : v1::PHOTON_END_ROULETTE);
+
+  EXPECT_TRUE(absl::IsOutOfRange(ReplayInScene(scene, settings, 0, 100).status()));
+  EXPECT_TRUE(
+      absl::IsOutOfRange(ReplayInScene(scene, settings, std::uint64_t{1} << 60, 0).status()));
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,195 @@
+#include "worker/replay.h"
+
+#include <utility>
+
+#include "render/scene/pbrt_parser.h"
+#include "render/transport/working_space.h"
+#include "render/wire/messages.h"
+#include "worker/connection.h"
+#include "worker/photon_path.h"
+#include "worker/scene_cache.h"
+
+namespace lucerna {
+namespace {
+
+// More than any job has; keeps the number of a photon within 64 bits.
+constexpr std::uint64_t kMostPasses = std::uint64_t{1} << 24;
+
+v1::Triple TripleOf(float x, float y, float z) {
+  v1::Triple triple;
+  triple.set_x(x);
+  triple.set_y(y);
+  triple.set_z(z);
+  return triple;
+}
+v1::Triple TripleOf(Vec3 v) {
+  return TripleOf(v.x, v.y, v.z);
+}
+v1::Triple TripleOf(Rgb c) {
+  return TripleOf(c.r, c.g, c.b);
+}
+
+std::string NameOf(const Emitter& light) {
+  const char* kind = "light";
+  switch (light.kind) {
+    case EmitterKind::kTriangle:
+      return absl::StrCat("triangle ", light.primitive, " of mesh ", light.geometry);
+    case EmitterKind::kSphere:
+      kind = "sphere";
+      break;
+    case EmitterKind::kDisk:
+      kind = "disk";
+      break;
+    case EmitterKind::kPoint:
+      kind = "point light";
+      break;
+    case EmitterKind::kSpot:
+      kind = "spot light";
+      break;
+    case EmitterKind::kDistant:
+      kind = "distant light";
+      break;
+    case EmitterKind::kInfinite:
+      return "the even sky";
+    case EmitterKind::kEnvironment:
+      kind = "environment map";
+      break;
+  }
+  return absl::StrCat(kind, " ", light.primitive);
+}
+
+std::string NameOfShape(const SurfacePoint& surface, const Intersector& intersector) {
+  if (surface.geometry < intersector.sphere_geometry()) {
+    return absl::StrCat("triangle ", surface.primitive, " of mesh ", surface.geometry);
+  }
+  return absl::StrCat(surface.geometry == intersector.disk_geometry() ? "disk " : "sphere ",
+                      surface.primitive);
+}
+
+const char* NameOf(Material::Kind kind) {
+  switch (kind) {
+    case Material::Kind::kDiffuse:
+      return "diffuse";
+    case Material::Kind::kConductor:
+      return "conductor";
+    case Material::Kind::kDielectric:
+      return "dielectric";
+  }
+  return "";
+}
+
+v1::PhotonEnd EndToProto(PhotonEnd end) {
+  switch (end) {
+    case PhotonEnd::kNotEmitted:
+      return v1::PHOTON_END_NOT_EMITTED;
+    case PhotonEnd::kEscaped:
+      return v1::PHOTON_END_ESCAPED;
+    case PhotonEnd::kAbsorbed:
+      return v1::PHOTON_END_ABSORBED;
+    case PhotonEnd::kSmoothing:
+      return v1::PHOTON_END_SMOOTHING;
+    case PhotonEnd::kRoulette:
+      return v1::PHOTON_END_ROULETTE;
+    case PhotonEnd::kDepth:
+      return v1::PHOTON_END_DEPTH;
+    case PhotonEnd::kNotFinite:
+      return v1::PHOTON_END_NOT_FINITE;
+  }
+  return v1::PHOTON_END_UNSPECIFIED;
+}
+
+v1::DepositFate FateOf(const PhotonLanding& landing) {
+  if (landing.leaves_deposit) return v1::DEPOSIT_FATE_LEFT;
+  if (!landing.gathers) return v1::DEPOSIT_FATE_NOT_GATHERED;
+  return landing.is_indirect ? v1::DEPOSIT_FATE_TOO_BRIGHT : v1::DEPOSIT_FATE_DIRECT;
+}
+
+std::string ChosenIn(const PhotonLanding& landing) {
+  if (landing.material_kind == Material::Kind::kDiffuse) return "diffuse reflection";
+  return absl::StrCat(landing.is_smooth ? "smooth " : "rough ",
+                      landing.transmits ? "transmission" : "reflection");
+}
+
+v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing,
+                                       const Intersector& intersector) {
+  v1::PhotonPath::Landing message;
+  message.set_shape(NameOfShape(landing.surface, intersector));
+  message.set_material(
+      absl::StrCat(landing.surface.material, " (", NameOf(landing.material_kind), ")"));
+  message.set_distance(static_cast<double>(landing.distance));
+  *message.mutable_position() = TripleOf(landing.surface.position);
+  *message.mutable_geometric_normal() = TripleOf(landing.surface.geometric_normal);
+  *message.mutable_shading_normal() = TripleOf(landing.surface.shading_normal);
+  *message.mutable_flux_arriving() = TripleOf(landing.arriving);
+  if (landing.was_received) {
+    *message.mutable_flux_landed() = TripleOf(landing.landed);
+    message.set_deposit(FateOf(landing));
+  }
+  if (landing.was_scattered) {
+    v1::PhotonPath::Landing::Scattering& scattering = *message.mutable_scattering();
+    scattering.set_chosen(ChosenIn(landing));
+    *scattering.mutable_direction() = TripleOf(landing.leaving);
+    *scattering.mutable_flux() = TripleOf(landing.scattered);
+    scattering.set_survival(landing.survival);
+    scattering.set_survived(landing.went_on);
+    *scattering.mutable_flux_leaving() =
+        TripleOf(landing.went_on ? landing.leaving_flux : landing.scattered);
+  }
+  return message;
+}
+
+}  // namespace
+
+StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& settings,
+                                       std::uint64_t pass, std::uint64_t index) {
+  if (pass >= kMostPasses || index >= static_cast<std::uint64_t>(settings.photons_per_pass)) {
+    return absl::OutOfRangeError(
+        absl::StrCat("there is no photon ", pass, ":", index,
+                     ": passes count from 0, and the photons of each from 0 to ",
+                     settings.photons_per_pass - 1));
+  }
+  const Scene scene = InWorkingSpace(std::move(rec709));
+  LUCERNA_ASSIGN_OR_RETURN(const auto intersector, Intersector::Create(scene));
+  const LightSet lights(scene, *intersector);
+  const PhotonPathTracer tracer(scene, *intersector, lights, settings, nullptr, Bounds());
+  const PhotonHistory history = tracer.Replay(pass, index);
+
+  v1::PhotonPath path;
+  path.mutable_key()->set_pass(pass);
+  path.mutable_key()->set_index(index);
+  path.set_end(EndToProto(history.end));
+  if (history.end == PhotonEnd::kNotEmitted) return path;
+  v1::PhotonPath::Emission& emission = *path.mutable_emission();
+  emission.set_light(NameOf(lights.emitter(history.emission.emitter)));
+  *emission.mutable_position() = TripleOf(history.emission.ray.origin);
+  *emission.mutable_direction() = TripleOf(history.emission.ray.direction);
+  *emission.mutable_flux() = TripleOf(history.emission.flux);
+  for (const PhotonLanding& landing : history.landings) {
+    *path.add_landings() = LandingToProto(landing, *intersector);
+  }
+  return path;
+}
+
+StatusOr<v1::PhotonPath> Replay(const ReplayOptions& options) {
+  Connection connection(options.server);
+  if (!connection.WaitUntilConnected(options.connect_timeout)) {
+    return absl::UnavailableError(absl::StrCat("no coordinator answers at ", options.server,
+                                               "; is lucerna-server running there?"));
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const v1::JobDescription job, connection.DescribeJob(options.job_id));
+  if (job.numeric_profile() != options.numeric_profile) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("this program has the numeric profile \"", options.numeric_profile,
+                     "\" and the coordinator \"", job.numeric_profile(),
+                     "\"; the photon would take another way, run the same build on both"));
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const RenderSettings settings, FromProto(job.settings()));
+  LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest, FromProto(job.scene()));
+  LUCERNA_ASSIGN_OR_RETURN(Scene scene,
+                           FetchScene(manifest, [&](const Digest& digest, std::uint64_t max_bytes) {
+                             return connection.Fetch(digest, max_bytes);
+                           }));
+  return ReplayInScene(std::move(scene), settings, options.pass, options.index);
+}
+
+}  // namespace lucerna

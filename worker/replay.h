@@ -1,0 +1,37 @@
+// What did that photon of that job do?
+//
+// Traces one photon of a job again, with the scene and settings that its coordinator still has, and
+// tells the way it took. Needs neither hitpoints nor radii, so a job may be over: a photon's walk
+// is a function of scene, settings, pass and index.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "proto/lucerna/v1/photons.pb.h"
+#include "render/base/clock.h"
+#include "render/base/status.h"
+#include "render/scene/render_settings.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+struct ReplayOptions {
+  std::string server;  // host:port
+  Duration connect_timeout{};
+  std::string numeric_profile;
+  std::string job_id;
+  std::uint64_t pass = 0;
+  std::uint64_t index = 0;
+};
+
+// Errors: UNAVAILABLE when no coordinator answers, NOT_FOUND when it does not have the job or its
+// scene any more, FAILED_PRECONDITION when its numeric profile is another, OUT_OF_RANGE for a
+// photon that no pass of the job has.
+[[nodiscard]] StatusOr<v1::PhotonPath> Replay(const ReplayOptions& options);
+
+// The same of a scene that is at hand, in Rec. 709.
+[[nodiscard]] StatusOr<v1::PhotonPath> ReplayInScene(Scene scene, const RenderSettings& settings,
+                                                     std::uint64_t pass, std::uint64_t index);
+
+}  // namespace lucerna
