@@ -354,4 +354,21 @@ std::string DigestReport(const Image& image) {
                  {"metadata", image.metadata}});
 }
 
+std::string SelfcheckReport(const std::vector<SelfcheckResult>& results) {
+  Json cases = Json::array();
+  bool all_hold = true;
+  for (const SelfcheckResult& result : results) {
+    all_hold = all_hold && result.outcome.holds;
+    // A figure that is not a number becomes null.
+    cases.push_back({{"name", result.name},
+                     {"claim", result.claim},
+                     {"figure", result.outcome.figure},
+                     {"bound", result.outcome.bound},
+                     {"note", result.outcome.note},
+                     {"holds", result.outcome.holds},
+                     {"wall_s", result.wall_s}});
+  }
+  return ToText({{"holds", all_hold}, {"cases", cases}});
+}
+
 }  // namespace lucerna

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/comparison.h"
+#include "client/selfcheck.h"
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "render/base/digest.h"
 #include "render/film/image_metrics.h"
@@ -40,5 +41,6 @@ struct SavedImage {
 // Of an image that MakeReference made.
 [[nodiscard]] std::string ReferenceReport(const Image& reference, const std::string& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
+[[nodiscard]] std::string SelfcheckReport(const std::vector<SelfcheckResult>& results);
 
 }  // namespace lucerna
