@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/math/double3.h"
 #include "render/math/warp.h"
 
 namespace lucerna {
@@ -50,8 +51,8 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     for (std::uint32_t t = 0; t < mesh.indices.size() / 3; ++t) {
       const std::uint32_t* corner = &mesh.indices[std::size_t{3} * t];
       const Vec3 p0 = mesh.positions[corner[0]];
-      const float area =
-          0.5F * Length(Cross(mesh.positions[corner[1]] - p0, mesh.positions[corner[2]] - p0));
+      const auto area = static_cast<float>(
+          Length(TriangleCross(p0, mesh.positions[corner[1]], mesh.positions[corner[2]])) / 2);
       Emitter emitter = area_emitter(Kind::kTriangle, mesh.traits, area);
       emitter.geometry = m;
       emitter.primitive = t;
@@ -177,7 +178,7 @@ void LightSet::PointOn(const Emitter& emitter, float u1, float u2, Vec3& positio
       float b2 = 0;
       SquareToTriangle(u1, u2, b1, b2);
       position = p0 + e1 * b1 + e2 * b2;
-      normal = Normalize(Cross(e1 * (1 / MaxAbs(e1)), e2 * (1 / MaxAbs(e2))));
+      normal = TriangleNormal(p0, mesh.positions[corner[1]], mesh.positions[corner[2]]);
       clearance = kClearance * (MaxAbs(p0) + MaxAbs(e1) + MaxAbs(e2));
       return;
     }
