@@ -12,6 +12,23 @@
 #include "server/eye_path.h"
 
 namespace lucerna {
+namespace {
+
+// Layers that are lengths, or one over a length, as the scene's file measures them.
+void ToFileUnit(Image& image, double unit) {
+  if (unit == 1) return;
+  for (ImageChannel& channel : image.channels) {
+    const bool is_length =
+        channel.name == "Z" || channel.name == "radius" || channel.name == "min_radius";
+    if (!is_length && channel.name != "bandwidth") continue;
+    const double factor = is_length ? unit : 1 / unit;
+    for (float& value : channel.pixels)
+      value = static_cast<float>(static_cast<double>(value) * factor);
+  }
+}
+
+}  // namespace
+
 struct JobEstimator::State {
   State(Scene s, RenderSettings r, int threads)
       : scene(InWorkingSpace(std::move(s))), settings(r), team(threads) {}
@@ -53,7 +70,8 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   const int height = settings.crop_height();
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const auto initial = static_cast<float>(
-      settings.initial_radius > 0 ? settings.initial_radius : settings.initial_footprints);
+      settings.initial_radius > 0 ? settings.initial_radius / state->scene.unit
+                                  : settings.initial_footprints);
   state->controller = MakeRadiusController(state->settings, initial);
   state->statistics =
       std::make_unique<PixelStatistics>(pixels, initial, state->controller->MemoryPerPixel());
@@ -107,6 +125,7 @@ std::uint64_t JobEstimator::eye_rays() const {
 Image JobEstimator::MakeImage() const {
   Image image = state_->film->MakeImage(*state_->statistics, *state_->controller,
                                         Kernel{state_->settings.kernel});
+  ToFileUnit(image, state_->scene.unit);
   if (passes_applied() < 2) return image;
   // Single pixels: their own variance over passes, made as large in all as the halves say it is.
   const double factor = EstimateError(1).noise_factor;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cfloat>
 #include <charconv>
 #include <cmath>
 #include <iterator>
@@ -19,6 +20,7 @@
 #include "render/scene/ply_file.h"
 #include "render/scene/scene_builder.h"
 #include "render/scene/scene_extent.h"
+#include "render/scene/scene_unit.h"
 #include "render/scene/tokenizer.h"
 
 namespace lucerna {
@@ -1119,6 +1121,17 @@ void PbrtParser::Finish() {
   if (scene_.area_lights.empty() && scene_.point_lights.empty() && scene_.spot_lights.empty() &&
       scene_.distant_lights.empty() && scene_.infinite_lights.empty()) {
     diagnostics_.Warning(whole, "the scene has no light: the image will be black");
+  }
+  if (const Status chosen = ChooseUnit(scene_); !chosen.ok()) {
+    diagnostics_.Error(whole, std::string(chosen.message()));
+  }
+  std::size_t dropped = 0;
+  for (TriangleMesh& mesh : scene_.meshes)
+    dropped += DropTriangles(mesh, FLT_MIN);
+  std::erase_if(scene_.meshes, [](const TriangleMesh& mesh) { return mesh.indices.empty(); });
+  if (dropped > 0) {
+    diagnostics_.Note(whole, Concat(dropped, dropped == 1 ? " triangle has" : " triangles have",
+                                    " no area in single precision and are dropped"));
   }
 }
 

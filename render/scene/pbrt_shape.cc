@@ -61,14 +61,14 @@ Double3 EdgeCross(const TriangleMesh& mesh, std::size_t triangle) {
                        mesh.positions[mesh.indices[3 * triangle + 2]]);
 }
 
-// Drops the triangles whose area is no normal float: they can neither be seen nor lit. Returns how
-// many.
-std::size_t DropDegenerate(TriangleMesh& mesh) {
+}  // namespace
+
+std::size_t DropTriangles(TriangleMesh& mesh, double least_area) {
   std::size_t kept = 0;
   const std::size_t count = mesh.indices.size() / 3;
   for (std::size_t triangle = 0; triangle < count; ++triangle) {
     const double area = Length(EdgeCross(mesh, triangle)) / 2;
-    if (!(area >= static_cast<double>(FLT_MIN) && area <= static_cast<double>(FLT_MAX))) continue;
+    if (!(area >= least_area && std::isfinite(area))) continue;
     for (std::size_t i = 0; i < 3; ++i)
       mesh.indices[3 * kept + i] = mesh.indices[3 * triangle + i];
     ++kept;
@@ -76,6 +76,11 @@ std::size_t DropDegenerate(TriangleMesh& mesh) {
   mesh.indices.resize(3 * kept);
   return count - kept;
 }
+
+namespace {
+
+// The area of what the unit of the scene may yet make large enough (scene_unit.h).
+constexpr double kLeastArea = 1e-90;
 
 // Puts a mesh with sound indices where `placement` says.
 void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
@@ -88,7 +93,7 @@ void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacemen
     for (Vec3& normal : mesh.normals)
       normal = -normal;
   }
-  const std::size_t dropped = DropDegenerate(mesh);
+  const std::size_t dropped = DropTriangles(mesh, kLeastArea);
   if (dropped > 0) {
     parameters.diagnostics().Note(
         parameters.place(),
@@ -293,7 +298,7 @@ StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world
   for (const TriangleMesh& original : object.meshes) {
     TriangleMesh mesh = original;
     if (!Move(to_world, mesh)) return moved_away;
-    DropDegenerate(mesh);
+    DropTriangles(mesh, kLeastArea);
     if (mesh.indices.empty()) continue;
     // The outward side stays outward: a mirror image is wound the other way round.
     if (to_world.SwapsHandedness()) {
