@@ -1,5 +1,6 @@
 #include "render/scene/scene_unit.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "render/scene/scene_extent.h"
@@ -13,6 +14,9 @@ namespace {
 constexpr int kLowest = -16;
 constexpr int kHighest = 20;
 constexpr int kChosen = 10;
+// Rays begin at cameras and lights too, and Embree ends the program for one that begins beyond
+// 2^60. Whatever lies farther than this from a scene of common size neither sees nor lights it.
+constexpr int kFarthest = 50;
 
 Vec3 Times(Vec3 v, double factor) {
   return {static_cast<float>(static_cast<double>(v.x) * factor),
@@ -34,14 +38,39 @@ Status ScaleIntensity(Rgb& intensity, double factor) {
       "single precision; scale the scene up or the intensity down");
 }
 
+double FarthestOf(const Scene& scene) {
+  double farthest = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto& row = scene.camera.camera_to_world.rows()[axis];
+    const double on_lens = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
+    farthest = std::max(farthest, std::abs(row[3]) + scene.camera.lens_radius * on_lens);
+  }
+  for (const PointLight& light : scene.point_lights)
+    farthest = std::max(farthest, static_cast<double>(MaxAbs(light.position)));
+  for (const SpotLight& light : scene.spot_lights)
+    farthest = std::max(farthest, static_cast<double>(MaxAbs(light.position)));
+  return farthest;
+}
+
+// Of the power of two that is to be the unit.
+int ExponentFor(const Scene& scene) {
+  int exponent = 0;
+  if (const double largest = ExtentOf(scene).largest; largest > 0) {
+    const int own = std::ilogb(largest);
+    if (own < kLowest || own > kHighest) exponent = own - kChosen;
+  }
+  if (const double farthest = FarthestOf(scene); farthest > 0) {
+    exponent = std::max(exponent, std::ilogb(farthest) - kFarthest);
+  }
+  return exponent;
+}
+
 }  // namespace
 
 Status ChooseUnit(Scene& scene) {
-  const double largest = ExtentOf(scene).largest;
-  if (!(largest > 0)) return absl::OkStatus();
-  const int exponent = std::ilogb(largest);
-  if (exponent >= kLowest && exponent <= kHighest) return absl::OkStatus();
-  scene.unit = std::ldexp(1.0, exponent - kChosen);
+  const int exponent = ExponentFor(scene);
+  if (exponent == 0) return absl::OkStatus();
+  scene.unit = std::ldexp(1.0, exponent);
   const double factor = 1 / scene.unit;
 
   for (TriangleMesh& mesh : scene.meshes) {

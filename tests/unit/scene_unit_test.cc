@@ -74,6 +74,22 @@ TEST(SceneUnitTest, ALightThatIsTooStrongForSoSmallASceneIsRefused) {
   EXPECT_THAT(std::string(parsed.ToStatus().message()), HasSubstr("too strong for the size"));
 }
 
+// A ray that begins beyond the range that Embree takes would end the coordinator.
+TEST(SceneUnitTest, CamerasAndLightsStayWhereRaysMayBegin) {
+  constexpr float kFarthest = 0x1p51F;
+  const ParsedScene light = SceneOfSize("1", "1e30", "0");
+  ASSERT_TRUE(light.ok()) << light.ToStatus();
+  EXPECT_LE(MaxAbs(light.scene.point_lights[0].position), kFarthest);
+  MemoryFiles files({{"scene.pbrt",
+                      "LookAt 1e30 0 -4  1e30 0 0  0 1 0\n"
+                      "Camera \"perspective\" \"float lensradius\" [1e35]\nWorldBegin\n"
+                      "Shape \"sphere\"\n"}});
+  const ParsedScene camera = ParsePbrt(files, "scene.pbrt");
+  ASSERT_TRUE(camera.ok()) << camera.ToStatus();
+  const auto lens = static_cast<float>(camera.scene.camera.lens_radius);
+  EXPECT_LE(MaxAbs(camera.scene.camera.camera_to_world.Point({lens, lens, 0})), kFarthest);
+}
+
 TEST(SceneExtentTest, AFarSceneIsToldSoAndANearOneIsNot) {
   const auto said = [](const ParsedScene& parsed) {
     std::string all;
