@@ -125,7 +125,7 @@ TEST(RenderSettingsTest, RefusesWhatIsOutOfRangeByTheFlagsName) {
   user.height = 4096;
   EXPECT_EQ(Why(user), "");
   user.height = 4097;
-  EXPECT_THAT(Why(user), HasSubstr("more than the 33554432 of one job"));
+  EXPECT_THAT(Why(user), HasSubstr("more than the 268435456 of one job"));
 }
 
 TEST(RenderSettingsTest, NamesAreReadBack) {
