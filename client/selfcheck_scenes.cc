@@ -61,9 +61,9 @@ class RoomText {
 
  private:
   [[nodiscard]] Point Turned(Point p) const {
-    const auto first = static_cast<std::size_t>((room_.turn_axis + 1) % 3);
-    const auto second = static_cast<std::size_t>((room_.turn_axis + 2) % 3);
-    for (int turn = 0; turn < room_.quarter_turns; ++turn) {
+    for (const int axis : room_.turns) {
+      const auto first = static_cast<std::size_t>((axis + 1) % 3);
+      const auto second = static_cast<std::size_t>((axis + 2) % 3);
       const double old = p[first];
       p[first] = -p[second];
       p[second] = old;
@@ -102,24 +102,28 @@ std::string RoomText::Mesh(std::vector<Triangle> triangles) const {
     triangles = Split(triangles);
   if (room_.is_reversed) std::ranges::reverse(triangles);
   std::vector<std::string> points;
+  std::vector<std::string> uvs;
   std::vector<std::size_t> indices;
   for (const Triangle& triangle : triangles) {
     for (const Point& corner : triangle) {
       indices.push_back(points.size());
       points.push_back(Words(Placed(corner)));
+      // Of the floor, the only mesh with a texture.
+      uvs.push_back(absl::StrFormat("%.17g %.17g", (corner[0] + 1) / 2, (corner[2] + 1) / 2));
     }
   }
   return absl::StrCat("Shape \"trianglemesh\" \"point3 P\" [", absl::StrJoin(points, "  "),
-                      "] \"integer indices\" [", absl::StrJoin(indices, " "), "]\n");
+                      "] \"point2 uv\" [", absl::StrJoin(uvs, "  "), "] \"integer indices\" [",
+                      absl::StrJoin(indices, " "), "]\n");
 }
 
 std::string RoomText::Standing(const Point& center, const Point& axis,
                                const std::string& shape) const {
-  // Any two axes at right angles to it do.
+  // The axes follow one another as the right hand has them.
   const Point x = {axis[1], axis[2], axis[0]};
   const Point y = {axis[1] * x[2] - axis[2] * x[1], axis[2] * x[0] - axis[0] * x[2],
                    axis[0] * x[1] - axis[1] * x[0]};
-  return absl::StrCat("AttributeBegin\nTransform [", Words(Turned(y)), " 0  ", Words(Turned(x)),
+  return absl::StrCat("AttributeBegin\nTransform [", Words(Turned(x)), " 0  ", Words(Turned(y)),
                       " 0  ", Words(Turned(axis)), " 0  ", Words(Placed(center)), " 1]\n", shape,
                       "\nAttributeEnd\n");
 }

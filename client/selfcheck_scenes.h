@@ -8,6 +8,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace lucerna {
 
@@ -29,8 +30,7 @@ struct CheckRoom {
 
   // Every point p becomes offset + scale · R p.
   double scale = 1;
-  int turn_axis = 1;      // of R, 0 to 2
-  int quarter_turns = 0;  // of R
+  std::vector<int> turns = {};  // R: quarter turns about these axes (0 to 2), the first one first
   std::array<double, 3> offset = {0, 0, 0};
   // Of radiance and intensity. The intensity of point and spot lights also grows with scale², so
   // that the image stays.

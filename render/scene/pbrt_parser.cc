@@ -18,11 +18,15 @@
 #include "render/scene/parameter_list.h"
 #include "render/scene/ply_file.h"
 #include "render/scene/scene_builder.h"
+#include "render/scene/scene_extent.h"
 #include "render/scene/tokenizer.h"
 
 namespace lucerna {
 namespace {
 
+// A scene farther than so many times its size from the origin gets a warning. Up to there images
+// agree within their noise (docs/numerics.md).
+constexpr double kFarSizes = 1e4;
 constexpr std::size_t kMaxNesting = 1000;  // AttributeBegin within AttributeBegin
 
 std::optional<double> ParseNumber(std::string_view text) {
@@ -1098,6 +1102,14 @@ void PbrtParser::Finish() {
       diagnostics_.Warning(whole,
                            "a mesh with a texture has no uv: every triangle shows half of it");
     }
+  }
+  const SceneExtent extent = ExtentOf(scene_);
+  if (extent.size > 0 && extent.from_origin > kFarSizes * extent.size) {
+    const double sizes = extent.from_origin / extent.size;
+    diagnostics_.Warning(
+        whole, Concat("the scene lies ", std::round(sizes),
+                      " times its own size from the origin, where single precision keeps 1/",
+                      std::round(std::max(1.0, 0x1p24 / sizes)), " of that size; move it nearer"));
   }
   if (!in_world_) diagnostics_.Error(whole, "the scene has no WorldBegin");
   if (!has_camera_) diagnostics_.Error(whole, "the scene has no camera");
