@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
+#include <fstream>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <string_view>
-
-#include "render/base/files.h"
 
 namespace lucerna {
 namespace {
@@ -24,9 +24,10 @@ std::optional<std::uint64_t> NumberAfter(std::string_view text, std::string_view
 }
 
 std::optional<std::uint64_t> NumberInFile(const std::string& path, std::string_view label) {
-  const StatusOr<std::string> text = ReadFile(path);
-  if (!text.ok()) return std::nullopt;
-  return NumberAfter(*text, label);
+  // These files have no size to be read by.
+  std::ifstream file(path);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  return NumberAfter(text, label);
 }
 
 }  // namespace
