@@ -27,6 +27,13 @@ void ToFileUnit(Image& image, double unit) {
   }
 }
 
+Status CheckPower(Rgb power_w) {
+  if (IsFinite(power_w) && std::isfinite(Luminance(power_w))) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      "the lights of the scene emit more power than a number holds (3e38 W); make all of them "
+      "dimmer by the same factor, and the image brighter by it with the film's iso");
+}
+
 }  // namespace
 
 struct JobEstimator::State {
@@ -63,6 +70,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   auto state = std::make_unique<State>(std::move(scene), settings, threads);
   LUCERNA_ASSIGN_OR_RETURN(state->intersector, Intersector::Create(state->scene));
   state->lights = std::make_unique<LightSet>(state->scene, *state->intersector);
+  LUCERNA_RETURN_IF_ERROR(CheckPower(state->lights->TotalPower()));
   state->tracer = std::make_unique<EyePathTracer>(state->scene, state->settings,
                                                   *state->intersector, *state->lights);
   state->scale = FluxScale::ForPower(state->lights->TotalPower());

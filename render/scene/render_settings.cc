@@ -14,9 +14,9 @@ constexpr int kMaxSide = 65536;
 // In the unit that the scene is rendered in: the square of a radius is a float.
 constexpr double kLeastRadius = 1e-18;
 constexpr double kMostRadius = 1e18;
-// An image of 7680 x 4320 fits. The coordinator keeps some 570 bytes a pixel, and must not be
-// ended for want of memory by one job among many.
-constexpr std::int64_t kMaxPixels = std::int64_t{1} << 25;
+// An image of 16384 x 16384 fits. Whether it fits into a coordinator's memory too is for that to
+// say (server/memory_need.h).
+constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
 constexpr std::int64_t kMaxPhotonsPerPass = 1'000'000'000'000;
 constexpr int kMaxDepth = 10'000;
 constexpr std::int64_t kDefaultPasses = 16;
