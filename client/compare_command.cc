@@ -108,9 +108,9 @@ double CpuSeconds(const v1::Progress& progress) {
 // Makes the runs, one after the other.
 class Comparer {
  public:
-  Comparer(LocalRuns& runs, const Yardstick& yardstick, const CompareRequest& request,
-           const Voice& voice)
-      : runs_(runs), yardstick_(yardstick), request_(request), voice_(voice) {
+  Comparer(LocalRuns& runs, const SceneManifest& manifest, const Yardstick& yardstick,
+           const CompareRequest& request, const Voice& voice)
+      : runs_(runs), manifest_(manifest), yardstick_(yardstick), request_(request), voice_(voice) {
     // Fetching images would take the time that is measured.
     voice_.previews = false;
   }
@@ -157,7 +157,8 @@ class Comparer {
                              const std::string& reference_path) {
     for (int attempt = 1;; ++attempt) {
       overrides.time_s = seconds / busy_share_;
-      LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, runs_.Run(overrides, reference_path, voice_));
+      LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, runs_.Run(request_.scene_path, manifest_,
+                                                            overrides, reference_path, voice_));
       const double had_s = CpuSeconds(job.progress()) / Cores();
       const double wall_s = Seconds(FromProto(job.progress().running()));
       busy_share_ = wall_s > 0 ? std::clamp(had_s / wall_s, kLeastBusyShare, 1.0) : kFirstBusyShare;
@@ -173,6 +174,7 @@ class Comparer {
 
   double busy_share_ = kFirstBusyShare;
   LocalRuns& runs_;
+  const SceneManifest& manifest_;
   const Yardstick& yardstick_;
   const CompareRequest& request_;
   Voice voice_;
@@ -315,8 +317,7 @@ Status CompareSettings(const CompareRequest& request, const ClusterOptions& clus
   LUCERNA_ASSIGN_OR_RETURN(const SceneOfJobs scene,
                            ReadSceneOfJobs(request.scene_path, overrides, voice.quiet));
   LUCERNA_RETURN_IF_ERROR(CheckSizes(settings, scene, yardstick->reference));
-  LUCERNA_ASSIGN_OR_RETURN(const auto runs,
-                           LocalRuns::Start(cluster, request.scene_path, scene.manifest));
+  LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster));
 
   // The coordinator's own record measures so.
   const bool has_record = request.mask_path.empty() && request.trim_share == kTrimmedShare;
@@ -324,7 +325,7 @@ Status CompareSettings(const CompareRequest& request, const ClusterOptions& clus
   std::vector<double> stops = times;
   if (stops.size() == 1) stops.insert(stops.begin(), stops[0] / 2);
   std::vector<ComparedRun> measured;
-  Comparer comparer(*runs, *yardstick, request, voice);
+  Comparer comparer(*runs, scene.manifest, *yardstick, request, voice);
   for (int repetition = 0; repetition < request.repetitions; ++repetition) {
     const std::size_t first = measured.size();
     for (std::size_t i = 0; i < settings.size(); ++i) {

@@ -80,9 +80,9 @@ Status Render(const RenderRequest& request, const ClusterOptions& cluster_option
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene_path, overrides, voice.quiet));
-  LUCERNA_ASSIGN_OR_RETURN(const auto runs,
-                           LocalRuns::Start(cluster_options, request.scene_path, manifest));
-  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, runs->Run(overrides, request.reference, voice));
+  LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster_options));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, runs->Run(request.scene_path, manifest, overrides,
+                                                        request.reference, voice));
   return SaveAndReport(runs->connection(), job, request.outputs, voice);
 }
 
@@ -92,9 +92,9 @@ Status Submit(const RenderRequest& request, const std::string& server, const Voi
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene_path, overrides, voice.quiet));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
-  LUCERNA_ASSIGN_OR_RETURN(
-      const v1::SubmitResponse submitted,
-      SendJob(*connection, request.scene_path, manifest, overrides, request.reference));
+  DirectoryFiles files(SplitScenePath(request.scene_path).folder);
+  LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
+                           SendJob(*connection, files, manifest, overrides, request.reference));
   if (request.outputs.empty()) {
     Print(voice.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
     return absl::OkStatus();

@@ -66,11 +66,10 @@ class Progress {
 
 }  // namespace
 
-StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, const std::string& scene_path,
+StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& files,
                                      const SceneManifest& manifest,
                                      const RenderOverrides& overrides,
                                      const std::string& reference_path) {
-  DirectoryFiles files(SplitScenePath(scene_path).folder);
   LUCERNA_RETURN_IF_ERROR(connection.Upload(manifest, files));
   v1::SubmitRequest request;
   if (!reference_path.empty()) {
@@ -120,20 +119,18 @@ StatusOr<Image> DecodeImageOf(const std::string& job_id, const std::string& byte
       "the image of job ", job_id, " arrived damaged; fetch it again: ", image.status().message()));
 }
 
-StatusOr<std::unique_ptr<LocalRuns>> LocalRuns::Start(const ClusterOptions& options,
-                                                      std::string scene_path,
-                                                      SceneManifest manifest) {
-  auto runs = std::unique_ptr<LocalRuns>(new LocalRuns(std::move(scene_path), std::move(manifest)));
+StatusOr<std::unique_ptr<LocalRuns>> LocalRuns::Start(const ClusterOptions& options) {
+  auto runs = std::unique_ptr<LocalRuns>(new LocalRuns());
   LUCERNA_ASSIGN_OR_RETURN(runs->cluster_, LocalCluster::Start(options));
   LUCERNA_ASSIGN_OR_RETURN(runs->connection_, ClientConnection::Open(runs->cluster_->address()));
   return runs;
 }
 
-StatusOr<v1::Job> LocalRuns::Run(const RenderOverrides& overrides,
+StatusOr<v1::Job> LocalRuns::Run(SceneFiles& files, const SceneManifest& manifest,
+                                 const RenderOverrides& overrides,
                                  const std::string& reference_path, const Voice& voice) {
-  LUCERNA_ASSIGN_OR_RETURN(
-      const v1::SubmitResponse submitted,
-      SendJob(*connection_, scene_path_, manifest_, overrides, reference_path));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
+                           SendJob(*connection_, files, manifest, overrides, reference_path));
   auto job = FollowToEnd(*connection_, submitted.job_id(), true, voice,
                          [this] { return cluster_->Check(); });
   if (!job.ok()) {
@@ -146,6 +143,13 @@ StatusOr<v1::Job> LocalRuns::Run(const RenderOverrides& overrides,
   }
   LUCERNA_RETURN_IF_ERROR(CheckSucceeded(*job));
   return job;
+}
+
+StatusOr<v1::Job> LocalRuns::Run(const std::string& scene_path, const SceneManifest& manifest,
+                                 const RenderOverrides& overrides,
+                                 const std::string& reference_path, const Voice& voice) {
+  DirectoryFiles files(SplitScenePath(scene_path).folder);
+  return Run(files, manifest, overrides, reference_path, voice);
 }
 
 StatusOr<Image> LocalRuns::ImageOf(const v1::Job& job) {

@@ -1,6 +1,7 @@
 // How does one job go from files on this machine to its end?
 //
-// `render` and `submit` run one job, `compare` and `reference` several on one local cluster.
+// `render` and `submit` run one job, `compare`, `reference` and `selfcheck` several on one local
+// cluster.
 #pragma once
 
 #include <functional>
@@ -17,9 +18,9 @@
 
 namespace lucerna {
 
-// Uploads what the coordinator does not have and submits. `reference_path` may be empty.
-[[nodiscard]] StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection,
-                                                   const std::string& scene_path,
+// Uploads what the coordinator does not have and submits. `files` reads those of the manifest.
+// `reference_path` may be empty.
+[[nodiscard]] StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& files,
                                                    const SceneManifest& manifest,
                                                    const RenderOverrides& overrides,
                                                    const std::string& reference_path);
@@ -37,16 +38,19 @@ namespace lucerna {
 // Errors: DATA_LOSS when they are none.
 [[nodiscard]] StatusOr<Image> DecodeImageOf(const std::string& job_id, const std::string& bytes);
 
-// Jobs of one scene, one after the other, on a coordinator and workers of their own.
+// Jobs, one after the other, on a coordinator and workers of their own.
 class LocalRuns {
  public:
   // To be called by a thread that lives as long as the runs (LocalCluster::Start).
-  [[nodiscard]] static StatusOr<std::unique_ptr<LocalRuns>> Start(const ClusterOptions& options,
-                                                                  std::string scene_path,
-                                                                  SceneManifest manifest);
+  [[nodiscard]] static StatusOr<std::unique_ptr<LocalRuns>> Start(const ClusterOptions& options);
 
   // Renders to the end; an interruption cancels the job. Returns a job that succeeded.
-  [[nodiscard]] StatusOr<v1::Job> Run(const RenderOverrides& overrides,
+  [[nodiscard]] StatusOr<v1::Job> Run(SceneFiles& files, const SceneManifest& manifest,
+                                      const RenderOverrides& overrides,
+                                      const std::string& reference_path, const Voice& voice);
+  // The same for the scene of a file on this machine.
+  [[nodiscard]] StatusOr<v1::Job> Run(const std::string& scene_path, const SceneManifest& manifest,
+                                      const RenderOverrides& overrides,
                                       const std::string& reference_path, const Voice& voice);
   // The image of a job that succeeded.
   [[nodiscard]] StatusOr<Image> ImageOf(const v1::Job& job);
@@ -54,11 +58,8 @@ class LocalRuns {
   [[nodiscard]] ClientConnection& connection() { return *connection_; }
 
  private:
-  LocalRuns(std::string scene_path, SceneManifest manifest)
-      : scene_path_(std::move(scene_path)), manifest_(std::move(manifest)) {}
+  LocalRuns() = default;
 
-  std::string scene_path_;
-  SceneManifest manifest_;
   std::unique_ptr<LocalCluster> cluster_;
   std::unique_ptr<ClientConnection> connection_;
 };

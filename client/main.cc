@@ -18,6 +18,7 @@
 #include "client/plan_command.h"
 #include "client/preview.h"
 #include "client/reference_command.h"
+#include "client/selfcheck.h"
 
 namespace lucerna {
 namespace {
@@ -52,6 +53,7 @@ int Run(int argc, char** argv) {
   MetricsOptions metrics;
   CompareRequest comparison;
   ReferenceRequest to_refer;
+  std::string only;
   double exposure_stops = 0;
   bool hides_preview = false;
   bool strict = false;
@@ -241,6 +243,15 @@ int Run(int argc, char** argv) {
   add_no_preview(reference);
   add_json(reference);
   add_quiet(reference);
+
+  CLI::App* selfcheck =
+      command("selfcheck", "say whether the numbers are right on this machine", [&]() -> Status {
+        LUCERNA_RETURN_IF_ERROR(find_programs());
+        return Selfcheck(only, cluster.program_folder, voice);
+      });
+  selfcheck->add_option("--only", only, "run the cases whose names begin so");
+  add_json(selfcheck);
+  add_quiet(selfcheck);
 
   CLI::App* digest = command("digest", "print the digest of an image's pixels and settings",
                              [&] { return PrintDigest(image_path, voice); });

@@ -58,8 +58,7 @@ Status RenderReference(const ReferenceRequest& request, const ClusterOptions& cl
                                  std::int64_t{settings.crop_height()};
   }
 
-  LUCERNA_ASSIGN_OR_RETURN(const auto runs,
-                           LocalRuns::Start(cluster, request.scene_path, scene.manifest));
+  LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster));
   std::array<Image, 2> halves;
   for (std::size_t half = 0; half < halves.size(); ++half) {
     // Unsigned: after the largest seed comes 0.
@@ -68,7 +67,8 @@ Status RenderReference(const ReferenceRequest& request, const ClusterOptions& cl
       std::fprintf(stderr, "half %zu of 2, seed %llu\n", half + 1,
                    static_cast<unsigned long long>(*overrides.seed));
     }
-    LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, runs->Run(overrides, "", voice));
+    LUCERNA_ASSIGN_OR_RETURN(const v1::Job job,
+                             runs->Run(request.scene_path, scene.manifest, overrides, "", voice));
     LUCERNA_ASSIGN_OR_RETURN(halves[half], runs->ImageOf(job));
   }
   LUCERNA_ASSIGN_OR_RETURN(const Image reference, MakeReference(halves[0], halves[1]));

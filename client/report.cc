@@ -446,4 +446,21 @@ std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost) {
                    {"pass_bytes_sent", cost.pass_bytes_sent}}}});
 }
 
+std::string SelfcheckReport(const std::vector<SelfcheckResult>& results) {
+  Json cases = Json::array();
+  bool all_hold = true;
+  for (const SelfcheckResult& result : results) {
+    all_hold = all_hold && result.outcome.holds;
+    // A figure that is not a number becomes null.
+    cases.push_back({{"name", result.name},
+                     {"claim", result.claim},
+                     {"figure", result.outcome.figure},
+                     {"bound", result.outcome.bound},
+                     {"note", result.outcome.note},
+                     {"holds", result.outcome.holds},
+                     {"wall_s", result.wall_s}});
+  }
+  return ToText({{"holds", all_hold}, {"cases", cases}});
+}
+
 }  // namespace lucerna

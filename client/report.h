@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "client/comparison.h"
+#include "client/selfcheck.h"
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "proto/lucerna/v1/photons.pb.h"
 #include "render/base/digest.h"
@@ -44,5 +45,6 @@ struct SavedImage {
 [[nodiscard]] std::string PhotonReport(const v1::PhotonPath& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
 [[nodiscard]] std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost);
+[[nodiscard]] std::string SelfcheckReport(const std::vector<SelfcheckResult>& results);
 
 }  // namespace lucerna

@@ -7,8 +7,10 @@
 #include "absl/strings/str_format.h"
 #include <spdlog/spdlog.h>
 
+#include "render/base/memory.h"
 #include "render/image/exr_file.h"
 #include "render/scene/pbrt_parser.h"
+#include "server/memory_need.h"
 #include "server/reference_image.h"
 
 namespace lucerna {
@@ -39,6 +41,11 @@ std::string InstanceName(const Clock& clock) {
   return absl::StrCat(absl::Hex(micros.count()));
 }
 
+Coordinator::Options WithMemory(Coordinator::Options options) {
+  if (options.max_job_bytes == 0) options.max_job_bytes = AvailableMemory();
+  return options;
+}
+
 SchedulerOptions OptionsFor(const Coordinator::Options& options, const std::string& instance) {
   SchedulerOptions scheduler;
   scheduler.instance = absl::StrCat("w", instance);
@@ -49,7 +56,7 @@ SchedulerOptions OptionsFor(const Coordinator::Options& options, const std::stri
 }  // namespace
 
 Coordinator::Coordinator(Options options, const Clock& clock)
-    : options_(std::move(options)),
+    : options_(WithMemory(std::move(options))),
       clock_(clock),
       instance_(InstanceName(clock)),
       blobs_(options_.max_store_bytes),
@@ -145,6 +152,10 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
   if (!settings.ok()) {
     unpin();
     return settings.status();
+  }
+  if (Status fits = CheckMemory(*settings, options_.max_job_bytes); !fits.ok()) {
+    unpin();
+    return fits;
   }
   if (submission.reference) {
     if (!blobs_.Pin(*submission.reference).ok()) {

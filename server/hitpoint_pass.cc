@@ -1,5 +1,7 @@
 #include "server/hitpoint_pass.h"
 
+#include <algorithm>
+
 #include "render/math/octahedral.h"
 
 namespace lucerna {
@@ -8,6 +10,12 @@ namespace {
 // Pixels of a tile are neighbours on the surfaces they see, so their hitpoints gather from the
 // same photons one after the other.
 constexpr int kTile = 16;
+
+// A pixel's width at the hitpoint, held where a radius in such units has a square. A camera that
+// touches a surface sees it in no width at all.
+float UnitRadius(const EyePath& path) {
+  return std::clamp(path.footprint, 1e-17F, 1e14F);
+}
 
 }  // namespace
 
@@ -58,7 +66,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, Threa
                  EncodeOctahedral(path.to_eye), EncodeOctahedral(path.shading_normal)});
           }
           per_tile[tile].rows.push_back({pixel, path.position, EncodeOctahedral(path.normal),
-                                         path.weight, automatic ? path.footprint : 1.0F});
+                                         path.weight, automatic ? UnitRadius(path) : 1.0F});
         }
       }
     }

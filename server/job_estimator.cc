@@ -12,6 +12,30 @@
 #include "server/eye_path.h"
 
 namespace lucerna {
+namespace {
+
+// Layers that are lengths, or one over a length, as the scene's file measures them.
+void ToFileUnit(Image& image, double unit) {
+  if (unit == 1) return;
+  for (ImageChannel& channel : image.channels) {
+    const bool is_length =
+        channel.name == "Z" || channel.name == "radius" || channel.name == "min_radius";
+    if (!is_length && channel.name != "bandwidth") continue;
+    const double factor = is_length ? unit : 1 / unit;
+    for (float& value : channel.pixels)
+      value = static_cast<float>(static_cast<double>(value) * factor);
+  }
+}
+
+Status CheckPower(Rgb power_w) {
+  if (IsFinite(power_w) && std::isfinite(Luminance(power_w))) return absl::OkStatus();
+  return absl::InvalidArgumentError(
+      "the lights of the scene emit more power than a number holds (3e38 W); make all of them "
+      "dimmer by the same factor, and the image brighter by it with the film's iso");
+}
+
+}  // namespace
+
 struct JobEstimator::State {
   State(Scene s, RenderSettings r, int threads)
       : scene(InWorkingSpace(std::move(s))),
@@ -50,6 +74,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   auto state = std::make_unique<State>(std::move(scene), settings, threads);
   LUCERNA_ASSIGN_OR_RETURN(state->intersector, Intersector::Create(state->scene));
   state->lights = std::make_unique<LightSet>(state->scene, *state->intersector);
+  LUCERNA_RETURN_IF_ERROR(CheckPower(state->lights->TotalPower()));
   state->tracer = std::make_unique<EyePathTracer>(state->scene, state->settings, state->needs,
                                                   *state->intersector, *state->lights);
   state->scale = FluxScale::ForPower(state->lights->TotalPower());
@@ -57,7 +82,8 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   const int height = settings.crop_height();
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const auto initial = static_cast<float>(
-      settings.initial_radius > 0 ? settings.initial_radius : settings.initial_footprints);
+      settings.initial_radius > 0 ? settings.initial_radius / state->scene.unit
+                                  : settings.initial_footprints);
   state->controller = MakeRadiusController(state->settings, initial);
   state->statistics =
       std::make_unique<PixelStatistics>(pixels, initial, state->controller->MemoryPerPixel());
@@ -115,6 +141,7 @@ std::uint64_t JobEstimator::eye_rays() const {
 Image JobEstimator::MakeImage() const {
   Image image = state_->film->MakeImage(*state_->statistics, *state_->controller,
                                         Kernel{state_->settings.kernel});
+  ToFileUnit(image, state_->scene.unit);
   if (passes_applied() < 2) return image;
   // Single pixels: their own variance over passes, made as large in all as the halves say it is.
   const double factor = EstimateError(1).noise_factor;

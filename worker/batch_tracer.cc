@@ -18,10 +18,14 @@
 namespace lucerna {
 namespace {
 
-constexpr std::uint64_t kPhotonsPerChunk = 2048;
-// A range is worked off in parts of so many photons, which bounds memory (about 100 bytes a
-// deposit) and is large enough for the sort to pay.
+// A range is worked off in parts: large enough for the sort to pay, and no larger, because a
+// deposit takes about 100 bytes. In a closed white room every photon lands max_depth times, so
+// what is counted is the deposits as well.
 constexpr std::uint64_t kPhotonsPerPart = std::uint64_t{1} << 20;
+constexpr std::uint64_t kDepositsPerPart = std::uint64_t{1} << 24;
+constexpr std::uint64_t kPhotonsPerChunk = 2048;
+constexpr std::uint64_t kMostDepositsPerChunk = std::uint64_t{1} << 20;
+constexpr std::uint64_t kChunksPerThread = 8;  // traced before deposits are counted again
 
 Status CheckBlock(const HitpointBlock& block, const RadiusColumn& radii, const Scene& scene) {
   if (block.normals_oct.size() != block.size() || radii.size() != block.size()) {
@@ -99,7 +103,10 @@ StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) 
     const std::uint64_t count =
         (from_a ? std::uint64_t{sum.counts[a]} : 0) + (from_b ? std::uint64_t{more.counts[b]} : 0);
     if (count > UINT32_MAX) {
-      return absl::OutOfRangeError("a hitpoint has more photons than a batch can count");
+      return absl::OutOfRangeError(
+          "a hitpoint found more than 2^32 photons of one batch; ask for fewer photons in a pass "
+          "or a "
+          "smaller radius");
     }
     out.counts.push_back(static_cast<std::uint32_t>(count));
     bool fits = true;
@@ -177,35 +184,53 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
   const PhotonPathTracer tracer(state_->scene, *state_->intersector, *state_->lights, settings,
                                 spectra, region);
-  for (std::uint64_t part = first; part < last; part += kPhotonsPerPart) {
+  const std::uint64_t per_chunk =
+      std::clamp(kMostDepositsPerChunk / static_cast<std::uint64_t>(settings.max_depth),
+                 std::uint64_t{1}, kPhotonsPerChunk);
+  const std::uint64_t per_round = per_chunk * kChunksPerThread *
+                                  static_cast<std::uint64_t>(std::max(1, state_->team.threads()));
+  for (std::uint64_t next = first; next < last;) {
+    const std::uint64_t part = next;
     const std::uint64_t part_end = std::min(last, part + kPhotonsPerPart);
-    const std::size_t chunks =
-        static_cast<std::size_t>((part_end - part + kPhotonsPerChunk - 1) / kPhotonsPerChunk);
-    std::vector<std::vector<Deposit>> deposits(chunks);
-    std::vector<std::vector<float>> traces(spectra == nullptr ? 0 : chunks);
-    std::vector<BatchTally> tallies(chunks);
-    std::vector<std::vector<std::uint64_t>> dropped(chunks);
-    state_->team.For(chunks, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t chunk = begin; chunk < end && !stop.load(std::memory_order_relaxed);
-           ++chunk) {
-        const std::uint64_t chunk_first = part + chunk * kPhotonsPerChunk;
-        const std::uint64_t chunk_last = std::min(part_end, chunk_first + kPhotonsPerChunk);
-        PhotonPathTracer::Landed landed;
-        landed.deposits.reserve(2 * kPhotonsPerChunk);
-        for (std::uint64_t index = chunk_first; index < chunk_last; ++index) {
-          tracer.Trace(pass, index, landed);
+    std::vector<std::vector<Deposit>> deposits;
+    std::vector<std::vector<float>> traces;
+    std::vector<BatchTally> tallies;
+    std::vector<std::vector<std::uint64_t>> dropped;
+    std::uint64_t found = 0;
+    while (next < part_end && found < kDepositsPerPart && !stop) {
+      const std::uint64_t round_end = std::min(part_end, next + per_round);
+      const std::size_t before = tallies.size();
+      const auto chunks = static_cast<std::size_t>((round_end - next + per_chunk - 1) / per_chunk);
+      deposits.resize(before + chunks);
+      tallies.resize(before + chunks);
+      dropped.resize(before + chunks);
+      if (spectra != nullptr) traces.resize(before + chunks);
+      state_->team.For(chunks, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t chunk = begin; chunk < end && !stop.load(std::memory_order_relaxed);
+             ++chunk) {
+          const std::uint64_t chunk_first = next + chunk * per_chunk;
+          const std::uint64_t chunk_last = std::min(round_end, chunk_first + per_chunk);
+          PhotonPathTracer::Landed landed;
+          landed.deposits.reserve(2 * per_chunk);
+          for (std::uint64_t index = chunk_first; index < chunk_last; ++index) {
+            tracer.Trace(pass, index, landed);
+          }
+          BatchTally& tally = tallies[before + chunk];
+          tally.photons = chunk_last - chunk_first;
+          tally.rays = landed.rays;
+          tally.dropped = landed.dropped;
+          tally.deposits = landed.deposits.size();
+          tally.excess = landed.excess;
+          tally.energy = landed.energy;
+          dropped[before + chunk] = std::move(landed.dropped_photons);
+          deposits[before + chunk] = std::move(landed.deposits);
+          if (spectra != nullptr) traces[before + chunk] = std::move(landed.traces);
         }
-        tallies[chunk].photons = chunk_last - chunk_first;
-        tallies[chunk].rays = landed.rays;
-        tallies[chunk].dropped = landed.dropped;
-        tallies[chunk].deposits = landed.deposits.size();
-        tallies[chunk].excess = landed.excess;
-        tallies[chunk].energy = landed.energy;
-        dropped[chunk] = std::move(landed.dropped_photons);
-        deposits[chunk] = std::move(landed.deposits);
-        if (spectra != nullptr) traces[chunk] = std::move(landed.traces);
-      }
-    });
+      });
+      for (std::size_t chunk = before; chunk < tallies.size(); ++chunk)
+        found += tallies[chunk].deposits;
+      next = round_end;
+    }
     if (stop) return absl::CancelledError("the batch was given up");
     LUCERNA_RETURN_IF_ERROR(CheckDeposits(tallies));
     const PhotonGrid grid(deposits, traces, region, cell, state_->team);

@@ -15,7 +15,9 @@ namespace {
 // farther than its kernel will ever reach. Follows from scene and settings alone, because every
 // worker must look equally far. With automatic radii it is judged for the middle of the scene.
 float ReachOf(const Scene& scene, const RenderSettings& settings, const Bounds& bounds) {
-  if (settings.initial_radius > 0) return 2 * static_cast<float>(settings.initial_radius);
+  if (settings.initial_radius > 0) {
+    return 2 * static_cast<float>(settings.initial_radius / scene.unit);
+  }
   const Window window = ScreenWindow(scene.camera, settings.width, settings.height);
   const auto pixel = static_cast<float>((window.high_x - window.low_x) / settings.width);
   const float distance = Length(scene.camera.camera_to_world.Point({}) - bounds.Center());

@@ -23,12 +23,11 @@ class Ppm final : public RadiusController {
     if (!(evidence.photons > 0)) return now;
     // The photons were gathered in a disc that may be larger than today's: count those that
     // today's would have held.
-    const double shrink = static_cast<double>(now.radius) / static_cast<double>(evidence.radius);
+    const double shrink = now.radius / evidence.radius;
     const double m = evidence.photons * shrink * shrink;
-    const auto n = static_cast<double>(now.photons);
+    const double n = now.photons;
     const double kept = n + alpha_ * m;
-    return {static_cast<float>(static_cast<double>(now.radius) * std::sqrt(kept / (n + m))),
-            static_cast<float>(kept)};
+    return {now.radius * std::sqrt(kept / (n + m)), kept};
   }
 
  private:
@@ -44,8 +43,7 @@ class Pppm final : public RadiusController {
   PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t pass,
                    std::span<double> /*memory*/) const override {
     const auto i = static_cast<double>(pass + 1);
-    return {static_cast<float>(static_cast<double>(now.radius) * std::sqrt((i + alpha_) / (i + 1))),
-            now.photons + static_cast<float>(evidence.photons)};
+    return {now.radius * std::sqrt((i + alpha_) / (i + 1)), now.photons + evidence.photons};
   }
 
  private:
@@ -67,7 +65,7 @@ class Appm final : public RadiusController {
 
   PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
                    std::span<double> memory) const override {
-    const double h = static_cast<double>(kCurvatureReach) * static_cast<double>(evidence.radius);
+    const double h = static_cast<double>(kCurvatureReach) * evidence.radius;
     const double h2 = h * h;
     const auto column = [&](CurvatureColumn c) {
       return kWeightUnit * static_cast<double>(evidence.columns[c]);
@@ -76,7 +74,7 @@ class Appm final : public RadiusController {
     memory[kLaplacian] += column(kCurvatureLaplacian) * 24 / (std::numbers::pi * h2 * h2);
     memory[kSquares] += column(kCurvatureWeight2) / (std::numbers::pi * h2);
     memory[kPasses] += 1;
-    PixelRadius next = {now.radius, now.photons + static_cast<float>(evidence.photons)};
+    PixelRadius next = {now.radius, now.photons + evidence.photons};
 
     const double n = memory[kPasses];
     const double laplacian = memory[kLaplacian] / n;
@@ -85,7 +83,7 @@ class Appm final : public RadiusController {
     const double sixth = 2 * moments_.roughness * (memory[kSquares] / n) /
                          (n * moments_.mu2 * moments_.mu2 * laplacian * laplacian);
     const double radius = std::max(std::cbrt(std::sqrt(sixth)), smallest_);
-    next.radius = std::min(next.radius, static_cast<float>(radius));
+    next.radius = std::min(next.radius, radius);
     return next;
   }
 
@@ -110,9 +108,10 @@ class Cppm final : public RadiusController {
 
   PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
                    std::span<double> memory) const override {
-    PixelRadius next = {now.radius, now.photons + static_cast<float>(evidence.photons)};
+    PixelRadius next = {now.radius, now.photons + evidence.photons};
     // Photons of a disc that has been left behind say nothing about today's cells.
-    if (evidence.radius > now.radius) return next;
+    // What was gathered with is rounded to a float.
+    if (evidence.radius > now.radius * (1 + 1e-6)) return next;
     double total = 0;
     for (std::size_t i = 0; i < kSectors; ++i) {
       memory[i] += static_cast<double>(evidence.columns[i]);
@@ -124,7 +123,7 @@ class Cppm final : public RadiusController {
     // Quantiles of chi-square at 95 % with 11 and 5 degrees of freedom.
     if (Statistic(memory.first(kSectors)) >= 19.675) {
       const bool inner_is_even = Statistic(memory.first(kSectors / 2)) < 11.070;
-      next.radius *= std::sqrt(inner_is_even ? 0.5F : 0.8F);
+      next.radius *= std::sqrt(inner_is_even ? 0.5 : 0.8);
     }
     for (double& count : memory.first(kSectors))
       count = 0;
@@ -165,7 +164,7 @@ class FrequencyBelief {
   // Takes in a pass, then lets what is older fade with the disc's area.
   static void Add(const PassEvidence& evidence, std::span<double> memory) {
     if (evidence.columns.empty()) return;
-    const auto radius = static_cast<double>(evidence.radius);
+    const double radius = evidence.radius;
     // Columns hold x = trace · radius²; memory holds traces, so that radii can change.
     const double to_trace = 1 / (radius * radius);
     const auto column = [&](FrequencyColumn c) { return static_cast<double>(evidence.columns[c]); };
@@ -224,13 +223,13 @@ class FrequencyFloor final : public RadiusController {
     FrequencyBelief::Add(evidence, memory);
     if (!(evidence.photons > 0)) return now;
     const std::optional<BandwidthPrediction> prediction = belief_.Predict(memory);
-    const auto radius = static_cast<double>(now.radius);
-    const double shrink = radius / static_cast<double>(evidence.radius);
+    const double radius = now.radius;
+    const double shrink = radius / evidence.radius;
     const RadiusStep step =
-        ShrinkToPrediction(static_cast<double>(now.photons), evidence.photons * shrink * shrink,
-                           radius, prediction ? prediction->min_radius : 0, alpha_, floor_alpha_);
+        ShrinkToPrediction(now.photons, evidence.photons * shrink * shrink, radius,
+                           prediction ? prediction->min_radius : 0, alpha_, floor_alpha_);
     FrequencyBelief::Fade(step.kept_share, memory);
-    return {static_cast<float>(step.radius), static_cast<float>(step.photons)};
+    return {step.radius, step.photons};
   }
 
   bool Predicts() const override { return true; }
@@ -256,10 +255,10 @@ class FrequencyMse final : public RadiusController {
   PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
                    std::span<double> memory) const override {
     FrequencyBelief::Add(evidence, memory);
-    const auto gathered = static_cast<double>(evidence.radius);
+    const double gathered = evidence.radius;
     double& photon_density = memory[FrequencyBelief::kNumbers];
     photon_density += evidence.photons / (std::numbers::pi * gathered * gathered);
-    const auto radius = static_cast<double>(now.radius);
+    const double radius = now.radius;
     const std::optional<BandwidthPrediction> prediction = belief_.Predict(memory);
     // Until there is evidence the radius stays: at a photon or two a pass, tens of passes go by
     // before eight frequency photons have come, and a radius that shrank meanwhile could not grow
@@ -271,7 +270,7 @@ class FrequencyMse final : public RadiusController {
           LeastErrorRadius(photon_density, kTypicalBias * prediction->trace, belief_.moments()));
     }
     FrequencyBelief::Fade(next * next / (radius * radius), memory);
-    return {static_cast<float>(next), now.photons + static_cast<float>(evidence.photons)};
+    return {next, now.photons + evidence.photons};
   }
 
   bool Predicts() const override { return true; }

@@ -18,14 +18,16 @@ namespace lucerna {
 // What is shared by all hitpoints that a pixel ever had (Hachisuka & Jensen 2009, "Stochastic
 // Progressive Photon Mapping").
 struct PixelRadius {
-  float radius = 0;   // in unit radii
-  float photons = 0;  // N, photons counted as kept so far
+  // In double: late passes shrink a radius by less than a float can tell, and add fewer photons to
+  // N than it can count.
+  double radius = 0;   // in unit radii
+  double photons = 0;  // N, photons counted as kept so far
 };
 
 // What one pass brought to one pixel.
 struct PassEvidence {
   double photons = 0;  // M, found with the radius below
-  float radius = 0;    // in unit radii; at least PixelRadius::radius, since radii lag by a pass
+  double radius = 0;   // in unit radii; at least PixelRadius::radius, since radii lag by a pass
   // One number a column, in the controller's order of columns; none in a pass without evidence.
   std::span<const std::int64_t> columns;
 };

@@ -1,14 +1,23 @@
 #include "render/estimate/statistics.h"
 
+#include <algorithm>
+
 #include "render/base/status.h"
 #include "render/estimate/evidence.h"
 
 namespace lucerna {
+namespace {
+
+// The square of a radius is a float.
+constexpr double kSmallestRadius = 1e-18;
+constexpr double kLargestRadius = 1e18;
+
+}  // namespace
 
 PixelStatistics::PixelStatistics(std::size_t pixels, float initial_radius,
                                  std::size_t memory_per_pixel)
-    : radius_(pixels, PixelRadius{initial_radius, 0}),
-      radius_before_(pixels, initial_radius),
+    : radius_(pixels, PixelRadius{static_cast<double>(initial_radius), 0}),
+      radius_before_(pixels, static_cast<double>(initial_radius)),
       radiance_sum_(pixels),
       photon_count_(pixels),
       last_radius_(pixels),
@@ -22,8 +31,9 @@ RadiusColumn PixelStatistics::Radii(const HitpointRows& rows, std::uint64_t pass
   RadiusColumn radii(rows.pixels.size());
   for (std::size_t row = 0; row < radii.size(); ++row) {
     const std::uint32_t pixel = rows.pixels[row];
-    radii[row] = (pass == passes ? radius_before_[pixel] : radius_[pixel].radius) *
-                 rows.unit_radii[row];
+    const double radius = pass == passes ? radius_before_[pixel] : radius_[pixel].radius;
+    radii[row] = static_cast<float>(std::clamp(radius * static_cast<double>(rows.unit_radii[row]),
+                                               kSmallestRadius, kLargestRadius));
   }
   return radii;
 }
@@ -65,10 +75,10 @@ void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& r
                   kToBias * static_cast<double>(Luminance(rows.weights[row]));
     radius_[pixel] = controller.Next(
         radius_[pixel],
-        {static_cast<double>(sums.counts()[row]), radii[row] / rows.unit_radii[row],
+        {static_cast<double>(sums.counts()[row]),
+         radius / static_cast<double>(rows.unit_radii[row]),
          std::span<const std::int64_t>(columns).subspan(kCommonColumns)},
-        pass,
-        std::span<double>(memory_).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
+        pass, std::span<double>(memory_).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
   }
   ++passes_;
 }

@@ -61,7 +61,7 @@ class PixelStatistics {
  private:
   std::int64_t passes_ = 0;
   std::vector<PixelRadius> radius_;
-  std::vector<float> radius_before_;  // the last pass was taken in
+  std::vector<double> radius_before_;  // the last pass was taken in
   std::vector<RgbSum> radiance_sum_;
   std::vector<std::uint64_t> photon_count_;
   std::vector<float> last_radius_;

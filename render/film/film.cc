@@ -8,6 +8,12 @@
 #include "render/math/color_space.h"
 
 namespace lucerna {
+namespace {
+
+// Features are known well after so many passes, and sums of more would lose what a float rounds.
+constexpr std::uint32_t kEnoughHits = 1U << 14;
+
+}  // namespace
 
 Film::Film(int width, int height, double exposure, double max_component)
     : width_(width),
@@ -22,8 +28,8 @@ void Film::Add(std::size_t pixel, Rgb direct, Rgb albedo, Vec3 normal, float dis
   sum[0] += static_cast<double>(direct.r);
   sum[1] += static_cast<double>(direct.g);
   sum[2] += static_cast<double>(direct.b);
-  if (!std::isfinite(distance)) return;
   Features& features = feature_sum_[pixel];
+  if (!std::isfinite(distance) || features.hits == kEnoughHits) return;
   features.albedo += albedo;
   features.normal = features.normal + normal;
   features.distance += distance;

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "render/geometry/curvature_change.h"
-#include "render/geometry/double3.h"
 #include "render/geometry/mesh_edges.h"
+#include "render/math/double3.h"
 
 namespace lucerna {
 namespace {

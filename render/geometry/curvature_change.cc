@@ -8,7 +8,7 @@
 #include <numbers>
 #include <utility>
 
-#include "render/geometry/double3.h"
+#include "render/math/double3.h"
 
 namespace lucerna {
 namespace {

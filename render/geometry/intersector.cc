@@ -6,39 +6,30 @@
 #include <embree3/rtcore.h>
 
 #include "render/geometry/embree_device.h"
+#include "render/math/double3.h"
 
 namespace lucerna {
 namespace {
-
-struct Double3 {
-  double x, y, z;
-};
-Double3 ToDouble(Vec3 v) {
-  return {static_cast<double>(v.x), static_cast<double>(v.y), static_cast<double>(v.z)};
-}
-double DotDouble(const Double3& a, const Double3& b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
 
 // The nearer root in (t_near, t_far), else the farther one; false without either. The roots are
 // found from the larger one, so that neither suffers cancellation.
 bool SphereRoot(const Sphere& sphere, Vec3 origin, Vec3 direction, float t_near, float t_far,
                 float& t) {
-  const Double3 o = ToDouble(origin);
-  const Double3 c = ToDouble(sphere.center);
-  const Double3 d = ToDouble(direction);
-  const Double3 oc = {o.x - c.x, o.y - c.y, o.z - c.z};
+  const Double3 o(origin);
+  const Double3 c(sphere.center);
+  const Double3 d(direction);
+  const Double3 oc = o - c;
   const auto radius = static_cast<double>(sphere.radius);
-  const double dd = DotDouble(d, d);
-  const double b = -DotDouble(oc, d);
+  const double dd = Dot(d, d);
+  const double b = -Dot(oc, d);
   // The discriminant by the distance of the centre from the line: exact for far spheres too.
   const double along = b / dd;
-  const Double3 nearest = {oc.x + along * d.x, oc.y + along * d.y, oc.z + along * d.z};
-  const double discriminant = radius * radius - DotDouble(nearest, nearest);
+  const Double3 nearest = oc + d * along;
+  const double discriminant = radius * radius - Dot(nearest, nearest);
   if (!(discriminant >= 0)) return false;
   const double root = std::sqrt(dd * discriminant);
   const double q = b + std::copysign(root, b);
-  const double other = (DotDouble(oc, oc) - radius * radius);
+  const double other = (Dot(oc, oc) - radius * radius);
   double t0 = q == 0 ? 0 : other / q;
   double t1 = q / dd;
   if (t0 > t1) std::swap(t0, t1);
@@ -276,10 +267,8 @@ SurfacePoint Intersector::SurfaceAt(const Ray& ray, const Hit& hit) const {
     // From the corners, not along the ray: the error then has the size of the triangle.
     point.position = p0 + e1 * hit.u + e2 * hit.v;
     point.clearance = kClearance * (MaxAbs(p0) + MaxAbs(e1) + MaxAbs(e2));
-    // The longest edges' lengths are taken out first, so that tiny triangles keep a normal.
-    const float s1 = MaxAbs(e1);
-    const float s2 = MaxAbs(e2);
-    point.geometric_normal = Normalize(Cross(e1 * (1 / s1), e2 * (1 / s2)));
+    point.geometric_normal =
+        TriangleNormal(p0, mesh.positions[corner[1]], mesh.positions[corner[2]]);
     point.shading_normal = point.geometric_normal;
     if (!mesh.normals.empty()) {
       const Vec3 n = mesh.normals[corner[0]] * (1 - hit.u - hit.v) +

@@ -9,9 +9,9 @@
 #include <tuple>
 #include <utility>
 
-#include "render/geometry/double3.h"
 #include "render/geometry/embree_device.h"
 #include "render/geometry/mesh_edges.h"
+#include "render/math/double3.h"
 
 namespace lucerna {
 namespace {

@@ -23,8 +23,10 @@ namespace lucerna {
 namespace {
 
 constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
-// Also bounds the memory of an image with very many channels: 4 GiB.
-constexpr std::uint64_t kMaxSamples = std::uint64_t{1} << 30;
+// What is read takes 4 GiB at most, or 256 times the file: an image of ours at its largest has some
+// 2^33 samples, and a small file must not fill the memory.
+constexpr std::uint64_t kSamplesOfAnyFile = std::uint64_t{1} << 30;
+constexpr std::uint64_t kSamplesPerByte = 64;
 // No compression of the format puts more lines than this into one block.
 constexpr std::uint64_t kMaxLinesPerBlock = 256;
 constexpr std::size_t kMaxAttributeName = 255;
@@ -273,10 +275,9 @@ StatusOr<std::string> EncodeExr(const Image& image) {
   }
   const auto pixels =
       static_cast<std::uint64_t>(image.width) * static_cast<std::uint64_t>(image.height);
-  if (pixels > kMaxPixels || pixels * image.channels.size() > kMaxSamples) {
+  if (pixels > kMaxPixels) {
     return absl::InvalidArgumentError(absl::StrCat("an image of ", image.width, " x ", image.height,
-                                                   " pixels and ", image.channels.size(),
-                                                   " channels is too large for EXR here"));
+                                                   " pixels is too large for EXR here"));
   }
   try {
     Imf::Header header(image.width, image.height);
@@ -339,7 +340,8 @@ StatusOr<Image> DecodeExr(std::string_view bytes) {
     const auto width = static_cast<std::size_t>(image.width);
     const auto height = static_cast<std::size_t>(image.height);
     if (image.channels.empty()) return Garbage("it has no channels");
-    if (width * height * image.channels.size() > kMaxSamples) {
+    if (width * height * image.channels.size() >
+        std::max(kSamplesOfAnyFile, kSamplesPerByte * bytes.size())) {
       return Garbage(absl::StrCat("it has ", image.channels.size(),
                                   " channels, too many for its size in pixels"));
     }

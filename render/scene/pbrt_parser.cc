@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cfloat>
 #include <charconv>
 #include <cmath>
 #include <iterator>
@@ -18,11 +19,16 @@
 #include "render/scene/parameter_list.h"
 #include "render/scene/ply_file.h"
 #include "render/scene/scene_builder.h"
+#include "render/scene/scene_extent.h"
+#include "render/scene/scene_unit.h"
 #include "render/scene/tokenizer.h"
 
 namespace lucerna {
 namespace {
 
+// A scene farther than so many times its size from the origin gets a warning. Up to there images
+// agree within their noise (docs/numerics.md).
+constexpr double kFarSizes = 1e4;
 constexpr std::size_t kMaxNesting = 1000;  // AttributeBegin within AttributeBegin
 
 std::optional<double> ParseNumber(std::string_view text) {
@@ -1099,6 +1105,14 @@ void PbrtParser::Finish() {
                            "a mesh with a texture has no uv: every triangle shows half of it");
     }
   }
+  const SceneExtent extent = ExtentOf(scene_);
+  if (extent.size > 0 && extent.from_origin > kFarSizes * extent.size) {
+    const double sizes = extent.from_origin / extent.size;
+    diagnostics_.Warning(
+        whole, Concat("the scene lies ", std::round(sizes),
+                      " times its own size from the origin, where single precision keeps 1/",
+                      std::round(std::max(1.0, 0x1p24 / sizes)), " of that size; move it nearer"));
+  }
   if (!in_world_) diagnostics_.Error(whole, "the scene has no WorldBegin");
   if (!has_camera_) diagnostics_.Error(whole, "the scene has no camera");
   if (scene_.meshes.empty() && scene_.spheres.empty() && scene_.disks.empty()) {
@@ -1107,6 +1121,17 @@ void PbrtParser::Finish() {
   if (scene_.area_lights.empty() && scene_.point_lights.empty() && scene_.spot_lights.empty() &&
       scene_.distant_lights.empty() && scene_.infinite_lights.empty()) {
     diagnostics_.Warning(whole, "the scene has no light: the image will be black");
+  }
+  if (const Status chosen = ChooseUnit(scene_); !chosen.ok()) {
+    diagnostics_.Error(whole, std::string(chosen.message()));
+  }
+  std::size_t dropped = 0;
+  for (TriangleMesh& mesh : scene_.meshes)
+    dropped += DropTriangles(mesh, FLT_MIN);
+  std::erase_if(scene_.meshes, [](const TriangleMesh& mesh) { return mesh.indices.empty(); });
+  if (dropped > 0) {
+    diagnostics_.Note(whole, Concat(dropped, dropped == 1 ? " triangle has" : " triangles have",
+                                    " no area in single precision and are dropped"));
   }
 }
 

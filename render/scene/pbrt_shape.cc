@@ -11,8 +11,9 @@
 #include <numbers>
 #include <utility>
 
-#include "render/scene/scene_builder.h"
 #include "render/base/text.h"
+#include "render/math/double3.h"
+#include "render/scene/scene_builder.h"
 
 namespace lucerna {
 namespace {
@@ -54,21 +55,20 @@ void SwapWinding(TriangleMesh& mesh, std::size_t triangle) {
   std::swap(mesh.indices[3 * triangle + 1], mesh.indices[3 * triangle + 2]);
 }
 
-Vec3 EdgeCross(const TriangleMesh& mesh, std::size_t triangle) {
-  const Vec3 p0 = mesh.positions[mesh.indices[3 * triangle]];
-  const Vec3 p1 = mesh.positions[mesh.indices[3 * triangle + 1]];
-  const Vec3 p2 = mesh.positions[mesh.indices[3 * triangle + 2]];
-  return Cross(p1 - p0, p2 - p0);
+Double3 EdgeCross(const TriangleMesh& mesh, std::size_t triangle) {
+  return TriangleCross(mesh.positions[mesh.indices[3 * triangle]],
+                       mesh.positions[mesh.indices[3 * triangle + 1]],
+                       mesh.positions[mesh.indices[3 * triangle + 2]]);
 }
 
-// Drops the triangles that have no normal in single precision: they have no area to speak of, and
-// can neither be seen nor lit. Returns how many.
-std::size_t DropDegenerate(TriangleMesh& mesh) {
+}  // namespace
+
+std::size_t DropTriangles(TriangleMesh& mesh, double least_area) {
   std::size_t kept = 0;
   const std::size_t count = mesh.indices.size() / 3;
   for (std::size_t triangle = 0; triangle < count; ++triangle) {
-    const float squared = LengthSquared(EdgeCross(mesh, triangle));
-    if (!(squared >= FLT_MIN && squared <= FLT_MAX)) continue;
+    const double area = Length(EdgeCross(mesh, triangle)) / 2;
+    if (!(area >= least_area && std::isfinite(area))) continue;
     for (std::size_t i = 0; i < 3; ++i)
       mesh.indices[3 * kept + i] = mesh.indices[3 * triangle + i];
     ++kept;
@@ -76,6 +76,11 @@ std::size_t DropDegenerate(TriangleMesh& mesh) {
   mesh.indices.resize(3 * kept);
   return count - kept;
 }
+
+namespace {
+
+// The area of what the unit of the scene may yet make large enough (scene_unit.h).
+constexpr double kLeastArea = 1e-90;
 
 // Puts a mesh with sound indices where `placement` says.
 void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
@@ -88,7 +93,7 @@ void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacemen
     for (Vec3& normal : mesh.normals)
       normal = -normal;
   }
-  const std::size_t dropped = DropDegenerate(mesh);
+  const std::size_t dropped = DropTriangles(mesh, kLeastArea);
   if (dropped > 0) {
     parameters.diagnostics().Note(
         parameters.place(),
@@ -102,7 +107,7 @@ void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacemen
       const Vec3 towards = mesh.normals[mesh.indices[3 * triangle]] +
                            mesh.normals[mesh.indices[3 * triangle + 1]] +
                            mesh.normals[mesh.indices[3 * triangle + 2]];
-      const float agreement = Dot(EdgeCross(mesh, triangle), towards);
+      const double agreement = Dot(EdgeCross(mesh, triangle), Double3(towards));
       if (agreement != 0) swap = agreement < 0;
     }
     if (swap) SwapWinding(mesh, triangle);
@@ -252,7 +257,7 @@ double ShapeSet::Area() const {
   double area_m2 = 0;
   for (const TriangleMesh& mesh : meshes) {
     for (std::size_t triangle = 0; triangle < mesh.indices.size() / 3; ++triangle) {
-      area_m2 += static_cast<double>(Length(EdgeCross(mesh, triangle))) / 2;
+      area_m2 += Length(EdgeCross(mesh, triangle)) / 2;
     }
   }
   const auto square = [](float x) { return static_cast<double>(x) * static_cast<double>(x); };
@@ -293,7 +298,7 @@ StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world
   for (const TriangleMesh& original : object.meshes) {
     TriangleMesh mesh = original;
     if (!Move(to_world, mesh)) return moved_away;
-    DropDegenerate(mesh);
+    DropTriangles(mesh, kLeastArea);
     if (mesh.indices.empty()) continue;
     // The outward side stays outward: a mirror image is wound the other way round.
     if (to_world.SwapsHandedness()) {

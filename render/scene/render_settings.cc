@@ -11,9 +11,12 @@ namespace lucerna {
 namespace {
 
 constexpr int kMaxSide = 65536;
-// An image of 7680 x 4320 fits. The coordinator keeps some 570 bytes a pixel, and must not be
-// ended for want of memory by one job among many.
-constexpr std::int64_t kMaxPixels = std::int64_t{1} << 25;
+// In the unit that the scene is rendered in: the square of a radius is a float.
+constexpr double kLeastRadius = 1e-18;
+constexpr double kMostRadius = 1e18;
+// An image of 16384 x 16384 fits. Whether it fits into a coordinator's memory too is for that to
+// say (server/memory_need.h).
+constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
 constexpr std::int64_t kMaxPhotonsPerPass = 1'000'000'000'000;
 constexpr int kMaxDepth = 10'000;
 constexpr std::int64_t kDefaultPasses = 16;
@@ -190,12 +193,12 @@ StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const
         Concat("--frequency-share must be above 0% and at most 100%, not ",
                100 * settings.frequency_share, "%"));
   }
-  // The square of a radius is a float.
   if (settings.initial_radius != 0 &&
-      !(settings.initial_radius >= 1e-18 && settings.initial_radius <= 1e18)) {
+      !(settings.initial_radius >= kLeastRadius * scene.unit &&
+        settings.initial_radius <= kMostRadius * scene.unit)) {
     return absl::InvalidArgumentError(
-        Concat("--initial-radius must be auto or a length from 1e-18 to 1e18, not ",
-               settings.initial_radius));
+        Concat("--initial-radius must be auto or a length from ", kLeastRadius * scene.unit, " to ",
+               kMostRadius * scene.unit, ", not ", settings.initial_radius));
   }
   settings.max_depth = overrides.max_depth.value_or(asked.max_depth.value_or(kDefaultDepth));
   LUCERNA_RETURN_IF_ERROR(CheckRange("--max-depth", settings.max_depth, 1, kMaxDepth));

@@ -5,8 +5,8 @@
 // it has been prepared for rendering yet (acceleration structures, light distributions): that is
 // for the floors above.
 //
-// Units: lengths in scene units, taken as metres; angles in radians unless a name says _deg;
-// radiance [W·m⁻²·sr⁻¹] in linear Rec. 709.
+// Units: lengths in `unit` scene units, which are taken as metres; angles in radians unless a name
+// says _deg; radiance [W·m⁻²·sr⁻¹] in linear Rec. 709.
 //
 // Invariants, which the parser guarantees and everything above relies on
 //   S1  Every position, normal, texture coordinate, transform, colour and pixel is finite.
@@ -215,6 +215,9 @@ struct IntegratorSettings {
 };
 
 struct Scene {
+  // A length here times this is one of the file: a power of two, 1 for scenes of common sizes
+  // (scene_unit.h). Of what is below, the integrator's settings are the file's.
+  double unit = 1;
   std::vector<TriangleMesh> meshes;
   std::vector<Sphere> spheres;
   std::vector<Disk> disks;

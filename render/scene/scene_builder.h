@@ -93,6 +93,9 @@ using MeshReader = std::function<StatusOr<TriangleMesh>(const std::string& file)
 // transform moves a position out of the finite numbers, or makes an ellipsoid of a sphere.
 [[nodiscard]] StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world);
 
+// Drops the triangles of a smaller area: they can neither be seen nor lit. Returns how many.
+std::size_t DropTriangles(TriangleMesh& mesh, double least_area);
+
 // The directives before WorldBegin. `exposure_time_s` is shutterclose - shutteropen; the film's
 // own share of the exposure is iso / 100, and the parser multiplies the two.
 void ReadCamera(std::string_view type, ParameterList& parameters, Camera& camera,

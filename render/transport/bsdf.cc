@@ -222,12 +222,14 @@ float FresnelDielectric(float cos_i, float eta, float& cos_t) {
     cos_i = -cos_i;
   }
   cos_i = std::min(cos_i, 1.0F);
-  const float sin2_t = (1 - cos_i * cos_i) / (eta * eta);
-  if (sin2_t >= 1) {
+  // eta² cos²_t, by a sum that does not cancel: at grazing incidence 1 - cos²_i would be 1 in
+  // float, and a surface between equal media would reflect all light.
+  const float squared = (eta - 1) * (eta + 1) + cos_i * cos_i;
+  if (!(squared > 0)) {
     cos_t = 0;
     return 1;
   }
-  cos_t = std::sqrt(1 - sin2_t);
+  cos_t = std::sqrt(squared) / eta;
   const float parallel = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
   const float perpendicular = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
   return 0.5F * (parallel * parallel + perpendicular * perpendicular);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/math/double3.h"
 #include "render/math/warp.h"
 
 namespace lucerna {
@@ -15,6 +16,10 @@ float SpotFalloff(const SpotLight& spot, float cosine) {
   const float x = (cosine - spot.cos_total_width) / (spot.cos_falloff_start - spot.cos_total_width);
   return x * x * (3 - 2 * x);
 }
+
+// How much of the choice of direct light is even among the lights. By power alone, a lamp nearby
+// that has a millionth of the power of another is found once in a million samples.
+constexpr double kEvenShare = 0.1;
 
 // 1 - cosine of the cone in which a sphere appears from outside, without cancellation.
 float OneMinusCosine(float sin2_max) {
@@ -50,8 +55,8 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     for (std::uint32_t t = 0; t < mesh.indices.size() / 3; ++t) {
       const std::uint32_t* corner = &mesh.indices[std::size_t{3} * t];
       const Vec3 p0 = mesh.positions[corner[0]];
-      const float area =
-          0.5F * Length(Cross(mesh.positions[corner[1]] - p0, mesh.positions[corner[2]] - p0));
+      const auto area = static_cast<float>(
+          Length(TriangleCross(p0, mesh.positions[corner[1]], mesh.positions[corner[2]])) / 2);
       Emitter emitter = area_emitter(Kind::kTriangle, mesh.traits, area);
       emitter.geometry = m;
       emitter.primitive = t;
@@ -135,22 +140,45 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     Add(emitter);
   }
 
+  ShareOut();
+}
+
+void LightSet::ShareOut() {
+  // A mesh is one light, whatever it is cut into.
+  const auto is_same_light = [](const Emitter& a, const Emitter& b) {
+    return a.kind == Kind::kTriangle && b.kind == Kind::kTriangle && a.geometry == b.geometry;
+  };
+  std::vector<double> light_power;
+  std::vector<std::size_t> light_of;
   double total = 0;
-  for (const Emitter& emitter : emitters_) {
-    total += static_cast<double>(Luminance(emitter.power));
-    cumulative_.push_back(total);
-    total_power_ += emitter.power;
+  for (std::size_t i = 0; i < emitters_.size(); ++i) {
+    if (i == 0 || !is_same_light(emitters_[i - 1], emitters_[i])) light_power.push_back(0);
+    const auto power = static_cast<double>(Luminance(emitters_[i].power));
+    light_of.push_back(light_power.size() - 1);
+    light_power.back() += power;
+    total += power;
+    total_power_ += emitters_[i].power;
   }
   if (!(total > 0)) {
     // No light at all: nothing is ever drawn.
     emitters_.clear();
-    cumulative_.clear();
     return;
   }
+  const auto lights = static_cast<double>(
+      std::ranges::count_if(light_power, [](double power) { return power > 0; }));
+  double sum = 0;
+  double direct_sum = 0;
   for (std::size_t i = 0; i < emitters_.size(); ++i) {
-    cumulative_[i] /= total;
-    emitters_[i].choice =
-        static_cast<float>(static_cast<double>(Luminance(emitters_[i].power)) / total);
+    const auto power = static_cast<double>(Luminance(emitters_[i].power));
+    const double choice = power / total;
+    const double even = power > 0 ? power / light_power[light_of[i]] / lights : 0;
+    const double direct_choice = choice + kEvenShare * (even - choice);
+    sum += power;
+    direct_sum += direct_choice;
+    cumulative_.push_back(sum / total);
+    direct_cumulative_.push_back(direct_sum);
+    emitters_[i].choice = static_cast<float>(choice);
+    emitters_[i].direct_choice = static_cast<float>(direct_choice);
   }
 }
 
@@ -158,10 +186,10 @@ void LightSet::Add(Emitter emitter) {
   emitters_.push_back(emitter);
 }
 
-const Emitter& LightSet::Choose(double u) const {
-  auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), u);
-  if (found == cumulative_.end()) --found;
-  return emitters_[static_cast<std::size_t>(found - cumulative_.begin())];
+const Emitter& LightSet::Choose(const std::vector<double>& cumulative, double u) const {
+  auto found = std::upper_bound(cumulative.begin(), cumulative.end(), u);
+  if (found == cumulative.end()) --found;
+  return emitters_[static_cast<std::size_t>(found - cumulative.begin())];
 }
 
 void LightSet::PointOn(const Emitter& emitter, float u1, float u2, Vec3& position, Vec3& normal,
@@ -177,7 +205,7 @@ void LightSet::PointOn(const Emitter& emitter, float u1, float u2, Vec3& positio
       float b2 = 0;
       SquareToTriangle(u1, u2, b1, b2);
       position = p0 + e1 * b1 + e2 * b2;
-      normal = Normalize(Cross(e1 * (1 / MaxAbs(e1)), e2 * (1 / MaxAbs(e2))));
+      normal = TriangleNormal(p0, mesh.positions[corner[1]], mesh.positions[corner[2]]);
       clearance = kClearance * (MaxAbs(p0) + MaxAbs(e1) + MaxAbs(e2));
       return;
     }
@@ -211,7 +239,7 @@ void LightSet::PointOn(const Emitter& emitter, float u1, float u2, Vec3& positio
 bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, float u_direction1,
                               float u_direction2, Emission& emission) const {
   if (emitters_.empty()) return false;
-  const Emitter& emitter = Choose(u_choice);
+  const Emitter& emitter = Choose(cumulative_, u_choice);
   emission.ray.t_max = HUGE_VALF;
   emission.flux = emitter.power / emitter.choice;
   emission.emitter = static_cast<std::uint32_t>(&emitter - emitters_.data());
@@ -286,7 +314,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
 bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
                             LightSample& sample) const {
   if (emitters_.empty()) return false;
-  const Emitter& emitter = Choose(u_choice);
+  const Emitter& emitter = Choose(direct_cumulative_, u_choice);
   switch (emitter.kind) {
     case Kind::kSphere: {
       const Sphere& sphere = scene_.spheres[emitter.primitive];
@@ -310,7 +338,7 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
         sample.target =
             sphere.center +
             outward * (sphere.radius + kClearance * (MaxAbs(sphere.center) + sphere.radius));
-        const float pdf = emitter.choice / (2 * kPi * one_minus_cos);
+        const float pdf = emitter.direct_choice / (2 * kPi * one_minus_cos);
         sample.pdf = pdf;
         sample.radiance_over_pdf = emitter.radiance / pdf;
         return true;
@@ -323,7 +351,7 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
       sample.is_distant = false;
       sample.target = scene_.point_lights[emitter.primitive].position;
       sample.wi = to / std::sqrt(distance2);
-      sample.radiance_over_pdf = emitter.radiance / (distance2 * emitter.choice);
+      sample.radiance_over_pdf = emitter.radiance / (distance2 * emitter.direct_choice);
       sample.pdf = 0;
       return distance2 > 0;
     }
@@ -335,14 +363,14 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
       sample.target = spot.position;
       sample.wi = to / std::sqrt(distance2);
       const float falloff = SpotFalloff(spot, -Dot(sample.wi, spot.direction));
-      sample.radiance_over_pdf = emitter.radiance * (falloff / (distance2 * emitter.choice));
+      sample.radiance_over_pdf = emitter.radiance * (falloff / (distance2 * emitter.direct_choice));
       sample.pdf = 0;
       return distance2 > 0 && falloff > 0;
     }
     case Kind::kDistant:
       sample.wi = -scene_.distant_lights[emitter.primitive].direction;
       sample.is_distant = true;
-      sample.radiance_over_pdf = emitter.radiance / emitter.choice;
+      sample.radiance_over_pdf = emitter.radiance / emitter.direct_choice;
       sample.pdf = 0;
       return true;
     case Kind::kInfinite:
@@ -375,7 +403,7 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
   if (!(cosine > 0)) return false;
   sample.is_distant = false;
   sample.target = position + normal * clearance;
-  sample.pdf = emitter.choice * distance2 / (cosine * emitter.area);
+  sample.pdf = emitter.direct_choice * distance2 / (cosine * emitter.area);
   sample.radiance_over_pdf = emitter.radiance / sample.pdf;
   return true;
 }
@@ -406,14 +434,14 @@ float LightSet::PdfDirect(Vec3 from, const SurfacePoint& point) const {
     const Sphere& sphere = scene_.spheres[emitter->primitive];
     const float sin2_max = sphere.radius * sphere.radius / LengthSquared(sphere.center - from);
     if (!sphere.inward && sin2_max < 0.9999F) {
-      return emitter->choice / (2 * kPi * OneMinusCosine(sin2_max));
+      return emitter->direct_choice / (2 * kPi * OneMinusCosine(sin2_max));
     }
   }
   const Vec3 to = point.position - from;
   const float distance2 = LengthSquared(to);
   const float cosine = std::abs(Dot(to, point.geometric_normal)) / std::sqrt(distance2);
   if (!(cosine > 0)) return 0;
-  return emitter->choice * distance2 / (cosine * emitter->area);
+  return emitter->direct_choice * distance2 / (cosine * emitter->area);
 }
 
 Rgb LightSet::InfiniteRadiance(Vec3 direction) const {
@@ -427,10 +455,10 @@ float LightSet::PdfDirectInfinite(Vec3 direction) const {
   if (emitters_.empty()) return 0;
   float pdf = 0;
   if (infinite_emitter_ >= 0) {
-    pdf = emitters_[static_cast<std::size_t>(infinite_emitter_)].choice / (4 * kPi);
+    pdf = emitters_[static_cast<std::size_t>(infinite_emitter_)].direct_choice / (4 * kPi);
   }
   for (std::size_t i = 0; i < environments_.size(); ++i) {
-    pdf += emitters_[first_environment_ + i].choice * environments_[i].PdfSolidAngle(direction);
+    pdf += emitters_[first_environment_ + i].direct_choice * environments_[i].PdfSolidAngle(direction);
   }
   return pdf;
 }

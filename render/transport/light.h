@@ -39,8 +39,9 @@ struct Emitter {
   std::uint32_t primitive = 0;  // triangle, sphere, disk, or index among lights or maps
   bool two_sided = false;
   float area = 0;
-  float choice = 0;  // probability
-  Rgb radiance;      // or intensity, or irradiance
+  float choice = 0;         // probability for a photon: its share of the power
+  float direct_choice = 0;  // probability for direct light
+  Rgb radiance;             // or intensity, or irradiance
   Rgb power;
 };
 
@@ -94,7 +95,9 @@ class LightSet {
   using Kind = EmitterKind;
 
   void Add(Emitter emitter);
-  [[nodiscard]] const Emitter& Choose(double u) const;
+  // Fills in the choices of all emitters.
+  void ShareOut();
+  [[nodiscard]] const Emitter& Choose(const std::vector<double>& cumulative, double u) const;
   [[nodiscard]] const Emitter* EmitterOf(const SurfacePoint& point) const;
   void PointOn(const Emitter& emitter, float u1, float u2, Vec3& position, Vec3& normal,
                float& clearance) const;
@@ -103,7 +106,7 @@ class LightSet {
   Vec3 center_;
   float radius_ = 0;  // of the scene's bounding sphere
   std::vector<Emitter> emitters_;
-  std::vector<double> cumulative_;  // [emitters] of the choice
+  std::vector<double> cumulative_, direct_cumulative_;  // [emitters] of the choices
   // [geometry]: number of its first emitter, or -1.
   std::vector<std::int64_t> first_emitter_;
   std::vector<std::int32_t> sphere_emitter_, disk_emitter_;

@@ -268,5 +268,17 @@ TEST(GathersTest, SeparatesWhatPhotonsFindFromWhatEyePathsFind) {
   EXPECT_TRUE(Gathers(metal));
 }
 
+// Between equal media nothing is reflected and nothing bent, down to 89.999999 degrees: there
+// 1 - cos² is 1 in float.
+TEST(FresnelTest, EqualMediaAreNoSurfaceAtAnyIncidence) {
+  for (const float cosine : {1.0F, 0.5F, 1e-2F, 1e-4F, 1e-6F, 2e-8F}) {
+    for (const float side : {1.0F, -1.0F}) {
+      float cos_t = 0;
+      EXPECT_LT(FresnelDielectric(side * cosine, 1, cos_t), 1e-12F) << cosine;
+      EXPECT_FLOAT_EQ(cos_t, cosine);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lucerna

@@ -291,5 +291,27 @@ TEST(SampleEmissionTest, FillsTheSceneFromInfinity) {
   EXPECT_NEAR(through, expected, 4 * std::sqrt(squares / kPhotons));
 }
 
+// Of two lamps as bright at the origin, one has 1e-12 of the power: a twentieth of the samples go to
+// it, where its power would send none.
+TEST(SampleDirectTest, FindsANearLampBesideAFarOneOfAllThePower) {
+  Scene scene = BlackRoom();
+  scene.point_lights.push_back({{0, 0, 1}, Gray(1)});
+  scene.point_lights.push_back({{0, 1e6F, 0}, Gray(1e12F)});
+  const Lit lit(std::move(scene));
+  KeyedRng rng(3);
+  int near = 0;
+  constexpr int kSamples = 10000;
+  for (int i = 0; i < kSamples; ++i) {
+    LightSample sample;
+    const float u = rng.Uniform();
+    ASSERT_TRUE(lit.lights.SampleDirect({0, 0, 0}, static_cast<double>(u), 0, 0, sample));
+    if (sample.wi.z < 0.5F) continue;
+    ++near;
+    EXPECT_NEAR(sample.radiance_over_pdf.g, 20, 1e-3);
+  }
+  // Five standard deviations.
+  EXPECT_NEAR(near, kSamples / 20, 5 * std::sqrt(kSamples / 20.0));
+}
+
 }  // namespace
 }  // namespace lucerna

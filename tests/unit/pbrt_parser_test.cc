@@ -666,5 +666,16 @@ TEST(PbrtParserTest, BinaryFilesAndMissingFiles) {
   EXPECT_EQ(ParsePbrt(none, "s.pbrt").ToStatus().code(), absl::StatusCode::kInvalidArgument);
 }
 
+// A triangle is kept as long as its area is a normal float, whatever the product of its edges
+// squared is.
+TEST(PbrtParserTest, TinyAndHugeTrianglesAndNeedlesAreKept) {
+  for (const std::string_view points :
+       {"0 0 0 1e-12 0 0 0 1e-12 0", "0 0 0 1e15 0 0 0 1e15 0", "0 0 0 1 0 0 0.5 1e-20 0"}) {
+    const Scene scene = World("Shape \"trianglemesh\" \"point3 P\" [" + std::string(points) + "]");
+    ASSERT_EQ(scene.meshes.size(), 1U) << points;
+    EXPECT_THAT(scene.meshes[0].indices, ElementsAre(0, 1, 2)) << points;
+  }
+}
+
 }  // namespace
 }  // namespace lucerna

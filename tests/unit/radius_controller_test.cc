@@ -45,8 +45,8 @@ TEST(PpmTest, CountsOnlyWhatTodaysDiscWouldHaveHeld) {
   const auto ppm = Make(RadiusControllerKind::kPpm, 2.0 / 3);
   const PixelRadius lagging = ppm->Next({1, 100}, {200, 2, {}}, 4, {});
   const PixelRadius direct = ppm->Next({1, 100}, {50, 1, {}}, 4, {});
-  EXPECT_FLOAT_EQ(lagging.radius, direct.radius);
-  EXPECT_FLOAT_EQ(lagging.photons, direct.photons);
+  EXPECT_DOUBLE_EQ(lagging.radius, direct.radius);
+  EXPECT_DOUBLE_EQ(lagging.photons, direct.photons);
 }
 
 // With M photons in every first disc, M r² of them in a disc of radius r, N + αM must keep the
@@ -55,7 +55,7 @@ TEST(PpmTest, KeepsTheDensityOverManyPasses) {
   const auto ppm = Make(RadiusControllerKind::kPpm, 0.8);
   PixelRadius pixel = {1, 0};
   for (std::uint64_t pass = 0; pass < 1000; ++pass) {
-    const float r = pixel.radius;
+    const double r = pixel.radius;
     pixel = ppm->Next(pixel, {100.0 * static_cast<double>(r) * static_cast<double>(r), r, {}}, pass,
                       {});
     ASSERT_LT(pixel.radius, r);
@@ -89,9 +89,9 @@ TEST(CppmTest, ShrinksOnlyWhereCountsAreUneven) {
     return cppm->Next({1, 0}, {120, 1, counts}, 0, memory).radius;
   };
   EXPECT_EQ(next({10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10}), 1);
-  EXPECT_FLOAT_EQ(next({30, 25, 10, 0, 5, 10, 15, 10, 5, 5, 0, 5}), std::sqrt(0.8F));
+  EXPECT_DOUBLE_EQ(next({30, 25, 10, 0, 5, 10, 15, 10, 5, 5, 0, 5}), std::sqrt(0.8));
   std::fill(memory.begin(), memory.end(), 0);
-  EXPECT_FLOAT_EQ(next({20, 20, 20, 20, 20, 20, 0, 0, 0, 0, 0, 0}), std::sqrt(0.5F));
+  EXPECT_DOUBLE_EQ(next({20, 20, 20, 20, 20, 20, 0, 0, 0, 0, 0, 0}), std::sqrt(0.5));
   // Too few to say anything.
   std::fill(memory.begin(), memory.end(), 0);
   EXPECT_EQ(next({20, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}), 1);
@@ -193,18 +193,18 @@ PixelRadius RunFrequency(RadiusControllerKind kind, double trace, int passes) {
 TEST(FrequencyTest, StopsAtThePredictedRadius) {
   // Epanechnikov: sqrt(12 · 0.02 / tr) = 0.5.
   constexpr double kTrace = 12 * 0.02 / 0.25;
-  const float stopped = RunFrequency(RadiusControllerKind::kFrequency, kTrace, 400).radius;
+  const double stopped = RunFrequency(RadiusControllerKind::kFrequency, kTrace, 400).radius;
   EXPECT_NEAR(stopped, 0.5, 0.005);
   EXPECT_EQ(RunFrequency(RadiusControllerKind::kFrequency, kTrace, 800).radius, stopped);
   // The consistent variant goes on below it, but slower than PPM.
-  const float consistent =
+  const double consistent =
       RunFrequency(RadiusControllerKind::kFrequencyConsistent, kTrace, 800).radius;
   EXPECT_LT(consistent, 0.495F);
   EXPECT_GT(consistent, 0.4F);
   // Even light: the radius stays, but for the first pass, whose five frequency photons say nothing
   // yet.
-  EXPECT_FLOAT_EQ(RunFrequency(RadiusControllerKind::kFrequency, 0, 100).radius,
-                  std::sqrt(2.0F / 3));
+  EXPECT_DOUBLE_EQ(RunFrequency(RadiusControllerKind::kFrequency, 0, 100).radius,
+                  std::sqrt(2.0 / 3));
   EXPECT_EQ(RunFrequency(RadiusControllerKind::kFrequencyMse, 0, 100).radius, 1);
 }
 
@@ -241,8 +241,8 @@ TEST(EvidenceOfTest, FrequencyPhotonsKeepTheirShareOverAPeriod) {
 
 TEST(FrequencyMseTest, TakesTheRadiusOfLeastErrorAtOnceAndThenFollowsTheDensity) {
   constexpr double kTrace = 40;  // tolerance at a radius of 0.077
-  const float early = RunFrequency(RadiusControllerKind::kFrequencyMse, kTrace, 20).radius;
-  const float late = RunFrequency(RadiusControllerKind::kFrequencyMse, kTrace, 2000).radius;
+  const double early = RunFrequency(RadiusControllerKind::kFrequencyMse, kTrace, 20).radius;
+  const double late = RunFrequency(RadiusControllerKind::kFrequencyMse, kTrace, 2000).radius;
   // r ~ (photons per area)^(-1/6).
   EXPECT_NEAR(static_cast<double>(late / early), std::pow(100.0, -1.0 / 6), 0.06);
   EXPECT_GT(late, 0.077F);

@@ -121,11 +121,11 @@ TEST(RenderSettingsTest, RefusesWhatIsOutOfRangeByTheFlagsName) {
   user.width = 65537;
   user.height = 1;
   EXPECT_THAT(Why(user), HasSubstr("--size"));
-  user.width = 8192;
-  user.height = 4096;
+  user.width = 16384;
+  user.height = 16384;
   EXPECT_EQ(Why(user), "");
-  user.height = 4097;
-  EXPECT_THAT(Why(user), HasSubstr("more than the 33554432 of one job"));
+  user.height = 16385;
+  EXPECT_THAT(Why(user), HasSubstr("more than the 268435456 of one job"));
 }
 
 TEST(RenderSettingsTest, NamesAreReadBack) {

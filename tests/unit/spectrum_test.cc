@@ -573,5 +573,55 @@ TEST(SpectrumHazardTest, LetsANaNThrough) {
   EXPECT_TRUE(std::isnan(ReceivedTrace(fine, kNaN, 0, 0, kLimits)));
 }
 
+// Every state at its lower clamp, in the middle or at its upper clamp, through every event with
+// arguments at their own: the outcome is within the limits, and so is what a second event makes of
+// it.
+TEST(SpectrumHazardTest, MapsEveryCombinationOfClampsIntoTheLimits) {
+  for (const double diagonal : {1e-20, 1.0, 1e20}) {
+    const SpectrumLimits limits = SpectrumLimits::ForDiagonal(diagonal);
+    const double middle_v = 1 / diagonal;
+    const std::array lengths = {0.0, limits.edge_distance_m, diagonal, limits.distance_m};
+    const std::array curvatures = {-limits.curvature, -middle_v, 0.0, middle_v, limits.curvature};
+    int states = 0;
+    for (const double s : {0.0, middle_v * middle_v, limits.s}) {
+      for (const double v : {-limits.v, -middle_v, 0.0, limits.v}) {
+        for (const double p : {kSmallestAngularVariance, 0.25, kLargestAngularVariance}) {
+          for (const double g : {0.0, limits.g}) {
+            for (const double h : {0.0, limits.h}) {
+              ++states;
+              const Spectrum x = Of(s, v, p, g, h);
+              std::vector<Spectrum> outcomes;
+              for (const double length : lengths) {
+                outcomes.push_back(Travel(x, length, limits));
+                outcomes.push_back(PassEdge(x, length, limits.distance_m - length, 1, limits));
+                outcomes.push_back(LeaveDiffuse(x, length, limits));
+              }
+              for (const double cosine : {0.0, 0.02, 0.7, 1.0}) {
+                for (const double curvature : curvatures) {
+                  const SurfaceBend bend = {curvature, -curvature, limits.g, limits.h};
+                  outcomes.push_back(Mirror(x, cosine, bend, limits));
+                  for (const double ratio : {0.01, 1 / 1.5, 1.0, 1.5, 100.0})
+                    outcomes.push_back(Refract(x, ratio, cosine, bend, limits));
+                  const double trace = ReceivedTrace(x, cosine, curvature, -curvature, limits);
+                  ASSERT_TRUE(std::isfinite(trace) && trace >= 0);
+                  outcomes.push_back(ScatterDiffusely(trace, limits.s, limits));
+                }
+              }
+              for (const double lobe : {0.0, 1e-12, kDiffuseLobe, 1e12})
+                outcomes.push_back(Blur(x, lobe, limits));
+              for (const Spectrum& outcome : outcomes) {
+                ExpectWithin(outcome, limits, "first");
+                ExpectWithin(Travel(outcome, diagonal, limits), limits, "second");
+              }
+              ASSERT_FALSE(HasFailure());
+            }
+          }
+        }
+      }
+    }
+    EXPECT_EQ(states, 3 * 4 * 3 * 2 * 2);
+  }
+}
+
 }  // namespace
 }  // namespace lucerna

@@ -38,4 +38,16 @@ inline Vec3 ToFloat(Double3 a) {
   return {static_cast<float>(a.x), static_cast<float>(a.y), static_cast<float>(a.z)};
 }
 
+// The outward normal of a triangle, as long as twice its area: a needle's too, whose sides are
+// nearly parallel, and at all sizes that floats have.
+inline Double3 TriangleCross(Vec3 p0, Vec3 p1, Vec3 p2) {
+  const Double3 origin(p0);
+  return Cross(Double3(p1) - origin, Double3(p2) - origin);
+}
+// Requires a triangle that has an area.
+inline Vec3 TriangleNormal(Vec3 p0, Vec3 p1, Vec3 p2) {
+  const Double3 cross = TriangleCross(p0, p1, p2);
+  return ToFloat(cross * (1 / Length(cross)));
+}
+
 }  // namespace lucerna

@@ -1,0 +1,46 @@
+#include "render/scene/scene_extent.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lucerna {
+namespace {
+
+Vec3 Everywhere(float length) {
+  return {length, length, length};
+}
+
+}  // namespace
+
+SceneExtent ExtentOf(const Scene& scene) {
+  Bounds box;
+  for (const TriangleMesh& mesh : scene.meshes) {
+    for (const Vec3& position : mesh.positions)
+      box.Add(position);
+  }
+  // A round shape may reach beyond the floats.
+  const auto add_around = [&](Vec3 center, float radius) {
+    box.Add(center - Everywhere(radius));
+    box.Add(center + Everywhere(radius));
+  };
+  for (const Sphere& sphere : scene.spheres)
+    add_around(sphere.center, sphere.radius);
+  for (const Disk& disk : scene.disks)
+    add_around(disk.center, disk.radius);
+  SceneExtent extent;
+  if (box.empty()) return extent;
+  double size_square = 0;
+  double middle_square = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto low = static_cast<double>(box.low[axis]);
+    const auto high = static_cast<double>(box.high[axis]);
+    size_square += (high - low) * (high - low);
+    middle_square += (high + low) * (high + low) / 4;
+    extent.largest = std::max({extent.largest, std::abs(low), std::abs(high)});
+  }
+  extent.size = std::sqrt(size_square);
+  extent.from_origin = std::sqrt(middle_square);
+  return extent;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,52 @@
+// A job whose image does not fit is refused in one sentence, before anything is allocated.
+#include "server/memory_need.h"
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "render/base/memory.h"
+
+namespace lucerna {
+namespace {
+
+RenderSettings Sized(int width, int height) {
+  RenderSettings settings;
+  settings.width = settings.crop_x1 = width;
+  settings.height = settings.crop_y1 = height;
+  return settings;
+}
+
+TEST(MemoryNeedTest, GrowsWithPixelsAndEvidence) {
+  EXPECT_EQ(MemoryNeeded(Sized(200, 100)), 2 * MemoryNeeded(Sized(100, 100)));
+  RenderSettings frequency = Sized(100, 100);
+  frequency.radius_controller = RadiusControllerKind::kFrequencyMse;
+  EXPECT_GT(MemoryNeeded(frequency), MemoryNeeded(Sized(100, 100)));
+}
+
+TEST(MemoryNeedTest, OfTheLargestFilmIsNotFoundOnASmallMachine) {
+  const RenderSettings largest = Sized(16384, 16384);
+  // The product of both sides and the bytes of a pixel needs more than 32 bits.
+  EXPECT_GT(MemoryNeeded(largest), std::uint64_t{100} << 30);
+  const Status refused = CheckMemory(largest, std::uint64_t{16} << 30);
+  EXPECT_TRUE(absl::IsResourceExhausted(refused));
+  EXPECT_THAT(std::string(refused.message()),
+              testing::AllOf(testing::HasSubstr("16384x16384"), testing::HasSubstr("17.2 GB"),
+                             testing::HasSubstr("cropwindow")));
+  EXPECT_TRUE(CheckMemory(largest, std::uint64_t{1} << 40).ok());
+}
+
+TEST(MemoryNeedTest, OfACropWindowIsThatOfItsPixels) {
+  RenderSettings crop = Sized(16384, 16384);
+  crop.crop_x0 = 8000;
+  crop.crop_x1 = 8010;
+  crop.crop_y1 = 10;
+  EXPECT_EQ(MemoryNeeded(crop), MemoryNeeded(Sized(10, 10)));
+}
+
+TEST(AvailableMemoryTest, IsKnownHere) {
+  EXPECT_GT(AvailableMemory(), std::uint64_t{1} << 20);
+  EXPECT_LT(AvailableMemory(), std::uint64_t{1} << 50);
+}
+
+}  // namespace
+}  // namespace lucerna
