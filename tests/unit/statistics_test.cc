@@ -60,9 +60,8 @@ TEST(PixelStatisticsTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
   EXPECT_NEAR(static_cast<double>(statistics.Radii(rows, 301)[0]) / r, 1, 1e-5);
 }
 
-// A million passes' worth of light in sixteen: 1e12 photons a pass that all reach one hitpoint,
-// each with its 2^18 quanta. Integers of 58 bits become doubles, whose rounding is all that may be
-// seen.
+// 1e12 photons a pass that all reach one hitpoint, each with its 2^18 quanta. Integers of 58 bits
+// become doubles, whose rounding is all that may be seen.
 TEST(PixelStatisticsTest, KeepsItsDigitsWithATrillionPhotonsAPass) {
   RenderSettings settings;
   settings.radius_controller = RadiusControllerKind::kPppm;
