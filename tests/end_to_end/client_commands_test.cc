@@ -444,7 +444,7 @@ TEST_F(ClientCommandsTest, TracePhotonShowsTheWayOfAPhotonOfAJobThatIsOver) {
   const auto cluster = LocalCluster::Start({LUCERNA_BIN_DIR, 1, 1});
   ASSERT_TRUE(cluster.ok()) << cluster.status();
   const std::string server = (*cluster)->address();
-  constexpr int kPhotons = 40;
+  constexpr int kPhotons = 12;
   constexpr int kDepth = 4;
   const Ran submitted = Run({"submit", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--server",
                              server, "--passes", "2", "--photons-per-pass",
@@ -482,7 +482,7 @@ TEST_F(ClientCommandsTest, TracePhotonShowsTheWayOfAPhotonOfAJobThatIsOver) {
   EXPECT_EQ(Run({"trace-photon", job, "7", "--pass", "1", "--server", server}).out, once.out);
   EXPECT_NE(Run({"trace-photon", job, "1:8", "--server", server}).out, once.out);
 
-  for (const char* nothing : {"7:", ":7", "x", "-1", "1:40", "1:7:2"}) {
+  for (const char* nothing : {"7:", ":7", "x", "-1", "1:12", "1:7:2"}) {
     const Ran refused = Run({"trace-photon", job, nothing, "--server", server});
     EXPECT_EQ(refused.code, 2) << nothing << refused.err;
     EXPECT_EQ(refused.out, "");

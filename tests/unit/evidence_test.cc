@@ -51,6 +51,26 @@ struct Cloud {
   }
 };
 
+// Photons of the greatest weight and spectrum that are told apart: the sum of squares stays at 2^62.
+TEST(EvidenceTest, HoldsTheSumOfSquaredTracesBelowItsEnd) {
+  Cloud cloud(1);
+  cloud.deposits[0][0].position = {0, 0, 0};
+  cloud.deposits[0][0].flux = Gray(1e4F);
+  cloud.traces[0][0] = 1e30F;
+  // Each term is 2^48: 2^14 of them are 2^62, to the unit, and one more changes nothing.
+  cloud.deposits[0].resize((1U << 14) - 1, cloud.deposits[0][0]);
+  cloud.traces[0].resize(cloud.deposits[0].size(), 1e30F);
+  const auto trace2 = [&] {
+    return cloud.Sum(Evidence::kFrequency).evidence[kCommonColumns + kFrequencyTrace2][0];
+  };
+  EXPECT_EQ(trace2(), (std::int64_t{1} << 62) - (std::int64_t{1} << 48));
+  for (int i = 0; i < 2; ++i) {
+    cloud.deposits[0].push_back(cloud.deposits[0][0]);
+    cloud.traces[0].push_back(1e30F);
+    EXPECT_EQ(trace2(), std::int64_t{1} << 62);
+  }
+}
+
 TEST(EvidenceTest, SectorsAreTwelveCellsOfEqualAreaAndHoldEveryPhotonOnce) {
   const Accumulation sum = Cloud(120000).Sum(Evidence::kSectors);
   ASSERT_EQ(sum.evidence.size(), kCommonColumns + kSectors);

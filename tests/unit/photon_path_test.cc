@@ -110,8 +110,8 @@ TEST(PhotonEnergyTest, TellsHowMuchWallsAbsorb) {
 
 TEST(PhotonPathTest, NamesPhotonsThatAreNotFinite) {
   Scene scene = OpenBox();
-  // Glass whose index is not a number: what it scatters goes nowhere.
-  scene.materials[1].ior = NAN;
+  // A metal whose index is not a number, nor then what it reflects.
+  scene.materials[2].eta = Gray(NAN);
   const Traced traced(scene);
   const PhotonPathTracer::Landed landed = traced.Trace(5000, 3);
   ASSERT_GT(landed.dropped, kDroppedNamed);

@@ -60,6 +60,46 @@ TEST(PixelStatisticsTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
   EXPECT_NEAR(static_cast<double>(statistics.Radii(rows, 301)[0]) / r, 1, 1e-5);
 }
 
+// 1e12 photons a pass that all reach one hitpoint, each with its 2^18 quanta. Integers of 58 bits
+// become doubles, whose rounding is all that may be seen.
+TEST(PixelStatisticsTest, KeepsItsDigitsWithATrillionPhotonsAPass) {
+  RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kPppm;
+  const auto controller = MakeRadiusController(settings, 1);
+  const Kernel kernel{KernelKind::kConstant};
+  const FluxScale scale = FluxScale::ForPower(Gray(1));
+  constexpr std::int64_t kPhotons = 1'000'000'000'000;
+  constexpr int kPasses = 16;
+  PixelStatistics statistics(1, 0.25F);
+  const std::vector<std::uint32_t> pixels = {0};
+  const std::vector<Rgb> weights = {{1, 1, 1}};
+  const std::vector<float> units = {1};
+  const HitpointRows rows = {pixels, weights, units};
+  std::vector<RgbSum> radiance(1);
+  std::vector<double> bias(1);
+  long double expected = 0;
+  for (int pass = 0; pass < kPasses; ++pass) {
+    PassSums sums(1, kCommonColumns);
+    Accumulation batch;
+    batch.hitpoints = {0};
+    batch.counts = {4'000'000'000};
+    for (auto& channel : batch.flux)
+      channel = {std::int64_t{4'000'000'000} << kFluxBits};
+    batch.evidence.assign(kCommonColumns, {0});
+    for (int i = 0; i < 250; ++i)
+      ASSERT_TRUE(sums.Add(batch).ok());
+    const RadiusColumn radii = statistics.Radii(rows, static_cast<std::uint64_t>(pass));
+    const long double radius = static_cast<long double>(radii[0]);
+    expected += 1 / (std::numbers::pi_v<long double> * radius * radius);
+    statistics.AddPhotons(rows, radii, sums, scale, kernel, kPhotons, *controller, radiance, bias);
+  }
+  EXPECT_EQ(statistics.photon_count()[0], std::uint64_t{kPasses} * kPhotons);
+  // A few roundings of 2^-53 for each term and each addition.
+  EXPECT_NEAR(statistics.radiance_sum()[0][1] / static_cast<double>(expected), 1,
+              10 * kPasses * 0x1p-53);
+  EXPECT_LE(static_cast<double>(statistics.Radii(rows, kPasses)[0]), 0.25);
+}
+
 TEST(PixelStatisticsTest, CountsAPassWithoutHitpointAsDark) {
   PixelStatistics statistics(2, 1);
   RenderSettings settings;
