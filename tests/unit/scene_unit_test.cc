@@ -27,8 +27,7 @@ ParsedScene Parse(const std::string& text) {
 ParsedScene SceneOfSize(const std::string& scale, const std::string& offset = "0",
                         const std::string& intensity = "1") {
   const std::string scaled = "\nScale " + scale + " " + scale + " " + scale + "\n";
-  return Parse("LookAt 0 0 -4  0 0 0  0 1 0" + scaled + "Camera \"perspective\"\nWorldBegin" +
-               scaled + "Translate " + offset +
+  return Parse("Camera \"perspective\"\nWorldBegin" + scaled + "Translate " + offset +
                " 0 0\n"
                "LightSource \"point\" \"point3 from\" [0 0 -1] \"float scale\" [" +
                intensity +
