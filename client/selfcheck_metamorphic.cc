@@ -122,7 +122,7 @@ StatusOr<CaseOutcome> ScalingKeepsBits(SelfcheckBench& bench) {
       // The intensity of point and spot lights grows with the square, and must be a float.
       const bool has_intensity = room.light == Light::kPoint || room.light == Light::kSpot;
       const int most = has_intensity ? 60 : 100;
-      for (const int length : {-most, -20, -7, 1, 20, most})
+      for (const int length : {-most, -16, -7, 1, 20, most})
         changes.push_back({.room = room, .controller = controller, .length = length});
     }
   }

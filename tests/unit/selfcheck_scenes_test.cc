@@ -39,11 +39,12 @@ TEST(SelfcheckScenesTest, APowerOfTwoScalesEveryPositionExactly) {
   const ParsedScene other = Parse(scaled);
   ASSERT_TRUE(base.ok() && other.ok());
   ASSERT_EQ(base.scene.meshes.size(), other.scene.meshes.size());
+  const auto unit = static_cast<float>(other.scene.unit);
   for (std::size_t mesh = 0; mesh < base.scene.meshes.size(); ++mesh) {
     const auto& positions = base.scene.meshes[mesh].positions;
     ASSERT_EQ(positions.size(), other.scene.meshes[mesh].positions.size());
     for (std::size_t i = 0; i < positions.size(); ++i)
-      EXPECT_EQ(positions[i] * 0x1p-20F, other.scene.meshes[mesh].positions[i]);
+      EXPECT_EQ(positions[i] * 0x1p-20F, other.scene.meshes[mesh].positions[i] * unit);
   }
 }
 
