@@ -81,9 +81,9 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   const int width = settings.crop_width();
   const int height = settings.crop_height();
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  const auto initial = static_cast<float>(
-      settings.initial_radius > 0 ? settings.initial_radius / state->scene.unit
-                                  : settings.initial_footprints);
+  const auto initial =
+      static_cast<float>(settings.initial_radius > 0 ? settings.initial_radius / state->scene.unit
+                                                     : settings.initial_footprints);
   state->controller = MakeRadiusController(state->settings, initial);
   state->statistics =
       std::make_unique<PixelStatistics>(pixels, initial, state->controller->MemoryPerPixel());

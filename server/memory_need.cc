@@ -21,8 +21,8 @@ std::uint64_t MemoryNeeded(const RenderSettings& settings) {
                       static_cast<std::uint64_t>(settings.crop_height());
   const std::uint64_t columns = EvidenceColumns(EvidenceOf(settings.radius_controller, 0));
   const std::uint64_t numbers = MakeRadiusController(settings, 1)->MemoryPerPixel();
-  return pixels * (kBytesPerPixel + sizeof(std::int64_t) * kOpenPasses * columns +
-                   sizeof(double) * numbers);
+  return pixels *
+         (kBytesPerPixel + sizeof(std::int64_t) * kOpenPasses * columns + sizeof(double) * numbers);
 }
 
 Status CheckMemory(const RenderSettings& settings, std::uint64_t available_bytes) {

@@ -458,7 +458,8 @@ float LightSet::PdfDirectInfinite(Vec3 direction) const {
     pdf = emitters_[static_cast<std::size_t>(infinite_emitter_)].direct_choice / (4 * kPi);
   }
   for (std::size_t i = 0; i < environments_.size(); ++i) {
-    pdf += emitters_[first_environment_ + i].direct_choice * environments_[i].PdfSolidAngle(direction);
+    pdf +=
+        emitters_[first_environment_ + i].direct_choice * environments_[i].PdfSolidAngle(direction);
   }
   return pdf;
 }

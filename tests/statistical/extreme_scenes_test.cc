@@ -168,7 +168,8 @@ TEST(ExtremeGlassTest, BallSeenFromInsideIsBrighterByTheSquaredIndex) {
 // A pane of the same index as what is around it, met at 89.99 degrees: what lies behind is seen.
 TEST(ExtremeGlassTest, OfTheSameIndexVanishesAtGrazingIncidence) {
   Scene scene;
-  AddQuad(scene, {0, -5e3F, 0}, {4e4F, 0, 0}, {0, 1e4F, 0}, AddMaterial(scene, DielectricMaterial(1)));
+  AddQuad(scene, {0, -5e3F, 0}, {4e4F, 0, 0}, {0, 1e4F, 0},
+          AddMaterial(scene, DielectricMaterial(1)));
   const std::int32_t lamp = AddMaterial(scene, DiffuseMaterial(0));
   // Below the pane only, facing the camera.
   AddQuad(scene, {2e4F, -5e3F, -100}, {0, 0, 99.5F}, {0, 1e4F, 0}, lamp, AddAreaLight(scene, 1));
@@ -213,9 +214,8 @@ double TransmittedShare(int panes, float thickness, float gap) {
   scene.spot_lights.push_back(spot);
   SetCamera(scene, {0.3, 0, 0.3}, {0, 0, 0}, {0, 1, 0}, 0.5, 2);
   const double power = 2 * kPiD * 0.001;
-  return MeteredFlux(
-             Measure(scene, FluxMeter(scene, 50000, 60), 1, kParts, "photons.G").mean,
-             static_cast<double>(kDark)) /
+  return MeteredFlux(Measure(scene, FluxMeter(scene, 50000, 60), 1, kParts, "photons.G").mean,
+                     static_cast<double>(kDark)) /
          power;
 }
 
@@ -262,9 +262,7 @@ TEST(ExtremeGlassTest, NestedAndTouchingBallsLoseNoPhoton) {
 // it: 1000 total reflections to the end.
 struct Rod {
   Vec3 along, across, up;
-  [[nodiscard]] Vec3 At(float x, float y, float z) const {
-    return along * x + across * y + up * z;
-  }
+  [[nodiscard]] Vec3 At(float x, float y, float z) const { return along * x + across * y + up * z; }
 };
 
 Rod TurnedRod() {
@@ -406,7 +404,8 @@ TEST(ExtremeRoughnessTest, MetalUnderAnEvenSkyReflectsItsAlbedo) {
         }
       }
     }
-    const MeasuredMean m = Measure(scene, TestSettings(scene, 1, 0.01, 4), 1024, kParts, "direct.G");
+    const MeasuredMean m =
+        Measure(scene, TestSettings(scene, 1, 0.01, 4), 1024, kParts, "direct.G");
     ExpectMean(m, albedo);
   }
 }
@@ -483,11 +482,12 @@ TEST(LargeMeshTest, OfTwoMillionTrianglesIsTheFloorItCovers) {
   TriangleMesh mesh;
   for (std::uint32_t y = 0; y <= kSide; ++y) {
     for (std::uint32_t x = 0; x <= kSide; ++x) {
-      mesh.positions.push_back({6 * static_cast<float>(x) / kSide - 3,
-                                6 * static_cast<float>(y) / kSide - 3, 0});
+      mesh.positions.push_back(
+          {6 * static_cast<float>(x) / kSide - 3, 6 * static_cast<float>(y) / kSide - 3, 0});
       if (x == kSide || y == kSide) continue;
       const std::uint32_t at = y * (kSide + 1) + x;
-      for (const std::uint32_t corner : {at, at + 1, at + kSide + 2, at, at + kSide + 2, at + kSide + 1})
+      for (const std::uint32_t corner :
+           {at, at + 1, at + kSide + 2, at, at + kSide + 2, at + kSide + 1})
         mesh.indices.push_back(corner);
     }
   }
