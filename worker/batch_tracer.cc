@@ -183,7 +183,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
   const SpectrumTracer* spectra =
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
   const PhotonPathTracer tracer(state_->scene, *state_->intersector, *state_->lights, settings,
-                                spectra, region);
+                                NeedsOf(state_->scene, settings), spectra, region);
   const std::uint64_t per_chunk =
       std::clamp(kMostDepositsPerChunk / static_cast<std::uint64_t>(settings.max_depth),
                  std::uint64_t{1}, kPhotonsPerChunk);

@@ -1,8 +1,10 @@
 #include "worker/photon_path.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "render/estimate/evidence.h"
 #include "render/math/octahedral.h"
@@ -92,7 +94,8 @@ class HistoryWatcher {
 
 PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& intersector,
                                    const LightSet& lights, const RenderSettings& settings,
-                                   const SpectrumTracer* spectra, const Bounds& region)
+                                   const SceneNeeds& needs, const SpectrumTracer* spectra,
+                                   const Bounds& region)
     : scene_(scene),
       intersector_(intersector),
       lights_(lights),
@@ -100,6 +103,10 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       spectra_(spectra),
       region_(region),
       scale_(FluxScale::ForPower(lights.TotalPower())) {
+  const bool all = settings.use_everything;
+  walk_ = (all || needs.Uses(Part::kTextures) ? 1U : 0U) |
+          (all || needs.Uses(Part::kShadingNormals) ? 2U : 0U) |
+          (all || needs.Uses(Part::kSpecular) || needs.Uses(Part::kGlossy) ? 4U : 0U);
   for (const Material& material : scene.materials) {
     gathers_.push_back(Gathers(material) ? 1 : 0);
   }
@@ -127,20 +134,19 @@ PhotonPathTracer::Key PhotonPathTracer::KeyOf(std::uint64_t pass, std::uint64_t 
 
 void PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index, Landed& landed) const {
   const Key key = KeyOf(pass, index);
-  NoWatcher nobody;
   const auto name_if_dropped = [&](PhotonEnd end) {
     if (end != PhotonEnd::kNotFinite) return;
     ++landed.dropped;
     if (landed.dropped_photons.size() < kDroppedNamed) landed.dropped_photons.push_back(index);
   };
-  if (spectra_ == nullptr) return name_if_dropped(Walk<false>(key, landed, nobody));
+  if (spectra_ == nullptr) return name_if_dropped(WalkUnseen<false>(key, landed));
   constexpr std::uint64_t kShareKey = 0x4652455155454E43ULL;
   const auto bits =
       static_cast<std::uint32_t>(CombineKeys(key.job_key ^ kShareKey, key.number) >> 32);
   if (static_cast<double>(UnitFloat(bits)) < FrequencyShareInPass(settings_)) {
-    return name_if_dropped(Walk<true>(key, landed, nobody));
+    return name_if_dropped(WalkUnseen<true>(key, landed));
   }
-  name_if_dropped(Walk<false>(key, landed, nobody));
+  name_if_dropped(WalkUnseen<false>(key, landed));
   landed.traces.resize(landed.deposits.size(), -1.0F);
 }
 
@@ -149,11 +155,23 @@ PhotonHistory PhotonPathTracer::Replay(std::uint64_t pass, std::uint64_t index) 
   HistoryWatcher watcher(history);
   Landed landed;
   // A spectrum follows the walk and never changes it.
-  history.end = Walk<false>(KeyOf(pass, index), landed, watcher);
+  history.end = Walk<WalkParts{false, true, true, true}>(KeyOf(pass, index), landed, watcher);
   return history;
 }
 
-template <bool kHasSpectrum, typename Watcher>
+template <bool kSpectrum>
+PhotonEnd PhotonPathTracer::WalkUnseen(const Key& key, Landed& landed) const {
+  using Function = PhotonEnd (PhotonPathTracer::*)(const Key&, Landed&, NoWatcher&) const;
+  static constexpr auto kWalks = []<std::size_t... kBits>(std::index_sequence<kBits...>) {
+    return std::array<Function, sizeof...(kBits)>{&PhotonPathTracer::Walk<
+        WalkParts{kSpectrum, (kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0}, NoWatcher>...};
+  }
+  (std::make_index_sequence<8>());
+  NoWatcher nobody;
+  return (this->*kWalks[walk_])(key, landed, nobody);
+}
+
+template <PhotonPathTracer::WalkParts kParts, typename Watcher>
 PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watcher) const {
   const SobolPoint u = OwenSobol(key.number, key.job_key);
   KeyedRng rng(CombineKeys(key.job_key, key.number));
@@ -179,7 +197,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     return why;
   };
   [[maybe_unused]] SpectrumTracer::Carried spectrum;
-  if constexpr (kHasSpectrum) spectrum = spectra_->Leave(emission);
+  if constexpr (kParts.spectrum) spectrum = spectra_->Leave(emission);
   for (int landing = 0; landing < settings_.max_depth; ++landing) {
     Hit hit;
     ++landed.rays;
@@ -191,11 +209,15 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
       return end(PhotonEnd::kNotFinite, energy.dropped);
     }
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
-    std::optional<Material> textured;
-    const Material& material = MaterialAt(scene_, surface, textured);
+    [[maybe_unused]] std::optional<Material> textured;
+    const Material& material = [&]() -> const Material& {
+      if constexpr (kParts.textures) return MaterialAt(scene_, surface, textured);
+      return scene_.materials[surface.material];
+    }();
     watcher.Landed(hit, surface, material, flux);
     const Vec3 wo = -ray.direction;
-    if (surface.has_shading_normal) {
+    const bool is_smoothed = kParts.shading_normals && surface.has_shading_normal;
+    if (is_smoothed) {
       const float shading = Dot(wo, surface.shading_normal);
       const float geometric = Dot(wo, surface.geometric_normal);
       // Below the smoothed surface's horizon: that surface would not have been met here.
@@ -205,13 +227,13 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     if (!IsFinite(flux) || !IsFinite(surface.position)) {
       return end(PhotonEnd::kNotFinite, energy.dropped);
     }
-    if (surface.has_shading_normal) book(flux, energy.smoothing);
+    if (is_smoothed) book(flux, energy.smoothing);
     const bool gathers = landing > 0 && gathers_[surface.material] != 0;
     const bool leaves_deposit = gathers && scale_.HasRoomFor(flux);
     if (gathers && !leaves_deposit) ++landed.excess;
     const bool is_found = leaves_deposit && Inside(region_, surface.position);
     watcher.Received(flux, gathers_[surface.material] != 0, landing > 0, leaves_deposit);
-    if constexpr (kHasSpectrum) {
+    if constexpr (kParts.spectrum) {
       // A surface that scatters light broadly forgets the shadows on it: after a leg of length d at
       // most 4/d² of any detail is left, of none at all 3/d² (see LeaveDiffuse).
       const bool shadows_count = is_found || material.kind != Material::Kind::kDiffuse;
@@ -227,14 +249,14 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
         landed.deposits.push_back({surface.position, flux,
                                    FaceForward(surface.geometric_normal, wo), EncodeOctahedral(wo),
                                    deposit_key});
-        if constexpr (kHasSpectrum) {
+        if constexpr (kParts.spectrum) {
           landed.traces.push_back(spectra_->Received(spectrum, surface, material, wo));
         }
       }
     }
     if (landing + 1 == settings_.max_depth) break;
 
-    float u_lobe = u[7];
+    [[maybe_unused]] float u_lobe = u[7];
     float u1 = u[5];
     float u2 = u[6];
     if (landing > 0) {
@@ -245,15 +267,19 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     const Frame frame(surface.shading_normal);
     BsdfSample sample;
     const Vec3 wo_local = frame.ToLocal(wo);
-    if (!SampleBsdf(material, wo_local, u_lobe, u1, u2, Carried::kFlux, sample)) {
-      return end(PhotonEnd::kAbsorbed, energy.absorbed);
-    }
+    const bool is_scattered = [&] {
+      if constexpr (kParts.lobes) {
+        return SampleBsdf(material, wo_local, u_lobe, u1, u2, Carried::kFlux, sample);
+      }
+      return SampleDiffuse(material, wo_local, u1, u2, sample);
+    }();
+    if (!is_scattered) return end(PhotonEnd::kAbsorbed, energy.absorbed);
     const Vec3 wi = frame.ToWorld(sample.wi);
     Rgb scattered = flux * sample.weight;
     watcher.Scattered(sample, wo_local.z, wi, scattered);
     if (!IsFinite(scattered)) return end(PhotonEnd::kNotFinite, energy.dropped);
     book(scattered, energy.absorbed);
-    if (surface.has_shading_normal) {
+    if (is_smoothed) {
       const float geometric = Dot(wi, surface.geometric_normal);
       const bool transmits = Dot(wo, frame.n) * sample.wi.z < 0;
       const bool crosses = Dot(wo, surface.geometric_normal) * geometric < 0;
@@ -275,7 +301,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     }
     flux = scattered;
     watcher.Left(flux);
-    if constexpr (kHasSpectrum) spectra_->Scatter(spectrum, surface, material, wo, wi);
+    if constexpr (kParts.spectrum) spectra_->Scatter(spectrum, surface, material, wo, wi);
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
   }
   return end(PhotonEnd::kDepth, energy.cut_off);

@@ -18,6 +18,7 @@
 #include "render/math/fixed_point.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
+#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/transport/bsdf.h"
@@ -76,11 +77,11 @@ struct PhotonHistory {
 
 class PhotonPathTracer {
  public:
-  // Keeps references to all. Deposits outside `region` are not kept.
+  // Keeps references to all but `needs`. Deposits outside `region` are not kept.
   // `spectra`: for jobs with frequency photons, else nullptr.
   PhotonPathTracer(const Scene& scene, const Intersector& intersector, const LightSet& lights,
-                   const RenderSettings& settings, const SpectrumTracer* spectra,
-                   const Bounds& region);
+                   const RenderSettings& settings, const SceneNeeds& needs,
+                   const SpectrumTracer* spectra, const Bounds& region);
 
   // What the photons of a range left.
   struct Landed {
@@ -111,10 +112,20 @@ class PhotonPathTracer {
     std::uint64_t job_key = 0;
   };
   [[nodiscard]] Key KeyOf(std::uint64_t pass, std::uint64_t index) const;
-  // The walk of one photon; with a spectrum only where the job and the photon have one, and with a
-  // watcher only for a replay, so that other photons pay for neither.
-  template <bool kHasSpectrum, typename Watcher>
+  // What a walk may meet. Walks are compiled for every combination, and the one that suits the job
+  // is chosen once: what the scene has not, its photons do not ask for.
+  struct WalkParts {
+    bool spectrum = false;  // of those that the photon carries
+    bool textures = false;
+    bool shading_normals = false;
+    bool lobes = false;  // other scattering than diffuse
+  };
+  // The walk of one photon; with a watcher only for a replay.
+  template <WalkParts kParts, typename Watcher>
   PhotonEnd Walk(const Key& key, Landed& landed, Watcher& watcher) const;
+  // The walk without a watcher that suits the job.
+  template <bool kSpectrum>
+  PhotonEnd WalkUnseen(const Key& key, Landed& landed) const;
   // In whole units of EnergyBooks.
   [[nodiscard]] std::int64_t EnergyOf(Rgb flux) const;
 
@@ -127,6 +138,7 @@ class PhotonPathTracer {
   std::vector<std::uint8_t> gathers_;  // [materials]
   FluxScale scale_;
   float energy_per_watt_ = 1;
+  std::size_t walk_ = 0;  // which one suits: bit 0 textures, bit 1 shading normals, bit 2 lobes
 };
 
 }  // namespace lucerna

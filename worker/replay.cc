@@ -151,7 +151,8 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
   const Scene scene = InWorkingSpace(std::move(rec709));
   LUCERNA_ASSIGN_OR_RETURN(const auto intersector, Intersector::Create(scene));
   const LightSet lights(scene, *intersector);
-  const PhotonPathTracer tracer(scene, *intersector, lights, settings, nullptr, Bounds());
+  const PhotonPathTracer tracer(scene, *intersector, lights, settings, NeedsOf(scene, settings),
+                                nullptr, Bounds());
   const PhotonHistory history = tracer.Replay(pass, index);
 
   v1::PhotonPath path;

@@ -260,15 +260,8 @@ Rgb FresnelConductor(float cos_i, Rgb eta, Rgb k) {
 bool SampleBsdf(const Material& material, Vec3 wo, float u_lobe, float u1, float u2,
                 Carried carried, BsdfSample& sample) {
   switch (material.kind) {
-    case Material::Kind::kDiffuse: {
-      if (wo.z == 0) return false;
-      sample.wi = SquareToCosineHemisphere(u1, u2);
-      sample.pdf = sample.wi.z * kInversePi;
-      if (wo.z < 0) sample.wi.z = -sample.wi.z;
-      sample.weight = material.reflectance;
-      sample.is_delta = false;
-      return sample.pdf > 0;
-    }
+    case Material::Kind::kDiffuse:
+      return SampleDiffuse(material, wo, u1, u2, sample);
     case Material::Kind::kConductor:
       return SampleConductor(material, wo, u1, u2, sample);
     case Material::Kind::kDielectric:

@@ -11,6 +11,7 @@
 
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
+#include "render/math/warp.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
@@ -25,6 +26,18 @@ struct BsdfSample {
   float pdf = 0;   // pdf_solid_angle [sr⁻¹]; meaningless when is_delta
   bool is_delta = false;
 };
+
+// The same as SampleBsdf, for a material that is known to be diffuse.
+[[nodiscard]] inline bool SampleDiffuse(const Material& material, Vec3 wo, float u1, float u2,
+                                        BsdfSample& sample) {
+  if (wo.z == 0) return false;
+  sample.wi = SquareToCosineHemisphere(u1, u2);
+  sample.pdf = sample.wi.z * kInversePi;
+  if (wo.z < 0) sample.wi.z = -sample.wi.z;
+  sample.weight = material.reflectance;
+  sample.is_delta = false;
+  return sample.pdf > 0;
+}
 
 // False when nothing is scattered. u_lobe, u1, u2 in [0, 1).
 [[nodiscard]] bool SampleBsdf(const Material& material, Vec3 wo, float u_lobe, float u1, float u2,

@@ -56,7 +56,8 @@ struct Bench {
       region.Add(eye.block.positions[row] + reach);
     }
     photons =
-        std::make_unique<PhotonPathTracer>(scene, *intersector, *lights, settings, nullptr, region);
+        std::make_unique<PhotonPathTracer>(scene, *intersector, *lights, settings,
+                                           NeedsOf(scene, settings), nullptr, region);
     scale = FluxScale::ForPower(lights->TotalPower());
   }
 

@@ -297,7 +297,8 @@ class Check {
  private:
   // The deposits of one pass within `region`.
   PhotonGrid TracePass(std::uint64_t pass, const Bounds& region, const SpectrumTracer* spectra) {
-    const PhotonPathTracer tracer(scene_, *intersector_, *lights_, settings_, spectra, region);
+    const PhotonPathTracer tracer(scene_, *intersector_, *lights_, settings_,
+                                  NeedsOf(scene_, settings_), spectra, region);
     const std::size_t chunks = kPhotonsPerPass / kPhotonsPerChunk;
     std::vector<std::vector<Deposit>> deposits(chunks);
     std::vector<std::vector<float>> traces(spectra == nullptr ? 0 : chunks);

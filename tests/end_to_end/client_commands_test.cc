@@ -162,6 +162,42 @@ TEST_F(ClientCommandsTest, TheDigestDoesNotDependOnWorkersOrThreadsAndDoesOnTheS
   EXPECT_EQ(json::parse(diff.out)["rmse"], 0);
 }
 
+// Where nothing on an eye path is random but its place in the pixel, hitpoints are sent once.
+TEST_F(ClientCommandsTest, AStaticSceneIsSentRadiiOnlyAfterTheFirstRoundOfEyePaths) {
+  const auto sent = [&](const std::string& passes, std::vector<std::string> more) {
+    std::vector<std::string> words = {"render",  SceneOfTests("corner.pbrt"), "--size", "48x48",
+                                      "--passes", passes, "--json", "-o", In("a.exr")};
+    words.insert(words.end(), more.begin(), more.end());
+    const Ran ran = Run(words);
+    EXPECT_EQ(ran.code, 0) << ran.err;
+    const json report = json::parse(ran.out);
+    return std::pair(report["hitpoints_sent"].get<double>(), report["sent_bytes"].get<double>());
+  };
+  const auto [once, bytes_once] = sent("64", {});
+  const auto [again, bytes_again] = sent("128", {});
+  const auto [fresh, bytes_fresh] = sent("128", {"--use-everything"});
+  EXPECT_EQ(once, 64 * 48 * 48);
+  EXPECT_EQ(again, once);
+  EXPECT_EQ(fresh, 2 * once);
+  // A radius is four bytes before compression.
+  EXPECT_LT(bytes_again - bytes_once, 64 * 48 * 48 * 4);
+  EXPECT_GT(bytes_fresh, 1.5 * bytes_again);
+}
+
+TEST_F(ClientCommandsTest, PlanSaysWhatIsLeftOut) {
+  const Ran plan = Run({"plan", SceneOfTests("corner.pbrt"), "--json"});
+  ASSERT_EQ(plan.code, 0) << plan.err;
+  int used = 0;
+  for (const json& part : json::parse(plan.out)["parts"]) {
+    used += part["is_used"].get<bool>() ? 1 : 0;
+    EXPECT_FALSE(part["reason"].get<std::string>().empty()) << part["part"];
+  }
+  EXPECT_GT(used, 1);
+  const Ran words = Run({"plan", SceneOfTests("corner.pbrt")});
+  EXPECT_NE(words.out.find("left out"), std::string::npos) << words.out;
+  EXPECT_EQ(Run({"plan", In("absent.pbrt")}).code, 1);
+}
+
 TEST_F(ClientCommandsTest, SpeaksOneLineAndIsQuietWhenTold) {
   const Ran plain = Run(SmallRender({"-o", In("a.exr")}));
   ASSERT_EQ(plain.code, 0) << plain.err;

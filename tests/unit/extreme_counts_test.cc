@@ -28,13 +28,21 @@ Accumulation OfOneHitpoint(std::uint32_t count, std::uint64_t photons) {
   for (auto& channel : accumulation.flux)
     channel = {1};
   accumulation.evidence.assign(kCommonColumns, {1});
-  accumulation.tally = {photons, 3 * photons, 2 * photons, photons, 1};
+  accumulation.tally.photons = photons;
+  accumulation.tally.rays = 3 * photons;
+  accumulation.tally.deposits = 2 * photons;
+  accumulation.tally.pairs = photons;
+  accumulation.tally.dropped = 1;
   return accumulation;
 }
 
 TEST(ExtremeCountsTest, ATallyCountsBeyondWhatADoubleHolds) {
-  BatchTally tally = {kBeyondDouble - 1, 0, 0, 0, 0};
-  tally += {1, kBeyondDouble, 0, 0, 0};
+  BatchTally tally;
+  tally.photons = kBeyondDouble - 1;
+  BatchTally more;
+  more.photons = 1;
+  more.rays = kBeyondDouble;
+  tally += more;
   EXPECT_EQ(tally.photons, kBeyondDouble);
   EXPECT_EQ(tally.rays, kBeyondDouble);
 }

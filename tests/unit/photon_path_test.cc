@@ -23,7 +23,7 @@ struct Traced {
         settings(TestSettings(scene, 20000, 0.1, max_depth)),
         intersector(Intersector::Create(scene).value()),
         lights(scene, *intersector),
-        tracer(scene, *intersector, lights, settings, nullptr, region) {}
+        tracer(scene, *intersector, lights, settings, NeedsOf(scene, settings), nullptr, region) {}
 
   [[nodiscard]] PhotonPathTracer::Landed Trace(std::uint64_t photons,
                                                std::uint64_t pass = 0) const {

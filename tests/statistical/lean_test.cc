@@ -1,0 +1,62 @@
+// Nothing that is left out changes the image: with everything forced on, the same bits while the
+// eye paths are the same, and the same image within its noise afterwards.
+#include <cmath>
+#include <string>
+
+#include "gtest/gtest.h"
+
+#include "render/image/image.h"
+#include "tests/support/local_render.h"
+
+namespace lucerna {
+namespace {
+
+RenderSettings SmallSettings(const Scene& scene, bool use_everything) {
+  RenderOverrides overrides;
+  overrides.width = 32;
+  overrides.height = 32;
+  overrides.initial_radius = 0;
+  overrides.max_depth = 8;
+  overrides.use_everything = use_everything;
+  return SettingsFor(scene, overrides);
+}
+
+class LeanTest : public testing::TestWithParam<const char*> {};
+
+TEST_P(LeanTest, ForcingEverythingOnChangesNoBit) {
+  const Scene scene = LoadScene(GetParam());
+  EXPECT_EQ(RenderLocally(scene, SmallSettings(scene, false), 3).PixelDigest(),
+            RenderLocally(scene, SmallSettings(scene, true), 3).PixelDigest());
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, LeanTest,
+                         testing::Values("penumbra.pbrt", "corner.pbrt", "hard-shadow.pbrt",
+                                         "caustic.pbrt", "glass-box.pbrt", "glass-sphere.pbrt",
+                                         "lamp-in-glass.pbrt", "water-sun.pbrt", "water-lamp.pbrt",
+                                         "textured.pbrt", "rough-metal.pbrt", "cardioid.pbrt",
+                                         "furnace.pbrt"));
+
+// After 64 passes the sets of eye paths take turns; after 320 every one has been used five times.
+TEST(EyePathsInTurnTest, AgreeWithFreshOnesWithinTheNoise) {
+  const Scene scene = LoadScene("corner.pbrt");
+  const Image lean = RenderLocally(scene, SmallSettings(scene, false), 320);
+  RenderSettings everything = SmallSettings(scene, true);
+  everything.seed = 7;
+  const Image full = RenderLocally(scene, everything, 320);
+  const ImageChannel& a = *lean.Find("G");
+  const ImageChannel& b = *full.Find("G");
+  const ImageChannel& noise_a = *lean.Find("noise");
+  const ImageChannel& noise_b = *full.Find("noise");
+  double off = 0;
+  double variance = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i) {
+    off += static_cast<double>(a.pixels[i]) - static_cast<double>(b.pixels[i]);
+    variance += std::pow(static_cast<double>(noise_a.pixels[i]), 2) +
+                std::pow(static_cast<double>(noise_b.pixels[i]), 2);
+  }
+  // Neighbours share photons, at most some thirty pixels' worth: the sum spreads by the root more.
+  EXPECT_LT(std::abs(off), 4 * std::sqrt(30 * variance));
+}
+
+}  // namespace
+}  // namespace lucerna
