@@ -32,7 +32,6 @@ Accumulation OfOneHitpoint(std::uint32_t count, std::uint64_t photons) {
   accumulation.tally.rays = 3 * photons;
   accumulation.tally.deposits = 2 * photons;
   accumulation.tally.pairs = photons;
-  accumulation.tally.dropped = 1;
   return accumulation;
 }
 
