@@ -32,6 +32,11 @@ bool Inside(const Bounds& region, Vec3 p) {
 // photons of the greatest depth fit in 62 bits.
 constexpr float kLargestEnergy = 0x1p28F;
 
+// Halves go up: faster than to the even number, and the books are as exact.
+std::int64_t WholeUnits(float energy) {
+  return static_cast<std::int64_t>(std::min(kLargestEnergy, energy + 0.5F));
+}
+
 // Sees nothing, for photons that nobody asks about.
 struct NoWatcher {
   void Emitted(const Emission& /*emission*/) const {}
@@ -111,10 +116,8 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
   }
 }
 
-std::int64_t PhotonPathTracer::EnergyOf(Rgb flux) const {
-  // Halves go up: faster than to the even number, and the books are as exact.
-  return static_cast<std::int64_t>(
-      std::min(kLargestEnergy, Luminance(flux) * energy_per_watt_ + 0.5F));
+float PhotonPathTracer::EnergyOf(Rgb flux) const {
+  return Luminance(flux) * energy_per_watt_;
 }
 
 PhotonPathTracer::Key PhotonPathTracer::KeyOf(std::uint64_t pass, std::uint64_t index) const {
@@ -166,13 +169,13 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
   Rgb flux = emission.flux;
   if (!IsFinite(flux)) return PhotonEnd::kNotFinite;
   EnergyBooks& energy = landed.energy;
-  std::int64_t carried = EnergyOf(flux);
+  std::int64_t carried = WholeUnits(EnergyOf(flux));
   energy.emitted += carried;
   // What the photon has more before than after goes to an account.
-  const auto book = [&](Rgb after, std::int64_t& account) {
-    const std::int64_t left = EnergyOf(after);
-    account += carried - left;
-    carried = left;
+  const auto book = [&](float after, std::int64_t& account) {
+    const std::int64_t units = WholeUnits(after);
+    account += carried - units;
+    carried = units;
   };
   const auto end = [&](PhotonEnd why, std::int64_t& account) {
     account += carried;
@@ -205,7 +208,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     if (!IsFinite(flux) || !IsFinite(surface.position)) {
       return end(PhotonEnd::kNotFinite, energy.dropped);
     }
-    if (surface.has_shading_normal) book(flux, energy.smoothing);
+    if (surface.has_shading_normal) book(EnergyOf(flux), energy.smoothing);
     const bool gathers = landing > 0 && gathers_[surface.material] != 0;
     const bool leaves_deposit = gathers && scale_.HasRoomFor(flux);
     if (gathers && !leaves_deposit) ++landed.excess;
@@ -252,14 +255,16 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     Rgb scattered = flux * sample.weight;
     watcher.Scattered(sample, wo_local.z, wi, scattered);
     if (!IsFinite(scattered)) return end(PhotonEnd::kNotFinite, energy.dropped);
-    book(scattered, energy.absorbed);
+    float left = EnergyOf(scattered);
+    book(left, energy.absorbed);
     if (surface.has_shading_normal) {
       const float geometric = Dot(wi, surface.geometric_normal);
       const bool transmits = Dot(wo, frame.n) * sample.wi.z < 0;
       const bool crosses = Dot(wo, surface.geometric_normal) * geometric < 0;
       if (transmits != crosses) return end(PhotonEnd::kSmoothing, energy.smoothing);
       scattered *= 1 / std::max(CosineRatio(sample.wi.z, geometric), 1 / kMaxCosineRatio);
-      book(scattered, energy.smoothing);
+      left = EnergyOf(scattered);
+      book(left, energy.smoothing);
     }
     // Survives with the share of flux that is left, and then has the flux it came with.
     const float before = MaxChannel(flux);
@@ -268,8 +273,9 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     if (!(survival > 0)) return end(PhotonEnd::kAbsorbed, energy.absorbed);
     if (survival < 1) {
       if (!(rng.Uniform() < survival)) return end(PhotonEnd::kRoulette, energy.roulette_took);
-      scattered *= 1 / survival;
-      const std::int64_t heavier = EnergyOf(scattered);
+      const float heavier_by = 1 / survival;
+      scattered *= heavier_by;
+      const std::int64_t heavier = WholeUnits(left * heavier_by);
       energy.roulette_gave += heavier - carried;
       carried = heavier;
     }

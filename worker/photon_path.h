@@ -115,8 +115,8 @@ class PhotonPathTracer {
   // watcher only for a replay, so that other photons pay for neither.
   template <bool kHasSpectrum, typename Watcher>
   PhotonEnd Walk(const Key& key, Landed& landed, Watcher& watcher) const;
-  // In whole units of EnergyBooks.
-  [[nodiscard]] std::int64_t EnergyOf(Rgb flux) const;
+  // In units of EnergyBooks.
+  [[nodiscard]] float EnergyOf(Rgb flux) const;
 
   const Scene& scene_;
   const Intersector& intersector_;
