@@ -34,6 +34,11 @@ bool Inside(const Bounds& region, Vec3 p) {
 // photons of the greatest depth fit in 62 bits.
 constexpr float kLargestEnergy = 0x1p28F;
 
+// Halves go up: faster than to the even number, and the books are as exact.
+std::int64_t WholeUnits(float energy) {
+  return static_cast<std::int64_t>(std::min(kLargestEnergy, energy + 0.5F));
+}
+
 // Sees nothing, for photons that nobody asks about.
 struct NoWatcher {
   void Emitted(const Emission& /*emission*/) const {}
@@ -118,10 +123,8 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
   }
 }
 
-std::int64_t PhotonPathTracer::EnergyOf(Rgb flux) const {
-  // Halves go up: faster than to the even number, and the books are as exact.
-  return static_cast<std::int64_t>(
-      std::min(kLargestEnergy, Luminance(flux) * energy_per_watt_ + 0.5F));
+float PhotonPathTracer::EnergyOf(Rgb flux) const {
+  return Luminance(flux) * energy_per_watt_;
 }
 
 PhotonPathTracer::Key PhotonPathTracer::KeyOf(std::uint64_t pass, std::uint64_t index) const {
@@ -184,13 +187,13 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
   Rgb flux = emission.flux;
   if (!IsFinite(flux)) return PhotonEnd::kNotFinite;
   EnergyBooks& energy = landed.energy;
-  std::int64_t carried = EnergyOf(flux);
+  std::int64_t carried = WholeUnits(EnergyOf(flux));
   energy.emitted += carried;
   // What the photon has more before than after goes to an account.
-  const auto book = [&](Rgb after, std::int64_t& account) {
-    const std::int64_t left = EnergyOf(after);
-    account += carried - left;
-    carried = left;
+  const auto book = [&](float after, std::int64_t& account) {
+    const std::int64_t units = WholeUnits(after);
+    account += carried - units;
+    carried = units;
   };
   const auto end = [&](PhotonEnd why, std::int64_t& account) {
     account += carried;
@@ -227,7 +230,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     if (!IsFinite(flux) || !IsFinite(surface.position)) {
       return end(PhotonEnd::kNotFinite, energy.dropped);
     }
-    if (is_smoothed) book(flux, energy.smoothing);
+    if (is_smoothed) book(EnergyOf(flux), energy.smoothing);
     const bool gathers = landing > 0 && gathers_[surface.material] != 0;
     const bool leaves_deposit = gathers && scale_.HasRoomFor(flux);
     if (gathers && !leaves_deposit) ++landed.excess;
@@ -278,14 +281,16 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     Rgb scattered = flux * sample.weight;
     watcher.Scattered(sample, wo_local.z, wi, scattered);
     if (!IsFinite(scattered)) return end(PhotonEnd::kNotFinite, energy.dropped);
-    book(scattered, energy.absorbed);
+    float left = EnergyOf(scattered);
+    book(left, energy.absorbed);
     if (is_smoothed) {
       const float geometric = Dot(wi, surface.geometric_normal);
       const bool transmits = Dot(wo, frame.n) * sample.wi.z < 0;
       const bool crosses = Dot(wo, surface.geometric_normal) * geometric < 0;
       if (transmits != crosses) return end(PhotonEnd::kSmoothing, energy.smoothing);
       scattered *= 1 / std::max(CosineRatio(sample.wi.z, geometric), 1 / kMaxCosineRatio);
-      book(scattered, energy.smoothing);
+      left = EnergyOf(scattered);
+      book(left, energy.smoothing);
     }
     // Survives with the share of flux that is left, and then has the flux it came with.
     const float before = MaxChannel(flux);
@@ -294,8 +299,9 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     if (!(survival > 0)) return end(PhotonEnd::kAbsorbed, energy.absorbed);
     if (survival < 1) {
       if (!(rng.Uniform() < survival)) return end(PhotonEnd::kRoulette, energy.roulette_took);
-      scattered *= 1 / survival;
-      const std::int64_t heavier = EnergyOf(scattered);
+      const float heavier_by = 1 / survival;
+      scattered *= heavier_by;
+      const std::int64_t heavier = WholeUnits(left * heavier_by);
       energy.roulette_gave += heavier - carried;
       carried = heavier;
     }

@@ -126,8 +126,8 @@ class PhotonPathTracer {
   // The walk without a watcher that suits the job.
   template <bool kSpectrum>
   PhotonEnd WalkUnseen(const Key& key, Landed& landed) const;
-  // In whole units of EnergyBooks.
-  [[nodiscard]] std::int64_t EnergyOf(Rgb flux) const;
+  // In units of EnergyBooks.
+  [[nodiscard]] float EnergyOf(Rgb flux) const;
 
   const Scene& scene_;
   const Intersector& intersector_;

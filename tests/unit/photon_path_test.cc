@@ -110,8 +110,8 @@ TEST(PhotonEnergyTest, TellsHowMuchWallsAbsorb) {
 
 TEST(PhotonPathTest, NamesPhotonsThatAreNotFinite) {
   Scene scene = OpenBox();
-  // A surface whose reflectance is not a number.
-  scene.materials[2] = DiffuseMaterial(NAN);
+  // A ball that reflects what is not a number.
+  scene.materials[1] = DiffuseMaterial(NAN);
   const Traced traced(scene);
   const PhotonPathTracer::Landed landed = traced.Trace(5000, 3);
   ASSERT_GT(landed.dropped, kDroppedNamed);
