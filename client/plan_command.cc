@@ -7,6 +7,7 @@
 #include "client/report.h"
 #include "client/scene_reading.h"
 #include "render/base/text.h"
+#include "render/estimate/expected_cost.h"
 #include "render/scene/needs.h"
 
 namespace lucerna {
@@ -42,14 +43,14 @@ Status PrintPlan(const std::string& scene_path, const RenderFlags& flags, const 
     }
   }
   std::printf("\nexpected, beside the scene itself\n");
-  std::printf("  %-18s %s\n", "coordinator", Bytes(cost.coordinator_bytes).c_str());
-  std::printf("  %-18s %s\n", "each worker", Bytes(cost.worker_bytes).c_str());
-  if (cost.pass_bytes_sent < cost.first_pass_bytes_sent) {
+  std::printf("  %-18s %s\n", "coordinator", Bytes(cost.coordinator).c_str());
+  std::printf("  %-18s %s\n", "each worker", Bytes(cost.worker).c_str());
+  if (cost.pass_sent < cost.first_pass_sent) {
     std::printf("  %-18s %s to each worker, %s after %d passes\n", "sent a pass",
-                Bytes(cost.first_pass_bytes_sent).c_str(), Bytes(cost.pass_bytes_sent).c_str(),
+                Bytes(cost.first_pass_sent).c_str(), Bytes(cost.pass_sent).c_str(),
                 needs.eye_sample_sets());
   } else {
-    std::printf("  %-18s %s to each worker\n", "sent a pass", Bytes(cost.pass_bytes_sent).c_str());
+    std::printf("  %-18s %s to each worker\n", "sent a pass", Bytes(cost.pass_sent).c_str());
   }
   return absl::OkStatus();
 }

@@ -440,10 +440,10 @@ std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost) {
   return ToText({{"parts", parts},
                  {"eye_sample_sets", needs.eye_sample_sets()},
                  {"expected",
-                  {{"coordinator_bytes", cost.coordinator_bytes},
-                   {"worker_bytes", cost.worker_bytes},
-                   {"first_pass_bytes_sent", cost.first_pass_bytes_sent},
-                   {"pass_bytes_sent", cost.pass_bytes_sent}}}});
+                  {{"coordinator_bytes", cost.coordinator},
+                   {"worker_bytes", cost.worker},
+                   {"first_pass_bytes_sent", cost.first_pass_sent},
+                   {"pass_bytes_sent", cost.pass_sent}}}});
 }
 
 std::string SelfcheckReport(const std::vector<SelfcheckResult>& results) {

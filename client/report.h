@@ -12,6 +12,7 @@
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "proto/lucerna/v1/photons.pb.h"
 #include "render/base/digest.h"
+#include "render/estimate/expected_cost.h"
 #include "render/film/image_metrics.h"
 #include "render/scene/needs.h"
 #include "render/scene/pbrt_parser.h"

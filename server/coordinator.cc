@@ -153,7 +153,7 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
     unpin();
     return settings.status();
   }
-  if (Status fits = CheckMemory(*settings, options_.max_job_bytes); !fits.ok()) {
+  if (Status fits = CheckMemory(NeedsOf(scene, *settings), *settings, options_.max_job_bytes); !fits.ok()) {
     unpin();
     return fits;
   }

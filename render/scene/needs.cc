@@ -21,10 +21,6 @@ constexpr int kEyeSampleSets = 64;
 // All sets' hitpoints together; a worker keeps 16 bytes of each, the coordinator about 8.
 constexpr std::int64_t kHitpointsOfSets = std::int64_t{1} << 24;
 
-// Bytes a pixel, measured (docs/lean.md).
-constexpr double kCoordinatorBytes = 650;
-constexpr double kWorkerBytes = 311;
-
 std::string Quoted(const Material& material) {
   return material.name.empty() ? std::string("a material without a name")
                                : Concat("material \"", material.name, "\"");
@@ -184,23 +180,6 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
   needs.Set(Part::kInstances, false,
             "instances are written out as shapes of their own: one level of acceleration");
   return needs;
-}
-
-ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& settings) {
-  const auto pixels = static_cast<double>(settings.crop_width()) * settings.crop_height();
-  // Bytes a hitpoint, compressed.
-  constexpr double kBlock = 6.5;
-  constexpr double kGlossyBlock = 14;
-  constexpr double kRadius = 2;
-  ExpectedCost cost;
-  const double block = needs.Uses(Part::kGlossy) ? kGlossyBlock : kBlock;
-  const double sets = needs.eye_sample_sets();
-  cost.coordinator_bytes = pixels * (kCoordinatorBytes + sets * block);
-  cost.worker_bytes = pixels * (kWorkerBytes + sets * 16);
-  cost.first_pass_bytes_sent = pixels * (block + kRadius);
-  cost.pass_bytes_sent = sets > 0 ? pixels * kRadius : cost.first_pass_bytes_sent;
-  if (!needs.Uses(Part::kPhotons)) cost = {.coordinator_bytes = pixels * kCoordinatorBytes};
-  return cost;
 }
 
 }  // namespace lucerna

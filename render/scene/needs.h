@@ -94,12 +94,4 @@ inline constexpr std::uint64_t kRoundsOfSets = 16;
   return pass / (n * kRoundsOfSets) * n + pass % n;
 }
 
-// What a job will take, roughly: from measured figures (docs/lean.md).
-struct ExpectedCost {
-  double coordinator_bytes = 0, worker_bytes = 0;  // memory, beside the scene itself
-  double first_pass_bytes_sent = 0;                // to each worker, while eye paths are new
-  double pass_bytes_sent = 0;                      // to each worker, later
-};
-[[nodiscard]] ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& settings);
-
 }  // namespace lucerna

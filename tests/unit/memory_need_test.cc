@@ -5,6 +5,7 @@
 #include "gtest/gtest.h"
 
 #include "render/base/memory.h"
+#include "render/estimate/expected_cost.h"
 
 namespace lucerna {
 namespace {
@@ -16,6 +17,10 @@ RenderSettings Sized(int width, int height) {
   return settings;
 }
 
+double MemoryNeeded(const RenderSettings& settings) {
+  return ExpectedCostOf(SceneNeeds(), settings).coordinator;
+}
+
 TEST(MemoryNeedTest, GrowsWithPixelsAndEvidence) {
   EXPECT_EQ(MemoryNeeded(Sized(200, 100)), 2 * MemoryNeeded(Sized(100, 100)));
   RenderSettings frequency = Sized(100, 100);
@@ -25,14 +30,13 @@ TEST(MemoryNeedTest, GrowsWithPixelsAndEvidence) {
 
 TEST(MemoryNeedTest, OfTheLargestFilmIsNotFoundOnASmallMachine) {
   const RenderSettings largest = Sized(16384, 16384);
-  // The product of both sides and the bytes of a pixel needs more than 32 bits.
-  EXPECT_GT(MemoryNeeded(largest), std::uint64_t{100} << 30);
-  const Status refused = CheckMemory(largest, std::uint64_t{16} << 30);
+  EXPECT_GT(MemoryNeeded(largest), 100e9);
+  const Status refused = CheckMemory(SceneNeeds(), largest, std::uint64_t{16} << 30);
   EXPECT_TRUE(absl::IsResourceExhausted(refused));
   EXPECT_THAT(std::string(refused.message()),
               testing::AllOf(testing::HasSubstr("16384x16384"), testing::HasSubstr("17.2 GB"),
                              testing::HasSubstr("cropwindow")));
-  EXPECT_TRUE(CheckMemory(largest, std::uint64_t{1} << 40).ok());
+  EXPECT_TRUE(CheckMemory(SceneNeeds(), largest, std::uint64_t{1} << 40).ok());
 }
 
 TEST(MemoryNeedTest, OfACropWindowIsThatOfItsPixels) {

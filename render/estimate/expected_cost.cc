@@ -1,0 +1,40 @@
+#include "render/estimate/expected_cost.h"
+
+#include <cstdint>
+
+#include "render/estimate/evidence.h"
+#include "render/estimate/radius_controller.h"
+
+namespace lucerna {
+namespace {
+
+// Bytes a pixel, measured (docs/numerics.md, docs/measurements.md): of the coordinator for a job
+// without evidence, and of a worker.
+constexpr double kCoordinator = 640;
+constexpr double kWorker = 311;
+// Bytes a hitpoint: compressed, with and without what glossy ones need, and as workers keep it.
+constexpr double kBlock = 6.5;
+constexpr double kGlossyBlock = 14;
+constexpr double kKeptBlock = 16;
+constexpr double kRadius = 2.5;
+constexpr double kOpenPasses = 2;
+
+}  // namespace
+
+ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& settings) {
+  const double pixels = static_cast<double>(settings.crop_width()) * settings.crop_height();
+  const auto columns =
+      static_cast<double>(EvidenceColumns(EvidenceOf(settings.radius_controller, 0)));
+  const auto numbers = static_cast<double>(MakeRadiusController(settings, 1)->MemoryPerPixel());
+  const double block = needs.Uses(Part::kGlossy) ? kGlossyBlock : kBlock;
+  const double sets = needs.eye_sample_sets();
+  ExpectedCost cost;
+  cost.coordinator = pixels * (kCoordinator + sizeof(std::int64_t) * kOpenPasses * columns +
+                               sizeof(double) * numbers + sets * block);
+  cost.worker = pixels * (kWorker + sets * kKeptBlock);
+  cost.first_pass_sent = pixels * (block + kRadius);
+  cost.pass_sent = sets > 0 ? pixels * kRadius : cost.first_pass_sent;
+  return cost;
+}
+
+}  // namespace lucerna
