@@ -422,7 +422,7 @@ Spectrum LeaveDiffuse(const Spectrum& spectrum, double next_distance_m,
   Spectrum out = limits.Clamp(spectrum);
   const double d = ClampDistance(next_distance_m, limits);
   // Not std::max(s, wall): a NaN of either must come out.
-  const double wall = kFiniteWall / (d * d);
+  const double wall = d * d > 0 ? kFiniteWall / (d * d) : HUGE_VAL;
   if (!(out.s >= wall)) out.s = std::isnan(out.s) ? out.s : wall;
   return limits.Clamp(out);
 }

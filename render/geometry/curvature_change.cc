@@ -351,14 +351,17 @@ class Surroundings {
       yy += points_[count].y * points_[count].y;
       ++count;
     }
+    if (count == 0) return {};
     const double weight = 1 / static_cast<double>(count);
     xx *= weight;
     xy *= weight;
     yy *= weight;
     const double root = std::sqrt((xx - yy) * (xx - yy) + 4 * xy * xy);
     const double larger = 0.5 * (xx + yy + root);
+    if (!(larger > 0)) return {};
     const double smaller = std::max((xx * yy - xy * xy) / larger, 1e-12 * larger);
-    if (!(larger > 0) || !std::isfinite(1 / smaller)) return {};
+    // Smaller numbers have no finite inverse.
+    if (!(smaller > 0x1p-1022)) return {};
     // The unit direction of the larger: from the row that is farther from 0.
     double c = xx > yy ? 0.5 * (xx - yy + root) : xy;
     double d = xx > yy ? xy : 0.5 * (yy - xx + root);

@@ -2,8 +2,8 @@
 //
 // A contribution is counted in quanta. The quantum of a channel is a power of two, about 2^-18 of
 // the power that the whole scene emits in it: a photon carries about that power, so its
-// contribution has 18 bits and a sum has room for 2^44 of them. What FluxScale has no room for is left
-// out and counted, so that no sum of kMostTerms wraps.
+// contribution has 18 bits and a sum has room for 2^44 of them. What FluxScale has no room for is
+// left out and counted, so that no sum of kMostTerms wraps.
 //
 // Rounding is up or down at random with the odds that make it exact on average, by random bits
 // that belong to the (photon, hitpoint) pair. So a channel in which a photon carries far less

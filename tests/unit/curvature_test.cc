@@ -90,7 +90,9 @@ SurfacePoint MiddleOf(const Scene& scene, std::uint32_t triangle) {
   const Vec3 p2 = mesh.positions[mesh.indices[3 * triangle + 2]];
   SurfacePoint point;
   point.position = (p0 + p1 + p2) * (1.0F / 3);
-  point.geometric_normal = Normalize(Cross(p1 - p0, p2 - p0));
+  const Vec3 across = Cross(p1 - p0, p2 - p0);
+  // At the poles of a tessellated sphere two corners are one.
+  point.geometric_normal = LengthSquared(across) > 0 ? Normalize(across) : Vec3{0, 0, 1};
   point.shading_normal = point.geometric_normal;
   point.primitive = triangle;
   return point;
