@@ -1,8 +1,10 @@
 #include "server/eye_path.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "render/math/warp.h"
 #include "render/transport/bsdf.h"
@@ -26,6 +28,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
     : scene_(scene),
       settings_(settings),
       eye_sets_(needs.eye_sample_sets()),
+      walk_(WalkFor(needs, settings)),
       intersector_(intersector),
       lights_(lights),
       filter_x_(scene.filter, scene.filter.radius_x),
@@ -64,7 +67,7 @@ EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass) const {
   const PixelSampler sampler(settings_.seed, pixel, pass, EyeSetOf(pass, eye_sets_));
   // The filter's weight is kept out of the walk, because it can be negative.
   float filter_weight = 1;
-  EyePath path = Walk(CameraRay(sampler, x, y, filter_weight), sampler);
+  EyePath path = (this->*walk_)(CameraRay(sampler, x, y, filter_weight), sampler);
   path.direct *= filter_weight;
   path.weight *= filter_weight;
   return path;
@@ -126,6 +129,7 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, Key
   return seen;
 }
 
+template <EyePathTracer::WalkParts kParts>
 EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
   EyePath path;
   Rgb weight = Gray(1);
@@ -160,8 +164,11 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
               : 1;
       path.direct += weight * emitted * mis;
     }
-    std::optional<Material> textured;
-    const Material& material = MaterialAt(scene_, surface, textured);
+    [[maybe_unused]] std::optional<Material> textured;
+    const Material& material = [&]() -> const Material& {
+      if constexpr (kParts.textures) return MaterialAt(scene_, surface, textured);
+      return scene_.materials[surface.material];
+    }();
     if (vertex == 0 || Gathers(material)) {
       path.features = {AlbedoOf(material), FaceForward(surface.shading_normal, wo), length};
     }
@@ -169,7 +176,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
 
     const Frame frame(surface.shading_normal);
     const SobolPoint u = sampler.ForVertex(vertex);
-    if (IsSmooth(material)) {
+    if (kParts.lobes && IsSmooth(material)) {
       if (vertex == 0 && !lights_.OnlyDelta()) {
         path.direct += EmissionThrough(surface, wo, sampler.ForBranches(), path.rays);
         emission_was_collected = true;
@@ -181,13 +188,20 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
     }
 
     BsdfSample sample;
-    bool scattered = SampleBsdf(material, frame.ToLocal(wo), u[0], u[1], u[2], Carried::kRadiance,
-                                sample);
+    bool scattered = [&] {
+      const Vec3 wo_local = frame.ToLocal(wo);
+      if constexpr (kParts.lobes) {
+        return SampleBsdf(material, wo_local, u[0], u[1], u[2], Carried::kRadiance, sample);
+      }
+      return SampleDiffuse(material, wo_local, u[1], u[2], sample);
+    }();
     Vec3 wi;
     if (scattered) {
       wi = frame.ToWorld(sample.wi);
-      const bool transmits = sample.wi.z * Dot(frame.n, wo) < 0;
-      scattered = SidesAgree(surface, wo, wi, transmits);
+      if constexpr (kParts.shading_normals) {
+        const bool transmits = sample.wi.z * Dot(frame.n, wo) < 0;
+        scattered = SidesAgree(surface, wo, wi, transmits);
+      }
     }
 
     if (Gathers(material)) {
@@ -211,7 +225,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
       path.has_hitpoint = true;
       path.position = surface.position;
       path.normal = FaceForward(surface.geometric_normal, wo);
-      path.is_glossy = material.kind != Material::Kind::kDiffuse;
+      path.is_glossy = kParts.lobes && material.kind != Material::Kind::kDiffuse;
       path.material = surface.material;
       path.to_eye = wo;
       path.shading_normal = surface.shading_normal;
@@ -232,6 +246,15 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
     }
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
   }
+}
+
+EyePathTracer::WalkFunction EyePathTracer::WalkFor(const SceneNeeds& needs,
+                                                   const RenderSettings& settings) {
+  static constexpr auto kWalks = []<std::size_t... kBits>(std::index_sequence<kBits...>) {
+    return std::array<WalkFunction, sizeof...(kBits)>{
+        &EyePathTracer::Walk<WalkParts{(kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0}>...};
+  }(std::make_index_sequence<8>());
+  return kWalks[WalkPartsOf(needs, settings)];
 }
 
 }  // namespace lucerna

@@ -50,7 +50,18 @@ class EyePathTracer {
 
  private:
   [[nodiscard]] Ray CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const;
+  // What a walk may meet. Walks are compiled for every combination, and the one that suits the job
+  // is chosen once.
+  struct WalkParts {
+    bool textures = false;
+    bool shading_normals = false;
+    bool lobes = false;  // other scattering than diffuse
+  };
+  template <WalkParts kParts>
   [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler) const;
+  using WalkFunction = EyePath (EyePathTracer::*)(Ray, const PixelSampler&) const;
+  [[nodiscard]] static WalkFunction WalkFor(const SceneNeeds& needs,
+                                            const RenderSettings& settings);
   // Radiance that leaves a smooth surface towards `first_wo` and was emitted where a chain of
   // smooth surfaces ends: reflections and refractions are all followed, not drawn.
   [[nodiscard]] Rgb EmissionThrough(const SurfacePoint& first, Vec3 first_wo, KeyedRng rng,
@@ -59,6 +70,7 @@ class EyePathTracer {
   const Scene& scene_;
   const RenderSettings& settings_;
   const int eye_sets_;  // see EyeSetOf
+  const WalkFunction walk_;
   const Intersector& intersector_;
   const LightSet& lights_;
   FilterSampler filter_x_, filter_y_;

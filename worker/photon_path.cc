@@ -107,11 +107,8 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       settings_(settings),
       spectra_(spectra),
       region_(region),
-      scale_(FluxScale::ForPower(lights.TotalPower())) {
-  const bool all = settings.use_everything;
-  walk_ = (all || needs.Uses(Part::kTextures) ? 1U : 0U) |
-          (all || needs.Uses(Part::kShadingNormals) ? 2U : 0U) |
-          (all || needs.Uses(Part::kSpecular) || needs.Uses(Part::kGlossy) ? 4U : 0U);
+      scale_(FluxScale::ForPower(lights.TotalPower())),
+      walk_(WalkPartsOf(needs, settings)) {
   for (const Material& material : scene.materials) {
     gathers_.push_back(Gathers(material) ? 1 : 0);
   }

@@ -138,7 +138,7 @@ class PhotonPathTracer {
   std::vector<std::uint8_t> gathers_;  // [materials]
   FluxScale scale_;
   float energy_per_watt_ = 1;
-  std::size_t walk_ = 0;  // which one suits: bit 0 textures, bit 1 shading normals, bit 2 lobes
+  std::size_t walk_ = 0;  // see WalkPartsOf
 };
 
 }  // namespace lucerna
