@@ -5,16 +5,37 @@
 #include <utility>
 
 #include "render/base/text.h"
+#include "render/math/double3.h"
+#include "render/scene/scene_extent.h"
 
 namespace lucerna {
 namespace {
 
-constexpr std::array<std::string_view, kParts> kNames = {
-    "photons",         "specular-surfaces", "glossy-hitpoints", "shading-normals", "textures",
-    "round-shapes",    "environment",       "area-lights",      "delta-lights",    "lens",
-    "fresh-eye-paths", "frequency-photons", "occluder-edges",   "curvature",       "texture-detail",
-    "sky-detail",      "glossy-window",     "motion",           "media",           "alpha-masks",
-    "instances"};
+constexpr std::array<std::string_view, kParts> kNames = {"photons",
+                                                         "specular-surfaces",
+                                                         "glossy-hitpoints",
+                                                         "shading-normals",
+                                                         "textures",
+                                                         "round-shapes",
+                                                         "environment",
+                                                         "area-lights",
+                                                         "delta-lights",
+                                                         "lamps-facing-away",
+                                                         "direct-sampling",
+                                                         "photon-normals",
+                                                         "robust-rays",
+                                                         "lens",
+                                                         "fresh-eye-paths",
+                                                         "frequency-photons",
+                                                         "occluder-edges",
+                                                         "curvature",
+                                                         "texture-detail",
+                                                         "sky-detail",
+                                                         "glossy-window",
+                                                         "motion",
+                                                         "media",
+                                                         "alpha-masks",
+                                                         "instances"};
 
 // Sets of eye paths: with fewer the edges of shapes would be seen not to be smooth.
 constexpr int kEyeSampleSets = 64;
@@ -46,6 +67,28 @@ const Material* FirstMaterial(const Scene& scene, const std::vector<std::uint8_t
     if (in_use[i] != 0 && is_so(scene.materials[i])) return &scene.materials[i];
   }
   return nullptr;
+}
+
+// The faces of one-sided lamps that shine away from all there is.
+std::size_t FacesOfLampsFacingAway(const Scene& scene) {
+  const Bounds box = BoundsOf(scene);
+  const auto is_one_sided = [&](const ShapeTraits& traits) {
+    return traits.area_light != kNoAreaLight &&
+           !scene.area_lights[static_cast<std::size_t>(traits.area_light)].two_sided;
+  };
+  std::size_t count = 0;
+  for (const TriangleMesh& mesh : scene.meshes) {
+    if (!is_one_sided(mesh.traits)) continue;
+    for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+      const Vec3 p0 = mesh.positions[mesh.indices[i]];
+      const Vec3 normal = TriangleNormal(p0, mesh.positions[mesh.indices[i + 1]],
+                                         mesh.positions[mesh.indices[i + 2]]);
+      count += FacesAway(p0, normal, box) ? 1 : 0;
+    }
+  }
+  for (const Disk& disk : scene.disks)
+    count += is_one_sided(disk.traits) && FacesAway(disk.center, disk.normal, box) ? 1 : 0;
+  return count;
 }
 
 bool IsBlackDiffuse(const Material& material) {
@@ -127,6 +170,18 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
   needs.Set(Part::kDeltaLights, delta > 0,
             delta > 0 ? Concat("points, spots and distant lights: ", delta)
                       : std::string("every light has an extent"));
+
+  const std::size_t away = FacesOfLampsFacingAway(scene);
+  needs.Set(Part::kLampsFacingAway, false,
+            away > 0 ? Concat("faces of lamps that nothing lies in front of: ", away)
+                     : std::string("every face of a lamp has something in front of it"));
+  needs.Set(Part::kDirectSampling, gathers != nullptr,
+            gathers != nullptr ? "direct light is sampled at hitpoints; photons would be noisier"
+                               : "no surface gathers light");
+  needs.Set(Part::kPhotonNormals, gathers != nullptr,
+            gathers != nullptr ? "hitpoints must not take photons from a thin wall's other side"
+                               : "no surface gathers light");
+  needs.Set(Part::kRobustRays, true, "rays must not slip between the triangles of a closed shape");
 
   const bool has_lens = scene.camera.lens_radius > 0;
   needs.Set(Part::kLens, has_lens, has_lens ? "the camera has a lens" : "the camera is a pinhole");

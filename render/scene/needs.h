@@ -18,23 +18,27 @@
 namespace lucerna {
 
 enum class Part : std::uint8_t {
-  kPhotons,         // photon passes at all
-  kSpecular,        // eye and photon paths through smooth and nearly smooth surfaces
-  kGlossy,          // BSDF columns of hitpoints, arrival directions of photons
-  kShadingNormals,  // vertex normals, and the horizon they bend
-  kTextures,        // look-ups of materials
-  kRoundShapes,     // spheres and disks beside triangles
-  kEnvironment,     // sampling of the sky
-  kAreaLights,      // emission of shapes, and scattered rays that look for it
-  kDeltaLights,     // points, spots, parallel light
-  kLens,            // depth of field
-  kFreshEyePaths,   // new eye paths in every pass, in place of a cycle of sample sets
-  kFrequency,       // frequency photons
-  kOccluderEdges,   // edges that photons pass, for their shadows' borders
-  kCurvature,       // second-order states at curved mirrors and glass
-  kTextureDetail,   // the spectrum of textures
-  kSkyDetail,       // the spectrum of environment maps
-  kGlossyWindow,    // what a glossy lobe hides of the spectrum
+  kPhotons,          // photon passes at all
+  kSpecular,         // eye and photon paths through smooth and nearly smooth surfaces
+  kGlossy,           // BSDF columns of hitpoints, arrival directions of photons
+  kShadingNormals,   // vertex normals, and the horizon they bend
+  kTextures,         // look-ups of materials
+  kRoundShapes,      // spheres and disks beside triangles
+  kEnvironment,      // sampling of the sky
+  kAreaLights,       // emission of shapes, and scattered rays that look for it
+  kDeltaLights,      // points, spots, parallel light
+  kLampsFacingAway,  // photons from faces of lamps that nothing lies in front of
+  kDirectSampling,   // direct light by samples, in place of photons
+  kPhotonNormals,    // what keeps photons on their side of a thin wall
+  kRobustRays,       // rays that do not slip through the edges of triangles
+  kLens,             // depth of field
+  kFreshEyePaths,    // new eye paths in every pass, in place of a cycle of sample sets
+  kFrequency,        // frequency photons
+  kOccluderEdges,    // edges that photons pass, for their shadows' borders
+  kCurvature,        // second-order states at curved mirrors and glass
+  kTextureDetail,    // the spectrum of textures
+  kSkyDetail,        // the spectrum of environment maps
+  kGlossyWindow,     // what a glossy lobe hides of the spectrum
   kMotion,
   kMedia,
   kAlphaMasks,

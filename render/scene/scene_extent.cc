@@ -12,7 +12,7 @@ Vec3 Everywhere(float length) {
 
 }  // namespace
 
-SceneExtent ExtentOf(const Scene& scene) {
+Bounds BoundsOf(const Scene& scene) {
   Bounds box;
   for (const TriangleMesh& mesh : scene.meshes) {
     for (const Vec3& position : mesh.positions)
@@ -27,6 +27,21 @@ SceneExtent ExtentOf(const Scene& scene) {
     add_around(sphere.center, sphere.radius);
   for (const Disk& disk : scene.disks)
     add_around(disk.center, disk.radius);
+  return box;
+}
+
+bool FacesAway(Vec3 point, Vec3 normal, const Bounds& box) {
+  double farthest = 0;  // of any corner in front of the plane
+  for (int axis = 0; axis < 3; ++axis) {
+    const float corner = normal[axis] > 0 ? box.high[axis] : box.low[axis];
+    farthest += static_cast<double>(normal[axis]) *
+                (static_cast<double>(corner) - static_cast<double>(point[axis]));
+  }
+  return farthest <= 0;
+}
+
+SceneExtent ExtentOf(const Scene& scene) {
+  const Bounds box = BoundsOf(scene);
   SceneExtent extent;
   if (box.empty()) return extent;
   double size_square = 0;

@@ -5,6 +5,7 @@
 
 #include "render/math/double3.h"
 #include "render/math/warp.h"
+#include "render/scene/scene_extent.h"
 
 namespace lucerna {
 namespace {
@@ -60,6 +61,9 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
       Emitter emitter = area_emitter(Kind::kTriangle, mesh.traits, area);
       emitter.geometry = m;
       emitter.primitive = t;
+      const Vec3 normal = TriangleNormal(p0, mesh.positions[corner[1]], mesh.positions[corner[2]]);
+      // What nothing can receive is not sent.
+      if (!emitter.two_sided && FacesAway(p0, normal, bounds)) emitter.power = {};
       Add(emitter);
     }
   }
@@ -80,6 +84,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
         area_emitter(Kind::kDisk, disk.traits,
                      kPi * (disk.radius * disk.radius - disk.inner_radius * disk.inner_radius));
     emitter.primitive = i;
+    if (!emitter.two_sided && FacesAway(disk.center, disk.normal, bounds)) emitter.power = {};
     Add(emitter);
   }
   only_delta_ = emitters_.empty();
@@ -189,6 +194,9 @@ void LightSet::Add(Emitter emitter) {
 const Emitter& LightSet::Choose(const std::vector<double>& cumulative, double u) const {
   auto found = std::upper_bound(cumulative.begin(), cumulative.end(), u);
   if (found == cumulative.end()) --found;
+  // Rounding may leave the end to an emitter that is never drawn.
+  while (found != cumulative.begin() && *found == *(found - 1))
+    --found;
   return emitters_[static_cast<std::size_t>(found - cumulative.begin())];
 }
 

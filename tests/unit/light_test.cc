@@ -198,6 +198,29 @@ std::array<double, 3> MeanFlux(const LightSet& lights, std::uint64_t key, double
   return sum;
 }
 
+// A lamp that hangs over a floor and shines up into nothing sends no photons, and one beside it that
+// shines down sends all.
+TEST(SampleEmissionTest, SendsNothingFromFacesThatNothingLiesInFrontOf) {
+  Scene scene = BlackRoom();
+  AddQuad(scene, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0);
+  const std::int32_t light = AddAreaLight(scene, 3);
+  AddQuad(scene, {0, 0, 1}, {0, 1, 0}, {1, 0, 0}, 0, light);  // down
+  const Lit down(scene);
+  AddQuad(scene, {-1, -1, 1}, {1, 0, 0}, {0, 1, 0}, 0, light);  // up
+  const Lit both(scene);
+  EXPECT_EQ(both.lights.TotalPower(), down.lights.TotalPower());
+  EXPECT_GT(both.lights.TotalPower().g, 0);
+  for (int i = 0; i < 1000; ++i) {
+    Emission emission;
+    ASSERT_TRUE(both.lights.SampleEmission((i + 0.5) / 1000, 0.3F, 0.4F, 0.5F, 0.6F, emission));
+    EXPECT_LT(emission.ray.direction.z, 0);
+  }
+  // With something over it, it sends too.
+  AddQuad(scene, {-2, -2, 2}, {4, 0, 0}, {0, 4, 0}, 0);
+  const Lit roofed(scene);
+  EXPECT_FLOAT_EQ(roofed.lights.TotalPower().g, 2 * down.lights.TotalPower().g);
+}
+
 TEST(SampleEmissionTest, SendsTheTotalPower) {
   Scene scene = Mixed();
   scene.area_lights[1].radiance = {20, 2, 0.2F};

@@ -46,9 +46,15 @@ std::set<std::string> Used(const SceneNeeds& needs) {
 
 using Names = std::set<std::string>;
 
+// With what every scene needs in which light is gathered.
+Names WithAlways(Names names) {
+  names.insert({"photons", "direct-sampling", "photon-normals", "robust-rays"});
+  return names;
+}
+
 TEST(SceneNeedsTest, AFloorUnderAPointLightNeedsNextToNothing) {
   const SceneNeeds needs = NeedsWith(Parsed(kCamera, ""));
-  EXPECT_EQ(Used(needs), (Names{"photons", "delta-lights"}));
+  EXPECT_EQ(Used(needs), (WithAlways({"delta-lights"})));
   EXPECT_EQ(needs.eye_sample_sets(), 64);
 }
 
@@ -62,8 +68,8 @@ struct Feature {
 class FeatureTest : public testing::TestWithParam<Feature> {};
 
 TEST_P(FeatureTest, TurnsOnOnlyWhatItNeeds) {
-  Names expected = GetParam().turned_on;
-  expected.insert({"photons", "delta-lights"});
+  Names expected = WithAlways(GetParam().turned_on);
+  expected.insert("delta-lights");
   EXPECT_EQ(Used(NeedsWith(Parsed(GetParam().camera, GetParam().world))), expected);
 }
 
@@ -116,10 +122,10 @@ TEST(SceneNeedsTest, FrequencyPhotonsBringOnlyTheirParts) {
   RenderOverrides overrides;
   overrides.radius_controller = RadiusControllerKind::kFrequencyMse;
   EXPECT_EQ(Used(NeedsWith(Parsed(kCamera, ""), overrides)),
-            (Names{"photons", "delta-lights", "frequency-photons", "occluder-edges"}));
+            (WithAlways({"delta-lights", "frequency-photons", "occluder-edges"})));
   EXPECT_EQ(Used(NeedsWith(Parsed(kCamera, "Translate 0 0 5\nShape \"sphere\"\n"), overrides)),
-            (Names{"photons", "delta-lights", "frequency-photons", "occluder-edges", "curvature",
-                   "round-shapes"}));
+            (WithAlways({"delta-lights", "frequency-photons", "occluder-edges", "curvature",
+                         "round-shapes"})));
 }
 
 TEST(SceneNeedsTest, OnlyMirrorsNeedNoPhotons) {
@@ -127,6 +133,18 @@ TEST(SceneNeedsTest, OnlyMirrorsNeedNoPhotons) {
   for (Material& material : scene.materials)
     material = ConductorMaterial({1, 1, 1}, {3, 3, 3}, 0, 0);
   EXPECT_FALSE(NeedsWith(scene).Uses(Part::kPhotons));
+}
+
+TEST(SceneNeedsTest, FacesOfLampsThatShineOnNothingAreCounted) {
+  Scene scene = Parsed(kCamera, "");
+  EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kLampsFacingAway),
+            "every face of a lamp has something in front of it");
+  const std::int32_t light = AddAreaLight(scene, 1);
+  // Above the floor, facing up: two triangles; and one more quad facing down on it.
+  AddQuad(scene, {-1, 2, 4}, {0, 0, 1}, {1, 0, 0}, 0, light);
+  AddQuad(scene, {-1, 1.5F, 4}, {1, 0, 0}, {0, 0, 1}, 0, light);
+  EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kLampsFacingAway),
+            "faces of lamps that nothing lies in front of: 2");
 }
 
 TEST(SceneNeedsTest, SetsOfEyePathsMustFit) {
