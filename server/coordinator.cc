@@ -153,7 +153,8 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
     unpin();
     return settings.status();
   }
-  if (Status fits = CheckMemory(NeedsOf(scene, *settings), *settings, options_.max_job_bytes); !fits.ok()) {
+  const SceneNeeds needs = NeedsOf(scene, *settings);
+  if (Status fits = CheckMemory(needs, *settings, options_.max_job_bytes); !fits.ok()) {
     unpin();
     return fits;
   }
@@ -201,7 +202,7 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
               .scene_digest = submission.manifest.SceneDigest(),
               .settings = *settings,
               .warnings = std::move(warnings),
-              .needs = NeedsOf(scene, *settings),
+              .needs = needs,
               .submitted_at = clock_.Wall(),
               .life = JobLife(clock_.Steady()),
               .books = {},

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -105,8 +106,7 @@ StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) 
     if (count > UINT32_MAX) {
       return absl::OutOfRangeError(
           "a hitpoint found more than 2^32 photons of one batch; ask for fewer photons in a pass "
-          "or a "
-          "smaller radius");
+          "or a smaller radius");
     }
     out.counts.push_back(static_cast<std::uint32_t>(count));
     bool fits = true;
@@ -147,6 +147,9 @@ struct BatchTracer::State {
   FluxScale scale;
   // Made when a job asks for it.
   std::unique_ptr<SpectrumTracer> spectra;
+  // Of the job that was worked for last: to find them takes a look at every triangle.
+  std::optional<RenderSettings> settings;
+  SceneNeeds needs;
 };
 
 BatchTracer::BatchTracer(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -180,10 +183,14 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
         state_->spectra,
         SpectrumTracer::Create(state_->scene, settings, *state_->intersector, *state_->lights));
   }
+  if (state_->settings != settings) {
+    state_->needs = NeedsOf(state_->scene, settings);
+    state_->settings = settings;
+  }
   const SpectrumTracer* spectra =
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
   const PhotonPathTracer tracer(state_->scene, *state_->intersector, *state_->lights, settings,
-                                NeedsOf(state_->scene, settings), spectra, region);
+                                state_->needs, spectra, region);
   const std::uint64_t per_chunk =
       std::clamp(kMostDepositsPerChunk / static_cast<std::uint64_t>(settings.max_depth),
                  std::uint64_t{1}, kPhotonsPerChunk);
