@@ -94,6 +94,14 @@ Json JobOf(const v1::Job& job) {
       {"dropped", progress.tally().dropped()},   {"excess", progress.tally().excess()}};
   if (progress.tally().energy().emitted() != 0)
     json["energy"] = EnergyOf(progress.tally().energy());
+  json["energy_of_passes"] = Json::array();
+  for (const v1::PassEnergy& part : job.energy_of_passes()) {
+    if (part.energy().emitted() == 0) continue;
+    Json item = EnergyOf(part.energy());
+    item["first_pass"] = part.first_pass();
+    item["passes"] = part.passes();
+    json["energy_of_passes"].push_back(std::move(item));
+  }
   json["sent_bytes"] = progress.bytes_sent();
   json["received_bytes"] = progress.bytes_received();
   json["hitpoints_sent"] = progress.hitpoints_sent();

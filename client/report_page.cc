@@ -371,6 +371,45 @@ std::string Workers(const v1::Job& job) {
   return html + "</tbody></table></div>\n</section>\n";
 }
 
+std::string Energy(const v1::Job& job) {
+  std::string rows;
+  bool is_balanced = true;
+  for (const v1::PassEnergy& part : job.energy_of_passes()) {
+    const v1::Energy& energy = part.energy();
+    if (energy.emitted() <= 0) continue;
+    is_balanced = is_balanced && EnergyImbalance(energy) == 0;
+    const std::int64_t last = part.first_pass() + part.passes() - 1;
+    absl::StrAppend(&rows, "<tr><th scope=\"row\">", part.first_pass());
+    if (part.passes() > 1) absl::StrAppend(&rows, " to ", last);
+    rows += "</th>";
+    for (const std::int64_t share :
+         {energy.roulette_gave(), energy.absorbed(), energy.escaped(), energy.roulette_took(),
+          energy.smoothing(), energy.cut_off(), energy.dropped(), EnergyImbalance(energy)}) {
+      absl::StrAppend(&rows, "<td>",
+                      absl::StrFormat("%.2f %%", 100 * static_cast<double>(share) /
+                                                     static_cast<double>(energy.emitted())),
+                      "</td>");
+    }
+    rows += "</tr>\n";
+  }
+  if (rows.empty()) return {};
+  return Concat("<section>\n<h2>Energy</h2>\n<details><summary>",
+                is_balanced ? "The books of every pass balance to the last unit."
+                            : "The books of some passes do not balance.",
+                "</summary>\n",
+                TableTop("Of the power that photons of a pass were emitted with.",
+                         {{"pass"},
+                          {"given by roulette"},
+                          {"absorbed"},
+                          {"escaped"},
+                          {"taken by roulette"},
+                          {"shading normals"},
+                          {"cut off"},
+                          {"dropped"},
+                          {"missing"}}),
+                rows, "</tbody></table></div>\n</details>\n</section>\n");
+}
+
 std::string Warnings(const v1::Job& job) {
   const std::string dropped = DroppedLine(job);
   if (job.warnings().empty() && dropped.empty()) return {};
@@ -419,7 +458,7 @@ std::string ReportPage(const v1::Job& job, const std::optional<PageImage>& image
       "</style>\n</head>\n<body>\n<main>\n<header>\n<h1>", name, "</h1>\n<p class=\"muted\">",
       subtitle, "</p>\n</header>\n<div class=\"top\">\n", ImageFigure(job, image), "<div>\n",
       Headline(job), RunFacts(job), "</div>\n</div>\n", Convergence(job), Workers(job),
-      Samples(job), Warnings(job), Parts(job), SettingFacts(job, image),
+      Samples(job), Warnings(job), Energy(job), Parts(job), SettingFacts(job, image),
       "<footer>Made by <code>lucerna report</code>. Time is wall time since the job "
       "began to run.</footer>\n</main>\n</body>\n</html>\n");
 }

@@ -17,8 +17,8 @@ namespace {
 
 StatusOr<std::vector<SelfcheckCase>> CasesNamed(const std::string& only) {
   std::vector<SelfcheckCase> cases = MetamorphicCases();
-  std::vector<SelfcheckCase> extreme = ExtremeCases();
-  std::ranges::move(extreme, std::back_inserter(cases));
+  for (std::vector<SelfcheckCase> more : {ExtremeCases(), SurfaceCases(), NumberCases()})
+    std::ranges::move(more, std::back_inserter(cases));
   std::vector<std::string> names;
   for (const SelfcheckCase& one : cases)
     names.push_back(one.name);

@@ -2,8 +2,9 @@
 //
 // `lucerna selfcheck` runs cases whose right answer is known without a reference image: a scene
 // that is scaled, turned or cut up must give the image it gave before (selfcheck_metamorphic.cc),
-// and scenes of extreme sizes and brightness must give what a formula says
-// (selfcheck_extreme.cc). What each case does, its bound and its limits: docs/numerics.md.
+// scenes of extreme sizes and brightness must give what a formula says (selfcheck_extreme.cc), and
+// so must surfaces (selfcheck_surfaces.cc) and numbers (selfcheck_numbers.cc) at the ends of their
+// ranges. What each case does, its bound and its limits: docs/numerics.md.
 #pragma once
 
 #include <string>
@@ -17,6 +18,8 @@ namespace lucerna {
 
 [[nodiscard]] std::vector<SelfcheckCase> MetamorphicCases();
 [[nodiscard]] std::vector<SelfcheckCase> ExtremeCases();
+[[nodiscard]] std::vector<SelfcheckCase> SurfaceCases();
+[[nodiscard]] std::vector<SelfcheckCase> NumberCases();
 
 // A case that was run.
 struct SelfcheckResult {

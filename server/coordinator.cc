@@ -208,6 +208,7 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
               .books = {},
               .reference = submission.reference,
               .convergence = {},
+              .pass_record = {},
               .workers = {}},
       .scene = std::nullopt,
       .runner = nullptr,
@@ -448,9 +449,10 @@ void Coordinator::RunJob(const std::shared_ptr<JobEntry>& entry) {
               },
           .when_pass_opened = [this] { AnswerWaiting(); },
           .when_pass_merged =
-              [this, entry](std::int64_t passes) {
+              [this, entry](std::int64_t passes, const BatchTally& of_pass) {
                 const MutexLock lock(mutex_);
                 entry->job.books.passes = passes;
+                entry->job.pass_record.Add(of_pass);
                 ++entry->version;
               },
           .when_looked =

@@ -67,6 +67,27 @@ Duration JobLife::Running(SteadyTime now) const {
   return ran_before_ + (ended_at_ ? *ended_at_ : now) - *started_at_;
 }
 
+void PassRecord::Add(const BatchTally& tally) {
+  if (!tallies_.empty() && tallies_.back().passes < passes_each_) {
+    ++tallies_.back().passes;
+    tallies_.back().tally += tally;
+    return;
+  }
+  if (tallies_.size() == kMostTallies) {
+    for (std::size_t i = 0; i < kMostTallies / 2; ++i) {
+      PassTally joined = tallies_[2 * i];
+      joined.passes += tallies_[2 * i + 1].passes;
+      joined.tally += tallies_[2 * i + 1].tally;
+      tallies_[i] = joined;
+    }
+    tallies_.resize(kMostTallies / 2);
+    passes_each_ *= 2;
+  }
+  const std::int64_t first =
+      tallies_.empty() ? 0 : tallies_.back().first_pass + tallies_.back().passes;
+  tallies_.push_back({.first_pass = first, .passes = 1, .tally = tally});
+}
+
 void JobBooks::NameDropped(std::uint64_t pass, const std::vector<std::uint64_t>& indices) {
   for (const std::uint64_t index : indices) {
     const PhotonKey key = {pass, index};

@@ -112,6 +112,27 @@ struct JobBooks {
   void NameDropped(std::uint64_t pass, const std::vector<std::uint64_t>& indices);
 };
 
+// What became of the photons of so many passes.
+struct PassTally {
+  std::int64_t first_pass = 0, passes = 0;
+  BatchTally tally;
+};
+
+// The tally of each pass. From kMostTallies on neighbours are joined, so that each tells of twice
+// as many passes as before.
+class PassRecord {
+ public:
+  static constexpr std::size_t kMostTallies = 256;
+
+  // Takes in the next pass.
+  void Add(const BatchTally& tally);
+  [[nodiscard]] const std::vector<PassTally>& tallies() const { return tallies_; }
+
+ private:
+  std::vector<PassTally> tallies_;
+  std::int64_t passes_each_ = 1;
+};
+
 // What was known of a job's error at one moment.
 struct ErrorSample {
   std::int64_t passes = 0;
@@ -143,6 +164,7 @@ struct Job {
   JobBooks books;
   std::optional<Digest> reference;  // of an EXR image
   std::vector<ErrorSample> convergence;
+  PassRecord pass_record;
   std::map<std::string, WorkerShare> workers;  // by id
   int most_workers = 0;                        // connected at one time while it ran
 };

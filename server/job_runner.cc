@@ -227,7 +227,7 @@ void JobRunner::TakeIn(OpenPass open) {
     passes = estimator_->passes_applied();
   }
   Close(open);
-  surroundings_.when_pass_merged(passes);
+  surroundings_.when_pass_merged(passes, sums.tally());
 }
 
 void JobRunner::Close(const OpenPass& open) {

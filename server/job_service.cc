@@ -144,6 +144,12 @@ v1::Job JobToProto(const Coordinator::Report& report) {
     *message.add_convergence() = SampleToProto(sample);
   AddShares(job.workers, message);
   message.set_has_reference(job.reference.has_value());
+  for (const PassTally& part : job.pass_record.tallies()) {
+    v1::PassEnergy& item = *message.add_energy_of_passes();
+    item.set_first_pass(part.first_pass);
+    item.set_passes(part.passes);
+    *item.mutable_energy() = ToProto(part.tally).energy();
+  }
   for (const PhotonKey& key : job.books.dropped_photons) {
     v1::PhotonKey& item = *message.add_dropped_photons();
     item.set_pass(key.pass);

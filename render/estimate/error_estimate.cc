@@ -13,19 +13,21 @@ namespace {
 // Of relMSE, as in film/image_metrics.h.
 constexpr double kEpsilon = 0.01;
 
-// What the estimate's models may be off by, in the logarithm of the squared error: a seventh of the
-// error. (Their worst on the project's scenes is a fifth, where the step of a hard shadow is
-// blurred.)
-constexpr double kModelError = 0.3;
+// What the models of noise may be off by, in the logarithm of the squared error: a tenth of the
+// error. Most of it is light so rare that the halves have hardly seen it.
+constexpr double kModelError = 0.2;
+// What squared bias is at least and at most, of what is estimated. It is too small where a step is
+// blurred and the dark side is not known to be so dark, too large where lines thinner than the
+// kernel are. On the project's scenes it is 0.5 to 1.4 times the truth wherever it matters.
+constexpr double kLeastBias = 0.5;
+constexpr double kMostBias = 2.5;
 
-// The share of a blurred edge's squared relative bias that smoothing loses while the kernel is a
-// few pixels wide, and that is lost because the edge's dark side is not known to be so dark; and
-// the area of correlation [pixels] from which on kernels are wide and less is lost. Measured.
+// The share of squared bias that smoothing loses. Measured.
 constexpr double kSmoothedAway = 1.0 / 3;
-constexpr double kWideKernel = 9;
-// Over how many more pixels products are alike once smoothed: the weights (1 2 1)/4 both ways have
-// squares that sum to 9/64, and the mean of the two ways to smooth one product varies by 13/128.
-constexpr double kSmoothedArea = 18.0 / 13;
+// The widest smoothing that is tried reaches over so many times the area over which noise is alike.
+constexpr double kWidest = 3;
+// How much less than narrower ones a wider smoothing may say, in deviations of theirs.
+constexpr double kUnsure = 0.5;
 
 // Neighbours whose differences correlate less are strangers.
 constexpr double kLeastCorrelation = 0.05;
@@ -86,25 +88,36 @@ struct PixelError {
   [[nodiscard]] float Size() const { return relative_noise + std::abs(relative_bias); }
 };
 
-// `values` with the weights (1 2 1)/4 along rows and along columns; edges repeat.
-std::vector<float> Smoothed(int width, int height, const std::vector<float>& values) {
-  std::vector<float> rows(values.size());
-  std::vector<float> smooth(values.size());
-  const auto at = [&](int x, int y) {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-           static_cast<std::size_t>(x);
+// `values` with triangular weights of `reach` pixels to either side, along rows and along columns;
+// edges repeat.
+std::vector<float> Smoothed(int width, int height, int reach, const std::vector<float>& values) {
+  std::vector<float> smooth = values;
+  std::vector<double> line;
+  // A triangle is a box over a box: one looks back, the other ahead.
+  const auto box = [&](std::size_t start, std::size_t step, int length, int back, int ahead) {
+    line.resize(static_cast<std::size_t>(length));
+    for (std::size_t i = 0; i < line.size(); ++i)
+      line[i] = static_cast<double>(smooth[start + i * step]);
+    const auto at = [&](int i) {
+      return line[static_cast<std::size_t>(std::clamp(i, 0, length - 1))];
+    };
+    double sum = 0;
+    for (int i = -back; i <= ahead; ++i)
+      sum += at(i);
+    for (int i = 0; i < length; ++i) {
+      smooth[start + static_cast<std::size_t>(i) * step] =
+          static_cast<float>(sum / (back + ahead + 1));
+      sum += at(i + ahead + 1) - at(i - back);
+    }
   };
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      rows[at(x, y)] = 0.25F * (values[at(std::max(x - 1, 0), y)] + 2 * values[at(x, y)] +
-                                values[at(std::min(x + 1, width - 1), y)]);
-    }
+  const auto w = static_cast<std::size_t>(width);
+  for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
+    box(y * w, 1, width, reach - 1, 0);
+    box(y * w, 1, width, 0, reach - 1);
   }
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      smooth[at(x, y)] = 0.25F * (rows[at(x, std::max(y - 1, 0))] + 2 * rows[at(x, y)] +
-                                  rows[at(x, std::min(y + 1, height - 1))]);
-    }
+  for (std::size_t x = 0; x < w; ++x) {
+    box(x, w, height, reach - 1, 0);
+    box(x, w, height, 0, reach - 1);
   }
   return smooth;
 }
@@ -115,60 +128,141 @@ struct BiasHalves {
 
   explicit BiasHalves(std::size_t pixels) : even(pixels), odd(pixels) {}
 
-  // Squared bias, without the halves' noise.
-  [[nodiscard]] std::vector<float> Squares(int width, int height, double factor) const {
-    const std::vector<float> smooth_even = Smoothed(width, height, even);
-    std::vector<float> squares = Smoothed(width, height, odd);
-    for (std::size_t i = 0; i < squares.size(); ++i) {
-      squares[i] =
-          static_cast<float>(factor) * 0.5F * (even[i] * squares[i] + smooth_even[i] * odd[i]);
-    }
+  // Squared bias, without the halves' noise: the product of one half with the other, smoothed.
+  [[nodiscard]] std::vector<float> Squares(int width, int height, int reach) const {
+    constexpr auto kScale = static_cast<float>(0.5 / (1 - kSmoothedAway));
+    const std::vector<float> smooth_even = Smoothed(width, height, reach, even);
+    std::vector<float> squares = Smoothed(width, height, reach, odd);
+    for (std::size_t i = 0; i < squares.size(); ++i)
+      squares[i] = kScale * (even[i] * squares[i] + smooth_even[i] * odd[i]);
     return squares;
   }
 };
 
-// Over how many pixels the signed `differences` are alike: the sum of their squared correlations
-// over all distances, taken as the product of those along rows and along columns.
-double CorrelatedArea(int width, int height, const std::vector<float>& differences) {
+// Over how many pixels products of one field's chance and the other's are alike: the sum, over all
+// distances, of the products of the two fields' correlations, taken as that along rows times that
+// along columns.
+double CorrelatedArea(int width, int height, const std::vector<float>& one,
+                      const std::vector<float>& other) {
   const auto w = static_cast<std::size_t>(width);
   const auto h = static_cast<std::size_t>(height);
-  const std::size_t stride = 1 + differences.size() / kCorrelationSample;
+  const std::size_t stride = 1 + one.size() / kCorrelationSample;
   double area = 1;
   for (const bool is_row : {true, false}) {
     const std::size_t length = is_row ? w : h;
     const std::size_t lines = is_row ? h : w;
     const std::size_t step = is_row ? 1 : w;
     const std::size_t next_line = is_row ? w : 1;
-    const auto product = [&](std::size_t lag) {
+    const auto product = [&](const std::vector<float>& field, std::size_t lag) {
       double sum = 0;
       for (std::size_t line = 0; line < lines; line += stride) {
-        const float* at = differences.data() + line * next_line;
+        const float* at = field.data() + line * next_line;
         for (std::size_t i = 0; i + lag < length; ++i)
           sum += static_cast<double>(at[i * step]) * static_cast<double>(at[(i + lag) * step]);
       }
       return sum;
     };
-    const double variance = product(0);
-    if (!(variance > 0)) return 1;
+    const double variance = product(one, 0);
+    const double other_variance = product(other, 0);
+    if (!(variance > 0 && other_variance > 0)) return 1;
     double sum = 1;
     for (std::size_t lag = 1; lag <= length / 4; ++lag) {
-      const double correlation = product(lag) / variance;
+      const double correlation = product(one, lag) / variance;
       if (correlation < kLeastCorrelation) break;
-      sum += 2 * correlation * correlation;
+      sum +=
+          2 * correlation * (&one == &other ? correlation : product(other, lag) / other_variance);
     }
     area *= sum;
   }
   return area;
 }
 
-// Squares and products of single pixels, with what their chance is known by.
+// The squared correlation of two fields, pixel by pixel.
+double SquaredCorrelation(const std::vector<float>& one, const std::vector<float>& other) {
+  double both = 0, ones = 0, others = 0;
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    const auto a = static_cast<double>(one[i]);
+    const auto b = static_cast<double>(other[i]);
+    both += a * b;
+    ones += a * a;
+    others += b * b;
+  }
+  return ones > 0 && others > 0 ? both * both / (ones * others) : 1;
+}
+
+// By what the chance in sums over pixels is known.
 struct Spread {
   double noise_area = 1, bias_area = 1;  // pixels that are alike
   double z = 0;                          // deviations at either end of an interval
 };
 
+// What smoothing over `reach` pixels makes of the squared bias of all pixels.
+struct SmoothedBias {
+  std::vector<float> relative, absolute;
+  double area = 1;  // pixels whose chance is alike
+  // Sums, and the deviation of the relative one.
+  double relative_sum = 0, absolute_sum = 0, deviation = 0;
+};
+
+// The biases of pixels: absolute, and relative to what the even passes and what the odd ones say. A
+// product of both halves' biases is free of noise only if its weight knows one of them alone.
+struct PixelBiases {
+  BiasHalves absolute, to_even, to_odd;
+
+  explicit PixelBiases(std::size_t pixels) : absolute(pixels), to_even(pixels), to_odd(pixels) {}
+
+  [[nodiscard]] SmoothedBias Smooth(int width, int height, int reach) const {
+    SmoothedBias smooth;
+    smooth.absolute = absolute.Squares(width, height, reach);
+    smooth.relative = to_even.Squares(width, height, reach);
+    const std::vector<float> relative_to_odd = to_odd.Squares(width, height, reach);
+    std::vector<float> differences(relative_to_odd.size());
+    double square_sum = 0;
+    for (std::size_t i = 0; i < differences.size(); ++i) {
+      differences[i] = to_even.even[i] - to_even.odd[i];
+      smooth.relative[i] = 0.5F * (smooth.relative[i] + relative_to_odd[i]);
+      const auto square = static_cast<double>(smooth.relative[i]);
+      smooth.relative_sum += square;
+      smooth.absolute_sum += static_cast<double>(smooth.absolute[i]);
+      square_sum += square * square;
+    }
+    // The mean of the two ways to smooth one product varies as one of them does, but its square is
+    // less by the second factor.
+    const std::vector<float> smoothed = Smoothed(width, height, reach, differences);
+    smooth.area = CorrelatedArea(width, height, differences, smoothed) * 2 /
+                  (1 + SquaredCorrelation(differences, smoothed));
+    smooth.deviation = std::sqrt(smooth.area * square_sum);
+    return smooth;
+  }
+};
+
+// Squared bias as the widest smoothing has it that says hardly less than the narrower ones.
+struct ChosenBias {
+  SmoothedBias bias;
+  // How much more narrower ones said, in sums.
+  double relative_lost = 0, absolute_lost = 0;
+};
+
+ChosenBias Choose(int width, int height, const PixelBiases& biases, double noise_area) {
+  ChosenBias chosen{.bias = biases.Smooth(width, height, 2)};
+  double most_relative = chosen.bias.relative_sum;
+  double most_absolute = chosen.bias.absolute_sum;
+  double least = most_relative - kUnsure * chosen.bias.deviation;
+  for (int reach = 4; reach * reach <= 1 + kWidest * noise_area; reach *= 2) {
+    SmoothedBias wider = biases.Smooth(width, height, reach);
+    if (wider.relative_sum < least) break;
+    most_relative = std::max(most_relative, wider.relative_sum);
+    most_absolute = std::max(most_absolute, wider.absolute_sum);
+    least = std::max(least, wider.relative_sum - kUnsure * wider.deviation);
+    chosen.bias = std::move(wider);
+  }
+  chosen.relative_lost = most_relative - chosen.bias.relative_sum;
+  chosen.absolute_lost = most_absolute - chosen.bias.absolute_sum;
+  return chosen;
+}
+
 SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::*noise_of,
-                       float PixelError::*bias_of, const Spread& spread) {
+                       float PixelError::*bias_of, double lost, const Spread& spread) {
   double noise = 0;
   double bias = 0;
   double of_noise = 0;  // fourth powers
@@ -193,9 +287,12 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::
   // E[D⁴] = 3 E[D²]², so 2/3 of the sum for the estimate and as much for the truth.
   const double variance = spread.noise_area * (4.0 / 3.0 * of_noise + 4 * std::max(of_cross, 0.0)) +
                           spread.bias_area * of_bias;
-  const double log_width = spread.z * std::sqrt(variance) / count / total + kModelError;
-  error.low = total * std::exp(-log_width);
-  error.high = total * std::exp(log_width);
+  const double chance = spread.z * std::sqrt(variance) / count / total;
+  // Chance and what bias may be off by know nothing of each other.
+  const double below = std::log(total / (error.noise + kLeastBias * error.bias));
+  const double above = std::log((error.noise + kMostBias * error.bias) / total);
+  error.low = total * std::exp(-std::hypot(chance, below) - kModelError);
+  error.high = (total + lost / count) * std::exp(std::hypot(chance, above) + kModelError);
   return error;
 }
 
@@ -241,8 +338,7 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   const auto odd_passes = static_cast<double>(pass_count / 2);
   // From the squared difference of the halves' means to the squared noise of the whole mean.
   const double to_noise = even_passes * odd_passes / (passes * passes);
-  const double spent = (1 - kConfidence) / (static_cast<double>(look) * (look + 1.0));
-  const double z = TwoSidedNormalQuantile(spent);
+  const double z = TwoSidedNormalQuantile((1 - kConfidence) * SpentAt(look));
 
   const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const auto mean_around = [&](std::size_t channel) {
@@ -255,8 +351,7 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
 
   std::vector<PixelError> pixels(count);
   std::vector<float> differences(count);
-  BiasHalves relative_bias(count);
-  BiasHalves bias(count);
+  PixelBiases biases(count);
   double halves = 0;
   double independent = 0;
   std::size_t pixel = 0;
@@ -265,7 +360,7 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
       const PixelSums sums = sums_at(pixel);
       RgbSum difference{};
       double noise_sum = 0, relative_noise = 0, signed_noise = 0;
-      double color_square = 0, relative_color_square = 0;
+      double color_square = 0, color_to_even = 0, color_to_odd = 0;
       for (std::size_t c = 0; c < 3; ++c) {
         const double even = sums.even[c] / even_passes;
         const double odd = (sums.all[c] - sums.even[c]) / odd_passes;
@@ -282,7 +377,8 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
         signed_noise += difference[c] * std::sqrt(weight);
         const double square = sums.bias_color[c] * sums.bias_color[c];
         color_square += square;
-        relative_color_square += square / (own * own + kEpsilon);
+        color_to_even += square / (even * even + kEpsilon);
+        color_to_odd += square / (odd * odd + kEpsilon);
       }
       pixels[pixel].noise = static_cast<float>(noise_sum / 3);
       pixels[pixel].relative_noise = static_cast<float>(relative_noise / 3);
@@ -290,35 +386,36 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
       const double even_bias = sums.even_bias / even_passes;
       const double odd_bias = sums.odd_bias / odd_passes;
       const double of_color = std::sqrt(color_square / 3);
-      const double of_relative_color = std::sqrt(relative_color_square / 3);
-      bias.even[pixel] = static_cast<float>(even_bias * of_color);
-      bias.odd[pixel] = static_cast<float>(odd_bias * of_color);
-      relative_bias.even[pixel] = static_cast<float>(even_bias * of_relative_color);
-      relative_bias.odd[pixel] = static_cast<float>(odd_bias * of_relative_color);
+      const double of_even = std::sqrt(color_to_even / 3);
+      const double of_odd = std::sqrt(color_to_odd / 3);
+      biases.absolute.even[pixel] = static_cast<float>(even_bias * of_color);
+      biases.absolute.odd[pixel] = static_cast<float>(odd_bias * of_color);
+      biases.to_even.even[pixel] = static_cast<float>(even_bias * of_even);
+      biases.to_even.odd[pixel] = static_cast<float>(odd_bias * of_even);
+      biases.to_odd.even[pixel] = static_cast<float>(even_bias * of_odd);
+      biases.to_odd.odd[pixel] = static_cast<float>(odd_bias * of_odd);
       const double luminance = LuminanceOf(difference);
       halves += luminance * luminance * to_noise;
       const double mean = LuminanceOf(sums.all) / passes;
       independent += std::max(0.0, sums.square / passes - mean * mean) / (passes - 1);
     }
   }
-  Spread spread{.noise_area = CorrelatedArea(width, height, differences), .z = z};
-  const double lost = kSmoothedAway * std::min(1.0, kWideKernel / spread.noise_area);
-  const std::vector<float> squares = bias.Squares(width, height, 1 / (1 - lost));
-  const std::vector<float> relative_squares = relative_bias.Squares(width, height, 1 / (1 - lost));
+  Spread spread{.noise_area = CorrelatedArea(width, height, differences, differences), .z = z};
+  const ChosenBias chosen = Choose(width, height, biases, spread.noise_area);
+  spread.bias_area = chosen.bias.area;
   for (std::size_t i = 0; i < count; ++i) {
-    pixels[i].bias = squares[i];
-    pixels[i].relative_bias = relative_squares[i];
-    differences[i] = relative_bias.even[i] - relative_bias.odd[i];
+    pixels[i].bias = chosen.bias.absolute[i];
+    pixels[i].relative_bias = chosen.bias.relative[i];
   }
-  spread.bias_area = kSmoothedArea * CorrelatedArea(width, height, differences);
   const std::size_t kept =
       count - static_cast<std::size_t>(kTrimmedShare * static_cast<double>(count));
   std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
                            &PixelError::Size);
   pixels.resize(kept);
-  return {.relative =
-              Summarize(pixels, &PixelError::relative_noise, &PixelError::relative_bias, spread),
-          .absolute = Summarize(pixels, &PixelError::noise, &PixelError::bias, spread),
+  return {.relative = Summarize(pixels, &PixelError::relative_noise, &PixelError::relative_bias,
+                                chosen.relative_lost, spread),
+          .absolute = Summarize(pixels, &PixelError::noise, &PixelError::bias, chosen.absolute_lost,
+                                spread),
           .noise_factor = independent > 0 ? halves / independent : 1};
 }
 

@@ -10,8 +10,10 @@
 // changes, and, divided by 1 - kInnerShare², an estimate of all that it changes (exact for light
 // whose second derivative is even across the disc). The product of the two halves' estimates is
 // free of their noise. As the inner kernels of neighbouring pixels hardly share photons and the
-// bias of neighbours is alike, one of the two is first smoothed over the pixels next to it, which
-// takes most of the chance out of the product and little of the bias (kSmoothedAway).
+// bias of neighbours is alike, one of the two is first smoothed over the pixels around it, which
+// takes most of the chance out of the product and little of the bias (kSmoothedAway). How far
+// around is chosen as by Lepskii 1991, "On a Problem of Adaptive Estimation in Gaussian White
+// Noise": the widest that agrees with all narrower ones.
 // Source: Hachisuka, Jarosz & Jensen 2010, "A Progressive Error Estimation Framework for Photon
 // Density Estimation", with kernels' differences in place of derivatives.
 //
@@ -29,8 +31,8 @@
 // photons, so that the spread of a sum is larger by the area over which differences are alike
 // (sum of the squares of their correlations, found in the differences themselves). The true
 // squared error around its expectation spreads alike, and by its cross term of bias and noise. What
-// the models above leave open is kModelError. Intervals are valid at all looks together: look j
-// (from 1) spends 1/(j (j + 1)) of the error probability. Source: the stitching of Howard, Ramdas,
+// the models above leave open is kModelError, and for the bias kLeastBias and kMostBias. Intervals
+// are valid at all looks together: look j (from 1) spends SpentAt(j) of the error probability. Source: the stitching of Howard, Ramdas,
 // McAuliffe & Sekhon 2021, "Time-uniform, nonparametric, nonasymptotic confidence sequences", with
 // looks as the epochs and normal tails within one.
 #pragma once
@@ -113,6 +115,11 @@ inline constexpr std::int64_t kFirstLook = 4;
 // the wider each one's interval.
 [[nodiscard]] constexpr std::int64_t NextLook(std::int64_t passes) {
   return passes * 7 / 6 > passes ? passes * 7 / 6 : passes + 1;
+}
+
+// The share of the error probability that look j (from 1) spends; of all looks the sum is 1.
+[[nodiscard]] constexpr double SpentAt(int look) {
+  return 3.0 / ((look + 2.0) * (look + 3.0));
 }
 
 // The share of runs in which the true error lies within the interval at all looks.

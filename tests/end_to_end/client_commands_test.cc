@@ -492,6 +492,12 @@ TEST_F(ClientCommandsTest, TracePhotonShowsTheWayOfAPhotonOfAJobThatIsOver) {
   const json books = json::parse(waited.out);
   EXPECT_EQ(books["tally"]["dropped"], 0);
   EXPECT_EQ(books["energy"]["balance"], 0);
+  ASSERT_EQ(books["energy_of_passes"].size(), 2U);
+  for (int pass = 0; pass < 2; ++pass) {
+    EXPECT_EQ(books["energy_of_passes"][pass]["first_pass"], pass);
+    EXPECT_EQ(books["energy_of_passes"][pass]["passes"], 1);
+    EXPECT_EQ(books["energy_of_passes"][pass]["balance"], 0);
+  }
   EXPECT_FALSE(books.contains("dropped_photons"));
 
   // A ray for every landing, and one for every photon that met nothing.

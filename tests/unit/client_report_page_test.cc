@@ -22,6 +22,24 @@ TEST(ReportPageTest, TellsTheFacts) {
   }
 }
 
+TEST(ReportPageTest, TellsTheEnergyOfPassesAndWhetherItBalances) {
+  v1::Job job = ConvergingJob();
+  EXPECT_FALSE(Has(ReportPage(job, std::nullopt), "<h2>Energy"));
+  v1::PassEnergy& part = *job.add_energy_of_passes();
+  part.set_first_pass(4);
+  part.set_passes(2);
+  part.mutable_energy()->set_emitted(1000);
+  part.mutable_energy()->set_absorbed(600);
+  part.mutable_energy()->set_escaped(400);
+  const std::string balanced = ReportPage(job, std::nullopt);
+  EXPECT_TRUE(Has(balanced, "The books of every pass balance"));
+  EXPECT_TRUE(Has(balanced, "4 to 5</th><td>0.00 %</td><td>60.00 %</td><td>40.00 %</td>"));
+  part.mutable_energy()->set_escaped(390);
+  const std::string off = ReportPage(job, std::nullopt);
+  EXPECT_TRUE(Has(off, "The books of some passes do not balance"));
+  EXPECT_TRUE(Has(off, "<td>1.00 %</td></tr>"));
+}
+
 TEST(ReportPageTest, StandsAlone) {
   const std::string page = ReportPage(ConvergingJob(), PageImage{"png bytes", Digest()});
   for (const char* text : {"http:", "https:", "//", "url(", "@import", "<script", "<iframe"}) {

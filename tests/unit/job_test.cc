@@ -25,6 +25,41 @@ TEST(JobBooksTest, NamesTheFirstDroppedPhotonsWhateverTheOrderOfBatches) {
   EXPECT_EQ(backward.dropped_photons, first);
 }
 
+// Every pass has its own entry until there are too many; none is lost, and the sums stay.
+TEST(PassRecordTest, KeepsEveryPassAndJoinsNeighboursWhenThereAreMany) {
+  PassRecord record;
+  constexpr std::int64_t kMost = PassRecord::kMostTallies;
+  const auto add = [&](std::int64_t passes) {
+    for (std::int64_t i = 0; i < passes; ++i) {
+      BatchTally tally;
+      tally.photons = 10;
+      tally.energy.emitted = tally.energy.escaped = 7;
+      record.Add(tally);
+    }
+  };
+  const auto expect = [&](std::int64_t passes, std::int64_t each) {
+    std::int64_t next = 0;
+    for (const PassTally& part : record.tallies()) {
+      EXPECT_EQ(part.first_pass, next);
+      next += part.passes;
+      if (next < passes) {
+        EXPECT_EQ(part.passes, each);
+      }
+      EXPECT_EQ(part.tally.photons, 10U * static_cast<std::uint64_t>(part.passes));
+      EXPECT_EQ(part.tally.energy.escaped, 7 * part.passes);
+    }
+    EXPECT_EQ(next, passes);
+  };
+  add(kMost);
+  EXPECT_EQ(record.tallies().size(), PassRecord::kMostTallies);
+  expect(kMost, 1);
+  add(1);
+  EXPECT_EQ(record.tallies().size(), PassRecord::kMostTallies / 2 + 1);
+  expect(kMost + 1, 2);
+  add(4 * kMost + 2);
+  expect(5 * kMost + 3, 8);
+}
+
 // A worker may say any time of a batch: a job's time stands still at its end and never wraps.
 TEST(SaturatingSumTest, StaysAtItsEnd) {
   const Duration most = SaturatingSum(Duration::max(), Duration::max());
