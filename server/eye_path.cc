@@ -23,8 +23,8 @@ constexpr float kBranchWeight = 0.01F;
 }  // namespace
 
 EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
-                             const SceneNeeds& needs,
-                             const Intersector& intersector, const LightSet& lights)
+                             const SceneNeeds& needs, const Intersector& intersector,
+                             const LightSet& lights)
     : scene_(scene),
       settings_(settings),
       eye_sets_(needs.eye_sample_sets()),
@@ -42,10 +42,10 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
 
 Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const {
   const SobolPoint u = sampler.ForCamera();
-  const double film_x = settings_.crop_x0 + x + 0.5 +
-                        static_cast<double>(filter_x_.Sample(u[0], weight));
-  const double film_y = settings_.crop_y0 + y + 0.5 +
-                        static_cast<double>(filter_y_.Sample(u[1], weight));
+  const double film_x =
+      settings_.crop_x0 + x + 0.5 + static_cast<double>(filter_x_.Sample(u[0], weight));
+  const double film_y =
+      settings_.crop_y0 + y + 0.5 + static_cast<double>(filter_y_.Sample(u[1], weight));
   const Camera& camera = scene_.camera;
   Vec3 origin;
   Vec3 direction = {static_cast<float>(window_low_x_ + film_x * pixel_width_),
@@ -56,18 +56,18 @@ Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& w
     origin = SquareToDisk(u[2], u[3]) * static_cast<float>(camera.lens_radius);
     direction = focus - origin;
   }
-  return {camera.camera_to_world.Point(origin),
-          Normalize(camera.camera_to_world.Vector(direction)), HUGE_VALF};
+  return {camera.camera_to_world.Point(origin), Normalize(camera.camera_to_world.Vector(direction)),
+          HUGE_VALF};
 }
 
-EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass) const {
+EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass, First first) const {
   const auto pixel = static_cast<std::uint64_t>(settings_.crop_y0 + y) *
                          static_cast<std::uint64_t>(settings_.width) +
                      static_cast<std::uint64_t>(settings_.crop_x0 + x);
   const PixelSampler sampler(settings_.seed, pixel, pass, EyeSetOf(pass, eye_sets_));
   // The filter's weight is kept out of the walk, because it can be negative.
   float filter_weight = 1;
-  EyePath path = (this->*walk_)(CameraRay(sampler, x, y, filter_weight), sampler);
+  EyePath path = (this->*walk_)(CameraRay(sampler, x, y, filter_weight), sampler, first);
   path.direct *= filter_weight;
   path.weight *= filter_weight;
   return path;
@@ -130,7 +130,7 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, Key
 }
 
 template <EyePathTracer::WalkParts kParts>
-EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
+EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) const {
   EyePath path;
   Rgb weight = Gray(1);
   float length = 0;
@@ -145,7 +145,18 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
   for (int vertex = 0;; ++vertex) {
     Hit hit;
     ++path.rays;
-    if (!intersector_.Intersect(ray, hit)) {
+    bool is_met = false;
+    if (vertex == 0 && first.is_known) {
+      hit = *first.hit;
+      is_met = hit.t < HUGE_VALF;
+    } else {
+      is_met = intersector_.Intersect(ray, hit);
+      if (vertex == 0 && first.hit != nullptr) {
+        *first.hit = hit;
+        if (!is_met) first.hit->t = HUGE_VALF;
+      }
+    }
+    if (!is_met) {
       if (emission_was_collected) return path;
       const float mis = scatter_pdf > 0
                             ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(ray.direction))
@@ -216,9 +227,8 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler) const {
           const SurfacePoint light = intersector_.SurfaceAt(probe, hit);
           const Rgb radiance = lights_.EmittedRadiance(light, -wi);
           if (!IsBlack(radiance)) {
-            path.direct +=
-                weight * sample.weight * radiance *
-                PowerHeuristic(sample.pdf, lights_.PdfDirect(surface.position, light));
+            path.direct += weight * sample.weight * radiance *
+                           PowerHeuristic(sample.pdf, lights_.PdfDirect(surface.position, light));
           }
         }
       }
@@ -253,7 +263,8 @@ EyePathTracer::WalkFunction EyePathTracer::WalkFor(const SceneNeeds& needs,
   static constexpr auto kWalks = []<std::size_t... kBits>(std::index_sequence<kBits...>) {
     return std::array<WalkFunction, sizeof...(kBits)>{
         &EyePathTracer::Walk<WalkParts{(kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0}>...};
-  }(std::make_index_sequence<8>());
+  }
+  (std::make_index_sequence<8>());
   return kWalks[WalkPartsOf(needs, settings)];
 }
 

@@ -43,8 +43,13 @@ class EyePathTracer {
   EyePathTracer(const Scene& scene, const RenderSettings& settings, const SceneNeeds& needs,
                 const Intersector& intersector, const LightSet& lights);
 
+  // What is known of the first thing that an eye path meets.
+  struct First {
+    Hit* hit = nullptr;  // t is infinite when it meets nothing; nullptr: nobody wants to know
+    bool is_known = false;
+  };
   // The eye path of a pixel of the crop window in one pass. Threads: any.
-  [[nodiscard]] EyePath Trace(int x, int y, std::uint64_t pass) const;
+  [[nodiscard]] EyePath Trace(int x, int y, std::uint64_t pass, First first) const;
 
   [[nodiscard]] const RenderSettings& settings() const { return settings_; }
 
@@ -58,8 +63,8 @@ class EyePathTracer {
     bool lobes = false;  // other scattering than diffuse
   };
   template <WalkParts kParts>
-  [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler) const;
-  using WalkFunction = EyePath (EyePathTracer::*)(Ray, const PixelSampler&) const;
+  [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler, First first) const;
+  using WalkFunction = EyePath (EyePathTracer::*)(Ray, const PixelSampler&, First) const;
   [[nodiscard]] static WalkFunction WalkFor(const SceneNeeds& needs,
                                             const RenderSettings& settings);
   // Radiance that leaves a smooth surface towards `first_wo` and was emitted where a chain of

@@ -19,7 +19,8 @@ float UnitRadius(const EyePath& path) {
 
 }  // namespace
 
-EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, ThreadTeam& team) {
+EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, FirstHitsOfSet* known,
+                          ThreadTeam& team) {
   const int width = tracer.settings().crop_width();
   const int height = tracer.settings().crop_height();
   const int tiles_x = (width + kTile - 1) / kTile;
@@ -55,15 +56,19 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, Threa
         for (int x = x0; x < std::min(x0 + kTile, width); ++x) {
           const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(width) +
                              static_cast<std::uint32_t>(x);
-          const EyePath path = tracer.Trace(x, y, pass);
+          const EyePathTracer::First first =
+              known == nullptr
+                  ? EyePathTracer::First{}
+                  : EyePathTracer::First{.hit = &known->hits[pixel], .is_known = known->is_known};
+          const EyePath path = tracer.Trace(x, y, pass, first);
           out.direct[pixel] = path.direct;
           out.features[pixel] = path.features;
           rays[tile] += static_cast<std::uint64_t>(path.rays);
           if (!path.has_hitpoint || IsBlack(path.weight)) continue;
           if (path.is_glossy) {
-            per_tile[tile].glossy.push_back(
-                {static_cast<std::uint32_t>(per_tile[tile].rows.size()), path.material,
-                 EncodeOctahedral(path.to_eye), EncodeOctahedral(path.shading_normal)});
+            per_tile[tile].glossy.push_back({static_cast<std::uint32_t>(per_tile[tile].rows.size()),
+                                             path.material, EncodeOctahedral(path.to_eye),
+                                             EncodeOctahedral(path.shading_normal)});
           }
           per_tile[tile].rows.push_back({pixel, path.position, EncodeOctahedral(path.normal),
                                          path.weight, automatic ? UnitRadius(path) : 1.0F});
@@ -72,8 +77,11 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, Threa
     }
   });
 
+  if (known != nullptr) known->is_known = true;
+
   std::size_t count = 0;
-  for (const Tile& tile : per_tile) count += tile.rows.size();
+  for (const Tile& tile : per_tile)
+    count += tile.rows.size();
   out.block.positions.reserve(count);
   out.block.normals_oct.reserve(count);
   out.pixels.reserve(count);

@@ -14,6 +14,7 @@
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "server/eye_path.h"
+#include "server/first_hits.h"
 
 namespace lucerna {
 
@@ -32,8 +33,9 @@ struct EyePass {
   [[nodiscard]] HitpointRows rows() const { return {pixels, weights, unit_radii}; }
 };
 
-// Traces one eye path for every pixel. Depends on the tracer's job and `pass` alone.
+// Traces one eye path for every pixel. Depends on the tracer's job and `pass` alone; `known` (or
+// nullptr), what the camera's rays meet, is used or filled and saves time alone.
 [[nodiscard]] EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass,
-                                        ThreadTeam& team);
+                                        FirstHitsOfSet* known, ThreadTeam& team);
 
 }  // namespace lucerna

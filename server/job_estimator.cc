@@ -41,12 +41,15 @@ struct JobEstimator::State {
       : scene(InWorkingSpace(std::move(s))),
         settings(r),
         needs(NeedsOf(scene, settings)),
-        team(threads) {}
+        team(threads),
+        first_hits(needs.eye_sample_sets(), static_cast<std::size_t>(r.crop_width()) *
+                                                static_cast<std::size_t>(r.crop_height())) {}
 
   Scene scene;
   RenderSettings settings;
   SceneNeeds needs;
-  mutable ThreadTeam team;
+  ThreadTeam team;
+  FirstHits first_hits;
   std::unique_ptr<Intersector> intersector;
   std::unique_ptr<LightSet> lights;
   std::unique_ptr<EyePathTracer> tracer;
@@ -94,7 +97,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
 }
 
 EyePass JobEstimator::TraceEyePaths(std::uint64_t pass) const {
-  return TraceHitpointPass(*state_->tracer, pass, state_->team);
+  return TraceHitpointPass(*state_->tracer, pass, state_->first_hits.Of(pass), state_->team);
 }
 
 RadiusColumn JobEstimator::Radii(const EyePass& pass) const {

@@ -107,4 +107,12 @@ inline constexpr std::uint64_t kRoundsOfSets = 16;
   return pass / (n * kRoundsOfSets) * n + pass % n;
 }
 
+// Of how many of the sets it is kept what the camera's rays meet: all for 256 x 256 pixels, fewer
+// for larger images, so that it takes 80 MiB at most.
+[[nodiscard]] constexpr std::size_t SetsOfFirstHits(int sets, std::size_t pixels) {
+  constexpr std::size_t kMostHits = std::size_t{1} << 22;
+  const std::size_t room = pixels == 0 ? 0 : kMostHits / pixels;
+  return room < static_cast<std::size_t>(sets) ? room : static_cast<std::size_t>(sets);
+}
+
 }  // namespace lucerna

@@ -1,0 +1,91 @@
+// What the camera's rays meet is found once for each set of eye paths, and changes nothing.
+#include "server/first_hits.h"
+
+#include <cmath>
+#include <cstdint>
+
+#include "gtest/gtest.h"
+
+#include "render/transport/working_space.h"
+#include "server/hitpoint_pass.h"
+#include "server/job_estimator.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+TEST(FirstHitsTest, BelongToTheSetOfAPass) {
+  constexpr int kSets = 4;
+  constexpr std::uint64_t kNextRound = kSets * kRoundsOfSets;
+  FirstHits hits(kSets, 10);
+  FirstHitsOfSet* first = hits.Of(1);
+  ASSERT_NE(first, nullptr);
+  EXPECT_FALSE(first->is_known);
+  ASSERT_EQ(first->hits.size(), 10U);
+  first->is_known = true;
+  EXPECT_FALSE(hits.Of(2)->is_known);
+  EXPECT_TRUE(hits.Of(1 + kSets)->is_known);
+  EXPECT_TRUE(hits.Of(1 + kNextRound - kSets)->is_known);
+  EXPECT_FALSE(hits.Of(1 + kNextRound)->is_known) << "new sets are drawn";
+}
+
+TEST(FirstHitsTest, AreNotKeptWhereEyePathsAreNewOrImagesLarge) {
+  EXPECT_EQ(FirstHits(0, 10).Of(0), nullptr);
+  EXPECT_EQ(SetsOfFirstHits(64, 256 * 256), 64U);
+  FirstHits large(64, 512 * 512);
+  EXPECT_NE(large.Of(15), nullptr);
+  EXPECT_EQ(large.Of(16), nullptr);
+  EXPECT_EQ(FirstHits(64, std::size_t{1} << 28).Of(0), nullptr);
+}
+
+// A floor, seen in part, and a lamp.
+Scene Floor() {
+  Scene scene;
+  AddQuad(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, AddMaterial(scene, DiffuseMaterial(0.5F)));
+  AddDisk(scene, {0, 0, 1}, {0, 0, -1}, 0.3F, 0, AddAreaLight(scene, 3));
+  SetCamera(scene, {0, -2, 1}, {0, 0, 0}, {0, 0, 1}, 70, 16);
+  return scene;
+}
+
+TEST(FirstHitsTest, GiveThePassThatTracingGives) {
+  const Scene scene = Floor();
+  const RenderSettings settings = TestSettings(scene, 1000, 0.1, 8);
+  const auto fresh = JobEstimator::Create(scene, settings, 1).value();
+  const auto warm = JobEstimator::Create(scene, settings, 2).value();
+  const int sets = warm->needs().eye_sample_sets();
+  ASSERT_GT(sets, 0);
+  const EyePass before = warm->TraceEyePaths(0);
+  const EyePass again = warm->TraceEyePaths(static_cast<std::uint64_t>(sets));
+  const EyePass traced = fresh->TraceEyePaths(static_cast<std::uint64_t>(sets));
+  EXPECT_EQ(again.block, before.block);
+  EXPECT_EQ(again.block, traced.block);
+  EXPECT_EQ(again.pixels, traced.pixels);
+  EXPECT_LT(again.pixels.size(), 256U) << "some rays meet nothing";
+  bool differs = false;
+  for (std::size_t i = 0; i < traced.direct.size(); ++i) {
+    EXPECT_EQ(again.direct[i].g, traced.direct[i].g);
+    differs = differs || before.direct[i].g != again.direct[i].g;
+  }
+  EXPECT_TRUE(differs) << "direct light is drawn anew";
+}
+
+TEST(FirstHitsTest, AreWhatEyePathsGoBy) {
+  const Scene scene = InWorkingSpace(Floor());
+  const RenderSettings settings = TestSettings(scene, 1000, 0.1, 8);
+  const SceneNeeds needs = NeedsOf(scene, settings);
+  const auto intersector = Intersector::Create(scene).value();
+  const LightSet lights(scene, *intersector);
+  const EyePathTracer tracer(scene, settings, needs, *intersector, lights);
+  ThreadTeam team(1);
+  FirstHitsOfSet known;
+  known.hits.resize(256);
+  const EyePass traced = TraceHitpointPass(tracer, 0, &known, team);
+  ASSERT_TRUE(known.is_known);
+  for (Hit& hit : known.hits)
+    hit.t = HUGE_VALF;
+  EXPECT_FALSE(traced.pixels.empty());
+  EXPECT_TRUE(TraceHitpointPass(tracer, 0, &known, team).pixels.empty());
+}
+
+}  // namespace
+}  // namespace lucerna
