@@ -161,13 +161,14 @@ Intersector::Intersector(const Scene& scene)
 
 Intersector::~Intersector() = default;
 
-StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene) {
+StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, TreeNeeds needs) {
   auto intersector = std::unique_ptr<Intersector>(new Intersector(scene));
   EmbreeScene& embree = *intersector->embree_;
   LUCERNA_ASSIGN_OR_RETURN(embree.device, NewEmbreeDevice());
   embree.scene = rtcNewScene(embree.device);
-  rtcSetSceneFlags(embree.scene, RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(embree.scene, RTC_BUILD_QUALITY_MEDIUM);
+  rtcSetSceneFlags(embree.scene, needs.robust_rays ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+  rtcSetSceneBuildQuality(
+      embree.scene, needs.split_triangles ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
 
   Bounds& bounds = intersector->bounds_;
   std::uint32_t number = 0;

@@ -11,6 +11,7 @@
 
 #include "render/base/status.h"
 #include "render/math/vector.h"
+#include "render/scene/needs.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
@@ -51,9 +52,14 @@ struct SurfacePoint {
 
 class Intersector {
  public:
-  // Keeps a reference to `scene`, which must outlive it and not change.
+  // Keeps a reference to `scene`, which must outlive it and not change. Hits do not depend on
+  // whether triangles are split.
   // Errors: RESOURCE_EXHAUSTED or INTERNAL with Embree's words.
-  [[nodiscard]] static StatusOr<std::unique_ptr<Intersector>> Create(const Scene& scene);
+  [[nodiscard]] static StatusOr<std::unique_ptr<Intersector>> Create(const Scene& scene) {
+    return Create(scene, TreeNeedsOf(scene));
+  }
+  [[nodiscard]] static StatusOr<std::unique_ptr<Intersector>> Create(const Scene& scene,
+                                                                     TreeNeeds needs);
   ~Intersector();
   Intersector(const Intersector&) = delete;
   Intersector& operator=(const Intersector&) = delete;

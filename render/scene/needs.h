@@ -31,6 +31,7 @@ enum class Part : std::uint8_t {
   kDirectSampling,   // direct light by samples, in place of photons
   kPhotonNormals,    // what keeps photons on their side of a thin wall
   kRobustRays,       // rays that do not slip through the edges of triangles
+  kSplitTriangles,   // a tree of higher build quality: large triangles are in it more than once
   kLens,             // depth of field
   kFreshEyePaths,    // new eye paths in every pass, in place of a cycle of sample sets
   kFrequency,        // frequency photons
@@ -86,6 +87,13 @@ class SceneNeeds {
 };
 
 [[nodiscard]] SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings);
+
+// Which tree rays are traced through. Asked of the scene alone: a worker keeps it for all its jobs.
+struct TreeNeeds {
+  bool robust_rays = true;
+  bool split_triangles = false;
+};
+[[nodiscard]] TreeNeeds TreeNeedsOf(const Scene& scene);
 
 // Which of the walks compiled for eye paths and photons suits a job: bit 0 stands for textures,
 // bit 1 for shading normals, bit 2 for other scattering than diffuse.

@@ -253,6 +253,35 @@ INSTANTIATE_TEST_SUITE_P(Coordinates, LeavingPointTest,
                                          Leaving{1e6F, 0}, Leaving{1e6F, 1}, Leaving{1e3F, 1e3F},
                                          Leaving{10, 1e5F}));
 
+// A tree that holds large triangles more than once finds the same hits, to the last bit.
+TEST(IntersectorTest, GivesTheSameHitsWhetherTrianglesAreSplitOrNot) {
+  KeyedRng rng(21);
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  TriangleMesh mesh;
+  for (std::uint32_t i = 0; i < 3000; ++i) {
+    mesh.indices.push_back(i);
+    const Vec3 long_side = RandomPoint(rng, i % 7 == 0 ? 5.0F : 0.2F);
+    mesh.positions.push_back(RandomPoint(rng, 3) + long_side);
+  }
+  scene.meshes.push_back(mesh);
+  const auto plain = Intersector::Create(scene, {.robust_rays = true, .split_triangles = false});
+  const auto split = Intersector::Create(scene, {.robust_rays = true, .split_triangles = true});
+  int met = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const Ray ray = {RandomPoint(rng, 4), RandomDirection(rng), HUGE_VALF};
+    Hit a;
+    Hit b;
+    const bool is_met = (*plain)->Intersect(ray, a);
+    ASSERT_EQ((*split)->Intersect(ray, b), is_met);
+    ASSERT_EQ((*split)->Occluded(ray), is_met);
+    if (!is_met) continue;
+    ++met;
+    ASSERT_TRUE(a.t == b.t && a.u == b.u && a.v == b.v && a.primitive == b.primitive);
+  }
+  EXPECT_GT(met, 5000);
+}
+
 TEST(IntersectorTest, GivesEveryThreadTheSameHits) {
   Scene scene;
   AddMaterial(scene, DiffuseMaterial(0.5F));

@@ -58,6 +58,25 @@ TEST(SceneNeedsTest, AFloorUnderAPointLightNeedsNextToNothing) {
   EXPECT_EQ(needs.eye_sample_sets(), 64);
 }
 
+TEST(SceneNeedsTest, TheTreeIsThatOfTheTriangles) {
+  Scene balls;
+  AddSphere(balls, {0, 0, 4}, 1, AddMaterial(balls, DiffuseMaterial(0.5F)));
+  SetCamera(balls, {0, 0, 0}, {0, 0, 1}, {0, 1, 0}, 40, 8);
+  EXPECT_FALSE(NeedsWith(balls).Uses(Part::kRobustRays));
+  EXPECT_FALSE(NeedsWith(balls).Uses(Part::kSplitTriangles));
+
+  Scene many = balls;
+  TriangleMesh mesh;
+  mesh.positions = {{0, 0, 3}, {1, 0, 3}, {0, 1, 3}};
+  for (int i = 0; i < 999; ++i)
+    mesh.indices.insert(mesh.indices.end(), {0, 1, 2});
+  many.meshes = {mesh};
+  EXPECT_TRUE(NeedsWith(many).Uses(Part::kRobustRays));
+  EXPECT_FALSE(NeedsWith(many).Uses(Part::kSplitTriangles));
+  many.meshes[0].indices.insert(many.meshes[0].indices.end(), {0, 1, 2});
+  EXPECT_TRUE(NeedsWith(many).Uses(Part::kSplitTriangles));
+}
+
 struct Feature {
   const char* name;
   const char* camera;
