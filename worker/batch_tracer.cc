@@ -175,17 +175,17 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
     sum.evidence.resize(EvidenceColumns(evidence));
     return sum;
   }
+  if (state_->settings != settings) {
+    state_->needs = NeedsOf(state_->scene, settings);
+    state_->settings = settings;
+  }
   const Bounds region = RegionOf(block, radii, ReachOf(evidence));
   const float cell = CellWidth(radii);
   if (evidence == Evidence::kFrequency &&
       (state_->spectra == nullptr || !state_->spectra->Suits(settings))) {
-    LUCERNA_ASSIGN_OR_RETURN(
-        state_->spectra,
-        SpectrumTracer::Create(state_->scene, settings, *state_->intersector, *state_->lights));
-  }
-  if (state_->settings != settings) {
-    state_->needs = NeedsOf(state_->scene, settings);
-    state_->settings = settings;
+    LUCERNA_ASSIGN_OR_RETURN(state_->spectra,
+                             SpectrumTracer::Create(state_->scene, settings, state_->needs,
+                                                    *state_->intersector, *state_->lights));
   }
   const SpectrumTracer* spectra =
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;

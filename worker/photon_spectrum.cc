@@ -29,11 +29,14 @@ float ReachOf(const Scene& scene, const RenderSettings& settings, const Bounds& 
 
 StatusOr<std::unique_ptr<SpectrumTracer>> SpectrumTracer::Create(const Scene& scene,
                                                                  const RenderSettings& settings,
+                                                                 const SceneNeeds& needs,
                                                                  const Intersector& intersector,
                                                                  const LightSet& lights) {
   auto tracer = std::unique_ptr<SpectrumTracer>(
-      new SpectrumTracer(scene, settings, intersector.bounds(), lights));
-  LUCERNA_ASSIGN_OR_RETURN(tracer->edges_, SilhouetteEdges::Create(scene, tracer->reach_));
+      new SpectrumTracer(scene, settings, needs, intersector.bounds(), lights));
+  if (needs.Uses(Part::kOccluderEdges)) {
+    LUCERNA_ASSIGN_OR_RETURN(tracer->edges_, SilhouetteEdges::Create(scene, tracer->reach_));
+  }
   return tracer;
 }
 
@@ -43,17 +46,20 @@ bool SpectrumTracer::Suits(const RenderSettings& settings) const {
 }
 
 SpectrumTracer::SpectrumTracer(const Scene& scene, const RenderSettings& settings,
-                               const Bounds& bounds, const LightSet& lights)
+                               const SceneNeeds& needs, const Bounds& bounds,
+                               const LightSet& lights)
     : scene_(scene),
       lights_(lights),
       bounds_(bounds),
       limits_(SpectrumLimits::ForDiagonal(static_cast<double>(bounds.Diagonal()))),
       edge_strength_(EdgeStrength(settings.bias, Kernel{settings.kernel}.Moments().mu2)),
       reach_(ReachOf(scene, settings, bounds)),
-      curvature_(scene, [](const Material&) { return true; }),
-      texture_details_(TextureDetails(scene.textures)) {
-  for (const EnvironmentMap& sky : lights.environments())
-    sky_details_.emplace_back(sky);
+      curvature_(scene, [&](const Material&) { return needs.Uses(Part::kCurvature); }) {
+  if (needs.Uses(Part::kTextureDetail)) texture_details_ = TextureDetails(scene.textures);
+  if (needs.Uses(Part::kSkyDetail)) {
+    for (const EnvironmentMap& sky : lights.environments())
+      sky_details_.emplace_back(sky);
+  }
   MeasureEmitters();
 }
 
@@ -137,7 +143,7 @@ void SpectrumTracer::Fly(Carried& carried, const Ray& ray, float distance, Shado
     carried.left_diffusely = false;
   }
   if (!(distance > 0)) return;
-  const NearbyEdges nearby = shadows == Shadows::kFound
+  const NearbyEdges nearby = shadows == Shadows::kFound && edges_ != nullptr
                                  ? edges_->Find(ray.origin, ray.direction, distance)
                                  : NearbyEdges();
   std::array<PassedEdge, NearbyEdges::kCapacity> passed;

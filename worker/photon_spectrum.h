@@ -12,6 +12,7 @@
 #include "render/geometry/curvature.h"
 #include "render/geometry/intersector.h"
 #include "render/geometry/silhouette.h"
+#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/transport/bsdf.h"
@@ -23,10 +24,11 @@ namespace lucerna {
 
 class SpectrumTracer {
  public:
-  // Keeps references to scene and lights. Errors: as SilhouetteEdges::Create.
+  // Keeps references to scene and lights. Measures of the scene what `needs` of a job with these
+  // settings ask for. Errors: as SilhouetteEdges::Create.
   [[nodiscard]] static StatusOr<std::unique_ptr<SpectrumTracer>> Create(
-      const Scene& scene, const RenderSettings& settings, const Intersector& intersector,
-      const LightSet& lights);
+      const Scene& scene, const RenderSettings& settings, const SceneNeeds& needs,
+      const Intersector& intersector, const LightSet& lights);
 
   // Whether it was made for settings that ask for the same.
   [[nodiscard]] bool Suits(const RenderSettings& settings) const;
@@ -52,8 +54,8 @@ class SpectrumTracer {
                Vec3 wi) const;
 
  private:
-  SpectrumTracer(const Scene& scene, const RenderSettings& settings, const Bounds& bounds,
-                 const LightSet& lights);
+  SpectrumTracer(const Scene& scene, const RenderSettings& settings, const SceneNeeds& needs,
+                 const Bounds& bounds, const LightSet& lights);
   void MeasureEmitters();
   [[nodiscard]] SurfaceBend BendAt(const SurfacePoint& surface, Vec3 wo) const;
   // Of the surface's texture, along the surface [1/length²].
@@ -65,7 +67,7 @@ class SpectrumTracer {
   SpectrumLimits limits_;
   double edge_strength_;
   float reach_;
-  std::unique_ptr<SilhouetteEdges> edges_;
+  std::unique_ptr<SilhouetteEdges> edges_;  // nullptr where nothing casts a shadow
   SurfaceCurvature curvature_;
   // Of emitting meshes, each connected surface as one emitter, in however many meshes it comes.
   std::vector<EmitterMoments> surface_moments_;

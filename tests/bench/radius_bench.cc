@@ -285,7 +285,9 @@ class Check {
     settings_ = SettingsFor(scene_, overrides);
     intersector_ = Intersector::Create(scene_).value();
     lights_ = std::make_unique<LightSet>(scene_, *intersector_);
-    spectra_ = SpectrumTracer::Create(scene_, settings_, *intersector_, *lights_).value();
+    spectra_ = SpectrumTracer::Create(scene_, settings_, NeedsOf(scene_, settings_), *intersector_,
+                                      *lights_)
+                   .value();
   }
 
   void Run() {

@@ -51,7 +51,8 @@ struct Cloud {
   }
 };
 
-// Photons of the greatest weight and spectrum that are told apart: the sum of squares stays at 2^62.
+// Photons of the greatest weight and spectrum that are told apart: the sum of squares stays at
+// 2^62.
 TEST(EvidenceTest, HoldsTheSumOfSquaredTracesBelowItsEnd) {
   Cloud cloud(1);
   cloud.deposits[0][0].position = {0, 0, 0};
@@ -139,9 +140,11 @@ TEST(EvidenceTest, IsMergedCheckedAndCarriedOnTheWire) {
   PassSums sums(1, kCommonColumns + kFrequencyColumns);
   ASSERT_TRUE(sums.Add(sum).ok());
   ASSERT_TRUE(sums.Add(sum).ok());
-  EXPECT_EQ(sums.evidence()[kCommonColumns + kFrequencyTrace][0], 2 * sum.evidence[kCommonColumns + kFrequencyTrace][0]);
+  EXPECT_EQ(sums.evidence()[kCommonColumns + kFrequencyTrace][0],
+            2 * sum.evidence[kCommonColumns + kFrequencyTrace][0]);
   ASSERT_TRUE(sums.Subtract(sum).ok());
-  EXPECT_EQ(sums.evidence()[kCommonColumns + kFrequencyTrace][0], sum.evidence[kCommonColumns + kFrequencyTrace][0]);
+  EXPECT_EQ(sums.evidence()[kCommonColumns + kFrequencyTrace][0],
+            sum.evidence[kCommonColumns + kFrequencyTrace][0]);
   // A worker that thinks of another controller is refused.
   EXPECT_FALSE(sums.Add(cloud.Sum(Evidence::kNone)).ok());
   EXPECT_FALSE(PassSums(1, kCommonColumns).Add(sum).ok());
@@ -159,7 +162,10 @@ struct SpectrumScene {
     RenderSettings settings;
     settings.width = settings.height = 64;
     settings.initial_radius = 0.01;
-    tracer = SpectrumTracer::Create(scene, settings, *intersector, *lights).value();
+    settings.radius_controller = RadiusControllerKind::kFrequency;
+    tracer =
+        SpectrumTracer::Create(scene, settings, NeedsOf(scene, settings), *intersector, *lights)
+            .value();
   }
 
   // What of light number `emitter` arrives after `distance` on a surface facing it.
@@ -258,7 +264,10 @@ TEST(SpectrumTracerTest, SeesTheImageOfAPointLightInAMirror) {
   RenderSettings settings;
   settings.width = settings.height = 64;
   settings.initial_radius = 0.01;
-  const auto tracer = SpectrumTracer::Create(scene, settings, *intersector, lights).value();
+  settings.radius_controller = RadiusControllerKind::kFrequency;
+  const auto tracer =
+      SpectrumTracer::Create(scene, settings, NeedsOf(scene, settings), *intersector, lights)
+          .value();
   Emission emission;
   emission.ray = {{0, 0, 2}, Normalize({0.6F, 0, -1}), HUGE_VALF};
   auto carried = tracer->Leave(emission);

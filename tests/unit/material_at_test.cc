@@ -89,8 +89,10 @@ double TraceAfterBounce(const Floor& floor, float distance) {
   RenderSettings settings;
   settings.width = settings.height = 64;
   settings.initial_radius = 0.01;
-  const auto tracer =
-      SpectrumTracer::Create(floor.scene, settings, *floor.intersector, lights).value();
+  settings.radius_controller = RadiusControllerKind::kFrequency;
+  const auto tracer = SpectrumTracer::Create(floor.scene, settings, NeedsOf(floor.scene, settings),
+                                             *floor.intersector, lights)
+                          .value();
   Emission emission;
   emission.ray = {{0, 0, 2}, Normalize({-0.3F, -0.3F, -1}), HUGE_VALF};
   auto carried = tracer->Leave(emission);
