@@ -87,15 +87,14 @@ StatusOr<double> DeviationsBeyondNoise(std::span<const Image* const> base,
     }
     if (!std::isfinite(difference)) return HUGE_VAL;
     if (difference == 0) continue;
+    if (!(variance > 0)) return HUGE_VAL;
     const double of_means =
         1 / static_cast<double>(base.size()) + 1 / static_cast<double>(others.size());
     const double freedom = static_cast<double>(base.size() - 1);
     // Tiles of unequal noise count for fewer of equal noise (Satterthwaite); squares of estimated
     // variances are too large by the second factor.
     const double tiles = variance * variance / variance_square * (1 + 2 / freedom);
-    most = std::max(
-        most, variance > 0 ? NormalFromF(difference / (variance * of_means), tiles, tiles * freedom)
-                           : HUGE_VAL);
+    most = std::max(most, NormalFromF(difference / (variance * of_means), tiles, tiles * freedom));
   }
   return most;
 }

@@ -167,8 +167,12 @@ StatusOr<CaseOutcome> BrighterNextDoor(SelfcheckBench& bench) {
                    "Shape \"sphere\" \"float radius\" [2]\n");
   LUCERNA_ASSIGN_OR_RETURN(const SelfcheckRender* render,
                            bench.Render(text, SmallRender(4, 1000, 5)));
-  return AtMost(std::abs(MeanOf(render->image) / 1e-10 - 1), kRounding,
-                "relative difference to the lamp's own radiance");
+  // No photon comes from the dim lamp, and that must be said.
+  const bool is_said = std::ranges::any_of(render->job.warnings(), [](const std::string& warning) {
+    return warning.find("less than 1e-9 of the scene's power") != std::string::npos;
+  });
+  return AtMost(std::abs(MeanOf(render->image) / 1e-10 - 1) + (is_said ? 0 : 1), kRounding,
+                "relative difference to the lamp's own radiance, and 1 without a warning");
 }
 
 }  // namespace

@@ -447,6 +447,12 @@ void Coordinator::RunJob(const std::shared_ptr<JobEntry>& entry) {
                 entry->cpu_at_start = ProcessCpuTime() - entry->job.books.coordinator_cpu;
                 ++entry->version;
               },
+          .when_warned =
+              [this, entry](std::string warning) {
+                const MutexLock lock(mutex_);
+                entry->job.warnings.push_back(std::move(warning));
+                ++entry->version;
+              },
           .when_pass_opened = [this] { AnswerWaiting(); },
           .when_pass_merged =
               [this, entry](std::int64_t passes, const BatchTally& of_pass) {

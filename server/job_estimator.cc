@@ -133,6 +133,10 @@ const SceneNeeds& JobEstimator::needs() const {
   return state_->needs;
 }
 
+std::size_t JobEstimator::faint_lights() const {
+  return state_->lights->faint_lights();
+}
+
 std::int64_t JobEstimator::passes_applied() const {
   return state_->statistics->passes();
 }

@@ -56,6 +56,8 @@ class JobEstimator {
   // `look` counts the looks at this job, from 1. Requires passes_applied() >= 2.
   [[nodiscard]] ErrorEstimate EstimateError(int look) const;
   [[nodiscard]] const SceneNeeds& needs() const;
+  // See LightSet.
+  [[nodiscard]] std::size_t faint_lights() const;
   // Requires passes_applied() > 0 and a reference as large as the image.
   [[nodiscard]] TrueError ErrorAgainst(const ReferenceImage& reference) const;
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
+
 #include "render/estimate/evidence.h"
 #include "render/wire/block_codec.h"
 
@@ -37,6 +39,13 @@ JobRunner::End JobRunner::EndOf(const RenderSettings& settings) {
 StatusOr<JobRunner::Result> JobRunner::Run(Scene scene, ReferenceImage reference) {
   LUCERNA_ASSIGN_OR_RETURN(estimator_, JobEstimator::Create(std::move(scene), settings_, threads_));
   reference_ = std::move(reference);
+  if (const std::size_t faint = estimator_->faint_lights(); faint > 0) {
+    surroundings_.when_warned(
+        absl::StrCat("warning: ", faint, faint == 1 ? " light has" : " lights have",
+                     " less than 1e-9 of the scene's power: photons hardly ever come from there, so"
+                     " what is lit by reflections of that light alone stays dark; render it by"
+                     " itself and add the images"));
+  }
   return RunToEnd();
 }
 

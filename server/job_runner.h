@@ -56,6 +56,7 @@ class JobRunner {
     const Clock& clock;
     // Called on the runner's thread, never under a lock.
     std::function<void()> when_running;
+    std::function<void(std::string warning)> when_warned;
     std::function<void()> when_pass_opened;
     std::function<void(std::int64_t passes, const BatchTally& of_pass)> when_pass_merged;
     std::function<void(const Look& look)> when_looked;

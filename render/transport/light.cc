@@ -21,6 +21,8 @@ float SpotFalloff(const SpotLight& spot, float cosine) {
 // How much of the choice of direct light is even among the lights. By power alone, a lamp nearby
 // that has a millionth of the power of another is found once in a million samples.
 constexpr double kEvenShare = 0.1;
+// Lights with less of the power than this are told of.
+constexpr double kFaintShare = 1e-9;
 
 // 1 - cosine of the cone in which a sphere appears from outside, without cancellation.
 float OneMinusCosine(float sin2_max) {
@@ -169,6 +171,8 @@ void LightSet::ShareOut() {
     emitters_.clear();
     return;
   }
+  faint_lights_ = static_cast<std::size_t>(std::ranges::count_if(
+      light_power, [&](double power) { return power > 0 && power < kFaintShare * total; }));
   const auto lights = static_cast<double>(
       std::ranges::count_if(light_power, [](double power) { return power > 0; }));
   double sum = 0;

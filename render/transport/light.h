@@ -64,6 +64,9 @@ class LightSet {
   [[nodiscard]] const Emitter& emitter(std::uint32_t number) const { return emitters_[number]; }
   // [W] per channel, of all emitters.
   [[nodiscard]] Rgb TotalPower() const { return total_power_; }
+  // How many lights (a mesh is one) have so small a share of the power, 1e-9, that hardly a photon
+  // ever comes from them: what they light directly is right, and what that light lights is dark.
+  [[nodiscard]] std::size_t faint_lights() const { return faint_lights_; }
   // True when all emitters are points or single directions, which no ray can hit.
   [[nodiscard]] bool OnlyDelta() const { return only_delta_; }
 
@@ -116,6 +119,7 @@ class LightSet {
   std::vector<EnvironmentMap> environments_;  // those that are not black
   std::size_t first_environment_ = 0;         // emitter of the first
   bool only_delta_ = true;
+  std::size_t faint_lights_ = 0;
 };
 
 }  // namespace lucerna

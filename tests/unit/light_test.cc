@@ -106,7 +106,9 @@ TEST(SampleDirectTest, DrawsByTheDensityThatItsSightGives) {
           direction = sample.wi;
           // A point behind its own lamp is drawn and then found hidden.
           return !lit.intersector->Occluded(
-              {{0, 0, 0}, sample.wi, sample.is_distant ? HUGE_VALF : 0.999F * Length(sample.target)});
+              {{0, 0, 0},
+               sample.wi,
+               sample.is_distant ? HUGE_VALF : 0.999F * Length(sample.target)});
         },
         [&](Vec3 wi) { return PdfToward(lit, wi); }, 200000, ++key);
     // The sky is drawn through the disk too, where sight finds the disk.
@@ -198,8 +200,8 @@ std::array<double, 3> MeanFlux(const LightSet& lights, std::uint64_t key, double
   return sum;
 }
 
-// A lamp that hangs over a floor and shines up into nothing sends no photons, and one beside it that
-// shines down sends all.
+// A lamp that hangs over a floor and shines up into nothing sends no photons, and one beside it
+// that shines down sends all.
 TEST(SampleEmissionTest, SendsNothingFromFacesThatNothingLiesInFrontOf) {
   Scene scene = BlackRoom();
   AddQuad(scene, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0);
@@ -314,8 +316,8 @@ TEST(SampleEmissionTest, FillsTheSceneFromInfinity) {
   EXPECT_NEAR(through, expected, 4 * std::sqrt(squares / kPhotons));
 }
 
-// Of two lamps as bright at the origin, one has 1e-12 of the power: a twentieth of the samples go to
-// it, where its power would send none.
+// Of two lamps as bright at the origin, one has 1e-12 of the power: a twentieth of the samples go
+// to it, where its power would send none.
 TEST(SampleDirectTest, FindsANearLampBesideAFarOneOfAllThePower) {
   Scene scene = BlackRoom();
   scene.point_lights.push_back({{0, 0, 1}, Gray(1)});
@@ -334,6 +336,19 @@ TEST(SampleDirectTest, FindsANearLampBesideAFarOneOfAllThePower) {
   }
   // Five standard deviations.
   EXPECT_NEAR(near, kSamples / 20, 5 * std::sqrt(kSamples / 20.0));
+}
+
+// A lamp that is off is none.
+TEST(LightSetTest, CountsLightsThatHardlySendAPhoton) {
+  Scene scene = SphereLamp();
+  EXPECT_EQ(Lit(scene).lights.faint_lights(), 0U);
+  scene.point_lights.push_back({{0, 0, 0}, Gray(1e-11F)});
+  EXPECT_EQ(Lit(scene).lights.faint_lights(), 1U);
+  scene.point_lights.push_back({{0, 1, 0}, Gray(0)});
+  AddSphere(scene, {5, 0, 2}, 1e-7F, 0, AddAreaLight(scene, 1));
+  EXPECT_EQ(Lit(scene).lights.faint_lights(), 2U);
+  scene.area_lights[0].radiance = Gray(1e-9F);
+  EXPECT_EQ(Lit(scene).lights.faint_lights(), 0U) << "what is faint depends on the rest";
 }
 
 }  // namespace
