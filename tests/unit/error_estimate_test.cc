@@ -15,6 +15,21 @@ namespace {
 constexpr int kSide = 96;
 constexpr std::size_t kPixels = static_cast<std::size_t>(kSide) * kSide;
 
+// Of grey passes whose sum is `all`.
+ErrorEstimate EstimateOf(const ErrorStatistics& statistics, const std::vector<RgbSum>& all,
+                         int look) {
+  return EstimateError(kSide, kSide, statistics.passes(), look, [&](std::size_t pixel) {
+    PixelSums sums;
+    sums.all = all[pixel];
+    sums.even = statistics.even_sum()[pixel];
+    sums.even_bias = statistics.even_bias()[pixel];
+    sums.odd_bias = statistics.odd_bias()[pixel];
+    sums.bias_color = {1, 1, 1};
+    sums.square = statistics.square_sum()[pixel];
+    return sums;
+  });
+}
+
 // A grey image of value 2 with independent noise of standard deviation `noise` a pass, and `bias`.
 struct Made {
   ErrorStatistics statistics{kPixels};
@@ -44,18 +59,7 @@ struct Made {
     }
   }
 
-  [[nodiscard]] ErrorEstimate Estimate(int look) const {
-    return EstimateError(kSide, kSide, statistics.passes(), look, [&](std::size_t pixel) {
-      PixelSums sums;
-      sums.all = all[pixel];
-      sums.even = statistics.even_sum()[pixel];
-      sums.even_bias = statistics.even_bias()[pixel];
-      sums.odd_bias = statistics.odd_bias()[pixel];
-      sums.bias_color = {1, 1, 1};
-      sums.square = statistics.square_sum()[pixel];
-      return sums;
-    });
-  }
+  [[nodiscard]] ErrorEstimate Estimate(int look) const { return EstimateOf(statistics, all, look); }
 };
 
 TEST(ErrorEstimateTest, FindsNoiseAndBias) {
@@ -78,6 +82,74 @@ TEST(ErrorEstimateTest, FindsNoiseAndBias) {
     EXPECT_LE(estimate.absolute.low, made.true_square);
     EXPECT_GE(estimate.absolute.high, made.true_square);
   }
+}
+
+// What is known of the bias comes from the photons that the value comes from: where chance brings
+// more of them, both are larger. Relative to a value that knows both halves, their product would
+// come out as 0.025 here.
+TEST(ErrorEstimateTest, ChanceThatValueAndBiasShareIsNoBias) {
+  constexpr int kPasses = 4;
+  ErrorStatistics statistics(kPixels);
+  std::vector<RgbSum> all(kPixels);
+  KeyedRng rng(17);
+  for (int pass = 0; pass < kPasses; ++pass) {
+    std::vector<RgbSum> radiance(kPixels);
+    std::vector<double> biases(kPixels);
+    for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
+      const double chance = 0.9 * (2 * static_cast<double>(rng.Uniform()) - 1);
+      radiance[pixel] = {1 + chance, 1 + chance, 1 + chance};
+      biases[pixel] = chance;
+      for (double& sum : all[pixel])
+        sum += 1 + chance;
+    }
+    statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, biases);
+  }
+  const ErrorEstimate estimate = EstimateOf(statistics, all, 1);
+  // Half a pass's variance of 0.27: products deviate by 0.135 · 3/8 · 1.5 times weights of about
+  // 2.5, over 96 pixels' root.
+  EXPECT_LT(estimate.relative.bias, 4 * 0.135 * 0.375 * 1.5 * 2.5 / 96);
+}
+
+// Kernels eight pixels wide, and a bias that changes its sign every four: smoothing over as much as
+// the kernels do would lose it.
+TEST(ErrorEstimateTest, KeepsABiasThatWideSmoothingWouldLose) {
+  constexpr int kPasses = 4;
+  constexpr double kBias = 0.3;
+  ErrorStatistics statistics(kPixels);
+  std::vector<RgbSum> all(kPixels);
+  KeyedRng rng(23);
+  for (int pass = 0; pass < kPasses; ++pass) {
+    std::vector<RgbSum> radiance(kPixels);
+    std::vector<double> biases(kPixels);
+    std::array<double, std::size_t{kSide / 8} * (kSide / 8)> blocks;
+    for (double& block : blocks)
+      block = 0.2 * (static_cast<double>(rng.Uniform()) - 0.5);
+    for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
+      const std::size_t x = pixel % kSide;
+      const std::size_t y = pixel / kSide;
+      const double bias = x / 4 % 2 == 0 ? kBias : -kBias;
+      const double chance = blocks[y / 8 * (kSide / 8) + x / 8];
+      const double value = 2 + bias + chance;
+      radiance[pixel] = {value, value, value};
+      biases[pixel] = bias + 0.1 * (static_cast<double>(rng.Uniform()) - 0.5);
+      for (double& sum : all[pixel])
+        sum += value;
+    }
+    statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, biases);
+  }
+  const ErrorEstimate estimate = EstimateOf(statistics, all, 1);
+  // Of stripes of four the weights (1 2 1)/4 leave 3/4 in the product; a third more is taken as
+  // lost than is.
+  EXPECT_NEAR(estimate.absolute.bias / (kBias * kBias), 0.75 * 1.5, 0.05);
+}
+
+TEST(ErrorEstimateTest, LooksSpendAllOfTheErrorProbability) {
+  double spent = 0;
+  for (int look = 1; look <= 100000; ++look) {
+    EXPECT_LE(SpentAt(look + 1), SpentAt(look));
+    spent += SpentAt(look);
+  }
+  EXPECT_NEAR(spent, 1, 1e-4);
 }
 
 TEST(ErrorEstimateTest, LaterLooksHaveWiderIntervals) {
