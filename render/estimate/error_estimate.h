@@ -32,9 +32,9 @@
 // (sum of the squares of their correlations, found in the differences themselves). The true
 // squared error around its expectation spreads alike, and by its cross term of bias and noise. What
 // the models above leave open is kModelError, and for the bias kLeastBias and kMostBias. Intervals
-// are valid at all looks together: look j (from 1) spends SpentAt(j) of the error probability. Source: the stitching of Howard, Ramdas,
-// McAuliffe & Sekhon 2021, "Time-uniform, nonparametric, nonasymptotic confidence sequences", with
-// looks as the epochs and normal tails within one.
+// are valid at all looks together: look j (from 1) spends SpentAt(j) of the error probability.
+// Source: the stitching of Howard, Ramdas, McAuliffe & Sekhon 2021, "Time-uniform, nonparametric,
+// nonasymptotic confidence sequences", with looks as the epochs and normal tails within one.
 #pragma once
 
 #include <array>

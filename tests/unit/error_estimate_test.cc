@@ -84,27 +84,39 @@ TEST(ErrorEstimateTest, FindsNoiseAndBias) {
   }
 }
 
+struct ValueAndBias {
+  double value = 0, bias = 0;
+};
+
+// Of four grey passes made pixel by pixel.
+template <typename Make>
+ErrorEstimate EstimateOfPasses(const Make& make) {
+  ErrorStatistics statistics(kPixels);
+  std::vector<RgbSum> all(kPixels);
+  for (std::uint64_t pass = 0; pass < 4; ++pass) {
+    std::vector<RgbSum> radiance(kPixels);
+    std::vector<double> biases(kPixels);
+    for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
+      const ValueAndBias made = make(pass, pixel);
+      radiance[pixel] = {made.value, made.value, made.value};
+      biases[pixel] = made.bias;
+      for (double& sum : all[pixel])
+        sum += made.value;
+    }
+    statistics.AddPass(pass, radiance, biases);
+  }
+  return EstimateOf(statistics, all, 1);
+}
+
 // What is known of the bias comes from the photons that the value comes from: where chance brings
 // more of them, both are larger. Relative to a value that knows both halves, their product would
 // come out as 0.025 here.
 TEST(ErrorEstimateTest, ChanceThatValueAndBiasShareIsNoBias) {
-  constexpr int kPasses = 4;
-  ErrorStatistics statistics(kPixels);
-  std::vector<RgbSum> all(kPixels);
   KeyedRng rng(17);
-  for (int pass = 0; pass < kPasses; ++pass) {
-    std::vector<RgbSum> radiance(kPixels);
-    std::vector<double> biases(kPixels);
-    for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
-      const double chance = 0.9 * (2 * static_cast<double>(rng.Uniform()) - 1);
-      radiance[pixel] = {1 + chance, 1 + chance, 1 + chance};
-      biases[pixel] = chance;
-      for (double& sum : all[pixel])
-        sum += 1 + chance;
-    }
-    statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, biases);
-  }
-  const ErrorEstimate estimate = EstimateOf(statistics, all, 1);
+  const ErrorEstimate estimate = EstimateOfPasses([&](std::uint64_t, std::size_t) {
+    const double chance = 0.9 * (2 * static_cast<double>(rng.Uniform()) - 1);
+    return ValueAndBias{1 + chance, chance};
+  });
   // Half a pass's variance of 0.27: products deviate by 0.135 · 3/8 · 1.5 times weights of about
   // 2.5, over 96 pixels' root.
   EXPECT_LT(estimate.relative.bias, 4 * 0.135 * 0.375 * 1.5 * 2.5 / 96);
@@ -113,31 +125,18 @@ TEST(ErrorEstimateTest, ChanceThatValueAndBiasShareIsNoBias) {
 // Kernels eight pixels wide, and a bias that changes its sign every four: smoothing over as much as
 // the kernels do would lose it.
 TEST(ErrorEstimateTest, KeepsABiasThatWideSmoothingWouldLose) {
-  constexpr int kPasses = 4;
   constexpr double kBias = 0.3;
-  ErrorStatistics statistics(kPixels);
-  std::vector<RgbSum> all(kPixels);
+  constexpr std::size_t kBlocks = kSide / 8;
   KeyedRng rng(23);
-  for (int pass = 0; pass < kPasses; ++pass) {
-    std::vector<RgbSum> radiance(kPixels);
-    std::vector<double> biases(kPixels);
-    std::array<double, std::size_t{kSide / 8} * (kSide / 8)> blocks;
-    for (double& block : blocks)
-      block = 0.2 * (static_cast<double>(rng.Uniform()) - 0.5);
-    for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
-      const std::size_t x = pixel % kSide;
-      const std::size_t y = pixel / kSide;
-      const double bias = x / 4 % 2 == 0 ? kBias : -kBias;
-      const double chance = blocks[y / 8 * (kSide / 8) + x / 8];
-      const double value = 2 + bias + chance;
-      radiance[pixel] = {value, value, value};
-      biases[pixel] = bias + 0.1 * (static_cast<double>(rng.Uniform()) - 0.5);
-      for (double& sum : all[pixel])
-        sum += value;
-    }
-    statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, biases);
-  }
-  const ErrorEstimate estimate = EstimateOf(statistics, all, 1);
+  std::array<double, kBlocks * kBlocks> blocks{};
+  const ErrorEstimate estimate = EstimateOfPasses([&](std::uint64_t, std::size_t pixel) {
+    const std::size_t x = pixel % kSide;
+    const std::size_t y = pixel / kSide;
+    double& block = blocks[y / 8 * kBlocks + x / 8];
+    if (x % 8 == 0 && y % 8 == 0) block = 0.2 * (static_cast<double>(rng.Uniform()) - 0.5);
+    const double bias = x / 4 % 2 == 0 ? kBias : -kBias;
+    return ValueAndBias{2 + bias + block, bias + 0.1 * (static_cast<double>(rng.Uniform()) - 0.5)};
+  });
   // Of stripes of four the weights (1 2 1)/4 leave 3/4 in the product; a third more is taken as
   // lost than is.
   EXPECT_NEAR(estimate.absolute.bias / (kBias * kBias), 0.75 * 1.5, 0.05);
