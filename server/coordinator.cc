@@ -480,7 +480,7 @@ void Coordinator::RunJob(const std::shared_ptr<JobEntry>& entry) {
     runner->SetEnd(entry->job.settings);
     entry->runner = runner;
   }
-  Conclude(entry, runner->Run(*std::move(scene), std::move(reference)));
+  Conclude(entry, runner->Run(*std::move(scene), entry->job.needs, std::move(reference)));
 }
 
 void Coordinator::Conclude(const std::shared_ptr<JobEntry>& entry,
@@ -600,7 +600,8 @@ std::optional<StatusOr<Coordinator::SyncAnswer>> Coordinator::TryAnswer(
         entry && entry->runner ? entry->runner->BlobsOf(told->lease->pass.pass) : std::nullopt;
     if (blobs) {
       entry->job.most_workers = std::max(entry->job.most_workers, scheduler_.LiveWorkers());
-      answer.loan = {*std::move(told->lease), entry->job.manifest, entry->job.settings, *blobs};
+      answer.loan = {*std::move(told->lease), entry->job.manifest, entry->job.settings,
+                     entry->job.needs, *blobs};
     }
     // Else the pass ended this moment, and its lease with it.
   }
@@ -760,7 +761,8 @@ StatusOr<Coordinator::Description> Coordinator::Describe(const std::string& job_
   const MutexLock lock(mutex_);
   const auto entry = Find(job_id);
   if (!entry) return UnknownJob(job_id);
-  return Description{entry->job.manifest, entry->job.settings, options_.numeric_profile};
+  return Description{entry->job.manifest, entry->job.settings, entry->job.needs,
+                     options_.numeric_profile};
 }
 
 void Coordinator::Goodbye(const std::string& worker) {

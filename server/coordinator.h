@@ -108,6 +108,7 @@ class Coordinator {
     BatchLease lease;
     SceneManifest scene;
     RenderSettings settings;
+    SceneNeeds needs;
     PassBlobs blobs;
   };
   struct SyncAnswer {
@@ -145,6 +146,7 @@ class Coordinator {
   struct Description {
     SceneManifest scene;
     RenderSettings settings;
+    SceneNeeds needs;
     std::string numeric_profile;
   };
   // Errors: NOT_FOUND.

@@ -28,7 +28,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
     : scene_(scene),
       settings_(settings),
       eye_sets_(needs.eye_sample_sets()),
-      walk_(WalkFor(needs, settings)),
+      walk_(WalkFor(needs)),
       intersector_(intersector),
       lights_(lights),
       filter_x_(scene.filter, scene.filter.radius_x),
@@ -129,6 +129,20 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, Key
   return seen;
 }
 
+bool EyePathTracer::FindFirst(const Ray& ray, First first, Hit& hit) const {
+  std::uint32_t shape = kNoShape;
+  if (first.is_known) {
+    shape = *first.shape;
+  } else {
+    if (intersector_.Intersect(ray, hit)) shape = intersector_.ShapeOf(hit);
+    if (first.shape != nullptr) *first.shape = shape;
+  }
+  if (shape == kNoShape) return false;
+  // Found or known, the hit has the same bits.
+  hit = intersector_.HitOn(shape, ray);
+  return true;
+}
+
 template <EyePathTracer::WalkParts kParts>
 EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) const {
   EyePath path;
@@ -145,18 +159,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   for (int vertex = 0;; ++vertex) {
     Hit hit;
     ++path.rays;
-    bool is_met = false;
-    if (vertex == 0 && first.is_known) {
-      hit = *first.hit;
-      is_met = hit.t < HUGE_VALF;
-    } else {
-      is_met = intersector_.Intersect(ray, hit);
-      if (vertex == 0 && first.hit != nullptr) {
-        *first.hit = hit;
-        if (!is_met) first.hit->t = HUGE_VALF;
-      }
-    }
-    if (!is_met) {
+    if (!(vertex == 0 ? FindFirst(ray, first, hit) : intersector_.Intersect(ray, hit))) {
       if (emission_was_collected) return path;
       const float mis = scatter_pdf > 0
                             ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(ray.direction))
@@ -194,8 +197,10 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       }
     } else {
       emission_was_collected = false;
-      const ShadingPoint point = {surface, material, frame, wo};
-      path.direct += weight * LightSampledRadiance(intersector_, lights_, point, u, path.rays);
+      if constexpr (kParts.lights) {
+        const ShadingPoint point = {surface, material, frame, wo};
+        path.direct += weight * LightSampledRadiance(intersector_, lights_, point, u, path.rays);
+      }
     }
 
     BsdfSample sample;
@@ -217,7 +222,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
 
     if (Gathers(material)) {
       // Half of the direct light: what a scattered ray finds of the lights themselves.
-      if (scattered && !lights_.OnlyDelta()) {
+      if (kParts.lights && scattered && !lights_.OnlyDelta()) {
         const Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
         ++path.rays;
         if (!intersector_.Intersect(probe, hit)) {
@@ -258,14 +263,13 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   }
 }
 
-EyePathTracer::WalkFunction EyePathTracer::WalkFor(const SceneNeeds& needs,
-                                                   const RenderSettings& settings) {
+EyePathTracer::WalkFunction EyePathTracer::WalkFor(const SceneNeeds& needs) {
   static constexpr auto kWalks = []<std::size_t... kBits>(std::index_sequence<kBits...>) {
-    return std::array<WalkFunction, sizeof...(kBits)>{
-        &EyePathTracer::Walk<WalkParts{(kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0}>...};
+    return std::array<WalkFunction, sizeof...(kBits)>{&EyePathTracer::Walk<WalkParts{
+        (kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0, (kBits & 8) != 0}>...};
   }
-  (std::make_index_sequence<8>());
-  return kWalks[WalkPartsOf(needs, settings)];
+  (std::make_index_sequence<16>());
+  return kWalks[WalkPartsOf(needs) | (needs.Uses(Part::kDirectSampling) ? 8U : 0U)];
 }
 
 }  // namespace lucerna

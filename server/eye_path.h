@@ -45,7 +45,7 @@ class EyePathTracer {
 
   // What is known of the first thing that an eye path meets.
   struct First {
-    Hit* hit = nullptr;  // t is infinite when it meets nothing; nullptr: nobody wants to know
+    std::uint32_t* shape = nullptr;  // nullptr: nobody wants to know
     bool is_known = false;
   };
   // The eye path of a pixel of the crop window in one pass. Threads: any.
@@ -60,13 +60,15 @@ class EyePathTracer {
   struct WalkParts {
     bool textures = false;
     bool shading_normals = false;
-    bool lobes = false;  // other scattering than diffuse
+    bool lobes = false;   // other scattering than diffuse
+    bool lights = false;  // that are sampled
   };
   template <WalkParts kParts>
   [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler, First first) const;
+  // What the camera's ray meets. False when that is nothing.
+  [[nodiscard]] bool FindFirst(const Ray& ray, First first, Hit& hit) const;
   using WalkFunction = EyePath (EyePathTracer::*)(Ray, const PixelSampler&, First) const;
-  [[nodiscard]] static WalkFunction WalkFor(const SceneNeeds& needs,
-                                            const RenderSettings& settings);
+  [[nodiscard]] static WalkFunction WalkFor(const SceneNeeds& needs);
   // Radiance that leaves a smooth surface towards `first_wo` and was emitted where a chain of
   // smooth surfaces ends: reflections and refractions are all followed, not drawn.
   [[nodiscard]] Rgb EmissionThrough(const SurfacePoint& first, Vec3 first_wo, KeyedRng rng,

@@ -1,13 +1,11 @@
 // What do eye paths meet first, pass after pass?
 //
 // Where sets of eye paths take turns (scene/needs.h, EyeSetOf), the camera's rays of a set are the
-// same in every pass that uses it, so what they meet is found once. Hits are kept and not surfaces:
-// a fifth of the memory, and the rest is soon computed again.
+// same in every pass that uses it, so what they meet is found once. Only which shape it is is
+// kept, 4 bytes for a ray: where the ray meets it is soon computed again.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <map>
 #include <vector>
 
 #include "render/geometry/intersector.h"
@@ -15,30 +13,28 @@
 
 namespace lucerna {
 
-// Of the camera's ray through each pixel; t is infinite where nothing is met.
+// Of the camera's ray through each pixel.
 struct FirstHitsOfSet {
   bool is_known = false;
-  std::vector<Hit> hits;  // [pixels of the crop window]
+  std::vector<std::uint32_t> shapes;  // [pixels of the crop window] see Intersector::ShapeOf
 };
 
 class FirstHits {
  public:
   // `sets` take turns; 0 when every pass has eye paths of its own.
-  FirstHits(int sets, std::size_t pixels) : sets_(sets), pixels_(pixels) {}
+  FirstHits(int sets, std::size_t pixels)
+      : pixels_(pixels), kept_(static_cast<std::size_t>(sets)) {}
 
-  // Of the set that `pass` uses: known, or to be filled and called known. nullptr when it is not
-  // kept. Valid until the next call.
+  // Of the set that `pass` uses: known, or to be filled and called known. nullptr when eye paths
+  // are never used again.
   [[nodiscard]] FirstHitsOfSet* Of(std::uint64_t pass) {
-    if (sets_ == 0) return nullptr;
-    const auto sets = static_cast<std::uint64_t>(sets_);
-    const std::uint64_t turn = pass % sets;
-    if (turn >= SetsOfFirstHits(sets_, pixels_)) return nullptr;
-    Kept& kept = kept_[turn];
-    const std::uint64_t set = EyeSetOf(pass, sets_);
-    if (kept.set != set || kept.hits.hits.empty()) {
+    if (kept_.empty()) return nullptr;
+    Kept& kept = kept_[pass % kept_.size()];
+    const std::uint64_t set = EyeSetOf(pass, static_cast<int>(kept_.size()));
+    if (kept.set != set || kept.hits.shapes.empty()) {
       kept.set = set;
       kept.hits.is_known = false;
-      kept.hits.hits.resize(pixels_);
+      kept.hits.shapes.resize(pixels_);
     }
     return &kept.hits;
   }
@@ -48,9 +44,8 @@ class FirstHits {
     std::uint64_t set = 0;
     FirstHitsOfSet hits;
   };
-  int sets_;
   std::size_t pixels_;
-  std::map<std::uint64_t, Kept> kept_;  // by turn
+  std::vector<Kept> kept_;  // by turn
 };
 
 }  // namespace lucerna

@@ -57,9 +57,9 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
           const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(width) +
                              static_cast<std::uint32_t>(x);
           const EyePathTracer::First first =
-              known == nullptr
-                  ? EyePathTracer::First{}
-                  : EyePathTracer::First{.hit = &known->hits[pixel], .is_known = known->is_known};
+              known == nullptr ? EyePathTracer::First{}
+                               : EyePathTracer::First{.shape = &known->shapes[pixel],
+                                                      .is_known = known->is_known};
           const EyePath path = tracer.Trace(x, y, pass, first);
           out.direct[pixel] = path.direct;
           out.features[pixel] = path.features;

@@ -37,10 +37,10 @@ Status CheckPower(Rgb power_w) {
 }  // namespace
 
 struct JobEstimator::State {
-  State(Scene s, RenderSettings r, int threads)
+  State(Scene s, RenderSettings r, SceneNeeds n, int threads)
       : scene(InWorkingSpace(std::move(s))),
         settings(r),
-        needs(NeedsOf(scene, settings)),
+        needs(std::move(n)),
         team(threads),
         first_hits(needs.eye_sample_sets(), static_cast<std::size_t>(r.crop_width()) *
                                                 static_cast<std::size_t>(r.crop_height())) {}
@@ -73,10 +73,11 @@ JobEstimator::JobEstimator(std::unique_ptr<State> state) : state_(std::move(stat
 JobEstimator::~JobEstimator() = default;
 
 StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, RenderSettings settings,
-                                                             int threads) {
-  auto state = std::make_unique<State>(std::move(scene), settings, threads);
-  LUCERNA_ASSIGN_OR_RETURN(state->intersector, Intersector::Create(state->scene));
-  state->lights = std::make_unique<LightSet>(state->scene, *state->intersector);
+                                                             SceneNeeds needs, int threads) {
+  auto state = std::make_unique<State>(std::move(scene), settings, std::move(needs), threads);
+  LUCERNA_ASSIGN_OR_RETURN(state->intersector,
+                           Intersector::Create(state->scene, state->needs.tree()));
+  state->lights = std::make_unique<LightSet>(state->scene, *state->intersector, state->needs);
   LUCERNA_RETURN_IF_ERROR(CheckPower(state->lights->TotalPower()));
   state->tracer = std::make_unique<EyePathTracer>(state->scene, state->settings, state->needs,
                                                   *state->intersector, *state->lights);

@@ -34,11 +34,12 @@ namespace lucerna {
 
 class JobEstimator {
  public:
-  // Keeps `scene`. Builds what eye paths need; may take seconds for big scenes. threads = 0: all
-  // the machine has.
+  // Keeps `scene`. `needs` are those of scene and settings. Builds what eye paths need; may take
+  // seconds for big scenes. threads = 0: all the machine has.
   // Errors: RESOURCE_EXHAUSTED when memory runs out, INTERNAL when Embree refuses the scene.
   [[nodiscard]] static StatusOr<std::unique_ptr<JobEstimator>> Create(Scene scene,
                                                                       RenderSettings settings,
+                                                                      SceneNeeds needs,
                                                                       int threads);
   ~JobEstimator();
 

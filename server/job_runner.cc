@@ -36,8 +36,10 @@ JobRunner::End JobRunner::EndOf(const RenderSettings& settings) {
   return end;
 }
 
-StatusOr<JobRunner::Result> JobRunner::Run(Scene scene, ReferenceImage reference) {
-  LUCERNA_ASSIGN_OR_RETURN(estimator_, JobEstimator::Create(std::move(scene), settings_, threads_));
+StatusOr<JobRunner::Result> JobRunner::Run(Scene scene, const SceneNeeds& needs,
+                                           ReferenceImage reference) {
+  LUCERNA_ASSIGN_OR_RETURN(estimator_,
+                           JobEstimator::Create(std::move(scene), settings_, needs, threads_));
   reference_ = std::move(reference);
   if (const std::size_t faint = estimator_->faint_lights(); faint > 0) {
     surroundings_.when_warned(

@@ -74,7 +74,8 @@ class JobRunner {
   // Renders to the end. `reference` may be empty; else it is as large as the image. Once only.
   // Errors: what JobEstimator says of the scene, RESOURCE_EXHAUSTED when blobs do not fit, or what
   // Stop was given.
-  [[nodiscard]] StatusOr<Result> Run(Scene scene, ReferenceImage reference);
+  [[nodiscard]] StatusOr<Result> Run(Scene scene, const SceneNeeds& needs,
+                                     ReferenceImage reference);
   // Goes on after Run or Resume ended well, to the end as it is now. Errors: as Run.
   [[nodiscard]] StatusOr<Result> Resume();
 

@@ -23,6 +23,7 @@ v1::Lease LoanToProto(const Coordinator::Loan& loan) {
   message.set_job_id(loan.lease.pass.job_id);
   *message.mutable_scene() = ToProto(loan.scene);
   *message.mutable_settings() = ToProto(loan.settings);
+  *message.mutable_needs() = ToProto(loan.needs);
   message.set_pass(loan.lease.pass.pass);
   message.set_first_photon(loan.lease.range.first);
   message.set_last_photon(loan.lease.range.last);
@@ -198,6 +199,7 @@ grpc::ServerUnaryReactor* WorkerService::DescribeJob(grpc::CallbackServerContext
   if (job.ok()) {
     *response->mutable_scene() = ToProto(job->scene);
     *response->mutable_settings() = ToProto(job->settings);
+    *response->mutable_needs() = ToProto(job->needs);
     response->set_numeric_profile(job->numeric_profile);
   }
   reactor->Finish(ToGrpc(job.status()));

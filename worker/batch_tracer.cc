@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -140,34 +139,43 @@ Status CheckDeposits(const std::vector<BatchTally>& tallies) {
 struct BatchTracer::State {
   State(Scene s, int threads) : scene(InWorkingSpace(std::move(s))), team(threads) {}
 
+  // Makes what a job with these needs asks for, and keeps what the job before it asked for too.
+  Status Prepare(const SceneNeeds& of_job) {
+    if (intersector != nullptr && needs == of_job) return absl::OkStatus();
+    spectra.reset();
+    lights.reset();
+    if (intersector == nullptr || needs.tree() != of_job.tree()) {
+      intersector.reset();
+      LUCERNA_ASSIGN_OR_RETURN(intersector, Intersector::Create(scene, of_job.tree()));
+    }
+    needs = of_job;
+    lights = std::make_unique<LightSet>(scene, *intersector, needs);
+    scale = FluxScale::ForPower(lights->TotalPower());
+    return absl::OkStatus();
+  }
+
   Scene scene;
   ThreadTeam team;
+  SceneNeeds needs;
   std::unique_ptr<Intersector> intersector;
   std::unique_ptr<LightSet> lights;
   FluxScale scale;
   // Made when a job asks for it.
   std::unique_ptr<SpectrumTracer> spectra;
-  // Of the job that was worked for last: to find them takes a look at every triangle.
-  std::optional<RenderSettings> settings;
-  SceneNeeds needs;
 };
 
-BatchTracer::BatchTracer(std::unique_ptr<State> state) : state_(std::move(state)) {}
+BatchTracer::BatchTracer(Scene scene, int threads)
+    : state_(std::make_unique<State>(std::move(scene), threads)) {}
 BatchTracer::~BatchTracer() = default;
 
-StatusOr<std::unique_ptr<BatchTracer>> BatchTracer::Create(Scene scene, int threads) {
-  auto state = std::make_unique<State>(std::move(scene), threads);
-  LUCERNA_ASSIGN_OR_RETURN(state->intersector, Intersector::Create(state->scene));
-  state->lights = std::make_unique<LightSet>(state->scene, *state->intersector);
-  state->scale = FluxScale::ForPower(state->lights->TotalPower());
-  return std::unique_ptr<BatchTracer>(new BatchTracer(std::move(state)));
-}
-
-StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uint64_t pass,
-                                        std::uint64_t first, std::uint64_t last,
+StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const SceneNeeds& needs,
+                                        std::uint64_t pass, std::uint64_t first, std::uint64_t last,
                                         const HitpointBlock& block, const RadiusColumn& radii,
                                         const std::atomic<bool>& stop) {
   LUCERNA_RETURN_IF_ERROR(CheckBlock(block, radii, state_->scene));
+  if (!block.glossy.empty() && !needs.Uses(Part::kPhotonDirections)) {
+    return absl::InvalidArgumentError("there are glossy hitpoints, but the job needs none");
+  }
   const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
   Accumulation sum;
   if (block.size() == 0 || first >= last) {
@@ -175,22 +183,19 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
     sum.evidence.resize(EvidenceColumns(evidence));
     return sum;
   }
-  if (state_->settings != settings) {
-    state_->needs = NeedsOf(state_->scene, settings);
-    state_->settings = settings;
-  }
+  LUCERNA_RETURN_IF_ERROR(state_->Prepare(needs));
   const Bounds region = RegionOf(block, radii, ReachOf(evidence));
   const float cell = CellWidth(radii);
   if (evidence == Evidence::kFrequency &&
       (state_->spectra == nullptr || !state_->spectra->Suits(settings))) {
     LUCERNA_ASSIGN_OR_RETURN(state_->spectra,
-                             SpectrumTracer::Create(state_->scene, settings, state_->needs,
+                             SpectrumTracer::Create(state_->scene, settings, needs,
                                                     *state_->intersector, *state_->lights));
   }
   const SpectrumTracer* spectra =
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
   const PhotonPathTracer tracer(state_->scene, *state_->intersector, *state_->lights, settings,
-                                state_->needs, spectra, region);
+                                needs, spectra, region);
   const std::uint64_t per_chunk =
       std::clamp(kMostDepositsPerChunk / static_cast<std::uint64_t>(settings.max_depth),
                  std::uint64_t{1}, kPhotonsPerChunk);
@@ -199,8 +204,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
   for (std::uint64_t next = first; next < last;) {
     const std::uint64_t part = next;
     const std::uint64_t part_end = std::min(last, part + kPhotonsPerPart);
-    std::vector<std::vector<Deposit>> deposits;
-    std::vector<std::vector<float>> traces;
+    std::vector<Deposits> deposits;
     std::vector<BatchTally> tallies;
     std::vector<std::vector<std::uint64_t>> dropped;
     std::uint64_t found = 0;
@@ -211,14 +215,13 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
       deposits.resize(before + chunks);
       tallies.resize(before + chunks);
       dropped.resize(before + chunks);
-      if (spectra != nullptr) traces.resize(before + chunks);
       state_->team.For(chunks, 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t chunk = begin; chunk < end && !stop.load(std::memory_order_relaxed);
              ++chunk) {
           const std::uint64_t chunk_first = next + chunk * per_chunk;
           const std::uint64_t chunk_last = std::min(round_end, chunk_first + per_chunk);
           PhotonPathTracer::Landed landed;
-          landed.deposits.reserve(2 * per_chunk);
+          landed.deposits.rows.reserve(2 * per_chunk);
           for (std::uint64_t index = chunk_first; index < chunk_last; ++index) {
             tracer.Trace(pass, index, landed);
           }
@@ -231,7 +234,6 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
           tally.energy = landed.energy;
           dropped[before + chunk] = std::move(landed.dropped_photons);
           deposits[before + chunk] = std::move(landed.deposits);
-          if (spectra != nullptr) traces[before + chunk] = std::move(landed.traces);
         }
       });
       for (std::size_t chunk = before; chunk < tallies.size(); ++chunk)
@@ -240,7 +242,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, std::uin
     }
     if (stop) return absl::CancelledError("the batch was given up");
     LUCERNA_RETURN_IF_ERROR(CheckDeposits(tallies));
-    const PhotonGrid grid(deposits, traces, region, cell, state_->team);
+    const PhotonGrid grid(deposits, region, cell, state_->team);
     Accumulation accumulation =
         Gather(block, radii, grid, state_->scene.materials, Kernel{settings.kernel}, state_->scale,
                state_->team, stop, evidence);

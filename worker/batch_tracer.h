@@ -13,6 +13,7 @@
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/hitpoint_block.h"
+#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 
@@ -20,21 +21,23 @@ namespace lucerna {
 
 class BatchTracer {
  public:
-  // Keeps `scene`. threads = 0: all the machine has. Errors: as JobEstimator::Create.
-  [[nodiscard]] static StatusOr<std::unique_ptr<BatchTracer>> Create(Scene scene, int threads);
+  // threads = 0: all the machine has.
+  BatchTracer(Scene scene, int threads);
   ~BatchTracer();
 
-  // Traces photons [first, last) of `pass`. One call at a time.
+  // Traces photons [first, last) of `pass`. `needs` are those of the scene and these settings; what
+  // they ask for is made with the first batch of a job. One call at a time.
   // Errors: INVALID_ARGUMENT when block and radii do not fit each other or the scene, CANCELLED
-  // soon (milliseconds) after `stop` becomes true.
-  [[nodiscard]] StatusOr<Accumulation> Run(const RenderSettings& settings, std::uint64_t pass,
-                                           std::uint64_t first, std::uint64_t last,
-                                           const HitpointBlock& block, const RadiusColumn& radii,
+  // soon (milliseconds) after `stop` becomes true, RESOURCE_EXHAUSTED when memory runs out,
+  // INTERNAL when Embree refuses the scene.
+  [[nodiscard]] StatusOr<Accumulation> Run(const RenderSettings& settings, const SceneNeeds& needs,
+                                           std::uint64_t pass, std::uint64_t first,
+                                           std::uint64_t last, const HitpointBlock& block,
+                                           const RadiusColumn& radii,
                                            const std::atomic<bool>& stop);
 
  private:
   struct State;
-  explicit BatchTracer(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };
 

@@ -137,6 +137,7 @@ StatusOr<LentBatch> ReadLease(const v1::Lease& message) {
   batch.job_id = message.job_id();
   LUCERNA_ASSIGN_OR_RETURN(batch.scene, FromProto(message.scene()));
   LUCERNA_ASSIGN_OR_RETURN(batch.settings, FromProto(message.settings()));
+  LUCERNA_ASSIGN_OR_RETURN(batch.needs, FromProto(message.needs()));
   batch.pass = message.pass();
   batch.first_photon = message.first_photon();
   batch.last_photon = message.last_photon();

@@ -20,6 +20,7 @@
 #include "render/base/digest.h"
 #include "render/base/mutex.h"
 #include "render/base/status.h"
+#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 
@@ -31,6 +32,7 @@ struct LentBatch {
   std::string job_id;
   SceneManifest scene;
   RenderSettings settings;
+  SceneNeeds needs;
   std::uint64_t pass = 0;
   std::uint64_t first_photon = 0, last_photon = 0;
   Digest block;

@@ -17,11 +17,11 @@ constexpr float kSameSurfaceCosine = 0.7F;
 // would be another place's light.
 constexpr float kLeastCornerCosine = -0.2F;
 
-bool Counts(const PhotonRecord& photon, Vec3 normal, Vec3 to_photon) {
-  const float cosine = Dot(photon.normal, normal);
+bool Counts(Vec3 photon_normal, Vec3 normal, Vec3 to_photon) {
+  const float cosine = Dot(photon_normal, normal);
   if (cosine >= kSameSurfaceCosine) return true;
   return cosine >= kLeastCornerCosine && Dot(to_photon, normal) > 0 &&
-         Dot(to_photon, photon.normal) < 0;
+         Dot(to_photon, photon_normal) < 0;
 }
 
 constexpr std::size_t kRowsPerPiece = 2048;
@@ -144,7 +144,8 @@ struct FrequencyEvidence {
   std::array<std::int64_t, kColumns> sums{};
 };
 
-template <KernelKind kKernel, typename EvidenceSums>
+// Without kNormals every photon counts.
+template <KernelKind kKernel, typename EvidenceSums, bool kNormals>
 void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const PhotonGrid& grid,
                const GlossyHitpoint* glossy, const std::vector<Material>& materials,
                const FluxScale& scale, Piece& piece) {
@@ -186,11 +187,11 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
     sum_b += RoundDithered(quanta.b, static_cast<std::uint32_t>((bits >> 42) & kMask));
     ++count;
   };
-  if (glossy == nullptr) {
+  if (!kNormals || glossy == nullptr) {
     grid.ForEachWithin(position, reach, [&](std::size_t i, float squared) {
       const PhotonRecord& photon = grid.record(i);
       const Vec3 to_photon = grid.position(i) - position;
-      if (!Counts(photon, normal, to_photon)) return;
+      if (kNormals && !Counts(grid.normal(i), normal, to_photon)) return;
       add(photon, photon.flux, squared);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux));
     });
@@ -203,9 +204,10 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       const PhotonRecord& photon = grid.record(i);
       const Vec3 to_photon = grid.position(i) - position;
       // Photons on the far side of a rough dielectric count too.
-      const bool is_behind = transmits && Dot(photon.normal, normal) < 0;
-      if (!Counts(photon, is_behind ? -normal : normal, to_photon)) return;
-      const Vec3 wi = frame.ToLocal(DecodeOctahedral(photon.arrival_oct));
+      const Vec3 photon_normal = grid.normal(i);
+      const bool is_behind = transmits && Dot(photon_normal, normal) < 0;
+      if (!Counts(photon_normal, is_behind ? -normal : normal, to_photon)) return;
+      const Vec3 wi = frame.ToLocal(DecodeOctahedral(grid.arrival_oct(i)));
       const Rgb scattered = photon.flux * EvaluateBsdf(material, wo, wi, Carried::kRadiance);
       if (!scale.HasRoomFor(scattered)) {
         ++piece.excess;
@@ -226,7 +228,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
   piece.pairs += count;
 }
 
-template <KernelKind kKernel, typename EvidenceSums>
+template <KernelKind kKernel, typename EvidenceSums, bool kNormals>
 Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
                        const PhotonGrid& grid, const std::vector<Material>& materials,
                        const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
@@ -244,8 +246,9 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
           [](const GlossyHitpoint& g, std::size_t row) { return g.hitpoint < row; });
       for (std::size_t row = first; row < last && !stop.load(std::memory_order_relaxed); ++row) {
         const bool is_glossy = glossy != block.glossy.end() && glossy->hitpoint == row;
-        GatherRow<kKernel, EvidenceSums>(block, row, radii[row], grid,
-                                         is_glossy ? &*glossy++ : nullptr, materials, scale, piece);
+        GatherRow<kKernel, EvidenceSums, kNormals>(block, row, radii[row], grid,
+                                                   is_glossy ? &*glossy++ : nullptr, materials,
+                                                   scale, piece);
       }
     }
   });
@@ -273,33 +276,34 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
   return accumulation;
 }
 
-using GatherFunction = decltype(&GatherAll<KernelKind::kConstant, NoEvidence>);
+using GatherFunction = decltype(&GatherAll<KernelKind::kConstant, NoEvidence, true>);
 
-template <typename EvidenceSums>
+template <typename EvidenceSums, bool kNormals>
 GatherFunction ForKernel(KernelKind kernel) {
   switch (kernel) {
     case KernelKind::kConstant:
-      return &GatherAll<KernelKind::kConstant, EvidenceSums>;
+      return &GatherAll<KernelKind::kConstant, EvidenceSums, kNormals>;
     case KernelKind::kEpanechnikov:
-      return &GatherAll<KernelKind::kEpanechnikov, EvidenceSums>;
+      return &GatherAll<KernelKind::kEpanechnikov, EvidenceSums, kNormals>;
     case KernelKind::kBiweight:
-      return &GatherAll<KernelKind::kBiweight, EvidenceSums>;
+      return &GatherAll<KernelKind::kBiweight, EvidenceSums, kNormals>;
     case KernelKind::kGaussian:
-      return &GatherAll<KernelKind::kGaussian, EvidenceSums>;
+      return &GatherAll<KernelKind::kGaussian, EvidenceSums, kNormals>;
   }
   return nullptr;
 }
 
+template <bool kNormals>
 GatherFunction Specialised(KernelKind kernel, Evidence evidence) {
   switch (evidence) {
     case Evidence::kNone:
-      return ForKernel<NoEvidence>(kernel);
+      return ForKernel<NoEvidence, kNormals>(kernel);
     case Evidence::kSectors:
-      return ForKernel<SectorEvidence>(kernel);
+      return ForKernel<SectorEvidence, kNormals>(kernel);
     case Evidence::kCurvature:
-      return ForKernel<CurvatureEvidence>(kernel);
+      return ForKernel<CurvatureEvidence, kNormals>(kernel);
     case Evidence::kFrequency:
-      return ForKernel<FrequencyEvidence>(kernel);
+      return ForKernel<FrequencyEvidence, kNormals>(kernel);
   }
   return nullptr;
 }
@@ -314,7 +318,11 @@ Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii, const
                     const std::vector<Material>& materials, const Kernel& kernel,
                     const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop,
                     Evidence evidence) {
-  return Specialised(kernel.kind, evidence)(block, radii, grid, materials, scale, team, stop);
+  LUCERNA_CHECK(grid.size() == 0 || block.glossy.empty() ||
+                (grid.has_normals() && grid.has_arrivals()));
+  const GatherFunction gather = grid.has_normals() ? Specialised<true>(kernel.kind, evidence)
+                                                   : Specialised<false>(kernel.kind, evidence);
+  return gather(block, radii, grid, materials, scale, team, stop);
 }
 
 }  // namespace lucerna

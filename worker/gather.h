@@ -17,13 +17,15 @@ namespace lucerna {
 // How far from a hitpoint photons are looked for, in radii.
 [[nodiscard]] float ReachOf(Evidence evidence);
 
-// Every hitpoint adds up the photons within its radius that landed on its side of the surface:
+// Every hitpoint adds up the photons within its radius that landed on its side of the surface (all
+// of them where photons have no normals):
 // kernel-weighted flux for diffuse ones, times the BSDF for glossy ones, and what `evidence` names.
 // Counts are of the photons within reach, flux of those within the radius.
 // Fills everything of the accumulation but the tally, of which it adds `pairs` and `excess`.
-// Requires at most kMostTerms photons that `scale` has room for each: then no sum wraps. Pairs are
-// independent of each other, so neither threads nor the order of photons can be seen in the result.
-// Once `stop` is true it ends soon, with a result of no use.
+// Requires normals and arrivals of photons where there are glossy hitpoints, and at most kMostTerms
+// photons that `scale` has room for each: then no sum wraps. Pairs are independent of each other,
+// so neither threads nor the order of photons can be seen in the result. Once `stop` is true it
+// ends soon, with a result of no use.
 [[nodiscard]] Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
                                   const PhotonGrid& grid, const std::vector<Material>& materials,
                                   const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,

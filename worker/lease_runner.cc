@@ -137,9 +137,9 @@ void LeaseRunner::ComputeStage() {
   while (auto fetched = fetched_.Take()) {
     const LentBatch& batch = fetched->held->batch;
     const Duration cpu_before = ProcessCpuTime();
-    StatusOr<Accumulation> accumulation =
-        fetched->tracer->Run(batch.settings, batch.pass, batch.first_photon, batch.last_photon,
-                             *fetched->block, fetched->radii, fetched->held->is_revoked);
+    StatusOr<Accumulation> accumulation = fetched->tracer->Run(
+        batch.settings, batch.needs, batch.pass, batch.first_photon, batch.last_photon,
+        *fetched->block, fetched->radii, fetched->held->is_revoked);
     if (!accumulation.ok()) {
       Release(*fetched->held, accumulation.status());
       continue;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 
 namespace lucerna {
 namespace {
@@ -13,9 +12,8 @@ constexpr double kFewestCells = 4096;
 
 }  // namespace
 
-PhotonGrid::PhotonGrid(const std::vector<std::vector<Deposit>>& deposits,
-                       const std::vector<std::vector<float>>& traces, const Bounds& region,
-                       float cell, ThreadTeam& team)
+PhotonGrid::PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& region, float cell,
+                       ThreadTeam& team)
     : low_(region.low) {
   std::size_t count = 0;
   std::vector<std::size_t> start;  // of each chunk in the input order
@@ -55,7 +53,7 @@ PhotonGrid::PhotonGrid(const std::vector<std::vector<Deposit>>& deposits,
       counts[group].assign(cells, 0);
       for (std::size_t c = chunk_of_group(group); c < chunk_of_group(group + 1); ++c) {
         std::size_t out = start[c];
-        for (const Deposit& deposit : deposits[c]) {
+        for (const Deposit& deposit : deposits[c].rows) {
           const Vec3 offset = deposit.position - low_;
           const std::size_t number =
               (static_cast<std::size_t>(CellOf(offset.z, nz_)) * static_cast<std::size_t>(ny_) +
@@ -84,29 +82,36 @@ PhotonGrid::PhotonGrid(const std::vector<std::vector<Deposit>>& deposits,
   y_.assign(count + 8, HUGE_VALF);
   z_.assign(count + 8, HUGE_VALF);
   records_.resize(count);
-  const auto place_all = [&](auto with_traces) {
-    team.For(groups, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t group = begin; group < end; ++group) {
-        for (std::size_t c = chunk_of_group(group); c < chunk_of_group(group + 1); ++c) {
-          for (std::size_t i = 0; i < deposits[c].size(); ++i) {
-            const Deposit& deposit = deposits[c][i];
-            const std::size_t out = counts[group][cell_of[start[c] + i]]++;
-            x_[out] = deposit.position.x;
-            y_[out] = deposit.position.y;
-            z_[out] = deposit.position.z;
-            records_[out] = {deposit.flux, deposit.normal, deposit.arrival_oct, deposit.key};
-            if constexpr (decltype(with_traces)::value) traces_[out] = traces[c][i];
-          }
-        }
-      }
-    });
+  const auto has = [&](auto Deposits::*column) {
+    return std::ranges::any_of(deposits, [&](const Deposits& d) { return !(d.*column).empty(); });
   };
-  if (traces.empty()) {
-    place_all(std::false_type{});
-  } else {
-    traces_.resize(count);
-    place_all(std::true_type{});
-  }
+  if (has(&Deposits::normals)) normals_.resize(count);
+  if (has(&Deposits::arrivals_oct)) arrivals_oct_.resize(count);
+  if (has(&Deposits::traces)) traces_.resize(count);
+  team.For(groups, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t group = begin; group < end; ++group) {
+      for (std::size_t c = chunk_of_group(group); c < chunk_of_group(group + 1); ++c) {
+        const Deposits& chunk = deposits[c];
+        std::uint32_t* const place = &cell_of[start[c]];
+        // From here on the cell of a deposit is its place.
+        for (std::size_t i = 0; i < chunk.size(); ++i) {
+          const Deposit& deposit = chunk.rows[i];
+          const std::size_t out = place[i] = counts[group][place[i]]++;
+          x_[out] = deposit.position.x;
+          y_[out] = deposit.position.y;
+          z_[out] = deposit.position.z;
+          records_[out] = {deposit.flux, deposit.key};
+        }
+        const auto put = [&](const auto& column, auto& sorted) {
+          for (std::size_t i = 0; i < column.size(); ++i)
+            sorted[place[i]] = column[i];
+        };
+        put(chunk.normals, normals_);
+        put(chunk.arrivals_oct, arrivals_oct_);
+        put(chunk.traces, traces_);
+      }
+    }
+  });
 }
 
 }  // namespace lucerna

@@ -15,27 +15,29 @@
 
 namespace lucerna {
 
-// What a photon brings once it is known to be near: 32 bytes, half a cache line.
-struct alignas(32) PhotonRecord {
+// What every photon brings once it is known to be near.
+struct alignas(16) PhotonRecord {
   Rgb flux;
-  Vec3 normal;
-  std::uint32_t arrival_oct = 0;
   std::uint32_t key = 0;
 };
 
 class PhotonGrid {
  public:
-  // `region` holds all deposits. Cells are about `cell` wide [scene units], wider when there would
-  // be far more of them than deposits. `traces` are the deposits' spectral traces, chunk by chunk;
-  // empty when the job has no frequency photons.
-  PhotonGrid(const std::vector<std::vector<Deposit>>& deposits,
-             const std::vector<std::vector<float>>& traces, const Bounds& region, float cell,
+  // `region` holds all deposits, which come in chunks that have the same columns. Cells are about
+  // `cell` wide [scene units], wider when there would be far more of them than deposits.
+  PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& region, float cell,
              ThreadTeam& team);
 
   [[nodiscard]] std::size_t size() const { return records_.size(); }
   [[nodiscard]] const PhotonRecord& record(std::size_t photon) const { return records_[photon]; }
-  // The photon's spectral trace [1/length²]; below 0 for photons without a spectrum. Requires
-  // traces.
+  // Whether there are the columns of Deposits; without photons there are none.
+  [[nodiscard]] bool has_normals() const { return !normals_.empty(); }
+  [[nodiscard]] bool has_arrivals() const { return !arrivals_oct_.empty(); }
+  // See Deposits. Each requires that there is such a column.
+  [[nodiscard]] Vec3 normal(std::size_t photon) const { return normals_[photon]; }
+  [[nodiscard]] std::uint32_t arrival_oct(std::size_t photon) const {
+    return arrivals_oct_[photon];
+  }
   [[nodiscard]] float trace(std::size_t photon) const { return traces_[photon]; }
   [[nodiscard]] Vec3 position(std::size_t photon) const {
     return {x_[photon], y_[photon], z_[photon]};
@@ -57,7 +59,10 @@ class PhotonGrid {
   std::vector<std::uint32_t> first_;  // [cells + 1] photon of each cell
   std::vector<float> x_, y_, z_;      // [photons + 8], the rest far away
   std::vector<PhotonRecord> records_;
-  std::vector<float> traces_;  // [photons] or empty
+  // [photons] or empty.
+  std::vector<Vec3> normals_;
+  std::vector<std::uint32_t> arrivals_oct_;
+  std::vector<float> traces_;
 };
 
 }  // namespace lucerna

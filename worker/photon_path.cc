@@ -39,6 +39,12 @@ std::int64_t WholeUnits(float energy) {
   return static_cast<std::int64_t>(std::min(kLargestEnergy, energy + 0.5F));
 }
 
+template <bool kNormals, bool kDirections>
+void KeepColumns(Deposits& deposits, const SurfacePoint& surface, Vec3 wo) {
+  if constexpr (kNormals) deposits.normals.push_back(FaceForward(surface.geometric_normal, wo));
+  if constexpr (kDirections) deposits.arrivals_oct.push_back(EncodeOctahedral(wo));
+}
+
 // Sees nothing, for photons that nobody asks about.
 struct NoWatcher {
   void Emitted(const Emission& /*emission*/) const {}
@@ -108,7 +114,10 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       spectra_(spectra),
       region_(region),
       scale_(FluxScale::ForPower(lights.TotalPower())),
-      walk_(WalkPartsOf(needs, settings)) {
+      walk_(WalkPartsOf(needs)),
+      keep_(needs.Uses(Part::kPhotonDirections) ? KeepColumns<true, true>
+            : needs.Uses(Part::kPhotonNormals)  ? KeepColumns<true, false>
+                                                : KeepColumns<false, false>) {
   for (const Material& material : scene.materials) {
     gathers_.push_back(Gathers(material) ? 1 : 0);
   }
@@ -147,7 +156,7 @@ void PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index, Landed& la
     return name_if_dropped(WalkUnseen<true>(key, landed));
   }
   name_if_dropped(WalkUnseen<false>(key, landed));
-  landed.traces.resize(landed.deposits.size(), -1.0F);
+  landed.deposits.traces.resize(landed.deposits.size(), -1.0F);
 }
 
 PhotonHistory PhotonPathTracer::Replay(std::uint64_t pass, std::uint64_t index) const {
@@ -246,11 +255,10 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
       // replay it without them.
       const auto deposit_key = static_cast<std::uint32_t>(rng.Bits() >> 32);
       if (is_found) {
-        landed.deposits.push_back({surface.position, flux,
-                                   FaceForward(surface.geometric_normal, wo), EncodeOctahedral(wo),
-                                   deposit_key});
+        landed.deposits.rows.push_back({surface.position, flux, deposit_key});
+        keep_(landed.deposits, surface, wo);
         if constexpr (kParts.spectrum) {
-          landed.traces.push_back(spectra_->Received(spectrum, surface, material, wo));
+          landed.deposits.traces.push_back(spectra_->Received(spectrum, surface, material, wo));
         }
       }
     }

@@ -30,10 +30,20 @@ namespace lucerna {
 // One photon landing on one surface.
 struct Deposit {
   Vec3 position;
-  Rgb flux;                   // [W] of all photons of a pass together
-  Vec3 normal;                // geometric, on the side that the photon came from
-  std::uint32_t arrival_oct;  // direction back to where it came from, octahedral
-  std::uint32_t key;          // random bits that belong to this deposit
+  Rgb flux;           // [W] of all photons of a pass together
+  std::uint32_t key;  // random bits that belong to this deposit
+};
+
+// Deposits as columns, of which a job has those that it needs.
+struct Deposits {
+  std::vector<Deposit> rows;
+  // Each [rows] or empty.
+  std::vector<Vec3> normals;                // geometric, on the side that the photon came from
+  std::vector<std::uint32_t> arrivals_oct;  // directions back to where it came from, octahedral
+  // Spectral traces [1/length²], below 0 for photons without a spectrum.
+  std::vector<float> traces;
+
+  [[nodiscard]] std::size_t size() const { return rows.size(); }
 };
 
 // Why a photon's walk is over.
@@ -85,10 +95,7 @@ class PhotonPathTracer {
 
   // What the photons of a range left.
   struct Landed {
-    std::vector<Deposit> deposits;
-    // [deposits] the spectral trace of each [1/length²], below 0 for photons without a spectrum;
-    // empty unless the job traces frequency photons.
-    std::vector<float> traces;
+    Deposits deposits;
     std::uint64_t rays = 0;
     // Photons given up because a number was not finite, and the first kDroppedNamed of them by
     // index, when photons are traced in order of their indices.
@@ -139,6 +146,9 @@ class PhotonPathTracer {
   FluxScale scale_;
   float energy_per_watt_ = 1;
   std::size_t walk_ = 0;  // see WalkPartsOf
+  // Adds to the columns that the job has beside those of every job.
+  using KeepFunction = void (*)(Deposits& deposits, const SurfacePoint& surface, Vec3 wo);
+  KeepFunction keep_;
 };
 
 }  // namespace lucerna

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "render/estimate/kernel.h"
-#include "render/geometry/mesh_edges.h"
 #include "render/geometry/surface_uv.h"
+#include "render/scene/mesh_edges.h"
 
 namespace lucerna {
 namespace {
@@ -54,7 +54,12 @@ SpectrumTracer::SpectrumTracer(const Scene& scene, const RenderSettings& setting
       limits_(SpectrumLimits::ForDiagonal(static_cast<double>(bounds.Diagonal()))),
       edge_strength_(EdgeStrength(settings.bias, Kernel{settings.kernel}.Moments().mu2)),
       reach_(ReachOf(scene, settings, bounds)),
-      curvature_(scene, [&](const Material&) { return needs.Uses(Part::kCurvature); }) {
+      curvature_(
+          scene, [&](const Material&) { return needs.Uses(Part::kCurvature); },
+          [&](const Material& material) {
+            // Only mirrors and glass ask for it (BendAt).
+            return needs.Uses(Part::kCurvedMirrors) && material.kind != Material::Kind::kDiffuse;
+          }) {
   if (needs.Uses(Part::kTextureDetail)) texture_details_ = TextureDetails(scene.textures);
   if (needs.Uses(Part::kSkyDetail)) {
     for (const EnvironmentMap& sky : lights.environments())
@@ -176,7 +181,7 @@ float SpectrumTracer::Received(const Carried& carried, const SurfacePoint& surfa
 
 double SpectrumTracer::TextureDetailAt(const SurfacePoint& surface,
                                        const Material& material) const {
-  if (material.texture == kNoTexture) return 0;
+  if (material.texture == kNoTexture || texture_details_.empty()) return 0;
   const TextureDetail& detail = texture_details_[static_cast<std::size_t>(material.texture)];
   const UvSlopes slopes = UvSlopesAt(scene_, surface);
   return detail.u * slopes.u + detail.v * slopes.v;

@@ -141,7 +141,8 @@ v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing,
 }  // namespace
 
 StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& settings,
-                                       std::uint64_t pass, std::uint64_t index) {
+                                       const SceneNeeds& needs, std::uint64_t pass,
+                                       std::uint64_t index) {
   if (pass >= kMostPasses || index >= static_cast<std::uint64_t>(settings.photons_per_pass)) {
     return absl::OutOfRangeError(
         absl::StrCat("there is no photon ", pass, ":", index,
@@ -149,10 +150,9 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
                      settings.photons_per_pass - 1));
   }
   const Scene scene = InWorkingSpace(std::move(rec709));
-  LUCERNA_ASSIGN_OR_RETURN(const auto intersector, Intersector::Create(scene));
-  const LightSet lights(scene, *intersector);
-  const PhotonPathTracer tracer(scene, *intersector, lights, settings, NeedsOf(scene, settings),
-                                nullptr, Bounds());
+  LUCERNA_ASSIGN_OR_RETURN(const auto intersector, Intersector::Create(scene, needs.tree()));
+  const LightSet lights(scene, *intersector, needs);
+  const PhotonPathTracer tracer(scene, *intersector, lights, settings, needs, nullptr, Bounds());
   const PhotonHistory history = tracer.Replay(pass, index);
 
   v1::PhotonPath path;
@@ -185,12 +185,13 @@ StatusOr<v1::PhotonPath> Replay(const ReplayOptions& options) {
                      "\"; the photon would take another way, run the same build on both"));
   }
   LUCERNA_ASSIGN_OR_RETURN(const RenderSettings settings, FromProto(job.settings()));
+  LUCERNA_ASSIGN_OR_RETURN(const SceneNeeds needs, FromProto(job.needs()));
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest, FromProto(job.scene()));
   LUCERNA_ASSIGN_OR_RETURN(Scene scene,
                            FetchScene(manifest, [&](const Digest& digest, std::uint64_t max_bytes) {
                              return connection.Fetch(digest, max_bytes);
                            }));
-  return ReplayInScene(std::move(scene), settings, options.pass, options.index);
+  return ReplayInScene(std::move(scene), settings, needs, options.pass, options.index);
 }
 
 }  // namespace lucerna

@@ -11,6 +11,7 @@
 #include "proto/lucerna/v1/photons.pb.h"
 #include "render/base/clock.h"
 #include "render/base/status.h"
+#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 
@@ -32,6 +33,7 @@ struct ReplayOptions {
 
 // The same of a scene that is at hand, in Rec. 709.
 [[nodiscard]] StatusOr<v1::PhotonPath> ReplayInScene(Scene scene, const RenderSettings& settings,
-                                                     std::uint64_t pass, std::uint64_t index);
+                                                     const SceneNeeds& needs, std::uint64_t pass,
+                                                     std::uint64_t index);
 
 }  // namespace lucerna

@@ -51,8 +51,7 @@ StatusOr<std::shared_ptr<BatchTracer>> SceneCache::TracerFor(const SceneManifest
   while (tracers_.size() >= kTracersKept)
     tracers_.pop_back();
   LUCERNA_ASSIGN_OR_RETURN(Scene fetched, FetchScene(scene, fetch_));
-  LUCERNA_ASSIGN_OR_RETURN(std::shared_ptr<BatchTracer> tracer,
-                           BatchTracer::Create(std::move(fetched), threads_));
+  auto tracer = std::make_shared<BatchTracer>(std::move(fetched), threads_);
   tracers_.emplace_front(digest, tracer);
   return tracer;
 }

@@ -35,7 +35,7 @@ class SceneCache {
 
   SceneCache(int threads, Fetch fetch) : threads_(threads), fetch_(std::move(fetch)) {}
 
-  // Errors: what fetching, reading the scene or building the tracer said.
+  // Errors: what fetching or reading the scene said.
   [[nodiscard]] StatusOr<std::shared_ptr<BatchTracer>> TracerFor(const SceneManifest& scene);
   // Errors: what fetching said, INVALID_ARGUMENT for bytes that are no block.
   [[nodiscard]] StatusOr<std::shared_ptr<const HitpointBlock>> BlockFor(const Digest& digest,

@@ -16,7 +16,7 @@ constexpr double kWorker = 311;
 constexpr double kBlock = 6.5;
 constexpr double kGlossyBlock = 14;
 constexpr double kKeptBlock = 16;
-constexpr double kFirstHit = 20;
+constexpr double kFirstHit = 4;
 constexpr double kRadius = 2.5;
 constexpr double kOpenPasses = 2;
 
@@ -30,11 +30,8 @@ ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& setti
   const double block = needs.Uses(Part::kGlossy) ? kGlossyBlock : kBlock;
   const double sets = needs.eye_sample_sets();
   ExpectedCost cost;
-  cost.coordinator =
-      pixels * (kCoordinator + sizeof(std::int64_t) * kOpenPasses * columns +
-                sizeof(double) * numbers + sets * block +
-                kFirstHit * static_cast<double>(SetsOfFirstHits(needs.eye_sample_sets(),
-                                                                static_cast<std::size_t>(pixels))));
+  cost.coordinator = pixels * (kCoordinator + sizeof(std::int64_t) * kOpenPasses * columns +
+                               sizeof(double) * numbers + sets * (block + kFirstHit));
   cost.worker = pixels * (kWorker + sets * kKeptBlock);
   cost.first_pass_sent = pixels * (block + kRadius);
   cost.pass_sent = sets > 0 ? pixels * kRadius : cost.first_pass_sent;

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "render/geometry/curvature_change.h"
-#include "render/geometry/mesh_edges.h"
 #include "render/math/double3.h"
+#include "render/scene/mesh_edges.h"
 
 namespace lucerna {
 namespace {
@@ -166,8 +166,8 @@ struct Ring {
 
 }  // namespace
 
-SurfaceCurvature::SurfaceCurvature(const Scene& scene,
-                                   const std::function<bool(const Material&)>& is_wanted)
+SurfaceCurvature::SurfaceCurvature(const Scene& scene, const Choice& is_wanted,
+                                   const Choice& is_change_wanted)
     : scene_(scene) {
   first_.reserve(scene.meshes.size());
   for (const TriangleMesh& mesh : scene.meshes) {
@@ -177,11 +177,11 @@ SurfaceCurvature::SurfaceCurvature(const Scene& scene,
       continue;
     }
     first_.push_back(static_cast<std::int64_t>(bendings_.size()));
-    AddMesh(mesh);
+    AddMesh(mesh, is_change_wanted(material));
   }
 }
 
-void SurfaceCurvature::AddMesh(const TriangleMesh& mesh) {
+void SurfaceCurvature::AddMesh(const TriangleMesh& mesh, bool with_change) {
   const std::size_t count = mesh.indices.size() / 3;
   std::vector<Fit> fits;
   fits.reserve(count);
@@ -191,6 +191,18 @@ void SurfaceCurvature::AddMesh(const TriangleMesh& mesh) {
         {mesh.positions[corner[0]], mesh.positions[corner[1]], mesh.positions[corner[2]]},
         {mesh.normals[corner[0]], mesh.normals[corner[1]], mesh.normals[corner[2]]}));
   }
+
+  for (const Fit& fit : fits) {
+    Bending& bending = bendings_.emplace_back();
+    if (!fit.is_curved) continue;
+    bending.xx = static_cast<float>(fit.xx);
+    bending.yy = static_cast<float>(fit.yy);
+    bending.zz = static_cast<float>(fit.zz);
+    bending.xy = static_cast<float>(fit.xy);
+    bending.xz = static_cast<float>(fit.xz);
+    bending.yz = static_cast<float>(fit.yz);
+  }
+  if (!with_change) return;
 
   // Triangles that share an edge, with the same normals at its ends: across a crease there is no
   // derivative.
@@ -227,16 +239,10 @@ void SurfaceCurvature::AddMesh(const TriangleMesh& mesh) {
 
   const std::vector<CurvatureChange> changes =
       CurvatureChanges(mesh.positions, mesh.normals, corners, all_sides);
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < fits.size(); ++i) {
     const Fit& fit = fits[i];
-    Bending& bending = bendings_.emplace_back();
     if (!fit.is_curved) continue;
-    bending.xx = static_cast<float>(fit.xx);
-    bending.yy = static_cast<float>(fit.yy);
-    bending.zz = static_cast<float>(fit.zz);
-    bending.xy = static_cast<float>(fit.xy);
-    bending.xz = static_cast<float>(fit.xz);
-    bending.yz = static_cast<float>(fit.yz);
+    Bending& bending = bendings_[bendings_.size() - fits.size() + i];
     Change change;
     double length_sum = 0;
     double length_count = 0;

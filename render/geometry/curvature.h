@@ -32,10 +32,15 @@ struct NormalCurvature {
 
 class SurfaceCurvature {
  public:
+  // Of materials, which are asked for.
+  using Choice = std::function<bool(const Material&)>;
   // Prepares the meshes with vertex normals whose material is one that `is_wanted`; others count
-  // as flat. 32 bytes per triangle prepared. Keeps a reference to `scene`, which must outlive it
-  // and not change.
-  SurfaceCurvature(const Scene& scene, const std::function<bool(const Material&)>& is_wanted);
+  // as flat. Gradients, by far the most work, are 0 on meshes whose `is_change_wanted` is not.
+  // 32 bytes per triangle prepared. Keeps a reference to `scene`, which must outlive it and not
+  // change.
+  SurfaceCurvature(
+      const Scene& scene, const Choice& is_wanted,
+      const Choice& is_change_wanted = [](const Material&) { return true; });
 
   // `tangent` is unit and about perpendicular to the surface; only its part in the surface's plane
   // counts. Without one the mean curvature is returned. Threads: any.
@@ -52,7 +57,7 @@ class SurfaceCurvature {
     float gradient = 0, second_gradient = 0;
   };
 
-  void AddMesh(const TriangleMesh& mesh);
+  void AddMesh(const TriangleMesh& mesh, bool with_change);
   [[nodiscard]] const Bending* BendingAt(const SurfacePoint& point) const;
   [[nodiscard]] float SphereCurvature(const Sphere& sphere) const;
 

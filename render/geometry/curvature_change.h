@@ -20,8 +20,8 @@
 #include <span>
 #include <vector>
 
-#include "render/geometry/mesh_edges.h"
 #include "render/math/vector.h"
+#include "render/scene/mesh_edges.h"
 
 namespace lucerna {
 

@@ -1,7 +1,8 @@
 #include "render/geometry/intersector.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstring>
 
 #include <embree3/rtcore.h>
 
@@ -53,6 +54,32 @@ bool DiskRoot(const Disk& disk, Vec3 origin, Vec3 direction, float t_near, float
   if (!(t > t_near && t < t_far)) return false;
   const float squared = LengthSquared(origin + direction * t - disk.center);
   return squared <= disk.radius * disk.radius && squared >= disk.inner_radius * disk.inner_radius;
+}
+
+struct TriangleHit {
+  float t, u, v;
+};
+
+// Where a line meets the plane of a triangle, by volumes (Möller and Trumbore 1997), moved into the
+// triangle.
+TriangleHit HitTriangle(const std::array<Vec3, 3>& corners, const Ray& ray) {
+  const Double3 p0(corners[0]);
+  const Double3 e1 = Double3(corners[1]) - p0;
+  const Double3 e2 = Double3(corners[2]) - p0;
+  const Double3 d(ray.direction);
+  const Double3 from = Double3(ray.origin) - p0;
+  const Double3 across = Cross(d, e2);
+  const double volume = Dot(across, e1);
+  const Double3 side = Cross(from, e1);
+  if (volume == 0) {
+    // Seen edge-on: anywhere on it will do.
+    const Double3 middle = (e1 + e2) * (1.0 / 3) - from;
+    return {static_cast<float>(std::max(0.0, Dot(middle, d))), 1.0F / 3, 1.0F / 3};
+  }
+  const double u = std::clamp(Dot(from, across) / volume, 0.0, 1.0);
+  const double v = std::clamp(Dot(d, side) / volume, 0.0, 1 - u);
+  const double t = std::max(0.0, Dot(e2, side) / volume);
+  return {static_cast<float>(t), static_cast<float>(u), static_cast<float>(v)};
 }
 
 void SphereBounds(const RTCBoundsFunctionArguments* arguments) {
@@ -157,7 +184,15 @@ struct Intersector::EmbreeScene {
 Intersector::Intersector(const Scene& scene)
     : scene_(scene),
       embree_(std::make_unique<EmbreeScene>()),
-      sphere_geometry_(static_cast<std::uint32_t>(scene.meshes.size())) {}
+      sphere_geometry_(static_cast<std::uint32_t>(scene.meshes.size())) {
+  std::uint32_t shapes = 0;
+  for (const TriangleMesh& mesh : scene.meshes) {
+    first_shape_.push_back(shapes);
+    shapes += static_cast<std::uint32_t>(mesh.indices.size() / 3);
+  }
+  first_shape_.push_back(shapes);
+  first_shape_.push_back(shapes + static_cast<std::uint32_t>(scene.spheres.size()));
+}
 
 Intersector::~Intersector() = default;
 
@@ -250,6 +285,32 @@ bool Intersector::Occluded(const Ray& ray) const {
   rtcInitIntersectContext(&context);
   rtcOccluded1(embree_->scene, &context, &embree_ray);
   return embree_ray.tfar < 0;
+}
+
+std::uint32_t Intersector::ShapeOf(const Hit& hit) const {
+  return first_shape_[hit.geometry] + hit.primitive;
+}
+
+Hit Intersector::HitOn(std::uint32_t shape, const Ray& ray) const {
+  const auto next = std::upper_bound(first_shape_.begin(), first_shape_.end(), shape);
+  const auto geometry = static_cast<std::uint32_t>(next - first_shape_.begin() - 1);
+  const std::uint32_t primitive = shape - first_shape_[geometry];
+  Hit hit{.geometry = geometry, .primitive = primitive};
+  if (geometry == sphere_geometry_) {
+    // As Embree was told: the same bits.
+    SphereRoot(scene_.spheres[primitive], ray.origin, ray.direction, 0, ray.t_max, hit.t);
+  } else if (geometry > sphere_geometry_) {
+    DiskRoot(scene_.disks[primitive], ray.origin, ray.direction, 0, ray.t_max, hit.t);
+  } else {
+    const TriangleMesh& mesh = scene_.meshes[geometry];
+    const std::uint32_t* corner = &mesh.indices[std::size_t{3} * primitive];
+    const TriangleHit at = HitTriangle(
+        {mesh.positions[corner[0]], mesh.positions[corner[1]], mesh.positions[corner[2]]}, ray);
+    hit.t = at.t;
+    hit.u = at.u;
+    hit.v = at.v;
+  }
+  return hit;
 }
 
 SurfacePoint Intersector::SurfaceAt(const Ray& ray, const Hit& hit) const {

@@ -27,6 +27,9 @@ struct Ray {
 // two units in the last place; four leave room for Embree's own rounding.
 inline constexpr float kClearance = 0x1p-22F;
 
+// In place of a shape's number where a ray meets nothing.
+inline constexpr std::uint32_t kNoShape = UINT32_MAX;
+
 // Geometry numbers: meshes in scene order, then one for all spheres, then one for all disks.
 struct Hit {
   float t = 0;
@@ -55,11 +58,8 @@ class Intersector {
   // Keeps a reference to `scene`, which must outlive it and not change. Hits do not depend on
   // whether triangles are split.
   // Errors: RESOURCE_EXHAUSTED or INTERNAL with Embree's words.
-  [[nodiscard]] static StatusOr<std::unique_ptr<Intersector>> Create(const Scene& scene) {
-    return Create(scene, TreeNeedsOf(scene));
-  }
   [[nodiscard]] static StatusOr<std::unique_ptr<Intersector>> Create(const Scene& scene,
-                                                                     TreeNeeds needs);
+                                                                     TreeNeeds needs = {});
   ~Intersector();
   Intersector(const Intersector&) = delete;
   Intersector& operator=(const Intersector&) = delete;
@@ -68,6 +68,12 @@ class Intersector {
   [[nodiscard]] bool Intersect(const Ray& ray, Hit& hit) const;
   // True when anything is met before ray.t_max. Threads: any.
   [[nodiscard]] bool Occluded(const Ray& ray) const;
+
+  // The number of the triangle, sphere or disk that was hit, among all of the scene.
+  [[nodiscard]] std::uint32_t ShapeOf(const Hit& hit) const;
+  // The hit of a ray with the one shape that it is known to meet first: computed from that alone.
+  // Where rounding has it just miss a triangle, the hit is on its edge.
+  [[nodiscard]] Hit HitOn(std::uint32_t shape, const Ray& ray) const;
 
   [[nodiscard]] SurfacePoint SurfaceAt(const Ray& ray, const Hit& hit) const;
 
@@ -82,6 +88,7 @@ class Intersector {
   const Scene& scene_;
   std::unique_ptr<EmbreeScene> embree_;
   std::uint32_t sphere_geometry_;
+  std::vector<std::uint32_t> first_shape_;  // [geometries] ascending
   Bounds bounds_;
 };
 

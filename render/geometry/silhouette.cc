@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "render/geometry/embree_device.h"
-#include "render/geometry/mesh_edges.h"
 #include "render/math/double3.h"
+#include "render/scene/mesh_edges.h"
 
 namespace lucerna {
 namespace {

@@ -1,8 +1,10 @@
 #include "render/scene/needs.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
+#include <vector>
 
 #include "render/base/text.h"
 #include "render/math/double3.h"
@@ -11,32 +13,20 @@
 namespace lucerna {
 namespace {
 
-constexpr std::array<std::string_view, kParts> kNames = {"photons",
-                                                         "specular-surfaces",
-                                                         "glossy-hitpoints",
-                                                         "shading-normals",
-                                                         "textures",
-                                                         "round-shapes",
-                                                         "environment",
-                                                         "area-lights",
-                                                         "delta-lights",
-                                                         "lamps-facing-away",
-                                                         "direct-sampling",
-                                                         "photon-normals",
-                                                         "robust-rays",
-                                                         "split-triangles",
-                                                         "lens",
-                                                         "fresh-eye-paths",
-                                                         "frequency-photons",
-                                                         "occluder-edges",
-                                                         "curvature",
-                                                         "texture-detail",
-                                                         "sky-detail",
-                                                         "glossy-window",
-                                                         "motion",
-                                                         "media",
-                                                         "alpha-masks",
-                                                         "instances"};
+constexpr std::array<std::string_view, kParts> kNames = {"photons",          "specular-surfaces",
+                                                         "glossy-hitpoints", "shading-normals",
+                                                         "textures",         "round-shapes",
+                                                         "environment",      "area-lights",
+                                                         "delta-lights",     "unseen-lamps",
+                                                         "direct-sampling",  "photon-directions",
+                                                         "photon-normals",   "robust-rays",
+                                                         "split-triangles",  "lens",
+                                                         "fresh-eye-paths",  "frequency-photons",
+                                                         "occluder-edges",   "curvature",
+                                                         "curved-mirrors",   "texture-detail",
+                                                         "sky-detail",       "glossy-window",
+                                                         "motion",           "media",
+                                                         "alpha-masks",      "instances"};
 
 // Sets of eye paths: with fewer the edges of shapes would be seen not to be smooth.
 constexpr int kEyeSampleSets = 64;
@@ -74,6 +64,29 @@ const Material* FirstMaterial(const Scene& scene, const std::vector<std::uint8_t
   return nullptr;
 }
 
+// Curved surfaces that reflect or refract, however roughly.
+bool HasCurvedMirrors(const Scene& scene) {
+  const auto scatters = [&](const ShapeTraits& traits) {
+    return scene.materials[static_cast<std::size_t>(traits.material)].kind !=
+           Material::Kind::kDiffuse;
+  };
+  return std::ranges::any_of(scene.spheres,
+                             [&](const Sphere& sphere) { return scatters(sphere.traits); }) ||
+         std::ranges::any_of(scene.meshes, [&](const TriangleMesh& mesh) {
+           return !mesh.normals.empty() && scatters(mesh.traits);
+         });
+}
+
+std::size_t CountLights(const Scene& scene) {
+  const auto emitting = [](const auto& shapes) {
+    return static_cast<std::size_t>(std::ranges::count_if(
+        shapes, [](const auto& shape) { return shape.traits.area_light != kNoAreaLight; }));
+  };
+  return emitting(scene.meshes) + emitting(scene.spheres) + emitting(scene.disks) +
+         scene.point_lights.size() + scene.spot_lights.size() + scene.distant_lights.size() +
+         scene.infinite_lights.size();
+}
+
 // The faces of one-sided lamps that shine away from all there is.
 std::size_t FacesOfLampsFacingAway(const Scene& scene) {
   const Bounds box = BoundsOf(scene);
@@ -96,20 +109,76 @@ std::size_t FacesOfLampsFacingAway(const Scene& scene) {
   return count;
 }
 
-bool IsBlackDiffuse(const Material& material) {
-  return material.kind == Material::Kind::kDiffuse && material.texture == kNoTexture &&
-         IsBlack(material.reflectance);
+// Whether all gathering surfaces are pieces of one plane that everything else, the camera too, lies
+// in front of. Photons and eye paths then never come from behind them, and are all on one side.
+bool GathersOnOneFloor(const Scene& scene) {
+  const auto gathers = [&](const ShapeTraits& traits) {
+    return Gathers(scene.materials[static_cast<std::size_t>(traits.material)]);
+  };
+  for (const Sphere& sphere : scene.spheres) {
+    if (gathers(sphere.traits)) return false;
+  }
+  const Bounds box = BoundsOf(scene);
+  const double near = 1e-6 * static_cast<double>(std::max(MaxAbs(box.low), MaxAbs(box.high)));
+  bool has_floor = false;
+  Double3 origin;
+  Double3 up;  // unit
+  const auto lies_in_floor = [&](Vec3 point) {
+    return std::abs(Dot(Double3(point) - origin, up)) <= near;
+  };
+  // The first face is the floor; its winding does not tell which side is up.
+  const auto take_floor = [&](Vec3 point, Double3 normal) {
+    if (has_floor) return;
+    has_floor = true;
+    origin = Double3(point);
+    up = normal * (1 / Length(normal));
+  };
+  for (const TriangleMesh& mesh : scene.meshes) {
+    if (!gathers(mesh.traits)) continue;
+    for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+      const std::array<Vec3, 3> corners = {mesh.positions[mesh.indices[i]],
+                                           mesh.positions[mesh.indices[i + 1]],
+                                           mesh.positions[mesh.indices[i + 2]]};
+      take_floor(corners[0], TriangleCross(corners[0], corners[1], corners[2]));
+      if (!std::ranges::all_of(corners, lies_in_floor)) return false;
+    }
+  }
+  for (const Disk& disk : scene.disks) {
+    if (!gathers(disk.traits)) continue;
+    const Double3 normal(disk.normal);
+    take_floor(disk.center, normal);
+    // Tilted by less than what lifts its rim off the floor.
+    const double tilt = Length(Cross(normal, up));
+    if (!lies_in_floor(disk.center) || tilt * static_cast<double>(disk.radius) > near) return false;
+  }
+  if (!has_floor) return false;
+  const Vec3 eye = scene.camera.camera_to_world.Point({});
+  if (Dot(Double3(eye) - origin, up) < 0) up = up * -1;
+  if (!(Dot(Double3(eye) - origin, up) > scene.camera.lens_radius + near)) return false;
+  const auto lies_in_front = [&](Vec3 point, double radius) {
+    return Dot(Double3(point) - origin, up) >= radius - near;
+  };
+  return std::ranges::all_of(scene.meshes,
+                             [&](const TriangleMesh& mesh) {
+                               return std::ranges::all_of(mesh.positions, [&](Vec3 point) {
+                                 return lies_in_front(point, 0);
+                               });
+                             }) &&
+         std::ranges::all_of(scene.spheres,
+                             [&](const Sphere& sphere) {
+                               return lies_in_front(sphere.center,
+                                                    static_cast<double>(sphere.radius));
+                             }) &&
+         std::ranges::all_of(scene.disks, [&](const Disk& disk) {
+           const double lean = Length(Cross(Double3(disk.normal), up));
+           return lies_in_front(disk.center, lean * static_cast<double>(disk.radius));
+         });
 }
 
 }  // namespace
 
 std::string_view NameOf(Part part) {
   return kNames[static_cast<std::size_t>(part)];
-}
-
-TreeNeeds TreeNeedsOf(const Scene& scene) {
-  const std::size_t triangles = scene.TriangleCount();
-  return {.robust_rays = triangles > 0, .split_triangles = triangles >= kFewTriangles};
 }
 
 SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
@@ -167,10 +236,15 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
     needs.Set(Part::kRoundShapes, false, "everything is made of triangles");
   }
 
+  LightsLeftOut lights = FindLightsLeftOut(scene);
+  const LightNumbers numbers(scene);
   const bool has_sky = !scene.infinite_lights.empty();
-  needs.Set(Part::kEnvironment, has_sky,
-            has_sky ? Concat("infinite lights: ", scene.infinite_lights.size())
-                    : std::string("there is no infinite light"));
+  const bool is_sky_unseen =
+      has_sky && std::ranges::binary_search(lights.of_photons, numbers.infinite);
+  needs.Set(Part::kEnvironment, has_sky && !is_sky_unseen,
+            !has_sky        ? std::string("there is no infinite light")
+            : is_sky_unseen ? std::string("the camera's side of the scene is closed")
+                            : Concat("infinite lights: ", scene.infinite_lights.size()));
   const bool has_area = !scene.area_lights.empty();
   needs.Set(Part::kAreaLights, has_area,
             has_area ? Concat("shapes that emit, of kinds: ", scene.area_lights.size())
@@ -182,22 +256,44 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
                       : std::string("every light has an extent"));
 
   const std::size_t away = FacesOfLampsFacingAway(scene);
-  needs.Set(Part::kLampsFacingAway, false,
-            away > 0 ? Concat("faces of lamps that nothing lies in front of: ", away)
-                     : std::string("every face of a lamp has something in front of it"));
-  needs.Set(Part::kDirectSampling, gathers != nullptr,
-            gathers != nullptr ? "direct light is sampled at hitpoints; photons would be noisier"
-                               : "no surface gathers light");
-  needs.Set(Part::kPhotonNormals, gathers != nullptr,
-            gathers != nullptr ? "hitpoints must not take photons from a thin wall's other side"
-                               : "no surface gathers light");
+  std::string unseen;
+  if (!lights.of_photons.empty()) {
+    unseen =
+        Concat("lights that closed walls keep from the camera's side: ", lights.of_photons.size());
+  }
+  if (away > 0) {
+    unseen +=
+        Concat(unseen.empty() ? "" : "; ", "faces of lamps that nothing lies in front of: ", away);
+  }
+  needs.Set(Part::kUnseenLamps, false,
+            unseen.empty() ? "every light may reach what the camera sees" : unseen);
+
+  const bool is_lit = FirstMaterial(scene, in_use, ScattersBroadly) != nullptr;
+  const std::size_t sampled =
+      CountLights(scene) - lights.of_photons.size() - lights.of_sampling.size();
+  needs.Set(
+      Part::kDirectSampling, is_lit && sampled > 0,
+      !is_lit ? std::string("no surface scatters light broadly")
+      : sampled == 0
+          ? std::string("smooth surfaces shut every light in: all light comes by photons")
+      : lights.of_sampling.empty()
+          ? std::string("direct light is sampled; photons would be noisier")
+          : Concat("direct light is sampled, but not of lights that smooth surfaces shut in: ",
+                   lights.of_sampling.size()));
+  needs.Set(Part::kPhotonDirections, glossy != nullptr,
+            glossy != nullptr ? "glossy hitpoints ask where light comes from"
+                              : "all hitpoints are diffuse");
+  const bool is_one_floor = glossy == nullptr && GathersOnOneFloor(scene);
+  needs.Set(Part::kPhotonNormals, gathers != nullptr && !is_one_floor,
+            gathers == nullptr ? "no surface gathers light"
+            : is_one_floor     ? "all hitpoints lie on one side of one plane"
+                               : "hitpoints must not take photons from another surface");
   const std::size_t triangles = scene.TriangleCount();
-  const TreeNeeds tree = TreeNeedsOf(scene);
-  needs.Set(Part::kRobustRays, tree.robust_rays,
-            tree.robust_rays ? "rays must not slip between the triangles of a closed shape"
-                             : "there are no triangles");
-  needs.Set(Part::kSplitTriangles, tree.split_triangles,
-            tree.split_triangles
+  needs.Set(Part::kRobustRays, triangles > 0,
+            triangles > 0 ? "rays must not slip between the triangles of a closed shape"
+                          : "there are no triangles");
+  needs.Set(Part::kSplitTriangles, triangles >= kFewTriangles,
+            triangles >= kFewTriangles
                 ? Concat("rays get through ", triangles, " triangles faster")
                 : Concat("there is little to gain with so few triangles as ", triangles));
 
@@ -206,9 +302,7 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
 
   const std::int64_t pixels =
       std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()};
-  if (settings.use_everything) {
-    needs.Set(Part::kFreshEyePaths, true, "everything is forced on");
-  } else if (has_lens) {
+  if (has_lens) {
     needs.Set(Part::kFreshEyePaths, true, "the camera has a lens");
   } else if (specular != nullptr) {
     needs.Set(Part::kFreshEyePaths, true,
@@ -238,6 +332,8 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
                      "shapes cast shadows on each other", "a single face shadows nothing");
   set_frequency_part(Part::kCurvature, smoothed > 0 || !scene.spheres.empty(),
                      "there are curved surfaces", "every surface is flat");
+  set_frequency_part(Part::kCurvedMirrors, HasCurvedMirrors(scene), "mirrors or glass are curved",
+                     "every mirror and all glass is flat");
   set_frequency_part(Part::kTextureDetail, textured != nullptr, "surfaces have textures",
                      "no surface has a texture");
   const bool has_map = std::ranges::any_of(scene.infinite_lights,
@@ -252,6 +348,26 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
   needs.Set(Part::kAlphaMasks, false, "alpha masks are not read");
   needs.Set(Part::kInstances, false,
             "instances are written out as shapes of their own: one level of acceleration");
+
+  needs.lights_ = std::move(lights);
+  if (settings.use_everything) {
+    constexpr std::array kForced = {
+        Part::kSpecular,    Part::kGlossy,         Part::kShadingNormals,   Part::kTextures,
+        Part::kUnseenLamps, Part::kDirectSampling, Part::kPhotonDirections, Part::kPhotonNormals,
+        Part::kRobustRays,  Part::kSplitTriangles, Part::kFreshEyePaths};
+    constexpr std::array kForcedWithFrequency = {Part::kOccluderEdges, Part::kCurvature,
+                                                 Part::kCurvedMirrors, Part::kTextureDetail,
+                                                 Part::kSkyDetail,     Part::kGlossyWindow};
+    const auto force = [&](const auto& parts) {
+      for (const Part part : parts) {
+        if (!needs.Uses(part)) needs.Set(part, true, "everything is forced on");
+      }
+    };
+    force(kForced);
+    if (frequency) force(kForcedWithFrequency);
+    needs.eye_sample_sets_ = 0;
+    needs.lights_ = {};
+  }
   return needs;
 }
 

@@ -1,9 +1,10 @@
 // What of the machine does this job use, and why?
 //
-// Derived once from the scene and the settings; everything downstream asks it. A part that is not
-// used costs nothing: no memory, no bytes on the wire, no branch in a loop over photons. With
-// `use_everything` all parts that can be forced are used, for comparison: the image is the same
-// within its noise, and to the bit where the arithmetic is the same.
+// Derived once from the scene and the settings, when a job is submitted; everything downstream asks
+// it, and workers are told of it with their leases. A part that is not used costs nothing: no
+// memory, no bytes on the wire, no branch in a loop over photons. With `use_everything` all parts
+// that the scene has not, but that could be asked for all the same, are used, for comparison: the
+// image is the same within its noise, and to the bit where the arithmetic is the same.
 #pragma once
 
 #include <array>
@@ -11,35 +12,39 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include "render/scene/enclosures.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
 
 enum class Part : std::uint8_t {
-  kPhotons,          // photon passes at all
-  kSpecular,         // eye and photon paths through smooth and nearly smooth surfaces
-  kGlossy,           // BSDF columns of hitpoints, arrival directions of photons
-  kShadingNormals,   // vertex normals, and the horizon they bend
-  kTextures,         // look-ups of materials
-  kRoundShapes,      // spheres and disks beside triangles
-  kEnvironment,      // sampling of the sky
-  kAreaLights,       // emission of shapes, and scattered rays that look for it
-  kDeltaLights,      // points, spots, parallel light
-  kLampsFacingAway,  // photons from faces of lamps that nothing lies in front of
-  kDirectSampling,   // direct light by samples, in place of photons
-  kPhotonNormals,    // what keeps photons on their side of a thin wall
-  kRobustRays,       // rays that do not slip through the edges of triangles
-  kSplitTriangles,   // a tree of higher build quality: large triangles are in it more than once
-  kLens,             // depth of field
-  kFreshEyePaths,    // new eye paths in every pass, in place of a cycle of sample sets
-  kFrequency,        // frequency photons
-  kOccluderEdges,    // edges that photons pass, for their shadows' borders
-  kCurvature,        // second-order states at curved mirrors and glass
-  kTextureDetail,    // the spectrum of textures
-  kSkyDetail,        // the spectrum of environment maps
-  kGlossyWindow,     // what a glossy lobe hides of the spectrum
+  kPhotons,           // photon passes at all
+  kSpecular,          // eye and photon paths through smooth and nearly smooth surfaces
+  kGlossy,            // BSDF columns of hitpoints
+  kShadingNormals,    // vertex normals, and the horizon they bend
+  kTextures,          // look-ups of materials
+  kRoundShapes,       // spheres and disks beside triangles
+  kEnvironment,       // sampling of the sky
+  kAreaLights,        // emission of shapes, and scattered rays that look for it
+  kDeltaLights,       // points, spots, parallel light
+  kUnseenLamps,       // photons whose light never comes to what the camera can see
+  kDirectSampling,    // direct light by samples, in place of photons
+  kPhotonDirections,  // where photons came from, for glossy hitpoints
+  kPhotonNormals,     // what keeps photons on their side of a thin wall
+  kRobustRays,        // rays that do not slip through the edges of triangles
+  kSplitTriangles,    // a tree of higher build quality: large triangles are in it more than once
+  kLens,              // depth of field
+  kFreshEyePaths,     // new eye paths in every pass, in place of a cycle of sample sets
+  kFrequency,         // frequency photons
+  kOccluderEdges,     // edges that photons pass, for their shadows' borders
+  kCurvature,         // the bend of surfaces that light falls on
+  kCurvedMirrors,     // second-order states at curved mirrors and glass
+  kTextureDetail,     // the spectrum of textures
+  kSkyDetail,         // the spectrum of environment maps
+  kGlossyWindow,      // what a glossy lobe hides of the spectrum
   kMotion,
   kMedia,
   kAlphaMasks,
@@ -57,8 +62,30 @@ inline constexpr std::size_t kParts = static_cast<std::size_t>(Part::kInstances)
 // As users are told: "shading-normals".
 [[nodiscard]] std::string_view NameOf(Part part);
 
+// Which tree rays are traced through.
+struct TreeNeeds {
+  bool robust_rays = true;
+  bool split_triangles = false;
+
+  bool operator==(const TreeNeeds&) const = default;
+};
+
 class SceneNeeds {
  public:
+  SceneNeeds() = default;
+  // As workers are told, without reasons: the parts that are used, bit by bit.
+  SceneNeeds(std::uint64_t parts, int eye_sample_sets, LightsLeftOut lights)
+      : eye_sample_sets_(eye_sample_sets), lights_(std::move(lights)) {
+    for (std::size_t i = 0; i < kParts; ++i)
+      entries_[i].is_used = (parts >> i & 1) != 0;
+  }
+  [[nodiscard]] std::uint64_t parts() const {
+    std::uint64_t parts = 0;
+    for (std::size_t i = 0; i < kParts; ++i)
+      parts |= static_cast<std::uint64_t>(entries_[i].is_used) << i;
+    return parts;
+  }
+
   [[nodiscard]] bool Uses(Part part) const { return entries_[Index(part)].is_used; }
   // A sentence: why it is used, or why not.
   [[nodiscard]] const std::string& ReasonOf(Part part) const {
@@ -67,6 +94,11 @@ class SceneNeeds {
 
   // How many sets of eye paths there are, used in turn; 0: each pass has its own.
   [[nodiscard]] int eye_sample_sets() const { return eye_sample_sets_; }
+  // None of those that Part::kUnseenLamps and Part::kDirectSampling speak of when they are forced.
+  [[nodiscard]] const LightsLeftOut& lights_left_out() const { return lights_; }
+  [[nodiscard]] TreeNeeds tree() const {
+    return {Uses(Part::kRobustRays), Uses(Part::kSplitTriangles)};
+  }
 
   bool operator==(const SceneNeeds&) const = default;
 
@@ -84,22 +116,14 @@ class SceneNeeds {
 
   std::array<Entry, kParts> entries_;
   int eye_sample_sets_ = 0;
+  LightsLeftOut lights_;
 };
 
 [[nodiscard]] SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings);
 
-// Which tree rays are traced through. Asked of the scene alone: a worker keeps it for all its jobs.
-struct TreeNeeds {
-  bool robust_rays = true;
-  bool split_triangles = false;
-};
-[[nodiscard]] TreeNeeds TreeNeedsOf(const Scene& scene);
-
 // Which of the walks compiled for eye paths and photons suits a job: bit 0 stands for textures,
 // bit 1 for shading normals, bit 2 for other scattering than diffuse.
-[[nodiscard]] inline std::size_t WalkPartsOf(const SceneNeeds& needs,
-                                             const RenderSettings& settings) {
-  if (settings.use_everything) return 7;
+[[nodiscard]] inline std::size_t WalkPartsOf(const SceneNeeds& needs) {
   return (needs.Uses(Part::kTextures) ? 1U : 0U) | (needs.Uses(Part::kShadingNormals) ? 2U : 0U) |
          (needs.Uses(Part::kSpecular) || needs.Uses(Part::kGlossy) ? 4U : 0U);
 }
@@ -113,14 +137,6 @@ inline constexpr std::uint64_t kRoundsOfSets = 16;
   if (sets == 0) return pass;
   const auto n = static_cast<std::uint64_t>(sets);
   return pass / (n * kRoundsOfSets) * n + pass % n;
-}
-
-// Of how many of the sets it is kept what the camera's rays meet: all for 256 x 256 pixels, fewer
-// for larger images, so that it takes 80 MiB at most.
-[[nodiscard]] constexpr std::size_t SetsOfFirstHits(int sets, std::size_t pixels) {
-  constexpr std::size_t kMostHits = std::size_t{1} << 22;
-  const std::size_t room = pixels == 0 ? 0 : kMostHits / pixels;
-  return room < static_cast<std::size_t>(sets) ? room : static_cast<std::size_t>(sets);
 }
 
 }  // namespace lucerna

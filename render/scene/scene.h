@@ -65,6 +65,17 @@ struct Material {
          material.alpha_v == 0;
 }
 
+// Black: nothing is scattered.
+[[nodiscard]] inline bool IsBlackDiffuse(const Material& material) {
+  return material.kind == Material::Kind::kDiffuse && material.texture == kNoTexture &&
+         IsBlack(material.reflectance);
+}
+
+// Where direct light may be sampled: light is scattered, and not into single directions.
+[[nodiscard]] inline bool ScattersBroadly(const Material& material) {
+  return !IsSmooth(material) && !IsBlackDiffuse(material);
+}
+
 // Rougher than this, photons are gathered; smoother, eye paths go on. A narrow lobe accepts few of
 // the photons around it, while a direction drawn from it is a good guess.
 inline constexpr float kGatherAlpha = 0.2F;

@@ -31,7 +31,10 @@ float OneMinusCosine(float sin2_max) {
 
 }  // namespace
 
-LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(scene) {
+LightSet::LightSet(const Scene& scene, const Intersector& intersector, const SceneNeeds& needs)
+    : scene_(scene), left_out_(needs.lights_left_out()) {
+  const LightNumbers numbers(scene);
+  const bool sends_unseen = needs.Uses(Part::kUnseenLamps);
   const Bounds& bounds = intersector.bounds();
   if (!bounds.empty()) {
     center_ = bounds.Center();
@@ -65,8 +68,10 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
       emitter.primitive = t;
       const Vec3 normal = TriangleNormal(p0, mesh.positions[corner[1]], mesh.positions[corner[2]]);
       // What nothing can receive is not sent.
-      if (!emitter.two_sided && FacesAway(p0, normal, bounds)) emitter.power = {};
-      Add(emitter);
+      if (!sends_unseen && !emitter.two_sided && FacesAway(p0, normal, bounds)) {
+        emitter.power = {};
+      }
+      Add(emitter, m);
     }
   }
   for (std::uint32_t i = 0; i < scene.spheres.size(); ++i) {
@@ -76,7 +81,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     Emitter emitter =
         area_emitter(Kind::kSphere, sphere.traits, 4 * kPi * sphere.radius * sphere.radius);
     emitter.primitive = i;
-    Add(emitter);
+    Add(emitter, numbers.spheres + i);
   }
   for (std::uint32_t i = 0; i < scene.disks.size(); ++i) {
     const Disk& disk = scene.disks[i];
@@ -86,8 +91,10 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
         area_emitter(Kind::kDisk, disk.traits,
                      kPi * (disk.radius * disk.radius - disk.inner_radius * disk.inner_radius));
     emitter.primitive = i;
-    if (!emitter.two_sided && FacesAway(disk.center, disk.normal, bounds)) emitter.power = {};
-    Add(emitter);
+    if (!sends_unseen && !emitter.two_sided && FacesAway(disk.center, disk.normal, bounds)) {
+      emitter.power = {};
+    }
+    Add(emitter, numbers.disks + i);
   }
   only_delta_ = emitters_.empty();
   for (std::uint32_t i = 0; i < scene.point_lights.size(); ++i) {
@@ -96,7 +103,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     emitter.primitive = i;
     emitter.radiance = scene.point_lights[i].intensity;
     emitter.power = emitter.radiance * (4 * kPi);
-    Add(emitter);
+    Add(emitter, numbers.points + i);
   }
   for (std::uint32_t i = 0; i < scene.spot_lights.size(); ++i) {
     const SpotLight& spot = scene.spot_lights[i];
@@ -109,7 +116,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
         emitter.radiance *
         (2 * kPi *
          ((1 - spot.cos_falloff_start) + 0.5F * (spot.cos_falloff_start - spot.cos_total_width)));
-    Add(emitter);
+    Add(emitter, numbers.spots + i);
   }
   for (std::uint32_t i = 0; i < scene.distant_lights.size(); ++i) {
     Emitter emitter;
@@ -117,7 +124,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     emitter.primitive = i;
     emitter.radiance = scene.distant_lights[i].irradiance;
     emitter.power = emitter.radiance * (kPi * radius_ * radius_);
-    Add(emitter);
+    Add(emitter, numbers.distant + i);
   }
   for (const InfiniteLight& light : scene.infinite_lights) {
     if (light.map == nullptr) {
@@ -134,7 +141,8 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     emitter.kind = Kind::kInfinite;
     emitter.radiance = infinite_radiance_;
     emitter.power = emitter.radiance * (4 * kPi * kPi * radius_ * radius_);
-    Add(emitter);
+    // Infinite lights are shut out together or not at all.
+    Add(emitter, numbers.infinite);
   }
   first_environment_ = emitters_.size();
   for (std::uint32_t i = 0; i < environments_.size(); ++i) {
@@ -144,7 +152,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector) : scene_(
     emitter.primitive = i;
     emitter.radiance = environments_[i].MeanRadiance();
     emitter.power = emitter.radiance * (4 * kPi * kPi * radius_ * radius_);
-    Add(emitter);
+    Add(emitter, numbers.infinite);
   }
 
   ShareOut();
@@ -158,10 +166,17 @@ void LightSet::ShareOut() {
   std::vector<double> light_power;
   std::vector<std::size_t> light_of;
   double total = 0;
+  double sampled_total = 0;
+  double sampled_lights = 0;
   for (std::size_t i = 0; i < emitters_.size(); ++i) {
     if (i == 0 || !is_same_light(emitters_[i - 1], emitters_[i])) light_power.push_back(0);
     const auto power = static_cast<double>(Luminance(emitters_[i].power));
     light_of.push_back(light_power.size() - 1);
+    // The first of a light's emitters that is sampled counts for it.
+    if (emitters_[i].is_sampled) {
+      sampled_total += power;
+      sampled_lights += light_power.back() == 0 ? 1 : 0;
+    }
     light_power.back() += power;
     total += power;
     total_power_ += emitters_[i].power;
@@ -173,15 +188,17 @@ void LightSet::ShareOut() {
   }
   faint_lights_ = static_cast<std::size_t>(std::ranges::count_if(
       light_power, [&](double power) { return power > 0 && power < kFaintShare * total; }));
-  const auto lights = static_cast<double>(
-      std::ranges::count_if(light_power, [](double power) { return power > 0; }));
   double sum = 0;
   double direct_sum = 0;
   for (std::size_t i = 0; i < emitters_.size(); ++i) {
     const auto power = static_cast<double>(Luminance(emitters_[i].power));
     const double choice = power / total;
-    const double even = power > 0 ? power / light_power[light_of[i]] / lights : 0;
-    const double direct_choice = choice + kEvenShare * (even - choice);
+    double direct_choice = 0;
+    if (emitters_[i].is_sampled) {
+      const double even = power / light_power[light_of[i]] / sampled_lights;
+      const double by_power = power / sampled_total;
+      direct_choice = by_power + kEvenShare * (even - by_power);
+    }
     sum += power;
     direct_sum += direct_choice;
     cumulative_.push_back(sum / total);
@@ -191,7 +208,10 @@ void LightSet::ShareOut() {
   }
 }
 
-void LightSet::Add(Emitter emitter) {
+void LightSet::Add(Emitter emitter, std::uint32_t number) {
+  if (std::ranges::binary_search(left_out_.of_photons, number)) emitter.power = {};
+  emitter.is_sampled =
+      Luminance(emitter.power) > 0 && !std::ranges::binary_search(left_out_.of_sampling, number);
   emitters_.push_back(emitter);
 }
 
@@ -325,7 +345,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
 
 bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
                             LightSample& sample) const {
-  if (emitters_.empty()) return false;
+  if (emitters_.empty() || direct_cumulative_.back() == 0) return false;
   const Emitter& emitter = Choose(direct_cumulative_, u_choice);
   switch (emitter.kind) {
     case Kind::kSphere: {

@@ -10,6 +10,7 @@
 #include "render/geometry/intersector.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
+#include "render/scene/needs.h"
 #include "render/scene/scene.h"
 #include "render/transport/environment_map.h"
 
@@ -38,6 +39,7 @@ struct Emitter {
   std::uint32_t geometry = 0;   // kTriangle: the mesh
   std::uint32_t primitive = 0;  // triangle, sphere, disk, or index among lights or maps
   bool two_sided = false;
+  bool is_sampled = true;  // for direct light
   float area = 0;
   float choice = 0;         // probability for a photon: its share of the power
   float direct_choice = 0;  // probability for direct light
@@ -57,8 +59,12 @@ struct LightSample {
 
 class LightSet {
  public:
-  // Keeps references to both.
-  LightSet(const Scene& scene, const Intersector& intersector);
+  // Keeps references to scene and intersector. Photons come from all lights, and direct light is
+  // drawn from all, but those that the job leaves out.
+  LightSet(const Scene& scene, const Intersector& intersector, const SceneNeeds& needs);
+  // Those of a job that leaves out only faces that nothing lies in front of.
+  LightSet(const Scene& scene, const Intersector& intersector)
+      : LightSet(scene, intersector, SceneNeeds()) {}
 
   [[nodiscard]] bool empty() const { return emitters_.empty(); }
   [[nodiscard]] const Emitter& emitter(std::uint32_t number) const { return emitters_[number]; }
@@ -97,7 +103,8 @@ class LightSet {
  private:
   using Kind = EmitterKind;
 
-  void Add(Emitter emitter);
+  // `number` is that of the light (LightNumbers).
+  void Add(Emitter emitter, std::uint32_t number);
   // Fills in the choices of all emitters.
   void ShareOut();
   [[nodiscard]] const Emitter& Choose(const std::vector<double>& cumulative, double u) const;
@@ -106,6 +113,7 @@ class LightSet {
                float& clearance) const;
 
   const Scene& scene_;
+  LightsLeftOut left_out_;
   Vec3 center_;
   float radius_ = 0;  // of the scene's bounding sphere
   std::vector<Emitter> emitters_;

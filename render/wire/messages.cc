@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 namespace lucerna {
 namespace {
@@ -10,6 +11,7 @@ namespace {
 constexpr int kLargestSide = 65'536;                      // [pixels]
 constexpr std::int64_t kMostPhotons = 1'000'000'000'000;  // per pass
 constexpr int kLargestDepth = 10'000;
+constexpr int kMostEyeSets = 65'536;
 constexpr std::int64_t kLongestSeconds = 9'000'000'000;  // fits in Duration
 constexpr std::int64_t kNanosPerSecond = 1'000'000'000;
 
@@ -214,6 +216,36 @@ StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message) {
   if (!IsBetween(settings.max_depth, 1, kLargestDepth)) return Outside("depth");
   settings.use_everything = message.use_everything();
   return settings;
+}
+
+v1::SceneNeeds ToProto(const SceneNeeds& needs) {
+  v1::SceneNeeds message;
+  message.set_parts(needs.parts());
+  message.set_eye_sample_sets(needs.eye_sample_sets());
+  const LightsLeftOut& lights = needs.lights_left_out();
+  message.mutable_lights_without_photons()->Assign(lights.of_photons.begin(),
+                                                   lights.of_photons.end());
+  message.mutable_lights_without_sampling()->Assign(lights.of_sampling.begin(),
+                                                    lights.of_sampling.end());
+  return message;
+}
+
+StatusOr<SceneNeeds> FromProto(const v1::SceneNeeds& message) {
+  if (message.parts() >> kParts != 0) {
+    return absl::InvalidArgumentError("the job needs parts that this program does not know");
+  }
+  if (!IsBetween(message.eye_sample_sets(), 0, kMostEyeSets)) {
+    return absl::InvalidArgumentError("the job has an impossible number of sets of eye paths");
+  }
+  LightsLeftOut lights;
+  lights.of_photons.assign(message.lights_without_photons().begin(),
+                           message.lights_without_photons().end());
+  lights.of_sampling.assign(message.lights_without_sampling().begin(),
+                            message.lights_without_sampling().end());
+  if (!std::ranges::is_sorted(lights.of_photons) || !std::ranges::is_sorted(lights.of_sampling)) {
+    return absl::InvalidArgumentError("the lights that a job leaves out are not in order");
+  }
+  return SceneNeeds(message.parts(), message.eye_sample_sets(), std::move(lights));
 }
 
 v1::Tally ToProto(const BatchTally& tally) {

@@ -9,6 +9,7 @@
 #include "render/base/clock.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
+#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 
@@ -25,6 +26,10 @@ namespace lucerna {
 
 [[nodiscard]] v1::RenderSettings ToProto(const RenderSettings& settings);
 [[nodiscard]] StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message);
+
+[[nodiscard]] v1::SceneNeeds ToProto(const SceneNeeds& needs);
+// Without reasons. Numbers of lights that the scene does not have say nothing.
+[[nodiscard]] StatusOr<SceneNeeds> FromProto(const v1::SceneNeeds& message);
 
 [[nodiscard]] v1::Tally ToProto(const BatchTally& tally);
 [[nodiscard]] BatchTally FromProto(const v1::Tally& message);

@@ -45,9 +45,10 @@ struct Bench {
     overrides.initial_radius = 0;
     overrides.max_depth = 32;
     settings = SettingsFor(scene, overrides);
-    intersector = Intersector::Create(scene).value();
-    lights = std::make_unique<LightSet>(scene, *intersector);
-    estimator = JobEstimator::Create(scene, settings, 1).value();
+    needs = NeedsOf(scene, settings);
+    intersector = Intersector::Create(scene, needs.tree()).value();
+    lights = std::make_unique<LightSet>(scene, *intersector, needs);
+    estimator = JobEstimator::Create(scene, settings, needs, 1).value();
     eye = estimator->TraceEyePaths(0);
     radii = estimator->Radii(eye);
     for (std::size_t row = 0; row < radii.size(); ++row) {
@@ -55,14 +56,14 @@ struct Bench {
       region.Add(eye.block.positions[row] - reach);
       region.Add(eye.block.positions[row] + reach);
     }
-    photons =
-        std::make_unique<PhotonPathTracer>(scene, *intersector, *lights, settings,
-                                           NeedsOf(scene, settings), nullptr, region);
+    photons = std::make_unique<PhotonPathTracer>(scene, *intersector, *lights, settings, needs,
+                                                 nullptr, region);
     scale = FluxScale::ForPower(lights->TotalPower());
   }
 
   Scene scene;
   RenderSettings settings;
+  SceneNeeds needs;
   std::unique_ptr<Intersector> intersector;
   std::unique_ptr<LightSet> lights;
   std::unique_ptr<JobEstimator> estimator;
@@ -80,7 +81,7 @@ void PhotonPaths(benchmark::State& state, const Bench& bench) {
   std::uint64_t deposits = 0;
   PhotonPathTracer::Landed landed;
   for (auto _ : state) {
-    landed.deposits.clear();
+    landed.deposits = {};
     for (int i = 0; i < 4096; ++i)
       bench.photons->Trace(0, index++, landed);
     deposits += landed.deposits.size();
@@ -147,8 +148,8 @@ void EyePaths(benchmark::State& state, const Bench& bench) {
   state.counters["rays/path"] = static_cast<double>(rays) / paths;
 }
 
-std::vector<std::vector<Deposit>> TraceDeposits(const Bench& bench, std::uint64_t photons) {
-  std::vector<std::vector<Deposit>> deposits;
+std::vector<Deposits> TraceDeposits(const Bench& bench, std::uint64_t photons) {
+  std::vector<Deposits> deposits;
   PhotonPathTracer::Landed landed;
   for (std::uint64_t index = 0; index < photons; ++index) {
     bench.photons->Trace(0, index, landed);
@@ -159,12 +160,12 @@ std::vector<std::vector<Deposit>> TraceDeposits(const Bench& bench, std::uint64_
   return deposits;
 }
 
-Accumulation GatherOnce(const Bench& bench, const std::vector<std::vector<Deposit>>& deposits,
+Accumulation GatherOnce(const Bench& bench, const std::vector<Deposits>& deposits,
                         ThreadTeam& team) {
   RadiusColumn sorted = bench.radii;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
                    sorted.end());
-  const PhotonGrid grid(deposits, {}, bench.region, 2 * sorted[sorted.size() / 2], team);
+  const PhotonGrid grid(deposits, bench.region, 2 * sorted[sorted.size() / 2], team);
   return Gather(bench.eye.block, bench.radii, grid, bench.scene.materials,
                 Kernel{bench.settings.kernel}, bench.scale, team, std::atomic<bool>(false));
 }
@@ -194,7 +195,8 @@ void Batch(benchmark::State& state, const Bench& bench, RadiusControllerKind con
   constexpr std::uint64_t kPhotons = 1 << 16;
   RenderSettings settings = bench.settings;
   settings.radius_controller = controller;
-  const auto tracer = BatchTracer::Create(bench.scene, 1).value();
+  BatchTracer tracer(bench.scene, 1);
+  const SceneNeeds needs = NeedsOf(bench.scene, settings);
   const std::atomic<bool> stop = false;
   // As many passes as it takes for evidence to come round.
   const std::uint64_t passes = UsesFrequency(controller) ? kFrequencyPeriod : 1;
@@ -203,7 +205,8 @@ void Batch(benchmark::State& state, const Bench& bench, RadiusControllerKind con
   for (auto _ : state) {
     for (std::uint64_t pass = 0; pass < passes; ++pass) {
       const Accumulation sums =
-          tracer->Run(settings, pass, 0, kPhotons, bench.eye.block, bench.radii, stop).value();
+          tracer.Run(settings, needs, pass, 0, kPhotons, bench.eye.block, bench.radii, stop)
+              .value();
       size_bytes += EncodeAccumulation(sums, bench.eye.block.size()).size();
       photons += kPhotons;
     }

@@ -283,11 +283,12 @@ class Check {
     overrides.bias = options.bias;
     overrides.frequency_share = 1;
     settings_ = SettingsFor(scene_, overrides);
-    intersector_ = Intersector::Create(scene_).value();
-    lights_ = std::make_unique<LightSet>(scene_, *intersector_);
-    spectra_ = SpectrumTracer::Create(scene_, settings_, NeedsOf(scene_, settings_), *intersector_,
-                                      *lights_)
-                   .value();
+    // With normals, which choose the photons here.
+    settings_.use_everything = true;
+    needs_ = NeedsOf(scene_, settings_);
+    intersector_ = Intersector::Create(scene_, needs_.tree()).value();
+    lights_ = std::make_unique<LightSet>(scene_, *intersector_, needs_);
+    spectra_ = SpectrumTracer::Create(scene_, settings_, needs_, *intersector_, *lights_).value();
   }
 
   void Run() {
@@ -299,21 +300,19 @@ class Check {
  private:
   // The deposits of one pass within `region`.
   PhotonGrid TracePass(std::uint64_t pass, const Bounds& region, const SpectrumTracer* spectra) {
-    const PhotonPathTracer tracer(scene_, *intersector_, *lights_, settings_,
-                                  NeedsOf(scene_, settings_), spectra, region);
+    const PhotonPathTracer tracer(scene_, *intersector_, *lights_, settings_, needs_, spectra,
+                                  region);
     const std::size_t chunks = kPhotonsPerPass / kPhotonsPerChunk;
-    std::vector<std::vector<Deposit>> deposits(chunks);
-    std::vector<std::vector<float>> traces(spectra == nullptr ? 0 : chunks);
+    std::vector<Deposits> deposits(chunks);
     team_.For(chunks, 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t chunk = begin; chunk < end; ++chunk) {
         PhotonPathTracer::Landed landed;
         for (std::uint64_t i = 0; i < kPhotonsPerChunk; ++i)
           tracer.Trace(pass, chunk * kPhotonsPerChunk + i, landed);
         deposits[chunk] = std::move(landed.deposits);
-        if (spectra != nullptr) traces[chunk] = std::move(landed.traces);
       }
     });
-    return {deposits, traces, region, static_cast<float>(options_.initial_radius / 2), team_};
+    return {deposits, region, static_cast<float>(options_.initial_radius / 2), team_};
   }
 
   // Calls visit(photon, squared distance) for the photons on the hitpoint's own surface.
@@ -321,7 +320,7 @@ class Check {
   static void ForEachNear(const PhotonGrid& grid, Vec3 position, Vec3 normal, double radius,
                           const Visitor& visit) {
     grid.ForEachWithin(position, static_cast<float>(radius), [&](std::size_t i, float squared) {
-      if (Dot(grid.record(i).normal, normal) < 0.7F) return;
+      if (Dot(grid.normal(i), normal) < 0.7F) return;
       visit(i, static_cast<double>(squared));
     });
   }
@@ -353,8 +352,10 @@ class Check {
   }
 
   void ChooseAndPredict() {
-    EyePass eye =
-        JobEstimator::Create(LoadScene(options_.scene), settings_, 0).value()->TraceEyePaths(0);
+    const Scene file = LoadScene(options_.scene);
+    EyePass eye = JobEstimator::Create(file, settings_, NeedsOf(file, settings_), 0)
+                      .value()
+                      ->TraceEyePaths(0);
     const std::size_t rows = eye.block.size();
     const auto reach = static_cast<float>(options_.initial_radius);
     Bounds region;
@@ -652,6 +653,7 @@ class Check {
   ClosedForm closed_form_;
   ThreadTeam team_;
   RenderSettings settings_;
+  SceneNeeds needs_;
   std::unique_ptr<Intersector> intersector_;
   std::unique_ptr<LightSet> lights_;
   std::unique_ptr<SpectrumTracer> spectra_;

@@ -7,6 +7,8 @@
 
 #include "render/image/image.h"
 #include "tests/support/local_render.h"
+#include "tests/support/measure.h"
+#include "tests/support/test_scenes.h"
 
 namespace lucerna {
 namespace {
@@ -35,6 +37,25 @@ INSTANTIATE_TEST_SUITE_P(Scenes, LeanTest,
                                          "lamp-in-glass.pbrt", "water-sun.pbrt", "water-lamp.pbrt",
                                          "textured.pbrt", "rough-metal.pbrt", "cardioid.pbrt",
                                          "furnace.pbrt"));
+
+// The light of a lamp next door, a hundred times as bright, never comes to the camera: with
+// photons from it as without them, and with them nearly all photons are spent in vain.
+TEST(ShutOutTest, LeavingOutALampNextDoorChangesNothingButNoise) {
+  Scene scene;
+  const std::int32_t wall = AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddBox(scene, {-1, -1, -1}, {1, 1, 1}, wall);
+  AddDisk(scene, {0, 0, 0.9F}, {0, 0, -1}, 0.4F, wall, AddAreaLight(scene, 1));
+  AddDisk(scene, {5, 0, 0.9F}, {0, 0, -1}, 0.4F, wall, AddAreaLight(scene, 100));
+  SetCamera(scene, {-0.9, -0.8, 0}, {0.5, 0.2, -0.3}, {0, 0, 1}, 60, 16);
+  RenderSettings settings = TestSettings(scene, 20000, 0.2, 8);
+  ASSERT_EQ(NeedsOf(scene, settings).lights_left_out().of_photons.size(), 1U);
+  const MeasuredMean lean = Measure(scene, settings, 8, 8, "G");
+  settings.use_everything = true;
+  const MeasuredMean full = Measure(scene, settings, 8, 8, "G");
+  EXPECT_LT(std::abs(lean.mean - full.mean),
+            StudentQuantile(1e-4, 8) * std::hypot(lean.standard_error, full.standard_error));
+  EXPECT_LT(lean.standard_error, full.standard_error);
+}
 
 // After 64 passes the sets of eye paths take turns; after 320 every one has been used five times.
 TEST(EyePathsInTurnTest, AgreeWithFreshOnesWithinTheNoise) {

@@ -27,8 +27,9 @@ T OrDie(StatusOr<T> value) {
 
 LocalRender::LocalRender(const Scene& scene, const RenderSettings& settings, int threads)
     : settings_(settings),
-      estimator_(OrDie(JobEstimator::Create(scene, settings, threads))),
-      tracer_(OrDie(BatchTracer::Create(scene, threads))) {
+      needs_(NeedsOf(scene, settings)),
+      estimator_(OrDie(JobEstimator::Create(scene, settings, needs_, threads))),
+      tracer_(std::make_unique<BatchTracer>(scene, threads)) {
   next_ = estimator_->TraceEyePaths(0);
   next_radii_ = estimator_->Radii(next_);
 }
@@ -45,7 +46,7 @@ void LocalRender::AddPass(int batches) {
     const auto b = static_cast<std::uint64_t>(batch);
     const auto n = static_cast<std::uint64_t>(batches);
     const Accumulation accumulation = OrDie(tracer_->Run(
-        settings_, pass_, photons * b / n, photons * (b + 1) / n, pass.block, radii, stop));
+        settings_, needs_, pass_, photons * b / n, photons * (b + 1) / n, pass.block, radii, stop));
     if (const Status added = sums.Add(accumulation); !added.ok()) Die(added);
   }
   estimator_->Apply(pass, radii, sums);

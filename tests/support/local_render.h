@@ -30,6 +30,7 @@ class LocalRender {
 
  private:
   RenderSettings settings_;
+  SceneNeeds needs_;
   std::unique_ptr<JobEstimator> estimator_;
   std::unique_ptr<BatchTracer> tracer_;
   // Radii lag by two passes: those of the next pass are taken before the current one is applied.

@@ -7,8 +7,8 @@
 
 #include "gtest/gtest.h"
 
-#include "render/estimate/evidence.h"
 #include "render/base/clock.h"
+#include "render/estimate/evidence.h"
 #include "render/math/octahedral.h"
 #include "tests/support/test_scenes.h"
 
@@ -51,8 +51,9 @@ struct Fixture {
   std::atomic<bool> stop = false;
 
   Accumulation Run(int threads, std::uint64_t pass, std::uint64_t first, std::uint64_t last) {
-    const auto tracer = BatchTracer::Create(scene, threads).value();
-    return tracer->Run(settings, pass, first, last, block, radii, stop).value();
+    BatchTracer tracer(scene, threads);
+    return tracer.Run(settings, NeedsOf(scene, settings), pass, first, last, block, radii, stop)
+        .value();
   }
 };
 
@@ -114,9 +115,10 @@ TEST(BatchTracerTest, TakesEmptyRangesAndBlocks) {
 
 TEST(BatchTracerTest, RefusesColumnsThatDoNotFit) {
   Fixture f;
-  const auto tracer = BatchTracer::Create(f.scene, 1).value();
+  BatchTracer tracer(f.scene, 1);
+  const SceneNeeds needs = NeedsOf(f.scene, f.settings);
   const auto code = [&](const HitpointBlock& block, const RadiusColumn& radii) {
-    return tracer->Run(f.settings, 0, 0, 10, block, radii, f.stop).status().code();
+    return tracer.Run(f.settings, needs, 0, 0, 10, block, radii, f.stop).status().code();
   };
   RadiusColumn radii = f.radii;
   radii.pop_back();
@@ -136,8 +138,9 @@ TEST(BatchTracerTest, RefusesColumnsThatDoNotFit) {
 TEST(BatchTracerTest, GivesUpWhenStoppedBeforeItStarts) {
   Fixture f;
   f.stop = true;
-  const auto tracer = BatchTracer::Create(f.scene, 2).value();
-  EXPECT_EQ(tracer->Run(f.settings, 0, 0, 20000, f.block, f.radii, f.stop).status().code(),
+  BatchTracer tracer(f.scene, 2);
+  const SceneNeeds needs = NeedsOf(f.scene, f.settings);
+  EXPECT_EQ(tracer.Run(f.settings, needs, 0, 0, 20000, f.block, f.radii, f.stop).status().code(),
             absl::StatusCode::kCancelled);
 }
 
@@ -147,13 +150,14 @@ TEST(BatchTracerTest, GivesUpSoonAlsoWhileHitpointsGather) {
   Fixture f;
   f.block = FloorBlock(300);
   f.radii.assign(f.block.size(), 4);
-  const auto tracer = BatchTracer::Create(f.scene, 2).value();
+  BatchTracer tracer(f.scene, 2);
+  const SceneNeeds needs = NeedsOf(f.scene, f.settings);
   std::thread stopper([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(400));
     f.stop = true;
   });
   const SteadyTime before = SystemClock().Steady();
-  const auto result = tracer->Run(f.settings, 0, 0, 20000, f.block, f.radii, f.stop);
+  const auto result = tracer.Run(f.settings, needs, 0, 0, 20000, f.block, f.radii, f.stop);
   const double waited_s = Seconds(SystemClock().Steady() - before);
   stopper.join();
   EXPECT_EQ(result.status().code(), absl::StatusCode::kCancelled);

@@ -20,8 +20,7 @@ namespace {
 
 // Photons of flux (1, 1, 1) on the plane z = 0 and one hitpoint of radius 0.5 at the origin.
 struct Cloud {
-  std::vector<std::vector<Deposit>> deposits{1};
-  std::vector<std::vector<float>> traces{1};
+  Deposits deposits;
   HitpointBlock block;
   RadiusColumn radii = {0.5F};
   Bounds region;
@@ -32,10 +31,10 @@ struct Cloud {
       const float x = 2 * rng.Uniform() - 1;
       const float y = 2 * rng.Uniform() - 1;
       const Vec3 up = {0, 0, 1};
-      deposits[0].push_back(
-          {{x, y, 0}, Gray(1), up, EncodeOctahedral(up), static_cast<std::uint32_t>(rng.Bits())});
+      deposits.rows.push_back({{x, y, 0}, Gray(1), static_cast<std::uint32_t>(rng.Bits())});
+      deposits.normals.push_back(up);
       // Three of four photons have no spectrum.
-      traces[0].push_back(i % 4 == 0 ? 10 * rng.Uniform() : -1.0F);
+      deposits.traces.push_back(i % 4 == 0 ? 10 * rng.Uniform() : -1.0F);
       region.Add({x, y, 0});
     }
     block.positions = {{0, 0, 0}};
@@ -44,7 +43,7 @@ struct Cloud {
 
   [[nodiscard]] Accumulation Sum(Evidence evidence) const {
     ThreadTeam team(1);
-    const PhotonGrid grid(deposits, traces, region, 0.3F, team);
+    const PhotonGrid grid({deposits}, region, 0.3F, team);
     const std::atomic<bool> stop = false;
     return Gather(block, radii, grid, {DiffuseMaterial(0.5F)}, Kernel{},
                   FluxScale::ForPower(Gray(1)), team, stop, evidence);
@@ -55,19 +54,22 @@ struct Cloud {
 // 2^62.
 TEST(EvidenceTest, HoldsTheSumOfSquaredTracesBelowItsEnd) {
   Cloud cloud(1);
-  cloud.deposits[0][0].position = {0, 0, 0};
-  cloud.deposits[0][0].flux = Gray(1e4F);
-  cloud.traces[0][0] = 1e30F;
+  cloud.deposits.rows[0].position = {0, 0, 0};
+  cloud.deposits.rows[0].flux = Gray(1e4F);
+  cloud.deposits.traces[0] = 1e30F;
   // Each term is 2^48: 2^14 of them are 2^62, to the unit, and one more changes nothing.
-  cloud.deposits[0].resize((1U << 14) - 1, cloud.deposits[0][0]);
-  cloud.traces[0].resize(cloud.deposits[0].size(), 1e30F);
+  const auto fill = [&](std::size_t count) {
+    cloud.deposits.rows.resize(count, cloud.deposits.rows[0]);
+    cloud.deposits.normals.resize(count, cloud.deposits.normals[0]);
+    cloud.deposits.traces.resize(count, 1e30F);
+  };
+  fill((1U << 14) - 1);
   const auto trace2 = [&] {
     return cloud.Sum(Evidence::kFrequency).evidence[kCommonColumns + kFrequencyTrace2][0];
   };
   EXPECT_EQ(trace2(), (std::int64_t{1} << 62) - (std::int64_t{1} << 48));
   for (int i = 0; i < 2; ++i) {
-    cloud.deposits[0].push_back(cloud.deposits[0][0]);
-    cloud.traces[0].push_back(1e30F);
+    fill(cloud.deposits.size() + 1);
     EXPECT_EQ(trace2(), std::int64_t{1} << 62);
   }
 }
@@ -93,10 +95,10 @@ TEST(EvidenceTest, FrequencyColumnsAreTheSumsTheySay) {
   double count = 0;
   double trace = 0;
   double trace2 = 0;
-  for (std::size_t i = 0; i < cloud.deposits[0].size(); ++i) {
-    const Vec3 p = cloud.deposits[0][i].position;
-    if (cloud.traces[0][i] < 0 || !(LengthSquared(p) < 0.25F)) continue;
-    const double x = static_cast<double>(cloud.traces[0][i] * 0.25F);
+  for (std::size_t i = 0; i < cloud.deposits.size(); ++i) {
+    const Vec3 p = cloud.deposits.rows[i].position;
+    if (cloud.deposits.traces[i] < 0 || !(LengthSquared(p) < 0.25F)) continue;
+    const double x = static_cast<double>(cloud.deposits.traces[i] * 0.25F);
     ++count;
     trace += x;
     trace2 += x * x;
@@ -119,7 +121,7 @@ TEST(EvidenceTest, CurvatureColumnsReachFurtherThanTheFluxDoes) {
   const float reach2 = 0.25F * kCurvatureReach * kCurvatureReach;
   double count = 0;
   double laplacian = 0;
-  for (const Deposit& deposit : cloud.deposits[0]) {
+  for (const Deposit& deposit : cloud.deposits.rows) {
     const float squared = LengthSquared(deposit.position);
     if (!(squared < reach2)) continue;
     ++count;

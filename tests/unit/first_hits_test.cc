@@ -21,7 +21,7 @@ TEST(FirstHitsTest, BelongToTheSetOfAPass) {
   FirstHitsOfSet* first = hits.Of(1);
   ASSERT_NE(first, nullptr);
   EXPECT_FALSE(first->is_known);
-  ASSERT_EQ(first->hits.size(), 10U);
+  ASSERT_EQ(first->shapes.size(), 10U);
   first->is_known = true;
   EXPECT_FALSE(hits.Of(2)->is_known);
   EXPECT_TRUE(hits.Of(1 + kSets)->is_known);
@@ -29,13 +29,8 @@ TEST(FirstHitsTest, BelongToTheSetOfAPass) {
   EXPECT_FALSE(hits.Of(1 + kNextRound)->is_known) << "new sets are drawn";
 }
 
-TEST(FirstHitsTest, AreNotKeptWhereEyePathsAreNewOrImagesLarge) {
+TEST(FirstHitsTest, AreNotKeptWhereEyePathsAreNew) {
   EXPECT_EQ(FirstHits(0, 10).Of(0), nullptr);
-  EXPECT_EQ(SetsOfFirstHits(64, 256 * 256), 64U);
-  FirstHits large(64, 512 * 512);
-  EXPECT_NE(large.Of(15), nullptr);
-  EXPECT_EQ(large.Of(16), nullptr);
-  EXPECT_EQ(FirstHits(64, std::size_t{1} << 28).Of(0), nullptr);
 }
 
 // A floor, seen in part, and a lamp.
@@ -50,8 +45,8 @@ Scene Floor() {
 TEST(FirstHitsTest, GiveThePassThatTracingGives) {
   const Scene scene = Floor();
   const RenderSettings settings = TestSettings(scene, 1000, 0.1, 8);
-  const auto fresh = JobEstimator::Create(scene, settings, 1).value();
-  const auto warm = JobEstimator::Create(scene, settings, 2).value();
+  const auto fresh = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 1).value();
+  const auto warm = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 2).value();
   const int sets = warm->needs().eye_sample_sets();
   ASSERT_GT(sets, 0);
   const EyePass before = warm->TraceEyePaths(0);
@@ -78,11 +73,11 @@ TEST(FirstHitsTest, AreWhatEyePathsGoBy) {
   const EyePathTracer tracer(scene, settings, needs, *intersector, lights);
   ThreadTeam team(1);
   FirstHitsOfSet known;
-  known.hits.resize(256);
+  known.shapes.resize(256);
   const EyePass traced = TraceHitpointPass(tracer, 0, &known, team);
   ASSERT_TRUE(known.is_known);
-  for (Hit& hit : known.hits)
-    hit.t = HUGE_VALF;
+  for (std::uint32_t& shape : known.shapes)
+    shape = kNoShape;
   EXPECT_FALSE(traced.pixels.empty());
   EXPECT_TRUE(TraceHitpointPass(tracer, 0, &known, team).pixels.empty());
 }

@@ -20,8 +20,30 @@
 namespace lucerna {
 namespace {
 
+// A deposit with all that it may have.
+struct Photon {
+  Vec3 position;
+  Rgb flux;
+  Vec3 normal;
+  std::uint32_t arrival_oct;
+  std::uint32_t key;
+};
+
+std::vector<Deposits> Columns(const std::vector<std::vector<Photon>>& chunks) {
+  std::vector<Deposits> columns;
+  for (const std::vector<Photon>& chunk : chunks) {
+    Deposits& deposits = columns.emplace_back();
+    for (const Photon& photon : chunk) {
+      deposits.rows.push_back({photon.position, photon.flux, photon.key});
+      deposits.normals.push_back(photon.normal);
+      deposits.arrivals_oct.push_back(photon.arrival_oct);
+    }
+  }
+  return columns;
+}
+
 struct Case {
-  std::vector<std::vector<Deposit>> deposits;
+  std::vector<std::vector<Photon>> deposits;
   HitpointBlock block;
   RadiusColumn radii;
   Bounds region;
@@ -46,7 +68,7 @@ Case RandomCase(int photons, int hitpoints, bool glossy, std::uint64_t key) {
   };
   out.deposits.resize(4);
   for (int i = 0; i < photons; ++i) {
-    Deposit deposit{};
+    Photon deposit{};
     deposit.position = point();
     deposit.flux = {rng.Uniform(), 1e-4F * rng.Uniform(), 10};
     deposit.normal = RandomDirection(rng);
@@ -71,7 +93,7 @@ Case RandomCase(int photons, int hitpoints, bool glossy, std::uint64_t key) {
 Accumulation GatherAll(const Case& input, const Kernel& kernel, const FluxScale& scale,
                        int threads) {
   ThreadTeam team(threads);
-  const PhotonGrid grid(input.deposits, {}, input.region, 0.02F, team);
+  const PhotonGrid grid(Columns(input.deposits), input.region, 0.02F, team);
   return Gather(input.block, input.radii, grid, input.materials, kernel, scale, team,
                 std::atomic<bool>(false));
 }
@@ -90,7 +112,7 @@ std::vector<std::array<std::int64_t, 4>> Oracle(const Case& input, const Kernel&
   for (const GlossyHitpoint& g : input.block.glossy)
     glossy[g.hitpoint] = &g;
   for (const auto& chunk : input.deposits) {
-    for (const Deposit& photon : chunk) {
+    for (const Photon& photon : chunk) {
       for (std::size_t row = 0; row < sums.size(); ++row) {
         const float radius = input.radii[row];
         const float squared = LengthSquared(photon.position - input.block.positions[row]);
@@ -158,7 +180,7 @@ TEST(GatherTest, LeavesOutWhatHasNoRoomAndCountsIt) {
   input.block.glossy = {{0, 1, EncodeOctahedral({0, 0, 1}), EncodeOctahedral({0, 0, 1})}};
   const FluxScale scale = FluxScale::ForPower(Gray(1));
   const auto add = [&](float flux) {
-    Deposit deposit{};
+    Photon deposit{};
     deposit.flux = {0, flux, 0};
     deposit.normal = {0, 0, 1};
     deposit.arrival_oct = EncodeOctahedral({0, 0, 1});
@@ -216,7 +238,7 @@ TEST(GatherTest, DoesNotSeeTheOrderOfPhotons) {
 TEST(GatherTest, TellsHollowCornersFromEdgesAndThinWalls) {
   const auto count = [](Vec3 photon_position, Vec3 photon_normal) {
     Case input;
-    Deposit deposit{};
+    Photon deposit{};
     deposit.position = photon_position;
     deposit.flux = Gray(1);
     deposit.normal = photon_normal;
@@ -232,6 +254,34 @@ TEST(GatherTest, TellsHollowCornersFromEdgesAndThinWalls) {
   EXPECT_EQ(count({0.1F, 0, -0.1F}, {1, 0, 0}), 0U) << "the side of a box under its top";
   EXPECT_EQ(count({0.1F, 0, 0.1F}, {1, 0, 0}), 0U) << "the back of a wall";
   EXPECT_EQ(count({0.1F, 0, -0.01F}, {0, 0, -1}), 0U) << "the far side of a thin floor";
+}
+
+// Photons without normals all count; that is right where none would have been refused.
+TEST(GatherTest, TakesEveryPhotonWithoutNormals) {
+  Case input = RandomCase(2000, 500, /*glossy=*/false, 7);
+  const FluxScale scale = FluxScale::ForPower(Gray(1));
+  const auto without = [&] {
+    std::vector<Deposits> columns = Columns(input.deposits);
+    for (Deposits& deposits : columns) {
+      deposits.normals.clear();
+      deposits.arrivals_oct.clear();
+    }
+    ThreadTeam team(1);
+    const PhotonGrid grid(columns, input.region, 0.02F, team);
+    EXPECT_FALSE(grid.has_normals());
+    return Gather(input.block, input.radii, grid, input.materials, Kernel{}, scale, team,
+                  std::atomic<bool>(false));
+  };
+  EXPECT_NE(without(), GatherAll(input, Kernel{}, scale, 1)) << "normals at random";
+  const Vec3 up = {0, 0, 1};
+  for (auto& chunk : input.deposits) {
+    for (Photon& photon : chunk)
+      photon.normal = up;
+  }
+  std::ranges::fill(input.block.normals_oct, EncodeOctahedral(up));
+  const Accumulation sum = without();
+  EXPECT_GT(sum.tally.pairs, 1000U);
+  EXPECT_EQ(sum, GatherAll(input, Kernel{}, scale, 1));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include "render/geometry/intersector.h"
 
 #include <cmath>
+#include <set>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -280,6 +281,68 @@ TEST(IntersectorTest, GivesTheSameHitsWhetherTrianglesAreSplitOrNot) {
     ASSERT_TRUE(a.t == b.t && a.u == b.u && a.v == b.v && a.primitive == b.primitive);
   }
   EXPECT_GT(met, 5000);
+}
+
+// A hit that is computed from the shape alone is the hit that tracing finds: of spheres and disks
+// to the bit, of triangles as near as float tells.
+TEST(IntersectorTest, FindsAHitAgainOnItsShape) {
+  KeyedRng rng(5);
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  for (int i = 0; i < 30; ++i) {
+    AddQuad(scene, RandomPoint(rng, 3), RandomDirection(rng), RandomDirection(rng), 0);
+    AddSphere(scene, RandomPoint(rng, 3), 0.4F, 0);
+    AddDisk(scene, RandomPoint(rng, 3), RandomDirection(rng), 0.5F, 0);
+  }
+  const auto intersector = Intersector::Create(scene).value();
+  std::set<std::uint32_t> shapes;
+  for (int i = 0; i < 20000; ++i) {
+    const Ray ray = {RandomPoint(rng, 4), RandomDirection(rng), HUGE_VALF};
+    Hit traced;
+    if (!intersector->Intersect(ray, traced)) continue;
+    const std::uint32_t shape = intersector->ShapeOf(traced);
+    shapes.insert(shape);
+    const Hit found = intersector->HitOn(shape, ray);
+    ASSERT_EQ(found.geometry, traced.geometry);
+    ASSERT_EQ(found.primitive, traced.primitive);
+    if (traced.geometry >= intersector->sphere_geometry()) {
+      ASSERT_EQ(found.t, traced.t);
+      continue;
+    }
+    // Seen edge-on a triangle tells less.
+    const Vec3 normal = intersector->SurfaceAt(ray, traced).geometric_normal;
+    const float slack = 2e-6F / std::max(1e-3F, std::abs(Dot(normal, ray.direction)));
+    ASSERT_NEAR(found.t, traced.t, 4 * slack);
+    ASSERT_NEAR(found.u, traced.u, slack * 10);
+    ASSERT_NEAR(found.v, traced.v, slack * 10);
+  }
+  EXPECT_EQ(shapes.size(), 120U) << "each has its number";
+  EXPECT_EQ(*shapes.rbegin(), 119U);
+}
+
+// Rays at the edges and corners of a triangle have their hit on it, whatever rounding says.
+TEST(IntersectorTest, KeepsHitsOnTheirTriangle) {
+  Scene scene;
+  AddQuad(scene, {0.1F, 0.2F, 3}, {0.7F, 0.1F, 0}, {0, 0.9F, 0.3F},
+          AddMaterial(scene, DiffuseMaterial(0.5F)));
+  const auto intersector = Intersector::Create(scene).value();
+  const TriangleMesh& mesh = scene.meshes[0];
+  KeyedRng rng(6);
+  for (int i = 0; i < 2000; ++i) {
+    const float along = i % 10 == 0 ? 0 : rng.Uniform();
+    const Vec3 target =
+        mesh.positions[mesh.indices[0]] * (1 - along) + mesh.positions[mesh.indices[1]] * along;
+    const Ray ray = {{0, 0, 0}, Normalize(target), HUGE_VALF};
+    const Hit hit = intersector->HitOn(0, ray);
+    ASSERT_GE(hit.u, 0);
+    ASSERT_GE(hit.v, 0);
+    ASSERT_LE(hit.u + hit.v, 1 + 1e-6F);
+    ASSERT_NEAR(hit.t, Length(target), 1e-5F);
+  }
+  // In the triangle's own plane.
+  const Hit edge_on =
+      intersector->HitOn(0, {mesh.positions[0], Normalize(Vec3{0.7F, 0.1F, 0}), HUGE_VALF});
+  EXPECT_TRUE(std::isfinite(edge_on.t) && edge_on.u >= 0 && edge_on.v >= 0);
 }
 
 TEST(IntersectorTest, GivesEveryThreadTheSameHits) {

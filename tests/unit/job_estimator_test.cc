@@ -48,8 +48,8 @@ TEST(JobEstimatorTest, GivesTheSameBitsForAnyThreadsAndBatches) {
 TEST(JobEstimatorTest, TracesTheEyePathsOfAPassAtAnyTime) {
   const Scene scene = Room();
   const RenderSettings settings = TestSettings(scene, 1000, 0.1, 8);
-  const auto early = JobEstimator::Create(scene, settings, 1).value();
-  const auto late = JobEstimator::Create(scene, settings, 3).value();
+  const auto early = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 1).value();
+  const auto late = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 3).value();
   for (int pass = 0; pass < 3; ++pass) {
     const EyePass now = late->TraceEyePaths(static_cast<std::uint64_t>(pass));
     late->Apply(now, late->Radii(now), PassSums(now.block.size(), kCommonColumns));
@@ -65,7 +65,8 @@ TEST(JobEstimatorTest, TracesTheEyePathsOfAPassAtAnyTime) {
 
 TEST(JobEstimatorTest, PutsHitpointsOnSurfacesWithEveryPixelAtMostOnce) {
   const Scene scene = Room();
-  const auto estimator = JobEstimator::Create(scene, TestSettings(scene, 1000, 0, 8), 2).value();
+  const RenderSettings settings = TestSettings(scene, 1000, 0, 8);
+  const auto estimator = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 2).value();
   const EyePass pass = estimator->TraceEyePaths(0);
   const RadiusColumn radii = estimator->Radii(pass);
   std::vector<int> hitpoints(32 * 32);

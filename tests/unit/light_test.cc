@@ -338,6 +338,48 @@ TEST(SampleDirectTest, FindsANearLampBesideAFarOneOfAllThePower) {
   EXPECT_NEAR(near, kSamples / 20, 5 * std::sqrt(kSamples / 20.0));
 }
 
+// What a job leaves out gets nothing, and the rest shares what there is.
+TEST(LightSetTest, LeavesOutWhatTheJobDoesNotNeed) {
+  Scene scene = SphereLamp();
+  scene.point_lights.push_back({{0, 0, 0}, Gray(1)});
+  scene.point_lights.push_back({{0, 1, 0}, Gray(5)});
+  scene.infinite_lights.push_back({Gray(2)});
+  const auto intersector = Intersector::Create(scene).value();
+  const LightNumbers numbers(scene);
+  const LightSet all(scene, *intersector);
+  const auto set = [&](std::vector<std::uint32_t> of_photons,
+                       std::vector<std::uint32_t> of_sampling) {
+    return LightSet(scene, *intersector,
+                    SceneNeeds(0, 0, {std::move(of_photons), std::move(of_sampling)}));
+  };
+  const float sum = all.TotalPower().g;
+  const LightSet unseen = set({numbers.spheres}, {});
+  EXPECT_FLOAT_EQ(unseen.TotalPower().g, sum - all.emitter(0).power.g);
+  EXPECT_EQ(unseen.emitter(0).choice, 0);
+  EXPECT_EQ(unseen.emitter(0).direct_choice, 0);
+
+  const LightSet unsampled = set({}, {numbers.points + 1, numbers.infinite});
+  EXPECT_EQ(unsampled.TotalPower(), all.TotalPower());
+  for (std::uint32_t i = 0; i < 4; ++i)
+    EXPECT_EQ(unsampled.emitter(i).choice, all.emitter(i).choice);
+  EXPECT_EQ(unsampled.emitter(2).direct_choice, 0);
+  EXPECT_EQ(unsampled.emitter(3).direct_choice, 0);
+  EXPECT_FLOAT_EQ(unsampled.emitter(0).direct_choice + unsampled.emitter(1).direct_choice, 1);
+  EXPECT_EQ(unsampled.PdfDirectInfinite({0, 0, 1}), 0);
+  for (int i = 0; i < 100; ++i) {
+    LightSample sample;
+    ASSERT_TRUE(unsampled.SampleDirect({3, 3, 3}, (i + 0.5) / 100, 0.4F, 0.6F, sample));
+    EXPECT_FALSE(sample.is_distant);
+    EXPECT_FALSE(sample.target == (Vec3{0, 1, 0}));
+  }
+
+  LightSample sample;
+  const LightSet none =
+      set({}, {numbers.spheres, numbers.points, numbers.points + 1, numbers.infinite});
+  EXPECT_FALSE(none.SampleDirect({3, 3, 3}, 0.5, 0.4F, 0.6F, sample));
+  EXPECT_EQ(none.TotalPower(), all.TotalPower());
+}
+
 // A lamp that is off is none.
 TEST(LightSetTest, CountsLightsThatHardlySendAPhoton) {
   Scene scene = SphereLamp();

@@ -48,7 +48,7 @@ using Names = std::set<std::string>;
 
 // With what every scene needs in which light is gathered.
 Names WithAlways(Names names) {
-  names.insert({"photons", "direct-sampling", "photon-normals", "robust-rays"});
+  names.insert({"photons", "direct-sampling", "robust-rays"});
   return names;
 }
 
@@ -103,13 +103,13 @@ INSTANTIATE_TEST_SUITE_P(
         Feature{"diffuse_sphere",
                 kCamera,
                 "Translate 0 0 5\nShape \"sphere\" \"float radius\" [.3]\n",
-                {"round-shapes"}},
+                {"round-shapes", "photon-normals"}},
         Feature{"texture",
                 kCamera,
                 "Texture \"squares\" \"spectrum\" \"checkerboard\"\n"
                 "Material \"diffuse\" \"texture reflectance\" \"squares\"\n"
                 "Shape \"trianglemesh\" \"point3 P\" [-1 0 4  1 0 4  1 0 6]\n",
-                {"textures"}},
+                {"textures", "photon-normals"}},
         Feature{"texture_on_nothing",
                 kCamera,
                 "Texture \"squares\" \"spectrum\" \"checkerboard\"\n"
@@ -119,18 +119,18 @@ INSTANTIATE_TEST_SUITE_P(
                 kCamera,
                 "Material \"conductor\" \"float roughness\" [.4] \"bool remaproughness\" false\n"
                 "Shape \"trianglemesh\" \"point3 P\" [-1 0 4  1 0 4  1 0 6]\n",
-                {"glossy-hitpoints"}},
+                {"glossy-hitpoints", "photon-directions", "photon-normals"}},
         Feature{"vertex_normals",
                 kCamera,
                 "Shape \"trianglemesh\" \"point3 P\" [-1 0 4  1 0 4  1 0 6]\n"
                 "  \"normal N\" [0 1 0  0 1 0  0 1 0]\n",
-                {"shading-normals"}},
+                {"shading-normals", "photon-normals"}},
         Feature{"sky", kCamera, "LightSource \"infinite\"\n", {"environment"}},
         Feature{"lamp",
                 kCamera,
                 "AreaLightSource \"diffuse\"\n"
                 "Shape \"trianglemesh\" \"point3 P\" [-1 3 4  1 3 4  1 3 6]\n",
-                {"area-lights"}},
+                {"area-lights", "photon-normals"}},
         Feature{"lens",
                 "Camera \"perspective\" \"float lensradius\" [.1] \"float focaldistance\" [5]\n",
                 "",
@@ -144,7 +144,14 @@ TEST(SceneNeedsTest, FrequencyPhotonsBringOnlyTheirParts) {
             (WithAlways({"delta-lights", "frequency-photons", "occluder-edges"})));
   EXPECT_EQ(Used(NeedsWith(Parsed(kCamera, "Translate 0 0 5\nShape \"sphere\"\n"), overrides)),
             (WithAlways({"delta-lights", "frequency-photons", "occluder-edges", "curvature",
-                         "round-shapes"})));
+                         "round-shapes", "photon-normals"})));
+  EXPECT_EQ(
+      Used(NeedsWith(Parsed(kCamera,
+                            "Material \"dielectric\"\nTranslate 0 0 5\n"
+                            "Shape \"sphere\" \"float radius\" [.3]\n"),
+                     overrides)),
+      (WithAlways({"delta-lights", "frequency-photons", "occluder-edges", "curvature",
+                   "curved-mirrors", "round-shapes", "specular-surfaces", "fresh-eye-paths"})));
 }
 
 TEST(SceneNeedsTest, OnlyMirrorsNeedNoPhotons) {
@@ -156,14 +163,89 @@ TEST(SceneNeedsTest, OnlyMirrorsNeedNoPhotons) {
 
 TEST(SceneNeedsTest, FacesOfLampsThatShineOnNothingAreCounted) {
   Scene scene = Parsed(kCamera, "");
-  EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kLampsFacingAway),
-            "every face of a lamp has something in front of it");
+  EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kUnseenLamps),
+            "every light may reach what the camera sees");
   const std::int32_t light = AddAreaLight(scene, 1);
   // Above the floor, facing up: two triangles; and one more quad facing down on it.
   AddQuad(scene, {-1, 2, 4}, {0, 0, 1}, {1, 0, 0}, 0, light);
   AddQuad(scene, {-1, 1.5F, 4}, {1, 0, 0}, {0, 0, 1}, 0, light);
-  EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kLampsFacingAway),
+  EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kUnseenLamps),
             "faces of lamps that nothing lies in front of: 2");
+}
+
+// A floor seen from above keeps its photons to itself until something lies on its other side, or
+// the camera does.
+TEST(SceneNeedsTest, OneFloorNeedsNoNormalsOfPhotons) {
+  const auto needs_normals = [](Scene scene) {
+    return NeedsWith(scene).Uses(Part::kPhotonNormals);
+  };
+  const Scene floor = Parsed(kCamera, "");
+  EXPECT_FALSE(needs_normals(floor));
+  Scene with_glass = floor;
+  const std::int32_t glass = AddMaterial(with_glass, DielectricMaterial(1.5F));
+  AddSphere(with_glass, {0, -0.4F, 5}, 0.5F, glass);
+  EXPECT_FALSE(needs_normals(with_glass));
+  Scene sunk = with_glass;
+  sunk.spheres[0].center.y = -0.8F;
+  EXPECT_TRUE(needs_normals(sunk)) << "light could come from below";
+  Scene from_below = floor;
+  SetCamera(from_below, {0, -3, 0}, {0, -1, 5}, {0, 1, 0}, 40, 8);
+  EXPECT_FALSE(needs_normals(from_below)) << "then that is the front";
+  SetCamera(from_below, {0, -1, 0}, {0, -1, 5}, {0, 1, 0}, 40, 8);
+  EXPECT_TRUE(needs_normals(from_below)) << "the camera lies in the floor";
+  Scene tilted = floor;
+  AddDisk(tilted, {0, -1, 5}, {0, 0.99995F, 0.01F}, 0.5F, 0);
+  EXPECT_TRUE(needs_normals(tilted));
+  Scene flat = floor;
+  AddDisk(flat, {3, -1, 5}, {0, -1, 0}, 0.5F, 0);
+  EXPECT_FALSE(needs_normals(flat));
+}
+
+// A lamp behind closed walls sends nothing, and one inside glass is not sampled.
+TEST(SceneNeedsTest, LightsThatAreShutInAreLeftOut) {
+  Scene scene = Parsed(kCamera, "");
+  AddBox(scene, {5, 0, 5}, {7, 2, 7}, 0);
+  const std::int32_t light = AddAreaLight(scene, 1);
+  AddSphere(scene, {6, 1, 6}, 0.2F, 0, light);
+  const SceneNeeds hidden = NeedsWith(scene);
+  EXPECT_FALSE(hidden.Uses(Part::kUnseenLamps));
+  EXPECT_EQ(hidden.ReasonOf(Part::kUnseenLamps),
+            "lights that closed walls keep from the camera's side: 1");
+  const LightNumbers numbers(scene);
+  EXPECT_EQ(hidden.lights_left_out().of_photons, std::vector<std::uint32_t>{numbers.spheres});
+  EXPECT_TRUE(hidden.Uses(Part::kDirectSampling)) << "of the point light";
+
+  Scene in_glass = scene;
+  in_glass.meshes.pop_back();
+  in_glass.point_lights.clear();
+  const std::int32_t glass = AddMaterial(in_glass, DielectricMaterial(1.5F));
+  AddSphere(in_glass, {6, 1, 6}, 0.5F, glass);
+  const SceneNeeds shut_in = NeedsWith(in_glass);
+  EXPECT_TRUE(shut_in.lights_left_out().of_photons.empty());
+  EXPECT_FALSE(shut_in.Uses(Part::kDirectSampling));
+  EXPECT_EQ(shut_in.ReasonOf(Part::kDirectSampling),
+            "smooth surfaces shut every light in: all light comes by photons");
+
+  RenderOverrides overrides;
+  overrides.use_everything = true;
+  const SceneNeeds forced = NeedsWith(scene, overrides);
+  EXPECT_TRUE(forced.Uses(Part::kUnseenLamps));
+  EXPECT_TRUE(forced.lights_left_out().of_photons.empty());
+  EXPECT_TRUE(NeedsWith(in_glass, overrides).Uses(Part::kDirectSampling));
+}
+
+// What has been built, and the scene only does not ask for, can be forced on.
+TEST(SceneNeedsTest, EverythingIsAllThatCanBeForced) {
+  RenderOverrides overrides;
+  overrides.use_everything = true;
+  overrides.radius_controller = RadiusControllerKind::kFrequencyMse;
+  Names left_out;
+  const SceneNeeds needs = NeedsWith(Parsed(kCamera, ""), overrides);
+  for (const Part part : AllParts()) {
+    if (!needs.Uses(part)) left_out.insert(std::string(NameOf(part)));
+  }
+  EXPECT_EQ(left_out, (Names{"round-shapes", "environment", "area-lights", "lens", "motion",
+                             "media", "alpha-masks", "instances"}));
 }
 
 TEST(SceneNeedsTest, SetsOfEyePathsMustFit) {

@@ -13,7 +13,7 @@ namespace lucerna {
 namespace {
 
 struct Cloud {
-  std::vector<std::vector<Deposit>> chunks;
+  std::vector<Deposits> chunks;
   std::vector<Vec3> all;
   Bounds region;
 
@@ -22,7 +22,7 @@ struct Cloud {
     Deposit deposit{};
     deposit.position = p;
     deposit.key = static_cast<std::uint32_t>(all.size());
-    chunks[chunk].push_back(deposit);
+    chunks[chunk].rows.push_back(deposit);
     all.push_back(p);
     region.Add(p);
   }
@@ -59,7 +59,7 @@ std::vector<std::uint32_t> NearByGrid(const PhotonGrid& grid, Vec3 center, float
 void ExpectAgreement(const Cloud& cloud, float cell, float extent, std::uint64_t key) {
   for (const int threads : {1, 3}) {
     ThreadTeam team(threads);
-    const PhotonGrid grid(cloud.chunks, {}, cloud.region, cell, team);
+    const PhotonGrid grid(cloud.chunks, cloud.region, cell, team);
     ASSERT_EQ(grid.size(), cloud.all.size());
     KeyedRng rng(key);
     for (int i = 0; i < 300; ++i) {
@@ -111,7 +111,7 @@ TEST(PhotonGridTest, HandlesOnePhotonAndNone) {
   one.Add(2, {7, 8, 9});
   ExpectAgreement(one, 1, 10, 5);
   ThreadTeam team(2);
-  const PhotonGrid empty({{}, {}}, {}, Bounds{}, 1, team);
+  const PhotonGrid empty(std::vector<Deposits>(2), Bounds{}, 1, team);
   EXPECT_EQ(empty.size(), 0U);
   EXPECT_TRUE(NearByGrid(empty, {0, 0, 0}, 1e30F).empty());
 }

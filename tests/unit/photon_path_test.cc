@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include "gtest/gtest.h"
 
@@ -138,7 +139,7 @@ TEST(PhotonPathTest, CountsLandingsThatAreTooBright) {
   EXPECT_EQ(landed.dropped, 0U);
   EXPECT_TRUE(landed.energy.Balance());
   const FluxScale scale = FluxScale::ForPower(traced.lights.TotalPower());
-  for (const Deposit& deposit : landed.deposits)
+  for (const Deposit& deposit : landed.deposits.rows)
     ASSERT_TRUE(scale.HasRoomFor(deposit.flux));
 }
 
@@ -149,7 +150,7 @@ TEST(PhotonPathTest, DropsAPhotonThatIsBornInfinite) {
   const Traced infinite(scene);
   const PhotonPathTracer::Landed landed = infinite.Trace(10);
   EXPECT_EQ(landed.dropped, 10U);
-  EXPECT_TRUE(landed.deposits.empty());
+  EXPECT_TRUE(landed.deposits.rows.empty());
   EXPECT_EQ(traced.Trace(10).dropped, 0U);
 }
 
@@ -163,8 +164,8 @@ TEST(PhotonReplayTest, LeavesTheDepositsThatTheTraceLeft) {
     for (const PhotonLanding& landing : history.landings) {
       if (!landing.leaves_deposit) continue;
       ASSERT_LT(deposits, landed.deposits.size());
-      ASSERT_EQ(landing.surface.position, landed.deposits[deposits].position);
-      ASSERT_EQ(landing.landed, landed.deposits[deposits].flux);
+      ASSERT_EQ(landing.surface.position, landed.deposits.rows[deposits].position);
+      ASSERT_EQ(landing.landed, landed.deposits.rows[deposits].flux);
       ++deposits;
     }
     ASSERT_EQ(deposits, landed.deposits.size());
@@ -172,6 +173,29 @@ TEST(PhotonReplayTest, LeavesTheDepositsThatTheTraceLeft) {
 }
 
 // A replay knows no hitpoints: where they are must not turn a photon.
+// A deposit has the columns that the job needs, row for row.
+TEST(PhotonPathTest, KeepsWhatIsAskedForOfADeposit) {
+  const auto columns = [](const Scene& scene) {
+    const PhotonPathTracer::Landed landed = Traced(scene).Trace(1000);
+    const Deposits& deposits = landed.deposits;
+    EXPECT_GT(deposits.size(), 20U);
+    EXPECT_TRUE(deposits.normals.empty() || deposits.normals.size() == deposits.size());
+    EXPECT_TRUE(deposits.arrivals_oct.empty() || deposits.arrivals_oct.size() == deposits.size());
+    EXPECT_TRUE(deposits.traces.empty());
+    return std::pair(!deposits.normals.empty(), !deposits.arrivals_oct.empty());
+  };
+  Scene floor;
+  AddQuad(floor, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, AddMaterial(floor, DiffuseMaterial(0.7F)));
+  AddSphere(floor, {0, 0, 0.5F}, 0.4F, AddMaterial(floor, DielectricMaterial(1.5F)));
+  AddDisk(floor, {0, 0, 2}, {0, 0, -1}, 1, AddMaterial(floor, DiffuseMaterial(0)),
+          AddAreaLight(floor, 10));
+  SetCamera(floor, {0, -2, 1}, {0, 0, 0}, {0, 0, 1}, 60, 8);
+  EXPECT_EQ(columns(floor), std::pair(false, false));
+  floor.materials[2] = DiffuseMaterial(0.5F);
+  EXPECT_EQ(columns(floor), std::pair(true, false)) << "the lamp gathers too";
+  EXPECT_EQ(columns(OpenBox()), std::pair(true, true));
+}
+
 TEST(PhotonReplayTest, DoesNotDependOnWhereDepositsAreKept) {
   const Traced everywhere(OpenBox());
   const Traced nowhere(OpenBox(), 6, Bounds());
@@ -210,7 +234,7 @@ TEST(PhotonReplayTest, TellsEveryStepOfAMirroredPhoton) {
   scene.spot_lights.push_back({{0, 0, 2}, {0, 0, -1}, Gray(1), 0.9999F, 0.9998F});
   scene.materials.push_back({});
   const RenderSettings settings = TestSettings(scene, 100, 0.1, 4);
-  const auto path = ReplayInScene(scene, settings, 0, 5);
+  const auto path = ReplayInScene(scene, settings, NeedsOf(scene, settings), 0, 5);
   ASSERT_TRUE(path.ok()) << path.status();
   EXPECT_EQ(path->emission().light(), "spot light 0");
   EXPECT_EQ(path->emission().position().z(), 2);
@@ -226,9 +250,12 @@ TEST(PhotonReplayTest, TellsEveryStepOfAMirroredPhoton) {
   EXPECT_EQ(path->end(),
             landing.scattering().survived() ? v1::PHOTON_END_ESCAPED : v1::PHOTON_END_ROULETTE);
 
-  EXPECT_TRUE(absl::IsOutOfRange(ReplayInScene(scene, settings, 0, 100).status()));
-  EXPECT_TRUE(
-      absl::IsOutOfRange(ReplayInScene(scene, settings, std::uint64_t{1} << 60, 0).status()));
+  const auto is_out_of_range = [&](std::uint64_t pass, std::uint64_t index) {
+    return absl::IsOutOfRange(
+        ReplayInScene(scene, settings, NeedsOf(scene, settings), pass, index).status());
+  };
+  EXPECT_TRUE(is_out_of_range(0, 100));
+  EXPECT_TRUE(is_out_of_range(std::uint64_t{1} << 60, 0));
 }
 
 }  // namespace

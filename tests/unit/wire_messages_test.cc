@@ -47,6 +47,30 @@ TEST(MessagesTest, SettingsComeBack) {
   EXPECT_EQ(*settings, SomeSettings());
 }
 
+TEST(MessagesTest, NeedsComeBackWithoutTheirReasons) {
+  const SceneNeeds needs(0b1011, 64, {{1, 5}, {2}});
+  const auto back = FromProto(ToProto(needs));
+  ASSERT_TRUE(back.ok()) << back.status();
+  EXPECT_EQ(*back, needs);
+  EXPECT_TRUE(back->Uses(Part::kPhotons));
+  EXPECT_TRUE(back->Uses(Part::kSpecular));
+  EXPECT_FALSE(back->Uses(Part::kGlossy));
+}
+
+TEST(MessagesTest, HostileNeedsAreRefused) {
+  const auto is_refused = [](auto change) {
+    v1::SceneNeeds message = ToProto(SceneNeeds(1, 64, {{1, 5}, {2}}));
+    change(message);
+    return absl::IsInvalidArgument(FromProto(message).status());
+  };
+  EXPECT_FALSE(is_refused([](auto&) {}));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_parts(std::uint64_t{1} << kParts); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_eye_sample_sets(-1); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_eye_sample_sets(65'537); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.add_lights_without_photons(3); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.add_lights_without_sampling(1); }));
+}
+
 TEST(MessagesTest, HostileSettingsAreRefused) {
   const auto is_refused = [](auto change) {
     v1::RenderSettings message = ToProto(SomeSettings());

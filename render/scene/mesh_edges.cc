@@ -1,4 +1,4 @@
-#include "render/geometry/mesh_edges.h"
+#include "render/scene/mesh_edges.h"
 
 #include <algorithm>
 #include <bit>

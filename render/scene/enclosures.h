@@ -1,0 +1,77 @@
+// Which lights are shut in, or shut out?
+//
+// A closed surface cuts space in two: whatever way light takes from one side to the other, it
+// crosses the surface an odd number of times. So light never comes through a closed surface that
+// is opaque, and never in a straight line through one of any kind. Both are proofs: what cannot be
+// proved (a crack in the wall, a lamp that touches it) counts as open.
+//
+// Triangles bound a closed surface when each of their edges belongs to an even number of them;
+// vertices are the same when they lie in the same place exactly. The surfaces that are looked at
+// are the faces of every region that triangles enclose, found by walking from each side of a
+// triangle to the next one around their common edge, and every sphere.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "render/math/double3.h"
+#include "render/math/vector.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+class ClosedSurface {
+ public:
+  explicit ClosedSurface(std::vector<std::array<Vec3, 3>> triangles);
+  explicit ClosedSurface(const Sphere& sphere);
+
+  [[nodiscard]] const Bounds& bounds() const { return bounds_; }
+  [[nodiscard]] std::size_t triangle_count() const { return triangles_.size(); }
+  // Whether the point lies inside; absent when it is too near to the surface to tell.
+  [[nodiscard]] std::optional<bool> Holds(Vec3 point) const;
+  // True when nothing of the convex hull of `points` comes near the surface. False may also mean
+  // that it could not be told.
+  [[nodiscard]] bool IsApartFrom(std::span<const Vec3> points) const;
+
+ private:
+  [[nodiscard]] bool IsOff(const std::array<Vec3, 3>& triangle, std::span<const Vec3> points,
+                           const Bounds& box) const;
+
+  std::vector<std::array<Vec3, 3>> triangles_;  // empty: the sphere
+  Double3 center_;
+  double radius_ = 0;
+  Bounds bounds_;
+  double near_ = 0;  // closer than this is too near
+};
+
+// The closed surfaces among the triangles and spheres whose material is one that `counts`.
+[[nodiscard]] std::vector<ClosedSurface> ClosedSurfacesOf(
+    const Scene& scene, const std::function<bool(const Material&)>& counts);
+
+// Lights are numbered: meshes, spheres, disks (shapes that do not emit have a number too), then
+// points, spots, distant and infinite lights.
+struct LightNumbers {
+  explicit LightNumbers(const Scene& scene);
+
+  std::uint32_t spheres, disks, points, spots, distant, infinite, end;
+};
+
+// Lights that need not do all that lights do, by number, ascending.
+struct LightsLeftOut {
+  // Their light never reaches what the camera can see.
+  std::vector<std::uint32_t> of_photons;
+  // Nothing that scatters their light lies in their line of sight: to sample them would find
+  // nothing. Those of_photons are not told again.
+  std::vector<std::uint32_t> of_sampling;
+
+  bool operator==(const LightsLeftOut&) const = default;
+};
+
+// Looks at every triangle, and for closed surfaces only when some light might be shut off.
+[[nodiscard]] LightsLeftOut FindLightsLeftOut(const Scene& scene);
+
+}  // namespace lucerna
