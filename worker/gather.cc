@@ -189,9 +189,11 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
   };
   if (!kNormals || glossy == nullptr) {
     grid.ForEachWithin(position, reach, [&](std::size_t i, float squared) {
-      const PhotonRecord& photon = grid.record(i);
+      const auto& photon = grid.template record<kNormals>(i);
       const Vec3 to_photon = grid.position(i) - position;
-      if (kNormals && !Counts(grid.normal(i), normal, to_photon)) return;
+      if constexpr (kNormals) {
+        if (!Counts(photon.normal, normal, to_photon)) return;
+      }
       add(photon, photon.flux, squared);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux));
     });
@@ -201,13 +203,12 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
     const Vec3 wo = frame.ToLocal(DecodeOctahedral(glossy->to_eye_oct));
     const bool transmits = material.kind == Material::Kind::kDielectric;
     grid.ForEachWithin(position, reach, [&](std::size_t i, float squared) {
-      const PhotonRecord& photon = grid.record(i);
+      const FacingRecord& photon = grid.template record<true>(i);
       const Vec3 to_photon = grid.position(i) - position;
       // Photons on the far side of a rough dielectric count too.
-      const Vec3 photon_normal = grid.normal(i);
-      const bool is_behind = transmits && Dot(photon_normal, normal) < 0;
-      if (!Counts(photon_normal, is_behind ? -normal : normal, to_photon)) return;
-      const Vec3 wi = frame.ToLocal(DecodeOctahedral(grid.arrival_oct(i)));
+      const bool is_behind = transmits && Dot(photon.normal, normal) < 0;
+      if (!Counts(photon.normal, is_behind ? -normal : normal, to_photon)) return;
+      const Vec3 wi = frame.ToLocal(DecodeOctahedral(photon.arrival_oct));
       const Rgb scattered = photon.flux * EvaluateBsdf(material, wo, wi, Carried::kRadiance);
       if (!scale.HasRoomFor(scattered)) {
         ++piece.excess;
@@ -318,8 +319,7 @@ Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii, const
                     const std::vector<Material>& materials, const Kernel& kernel,
                     const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop,
                     Evidence evidence) {
-  LUCERNA_CHECK(grid.size() == 0 || block.glossy.empty() ||
-                (grid.has_normals() && grid.has_arrivals()));
+  LUCERNA_CHECK(grid.size() == 0 || block.glossy.empty() || grid.has_normals());
   const GatherFunction gather = grid.has_normals() ? Specialised<true>(kernel.kind, evidence)
                                                    : Specialised<false>(kernel.kind, evidence);
   return gather(block, radii, grid, materials, scale, team, stop);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace lucerna {
 namespace {
@@ -81,37 +82,49 @@ PhotonGrid::PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& regi
   x_.assign(count + 8, HUGE_VALF);
   y_.assign(count + 8, HUGE_VALF);
   z_.assign(count + 8, HUGE_VALF);
-  records_.resize(count);
+  size_ = count;
   const auto has = [&](auto Deposits::*column) {
     return std::ranges::any_of(deposits, [&](const Deposits& d) { return !(d.*column).empty(); });
   };
-  if (has(&Deposits::normals)) normals_.resize(count);
-  if (has(&Deposits::arrivals_oct)) arrivals_oct_.resize(count);
-  if (has(&Deposits::traces)) traces_.resize(count);
-  team.For(groups, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t group = begin; group < end; ++group) {
-      for (std::size_t c = chunk_of_group(group); c < chunk_of_group(group + 1); ++c) {
-        const Deposits& chunk = deposits[c];
-        std::uint32_t* const place = &cell_of[start[c]];
-        // From here on the cell of a deposit is its place.
-        for (std::size_t i = 0; i < chunk.size(); ++i) {
-          const Deposit& deposit = chunk.rows[i];
-          const std::size_t out = place[i] = counts[group][place[i]]++;
-          x_[out] = deposit.position.x;
-          y_[out] = deposit.position.y;
-          z_[out] = deposit.position.z;
-          records_[out] = {deposit.flux, deposit.key};
+  const auto place_all = [&](auto with_normals, auto with_traces) {
+    team.For(groups, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t group = begin; group < end; ++group) {
+        for (std::size_t c = chunk_of_group(group); c < chunk_of_group(group + 1); ++c) {
+          const Deposits& chunk = deposits[c];
+          for (std::size_t i = 0; i < chunk.size(); ++i) {
+            const Deposit& deposit = chunk.rows[i];
+            const std::size_t out = counts[group][cell_of[start[c] + i]]++;
+            x_[out] = deposit.position.x;
+            y_[out] = deposit.position.y;
+            z_[out] = deposit.position.z;
+            if constexpr (with_normals) {
+              facing_[out] = {{deposit.flux, deposit.key},
+                              chunk.normals[i],
+                              chunk.arrivals_oct.empty() ? 0 : chunk.arrivals_oct[i]};
+            } else {
+              records_[out] = {deposit.flux, deposit.key};
+            }
+            if constexpr (with_traces) traces_[out] = chunk.traces[i];
+          }
         }
-        const auto put = [&](const auto& column, auto& sorted) {
-          for (std::size_t i = 0; i < column.size(); ++i)
-            sorted[place[i]] = column[i];
-        };
-        put(chunk.normals, normals_);
-        put(chunk.arrivals_oct, arrivals_oct_);
-        put(chunk.traces, traces_);
       }
+    });
+  };
+  const auto place = [&](auto with_normals) {
+    if (has(&Deposits::traces)) {
+      traces_.resize(count);
+      place_all(with_normals, std::true_type{});
+    } else {
+      place_all(with_normals, std::false_type{});
     }
-  });
+  };
+  if (has(&Deposits::normals)) {
+    facing_.resize(count);
+    place(std::true_type{});
+  } else {
+    records_.resize(count);
+    place(std::false_type{});
+  }
 }
 
 }  // namespace lucerna

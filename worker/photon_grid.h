@@ -21,6 +21,13 @@ struct alignas(16) PhotonRecord {
   std::uint32_t key = 0;
 };
 
+// What it brings where jobs ask which way it faces: half a cache line, in one place, because every
+// photon that is near needs all of it. Columns of their own took a fifth longer to gather.
+struct alignas(32) FacingRecord : PhotonRecord {
+  Vec3 normal;
+  std::uint32_t arrival_oct = 0;  // 0 in jobs that have no such column
+};
+
 class PhotonGrid {
  public:
   // `region` holds all deposits, which come in chunks that have the same columns. Cells are about
@@ -28,16 +35,19 @@ class PhotonGrid {
   PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& region, float cell,
              ThreadTeam& team);
 
-  [[nodiscard]] std::size_t size() const { return records_.size(); }
-  [[nodiscard]] const PhotonRecord& record(std::size_t photon) const { return records_[photon]; }
-  // Whether there are the columns of Deposits; without photons there are none.
-  [[nodiscard]] bool has_normals() const { return !normals_.empty(); }
-  [[nodiscard]] bool has_arrivals() const { return !arrivals_oct_.empty(); }
-  // See Deposits. Each requires that there is such a column.
-  [[nodiscard]] Vec3 normal(std::size_t photon) const { return normals_[photon]; }
-  [[nodiscard]] std::uint32_t arrival_oct(std::size_t photon) const {
-    return arrivals_oct_[photon];
+  [[nodiscard]] std::size_t size() const { return size_; }
+  // Whether deposits had normals, and so photons FacingRecords; never without photons.
+  [[nodiscard]] bool has_normals() const { return !facing_.empty(); }
+  // kNormals as has_normals().
+  template <bool kNormals>
+  [[nodiscard]] const auto& record(std::size_t photon) const {
+    if constexpr (kNormals) {
+      return facing_[photon];
+    } else {
+      return records_[photon];
+    }
   }
+  // See Deposits. Requires that there is such a column.
   [[nodiscard]] float trace(std::size_t photon) const { return traces_[photon]; }
   [[nodiscard]] Vec3 position(std::size_t photon) const {
     return {x_[photon], y_[photon], z_[photon]};
@@ -58,11 +68,11 @@ class PhotonGrid {
   int nx_ = 1, ny_ = 1, nz_ = 1;
   std::vector<std::uint32_t> first_;  // [cells + 1] photon of each cell
   std::vector<float> x_, y_, z_;      // [photons + 8], the rest far away
+  std::size_t size_ = 0;
+  // [photons], one of them, the other empty.
   std::vector<PhotonRecord> records_;
-  // [photons] or empty.
-  std::vector<Vec3> normals_;
-  std::vector<std::uint32_t> arrivals_oct_;
-  std::vector<float> traces_;
+  std::vector<FacingRecord> facing_;
+  std::vector<float> traces_;  // [photons] or empty
 };
 
 }  // namespace lucerna

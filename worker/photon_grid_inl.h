@@ -11,7 +11,7 @@ namespace lucerna {
 
 template <typename Visit>
 void PhotonGrid::ForEachWithin(Vec3 center, float radius, const Visit& visit) const {
-  if (records_.empty()) return;
+  if (size_ == 0) return;
   const float squared_radius = radius * radius;
   const int x0 = CellOf(center.x - radius - low_.x, nx_);
   const int x1 = CellOf(center.x + radius - low_.x, nx_);

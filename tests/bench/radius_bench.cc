@@ -320,7 +320,7 @@ class Check {
   static void ForEachNear(const PhotonGrid& grid, Vec3 position, Vec3 normal, double radius,
                           const Visitor& visit) {
     grid.ForEachWithin(position, static_cast<float>(radius), [&](std::size_t i, float squared) {
-      if (Dot(grid.normal(i), normal) < 0.7F) return;
+      if (Dot(grid.record<true>(i).normal, normal) < 0.7F) return;
       visit(i, static_cast<double>(squared));
     });
   }
@@ -378,7 +378,7 @@ class Check {
         ForEachNear(grids[0], eye.block.positions[row],
                     DecodeOctahedral(eye.block.normals_oct[row]), rough,
                     [&](std::size_t i, double) {
-                      light[row] += static_cast<double>(Luminance(grids[0].record(i).flux));
+                      light[row] += static_cast<double>(Luminance(grids[0].record<true>(i).flux));
                     });
       }
     });
@@ -416,8 +416,9 @@ class Check {
               [&](std::size_t photon, double squared) {
                 const auto trace = static_cast<double>(grid.trace(photon));
                 if (!(trace >= 0)) return;
-                samples.push_back(
-                    {squared, static_cast<double>(Luminance(grid.record(photon).flux)), trace});
+                samples.push_back({squared,
+                                   static_cast<double>(Luminance(grid.record<true>(photon).flux)),
+                                   trace});
               });
         }
         points_[i].predicted = Converge(samples);
@@ -452,7 +453,8 @@ class Check {
                             std::upper_bound(point.edges.begin(), point.edges.end(), distance);
                         if (edge == point.edges.end()) return;
                         point.rings[static_cast<std::size_t>(edge - point.edges.begin())].Add(
-                            static_cast<double>(Luminance(grid.record(photon).flux)), squared);
+                            static_cast<double>(Luminance(grid.record<true>(photon).flux)),
+                            squared);
                       });
         }
       });

@@ -50,7 +50,7 @@ std::vector<std::uint32_t> NearByGrid(const PhotonGrid& grid, Vec3 center, float
   std::vector<std::uint32_t> near;
   grid.ForEachWithin(center, radius, [&](std::size_t i, float squared) {
     EXPECT_LT(squared, radius * radius);
-    near.push_back(grid.record(i).key);
+    near.push_back(grid.record<false>(i).key);
   });
   std::ranges::sort(near);
   return near;
