@@ -54,6 +54,7 @@ SpectrumTracer::SpectrumTracer(const Scene& scene, const RenderSettings& setting
       limits_(SpectrumLimits::ForDiagonal(static_cast<double>(bounds.Diagonal()))),
       edge_strength_(EdgeStrength(settings.bias, Kernel{settings.kernel}.Moments().mu2)),
       reach_(ReachOf(scene, settings, bounds)),
+      sees_glossily_(needs.Uses(Part::kGlossyWindow)),
       curvature_(
           scene, [&](const Material&) { return needs.Uses(Part::kCurvature); },
           [&](const Material& material) {
@@ -165,7 +166,7 @@ float SpectrumTracer::Received(const Carried& carried, const SurfacePoint& surfa
                                const Material& material, Vec3 wo) const {
   const double cosine = static_cast<double>(std::abs(Dot(wo, surface.shading_normal)));
   Spectrum seen = carried.spectrum;
-  if (material.kind != Material::Kind::kDiffuse) {
+  if (sees_glossily_ && material.kind != Material::Kind::kDiffuse) {
     const double lobe =
         ReflectedLobe(static_cast<double>(std::max(material.alpha_u, material.alpha_v)));
     if (lobe < kDiffuseLobe) {
