@@ -207,8 +207,8 @@ Status JobRunner::Open(TracedPass traced) {
     const MutexLock lock(mutex_);
     blobs_[pass] = open.blobs;
   }
-  // A camera that sees nothing needs no photons: such a pass is complete as it is.
-  if (open.blobs.hitpoints > 0) {
+  // Without photons a pass is complete as it is.
+  if (HasPhotons(open)) {
     const auto photons = static_cast<std::uint64_t>(settings_.photons_per_pass);
     surroundings_.merger.Open(KeyOf(pass), open.blobs.hitpoints, photons,
                               EvidenceColumns(EvidenceOf(settings_.radius_controller, pass)));
@@ -219,14 +219,20 @@ Status JobRunner::Open(TracedPass traced) {
   return absl::OkStatus();
 }
 
+bool JobRunner::HasPhotons(const OpenPass& open) const {
+  // None that a camera could see that sees nothing, or without light.
+  return open.blobs.hitpoints > 0 && estimator_->needs().Uses(Part::kPhotons);
+}
+
 bool JobRunner::IsComplete(const OpenPass& open) const {
-  return open.blobs.hitpoints == 0 || surroundings_.merger.IsComplete(KeyOf(open.traced.eye.pass));
+  return !HasPhotons(open) || surroundings_.merger.IsComplete(KeyOf(open.traced.eye.pass));
 }
 
 void JobRunner::TakeIn(OpenPass open) {
   const PassKey key = KeyOf(open.traced.eye.pass);
-  PassSums sums(0, EvidenceColumns(EvidenceOf(settings_.radius_controller, key.pass)));
-  if (open.blobs.hitpoints > 0) {
+  PassSums sums(open.blobs.hitpoints,
+                EvidenceColumns(EvidenceOf(settings_.radius_controller, key.pass)));
+  if (HasPhotons(open)) {
     surroundings_.scheduler.ClosePass(key);
     sums = surroundings_.merger.Take(key);
   }

@@ -126,6 +126,7 @@ class JobRunner {
   StopReason ReasonToStop(const End& end, bool is_time_up) const;
   StatusOr<TracedPass> Trace(std::uint64_t pass);
   Status Open(TracedPass traced);
+  bool HasPhotons(const OpenPass& open) const;
   bool IsComplete(const OpenPass& open) const;
   void TakeIn(OpenPass open);
   // Ends a pass for workers and forgets what they needed for it.

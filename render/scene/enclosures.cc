@@ -20,6 +20,8 @@ constexpr double kNear = 1e-6;
 constexpr double kMostQuestions = 0x1p28;
 // Lamps of more triangles than this are looked at as the box around them.
 constexpr std::size_t kFewTriangles = 64;
+// From how many shapes it is looked whether a light is in sight, before all are asked.
+constexpr std::size_t kFewPlaces = 8;
 
 Bounds BoxAround(std::span<const Vec3> points) {
   Bounds box;
@@ -159,7 +161,7 @@ struct Walls {
   }
 };
 
-Walls WallsOf(const Scene& scene, const std::function<bool(const Material&)>& counts) {
+Walls WallsOf(const Scene& scene, const Counts& counts) {
   Walls walls;
   std::vector<std::uint32_t> corners;
   for (const TriangleMesh& mesh : scene.meshes) {
@@ -245,8 +247,8 @@ class Place {
   // Outside everything.
   Place() = default;
   explicit Place(Vec3 point) { pieces_.push_back({point}); }
-  // All over a box.
-  explicit Place(const Bounds& box) {
+  // All over a box, in whose middle there is something else to be seen than the light.
+  explicit Place(const Bounds& box) : hidden_(static_cast<double>(box.high.x - box.low.x) / 2) {
     const std::array<Vec3, 8> corners = CornersOf(box);
     pieces_.emplace_back(corners.begin(), corners.end());
   }
@@ -274,6 +276,8 @@ class Place {
     }
     return inside;
   }
+  // How far around Point() the light itself stands in the way.
+  [[nodiscard]] double hidden() const { return hidden_; }
   // Some point of it.
   [[nodiscard]] std::optional<Vec3> Point() const {
     if (pieces_.empty()) return std::nullopt;
@@ -285,6 +289,7 @@ class Place {
 
  private:
   std::vector<std::vector<Vec3>> pieces_;
+  double hidden_ = 0;
 };
 
 struct NumberedLight {
@@ -324,12 +329,12 @@ bool IsOpaque(const Material& material) {
   return material.kind != Material::Kind::kDielectric;
 }
 
-// Whether something opaque lies on the way from a point, `length` far.
-bool IsBlocked(const Scene& scene, Vec3 from, Double3 way, double length) {
+// Whether something of a material that `counts` lies on the way from a point, `length` far.
+bool IsBlocked(const Scene& scene, const Counts& counts, Vec3 from, Double3 way, double length) {
   const Double3 origin(from);
   const Axes frame(way.x, way.y, way.z);
   for (const TriangleMesh& mesh : scene.meshes) {
-    if (!IsOpaque(scene.materials[static_cast<std::size_t>(mesh.traits.material)])) continue;
+    if (!counts(scene.materials[static_cast<std::size_t>(mesh.traits.material)])) continue;
     for (std::size_t i = 0; i < mesh.indices.size() / 3; ++i) {
       const Triangle triangle = TriangleOf(mesh, i);
       double along = 0;
@@ -342,7 +347,7 @@ bool IsBlocked(const Scene& scene, Vec3 from, Double3 way, double length) {
     }
   }
   for (const Sphere& sphere : scene.spheres) {
-    if (!IsOpaque(scene.materials[static_cast<std::size_t>(sphere.traits.material)])) continue;
+    if (!counts(scene.materials[static_cast<std::size_t>(sphere.traits.material)])) continue;
     const Double3 center = frame.In(Double3(sphere.center) - origin);
     const auto radius = static_cast<double>(sphere.radius);
     const double square = radius * radius - center.x * center.x - center.y * center.y;
@@ -355,16 +360,17 @@ bool IsBlocked(const Scene& scene, Vec3 from, Double3 way, double length) {
   return false;
 }
 
-// Whether a light might be shut out: some of its light, or of that from far away, is blocked. Asks
-// for nothing but the shapes themselves.
-bool MayBeShutOut(const Scene& scene, Vec3 eye, std::optional<Vec3> light) {
-  if (light) {
-    const Double3 way = Double3(*light) - Double3(eye);
-    const double length = Length(way);
-    return length > 0 && IsBlocked(scene, eye, way, length);
+// Whether closed surfaces of materials that count might keep a point and a light apart: they stand
+// in the way. Asks for nothing but the shapes themselves.
+bool MayBeApart(const Scene& scene, const Counts& counts, Vec3 point, const Place& light) {
+  if (const std::optional<Vec3> there = light.Point()) {
+    const Double3 way = Double3(*there) - Double3(point);
+    const double length = Length(way) - light.hidden();
+    return length > 0 && IsBlocked(scene, counts, point, way, length);
   }
   return std::ranges::all_of(kLines, [&](const Axes& line) {
-    return IsBlocked(scene, eye, line.z, HUGE_VAL) && IsBlocked(scene, eye, line.z * -1, HUGE_VAL);
+    return IsBlocked(scene, counts, point, line.z, HUGE_VAL) &&
+           IsBlocked(scene, counts, point, line.z * -1, HUGE_VAL);
   });
 }
 
@@ -372,11 +378,8 @@ bool MayBeShutOut(const Scene& scene, Vec3 eye, std::optional<Vec3> light) {
 std::vector<std::uint32_t> ShutOut(const Scene& scene, const std::vector<NumberedLight>& lights) {
   const Vec3 eye = scene.camera.camera_to_world.Point({});
   std::vector<const NumberedLight*> candidates;
-  if (static_cast<double>(lights.size()) * static_cast<double>(scene.TriangleCount()) >
-      kMostQuestions)
-    return {};
   for (const NumberedLight& light : lights) {
-    if (MayBeShutOut(scene, eye, light.place.Point())) candidates.push_back(&light);
+    if (MayBeApart(scene, IsOpaque, eye, light.place)) candidates.push_back(&light);
   }
   if (candidates.empty()) return {};
   const auto lens = static_cast<float>(scene.camera.lens_radius);
@@ -434,21 +437,38 @@ bool AllSampledLie(const Scene& scene, const ClosedSurface& surface, bool inside
   return all_lie(scene.spheres, numbers.spheres) && all_lie(scene.disks, numbers.disks);
 }
 
+bool ScattersNarrowly(const Material& material) {
+  return !ScattersBroadly(material);
+}
+
 // The lights that are never in the line of sight of anything that scatters their light.
 std::vector<std::uint32_t> NeverInSight(const Scene& scene,
                                         const std::vector<NumberedLight>& lights,
                                         const std::vector<std::uint32_t>& but) {
-  const bool has_smooth = std::ranges::any_of(
-      scene.materials, [](const Material& material) { return IsSmooth(material); });
-  if (!has_smooth) return {};
+  // Some places where they would be sampled.
+  std::vector<Vec3> lit;
+  for (const TriangleMesh& mesh : scene.meshes) {
+    if (mesh.indices.empty() || mesh.traits.area_light != kNoAreaLight) continue;
+    if (!ScattersBroadly(scene.materials[static_cast<std::size_t>(mesh.traits.material)])) continue;
+    const Triangle triangle = TriangleOf(mesh, mesh.indices.size() / 6);
+    lit.push_back((triangle[0] + triangle[1] + triangle[2]) * (1.0F / 3));
+    if (lit.size() == kFewPlaces) break;
+  }
+  std::vector<const NumberedLight*> candidates;
+  for (const NumberedLight& light : lights) {
+    if (std::ranges::binary_search(but, light.number)) continue;
+    if (std::ranges::all_of(lit, [&](Vec3 place) {
+          return MayBeApart(scene, ScattersNarrowly, place, light.place);
+        }))
+      candidates.push_back(&light);
+  }
+  if (candidates.empty()) return {};
   std::vector<std::uint32_t> never;
-  for (const ClosedSurface& shell :
-       ClosedSurfacesOf(scene, [](const Material& m) { return !ScattersBroadly(m); })) {
-    for (const NumberedLight& light : lights) {
-      if (std::ranges::binary_search(but, light.number)) continue;
-      const std::optional<bool> holds_light = light.place.IsIn(shell);
-      if (holds_light && AllSampledLie(scene, shell, !*holds_light, light.number))
-        never.push_back(light.number);
+  for (const ClosedSurface& shell : ClosedSurfacesOf(scene, ScattersNarrowly)) {
+    for (const NumberedLight* light : candidates) {
+      const std::optional<bool> holds_light = light->place.IsIn(shell);
+      if (holds_light && AllSampledLie(scene, shell, !*holds_light, light->number))
+        never.push_back(light->number);
     }
   }
   std::ranges::sort(never);
@@ -526,8 +546,7 @@ bool ClosedSurface::IsApartFrom(std::span<const Vec3> points) const {
       triangles_, [&](const Triangle& triangle) { return IsOff(triangle, points, box); });
 }
 
-std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene,
-                                            const std::function<bool(const Material&)>& counts) {
+std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene, const Counts& counts) {
   std::vector<ClosedSurface> surfaces;
   const Walls walls = WallsOf(scene, counts);
   const std::vector<TriangleSide> sides = SidesByEdge(walls.corners, walls.positions.size());
@@ -580,6 +599,9 @@ LightNumbers::LightNumbers(const Scene& scene)
 LightsLeftOut FindLightsLeftOut(const Scene& scene) {
   const std::vector<NumberedLight> lights = LightsOf(scene);
   LightsLeftOut left_out;
+  if (static_cast<double>(lights.size()) * static_cast<double>(scene.TriangleCount()) >
+      kMostQuestions)
+    return left_out;
   left_out.of_photons = ShutOut(scene, lights);
   left_out.of_sampling = NeverInSight(scene, lights, left_out.of_photons);
   return left_out;

@@ -49,8 +49,8 @@ class ClosedSurface {
 };
 
 // The closed surfaces among the triangles and spheres whose material is one that `counts`.
-[[nodiscard]] std::vector<ClosedSurface> ClosedSurfacesOf(
-    const Scene& scene, const std::function<bool(const Material&)>& counts);
+using Counts = std::function<bool(const Material&)>;
+[[nodiscard]] std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene, const Counts& counts);
 
 // Lights are numbered: meshes, spheres, disks (shapes that do not emit have a number too), then
 // points, spots, distant and infinite lights.

@@ -187,11 +187,6 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
 
   const Material* gathers =
       FirstMaterial(scene, in_use, [](const Material& m) { return Gathers(m); });
-  if (gathers != nullptr) {
-    needs.Set(Part::kPhotons, true, Concat("they are gathered on ", Quoted(*gathers)));
-  } else {
-    needs.Set(Part::kPhotons, false, "no surface is rough enough for photons to be gathered on");
-  }
 
   const Material* specular = FirstMaterial(
       scene, in_use, [](const Material& m) { return !Gathers(m) && !IsBlackDiffuse(m); });
@@ -237,6 +232,12 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
   }
 
   LightsLeftOut lights = FindLightsLeftOut(scene);
+  const bool is_dark = lights.of_photons.size() == CountLights(scene);
+  needs.Set(Part::kPhotons, gathers != nullptr && !is_dark,
+            gathers == nullptr
+                ? std::string("no surface is rough enough for photons to be gathered on")
+            : is_dark ? std::string("no light comes to what the camera can see")
+                      : Concat("they are gathered on ", Quoted(*gathers)));
   const LightNumbers numbers(scene);
   const bool has_sky = !scene.infinite_lights.empty();
   const bool is_sky_unseen =
@@ -273,7 +274,8 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
       CountLights(scene) - lights.of_photons.size() - lights.of_sampling.size();
   needs.Set(
       Part::kDirectSampling, is_lit && sampled > 0,
-      !is_lit ? std::string("no surface scatters light broadly")
+      !is_lit   ? std::string("no surface scatters light broadly")
+      : is_dark ? std::string("no light comes to what the camera can see")
       : sampled == 0
           ? std::string("smooth surfaces shut every light in: all light comes by photons")
       : lights.of_sampling.empty()
@@ -364,6 +366,7 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
       }
     };
     force(kForced);
+    if (gathers != nullptr) force(std::array{Part::kPhotons});
     if (frequency) force(kForcedWithFrequency);
     needs.eye_sample_sets_ = 0;
     needs.lights_ = {};

@@ -226,8 +226,15 @@ TEST(SceneNeedsTest, LightsThatAreShutInAreLeftOut) {
   EXPECT_EQ(shut_in.ReasonOf(Part::kDirectSampling),
             "smooth surfaces shut every light in: all light comes by photons");
 
+  Scene dark = scene;
+  dark.point_lights.clear();
+  EXPECT_FALSE(NeedsWith(dark).Uses(Part::kPhotons));
+  EXPECT_FALSE(NeedsWith(dark).Uses(Part::kDirectSampling));
+  EXPECT_EQ(NeedsWith(dark).ReasonOf(Part::kPhotons), "no light comes to what the camera can see");
+
   RenderOverrides overrides;
   overrides.use_everything = true;
+  EXPECT_TRUE(NeedsWith(dark, overrides).Uses(Part::kPhotons));
   const SceneNeeds forced = NeedsWith(scene, overrides);
   EXPECT_TRUE(forced.Uses(Part::kUnseenLamps));
   EXPECT_TRUE(forced.lights_left_out().of_photons.empty());
