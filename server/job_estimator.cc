@@ -76,7 +76,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
                                                              SceneNeeds needs, int threads) {
   auto state = std::make_unique<State>(std::move(scene), settings, std::move(needs), threads);
   LUCERNA_ASSIGN_OR_RETURN(state->intersector,
-                           Intersector::Create(state->scene, state->needs.tree()));
+                           Intersector::Create(state->scene, state->needs.rays()));
   state->lights = std::make_unique<LightSet>(state->scene, *state->intersector, state->needs);
   LUCERNA_RETURN_IF_ERROR(CheckPower(state->lights->TotalPower()));
   state->tracer = std::make_unique<EyePathTracer>(state->scene, state->settings, state->needs,

@@ -144,9 +144,9 @@ struct BatchTracer::State {
     if (intersector != nullptr && needs == of_job) return absl::OkStatus();
     spectra.reset();
     lights.reset();
-    if (intersector == nullptr || needs.tree() != of_job.tree()) {
+    if (intersector == nullptr || needs.rays() != of_job.rays()) {
       intersector.reset();
-      LUCERNA_ASSIGN_OR_RETURN(intersector, Intersector::Create(scene, of_job.tree()));
+      LUCERNA_ASSIGN_OR_RETURN(intersector, Intersector::Create(scene, of_job.rays()));
     }
     needs = of_job;
     lights = std::make_unique<LightSet>(scene, *intersector, needs);

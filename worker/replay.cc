@@ -150,7 +150,7 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
                      settings.photons_per_pass - 1));
   }
   const Scene scene = InWorkingSpace(std::move(rec709));
-  LUCERNA_ASSIGN_OR_RETURN(const auto intersector, Intersector::Create(scene, needs.tree()));
+  LUCERNA_ASSIGN_OR_RETURN(const auto intersector, Intersector::Create(scene, needs.rays()));
   const LightSet lights(scene, *intersector, needs);
   const PhotonPathTracer tracer(scene, *intersector, lights, settings, needs, nullptr, Bounds());
   const PhotonHistory history = tracer.Replay(pass, index);

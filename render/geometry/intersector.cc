@@ -181,9 +181,10 @@ struct Intersector::EmbreeScene {
   }
 };
 
-Intersector::Intersector(const Scene& scene)
+Intersector::Intersector(const Scene& scene, bool has_shading_normals)
     : scene_(scene),
       embree_(std::make_unique<EmbreeScene>()),
+      has_shading_normals_(has_shading_normals),
       sphere_geometry_(static_cast<std::uint32_t>(scene.meshes.size())) {
   std::uint32_t shapes = 0;
   for (const TriangleMesh& mesh : scene.meshes) {
@@ -196,8 +197,8 @@ Intersector::Intersector(const Scene& scene)
 
 Intersector::~Intersector() = default;
 
-StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, TreeNeeds needs) {
-  auto intersector = std::unique_ptr<Intersector>(new Intersector(scene));
+StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, RayNeeds needs) {
+  auto intersector = std::unique_ptr<Intersector>(new Intersector(scene, needs.shading_normals));
   EmbreeScene& embree = *intersector->embree_;
   LUCERNA_ASSIGN_OR_RETURN(embree.device, NewEmbreeDevice());
   embree.scene = rtcNewScene(embree.device);
@@ -332,7 +333,7 @@ SurfacePoint Intersector::SurfaceAt(const Ray& ray, const Hit& hit) const {
     point.geometric_normal =
         TriangleNormal(p0, mesh.positions[corner[1]], mesh.positions[corner[2]]);
     point.shading_normal = point.geometric_normal;
-    if (!mesh.normals.empty()) {
+    if (has_shading_normals_ && !mesh.normals.empty()) {
       const Vec3 n = mesh.normals[corner[0]] * (1 - hit.u - hit.v) +
                      mesh.normals[corner[1]] * hit.u + mesh.normals[corner[2]] * hit.v;
       const float squared = LengthSquared(n);

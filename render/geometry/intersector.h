@@ -56,10 +56,10 @@ struct SurfacePoint {
 class Intersector {
  public:
   // Keeps a reference to `scene`, which must outlive it and not change. Hits do not depend on
-  // whether triangles are split.
+  // whether triangles are split. Without shading normals every surface is as flat as its triangles.
   // Errors: RESOURCE_EXHAUSTED or INTERNAL with Embree's words.
   [[nodiscard]] static StatusOr<std::unique_ptr<Intersector>> Create(const Scene& scene,
-                                                                     TreeNeeds needs = {});
+                                                                     RayNeeds needs = {});
   ~Intersector();
   Intersector(const Intersector&) = delete;
   Intersector& operator=(const Intersector&) = delete;
@@ -82,11 +82,12 @@ class Intersector {
   [[nodiscard]] std::uint32_t disk_geometry() const { return sphere_geometry_ + 1; }
 
  private:
-  explicit Intersector(const Scene& scene);
+  Intersector(const Scene& scene, bool has_shading_normals);
   struct EmbreeScene;
 
   const Scene& scene_;
   std::unique_ptr<EmbreeScene> embree_;
+  bool has_shading_normals_;
   std::uint32_t sphere_geometry_;
   std::vector<std::uint32_t> first_shape_;  // [geometries] ascending
   Bounds bounds_;

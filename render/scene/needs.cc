@@ -64,6 +64,20 @@ const Material* FirstMaterial(const Scene& scene, const std::vector<std::uint8_t
   return nullptr;
 }
 
+// Whether some vertex normal is another than its triangle's, beyond what six digits leave open.
+bool IsSmoothed(const TriangleMesh& mesh) {
+  if (mesh.normals.empty()) return false;
+  constexpr double kTurned = 1e-5;  // [rad]
+  for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
+    const std::uint32_t* corner = &mesh.indices[i - i % 3];
+    const Double3 normal(mesh.normals[mesh.indices[i]]);
+    const Double3 cross = TriangleCross(mesh.positions[corner[0]], mesh.positions[corner[1]],
+                                        mesh.positions[corner[2]]);
+    if (Length(Cross(normal, cross)) > kTurned * Length(cross)) return true;
+  }
+  return false;
+}
+
 // Curved surfaces that reflect or refract, however roughly.
 bool HasCurvedMirrors(const Scene& scene) {
   const auto scatters = [&](const ShapeTraits& traits) {
@@ -73,7 +87,7 @@ bool HasCurvedMirrors(const Scene& scene) {
   return std::ranges::any_of(scene.spheres,
                              [&](const Sphere& sphere) { return scatters(sphere.traits); }) ||
          std::ranges::any_of(scene.meshes, [&](const TriangleMesh& mesh) {
-           return !mesh.normals.empty() && scatters(mesh.traits);
+           return scatters(mesh.traits) && IsSmoothed(mesh);
          });
 }
 
@@ -206,15 +220,14 @@ SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
     needs.Set(Part::kGlossy, false, "all hitpoints are diffuse");
   }
 
-  std::size_t smoothed = 0;
-  for (const TriangleMesh& mesh : scene.meshes)
-    smoothed += mesh.normals.empty() ? 0 : 1;
-  if (smoothed > 0) {
-    needs.Set(Part::kShadingNormals, true,
-              Concat(smoothed, smoothed == 1 ? " mesh has" : " meshes have", " vertex normals"));
-  } else {
-    needs.Set(Part::kShadingNormals, false, "no mesh has vertex normals");
-  }
+  const auto smoothed = std::ranges::count_if(scene.meshes, IsSmoothed);
+  const bool has_normals = std::ranges::any_of(
+      scene.meshes, [](const TriangleMesh& mesh) { return !mesh.normals.empty(); });
+  needs.Set(Part::kShadingNormals, smoothed > 0,
+            smoothed > 0  ? Concat(smoothed, smoothed == 1 ? " mesh is" : " meshes are",
+                                   " smoothed by vertex normals")
+            : has_normals ? std::string("every vertex normal is that of its triangles")
+                          : std::string("no mesh has vertex normals"));
 
   const Material* textured =
       FirstMaterial(scene, in_use, [](const Material& m) { return m.texture != kNoTexture; });

@@ -62,12 +62,13 @@ inline constexpr std::size_t kParts = static_cast<std::size_t>(Part::kInstances)
 // As users are told: "shading-normals".
 [[nodiscard]] std::string_view NameOf(Part part);
 
-// Which tree rays are traced through.
-struct TreeNeeds {
+// Which tree rays are traced through, and what is asked of their hits.
+struct RayNeeds {
   bool robust_rays = true;
   bool split_triangles = false;
+  bool shading_normals = true;
 
-  bool operator==(const TreeNeeds&) const = default;
+  bool operator==(const RayNeeds&) const = default;
 };
 
 class SceneNeeds {
@@ -96,8 +97,8 @@ class SceneNeeds {
   [[nodiscard]] int eye_sample_sets() const { return eye_sample_sets_; }
   // None of those that Part::kUnseenLamps and Part::kDirectSampling speak of when they are forced.
   [[nodiscard]] const LightsLeftOut& lights_left_out() const { return lights_; }
-  [[nodiscard]] TreeNeeds tree() const {
-    return {Uses(Part::kRobustRays), Uses(Part::kSplitTriangles)};
+  [[nodiscard]] RayNeeds rays() const {
+    return {Uses(Part::kRobustRays), Uses(Part::kSplitTriangles), Uses(Part::kShadingNormals)};
   }
 
   bool operator==(const SceneNeeds&) const = default;

@@ -46,7 +46,7 @@ struct Bench {
     overrides.max_depth = 32;
     settings = SettingsFor(scene, overrides);
     needs = NeedsOf(scene, settings);
-    intersector = Intersector::Create(scene, needs.tree()).value();
+    intersector = Intersector::Create(scene, needs.rays()).value();
     lights = std::make_unique<LightSet>(scene, *intersector, needs);
     estimator = JobEstimator::Create(scene, settings, needs, 1).value();
     eye = estimator->TraceEyePaths(0);

@@ -286,7 +286,7 @@ class Check {
     // With normals, which choose the photons here.
     settings_.use_everything = true;
     needs_ = NeedsOf(scene_, settings_);
-    intersector_ = Intersector::Create(scene_, needs_.tree()).value();
+    intersector_ = Intersector::Create(scene_, needs_.rays()).value();
     lights_ = std::make_unique<LightSet>(scene_, *intersector_, needs_);
     spectra_ = SpectrumTracer::Create(scene_, settings_, needs_, *intersector_, *lights_).value();
   }

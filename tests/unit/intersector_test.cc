@@ -283,6 +283,22 @@ TEST(IntersectorTest, GivesTheSameHitsWhetherTrianglesAreSplitOrNot) {
   EXPECT_GT(met, 5000);
 }
 
+// Without shading normals a hit has the normal of its triangle.
+TEST(IntersectorTest, SmoothsOnlyWhereItIsAsked) {
+  Scene scene;
+  AddQuad(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, AddMaterial(scene, DiffuseMaterial(0.5F)));
+  scene.meshes[0].normals.assign(4, Normalize({1, 0, 1}));
+  const Ray ray = {{0.2F, 0.3F, 1}, {0, 0, -1}, HUGE_VALF};
+  for (const bool smooth : {true, false}) {
+    const auto intersector = Intersector::Create(scene, {.shading_normals = smooth}).value();
+    Hit hit;
+    ASSERT_TRUE(intersector->Intersect(ray, hit));
+    const SurfacePoint point = intersector->SurfaceAt(ray, hit);
+    EXPECT_EQ(point.has_shading_normal, smooth);
+    EXPECT_EQ(point.shading_normal == point.geometric_normal, !smooth);
+  }
+}
+
 // A hit that is computed from the shape alone is the hit that tracing finds: of spheres and disks
 // to the bit, of triangles as near as float tells.
 TEST(IntersectorTest, FindsAHitAgainOnItsShape) {

@@ -123,8 +123,13 @@ INSTANTIATE_TEST_SUITE_P(
         Feature{"vertex_normals",
                 kCamera,
                 "Shape \"trianglemesh\" \"point3 P\" [-1 0 4  1 0 4  1 0 6]\n"
-                "  \"normal N\" [0 1 0  0 1 0  0 1 0]\n",
+                "  \"normal N\" [0 1 0  0 1 0  0 .8 .6]\n",
                 {"shading-normals", "photon-normals"}},
+        Feature{"normals_of_flat_triangles",
+                kCamera,
+                "Shape \"trianglemesh\" \"point3 P\" [-1 0 4  1 0 4  1 0 6]\n"
+                "  \"normal N\" [0 1 0  0 -1 0  2e-7 1 0]\n",
+                {"photon-normals"}},
         Feature{"sky", kCamera, "LightSource \"infinite\"\n", {"environment"}},
         Feature{"lamp",
                 kCamera,
