@@ -242,13 +242,13 @@ TEST(SpectrumTracerTest, SeesTheRimOfAHardSpot) {
 // A flat hitpoint that looks through a narrow lobe sees a point light's beam as its vergence makes
 // the direction change across the surface: s + v² q (1 + p q)⁻¹ in each axis, v = 1/d.
 TEST(SpectrumTracerTest, AGlossyHitpointSeesThroughItsLobe) {
-  Scene scene;
-  AddQuad(scene, {-5, -5, -3}, {10, 0, 0}, {0, 10, 0}, AddMaterial(scene, DiffuseMaterial(0.5F)));
-  scene.point_lights.push_back({{0, 0, 0}, Gray(1)});
-  const SpectrumScene point(scene);
   constexpr double kAlpha = 0.25;
   const double q = 1 / (1.2 * kAlpha * kAlpha);
   const Material glossy = ConductorMaterial(Gray(0.2F), Gray(3), kAlpha, kAlpha);
+  Scene scene;
+  AddQuad(scene, {-5, -5, -3}, {10, 0, 0}, {0, 10, 0}, AddMaterial(scene, glossy));
+  scene.point_lights.push_back({{0, 0, 0}, Gray(1)});
+  const SpectrumScene point(scene);
   const double expected = 2 * (3 + q) / 4;
   EXPECT_NEAR(point.HeadOn(0, {0, 0, -1}, 2, glossy), expected, 0.01 * expected);
   EXPECT_NEAR(point.HeadOn(0, {0, 0, -1}, 2, DiffuseMaterial(0.5F)), 1.5, 0.01);
