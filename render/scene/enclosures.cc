@@ -382,7 +382,7 @@ std::vector<std::uint32_t> ShutOut(const Scene& scene, const std::vector<Numbere
     if (MayBeApart(scene, IsOpaque, eye, light.place)) candidates.push_back(&light);
   }
   if (candidates.empty()) return {};
-  const auto lens = static_cast<float>(scene.camera.lens_radius);
+  const auto lens = static_cast<float>(LensReach(scene.camera));
   const Place camera = lens > 0 ? Place(BoxAround(eye, lens)) : Place(eye);
   std::vector<std::uint32_t> shut_out;
   for (const ClosedSurface& wall : ClosedSurfacesOf(scene, IsOpaque)) {

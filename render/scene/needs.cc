@@ -168,7 +168,7 @@ bool GathersOnOneFloor(const Scene& scene) {
   if (!has_floor) return false;
   const Vec3 eye = scene.camera.camera_to_world.Point({});
   if (Dot(Double3(eye) - origin, up) < 0) up = up * -1;
-  if (!(Dot(Double3(eye) - origin, up) > scene.camera.lens_radius + near)) return false;
+  if (!(Dot(Double3(eye) - origin, up) > LensReach(scene.camera) + near)) return false;
   const auto lies_in_front = [&](Vec3 point, double radius) {
     return Dot(Double3(point) - origin, up) >= radius - near;
   };

@@ -1,5 +1,6 @@
 #include "render/scene/scene.h"
 
+#include <cmath>
 #include <numbers>
 
 namespace lucerna {
@@ -19,6 +20,13 @@ Window ScreenWindow(const Camera& camera, int width, int height) {
   }
   const double scale = std::tan(camera.fov_deg * std::numbers::pi / 360);
   return {window.low_x * scale, window.high_x * scale, window.low_y * scale, window.high_y * scale};
+}
+
+double LensReach(const Camera& camera) {
+  const auto radius = static_cast<float>(camera.lens_radius);
+  const double x = static_cast<double>(Length(camera.camera_to_world.Vector({radius, 0, 0})));
+  const double y = static_cast<double>(Length(camera.camera_to_world.Vector({0, radius, 0})));
+  return std::hypot(x, y);
 }
 
 }  // namespace lucerna

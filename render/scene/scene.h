@@ -196,6 +196,9 @@ struct Camera {
 // as a whole (a crop window shows a part of it).
 [[nodiscard]] Window ScreenWindow(const Camera& camera, int width, int height);
 
+// No point of the lens is farther than this from the camera's own [world]; 0 for a pinhole.
+[[nodiscard]] double LensReach(const Camera& camera);
+
 // The reconstruction filter of the film, separable, in pixels.
 struct PixelFilter {
   enum class Kind : std::uint8_t { kBox, kTriangle, kGaussian, kMitchell };

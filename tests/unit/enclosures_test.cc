@@ -170,7 +170,7 @@ TEST(LightsLeftOutTest, ACameraWithAWideLensSeesBothSides) {
     return FindLightsLeftOut(rooms.scene).of_photons.size();
   };
   EXPECT_EQ(left_out(0), 1U);
-  EXPECT_EQ(left_out(0.5), 1U);
+  EXPECT_EQ(left_out(0.4), 1U);
   EXPECT_EQ(left_out(0.8), 0U);
 }
 
