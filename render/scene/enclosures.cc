@@ -223,24 +223,6 @@ Unions RegionsOf(const Walls& walls, const std::vector<TriangleSide>& sides) {
   return regions;
 }
 
-// Every edge belongs to an even number of them.
-bool IsClosed(const Walls& walls, const std::vector<std::uint32_t>& triangles) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> edges;
-  edges.reserve(3 * triangles.size());
-  for (const std::uint32_t t : triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t a = walls.corners[3 * t + k];
-      const std::uint32_t b = walls.corners[3 * t + (k + 1) % 3];
-      edges.emplace_back(std::min(a, b), std::max(a, b));
-    }
-  }
-  std::ranges::sort(edges);
-  for (std::size_t i = 0; i < edges.size(); i += 2) {
-    if (i + 1 == edges.size() || edges[i] != edges[i + 1]) return false;
-  }
-  return true;
-}
-
 // Where a light is, as far as closed surfaces are concerned.
 class Place {
  public:
@@ -551,8 +533,9 @@ std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene, const Counts& co
   const Walls walls = WallsOf(scene, counts);
   const std::vector<TriangleSide> sides = SidesByEdge(walls.corners, walls.positions.size());
   Unions regions = RegionsOf(walls, sides);
-  // A region is bounded by the triangles that have one side in it. Those that have both are
-  // surrounded by it.
+  // A region is bounded by the triangles that have one side in it; those that have both are
+  // surrounded by it. Around an edge one enters the region as often as one leaves it, so its
+  // boundary has an even number of triangles there: it is closed.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> faces;  // region, triangle
   for (std::uint32_t t = 0; t < walls.size(); ++t) {
     const std::uint32_t front = regions.Find(2 * t);
@@ -567,7 +550,6 @@ std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene, const Counts& co
     std::vector<std::uint32_t> triangles;
     while (end < faces.size() && faces[end].first == faces[begin].first)
       triangles.push_back(faces[end++].second);
-    if (!IsClosed(walls, triangles)) continue;
     told.push_back(std::move(triangles));
   }
   // The same surface from within and from without.

@@ -1,9 +1,9 @@
 // What is left out of a scene because of closed surfaces would have come to nothing.
 //
-// Hundreds of scenes of rooms that share walls, touch, lie in each other, lack a wall or have one of
-// glass, with lamps and the camera anywhere: no photon of a lamp that is left out ever lands where
-// the camera could see it, and no straight line leads from a lamp that is not sampled to a surface
-// that would ask for it.
+// Hundreds of scenes of rooms that share walls, touch, lie in each other, lack a wall or have one
+// of glass, with lamps and the camera anywhere: no photon of a lamp that is left out ever lands
+// where the camera could see it, and no straight line leads from a lamp that is not sampled to a
+// surface that would ask for it.
 #include "render/scene/enclosures.h"
 
 #include <algorithm>
@@ -68,7 +68,11 @@ struct RandomScene {
   // Corners on a coarse lattice, so that rooms touch and share walls; six meshes, of which one may
   // be missing or of another material.
   void AddRoom() {
-    const auto corner = [&] { return static_cast<float>(Below(3)); };
+    const std::int32_t odd_material = Material();
+    // A pane of glass that lies on a wall, or a mirror, is met in its place or not, as rounding has
+    // it.
+    const float off = odd_material == materials[0] ? 0 : 0.01F + 0.05F * rng.Uniform();
+    const auto corner = [&] { return off + static_cast<float>(Below(3)); };
     const Vec3 low = {corner(), corner(), corner()};
     const auto size = [&] { return static_cast<float>(1 + Below(2)); };
     const Vec3 x = {size(), 0, 0};
@@ -81,7 +85,7 @@ struct RandomScene {
     for (int i = 0; i < 6; ++i) {
       if (i == odd && is_missing) continue;
       const auto& quad = quads[static_cast<std::size_t>(i)];
-      AddQuad(scene, quad[0], quad[1], quad[2], i == odd ? Material() : materials[0]);
+      AddQuad(scene, quad[0], quad[1], quad[2], i == odd ? odd_material : materials[0]);
     }
   }
 };

@@ -113,6 +113,35 @@ TEST(BatchTracerTest, TakesEmptyRangesAndBlocks) {
   EXPECT_EQ(nothing.tally.photons, 100U);
 }
 
+// A worker keeps its tracer of a scene for other jobs, which may need other parts of it.
+TEST(BatchTracerTest, MakesForEveryJobWhatItNeeds) {
+  Fixture f;
+  f.scene.point_lights.push_back({{0.5F, 0.5F, 0}, Gray(10)});
+  const SceneNeeds all = NeedsOf(f.scene, f.settings);
+  const LightNumbers numbers(f.scene);
+  const SceneNeeds less(all.parts(), all.eye_sample_sets(), {{numbers.points}, {}});
+  const auto run = [&](BatchTracer& tracer, const SceneNeeds& needs) {
+    return tracer.Run(f.settings, needs, 0, 0, 2000, f.block, f.radii, f.stop).value();
+  };
+  BatchTracer kept(f.scene, 1);
+  const Accumulation with_all = run(kept, all);
+  const Accumulation with_less = run(kept, less);
+  EXPECT_NE(with_less, with_all);
+  EXPECT_EQ(run(kept, all), with_all);
+  BatchTracer fresh(f.scene, 1);
+  EXPECT_EQ(run(fresh, less), with_less);
+}
+
+TEST(BatchTracerTest, RefusesHitpointsThatTheJobDoesNotKnowOf) {
+  Fixture f;
+  f.block.glossy = {{0, 0, 0, 0}};
+  BatchTracer tracer(f.scene, 1);
+  const SceneNeeds needs = NeedsOf(f.scene, f.settings);
+  ASSERT_FALSE(needs.Uses(Part::kPhotonDirections));
+  EXPECT_TRUE(absl::IsInvalidArgument(
+      tracer.Run(f.settings, needs, 0, 0, 10, f.block, f.radii, f.stop).status()));
+}
+
 TEST(BatchTracerTest, RefusesColumnsThatDoNotFit) {
   Fixture f;
   BatchTracer tracer(f.scene, 1);

@@ -158,6 +158,7 @@ TEST(LightsLeftOutTest, AreNotThoseThatMeetTheWall) {
   EXPECT_FALSE(left_out({2, 0.5F, 0.5F}, {0, 1, 0}, {0, 0, 1})) << "in the wall";
   EXPECT_FALSE(left_out({2, 0.5F, 0.5F}, {1, 0, 0}, {0, 0, 1})) << "against the wall";
   EXPECT_FALSE(left_out({1.5F, 0.5F, 0.5F}, {1, 0, 0}, {0, 0, 1})) << "through the wall";
+  EXPECT_FALSE(left_out({2.5F, 0.5F, 0.5F}, {-0.6F, 0, 0}, {0, 0, 1})) << "from outside";
   EXPECT_FALSE(left_out({0.5F, 0.5F, 0.5F}, {0.5F, 0, 0}, {0, 0, 0.5F})) << "in the room";
 }
 
@@ -206,6 +207,16 @@ TEST(LightsLeftOutTest, LampsInGlassAreNotSampled) {
             }),
             Numbers{})
       << "frosted glass is lit itself";
+}
+
+// A ball that shines inwards lights its own inside.
+TEST(LightsLeftOutTest, AFurnaceInGlassIsSampledOnItself) {
+  for (const bool inward : {true, false}) {
+    Rooms rooms;
+    AddSphere(rooms.scene, {1, 1, 1}, 0.5F, rooms.wall, rooms.light, inward);
+    AddSphere(rooms.scene, {1, 1, 1}, 0.9F, rooms.glass);
+    EXPECT_EQ(FindLightsLeftOut(rooms.scene).of_sampling.size(), inward ? 0U : 1U);
+  }
 }
 
 TEST(LightsLeftOutTest, WhatLiesInGlassIsNotLitBySkyThroughIt) {

@@ -355,10 +355,14 @@ TEST(IntersectorTest, KeepsHitsOnTheirTriangle) {
     ASSERT_LE(hit.u + hit.v, 1 + 1e-6F);
     ASSERT_NEAR(hit.t, Length(target), 1e-5F);
   }
-  // In the triangle's own plane.
-  const Hit edge_on =
-      intersector->HitOn(0, {mesh.positions[0], Normalize(Vec3{0.7F, 0.1F, 0}), HUGE_VALF});
-  EXPECT_TRUE(std::isfinite(edge_on.t) && edge_on.u >= 0 && edge_on.v >= 0);
+  // In the triangle's own plane, two units from its middle.
+  Scene flat;
+  AddQuad(flat, {0, 0, 0}, {3, 0, 0}, {0, 3, 0}, AddMaterial(flat, DiffuseMaterial(0.5F)));
+  const auto on_edge = Intersector::Create(flat).value();
+  const Hit edge_on = on_edge->HitOn(0, {{0, 1, 0}, {1, 0, 0}, HUGE_VALF});
+  EXPECT_EQ(edge_on.t, 2);
+  EXPECT_EQ(edge_on.u, 1.0F / 3);
+  EXPECT_EQ(edge_on.v, 1.0F / 3);
 }
 
 TEST(IntersectorTest, GivesEveryThreadTheSameHits) {

@@ -198,6 +198,11 @@ TEST(SceneNeedsTest, OneFloorNeedsNoNormalsOfPhotons) {
   EXPECT_FALSE(needs_normals(from_below)) << "then that is the front";
   SetCamera(from_below, {0, -1, 0}, {0, -1, 5}, {0, 1, 0}, 40, 8);
   EXPECT_TRUE(needs_normals(from_below)) << "the camera lies in the floor";
+  Scene with_lens = floor;
+  with_lens.camera.lens_radius = 0.5;
+  EXPECT_FALSE(needs_normals(with_lens));
+  with_lens.camera.lens_radius = 2;
+  EXPECT_TRUE(needs_normals(with_lens)) << "the lens reaches under the floor";
   Scene tilted = floor;
   AddDisk(tilted, {0, -1, 5}, {0, 0.99995F, 0.01F}, 0.5F, 0);
   EXPECT_TRUE(needs_normals(tilted));
