@@ -51,8 +51,8 @@ def main():
         scratch = pathlib.Path(scratch)
         for scene in arguments.scenes:
             runs = {False: [], True: []}
-            for _ in range(arguments.repetitions):
-                for everything in (False, True):
+            for repetition in range(arguments.repetitions):
+                for everything in ((False, True), (True, False))[repetition % 2]:
                     image = scratch / f"{everything}.exr"
                     runs[everything].append(render(lucerna, scene, arguments, image, everything))
             lean, full = ({key: statistics.median(run[key] for run in runs[everything])
