@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <initializer_list>
 #include <utility>
 #include <vector>
 
@@ -195,196 +196,232 @@ std::string_view NameOf(Part part) {
   return kNames[static_cast<std::size_t>(part)];
 }
 
-SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
-  SceneNeeds needs;
-  const std::vector<std::uint8_t> in_use = MaterialsInUse(scene);
+// Finds the needs of one job, group by group: later groups ask what earlier ones found.
+class NeedsFinder {
+ public:
+  NeedsFinder(const Scene& scene, const RenderSettings& settings)
+      : scene_(scene), settings_(settings), in_use_(MaterialsInUse(scene)) {}
 
-  const Material* gathers =
-      FirstMaterial(scene, in_use, [](const Material& m) { return Gathers(m); });
-
-  const Material* specular = FirstMaterial(
-      scene, in_use, [](const Material& m) { return !Gathers(m) && !IsBlackDiffuse(m); });
-  if (specular != nullptr) {
-    needs.Set(Part::kSpecular, true, Concat("paths go on at ", Quoted(*specular)));
-  } else {
-    needs.Set(Part::kSpecular, false, "every surface gathers photons or is black");
+  SceneNeeds Find() && {
+    FindSurfaces();
+    FindLights();
+    FindPhotons();
+    FindRays();
+    FindEyePaths();
+    FindFrequency();
+    SayWhatIsNotRead();
+    if (settings_.use_everything) ForceEverything();
+    return std::move(needs_);
   }
 
-  const Material* glossy = FirstMaterial(scene, in_use, [](const Material& m) {
-    return Gathers(m) && m.kind != Material::Kind::kDiffuse;
-  });
-  if (glossy != nullptr) {
-    needs.Set(Part::kGlossy, true,
-              Concat("photons are gathered on ", Quoted(*glossy), ", which is not diffuse"));
-  } else {
-    needs.Set(Part::kGlossy, false, "all hitpoints are diffuse");
+ private:
+  void Set(Part part, bool is_used, std::string reason) {
+    needs_.Set(part, is_used, std::move(reason));
+  }
+  // The first material in use that is so; nullptr without one.
+  template <typename Predicate>
+  const Material* First(Predicate is_so) const {
+    return FirstMaterial(scene_, in_use_, is_so);
   }
 
-  const auto smoothed = std::ranges::count_if(scene.meshes, IsSmoothed);
-  const bool has_normals = std::ranges::any_of(
-      scene.meshes, [](const TriangleMesh& mesh) { return !mesh.normals.empty(); });
-  needs.Set(Part::kShadingNormals, smoothed > 0,
-            smoothed > 0  ? Concat(smoothed, smoothed == 1 ? " mesh is" : " meshes are",
-                                   " smoothed by vertex normals")
-            : has_normals ? std::string("every vertex normal is that of its triangles")
-                          : std::string("no mesh has vertex normals"));
+  void FindSurfaces() {
+    gathers_ = First([](const Material& m) { return Gathers(m); });
+    specular_ = First([](const Material& m) { return !Gathers(m) && !IsBlackDiffuse(m); });
+    Set(Part::kSpecular, specular_ != nullptr,
+        specular_ != nullptr ? Concat("paths go on at ", Quoted(*specular_))
+                             : std::string("every surface gathers photons or is black"));
+    glossy_ =
+        First([](const Material& m) { return Gathers(m) && m.kind != Material::Kind::kDiffuse; });
+    Set(Part::kGlossy, glossy_ != nullptr,
+        glossy_ != nullptr
+            ? Concat("photons are gathered on ", Quoted(*glossy_), ", which is not diffuse")
+            : std::string("all hitpoints are diffuse"));
 
-  const Material* textured =
-      FirstMaterial(scene, in_use, [](const Material& m) { return m.texture != kNoTexture; });
-  if (textured != nullptr) {
-    needs.Set(Part::kTextures, true, Concat(Quoted(*textured), " has one"));
-  } else {
-    needs.Set(Part::kTextures, false, "no surface has one");
+    const auto smoothed = std::ranges::count_if(scene_.meshes, IsSmoothed);
+    const bool has_normals = std::ranges::any_of(
+        scene_.meshes, [](const TriangleMesh& mesh) { return !mesh.normals.empty(); });
+    Set(Part::kShadingNormals, smoothed > 0,
+        smoothed > 0  ? Concat(smoothed, smoothed == 1 ? " mesh is" : " meshes are",
+                               " smoothed by vertex normals")
+        : has_normals ? std::string("every vertex normal is that of its triangles")
+                      : std::string("no mesh has vertex normals"));
+
+    textured_ = First([](const Material& m) { return m.texture != kNoTexture; });
+    Set(Part::kTextures, textured_ != nullptr,
+        textured_ != nullptr ? Concat(Quoted(*textured_), " has one")
+                             : std::string("no surface has one"));
+    Set(Part::kRoundShapes, RoundShapes() > 0,
+        RoundShapes() > 0 ? Concat("spheres and disks: ", RoundShapes())
+                          : std::string("everything is made of triangles"));
   }
 
-  const std::size_t round = scene.spheres.size() + scene.disks.size();
-  if (round > 0) {
-    needs.Set(Part::kRoundShapes, true, Concat("spheres and disks: ", round));
-  } else {
-    needs.Set(Part::kRoundShapes, false, "everything is made of triangles");
+  void FindLights() {
+    needs_.lights_ = FindLightsLeftOut(scene_);
+    const LightsLeftOut& left_out = needs_.lights_;
+    const std::size_t count = CountLights(scene_);
+    is_dark_ = left_out.of_photons.size() == count;
+    const std::size_t skies = scene_.infinite_lights.size();
+    const bool is_sky_unseen =
+        skies > 0 && std::ranges::binary_search(left_out.of_photons, LightNumbers(scene_).infinite);
+    Set(Part::kEnvironment, skies > 0 && !is_sky_unseen,
+        skies == 0      ? std::string("there is no infinite light")
+        : is_sky_unseen ? std::string("the camera's side of the scene is closed")
+                        : Concat("infinite lights: ", skies));
+    const std::size_t kinds = scene_.area_lights.size();
+    Set(Part::kAreaLights, kinds > 0,
+        kinds > 0 ? Concat("shapes that emit, of kinds: ", kinds) : std::string("no shape emits"));
+    const std::size_t delta =
+        scene_.point_lights.size() + scene_.spot_lights.size() + scene_.distant_lights.size();
+    Set(Part::kDeltaLights, delta > 0,
+        delta > 0 ? Concat("points, spots and distant lights: ", delta)
+                  : std::string("every light has an extent"));
+
+    std::string unseen;
+    if (const std::size_t shut_out = left_out.of_photons.size(); shut_out > 0) {
+      unseen = Concat("lights that closed walls keep from the camera's side: ", shut_out);
+    }
+    if (const std::size_t away = FacesOfLampsFacingAway(scene_); away > 0) {
+      unseen += Concat(unseen.empty() ? "" : "; ",
+                       "faces of lamps that nothing lies in front of: ", away);
+    }
+    Set(Part::kUnseenLamps, false,
+        unseen.empty() ? "every light may reach what the camera sees" : unseen);
+
+    const bool is_lit = First(ScattersBroadly) != nullptr;
+    const std::size_t shut_in = left_out.of_sampling.size();
+    const bool is_sampled = left_out.of_photons.size() + shut_in < count;
+    Set(Part::kDirectSampling, is_lit && is_sampled,
+        !is_lit    ? std::string("no surface scatters light broadly")
+        : is_dark_ ? std::string(kDark)
+        : !is_sampled
+            ? std::string("smooth surfaces shut every light in: all light comes by photons")
+        : shut_in > 0
+            ? Concat("direct light is sampled, but not of lights that smooth surfaces shut in: ",
+                     shut_in)
+            : std::string("direct light is sampled; photons would be noisier"));
   }
 
-  LightsLeftOut lights = FindLightsLeftOut(scene);
-  const bool is_dark = lights.of_photons.size() == CountLights(scene);
-  needs.Set(Part::kPhotons, gathers != nullptr && !is_dark,
-            gathers == nullptr
-                ? std::string("no surface is rough enough for photons to be gathered on")
-            : is_dark ? std::string("no light comes to what the camera can see")
-                      : Concat("they are gathered on ", Quoted(*gathers)));
-  const LightNumbers numbers(scene);
-  const bool has_sky = !scene.infinite_lights.empty();
-  const bool is_sky_unseen =
-      has_sky && std::ranges::binary_search(lights.of_photons, numbers.infinite);
-  needs.Set(Part::kEnvironment, has_sky && !is_sky_unseen,
-            !has_sky        ? std::string("there is no infinite light")
-            : is_sky_unseen ? std::string("the camera's side of the scene is closed")
-                            : Concat("infinite lights: ", scene.infinite_lights.size()));
-  const bool has_area = !scene.area_lights.empty();
-  needs.Set(Part::kAreaLights, has_area,
-            has_area ? Concat("shapes that emit, of kinds: ", scene.area_lights.size())
-                     : std::string("no shape emits"));
-  const std::size_t delta =
-      scene.point_lights.size() + scene.spot_lights.size() + scene.distant_lights.size();
-  needs.Set(Part::kDeltaLights, delta > 0,
-            delta > 0 ? Concat("points, spots and distant lights: ", delta)
-                      : std::string("every light has an extent"));
-
-  const std::size_t away = FacesOfLampsFacingAway(scene);
-  std::string unseen;
-  if (!lights.of_photons.empty()) {
-    unseen =
-        Concat("lights that closed walls keep from the camera's side: ", lights.of_photons.size());
-  }
-  if (away > 0) {
-    unseen +=
-        Concat(unseen.empty() ? "" : "; ", "faces of lamps that nothing lies in front of: ", away);
-  }
-  needs.Set(Part::kUnseenLamps, false,
-            unseen.empty() ? "every light may reach what the camera sees" : unseen);
-
-  const bool is_lit = FirstMaterial(scene, in_use, ScattersBroadly) != nullptr;
-  const std::size_t sampled =
-      CountLights(scene) - lights.of_photons.size() - lights.of_sampling.size();
-  needs.Set(
-      Part::kDirectSampling, is_lit && sampled > 0,
-      !is_lit   ? std::string("no surface scatters light broadly")
-      : is_dark ? std::string("no light comes to what the camera can see")
-      : sampled == 0
-          ? std::string("smooth surfaces shut every light in: all light comes by photons")
-      : lights.of_sampling.empty()
-          ? std::string("direct light is sampled; photons would be noisier")
-          : Concat("direct light is sampled, but not of lights that smooth surfaces shut in: ",
-                   lights.of_sampling.size()));
-  needs.Set(Part::kPhotonDirections, glossy != nullptr,
-            glossy != nullptr ? "glossy hitpoints ask where light comes from"
-                              : "all hitpoints are diffuse");
-  const bool is_one_floor = glossy == nullptr && GathersOnOneFloor(scene);
-  needs.Set(Part::kPhotonNormals, gathers != nullptr && !is_one_floor,
-            gathers == nullptr ? "no surface gathers light"
-            : is_one_floor     ? "all hitpoints lie on one side of one plane"
-                               : "hitpoints must not take photons from another surface");
-  const std::size_t triangles = scene.TriangleCount();
-  needs.Set(Part::kRobustRays, triangles > 0,
-            triangles > 0 ? "rays must not slip between the triangles of a closed shape"
-                          : "there are no triangles");
-  needs.Set(Part::kSplitTriangles, triangles >= kFewTriangles,
-            triangles >= kFewTriangles
-                ? Concat("rays get through ", triangles, " triangles faster")
-                : Concat("there is little to gain with so few triangles as ", triangles));
-
-  const bool has_lens = scene.camera.lens_radius > 0;
-  needs.Set(Part::kLens, has_lens, has_lens ? "the camera has a lens" : "the camera is a pinhole");
-
-  const std::int64_t pixels =
-      std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()};
-  if (has_lens) {
-    needs.Set(Part::kFreshEyePaths, true, "the camera has a lens");
-  } else if (specular != nullptr) {
-    needs.Set(Part::kFreshEyePaths, true,
-              Concat("eye paths choose at random at ", Quoted(*specular)));
-  } else if (pixels * kEyeSampleSets > kHitpointsOfSets) {
-    needs.Set(Part::kFreshEyePaths, true,
-              Concat(kEyeSampleSets, " sets of ", pixels, " hitpoints are more than workers keep"));
-  } else {
-    needs.Set(Part::kFreshEyePaths, false,
-              Concat("nothing on an eye path is random but its place in the pixel: ",
-                     kEyeSampleSets, " sets of eye paths take turns"));
-    needs.eye_sample_sets_ = kEyeSampleSets;
+  void FindPhotons() {
+    Set(Part::kPhotons, gathers_ != nullptr && !is_dark_,
+        gathers_ == nullptr
+            ? std::string("no surface is rough enough for photons to be gathered on")
+        : is_dark_ ? std::string(kDark)
+                   : Concat("they are gathered on ", Quoted(*gathers_)));
+    Set(Part::kPhotonDirections, glossy_ != nullptr,
+        glossy_ != nullptr ? "glossy hitpoints ask where light comes from"
+                           : "all hitpoints are diffuse");
+    const bool is_one_floor = glossy_ == nullptr && GathersOnOneFloor(scene_);
+    Set(Part::kPhotonNormals, gathers_ != nullptr && !is_one_floor,
+        gathers_ == nullptr ? "no surface gathers light"
+        : is_one_floor      ? "all hitpoints lie on one side of one plane"
+                            : "hitpoints must not take photons from another surface");
   }
 
-  const bool frequency = UsesFrequency(settings.radius_controller);
-  const std::string controller = Concat("radius controller ", NameOf(settings.radius_controller));
-  needs.Set(Part::kFrequency, frequency,
-            Concat(controller, frequency ? " asks for them" : " needs none"));
-  const auto set_frequency_part = [&](Part part, bool is_used, std::string_view why,
-                                      std::string_view why_not) {
-    needs.Set(part, frequency && is_used,
-              std::string(!frequency ? std::string_view("there are no frequency photons")
-                                     : (is_used ? why : why_not)));
-  };
-  const std::size_t shapes = scene.meshes.size() + round;
-  set_frequency_part(Part::kOccluderEdges, shapes > 1 || scene.TriangleCount() > 1,
-                     "shapes cast shadows on each other", "a single face shadows nothing");
-  set_frequency_part(Part::kCurvature, smoothed > 0 || !scene.spheres.empty(),
-                     "there are curved surfaces", "every surface is flat");
-  set_frequency_part(Part::kCurvedMirrors, HasCurvedMirrors(scene), "mirrors or glass are curved",
-                     "every mirror and all glass is flat");
-  set_frequency_part(Part::kTextureDetail, textured != nullptr, "surfaces have textures",
-                     "no surface has a texture");
-  const bool has_map = std::ranges::any_of(scene.infinite_lights,
-                                           [](const auto& light) { return light.map != nullptr; });
-  set_frequency_part(Part::kSkyDetail, has_map, "an environment map lights the scene",
-                     "no environment map lights the scene");
-  set_frequency_part(Part::kGlossyWindow, glossy != nullptr, "there are glossy hitpoints",
-                     "all hitpoints are diffuse");
+  void FindRays() {
+    const std::size_t triangles = scene_.TriangleCount();
+    Set(Part::kRobustRays, triangles > 0,
+        triangles > 0 ? "rays must not slip between the triangles of a closed shape"
+                      : "there are no triangles");
+    Set(Part::kSplitTriangles, triangles >= kFewTriangles,
+        triangles >= kFewTriangles
+            ? Concat("rays get through ", triangles, " triangles faster")
+            : Concat("there is little to gain with so few triangles as ", triangles));
+  }
 
-  needs.Set(Part::kMotion, false, "scenes that move are not read");
-  needs.Set(Part::kMedia, false, "media are not read");
-  needs.Set(Part::kAlphaMasks, false, "alpha masks are not read");
-  needs.Set(Part::kInstances, false,
-            "instances are written out as shapes of their own: one level of acceleration");
+  void FindEyePaths() {
+    const bool has_lens = scene_.camera.lens_radius > 0;
+    Set(Part::kLens, has_lens, has_lens ? "the camera has a lens" : "the camera is a pinhole");
+    const std::int64_t pixels =
+        std::int64_t{settings_.crop_width()} * std::int64_t{settings_.crop_height()};
+    if (has_lens) {
+      Set(Part::kFreshEyePaths, true, "the camera has a lens");
+    } else if (specular_ != nullptr) {
+      Set(Part::kFreshEyePaths, true, Concat("eye paths choose at random at ", Quoted(*specular_)));
+    } else if (pixels * kEyeSampleSets > kHitpointsOfSets) {
+      Set(Part::kFreshEyePaths, true,
+          Concat(kEyeSampleSets, " sets of ", pixels, " hitpoints are more than workers keep"));
+    } else {
+      Set(Part::kFreshEyePaths, false,
+          Concat("nothing on an eye path is random but its place in the pixel: ", kEyeSampleSets,
+                 " sets of eye paths take turns"));
+      needs_.eye_sample_sets_ = kEyeSampleSets;
+    }
+  }
 
-  needs.lights_ = std::move(lights);
-  if (settings.use_everything) {
-    constexpr std::array kForced = {
-        Part::kSpecular,    Part::kGlossy,         Part::kShadingNormals,   Part::kTextures,
-        Part::kUnseenLamps, Part::kDirectSampling, Part::kPhotonDirections, Part::kPhotonNormals,
-        Part::kRobustRays,  Part::kSplitTriangles, Part::kFreshEyePaths};
-    constexpr std::array kForcedWithFrequency = {Part::kOccluderEdges, Part::kCurvature,
-                                                 Part::kCurvedMirrors, Part::kTextureDetail,
-                                                 Part::kSkyDetail,     Part::kGlossyWindow};
-    const auto force = [&](const auto& parts) {
+  void FindFrequency() {
+    const bool is_used = UsesFrequency(settings_.radius_controller);
+    Set(Part::kFrequency, is_used,
+        Concat("radius controller ", NameOf(settings_.radius_controller),
+               is_used ? " asks for them" : " needs none"));
+    const auto set = [&](Part part, bool has_it, std::string_view why, std::string_view why_not) {
+      Set(part, is_used && has_it,
+          std::string(!is_used ? "there are no frequency photons"
+                      : has_it ? why
+                               : why_not));
+    };
+    const std::size_t shapes = scene_.meshes.size() + RoundShapes();
+    set(Part::kOccluderEdges, shapes > 1 || scene_.TriangleCount() > 1,
+        "shapes cast shadows on each other", "a single face shadows nothing");
+    set(Part::kCurvature, needs_.Uses(Part::kShadingNormals) || !scene_.spheres.empty(),
+        "there are curved surfaces", "every surface is flat");
+    set(Part::kCurvedMirrors, HasCurvedMirrors(scene_), "mirrors or glass are curved",
+        "every mirror and all glass is flat");
+    set(Part::kTextureDetail, textured_ != nullptr, "surfaces have textures",
+        "no surface has a texture");
+    const bool has_map = std::ranges::any_of(
+        scene_.infinite_lights, [](const auto& light) { return light.map != nullptr; });
+    set(Part::kSkyDetail, has_map, "an environment map lights the scene",
+        "no environment map lights the scene");
+    set(Part::kGlossyWindow, glossy_ != nullptr, "there are glossy hitpoints",
+        "all hitpoints are diffuse");
+  }
+
+  void SayWhatIsNotRead() {
+    Set(Part::kMotion, false, "scenes that move are not read");
+    Set(Part::kMedia, false, "media are not read");
+    Set(Part::kAlphaMasks, false, "alpha masks are not read");
+    Set(Part::kInstances, false,
+        "instances are written out as shapes of their own: one level of acceleration");
+  }
+
+  void ForceEverything() {
+    const auto force = [&](std::initializer_list<Part> parts) {
       for (const Part part : parts) {
-        if (!needs.Uses(part)) needs.Set(part, true, "everything is forced on");
+        if (!needs_.Uses(part)) Set(part, true, "everything is forced on");
       }
     };
-    force(kForced);
-    if (gathers != nullptr) force(std::array{Part::kPhotons});
-    if (frequency) force(kForcedWithFrequency);
-    needs.eye_sample_sets_ = 0;
-    needs.lights_ = {};
+    force({Part::kSpecular, Part::kGlossy, Part::kShadingNormals, Part::kTextures,
+           Part::kUnseenLamps, Part::kDirectSampling, Part::kPhotonDirections, Part::kPhotonNormals,
+           Part::kRobustRays, Part::kSplitTriangles, Part::kFreshEyePaths});
+    if (gathers_ != nullptr) force({Part::kPhotons});
+    if (needs_.Uses(Part::kFrequency)) {
+      force({Part::kOccluderEdges, Part::kCurvature, Part::kCurvedMirrors, Part::kTextureDetail,
+             Part::kSkyDetail, Part::kGlossyWindow});
+    }
+    needs_.eye_sample_sets_ = 0;
+    needs_.lights_ = {};
   }
-  return needs;
+
+  [[nodiscard]] std::size_t RoundShapes() const {
+    return scene_.spheres.size() + scene_.disks.size();
+  }
+
+  static constexpr std::string_view kDark = "no light comes to what the camera can see";
+
+  const Scene& scene_;
+  const RenderSettings& settings_;
+  const std::vector<std::uint8_t> in_use_;  // [materials]
+  // The first of their kind, or nullptr.
+  const Material* gathers_ = nullptr;
+  const Material* specular_ = nullptr;
+  const Material* glossy_ = nullptr;
+  const Material* textured_ = nullptr;
+  bool is_dark_ = false;
+  SceneNeeds needs_;
+};
+
+SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings) {
+  return NeedsFinder(scene, settings).Find();
 }
 
 }  // namespace lucerna

@@ -104,7 +104,7 @@ class SceneNeeds {
   bool operator==(const SceneNeeds&) const = default;
 
  private:
-  friend SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings);
+  friend class NeedsFinder;
   struct Entry {
     bool is_used = false;
     std::string reason;
