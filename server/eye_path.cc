@@ -29,6 +29,8 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       settings_(settings),
       eye_sets_(needs.eye_sample_sets()),
       walk_(WalkFor(needs)),
+      has_lens_(needs.Uses(Part::kLens)),
+      rays_find_lights_(needs.Uses(Part::kAreaLights) || needs.Uses(Part::kEnvironment)),
       intersector_(intersector),
       lights_(lights),
       filter_x_(scene.filter, scene.filter.radius_x),
@@ -50,7 +52,7 @@ Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& w
   Vec3 origin;
   Vec3 direction = {static_cast<float>(window_low_x_ + film_x * pixel_width_),
                     static_cast<float>(window_high_y_ - film_y * pixel_height_), 1};
-  if (camera.lens_radius > 0) {
+  if (has_lens_) {
     // A thin lens: all rays of one film point meet on the plane of focus.
     const Vec3 focus = direction * static_cast<float>(camera.focal_distance);
     origin = SquareToDisk(u[2], u[3]) * static_cast<float>(camera.lens_radius);
@@ -191,7 +193,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     const Frame frame(surface.shading_normal);
     const SobolPoint u = sampler.ForVertex(vertex);
     if (kParts.lobes && IsSmooth(material)) {
-      if (vertex == 0 && !lights_.OnlyDelta()) {
+      if (vertex == 0 && rays_find_lights_) {
         path.direct += EmissionThrough(surface, wo, sampler.ForBranches(), path.rays);
         emission_was_collected = true;
       }
@@ -222,7 +224,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
 
     if (Gathers(material)) {
       // Half of the direct light: what a scattered ray finds of the lights themselves.
-      if (kParts.lights && scattered && !lights_.OnlyDelta()) {
+      if (kParts.lights && scattered && rays_find_lights_) {
         const Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
         ++path.rays;
         if (!intersector_.Intersect(probe, hit)) {

@@ -78,6 +78,8 @@ class EyePathTracer {
   const RenderSettings& settings_;
   const int eye_sets_;  // see EyeSetOf
   const WalkFunction walk_;
+  const bool has_lens_;
+  const bool rays_find_lights_;  // some have an extent
   const Intersector& intersector_;
   const LightSet& lights_;
   FilterSampler filter_x_, filter_y_;

@@ -220,7 +220,7 @@ Status JobRunner::Open(TracedPass traced) {
 }
 
 bool JobRunner::HasPhotons(const OpenPass& open) const {
-  // None that a camera could see that sees nothing, or without light.
+  // A camera that sees nothing needs none, and without light there are none.
   return open.blobs.hitpoints > 0 && estimator_->needs().Uses(Part::kPhotons);
 }
 

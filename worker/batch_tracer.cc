@@ -139,7 +139,7 @@ Status CheckDeposits(const std::vector<BatchTally>& tallies) {
 struct BatchTracer::State {
   State(Scene s, int threads) : scene(InWorkingSpace(std::move(s))), team(threads) {}
 
-  // Makes what a job with these needs asks for, and keeps what the job before it asked for too.
+  // Makes what a job with these needs asks for; what the job before it asked for too is kept.
   Status Prepare(const SceneNeeds& of_job) {
     if (intersector != nullptr && needs == of_job) return absl::OkStatus();
     spectra.reset();

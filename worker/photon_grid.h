@@ -28,6 +28,8 @@ struct alignas(32) FacingRecord : PhotonRecord {
   std::uint32_t arrival_oct = 0;  // 0 in jobs that have no such column
 };
 
+static_assert(sizeof(PhotonRecord) == 16 && sizeof(FacingRecord) == 32);
+
 class PhotonGrid {
  public:
   // `region` holds all deposits, which come in chunks that have the same columns. Cells are about

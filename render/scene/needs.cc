@@ -260,21 +260,26 @@ class NeedsFinder {
     const LightsLeftOut& left_out = needs_.lights_;
     const std::size_t count = CountLights(scene_);
     is_dark_ = left_out.of_photons.size() == count;
+    const LightNumbers numbers(scene_);
+    // Lights [first, last), of which there are `all`.
+    const auto tell = [&](Part part, std::size_t all, std::uint32_t first, std::uint32_t last,
+                          std::string_view what, std::string_view none) {
+      const auto shut_out = static_cast<std::size_t>(std::ranges::count_if(
+          left_out.of_photons, [&](std::uint32_t n) { return n >= first && n < last; }));
+      Set(part, shut_out < all,
+          shut_out < all ? Concat(what, ": ", all - shut_out)
+          : all > 0      ? std::string("closed walls keep all of them from the camera's side")
+                         : std::string(none));
+    };
     const std::size_t skies = scene_.infinite_lights.size();
-    const bool is_sky_unseen =
-        skies > 0 && std::ranges::binary_search(left_out.of_photons, LightNumbers(scene_).infinite);
-    Set(Part::kEnvironment, skies > 0 && !is_sky_unseen,
-        skies == 0      ? std::string("there is no infinite light")
-        : is_sky_unseen ? std::string("the camera's side of the scene is closed")
-                        : Concat("infinite lights: ", skies));
-    const std::size_t kinds = scene_.area_lights.size();
-    Set(Part::kAreaLights, kinds > 0,
-        kinds > 0 ? Concat("shapes that emit, of kinds: ", kinds) : std::string("no shape emits"));
     const std::size_t delta =
         scene_.point_lights.size() + scene_.spot_lights.size() + scene_.distant_lights.size();
-    Set(Part::kDeltaLights, delta > 0,
-        delta > 0 ? Concat("points, spots and distant lights: ", delta)
-                  : std::string("every light has an extent"));
+    tell(Part::kEnvironment, skies, numbers.infinite, numbers.end, "infinite lights",
+         "there is no infinite light");
+    tell(Part::kAreaLights, count - delta - skies, 0, numbers.points, "shapes that emit",
+         "no shape emits");
+    tell(Part::kDeltaLights, delta, numbers.points, numbers.infinite,
+         "points, spots and distant lights", "every light has an extent");
 
     std::string unseen;
     if (const std::size_t shut_out = left_out.of_photons.size(); shut_out > 0) {

@@ -96,7 +96,6 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
     }
     Add(emitter, numbers.disks + i);
   }
-  only_delta_ = emitters_.empty();
   for (std::uint32_t i = 0; i < scene.point_lights.size(); ++i) {
     Emitter emitter;
     emitter.kind = Kind::kPoint;
@@ -135,7 +134,6 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
     if (!IsBlack(environment.MeanRadiance())) environments_.push_back(std::move(environment));
   }
   if (!IsBlack(infinite_radiance_)) {
-    only_delta_ = false;
     infinite_emitter_ = static_cast<std::int64_t>(emitters_.size());
     Emitter emitter;
     emitter.kind = Kind::kInfinite;
@@ -146,7 +144,6 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
   }
   first_environment_ = emitters_.size();
   for (std::uint32_t i = 0; i < environments_.size(); ++i) {
-    only_delta_ = false;
     Emitter emitter;
     emitter.kind = Kind::kEnvironment;
     emitter.primitive = i;

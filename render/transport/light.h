@@ -73,9 +73,6 @@ class LightSet {
   // How many lights (a mesh is one) have so small a share of the power, 1e-9, that hardly a photon
   // ever comes from them: what they light directly is right, and what that light lights is dark.
   [[nodiscard]] std::size_t faint_lights() const { return faint_lights_; }
-  // True when all emitters are points or single directions, which no ray can hit.
-  [[nodiscard]] bool OnlyDelta() const { return only_delta_; }
-
   // Draws a photon. u_choice picks the emitter, in double because a lamp may have less than 2^-24
   // of the power; u_place and u_direction the rest. False when
   // the numbers give nothing (outside a spot's cone).
@@ -126,7 +123,6 @@ class LightSet {
   std::int64_t infinite_emitter_ = -1;
   std::vector<EnvironmentMap> environments_;  // those that are not black
   std::size_t first_environment_ = 0;         // emitter of the first
-  bool only_delta_ = true;
   std::size_t faint_lights_ = 0;
 };
 

@@ -160,7 +160,6 @@ TEST(SampleDirectTest, GivesDeltaLightsTheirIrradiance) {
   {
     const Lit lit(scene);
     ASSERT_TRUE(lit.lights.SampleDirect({0, 0, 0}, 0.5F, 0.1F, 0.2F, sample));
-    EXPECT_TRUE(lit.lights.OnlyDelta());
     EXPECT_EQ(sample.pdf, 0);
     EXPECT_EQ(sample.target, (Vec3{0, 3, 4}));
     EXPECT_FLOAT_EQ(sample.radiance_over_pdf.r, 10.0F / 25);

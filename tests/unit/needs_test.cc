@@ -223,6 +223,9 @@ TEST(SceneNeedsTest, LightsThatAreShutInAreLeftOut) {
             "lights that closed walls keep from the camera's side: 1");
   const LightNumbers numbers(scene);
   EXPECT_EQ(hidden.lights_left_out().of_photons, std::vector<std::uint32_t>{numbers.spheres});
+  EXPECT_FALSE(hidden.Uses(Part::kAreaLights));
+  EXPECT_EQ(hidden.ReasonOf(Part::kAreaLights),
+            "closed walls keep all of them from the camera's side");
   EXPECT_TRUE(hidden.Uses(Part::kDirectSampling)) << "of the point light";
 
   Scene in_glass = scene;
