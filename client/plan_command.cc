@@ -24,10 +24,11 @@ std::string Bytes(double bytes) {
 
 Status PrintPlan(const std::string& scene_path, const RenderFlags& flags, const Voice& voice) {
   LUCERNA_ASSIGN_OR_RETURN(const RenderOverrides overrides, ToOverrides(flags));
-  LUCERNA_ASSIGN_OR_RETURN(const SceneOfJobs scene,
-                           ReadSceneOfJobs(scene_path, {&overrides, 1}, voice.quiet));
-  const RenderSettings& settings = scene.settings.front();
-  const SceneNeeds& needs = scene.needs.front();
+  Scene scene;
+  LUCERNA_ASSIGN_OR_RETURN(const SceneOfJobs read,
+                           ReadSceneOfJobs(scene_path, {&overrides, 1}, voice.quiet, &scene));
+  const RenderSettings& settings = read.settings.front();
+  const SceneNeeds needs = NeedsOf(scene, settings);
   const ExpectedCost cost = ExpectedCostOf(needs, settings);
   if (voice.json) {
     std::fputs(PlanReport(needs, cost).c_str(), stdout);

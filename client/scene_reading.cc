@@ -26,11 +26,12 @@ StatusOr<SceneManifest> ReadScene(const std::string& path, const RenderOverrides
 }
 
 StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
-                                      std::span<const RenderOverrides> overrides, bool quiet) {
+                                      std::span<const RenderOverrides> overrides, bool quiet,
+                                      Scene* scene) {
   LUCERNA_RETURN_IF_ERROR(CheckNamesFile(path));
   const ScenePath place = SplitScenePath(path);
   DirectoryFiles files(place.folder);
-  const ParsedScene parsed = ParsePbrt(files, place.main);
+  ParsedScene parsed = ParsePbrt(files, place.main);
   std::size_t errors = 0;
   for (const Diagnostic& diagnostic : parsed.diagnostics) {
     const bool is_error = diagnostic.severity == Diagnostic::Severity::kError;
@@ -43,17 +44,17 @@ StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
                                                    errors == 1 ? " error" : " errors",
                                                    "; correct the scene and try again"));
   }
-  SceneOfJobs scene;
+  SceneOfJobs read;
   for (const RenderOverrides& of_job : overrides) {
     const auto settings = ResolveSettings(of_job, parsed.scene);
     if (!settings.ok()) {
       return Failure(ExitCode::kUsage, std::string(settings.status().message()));
     }
-    scene.settings.push_back(*settings);
-    scene.needs.push_back(NeedsOf(parsed.scene, *settings));
+    read.settings.push_back(*settings);
   }
-  scene.manifest = files.Manifest(place.main);
-  return scene;
+  read.manifest = files.Manifest(place.main);
+  if (scene != nullptr) *scene = std::move(parsed.scene);
+  return read;
 }
 
 }  // namespace lucerna

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "client/render_flags.h"
-#include "render/scene/needs.h"
 #include "render/scene/pbrt_parser.h"
 #include "render/scene/scene_files.h"
 
@@ -35,10 +34,10 @@ struct ScenePath {
 struct SceneOfJobs {
   SceneManifest manifest;
   std::vector<RenderSettings> settings;  // as many as there are overrides
-  std::vector<SceneNeeds> needs;         // of each
 };
+// The scene itself goes to `scene`, if somebody wants it.
 [[nodiscard]] StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
                                                     std::span<const RenderOverrides> overrides,
-                                                    bool quiet);
+                                                    bool quiet, Scene* scene = nullptr);
 
 }  // namespace lucerna
