@@ -369,7 +369,7 @@ class NeedsFinder {
         "shapes cast shadows on each other", "a single face shadows nothing");
     set(Part::kCurvature, needs_.Uses(Part::kShadingNormals) || !scene_.spheres.empty(),
         "there are curved surfaces", "every surface is flat");
-    set(Part::kCurvedMirrors, HasCurvedMirrors(scene_), "mirrors or glass are curved",
+    set(Part::kCurvedMirrors, is_used && HasCurvedMirrors(scene_), "mirrors or glass are curved",
         "every mirror and all glass is flat");
     set(Part::kTextureDetail, textured_ != nullptr, "surfaces have textures",
         "no surface has a texture");

@@ -32,8 +32,15 @@ float OneMinusCosine(float sin2_max) {
 }  // namespace
 
 LightSet::LightSet(const Scene& scene, const Intersector& intersector, const SceneNeeds& needs)
-    : scene_(scene), left_out_(needs.lights_left_out()) {
+    : scene_(scene) {
   const LightNumbers numbers(scene);
+  const auto add = [&](Emitter emitter, std::uint32_t number) {
+    const LightsLeftOut& left_out = needs.lights_left_out();
+    if (std::ranges::binary_search(left_out.of_photons, number)) emitter.power = {};
+    emitter.is_sampled =
+        Luminance(emitter.power) > 0 && !std::ranges::binary_search(left_out.of_sampling, number);
+    emitters_.push_back(emitter);
+  };
   const bool sends_unseen = needs.Uses(Part::kUnseenLamps);
   const Bounds& bounds = intersector.bounds();
   if (!bounds.empty()) {
@@ -71,7 +78,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
       if (!sends_unseen && !emitter.two_sided && FacesAway(p0, normal, bounds)) {
         emitter.power = {};
       }
-      Add(emitter, m);
+      add(emitter, m);
     }
   }
   for (std::uint32_t i = 0; i < scene.spheres.size(); ++i) {
@@ -81,7 +88,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
     Emitter emitter =
         area_emitter(Kind::kSphere, sphere.traits, 4 * kPi * sphere.radius * sphere.radius);
     emitter.primitive = i;
-    Add(emitter, numbers.spheres + i);
+    add(emitter, numbers.spheres + i);
   }
   for (std::uint32_t i = 0; i < scene.disks.size(); ++i) {
     const Disk& disk = scene.disks[i];
@@ -94,7 +101,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
     if (!sends_unseen && !emitter.two_sided && FacesAway(disk.center, disk.normal, bounds)) {
       emitter.power = {};
     }
-    Add(emitter, numbers.disks + i);
+    add(emitter, numbers.disks + i);
   }
   for (std::uint32_t i = 0; i < scene.point_lights.size(); ++i) {
     Emitter emitter;
@@ -102,7 +109,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
     emitter.primitive = i;
     emitter.radiance = scene.point_lights[i].intensity;
     emitter.power = emitter.radiance * (4 * kPi);
-    Add(emitter, numbers.points + i);
+    add(emitter, numbers.points + i);
   }
   for (std::uint32_t i = 0; i < scene.spot_lights.size(); ++i) {
     const SpotLight& spot = scene.spot_lights[i];
@@ -115,7 +122,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
         emitter.radiance *
         (2 * kPi *
          ((1 - spot.cos_falloff_start) + 0.5F * (spot.cos_falloff_start - spot.cos_total_width)));
-    Add(emitter, numbers.spots + i);
+    add(emitter, numbers.spots + i);
   }
   for (std::uint32_t i = 0; i < scene.distant_lights.size(); ++i) {
     Emitter emitter;
@@ -123,7 +130,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
     emitter.primitive = i;
     emitter.radiance = scene.distant_lights[i].irradiance;
     emitter.power = emitter.radiance * (kPi * radius_ * radius_);
-    Add(emitter, numbers.distant + i);
+    add(emitter, numbers.distant + i);
   }
   for (const InfiniteLight& light : scene.infinite_lights) {
     if (light.map == nullptr) {
@@ -140,7 +147,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
     emitter.radiance = infinite_radiance_;
     emitter.power = emitter.radiance * (4 * kPi * kPi * radius_ * radius_);
     // Infinite lights are shut out together or not at all.
-    Add(emitter, numbers.infinite);
+    add(emitter, numbers.infinite);
   }
   first_environment_ = emitters_.size();
   for (std::uint32_t i = 0; i < environments_.size(); ++i) {
@@ -149,7 +156,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
     emitter.primitive = i;
     emitter.radiance = environments_[i].MeanRadiance();
     emitter.power = emitter.radiance * (4 * kPi * kPi * radius_ * radius_);
-    Add(emitter, numbers.infinite);
+    add(emitter, numbers.infinite);
   }
 
   ShareOut();
@@ -203,13 +210,6 @@ void LightSet::ShareOut() {
     emitters_[i].choice = static_cast<float>(choice);
     emitters_[i].direct_choice = static_cast<float>(direct_choice);
   }
-}
-
-void LightSet::Add(Emitter emitter, std::uint32_t number) {
-  if (std::ranges::binary_search(left_out_.of_photons, number)) emitter.power = {};
-  emitter.is_sampled =
-      Luminance(emitter.power) > 0 && !std::ranges::binary_search(left_out_.of_sampling, number);
-  emitters_.push_back(emitter);
 }
 
 const Emitter& LightSet::Choose(const std::vector<double>& cumulative, double u) const {

@@ -100,8 +100,6 @@ class LightSet {
  private:
   using Kind = EmitterKind;
 
-  // `number` is that of the light (LightNumbers).
-  void Add(Emitter emitter, std::uint32_t number);
   // Fills in the choices of all emitters.
   void ShareOut();
   [[nodiscard]] const Emitter& Choose(const std::vector<double>& cumulative, double u) const;
@@ -110,7 +108,6 @@ class LightSet {
                float& clearance) const;
 
   const Scene& scene_;
-  LightsLeftOut left_out_;
   Vec3 center_;
   float radius_ = 0;  // of the scene's bounding sphere
   std::vector<Emitter> emitters_;
