@@ -31,6 +31,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       walk_(WalkFor(needs)),
       has_lens_(needs.Uses(Part::kLens)),
       rays_find_lights_(needs.Uses(Part::kAreaLights) || needs.Uses(Part::kEnvironment)),
+      caustic_weight_(scene, settings, intersector.bounds()),
       intersector_(intersector),
       lights_(lights),
       filter_x_(scene.filter, scene.filter.radius_x),
@@ -71,7 +72,8 @@ EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass, First first) cons
   float filter_weight = 1;
   EyePath path = (this->*walk_)(CameraRay(sampler, x, y, filter_weight), sampler, first);
   path.direct *= filter_weight;
-  path.weight *= filter_weight;
+  path.hitpoint.weight *= filter_weight;
+  path.caustic.weight *= path.caustic_strength * filter_weight;
   return path;
 }
 
@@ -157,6 +159,18 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   // tree of their branches: a small lamp seen in glass would otherwise be one bright speck in
   // thousands of passes.
   bool emission_was_collected = false;
+  // The last surface that gathers caustic photons, as long as only smooth ones have come since.
+  struct Receiver {
+    float scatter_pdf = 0, cosine = 0;
+    bool is_last = false;
+    bool was_left_smoothly = false;
+  };
+  [[maybe_unused]] Receiver receiver;
+  const auto share_of_rays = [&](float emission_density) {
+    if (!kParts.caustics || !receiver.was_left_smoothly) return 1.0F;
+    return caustic_weight_.OfRays(emission_density, receiver.cosine, receiver.scatter_pdf);
+  };
+  [[maybe_unused]] KeyedRng caustic_rng = sampler.ForCaustics();
 
   for (int vertex = 0;; ++vertex) {
     Hit hit;
@@ -166,7 +180,8 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       const float mis = scatter_pdf > 0
                             ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(ray.direction))
                             : 1;
-      path.direct += weight * lights_.InfiniteRadiance(ray.direction) * mis;
+      path.direct += weight * lights_.InfiniteRadiance(ray.direction) *
+                     (mis * share_of_rays(lights_.EmissionDensityInfinite(ray.direction)));
       return path;
     }
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
@@ -178,7 +193,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
           scatter_pdf > 0
               ? PowerHeuristic(scatter_pdf, lights_.PdfDirect(scatter_position, surface))
               : 1;
-      path.direct += weight * emitted * mis;
+      path.direct += weight * emitted * (mis * share_of_rays(lights_.EmissionDensity(surface)));
     }
     [[maybe_unused]] std::optional<Material> textured;
     const Material& material = [&]() -> const Material& {
@@ -222,6 +237,19 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       }
     }
 
+    const auto hitpoint_here = [&](bool is_glossy, const Material& here) {
+      EyeHitpoint hitpoint;
+      hitpoint.position = surface.position;
+      hitpoint.normal = FaceForward(surface.geometric_normal, wo);
+      hitpoint.is_glossy = is_glossy;
+      hitpoint.material = surface.material;
+      hitpoint.to_eye = wo;
+      hitpoint.shading_normal = surface.shading_normal;
+      if (here.texture != kNoTexture && is_glossy) hitpoint.textured_k = here.k;
+      hitpoint.weight = weight;
+      hitpoint.footprint = length * static_cast<float>(std::sqrt(pixel_width_ * pixel_height_));
+      return hitpoint;
+    };
     if (Gathers(material)) {
       // Half of the direct light: what a scattered ray finds of the lights themselves.
       if (kParts.lights && scattered && rays_find_lights_) {
@@ -239,16 +267,25 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
           }
         }
       }
-      path.has_hitpoint = true;
-      path.position = surface.position;
-      path.normal = FaceForward(surface.geometric_normal, wo);
-      path.is_glossy = kParts.lobes && material.kind != Material::Kind::kDiffuse;
-      path.material = surface.material;
-      path.to_eye = wo;
-      path.shading_normal = surface.shading_normal;
-      path.weight = path.is_glossy ? weight : weight * material.reflectance * kInversePi;
-      path.footprint = length * static_cast<float>(std::sqrt(pixel_width_ * pixel_height_));
+      const bool is_glossy = kParts.lobes && material.kind != Material::Kind::kDiffuse;
+      path.hitpoint = hitpoint_here(is_glossy, material);
+      if (!is_glossy) path.hitpoint.weight *= material.reflectance * kInversePi;
       return path;
+    }
+    if constexpr (kParts.caustics) {
+      if (IsSmooth(material)) {
+        receiver.was_left_smoothly = receiver.is_last;
+      } else {
+        receiver = {sample.pdf, sample.wi.z, true, false};
+        // One of them is drawn in proportion to what it weighs, and stands for all.
+        const float strength = MaxChannel(weight);
+        path.caustic_strength += strength;
+        if (caustic_rng.Uniform() * path.caustic_strength < strength) {
+          path.caustic = hitpoint_here(true, material);
+          path.caustic.weight *= 1 / strength;
+        }
+
+      }
     }
 
     if (!scattered) return path;
@@ -268,10 +305,12 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
 EyePathTracer::WalkFunction EyePathTracer::WalkFor(const SceneNeeds& needs) {
   static constexpr auto kWalks = []<std::size_t... kBits>(std::index_sequence<kBits...>) {
     return std::array<WalkFunction, sizeof...(kBits)>{&EyePathTracer::Walk<WalkParts{
-        (kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0, (kBits & 8) != 0}>...};
+        (kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0 || kBits >= 16, (kBits & 8) != 0,
+        kBits >= 16}>...};
   }
-  (std::make_index_sequence<16>());
-  return kWalks[WalkPartsOf(needs) | (needs.Uses(Part::kDirectSampling) ? 8U : 0U)];
+  (std::make_index_sequence<32>());
+  return kWalks[WalkPartsOf(needs) | (needs.Uses(Part::kDirectSampling) ? 8U : 0U) |
+                (needs.Uses(Part::kCausticHitpoints) ? 16U : 0U)];
 }
 
 }  // namespace lucerna

@@ -9,6 +9,7 @@
 #include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
+#include "render/transport/caustic_weight.h"
 #include "render/transport/light.h"
 #include "server/pixel_sampler.h"
 
@@ -21,19 +22,27 @@ struct EyeFeatures {
   float distance = HUGE_VALF;  // along the path [scene units]
 };
 
-// The end of one eye path.
-struct EyePath {
-  Rgb direct;  // radiance that needs no photons
-  EyeFeatures features;
-  bool has_hitpoint = false;
-  // Of the hitpoint; meaningful when there is one.
+// Where an eye path waits for photons.
+struct EyeHitpoint {
   Vec3 position;
   Vec3 normal;  // geometric, on the eye's side
   bool is_glossy = false;
   std::uint32_t material = 0;
   Vec3 to_eye, shading_normal;  // glossy only
-  Rgb weight;                   // from gathered flux density to radiance
+  Rgb textured_k;               // of a conductor with a texture
+  Rgb weight;                   // from gathered flux density to radiance; black: no hitpoint
   float footprint = 0;          // width of the pixel at the hitpoint [scene units]
+};
+
+// The end of one eye path.
+struct EyePath {
+  Rgb direct;  // radiance that needs no photons
+  EyeFeatures features;
+  EyeHitpoint hitpoint;
+  // One of the surfaces on the way that gather caustic photons, with the weight that stands for all
+  // of them; glossy.
+  EyeHitpoint caustic;
+  float caustic_strength = 0;  // sum of the weights of those surfaces, largest channels
   int rays = 0;
 };
 
@@ -62,6 +71,7 @@ class EyePathTracer {
     bool shading_normals = false;
     bool lobes = false;   // other scattering than diffuse
     bool lights = false;  // that are sampled
+    bool caustics = false;  // hitpoints for caustic photons
   };
   template <WalkParts kParts>
   [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler, First first) const;
@@ -80,6 +90,7 @@ class EyePathTracer {
   const WalkFunction walk_;
   const bool has_lens_;
   const bool rays_find_lights_;  // some have an extent
+  const CausticWeight caustic_weight_;
   const Intersector& intersector_;
   const LightSet& lights_;
   FilterSampler filter_x_, filter_y_;

@@ -13,8 +13,8 @@ constexpr int kTile = 16;
 
 // A pixel's width at the hitpoint, held where a radius in such units has a square. A camera that
 // touches a surface sees it in no width at all.
-float UnitRadius(const EyePath& path) {
-  return std::clamp(path.footprint, 1e-17F, 1e14F);
+float UnitRadius(const EyeHitpoint& hitpoint) {
+  return std::clamp(hitpoint.footprint, 1e-17F, 1e14F);
 }
 
 }  // namespace
@@ -41,9 +41,14 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     Rgb weight;
     float unit_radius;
   };
-  struct Tile {
+  struct Rows {
     std::vector<Row> rows;
     std::vector<GlossyHitpoint> glossy;  // by row of the tile
+    std::vector<Rgb> textured_k;         // [glossy]
+  };
+  struct Tile {
+    Rows rows;
+    Rows caustic_rows;
   };
   const bool automatic = tracer.settings().initial_radius == 0;
   std::vector<Tile> per_tile(tiles);
@@ -64,14 +69,19 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
           out.direct[pixel] = path.direct;
           out.features[pixel] = path.features;
           rays[tile] += static_cast<std::uint64_t>(path.rays);
-          if (!path.has_hitpoint || IsBlack(path.weight)) continue;
-          if (path.is_glossy) {
-            per_tile[tile].glossy.push_back({static_cast<std::uint32_t>(per_tile[tile].rows.size()),
-                                             path.material, EncodeOctahedral(path.to_eye),
-                                             EncodeOctahedral(path.shading_normal)});
-          }
-          per_tile[tile].rows.push_back({pixel, path.position, EncodeOctahedral(path.normal),
-                                         path.weight, automatic ? UnitRadius(path) : 1.0F});
+          const auto keep = [&](const EyeHitpoint& hitpoint, Rows& rows) {
+            if (IsBlack(hitpoint.weight)) return;
+            if (hitpoint.is_glossy) {
+              rows.glossy.push_back({static_cast<std::uint32_t>(rows.rows.size()),
+                                     hitpoint.material, EncodeOctahedral(hitpoint.to_eye),
+                                     EncodeOctahedral(hitpoint.shading_normal)});
+              rows.textured_k.push_back(hitpoint.textured_k);
+            }
+            rows.rows.push_back({pixel, hitpoint.position, EncodeOctahedral(hitpoint.normal),
+                                 hitpoint.weight, automatic ? UnitRadius(hitpoint) : 1.0F});
+          };
+          keep(path.hitpoint, per_tile[tile].rows);
+          keep(path.caustic, per_tile[tile].caustic_rows);
         }
       }
     }
@@ -80,28 +90,46 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   if (known != nullptr) known->is_known = true;
 
   std::size_t count = 0;
-  for (const Tile& tile : per_tile)
-    count += tile.rows.size();
+  bool has_textured_k = false;
+  for (const Tile& tile : per_tile) {
+    count += tile.rows.rows.size() + tile.caustic_rows.rows.size();
+    out.block.caustic_rows += tile.caustic_rows.rows.size();
+    for (const Rows* rows : {&tile.rows, &tile.caustic_rows}) {
+      has_textured_k = has_textured_k || std::ranges::any_of(rows->textured_k,
+                                                             [](Rgb k) { return !IsBlack(k); });
+    }
+  }
   out.block.positions.reserve(count);
   out.block.normals_oct.reserve(count);
   out.pixels.reserve(count);
   out.weights.reserve(count);
   out.unit_radii.reserve(count);
-  for (std::size_t tile = 0; tile < tiles; ++tile) {
-    out.rays += rays[tile];
+  const auto append = [&](Rows& rows) {
     const auto first = static_cast<std::uint32_t>(out.block.size());
-    for (GlossyHitpoint glossy : per_tile[tile].glossy) {
+    for (GlossyHitpoint glossy : rows.glossy) {
       glossy.hitpoint += first;
       out.block.glossy.push_back(glossy);
     }
-    for (const Row& row : per_tile[tile].rows) {
+    if (has_textured_k) {
+      out.block.textured_k.insert(out.block.textured_k.end(), rows.textured_k.begin(),
+                                  rows.textured_k.end());
+    }
+    for (const Row& row : rows.rows) {
       out.block.positions.push_back(row.position);
       out.block.normals_oct.push_back(row.normal_oct);
       out.pixels.push_back(row.pixel);
       out.weights.push_back(row.weight);
       out.unit_radii.push_back(row.unit_radius);
     }
-    per_tile[tile] = {};
+    rows = {};
+  };
+  for (std::size_t tile = 0; tile < tiles; ++tile) {
+    out.rays += rays[tile];
+    append(per_tile[tile].rows);
+  }
+  if (out.block.caustic_rows > 0) {
+    for (Tile& tile : per_tile)
+      append(tile.caustic_rows);
   }
   return out;
 }

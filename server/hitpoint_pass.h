@@ -30,7 +30,19 @@ struct EyePass {
   std::vector<EyeFeatures> features;
   std::uint64_t rays = 0;
 
-  [[nodiscard]] HitpointRows rows() const { return {pixels, weights, unit_radii}; }
+  // The rows that gather all photons but caustic ones, and those that gather these.
+  [[nodiscard]] HitpointRows rows() const {
+    return Rows(0, pixels.size() - block.caustic_rows);
+  }
+  [[nodiscard]] HitpointRows caustic_rows() const {
+    return Rows(pixels.size() - block.caustic_rows, block.caustic_rows);
+  }
+
+ private:
+  [[nodiscard]] HitpointRows Rows(std::size_t first, std::size_t count) const {
+    return {std::span(pixels).subspan(first, count), std::span(weights).subspan(first, count),
+            std::span(unit_radii).subspan(first, count), first};
+  }
 };
 
 // Traces one eye path for every pixel. Depends on the tracer's job and `pass` alone; `known` (or

@@ -56,15 +56,25 @@ struct JobEstimator::State {
   std::unique_ptr<RadiusController> controller;
   FluxScale scale;
   std::unique_ptr<PixelStatistics> statistics;
+  // Of the hitpoints that gather caustic photons; nullptr where there are none.
+  std::unique_ptr<PixelStatistics> caustics;
   std::unique_ptr<Film> film;
   std::unique_ptr<ErrorStatistics> errors;
   std::uint64_t eye_rays = 0;
 
+  // Radiance over all passes that photons brought, in the working space.
+  [[nodiscard]] RgbSum PhotonSum(std::size_t pixel) const {
+    RgbSum sum = statistics->radiance_sum()[pixel];
+    if (caustics == nullptr) return sum;
+    for (std::size_t c = 0; c < 3; ++c)
+      sum[c] += caustics->radiance_sum()[pixel][c];
+    return sum;
+  }
   // Radiance over all passes, Rec. 709.
   [[nodiscard]] RgbSum Sum(std::size_t pixel) const {
-    RgbSum sum = film->direct_sum()[pixel];
+    RgbSum sum = PhotonSum(pixel);
     for (std::size_t c = 0; c < 3; ++c)
-      sum[c] += statistics->radiance_sum()[pixel][c];
+      sum[c] += film->direct_sum()[pixel][c];
     return ToRec709(sum);
   }
 };
@@ -91,6 +101,10 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   state->controller = MakeRadiusController(state->settings, initial);
   state->statistics =
       std::make_unique<PixelStatistics>(pixels, initial, state->controller->MemoryPerPixel());
+  if (state->needs.Uses(Part::kCausticHitpoints)) {
+    state->caustics =
+        std::make_unique<PixelStatistics>(pixels, initial, state->controller->MemoryPerPixel());
+  }
   state->film = std::make_unique<Film>(width, height, state->scene.film.exposure,
                                        state->scene.film.max_component);
   state->errors = std::make_unique<ErrorStatistics>(pixels);
@@ -102,16 +116,24 @@ EyePass JobEstimator::TraceEyePaths(std::uint64_t pass) const {
 }
 
 RadiusColumn JobEstimator::Radii(const EyePass& pass) const {
-  return state_->statistics->Radii(pass.rows(), pass.pass);
+  RadiusColumn radii = state_->statistics->Radii(pass.rows(), pass.pass);
+  if (pass.block.caustic_rows > 0) {
+    const RadiusColumn caustic = state_->caustics->Radii(pass.caustic_rows(), pass.pass);
+    radii.insert(radii.end(), caustic.begin(), caustic.end());
+  }
+  return radii;
 }
 
 void JobEstimator::Apply(const EyePass& pass, const RadiusColumn& radii, const PassSums& sums) {
   LUCERNA_CHECK(static_cast<std::int64_t>(pass.pass) == passes_applied());
   std::vector<RgbSum> photons(pass.direct.size());
   std::vector<double> bias(photons.size());
-  state_->statistics->AddPhotons(pass.rows(), radii, sums, state_->scale,
-                                 Kernel{state_->settings.kernel}, state_->settings.photons_per_pass,
-                                 *state_->controller, photons, bias);
+  const auto add = [&](PixelStatistics& statistics, const HitpointRows& rows) {
+    statistics.AddPhotons(rows, radii, sums, state_->scale, Kernel{state_->settings.kernel},
+                          state_->settings.photons_per_pass, *state_->controller, photons, bias);
+  };
+  add(*state_->statistics, pass.rows());
+  if (state_->caustics != nullptr) add(*state_->caustics, pass.caustic_rows());
   std::vector<RgbSum> radiance(photons.size());
   for (std::size_t pixel = 0; pixel < radiance.size(); ++pixel) {
     photons[pixel] = ToRec709(photons[pixel]);
@@ -147,8 +169,8 @@ std::uint64_t JobEstimator::eye_rays() const {
 }
 
 Image JobEstimator::MakeImage() const {
-  Image image = state_->film->MakeImage(*state_->statistics, *state_->controller,
-                                        Kernel{state_->settings.kernel});
+  Image image = state_->film->MakeImage(*state_->statistics, state_->caustics.get(),
+                                        *state_->controller, Kernel{state_->settings.kernel});
   ToFileUnit(image, state_->scene.unit);
   if (passes_applied() < 2) return image;
   // Single pixels: their own variance over passes, made as large in all as the halves say it is.
@@ -178,7 +200,7 @@ ErrorEstimate JobEstimator::EstimateError(int look) const {
     PixelSums sums;
     const RgbSum all = state_->Sum(pixel);
     // Bias is known as a luminance: it has the colour that the photons have.
-    RgbSum photons = state_->statistics->radiance_sum()[pixel];
+    RgbSum photons = state_->PhotonSum(pixel);
     const double luminance = LuminanceOf(photons);
     photons = ToRec709(photons);
     for (std::size_t c = 0; c < 3; ++c) {

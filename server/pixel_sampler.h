@@ -41,6 +41,10 @@ class PixelSampler {
 
   // Independent numbers for the tree of specular branches.
   [[nodiscard]] KeyedRng ForBranches() const { return KeyedRng(CombineKeys(~key_, pass_)); }
+  // Independent numbers for the choice of the hitpoint for caustic photons.
+  [[nodiscard]] KeyedRng ForCaustics() const {
+    return KeyedRng(CombineKeys(key_ ^ 0x4341555354494353ULL, pass_));
+  }
 
  private:
   std::uint64_t key_;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -27,7 +29,14 @@ constexpr std::uint64_t kPhotonsPerChunk = 2048;
 constexpr std::uint64_t kMostDepositsPerChunk = std::uint64_t{1} << 20;
 constexpr std::uint64_t kChunksPerThread = 8;  // traced before deposits are counted again
 
-Status CheckBlock(const HitpointBlock& block, const RadiusColumn& radii, const Scene& scene) {
+Status CheckBlock(const HitpointBlock& block, const RadiusColumn& radii, const Scene& scene,
+                  const SceneNeeds& needs) {
+  if (block.caustic_rows > 0 && !needs.Uses(Part::kCausticHitpoints)) {
+    return absl::InvalidArgumentError("there are caustic hitpoints, but the job needs none");
+  }
+  if (block.glossy.size() > block.caustic_rows && !needs.Uses(Part::kPhotonDirections)) {
+    return absl::InvalidArgumentError("there are glossy hitpoints, but the job needs none");
+  }
   if (block.normals_oct.size() != block.size() || radii.size() != block.size()) {
     return absl::InvalidArgumentError("hitpoint columns and radii differ in length");
   }
@@ -61,7 +70,9 @@ Bounds RegionOf(const HitpointBlock& block, const RadiusColumn& radii, float rad
 
 // Cells twice as wide as the middle radius: a hitpoint meets two to three of them along an axis,
 // and a few very large or small radii do not spoil the grid for the others.
-float CellWidth(RadiusColumn radii) {
+float CellWidth(std::span<const float> of_hitpoints) {
+  if (of_hitpoints.empty()) return 0;
+  RadiusColumn radii(of_hitpoints.begin(), of_hitpoints.end());
   const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
   std::nth_element(radii.begin(), middle, radii.end());
   return 2 * *middle;
@@ -172,10 +183,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
                                         std::uint64_t pass, std::uint64_t first, std::uint64_t last,
                                         const HitpointBlock& block, const RadiusColumn& radii,
                                         const std::atomic<bool>& stop) {
-  LUCERNA_RETURN_IF_ERROR(CheckBlock(block, radii, state_->scene));
-  if (!block.glossy.empty() && !needs.Uses(Part::kPhotonDirections)) {
-    return absl::InvalidArgumentError("there are glossy hitpoints, but the job needs none");
-  }
+  LUCERNA_RETURN_IF_ERROR(CheckBlock(block, radii, state_->scene, needs));
   const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
   Accumulation sum;
   if (block.size() == 0 || first >= last) {
@@ -185,7 +193,10 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
   }
   LUCERNA_RETURN_IF_ERROR(state_->Prepare(needs));
   const Bounds region = RegionOf(block, radii, ReachOf(evidence));
-  const float cell = CellWidth(radii);
+  const std::size_t first_caustic = block.size() - block.caustic_rows;
+  const float cell = CellWidth(std::span(radii).first(first_caustic));
+  const float caustic_cell = CellWidth(std::span(radii).subspan(first_caustic));
+  const CausticWeight caustic_weight(state_->scene, settings, state_->intersector->bounds());
   if (evidence == Evidence::kFrequency &&
       (state_->spectra == nullptr || !state_->spectra->Suits(settings))) {
     LUCERNA_ASSIGN_OR_RETURN(state_->spectra,
@@ -205,6 +216,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     const std::uint64_t part = next;
     const std::uint64_t part_end = std::min(last, part + kPhotonsPerPart);
     std::vector<Deposits> deposits;
+    std::vector<Deposits> caustics;
     std::vector<BatchTally> tallies;
     std::vector<std::vector<std::uint64_t>> dropped;
     std::uint64_t found = 0;
@@ -213,6 +225,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
       const std::size_t before = tallies.size();
       const auto chunks = static_cast<std::size_t>((round_end - next + per_chunk - 1) / per_chunk);
       deposits.resize(before + chunks);
+      caustics.resize(before + chunks);
       tallies.resize(before + chunks);
       dropped.resize(before + chunks);
       state_->team.For(chunks, 1, [&](std::size_t begin, std::size_t end) {
@@ -229,11 +242,12 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
           tally.photons = chunk_last - chunk_first;
           tally.rays = landed.rays;
           tally.dropped = landed.dropped;
-          tally.deposits = landed.deposits.size();
+          tally.deposits = landed.deposits.size() + landed.caustics.size();
           tally.excess = landed.excess;
           tally.energy = landed.energy;
           dropped[before + chunk] = std::move(landed.dropped_photons);
           deposits[before + chunk] = std::move(landed.deposits);
+          caustics[before + chunk] = std::move(landed.caustics);
         }
       });
       for (std::size_t chunk = before; chunk < tallies.size(); ++chunk)
@@ -243,9 +257,16 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     if (stop) return absl::CancelledError("the batch was given up");
     LUCERNA_RETURN_IF_ERROR(CheckDeposits(tallies));
     const PhotonGrid grid(deposits, region, cell, state_->team);
+    std::optional<PhotonGrid> caustic_grid;
+    GatheredPhotons photons{.grid = grid};
+    if (block.caustic_rows > 0) {
+      caustic_grid.emplace(caustics, region, caustic_cell, state_->team);
+      photons.caustics = &*caustic_grid;
+      photons.caustic_weight = &caustic_weight;
+    }
     Accumulation accumulation =
-        Gather(block, radii, grid, state_->scene.materials, Kernel{settings.kernel}, state_->scale,
-               state_->team, stop, evidence);
+        Gather(block, radii, photons, state_->scene.materials, Kernel{settings.kernel},
+               state_->scale, state_->team, stop, evidence);
     for (const BatchTally& tally : tallies)
       accumulation.tally += tally;
     for (const std::vector<std::uint64_t>& named : dropped) {

@@ -1,6 +1,7 @@
 #include "worker/gather.h"
 
 #include <cmath>
+#include <optional>
 
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
@@ -120,7 +121,7 @@ struct FrequencyEvidence {
   FrequencyEvidence(Vec3 /*normal*/, const FluxScale& scale) : weight_scale(WeightScale(scale)) {}
   void Add(const PhotonGrid& grid, std::size_t photon, Vec3 /*to_photon*/, float /*squared*/,
            float squared_radius, float weight) {
-    const float trace = grid.trace(photon);
+    const float trace = grid.has_traces() ? grid.trace(photon) : -1;
     if (!(trace >= 0)) return;
     // In double: the terms span ten decades, and each is rounded once.
     const auto w = static_cast<double>(std::min(weight * weight_scale, kLargestWeight));
@@ -148,7 +149,7 @@ struct FrequencyEvidence {
 template <KernelKind kKernel, typename EvidenceSums, bool kNormals>
 void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const PhotonGrid& grid,
                const GlossyHitpoint* glossy, const std::vector<Material>& materials,
-               const FluxScale& scale, Piece& piece) {
+               const CausticWeight* caustic_weight, const FluxScale& scale, Piece& piece) {
   const auto hitpoint = static_cast<std::uint32_t>(row);
   const Vec3 position = block.positions[row];
   const Vec3 normal = DecodeOctahedral(block.normals_oct[row]);
@@ -198,7 +199,14 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux));
     });
   } else {
-    const Material& material = materials[glossy->material];
+    const Material& untextured = materials[glossy->material];
+    std::optional<Material> textured;
+    if (!block.textured_k.empty() && untextured.texture != kNoTexture) {
+      textured = untextured;
+      textured->eta = Gray(1);
+      textured->k = block.textured_k[static_cast<std::size_t>(glossy - block.glossy.data())];
+    }
+    const Material& material = textured ? *textured : untextured;
     const Frame frame(DecodeOctahedral(glossy->shading_normal_oct));
     const Vec3 wo = frame.ToLocal(DecodeOctahedral(glossy->to_eye_oct));
     const bool transmits = material.kind == Material::Kind::kDielectric;
@@ -209,7 +217,11 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       const bool is_behind = transmits && Dot(photon.normal, normal) < 0;
       if (!Counts(photon.normal, is_behind ? -normal : normal, to_photon)) return;
       const Vec3 wi = frame.ToLocal(DecodeOctahedral(photon.arrival_oct));
-      const Rgb scattered = photon.flux * EvaluateBsdf(material, wo, wi, Carried::kRadiance);
+      Rgb scattered = photon.flux * EvaluateBsdf(material, wo, wi, Carried::kRadiance);
+      if (caustic_weight != nullptr) {
+        scattered *= caustic_weight->OfPhotons(grid.emission_density(i), wi.z,
+                                               PdfBsdf(material, wo, wi));
+      }
       if (!scale.HasRoomFor(scattered)) {
         ++piece.excess;
         return;
@@ -231,9 +243,10 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
 
 template <KernelKind kKernel, typename EvidenceSums, bool kNormals>
 Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
-                       const PhotonGrid& grid, const std::vector<Material>& materials,
+                       const GatheredPhotons& photons, const std::vector<Material>& materials,
                        const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
   const std::size_t rows = block.size();
+  const std::size_t first_caustic = rows - block.caustic_rows;
   const std::size_t piece_count = (rows + kRowsPerPiece - 1) / kRowsPerPiece;
   std::vector<Piece> pieces(piece_count);
   team.For(piece_count, 1, [&](std::size_t begin, std::size_t end) {
@@ -247,9 +260,15 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
           [](const GlossyHitpoint& g, std::size_t row) { return g.hitpoint < row; });
       for (std::size_t row = first; row < last && !stop.load(std::memory_order_relaxed); ++row) {
         const bool is_glossy = glossy != block.glossy.end() && glossy->hitpoint == row;
-        GatherRow<kKernel, EvidenceSums, kNormals>(block, row, radii[row], grid,
-                                                   is_glossy ? &*glossy++ : nullptr, materials,
-                                                   scale, piece);
+        const GlossyHitpoint* glossy_here = is_glossy ? &*glossy++ : nullptr;
+        if (row < first_caustic) {
+          GatherRow<kKernel, EvidenceSums, kNormals>(block, row, radii[row], photons.grid,
+                                                     glossy_here, materials, nullptr, scale, piece);
+        } else if (photons.caustics != nullptr) {
+          GatherRow<kKernel, EvidenceSums, true>(block, row, radii[row], *photons.caustics,
+                                                 glossy_here, materials, photons.caustic_weight,
+                                                 scale, piece);
+        }
       }
     }
   });
@@ -315,14 +334,17 @@ float ReachOf(Evidence evidence) {
   return evidence == Evidence::kCurvature ? kCurvatureReach : 1;
 }
 
-Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii, const PhotonGrid& grid,
-                    const std::vector<Material>& materials, const Kernel& kernel,
-                    const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop,
-                    Evidence evidence) {
-  LUCERNA_CHECK(grid.size() == 0 || block.glossy.empty() || grid.has_normals());
-  const GatherFunction gather = grid.has_normals() ? Specialised<true>(kernel.kind, evidence)
-                                                   : Specialised<false>(kernel.kind, evidence);
-  return gather(block, radii, grid, materials, scale, team, stop);
+Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
+                    const GatheredPhotons& photons, const std::vector<Material>& materials,
+                    const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,
+                    const std::atomic<bool>& stop, Evidence evidence) {
+  const bool has_normals = photons.grid.has_normals();
+  LUCERNA_CHECK(photons.grid.size() == 0 || block.glossy.size() == block.caustic_rows ||
+                has_normals);
+  LUCERNA_CHECK(photons.caustics == nullptr || photons.caustic_weight != nullptr);
+  const GatherFunction gather = has_normals ? Specialised<true>(kernel.kind, evidence)
+                                            : Specialised<false>(kernel.kind, evidence);
+  return gather(block, radii, photons, materials, scale, team, stop);
 }
 
 }  // namespace lucerna

@@ -10,9 +10,19 @@
 #include "render/estimate/kernel.h"
 #include "render/math/fixed_point.h"
 #include "render/scene/scene.h"
+#include "render/transport/caustic_weight.h"
 #include "worker/photon_grid.h"
 
 namespace lucerna {
+
+// What the hitpoints gather from.
+struct GatheredPhotons {
+  const PhotonGrid& grid;
+  // Caustic photons with normals, arrivals and emission densities, and the share of light that is
+  // theirs; for the block's caustic rows, nullptr where there are none.
+  const PhotonGrid* caustics = nullptr;
+  const CausticWeight* caustic_weight = nullptr;
+};
 
 // How far from a hitpoint photons are looked for, in radii.
 [[nodiscard]] float ReachOf(Evidence evidence);
@@ -27,7 +37,8 @@ namespace lucerna {
 // so neither threads nor the order of photons can be seen in the result. Once `stop` is true it
 // ends soon, with a result of no use.
 [[nodiscard]] Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
-                                  const PhotonGrid& grid, const std::vector<Material>& materials,
+                                  const GatheredPhotons& photons,
+                                  const std::vector<Material>& materials,
                                   const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,
                                   const std::atomic<bool>& stop,
                                   Evidence evidence = Evidence::kNone);

@@ -125,10 +125,11 @@ StatusOr<LeaseRunner::Fetched> LeaseRunner::Fetch(const std::shared_ptr<Held>& h
   const LentBatch& batch = held->batch;
   const std::size_t pixels = static_cast<std::size_t>(batch.settings.crop_width()) *
                              static_cast<std::size_t>(batch.settings.crop_height());
+  const std::size_t per_pixel = batch.needs.Uses(Part::kCausticHitpoints) ? 2 : 1;
   Fetched fetched;
   fetched.held = held;
   LUCERNA_ASSIGN_OR_RETURN(fetched.tracer, cache_.TracerFor(batch.scene));
-  LUCERNA_ASSIGN_OR_RETURN(fetched.block, cache_.BlockFor(batch.block, pixels));
+  LUCERNA_ASSIGN_OR_RETURN(fetched.block, cache_.BlockFor(batch.block, pixels * per_pixel));
   LUCERNA_ASSIGN_OR_RETURN(fetched.radii, cache_.RadiiFor(batch.radii, fetched.block->size()));
   return fetched;
 }

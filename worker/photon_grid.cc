@@ -86,6 +86,8 @@ PhotonGrid::PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& regi
   const auto has = [&](auto Deposits::*column) {
     return std::ranges::any_of(deposits, [&](const Deposits& d) { return !(d.*column).empty(); });
   };
+  const bool has_densities = has(&Deposits::emission_densities);
+  if (has_densities) emission_densities_.resize(count);
   const auto place_all = [&](auto with_normals, auto with_traces) {
     team.For(groups, 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t group = begin; group < end; ++group) {
@@ -105,6 +107,7 @@ PhotonGrid::PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& regi
               records_[out] = {deposit.flux, deposit.key};
             }
             if constexpr (with_traces) traces_[out] = chunk.traces[i];
+            if (has_densities) emission_densities_[out] = chunk.emission_densities[i];
           }
         }
       }

@@ -51,6 +51,10 @@ class PhotonGrid {
   }
   // See Deposits. Requires that there is such a column.
   [[nodiscard]] float trace(std::size_t photon) const { return traces_[photon]; }
+  [[nodiscard]] bool has_traces() const { return !traces_.empty(); }
+  [[nodiscard]] float emission_density(std::size_t photon) const {
+    return emission_densities_[photon];
+  }
   [[nodiscard]] Vec3 position(std::size_t photon) const {
     return {x_[photon], y_[photon], z_[photon]};
   }
@@ -74,7 +78,8 @@ class PhotonGrid {
   // [photons], one of them, the other empty.
   std::vector<PhotonRecord> records_;
   std::vector<FacingRecord> facing_;
-  std::vector<float> traces_;  // [photons] or empty
+  std::vector<float> traces_;              // [photons] or empty
+  std::vector<float> emission_densities_;  // [photons] or empty
 };
 
 }  // namespace lucerna

@@ -114,12 +114,13 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       spectra_(spectra),
       region_(region),
       scale_(FluxScale::ForPower(lights.TotalPower())),
-      walk_(WalkPartsOf(needs)),
+      walk_(WalkPartsOf(needs) | (needs.Uses(Part::kCausticHitpoints) ? 8U : 0U)),
       keep_(needs.Uses(Part::kPhotonDirections) ? KeepColumns<true, true>
             : needs.Uses(Part::kPhotonNormals)  ? KeepColumns<true, false>
                                                 : KeepColumns<false, false>) {
   for (const Material& material : scene.materials) {
     gathers_.push_back(Gathers(material) ? 1 : 0);
+    gathers_caustics_.push_back(GathersCaustics(material) ? 1 : 0);
   }
   const double power = static_cast<double>(Luminance(lights.TotalPower()));
   // At the ends of the float range the scale is held where it is a normal number.
@@ -164,7 +165,10 @@ PhotonHistory PhotonPathTracer::Replay(std::uint64_t pass, std::uint64_t index) 
   HistoryWatcher watcher(history);
   Landed landed;
   // A spectrum follows the walk and never changes it.
-  history.end = Walk<WalkParts{false, true, true, true}>(KeyOf(pass, index), landed, watcher);
+  history.end =
+      (walk_ & 8) != 0
+          ? Walk<WalkParts{false, true, true, true, true}>(KeyOf(pass, index), landed, watcher)
+          : Walk<WalkParts{false, true, true, true, false}>(KeyOf(pass, index), landed, watcher);
   return history;
 }
 
@@ -173,9 +177,11 @@ PhotonEnd PhotonPathTracer::WalkUnseen(const Key& key, Landed& landed) const {
   using Function = PhotonEnd (PhotonPathTracer::*)(const Key&, Landed&, NoWatcher&) const;
   static constexpr auto kWalks = []<std::size_t... kBits>(std::index_sequence<kBits...>) {
     return std::array<Function, sizeof...(kBits)>{&PhotonPathTracer::Walk<
-        WalkParts{kSpectrum, (kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0}, NoWatcher>...};
+        WalkParts{kSpectrum, (kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0 || kBits >= 8,
+                  kBits >= 8},
+        NoWatcher>...};
   }
-  (std::make_index_sequence<8>());
+  (std::make_index_sequence<16>());
   NoWatcher nobody;
   return (this->*kWalks[walk_])(key, landed, nobody);
 }
@@ -207,6 +213,8 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
   };
   [[maybe_unused]] SpectrumTracer::Carried spectrum;
   if constexpr (kParts.spectrum) spectrum = spectra_->Leave(emission);
+  // Whether only smooth surfaces have been met.
+  [[maybe_unused]] bool is_caustic = true;
   for (int landing = 0; landing < settings_.max_depth; ++landing) {
     Hit hit;
     ++landed.rays;
@@ -238,10 +246,28 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     }
     if (is_smoothed) book(EnergyOf(flux), energy.smoothing);
     const bool gathers = landing > 0 && gathers_[surface.material] != 0;
-    const bool leaves_deposit = gathers && scale_.HasRoomFor(flux);
-    if (gathers && !leaves_deposit) ++landed.excess;
-    const bool is_found = leaves_deposit && Inside(region_, surface.position);
-    watcher.Received(flux, gathers_[surface.material] != 0, landing > 0, leaves_deposit);
+    bool gathers_caustic = false;
+    if constexpr (kParts.caustics) {
+      gathers_caustic = is_caustic && landing > 0 && gathers_caustics_[surface.material] != 0;
+      is_caustic = is_caustic && IsSmooth(material);
+    }
+    const bool leaves_deposit = (gathers || gathers_caustic) && scale_.HasRoomFor(flux);
+    if ((gathers || gathers_caustic) && !leaves_deposit) ++landed.excess;
+    const bool is_kept = leaves_deposit && Inside(region_, surface.position);
+    const bool is_found = is_kept && gathers;
+    watcher.Received(flux, gathers_[surface.material] != 0 || gathers_caustic, landing > 0,
+                     leaves_deposit);
+    if constexpr (kParts.caustics) {
+      if (is_kept && gathers_caustic) {
+        // A key that is not drawn: the rest of the walk is that of a job without such hitpoints.
+        constexpr std::uint64_t kCausticKey = 0x434155535449434BULL;
+        const auto caustic_key =
+            static_cast<std::uint32_t>(CombineKeys(key.job_key ^ kCausticKey, key.number) >> 32);
+        landed.caustics.rows.push_back({surface.position, flux, caustic_key});
+        KeepColumns<true, true>(landed.caustics, surface, wo);
+        landed.caustics.emission_densities.push_back(emission.density);
+      }
+    }
     if constexpr (kParts.spectrum) {
       // A surface that scatters light broadly forgets the shadows on it: after a leg of length d at
       // most 4/d² of any detail is left, of none at all 3/d² (see LeaveDiffuse).

@@ -42,6 +42,8 @@ struct Deposits {
   std::vector<std::uint32_t> arrivals_oct;  // directions back to where it came from, octahedral
   // Spectral traces [1/length²], below 0 for photons without a spectrum.
   std::vector<float> traces;
+  // See Emission::density; of caustic photons.
+  std::vector<float> emission_densities;
 
   [[nodiscard]] std::size_t size() const { return rows.size(); }
 };
@@ -96,6 +98,8 @@ class PhotonPathTracer {
   // What the photons of a range left.
   struct Landed {
     Deposits deposits;
+    // Photons that have met only smooth surfaces, on surfaces where eye paths go on.
+    Deposits caustics;
     std::uint64_t rays = 0;
     // Photons given up because a number was not finite, and the first kDroppedNamed of them by
     // index, when photons are traced in order of their indices.
@@ -126,6 +130,7 @@ class PhotonPathTracer {
     bool textures = false;
     bool shading_normals = false;
     bool lobes = false;  // other scattering than diffuse
+    bool caustics = false;  // deposits for hitpoints of caustic photons
   };
   // The walk of one photon; with a watcher only for a replay.
   template <WalkParts kParts, typename Watcher>
@@ -142,10 +147,11 @@ class PhotonPathTracer {
   const RenderSettings& settings_;
   const SpectrumTracer* spectra_;  // nullptr: no frequency photons
   Bounds region_;
-  std::vector<std::uint8_t> gathers_;  // [materials]
+  std::vector<std::uint8_t> gathers_;           // [materials]
+  std::vector<std::uint8_t> gathers_caustics_;  // [materials]
   FluxScale scale_;
   float energy_per_watt_ = 1;
-  std::size_t walk_ = 0;  // see WalkPartsOf
+  std::size_t walk_ = 0;  // see WalkPartsOf; bit 3: WalkParts::caustics
   // Adds to the columns that the job has beside those of every job.
   using KeepFunction = void (*)(Deposits& deposits, const SurfacePoint& surface, Vec3 wo);
   KeepFunction keep_;

@@ -12,11 +12,14 @@
 //   H1  All columns that are present have `size()` rows; glossy columns have glossy.size() rows.
 //   H2  Positions are finite; normals are unit length up to the 2 × 16 bit octahedral rounding.
 //   H3  Glossy rows are in increasing order of hitpoint.
+//   H4  The last `caustic_rows` rows are glossy ones: they gather caustic photons, and all rows
+//       before them the other ones.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "render/math/rgb.h"
 #include "render/math/vector.h"
 
 namespace lucerna {
@@ -35,6 +38,9 @@ struct HitpointBlock {
   std::vector<Vec3> positions;             // [hitpoints]
   std::vector<std::uint32_t> normals_oct;  // [hitpoints] geometric, on the eye's side
   std::vector<GlossyHitpoint> glossy;      // [glossy hitpoints]
+  // [glossy hitpoints] or empty: absorption of conductors whose material has a texture, else 0.
+  std::vector<Rgb> textured_k;
+  std::size_t caustic_rows = 0;
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
   bool operator==(const HitpointBlock&) const = default;

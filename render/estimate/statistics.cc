@@ -43,7 +43,7 @@ void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& r
                                  std::int64_t photons_per_pass,
                                  const RadiusController& controller,
                                  std::span<RgbSum> radiance, std::span<double> bias) {
-  LUCERNA_CHECK(rows.pixels.size() == sums.size() && radii.size() == sums.size() &&
+  LUCERNA_CHECK(rows.first + rows.pixels.size() <= sums.size() && radii.size() == sums.size() &&
                 sums.evidence().size() >= kCommonColumns);
   const auto pass = static_cast<std::uint64_t>(passes_);
   for (std::size_t pixel = 0; pixel < radius_.size(); ++pixel)
@@ -52,30 +52,31 @@ void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& r
   const double luminance_per_quantum = static_cast<double>(Luminance(scale.watts_per_quantum));
   constexpr double kToBias = 1 / (1 - static_cast<double>(kInnerShare * kInnerShare));
   const double per_photon = kernel.Norm() / static_cast<double>(photons_per_pass);
-  for (std::size_t row = 0; row < radii.size(); ++row) {
+  for (std::size_t row = 0; row < rows.pixels.size(); ++row) {
+    const std::size_t block_row = rows.first + row;
     const std::uint32_t pixel = rows.pixels[row];
-    const auto radius = static_cast<double>(radii[row]);
+    const auto radius = static_cast<double>(radii[block_row]);
     const double to_density = per_photon / (radius * radius);
     RgbSum& sum = radiance_sum_[pixel];
     for (int channel = 0; channel < 3; ++channel) {
       const auto c = static_cast<std::size_t>(channel);
-      const double flux = static_cast<double>(sums.flux(channel)[row]) *
+      const double flux = static_cast<double>(sums.flux(channel)[block_row]) *
                           static_cast<double>(scale.watts_per_quantum[channel]);
       const double value = static_cast<double>(rows.weights[row][channel]) * flux * to_density;
       sum[c] += value;
       radiance[pixel][c] += value;
     }
-    photon_count_[pixel] += sums.counts()[row];
-    last_radius_[pixel] = radii[row];
+    photon_count_[pixel] += sums.counts()[block_row];
+    last_radius_[pixel] = radii[block_row];
     last_unit_radius_[pixel] = rows.unit_radii[row];
     for (std::size_t column = 0; column < columns.size(); ++column) {
-      columns[column] = sums.evidence()[column][row];
+      columns[column] = sums.evidence()[column][block_row];
     }
-    bias[pixel] = static_cast<double>(columns[kBlurColumn]) * luminance_per_quantum * to_density *
+    bias[pixel] += static_cast<double>(columns[kBlurColumn]) * luminance_per_quantum * to_density *
                   kToBias * static_cast<double>(Luminance(rows.weights[row]));
     radius_[pixel] = controller.Next(
         radius_[pixel],
-        {static_cast<double>(sums.counts()[row]),
+        {static_cast<double>(sums.counts()[block_row]),
          radius / static_cast<double>(rows.unit_radii[row]),
          std::span<const std::int64_t>(columns).subspan(kCommonColumns)},
         pass, std::span<double>(memory_).subspan(pixel * memory_per_pixel_, memory_per_pixel_));

@@ -21,11 +21,12 @@
 
 namespace lucerna {
 
-// The hitpoints of one pass and what belongs to each of them.
+// Hitpoints of one pass, neighbouring rows of its block, and what belongs to each of them.
 struct HitpointRows {
   std::span<const std::uint32_t> pixels;  // row -> pixel; a pixel has at most one row
   std::span<const Rgb> weights;           // from gathered flux density to radiance
   std::span<const float> unit_radii;      // length of a radius of 1 [scene units]
+  std::size_t first = 0;                  // row of the block that is the first here
 };
 
 class PixelStatistics {
@@ -37,8 +38,8 @@ class PixelStatistics {
   // before the one before it. Requires passes() <= pass <= passes() + 1.
   [[nodiscard]] RadiusColumn Radii(const HitpointRows& rows, std::uint64_t pass) const;
 
-  // Takes in the merged photons of a pass that were gathered with `radii`. Adds what they bring to
-  // `radiance` and sets `bias`, both [pixels], for ErrorStatistics.
+  // Takes in the merged photons of a pass that were gathered with `radii`, both of all rows of the
+  // block. Adds what they bring to `radiance` and `bias`, both [pixels], for ErrorStatistics.
   void AddPhotons(const HitpointRows& rows, const RadiusColumn& radii, const PassSums& sums,
                   const FluxScale& scale, const Kernel& kernel, std::int64_t photons_per_pass,
                   const RadiusController& controller, std::span<RgbSum> radiance,

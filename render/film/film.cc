@@ -36,8 +36,8 @@ void Film::Add(std::size_t pixel, Rgb direct, Rgb albedo, Vec3 normal, float dis
   ++features.hits;
 }
 
-Image Film::MakeImage(const PixelStatistics& statistics, const RadiusController& controller,
-                      const Kernel& kernel) const {
+Image Film::MakeImage(const PixelStatistics& statistics, const PixelStatistics* caustics,
+                      const RadiusController& controller, const Kernel& kernel) const {
   LUCERNA_CHECK(statistics.passes() > 0);
   Image image;
   image.width = width_;
@@ -72,7 +72,12 @@ Image Film::MakeImage(const PixelStatistics& statistics, const RadiusController&
   const double to_pixel = exposure_ / static_cast<double>(statistics.passes());
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     RgbSum from_direct = ToRec709(direct_sum_[pixel]);
-    RgbSum from_photons = ToRec709(statistics.radiance_sum()[pixel]);
+    RgbSum from_photons = statistics.radiance_sum()[pixel];
+    if (caustics != nullptr) {
+      for (std::size_t c = 0; c < 3; ++c)
+        from_photons[c] += caustics->radiance_sum()[pixel][c];
+    }
+    from_photons = ToRec709(from_photons);
     double largest = 0;
     for (std::size_t c = 0; c < 3; ++c) {
       from_direct[c] *= to_pixel;

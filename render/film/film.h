@@ -22,11 +22,12 @@ class Film {
   // nothing was hit.
   void Add(std::size_t pixel, Rgb direct, Rgb albedo, Vec3 normal, float distance);
 
-  // The image of all passes that `statistics` holds; every pixel has been added as often.
+  // The image of all passes that `statistics` holds; every pixel has been added as often. What the
+  // hitpoints of `caustics` (or nullptr) gathered is added to the photons' light.
   // Layers of the radius controller's predictions are added when it makes any:
   // bandwidth [1/unit], the square root of the spectral trace; min_radius [scene units]; and
   // relative_bias, the bias expected at the last radius. 0 where there is no prediction.
-  [[nodiscard]] Image MakeImage(const PixelStatistics& statistics,
+  [[nodiscard]] Image MakeImage(const PixelStatistics& statistics, const PixelStatistics* caustics,
                                 const RadiusController& controller, const Kernel& kernel) const;
 
   // Sums over passes [pixels].

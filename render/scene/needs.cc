@@ -14,20 +14,37 @@
 namespace lucerna {
 namespace {
 
-constexpr std::array<std::string_view, kParts> kNames = {"photons",          "specular-surfaces",
-                                                         "glossy-hitpoints", "shading-normals",
-                                                         "textures",         "round-shapes",
-                                                         "environment",      "area-lights",
-                                                         "delta-lights",     "unseen-lamps",
-                                                         "direct-sampling",  "photon-directions",
-                                                         "photon-normals",   "robust-rays",
-                                                         "split-triangles",  "lens",
-                                                         "fresh-eye-paths",  "frequency-photons",
-                                                         "occluder-edges",   "curvature",
-                                                         "curved-mirrors",   "texture-detail",
-                                                         "sky-detail",       "glossy-window",
-                                                         "motion",           "media",
-                                                         "alpha-masks",      "instances"};
+constexpr std::array<std::string_view, kParts> kNames = {
+    "photons",
+    "specular-surfaces",
+    "glossy-hitpoints",
+    "caustic-hitpoints",
+    "shading-normals",
+    "textures",
+    "round-shapes",
+    "environment",
+    "area-lights",
+    "delta-lights",
+    "unseen-lamps",
+    "direct-sampling",
+    "photon-directions",
+    "photon-normals",
+    "robust-rays",
+    "split-triangles",
+    "lens",
+    "fresh-eye-paths",
+    "frequency-photons",
+    "occluder-edges",
+    "curvature",
+    "curved-mirrors",
+    "texture-detail",
+    "sky-detail",
+    "glossy-window",
+    "motion",
+    "media",
+    "alpha-masks",
+    "instances",
+};
 
 // Sets of eye paths: with fewer the edges of shapes would be seen not to be smooth.
 constexpr int kEyeSampleSets = 64;
@@ -306,12 +323,42 @@ class NeedsFinder {
             : std::string("direct light is sampled; photons would be noisier"));
   }
 
+  // Whether an eye path that finds a light by chance may see more than the image's white, or no eye
+  // path can find it.
+  [[nodiscard]] bool HasBrightLights() const {
+    if (needs_.Uses(Part::kDeltaLights)) return true;
+    const auto is_bright = [&](Rgb radiance) {
+      return static_cast<double>(MaxChannel(radiance)) * scene_.film.exposure > 1;
+    };
+    return std::ranges::any_of(scene_.area_lights,
+                               [&](const AreaLight& l) { return is_bright(l.radiance); }) ||
+           std::ranges::any_of(scene_.infinite_lights, [&](const InfiniteLight& l) {
+             return l.map != nullptr || is_bright(l.radiance);
+           });
+  }
+
+  void FindCausticHitpoints() {
+    const Material* narrow = First(GathersCaustics);
+    const bool has_smooth = First(IsSmooth) != nullptr;
+    const bool is_used = narrow != nullptr && has_smooth && !is_dark_ && HasBrightLights();
+    Set(Part::kCausticHitpoints, is_used,
+        is_used ? Concat("smooth surfaces throw light on ", Quoted(*narrow), ", where paths go on")
+        : narrow == nullptr
+            ? std::string("rough surfaces are rough enough for all photons to be gathered on")
+        : !has_smooth ? std::string("no surface is smooth")
+        : is_dark_    ? std::string(kDark)
+                      : std::string("eye paths find every light, and none is brighter than white"));
+    if (is_used && gathers_ == nullptr) caustics_only_ = narrow;
+  }
+
   void FindPhotons() {
-    Set(Part::kPhotons, gathers_ != nullptr && !is_dark_,
-        gathers_ == nullptr
+    FindCausticHitpoints();
+    const Material* receiver = gathers_ != nullptr ? gathers_ : caustics_only_;
+    Set(Part::kPhotons, receiver != nullptr && !is_dark_,
+        receiver == nullptr
             ? std::string("no surface is rough enough for photons to be gathered on")
         : is_dark_ ? std::string(kDark)
-                   : Concat("they are gathered on ", Quoted(*gathers_)));
+                   : Concat("they are gathered on ", Quoted(*receiver)));
     Set(Part::kPhotonDirections, glossy_ != nullptr,
         glossy_ != nullptr ? "glossy hitpoints ask where light comes from"
                            : "all hitpoints are diffuse");
@@ -421,6 +468,8 @@ class NeedsFinder {
   const Material* specular_ = nullptr;
   const Material* glossy_ = nullptr;
   const Material* textured_ = nullptr;
+  // Where caustic photons alone are gathered, or nullptr.
+  const Material* caustics_only_ = nullptr;
   bool is_dark_ = false;
   SceneNeeds needs_;
 };

@@ -24,6 +24,7 @@ enum class Part : std::uint8_t {
   kPhotons,           // photon passes at all
   kSpecular,          // eye and photon paths through smooth and nearly smooth surfaces
   kGlossy,            // BSDF columns of hitpoints
+  kCausticHitpoints,  // photons through smooth surfaces, gathered where eye paths go on
   kShadingNormals,    // vertex normals, and the horizon they bend
   kTextures,          // look-ups of materials
   kRoundShapes,       // spheres and disks beside triangles

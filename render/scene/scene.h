@@ -92,6 +92,12 @@ inline constexpr float kGatherAlphaDielectric = 0.5F;
          (material.kind == Material::Kind::kConductor ? kGatherAlpha : kGatherAlphaDielectric);
 }
 
+// Where eye paths go on although a range of directions is scattered: what eye paths do not find of
+// the light there, caustic photons bring (transport/caustic_weight.h).
+[[nodiscard]] inline bool GathersCaustics(const Material& material) {
+  return ScattersBroadly(material) && !Gathers(material);
+}
+
 // Emission of the surface of a shape.
 struct AreaLight {
   Rgb radiance;            // [W·m⁻²·sr⁻¹], scale and power already applied

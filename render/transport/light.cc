@@ -272,6 +272,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
   emission.ray.t_max = HUGE_VALF;
   emission.flux = emitter.power / emitter.choice;
   emission.emitter = static_cast<std::uint32_t>(&emitter - emitters_.data());
+  emission.density = HUGE_VALF;
   switch (emitter.kind) {
     case Kind::kTriangle:
     case Kind::kSphere:
@@ -291,6 +292,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
       const Vec3 local = SquareToCosineHemisphere(u_direction1, u_direction2);
       emission.ray.direction = Frame(normal).ToWorld(local);
       emission.ray.origin = position + normal * clearance;
+      emission.density = AreaDensity(emitter);
       return local.z > 0;
     }
     case Kind::kPoint:
@@ -326,6 +328,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
       emission.ray.origin = center_ + towards * radius_ + frame.s * disk.x + frame.t * disk.y;
       emission.ray.direction = -towards;
       emission.flux = sky.Radiance(towards) * (kPi * radius_ * radius_ / (pdf * emitter.choice));
+      emission.density = EmissionDensityInfinite(towards);
       return true;
     }
     case Kind::kInfinite: {
@@ -334,6 +337,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
       const Vec3 disk = SquareToDisk(u_place1, u_place2) * radius_;
       emission.ray.origin = center_ - direction * radius_ + frame.s * disk.x + frame.t * disk.y;
       emission.ray.direction = direction;
+      emission.density = EmissionDensityInfinite(-direction);
       return true;
     }
   }
@@ -471,6 +475,27 @@ float LightSet::PdfDirect(Vec3 from, const SurfacePoint& point) const {
   const float cosine = std::abs(Dot(to, point.geometric_normal)) / std::sqrt(distance2);
   if (!(cosine > 0)) return 0;
   return emitter->direct_choice * distance2 / (cosine * emitter->area);
+}
+
+float LightSet::AreaDensity(const Emitter& emitter) {
+  return emitter.choice / (emitter.area * kPi * (emitter.two_sided ? 2.0F : 1.0F));
+}
+
+float LightSet::EmissionDensity(const SurfacePoint& point) const {
+  const Emitter* emitter = EmitterOf(point);
+  return emitter == nullptr ? 0 : AreaDensity(*emitter);
+}
+
+float LightSet::EmissionDensityInfinite(Vec3 direction) const {
+  if (emitters_.empty()) return 0;
+  float pdf = 0;
+  if (infinite_emitter_ >= 0) {
+    pdf = emitters_[static_cast<std::size_t>(infinite_emitter_)].choice / (4 * kPi);
+  }
+  for (std::size_t i = 0; i < environments_.size(); ++i) {
+    pdf += emitters_[first_environment_ + i].choice * environments_[i].PdfSolidAngle(direction);
+  }
+  return pdf / (kPi * radius_ * radius_);
 }
 
 Rgb LightSet::InfiniteRadiance(Vec3 direction) const {

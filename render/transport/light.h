@@ -21,6 +21,9 @@ struct Emission {
   Ray ray;
   Rgb flux;  // [W]: of all photons together, so an estimate divides by their number
   std::uint32_t emitter = 0;  // number of the light, for LightSet::emitter
+  // The density with which photons leave there, of all emitters that send some the same way
+  // [choice × m⁻²·sr⁻¹, across the ray]; +infinity for delta lights.
+  float density = 0;
 };
 
 enum class EmitterKind : std::uint8_t {
@@ -91,6 +94,12 @@ class LightSet {
   // [choice × sr⁻¹].
   [[nodiscard]] float PdfDirect(Vec3 from, const SurfacePoint& point) const;
 
+  // The density with which photons leave `point`, in every direction into which it emits (see
+  // Emission::density).
+  [[nodiscard]] float EmissionDensity(const SurfacePoint& point) const;
+  // The same of photons from infinity that travel against `direction`.
+  [[nodiscard]] float EmissionDensityInfinite(Vec3 direction) const;
+
   // Radiance of all infinite lights from a direction in which no shape is.
   [[nodiscard]] Rgb InfiniteRadiance(Vec3 direction) const;
   // The density with which SampleDirect draws a direction by any of them [choice × sr⁻¹].
@@ -104,6 +113,7 @@ class LightSet {
   void ShareOut();
   [[nodiscard]] const Emitter& Choose(const std::vector<double>& cumulative, double u) const;
   [[nodiscard]] const Emitter* EmitterOf(const SurfacePoint& point) const;
+  [[nodiscard]] static float AreaDensity(const Emitter& emitter);
   void PointOn(const Emitter& emitter, float u1, float u2, Vec3& position, Vec3& normal,
                float& clearance) const;
 

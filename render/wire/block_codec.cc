@@ -11,7 +11,7 @@ namespace lucerna {
 namespace {
 
 // The last character is the version.
-constexpr std::string_view kBlockMagic = "LHB1";
+constexpr std::string_view kBlockMagic = "LHB2";
 constexpr std::string_view kRadiiMagic = "LRC1";
 constexpr std::uint32_t kLargestOctahedralHalf = 65534;
 
@@ -55,6 +55,8 @@ std::string EncodeHitpointBlock(const HitpointBlock& block) {
   writer.Bytes(kBlockMagic);
   writer.Varint(block.size());
   writer.Varint(block.glossy.size());
+  writer.Varint(block.caustic_rows);
+  writer.Varint(block.textured_k.size());
   for (int axis = 0; axis < 3; ++axis) {
     WriteDeltas(writer, block.size(), [&](std::size_t i) {
       return std::bit_cast<std::uint32_t>(block.positions[i][axis]);
@@ -68,6 +70,12 @@ std::string EncodeHitpointBlock(const HitpointBlock& block) {
     WriteDeltas(writer, glossy.size(), [&](std::size_t i) { return glossy[i].to_eye_oct; });
     WriteDeltas(writer, glossy.size(), [&](std::size_t i) { return glossy[i].shading_normal_oct; });
   }
+  if (const auto& k = block.textured_k; !k.empty()) {
+    for (int channel = 0; channel < 3; ++channel) {
+      WriteDeltas(writer, k.size(),
+                  [&](std::size_t i) { return std::bit_cast<std::uint32_t>(k[i][channel]); });
+    }
+  }
   return writer.Take();
 }
 
@@ -76,12 +84,20 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
   if (reader.Bytes(kBlockMagic.size()) != kBlockMagic) return Malformed("wrong magic or version");
   const std::uint64_t rows = reader.Varint();
   const std::uint64_t glossy_rows = reader.Varint();
-  if (rows > max_hitpoints || glossy_rows > rows) return Malformed("more rows than there can be");
+  const std::uint64_t caustic_rows = reader.Varint();
+  const std::uint64_t textured_rows = reader.Varint();
+  if (rows > max_hitpoints || glossy_rows > rows || caustic_rows > glossy_rows) {
+    return Malformed("more rows than there can be");
+  }
+  if (textured_rows != 0 && textured_rows != glossy_rows) {
+    return Malformed("a column of another length");
+  }
 
   const Column x = ReadDeltas(reader, rows);
   const Column y = ReadDeltas(reader, rows);
   const Column z = ReadDeltas(reader, rows);
   HitpointBlock block;
+  block.caustic_rows = caustic_rows;
   block.normals_oct = ReadDeltas(reader, rows);
   if (!reader.ok()) return Malformed("truncated or damaged columns");
   block.positions.resize(rows);
@@ -107,6 +123,24 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
       if (!IsOctahedral(to_eye[i]) || !IsOctahedral(shading_normals[i])) {
         return Malformed("a glossy direction is not a direction");
       }
+    }
+    if (caustic_rows > 0 && hitpoints[glossy_rows - caustic_rows] != rows - caustic_rows) {
+      return Malformed("a caustic hitpoint is not glossy");
+    }
+  }
+  if (textured_rows > 0) {
+    const Column r = ReadDeltas(reader, textured_rows);
+    const Column g = ReadDeltas(reader, textured_rows);
+    const Column b = ReadDeltas(reader, textured_rows);
+    if (!reader.ok()) return Malformed("truncated or damaged textures");
+    block.textured_k.resize(textured_rows);
+    for (std::size_t i = 0; i < textured_rows; ++i) {
+      const Rgb k = {std::bit_cast<float>(r[i]), std::bit_cast<float>(g[i]),
+                     std::bit_cast<float>(b[i])};
+      if (!IsFinite(k) || !(k.r >= 0 && k.g >= 0 && k.b >= 0)) {
+        return Malformed("an absorption is not a number");
+      }
+      block.textured_k[i] = k;
     }
   }
   if (!reader.finished()) return Malformed("bytes are left over");

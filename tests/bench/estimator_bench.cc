@@ -166,7 +166,7 @@ Accumulation GatherOnce(const Bench& bench, const std::vector<Deposits>& deposit
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
                    sorted.end());
   const PhotonGrid grid(deposits, bench.region, 2 * sorted[sorted.size() / 2], team);
-  return Gather(bench.eye.block, bench.radii, grid, bench.scene.materials,
+  return Gather(bench.eye.block, bench.radii, {grid}, bench.scene.materials,
                 Kernel{bench.settings.kernel}, bench.scale, team, std::atomic<bool>(false));
 }
 

@@ -45,7 +45,7 @@ struct Cloud {
     ThreadTeam team(1);
     const PhotonGrid grid({deposits}, region, 0.3F, team);
     const std::atomic<bool> stop = false;
-    return Gather(block, radii, grid, {DiffuseMaterial(0.5F)}, Kernel{},
+    return Gather(block, radii, {grid}, {DiffuseMaterial(0.5F)}, Kernel{},
                   FluxScale::ForPower(Gray(1)), team, stop, evidence);
   }
 };

@@ -94,7 +94,7 @@ Accumulation GatherAll(const Case& input, const Kernel& kernel, const FluxScale&
                        int threads) {
   ThreadTeam team(threads);
   const PhotonGrid grid(Columns(input.deposits), input.region, 0.02F, team);
-  return Gather(input.block, input.radii, grid, input.materials, kernel, scale, team,
+  return Gather(input.block, input.radii, {grid}, input.materials, kernel, scale, team,
                 std::atomic<bool>(false));
 }
 
@@ -269,7 +269,7 @@ TEST(GatherTest, TakesEveryPhotonWithoutNormals) {
     ThreadTeam team(1);
     const PhotonGrid grid(columns, input.region, 0.02F, team);
     EXPECT_FALSE(grid.has_normals());
-    return Gather(input.block, input.radii, grid, input.materials, Kernel{}, scale, team,
+    return Gather(input.block, input.radii, {grid}, input.materials, Kernel{}, scale, team,
                   std::atomic<bool>(false));
   };
   EXPECT_NE(without(), GatherAll(input, Kernel{}, scale, 1)) << "normals at random";

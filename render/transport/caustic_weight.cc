@@ -1,0 +1,27 @@
+#include "render/transport/caustic_weight.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace lucerna {
+
+CausticWeight::CausticWeight(const Scene& scene, const RenderSettings& settings,
+                             const Bounds& bounds) {
+  double radius = settings.initial_radius / scene.unit;
+  if (!(radius > 0) && !bounds.empty()) {
+    // The first radius as seen from the camera in the middle of the scene.
+    const Window window = ScreenWindow(scene.camera, settings.width, settings.height);
+    const double pixel = std::sqrt((window.high_x - window.low_x) / settings.width *
+                                   (window.high_y - window.low_y) / settings.height);
+    const auto extent = static_cast<double>(bounds.Diagonal());
+    const Vec3 to_middle = bounds.Center() - scene.camera.camera_to_world.Point({});
+    const double distance =
+        std::clamp(static_cast<double>(Length(to_middle)), extent / 4, extent * 4);
+    radius = settings.initial_footprints * pixel * distance;
+  }
+  photon_area_ =
+      static_cast<double>(settings.photons_per_pass) * std::numbers::pi * radius * radius;
+}
+
+}  // namespace lucerna
