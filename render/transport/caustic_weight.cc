@@ -5,6 +5,13 @@
 #include <numbers>
 
 namespace lucerna {
+namespace {
+
+// The nominal radius over the first one: about what is left of it after some hundred passes, in
+// which most photons are gathered.
+constexpr double kNominalShare = 1.0 / 3;
+
+}  // namespace
 
 CausticWeight::CausticWeight(const Scene& scene, const RenderSettings& settings,
                              const Bounds& bounds) {
@@ -20,6 +27,7 @@ CausticWeight::CausticWeight(const Scene& scene, const RenderSettings& settings,
         std::clamp(static_cast<double>(Length(to_middle)), extent / 4, extent * 4);
     radius = settings.initial_footprints * pixel * distance;
   }
+  radius *= kNominalShare;
   photon_area_ =
       static_cast<double>(settings.photons_per_pass) * std::numbers::pi * radius * radius;
 }
