@@ -16,9 +16,18 @@ namespace {
 
 // Eye paths weaker than this end by roulette more often than they go on.
 constexpr float kRouletteWeight = 0.5F;
-// Branches of the specular tree weaker than this end by roulette. A lamp seen by way of two inner
-// reflections of a glass surface (about 0.04 each) is then still found by one path in ten.
-constexpr float kBranchWeight = 0.01F;
+// Branches of the specular tree weaker than `BranchWeight` end by roulette. What survives and finds
+// the brightest light adds no more than the image's white, so that a small light seen by way of
+// several inner reflections of glass (about 0.04 each) is no bright speck in one pass of a hundred.
+constexpr float kLargestBranchWeight = 0.01F;
+// With a light so bright that four inner reflections of it are white, roulette is allowed to show.
+constexpr float kSmallestBranchWeight = 0x1p-16F;
+
+float BranchWeight(const Scene& scene, const LightSet& lights) {
+  const double white_share =
+      1 / (static_cast<double>(lights.LargestRadiance()) * scene.film.exposure);
+  return std::clamp(static_cast<float>(white_share), kSmallestBranchWeight, kLargestBranchWeight);
+}
 
 }  // namespace
 
@@ -32,6 +41,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       has_lens_(needs.Uses(Part::kLens)),
       rays_find_lights_(needs.Uses(Part::kAreaLights) || needs.Uses(Part::kEnvironment)),
       caustic_weight_(scene, settings, intersector.bounds()),
+      branch_weight_(BranchWeight(scene, lights)),
       intersector_(intersector),
       lights_(lights),
       filter_x_(scene.filter, scene.filter.radius_x),
@@ -107,9 +117,9 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, Key
       if (!SidesAgree(surface, wo, wi, wo_local.z * sample.wi.z < 0)) continue;
       Rgb next = weight * sample.weight * share;
       const float strength = MaxChannel(next);
-      if (strength < kBranchWeight) {
-        if (!(rng.Uniform() * kBranchWeight < strength)) continue;
-        next *= kBranchWeight / strength;
+      if (strength < branch_weight_) {
+        if (!(rng.Uniform() * branch_weight_ < strength)) continue;
+        next *= branch_weight_ / strength;
       }
       branches.push_back({{LeavingPoint(surface, wi), wi, HUGE_VALF}, next, vertex + 1});
     }

@@ -91,6 +91,7 @@ class EyePathTracer {
   const bool has_lens_;
   const bool rays_find_lights_;  // some have an extent
   const CausticWeight caustic_weight_;
+  const float branch_weight_;  // see BranchWeight
   const Intersector& intersector_;
   const LightSet& lights_;
   FilterSampler filter_x_, filter_y_;

@@ -19,6 +19,9 @@ constexpr double kKeptBlock = 16;
 constexpr double kFirstHit = 4;
 constexpr double kRadius = 2.5;
 constexpr double kOpenPasses = 2;
+// Of the coordinator, by the columns of a second set of statistics, rows and sums; and of a worker.
+constexpr double kCausticHitpoint = 370;
+constexpr double kCausticOfWorker = 100;
 
 }  // namespace
 
@@ -29,11 +32,12 @@ ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& setti
   const auto numbers = static_cast<double>(MakeRadiusController(settings, 1)->MemoryPerPixel());
   const double block = needs.Uses(Part::kGlossy) ? kGlossyBlock : kBlock;
   const double sets = needs.eye_sample_sets();
+  const double caustic_rows = needs.Uses(Part::kCausticHitpoints) ? 1 : 0;
   ExpectedCost cost;
-  cost.coordinator = pixels * (kCoordinator + sizeof(std::int64_t) * kOpenPasses * columns +
+  cost.coordinator = pixels * (kCoordinator + caustic_rows * kCausticHitpoint + sizeof(std::int64_t) * kOpenPasses * columns +
                                sizeof(double) * numbers + sets * (block + kFirstHit));
-  cost.worker = pixels * (kWorker + sets * kKeptBlock);
-  cost.first_pass_sent = pixels * (block + kRadius);
+  cost.worker = pixels * (kWorker + caustic_rows * kCausticOfWorker + sets * kKeptBlock);
+  cost.first_pass_sent = pixels * (block + kRadius + caustic_rows * (kGlossyBlock + kRadius));
   cost.pass_sent = sets > 0 ? pixels * kRadius : cost.first_pass_sent;
   return cost;
 }

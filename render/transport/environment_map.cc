@@ -40,6 +40,7 @@ EnvironmentMap::EnvironmentMap(const InfiniteLight& light)
     double row_luminance = 0;
     for (int x = 0; x < size_; ++x) {
       const Rgb radiance = RadianceOf({x, y});
+      largest_ = std::max(largest_, MaxChannel(radiance));
       for (int c = 0; c < 3; ++c)
         sum[static_cast<std::size_t>(c)] += static_cast<double>(radiance[c]);
       row_luminance += static_cast<double>(Luminance(radiance));

@@ -24,6 +24,8 @@ class EnvironmentMap {
   [[nodiscard]] Rgb Radiance(Vec3 direction) const;
   // The mean over all directions.
   [[nodiscard]] Rgb MeanRadiance() const { return mean_; }
+  // The largest channel of any texel.
+  [[nodiscard]] float LargestRadiance() const { return largest_; }
 
   // Zero where the sky is black. Requires a map that is not all black.
   [[nodiscard]] float PdfSolidAngle(Vec3 direction) const;
@@ -48,6 +50,7 @@ class EnvironmentMap {
   ShapeAxes axes_;
   int size_;
   Rgb mean_;
+  float largest_ = 0;
   double mean_luminance_ = 0;
   // Shares of the luminance before the end of each row in all rows, and of each pixel in its row.
   std::vector<double> rows_;

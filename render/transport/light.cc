@@ -477,6 +477,19 @@ float LightSet::PdfDirect(Vec3 from, const SurfacePoint& point) const {
   return emitter->direct_choice * distance2 / (cosine * emitter->area);
 }
 
+float LightSet::LargestRadiance() const {
+  float of_areas = 0;
+  for (const Emitter& emitter : emitters_) {
+    const bool has_area = emitter.kind == Kind::kTriangle || emitter.kind == Kind::kSphere ||
+                          emitter.kind == Kind::kDisk;
+    if (has_area) of_areas = std::max(of_areas, MaxChannel(emitter.radiance));
+  }
+  float from_infinity = MaxChannel(infinite_radiance_);
+  for (const EnvironmentMap& sky : environments_)
+    from_infinity += sky.LargestRadiance();
+  return std::max(of_areas, from_infinity);
+}
+
 float LightSet::AreaDensity(const Emitter& emitter) {
   return emitter.choice / (emitter.area * kPi * (emitter.two_sided ? 2.0F : 1.0F));
 }

@@ -73,6 +73,8 @@ class LightSet {
   [[nodiscard]] const Emitter& emitter(std::uint32_t number) const { return emitters_[number]; }
   // [W] per channel, of all emitters.
   [[nodiscard]] Rgb TotalPower() const { return total_power_; }
+  // [W·m⁻²·sr⁻¹] at least the largest channel that a ray can find, of all emitters.
+  [[nodiscard]] float LargestRadiance() const;
   // How many lights (a mesh is one) have so small a share of the power, 1e-9, that hardly a photon
   // ever comes from them: what they light directly is right, and what that light lights is dark.
   [[nodiscard]] std::size_t faint_lights() const { return faint_lights_; }

@@ -149,7 +149,7 @@ TEST(ExtremeCountsTest, FeaturesStayMeansOverManyPasses) {
                         Kernel{KernelKind::kConstant}, 1, *ppm, radiance, bias);
   for (int pass = 0; pass < 2'000'000; ++pass)
     film.Add(0, {}, Gray(0.3F), {0, 0, 1}, 0.7F);
-  const Image image = film.MakeImage(statistics, *ppm, Kernel{KernelKind::kConstant});
+  const Image image = film.MakeImage(statistics, nullptr, *ppm, Kernel{KernelKind::kConstant});
   EXPECT_NEAR(image.Find("albedo.G")->pixels[0], 0.3F, 3e-4F);
   EXPECT_NEAR(image.Find("Z")->pixels[0], 0.7F, 7e-4F);
 }

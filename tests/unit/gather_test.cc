@@ -98,6 +98,57 @@ Accumulation GatherAll(const Case& input, const Kernel& kernel, const FluxScale&
                 std::atomic<bool>(false));
 }
 
+// Caustic rows and the others gather from photons of their own; a caustic photon from a point light
+// counts in full, one from an emitter that scattered rays find as well counts less.
+TEST(GatherTest, CausticRowsTakeCausticPhotonsAloneAndWeighThem) {
+  const std::uint32_t up = EncodeOctahedral({0, 0, 1});
+  Case input;
+  input.block.positions = {{0, 0, 0}, {0, 0, 0}};
+  input.block.normals_oct = {up, up};
+  input.block.glossy = {{1, 1, up, up}};
+  input.block.caustic_rows = 1;
+  input.radii = {0.1F, 0.1F};
+  Photon photon{};
+  photon.flux = Gray(1);
+  photon.normal = {0, 0, 1};
+  photon.arrival_oct = up;
+  photon.position = {0.01F, 0, 0};
+  input.region.Add({-1, -1, -1});
+  input.region.Add({1, 1, 1});
+  input.deposits = {{photon}};
+  ThreadTeam team(1);
+  const FluxScale scale = FluxScale::ForPower(Gray(1));
+  const Scene scene;
+  RenderSettings settings;
+  settings.width = settings.height = 1;
+  settings.photons_per_pass = 1;
+  settings.initial_radius = 1;
+  const CausticWeight weight(scene, settings, input.region);
+  const auto sums = [&](float emission_density) {
+    std::vector<Deposits> caustics = Columns({{photon, photon}});
+    caustics[0].emission_densities = {emission_density, emission_density};
+    const PhotonGrid grid(Columns(input.deposits), input.region, 0.1F, team);
+    const PhotonGrid caustic_grid(caustics, input.region, 0.1F, team);
+    return Gather(input.block, input.radii, {grid, &caustic_grid, &weight}, input.materials,
+                  Kernel{KernelKind::kConstant}, scale, team, std::atomic<bool>(false));
+  };
+  const Accumulation of_point = sums(HUGE_VALF);
+  ASSERT_EQ(of_point.hitpoints, (std::vector<std::uint32_t>{0, 1}));
+  EXPECT_EQ(of_point.counts, (std::vector<std::uint32_t>{1, 2}));
+  // Straight down and straight up: f(n, n) of the metal, once for each photon.
+  const Vec3 n = {0, 0, 1};
+  const Material& metal = input.materials[1];
+  const double f = static_cast<double>(EvaluateBsdf(metal, n, n, Carried::kRadiance).g);
+  const double quanta = static_cast<double>(scale.quanta_per_watt.g);
+  EXPECT_NEAR(static_cast<double>(of_point.flux[1][1]), 2 * f * quanta, 2);
+  const float density = 3;
+  const double share =
+      static_cast<double>(weight.OfPhotons(density, 1, PdfBsdf(metal, n, n)));
+  ASSERT_GT(share, 0.01);
+  ASSERT_LT(share, 0.99);
+  EXPECT_NEAR(static_cast<double>(sums(density).flux[1][1]), 2 * f * share * quanta, 2);
+}
+
 std::uint64_t PairBits(std::uint32_t key, std::uint32_t hitpoint) {
   std::uint64_t x = (std::uint64_t{key} << 32 | hitpoint) * 0x9E3779B97F4A7C15ULL;
   x = (x ^ (x >> 32)) * 0xD6E8FEB86659FD93ULL;

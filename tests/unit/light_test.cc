@@ -238,6 +238,56 @@ TEST(SampleEmissionTest, SendsTheTotalPower) {
   }
 }
 
+// Photons of all emitters together fill the light with flux: their flux times their density, over
+// area across the ray and solid angle, is the radiance there. A ray that looks back says the same.
+TEST(SampleEmissionTest, HasTheDensityThatMakesFluxRadiance) {
+  KeyedRng rng(71);
+  for (const auto& [name, make] : kLamps) {
+    const Lit lit(make());
+    int compared = 0;
+    for (int i = 0; i < 2000; ++i) {
+      std::array<float, 5> u{};
+      for (float& number : u)
+        number = rng.Uniform();
+      Emission emission;
+      if (!lit.lights.SampleEmission(u[0], u[1], u[2], u[3], u[4], emission)) continue;
+      const Vec3 back = -emission.ray.direction;
+      const Emitter& emitter = lit.lights.emitter(emission.emitter);
+      for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(emission.flux[c] * emission.density / emitter.radiance[c], 1, 1e-4F) << name;
+      }
+      if (emitter.kind == EmitterKind::kInfinite) {
+        EXPECT_EQ(lit.lights.EmissionDensityInfinite(back), emission.density) << name;
+        ++compared;
+        continue;
+      }
+      const Ray ray = {emission.ray.origin + emission.ray.direction * 1e-3F, back, HUGE_VALF};
+      Hit hit;
+      if (!lit.intersector->Intersect(ray, hit)) continue;
+      const SurfacePoint surface = lit.intersector->SurfaceAt(ray, hit);
+      if (IsBlack(lit.lights.EmittedRadiance(surface, emission.ray.direction))) continue;
+      EXPECT_EQ(lit.lights.EmissionDensity(surface), emission.density) << name;
+      ++compared;
+    }
+    EXPECT_GT(compared, 1000) << name;
+  }
+}
+
+TEST(SampleEmissionTest, GivesDeltaLightsNoBoundToTheirDensity) {
+  Scene scene = BlackRoom();
+  AddQuad(scene, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0);
+  scene.point_lights.push_back({{0, 0, 1}, Gray(1)});
+  scene.spot_lights.push_back({{0, 0, 1}, {0, 0, -1}, Gray(1), 0.9F, 0.8F});
+  scene.distant_lights.push_back({{0, 0, -1}, Gray(1)});
+  const Lit lit(std::move(scene));
+  for (int i = 0; i < 32; ++i) {
+    Emission emission;
+    emission.density = 0;
+    if (!lit.lights.SampleEmission((i + 0.5) / 32, 0.5F, 0.5F, 0.25F, 0.5F, emission)) continue;
+    EXPECT_EQ(emission.density, HUGE_VALF);
+  }
+}
+
 TEST(SampleEmissionTest, HasThePowerOfEachLightInClosedForm) {
   const auto power = [](const Scene& scene) {
     return static_cast<double>(Lit(scene).lights.TotalPower().g);

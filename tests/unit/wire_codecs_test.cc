@@ -123,6 +123,48 @@ TEST(BlockCodecTest, BringsGlossyRowsBack) {
   EXPECT_EQ(*decoded, block);
 }
 
+// A block of three rows, of which the last is a caustic one on a metal with a texture.
+HitpointBlock CausticBlock() {
+  HitpointBlock block;
+  const std::uint32_t up = EncodeOctahedral({0, 1, 0});
+  block.positions = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
+  block.normals_oct = {up, up, up};
+  block.glossy = {{1, 0, up, up}, {2, 1, up, up}};
+  block.textured_k = {{0, 0, 0}, {3, 2.5F, 0.125F}};
+  block.caustic_rows = 1;
+  return block;
+}
+
+TEST(BlockCodecTest, BringsCausticRowsAndTexturesBack) {
+  const HitpointBlock block = CausticBlock();
+  const auto decoded = DecodeHitpointBlock(EncodeHitpointBlock(block), block.size());
+  ASSERT_TRUE(decoded.ok()) << decoded.status();
+  EXPECT_EQ(*decoded, block);
+}
+
+TEST(BlockCodecTest, RefusesCausticRowsThatAreNotGlossyAndColumnsOfAnotherLength) {
+  const auto is_refused = [](const HitpointBlock& block) {
+    return DecodeHitpointBlock(EncodeHitpointBlock(block), 3).status().code() ==
+           absl::StatusCode::kInvalidArgument;
+  };
+  HitpointBlock block = CausticBlock();
+  block.caustic_rows = 3;
+  EXPECT_TRUE(is_refused(block));
+  // Row 1 would have to be glossy, and row 0 is in its place.
+  block = CausticBlock();
+  block.caustic_rows = 2;
+  block.glossy[0].hitpoint = 0;
+  EXPECT_TRUE(is_refused(block));
+  block = CausticBlock();
+  block.textured_k.pop_back();
+  EXPECT_TRUE(is_refused(block));
+  block = CausticBlock();
+  block.textured_k[1].g = -1;
+  EXPECT_TRUE(is_refused(block));
+  block.textured_k[1].g = HUGE_VALF;
+  EXPECT_TRUE(is_refused(block));
+}
+
 TEST(BlockCodecTest, BringsAnEmptyBlockBack) {
   const auto decoded = DecodeHitpointBlock(EncodeHitpointBlock({}), 10);
   ASSERT_TRUE(decoded.ok()) << decoded.status();
