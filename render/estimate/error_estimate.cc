@@ -6,12 +6,10 @@
 #include <utility>
 
 #include "render/base/status.h"
+#include "render/estimate/relative_error.h"
 
 namespace lucerna {
 namespace {
-
-// Of relMSE, as in film/image_metrics.h.
-constexpr double kEpsilon = 0.01;
 
 // What the models of noise may be off by, in the logarithm of the squared error: a tenth of the
 // error. Most of it is light so rare that the halves have hardly seen it.
@@ -298,7 +296,8 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::
 
 }  // namespace
 
-ErrorStatistics::ErrorStatistics(std::size_t pixels) : even_sum_(pixels), square_sum_(pixels) {
+ErrorStatistics::ErrorStatistics(std::size_t pixels)
+    : even_sum_(pixels), square_sum_(pixels), largest_(pixels) {
   for (std::vector<double>& sum : bias_sum_)
     sum.resize(pixels);
 }
@@ -311,6 +310,7 @@ void ErrorStatistics::AddPass(std::uint64_t pass, std::span<const RgbSum> radian
   for (std::size_t pixel = 0; pixel < radiance.size(); ++pixel) {
     const double luminance = LuminanceOf(radiance[pixel]);
     square_sum_[pixel] += luminance * luminance;
+    largest_[pixel] = std::max(largest_[pixel], static_cast<float>(luminance));
     bias_sum[pixel] += bias[pixel];
     if (!is_even) continue;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -348,6 +348,16 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
     return MeanAround(width, height, std::move(means));
   };
   const std::array<MeanAround, 3> around = {mean_around(0), mean_around(1), mean_around(2)};
+  const double floor = [&] {
+    std::vector<double> luminances(count);
+    for (std::size_t i = 0; i < count; ++i)
+      luminances[i] = LuminanceOf(sums_at(i).all) / passes;
+    return RelativeErrorFloor(luminances);
+  }();
+  if (floor == 0) {
+    const SquaredError unknown = {.noise = HUGE_VAL, .bias = 0, .low = 0, .high = HUGE_VAL};
+    return {.relative = unknown, .absolute = {}, .untrimmed = HUGE_VAL};
+  }
 
   std::vector<PixelError> pixels(count);
   std::vector<float> differences(count);
@@ -368,17 +378,17 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
         const double own = sums.all[c] / passes;
         const double agreed = Middle(even, odd, around[c](x, y));
         const double least = std::min(own, agreed);
-        // One over value² + kEpsilon. The agreed value is too large where rare light fell on the
+        // One over value² + floor. The agreed value is too large where rare light fell on the
         // dark, the least one too small where lamps are seen in few samples.
-        const double weight = 0.5 / (agreed * agreed + kEpsilon) + 0.5 / (least * least + kEpsilon);
+        const double weight = 0.5 / (agreed * agreed + floor) + 0.5 / (least * least + floor);
         const double noise = difference[c] * difference[c] * to_noise;
         noise_sum += noise;
         relative_noise += noise * weight;
         signed_noise += difference[c] * std::sqrt(weight);
         const double square = sums.bias_color[c] * sums.bias_color[c];
         color_square += square;
-        color_to_even += square / (even * even + kEpsilon);
-        color_to_odd += square / (odd * odd + kEpsilon);
+        color_to_even += square / (even * even + floor);
+        color_to_odd += square / (odd * odd + floor);
       }
       pixels[pixel].noise = static_cast<float>(noise_sum / 3);
       pixels[pixel].relative_noise = static_cast<float>(relative_noise / 3);
@@ -407,6 +417,9 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
     pixels[i].bias = chosen.bias.absolute[i];
     pixels[i].relative_bias = chosen.bias.relative[i];
   }
+  double untrimmed = 0;
+  for (const PixelError& one : pixels)
+    untrimmed += static_cast<double>(one.relative_noise) + static_cast<double>(one.relative_bias);
   const std::size_t kept =
       count - static_cast<std::size_t>(kTrimmedShare * static_cast<double>(count));
   std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
@@ -416,7 +429,10 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
                                 chosen.relative_lost, spread),
           .absolute = Summarize(pixels, &PixelError::noise, &PixelError::bias, chosen.absolute_lost,
                                 spread),
-          .noise_factor = independent > 0 ? halves / independent : 1};
+          .untrimmed = std::max(untrimmed, 0.0) / static_cast<double>(count),
+          .left_out_pixels = static_cast<std::int64_t>(count - kept),
+          .noise_factor = independent > 0 ? halves / independent : 1,
+          .noise_area = spread.noise_area};
 }
 
 }  // namespace lucerna
