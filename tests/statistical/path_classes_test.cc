@@ -1,0 +1,324 @@
+// No light is lost: one tiny scene for each class of paths, by kind of light, what the light meets
+// on its way, and the surface that the camera sees.
+//
+// Each scene is rendered by the estimator and by the path tracer of tests/support, which shares
+// nothing with it but geometry. Means over the image and over its quarters are compared; the
+// standard errors of both come from independent repetitions, and Student's quantile bounds their
+// difference. docs/path-classes.md has the table of classes, and names these tests.
+//
+// Kernel bias is kept below what the bounds allow by geometry: floors and panes are flat, radii are
+// 4 % of the floor, and the camera sees no edge within a radius of a gathering surface.
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "tests/support/local_render.h"
+#include "tests/support/path_tracer.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+enum class LightKind { kTriangles, kSphere, kDisk, kPoint, kSpot, kDistant, kConstant, kMap };
+enum class Chain { kNone, kPane, kThinPane, kRoughPane, kMirror, kNarrowWall, kDiffuseWall };
+enum class Floor { kDiffuse, kRoughMetal, kNarrowMetal, kTexturedMetal, kNarrowGlass, kRoughGlass };
+enum class View { kPlain, kThroughGlass, kInMirror };
+
+struct PathClass {
+  LightKind light;
+  Chain chain;
+  Floor floor;
+  View view = View::kPlain;
+};
+
+std::string NameOf(const PathClass& cell) {
+  constexpr std::array<std::string_view, 8> kLights = {"Triangles", "Sphere",  "Disk",     "Point",
+                                                       "Spot",      "Distant", "Constant", "Map"};
+  constexpr std::array<std::string_view, 7> kChains = {
+      "Directly",   "ByPane",       "ByThinPane", "ByRoughPane",
+      "ByMirror", "ByNarrowMetal", "ByDiffuseWall"};
+  constexpr std::array<std::string_view, 6> kFloors = {
+      "Diffuse", "RoughMetal", "NarrowMetal", "TexturedMetal", "NarrowGlass", "RoughGlass"};
+  constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
+  std::string name(kLights[static_cast<std::size_t>(cell.light)]);
+  name += kChains[static_cast<std::size_t>(cell.chain)];
+  name += "On";
+  name += kFloors[static_cast<std::size_t>(cell.floor)];
+  name += kViews[static_cast<std::size_t>(cell.view)];
+  return name;
+}
+
+bool IsWall(Chain chain) {
+  return chain == Chain::kMirror || chain == Chain::kNarrowWall || chain == Chain::kDiffuseWall;
+}
+
+Material Metal(float alpha) {
+  return ConductorMaterial(Gray(0.2F), Gray(3), alpha, alpha);
+}
+
+// A floor z = 0. Light comes from above its far side (y > 0), or, with a wall there, from behind
+// the camera by way of the wall while a black shield shades the floor itself.
+Scene SceneOf(const PathClass& cell) {
+  Scene scene;
+  const std::int32_t black = AddMaterial(scene, DiffuseMaterial(0));
+
+  const auto floor = [&](std::int32_t material) {
+    AddQuad(scene, {-0.7F, -0.8F, 0}, {1.4F, 0, 0}, {0, 1.6F, 0}, material);
+  };
+  switch (cell.floor) {
+    case Floor::kDiffuse:
+      floor(AddMaterial(scene, DiffuseMaterial(0.6F)));
+      break;
+    case Floor::kRoughMetal:
+      floor(AddMaterial(scene, Metal(0.3F)));
+      break;
+    case Floor::kNarrowMetal:
+      floor(AddMaterial(scene, Metal(0.1F)));
+      break;
+    case Floor::kTexturedMetal: {
+      Texture dark;
+      dark.color = Gray(0.3F);
+      Texture bright;
+      bright.color = Gray(0.9F);
+      Texture board;
+      board.kind = Texture::Kind::kCheckerboard;
+      board.parts = {0, 1};
+      board.mapping = {6, 6, 0, 0};
+      scene.textures = {dark, bright, board};
+      Material metal = Metal(0.3F);
+      metal.texture = 2;
+      floor(AddMaterial(scene, metal));
+      break;
+    }
+    case Floor::kNarrowGlass:
+    case Floor::kRoughGlass:
+      // With a diffuse bottom inside the glass.
+      floor(AddMaterial(
+          scene, DielectricMaterial(1.5F, cell.floor == Floor::kNarrowGlass ? 0.2F : 0.6F)));
+      AddQuad(scene, {-0.9F, -1, -0.1F}, {1.8F, 0, 0}, {0, 2, 0},
+              AddMaterial(scene, DiffuseMaterial(0.6F)));
+      break;
+  }
+
+  const auto pane = [&](const Material& material) {
+    AddBox(scene, {-1, -1, 0.9F}, {1, 1, 1}, AddMaterial(scene, material));
+  };
+  const auto wall = [&](const Material& material) {
+    AddQuad(scene, {-1, 0.85F, 0.02F}, {2, 0, 0}, {0, 0, 1.4F}, AddMaterial(scene, material));
+    AddQuad(scene, {-0.8F, -1.7F, 1.1F}, {1.6F, 0, 0}, {0, 1.35F, 0}, black);
+  };
+  switch (cell.chain) {
+    case Chain::kNone:
+      break;
+    case Chain::kPane:
+      pane(DielectricMaterial(1.5F));
+      break;
+    case Chain::kThinPane:
+      pane(DielectricMaterial(1.0001F));
+      break;
+    case Chain::kRoughPane:
+      pane(DielectricMaterial(1.5F, 0.2F));
+      break;
+    case Chain::kMirror:
+      wall(Metal(0));
+      break;
+    case Chain::kNarrowWall:
+      wall(Metal(0.1F));
+      break;
+    case Chain::kDiffuseWall:
+      wall(DiffuseMaterial(0.8F));
+      break;
+  }
+
+  const bool by_wall = IsWall(cell.chain);
+  const Vec3 place = by_wall ? Vec3{0.05F, -1, 2.2F} : Vec3{0.05F, 1.2F, 1.6F};
+  const Vec3 lit = by_wall ? Vec3{0, 0.85F, 0.8F} : Vec3{0, 0, 0};
+  const Vec3 along = Normalize(lit - place);
+  const auto area_light = [&] { return AddAreaLight(scene, 15, cell.light == LightKind::kDisk); };
+  switch (cell.light) {
+    case LightKind::kTriangles: {
+      const Frame frame(along);
+      AddQuad(scene, place - (frame.s + frame.t) * 0.2F, frame.s * 0.4F, frame.t * 0.4F, black,
+              area_light());
+      break;
+    }
+    case LightKind::kSphere:
+      AddSphere(scene, place, 0.2F, black, area_light());
+      break;
+    case LightKind::kDisk:
+      AddDisk(scene, place, along, 0.22F, black, area_light());
+      break;
+    case LightKind::kPoint:
+      scene.point_lights.push_back({place, Gray(3)});
+      break;
+    case LightKind::kSpot:
+      scene.spot_lights.push_back(
+          {place, along, Gray(3), std::cos(0.25F), std::cos(0.7F)});
+      break;
+    case LightKind::kDistant:
+      scene.distant_lights.push_back({along, Gray(1)});
+      break;
+    case LightKind::kConstant:
+      scene.infinite_lights.push_back({Gray(0.7F)});
+      break;
+    case LightKind::kMap: {
+      Picture picture;
+      picture.width = picture.height = 6;
+      picture.channels = 1;
+      for (int i = 0; i < 36; ++i)
+        picture.linear.push_back(0.1F + 0.4F * static_cast<float>(i * 7 % 5));
+      InfiniteLight light;
+      light.radiance = Gray(1);
+      light.map = std::make_shared<const Picture>(std::move(picture));
+      scene.infinite_lights.push_back(light);
+      break;
+    }
+  }
+
+  constexpr double kFovDeg = 28;
+  constexpr int kSize = 8;
+  switch (cell.view) {
+    case View::kPlain:
+      SetCamera(scene, {0, -0.8, 0.8}, {0, 0, 0}, {0, 0, 1}, kFovDeg, kSize);
+      break;
+    case View::kThroughGlass:
+      SetCamera(scene, {0, -1.1, 1.1}, {0, 0, 0}, {0, 0, 1}, kFovDeg * 0.75, kSize);
+      AddBox(scene, {-0.6F, -0.9F, 0.8F}, {0.6F, -0.2F, 0.86F},
+             AddMaterial(scene, DielectricMaterial(1.5F)));
+      break;
+    case View::kInMirror:
+      // The mirror is behind the floor's near edge, and the camera sees the floor in it.
+      SetCamera(scene, {0, 0.1, 0.8}, {0, -0.9, 0.9}, {0, 0, 1}, kFovDeg, kSize);
+      AddQuad(scene, {-0.7F, -0.9F, 0.1F}, {1.4F, 0, 0}, {0, 0, 1.2F},
+              AddMaterial(scene, Metal(0)));
+      break;
+  }
+  return scene;
+}
+
+// Image and quarters of cells.
+constexpr int kBlocks = 5;
+PixelBlock BlockOf(int block, int size) {
+  if (block == 0) return {0, 0, size, size};
+  const int half = size / 2;
+  const int x0 = (block - 1) % 2 * half;
+  const int y0 = (block - 1) / 2 * half;
+  return {x0, y0, x0 + half, y0 + half};
+}
+
+double MeanOver(const Image& image, const PixelBlock& block, std::string_view channel) {
+  const ImageChannel* found = image.Find(channel);
+  LUCERNA_CHECK(found != nullptr);
+  double sum = 0;
+  for (int y = block.y0; y < block.y1; ++y) {
+    for (int x = block.x0; x < block.x1; ++x)
+      sum += static_cast<double>(found->pixels[static_cast<std::size_t>(y * image.width + x)]);
+  }
+  return sum / ((block.x1 - block.x0) * (block.y1 - block.y0));
+}
+
+constexpr int kParts = 16;
+constexpr int kDepth = 24;
+// At least as many comparisons as this file makes: cells times blocks.
+constexpr int kQuestions = 1500;
+constexpr double kLevel = 1e-2;
+
+struct Effort {
+  int passes = 8;
+  int photons = 2000;
+  int paths = 20000;
+  float delta_radius = 0.08F;
+};
+
+void ExpectSameLight(const Scene& scene, const Effort& effort, double radius = 0.04,
+                     int max_depth = kDepth) {
+  RenderSettings settings = TestSettings(scene, effort.photons, radius, max_depth);
+  settings.alpha = 1 - 1e-7;  // the radius is held
+  const int size = scene.film.width;
+  std::array<std::vector<double>, kBlocks> parts;
+  for (int part = 0; part < kParts; ++part) {
+    settings.seed = 1000 + static_cast<std::uint64_t>(part);
+    const Image image = RenderLocally(scene, settings, effort.passes);
+    for (int block = 0; block < kBlocks; ++block) {
+      parts[static_cast<std::size_t>(block)].push_back(MeanOver(image, BlockOf(block, size), "G"));
+    }
+  }
+  PathTracerSettings tracer;
+  tracer.width = tracer.height = size;
+  tracer.max_depth = max_depth;
+  tracer.paths_per_replica = effort.paths;
+  tracer.delta_radius = effort.delta_radius;
+  tracer.delta_angle_rad = effort.delta_radius / 2;
+  const TracedImage traced = TracePaths(scene, tracer);
+
+  static const double quantile = StudentQuantile(SidakLevel(kLevel, kQuestions), kParts);
+  for (int block = 0; block < kBlocks; ++block) {
+    SCOPED_TRACE(block == 0 ? "image" : "quarter " + std::to_string(block));
+    const MeasuredMean measured = MeanOf(parts[static_cast<std::size_t>(block)]);
+    const MeasuredMean expected = traced.MeanOver(BlockOf(block, size), 1);
+    const double error = std::hypot(measured.standard_error, expected.standard_error);
+    std::printf("BLOCK %d est %.5f +- %.2f%% ref %.5f +- %.2f%% ratio %.4f z %.2f\n", block,
+                measured.mean, 100 * measured.standard_error / measured.mean, expected.mean,
+                100 * expected.standard_error / expected.mean, measured.mean / expected.mean,
+                (measured.mean - expected.mean) / error);
+    EXPECT_NEAR(measured.mean, expected.mean, quantile * error)
+        << "ratio " << measured.mean / expected.mean;
+    EXPECT_GT(expected.mean, 0);
+  }
+}
+
+class PathClassTest : public testing::TestWithParam<PathClass> {};
+
+std::vector<PathClass> Cells() {
+  std::vector<PathClass> cells;
+  for (int light = 0; light < 8; ++light) {
+    for (int chain = 0; chain < 7; ++chain) {
+      for (int floor = 0; floor < 6; ++floor) {
+        const PathClass cell = {static_cast<LightKind>(light), static_cast<Chain>(chain),
+                                static_cast<Floor>(floor)};
+        cells.push_back(cell);
+      }
+    }
+  }
+  return cells;
+}
+
+std::string CellName(const testing::TestParamInfo<PathClass>& info) {
+  return NameOf(info.param);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cells, PathClassTest, testing::ValuesIn(Cells()), CellName);
+
+// Narrow lobes want small emitters in place of delta lights; below broad ones, large ones are found
+// more often.
+Effort EffortFor(const PathClass& cell) {
+  Effort effort;
+  switch (cell.floor) {
+    case Floor::kRoughMetal:
+    case Floor::kTexturedMetal:
+      effort.delta_radius = 0.12F;
+      break;
+    case Floor::kNarrowMetal:
+      effort.delta_radius = 0.08F;
+      break;
+    default:
+      effort.delta_radius = 0.2F;
+      break;
+  }
+  if (cell.floor == Floor::kRoughGlass) effort.photons = 6000;
+  return effort;
+}
+
+TEST_P(PathClassTest, IsSampled) {
+  ExpectSameLight(SceneOf(GetParam()), EffortFor(GetParam()));
+}
+
+}  // namespace
+}  // namespace lucerna
