@@ -10,7 +10,9 @@
 // 4 % of the floor, and the camera sees no edge within a radius of a gathering surface.
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -19,7 +21,8 @@
 
 #include "gtest/gtest.h"
 
-#include "tests/support/local_render.h"
+#include "render/math/rng.h"
+#include "tests/support/path_comparison.h"
 #include "tests/support/path_tracer.h"
 #include "tests/support/test_scenes.h"
 
@@ -27,7 +30,19 @@ namespace lucerna {
 namespace {
 
 enum class LightKind { kTriangles, kSphere, kDisk, kPoint, kSpot, kDistant, kConstant, kMap };
-enum class Chain { kNone, kPane, kThinPane, kRoughPane, kMirror, kNarrowWall, kDiffuseWall };
+enum class Chain {
+  kNone,
+  kPane,
+  kThinPane,
+  kRoughPane,
+  kMirror,
+  kNarrowWall,
+  kDiffuseWall,
+  kPaneAndNarrowWall,
+  kInBall,
+  kInNarrowBall,
+  kInRoughBall
+};
 enum class Floor { kDiffuse, kRoughMetal, kNarrowMetal, kTexturedMetal, kNarrowGlass, kRoughGlass };
 enum class View { kPlain, kThroughGlass, kInMirror };
 
@@ -41,9 +56,12 @@ struct PathClass {
 std::string NameOf(const PathClass& cell) {
   constexpr std::array<std::string_view, 8> kLights = {"Triangles", "Sphere",  "Disk",     "Point",
                                                        "Spot",      "Distant", "Constant", "Map"};
-  constexpr std::array<std::string_view, 7> kChains = {
-      "Directly",   "ByPane",       "ByThinPane", "ByRoughPane",
-      "ByMirror", "ByNarrowMetal", "ByDiffuseWall"};
+  constexpr std::array<std::string_view, 11> kChains = {"Directly",        "ByPane",
+                                                        "ByThinPane",      "ByRoughPane",
+                                                        "ByMirror",        "ByNarrowMetal",
+                                                        "ByDiffuseWall",   "ByPaneAndNarrowMetal",
+                                                        "InGlassBall",     "InNarrowGlassBall",
+                                                        "InRoughGlassBall"};
   constexpr std::array<std::string_view, 6> kFloors = {
       "Diffuse", "RoughMetal", "NarrowMetal", "TexturedMetal", "NarrowGlass", "RoughGlass"};
   constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
@@ -56,8 +74,12 @@ std::string NameOf(const PathClass& cell) {
 }
 
 bool IsWall(Chain chain) {
-  return chain == Chain::kMirror || chain == Chain::kNarrowWall || chain == Chain::kDiffuseWall;
+  return chain == Chain::kMirror || chain == Chain::kNarrowWall || chain == Chain::kDiffuseWall ||
+         chain == Chain::kPaneAndNarrowWall;
 }
+
+// Of lights that come straight to the floor.
+constexpr Vec3 kPlace = {0.05F, 1.2F, 1.6F};
 
 Material Metal(float alpha) {
   return ConductorMaterial(Gray(0.2F), Gray(3), alpha, alpha);
@@ -100,8 +122,8 @@ Scene SceneOf(const PathClass& cell) {
     case Floor::kNarrowGlass:
     case Floor::kRoughGlass:
       // With a diffuse bottom inside the glass.
-      floor(AddMaterial(
-          scene, DielectricMaterial(1.5F, cell.floor == Floor::kNarrowGlass ? 0.2F : 0.6F)));
+      floor(AddMaterial(scene,
+                        DielectricMaterial(1.5F, cell.floor == Floor::kNarrowGlass ? 0.2F : 0.6F)));
       AddQuad(scene, {-0.9F, -1, -0.1F}, {1.8F, 0, 0}, {0, 2, 0},
               AddMaterial(scene, DiffuseMaterial(0.6F)));
       break;
@@ -135,10 +157,24 @@ Scene SceneOf(const PathClass& cell) {
     case Chain::kDiffuseWall:
       wall(DiffuseMaterial(0.8F));
       break;
+    case Chain::kPaneAndNarrowWall:
+      wall(Metal(0.1F));
+      AddBox(scene, {-0.9F, -1.2F, 1.5F}, {0.9F, 0.5F, 1.6F},
+             AddMaterial(scene, DielectricMaterial(1.5F)));
+      break;
+    case Chain::kInBall:
+    case Chain::kInNarrowBall:
+    case Chain::kInRoughBall:
+      AddSphere(scene, kPlace, 0.35F,
+                AddMaterial(scene,
+                            DielectricMaterial(1.5F, cell.chain == Chain::kInBall         ? 0
+                                                     : cell.chain == Chain::kInNarrowBall ? 0.2F
+                                                                                          : 0.6F)));
+      break;
   }
 
   const bool by_wall = IsWall(cell.chain);
-  const Vec3 place = by_wall ? Vec3{0.05F, -1, 2.2F} : Vec3{0.05F, 1.2F, 1.6F};
+  const Vec3 place = by_wall ? Vec3{0.05F, -1, 2.2F} : kPlace;
   const Vec3 lit = by_wall ? Vec3{0, 0.85F, 0.8F} : Vec3{0, 0, 0};
   const Vec3 along = Normalize(lit - place);
   const auto area_light = [&] { return AddAreaLight(scene, 15, cell.light == LightKind::kDisk); };
@@ -159,8 +195,7 @@ Scene SceneOf(const PathClass& cell) {
       scene.point_lights.push_back({place, Gray(3)});
       break;
     case LightKind::kSpot:
-      scene.spot_lights.push_back(
-          {place, along, Gray(3), std::cos(0.25F), std::cos(0.7F)});
+      scene.spot_lights.push_back({place, along, Gray(3), std::cos(0.25F), std::cos(0.7F)});
       break;
     case LightKind::kDistant:
       scene.distant_lights.push_back({along, Gray(1)});
@@ -203,27 +238,6 @@ Scene SceneOf(const PathClass& cell) {
   return scene;
 }
 
-// Image and quarters of cells.
-constexpr int kBlocks = 5;
-PixelBlock BlockOf(int block, int size) {
-  if (block == 0) return {0, 0, size, size};
-  const int half = size / 2;
-  const int x0 = (block - 1) % 2 * half;
-  const int y0 = (block - 1) / 2 * half;
-  return {x0, y0, x0 + half, y0 + half};
-}
-
-double MeanOver(const Image& image, const PixelBlock& block, std::string_view channel) {
-  const ImageChannel* found = image.Find(channel);
-  LUCERNA_CHECK(found != nullptr);
-  double sum = 0;
-  for (int y = block.y0; y < block.y1; ++y) {
-    for (int x = block.x0; x < block.x1; ++x)
-      sum += static_cast<double>(found->pixels[static_cast<std::size_t>(y * image.width + x)]);
-  }
-  return sum / ((block.x1 - block.x0) * (block.y1 - block.y0));
-}
-
 constexpr int kParts = 16;
 constexpr int kDepth = 24;
 // At least as many comparisons as this file makes: cells times blocks.
@@ -231,62 +245,78 @@ constexpr int kQuestions = 1500;
 constexpr double kLevel = 1e-2;
 
 struct Effort {
-  int passes = 8;
+  int passes = 16;
   int photons = 2000;
-  int paths = 20000;
+  int paths = 24000;  // of each replica of the path tracer
   float delta_radius = 0.08F;
 };
 
-void ExpectSameLight(const Scene& scene, const Effort& effort, double radius = 0.04,
-                     int max_depth = kDepth) {
-  RenderSettings settings = TestSettings(scene, effort.photons, radius, max_depth);
+std::uint64_t KeyOf(std::string_view name) {
+  std::uint64_t key = 0;
+  for (const char c : name)
+    key = CombineKeys(key, static_cast<unsigned char>(c));
+  return key;
+}
+
+void ExpectSameLight(const Scene& scene, const Effort& effort, std::string_view name) {
+  constexpr double kRadius = 0.04;
+  RenderSettings settings = TestSettings(scene, effort.photons, kRadius, kDepth, KeyOf(name));
   settings.alpha = 1 - 1e-7;  // the radius is held
-  const int size = scene.film.width;
-  std::array<std::vector<double>, kBlocks> parts;
-  for (int part = 0; part < kParts; ++part) {
-    settings.seed = 1000 + static_cast<std::uint64_t>(part);
-    const Image image = RenderLocally(scene, settings, effort.passes);
-    for (int block = 0; block < kBlocks; ++block) {
-      parts[static_cast<std::size_t>(block)].push_back(MeanOver(image, BlockOf(block, size), "G"));
-    }
-  }
   PathTracerSettings tracer;
-  tracer.width = tracer.height = size;
-  tracer.max_depth = max_depth;
+  tracer.key = Mix64(KeyOf(name));
   tracer.paths_per_replica = effort.paths;
   tracer.delta_radius = effort.delta_radius;
   tracer.delta_angle_rad = effort.delta_radius / 2;
-  const TracedImage traced = TracePaths(scene, tracer);
-
   static const double quantile = StudentQuantile(SidakLevel(kLevel, kQuestions), kParts);
-  for (int block = 0; block < kBlocks; ++block) {
-    SCOPED_TRACE(block == 0 ? "image" : "quarter " + std::to_string(block));
-    const MeasuredMean measured = MeanOf(parts[static_cast<std::size_t>(block)]);
-    const MeasuredMean expected = traced.MeanOver(BlockOf(block, size), 1);
-    const double error = std::hypot(measured.standard_error, expected.standard_error);
-    std::printf("BLOCK %d est %.5f +- %.2f%% ref %.5f +- %.2f%% ratio %.4f z %.2f\n", block,
-                measured.mean, 100 * measured.standard_error / measured.mean, expected.mean,
-                100 * expected.standard_error / expected.mean, measured.mean / expected.mean,
-                (measured.mean - expected.mean) / error);
-    EXPECT_NEAR(measured.mean, expected.mean, quantile * error)
-        << "ratio " << measured.mean / expected.mean;
-    EXPECT_GT(expected.mean, 0);
+  for (const PathComparison& c :
+       CompareWithPaths(scene, settings, tracer, effort.passes, kParts, 2, "G")) {
+    if (std::getenv("PATHS_SHOW") != nullptr)
+      std::printf("BLOCK %d est %.5f +- %.2f%% ref %.5f +- %.2f%% ratio %.4f z %.2f\n",
+                  c.block.x0 + 2 * c.block.y0 + c.block.x1 + 2 * c.block.y1, c.estimated.mean,
+                  100 * c.estimated.standard_error / c.estimated.mean, c.traced.mean,
+                  100 * c.traced.standard_error / c.traced.mean, c.Ratio(), c.Deviation());
+    EXPECT_GT(c.traced.mean, 0);
+    EXPECT_LT(std::abs(c.Deviation()), quantile)
+        << "pixels from (" << c.block.x0 << ", " << c.block.y0 << "): " << c.estimated.mean
+        << " +- " << c.estimated.standard_error << " estimated, " << c.traced.mean << " +- "
+        << c.traced.standard_error << " traced";
   }
 }
 
 class PathClassTest : public testing::TestWithParam<PathClass> {};
 
 std::vector<PathClass> Cells() {
+  using enum LightKind;
+  using enum Chain;
+  const std::vector<Floor> all_floors = {Floor::kDiffuse,     Floor::kRoughMetal,
+                                         Floor::kNarrowMetal, Floor::kTexturedMetal,
+                                         Floor::kNarrowGlass, Floor::kRoughGlass};
+  const std::vector<Floor> narrow = {Floor::kNarrowMetal, Floor::kTexturedMetal,
+                                     Floor::kNarrowGlass};
+  const std::vector<Floor> two = {Floor::kDiffuse, Floor::kNarrowMetal};
   std::vector<PathClass> cells;
-  for (int light = 0; light < 8; ++light) {
-    for (int chain = 0; chain < 7; ++chain) {
-      for (int floor = 0; floor < 6; ++floor) {
-        const PathClass cell = {static_cast<LightKind>(light), static_cast<Chain>(chain),
-                                static_cast<Floor>(floor)};
-        cells.push_back(cell);
+  const auto add = [&](const std::vector<LightKind>& lights, const std::vector<Chain>& chains,
+                       const std::vector<Floor>& floors, View view = View::kPlain) {
+    for (const LightKind light : lights) {
+      for (const Chain chain : chains) {
+        for (const Floor floor : floors)
+          cells.push_back({light, chain, floor, view});
       }
     }
-  }
+  };
+  add({kTriangles, kPoint, kDistant, kMap},
+      {kNone, kPane, kRoughPane, kMirror, kNarrowWall, kDiffuseWall}, all_floors);
+  // What differs from those in the light alone.
+  add({kSphere, kDisk, kConstant}, {kNone, kPane, kMirror}, two);
+  add({kSpot}, {kNone, kPane, kMirror, kNarrowWall}, {Floor::kDiffuse, Floor::kNarrowMetal});
+  add({kSpot}, {kPane}, {Floor::kTexturedMetal, Floor::kNarrowGlass});
+  // As bright as without the pane.
+  add({kPoint, kSpot, kDistant}, {kThinPane}, narrow);
+  add({kTriangles, kPoint, kDistant, kMap}, {kPaneAndNarrowWall}, two);
+  add({kSphere, kPoint}, {kInBall, kInNarrowBall, kInRoughBall}, two);
+  add({kTriangles, kPoint, kDistant, kMap}, {kNone, kPane},
+      {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kNarrowGlass}, View::kThroughGlass);
+  add({kTriangles, kPoint, kMap}, {kNone, kPane}, two, View::kInMirror);
   return cells;
 }
 
@@ -313,11 +343,15 @@ Effort EffortFor(const PathClass& cell) {
       break;
   }
   if (cell.floor == Floor::kRoughGlass) effort.photons = 6000;
+  if (cell.chain == Chain::kInBall || cell.chain == Chain::kInNarrowBall ||
+      cell.chain == Chain::kInRoughBall) {
+    effort.delta_radius = 0.06F;
+  }
   return effort;
 }
 
 TEST_P(PathClassTest, IsSampled) {
-  ExpectSameLight(SceneOf(GetParam()), EffortFor(GetParam()));
+  ExpectSameLight(SceneOf(GetParam()), EffortFor(GetParam()), NameOf(GetParam()));
 }
 
 }  // namespace

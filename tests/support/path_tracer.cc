@@ -33,7 +33,8 @@ constexpr Color Times(const Color& a, double s) {
   return {a[0] * s, a[1] * s, a[2] * s};
 }
 constexpr void AddTo(Color& sum, const Color& term) {
-  for (std::size_t c = 0; c < 3; ++c) sum[c] += term[c];
+  for (std::size_t c = 0; c < 3; ++c)
+    sum[c] += term[c];
 }
 double Largest(const Color& c) {
   return std::max(c[0], std::max(c[1], c[2]));
@@ -45,7 +46,8 @@ Color FromFloat(Rgb c) {
 Color Working(const Color& c) {
   Color out{};
   for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t k = 0; k < 3; ++k) out[i] += kWorkingFrom709[i][k] * c[k];
+    for (std::size_t k = 0; k < 3; ++k)
+      out[i] += kWorkingFrom709[i][k] * c[k];
   }
   return out;
 }
@@ -132,12 +134,13 @@ Double3 Unit(Double3 v) {
 Double3 DrawFacet(const Surface& surface, double u1, double u2) {
   const double slope = std::sqrt(u1 / (1 - u1));
   const double phi = 2 * kPiD * u2;
-  return Unit({surface.alpha_u * slope * std::cos(phi), surface.alpha_v * slope * std::sin(phi), 1});
+  return Unit(
+      {surface.alpha_u * slope * std::cos(phi), surface.alpha_v * slope * std::sin(phi), 1});
 }
 
 struct Scattered {
   Double3 wi;
-  Color weight{};    // f·|cosθ| / density
+  Color weight{};  // f·|cosθ| / density
   bool is_delta = false;
   double index = 1;  // where wi is over where wo is
 };
@@ -266,8 +269,8 @@ class PathTracer {
 
   [[nodiscard]] TracedImage Trace() const {
     TracedImage image(settings_.width, settings_.height, settings_.replicas);
-    const auto channels = static_cast<std::size_t>(settings_.width) *
-                          static_cast<std::size_t>(settings_.height) * 3;
+    const auto channels =
+        static_cast<std::size_t>(settings_.width) * static_cast<std::size_t>(settings_.height) * 3;
     ThreadTeam team(settings_.threads);
     team.For(static_cast<std::size_t>(settings_.replicas), 1,
              [&](std::size_t begin, std::size_t end) {
@@ -291,7 +294,8 @@ class PathTracer {
     const std::uint64_t key = CombineKeys(settings_.key, replica);
     std::array<double, kEvenDimensions> shifts{};
     KeyedRng rng(key);
-    for (double& shift : shifts) shift = static_cast<double>(rng.Bits() >> 11) * 0x1p-53;
+    for (double& shift : shifts)
+      shift = static_cast<double>(rng.Bits() >> 11) * 0x1p-53;
     const double share =
         static_cast<double>(settings_.width) * settings_.height / settings_.paths_per_replica;
     const double half = std::tan(scene_.camera.fov_deg * kPiD / 360);
@@ -305,9 +309,10 @@ class PathTracer {
       const Transform& to_world = scene_.camera.camera_to_world;
       const Ray ray = {to_world.Point({0, 0, 0}), Normalize(to_world.Vector(direction)), HUGE_VALF};
       const std::array<double, 3> seen = ToRec709(Radiance(ray, numbers));
-      const auto pixel = static_cast<std::size_t>(static_cast<int>(y) * settings_.width +
-                                                  static_cast<int>(x));
-      for (std::size_t c = 0; c < 3; ++c) radiance[3 * pixel + c] += seen[c] * share;
+      const auto pixel =
+          static_cast<std::size_t>(static_cast<int>(y) * settings_.width + static_cast<int>(x));
+      for (std::size_t c = 0; c < 3; ++c)
+        radiance[3 * pixel + c] += seen[c] * share;
     }
   }
 
@@ -409,8 +414,7 @@ class PathTracer {
       const Vec3 wi = frame.ToWorld(ToFloat(scattered.wi));
       // What the shading normal calls reflection must be one for the geometry too.
       const bool transmits = scattered.wi.z * static_cast<double>(wo_local.z) < 0;
-      const bool crosses =
-          Dot(wo, point.geometric_normal) * Dot(wi, point.geometric_normal) < 0;
+      const bool crosses = Dot(wo, point.geometric_normal) * Dot(wi, point.geometric_normal) < 0;
       if (transmits != crosses) return seen;
       weight = Times(weight, scattered.weight);
       compression *= scattered.index * scattered.index;
