@@ -4,10 +4,11 @@
 // the difference in standard errors. Point, spot and distant lights stand for small emitters in the
 // path tracer: see tests/support/path_tracer.h.
 // Run: build/release/bin/lucerna-path-check SCENE [side [passes [paths [parts [delta [depth
-// [channel]]]]]]]
+// [channel [radius]]]]]]]]
 //   side     of the image [pixels], a multiple of 4 (32); passes of each part (64); paths of the
 //   path tracer in millions (24); parts (16); radius of what stands for a point [scene units]
-//   (0.02); greatest depth (the scene's); R, G or B (G)
+//   (0.02); greatest depth (the scene's); R, G or B (G);
+//   first radius [widths of a pixel] (3)
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -18,9 +19,10 @@
 int main(int argc, char** argv) {
   using namespace lucerna;
   if (argc < 2) {
-    std::fprintf(stderr,
-                 "usage: %s SCENE [side [passes [paths [parts [delta [depth [channel]]]]]]]\n",
-                 argv[0]);
+    std::fprintf(
+        stderr,
+        "usage: %s SCENE [side [passes [paths [parts [delta [depth [channel [radius]]]]]]]]\n",
+        argv[0]);
     return 2;
   }
   const auto number = [&](int index, double otherwise) {
@@ -32,6 +34,7 @@ int main(int argc, char** argv) {
   RenderOverrides overrides;
   overrides.width = overrides.height = side;
   if (argc > 7) overrides.max_depth = std::atoi(argv[7]);
+  if (argc > 9) overrides.initial_footprints = std::atof(argv[9]);
   const RenderSettings settings = SettingsFor(scene, overrides);
   PathTracerSettings tracer;
   tracer.paths_per_replica = static_cast<int>(number(4, 24) * 1e6 / tracer.replicas);
