@@ -1,0 +1,425 @@
+// No light is lost: one tiny scene for each class of paths, by kind of light, what the light meets
+// on its way, and the surface that the camera sees.
+//
+// Each scene is rendered by the estimator and by the path tracer of tests/support, which shares
+// nothing with it but geometry. Means over the image and over its quarters are compared; the
+// standard errors of both come from independent repetitions, and Student's quantile bounds their
+// difference. docs/path-classes.md has the table of classes, and names these tests.
+//
+// Kernel bias is kept below what the bounds allow by geometry: floors and panes are flat, radii are
+// 4 % of the floor, and the camera sees no edge within a radius of a gathering surface.
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/math/rng.h"
+#include "tests/support/path_comparison.h"
+#include "tests/support/path_tracer.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+enum class LightKind { kTriangles, kSphere, kDisk, kPoint, kSpot, kDistant, kConstant, kMap };
+enum class Chain {
+  kNone,
+  kPane,
+  kThinPane,
+  kRoughPane,
+  kMirror,
+  kNarrowWall,
+  kDiffuseWall,
+  kPaneAndNarrowWall,
+  kInBall,
+  kInNarrowBall,
+  kInRoughBall
+};
+enum class Floor { kDiffuse, kRoughMetal, kNarrowMetal, kTexturedMetal, kNarrowGlass, kRoughGlass };
+enum class View { kPlain, kThroughGlass, kInMirror };
+
+struct PathClass {
+  LightKind light;
+  Chain chain;
+  Floor floor;
+  View view = View::kPlain;
+};
+
+std::string NameOf(const PathClass& cell) {
+  constexpr std::array<std::string_view, 8> kLights = {"Triangles", "Sphere",  "Disk",     "Point",
+                                                       "Spot",      "Distant", "Constant", "Map"};
+  constexpr std::array<std::string_view, 11> kChains = {"Directly",        "ByPane",
+                                                        "ByThinPane",      "ByRoughPane",
+                                                        "ByMirror",        "ByNarrowMetal",
+                                                        "ByDiffuseWall",   "ByPaneAndNarrowMetal",
+                                                        "InGlassBall",     "InNarrowGlassBall",
+                                                        "InRoughGlassBall"};
+  constexpr std::array<std::string_view, 6> kFloors = {
+      "Diffuse", "RoughMetal", "NarrowMetal", "TexturedMetal", "NarrowGlass", "RoughGlass"};
+  constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
+  std::string name(kLights[static_cast<std::size_t>(cell.light)]);
+  name += kChains[static_cast<std::size_t>(cell.chain)];
+  name += "On";
+  name += kFloors[static_cast<std::size_t>(cell.floor)];
+  name += kViews[static_cast<std::size_t>(cell.view)];
+  return name;
+}
+
+bool GathersCaustics(Floor floor) {
+  return floor == Floor::kNarrowMetal || floor == Floor::kTexturedMetal ||
+         floor == Floor::kNarrowGlass;
+}
+bool IsWall(Chain chain) {
+  return chain == Chain::kMirror || chain == Chain::kNarrowWall || chain == Chain::kDiffuseWall ||
+         chain == Chain::kPaneAndNarrowWall;
+}
+
+// Of lights that come straight to the floor.
+constexpr Vec3 kPlace = {0.05F, 1.2F, 1.6F};
+
+Material Metal(float alpha) {
+  return ConductorMaterial(Gray(0.2F), Gray(3), alpha, alpha);
+}
+
+// A floor z = 0. Light comes from above its far side (y > 0), or, with a wall there, from behind
+// the camera by way of the wall while a black shield shades the floor itself.
+Scene SceneOf(const PathClass& cell) {
+  Scene scene;
+  const std::int32_t black = AddMaterial(scene, DiffuseMaterial(0));
+
+  const auto floor = [&](std::int32_t material) {
+    AddQuad(scene, {-0.7F, -0.8F, 0}, {1.4F, 0, 0}, {0, 1.6F, 0}, material);
+  };
+  switch (cell.floor) {
+    case Floor::kDiffuse:
+      floor(AddMaterial(scene, DiffuseMaterial(0.6F)));
+      break;
+    case Floor::kRoughMetal:
+      floor(AddMaterial(scene, Metal(0.3F)));
+      break;
+    case Floor::kNarrowMetal:
+      floor(AddMaterial(scene, Metal(0.1F)));
+      break;
+    case Floor::kTexturedMetal: {
+      Texture dark;
+      dark.color = Gray(0.3F);
+      Texture bright;
+      bright.color = Gray(0.9F);
+      Texture board;
+      board.kind = Texture::Kind::kCheckerboard;
+      board.parts = {0, 1};
+      board.mapping = {6, 6, 0, 0};
+      scene.textures = {dark, bright, board};
+      Material metal = Metal(0.3F);
+      metal.texture = 2;
+      floor(AddMaterial(scene, metal));
+      break;
+    }
+    case Floor::kNarrowGlass:
+    case Floor::kRoughGlass:
+      // With a diffuse bottom inside the glass.
+      floor(AddMaterial(scene,
+                        DielectricMaterial(1.5F, cell.floor == Floor::kNarrowGlass ? 0.2F : 0.6F)));
+      AddQuad(scene, {-0.9F, -1, -0.1F}, {1.8F, 0, 0}, {0, 2, 0},
+              AddMaterial(scene, DiffuseMaterial(0.6F)));
+      break;
+  }
+
+  const auto pane = [&](const Material& material) {
+    AddBox(scene, {-1, -1, 0.9F}, {1, 1, 1}, AddMaterial(scene, material));
+  };
+  const auto wall = [&](const Material& material) {
+    AddQuad(scene, {-1, 0.85F, 0.02F}, {2, 0, 0}, {0, 0, 1.4F}, AddMaterial(scene, material));
+    // The sun's shadow of its edge would be blurred where a cone stands for the sun.
+    if (cell.light != LightKind::kDistant) {
+      AddQuad(scene, {-0.8F, -1.7F, 1.1F}, {1.6F, 0, 0}, {0, 1.35F, 0}, black);
+    }
+  };
+  switch (cell.chain) {
+    case Chain::kNone:
+      break;
+    case Chain::kPane:
+      pane(DielectricMaterial(1.5F));
+      break;
+    case Chain::kThinPane:
+      pane(DielectricMaterial(1.0001F));
+      break;
+    case Chain::kRoughPane:
+      pane(DielectricMaterial(1.5F, 0.2F));
+      break;
+    case Chain::kMirror:
+      wall(Metal(0));
+      break;
+    case Chain::kNarrowWall:
+      wall(Metal(0.1F));
+      break;
+    case Chain::kDiffuseWall:
+      wall(DiffuseMaterial(0.8F));
+      break;
+    case Chain::kPaneAndNarrowWall:
+      wall(Metal(0.1F));
+      AddBox(scene, {-0.9F, -1.2F, 1.5F}, {0.9F, 0.5F, 1.6F},
+             AddMaterial(scene, DielectricMaterial(1.5F)));
+      break;
+    case Chain::kInBall:
+    case Chain::kInNarrowBall:
+    case Chain::kInRoughBall:
+      AddSphere(scene, kPlace, 0.35F,
+                AddMaterial(scene,
+                            DielectricMaterial(1.5F, cell.chain == Chain::kInBall         ? 0
+                                                     : cell.chain == Chain::kInNarrowBall ? 0.2F
+                                                                                          : 0.6F)));
+      break;
+  }
+
+  const bool by_wall = IsWall(cell.chain);
+  const Vec3 place = by_wall ? Vec3{0.05F, -1, 2.2F} : kPlace;
+  const Vec3 lit = by_wall ? Vec3{0, 0.85F, 0.8F} : Vec3{0, 0, 0};
+  const Vec3 along = Normalize(lit - place);
+  const auto area_light = [&] { return AddAreaLight(scene, 15, cell.light == LightKind::kDisk); };
+  switch (cell.light) {
+    case LightKind::kTriangles: {
+      const Frame frame(along);
+      AddQuad(scene, place - (frame.s + frame.t) * 0.2F, frame.s * 0.4F, frame.t * 0.4F, black,
+              area_light());
+      break;
+    }
+    case LightKind::kSphere:
+      AddSphere(scene, place, 0.2F, black, area_light());
+      break;
+    case LightKind::kDisk:
+      AddDisk(scene, place, along, 0.22F, black, area_light());
+      break;
+    case LightKind::kPoint:
+      scene.point_lights.push_back({place, Gray(3)});
+      break;
+    case LightKind::kSpot:
+      scene.spot_lights.push_back({place, along, Gray(3), std::cos(0.25F), std::cos(0.7F)});
+      break;
+    case LightKind::kDistant:
+      scene.distant_lights.push_back({along, Gray(1)});
+      break;
+    case LightKind::kConstant:
+      scene.infinite_lights.push_back({Gray(0.7F)});
+      break;
+    case LightKind::kMap: {
+      Picture picture;
+      picture.width = picture.height = 6;
+      picture.channels = 1;
+      for (int i = 0; i < 36; ++i)
+        picture.linear.push_back(0.1F + 0.4F * static_cast<float>(i * 7 % 5));
+      InfiniteLight light;
+      light.radiance = Gray(1);
+      light.map = std::make_shared<const Picture>(std::move(picture));
+      scene.infinite_lights.push_back(light);
+      break;
+    }
+  }
+
+  constexpr double kFovDeg = 28;
+  constexpr int kSize = 8;
+  switch (cell.view) {
+    case View::kPlain:
+      SetCamera(scene, {0, -0.8, 0.8}, {0, 0, 0}, {0, 0, 1}, kFovDeg, kSize);
+      break;
+    case View::kThroughGlass:
+      SetCamera(scene, {0, -1.1, 1.1}, {0, 0, 0}, {0, 0, 1}, kFovDeg * 0.75, kSize);
+      AddBox(scene, {-0.6F, -0.9F, 0.8F}, {0.6F, -0.2F, 0.86F},
+             AddMaterial(scene, DielectricMaterial(1.5F)));
+      break;
+    case View::kInMirror:
+      // The mirror is behind the floor's near edge, and the camera sees the floor in it.
+      SetCamera(scene, {0, 0.1, 0.8}, {0, -0.9, 0.9}, {0, 0, 1}, kFovDeg, kSize);
+      AddQuad(scene, {-0.7F, -0.9F, 0.1F}, {1.4F, 0, 0}, {0, 0, 1.2F},
+              AddMaterial(scene, Metal(0)));
+      break;
+  }
+  return scene;
+}
+
+constexpr int kParts = 16;
+constexpr int kDepth = 24;
+// At least as many comparisons as this file makes: cells times blocks.
+constexpr int kQuestions = 1500;
+constexpr double kLevel = 1e-2;
+
+struct Effort {
+  int passes = 16;
+  int photons = 2000;
+  int paths = 24000;  // of each replica of the path tracer
+  float delta_radius = 0.08F;
+};
+
+std::uint64_t KeyOf(std::string_view name) {
+  std::uint64_t key = 0;
+  for (const char c : name)
+    key = CombineKeys(key, static_cast<unsigned char>(c));
+  return key;
+}
+
+void ExpectSameLight(const Scene& scene, const Effort& effort, std::string_view name) {
+  constexpr double kRadius = 0.04;
+  RenderSettings settings = TestSettings(scene, effort.photons, kRadius, kDepth, KeyOf(name));
+  settings.alpha = 1 - 1e-7;  // the radius is held
+  PathTracerSettings tracer;
+  tracer.key = Mix64(KeyOf(name));
+  tracer.paths_per_replica = effort.paths;
+  tracer.delta_radius = effort.delta_radius;
+  tracer.delta_angle_rad = tracer.delta_radius / 2;
+  static const double quantile = StudentQuantile(SidakLevel(kLevel, kQuestions), kParts);
+  for (const PathComparison& c :
+       CompareWithPaths(scene, settings, tracer, effort.passes, kParts, 2, "G")) {
+    EXPECT_GT(c.traced.mean, 0);
+    EXPECT_LT(std::abs(c.Deviation()), quantile)
+        << "pixels from (" << c.block.x0 << ", " << c.block.y0 << "): " << c.estimated.mean
+        << " +- " << c.estimated.standard_error << " estimated, " << c.traced.mean << " +- "
+        << c.traced.standard_error << " traced";
+  }
+}
+
+// --- the path tracer itself ----------------------------------------------------------------------
+
+MeasuredMean TracedMean(const Scene& scene, float delta_radius, int paths = 20000) {
+  PathTracerSettings settings;
+  settings.paths_per_replica = paths;
+  settings.delta_radius = delta_radius;
+  settings.delta_angle_rad = delta_radius / 2;
+  return TracePaths(scene, settings).MeanOver({0, 0, settings.width, settings.height}, 1);
+}
+
+// Six standard errors of 24 replicas: once in 250,000.
+constexpr double kErrors = 6;
+
+// Under a sky of radiance 1, smooth glass is as bright as the sky.
+TEST(PathTracerTest, KeepsRadianceInAFurnace) {
+  Scene scene;
+  AddSphere(scene, {0, 0, 0}, 1, AddMaterial(scene, DielectricMaterial(1.5F)));
+  scene.infinite_lights.push_back({Gray(1)});
+  SetCamera(scene, {0, 0, -4}, {0, 0, 0}, {0, 1, 0}, 20, 8);
+  const MeasuredMean mean = TracedMean(scene, 0.1F);
+  EXPECT_NEAR(mean.mean, 1, kErrors * mean.standard_error + 1e-3);
+  EXPECT_LT(mean.standard_error, 5e-3);
+}
+
+// ρ I cosθ / (π d²) below a point, and ρ E cosθ / π below the sun, whatever stands for them.
+TEST(PathTracerTest, LightsADiffuseFloorByClosedForms) {
+  for (const float size : {0.1F, 0.3F}) {
+    SCOPED_TRACE(size);
+    Scene point;
+    AddQuad(point, {-3, -3, 0}, {6, 0, 0}, {0, 6, 0}, AddMaterial(point, DiffuseMaterial(0.5F)));
+    SetCamera(point, {0, -1, 1}, {0, 0, 0}, {0, 0, 1}, 0.1, 8);
+    Scene sun = point;
+    point.point_lights.push_back({{1, 0, 1}, Gray(4)});
+    MeasuredMean mean = TracedMean(point, size, 60000);
+    double expected = 0.5 * 4 * std::sqrt(0.5) / (std::numbers::pi * 2);
+    EXPECT_NEAR(mean.mean, expected, kErrors * mean.standard_error);
+    EXPECT_LT(mean.standard_error, 0.02 * expected);
+    sun.distant_lights.push_back({Normalize({1, 1, -1}), Gray(2)});
+    mean = TracedMean(sun, size, 60000);
+    expected = 0.5 * 2 / (std::sqrt(3.0) * std::numbers::pi);
+    EXPECT_NEAR(mean.mean, expected, kErrors * mean.standard_error);
+    EXPECT_LT(mean.standard_error, 0.02 * expected);
+  }
+}
+
+// What stands for a point does not blur away light: half the size gives the same.
+TEST(PathTracerTest, StandInsOfTwoSizesGiveTheSameLight) {
+  for (const Chain chain : {Chain::kNone, Chain::kPane, Chain::kMirror}) {
+    const Scene scene = SceneOf({LightKind::kPoint, chain, Floor::kNarrowMetal});
+    const MeasuredMean large = TracedMean(scene, 0.08F, 25000);
+    const MeasuredMean small = TracedMean(scene, 0.04F, 60000);
+    EXPECT_NEAR(large.mean, small.mean,
+                kErrors * std::hypot(large.standard_error, small.standard_error));
+    EXPECT_LT(small.standard_error, 0.02 * small.mean);
+  }
+}
+
+// --- cells
+// -----------------------------------------------------------------------------------------
+
+class PathClassTest : public testing::TestWithParam<PathClass> {};
+
+std::vector<PathClass> Cells() {
+  using enum LightKind;
+  using enum Chain;
+  const std::vector<Floor> narrow = {Floor::kNarrowMetal, Floor::kTexturedMetal,
+                                     Floor::kNarrowGlass};
+  const std::vector<Floor> two = {Floor::kDiffuse, Floor::kNarrowMetal};
+  std::vector<PathClass> cells;
+  const auto add = [&](const std::vector<LightKind>& lights, const std::vector<Chain>& chains,
+                       const std::vector<Floor>& floors, View view = View::kPlain) {
+    for (const LightKind light : lights) {
+      for (const Chain chain : chains) {
+        for (const Floor floor : floors)
+          cells.push_back({light, chain, floor, view});
+      }
+    }
+  };
+  add({kTriangles, kPoint}, {kNone, kPane, kRoughPane, kMirror, kNarrowWall, kDiffuseWall},
+      {Floor::kDiffuse, Floor::kRoughMetal, Floor::kNarrowMetal, Floor::kTexturedMetal,
+       Floor::kNarrowGlass, Floor::kRoughGlass});
+  // What differs from those in the light alone.
+  add({kDistant}, {kNone, kPane, kRoughPane, kMirror, kNarrowWall, kDiffuseWall},
+      {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kTexturedMetal, Floor::kNarrowGlass});
+  add({kMap}, {kNone, kPane, kRoughPane, kMirror, kNarrowWall, kDiffuseWall},
+      {Floor::kDiffuse, Floor::kRoughMetal, Floor::kNarrowMetal});
+  add({kSphere, kDisk, kConstant}, {kNone, kPane}, two);
+  add({kSpot}, {kNone, kPane, kMirror}, two);
+  add({kSpot}, {kPane}, {Floor::kTexturedMetal, Floor::kNarrowGlass});
+  // As bright as without the pane.
+  add({kPoint, kSpot, kDistant}, {kThinPane}, narrow);
+  add({kTriangles, kPoint, kDistant}, {kPaneAndNarrowWall}, two);
+  add({kSphere, kPoint}, {kInBall, kInNarrowBall, kInRoughBall}, two);
+  add({kTriangles, kPoint}, {kNone, kPane},
+      {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kNarrowGlass}, View::kThroughGlass);
+  add({kTriangles, kPoint}, {kNone, kPane}, two, View::kInMirror);
+  return cells;
+}
+
+std::string CellName(const testing::TestParamInfo<PathClass>& info) {
+  return NameOf(info.param);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cells, PathClassTest, testing::ValuesIn(Cells()), CellName);
+
+// Narrow lobes want small emitters in place of delta lights; below broad ones, large ones are found
+// more often.
+Effort EffortFor(const PathClass& cell) {
+  Effort effort;
+  switch (cell.floor) {
+    case Floor::kRoughMetal:
+    case Floor::kTexturedMetal:
+      effort.delta_radius = 0.12F;
+      break;
+    case Floor::kNarrowMetal:
+      effort.delta_radius = 0.08F;
+      break;
+    default:
+      effort.delta_radius = 0.2F;
+      break;
+  }
+  if (cell.light == LightKind::kSpot) effort.delta_radius = 0.08F;
+  // Found by few of the photons or scattered rays.
+  if (cell.floor == Floor::kRoughGlass || cell.floor == Floor::kRoughMetal) effort.photons = 6000;
+  if (GathersCaustics(cell.floor) && cell.chain != Chain::kNone) effort.passes = 28;
+  if (effort.delta_radius < 0.1F) effort.paths = 36000;
+  if (cell.chain == Chain::kInBall || cell.chain == Chain::kInNarrowBall ||
+      cell.chain == Chain::kInRoughBall) {
+    effort.delta_radius = 0.06F;
+  }
+  return effort;
+}
+
+TEST_P(PathClassTest, IsSampled) {
+  ExpectSameLight(SceneOf(GetParam()), EffortFor(GetParam()), NameOf(GetParam()));
+}
+
+}  // namespace
+}  // namespace lucerna

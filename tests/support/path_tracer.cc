@@ -1,0 +1,467 @@
+#include "tests/support/path_tracer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "render/base/parallel.h"
+#include "render/geometry/intersector.h"
+#include "render/geometry/surface_uv.h"
+#include "render/math/color_space.h"
+#include "render/math/double3.h"
+#include "render/math/equal_area_square.h"
+#include "render/math/rng.h"
+#include "render/scene/texture.h"
+
+namespace lucerna {
+namespace {
+
+constexpr double kPiD = std::numbers::pi;
+using Color = std::array<double, 3>;
+
+constexpr Color Times(const Color& a, const Color& b) {
+  return {a[0] * b[0], a[1] * b[1], a[2] * b[2]};
+}
+constexpr Color Times(const Color& a, double s) {
+  return {a[0] * s, a[1] * s, a[2] * s};
+}
+constexpr void AddTo(Color& sum, const Color& term) {
+  for (std::size_t c = 0; c < 3; ++c)
+    sum[c] += term[c];
+}
+double Largest(const Color& c) {
+  return std::max(c[0], std::max(c[1], c[2]));
+}
+Color FromFloat(Rgb c) {
+  return {static_cast<double>(c.r), static_cast<double>(c.g), static_cast<double>(c.b)};
+}
+// Scenes and images are in Rec. 709, products of colours are taken in the working space.
+Color Working(const Color& c) {
+  Color out{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t k = 0; k < 3; ++k)
+      out[i] += kWorkingFrom709[i][k] * c[k];
+  }
+  return out;
+}
+
+// --- surfaces ----------------------------------------------------------------------------------
+
+// Unpolarised, by the law of Snell and the amplitudes of Fresnel. `eta`: index where the light
+// goes over the index where it is; cos_i in (0, 1].
+double DielectricReflectance(double cos_i, double eta, double& cos_t) {
+  const double sin2_t = (1 - cos_i * cos_i) / (eta * eta);
+  if (sin2_t >= 1) {
+    cos_t = 0;
+    return 1;
+  }
+  cos_t = std::sqrt(1 - sin2_t);
+  const double s = (cos_i - eta * cos_t) / (cos_i + eta * cos_t);
+  const double p = (eta * cos_i - cos_t) / (eta * cos_i + cos_t);
+  return (s * s + p * p) / 2;
+}
+
+// The same amplitudes with the complex index n + i·k.
+double ConductorReflectance(double cos_i, double n, double k) {
+  const std::complex<double> index2 = std::complex<double>(n, k) * std::complex<double>(n, k);
+  const std::complex<double> b = std::sqrt(index2 - (1 - cos_i * cos_i));  // index · cos θt
+  const std::complex<double> s = (cos_i - b) / (cos_i + b);
+  const std::complex<double> p = (index2 * cos_i - b) / (index2 * cos_i + b);
+  return (std::norm(s) + std::norm(p)) / 2;
+}
+
+struct Surface {
+  Material::Kind kind = Material::Kind::kDiffuse;
+  bool is_smooth = false;
+  bool gathers = false;
+  Color reflectance{};  // diffuse, working space
+  Color eta{}, k{};     // conductor, Rec. 709
+  double ior = 1, alpha_u = 0, alpha_v = 0;
+};
+
+Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
+  const Material& material = scene.materials[point.material];
+  Surface surface;
+  surface.kind = material.kind;
+  surface.is_smooth = IsSmooth(material);
+  surface.gathers = Gathers(material);
+  surface.reflectance = Working(FromFloat(material.reflectance));
+  surface.eta = FromFloat(material.eta);
+  surface.k = FromFloat(material.k);
+  surface.ior = static_cast<double>(material.ior);
+  surface.alpha_u = static_cast<double>(std::max(material.alpha_u, 1e-4F));
+  surface.alpha_v = static_cast<double>(std::max(material.alpha_v, 1e-4F));
+  if (material.texture != kNoTexture) {
+    const Color color =
+        FromFloat(TextureColor(scene.textures, material.texture, UvAt(scene, point)));
+    surface.reflectance = Working(color);
+    surface.eta = {1, 1, 1};
+    for (std::size_t c = 0; c < 3; ++c) {
+      // (k² / (4 + k²)) is the reflectance at right angles for n = 1.
+      const double r = std::min(color[c], 0.9999);
+      surface.k[c] = 2 * std::sqrt(r / (1 - r));
+    }
+  }
+  return surface;
+}
+
+Color MetalColor(const Surface& surface, double cos_i) {
+  Color reflected{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    reflected[c] = ConductorReflectance(std::min(1.0, cos_i), surface.eta[c], surface.k[c]);
+  }
+  return Working(reflected);
+}
+
+double SmithLambda(const Surface& surface, Double3 w) {
+  const double x = surface.alpha_u * w.x;
+  const double y = surface.alpha_v * w.y;
+  return (std::sqrt(1 + (x * x + y * y) / (w.z * w.z)) - 1) / 2;
+}
+
+Double3 Unit(Double3 v) {
+  return v * (1 / Length(v));
+}
+
+// A facet with density D(m)·cosθ.
+Double3 DrawFacet(const Surface& surface, double u1, double u2) {
+  const double slope = std::sqrt(u1 / (1 - u1));
+  const double phi = 2 * kPiD * u2;
+  return Unit(
+      {surface.alpha_u * slope * std::cos(phi), surface.alpha_v * slope * std::sin(phi), 1});
+}
+
+struct Scattered {
+  Double3 wi;
+  Color weight{};  // f·|cosθ| / density
+  bool is_delta = false;
+  double index = 1;  // where wi is over where wo is
+};
+
+// In the shading frame. False: absorbed.
+bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u, Scattered& out) {
+  if (wo.z == 0) return false;
+  const double side = wo.z < 0 ? -1 : 1;
+  const Double3 up = wo * side;
+  out.is_delta = surface.is_smooth;
+  out.index = 1;
+  if (surface.kind == Material::Kind::kDiffuse) {
+    const double sine = std::sqrt(u[1]);
+    const double phi = 2 * kPiD * u[2];
+    out.wi = Double3{sine * std::cos(phi), sine * std::sin(phi), std::sqrt(1 - u[1])} * side;
+    out.weight = surface.reflectance;
+    return true;
+  }
+  const Double3 m = surface.is_smooth ? Double3{0, 0, 1} : DrawFacet(surface, u[1], u[2]);
+  const double cos_m = Dot(up, m);
+  if (!(cos_m > 0)) return false;
+  const Double3 reflected = m * (2 * cos_m) - up;
+  // Walter et al. eq. (41).
+  const auto weight_of = [&](Double3 wi) {
+    if (surface.is_smooth) return 1.0;
+    const double g2 = 1 / (1 + SmithLambda(surface, up) + SmithLambda(surface, wi));
+    return cos_m * g2 / (up.z * m.z);
+  };
+  if (surface.kind == Material::Kind::kConductor) {
+    if (!(reflected.z > 0)) return false;
+    out.wi = reflected * side;
+    out.weight = Times(MetalColor(surface, cos_m), weight_of(reflected));
+    return true;
+  }
+  const double eta = wo.z > 0 ? surface.ior : 1 / surface.ior;
+  double cos_t = 0;
+  if (u[0] < DielectricReflectance(std::min(1.0, cos_m), eta, cos_t)) {
+    if (!(reflected.z > 0)) return false;
+    out.wi = reflected * side;
+    const double weight = weight_of(reflected);
+    out.weight = {weight, weight, weight};
+    return true;
+  }
+  const Double3 refracted = m * (cos_m / eta - cos_t) - up * (1 / eta);
+  if (!(refracted.z < 0)) return false;
+  out.wi = refracted * side;
+  out.index = eta;
+  const double weight = weight_of(refracted) / (eta * eta);
+  out.weight = {weight, weight, weight};
+  return true;
+}
+
+// --- numbers -----------------------------------------------------------------------------------
+
+// The numbers of one path: the first ones from a Kronecker lattice with a random shift, which
+// spreads the paths of a replica evenly, the others independent.
+constexpr std::size_t kEvenDimensions = 11;
+
+class PathNumbers {
+ public:
+  PathNumbers(std::uint64_t key, const std::array<double, kEvenDimensions>& shifts, int path)
+      : shifts_(shifts), path_(path), rng_(CombineKeys(key, static_cast<std::uint64_t>(path))) {}
+
+  double Next() {
+    static const std::array<double, kEvenDimensions> kSteps = [] {
+      constexpr std::array<int, kEvenDimensions> kPrimes = {2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31};
+      std::array<double, kEvenDimensions> steps{};
+      for (std::size_t d = 0; d < kEvenDimensions; ++d)
+        steps[d] = std::sqrt(static_cast<double>(kPrimes[d]));
+      return steps;
+    }();
+    if (dimension_ >= kEvenDimensions) {
+      return static_cast<double>(rng_.Bits() >> 11) * 0x1p-53;
+    }
+    const double x = shifts_[dimension_] + path_ * kSteps[dimension_];
+    ++dimension_;
+    return x - std::floor(x);
+  }
+
+ private:
+  const std::array<double, kEvenDimensions>& shifts_;
+  int path_;
+  KeyedRng rng_;
+  std::size_t dimension_ = 0;
+};
+
+}  // namespace
+
+// --- paths -------------------------------------------------------------------------------------
+
+class PathTracer {
+ public:
+  PathTracer(const Scene& scene, const PathTracerSettings& settings)
+      : scene_(scene), settings_(settings) {
+    if (scene.camera.lens_radius > 0) {
+      std::fprintf(stderr, "the path tracer knows no lens\n");
+      std::abort();
+    }
+    first_stand_in_ = static_cast<std::uint32_t>(scene.spheres.size());
+    scene_.materials.emplace_back();
+    const auto material = static_cast<std::int32_t>(scene_.materials.size()) - 1;
+    const double area = kPiD * static_cast<double>(settings.delta_radius) *
+                        static_cast<double>(settings.delta_radius);
+    const auto stand_in = [&](Vec3 position, Rgb intensity, const SpotLight* spot) {
+      scene_.spheres.push_back(
+          {position, settings.delta_radius, false, {material, kNoAreaLight}, {}});
+      stand_ins_.push_back({Times(Working(FromFloat(intensity)), 1 / area), spot});
+    };
+    for (const PointLight& light : scene.point_lights)
+      stand_in(light.position, light.intensity, nullptr);
+    for (const SpotLight& light : scene.spot_lights)
+      stand_in(light.position, light.intensity, &light);
+    const double sine = std::sin(static_cast<double>(settings.delta_angle_rad));
+    cos_cone_ = std::sqrt(1 - sine * sine);
+    for (const DistantLight& light : scene.distant_lights) {
+      suns_.push_back({Unit(Double3(-light.direction)),
+                       Times(Working(FromFloat(light.irradiance)), 1 / (kPiD * sine * sine))});
+    }
+    StatusOr<std::unique_ptr<Intersector>> intersector = Intersector::Create(scene_);
+    if (!intersector.ok()) {
+      std::fprintf(stderr, "%s\n", std::string(intersector.status().message()).c_str());
+      std::abort();
+    }
+    intersector_ = std::move(intersector).value();
+  }
+
+  [[nodiscard]] TracedImage Trace() const {
+    TracedImage image(settings_.width, settings_.height, settings_.replicas);
+    const auto channels =
+        static_cast<std::size_t>(settings_.width) * static_cast<std::size_t>(settings_.height) * 3;
+    ThreadTeam team(settings_.threads);
+    team.For(static_cast<std::size_t>(settings_.replicas), 1,
+             [&](std::size_t begin, std::size_t end) {
+               for (std::size_t replica = begin; replica < end; ++replica)
+                 TraceReplica(replica, &image.radiance_[replica * channels]);
+             });
+    return image;
+  }
+
+ private:
+  struct StandIn {
+    Color radiance;
+    const SpotLight* spot;
+  };
+  struct Sun {
+    Double3 towards;
+    Color radiance;
+  };
+
+  void TraceReplica(std::size_t replica, double* radiance) const {
+    const std::uint64_t key = CombineKeys(settings_.key, replica);
+    std::array<double, kEvenDimensions> shifts{};
+    KeyedRng rng(key);
+    for (double& shift : shifts)
+      shift = static_cast<double>(rng.Bits() >> 11) * 0x1p-53;
+    const double share =
+        static_cast<double>(settings_.width) * settings_.height / settings_.paths_per_replica;
+    const double half = std::tan(scene_.camera.fov_deg * kPiD / 360);
+    const double shorter = std::min(settings_.width, settings_.height);
+    for (int path = 0; path < settings_.paths_per_replica; ++path) {
+      PathNumbers numbers(key, shifts, path);
+      const double x = numbers.Next() * settings_.width;
+      const double y = numbers.Next() * settings_.height;
+      const Vec3 direction = {static_cast<float>((2 * x - settings_.width) / shorter * half),
+                              static_cast<float>((settings_.height - 2 * y) / shorter * half), 1};
+      const Transform& to_world = scene_.camera.camera_to_world;
+      const Ray ray = {to_world.Point({0, 0, 0}), Normalize(to_world.Vector(direction)), HUGE_VALF};
+      const std::array<double, 3> seen = ToRec709(Radiance(ray, numbers));
+      const auto pixel =
+          static_cast<std::size_t>(static_cast<int>(y) * settings_.width + static_cast<int>(x));
+      for (std::size_t c = 0; c < 3; ++c)
+        radiance[3 * pixel + c] += seen[c] * share;
+    }
+  }
+
+  // Of what the ray meets. Stand-ins that it passes add to `passed`.
+  bool Meet(Ray ray, bool sees_stand_ins, Color& passed, SurfacePoint& surface) const {
+    Hit hit;
+    while (intersector_->Intersect(ray, hit)) {
+      surface = intersector_->SurfaceAt(ray, hit);
+      if (hit.geometry != intersector_->sphere_geometry() || hit.primitive < first_stand_in_) {
+        return true;
+      }
+      const Vec3 wo = -ray.direction;
+      if (sees_stand_ins && Dot(surface.geometric_normal, wo) > 0) {
+        const StandIn& light = stand_ins_[hit.primitive - first_stand_in_];
+        AddTo(passed, Times(light.radiance, light.spot == nullptr ? 1 : Falloff(*light.spot, wo)));
+      }
+      ray.origin = LeavingPoint(surface, ray.direction);
+    }
+    return false;
+  }
+
+  // pbrt's spot: a cubic step of the cosine.
+  static double Falloff(const SpotLight& spot, Vec3 leaving) {
+    const double cosine = Dot(Unit(Double3(leaving)), Unit(Double3(spot.direction)));
+    const auto outer = static_cast<double>(spot.cos_total_width);
+    const auto inner = static_cast<double>(spot.cos_falloff_start);
+    if (cosine >= inner) return 1;
+    if (cosine <= outer) return 0;
+    const double t = (cosine - outer) / (inner - outer);
+    return 3 * t * t - 2 * t * t * t;
+  }
+
+  Color FromInfinity(Vec3 direction, bool sees_stand_ins) const {
+    Color seen{};
+    for (const InfiniteLight& light : scene_.infinite_lights) {
+      const Color scale = Working(FromFloat(light.radiance));
+      if (light.map == nullptr) {
+        AddTo(seen, scale);
+        continue;
+      }
+      const Vec3 on_map = {Dot(direction, light.axes.x), Dot(direction, light.axes.y),
+                           Dot(direction, light.axes.z)};
+      const Vec2 place = EqualAreaPlace(Normalize(on_map));
+      const auto texel = [](float coordinate, int size) {
+        return std::min(static_cast<int>(coordinate * static_cast<float>(size)), size - 1);
+      };
+      const Color pixel = FromFloat(
+          light.map->At(texel(place.x, light.map->width), texel(place.y, light.map->height)));
+      AddTo(seen, Times(scale, Working(pixel)));
+    }
+    if (sees_stand_ins) {
+      const Double3 towards = Unit(Double3(direction));
+      for (const Sun& sun : suns_) {
+        if (Dot(towards, sun.towards) > cos_cone_) AddTo(seen, sun.radiance);
+      }
+    }
+    return seen;
+  }
+
+  Color Radiance(Ray ray, PathNumbers& numbers) const {
+    Color seen{};
+    Color weight = {1, 1, 1};
+    // Radiance is compressed in glass: undone for the roulette, which else would end half of the
+    // paths that enter.
+    double compression = 1;
+    bool only_smooth = true;
+    bool gathered = false;
+    int events_left = settings_.max_depth;
+    for (int vertex = 0;; ++vertex) {
+      Color passed{};
+      SurfacePoint point;
+      const bool met = Meet(ray, !only_smooth, passed, point);
+      AddTo(seen, Times(weight, passed));
+      if (!met) {
+        AddTo(seen, Times(weight, FromInfinity(ray.direction, !only_smooth)));
+        return seen;
+      }
+      const Vec3 wo = -ray.direction;
+      if (point.area_light != kNoAreaLight) {
+        const AreaLight& light = scene_.area_lights[static_cast<std::size_t>(point.area_light)];
+        if (light.two_sided || Dot(point.geometric_normal, wo) > 0) {
+          AddTo(seen, Times(weight, Working(FromFloat(light.radiance))));
+        }
+      }
+      if (events_left == 0) return seen;
+      const Surface surface = SurfaceOf(scene_, point);
+      // The event at the first gathering surface belongs to both ends of a path.
+      if (surface.gathers && !gathered) {
+        gathered = true;
+        events_left = settings_.max_depth;
+      }
+      --events_left;
+
+      const Frame frame(point.shading_normal);
+      Scattered scattered;
+      const std::array<double, 3> u = {numbers.Next(), numbers.Next(), numbers.Next()};
+      const Vec3 wo_local = frame.ToLocal(wo);
+      if (!Scatter(surface, Unit(Double3(wo_local)), u, scattered)) return seen;
+      const Vec3 wi = frame.ToWorld(ToFloat(scattered.wi));
+      // What the shading normal calls reflection must be one for the geometry too.
+      const bool transmits = scattered.wi.z * static_cast<double>(wo_local.z) < 0;
+      const bool crosses = Dot(wo, point.geometric_normal) * Dot(wi, point.geometric_normal) < 0;
+      if (transmits != crosses) return seen;
+      weight = Times(weight, scattered.weight);
+      compression *= scattered.index * scattered.index;
+      only_smooth = only_smooth && scattered.is_delta;
+      const double survival = Largest(weight) * compression;
+      if (!(survival > 0)) return seen;
+      if (vertex > 3 && survival < 1) {
+        if (!(numbers.Next() < survival)) return seen;
+        weight = Times(weight, 1 / survival);
+      }
+      ray = {LeavingPoint(point, wi), Normalize(wi), HUGE_VALF};
+    }
+  }
+
+  Scene scene_;  // with stand-ins as the last spheres
+  PathTracerSettings settings_;
+  std::unique_ptr<Intersector> intersector_;
+  std::uint32_t first_stand_in_ = 0;
+  std::vector<StandIn> stand_ins_;
+  std::vector<Sun> suns_;
+  double cos_cone_ = 1;
+};
+
+TracedImage::TracedImage(int width, int height, int replicas)
+    : width_(width),
+      height_(height),
+      replicas_(replicas),
+      radiance_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
+                static_cast<std::size_t>(replicas) * 3) {}
+
+MeasuredMean TracedImage::MeanOver(const PixelBlock& block, int channel) const {
+  std::vector<double> means;
+  for (int replica = 0; replica < replicas_; ++replica) {
+    double sum = 0;
+    for (int y = block.y0; y < block.y1; ++y) {
+      for (int x = block.x0; x < block.x1; ++x) {
+        sum += radiance_[static_cast<std::size_t>(((replica * height_ + y) * width_ + x) * 3 +
+                                                  channel)];
+      }
+    }
+    means.push_back(sum / ((block.x1 - block.x0) * (block.y1 - block.y0)));
+  }
+  return MeanOf(means);
+}
+
+TracedImage TracePaths(const Scene& scene, const PathTracerSettings& settings) {
+  return PathTracer(scene, settings).Trace();
+}
+
+}  // namespace lucerna
