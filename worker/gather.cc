@@ -148,7 +148,7 @@ struct FrequencyEvidence {
 template <KernelKind kKernel, typename EvidenceSums, bool kNormals>
 void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const PhotonGrid& grid,
                const GlossyHitpoint* glossy, const std::vector<Material>& materials,
-               const FluxScale& scale, Piece& piece) {
+               const FluxScale& scale, std::span<std::uint8_t> was_found, Piece& piece) {
   const auto hitpoint = static_cast<std::uint32_t>(row);
   const Vec3 position = block.positions[row];
   const Vec3 normal = DecodeOctahedral(block.normals_oct[row]);
@@ -176,7 +176,10 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
     return t2 < 1 ? whole - KernelShape<kKernel>(t2) * (1 / kInnerArea) : whole;
   };
   std::int64_t blur = 0;
-  const auto add = [&](const PhotonRecord& photon, Rgb flux, float squared) {
+  const auto add = [&](std::size_t number, const PhotonRecord& photon, Rgb flux, float squared) {
+    // Several threads may find a photon. Most have been found before, and are only read.
+    const std::atomic_ref<std::uint8_t> mark(was_found[number]);
+    if (mark.load(std::memory_order_relaxed) == 0) mark.store(1, std::memory_order_relaxed);
     const float whole = shape(squared);
     const Rgb quanta = flux * scale.quanta_per_watt * whole;
     blur += std::llrint(Luminance(flux) * quanta_per_luminance * blurred(squared, whole));
@@ -194,7 +197,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       if constexpr (kNormals) {
         if (!Counts(photon.normal, normal, to_photon)) return;
       }
-      add(photon, photon.flux, squared);
+      add(i, photon, photon.flux, squared);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux));
     });
   } else {
@@ -214,7 +217,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
         ++piece.excess;
         return;
       }
-      add(photon, scattered, squared);
+      add(i, photon, scattered, squared);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(scattered));
     });
   }
@@ -232,7 +235,8 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
 template <KernelKind kKernel, typename EvidenceSums, bool kNormals>
 Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
                        const PhotonGrid& grid, const std::vector<Material>& materials,
-                       const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
+                       const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop,
+                       std::span<std::uint8_t> was_found) {
   const std::size_t rows = block.size();
   const std::size_t piece_count = (rows + kRowsPerPiece - 1) / kRowsPerPiece;
   std::vector<Piece> pieces(piece_count);
@@ -249,7 +253,7 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
         const bool is_glossy = glossy != block.glossy.end() && glossy->hitpoint == row;
         GatherRow<kKernel, EvidenceSums, kNormals>(block, row, radii[row], grid,
                                                    is_glossy ? &*glossy++ : nullptr, materials,
-                                                   scale, piece);
+                                                   scale, was_found, piece);
       }
     }
   });
@@ -319,10 +323,19 @@ Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii, const
                     const std::vector<Material>& materials, const Kernel& kernel,
                     const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop,
                     Evidence evidence) {
+  std::vector<std::uint8_t> was_found(grid.size());
+  return Gather(block, radii, grid, materials, kernel, scale, team, stop, evidence, was_found);
+}
+
+Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii, const PhotonGrid& grid,
+                    const std::vector<Material>& materials, const Kernel& kernel,
+                    const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop,
+                    Evidence evidence, std::span<std::uint8_t> was_found) {
+  LUCERNA_CHECK(was_found.size() == grid.size());
   LUCERNA_CHECK(grid.size() == 0 || block.glossy.empty() || grid.has_normals());
   const GatherFunction gather = grid.has_normals() ? Specialised<true>(kernel.kind, evidence)
                                                    : Specialised<false>(kernel.kind, evidence);
-  return gather(block, radii, grid, materials, scale, team, stop);
+  return gather(block, radii, grid, materials, scale, team, stop, was_found);
 }
 
 }  // namespace lucerna

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
+#include <span>
 
 #include "render/base/parallel.h"
 #include "render/estimate/accumulation.h"
@@ -25,7 +27,14 @@ namespace lucerna {
 // Requires normals and arrivals of photons where there are glossy hitpoints, and at most kMostTerms
 // photons that `scale` has room for each: then no sum wraps. Pairs are independent of each other,
 // so neither threads nor the order of photons can be seen in the result. Once `stop` is true it
-// ends soon, with a result of no use.
+// ends soon, with a result of no use. `was_found` [photons of the grid] becomes 1 for every photon
+// that counted somewhere.
+[[nodiscard]] Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
+                                  const PhotonGrid& grid, const std::vector<Material>& materials,
+                                  const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,
+                                  const std::atomic<bool>& stop, Evidence evidence,
+                                  std::span<std::uint8_t> was_found);
+// The same without that.
 [[nodiscard]] Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
                                   const PhotonGrid& grid, const std::vector<Material>& materials,
                                   const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,

@@ -51,6 +51,9 @@ class PhotonGrid {
   }
   // See Deposits. Requires that there is such a column.
   [[nodiscard]] float trace(std::size_t photon) const { return traces_[photon]; }
+  [[nodiscard]] DepositSource source(std::size_t photon) const {
+    return DepositSource::Unpacked(sources_[photon]);
+  }
   [[nodiscard]] Vec3 position(std::size_t photon) const {
     return {x_[photon], y_[photon], z_[photon]};
   }
@@ -75,6 +78,7 @@ class PhotonGrid {
   std::vector<PhotonRecord> records_;
   std::vector<FacingRecord> facing_;
   std::vector<float> traces_;  // [photons] or empty
+  std::vector<std::uint32_t> sources_;  // [photons]
 };
 
 }  // namespace lucerna

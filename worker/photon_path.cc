@@ -185,9 +185,14 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
   const SobolPoint u = OwenSobol(key.number, key.job_key);
   KeyedRng rng(CombineKeys(key.job_key, key.number));
 
+  if (lights_.empty()) return PhotonEnd::kNotEmitted;
   Emission emission;
-  if (!lights_.SampleEmission(FineChoice(u[4], rng.Uniform()), u[0], u[1], u[2], u[3], emission))
-    return PhotonEnd::kNotEmitted;
+  const bool is_emitted =
+      lights_.SampleEmission(FineChoice(u[4], rng.Uniform()), u[0], u[1], u[2], u[3], emission);
+  const std::uint8_t light = lights_.emitter(emission.emitter).light;
+  ++landed.sent[light];
+  if (!is_emitted) return PhotonEnd::kNotEmitted;
+  bool met_smooth_only = true;
   watcher.Emitted(emission);
   Ray ray = emission.ray;
   Rgb flux = emission.flux;
@@ -255,7 +260,10 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
       // replay it without them.
       const auto deposit_key = static_cast<std::uint32_t>(rng.Bits() >> 32);
       if (is_found) {
-        landed.deposits.rows.push_back({surface.position, flux, deposit_key});
+        const DepositSource source = {
+            static_cast<std::uint32_t>(key.number) & ((1U << DepositSource::kNumberBits) - 1),
+            light, met_smooth_only ? PathClass::kCaustic : PathClass::kOther};
+        landed.deposits.rows.push_back({surface.position, flux, deposit_key, source.Packed()});
         keep_(landed.deposits, surface, wo);
         if constexpr (kParts.spectrum) {
           landed.deposits.traces.push_back(spectra_->Received(spectrum, surface, material, wo));
@@ -282,6 +290,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
       return SampleDiffuse(material, wo_local, u1, u2, sample);
     }();
     if (!is_scattered) return end(PhotonEnd::kAbsorbed, energy.absorbed);
+    met_smooth_only = met_smooth_only && sample.is_delta;
     const Vec3 wi = frame.ToWorld(sample.wi);
     Rgb scattered = flux * sample.weight;
     watcher.Scattered(sample, wo_local.z, wi, scattered);
