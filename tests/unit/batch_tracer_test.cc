@@ -107,7 +107,7 @@ TEST(BatchTracerTest, MergesTheLargePartsOfARange) {
 TEST(BatchTracerTest, CountsThePhotonsOfEachLightThatHitpointsFound) {
   Fixture f;
   AddBox(f.scene, {3, -1, -1}, {5, 1, 1}, 0);
-  f.scene.point_lights.push_back({{4, 0, 0}, Gray(1)});
+  f.scene.point_lights.push_back({{4, 0, 0}, Gray(0.01F)});
   // Were it proved to be shut off, it would send nothing.
   const SceneNeeds needs(NeedsOf(f.scene, f.settings).parts(), 0, {});
   BatchTracer tracer(f.scene, 2);
