@@ -66,7 +66,7 @@ TEST(MissingLightTest, TheIntervalHoldsWhatComesThroughAHole) {
       const double truth =
           Compare(render.MakeImage(), reference, {.trim_share = kTrimmedShare})->rel_mse;
       holds = holds && truth <= high;
-      stops = stops || high <= 0.3 * 0.3;
+      stops = stops || high <= 0.5 * 0.5;
     }
     held += holds ? 1 : 0;
     stopped += stops ? 1 : 0;
