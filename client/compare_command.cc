@@ -259,7 +259,7 @@ StatusOr<std::vector<NamedFlags>> ParseSettings(const std::vector<std::string>& 
     if (colon != std::string::npos) {
       one.words = std::string(absl::StripAsciiWhitespace(text.substr(colon + 1)));
     }
-    if (one.name.empty() || one.name.starts_with('-')) {
+    if (one.name.empty() || one.name.starts_with('-') || colon == std::string::npos) {
       return Misuse(absl::StrCat("--settings \"", text,
                                  "\": give a name, a colon and flags, like \"wide: --alpha 0.9\""));
     }

@@ -28,8 +28,17 @@ struct RelativeError {
 
 [[nodiscard]] RelativeError ErrorOf(const v1::ErrorSample& sample);
 
-// Of the newest sample; absent before the first.
+// Of the newest sample; absent before the first and while nothing has been found.
 [[nodiscard]] std::optional<RelativeError> NewestError(const v1::Job& job);
+
+// Whether the scene has lights and the image was still black at the newest sample: then nothing is
+// known of its error.
+[[nodiscard]] bool FoundNothing(const v1::Job& job);
+
+// One sentence that names the lights of which too few photons have come into view, worst first, and
+// how much of the image they may be; empty while that is no matter: below a tenth of the interval's
+// upper end and, if there is a target, below half of it.
+[[nodiscard]] std::string MissingLightSentence(const v1::Job& job);
 
 // y = factor · x^exponent.
 struct PowerLaw {
@@ -57,6 +66,16 @@ enum class ErrorAgainst : std::uint8_t { kTime, kPhotons };
 // end followed lately; zero when it is there. Absent without a target, or when the error does not
 // fall.
 [[nodiscard]] std::optional<Duration> TimeToTarget(const v1::Job& job);
+
+// An error target that is out of sight.
+struct FarTarget {
+  std::optional<Duration> left;  // by the trend; absent when the error does not fall
+  std::string sentence;          // why, and what would help
+};
+// Absent without a target, when it is reached, while there are too few samples for a trend, and when
+// the trend says that it will be reached within kFarTimes times the time so far.
+[[nodiscard]] std::optional<FarTarget> FindFarTarget(const v1::Job& job);
+inline constexpr double kFarTimes = 100;
 
 // "1.83 %", "0.0512 %": three digits.
 [[nodiscard]] std::string ShortPercent(double share);

@@ -99,6 +99,12 @@ StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& j
   if (job.ok() && !voice.quiet) {
     const std::string dropped = DroppedLine(*job);
     if (!dropped.empty()) std::fprintf(stderr, "lucerna: warning: %s\n", dropped.c_str());
+    // Warnings of the scene's files have a place and came when the scene was read.
+    for (const std::string& warning : job->warnings()) {
+      if (warning.starts_with("warning: ")) std::fprintf(stderr, "lucerna: %s\n", warning.c_str());
+    }
+    for (const std::string& note : ErrorNotes(*job))
+      std::fprintf(stderr, "lucerna: %s\n", note.c_str());
   }
   return job;
 }

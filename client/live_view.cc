@@ -108,6 +108,22 @@ std::vector<std::string> Broken(const std::string& line, int columns) {
   return lines;
 }
 
+// The text broken at single spaces where it is wider than `columns`.
+std::vector<std::string> Wrapped(const std::string& text, int columns) {
+  std::vector<std::string> lines;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t gap = std::min(text.find(' ', at), text.size());
+    const std::string word = text.substr(at, gap - at);
+    if (!lines.empty() && ColumnsOf(lines.back()) + 1 + ColumnsOf(word) <= columns) {
+      lines.back() += " " + word;
+    } else {
+      lines.push_back(word);
+    }
+    at = gap + 1;
+  }
+  return lines;
+}
+
 // The curve with the error at its upper and lower end in front, and the time below; `rows` lines.
 std::vector<std::string> LabelledCurve(const v1::Job& job, int columns, int rows) {
   std::vector<ChartPoint> points;
@@ -225,6 +241,10 @@ std::vector<std::string> LiveLines(const v1::Job& job, const Image* image, Termi
   std::vector<std::string> lines = Broken(ProgressLine(job), size.columns);
   for (std::string& line : Broken(ErrorLine(job), size.columns))
     lines.push_back(std::move(line));
+  for (const std::string& note : ErrorNotes(job)) {
+    for (std::string& line : Wrapped(note, size.columns))
+      lines.push_back(std::move(line));
+  }
   // The line that the cursor may need stays free.
   int rows = std::min(kMostRows, size.rows - 1 - static_cast<int>(lines.size()));
   const bool is_wide = size.columns >= 2 * (kFewestColumns + kLabelColumns);

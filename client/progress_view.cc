@@ -81,6 +81,8 @@ std::string ShortTime(Duration duration) {
   if (seconds < 59.95) return absl::StrFormat("%.1f s", seconds);
   const auto whole = static_cast<std::int64_t>(std::llround(seconds));
   if (whole < 3600) return absl::StrFormat("%d:%02d", whole / 60, whole % 60);
+  constexpr std::int64_t kDay = 86400;
+  if (whole >= 2 * kDay) return absl::StrFormat("%.1f days", seconds / kDay);
   return absl::StrFormat("%d:%02d:%02d", whole / 3600, whole / 60 % 60, whole % 60);
 }
 
@@ -158,7 +160,11 @@ std::string ProgressLine(const v1::Job& job) {
   if (job.no_workers()) return line + "  no worker is connected; waiting for one";
   absl::StrAppendFormat(&line, "  %s/s  %s", ShortCount(job.progress().photons_per_second()),
                         ShortTime(FromProto(job.progress().running())));
-  if (const auto left = TimeLeft(job)) absl::StrAppend(&line, "  ETA ", ShortTime(*left));
+  if (const auto left = TimeLeft(job)) {
+    absl::StrAppend(&line, "  ETA ", ShortTime(*left));
+  } else if (const auto far = FindFarTarget(job); far && !far->left) {
+    absl::StrAppend(&line, "  ETA not in sight");
+  }
   return line;
 }
 
@@ -187,22 +193,36 @@ std::string SummaryLine(const v1::Job& job) {
       absl::StrAppend(&line, "; the target leaves out the worst ", pixels,
                       pixels == 1 ? " pixel" : " pixels");
     }
+  } else if (FoundNothing(job)) {
+    line += ", no light was found: the image is black";
   }
   return line;
 }
 
 std::string ErrorLine(const v1::Job& job) {
+  if (FoundNothing(job)) return "nothing found yet: no light has reached the view";
   const auto error = NewestError(job);
   if (!error) return {};
   std::string line = Concat("error about ", ErrorWithInterval(*error), "  untrimmed ",
                             ShortPercent(error->untrimmed));
   if (const double target = job.settings().error(); target > 0) {
     absl::StrAppend(&line, "  target ", ShortPercent(target));
-    if (const auto left = TimeToTarget(job); left && *left > Duration::zero()) {
+    if (const auto far = FindFarTarget(job); far && !far->left) {
+      line += " not in sight";
+    } else if (const auto left = TimeToTarget(job); left && *left > Duration::zero()) {
       absl::StrAppend(&line, " in about ", ShortTime(*left));
     }
   }
   return line;
+}
+
+std::vector<std::string> ErrorNotes(const v1::Job& job) {
+  std::vector<std::string> notes;
+  if (std::string missing = MissingLightSentence(job); !missing.empty()) {
+    notes.push_back(std::move(missing));
+  }
+  if (auto far = FindFarTarget(job)) notes.push_back(std::move(far->sentence));
+  return notes;
 }
 
 std::string TableHead() {
@@ -226,7 +246,15 @@ std::string ProgressPrinter::Update(const v1::Job& job, SteadyTime now) {
   last_line_ = line;
   last_written_ = now;
   last_state_ = job.state();
-  return line + "\n";
+  std::string text = line + "\n";
+  // Numbers in them change with every line: they are written when they come, and with the last.
+  const std::vector<std::string> notes = ErrorNotes(job);
+  if (notes.size() != last_notes_.size()) {
+    for (const std::string& note : notes)
+      text += note + "\n";
+  }
+  last_notes_ = notes;
+  return text;
 }
 
 }  // namespace lucerna

@@ -6,6 +6,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "render/base/clock.h"
@@ -15,7 +16,7 @@ namespace lucerna {
 // "13.9 M", "512", "2.05 k".
 [[nodiscard]] std::string ShortCount(double count);
 
-// "0.35 s", "12.5 s", "4:05", "1:02:03".
+// "0.35 s", "12.5 s", "4:05", "1:02:03", from two days on "3.5 days".
 [[nodiscard]] std::string ShortTime(Duration duration);
 
 // "RUNNING", "PASSES": the names of the protocol without their prefix.
@@ -39,8 +40,13 @@ namespace lucerna {
 [[nodiscard]] std::string SummaryLine(const v1::Job& job);
 
 // One line without its end: "error about 1.83 % (95 %: 1.52 % to 2.11 %)  untrimmed 2.40 %
-// target 1.00 % in about 4:05". Empty while nothing is known of the error.
+// target 1.00 % in about 4:05". Empty while nothing is known of the error, and "nothing found yet:
+// ..." while the image is black.
 [[nodiscard]] std::string ErrorLine(const v1::Job& job);
+
+// What stands between the job and its target, or may be missing, a sentence each: light that was not
+// found, a target that is far away. Often none.
+[[nodiscard]] std::vector<std::string> ErrorNotes(const v1::Job& job);
 
 // The job on one line of a table; TableHead is the line above.
 [[nodiscard]] std::string TableHead();
@@ -54,6 +60,7 @@ class ProgressPrinter {
 
  private:
   std::string last_line_;
+  std::vector<std::string> last_notes_;
   std::optional<SteadyTime> last_written_;
   v1::JobState last_state_ = v1::JOB_STATE_UNSPECIFIED;
 };

@@ -120,6 +120,12 @@ StatusOr<RenderOverrides> ToOverrides(const RenderFlags& flags) {
     if (!number) {
       return Misuse(absl::StrCat(flag, " ", **given, ": give a share, like 2% or 0.02"));
     }
+    // "3" is hardly ever meant as 300 %.
+    if (!is_percent && *number > 1) {
+      return Misuse(absl::StrCat(flag, " ", **given, " is ", *number * 100, " %: write ", **given,
+                                 "% for ", **given, " percent, or ", *number * 100,
+                                 "% if that is meant"));
+    }
     *wanted = is_percent ? *number / 100 : *number;
   }
   overrides.passes = flags.passes;

@@ -116,6 +116,29 @@ Json JobOf(const v1::Job& job) {
     json["parts"].push_back(
         {{"part", use.part()}, {"is_used", use.is_used()}, {"reason", use.reason()}});
   }
+  if (const auto error = NewestError(job)) {
+    json["relative_error"] = {
+        {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
+    if (error->truth) json["relative_error"]["true"] = *error->truth;
+  }
+  if (FoundNothing(job)) json["nothing_found"] = true;
+  if (const auto far = FindFarTarget(job)) {
+    json["far_target"] = {{"in_sight", far->left.has_value()}, {"message", far->sentence}};
+    if (far->left) json["far_target"]["left_s"] = Seconds(*far->left);
+  }
+  if (const std::string missing = MissingLightSentence(job); !missing.empty()) {
+    json["missing_light"] = missing;
+  }
+  json["lights"] = Json::array();
+  for (const v1::LightFinding& light : job.lights()) {
+    // What is infinite becomes null.
+    json["lights"].push_back({{"light", light.name()},
+                              {"power_share", light.power_share()},
+                              {"photons_sent", light.photons_sent()},
+                              {"in_view_caustic", light.in_view_caustic()},
+                              {"in_view_other", light.in_view_other()},
+                              {"missing_share", light.missing_share()}});
+  }
   if (job.dropped_photons_size() > 0) json["dropped_photons"] = Json::array();
   for (const v1::PhotonKey& key : job.dropped_photons())
     json["dropped_photons"].push_back({{"pass", key.pass()}, {"index", key.index()}});
@@ -177,7 +200,9 @@ Json SampleOf(const v1::ErrorSample& sample) {
                {"running_s", Seconds(FromProto(sample.running()))},
                {"cpu_s", Seconds(FromProto(sample.cpu()))},
                {"relative", SquaredErrorOf(sample.relative())},
-               {"absolute", SquaredErrorOf(sample.absolute())}};
+               {"absolute", SquaredErrorOf(sample.absolute())},
+               {"missing_relative", sample.missing_relative()}};
+  if (sample.nothing_found()) json["nothing_found"] = true;
   if (sample.has_true_relative()) json["true_relative_mse"] = sample.true_relative();
   if (sample.has_true_absolute()) json["true_absolute_mse"] = sample.true_absolute();
   json["relative_mse_untrimmed"] = sample.relative_untrimmed();
@@ -238,14 +263,6 @@ std::string JobReport(const v1::Job& job, const SavedImage& saved) {
 std::string ConvergenceReport(const v1::Job& job) {
   Json json = JobOf(job);
   json["has_reference"] = job.has_reference();
-  if (const auto error = NewestError(job)) {
-    json["relative_error"] = {
-        {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
-    if (error->truth) json["relative_error"]["true"] = *error->truth;
-    json["relative_error"]["untrimmed"] = error->untrimmed;
-    if (error->true_untrimmed) json["relative_error"]["true_untrimmed"] = *error->true_untrimmed;
-    json["relative_error"]["left_out_pixels"] = job.convergence().rbegin()->left_out_pixels();
-  }
   for (const auto& [name, against] : {std::pair{"mse_exponent_time", ErrorAgainst::kTime},
                                       std::pair{"mse_exponent_photons", ErrorAgainst::kPhotons}}) {
     if (const auto law = FitOfSquaredError(job, against)) json[name] = law->exponent;

@@ -192,6 +192,11 @@ std::string SettingFacts(const v1::Job& job, const std::optional<PageImage>& ima
 
 // The estimate in large figures, or why there is none.
 std::string Headline(const v1::Job& job) {
+  if (FoundNothing(job)) {
+    return "<p class=\"headline\"><span class=\"muted\">Estimated relative error</span>"
+           "<span class=\"figure\">unknown</span>Nothing found yet: no light has reached the "
+           "view.</p>\n";
+  }
   const auto error = NewestError(job);
   if (!error) {
     return "<p class=\"headline muted\">The error is not known: it has not been looked at "
@@ -423,11 +428,37 @@ std::string Energy(const v1::Job& job) {
                 rows, "</tbody></table></div>\n</details>\n</section>\n");
 }
 
+std::string Lights(const v1::Job& job) {
+  if (job.lights().empty()) return {};
+  std::string html = Concat(
+      "<section>\n<h2>Lights</h2>\n",
+      TableTop("Photons of each light that hitpoints found, and what may be missing, at 95 %, because "
+               "too few have reached the view.",
+               {{"light", "name"},
+                {"of the power"},
+                {"photons sent"},
+                {"in view through smooth surfaces alone"},
+                {"in view otherwise"},
+                {"may be missing of the image"}}));
+  for (const v1::LightFinding& light : job.lights()) {
+    absl::StrAppend(&html, "<tr><th scope=\"row\" class=\"name\">", EscapeMarkup(light.name()),
+                    "</th><td>", ShortPercent(light.power_share()), "</td><td>",
+                    CountText(light.photons_sent()), "</td><td>",
+                    CountText(light.in_view_caustic()), "</td><td>",
+                    CountText(light.in_view_other()), "</td><td>",
+                    ShortPercent(light.missing_share()), "</td></tr>\n");
+  }
+  return html + "</tbody></table></div>\n</section>\n";
+}
+
 std::string Warnings(const v1::Job& job) {
   const std::string dropped = DroppedLine(job);
-  if (job.warnings().empty() && dropped.empty()) return {};
+  const std::vector<std::string> notes = ErrorNotes(job);
+  if (job.warnings().empty() && dropped.empty() && notes.empty()) return {};
   std::string html = "<section>\n<h2>Warnings</h2>\n<ul class=\"warnings\">\n";
   if (!dropped.empty()) absl::StrAppend(&html, "<li>", EscapeMarkup(dropped), "</li>\n");
+  for (const std::string& note : notes)
+    absl::StrAppend(&html, "<li>", EscapeMarkup(note), "</li>\n");
   for (const std::string& warning : job.warnings())
     absl::StrAppend(&html, "<li>", EscapeMarkup(warning), "</li>\n");
   return html + "</ul>\n</section>\n";
@@ -471,7 +502,7 @@ std::string ReportPage(const v1::Job& job, const std::optional<PageImage>& image
       "</style>\n</head>\n<body>\n<main>\n<header>\n<h1>", name, "</h1>\n<p class=\"muted\">",
       subtitle, "</p>\n</header>\n<div class=\"top\">\n", ImageFigure(job, image), "<div>\n",
       Headline(job), RunFacts(job), "</div>\n</div>\n", Convergence(job), Workers(job),
-      Samples(job), Warnings(job), Energy(job), Parts(job), SettingFacts(job, image),
+      Samples(job), Warnings(job), Lights(job), Energy(job), Parts(job), SettingFacts(job, image),
       "<footer>Made by <code>lucerna report</code>. Time is wall time since the job "
       "began to run.</footer>\n</main>\n</body>\n</html>\n");
 }

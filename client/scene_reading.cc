@@ -1,5 +1,6 @@
 #include "client/scene_reading.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
 
@@ -51,6 +52,19 @@ StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
       return Failure(ExitCode::kUsage, std::string(settings.status().message()));
     }
     read.settings.push_back(*settings);
+  }
+  // Flags may be common to several jobs, of which one uses them.
+  const bool is_given = std::ranges::any_of(overrides, [](const RenderOverrides& of_job) {
+    return of_job.bias.has_value() || of_job.frequency_share.has_value();
+  });
+  const bool is_used = std::ranges::any_of(read.settings, [](const RenderSettings& of_job) {
+    return UsesFrequency(of_job.radius_controller);
+  });
+  if (is_given && !is_used && !quiet) {
+    std::fprintf(stderr,
+                 "lucerna: warning: --bias and --frequency-share are for the radius controllers "
+                 "frequency, frequency-consistent and frequency-mse; %s ignores them\n",
+                 std::string(NameOf(read.settings.front().radius_controller)).c_str());
   }
   read.manifest = files.Manifest(place.main);
   if (scene != nullptr) *scene = std::move(parsed.scene);

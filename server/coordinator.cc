@@ -193,27 +193,21 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
   }
   const std::uint64_t serial = next_serial_++;
   // Until Unpin.
-  auto entry = std::make_shared<JobEntry>(JobEntry{
-      .serial = serial,
-      .request_id = submission.request_id,
-      .job = {.id = absl::StrCat(instance_, "-", serial),
-              .name = submission.name.empty() ? submission.manifest.main_path : submission.name,
-              .manifest = submission.manifest,
-              .scene_digest = submission.manifest.SceneDigest(),
-              .settings = *settings,
-              .warnings = std::move(warnings),
-              .needs = needs,
-              .submitted_at = clock_.Wall(),
-              .life = JobLife(clock_.Steady()),
-              .books = {},
-              .reference = submission.reference,
-              .convergence = {},
-              .pass_record = {},
-              .workers = {}},
-      .scene = std::nullopt,
-      .runner = nullptr,
-      .image = nullptr,
-      .pinned = std::move(pinned)});
+  auto entry = std::make_shared<JobEntry>();
+  entry->serial = serial;
+  entry->request_id = submission.request_id;
+  entry->pinned = std::move(pinned);
+  Job& job = entry->job;
+  job.id = absl::StrCat(instance_, "-", serial);
+  job.name = submission.name.empty() ? submission.manifest.main_path : submission.name;
+  job.manifest = submission.manifest;
+  job.scene_digest = submission.manifest.SceneDigest();
+  job.settings = *settings;
+  job.warnings = std::move(warnings);
+  job.needs = needs;
+  job.submitted_at = clock_.Wall();
+  job.life = JobLife(clock_.Steady());
+  job.reference = submission.reference;
   // A job that must wait is read again later, so that waiting jobs cost no memory.
   if (queue_.empty() && !current_) entry->scene = std::move(scene);
   submitted.job_id = entry->job.id;
@@ -468,7 +462,8 @@ void Coordinator::RunJob(const std::shared_ptr<JobEntry>& entry) {
                 entry->job.convergence.push_back(
                     {look.passes, look.photons, entry->job.life.Running(clock_.Steady()),
                      ProcessCpuTime() - entry->cpu_at_start + books.worker_cpu, look.estimate,
-                     look.truth});
+                     look.truth, look.missing.relative, look.missing.nothing_found});
+                entry->job.lights = look.missing.lights;
                 ++entry->version;
               },
       });

@@ -141,6 +141,9 @@ struct ErrorSample {
   Duration cpu{};  // of coordinator and workers
   ErrorEstimate estimate;
   std::optional<TrueError> truth;  // when the job has a reference
+  // What light that may not have been found adds to the upper end of the relative interval.
+  double missing_relative = 0;
+  bool nothing_found = false;  // the image was black
 };
 
 // A worker's part in a job.
@@ -164,6 +167,7 @@ struct Job {
   JobBooks books;
   std::optional<Digest> reference;  // of an EXR image
   std::vector<ErrorSample> convergence;
+  std::vector<LightFinding> lights;  // of the newest sample
   PassRecord pass_record;
   std::map<std::string, WorkerShare> workers;  // by id
   int most_workers = 0;                        // connected at one time while it ran

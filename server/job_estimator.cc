@@ -1,10 +1,16 @@
 #include "server/job_estimator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
+#include "absl/strings/str_format.h"
+
 #include "render/base/parallel.h"
+#include "render/base/text.h"
+#include "render/estimate/missing_light.h"
 #include "render/estimate/noise_layer.h"
 #include "render/estimate/relative_error.h"
 #include "render/estimate/statistics.h"
@@ -27,6 +33,51 @@ void ToFileUnit(Image& image, double unit) {
     for (float& value : channel.pixels)
       value = static_cast<float>(static_cast<double>(value) * factor);
   }
+}
+
+constexpr double kPi64 = std::numbers::pi;
+
+// Whether a path may be bent by a smooth surface.
+bool HasSmoothSurfaces(const Scene& scene) {
+  const auto is_smooth = [&](const auto& shape) {
+    return IsSmooth(scene.materials[static_cast<std::size_t>(shape.traits.material)]);
+  };
+  return std::ranges::any_of(scene.meshes, is_smooth) ||
+         std::ranges::any_of(scene.spheres, is_smooth) ||
+         std::ranges::any_of(scene.disks, is_smooth);
+}
+
+// "light 2 (a point light at (0, 1, 2))", in the units of the scene's file.
+std::string NameOf(const LightGroup& light, std::size_t number, double unit) {
+  if (light.lights > 1) return Concat("the faintest ", light.lights, " lights together");
+  const auto at = [&](double scale) {
+    return absl::StrFormat("(%.4g, %.4g, %.4g)", static_cast<double>(light.position.x) * scale,
+                           static_cast<double>(light.position.y) * scale,
+                           static_cast<double>(light.position.z) * scale);
+  };
+  const auto described = [&]() -> std::string {
+    switch (light.kind) {
+      case EmitterKind::kTriangle:
+        return Concat("an area light of ", light.emitters,
+                      light.emitters == 1 ? " triangle" : " triangles", " around ", at(unit));
+      case EmitterKind::kSphere:
+        return Concat("an area light, a sphere around ", at(unit));
+      case EmitterKind::kDisk:
+        return Concat("an area light, a disk around ", at(unit));
+      case EmitterKind::kPoint:
+        return Concat("a point light at ", at(unit));
+      case EmitterKind::kSpot:
+        return Concat("a spot light at ", at(unit));
+      case EmitterKind::kDistant:
+        return Concat("a distant light that shines towards ", at(1));
+      case EmitterKind::kInfinite:
+        return "the constant environment light";
+      case EmitterKind::kEnvironment:
+        return "an environment map";
+    }
+    return "";
+  };
+  return Concat("light ", number, " (", described(), ")");
 }
 
 Status CheckPower(Rgb power_w) {
@@ -66,6 +117,12 @@ struct JobEstimator::State {
   std::unique_ptr<Film> film;
   std::unique_ptr<ErrorStatistics> errors;
   std::uint64_t eye_rays = 0;
+  // For light that may not have been found.
+  BatchTally tally;
+  bool has_smooth_surfaces = false;
+  Bounds view;              // of the hitpoints of the first pass
+  float widest_radius = 0;  // of these hitpoints
+  double hit_share = 0;     // of the pixels that have one
 
   // Radiance over all passes that photons brought, in the working space.
   [[nodiscard]] RgbSum PhotonSum(std::size_t pixel) const {
@@ -116,6 +173,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   state->film = std::make_unique<Film>(width, height, state->scene.film.exposure,
                                        state->scene.film.max_component);
   state->errors = std::make_unique<ErrorStatistics>(pixels);
+  state->has_smooth_surfaces = HasSmoothSurfaces(state->scene);
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));
 }
 
@@ -161,6 +219,14 @@ void JobEstimator::Apply(const EyePass& pass, const RadiusColumn& radii, const P
                       features.distance);
   }
   state_->eye_rays += pass.rays;
+  state_->tally += sums.tally();
+  if (pass.pass > 0) return;
+  for (std::size_t row = 0; row < pass.block.size(); ++row) {
+    state_->view.Add(pass.block.positions[row]);
+    state_->widest_radius = std::max(state_->widest_radius, radii[row]);
+  }
+  state_->hit_share =
+      static_cast<double>(pass.block.size()) / static_cast<double>(pass.direct.size());
 }
 
 const SceneNeeds& JobEstimator::needs() const {
@@ -238,8 +304,90 @@ ErrorEstimate JobEstimator::EstimateError(int look) const {
       lucerna::EstimateError(state_->settings.crop_width(), state_->settings.crop_height(),
                              passes_applied(), look, sums_at);
   // Without any light a black image is exact.
-  if (IsBlack(state_->lights->TotalPower())) estimate.relative = {}, estimate.untrimmed = 0;
+  if (lucerna::IsBlack(state_->lights->TotalPower())) {
+    estimate.relative = {};
+    estimate.untrimmed = 0;
+  }
+  const MissingLight missing = FindMissingLight();
+  estimate.relative.high += missing.relative;
+  estimate.absolute.high += missing.absolute;
   return estimate;
+}
+
+bool JobEstimator::IsBlack() const {
+  const std::size_t pixels = state_->film->direct_sum().size();
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    if (LuminanceOf(state_->Sum(pixel)) > 0) return false;
+  }
+  return true;
+}
+
+MissingLight JobEstimator::FindMissingLight() const {
+  const State& state = *state_;
+  const auto passes = static_cast<double>(passes_applied());
+  const std::size_t pixels = state.film->direct_sum().size();
+  const auto pixel_count = static_cast<double>(pixels);
+  std::vector<double> luminances(pixels);
+  double sum = 0;
+  double photon_sum = 0;
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    luminances[pixel] = std::max(0.0, LuminanceOf(state.Sum(pixel)) / passes);
+    sum += luminances[pixel];
+    photon_sum += LuminanceOf(ToRec709(state.PhotonSum(pixel))) / passes;
+  }
+  PhotonView view;
+  view.takes_photons =
+      state.needs.Uses(Part::kPhotons) && state.settings.max_depth > 1 && state.hit_share > 0;
+  view.has_caustics = state.has_smooth_surfaces;
+  view.photon_radiance = photon_sum / pixel_count;
+  // What relative errors are relative to, as their mean over pixels has it: dark pixels weigh most,
+  // down to a tenth of the mean.
+  const double mean = sum / pixel_count;
+  if (mean > 0) {
+    double inverse = 0;
+    for (const double luminance : luminances) {
+      const double of_mean = luminance / mean;
+      inverse += 1 / (of_mean * of_mean + 0.01);
+    }
+    view.brightness = mean / std::sqrt(inverse / pixel_count);
+  }
+  // The visible surfaces are at least about as large as the larger side of their box, and no smaller
+  // than what a hitpoint gathers from; white ones scatter 1/pi of what falls on them per steradian.
+  const Vec3 box = state.hit_share > 0 ? state.view.high - state.view.low : Vec3{};
+  std::array<double, 3> sides = {static_cast<double>(box.x), static_cast<double>(box.y),
+                                 static_cast<double>(box.z)};
+  std::ranges::sort(sides);
+  const auto radius = static_cast<double>(state.widest_radius);
+  const double area = std::max(sides[1] * sides[2], kPi64 * radius * radius);
+  view.radiance_per_watt = area > 0 ? state.hit_share / (kPi64 * area) : 0;
+
+  MissingLight missing;
+  std::vector<LightPhotons> lights;
+  const auto total_power = static_cast<double>(Luminance(state.lights->TotalPower()));
+  const std::vector<LightTally>& tallies = state.tally.lights;
+  for (std::size_t i = 0; i < state.lights->lights().size(); ++i) {
+    const LightGroup& light = state.lights->lights()[i];
+    lights.push_back({.power_w = static_cast<double>(Luminance(light.power)),
+                      .tally = i < tallies.size() ? tallies[i] : LightTally()});
+    missing.lights.push_back({.name = NameOf(light, i + 1, state.scene.unit),
+                              .power_share = lights[i].power_w / total_power,
+                              .photons = lights[i].tally});
+  }
+  const std::vector<double> shares = MissingShares(lights, view);
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    missing.lights[i].missing_share = shares[i];
+    missing.share += shares[i];
+  }
+  missing.nothing_found = !state.lights->empty() && !(sum > 0);
+  if (missing.nothing_found) {
+    missing.relative = HUGE_VAL;
+    missing.absolute = HUGE_VAL;
+  } else if (missing.share > 0) {
+    missing.relative = LargestRelativeError(missing.share);
+    const double brightness = state.scene.film.exposure * view.brightness;
+    missing.absolute = brightness * brightness * LargestAbsoluteError(missing.share);
+  }
+  return missing;
 }
 
 TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {

@@ -17,6 +17,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "render/base/status.h"
@@ -31,6 +32,26 @@
 #include "server/reference_image.h"
 
 namespace lucerna {
+
+// A light that sends photons, and how many of them have come into view.
+struct LightFinding {
+  std::string name;        // "light 2 (a point light at (0, 1, 2))"
+  double power_share = 0;  // of the power of all lights
+  LightTally photons;
+  // What may be missing because too few photons have found the way, as a share of the image's
+  // brightness (estimate/missing_light.h); infinite while the image is black.
+  double missing_share = 0;
+};
+
+// Light that may not have been found yet.
+struct MissingLight {
+  std::vector<LightFinding> lights;
+  double share = 0;  // the sum of those of the lights
+  // What it adds to the upper ends of the intervals of the squared errors.
+  double relative = 0, absolute = 0;
+  // Lights send photons or are sampled, and the image is black.
+  bool nothing_found = false;
+};
 
 class JobEstimator {
  public:
@@ -54,8 +75,13 @@ class JobEstimator {
   // The image of the passes applied so far, without metadata. Requires passes_applied() > 0. Layers
   // `noise` and `bias` from the second pass on.
   [[nodiscard]] Image MakeImage() const;
-  // `look` counts the looks at this job, from 1. Requires passes_applied() >= 2.
+  // `look` counts the looks at this job, from 1. The upper ends of its intervals hold what may be
+  // missing; they are infinite while nothing is found. Requires passes_applied() >= 2.
   [[nodiscard]] ErrorEstimate EstimateError(int look) const;
+  // Requires passes_applied() > 0.
+  [[nodiscard]] MissingLight FindMissingLight() const;
+  // Whether all pixels are black. Requires passes_applied() > 0.
+  [[nodiscard]] bool IsBlack() const;
   [[nodiscard]] const SceneNeeds& needs() const;
   // See LightSet.
   [[nodiscard]] std::size_t faint_lights() const;

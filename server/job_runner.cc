@@ -44,9 +44,9 @@ StatusOr<JobRunner::Result> JobRunner::Run(Scene scene, const SceneNeeds& needs,
   if (const std::size_t faint = estimator_->faint_lights(); faint > 0) {
     surroundings_.when_warned(
         absl::StrCat("warning: ", faint, faint == 1 ? " light has" : " lights have",
-                     " less than 1e-9 of the scene's power: photons hardly ever come from there, so"
-                     " what is lit by reflections of that light alone stays dark; render it by"
-                     " itself and add the images"));
+                     " less than 4e-15 of the scene's power: photons of it are too faint to count"
+                     " beside the others, so what is lit by reflections of that light alone stays"
+                     " dark; render it by itself and add the images"));
   }
   return RunToEnd();
 }
@@ -111,6 +111,7 @@ StatusOr<JobRunner::Result> JobRunner::RunPasses() {
     const bool is_time_up = time_is_up && surroundings_.clock.Steady() >= *time_is_up;
     if (const StopReason reason = ReasonToStop(end, is_time_up); reason != StopReason::kNone) {
       LookAtError(true);
+      CheckImage();
       const MutexLock lock(estimator_mutex_);
       return MakeResult(reason);
     }
@@ -157,12 +158,27 @@ void JobRunner::LookAtError(bool is_last) {
     if (!is_last && look.passes < next_look_) return;
     look.photons = photons_applied_;
     look.estimate = estimator_->EstimateError(++looks_);
+    look.missing = estimator_->FindMissingLight();
     if (!reference_.empty()) look.truth = estimator_->ErrorAgainst(reference_);
   }
   looked_at_ = look.passes;
   error_at_most_ = std::sqrt(look.estimate.relative.high);
   next_look_ = NextLook(look.passes);
   surroundings_.when_looked(look);
+}
+
+void JobRunner::CheckImage() {
+  std::uint64_t photons = 0;
+  {
+    const MutexLock lock(estimator_mutex_);
+    if (has_warned_ || !estimator_->IsBlack()) return;
+    photons = photons_applied_;
+  }
+  has_warned_ = true;
+  surroundings_.when_warned(absl::StrCat(
+      "warning: the image is black after ", photons, " photons: no light has reached the"
+      " view; check that the scene has lights, which way they and the camera face, and what stands"
+      " between them"));
 }
 
 StatusOr<JobRunner::TracedPass> JobRunner::Trace(std::uint64_t pass) {

@@ -47,6 +47,7 @@ class JobRunner {
     std::uint64_t photons = 0;
     ErrorEstimate estimate;
     std::optional<TrueError> truth;
+    MissingLight missing;
   };
 
   struct Surroundings {
@@ -122,6 +123,8 @@ class JobRunner {
   StatusOr<Result> RunPasses();
   // Estimates the error, if it is time to look or `is_last`.
   void LookAtError(bool is_last);
+  // Warns of a black image.
+  void CheckImage();
   // Why to stop now; kNone: go on.
   StopReason ReasonToStop(const End& end, bool is_time_up) const;
   StatusOr<TracedPass> Trace(std::uint64_t pass);
@@ -155,6 +158,7 @@ class JobRunner {
   Duration ran_before_{};
   std::int64_t next_look_ = kFirstLook;
   int looks_ = 0;
+  bool has_warned_ = false;          // of a black image
   std::int64_t looked_at_ = 0;       // passes
   double error_at_most_ = HUGE_VAL;  // the upper end of the last look's interval
   std::deque<OpenPass> open_;

@@ -100,6 +100,8 @@ v1::ErrorSample SampleToProto(const ErrorSample& sample) {
     message.set_true_absolute(sample.truth->absolute);
     message.set_true_relative_untrimmed(sample.truth->untrimmed);
   }
+  message.set_missing_relative(sample.missing_relative);
+  message.set_nothing_found(sample.nothing_found);
   return message;
 }
 
@@ -145,6 +147,15 @@ v1::Job JobToProto(const Coordinator::Report& report) {
   message.set_no_workers(state == JobState::kRunning && report.workers == 0);
   for (const ErrorSample& sample : job.convergence)
     *message.add_convergence() = SampleToProto(sample);
+  for (const LightFinding& light : job.lights) {
+    v1::LightFinding& item = *message.add_lights();
+    item.set_name(light.name);
+    item.set_power_share(light.power_share);
+    item.set_photons_sent(light.photons.sent);
+    item.set_in_view_caustic(light.photons.InView(PathClass::kCaustic));
+    item.set_in_view_other(light.photons.InView(PathClass::kOther));
+    item.set_missing_share(light.missing_share);
+  }
   AddShares(job.workers, message);
   message.set_has_reference(job.reference.has_value());
   for (const PassTally& part : job.pass_record.tallies()) {

@@ -1,6 +1,7 @@
 #include "worker/batch_tracer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <span>
@@ -23,7 +24,7 @@ namespace {
 // A range is worked off in parts: large enough for the sort to pay, and no larger, because a
 // deposit takes about 100 bytes. In a closed white room every photon lands max_depth times, so
 // what is counted is the deposits as well.
-constexpr std::uint64_t kPhotonsPerPart = std::uint64_t{1} << 20;
+constexpr std::uint64_t kPhotonsPerPart = std::uint64_t{1} << DepositSource::kNumberBits;
 constexpr std::uint64_t kDepositsPerPart = std::uint64_t{1} << 24;
 constexpr std::uint64_t kPhotonsPerChunk = 2048;
 constexpr std::uint64_t kMostDepositsPerChunk = std::uint64_t{1} << 20;
@@ -134,6 +135,35 @@ StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) 
   return out;
 }
 
+// The photons of a part by light: those that each has sent, and those that hitpoints found.
+std::vector<LightTally> TallyLights(
+    const std::vector<std::array<std::uint64_t, kMaxLightGroups>>& sent,
+    const GatheredPhotons& photons) {
+  std::vector<LightTally> lights(kMaxLightTallies);
+  for (const auto& of_chunk : sent) {
+    for (std::size_t light = 0; light < kMaxLightGroups; ++light)
+      lights[light].sent += of_chunk[light];
+  }
+  // [photons of the part × classes] whether the photon has been counted.
+  std::vector<bool> is_counted(kPathClasses << DepositSource::kNumberBits);
+  const auto count = [&](const PhotonGrid& grid, std::span<const std::uint8_t> was_found) {
+    for (std::size_t i = 0; i < was_found.size(); ++i) {
+      if (was_found[i] == 0) continue;
+      const DepositSource source = grid.source(i);
+      const auto path = static_cast<std::size_t>(source.path);
+      const std::size_t entry = kPathClasses * source.number + path;
+      if (is_counted[entry]) continue;
+      is_counted[entry] = true;
+      ++lights[source.light].in_view[path];
+    }
+  };
+  count(photons.grid, photons.was_found);
+  if (photons.caustics != nullptr) count(*photons.caustics, photons.caustic_was_found);
+  while (!lights.empty() && lights.back().sent == 0)
+    lights.pop_back();
+  return lights;
+}
+
 // A photon path that leaves as many deposits as its greatest depth leaves few for others.
 Status CheckDeposits(const std::vector<BatchTally>& tallies) {
   std::uint64_t deposits = 0;
@@ -219,6 +249,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     std::vector<Deposits> caustics;
     std::vector<BatchTally> tallies;
     std::vector<std::vector<std::uint64_t>> dropped;
+    std::vector<std::array<std::uint64_t, kMaxLightGroups>> sent;
     std::uint64_t found = 0;
     while (next < part_end && found < kDepositsPerPart && !stop) {
       const std::uint64_t round_end = std::min(part_end, next + per_round);
@@ -228,6 +259,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
       caustics.resize(before + chunks);
       tallies.resize(before + chunks);
       dropped.resize(before + chunks);
+      sent.resize(before + chunks);
       state_->team.For(chunks, 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t chunk = begin; chunk < end && !stop.load(std::memory_order_relaxed);
              ++chunk) {
@@ -246,6 +278,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
           tally.excess = landed.excess;
           tally.energy = landed.energy;
           dropped[before + chunk] = std::move(landed.dropped_photons);
+          sent[before + chunk] = landed.sent;
           deposits[before + chunk] = std::move(landed.deposits);
           caustics[before + chunk] = std::move(landed.caustics);
         }
@@ -257,11 +290,15 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     if (stop) return absl::CancelledError("the batch was given up");
     LUCERNA_RETURN_IF_ERROR(CheckDeposits(tallies));
     const PhotonGrid grid(deposits, region, cell, state_->team);
+    std::vector<std::uint8_t> was_found(grid.size());
     std::optional<PhotonGrid> caustic_grid;
-    GatheredPhotons photons{.grid = grid};
+    std::vector<std::uint8_t> caustic_was_found;
+    GatheredPhotons photons{.grid = grid, .was_found = was_found};
     if (block.caustic_rows > 0) {
       caustic_grid.emplace(caustics, region, caustic_cell, state_->team);
+      caustic_was_found.resize(caustic_grid->size());
       photons.caustics = &*caustic_grid;
+      photons.caustic_was_found = caustic_was_found;
       photons.caustic_weight = &caustic_weight;
     }
     Accumulation accumulation =
@@ -269,6 +306,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
                state_->scale, state_->team, stop, evidence);
     for (const BatchTally& tally : tallies)
       accumulation.tally += tally;
+    accumulation.tally.lights = TallyLights(sent, photons);
     for (const std::vector<std::uint64_t>& named : dropped) {
       for (const std::uint64_t index : named) {
         if (accumulation.dropped_photons.size() == kDroppedNamed) break;

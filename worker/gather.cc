@@ -149,7 +149,8 @@ struct FrequencyEvidence {
 template <KernelKind kKernel, typename EvidenceSums, bool kNormals>
 void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const PhotonGrid& grid,
                const GlossyHitpoint* glossy, const std::vector<Material>& materials,
-               const CausticWeight* caustic_weight, const FluxScale& scale, Piece& piece) {
+               const CausticWeight* caustic_weight, const FluxScale& scale,
+               std::span<std::uint8_t> was_found, Piece& piece) {
   const auto hitpoint = static_cast<std::uint32_t>(row);
   const Vec3 position = block.positions[row];
   const Vec3 normal = DecodeOctahedral(block.normals_oct[row]);
@@ -177,7 +178,12 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
     return t2 < 1 ? whole - KernelShape<kKernel>(t2) * (1 / kInnerArea) : whole;
   };
   std::int64_t blur = 0;
-  const auto add = [&](const PhotonRecord& photon, Rgb flux, float squared) {
+  const auto add = [&](std::size_t number, const PhotonRecord& photon, Rgb flux, float squared) {
+    // Several threads may find a photon. Most have been found before, and are only read.
+    if (!was_found.empty()) {
+      const std::atomic_ref<std::uint8_t> mark(was_found[number]);
+      if (mark.load(std::memory_order_relaxed) == 0) mark.store(1, std::memory_order_relaxed);
+    }
     const float whole = shape(squared);
     const Rgb quanta = flux * scale.quanta_per_watt * whole;
     blur += std::llrint(Luminance(flux) * quanta_per_luminance * blurred(squared, whole));
@@ -195,7 +201,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       if constexpr (kNormals) {
         if (!Counts(photon.normal, normal, to_photon)) return;
       }
-      add(photon, photon.flux, squared);
+      add(i, photon, photon.flux, squared);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux));
     });
   } else {
@@ -226,7 +232,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
         ++piece.excess;
         return;
       }
-      add(photon, scattered, squared);
+      add(i, photon, scattered, squared);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(scattered));
     });
   }
@@ -263,11 +269,12 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
         const GlossyHitpoint* glossy_here = is_glossy ? &*glossy++ : nullptr;
         if (row < first_caustic) {
           GatherRow<kKernel, EvidenceSums, kNormals>(block, row, radii[row], photons.grid,
-                                                     glossy_here, materials, nullptr, scale, piece);
+                                                     glossy_here, materials, nullptr, scale,
+                                                     photons.was_found, piece);
         } else if (photons.caustics != nullptr) {
           GatherRow<kKernel, EvidenceSums, true>(block, row, radii[row], *photons.caustics,
                                                  glossy_here, materials, photons.caustic_weight,
-                                                 scale, piece);
+                                                 scale, photons.caustic_was_found, piece);
         }
       }
     }

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
+#include <span>
 
 #include "render/base/parallel.h"
 #include "render/estimate/accumulation.h"
@@ -22,6 +24,9 @@ struct GatheredPhotons {
   // theirs; for the block's caustic rows, nullptr where there are none.
   const PhotonGrid* caustics = nullptr;
   const CausticWeight* caustic_weight = nullptr;
+  // [photons of either grid] or empty: become 1 for every photon that counted somewhere.
+  std::span<std::uint8_t> was_found = {};
+  std::span<std::uint8_t> caustic_was_found = {};
 };
 
 // How far from a hitpoint photons are looked for, in radii.

@@ -83,6 +83,7 @@ PhotonGrid::PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& regi
   y_.assign(count + 8, HUGE_VALF);
   z_.assign(count + 8, HUGE_VALF);
   size_ = count;
+  sources_.resize(count);
   const auto has = [&](auto Deposits::*column) {
     return std::ranges::any_of(deposits, [&](const Deposits& d) { return !(d.*column).empty(); });
   };
@@ -99,6 +100,7 @@ PhotonGrid::PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& regi
             x_[out] = deposit.position.x;
             y_[out] = deposit.position.y;
             z_[out] = deposit.position.z;
+            sources_[out] = deposit.source;
             if constexpr (with_normals) {
               facing_[out] = {{deposit.flux, deposit.key},
                               chunk.normals[i],

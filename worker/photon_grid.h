@@ -55,6 +55,9 @@ class PhotonGrid {
   [[nodiscard]] float emission_density(std::size_t photon) const {
     return emission_densities_[photon];
   }
+  [[nodiscard]] DepositSource source(std::size_t photon) const {
+    return DepositSource::Unpacked(sources_[photon]);
+  }
   [[nodiscard]] Vec3 position(std::size_t photon) const {
     return {x_[photon], y_[photon], z_[photon]};
   }
@@ -80,6 +83,7 @@ class PhotonGrid {
   std::vector<FacingRecord> facing_;
   std::vector<float> traces_;              // [photons] or empty
   std::vector<float> emission_densities_;  // [photons] or empty
+  std::vector<std::uint32_t> sources_;     // [photons]
 };
 
 }  // namespace lucerna

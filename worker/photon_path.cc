@@ -191,9 +191,18 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
   const SobolPoint u = OwenSobol(key.number, key.job_key);
   KeyedRng rng(CombineKeys(key.job_key, key.number));
 
+  if (lights_.empty()) return PhotonEnd::kNotEmitted;
   Emission emission;
-  if (!lights_.SampleEmission(FineChoice(u[4], rng.Uniform()), u[0], u[1], u[2], u[3], emission))
-    return PhotonEnd::kNotEmitted;
+  const bool is_emitted =
+      lights_.SampleEmission(FineChoice(u[4], rng.Uniform()), u[0], u[1], u[2], u[3], emission);
+  const std::uint8_t light = lights_.emitter(emission.emitter).light;
+  ++landed.sent[light];
+  if (!is_emitted) return PhotonEnd::kNotEmitted;
+  bool met_smooth_only = true;
+  const auto source_of = [&](PathClass path) {
+    constexpr std::uint32_t kNumbers = (1U << DepositSource::kNumberBits) - 1;
+    return DepositSource{static_cast<std::uint32_t>(key.number) & kNumbers, light, path}.Packed();
+  };
   watcher.Emitted(emission);
   Ray ray = emission.ray;
   Rgb flux = emission.flux;
@@ -213,8 +222,6 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
   };
   [[maybe_unused]] SpectrumTracer::Carried spectrum;
   if constexpr (kParts.spectrum) spectrum = spectra_->Leave(emission);
-  // Whether only smooth surfaces have been met.
-  [[maybe_unused]] bool is_caustic = true;
   for (int landing = 0; landing < settings_.max_depth; ++landing) {
     Hit hit;
     ++landed.rays;
@@ -248,8 +255,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     const bool gathers = landing > 0 && gathers_[surface.material] != 0;
     bool gathers_caustic = false;
     if constexpr (kParts.caustics) {
-      gathers_caustic = is_caustic && landing > 0 && gathers_caustics_[surface.material] != 0;
-      is_caustic = is_caustic && IsSmooth(material);
+      gathers_caustic = met_smooth_only && landing > 0 && gathers_caustics_[surface.material] != 0;
     }
     const bool leaves_deposit = (gathers || gathers_caustic) && scale_.HasRoomFor(flux);
     if ((gathers || gathers_caustic) && !leaves_deposit) ++landed.excess;
@@ -263,7 +269,8 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
         constexpr std::uint64_t kCausticKey = 0x434155535449434BULL;
         const auto caustic_key =
             static_cast<std::uint32_t>(CombineKeys(key.job_key ^ kCausticKey, key.number) >> 32);
-        landed.caustics.rows.push_back({surface.position, flux, caustic_key});
+        landed.caustics.rows.push_back(
+            {surface.position, flux, caustic_key, source_of(PathClass::kCaustic)});
         KeepColumns<true, true>(landed.caustics, surface, wo);
         landed.caustics.emission_densities.push_back(emission.density);
       }
@@ -281,7 +288,9 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
       // replay it without them.
       const auto deposit_key = static_cast<std::uint32_t>(rng.Bits() >> 32);
       if (is_found) {
-        landed.deposits.rows.push_back({surface.position, flux, deposit_key});
+        landed.deposits.rows.push_back(
+            {surface.position, flux, deposit_key,
+             source_of(met_smooth_only ? PathClass::kCaustic : PathClass::kOther)});
         keep_(landed.deposits, surface, wo);
         if constexpr (kParts.spectrum) {
           landed.deposits.traces.push_back(spectra_->Received(spectrum, surface, material, wo));
@@ -308,6 +317,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
       return SampleDiffuse(material, wo_local, u1, u2, sample);
     }();
     if (!is_scattered) return end(PhotonEnd::kAbsorbed, energy.absorbed);
+    met_smooth_only = met_smooth_only && sample.is_delta;
     const Vec3 wi = frame.ToWorld(sample.wi);
     Rgb scattered = flux * sample.weight;
     watcher.Scattered(sample, wo_local.z, wi, scattered);

@@ -10,6 +10,7 @@
 // scene, settings, pass and index alone.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -27,11 +28,32 @@
 
 namespace lucerna {
 
+// Which photon left a deposit, of which light, and what its path had met before.
+struct DepositSource {
+  // So many consecutive photons of a pass have different numbers.
+  static constexpr int kNumberBits = 20;
+
+  std::uint32_t number = 0;  // the lowest bits of what numbers the photon
+  std::uint8_t light = 0;    // index into LightSet::lights()
+  PathClass path = PathClass::kOther;
+
+  [[nodiscard]] std::uint32_t Packed() const {
+    return number << 7U | static_cast<std::uint32_t>(light) << 1U |
+           static_cast<std::uint32_t>(path);
+  }
+  [[nodiscard]] static DepositSource Unpacked(std::uint32_t bits) {
+    return {bits >> 7U, static_cast<std::uint8_t>(bits >> 1U & (kMaxLightGroups - 1)),
+            static_cast<PathClass>(bits & 1U)};
+  }
+};
+static_assert(kMaxLightGroups == 64 && kMaxLightTallies == kMaxLightGroups);
+
 // One photon landing on one surface.
 struct Deposit {
   Vec3 position;
-  Rgb flux;           // [W] of all photons of a pass together
-  std::uint32_t key;  // random bits that belong to this deposit
+  Rgb flux;                  // [W] of all photons of a pass together
+  std::uint32_t key;         // random bits that belong to this deposit
+  std::uint32_t source = 0;  // a DepositSource, packed
 };
 
 // Deposits as columns, of which a job has those that it needs.
@@ -108,6 +130,7 @@ class PhotonPathTracer {
     // Landings of photons that are too bright to be a deposit (FluxScale::HasRoomFor).
     std::uint64_t excess = 0;
     EnergyBooks energy;
+    std::array<std::uint64_t, kMaxLightGroups> sent{};  // photons by light
   };
 
   // Traces photon `index` of `pass`. Threads: any, each with its own `landed`.

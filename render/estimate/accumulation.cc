@@ -30,7 +30,7 @@ std::int64_t SaturatingSum(std::int64_t a, std::int64_t b) {
   return a < 0 ? Limits::min() : Limits::max();
 }
 
-// Calls visit(ours, theirs) for every sum of two tallies.
+// Calls visit(ours, theirs) for every sum of two tallies, of which ours has as many lights as theirs.
 template <typename Ours, typename Visit>
 void ForEachSum(Ours& ours, const BatchTally& theirs, const Visit& visit) {
   visit(ours.photons, theirs.photons);
@@ -47,7 +47,13 @@ void ForEachSum(Ours& ours, const BatchTally& theirs, const Visit& visit) {
   visit(ours.energy.smoothing, theirs.energy.smoothing);
   visit(ours.energy.cut_off, theirs.energy.cut_off);
   visit(ours.energy.dropped, theirs.energy.dropped);
+  for (std::size_t i = 0; i < theirs.lights.size(); ++i) {
+    visit(ours.lights[i].sent, theirs.lights[i].sent);
+    for (std::size_t path = 0; path < kPathClasses; ++path)
+      visit(ours.lights[i].in_view[path], theirs.lights[i].in_view[path]);
+  }
 }
+
 
 }  // namespace
 
@@ -56,14 +62,39 @@ bool EnergyBooks::Balance() const {
          Wide{roulette_took} + absorbed + escaped + smoothing + cut_off + dropped;
 }
 
+bool BatchTally::LightsFit() const {
+  if (lights.size() > kMaxLightTallies) return false;
+  if (!lights.empty() && lights.back().sent == 0) return false;
+  std::uint64_t left = photons;
+  for (const LightTally& light : lights) {
+    if (light.sent > left) return false;
+    left -= light.sent;
+    for (const std::uint64_t in_view : light.in_view) {
+      if (in_view > light.sent) return false;
+    }
+  }
+  return true;
+}
+
+BatchTally& BatchTally::operator-=(const BatchTally& other) {
+  if (lights.size() < other.lights.size()) lights.resize(other.lights.size());
+  ForEachSum(*this, other, [](auto& ours, auto theirs) { ours -= theirs; });
+  while (!lights.empty() && lights.back() == LightTally())
+    lights.pop_back();
+  return *this;
+}
+
 BatchTally& BatchTally::operator+=(const BatchTally& other) {
+  if (lights.size() < other.lights.size()) lights.resize(other.lights.size());
   ForEachSum(*this, other, [](auto& ours, auto theirs) { ours = SaturatingSum(ours, theirs); });
   return *this;
 }
 
 bool BatchTally::Fits(const BatchTally& other, bool adding) const {
+  BatchTally ours_with_lights = *this;
+  if (lights.size() < other.lights.size()) ours_with_lights.lights.resize(other.lights.size());
   bool fits = true;
-  ForEachSum(*this, other,
+  ForEachSum(ours_with_lights, other,
              [&](auto ours, auto theirs) { fits = fits && SumFits(ours, theirs, adding); });
   return fits;
 }
@@ -97,6 +128,9 @@ Status PassSums::Check(const Accumulation& accumulation, bool adding) const {
   }
   if (!accumulation.tally.energy.Balance()) {
     return absl::InvalidArgumentError("an accumulation's energy does not balance");
+  }
+  if (!accumulation.tally.LightsFit()) {
+    return absl::InvalidArgumentError("an accumulation's photons by light contradict its photons");
   }
   if (!tally_.Fits(accumulation.tally, adding)) {
     return absl::OutOfRangeError("the tally of a pass would not fit in 64 bits");
@@ -164,7 +198,7 @@ Status PassSums::Subtract(const Accumulation& accumulation) {
       evidence_[column][accumulation.hitpoints[i]] -= accumulation.evidence[column][i];
     }
   }
-  ForEachSum(tally_, accumulation.tally, [](auto& ours, auto theirs) { ours -= theirs; });
+  tally_ -= accumulation.tally;
   return absl::OkStatus();
 }
 

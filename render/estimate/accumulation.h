@@ -36,6 +36,27 @@ struct EnergyBooks {
 };
 inline constexpr int kEnergyBits = 12;
 
+// What the path of a photon has met before a landing: smooth surfaces alone (a caustic), or a surface
+// that scatters broadly too.
+enum class PathClass : std::uint8_t { kCaustic, kOther };
+inline constexpr std::size_t kPathClasses = 2;
+inline constexpr std::array<PathClass, kPathClasses> kAllPathClasses = {PathClass::kCaustic,
+                                                                       PathClass::kOther};
+
+// The photons of one light (LightSet::lights).
+struct LightTally {
+  std::uint64_t sent = 0;
+  // [class] photons of which a hitpoint found a deposit; a photon counts once in each class.
+  std::array<std::uint64_t, kPathClasses> in_view{};
+
+  [[nodiscard]] std::uint64_t InView(PathClass path) const {
+    return in_view[static_cast<std::size_t>(path)];
+  }
+  bool operator==(const LightTally&) const = default;
+};
+// More lights than this are not counted one by one (kMaxLightGroups).
+inline constexpr std::size_t kMaxLightTallies = 64;
+
 // The books of a batch, for progress and for checking energy. Sums, so they merge like the rest.
 struct BatchTally {
   std::uint64_t photons = 0;   // photon paths emitted
@@ -47,7 +68,15 @@ struct BatchTally {
   // (FluxScale::HasRoomFor).
   std::uint64_t excess = 0;
   EnergyBooks energy;
+  // By light, at most kMaxLightTallies; lights that are not there have sent nothing, and the last
+  // one that is has sent some.
+  std::vector<LightTally> lights = {};
 
+  // Whether `lights` keeps its promises: no light has more photons in view than it has sent, and
+  // all together have not sent more than `photons`.
+  [[nodiscard]] bool LightsFit() const;
+  // Takes out what += put in. Requires Fits(other, false).
+  BatchTally& operator-=(const BatchTally& other);
   // A sum that would leave its range stays at its end.
   BatchTally& operator+=(const BatchTally& other);
   // Whether no sum leaves its range when `other` is added (or taken out).

@@ -44,6 +44,10 @@ Vec3 Direction(ParameterList& parameters, const Transform& to_world, Vec3 from, 
   return {0, 0, 1};
 }
 
+void WarnIfBlack(ParameterList& parameters, Rgb emitted) {
+  if (IsBlack(emitted)) parameters.Warning("", "emits nothing: its colour or scale is 0");
+}
+
 // [W·m⁻²] luminance of what falls onto a plane that looks along z of the map. pbrt-v4 weighs each
 // pixel by half its solid angle and so renders a map with an illuminance twice as bright; here it
 // means what it means for a constant light.
@@ -161,6 +165,7 @@ void AddLight(std::string_view type, ParameterList& parameters, const Transform&
       if (power_w > 0) scale *= power_w / (4 * kPiD);
       scene.point_lights.push_back(
           {FinitePoint(parameters, to_world, from), Scaled(parameters, color, scale)});
+      WarnIfBlack(parameters, scene.point_lights.back().intensity);
     } else {
       const Vec3 to = parameters.Point("to", {0, 0, 1});
       const double width_deg = parameters.Float("coneangle", 30, {0, 180, false});
@@ -179,6 +184,7 @@ void AddLight(std::string_view type, ParameterList& parameters, const Transform&
       light.direction = Direction(parameters, to_world, from, to);
       light.intensity = Scaled(parameters, color, scale);
       scene.spot_lights.push_back(light);
+      WarnIfBlack(parameters, light.intensity);
     }
   } else if (type == "distant") {
     const Rgb color = parameters.FindEmission("L").value_or(Gray(1));
@@ -189,6 +195,7 @@ void AddLight(std::string_view type, ParameterList& parameters, const Transform&
     const Vec3 to = parameters.Point("to", {0, 0, 1});
     scene.distant_lights.push_back(
         {Direction(parameters, to_world, from, to), Scaled(parameters, color, scale)});
+    WarnIfBlack(parameters, scene.distant_lights.back().irradiance);
   } else if (type == "infinite") {
     if (parameters.Has("portal")) {
       parameters.Error("portal", "is not supported");
@@ -205,6 +212,7 @@ void AddLight(std::string_view type, ParameterList& parameters, const Transform&
       InfiniteLight light;
       light.radiance = Scaled(parameters, color, scale);
       scene.infinite_lights.push_back(light);
+      WarnIfBlack(parameters, light.radiance);
     }
   } else {
     parameters.Error("is not supported; there are point, spot, distant and infinite");

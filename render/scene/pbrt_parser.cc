@@ -167,6 +167,7 @@ class PbrtParser {
   bool DoAreaLightSource();
   bool DoLightSource();
   bool DoShape();
+  void WarnOfNoArea(const Place& place, const std::string& subject);
   bool DoTexture();
   bool DoMediumInterface();
   bool DoMakeNamedMedium();
@@ -212,6 +213,13 @@ class PbrtParser {
   std::multimap<std::string, KnownPicture> pictures_;  // by path: each is in memory once
   std::map<std::string, ShapeSet> objects_;
   ShapeSet* open_object_ = nullptr;  // between ObjectBegin and ObjectEnd
+  // Meshes that emit, which may turn out to have no area in single precision.
+  struct EmittingMesh {
+    std::size_t mesh;  // index in the scene
+    Place place;
+    std::string subject;
+  };
+  std::vector<EmittingMesh> emitting_meshes_;
 };
 
 std::span<const PbrtParser::Directive> PbrtParser::Directives() {
@@ -962,7 +970,12 @@ bool PbrtParser::DoAreaLightSource() {
   const AreaEmission emission = MakeAreaEmission(type, list);
   state_.area_light = kNoAreaLight;
   state_.area_emission.reset();
-  if (IsBlack(emission.radiance)) return true;  // emits nothing, so it is no light
+  if (IsBlack(emission.radiance)) {
+    if (type == "diffuse") {
+      list.Warning("", "emits nothing, its L or scale is 0: its shapes are no lights");
+    }
+    return true;
+  }
   if (!emission.power_w.has_value()) {
     state_.area_light = static_cast<std::int32_t>(scene_.area_lights.size());
     scene_.area_lights.push_back(MakeAreaLight(emission, 1));
@@ -980,6 +993,10 @@ bool PbrtParser::DoLightSource() {
   return true;
 }
 
+void PbrtParser::WarnOfNoArea(const Place& place, const std::string& subject) {
+  diagnostics_.Warning(place, Concat(subject, " has no area: it emits no light"));
+}
+
 bool PbrtParser::DoShape() {
   std::string type;
   std::vector<Parameter> parameters;
@@ -992,6 +1009,7 @@ bool PbrtParser::DoShape() {
     placement.traits.area_light = kNoAreaLight;
   }
   const Place place = place_;
+  const bool is_light = state_.area_emission != nullptr && open_object_ == nullptr;
   ShapeSet shapes =
       MakeShapes(type, list, placement, [this](const std::string& file) { return ReadMesh(file); });
   if (shapes.Cost() > limits_.max_triangles - shapes_cost_) {
@@ -1000,8 +1018,14 @@ bool PbrtParser::DoShape() {
     is_stopped_ = true;
     return true;
   }
-  if (open_object_ == nullptr && state_.area_emission != nullptr &&
-      state_.area_emission->power_w.has_value() && shapes.Cost() > 0) {
+  if (is_light && !diagnostics_.has_error() && !(shapes.Area() > 0)) WarnOfNoArea(place, list.subject());
+  if (is_light) {
+    for (std::size_t i = 0; i < shapes.meshes.size(); ++i) {
+      if (shapes.meshes[i].indices.empty()) continue;
+      emitting_meshes_.push_back({scene_.meshes.size() + i, place, list.subject()});
+    }
+  }
+  if (is_light && state_.area_emission->power_w.has_value() && shapes.Cost() > 0) {
     if (!shapes.meshes.empty() && shapes.meshes[0].indices.size() > 3) {
       list.Warning("", "gets its power as a whole; pbrt-v4 gives it to each triangle");
     }
@@ -1128,6 +1152,9 @@ void PbrtParser::Finish() {
   std::size_t dropped = 0;
   for (TriangleMesh& mesh : scene_.meshes)
     dropped += DropTriangles(mesh, FLT_MIN);
+  for (const EmittingMesh& light : emitting_meshes_) {
+    if (scene_.meshes[light.mesh].indices.empty()) WarnOfNoArea(light.place, light.subject);
+  }
   std::erase_if(scene_.meshes, [](const TriangleMesh& mesh) { return mesh.indices.empty(); });
   if (dropped > 0) {
     diagnostics_.Note(whole, Concat(dropped, dropped == 1 ? " triangle has" : " triangles have",

@@ -21,9 +21,6 @@ float SpotFalloff(const SpotLight& spot, float cosine) {
 // How much of the choice of direct light is even among the lights. By power alone, a lamp nearby
 // that has a millionth of the power of another is found once in a million samples.
 constexpr double kEvenShare = 0.1;
-// Lights with less of the power than this are told of.
-constexpr double kFaintShare = 1e-9;
-
 // 1 - cosine of the cone in which a sphere appears from outside, without cancellation.
 float OneMinusCosine(float sin2_max) {
   return sin2_max / (1 + std::sqrt(std::max(0.0F, 1 - sin2_max)));
@@ -192,11 +189,20 @@ void LightSet::ShareOut() {
   }
   faint_lights_ = static_cast<std::size_t>(std::ranges::count_if(
       light_power, [&](double power) { return power > 0 && power < kFaintShare * total; }));
+  const auto sending = static_cast<double>(
+      std::ranges::count_if(light_power, [](double power) { return power > 0; }));
+  const double even_share = sending > 1 ? kEvenPhotonShare : 0;
   double sum = 0;
+  double even_sum = 0;
   double direct_sum = 0;
   for (std::size_t i = 0; i < emitters_.size(); ++i) {
     const auto power = static_cast<double>(Luminance(emitters_[i].power));
-    const double choice = power / total;
+    double choice = power / total;
+    if (even_share > 0 && power > 0) {
+      const double even = power / light_power[light_of[i]] / sending;
+      choice += even_share * (even - choice);
+      even_sum += even;
+    }
     double direct_choice = 0;
     if (emitters_[i].is_sampled) {
       const double even = power / light_power[light_of[i]] / sampled_lights;
@@ -205,10 +211,72 @@ void LightSet::ShareOut() {
     }
     sum += power;
     direct_sum += direct_choice;
-    cumulative_.push_back(sum / total);
+    cumulative_.push_back(sum / total + even_share * (even_sum - sum / total));
     direct_cumulative_.push_back(direct_sum);
     emitters_[i].choice = static_cast<float>(choice);
     emitters_[i].direct_choice = static_cast<float>(direct_choice);
+  }
+  GroupLights(light_of, light_power);
+}
+
+void LightSet::GroupLights(const std::vector<std::size_t>& light_of,
+                           const std::vector<double>& light_power) {
+  std::vector<std::size_t> strongest;
+  for (std::size_t light = 0; light < light_power.size(); ++light) {
+    if (light_power[light] > 0) strongest.push_back(light);
+  }
+  const std::size_t sending = strongest.size();
+  if (sending > kMaxLightGroups) {
+    std::ranges::stable_sort(
+        strongest, [&](std::size_t a, std::size_t b) { return light_power[a] > light_power[b]; });
+    strongest.resize(kMaxLightGroups - 1);
+    std::ranges::sort(strongest);
+  }
+  constexpr std::size_t kNone = ~std::size_t{0};
+  std::vector<std::size_t> group_of(light_power.size(), kNone);
+  for (std::size_t group = 0; group < strongest.size(); ++group)
+    group_of[strongest[group]] = group;
+  lights_.assign(strongest.size(), {});
+  if (sending > kMaxLightGroups) {
+    const auto others = static_cast<std::uint32_t>(sending - strongest.size());
+    lights_.push_back({.lights = others, .power = {}, .position = {}});
+  }
+  for (std::size_t i = 0; i < emitters_.size(); ++i) {
+    Emitter& emitter = emitters_[i];
+    if (IsBlack(emitter.power)) continue;
+    const std::size_t found = group_of[light_of[i]];
+    const std::size_t group = found == kNone ? lights_.size() - 1 : found;
+    emitter.light = static_cast<std::uint8_t>(group);
+    LightGroup& light = lights_[group];
+    light.kind = emitter.kind;
+    light.power += emitter.power;
+    light.position = light.position + CentreOf(emitter);
+    ++light.emitters;
+  }
+  for (LightGroup& light : lights_)
+    light.position = light.position / static_cast<float>(std::max(1U, light.emitters));
+}
+
+Vec3 LightSet::CentreOf(const Emitter& emitter) const {
+  switch (emitter.kind) {
+    case Kind::kTriangle: {
+      const TriangleMesh& mesh = scene_.meshes[emitter.geometry];
+      const std::uint32_t* corner = &mesh.indices[std::size_t{3} * emitter.primitive];
+      return (mesh.positions[corner[0]] + mesh.positions[corner[1]] + mesh.positions[corner[2]]) *
+             (1.0F / 3);
+    }
+    case Kind::kSphere:
+      return scene_.spheres[emitter.primitive].center;
+    case Kind::kDisk:
+      return scene_.disks[emitter.primitive].center;
+    case Kind::kPoint:
+      return scene_.point_lights[emitter.primitive].position;
+    case Kind::kSpot:
+      return scene_.spot_lights[emitter.primitive].position;
+    case Kind::kDistant:
+      return scene_.distant_lights[emitter.primitive].direction;
+    default:
+      return {};
   }
 }
 

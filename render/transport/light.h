@@ -1,13 +1,18 @@
 // Which lights are there, how strong is each, and where does their light go?
 //
-// Every emitting triangle, sphere, disk and every other light is one emitter. Emitters are chosen
-// in proportion to their power (luminance), so that all photons carry about the same flux.
+// Every emitting triangle, sphere, disk and every other light is one emitter; all emitters of a mesh
+// are one light. Emitters are chosen in proportion to their power (luminance), so that all photons
+// carry about the same flux, but for kEvenPhotonShare of the photons, which is even among the
+// lights: a light with a millionth of the power is sampled all the same. With a single light there
+// is no such share.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "render/geometry/intersector.h"
+#include "render/math/fixed_point.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "render/scene/needs.h"
@@ -48,6 +53,20 @@ struct Emitter {
   float direct_choice = 0;  // probability for direct light
   Rgb radiance;             // or intensity, or irradiance
   Rgb power;
+  std::uint8_t light = 0;  // index into LightSet::lights()
+};
+
+// At most so many lights are counted one by one.
+inline constexpr std::size_t kMaxLightGroups = 64;
+
+// A light that sends photons.
+struct LightGroup {
+  EmitterKind kind = EmitterKind::kPoint;
+  std::uint32_t emitters = 0;
+  // More than 1: the faintest lights together, the other members but `power` are meaningless.
+  std::uint32_t lights = 1;
+  Rgb power;
+  Vec3 position;  // of an area light its centre; of a distant light the direction it travels
 };
 
 // Light that arrives at a point from one emitter.
@@ -75,8 +94,12 @@ class LightSet {
   [[nodiscard]] Rgb TotalPower() const { return total_power_; }
   // [W·m⁻²·sr⁻¹] at least the largest channel that a ray can find, of all emitters.
   [[nodiscard]] float LargestRadiance() const;
-  // How many lights (a mesh is one) have so small a share of the power, 1e-9, that hardly a photon
-  // ever comes from them: what they light directly is right, and what that light lights is dark.
+  // The lights that send photons, in the order of their emitters, at most kMaxLightGroups; of more
+  // lights the last entry stands for the faintest together.
+  [[nodiscard]] const std::vector<LightGroup>& lights() const { return lights_; }
+  // How many lights have less than kFaintShare of the power: their photons carry so far less than a
+  // quantum (math/fixed_point.h) that hardly one of a billion adds anything. What they light
+  // directly is right, and what that light lights is dark.
   [[nodiscard]] std::size_t faint_lights() const { return faint_lights_; }
   // Draws a photon. u_choice picks the emitter, in double because a lamp may have less than 2^-24
   // of the power; u_place and u_direction the rest. False when
@@ -113,6 +136,9 @@ class LightSet {
 
   // Fills in the choices of all emitters.
   void ShareOut();
+  // Fills in lights(), given for each emitter the light it belongs to and the power of each light.
+  void GroupLights(const std::vector<std::size_t>& light_of, const std::vector<double>& light_power);
+  [[nodiscard]] Vec3 CentreOf(const Emitter& emitter) const;
   [[nodiscard]] const Emitter& Choose(const std::vector<double>& cumulative, double u) const;
   [[nodiscard]] const Emitter* EmitterOf(const SurfacePoint& point) const;
   [[nodiscard]] static float AreaDensity(const Emitter& emitter);
@@ -132,7 +158,13 @@ class LightSet {
   std::int64_t infinite_emitter_ = -1;
   std::vector<EnvironmentMap> environments_;  // those that are not black
   std::size_t first_environment_ = 0;         // emitter of the first
+  std::vector<LightGroup> lights_;
   std::size_t faint_lights_ = 0;
 };
+
+// The share of photons that is even among the lights of a scene with several.
+inline constexpr double kEvenPhotonShare = 0.05;
+// One billionth of a quantum, for which photons of about the whole power are made.
+inline constexpr double kFaintShare = 1e-9 / (1 << kFluxBits);
 
 }  // namespace lucerna

@@ -12,7 +12,7 @@ namespace {
 
 __extension__ using Wide = __int128;
 
-constexpr std::string_view kMagic = "LAC3";
+constexpr std::string_view kMagic = "LAC4";
 // More columns of evidence than any radius controller asks for.
 constexpr std::uint64_t kMostEvidence = 32;
 constexpr std::uint8_t kIndicesAsVarints = 0;
@@ -122,6 +122,12 @@ std::string EncodeAccumulation(const Accumulation& accumulation, std::size_t hit
         energy.smoothing, energy.cut_off, energy.dropped}) {
     writer.Varint(ZigZag(value));
   }
+  writer.Varint(tally.lights.size());
+  for (const LightTally& light : tally.lights) {
+    writer.Varint(light.sent);
+    for (const std::uint64_t in_view : light.in_view)
+      writer.Varint(in_view);
+  }
   writer.Varint(accumulation.dropped_photons.size());
   for (const std::uint64_t index : accumulation.dropped_photons)
     writer.Varint(index);
@@ -182,6 +188,15 @@ StatusOr<Accumulation> DecodeAccumulation(std::string_view bytes, std::size_t hi
     *value = UnZigZag(reader.Varint());
   }
   if (!energy.Balance()) return Malformed("its energy does not balance");
+  const std::uint64_t lights = reader.Varint();
+  if (lights > kMaxLightTallies) return Malformed("it counts the photons of too many lights");
+  tally.lights.resize(lights);
+  for (LightTally& light : tally.lights) {
+    light.sent = reader.Varint();
+    for (std::uint64_t& in_view : light.in_view)
+      in_view = reader.Varint();
+  }
+  if (!tally.LightsFit()) return Malformed("its photons by light contradict its photons");
   const std::uint64_t named = reader.Varint();
   if (named > kDroppedNamed) return Malformed("it names too many dropped photons");
   for (std::uint64_t i = 0; i < named; ++i) {

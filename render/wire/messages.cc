@@ -265,11 +265,22 @@ v1::Tally ToProto(const BatchTally& tally) {
   energy.set_smoothing(tally.energy.smoothing);
   energy.set_cut_off(tally.energy.cut_off);
   energy.set_dropped(tally.energy.dropped);
+  for (const LightTally& light : tally.lights) {
+    v1::LightTally& item = *message.add_lights();
+    item.set_sent(light.sent);
+    item.set_in_view_caustic(light.InView(PathClass::kCaustic));
+    item.set_in_view_other(light.InView(PathClass::kOther));
+  }
   return message;
 }
 
 BatchTally FromProto(const v1::Tally& message) {
   const v1::Energy& energy = message.energy();
+  std::vector<LightTally> lights;
+  for (const v1::LightTally& light : message.lights()) {
+    if (lights.size() == kMaxLightTallies) break;
+    lights.push_back({light.sent(), {light.in_view_caustic(), light.in_view_other()}});
+  }
   return {.photons = message.photons(),
           .rays = message.rays(),
           .deposits = message.deposits(),
@@ -283,7 +294,8 @@ BatchTally FromProto(const v1::Tally& message) {
                      .escaped = energy.escaped(),
                      .smoothing = energy.smoothing(),
                      .cut_off = energy.cut_off(),
-                     .dropped = energy.dropped()}};
+                     .dropped = energy.dropped()},
+          .lights = std::move(lights)};
 }
 
 google::protobuf::Duration ToProto(Duration duration) {

@@ -25,6 +25,7 @@ class LocalRender {
   [[nodiscard]] ErrorEstimate EstimateError(int look) const {
     return estimator_->EstimateError(look);
   }
+  [[nodiscard]] MissingLight FindMissingLight() const { return estimator_->FindMissingLight(); }
   // Over all passes.
   [[nodiscard]] const BatchTally& tally() const { return tally_; }
 

@@ -103,6 +103,45 @@ TEST(BatchTracerTest, MergesTheLargePartsOfARange) {
     EXPECT_EQ(parts.flux(c), whole.flux(c));
 }
 
+// A second light in a box of its own next door, from which nothing comes into view.
+TEST(BatchTracerTest, CountsThePhotonsOfEachLightThatHitpointsFound) {
+  Fixture f;
+  AddBox(f.scene, {3, -1, -1}, {5, 1, 1}, 0);
+  f.scene.point_lights.push_back({{4, 0, 0}, Gray(0.01F)});
+  // Were it proved to be shut off, it would send nothing.
+  const SceneNeeds needs(NeedsOf(f.scene, f.settings).parts(), 0, {});
+  BatchTracer tracer(f.scene, 2);
+  const auto run = [&](std::uint64_t first, std::uint64_t last) {
+    return tracer.Run(f.settings, needs, 0, first, last, f.block, f.radii, f.stop).value();
+  };
+  const std::vector<LightTally> lights = run(0, 20000).tally.lights;
+  ASSERT_EQ(lights.size(), 2U);
+  EXPECT_EQ(lights[0].sent + lights[1].sent, 20000U);
+  EXPECT_GT(lights[1].sent, 20000U / 40) << "its even share";
+  EXPECT_GT(lights[0].InView(PathClass::kCaustic), 1000U) << "through glass alone";
+  EXPECT_GT(lights[0].InView(PathClass::kOther), 1000U);
+  EXPECT_EQ(lights[1].in_view, (LightTally().in_view));
+
+  // One by one: a photon counts in a class when it is found, and once.
+  LightTally sum;
+  int found = 0;
+  for (std::uint64_t i = 0; i < 400; ++i) {
+    const BatchTally tally = run(i, i + 1).tally;
+    std::uint64_t counted = 0;
+    for (const LightTally& light : tally.lights) {
+      for (std::size_t path = 0; path < kPathClasses; ++path) {
+        counted += light.in_view[path];
+        sum.in_view[path] += light.in_view[path];
+        EXPECT_LE(light.in_view[path], 1U);
+      }
+    }
+    EXPECT_EQ(counted > 0, tally.pairs > 0) << i;
+    found += tally.pairs > 0 ? 1 : 0;
+  }
+  EXPECT_GT(found, 100);
+  EXPECT_EQ(run(0, 400).tally.lights[0].in_view, sum.in_view);
+}
+
 TEST(BatchTracerTest, TakesEmptyRangesAndBlocks) {
   Fixture f;
   EXPECT_EQ(f.Run(1, 0, 5, 5).size(), 0U);

@@ -107,5 +107,116 @@ TEST(ConvergenceTest, PercentagesHaveThreeDigits) {
   EXPECT_EQ(ShortPercent(std::nan("")), "unknown");
 }
 
+// A running job whose newest sample may miss `share` of the image.
+v1::Job MissingJob(double share) {
+  v1::Job job = ConvergingJob(10);
+  v1::ErrorSample& newest = *job.mutable_convergence(9);
+  newest.set_missing_relative(share);
+  newest.mutable_relative()->set_high(newest.relative().high() + share);
+  v1::LightFinding& weak = *job.add_lights();
+  weak.set_name("light 1 (a point light at (0, 0, 1))");
+  weak.set_photons_sent(50'000);
+  weak.set_in_view_other(20'000);
+  v1::LightFinding& hidden = *job.add_lights();
+  hidden.set_name("light 2 (a disk)");
+  hidden.set_photons_sent(12'000);
+  hidden.set_missing_share(0.4);
+  return job;
+}
+
+TEST(MissingLightSentenceTest, NamesTheLight) {
+  EXPECT_EQ(MissingLightSentence(MissingJob(0.1)),
+            "light 2 (a disk): no photon of 12000 has reached the view, light worth up to 40.0 % of "
+            "the image may be missing");
+  EXPECT_EQ(MissingLightSentence(MissingJob(1e-9)), "") << "too little to matter";
+  EXPECT_EQ(MissingLightSentence(v1::Job()), "");
+}
+
+TEST(MissingLightSentenceTest, TellsFewFromNoneAndOneWayFromAnother) {
+  v1::Job job = MissingJob(0.1);
+  job.mutable_lights(1)->set_in_view_other(3);
+  EXPECT_NE(MissingLightSentence(job).find("only 3 of 12000 photons have reached the view,"),
+            std::string::npos)
+      << MissingLightSentence(job);
+  job.mutable_lights(1)->set_in_view_other(5000);
+  EXPECT_NE(MissingLightSentence(job).find(
+                "no photon of 12000 has reached the view through smooth surfaces alone"),
+            std::string::npos)
+      << MissingLightSentence(job);
+  job.mutable_lights(1)->set_in_view_other(2);
+  job.mutable_lights(1)->set_in_view_caustic(5000);
+  EXPECT_NE(MissingLightSentence(job).find(
+                "only 2 of 12000 photons have reached the view by other ways"),
+            std::string::npos)
+      << MissingLightSentence(job);
+}
+
+TEST(FoundNothingTest, ABlackImageHasNoError) {
+  v1::Job job = ConvergingJob(10);
+  EXPECT_FALSE(FoundNothing(job));
+  v1::ErrorSample& newest = *job.mutable_convergence(9);
+  newest.clear_relative();
+  newest.mutable_relative()->set_high(HUGE_VAL);
+  newest.set_nothing_found(true);
+  EXPECT_TRUE(FoundNothing(job));
+  EXPECT_FALSE(NewestError(job).has_value());
+  EXPECT_FALSE(FindFarTarget(job).has_value());
+}
+
+// Squared errors fall as time^(-2/3): a tenth of the error takes a thousand times as long.
+TEST(FarTargetTest, IsSaidBeyondAHundredTimesTheTime) {
+  v1::Job job = ConvergingJob(12);
+  const double high = std::sqrt(job.convergence(11).relative().high());
+  // 4.5³ = 91 times the time.
+  job.mutable_settings()->set_error(high / 4.5);
+  EXPECT_FALSE(FindFarTarget(job).has_value());
+  job.mutable_settings()->set_error(high / 10);
+  const auto far = FindFarTarget(job);
+  ASSERT_TRUE(far.has_value());
+  const double so_far_s = Seconds(FromProto(job.convergence(11).running()));
+  EXPECT_NEAR(Seconds(*far->left) / so_far_s, 999, 2);
+  EXPECT_NE(far->sentence.find("needs 1000 times the time so far"), std::string::npos)
+      << far->sentence;
+  EXPECT_NE(far->sentence.find("more workers"), std::string::npos) << "noise prevails";
+  job.mutable_settings()->set_error(high * 1.01);
+  EXPECT_FALSE(FindFarTarget(job).has_value()) << "reached";
+  job.mutable_settings()->clear_error();
+  EXPECT_FALSE(FindFarTarget(job).has_value()) << "no target";
+  job = ConvergingJob(5);
+  job.mutable_settings()->set_error(1e-6);
+  EXPECT_FALSE(FindFarTarget(job).has_value()) << "no trend yet";
+}
+
+TEST(FarTargetTest, BiasThatStandsStillIsNotInSight) {
+  v1::Job job = ConvergingJob(24);
+  for (v1::ErrorSample& sample : *job.mutable_convergence()) {
+    v1::SquaredError& relative = *sample.mutable_relative();
+    relative.set_bias(0.01);
+    relative.set_high(1.3 * (relative.noise() + relative.bias()));
+  }
+  job.mutable_settings()->set_error(0.035);
+  const auto far = FindFarTarget(job);
+  ASSERT_TRUE(far.has_value());
+  EXPECT_FALSE(far->left.has_value());
+  EXPECT_NE(far->sentence.find("the bias stands still at 10.0 %"), std::string::npos)
+      << far->sentence;
+  EXPECT_NE(far->sentence.find("--initial-radius"), std::string::npos);
+  // Bias below the target does not keep the job from it.
+  job.mutable_settings()->set_error(0.11);
+  EXPECT_FALSE(FindFarTarget(job).has_value());
+}
+
+TEST(FarTargetTest, LightThatWasNotFoundAsksForPhotons) {
+  v1::Job job = ConvergingJob(12);
+  for (v1::ErrorSample& sample : *job.mutable_convergence()) {
+    sample.mutable_relative()->set_high(0.9);
+    sample.set_missing_relative(0.8);
+  }
+  const auto far = FindFarTarget(job);
+  ASSERT_TRUE(far.has_value());
+  EXPECT_NE(far->sentence.find("not in sight"), std::string::npos) << far->sentence;
+  EXPECT_NE(far->sentence.find("more photons would help"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace lucerna

@@ -46,6 +46,8 @@ TEST(ProgressViewTest, TimesAreShort) {
   EXPECT_EQ(ShortTime(milliseconds(59990)), "1:00");
   EXPECT_EQ(ShortTime(seconds(245)), "4:05");
   EXPECT_EQ(ShortTime(seconds(3723)), "1:02:03");
+  EXPECT_EQ(ShortTime(seconds(172'799)), "47:59:59");
+  EXPECT_EQ(ShortTime(seconds(302'400)), "3.5 days");
 }
 
 TEST(ProgressViewTest, ARunningJobShowsItsShareRateAndTimeLeft) {
@@ -158,6 +160,44 @@ TEST(ProgressPrinterTest, PlainLinesComeAtMostEveryTwoSecondsAndAtEveryNewState)
   job.mutable_progress()->set_photons(5'000'000);
   EXPECT_EQ(printer.Update(job, now + milliseconds(1999)), "");
   EXPECT_EQ(printer.Update(job, now + milliseconds(2000)), ProgressLine(job) + "\n");
+}
+
+// Never "0 %".
+TEST(ErrorLineTest, ABlackImageIsNothingFound) {
+  v1::Job job = ConvergingJob(8);
+  v1::ErrorSample& newest = *job.mutable_convergence(7);
+  newest.clear_relative();
+  newest.mutable_relative()->set_high(HUGE_VAL);
+  newest.set_nothing_found(true);
+  EXPECT_EQ(ErrorLine(job), "nothing found yet: no light has reached the view");
+  EXPECT_NE(SummaryLine(job).find("no light was found: the image is black"), std::string::npos)
+      << SummaryLine(job);
+  v1::LightFinding& light = *job.add_lights();
+  light.set_name("light 1 (a point light at (0, 0, 1))");
+  light.set_photons_sent(99);
+  light.set_missing_share(HUGE_VAL);
+  EXPECT_EQ(ErrorNotes(job),
+            std::vector<std::string>(
+                {"light 1 (a point light at (0, 0, 1)): no photon of 99 has reached the view"}));
+}
+
+TEST(ErrorLineTest, ATargetOutOfSightIsSaid) {
+  v1::Job job = ConvergingJob(24);
+  job.set_state(v1::JOB_STATE_RUNNING);
+  for (v1::ErrorSample& sample : *job.mutable_convergence()) {
+    sample.mutable_relative()->set_bias(0.04);
+    sample.mutable_relative()->set_high(0.1);
+  }
+  job.mutable_settings()->clear_time_s();
+  EXPECT_TRUE(ErrorLine(job).ends_with("target 3.50 % not in sight")) << ErrorLine(job);
+  EXPECT_TRUE(ProgressLine(job).ends_with("ETA not in sight")) << ProgressLine(job);
+  ASSERT_EQ(ErrorNotes(job).size(), 1U);
+  ProgressPrinter printer;
+  const std::string first = printer.Update(job, SteadyTime());
+  EXPECT_NE(first.find(ErrorNotes(job)[0]), std::string::npos) << first;
+  job.mutable_progress()->set_photons(job.progress().photons() * 2);
+  const std::string second = printer.Update(job, SteadyTime() + seconds(10));
+  EXPECT_EQ(second.find("not in sight:"), std::string::npos) << "said once: " << second;
 }
 
 }  // namespace

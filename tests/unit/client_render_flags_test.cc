@@ -46,6 +46,23 @@ TEST(RenderFlagsTest, EveryFlagArrives) {
   EXPECT_EQ(overrides->max_depth, 8);
 }
 
+// "3" is hardly ever meant as 300 %.
+TEST(RenderFlagsTest, AShareAboveOneNeedsItsPercentSign) {
+  RenderFlags flags;
+  flags.error = "3";
+  const auto refused = ToOverrides(flags);
+  EXPECT_EQ(ExitCodeOf(refused.status()), ExitCode::kUsage);
+  EXPECT_NE(refused.status().message().find("write 3% for 3 percent, or 300%"),
+            std::string_view::npos)
+      << refused.status();
+  flags.error = "300%";
+  EXPECT_EQ(ToOverrides(flags)->error, 3);
+  flags.error = "1";
+  EXPECT_EQ(ToOverrides(flags)->error, 1);
+  flags.error = "3%";
+  EXPECT_EQ(ToOverrides(flags)->error, 0.03);
+}
+
 TEST(RenderFlagsTest, AutoIsARadiusOfZero) {
   RenderFlags flags;
   flags.initial_radius = "auto";

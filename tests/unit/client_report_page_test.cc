@@ -40,6 +40,21 @@ TEST(ReportPageTest, TellsTheEnergyOfPassesAndWhetherItBalances) {
   EXPECT_TRUE(Has(off, "<td>1.00 %</td></tr>"));
 }
 
+TEST(ReportPageTest, LightThatWasNotFoundIsNamed) {
+  v1::Job job = ConvergingJob(12);
+  job.mutable_convergence(11)->set_missing_relative(1);
+  v1::LightFinding& light = *job.add_lights();
+  light.set_name("light 1 (a <disk>)");
+  light.set_photons_sent(1234);
+  light.set_missing_share(0.25);
+  const std::string page = ReportPage(job, std::nullopt);
+  EXPECT_NE(page.find("light 1 (a &lt;disk&gt;): no photon of 1234 has reached the view"),
+            std::string::npos);
+  EXPECT_NE(page.find("<td>25.0 %</td>"), std::string::npos);
+  job.mutable_convergence(11)->set_nothing_found(true);
+  EXPECT_NE(ReportPage(job, std::nullopt).find("Nothing found yet"), std::string::npos);
+}
+
 TEST(ReportPageTest, StandsAlone) {
   const std::string page = ReportPage(ConvergingJob(), PageImage{"png bytes", Digest()});
   for (const char* text : {"http:", "https:", "//", "url(", "@import", "<script", "<iframe"}) {

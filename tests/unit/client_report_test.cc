@@ -45,6 +45,31 @@ TEST(ReportTest, AJobTellsItsFigures) {
   EXPECT_FALSE(report.contains("to_first_photons_s")) << "absent until a batch came back";
 }
 
+// What `render --json` prints carries the estimate, and with a reference the truth.
+TEST(ReportTest, AJobsReportCarriesItsError) {
+  v1::Job job = ConvergingJob(12);
+  json report = json::parse(JobReport(job));
+  EXPECT_DOUBLE_EQ(report["relative_error"]["estimate"].get<double>(),
+                   std::sqrt(job.convergence(11).relative().noise() +
+                             job.convergence(11).relative().bias()));
+  EXPECT_DOUBLE_EQ(report["relative_error"]["true"].get<double>(),
+                   std::sqrt(job.convergence(11).true_relative()));
+  EXPECT_FALSE(report.contains("nothing_found"));
+
+  v1::ErrorSample& newest = *job.mutable_convergence(11);
+  newest.mutable_relative()->set_high(HUGE_VAL);
+  newest.set_nothing_found(true);
+  v1::LightFinding& light = *job.add_lights();
+  light.set_name("light 1");
+  light.set_photons_sent(5);
+  light.set_missing_share(HUGE_VAL);
+  report = json::parse(JobReport(job));
+  EXPECT_FALSE(report.contains("relative_error")) << "nothing is known, above all not 0";
+  EXPECT_EQ(report["nothing_found"], true);
+  EXPECT_EQ(report["lights"][0]["photons_sent"], 5);
+  EXPECT_TRUE(report["lights"][0]["missing_share"].is_null());
+}
+
 TEST(ReportTest, TheConvergenceRecordKeepsItsDigits) {
   const v1::Job job = ConvergingJob(12);
   const json report = json::parse(ConvergenceReport(job));

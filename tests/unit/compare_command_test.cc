@@ -17,7 +17,7 @@ TEST(CompareCommandTest, SettingsHaveNamesAndTheirOwnFlags) {
   RenderFlags common;
   common.alpha = 0.5;
   const auto settings =
-      ParseSettings({"plain", " wide : --alpha 0.9 --initial-radius 4px "}, common);
+      ParseSettings({"plain:", " wide : --alpha 0.9 --initial-radius 4px "}, common);
   ASSERT_TRUE(settings.ok()) << settings.status();
   ASSERT_EQ(settings->size(), 2U);
   EXPECT_EQ((*settings)[0].name, "plain");
@@ -36,7 +36,9 @@ TEST(CompareCommandTest, WithoutSettingsEachControllerIsOne) {
 }
 
 TEST(CompareCommandTest, SettingsThatMakeNoSenseAreRefused) {
-  for (const std::vector<std::string>& typed : {std::vector<std::string>{"a", "a"},
+  for (const std::vector<std::string>& typed : {std::vector<std::string>{"a:", "a:"},
+                                                {"a"},
+                                                {"alpha 0.5"},
                                                 {""},
                                                 {": --alpha 0.5"},
                                                 {"--alpha 0.5"},

@@ -429,16 +429,71 @@ TEST(LightSetTest, LeavesOutWhatTheJobDoesNotNeed) {
   EXPECT_EQ(none.TotalPower(), all.TotalPower());
 }
 
+// Of several lights each has an even share of a twentieth of the photons, and the rest by power.
+TEST(LightSetTest, EachLightHasAnEvenShareOfSomePhotons) {
+  Scene scene = QuadLamp();
+  ASSERT_EQ(Lit(scene).lights.lights().size(), 1U);
+  const Lit single(scene);
+  EXPECT_EQ(single.lights.emitter(0).choice + single.lights.emitter(1).choice, 1)
+      << "one light alone: by power";
+  scene.point_lights.push_back({{0, 1, 2}, Gray(1e-6F)});
+  scene.point_lights.push_back({{0, 0, 0}, Gray(0)});
+  const Lit lit(scene);
+  const double of_quad = static_cast<double>(lit.lights.emitter(0).power.g) * 2;
+  const double of_point = static_cast<double>(lit.lights.emitter(2).power.g);
+  const double by_power = of_point / (of_point + of_quad);
+  EXPECT_NEAR(lit.lights.emitter(2).choice, 0.95 * by_power + 0.05 / 2, 1e-7);
+  EXPECT_NEAR(lit.lights.emitter(0).choice, 0.5 * (0.95 * (1 - by_power) + 0.05 / 2), 1e-6);
+  EXPECT_EQ(lit.lights.emitter(3).choice, 0);
+
+  // Photons come so, and all their flux together is the power.
+  constexpr int kPhotons = 20000;
+  int from_point = 0;
+  double flux = 0;
+  for (int i = 0; i < kPhotons; ++i) {
+    Emission emission;
+    ASSERT_TRUE(
+        lit.lights.SampleEmission((i + 0.5) / kPhotons, 0.3F, 0.6F, 0.2F, 0.7F, emission));
+    from_point += emission.emitter == 2 ? 1 : 0;
+    flux += static_cast<double>(emission.flux.g) / kPhotons;
+    EXPECT_EQ(lit.lights.emitter(emission.emitter).light, emission.emitter == 2 ? 1 : 0);
+  }
+  EXPECT_NEAR(from_point, 0.025 * kPhotons, 2);
+  EXPECT_NEAR(flux, static_cast<double>(lit.lights.TotalPower().g), 1e-3 * flux);
+
+  ASSERT_EQ(lit.lights.lights().size(), 2U) << "one that is off is none";
+  EXPECT_EQ(lit.lights.lights()[0].emitters, 2U);
+  EXPECT_EQ(lit.lights.lights()[1].position, (Vec3{0, 1, 2}));
+}
+
+TEST(LightSetTest, TheFaintestOfManyLightsCountAsOne) {
+  Scene scene = BlackRoom();
+  for (int i = 0; i < 100; ++i)
+    scene.point_lights.push_back({{static_cast<float>(i), 0, 0}, Gray(i % 2 == 0 ? 1 : 2)});
+  const Lit lit(scene);
+  ASSERT_EQ(lit.lights.lights().size(), kMaxLightGroups);
+  EXPECT_EQ(lit.lights.lights().back().lights, 37U);
+  float power = 0;
+  for (const LightGroup& light : lit.lights.lights())
+    power += light.power.g;
+  EXPECT_NEAR(power, lit.lights.TotalPower().g, 1e-3F * power);
+  for (std::uint32_t i = 1; i < 100; i += 2)
+    EXPECT_LT(lit.lights.emitter(i).light, kMaxLightGroups - 1) << "the stronger half has its own";
+  EXPECT_EQ(lit.lights.emitter(98).light, kMaxLightGroups - 1);
+}
+
 // A lamp that is off is none.
-TEST(LightSetTest, CountsLightsThatHardlySendAPhoton) {
+TEST(LightSetTest, CountsLightsTooFaintToCountBesideTheOthers) {
   Scene scene = SphereLamp();
   EXPECT_EQ(Lit(scene).lights.faint_lights(), 0U);
-  scene.point_lights.push_back({{0, 0, 0}, Gray(1e-11F)});
+  scene.point_lights.push_back({{0, 2, 0}, Gray(1e-11F)});
+  EXPECT_EQ(Lit(scene).lights.faint_lights(), 0U) << "it has its even share";
+  scene.point_lights.back() = {{0, 0, 0}, Gray(1e-17F)};
   EXPECT_EQ(Lit(scene).lights.faint_lights(), 1U);
   scene.point_lights.push_back({{0, 1, 0}, Gray(0)});
-  AddSphere(scene, {5, 0, 2}, 1e-7F, 0, AddAreaLight(scene, 1));
+  AddSphere(scene, {5, 0, 2}, 1e-9F, 0, AddAreaLight(scene, 1));
   EXPECT_EQ(Lit(scene).lights.faint_lights(), 2U);
-  scene.area_lights[0].radiance = Gray(1e-9F);
+  scene.area_lights[0].radiance = Gray(1e-15F);
   EXPECT_EQ(Lit(scene).lights.faint_lights(), 0U) << "what is faint depends on the rest";
 }
 

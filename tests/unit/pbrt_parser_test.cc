@@ -17,6 +17,7 @@
 namespace lucerna {
 namespace {
 
+using ::testing::AnyOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
@@ -227,6 +228,31 @@ TEST(PbrtParserTest, DegenerateTrianglesAreDroppedAndCounted) {
       "\"integer indices\" [0 1 1  0 1 2  0 1 3]";
   EXPECT_THAT(World(world).meshes[0].indices, ElementsAre(0, 1, 2));
   EXPECT_THAT(SaidOfWorld(world), HasSubstr("2 of 3 triangles have no area"));
+}
+
+// What was meant to shine and does not is said, with its place.
+TEST(PbrtParserTest, LightsThatEmitNothingAreWarnedOf) {
+  const std::string light = "AreaLightSource \"diffuse\"\n";
+  const std::string flat =
+      "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 2 0 0] \"integer indices\" [0 1 2]";
+  EXPECT_THAT(SaidOfWorld(light + flat), HasSubstr("warning: Shape \"trianglemesh\" has no area"));
+  EXPECT_THAT(SaidOfWorld(flat), Not(HasSubstr("warning: Shape")));
+  // In single precision: 1e-25 m² are more than kLeastArea, and next to the other triangle nothing.
+  const std::string tiny =
+      "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1e-25 0 0 0 1e-25 0] \"integer indices\" [0 1 2]";
+  EXPECT_THAT(SaidOfWorld(std::string(kTriangle) + light + tiny),
+              HasSubstr("warning: Shape \"trianglemesh\" has no area"));
+  EXPECT_THAT(SaidOfWorld(light + "Shape \"disk\" \"float radius\" 1 \"float innerradius\" 1"),
+              AnyOf(HasSubstr("Shape \"disk\" has no area"), HasSubstr("error")));
+  EXPECT_THAT(SaidOfWorld(light + "Shape \"sphere\" \"float radius\" 0"), HasSubstr("error"));
+  EXPECT_THAT(SaidOfWorld(light + kTriangle), Not(HasSubstr("has no area")));
+  EXPECT_THAT(SaidOfWorld("AreaLightSource \"diffuse\" \"rgb L\" [0 0 0]"),
+              HasSubstr("warning: AreaLightSource \"diffuse\" emits nothing"));
+  for (const char* type : {"point", "spot", "distant", "infinite"}) {
+    const std::string source = std::string("LightSource \"") + type + "\"";
+    EXPECT_THAT(SaidOfWorld(source + " \"float scale\" 0"), HasSubstr("emits nothing")) << type;
+    EXPECT_THAT(SaidOfWorld(source), Not(HasSubstr("emits nothing"))) << type;
+  }
 }
 
 TEST(PbrtParserTest, InstancesAreLaidOut) {

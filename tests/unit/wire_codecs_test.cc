@@ -56,7 +56,8 @@ Accumulation RealisticAccumulation(std::size_t hitpoints, double touched_share) 
                                    .escaped = 3'096'000,
                                    .smoothing = -1,
                                    .cut_off = 7,
-                                   .dropped = 5}};
+                                   .dropped = 5},
+                        .lights = {{.sent = 700, .in_view = {3, 650}}, {.sent = 300}}};
   accumulation.dropped_photons = {41, std::uint64_t{1} << 40};
   for (std::size_t i = 0; i < hitpoints; ++i) {
     if (!is_touched(random)) continue;
