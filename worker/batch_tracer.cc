@@ -7,6 +7,7 @@
 
 #include "render/base/parallel.h"
 #include "render/estimate/evidence.h"
+#include "render/geometry/feature_edges.h"
 #include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
 #include "render/transport/light.h"
@@ -137,7 +138,8 @@ Status CheckDeposits(const std::vector<BatchTally>& tallies) {
 }  // namespace
 
 struct BatchTracer::State {
-  State(Scene s, int threads) : scene(InWorkingSpace(std::move(s))), team(threads) {}
+  State(Scene s, int threads)
+      : scene(InWorkingSpace(std::move(s))), features(scene), team(threads) {}
 
   // Makes what a job with these needs asks for; what the job before it asked for too is kept.
   Status Prepare(const SceneNeeds& of_job) {
@@ -155,6 +157,7 @@ struct BatchTracer::State {
   }
 
   Scene scene;
+  FeatureEdges features;
   ThreadTeam team;
   SceneNeeds needs;
   std::unique_ptr<Intersector> intersector;
@@ -245,7 +248,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     const PhotonGrid grid(deposits, region, cell, state_->team);
     Accumulation accumulation =
         Gather(block, radii, grid, state_->scene.materials, Kernel{settings.kernel}, state_->scale,
-               state_->team, stop, evidence);
+               state_->team, stop, evidence, &state_->features);
     for (const BatchTally& tally : tallies)
       accumulation.tally += tally;
     for (const std::vector<std::uint64_t>& named : dropped) {

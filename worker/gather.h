@@ -8,6 +8,7 @@
 #include "render/estimate/evidence.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/estimate/kernel.h"
+#include "render/geometry/feature_edges.h"
 #include "render/math/fixed_point.h"
 #include "render/scene/scene.h"
 #include "worker/photon_grid.h"
@@ -17,9 +18,11 @@ namespace lucerna {
 // How far from a hitpoint photons are looked for, in radii.
 [[nodiscard]] float ReachOf(Evidence evidence);
 
-// Every hitpoint adds up the photons within its radius that landed on its side of the surface (all
-// of them where photons have no normals):
+// Every hitpoint adds up the photons within its radius that landed on its side of its surface (all
+// of them where photons have no normals), and of those the ones that no edge of `features`, where
+// there are any, separates from it (worker/cut_disc.h):
 // kernel-weighted flux for diffuse ones, times the BSDF for glossy ones, and what `evidence` names.
+// Flux may be negative at a hitpoint whose disc is cut.
 // Counts are of the photons within reach, flux of those within the radius.
 // Fills everything of the accumulation but the tally, of which it adds `pairs` and `excess`.
 // Requires normals and arrivals of photons where there are glossy hitpoints, and at most kMostTerms
@@ -30,6 +33,7 @@ namespace lucerna {
                                   const PhotonGrid& grid, const std::vector<Material>& materials,
                                   const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,
                                   const std::atomic<bool>& stop,
-                                  Evidence evidence = Evidence::kNone);
+                                  Evidence evidence = Evidence::kNone,
+                                  const FeatureEdges* features = nullptr);
 
 }  // namespace lucerna
