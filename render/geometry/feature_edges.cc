@@ -52,6 +52,8 @@ bool IsSmooth(std::span<const Double3> wings) {
 FeatureEdges::FeatureEdges(const Scene& scene) {
   AddMeshEdges(scene);
   AddDisks(scene);
+  const std::vector<FeatureSegment> crossings = SurfaceCrossings(scene);
+  segments_.insert(segments_.end(), crossings.begin(), crossings.end());
   BuildLevels();
 }
 

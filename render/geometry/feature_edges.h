@@ -7,7 +7,8 @@
 //     bit are the same corner, whatever mesh they belong to;
 //   * edges between a surface on which photons are kept and one on which none are;
 //   * rims of disks, as polygons of 256 sides with their corners on the outer rim, and
-//     around the inner one.
+//     around the inner one;
+//   * where surfaces pass through each other (surface_crossings.h).
 //
 // A segment that a surface merely passes by is harmless: discs are normalised by what is left of
 // them, so cutting too much costs noise and no bias. So near misses (corners that are equal but for
@@ -23,6 +24,7 @@
 #include <span>
 #include <vector>
 
+#include "render/geometry/surface_crossings.h"
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
 
@@ -30,10 +32,6 @@ namespace lucerna {
 
 // Surfaces turned less than this from each other count as one.
 inline constexpr float kSameSurfaceCosine = 0.7F;
-
-struct FeatureSegment {
-  std::array<Vec3, 2> ends;
-};
 
 // Memory: 24 bytes a segment and about 40 in the grids, at least 1.2 MB when there are any; while
 // it is built 24 per vertex and 40 per triangle of the scene.
