@@ -3,10 +3,9 @@
 // The segments of the scene's feature edges that come near the hitpoint's tangent plane are
 // projected into it, and the disc is cut down to the part that is seen from the hitpoint along the
 // plane (estimate/star_region.h). Photons behind a segment do not count, and those before it count
-// more, so that the kernel keeps its integral and, over the part that is left, its first moments
-// vanish: even light, and light that changes evenly, is estimated without bias up to the very edge,
-// like the local linear fit of Fan and Gijbels (1992, "Variable bandwidth and local linear
-// regression smoothers"). The weights of some photons are negative.
+// more, so that the kernel keeps its integral over the part that is left and, as far as weights
+// stay positive, its first moments vanish: even light is estimated without bias up to the very
+// edge, light that changes evenly nearly so.
 //
 // Whatever is cut away is made up for, so a segment too many costs noise and no bias.
 #pragma once

@@ -149,8 +149,8 @@ struct FrequencyEvidence {
   std::array<std::int64_t, kColumns> sums{};
 };
 
-// Contributions to discs that are cut may weigh many times the kernel, and less than nothing. Held
-// here, kMostTerms of them fit; a photon that carries about the scene's power is far below.
+// Contributions to discs that are cut may weigh many times the kernel. Held here, kMostTerms of them
+// fit; a photon that carries about the scene's power is far below.
 constexpr float kLargestCutContribution = 8 * kLargestContribution;
 
 // Without kNormals every photon counts that lies in the disc. With kCut the disc is `cut`.
@@ -193,16 +193,18 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       return static_cast<std::uint32_t>((bits >> (21 * channel)) & kMask);
     };
     if constexpr (kCut) {
-      const auto held = [](float value) {
-        return std::clamp(value, -kLargestCutContribution, kLargestCutContribution);
+      const auto held = [](float value, float least) {
+        return std::clamp(value, least, kLargestCutContribution);
       };
       const float weighed = whole * cut->WeightAt(place);
       const Rgb quanta = flux * scale.quanta_per_watt * weighed;
       const float inner = (whole - blurred(squared, whole)) * cut->InnerWeightAt(place);
-      blur += std::llrint(held(Luminance(flux) * quanta_per_luminance * (weighed - inner)));
-      sum_r += RoundDitheredSigned(held(quanta.r), dither(0));
-      sum_g += RoundDitheredSigned(held(quanta.g), dither(1));
-      sum_b += RoundDitheredSigned(held(quanta.b), dither(2));
+      blur += std::llrint(held(Luminance(flux) * quanta_per_luminance * (weighed - inner),
+                               -kLargestCutContribution));
+      // Rounding may leave a weight below 0.
+      sum_r += RoundDithered(held(quanta.r, 0), dither(0));
+      sum_g += RoundDithered(held(quanta.g, 0), dither(1));
+      sum_b += RoundDithered(held(quanta.b, 0), dither(2));
     } else {
       const Rgb quanta = flux * scale.quanta_per_watt * whole;
       blur += std::llrint(Luminance(flux) * quanta_per_luminance * blurred(squared, whole));

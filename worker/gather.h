@@ -22,7 +22,6 @@ namespace lucerna {
 // of them where photons have no normals), and of those the ones that no edge of `features`, where
 // there are any, separates from it (worker/cut_disc.h):
 // kernel-weighted flux for diffuse ones, times the BSDF for glossy ones, and what `evidence` names.
-// Flux may be negative at a hitpoint whose disc is cut.
 // Counts are of the photons within reach, flux of those within the radius.
 // Fills everything of the accumulation but the tally, of which it adds `pairs` and `excess`.
 // Requires normals and arrivals of photons where there are glossy hitpoints, and at most kMostTerms

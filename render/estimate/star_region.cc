@@ -36,8 +36,8 @@ double OrderOf(Point2 a) {
   return a.x >= 0 ? t : a.y >= 0 ? 2 - t : -2 - t;
 }
 
-// The angle from one direction to the next, counter-clockwise, in [0, 2π). Directions that are equal
-// but for rounding are equal.
+// The angle from one direction to the next, counter-clockwise, in [0, 2π). Directions that are
+// equal but for rounding are equal.
 double AngleBetween(Point2 from, Point2 to) {
   const double angle = std::atan2(Cross(from, to), Dot(from, to));
   return angle < -1e-14 ? angle + 2 * std::numbers::pi : std::max(angle, 0.0);
@@ -288,30 +288,21 @@ StarRegion::PowerMoments StarRegion::PowerMomentsOf(double scale) const {
 }
 
 RegionWeight WeightFor(const RegionMoments& m, double whole) {
-  // Without its first moments what is left of the integral, m0 - m1ᵀ M2⁻¹ m1, is at least 0.147 of
-  // m0 at the tip of a needle and 0.31 at a straight edge, for Epanechnikov's kernel.
-  constexpr double kMostRemoved = 0.9;
   const double determinant = m.xx * m.yy - m.xy * m.xy;
-  RegionWeight weight;
   double bx = 0;
   double by = 0;
   if (determinant > 1e-9 * m.xx * m.yy) {
     bx = (m.yy * m.x - m.xy * m.y) / determinant;
     by = (m.xx * m.y - m.xy * m.x) / determinant;
-    const double removed = bx * m.x + by * m.y;
-    if (!(removed > 0)) {
-      bx = by = 0;
-    } else if (removed > kMostRemoved * m.zeroth) {
-      const double less = kMostRemoved * m.zeroth / removed;
-      bx *= less;
-      by *= less;
+    const double length = std::sqrt(bx * bx + by * by);
+    if (length > 1) {
+      bx /= length;
+      by /= length;
     }
   }
   const double constant = whole / (m.zeroth - bx * m.x - by * m.y);
-  weight.constant = static_cast<float>(constant);
-  weight.slope_x = static_cast<float>(-constant * bx);
-  weight.slope_y = static_cast<float>(-constant * by);
-  return weight;
+  return {static_cast<float>(constant), static_cast<float>(-constant * bx),
+          static_cast<float>(-constant * by)};
 }
 
 }  // namespace lucerna

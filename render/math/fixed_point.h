@@ -64,10 +64,4 @@ struct FluxScale {
   return static_cast<std::int64_t>(value + offset);
 }
 
-// The same for values of either sign.
-[[nodiscard]] inline std::int64_t RoundDitheredSigned(float value, std::uint32_t dither) {
-  const float offset = static_cast<float>(dither) * 0x1p-21F;
-  return static_cast<std::int64_t>(std::floor(value + offset));
-}
-
 }  // namespace lucerna
