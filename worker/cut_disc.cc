@@ -19,7 +19,7 @@ constexpr double kLeastShare = 0.02;
 }  // namespace
 
 // In double: segments may be a million radii long.
-void CutDisc::AddSegment(const FeatureSegment& segment, double reach) {
+void CutDisc::AddSegment(const FeatureSegment& segment, const Frame& frame, double reach) {
   const auto scale = static_cast<double>(inverse_radius_);
   const Double3 a = (Double3(segment.ends[0]) - Double3(position_)) * scale;
   const Double3 along = (Double3(segment.ends[1]) - Double3(position_)) * scale + a * -1;
@@ -39,7 +39,6 @@ void CutDisc::AddSegment(const FeatureSegment& segment, double reach) {
     t1 = std::min(t1, std::max(enters, leaves));
   }
   // The part within the disc: |p + t d|² < reach².
-  const Frame frame(normal_);
   const auto flat = [&](Double3 v) {
     return Point2{Dot(v, Double3(frame.s)), Dot(v, Double3(frame.t))};
   };
@@ -66,9 +65,10 @@ bool CutDisc::Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, floa
   position_ = position;
   normal_ = normal;
   inverse_radius_ = 1 / radius;
+  const Frame frame(normal);
   region_.Clear();
   for (const std::uint32_t number : std::span(found).first(count))
-    AddSegment(features.segments()[number], static_cast<double>(reach));
+    AddSegment(features.segments()[number], frame, static_cast<double>(reach));
   if (region_.segments() == 0) return false;
   region_.Finish();
 
@@ -82,7 +82,6 @@ bool CutDisc::Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, floa
   inner_.slope_x /= kInnerShare;
   inner_.slope_y /= kInnerShare;
   if (reach > 1) FitLaplacian(static_cast<double>(reach));
-  const Frame frame(normal);
   s_ = frame.s * inverse_radius_;
   t_ = frame.t * inverse_radius_;
   return true;

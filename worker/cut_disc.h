@@ -20,8 +20,8 @@
 
 namespace lucerna {
 
-// What lies further from the tangent plane than this, in radii, is another surface. A surface
-// that turns by 45 degrees at the hitpoint is 0.35 off, halfway between both planes.
+// Segments further from the tangent plane than this, in radii, do not cut. What is curved, as much
+// as a radius that makes sense allows, ends no further off.
 inline constexpr float kPlaneTolerance = 0.36F;
 
 // Where a photon is in the tangent plane, in radii.
@@ -56,7 +56,7 @@ class CutDisc {
   [[nodiscard]] float inverse_share() const { return inverse_share_; }
 
  private:
-  void AddSegment(const FeatureSegment& segment, double reach);
+  void AddSegment(const FeatureSegment& segment, const Frame& frame, double reach);
   void FitLaplacian(double reach);
 
   Vec3 position_, normal_;

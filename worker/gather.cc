@@ -11,13 +11,16 @@ namespace lucerna {
 namespace {
 
 // Whether a photon lies on the hitpoint's surface: turned by less than about 45 degrees, and not
-// above or below it. Along a circle the height of the photon over the hitpoint's plane is the
-// hitpoint's over the photon's; on a step, or a sheet that lies over another, one is the negative
-// of the other.
+// above or below it. Along an arc the height of the photon over the hitpoint's plane is the
+// hitpoint's over the photon's, so that both cancel in the sum below; at a bend of angle a it is at
+// most sin(a) times the distance; on a step, or a sheet that lies over another, nothing bends.
 bool IsOnSurface(Vec3 photon_normal, Vec3 normal, Vec3 to_photon, float squared_reach) {
-  if (!(Dot(photon_normal, normal) >= kSameSurfaceCosine)) return false;
+  constexpr float kMostStep = 0.1F;  // twice its height over the reach, for rounding and facets
+  const float cosine = Dot(photon_normal, normal);
+  if (!(cosine >= kSameSurfaceCosine)) return false;
   const float twice_height = Dot(to_photon, normal) + Dot(to_photon, photon_normal);
-  return twice_height * twice_height <= 4 * kPlaneTolerance * kPlaneTolerance * squared_reach;
+  return twice_height * twice_height <=
+         (2 * std::max(0.0F, 1 - cosine) + kMostStep * kMostStep) * squared_reach;
 }
 
 constexpr std::size_t kRowsPerPiece = 2048;

@@ -173,7 +173,7 @@ void StarRegion::Finish() {
         active[active_count++] = i;
     }
     if (active_count == 0) {
-      AddPiece(from.direction, to.direction, {});
+      AddPiece(from.direction, to.direction, {0, 0});
     } else {
       SplitWedge(from.direction, to.direction, active.data(), active_count, 6);
     }

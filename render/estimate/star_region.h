@@ -16,8 +16,9 @@
 
 namespace lucerna {
 
+// Without initial values, because arrays of them are made for every disc that is cut.
 struct Point2 {
-  double x = 0, y = 0;
+  double x, y;
 };
 
 // Integrals of a function over the region, times 1, the place, and its products.
@@ -85,11 +86,12 @@ class StarRegion {
 
   std::size_t segments_ = 0;
   std::size_t pieces_ = 0;
-  std::array<Wedge, kMostSegments> wedges_;
   struct Segment {
     Point2 a, b, g;
   };
   std::array<Segment, kMostSegments> exact_;
+  // The same for Sees.
+  std::array<Wedge, kMostSegments> wedges_;
   std::array<Piece, kMostPieces> all_pieces_;
 };
 
