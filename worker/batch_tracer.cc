@@ -10,6 +10,7 @@
 
 #include "render/base/parallel.h"
 #include "render/estimate/evidence.h"
+#include "render/geometry/feature_edges.h"
 #include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
 #include "render/transport/light.h"
@@ -178,7 +179,8 @@ Status CheckDeposits(const std::vector<BatchTally>& tallies) {
 }  // namespace
 
 struct BatchTracer::State {
-  State(Scene s, int threads) : scene(InWorkingSpace(std::move(s))), team(threads) {}
+  State(Scene s, int threads)
+      : scene(InWorkingSpace(std::move(s))), features(scene), team(threads) {}
 
   // Makes what a job with these needs asks for; what the job before it asked for too is kept.
   Status Prepare(const SceneNeeds& of_job) {
@@ -196,6 +198,7 @@ struct BatchTracer::State {
   }
 
   Scene scene;
+  FeatureEdges features;
   ThreadTeam team;
   SceneNeeds needs;
   std::unique_ptr<Intersector> intersector;
@@ -293,7 +296,8 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     std::vector<std::uint8_t> was_found(grid.size());
     std::optional<PhotonGrid> caustic_grid;
     std::vector<std::uint8_t> caustic_was_found;
-    GatheredPhotons photons{.grid = grid, .was_found = was_found};
+    GatheredPhotons photons{
+        .grid = grid, .features = &state_->features, .was_found = was_found};
     if (block.caustic_rows > 0) {
       caustic_grid.emplace(caustics, region, caustic_cell, state_->team);
       caustic_was_found.resize(caustic_grid->size());

@@ -1,28 +1,30 @@
 #include "worker/gather.h"
 
+#include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "render/transport/bsdf.h"
+#include "worker/cut_disc.h"
 
 namespace lucerna {
 namespace {
 
-// Surfaces turned less than this from each other count as one.
-constexpr float kSameSurfaceCosine = 0.7F;
-// A photon on a surface turned further away counts in a hollow corner only, where each of the two
-// points lies in front of the other's surface: there the photons of one wall make up for the part
-// of the disc that the other wall lacks. Across an outward edge, and through a thin wall, they
-// would be another place's light.
-constexpr float kLeastCornerCosine = -0.2F;
-
-bool Counts(Vec3 photon_normal, Vec3 normal, Vec3 to_photon) {
+// Whether a photon lies on the hitpoint's surface: turned by less than about 45 degrees, and not
+// above or below it. Along an arc the height of the photon over the hitpoint's plane is the
+// hitpoint's over the photon's, so that both cancel in the sum below; at a bend of angle a it is at
+// most sin(a) times the distance; on a step, or a sheet that lies over another, nothing bends.
+bool IsOnSurface(Vec3 photon_normal, Vec3 normal, Vec3 to_photon, float squared_reach) {
+  constexpr float kMostStep = 0.1F;  // twice its height over the reach, for rounding and facets
   const float cosine = Dot(photon_normal, normal);
-  if (cosine >= kSameSurfaceCosine) return true;
-  return cosine >= kLeastCornerCosine && Dot(to_photon, normal) > 0 &&
-         Dot(to_photon, photon_normal) < 0;
+  if (!(cosine >= kSameSurfaceCosine)) return false;
+  const float twice_height = Dot(to_photon, normal) + Dot(to_photon, photon_normal);
+  return twice_height * twice_height <=
+         (2 * std::max(0.0F, 1 - cosine) + kMostStep * kMostStep) * squared_reach;
 }
 
 constexpr std::size_t kRowsPerPiece = 2048;
@@ -52,7 +54,8 @@ struct NoEvidence {
   static constexpr float kReach = 1;
   NoEvidence(Vec3 /*normal*/, const FluxScale& /*scale*/) {}
   void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 /*to_photon*/,
-           float /*squared*/, float /*squared_radius*/, float /*weight*/) {}
+           float /*squared*/, float /*squared_radius*/, float /*weight*/,
+           const CutDisc* /*cut*/) {}
   void Store(std::vector<std::vector<std::int64_t>>& /*columns*/) const {}
 };
 
@@ -62,7 +65,7 @@ struct SectorEvidence {
   static constexpr float kReach = 1;
   SectorEvidence(Vec3 normal, const FluxScale& /*scale*/) : frame(normal) {}
   void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 to_photon, float squared,
-           float squared_radius, float /*weight*/) {
+           float squared_radius, float /*weight*/, const CutDisc* /*cut*/) {
     constexpr float kSqrt3 = 1.7320508F;
     const float x = Dot(to_photon, frame.s);
     const float y = Dot(to_photon, frame.t);
@@ -95,14 +98,22 @@ struct CurvatureEvidence {
   static constexpr std::size_t kColumns = kCurvatureColumns;
   static constexpr float kReach = kCurvatureReach;
   CurvatureEvidence(Vec3 /*normal*/, const FluxScale& scale) : weight_scale(WeightScale(scale)) {}
-  void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 /*to_photon*/, float squared,
-           float squared_radius, float weight) {
+  void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 to_photon, float squared,
+           float squared_radius, float weight, const CutDisc* cut) {
     constexpr float kPerRadius = 1 / (kReach * kReach);
     constexpr auto kUnits = static_cast<float>(1 / kWeightUnit);
     const float w = std::min(weight * weight_scale, kLargestWeight);
     const float u = squared / squared_radius * kPerRadius;
-    sums[kCurvatureLaplacian] += std::llrint(w * (2 * u - 1) * kUnits);
-    sums[kCurvatureWeight2] += std::llrint(w * w * kUnits);
+    if (cut == nullptr) {
+      sums[kCurvatureLaplacian] += std::llrint(w * (2 * u - 1) * kUnits);
+      sums[kCurvatureWeight2] += std::llrint(w * w * kUnits);
+      return;
+    }
+    // At most 16 times what a whole disc may add: 36 bits, so that kMostTerms fit.
+    constexpr float kLargest = 16 * kLargestWeight * kLargestWeight;
+    const float laplacian = w * cut->LaplacianAt(cut->PlaceOf(to_photon), u);
+    sums[kCurvatureLaplacian] += std::llrint(std::clamp(laplacian, -kLargest, kLargest) * kUnits);
+    sums[kCurvatureWeight2] += std::llrint(std::min(w * w * cut->inverse_share(), kLargest) * kUnits);
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
     for (std::size_t i = 0; i < kColumns; ++i)
@@ -120,7 +131,7 @@ struct FrequencyEvidence {
   static constexpr float kReach = 1;
   FrequencyEvidence(Vec3 /*normal*/, const FluxScale& scale) : weight_scale(WeightScale(scale)) {}
   void Add(const PhotonGrid& grid, std::size_t photon, Vec3 /*to_photon*/, float /*squared*/,
-           float squared_radius, float weight) {
+           float squared_radius, float weight, const CutDisc* /*cut*/) {
     const float trace = grid.has_traces() ? grid.trace(photon) : -1;
     if (!(trace >= 0)) return;
     // In double: the terms span ten decades, and each is rounded once.
@@ -145,12 +156,23 @@ struct FrequencyEvidence {
   std::array<std::int64_t, kColumns> sums{};
 };
 
-// Without kNormals every photon counts.
-template <KernelKind kKernel, typename EvidenceSums, bool kNormals>
-void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const PhotonGrid& grid,
+// What one hitpoint gathers from.
+struct RowSource {
+  const PhotonGrid& grid;
+  const CausticWeight* caustic_weight = nullptr;  // of caustic photons
+  std::span<std::uint8_t> was_found;
+};
+
+// Contributions to discs that are cut may weigh many times the kernel. Held here, kMostTerms of them
+// fit; a photon that carries about the scene's power is far below.
+constexpr float kLargestCutContribution = 8 * kLargestContribution;
+
+// Without kNormals every photon counts that lies in the disc. With kCut the disc is `cut`.
+template <KernelKind kKernel, typename EvidenceSums, bool kNormals, bool kCut>
+void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
                const GlossyHitpoint* glossy, const std::vector<Material>& materials,
-               const CausticWeight* caustic_weight, const FluxScale& scale,
-               std::span<std::uint8_t> was_found, Piece& piece) {
+               const FluxScale& scale, const RowSource& source, const CutDisc* cut, Piece& piece) {
+  const PhotonGrid& grid = source.grid;
   const auto hitpoint = static_cast<std::uint32_t>(row);
   const Vec3 position = block.positions[row];
   const Vec3 normal = DecodeOctahedral(block.normals_oct[row]);
@@ -178,31 +200,63 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
     return t2 < 1 ? whole - KernelShape<kKernel>(t2) * (1 / kInnerArea) : whole;
   };
   std::int64_t blur = 0;
-  const auto add = [&](std::size_t number, const PhotonRecord& photon, Rgb flux, float squared) {
+  const auto add = [&](std::size_t number, const PhotonRecord& photon, Rgb flux, float squared,
+                       DiscPlace place) {
     // Several threads may find a photon. Most have been found before, and are only read.
-    if (!was_found.empty()) {
-      const std::atomic_ref<std::uint8_t> mark(was_found[number]);
+    if (!source.was_found.empty()) {
+      const std::atomic_ref<std::uint8_t> mark(source.was_found[number]);
       if (mark.load(std::memory_order_relaxed) == 0) mark.store(1, std::memory_order_relaxed);
     }
     const float whole = shape(squared);
-    const Rgb quanta = flux * scale.quanta_per_watt * whole;
-    blur += std::llrint(Luminance(flux) * quanta_per_luminance * blurred(squared, whole));
     const std::uint64_t bits = PairBits(photon.key, hitpoint);
     constexpr std::uint64_t kMask = (1U << 21) - 1;
-    sum_r += RoundDithered(quanta.r, static_cast<std::uint32_t>(bits & kMask));
-    sum_g += RoundDithered(quanta.g, static_cast<std::uint32_t>((bits >> 21) & kMask));
-    sum_b += RoundDithered(quanta.b, static_cast<std::uint32_t>((bits >> 42) & kMask));
+    const auto dither = [&](int channel) {
+      return static_cast<std::uint32_t>((bits >> (21 * channel)) & kMask);
+    };
+    if constexpr (kCut) {
+      const auto held = [](float value, float least) {
+        return std::clamp(value, least, kLargestCutContribution);
+      };
+      const float weighed = whole * cut->WeightAt(place);
+      const Rgb quanta = flux * scale.quanta_per_watt * weighed;
+      const float inner = (whole - blurred(squared, whole)) * cut->InnerWeightAt(place);
+      blur += std::llrint(held(Luminance(flux) * quanta_per_luminance * (weighed - inner),
+                               -kLargestCutContribution));
+      // Rounding may leave a weight below 0.
+      sum_r += RoundDithered(held(quanta.r, 0), dither(0));
+      sum_g += RoundDithered(held(quanta.g, 0), dither(1));
+      sum_b += RoundDithered(held(quanta.b, 0), dither(2));
+    } else {
+      const Rgb quanta = flux * scale.quanta_per_watt * whole;
+      blur += std::llrint(Luminance(flux) * quanta_per_luminance * blurred(squared, whole));
+      sum_r += RoundDithered(quanta.r, dither(0));
+      sum_g += RoundDithered(quanta.g, dither(1));
+      sum_b += RoundDithered(quanta.b, dither(2));
+    }
     ++count;
+  };
+  // Whether a place belongs to the disc.
+  const auto find_place = [&](Vec3 to_photon, DiscPlace& place) {
+    if constexpr (kCut) {
+      place = cut->PlaceOf(to_photon);
+      return cut->Holds(place);
+    } else {
+      return true;
+    }
   };
   if (!kNormals || glossy == nullptr) {
     grid.ForEachWithin(position, reach, [&](std::size_t i, float squared) {
       const auto& photon = grid.template record<kNormals>(i);
       const Vec3 to_photon = grid.position(i) - position;
       if constexpr (kNormals) {
-        if (!Counts(photon.normal, normal, to_photon)) return;
+        if (!IsOnSurface(photon.normal, normal, to_photon, std::max(squared, squared_radius))) {
+          return;
+        }
       }
-      add(i, photon, photon.flux, squared);
-      evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux));
+      DiscPlace place;
+      if (!find_place(to_photon, place)) return;
+      add(i, photon, photon.flux, squared, place);
+      evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux), cut);
     });
   } else {
     const Material& untextured = materials[glossy->material];
@@ -221,19 +275,24 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius, const 
       const Vec3 to_photon = grid.position(i) - position;
       // Photons on the far side of a rough dielectric count too.
       const bool is_behind = transmits && Dot(photon.normal, normal) < 0;
-      if (!Counts(photon.normal, is_behind ? -normal : normal, to_photon)) return;
+      if (!IsOnSurface(photon.normal, is_behind ? -normal : normal, to_photon,
+                       std::max(squared, squared_radius))) {
+        return;
+      }
+      DiscPlace place;
+      if (!find_place(to_photon, place)) return;
       const Vec3 wi = frame.ToLocal(DecodeOctahedral(photon.arrival_oct));
       Rgb scattered = photon.flux * EvaluateBsdf(material, wo, wi, Carried::kRadiance);
-      if (caustic_weight != nullptr) {
-        scattered *= caustic_weight->OfPhotons(grid.emission_density(i), wi.z,
+      if (source.caustic_weight != nullptr) {
+        scattered *= source.caustic_weight->OfPhotons(grid.emission_density(i), wi.z,
                                                PdfBsdf(material, wo, wi));
       }
       if (!scale.HasRoomFor(scattered)) {
         ++piece.excess;
         return;
       }
-      add(i, photon, scattered, squared);
-      evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(scattered));
+      add(i, photon, scattered, squared, place);
+      evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(scattered), cut);
     });
   }
   if (count == 0) return;
@@ -253,6 +312,9 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
                        const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
   const std::size_t rows = block.size();
   const std::size_t first_caustic = rows - block.caustic_rows;
+  const RowSource ordinary = {photons.grid, nullptr, photons.was_found};
+  const RowSource caustic = {photons.caustics != nullptr ? *photons.caustics : photons.grid,
+                             photons.caustic_weight, photons.caustic_was_found};
   const std::size_t piece_count = (rows + kRowsPerPiece - 1) / kRowsPerPiece;
   std::vector<Piece> pieces(piece_count);
   team.For(piece_count, 1, [&](std::size_t begin, std::size_t end) {
@@ -264,17 +326,28 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
       auto glossy = std::lower_bound(
           block.glossy.begin(), block.glossy.end(), first,
           [](const GlossyHitpoint& g, std::size_t row) { return g.hitpoint < row; });
+      CutDisc cut;
       for (std::size_t row = first; row < last && !stop.load(std::memory_order_relaxed); ++row) {
         const bool is_glossy = glossy != block.glossy.end() && glossy->hitpoint == row;
-        const GlossyHitpoint* glossy_here = is_glossy ? &*glossy++ : nullptr;
-        if (row < first_caustic) {
-          GatherRow<kKernel, EvidenceSums, kNormals>(block, row, radii[row], photons.grid,
-                                                     glossy_here, materials, nullptr, scale,
-                                                     photons.was_found, piece);
-        } else if (photons.caustics != nullptr) {
-          GatherRow<kKernel, EvidenceSums, true>(block, row, radii[row], *photons.caustics,
-                                                 glossy_here, materials, photons.caustic_weight,
-                                                 scale, photons.caustic_was_found, piece);
+        const GlossyHitpoint* lobe = is_glossy ? &*glossy++ : nullptr;
+        const bool is_caustic = row >= first_caustic;
+        if (is_caustic && photons.caustics == nullptr) continue;
+        const bool is_cut =
+            photons.features != nullptr &&
+            cut.Cut(*photons.features, block.positions[row],
+                    DecodeOctahedral(block.normals_oct[row]), radii[row], EvidenceSums::kReach,
+                    kKernel);
+        const auto gather_row = [&](auto with_normals, auto with_cut, const RowSource& source) {
+          GatherRow<kKernel, EvidenceSums, with_normals(), with_cut()>(
+              block, row, radii[row], lobe, materials, scale, source, is_cut ? &cut : nullptr,
+              piece);
+        };
+        if (is_caustic) {
+          is_cut ? gather_row(std::true_type(), std::true_type(), caustic)
+                 : gather_row(std::true_type(), std::false_type(), caustic);
+        } else {
+          is_cut ? gather_row(std::bool_constant<kNormals>(), std::true_type(), ordinary)
+                 : gather_row(std::bool_constant<kNormals>(), std::false_type(), ordinary);
         }
       }
     }
@@ -351,7 +424,9 @@ Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
   LUCERNA_CHECK(photons.caustics == nullptr || photons.caustic_weight != nullptr);
   const GatherFunction gather = has_normals ? Specialised<true>(kernel.kind, evidence)
                                             : Specialised<false>(kernel.kind, evidence);
-  return gather(block, radii, photons, materials, scale, team, stop);
+  GatheredPhotons found = photons;
+  if (found.features != nullptr && found.features->empty()) found.features = nullptr;
+  return gather(block, radii, found, materials, scale, team, stop);
 }
 
 }  // namespace lucerna

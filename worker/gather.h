@@ -10,6 +10,7 @@
 #include "render/estimate/evidence.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/estimate/kernel.h"
+#include "render/geometry/feature_edges.h"
 #include "render/math/fixed_point.h"
 #include "render/scene/scene.h"
 #include "render/transport/caustic_weight.h"
@@ -24,6 +25,8 @@ struct GatheredPhotons {
   // theirs; for the block's caustic rows, nullptr where there are none.
   const PhotonGrid* caustics = nullptr;
   const CausticWeight* caustic_weight = nullptr;
+  // Edges at which discs end, or nullptr.
+  const FeatureEdges* features = nullptr;
   // [photons of either grid] or empty: become 1 for every photon that counted somewhere.
   std::span<std::uint8_t> was_found = {};
   std::span<std::uint8_t> caustic_was_found = {};
@@ -32,8 +35,9 @@ struct GatheredPhotons {
 // How far from a hitpoint photons are looked for, in radii.
 [[nodiscard]] float ReachOf(Evidence evidence);
 
-// Every hitpoint adds up the photons within its radius that landed on its side of the surface (all
-// of them where photons have no normals):
+// Every hitpoint adds up the photons within its radius that landed on its side of its surface (all
+// of them where photons have no normals), and of those the ones that no edge of `features`, where
+// there are any, separates from it (worker/cut_disc.h):
 // kernel-weighted flux for diffuse ones, times the BSDF for glossy ones, and what `evidence` names.
 // Counts are of the photons within reach, flux of those within the radius.
 // Fills everything of the accumulation but the tally, of which it adds `pairs` and `excess`.

@@ -1,14 +1,15 @@
 // How fast are the parts that a render spends its time in?
 //
 // One thread each, so that numbers are per core. Scenes: the house's own, and water-caustic and
-// cornell-box where they lie beside the project.
+// cornell-box where they lie beside the project, or those that the command line names.
 //   photon_paths    photon paths per second, tracing and keeping deposits
 //   photon_rays     the same rays again, intersection only: the ceiling
 //   eye_paths       eye paths per second with direct light
 //   batch           photons per second of a whole batch, for each kind of evidence, with the same
 //   radii gather          ns per (photon, hitpoint) pair, sorting the photons included wire bytes a
 //   hitpoint sent and a touched hitpoint returned, and codec speed merge           touched
-//   hitpoints merged per second
+//   hitpoints merged per second; gather_whole_discs    the same without edges, and gathering one
+//   photon, where finding edges is all there is; feature_edges    finding all edges of the scene
 // Run: build/release/bin/lucerna-bench --benchmark_repetitions=10
 // --benchmark_report_aggregates_only=true
 #include <atomic>
@@ -59,6 +60,7 @@ struct Bench {
     photons = std::make_unique<PhotonPathTracer>(scene, *intersector, *lights, settings, needs,
                                                  nullptr, region);
     scale = FluxScale::ForPower(lights->TotalPower());
+    features = std::make_unique<FeatureEdges>(scene);
   }
 
   Scene scene;
@@ -72,6 +74,7 @@ struct Bench {
   Bounds region;
   std::unique_ptr<PhotonPathTracer> photons;
   FluxScale scale;
+  std::unique_ptr<FeatureEdges> features;
 };
 
 using Counter = benchmark::Counter;
@@ -161,22 +164,24 @@ std::vector<Deposits> TraceDeposits(const Bench& bench, std::uint64_t photons) {
 }
 
 Accumulation GatherOnce(const Bench& bench, const std::vector<Deposits>& deposits,
-                        ThreadTeam& team) {
+                        ThreadTeam& team, bool cuts = true) {
   RadiusColumn sorted = bench.radii;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
                    sorted.end());
   const PhotonGrid grid(deposits, bench.region, 2 * sorted[sorted.size() / 2], team);
-  return Gather(bench.eye.block, bench.radii, {grid}, bench.scene.materials,
+  GatheredPhotons photons{.grid = grid};
+  if (cuts) photons.features = bench.features.get();
+  return Gather(bench.eye.block, bench.radii, photons, bench.scene.materials,
                 Kernel{bench.settings.kernel}, bench.scale, team, std::atomic<bool>(false));
 }
 
-void GatherPairs(benchmark::State& state, const Bench& bench) {
+void GatherPairs(benchmark::State& state, const Bench& bench, bool cuts) {
   const auto deposits = TraceDeposits(bench, static_cast<std::uint64_t>(state.range(0)));
   ThreadTeam team(1);
   std::uint64_t pairs = 0;
   std::uint64_t landed = 0;
   for (auto _ : state) {
-    pairs += GatherOnce(bench, deposits, team).tally.pairs;
+    pairs += GatherOnce(bench, deposits, team, cuts).tally.pairs;
     for (const auto& chunk : deposits)
       landed += chunk.size();
   }
@@ -187,6 +192,17 @@ void GatherPairs(benchmark::State& state, const Bench& bench) {
   state.counters["pairs/hitpoint"] = static_cast<double>(pairs) /
                                      static_cast<double>(state.iterations()) /
                                      static_cast<double>(bench.eye.block.size());
+  state.counters["s/hitpoint"] =
+      Counter(static_cast<double>(state.iterations()) *
+                  static_cast<double>(bench.eye.block.size()),
+              Counter::kIsRate | Counter::kInvert);
+}
+
+void FindFeatures(benchmark::State& state, const Bench& bench) {
+  for (auto _ : state)
+    benchmark::DoNotOptimize(FeatureEdges(bench.scene).segments().size());
+  state.counters["segments"] = static_cast<double>(bench.features->segments().size());
+  state.counters["triangles"] = static_cast<double>(bench.scene.TriangleCount());
 }
 
 // A batch as a worker runs it, up to its answer's bytes. The radii are those of the first pass for
@@ -267,7 +283,12 @@ void Register(const std::string& name, const std::string& path) {
   add("photon_paths", PhotonPaths)->Unit(benchmark::kMillisecond);
   add("photon_rays", PhotonRays)->Unit(benchmark::kMillisecond);
   add("eye_paths", EyePaths)->Unit(benchmark::kMillisecond);
-  add("gather", GatherPairs)->Arg(1 << 16)->Arg(1 << 18)->Unit(benchmark::kMillisecond);
+  for (const bool cuts : {true, false}) {
+    add(cuts ? "gather" : "gather_whole_discs", [cuts](benchmark::State& s, const Bench& b) {
+      GatherPairs(s, b, cuts);
+    })->Arg(1)->Arg(1 << 16)->Arg(1 << 18)->Unit(benchmark::kMillisecond);
+  }
+  add("feature_edges", FindFeatures)->Unit(benchmark::kMillisecond);
   for (const auto controller : {RadiusControllerKind::kPpm, RadiusControllerKind::kFrequencyMse,
                                 RadiusControllerKind::kAppm, RadiusControllerKind::kCppm}) {
     add(Concat("batch/", NameOf(controller)).c_str(), [controller](benchmark::State& s,
@@ -287,6 +308,13 @@ void Register(const std::string& name, const std::string& path) {
 }  // namespace lucerna
 
 int main(int argc, char** argv) {
+  benchmark::Initialize(&argc, argv);
+  for (int i = 1; i < argc; ++i)
+    lucerna::Register(std::filesystem::path(argv[i]).parent_path().filename().string(), argv[i]);
+  if (argc > 1) {
+    benchmark::RunSpecifiedBenchmarks();
+    return 0;
+  }
   lucerna::Register("glass-box", "glass-box.pbrt");
   const std::string outside = std::string(LUCERNA_SOURCE_DIR) + "/../shared/scenes/";
   for (const char* name : {"cornell-box", "water-caustic", "veach-bidir", "sphere-box"}) {
@@ -296,7 +324,6 @@ int main(int argc, char** argv) {
       if (std::filesystem::exists(path)) lucerna::Register(name, path);
     }
   }
-  benchmark::Initialize(&argc, argv);
   benchmark::RunSpecifiedBenchmarks();
   return 0;
 }

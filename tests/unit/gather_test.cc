@@ -183,8 +183,9 @@ std::vector<std::array<std::int64_t, 4>> Oracle(const Case& input, const Kernel&
                            frame.ToLocal(DecodeOctahedral(photon.arrival_oct)), Carried::kRadiance);
         }
         const float cosine = Dot(photon.normal, side);
-        const bool hollow = Dot(to_photon, side) > 0 && Dot(to_photon, photon.normal) < 0;
-        if (cosine < (hollow ? -0.2F : 0.7F)) continue;
+        const float twice_height = Dot(to_photon, side) + Dot(to_photon, photon.normal);
+        const float most = 2 * std::max(0.0F, 1 - cosine) + 0.1F * 0.1F;
+        if (cosine < 0.7F || twice_height * twice_height > most * (radius * radius)) continue;
         const float shape = kernel.Shape(squared * (1 / (radius * radius)));
         const std::uint64_t bits = PairBits(photon.key, static_cast<std::uint32_t>(row));
         ++sums[row][0];
@@ -284,9 +285,9 @@ TEST(GatherTest, DoesNotSeeTheOrderOfPhotons) {
   EXPECT_EQ(GatherAll(forward, Kernel{}, scale, 1), GatherAll(backward, Kernel{}, scale, 2));
 }
 
-// A wall's back keeps its photons to itself; the walls of a hollow corner share theirs, those of
-// an outward edge do not.
-TEST(GatherTest, TellsHollowCornersFromEdgesAndThinWalls) {
+// A surface keeps its photons to itself, on each of its sides: neither the other wall of a corner
+// nor a sheet above or below shares them. A bend does.
+TEST(GatherTest, TellsItsOwnSurfaceFromOthers) {
   const auto count = [](Vec3 photon_position, Vec3 photon_normal) {
     Case input;
     Photon deposit{};
@@ -301,10 +302,17 @@ TEST(GatherTest, TellsHollowCornersFromEdgesAndThinWalls) {
     return GatherAll(input, Kernel{}, FluxScale::ForPower(Gray(1)), 1).size();
   };
   EXPECT_EQ(count({0.1F, 0, 0}, {0, 0, 1}), 1U);
-  EXPECT_EQ(count({0.1F, 0, 0.1F}, {-1, 0, 0}), 1U) << "a wall that rises from the floor";
+  EXPECT_EQ(count({0.1F, 0, 0.1F}, {-1, 0, 0}), 0U) << "a wall that rises from the floor";
   EXPECT_EQ(count({0.1F, 0, -0.1F}, {1, 0, 0}), 0U) << "the side of a box under its top";
   EXPECT_EQ(count({0.1F, 0, 0.1F}, {1, 0, 0}), 0U) << "the back of a wall";
   EXPECT_EQ(count({0.1F, 0, -0.01F}, {0, 0, -1}), 0U) << "the far side of a thin floor";
+  EXPECT_EQ(count({0.1F, 0, 0.04F}, {0, 0, 1}), 1U) << "hardly higher";
+  EXPECT_EQ(count({0.1F, 0, 0.06F}, {0, 0, 1}), 0U) << "a sheet above";
+  // A bend by 40 degrees right beside the hitpoint, and one halfway.
+  EXPECT_EQ(count({0.75F, 0, 0.63F}, {-0.6428F, 0, 0.766F}), 1U);
+  EXPECT_EQ(count({0.75F, 0, 0.21F}, {-0.6428F, 0, 0.766F}), 1U);
+  // On a ball of radius 1.3 below the hitpoint, 40 degrees away.
+  EXPECT_EQ(count({0.8356F, 0, -0.3041F}, {0.6428F, 0, 0.766F}), 1U);
 }
 
 // Photons without normals all count; that is right where none would have been refused.
@@ -326,9 +334,13 @@ TEST(GatherTest, TakesEveryPhotonWithoutNormals) {
   EXPECT_NE(without(), GatherAll(input, Kernel{}, scale, 1)) << "normals at random";
   const Vec3 up = {0, 0, 1};
   for (auto& chunk : input.deposits) {
-    for (Photon& photon : chunk)
+    for (Photon& photon : chunk) {
       photon.normal = up;
+      photon.position.z = 0;
+    }
   }
+  for (Vec3& position : input.block.positions)
+    position.z = 0;
   std::ranges::fill(input.block.normals_oct, EncodeOctahedral(up));
   const Accumulation sum = without();
   EXPECT_GT(sum.tally.pairs, 1000U);

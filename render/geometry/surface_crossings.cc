@@ -1,0 +1,353 @@
+#include "render/geometry/surface_crossings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <optional>
+
+#include "render/math/double3.h"
+#include "render/scene/mesh_edges.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::size_t kMostSegments = std::size_t{1} << 22;
+// Pairs of shapes whose boxes overlap, and per shape so many of boxes of the tree.
+constexpr std::uint64_t kPairsPerShape = 256;
+constexpr std::size_t kShapesPerLeaf = 4;
+constexpr int kCircleSides = 256;
+constexpr std::uint32_t kMixed = std::numeric_limits<std::uint32_t>::max();
+
+enum class Kind : std::uint8_t { kTriangle, kSphere, kDisk };
+
+struct Shape {
+  Bounds bounds;
+  std::uint32_t surface = 0;
+  std::uint32_t index = 0;  // of the triangle among all, the sphere or the disk
+  Kind kind = Kind::kTriangle;
+};
+
+struct Node {
+  Bounds bounds;
+  std::uint32_t surface = 0;  // of all shapes below, or kMixed
+  std::uint32_t begin = 0, end = 0;
+  std::uint32_t left = 0, right = 0;  // 0 and 0: a leaf
+};
+
+bool Overlap(const Bounds& a, const Bounds& b) {
+  return a.low.x <= b.high.x && b.low.x <= a.high.x && a.low.y <= b.high.y && b.low.y <= a.high.y &&
+         a.low.z <= b.high.z && b.low.z <= a.high.z;
+}
+
+void AddAll(Bounds& to, const Bounds& from) {
+  to.Add(from.low);
+  to.Add(from.high);
+}
+
+struct Triangle {
+  std::array<Double3, 3> corners;
+  Double3 normal;  // unit
+};
+
+struct Span {
+  std::array<Double3, 2> ends;
+};
+
+// Where a triangle meets the plane through `origin`; absent where it lies on one side. A corner in
+// the plane counts as above it.
+std::optional<Span> CutByPlane(const Triangle& triangle, Double3 origin, Double3 normal) {
+  std::array<double, 3> height;
+  for (std::size_t i = 0; i < 3; ++i)
+    height[i] = Dot(triangle.corners[i] - origin, normal);
+  Span span;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::size_t j = (i + 1) % 3;
+    if ((height[i] >= 0) == (height[j] >= 0)) continue;
+    const double t = height[i] / (height[i] - height[j]);
+    const Double3 along = triangle.corners[j] - triangle.corners[i];
+    span.ends[count++] = triangle.corners[i] + along * t;
+  }
+  if (count < 2) return std::nullopt;
+  return span;
+}
+
+class Crossings {
+ public:
+  explicit Crossings(const Scene& scene) : scene_(scene) {}
+
+  std::vector<FeatureSegment> Find() {
+    if (!AddShapes() || shapes_.size() < 2) return {};
+    nodes_.reserve(2 * shapes_.size());
+    Build(0, static_cast<std::uint32_t>(shapes_.size()));
+    // One surface alone has nothing to cross.
+    if (nodes_[0].surface != kMixed) return {};
+    most_pairs_ = kPairsPerShape * shapes_.size() + (std::uint64_t{1} << 20);
+    Within(0);
+    if (most_pairs_ == 0) return {};
+    return std::move(segments_);
+  }
+
+ private:
+  bool AddShapes() {
+    std::size_t vertex_count = 0;
+    std::size_t corner_count = 0;
+    for (const TriangleMesh& mesh : scene_.meshes) {
+      vertex_count += mesh.positions.size();
+      corner_count += mesh.indices.size();
+    }
+    if (std::max(vertex_count, corner_count) + scene_.spheres.size() + scene_.disks.size() >=
+        kMixed) {
+      return false;
+    }
+    positions_.reserve(vertex_count);
+    corners_.reserve(corner_count);
+    for (const TriangleMesh& mesh : scene_.meshes) {
+      const auto first = static_cast<std::uint32_t>(positions_.size());
+      positions_.insert(positions_.end(), mesh.positions.begin(), mesh.positions.end());
+      for (const std::uint32_t index : mesh.indices)
+        corners_.push_back(first + index);
+    }
+    std::vector<std::uint32_t> welded = WeldVertices(positions_, {});
+    for (std::uint32_t& corner : corners_)
+      corner = welded[corner];
+    welded = ConnectedSurfaces(corners_, positions_.size());
+    std::uint32_t surfaces = 0;
+    shapes_.reserve(welded.size() + scene_.spheres.size() + scene_.disks.size());
+    for (std::uint32_t i = 0; i < welded.size(); ++i) {
+      Shape& shape = shapes_.emplace_back();
+      shape.surface = welded[i];
+      shape.index = i;
+      for (std::size_t k = 0; k < 3; ++k)
+        shape.bounds.Add(positions_[corners_[3 * std::size_t{i} + k]]);
+      surfaces = std::max(surfaces, welded[i] + 1);
+    }
+    const auto add_round = [&](Kind kind, std::size_t index, Vec3 center, float radius) {
+      const Vec3 reach = {radius, radius, radius};
+      shapes_.push_back(
+          {{center - reach, center + reach}, surfaces++, static_cast<std::uint32_t>(index), kind});
+    };
+    for (std::size_t i = 0; i < scene_.spheres.size(); ++i)
+      add_round(Kind::kSphere, i, scene_.spheres[i].center, scene_.spheres[i].radius);
+    for (std::size_t i = 0; i < scene_.disks.size(); ++i)
+      add_round(Kind::kDisk, i, scene_.disks[i].center, scene_.disks[i].radius);
+    return true;
+  }
+
+  // Halves at the middle shape along the widest axis of their centres.
+  std::uint32_t Build(std::uint32_t begin, std::uint32_t end) {
+    const auto number = static_cast<std::uint32_t>(nodes_.size());
+    nodes_.emplace_back();
+    Node node;
+    node.begin = begin;
+    node.end = end;
+    node.surface = shapes_[begin].surface;
+    Bounds centers;
+    for (std::uint32_t i = begin; i < end; ++i) {
+      AddAll(node.bounds, shapes_[i].bounds);
+      centers.Add(shapes_[i].bounds.Center());
+      if (shapes_[i].surface != node.surface) node.surface = kMixed;
+    }
+    if (end - begin > kShapesPerLeaf) {
+      const Vec3 extent = centers.high - centers.low;
+      const int axis = extent.x >= extent.y && extent.x >= extent.z ? 0
+                       : extent.y >= extent.z                       ? 1
+                                                                    : 2;
+      const std::uint32_t middle = begin + (end - begin) / 2;
+      const auto at = [&](std::uint32_t i) { return shapes_.begin() + i; };
+      std::nth_element(at(begin), at(middle), at(end), [axis](const Shape& a, const Shape& b) {
+        return a.bounds.Center()[axis] < b.bounds.Center()[axis];
+      });
+      node.left = Build(begin, middle);
+      node.right = Build(middle, end);
+    }
+    nodes_[number] = node;
+    return number;
+  }
+
+  [[nodiscard]] bool IsOver() const { return most_pairs_ == 0; }
+
+  void Within(std::uint32_t number) {
+    const Node& node = nodes_[number];
+    if (node.surface != kMixed || IsOver()) return;
+    if (node.left == 0) {
+      for (std::uint32_t i = node.begin; i < node.end; ++i) {
+        for (std::uint32_t j = i + 1; j < node.end; ++j)
+          Cross(shapes_[i], shapes_[j]);
+      }
+      return;
+    }
+    Within(node.left);
+    Within(node.right);
+    Between(node.left, node.right);
+  }
+
+  void Between(std::uint32_t one, std::uint32_t other) {
+    const Node& a = nodes_[one];
+    const Node& b = nodes_[other];
+    if (IsOver() || (a.surface != kMixed && a.surface == b.surface) ||
+        !Overlap(a.bounds, b.bounds)) {
+      return;
+    }
+    --most_pairs_;
+    if (a.left == 0 && b.left == 0) {
+      for (std::uint32_t i = a.begin; i < a.end; ++i) {
+        for (std::uint32_t j = b.begin; j < b.end; ++j)
+          Cross(shapes_[i], shapes_[j]);
+      }
+    } else if (b.left == 0 || (a.left != 0 && a.end - a.begin >= b.end - b.begin)) {
+      Between(a.left, other);
+      Between(a.right, other);
+    } else {
+      Between(one, b.left);
+      Between(one, b.right);
+    }
+  }
+
+  // False for a triangle without area.
+  bool TriangleOf(const Shape& shape, Triangle& out) const {
+    for (std::size_t k = 0; k < 3; ++k)
+      out.corners[k] = Double3(positions_[corners_[3 * std::size_t{shape.index} + k]]);
+    const Double3 normal =
+        ::lucerna::Cross(out.corners[1] - out.corners[0], out.corners[2] - out.corners[0]);
+    const double length = Length(normal);
+    if (!(length > 0)) return false;
+    out.normal = normal * (1 / length);
+    return true;
+  }
+
+  void Add(Double3 a, Double3 b) {
+    if (segments_.size() == kMostSegments) most_pairs_ = 0;
+    const FeatureSegment segment = {{ToFloat(a), ToFloat(b)}};
+    if (!IsOver() && !(segment.ends[0] == segment.ends[1])) segments_.push_back(segment);
+  }
+
+  // The order of the two must not be seen.
+  void Cross(const Shape& one, const Shape& other) {
+    if (one.surface == other.surface || !Overlap(one.bounds, other.bounds)) return;
+    const auto order = [](const Shape& s) { return std::pair(s.kind, s.index); };
+    const Shape& a = order(one) < order(other) ? one : other;
+    const Shape& b = &a == &one ? other : one;
+    Triangle triangle;
+    if (a.kind == Kind::kTriangle) {
+      if (!TriangleOf(a, triangle)) return;
+      if (b.kind == Kind::kTriangle) {
+        Triangle second;
+        if (TriangleOf(b, second)) CrossTriangles(triangle, second);
+      } else if (b.kind == Kind::kSphere) {
+        CrossSphere(scene_.spheres[b.index], triangle.corners[0], triangle.normal, &triangle,
+                    nullptr);
+      } else {
+        CrossDisk(triangle, scene_.disks[b.index]);
+      }
+    } else if (a.kind == Kind::kSphere && b.kind == Kind::kDisk) {
+      const Disk& disk = scene_.disks[b.index];
+      CrossSphere(scene_.spheres[a.index], Double3(disk.center), Double3(disk.normal), nullptr,
+                  &disk);
+    }
+  }
+
+  // Both meet the line in which their planes cross in a span; what the spans have in common.
+  void CrossTriangles(const Triangle& a, const Triangle& b) {
+    const Double3 line = ::lucerna::Cross(a.normal, b.normal);
+    if (!(Length(line) > 1e-4)) return;
+    const std::optional<Span> of_a = CutByPlane(a, b.corners[0], b.normal);
+    if (!of_a) return;
+    const std::optional<Span> of_b = CutByPlane(b, a.corners[0], a.normal);
+    if (!of_b) return;
+    const auto ordered = [&](const Span& span) {
+      return Dot(span.ends[0], line) <= Dot(span.ends[1], line)
+                 ? span
+                 : Span{{span.ends[1], span.ends[0]}};
+    };
+    const Span p = ordered(*of_a);
+    const Span q = ordered(*of_b);
+    const Double3 begin = Dot(p.ends[0], line) >= Dot(q.ends[0], line) ? p.ends[0] : q.ends[0];
+    const Double3 end = Dot(p.ends[1], line) <= Dot(q.ends[1], line) ? p.ends[1] : q.ends[1];
+    if (Dot(end, line) > Dot(begin, line)) Add(begin, end);
+  }
+
+  void CrossDisk(const Triangle& triangle, const Disk& disk) {
+    const Double3 center(disk.center);
+    const std::optional<Span> span = CutByPlane(triangle, center, Double3(disk.normal));
+    if (!span) return;
+    // The part of the span within the rim.
+    const Double3 from = span->ends[0] - center;
+    const Double3 along = span->ends[1] - span->ends[0];
+    const double squared = Dot(along, along);
+    if (!(squared > 0)) return;
+    const double middle = -Dot(from, along) / squared;
+    const Double3 nearest = from + along * middle;
+    const auto radius = static_cast<double>(disk.radius);
+    const double left = radius * radius - Dot(nearest, nearest);
+    if (!(left > 0)) return;
+    const double half = std::sqrt(left / squared);
+    const double begin = std::max(0.0, middle - half);
+    const double end = std::min(1.0, middle + half);
+    if (begin < end) Add(span->ends[0] + along * begin, span->ends[0] + along * end);
+  }
+
+  // The sphere's circle in a plane: what of the polygon around it lies in the triangle or disk.
+  void CrossSphere(const Sphere& sphere, Double3 origin, Double3 normal, const Triangle* triangle,
+                   const Disk* disk) {
+    const Double3 center(sphere.center);
+    const auto radius = static_cast<double>(sphere.radius);
+    const double height = Dot(center - origin, normal);
+    const double squared = radius * radius - height * height;
+    // Hardly more than a point of contact.
+    if (!(squared > 1e-8 * radius * radius)) return;
+    const double around = std::sqrt(squared) / std::cos(std::numbers::pi / kCircleSides);
+    const Double3 middle = center - normal * height;
+    const Frame frame(ToFloat(normal));
+    const Double3 s(frame.s);
+    const Double3 t = ::lucerna::Cross(normal, s);
+    const auto corner = [&](int i) {
+      const double angle = 2 * std::numbers::pi * (i % kCircleSides) / kCircleSides;
+      return middle + s * (around * std::cos(angle)) + t * (around * std::sin(angle));
+    };
+    for (int i = 0; i < kCircleSides && !IsOver(); ++i) {
+      const Double3 a = corner(i);
+      const Double3 along = corner(i + 1) - a;
+      double begin = 0;
+      double end = 1;
+      if (triangle != nullptr) {
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Double3 side = triangle->corners[(k + 1) % 3] - triangle->corners[k];
+          const Double3 inward = ::lucerna::Cross(triangle->normal, side);
+          const double at = Dot(a - triangle->corners[k], inward);
+          const double rise = Dot(along, inward);
+          if (rise > 0) {
+            begin = std::max(begin, -at / rise);
+          } else if (rise < 0) {
+            end = std::min(end, -at / rise);
+          } else if (at < 0) {
+            end = 0;
+          }
+        }
+      }
+      if (disk != nullptr) {
+        const Double3 from_center = a + along * 0.5 - Double3(disk->center);
+        if (Length(from_center) > static_cast<double>(disk->radius)) continue;
+      }
+      if (begin < end) Add(a + along * begin, a + along * end);
+    }
+  }
+
+  const Scene& scene_;
+  std::vector<Vec3> positions_;
+  std::vector<std::uint32_t> corners_;
+  std::vector<Shape> shapes_;
+  std::vector<Node> nodes_;
+  std::uint64_t most_pairs_ = 0;
+  std::vector<FeatureSegment> segments_;
+};
+
+}  // namespace
+
+std::vector<FeatureSegment> SurfaceCrossings(const Scene& scene) {
+  return Crossings(scene).Find();
+}
+
+}  // namespace lucerna

@@ -1,0 +1,104 @@
+// Corners and edges are as bright as they should be.
+//
+// In a closed room in which every surface shines alike and reflects half of what arrives, the
+// radiance is the same everywhere, whatever stands in the room: 1 from the surface, 1/2 that came
+// straight from others and is sampled, and 1/2 by photons. So every photon that an edge lets
+// through, and every part of a disc where there are none, shows in the mean.
+//
+// Measurements are means of independent renders; bounds are Student's quantile of their spread, at
+// a chance of a false alarm of 1e-3 for all of this file.
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "tests/support/local_render.h"
+#include "tests/support/measure.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+constexpr int kParts = 24;
+constexpr int kComparisons = 8;
+
+// A room whose walls, numbered 0, shine inwards; light 0 shines from one side, light 1 from both.
+Scene Room() {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddAreaLight(scene, 1);
+  AddAreaLight(scene, 1, /*two_sided=*/true);
+  AddBox(scene, {-1, -1, -1}, {1, 1, 1}, 0);
+  TriangleMesh& walls = scene.meshes.back();
+  walls.traits.area_light = 0;
+  for (std::size_t i = 0; i < walls.indices.size(); i += 3)
+    std::swap(walls.indices[i + 1], walls.indices[i + 2]);
+  // Down at an angle: floor, walls and three corners of both, and whatever stands there.
+  SetCamera(scene, {-0.8, -0.7, 0.5}, {0.3, 0.2, -0.9}, {0, 0, 1}, 90, 48);
+  return scene;
+}
+
+void AddShiningBox(Scene& scene, Vec3 low, Vec3 high) {
+  AddBox(scene, low, high, 0);
+  scene.meshes.back().traits.area_light = 0;
+}
+
+struct Furniture {
+  std::string name;
+  std::function<void(Scene&)> add;
+};
+
+std::vector<Furniture> AllFurniture() {
+  return {
+      {"nothing", [](Scene&) {}},
+      {"a box on the floor",
+       [](Scene& scene) {
+         AddShiningBox(scene, {-0.2F, -0.3F, -1}, {0.3F, 0.3F, -0.6F});
+       }},
+      {"a box sunk into the floor and a wall",
+       [](Scene& scene) {
+         AddShiningBox(scene, {-0.2F, 0.5F, -1.2F}, {0.3F, 1.2F, -0.5F});
+       }},
+      {"a step",
+       [](Scene& scene) {
+         AddShiningBox(scene, {-0.3F, -1, -1}, {1, 1, -0.93F});
+       }},
+      {"a thin wall",
+       [](Scene& scene) {
+         AddQuad(scene, {0, -0.4F, -1}, {0, 0.8F, 0}, {0, 0, 0.5F}, 0, 1);
+       }},
+      {"a disk",
+       [](Scene& scene) {
+         AddDisk(scene, {0.3F, 0.3F, -0.7F}, {0, 0, 1}, 0.4F, 0, 1);
+       }},
+      {"a ball sunk into the floor",
+       [](Scene& scene) {
+         AddSphere(scene, {0.1F, 0, -1.3F}, 0.6F, 0, 0);
+       }},
+  };
+}
+
+TEST(CornersTest, AreAsBrightAsTheRestOfAFurnace) {
+  const double quantile = StudentQuantile(SidakLevel(1e-3, kComparisons), kParts);
+  for (const Furniture& furniture : AllFurniture()) {
+    SCOPED_TRACE(furniture.name);
+    Scene scene = Room();
+    furniture.add(scene);
+    RenderOverrides overrides;
+    overrides.initial_radius = 0;
+    overrides.max_depth = 40;
+    overrides.photons_per_pass = 20000;
+    const MeasuredMean photons =
+        Measure(scene, SettingsFor(scene, overrides), 6, kParts, "photons.G");
+    const double bound = quantile * photons.standard_error;
+    // Of the whole radiance, 2: 0.05 %, and what chance may do.
+    EXPECT_NEAR(photons.mean, 0.5, 0.0005 * 2 + bound) << "bound " << bound;
+    EXPECT_LT(bound, 0.004);
+  }
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,236 @@
+// Surfaces have edges where they end, turn or meet, and nowhere else.
+#include "render/geometry/feature_edges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+#include "gtest/gtest.h"
+
+#include "render/math/rng.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+double LengthOf(const FeatureEdges& edges) {
+  double length = 0;
+  for (const FeatureSegment& segment : edges.segments())
+    length += static_cast<double>(Length(segment.ends[1] - segment.ends[0]));
+  return length;
+}
+
+Scene Empty() {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  return scene;
+}
+
+TEST(FeatureEdgesTest, OfAnEmptySceneAreNone) {
+  EXPECT_TRUE(FeatureEdges(Empty()).empty());
+  Scene ball = Empty();
+  AddSphere(ball, {0, 0, 0}, 1, 0);
+  const FeatureEdges edges(ball);
+  EXPECT_TRUE(edges.empty());
+  std::array<std::uint32_t, 4> found;
+  EXPECT_EQ(edges.Find({0, 0, 0}, 10, found), 0U);
+}
+
+TEST(FeatureEdgesTest, OfAQuadAreItsFourSidesAndOfABoxItsTwelve) {
+  Scene quad = Empty();
+  AddQuad(quad, {0, 0, 0}, {2, 0, 0}, {0, 3, 0}, 0);
+  EXPECT_EQ(FeatureEdges(quad).segments().size(), 4U) << "and not the diagonal";
+  Scene box = Empty();
+  AddBox(box, {0, 0, 0}, {1, 2, 3}, 0);
+  const FeatureEdges edges(box);
+  EXPECT_EQ(edges.segments().size(), 12U);
+  EXPECT_NEAR(LengthOf(edges), 4 * (1 + 2 + 3), 1e-5);
+}
+
+// Quads that share corners by position alone are one surface, unless they differ in what stays on
+// them, or a wall rises between them.
+TEST(FeatureEdgesTest, OfNeighboursAreNoneUnlessTheyDiffer) {
+  Scene scene = Empty();
+  AddQuad(scene, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0);
+  AddQuad(scene, {1, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0);
+  EXPECT_EQ(FeatureEdges(scene).segments().size(), 6U);
+  Scene mirror = Empty();
+  AddMaterial(mirror, ConductorMaterial(Gray(0.2F), Gray(3), 0, 0));
+  AddQuad(mirror, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0);
+  AddQuad(mirror, {1, 0, 0}, {1, 0, 0}, {0, 1, 0}, 1);
+  EXPECT_EQ(FeatureEdges(mirror).segments().size(), 7U);
+  AddQuad(scene, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0);
+  EXPECT_EQ(FeatureEdges(scene).segments().size(), 10U) << "a thin wall";
+  // The same twice over has no more edges.
+  Scene twice = Empty();
+  for (int i = 0; i < 2; ++i) {
+    AddQuad(twice, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0);
+    AddQuad(twice, {1, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0);
+  }
+  // Sides that end in one direction, twice, are ends still.
+  EXPECT_EQ(FeatureEdges(twice).segments().size(), 6U);
+}
+
+TEST(FeatureEdgesTest, OfABendDependOnItsAngle) {
+  for (const double degrees : {0.0, 20.0, 43.0, 47.0, 90.0, 179.9}) {
+    const double turn = degrees * std::numbers::pi / 180;
+    Scene scene = Empty();
+    AddQuad(scene, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0);
+    AddQuad(scene, {1, 0, 0},
+            {static_cast<float>(std::cos(turn)), 0, static_cast<float>(std::sin(turn))}, {0, 1, 0},
+            0);
+    EXPECT_EQ(FeatureEdges(scene).segments().size(), degrees < 45 ? 6U : 7U) << degrees;
+  }
+}
+
+TEST(FeatureEdgesTest, OfADiskAreItsRims) {
+  Scene scene = Empty();
+  AddDisk(scene, {1, 2, 3}, Normalize({1, 1, 1}), 2, 0);
+  EXPECT_NEAR(LengthOf(FeatureEdges(scene)), 4 * std::numbers::pi, 1e-3);
+  scene.disks[0].inner_radius = 1;
+  EXPECT_NEAR(LengthOf(FeatureEdges(scene)), 6 * std::numbers::pi, 1e-3);
+}
+
+// A box that is sunk into the floor meets it in a square; one that stands on it does not.
+TEST(FeatureEdgesTest, AreWhereSurfacesPassThroughEachOther) {
+  const auto crossings = [](float bottom, float size) {
+    Scene scene = Empty();
+    AddQuad(scene, {-4 * size, -5 * size, 0}, {8 * size, 0, 0}, {0, 9 * size, 0}, 0);
+    AddBox(scene, {0, 0, bottom * size}, {size, 2 * size, 3 * size}, 0);
+    const std::vector<FeatureSegment> segments = SurfaceCrossings(scene);
+    double length = 0;
+    for (const FeatureSegment& segment : segments) {
+      for (const Vec3 end : segment.ends)
+        EXPECT_NEAR(end.z / size, 0, 1e-6);
+      length += static_cast<double>(Length(segment.ends[1] - segment.ends[0]) / size);
+    }
+    return length;
+  };
+  for (const float size : {1e-6F, 1.0F, 1e6F}) {
+    EXPECT_NEAR(crossings(-0.5F, size), 6, 1e-4) << size;
+    EXPECT_EQ(crossings(0.5F, size), 0) << size;
+    EXPECT_EQ(crossings(0, size), 0) << size;
+  }
+}
+
+TEST(FeatureEdgesTest, AreTheCirclesOfSunkenBalls) {
+  Scene scene = Empty();
+  AddQuad(scene, {-4, -5, 0}, {8, 0, 0}, {0, 9, 0}, 0);
+  AddSphere(scene, {0.3F, 0, 0.6F}, 1, 0);
+  double length = 0;
+  for (const FeatureSegment& segment : SurfaceCrossings(scene)) {
+    for (const Vec3 end : segment.ends) {
+      // Around the circle, never inside.
+      const double radius =
+          std::hypot(static_cast<double>(end.x) - 0.3, static_cast<double>(end.y));
+      EXPECT_GT(radius, 0.8 - 1e-6);
+      EXPECT_LT(radius, 0.8 * (1 + 1e-4));
+    }
+    length += static_cast<double>(Length(segment.ends[1] - segment.ends[0]));
+  }
+  EXPECT_NEAR(length, 2 * std::numbers::pi * 0.8, 1e-3);
+  scene.spheres[0].center.z = 1;
+  EXPECT_TRUE(SurfaceCrossings(scene).empty()) << "it lies on the floor";
+  Scene disk = Empty();
+  AddDisk(disk, {0, 0, 0}, {0, 0, 1}, 3, 0);
+  AddSphere(disk, {0.3F, 0, 0.6F}, 1, 0);
+  EXPECT_EQ(SurfaceCrossings(disk).size(), 256U);
+  AddQuad(disk, {-1, -1, -1}, {0, 2, 0}, {0, 0, 2}, 0);
+  EXPECT_EQ(SurfaceCrossings(disk).size(), 256U + 2U) << "the two triangles of a wall";
+}
+
+// Two blades that turn about each other cross where both planes meet.
+TEST(FeatureEdgesTest, OfCrossingTrianglesLieInBoth) {
+  KeyedRng rng(5);
+  const auto point = [&] {
+    const float x = rng.Uniform();
+    const float y = rng.Uniform();
+    const float z = rng.Uniform();
+    return Vec3{x, y, z};
+  };
+  int crossed = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    Scene scene = Empty();
+    std::array<Vec3, 6> corners;
+    for (Vec3& corner : corners)
+      corner = point();
+    for (const std::size_t first : {0U, 3U}) {
+      TriangleMesh mesh;
+      mesh.positions = {corners[first], corners[first + 1], corners[first + 2]};
+      mesh.indices = {0, 1, 2};
+      mesh.traits.material = 0;
+      scene.meshes.push_back(mesh);
+    }
+    // The oracle: a side of one passes through the other.
+    const auto passes = [&](std::size_t t, Vec3 from, Vec3 to) {
+      const Vec3 n = Cross(corners[t + 1] - corners[t], corners[t + 2] - corners[t]);
+      const float a = Dot(from - corners[t], n);
+      const float b = Dot(to - corners[t], n);
+      if ((a > 0) == (b > 0)) return false;
+      const Vec3 p = from + (to - from) * (a / (a - b));
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Vec3 corner = corners[t + k];
+        if (Dot(Cross(corners[t + (k + 1) % 3] - corner, p - corner), n) < 0) return false;
+      }
+      return true;
+    };
+    int sides = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      sides += passes(0, corners[3 + k], corners[3 + (k + 1) % 3]) ? 1 : 0;
+      sides += passes(3, corners[k], corners[(k + 1) % 3]) ? 1 : 0;
+    }
+    const std::vector<FeatureSegment> segments = SurfaceCrossings(scene);
+    EXPECT_EQ(segments.size(), sides == 2 ? 1U : 0U) << trial;
+    crossed += sides == 2 ? 1 : 0;
+  }
+  EXPECT_GT(crossed, 30);
+}
+
+TEST(FeatureEdgesTest, AreFoundWhereTheyAre) {
+  KeyedRng rng(9);
+  std::vector<FeatureSegment> segments;
+  for (int i = 0; i < 300; ++i) {
+    const auto at = [&](float size) {
+      const float x = rng.Uniform();
+      const float y = rng.Uniform();
+      const float z = rng.Uniform();
+      return Vec3{size * x, 3 * size * y, 0.1F * size * z};
+    };
+    const Vec3 a = at(10);
+    segments.push_back({{a, i % 5 == 0 ? at(10) : a + at(0.1F)}});
+  }
+  const FeatureEdges edges(segments);
+  for (int i = 0; i < 3000; ++i) {
+    const float x = rng.Uniform();
+    const float y = rng.Uniform();
+    const Vec3 center = {12 * x - 1, 34 * y - 2, 0.5F};
+    const float reach = std::pow(10.0F, -3 + 4 * rng.Uniform());
+    std::set<std::uint32_t> expected;
+    for (std::uint32_t s = 0; s < segments.size(); ++s) {
+      const Vec3 a = segments[s].ends[0];
+      const Vec3 along = segments[s].ends[1] - a;
+      const float t = std::clamp(Dot(center - a, along) / LengthSquared(along), 0.0F, 1.0F);
+      const float distance = Length(a + along * t - center);
+      // Those at the very end are found or not.
+      if (std::abs(distance - reach) < 1e-4F * (reach + 1e-2F)) expected.insert(UINT32_MAX);
+      if (distance < reach) expected.insert(s);
+    }
+    if (expected.contains(UINT32_MAX)) continue;
+    std::array<std::uint32_t, 400> found;
+    const std::size_t count = edges.Find(center, reach, found);
+    // Too many to go through.
+    if (count > found.size()) {
+      EXPECT_GT(expected.size(), 50U);
+      continue;
+    }
+    EXPECT_EQ(std::set(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count)),
+              expected);
+    EXPECT_EQ(count, expected.size());
+  }
+  std::array<std::uint32_t, 2> few;
+  EXPECT_GT(edges.Find(segments[0].ends[0], 3, few), few.size());
+}
+
+}  // namespace
+}  // namespace lucerna
