@@ -116,6 +116,14 @@ Json JobOf(const v1::Job& job) {
     json["parts"].push_back(
         {{"part", use.part()}, {"is_used", use.is_used()}, {"reason", use.reason()}});
   }
+  if (const auto error = NewestError(job)) {
+    json["relative_error"] = {
+        {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
+    if (error->truth) json["relative_error"]["true"] = *error->truth;
+    json["relative_error"]["untrimmed"] = error->untrimmed;
+    if (error->true_untrimmed) json["relative_error"]["true_untrimmed"] = *error->true_untrimmed;
+    json["relative_error"]["left_out_pixels"] = job.convergence().rbegin()->left_out_pixels();
+  }
   if (job.dropped_photons_size() > 0) json["dropped_photons"] = Json::array();
   for (const v1::PhotonKey& key : job.dropped_photons())
     json["dropped_photons"].push_back({{"pass", key.pass()}, {"index", key.index()}});
@@ -238,14 +246,6 @@ std::string JobReport(const v1::Job& job, const SavedImage& saved) {
 std::string ConvergenceReport(const v1::Job& job) {
   Json json = JobOf(job);
   json["has_reference"] = job.has_reference();
-  if (const auto error = NewestError(job)) {
-    json["relative_error"] = {
-        {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
-    if (error->truth) json["relative_error"]["true"] = *error->truth;
-    json["relative_error"]["untrimmed"] = error->untrimmed;
-    if (error->true_untrimmed) json["relative_error"]["true_untrimmed"] = *error->true_untrimmed;
-    json["relative_error"]["left_out_pixels"] = job.convergence().rbegin()->left_out_pixels();
-  }
   for (const auto& [name, against] : {std::pair{"mse_exponent_time", ErrorAgainst::kTime},
                                       std::pair{"mse_exponent_photons", ErrorAgainst::kPhotons}}) {
     if (const auto law = FitOfSquaredError(job, against)) json[name] = law->exponent;

@@ -207,7 +207,7 @@ ErrorEstimate JobEstimator::EstimateError(int look) const {
       lucerna::EstimateError(state_->settings.crop_width(), state_->settings.crop_height(),
                              passes_applied(), look, sums_at);
   // Without any light a black image is exact.
-  if (IsBlack(state_->lights->TotalPower())) estimate.relative = {}, estimate.untrimmed = 0;
+  if (lucerna::IsBlack(state_->lights->TotalPower())) estimate.relative = {}, estimate.untrimmed = 0;
   return estimate;
 }
 
