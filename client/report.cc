@@ -120,6 +120,9 @@ Json JobOf(const v1::Job& job) {
     json["relative_error"] = {
         {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
     if (error->truth) json["relative_error"]["true"] = *error->truth;
+    json["relative_error"]["untrimmed"] = error->untrimmed;
+    if (error->true_untrimmed) json["relative_error"]["true_untrimmed"] = *error->true_untrimmed;
+    json["relative_error"]["left_out_pixels"] = job.convergence().rbegin()->left_out_pixels();
   }
   if (FoundNothing(job)) json["nothing_found"] = true;
   if (const auto far = FindFarTarget(job)) {

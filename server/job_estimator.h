@@ -73,7 +73,7 @@ class JobEstimator {
   // Rays traced for the passes applied so far.
   [[nodiscard]] std::uint64_t eye_rays() const;
   // The image of the passes applied so far, without metadata. Requires passes_applied() > 0. Layers
-  // `noise` and `bias` from the second pass on.
+  // `noise` (standard deviation of each pixel's luminance) and `bias` from the second pass on.
   [[nodiscard]] Image MakeImage() const;
   // `look` counts the looks at this job, from 1. The upper ends of its intervals hold what may be
   // missing; they are infinite while nothing is found. Requires passes_applied() >= 2.

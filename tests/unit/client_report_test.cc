@@ -85,6 +85,7 @@ TEST(ReportTest, TheConvergenceRecordKeepsItsDigits) {
   EXPECT_EQ(sample["left_out_pixels"], 65);
   EXPECT_DOUBLE_EQ(report["relative_error"]["untrimmed"].get<double>(),
                    std::sqrt(job.convergence(11).relative_untrimmed()));
+  EXPECT_EQ(json::parse(JobReport(job))["relative_error"], report["relative_error"]);
   EXPECT_NEAR(report["mse_exponent_photons"].get<double>(), -2.0 / 3, 1e-4);
   EXPECT_DOUBLE_EQ(report["relative_error"]["high"].get<double>(),
                    std::sqrt(job.convergence(11).relative().high()));
