@@ -65,18 +65,22 @@ struct SectorEvidence {
   static constexpr float kReach = 1;
   SectorEvidence(Vec3 normal, const FluxScale& /*scale*/) : frame(normal) {}
   void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 to_photon, float squared,
-           float squared_radius, float /*weight*/, const CutDisc* /*cut*/) {
+           float squared_radius, float /*weight*/, const CutDisc* cut) {
+    const std::size_t ring = 2 * squared < squared_radius ? 0 : 6;
+    ++counts[ring + SectorOf(to_photon)];
+    // In place of what an edge has cut away, the other side of the hitpoint.
+    if (cut != nullptr && !cut->Holds(cut->PlaceOf(-to_photon)))
+      ++counts[ring + SectorOf(-to_photon)];
+  }
+  // Sixths of a turn by the sides of two lines at 60 degrees and the x axis, without an arc tangent.
+  [[nodiscard]] std::size_t SectorOf(Vec3 to_photon) const {
     constexpr float kSqrt3 = 1.7320508F;
     const float x = Dot(to_photon, frame.s);
     const float y = Dot(to_photon, frame.t);
-    // Sixths of a turn by the sides of two lines at 60 degrees and the x axis, without an arc
-    // tangent.
     const bool above = y >= 0;
     const float side = std::abs(y);
     const std::size_t third = side < kSqrt3 * x ? 0 : side < -kSqrt3 * x ? 2 : 1;
-    const std::size_t sector = above ? third : 5 - third;
-    const std::size_t ring = 2 * squared < squared_radius ? 0 : 6;
-    ++counts[ring + sector];
+    return above ? third : 5 - third;
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
     for (std::size_t i = 0; i < kColumns; ++i)

@@ -191,6 +191,34 @@ TEST(CutDiscTest, KeepsEvenLightWhereItCutsTooMuch) {
   EXPECT_EQ(with.laplacian, without.laplacian);
 }
 
+// Even light is even in all twelve cells beside an edge too.
+TEST(CutDiscTest, FillsTheSectorsBeyondAnEdge) {
+  const Scene scene = Corner();
+  const Deposits deposits = CornerLight(kEven, 100);
+  ThreadTeam team(1);
+  Bounds region;
+  region.Add({-2, -2, -2});
+  region.Add({2, 2, 2});
+  const PhotonGrid grid({deposits}, region, 0.5F, team);
+  const FeatureEdges features(scene);
+  for (const float distance : {0.01F, 0.1F, 0.2F}) {
+    HitpointBlock block;
+    block.positions = {{-distance, 0.1F, 0}};
+    block.normals_oct = {EncodeOctahedral({0, 0, 1})};
+    const Accumulation sum =
+        Gather(block, {0.4F}, grid, scene.materials, Kernel{}, FluxScale::ForPower(Gray(1)), team,
+               std::atomic<bool>(false), Evidence::kSectors, &features);
+    ASSERT_EQ(sum.size(), 1U);
+    // Photons a cell: a twelfth of the disc's area, over the lattice's step squared.
+    const double expected = 3.14159 * 0.16 / 12 * 160 * 160;
+    for (std::size_t i = 0; i < kSectors; ++i) {
+      EXPECT_NEAR(static_cast<double>(sum.evidence[kCommonColumns + i][0]), expected,
+                  0.05 * expected)
+          << distance;
+    }
+  }
+}
+
 // Nothing leaves its range where little is left of a disc, or where a photon is as strong as there
 // is room for.
 TEST(CutDiscTest, HoldsContributionsInTheirRange) {
