@@ -21,17 +21,22 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
   return text;
 }
 
+// The room of hole.pbrt with another hole, from `low` to `high`, and another light behind it.
+Scene WithHole(const std::string& low, const std::string& high, const std::string& intensity) {
+  std::string text =
+      ReadFile(std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/hole.pbrt").value();
+  text = Replaced(Replaced(text, "0.4985", low), "0.5015", high);
+  text = Replaced(text, "[3e6 3e6 3e6]", "[" + intensity + " " + intensity + " " + intensity + "]");
+  MemoryFiles files({{"room.pbrt", text}});
+  ParsedScene parsed = ParsePbrt(files, "room.pbrt");
+  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+  return std::move(parsed.scene);
+}
+
 // The same room with a hole 30 times as wide and light 900 times as weak: the same light comes
 // through, to first order, and photons find it 900 times as often.
 Scene WithWideHole() {
-  std::string text =
-      ReadFile(std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/hole.pbrt").value();
-  text = Replaced(Replaced(text, "0.4985", "0.455"), "0.5015", "0.545");
-  text = Replaced(text, "[3e6 3e6 3e6]", "[3333 3333 3333]");
-  MemoryFiles files({{"wide.pbrt", text}});
-  ParsedScene parsed = ParsePbrt(files, "wide.pbrt");
-  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
-  return std::move(parsed.scene);
+  return WithHole("0.455", "0.545", "3333");
 }
 
 RenderSettings Settings(const Scene& scene, std::uint64_t seed, std::int64_t photons) {
@@ -96,6 +101,24 @@ TEST(MissingLightTest, WhatMayBeMissingFallsAsPhotonsGoOn) {
   const auto sent = static_cast<double>(first.lights[1].photons.sent);
   EXPECT_NEAR(static_cast<double>(then.lights[1].photons.sent) / sent, 2, 0.01);
   EXPECT_LT(then.lights[1].missing_share, 0.7 * first.lights[1].missing_share);
+}
+
+// With a light of 3e9 times the power, behind a hole of a micrometre, a photon of the weak light
+// carries a 500th of a quantum. What it adds is rounded at random, so that its mean stays.
+TEST(MissingLightTest, ALightFarBelowTheQuantumKeepsItsMean) {
+  const auto mean_of_photons = [](const Scene& scene) {
+    const Image image = RenderLocally(scene, Settings(scene, 3, 100'000), 20);
+    double sum = 0;
+    for (const float value : image.Find("photons.G")->pixels)
+      sum += static_cast<double>(value) / (kSide * kSide);
+    return sum;
+  };
+  Scene alone = LoadScene("hole.pbrt");
+  alone.point_lights.pop_back();
+  const double weak = mean_of_photons(alone);
+  const double beside = mean_of_photons(WithHole("0.4999995", "0.5000005", "3e9"));
+  // One or two thousand quanta fall in all: five deviations.
+  EXPECT_NEAR(beside / weak, 1, 0.15);
 }
 
 }  // namespace
