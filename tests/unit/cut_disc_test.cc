@@ -58,8 +58,9 @@ Gathered At(const Scene& scene, const Deposits& deposits, Vec3 position, Vec3 no
   block.normals_oct = {EncodeOctahedral(normal)};
   const FeatureEdges features(scene);
   const FluxScale scale = FluxScale::ForPower(Gray(1));
-  const Accumulation sum = Gather(block, {radius}, grid, scene.materials, Kernel{kernel}, scale,
-                                  team, std::atomic<bool>(false), Evidence::kCurvature, &features);
+  const Accumulation sum =
+      Gather(block, {radius}, {.grid = grid, .features = &features}, scene.materials,
+             Kernel{kernel}, scale, team, std::atomic<bool>(false), Evidence::kCurvature);
   if (sum.size() == 0) return {};
   const auto r = static_cast<double>(radius);
   const double per_area = static_cast<double>(kStep) * static_cast<double>(kStep) / (r * r);
@@ -206,8 +207,8 @@ TEST(CutDiscTest, FillsTheSectorsBeyondAnEdge) {
     block.positions = {{-distance, 0.1F, 0}};
     block.normals_oct = {EncodeOctahedral({0, 0, 1})};
     const Accumulation sum =
-        Gather(block, {0.4F}, grid, scene.materials, Kernel{}, FluxScale::ForPower(Gray(1)), team,
-               std::atomic<bool>(false), Evidence::kSectors, &features);
+        Gather(block, {0.4F}, {.grid = grid, .features = &features}, scene.materials, Kernel{},
+               FluxScale::ForPower(Gray(1)), team, std::atomic<bool>(false), Evidence::kSectors);
     ASSERT_EQ(sum.size(), 1U);
     // Photons a cell: a twelfth of the disc's area, over the lattice's step squared.
     const double expected = 3.14159 * 0.16 / 12 * 160 * 160;
@@ -245,9 +246,9 @@ TEST(CutDiscTest, HoldsContributionsInTheirRange) {
       radii.push_back(radius);
     }
   }
-  const Accumulation sum =
-      Gather(block, radii, grid, scene.materials, Kernel{KernelKind::kConstant}, scale, team,
-             std::atomic<bool>(false), Evidence::kCurvature, &features);
+  const Accumulation sum = Gather(block, radii, {.grid = grid, .features = &features},
+                                  scene.materials, Kernel{KernelKind::kConstant}, scale, team,
+                                  std::atomic<bool>(false), Evidence::kCurvature);
   ASSERT_GT(sum.size(), 20U);
   const auto most = static_cast<std::int64_t>(8 * kLargestContribution);
   for (std::size_t i = 0; i < sum.size(); ++i) {
