@@ -252,7 +252,7 @@ TEST(GatherTest, TellsItsOwnSurfaceFromOthers) {
   };
   EXPECT_EQ(count({0.1F, 0, 0}, {0, 0, 1}), 1U);
   EXPECT_EQ(count({0.1F, 0, 0.3F}, {-1, 0, 0}), 0U) << "a wall that rises from the floor";
-  EXPECT_EQ(count({0.1F, 0, -0.1F}, {1, 0, 0}), 0U) << "the side of a box under its top";
+  EXPECT_EQ(count({0.1F, 0, -0.3F}, {1, 0, 0}), 0U) << "the side of a box under its top";
   EXPECT_EQ(count({0.1F, 0, 0.1F}, {1, 0, 0}), 0U) << "the back of a wall";
   EXPECT_EQ(count({0.1F, 0, -0.01F}, {0, 0, -1}), 0U) << "the far side of a thin floor";
   EXPECT_EQ(count({0.1F, 0, 0.04F}, {0, 0, 1}), 1U) << "hardly higher";
