@@ -14,17 +14,20 @@
 namespace lucerna {
 namespace {
 
-// Whether a photon lies on the hitpoint's surface: turned by less than about 45 degrees, and not
-// above or below it. Along an arc the height of the photon over the hitpoint's plane is the
-// hitpoint's over the photon's, so that both cancel in the sum below; at a bend of angle a it is at
-// most sin(a) times the distance; on a step, or a sheet that lies over another, nothing bends.
+// Whether a photon lies on the hitpoint's surface, and not on one above or below it. Along an arc the
+// height of the photon over the hitpoint's plane is the hitpoint's over the photon's, so that both
+// cancel in the sum below; at a bend of angle a, which is no edge up to 45 degrees, it is at most
+// sin(a) times the distance; on a step, or a sheet that lies over another, nothing bends.
+// Without an edge in the disc a surface may turn by up to 90 degrees, if it does so along an arc.
+template <bool kCut>
 bool IsOnSurface(Vec3 photon_normal, Vec3 normal, Vec3 to_photon, float squared_reach) {
   constexpr float kMostStep = 0.1F;  // twice its height over the reach, for rounding and facets
+  constexpr float kLeastCosine = kCut ? kSameSurfaceCosine : 0;
   const float cosine = Dot(photon_normal, normal);
-  if (!(cosine >= kSameSurfaceCosine)) return false;
+  if (!(cosine >= kLeastCosine)) return false;
+  const float bend = cosine >= kSameSurfaceCosine ? 2 * std::max(0.0F, 1 - cosine) : 0;
   const float twice_height = Dot(to_photon, normal) + Dot(to_photon, photon_normal);
-  return twice_height * twice_height <=
-         (2 * std::max(0.0F, 1 - cosine) + kMostStep * kMostStep) * squared_reach;
+  return twice_height * twice_height <= (bend + kMostStep * kMostStep) * squared_reach;
 }
 
 constexpr std::size_t kRowsPerPiece = 2048;
@@ -253,7 +256,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
       const auto& photon = grid.template record<kNormals>(i);
       const Vec3 to_photon = grid.position(i) - position;
       if constexpr (kNormals) {
-        if (!IsOnSurface(photon.normal, normal, to_photon, std::max(squared, squared_radius))) {
+        if (!IsOnSurface<kCut>(photon.normal, normal, to_photon, std::max(squared, squared_radius))) {
           return;
         }
       }
@@ -279,7 +282,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
       const Vec3 to_photon = grid.position(i) - position;
       // Photons on the far side of a rough dielectric count too.
       const bool is_behind = transmits && Dot(photon.normal, normal) < 0;
-      if (!IsOnSurface(photon.normal, is_behind ? -normal : normal, to_photon,
+      if (!IsOnSurface<kCut>(photon.normal, is_behind ? -normal : normal, to_photon,
                        std::max(squared, squared_radius))) {
         return;
       }

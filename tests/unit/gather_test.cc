@@ -184,8 +184,8 @@ std::vector<std::array<std::int64_t, 4>> Oracle(const Case& input, const Kernel&
         }
         const float cosine = Dot(photon.normal, side);
         const float twice_height = Dot(to_photon, side) + Dot(to_photon, photon.normal);
-        const float most = 2 * std::max(0.0F, 1 - cosine) + 0.1F * 0.1F;
-        if (cosine < 0.7F || twice_height * twice_height > most * (radius * radius)) continue;
+        const float most = (cosine >= 0.7F ? 2 * std::max(0.0F, 1 - cosine) : 0) + 0.1F * 0.1F;
+        if (cosine < 0 || twice_height * twice_height > most * (radius * radius)) continue;
         const float shape = kernel.Shape(squared * (1 / (radius * radius)));
         const std::uint64_t bits = PairBits(photon.key, static_cast<std::uint32_t>(row));
         ++sums[row][0];
@@ -302,8 +302,8 @@ TEST(GatherTest, TellsItsOwnSurfaceFromOthers) {
     return GatherAll(input, Kernel{}, FluxScale::ForPower(Gray(1)), 1).size();
   };
   EXPECT_EQ(count({0.1F, 0, 0}, {0, 0, 1}), 1U);
-  EXPECT_EQ(count({0.1F, 0, 0.1F}, {-1, 0, 0}), 0U) << "a wall that rises from the floor";
-  EXPECT_EQ(count({0.1F, 0, -0.1F}, {1, 0, 0}), 0U) << "the side of a box under its top";
+  EXPECT_EQ(count({0.1F, 0, 0.3F}, {-1, 0, 0}), 0U) << "a wall that rises from the floor";
+  EXPECT_EQ(count({0.1F, 0, -0.3F}, {1, 0, 0}), 0U) << "the side of a box under its top";
   EXPECT_EQ(count({0.1F, 0, 0.1F}, {1, 0, 0}), 0U) << "the back of a wall";
   EXPECT_EQ(count({0.1F, 0, -0.01F}, {0, 0, -1}), 0U) << "the far side of a thin floor";
   EXPECT_EQ(count({0.1F, 0, 0.04F}, {0, 0, 1}), 1U) << "hardly higher";
@@ -313,6 +313,8 @@ TEST(GatherTest, TellsItsOwnSurfaceFromOthers) {
   EXPECT_EQ(count({0.75F, 0, 0.21F}, {-0.6428F, 0, 0.766F}), 1U);
   // On a ball of radius 1.3 below the hitpoint, 40 degrees away.
   EXPECT_EQ(count({0.8356F, 0, -0.3041F}, {0.6428F, 0, 0.766F}), 1U);
+  // Inside a ball of radius 0.6 above it, 80 degrees away.
+  EXPECT_EQ(count({0.5909F, 0, 0.4958F}, {-0.9848F, 0, 0.1736F}), 1U);
 }
 
 // Photons without normals all count; that is right where none would have been refused.
