@@ -273,8 +273,8 @@ TEST_F(ClientCommandsTest, ABlackImageIsSaidToBeOneAndReachesNoTarget) {
 
 TEST_F(ClientCommandsTest, ARendersReportCarriesItsErrorAndTheTrueOne) {
   ASSERT_EQ(Run(SmallRender({"-o", In("a.exr")})).code, 0);
-  const Ran ran = Run(
-      SmallRender({"-o", In("b.exr"), "--seed", "5", "--reference", In("a.exr"), "--json"}));
+  const Ran ran =
+      Run(SmallRender({"-o", In("b.exr"), "--seed", "5", "--reference", In("a.exr"), "--json"}));
   ASSERT_EQ(ran.code, 0) << ran.err;
   const json error = json::parse(ran.out)["relative_error"];
   EXPECT_GT(error["estimate"].get<double>(), 0);
@@ -286,8 +286,8 @@ TEST_F(ClientCommandsTest, FlagsThatAControllerIgnoresAreWarnedOf) {
   const Ran ignored = Run(SmallRender({"-o", In("a.exr"), "--bias", "1%"}));
   EXPECT_EQ(ignored.code, 0);
   EXPECT_NE(ignored.err.find("appm ignores them"), std::string::npos) << ignored.err;
-  const Ran used = Run(
-      SmallRender({"-o", In("a.exr"), "--bias", "1%", "--radius-controller", "frequency-mse"}));
+  const Ran used =
+      Run(SmallRender({"-o", In("a.exr"), "--bias", "1%", "--radius-controller", "frequency-mse"}));
   EXPECT_EQ(used.err.find("ignores"), std::string::npos) << used.err;
   EXPECT_EQ(Run(SmallRender({"-o", In("a.exr"), "--error", "3"})).code, 2);
 }
