@@ -198,8 +198,7 @@ std::optional<FarTarget> FindFarTarget(const v1::Job& job) {
     far.sentence = Concat("the target of ", wanted, " is not in sight: the bias stands still at ",
                           ShortPercent(Root(squared.bias())), "; ");
   } else if (!far.left) {
-    far.sentence =
-        Concat("the target of ", wanted, " is not in sight: the error does not fall; ");
+    far.sentence = Concat("the target of ", wanted, " is not in sight: the error does not fall; ");
   } else {
     far.sentence =
         Concat("the target of ", wanted, " needs ", Rounded(Seconds(*far.left) / so_far_s),

@@ -72,8 +72,8 @@ struct FarTarget {
   std::optional<Duration> left;  // by the trend; absent when the error does not fall
   std::string sentence;          // why, and what would help
 };
-// Absent without a target, when it is reached, while there are too few samples for a trend, and when
-// the trend says that it will be reached within kFarTimes times the time so far.
+// Absent without a target, when it is reached, while there are too few samples for a trend, and
+// when the trend says that it will be reached within kFarTimes times the time so far.
 [[nodiscard]] std::optional<FarTarget> FindFarTarget(const v1::Job& job);
 inline constexpr double kFarTimes = 100;
 

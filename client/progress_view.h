@@ -44,8 +44,8 @@ namespace lucerna {
 // ..." while the image is black.
 [[nodiscard]] std::string ErrorLine(const v1::Job& job);
 
-// What stands between the job and its target, or may be missing, a sentence each: light that was not
-// found, a target that is far away. Often none.
+// What stands between the job and its target, or may be missing, a sentence each: light that was
+// not found, a target that is far away. Often none.
 [[nodiscard]] std::vector<std::string> ErrorNotes(const v1::Job& job);
 
 // The job on one line of a table; TableHead is the line above.

@@ -432,14 +432,15 @@ std::string Lights(const v1::Job& job) {
   if (job.lights().empty()) return {};
   std::string html = Concat(
       "<section>\n<h2>Lights</h2>\n",
-      TableTop("Photons of each light that hitpoints found, and what may be missing, at 95 %, because "
-               "too few have reached the view.",
-               {{"light", "name"},
-                {"of the power"},
-                {"photons sent"},
-                {"in view through smooth surfaces alone"},
-                {"in view otherwise"},
-                {"may be missing of the image"}}));
+      TableTop(
+          "Photons of each light that hitpoints found, and what may be missing, at 95 %, because "
+          "too few have reached the view.",
+          {{"light", "name"},
+           {"of the power"},
+           {"photons sent"},
+           {"in view through smooth surfaces alone"},
+           {"in view otherwise"},
+           {"may be missing of the image"}}));
   for (const v1::LightFinding& light : job.lights()) {
     absl::StrAppend(&html, "<tr><th scope=\"row\" class=\"name\">", EscapeMarkup(light.name()),
                     "</th><td>", ShortPercent(light.power_share()), "</td><td>",

@@ -351,8 +351,9 @@ MissingLight JobEstimator::FindMissingLight() const {
     }
     view.brightness = mean / std::sqrt(inverse / pixel_count);
   }
-  // The visible surfaces are at least about as large as the larger side of their box, and no smaller
-  // than what a hitpoint gathers from; white ones scatter 1/pi of what falls on them per steradian.
+  // The visible surfaces are at least about as large as the larger side of their box, and no
+  // smaller than what a hitpoint gathers from; white ones scatter 1/pi of what falls on them per
+  // steradian.
   const Vec3 box = state.hit_share > 0 ? state.view.high - state.view.low : Vec3{};
   std::array<double, 3> sides = {static_cast<double>(box.x), static_cast<double>(box.y),
                                  static_cast<double>(box.z)};

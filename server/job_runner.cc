@@ -176,7 +176,8 @@ void JobRunner::CheckImage() {
   }
   has_warned_ = true;
   surroundings_.when_warned(absl::StrCat(
-      "warning: the image is black after ", photons, " photons: no light has reached the"
+      "warning: the image is black after ", photons,
+      " photons: no light has reached the"
       " view; check that the scene has lights, which way they and the camera face, and what stands"
       " between them"));
 }

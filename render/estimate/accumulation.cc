@@ -30,7 +30,8 @@ std::int64_t SaturatingSum(std::int64_t a, std::int64_t b) {
   return a < 0 ? Limits::min() : Limits::max();
 }
 
-// Calls visit(ours, theirs) for every sum of two tallies, of which ours has as many lights as theirs.
+// Calls visit(ours, theirs) for every sum of two tallies, of which ours has as many lights as
+// theirs.
 template <typename Ours, typename Visit>
 void ForEachSum(Ours& ours, const BatchTally& theirs, const Visit& visit) {
   visit(ours.photons, theirs.photons);
@@ -53,7 +54,6 @@ void ForEachSum(Ours& ours, const BatchTally& theirs, const Visit& visit) {
       visit(ours.lights[i].in_view[path], theirs.lights[i].in_view[path]);
   }
 }
-
 
 }  // namespace
 

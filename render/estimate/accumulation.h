@@ -36,12 +36,12 @@ struct EnergyBooks {
 };
 inline constexpr int kEnergyBits = 12;
 
-// What the path of a photon has met before a landing: smooth surfaces alone (a caustic), or a surface
-// that scatters broadly too.
+// What the path of a photon has met before a landing: smooth surfaces alone (a caustic), or a
+// surface that scatters broadly too.
 enum class PathClass : std::uint8_t { kCaustic, kOther };
 inline constexpr std::size_t kPathClasses = 2;
 inline constexpr std::array<PathClass, kPathClasses> kAllPathClasses = {PathClass::kCaustic,
-                                                                       PathClass::kOther};
+                                                                        PathClass::kOther};
 
 // The photons of one light (LightSet::lights).
 struct LightTally {

@@ -60,8 +60,8 @@ std::vector<double> MissingShares(std::span<const LightPhotons> lights, const Ph
   for (const LightPhotons& light : lights) {
     for (const std::uint64_t in_view : light.tally.in_view) {
       if (light.tally.sent == 0) continue;
-      found_w += light.power_w * static_cast<double>(in_view) /
-                 static_cast<double>(light.tally.sent);
+      found_w +=
+          light.power_w * static_cast<double>(in_view) / static_cast<double>(light.tally.sent);
       found += in_view;
     }
   }
@@ -78,8 +78,8 @@ std::vector<double> MissingShares(std::span<const LightPhotons> lights, const Ph
     if (missing == 0) continue;
     const double of_power =
         light.tally.sent == 0 ? 1 : std::min(1.0, missing / static_cast<double>(light.tally.sent));
-    shares[i] = view.brightness > 0 ? light.power_w * of_power * per_watt / view.brightness
-                                    : HUGE_VAL;
+    shares[i] =
+        view.brightness > 0 ? light.power_w * of_power * per_watt / view.brightness : HUGE_VAL;
   }
   return shares;
 }

@@ -1,18 +1,18 @@
 // How much light may an image lack because no photon has found its way yet?
 //
-// An estimate of noise knows nothing of light that has not been found. Of N photons that a light has
-// sent, none landed in view: then, at 95 %, fewer than 3/N of its photons would, and the power that
-// may be missing is at most 3/N of the light's. With k landed it is the upper limit of a Poisson
-// number's mean, less what was found; from kEnoughPhotons on the halves of the render differ in that
-// light, and its noise is part of the estimate.
-// Source: Hanley & Lippman-Hand 1983, "If Nothing Goes Wrong, Is Everything All Right?".
+// An estimate of noise knows nothing of light that has not been found. Of N photons that a light
+// has sent, none landed in view: then, at 95 %, fewer than 3/N of its photons would, and the power
+// that may be missing is at most 3/N of the light's. With k landed it is the upper limit of a
+// Poisson number's mean, less what was found; from kEnoughPhotons on the halves of the render
+// differ in that light, and its noise is part of the estimate. Source: Hanley & Lippman-Hand 1983,
+// "If Nothing Goes Wrong, Is Everything All Right?".
 //
-// The bound falls with N alone while nothing is found, so the first checkpoint at which it is below a
-// target is known beforehand: it spends its 5 % once, however many checkpoints there are.
+// The bound falls with N alone while nothing is found, so the first checkpoint at which it is below
+// a target is known beforehand: it spends its 5 % once, however many checkpoints there are.
 //
-// From power to an error of the image, assumed: a watt that lands in view brings as much radiance as
-// the watts that were found there do. Which pixels it lands on is not assumed: the worst case counts
-// (LargestRelativeError).
+// From power to an error of the image, assumed: a watt that lands in view brings as much radiance
+// as the watts that were found there do. Which pixels it lands on is not assumed: the worst case
+// counts (LargestRelativeError).
 #pragma once
 
 #include <cstdint>
@@ -30,9 +30,10 @@ inline constexpr std::uint64_t kEnoughPhotons = 100;
 // Poisson number that was `found`, less `found`; 0 from kEnoughPhotons on. MissingPhotons(0) = 3.0.
 [[nodiscard]] double MissingPhotons(std::uint64_t found);
 
-// The largest mean over pixels of error² / truth², without the kTrimmedShare of pixels in which it is
-// largest, when an even image lacks light of `share` of its mean, on any part of its pixels:
-// share² / (4 (share + kTrimmedShare)), on the share + 2 kTrimmedShare of pixels where it does most.
+// The largest mean over pixels of error² / truth², without the kTrimmedShare of pixels in which it
+// is largest, when an even image lacks light of `share` of its mean, on any part of its pixels:
+// share² / (4 (share + kTrimmedShare)), on the share + 2 kTrimmedShare of pixels where it does
+// most.
 [[nodiscard]] double LargestRelativeError(double share);
 // The same of error² / mean², which is larger.
 [[nodiscard]] double LargestAbsoluteError(double share);

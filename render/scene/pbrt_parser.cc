@@ -1018,7 +1018,8 @@ bool PbrtParser::DoShape() {
     is_stopped_ = true;
     return true;
   }
-  if (is_light && !diagnostics_.has_error() && !(shapes.Area() > 0)) WarnOfNoArea(place, list.subject());
+  if (is_light && !diagnostics_.has_error() && !(shapes.Area() > 0))
+    WarnOfNoArea(place, list.subject());
   if (is_light) {
     for (std::size_t i = 0; i < shapes.meshes.size(); ++i) {
       if (shapes.meshes[i].indices.empty()) continue;

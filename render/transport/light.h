@@ -1,10 +1,10 @@
 // Which lights are there, how strong is each, and where does their light go?
 //
-// Every emitting triangle, sphere, disk and every other light is one emitter; all emitters of a mesh
-// are one light. Emitters are chosen in proportion to their power (luminance), so that all photons
-// carry about the same flux, but for kEvenPhotonShare of the photons, which is even among the
-// lights: a light with a millionth of the power is sampled all the same. With a single light there
-// is no such share.
+// Every emitting triangle, sphere, disk and every other light is one emitter; all emitters of a
+// mesh are one light. Emitters are chosen in proportion to their power (luminance), so that all
+// photons carry about the same flux, but for kEvenPhotonShare of the photons, which is even among
+// the lights: a light with a millionth of the power is sampled all the same. With a single light
+// there is no such share.
 #pragma once
 
 #include <cstddef>
@@ -137,7 +137,8 @@ class LightSet {
   // Fills in the choices of all emitters.
   void ShareOut();
   // Fills in lights(), given for each emitter the light it belongs to and the power of each light.
-  void GroupLights(const std::vector<std::size_t>& light_of, const std::vector<double>& light_power);
+  void GroupLights(const std::vector<std::size_t>& light_of,
+                   const std::vector<double>& light_power);
   [[nodiscard]] Vec3 CentreOf(const Emitter& emitter) const;
   [[nodiscard]] const Emitter& Choose(const std::vector<double>& cumulative, double u) const;
   [[nodiscard]] const Emitter* EmitterOf(const SurfacePoint& point) const;

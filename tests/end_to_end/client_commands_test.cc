@@ -246,6 +246,52 @@ TEST_F(ClientCommandsTest, MisuseIsRefusedWithCodeTwo) {
   EXPECT_EQ(Run({"render", "--help"}).code, 0);
 }
 
+// A light behind the floor, one without area, and a target: nothing is found, nothing is claimed.
+TEST_F(ClientCommandsTest, ABlackImageIsSaidToBeOneAndReachesNoTarget) {
+  std::ofstream(In("black.pbrt"))
+      << "LookAt 0 0 1  0 0 0  0 1 0\nCamera \"perspective\" \"float fov\" [40]\n"
+         "WorldBegin\nLightSource \"point\" \"point3 from\" [0 0 -2]\n"
+         "AttributeBegin\nAreaLightSource \"diffuse\"\n"
+         "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 2 0 0] \"integer indices\" [0 1 2]\n"
+         "AttributeEnd\nShape \"disk\" \"float radius\" [9]\n";
+  const Ran ran = Run({"render", In("black.pbrt"), "-o", In("a.exr"), "--size", "8x8", "--error",
+                       "3%", "--passes", "40", "--json"});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const json report = json::parse(ran.out);
+  EXPECT_EQ(report["stop_reason"], "PASSES") << "not by its error";
+  EXPECT_FALSE(report.contains("relative_error"));
+  EXPECT_EQ(report["nothing_found"], true);
+  EXPECT_NE(ran.err.find("black.pbrt:7:1: warning: Shape \"trianglemesh\" has no area"),
+            std::string::npos)
+      << ran.err;
+  EXPECT_NE(ran.err.find("warning: the image is black after 2560 photons"), std::string::npos)
+      << ran.err;
+  EXPECT_NE(ran.err.find("light 1 (a point light at (0, 0, -2)): no photon of 2560"),
+            std::string::npos)
+      << ran.err;
+}
+
+TEST_F(ClientCommandsTest, ARendersReportCarriesItsErrorAndTheTrueOne) {
+  ASSERT_EQ(Run(SmallRender({"-o", In("a.exr")})).code, 0);
+  const Ran ran =
+      Run(SmallRender({"-o", In("b.exr"), "--seed", "5", "--reference", In("a.exr"), "--json"}));
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  const json error = json::parse(ran.out)["relative_error"];
+  EXPECT_GT(error["estimate"].get<double>(), 0);
+  EXPECT_GT(error["high"].get<double>(), error["estimate"].get<double>());
+  EXPECT_GT(error["true"].get<double>(), 0);
+}
+
+TEST_F(ClientCommandsTest, FlagsThatAControllerIgnoresAreWarnedOf) {
+  const Ran ignored = Run(SmallRender({"-o", In("a.exr"), "--bias", "1%"}));
+  EXPECT_EQ(ignored.code, 0);
+  EXPECT_NE(ignored.err.find("appm ignores them"), std::string::npos) << ignored.err;
+  const Ran used =
+      Run(SmallRender({"-o", In("a.exr"), "--bias", "1%", "--radius-controller", "frequency-mse"}));
+  EXPECT_EQ(used.err.find("ignores"), std::string::npos) << used.err;
+  EXPECT_EQ(Run(SmallRender({"-o", In("a.exr"), "--error", "3"})).code, 2);
+}
+
 TEST_F(ClientCommandsTest, OneFileCannotBeBothImages) {
   const std::string name = In("a.exr");
   for (const std::string& other : {name, In("./a.exr"), In("no/../a.exr")}) {

@@ -23,8 +23,7 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
 
 // The room of hole.pbrt with another hole, from `low` to `high`, and another light behind it.
 Scene WithHole(const std::string& low, const std::string& high, const std::string& intensity) {
-  std::string text =
-      ReadFile(std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/hole.pbrt").value();
+  std::string text = ReadFile(std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/hole.pbrt").value();
   text = Replaced(Replaced(text, "0.4985", low), "0.5015", high);
   text = Replaced(text, "[3e6 3e6 3e6]", "[" + intensity + " " + intensity + " " + intensity + "]");
   MemoryFiles files({{"room.pbrt", text}});

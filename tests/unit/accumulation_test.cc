@@ -62,8 +62,8 @@ TEST(PassSumsTest, CountsPhotonsByLight) {
   ASSERT_TRUE(sums.Add(other).ok());
   const BatchTally before = sums.tally();
   ASSERT_TRUE(sums.Add(one).ok());
-  EXPECT_EQ(sums.tally().lights,
-            (std::vector<LightTally>{{.sent = 9, .in_view = {1, 3}}, {.sent = 4, .in_view = {4, 0}}}));
+  EXPECT_EQ(sums.tally().lights, (std::vector<LightTally>{{.sent = 9, .in_view = {1, 3}},
+                                                          {.sent = 4, .in_view = {4, 0}}}));
   ASSERT_TRUE(sums.Subtract(one).ok());
   EXPECT_EQ(sums.tally(), before);
   EXPECT_TRUE(absl::IsOutOfRange(sums.Subtract(one))) << "was taken out";
@@ -73,13 +73,13 @@ TEST(PassSumsTest, CountsPhotonsByLight) {
 TEST(PassSumsTest, RefusesPhotonsByLightThatContradictThePhotons) {
   using Lights = std::vector<LightTally>;
   PassSums sums(4);
-  for (const Lights& lights : {Lights{{.sent = 11}},                        // more than there were
-                               Lights{{.sent = 6}, {.sent = 5}},            // together
-                               Lights{{.sent = ~std::uint64_t{0}}, {.sent = 11}},
-                               Lights{{.sent = 3, .in_view = {4, 0}}},      // found, never sent
-                               Lights{{.sent = 3, .in_view = {0, 4}}},
-                               Lights{{.sent = 3}, {}},                     // ends with none
-                               Lights(kMaxLightTallies + 1, {.sent = 0})}) {
+  for (const Lights& lights :
+       {Lights{{.sent = 11}},              // more than there were
+        Lights{{.sent = 6}, {.sent = 5}},  // together
+        Lights{{.sent = ~std::uint64_t{0}}, {.sent = 11}},
+        Lights{{.sent = 3, .in_view = {4, 0}}},                           // found, never sent
+        Lights{{.sent = 3, .in_view = {0, 4}}}, Lights{{.sent = 3}, {}},  // ends with none
+        Lights(kMaxLightTallies + 1, {.sent = 0})}) {
     Accumulation bad = Make({0}, 1);
     bad.tally.lights = lights;
     EXPECT_TRUE(absl::IsInvalidArgument(sums.Add(bad)));

@@ -125,9 +125,10 @@ v1::Job MissingJob(double share) {
 }
 
 TEST(MissingLightSentenceTest, NamesTheLight) {
-  EXPECT_EQ(MissingLightSentence(MissingJob(0.1)),
-            "light 2 (a disk): no photon of 12000 has reached the view, light worth up to 40.0 % of "
-            "the image may be missing");
+  EXPECT_EQ(
+      MissingLightSentence(MissingJob(0.1)),
+      "light 2 (a disk): no photon of 12000 has reached the view, light worth up to 40.0 % of "
+      "the image may be missing");
   EXPECT_EQ(MissingLightSentence(MissingJob(1e-9)), "") << "too little to matter";
   EXPECT_EQ(MissingLightSentence(v1::Job()), "");
 }
@@ -145,9 +146,9 @@ TEST(MissingLightSentenceTest, TellsFewFromNoneAndOneWayFromAnother) {
       << MissingLightSentence(job);
   job.mutable_lights(1)->set_in_view_other(2);
   job.mutable_lights(1)->set_in_view_caustic(5000);
-  EXPECT_NE(MissingLightSentence(job).find(
-                "only 2 of 12000 photons have reached the view by other ways"),
-            std::string::npos)
+  EXPECT_NE(
+      MissingLightSentence(job).find("only 2 of 12000 photons have reached the view by other ways"),
+      std::string::npos)
       << MissingLightSentence(job);
 }
 

@@ -49,9 +49,9 @@ TEST(ReportTest, AJobTellsItsFigures) {
 TEST(ReportTest, AJobsReportCarriesItsError) {
   v1::Job job = ConvergingJob(12);
   json report = json::parse(JobReport(job));
-  EXPECT_DOUBLE_EQ(report["relative_error"]["estimate"].get<double>(),
-                   std::sqrt(job.convergence(11).relative().noise() +
-                             job.convergence(11).relative().bias()));
+  EXPECT_DOUBLE_EQ(
+      report["relative_error"]["estimate"].get<double>(),
+      std::sqrt(job.convergence(11).relative().noise() + job.convergence(11).relative().bias()));
   EXPECT_DOUBLE_EQ(report["relative_error"]["true"].get<double>(),
                    std::sqrt(job.convergence(11).true_relative()));
   EXPECT_FALSE(report.contains("nothing_found"));

@@ -452,8 +452,7 @@ TEST(LightSetTest, EachLightHasAnEvenShareOfSomePhotons) {
   double flux = 0;
   for (int i = 0; i < kPhotons; ++i) {
     Emission emission;
-    ASSERT_TRUE(
-        lit.lights.SampleEmission((i + 0.5) / kPhotons, 0.3F, 0.6F, 0.2F, 0.7F, emission));
+    ASSERT_TRUE(lit.lights.SampleEmission((i + 0.5) / kPhotons, 0.3F, 0.6F, 0.2F, 0.7F, emission));
     from_point += emission.emitter == 2 ? 1 : 0;
     flux += static_cast<double>(emission.flux.g) / kPhotons;
     EXPECT_EQ(lit.lights.emitter(emission.emitter).light, emission.emitter == 2 ? 1 : 0);

@@ -216,6 +216,20 @@ TEST(AccumulationCodecTest, BringsARealisticOneBackInUnder9BytesATouchedHitpoint
   EXPECT_EQ(*decoded, accumulation);
 }
 
+TEST(AccumulationCodecTest, RefusesPhotonsByLightThatCannotBe) {
+  const auto decodes = [](std::vector<LightTally> lights) {
+    Accumulation accumulation;
+    accumulation.tally.photons = 100;
+    accumulation.tally.lights = std::move(lights);
+    return DecodeAccumulation(EncodeAccumulation(accumulation, 10), 10).ok();
+  };
+  EXPECT_TRUE(decodes({{.sent = 40, .in_view = {40, 0}}, {.sent = 60}}));
+  EXPECT_TRUE(decodes(std::vector<LightTally>(kMaxLightTallies, {.sent = 1})));
+  EXPECT_FALSE(decodes(std::vector<LightTally>(kMaxLightTallies + 1, {.sent = 1})));
+  EXPECT_FALSE(decodes({{.sent = 101}}));
+  EXPECT_FALSE(decodes({{.sent = 40, .in_view = {41, 0}}}));
+}
+
 TEST(AccumulationCodecTest, BringsSparseAndEmptyOnesBack) {
   for (const double share : {0.0, 0.001, 0.05, 1.0}) {
     const Accumulation accumulation = RealisticAccumulation(kPixels, share);
