@@ -201,6 +201,10 @@ int Run(int argc, char** argv) {
   diff->add_option("--clip", metrics.clip, "clip every channel of both at this value first")
       ->check(CLI::PositiveNumber);
   diff->add_option("--trim", metrics.trim_share, "leave out this share of the worst pixels");
+  diff->add_option("--floor", metrics.floor,
+                   "floor of relMSE (default: 0.01 times B's squared mean luminance without its "
+                   "brightest 1 %)")
+      ->check(CLI::NonNegativeNumber);
   diff->add_option("--mask", mask_path, "EXR file; pixels that are 0 in it are left out");
   add_json(diff);
 

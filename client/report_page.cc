@@ -276,8 +276,9 @@ std::string Convergence(const v1::Job& job) {
                   ErrorChart(job, ErrorAgainst::kPhotons), "</div>\n");
   html +=
       "<p class=\"muted\">The relative error is the root of relMSE, the mean of error² / (value² + "
-      "0.01) over pixels and channels, without the worst 0.1 % of pixels. Squared, noise and bias "
-      "add up to it.";
+      "floor) over pixels and channels, without the worst 0.1 % of pixels. The floor is a hundredth "
+      "of the squared mean luminance of the image without its brightest 1 %. Squared, noise and "
+      "bias add up to it.";
   if (job.has_reference()) {
     html += " The true error is that against the job's reference image.";
   }

@@ -14,6 +14,7 @@
 #include "client/selfcheck_agreement.h"
 #include "client/selfcheck_fixed_point.h"
 #include "client/selfcheck_scenes.h"
+#include "render/film/image_metrics.h"
 
 namespace lucerna {
 namespace {
@@ -138,6 +139,58 @@ StatusOr<CaseOutcome> LightScalesExactly(SelfcheckBench& bench) {
     }
   }
   return SameBits(bench, changes);
+}
+
+// Relative errors of `base` and `image` that are not the same number: in the convergence record of
+// the jobs, and in the difference of each image from one of another seed.
+StatusOr<int> DifferentErrors(const SelfcheckRender& base, const Image& base_of_other_seed,
+                              const SelfcheckRender& image, const Image& image_of_other_seed) {
+  int different = std::abs(base.job.convergence_size() - image.job.convergence_size());
+  for (int i = 0; i < std::min(base.job.convergence_size(), image.job.convergence_size()); ++i) {
+    const v1::SquaredError& a = base.job.convergence(i).relative();
+    const v1::SquaredError& b = image.job.convergence(i).relative();
+    different += a.noise() != b.noise();
+    different += a.bias() != b.bias();
+    different += a.low() != b.low();
+    different += a.high() != b.high();
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const ImageMetrics a, Compare(base.image, base_of_other_seed));
+  LUCERNA_ASSIGN_OR_RETURN(const ImageMetrics b, Compare(image.image, image_of_other_seed));
+  return different + (a.rel_mse != b.rel_mse);
+}
+
+StatusOr<CaseOutcome> LightScalesNoError(SelfcheckBench& bench) {
+  int different = 0;
+  std::size_t images = 0;
+  std::string first;
+  for (const CheckRoom& room : Rooms()) {
+    const RenderOverrides overrides = Small(Controller::kAppm);
+    RenderOverrides other_seed = overrides;
+    other_seed.seed = 8;
+    LUCERNA_ASSIGN_OR_RETURN(const SelfcheckRender* base, bench.Render(TextOf(room), overrides));
+    LUCERNA_ASSIGN_OR_RETURN(const SelfcheckRender* base_of_other,
+                             bench.Render(TextOf(room), other_seed));
+    if (base->job.convergence().empty()) {
+      return absl::InternalError("the job recorded no estimate of its error");
+    }
+    for (const int light : {-60, 17, 60}) {
+      CheckRoom changed = room;
+      changed.light_scale = std::ldexp(1.0, light);
+      LUCERNA_ASSIGN_OR_RETURN(const SelfcheckRender* image,
+                               bench.Render(TextOf(changed), overrides));
+      LUCERNA_ASSIGN_OR_RETURN(const SelfcheckRender* image_of_other,
+                               bench.Render(TextOf(changed), other_seed));
+      LUCERNA_ASSIGN_OR_RETURN(
+          const int of_this,
+          DifferentErrors(*base, base_of_other->image, *image, image_of_other->image));
+      different += of_this;
+      ++images;
+      if (of_this > 0 && first.empty())
+        first = absl::StrFormat("; first in %s with light by 2^%d", NameOf(room), light);
+    }
+  }
+  return AtMost(different, 0,
+                absl::StrCat("relative errors that differ in ", images, " images", first));
 }
 
 // Renders of `room` with seeds from `first_seed` on, enough photons that noise is a few percent.
@@ -336,6 +389,8 @@ std::vector<SelfcheckCase> MetamorphicCases() {
       {"workers-bits", "1 and 3 workers of one thread give the same image", WorkersKeepBits},
       {"light-bits", "light times 2^-60 to 2^60 gives the image times the same",
        LightScalesExactly},
+      {"light-error", "light times 2^-60 to 2^60 gives the same relative errors",
+       LightScalesNoError},
   };
 }
 

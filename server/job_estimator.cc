@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "render/base/parallel.h"
+#include "render/estimate/relative_error.h"
 #include "render/estimate/statistics.h"
 #include "render/film/film.h"
 #include "render/math/color_space.h"
@@ -191,12 +192,23 @@ ErrorEstimate JobEstimator::EstimateError(int look) const {
     sums.square = exposure * exposure * errors.square_sum()[pixel];
     return sums;
   };
-  return lucerna::EstimateError(state_->settings.crop_width(), state_->settings.crop_height(),
-                                passes_applied(), look, sums_at);
+  ErrorEstimate estimate =
+      lucerna::EstimateError(state_->settings.crop_width(), state_->settings.crop_height(),
+                             passes_applied(), look, sums_at);
+  // Without any light a black image is exact.
+  if (IsBlack(state_->lights->TotalPower())) estimate.relative = {};
+  return estimate;
 }
 
 TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
   const double to_pixel = state_->scene.film.exposure / static_cast<double>(passes_applied());
+  std::vector<double> luminances(reference.size());
+  for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
+    const Rgb right = reference[pixel];
+    luminances[pixel] = LuminanceOf(
+        {static_cast<double>(right.r), static_cast<double>(right.g), static_cast<double>(right.b)});
+  }
+  const double floor = RelativeErrorFloor(luminances);
   std::vector<TrueError> pixels(reference.size());
   for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
     const RgbSum sum = state_->Sum(pixel);
@@ -204,7 +216,7 @@ TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
       const auto right = static_cast<double>(reference[pixel][static_cast<int>(c)]);
       const double off = sum[c] * to_pixel - right;
       pixels[pixel].absolute += off * off;
-      pixels[pixel].relative += off * off / (right * right + 0.01);
+      pixels[pixel].relative += RelativeSquare(off * off, right, floor);
     }
   }
   const auto kept =

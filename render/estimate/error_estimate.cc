@@ -6,12 +6,10 @@
 #include <utility>
 
 #include "render/base/status.h"
+#include "render/estimate/relative_error.h"
 
 namespace lucerna {
 namespace {
-
-// Of relMSE, as in film/image_metrics.h.
-constexpr double kEpsilon = 0.01;
 
 // What the models of noise may be off by, in the logarithm of the squared error: a tenth of the
 // error. Most of it is light so rare that the halves have hardly seen it.
@@ -348,6 +346,14 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
     return MeanAround(width, height, std::move(means));
   };
   const std::array<MeanAround, 3> around = {mean_around(0), mean_around(1), mean_around(2)};
+  std::vector<double> luminances(count);
+  for (std::size_t i = 0; i < count; ++i)
+    luminances[i] = LuminanceOf(sums_at(i).all) / passes;
+  const double floor = RelativeErrorFloor(luminances);
+  if (floor == 0) {
+    const SquaredError unknown = {.noise = HUGE_VAL, .bias = 0, .low = 0, .high = HUGE_VAL};
+    return {.relative = unknown, .absolute = {}, .noise_factor = 1};
+  }
 
   std::vector<PixelError> pixels(count);
   std::vector<float> differences(count);
@@ -368,17 +374,17 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
         const double own = sums.all[c] / passes;
         const double agreed = Middle(even, odd, around[c](x, y));
         const double least = std::min(own, agreed);
-        // One over value² + kEpsilon. The agreed value is too large where rare light fell on the
+        // One over value² + floor. The agreed value is too large where rare light fell on the
         // dark, the least one too small where lamps are seen in few samples.
-        const double weight = 0.5 / (agreed * agreed + kEpsilon) + 0.5 / (least * least + kEpsilon);
+        const double weight = 0.5 / (agreed * agreed + floor) + 0.5 / (least * least + floor);
         const double noise = difference[c] * difference[c] * to_noise;
         noise_sum += noise;
         relative_noise += noise * weight;
         signed_noise += difference[c] * std::sqrt(weight);
         const double square = sums.bias_color[c] * sums.bias_color[c];
         color_square += square;
-        color_to_even += square / (even * even + kEpsilon);
-        color_to_odd += square / (odd * odd + kEpsilon);
+        color_to_even += square / (even * even + floor);
+        color_to_odd += square / (odd * odd + floor);
       }
       pixels[pixel].noise = static_cast<float>(noise_sum / 3);
       pixels[pixel].relative_noise = static_cast<float>(relative_noise / 3);

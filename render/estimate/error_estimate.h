@@ -17,7 +17,8 @@
 // Source: Hachisuka, Jarosz & Jensen 2010, "A Progressive Error Estimation Framework for Photon
 // Density Estimation", with kernels' differences in place of derivatives.
 //
-// Relative errors are squares over (value² + 0.01), and the value is not known either. What two
+// Relative errors are squares over (value² + floor), where the floor is that of the image rendered
+// so far (relative_error.h), and the value is not known either. What two
 // halves and the pixels around agree on is one guess, the least of that and the pixel's own mean
 // another, and the mean of what they give is used.
 //
@@ -87,8 +88,9 @@ struct SquaredError {
 };
 
 struct ErrorEstimate {
-  // Mean over pixels and channels of error² / (value² + 0.01): what ImageMetrics calls rel_mse with
-  // a trim_share of kTrimmedShare.
+  // Mean over pixels and channels of error² / (value² + floor): what ImageMetrics calls rel_mse with
+  // a trim_share of kTrimmedShare. Infinite while the image is black:
+  // relative to nothing there is no error, and the light may not have been found yet.
   SquaredError relative;
   // Mean of error² over the same pixels: the square of its rmse.
   SquaredError absolute;

@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "render/estimate/error_estimate.h"
+#include "render/estimate/relative_error.h"
 #include "render/film/reference.h"
 
 namespace lucerna {
@@ -113,6 +115,16 @@ StatusOr<Plane> FitMask(const Image& mask, Size size, const MetricsOptions& opti
   return FitPlane(*channel, mask_size, size, options);
 }
 
+// What is masked may be other than finite: it does not count as light.
+double FloorOf(const std::array<Plane, 3>& planes) {
+  std::vector<double> luminances(planes[0].size());
+  for (std::size_t i = 0; i < luminances.size(); ++i) {
+    const double luminance = LuminanceOf({planes[0][i], planes[1][i], planes[2][i]});
+    luminances[i] = std::isfinite(luminance) ? luminance : 0;
+  }
+  return RelativeErrorFloor(luminances);
+}
+
 double Ratio(double a, double b) {
   return a == b ? 1 : a / b;
 }
@@ -145,12 +157,24 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
     LUCERNA_ASSIGN_OR_RETURN(mask, FitMask(*options.mask, size, options));
   }
 
+  const std::size_t count = a[0].size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!mask.empty() && mask[i] == 0) continue;
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      if (std::isfinite(a[channel][i]) && std::isfinite(b[channel][i])) continue;
+      return absl::InvalidArgumentError(
+          absl::StrCat("the ", std::isfinite(a[channel][i]) ? "reference" : "image",
+                       " is not finite at pixel (", i % static_cast<std::size_t>(size.width), ", ",
+                       i / static_cast<std::size_t>(size.width), ")"));
+    }
+  }
+  const double floor = options.floor ? *options.floor : FloorOf(b);
+
   struct Compared {
     double relative_error = 0;  // summed over channels
     std::size_t pixel = 0;
   };
   std::vector<Compared> compared;
-  const std::size_t count = a[0].size();
   compared.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
     if (!mask.empty() && mask[i] == 0) continue;
@@ -158,13 +182,7 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
     for (std::size_t channel = 0; channel < 3; ++channel) {
       const double va = a[channel][i];
       const double vb = b[channel][i];
-      if (!std::isfinite(va) || !std::isfinite(vb)) {
-        return absl::InvalidArgumentError(
-            absl::StrCat("the ", std::isfinite(va) ? "reference" : "image",
-                         " is not finite at pixel (", i % static_cast<std::size_t>(size.width),
-                         ", ", i / static_cast<std::size_t>(size.width), ")"));
-      }
-      relative_error += (va - vb) * (va - vb) / (vb * vb + options.epsilon);
+      relative_error += RelativeSquare((va - vb) * (va - vb), vb, floor);
     }
     compared.push_back({relative_error, i});
   }
@@ -182,6 +200,7 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
 
   ImageMetrics metrics;
   metrics.pixels = kept;
+  metrics.floor = floor;
   std::array<double, 3> sum_a{};
   std::array<double, 3> sum_b{};
   double squares = 0;
@@ -196,7 +215,7 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
       if (noise) {
         const double deviation = (*noise)[channel][one.pixel];
         noise_squares += deviation * deviation;
-        relative_noise += deviation * deviation / (vb * vb + options.epsilon);
+        relative_noise += RelativeSquare(deviation * deviation, vb, floor);
       }
       sum_a[channel] += va;
       sum_b[channel] += vb;

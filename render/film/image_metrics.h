@@ -18,8 +18,10 @@ struct MetricsOptions {
   // the smaller width and height.
   Fit fit = Fit::kExact;
   double clip = HUGE_VAL;  // every channel of both images is clipped to this first
-  double epsilon = 0.01;   // of relMSE
   double trim_share = 0;   // share of the pixels with the largest relative error left out
+  // Floor of relMSE; absent: that of the reference (render/estimate/relative_error.h), clipped and
+  // scaled as it is compared, of all pixels whatever the mask.
+  std::optional<double> floor = std::nullopt;
   // Pixels whose R (or Y, or first channel) is 0 in it are left out. As large as the comparison;
   // a larger one is cropped or averaged as the images are.
   const Image* mask = nullptr;
@@ -28,7 +30,8 @@ struct MetricsOptions {
 struct ImageMetrics {
   std::uint64_t pixels = 0;       // compared
   double rmse = 0;                // sqrt of the mean over pixels and channels of (a - b)²
-  double rel_mse = 0;             // mean over pixels and channels of (a - b)² / (b² + epsilon)
+  double rel_mse = 0;             // mean over pixels and channels of (a - b)² / (b² + floor)
+  double floor = 0;               // of rel_mse
   double mean_a = 0, mean_b = 0;  // over pixels and channels
   double mean_ratio = 0;          // mean_a / mean_b
   std::array<double, 3> channel_mean_ratio{};

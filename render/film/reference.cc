@@ -6,16 +6,30 @@
 #include <utility>
 #include <vector>
 
+#include "render/estimate/error_estimate.h"
+#include "render/estimate/relative_error.h"
+
 namespace lucerna {
 namespace {
 
-constexpr double kEpsilon = 0.01;  // of relMSE, as MetricsOptions has it
 constexpr char kRelMse[] = "lucerna.reference.rel_mse";
 constexpr char kSeed[] = "lucerna.seed";
 
 std::string TextOf(const Image& image, const std::string& key) {
   const auto found = image.metadata.find(key);
   return found == image.metadata.end() ? std::string() : found->second;
+}
+
+// Of an image whose channels are R, G, B.
+std::vector<double> LuminancesOf(const Image& image) {
+  std::vector<double> luminances(image.channels[0].pixels.size());
+  for (std::size_t i = 0; i < luminances.size(); ++i) {
+    const auto value = [&](std::size_t c) {
+      return static_cast<double>(image.channels[c].pixels[i]);
+    };
+    luminances[i] = LuminanceOf({value(0), value(1), value(2)});
+  }
+  return luminances;
 }
 
 }  // namespace
@@ -36,7 +50,6 @@ StatusOr<Image> MakeReference(const Image& a, const Image& b) {
   reference.height = a.height;
   constexpr std::array<const char*, 3> kColour = {"R", "G", "B"};
   std::vector<ImageChannel> noise;
-  double relative = 0;
   double absolute = 0;
   double samples = 0;
   for (std::size_t c = 0; c < 3; ++c) {
@@ -59,12 +72,20 @@ StatusOr<Image> MakeReference(const Image& a, const Image& b) {
       const double error = std::abs(va - vb) / 2;
       mean.pixels[i] = static_cast<float>(value);
       deviation.pixels[i] = static_cast<float>(error);
-      relative += error * error / (value * value + kEpsilon);
       absolute += error * error;
     }
     samples += static_cast<double>(mean.pixels.size());
     reference.channels.push_back(std::move(mean));
     noise.push_back(std::move(deviation));
+  }
+  const double floor = RelativeErrorFloor(LuminancesOf(reference));
+  double relative = 0;
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t i = 0; i < noise[c].pixels.size(); ++i) {
+      const auto value = static_cast<double>(reference.channels[c].pixels[i]);
+      const auto error = static_cast<double>(noise[c].pixels[i]);
+      relative += RelativeSquare(error * error, value, floor);
+    }
   }
   std::ranges::move(noise, std::back_inserter(reference.channels));
 

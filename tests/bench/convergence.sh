@@ -33,8 +33,9 @@ cat > "$page" <<'PAGE'
 
 Made by `bash tests/bench/convergence.sh`: for every scene a reference by `lucerna reference`, and
 `lucerna compare` with seven settings in turn, several repetitions, errors after equal processor
-time. relMSE is the mean of error² / (value² + 0.01) without the worst 0.1 % of pixels; the
-reference's own noise is taken off.
+time. relMSE is the mean of error² / (value² + floor) without the worst 0.1 % of pixels; the floor is
+0.01 times the squared mean luminance of the reference without its brightest 1 % of lit pixels. The
+reference's own noise is subtracted.
 
 What theory says. With `ppm` and alpha 2/3 the squared error falls as n^-2/3, variance and squared
 bias alike. A fixed radius has a variance that falls as n^-1 until its bias is all that is left;

@@ -75,7 +75,8 @@ TEST(ErrorEstimateTest, FindsNoiseAndBias) {
     EXPECT_NEAR(estimate.absolute.bias, 1.5 * 0.01,
                 4 * 1.5 * (3.0 / 8 * half * half + 0.1 * half) / 96)
         << passes;
-    EXPECT_NEAR(estimate.relative.total() / (estimate.absolute.total() / (2.1 * 2.1 + 0.01)), 1,
+    // The floor is a hundredth of the squared mean.
+    EXPECT_NEAR(estimate.relative.total() / (estimate.absolute.total() / (1.01 * 2.1 * 2.1)), 1,
                 0.15)
         << passes;
     EXPECT_NEAR(estimate.noise_factor, 1, 0.06) << passes;
@@ -106,6 +107,59 @@ ErrorEstimate EstimateOfPasses(const Make& make) {
     statistics.AddPass(pass, radiance, biases);
   }
   return EstimateOf(statistics, all, 1);
+}
+
+// Passes with noise, a bias that changes from place to place, and some bright emitters; all of it
+// times `factor`.
+ErrorEstimate EstimateOfLightTimes(double factor) {
+  KeyedRng rng(31);
+  const auto uniform = [&] { return static_cast<double>(rng.Uniform()); };
+  ErrorStatistics statistics(kPixels);
+  std::vector<RgbSum> all(kPixels);
+  for (std::uint64_t pass = 0; pass < 8; ++pass) {
+    std::vector<RgbSum> radiance(kPixels);
+    std::vector<double> biases(kPixels);
+    for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
+      const double value = factor * (pixel % 211 == 0 ? 500 : 0.1 + 3 * uniform());
+      radiance[pixel] = {value, value, value};
+      biases[pixel] = factor * (0.1 * std::sin(static_cast<double>(pixel % kSide) / 9) + uniform());
+      for (double& sum : all[pixel])
+        sum += value;
+    }
+    statistics.AddPass(pass, radiance, biases);
+  }
+  return EstimateOf(statistics, all, 1);
+}
+
+TEST(ErrorEstimateTest, LightTimesAnyFactorGivesTheSameRelativeError) {
+  const SquaredError base = EstimateOfLightTimes(1).relative;
+  EXPECT_GT(base.noise, 0.01);
+  EXPECT_GT(base.bias, 0.001);
+  for (const int exponent : {-60, -7, 1, 16, 60}) {
+    const SquaredError scaled = EstimateOfLightTimes(std::ldexp(1.0, exponent)).relative;
+    EXPECT_EQ(scaled.noise, base.noise) << exponent;
+    EXPECT_EQ(scaled.bias, base.bias) << exponent;
+    EXPECT_EQ(scaled.low, base.low) << exponent;
+    EXPECT_EQ(scaled.high, base.high) << exponent;
+  }
+  // Means around a pixel, noise and bias are floats, rounded at most some eight times; errors of
+  // 2^-24 of a mean of 49 values count ten times in a difference a tenth as large.
+  for (const double factor : {0.4, 3.0, 40000.0}) {
+    const SquaredError scaled = EstimateOfLightTimes(factor).relative;
+    EXPECT_NEAR(scaled.noise / base.noise, 1, 1e-5) << factor;
+    EXPECT_NEAR(scaled.bias / base.bias, 1, 1e-5) << factor;
+    EXPECT_NEAR(scaled.low / base.low, 1, 1e-5) << factor;
+    EXPECT_NEAR(scaled.high / base.high, 1, 1e-5) << factor;
+  }
+}
+
+// Nothing has been found yet: that is no error of 0.
+TEST(ErrorEstimateTest, ABlackImageHasNoKnownRelativeError) {
+  const ErrorEstimate estimate =
+      EstimateOfPasses([](std::uint64_t, std::size_t) { return ValueAndBias{}; });
+  EXPECT_EQ(estimate.relative.total(), HUGE_VAL);
+  EXPECT_EQ(estimate.relative.high, HUGE_VAL);
+  EXPECT_EQ(estimate.absolute.total(), 0);
 }
 
 // What is known of the bias comes from the photons that the value comes from: where chance brings

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -30,7 +31,9 @@ TEST(ImageMetricsTest, WorkedByHand) {
   const ImageMetrics metrics = Compared(Gray(2, 1, {2, 2}), Gray(2, 1, {1, 4}));
   EXPECT_EQ(metrics.pixels, 2U);
   EXPECT_DOUBLE_EQ(metrics.rmse, std::sqrt(2.5));
-  EXPECT_DOUBLE_EQ(metrics.rel_mse, (1 / 1.01 + 4 / 16.01) / 2);
+  // Mean luminance 2.5, of which a hundredth of the square.
+  EXPECT_DOUBLE_EQ(metrics.floor, 0.0625);
+  EXPECT_DOUBLE_EQ(metrics.rel_mse, (1 / 1.0625 + 4 / 16.0625) / 2);
   EXPECT_DOUBLE_EQ(metrics.mean_a, 2);
   EXPECT_DOUBLE_EQ(metrics.mean_b, 2.5);
   EXPECT_DOUBLE_EQ(metrics.mean_ratio, 0.8);
@@ -52,6 +55,45 @@ TEST(ImageMetricsTest, EqualImagesAreAtDistanceZeroAlsoWhenBlack) {
   EXPECT_EQ(metrics.rmse, 0);
   EXPECT_EQ(metrics.rel_mse, 0);
   EXPECT_EQ(metrics.mean_ratio, 1);
+}
+
+// A black reference has no relative error; the limit of ever darker ones is infinite.
+TEST(ImageMetricsTest, AnyErrorIsInfiniteRelativeToABlackReference) {
+  EXPECT_EQ(Compared(Gray(2, 1, {0, 1}), Gray(2, 1, {0, 0})).rel_mse, HUGE_VAL);
+}
+
+TEST(ImageMetricsTest, AFloorCanBeGiven) {
+  const MetricsOptions options = {.floor = 0.01};
+  const ImageMetrics metrics = Compared(Gray(2, 1, {2, 2}), Gray(2, 1, {1, 4}), options);
+  EXPECT_DOUBLE_EQ(metrics.rel_mse, (1 / 1.01 + 4 / 16.01) / 2);
+  EXPECT_EQ(metrics.floor, 0.01);
+}
+
+TEST(ImageMetricsTest, LightTimesAnyFactorGivesTheSameRelativeError) {
+  std::mt19937 random(5);
+  std::exponential_distribution<float> value(1);
+  std::vector<float> pixels(4096);
+  std::vector<float> noisy(pixels.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    pixels[i] = value(random) * (i % 100 == 0 ? 1000.0F : 1.0F);
+    noisy[i] = pixels[i] * (0.9F + 0.2F * value(random));
+  }
+  const auto compared = [&](float factor) {
+    std::vector<float> a = noisy;
+    std::vector<float> b = pixels;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      a[i] *= factor;
+      b[i] *= factor;
+    }
+    return Compared(Gray(64, 64, a), Gray(64, 64, b), {.trim_share = 0.001}).rel_mse;
+  };
+  const double base = compared(1);
+  EXPECT_GT(base, 0.01);
+  for (const int exponent : {-60, -3, 1, 17, 60})
+    EXPECT_EQ(compared(std::ldexp(1.0F, exponent)), base) << exponent;
+  // Pixels are floats: each is off by at most 2^-24, and a difference of a tenth by ten times that.
+  for (const float factor : {0.4F / 3, 0.3F, 7.0F, 40000.0F})
+    EXPECT_NEAR(compared(factor) / base, 1, 8 * 10 * 0x1p-24) << factor;
 }
 
 TEST(ImageMetricsTest, SizesMustAgreeUnlessToldOtherwise) {
@@ -89,7 +131,8 @@ TEST(ImageMetricsTest, TrimsTheWorstPixels) {
   const Image reference = Gray(4, 1, {1, 1, 2, 1});
   const ImageMetrics metrics = Compared(image, reference, {.trim_share = 0.25});
   EXPECT_EQ(metrics.pixels, 3U);
-  EXPECT_DOUBLE_EQ(metrics.rel_mse, 1 / 4.01 / 3);
+  // The floor is that of the whole reference: mean 5/4.
+  EXPECT_DOUBLE_EQ(metrics.rel_mse, 1 / (4 + 0.015625) / 3);
   EXPECT_EQ(Compare(image, reference, {.trim_share = 1}).status().code(),
             absl::StatusCode::kInvalidArgument);
 }
