@@ -20,8 +20,6 @@ constexpr double kModelError = 0.2;
 constexpr double kLeastBias = 0.5;
 constexpr double kMostBias = 2.5;
 
-// The share of squared bias that smoothing loses. Measured.
-constexpr double kSmoothedAway = 1.0 / 3;
 // The widest smoothing that is tried reaches over so many times the area over which noise is alike.
 constexpr double kWidest = 3;
 // How much less than narrower ones a wider smoothing may say, in deviations of theirs.
@@ -128,11 +126,10 @@ struct BiasHalves {
 
   // Squared bias, without the halves' noise: the product of one half with the other, smoothed.
   [[nodiscard]] std::vector<float> Squares(int width, int height, int reach) const {
-    constexpr auto kScale = static_cast<float>(0.5 / (1 - kSmoothedAway));
     const std::vector<float> smooth_even = Smoothed(width, height, reach, even);
     std::vector<float> squares = Smoothed(width, height, reach, odd);
     for (std::size_t i = 0; i < squares.size(); ++i)
-      squares[i] = kScale * (even[i] * squares[i] + smooth_even[i] * odd[i]);
+      squares[i] = 0.5F * (even[i] * squares[i] + smooth_even[i] * odd[i]);
     return squares;
   }
 };
@@ -202,23 +199,40 @@ struct SmoothedBias {
   double relative_sum = 0, absolute_sum = 0, deviation = 0;
 };
 
-// The biases of pixels: absolute, and relative to what the even passes and what the odd ones say. A
-// product of both halves' biases is free of noise only if its weight knows one of them alone.
-struct PixelBiases {
-  BiasHalves absolute, to_even, to_odd;
+// Which folds' biases are multiplied: one even, one odd. The weight of their product, one over the
+// squared value, comes from the other two, so that it shares no noise with it.
+struct FoldPair {
+  std::size_t even, odd;
 
-  explicit PixelBiases(std::size_t pixels) : absolute(pixels), to_even(pixels), to_odd(pixels) {}
+  [[nodiscard]] std::size_t other_even() const { return 2 - even; }
+  [[nodiscard]] std::size_t other_odd() const { return 4 - odd; }
+};
+constexpr std::array<FoldPair, 4> kFoldPairs = {{{0, 1}, {0, 3}, {2, 1}, {2, 3}}};
+
+// The biases of pixels: absolute, and relative. All products of fold pairs together are the product
+// of the two halves.
+struct PixelBiases {
+  BiasHalves absolute;
+  std::array<BiasHalves, kFoldPairs.size()> relative;
+
+  explicit PixelBiases(std::size_t pixels)
+      : absolute(pixels),
+        relative{BiasHalves(pixels), BiasHalves(pixels), BiasHalves(pixels), BiasHalves(pixels)} {}
 
   [[nodiscard]] SmoothedBias Smooth(int width, int height, int reach) const {
     SmoothedBias smooth;
     smooth.absolute = absolute.Squares(width, height, reach);
-    smooth.relative = to_even.Squares(width, height, reach);
-    const std::vector<float> relative_to_odd = to_odd.Squares(width, height, reach);
-    std::vector<float> differences(relative_to_odd.size());
+    smooth.relative.resize(smooth.absolute.size());
+    std::vector<float> differences(smooth.absolute.size());
+    for (const BiasHalves& pair : relative) {
+      const std::vector<float> squares = pair.Squares(width, height, reach);
+      for (std::size_t i = 0; i < squares.size(); ++i) {
+        smooth.relative[i] += squares[i];
+        differences[i] += pair.even[i] - pair.odd[i];
+      }
+    }
     double square_sum = 0;
     for (std::size_t i = 0; i < differences.size(); ++i) {
-      differences[i] = to_even.even[i] - to_even.odd[i];
-      smooth.relative[i] = 0.5F * (smooth.relative[i] + relative_to_odd[i]);
       const auto square = static_cast<double>(smooth.relative[i]);
       smooth.relative_sum += square;
       smooth.absolute_sum += static_cast<double>(smooth.absolute[i]);
@@ -234,6 +248,61 @@ struct PixelBiases {
   }
 };
 
+// The luminance without what the kernel is estimated to have added, from the folds that a fold pair
+// leaves. What is taken away is the estimate times the share of its square that is no noise in the
+// pixels around (Wiener's filter).
+class UnblurredLuminance {
+ public:
+  UnblurredLuminance(int width, int height, std::int64_t passes, const PixelSumsAt& sums_at) {
+    const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    for (std::size_t p = 0; p < kFoldPairs.size(); ++p) {
+      const std::size_t e = FoldOrSibling(kFoldPairs[p].other_even(), passes);
+      const std::size_t o = FoldOrSibling(kFoldPairs[p].other_odd(), passes);
+      const double even_passes = PassesOf(e, passes);
+      const double odd_passes = PassesOf(o, passes);
+      std::vector<float> products(count);
+      std::vector<float> noise(count);
+      std::vector<float> bias(count);
+      values_[p].resize(count);
+      for (std::size_t i = 0; i < count; ++i) {
+        const PixelSums sums = sums_at(i);
+        const double even = sums.bias[e] / even_passes;
+        const double odd = sums.bias[o] / odd_passes;
+        products[i] = static_cast<float>(even * odd);
+        noise[i] = static_cast<float>(0.25 * (even - odd) * (even - odd));
+        bias[i] = static_cast<float>(0.5 * (even + odd));
+        values_[p][i] = static_cast<float>(
+            0.5 * (sums.luminance[e] / even_passes + sums.luminance[o] / odd_passes));
+      }
+      products = Smoothed(width, height, kReach, products);
+      noise = Smoothed(width, height, kReach, noise);
+      for (std::size_t i = 0; i < count; ++i) {
+        if (!(products[i] > 0)) continue;
+        const float share = products[i] / (products[i] + noise[i]);
+        values_[p][i] = std::max(0.0F, values_[p][i] - share * bias[i]);
+      }
+    }
+  }
+
+  [[nodiscard]] double operator()(std::size_t pair, std::size_t pixel) const {
+    return static_cast<double>(values_[pair][pixel]);
+  }
+
+ private:
+  static constexpr int kReach = 2;
+
+  static double PassesOf(std::size_t fold, std::int64_t passes) {
+    return static_cast<double>((passes + static_cast<std::int64_t>(kFolds - 1 - fold)) /
+                               static_cast<std::int64_t>(kFolds));
+  }
+  // Before there are kFolds passes, the last folds have none.
+  static std::size_t FoldOrSibling(std::size_t fold, std::int64_t passes) {
+    return static_cast<std::int64_t>(fold) < passes ? fold : fold - 2;
+  }
+
+  std::array<std::vector<float>, kFoldPairs.size()> values_;
+};
+
 // Squared bias as the widest smoothing has it that says hardly less than the narrower ones.
 struct ChosenBias {
   SmoothedBias bias;
@@ -242,11 +311,11 @@ struct ChosenBias {
 };
 
 ChosenBias Choose(int width, int height, const PixelBiases& biases, double noise_area) {
-  ChosenBias chosen{.bias = biases.Smooth(width, height, 2)};
+  ChosenBias chosen{.bias = biases.Smooth(width, height, 1)};
   double most_relative = chosen.bias.relative_sum;
   double most_absolute = chosen.bias.absolute_sum;
   double least = most_relative - kUnsure * chosen.bias.deviation;
-  for (int reach = 4; reach * reach <= 1 + kWidest * noise_area; reach *= 2) {
+  for (int reach = 2; reach * reach <= 1 + kWidest * noise_area; reach *= 2) {
     SmoothedBias wider = biases.Smooth(width, height, reach);
     if (wider.relative_sum < least) break;
     most_relative = std::max(most_relative, wider.relative_sum);
@@ -296,20 +365,19 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::
 
 }  // namespace
 
-ErrorStatistics::ErrorStatistics(std::size_t pixels) : even_sum_(pixels), square_sum_(pixels) {
-  for (std::vector<double>& sum : bias_sum_)
-    sum.resize(pixels);
-}
+ErrorStatistics::ErrorStatistics(std::size_t pixels)
+    : even_sum_(pixels), square_sum_(pixels), luminance_sums_(pixels), bias_sums_(pixels) {}
 
 void ErrorStatistics::AddPass(std::uint64_t pass, std::span<const RgbSum> radiance,
                               std::span<const double> bias) {
   LUCERNA_CHECK(radiance.size() == even_sum_.size() && bias.size() == even_sum_.size());
   const bool is_even = pass % 2 == 0;
-  std::vector<double>& bias_sum = bias_sum_[is_even ? 0 : 1];
+  const std::size_t fold = pass % kFolds;
   for (std::size_t pixel = 0; pixel < radiance.size(); ++pixel) {
     const double luminance = LuminanceOf(radiance[pixel]);
     square_sum_[pixel] += luminance * luminance;
-    bias_sum[pixel] += bias[pixel];
+    luminance_sums_[pixel][fold] += luminance;
+    bias_sums_[pixel][fold] += bias[pixel];
     if (!is_even) continue;
     for (std::size_t c = 0; c < 3; ++c) {
       even_sum_[pixel][c] += radiance[pixel][c];
@@ -358,6 +426,7 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   std::vector<PixelError> pixels(count);
   std::vector<float> differences(count);
   PixelBiases biases(count);
+  const UnblurredLuminance unblurred(width, height, pass_count, sums_at);
   double halves = 0;
   double independent = 0;
   std::size_t pixel = 0;
@@ -366,7 +435,7 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
       const PixelSums sums = sums_at(pixel);
       RgbSum difference{};
       double noise_sum = 0, relative_noise = 0, signed_noise = 0;
-      double color_square = 0, color_to_even = 0, color_to_odd = 0;
+      double color_square = 0;
       for (std::size_t c = 0; c < 3; ++c) {
         const double even = sums.even[c] / even_passes;
         const double odd = (sums.all[c] - sums.even[c]) / odd_passes;
@@ -381,28 +450,33 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
         noise_sum += noise;
         relative_noise += noise * weight;
         signed_noise += difference[c] * std::sqrt(weight);
-        const double square = sums.bias_color[c] * sums.bias_color[c];
-        color_square += square;
-        color_to_even += square / (even * even + floor);
-        color_to_odd += square / (odd * odd + floor);
+        color_square += sums.bias_color[c] * sums.bias_color[c];
       }
       pixels[pixel].noise = static_cast<float>(noise_sum / 3);
       pixels[pixel].relative_noise = static_cast<float>(relative_noise / 3);
       differences[pixel] = static_cast<float>(signed_noise);
-      const double even_bias = sums.even_bias / even_passes;
-      const double odd_bias = sums.odd_bias / odd_passes;
       const double of_color = std::sqrt(color_square / 3);
-      const double of_even = std::sqrt(color_to_even / 3);
-      const double of_odd = std::sqrt(color_to_odd / 3);
-      biases.absolute.even[pixel] = static_cast<float>(even_bias * of_color);
-      biases.absolute.odd[pixel] = static_cast<float>(odd_bias * of_color);
-      biases.to_even.even[pixel] = static_cast<float>(even_bias * of_even);
-      biases.to_even.odd[pixel] = static_cast<float>(odd_bias * of_even);
-      biases.to_odd.even[pixel] = static_cast<float>(even_bias * of_odd);
-      biases.to_odd.odd[pixel] = static_cast<float>(odd_bias * of_odd);
+      biases.absolute.even[pixel] =
+          static_cast<float>((sums.bias[0] + sums.bias[2]) / even_passes * of_color);
+      biases.absolute.odd[pixel] =
+          static_cast<float>((sums.bias[1] + sums.bias[3]) / odd_passes * of_color);
+      const double mean = LuminanceOf(sums.all) / passes;
+      for (std::size_t p = 0; p < kFoldPairs.size(); ++p) {
+        const FoldPair pair = kFoldPairs[p];
+        const double share = mean > 0 ? unblurred(p, pixel) / mean : 0;
+        double color_over_value = 0;
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double value = share * sums.all[c] / passes;
+          color_over_value += sums.bias_color[c] * sums.bias_color[c] / (value * value + floor);
+        }
+        const double of_pair = std::sqrt(color_over_value / 3);
+        biases.relative[p].even[pixel] =
+            static_cast<float>(sums.bias[pair.even] / even_passes * of_pair);
+        biases.relative[p].odd[pixel] =
+            static_cast<float>(sums.bias[pair.odd] / odd_passes * of_pair);
+      }
       const double luminance = LuminanceOf(difference);
       halves += luminance * luminance * to_noise;
-      const double mean = LuminanceOf(sums.all) / passes;
       independent += std::max(0.0, sums.square / passes - mean * mean) / (passes - 1);
     }
   }

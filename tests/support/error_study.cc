@@ -46,7 +46,8 @@ class PartsOfError {
         sum_(3 * reference.channels[0].pixels.size()),
         square_sum_(sum_.size()),
         bias_sum_(sum_.size() / 3),
-        bias_square_sum_(bias_sum_.size()) {}
+        bias_square_sum_(bias_sum_.size()),
+        floor_(Compare(reference, reference).value().floor) {}
 
   void Add(const Image& image, const SquaredError& estimate) {
     ForEachValue(image, [&](std::size_t i, double value) {
@@ -75,7 +76,7 @@ class PartsOfError {
       const double noise = (square_sum_[i] / n - mean * mean) * n / (n - 1);
       const double own_noise = NoiseOfReference(i);
       const double bias = (mean - right) * (mean - right) - noise / n - own_noise * own_noise;
-      const double weight = 1 / (right * right + kEpsilon);
+      const double weight = 1 / (right * right + floor_);
       parts.true_noise += weight * noise / static_cast<double>(sum_.size());
       parts.true_bias += weight * bias / static_cast<double>(sum_.size());
     });
@@ -84,8 +85,6 @@ class PartsOfError {
   }
 
  private:
-  static constexpr double kEpsilon = 0.01;  // of relMSE
-
   template <typename F>
   static void ForEachValue(const Image& image, const F& f) {
     constexpr std::array<const char*, 3> kColour = {"R", "G", "B"};
@@ -109,7 +108,7 @@ class PartsOfError {
     for (std::size_t i = 0; i < pixels; ++i) {
       const double right = luminance([&](std::size_t c) { return ReferenceValue(c * pixels + i); });
       const double mean = luminance([&](std::size_t c) { return sum_[c * pixels + i] / n; });
-      const double weight = 1 / (right * right + kEpsilon) / static_cast<double>(pixels);
+      const double weight = 1 / (right * right + floor_) / static_cast<double>(pixels);
       // Noise of colours that is alike in all channels.
       const double noise = luminance([&](std::size_t c) {
         const double m = sum_[c * pixels + i] / n;
@@ -134,6 +133,7 @@ class PartsOfError {
   const Image& reference_;
   std::vector<double> sum_, square_sum_;
   std::vector<double> bias_sum_, bias_square_sum_;  // of the layer
+  double floor_;  // of relative errors
   StudiedParts estimated_;
   int renders_ = 0;
 };
