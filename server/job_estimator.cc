@@ -164,10 +164,8 @@ Image JobEstimator::MakeImage() const {
     const double mean = LuminanceOf(all) / passes;
     const double variance = std::max(0.0, errors.square_sum()[pixel] / passes - mean * mean);
     noise[pixel] = static_cast<float>(exposure * std::sqrt(factor * variance / (passes - 1)));
-    double bias_sum = 0;
-    for (const double sum : errors.bias_sums()[pixel])
-      bias_sum += sum;
-    bias[pixel] = static_cast<float>(exposure * bias_sum / passes);
+    bias[pixel] = static_cast<float>(
+        exposure * (errors.even_bias()[pixel] + errors.odd_bias()[pixel]) / passes);
   }
   image.channels.push_back({"noise", std::move(noise)});
   image.channels.push_back({"bias", std::move(bias)});
@@ -189,10 +187,8 @@ ErrorEstimate JobEstimator::EstimateError(int look) const {
       sums.even[c] = exposure * errors.even_sum()[pixel][c];
       sums.bias_color[c] = luminance > 0 ? photons[c] / luminance : 0;
     }
-    for (std::size_t fold = 0; fold < kFolds; ++fold) {
-      sums.luminance[fold] = exposure * errors.luminance_sums()[pixel][fold];
-      sums.bias[fold] = exposure * errors.bias_sums()[pixel][fold];
-    }
+    sums.even_bias = exposure * errors.even_bias()[pixel];
+    sums.odd_bias = exposure * errors.odd_bias()[pixel];
     sums.square = exposure * exposure * errors.square_sum()[pixel];
     return sums;
   };

@@ -20,6 +20,12 @@ constexpr double kModelError = 0.2;
 constexpr double kLeastBias = 0.5;
 constexpr double kMostBias = 2.5;
 
+// No estimate is believed to be too large by more than this, as a share of its square.
+constexpr double kLeastShare = 0.01;
+// How much noise of the estimated bias weighs against the bias in the share of it that is believed
+// of single pixels. Chosen on half A of tests/tools/make_study_scenes.py.
+constexpr double kNoiseWeight = 0.02;
+
 // The widest smoothing that is tried reaches over so many times the area over which noise is alike.
 constexpr double kWidest = 3;
 // How much less than narrower ones a wider smoothing may say, in deviations of theirs.
@@ -75,10 +81,30 @@ class MeanAround {
   std::vector<float> rows_;  // sums over x
 };
 
+// The share of the estimated bias that is taken off single pixels to guess their values without
+// blur: near 1 unless the estimate is mostly noise.
+double BelievedShare(const PixelSumsAt& sums_at, const std::vector<double>& luminances,
+                     double floor, double even_passes, double odd_passes) {
+  double bias = 0;
+  double noise = 0;
+  for (std::size_t i = 0; i < luminances.size(); ++i) {
+    const PixelSums sums = sums_at(i);
+    const double even = sums.even_bias / even_passes;
+    const double odd = sums.odd_bias / odd_passes;
+    const double weight = 1 / (luminances[i] * luminances[i] + floor);
+    bias += even * odd * weight;
+    noise += 0.25 * (even - odd) * (even - odd) * weight;
+  }
+  bias = std::max(bias, 0.0);
+  return noise > 0 ? bias / (bias + kNoiseWeight * noise) : 1;
+}
+
 // The estimates of one pixel, means over channels.
 struct PixelError {
   float relative_noise = 0, relative_bias = 0;
   float noise = 0, bias = 0;
+  // By how much the relative bias might be larger, or smaller, for another value without blur.
+  float more_bias = 0, less_bias = 0;
 
   // By which pixels are left out: whatever is large by chance, be it above or below 0.
   [[nodiscard]] float Size() const { return relative_noise + std::abs(relative_bias); }
@@ -116,6 +142,36 @@ std::vector<float> Smoothed(int width, int height, int reach, const std::vector<
     box(x, w, height, 0, reach - 1);
   }
   return smooth;
+}
+
+// The least of `values` within `reach` pixels along rows and columns.
+std::vector<float> LeastAround(int width, int height, int reach, const std::vector<float>& values) {
+  std::vector<float> least = values;
+  std::vector<float> line;
+  const auto along = [&](std::size_t start, std::size_t step, int length) {
+    line.resize(static_cast<std::size_t>(length));
+    for (std::size_t i = 0; i < line.size(); ++i)
+      line[i] = least[start + i * step];
+    for (int i = 0; i < length; ++i) {
+      least[start + static_cast<std::size_t>(i) * step] =
+          *std::min_element(line.begin() + std::max(0, i - reach),
+                            line.begin() + std::min(length, i + reach + 1));
+    }
+  };
+  const auto w = static_cast<std::size_t>(width);
+  for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y)
+    along(y * w, 1, width);
+  for (std::size_t x = 0; x < w; ++x)
+    along(x, w, height);
+  return least;
+}
+
+// What a kernel at most blurs over, in pixels: the default first radius.
+constexpr int kKernelReach = 3;
+
+// The least luminance that a pixel can be believed to have without the blur.
+std::vector<float> LeastLuminance(int width, int height, std::vector<float> luminance) {
+  return LeastAround(width, height, kKernelReach, Smoothed(width, height, 2, luminance));
 }
 
 // What the kernel changed in each pixel, as the two halves have it.
@@ -199,40 +255,23 @@ struct SmoothedBias {
   double relative_sum = 0, absolute_sum = 0, deviation = 0;
 };
 
-// Which folds' biases are multiplied: one even, one odd. The weight of their product, one over the
-// squared value, comes from the other two, so that it shares no noise with it.
-struct FoldPair {
-  std::size_t even, odd;
-
-  [[nodiscard]] std::size_t other_even() const { return 2 - even; }
-  [[nodiscard]] std::size_t other_odd() const { return 4 - odd; }
-};
-constexpr std::array<FoldPair, 4> kFoldPairs = {{{0, 1}, {0, 3}, {2, 1}, {2, 3}}};
-
-// The biases of pixels: absolute, and relative. All products of fold pairs together are the product
-// of the two halves.
+// The biases of pixels: absolute, and relative to what the even passes and what the odd ones say. A
+// product of both halves' biases is free of noise only if its weight knows one of them alone.
 struct PixelBiases {
-  BiasHalves absolute;
-  std::array<BiasHalves, kFoldPairs.size()> relative;
+  BiasHalves absolute, to_even, to_odd;
 
-  explicit PixelBiases(std::size_t pixels)
-      : absolute(pixels),
-        relative{BiasHalves(pixels), BiasHalves(pixels), BiasHalves(pixels), BiasHalves(pixels)} {}
+  explicit PixelBiases(std::size_t pixels) : absolute(pixels), to_even(pixels), to_odd(pixels) {}
 
   [[nodiscard]] SmoothedBias Smooth(int width, int height, int reach) const {
     SmoothedBias smooth;
     smooth.absolute = absolute.Squares(width, height, reach);
-    smooth.relative.resize(smooth.absolute.size());
-    std::vector<float> differences(smooth.absolute.size());
-    for (const BiasHalves& pair : relative) {
-      const std::vector<float> squares = pair.Squares(width, height, reach);
-      for (std::size_t i = 0; i < squares.size(); ++i) {
-        smooth.relative[i] += squares[i];
-        differences[i] += pair.even[i] - pair.odd[i];
-      }
-    }
+    smooth.relative = to_even.Squares(width, height, reach);
+    const std::vector<float> relative_to_odd = to_odd.Squares(width, height, reach);
+    std::vector<float> differences(relative_to_odd.size());
     double square_sum = 0;
     for (std::size_t i = 0; i < differences.size(); ++i) {
+      differences[i] = to_even.even[i] - to_even.odd[i];
+      smooth.relative[i] = 0.5F * (smooth.relative[i] + relative_to_odd[i]);
       const auto square = static_cast<double>(smooth.relative[i]);
       smooth.relative_sum += square;
       smooth.absolute_sum += static_cast<double>(smooth.absolute[i]);
@@ -246,61 +285,6 @@ struct PixelBiases {
     smooth.deviation = std::sqrt(smooth.area * square_sum);
     return smooth;
   }
-};
-
-// The luminance without what the kernel is estimated to have added, from the folds that a fold pair
-// leaves. What is taken away is the estimate times the share of its square that is no noise in the
-// pixels around (Wiener's filter).
-class UnblurredLuminance {
- public:
-  UnblurredLuminance(int width, int height, std::int64_t passes, const PixelSumsAt& sums_at) {
-    const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-    for (std::size_t p = 0; p < kFoldPairs.size(); ++p) {
-      const std::size_t e = FoldOrSibling(kFoldPairs[p].other_even(), passes);
-      const std::size_t o = FoldOrSibling(kFoldPairs[p].other_odd(), passes);
-      const double even_passes = PassesOf(e, passes);
-      const double odd_passes = PassesOf(o, passes);
-      std::vector<float> products(count);
-      std::vector<float> noise(count);
-      std::vector<float> bias(count);
-      values_[p].resize(count);
-      for (std::size_t i = 0; i < count; ++i) {
-        const PixelSums sums = sums_at(i);
-        const double even = sums.bias[e] / even_passes;
-        const double odd = sums.bias[o] / odd_passes;
-        products[i] = static_cast<float>(even * odd);
-        noise[i] = static_cast<float>(0.25 * (even - odd) * (even - odd));
-        bias[i] = static_cast<float>(0.5 * (even + odd));
-        values_[p][i] = static_cast<float>(
-            0.5 * (sums.luminance[e] / even_passes + sums.luminance[o] / odd_passes));
-      }
-      products = Smoothed(width, height, kReach, products);
-      noise = Smoothed(width, height, kReach, noise);
-      for (std::size_t i = 0; i < count; ++i) {
-        if (!(products[i] > 0)) continue;
-        const float share = products[i] / (products[i] + noise[i]);
-        values_[p][i] = std::max(0.0F, values_[p][i] - share * bias[i]);
-      }
-    }
-  }
-
-  [[nodiscard]] double operator()(std::size_t pair, std::size_t pixel) const {
-    return static_cast<double>(values_[pair][pixel]);
-  }
-
- private:
-  static constexpr int kReach = 2;
-
-  static double PassesOf(std::size_t fold, std::int64_t passes) {
-    return static_cast<double>((passes + static_cast<std::int64_t>(kFolds - 1 - fold)) /
-                               static_cast<std::int64_t>(kFolds));
-  }
-  // Before there are kFolds passes, the last folds have none.
-  static std::size_t FoldOrSibling(std::size_t fold, std::int64_t passes) {
-    return static_cast<std::int64_t>(fold) < passes ? fold : fold - 2;
-  }
-
-  std::array<std::vector<float>, kFoldPairs.size()> values_;
 };
 
 // Squared bias as the widest smoothing has it that says hardly less than the narrower ones.
@@ -328,8 +312,16 @@ ChosenBias Choose(int width, int height, const PixelBiases& biases, double noise
   return chosen;
 }
 
-SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::*noise_of,
-                       float PixelError::*bias_of, double lost, const Spread& spread) {
+// Whether `pixels` are summed as relative errors or as absolute ones.
+enum class Scale : std::uint8_t { kRelative, kAbsolute };
+
+SquaredError Summarize(const std::vector<PixelError>& pixels, Scale scale, double lost,
+                       const Spread& spread) {
+  const bool is_relative = scale == Scale::kRelative;
+  const auto noise_of = is_relative ? &PixelError::relative_noise : &PixelError::noise;
+  const auto bias_of = is_relative ? &PixelError::relative_bias : &PixelError::bias;
+  double more = 0;
+  double less = 0;
   double noise = 0;
   double bias = 0;
   double of_noise = 0;  // fourth powers
@@ -343,6 +335,9 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::
     of_noise += n * n;
     of_bias += b * b;
     of_cross += b * n;
+    if (!is_relative) continue;
+    more += static_cast<double>(pixel.more_bias);
+    less += static_cast<double>(pixel.less_bias);
   }
   const auto count = static_cast<double>(pixels.size());
   SquaredError error;
@@ -356,8 +351,11 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::
                           spread.bias_area * of_bias;
   const double chance = spread.z * std::sqrt(variance) / count / total;
   // Chance and what bias may be off by know nothing of each other.
-  const double below = std::log(total / (error.noise + kLeastBias * error.bias));
-  const double above = std::log((error.noise + kMostBias * error.bias) / total);
+  const double least_bias = kLeastBias * std::max(0.0, error.bias - std::max(less, 0.0) / count);
+  const double most_bias = kMostBias * error.bias + std::max(more, 0.0) / count;
+  const double below =
+      std::log(total / std::max(error.noise + least_bias, kLeastShare * total));
+  const double above = std::log((error.noise + most_bias) / total);
   error.low = total * std::exp(-std::hypot(chance, below) - kModelError);
   error.high = (total + lost / count) * std::exp(std::hypot(chance, above) + kModelError);
   return error;
@@ -365,19 +363,20 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::
 
 }  // namespace
 
-ErrorStatistics::ErrorStatistics(std::size_t pixels)
-    : even_sum_(pixels), square_sum_(pixels), luminance_sums_(pixels), bias_sums_(pixels) {}
+ErrorStatistics::ErrorStatistics(std::size_t pixels) : even_sum_(pixels), square_sum_(pixels) {
+  for (std::vector<double>& sum : bias_sum_)
+    sum.resize(pixels);
+}
 
 void ErrorStatistics::AddPass(std::uint64_t pass, std::span<const RgbSum> radiance,
                               std::span<const double> bias) {
   LUCERNA_CHECK(radiance.size() == even_sum_.size() && bias.size() == even_sum_.size());
   const bool is_even = pass % 2 == 0;
-  const std::size_t fold = pass % kFolds;
+  std::vector<double>& bias_sum = bias_sum_[is_even ? 0 : 1];
   for (std::size_t pixel = 0; pixel < radiance.size(); ++pixel) {
     const double luminance = LuminanceOf(radiance[pixel]);
     square_sum_[pixel] += luminance * luminance;
-    luminance_sums_[pixel][fold] += luminance;
-    bias_sums_[pixel][fold] += bias[pixel];
+    bias_sum[pixel] += bias[pixel];
     if (!is_even) continue;
     for (std::size_t c = 0; c < 3; ++c) {
       even_sum_[pixel][c] += radiance[pixel][c];
@@ -417,16 +416,18 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   std::vector<double> luminances(count);
   for (std::size_t i = 0; i < count; ++i)
     luminances[i] = LuminanceOf(sums_at(i).all) / passes;
+  const std::vector<float> least_luminance =
+      LeastLuminance(width, height, std::vector<float>(luminances.begin(), luminances.end()));
   const double floor = RelativeErrorFloor(luminances);
   if (floor == 0) {
     const SquaredError unknown = {.noise = HUGE_VAL, .bias = 0, .low = 0, .high = HUGE_VAL};
     return {.relative = unknown, .absolute = {}, .noise_factor = 1};
   }
 
+  const double believed = BelievedShare(sums_at, luminances, floor, even_passes, odd_passes);
   std::vector<PixelError> pixels(count);
   std::vector<float> differences(count);
   PixelBiases biases(count);
-  const UnblurredLuminance unblurred(width, height, pass_count, sums_at);
   double halves = 0;
   double independent = 0;
   std::size_t pixel = 0;
@@ -436,9 +437,11 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
       RgbSum difference{};
       double noise_sum = 0, relative_noise = 0, signed_noise = 0;
       double color_square = 0;
+      RgbSum odd_sum{};
       for (std::size_t c = 0; c < 3; ++c) {
         const double even = sums.even[c] / even_passes;
-        const double odd = (sums.all[c] - sums.even[c]) / odd_passes;
+        odd_sum[c] = sums.all[c] - sums.even[c];
+        const double odd = odd_sum[c] / odd_passes;
         difference[c] = even - odd;
         const double own = sums.all[c] / passes;
         const double agreed = Middle(even, odd, around[c](x, y));
@@ -455,26 +458,45 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
       pixels[pixel].noise = static_cast<float>(noise_sum / 3);
       pixels[pixel].relative_noise = static_cast<float>(relative_noise / 3);
       differences[pixel] = static_cast<float>(signed_noise);
-      const double of_color = std::sqrt(color_square / 3);
-      biases.absolute.even[pixel] =
-          static_cast<float>((sums.bias[0] + sums.bias[2]) / even_passes * of_color);
-      biases.absolute.odd[pixel] =
-          static_cast<float>((sums.bias[1] + sums.bias[3]) / odd_passes * of_color);
-      const double mean = LuminanceOf(sums.all) / passes;
-      for (std::size_t p = 0; p < kFoldPairs.size(); ++p) {
-        const FoldPair pair = kFoldPairs[p];
-        const double share = mean > 0 ? unblurred(p, pixel) / mean : 0;
-        double color_over_value = 0;
+      const double even_bias = sums.even_bias / even_passes;
+      const double odd_bias = sums.odd_bias / odd_passes;
+      // One over value² + floor as a half has it without `share` of the bias, times the squared
+      // colour of the bias.
+      const double mean = luminances[pixel];
+      const auto color_over_value = [&](double half, double bias, double share) {
+        const double unblurred =
+            std::max({static_cast<double>(least_luminance[pixel]), half - share * bias, 0.0});
+        const double of_mean = mean > 0 ? unblurred / mean : 0;
+        double sum = 0;
         for (std::size_t c = 0; c < 3; ++c) {
-          const double value = share * sums.all[c] / passes;
-          color_over_value += sums.bias_color[c] * sums.bias_color[c] / (value * value + floor);
+          const double value = of_mean * sums.all[c] / passes;
+          sum += sums.bias_color[c] * sums.bias_color[c] / (value * value + floor);
         }
-        const double of_pair = std::sqrt(color_over_value / 3);
-        biases.relative[p].even[pixel] =
-            static_cast<float>(sums.bias[pair.even] / even_passes * of_pair);
-        biases.relative[p].odd[pixel] =
-            static_cast<float>(sums.bias[pair.odd] / odd_passes * of_pair);
-      }
+        return sum / 3;
+      };
+      const double even = LuminanceOf(sums.even) / even_passes;
+      const double odd = LuminanceOf(odd_sum) / odd_passes;
+      const double square_to_even = color_over_value(even, even_bias, believed);
+      const double square_to_odd = color_over_value(odd, odd_bias, believed);
+      const double of_even = std::sqrt(square_to_even);
+      const double of_odd = std::sqrt(square_to_odd);
+      const auto product = [&](double to_even, double to_odd) {
+        return 0.5 * even_bias * odd_bias * (to_even + to_odd);
+      };
+      const double relative_product = product(square_to_even, square_to_odd);
+      pixels[pixel].more_bias = static_cast<float>(
+          product(color_over_value(even, even_bias, 1), color_over_value(odd, odd_bias, 1)) -
+          relative_product);
+      pixels[pixel].less_bias = static_cast<float>(
+          relative_product -
+          product(color_over_value(even, even_bias, 0), color_over_value(odd, odd_bias, 0)));
+      const double of_color = std::sqrt(color_square / 3);
+      biases.absolute.even[pixel] = static_cast<float>(even_bias * of_color);
+      biases.absolute.odd[pixel] = static_cast<float>(odd_bias * of_color);
+      biases.to_even.even[pixel] = static_cast<float>(even_bias * of_even);
+      biases.to_even.odd[pixel] = static_cast<float>(odd_bias * of_even);
+      biases.to_odd.even[pixel] = static_cast<float>(even_bias * of_odd);
+      biases.to_odd.odd[pixel] = static_cast<float>(odd_bias * of_odd);
       const double luminance = LuminanceOf(difference);
       halves += luminance * luminance * to_noise;
       independent += std::max(0.0, sums.square / passes - mean * mean) / (passes - 1);
@@ -492,10 +514,8 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
                            &PixelError::Size);
   pixels.resize(kept);
-  return {.relative = Summarize(pixels, &PixelError::relative_noise, &PixelError::relative_bias,
-                                chosen.relative_lost, spread),
-          .absolute = Summarize(pixels, &PixelError::noise, &PixelError::bias, chosen.absolute_lost,
-                                spread),
+  return {.relative = Summarize(pixels, Scale::kRelative, chosen.relative_lost, spread),
+          .absolute = Summarize(pixels, Scale::kAbsolute, chosen.absolute_lost, spread),
           .noise_factor = independent > 0 ? halves / independent : 1};
 }
 

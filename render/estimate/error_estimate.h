@@ -52,11 +52,6 @@ using RgbSum = std::array<double, 3>;
   return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
 }
 
-// Passes are also told apart by their number modulo kFolds. Even and odd folds are independent.
-inline constexpr std::size_t kFolds = 4;
-// Sums over the passes of each fold.
-using FoldSums = std::array<double, kFolds>;
-
 // What is kept of all passes, per pixel.
 class ErrorStatistics {
  public:
@@ -71,15 +66,15 @@ class ErrorStatistics {
   [[nodiscard]] const std::vector<RgbSum>& even_sum() const { return even_sum_; }
   // Sums over all passes of the squared luminance [pixels].
   [[nodiscard]] const std::vector<double>& square_sum() const { return square_sum_; }
-  // Sums over the passes of each fold of the luminance and of the bias [pixels].
-  [[nodiscard]] const std::vector<FoldSums>& luminance_sums() const { return luminance_sums_; }
-  [[nodiscard]] const std::vector<FoldSums>& bias_sums() const { return bias_sums_; }
+  // Sums over even and odd passes of the bias [pixels].
+  [[nodiscard]] const std::vector<double>& even_bias() const { return bias_sum_[0]; }
+  [[nodiscard]] const std::vector<double>& odd_bias() const { return bias_sum_[1]; }
 
  private:
   std::int64_t passes_ = 0;
   std::vector<RgbSum> even_sum_;
   std::vector<double> square_sum_;
-  std::vector<FoldSums> luminance_sums_, bias_sums_;
+  std::array<std::vector<double>, 2> bias_sum_;
 };
 
 // An expected squared error and its parts.
@@ -106,10 +101,10 @@ struct ErrorEstimate {
 
 // Sums over passes of what one pixel is made of, in the colours and the exposure of the image.
 struct PixelSums {
-  RgbSum all{}, even{};            // over all passes and the even ones
-  FoldSums luminance{}, bias{};    // bias: as a luminance
-  RgbSum bias_color{};             // of luminance 1
-  double square = 0;               // squared luminance
+  RgbSum all{}, even{};                // over all passes and the even ones
+  double even_bias = 0, odd_bias = 0;  // luminance, of even passes and of odd ones
+  RgbSum bias_color{};                 // of luminance 1
+  double square = 0;                   // squared luminance
 };
 using PixelSumsAt = std::function<PixelSums(std::size_t pixel)>;
 

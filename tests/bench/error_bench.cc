@@ -63,7 +63,8 @@ void PrintHead() {
   std::printf(
       "| scene | true %% | true noise, bias %% | estimated noise, bias %% | luminance bias: true, "
       "by kernels | estimated/true first, "
-      "half-way, last | outside: at any checkpoint | outside: last, below, above | width | stop: "
+      "half-way, last | renders outside at any checkpoint | truth below, above (checkpoints) | "
+      "width | stop: "
       "stopped, kept, spent |\n|---|---|---|---|---|---|---|---|---|---|\n");
 }
 
@@ -79,8 +80,10 @@ void PrintRow(const std::string& name, const ErrorStudy& study) {
     truth += end.truth / renders;
     middle_truth += looks[middle].truth / renders;
     width += std::sqrt(end.high / end.low) / renders;
-    below += end.truth < end.low ? 1 : 0;
-    above += end.truth > end.high ? 1 : 0;
+    for (const StudiedLook& look : looks) {
+      below += look.truth < look.low ? 1 : 0;
+      above += look.truth > look.high ? 1 : 0;
+    }
   }
   // A target that is there to be reached.
   const StopOutcome stop = StopAt(study, std::sqrt(middle_truth));

@@ -22,8 +22,8 @@ ErrorEstimate EstimateOf(const ErrorStatistics& statistics, const std::vector<Rg
     PixelSums sums;
     sums.all = all[pixel];
     sums.even = statistics.even_sum()[pixel];
-    sums.luminance = statistics.luminance_sums()[pixel];
-    sums.bias = statistics.bias_sums()[pixel];
+    sums.even_bias = statistics.even_bias()[pixel];
+    sums.odd_bias = statistics.odd_bias()[pixel];
     sums.bias_color = {1, 1, 1};
     sums.square = statistics.square_sum()[pixel];
     return sums;
