@@ -73,13 +73,13 @@ TEST(ErrorEstimateTest, FindsNoiseAndBias) {
     // chance the widest smoothing may be taken to lose half a deviation more than it does.
     const double half = 1.5 / std::sqrt(3.0) * std::sqrt(2.0 / passes);
     EXPECT_NEAR(estimate.absolute.bias, 0.01, 4.5 * (half * half + 2 * 0.1 * half) / 96) << passes;
-    EXPECT_NEAR(estimate.relative.noise / (estimate.absolute.noise / (1.01 * 2.1 * 2.1)), 1, 0.15)
-        << passes;
-    // Bias is relative to what would be there without it, 2, as halves of variance v know it: the
-    // mean of 1/x² is larger than 1/2² by 3v/2² of it.
+    // Noise is relative to what is there, bias to what would be there without it, 2, as halves of
+    // variance v know it: the mean of 1/x² is larger than 1/2² by 3v/2² of it.
+    const double noise = estimate.absolute.noise / (1.01 * 2.1 * 2.1);
+    const double bias = estimate.absolute.bias / (1.01 * 2.0 * 2.0);
     const double variance = (0.25 + 0.75) * 2.0 / passes;
-    EXPECT_NEAR(estimate.relative.bias / (estimate.absolute.bias / (1.01 * 2.0 * 2.0)), 1,
-                0.15 + 3 * variance / 4)
+    EXPECT_NEAR(estimate.relative.total() / (noise + bias), 1,
+                0.12 + 3 * variance / 4 * bias / (noise + bias))
         << passes;
     EXPECT_NEAR(estimate.noise_factor, 1, 0.06) << passes;
     EXPECT_LE(estimate.absolute.low, made.true_square);
