@@ -68,6 +68,7 @@ struct Yardstick {
   Image mask;
   MetricsOptions options;
   std::optional<double> noise;  // relMSE of the reference itself, over the compared pixels
+  double untrimmed_noise = 0;   // of all pixels; 0: not known
 };
 
 StatusOr<std::unique_ptr<Yardstick>> ReadYardstick(const CompareRequest& request) {
@@ -85,6 +86,7 @@ StatusOr<std::unique_ptr<Yardstick>> ReadYardstick(const CompareRequest& request
         absl::StrCat(request.reference_path, ": ", metrics.status().message()));
   }
   yardstick->noise = metrics->reference_rel_mse;
+  yardstick->untrimmed_noise = metrics->reference_rel_mse_untrimmed;
   return yardstick;
 }
 
@@ -119,7 +121,8 @@ class Comparer {
   StatusOr<std::vector<ErrorPoint>> Record(const RenderOverrides& overrides, double seconds) {
     LUCERNA_ASSIGN_OR_RETURN(const v1::Job job,
                              RunUntil(overrides, seconds, HUGE_VAL, request_.reference_path));
-    std::vector<ErrorPoint> curve = CurveOf(job, Cores(), yardstick_.noise.value_or(0));
+    std::vector<ErrorPoint> curve =
+        CurveOf(job, Cores(), yardstick_.noise.value_or(0), yardstick_.untrimmed_noise);
     if (curve.empty()) {
       return absl::InternalError(absl::StrCat("job ", job.job_id(),
                                               " recorded no true errors; give it more time, or "
@@ -139,7 +142,9 @@ class Comparer {
                       .wall_s = Seconds(FromProto(progress.running())),
                       .photons = static_cast<double>(progress.photons()),
                       .rel_mse = metrics.rel_mse,
-                      .reference_noise = metrics.reference_rel_mse.value_or(0)};
+                      .reference_noise = metrics.reference_rel_mse.value_or(0),
+                      .untrimmed = metrics.rel_mse_untrimmed,
+                      .untrimmed_reference_noise = metrics.reference_rel_mse_untrimmed};
   }
 
   void Announce(int repetition, const std::string& setting, double seconds) const {
@@ -284,7 +289,8 @@ StatusOr<std::vector<double>> ParseTimes(const std::string& typed) {
   return times;
 }
 
-std::vector<ErrorPoint> CurveOf(const v1::Job& job, int cores, double reference_noise) {
+std::vector<ErrorPoint> CurveOf(const v1::Job& job, int cores, double reference_noise,
+                                double untrimmed_reference_noise) {
   std::vector<ErrorPoint> curve;
   for (const v1::ErrorSample& sample : job.convergence()) {
     if (!sample.has_true_relative()) continue;
@@ -292,7 +298,9 @@ std::vector<ErrorPoint> CurveOf(const v1::Job& job, int cores, double reference_
                      .wall_s = Seconds(FromProto(sample.running())),
                      .photons = static_cast<double>(sample.photons()),
                      .rel_mse = sample.true_relative(),
-                     .reference_noise = reference_noise});
+                     .reference_noise = reference_noise,
+                     .untrimmed = sample.true_relative_untrimmed(),
+                     .untrimmed_reference_noise = untrimmed_reference_noise});
   }
   return curve;
 }

@@ -51,7 +51,7 @@ struct NamedFlags {
 [[nodiscard]] StatusOr<std::vector<double>> ParseTimes(const std::string& typed);
 
 // The record of a job with a reference as a curve; samples without a true error are left out.
-[[nodiscard]] std::vector<ErrorPoint> CurveOf(const v1::Job& job, int cores,
-                                              double reference_noise);
+[[nodiscard]] std::vector<ErrorPoint> CurveOf(const v1::Job& job, int cores, double reference_noise,
+                                              double untrimmed_reference_noise);
 
 }  // namespace lucerna

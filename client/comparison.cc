@@ -48,6 +48,7 @@ std::vector<ErrorPoint> Corrected(std::span<const ErrorPoint> points) {
   std::vector<ErrorPoint> corrected;
   for (ErrorPoint point : points) {
     point.rel_mse -= point.reference_noise;
+    point.untrimmed -= point.untrimmed_reference_noise;
     const bool counts = point.rel_mse > 0 && point.seconds > 0 && point.photons > 0 &&
                         point.wall_s > 0 && std::isfinite(point.rel_mse);
     // Two looks can fall on one tick of a clock.
@@ -128,6 +129,7 @@ std::optional<ComparedCell> CellOf(const std::vector<ErrorPoint>& points,
   ComparedCell cell;
   cell.seconds = seconds;
   cell.rel_mse = MeanOf(errors);
+  cell.untrimmed = MeanOf(Column(points, &ErrorPoint::untrimmed));
   // Against a first setting that never came here there is no ratio; NaN is shown as such.
   cell.ratio = of_first.empty() ? MeanOfRuns{.value = NAN, .standard_error = std::nullopt}
                                 : RatioOf(errors, Column(of_first, &ErrorPoint::rel_mse));
@@ -193,7 +195,10 @@ std::optional<ErrorPoint> PointAt(std::span<const ErrorPoint> points, double sec
                     .wall_s = Between(a.wall_s, b.wall_s, t),
                     .photons = Between(a.photons, b.photons, t),
                     .rel_mse = Between(a.rel_mse, b.rel_mse, t),
-                    .reference_noise = t < 0.5 ? a.reference_noise : b.reference_noise};
+                    .reference_noise = t < 0.5 ? a.reference_noise : b.reference_noise,
+                    .untrimmed = a.untrimmed > 0 && b.untrimmed > 0
+                                     ? Between(a.untrimmed, b.untrimmed, t)
+                                     : std::lerp(a.untrimmed, b.untrimmed, t)};
 }
 
 Comparison CompareRuns(const std::vector<SettingToCompare>& settings,
@@ -244,7 +249,7 @@ std::string ComparisonTable(const Comparison& comparison, const ComparisonSubjec
                   subject.first_seed, ", runs of all settings in turn.\n");
   absl::StrAppend(&text, "Time is processor time of coordinator and workers over ", subject.cores,
                   subject.cores == 1 ? " core" : " cores",
-                  "; the ratio is to the first setting.\n");
+                  "; the ratio is to the first setting. Untrimmed is relMSE of all pixels.\n");
   if (subject.reference_noise) {
     absl::StrAppendFormat(
         &text,
@@ -259,17 +264,18 @@ std::string ComparisonTable(const Comparison& comparison, const ComparisonSubjec
   absl::StrAppend(&text, "— where a run did not come near the time, or no error was left.\n\n");
 
   absl::StrAppend(&text,
-                  "| s | setting | relMSE | ratio | wall s | photons |\n"
-                  "|---|---|---|---|---|---|\n");
+                  "| s | setting | relMSE | untrimmed | ratio | wall s | photons |\n"
+                  "|---|---|---|---|---|---|---|\n");
   for (std::size_t i = 0; i < comparison.times.size(); ++i) {
     for (const ComparedSetting& setting : comparison.settings) {
       absl::StrAppendFormat(&text, "| %g | %s | ", comparison.times[i], Escaped(setting.name));
       const std::optional<ComparedCell>& cell = setting.cells[i];
       if (!cell) {
-        absl::StrAppend(&text, "— | — | — | — |\n");
+        absl::StrAppend(&text, "— | — | — | — | — |\n");
         continue;
       }
       absl::StrAppend(&text, ErrorText(cell->rel_mse), cell->is_mostly_reference ? " †" : "", " | ",
+                      ErrorText(cell->untrimmed), " | ",
                       std::isfinite(cell->ratio.value) ? PlainText(cell->ratio) : "—");
       absl::StrAppendFormat(&text, " | %.2f | %.3g |\n", cell->wall_s, cell->photons);
     }

@@ -25,6 +25,8 @@ struct ErrorPoint {
   double photons = 0;
   double rel_mse = 0;          // as measured
   double reference_noise = 0;  // the part of it that is noise of the reference; 0: not known
+  // relMSE of all pixels, as measured, and the reference's part of it. Need not be above 0.
+  double untrimmed = 0, untrimmed_reference_noise = 0;
 };
 
 struct ComparedRun {
@@ -42,8 +44,9 @@ struct MeanOfRuns {
 // One setting at one of the asked times.
 struct ComparedCell {
   double seconds = 0;
-  MeanOfRuns rel_mse;  // without the reference's noise
-  MeanOfRuns ratio;    // to the first setting's
+  MeanOfRuns rel_mse;    // without the reference's noise
+  MeanOfRuns untrimmed;  // the same of all pixels
+  MeanOfRuns ratio;      // to the first setting's
   double wall_s = 0;   // means of the runs
   double photons = 0;
   // More than half of what was measured was the reference's noise.

@@ -36,8 +36,12 @@ RelativeError ErrorOf(const v1::ErrorSample& sample) {
                          .low = Root(squared.low()),
                          .high = Root(squared.high()),
                          .noise = Root(squared.noise()),
-                         .bias = Root(squared.bias())};
+                         .bias = Root(squared.bias()),
+                         .untrimmed = Root(sample.relative_untrimmed())};
   if (sample.has_true_relative()) error.truth = Root(sample.true_relative());
+  if (sample.has_true_relative_untrimmed()) {
+    error.true_untrimmed = Root(sample.true_relative_untrimmed());
+  }
   return error;
 }
 

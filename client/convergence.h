@@ -21,6 +21,9 @@ struct RelativeError {
   double low = 0, high = 0;  // ends of the 95 % interval
   double noise = 0, bias = 0;
   std::optional<double> truth = std::nullopt;  // against the job's reference
+  // The same of all pixels.
+  double untrimmed = 0;
+  std::optional<double> true_untrimmed = std::nullopt;
 };
 
 [[nodiscard]] RelativeError ErrorOf(const v1::ErrorSample& sample);

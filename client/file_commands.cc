@@ -10,6 +10,7 @@
 #include "client/report.h"
 #include "client/scene_reading.h"
 #include "render/base/files.h"
+#include "render/estimate/error_estimate.h"
 #include "render/film/png_file.h"
 #include "render/image/exr_file.h"
 
@@ -66,22 +67,26 @@ Status Diff(const std::string& image_path, const std::string& reference_path,
     std::fputs(MetricsReport(metrics).c_str(), stdout);
     return absl::OkStatus();
   }
+  const double trimmed_share = options.trim_share > 0 ? options.trim_share : kTrimmedShare;
   const std::string text = absl::StrFormat(
       "pixels compared  %d\n"
       "RMSE             %.6g\n"
-      "relMSE           %.6g\n"
+      "relMSE trimmed   %.6g  (without the worst %g %% of pixels)\n"
+      "relMSE untrimmed %.6g  (all pixels)\n"
       "means            %.6g and %.6g\n"
       "mean ratio       %.6f  (R %.6f, G %.6f, B %.6f)\n",
-      metrics.pixels, metrics.rmse, metrics.rel_mse, metrics.mean_a, metrics.mean_b,
-      metrics.mean_ratio, metrics.channel_mean_ratio[0], metrics.channel_mean_ratio[1],
-      metrics.channel_mean_ratio[2]);
+      metrics.pixels, metrics.rmse, metrics.rel_mse_trimmed, 100 * trimmed_share,
+      metrics.rel_mse_untrimmed, metrics.mean_a, metrics.mean_b, metrics.mean_ratio,
+      metrics.channel_mean_ratio[0], metrics.channel_mean_ratio[1], metrics.channel_mean_ratio[2]);
   std::fputs(text.c_str(), stdout);
   if (metrics.reference_rel_mse && metrics.reference_mse) {
     const std::string of_reference = absl::StrFormat(
-        "the reference's noise: relMSE %.6g, RMSE %.6g\n"
-        "without it       relMSE %.6g\n",
-        *metrics.reference_rel_mse, std::sqrt(*metrics.reference_mse),
-        metrics.rel_mse - *metrics.reference_rel_mse);
+        "the reference's noise: relMSE trimmed %.6g, untrimmed %.6g; RMSE %.6g\n"
+        "without it: relMSE trimmed %.6g, untrimmed %.6g\n",
+        metrics.reference_rel_mse_trimmed, metrics.reference_rel_mse_untrimmed,
+        std::sqrt(*metrics.reference_mse),
+        metrics.rel_mse_trimmed - metrics.reference_rel_mse_trimmed,
+        metrics.rel_mse_untrimmed - metrics.reference_rel_mse_untrimmed);
     std::fputs(of_reference.c_str(), stdout);
   }
   return absl::OkStatus();

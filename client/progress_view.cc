@@ -180,7 +180,13 @@ std::string SummaryLine(const v1::Job& job) {
       break;
   }
   if (const auto error = NewestError(job)) {
-    absl::StrAppend(&line, ", error about ", ErrorWithInterval(*error));
+    absl::StrAppend(&line, ", error about ", ErrorWithInterval(*error), ", untrimmed ",
+                    ShortPercent(error->untrimmed));
+    if (job.stop_reason() == v1::STOP_REASON_ERROR) {
+      const std::int64_t pixels = job.convergence().rbegin()->left_out_pixels();
+      absl::StrAppend(&line, "; the target leaves out the worst ", pixels,
+                      pixels == 1 ? " pixel" : " pixels");
+    }
   }
   return line;
 }
@@ -188,7 +194,8 @@ std::string SummaryLine(const v1::Job& job) {
 std::string ErrorLine(const v1::Job& job) {
   const auto error = NewestError(job);
   if (!error) return {};
-  std::string line = Concat("error about ", ErrorWithInterval(*error));
+  std::string line = Concat("error about ", ErrorWithInterval(*error), "  untrimmed ",
+                            ShortPercent(error->untrimmed));
   if (const double target = job.settings().error(); target > 0) {
     absl::StrAppend(&line, "  target ", ShortPercent(target));
     if (const auto left = TimeToTarget(job); left && *left > Duration::zero()) {

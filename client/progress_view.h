@@ -38,8 +38,8 @@ namespace lucerna {
 // One line without its end, about a job that has ended.
 [[nodiscard]] std::string SummaryLine(const v1::Job& job);
 
-// One line without its end: "error about 1.83 % (95 %: 1.52 % to 2.11 %)  target 1.00 % in about
-// 4:05". Empty while nothing is known of the error.
+// One line without its end: "error about 1.83 % (95 %: 1.52 % to 2.11 %)  untrimmed 2.40 %
+// target 1.00 % in about 4:05". Empty while nothing is known of the error.
 [[nodiscard]] std::string ErrorLine(const v1::Job& job);
 
 // The job on one line of a table; TableHead is the line above.

@@ -77,9 +77,10 @@ Status RenderReference(const ReferenceRequest& request, const ClusterOptions& cl
   if (voice.json) {
     std::fputs(ReferenceReport(reference, request.output_path).c_str(), stdout);
   } else if (!voice.quiet) {
-    std::printf("%s passes, %s photons, noise: relMSE %s, RMSE %s: %s\n",
+    std::printf("%s passes, %s photons, noise: relMSE trimmed %s, untrimmed %s; RMSE %s: %s\n",
                 MetadataOf(reference, "lucerna.reference.passes").c_str(),
                 MetadataOf(reference, "lucerna.reference.photons").c_str(),
+                MetadataOf(reference, "lucerna.reference.rel_mse_trimmed").c_str(),
                 MetadataOf(reference, "lucerna.reference.rel_mse").c_str(),
                 MetadataOf(reference, "lucerna.reference.rmse").c_str(),
                 request.output_path.c_str());

@@ -116,6 +116,14 @@ Json JobOf(const v1::Job& job) {
     json["parts"].push_back(
         {{"part", use.part()}, {"is_used", use.is_used()}, {"reason", use.reason()}});
   }
+  if (const auto error = NewestError(job)) {
+    json["relative_error"] = {
+        {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
+    if (error->truth) json["relative_error"]["true"] = *error->truth;
+    json["relative_error"]["untrimmed"] = error->untrimmed;
+    if (error->true_untrimmed) json["relative_error"]["true_untrimmed"] = *error->true_untrimmed;
+    json["relative_error"]["left_out_pixels"] = job.convergence().rbegin()->left_out_pixels();
+  }
   if (job.dropped_photons_size() > 0) json["dropped_photons"] = Json::array();
   for (const v1::PhotonKey& key : job.dropped_photons())
     json["dropped_photons"].push_back({{"pass", key.pass()}, {"index", key.index()}});
@@ -180,6 +188,10 @@ Json SampleOf(const v1::ErrorSample& sample) {
                {"absolute", SquaredErrorOf(sample.absolute())}};
   if (sample.has_true_relative()) json["true_relative_mse"] = sample.true_relative();
   if (sample.has_true_absolute()) json["true_absolute_mse"] = sample.true_absolute();
+  json["relative_mse_untrimmed"] = sample.relative_untrimmed();
+  if (sample.has_true_relative_untrimmed())
+    json["true_relative_mse_untrimmed"] = sample.true_relative_untrimmed();
+  json["left_out_pixels"] = sample.left_out_pixels();
   return json;
 }
 
@@ -234,11 +246,6 @@ std::string JobReport(const v1::Job& job, const SavedImage& saved) {
 std::string ConvergenceReport(const v1::Job& job) {
   Json json = JobOf(job);
   json["has_reference"] = job.has_reference();
-  if (const auto error = NewestError(job)) {
-    json["relative_error"] = {
-        {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
-    if (error->truth) json["relative_error"]["true"] = *error->truth;
-  }
   for (const auto& [name, against] : {std::pair{"mse_exponent_time", ErrorAgainst::kTime},
                                       std::pair{"mse_exponent_photons", ErrorAgainst::kPhotons}}) {
     if (const auto law = FitOfSquaredError(job, against)) json[name] = law->exponent;
@@ -272,7 +279,10 @@ std::string ConvergenceCsv(const v1::Job& job) {
                                          "absolute_low",
                                          "absolute_high",
                                          "true_relative_mse",
-                                         "true_absolute_mse"};
+                                         "true_absolute_mse",
+                                         "relative_mse_untrimmed",
+                                         "true_relative_mse_untrimmed",
+                                         "left_out_pixels"};
   std::string csv = absl::StrJoin(head, ",") + "\r\n";
   for (const v1::ErrorSample& sample : job.convergence()) {
     std::vector<std::string> cells = {"sample",
@@ -287,6 +297,10 @@ std::string ConvergenceCsv(const v1::Job& job) {
     AppendSquaredError(cells, sample.absolute());
     cells.push_back(sample.has_true_relative() ? Cell(sample.true_relative()) : "");
     cells.push_back(sample.has_true_absolute() ? Cell(sample.true_absolute()) : "");
+    cells.push_back(Cell(sample.relative_untrimmed()));
+    cells.push_back(sample.has_true_relative_untrimmed() ? Cell(sample.true_relative_untrimmed())
+                                                         : "");
+    cells.push_back(std::to_string(sample.left_out_pixels()));
     absl::StrAppend(&csv, absl::StrJoin(cells, ","), "\r\n");
   }
   for (const v1::WorkerShare& share : job.worker_shares()) {
@@ -343,6 +357,9 @@ std::string MetricsReport(const ImageMetrics& metrics) {
   Json json = {{"pixels", metrics.pixels},
                {"rmse", metrics.rmse},
                {"rel_mse", metrics.rel_mse},
+               {"rel_mse_trimmed", metrics.rel_mse_trimmed},
+               {"rel_mse_untrimmed", metrics.rel_mse_untrimmed},
+               {"floor", metrics.floor},
                {"mean_a", metrics.mean_a},
                {"mean_b", metrics.mean_b},
                {"mean_ratio", metrics.mean_ratio},
@@ -351,6 +368,9 @@ std::string MetricsReport(const ImageMetrics& metrics) {
     json["reference_rel_mse"] = *metrics.reference_rel_mse;
     json["reference_rmse"] = std::sqrt(*metrics.reference_mse);
     json["corrected_rel_mse"] = metrics.rel_mse - *metrics.reference_rel_mse;
+    json["corrected_rel_mse_trimmed"] = metrics.rel_mse_trimmed - metrics.reference_rel_mse_trimmed;
+    json["corrected_rel_mse_untrimmed"] =
+        metrics.rel_mse_untrimmed - metrics.reference_rel_mse_untrimmed;
   }
   return ToText(json);
 }
@@ -382,6 +402,7 @@ std::string ComparisonReport(const Comparison& comparison, const ComparisonSubje
                  {"wall_s", cell->wall_s},
                  {"photons", cell->photons},
                  {"rel_mse", MeanJson(cell->rel_mse)},
+                 {"rel_mse_untrimmed", MeanJson(cell->untrimmed)},
                  {"mostly_reference_noise", cell->is_mostly_reference}};
       if (std::isfinite(cell->ratio.value)) at["ratio"] = MeanJson(cell->ratio);
       one["at"].push_back(std::move(at));
@@ -395,7 +416,9 @@ std::string ComparisonReport(const Comparison& comparison, const ComparisonSubje
                           {"wall_s", point.wall_s},
                           {"photons", point.photons},
                           {"measured_rel_mse", point.rel_mse},
-                          {"reference_rel_mse", point.reference_noise}});
+                          {"reference_rel_mse", point.reference_noise},
+                          {"measured_rel_mse_untrimmed", point.untrimmed},
+                          {"reference_rel_mse_untrimmed", point.untrimmed_reference_noise}});
       }
       one["runs"].push_back({{"seed", run.seed}, {"points", std::move(points)}});
     }

@@ -200,11 +200,15 @@ std::string Headline(const v1::Job& job) {
   std::string html =
       Concat("<p class=\"headline\"><span class=\"muted\">Estimated relative error</span>",
              "<span class=\"figure\">", ShortPercent(error->value), "</span>95 % interval ",
-             ShortPercent(error->low), " to ", ShortPercent(error->high));
+             ShortPercent(error->low), " to ", ShortPercent(error->high), "; untrimmed ",
+             ShortPercent(error->untrimmed));
   if (job.settings().error() > 0) {
     absl::StrAppend(&html, "; target ", ShortPercent(job.settings().error()));
   }
   if (error->truth) absl::StrAppend(&html, "; true error ", ShortPercent(*error->truth));
+  if (error->true_untrimmed) {
+    absl::StrAppend(&html, ", untrimmed ", ShortPercent(*error->true_untrimmed));
+  }
   return html + "</p>\n";
 }
 
@@ -276,9 +280,10 @@ std::string Convergence(const v1::Job& job) {
                   ErrorChart(job, ErrorAgainst::kPhotons), "</div>\n");
   html +=
       "<p class=\"muted\">The relative error is the root of relMSE, the mean of error² / (value² + "
-      "floor) over pixels and channels, without the worst 0.1 % of pixels. The floor is a hundredth "
+      "floor) over pixels and channels, without the worst 0.1 % of pixels. The floor is a "
+      "hundredth "
       "of the squared mean luminance of the image without its brightest 1 %. Squared, noise and "
-      "bias add up to it.";
+      "bias add up to it. The untrimmed error is that of all pixels.";
   if (job.has_reference()) {
     html += " The true error is that against the job's reference image.";
   }
@@ -307,10 +312,13 @@ std::string Samples(const v1::Job& job) {
   const bool has_truth =
       std::any_of(job.convergence().begin(), job.convergence().end(),
                   [](const v1::ErrorSample& sample) { return sample.has_true_relative(); });
-  std::vector<Column> columns = {{"passes"}, {"photons"},   {"time"}, {"processor time"},
-                                 {"error"},  {"95 % from"}, {"to"},   {"noise"},
-                                 {"bias"},   {"RMSE"}};
-  if (has_truth) columns.push_back({"true error"});
+  std::vector<Column> columns = {{"passes"}, {"photons"},   {"time"},     {"processor time"},
+                                 {"error"},  {"95 % from"}, {"to"},       {"noise"},
+                                 {"bias"},   {"RMSE"},      {"untrimmed"}};
+  if (has_truth) {
+    columns.push_back({"true error"});
+    columns.push_back({"true untrimmed"});
+  }
   std::string html =
       Concat("<section>\n<h2>Samples</h2>\n",
              TableTop("Errors are relative; RMSE is the estimated root of the mean squared error.",
@@ -326,8 +334,12 @@ std::string Samples(const v1::Job& job) {
                                       ShortPercent(error.high),
                                       ShortPercent(error.noise),
                                       ShortPercent(error.bias),
-                                      absl::StrFormat("%.3g", std::sqrt(std::max(0.0, squared)))};
-    if (has_truth) cells.push_back(error.truth ? ShortPercent(*error.truth) : "–");
+                                      absl::StrFormat("%.3g", std::sqrt(std::max(0.0, squared))),
+                                      ShortPercent(error.untrimmed)};
+    if (has_truth) {
+      for (const std::optional<double> truth : {error.truth, error.true_untrimmed})
+        cells.push_back(truth ? ShortPercent(*truth) : "–");
+    }
     absl::StrAppend(&html, "<tr><th scope=\"row\">", sample.passes(), "</th>");
     for (const std::string& cell : cells)
       absl::StrAppend(&html, "<td>", EscapeMarkup(cell), "</td>");

@@ -180,9 +180,8 @@ StatusOr<CaseOutcome> LightScalesNoError(SelfcheckBench& bench) {
                                bench.Render(TextOf(changed), overrides));
       LUCERNA_ASSIGN_OR_RETURN(const SelfcheckRender* image_of_other,
                                bench.Render(TextOf(changed), other_seed));
-      LUCERNA_ASSIGN_OR_RETURN(
-          const int of_this,
-          DifferentErrors(*base, base_of_other->image, *image, image_of_other->image));
+      LUCERNA_ASSIGN_OR_RETURN(const int of_this, DifferentErrors(*base, base_of_other->image,
+                                                                  *image, image_of_other->image));
       different += of_this;
       ++images;
       if (of_this > 0 && first.empty())

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "render/base/parallel.h"
+#include "render/estimate/noise_layer.h"
 #include "render/estimate/relative_error.h"
 #include "render/estimate/statistics.h"
 #include "render/film/film.h"
@@ -152,22 +153,32 @@ Image JobEstimator::MakeImage() const {
                                         Kernel{state_->settings.kernel});
   ToFileUnit(image, state_->scene.unit);
   if (passes_applied() < 2) return image;
-  // Single pixels: their own variance over passes, made as large in all as the halves say it is.
-  const double factor = EstimateError(1).noise_factor;
   const ErrorStatistics& errors = *state_->errors;
   const auto passes = static_cast<double>(passes_applied());
   const double exposure = state_->scene.film.exposure;
-  std::vector<float> noise(image.channels[0].pixels.size());
+  const double even_passes = std::ceil(passes / 2);
+  const double odd_passes = passes - even_passes;
+  const double noise_area = EstimateError(1).noise_area;
+  std::vector<PixelNoise> noise(image.channels[0].pixels.size());
   std::vector<float> bias(noise.size());
   for (std::size_t pixel = 0; pixel < noise.size(); ++pixel) {
-    const RgbSum all = state_->Sum(pixel);
-    const double mean = LuminanceOf(all) / passes;
-    const double variance = std::max(0.0, errors.square_sum()[pixel] / passes - mean * mean);
-    noise[pixel] = static_cast<float>(exposure * std::sqrt(factor * variance / (passes - 1)));
+    const double sum = exposure * LuminanceOf(state_->Sum(pixel));
+    const double even_sum = exposure * LuminanceOf(errors.even_sum()[pixel]);
+    const double mean = sum / passes;
+    const double square = exposure * exposure * errors.square_sum()[pixel] / passes;
     bias[pixel] = static_cast<float>(
         exposure * (errors.even_bias()[pixel] + errors.odd_bias()[pixel]) / passes);
+    // Less than this is rounding of a pixel that is the same in every pass.
+    constexpr double kRounding = 1e-12;
+    if (!(square - mean * mean > kRounding * square)) continue;
+    const double difference = even_sum / even_passes - (sum - even_sum) / odd_passes;
+    const double largest = exposure * static_cast<double>(errors.largest()[pixel]) - mean;
+    noise[pixel] = {
+        .of_halves = difference * difference * even_passes * odd_passes / (passes * passes),
+        .of_passes = (square - mean * mean) / (passes - 1),
+        .largest_share = std::min(1.0, largest * largest / (passes * (square - mean * mean)))};
   }
-  image.channels.push_back({"noise", std::move(noise)});
+  image.channels.push_back({"noise", NoiseOfPixels(image.width, image.height, noise_area, noise)});
   image.channels.push_back({"bias", std::move(bias)});
   return image;
 }
@@ -196,7 +207,7 @@ ErrorEstimate JobEstimator::EstimateError(int look) const {
       lucerna::EstimateError(state_->settings.crop_width(), state_->settings.crop_height(),
                              passes_applied(), look, sums_at);
   // Without any light a black image is exact.
-  if (IsBlack(state_->lights->TotalPower())) estimate.relative = {};
+  if (lucerna::IsBlack(state_->lights->TotalPower())) estimate.relative = {}, estimate.untrimmed = 0;
   return estimate;
 }
 
@@ -219,18 +230,23 @@ TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
       pixels[pixel].relative += RelativeSquare(off * off, right, floor);
     }
   }
+  double untrimmed = 0;
+  for (const TrueError& pixel : pixels)
+    untrimmed += pixel.relative;
   const auto kept =
       pixels.size() - static_cast<std::size_t>(kTrimmedShare * static_cast<double>(pixels.size()));
   std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
                            &TrueError::relative);
   pixels.resize(kept);
-  TrueError error;
+  TrueError error = {.untrimmed = untrimmed / (3 * static_cast<double>(reference.size()))};
   for (const TrueError& pixel : pixels) {
     error.absolute += pixel.absolute;
     error.relative += pixel.relative;
   }
   const double terms = 3 * static_cast<double>(kept);
-  return {error.relative / terms, error.absolute / terms};
+  error.relative /= terms;
+  error.absolute /= terms;
+  return error;
 }
 
 }  // namespace lucerna

@@ -52,7 +52,7 @@ class JobEstimator {
   // Rays traced for the passes applied so far.
   [[nodiscard]] std::uint64_t eye_rays() const;
   // The image of the passes applied so far, without metadata. Requires passes_applied() > 0. Layers
-  // `noise` and `bias` from the second pass on.
+  // `noise` (standard deviation of each pixel's luminance) and `bias` from the second pass on.
   [[nodiscard]] Image MakeImage() const;
   // `look` counts the looks at this job, from 1. Requires passes_applied() >= 2.
   [[nodiscard]] ErrorEstimate EstimateError(int look) const;

@@ -93,9 +93,12 @@ v1::ErrorSample SampleToProto(const ErrorSample& sample) {
   *message.mutable_cpu() = ToProto(sample.cpu);
   *message.mutable_relative() = ErrorToProto(sample.estimate.relative);
   *message.mutable_absolute() = ErrorToProto(sample.estimate.absolute);
+  message.set_relative_untrimmed(sample.estimate.untrimmed);
+  message.set_left_out_pixels(sample.estimate.left_out_pixels);
   if (sample.truth) {
     message.set_true_relative(sample.truth->relative);
     message.set_true_absolute(sample.truth->absolute);
+    message.set_true_relative_untrimmed(sample.truth->untrimmed);
   }
   return message;
 }

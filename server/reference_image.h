@@ -17,6 +17,7 @@ using ReferenceImage = std::vector<Rgb>;
 struct TrueError {
   double relative = 0;
   double absolute = 0;
+  double untrimmed = 0;  // relative, of all pixels
 };
 
 // Errors: INVALID_ARGUMENT for bytes that are not an EXR image of the job's size with R, G, B.

@@ -364,7 +364,8 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, Scale scale, doubl
 
 }  // namespace
 
-ErrorStatistics::ErrorStatistics(std::size_t pixels) : even_sum_(pixels), square_sum_(pixels) {
+ErrorStatistics::ErrorStatistics(std::size_t pixels)
+    : even_sum_(pixels), square_sum_(pixels), largest_(pixels) {
   for (std::vector<double>& sum : bias_sum_)
     sum.resize(pixels);
 }
@@ -377,6 +378,7 @@ void ErrorStatistics::AddPass(std::uint64_t pass, std::span<const RgbSum> radian
   for (std::size_t pixel = 0; pixel < radiance.size(); ++pixel) {
     const double luminance = LuminanceOf(radiance[pixel]);
     square_sum_[pixel] += luminance * luminance;
+    largest_[pixel] = std::max(largest_[pixel], static_cast<float>(luminance));
     bias_sum[pixel] += bias[pixel];
     if (!is_even) continue;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -422,7 +424,7 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   const double floor = RelativeErrorFloor(luminances);
   if (floor == 0) {
     const SquaredError unknown = {.noise = HUGE_VAL, .bias = 0, .low = 0, .high = HUGE_VAL};
-    return {.relative = unknown, .absolute = {}, .noise_factor = 1};
+    return {.relative = unknown, .absolute = {}, .untrimmed = HUGE_VAL};
   }
 
   const double believed = BelievedShare(sums_at, luminances, floor, even_passes, odd_passes);
@@ -510,6 +512,9 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
     pixels[i].bias = chosen.bias.absolute[i];
     pixels[i].relative_bias = chosen.bias.relative[i];
   }
+  double untrimmed = 0;
+  for (const PixelError& one : pixels)
+    untrimmed += static_cast<double>(one.relative_noise) + static_cast<double>(one.relative_bias);
   const std::size_t kept =
       count - static_cast<std::size_t>(kTrimmedShare * static_cast<double>(count));
   std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
@@ -517,7 +522,10 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   pixels.resize(kept);
   return {.relative = Summarize(pixels, Scale::kRelative, chosen.relative_lost, spread),
           .absolute = Summarize(pixels, Scale::kAbsolute, chosen.absolute_lost, spread),
-          .noise_factor = independent > 0 ? halves / independent : 1};
+          .untrimmed = std::max(untrimmed, 0.0) / static_cast<double>(count),
+          .left_out_pixels = static_cast<std::int64_t>(count - kept),
+          .noise_factor = independent > 0 ? halves / independent : 1,
+          .noise_area = spread.noise_area};
 }
 
 }  // namespace lucerna

@@ -66,6 +66,8 @@ class ErrorStatistics {
   [[nodiscard]] const std::vector<RgbSum>& even_sum() const { return even_sum_; }
   // Sums over all passes of the squared luminance [pixels].
   [[nodiscard]] const std::vector<double>& square_sum() const { return square_sum_; }
+  // The largest luminance of a pass [pixels].
+  [[nodiscard]] const std::vector<float>& largest() const { return largest_; }
   // Sums over even and odd passes of the bias [pixels].
   [[nodiscard]] const std::vector<double>& even_bias() const { return bias_sum_[0]; }
   [[nodiscard]] const std::vector<double>& odd_bias() const { return bias_sum_[1]; }
@@ -74,6 +76,7 @@ class ErrorStatistics {
   std::int64_t passes_ = 0;
   std::vector<RgbSum> even_sum_;
   std::vector<double> square_sum_;
+  std::vector<float> largest_;
   std::array<std::vector<double>, 2> bias_sum_;
 };
 
@@ -88,15 +91,20 @@ struct SquaredError {
 };
 
 struct ErrorEstimate {
-  // Mean over pixels and channels of error² / (value² + floor): what ImageMetrics calls rel_mse with
-  // a trim_share of kTrimmedShare. Infinite while the image is black:
-  // relative to nothing there is no error, and the light may not have been found yet.
+  // Mean over pixels and channels of error² / (value² + floor): what ImageMetrics calls rel_mse
+  // with a trim_share of kTrimmedShare. Infinite while the image is black: relative to nothing
+  // there is no error, and the light may not have been found yet.
   SquaredError relative;
   // Mean of error² over the same pixels: the square of its rmse.
   SquaredError absolute;
-  // True squared noise over what passes that knew nothing of each other would have: below 1 where
-  // stratification over passes helps. For the noise of single pixels.
+  // The relative squared error of all pixels; no interval is known where rare light decides it.
+  double untrimmed = 0;
+  // How many pixels `relative` and `absolute` leave out.
+  std::int64_t left_out_pixels = 0;
+  // Squared noise over that of independent passes: below 1 where stratification over passes helps.
   double noise_factor = 1;
+  // Number of pixels whose noise is alike.
+  double noise_area = 1;
 };
 
 // Sums over passes of what one pixel is made of, in the colours and the exposure of the image.

@@ -172,6 +172,7 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
 
   struct Compared {
     double relative_error = 0;  // summed over channels
+    double relative_noise = 0;  // of the reference
     std::size_t pixel = 0;
   };
   std::vector<Compared> compared;
@@ -179,35 +180,53 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
   for (std::size_t i = 0; i < count; ++i) {
     if (!mask.empty() && mask[i] == 0) continue;
     double relative_error = 0;
+    double relative_noise = 0;
     for (std::size_t channel = 0; channel < 3; ++channel) {
       const double va = a[channel][i];
       const double vb = b[channel][i];
       relative_error += RelativeSquare((va - vb) * (va - vb), vb, floor);
+      if (!noise) continue;
+      const double deviation = (*noise)[channel][i];
+      relative_noise += RelativeSquare(deviation * deviation, vb, floor);
     }
-    compared.push_back({relative_error, i});
+    compared.push_back({relative_error, relative_noise, i});
   }
 
-  const auto trimmed =
-      static_cast<std::size_t>(options.trim_share * static_cast<double>(compared.size()));
-  const std::size_t kept = compared.size() - trimmed;
+  const auto kept_without = [&](double share) {
+    return compared.size() - static_cast<std::size_t>(share * static_cast<double>(compared.size()));
+  };
+  const std::size_t kept = kept_without(options.trim_share);
   if (kept == 0) return absl::InvalidArgumentError("there is no pixel left to compare");
   // Ties go by place, so that the same images always give the same figures.
   std::ranges::sort(compared, [](const Compared& left, const Compared& right) {
     return left.relative_error != right.relative_error ? left.relative_error < right.relative_error
                                                        : left.pixel < right.pixel;
   });
-  compared.resize(kept);
-
+  // Of the so many pixels with the least error.
+  const auto mean_of = [&](double Compared::*of, std::size_t pixels) {
+    double sum = 0;
+    for (std::size_t i = 0; i < pixels; ++i)
+      sum += compared[i].*of;
+    return sum / (3 * static_cast<double>(pixels));
+  };
   ImageMetrics metrics;
+  const std::size_t kept_trimmed = options.trim_share > 0 ? kept : kept_without(kTrimmedShare);
+  metrics.rel_mse = mean_of(&Compared::relative_error, kept);
+  metrics.rel_mse_trimmed = mean_of(&Compared::relative_error, kept_trimmed);
+  metrics.rel_mse_untrimmed = mean_of(&Compared::relative_error, compared.size());
+  if (noise) {
+    metrics.reference_rel_mse = mean_of(&Compared::relative_noise, kept);
+    metrics.reference_rel_mse_trimmed = mean_of(&Compared::relative_noise, kept_trimmed);
+    metrics.reference_rel_mse_untrimmed = mean_of(&Compared::relative_noise, compared.size());
+  }
+  compared.resize(kept);
   metrics.pixels = kept;
   metrics.floor = floor;
   std::array<double, 3> sum_a{};
   std::array<double, 3> sum_b{};
   double squares = 0;
   double noise_squares = 0;
-  double relative_noise = 0;
   for (const Compared& one : compared) {
-    metrics.rel_mse += one.relative_error;
     for (std::size_t channel = 0; channel < 3; ++channel) {
       const double va = a[channel][one.pixel];
       const double vb = b[channel][one.pixel];
@@ -215,7 +234,6 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
       if (noise) {
         const double deviation = (*noise)[channel][one.pixel];
         noise_squares += deviation * deviation;
-        relative_noise += RelativeSquare(deviation * deviation, vb, floor);
       }
       sum_a[channel] += va;
       sum_b[channel] += vb;
@@ -223,9 +241,7 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
   }
   const double samples = 3 * static_cast<double>(kept);
   metrics.rmse = std::sqrt(squares / samples);
-  metrics.rel_mse /= samples;
   if (noise) {
-    metrics.reference_rel_mse = relative_noise / samples;
     metrics.reference_mse = noise_squares / samples;
     if (!std::isfinite(*metrics.reference_mse)) {
       return absl::InvalidArgumentError("the noise layer of the reference is not finite");

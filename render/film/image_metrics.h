@@ -31,6 +31,9 @@ struct ImageMetrics {
   std::uint64_t pixels = 0;       // compared
   double rmse = 0;                // sqrt of the mean over pixels and channels of (a - b)²
   double rel_mse = 0;             // mean over pixels and channels of (a - b)² / (b² + floor)
+  // The same without the trim_share of pixels in which it is largest, kTrimmedShare where none is
+  // asked for, and of all pixels.
+  double rel_mse_trimmed = 0, rel_mse_untrimmed = 0;
   double floor = 0;               // of rel_mse
   double mean_a = 0, mean_b = 0;  // over pixels and channels
   double mean_ratio = 0;          // mean_a / mean_b
@@ -38,6 +41,8 @@ struct ImageMetrics {
   // The part of rel_mse, and of the square of rmse, that is noise of the reference itself; where
   // the reference tells its noise (film/reference.h), and neither clipping nor scaling changed it.
   std::optional<double> reference_rel_mse, reference_mse;
+  // The parts of rel_mse_trimmed and rel_mse_untrimmed; 0 where the others are absent.
+  double reference_rel_mse_trimmed = 0, reference_rel_mse_untrimmed = 0;
 };
 
 // Compares R, G, B of `image` with those of `reference`.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -79,12 +80,12 @@ StatusOr<Image> MakeReference(const Image& a, const Image& b) {
     noise.push_back(std::move(deviation));
   }
   const double floor = RelativeErrorFloor(LuminancesOf(reference));
-  double relative = 0;
+  std::vector<double> relative(reference.channels[0].pixels.size());
   for (std::size_t c = 0; c < 3; ++c) {
-    for (std::size_t i = 0; i < noise[c].pixels.size(); ++i) {
+    for (std::size_t i = 0; i < relative.size(); ++i) {
       const auto value = static_cast<double>(reference.channels[c].pixels[i]);
       const auto error = static_cast<double>(noise[c].pixels[i]);
-      relative += RelativeSquare(error * error, value, floor);
+      relative[i] += RelativeSquare(error * error, value, floor);
     }
   }
   std::ranges::move(noise, std::back_inserter(reference.channels));
@@ -98,7 +99,16 @@ StatusOr<Image> MakeReference(const Image& a, const Image& b) {
         absl::StrCat(TextOf(a, of_half), " ", TextOf(b, of_half));
   }
   const double count = std::max(samples, 1.0);
-  reference.metadata[kRelMse] = absl::StrCat(relative / count);
+  const auto mean_of = [&](std::size_t pixels) {
+    const double sum = std::accumulate(relative.begin(),
+                                       relative.begin() + static_cast<std::ptrdiff_t>(pixels), 0.0);
+    return absl::StrCat(sum / std::max(3.0 * static_cast<double>(pixels), 1.0));
+  };
+  std::ranges::sort(relative);
+  const auto left_out =
+      static_cast<std::size_t>(kTrimmedShare * static_cast<double>(relative.size()));
+  reference.metadata[kRelMse] = mean_of(relative.size());
+  reference.metadata["lucerna.reference.rel_mse_trimmed"] = mean_of(relative.size() - left_out);
   reference.metadata["lucerna.reference.rmse"] = absl::StrCat(std::sqrt(absolute / count));
   return reference;
 }

@@ -20,6 +20,8 @@ inline constexpr std::array<const char*, 3> kNoiseLayer = {"noise.R", "noise.G",
 // The average, with the noise layer and in its metadata
 //   lucerna.reference.rel_mse   the mean over pixels and channels of (a - b)²/4 / (value² +
 //                               floor); the floor is that of render/estimate/relative_error.h
+//   lucerna.reference.rel_mse_trimmed   the same without the kTrimmedShare of pixels in which it is
+//                               largest
 //   lucerna.reference.rmse      the root of the mean of (a - b)²/4
 //   lucerna.reference.seeds, .passes, .photons   of both halves
 //   lucerna.scene_digest, .settings, .numeric_profile   as the first half has them

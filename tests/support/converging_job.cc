@@ -54,6 +54,9 @@ v1::Job ConvergingJob(int samples) {
     SetError(sample->mutable_relative(), 0.040 * law, 0.009 * law);
     SetError(sample->mutable_absolute(), 0.0040 * law, 0.0007 * law);
     sample->set_true_relative(0.049 * law * (1 + 0.15 * std::sin(1.7 * i)));
+    sample->set_relative_untrimmed(0.060 * law);
+    sample->set_true_relative_untrimmed(0.070 * law);
+    sample->set_left_out_pixels(65);
     sample->set_true_absolute(0.0047 * law * (1 + 0.15 * std::sin(1.7 * i)));
   }
   v1::Progress* progress = job.mutable_progress();

@@ -88,7 +88,7 @@ TEST(LiveViewTest, LongLinesBreakBetweenTheirParts) {
   const std::vector<std::string> lines = LiveLines(RunningJob(24), nullptr, {46, 40});
   EXPECT_EQ(lines[0], "[####################] 100 %  pass 418");
   EXPECT_EQ(lines[2], "error about 2.96 % (95 %: 2.65 % to 3.38 %)");
-  EXPECT_EQ(lines[3], "target 3.50 %");
+  EXPECT_EQ(lines[3], "untrimmed 3.28 %  target 3.50 %");
 }
 
 TEST(FramePainterTest, FramesReplaceOneAnother) {

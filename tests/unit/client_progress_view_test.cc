@@ -132,9 +132,11 @@ TEST(ProgressViewTest, AnErrorTargetIsALimitToo) {
 
 TEST(ProgressViewTest, TheErrorIsSaidWithItsIntervalAndTarget) {
   v1::Job job = ConvergingJob();
-  EXPECT_EQ(ErrorLine(job), "error about 2.96 % (95 %: 2.65 % to 3.38 %)  target 3.50 %");
+  EXPECT_EQ(ErrorLine(job),
+            "error about 2.96 % (95 %: 2.65 % to 3.38 %)  untrimmed 3.28 %  target 3.50 %");
   EXPECT_NE(SummaryLine(job).find(
-                ", its error target reached, error about 2.96 % (95 %: 2.65 % to 3.38 %)"),
+                ", its error target reached, error about 2.96 % (95 %: 2.65 % to 3.38 %), "
+                "untrimmed 3.28 %; the target leaves out the worst 65 pixels"),
             std::string::npos)
       << SummaryLine(job);
   job.mutable_settings()->set_error(0.03);

@@ -53,6 +53,14 @@ TEST(ReportTest, TheConvergenceRecordKeepsItsDigits) {
   EXPECT_EQ(sample["photons"], job.convergence(3).photons());
   EXPECT_EQ(sample["relative"]["noise"].get<double>(), job.convergence(3).relative().noise());
   EXPECT_EQ(sample["true_relative_mse"].get<double>(), job.convergence(3).true_relative());
+  EXPECT_EQ(sample["relative_mse_untrimmed"].get<double>(),
+            job.convergence(3).relative_untrimmed());
+  EXPECT_EQ(sample["true_relative_mse_untrimmed"].get<double>(),
+            job.convergence(3).true_relative_untrimmed());
+  EXPECT_EQ(sample["left_out_pixels"], 65);
+  EXPECT_DOUBLE_EQ(report["relative_error"]["untrimmed"].get<double>(),
+                   std::sqrt(job.convergence(11).relative_untrimmed()));
+  EXPECT_EQ(json::parse(JobReport(job))["relative_error"], report["relative_error"]);
   EXPECT_NEAR(report["mse_exponent_photons"].get<double>(), -2.0 / 3, 1e-4);
   EXPECT_DOUBLE_EQ(report["relative_error"]["high"].get<double>(),
                    std::sqrt(job.convergence(11).relative().high()));
@@ -108,9 +116,13 @@ TEST(ReportTest, DiagnosticsKeepTheirPlace) {
 TEST(ReportTest, MetricsKeepTheirDigits) {
   ImageMetrics metrics;
   metrics.rel_mse = 0.1 + 0.2;
+  metrics.rel_mse_trimmed = 0.1;
+  metrics.rel_mse_untrimmed = 0.7;
   metrics.channel_mean_ratio = {1, 2, 3};
   const json report = json::parse(MetricsReport(metrics));
   EXPECT_EQ(report["rel_mse"].get<double>(), 0.1 + 0.2);
+  EXPECT_EQ(report["rel_mse_trimmed"].get<double>(), 0.1);
+  EXPECT_EQ(report["rel_mse_untrimmed"].get<double>(), 0.7);
   EXPECT_EQ(report["channel_mean_ratio"], json({1.0, 2.0, 3.0}));
 }
 

@@ -61,13 +61,16 @@ TEST(CompareCommandTest, ARecordIsACurveOfProcessorTimeOverCores) {
   *sample.mutable_running() = ToProto(Duration(std::chrono::seconds(4)));
   sample.set_photons(1000);
   sample.set_true_relative(0.25);
-  const std::vector<ErrorPoint> curve = CurveOf(job, 2, 0.01);
+  sample.set_true_relative_untrimmed(0.5);
+  const std::vector<ErrorPoint> curve = CurveOf(job, 2, 0.01, 0.02);
   ASSERT_EQ(curve.size(), 1U);
   EXPECT_EQ(curve[0].seconds, 3);
   EXPECT_EQ(curve[0].wall_s, 4);
   EXPECT_EQ(curve[0].photons, 1000);
   EXPECT_EQ(curve[0].rel_mse, 0.25);
   EXPECT_EQ(curve[0].reference_noise, 0.01);
+  EXPECT_EQ(curve[0].untrimmed, 0.5);
+  EXPECT_EQ(curve[0].untrimmed_reference_noise, 0.02);
 }
 
 }  // namespace

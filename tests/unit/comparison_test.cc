@@ -24,7 +24,9 @@ ComparedRun PowerLaw(std::size_t setting, double scale, double exponent, double 
                           .wall_s = seconds / 0.8,
                           .photons = photons,
                           .rel_mse = scale * std::pow(photons, exponent) + noise,
-                          .reference_noise = noise});
+                          .reference_noise = noise,
+                          .untrimmed = 3 * scale * std::pow(photons, exponent) + 2 * noise,
+                          .untrimmed_reference_noise = 2 * noise});
   }
   return run;
 }
@@ -45,6 +47,8 @@ TEST(ComparisonTest, APowerLawIsMetExactlyBetweenItsPoints) {
     ASSERT_TRUE(cell_a && cell_b) << kTimes[i];
     EXPECT_NEAR(cell_a->rel_mse.value / a, 1, 1e-12);
     EXPECT_NEAR(cell_b->rel_mse.value / b, 1, 1e-12);
+    EXPECT_NEAR(cell_a->untrimmed.value / a, 3, 1e-11);
+    EXPECT_NEAR(cell_b->untrimmed.value / b, 3, 1e-11);
     EXPECT_NEAR(cell_a->ratio.value, 1, 1e-12);
     EXPECT_NEAR(cell_b->ratio.value / (b / a), 1, 1e-12);
     EXPECT_NEAR(cell_a->wall_s, kTimes[i] / 0.8, 1e-9);
@@ -172,9 +176,9 @@ TEST(ComparisonTest, TheTableSaysWhatWasComparedAndHow) {
   EXPECT_THAT(table, HasSubstr("# box.pbrt\n"));
   EXPECT_THAT(table, HasSubstr("does not tell its own noise"));
   EXPECT_THAT(table, HasSubstr("over 2 cores"));
-  EXPECT_THAT(table, HasSubstr("| 1 | a | 1.00e-06 | 1.00 | 1.25 | 1e+06 |\n"));
-  EXPECT_THAT(table, HasSubstr("| 1 | b | 2.00e-06 | 2.00 | 1.25 | 1e+06 |\n"));
-  EXPECT_THAT(table, HasSubstr("| 100 | a | — | — | — | — |\n"));
+  EXPECT_THAT(table, HasSubstr("| 1 | a | 1.00e-06 | 3.00e-06 | 1.00 | 1.25 | 1e+06 |\n"));
+  EXPECT_THAT(table, HasSubstr("| 1 | b | 2.00e-06 | 6.00e-06 | 2.00 | 1.25 | 1e+06 |\n"));
+  EXPECT_THAT(table, HasSubstr("| 100 | a | — | — | — | — | — |\n"));
   EXPECT_THAT(table, HasSubstr("| b | `--alpha 0.5 \\| x` |"));
   EXPECT_THAT(table, HasSubstr("| -1.00 / 0.00 |\n"));
   subject.reference_noise = 1.25e-5;

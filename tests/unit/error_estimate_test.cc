@@ -155,6 +155,21 @@ TEST(ErrorEstimateTest, LightTimesAnyFactorGivesTheSameRelativeError) {
   }
 }
 
+// A few pixels with a thousand times the noise decide the error of all pixels, and are left out of
+// the other.
+TEST(ErrorEstimateTest, TellsTheErrorWithAndWithoutTheWorstPixels) {
+  KeyedRng rng(37);
+  const ErrorEstimate estimate = EstimateOfPasses([&](std::uint64_t, std::size_t pixel) {
+    const double noise = 2 * static_cast<double>(rng.Uniform()) - 1;
+    return ValueAndBias{1000 + (pixel % 1111 == 0 ? 1000 : 1) * noise, 0};
+  });
+  EXPECT_EQ(estimate.left_out_pixels, 9);
+  // Noise of variance 1/3 a pass, four passes, in 1.01e6; nine of 9216 pixels with a million times.
+  EXPECT_NEAR(estimate.relative.total() * 1.01e6 / (1.0 / 12), 1, 0.1);
+  EXPECT_GT(estimate.untrimmed, 100 * estimate.relative.total());
+  EXPECT_LT(estimate.untrimmed, 5000 * estimate.relative.total());
+}
+
 // Nothing has been found yet: that is no error of 0.
 TEST(ErrorEstimateTest, ABlackImageHasNoKnownRelativeError) {
   const ErrorEstimate estimate =

@@ -133,8 +133,23 @@ TEST(ImageMetricsTest, TrimsTheWorstPixels) {
   EXPECT_EQ(metrics.pixels, 3U);
   // The floor is that of the whole reference: mean 5/4.
   EXPECT_DOUBLE_EQ(metrics.rel_mse, 1 / (4 + 0.015625) / 3);
+  EXPECT_EQ(metrics.rel_mse_trimmed, metrics.rel_mse);
+  const double worst = 49 * 49 / (1 + 0.015625);
+  EXPECT_DOUBLE_EQ(metrics.rel_mse_untrimmed, (1 / (4 + 0.015625) + worst) / 4);
   EXPECT_EQ(Compare(image, reference, {.trim_share = 1}).status().code(),
             absl::StatusCode::kInvalidArgument);
+}
+
+TEST(ImageMetricsTest, TellsTheErrorWithAndWithoutTheWorstPixelsWhateverIsAskedFor) {
+  std::vector<float> pixels(2000, 2);
+  const std::vector<float> reference(2000, 1);
+  pixels[3] = 1e4F;
+  pixels[77] = 1e3F;
+  const ImageMetrics metrics = Compared(Gray(50, 40, pixels), Gray(50, 40, reference));
+  EXPECT_EQ(metrics.pixels, 2000U);
+  EXPECT_NEAR(metrics.rel_mse_trimmed, 1 / 1.01, 1e-12);
+  EXPECT_EQ(metrics.rel_mse_untrimmed, metrics.rel_mse);
+  EXPECT_NEAR(metrics.rel_mse, (1998 + std::pow(9999, 2) + std::pow(999, 2)) / 1.01 / 2000, 1e-6);
 }
 
 TEST(ImageMetricsTest, LeavesOutWhatTheMaskBlackens) {

@@ -38,8 +38,10 @@ TEST(ReferenceTest, WorkedByHand) {
   ASSERT_TRUE(reference.ok()) << reference.status();
   EXPECT_EQ(reference->Find("G")->pixels, (std::vector<float>{2, 4}));
   EXPECT_EQ(reference->Find("noise.G")->pixels, (std::vector<float>{1, 0}));
-  EXPECT_NEAR(std::stod(reference->metadata.at("lucerna.reference.rel_mse")), 1 / 4.09 / 2,
-              1e-6);
+  EXPECT_NEAR(std::stod(reference->metadata.at("lucerna.reference.rel_mse")), 1 / 4.09 / 2, 1e-6);
+  EXPECT_EQ(reference->metadata.at("lucerna.reference.rel_mse_trimmed"),
+            reference->metadata.at("lucerna.reference.rel_mse"))
+      << "of two pixels none is left out";
   EXPECT_NEAR(std::stod(reference->metadata.at("lucerna.reference.rmse")), std::sqrt(0.5), 1e-6);
   // Mean luminance 3: a floor of 0.09.
   EXPECT_EQ(reference->metadata.at("lucerna.reference.seeds"), "0 1");
