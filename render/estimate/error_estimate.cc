@@ -11,17 +11,22 @@
 namespace lucerna {
 namespace {
 
-// What the models of noise may be off by, in the logarithm of the squared error: a tenth of the
+// What the models of noise may be off by, in the logarithm of the squared error: a seventh of the
 // error. Most of it is light so rare that the halves have hardly seen it.
-constexpr double kModelError = 0.2;
-// What squared bias is at least and at most, of what is estimated. It is too small where a step is
-// blurred and the dark side is not known to be so dark, too large where lines thinner than the
-// kernel are. On the project's scenes it is 0.5 to 1.4 times the truth wherever it matters.
-constexpr double kLeastBias = 0.5;
+constexpr double kModelError = 0.3;
+// What squared bias is at least and at most, of what is estimated. It is too large where values
+// without blur are guessed from few photons, too small where lines thinner than the inner kernel
+// are. Chosen, with kModelError, on half A of tests/tools/make_study_scenes.py and on scenes of the
+// project.
+constexpr double kLeastBias = 0.35;
 constexpr double kMostBias = 2.5;
 
-// The share of squared bias that smoothing loses. Measured.
-constexpr double kSmoothedAway = 1.0 / 3;
+// No estimate is believed to be too large by more than this, as a share of its square.
+constexpr double kLeastShare = 0.01;
+// How much noise of the estimated bias weighs against the bias in the share of it that is believed
+// of single pixels. Chosen on half A of tests/tools/make_study_scenes.py.
+constexpr double kNoiseWeight = 0.02;
+
 // The widest smoothing that is tried reaches over so many times the area over which noise is alike.
 constexpr double kWidest = 3;
 // How much less than narrower ones a wider smoothing may say, in deviations of theirs.
@@ -77,10 +82,30 @@ class MeanAround {
   std::vector<float> rows_;  // sums over x
 };
 
+// The share of the estimated bias that is taken off single pixels to guess their values without
+// blur: near 1 unless the estimate is mostly noise.
+double BelievedShare(const PixelSumsAt& sums_at, const std::vector<double>& luminances,
+                     double floor, double even_passes, double odd_passes) {
+  double bias = 0;
+  double noise = 0;
+  for (std::size_t i = 0; i < luminances.size(); ++i) {
+    const PixelSums sums = sums_at(i);
+    const double even = sums.even_bias / even_passes;
+    const double odd = sums.odd_bias / odd_passes;
+    const double weight = 1 / (luminances[i] * luminances[i] + floor);
+    bias += even * odd * weight;
+    noise += 0.25 * (even - odd) * (even - odd) * weight;
+  }
+  bias = std::max(bias, 0.0);
+  return noise > 0 ? bias / (bias + kNoiseWeight * noise) : 1;
+}
+
 // The estimates of one pixel, means over channels.
 struct PixelError {
   float relative_noise = 0, relative_bias = 0;
   float noise = 0, bias = 0;
+  // By how much the relative bias might be larger, or smaller, for another value without blur.
+  float more_bias = 0, less_bias = 0;
 
   // By which pixels are left out: whatever is large by chance, be it above or below 0.
   [[nodiscard]] float Size() const { return relative_noise + std::abs(relative_bias); }
@@ -120,6 +145,36 @@ std::vector<float> Smoothed(int width, int height, int reach, const std::vector<
   return smooth;
 }
 
+// The least of `values` within `reach` pixels along rows and columns.
+std::vector<float> LeastAround(int width, int height, int reach, const std::vector<float>& values) {
+  std::vector<float> least = values;
+  std::vector<float> line;
+  const auto along = [&](std::size_t start, std::size_t step, int length) {
+    line.resize(static_cast<std::size_t>(length));
+    for (std::size_t i = 0; i < line.size(); ++i)
+      line[i] = least[start + i * step];
+    for (int i = 0; i < length; ++i) {
+      least[start + static_cast<std::size_t>(i) * step] =
+          *std::min_element(line.begin() + std::max(0, i - reach),
+                            line.begin() + std::min(length, i + reach + 1));
+    }
+  };
+  const auto w = static_cast<std::size_t>(width);
+  for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y)
+    along(y * w, 1, width);
+  for (std::size_t x = 0; x < w; ++x)
+    along(x, w, height);
+  return least;
+}
+
+// What a kernel at most blurs over, in pixels: the default first radius.
+constexpr int kKernelReach = 3;
+
+// The least luminance that a pixel can be believed to have without the blur.
+std::vector<float> LeastLuminance(int width, int height, std::vector<float> luminance) {
+  return LeastAround(width, height, kKernelReach, Smoothed(width, height, 2, luminance));
+}
+
 // What the kernel changed in each pixel, as the two halves have it.
 struct BiasHalves {
   std::vector<float> even, odd;
@@ -128,11 +183,10 @@ struct BiasHalves {
 
   // Squared bias, without the halves' noise: the product of one half with the other, smoothed.
   [[nodiscard]] std::vector<float> Squares(int width, int height, int reach) const {
-    constexpr auto kScale = static_cast<float>(0.5 / (1 - kSmoothedAway));
     const std::vector<float> smooth_even = Smoothed(width, height, reach, even);
     std::vector<float> squares = Smoothed(width, height, reach, odd);
     for (std::size_t i = 0; i < squares.size(); ++i)
-      squares[i] = kScale * (even[i] * squares[i] + smooth_even[i] * odd[i]);
+      squares[i] = 0.5F * (even[i] * squares[i] + smooth_even[i] * odd[i]);
     return squares;
   }
 };
@@ -242,11 +296,11 @@ struct ChosenBias {
 };
 
 ChosenBias Choose(int width, int height, const PixelBiases& biases, double noise_area) {
-  ChosenBias chosen{.bias = biases.Smooth(width, height, 2)};
+  ChosenBias chosen{.bias = biases.Smooth(width, height, 1)};
   double most_relative = chosen.bias.relative_sum;
   double most_absolute = chosen.bias.absolute_sum;
   double least = most_relative - kUnsure * chosen.bias.deviation;
-  for (int reach = 4; reach * reach <= 1 + kWidest * noise_area; reach *= 2) {
+  for (int reach = 2; reach * reach <= 1 + kWidest * noise_area; reach *= 2) {
     SmoothedBias wider = biases.Smooth(width, height, reach);
     if (wider.relative_sum < least) break;
     most_relative = std::max(most_relative, wider.relative_sum);
@@ -259,8 +313,16 @@ ChosenBias Choose(int width, int height, const PixelBiases& biases, double noise
   return chosen;
 }
 
-SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::*noise_of,
-                       float PixelError::*bias_of, double lost, const Spread& spread) {
+// Whether `pixels` are summed as relative errors or as absolute ones.
+enum class Scale : std::uint8_t { kRelative, kAbsolute };
+
+SquaredError Summarize(const std::vector<PixelError>& pixels, Scale scale, double lost,
+                       const Spread& spread) {
+  const bool is_relative = scale == Scale::kRelative;
+  const auto noise_of = is_relative ? &PixelError::relative_noise : &PixelError::noise;
+  const auto bias_of = is_relative ? &PixelError::relative_bias : &PixelError::bias;
+  double more = 0;
+  double less = 0;
   double noise = 0;
   double bias = 0;
   double of_noise = 0;  // fourth powers
@@ -274,6 +336,9 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::
     of_noise += n * n;
     of_bias += b * b;
     of_cross += b * n;
+    if (!is_relative) continue;
+    more += static_cast<double>(pixel.more_bias);
+    less += static_cast<double>(pixel.less_bias);
   }
   const auto count = static_cast<double>(pixels.size());
   SquaredError error;
@@ -287,8 +352,11 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, float PixelError::
                           spread.bias_area * of_bias;
   const double chance = spread.z * std::sqrt(variance) / count / total;
   // Chance and what bias may be off by know nothing of each other.
-  const double below = std::log(total / (error.noise + kLeastBias * error.bias));
-  const double above = std::log((error.noise + kMostBias * error.bias) / total);
+  const double least_bias = kLeastBias * std::max(0.0, error.bias - std::max(less, 0.0) / count);
+  const double most_bias = kMostBias * error.bias + std::max(more, 0.0) / count;
+  const double below =
+      std::log(total / std::max(error.noise + least_bias, kLeastShare * total));
+  const double above = std::log((error.noise + most_bias) / total);
   error.low = total * std::exp(-std::hypot(chance, below) - kModelError);
   error.high = (total + lost / count) * std::exp(std::hypot(chance, above) + kModelError);
   return error;
@@ -348,17 +416,18 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
     return MeanAround(width, height, std::move(means));
   };
   const std::array<MeanAround, 3> around = {mean_around(0), mean_around(1), mean_around(2)};
-  const double floor = [&] {
-    std::vector<double> luminances(count);
-    for (std::size_t i = 0; i < count; ++i)
-      luminances[i] = LuminanceOf(sums_at(i).all) / passes;
-    return RelativeErrorFloor(luminances);
-  }();
+  std::vector<double> luminances(count);
+  for (std::size_t i = 0; i < count; ++i)
+    luminances[i] = LuminanceOf(sums_at(i).all) / passes;
+  const std::vector<float> least_luminance =
+      LeastLuminance(width, height, std::vector<float>(luminances.begin(), luminances.end()));
+  const double floor = RelativeErrorFloor(luminances);
   if (floor == 0) {
     const SquaredError unknown = {.noise = HUGE_VAL, .bias = 0, .low = 0, .high = HUGE_VAL};
     return {.relative = unknown, .absolute = {}, .untrimmed = HUGE_VAL};
   }
 
+  const double believed = BelievedShare(sums_at, luminances, floor, even_passes, odd_passes);
   std::vector<PixelError> pixels(count);
   std::vector<float> differences(count);
   PixelBiases biases(count);
@@ -370,10 +439,12 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
       const PixelSums sums = sums_at(pixel);
       RgbSum difference{};
       double noise_sum = 0, relative_noise = 0, signed_noise = 0;
-      double color_square = 0, color_to_even = 0, color_to_odd = 0;
+      double color_square = 0;
+      RgbSum odd_sum{};
       for (std::size_t c = 0; c < 3; ++c) {
         const double even = sums.even[c] / even_passes;
-        const double odd = (sums.all[c] - sums.even[c]) / odd_passes;
+        odd_sum[c] = sums.all[c] - sums.even[c];
+        const double odd = odd_sum[c] / odd_passes;
         difference[c] = even - odd;
         const double own = sums.all[c] / passes;
         const double agreed = Middle(even, odd, around[c](x, y));
@@ -385,19 +456,44 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
         noise_sum += noise;
         relative_noise += noise * weight;
         signed_noise += difference[c] * std::sqrt(weight);
-        const double square = sums.bias_color[c] * sums.bias_color[c];
-        color_square += square;
-        color_to_even += square / (even * even + floor);
-        color_to_odd += square / (odd * odd + floor);
+        color_square += sums.bias_color[c] * sums.bias_color[c];
       }
       pixels[pixel].noise = static_cast<float>(noise_sum / 3);
       pixels[pixel].relative_noise = static_cast<float>(relative_noise / 3);
       differences[pixel] = static_cast<float>(signed_noise);
       const double even_bias = sums.even_bias / even_passes;
       const double odd_bias = sums.odd_bias / odd_passes;
+      // One over value² + floor as a half has it without `share` of the bias, times the squared
+      // colour of the bias.
+      const double mean = luminances[pixel];
+      const auto color_over_value = [&](double half, double bias, double share) {
+        const double unblurred =
+            std::max({static_cast<double>(least_luminance[pixel]), half - share * bias, 0.0});
+        const double of_mean = mean > 0 ? unblurred / mean : 0;
+        double sum = 0;
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double value = of_mean * sums.all[c] / passes;
+          sum += sums.bias_color[c] * sums.bias_color[c] / (value * value + floor);
+        }
+        return sum / 3;
+      };
+      const double even = LuminanceOf(sums.even) / even_passes;
+      const double odd = LuminanceOf(odd_sum) / odd_passes;
+      const double square_to_even = color_over_value(even, even_bias, believed);
+      const double square_to_odd = color_over_value(odd, odd_bias, believed);
+      const double of_even = std::sqrt(square_to_even);
+      const double of_odd = std::sqrt(square_to_odd);
+      const auto product = [&](double to_even, double to_odd) {
+        return 0.5 * even_bias * odd_bias * (to_even + to_odd);
+      };
+      const double relative_product = product(square_to_even, square_to_odd);
+      pixels[pixel].more_bias = static_cast<float>(
+          product(color_over_value(even, even_bias, 1), color_over_value(odd, odd_bias, 1)) -
+          relative_product);
+      pixels[pixel].less_bias = static_cast<float>(
+          relative_product -
+          product(color_over_value(even, even_bias, 0), color_over_value(odd, odd_bias, 0)));
       const double of_color = std::sqrt(color_square / 3);
-      const double of_even = std::sqrt(color_to_even / 3);
-      const double of_odd = std::sqrt(color_to_odd / 3);
       biases.absolute.even[pixel] = static_cast<float>(even_bias * of_color);
       biases.absolute.odd[pixel] = static_cast<float>(odd_bias * of_color);
       biases.to_even.even[pixel] = static_cast<float>(even_bias * of_even);
@@ -406,7 +502,6 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
       biases.to_odd.odd[pixel] = static_cast<float>(odd_bias * of_odd);
       const double luminance = LuminanceOf(difference);
       halves += luminance * luminance * to_noise;
-      const double mean = LuminanceOf(sums.all) / passes;
       independent += std::max(0.0, sums.square / passes - mean * mean) / (passes - 1);
     }
   }
@@ -425,10 +520,8 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
                            &PixelError::Size);
   pixels.resize(kept);
-  return {.relative = Summarize(pixels, &PixelError::relative_noise, &PixelError::relative_bias,
-                                chosen.relative_lost, spread),
-          .absolute = Summarize(pixels, &PixelError::noise, &PixelError::bias, chosen.absolute_lost,
-                                spread),
+  return {.relative = Summarize(pixels, Scale::kRelative, chosen.relative_lost, spread),
+          .absolute = Summarize(pixels, Scale::kAbsolute, chosen.absolute_lost, spread),
           .untrimmed = std::max(untrimmed, 0.0) / static_cast<double>(count),
           .left_out_pixels = static_cast<std::int64_t>(count - kept),
           .noise_factor = independent > 0 ? halves / independent : 1,

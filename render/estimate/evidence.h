@@ -21,7 +21,7 @@ namespace lucerna {
 inline constexpr std::size_t kBlurColumn = 0;
 inline constexpr std::size_t kCommonColumns = 1;
 // Radius of the inner kernel over that of the whole one.
-inline constexpr float kInnerShare = 0.4F;
+inline constexpr float kInnerShare = 1.0F / 3;
 
 // What a radius controller asks for behind it.
 enum class Evidence : std::uint8_t { kNone, kSectors, kCurvature, kFrequency };

@@ -137,7 +137,7 @@ TEST(PixelStatisticsTest, CountsAPassWithoutHitpointAsDark) {
   EXPECT_EQ(radiance[0][0], 1);
   // Half the flux is outside the inner kernel's share: (4/8) density, over what that kernel leaves.
   const double luminance = 2 * 0.2126 - 0.0722;
-  EXPECT_NEAR(bias[1], luminance * density / 2 / (1 - 0.16), 1e-6);
+  EXPECT_NEAR(bias[1], luminance * density / 2 / (1 - 1.0 / 9), 1e-6);
   EXPECT_EQ(statistics.photon_count()[1], 3U);
   EXPECT_EQ(statistics.last_radius()[1], 0.5F);
 }

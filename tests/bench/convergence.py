@@ -1,0 +1,257 @@
+#!/usr/bin/env python3
+"""How does the error fall with time, and how true is what the program says of it?
+
+  tests/bench/convergence.py [--times 1,5,20,60] [--reference-s 240] [--size 128x128]
+                             [--settings default,pppm,frequency-mse] [--scenes NAME,...]
+
+Renders the twelve scenes of half B of make_study_scenes.py (no constant of the error estimate has
+seen them) and twelve others through a coordinator and a worker of its own. For every scene, setting
+and time it notes the estimated error with its interval and, against a reference whose own noise is
+taken off, the true error with and without the worst 0.1 % of pixels. Errors are roots of relMSE.
+
+Results are kept in docs/convergence/results.csv: what is there is not rendered again, so that the
+program can be stopped and started. References are kept in --work. At the end the page
+docs/convergence.md and a plot for each scene are written from the table. In full it takes about
+two hours on an idle machine of two cores.
+"""
+import argparse
+import csv
+import json
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+BIN = ROOT / "build/release/bin"
+OWN = ["hard-shadow", "penumbra", "water-sun", "water-lamp", "caustic", "cardioid", "corner",
+       "glass-box", "glass-sphere", "lamp-in-glass", "rough-metal", "textured"]
+FLAGS = {"default": [], "pppm": ["--radius-controller", "pppm"],
+         "frequency-mse": ["--radius-controller", "frequency-mse"]}
+COLUMNS = ["scene", "setting", "time_s", "passes", "photons", "estimated", "low", "high",
+           "true_trimmed", "true_untrimmed", "reference_noise"]
+
+
+def run(command):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True,
+                          check=False)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(map(str, command))}\n{done.stderr}")
+    return done.stdout
+
+
+class Cluster:
+    """A coordinator and a worker on a free port."""
+
+    def __init__(self, log):
+        self.server = subprocess.Popen([BIN / "lucerna-server", "--listen", "127.0.0.1:0"],
+                                       stdout=log, stderr=log)
+        self.log = pathlib.Path(log.name)
+        self.address = self.find_address()
+        self.worker = subprocess.Popen([BIN / "lucerna-worker", "--server", self.address],
+                                       stdout=log, stderr=log)
+
+    def find_address(self):
+        for _ in range(100):
+            for word in self.log.read_text(encoding="utf-8").split():
+                if word.startswith("127.0.0.1:") and not word.endswith(":0"):
+                    return word.rstrip(",;.")
+            time.sleep(0.1)
+        sys.exit("the coordinator did not say where it listens")
+
+    def close(self):
+        for process in (self.worker, self.server):
+            process.terminate()
+            process.wait()
+
+    def render(self, scene, flags, seconds, image):
+        """The job's report after `seconds`; its image goes to `image`."""
+        at = ["--server", self.address]
+        job = json.loads(run([BIN / "lucerna", "submit", scene, *at, "--time", seconds, *flags,
+                              "--json"]))["job_id"]
+        run([BIN / "lucerna", "watch", job, *at, "--quiet"])
+        run([BIN / "lucerna", "fetch", job, *at, "-o", image, "--quiet"])
+        return json.loads(run([BIN / "lucerna", "report", job, *at, "--json"]))
+
+
+def true_error(image, reference, trim):
+    diff = json.loads(run([BIN / "lucerna", "diff", image, reference, "--json",
+                           *(["--trim", "0.001"] if trim else [])]))
+    noise = diff.get("reference_rel_mse") or 0.0
+    return math.sqrt(max(diff["rel_mse"] - noise, 0.0)), math.sqrt(max(noise, 0.0))
+
+
+def measure(cluster, name, path, setting, seconds, arguments, reference, folder):
+    image = folder / "image.exr"
+    flags = ["--size", arguments.size, *FLAGS[setting]]
+    job = cluster.render(path, flags, seconds, image)
+    error = job["convergence"][-1]["relative"]
+    trimmed, noise = true_error(image, reference, trim=True)
+    untrimmed, _ = true_error(image, reference, trim=False)
+    return {"scene": name, "setting": setting, "time_s": f"{seconds:g}", "passes": job["passes"],
+            "photons": job["photons"],
+            "estimated": math.sqrt(error["noise"] + error["bias"]),
+            "low": math.sqrt(error["low"]), "high": math.sqrt(error["high"]),
+            "true_trimmed": trimmed, "true_untrimmed": untrimmed, "reference_noise": noise}
+
+
+def read_rows(path):
+    if not path.exists():
+        return []
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def append_row(path, row):
+    is_new = not path.exists()
+    with path.open("a", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS)
+        if is_new:
+            writer.writeheader()
+        writer.writerow({key: f"{value:.6g}" if isinstance(value, float) else value
+                         for key, value in row.items()})
+
+
+def number(row, column):
+    return float(row[column])
+
+
+def is_inside(row):
+    return number(row, "low") <= number(row, "true_trimmed") <= number(row, "high")
+
+
+def plot(path, name, rows):
+    """True error (line), estimate (circles) and interval (bars) against time, both logarithmic."""
+    width, height, margin = 420, 300, 45
+    rows = sorted(rows, key=lambda row: number(row, "time_s"))
+    times = [number(row, "time_s") for row in rows]
+    values = [number(row, column) for row in rows for column in ("low", "high", "true_trimmed")]
+    low, high = max(min(values), 1e-5) * 0.8, max(values) * 1.25
+    span = math.log(max(times) / min(times)) or 1.0
+
+    def place(seconds, value):
+        x = margin + (width - 2 * margin) * math.log(seconds / min(times)) / span
+        y = height - margin - (height - 2 * margin) * (
+            math.log(max(value, low) / low) / math.log(high / low))
+        return f"{x:.1f}", f"{y:.1f}"
+
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
+           'font-family="sans-serif" font-size="11">',
+           f'<rect width="{width}" height="{height}" fill="white"/>',
+           f'<text x="{margin}" y="20">{name}: error against time, true (line), estimated with '
+           'interval</text>']
+    line = " ".join(",".join(place(t, number(r, "true_trimmed"))) for t, r in zip(times, rows))
+    out.append(f'<polyline points="{line}" fill="none" stroke="black"/>')
+    for t, row in zip(times, rows):
+        x, y = place(t, number(row, "estimated"))
+        _, y_low = place(t, number(row, "low"))
+        _, y_high = place(t, number(row, "high"))
+        out.append(f'<line x1="{x}" y1="{y_low}" x2="{x}" y2="{y_high}" stroke="#b40"/>')
+        out.append(f'<circle cx="{x}" cy="{y}" r="3" fill="none" stroke="#b40"/>')
+        out.append(f'<text x="{x}" y="{height - 25}" text-anchor="middle">{t:g} s</text>')
+    for value in (low * 1.25, high / 1.25):
+        _, y = place(times[0], value)
+        out.append(f'<text x="4" y="{y}">{100 * value:.2g} %</text>')
+    out.append("</svg>")
+    path.write_text("\n".join(out) + "\n", encoding="utf-8")
+
+
+def share_line(title, rows):
+    ratios = [number(row, "estimated") / number(row, "true_trimmed") for row in rows
+              if number(row, "true_trimmed") > 0]
+    if not ratios:
+        return ""
+    near = sum(0.8 <= ratio <= 1.25 for ratio in ratios)
+    inside = sum(map(is_inside, rows))
+    return (f"* {title}: estimated/true within 0.8 to 1.25 in {near} of {len(ratios)} "
+            f"({min(ratios):.2f} to {max(ratios):.2f}); true error within the interval in {inside} "
+            f"of {len(rows)}; reference's squared noise at most "
+            f"{max((number(r, 'reference_noise') / max(number(r, 'true_trimmed'), 1e-9))**2 for r in rows):.2f} "
+            "of what is judged.\n")
+
+
+def write_page(rows, arguments):
+    page = ["# How the error falls\n",
+            f"Made by `tests/bench/convergence.py` ({arguments.size} pixels, references of "
+            f"{arguments.reference_s:g} s). The error is the root of relMSE; its floor follows the image. "
+            "\"True\" is against the reference with the reference's own noise taken off, \"all\" "
+            "with the worst 0.1 % of pixels. Scenes b-* are half B of "
+            "`tests/tools/make_study_scenes.py`, which no constant of the estimate has seen. All figures "
+            "are in [results.csv](convergence/results.csv).\n"]
+    judged = [row for row in rows if row["setting"] == "default"]
+    half_b = [row for row in judged if row["scene"].startswith("b-")]
+    page.append(share_line("Half B", half_b) +
+                share_line("Other scenes", [row for row in judged if row not in half_b]))
+    for setting in sorted({row["setting"] for row in rows}):
+        page.append(f"## {setting}\n")
+        page.append("| scene | s | passes | true % | all % | estimated % (interval) | "
+                    "estimated/true | inside |\n|---|---|---|---|---|---|---|---|")
+        for row in sorted((row for row in rows if row["setting"] == setting),
+                          key=lambda row: (row["scene"], number(row, "time_s"))):
+            true = number(row, "true_trimmed")
+            ratio = f"{number(row, 'estimated') / true:.2f}" if true > 0 else "-"
+            page.append(
+                f"| {row['scene']} | {row['time_s']} | {row['passes']} | {100 * true:.2f} | "
+                f"{100 * number(row, 'true_untrimmed'):.2f} | {100 * number(row, 'estimated'):.2f} "
+                f"({100 * number(row, 'low'):.2f} to {100 * number(row, 'high'):.2f}) | {ratio} | "
+                f"{'yes' if is_inside(row) else 'no'} |")
+        page.append("")
+    page.append("Plots: " + ", ".join(
+        f"[{name}](convergence/{name}.svg)" for name in sorted({row["scene"] for row in judged})))
+    (arguments.docs / "convergence.md").write_text("\n".join(page) + "\n", encoding="utf-8")
+    for name in {row["scene"] for row in judged}:
+        plot(arguments.docs / "convergence" / f"{name}.svg", name,
+             [row for row in judged if row["scene"] == name])
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("--times", default="1,5,20,60")
+    parser.add_argument("--reference-s", type=float, default=240)
+    parser.add_argument("--size", default="128x128")
+    parser.add_argument("--settings", default="default")
+    parser.add_argument("--scenes", default="", help="names, by commas; empty: all 24")
+    parser.add_argument("--work", type=pathlib.Path, default=ROOT / "build/convergence")
+    parser.add_argument("--docs", type=pathlib.Path, default=DOCS)
+    arguments = parser.parse_args()
+    arguments.work.mkdir(parents=True, exist_ok=True)
+    (arguments.docs / "convergence").mkdir(parents=True, exist_ok=True)
+    run([ROOT / "tests/tools/make_study_scenes.py", arguments.work / "scenes", "--half", "b"])
+    scenes = {path.stem: path for path in sorted((arguments.work / "scenes").glob("b-*.pbrt"))}
+    scenes |= {name: ROOT / "tests/scenes" / f"{name}.pbrt" for name in OWN}
+    if arguments.scenes:
+        scenes = {name: scenes[name] for name in arguments.scenes.split(",")}
+    table = arguments.docs / "convergence" / "results.csv"
+    done = {(row["scene"], row["setting"], float(row["time_s"])) for row in read_rows(table)}
+    times = [float(word) for word in arguments.times.split(",")]
+    with tempfile.TemporaryDirectory() as folder, \
+            (arguments.work / "cluster.log").open("w", encoding="utf-8") as log:
+        cluster = Cluster(log)
+        try:
+            for index, (name, path) in enumerate(scenes.items(), 1):
+                wanted = [(setting, seconds) for setting in arguments.settings.split(",")
+                          for seconds in times if (name, setting, seconds) not in done]
+                if not wanted:
+                    continue
+                print(f"{index} of {len(scenes)}: {name}", flush=True)
+                reference = arguments.work / f"{name}-{arguments.size}-{arguments.reference_s:g}.exr"
+                if not reference.exists():
+                    run([BIN / "lucerna", "reference", path, "--size", arguments.size, "--quiet",
+                         "--initial-radius", "1px", "--time", arguments.reference_s, "-o",
+                         reference])
+                for setting, seconds in wanted:
+                    row = measure(cluster, name, path, setting, seconds, arguments, reference,
+                                  pathlib.Path(folder))
+                    append_row(table, row)
+                    print(f"  {setting} {seconds:g} s: true {100 * row['true_trimmed']:.2f} %, "
+                          f"estimated {100 * row['estimated']:.2f} %", flush=True)
+        finally:
+            cluster.close()
+    write_page(read_rows(table), arguments)
+
+
+if __name__ == "__main__":
+    main()
