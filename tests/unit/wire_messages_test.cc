@@ -184,7 +184,7 @@ TEST(ChannelTest, AnAddressHasAHostAndAPortThatExists) {
 }
 
 TEST(WireMessagesTest, ATallyKeepsItsLights) {
-  BatchTally tally = {.photons = 10, .lights = {{.sent = 4, .in_view = {1, 2}}, {.sent = 6}}};
+  BatchTally tally = {.photons = 10, .lights = {{.sent = 4, .in_view = {1, 2}}, {.sent = 6, .in_view = {}}}};
   EXPECT_EQ(FromProto(ToProto(tally)), tally);
   v1::Tally message = ToProto(tally);
   for (int i = 0; i < 100; ++i)
