@@ -184,7 +184,12 @@ TEST(ChannelTest, AnAddressHasAHostAndAPortThatExists) {
 }
 
 TEST(WireMessagesTest, ATallyKeepsItsLights) {
-  BatchTally tally = {.photons = 10, .lights = {{.sent = 4, .in_view = {1, 2}}, {.sent = 6, .in_view = {}}}};
+  BatchTally tally;
+  tally.photons = 10;
+  tally.lights.resize(2);
+  tally.lights[0].sent = 4;
+  tally.lights[0].in_view = {1, 2};
+  tally.lights[1].sent = 6;
   EXPECT_EQ(FromProto(ToProto(tally)), tally);
   v1::Tally message = ToProto(tally);
   for (int i = 0; i < 100; ++i)
