@@ -265,7 +265,45 @@ TEST(SceneNeedsTest, EverythingIsAllThatCanBeForced) {
     if (!needs.Uses(part)) left_out.insert(std::string(NameOf(part)));
   }
   EXPECT_EQ(left_out, (Names{"round-shapes", "environment", "area-lights", "lens", "motion",
-                             "media", "alpha-masks", "instances"}));
+                             "media", "alpha-masks", "instances", "caustic-hitpoints"}));
+}
+
+TEST(SceneNeedsTest, CausticPhotonsAreForNarrowSurfacesBehindSmoothOnes) {
+  const std::string narrow =
+      "Material \"conductor\" \"float roughness\" [.1] \"bool remaproughness\" [false]\n";
+  const std::string wide =
+      "Material \"conductor\" \"float roughness\" [.3] \"bool remaproughness\" [false]\n";
+  const std::string glass = "Material \"dielectric\"\n";
+  const auto uses = [&](const std::string& world) {
+    return NeedsWith(Parsed(kCamera, world)).Uses(Part::kCausticHitpoints);
+  };
+  EXPECT_TRUE(uses(narrow + kFloor + glass + kFloor));
+  EXPECT_FALSE(uses(wide + kFloor + glass + kFloor));
+  EXPECT_FALSE(uses(narrow + kFloor));
+  EXPECT_FALSE(uses(glass + kFloor));
+}
+
+// A ray finds every light that has an extent; as long as none is brighter than white, that is
+// enough.
+TEST(SceneNeedsTest, CausticPhotonsAreForLightsThatRaysMissOrThatAreBright) {
+  Scene scene;
+  const std::int32_t black = AddMaterial(scene, DiffuseMaterial(0));
+  AddQuad(scene, {0, 0, 4}, {1, 0, 0}, {0, 1, 0},
+          AddMaterial(scene, ConductorMaterial(Gray(0.2F), Gray(3), 0.1F, 0.1F)));
+  AddQuad(scene, {0, 0, 3}, {1, 0, 0}, {0, 1, 0},
+          AddMaterial(scene, DielectricMaterial(1.5F, 0)));
+  AddQuad(scene, {0, 0, -2}, {1, 0, 0}, {0, 1, 0}, black, AddAreaLight(scene, 0.5F, true));
+  SetCamera(scene, {0, 0, 0}, {0, 0, 1}, {0, 1, 0}, 40, 8);
+  const auto uses = [](const Scene& lit) { return NeedsWith(lit).Uses(Part::kCausticHitpoints); };
+  EXPECT_FALSE(uses(scene));
+  Scene bright = scene;
+  bright.film.exposure = 4;
+  EXPECT_TRUE(uses(bright));
+  Scene with_sun = scene;
+  with_sun.distant_lights.push_back({{0, 0, 1}, Gray(1e-3F)});
+  EXPECT_TRUE(uses(with_sun));
+  // Where no surface gathers the other photons, these are all there are.
+  EXPECT_TRUE(NeedsWith(with_sun).Uses(Part::kPhotons));
 }
 
 TEST(SceneNeedsTest, SetsOfEyePathsMustFit) {
