@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -17,16 +18,25 @@ namespace {
 // Eye paths weaker than this end by roulette more often than they go on.
 constexpr float kRouletteWeight = 0.5F;
 // Branches of the specular tree weaker than `BranchWeight` end by roulette. What survives and finds
-// the brightest light adds no more than the image's white, so that a small light seen by way of
-// several inner reflections of glass (about 0.04 each) is no bright speck in one pass of a hundred.
+// the brightest light adds no more than kWhite times the mean radiance of the scene, so that a small
+// light seen by way of several inner reflections of glass (about 0.04 each) is no bright speck in one
+// pass of a hundred. Relative to the scene's own light: the same bits however bright it is.
 constexpr float kLargestBranchWeight = 0.01F;
-// With a light so bright that four inner reflections of it are white, roulette is allowed to show.
 constexpr float kSmallestBranchWeight = 0x1p-16F;
+// About what a film shows as white over what it shows as middle grey.
+constexpr double kWhite = 5;
 
-float BranchWeight(const Scene& scene, const LightSet& lights) {
-  const double white_share =
-      1 / (static_cast<double>(lights.LargestRadiance()) * scene.film.exposure);
-  return std::clamp(static_cast<float>(white_share), kSmallestBranchWeight, kLargestBranchWeight);
+float BranchWeight(const Intersector& intersector, const LightSet& lights) {
+  const auto brightest = static_cast<double>(lights.LargestRadiance());
+  if (!(brightest > 0) || intersector.bounds().empty()) return kLargestBranchWeight;
+  // All power spread over a sphere around the scene, and scattered evenly.
+  const auto diameter = static_cast<double>(intersector.bounds().Diagonal());
+  const double area = std::numbers::pi * diameter * diameter;
+  const double mean =
+      static_cast<double>(MaxChannel(lights.TotalPower())) / (std::numbers::pi * area);
+  return static_cast<float>(std::clamp(kWhite * mean / brightest,
+                                       static_cast<double>(kSmallestBranchWeight),
+                                       static_cast<double>(kLargestBranchWeight)));
 }
 
 }  // namespace
@@ -41,7 +51,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       has_lens_(needs.Uses(Part::kLens)),
       rays_find_lights_(needs.Uses(Part::kAreaLights) || needs.Uses(Part::kEnvironment)),
       caustic_weight_(scene, settings, intersector.bounds()),
-      branch_weight_(BranchWeight(scene, lights)),
+      branch_weight_(BranchWeight(intersector, lights)),
       intersector_(intersector),
       lights_(lights),
       filter_x_(scene.filter, scene.filter.radius_x),

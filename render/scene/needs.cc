@@ -323,31 +323,24 @@ class NeedsFinder {
             : std::string("direct light is sampled; photons would be noisier"));
   }
 
-  // Whether an eye path that finds a light by chance may see more than the image's white, or no eye
-  // path can find it.
-  [[nodiscard]] bool HasBrightLights() const {
-    if (needs_.Uses(Part::kDeltaLights)) return true;
-    const auto is_bright = [&](Rgb radiance) {
-      return static_cast<double>(MaxChannel(radiance)) * scene_.film.exposure > 1;
-    };
-    return std::ranges::any_of(scene_.area_lights,
-                               [&](const AreaLight& l) { return is_bright(l.radiance); }) ||
-           std::ranges::any_of(scene_.infinite_lights, [&](const InfiniteLight& l) {
-             return l.map != nullptr || is_bright(l.radiance);
-           });
+  // Whether there are lights that eye paths never find, or only by chance.
+  [[nodiscard]] bool HasSmallLights() const {
+    return needs_.Uses(Part::kDeltaLights) || needs_.Uses(Part::kAreaLights) ||
+           std::ranges::any_of(scene_.infinite_lights,
+                               [](const InfiniteLight& light) { return light.map != nullptr; });
   }
 
   void FindCausticHitpoints() {
     const Material* narrow = First(GathersCaustics);
     const bool has_smooth = First(IsSmooth) != nullptr;
-    const bool is_used = narrow != nullptr && has_smooth && !is_dark_ && HasBrightLights();
+    const bool is_used = narrow != nullptr && has_smooth && !is_dark_ && HasSmallLights();
     Set(Part::kCausticHitpoints, is_used,
         is_used ? Concat("smooth surfaces throw light on ", Quoted(*narrow), ", where paths go on")
         : narrow == nullptr
             ? std::string("rough surfaces are rough enough for all photons to be gathered on")
         : !has_smooth ? std::string("no surface is smooth")
         : is_dark_    ? std::string(kDark)
-                      : std::string("eye paths find every light, and none is brighter than white"));
+                      : std::string("eye paths that leave the scene find all the light there is"));
     if (is_used && gathers_ == nullptr) caustics_only_ = narrow;
   }
 
