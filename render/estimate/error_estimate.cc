@@ -520,9 +520,12 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
                            &PixelError::Size);
   pixels.resize(kept);
-  return {.relative = Summarize(pixels, Scale::kRelative, chosen.relative_lost, spread),
+  const SquaredError relative =
+      Summarize(pixels, Scale::kRelative, chosen.relative_lost, spread);
+  return {.relative = relative,
           .absolute = Summarize(pixels, Scale::kAbsolute, chosen.absolute_lost, spread),
-          .untrimmed = std::max(untrimmed, 0.0) / static_cast<double>(count),
+          // Products of the halves' biases may be below 0 in the pixels left out; errors are not.
+          .untrimmed = std::max(untrimmed / static_cast<double>(count), relative.total()),
           .left_out_pixels = static_cast<std::int64_t>(count - kept),
           .noise_factor = independent > 0 ? halves / independent : 1,
           .noise_area = spread.noise_area};
