@@ -7,6 +7,15 @@
 
 namespace lucerna {
 
+namespace {
+
+// Where a shadow ray ends, over the distance to the light. The target is clear of the light's surface
+// by a few roundings of the light's own coordinates; those of a far receiver are larger, and the ray
+// would meet the light itself: a small light lost a tenth of its light 2.5 m away.
+constexpr float kShadowEnd = 1 - 0x1p-17F;
+
+}  // namespace
+
 float PowerHeuristic(float drawn, float other) {
   if (drawn >= other) {
     if (!(drawn > 0)) return 0;
@@ -42,7 +51,7 @@ Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
   // Both ends are clear of their surfaces, so nothing but a third surface can be met.
   const Vec3 origin = LeavingPoint(point.surface, light.wi);
   const Ray shadow = light.is_distant ? Ray{origin, light.wi, HUGE_VALF}
-                                      : Ray{origin, light.target - origin, 1};
+                                      : Ray{origin, light.target - origin, kShadowEnd};
   return intersector.Occluded(shadow) ? Rgb{} : radiance;
 }
 
