@@ -94,16 +94,16 @@ TEST_P(BulbOverFloor, IsSeenWholeHoweverSmall) {
 INSTANTIATE_TEST_SUITE_P(Radii, BulbOverFloor,
                          testing::Values(1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.5));
 
-// The light is small and near the ceiling, and the receiver's coordinates are larger than those by
+// The light is small and faces along the surface; the receiver's coordinates are larger than those by
 // which the light's own clearance goes.
-TEST(LightSampledRadianceTest, FindsASmallLightWholeFromEveryPlaceOfARoom) {
+TEST(LightSampledRadianceTest, FindsASmallLightWholeFromFarAlongAWall) {
   Scene scene;
   const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.5F));
-  AddQuad(scene, {-1.27F, -1.25F, -1.28F}, {2.56F, 0, 0}, {0, 2.56F, 0}, white);
-  AddQuad(scene, {-0.1F, 0.1F, 1.27F}, {0.2F, 0, 0}, {0, -0.2F, 0}, white, AddAreaLight(scene, 3));
-  for (float x = -1.2F; x < 1.3F; x += 0.31F) {
-    for (float y = -1.2F; y < 1.3F; y += 0.37F)
-      EXPECT_EQ(VisibleShare(scene, {x, y, -1.28F}), 1) << x << " " << y;
+  AddQuad(scene, {-1.28F, -1.25F, -1.27F}, {2.56F, 0, 0}, {0, 2.56F, 0}, white);
+  AddQuad(scene, {1.27F, -0.1F, -0.1F}, {0, 0, 0.2F}, {0, 0.2F, 0}, white, AddAreaLight(scene, 3));
+  for (float x = -1.213F; x < 1.2F; x += 0.31F) {
+    for (float y = -1.207F; y < 1.2F; y += 0.37F)
+      EXPECT_EQ(VisibleShare(scene, {x, y, -1.27F}), 1) << x << " " << y;
   }
 }
 
