@@ -50,11 +50,13 @@ class Pppm final : public RadiusController {
   double alpha_;
 };
 
-// Takes the radius of least mean squared error for the Laplacian that the photons themselves show.
-// Source: Kaplanyan & Dachsbacher 2013, "Adaptive Progressive Photon Mapping", restated: the
-// Laplacian is that of a biweight kernel which stays wider than the estimate's by kCurvatureReach.
-// By that its noise alone asks for a radius 1.5 times the present one, so even light is not shrunk
-// for nothing.
+// Takes the radius of least mean squared error for the bias that the photons themselves show, in two
+// ways. Source: Kaplanyan & Dachsbacher 2013, "Adaptive Progressive Photon Mapping", restated.
+// The Laplacian is that of a biweight kernel which stays wider than the estimate's by
+// kCurvatureReach. By that its noise alone asks for a radius 1.5 times the present one, so even light
+// is not shrunk for nothing. But on the rim of a bright spot a Laplacian passes through zero while the
+// bias is largest, so what the kernel itself adds over one of a third of its radius counts too, as
+// far as it is surely more than noise.
 class Appm final : public RadiusController {
  public:
   Appm(const RenderSettings& settings, float initial_radius)
@@ -70,26 +72,43 @@ class Appm final : public RadiusController {
     const auto column = [&](CurvatureColumn c) {
       return kWeightUnit * static_cast<double>(evidence.columns[c]);
     };
-    // Per pass and unit of flux: the Laplacian of the flux density, and the density of squares.
+    // Per pass and unit of flux: the Laplacian of the flux density, the density of squares, and blur
+    // over the squared radius.
     memory[kLaplacian] += column(kCurvatureLaplacian) * 24 / (std::numbers::pi * h2 * h2);
     memory[kSquares] += column(kCurvatureWeight2) / (std::numbers::pi * h2);
+    const double blur = evidence.blur / (evidence.radius * evidence.radius);
+    memory[kBlur] += blur;
+    memory[kBlurSquares] += blur * blur;
     memory[kPasses] += 1;
     PixelRadius next = {now.radius, now.photons + evidence.photons};
 
     const double n = memory[kPasses];
-    const double laplacian = memory[kLaplacian] / n;
-    if (laplacian == 0) return next;
-    // The least of roughness · squares / (n r²) + (mu2/2)² Laplacian² r⁴.
-    const double sixth = 2 * moments_.roughness * (memory[kSquares] / n) /
-                         (n * moments_.mu2 * moments_.mu2 * laplacian * laplacian);
+    // Of the bias over the squared radius, squared.
+    const double by_laplacian = moments_.mu2 / 2 * memory[kLaplacian] / n;
+    const double square = std::max(by_laplacian * by_laplacian, SureSquareOfBlur(memory));
+    if (square == 0) return next;
+    // The least of roughness · squares / (n r²) + square r⁴.
+    const double sixth = moments_.roughness * (memory[kSquares] / n) / (n * 2 * square);
     const double radius = std::max(std::cbrt(std::sqrt(sixth)), smallest_);
     next.radius = std::min(next.radius, radius);
     return next;
   }
 
  private:
-  enum Memory : std::size_t { kLaplacian, kSquares, kPasses, kNumbers };
+  enum Memory : std::size_t { kLaplacian, kSquares, kBlur, kBlurSquares, kPasses, kNumbers };
   static constexpr double kSmallestShare = 0.01;
+  // Blur counts from so many passes on, and so many times its standard deviation is taken from it:
+  // less than this is shown by noise in one of thousands of pixels.
+  static constexpr double kFirstPasses = 8;
+  static constexpr double kSureDeviations = 8;
+
+  static double SureSquareOfBlur(std::span<const double> memory) {
+    const double n = memory[kPasses];
+    if (n < kFirstPasses) return 0;
+    const double mean = memory[kBlur] / n;
+    const double variance = (memory[kBlurSquares] / n - mean * mean) / (n - 1);
+    return std::max(0.0, mean * mean - kSureDeviations * kSureDeviations * variance);
+  }
 
   KernelMoments moments_;
   double smallest_;

@@ -72,13 +72,16 @@ void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& r
     for (std::size_t column = 0; column < columns.size(); ++column) {
       columns[column] = sums.evidence()[column][block_row];
     }
-    bias[pixel] += static_cast<double>(columns[kBlurColumn]) * luminance_per_quantum * to_density *
-                  kToBias * static_cast<double>(Luminance(rows.weights[row]));
+    const double blur = static_cast<double>(columns[kBlurColumn]) * kToBias;
+    bias[pixel] += blur * luminance_per_quantum * to_density *
+                   static_cast<double>(Luminance(rows.weights[row]));
+    const double in_unit_radii = radius / static_cast<double>(rows.unit_radii[row]);
     radius_[pixel] = controller.Next(
         radius_[pixel],
-        {static_cast<double>(sums.counts()[block_row]),
-         radius / static_cast<double>(rows.unit_radii[row]),
-         std::span<const std::int64_t>(columns).subspan(kCommonColumns)},
+        {.photons = static_cast<double>(sums.counts()[block_row]),
+         .radius = in_unit_radii,
+         .columns = std::span<const std::int64_t>(columns).subspan(kCommonColumns),
+         .blur = blur * kernel.Norm() / ((1 << kFluxBits) * in_unit_radii * in_unit_radii)},
         pass, std::span<double>(memory_).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
   }
   ++passes_;
