@@ -19,6 +19,7 @@
 #include "client/preview.h"
 #include "client/reference_command.h"
 #include "client/selfcheck.h"
+#include "render/base/version.h"
 
 namespace lucerna {
 namespace {
@@ -32,6 +33,7 @@ int Run(int argc, char** argv) {
       "Lucerna renders light that path tracers do not find, by progressive photon mapping.",
       "lucerna");
   app.require_subcommand(1);
+  app.set_version_flag("--version", absl::StrCat("lucerna ", Version()));
   app.footer(
       "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 coordinator unreachable, 130 interrupted.");
 

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
@@ -16,6 +17,7 @@
 #include <spdlog/spdlog.h>
 
 #include "render/base/clock.h"
+#include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
 #include "server/asset_service.h"
@@ -96,6 +98,7 @@ int Main(int argc, char** argv) {
   Flags flags;
   flags.coordinator.numeric_profile = NumericProfile();
   CLI::App app("Lucerna's coordinator: takes jobs, lends batches to workers, keeps images.");
+  app.set_version_flag("--version", absl::StrCat("lucerna-server ", Version()));
   app.add_option("--listen", flags.listen, "HOST:PORT to listen on; port 0 picks a free one")
       ->capture_default_str();
   app.add_flag("--allow-insecure-network", flags.allow_insecure_network,
@@ -115,6 +118,8 @@ int Main(int argc, char** argv) {
   app.add_option("--log-level", flags.log_level, "debug, info, warn, error or off")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
+  std::string help = "--help";
+  if (argc == 2 && std::string_view(argv[1]) == "help") argv[1] = help.data();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

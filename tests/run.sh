@@ -9,5 +9,5 @@ bash "$root/deploy/packages.sh" tests
 cd "$root"
 cmake --preset release -D LUCERNA_BUILD_TESTS=ON
 cmake --build --preset release
-# Tests that start processes share the machine's cores with nobody.
-exec ctest --preset release --parallel 1 "$@"
+# Tests that start the programs run alone (see tests/CMakeLists.txt).
+exec ctest --preset release --parallel "$(nproc)" "$@"

@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdio>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include <CLI/CLI.hpp>
@@ -16,6 +17,7 @@
 #include <unistd.h>
 
 #include "render/base/clock.h"
+#include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
 #include "worker/replay.h"
@@ -93,6 +95,7 @@ int Main(int argc, char** argv) {
   double connect_timeout_s = 60;
   options.server = "127.0.0.1:7400";
   CLI::App app("Lucerna's worker: traces batches of photons for a coordinator.");
+  app.set_version_flag("--version", absl::StrCat("lucerna-worker ", Version()));
   app.add_option("--server", options.server, "HOST:PORT of the coordinator")->capture_default_str();
   app.add_option("--threads", options.threads, "threads to trace with; 0: all")
       ->check(CLI::Range(0, 1024))
@@ -110,6 +113,8 @@ int Main(int argc, char** argv) {
   app.add_option("--pass", replay.pass, "of the photon to replay, from 0")->needs(job);
   app.add_option("--index", replay.index, "of the photon to replay in its pass, from 0")
       ->needs(job);
+  std::string help = "--help";
+  if (argc == 2 && std::string_view(argv[1]) == "help") argv[1] = help.data();
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

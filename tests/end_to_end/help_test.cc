@@ -1,0 +1,36 @@
+// All three programs say which release they are and how they are called.
+#include <string>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "tests/support/process.h"
+
+namespace lucerna {
+namespace {
+
+const std::string kBin = LUCERNA_BIN_DIR;
+
+class HelpTest : public testing::TestWithParam<const char*> {};
+
+TEST_P(HelpTest, SaysTheVersionAndTheUsage) {
+  const std::string program = kBin + "/" + GetParam();
+  const auto version = RunProgram({program, "--version"});
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_THAT(version.output, testing::MatchesRegex(std::string(GetParam()) + " [0-9.]+\n"));
+  const auto help = RunProgram({program, "help"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_THAT(help.output, testing::HasSubstr("Usage: "));
+  EXPECT_EQ(help.output, RunProgram({program, "--help"}).output);
+}
+
+INSTANTIATE_TEST_SUITE_P(Programs, HelpTest,
+                         testing::Values("lucerna", "lucerna-server", "lucerna-worker"),
+                         [](const auto& program) {
+                           std::string name = program.param;
+                           std::erase(name, '-');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace lucerna
