@@ -17,6 +17,7 @@
 #include "client/file_commands.h"
 #include "client/job_run.h"
 #include "client/progress_view.h"
+#include "client/render_flags.h"
 #include "client/report.h"
 #include "client/scene_reading.h"
 #include "render/base/files.h"
@@ -241,13 +242,13 @@ std::string LeftOut(const CompareRequest& request) {
 }  // namespace
 
 StatusOr<std::vector<NamedFlags>> ParseSettings(const std::vector<std::string>& typed,
-                                                const RenderFlags& common) {
+                                                const RenderOverrides& common) {
   std::vector<NamedFlags> settings;
   if (typed.empty()) {
     for (const std::string_view controller : RadiusControllerNames()) {
-      NamedFlags one = {.name = std::string(controller), .words = "", .flags = common};
+      NamedFlags one = {.name = std::string(controller), .words = "", .overrides = {}};
       one.words = absl::StrCat("--radius-controller ", one.name);
-      one.flags.radius_controller = one.name;
+      LUCERNA_ASSIGN_OR_RETURN(one.overrides, WithImageFlags(common, one.words));
       settings.push_back(std::move(one));
     }
     return settings;
@@ -266,7 +267,7 @@ StatusOr<std::vector<NamedFlags>> ParseSettings(const std::vector<std::string>& 
     if (std::ranges::any_of(settings, [&](const auto& other) { return other.name == one.name; })) {
       return Misuse(absl::StrCat("--settings: two are called \"", one.name, "\""));
     }
-    LUCERNA_ASSIGN_OR_RETURN(one.flags, WithImageFlags(common, one.words));
+    LUCERNA_ASSIGN_OR_RETURN(one.overrides, WithImageFlags(common, one.words));
     settings.push_back(std::move(one));
   }
   return settings;
@@ -316,7 +317,7 @@ Status CompareSettings(const CompareRequest& request, const ClusterOptions& clus
                            ParseSettings(request.settings, request.common));
   std::vector<RenderOverrides> overrides;
   for (const NamedFlags& one : settings) {
-    LUCERNA_ASSIGN_OR_RETURN(overrides.emplace_back(), ToOverrides(one.flags));
+    overrides.push_back(one.overrides);
     // Only for the check; each job gets its own time.
     overrides.back().time_s = times.back();
   }

@@ -13,16 +13,16 @@
 #include "client/comparison.h"
 #include "client/job_commands.h"
 #include "client/local_cluster.h"
-#include "client/render_flags.h"
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "render/base/status.h"
 #include "render/estimate/error_estimate.h"
+#include "render/scene/render_settings.h"
 
 namespace lucerna {
 
 struct CompareRequest {
   std::string scene_path;
-  RenderFlags common;                 // of all settings; says nothing of when to stop
+  RenderOverrides common;             // of all settings; without stop criteria
   std::vector<std::string> settings;  // "NAME: flags"; empty: one for each radius controller
   std::string reference_path;
   std::string mask_path;  // empty: all pixels
@@ -39,13 +39,13 @@ struct CompareRequest {
 // A setting as it was typed: "NAME: flags".
 struct NamedFlags {
   std::string name;
-  std::string words;  // the flags, as typed
-  RenderFlags flags;  // with the common ones
+  std::string words;          // the flags, as typed
+  RenderOverrides overrides;  // with the common ones
 };
 // Errors: Failure(kUsage) for a setting without a name, with another's name, or with flags that
 // make no sense.
 [[nodiscard]] StatusOr<std::vector<NamedFlags>> ParseSettings(const std::vector<std::string>& typed,
-                                                              const RenderFlags& common);
+                                                              const RenderOverrides& common);
 
 // "1,2.5,10" as growing seconds. Errors: Failure(kUsage).
 [[nodiscard]] StatusOr<std::vector<double>> ParseTimes(const std::string& typed);

@@ -66,7 +66,7 @@ bool FoundNothing(const v1::Job& job) {
 std::string MissingLightSentence(const v1::Job& job) {
   if (job.convergence().empty()) return {};
   const v1::ErrorSample& newest = *job.convergence().rbegin();
-  const double target = job.settings().error();
+  const double target = SettingsOf(job).error;
   const bool matters = FoundNothing(job) ||
                        newest.missing_relative() > 0.01 * newest.relative().high() ||
                        (target > 0 && newest.missing_relative() > 0.25 * target * target);
@@ -154,7 +154,7 @@ std::optional<PowerLaw> FitOfSquaredError(const v1::Job& job, ErrorAgainst again
 }
 
 std::optional<Duration> TimeToTarget(const v1::Job& job) {
-  const double target = job.settings().error();
+  const double target = SettingsOf(job).error;
   if (!(target > 0) || job.convergence().empty()) return std::nullopt;
   const v1::ErrorSample& newest = *job.convergence().rbegin();
   const double high = newest.relative().high();
@@ -175,7 +175,7 @@ std::optional<Duration> TimeToTarget(const v1::Job& job) {
 std::optional<FarTarget> FindFarTarget(const v1::Job& job) {
   // With fewer samples a trend is chance.
   constexpr int kFewestJudged = 6;
-  const double target = job.settings().error();
+  const double target = SettingsOf(job).error;
   if (!(target > 0) || job.convergence_size() < kFewestJudged || FoundNothing(job)) {
     return std::nullopt;
   }

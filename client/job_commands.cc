@@ -76,25 +76,25 @@ Status Nothing() {
 
 Status Render(const RenderRequest& request, const ClusterOptions& cluster_options,
               const Voice& voice) {
-  LUCERNA_ASSIGN_OR_RETURN(const RenderOverrides overrides, ToOverrides(request.flags));
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
-                           ReadScene(request.scene_path, overrides, voice.quiet));
+                           ReadScene(request.scene_path, request.overrides, voice.quiet));
   LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster_options));
-  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, runs->Run(request.scene_path, manifest, overrides,
-                                                        request.reference, voice));
+  LUCERNA_ASSIGN_OR_RETURN(
+      const v1::Job job,
+      runs->Run(request.scene_path, manifest, request.overrides, request.reference, voice));
   return SaveAndReport(runs->connection(), job, request.outputs, voice);
 }
 
 Status Submit(const RenderRequest& request, const std::string& server, const Voice& voice) {
-  LUCERNA_ASSIGN_OR_RETURN(const RenderOverrides overrides, ToOverrides(request.flags));
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
-                           ReadScene(request.scene_path, overrides, voice.quiet));
+                           ReadScene(request.scene_path, request.overrides, voice.quiet));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   DirectoryFiles files(SplitScenePath(request.scene_path).folder);
-  LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
-                           SendJob(*connection, files, manifest, overrides, request.reference));
+  LUCERNA_ASSIGN_OR_RETURN(
+      const v1::SubmitResponse submitted,
+      SendJob(*connection, files, manifest, request.overrides, request.reference));
   if (request.outputs.empty()) {
     Print(voice.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
     return absl::OkStatus();
@@ -219,11 +219,10 @@ Status StopJob(const std::string& job_id, const std::string& server, const Voice
   return Acknowledge(connection->Stop(job_id), voice);
 }
 
-Status Extend(const std::string& job_id, const RenderFlags& until, const std::string& server,
+Status Extend(const std::string& job_id, const RenderOverrides& until, const std::string& server,
               const Voice& voice) {
-  LUCERNA_ASSIGN_OR_RETURN(const RenderOverrides overrides, ToOverrides(until));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
-  return Acknowledge(connection->Extend(job_id, overrides), voice);
+  return Acknowledge(connection->Extend(job_id, until), voice);
 }
 
 }  // namespace lucerna

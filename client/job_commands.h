@@ -7,9 +7,9 @@
 #include <string>
 
 #include "client/local_cluster.h"
-#include "client/render_flags.h"
 #include "client/voice.h"
 #include "render/base/status.h"
+#include "render/scene/render_settings.h"
 
 namespace lucerna {
 
@@ -23,7 +23,7 @@ struct OutputPaths {
 
 struct RenderRequest {
   std::string scene_path;
-  RenderFlags flags;
+  RenderOverrides overrides;
   std::string reference;  // EXR file to tell the true error by; empty: none
   OutputPaths outputs;
 };
@@ -62,7 +62,7 @@ struct ReportPaths {
                              const Voice& voice);
 
 // Gives the job a new end (passes, photons, time, error) and lets it go on.
-[[nodiscard]] Status Extend(const std::string& job_id, const RenderFlags& until,
+[[nodiscard]] Status Extend(const std::string& job_id, const RenderOverrides& until,
                             const std::string& server, const Voice& voice);
 
 [[nodiscard]] Status Cancel(const std::string& job_id, const std::string& server,

@@ -132,7 +132,7 @@ std::vector<std::string> LabelledCurve(const v1::Job& job, int columns, int rows
     if (HasLogarithm(point.x) && HasLogarithm(point.y)) points.push_back(point);
   }
   if (points.size() < 2 || columns < kFewestColumns || rows < kFewestRows) return {};
-  const double target = job.settings().error();
+  const double target = SettingsOf(job).error;
   const int curve_columns = columns - kLabelColumns - 1;
   std::vector<std::string> lines =
       DrawCurve(points, target > 0 ? std::optional(target) : std::nullopt, curve_columns, rows - 1);

@@ -18,6 +18,7 @@
 #include "client/plan_command.h"
 #include "client/preview.h"
 #include "client/reference_command.h"
+#include "client/render_flags.h"
 #include "client/selfcheck.h"
 #include "render/base/version.h"
 
@@ -42,9 +43,9 @@ int Run(int argc, char** argv) {
   ClusterOptions cluster;
   OutputPaths fetched;
   ReportPaths report_paths;
-  RenderFlags until;
+  RenderOverrides until;
   PhotonRequest photon;
-  RenderFlags planned;
+  RenderOverrides planned;
   std::string server = "127.0.0.1:7400";
   std::string job_id;
   std::string scene_path;
@@ -56,6 +57,7 @@ int Run(int argc, char** argv) {
   CompareRequest comparison;
   ReferenceRequest to_refer;
   std::string only;
+  std::string topic;
   double exposure_stops = 0;
   bool hides_preview = false;
   bool strict = false;
@@ -83,12 +85,15 @@ int Run(int argc, char** argv) {
         ->envname("LUCERNA_SERVER")
         ->capture_default_str();
   };
+  const auto add_image_flags = [](CLI::App* to, RenderOverrides& overrides) {
+    AddSettingFlags(*to, SettingRole::kDecidesPixels, overrides);
+  };
   const auto add_render_flags = [&](CLI::App* to) {
     to->add_option("SCENE", request.scene_path, "pbrt-v4 scene file")->required();
     to->add_option("-o,--output", request.outputs.exr, "EXR file to write");
     to->add_option("--png", request.outputs.png, "PNG preview to write");
-    AddImageFlags(*to, request.flags);
-    AddStopFlags(*to, request.flags);
+    add_image_flags(to, request.overrides);
+    AddSettingFlags(*to, SettingRole::kStopsJob, request.overrides);
     to->add_option("--reference", request.reference, "EXR file to tell the true error by");
   };
 
@@ -166,10 +171,11 @@ int Run(int argc, char** argv) {
                            [&] { return StopJob(job_id, server, voice); });
   CLI::App* extend = command("extend", "go on with a job, from all its photons, to a new end",
                              [&] { return Extend(job_id, until, server, voice); });
-  extend->add_option("--passes", until.passes, "stop after so many passes in all");
-  extend->add_option("--photons", until.photons, "stop after so many photons in all");
-  extend->add_option("--time", until.time_s, "stop after so many seconds in all");
-  extend->add_option("--error", until.error, "stop when the relative error is at most this");
+  for (const Setting& setting : AllSettings()) {
+    // The defaults of a new job do not count here.
+    if (setting.role != SettingRole::kStopsJob) continue;
+    AddSettingFlag(*extend, setting.name, until, std::string(setting.meaning));
+  }
   for (CLI::App* about_job : {stop, extend}) {
     about_job->add_option("JOB", job_id, "the job's id")->required();
     add_server(about_job);
@@ -187,7 +193,7 @@ int Run(int argc, char** argv) {
   CLI::App* plan = command("plan", "say what a job will use, what is left out, and why",
                            [&] { return PrintPlan(scene_path, planned, voice); });
   plan->add_option("SCENE", scene_path, "pbrt-v4 scene file")->required();
-  AddImageFlags(*plan, planned);
+  add_image_flags(plan, planned);
   add_json(plan);
   add_quiet(plan);
 
@@ -232,7 +238,7 @@ int Run(int argc, char** argv) {
       ->allow_extra_args(false);
   compare->add_option("-o,--output", comparison.table_path, "table to write, as Markdown");
   compare->add_option("--plot", comparison.plot_path, "plot to write, as SVG");
-  AddImageFlags(*compare, comparison.common);
+  add_image_flags(compare, comparison.common);
   add_json(compare);
   add_quiet(compare);
 
@@ -243,9 +249,9 @@ int Run(int argc, char** argv) {
       });
   reference->add_option("SCENE", to_refer.scene_path, "pbrt-v4 scene file")->required();
   reference->add_option("-o,--output", to_refer.output_path, "EXR file to write")->required();
-  reference->add_option("--time", to_refer.flags.time_s, "seconds, of both halves together");
-  reference->add_option("--passes", to_refer.flags.passes, "passes, of both halves together");
-  AddImageFlags(*reference, to_refer.flags);
+  AddSettingFlag(*reference, "time_s", to_refer.overrides, "seconds, of both halves together");
+  AddSettingFlag(*reference, "passes", to_refer.overrides, "passes, of both halves together");
+  add_image_flags(reference, to_refer.overrides);
   add_no_preview(reference);
   add_json(reference);
   add_quiet(reference);
@@ -258,6 +264,12 @@ int Run(int argc, char** argv) {
   selfcheck->add_option("--only", only, "run the cases whose names begin so");
   add_json(selfcheck);
   add_quiet(selfcheck);
+
+  CLI::App* help = command("help", "print the table of all settings of a job", [&] {
+    std::fputs(SettingsTable().c_str(), stdout);
+    return absl::OkStatus();
+  });
+  help->add_option("TOPIC", topic, "settings")->required()->check(CLI::IsMember({"settings"}));
 
   CLI::App* digest = command("digest", "print the digest of an image's pixels and settings",
                              [&] { return PrintDigest(image_path, voice); });
@@ -297,7 +309,7 @@ int Run(int argc, char** argv) {
     status = absl::ResourceExhaustedError("cannot write to the standard output");
   }
   if (!status.ok()) {
-    std::fprintf(stderr, "lucerna: %s\n", std::string(status.message()).c_str());
+    std::fprintf(stderr, "lucerna: %s\n", WithFlagNames(std::string(status.message())).c_str());
   }
   return End(ExitCodeOf(status));
 }

@@ -9,6 +9,7 @@
 #include "client/photon_view.h"
 #include "client/program_output.h"
 #include "client/report.h"
+#include "render/wire/messages.h"
 
 namespace lucerna {
 namespace {
@@ -44,7 +45,7 @@ Status TracePhoton(const PhotonRequest& request, const std::string& server, cons
   LUCERNA_ASSIGN_OR_RETURN(const v1::PhotonKey key, ReadKey(request));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, connection->Get(request.job_id));
-  const auto photons = static_cast<std::uint64_t>(job.settings().photons_per_pass());
+  const auto photons = static_cast<std::uint64_t>(SettingsOf(job).photons_per_pass);
   if (key.index() >= photons) {
     return Failure(ExitCode::kUsage,
                    absl::StrCat("the passes of job ", request.job_id, " have the photons 0 to ",

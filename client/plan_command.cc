@@ -22,8 +22,8 @@ std::string Bytes(double bytes) {
 
 }  // namespace
 
-Status PrintPlan(const std::string& scene_path, const RenderFlags& flags, const Voice& voice) {
-  LUCERNA_ASSIGN_OR_RETURN(const RenderOverrides overrides, ToOverrides(flags));
+Status PrintPlan(const std::string& scene_path, const RenderOverrides& overrides,
+                 const Voice& voice) {
   Scene scene;
   LUCERNA_ASSIGN_OR_RETURN(const SceneOfJobs read,
                            ReadSceneOfJobs(scene_path, {&overrides, 1}, voice.quiet, &scene));

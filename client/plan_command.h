@@ -3,15 +3,15 @@
 
 #include <string>
 
-#include "client/render_flags.h"
 #include "client/voice.h"
 #include "render/base/status.h"
+#include "render/scene/render_settings.h"
 
 namespace lucerna {
 
 // Reads the scene and prints its plan; nothing is rendered.
 // Errors: as ReadSceneOfJobs.
-[[nodiscard]] Status PrintPlan(const std::string& scene_path, const RenderFlags& flags,
+[[nodiscard]] Status PrintPlan(const std::string& scene_path, const RenderOverrides& overrides,
                                const Voice& voice);
 
 }  // namespace lucerna

@@ -16,10 +16,10 @@ namespace {
 constexpr Duration kPlainLineEvery = std::chrono::seconds(2);
 
 // After how many photons the job stops, by its passes or its photons; 0: no limit.
-double PhotonsInAll(const v1::RenderSettings& settings) {
-  const double per_pass = static_cast<double>(settings.photons_per_pass());
-  const double of_passes = static_cast<double>(settings.passes()) * per_pass;
-  double of_photons = static_cast<double>(settings.photons());
+double PhotonsInAll(const RenderSettings& settings) {
+  const double per_pass = static_cast<double>(settings.photons_per_pass);
+  const double of_passes = static_cast<double>(settings.passes) * per_pass;
+  double of_photons = static_cast<double>(settings.photons);
   // It ends with the pass that reaches them.
   if (per_pass > 0) of_photons = per_pass * std::ceil(of_photons / per_pass);
   if (of_passes > 0 && of_photons > 0) return std::min(of_passes, of_photons);
@@ -35,7 +35,7 @@ std::string Bar(double share) {
 
 std::string Passes(const v1::Job& job) {
   const std::int64_t passes = job.progress().passes();
-  const std::int64_t wanted = job.settings().passes();
+  const std::int64_t wanted = SettingsOf(job).passes;
   return wanted > 0 ? absl::StrCat("pass ", passes, "/", wanted) : absl::StrCat("pass ", passes);
 }
 
@@ -102,13 +102,13 @@ bool HasEnded(v1::JobState state) {
 std::optional<double> ShareDone(const v1::Job& job) {
   if (job.state() == v1::JOB_STATE_SUCCEEDED) return 1.0;
   if (!job.has_settings()) return std::nullopt;
+  const RenderSettings settings = SettingsOf(job);
   double share = 0;
-  if (job.settings().time_s() > 0) {
-    share = Seconds(FromProto(job.progress().running())) / job.settings().time_s();
+  if (settings.time_s > 0) {
+    share = Seconds(FromProto(job.progress().running())) / settings.time_s;
   }
-  if (PhotonsInAll(job.settings()) > 0) {
-    share = std::max(share,
-                     static_cast<double>(job.progress().photons()) / PhotonsInAll(job.settings()));
+  if (PhotonsInAll(settings) > 0) {
+    share = std::max(share, static_cast<double>(job.progress().photons()) / PhotonsInAll(settings));
   }
   if (const auto left = TimeToTarget(job)) {
     const double running_s = Seconds(FromProto(job.progress().running()));
@@ -120,14 +120,14 @@ std::optional<double> ShareDone(const v1::Job& job) {
 
 std::optional<Duration> TimeLeft(const v1::Job& job) {
   if (job.state() != v1::JOB_STATE_RUNNING) return std::nullopt;
+  const RenderSettings settings = SettingsOf(job);
   std::optional<double> left_s;
-  if (job.settings().time_s() > 0) {
-    left_s = job.settings().time_s() - Seconds(FromProto(job.progress().running()));
+  if (settings.time_s > 0) {
+    left_s = settings.time_s - Seconds(FromProto(job.progress().running()));
   }
   const double rate = job.progress().photons_per_second();
-  if (PhotonsInAll(job.settings()) > 0 && rate > 0) {
-    const double photons =
-        PhotonsInAll(job.settings()) - static_cast<double>(job.progress().photons());
+  if (PhotonsInAll(settings) > 0 && rate > 0) {
+    const double photons = PhotonsInAll(settings) - static_cast<double>(job.progress().photons());
     left_s = left_s ? std::min(*left_s, photons / rate) : photons / rate;
   }
   if (const auto left = TimeToTarget(job)) {
@@ -205,7 +205,7 @@ std::string ErrorLine(const v1::Job& job) {
   if (!error) return {};
   std::string line = Concat("error about ", ErrorWithInterval(*error), "  untrimmed ",
                             ShortPercent(error->untrimmed));
-  if (const double target = job.settings().error(); target > 0) {
+  if (const double target = SettingsOf(job).error; target > 0) {
     absl::StrAppend(&line, "  target ", ShortPercent(target));
     if (const auto far = FindFarTarget(job); far && !far->left) {
       line += " not in sight";

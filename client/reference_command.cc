@@ -30,7 +30,7 @@ std::string MetadataOf(const Image& image, const std::string& key) {
 
 Status RenderReference(const ReferenceRequest& request, const ClusterOptions& cluster,
                        const Voice& voice) {
-  LUCERNA_ASSIGN_OR_RETURN(RenderOverrides overrides, ToOverrides(request.flags));
+  RenderOverrides overrides = request.overrides;
   if (overrides.passes.has_value() == overrides.time_s.has_value()) {
     return Failure(ExitCode::kUsage, "say how long to render, with --time SECONDS or --passes N");
   }

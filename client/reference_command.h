@@ -19,8 +19,8 @@
 
 #include "client/job_commands.h"
 #include "client/local_cluster.h"
-#include "client/render_flags.h"
 #include "render/base/status.h"
+#include "render/scene/render_settings.h"
 
 namespace lucerna {
 
@@ -28,7 +28,7 @@ struct ReferenceRequest {
   std::string scene_path;
   // What is not given is chosen for little bias. passes and time_s are those of both halves
   // together; one of them is needed.
-  RenderFlags flags;
+  RenderOverrides overrides;
   std::string output_path;
 };
 

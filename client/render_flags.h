@@ -1,15 +1,15 @@
-// What did the user say about the render?
+// Command-line flags of a job's settings.
 //
-// The flags that commands which render share, as they were typed, and their meaning as
-// RenderOverrides. What is not given is left to the scene file, then to the defaults.
+// Each row of the table of settings is a flag: `photons_per_pass` is --photons-per-pass, `time_s`
+// is --time. What is not given is left to the scene file, then to the defaults.
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <string>
+#include <string_view>
 
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
+#include "render/scene/setting_table.h"
 
 namespace CLI {
 class App;
@@ -17,35 +17,27 @@ class App;
 
 namespace lucerna {
 
-struct RenderFlags {
-  std::optional<std::string> size;  // "640x480"
-  std::optional<std::int64_t> passes;
-  std::optional<std::int64_t> photons_per_pass;
-  std::optional<double> time_s;
-  std::optional<std::string> error;  // "2%" or "0.02"
-  std::optional<std::uint64_t> photons;
-  std::optional<std::uint64_t> seed;
-  std::optional<std::string> radius_controller;
-  std::optional<double> alpha;
-  std::optional<std::string> kernel;
-  std::optional<std::string> bias, frequency_share;  // "2%" or "0.02"
-  std::optional<std::string> initial_radius;         // scene units, "1.5px", or "auto"
-  std::optional<int> max_depth;
-  bool use_everything = false;
-};
+// "--photons-per-pass".
+[[nodiscard]] std::string FlagOf(const Setting& setting);
 
-// Gives `command` the flags that decide what the pixels are, and those that say when to stop.
-// `flags` outlives the command.
-void AddImageFlags(CLI::App& command, RenderFlags& flags);
-void AddStopFlags(CLI::App& command, RenderFlags& flags);
+// `message` with flags in place of the names of settings (NameInMessage).
+[[nodiscard]] std::string WithFlagNames(std::string message);
 
-// `flags` with what `words`, like "--alpha 0.5 --kernel constant", says otherwise. When to stop
-// cannot be said.
-// Errors: Failure(kUsage).
-[[nodiscard]] StatusOr<RenderFlags> WithImageFlags(RenderFlags flags, const std::string& words);
-
-// Errors: Failure(kUsage) that names the flag. Ranges that depend on the scene are for
+// Gives `command` the flag of every setting with the role. Parsing writes to `overrides`, which
+// outlives the command, and refuses what is not of the setting's type. Ranges are for
 // ResolveSettings to check.
-[[nodiscard]] StatusOr<RenderOverrides> ToOverrides(const RenderFlags& flags);
+void AddSettingFlags(CLI::App& command, SettingRole role, RenderOverrides& overrides);
+// One of them, with another help text.
+void AddSettingFlag(CLI::App& command, std::string_view name, RenderOverrides& overrides,
+                    const std::string& help);
+
+// `overrides` with the changes in `words`, like "--alpha 0.5 --kernel constant". Stop criteria are
+// not accepted.
+// Errors: Failure(kUsage) that names the flag.
+[[nodiscard]] StatusOr<RenderOverrides> WithImageFlags(RenderOverrides overrides,
+                                                       const std::string& words);
+
+// All settings with their flags, units, ranges and defaults, as a Markdown table.
+[[nodiscard]] std::string SettingsTable();
 
 }  // namespace lucerna

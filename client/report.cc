@@ -14,6 +14,7 @@
 #include "client/convergence.h"
 #include "client/photon_view.h"
 #include "client/progress_view.h"
+#include "render/scene/setting_table.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {
@@ -31,27 +32,31 @@ std::string HexOf(const std::string& bytes) {
   return digest.ok() ? digest->Hex() : std::string();
 }
 
-Json SettingsOf(const v1::RenderSettings& settings) {
-  return {
-      {"width", settings.width()},
-      {"height", settings.height()},
-      {"crop", {settings.crop_x0(), settings.crop_y0(), settings.crop_x1(), settings.crop_y1()}},
-      {"passes", settings.passes()},
-      {"time_s", settings.time_s()},
-      {"error", settings.error()},
-      {"photons", settings.photons()},
-      {"photons_per_pass", settings.photons_per_pass()},
-      {"seed", settings.seed()},
-      {"radius_controller", settings.radius_controller()},
-      {"alpha", settings.alpha()},
-      {"kernel", settings.kernel()},
-      {"bias", settings.bias()},
-      {"frequency_share", settings.frequency_share()},
-      {"use_everything", settings.use_everything()},
-      {"initial_radius", settings.initial_radius()},
-      {"initial_footprints", settings.initial_footprints()},
-      {"max_depth", settings.max_depth()},
-  };
+// Names as in the table of settings; two values that are given as one keep a name each.
+Json SettingsJson(const RenderSettings& settings) {
+  Json json;
+  for (const Setting& setting : AllSettings()) {
+    const std::string name(setting.name);
+    if (const auto* size = std::get_if<SizeFields>(&setting.type)) {
+      json["width"] = settings.*size->width.value;
+      json["height"] = settings.*size->height.value;
+      json["crop"] = {settings.crop_x0, settings.crop_y0, settings.crop_x1, settings.crop_y1};
+    } else if (const auto* radius = std::get_if<RadiusFields>(&setting.type)) {
+      json[name] = settings.*radius->scene_units.value;
+      json["initial_footprints"] = settings.*radius->footprints.value;
+    } else {
+      std::visit(
+          [&]<typename Field>(const Field& field) {
+            if constexpr (requires { NameOf(settings.*field.value); }) {
+              json[name] = std::string(NameOf(settings.*field.value));
+            } else if constexpr (requires { field.value; }) {
+              json[name] = settings.*field.value;
+            }
+          },
+          setting.type);
+    }
+  }
+  return json;
 }
 
 // As shares of what was emitted. `balance` is what the books are off by, in their smallest unit.
@@ -106,7 +111,7 @@ Json JobOf(const v1::Job& job) {
   json["received_bytes"] = progress.bytes_received();
   json["hitpoints_sent"] = progress.hitpoints_sent();
   json["hitpoints_returned"] = progress.hitpoints_returned();
-  if (job.has_settings()) json["settings"] = SettingsOf(job.settings());
+  if (job.has_settings()) json["settings"] = SettingsJson(SettingsOf(job));
   if (!job.scene_digest().empty()) json["scene_digest"] = HexOf(job.scene_digest());
   json["warnings"] = Json::array();
   for (const std::string& warning : job.warnings())

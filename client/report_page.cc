@@ -105,12 +105,12 @@ std::string EndInWords(const v1::Job& job) {
   }
 }
 
-std::string EndsInWords(const v1::RenderSettings& settings) {
+std::string EndsInWords(const RenderSettings& settings) {
   std::vector<std::string> ends;
-  if (settings.error() > 0) ends.push_back(Concat("error ≤ ", ShortPercent(settings.error())));
-  if (settings.passes() > 0) ends.push_back(Passes(settings.passes()));
-  if (settings.photons() > 0) ends.push_back(Concat(CountText(settings.photons()), " photons"));
-  if (settings.time_s() > 0) ends.push_back(absl::StrFormat("%g s", settings.time_s()));
+  if (settings.error > 0) ends.push_back(Concat("error ≤ ", ShortPercent(settings.error)));
+  if (settings.passes > 0) ends.push_back(Passes(settings.passes));
+  if (settings.photons > 0) ends.push_back(Concat(CountText(settings.photons), " photons"));
+  if (settings.time_s > 0) ends.push_back(absl::StrFormat("%g s", settings.time_s));
   return ends.empty() ? "none" : Listed(ends, " or ");
 }
 
@@ -160,27 +160,27 @@ std::string RunFacts(const v1::Job& job) {
 }
 
 std::string SettingFacts(const v1::Job& job, const std::optional<PageImage>& image) {
-  const v1::RenderSettings& settings = job.settings();
+  const RenderSettings settings = SettingsOf(job);
   Facts facts;
   if (job.has_settings()) {
-    facts.Add("Size", Concat(settings.width(), " × ", settings.height(), " pixels"));
+    facts.Add("Size", Concat(settings.width, " × ", settings.height, " pixels"));
     facts.Add("Stops at", EndsInWords(settings));
     facts.Add("Photons per pass", CountText(static_cast<std::uint64_t>(
-                                      std::max<std::int64_t>(0, settings.photons_per_pass()))));
-    const bool has_frequency = settings.radius_controller().starts_with("frequency");
+                                      std::max<std::int64_t>(0, settings.photons_per_pass))));
+    const bool has_frequency = UsesFrequency(settings.radius_controller);
     facts.Add(
         "Radius controller",
-        Concat(settings.radius_controller(), absl::StrFormat(", alpha %.3g", settings.alpha()),
+        Concat(NameOf(settings.radius_controller), absl::StrFormat(", alpha %.3g", settings.alpha),
                has_frequency
-                   ? Concat(", bias ", ShortPercent(settings.bias()), ", ",
-                            ShortPercent(settings.frequency_share()), " frequency photons")
+                   ? Concat(", bias ", ShortPercent(settings.bias), ", ",
+                            ShortPercent(settings.frequency_share), " frequency photons")
                    : ""));
-    facts.Add("First radius", settings.initial_radius() > 0
-                                  ? absl::StrFormat("%g scene units", settings.initial_radius())
+    facts.Add("First radius", settings.initial_radius > 0
+                                  ? absl::StrFormat("%g scene units", settings.initial_radius)
                                   : "auto");
-    facts.Add("Kernel", settings.kernel());
-    facts.Add("Depth", Concat("at most ", settings.max_depth(), " scattering events"));
-    facts.Add("Seed", Concat(settings.seed()));
+    facts.Add("Kernel", NameOf(settings.kernel));
+    facts.Add("Depth", Concat("at most ", settings.max_depth, " scattering events"));
+    facts.Add("Seed", Concat(settings.seed));
   }
   if (const auto digest = Digest::FromBytes(job.scene_digest()); digest.ok()) {
     facts.AddCode("Scene digest", digest->Hex());
@@ -207,8 +207,8 @@ std::string Headline(const v1::Job& job) {
              "<span class=\"figure\">", ShortPercent(error->value), "</span>95 % interval ",
              ShortPercent(error->low), " to ", ShortPercent(error->high), "; untrimmed ",
              ShortPercent(error->untrimmed));
-  if (job.settings().error() > 0) {
-    absl::StrAppend(&html, "; target ", ShortPercent(job.settings().error()));
+  if (const double target = SettingsOf(job).error; target > 0) {
+    absl::StrAppend(&html, "; target ", ShortPercent(target));
   }
   if (error->truth) absl::StrAppend(&html, "; true error ", ShortPercent(*error->truth));
   if (error->true_untrimmed) {
@@ -268,9 +268,8 @@ std::string ErrorChart(const v1::Job& job, ErrorAgainst against) {
     chart.description = Concat("The estimated relative error goes from ", ShortPercent(first.value),
                                " to ", ShortPercent(newest->value), ".");
   }
-  if (job.settings().error() > 0) {
-    chart.levels.push_back(
-        {Concat("target ", ShortPercent(job.settings().error())), 100 * job.settings().error()});
+  if (const double target = SettingsOf(job).error; target > 0) {
+    chart.levels.push_back({Concat("target ", ShortPercent(target)), 100 * target});
   }
   return Concat("<figure class=\"card\">", DrawChart(chart), "<figcaption>",
                 SlopeSentence(job, against), "</figcaption></figure>\n");

@@ -5,8 +5,26 @@
 #include <utility>
 
 #include "client/exit_code.h"
+#include "client/render_flags.h"
 
 namespace lucerna {
+namespace {
+
+// Settings may be common to several jobs, of which one uses them.
+void WarnOfUnused(std::span<const RenderOverrides> overrides,
+                  std::span<const RenderSettings> settings) {
+  for (const Setting& setting : AllSettings()) {
+    if (setting.is_used == nullptr) continue;
+    const bool is_given = std::ranges::any_of(
+        overrides, [&](const RenderOverrides& of_job) { return IsGiven(setting, of_job); });
+    if (!is_given || std::ranges::any_of(settings, setting.is_used)) continue;
+    std::fprintf(stderr,
+                 "lucerna: warning: %s has no effect with the other settings of this job (%s)\n",
+                 FlagOf(setting).c_str(), std::string(setting.meaning).c_str());
+  }
+}
+
+}  // namespace
 
 ScenePath SplitScenePath(const std::string& path) {
   const std::size_t slash = path.rfind('/');
@@ -53,19 +71,7 @@ StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
     }
     read.settings.push_back(*settings);
   }
-  // Flags may be common to several jobs, of which one uses them.
-  const bool is_given = std::ranges::any_of(overrides, [](const RenderOverrides& of_job) {
-    return of_job.bias.has_value() || of_job.frequency_share.has_value();
-  });
-  const bool is_used = std::ranges::any_of(read.settings, [](const RenderSettings& of_job) {
-    return UsesFrequency(of_job.radius_controller);
-  });
-  if (is_given && !is_used && !quiet) {
-    std::fprintf(stderr,
-                 "lucerna: warning: --bias and --frequency-share are for the radius controllers "
-                 "frequency, frequency-consistent and frequency-mse; %s ignores them\n",
-                 std::string(NameOf(read.settings.front().radius_controller)).c_str());
-  }
+  if (!quiet) WarnOfUnused(overrides, read.settings);
   read.manifest = files.Manifest(place.main);
   if (scene != nullptr) *scene = std::move(parsed.scene);
   return read;

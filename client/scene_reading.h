@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "client/render_flags.h"
 #include "render/scene/pbrt_parser.h"
+#include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 
 namespace lucerna {

@@ -10,6 +10,7 @@
 #include "render/base/memory.h"
 #include "render/image/exr_file.h"
 #include "render/scene/pbrt_parser.h"
+#include "render/scene/setting_table.h"
 #include "server/memory_need.h"
 #include "server/reference_image.h"
 

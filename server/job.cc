@@ -1,20 +1,8 @@
 #include "server/job.h"
 
 #include <algorithm>
-#include <charconv>
 
 namespace lucerna {
-namespace {
-
-// The shortest text that reads back as the same number.
-std::string NumberText(double value) {
-  std::string text(32, '\0');
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  text.resize(static_cast<std::size_t>(end - text.data()));
-  return text;
-}
-
-}  // namespace
 
 bool JobLife::Prepare() {
   if (state_ != JobState::kQueued) return false;
@@ -110,32 +98,6 @@ double SlidingRate::PerSecond(SteadyTime since, SteadyTime now) const {
     if (when + span >= now) sum += events;
   }
   return static_cast<double>(sum) / Seconds(span);
-}
-
-namespace {
-
-// "auto" alone is the default, as it was before another could be given.
-std::string RadiusText(const RenderSettings& settings) {
-  if (settings.initial_radius > 0) return NumberText(settings.initial_radius);
-  if (settings.initial_footprints == kInitialFootprints) return "auto";
-  return absl::StrCat(NumberText(settings.initial_footprints), "px");
-}
-
-}  // namespace
-
-std::string SettingsText(const RenderSettings& settings) {
-  return absl::StrCat("size=", settings.width, "x", settings.height, " crop=", settings.crop_x0,
-                      ",", settings.crop_y0, ",", settings.crop_x1, ",", settings.crop_y1,
-                      " photons-per-pass=", settings.photons_per_pass, " seed=", settings.seed,
-                      " radius-controller=", std::string(NameOf(settings.radius_controller)),
-                      " alpha=", NumberText(settings.alpha),
-                      " kernel=", std::string(NameOf(settings.kernel)),
-                      " initial-radius=", RadiusText(settings), " max-depth=", settings.max_depth,
-                      UsesFrequency(settings.radius_controller)
-                          ? absl::StrCat(" bias=", NumberText(settings.bias),
-                                         " frequency-share=", NumberText(settings.frequency_share))
-                          : std::string(),
-                      settings.use_everything ? " use-everything" : "");
 }
 
 }  // namespace lucerna

@@ -173,8 +173,4 @@ struct Job {
   int most_workers = 0;                        // connected at one time while it ran
 };
 
-// All settings that decide the pixels, as one line that is the same whenever they are. Passes are
-// not among them: how many were merged is known only at the end.
-[[nodiscard]] std::string SettingsText(const RenderSettings& settings);
-
 }  // namespace lucerna

@@ -2,7 +2,8 @@
 //
 // What the user gives (RenderOverrides), else what the scene file says, else a documented
 // default, becomes one RenderSettings: complete, checked, and together with the scene's digest
-// all that the image depends on.
+// all that the image depends on. Unit, range, default and meaning of each setting: its row in
+// setting_table.cc.
 #pragma once
 
 #include <cstdint>
@@ -36,9 +37,10 @@ enum class KernelKind : std::uint8_t { kConstant, kEpanechnikov, kBiweight, kGau
 
 [[nodiscard]] std::string_view NameOf(RadiusControllerKind kind);
 [[nodiscard]] std::string_view NameOf(KernelKind kind);
-// Of all there are, in the order in which they are told.
+// All, in documentation order.
 [[nodiscard]] std::vector<std::string_view> RadiusControllerNames();
-// Errors: INVALID_ARGUMENT that lists the names there are.
+[[nodiscard]] std::vector<std::string_view> KernelNames();
+// Errors: INVALID_ARGUMENT that lists all names.
 [[nodiscard]] StatusOr<RadiusControllerKind> ParseRadiusController(std::string_view name);
 [[nodiscard]] StatusOr<KernelKind> ParseKernel(std::string_view name);
 
@@ -47,62 +49,64 @@ enum class KernelKind : std::uint8_t { kConstant, kEpanechnikov, kBiweight, kGau
 // would.
 inline constexpr float kInitialFootprints = 3;
 
-// What a user may say about one job; absent means "as the scene file has it, else the default".
-struct RenderOverrides {
-  std::optional<int> width, height;  // both or neither; the crop window is scaled along
-  std::optional<std::int64_t> passes;
-  std::optional<std::int64_t> photons_per_pass;
-  std::optional<double> time_s;
-  std::optional<double> error;
-  std::optional<std::uint64_t> photons;
-  std::optional<std::uint64_t> seed;
-  std::optional<RadiusControllerKind> radius_controller;
-  std::optional<double> alpha;
-  std::optional<KernelKind> kernel;
-  std::optional<double> bias;
-  std::optional<double> frequency_share;
-  // A radius in scene units, or 0 for "auto".
-  std::optional<double> initial_radius;
-  // What "auto" is, in widths of a pixel at the hitpoint.
-  std::optional<double> initial_footprints;
-  std::optional<int> max_depth;
-  std::optional<bool> use_everything;
+// One field for each setting of a job. The struct exists twice, so that a setting is declared
+// once: with the values themselves (RenderSettings) and with optional values (RenderOverrides).
+template <template <typename> class Field>
+struct SettingFields {
+  Field<int> width{}, height{};  // [pixels]
+
+  // Stop criteria. The job ends when the first of them is met. 0: none.
+  Field<std::int64_t> passes{};
+  Field<double> time_s{};
+  Field<double> error{};  // relative error: the root of relMSE
+  Field<std::uint64_t> photons{};
+
+  Field<std::int64_t> photons_per_pass{};
+  Field<std::uint64_t> seed{};
+  Field<RadiusControllerKind> radius_controller{};
+  Field<double> alpha{};
+  Field<KernelKind> kernel{};
+  // In scene units; 0: automatic, which is `initial_footprints` widths of a pixel at the hitpoint.
+  // The latter has no effect beside a radius in scene units, and is not sent with one.
+  Field<double> initial_radius{};
+  Field<double> initial_footprints{};
+  Field<int> max_depth{};
+  Field<double> bias{};
+  Field<double> frequency_share{};
+  Field<bool> use_everything{};
+
+  bool operator==(const SettingFields&) const = default;
 };
 
-struct RenderSettings {
-  int width = 0, height = 0;  // [pixels]
+template <typename T>
+using SettingValue = T;
+
+// What a user gives for one job; absent: the scene file's value, else the default. Width and
+// height are given both or not at all; the crop window is scaled along.
+struct RenderOverrides : SettingFields<std::optional> {
+  bool operator==(const RenderOverrides&) const = default;
+};
+
+struct RenderSettings : SettingFields<SettingValue> {
+  // All defaults; those that depend on the scene are 0.
+  RenderSettings();
+
   int crop_x0 = 0, crop_y0 = 0, crop_x1 = 0, crop_y1 = 0;
-  std::int64_t passes = 16;  // stop after so many; 0: no limit
-  double time_s = 0;         // stop after so long; 0: no limit
-  // Stop when the relative error (the root of relMSE) is known to be at most this; 0: no target.
-  double error = 0;
-  std::uint64_t photons = 0;  // stop after so many in all, at the end of a pass; 0: no limit
-  std::int64_t photons_per_pass = 0;
-  std::uint64_t seed = 0;
-  RadiusControllerKind radius_controller = RadiusControllerKind::kAppm;
-  double alpha = 2.0 / 3;  // share of new photons kept by ppm and pppm, in (0, 1)
-  KernelKind kernel = KernelKind::kEpanechnikov;
-  // Frequency controllers only: the relative bias that a pixel may have, and the share of photons
-  // that carry a spectrum.
-  double bias = 0.02;
-  double frequency_share = 0.05;
-  double initial_radius = 0;  // scene units; 0: auto, from each pixel's footprint
-  double initial_footprints = kInitialFootprints;  // the automatic radius, in footprints
-  int max_depth = 5;  // scattering events of an eye path, and of a photon path
-  // Leave nothing out that the scene does not need (see needs.h): for comparison.
-  bool use_everything = false;
 
   [[nodiscard]] int crop_width() const { return crop_x1 - crop_x0; }
   [[nodiscard]] int crop_height() const { return crop_y1 - crop_y0; }
   bool operator==(const RenderSettings&) const = default;
 };
 
-// Fills in what `overrides` leaves open. When the user gives a time, an error or a number of
-// photons and no passes, passes is 0. Errors: INVALID_ARGUMENT for a value out of its range, naming
-// the flag and the range. Replaces the stop criteria of `settings` by those of `until`: those it
-// leaves open are none. Errors: INVALID_ARGUMENT without any, or for a value out of its range.
+// Replaces the stop criteria of `settings` by those of `until`; those that it does not give become
+// none. 0 passes beside another criterion are none too.
+// Errors: INVALID_ARGUMENT without any, or for a value out of its range.
 [[nodiscard]] Status SetStopCriteria(const RenderOverrides& until, RenderSettings& settings);
 
+// Adds to `overrides` what the scene file gives, and the defaults. When the user gives another stop
+// criterion but no passes, there is no limit of passes.
+// Errors: INVALID_ARGUMENT for a value out of its range, with the setting's name (NameInMessage)
+// and its range.
 [[nodiscard]] StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides,
                                                        const Scene& scene);
 

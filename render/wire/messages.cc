@@ -2,26 +2,58 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <string>
 #include <utility>
+
+#include <google/protobuf/unknown_field_set.h>
+
+#include "render/base/text.h"
+#include "render/scene/setting_table.h"
 
 namespace lucerna {
 namespace {
 
-constexpr int kLargestSide = 65'536;                      // [pixels]
-constexpr std::int64_t kMostPhotons = 1'000'000'000'000;  // per pass
-constexpr int kLargestDepth = 10'000;
 constexpr int kMostEyeSets = 65'536;
 constexpr std::int64_t kLongestSeconds = 9'000'000'000;  // fits in Duration
 constexpr std::int64_t kNanosPerSecond = 1'000'000'000;
 
-Status Outside(std::string_view field) {
-  return absl::InvalidArgumentError(
-      absl::StrCat("the settings' ", std::string(field), " is out of range"));
-}
-
 bool IsBetween(double value, double low, double high) {
   return value >= low && value <= high;
+}
+
+// Texts from outside are shown up to this length.
+constexpr std::size_t kMaxShownText = 64;
+
+Status OtherVersion(std::string_view what) {
+  return absl::InvalidArgumentError(
+      Concat(what, "; the programs are of different versions, use the same build everywhere"));
+}
+
+using SettingList = google::protobuf::RepeatedPtrField<v1::Setting>;
+
+void AddSetting(const Setting& setting, std::string text, SettingList& list) {
+  v1::Setting& item = *list.Add();
+  item.set_name(std::string(setting.name));
+  item.set_value(std::move(text));
+}
+
+// Fields of older versions would be overlooked otherwise.
+template <typename Message>
+Status CheckHasNoOtherFields(const Message& message) {
+  if (message.GetReflection()->GetUnknownFields(message).empty()) return absl::OkStatus();
+  return OtherVersion("the job has settings in another form");
+}
+
+Status ReadSettings(const SettingList& list, RenderOverrides& overrides) {
+  for (const v1::Setting& item : list) {
+    const Setting* setting = FindSetting(item.name());
+    if (setting == nullptr) {
+      return OtherVersion(Concat("unknown setting \"", item.name().substr(0, kMaxShownText), "\""));
+    }
+    LUCERNA_RETURN_IF_ERROR(ParseSetting(*setting, item.value(), overrides));
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -68,110 +100,44 @@ StatusOr<SceneManifest> FromProto(const v1::SceneManifest& message, const SceneL
 
 v1::RenderOverrides ToProto(const RenderOverrides& overrides) {
   v1::RenderOverrides message;
-  if (overrides.width) message.set_width(*overrides.width);
-  if (overrides.height) message.set_height(*overrides.height);
-  if (overrides.passes) message.set_passes(*overrides.passes);
-  if (overrides.photons_per_pass) message.set_photons_per_pass(*overrides.photons_per_pass);
-  if (overrides.time_s) message.set_time_s(*overrides.time_s);
-  if (overrides.error) message.set_error(*overrides.error);
-  if (overrides.photons) message.set_photons(*overrides.photons);
-  if (overrides.seed) message.set_seed(*overrides.seed);
-  if (overrides.radius_controller) {
-    message.set_radius_controller(std::string(NameOf(*overrides.radius_controller)));
+  for (const Setting& setting : AllSettings()) {
+    std::optional<std::string> text = SettingText(setting, overrides);
+    if (text) AddSetting(setting, *std::move(text), *message.mutable_settings());
   }
-  if (overrides.alpha) message.set_alpha(*overrides.alpha);
-  if (overrides.kernel) message.set_kernel(std::string(NameOf(*overrides.kernel)));
-  if (overrides.bias) message.set_bias(*overrides.bias);
-  if (overrides.frequency_share) message.set_frequency_share(*overrides.frequency_share);
-  if (overrides.initial_radius) message.set_initial_radius(*overrides.initial_radius);
-  if (overrides.initial_footprints) {
-    message.set_initial_footprints(*overrides.initial_footprints);
-  }
-  if (overrides.max_depth) message.set_max_depth(*overrides.max_depth);
-  if (overrides.use_everything) message.set_use_everything(*overrides.use_everything);
   return message;
 }
 
 StatusOr<RenderOverrides> FromProto(const v1::RenderOverrides& message) {
+  LUCERNA_RETURN_IF_ERROR(CheckHasNoOtherFields(message));
   RenderOverrides overrides;
-  if (message.has_width()) overrides.width = message.width();
-  if (message.has_height()) overrides.height = message.height();
-  if (message.has_passes()) overrides.passes = message.passes();
-  if (message.has_photons_per_pass()) overrides.photons_per_pass = message.photons_per_pass();
-  if (message.has_seed()) overrides.seed = message.seed();
-  if (message.has_max_depth()) overrides.max_depth = message.max_depth();
-  if (message.has_use_everything()) overrides.use_everything = message.use_everything();
-  if (message.has_time_s()) {
-    if (!std::isfinite(message.time_s())) return Outside("time");
-    overrides.time_s = message.time_s();
-  }
-  if (message.has_error()) {
-    if (!std::isfinite(message.error())) return Outside("error");
-    overrides.error = message.error();
-  }
-  if (message.has_photons()) overrides.photons = message.photons();
-  if (message.has_alpha()) {
-    if (!std::isfinite(message.alpha())) return Outside("alpha");
-    overrides.alpha = message.alpha();
-  }
-  if (message.has_initial_radius()) {
-    if (!std::isfinite(message.initial_radius())) return Outside("initial radius");
-    overrides.initial_radius = message.initial_radius();
-  }
-  if (message.has_initial_footprints()) {
-    if (!std::isfinite(message.initial_footprints())) return Outside("initial radius");
-    overrides.initial_footprints = message.initial_footprints();
-  }
-  if (message.has_radius_controller()) {
-    LUCERNA_ASSIGN_OR_RETURN(overrides.radius_controller,
-                             ParseRadiusController(message.radius_controller()));
-  }
-  if (message.has_kernel()) {
-    LUCERNA_ASSIGN_OR_RETURN(overrides.kernel, ParseKernel(message.kernel()));
-  }
-  if (message.has_bias()) {
-    if (!std::isfinite(message.bias())) return Outside("bias");
-    overrides.bias = message.bias();
-  }
-  if (message.has_frequency_share()) {
-    if (!std::isfinite(message.frequency_share())) return Outside("frequency_share");
-    overrides.frequency_share = message.frequency_share();
-  }
+  LUCERNA_RETURN_IF_ERROR(ReadSettings(message.settings(), overrides));
   return overrides;
 }
 
 v1::RenderSettings ToProto(const RenderSettings& settings) {
   v1::RenderSettings message;
-  message.set_width(settings.width);
-  message.set_height(settings.height);
   message.set_crop_x0(settings.crop_x0);
   message.set_crop_y0(settings.crop_y0);
   message.set_crop_x1(settings.crop_x1);
   message.set_crop_y1(settings.crop_y1);
-  message.set_passes(settings.passes);
-  message.set_time_s(settings.time_s);
-  message.set_error(settings.error);
-  message.set_photons(settings.photons);
-  message.set_photons_per_pass(settings.photons_per_pass);
-  message.set_seed(settings.seed);
-  message.set_radius_controller(std::string(NameOf(settings.radius_controller)));
-  message.set_alpha(settings.alpha);
-  message.set_kernel(std::string(NameOf(settings.kernel)));
-  message.set_bias(settings.bias);
-  message.set_frequency_share(settings.frequency_share);
-  message.set_initial_radius(settings.initial_radius);
-  message.set_initial_footprints(settings.initial_footprints);
-  message.set_max_depth(settings.max_depth);
-  message.set_use_everything(settings.use_everything);
+  for (const Setting& setting : AllSettings())
+    AddSetting(setting, SettingText(setting, settings), *message.mutable_settings());
   return message;
 }
 
 StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message) {
+  LUCERNA_RETURN_IF_ERROR(CheckHasNoOtherFields(message));
+  RenderOverrides given;
+  LUCERNA_RETURN_IF_ERROR(ReadSettings(message.settings(), given));
   RenderSettings settings;
-  settings.width = message.width();
-  settings.height = message.height();
-  if (!IsBetween(settings.width, 1, kLargestSide)) return Outside("width");
-  if (!IsBetween(settings.height, 1, kLargestSide)) return Outside("height");
+  for (const Setting& setting : AllSettings()) {
+    if (!IsGiven(setting, given)) {
+      return OtherVersion(Concat(NameInMessage(setting), " is missing"));
+    }
+    ResolveSetting(setting, given, nullptr, settings);
+    if (IsNoLimit(setting, settings)) continue;
+    LUCERNA_RETURN_IF_ERROR(CheckSetting(setting, settings));
+  }
   settings.crop_x0 = message.crop_x0();
   settings.crop_y0 = message.crop_y0();
   settings.crop_x1 = message.crop_x1();
@@ -179,42 +145,26 @@ StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message) {
   if (settings.crop_x0 < 0 || settings.crop_x0 >= settings.crop_x1 ||
       settings.crop_x1 > settings.width || settings.crop_y0 < 0 ||
       settings.crop_y0 >= settings.crop_y1 || settings.crop_y1 > settings.height) {
-    return Outside("crop window");
+    return absl::InvalidArgumentError("the crop window is not within the image");
   }
-  settings.passes = message.passes();
-  if (settings.passes < 0) return Outside("number of passes");
-  settings.time_s = message.time_s();
-  if (!(settings.time_s >= 0) || !std::isfinite(settings.time_s)) return Outside("time");
-  settings.error = message.error();
-  if (!IsBetween(settings.error, 0, 10)) return Outside("error");
-  settings.photons = message.photons();
-  settings.photons_per_pass = message.photons_per_pass();
-  if (settings.photons_per_pass < 1 || settings.photons_per_pass > kMostPhotons) {
-    return Outside("number of photons per pass");
+  return settings;
+}
+
+RenderSettings SettingsOf(const v1::Job& job) {
+  const v1::RenderSettings& message = job.settings();
+  RenderOverrides given;
+  given.passes = 0;
+  for (const v1::Setting& item : message.settings()) {
+    const Setting* setting = FindSetting(item.name());
+    if (setting != nullptr) ParseSetting(*setting, item.value(), given).IgnoreError();
   }
-  settings.seed = message.seed();
-  LUCERNA_ASSIGN_OR_RETURN(settings.radius_controller,
-                           ParseRadiusController(message.radius_controller()));
-  settings.alpha = message.alpha();
-  if (!(settings.alpha > 0 && settings.alpha < 1)) return Outside("alpha");
-  LUCERNA_ASSIGN_OR_RETURN(settings.kernel, ParseKernel(message.kernel()));
-  settings.bias = message.bias();
-  if (!(settings.bias > 0 && settings.bias <= 1)) return Outside("bias");
-  settings.frequency_share = message.frequency_share();
-  if (!(settings.frequency_share > 0 && settings.frequency_share <= 1)) {
-    return Outside("frequency_share");
-  }
-  settings.initial_radius = message.initial_radius();
-  if (!(settings.initial_radius >= 0) || !std::isfinite(settings.initial_radius)) {
-    return Outside("initial radius");
-  }
-  settings.initial_footprints = message.initial_footprints();
-  if (!(settings.initial_footprints > 0) || !std::isfinite(settings.initial_footprints)) {
-    return Outside("initial radius");
-  }
-  settings.max_depth = message.max_depth();
-  if (!IsBetween(settings.max_depth, 1, kLargestDepth)) return Outside("depth");
-  settings.use_everything = message.use_everything();
+  RenderSettings settings;
+  for (const Setting& setting : AllSettings())
+    ResolveSetting(setting, given, nullptr, settings);
+  settings.crop_x0 = message.crop_x0();
+  settings.crop_y0 = message.crop_y0();
+  settings.crop_x1 = message.crop_x1();
+  settings.crop_y1 = message.crop_y1();
   return settings;
 }
 

@@ -22,10 +22,15 @@ namespace lucerna {
 
 [[nodiscard]] v1::RenderOverrides ToProto(const RenderOverrides& overrides);
 // Ranges are for ResolveSettings to check; here numbers are finite and names are known.
+// Errors: INVALID_ARGUMENT that names an unknown setting.
 [[nodiscard]] StatusOr<RenderOverrides> FromProto(const v1::RenderOverrides& message);
 
 [[nodiscard]] v1::RenderSettings ToProto(const RenderSettings& settings);
+// Checks ranges too. Errors: INVALID_ARGUMENT, also for a setting that is unknown or missing.
 [[nodiscard]] StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message);
+// The job's settings to show to a user: what cannot be read has its default, and a stop criterion
+// that cannot be read is none.
+[[nodiscard]] RenderSettings SettingsOf(const v1::Job& job);
 
 [[nodiscard]] v1::SceneNeeds ToProto(const SceneNeeds& needs);
 // Without reasons. Numbers of lights that the scene does not have say nothing.

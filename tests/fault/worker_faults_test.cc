@@ -83,10 +83,12 @@ class Coordinator {
     v1::SubmitRequest request;
     request.set_request_id("the only one");
     *request.mutable_scene() = ToProto(manifest);
-    request.mutable_overrides()->set_passes(passes);
-    request.mutable_overrides()->set_photons_per_pass(photons);
-    request.mutable_overrides()->set_width(64);
-    request.mutable_overrides()->set_height(64);
+    RenderOverrides overrides;
+    overrides.passes = passes;
+    overrides.photons_per_pass = photons;
+    overrides.width = 64;
+    overrides.height = 64;
+    *request.mutable_overrides() = ToProto(overrides);
     v1::SubmitResponse response;
     grpc::ClientContext context;
     const grpc::Status status =

@@ -32,16 +32,16 @@ v1::Job ConvergingJob(int samples) {
   job.add_warnings("sphere-caustic.pbrt:12:3: warning: \"string filename\" of Film is ignored");
   job.add_warnings("sphere-caustic.pbrt:48:1: note: roughness 0.01 is treated as a mirror");
   job.mutable_submitted_at()->set_seconds(1'763'700'000);
-  v1::RenderSettings* settings = job.mutable_settings();
-  settings->set_width(640);
-  settings->set_height(480);
-  settings->set_photons_per_pass(300'000);
-  settings->set_radius_controller("ppm");
-  settings->set_alpha(2.0 / 3);
-  settings->set_kernel("epanechnikov");
-  settings->set_max_depth(8);
-  settings->set_error(0.035);
-  settings->set_time_s(600);
+  RenderSettings settings;
+  settings.width = 640;
+  settings.height = 480;
+  settings.photons_per_pass = 300'000;
+  settings.radius_controller = RadiusControllerKind::kPpm;
+  settings.max_depth = 8;
+  settings.passes = 0;
+  settings.error = 0.035;
+  settings.time_s = 600;
+  *job.mutable_settings() = ToProto(settings);
 
   double scale = 1;
   for (int i = 0; i < samples; ++i, scale *= 1.3) {

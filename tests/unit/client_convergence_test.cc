@@ -7,6 +7,7 @@
 #include "client/convergence.h"
 #include "render/wire/messages.h"
 #include "tests/support/converging_job.h"
+#include "tests/support/job_settings.h"
 
 namespace lucerna {
 namespace {
@@ -71,21 +72,21 @@ TEST(ConvergenceTest, TheTargetIsReachedWhenTheUpperEndIsThere) {
   const double high = job.convergence(9).relative().high();
   const double now_s = Seconds(FromProto(job.progress().running()));
   // Half the error is a quarter of its square: 4^(3/2) = 8 times the time, of which one has passed.
-  job.mutable_settings()->set_error(std::sqrt(high) / 2);
+  SetSetting(job, &RenderSettings::error, std::sqrt(high) / 2);
   EXPECT_NEAR(Seconds(*TimeToTarget(job)), 7 * now_s, 1e-4 * now_s);
   // What has passed since the sample is not waited for again.
   *job.mutable_progress()->mutable_running() =
       ToProto(FromProto(job.progress().running()) + std::chrono::seconds(2));
   EXPECT_NEAR(Seconds(*TimeToTarget(job)), 7 * now_s - 2, 1e-4 * now_s);
-  job.mutable_settings()->set_error(std::sqrt(high) * 1.0001);
+  SetSetting(job, &RenderSettings::error, std::sqrt(high) * 1.0001);
   EXPECT_EQ(*TimeToTarget(job), Duration::zero());
 }
 
 TEST(ConvergenceTest, WithoutATargetOrAFallThereIsNoTime) {
   v1::Job job = ConvergingJob(10);
-  job.mutable_settings()->set_error(0);
+  SetSetting(job, &RenderSettings::error, 0);
   EXPECT_FALSE(TimeToTarget(job).has_value());
-  job.mutable_settings()->set_error(0.01);
+  SetSetting(job, &RenderSettings::error, 0.01);
   for (v1::ErrorSample& sample : *job.mutable_convergence())
     sample.mutable_relative()->set_high(1);
   EXPECT_FALSE(TimeToTarget(job).has_value()) << "level";
@@ -93,7 +94,7 @@ TEST(ConvergenceTest, WithoutATargetOrAFallThereIsNoTime) {
   EXPECT_FALSE(TimeToTarget(ConvergingJob(0)).has_value());
   // One that hardly falls gives a long time, not an overflowed one.
   job = ConvergingJob(10);
-  job.mutable_settings()->set_error(1e-12);
+  SetSetting(job, &RenderSettings::error, 1e-12);
   EXPECT_GT(*TimeToTarget(job), std::chrono::hours(24 * 365));
 }
 
@@ -169,9 +170,9 @@ TEST(FarTargetTest, IsSaidBeyondAHundredTimesTheTime) {
   v1::Job job = ConvergingJob(12);
   const double high = std::sqrt(job.convergence(11).relative().high());
   // 4.5³ = 91 times the time.
-  job.mutable_settings()->set_error(high / 4.5);
+  SetSetting(job, &RenderSettings::error, high / 4.5);
   EXPECT_FALSE(FindFarTarget(job).has_value());
-  job.mutable_settings()->set_error(high / 10);
+  SetSetting(job, &RenderSettings::error, high / 10);
   const auto far = FindFarTarget(job);
   ASSERT_TRUE(far.has_value());
   const double so_far_s = Seconds(FromProto(job.convergence(11).running()));
@@ -179,12 +180,12 @@ TEST(FarTargetTest, IsSaidBeyondAHundredTimesTheTime) {
   EXPECT_NE(far->sentence.find("needs 1000 times the time so far"), std::string::npos)
       << far->sentence;
   EXPECT_NE(far->sentence.find("more workers"), std::string::npos) << "noise prevails";
-  job.mutable_settings()->set_error(high * 1.01);
+  SetSetting(job, &RenderSettings::error, high * 1.01);
   EXPECT_FALSE(FindFarTarget(job).has_value()) << "reached";
-  job.mutable_settings()->clear_error();
+  SetSetting(job, &RenderSettings::error, 0);
   EXPECT_FALSE(FindFarTarget(job).has_value()) << "no target";
   job = ConvergingJob(5);
-  job.mutable_settings()->set_error(1e-6);
+  SetSetting(job, &RenderSettings::error, 1e-6);
   EXPECT_FALSE(FindFarTarget(job).has_value()) << "no trend yet";
 }
 
@@ -195,7 +196,7 @@ TEST(FarTargetTest, BiasThatStandsStillIsNotInSight) {
     relative.set_bias(0.01);
     relative.set_high(1.3 * (relative.noise() + relative.bias()));
   }
-  job.mutable_settings()->set_error(0.035);
+  SetSetting(job, &RenderSettings::error, 0.035);
   const auto far = FindFarTarget(job);
   ASSERT_TRUE(far.has_value());
   EXPECT_FALSE(far->left.has_value());
@@ -203,7 +204,7 @@ TEST(FarTargetTest, BiasThatStandsStillIsNotInSight) {
       << far->sentence;
   EXPECT_NE(far->sentence.find("--initial-radius"), std::string::npos);
   // Bias below the target does not keep the job from it.
-  job.mutable_settings()->set_error(0.11);
+  SetSetting(job, &RenderSettings::error, 0.11);
   EXPECT_FALSE(FindFarTarget(job).has_value());
 }
 

@@ -8,6 +8,7 @@
 #include "client/progress_view.h"
 #include "render/wire/messages.h"
 #include "tests/support/converging_job.h"
+#include "tests/support/job_settings.h"
 
 namespace lucerna {
 namespace {
@@ -21,8 +22,8 @@ v1::Job Running() {
   job.set_job_id("j1");
   job.set_name("pool.pbrt");
   job.set_state(v1::JOB_STATE_RUNNING);
-  job.mutable_settings()->set_passes(16);
-  job.mutable_settings()->set_photons_per_pass(1'000'000);
+  SetSetting(job, &RenderSettings::passes, 16);
+  SetSetting(job, &RenderSettings::photons_per_pass, 1'000'000);
   job.mutable_progress()->set_passes(3);
   job.mutable_progress()->set_photons(4'000'000);
   job.mutable_progress()->set_photons_per_second(1'000'000);
@@ -58,13 +59,13 @@ TEST(ProgressViewTest, ARunningJobShowsItsShareRateAndTimeLeft) {
 
 TEST(ProgressViewTest, TheLimitThatStopsFirstDecides) {
   v1::Job job = Running();
-  job.mutable_settings()->set_time_s(8);
+  SetSetting(job, &RenderSettings::time_s, 8);
   EXPECT_DOUBLE_EQ(*ShareDone(job), 0.5);
   EXPECT_EQ(*TimeLeft(job), seconds(4));
-  job.mutable_settings()->set_time_s(800);
+  SetSetting(job, &RenderSettings::time_s, 800);
   EXPECT_DOUBLE_EQ(*ShareDone(job), 0.25);
   EXPECT_EQ(*TimeLeft(job), seconds(12));
-  job.mutable_settings()->set_passes(0);
+  SetSetting(job, &RenderSettings::passes, 0);
   EXPECT_DOUBLE_EQ(*ShareDone(job), 0.005);
   EXPECT_EQ(*TimeLeft(job), seconds(796));
 }
@@ -110,12 +111,12 @@ TEST(ProgressViewTest, ASummaryNamesTheEnd) {
 
 TEST(ProgressViewTest, PhotonsAreALimitAtTheEndOfTheirPass) {
   v1::Job job = Running();
-  job.mutable_settings()->set_photons(7'100'000);
+  SetSetting(job, &RenderSettings::photons, 7'100'000);
   EXPECT_DOUBLE_EQ(*ShareDone(job), 0.5) << "the eighth pass reaches them";
   EXPECT_EQ(*TimeLeft(job), seconds(4));
-  job.mutable_settings()->set_photons(100'000'000);
+  SetSetting(job, &RenderSettings::photons, 100'000'000);
   EXPECT_DOUBLE_EQ(*ShareDone(job), 0.25) << "passes end it first";
-  job.mutable_settings()->set_passes(0);
+  SetSetting(job, &RenderSettings::passes, 0);
   EXPECT_DOUBLE_EQ(*ShareDone(job), 0.04);
 }
 
@@ -123,12 +124,12 @@ TEST(ProgressViewTest, AnErrorTargetIsALimitToo) {
   v1::Job job = ConvergingJob(10);
   job.set_state(v1::JOB_STATE_RUNNING);
   const double high = job.convergence(9).relative().high();
-  job.mutable_settings()->set_time_s(0);
+  SetSetting(job, &RenderSettings::time_s, 0);
   // Half the error takes eight times as long.
-  job.mutable_settings()->set_error(std::sqrt(high) / 2);
+  SetSetting(job, &RenderSettings::error, std::sqrt(high) / 2);
   EXPECT_NEAR(*ShareDone(job), 1.0 / 8, 1e-5);
   EXPECT_EQ(*TimeLeft(job), *TimeToTarget(job));
-  job.mutable_settings()->set_time_s(2 * Seconds(FromProto(job.progress().running())));
+  SetSetting(job, &RenderSettings::time_s, 2 * Seconds(FromProto(job.progress().running())));
   EXPECT_NEAR(*ShareDone(job), 1.0 / 2, 1e-5) << "time ends it first";
 }
 
@@ -141,7 +142,7 @@ TEST(ProgressViewTest, TheErrorIsSaidWithItsIntervalAndTarget) {
                 "untrimmed 3.28 %; the target leaves out the worst 65 pixels"),
             std::string::npos)
       << SummaryLine(job);
-  job.mutable_settings()->set_error(0.03);
+  SetSetting(job, &RenderSettings::error, 0.03);
   EXPECT_NE(ErrorLine(job).find("  target 3.00 % in about 1:"), std::string::npos)
       << ErrorLine(job);
   EXPECT_EQ(ErrorLine(Running()), "");
@@ -188,7 +189,7 @@ TEST(ErrorLineTest, ATargetOutOfSightIsSaid) {
     sample.mutable_relative()->set_bias(0.04);
     sample.mutable_relative()->set_high(0.1);
   }
-  job.mutable_settings()->clear_time_s();
+  SetSetting(job, &RenderSettings::time_s, 0);
   EXPECT_TRUE(ErrorLine(job).ends_with("target 3.50 % not in sight")) << ErrorLine(job);
   EXPECT_TRUE(ProgressLine(job).ends_with("ETA not in sight")) << ProgressLine(job);
   ASSERT_EQ(ErrorNotes(job).size(), 1U);

@@ -1,121 +1,120 @@
 // A flag must mean exactly what was typed, or be refused by name with the exit code for misuse.
-#include <optional>
 #include <string>
+#include <utility>
 
 #include "gtest/gtest.h"
+#include <CLI/CLI.hpp>
 
 #include "client/exit_code.h"
 #include "client/render_flags.h"
+#include "render/base/files.h"
 
 namespace lucerna {
 namespace {
 
+StatusOr<RenderOverrides> Parse(const std::string& words) {
+  return WithImageFlags({}, words);
+}
+
+// Stop criteria are flags of other commands.
+RenderOverrides ParseStop(const std::string& words) {
+  CLI::App app;
+  RenderOverrides overrides;
+  AddSettingFlags(app, SettingRole::kStopsJob, overrides);
+  app.parse(words);
+  return overrides;
+}
+
 TEST(RenderFlagsTest, WhatIsNotGivenStaysOpen) {
-  const auto overrides = ToOverrides({});
-  ASSERT_TRUE(overrides.ok());
-  EXPECT_FALSE(overrides->width || overrides->height || overrides->passes ||
-               overrides->photons_per_pass || overrides->time_s || overrides->seed ||
-               overrides->radius_controller || overrides->alpha || overrides->kernel ||
-               overrides->initial_radius || overrides->max_depth);
+  EXPECT_EQ(Parse("").value(), RenderOverrides());
 }
 
 TEST(RenderFlagsTest, EveryFlagArrives) {
-  RenderFlags flags;
-  flags.size = "640x360";
-  flags.passes = 3;
-  flags.photons_per_pass = 4;
-  flags.time_s = 5.5;
-  flags.seed = 18'446'744'073'709'551'615U;
-  flags.radius_controller = "pppm";
-  flags.alpha = 0.7;
-  flags.kernel = "constant";
-  flags.initial_radius = "0.25";
-  flags.max_depth = 8;
-  const auto overrides = ToOverrides(flags);
+  RenderOverrides expected;
+  expected.width = 640;
+  expected.height = 360;
+  expected.photons_per_pass = 4;
+  expected.seed = 18'446'744'073'709'551'615U;
+  expected.radius_controller = RadiusControllerKind::kPppm;
+  expected.alpha = 0.7;
+  expected.kernel = KernelKind::kConstant;
+  expected.initial_radius = 0.25;
+  expected.max_depth = 8;
+  expected.bias = 0.01;
+  expected.frequency_share = 0.5;
+  expected.use_everything = true;
+  const auto overrides = Parse(
+      "--size 640x360 --photons-per-pass 4 --seed 18446744073709551615 "
+      "--radius-controller pppm --alpha 0.7 --kernel constant --initial-radius 0.25 "
+      "--max-depth 8 --bias 1% --frequency-share 0.5 --use-everything");
   ASSERT_TRUE(overrides.ok()) << overrides.status();
-  EXPECT_EQ(overrides->width, 640);
-  EXPECT_EQ(overrides->height, 360);
-  EXPECT_EQ(overrides->passes, 3);
-  EXPECT_EQ(overrides->photons_per_pass, 4);
-  EXPECT_EQ(overrides->time_s, 5.5);
-  EXPECT_EQ(overrides->seed, 18'446'744'073'709'551'615U);
-  EXPECT_EQ(overrides->radius_controller, RadiusControllerKind::kPppm);
-  EXPECT_EQ(overrides->alpha, 0.7);
-  EXPECT_EQ(overrides->kernel, KernelKind::kConstant);
-  EXPECT_EQ(overrides->initial_radius, 0.25);
-  EXPECT_EQ(overrides->max_depth, 8);
+  EXPECT_EQ(*overrides, expected);
+  RenderOverrides until;
+  until.passes = 3;
+  until.time_s = 5.5;
+  until.error = 0.02;
+  until.photons = 6;
+  EXPECT_EQ(ParseStop("--passes 3 --time 5.5 --error 2% --photons 6"), until);
 }
 
 // "3" is hardly ever meant as 300 %.
 TEST(RenderFlagsTest, AShareAboveOneNeedsItsPercentSign) {
-  RenderFlags flags;
-  flags.error = "3";
-  const auto refused = ToOverrides(flags);
-  EXPECT_EQ(ExitCodeOf(refused.status()), ExitCode::kUsage);
-  EXPECT_NE(refused.status().message().find("write 3% for 3 percent, or 300%"),
-            std::string_view::npos)
-      << refused.status();
-  flags.error = "300%";
-  EXPECT_EQ(ToOverrides(flags)->error, 3);
-  flags.error = "1";
-  EXPECT_EQ(ToOverrides(flags)->error, 1);
-  flags.error = "3%";
-  EXPECT_EQ(ToOverrides(flags)->error, 0.03);
-}
-
-TEST(RenderFlagsTest, AutoIsARadiusOfZero) {
-  RenderFlags flags;
-  flags.initial_radius = "auto";
-  const auto overrides = ToOverrides(flags);
-  ASSERT_TRUE(overrides.ok());
-  EXPECT_EQ(overrides->initial_radius, 0);
-}
-
-TEST(RenderFlagsTest, ARadiusInPixelsIsAnAutomaticOneOfThatManyFootprints) {
-  RenderFlags flags;
-  flags.initial_radius = "1.5px";
-  const auto overrides = ToOverrides(flags);
-  ASSERT_TRUE(overrides.ok()) << overrides.status();
-  EXPECT_EQ(overrides->initial_radius, 0) << "also where the scene gives a radius";
-  EXPECT_EQ(overrides->initial_footprints, 1.5);
+  try {
+    (void)ParseStop("--error 3");
+    FAIL();
+  } catch (const CLI::ParseError& error) {
+    EXPECT_NE(std::string(error.what()).find("write 3% for 3 percent, or 300%"), std::string::npos)
+        << error.what();
+  }
+  EXPECT_EQ(ParseStop("--error 300%").error, 3);
+  EXPECT_EQ(ParseStop("--error 1").error, 1);
+  EXPECT_EQ(ParseStop("--error 3%").error, 0.03);
 }
 
 TEST(RenderFlagsTest, WordsChangeWhatTheyNameAndNothingElse) {
-  RenderFlags common;
+  RenderOverrides common;
   common.seed = 7;
   common.alpha = 0.5;
-  const auto flags = WithImageFlags(common, " --alpha 0.7 --bias 1% --initial-radius 2px ");
-  ASSERT_TRUE(flags.ok()) << flags.status();
-  EXPECT_EQ(flags->seed, 7U);
-  EXPECT_EQ(flags->alpha, 0.7);
-  EXPECT_EQ(flags->bias, "1%");
-  EXPECT_EQ(flags->initial_radius, "2px");
-  EXPECT_FALSE(flags->kernel);
-  EXPECT_EQ(WithImageFlags(common, "")->alpha, 0.5);
+  const auto changed = WithImageFlags(common, " --alpha 0.7 --bias 1% --initial-radius 2px ");
+  ASSERT_TRUE(changed.ok()) << changed.status();
+  RenderOverrides expected = common;
+  expected.alpha = 0.7;
+  expected.bias = 0.01;
+  expected.initial_radius = 0;
+  expected.initial_footprints = 2;
+  EXPECT_EQ(*changed, expected);
+  EXPECT_EQ(WithImageFlags(common, "").value(), common);
   for (const char* words : {"--alpha", "--alpha x", "--unknown 3", "word", "--passes 3"}) {
     EXPECT_EQ(ExitCodeOf(WithImageFlags(common, words).status()), ExitCode::kUsage) << words;
   }
 }
 
-void ExpectMisuse(std::optional<std::string> RenderFlags::*flag, const char* typed,
-                  const std::string& name) {
-  RenderFlags flags;
-  flags.*flag = typed;
-  const Status status = ToOverrides(flags).status();
-  EXPECT_EQ(ExitCodeOf(status), ExitCode::kUsage) << typed << ": " << status;
-  EXPECT_NE(std::string(status.message()).find(name), std::string::npos) << status;
+TEST(RenderFlagsTest, WhatIsNotOfTheTypeIsRefusedByTheFlagsName) {
+  for (const auto& [words, flag] : {std::pair{"--size 640", "--size must be"},
+                                    std::pair{"--initial-radius 0", "--initial-radius must be"},
+                                    std::pair{"--photons-per-pass x", "--photons-per-pass must be"},
+                                    std::pair{"--radius-controller sppm", "--radius-controller: "},
+                                    std::pair{"--kernel box", "--kernel: "}}) {
+    const Status status = Parse(words).status();
+    EXPECT_EQ(ExitCodeOf(status), ExitCode::kUsage) << words;
+    EXPECT_NE(std::string(status.message()).find(flag), std::string::npos) << status;
+  }
 }
 
-TEST(RenderFlagsTest, RefusesWhatMakesNoSense) {
-  for (const char* size : {"", "x", "640", "640x", "x480", "640*480", "0x1", "-1x5", "1x1x1",
-                           "1 x 1", "99999999999x1"}) {
-    ExpectMisuse(&RenderFlags::size, size, "--size");
-  }
-  for (const char* radius : {"", "automatic", "0", "-1", "nan", "inf", "1m", "px", "0px", "-1px"}) {
-    ExpectMisuse(&RenderFlags::initial_radius, radius, "--initial-radius");
-  }
-  ExpectMisuse(&RenderFlags::radius_controller, "sppm", "--radius-controller");
-  ExpectMisuse(&RenderFlags::kernel, "box", "--kernel");
+TEST(RenderFlagsTest, MessagesShowFlagsInPlaceOfNamesOfSettings) {
+  EXPECT_EQ(WithFlagNames("setting \"time_s\" or setting \"photons_per_pass\" is wrong"),
+            "--time or --photons-per-pass is wrong");
+  EXPECT_EQ(WithFlagNames("a.pbrt:1:1: error: \"alpha\" of passes, unknown setting \"x\""),
+            "a.pbrt:1:1: error: \"alpha\" of passes, unknown setting \"x\"");
+}
+
+// README holds what `lucerna help settings` prints, between two empty lines.
+TEST(RenderFlagsTest, ReadmesTableOfSettingsIsUpToDate) {
+  const StatusOr<std::string> readme = ReadFile(LUCERNA_SOURCE_DIR "/README.md");
+  ASSERT_TRUE(readme.ok()) << readme.status();
+  EXPECT_NE(readme->find("\n\n" + SettingsTable() + "\n"), std::string::npos)
+      << "put the output of `lucerna help settings` into README.md:\n"
+      << SettingsTable();
 }
 
 TEST(ExitCodeTest, AFailureKeepsItsCodeAndOthersAreOne) {

@@ -72,8 +72,8 @@ TEST(ReportPageTest, NothingFromOutsideBecomesMarkup) {
   job.mutable_worker_shares(0)->set_name(bad);
   job.mutable_worker_shares(1)->clear_name();
   job.mutable_worker_shares(1)->set_worker_id(bad);
-  job.mutable_settings()->set_radius_controller(bad);
-  job.mutable_settings()->set_kernel(bad);
+  for (v1::Setting& setting : *job.mutable_settings()->mutable_settings())
+    setting.set_value("\"><script>alert('x')</script>");
   for (const v1::JobState state : {v1::JOB_STATE_SUCCEEDED, v1::JOB_STATE_FAILED}) {
     job.set_state(state);
     job.set_failure(bad);

@@ -8,6 +8,7 @@
 #include "client/report.h"
 #include "render/wire/messages.h"
 #include "tests/support/converging_job.h"
+#include "tests/support/job_settings.h"
 
 namespace lucerna {
 namespace {
@@ -20,7 +21,7 @@ TEST(ReportTest, AJobTellsItsFigures) {
   job.set_name("a \"quoted\"\nname \xff");
   job.set_state(v1::JOB_STATE_SUCCEEDED);
   job.set_stop_reason(v1::STOP_REASON_TIME);
-  job.mutable_settings()->set_seed(18'446'744'073'709'551'615U);
+  SetSetting(job, &RenderSettings::seed, 18'446'744'073'709'551'615U);
   job.set_scene_digest(std::string(32, '\x01'));
   job.add_warnings("scene.pbrt:1:1: warning: something");
   job.mutable_progress()->set_photons(7);

@@ -14,17 +14,17 @@ namespace lucerna {
 namespace {
 
 TEST(CompareCommandTest, SettingsHaveNamesAndTheirOwnFlags) {
-  RenderFlags common;
+  RenderOverrides common;
   common.alpha = 0.5;
   const auto settings =
       ParseSettings({"plain:", " wide : --alpha 0.9 --initial-radius 4px "}, common);
   ASSERT_TRUE(settings.ok()) << settings.status();
   ASSERT_EQ(settings->size(), 2U);
   EXPECT_EQ((*settings)[0].name, "plain");
-  EXPECT_EQ((*settings)[0].flags.alpha, 0.5);
+  EXPECT_EQ((*settings)[0].overrides.alpha, 0.5);
   EXPECT_EQ((*settings)[1].name, "wide");
   EXPECT_EQ((*settings)[1].words, "--alpha 0.9 --initial-radius 4px");
-  EXPECT_EQ((*settings)[1].flags.alpha, 0.9);
+  EXPECT_EQ((*settings)[1].overrides.alpha, 0.9);
 }
 
 TEST(CompareCommandTest, WithoutSettingsEachControllerIsOne) {
@@ -32,7 +32,7 @@ TEST(CompareCommandTest, WithoutSettingsEachControllerIsOne) {
   ASSERT_TRUE(settings.ok());
   EXPECT_EQ(settings->size(), RadiusControllerNames().size());
   EXPECT_EQ(settings->front().name, "ppm");
-  EXPECT_EQ(settings->front().flags.radius_controller, "ppm");
+  EXPECT_EQ(settings->front().overrides.radius_controller, RadiusControllerKind::kPpm);
 }
 
 TEST(CompareCommandTest, SettingsThatMakeNoSenseAreRefused) {

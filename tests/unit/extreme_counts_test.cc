@@ -14,6 +14,7 @@
 #include "render/film/film.h"
 #include "server/pass_merger.h"
 #include "server/scheduler.h"
+#include "tests/support/job_settings.h"
 
 namespace lucerna {
 namespace {
@@ -157,11 +158,11 @@ TEST(ExtremeCountsTest, FeaturesStayMeansOverManyPasses) {
 TEST(ExtremeCountsTest, ProgressOfTheLongestJobIsAShare) {
   v1::Job job;
   job.set_state(v1::JOB_STATE_RUNNING);
-  job.mutable_settings()->set_photons_per_pass(static_cast<std::int64_t>(kTrillion));
-  job.mutable_settings()->set_passes(9'000'000);
+  SetSetting(job, &RenderSettings::photons_per_pass, static_cast<std::int64_t>(kTrillion));
+  SetSetting(job, &RenderSettings::passes, 9'000'000);
   job.mutable_progress()->set_photons(4'500'000 * kTrillion);
   EXPECT_NEAR(ShareDone(job).value(), 0.5, 1e-12);
-  job.mutable_settings()->set_passes(INT64_MAX);
+  SetSetting(job, &RenderSettings::passes, INT64_MAX);
   EXPECT_LT(ShareDone(job).value(), 1e-9);
 }
 

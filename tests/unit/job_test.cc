@@ -120,33 +120,5 @@ TEST(SlidingRateTest, DividesByTheTimeThereWas) {
   EXPECT_EQ(rate.PerSecond(At(2), At(2)), 0) << "no time at all";
 }
 
-TEST(SettingsTextTest, NamesWhatDecidesThePixelsAndNothingElse) {
-  RenderSettings settings;
-  settings.width = settings.crop_x1 = 64;
-  settings.height = settings.crop_y1 = 32;
-  settings.photons_per_pass = 1000;
-  const std::string text = SettingsText(settings);
-  RenderSettings same = settings;
-  same.time_s = 7;
-  same.passes = 3;
-  EXPECT_EQ(SettingsText(same), text);
-  const auto differs = [&](auto change) {
-    RenderSettings other = settings;
-    change(other);
-    return SettingsText(other) != text;
-  };
-  EXPECT_TRUE(differs([](RenderSettings& s) { s.alpha = std::nextafter(s.alpha, 1.0); }));
-  EXPECT_TRUE(differs([](RenderSettings& s) { s.seed = 1; }));
-  EXPECT_TRUE(differs([](RenderSettings& s) { s.crop_x0 = 1; }));
-  EXPECT_TRUE(differs([](RenderSettings& s) { s.max_depth = 6; }));
-  EXPECT_TRUE(differs([](RenderSettings& s) { s.initial_radius = 1e-30; }));
-  EXPECT_TRUE(differs([](RenderSettings& s) { s.initial_footprints = 1; }));
-  EXPECT_NE(text.find("initial-radius=auto"), std::string::npos) << "as old digests have it";
-  EXPECT_TRUE(differs([](RenderSettings& s) { s.kernel = KernelKind::kConstant; }));
-  EXPECT_TRUE(
-      differs([](RenderSettings& s) { s.radius_controller = RadiusControllerKind::kPppm; }));
-  EXPECT_TRUE(differs([](RenderSettings& s) { s.photons_per_pass = 1001; }));
-}
-
 }  // namespace
 }  // namespace lucerna

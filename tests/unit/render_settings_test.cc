@@ -1,5 +1,5 @@
 // What the user gives wins over the scene file, the scene file over the defaults; every value out
-// of range is refused by the name of its flag.
+// of range is refused by the name of its setting.
 #include "render/scene/render_settings.h"
 
 #include <cmath>
@@ -24,7 +24,7 @@ std::string Why(const RenderOverrides& overrides) {
   return settings.ok() ? "" : std::string(settings.status().message());
 }
 
-TEST(RenderSettingsTest, DefaultsStandWhereNobodySaysAnything) {
+TEST(RenderSettingsTest, DefaultsStandWhereNothingIsGiven) {
   const RenderSettings settings = ResolveSettings({}, SmallScene()).value();
   RenderSettings expected;
   expected.width = expected.crop_x1 = 40;
@@ -76,6 +76,26 @@ TEST(RenderSettingsTest, ATimeAloneLiftsTheLimitOfPasses) {
   EXPECT_EQ(ResolveSettings(user, SmallScene())->passes, 5);
 }
 
+TEST(RenderSettingsTest, StopCriteriaAreReplacedAsAWhole) {
+  RenderSettings settings;
+  settings.error = 0.5;
+  RenderOverrides until;
+  EXPECT_THAT(std::string(SetStopCriteria(until, settings).message()),
+              HasSubstr("setting \"time_s\""));
+  EXPECT_EQ(settings.error, 0.5) << "unchanged";
+  until.passes = 0;
+  EXPECT_FALSE(SetStopCriteria(until, settings).ok()) << "no passes and no other criterion";
+  until.photons = 1000;
+  ASSERT_TRUE(SetStopCriteria(until, settings).ok());
+  EXPECT_EQ(settings.photons, 1000U);
+  EXPECT_EQ(settings.passes, 0);
+  EXPECT_EQ(settings.error, 0);
+  until.photons = 0;
+  EXPECT_THAT(std::string(SetStopCriteria(until, settings).message()),
+              HasSubstr("setting \"photons\" must be at least 1, not 0"));
+  EXPECT_EQ(settings.photons, 1000U) << "unchanged";
+}
+
 TEST(RenderSettingsTest, TheCropWindowFollowsTheSize) {
   Scene scene = SmallScene();
   scene.film.crop_x0 = 10;
@@ -96,31 +116,33 @@ TEST(RenderSettingsTest, TheCropWindowFollowsTheSize) {
   EXPECT_EQ(tiny.crop_height(), 1);
 }
 
-TEST(RenderSettingsTest, RefusesWhatIsOutOfRangeByTheFlagsName) {
+TEST(RenderSettingsTest, RefusesWhatIsOutOfRangeByTheSettingsName) {
   const auto with = [](auto member, auto value) {
     RenderOverrides user;
     user.*member = value;
     return Why(user);
   };
-  EXPECT_THAT(with(&RenderOverrides::width, 10), HasSubstr("--size"));
-  EXPECT_THAT(with(&RenderOverrides::passes, 0), HasSubstr("--passes"));
-  EXPECT_THAT(with(&RenderOverrides::passes, -1), HasSubstr("--passes"));
-  EXPECT_THAT(with(&RenderOverrides::photons_per_pass, 0), HasSubstr("--photons-per-pass"));
+  EXPECT_THAT(with(&RenderOverrides::width, 10), HasSubstr("setting \"size\""));
+  EXPECT_THAT(with(&RenderOverrides::passes, 0), HasSubstr("setting \"passes\""));
+  EXPECT_THAT(with(&RenderOverrides::passes, -1), HasSubstr("setting \"passes\""));
+  EXPECT_THAT(with(&RenderOverrides::photons_per_pass, 0),
+              HasSubstr("setting \"photons_per_pass\""));
   EXPECT_THAT(with(&RenderOverrides::photons_per_pass, 1'000'000'000'001),
-              HasSubstr("--photons-per-pass"));
-  EXPECT_THAT(with(&RenderOverrides::time_s, 0.0), HasSubstr("--time"));
-  EXPECT_THAT(with(&RenderOverrides::time_s, HUGE_VAL), HasSubstr("--time"));
-  EXPECT_THAT(with(&RenderOverrides::alpha, 0.0), HasSubstr("--alpha"));
-  EXPECT_THAT(with(&RenderOverrides::alpha, 1.0), HasSubstr("--alpha"));
-  EXPECT_THAT(with(&RenderOverrides::alpha, std::nan("")), HasSubstr("--alpha"));
-  EXPECT_THAT(with(&RenderOverrides::initial_radius, -1.0), HasSubstr("--initial-radius"));
+              HasSubstr("setting \"photons_per_pass\""));
+  EXPECT_THAT(with(&RenderOverrides::time_s, 0.0), HasSubstr("setting \"time_s\""));
+  EXPECT_THAT(with(&RenderOverrides::time_s, HUGE_VAL), HasSubstr("setting \"time_s\""));
+  EXPECT_THAT(with(&RenderOverrides::alpha, 0.0), HasSubstr("setting \"alpha\""));
+  EXPECT_THAT(with(&RenderOverrides::alpha, 1.0), HasSubstr("setting \"alpha\""));
+  EXPECT_THAT(with(&RenderOverrides::alpha, std::nan("")), HasSubstr("setting \"alpha\""));
+  EXPECT_THAT(with(&RenderOverrides::initial_radius, -1.0),
+              HasSubstr("setting \"initial_radius\""));
   EXPECT_THAT(with(&RenderOverrides::initial_footprints, 0.0), HasSubstr("0.001px"));
-  EXPECT_THAT(with(&RenderOverrides::max_depth, 0), HasSubstr("--max-depth"));
-  EXPECT_THAT(with(&RenderOverrides::max_depth, 10'001), HasSubstr("--max-depth"));
+  EXPECT_THAT(with(&RenderOverrides::max_depth, 0), HasSubstr("setting \"max_depth\""));
+  EXPECT_THAT(with(&RenderOverrides::max_depth, 10'001), HasSubstr("setting \"max_depth\""));
   RenderOverrides user;
   user.width = 65537;
   user.height = 1;
-  EXPECT_THAT(Why(user), HasSubstr("--size"));
+  EXPECT_THAT(Why(user), HasSubstr("setting \"size\""));
   user.width = 16384;
   user.height = 16384;
   EXPECT_EQ(Why(user), "");

@@ -4,10 +4,12 @@
 #include <limits>
 
 #include "gtest/gtest.h"
+#include <google/protobuf/unknown_field_set.h>
 
 #include "render/wire/channel.h"
 #include "render/wire/grpc_status.h"
 #include "render/wire/messages.h"
+#include "tests/support/job_settings.h"
 
 namespace lucerna {
 namespace {
@@ -27,8 +29,10 @@ RenderSettings SomeSettings() {
   settings.radius_controller = RadiusControllerKind::kPppm;
   settings.alpha = 0.7;
   settings.kernel = KernelKind::kConstant;
-  settings.initial_radius = 0.01;
   settings.initial_footprints = 1.5;
+  settings.bias = 0.1;
+  settings.frequency_share = 1;
+  settings.use_everything = true;
   settings.max_depth = 12;
   return settings;
 }
@@ -45,6 +49,54 @@ TEST(MessagesTest, SettingsComeBack) {
   const auto settings = FromProto(ToProto(SomeSettings()));
   ASSERT_TRUE(settings.ok()) << settings.status();
   EXPECT_EQ(*settings, SomeSettings());
+  RenderSettings other = SomeSettings();
+  other.initial_radius = 0.01;
+  other.initial_footprints = kInitialFootprints;
+  EXPECT_EQ(FromProto(ToProto(other)).value(), other);
+}
+
+TEST(MessagesTest, AnUnknownSettingIsNamed) {
+  v1::RenderOverrides overrides;
+  v1::Setting& item = *overrides.add_settings();
+  item.set_name("importons");
+  item.set_value("5");
+  const Status status = FromProto(overrides).status();
+  EXPECT_TRUE(absl::IsInvalidArgument(status));
+  EXPECT_NE(status.message().find("unknown setting \"importons\""), std::string::npos) << status;
+  v1::RenderSettings settings = ToProto(SomeSettings());
+  *settings.add_settings() = item;
+  EXPECT_EQ(FromProto(settings).status(), status);
+}
+
+// Version 0.1 sent one field for each setting: here `passes` of its overrides, `alpha` of its
+// settings.
+TEST(MessagesTest, SettingsInTheFormOfAnOlderVersionAreRefused) {
+  v1::RenderOverrides overrides = ToProto(RenderOverrides());
+  overrides.GetReflection()->MutableUnknownFields(&overrides)->AddVarint(3, 7);
+  EXPECT_TRUE(absl::IsInvalidArgument(FromProto(overrides).status()));
+  v1::RenderSettings settings = ToProto(SomeSettings());
+  settings.GetReflection()->MutableUnknownFields(&settings)->AddFixed64(12, 0);
+  EXPECT_TRUE(absl::IsInvalidArgument(FromProto(settings).status()));
+}
+
+TEST(MessagesTest, AMissingSettingIsNamed) {
+  v1::RenderSettings message = ToProto(SomeSettings());
+  message.mutable_settings()->RemoveLast();
+  const Status status = FromProto(message).status();
+  EXPECT_NE(status.message().find("setting \"use_everything\" is missing"), std::string::npos)
+      << status;
+}
+
+TEST(MessagesTest, SettingsToShowAreThoseThatCanBeRead) {
+  v1::Job job;
+  EXPECT_EQ(SettingsOf(job).passes, 0) << "no limit is known";
+  *job.mutable_settings() =
+      WithSettingText(WithSettingText(ToProto(SomeSettings()), "alpha", "many"), "passes", "");
+  job.mutable_settings()->add_settings()->set_name("importons");
+  RenderSettings expected = SomeSettings();
+  expected.alpha = RenderSettings().alpha;
+  expected.passes = 0;
+  EXPECT_EQ(SettingsOf(job), expected);
 }
 
 TEST(MessagesTest, NeedsComeBackWithoutTheirReasons) {
@@ -77,23 +129,33 @@ TEST(MessagesTest, HostileSettingsAreRefused) {
     change(message);
     return absl::IsInvalidArgument(FromProto(message).status());
   };
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_width(0); }));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_height(65'537); }));
+  EXPECT_FALSE(is_refused([](auto&) {}));
   EXPECT_TRUE(is_refused([](auto& m) { m.set_crop_x1(641); }));
   EXPECT_TRUE(is_refused([](auto& m) { m.set_crop_x0(-1); }));
   EXPECT_TRUE(is_refused([](auto& m) { m.set_crop_y0(460); }));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_passes(-1); }));
-  EXPECT_TRUE(is_refused([&](auto& m) { m.set_time_s(nan); }));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_time_s(HUGE_VAL); }));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_photons_per_pass(0); }));
-  EXPECT_TRUE(is_refused([&](auto& m) { m.set_alpha(nan); }));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_alpha(1); }));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_kernel("cubic"); }));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_radius_controller(""); }));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_initial_radius(-1); }));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_initial_footprints(0); }));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_max_depth(0); }));
+  const auto is_text_refused = [&](std::string_view name, std::string_view text) {
+    return is_refused([&](auto& m) { m = WithSettingText(m, name, text); });
+  };
+  EXPECT_TRUE(is_text_refused("size", "0x480"));
+  EXPECT_TRUE(is_text_refused("size", "640x65537"));
+  EXPECT_TRUE(is_text_refused("passes", "-1"));
+  EXPECT_TRUE(is_text_refused("time_s", "nan"));
+  EXPECT_TRUE(is_text_refused("time_s", "inf"));
+  EXPECT_TRUE(is_text_refused("time_s", "-1"));
+  EXPECT_TRUE(is_text_refused("error", "11"));
+  EXPECT_TRUE(is_text_refused("photons", "-1"));
+  EXPECT_TRUE(is_text_refused("photons_per_pass", "0"));
+  EXPECT_TRUE(is_text_refused("photons_per_pass", "1000000000001"));
+  EXPECT_TRUE(is_text_refused("alpha", "nan"));
+  EXPECT_TRUE(is_text_refused("alpha", "1"));
+  EXPECT_TRUE(is_text_refused("kernel", "cubic"));
+  EXPECT_TRUE(is_text_refused("radius_controller", ""));
+  EXPECT_TRUE(is_text_refused("initial_radius", "-1"));
+  EXPECT_TRUE(is_text_refused("initial_radius", "0px"));
+  EXPECT_TRUE(is_text_refused("bias", "0"));
+  EXPECT_TRUE(is_text_refused("frequency_share", "1.1"));
+  EXPECT_TRUE(is_text_refused("max_depth", "0"));
+  EXPECT_FALSE(is_text_refused("passes", "0")) << "no limit";
 }
 
 TEST(MessagesTest, OverridesComeBackWithWhatIsAbsent) {
@@ -111,7 +173,8 @@ TEST(MessagesTest, OverridesComeBackWithWhatIsAbsent) {
   EXPECT_FALSE(back->width || back->height || back->photons_per_pass || back->time_s ||
                back->seed || back->radius_controller || back->alpha || back->max_depth);
   v1::RenderOverrides hostile;
-  hostile.set_alpha(std::numeric_limits<double>::quiet_NaN());
+  hostile.add_settings()->set_name("alpha");
+  hostile.mutable_settings(0)->set_value("nan");
   EXPECT_FALSE(FromProto(hostile).ok());
 }
 
