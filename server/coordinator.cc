@@ -272,17 +272,13 @@ std::pair<std::vector<Coordinator::Report>, std::uint64_t> Coordinator::List(
 }
 
 StatusOr<Coordinator::Report> Coordinator::Cancel(const std::string& job_id) {
-  std::shared_ptr<JobRunner> runner;
   std::shared_ptr<JobEntry> entry;
   {
     const MutexLock lock(mutex_);
     entry = Find(job_id);
     if (!entry) return UnknownJob(job_id);
-    if (!entry->job.life.has_ended()) runner = entry->runner;
   }
-  const Status why = absl::CancelledError("the user cancelled the job");
-  if (runner) runner->Stop(why);
-  EndJob(entry, why);
+  EndJob(entry, absl::CancelledError("the user cancelled the job"));
   const MutexLock lock(mutex_);
   return MakeReport(*entry);
 }
@@ -505,6 +501,7 @@ void Coordinator::Conclude(const std::shared_ptr<JobEntry>& entry,
 }
 
 void Coordinator::EndJob(const std::shared_ptr<JobEntry>& entry, const Status& failure) {
+  std::shared_ptr<JobRunner> runner;
   {
     const MutexLock lock(mutex_);
     const bool was_waiting = entry->job.life.state() == JobState::kQueued;
@@ -516,7 +513,9 @@ void Coordinator::EndJob(const std::shared_ptr<JobEntry>& entry, const Status& f
     if (!has_ended) return;
     if (was_running) entry->job.books.coordinator_cpu = ProcessCpuTime() - entry->cpu_at_start;
     entry->scene = std::nullopt;
-    entry->runner = nullptr;
+    // Taken in the step that ends the life: RunJob gives an ended job no runner any more, so that
+    // every runner there is gets the stop.
+    runner = std::exchange(entry->runner, nullptr);
     ++entry->version;
     // One that was being rendered gives its files back when its thread is done with them.
     if (was_waiting) {
@@ -525,6 +524,7 @@ void Coordinator::EndJob(const std::shared_ptr<JobEntry>& entry, const Status& f
     }
     ForgetOldJobs();
   }
+  if (runner) runner->Stop(failure);
   spdlog::info("job {} ended: {}", entry->job.id, std::string(failure.message()));
 }
 
