@@ -123,76 +123,63 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
   }
 
   // Pinned before the scene is read, so that nothing vanishes until the job has ended.
-  std::vector<Digest> pinned;
-  const auto unpin = [&] {
-    for (const Digest& digest : pinned)
-      blobs_.Unpin(digest);
-  };
+  PinnedBlobs pinned;
   std::size_t missing = 0;
   for (const auto& [path, file] : submission.manifest.entries) {
-    if (blobs_.Pin(file.digest).ok()) {
-      pinned.push_back(file.digest);
+    if (auto pin = blobs_.Pin(file.digest); pin.ok()) {
+      pinned.push_back(*std::move(pin));
     } else {
       ++missing;
     }
   }
   if (missing > 0) {
-    unpin();
     return absl::FailedPreconditionError(
         absl::StrCat(missing, " of the scene's ", submission.manifest.entries.size(),
                      " files are not here yet; upload them and submit again"));
   }
   auto read = ReadScene(submission.manifest);
   if (!read.ok()) {
-    unpin();
     return read.status();
   }
   auto& [scene, warnings] = *read;
   const StatusOr<RenderSettings> settings = ResolveSettings(submission.overrides, scene);
   if (!settings.ok()) {
-    unpin();
     return settings.status();
   }
   const SceneNeeds needs = NeedsOf(scene, *settings);
   if (Status fits = CheckMemory(needs, *settings, options_.max_job_bytes); !fits.ok()) {
-    unpin();
     return fits;
   }
   if (submission.reference) {
-    if (!blobs_.Pin(*submission.reference).ok()) {
-      unpin();
+    auto pin = blobs_.Pin(*submission.reference);
+    if (!pin.ok()) {
       return absl::FailedPreconditionError(
           "the reference image is not here yet; upload it and submit again");
     }
-    pinned.push_back(*submission.reference);
+    pinned.push_back(*std::move(pin));
     const StatusOr<Blob> bytes = blobs_.Get(*submission.reference);
     const auto reference = bytes.ok() ? ReadReference(**bytes, *settings) : bytes.status();
     if (!reference.ok()) {
-      unpin();
       return reference.status();
     }
   }
   Submitted submitted;
   submitted.warnings = warnings;
   if (submission.validate_only) {
-    unpin();
     return submitted;
   }
 
   const MutexLock lock(mutex_);
   // The same request may have come twice at once.
   if (auto earlier = find_earlier()) {
-    unpin();
     return *std::move(earlier);
   }
   if (is_closed_ || queue_.size() >= kMostWaitingJobs) {
-    unpin();
     if (is_closed_) return absl::UnavailableError("the coordinator is shutting down");
     return absl::ResourceExhaustedError(
         absl::StrCat(queue_.size(), " jobs are waiting already; try again later"));
   }
   const std::uint64_t serial = next_serial_++;
-  // Until Unpin.
   auto entry = std::make_shared<JobEntry>();
   entry->serial = serial;
   entry->request_id = submission.request_id;
@@ -394,7 +381,7 @@ void Coordinator::RunJobs() {
     }
     RunJob(entry);
     const MutexLock lock(mutex_);
-    if (!entry->runner) Unpin(*entry);
+    if (!entry->runner) entry->pinned.clear();
   }
 }
 
@@ -520,17 +507,12 @@ void Coordinator::EndJob(const std::shared_ptr<JobEntry>& entry, const Status& f
     // One that was being rendered gives its files back when its thread is done with them.
     if (was_waiting) {
       std::erase(queue_, entry);
-      Unpin(*entry);
+      entry->pinned.clear();
     }
     ForgetOldJobs();
   }
   if (runner) runner->Stop(failure);
   spdlog::info("job {} ended: {}", entry->job.id, std::string(failure.message()));
-}
-
-void Coordinator::Unpin(JobEntry& entry) {
-  for (const Digest& digest : std::exchange(entry.pinned, {}))
-    blobs_.Unpin(digest);
 }
 
 void Coordinator::ForgetOldJobs() {
@@ -551,7 +533,7 @@ void Coordinator::ForgetOldJobs() {
       // The one that has just ended is still in use by its thread, which then gives its files back.
       if (pixels > kPixelsRemembered || ended > kJobsRemembered) {
         entry->second->runner = nullptr;
-        if (entry->second != current_) Unpin(*entry->second);
+        if (entry->second != current_) entry->second->pinned.clear();
       }
     }
     if (!entry->second->image) continue;

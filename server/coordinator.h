@@ -171,7 +171,7 @@ class Coordinator {
     Blob image;
     std::uint64_t version = 0;
     Duration cpu_at_start{};  // less what earlier runs took
-    std::vector<Digest> pinned;
+    PinnedBlobs pinned;  // the files of the scene and the reference, while the job may need them
   };
   struct WaitingSync {
     std::string worker;
@@ -190,8 +190,6 @@ class Coordinator {
   StatusOr<Blob> Encode(const Job& job, JobRunner::Result result, Duration running,
                         Duration coordinator_cpu) const;
   void EndJob(const std::shared_ptr<JobEntry>& entry, const Status& failure);
-  // Gives the job's files back, unless it may still need them.
-  void Unpin(JobEntry& entry) LUCERNA_REQUIRES(mutex_);
   void ForgetOldJobs() LUCERNA_REQUIRES(mutex_);
   Report MakeReport(const JobEntry& entry) const LUCERNA_REQUIRES(mutex_);
   std::shared_ptr<JobEntry> Find(const std::string& job_id) const LUCERNA_REQUIRES(mutex_);

@@ -66,10 +66,9 @@ StatusOr<JobRunner::Result> JobRunner::RunToEnd() {
   while (!open_.empty()) {
     surroundings_.scheduler.ClosePass(KeyOf(open_.front().traced.eye.pass));
     surroundings_.merger.Drop(KeyOf(open_.front().traced.eye.pass));
-    Close(open_.front());
+    Withdraw(open_.front());
     open_.pop_front();
   }
-  if (ahead_) ReleaseBlock(ahead_->block_digest);
   ahead_.reset();
   return result;
 }
@@ -189,18 +188,21 @@ StatusOr<JobRunner::TracedPass> JobRunner::Trace(std::uint64_t pass) {
   const int sets = estimator_->needs().eye_sample_sets();
   const std::uint64_t set = EyeSetOf(pass, sets);
   if (const auto known = set_blocks_.find(set); known != set_blocks_.end()) {
-    if (surroundings_.blobs.Pin(known->second).ok()) {
-      traced.block_digest = known->second;
+    if (auto pin = surroundings_.blobs.Pin(known->second); pin.ok()) {
+      traced.block = *std::move(pin);
       return traced;
     }
   }
   std::string bytes = EncodeHitpointBlock(traced.eye.block);
-  traced.block_digest = Sha256(bytes);
-  LUCERNA_RETURN_IF_ERROR(surroundings_.blobs.PutPinned(traced.block_digest, std::move(bytes)));
+  const Digest digest = Sha256(bytes);
+  // A block stays for its next turn if it has one.
+  LUCERNA_ASSIGN_OR_RETURN(traced.block, surroundings_.blobs.PutPinned(
+                                             digest, std::move(bytes),
+                                             sets > 0 ? AfterLastPin::kKeep : AfterLastPin::kDrop));
   if (sets > 0) {
     // Sets of an earlier round are not used again.
     if (set_blocks_.size() >= static_cast<std::size_t>(sets)) set_blocks_.clear();
-    set_blocks_[set] = traced.block_digest;
+    set_blocks_[set] = digest;
   }
   return traced;
 }
@@ -212,12 +214,10 @@ Status JobRunner::Open(TracedPass traced) {
     open.radii = estimator_->Radii(traced.eye);
   }
   std::string bytes = EncodeRadii(open.radii);
-  open.blobs = {traced.block_digest, Sha256(bytes), traced.eye.block.size()};
-  if (Status status = surroundings_.blobs.PutPinned(open.blobs.radii, std::move(bytes));
-      !status.ok()) {
-    ReleaseBlock(traced.block_digest);
-    return status;
-  }
+  open.blobs = {traced.block.digest(), Sha256(bytes), traced.eye.block.size()};
+  LUCERNA_ASSIGN_OR_RETURN(
+      open.encoded_radii,
+      surroundings_.blobs.PutPinned(open.blobs.radii, std::move(bytes), AfterLastPin::kDrop));
   const std::uint64_t pass = traced.eye.pass;
   open.traced = std::move(traced);
   {
@@ -260,25 +260,13 @@ void JobRunner::TakeIn(OpenPass open) {
     photons_applied_ += sums.tally().photons;
     passes = estimator_->passes_applied();
   }
-  Close(open);
+  Withdraw(open);
   surroundings_.when_pass_merged(passes, sums.tally());
 }
 
-void JobRunner::Close(const OpenPass& open) {
-  {
-    const MutexLock lock(mutex_);
-    blobs_.erase(open.traced.eye.pass);
-  }
-  ReleaseBlock(open.blobs.block);
-  surroundings_.blobs.UnpinAndDrop(open.blobs.radii);
-}
-
-void JobRunner::ReleaseBlock(const Digest& digest) {
-  if (estimator_->needs().eye_sample_sets() > 0) {
-    surroundings_.blobs.Unpin(digest);
-  } else {
-    surroundings_.blobs.UnpinAndDrop(digest);
-  }
+void JobRunner::Withdraw(const OpenPass& open) {
+  const MutexLock lock(mutex_);
+  blobs_.erase(open.traced.eye.pass);
 }
 
 bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {

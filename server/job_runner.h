@@ -102,11 +102,12 @@ class JobRunner {
  private:
   struct TracedPass {
     EyePass eye;
-    Digest block_digest;
+    BlobPin block;  // the hitpoints, encoded
   };
   struct OpenPass {
     TracedPass traced;
     RadiusColumn radii;
+    BlobPin encoded_radii;
     PassBlobs blobs;
   };
 
@@ -132,10 +133,8 @@ class JobRunner {
   bool HasPhotons(const OpenPass& open) const;
   bool IsComplete(const OpenPass& open) const;
   void TakeIn(OpenPass open);
-  // Ends a pass for workers and forgets what they needed for it.
-  void Close(const OpenPass& open);
-  // Undoes one pin of a block, which stays for its next turn if it has one.
-  void ReleaseBlock(const Digest& digest);
+  // Workers are not given the pass any more.
+  void Withdraw(const OpenPass& open);
   // Waits for a wake, until `until` if there is one. False when Run must end now.
   bool WaitForChange(std::optional<SteadyTime> until);
   Status why_stopped() const;
