@@ -92,12 +92,15 @@ void Coordinator::Close() {
 // ---------------------------------------------------------------------------------------------
 
 StatusOr<std::pair<Scene, std::vector<std::string>>> Coordinator::ReadScene(
-    const SceneManifest& manifest) {
-  ManifestFiles files(manifest, [this](const Digest& digest) -> StatusOr<std::string> {
+    const SceneManifest& manifest, const StillNeeded& still_needed) {
+  ManifestFiles files(manifest, [&](const Digest& digest) -> StatusOr<std::string> {
+    LUCERNA_RETURN_IF_ERROR(still_needed());
     LUCERNA_ASSIGN_OR_RETURN(const Blob blob, blobs_.Get(digest));
     return *blob;
   });
   ParsedScene parsed = ParsePbrt(files, manifest.main_path);
+  // Before the errors of a scene of which files were not read.
+  LUCERNA_RETURN_IF_ERROR(still_needed());
   LUCERNA_RETURN_IF_ERROR(parsed.ToStatus());
   std::vector<std::string> warnings;
   for (const Diagnostic& diagnostic : parsed.diagnostics)
@@ -105,7 +108,8 @@ StatusOr<std::pair<Scene, std::vector<std::string>>> Coordinator::ReadScene(
   return std::pair(std::move(parsed.scene), std::move(warnings));
 }
 
-StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submission) {
+StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submission,
+                                                     const StillNeeded& still_needed) {
   if (submission.request_id.empty() || submission.request_id.size() > 128) {
     return absl::InvalidArgumentError("a request id has 1 to 128 characters");
   }
@@ -137,7 +141,7 @@ StatusOr<Coordinator::Submitted> Coordinator::Submit(const Submission& submissio
         absl::StrCat(missing, " of the scene's ", submission.manifest.entries.size(),
                      " files are not here yet; upload them and submit again"));
   }
-  auto read = ReadScene(submission.manifest);
+  auto read = ReadScene(submission.manifest, still_needed);
   if (!read.ok()) {
     return read.status();
   }
@@ -229,11 +233,11 @@ Coordinator::Report Coordinator::MakeReport(const JobEntry& entry) const {
   const JobLife& life = entry.job.life;
   report.running = life.Running(now);
   if (life.state() == JobState::kRunning) {
-    report.photons_per_second = entry.job.books.rate.PerSecond(now - report.running, now);
-    report.job.books.coordinator_cpu = ProcessCpuTime() - entry.cpu_at_start;
+    report.photons_per_second = entry.job.counters.rate.PerSecond(now - report.running, now);
+    report.job.counters.coordinator_cpu = ProcessCpuTime() - entry.cpu_at_start;
   } else if (life.has_ended() && report.running > Duration::zero()) {
     report.photons_per_second =
-        static_cast<double>(entry.job.books.photons) / Seconds(report.running);
+        static_cast<double>(entry.job.counters.photons) / Seconds(report.running);
   }
   return report;
 }
@@ -303,6 +307,7 @@ StatusOr<Coordinator::Report> Coordinator::Extend(const std::string& job_id,
           " ended so long ago that its photons are not kept any more; submit it again"));
     }
     job.life.Extend();
+    entry->runner->Reopen(settings);
     // The image grows from now on.
     entry->image = nullptr;
     queue_.push_back(entry);
@@ -356,7 +361,7 @@ StatusOr<Blob> Coordinator::Encode(const Job& job, JobRunner::Result result, Dur
   metadata["lucerna.numeric_profile"] = options_.numeric_profile;
   metadata["lucerna.run.seconds"] = absl::StrFormat("%.3f", Seconds(running));
   metadata["lucerna.run.cpu_seconds"] =
-      absl::StrFormat("%.3f", Seconds(coordinator_cpu + job.books.worker_cpu));
+      absl::StrFormat("%.3f", Seconds(coordinator_cpu + job.counters.worker_cpu));
   metadata["lucerna.run.workers"] = absl::StrCat(job.most_workers);
   metadata["lucerna.run.finished_at"] = UtcText(clock_.Wall());
   LUCERNA_ASSIGN_OR_RETURN(std::string bytes, EncodeExr(result.image));
@@ -406,47 +411,53 @@ void Coordinator::RunJob(const std::shared_ptr<JobEntry>& entry) {
     reference = *std::move(read);
   }
   if (!scene) {
-    auto read = ReadScene(entry->job.manifest);
+    auto read = ReadScene(entry->job.manifest, [&]() -> Status {
+      const MutexLock lock(mutex_);
+      if (!entry->job.life.has_ended() && !is_closed_) return absl::OkStatus();
+      return absl::CancelledError("the job has ended");
+    });
     if (!read.ok()) return EndJob(entry, read.status());
     scene = std::move(read->first);
   }
   runner = std::make_shared<JobRunner>(
       entry->job.id, settings, options_.threads,
-      JobRunner::Surroundings{
+      RunnerHooks{
           .blobs = blobs_,
           .scheduler = scheduler_,
           .merger = merger_,
           .clock = clock_,
-          .when_running =
+          .on_running =
               [this, entry] {
                 const MutexLock lock(mutex_);
                 entry->job.life.Run(clock_.Steady());
-                entry->cpu_at_start = ProcessCpuTime() - entry->job.books.coordinator_cpu;
+                entry->cpu_at_start = ProcessCpuTime() - entry->job.counters.coordinator_cpu;
                 ++entry->version;
               },
-          .when_warned =
+          .on_warning =
               [this, entry](std::string warning) {
                 const MutexLock lock(mutex_);
                 entry->job.warnings.push_back(std::move(warning));
                 ++entry->version;
               },
-          .when_pass_opened = [this] { AnswerWaiting(); },
-          .when_pass_merged =
+          .on_pass_opened = [this] { AnswerWaiting(); },
+          .on_pass_merged =
               [this, entry](std::int64_t passes, const BatchTally& of_pass) {
                 const MutexLock lock(mutex_);
-                entry->job.books.passes = passes;
+                entry->job.counters.passes = passes;
                 entry->job.pass_record.Add(of_pass);
                 ++entry->version;
               },
-          .when_looked =
-              [this, entry](const JobRunner::Look& look) {
+          .on_error_estimate =
+              [this, entry](const ErrorCheckpoint& checkpoint) {
                 const MutexLock lock(mutex_);
-                const JobBooks& books = entry->job.books;
+                const JobCounters& counters = entry->job.counters;
                 entry->job.convergence.push_back(
-                    {look.passes, look.photons, entry->job.life.Running(clock_.Steady()),
-                     ProcessCpuTime() - entry->cpu_at_start + books.worker_cpu, look.estimate,
-                     look.truth, look.missing.relative, look.missing.nothing_found});
-                entry->job.lights = look.missing.lights;
+                    {checkpoint.passes, checkpoint.photons,
+                     entry->job.life.Running(clock_.Steady()),
+                     ProcessCpuTime() - entry->cpu_at_start + counters.worker_cpu,
+                     checkpoint.estimate, checkpoint.truth, checkpoint.missing.relative,
+                     checkpoint.missing.nothing_found});
+                entry->job.lights = checkpoint.missing.lights;
                 ++entry->version;
               },
       });
@@ -479,12 +490,12 @@ void Coordinator::Conclude(const std::shared_ptr<JobEntry>& entry,
   if (!image.ok()) return EndJob(entry, image.status());
   const MutexLock lock(mutex_);
   if (!entry->job.life.Succeed(reason, clock_.Steady())) return;
-  entry->job.books.coordinator_cpu = ProcessCpuTime() - entry->cpu_at_start;
+  entry->job.counters.coordinator_cpu = ProcessCpuTime() - entry->cpu_at_start;
   entry->image = *std::move(image);
   ++entry->version;
   ForgetOldJobs();
   spdlog::info("job {} succeeded after {} passes and {:.1f} s", entry->job.id,
-               entry->job.books.passes, Seconds(running));
+               entry->job.counters.passes, Seconds(running));
 }
 
 void Coordinator::EndJob(const std::shared_ptr<JobEntry>& entry, const Status& failure) {
@@ -498,7 +509,7 @@ void Coordinator::EndJob(const std::shared_ptr<JobEntry>& entry, const Status& f
             ? entry->job.life.Cancel(clock_.Steady())
             : entry->job.life.Fail(std::string(failure.message()), clock_.Steady());
     if (!has_ended) return;
-    if (was_running) entry->job.books.coordinator_cpu = ProcessCpuTime() - entry->cpu_at_start;
+    if (was_running) entry->job.counters.coordinator_cpu = ProcessCpuTime() - entry->cpu_at_start;
     entry->scene = std::nullopt;
     // Taken in the step that ends the life: RunJob gives an ended job no runner any more, so that
     // every runner there is gets the stop.
@@ -565,19 +576,19 @@ StatusOr<std::string> Coordinator::Register(const std::string& name, int threads
 
 std::optional<StatusOr<Coordinator::SyncAnswer>> Coordinator::TryAnswer(
     const std::string& worker, const Scheduler::Report& report) {
-  StatusOr<Scheduler::Answer> told = scheduler_.Tell(worker, report, clock_.Steady());
-  if (!told.ok()) return told.status();
-  if (told->empty()) return std::nullopt;
+  StatusOr<Scheduler::Answer> result = scheduler_.Tell(worker, report, clock_.Steady());
+  if (!result.ok()) return result.status();
+  if (result->empty()) return std::nullopt;
   SyncAnswer answer;
-  answer.revoked = std::move(told->revoked);
-  if (told->lease) {
+  answer.revoked = std::move(result->revoked);
+  if (result->lease) {
     const MutexLock lock(mutex_);
-    const auto entry = Find(told->lease->pass.job_id);
+    const auto entry = Find(result->lease->pass.job_id);
     const auto blobs =
-        entry && entry->runner ? entry->runner->BlobsOf(told->lease->pass.pass) : std::nullopt;
+        entry && entry->runner ? entry->runner->BlobsOf(result->lease->pass.pass) : std::nullopt;
     if (blobs) {
       entry->job.most_workers = std::max(entry->job.most_workers, scheduler_.LiveWorkers());
-      answer.loan = {*std::move(told->lease), entry->job.manifest, entry->job.settings,
+      answer.loan = {*std::move(result->lease), entry->job.manifest, entry->job.settings,
                      entry->job.needs, *blobs};
     }
     // Else the pass ended this moment, and its lease with it.
@@ -688,8 +699,8 @@ StatusOr<Blob> Coordinator::Fetch(const Digest& digest) {
   const MutexLock lock(mutex_);
   if (!current_ || !current_->runner) return blob;
   if (const auto hitpoints = current_->runner->HitpointsIn(digest)) {
-    current_->job.books.bytes_sent += blob->size();
-    current_->job.books.hitpoints_sent += *hitpoints;
+    current_->job.counters.bytes_sent += blob->size();
+    current_->job.counters.hitpoints_sent += *hitpoints;
   }
   return blob;
 }
@@ -705,15 +716,16 @@ StatusOr<PassMerger::Outcome> Coordinator::Commit(const Delivery& delivery,
     const MutexLock lock(mutex_);
     if (const auto entry = Find(delivery.pass.job_id)) {
       const SteadyTime now = clock_.Steady();
-      JobBooks& books = entry->job.books;
-      if (!books.to_first_photons) books.to_first_photons = now - entry->job.life.submitted_at();
-      books.photons += accumulation.tally.photons;
-      books.tally += accumulation.tally;
-      books.NameDropped(delivery.pass.pass, accumulation.dropped_photons);
-      books.worker_cpu = SaturatingSum(books.worker_cpu, delivery.cpu);
-      books.bytes_received += delivery.size_bytes;
-      books.hitpoints_returned += accumulation.size();
-      books.rate.Add(accumulation.tally.photons, now);
+      JobCounters& counters = entry->job.counters;
+      if (!counters.to_first_photons)
+        counters.to_first_photons = now - entry->job.life.submitted_at();
+      counters.photons += accumulation.tally.photons;
+      counters.tally += accumulation.tally;
+      counters.NameDropped(delivery.pass.pass, accumulation.dropped_photons);
+      counters.worker_cpu = SaturatingSum(counters.worker_cpu, delivery.cpu);
+      counters.bytes_received += delivery.size_bytes;
+      counters.hitpoints_returned += accumulation.size();
+      counters.rate.Add(accumulation.tally.photons, now);
       WorkerShare& share = entry->job.workers[delivery.worker];
       if (share.name.empty()) share.name = scheduler_.NameOf(delivery.worker);
       share.photons += accumulation.tally.photons;

@@ -34,6 +34,7 @@
 #include "server/job_runner.h"
 #include "server/pass_merger.h"
 #include "server/scheduler.h"
+#include "server/work_pool.h"
 
 namespace lucerna {
 
@@ -69,7 +70,9 @@ class Coordinator {
   // Reads the whole scene before it says yes.
   // Errors: INVALID_ARGUMENT with all errors of scene and settings, FAILED_PRECONDITION when
   // blobs are missing, RESOURCE_EXHAUSTED when too many jobs wait.
-  [[nodiscard]] StatusOr<Submitted> Submit(const Submission& submission);
+  // What `still_needed` says ends the reading between two files.
+  [[nodiscard]] StatusOr<Submitted> Submit(const Submission& submission,
+                                           const StillNeeded& still_needed);
 
   // A job as it is now, for people.
   struct Report {
@@ -182,7 +185,8 @@ class Coordinator {
     bool is_broken = false;
   };
 
-  StatusOr<std::pair<Scene, std::vector<std::string>>> ReadScene(const SceneManifest& manifest);
+  StatusOr<std::pair<Scene, std::vector<std::string>>> ReadScene(const SceneManifest& manifest,
+                                                                 const StillNeeded& still_needed);
   void RunJobs();
   void RunJob(const std::shared_ptr<JobEntry>& entry);
   // What becomes of a job whose runner has come back.

@@ -39,31 +39,31 @@ struct PassBlobs {
   std::size_t hitpoints = 0;
 };
 
+// The error of the image after so many passes.
+struct ErrorCheckpoint {
+  std::int64_t passes = 0;
+  std::uint64_t photons = 0;
+  ErrorEstimate estimate;
+  std::optional<TrueError> truth;
+  MissingLight missing;
+};
+
+struct RunnerHooks {
+  BlobStore& blobs;
+  Scheduler& scheduler;
+  PassMerger& merger;
+  const Clock& clock;
+  // Called on the runner's thread, never under a lock.
+  std::function<void()> on_running;
+  std::function<void(std::string warning)> on_warning;
+  std::function<void()> on_pass_opened;
+  std::function<void(std::int64_t passes, const BatchTally& of_pass)> on_pass_merged;
+  std::function<void(const ErrorCheckpoint& checkpoint)> on_error_estimate;
+};
+
 class JobRunner {
  public:
-  // What a look at the error found.
-  struct Look {
-    std::int64_t passes = 0;
-    std::uint64_t photons = 0;
-    ErrorEstimate estimate;
-    std::optional<TrueError> truth;
-    MissingLight missing;
-  };
-
-  struct Surroundings {
-    BlobStore& blobs;
-    Scheduler& scheduler;
-    PassMerger& merger;
-    const Clock& clock;
-    // Called on the runner's thread, never under a lock.
-    std::function<void()> when_running;
-    std::function<void(std::string warning)> when_warned;
-    std::function<void()> when_pass_opened;
-    std::function<void(std::int64_t passes, const BatchTally& of_pass)> when_pass_merged;
-    std::function<void(const Look& look)> when_looked;
-  };
-
-  JobRunner(std::string job_id, RenderSettings settings, int threads, Surroundings surroundings);
+  JobRunner(std::string job_id, RenderSettings settings, int threads, RunnerHooks hooks);
   ~JobRunner();
 
   struct Result {
@@ -77,18 +77,20 @@ class JobRunner {
   // Stop was given.
   [[nodiscard]] StatusOr<Result> Run(Scene scene, const SceneNeeds& needs,
                                      ReferenceImage reference);
-  // Goes on after Run or Resume ended well, to the end as it is now. Errors: as Run.
+  // Goes on after Run or Resume ended well and Reopen, to the end as it is now. Errors: as Run.
   [[nodiscard]] StatusOr<Result> Resume();
 
   // Threads: all of the following, any.
 
   // A new end: passes, photons, time_s and error of `settings`.
   void SetEnd(const RenderSettings& settings);
-  // Ends Run well as soon as there is an image.
+  // Before Resume: a new end, and what Finish asked of the run before is over.
+  void Reopen(const RenderSettings& settings);
+  // Ends Run or Resume well as soon as there is an image; also before it is called.
   void Finish();
   // Ends Run soon with `why`. The first call counts.
   void Stop(Status why);
-  // A batch was merged, or time has passed: look again.
+  // A batch was merged: the runner checks whether a pass is complete.
   void Wake();
   // What workers need for an open pass; absent when it is not open.
   [[nodiscard]] std::optional<PassBlobs> BlobsOf(std::uint64_t pass) const;
@@ -122,8 +124,8 @@ class JobRunner {
 
   StatusOr<Result> RunToEnd();
   StatusOr<Result> RunPasses();
-  // Estimates the error, if it is time to look or `is_last`.
-  void LookAtError(bool is_last);
+  // Estimates the error at the next checkpoint, or if `is_last`.
+  void EstimateErrorIfDue(bool is_last);
   // Warns of a black image.
   void CheckImage();
   // Why to stop now; kNone: go on.
@@ -144,7 +146,7 @@ class JobRunner {
   const std::string job_id_;
   const RenderSettings settings_;
   const int threads_;
-  const Surroundings surroundings_;
+  const RunnerHooks hooks_;
 
   // Held for one step of the estimator at a time, except its eye paths.
   mutable Mutex estimator_mutex_;
@@ -155,11 +157,11 @@ class JobRunner {
   // The runner's thread only.
   ReferenceImage reference_;
   Duration ran_before_{};
-  std::int64_t next_look_ = kFirstLook;
-  int looks_ = 0;
-  bool has_warned_ = false;          // of a black image
-  std::int64_t looked_at_ = 0;       // passes
-  double error_at_most_ = HUGE_VAL;  // the upper end of the last look's interval
+  std::int64_t next_checkpoint_ = kFirstLook;
+  int checkpoints_ = 0;
+  bool has_warned_ = false;                // of a black image
+  std::int64_t passes_at_checkpoint_ = 0;  // passes
+  double error_at_most_ = HUGE_VAL;        // the upper end of the last interval
   std::deque<OpenPass> open_;
   std::optional<TracedPass> ahead_;
   std::map<std::uint64_t, Digest> set_blocks_;  // by set of eye paths, where they take turns

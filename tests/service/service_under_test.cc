@@ -80,10 +80,10 @@ ServiceUnderTest::ServiceUnderTest() {
   options.threads = 1;
   options.numeric_profile = kNumericProfile;
   coordinator_ = std::make_unique<Coordinator>(options, clock_);
-  assets_ = std::make_unique<AssetService>(coordinator_->blobs());
-  jobs_ = std::make_unique<JobService>(*coordinator_, clock_);
-  images_ = std::make_unique<ImageService>(*coordinator_);
-  workers_ = std::make_unique<WorkerService>(*coordinator_);
+  assets_ = std::make_unique<AssetService>(coordinator_->blobs(), pools_);
+  jobs_ = std::make_unique<JobService>(*coordinator_, pools_, clock_);
+  images_ = std::make_unique<ImageService>(*coordinator_, pools_);
+  workers_ = std::make_unique<WorkerService>(*coordinator_, pools_);
   grpc::ServerBuilder builder;
   SetUpConnections(builder);
   builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);
@@ -110,6 +110,7 @@ void ServiceUnderTest::ShutDown() {
   if (is_shut_down_.exchange(true)) return;
   ticks_.join();
   coordinator_->Close();
+  pools_.Close();
   jobs_->Close();
   server_->Shutdown(DeadlineIn(std::chrono::seconds(1)));
   server_->Wait();

@@ -26,6 +26,7 @@
 #include "server/coordinator.h"
 #include "server/image_service.h"
 #include "server/job_service.h"
+#include "server/work_pool.h"
 #include "server/worker_service.h"
 
 namespace lucerna {
@@ -70,6 +71,7 @@ class ServiceUnderTest {
 
   MovableClock& clock() { return clock_; }
   Coordinator& coordinator() { return *coordinator_; }
+  WorkPools& pools() { return pools_; }
   // A connection of its own to the server.
   [[nodiscard]] std::shared_ptr<grpc::Channel> NewChannel() const;
 
@@ -79,6 +81,7 @@ class ServiceUnderTest {
  private:
   MovableClock clock_;
   std::unique_ptr<Coordinator> coordinator_;
+  WorkPools pools_;
   std::unique_ptr<AssetService> assets_;
   std::unique_ptr<JobService> jobs_;
   std::unique_ptr<ImageService> images_;
