@@ -35,8 +35,8 @@ JobRunner::End JobRunner::EndOf(const RenderSettings& settings) {
   return end;
 }
 
-StatusOr<JobRunner::Result> JobRunner::Run(Scene scene, const SceneNeeds& needs,
-                                           ReferenceImage reference) {
+StatusOr<RenderResult> JobRunner::Run(Scene scene, const SceneNeeds& needs,
+                                      ReferenceImage reference) {
   LUCERNA_ASSIGN_OR_RETURN(estimator_,
                            JobEstimator::Create(std::move(scene), settings_, needs, threads_));
   reference_ = std::move(reference);
@@ -50,16 +50,16 @@ StatusOr<JobRunner::Result> JobRunner::Run(Scene scene, const SceneNeeds& needs,
   return RunToEnd();
 }
 
-StatusOr<JobRunner::Result> JobRunner::Resume() {
+StatusOr<RenderResult> JobRunner::Resume() {
   return RunToEnd();
 }
 
-StatusOr<JobRunner::Result> JobRunner::RunToEnd() {
+StatusOr<RenderResult> JobRunner::RunToEnd() {
   LUCERNA_RETURN_IF_ERROR(why_stopped());
   is_running_ = true;
   hooks_.on_running();
   const SteadyTime started_at = hooks_.clock.Steady();
-  StatusOr<Result> result = RunPasses();
+  StatusOr<RenderResult> result = RunPasses();
   ran_before_ += hooks_.clock.Steady() - started_at;
   // Whatever ended it: workers must not go on with passes that nobody will take in.
   while (!open_.empty()) {
@@ -84,7 +84,7 @@ StopReason JobRunner::ReasonToStop(const End& end, bool is_time_up) const {
   return shall_finish_ ? StopReason::kUser : StopReason::kNone;
 }
 
-StatusOr<JobRunner::Result> JobRunner::RunPasses() {
+StatusOr<RenderResult> JobRunner::RunPasses() {
   const SteadyTime started_at = hooks_.clock.Steady() - ran_before_;
   auto next_pass = static_cast<std::uint64_t>(estimator_->passes_applied());  // to be opened
 
@@ -330,8 +330,8 @@ std::optional<std::size_t> JobRunner::HitpointsIn(const Digest& digest) const {
   return std::nullopt;
 }
 
-JobRunner::Result JobRunner::MakeResult(StopReason reason) const {
-  Result result;
+RenderResult JobRunner::MakeResult(StopReason reason) const {
+  RenderResult result;
   result.reason = reason;
   result.image = estimator_->MakeImage();
   result.passes = estimator_->passes_applied();
@@ -339,7 +339,7 @@ JobRunner::Result JobRunner::MakeResult(StopReason reason) const {
   return result;
 }
 
-StatusOr<JobRunner::Result> JobRunner::ImageSoFar() const {
+StatusOr<RenderResult> JobRunner::ImageSoFar() const {
   if (is_running_) {
     const MutexLock lock(estimator_mutex_);
     if (estimator_->passes_applied() > 0) return MakeResult(StopReason::kNone);

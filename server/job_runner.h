@@ -28,16 +28,10 @@
 #include "server/job.h"
 #include "server/job_estimator.h"
 #include "server/pass_merger.h"
+#include "server/running_job.h"
 #include "server/scheduler.h"
 
 namespace lucerna {
-
-// What a worker must fetch for a pass.
-struct PassBlobs {
-  Digest block;
-  Digest radii;
-  std::size_t hitpoints = 0;
-};
 
 // The error of the image after so many passes.
 struct ErrorCheckpoint {
@@ -61,45 +55,26 @@ struct RunnerHooks {
   std::function<void(const ErrorCheckpoint& checkpoint)> on_error_estimate;
 };
 
-class JobRunner {
+class JobRunner final : public RunningJob {
  public:
   JobRunner(std::string job_id, RenderSettings settings, int threads, RunnerHooks hooks);
-  ~JobRunner();
+  ~JobRunner() override;
 
-  struct Result {
-    StopReason reason = StopReason::kNone;
-    Image image;  // without metadata
-    std::int64_t passes = 0;
-    std::uint64_t photons = 0;  // in the image
-  };
   // Renders to the end. `reference` may be empty; else it is as large as the image. Once only.
   // Errors: what JobEstimator says of the scene, RESOURCE_EXHAUSTED when blobs do not fit, or what
   // Stop was given.
-  [[nodiscard]] StatusOr<Result> Run(Scene scene, const SceneNeeds& needs,
-                                     ReferenceImage reference);
-  // Goes on after Run or Resume ended well and Reopen, to the end as it is now. Errors: as Run.
-  [[nodiscard]] StatusOr<Result> Resume();
+  [[nodiscard]] StatusOr<RenderResult> Run(Scene scene, const SceneNeeds& needs,
+                                           ReferenceImage reference);
+  [[nodiscard]] StatusOr<RenderResult> Resume() override;
 
-  // Threads: all of the following, any.
-
-  // A new end: passes, photons, time_s and error of `settings`.
-  void SetEnd(const RenderSettings& settings);
-  // Before Resume: a new end, and what Finish asked of the run before is over.
-  void Reopen(const RenderSettings& settings);
-  // Ends Run or Resume well as soon as there is an image; also before it is called.
-  void Finish();
-  // Ends Run soon with `why`. The first call counts.
-  void Stop(Status why);
-  // A batch was merged: the runner checks whether a pass is complete.
-  void Wake();
-  // What workers need for an open pass; absent when it is not open.
-  [[nodiscard]] std::optional<PassBlobs> BlobsOf(std::uint64_t pass) const;
-  // How many hitpoints the bytes named `digest` describe: those of a block, 0 for radii; absent
-  // when they belong to no open pass.
-  [[nodiscard]] std::optional<std::size_t> HitpointsIn(const Digest& digest) const;
-  // The image of the passes merged so far, without metadata.
-  // Errors: FAILED_PRECONDITION before the first one.
-  [[nodiscard]] StatusOr<Result> ImageSoFar() const;
+  void SetEnd(const RenderSettings& settings) override;
+  void Reopen(const RenderSettings& settings) override;
+  void Finish() override;
+  void Stop(Status why) override;
+  void Wake() override;
+  [[nodiscard]] std::optional<PassBlobs> BlobsOf(std::uint64_t pass) const override;
+  [[nodiscard]] std::optional<std::size_t> HitpointsIn(const Digest& digest) const override;
+  [[nodiscard]] StatusOr<RenderResult> ImageSoFar() const override;
 
  private:
   struct TracedPass {
@@ -122,8 +97,8 @@ class JobRunner {
   };
   static End EndOf(const RenderSettings& settings);
 
-  StatusOr<Result> RunToEnd();
-  StatusOr<Result> RunPasses();
+  StatusOr<RenderResult> RunToEnd();
+  StatusOr<RenderResult> RunPasses();
   // Estimates the error at the next checkpoint, or if `is_last`.
   void EstimateErrorIfDue(bool is_last);
   // Warns of a black image.
@@ -141,7 +116,7 @@ class JobRunner {
   bool WaitForChange(std::optional<SteadyTime> until);
   Status why_stopped() const;
   PassKey KeyOf(std::uint64_t pass) const { return {job_id_, pass}; }
-  Result MakeResult(StopReason reason) const LUCERNA_REQUIRES(estimator_mutex_);
+  RenderResult MakeResult(StopReason reason) const LUCERNA_REQUIRES(estimator_mutex_);
 
   const std::string job_id_;
   const RenderSettings settings_;

@@ -56,7 +56,7 @@ v1::StopReason ReasonToProto(StopReason reason) {
   return v1::STOP_REASON_UNSPECIFIED;
 }
 
-v1::Progress ProgressToProto(const Coordinator::Report& report) {
+v1::Progress ProgressToProto(const JobReport& report) {
   const JobCounters& counters = report.job.counters;
   v1::Progress message;
   message.set_passes(counters.passes);
@@ -123,7 +123,7 @@ void AddShares(const std::map<std::string, WorkerShare>& workers, v1::Job& messa
   }
 }
 
-v1::Job JobToProto(const Coordinator::Report& report) {
+v1::Job JobToProto(const JobReport& report) {
   const Job& job = report.job;
   const JobState state = job.life.state();
   v1::Job message;
@@ -173,8 +173,8 @@ v1::Job JobToProto(const Coordinator::Report& report) {
   return message;
 }
 
-StatusOr<Coordinator::Submission> ReadSubmission(const v1::SubmitRequest& request) {
-  Coordinator::Submission submission;
+StatusOr<Submission> ReadSubmission(const v1::SubmitRequest& request) {
+  Submission submission;
   submission.request_id = request.request_id();
   submission.name = request.name();
   if (submission.name.size() > 1024) {
@@ -189,7 +189,7 @@ StatusOr<Coordinator::Submission> ReadSubmission(const v1::SubmitRequest& reques
   return submission;
 }
 
-grpc::Status Put(const StatusOr<Coordinator::Report>& report, v1::Job* response) {
+grpc::Status Put(const StatusOr<JobReport>& report, v1::Job* response) {
   if (report.ok()) *response = JobToProto(*report);
   return ToGrpc(report.status());
 }
@@ -215,7 +215,7 @@ class JobService::WatchReactor final : public grpc::ServerWriteReactor<v1::Job> 
       End(absl::OkStatus());
       return;
     }
-    const StatusOr<Coordinator::Report> report = service_.coordinator_.ReportOf(job_id_);
+    const StatusOr<JobReport> report = service_.coordinator_.ReportOf(job_id_);
     if (!report.ok()) {
       End(report.status());
       return;
@@ -295,8 +295,8 @@ grpc::ServerUnaryReactor* JobService::Submit(grpc::CallbackServerContext* contex
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   const StillNeeded still_needed = NeededByCaller(context);
   const auto submit = [this, request, response, still_needed]() -> Status {
-    LUCERNA_ASSIGN_OR_RETURN(const Coordinator::Submission submission, ReadSubmission(*request));
-    LUCERNA_ASSIGN_OR_RETURN(const Coordinator::Submitted submitted,
+    LUCERNA_ASSIGN_OR_RETURN(const Submission submission, ReadSubmission(*request));
+    LUCERNA_ASSIGN_OR_RETURN(const JobTable::Submitted submitted,
                              coordinator_.Submit(submission, still_needed));
     response->set_job_id(submitted.job_id);
     for (std::size_t i = 0; i < std::min(submitted.warnings.size(), kMostWarnings); ++i) {
@@ -334,7 +334,7 @@ grpc::ServerUnaryReactor* JobService::List(grpc::CallbackServerContext* context,
           ? kUsualPage
           : std::min(static_cast<std::size_t>(request->page_size()), kLargestPage);
   const auto [reports, next] = coordinator_.List(count, before);
-  for (const Coordinator::Report& report : reports)
+  for (const JobReport& report : reports)
     *response->add_jobs() = JobToProto(report);
   if (next != 0) response->set_next_page_token(absl::StrCat(next));
   reactor->Finish(grpc::Status::OK);

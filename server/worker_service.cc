@@ -18,7 +18,7 @@ constexpr std::uint64_t kAccumulationHeadBytes = 4096;
 constexpr std::uint64_t kAccumulationBytesPerHitpoint = 64;
 constexpr int kMostLeases = 64;  // that one worker may speak of
 
-v1::Lease LoanToProto(const Coordinator::Loan& loan) {
+v1::Lease LoanToProto(const Loan& loan) {
   v1::Lease message;
   message.set_lease_id(loan.lease.id);
   message.set_job_id(loan.lease.pass.job_id);
@@ -134,7 +134,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
   const grpc::CallbackServerContext* const context_;
   v1::CommitBatchResponse* const response_;
   v1::CommitBatchRequest part_;
-  Coordinator::Delivery delivery_;
+  Delivery delivery_;
   bool is_superseded_ = false;
   std::optional<ChunkCollector> collector_;
 };
@@ -173,7 +173,7 @@ grpc::ServerUnaryReactor* WorkerService::Sync(grpc::CallbackServerContext* conte
   auto* const reactor = new SyncReactor(coordinator_);
   reactor->set_ticket(
       coordinator_.Sync(request->worker_id(), std::move(report), FromProto(request->wait_at_most()),
-                        [reactor, response](StatusOr<Coordinator::SyncAnswer> answer) {
+                        [reactor, response](StatusOr<SyncAnswer> answer) {
                           if (answer.ok()) {
                             if (answer->loan)
                               *response->mutable_lease() = LoanToProto(*answer->loan);
