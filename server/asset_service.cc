@@ -6,17 +6,23 @@
 #include "render/scene/scene_files.h"
 #include "render/wire/chunks.h"
 #include "render/wire/grpc_status.h"
+#include "server/rpc_caller.h"
 
 namespace lucerna {
 namespace {
 
 class UploadReactor final : public grpc::ServerReadReactor<v1::UploadRequest> {
  public:
-  explicit UploadReactor(BlobStore& blobs) : blobs_(blobs) { StartRead(&part_); }
+  UploadReactor(BlobStore& blobs, WorkPool& pool, const grpc::CallbackServerContext* context)
+      : blobs_(blobs), pool_(pool), context_(context) {
+    StartRead(&part_);
+  }
 
   void OnReadDone(bool ok) override {
     if (!ok) {
-      Finish(ToGrpc(Keep()));
+      pool_.Run(NeededByCaller(context_), [this](const Status& may_begin) {
+        Finish(ToGrpc(may_begin.ok() ? Keep() : may_begin));
+      });
       return;
     }
     if (const Status status = Take(); !status.ok()) {
@@ -50,6 +56,8 @@ class UploadReactor final : public grpc::ServerReadReactor<v1::UploadRequest> {
   }
 
   BlobStore& blobs_;
+  WorkPool& pool_;
+  const grpc::CallbackServerContext* const context_;
   v1::UploadRequest part_;
   Digest digest_;
   std::optional<ChunkCollector> collector_;
@@ -76,8 +84,8 @@ grpc::ServerUnaryReactor* AssetService::FindMissing(grpc::CallbackServerContext*
 }
 
 grpc::ServerReadReactor<v1::UploadRequest>* AssetService::Upload(
-    grpc::CallbackServerContext* /*context*/, v1::UploadResponse* /*response*/) {
-  return new UploadReactor(blobs_);
+    grpc::CallbackServerContext* context, v1::UploadResponse* /*response*/) {
+  return new UploadReactor(blobs_, pools_.uploads, context);
 }
 
 }  // namespace lucerna

@@ -2,20 +2,22 @@
 //
 // Turns bytes into blobs of the store. Nothing is decided here.
 //
-// Threads: gRPC calls in from its own pool. Handlers never wait.
+// Threads: gRPC calls in from its own pool. Handlers never wait; digests are checked in the pool
+// for uploads.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
 
 #include "proto/lucerna/v1/assets.grpc.pb.h"
 #include "server/blob_store.h"
+#include "server/work_pool.h"
 
 namespace lucerna {
 
 class AssetService final : public v1::AssetService::CallbackService {
  public:
-  // The store outlives the service.
-  explicit AssetService(BlobStore& blobs) : blobs_(blobs) {}
+  // Both outlive the service.
+  AssetService(BlobStore& blobs, WorkPools& pools) : blobs_(blobs), pools_(pools) {}
 
   grpc::ServerUnaryReactor* FindMissing(grpc::CallbackServerContext* context,
                                         const v1::FindMissingRequest* request,
@@ -25,6 +27,7 @@ class AssetService final : public v1::AssetService::CallbackService {
 
  private:
   BlobStore& blobs_;
+  WorkPools& pools_;
 };
 
 }  // namespace lucerna

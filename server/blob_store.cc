@@ -4,14 +4,29 @@
 
 namespace lucerna {
 
+BlobPin& BlobPin::operator=(BlobPin&& other) noexcept {
+  if (this == &other) return *this;
+  Release();
+  store_ = std::exchange(other.store_, nullptr);
+  digest_ = other.digest_;
+  after_ = other.after_;
+  return *this;
+}
+
+void BlobPin::Release() {
+  if (store_ != nullptr) std::exchange(store_, nullptr)->Unpin(digest_, after_);
+}
+
 Status BlobStore::Put(const Digest& digest, std::string bytes) {
   const MutexLock lock(mutex_);
   return PutLocked(digest, std::move(bytes), 0);
 }
 
-Status BlobStore::PutPinned(const Digest& digest, std::string bytes) {
+StatusOr<BlobPin> BlobStore::PutPinned(const Digest& digest, std::string bytes,
+                                       AfterLastPin after) {
   const MutexLock lock(mutex_);
-  return PutLocked(digest, std::move(bytes), 1);
+  LUCERNA_RETURN_IF_ERROR(PutLocked(digest, std::move(bytes), 1));
+  return BlobPin(*this, digest, after);
 }
 
 Status BlobStore::PutLocked(const Digest& digest, std::string bytes, int pins) {
@@ -65,14 +80,14 @@ bool BlobStore::Has(const Digest& digest) const {
   return entries_.contains(digest);
 }
 
-Status BlobStore::Pin(const Digest& digest) {
+StatusOr<BlobPin> BlobStore::Pin(const Digest& digest, AfterLastPin after) {
   const MutexLock lock(mutex_);
   const auto found = entries_.find(digest);
   if (found == entries_.end()) {
     return absl::NotFoundError(absl::StrCat("there are no bytes named ", digest.Hex()));
   }
   PinLocked(found->second);
-  return absl::OkStatus();
+  return BlobPin(*this, digest, after);
 }
 
 void BlobStore::PinLocked(Entry& entry) {
@@ -81,23 +96,18 @@ void BlobStore::PinLocked(Entry& entry) {
   pinned_bytes_ += entry.bytes->size();
 }
 
-void BlobStore::Unpin(const Digest& digest) {
+void BlobStore::Unpin(const Digest& digest, AfterLastPin after) {
   const MutexLock lock(mutex_);
   const auto found = entries_.find(digest);
   LUCERNA_CHECK(found != entries_.end() && found->second.pins > 0);
   if (--found->second.pins > 0) return;
   pinned_bytes_ -= found->second.bytes->size();
-  found->second.place = unpinned_.insert(unpinned_.end(), digest);
-}
-
-void BlobStore::UnpinAndDrop(const Digest& digest) {
-  const MutexLock lock(mutex_);
-  const auto found = entries_.find(digest);
-  LUCERNA_CHECK(found != entries_.end() && found->second.pins > 0);
-  if (--found->second.pins > 0) return;
-  pinned_bytes_ -= found->second.bytes->size();
-  size_bytes_ -= found->second.bytes->size();
-  entries_.erase(found);
+  if (after == AfterLastPin::kKeep) {
+    found->second.place = unpinned_.insert(unpinned_.end(), digest);
+  } else {
+    size_bytes_ -= found->second.bytes->size();
+    entries_.erase(found);
+  }
 }
 
 std::uint64_t BlobStore::size_bytes() const {

@@ -12,6 +12,8 @@
 #include <memory>
 #include <string>
 #include <unordered_map>
+#include <utility>
+#include <vector>
 
 #include "render/base/digest.h"
 #include "render/base/mutex.h"
@@ -21,6 +23,40 @@ namespace lucerna {
 
 using Blob = std::shared_ptr<const std::string>;
 
+class BlobStore;
+
+// What becomes of bytes with their last pin.
+enum class AfterLastPin : std::uint8_t {
+  kKeep,  // while there is room
+  kDrop,  // at once: nothing needs them any more
+};
+
+// One need for a blob, which stays in its store for as long as the pin lives. The store outlives
+// all its pins.
+class BlobPin {
+ public:
+  BlobPin() = default;  // of nothing
+  BlobPin(BlobPin&& other) noexcept { *this = std::move(other); }
+  BlobPin& operator=(BlobPin&& other) noexcept;
+  BlobPin(const BlobPin&) = delete;
+  BlobPin& operator=(const BlobPin&) = delete;
+  ~BlobPin() { Release(); }
+
+  // Requires a pin that a store gave.
+  [[nodiscard]] const Digest& digest() const { return digest_; }
+
+ private:
+  friend class BlobStore;
+  BlobPin(BlobStore& store, const Digest& digest, AfterLastPin after)
+      : store_(&store), digest_(digest), after_(after) {}
+  void Release();
+
+  BlobStore* store_ = nullptr;
+  Digest digest_;
+  AfterLastPin after_ = AfterLastPin::kKeep;
+};
+using PinnedBlobs = std::vector<BlobPin>;
+
 class BlobStore {
  public:
   explicit BlobStore(std::uint64_t max_bytes) : max_bytes_(max_bytes) {}
@@ -28,19 +64,17 @@ class BlobStore {
   // Keeps `bytes`, whose digest the caller has made sure of. Bytes already there are kept once.
   // Errors: RESOURCE_EXHAUSTED when they do not fit beside what is pinned.
   [[nodiscard]] Status Put(const Digest& digest, std::string bytes);
-  // As Put, and pinned in the same breath.
-  [[nodiscard]] Status PutPinned(const Digest& digest, std::string bytes);
+  // As Put, and pinned in the same step.
+  [[nodiscard]] StatusOr<BlobPin> PutPinned(const Digest& digest, std::string bytes,
+                                            AfterLastPin after = AfterLastPin::kKeep);
 
   // Errors: NOT_FOUND.
   [[nodiscard]] StatusOr<Blob> Get(const Digest& digest);
   [[nodiscard]] bool Has(const Digest& digest) const;
 
-  // Errors: NOT_FOUND.
-  [[nodiscard]] Status Pin(const Digest& digest);
-  // Requires a Pin that was not yet undone. The bytes stay while there is room.
-  void Unpin(const Digest& digest);
-  // As Unpin, and the bytes go with the last pin: nobody will ask for them again.
-  void UnpinAndDrop(const Digest& digest);
+  // The pin that is released last decides what becomes of the bytes. Errors: NOT_FOUND.
+  [[nodiscard]] StatusOr<BlobPin> Pin(const Digest& digest,
+                                      AfterLastPin after = AfterLastPin::kKeep);
 
   [[nodiscard]] std::uint64_t size_bytes() const;
 
@@ -55,6 +89,8 @@ class BlobStore {
 
   Status PutLocked(const Digest& digest, std::string bytes, int pins) LUCERNA_REQUIRES(mutex_);
   void PinLocked(Entry& entry) LUCERNA_REQUIRES(mutex_);
+  friend class BlobPin;
+  void Unpin(const Digest& digest, AfterLastPin after);
   bool MakeRoom(std::uint64_t bytes) LUCERNA_REQUIRES(mutex_);
 
   const std::uint64_t max_bytes_;

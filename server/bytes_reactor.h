@@ -17,7 +17,8 @@ namespace lucerna {
 // Sends one blob, or says why there is none; deletes itself when the call is over.
 class BytesReactor final : public grpc::ServerWriteReactor<v1::Chunk> {
  public:
-  explicit BytesReactor(StatusOr<Blob> blob) {
+  // Once; from any thread.
+  void Send(StatusOr<Blob> blob) {
     if (!blob.ok()) {
       Finish(ToGrpc(blob.status()));
       return;

@@ -1,7 +1,7 @@
 // The door through which images go out.
 //
-// Threads: gRPC calls in from its own pool. Asking for the image of a running job waits for one
-// step of its estimator and for the encoding, and for nothing else.
+// Threads: gRPC calls in from its own pool. The image of a running job waits for one step of its
+// estimator and for the encoding, in the pool for images.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -9,21 +9,30 @@
 #include "proto/lucerna/v1/images.grpc.pb.h"
 #include "server/bytes_reactor.h"
 #include "server/coordinator.h"
+#include "server/rpc_caller.h"
+#include "server/work_pool.h"
 
 namespace lucerna {
 
 class ImageService final : public v1::ImageService::CallbackService {
  public:
-  // The coordinator outlives the service.
-  explicit ImageService(Coordinator& coordinator) : coordinator_(coordinator) {}
+  // Both outlive the service.
+  ImageService(Coordinator& coordinator, WorkPools& pools)
+      : coordinator_(coordinator), pools_(pools) {}
 
-  grpc::ServerWriteReactor<v1::Chunk>* GetImage(grpc::CallbackServerContext* /*context*/,
+  grpc::ServerWriteReactor<v1::Chunk>* GetImage(grpc::CallbackServerContext* context,
                                                 const v1::GetImageRequest* request) override {
-    return new BytesReactor(coordinator_.ImageOf(request->job_id()));
+    auto* const reactor = new BytesReactor;
+    pools_.images.Run(NeededByCaller(context), [this, reactor, job_id = request->job_id()](
+                                                   const Status& may_begin) {
+      reactor->Send(may_begin.ok() ? coordinator_.ImageOf(job_id) : StatusOr<Blob>(may_begin));
+    });
+    return reactor;
   }
 
  private:
   Coordinator& coordinator_;
+  WorkPools& pools_;
 };
 
 }  // namespace lucerna

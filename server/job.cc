@@ -76,7 +76,7 @@ void PassRecord::Add(const BatchTally& tally) {
   tallies_.push_back({.first_pass = first, .passes = 1, .tally = tally});
 }
 
-void JobBooks::NameDropped(std::uint64_t pass, const std::vector<std::uint64_t>& indices) {
+void JobCounters::NameDropped(std::uint64_t pass, const std::vector<std::uint64_t>& indices) {
   for (const std::uint64_t index : indices) {
     const PhotonKey key = {pass, index};
     dropped_photons.insert(std::ranges::upper_bound(dropped_photons, key), key);

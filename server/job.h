@@ -95,7 +95,7 @@ struct PhotonKey {
 };
 
 // What a job has cost and brought.
-struct JobBooks {
+struct JobCounters {
   std::int64_t passes = 0;                   // merged into the image
   std::uint64_t photons = 0;                 // merged, also of a pass that is not complete
   std::optional<Duration> to_first_photons;  // from submission
@@ -164,7 +164,7 @@ struct Job {
   SceneNeeds needs;
   WallTime submitted_at;
   JobLife life;
-  JobBooks books;
+  JobCounters counters;
   std::optional<Digest> reference;  // of an EXR image
   std::vector<ErrorSample> convergence;
   std::vector<LightFinding> lights;  // of the newest sample

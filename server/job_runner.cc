@@ -10,12 +10,11 @@
 
 namespace lucerna {
 
-JobRunner::JobRunner(std::string job_id, RenderSettings settings, int threads,
-                     Surroundings surroundings)
+JobRunner::JobRunner(std::string job_id, RenderSettings settings, int threads, RunnerHooks hooks)
     : job_id_(std::move(job_id)),
       settings_(std::move(settings)),
       threads_(threads),
-      surroundings_(std::move(surroundings)),
+      hooks_(std::move(hooks)),
       end_(EndOf(settings_)) {}
 
 JobRunner::~JobRunner() = default;
@@ -36,13 +35,13 @@ JobRunner::End JobRunner::EndOf(const RenderSettings& settings) {
   return end;
 }
 
-StatusOr<JobRunner::Result> JobRunner::Run(Scene scene, const SceneNeeds& needs,
-                                           ReferenceImage reference) {
+StatusOr<RenderResult> JobRunner::Run(Scene scene, const SceneNeeds& needs,
+                                      ReferenceImage reference) {
   LUCERNA_ASSIGN_OR_RETURN(estimator_,
                            JobEstimator::Create(std::move(scene), settings_, needs, threads_));
   reference_ = std::move(reference);
   if (const std::size_t faint = estimator_->faint_lights(); faint > 0) {
-    surroundings_.when_warned(
+    hooks_.on_warning(
         absl::StrCat("warning: ", faint, faint == 1 ? " light has" : " lights have",
                      " less than 4e-15 of the scene's power: photons of it are too faint to count"
                      " beside the others, so what is lit by reflections of that light alone stays"
@@ -51,25 +50,24 @@ StatusOr<JobRunner::Result> JobRunner::Run(Scene scene, const SceneNeeds& needs,
   return RunToEnd();
 }
 
-StatusOr<JobRunner::Result> JobRunner::Resume() {
+StatusOr<RenderResult> JobRunner::Resume() {
   return RunToEnd();
 }
 
-StatusOr<JobRunner::Result> JobRunner::RunToEnd() {
+StatusOr<RenderResult> JobRunner::RunToEnd() {
   LUCERNA_RETURN_IF_ERROR(why_stopped());
   is_running_ = true;
-  surroundings_.when_running();
-  const SteadyTime started_at = surroundings_.clock.Steady();
-  StatusOr<Result> result = RunPasses();
-  ran_before_ += surroundings_.clock.Steady() - started_at;
+  hooks_.on_running();
+  const SteadyTime started_at = hooks_.clock.Steady();
+  StatusOr<RenderResult> result = RunPasses();
+  ran_before_ += hooks_.clock.Steady() - started_at;
   // Whatever ended it: workers must not go on with passes that nobody will take in.
   while (!open_.empty()) {
-    surroundings_.scheduler.ClosePass(KeyOf(open_.front().traced.eye.pass));
-    surroundings_.merger.Drop(KeyOf(open_.front().traced.eye.pass));
-    Close(open_.front());
+    hooks_.scheduler.ClosePass(KeyOf(open_.front().traced.eye.pass));
+    hooks_.merger.Drop(KeyOf(open_.front().traced.eye.pass));
+    Withdraw(open_.front());
     open_.pop_front();
   }
-  if (ahead_) ReleaseBlock(ahead_->block_digest);
   ahead_.reset();
   return result;
 }
@@ -86,12 +84,8 @@ StopReason JobRunner::ReasonToStop(const End& end, bool is_time_up) const {
   return shall_finish_ ? StopReason::kUser : StopReason::kNone;
 }
 
-StatusOr<JobRunner::Result> JobRunner::RunPasses() {
-  const SteadyTime started_at = surroundings_.clock.Steady() - ran_before_;
-  {
-    const MutexLock lock(mutex_);
-    shall_finish_ = false;
-  }
+StatusOr<RenderResult> JobRunner::RunPasses() {
+  const SteadyTime started_at = hooks_.clock.Steady() - ran_before_;
   auto next_pass = static_cast<std::uint64_t>(estimator_->passes_applied());  // to be opened
 
   while (true) {
@@ -108,9 +102,9 @@ StatusOr<JobRunner::Result> JobRunner::RunPasses() {
       time_is_up =
           started_at + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
     }
-    const bool is_time_up = time_is_up && surroundings_.clock.Steady() >= *time_is_up;
+    const bool is_time_up = time_is_up && hooks_.clock.Steady() >= *time_is_up;
     if (const StopReason reason = ReasonToStop(end, is_time_up); reason != StopReason::kNone) {
-      LookAtError(true);
+      EstimateErrorIfDue(true);
       CheckImage();
       const MutexLock lock(estimator_mutex_);
       return MakeResult(reason);
@@ -137,7 +131,7 @@ StatusOr<JobRunner::Result> JobRunner::RunPasses() {
       OpenPass complete = std::move(open_.front());
       open_.pop_front();
       TakeIn(std::move(complete));
-      LookAtError(false);
+      EstimateErrorIfDue(false);
       continue;
     }
     if (wants_more && !ahead_) {
@@ -149,22 +143,22 @@ StatusOr<JobRunner::Result> JobRunner::RunPasses() {
   }
 }
 
-void JobRunner::LookAtError(bool is_last) {
-  Look look;
+void JobRunner::EstimateErrorIfDue(bool is_last) {
+  ErrorCheckpoint checkpoint;
   {
     const MutexLock lock(estimator_mutex_);
-    look.passes = estimator_->passes_applied();
-    if (look.passes < 2 || look.passes == looked_at_) return;
-    if (!is_last && look.passes < next_look_) return;
-    look.photons = photons_applied_;
-    look.estimate = estimator_->EstimateError(++looks_);
-    look.missing = estimator_->FindMissingLight();
-    if (!reference_.empty()) look.truth = estimator_->ErrorAgainst(reference_);
+    checkpoint.passes = estimator_->passes_applied();
+    if (checkpoint.passes < 2 || checkpoint.passes == passes_at_checkpoint_) return;
+    if (!is_last && checkpoint.passes < next_checkpoint_) return;
+    checkpoint.photons = photons_applied_;
+    checkpoint.estimate = estimator_->EstimateError(++checkpoints_);
+    checkpoint.missing = estimator_->FindMissingLight();
+    if (!reference_.empty()) checkpoint.truth = estimator_->ErrorAgainst(reference_);
   }
-  looked_at_ = look.passes;
-  error_at_most_ = std::sqrt(look.estimate.relative.high);
-  next_look_ = NextLook(look.passes);
-  surroundings_.when_looked(look);
+  passes_at_checkpoint_ = checkpoint.passes;
+  error_at_most_ = std::sqrt(checkpoint.estimate.relative.high);
+  next_checkpoint_ = NextLook(checkpoint.passes);
+  hooks_.on_error_estimate(checkpoint);
 }
 
 void JobRunner::CheckImage() {
@@ -175,7 +169,7 @@ void JobRunner::CheckImage() {
     photons = photons_applied_;
   }
   has_warned_ = true;
-  surroundings_.when_warned(absl::StrCat(
+  hooks_.on_warning(absl::StrCat(
       "warning: the image is black after ", photons,
       " photons: no light has reached the"
       " view; check that the scene has lights, which way they and the camera face, and what stands"
@@ -189,18 +183,21 @@ StatusOr<JobRunner::TracedPass> JobRunner::Trace(std::uint64_t pass) {
   const int sets = estimator_->needs().eye_sample_sets();
   const std::uint64_t set = EyeSetOf(pass, sets);
   if (const auto known = set_blocks_.find(set); known != set_blocks_.end()) {
-    if (surroundings_.blobs.Pin(known->second).ok()) {
-      traced.block_digest = known->second;
+    if (auto pin = hooks_.blobs.Pin(known->second); pin.ok()) {
+      traced.block = *std::move(pin);
       return traced;
     }
   }
   std::string bytes = EncodeHitpointBlock(traced.eye.block);
-  traced.block_digest = Sha256(bytes);
-  LUCERNA_RETURN_IF_ERROR(surroundings_.blobs.PutPinned(traced.block_digest, std::move(bytes)));
+  const Digest digest = Sha256(bytes);
+  // A block stays for its next turn if it has one.
+  LUCERNA_ASSIGN_OR_RETURN(
+      traced.block, hooks_.blobs.PutPinned(digest, std::move(bytes),
+                                           sets > 0 ? AfterLastPin::kKeep : AfterLastPin::kDrop));
   if (sets > 0) {
     // Sets of an earlier round are not used again.
     if (set_blocks_.size() >= static_cast<std::size_t>(sets)) set_blocks_.clear();
-    set_blocks_[set] = traced.block_digest;
+    set_blocks_[set] = digest;
   }
   return traced;
 }
@@ -212,12 +209,10 @@ Status JobRunner::Open(TracedPass traced) {
     open.radii = estimator_->Radii(traced.eye);
   }
   std::string bytes = EncodeRadii(open.radii);
-  open.blobs = {traced.block_digest, Sha256(bytes), traced.eye.block.size()};
-  if (Status status = surroundings_.blobs.PutPinned(open.blobs.radii, std::move(bytes));
-      !status.ok()) {
-    ReleaseBlock(traced.block_digest);
-    return status;
-  }
+  open.blobs = {traced.block.digest(), Sha256(bytes), traced.eye.block.size()};
+  LUCERNA_ASSIGN_OR_RETURN(
+      open.encoded_radii,
+      hooks_.blobs.PutPinned(open.blobs.radii, std::move(bytes), AfterLastPin::kDrop));
   const std::uint64_t pass = traced.eye.pass;
   open.traced = std::move(traced);
   {
@@ -227,12 +222,12 @@ Status JobRunner::Open(TracedPass traced) {
   // Without photons a pass is complete as it is.
   if (HasPhotons(open)) {
     const auto photons = static_cast<std::uint64_t>(settings_.photons_per_pass);
-    surroundings_.merger.Open(KeyOf(pass), open.blobs.hitpoints, photons,
-                              EvidenceColumns(EvidenceOf(settings_.radius_controller, pass)));
-    surroundings_.scheduler.OpenPass(KeyOf(pass), photons);
+    hooks_.merger.Open(KeyOf(pass), open.blobs.hitpoints, photons,
+                       EvidenceColumns(EvidenceOf(settings_.radius_controller, pass)));
+    hooks_.scheduler.OpenPass(KeyOf(pass), photons);
   }
   open_.push_back(std::move(open));
-  surroundings_.when_pass_opened();
+  hooks_.on_pass_opened();
   return absl::OkStatus();
 }
 
@@ -242,7 +237,7 @@ bool JobRunner::HasPhotons(const OpenPass& open) const {
 }
 
 bool JobRunner::IsComplete(const OpenPass& open) const {
-  return !HasPhotons(open) || surroundings_.merger.IsComplete(KeyOf(open.traced.eye.pass));
+  return !HasPhotons(open) || hooks_.merger.IsComplete(KeyOf(open.traced.eye.pass));
 }
 
 void JobRunner::TakeIn(OpenPass open) {
@@ -250,8 +245,8 @@ void JobRunner::TakeIn(OpenPass open) {
   PassSums sums(open.blobs.hitpoints,
                 EvidenceColumns(EvidenceOf(settings_.radius_controller, key.pass)));
   if (HasPhotons(open)) {
-    surroundings_.scheduler.ClosePass(key);
-    sums = surroundings_.merger.Take(key);
+    hooks_.scheduler.ClosePass(key);
+    sums = hooks_.merger.Take(key);
   }
   std::int64_t passes = 0;
   {
@@ -260,33 +255,20 @@ void JobRunner::TakeIn(OpenPass open) {
     photons_applied_ += sums.tally().photons;
     passes = estimator_->passes_applied();
   }
-  Close(open);
-  surroundings_.when_pass_merged(passes, sums.tally());
+  Withdraw(open);
+  hooks_.on_pass_merged(passes, sums.tally());
 }
 
-void JobRunner::Close(const OpenPass& open) {
-  {
-    const MutexLock lock(mutex_);
-    blobs_.erase(open.traced.eye.pass);
-  }
-  ReleaseBlock(open.blobs.block);
-  surroundings_.blobs.UnpinAndDrop(open.blobs.radii);
-}
-
-void JobRunner::ReleaseBlock(const Digest& digest) {
-  if (estimator_->needs().eye_sample_sets() > 0) {
-    surroundings_.blobs.Unpin(digest);
-  } else {
-    surroundings_.blobs.UnpinAndDrop(digest);
-  }
+void JobRunner::Withdraw(const OpenPass& open) {
+  const MutexLock lock(mutex_);
+  blobs_.erase(open.traced.eye.pass);
 }
 
 bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {
   // Now and then without a reason, so that a wake that is lost costs a moment and not the job.
   constexpr Duration kLongest = std::chrono::seconds(1);
   Duration longest = kLongest;
-  if (until)
-    longest = std::clamp(*until - surroundings_.clock.Steady(), Duration::zero(), kLongest);
+  if (until) longest = std::clamp(*until - hooks_.clock.Steady(), Duration::zero(), kLongest);
   const MutexLock lock(mutex_);
   if (!was_woken_ && !why_stopped_ && longest > Duration::zero()) {
     changed_.WaitFor(mutex_, longest);
@@ -305,6 +287,12 @@ void JobRunner::SetEnd(const RenderSettings& settings) {
   end_ = EndOf(settings);
   was_woken_ = true;
   changed_.NotifyAll();
+}
+
+void JobRunner::Reopen(const RenderSettings& settings) {
+  const MutexLock lock(mutex_);
+  shall_finish_ = false;
+  end_ = EndOf(settings);
 }
 
 void JobRunner::Finish() {
@@ -342,8 +330,8 @@ std::optional<std::size_t> JobRunner::HitpointsIn(const Digest& digest) const {
   return std::nullopt;
 }
 
-JobRunner::Result JobRunner::MakeResult(StopReason reason) const {
-  Result result;
+RenderResult JobRunner::MakeResult(StopReason reason) const {
+  RenderResult result;
   result.reason = reason;
   result.image = estimator_->MakeImage();
   result.passes = estimator_->passes_applied();
@@ -351,7 +339,7 @@ JobRunner::Result JobRunner::MakeResult(StopReason reason) const {
   return result;
 }
 
-StatusOr<JobRunner::Result> JobRunner::ImageSoFar() const {
+StatusOr<RenderResult> JobRunner::ImageSoFar() const {
   if (is_running_) {
     const MutexLock lock(estimator_mutex_);
     if (estimator_->passes_applied() > 0) return MakeResult(StopReason::kNone);

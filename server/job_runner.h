@@ -28,85 +28,63 @@
 #include "server/job.h"
 #include "server/job_estimator.h"
 #include "server/pass_merger.h"
+#include "server/running_job.h"
 #include "server/scheduler.h"
 
 namespace lucerna {
 
-// What a worker must fetch for a pass.
-struct PassBlobs {
-  Digest block;
-  Digest radii;
-  std::size_t hitpoints = 0;
+// The error of the image after so many passes.
+struct ErrorCheckpoint {
+  std::int64_t passes = 0;
+  std::uint64_t photons = 0;
+  ErrorEstimate estimate;
+  std::optional<TrueError> truth;
+  MissingLight missing;
 };
 
-class JobRunner {
+struct RunnerHooks {
+  BlobStore& blobs;
+  Scheduler& scheduler;
+  PassMerger& merger;
+  const Clock& clock;
+  // Called on the runner's thread, never under a lock.
+  std::function<void()> on_running;
+  std::function<void(std::string warning)> on_warning;
+  std::function<void()> on_pass_opened;
+  std::function<void(std::int64_t passes, const BatchTally& of_pass)> on_pass_merged;
+  std::function<void(const ErrorCheckpoint& checkpoint)> on_error_estimate;
+};
+
+class JobRunner final : public RunningJob {
  public:
-  // What a look at the error found.
-  struct Look {
-    std::int64_t passes = 0;
-    std::uint64_t photons = 0;
-    ErrorEstimate estimate;
-    std::optional<TrueError> truth;
-    MissingLight missing;
-  };
+  JobRunner(std::string job_id, RenderSettings settings, int threads, RunnerHooks hooks);
+  ~JobRunner() override;
 
-  struct Surroundings {
-    BlobStore& blobs;
-    Scheduler& scheduler;
-    PassMerger& merger;
-    const Clock& clock;
-    // Called on the runner's thread, never under a lock.
-    std::function<void()> when_running;
-    std::function<void(std::string warning)> when_warned;
-    std::function<void()> when_pass_opened;
-    std::function<void(std::int64_t passes, const BatchTally& of_pass)> when_pass_merged;
-    std::function<void(const Look& look)> when_looked;
-  };
-
-  JobRunner(std::string job_id, RenderSettings settings, int threads, Surroundings surroundings);
-  ~JobRunner();
-
-  struct Result {
-    StopReason reason = StopReason::kNone;
-    Image image;  // without metadata
-    std::int64_t passes = 0;
-    std::uint64_t photons = 0;  // in the image
-  };
   // Renders to the end. `reference` may be empty; else it is as large as the image. Once only.
   // Errors: what JobEstimator says of the scene, RESOURCE_EXHAUSTED when blobs do not fit, or what
   // Stop was given.
-  [[nodiscard]] StatusOr<Result> Run(Scene scene, const SceneNeeds& needs,
-                                     ReferenceImage reference);
-  // Goes on after Run or Resume ended well, to the end as it is now. Errors: as Run.
-  [[nodiscard]] StatusOr<Result> Resume();
+  [[nodiscard]] StatusOr<RenderResult> Run(Scene scene, const SceneNeeds& needs,
+                                           ReferenceImage reference);
+  [[nodiscard]] StatusOr<RenderResult> Resume() override;
 
-  // Threads: all of the following, any.
-
-  // A new end: passes, photons, time_s and error of `settings`.
-  void SetEnd(const RenderSettings& settings);
-  // Ends Run well as soon as there is an image.
-  void Finish();
-  // Ends Run soon with `why`. The first call counts.
-  void Stop(Status why);
-  // A batch was merged, or time has passed: look again.
-  void Wake();
-  // What workers need for an open pass; absent when it is not open.
-  [[nodiscard]] std::optional<PassBlobs> BlobsOf(std::uint64_t pass) const;
-  // How many hitpoints the bytes named `digest` describe: those of a block, 0 for radii; absent
-  // when they belong to no open pass.
-  [[nodiscard]] std::optional<std::size_t> HitpointsIn(const Digest& digest) const;
-  // The image of the passes merged so far, without metadata.
-  // Errors: FAILED_PRECONDITION before the first one.
-  [[nodiscard]] StatusOr<Result> ImageSoFar() const;
+  void SetEnd(const RenderSettings& settings) override;
+  void Reopen(const RenderSettings& settings) override;
+  void Finish() override;
+  void Stop(Status why) override;
+  void Wake() override;
+  [[nodiscard]] std::optional<PassBlobs> BlobsOf(std::uint64_t pass) const override;
+  [[nodiscard]] std::optional<std::size_t> HitpointsIn(const Digest& digest) const override;
+  [[nodiscard]] StatusOr<RenderResult> ImageSoFar() const override;
 
  private:
   struct TracedPass {
     EyePass eye;
-    Digest block_digest;
+    BlobPin block;  // the hitpoints, encoded
   };
   struct OpenPass {
     TracedPass traced;
     RadiusColumn radii;
+    BlobPin encoded_radii;
     PassBlobs blobs;
   };
 
@@ -119,10 +97,10 @@ class JobRunner {
   };
   static End EndOf(const RenderSettings& settings);
 
-  StatusOr<Result> RunToEnd();
-  StatusOr<Result> RunPasses();
-  // Estimates the error, if it is time to look or `is_last`.
-  void LookAtError(bool is_last);
+  StatusOr<RenderResult> RunToEnd();
+  StatusOr<RenderResult> RunPasses();
+  // Estimates the error at the next checkpoint, or if `is_last`.
+  void EstimateErrorIfDue(bool is_last);
   // Warns of a black image.
   void CheckImage();
   // Why to stop now; kNone: go on.
@@ -132,20 +110,18 @@ class JobRunner {
   bool HasPhotons(const OpenPass& open) const;
   bool IsComplete(const OpenPass& open) const;
   void TakeIn(OpenPass open);
-  // Ends a pass for workers and forgets what they needed for it.
-  void Close(const OpenPass& open);
-  // Undoes one pin of a block, which stays for its next turn if it has one.
-  void ReleaseBlock(const Digest& digest);
+  // Workers are not given the pass any more.
+  void Withdraw(const OpenPass& open);
   // Waits for a wake, until `until` if there is one. False when Run must end now.
   bool WaitForChange(std::optional<SteadyTime> until);
   Status why_stopped() const;
   PassKey KeyOf(std::uint64_t pass) const { return {job_id_, pass}; }
-  Result MakeResult(StopReason reason) const LUCERNA_REQUIRES(estimator_mutex_);
+  RenderResult MakeResult(StopReason reason) const LUCERNA_REQUIRES(estimator_mutex_);
 
   const std::string job_id_;
   const RenderSettings settings_;
   const int threads_;
-  const Surroundings surroundings_;
+  const RunnerHooks hooks_;
 
   // Held for one step of the estimator at a time, except its eye paths.
   mutable Mutex estimator_mutex_;
@@ -156,11 +132,11 @@ class JobRunner {
   // The runner's thread only.
   ReferenceImage reference_;
   Duration ran_before_{};
-  std::int64_t next_look_ = kFirstLook;
-  int looks_ = 0;
-  bool has_warned_ = false;          // of a black image
-  std::int64_t looked_at_ = 0;       // passes
-  double error_at_most_ = HUGE_VAL;  // the upper end of the last look's interval
+  std::int64_t next_checkpoint_ = kFirstLook;
+  int checkpoints_ = 0;
+  bool has_warned_ = false;                // of a black image
+  std::int64_t passes_at_checkpoint_ = 0;  // passes
+  double error_at_most_ = HUGE_VAL;        // the upper end of the last interval
   std::deque<OpenPass> open_;
   std::optional<TracedPass> ahead_;
   std::map<std::uint64_t, Digest> set_blocks_;  // by set of eye paths, where they take turns

@@ -7,6 +7,7 @@
 
 #include "render/wire/grpc_status.h"
 #include "render/wire/messages.h"
+#include "server/rpc_caller.h"
 
 namespace lucerna {
 namespace {
@@ -55,24 +56,24 @@ v1::StopReason ReasonToProto(StopReason reason) {
   return v1::STOP_REASON_UNSPECIFIED;
 }
 
-v1::Progress ProgressToProto(const Coordinator::Report& report) {
-  const JobBooks& books = report.job.books;
+v1::Progress ProgressToProto(const JobReport& report) {
+  const JobCounters& counters = report.job.counters;
   v1::Progress message;
-  message.set_passes(books.passes);
-  message.set_photons(books.photons);
+  message.set_passes(counters.passes);
+  message.set_photons(counters.photons);
   *message.mutable_running() = ToProto(report.running);
-  if (books.to_first_photons) {
-    *message.mutable_to_first_photons() = ToProto(*books.to_first_photons);
+  if (counters.to_first_photons) {
+    *message.mutable_to_first_photons() = ToProto(*counters.to_first_photons);
   }
-  *message.mutable_coordinator_cpu() = ToProto(books.coordinator_cpu);
-  *message.mutable_worker_cpu() = ToProto(books.worker_cpu);
+  *message.mutable_coordinator_cpu() = ToProto(counters.coordinator_cpu);
+  *message.mutable_worker_cpu() = ToProto(counters.worker_cpu);
   message.set_photons_per_second(report.photons_per_second);
   message.set_workers(report.workers);
-  *message.mutable_tally() = ToProto(books.tally);
-  message.set_bytes_sent(books.bytes_sent);
-  message.set_bytes_received(books.bytes_received);
-  message.set_hitpoints_sent(books.hitpoints_sent);
-  message.set_hitpoints_returned(books.hitpoints_returned);
+  *message.mutable_tally() = ToProto(counters.tally);
+  message.set_bytes_sent(counters.bytes_sent);
+  message.set_bytes_received(counters.bytes_received);
+  message.set_hitpoints_sent(counters.hitpoints_sent);
+  message.set_hitpoints_returned(counters.hitpoints_returned);
   return message;
 }
 
@@ -122,7 +123,7 @@ void AddShares(const std::map<std::string, WorkerShare>& workers, v1::Job& messa
   }
 }
 
-v1::Job JobToProto(const Coordinator::Report& report) {
+v1::Job JobToProto(const JobReport& report) {
   const Job& job = report.job;
   const JobState state = job.life.state();
   v1::Job message;
@@ -164,7 +165,7 @@ v1::Job JobToProto(const Coordinator::Report& report) {
     item.set_passes(part.passes);
     *item.mutable_energy() = ToProto(part.tally).energy();
   }
-  for (const PhotonKey& key : job.books.dropped_photons) {
+  for (const PhotonKey& key : job.counters.dropped_photons) {
     v1::PhotonKey& item = *message.add_dropped_photons();
     item.set_pass(key.pass);
     item.set_index(key.index);
@@ -172,8 +173,8 @@ v1::Job JobToProto(const Coordinator::Report& report) {
   return message;
 }
 
-StatusOr<Coordinator::Submission> ReadSubmission(const v1::SubmitRequest& request) {
-  Coordinator::Submission submission;
+StatusOr<Submission> ReadSubmission(const v1::SubmitRequest& request) {
+  Submission submission;
   submission.request_id = request.request_id();
   submission.name = request.name();
   if (submission.name.size() > 1024) {
@@ -188,7 +189,7 @@ StatusOr<Coordinator::Submission> ReadSubmission(const v1::SubmitRequest& reques
   return submission;
 }
 
-grpc::Status Put(const StatusOr<Coordinator::Report>& report, v1::Job* response) {
+grpc::Status Put(const StatusOr<JobReport>& report, v1::Job* response) {
   if (report.ok()) *response = JobToProto(*report);
   return ToGrpc(report.status());
 }
@@ -203,7 +204,7 @@ class JobService::WatchReactor final : public grpc::ServerWriteReactor<v1::Job> 
       : service_(service), job_id_(std::move(job_id)) {}
 
   // Sends what is new, if it is time to.
-  void Look(SteadyTime now) {
+  void SendIfDue(SteadyTime now) {
     const MutexLock lock(mutex_);
     if (is_writing_ || is_finished_) return;
     if (is_cancelled_) {
@@ -214,7 +215,7 @@ class JobService::WatchReactor final : public grpc::ServerWriteReactor<v1::Job> 
       End(absl::OkStatus());
       return;
     }
-    const StatusOr<Coordinator::Report> report = service_.coordinator_.ReportOf(job_id_);
+    const StatusOr<JobReport> report = service_.coordinator_.ReportOf(job_id_);
     if (!report.ok()) {
       End(report.status());
       return;
@@ -292,17 +293,20 @@ grpc::ServerUnaryReactor* JobService::Submit(grpc::CallbackServerContext* contex
                                              const v1::SubmitRequest* request,
                                              v1::SubmitResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const auto submit = [&]() -> Status {
-    LUCERNA_ASSIGN_OR_RETURN(const Coordinator::Submission submission, ReadSubmission(*request));
-    LUCERNA_ASSIGN_OR_RETURN(const Coordinator::Submitted submitted,
-                             coordinator_.Submit(submission));
+  const StillNeeded still_needed = NeededByCaller(context);
+  const auto submit = [this, request, response, still_needed]() -> Status {
+    LUCERNA_ASSIGN_OR_RETURN(const Submission submission, ReadSubmission(*request));
+    LUCERNA_ASSIGN_OR_RETURN(const JobTable::Submitted submitted,
+                             coordinator_.Submit(submission, still_needed));
     response->set_job_id(submitted.job_id);
     for (std::size_t i = 0; i < std::min(submitted.warnings.size(), kMostWarnings); ++i) {
       response->add_warnings(submitted.warnings[i]);
     }
     return absl::OkStatus();
   };
-  reactor->Finish(ToGrpc(submit()));
+  pools_.scenes.Run(still_needed, [reactor, submit](const Status& may_begin) {
+    reactor->Finish(ToGrpc(may_begin.ok() ? submit() : may_begin));
+  });
   return reactor;
 }
 
@@ -330,7 +334,7 @@ grpc::ServerUnaryReactor* JobService::List(grpc::CallbackServerContext* context,
           ? kUsualPage
           : std::min(static_cast<std::size_t>(request->page_size()), kLargestPage);
   const auto [reports, next] = coordinator_.List(count, before);
-  for (const Coordinator::Report& report : reports)
+  for (const JobReport& report : reports)
     *response->add_jobs() = JobToProto(report);
   if (next != 0) response->set_next_page_token(absl::StrCat(next));
   reactor->Finish(grpc::Status::OK);
@@ -374,7 +378,7 @@ grpc::ServerWriteReactor<v1::Job>* JobService::Watch(grpc::CallbackServerContext
   if (is_closed) {
     watch->Close();
   } else {
-    watch->Look(clock_.Steady());
+    watch->SendIfDue(clock_.Steady());
   }
   return watch;
 }
@@ -383,7 +387,7 @@ void JobService::Tick() {
   // Under the lock, so that no watcher is deleted meanwhile: OnDone needs it first.
   const MutexLock lock(mutex_);
   for (WatchReactor* const watch : watches_)
-    watch->Look(clock_.Steady());
+    watch->SendIfDue(clock_.Steady());
 }
 
 void JobService::Close() {

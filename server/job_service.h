@@ -4,7 +4,8 @@
 // here except when a watcher hears of a change: at most ten times a second, at least every five
 // seconds, and at once when the job's state is another.
 //
-// Threads: gRPC calls in from its own pool. Handlers never wait; Submit reads the scene.
+// Threads: gRPC calls in from its own pool. Handlers never wait; Submit reads the scene in the pool
+// for scenes.
 #pragma once
 
 #include <set>
@@ -15,14 +16,15 @@
 #include "render/base/clock.h"
 #include "render/base/mutex.h"
 #include "server/coordinator.h"
+#include "server/work_pool.h"
 
 namespace lucerna {
 
 class JobService final : public v1::JobService::CallbackService {
  public:
-  // Both outlive the service.
-  JobService(Coordinator& coordinator, const Clock& clock)
-      : coordinator_(coordinator), clock_(clock) {}
+  // All outlive the service.
+  JobService(Coordinator& coordinator, WorkPools& pools, const Clock& clock)
+      : coordinator_(coordinator), pools_(pools), clock_(clock) {}
 
   grpc::ServerUnaryReactor* Submit(grpc::CallbackServerContext* context,
                                    const v1::SubmitRequest* request,
@@ -50,6 +52,7 @@ class JobService final : public v1::JobService::CallbackService {
   class WatchReactor;
 
   Coordinator& coordinator_;
+  WorkPools& pools_;
   const Clock& clock_;
   Mutex mutex_;
   bool is_closed_ LUCERNA_GUARDED_BY(mutex_) = false;

@@ -24,6 +24,7 @@
 #include "server/coordinator.h"
 #include "server/image_service.h"
 #include "server/job_service.h"
+#include "server/work_pool.h"
 #include "server/worker_service.h"
 
 namespace lucerna {
@@ -53,10 +54,11 @@ sigset_t BlockEndSignals() {
 int Serve(const Flags& flags) {
   const sigset_t end_signals = BlockEndSignals();
   Coordinator coordinator(flags.coordinator, SystemClock());
-  AssetService assets(coordinator.blobs());
-  JobService jobs(coordinator, SystemClock());
-  ImageService images(coordinator);
-  WorkerService workers(coordinator);
+  WorkPools pools;
+  AssetService assets(coordinator.blobs(), pools);
+  JobService jobs(coordinator, pools, SystemClock());
+  ImageService images(coordinator, pools);
+  WorkerService workers(coordinator, pools);
 
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -88,6 +90,7 @@ int Serve(const Flags& flags) {
   }
   spdlog::info("ending");
   coordinator.Close();
+  pools.Close();
   jobs.Close();
   server->Shutdown(DeadlineIn(std::chrono::seconds(1)));
   server->Wait();

@@ -7,6 +7,7 @@
 #include "render/wire/chunks.h"
 #include "render/wire/grpc_status.h"
 #include "render/wire/messages.h"
+#include "server/rpc_caller.h"
 
 namespace lucerna {
 namespace {
@@ -17,7 +18,7 @@ constexpr std::uint64_t kAccumulationHeadBytes = 4096;
 constexpr std::uint64_t kAccumulationBytesPerHitpoint = 64;
 constexpr int kMostLeases = 64;  // that one worker may speak of
 
-v1::Lease LoanToProto(const Coordinator::Loan& loan) {
+v1::Lease LoanToProto(const Loan& loan) {
   v1::Lease message;
   message.set_lease_id(loan.lease.id);
   message.set_job_id(loan.lease.pass.job_id);
@@ -60,14 +61,17 @@ class SyncReactor final : public grpc::ServerUnaryReactor {
 
 class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchRequest> {
  public:
-  CommitReactor(Coordinator& coordinator, v1::CommitBatchResponse* response)
-      : coordinator_(coordinator), response_(response) {
+  CommitReactor(Coordinator& coordinator, WorkPool& pool,
+                const grpc::CallbackServerContext* context, v1::CommitBatchResponse* response)
+      : coordinator_(coordinator), pool_(pool), context_(context), response_(response) {
     StartRead(&part_);
   }
 
   void OnReadDone(bool ok) override {
     if (!ok) {
-      Finish(ToGrpc(Merge()));
+      pool_.Run(NeededByCaller(context_), [this](const Status& may_begin) {
+        Finish(ToGrpc(may_begin.ok() ? Merge() : may_begin));
+      });
       return;
     }
     if (const Status status = Take(); !status.ok()) {
@@ -126,9 +130,11 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
   }
 
   Coordinator& coordinator_;
+  WorkPool& pool_;
+  const grpc::CallbackServerContext* const context_;
   v1::CommitBatchResponse* const response_;
   v1::CommitBatchRequest part_;
-  Coordinator::Delivery delivery_;
+  Delivery delivery_;
   bool is_superseded_ = false;
   std::optional<ChunkCollector> collector_;
 };
@@ -167,7 +173,7 @@ grpc::ServerUnaryReactor* WorkerService::Sync(grpc::CallbackServerContext* conte
   auto* const reactor = new SyncReactor(coordinator_);
   reactor->set_ticket(
       coordinator_.Sync(request->worker_id(), std::move(report), FromProto(request->wait_at_most()),
-                        [reactor, response](StatusOr<Coordinator::SyncAnswer> answer) {
+                        [reactor, response](StatusOr<SyncAnswer> answer) {
                           if (answer.ok()) {
                             if (answer->loan)
                               *response->mutable_lease() = LoanToProto(*answer->loan);
@@ -182,13 +188,14 @@ grpc::ServerUnaryReactor* WorkerService::Sync(grpc::CallbackServerContext* conte
 grpc::ServerWriteReactor<v1::Chunk>* WorkerService::FetchBlob(
     grpc::CallbackServerContext* /*context*/, const v1::FetchBlobRequest* request) {
   const StatusOr<Digest> digest = Digest::FromBytes(request->digest());
-  if (!digest.ok()) return new BytesReactor(digest.status());
-  return new BytesReactor(coordinator_.Fetch(*digest));
+  auto* const reactor = new BytesReactor;
+  reactor->Send(digest.ok() ? coordinator_.Fetch(*digest) : digest.status());
+  return reactor;
 }
 
 grpc::ServerReadReactor<v1::CommitBatchRequest>* WorkerService::CommitBatch(
-    grpc::CallbackServerContext* /*context*/, v1::CommitBatchResponse* response) {
-  return new CommitReactor(coordinator_, response);
+    grpc::CallbackServerContext* context, v1::CommitBatchResponse* response) {
+  return new CommitReactor(coordinator_, pools_.commits, context, response);
 }
 
 grpc::ServerUnaryReactor* WorkerService::DescribeJob(grpc::CallbackServerContext* context,

@@ -4,7 +4,7 @@
 // promises and which errors it has is said in work.proto. Nothing is decided here.
 //
 // Threads: gRPC calls in from its own pool. A Sync that must wait is parked with the coordinator;
-// CommitBatch unpacks and merges in the thread that brought its last chunk.
+// CommitBatch unpacks and merges in the pool for commits.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -12,13 +12,15 @@
 #include "proto/lucerna/v1/work.grpc.pb.h"
 #include "server/bytes_reactor.h"
 #include "server/coordinator.h"
+#include "server/work_pool.h"
 
 namespace lucerna {
 
 class WorkerService final : public v1::WorkerService::CallbackService {
  public:
-  // The coordinator outlives the service.
-  explicit WorkerService(Coordinator& coordinator) : coordinator_(coordinator) {}
+  // Both outlive the service.
+  WorkerService(Coordinator& coordinator, WorkPools& pools)
+      : coordinator_(coordinator), pools_(pools) {}
 
   grpc::ServerUnaryReactor* Register(grpc::CallbackServerContext* context,
                                      const v1::RegisterRequest* request,
@@ -39,6 +41,7 @@ class WorkerService final : public v1::WorkerService::CallbackService {
 
  private:
   Coordinator& coordinator_;
+  WorkPools& pools_;
 };
 
 }  // namespace lucerna

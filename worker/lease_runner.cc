@@ -11,6 +11,7 @@ namespace lucerna {
 namespace {
 
 constexpr int kCommitTries = 3;
+constexpr std::chrono::milliseconds kBusyPause{200};
 
 bool IsGone(const Status& status) {
   return absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status) ||
@@ -179,6 +180,12 @@ StatusOr<v1::CommitOutcome> LeaseRunner::Commit(const Computed& computed) {
   StatusOr<v1::CommitOutcome> outcome = connection_.Commit(header, bytes);
   // Bytes that were damaged on the way are sent again.
   for (int i = 1; i < kCommitTries && absl::IsDataLoss(outcome.status()); ++i) {
+    outcome = connection_.Commit(header, bytes);
+  }
+  // The coordinator has more commits than it can merge: this worker's batch is no failure. A lease
+  // that is revoked, also by Stop, ends the waiting.
+  while (absl::IsResourceExhausted(outcome.status()) && !computed.held->is_revoked) {
+    std::this_thread::sleep_for(kBusyPause);
     outcome = connection_.Commit(header, bytes);
   }
   return outcome;

@@ -119,14 +119,15 @@ TEST(CoordinatorPartsTest, ThePinnedBytesOfEveryThreadStay) {
       const std::string mine = absl::StrCat("radii of pass ", i, " of ", thread);
       const std::string shared = absl::StrCat("mesh ", i % 7);
       const Digest digest = Sha256(mine);
-      ASSERT_TRUE(blobs.PutPinned(digest, mine).ok());
-      ASSERT_TRUE(blobs.PutPinned(Sha256(shared), shared).ok());
+      StatusOr<BlobPin> pin = blobs.PutPinned(digest, mine, AfterLastPin::kDrop);
+      ASSERT_TRUE(pin.ok());
+      const StatusOr<BlobPin> pin_of_shared = blobs.PutPinned(Sha256(shared), shared);
+      ASSERT_TRUE(pin_of_shared.ok());
       const auto blob = blobs.Get(digest);
       ASSERT_TRUE(blob.ok());
       EXPECT_EQ(**blob, mine);
       ASSERT_TRUE(blobs.Get(Sha256(shared)).ok());
-      blobs.Unpin(Sha256(shared));
-      blobs.UnpinAndDrop(digest);
+      *pin = BlobPin();
       EXPECT_FALSE(blobs.Has(digest));
     }
   });

@@ -36,32 +36,50 @@ TEST(BlobStoreTest, ForgetsTheLeastRecentlyUsedFirst) {
 TEST(BlobStoreTest, KeepsWhatIsPinnedAndSaysWhenItIsFull) {
   BlobStore blobs(10);
   const Digest a = Put(blobs, "aaaa");
-  ASSERT_TRUE(blobs.Pin(a).ok());
-  ASSERT_TRUE(blobs.Pin(a).ok());
+  StatusOr<BlobPin> first = blobs.Pin(a);
+  StatusOr<BlobPin> second = blobs.Pin(a);
+  ASSERT_TRUE(first.ok() && second.ok());
   const Digest b = Sha256("bbbb");
-  ASSERT_TRUE(blobs.PutPinned(b, "bbbb").ok());
+  const StatusOr<BlobPin> of_b = blobs.PutPinned(b, "bbbb");
+  ASSERT_TRUE(of_b.ok());
   EXPECT_TRUE(absl::IsResourceExhausted(blobs.Put(Sha256("cccc"), "cccc")));
-  blobs.Unpin(a);
+  *first = BlobPin();
   EXPECT_TRUE(absl::IsResourceExhausted(blobs.Put(Sha256("cccc"), "cccc"))) << "pinned twice";
-  blobs.Unpin(a);
+  *second = BlobPin();
   EXPECT_TRUE(blobs.Has(a)) << "stays while there is room";
   EXPECT_TRUE(blobs.Put(Sha256("cccc"), "cccc").ok());
   EXPECT_FALSE(blobs.Has(a));
-  EXPECT_TRUE(absl::IsNotFound(blobs.Pin(a)));
+  EXPECT_TRUE(absl::IsNotFound(blobs.Pin(a).status()));
 }
 
 TEST(BlobStoreTest, DropsWithTheLastPin) {
   BlobStore blobs(10);
   const Digest a = Sha256("aaaa");
-  ASSERT_TRUE(blobs.PutPinned(a, "aaaa").ok());
-  ASSERT_TRUE(blobs.PutPinned(a, "aaaa").ok());
-  blobs.UnpinAndDrop(a);
+  StatusOr<BlobPin> first = blobs.PutPinned(a, "aaaa", AfterLastPin::kDrop);
+  StatusOr<BlobPin> second = blobs.PutPinned(a, "aaaa", AfterLastPin::kDrop);
+  ASSERT_TRUE(first.ok() && second.ok());
+  *first = BlobPin();
   EXPECT_TRUE(blobs.Has(a)) << "another pass has the same radii";
   const Blob held = *blobs.Get(a);
-  blobs.UnpinAndDrop(a);
+  *second = BlobPin();
   EXPECT_FALSE(blobs.Has(a));
   EXPECT_EQ(blobs.size_bytes(), 0U);
   EXPECT_EQ(*held, "aaaa") << "what is being sent stays valid";
+}
+
+TEST(BlobStoreTest, APinMovesWithItsOwnerAndEndsOnce) {
+  BlobStore blobs(4);
+  const Digest a = Put(blobs, "aaaa");
+  {
+    PinnedBlobs pins;
+    pins.push_back(*blobs.Pin(a));
+    const PinnedBlobs moved = std::move(pins);
+    pins.clear();
+    EXPECT_EQ(moved[0].digest(), a);
+    EXPECT_TRUE(absl::IsResourceExhausted(blobs.Put(Sha256("bbbb"), "bbbb")));
+  }
+  EXPECT_TRUE(blobs.Put(Sha256("bbbb"), "bbbb").ok());
+  EXPECT_FALSE(blobs.Has(a));
 }
 
 }  // namespace

@@ -12,9 +12,9 @@ SteadyTime At(double s) {
   return SteadyTime(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(s)));
 }
 
-TEST(JobBooksTest, NamesTheFirstDroppedPhotonsWhateverTheOrderOfBatches) {
-  JobBooks forward;
-  JobBooks backward;
+TEST(JobCountersTest, NamesTheFirstDroppedPhotonsWhateverTheOrderOfBatches) {
+  JobCounters forward;
+  JobCounters backward;
   for (std::uint64_t pass = 0; pass < 4; ++pass)
     forward.NameDropped(pass, {10 - pass, 20, 30});
   for (std::uint64_t pass = 4; pass-- > 0;)

@@ -1,0 +1,420 @@
+#include "server/job_table.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace lucerna {
+namespace {
+
+Status UnknownJob(const std::string& job_id) {
+  return absl::NotFoundError(absl::StrCat("there is no job ", job_id));
+}
+
+}  // namespace
+
+JobTable::JobTable(Options options) : options_(std::move(options)), queue_(options_.max_waiting) {}
+
+JobTable::Entries::iterator JobTable::FindLocked(const std::string& job_id) {
+  return std::find_if(entries_.begin(), entries_.end(),
+                      [&](const auto& item) { return item.second.job.id == job_id; });
+}
+
+JobTable::Entries::const_iterator JobTable::FindLocked(const std::string& job_id) const {
+  return std::find_if(entries_.begin(), entries_.end(),
+                      [&](const auto& item) { return item.second.job.id == job_id; });
+}
+
+std::optional<JobTable::Submitted> JobTable::FindRequestLocked(
+    const std::string& request_id) const {
+  for (const auto& [serial, entry] : entries_) {
+    if (entry.request_id == request_id) return Submitted{entry.job.id, entry.job.warnings};
+  }
+  return std::nullopt;
+}
+
+std::optional<JobTable::Submitted> JobTable::FindRequest(const std::string& request_id) const {
+  const MutexLock lock(mutex_);
+  return FindRequestLocked(request_id);
+}
+
+StatusOr<JobTable::Submitted> JobTable::Add(CheckedJob checked, WallTime submitted_at,
+                                            const Moment& moment) {
+  const MutexLock lock(mutex_);
+  // The same request may have come twice at once.
+  if (auto earlier = FindRequestLocked(checked.submission.request_id)) return *std::move(earlier);
+  if (is_closed_) return absl::UnavailableError("the coordinator is shutting down");
+  if (queue_.is_full()) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat(queue_.size(), " jobs are waiting already; try again later"));
+  }
+  const std::uint64_t serial = next_serial_++;
+  Entry& entry = entries_[serial];
+  entry.request_id = std::move(checked.submission.request_id);
+  entry.pinned = std::move(checked.pinned);
+  Job& job = entry.job;
+  job.id = absl::StrCat(options_.instance, "-", serial);
+  job.manifest = std::move(checked.submission.manifest);
+  job.name = checked.submission.name.empty() ? job.manifest.main_path : checked.submission.name;
+  job.scene_digest = job.manifest.SceneDigest();
+  job.settings = std::move(checked.settings);
+  job.warnings = std::move(checked.warnings);
+  job.needs = std::move(checked.needs);
+  job.submitted_at = submitted_at;
+  job.life = JobLife(moment.now);
+  job.reference = checked.submission.reference;
+  // A job that must wait is read again later, so that waiting jobs cost no memory.
+  if (queue_.is_idle()) entry.scene = std::move(checked.scene);
+  queue_.Push(serial);
+  job_waits_.NotifyAll();
+  return Submitted{job.id, job.warnings};
+}
+
+// Requests
+// ---------------------------------------------------------------------------------------------
+
+JobReport JobTable::MakeReport(const Entry& entry, const Moment& moment) const {
+  JobReport report;
+  report.job = entry.job;
+  report.version = entry.version;
+  const JobLife& life = entry.job.life;
+  report.running = life.Running(moment.now);
+  if (life.state() == JobState::kRunning) {
+    report.photons_per_second =
+        entry.job.counters.rate.PerSecond(moment.now - report.running, moment.now);
+    report.job.counters.coordinator_cpu = moment.cpu - entry.cpu_at_start;
+  } else if (life.has_ended() && report.running > Duration::zero()) {
+    report.photons_per_second =
+        static_cast<double>(entry.job.counters.photons) / Seconds(report.running);
+  }
+  return report;
+}
+
+StatusOr<JobReport> JobTable::ReportOf(const std::string& job_id, const Moment& moment) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  return MakeReport(found->second, moment);
+}
+
+std::pair<std::vector<JobReport>, std::uint64_t> JobTable::List(std::size_t count,
+                                                                std::uint64_t before,
+                                                                const Moment& moment) const {
+  const MutexLock lock(mutex_);
+  std::pair<std::vector<JobReport>, std::uint64_t> page;
+  auto end = before == 0 ? entries_.end() : entries_.lower_bound(before);
+  while (end != entries_.begin() && page.first.size() < count) {
+    --end;
+    page.first.push_back(MakeReport(end->second, moment));
+  }
+  page.second = end == entries_.begin() ? 0 : end->first;
+  return page;
+}
+
+void JobTable::End(std::uint64_t serial, Entry& entry, const Status& why, const Moment& moment,
+                   Dropped& dropped) {
+  JobLife& life = entry.job.life;
+  const JobState before = life.state();
+  if (absl::IsCancelled(why) ? !life.Cancel(moment.now)
+                             : !life.Fail(std::string(why.message()), moment.now)) {
+    return;
+  }
+  if (before == JobState::kRunning) {
+    entry.job.counters.coordinator_cpu = moment.cpu - entry.cpu_at_start;
+  }
+  ++entry.version;
+  dropped.scenes.push_back(std::exchange(entry.scene, std::nullopt));
+  if (entry.runner) {
+    entry.runner->Stop(why);
+    dropped.runners.push_back(std::exchange(entry.runner, nullptr));
+  }
+  // One whose turn it is keeps its files until the turn has ended.
+  if (before == JobState::kQueued) {
+    queue_.Remove(serial);
+    if (queue_.current() != serial) dropped.pinned.push_back(std::exchange(entry.pinned, {}));
+  }
+}
+
+StatusOr<JobReport> JobTable::Cancel(const std::string& job_id, const Moment& moment) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  End(found->first, found->second, absl::CancelledError("the user cancelled the job"), moment,
+      dropped);
+  JobReport report = MakeReport(found->second, moment);
+  Retain(dropped);
+  return report;
+}
+
+void JobTable::Fail(const std::string& job_id, const Status& why, const Moment& moment) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  End(found->first, found->second, why, moment, dropped);
+  Retain(dropped);
+}
+
+StatusOr<JobReport> JobTable::Stop(const std::string& job_id, const Moment& moment) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  const Entry& entry = found->second;
+  if (!entry.job.life.has_ended()) {
+    if (!entry.runner) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "job ", job_id, " has not begun to run and has no image; cancel it instead"));
+    }
+    entry.runner->Finish();
+  }
+  return MakeReport(entry, moment);
+}
+
+StatusOr<JobReport> JobTable::Extend(const std::string& job_id, const RenderOverrides& until,
+                                     const Moment& moment) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  Entry& entry = found->second;
+  Job& job = entry.job;
+  RenderSettings settings = job.settings;
+  LUCERNA_RETURN_IF_ERROR(SetStopCriteria(until, settings));
+  if (job.life.has_ended()) {
+    if (job.life.state() != JobState::kSucceeded) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("job ", job_id, " was cancelled or failed; submit it again"));
+    }
+    if (!entry.runner || is_closed_) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          "job ", job_id,
+          " ended so long ago that its photons are not kept any more; submit it again"));
+    }
+    job.life.Extend();
+    entry.runner->Reopen(settings);
+    // The image grows from now on.
+    dropped.images.push_back(std::exchange(entry.image, nullptr));
+    queue_.Push(found->first);
+    job_waits_.NotifyAll();
+  } else if (entry.runner) {
+    entry.runner->SetEnd(settings);
+  }
+  job.settings = std::move(settings);
+  ++entry.version;
+  return MakeReport(entry, moment);
+}
+
+JobTable::ImageSource JobTable::MakeImageSource(const Entry& entry, const Moment& moment) const {
+  return {entry.image, entry.runner, entry.job, entry.job.life.Running(moment.now),
+          moment.cpu - entry.cpu_at_start};
+}
+
+StatusOr<JobTable::ImageSource> JobTable::FindImage(const std::string& job_id,
+                                                    const Moment& moment) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  const Entry& entry = found->second;
+  if (!entry.image && entry.job.life.has_ended()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("job ", job_id,
+                     entry.job.life.state() == JobState::kSucceeded
+                         ? " ended so long ago that its image is not kept any more; submit it again"
+                         : " was cancelled or failed and has no image"));
+  }
+  if (!entry.image && !entry.runner) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("job ", job_id, " has not begun to run; ask again later"));
+  }
+  return MakeImageSource(entry, moment);
+}
+
+std::optional<Job> JobTable::Find(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return std::nullopt;
+  return found->second.job;
+}
+
+// Workers
+// ---------------------------------------------------------------------------------------------
+
+std::optional<Loan> JobTable::MakeLoan(BatchLease lease, int workers) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(lease.pass.job_id);
+  if (found == entries_.end() || !found->second.runner) return std::nullopt;
+  const auto blobs = found->second.runner->BlobsOf(lease.pass.pass);
+  if (!blobs) return std::nullopt;
+  Job& job = found->second.job;
+  job.most_workers = std::max(job.most_workers, workers);
+  return Loan{std::move(lease), job.manifest, job.settings, job.needs, *blobs};
+}
+
+void JobTable::CountMerged(const Delivery& delivery, const Accumulation& accumulation,
+                           const std::string& worker_name, SteadyTime now) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(delivery.pass.job_id);
+  if (found == entries_.end()) return;
+  CountCommit(found->second.job, delivery, accumulation, worker_name, now);
+  ++found->second.version;
+  if (found->second.runner) found->second.runner->Wake();
+}
+
+void JobTable::CountFetched(const Digest& digest, std::uint64_t size_bytes) {
+  const MutexLock lock(mutex_);
+  if (!queue_.current()) return;
+  const auto found = entries_.find(*queue_.current());
+  if (found == entries_.end() || !found->second.runner) return;
+  if (const auto hitpoints = found->second.runner->HitpointsIn(digest)) {
+    CountFetch(found->second.job, size_bytes, *hitpoints);
+  }
+}
+
+// The thread of jobs
+// ---------------------------------------------------------------------------------------------
+
+std::optional<JobTable::Turn> JobTable::WaitForTurn() {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  if (const auto last = queue_.current()) {
+    queue_.End();
+    const auto found = entries_.find(*last);
+    if (found != entries_.end() && !found->second.runner) {
+      dropped.pinned.push_back(std::exchange(found->second.pinned, {}));
+    }
+  }
+  while (!queue_.has_waiting() && !is_closed_)
+    job_waits_.Wait(mutex_);
+  if (is_closed_) return std::nullopt;
+  Entry& entry = entries_.at(queue_.Begin());
+  // A job that ends while it waits leaves the queue in the same step.
+  LUCERNA_CHECK(entry.job.life.Prepare());
+  ++entry.version;
+  return Turn{entry.job.id,    entry.job.manifest,  entry.job.settings,
+              entry.job.needs, entry.job.reference, std::exchange(entry.scene, std::nullopt),
+              entry.runner};
+}
+
+Status JobTable::CheckStillNeeded(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (is_closed_ || found == entries_.end() || found->second.job.life.has_ended()) {
+    return absl::CancelledError("the job has ended");
+  }
+  return absl::OkStatus();
+}
+
+bool JobTable::Attach(const std::string& job_id, std::shared_ptr<RunningJob> runner) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (is_closed_ || found == entries_.end() || found->second.job.life.has_ended()) return false;
+  // The end may have been changed since the turn began.
+  runner->SetEnd(found->second.job.settings);
+  found->second.runner = std::move(runner);
+  return true;
+}
+
+std::optional<JobTable::ImageSource> JobTable::DescribeRun(const std::string& job_id,
+                                                           const Moment& moment) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return std::nullopt;
+  return MakeImageSource(found->second, moment);
+}
+
+bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,
+                       const Moment& moment) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return false;
+  Entry& entry = found->second;
+  if (!entry.job.life.Succeed(reason, moment.now)) return false;
+  entry.job.counters.coordinator_cpu = moment.cpu - entry.cpu_at_start;
+  entry.image = std::move(image);
+  ++entry.version;
+  Retain(dropped);
+  return true;
+}
+
+void JobTable::OnRunning(const std::string& job_id, const Moment& moment) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  found->second.job.life.Run(moment.now);
+  found->second.cpu_at_start = moment.cpu - found->second.job.counters.coordinator_cpu;
+  ++found->second.version;
+}
+
+void JobTable::OnWarning(const std::string& job_id, std::string warning) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  found->second.job.warnings.push_back(std::move(warning));
+  ++found->second.version;
+}
+
+void JobTable::OnPassMerged(const std::string& job_id, std::int64_t passes,
+                            const BatchTally& of_pass) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  found->second.job.counters.passes = passes;
+  found->second.job.pass_record.Add(of_pass);
+  ++found->second.version;
+}
+
+void JobTable::OnErrorEstimate(const std::string& job_id, ErrorSample sample,
+                               std::vector<LightFinding> lights, const Moment& moment) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  Entry& entry = found->second;
+  sample.running = entry.job.life.Running(moment.now);
+  sample.cpu = moment.cpu - entry.cpu_at_start + entry.job.counters.worker_cpu;
+  entry.job.convergence.push_back(std::move(sample));
+  entry.job.lights = std::move(lights);
+  ++entry.version;
+}
+
+void JobTable::Close(const Status& why) {
+  const MutexLock lock(mutex_);
+  is_closed_ = true;
+  if (const auto current = queue_.current()) {
+    const auto found = entries_.find(*current);
+    if (found != entries_.end() && found->second.runner) found->second.runner->Stop(why);
+  }
+  job_waits_.NotifyAll();
+}
+
+void JobTable::Retain(Dropped& dropped) {
+  std::vector<std::uint64_t> serials;
+  std::vector<EndedJob> ended;
+  for (auto item = entries_.rbegin(); item != entries_.rend(); ++item) {
+    const Entry& entry = item->second;
+    if (!entry.job.life.has_ended()) continue;
+    const RenderSettings& settings = entry.job.settings;
+    serials.push_back(item->first);
+    ended.push_back(
+        {.has_photons = entry.runner != nullptr,
+         .pixels = std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()},
+         .has_image = entry.image != nullptr,
+         .image_bytes = entry.image ? entry.image->size() : 0});
+  }
+  const std::vector<KeptOfJob> kept = DecideRetention(ended, options_.retention);
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    const auto found = entries_.find(serials[i]);
+    Entry& entry = found->second;
+    if (!kept[i].photons) {
+      dropped.runners.push_back(std::exchange(entry.runner, nullptr));
+      // The one that has just ended is still in use by its thread; its files go with its turn.
+      if (queue_.current() != found->first) {
+        dropped.pinned.push_back(std::exchange(entry.pinned, {}));
+      }
+    }
+    if (!kept[i].image) dropped.images.push_back(std::exchange(entry.image, nullptr));
+    if (!kept[i].record) dropped.entries.push_back(entries_.extract(found));
+  }
+}
+
+}  // namespace lucerna

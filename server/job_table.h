@@ -1,0 +1,189 @@
+// All jobs of a coordinator: which there are, where each stands, and which one runs.
+//
+// Every request is one step under one lock, so a job and its runner cannot come apart: whoever ends
+// a job's life takes its runner in the same step and stops it, and a job that has ended is given no
+// runner. One job runs at a time, the others wait in order. Moments come in as arguments.
+//
+// Ended jobs are remembered, with the images of the newest; the very newest also with all their
+// photons, so that they can go on (server/job_retention.h).
+//
+// Threads: any. Only WaitForTurn waits. What is dropped is destroyed outside the lock.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "render/base/clock.h"
+#include "render/base/mutex.h"
+#include "render/base/status.h"
+#include "render/scene/scene.h"
+#include "server/blob_store.h"
+#include "server/commit_accounting.h"
+#include "server/job.h"
+#include "server/job_intake.h"
+#include "server/job_queue.h"
+#include "server/job_retention.h"
+#include "server/running_job.h"
+
+namespace lucerna {
+
+// Now, and the processor time of this process so far.
+struct Moment {
+  SteadyTime now;
+  Duration cpu{};
+};
+
+// A job as it is now, for people.
+struct JobReport {
+  Job job;
+  int workers = 0;  // for the coordinator to fill in
+  Duration running{};
+  double photons_per_second = 0;
+  std::uint64_t version = 0;  // grows with every change
+};
+
+class JobTable {
+ public:
+  struct Options {
+    std::string instance;  // in front of every job's id
+    std::size_t max_waiting = 256;
+    RetentionLimits retention;
+  };
+  explicit JobTable(Options options);
+
+  struct Submitted {
+    std::string job_id;  // empty when only validated
+    std::vector<std::string> warnings;
+  };
+  // The job of an earlier submission with this request id.
+  [[nodiscard]] std::optional<Submitted> FindRequest(const std::string& request_id) const;
+  // The new job, or that of the same request id, if there is one by now.
+  // Errors: RESOURCE_EXHAUSTED when too many jobs wait, UNAVAILABLE after Close.
+  [[nodiscard]] StatusOr<Submitted> Add(CheckedJob job, WallTime submitted_at,
+                                        const Moment& moment);
+
+  // Errors of all requests: NOT_FOUND.
+
+  [[nodiscard]] StatusOr<JobReport> ReportOf(const std::string& job_id, const Moment& moment) const;
+  // At most `count` jobs older than `before` (0: from the newest), newest first, and where the
+  // next page begins (0: nowhere).
+  [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(std::size_t count,
+                                                                      std::uint64_t before,
+                                                                      const Moment& moment) const;
+  [[nodiscard]] StatusOr<JobReport> Cancel(const std::string& job_id, const Moment& moment);
+  // Ends a job well, with the image as it is. FAILED_PRECONDITION when it has not begun to run.
+  [[nodiscard]] StatusOr<JobReport> Stop(const std::string& job_id, const Moment& moment);
+  // Gives a job that has not ended, or that succeeded, the stop criteria of `until`.
+  // INVALID_ARGUMENT (SetStopCriteria), FAILED_PRECONDITION when the job was cancelled, failed, or
+  // its photons are not kept any more.
+  [[nodiscard]] StatusOr<JobReport> Extend(const std::string& job_id, const RenderOverrides& until,
+                                           const Moment& moment);
+  // Ends a job as failed. Nothing when there is no such job, or it has ended.
+  void Fail(const std::string& job_id, const Status& why, const Moment& moment);
+
+  // The image of a job, or what it can be made from.
+  struct ImageSource {
+    Blob image;  // when the job has ended; else:
+    std::shared_ptr<RunningJob> runner;
+    Job job;
+    Duration running{};
+    Duration cpu{};
+  };
+  // FAILED_PRECONDITION when there is no image (yet).
+  [[nodiscard]] StatusOr<ImageSource> FindImage(const std::string& job_id,
+                                                const Moment& moment) const;
+  // The job's record. Absent when there is no such job.
+  [[nodiscard]] std::optional<Job> Find(const std::string& job_id) const;
+
+  // Workers ------------------------------------------------------------------------------------
+
+  // What a worker must know of a batch; absent when its pass has ended. `workers` are connected.
+  [[nodiscard]] std::optional<Loan> MakeLoan(BatchLease lease, int workers);
+  // Counts a batch that was merged, and wakes the job's runner.
+  void CountMerged(const Delivery& delivery, const Accumulation& accumulation,
+                   const std::string& worker_name, SteadyTime now);
+  // Counts bytes that a worker fetched, if they belong to an open pass.
+  void CountFetched(const Digest& digest, std::uint64_t size_bytes);
+
+  // The thread of jobs -------------------------------------------------------------------------
+
+  // A job whose turn it is.
+  struct Turn {
+    std::string job_id;
+    SceneManifest manifest;
+    RenderSettings settings;
+    SceneNeeds needs;
+    std::optional<Digest> reference;
+    std::optional<Scene> scene;          // absent: to be read again
+    std::shared_ptr<RunningJob> runner;  // of a job that goes on
+  };
+  // Ends the turn before, waits for a job and begins its turn. Absent after Close.
+  [[nodiscard]] std::optional<Turn> WaitForTurn();
+  // Whether the job of this turn is still to be rendered: OK or CANCELLED.
+  [[nodiscard]] Status CheckStillNeeded(const std::string& job_id) const;
+  // Gives a job its runner. False when it has ended meanwhile, or after Close: it must not run.
+  [[nodiscard]] bool Attach(const std::string& job_id, std::shared_ptr<RunningJob> runner);
+  // The job as it is now with what it has cost; absent when it has been dropped.
+  [[nodiscard]] std::optional<ImageSource> DescribeRun(const std::string& job_id,
+                                                       const Moment& moment) const;
+  // False when the job has ended meanwhile.
+  bool Succeed(const std::string& job_id, StopReason reason, Blob image, const Moment& moment);
+
+  // What the runner reports.
+  void OnRunning(const std::string& job_id, const Moment& moment);
+  void OnWarning(const std::string& job_id, std::string warning);
+  void OnPassMerged(const std::string& job_id, std::int64_t passes, const BatchTally& of_pass);
+  void OnErrorEstimate(const std::string& job_id, ErrorSample sample,
+                       std::vector<LightFinding> lights, const Moment& moment);
+
+  // Stops the job that runs, with `why`, and begins no other.
+  void Close(const Status& why);
+
+ private:
+  struct Entry {
+    std::string request_id;
+    Job job;
+    std::optional<Scene> scene;  // kept from Add when it will be rendered at once
+    std::shared_ptr<RunningJob> runner;
+    Blob image;
+    std::uint64_t version = 0;
+    Duration cpu_at_start{};  // less what earlier runs took
+    PinnedBlobs pinned;       // while the job may need its files
+  };
+  using Entries = std::map<std::uint64_t, Entry>;  // by serial number
+  // What was taken from the table under the lock, to be destroyed after it.
+  struct Dropped {
+    std::vector<std::shared_ptr<RunningJob>> runners;
+    std::vector<Blob> images;
+    std::vector<PinnedBlobs> pinned;
+    std::vector<std::optional<Scene>> scenes;
+    std::vector<Entries::node_type> entries;
+  };
+
+  Entries::iterator FindLocked(const std::string& job_id) LUCERNA_REQUIRES(mutex_);
+  Entries::const_iterator FindLocked(const std::string& job_id) const LUCERNA_REQUIRES(mutex_);
+  std::optional<Submitted> FindRequestLocked(const std::string& request_id) const
+      LUCERNA_REQUIRES(mutex_);
+  JobReport MakeReport(const Entry& entry, const Moment& moment) const LUCERNA_REQUIRES(mutex_);
+  ImageSource MakeImageSource(const Entry& entry, const Moment& moment) const
+      LUCERNA_REQUIRES(mutex_);
+  // Ends a job's life and stops its runner. Nothing when it has ended.
+  void End(std::uint64_t serial, Entry& entry, const Status& why, const Moment& moment,
+           Dropped& dropped) LUCERNA_REQUIRES(mutex_);
+  void Retain(Dropped& dropped) LUCERNA_REQUIRES(mutex_);
+
+  const Options options_;
+  mutable Mutex mutex_;
+  Condition job_waits_;
+  bool is_closed_ LUCERNA_GUARDED_BY(mutex_) = false;
+  std::uint64_t next_serial_ LUCERNA_GUARDED_BY(mutex_) = 1;
+  Entries entries_ LUCERNA_GUARDED_BY(mutex_);
+  JobQueue queue_ LUCERNA_GUARDED_BY(mutex_);
+};
+
+}  // namespace lucerna
