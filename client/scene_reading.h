@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 

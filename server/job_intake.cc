@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "server/memory_need.h"
 
 namespace lucerna {
@@ -14,7 +14,7 @@ StatusOr<JobIntake::ReadResult> JobIntake::ReadScene(const SceneManifest& manife
     LUCERNA_ASSIGN_OR_RETURN(const Blob blob, blobs_.Get(digest));
     return *blob;
   });
-  ParsedScene parsed = ParsePbrt(files, manifest.main_path);
+  ParsedScene parsed = lucerna::ReadScene(files, manifest.main_path);
   // Before the errors of a scene whose files were not all read.
   LUCERNA_RETURN_IF_ERROR(still_needed());
   LUCERNA_RETURN_IF_ERROR(parsed.ToStatus());
