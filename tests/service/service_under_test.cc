@@ -1,5 +1,6 @@
 #include "tests/service/service_under_test.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "gtest/gtest.h"
@@ -278,11 +279,10 @@ Answer<v1::CommitBatchResponse> IdleHandsWorker::Commit(const v1::Lease& lease) 
   Accumulation accumulation;
   accumulation.evidence.resize(EvidenceColumns(Evidence::kNone));
   accumulation.tally.photons = lease.last_photon() - lease.first_photon();
+  // Without a block the pass has ended, and the answer comes before the bytes.
   const StatusOr<HitpointBlock> block =
       DecodeHitpointBlock(Fetch(lease.block_digest()).message, kMostHitpoints);
-  // The pass has ended.
-  if (!block.ok()) return {grpc::Status(grpc::StatusCode::NOT_FOUND, "no block"), {}};
-  const std::string bytes = EncodeAccumulation(accumulation, block->size());
+  const std::string bytes = EncodeAccumulation(accumulation, block.ok() ? block->size() : 0);
   v1::CommitBatchRequest part;
   v1::CommitBatchRequest::Header& header = *part.mutable_header();
   header.set_worker_id(id_);
@@ -298,6 +298,17 @@ Answer<v1::CommitBatchResponse> IdleHandsWorker::Commit(const v1::Lease& lease) 
   const auto writer = stub_->CommitBatch(&context, &answer.message);
   answer.status = Send(*writer, part, bytes);
   return answer;
+}
+
+grpc::Status IdleHandsWorker::GiveUp(const v1::Lease& lease, const std::string& reason) {
+  Deadline context;
+  v1::SyncRequest request;
+  request.set_worker_id(id_);
+  v1::SyncRequest::Failure& failure = *request.add_failures();
+  failure.set_lease_id(lease.lease_id());
+  failure.set_reason(reason);
+  v1::SyncResponse response;
+  return stub_->Sync(&context, request, &response);
 }
 
 Answer<std::string> IdleHandsWorker::Fetch(const std::string& digest) {
@@ -334,8 +345,7 @@ WorkerThread::WorkerThread(const ServiceUnderTest& service) : worker_(service) {
       if (!answer.ok()) return;
       if (answer.message.has_lease()) {
         const Answer<v1::CommitBatchResponse> committed = worker_.Commit(answer.message.lease());
-        EXPECT_TRUE(committed.ok() || committed.code() == grpc::StatusCode::NOT_FOUND)
-            << committed.status.error_message();
+        EXPECT_TRUE(committed.ok()) << committed.status.error_message();
       } else {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
       }

@@ -134,8 +134,9 @@ class IdleHandsWorker {
   [[nodiscard]] const std::string& id() const { return id_; }
   Answer<v1::SyncResponse> Sync(bool wants_lease, Duration wait, std::vector<std::string> held = {},
                                 grpc::ClientContext* context = nullptr);
-  // NOT_FOUND when the lease's pass has ended.
   Answer<v1::CommitBatchResponse> Commit(const v1::Lease& lease);
+  // Hands a lease back as a failure.
+  grpc::Status GiveUp(const v1::Lease& lease, const std::string& reason);
   // The bytes of a blob.
   Answer<std::string> Fetch(const std::string& digest);
   // Asks until there is a lease; absent after many answers without one.

@@ -1,4 +1,5 @@
-// A job is stopped with its image, goes on to a new end, and is stopped again, in any of its states.
+// A job is stopped with its image, goes on to a new end, and is stopped again, in any of its
+// states.
 #include <string>
 
 #include "gtest/gtest.h"

@@ -1,0 +1,251 @@
+// Whatever comes to a job in whatever order, its thread never waits for a runner that nobody stops.
+//
+// The table with runners that render nothing. The orders of a cancel and a runner are tried one by
+// one, then many threads ask for everything at once.
+#include "server/job_table.h"
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/math/rng.h"
+
+namespace lucerna {
+namespace {
+
+Moment At(int s) {
+  return {SteadyTime(std::chrono::seconds(s)), std::chrono::seconds(s)};
+}
+
+// Runs until it is stopped, finished, or has an end of 0 passes.
+class FakeRunner final : public RunningJob {
+ public:
+  StatusOr<RenderResult> Run() {
+    const MutexLock lock(mutex_);
+    while (!why_stopped_ && !is_finished_ && passes_ > 1)
+      changed_.Wait(mutex_);
+    if (why_stopped_) return *why_stopped_;
+    RenderResult result;
+    result.reason = is_finished_ ? StopReason::kUser : StopReason::kPasses;
+    return result;
+  }
+  StatusOr<RenderResult> Resume() override { return Run(); }
+  void SetEnd(const RenderSettings& settings) override {
+    const MutexLock lock(mutex_);
+    passes_ = settings.passes;
+    changed_.NotifyAll();
+  }
+  void Reopen(const RenderSettings& settings) override {
+    const MutexLock lock(mutex_);
+    is_finished_ = false;
+    passes_ = settings.passes;
+  }
+  void Finish() override {
+    const MutexLock lock(mutex_);
+    is_finished_ = true;
+    changed_.NotifyAll();
+  }
+  void Stop(Status why) override {
+    const MutexLock lock(mutex_);
+    if (!why_stopped_) why_stopped_ = std::move(why);
+    changed_.NotifyAll();
+  }
+  void Wake() override {}
+  std::optional<PassBlobs> BlobsOf(std::uint64_t) const override { return PassBlobs{}; }
+  std::optional<std::size_t> HitpointsIn(const Digest&) const override { return 0; }
+  StatusOr<RenderResult> ImageSoFar() const override { return RenderResult{}; }
+
+  [[nodiscard]] bool is_stopped() const {
+    const MutexLock lock(mutex_);
+    return why_stopped_.has_value();
+  }
+
+ private:
+  mutable Mutex mutex_;
+  Condition changed_;
+  std::int64_t passes_ = 0;
+  bool is_finished_ = false;
+  std::optional<Status> why_stopped_;
+};
+
+CheckedJob JobOf(const std::string& request_id, std::int64_t passes = 1000) {
+  CheckedJob job;
+  job.submission.request_id = request_id;
+  job.submission.manifest.main_path = "scene.pbrt";
+  job.settings.passes = passes;
+  job.settings.width = job.settings.height = job.settings.crop_x1 = job.settings.crop_y1 = 8;
+  return job;
+}
+
+JobTable::Options SmallTable() {
+  return {.instance = "t", .max_waiting = 4, .retention = {}};
+}
+
+std::string Added(JobTable& table, const std::string& request_id) {
+  const auto submitted = table.Add(JobOf(request_id), WallTime(), At(0));
+  EXPECT_TRUE(submitted.ok()) << submitted.status();
+  return submitted.ok() ? submitted->job_id : std::string();
+}
+
+JobState StateOf(const JobTable& table, const std::string& job) {
+  return table.Find(job)->life.state();
+}
+
+// The thread of jobs, as the coordinator has it.
+void RunTurns(JobTable& table) {
+  while (auto turn = table.WaitForTurn()) {
+    StatusOr<RenderResult> result = absl::CancelledError("the job has ended");
+    if (turn->runner) {
+      table.OnRunning(turn->job_id, At(1));
+      result = turn->runner->Resume();
+    } else {
+      const auto runner = std::make_shared<FakeRunner>();
+      if (table.Attach(turn->job_id, runner)) {
+        table.OnRunning(turn->job_id, At(1));
+        result = runner->Run();
+      }
+    }
+    if (result.ok()) {
+      const Blob image = std::make_shared<const std::string>("image");
+      table.Succeed(turn->job_id, result->reason, image, At(2));
+    } else {
+      table.Fail(turn->job_id, result.status(), At(2));
+    }
+  }
+}
+
+TEST(JobTableTest, ACancelBeforeTheRunnerKeepsItFromRunning) {
+  JobTable table(SmallTable());
+  const std::string job = Added(table, "a");
+  ASSERT_TRUE(table.WaitForTurn());
+  EXPECT_EQ(table.Cancel(job, At(1))->job.life.state(), JobState::kCancelled);
+  EXPECT_TRUE(absl::IsCancelled(table.CheckStillNeeded(job)));
+  EXPECT_FALSE(table.Attach(job, std::make_shared<FakeRunner>()));
+}
+
+// Between the runner and its first step: the stop has to reach it all the same.
+TEST(JobTableTest, ACancelAfterTheRunnerStopsItAlsoBeforeItRuns) {
+  JobTable table(SmallTable());
+  const std::string job = Added(table, "a");
+  ASSERT_TRUE(table.WaitForTurn());
+  const auto runner = std::make_shared<FakeRunner>();
+  ASSERT_TRUE(table.Attach(job, runner));
+  EXPECT_EQ(StateOf(table, job), JobState::kPreparing);
+  EXPECT_TRUE(table.Cancel(job, At(1)).ok());
+  EXPECT_TRUE(runner->is_stopped());
+  EXPECT_EQ(runner.use_count(), 1) << "the table lets go of it";
+}
+
+TEST(JobTableTest, ClosingStopsTheRunnerAndGivesNoOther) {
+  JobTable table(SmallTable());
+  const std::string job = Added(table, "a");
+  const std::string next = Added(table, "b");
+  ASSERT_TRUE(table.WaitForTurn());
+  const auto runner = std::make_shared<FakeRunner>();
+  ASSERT_TRUE(table.Attach(job, runner));
+  table.Close(absl::UnavailableError("closing"));
+  EXPECT_TRUE(runner->is_stopped());
+  EXPECT_FALSE(table.WaitForTurn());
+  EXPECT_FALSE(table.Attach(next, std::make_shared<FakeRunner>()));
+  EXPECT_TRUE(absl::IsUnavailable(table.Add(JobOf("c"), WallTime(), At(0)).status()));
+}
+
+TEST(JobTableTest, JobsTakeTurnsInOrderAndTooManyAreRefused) {
+  JobTable table(SmallTable());
+  const std::vector<std::string> jobs = {Added(table, "a"), Added(table, "b"), Added(table, "c"),
+                                         Added(table, "d")};
+  EXPECT_TRUE(absl::IsResourceExhausted(table.Add(JobOf("e"), WallTime(), At(0)).status()));
+  EXPECT_EQ(table.Add(JobOf("b"), WallTime(), At(0))->job_id, jobs[1]) << "the same request";
+  EXPECT_TRUE(table.Cancel(jobs[1], At(0)).ok());
+  const auto first = table.WaitForTurn();
+  EXPECT_EQ(first->job_id, jobs[0]);
+  EXPECT_TRUE(first->scene.has_value()) << "read already when it came";
+  const auto second = table.WaitForTurn();
+  EXPECT_EQ(second->job_id, jobs[2]);
+  EXPECT_FALSE(second->scene.has_value());
+}
+
+TEST(JobTableTest, GivesFilesBackWhenAJobCannotNeedThemAnyMore) {
+  BlobStore blobs(4);
+  const Digest file = Sha256("file");
+  ASSERT_TRUE(blobs.Put(file, "file").ok());
+  const auto is_pinned = [&] { return !blobs.Put(Sha256("mine"), "mine").ok(); };
+  {
+    JobTable table(SmallTable());
+    CheckedJob job = JobOf("a");
+    job.pinned.push_back(*blobs.Pin(file));
+    const std::string id = table.Add(std::move(job), WallTime(), At(0))->job_id;
+    ASSERT_TRUE(table.WaitForTurn());
+    EXPECT_TRUE(table.Cancel(id, At(1)).ok());
+    EXPECT_TRUE(is_pinned()) << "its thread may still read";
+    table.Close(absl::UnavailableError("closing"));
+    EXPECT_FALSE(table.WaitForTurn());
+    EXPECT_FALSE(is_pinned());
+  }
+}
+
+// Threads ask for everything, of all jobs and in an order of their own; the jobs that are left end
+// when they are cancelled, and the thread of jobs comes back.
+TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
+  for (std::uint64_t key = 0; key < 8; ++key) {
+    JobTable table({.instance = "t", .max_waiting = 16, .retention = {.jobs = 20, .pixels = 640}});
+    std::thread turns([&] { RunTurns(table); });
+    std::vector<std::thread> callers;
+    for (std::uint64_t c = 0; c < 4; ++c) {
+      callers.emplace_back([&table, key, c] {
+        KeyedRng rng(CombineKeys(key, c));
+        for (int i = 0; i < 400; ++i) {
+          const std::string job = absl::StrCat("t-", 1 + rng.Bits() % 60);
+          RenderOverrides until;
+          until.passes = 1 + static_cast<std::int64_t>(rng.Bits() % 2) * 1000;
+          const std::string request = absl::StrCat(c, " ", i);
+          Delivery delivery;
+          delivery.pass.job_id = job;
+          switch (rng.Bits() % 8) {
+            case 0:
+              (void)table.Add(JobOf(request, *until.passes), WallTime(), At(0));
+              break;
+            case 1:
+            case 2:
+              (void)table.Cancel(job, At(1));
+              break;
+            case 3:
+              (void)table.Stop(job, At(1));
+              break;
+            case 4:
+              (void)table.Extend(job, until, At(1));
+              break;
+            case 5:
+              (void)table.FindImage(job, At(1));
+              break;
+            case 6:
+              (void)table.List(10, 0, At(1));
+              (void)table.MakeLoan({}, 1);
+              break;
+            default:
+              table.CountMerged(delivery, Accumulation(), "w", At(1).now);
+              table.CountFetched(Digest(), 1);
+          }
+        }
+      });
+    }
+    for (std::thread& caller : callers)
+      caller.join();
+    const auto [reports, next] = table.List(1000, 0, At(3));
+    for (const JobReport& report : reports)
+      (void)table.Cancel(report.job.id, At(3));
+    // Its turn comes and it runs to its end: the thread of jobs is not stuck with one before it.
+    const std::string last = table.Add(JobOf("last", 1), WallTime(), At(4))->job_id;
+    while (StateOf(table, last) != JobState::kSucceeded)
+      std::this_thread::yield();
+    table.Close(absl::UnavailableError("closing"));
+    turns.join();
+  }
+}
+
+}  // namespace
+}  // namespace lucerna
