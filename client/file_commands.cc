@@ -34,7 +34,7 @@ Status Validate(const std::string& scene_path, bool strict, const Voice& voice) 
   LUCERNA_RETURN_IF_ERROR(CheckNamesFile(scene_path));
   const ScenePath place = SplitScenePath(scene_path);
   DirectoryFiles files(place.folder);
-  const ParsedScene parsed = ParsePbrt(files, place.main);
+  const ParsedScene parsed = ReadScene(files, place.main);
   std::array<std::size_t, 3> counts{};
   for (const Diagnostic& diagnostic : parsed.diagnostics) {
     ++counts[static_cast<std::size_t>(diagnostic.severity)];

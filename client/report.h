@@ -14,8 +14,8 @@
 #include "render/base/digest.h"
 #include "render/estimate/expected_cost.h"
 #include "render/film/image_metrics.h"
+#include "render/formats/diagnostic.h"
 #include "render/scene/needs.h"
-#include "render/scene/pbrt_parser.h"
 
 namespace lucerna {
 

@@ -32,7 +32,7 @@ StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
   LUCERNA_RETURN_IF_ERROR(CheckNamesFile(path));
   const ScenePath place = SplitScenePath(path);
   DirectoryFiles files(place.folder);
-  ParsedScene parsed = ParsePbrt(files, place.main);
+  ParsedScene parsed = ReadScene(files, place.main);
   std::size_t errors = 0;
   for (const Diagnostic& diagnostic : parsed.diagnostics) {
     const bool is_error = diagnostic.severity == Diagnostic::Severity::kError;

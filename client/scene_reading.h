@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/render_flags.h"
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "render/scene/scene_files.h"
 
 namespace lucerna {

@@ -8,8 +8,8 @@
 #include <spdlog/spdlog.h>
 
 #include "render/base/memory.h"
+#include "render/formats/read_scene.h"
 #include "render/image/exr_file.h"
-#include "render/scene/pbrt_parser.h"
 #include "server/memory_need.h"
 #include "server/reference_image.h"
 
@@ -97,7 +97,7 @@ StatusOr<std::pair<Scene, std::vector<std::string>>> Coordinator::ReadScene(
     LUCERNA_ASSIGN_OR_RETURN(const Blob blob, blobs_.Get(digest));
     return *blob;
   });
-  ParsedScene parsed = ParsePbrt(files, manifest.main_path);
+  ParsedScene parsed = lucerna::ReadScene(files, manifest.main_path);
   LUCERNA_RETURN_IF_ERROR(parsed.ToStatus());
   std::vector<std::string> warnings;
   for (const Diagnostic& diagnostic : parsed.diagnostics)

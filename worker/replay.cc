@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "render/scene/pbrt_parser.h"
 #include "render/transport/working_space.h"
 #include "render/wire/messages.h"
 #include "worker/connection.h"

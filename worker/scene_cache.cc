@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "render/wire/block_codec.h"
 
 namespace lucerna {
@@ -38,7 +38,7 @@ StatusOr<Scene> FetchScene(const SceneManifest& manifest, const FetchBytes& fetc
     fetched.Update(bytes.status());
     return bytes;
   });
-  ParsedScene parsed = ParsePbrt(files, manifest.main_path);
+  ParsedScene parsed = ReadScene(files, manifest.main_path);
   LUCERNA_RETURN_IF_ERROR(fetched);
   LUCERNA_RETURN_IF_ERROR(parsed.ToStatus());
   return std::move(parsed.scene);

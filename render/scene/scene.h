@@ -8,7 +8,7 @@
 // Units: lengths in `unit` scene units, which are taken as metres; angles in radians unless a name
 // says _deg; radiance [W·m⁻²·sr⁻¹] in linear Rec. 709.
 //
-// Invariants, which the parser guarantees and everything above relies on
+// Invariants, which the readers guarantee and everything above relies on
 //   S1  Every position, normal, texture coordinate, transform, colour and pixel is finite.
 //   S2  Every index is in range: triangle -> vertex, shape -> material, shape -> area light,
 //       material -> texture; a texture is made of textures before it. A texture that needs a
@@ -236,7 +236,7 @@ struct IntegratorSettings {
 
 struct Scene {
   // A length here times this is one of the file: a power of two, 1 for scenes of common sizes
-  // (scene_unit.h). Of what is below, the integrator's settings are the file's.
+  // (formats/scene_unit.h). Of what is below, the integrator's settings are the file's.
   double unit = 1;
   std::vector<TriangleMesh> meshes;
   std::vector<Sphere> spheres;

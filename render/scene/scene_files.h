@@ -1,6 +1,6 @@
 // Where does a scene's text come from?
 //
-// A scene is the closure of its main file over Include, Import, meshes and pictures. The parser
+// A scene is the closure of its main file over Include, Import, meshes and pictures. A reader
 // reads all of them through SceneFiles, by logical path, so the same parse runs on the user's disk
 // and on bytes that came over the wire; and what it read is the scene's manifest.
 //

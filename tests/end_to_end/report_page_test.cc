@@ -14,7 +14,7 @@
 #include "gtest/gtest.h"
 
 #include "render/base/files.h"
-#include "render/scene/image_file.h"
+#include "render/formats/image_file.h"
 #include "tests/support/converging_job.h"
 #include "tests/support/process.h"
 

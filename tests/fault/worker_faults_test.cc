@@ -17,8 +17,8 @@
 #include "proto/lucerna/v1/jobs.grpc.pb.h"
 #include "proto/lucerna/v1/work.grpc.pb.h"
 #include "render/base/files.h"
+#include "render/formats/read_scene.h"
 #include "render/image/exr_file.h"
-#include "render/scene/pbrt_parser.h"
 #include "render/scene/scene_files.h"
 #include "render/wire/channel.h"
 #include "render/wire/chunks.h"
@@ -63,7 +63,7 @@ class Coordinator {
   // Uploads and submits a scene of ours; the job's id.
   std::string Submit(const std::string& scene, int passes, std::int64_t photons) {
     DirectoryFiles files(kScenes);
-    const ParsedScene parsed = ParsePbrt(files, scene);
+    const ParsedScene parsed = ReadScene(files, scene);
     EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
     const SceneManifest manifest = files.Manifest(scene);
     const auto assets = v1::AssetService::NewStub(channel_);

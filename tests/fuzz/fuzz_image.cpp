@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "render/scene/image_file.h"
+#include "render/formats/image_file.h"
 #include "tests/fuzz/sound_scene.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "tests/fuzz/sound_scene.h"
 #include "tests/support/memory_files.h"
 
@@ -15,7 +15,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t siz
   limits.max_files = 50;
   limits.max_total_bytes = 1 << 20;
   limits.max_triangles = 10'000;
-  const lucerna::ParsedScene parsed = lucerna::ParsePbrt(files, "fuzz.pbrt", limits);
+  const lucerna::ParsedScene parsed = lucerna::ReadScene(files, "fuzz.pbrt", limits);
   LUCERNA_CHECK(!parsed.ok() || lucerna::WhatIsUnsound(parsed.scene).empty());
   return 0;
 }

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "render/scene/ply_file.h"
+#include "render/formats/ply_file.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   const auto mesh = lucerna::ParsePly({reinterpret_cast<const char*>(bytes), size});

@@ -8,9 +8,9 @@
 #include "gtest/gtest.h"
 
 #include "render/base/files.h"
-#include "render/scene/image_file.h"
-#include "render/scene/pbrt_parser.h"
-#include "render/scene/ply_file.h"
+#include "render/formats/image_file.h"
+#include "render/formats/ply_file.h"
+#include "render/formats/read_scene.h"
 #include "tests/fuzz/mutation.h"
 #include "tests/fuzz/sound_scene.h"
 #include "tests/support/memory_files.h"
@@ -57,7 +57,7 @@ ParsedScene ParseBytes(const std::string& bytes) {
   limits.max_picture_bytes = 1 << 20;
   limits.max_total_bytes = 1 << 20;
   limits.max_triangles = 10'000;
-  return ParsePbrt(files, "fuzz.pbrt", limits);
+  return ReadScene(files, "fuzz.pbrt", limits);
 }
 
 void ExpectSoundOrRefused(const ParsedScene& parsed) {

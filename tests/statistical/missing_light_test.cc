@@ -6,7 +6,7 @@
 
 #include "render/base/files.h"
 #include "render/film/image_metrics.h"
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "tests/support/local_render.h"
 #include "tests/support/memory_files.h"
 
@@ -27,7 +27,7 @@ Scene WithHole(const std::string& low, const std::string& high, const std::strin
   text = Replaced(Replaced(text, "0.4985", low), "0.5015", high);
   text = Replaced(text, "[3e6 3e6 3e6]", "[" + intensity + " " + intensity + " " + intensity + "]");
   MemoryFiles files({{"room.pbrt", text}});
-  ParsedScene parsed = ParsePbrt(files, "room.pbrt");
+  ParsedScene parsed = ReadScene(files, "room.pbrt");
   EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
   return std::move(parsed.scene);
 }

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "render/estimate/evidence.h"
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "render/scene/scene_files.h"
 
 namespace lucerna {
@@ -66,7 +66,7 @@ Scene LoadScene(const std::string& path) {
       path.starts_with('/') ? path : std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/" + path;
   const std::size_t slash = full.rfind('/');
   DirectoryFiles files(full.substr(0, slash));
-  ParsedScene parsed = ParsePbrt(files, full.substr(slash + 1));
+  ParsedScene parsed = ReadScene(files, full.substr(slash + 1));
   if (!parsed.ok()) Die(parsed.ToStatus());
   return std::move(parsed.scene);
 }

@@ -17,7 +17,8 @@ BELOW = {
     "render/base": [],
     "render/math": ["render/base"],
     "render/image": ["render/base"],
-    "render/scene": ["render/base", "render/math", "render/image"],
+    "render/scene": ["render/base", "render/math"],
+    "render/formats": ["render/base", "render/math", "render/image", "render/scene"],
     "render/frequency": ["render/base", "render/math"],
 }
 LINE = ["render/geometry", "render/transport", "render/estimate", "render/film", "render/wire"]
@@ -35,12 +36,12 @@ BELOW["render/wire"].append("proto")
 OWNERS = {
     r"embree3/": ["render/geometry/"],
     r"(Imf|Imath|Iex|OpenEXR/)": ["render/image/exr_file"],
-    r"stb": ["render/film/png_file", "render/scene/image_file"],
+    r"stb": ["render/film/png_file", "render/formats/image_file"],
     r"(google/protobuf|grpcpp|grpc)/": ["render/wire/", "server/", "worker/", "client/"],
     r"zstd\.h": ["render/wire/"],
     r"openssl/": ["render/base/"],
     r"tbb/": ["render/base/parallel"],
-    r"zlib\.h": ["render/scene/", "render/image/"],
+    r"zlib\.h": ["render/formats/", "render/image/"],
     r"sqlite3\.h": ["server/"],
     r"random>?$": [],
 }
@@ -114,6 +115,8 @@ PLANTED = [
     ("render/transport/a.cc", "#include <embree3/rtcore.h>"),
     ("render/film/film.cc", "#include <ImfOutputFile.h>"),
     ("render/image/a.cc", '#include "render/scene/scene.h"'),
+    ("render/scene/a.cc", '#include "render/formats/read_scene.h"'),
+    ("render/transport/a.cc", '#include "render/formats/pbrt/lights.h"'),
     ("render/scene/a.cc", "#include <google/protobuf/message.h>"),
     ("worker/a.cc", "#include <tbb/parallel_for.h>"),
     ("render/math/a.cc", "#include <random>"),

@@ -1,5 +1,5 @@
 // Every format gives its pixels, and no file is believed beyond its bytes.
-#include "render/scene/image_file.h"
+#include "render/formats/image_file.h"
 
 #include <cstring>
 #include <map>

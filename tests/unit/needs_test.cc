@@ -6,7 +6,7 @@
 
 #include "gtest/gtest.h"
 
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "tests/support/memory_files.h"
 #include "tests/support/test_scenes.h"
 
@@ -26,7 +26,7 @@ Scene Parsed(const std::string& before_world, const std::string& world) {
                           "WorldBegin\nLightSource \"point\" \"point3 from\" [0 2 4]\n"
                           "Material \"diffuse\" \"rgb reflectance\" [.5 .5 .5]\n" +
                           kFloor + world}});
-  ParsedScene parsed = ParsePbrt(files, "scene.pbrt");
+  ParsedScene parsed = ReadScene(files, "scene.pbrt");
   EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
   return parsed.scene;
 }

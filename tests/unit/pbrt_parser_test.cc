@@ -1,7 +1,5 @@
 // What a pbrt-v4 text means: defaults, units, scopes and orientation are pbrt-v4's, and everything
 // wrong is said at once, each at its place.
-#include "render/scene/pbrt_parser.h"
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -12,6 +10,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "render/formats/read_scene.h"
 #include "tests/support/memory_files.h"
 
 namespace lucerna {
@@ -28,7 +27,7 @@ ParsedScene Parse(const std::string& text, std::map<std::string, std::string> ot
                   const SceneLimits& limits = {}) {
   others["s.pbrt"] = text;
   MemoryFiles files(std::move(others));
-  return ParsePbrt(files, "s.pbrt", limits);
+  return ReadScene(files, "s.pbrt", limits);
 }
 
 // A scene whose world is `world`; it must be right.
@@ -689,7 +688,7 @@ TEST(PbrtParserTest, BinaryFilesAndMissingFiles) {
   EXPECT_EQ(Said(std::string("PNG\0\0", 5)),
             "s.pbrt: error: this is not a pbrt text file: it holds binary data\n");
   MemoryFiles none({});
-  EXPECT_EQ(ParsePbrt(none, "s.pbrt").ToStatus().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(ReadScene(none, "s.pbrt").ToStatus().code(), absl::StatusCode::kInvalidArgument);
 }
 
 // A triangle is kept as long as its area is a normal float, whatever the product of its edges

@@ -7,7 +7,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "render/scene/render_settings.h"
 
 namespace lucerna {
@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 ParsedScene ParseAt(const std::string& path) {
   const std::filesystem::path whole(path);
   DirectoryFiles files(whole.parent_path().string());
-  return ParsePbrt(files, whole.filename().string());
+  return ReadScene(files, whole.filename().string());
 }
 
 ParsedScene ParseOwn(const std::string& name) {
@@ -102,7 +102,7 @@ TEST(OwnScenesTest, AllAreReadWithoutErrorsOrWarnings) {
 // What a texture or a map names belongs to the scene, and is sent with it.
 TEST(OwnScenesTest, PicturesAreOfTheScenesFiles) {
   DirectoryFiles files(std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes");
-  const Scene scene = ParsePbrt(files, "textured.pbrt").scene;
+  const Scene scene = ReadScene(files, "textured.pbrt").scene;
   const SceneManifest manifest = files.Manifest("textured.pbrt");
   EXPECT_EQ(manifest.entries.size(), 3U);
   EXPECT_TRUE(manifest.entries.contains("textures/bricks.png"));

@@ -5,7 +5,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "render/scene/tokenizer.h"
+#include "render/formats/pbrt/tokenizer.h"
 
 namespace lucerna {
 namespace {
@@ -24,8 +24,8 @@ Read ReadAll(const std::string& text) {
   Read read;
   for (Token token = tokenizer.Next(); token.kind != Token::Kind::kEnd; token = tokenizer.Next()) {
     const char kind = "EWS[]"[static_cast<int>(token.kind)];
-    read.tokens.push_back(std::to_string(token.place.line) + ":" +
-                          std::to_string(token.place.column) + " " + kind + " " +
+    read.tokens.push_back(std::to_string(token.location.line) + ":" +
+                          std::to_string(token.location.column) + " " + kind + " " +
                           std::string(token.text));
   }
   read.diagnostics = diagnostics.Take();

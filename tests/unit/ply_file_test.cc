@@ -1,6 +1,6 @@
 // One mesh reads the same from ASCII, little-endian and big-endian PLY, gzipped or not; and bytes
 // that are not a sound mesh are refused with a reason, before memory is taken for them.
-#include "render/scene/ply_file.h"
+#include "render/formats/ply_file.h"
 
 #include <bit>
 #include <cstdint>

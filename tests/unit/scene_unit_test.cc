@@ -1,6 +1,6 @@
 // A scene of any size must reach the floors above the parser with lengths whose fourth powers are
 // floats, exactly as its file has them but for a power of two.
-#include "render/scene/scene_unit.h"
+#include "render/formats/scene_unit.h"
 
 #include <cmath>
 #include <string>
@@ -8,7 +8,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_extent.h"
 #include "tests/support/memory_files.h"
@@ -20,7 +20,7 @@ using testing::HasSubstr;
 
 ParsedScene Parse(const std::string& text) {
   MemoryFiles files({{"scene.pbrt", text}});
-  return ParsePbrt(files, "scene.pbrt");
+  return ReadScene(files, "scene.pbrt");
 }
 
 // A triangle, a sphere and a point light, all lengths times `scale`, moved by `offset` of them.

@@ -4,7 +4,7 @@
 
 #include "gtest/gtest.h"
 
-#include "render/scene/pbrt_parser.h"
+#include "render/formats/read_scene.h"
 #include "tests/support/memory_files.h"
 
 namespace lucerna {
@@ -12,7 +12,7 @@ namespace {
 
 ParsedScene Parse(const CheckRoom& room) {
   MemoryFiles files({{"room.pbrt", TextOf(room)}});
-  return ParsePbrt(files, "room.pbrt");
+  return ReadScene(files, "room.pbrt");
 }
 
 TEST(SelfcheckScenesTest, EveryObjectAndLightParsesWithoutAWord) {

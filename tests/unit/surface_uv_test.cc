@@ -7,8 +7,8 @@
 
 #include "gtest/gtest.h"
 
+#include "render/formats/read_scene.h"
 #include "render/math/warp.h"
-#include "render/scene/pbrt_parser.h"
 #include "tests/support/memory_files.h"
 
 namespace lucerna {
@@ -17,7 +17,7 @@ namespace {
 struct Surfaces {
   explicit Surfaces(const std::string& world) {
     MemoryFiles files({{"s.pbrt", "Camera \"perspective\" WorldBegin " + world}});
-    ParsedScene parsed = ParsePbrt(files, "s.pbrt");
+    ParsedScene parsed = ReadScene(files, "s.pbrt");
     EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
     scene = std::move(parsed.scene);
     intersector = Intersector::Create(scene).value();

@@ -1,0 +1,46 @@
+#include "render/formats/asset_reader.h"
+
+#include <utility>
+
+#include "render/base/text.h"
+#include "render/formats/ply_file.h"
+
+namespace lucerna {
+
+StatusOr<std::string> AssetReader::ReadBytes(const std::string& path) {
+  std::string normal_path = path;
+  while (normal_path.starts_with("./"))
+    normal_path.erase(0, 2);
+  LUCERNA_ASSIGN_OR_RETURN(std::string bytes, files_.Read(normal_path));
+  bytes_read_ += bytes.size();
+  if (!is_over_limit()) return bytes;
+  return absl::ResourceExhaustedError(
+      Concat("the scene reads more than ", limits_.max_total_bytes, " bytes"));
+}
+
+StatusOr<TriangleMesh> AssetReader::ReadMesh(const std::string& path) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path));
+  StatusOr<TriangleMesh> mesh = ParsePly(bytes);
+  if (mesh.ok()) return mesh;
+  return absl::InvalidArgumentError(Concat(path, ": ", mesh.status().message()));
+}
+
+StatusOr<std::shared_ptr<const Picture>> AssetReader::ReadPicture(const std::string& path,
+                                                                  const PixelEncoding& encoding) {
+  const auto [first, last] = pictures_.equal_range(path);
+  for (auto known = first; known != last; ++known) {
+    if (known->second.encoding == encoding) return known->second.picture;
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path));
+  StatusOr<Picture> picture =
+      lucerna::ReadPicture(bytes, path, encoding, limits_.max_picture_bytes - picture_bytes_);
+  if (!picture.ok()) {
+    return Status(picture.status().code(), Concat(path, ": ", picture.status().message()));
+  }
+  picture_bytes_ += SizeBytes(*picture);
+  auto shared = std::make_shared<const Picture>(*std::move(picture));
+  pictures_.emplace(path, KnownPicture{encoding, shared});
+  return shared;
+}
+
+}  // namespace lucerna

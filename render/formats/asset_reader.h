@@ -1,0 +1,48 @@
+// The files that a scene brings, read within its limits: texts, meshes, pictures.
+//
+// Every reader of a format reads through one AssetReader, so that limits hold for the scene as a
+// whole. Every reading counts, also of a file that was read before; a picture is in memory once.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "render/base/status.h"
+#include "render/formats/image_file.h"
+#include "render/scene/scene.h"
+#include "render/scene/scene_files.h"
+
+namespace lucerna {
+
+class AssetReader {
+ public:
+  // `files` outlives the reader.
+  AssetReader(SceneFiles& files, const SceneLimits& limits) : files_(files), limits_(limits) {}
+
+  // The bytes of a file. Errors: what `files` says, RESOURCE_EXHAUSTED beyond the limits.
+  [[nodiscard]] StatusOr<std::string> ReadBytes(const std::string& path);
+  // Errors: those of ReadBytes and of the file's format, with the path.
+  [[nodiscard]] StatusOr<TriangleMesh> ReadMesh(const std::string& path);
+  [[nodiscard]] StatusOr<std::shared_ptr<const Picture>> ReadPicture(const std::string& path,
+                                                                     const PixelEncoding& encoding);
+
+  [[nodiscard]] const SceneLimits& limits() const { return limits_; }
+  // True once the files together have more bytes than the limits allow: reading must end.
+  [[nodiscard]] bool is_over_limit() const { return bytes_read_ > limits_.max_total_bytes; }
+
+ private:
+  struct KnownPicture {
+    PixelEncoding encoding;
+    std::shared_ptr<const Picture> picture;
+  };
+
+  SceneFiles& files_;
+  const SceneLimits limits_;
+  std::uint64_t bytes_read_ = 0;
+  std::uint64_t picture_bytes_ = 0;
+  std::multimap<std::string, KnownPicture> pictures_;  // by path
+};
+
+}  // namespace lucerna

@@ -1,0 +1,93 @@
+#include "render/formats/finish_scene.h"
+
+#include <algorithm>
+#include <cfloat>
+#include <cmath>
+#include <utility>
+
+#include "render/base/text.h"
+#include "render/formats/degenerate_triangles.h"
+#include "render/formats/scene_unit.h"
+#include "render/scene/scene_extent.h"
+
+namespace lucerna {
+namespace {
+
+// A scene farther than so many times its size from the origin gets a warning. Up to there images
+// agree within their noise (docs/numerics.md).
+constexpr double kFarSizes = 1e4;
+
+void WarnOfMissingUvs(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
+  for (const TriangleMesh& mesh : scene.meshes) {
+    const Material& material = scene.materials[static_cast<std::size_t>(mesh.traits.material)];
+    if (mesh.uvs.empty() && material.texture != kNoTexture) {
+      diagnostics.Warning(whole,
+                          "a mesh with a texture has no uv: every triangle shows half of it");
+    }
+  }
+}
+
+void WarnOfDistance(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
+  const SceneExtent extent = ExtentOf(scene);
+  if (!(extent.size > 0 && extent.from_origin > kFarSizes * extent.size)) return;
+  const double sizes = extent.from_origin / extent.size;
+  diagnostics.Warning(
+      whole, Concat("the scene lies ", std::round(sizes),
+                    " times its own size from the origin, where single precision keeps 1/",
+                    std::round(std::max(1.0, 0x1p24 / sizes)), " of that size; move it nearer"));
+}
+
+void WarnOfEmptiness(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
+  if (scene.meshes.empty() && scene.spheres.empty() && scene.disks.empty()) {
+    diagnostics.Warning(whole, "the scene has no shapes");
+  }
+  if (scene.area_lights.empty() && scene.point_lights.empty() && scene.spot_lights.empty() &&
+      scene.distant_lights.empty() && scene.infinite_lights.empty()) {
+    diagnostics.Warning(whole, "the scene has no light: the image will be black");
+  }
+}
+
+// Of triangles that have no area in the scene's own unit.
+void DropFlatTriangles(UnfinishedScene& unfinished, const SourceLocation& whole,
+                       Diagnostics& diagnostics) {
+  Scene& scene = unfinished.scene;
+  std::size_t dropped = 0;
+  for (TriangleMesh& mesh : scene.meshes)
+    dropped += DropTriangles(mesh, FLT_MIN);
+  for (const EmittingMesh& light : unfinished.emitting_meshes) {
+    if (scene.meshes[light.mesh].indices.empty())
+      WarnOfLightWithoutArea(light.location, light.subject, diagnostics);
+  }
+  std::erase_if(scene.meshes, [](const TriangleMesh& mesh) { return mesh.indices.empty(); });
+  if (dropped > 0) {
+    diagnostics.Note(whole, Concat(dropped, dropped == 1 ? " triangle has" : " triangles have",
+                                   " no area in single precision and are dropped"));
+  }
+}
+
+}  // namespace
+
+void WarnOfLightWithoutArea(const SourceLocation& location, const std::string& subject,
+                            Diagnostics& diagnostics) {
+  diagnostics.Warning(location, Concat(subject, " has no area: it emits no light"));
+}
+
+Scene FinishScene(UnfinishedScene unfinished, const std::string& main_file,
+                  Diagnostics& diagnostics) {
+  Scene& scene = unfinished.scene;
+  if (diagnostics.has_error()) return std::move(scene);
+  const SourceLocation whole = {&main_file, 0, 0};
+  WarnOfMissingUvs(scene, whole, diagnostics);
+  WarnOfDistance(scene, whole, diagnostics);
+  for (std::string& message : unfinished.missing)
+    diagnostics.Error(whole, std::move(message));
+  if (!unfinished.has_camera) diagnostics.Error(whole, "the scene has no camera");
+  WarnOfEmptiness(scene, whole, diagnostics);
+  if (const Status chosen = ChooseUnit(scene); !chosen.ok()) {
+    diagnostics.Error(whole, std::string(chosen.message()));
+  }
+  DropFlatTriangles(unfinished, whole, diagnostics);
+  return std::move(scene);
+}
+
+}  // namespace lucerna

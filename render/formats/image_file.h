@@ -1,0 +1,40 @@
+// Reads pictures from image files.
+//
+// Every size is checked against the limits before anything of that size is allocated, and no file
+// gives pixels that it does not hold: what is cut off is refused.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "render/base/status.h"
+#include "render/scene/texture.h"
+
+namespace lucerna {
+
+inline constexpr std::uint64_t kMaxPicturePixels = std::uint64_t{1} << 28;
+
+// What the whole numbers in a file stand for.
+struct PixelEncoding {
+  enum class Kind : std::uint8_t { kSrgb, kLinear, kGamma };
+
+  Kind kind = Kind::kSrgb;
+  double gamma = 1;  // kGamma
+
+  // [0, 1] -> [0, 1].
+  [[nodiscard]] double Decode(double coded) const;
+  bool operator==(const PixelEncoding&) const = default;
+};
+
+// Reads PNG, JPEG, TGA, Radiance HDR, PFM or EXR, by the end of `path`. `encoding` is that of PNG;
+// JPEG and TGA are sRGB, the others linear. Negative numbers become 0; alpha is dropped.
+// Errors: INVALID_ARGUMENT with what is wrong; RESOURCE_EXHAUSTED for more than
+// kMaxPicturePixels, or more than `max_size_bytes` of pixels in memory.
+[[nodiscard]] StatusOr<Picture> ReadPicture(std::string_view bytes, std::string_view path,
+                                            const PixelEncoding& encoding,
+                                            std::uint64_t max_size_bytes);
+
+// The size that the pixels take in memory.
+[[nodiscard]] std::uint64_t SizeBytes(const Picture& picture);
+
+}  // namespace lucerna

@@ -1,0 +1,50 @@
+// Reads the arguments of one directive: numbers, strings and parameters.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render/formats/diagnostic.h"
+#include "render/formats/pbrt/parameter_list.h"
+#include "render/formats/pbrt/tokenizer.h"
+
+namespace lucerna {
+
+// Functions that return bool return false when the arguments break off at something unexpected,
+// which is then reported; the text is to be skipped to the next directive.
+class Arguments {
+ public:
+  // `directive`, `tokens` and `diagnostics` outlive the arguments.
+  Arguments(std::string_view directive, SourceLocation location, Tokenizer& tokens,
+            Diagnostics& diagnostics)
+      : directive_(directive), location_(location), tokens_(tokens), diagnostics_(diagnostics) {}
+
+  [[nodiscard]] std::string_view directive() const { return directive_; }
+  [[nodiscard]] const SourceLocation& location() const { return location_; }
+  [[nodiscard]] Tokenizer& tokens() { return tokens_; }
+
+  // As many numbers as the span has, with or without brackets.
+  bool ReadNumbers(std::span<double> numbers);
+  // A string, which messages call `what`.
+  bool ReadString(std::string_view what, std::string& out);
+  // All parameters there are.
+  bool ReadParameters(std::vector<Parameter>& parameters);
+  // The type in quotes that follows the directive, then its parameters.
+  bool ReadTyped(std::string& type, std::vector<Parameter>& parameters);
+
+  // Reports an error of the directive.
+  void Error(std::string message);
+
+ private:
+  bool ReadParameter(std::vector<Parameter>& parameters);
+  bool ReadValue(Parameter& parameter, bool is_known_type);
+
+  const std::string_view directive_;
+  const SourceLocation location_;
+  Tokenizer& tokens_;
+  Diagnostics& diagnostics_;
+};
+
+}  // namespace lucerna

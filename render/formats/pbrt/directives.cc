@@ -1,0 +1,351 @@
+#include "render/formats/pbrt/directives.h"
+
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "render/base/text.h"
+
+namespace lucerna {
+
+std::span<const DirectiveReader::Directive> DirectiveReader::Directives() {
+  using P = DirectiveReader;
+  static constexpr Directive kDirectives[] = {
+      {"Accelerator", &P::OnAccelerator, Phase::kBeforeWorld},
+      {"ActiveTransform", &P::OnActiveTransform, Phase::kAnywhere},
+      {"AreaLightSource", &P::OnAreaLightSource, Phase::kInWorld},
+      {"Attribute", &P::OnAttribute, Phase::kAnywhere},
+      {"AttributeBegin", &P::OnAttributeBegin, Phase::kInWorld},
+      {"AttributeEnd", &P::OnAttributeEnd, Phase::kInWorld},
+      {"Camera", &P::OnCamera, Phase::kBeforeWorld},
+      {"ColorSpace", &P::OnColorSpace, Phase::kAnywhere},
+      {"ConcatTransform", &P::OnConcatTransform, Phase::kAnywhere},
+      {"CoordSysTransform", &P::OnCoordSysTransform, Phase::kAnywhere},
+      {"CoordinateSystem", &P::OnCoordinateSystem, Phase::kAnywhere},
+      {"Film", &P::OnFilm, Phase::kBeforeWorld},
+      {"Identity", &P::OnIdentity, Phase::kAnywhere},
+      {"Import", &P::OnImport, Phase::kInWorld},
+      {"Include", &P::OnInclude, Phase::kAnywhere},
+      {"Integrator", &P::OnIntegrator, Phase::kBeforeWorld},
+      {"LightSource", &P::OnLightSource, Phase::kInWorld},
+      {"LookAt", &P::OnLookAt, Phase::kAnywhere},
+      {"MakeNamedMaterial", &P::OnMakeNamedMaterial, Phase::kInWorld},
+      {"MakeNamedMedium", &P::OnMakeNamedMedium, Phase::kAnywhere},
+      {"Material", &P::OnMaterial, Phase::kInWorld},
+      {"MediumInterface", &P::OnMediumInterface, Phase::kAnywhere},
+      {"NamedMaterial", &P::OnNamedMaterial, Phase::kInWorld},
+      {"ObjectBegin", &P::OnObjectBegin, Phase::kInWorld},
+      {"ObjectEnd", &P::OnObjectEnd, Phase::kInWorld},
+      {"ObjectInstance", &P::OnObjectInstance, Phase::kInWorld},
+      {"Option", &P::OnOption, Phase::kAnywhere},
+      {"PixelFilter", &P::OnPixelFilter, Phase::kBeforeWorld},
+      {"ReverseOrientation", &P::OnReverseOrientation, Phase::kInWorld},
+      {"Rotate", &P::OnRotate, Phase::kAnywhere},
+      {"Sampler", &P::OnSampler, Phase::kBeforeWorld},
+      {"Scale", &P::OnScale, Phase::kAnywhere},
+      {"Shape", &P::OnShape, Phase::kInWorld},
+      {"Texture", &P::OnTexture, Phase::kInWorld},
+      {"Transform", &P::OnTransform, Phase::kAnywhere},
+      {"TransformBegin", &P::OnTransformBegin, Phase::kInWorld},
+      {"TransformEnd", &P::OnTransformEnd, Phase::kInWorld},
+      {"TransformTimes", &P::OnTransformTimes, Phase::kAnywhere},
+      {"Translate", &P::OnTranslate, Phase::kAnywhere},
+      {"WorldBegin", &P::OnWorldBegin, Phase::kBeforeWorld},
+      // pbrt-v3 and older.
+      {"Renderer", &P::OnPbrtV3, Phase::kAnywhere},
+      {"SurfaceIntegrator", &P::OnPbrtV3, Phase::kAnywhere},
+      {"Volume", &P::OnPbrtV3, Phase::kAnywhere},
+      {"VolumeIntegrator", &P::OnPbrtV3, Phase::kAnywhere},
+      {"WorldEnd", &P::OnPbrtV3, Phase::kAnywhere},
+  };
+  return kDirectives;
+}
+
+const DirectiveReader::Directive* DirectiveReader::FindDirective(std::string_view name) {
+  for (const Directive& directive : Directives()) {
+    if (directive.name == name) return &directive;
+  }
+  return nullptr;
+}
+
+bool IsDirective(std::string_view word) {
+  return DirectiveReader::FindDirective(word) != nullptr;
+}
+
+UnfinishedScene DirectiveReader::Read(const std::string& main_path, std::string_view text) {
+  scene_.materials.emplace_back();  // of shapes that name none
+  ++texts_read_;
+  ReadText(main_path, text);
+  if (IsStopped()) return std::move(unfinished_);
+  ReportUnclosedScopes();
+  ReportNamedMaterials();
+  scene_.film.exposure *= exposure_time_s_;
+  if (!in_world_) unfinished_.missing.emplace_back("the scene has no WorldBegin");
+  return std::move(unfinished_);
+}
+
+// ---- texts
+
+void DirectiveReader::IncludeFile(const std::string& path, const SourceLocation& location) {
+  const SceneLimits& limits = assets_.limits();
+  if (depth_ >= limits.max_include_depth) {
+    diagnostics_.Error(location, Concat("files include one another more than ",
+                                        limits.max_include_depth, " deep"));
+    return;
+  }
+  if (++texts_read_ > limits.max_files) {
+    diagnostics_.Error(location, Concat("more than ", limits.max_files, " files are included"));
+    is_stopped_ = true;
+    return;
+  }
+  const StatusOr<std::string> text = assets_.ReadBytes(path);
+  if (text.ok()) {
+    ReadText(path, *text);
+  } else {
+    diagnostics_.Error(location, std::string(text.status().message()));
+  }
+}
+
+void DirectiveReader::ReadText(const std::string& path, std::string_view text) {
+  const std::string* name = diagnostics_.NameOfFile(path);
+  if (text.find('\0') != std::string_view::npos) {
+    diagnostics_.Error({name, 0, 0}, "this is not a pbrt text file: it holds binary data");
+    return;
+  }
+  Tokenizer tokens(name, text, diagnostics_);
+  ++depth_;
+  ReadDirectives(tokens);
+  --depth_;
+}
+
+void DirectiveReader::ReadDirectives(Tokenizer& tokens) {
+  while (!IsStopped()) {
+    const Token token = tokens.Next();
+    if (token.kind == Token::Kind::kEnd) return;
+    const Directive* directive =
+        token.kind == Token::Kind::kWord ? FindDirective(token.text) : nullptr;
+    if (directive == nullptr) {
+      SayUnknown(token);
+      SkipToDirective(tokens);
+      continue;
+    }
+    Arguments arguments(directive->name, token.location, tokens, diagnostics_);
+    if (directive->phase == Phase::kBeforeWorld && in_world_) {
+      arguments.Error(Concat(directive->name, " must come before WorldBegin"));
+    } else if (directive->phase == Phase::kInWorld && !in_world_) {
+      arguments.Error(Concat(directive->name, " must come after WorldBegin"));
+    }
+    if (!(this->*directive->handler)(arguments)) SkipToDirective(tokens);
+  }
+}
+
+void DirectiveReader::SayUnknown(const Token& token) {
+  if (token.kind != Token::Kind::kWord) {
+    diagnostics_.Error(token.location, Concat("expected a directive, not ", Quoted(token.text)));
+    return;
+  }
+  std::string_view closest;
+  if (!diagnostics_.IsFull(Diagnostic::Severity::kError)) {
+    std::vector<std::string_view> names;
+    for (const Directive& known : Directives()) {
+      if (known.handler != &DirectiveReader::OnPbrtV3) names.push_back(known.name);
+    }
+    closest = ClosestOf(token.text, names);
+  }
+  diagnostics_.Error(token.location,
+                     Concat("unknown directive ", Quoted(token.text),
+                            closest.empty() ? "" : Concat("; did you mean ", closest, "?")));
+}
+
+void DirectiveReader::SkipToDirective(Tokenizer& tokens) {
+  while (true) {
+    const Token& token = tokens.Peek();
+    if (token.kind == Token::Kind::kEnd) return;
+    if (token.kind == Token::Kind::kWord && IsDirective(token.text)) return;
+    tokens.Next();
+  }
+}
+
+void DirectiveReader::ReportUnclosedScopes() {
+  for (const GraphicsStack::Scope& scope : graphics_.open_scopes()) {
+    diagnostics_.Error(scope.location, Concat(scope.begun_by, " is never closed"));
+  }
+}
+
+void DirectiveReader::ReportNamedMaterials() {
+  for (const auto& [name, material] : named_materials_) {
+    if (!material.is_defined) {
+      diagnostics_.Error(material.location, Concat("there is no material ", Quoted(name),
+                                                   "; define it by MakeNamedMaterial"));
+    } else if (!material.is_used) {
+      diagnostics_.Note(material.location, Concat("the material ", Quoted(name), " is not used"));
+    }
+  }
+}
+
+// ---- arguments
+
+ParameterList DirectiveReader::ListFor(const Arguments& arguments, std::string_view type,
+                                       std::vector<Parameter> parameters,
+                                       const GraphicsState::Defaults& defaults) {
+  return ParameterList(Concat(arguments.directive(), " ", Quoted(type)), arguments.location(),
+                       std::move(parameters), defaults.get(), diagnostics_);
+}
+
+bool DirectiveReader::RefusePbrtV3(const Arguments& arguments) {
+  diagnostics_.OnlyError(arguments.location(),
+                         "this is a pbrt-v3 file; convert it with \"pbrt --upgrade\"");
+  is_stopped_ = true;
+  return true;
+}
+
+bool DirectiveReader::OnPbrtV3(Arguments& arguments) {
+  return RefusePbrtV3(arguments);
+}
+
+// ---- scopes
+
+void DirectiveReader::Begin(Arguments& arguments) {
+  const Status begun = graphics_.Begin(arguments.directive(), arguments.location());
+  if (begun.ok()) return;
+  arguments.Error(std::string(begun.message()));
+  is_stopped_ = true;
+}
+
+bool DirectiveReader::End(Arguments& arguments, std::string_view begun_by) {
+  const Status ended = graphics_.End(arguments.directive(), begun_by);
+  if (!ended.ok()) arguments.Error(std::string(ended.message()));
+  return ended.ok();
+}
+
+bool DirectiveReader::OnAttributeBegin(Arguments& arguments) {
+  Begin(arguments);
+  return true;
+}
+
+bool DirectiveReader::OnAttributeEnd(Arguments& arguments) {
+  End(arguments, "AttributeBegin");
+  return true;
+}
+
+// pbrt-v4 reads TransformBegin as AttributeBegin.
+bool DirectiveReader::OnTransformBegin(Arguments& arguments) {
+  Begin(arguments);
+  return true;
+}
+
+bool DirectiveReader::OnTransformEnd(Arguments& arguments) {
+  End(arguments, "TransformBegin");
+  return true;
+}
+
+bool DirectiveReader::OnAttribute(Arguments& arguments) {
+  std::string target;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadString("a target", target) || !arguments.ReadParameters(parameters))
+    return false;
+  std::optional<AttributeTarget> known;
+  if (target == "shape") known = AttributeTarget::kShape;
+  if (target == "light") known = AttributeTarget::kLight;
+  if (target == "material") known = AttributeTarget::kMaterial;
+  if (target == "texture") known = AttributeTarget::kTexture;
+  if (!known.has_value()) {
+    if (target != "medium") {
+      arguments.Error(Concat("Attribute takes shape, light, material, medium or texture, not ",
+                             Quoted(target)));
+    }
+    return true;  // media are refused where they are made
+  }
+  // The newest first: of two defaults of one name the later counts.
+  auto all = std::make_shared<std::vector<Parameter>>(std::move(parameters));
+  GraphicsState::Defaults& defaults = graphics_.state().DefaultsOf(*known);
+  if (const GraphicsState::Defaults& older = defaults; older != nullptr) {
+    constexpr std::size_t kMaxDefaults = 100;
+    if (all->size() + older->size() > kMaxDefaults) {
+      arguments.Error(
+          Concat("more than ", kMaxDefaults, " parameters by Attribute ", Quoted(target)));
+      return true;
+    }
+    all->insert(all->end(), older->begin(), older->end());
+  }
+  defaults = std::move(all);
+  return true;
+}
+
+bool DirectiveReader::OnReverseOrientation(Arguments& /*arguments*/) {
+  graphics_.state().reverse_orientation = !graphics_.state().reverse_orientation;
+  return true;
+}
+
+bool DirectiveReader::OnObjectBegin(Arguments& arguments) {
+  std::string name;
+  if (!arguments.ReadString("a name", name)) return false;
+  if (open_object_ != nullptr) arguments.Error("ObjectBegin within ObjectBegin");
+  Begin(arguments);
+  const auto [object, is_new] = objects_.try_emplace(name);
+  if (!is_new) arguments.Error(Concat("the object ", Quoted(name), " is defined twice"));
+  open_object_ = &object->second;
+  return true;
+}
+
+bool DirectiveReader::OnObjectEnd(Arguments& arguments) {
+  if (End(arguments, "ObjectBegin")) open_object_ = nullptr;
+  return true;
+}
+
+bool DirectiveReader::OnObjectInstance(Arguments& arguments) {
+  std::string name;
+  if (!arguments.ReadString("a name", name)) return false;
+  if (open_object_ != nullptr) {
+    arguments.Error("ObjectInstance within ObjectBegin");
+    return true;
+  }
+  const auto object = objects_.find(name);
+  if (object == objects_.end()) {
+    arguments.Error(
+        Concat("there is no object ", Quoted(name), "; define it by ObjectBegin first"));
+    return true;
+  }
+  // Before it is laid out, because that is what takes the memory.
+  if (!HasRoomFor(object->second, arguments)) return true;
+  StatusOr<ShapeSet> shapes = Instantiate(object->second, graphics_.state().to_world);
+  if (!shapes.ok()) {
+    arguments.Error(std::string(shapes.status().message()));
+    return true;
+  }
+  AddShapes(*std::move(shapes));
+  return true;
+}
+
+bool DirectiveReader::OnWorldBegin(Arguments& /*arguments*/) {
+  in_world_ = true;
+  graphics_.state().to_world = Transform();
+  coordinate_systems_["world"] = Transform();
+  return true;
+}
+
+bool DirectiveReader::OnInclude(Arguments& arguments) {
+  std::string path;
+  if (!arguments.ReadString("a file name", path)) return false;
+  IncludeFile(path, arguments.location());
+  return true;
+}
+
+// As Include, but what the file changes of the graphics state ends with it.
+bool DirectiveReader::OnImport(Arguments& arguments) {
+  std::string path;
+  if (!arguments.ReadString("a file name", path)) return false;
+  const std::size_t outer_scopes = graphics_.open_scopes().size();
+  Begin(arguments);
+  IncludeFile(path, arguments.location());
+  if (IsStopped()) return true;
+  if (graphics_.open_scopes().size() != outer_scopes + 1) {
+    arguments.Error(Concat("the scopes of the imported file ", Quoted(path), " are not balanced"));
+    is_stopped_ = true;
+    return true;
+  }
+  End(arguments, "Import");
+  return true;
+}
+
+}  // namespace lucerna

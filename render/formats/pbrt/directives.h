@@ -1,0 +1,155 @@
+// Carries out the directives of pbrt texts, one after the other.
+//
+// One table says which directives there are and where each may stand. Each has a function of its
+// own, which reads its arguments and changes the graphics state or the scene; what a shape, light,
+// material, texture or camera of some type is read from is in the files of these names.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render/base/status.h"
+#include "render/formats/asset_reader.h"
+#include "render/formats/diagnostic.h"
+#include "render/formats/finish_scene.h"
+#include "render/formats/pbrt/arguments.h"
+#include "render/formats/pbrt/graphics_state.h"
+#include "render/formats/pbrt/parameter_list.h"
+#include "render/formats/pbrt/shapes.h"
+#include "render/formats/pbrt/textures.h"
+#include "render/formats/pbrt/tokenizer.h"
+#include "render/math/transform.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+[[nodiscard]] bool IsDirective(std::string_view word);
+
+class DirectiveReader {
+ public:
+  // Both outlive the reader.
+  DirectiveReader(AssetReader& assets, Diagnostics& diagnostics)
+      : assets_(assets), diagnostics_(diagnostics) {}
+
+  // Call it once.
+  [[nodiscard]] UnfinishedScene Read(const std::string& main_path, std::string_view text);
+
+ private:
+  // Reads the directive's arguments and carries it out. Returns false when the arguments broke off
+  // at something unexpected, which is reported; the text is then skipped to the next directive.
+  using Handler = bool (DirectiveReader::*)(Arguments& arguments);
+  enum class Phase : std::uint8_t { kAnywhere, kBeforeWorld, kInWorld };
+  struct Directive {
+    std::string_view name;
+    Handler handler;
+    Phase phase;
+  };
+  friend bool IsDirective(std::string_view word);
+  static std::span<const Directive> Directives();
+  static const Directive* FindDirective(std::string_view name);
+
+  // Texts (directives.cc).
+  void IncludeFile(const std::string& path, const SourceLocation& location);
+  void ReadText(const std::string& path, std::string_view text);
+  void ReadDirectives(Tokenizer& tokens);
+  void SayUnknown(const Token& token);
+  static void SkipToDirective(Tokenizer& tokens);
+  [[nodiscard]] bool IsStopped() const { return is_stopped_ || assets_.is_over_limit(); }
+  void ReportUnclosedScopes();
+  void ReportNamedMaterials();
+
+  // Arguments.
+  ParameterList ListFor(const Arguments& arguments, std::string_view type,
+                        std::vector<Parameter> parameters,
+                        const GraphicsState::Defaults& defaults = nullptr);
+  bool RefusePbrtV3(const Arguments& arguments);
+
+  // Transforms (transform_directives.cc).
+  bool Concatenate(Arguments& arguments, const StatusOr<Transform>& transform);
+  bool Replace(Arguments& arguments, const Transform& transform);
+  bool ReadMatrix(Arguments& arguments, Transform& transform);
+  bool OnIdentity(Arguments& arguments);
+  bool OnTranslate(Arguments& arguments);
+  bool OnScale(Arguments& arguments);
+  bool OnRotate(Arguments& arguments);
+  bool OnLookAt(Arguments& arguments);
+  bool OnTransform(Arguments& arguments);
+  bool OnConcatTransform(Arguments& arguments);
+  bool OnCoordinateSystem(Arguments& arguments);
+  bool OnCoordSysTransform(Arguments& arguments);
+  bool OnActiveTransform(Arguments& arguments);
+  bool OnTransformTimes(Arguments& arguments);
+
+  // Scopes (directives.cc).
+  void Begin(Arguments& arguments);
+  bool End(Arguments& arguments, std::string_view begun_by);
+  bool OnAttributeBegin(Arguments& arguments);
+  bool OnAttributeEnd(Arguments& arguments);
+  bool OnTransformBegin(Arguments& arguments);
+  bool OnTransformEnd(Arguments& arguments);
+  bool OnAttribute(Arguments& arguments);
+  bool OnReverseOrientation(Arguments& arguments);
+  bool OnObjectBegin(Arguments& arguments);
+  bool OnObjectEnd(Arguments& arguments);
+  bool OnObjectInstance(Arguments& arguments);
+  bool OnWorldBegin(Arguments& arguments);
+  bool OnInclude(Arguments& arguments);
+  bool OnImport(Arguments& arguments);
+  bool OnPbrtV3(Arguments& arguments);
+
+  // The parts of a scene (scene_directives.cc).
+  struct NamedMaterial {
+    std::int32_t index = 0;
+    SourceLocation location;  // where it is first mentioned
+    bool is_defined = false;
+    bool is_used = false;
+  };
+  NamedMaterial& Named(const std::string& name, const SourceLocation& location);
+  // Reports an error and stops the reading when the scene has no room for these shapes.
+  bool HasRoomFor(const ShapeSet& shapes, Arguments& arguments);
+  void AddShapes(ShapeSet shapes);
+  bool OnCamera(Arguments& arguments);
+  bool OnFilm(Arguments& arguments);
+  bool OnPixelFilter(Arguments& arguments);
+  bool OnSampler(Arguments& arguments);
+  bool OnIntegrator(Arguments& arguments);
+  bool OnAccelerator(Arguments& arguments);
+  bool OnColorSpace(Arguments& arguments);
+  bool OnOption(Arguments& arguments);
+  bool OnMaterial(Arguments& arguments);
+  bool OnMakeNamedMaterial(Arguments& arguments);
+  bool OnNamedMaterial(Arguments& arguments);
+  bool OnAreaLightSource(Arguments& arguments);
+  bool OnLightSource(Arguments& arguments);
+  bool OnShape(Arguments& arguments);
+  bool OnTexture(Arguments& arguments);
+  bool OnMediumInterface(Arguments& arguments);
+  bool OnMakeNamedMedium(Arguments& arguments);
+
+  AssetReader& assets_;
+  Diagnostics& diagnostics_;
+  UnfinishedScene unfinished_;
+  Scene& scene_ = unfinished_.scene;
+
+  int depth_ = 0;  // of files that include files
+  std::uint64_t texts_read_ = 0;
+  std::uint64_t shapes_cost_ = 0;
+  bool is_stopped_ = false;
+
+  GraphicsStack graphics_;
+  bool in_world_ = false;
+  double exposure_time_s_ = 1;
+  std::map<std::string, Transform> coordinate_systems_;
+  std::map<std::string, NamedMaterial> named_materials_;
+  TextureNames textures_;
+  std::set<std::string> float_textures_;
+  std::map<std::string, ShapeSet> objects_;
+  ShapeSet* open_object_ = nullptr;  // between ObjectBegin and ObjectEnd
+};
+
+}  // namespace lucerna

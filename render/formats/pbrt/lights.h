@@ -1,0 +1,30 @@
+// Reads LightSource and AreaLightSource directives.
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "render/formats/asset_reader.h"
+#include "render/formats/pbrt/parameter_list.h"
+#include "render/math/rgb.h"
+#include "render/math/transform.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+// An AreaLightSource: what it makes of a shape depends on the shape's area when a power is given.
+struct AreaEmission {
+  Rgb radiance;  // at scale 1 and, where there is one, power 1 over an emitting area of 1 m²
+  bool two_sided = false;
+  std::optional<double> power_w;  // luminous, of the whole shape
+};
+// Absent for a type that is not supported, which is an error.
+[[nodiscard]] std::optional<AreaEmission> ReadAreaEmission(std::string_view type,
+                                                           ParameterList& parameters);
+[[nodiscard]] AreaLight MakeAreaLight(const AreaEmission& emission, double area_m2);
+
+// A LightSource, with the transform from its space to the world. Adds it to `scene`.
+void ReadLight(std::string_view type, ParameterList& parameters, const Transform& to_world,
+               AssetReader& assets, Scene& scene);
+
+}  // namespace lucerna

@@ -1,0 +1,129 @@
+#include "render/formats/pbrt/materials.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "render/base/text.h"
+#include "render/formats/pbrt/kinds.h"
+#include "render/formats/pbrt/optical_constants.h"
+
+namespace lucerna {
+namespace {
+
+// Below this width pbrt-v4 renders a surface as perfectly smooth.
+constexpr double kSmoothAlpha = 1e-3;
+constexpr Range kRoughness = {0, 1e3};
+constexpr Range kIndexRange = {0.01, 100};
+
+void ReadRoughness(ParameterList& parameters, Material& material) {
+  const double roughness = parameters.Float("roughness", 0, kRoughness);
+  const double u = parameters.Float("uroughness", roughness, kRoughness);
+  const double v = parameters.Float("vroughness", roughness, kRoughness);
+  const bool remap = parameters.Bool("remaproughness", true);
+  const double alpha_u = remap ? std::sqrt(u) : u;
+  const double alpha_v = remap ? std::sqrt(v) : v;
+  if (std::max(alpha_u, alpha_v) < kSmoothAlpha) return;
+  // A width of zero in one direction only would divide by zero.
+  constexpr double kSmallestAlpha = 1e-4;
+  material.alpha_u = static_cast<float>(std::max(alpha_u, kSmallestAlpha));
+  material.alpha_v = static_cast<float>(std::max(alpha_v, kSmallestAlpha));
+}
+
+// The texture that `name` refers to, if it is one and can be used.
+std::int32_t FindTexture(std::string_view name, ParameterList& parameters,
+                         const TextureNames& names) {
+  if (!parameters.IsTexture(name)) return kNoTexture;
+  const std::optional<std::string> texture = parameters.FindTexture(name);
+  if (!texture.has_value()) return kNoTexture;
+  const auto named = names.find(*texture);
+  if (named == names.end()) {
+    parameters.Error(name, Concat("refers to the spectrum texture ", Quoted(*texture),
+                                  ", which is not defined before it"));
+    return kNoTexture;
+  }
+  if (named->second.number == kNoTexture) parameters.Error(name, named->second.why_not);
+  return named->second.number;
+}
+
+void ReadDiffuse(ParameterList& parameters, const TextureNames& names, Material& material) {
+  material.kind = Material::Kind::kDiffuse;
+  if (parameters.IsTexture("reflectance")) {
+    material.texture = FindTexture("reflectance", parameters, names);
+  } else {
+    material.reflectance = parameters.FindReflectance("reflectance").value_or(Gray(0.5F));
+  }
+}
+
+void ReadConductor(ParameterList& parameters, const TextureNames& names, Material& material) {
+  material.kind = Material::Kind::kConductor;
+  const bool is_textured = parameters.IsTexture("reflectance");
+  if (is_textured) material.texture = FindTexture("reflectance", parameters, names);
+  const std::optional<Rgb> reflectance =
+      is_textured ? Gray(0.5F) : parameters.FindReflectance("reflectance");
+  if (reflectance.has_value()) {
+    if (parameters.Has("eta") || parameters.Has("k")) {
+      parameters.Error("reflectance", "and eta or k exclude each other; give one or the other");
+    }
+    parameters.Ignore("eta");
+    parameters.Ignore("k");
+    material.eta = Gray(1);
+    material.k = {AbsorptionFor(reflectance->r), AbsorptionFor(reflectance->g),
+                  AbsorptionFor(reflectance->b)};
+  } else {
+    const MetalConstants copper = MetalNamed("Cu").value();
+    material.eta = parameters.FindOpticalConstant("eta", kIndexRange).value_or(copper.eta);
+    material.k = parameters.FindOpticalConstant("k", {0, 1000}).value_or(copper.k);
+  }
+  ReadRoughness(parameters, material);
+}
+
+void ReadDielectric(ParameterList& parameters, const TextureNames& /*names*/, Material& material) {
+  material.kind = Material::Kind::kDielectric;
+  material.ior =
+      static_cast<float>(parameters.FindRefractiveIndex("eta", kIndexRange).value_or(1.5));
+  ReadRoughness(parameters, material);
+}
+
+using MaterialReader = void (*)(ParameterList&, const TextureNames&, Material&);
+constexpr Kind<MaterialReader> kKinds[] = {
+    {"diffuse", &ReadDiffuse},
+    {"conductor", &ReadConductor},
+    {"dielectric", &ReadDielectric},
+};
+
+}  // namespace
+
+bool IsPbrtV3Material(std::string_view type) {
+  constexpr std::array<std::string_view, 11> kTypes = {
+      "matte",       "plastic",   "uber",   "glass",   "mirror",      "metal",
+      "translucent", "substrate", "disney", "fourier", "kdsubsurface"};
+  return std::find(kTypes.begin(), kTypes.end(), type) != kTypes.end();
+}
+
+bool IsSupportedMaterial(std::string_view type) {
+  return FindReader<MaterialReader>(kKinds, type) != nullptr;
+}
+
+Material ReadMaterial(std::string_view type, ParameterList& parameters, const TextureNames& names) {
+  Material material;
+  const MaterialReader read = FindReader<MaterialReader>(kKinds, type);
+  if (read == nullptr) {
+    parameters.Error(Concat(type.empty() || type == "interface" || type == "none"
+                                ? "lets light through unchanged, which is not supported"
+                                : "is not supported",
+                            "; ", SupportedKinds<MaterialReader>(kKinds)));
+    return material;
+  }
+  read(parameters, names, material);
+  if (parameters.Has("displacement") || parameters.Has("normalmap")) {
+    parameters.Warning(parameters.Has("normalmap") ? "normalmap" : "displacement",
+                       "is ignored: bumps are not rendered");
+    parameters.Ignore("displacement");
+    parameters.Ignore("normalmap");
+  }
+  parameters.WarnOfUnread();
+  return material;
+}
+
+}  // namespace lucerna

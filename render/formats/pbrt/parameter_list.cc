@@ -1,0 +1,385 @@
+#include "render/formats/pbrt/parameter_list.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "render/base/text.h"
+#include "render/formats/pbrt/optical_constants.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::array<std::string_view, 1> kFloat = {"float"};
+constexpr std::array<std::string_view, 1> kInteger = {"integer"};
+constexpr std::array<std::string_view, 1> kBool = {"bool"};
+constexpr std::array<std::string_view, 1> kString = {"string"};
+constexpr std::array<std::string_view, 1> kTexture = {"texture"};
+constexpr std::array<std::string_view, 2> kPoint = {"point3", "point"};
+constexpr std::array<std::string_view, 2> kReflectanceTypes = {"rgb", "spectrum"};
+constexpr std::array<std::string_view, 3> kEmissionTypes = {"rgb", "spectrum", "blackbody"};
+constexpr std::array<std::string_view, 3> kOpticalTypes = {"spectrum", "rgb", "float"};
+constexpr std::array<std::string_view, 2> kIndexTypes = {"float", "spectrum"};
+
+Rgb ToRgb(const std::vector<double>& numbers) {
+  return {static_cast<float>(numbers[0]), static_cast<float>(numbers[1]),
+          static_cast<float>(numbers[2])};
+}
+
+}  // namespace
+
+const std::vector<std::string_view>& KnownParameterTypes() {
+  static const std::vector<std::string_view> types = {
+      "bool",   "integer", "float",  "point2", "vector2",  "point3",    "point",  "vector3",
+      "vector", "normal3", "normal", "rgb",    "spectrum", "blackbody", "string", "texture"};
+  return types;
+}
+
+ParameterList::ParameterList(std::string subject, SourceLocation location,
+                             std::vector<Parameter> parameters,
+                             const std::vector<Parameter>* defaults, Diagnostics& diagnostics)
+    : subject_(std::move(subject)),
+      location_(location),
+      parameters_(std::move(parameters)),
+      was_read_(parameters_.size()),
+      defaults_(defaults),
+      diagnostics_(diagnostics) {
+  // Sorted, because a hostile text can bring very many.
+  std::vector<std::size_t> order(parameters_.size());
+  for (std::size_t i = 0; i < order.size(); ++i)
+    order[i] = i;
+  std::stable_sort(order.begin(), order.end(), [this](std::size_t a, std::size_t b) {
+    return parameters_[a].name < parameters_[b].name;
+  });
+  for (std::size_t i = 1; i < order.size(); ++i) {
+    if (parameters_[order[i]].name == parameters_[order[i - 1]].name) {
+      diagnostics_.Error(parameters_[order[i]].location,
+                         Concat("parameter ", Quoted(parameters_[order[i]].name), " of ", subject_,
+                                " is given twice"));
+    }
+  }
+}
+
+const Parameter* ParameterList::Find(std::string_view name) const {
+  for (const Parameter& parameter : parameters_) {
+    if (parameter.name == name) return &parameter;
+  }
+  if (defaults_ == nullptr) return nullptr;
+  for (const Parameter& parameter : *defaults_) {
+    if (parameter.name == name) return &parameter;
+  }
+  return nullptr;
+}
+
+bool ParameterList::MarkRead(const Parameter& parameter) {
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    if (&parameters_[i] != &parameter) continue;
+    const bool is_first_time = !was_read_[i];
+    was_read_[i] = true;
+    return is_first_time;
+  }
+  return true;
+}
+
+std::string ParameterList::Called(const Parameter& parameter) const {
+  return Concat(Quoted(parameter.name), " of ", subject_);
+}
+
+const Parameter* ParameterList::Take(std::string_view name, std::span<const std::string_view> types,
+                                     std::size_t count) {
+  known_names_.push_back(name);
+  const Parameter* parameter = Find(name);
+  if (parameter == nullptr) return nullptr;
+  const bool is_first_time = MarkRead(*parameter);
+  if (std::find(types.begin(), types.end(), parameter->type) == types.end()) {
+    if (!is_first_time) return nullptr;
+    const std::string wanted = Listed(types, " or ");
+    if (parameter->type == "texture") {
+      diagnostics_.Error(parameter->location,
+                         Concat(Called(*parameter), " is a texture; ",
+                                "textures are supported for the reflectance of diffuse and "
+                                "conductor only, give a ",
+                                wanted, " instead"));
+    } else {
+      diagnostics_.Error(parameter->location, Concat(Called(*parameter), " must be of type ",
+                                                     wanted, ", not ", parameter->type));
+    }
+    return nullptr;
+  }
+  if (count != 0 && !CheckCount(*parameter, count)) return nullptr;
+  return parameter;
+}
+
+bool ParameterList::CheckCount(const Parameter& parameter, std::size_t count) {
+  if (parameter.count() == count) return true;
+  diagnostics_.Error(parameter.location,
+                     Concat(Called(parameter), " must have ", count,
+                            count == 1 ? " value, not " : " values, not ", parameter.count()));
+  return false;
+}
+
+bool ParameterList::CheckRange(const Parameter& parameter, double value, Range range) {
+  if (value <= range.high && (range.low_is_allowed ? value >= range.low : value > range.low)) {
+    return true;
+  }
+  const std::string low = Concat(range.low_is_allowed ? "at least " : "above ", range.low);
+  const std::string high = range.high < 3e38 ? Concat(" and at most ", range.high) : "";
+  diagnostics_.Error(parameter.location,
+                     Concat(Called(parameter), " must be ", low, high, ", not ", value));
+  return false;
+}
+
+std::optional<double> ParameterList::FindFloat(std::string_view name, Range range) {
+  const Parameter* parameter = Take(name, kFloat, 1);
+  if (parameter == nullptr || !CheckRange(*parameter, parameter->numbers[0], range)) {
+    return std::nullopt;
+  }
+  return parameter->numbers[0];
+}
+
+double ParameterList::Float(std::string_view name, double otherwise, Range range) {
+  return FindFloat(name, range).value_or(otherwise);
+}
+
+std::optional<std::int64_t> ParameterList::FindInteger(std::string_view name, Range range) {
+  const Parameter* parameter = Take(name, kInteger, 1);
+  if (parameter == nullptr || !CheckRange(*parameter, parameter->numbers[0], range)) {
+    return std::nullopt;
+  }
+  return static_cast<std::int64_t>(parameter->numbers[0]);
+}
+
+std::optional<bool> ParameterList::FindBool(std::string_view name) {
+  const Parameter* parameter = Take(name, kBool, 1);
+  if (parameter == nullptr) return std::nullopt;
+  return parameter->bools[0];
+}
+
+bool ParameterList::Bool(std::string_view name, bool otherwise) {
+  return FindBool(name).value_or(otherwise);
+}
+
+std::optional<std::string> ParameterList::FindString(std::string_view name) {
+  const Parameter* parameter = Take(name, kString, 1);
+  if (parameter == nullptr) return std::nullopt;
+  return parameter->strings[0];
+}
+
+std::string ParameterList::String(std::string_view name, std::string otherwise) {
+  return FindString(name).value_or(std::move(otherwise));
+}
+
+bool ParameterList::IsTexture(std::string_view name) const {
+  const Parameter* parameter = Find(name);
+  return parameter != nullptr && parameter->type == "texture";
+}
+
+std::optional<std::string> ParameterList::FindTexture(std::string_view name) {
+  const Parameter* parameter = Take(name, kTexture, 1);
+  if (parameter == nullptr) return std::nullopt;
+  return parameter->strings[0];
+}
+
+Vec3 ParameterList::Point(std::string_view name, Vec3 otherwise) {
+  const Parameter* parameter = Take(name, kPoint, 3);
+  if (parameter == nullptr) return otherwise;
+  const Rgb three = ToRgb(parameter->numbers);
+  return {three.r, three.g, three.b};
+}
+
+std::span<const double> ParameterList::Numbers(std::string_view name,
+                                               std::span<const std::string_view> types,
+                                               std::size_t group) {
+  const Parameter* parameter = Take(name, types, 0);
+  if (parameter == nullptr) return {};
+  if (parameter->numbers.empty() || parameter->numbers.size() % group != 0) {
+    diagnostics_.Error(parameter->location,
+                       Concat(Called(*parameter), " must have a multiple of ", group,
+                              " values, not ", parameter->numbers.size()));
+    return {};
+  }
+  return parameter->numbers;
+}
+
+std::optional<WavelengthCurve> ParameterList::CurveOf(const Parameter& parameter) {
+  WavelengthCurve curve;
+  const std::vector<double>& numbers = parameter.numbers;
+  if (numbers.size() < 2 || numbers.size() % 2 != 0) {
+    diagnostics_.Error(parameter.location,
+                       Concat(Called(parameter), " must be pairs of wavelength and value"));
+    return std::nullopt;
+  }
+  for (std::size_t i = 0; i < numbers.size(); i += 2) {
+    if (!(numbers[i] > 0) || (i > 0 && !(numbers[i] > numbers[i - 2]))) {
+      diagnostics_.Error(parameter.location,
+                         Concat(Called(parameter), ": wavelengths must be above 0 and rise"));
+      return std::nullopt;
+    }
+    if (numbers[i + 1] < 0) {
+      diagnostics_.Error(parameter.location,
+                         Concat(Called(parameter), " must not have a negative value"));
+      return std::nullopt;
+    }
+    curve.wavelength_nm.push_back(numbers[i]);
+    curve.value.push_back(numbers[i + 1]);
+  }
+  return curve;
+}
+
+std::optional<Rgb> ParameterList::FindReflectance(std::string_view name) {
+  const Parameter* parameter = Take(name, kReflectanceTypes, 0);
+  if (parameter == nullptr) return std::nullopt;
+  if (parameter->type == "rgb") {
+    if (!CheckCount(*parameter, 3)) return std::nullopt;
+    for (const double value : parameter->numbers) {
+      if (!CheckRange(*parameter, value, {0, 1})) return std::nullopt;
+    }
+    return ToRgb(parameter->numbers);
+  }
+  if (!parameter->strings.empty()) {
+    diagnostics_.Error(
+        parameter->location,
+        Concat(Called(*parameter), ": the named spectrum ", Quoted(parameter->strings[0]),
+               " is not a reflectance that is supported; give an rgb"));
+    return std::nullopt;
+  }
+  const std::optional<WavelengthCurve> curve = CurveOf(*parameter);
+  if (!curve.has_value()) return std::nullopt;
+  for (const double value : curve->value) {
+    if (!CheckRange(*parameter, value, {0, 1})) return std::nullopt;
+  }
+  return ReflectanceColor(*curve);
+}
+
+std::optional<Rgb> ParameterList::FindEmission(std::string_view name) {
+  const Parameter* parameter = Take(name, kEmissionTypes, 0);
+  if (parameter == nullptr) return std::nullopt;
+  if (parameter->type == "rgb") {
+    if (!CheckCount(*parameter, 3)) return std::nullopt;
+    for (const double value : parameter->numbers) {
+      if (!CheckRange(*parameter, value, kZeroOrMore)) return std::nullopt;
+    }
+    return ToRgb(parameter->numbers);
+  }
+  if (parameter->type == "blackbody") {
+    if (!CheckCount(*parameter, 1)) return std::nullopt;
+    if (!CheckRange(*parameter, parameter->numbers[0], {kMinBlackbodyK, kMaxBlackbodyK})) {
+      return std::nullopt;
+    }
+    return BlackbodyColor(parameter->numbers[0]);
+  }
+  if (!parameter->strings.empty()) {
+    if (parameter->strings.size() == 1 && parameter->strings[0] == "stdillum-D65") return Gray(1);
+    diagnostics_.Error(
+        parameter->location,
+        Concat(Called(*parameter), ": the named spectrum ", Quoted(parameter->strings[0]),
+               " is not supported for lights; there is stdillum-D65, or give ",
+               "an rgb, a blackbody or pairs of wavelength and value"));
+    return std::nullopt;
+  }
+  const std::optional<WavelengthCurve> curve = CurveOf(*parameter);
+  if (!curve.has_value()) return std::nullopt;
+  return EmissionColor(*curve);
+}
+
+std::optional<Rgb> ParameterList::FindOpticalConstant(std::string_view name, Range range) {
+  const Parameter* parameter = Take(name, kOpticalTypes, 0);
+  if (parameter == nullptr) return std::nullopt;
+  Rgb constant;
+  if (!parameter->strings.empty()) {
+    const std::optional<Rgb> metal = MetalCurveNamed(parameter->strings[0]);
+    const std::optional<float> glass = GlassNamed(parameter->strings[0]);
+    if (parameter->strings.size() != 1 || !(metal.has_value() || glass.has_value())) {
+      diagnostics_.Error(
+          parameter->location,
+          Concat(Called(*parameter), ": unknown named spectrum ", Quoted(parameter->strings[0]),
+                 "; there are metal-Ag-eta, metal-Ag-k and so on for Ag, Al, Au, Cu, CuZn, ",
+                 "MgO and TiO2"));
+      return std::nullopt;
+    }
+    constant = metal.has_value() ? *metal : Gray(*glass);
+  } else if (parameter->type == "rgb") {
+    if (!CheckCount(*parameter, 3)) return std::nullopt;
+    constant = ToRgb(parameter->numbers);
+  } else if (parameter->type == "float") {
+    if (!CheckCount(*parameter, 1)) return std::nullopt;
+    constant = Gray(static_cast<float>(parameter->numbers[0]));
+  } else {
+    const std::optional<WavelengthCurve> curve = CurveOf(*parameter);
+    if (!curve.has_value()) return std::nullopt;
+    constant = {static_cast<float>(curve->AtClamped(kRedNm)),
+                static_cast<float>(curve->AtClamped(kGreenNm)),
+                static_cast<float>(curve->AtClamped(kBlueNm))};
+  }
+  for (int channel = 0; channel < 3; ++channel) {
+    if (!CheckRange(*parameter, static_cast<double>(constant[channel]), range)) return std::nullopt;
+  }
+  return constant;
+}
+
+std::optional<double> ParameterList::FindRefractiveIndex(std::string_view name, Range range) {
+  const Parameter* parameter = Take(name, kIndexTypes, 0);
+  if (parameter == nullptr) return std::nullopt;
+  double index = 0;
+  if (parameter->type == "float") {
+    if (!CheckCount(*parameter, 1)) return std::nullopt;
+    index = parameter->numbers[0];
+  } else {
+    if (!parameter->strings.empty()) {
+      const std::optional<float> glass = GlassNamed(parameter->strings[0]);
+      if (parameter->strings.size() != 1 || !glass.has_value()) {
+        diagnostics_.Error(
+            parameter->location,
+            Concat(Called(*parameter), ": unknown named spectrum ", Quoted(parameter->strings[0]),
+                   "; there are glass-BK7, glass-BAF10, glass-FK51A, glass-LASF9, glass-F5, ",
+                   "glass-F10, glass-F11 and diamond"));
+        return std::nullopt;
+      }
+      index = static_cast<double>(*glass);
+    } else {
+      const std::optional<WavelengthCurve> curve = CurveOf(*parameter);
+      if (!curve.has_value()) return std::nullopt;
+      constexpr double kHeliumDNm = 587.6;
+      index = curve->AtClamped(kHeliumDNm);
+    }
+    diagnostics_.Warning(parameter->location,
+                         Concat(Called(*parameter), ": dispersion is not rendered, one ",
+                                "index of refraction (at 587.6 nm) stands for all colours"));
+  }
+  if (!CheckRange(*parameter, index, range)) return std::nullopt;
+  return index;
+}
+
+void ParameterList::Ignore(std::string_view name) {
+  known_names_.push_back(name);
+  if (const Parameter* parameter = Find(name)) MarkRead(*parameter);
+}
+
+void ParameterList::Error(std::string_view name, std::string_view message) {
+  const Parameter* parameter = Find(name);
+  diagnostics_.Error(parameter != nullptr ? parameter->location : location_,
+                     Concat(parameter != nullptr ? Called(*parameter) : subject_, " ", message));
+}
+
+void ParameterList::Warning(std::string_view name, std::string_view message) {
+  const Parameter* parameter = Find(name);
+  diagnostics_.Warning(parameter != nullptr ? parameter->location : location_,
+                       Concat(parameter != nullptr ? Called(*parameter) : subject_, " ", message));
+}
+
+void ParameterList::WarnOfUnread() {
+  for (std::size_t i = 0; i < parameters_.size(); ++i) {
+    if (was_read_[i]) continue;
+    const Parameter& parameter = parameters_[i];
+    // Looking for the nearest name is slow; it is left out once no more warnings are kept.
+    const std::string_view closest = diagnostics_.IsFull(Diagnostic::Severity::kWarning)
+                                         ? std::string_view()
+                                         : ClosestOf(parameter.name, known_names_);
+    diagnostics_.Warning(
+        parameter.location,
+        Concat("unknown parameter ", Called(parameter), " is ignored",
+               closest.empty() ? "" : Concat("; did you mean ", Quoted(closest), "?")));
+  }
+}
+
+}  // namespace lucerna

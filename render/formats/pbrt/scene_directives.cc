@@ -1,0 +1,306 @@
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "render/base/text.h"
+#include "render/formats/pbrt/directives.h"
+#include "render/formats/pbrt/lights.h"
+#include "render/formats/pbrt/materials.h"
+#include "render/formats/pbrt/settings.h"
+
+namespace lucerna {
+
+bool DirectiveReader::OnCamera(Arguments& arguments) {
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadTyped(type, parameters)) return false;
+  if (unfinished_.has_camera) arguments.Error("the scene has a second camera");
+  unfinished_.has_camera = true;
+  ParameterList list = ListFor(arguments, type, std::move(parameters));
+  ReadCamera(type, list, scene_.camera, exposure_time_s_);
+  // Replace() lets only invertible transforms pass.
+  scene_.camera.camera_to_world = graphics_.state().to_world.Inverse().value();
+  coordinate_systems_["camera"] = scene_.camera.camera_to_world;
+  return true;
+}
+
+bool DirectiveReader::OnFilm(Arguments& arguments) {
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadTyped(type, parameters)) return false;
+  if (type == "image") return RefusePbrtV3(arguments);
+  ParameterList list = ListFor(arguments, type, std::move(parameters));
+  ReadFilm(type, list, scene_.film);
+  return true;
+}
+
+bool DirectiveReader::OnPixelFilter(Arguments& arguments) {
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadTyped(type, parameters)) return false;
+  ParameterList list = ListFor(arguments, type, std::move(parameters));
+  ReadPixelFilter(type, list, scene_.filter);
+  return true;
+}
+
+bool DirectiveReader::OnSampler(Arguments& arguments) {
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadTyped(type, parameters)) return false;
+  ParameterList list = ListFor(arguments, type, std::move(parameters));
+  ReadSampler(type, list, scene_.integrator);
+  return true;
+}
+
+bool DirectiveReader::OnIntegrator(Arguments& arguments) {
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadTyped(type, parameters)) return false;
+  ParameterList list = ListFor(arguments, type, std::move(parameters));
+  ReadIntegrator(type, list, scene_.integrator);
+  return true;
+}
+
+bool DirectiveReader::OnAccelerator(Arguments& arguments) {
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadTyped(type, parameters)) return false;
+  diagnostics_.Note(arguments.location(), Concat("Accelerator ", Quoted(type), " is ignored"));
+  return true;
+}
+
+bool DirectiveReader::OnColorSpace(Arguments& arguments) {
+  std::string name;
+  if (!arguments.ReadString("a name", name)) return false;
+  if (name != "srgb") {
+    diagnostics_.Warning(
+        arguments.location(),
+        Concat("ColorSpace ", Quoted(name), " is not supported; colours are read as srgb"));
+  }
+  return true;
+}
+
+bool DirectiveReader::OnOption(Arguments& arguments) {
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadParameters(parameters)) return false;
+  for (const Parameter& parameter : parameters) {
+    diagnostics_.Note(parameter.location, Concat("Option ", Quoted(parameter.name), " is ignored"));
+  }
+  return true;
+}
+
+bool DirectiveReader::OnMaterial(Arguments& arguments) {
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadTyped(type, parameters)) return false;
+  if (IsPbrtV3Material(type)) return RefusePbrtV3(arguments);
+  ParameterList list = ListFor(arguments, type, std::move(parameters),
+                               graphics_.state().DefaultsOf(AttributeTarget::kMaterial));
+  graphics_.state().material = static_cast<std::int32_t>(scene_.materials.size());
+  scene_.materials.push_back(ReadMaterial(type, list, textures_));
+  return true;
+}
+
+DirectiveReader::NamedMaterial& DirectiveReader::Named(const std::string& name,
+                                                       const SourceLocation& location) {
+  const auto [material, is_new] = named_materials_.try_emplace(name);
+  if (is_new) {
+    material->second.index = static_cast<std::int32_t>(scene_.materials.size());
+    material->second.location = location;
+    scene_.materials.push_back(Material());
+  }
+  return material->second;
+}
+
+bool DirectiveReader::OnMakeNamedMaterial(Arguments& arguments) {
+  std::string name;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadString("a name", name) || !arguments.ReadParameters(parameters)) return false;
+  ParameterList list = ListFor(arguments, name, std::move(parameters),
+                               graphics_.state().DefaultsOf(AttributeTarget::kMaterial));
+  const std::optional<std::string> type = list.FindString("type");
+  if (type.has_value() && IsPbrtV3Material(*type)) return RefusePbrtV3(arguments);
+  NamedMaterial& named = Named(name, arguments.location());
+  if (named.is_defined) arguments.Error(Concat("the material ", Quoted(name), " is defined twice"));
+  named.is_defined = true;
+  if (!type.has_value()) {
+    if (!list.Has("type")) list.Error("needs \"string type\"");
+    return true;
+  }
+  Material material;
+  if (IsSupportedMaterial(*type)) {
+    material = ReadMaterial(*type, list, textures_);
+  } else {
+    // Names the type, which the subject of the list does not.
+    ParameterList unsupported(Concat("the type ", Quoted(*type), " of ", list.subject()),
+                              arguments.location(), {}, nullptr, diagnostics_);
+    material = ReadMaterial(*type, unsupported, textures_);
+  }
+  material.name = name;
+  scene_.materials[static_cast<std::size_t>(named.index)] = std::move(material);
+  return true;
+}
+
+bool DirectiveReader::OnNamedMaterial(Arguments& arguments) {
+  std::string name;
+  if (!arguments.ReadString("a name", name)) return false;
+  NamedMaterial& named = Named(name, arguments.location());  // may be defined later
+  if (!std::exchange(named.is_used, true)) named.location = arguments.location();
+  graphics_.state().material = named.index;
+  return true;
+}
+
+bool DirectiveReader::OnAreaLightSource(Arguments& arguments) {
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadTyped(type, parameters)) return false;
+  ParameterList list = ListFor(arguments, type, std::move(parameters),
+                               graphics_.state().DefaultsOf(AttributeTarget::kLight));
+  const std::optional<AreaEmission> emission = ReadAreaEmission(type, list);
+  GraphicsState& state = graphics_.state();
+  state.area_light = kNoAreaLight;
+  state.area_emission.reset();
+  if (!emission.has_value()) return true;
+  if (IsBlack(emission->radiance)) {
+    list.Warning("", "emits nothing, its L or scale is 0: its shapes are no lights");
+    return true;
+  }
+  if (!emission->power_w.has_value()) {
+    state.area_light = static_cast<std::int32_t>(scene_.area_lights.size());
+    scene_.area_lights.push_back(MakeAreaLight(*emission, 1));
+  }
+  state.area_emission = std::make_shared<const AreaEmission>(*emission);
+  return true;
+}
+
+bool DirectiveReader::OnLightSource(Arguments& arguments) {
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadTyped(type, parameters)) return false;
+  ParameterList list = ListFor(arguments, type, std::move(parameters),
+                               graphics_.state().DefaultsOf(AttributeTarget::kLight));
+  ReadLight(type, list, graphics_.state().to_world, assets_, scene_);
+  return true;
+}
+
+bool DirectiveReader::OnShape(Arguments& arguments) {
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadTyped(type, parameters)) return false;
+  GraphicsState& state = graphics_.state();
+  ParameterList list =
+      ListFor(arguments, type, std::move(parameters), state.DefaultsOf(AttributeTarget::kShape));
+  ShapePlacement placement = {
+      state.to_world, state.reverse_orientation, {state.material, state.area_light}};
+  const bool emits = state.area_emission != nullptr;
+  if (emits && open_object_ != nullptr) {
+    list.Error("emits light inside an object, which is not supported; move it out of ObjectBegin");
+    placement.traits.area_light = kNoAreaLight;
+  }
+  const bool is_light = emits && open_object_ == nullptr;
+  ShapeSet shapes = ReadShapes(type, list, placement, assets_);
+  if (!HasRoomFor(shapes, arguments)) return true;
+  if (is_light && !diagnostics_.has_error() && !(shapes.Area() > 0))
+    WarnOfLightWithoutArea(arguments.location(), list.subject(), diagnostics_);
+  if (is_light) {
+    for (std::size_t i = 0; i < shapes.meshes.size(); ++i) {
+      if (shapes.meshes[i].indices.empty()) continue;
+      unfinished_.emitting_meshes.push_back(
+          {scene_.meshes.size() + i, arguments.location(), list.subject()});
+    }
+  }
+  if (is_light && state.area_emission->power_w.has_value() && shapes.Cost() > 0) {
+    if (!shapes.meshes.empty() && shapes.meshes[0].indices.size() > 3) {
+      list.Warning("", "gets its power as a whole; pbrt-v4 gives it to each triangle");
+    }
+    const AreaLight light = MakeAreaLight(*state.area_emission, shapes.Area());
+    if (!IsFinite(light.radiance)) list.Error("is too small for its power");
+    const auto index = static_cast<std::int32_t>(scene_.area_lights.size());
+    scene_.area_lights.push_back(light);
+    for (TriangleMesh& mesh : shapes.meshes)
+      mesh.traits.area_light = index;
+    for (Sphere& sphere : shapes.spheres)
+      sphere.traits.area_light = index;
+    for (Disk& disk : shapes.disks)
+      disk.traits.area_light = index;
+  }
+  AddShapes(std::move(shapes));
+  return true;
+}
+
+bool DirectiveReader::HasRoomFor(const ShapeSet& shapes, Arguments& arguments) {
+  const std::uint64_t most = assets_.limits().max_triangles;
+  if (shapes.Cost() <= most - shapes_cost_) return true;
+  arguments.Error(Concat("the scene has more than ", most, " triangles"));
+  is_stopped_ = true;
+  return false;
+}
+
+void DirectiveReader::AddShapes(ShapeSet shapes) {
+  shapes_cost_ += shapes.Cost();
+  const auto append = [](auto& to, auto& from) {
+    to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+  };
+  append(open_object_ != nullptr ? open_object_->meshes : scene_.meshes, shapes.meshes);
+  append(open_object_ != nullptr ? open_object_->spheres : scene_.spheres, shapes.spheres);
+  append(open_object_ != nullptr ? open_object_->disks : scene_.disks, shapes.disks);
+}
+
+bool DirectiveReader::OnTexture(Arguments& arguments) {
+  std::string name;
+  std::string kind;
+  std::string type;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadString("a name", name) || !arguments.ReadString("a kind", kind) ||
+      !arguments.ReadString("a type", type) || !arguments.ReadParameters(parameters)) {
+    return false;
+  }
+  if (kind == "float") {
+    // Nothing here takes one: a parameter that refers to it is refused, whatever it is.
+    if (!float_textures_.insert(name).second) {
+      arguments.Error(Concat("the float texture ", Quoted(name), " is defined twice"));
+    }
+    return true;
+  }
+  if (kind == "color") return RefusePbrtV3(arguments);
+  if (kind != "spectrum") {
+    arguments.Error(
+        Concat("Texture ", Quoted(name), " must be of spectrum or float, not ", Quoted(kind)));
+    return true;
+  }
+  if (textures_.contains(name)) {
+    arguments.Error(Concat("the texture ", Quoted(name), " is defined twice"));
+    return true;
+  }
+  ParameterList list(Concat("Texture ", Quoted(name)), arguments.location(), std::move(parameters),
+                     graphics_.state().DefaultsOf(AttributeTarget::kTexture).get(), diagnostics_);
+  // Made first: a texture may not be a part of itself.
+  NamedTexture made = ReadTexture(type, list, textures_, assets_, scene_.textures);
+  textures_.emplace(name, std::move(made));
+  return true;
+}
+
+bool DirectiveReader::OnMediumInterface(Arguments& arguments) {
+  std::string inside;
+  std::string outside;
+  if (!arguments.ReadString("a name", inside)) return false;
+  if (arguments.tokens().Peek().kind == Token::Kind::kString &&
+      !arguments.ReadString("a name", outside))
+    return false;
+  if (!inside.empty() || !outside.empty()) {
+    arguments.Error("participating media are not supported (MediumInterface)");
+  }
+  return true;
+}
+
+bool DirectiveReader::OnMakeNamedMedium(Arguments& arguments) {
+  std::string name;
+  std::vector<Parameter> parameters;
+  if (!arguments.ReadString("a name", name) || !arguments.ReadParameters(parameters)) return false;
+  arguments.Error(
+      Concat("participating media are not supported (MakeNamedMedium ", Quoted(name), ")"));
+  return true;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,354 @@
+#include "render/formats/pbrt/shapes.h"
+
+// Which way shapes face, by pbrt-v4's rules. A mesh without normals faces along the cross product
+// of its world-space edges, turned over by ReverseOrientation and by a mirroring transform, one
+// undoing the other. A mesh with normals faces with its normals, which are mapped as normals and
+// turned over by ReverseOrientation alone. Spheres face outward, disks along +z of their own space;
+// only ReverseOrientation turns them over.
+#include <array>
+#include <cfloat>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "render/base/text.h"
+#include "render/formats/degenerate_triangles.h"
+#include "render/formats/pbrt/kinds.h"
+#include "render/math/double3.h"
+
+namespace lucerna {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+constexpr std::array<std::string_view, 2> kPointTypes = {"point3", "point"};
+constexpr std::array<std::string_view, 2> kNormalTypes = {"normal", "normal3"};
+constexpr std::array<std::string_view, 4> kPoint2Types = {"point2", "vector2", "point", "float"};
+constexpr std::array<std::string_view, 1> kIntegerType = {"integer"};
+
+std::vector<Vec3> Triples(std::span<const double> numbers) {
+  std::vector<Vec3> triples;
+  triples.reserve(numbers.size() / 3);
+  for (std::size_t i = 0; i + 2 < numbers.size(); i += 3) {
+    triples.push_back({static_cast<float>(numbers[i]), static_cast<float>(numbers[i + 1]),
+                       static_cast<float>(numbers[i + 2])});
+  }
+  return triples;
+}
+
+// Moves the mesh; its winding is not touched. Returns false when a position leaves the finite
+// numbers.
+bool Move(const Transform& to_world, TriangleMesh& mesh) {
+  for (Vec3& position : mesh.positions) {
+    position = to_world.Point(position);
+    if (!IsFinite(position)) return false;
+  }
+  for (Vec3& normal : mesh.normals) {
+    const float size = MaxAbs(normal);
+    normal = size > 0 ? to_world.Normal(normal / size) : Vec3();
+    // Normal() leaves zero when there is no direction left: S3 lets that stand.
+    if (normal != Vec3()) normal = Normalize(normal);
+  }
+  return true;
+}
+
+void SwapWinding(TriangleMesh& mesh, std::size_t triangle) {
+  std::swap(mesh.indices[3 * triangle + 1], mesh.indices[3 * triangle + 2]);
+}
+
+Double3 EdgeCross(const TriangleMesh& mesh, std::size_t triangle) {
+  return TriangleCross(mesh.positions[mesh.indices[3 * triangle]],
+                       mesh.positions[mesh.indices[3 * triangle + 1]],
+                       mesh.positions[mesh.indices[3 * triangle + 2]]);
+}
+
+// The area of what the unit of the scene may yet make large enough (scene_unit.h).
+constexpr double kLeastArea = 1e-90;
+
+// What the readers of all kinds of shape are given.
+struct ShapeInput {
+  ParameterList& parameters;
+  const ShapePlacement& placement;
+  AssetReader& assets;
+};
+
+// Puts a mesh with sound indices where `placement` says.
+void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
+               ShapeSet& shapes) {
+  if (!Move(placement.to_world, mesh)) {
+    parameters.Error("is moved out of the finite numbers by its transform");
+    return;
+  }
+  if (placement.reverse_orientation) {
+    for (Vec3& normal : mesh.normals)
+      normal = -normal;
+  }
+  const std::size_t dropped = DropTriangles(mesh, kLeastArea);
+  if (dropped > 0) {
+    parameters.diagnostics().Note(
+        parameters.location(),
+        Concat(parameters.subject(), ": ", dropped, " of ", dropped + mesh.indices.size() / 3,
+               " triangles have no area and are dropped"));
+  }
+  const bool turned_over = placement.reverse_orientation != placement.to_world.SwapsHandedness();
+  for (std::size_t triangle = 0; triangle < mesh.indices.size() / 3; ++triangle) {
+    bool swap = turned_over;
+    if (!mesh.normals.empty()) {
+      const Vec3 towards = mesh.normals[mesh.indices[3 * triangle]] +
+                           mesh.normals[mesh.indices[3 * triangle + 1]] +
+                           mesh.normals[mesh.indices[3 * triangle + 2]];
+      const double agreement = Dot(EdgeCross(mesh, triangle), Double3(towards));
+      if (agreement != 0) swap = agreement < 0;
+    }
+    if (swap) SwapWinding(mesh, triangle);
+  }
+  if (mesh.indices.empty()) return;
+  mesh.traits = placement.traits;
+  shapes.meshes.push_back(std::move(mesh));
+}
+
+void ReadTriangleMesh(const ShapeInput& input, ShapeSet& shapes) {
+  ParameterList& parameters = input.parameters;
+  TriangleMesh mesh;
+  mesh.positions = Triples(parameters.Numbers("P", kPointTypes, 3));
+  mesh.normals = Triples(parameters.Numbers("N", kNormalTypes, 3));
+  const std::span<const double> indices = parameters.Numbers("indices", kIntegerType, 3);
+  for (const std::string_view name : {"S", "faceIndices"})
+    parameters.Ignore(name);
+  const std::string_view uv_name = parameters.Has("uv") ? "uv" : "st";
+  const std::span<const double> uvs = parameters.Numbers(uv_name, kPoint2Types, 2);
+  for (std::size_t i = 0; i + 1 < uvs.size(); i += 2) {
+    mesh.uvs.push_back({static_cast<float>(uvs[i]), static_cast<float>(uvs[i + 1])});
+  }
+  if (mesh.positions.empty()) {
+    if (!parameters.Has("P")) parameters.Error("needs vertex positions: \"point3 P\" [ ... ]");
+    return;
+  }
+  if (!mesh.normals.empty() && mesh.normals.size() != mesh.positions.size()) {
+    parameters.Error("N", Concat("must have as many normals as P has vertices (",
+                                 mesh.positions.size(), "), not ", mesh.normals.size()));
+    return;
+  }
+  if (!mesh.uvs.empty() && mesh.uvs.size() != mesh.positions.size()) {
+    parameters.Error(uv_name, Concat("must have as many pairs as P has vertices (",
+                                     mesh.positions.size(), "), not ", mesh.uvs.size()));
+    return;
+  }
+  if (!parameters.Has("indices") && mesh.positions.size() == 3) {
+    mesh.indices = {0, 1, 2};
+  } else if (indices.empty()) {
+    if (!parameters.Has("indices")) {
+      parameters.Error("needs vertex indices, three for each triangle");
+    }
+    return;
+  }
+  for (const double index : indices) {
+    if (!(index >= 0 && index < static_cast<double>(mesh.positions.size()))) {
+      parameters.Error("indices",
+                       Concat("refers to vertex ", index, " of ", mesh.positions.size()));
+      return;
+    }
+    mesh.indices.push_back(static_cast<std::uint32_t>(index));
+  }
+  PlaceMesh(std::move(mesh), parameters, input.placement, shapes);
+}
+
+void ReadPlyMesh(const ShapeInput& input, ShapeSet& shapes) {
+  ParameterList& parameters = input.parameters;
+  const std::optional<std::string> file = parameters.FindString("filename");
+  if (parameters.Has("displacement")) {
+    parameters.Error("displacement", "is not supported");
+    parameters.Ignore("displacement");
+  }
+  parameters.Ignore("edgelength");
+  if (!file.has_value()) {
+    if (!parameters.Has("filename")) parameters.Error("needs \"string filename\"");
+    return;
+  }
+  StatusOr<TriangleMesh> mesh = input.assets.ReadMesh(*file);
+  if (!mesh.ok()) {
+    parameters.Error("filename", Concat("cannot be read: ", mesh.status().message()));
+    return;
+  }
+  PlaceMesh(*std::move(mesh), parameters, input.placement, shapes);
+}
+
+void ReadSphere(const ShapeInput& input, ShapeSet& shapes) {
+  ParameterList& parameters = input.parameters;
+  const ShapePlacement& placement = input.placement;
+  const double radius = parameters.Float("radius", 1, kAboveZero);
+  if (parameters.Float("zmin", -radius) > -radius || parameters.Float("zmax", radius) < radius ||
+      parameters.Float("phimax", 360) < 360) {
+    parameters.Error("is only a part of a sphere (zmin, zmax, phimax), which is not supported");
+    return;
+  }
+  const StatusOr<double> scale = placement.to_world.UniformScale();
+  if (!scale.ok()) {
+    parameters.Error(
+        "is made an ellipsoid by its transform, which is not supported; scale all "
+        "axes alike, or give a mesh");
+    return;
+  }
+  Sphere sphere;
+  sphere.center = placement.to_world.Point({0, 0, 0});
+  sphere.radius = static_cast<float>(radius * *scale);
+  sphere.inward = placement.reverse_orientation;
+  sphere.traits = placement.traits;
+  sphere.axes = AxesOf(placement.to_world).value_or(ShapeAxes());
+  if (!IsFinite(sphere.center) || !(sphere.radius >= FLT_MIN) || !std::isfinite(sphere.radius)) {
+    parameters.Error("is moved or scaled out of single precision by its transform");
+    return;
+  }
+  shapes.spheres.push_back(sphere);
+}
+
+void ReadDisk(const ShapeInput& input, ShapeSet& shapes) {
+  ParameterList& parameters = input.parameters;
+  const ShapePlacement& placement = input.placement;
+  const double radius = parameters.Float("radius", 1, kAboveZero);
+  const double inner_radius = parameters.Float("innerradius", 0, kZeroOrMore);
+  const double height = parameters.Float("height", 0);
+  if (parameters.Float("phimax", 360) < 360) {
+    parameters.Error("phimax", "makes it a part of a disk, which is not supported");
+    return;
+  }
+  if (inner_radius >= radius) {
+    parameters.Error("innerradius", "must be smaller than radius");
+    return;
+  }
+  const StatusOr<double> scale = placement.to_world.UniformScale();
+  if (!scale.ok()) {
+    parameters.Error(
+        "is made an ellipse by its transform, which is not supported; scale all axes "
+        "alike, or give a mesh");
+    return;
+  }
+  Disk disk;
+  disk.center = placement.to_world.Point({0, 0, static_cast<float>(height)});
+  disk.normal = Normalize(placement.to_world.Normal({0, 0, 1}));
+  if (placement.reverse_orientation) disk.normal = -disk.normal;
+  disk.radius = static_cast<float>(radius * *scale);
+  disk.inner_radius = static_cast<float>(inner_radius * *scale);
+  disk.traits = placement.traits;
+  disk.axes = AxesOf(placement.to_world).value_or(ShapeAxes());
+  if (!IsFinite(disk.center) || !(disk.radius >= FLT_MIN) || !std::isfinite(disk.radius)) {
+    parameters.Error("is moved or scaled out of single precision by its transform");
+    return;
+  }
+  shapes.disks.push_back(disk);
+}
+
+using ShapeReader = void (*)(const ShapeInput&, ShapeSet&);
+constexpr Kind<ShapeReader> kKinds[] = {
+    {"trianglemesh", &ReadTriangleMesh},
+    {"plymesh", &ReadPlyMesh},
+    {"sphere", &ReadSphere},
+    {"disk", &ReadDisk},
+};
+
+}  // namespace
+
+StatusOr<ShapeAxes> AxesOf(const Transform& to_world) {
+  LUCERNA_ASSIGN_OR_RETURN(const double scale, to_world.UniformScale());
+  const auto axis = [&](Vec3 local) {
+    const Vec3 world = to_world.Vector(local * static_cast<float>(1 / scale));
+    const float size = MaxAbs(world);
+    return size > 0 && std::isfinite(size) ? Normalize(world / size) : local;
+  };
+  return ShapeAxes{axis({1, 0, 0}), axis({0, 1, 0}), axis({0, 0, 1})};
+}
+
+std::uint64_t ShapeSet::Cost() const {
+  std::uint64_t cost = spheres.size() + disks.size();
+  for (const TriangleMesh& mesh : meshes) {
+    cost += std::max<std::uint64_t>({1, mesh.indices.size() / 3, mesh.positions.size() / 3});
+  }
+  return cost;
+}
+
+double ShapeSet::Area() const {
+  double area_m2 = 0;
+  for (const TriangleMesh& mesh : meshes) {
+    for (std::size_t triangle = 0; triangle < mesh.indices.size() / 3; ++triangle) {
+      area_m2 += Length(EdgeCross(mesh, triangle)) / 2;
+    }
+  }
+  const auto square = [](float x) { return static_cast<double>(x) * static_cast<double>(x); };
+  for (const Sphere& sphere : spheres)
+    area_m2 += 4 * kPi * square(sphere.radius);
+  for (const Disk& disk : disks) {
+    area_m2 += kPi * (square(disk.radius) - square(disk.inner_radius));
+  }
+  return area_m2;
+}
+
+ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
+                    const ShapePlacement& placement, AssetReader& assets) {
+  ShapeSet shapes;
+  const ShapeReader read = FindReader<ShapeReader>(kKinds, type);
+  if (read == nullptr) {
+    parameters.Error(Concat("is not supported; ", SupportedKinds<ShapeReader>(kKinds)));
+    return shapes;
+  }
+  read({parameters, placement, assets}, shapes);
+  if (parameters.Has("alpha") && parameters.FindFloat("alpha").value_or(1) != 1) {
+    parameters.Error("alpha", "is not supported: shapes are opaque");
+  }
+  parameters.WarnOfUnread();
+  return shapes;
+}
+
+StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world) {
+  const Status moved_away = absl::InvalidArgumentError(
+      "the instance is moved or scaled out of single precision by its transform");
+  ShapeSet shapes;
+  for (const TriangleMesh& original : object.meshes) {
+    TriangleMesh mesh = original;
+    if (!Move(to_world, mesh)) return moved_away;
+    DropTriangles(mesh, kLeastArea);
+    if (mesh.indices.empty()) continue;
+    // The outward side stays outward: a mirror image is wound the other way round.
+    if (to_world.SwapsHandedness()) {
+      for (std::size_t i = 0; i < mesh.indices.size() / 3; ++i)
+        SwapWinding(mesh, i);
+    }
+    shapes.meshes.push_back(std::move(mesh));
+  }
+  if (object.spheres.empty() && object.disks.empty()) return shapes;
+
+  const StatusOr<double> scale = to_world.UniformScale();
+  if (!scale.ok()) {
+    return absl::InvalidArgumentError(
+        "the instance holds a sphere or a disk, and its transform does not scale all axes alike, "
+        "which is not supported");
+  }
+  const auto factor = static_cast<float>(*scale);
+  const ShapeAxes turned = AxesOf(to_world).value_or(ShapeAxes());
+  const auto in_world = [&](Vec3 v) { return turned.x * v.x + turned.y * v.y + turned.z * v.z; };
+  const auto axes_in_world = [&](const ShapeAxes& axes) {
+    return ShapeAxes{in_world(axes.x), in_world(axes.y), in_world(axes.z)};
+  };
+  for (Sphere sphere : object.spheres) {
+    sphere.center = to_world.Point(sphere.center);
+    sphere.radius *= factor;
+    sphere.axes = axes_in_world(sphere.axes);
+    if (!IsFinite(sphere.center) || !(sphere.radius >= FLT_MIN) || !std::isfinite(sphere.radius)) {
+      return moved_away;
+    }
+    shapes.spheres.push_back(sphere);
+  }
+  for (Disk disk : object.disks) {
+    disk.center = to_world.Point(disk.center);
+    disk.normal = Normalize(to_world.Normal(disk.normal));
+    disk.radius *= factor;
+    disk.axes = axes_in_world(disk.axes);
+    disk.inner_radius *= factor;
+    if (!IsFinite(disk.center) || !(disk.radius >= FLT_MIN) || !std::isfinite(disk.radius)) {
+      return moved_away;
+    }
+    shapes.disks.push_back(disk);
+  }
+  return shapes;
+}
+
+}  // namespace lucerna

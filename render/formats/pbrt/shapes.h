@@ -1,0 +1,49 @@
+// Reads Shape directives.
+//
+// Each function that reads a directive asks `parameters` for what it knows, reports what is wrong,
+// and does its best to go on; after an error its outcome is never rendered.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "render/base/status.h"
+#include "render/formats/asset_reader.h"
+#include "render/formats/pbrt/parameter_list.h"
+#include "render/math/transform.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+// Where the axes of a space point. Errors: INVALID_ARGUMENT when it is stretched.
+[[nodiscard]] StatusOr<ShapeAxes> AxesOf(const Transform& to_world);
+
+// Shapes in world space, or in the space of an object that is instanced later. Their traits are
+// those of the Shape directive that made them.
+struct ShapeSet {
+  std::vector<TriangleMesh> meshes;
+  std::vector<Sphere> spheres;
+  std::vector<Disk> disks;
+
+  // What it costs to keep: triangles, every other shape as one, and vertices that no triangle
+  // needs as a third of one.
+  [[nodiscard]] std::uint64_t Cost() const;
+  // [m²], of one side.
+  [[nodiscard]] double Area() const;
+};
+
+struct ShapePlacement {
+  Transform to_world;
+  bool reverse_orientation = false;
+  ShapeTraits traits;
+};
+
+[[nodiscard]] ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
+                                  const ShapePlacement& placement, AssetReader& assets);
+
+// The shapes of an object where an instance of it stands. Errors: INVALID_ARGUMENT when the
+// transform moves a position out of the finite numbers, or makes an ellipsoid of a sphere.
+[[nodiscard]] StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world);
+
+}  // namespace lucerna

@@ -1,0 +1,112 @@
+#include <array>
+
+#include "render/base/text.h"
+#include "render/formats/pbrt/directives.h"
+
+namespace lucerna {
+
+bool DirectiveReader::Replace(Arguments& arguments, const Transform& transform) {
+  if (transform.IsFinite() && transform.Inverse().ok()) {
+    graphics_.state().to_world = transform;
+  } else {
+    arguments.Error(Concat(arguments.directive(), " makes a transform that cannot be inverted"));
+  }
+  return true;
+}
+
+bool DirectiveReader::Concatenate(Arguments& arguments, const StatusOr<Transform>& transform) {
+  if (transform.ok()) return Replace(arguments, graphics_.state().to_world * *transform);
+  arguments.Error(std::string(transform.status().message()));
+  return true;
+}
+
+bool DirectiveReader::OnIdentity(Arguments& arguments) {
+  return Replace(arguments, Transform());
+}
+
+bool DirectiveReader::OnTranslate(Arguments& arguments) {
+  std::array<double, 3> v{};
+  return arguments.ReadNumbers(v) && Concatenate(arguments, Transform::Translate(v[0], v[1], v[2]));
+}
+
+bool DirectiveReader::OnScale(Arguments& arguments) {
+  std::array<double, 3> v{};
+  return arguments.ReadNumbers(v) && Concatenate(arguments, Transform::Scale(v[0], v[1], v[2]));
+}
+
+bool DirectiveReader::OnRotate(Arguments& arguments) {
+  std::array<double, 4> v{};
+  return arguments.ReadNumbers(v) &&
+         Concatenate(arguments, Transform::Rotate(v[0], v[1], v[2], v[3]));
+}
+
+bool DirectiveReader::OnLookAt(Arguments& arguments) {
+  std::array<double, 9> v{};
+  return arguments.ReadNumbers(v) &&
+         Concatenate(arguments,
+                     Transform::LookAt({v[0], v[1], v[2]}, {v[3], v[4], v[5]}, {v[6], v[7], v[8]}));
+}
+
+bool DirectiveReader::ReadMatrix(Arguments& arguments, Transform& transform) {
+  std::array<double, 16> v{};
+  if (!arguments.ReadNumbers(v)) return false;
+  std::array<std::array<double, 4>, 4> rows{};
+  for (std::size_t i = 0; i < 16; ++i)
+    rows[i % 4][i / 4] = v[i];  // column by column
+  if (rows[3] != std::array<double, 4>{0, 0, 0, 1}) {
+    arguments.Error(Concat(arguments.directive(),
+                           " must be affine: its 4th, 8th, 12th and 16th numbers are 0, ",
+                           "0, 0 and 1"));
+    return true;
+  }
+  transform = Transform(rows);
+  return true;
+}
+
+bool DirectiveReader::OnTransform(Arguments& arguments) {
+  Transform transform = graphics_.state().to_world;
+  return ReadMatrix(arguments, transform) && Replace(arguments, transform);
+}
+
+bool DirectiveReader::OnConcatTransform(Arguments& arguments) {
+  Transform transform;
+  return ReadMatrix(arguments, transform) && Concatenate(arguments, transform);
+}
+
+bool DirectiveReader::OnCoordinateSystem(Arguments& arguments) {
+  std::string name;
+  if (!arguments.ReadString("a name", name)) return false;
+  coordinate_systems_[name] = graphics_.state().to_world;
+  return true;
+}
+
+bool DirectiveReader::OnCoordSysTransform(Arguments& arguments) {
+  std::string name;
+  if (!arguments.ReadString("a name", name)) return false;
+  const auto system = coordinate_systems_.find(name);
+  if (system == coordinate_systems_.end()) {
+    arguments.Error(Concat("there is no coordinate system ", Quoted(name)));
+    return true;
+  }
+  return Replace(arguments, system->second);
+}
+
+bool DirectiveReader::OnActiveTransform(Arguments& arguments) {
+  const Token token = arguments.tokens().Peek();
+  if (token.kind != Token::Kind::kWord ||
+      (token.text != "All" && token.text != "StartTime" && token.text != "EndTime")) {
+    arguments.Error("ActiveTransform takes StartTime, EndTime or All");
+    return false;
+  }
+  if (token.text != "All") arguments.Error("motion blur is not supported (ActiveTransform)");
+  arguments.tokens().Next();
+  return true;
+}
+
+bool DirectiveReader::OnTransformTimes(Arguments& arguments) {
+  std::array<double, 2> v{};
+  arguments.Error("motion blur is not supported (TransformTimes)");
+  return arguments.ReadNumbers(v);
+}
+
+}  // namespace lucerna

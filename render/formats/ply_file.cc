@@ -1,0 +1,478 @@
+#include "render/formats/ply_file.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/numbers.h"
+#include <zlib.h>
+
+#include "render/base/text.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::uint64_t kMaxInflation = 200;
+
+Status Bad(std::string_view what) {
+  return absl::InvalidArgumentError(Concat("bad PLY file: ", what));
+}
+
+enum class Format : std::uint8_t { kAscii, kLittleEndian, kBigEndian };
+enum class Scalar : std::uint8_t {
+  kInt8,
+  kUint8,
+  kInt16,
+  kUint16,
+  kInt32,
+  kUint32,
+  kFloat,
+  kDouble
+};
+
+std::size_t SizeOf(Scalar scalar) {
+  constexpr std::array<std::size_t, 8> kSizes = {1, 1, 2, 2, 4, 4, 4, 8};
+  return kSizes[static_cast<std::size_t>(scalar)];
+}
+
+std::optional<Scalar> ScalarNamed(std::string_view name) {
+  constexpr std::array<std::pair<std::string_view, Scalar>, 16> kNames = {{
+      {"char", Scalar::kInt8},
+      {"int8", Scalar::kInt8},
+      {"uchar", Scalar::kUint8},
+      {"uint8", Scalar::kUint8},
+      {"short", Scalar::kInt16},
+      {"int16", Scalar::kInt16},
+      {"ushort", Scalar::kUint16},
+      {"uint16", Scalar::kUint16},
+      {"int", Scalar::kInt32},
+      {"int32", Scalar::kInt32},
+      {"uint", Scalar::kUint32},
+      {"uint32", Scalar::kUint32},
+      {"float", Scalar::kFloat},
+      {"float32", Scalar::kFloat},
+      {"double", Scalar::kDouble},
+      {"float64", Scalar::kDouble},
+  }};
+  for (const auto& [known, scalar] : kNames) {
+    if (known == name) return scalar;
+  }
+  return std::nullopt;
+}
+
+struct Property {
+  std::string name;
+  bool is_list = false;
+  Scalar count_type = Scalar::kUint8;  // of a list
+  Scalar type = Scalar::kFloat;
+};
+
+struct Element {
+  std::string name;
+  std::uint64_t count = 0;
+  std::vector<Property> properties;
+
+  // The fewest bytes that one of these can take.
+  [[nodiscard]] std::uint64_t MinSizeBytes(Format format) const {
+    // In ASCII a value is a digit and a separator, and an element without values an empty line.
+    if (format == Format::kAscii) return std::max<std::uint64_t>(1, 2 * properties.size());
+    std::uint64_t size = 0;
+    for (const Property& property : properties) {
+      size += SizeOf(property.is_list ? property.count_type : property.type);
+    }
+    return size;
+  }
+  [[nodiscard]] bool has_list() const {
+    return std::any_of(properties.begin(), properties.end(),
+                       [](const Property& property) { return property.is_list; });
+  }
+};
+
+struct Header {
+  Format format = Format::kAscii;
+  std::vector<Element> elements;
+  std::size_t body_offset = 0;
+};
+
+StatusOr<Header> ParseHeader(std::string_view bytes) {
+  constexpr std::size_t kMaxHeaderBytes = 1 << 20;
+  Header header;
+  bool has_format = false;
+  std::size_t position = 0;
+  for (int line_number = 1;; ++line_number) {
+    const std::size_t end = bytes.substr(0, kMaxHeaderBytes).find('\n', position);
+    if (end == std::string_view::npos) return Bad("the header has no end_header line");
+    std::string_view line = bytes.substr(position, end - position);
+    position = end + 1;
+    if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+    const auto bad_line = [&](std::string_view what) {
+      return Bad(Concat("header line ", line_number, ": ", what));
+    };
+    if (line_number == 1) {
+      if (line != "ply") return Bad("it does not begin with \"ply\"");
+      continue;
+    }
+    const std::vector<std::string_view> words = WordsOf(line);
+    if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
+    if (words[0] == "end_header") {
+      if (!has_format) return Bad("the header has no format line");
+      header.body_offset = position;
+      return header;
+    }
+    if (words[0] == "format") {
+      if (words.size() != 3 || words[2] != "1.0") return bad_line("the format must be 1.0");
+      if (words[1] == "ascii") {
+        header.format = Format::kAscii;
+      } else if (words[1] == "binary_little_endian") {
+        header.format = Format::kLittleEndian;
+      } else if (words[1] == "binary_big_endian") {
+        header.format = Format::kBigEndian;
+      } else {
+        return bad_line("unknown format");
+      }
+      has_format = true;
+    } else if (words[0] == "element") {
+      Element element;
+      if (words.size() != 3 || !absl::SimpleAtoi(ToAbsl(words[2]), &element.count)) {
+        return bad_line("an element has a name and a count");
+      }
+      element.name = std::string(words[1]);
+      header.elements.push_back(std::move(element));
+    } else if (words[0] == "property") {
+      if (header.elements.empty()) return bad_line("a property before any element");
+      Property property;
+      property.is_list = words.size() == 5 && words[1] == "list";
+      if (!property.is_list && words.size() != 3)
+        return bad_line("a property has a type and a name");
+      const std::optional<Scalar> type = ScalarNamed(words[property.is_list ? 3 : 1]);
+      const std::optional<Scalar> count_type =
+          property.is_list ? ScalarNamed(words[2]) : Scalar::kUint8;
+      if (!type.has_value() || !count_type.has_value() || *count_type == Scalar::kFloat ||
+          *count_type == Scalar::kDouble) {
+        return bad_line("unknown property type");
+      }
+      property.type = *type;
+      property.count_type = *count_type;
+      property.name = std::string(words.back());
+      header.elements.back().properties.push_back(std::move(property));
+    } else {
+      return bad_line("unknown keyword");
+    }
+  }
+}
+
+// The values of the body, one after the other. Whoever asks for more than there is gets zeros,
+// and is_truncated() says so.
+class Body {
+ public:
+  Body(std::string_view bytes, Format format) : bytes_(bytes), format_(format) {}
+
+  [[nodiscard]] std::size_t remaining() const { return bytes_.size() - position_; }
+  [[nodiscard]] std::size_t position() const { return position_; }
+  [[nodiscard]] bool is_truncated() const { return is_truncated_; }
+  [[nodiscard]] bool is_malformed() const { return is_malformed_; }
+  [[nodiscard]] bool ok() const { return !is_truncated_ && !is_malformed_; }
+
+  double Read(Scalar type) {
+    if (format_ == Format::kAscii) return ReadText();
+    switch (type) {
+      case Scalar::kInt8:
+        return ReadBinary<std::int8_t>();
+      case Scalar::kUint8:
+        return ReadBinary<std::uint8_t>();
+      case Scalar::kInt16:
+        return ReadBinary<std::int16_t>();
+      case Scalar::kUint16:
+        return ReadBinary<std::uint16_t>();
+      case Scalar::kInt32:
+        return ReadBinary<std::int32_t>();
+      case Scalar::kUint32:
+        return ReadBinary<std::uint32_t>();
+      case Scalar::kFloat:
+        return static_cast<double>(ReadBinary<float>());
+      case Scalar::kDouble:
+        break;
+    }
+    return ReadBinary<double>();
+  }
+
+  // Binary only: passes over `size_bytes`.
+  void Skip(std::uint64_t size_bytes) {
+    if (size_bytes > remaining()) {
+      is_truncated_ = true;
+      return;
+    }
+    position_ += static_cast<std::size_t>(size_bytes);
+  }
+
+ private:
+  template <typename T>
+  T ReadBinary() {
+    if (remaining() < sizeof(T)) {
+      is_truncated_ = true;
+      return 0;
+    }
+    std::array<char, sizeof(T)> raw{};
+    std::memcpy(raw.data(), bytes_.data() + position_, sizeof(T));
+    position_ += sizeof(T);
+    if (format_ == Format::kBigEndian) std::reverse(raw.begin(), raw.end());
+    return std::bit_cast<T>(raw);
+  }
+
+  double ReadText() {
+    const char* const end = bytes_.data() + bytes_.size();
+    const char* start = bytes_.data() + position_;
+    while (start != end && IsSpace(*start))
+      ++start;
+    const char* stop = start;
+    while (stop != end && !IsSpace(*stop))
+      ++stop;
+    position_ = static_cast<std::size_t>(stop - bytes_.data());
+    if (start == stop) {
+      is_truncated_ = true;
+      return 0;
+    }
+    double value = 0;
+    // absl's reader, unlike from_chars, rounds numbers beyond the range to zero or infinity.
+    if (!absl::SimpleAtod({start, static_cast<std::size_t>(stop - start)}, &value)) {
+      is_malformed_ = true;
+    }
+    return value;
+  }
+
+  static bool IsSpace(char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; }
+
+  static_assert(std::endian::native == std::endian::little);
+  std::string_view bytes_;
+  Format format_;
+  std::size_t position_ = 0;
+  bool is_truncated_ = false;
+  bool is_malformed_ = false;
+};
+
+void SkipList(Body& body, Format format, const Property& property) {
+  const double count = body.Read(property.count_type);
+  if (!(count >= 0)) return;
+  if (format != Format::kAscii) {
+    body.Skip(static_cast<std::uint64_t>(count) * SizeOf(property.type));
+    return;
+  }
+  for (double i = 0; i < count && body.ok(); ++i)
+    body.Read(property.type);
+}
+
+Status Broken(const Body& body, const Element& element, std::uint64_t index) {
+  return Bad(Concat(body.is_truncated() ? "it ends within " : "there is no number in ",
+                    element.name, " ", index, " of ", element.count));
+}
+
+Status ReadVertices(Body& body, Format format, const Element& element, TriangleMesh& mesh) {
+  constexpr std::array<std::string_view, 10> kColumns = {"x",  "y", "z", "nx", "ny",
+                                                         "nz", "u", "v", "s",  "t"};
+  // Where each property goes: one of kColumns, or nowhere.
+  std::vector<std::size_t> column_of(element.properties.size(), kColumns.size());
+  std::array<bool, kColumns.size()> is_there{};
+  for (std::size_t i = 0; i < element.properties.size(); ++i) {
+    for (std::size_t column = 0; column < kColumns.size(); ++column) {
+      if (element.properties[i].name != kColumns[column] || element.properties[i].is_list) continue;
+      column_of[i] = column;
+      is_there[column] = true;
+    }
+  }
+  if (!(is_there[0] && is_there[1] && is_there[2])) return Bad("its vertices have no x, y and z");
+  const bool has_normals = is_there[3] && is_there[4] && is_there[5];
+  const bool has_uv = is_there[6] && is_there[7];
+  const bool has_st = is_there[8] && is_there[9];
+  mesh.positions.resize(element.count);
+  if (has_uv || has_st) mesh.uvs.resize(element.count);
+  if (has_normals) mesh.normals.resize(element.count);
+  for (std::uint64_t vertex = 0; vertex < element.count; ++vertex) {
+    std::array<float, kColumns.size() + 1> value{};  // the last takes what goes nowhere
+    for (std::size_t i = 0; i < element.properties.size(); ++i) {
+      const Property& property = element.properties[i];
+      if (property.is_list) {
+        SkipList(body, format, property);
+      } else {
+        value[column_of[i]] = static_cast<float>(body.Read(property.type));
+      }
+    }
+    if (!body.ok()) return Broken(body, element, vertex);
+    mesh.positions[vertex] = {value[0], value[1], value[2]};
+    if (!IsFinite(mesh.positions[vertex])) {
+      return Bad(Concat("the position of vertex ", vertex, " is not finite"));
+    }
+    if (has_normals) {
+      const Vec3 normal = {value[3], value[4], value[5]};
+      mesh.normals[vertex] = IsFinite(normal) ? normal : Vec3();
+    }
+    if (has_uv || has_st) {
+      const Vec2 uv = has_uv ? Vec2{value[6], value[7]} : Vec2{value[8], value[9]};
+      mesh.uvs[vertex] = std::isfinite(uv.x) && std::isfinite(uv.y) ? uv : Vec2();
+    }
+  }
+  return absl::OkStatus();
+}
+
+Status ReadFaces(Body& body, Format format, const Element& element, TriangleMesh& mesh) {
+  const auto is_corners = [](const Property& property) {
+    return property.is_list &&
+           (property.name == "vertex_indices" || property.name == "vertex_index");
+  };
+  if (element.count > 0 &&
+      std::none_of(element.properties.begin(), element.properties.end(), is_corners)) {
+    return Bad("its faces have no list vertex_indices");
+  }
+  mesh.indices.reserve(element.count * 3);
+  for (std::uint64_t face = 0; face < element.count; ++face) {
+    for (const Property& property : element.properties) {
+      if (!property.is_list) {
+        body.Read(property.type);
+        continue;
+      }
+      if (!is_corners(property)) {
+        SkipList(body, format, property);
+        continue;
+      }
+      const double count = body.Read(property.count_type);
+      if (!body.ok()) return Broken(body, element, face);
+      if (count != 3 && count != 4) {
+        return Bad(Concat("face ", face, " has ", count,
+                          " corners; only triangles and quadrangles are supported"));
+      }
+      std::array<std::uint32_t, 4> corner{};
+      for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+        const double index = body.Read(property.type);
+        if (!body.ok()) return Broken(body, element, face);
+        if (!(index >= 0 && index < static_cast<double>(mesh.positions.size())) ||
+            index != std::floor(index)) {
+          return Bad(
+              Concat("face ", face, " refers to vertex ", index, " of ", mesh.positions.size()));
+        }
+        corner[i] = static_cast<std::uint32_t>(index);
+      }
+      mesh.indices.insert(mesh.indices.end(), {corner[0], corner[1], corner[2]});
+      if (count == 4) mesh.indices.insert(mesh.indices.end(), {corner[0], corner[2], corner[3]});
+    }
+    if (!body.ok()) return Broken(body, element, face);
+  }
+  return absl::OkStatus();
+}
+
+Status SkipElement(Body& body, Format format, const Element& element) {
+  if (element.properties.empty()) return absl::OkStatus();
+  if (format != Format::kAscii && !element.has_list()) {
+    // No overflow: the counts were checked against the size of the file.
+    body.Skip(element.count * element.MinSizeBytes(format));
+    return body.ok() ? absl::OkStatus() : Broken(body, element, 0);
+  }
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    for (const Property& property : element.properties) {
+      if (property.is_list) {
+        SkipList(body, format, property);
+      } else {
+        body.Read(property.type);
+      }
+    }
+    if (!body.ok()) return Broken(body, element, i);
+  }
+  return absl::OkStatus();
+}
+
+// zlib's stream, which ends itself.
+class Inflater {
+ public:
+  Inflater() { LUCERNA_CHECK(inflateInit2(&stream_, 15 + 16) == Z_OK); }  // +16: gzip
+  ~Inflater() { inflateEnd(&stream_); }
+  Inflater(const Inflater&) = delete;
+  Inflater& operator=(const Inflater&) = delete;
+  z_stream& stream() { return stream_; }
+
+ private:
+  z_stream stream_{};
+};
+
+StatusOr<std::string> Gunzip(std::string_view bytes) {
+  const std::uint64_t limit = kMaxInflation * bytes.size();
+  std::string out;
+  std::vector<unsigned char> piece(std::size_t{1} << 18);
+  Inflater inflater;
+  z_stream& stream = inflater.stream();
+  int result = Z_OK;
+  std::size_t consumed = 0;
+  while (result != Z_STREAM_END) {
+    if (stream.avail_in == 0) {
+      // zlib counts in 32 bits.
+      const std::size_t given = std::min<std::size_t>(bytes.size() - consumed, 1U << 30);
+      if (given == 0) return Bad("its gzip stream is truncated");
+      stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data() + consumed));
+      stream.avail_in = static_cast<uInt>(given);
+      consumed += given;
+    }
+    stream.next_out = piece.data();
+    stream.avail_out = static_cast<uInt>(piece.size());
+    result = inflate(&stream, Z_NO_FLUSH);
+    if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR) {
+      return Bad("its gzip stream is damaged");
+    }
+    const std::size_t made = piece.size() - stream.avail_out;
+    if (out.size() + made > limit) {
+      return Bad(Concat("it unpacks to more than ", kMaxInflation, " times its size"));
+    }
+    out.append(reinterpret_cast<const char*>(piece.data()), made);
+  }
+  return out;
+}
+
+}  // namespace
+
+StatusOr<TriangleMesh> ParsePly(std::string_view bytes) {
+  std::string unpacked;
+  if (bytes.starts_with("\x1f\x8b")) {
+    LUCERNA_ASSIGN_OR_RETURN(unpacked, Gunzip(bytes));
+    bytes = unpacked;
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const Header header, ParseHeader(bytes));
+  // One element at a time, each against what the ones before it leave: no sum can overflow.
+  std::uint64_t left = bytes.size() - header.body_offset;
+  for (const Element& element : header.elements) {
+    const std::uint64_t size_bytes = element.MinSizeBytes(header.format);
+    if (size_bytes == 0) continue;  // has no values, and is never read
+    // The last value of an ASCII file may lack its separator.
+    const std::uint64_t room = left + (header.format == Format::kAscii ? 1 : 0);
+    if (element.count > room / size_bytes) {
+      return Bad(Concat("it announces ", element.count, " times ", element.name, ", more than its ",
+                        bytes.size(), " bytes can hold"));
+    }
+    left -= std::min(left, element.count * size_bytes);
+  }
+  TriangleMesh mesh;
+  bool has_vertices = false;
+  bool has_faces = false;
+  Body body(bytes.substr(header.body_offset), header.format);
+  for (const Element& element : header.elements) {
+    if (element.name == "vertex") {
+      if (std::exchange(has_vertices, true)) return Bad("it has two elements vertex");
+      if (element.count > 0xFFFFFFFFU) return Bad("it has more than 2^32 vertices");
+      LUCERNA_RETURN_IF_ERROR(ReadVertices(body, header.format, element, mesh));
+    } else if (element.name == "face") {
+      if (!has_vertices) return Bad("its faces come before its vertices");
+      if (std::exchange(has_faces, true)) return Bad("it has two elements face");
+      LUCERNA_RETURN_IF_ERROR(ReadFaces(body, header.format, element, mesh));
+    } else {
+      LUCERNA_RETURN_IF_ERROR(SkipElement(body, header.format, element));
+    }
+  }
+  if (!has_vertices || !has_faces) return Bad("it has no vertices or no faces");
+  return mesh;
+}
+
+}  // namespace lucerna

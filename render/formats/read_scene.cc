@@ -1,0 +1,72 @@
+#include "render/formats/read_scene.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "render/base/text.h"
+#include "render/formats/asset_reader.h"
+#include "render/formats/finish_scene.h"
+#include "render/formats/pbrt/pbrt_reader.h"
+
+namespace lucerna {
+namespace {
+
+// A format that scenes may have. To add one is to write its two functions and its row.
+struct SceneFormat {
+  std::string_view name;
+  std::string_view extension;
+  // Whether a text begins as those of the format do.
+  bool (*is_begun_by)(std::string_view text);
+  // Reads a main file, whose text is given, and what it includes. `main_path` outlives the
+  // diagnostics.
+  UnfinishedScene (*read)(const std::string& main_path, std::string_view text, AssetReader& assets,
+                          Diagnostics& diagnostics);
+};
+
+constexpr std::array kFormats = {
+    SceneFormat{"pbrt-v4", ".pbrt", &BeginsAsPbrt, &ReadPbrt},
+};
+
+const SceneFormat* FormatOf(std::string_view path, std::string_view text) {
+  for (const SceneFormat& format : kFormats) {
+    if (path.ends_with(format.extension)) return &format;
+  }
+  for (const SceneFormat& format : kFormats) {
+    if (format.is_begun_by(text)) return &format;
+  }
+  return nullptr;
+}
+
+std::string NamesOfFormats() {
+  std::vector<std::string> names;
+  for (const SceneFormat& format : kFormats)
+    names.push_back(Concat(format.name, " (", format.extension, ")"));
+  return Concat(names.size() == 1 ? "there is " : "there are ", Listed(names));
+}
+
+}  // namespace
+
+ParsedScene ReadScene(SceneFiles& files, const std::string& main_path, const SceneLimits& limits) {
+  Diagnostics diagnostics;
+  AssetReader assets(files, limits);
+  const SourceLocation whole = {&main_path, 0, 0};
+  const StatusOr<std::string> text = assets.ReadBytes(main_path);
+  if (!text.ok()) {
+    diagnostics.Error(whole, std::string(text.status().message()));
+    return {Scene(), diagnostics.Take()};
+  }
+  const SceneFormat* format = FormatOf(main_path, *text);
+  if (format == nullptr) {
+    diagnostics.Error(whole,
+                      Concat("this is no scene in a format that is read here; ", NamesOfFormats()));
+    return {Scene(), diagnostics.Take()};
+  }
+  Scene scene =
+      FinishScene(format->read(main_path, *text, assets, diagnostics), main_path, diagnostics);
+  return {std::move(scene), diagnostics.Take()};
+}
+
+}  // namespace lucerna

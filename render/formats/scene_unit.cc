@@ -1,0 +1,105 @@
+#include "render/formats/scene_unit.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/scene/scene_extent.h"
+
+namespace lucerna {
+namespace {
+
+// The largest coordinate is left alone within these powers of two, where scaling a scene keeps its
+// bits (lucerna selfcheck, scale-bits), and is else brought to the last of them: half-way down from
+// there to the finest detail that positions of 24 bits can have.
+constexpr int kLowest = -16;
+constexpr int kHighest = 20;
+constexpr int kChosen = 10;
+// Rays begin at cameras and lights too, and Embree ends the program for one that begins beyond
+// 2^60. Whatever lies farther than this from a scene of common size neither sees nor lights it.
+constexpr int kFarthest = 50;
+
+Vec3 Times(Vec3 v, double factor) {
+  return {static_cast<float>(static_cast<double>(v.x) * factor),
+          static_cast<float>(static_cast<double>(v.y) * factor),
+          static_cast<float>(static_cast<double>(v.z) * factor)};
+}
+
+float Times(float value, double factor) {
+  return static_cast<float>(static_cast<double>(value) * factor);
+}
+
+// [W·sr⁻¹] is radiance times an area.
+Status ScaleIntensity(Rgb& intensity, double factor) {
+  for (float* channel : {&intensity.r, &intensity.g, &intensity.b})
+    *channel = Times(*channel, factor * factor);
+  if (std::isfinite(MaxChannel(intensity))) return absl::OkStatus();
+  return absl::OutOfRangeError(
+      "a point or spot light is too strong for the size of the scene: its light has no number in "
+      "single precision; scale the scene up or the intensity down");
+}
+
+double FarthestOf(const Scene& scene) {
+  double farthest = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto& row = scene.camera.camera_to_world.rows()[axis];
+    const double on_lens = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
+    farthest = std::max(farthest, std::abs(row[3]) + scene.camera.lens_radius * on_lens);
+  }
+  for (const PointLight& light : scene.point_lights)
+    farthest = std::max(farthest, static_cast<double>(MaxAbs(light.position)));
+  for (const SpotLight& light : scene.spot_lights)
+    farthest = std::max(farthest, static_cast<double>(MaxAbs(light.position)));
+  return farthest;
+}
+
+// Of the power of two that is to be the unit.
+int ExponentFor(const Scene& scene) {
+  int exponent = 0;
+  if (const double largest = ExtentOf(scene).largest; largest > 0) {
+    const int own = std::ilogb(largest);
+    if (own < kLowest || own > kHighest) exponent = own - kChosen;
+  }
+  if (const double farthest = FarthestOf(scene); farthest > 0) {
+    exponent = std::max(exponent, std::ilogb(farthest) - kFarthest);
+  }
+  return exponent;
+}
+
+}  // namespace
+
+Status ChooseUnit(Scene& scene) {
+  const int exponent = ExponentFor(scene);
+  if (exponent == 0) return absl::OkStatus();
+  scene.unit = std::ldexp(1.0, exponent);
+  const double factor = 1 / scene.unit;
+
+  for (TriangleMesh& mesh : scene.meshes) {
+    for (Vec3& position : mesh.positions)
+      position = Times(position, factor);
+  }
+  for (Sphere& sphere : scene.spheres) {
+    sphere.center = Times(sphere.center, factor);
+    sphere.radius = Times(sphere.radius, factor);
+  }
+  for (Disk& disk : scene.disks) {
+    disk.center = Times(disk.center, factor);
+    disk.radius = Times(disk.radius, factor);
+    disk.inner_radius = Times(disk.inner_radius, factor);
+  }
+  for (PointLight& light : scene.point_lights) {
+    light.position = Times(light.position, factor);
+    LUCERNA_RETURN_IF_ERROR(ScaleIntensity(light.intensity, factor));
+  }
+  for (SpotLight& light : scene.spot_lights) {
+    light.position = Times(light.position, factor);
+    LUCERNA_RETURN_IF_ERROR(ScaleIntensity(light.intensity, factor));
+  }
+  Camera& camera = scene.camera;
+  camera.camera_to_world = Transform::Scale(factor, factor, factor) * camera.camera_to_world *
+                           Transform::Scale(scene.unit, scene.unit, scene.unit);
+  camera.lens_radius *= factor;
+  camera.focal_distance *= factor;
+  return absl::OkStatus();
+}
+
+}  // namespace lucerna
