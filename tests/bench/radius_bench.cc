@@ -287,7 +287,7 @@ class Check {
     settings_.use_everything = true;
     needs_ = NeedsOf(scene_, settings_);
     intersector_ = Intersector::Create(scene_, needs_.rays()).value();
-    lights_ = std::make_unique<LightSet>(scene_, *intersector_, needs_);
+    lights_ = std::make_unique<LightSet>(scene_, *intersector_, needs_.lights());
     spectra_ = SpectrumTracer::Create(scene_, settings_, needs_, *intersector_, *lights_).value();
   }
 
