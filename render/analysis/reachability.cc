@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -9,6 +10,8 @@
 
 #include "render/analysis/enclosures.h"
 #include "render/analysis/line_crossing.h"
+#include "render/base/status.h"
+#include "render/geometry/intersector.h"
 
 namespace lucerna {
 namespace {
@@ -109,61 +112,70 @@ bool IsOpaque(const Material& material) {
   return material.kind != Material::Kind::kDielectric;
 }
 
-// Whether something of a material that `is_wall` accepts lies within `length` of a point on the
-// line towards `direction`.
-bool IsBlocked(const Scene& scene, const MaterialPredicate& is_wall, Vec3 from, Double3 direction,
-               double length) {
-  const Double3 origin(from);
-  const Axes frame(direction.x, direction.y, direction.z);
-  for (const TriangleMesh& mesh : scene.meshes) {
-    if (!is_wall(scene.materials[static_cast<std::size_t>(mesh.traits.material)])) continue;
-    for (std::size_t i = 0; i < mesh.indices.size() / 3; ++i) {
-      const Triangle triangle = TriangleOf(mesh, i);
-      double along = 0;
-      const Crossing crossing = CrossingOf(
-          {frame.In(Double3(triangle[0]) - origin), frame.In(Double3(triangle[1]) - origin),
-           frame.In(Double3(triangle[2]) - origin)},
-          along);
-      if (crossing == Crossing::kAtTheEdge) return true;
-      if (crossing == Crossing::kOnce && along > 0 && along < length * (1 - kNear)) return true;
+// The shapes of the materials that some predicate accepts, as rays meet them.
+class Walls {
+ public:
+  // Errors: those of Intersector::Create.
+  static StatusOr<std::unique_ptr<Walls>> Create(const Scene& scene,
+                                                 const MaterialPredicate& is_wall) {
+    std::unique_ptr<Walls> walls(new Walls);
+    const auto accepts = [&](const ShapeTraits& traits) {
+      return is_wall(scene.materials[static_cast<std::size_t>(traits.material)]);
+    };
+    for (const TriangleMesh& mesh : scene.meshes) {
+      if (!accepts(mesh.traits)) continue;
+      TriangleMesh& wall = walls->shapes_.meshes.emplace_back();
+      wall.positions = mesh.positions;
+      wall.indices = mesh.indices;
     }
+    for (const Sphere& sphere : scene.spheres) {
+      if (accepts(sphere.traits)) walls->shapes_.spheres.push_back(sphere);
+    }
+    LUCERNA_ASSIGN_OR_RETURN(walls->intersector_, Intersector::Create(walls->shapes_));
+    return walls;
   }
-  for (const Sphere& sphere : scene.spheres) {
-    if (!is_wall(scene.materials[static_cast<std::size_t>(sphere.traits.material)])) continue;
-    const Double3 center = frame.In(Double3(sphere.center) - origin);
-    const auto radius = static_cast<double>(sphere.radius);
-    const double square = radius * radius - center.x * center.x - center.y * center.y;
-    if (!(square > 0)) continue;
-    const double half = std::sqrt(square);
-    if ((center.z - half > 0 && center.z - half < length * (1 - kNear)) ||
-        (center.z + half > 0 && center.z + half < length * (1 - kNear)))
-      return true;
-  }
-  return false;
-}
 
-// Whether closed surfaces of the materials that `is_wall` accepts might separate a point from a
-// light: some shape of such a material lies between them.
-bool MayBeSeparated(const Scene& scene, const MaterialPredicate& is_wall, Vec3 point,
-                    const LightExtent& light) {
-  if (const std::optional<Vec3> there = light.Point()) {
-    const Double3 way = Double3(*there) - Double3(point);
-    const double length = Length(way) - light.hidden();
-    return length > 0 && IsBlocked(scene, is_wall, point, way, length);
+  // Whether some wall may lie between a point and a light. No is certain: a closed wall that
+  // separates them crosses the line between them, and robust rays slip through no edge.
+  [[nodiscard]] bool MayBeBetween(Vec3 point, const LightExtent& light) const {
+    if (const std::optional<Vec3> there = light.Point()) {
+      const Double3 way = Double3(*there) - Double3(point);
+      // The light's own surface is no wall.
+      const double length = (Length(way) - light.hidden()) * (1 - kNear);
+      if (!(length > 0)) return false;
+      // From both ends: the direction is rounded, so that a ray from afar may miss a small wall.
+      const Double3 direction = way * (1 / Length(way));
+      const Double3 end = Double3(point) + direction * length;
+      return IsMet(point, direction, length) || IsMet(ToFloat(end), direction * -1, length);
+    }
+    return std::ranges::all_of(kParityRayDirections, [&](const Axes& line) {
+      return IsMet(point, line.z, HUGE_VAL) && IsMet(point, line.z * -1, HUGE_VAL);
+    });
   }
-  return std::ranges::all_of(kParityRayDirections, [&](const Axes& line) {
-    return IsBlocked(scene, is_wall, point, line.z, HUGE_VAL) &&
-           IsBlocked(scene, is_wall, point, line.z * -1, HUGE_VAL);
-  });
-}
+
+ private:
+  Walls() = default;
+
+  static Vec3 ToFloat(Double3 v) {
+    return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
+  }
+  [[nodiscard]] bool IsMet(Vec3 from, Double3 direction, double length) const {
+    return intersector_->Occluded({from, ToFloat(direction), static_cast<float>(length)});
+  }
+
+  Scene shapes_;
+  std::unique_ptr<Intersector> intersector_;
+};
 
 // The lights whose light cannot reach the camera, however it is scattered.
 std::vector<std::uint32_t> FindSeparated(const Scene& scene,
                                          const std::vector<NumberedLight>& lights) {
+  const auto walls = Walls::Create(scene, IsOpaque);
+  if (!walls.ok()) return {};
   const Vec3 eye = scene.camera.camera_to_world.Point({});
   std::vector<const NumberedLight*> candidates;
   for (const NumberedLight& light : lights) {
-    if (MayBeSeparated(scene, IsOpaque, eye, light.extent)) candidates.push_back(&light);
+    if ((*walls)->MayBeBetween(eye, light.extent)) candidates.push_back(&light);
   }
   if (candidates.empty()) return {};
   const auto lens = static_cast<float>(LensReach(scene.camera));
@@ -229,6 +241,8 @@ bool ScattersNarrowly(const Material& material) {
 std::vector<std::uint32_t> FindWithoutLineOfSight(const Scene& scene,
                                                   const std::vector<NumberedLight>& lights,
                                                   const std::vector<std::uint32_t>& but) {
+  const auto walls = Walls::Create(scene, ScattersNarrowly);
+  if (!walls.ok()) return {};
   // Some points where they would be sampled.
   std::vector<Vec3> lit;
   for (const TriangleMesh& mesh : scene.meshes) {
@@ -241,9 +255,8 @@ std::vector<std::uint32_t> FindWithoutLineOfSight(const Scene& scene,
   std::vector<const NumberedLight*> candidates;
   for (const NumberedLight& light : lights) {
     if (std::ranges::binary_search(but, light.number)) continue;
-    if (std::ranges::all_of(lit, [&](Vec3 place) {
-          return MayBeSeparated(scene, ScattersNarrowly, place, light.extent);
-        }))
+    if (std::ranges::all_of(
+            lit, [&](Vec3 place) { return (*walls)->MayBeBetween(place, light.extent); }))
       candidates.push_back(&light);
   }
   if (candidates.empty()) return {};
@@ -264,13 +277,13 @@ std::vector<std::uint32_t> FindWithoutLineOfSight(const Scene& scene,
 
 UnreachableLights FindUnreachableLights(const Scene& scene) {
   const std::vector<NumberedLight> lights = LightsOf(scene);
-  UnreachableLights lights_found;
+  UnreachableLights unreachable;
   if (static_cast<double>(lights.size()) * static_cast<double>(scene.TriangleCount()) >
       kMaxTriangleTests)
-    return lights_found;
-  lights_found.of_photons = FindSeparated(scene, lights);
-  lights_found.of_sampling = FindWithoutLineOfSight(scene, lights, lights_found.of_photons);
-  return lights_found;
+    return unreachable;
+  unreachable.of_photons = FindSeparated(scene, lights);
+  unreachable.of_sampling = FindWithoutLineOfSight(scene, lights, unreachable.of_photons);
+  return unreachable;
 }
 
 }  // namespace lucerna

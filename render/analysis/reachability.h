@@ -9,7 +9,8 @@
 
 namespace lucerna {
 
-// Tests every triangle, and builds closed surfaces only when some light might be separated.
+// Builds closed surfaces only when rays find walls between the view and a light. None are found
+// where memory does not suffice.
 [[nodiscard]] UnreachableLights FindUnreachableLights(const Scene& scene);
 
 }  // namespace lucerna
