@@ -6,9 +6,9 @@
 
 #include "client/report.h"
 #include "client/scene_reading.h"
+#include "render/analysis/expected_cost.h"
+#include "render/analysis/needs.h"
 #include "render/base/text.h"
-#include "render/estimate/expected_cost.h"
-#include "render/scene/needs.h"
 
 namespace lucerna {
 namespace {

@@ -11,11 +11,11 @@
 #include "client/selfcheck.h"
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "proto/lucerna/v1/photons.pb.h"
+#include "render/analysis/expected_cost.h"
+#include "render/analysis/needs.h"
 #include "render/base/digest.h"
-#include "render/estimate/expected_cost.h"
 #include "render/film/image_metrics.h"
 #include "render/formats/diagnostic.h"
-#include "render/scene/needs.h"
 
 namespace lucerna {
 

@@ -3,10 +3,10 @@
 
 #include <cstdint>
 
+#include "render/analysis/needs.h"
 #include "render/geometry/intersector.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
-#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/transport/caustic_weight.h"

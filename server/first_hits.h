@@ -1,15 +1,15 @@
 // What do eye paths meet first, pass after pass?
 //
-// Where sets of eye paths take turns (scene/needs.h, EyeSetOf), the camera's rays of a set are the
-// same in every pass that uses it, so what they meet is found once. Only which shape it is is
+// Where sets of eye paths take turns (analysis/needs.h, EyeSetOf), the camera's rays of a set are
+// the same in every pass that uses it, so what they meet is found once. Only which shape it is is
 // kept, 4 bytes for a ray: where the ray meets it is soon computed again.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "render/analysis/needs.h"
 #include "render/geometry/intersector.h"
-#include "render/scene/needs.h"
 
 namespace lucerna {
 

@@ -19,10 +19,10 @@
 #include <utility>
 #include <vector>
 
+#include "render/analysis/needs.h"
 #include "render/base/clock.h"
 #include "render/base/digest.h"
 #include "render/estimate/accumulation.h"
-#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 #include "server/job_estimator.h"

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_format.h"
 
+#include "render/analysis/prepared_scene.h"
 #include "render/base/parallel.h"
 #include "render/base/text.h"
 #include "render/estimate/missing_light.h"
@@ -16,7 +17,6 @@
 #include "render/estimate/statistics.h"
 #include "render/film/film.h"
 #include "render/math/color_space.h"
-#include "render/transport/working_space.h"
 #include "server/eye_path.h"
 
 namespace lucerna {
@@ -90,24 +90,19 @@ Status CheckPower(Rgb power_w) {
 }  // namespace
 
 struct JobEstimator::State {
-  State(Scene s, RenderSettings r, SceneNeeds n, int threads)
-      : scene(InWorkingSpace(std::move(s))),
+  State(Scene s, RenderSettings r, const SceneNeeds& needs, int threads)
+      : prepared(std::move(s)),
         settings(r),
-        needs(std::move(n)),
         team(threads),
         first_hits(needs.eye_sample_sets(), static_cast<std::size_t>(r.crop_width()) *
                                                 static_cast<std::size_t>(r.crop_height())) {}
 
-  Scene scene;
+  PreparedScene prepared;
   RenderSettings settings;
-  SceneNeeds needs;
   ThreadTeam team;
   FirstHits first_hits;
-  std::unique_ptr<Intersector> intersector;
-  std::unique_ptr<LightSet> lights;
   std::unique_ptr<EyePathTracer> tracer;
   std::unique_ptr<RadiusController> controller;
-  FluxScale scale;
   std::unique_ptr<PixelStatistics> statistics;
   // Of the hitpoints that gather caustic photons; nullptr where there are none.
   std::unique_ptr<PixelStatistics> caustics;
@@ -146,34 +141,33 @@ JobEstimator::~JobEstimator() = default;
 
 StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, RenderSettings settings,
                                                              SceneNeeds needs, int threads) {
-  auto state = std::make_unique<State>(std::move(scene), settings, std::move(needs), threads);
-  LUCERNA_ASSIGN_OR_RETURN(state->intersector,
-                           Intersector::Create(state->scene, state->needs.rays()));
-  state->lights = std::make_unique<LightSet>(state->scene, *state->intersector, state->needs);
-  LUCERNA_RETURN_IF_ERROR(CheckPower(state->lights->TotalPower()));
-  state->tracer = std::make_unique<EyePathTracer>(state->scene, state->settings, state->needs,
-                                                  *state->intersector, *state->lights);
-  state->scale = FluxScale::ForPower(state->lights->TotalPower());
+  auto state = std::make_unique<State>(std::move(scene), settings, needs, threads);
+  const PreparedScene& prepared = state->prepared;
+  LUCERNA_RETURN_IF_ERROR(state->prepared.PrepareFor(needs));
+  LUCERNA_RETURN_IF_ERROR(CheckPower(prepared.lights().TotalPower()));
+  state->tracer =
+      std::make_unique<EyePathTracer>(prepared.scene(), state->settings, prepared.needs(),
+                                      prepared.intersector(), prepared.lights());
   const int width = settings.crop_width();
   const int height = settings.crop_height();
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  const auto initial =
-      static_cast<float>(settings.initial_radius > 0 ? settings.initial_radius / state->scene.unit
-                                                     : settings.initial_footprints);
+  const auto initial = static_cast<float>(settings.initial_radius > 0
+                                              ? settings.initial_radius / prepared.scene().unit
+                                              : settings.initial_footprints);
   state->controller = MakeRadiusController(state->settings, initial);
   state->statistics =
       std::make_unique<PixelStatistics>(pixels, initial, state->controller->MemoryPerPixel());
-  if (state->needs.Uses(Part::kCausticHitpoints)) {
+  if (prepared.needs().Uses(Part::kCausticHitpoints)) {
     RenderSettings schedule = state->settings;
     schedule.radius_controller = RadiusControllerKind::kPppm;
     state->caustic_controller = MakeRadiusController(schedule, initial);
     state->caustics = std::make_unique<PixelStatistics>(
         pixels, initial, state->caustic_controller->MemoryPerPixel());
   }
-  state->film = std::make_unique<Film>(width, height, state->scene.film.exposure,
-                                       state->scene.film.max_component);
+  state->film = std::make_unique<Film>(width, height, prepared.scene().film.exposure,
+                                       prepared.scene().film.max_component);
   state->errors = std::make_unique<ErrorStatistics>(pixels);
-  state->has_smooth_surfaces = HasSmoothSurfaces(state->scene);
+  state->has_smooth_surfaces = HasSmoothSurfaces(prepared.scene());
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));
 }
 
@@ -196,8 +190,9 @@ void JobEstimator::Apply(const EyePass& pass, const RadiusColumn& radii, const P
   std::vector<double> bias(photons.size());
   const auto add = [&](PixelStatistics& statistics, const RadiusController& controller,
                        const HitpointRows& rows) {
-    statistics.AddPhotons(rows, radii, sums, state_->scale, Kernel{state_->settings.kernel},
-                          state_->settings.photons_per_pass, controller, photons, bias);
+    statistics.AddPhotons(rows, radii, sums, state_->prepared.flux_scale(),
+                          Kernel{state_->settings.kernel}, state_->settings.photons_per_pass,
+                          controller, photons, bias);
   };
   add(*state_->statistics, *state_->controller, pass.rows());
   if (state_->caustics != nullptr) {
@@ -230,11 +225,11 @@ void JobEstimator::Apply(const EyePass& pass, const RadiusColumn& radii, const P
 }
 
 const SceneNeeds& JobEstimator::needs() const {
-  return state_->needs;
+  return state_->prepared.needs();
 }
 
 std::size_t JobEstimator::faint_lights() const {
-  return state_->lights->faint_lights();
+  return state_->prepared.lights().faint_lights();
 }
 
 std::int64_t JobEstimator::passes_applied() const {
@@ -248,11 +243,11 @@ std::uint64_t JobEstimator::eye_rays() const {
 Image JobEstimator::MakeImage() const {
   Image image = state_->film->MakeImage(*state_->statistics, state_->caustics.get(),
                                         *state_->controller, Kernel{state_->settings.kernel});
-  ToFileUnit(image, state_->scene.unit);
+  ToFileUnit(image, state_->prepared.scene().unit);
   if (passes_applied() < 2) return image;
   const ErrorStatistics& errors = *state_->errors;
   const auto passes = static_cast<double>(passes_applied());
-  const double exposure = state_->scene.film.exposure;
+  const double exposure = state_->prepared.scene().film.exposure;
   const double even_passes = std::ceil(passes / 2);
   const double odd_passes = passes - even_passes;
   const double noise_area = EstimateError(1).noise_area;
@@ -282,7 +277,7 @@ Image JobEstimator::MakeImage() const {
 
 ErrorEstimate JobEstimator::EstimateError(int look) const {
   const ErrorStatistics& errors = *state_->errors;
-  const double exposure = state_->scene.film.exposure;
+  const double exposure = state_->prepared.scene().film.exposure;
   const auto sums_at = [&](std::size_t pixel) {
     PixelSums sums;
     const RgbSum all = state_->Sum(pixel);
@@ -304,7 +299,7 @@ ErrorEstimate JobEstimator::EstimateError(int look) const {
       lucerna::EstimateError(state_->settings.crop_width(), state_->settings.crop_height(),
                              passes_applied(), look, sums_at);
   // Without any light a black image is exact.
-  if (lucerna::IsBlack(state_->lights->TotalPower())) {
+  if (lucerna::IsBlack(state_->prepared.lights().TotalPower())) {
     estimate.relative = {};
     estimate.untrimmed = 0;
   }
@@ -336,8 +331,8 @@ MissingLight JobEstimator::FindMissingLight() const {
     photon_sum += LuminanceOf(ToRec709(state.PhotonSum(pixel))) / passes;
   }
   PhotonView view;
-  view.takes_photons =
-      state.needs.Uses(Part::kPhotons) && state.settings.max_depth > 1 && state.hit_share > 0;
+  view.takes_photons = state.prepared.needs().Uses(Part::kPhotons) &&
+                       state.settings.max_depth > 1 && state.hit_share > 0;
   view.has_caustics = state.has_smooth_surfaces;
   view.photon_radiance = photon_sum / pixel_count;
   // What relative errors are relative to, as their mean over pixels has it: dark pixels weigh most,
@@ -364,13 +359,13 @@ MissingLight JobEstimator::FindMissingLight() const {
 
   MissingLight missing;
   std::vector<LightPhotons> lights;
-  const auto total_power = static_cast<double>(Luminance(state.lights->TotalPower()));
+  const auto total_power = static_cast<double>(Luminance(state.prepared.lights().TotalPower()));
   const std::vector<LightTally>& tallies = state.tally.lights;
-  for (std::size_t i = 0; i < state.lights->lights().size(); ++i) {
-    const LightGroup& light = state.lights->lights()[i];
+  for (std::size_t i = 0; i < state.prepared.lights().lights().size(); ++i) {
+    const LightGroup& light = state.prepared.lights().lights()[i];
     lights.push_back({.power_w = static_cast<double>(Luminance(light.power)),
                       .tally = i < tallies.size() ? tallies[i] : LightTally()});
-    missing.lights.push_back({.name = NameOf(light, i + 1, state.scene.unit),
+    missing.lights.push_back({.name = NameOf(light, i + 1, state.prepared.scene().unit),
                               .power_share = lights[i].power_w / total_power,
                               .photons = lights[i].tally});
   }
@@ -379,20 +374,21 @@ MissingLight JobEstimator::FindMissingLight() const {
     missing.lights[i].missing_share = shares[i];
     missing.share += shares[i];
   }
-  missing.nothing_found = !state.lights->empty() && !(sum > 0);
+  missing.nothing_found = !state.prepared.lights().empty() && !(sum > 0);
   if (missing.nothing_found) {
     missing.relative = HUGE_VAL;
     missing.absolute = HUGE_VAL;
   } else if (missing.share > 0) {
     missing.relative = LargestRelativeError(missing.share);
-    const double brightness = state.scene.film.exposure * view.brightness;
+    const double brightness = state.prepared.scene().film.exposure * view.brightness;
     missing.absolute = brightness * brightness * LargestAbsoluteError(missing.share);
   }
   return missing;
 }
 
 TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
-  const double to_pixel = state_->scene.film.exposure / static_cast<double>(passes_applied());
+  const double to_pixel =
+      state_->prepared.scene().film.exposure / static_cast<double>(passes_applied());
   std::vector<double> luminances(reference.size());
   for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
     const Rgb right = reference[pixel];

@@ -20,12 +20,12 @@
 #include <string>
 #include <vector>
 
+#include "render/analysis/needs.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/error_estimate.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/image/image.h"
-#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "server/hitpoint_pass.h"

@@ -2,7 +2,7 @@
 
 #include "absl/strings/str_format.h"
 
-#include "render/estimate/expected_cost.h"
+#include "render/analysis/expected_cost.h"
 
 namespace lucerna {
 

@@ -6,8 +6,8 @@
 
 #include <cstdint>
 
+#include "render/analysis/needs.h"
 #include "render/base/status.h"
-#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 
 namespace lucerna {

@@ -8,13 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "render/analysis/prepared_scene.h"
 #include "render/base/parallel.h"
 #include "render/estimate/evidence.h"
 #include "render/geometry/feature_edges.h"
-#include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
-#include "render/transport/light.h"
-#include "render/transport/working_space.h"
 #include "worker/gather.h"
 #include "worker/photon_grid.h"
 #include "worker/photon_path.h"
@@ -179,32 +177,19 @@ Status CheckDeposits(const std::vector<BatchTally>& tallies) {
 }  // namespace
 
 struct BatchTracer::State {
-  State(Scene s, int threads)
-      : scene(InWorkingSpace(std::move(s))), features(scene), team(threads) {}
+  State(Scene s, int threads) : prepared(std::move(s)), features(prepared.scene()), team(threads) {}
 
-  // Makes what a job with these needs asks for; what the job before it asked for too is kept.
-  Status Prepare(const SceneNeeds& of_job) {
-    if (intersector != nullptr && needs == of_job) return absl::OkStatus();
+  // Builds what a job with these needs uses; what the job before it used too is kept.
+  Status PrepareFor(const SceneNeeds& needs) {
+    if (prepared.IsPreparedFor(needs)) return absl::OkStatus();
     spectra.reset();
-    lights.reset();
-    if (intersector == nullptr || needs.rays() != of_job.rays()) {
-      intersector.reset();
-      LUCERNA_ASSIGN_OR_RETURN(intersector, Intersector::Create(scene, of_job.rays()));
-    }
-    needs = of_job;
-    lights = std::make_unique<LightSet>(scene, *intersector, needs);
-    scale = FluxScale::ForPower(lights->TotalPower());
-    return absl::OkStatus();
+    return prepared.PrepareFor(needs);
   }
 
-  Scene scene;
+  PreparedScene prepared;
   FeatureEdges features;
   ThreadTeam team;
-  SceneNeeds needs;
-  std::unique_ptr<Intersector> intersector;
-  std::unique_ptr<LightSet> lights;
-  FluxScale scale;
-  // Made when a job asks for it.
+  // Made when a job uses it.
   std::unique_ptr<SpectrumTracer> spectra;
 };
 
@@ -216,7 +201,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
                                         std::uint64_t pass, std::uint64_t first, std::uint64_t last,
                                         const HitpointBlock& block, const RadiusColumn& radii,
                                         const std::atomic<bool>& stop) {
-  LUCERNA_RETURN_IF_ERROR(CheckBlock(block, radii, state_->scene, needs));
+  LUCERNA_RETURN_IF_ERROR(CheckBlock(block, radii, state_->prepared.scene(), needs));
   const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
   Accumulation sum;
   if (block.size() == 0 || first >= last) {
@@ -224,22 +209,23 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     sum.evidence.resize(EvidenceColumns(evidence));
     return sum;
   }
-  LUCERNA_RETURN_IF_ERROR(state_->Prepare(needs));
+  LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(needs));
+  const PreparedScene& prepared = state_->prepared;
   const Bounds region = RegionOf(block, radii, ReachOf(evidence));
   const std::size_t first_caustic = block.size() - block.caustic_rows;
   const float cell = CellWidth(std::span(radii).first(first_caustic));
   const float caustic_cell = CellWidth(std::span(radii).subspan(first_caustic));
-  const CausticWeight caustic_weight(state_->scene, settings, state_->intersector->bounds());
+  const CausticWeight caustic_weight(prepared.scene(), settings, prepared.intersector().bounds());
   if (evidence == Evidence::kFrequency &&
       (state_->spectra == nullptr || !state_->spectra->Suits(settings))) {
     LUCERNA_ASSIGN_OR_RETURN(state_->spectra,
-                             SpectrumTracer::Create(state_->scene, settings, needs,
-                                                    *state_->intersector, *state_->lights));
+                             SpectrumTracer::Create(prepared.scene(), settings, needs,
+                                                    prepared.intersector(), prepared.lights()));
   }
   const SpectrumTracer* spectra =
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
-  const PhotonPathTracer tracer(state_->scene, *state_->intersector, *state_->lights, settings,
-                                needs, spectra, region);
+  const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
+                                settings, needs, spectra, region);
   const std::uint64_t per_chunk =
       std::clamp(kMostDepositsPerChunk / static_cast<std::uint64_t>(settings.max_depth),
                  std::uint64_t{1}, kPhotonsPerChunk);
@@ -306,8 +292,8 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
       photons.caustic_weight = &caustic_weight;
     }
     Accumulation accumulation =
-        Gather(block, radii, photons, state_->scene.materials, Kernel{settings.kernel},
-               state_->scale, state_->team, stop, evidence);
+        Gather(block, radii, photons, prepared.scene().materials, Kernel{settings.kernel},
+               prepared.flux_scale(), state_->team, stop, evidence);
     for (const BatchTally& tally : tallies)
       accumulation.tally += tally;
     accumulation.tally.lights = TallyLights(sent, photons);

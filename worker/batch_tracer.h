@@ -10,10 +10,10 @@
 #include <cstdint>
 #include <memory>
 
+#include "render/analysis/needs.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/hitpoint_block.h"
-#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 

@@ -16,11 +16,11 @@
 #include <grpcpp/grpcpp.h>
 
 #include "proto/lucerna/v1/work.grpc.pb.h"
+#include "render/analysis/needs.h"
 #include "render/base/clock.h"
 #include "render/base/digest.h"
 #include "render/base/mutex.h"
 #include "render/base/status.h"
-#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 

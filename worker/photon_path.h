@@ -14,12 +14,12 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/analysis/needs.h"
 #include "render/estimate/accumulation.h"
 #include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
-#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/transport/bsdf.h"

@@ -8,11 +8,11 @@
 #include <memory>
 #include <vector>
 
+#include "render/analysis/needs.h"
 #include "render/frequency/spectrum.h"
 #include "render/geometry/curvature.h"
 #include "render/geometry/intersector.h"
 #include "render/geometry/silhouette.h"
-#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/transport/bsdf.h"

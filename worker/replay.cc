@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "render/transport/working_space.h"
+#include "render/analysis/prepared_scene.h"
 #include "render/wire/messages.h"
 #include "worker/connection.h"
 #include "worker/photon_path.h"
@@ -148,10 +148,10 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
                      ": passes count from 0, and the photons of each from 0 to ",
                      settings.photons_per_pass - 1));
   }
-  const Scene scene = InWorkingSpace(std::move(rec709));
-  LUCERNA_ASSIGN_OR_RETURN(const auto intersector, Intersector::Create(scene, needs.rays()));
-  const LightSet lights(scene, *intersector, needs);
-  const PhotonPathTracer tracer(scene, *intersector, lights, settings, needs, nullptr, Bounds());
+  PreparedScene prepared(std::move(rec709));
+  LUCERNA_RETURN_IF_ERROR(prepared.PrepareFor(needs));
+  const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
+                                settings, needs, nullptr, Bounds());
   const PhotonHistory history = tracer.Replay(pass, index);
 
   v1::PhotonPath path;
@@ -160,12 +160,12 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
   path.set_end(EndToProto(history.end));
   if (history.end == PhotonEnd::kNotEmitted) return path;
   v1::PhotonPath::Emission& emission = *path.mutable_emission();
-  emission.set_light(NameOf(lights.emitter(history.emission.emitter)));
+  emission.set_light(NameOf(prepared.lights().emitter(history.emission.emitter)));
   *emission.mutable_position() = TripleOf(history.emission.ray.origin);
   *emission.mutable_direction() = TripleOf(history.emission.ray.direction);
   *emission.mutable_flux() = TripleOf(history.emission.flux);
   for (const PhotonLanding& landing : history.landings) {
-    *path.add_landings() = LandingToProto(landing, *intersector);
+    *path.add_landings() = LandingToProto(landing, prepared.intersector());
   }
   return path;
 }

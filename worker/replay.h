@@ -9,9 +9,9 @@
 #include <string>
 
 #include "proto/lucerna/v1/photons.pb.h"
+#include "render/analysis/needs.h"
 #include "render/base/clock.h"
 #include "render/base/status.h"
-#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 

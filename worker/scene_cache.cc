@@ -12,7 +12,7 @@ constexpr std::size_t kTracersKept = 2;
 // Two passes may be open, and workers fetch one ahead.
 constexpr std::size_t kBlocksKept = 3;
 // More of them while they have at most so many hitpoints together: where eye paths take turns, all
-// blocks come again (see scene/needs.h). 16 bytes each.
+// blocks come again (see analysis/needs.h). 16 bytes each.
 constexpr std::size_t kHitpointsKept = std::size_t{1} << 24;
 // What a hitpoint and its radius may need at most before compression, which cannot double it.
 constexpr std::uint64_t kBytesPerHitpoint = 80;

@@ -11,10 +11,18 @@
 
 #include "render/base/status.h"
 #include "render/math/vector.h"
-#include "render/scene/needs.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
+
+// Which tree rays are traced through, and what hits are to tell.
+struct RayNeeds {
+  bool robust_rays = true;
+  bool split_triangles = false;
+  bool shading_normals = true;
+
+  bool operator==(const RayNeeds&) const = default;
+};
 
 struct Ray {
   Vec3 origin;

@@ -18,7 +18,7 @@ float SpotFalloff(const SpotLight& spot, float cosine) {
   return x * x * (3 - 2 * x);
 }
 
-// How much of the choice of direct light is even among the lights. By power alone, a lamp nearby
+// How much of the choice of direct light is even among the lights. By power alone, a light nearby
 // that has a millionth of the power of another is found once in a million samples.
 constexpr double kEvenShare = 0.1;
 // 1 - cosine of the cone in which a sphere appears from outside, without cancellation.
@@ -28,17 +28,17 @@ float OneMinusCosine(float sin2_max) {
 
 }  // namespace
 
-LightSet::LightSet(const Scene& scene, const Intersector& intersector, const SceneNeeds& needs)
+LightSet::LightSet(const Scene& scene, const Intersector& intersector,
+                   const LightSelection& selection)
     : scene_(scene) {
   const LightNumbers numbers(scene);
   const auto add = [&](Emitter emitter, std::uint32_t number) {
-    const LightsLeftOut& left_out = needs.lights_left_out();
-    if (std::ranges::binary_search(left_out.of_photons, number)) emitter.power = {};
-    emitter.is_sampled =
-        Luminance(emitter.power) > 0 && !std::ranges::binary_search(left_out.of_sampling, number);
+    const UnreachableLights& unreachable = selection.unreachable;
+    if (std::ranges::binary_search(unreachable.of_photons, number)) emitter.power = {};
+    emitter.is_sampled = Luminance(emitter.power) > 0 &&
+                         !std::ranges::binary_search(unreachable.of_sampling, number);
     emitters_.push_back(emitter);
   };
-  const bool sends_unseen = needs.Uses(Part::kUnseenLamps);
   const Bounds& bounds = intersector.bounds();
   if (!bounds.empty()) {
     center_ = bounds.Center();
@@ -72,7 +72,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
       emitter.primitive = t;
       const Vec3 normal = TriangleNormal(p0, mesh.positions[corner[1]], mesh.positions[corner[2]]);
       // What nothing can receive is not sent.
-      if (!sends_unseen && !emitter.two_sided && FacesAway(p0, normal, bounds)) {
+      if (!selection.includes_faces_away && !emitter.two_sided && FacesAway(p0, normal, bounds)) {
         emitter.power = {};
       }
       add(emitter, m);
@@ -95,7 +95,8 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
         area_emitter(Kind::kDisk, disk.traits,
                      kPi * (disk.radius * disk.radius - disk.inner_radius * disk.inner_radius));
     emitter.primitive = i;
-    if (!sends_unseen && !emitter.two_sided && FacesAway(disk.center, disk.normal, bounds)) {
+    if (!selection.includes_faces_away && !emitter.two_sided &&
+        FacesAway(disk.center, disk.normal, bounds)) {
       emitter.power = {};
     }
     add(emitter, numbers.disks + i);
@@ -143,7 +144,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector, const Sce
     emitter.kind = Kind::kInfinite;
     emitter.radiance = infinite_radiance_;
     emitter.power = emitter.radiance * (4 * kPi * kPi * radius_ * radius_);
-    // Infinite lights are shut out together or not at all.
+    // Infinite lights are unreachable together or not at all.
     add(emitter, numbers.infinite);
   }
   first_environment_ = emitters_.size();

@@ -15,9 +15,9 @@
 #include "render/math/fixed_point.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
-#include "render/scene/needs.h"
 #include "render/scene/scene.h"
 #include "render/transport/environment_map.h"
+#include "render/transport/unreachable_lights.h"
 
 namespace lucerna {
 
@@ -82,11 +82,9 @@ struct LightSample {
 class LightSet {
  public:
   // Keeps references to scene and intersector. Photons come from all lights, and direct light is
-  // drawn from all, but those that the job leaves out.
-  LightSet(const Scene& scene, const Intersector& intersector, const SceneNeeds& needs);
-  // Those of a job that leaves out only faces that nothing lies in front of.
-  LightSet(const Scene& scene, const Intersector& intersector)
-      : LightSet(scene, intersector, SceneNeeds()) {}
+  // drawn from all, except those that `selection` leaves out.
+  LightSet(const Scene& scene, const Intersector& intersector,
+           const LightSelection& selection = {});
 
   [[nodiscard]] bool empty() const { return emitters_.empty(); }
   [[nodiscard]] const Emitter& emitter(std::uint32_t number) const { return emitters_[number]; }
@@ -101,7 +99,7 @@ class LightSet {
   // quantum (math/fixed_point.h) that hardly one of a billion adds anything. What they light
   // directly is right, and what that light lights is dark.
   [[nodiscard]] std::size_t faint_lights() const { return faint_lights_; }
-  // Draws a photon. u_choice picks the emitter, in double because a lamp may have less than 2^-24
+  // Draws a photon. u_choice picks the emitter, in double because a light may have less than 2^-24
   // of the power; u_place and u_direction the rest. False when
   // the numbers give nothing (outside a spot's cone).
   [[nodiscard]] bool SampleEmission(double u_choice, float u_place1, float u_place2,

@@ -172,7 +172,7 @@ v1::SceneNeeds ToProto(const SceneNeeds& needs) {
   v1::SceneNeeds message;
   message.set_parts(needs.parts());
   message.set_eye_sample_sets(needs.eye_sample_sets());
-  const LightsLeftOut& lights = needs.lights_left_out();
+  const UnreachableLights& lights = needs.unreachable_lights();
   message.mutable_lights_without_photons()->Assign(lights.of_photons.begin(),
                                                    lights.of_photons.end());
   message.mutable_lights_without_sampling()->Assign(lights.of_sampling.begin(),
@@ -187,7 +187,7 @@ StatusOr<SceneNeeds> FromProto(const v1::SceneNeeds& message) {
   if (!IsBetween(message.eye_sample_sets(), 0, kMostEyeSets)) {
     return absl::InvalidArgumentError("the job has an impossible number of sets of eye paths");
   }
-  LightsLeftOut lights;
+  UnreachableLights lights;
   lights.of_photons.assign(message.lights_without_photons().begin(),
                            message.lights_without_photons().end());
   lights.of_sampling.assign(message.lights_without_sampling().begin(),

@@ -6,10 +6,10 @@
 
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "proto/lucerna/v1/values.pb.h"
+#include "render/analysis/needs.h"
 #include "render/base/clock.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
-#include "render/scene/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 

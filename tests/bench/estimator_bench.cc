@@ -48,7 +48,7 @@ struct Bench {
     settings = SettingsFor(scene, overrides);
     needs = NeedsOf(scene, settings);
     intersector = Intersector::Create(scene, needs.rays()).value();
-    lights = std::make_unique<LightSet>(scene, *intersector, needs);
+    lights = std::make_unique<LightSet>(scene, *intersector, needs.lights());
     estimator = JobEstimator::Create(scene, settings, needs, 1).value();
     eye = estimator->TraceEyePaths(0);
     radii = estimator->Radii(eye);

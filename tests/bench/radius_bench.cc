@@ -125,7 +125,7 @@ constexpr float kBoardHeight = 1;
 ClosedForm ClosedFormOf(const std::string& scene) {
   if (scene == "penumbra.pbrt") {
     return [](Vec3 p) {
-      // The part of the lamp that the board leaves: beyond the plane through p and its edge.
+      // The part of the light that the board leaves: beyond the plane through p and its edge.
       const float from = std::clamp(p.x + (0 - p.x) * 2 / kBoardHeight, -0.25F, 0.25F);
       if (!(from < 0.25F)) return 0.0;
       return PolygonIrradiance(
@@ -287,7 +287,7 @@ class Check {
     settings_.use_everything = true;
     needs_ = NeedsOf(scene_, settings_);
     intersector_ = Intersector::Create(scene_, needs_.rays()).value();
-    lights_ = std::make_unique<LightSet>(scene_, *intersector_, needs_);
+    lights_ = std::make_unique<LightSet>(scene_, *intersector_, needs_.lights());
     spectra_ = SpectrumTracer::Create(scene_, settings_, needs_, *intersector_, *lights_).value();
   }
 

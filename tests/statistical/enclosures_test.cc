@@ -1,10 +1,10 @@
 // What is left out of a scene because of closed surfaces would have come to nothing.
 //
 // Hundreds of scenes of rooms that share walls, touch, lie in each other, lack a wall or have one
-// of glass, with lamps and the camera anywhere: no photon of a lamp that is left out ever lands
-// where the camera could see it, and no straight line leads from a lamp that is not sampled to a
+// of glass, with lights and the camera anywhere: no photon of a light that is left out ever lands
+// where the camera could see it, and no straight line leads from a light that is not sampled to a
 // surface that would ask for it.
-#include "render/scene/enclosures.h"
+#include "render/analysis/enclosures.h"
 
 #include <algorithm>
 #include <array>
@@ -12,6 +12,8 @@
 
 #include "gtest/gtest.h"
 
+#include "render/analysis/needs.h"
+#include "render/analysis/reachability.h"
 #include "render/geometry/intersector.h"
 #include "render/math/rng.h"
 #include "render/transport/light.h"
@@ -112,7 +114,7 @@ TEST(LeftOutTest, NoPhotonOfAShutOutLightIsEverSeen) {
   std::uint64_t landed = 0;
   for (std::uint64_t key = 0; key < kScenes; ++key) {
     const Scene all = RandomScene(key).scene;
-    const LightsLeftOut lights = FindLightsLeftOut(all);
+    const UnreachableLights lights = FindUnreachableLights(all);
     kept += 5 - static_cast<int>(lights.of_photons.size());
     const Vec3 eye = all.camera.camera_to_world.Point({});
     for (const std::uint32_t number : lights.of_photons) {
@@ -156,7 +158,7 @@ TEST(LeftOutTest, NoLightThatIsNotSampledIsInSight) {
   for (std::uint64_t key = 0; key < kScenes; ++key) {
     RandomScene random(key);
     const Scene& all = random.scene;
-    const LightsLeftOut lights = FindLightsLeftOut(all);
+    const UnreachableLights lights = FindUnreachableLights(all);
     for (const std::uint32_t number : lights.of_sampling) {
       ++left_out;
       const Scene scene = LitOnlyBy(all, number);
@@ -168,7 +170,7 @@ TEST(LeftOutTest, NoLightThatIsNotSampledIsInSight) {
         Hit hit;
         if (!intersector->Intersect(ray, hit)) continue;
         const SurfacePoint surface = intersector->SurfaceAt(ray, hit);
-        // The lamp's own surface lights nothing of itself.
+        // The light's own surface lights nothing of itself.
         if (!ScattersBroadly(scene.materials[surface.material]) ||
             surface.area_light != kNoAreaLight) {
           continue;

@@ -38,9 +38,9 @@ INSTANTIATE_TEST_SUITE_P(Scenes, LeanTest,
                                          "textured.pbrt", "rough-metal.pbrt", "cardioid.pbrt",
                                          "furnace.pbrt"));
 
-// The light of a lamp next door, a hundred times as bright, never comes to the camera: with
+// The light of a light next door, a hundred times as bright, never comes to the camera: with
 // photons from it as without them, and with them nearly all photons are spent in vain.
-TEST(ShutOutTest, LeavingOutALampNextDoorChangesNothingButNoise) {
+TEST(ShutOutTest, LeavingOutALightNextDoorChangesNothingButNoise) {
   Scene scene;
   const std::int32_t wall = AddMaterial(scene, DiffuseMaterial(0.5F));
   AddBox(scene, {-1, -1, -1}, {1, 1, 1}, wall);
@@ -48,7 +48,7 @@ TEST(ShutOutTest, LeavingOutALampNextDoorChangesNothingButNoise) {
   AddDisk(scene, {5, 0, 0.9F}, {0, 0, -1}, 0.4F, wall, AddAreaLight(scene, 100));
   SetCamera(scene, {-0.9, -0.8, 0}, {0.5, 0.2, -0.3}, {0, 0, 1}, 60, 16);
   RenderSettings settings = TestSettings(scene, 20000, 0.2, 8);
-  ASSERT_EQ(NeedsOf(scene, settings).lights_left_out().of_photons.size(), 1U);
+  ASSERT_EQ(NeedsOf(scene, settings).unreachable_lights().of_photons.size(), 1U);
   const MeasuredMean lean = Measure(scene, settings, 8, 8, "G");
   settings.use_everything = true;
   const MeasuredMean full = Measure(scene, settings, 8, 8, "G");

@@ -21,7 +21,14 @@ BELOW = {
     "render/formats": ["render/base", "render/math", "render/image", "render/scene"],
     "render/frequency": ["render/base", "render/math"],
 }
-LINE = ["render/geometry", "render/transport", "render/estimate", "render/film", "render/wire"]
+LINE = [
+    "render/geometry",
+    "render/transport",
+    "render/estimate",
+    "render/film",
+    "render/analysis",
+    "render/wire",
+]
 for number, floor in enumerate(LINE):
     BELOW[floor] = (
         ["render/base", "render/math", "render/image", "render/scene", "render/frequency"]
@@ -110,6 +117,7 @@ PLANTED = [
     ("render/math/a.h", '#include "render/scene/scene.h"'),
     ("render/estimate/a.h", '#include "render/film/film.h"'),
     ("render/transport/a.cc", '#include "proto/lucerna/v1/jobs.pb.h"'),
+    ("render/transport/a.cc", '#include "render/analysis/needs.h"'),
     ("server/a.cc", '#include "worker/gather.h"'),
     ("worker/a.cc", '#include "client/report.h"'),
     ("render/transport/a.cc", "#include <embree3/rtcore.h>"),

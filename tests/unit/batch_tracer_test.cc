@@ -15,8 +15,8 @@
 namespace lucerna {
 namespace {
 
-// A lamp in a glass ball in a white box.
-Scene GlassLamp() {
+// A light in a glass ball in a white box.
+Scene GlassLight() {
   Scene scene;
   const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.7F));
   const std::int32_t glass = AddMaterial(scene, DielectricMaterial(1.5F));
@@ -44,7 +44,7 @@ HitpointBlock FloorBlock(int side) {
 }
 
 struct Fixture {
-  Scene scene = GlassLamp();
+  Scene scene = GlassLight();
   RenderSettings settings = TestSettings(scene, 20000, 0.1, 6);
   HitpointBlock block = FloorBlock(40);
   RadiusColumn radii = RadiusColumn(block.size(), 0.07F);

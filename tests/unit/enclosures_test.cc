@@ -1,11 +1,12 @@
 // Closed surfaces are found where they are, and nothing is called closed that has a crack.
-#include "render/scene/enclosures.h"
+#include "render/analysis/enclosures.h"
 
 #include <cmath>
 #include <vector>
 
 #include "gtest/gtest.h"
 
+#include "render/analysis/reachability.h"
 #include "render/math/rng.h"
 #include "tests/support/test_scenes.h"
 
@@ -58,13 +59,13 @@ TEST(ClosedSurfaceTest, HoldsWhatIsInsideABox) {
   for (int i = 0; i < 2000; ++i) {
     const Vec3 p = {4 * rng.Uniform() - 2, 8 * rng.Uniform() - 4, 12 * rng.Uniform() - 6};
     const bool expected = std::abs(p.x) < 1 && std::abs(p.y) < 2 && std::abs(p.z) < 3;
-    ASSERT_EQ(surfaces[0].Holds(p), expected) << p.x << " " << p.y << " " << p.z;
+    ASSERT_EQ(surfaces[0].Contains(p), expected) << p.x << " " << p.y << " " << p.z;
     inside += expected ? 1 : 0;
   }
   EXPECT_GT(inside, 150);
-  EXPECT_EQ(surfaces[0].Holds({0, 0, 0}), true) << "where diagonals cross";
-  EXPECT_EQ(surfaces[0].Holds({1, 0, 0}), std::nullopt) << "on the wall";
-  EXPECT_EQ(surfaces[0].Holds({1 + 1e-7F, 0, 0}), std::nullopt) << "too near to tell";
+  EXPECT_EQ(surfaces[0].Contains({0, 0, 0}), true) << "where diagonals cross";
+  EXPECT_EQ(surfaces[0].Contains({1, 0, 0}), std::nullopt) << "on the wall";
+  EXPECT_EQ(surfaces[0].Contains({1 + 1e-7F, 0, 0}), std::nullopt) << "too near to tell";
 }
 
 TEST(ClosedSurfaceTest, TellsASphereFromItsSurroundings) {
@@ -72,9 +73,9 @@ TEST(ClosedSurfaceTest, TellsASphereFromItsSurroundings) {
   AddSphere(scene, {1, 2, 3}, 2, AddMaterial(scene, DiffuseMaterial(0.5F)));
   const std::vector<ClosedSurface> surfaces = SurfacesOf(scene);
   ASSERT_EQ(surfaces.size(), 1U);
-  EXPECT_EQ(surfaces[0].Holds({1, 2, 4.9F}), true);
-  EXPECT_EQ(surfaces[0].Holds({1, 2, 5.1F}), false);
-  EXPECT_EQ(surfaces[0].Holds({1, 2, 5}), std::nullopt);
+  EXPECT_EQ(surfaces[0].Contains({1, 2, 4.9F}), true);
+  EXPECT_EQ(surfaces[0].Contains({1, 2, 5.1F}), false);
+  EXPECT_EQ(surfaces[0].Contains({1, 2, 5}), std::nullopt);
   const auto apart = [&](std::vector<Vec3> points) { return surfaces[0].IsApartFrom(points); };
   EXPECT_TRUE(apart({{1, 2, 3}, {1, 3, 3}, {2, 2, 3}}));
   EXPECT_FALSE(apart({{1, 2, 3}, {1, 9, 3}, {2, 2, 3}})) << "through the wall";
@@ -108,15 +109,15 @@ TEST(ClosedSurfaceTest, RoomsMayShareAWall) {
   int left = 0;
   int right = 0;
   for (const ClosedSurface& surface : surfaces) {
-    left += surface.Holds({1, 1, 1.5F}) == true ? 1 : 0;
-    right += surface.Holds({3, 1, 1.5F}) == true ? 1 : 0;
-    EXPECT_EQ(surface.Holds({5, 1, 1}), false);
+    left += surface.Contains({1, 1, 1.5F}) == true ? 1 : 0;
+    right += surface.Contains({3, 1, 1.5F}) == true ? 1 : 0;
+    EXPECT_EQ(surface.Contains({5, 1, 1}), false);
   }
   EXPECT_EQ(left, 2);
   EXPECT_EQ(right, 2);
 }
 
-TEST(LightsLeftOutTest, AreThoseInAnotherRoom) {
+TEST(UnreachableLightsTest, AreThoseInAnotherRoom) {
   Rooms rooms;
   AddQuads(rooms.scene, {0, 0, 0}, {2, 2, 2}, rooms.wall);
   AddQuads(rooms.scene, {2, 0, 0}, {4, 2, 2}, rooms.wall);
@@ -127,32 +128,32 @@ TEST(LightsLeftOutTest, AreThoseInAnotherRoom) {
   rooms.AddPoint({3, 1, 0.5F});
   rooms.scene.infinite_lights.push_back({Gray(1)});
   const LightNumbers numbers(rooms.scene);
-  EXPECT_EQ(FindLightsLeftOut(rooms.scene).of_photons,
+  EXPECT_EQ(FindUnreachableLights(rooms.scene).of_photons,
             (Numbers{12, numbers.spheres, numbers.disks, numbers.points + 1, numbers.infinite}));
 
   // A window of glass lets everything in, and so does a door.
   Scene window = rooms.scene;
   window.meshes[6 + 1].traits.material = rooms.glass;  // both sides of the wall between them
   window.meshes[4].traits.material = rooms.glass;
-  EXPECT_EQ(FindLightsLeftOut(window).of_photons, Numbers{numbers.infinite});
+  EXPECT_EQ(FindUnreachableLights(window).of_photons, Numbers{numbers.infinite});
   Scene door = rooms.scene;
   for (const std::size_t wall : {std::size_t{6 + 1}, std::size_t{4}}) {
     door.meshes[wall].indices.resize(3);
   }
-  EXPECT_EQ(FindLightsLeftOut(door).of_photons, Numbers{numbers.infinite});
+  EXPECT_EQ(FindUnreachableLights(door).of_photons, Numbers{numbers.infinite});
   Scene skylight = rooms.scene;
   skylight.meshes[5].traits.material = rooms.glass;
-  EXPECT_EQ(FindLightsLeftOut(skylight).of_photons,
+  EXPECT_EQ(FindUnreachableLights(skylight).of_photons,
             (Numbers{12, numbers.spheres, numbers.disks, numbers.points + 1}));
 }
 
 // What touches a wall, or reaches through it, may shine on both sides.
-TEST(LightsLeftOutTest, AreNotThoseThatMeetTheWall) {
+TEST(UnreachableLightsTest, AreNotThoseThatMeetTheWall) {
   const auto left_out = [](Vec3 corner, Vec3 edge1, Vec3 edge2) {
     Rooms rooms;
     AddBox(rooms.scene, {0, 0, 0}, {2, 2, 2}, rooms.wall);
     AddQuad(rooms.scene, corner, edge1, edge2, rooms.wall, rooms.light);
-    return !FindLightsLeftOut(rooms.scene).of_photons.empty();
+    return !FindUnreachableLights(rooms.scene).of_photons.empty();
   };
   EXPECT_TRUE(left_out({2.25F, 0.5F, 0.5F}, {0, 1, 0}, {0, 0, 1}));
   EXPECT_FALSE(left_out({2, 0.5F, 0.5F}, {0, 1, 0}, {0, 0, 1})) << "in the wall";
@@ -162,21 +163,21 @@ TEST(LightsLeftOutTest, AreNotThoseThatMeetTheWall) {
   EXPECT_FALSE(left_out({0.5F, 0.5F, 0.5F}, {0.5F, 0, 0}, {0, 0, 0.5F})) << "in the room";
 }
 
-TEST(LightsLeftOutTest, ACameraWithAWideLensSeesBothSides) {
+TEST(UnreachableLightsTest, ACameraWithAWideLensSeesBothSides) {
   const auto left_out = [](double lens) {
     Rooms rooms;
     AddBox(rooms.scene, {0, 0, 0}, {2, 2, 2}, rooms.wall);
     rooms.AddPoint({3, 1, 1});
     rooms.scene.camera.lens_radius = lens;
-    return FindLightsLeftOut(rooms.scene).of_photons.size();
+    return FindUnreachableLights(rooms.scene).of_photons.size();
   };
   EXPECT_EQ(left_out(0), 1U);
   EXPECT_EQ(left_out(0.4), 1U);
   EXPECT_EQ(left_out(0.8), 0U);
 }
 
-// A lamp in a bulb: no straight line leads from it to anything that scatters broadly.
-TEST(LightsLeftOutTest, LampsInGlassAreNotSampled) {
+// A light in a bulb: no straight line leads from it to anything that scatters broadly.
+TEST(UnreachableLightsTest, LightsInGlassAreNotSampled) {
   const auto of_sampling = [](auto change) {
     Rooms rooms;
     AddBox(rooms.scene, {0, 0, 0}, {2, 2, 2}, rooms.wall);
@@ -186,7 +187,7 @@ TEST(LightsLeftOutTest, LampsInGlassAreNotSampled) {
     rooms.AddPoint({1, 1, 0.5F});
     change(rooms);
     const LightNumbers numbers(rooms.scene);
-    Numbers left_out = FindLightsLeftOut(rooms.scene).of_sampling;
+    Numbers left_out = FindUnreachableLights(rooms.scene).of_sampling;
     for (std::uint32_t& number : left_out)
       number -= numbers.spheres;
     return left_out;
@@ -210,22 +211,22 @@ TEST(LightsLeftOutTest, LampsInGlassAreNotSampled) {
 }
 
 // A ball that shines inwards lights its own inside.
-TEST(LightsLeftOutTest, AFurnaceInGlassIsSampledOnItself) {
+TEST(UnreachableLightsTest, AFurnaceInGlassIsSampledOnItself) {
   for (const bool inward : {true, false}) {
     Rooms rooms;
     AddSphere(rooms.scene, {1, 1, 1}, 0.5F, rooms.wall, rooms.light, inward);
     AddSphere(rooms.scene, {1, 1, 1}, 0.9F, rooms.glass);
-    EXPECT_EQ(FindLightsLeftOut(rooms.scene).of_sampling.size(), inward ? 0U : 1U);
+    EXPECT_EQ(FindUnreachableLights(rooms.scene).of_sampling.size(), inward ? 0U : 1U);
   }
 }
 
-TEST(LightsLeftOutTest, WhatLiesInGlassIsNotLitBySkyThroughIt) {
+TEST(UnreachableLightsTest, WhatLiesInGlassIsNotLitBySkyThroughIt) {
   Rooms rooms;
   AddBox(rooms.scene, {0, 0, 0}, {2, 2, 2}, rooms.glass);
   AddSphere(rooms.scene, {1, 1, 0.5F}, 0.25F, rooms.wall);
   rooms.scene.infinite_lights.push_back({Gray(1)});
   rooms.AddPoint({1, 1, 1});
-  const LightsLeftOut left_out = FindLightsLeftOut(rooms.scene);
+  const UnreachableLights left_out = FindUnreachableLights(rooms.scene);
   EXPECT_TRUE(left_out.of_photons.empty());
   EXPECT_EQ(left_out.of_sampling, Numbers{LightNumbers(rooms.scene).infinite});
 }

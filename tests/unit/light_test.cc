@@ -37,28 +37,28 @@ Scene BlackRoom() {
   return scene;
 }
 
-Scene QuadLamp() {
+Scene QuadLight() {
   Scene scene = BlackRoom();
   AddQuad(scene, {1, 0, 2}, {0, 0.5F, 0.5F}, {1, 0, 0}, 0, AddAreaLight(scene, 3));
   return scene;
 }
-Scene SphereLamp() {
+Scene SphereLight() {
   Scene scene = BlackRoom();
   AddSphere(scene, {1, -1, 2}, 0.7F, 0, AddAreaLight(scene, 3));
   return scene;
 }
-Scene InwardSphereLamp() {
+Scene InwardSphereLight() {
   Scene scene = BlackRoom();
   AddSphere(scene, {0.2F, 0, 0}, 2, 0, AddAreaLight(scene, 3), /*inward=*/true);
   return scene;
 }
-Scene RingLamp() {
+Scene RingLight() {
   Scene scene = BlackRoom();
   AddDisk(scene, {1, 1, 1}, Normalize({-1, -1, -1}), 1, 0, AddAreaLight(scene, 3));
   scene.disks[0].inner_radius = 0.5F;
   return scene;
 }
-Scene TwoSidedLamp() {
+Scene TwoSidedLight() {
   Scene scene = BlackRoom();
   AddDisk(scene, {0, 0.3F, 1}, Normalize({0, 1, 0.2F}), 1, 0, AddAreaLight(scene, 3, true));
   return scene;
@@ -70,15 +70,19 @@ Scene Sky() {
   return scene;
 }
 Scene Mixed() {
-  Scene scene = QuadLamp();
+  Scene scene = QuadLight();
   AddSphere(scene, {-2, 0, 1}, 0.3F, 0, AddAreaLight(scene, 20));
   scene.infinite_lights.push_back({{0.1F, 0.2F, 0.4F}});
   return scene;
 }
 
-const std::vector<std::pair<const char*, Scene (*)()>> kLamps = {
-    {"quad", &QuadLamp}, {"sphere", &SphereLamp},           {"inside a sphere", &InwardSphereLamp},
-    {"ring", &RingLamp}, {"two-sided disk", &TwoSidedLamp}, {"sky", &Sky},
+const std::vector<std::pair<const char*, Scene (*)()>> kLights = {
+    {"quad", &QuadLight},
+    {"sphere", &SphereLight},
+    {"inside a sphere", &InwardSphereLight},
+    {"ring", &RingLight},
+    {"two-sided disk", &TwoSidedLight},
+    {"sky", &Sky},
     {"several", &Mixed}};
 
 // The density of drawing `wi` from the origin, by asking what lies there.
@@ -96,7 +100,7 @@ double PdfToward(const Lit& lit, Vec3 wi) {
 TEST(SampleDirectTest, DrawsByTheDensityThatItsSightGives) {
   const double level = SidakLevel(1e-3, 6);
   std::uint64_t key = 40;
-  for (const auto& [name, make] : kLamps) {
+  for (const auto& [name, make] : kLights) {
     if (make == &Mixed) continue;  // emitters in each other's way: density is choice × visibility
     const Lit lit(make());
     const double p_value = DirectionsPValue(
@@ -104,7 +108,7 @@ TEST(SampleDirectTest, DrawsByTheDensityThatItsSightGives) {
           LightSample sample;
           if (!lit.lights.SampleDirect({0, 0, 0}, u_lobe, u1, u2, sample)) return false;
           direction = sample.wi;
-          // A point behind its own lamp is drawn and then found hidden.
+          // A point behind its own light is drawn and then found hidden.
           return !lit.intersector->Occluded(
               {{0, 0, 0},
                sample.wi,
@@ -120,7 +124,7 @@ TEST(SampleDirectTest, DrawsByTheDensityThatItsSightGives) {
 
 TEST(SampleDirectTest, AgreesWithSightPointByPoint) {
   KeyedRng rng(50);
-  for (const auto& [name, make] : kLamps) {
+  for (const auto& [name, make] : kLights) {
     const Lit lit(make());
     int compared = 0;
     for (int i = 0; i < 20000; ++i) {
@@ -138,7 +142,7 @@ TEST(SampleDirectTest, AgreesWithSightPointByPoint) {
         ++compared;
         continue;
       }
-      // Light of another lamp, or a rim that rounding decides.
+      // Light of another light, or a rim that rounding decides.
       if (!met || std::abs(hit.t / Length(sample.target) - 1) > 1e-3F) continue;
       const SurfacePoint surface = lit.intersector->SurfaceAt(ray, hit);
       const float cosine = std::abs(Dot(surface.geometric_normal, sample.wi));
@@ -199,7 +203,7 @@ std::array<double, 3> MeanFlux(const LightSet& lights, std::uint64_t key, double
   return sum;
 }
 
-// A lamp that hangs over a floor and shines up into nothing sends no photons, and one beside it
+// A light that hangs over a floor and shines up into nothing sends no photons, and one beside it
 // that shines down sends all.
 TEST(SampleEmissionTest, SendsNothingFromFacesThatNothingLiesInFrontOf) {
   Scene scene = BlackRoom();
@@ -242,7 +246,7 @@ TEST(SampleEmissionTest, SendsTheTotalPower) {
 // area across the ray and solid angle, is the radiance there. A ray that looks back says the same.
 TEST(SampleEmissionTest, HasTheDensityThatMakesFluxRadiance) {
   KeyedRng rng(71);
-  for (const auto& [name, make] : kLamps) {
+  for (const auto& [name, make] : kLights) {
     const Lit lit(make());
     int compared = 0;
     for (int i = 0; i < 2000; ++i) {
@@ -292,9 +296,9 @@ TEST(SampleEmissionTest, HasThePowerOfEachLightInClosedForm) {
   const auto power = [](const Scene& scene) {
     return static_cast<double>(Lit(scene).lights.TotalPower().g);
   };
-  EXPECT_NEAR(power(SphereLamp()), 3 * kPiD * 4 * kPiD * 0.49, 1e-3);
-  EXPECT_NEAR(power(RingLamp()), 3 * kPiD * kPiD * 0.75, 1e-4);
-  EXPECT_NEAR(power(TwoSidedLamp()), 2 * 3 * kPiD * kPiD, 1e-4);
+  EXPECT_NEAR(power(SphereLight()), 3 * kPiD * 4 * kPiD * 0.49, 1e-3);
+  EXPECT_NEAR(power(RingLight()), 3 * kPiD * kPiD * 0.75, 1e-4);
+  EXPECT_NEAR(power(TwoSidedLight()), 2 * 3 * kPiD * kPiD, 1e-4);
   Scene scene = BlackRoom();
   scene.point_lights.push_back({{}, Gray(2)});
   EXPECT_NEAR(power(scene), 8 * kPiD, 1e-5);
@@ -365,9 +369,9 @@ TEST(SampleEmissionTest, FillsTheSceneFromInfinity) {
   EXPECT_NEAR(through, expected, 4 * std::sqrt(squares / kPhotons));
 }
 
-// Of two lamps as bright at the origin, one has 1e-12 of the power: a twentieth of the samples go
+// Of two lights as bright at the origin, one has 1e-12 of the power: a twentieth of the samples go
 // to it, where its power would send none.
-TEST(SampleDirectTest, FindsANearLampBesideAFarOneOfAllThePower) {
+TEST(SampleDirectTest, FindsANearLightBesideAFarOneOfAllThePower) {
   Scene scene = BlackRoom();
   scene.point_lights.push_back({{0, 0, 1}, Gray(1)});
   scene.point_lights.push_back({{0, 1e6F, 0}, Gray(1e12F)});
@@ -389,7 +393,7 @@ TEST(SampleDirectTest, FindsANearLampBesideAFarOneOfAllThePower) {
 
 // What a job leaves out gets nothing, and the rest shares what there is.
 TEST(LightSetTest, LeavesOutWhatTheJobDoesNotNeed) {
-  Scene scene = SphereLamp();
+  Scene scene = SphereLight();
   scene.point_lights.push_back({{0, 0, 0}, Gray(1)});
   scene.point_lights.push_back({{0, 1, 0}, Gray(5)});
   scene.infinite_lights.push_back({Gray(2)});
@@ -399,7 +403,7 @@ TEST(LightSetTest, LeavesOutWhatTheJobDoesNotNeed) {
   const auto set = [&](std::vector<std::uint32_t> of_photons,
                        std::vector<std::uint32_t> of_sampling) {
     return LightSet(scene, *intersector,
-                    SceneNeeds(0, 0, {std::move(of_photons), std::move(of_sampling)}));
+                    LightSelection{{std::move(of_photons), std::move(of_sampling)}});
   };
   const float sum = all.TotalPower().g;
   const LightSet unseen = set({numbers.spheres}, {});
@@ -431,7 +435,7 @@ TEST(LightSetTest, LeavesOutWhatTheJobDoesNotNeed) {
 
 // Of several lights each has an even share of a twentieth of the photons, and the rest by power.
 TEST(LightSetTest, EachLightHasAnEvenShareOfSomePhotons) {
-  Scene scene = QuadLamp();
+  Scene scene = QuadLight();
   ASSERT_EQ(Lit(scene).lights.lights().size(), 1U);
   const Lit single(scene);
   EXPECT_EQ(single.lights.emitter(0).choice + single.lights.emitter(1).choice, 1)
@@ -481,9 +485,9 @@ TEST(LightSetTest, TheFaintestOfManyLightsCountAsOne) {
   EXPECT_EQ(lit.lights.emitter(98).light, kMaxLightGroups - 1);
 }
 
-// A lamp that is off is none.
+// A light that is off is none.
 TEST(LightSetTest, CountsLightsTooFaintToCountBesideTheOthers) {
-  Scene scene = SphereLamp();
+  Scene scene = SphereLight();
   EXPECT_EQ(Lit(scene).lights.faint_lights(), 0U);
   scene.point_lights.push_back({{0, 2, 0}, Gray(1e-11F)});
   EXPECT_EQ(Lit(scene).lights.faint_lights(), 0U) << "it has its even share";

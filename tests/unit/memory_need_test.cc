@@ -4,8 +4,8 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "render/analysis/expected_cost.h"
 #include "render/base/memory.h"
-#include "render/estimate/expected_cost.h"
 
 namespace lucerna {
 namespace {

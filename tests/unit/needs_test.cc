@@ -1,5 +1,5 @@
 // A scene's plan: what one more feature turns on, and nothing else.
-#include "render/scene/needs.h"
+#include "render/analysis/needs.h"
 
 #include <set>
 #include <string>
@@ -131,7 +131,7 @@ INSTANTIATE_TEST_SUITE_P(
                 "  \"normal N\" [0 1 0  0 -1 0  2e-7 1 0]\n",
                 {"photon-normals"}},
         Feature{"sky", kCamera, "LightSource \"infinite\"\n", {"environment"}},
-        Feature{"lamp",
+        Feature{"light",
                 kCamera,
                 "AreaLightSource \"diffuse\"\n"
                 "Shape \"trianglemesh\" \"point3 P\" [-1 3 4  1 3 4  1 3 6]\n",
@@ -166,16 +166,16 @@ TEST(SceneNeedsTest, OnlyMirrorsNeedNoPhotons) {
   EXPECT_FALSE(NeedsWith(scene).Uses(Part::kPhotons));
 }
 
-TEST(SceneNeedsTest, FacesOfLampsThatShineOnNothingAreCounted) {
+TEST(SceneNeedsTest, FacesOfLightsThatShineOnNothingAreCounted) {
   Scene scene = Parsed(kCamera, "");
-  EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kUnseenLamps),
+  EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kUnreachableLights),
             "every light may reach what the camera sees");
   const std::int32_t light = AddAreaLight(scene, 1);
   // Above the floor, facing up: two triangles; and one more quad facing down on it.
   AddQuad(scene, {-1, 2, 4}, {0, 0, 1}, {1, 0, 0}, 0, light);
   AddQuad(scene, {-1, 1.5F, 4}, {1, 0, 0}, {0, 0, 1}, 0, light);
-  EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kUnseenLamps),
-            "faces of lamps that nothing lies in front of: 2");
+  EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kUnreachableLights),
+            "faces of lights that nothing lies in front of: 2");
 }
 
 // A floor seen from above keeps its photons to itself until something lies on its other side, or
@@ -211,21 +211,21 @@ TEST(SceneNeedsTest, OneFloorNeedsNoNormalsOfPhotons) {
   EXPECT_FALSE(needs_normals(flat));
 }
 
-// A lamp behind closed walls sends nothing, and one inside glass is not sampled.
-TEST(SceneNeedsTest, LightsThatAreShutInAreLeftOut) {
+// A light behind closed walls sends nothing, and one inside glass is not sampled.
+TEST(SceneNeedsTest, LightsThatAreSeparatedOrEnclosedAreLeftOut) {
   Scene scene = Parsed(kCamera, "");
   AddBox(scene, {5, 0, 5}, {7, 2, 7}, 0);
   const std::int32_t light = AddAreaLight(scene, 1);
   AddSphere(scene, {6, 1, 6}, 0.2F, 0, light);
   const SceneNeeds hidden = NeedsWith(scene);
-  EXPECT_FALSE(hidden.Uses(Part::kUnseenLamps));
-  EXPECT_EQ(hidden.ReasonOf(Part::kUnseenLamps),
-            "lights that closed walls keep from the camera's side: 1");
+  EXPECT_FALSE(hidden.Uses(Part::kUnreachableLights));
+  EXPECT_EQ(hidden.ReasonOf(Part::kUnreachableLights),
+            "lights that opaque closed geometry separates from the view: 1");
   const LightNumbers numbers(scene);
-  EXPECT_EQ(hidden.lights_left_out().of_photons, std::vector<std::uint32_t>{numbers.spheres});
+  EXPECT_EQ(hidden.unreachable_lights().of_photons, std::vector<std::uint32_t>{numbers.spheres});
   EXPECT_FALSE(hidden.Uses(Part::kAreaLights));
   EXPECT_EQ(hidden.ReasonOf(Part::kAreaLights),
-            "closed walls keep all of them from the camera's side");
+            "opaque closed geometry separates these lights from the view");
   EXPECT_TRUE(hidden.Uses(Part::kDirectSampling)) << "of the point light";
 
   Scene in_glass = scene;
@@ -233,24 +233,24 @@ TEST(SceneNeedsTest, LightsThatAreShutInAreLeftOut) {
   in_glass.point_lights.clear();
   const std::int32_t glass = AddMaterial(in_glass, DielectricMaterial(1.5F));
   AddSphere(in_glass, {6, 1, 6}, 0.5F, glass);
-  const SceneNeeds shut_in = NeedsWith(in_glass);
-  EXPECT_TRUE(shut_in.lights_left_out().of_photons.empty());
-  EXPECT_FALSE(shut_in.Uses(Part::kDirectSampling));
-  EXPECT_EQ(shut_in.ReasonOf(Part::kDirectSampling),
-            "smooth surfaces shut every light in: all light comes by photons");
+  const SceneNeeds enclosed = NeedsWith(in_glass);
+  EXPECT_TRUE(enclosed.unreachable_lights().of_photons.empty());
+  EXPECT_FALSE(enclosed.Uses(Part::kDirectSampling));
+  EXPECT_EQ(enclosed.ReasonOf(Part::kDirectSampling),
+            "smooth surfaces enclose every light: all light comes by photons");
 
   Scene dark = scene;
   dark.point_lights.clear();
   EXPECT_FALSE(NeedsWith(dark).Uses(Part::kPhotons));
   EXPECT_FALSE(NeedsWith(dark).Uses(Part::kDirectSampling));
-  EXPECT_EQ(NeedsWith(dark).ReasonOf(Part::kPhotons), "no light comes to what the camera can see");
+  EXPECT_EQ(NeedsWith(dark).ReasonOf(Part::kPhotons), "no light reaches what the camera can see");
 
   RenderOverrides overrides;
   overrides.use_everything = true;
   EXPECT_TRUE(NeedsWith(dark, overrides).Uses(Part::kPhotons));
   const SceneNeeds forced = NeedsWith(scene, overrides);
-  EXPECT_TRUE(forced.Uses(Part::kUnseenLamps));
-  EXPECT_TRUE(forced.lights_left_out().of_photons.empty());
+  EXPECT_TRUE(forced.Uses(Part::kUnreachableLights));
+  EXPECT_TRUE(forced.unreachable_lights().of_photons.empty());
   EXPECT_TRUE(NeedsWith(in_glass, overrides).Uses(Part::kDirectSampling));
 }
 

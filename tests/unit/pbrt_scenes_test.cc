@@ -64,8 +64,8 @@ TEST_F(SharedScenesTest, ReadsWhatIsPromised) {
   }
 }
 
-TEST_F(SharedScenesTest, LampsFaceTheRoom) {
-  // The lamp under the ceiling of the Cornell box shines down.
+TEST_F(SharedScenesTest, LightsFaceTheRoom) {
+  // The light under the ceiling of the Cornell box shines down.
   const Scene scene = Parse("cornell-box/scene-v4.pbrt").scene;
   for (const TriangleMesh& mesh : scene.meshes) {
     if (mesh.traits.area_light == kNoAreaLight) continue;
@@ -124,7 +124,7 @@ TEST(OwnScenesTest, TheFurnaceEmitsInward) {
   EXPECT_FALSE(scene.area_lights.at(0).two_sided);
 }
 
-TEST(OwnScenesTest, TheLampIsInsideItsGlass) {
+TEST(OwnScenesTest, TheLightIsInsideItsGlass) {
   const Scene scene = ParseOwn("lamp-in-glass.pbrt").scene;
   ASSERT_EQ(scene.spheres.size(), 2U);
   EXPECT_EQ(scene.spheres[0].center, scene.spheres[1].center);
@@ -142,18 +142,18 @@ TEST(OwnScenesTest, MeshesOfTheScenesAreSmooth) {
   }
 }
 
-TEST(OwnScenesTest, TheLampsOfTheShadowsAreHiddenFromTheFloor) {
-  // In glass: the lamp is within the box that the fourth mesh is.
+TEST(OwnScenesTest, TheLightsOfTheShadowsAreHiddenFromTheFloor) {
+  // In glass: the light is within the box that the fourth mesh is.
   const Scene penumbra = ParseOwn("penumbra.pbrt").scene;
   ASSERT_EQ(penumbra.meshes.size(), 4U);
-  const TriangleMesh& lamp = penumbra.meshes[2];
-  ASSERT_NE(lamp.traits.area_light, kNoAreaLight);
-  EXPECT_LT(Cross(lamp.positions[1] - lamp.positions[0], lamp.positions[2] - lamp.positions[0]).z,
-            0);
+  const TriangleMesh& light = penumbra.meshes[2];
+  ASSERT_NE(light.traits.area_light, kNoAreaLight);
+  EXPECT_LT(
+      Cross(light.positions[1] - light.positions[0], light.positions[2] - light.positions[0]).z, 0);
   Bounds box;
   for (const Vec3 p : penumbra.meshes[3].positions)
     box.Add(p);
-  for (const Vec3 p : lamp.positions) {
+  for (const Vec3 p : light.positions) {
     EXPECT_GT(p.z, box.low.z);
     EXPECT_LT(p.z, box.high.z);
   }
@@ -161,11 +161,11 @@ TEST(OwnScenesTest, TheLampsOfTheShadowsAreHiddenFromTheFloor) {
   EXPECT_GT(ParseOwn("hard-shadow.pbrt").scene.spot_lights.at(0).direction.z, 0.99F);
 }
 
-TEST(OwnScenesTest, TheLampOfTheCausticFacesTheRing) {
+TEST(OwnScenesTest, TheLightOfTheCausticFacesTheRing) {
   const Scene scene = ParseOwn("caustic.pbrt").scene;
-  const TriangleMesh& lamp = scene.meshes.at(0);
-  ASSERT_EQ(lamp.traits.area_light, 0);
-  const auto p = [&](std::size_t i) { return lamp.positions[lamp.indices[i]]; };
+  const TriangleMesh& light = scene.meshes.at(0);
+  ASSERT_EQ(light.traits.area_light, 0);
+  const auto p = [&](std::size_t i) { return light.positions[light.indices[i]]; };
   EXPECT_GT(Dot(Normalize(Cross(p(1) - p(0), p(2) - p(0))), Normalize(-p(0))), 0.9F);
 }
 

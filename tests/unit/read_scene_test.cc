@@ -2,7 +2,10 @@
 // tell; a file of no known format is refused in one sentence that names the formats.
 #include "render/formats/read_scene.h"
 
+#include <map>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -15,7 +18,9 @@ namespace {
 constexpr std::string_view kText = "# a comment\n\nCamera \"perspective\" WorldBegin\n";
 
 ParsedScene ReadNamed(const std::string& name, const std::string& bytes) {
-  MemoryFiles files({{name, bytes}});
+  std::map<std::string, std::string> named;
+  named[name] = bytes;
+  MemoryFiles files(std::move(named));
   return ReadScene(files, name);
 }
 

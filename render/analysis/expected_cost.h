@@ -1,10 +1,10 @@
-// What will a job take of memory and of the wire?
+// How much memory and traffic a job needs.
 //
 // From measured figures, roughly; enough to refuse a job that does not fit, and to tell users
 // before they start one.
 #pragma once
 
-#include "render/scene/needs.h"
+#include "render/analysis/needs.h"
 #include "render/scene/render_settings.h"
 
 namespace lucerna {

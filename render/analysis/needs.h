@@ -1,10 +1,10 @@
-// What of the machine does this job use, and why?
+// Which parts of the renderer a job uses, and why.
 //
-// Derived once from the scene and the settings, when a job is submitted; everything downstream asks
-// it, and workers are told of it with their leases. A part that is not used costs nothing: no
-// memory, no bytes on the wire, no branch in a loop over photons. With `use_everything` all parts
-// that the scene has not, but that could be asked for all the same, are used, for comparison: the
-// image is the same within its noise, and to the bit where the arithmetic is the same.
+// Derived once from the scene and the settings, when a job is submitted; workers get the result
+// with their leases. A part that is not used costs nothing: no memory, no bytes on the wire, no
+// branch in a loop over photons. With `use_everything` all parts that can run without being needed
+// are used, for comparison: the image is the same within its noise, and to the bit where the
+// arithmetic is the same.
 #pragma once
 
 #include <array>
@@ -14,38 +14,39 @@
 #include <string_view>
 #include <utility>
 
-#include "render/scene/enclosures.h"
+#include "render/geometry/intersector.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
+#include "render/transport/unreachable_lights.h"
 
 namespace lucerna {
 
 enum class Part : std::uint8_t {
-  kPhotons,           // photon passes at all
-  kSpecular,          // eye and photon paths through smooth and nearly smooth surfaces
-  kGlossy,            // BSDF columns of hitpoints
-  kCausticHitpoints,  // photons through smooth surfaces, gathered where eye paths go on
-  kShadingNormals,    // vertex normals, and the horizon they bend
-  kTextures,          // look-ups of materials
-  kRoundShapes,       // spheres and disks beside triangles
-  kEnvironment,       // sampling of the sky
-  kAreaLights,        // emission of shapes, and scattered rays that look for it
-  kDeltaLights,       // points, spots, parallel light
-  kUnseenLamps,       // photons whose light never comes to what the camera can see
-  kDirectSampling,    // direct light by samples, in place of photons
-  kPhotonDirections,  // where photons came from, for glossy hitpoints
-  kPhotonNormals,     // what keeps photons on their side of a thin wall
-  kRobustRays,        // rays that do not slip through the edges of triangles
-  kSplitTriangles,    // a tree of higher build quality: large triangles are in it more than once
-  kLens,              // depth of field
-  kFreshEyePaths,     // new eye paths in every pass, in place of a cycle of sample sets
-  kFrequency,         // frequency photons
-  kOccluderEdges,     // edges that photons pass, for their shadows' borders
-  kCurvature,         // the bend of surfaces that light falls on
-  kCurvedMirrors,     // second-order states at curved mirrors and glass
-  kTextureDetail,     // the spectrum of textures
-  kSkyDetail,         // the spectrum of environment maps
-  kGlossyWindow,      // what a glossy lobe hides of the spectrum
+  kPhotons,            // photon passes at all
+  kSpecular,           // eye and photon paths through smooth and nearly smooth surfaces
+  kGlossy,             // BSDF columns of hitpoints
+  kCausticHitpoints,   // photons through smooth surfaces, gathered where eye paths go on
+  kShadingNormals,     // vertex normals, and the horizon they bend
+  kTextures,           // look-ups of materials
+  kRoundShapes,        // spheres and disks beside triangles
+  kEnvironment,        // sampling of environment lights
+  kAreaLights,         // emission of shapes, and scattered rays that find it
+  kDeltaLights,        // points, spots, parallel light
+  kUnreachableLights,  // photons whose light never reaches what the camera can see
+  kDirectSampling,     // direct light by samples, in place of photons
+  kPhotonDirections,   // where photons came from, for glossy hitpoints
+  kPhotonNormals,      // what keeps photons on their side of a thin wall
+  kRobustRays,         // rays that do not slip through the edges of triangles
+  kSplitTriangles,     // a tree of higher build quality: large triangles are in it more than once
+  kLens,               // depth of field
+  kFreshEyePaths,      // new eye paths in every pass, in place of a cycle of sample sets
+  kFrequency,          // frequency photons
+  kOccluderEdges,      // edges that photons pass, for their shadows' borders
+  kCurvature,          // the bend of surfaces that light falls on
+  kCurvedMirrors,      // second-order states at curved mirrors and glass
+  kTextureDetail,      // the spectrum of textures
+  kSkyDetail,          // the spectrum of environment maps
+  kGlossyWindow,       // what a glossy lobe hides of the spectrum
   kMotion,
   kMedia,
   kAlphaMasks,
@@ -60,23 +61,14 @@ inline constexpr std::size_t kParts = static_cast<std::size_t>(Part::kInstances)
   return parts;
 }
 
-// As users are told: "shading-normals".
+// Its name in reports: "shading-normals".
 [[nodiscard]] std::string_view NameOf(Part part);
-
-// Which tree rays are traced through, and what is asked of their hits.
-struct RayNeeds {
-  bool robust_rays = true;
-  bool split_triangles = false;
-  bool shading_normals = true;
-
-  bool operator==(const RayNeeds&) const = default;
-};
 
 class SceneNeeds {
  public:
   SceneNeeds() = default;
-  // As workers are told, without reasons: the parts that are used, bit by bit.
-  SceneNeeds(std::uint64_t parts, int eye_sample_sets, LightsLeftOut lights)
+  // As workers get them, without reasons: the parts that are used, bit by bit.
+  SceneNeeds(std::uint64_t parts, int eye_sample_sets, UnreachableLights lights)
       : eye_sample_sets_(eye_sample_sets), lights_(std::move(lights)) {
     for (std::size_t i = 0; i < kParts; ++i)
       entries_[i].is_used = (parts >> i & 1) != 0;
@@ -96,8 +88,9 @@ class SceneNeeds {
 
   // How many sets of eye paths there are, used in turn; 0: each pass has its own.
   [[nodiscard]] int eye_sample_sets() const { return eye_sample_sets_; }
-  // None of those that Part::kUnseenLamps and Part::kDirectSampling speak of when they are forced.
-  [[nodiscard]] const LightsLeftOut& lights_left_out() const { return lights_; }
+  // Empty when Part::kUnreachableLights and Part::kDirectSampling are forced.
+  [[nodiscard]] const UnreachableLights& unreachable_lights() const { return lights_; }
+  [[nodiscard]] LightSelection lights() const { return {lights_, Uses(Part::kUnreachableLights)}; }
   [[nodiscard]] RayNeeds rays() const {
     return {Uses(Part::kRobustRays), Uses(Part::kSplitTriangles), Uses(Part::kShadingNormals)};
   }
@@ -118,7 +111,7 @@ class SceneNeeds {
 
   std::array<Entry, kParts> entries_;
   int eye_sample_sets_ = 0;
-  LightsLeftOut lights_;
+  UnreachableLights lights_;
 };
 
 [[nodiscard]] SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings);

@@ -1,4 +1,4 @@
-#include "render/estimate/expected_cost.h"
+#include "render/analysis/expected_cost.h"
 
 #include <cstdint>
 
@@ -34,7 +34,8 @@ ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& setti
   const double sets = needs.eye_sample_sets();
   const double caustic_rows = needs.Uses(Part::kCausticHitpoints) ? 1 : 0;
   ExpectedCost cost;
-  cost.coordinator = pixels * (kCoordinator + caustic_rows * kCausticHitpoint + sizeof(std::int64_t) * kOpenPasses * columns +
+  cost.coordinator = pixels * (kCoordinator + caustic_rows * kCausticHitpoint +
+                               sizeof(std::int64_t) * kOpenPasses * columns +
                                sizeof(double) * numbers + sets * (block + kFirstHit));
   cost.worker = pixels * (kWorker + caustic_rows * kCausticOfWorker + sets * kKeptBlock);
   cost.first_pass_sent = pixels * (block + kRadius + caustic_rows * (kGlossyBlock + kRadius));

@@ -1,4 +1,4 @@
-#include "render/scene/needs.h"
+#include "render/analysis/needs.h"
 
 #include <algorithm>
 #include <array>
@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/analysis/reachability.h"
 #include "render/base/text.h"
 #include "render/math/double3.h"
 #include "render/scene/scene_extent.h"
@@ -25,7 +26,7 @@ constexpr std::array<std::string_view, kParts> kNames = {
     "environment",
     "area-lights",
     "delta-lights",
-    "unseen-lamps",
+    "unreachable-lights",
     "direct-sampling",
     "photon-directions",
     "photon-normals",
@@ -119,8 +120,8 @@ std::size_t CountLights(const Scene& scene) {
          scene.infinite_lights.size();
 }
 
-// The faces of one-sided lamps that shine away from all there is.
-std::size_t FacesOfLampsFacingAway(const Scene& scene) {
+// The faces of one-sided lights that nothing lies in front of.
+std::size_t FacesAwayFromScene(const Scene& scene) {
   const Bounds box = BoundsOf(scene);
   const auto is_one_sided = [&](const ShapeTraits& traits) {
     return traits.area_light != kNoAreaLight &&
@@ -273,53 +274,53 @@ class NeedsFinder {
   }
 
   void FindLights() {
-    needs_.lights_ = FindLightsLeftOut(scene_);
-    const LightsLeftOut& left_out = needs_.lights_;
+    needs_.lights_ = FindUnreachableLights(scene_);
+    const UnreachableLights& unreachable = needs_.lights_;
     const std::size_t count = CountLights(scene_);
-    is_dark_ = left_out.of_photons.size() == count;
+    is_dark_ = unreachable.of_photons.size() == count;
     const LightNumbers numbers(scene_);
     // Lights [first, last), of which there are `all`.
-    const auto tell = [&](Part part, std::size_t all, std::uint32_t first, std::uint32_t last,
-                          std::string_view what, std::string_view none) {
-      const auto shut_out = static_cast<std::size_t>(std::ranges::count_if(
-          left_out.of_photons, [&](std::uint32_t n) { return n >= first && n < last; }));
-      Set(part, shut_out < all,
-          shut_out < all ? Concat(what, ": ", all - shut_out)
-          : all > 0      ? std::string("closed walls keep all of them from the camera's side")
-                         : std::string(none));
+    const auto set_kind = [&](Part part, std::size_t all, std::uint32_t first, std::uint32_t last,
+                              std::string_view what, std::string_view none) {
+      const auto left_out = static_cast<std::size_t>(std::ranges::count_if(
+          unreachable.of_photons, [&](std::uint32_t n) { return n >= first && n < last; }));
+      Set(part, left_out < all,
+          left_out < all ? Concat(what, ": ", all - left_out)
+          : all > 0 ? std::string("opaque closed geometry separates these lights from the view")
+                    : std::string(none));
     };
-    const std::size_t skies = scene_.infinite_lights.size();
+    const std::size_t infinite = scene_.infinite_lights.size();
     const std::size_t delta =
         scene_.point_lights.size() + scene_.spot_lights.size() + scene_.distant_lights.size();
-    tell(Part::kEnvironment, skies, numbers.infinite, numbers.end, "infinite lights",
-         "there is no infinite light");
-    tell(Part::kAreaLights, count - delta - skies, 0, numbers.points, "shapes that emit",
-         "no shape emits");
-    tell(Part::kDeltaLights, delta, numbers.points, numbers.infinite,
-         "points, spots and distant lights", "every light has an extent");
+    set_kind(Part::kEnvironment, infinite, numbers.infinite, numbers.end, "infinite lights",
+             "there is no infinite light");
+    set_kind(Part::kAreaLights, count - delta - infinite, 0, numbers.points, "shapes that emit",
+             "no shape emits");
+    set_kind(Part::kDeltaLights, delta, numbers.points, numbers.infinite,
+             "points, spots and distant lights", "every light has an extent");
 
-    std::string unseen;
-    if (const std::size_t shut_out = left_out.of_photons.size(); shut_out > 0) {
-      unseen = Concat("lights that closed walls keep from the camera's side: ", shut_out);
+    std::string reason;
+    if (const std::size_t separated = unreachable.of_photons.size(); separated > 0) {
+      reason = Concat("lights that opaque closed geometry separates from the view: ", separated);
     }
-    if (const std::size_t away = FacesOfLampsFacingAway(scene_); away > 0) {
-      unseen += Concat(unseen.empty() ? "" : "; ",
-                       "faces of lamps that nothing lies in front of: ", away);
+    if (const std::size_t away = FacesAwayFromScene(scene_); away > 0) {
+      reason += Concat(reason.empty() ? "" : "; ",
+                       "faces of lights that nothing lies in front of: ", away);
     }
-    Set(Part::kUnseenLamps, false,
-        unseen.empty() ? "every light may reach what the camera sees" : unseen);
+    Set(Part::kUnreachableLights, false,
+        reason.empty() ? "every light may reach what the camera sees" : reason);
 
     const bool is_lit = First(ScattersBroadly) != nullptr;
-    const std::size_t shut_in = left_out.of_sampling.size();
-    const bool is_sampled = left_out.of_photons.size() + shut_in < count;
+    const std::size_t enclosed = unreachable.of_sampling.size();
+    const bool is_sampled = unreachable.of_photons.size() + enclosed < count;
     Set(Part::kDirectSampling, is_lit && is_sampled,
         !is_lit    ? std::string("no surface scatters light broadly")
         : is_dark_ ? std::string(kDark)
         : !is_sampled
-            ? std::string("smooth surfaces shut every light in: all light comes by photons")
-        : shut_in > 0
-            ? Concat("direct light is sampled, but not of lights that smooth surfaces shut in: ",
-                     shut_in)
+            ? std::string("smooth surfaces enclose every light: all light comes by photons")
+        : enclosed > 0
+            ? Concat("direct light is sampled, except of lights that smooth surfaces enclose: ",
+                     enclosed)
             : std::string("direct light is sampled; photons would be noisier"));
   }
 
@@ -436,8 +437,8 @@ class NeedsFinder {
       }
     };
     force({Part::kSpecular, Part::kGlossy, Part::kShadingNormals, Part::kTextures,
-           Part::kUnseenLamps, Part::kDirectSampling, Part::kPhotonDirections, Part::kPhotonNormals,
-           Part::kRobustRays, Part::kSplitTriangles, Part::kFreshEyePaths});
+           Part::kUnreachableLights, Part::kDirectSampling, Part::kPhotonDirections,
+           Part::kPhotonNormals, Part::kRobustRays, Part::kSplitTriangles, Part::kFreshEyePaths});
     if (gathers_ != nullptr) force({Part::kPhotons});
     if (needs_.Uses(Part::kFrequency)) {
       force({Part::kOccluderEdges, Part::kCurvature, Part::kCurvedMirrors, Part::kTextureDetail,
@@ -451,7 +452,7 @@ class NeedsFinder {
     return scene_.spheres.size() + scene_.disks.size();
   }
 
-  static constexpr std::string_view kDark = "no light comes to what the camera can see";
+  static constexpr std::string_view kDark = "no light reaches what the camera can see";
 
   const Scene& scene_;
   const RenderSettings& settings_;

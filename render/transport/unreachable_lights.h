@@ -1,0 +1,37 @@
+// Numbers of a scene's lights, and the lights that a job need not trace or sample.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+// Lights are numbered: meshes, spheres, disks (shapes that do not emit have a number too), then
+// points, spots, distant and infinite lights.
+struct LightNumbers {
+  explicit LightNumbers(const Scene& scene);
+
+  std::uint32_t spheres, disks, points, spots, distant, infinite, end;
+};
+
+// Lights by number, ascending.
+struct UnreachableLights {
+  // Their light never reaches what the camera can see: they send no photons and are not sampled.
+  std::vector<std::uint32_t> of_photons;
+  // Nothing that scatters their light has a line of sight to them: next-event estimation would
+  // find nothing. Those of_photons are not repeated.
+  std::vector<std::uint32_t> of_sampling;
+
+  bool operator==(const UnreachableLights&) const = default;
+};
+
+// Which lights a LightSet leaves out.
+struct LightSelection {
+  UnreachableLights unreachable;
+  // Whether the faces of one-sided lights that nothing lies in front of emit too.
+  bool includes_faces_away = false;
+};
+
+}  // namespace lucerna
