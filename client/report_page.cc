@@ -171,10 +171,9 @@ std::string SettingFacts(const v1::Job& job, const std::optional<PageImage>& ima
     facts.Add(
         "Radius controller",
         Concat(NameOf(settings.radius_controller), absl::StrFormat(", alpha %.3g", settings.alpha),
-               has_frequency
-                   ? Concat(", bias ", ShortPercent(settings.bias), ", ",
-                            ShortPercent(settings.frequency_share), " frequency photons")
-                   : ""));
+               has_frequency ? Concat(", bias ", ShortPercent(settings.bias), ", ",
+                                      ShortPercent(settings.frequency_share), " frequency photons")
+                             : ""));
     facts.Add("First radius", settings.initial_radius > 0
                                   ? absl::StrFormat("%g scene units", settings.initial_radius)
                                   : "auto");

@@ -103,7 +103,8 @@ Status SetStopCriteria(const RenderOverrides& until, RenderSettings& settings) {
     given += IsGiven(setting, until) ? 1 : 0;
   }
   if (given == 0) {
-    return absl::InvalidArgumentError(Concat("no stop criterion is given: give ", Listed(all, " or ")));
+    return absl::InvalidArgumentError(
+        Concat("no stop criterion is given: give ", Listed(all, " or ")));
   }
   RenderOverrides limits = until;
   if (limits.passes == 0 && given > 1) limits.passes.reset();
