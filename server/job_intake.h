@@ -13,7 +13,7 @@
 
 #include "render/base/digest.h"
 #include "render/base/status.h"
-#include "render/scene/needs.h"
+#include "render/analysis/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/scene/scene_files.h"

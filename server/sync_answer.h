@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "render/base/digest.h"
-#include "render/scene/needs.h"
+#include "render/analysis/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 #include "server/scheduler.h"
