@@ -100,8 +100,9 @@ std::pair<std::vector<JobReport>, std::uint64_t> Coordinator::List(std::size_t c
 }
 
 StatusOr<JobReport> Coordinator::Cancel(const std::string& job_id) {
-  spdlog::info("job {}: the user cancels it", job_id);
-  return WithWorkers(jobs_.Cancel(job_id, Now()));
+  StatusOr<JobReport> report = WithWorkers(jobs_.Cancel(job_id, Now()));
+  if (report.ok()) spdlog::info("job {}: a cancel came", job_id);
+  return report;
 }
 
 StatusOr<JobReport> Coordinator::Stop(const std::string& job_id) {
