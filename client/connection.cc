@@ -10,7 +10,7 @@
 
 #include "client/exit_code.h"
 #include "client/interruption.h"
-#include "client/progress_view.h"
+#include "client/view/progress_view.h"
 #include "render/base/clock.h"
 #include "render/base/mutex.h"
 #include "render/wire/channel.h"

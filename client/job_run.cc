@@ -7,12 +7,12 @@
 #include <unistd.h>
 
 #include "client/exit_code.h"
-#include "client/live_view.h"
-#include "client/photon_view.h"
-#include "client/preview_source.h"
-#include "client/progress_view.h"
 #include "client/scene_reading.h"
-#include "client/terminal.h"
+#include "client/view/live_view.h"
+#include "client/view/photon_view.h"
+#include "client/view/preview_source.h"
+#include "client/view/progress_view.h"
+#include "client/view/terminal.h"
 #include "render/base/clock.h"
 #include "render/base/files.h"
 #include "render/image/exr_file.h"
@@ -33,9 +33,10 @@ std::string NewRequestId(const SceneManifest& manifest) {
 // Shows a job as it moves on: redrawn in place on a terminal, else as plain lines, on stderr.
 class Progress {
  public:
-  Progress(ClientConnection& connection, const std::string& job_id, const Voice& voice)
-      : redraws_(voice.redraws && SizeOfTerminal(STDERR_FILENO).has_value()) {
-    if (!redraws_ || !voice.previews) return;
+  Progress(ClientConnection& connection, const std::string& job_id,
+           const OutputOptions& output_options)
+      : redraws_(output_options.redraws && SizeOfTerminal(STDERR_FILENO).has_value()) {
+    if (!redraws_ || !output_options.previews) return;
     previews_.emplace([&connection, job_id](const std::function<bool()>& gives_up) {
       return connection.GetImage(job_id, gives_up);
     });
@@ -84,10 +85,10 @@ StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& f
 }
 
 StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& job_id,
-                              bool shows_progress, const Voice& voice,
+                              bool shows_progress, const OutputOptions& output_options,
                               const std::function<Status()>& check) {
   std::optional<Progress> progress;
-  if (shows_progress && !voice.quiet) progress.emplace(connection, job_id, voice);
+  if (shows_progress && !output_options.quiet) progress.emplace(connection, job_id, output_options);
   auto job = connection.Watch(job_id, [&](const v1::Job& newest) {
     // Of the end tells the summary.
     if (progress && newest.state() != v1::JOB_STATE_UNSPECIFIED && !HasEnded(newest.state())) {
@@ -96,7 +97,7 @@ StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& j
     return check();
   });
   if (progress) progress->Finish();
-  if (job.ok() && !voice.quiet) {
+  if (job.ok() && !output_options.quiet) {
     const std::string dropped = DroppedLine(*job);
     if (!dropped.empty()) std::fprintf(stderr, "lucerna: warning: %s\n", dropped.c_str());
     // Warnings of the scene's files have a place and came when the scene was read.
@@ -134,10 +135,11 @@ StatusOr<std::unique_ptr<LocalRuns>> LocalRuns::Start(const ClusterOptions& opti
 
 StatusOr<v1::Job> LocalRuns::Run(SceneFiles& files, const SceneManifest& manifest,
                                  const RenderOverrides& overrides,
-                                 const std::string& reference_path, const Voice& voice) {
+                                 const std::string& reference_path,
+                                 const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
                            SendJob(*connection_, files, manifest, overrides, reference_path));
-  auto job = FollowToEnd(*connection_, submitted.job_id(), true, voice,
+  auto job = FollowToEnd(*connection_, submitted.job_id(), true, output_options,
                          [this] { return cluster_->Check(); });
   if (!job.ok()) {
     // The coordinator ends with us; cancelling first lets the workers leave at once. Whether it
@@ -153,9 +155,10 @@ StatusOr<v1::Job> LocalRuns::Run(SceneFiles& files, const SceneManifest& manifes
 
 StatusOr<v1::Job> LocalRuns::Run(const std::string& scene_path, const SceneManifest& manifest,
                                  const RenderOverrides& overrides,
-                                 const std::string& reference_path, const Voice& voice) {
+                                 const std::string& reference_path,
+                                 const OutputOptions& output_options) {
   DirectoryFiles files(SplitScenePath(scene_path).folder);
-  return Run(files, manifest, overrides, reference_path, voice);
+  return Run(files, manifest, overrides, reference_path, output_options);
 }
 
 StatusOr<Image> LocalRuns::ImageOf(const v1::Job& job) {

@@ -10,7 +10,7 @@
 
 #include "client/connection.h"
 #include "client/local_cluster.h"
-#include "client/voice.h"
+#include "client/output_options.h"
 #include "render/base/status.h"
 #include "render/image/image.h"
 #include "render/scene/render_settings.h"
@@ -28,7 +28,8 @@ namespace lucerna {
 // Follows the job to its end, and shows its progress unless told not to. `check` is asked several
 // times a second.
 [[nodiscard]] StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& job_id,
-                                            bool shows_progress, const Voice& voice,
+                                            bool shows_progress,
+                                            const OutputOptions& output_options,
                                             const std::function<Status()>& check);
 
 // Errors: FAILED_PRECONDITION that says what became of the job instead.
@@ -47,11 +48,13 @@ class LocalRuns {
   // Renders to the end; an interruption cancels the job. Returns a job that succeeded.
   [[nodiscard]] StatusOr<v1::Job> Run(SceneFiles& files, const SceneManifest& manifest,
                                       const RenderOverrides& overrides,
-                                      const std::string& reference_path, const Voice& voice);
+                                      const std::string& reference_path,
+                                      const OutputOptions& output_options);
   // The same for the scene of a file on this machine.
   [[nodiscard]] StatusOr<v1::Job> Run(const std::string& scene_path, const SceneManifest& manifest,
                                       const RenderOverrides& overrides,
-                                      const std::string& reference_path, const Voice& voice);
+                                      const std::string& reference_path,
+                                      const OutputOptions& output_options);
   // The image of a job that succeeded.
   [[nodiscard]] StatusOr<Image> ImageOf(const v1::Job& job);
 

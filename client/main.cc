@@ -8,18 +8,18 @@
 
 #include <CLI/CLI.hpp>
 
-#include "client/compare_command.h"
+#include "client/commands/compare_command.h"
+#include "client/commands/file_commands.h"
+#include "client/commands/job_commands.h"
+#include "client/commands/photon_command.h"
+#include "client/commands/plan_command.h"
+#include "client/commands/reference_command.h"
 #include "client/exit_code.h"
-#include "client/file_commands.h"
 #include "client/interruption.h"
-#include "client/job_commands.h"
 #include "client/local_cluster.h"
-#include "client/photon_command.h"
-#include "client/plan_command.h"
-#include "client/preview.h"
-#include "client/reference_command.h"
 #include "client/render_flags.h"
-#include "client/selfcheck.h"
+#include "client/selfcheck/selfcheck.h"
+#include "client/view/preview.h"
 #include "render/base/version.h"
 
 namespace lucerna {
@@ -38,7 +38,7 @@ int Run(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 coordinator unreachable, 130 interrupted.");
 
-  Voice voice;
+  OutputOptions output_options;
   RenderRequest request;
   ClusterOptions cluster;
   OutputPaths fetched;
@@ -72,10 +72,11 @@ int Run(int argc, char** argv) {
     return added;
   };
   const auto add_json = [&](CLI::App* to) {
-    to->add_flag("--json", voice.json, "print the result as one JSON value");
+    to->add_flag("--json", output_options.json, "print the result as one JSON value");
   };
   const auto add_quiet = [&](CLI::App* to) {
-    to->add_flag("--quiet", voice.quiet, "print nothing but errors and what was asked for");
+    to->add_flag("--quiet", output_options.quiet,
+                 "print nothing but errors and what was asked for");
   };
   const auto add_no_preview = [&](CLI::App* to) {
     to->add_flag("--no-preview", hides_preview, "do not show the image on a terminal with colours");
@@ -104,7 +105,7 @@ int Run(int argc, char** argv) {
   };
   CLI::App* render = command("render", "render a scene on this machine", [&]() -> Status {
     LUCERNA_RETURN_IF_ERROR(find_programs());
-    return Render(request, cluster, voice);
+    return Render(request, cluster, output_options);
   });
   add_render_flags(render);
   render->add_option("--workers", cluster.workers, "worker processes")
@@ -117,32 +118,32 @@ int Run(int argc, char** argv) {
   add_no_preview(render);
 
   CLI::App* submit = command("submit", "send a scene to a coordinator",
-                             [&] { return Submit(request, server, voice); });
+                             [&] { return Submit(request, server, output_options); });
   add_render_flags(submit);
   add_server(submit);
   add_json(submit);
   add_quiet(submit);
   add_no_preview(submit);
 
-  CLI::App* jobs =
-      command("jobs", "list the jobs of a coordinator", [&] { return ListJobs(server, voice); });
+  CLI::App* jobs = command("jobs", "list the jobs of a coordinator",
+                           [&] { return ListJobs(server, output_options); });
   add_server(jobs);
   add_json(jobs);
 
   CLI::App* watch = command("watch", "show a job's progress until it has ended",
-                            [&] { return Follow(job_id, true, server, voice); });
+                            [&] { return Follow(job_id, true, server, output_options); });
   CLI::App* wait = command("wait", "wait until a job has ended",
-                           [&] { return Follow(job_id, false, server, voice); });
+                           [&] { return Follow(job_id, false, server, output_options); });
   CLI::App* fetch = command("fetch", "fetch a job's image, also of one that still runs",
-                            [&] { return Fetch(job_id, fetched, server, voice); });
+                            [&] { return Fetch(job_id, fetched, server, output_options); });
   fetch->add_option("-o,--output", fetched.exr, "EXR file to write");
   fetch->add_option("--png", fetched.png, "PNG preview to write");
   CLI::App* cancel = command("cancel", "end a job and drop its image",
-                             [&] { return Cancel(job_id, server, voice); });
+                             [&] { return Cancel(job_id, server, output_options); });
   add_no_preview(watch);
   CLI::App* report =
       command("report", "tell how a job went: image, error, workers, on a page of its own",
-              [&] { return Report(job_id, report_paths, server, voice); });
+              [&] { return Report(job_id, report_paths, server, output_options); });
   report->add_option("-o,--output", report_paths.html, "HTML file to write");
   report->add_option("--csv", report_paths.csv, "file to write samples and workers to, as a table");
   for (CLI::App* about_job : {watch, wait, fetch, report, cancel}) {
@@ -157,7 +158,7 @@ int Run(int argc, char** argv) {
         LUCERNA_RETURN_IF_ERROR(find_programs());
         photon.job_id = job_id;
         photon.program_folder = cluster.program_folder;
-        return TracePhoton(photon, server, voice);
+        return TracePhoton(photon, server, output_options);
       });
   trace_photon->add_option("JOB", job_id, "the job's id; it may have ended")->required();
   trace_photon->add_option("PHOTON", photon.photon, "PASS:INDEX, both from 0, or INDEX")
@@ -168,9 +169,9 @@ int Run(int argc, char** argv) {
   add_json(trace_photon);
 
   CLI::App* stop = command("stop", "end a job and keep its image",
-                           [&] { return StopJob(job_id, server, voice); });
+                           [&] { return StopJob(job_id, server, output_options); });
   CLI::App* extend = command("extend", "go on with a job, from all its photons, to a new end",
-                             [&] { return Extend(job_id, until, server, voice); });
+                             [&] { return Extend(job_id, until, server, output_options); });
   for (const Setting& setting : AllSettings()) {
     // The defaults of a new job do not count here.
     if (setting.role != SettingRole::kStopsJob) continue;
@@ -184,14 +185,14 @@ int Run(int argc, char** argv) {
   }
 
   CLI::App* validate = command("validate", "say what is wrong with a scene",
-                               [&] { return Validate(scene_path, strict, voice); });
+                               [&] { return Validate(scene_path, strict, output_options); });
   validate->add_option("SCENE", scene_path, "pbrt-v4 scene file")->required();
   validate->add_flag("--strict", strict, "warnings are errors");
   add_json(validate);
   add_quiet(validate);
 
   CLI::App* plan = command("plan", "say what a job will use, what is left out, and why",
-                           [&] { return PrintPlan(scene_path, planned, voice); });
+                           [&] { return PrintPlan(scene_path, planned, output_options); });
   plan->add_option("SCENE", scene_path, "pbrt-v4 scene file")->required();
   add_image_flags(plan, planned);
   add_json(plan);
@@ -200,7 +201,7 @@ int Run(int argc, char** argv) {
   CLI::App* diff = command("diff", "say how far an image is from a reference", [&] {
     if (crops) metrics.fit = MetricsOptions::Fit::kCrop;
     if (scales) metrics.fit = MetricsOptions::Fit::kScale;
-    return Diff(image_path, reference_path, mask_path, metrics, voice);
+    return Diff(image_path, reference_path, mask_path, metrics, output_options);
   });
   diff->add_option("A", image_path, "EXR file")->required();
   diff->add_option("B", reference_path, "EXR file to compare with")->required();
@@ -219,7 +220,7 @@ int Run(int argc, char** argv) {
   CLI::App* compare =
       command("compare", "say which settings are ahead after equal time", [&]() -> Status {
         LUCERNA_RETURN_IF_ERROR(find_programs());
-        return CompareSettings(comparison, cluster, voice);
+        return CompareSettings(comparison, cluster, output_options);
       });
   compare->add_option("SCENE", comparison.scene_path, "pbrt-v4 scene file")->required();
   compare->add_option("--reference", comparison.reference_path, "EXR file to measure errors by")
@@ -245,7 +246,7 @@ int Run(int argc, char** argv) {
   CLI::App* reference =
       command("reference", "render an image to measure others by", [&]() -> Status {
         LUCERNA_RETURN_IF_ERROR(find_programs());
-        return RenderReference(to_refer, cluster, voice);
+        return RenderReference(to_refer, cluster, output_options);
       });
   reference->add_option("SCENE", to_refer.scene_path, "pbrt-v4 scene file")->required();
   reference->add_option("-o,--output", to_refer.output_path, "EXR file to write")->required();
@@ -259,7 +260,7 @@ int Run(int argc, char** argv) {
   CLI::App* selfcheck =
       command("selfcheck", "say whether the numbers are right on this machine", [&]() -> Status {
         LUCERNA_RETURN_IF_ERROR(find_programs());
-        return Selfcheck(only, cluster.program_folder, voice);
+        return Selfcheck(only, cluster.program_folder, output_options);
       });
   selfcheck->add_option("--only", only, "run the cases whose names begin so");
   add_json(selfcheck);
@@ -272,7 +273,7 @@ int Run(int argc, char** argv) {
   help->add_option("TOPIC", topic, "settings")->required()->check(CLI::IsMember({"settings"}));
 
   CLI::App* digest = command("digest", "print the digest of an image's pixels and settings",
-                             [&] { return PrintDigest(image_path, voice); });
+                             [&] { return PrintDigest(image_path, output_options); });
   digest->add_option("FILE", image_path, "EXR file")->required();
   add_json(digest);
 
@@ -294,14 +295,14 @@ int Run(int argc, char** argv) {
     return End(ExitCode::kUsage);
   }
 
-  if (*report && report_paths.html.empty() && report_paths.csv.empty() && !voice.json) {
+  if (*report && report_paths.html.empty() && report_paths.csv.empty() && !output_options.json) {
     std::fputs("lucerna: say where the report goes, with -o PAGE.html, --csv FILE or --json\n",
                stderr);
     return End(ExitCode::kUsage);
   }
   const char* term = std::getenv("TERM");
-  voice.redraws = term != nullptr && std::string(term) != "dumb";
-  voice.previews = !hides_preview && HasColors(std::getenv("COLORTERM"), term);
+  output_options.redraws = term != nullptr && std::string(term) != "dumb";
+  output_options.previews = !hides_preview && HasColors(std::getenv("COLORTERM"), term);
 
   CatchInterruptions();
   Status status = chosen();

@@ -9,9 +9,9 @@ namespace lucerna {
 
 namespace {
 
-// Where a shadow ray ends, over the distance to the light. The target is clear of the light's surface
-// by a few roundings of the light's own coordinates; those of a far receiver are larger, and the ray
-// would meet the light itself: a small light lost a tenth of its light 2.5 m away.
+// Where a shadow ray ends, over the distance to the light. The target is clear of the light's
+// surface by a few roundings of the light's own coordinates; those of a far receiver are larger,
+// and the ray would meet the light itself: a small light lost a tenth of its light 2.5 m away.
 constexpr float kShadowEnd = 1 - 0x1p-17F;
 
 }  // namespace
@@ -28,15 +28,15 @@ float PowerHeuristic(float drawn, float other) {
 
 bool SidesAgree(const SurfacePoint& surface, Vec3 wo, Vec3 wi, bool transmits) {
   if (!surface.has_shading_normal) return true;
-  const bool same_side =
-      Dot(wo, surface.geometric_normal) * Dot(wi, surface.geometric_normal) > 0;
+  const bool same_side = Dot(wo, surface.geometric_normal) * Dot(wi, surface.geometric_normal) > 0;
   return same_side != transmits;
 }
 
 Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
                          const ShadingPoint& point, const SobolPoint& u, int& rays) {
   LightSample light;
-  if (!lights.SampleDirect(point.surface.position, FineChoice(u[3], u[7]), u[4], u[5], light)) return {};
+  if (!lights.SampleDirect(point.surface.position, FineChoice(u[3], u[7]), u[4], u[5], light))
+    return {};
   const Vec3 wo = point.frame.ToLocal(point.wo);
   const Vec3 wi = point.frame.ToLocal(light.wi);
   const Rgb bsdf = EvaluateBsdf(point.material, wo, wi, Carried::kRadiance);

@@ -18,9 +18,10 @@ namespace {
 // Eye paths weaker than this end by roulette more often than they go on.
 constexpr float kRouletteWeight = 0.5F;
 // Branches of the specular tree weaker than `BranchWeight` end by roulette. What survives and finds
-// the brightest light adds no more than kWhite times the mean radiance of the scene, so that a small
-// light seen by way of several inner reflections of glass (about 0.04 each) is no bright speck in one
-// pass of a hundred. Relative to the scene's own light: the same bits however bright it is.
+// the brightest light adds no more than kWhite times the mean radiance of the scene, so that a
+// small light seen by way of several inner reflections of glass (about 0.04 each) is no bright
+// speck in one pass of a hundred. Relative to the scene's own light: the same bits however bright
+// it is.
 constexpr float kLargestBranchWeight = 0.01F;
 constexpr float kSmallestBranchWeight = 0x1p-16F;
 // About what a film shows as white over what it shows as middle grey.
@@ -304,7 +305,6 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
           path.caustic = hitpoint_here(true, material);
           path.caustic.weight *= 1 / strength;
         }
-
       }
     }
 

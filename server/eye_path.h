@@ -69,8 +69,8 @@ class EyePathTracer {
   struct WalkParts {
     bool textures = false;
     bool shading_normals = false;
-    bool lobes = false;   // other scattering than diffuse
-    bool lights = false;  // that are sampled
+    bool lobes = false;     // other scattering than diffuse
+    bool lights = false;    // that are sampled
     bool caustics = false;  // hitpoints for caustic photons
   };
   template <WalkParts kParts>

@@ -95,8 +95,8 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     count += tile.rows.rows.size() + tile.caustic_rows.rows.size();
     out.block.caustic_rows += tile.caustic_rows.rows.size();
     for (const Rows* rows : {&tile.rows, &tile.caustic_rows}) {
-      has_textured_k = has_textured_k || std::ranges::any_of(rows->textured_k,
-                                                             [](Rgb k) { return !IsBlack(k); });
+      has_textured_k = has_textured_k ||
+                       std::ranges::any_of(rows->textured_k, [](Rgb k) { return !IsBlack(k); });
     }
   }
   out.block.positions.reserve(count);

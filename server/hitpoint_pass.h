@@ -31,9 +31,7 @@ struct EyePass {
   std::uint64_t rays = 0;
 
   // The rows that gather all photons but caustic ones, and those that gather these.
-  [[nodiscard]] HitpointRows rows() const {
-    return Rows(0, pixels.size() - block.caustic_rows);
-  }
+  [[nodiscard]] HitpointRows rows() const { return Rows(0, pixels.size() - block.caustic_rows); }
   [[nodiscard]] HitpointRows caustic_rows() const {
     return Rows(pixels.size() - block.caustic_rows, block.caustic_rows);
   }

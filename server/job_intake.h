@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "render/analysis/needs.h"
 #include "render/base/digest.h"
 #include "render/base/status.h"
-#include "render/analysis/needs.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/scene/scene_files.h"

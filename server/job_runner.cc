@@ -157,7 +157,7 @@ void JobRunner::EstimateErrorIfDue(bool is_last) {
   }
   passes_at_checkpoint_ = checkpoint.passes;
   error_at_most_ = std::sqrt(checkpoint.estimate.relative.high);
-  next_checkpoint_ = NextLook(checkpoint.passes);
+  next_checkpoint_ = NextCheckpoint(checkpoint.passes);
   hooks_.on_error_estimate(checkpoint);
 }
 

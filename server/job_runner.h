@@ -132,7 +132,7 @@ class JobRunner final : public RunningJob {
   // The runner's thread only.
   ReferenceImage reference_;
   Duration ran_before_{};
-  std::int64_t next_checkpoint_ = kFirstLook;
+  std::int64_t next_checkpoint_ = kFirstCheckpoint;
   int checkpoints_ = 0;
   bool has_warned_ = false;                // of a black image
   std::int64_t passes_at_checkpoint_ = 0;  // passes

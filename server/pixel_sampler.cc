@@ -6,7 +6,9 @@
 namespace lucerna {
 namespace {
 
-double GaussianAt(double x, double sigma) { return std::exp(-x * x / (2 * sigma * sigma)); }
+double GaussianAt(double x, double sigma) {
+  return std::exp(-x * x / (2 * sigma * sigma));
+}
 
 // Mitchell & Netravali 1988, eq. (8), over a support of two radii of 1.
 double MitchellAt(double x, double b, double c) {
@@ -16,7 +18,8 @@ double MitchellAt(double x, double b, double c) {
   }
   if (x <= 2) {
     return ((-b - 6 * c) * x * x * x + (6 * b + 30 * c) * x * x + (-12 * b - 48 * c) * x +
-            (8 * b + 24 * c)) / 6;
+            (8 * b + 24 * c)) /
+           6;
   }
   return 0;
 }

@@ -1,8 +1,9 @@
 // Which random numbers does the eye path of a pixel use?
 //
-// Every pixel has its own low-discrepancy sequences, two sets of them: even passes are the points of
-// one, odd passes those of the other, so that after 2n passes a pixel has twice n well-spread samples
-// of its filter, of its lights and of its scattering, and two independent halves tell the noise.
+// Every pixel has its own low-discrepancy sequences, two sets of them: even passes are the points
+// of one, odd passes those of the other, so that after 2n passes a pixel has twice n well-spread
+// samples of its filter, of its lights and of its scattering, and two independent halves tell the
+// noise.
 #pragma once
 
 #include <array>
@@ -35,7 +36,8 @@ class PixelSampler {
     if (vertex < kStratifiedVertices) return ShuffledOwenSobol(pass_, key);
     KeyedRng rng(CombineKeys(key, pass_));
     SobolPoint point;
-    for (float& u : point) u = rng.Uniform();
+    for (float& u : point)
+      u = rng.Uniform();
     return point;
   }
 

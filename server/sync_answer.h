@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "render/base/digest.h"
 #include "render/analysis/needs.h"
+#include "render/base/digest.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 #include "server/scheduler.h"

@@ -282,8 +282,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     std::vector<std::uint8_t> was_found(grid.size());
     std::optional<PhotonGrid> caustic_grid;
     std::vector<std::uint8_t> caustic_was_found;
-    GatheredPhotons photons{
-        .grid = grid, .features = &state_->features, .was_found = was_found};
+    GatheredPhotons photons{.grid = grid, .features = &state_->features, .was_found = was_found};
     if (block.caustic_rows > 0) {
       caustic_grid.emplace(caustics, region, caustic_cell, state_->team);
       caustic_was_found.resize(caustic_grid->size());

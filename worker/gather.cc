@@ -14,10 +14,10 @@
 namespace lucerna {
 namespace {
 
-// Whether a photon lies on the hitpoint's surface, and not on one above or below it. Along an arc the
-// height of the photon over the hitpoint's plane is the hitpoint's over the photon's, so that both
-// cancel in the sum below; at a bend of angle a, which is no edge up to 45 degrees, it is at most
-// sin(a) times the distance; on a step, or a sheet that lies over another, nothing bends.
+// Whether a photon lies on the hitpoint's surface, and not on one above or below it. Along an arc
+// the height of the photon over the hitpoint's plane is the hitpoint's over the photon's, so that
+// both cancel in the sum below; at a bend of angle a, which is no edge up to 45 degrees, it is at
+// most sin(a) times the distance; on a step, or a sheet that lies over another, nothing bends.
 // Without an edge in the disc a surface may turn by up to 90 degrees, if it does so along an arc.
 template <bool kCut>
 bool IsOnSurface(Vec3 photon_normal, Vec3 normal, Vec3 to_photon, float squared_reach) {
@@ -57,8 +57,7 @@ struct NoEvidence {
   static constexpr float kReach = 1;
   NoEvidence(Vec3 /*normal*/, const FluxScale& /*scale*/) {}
   void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 /*to_photon*/,
-           float /*squared*/, float /*squared_radius*/, float /*weight*/,
-           const CutDisc* /*cut*/) {}
+           float /*squared*/, float /*squared_radius*/, float /*weight*/, const CutDisc* /*cut*/) {}
   void Store(std::vector<std::vector<std::int64_t>>& /*columns*/) const {}
 };
 
@@ -75,7 +74,8 @@ struct SectorEvidence {
     if (cut != nullptr && !cut->Holds(cut->PlaceOf(-to_photon)))
       ++counts[ring + SectorOf(-to_photon)];
   }
-  // Sixths of a turn by the sides of two lines at 60 degrees and the x axis, without an arc tangent.
+  // Sixths of a turn by the sides of two lines at 60 degrees and the x axis, without an arc
+  // tangent.
   [[nodiscard]] std::size_t SectorOf(Vec3 to_photon) const {
     constexpr float kSqrt3 = 1.7320508F;
     const float x = Dot(to_photon, frame.s);
@@ -120,7 +120,8 @@ struct CurvatureEvidence {
     constexpr float kLargest = 16 * kLargestWeight * kLargestWeight;
     const float laplacian = w * cut->LaplacianAt(cut->PlaceOf(to_photon), u);
     sums[kCurvatureLaplacian] += std::llrint(std::clamp(laplacian, -kLargest, kLargest) * kUnits);
-    sums[kCurvatureWeight2] += std::llrint(std::min(w * w * cut->inverse_share(), kLargest) * kUnits);
+    sums[kCurvatureWeight2] +=
+        std::llrint(std::min(w * w * cut->inverse_share(), kLargest) * kUnits);
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
     for (std::size_t i = 0; i < kColumns; ++i)
@@ -170,8 +171,8 @@ struct RowSource {
   std::span<std::uint8_t> was_found;
 };
 
-// Contributions to discs that are cut may weigh many times the kernel. Held here, kMostTerms of them
-// fit; a photon that carries about the scene's power is far below.
+// Contributions to discs that are cut may weigh many times the kernel. Held here, kMostTerms of
+// them fit; a photon that carries about the scene's power is far below.
 constexpr float kLargestCutContribution = 8 * kLargestContribution;
 
 // Without kNormals every photon counts that lies in the disc. With kCut the disc is `cut`.
@@ -256,7 +257,8 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
       const auto& photon = grid.template record<kNormals>(i);
       const Vec3 to_photon = grid.position(i) - position;
       if constexpr (kNormals) {
-        if (!IsOnSurface<kCut>(photon.normal, normal, to_photon, std::max(squared, squared_radius))) {
+        if (!IsOnSurface<kCut>(photon.normal, normal, to_photon,
+                               std::max(squared, squared_radius))) {
           return;
         }
       }
@@ -283,7 +285,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
       // Photons on the far side of a rough dielectric count too.
       const bool is_behind = transmits && Dot(photon.normal, normal) < 0;
       if (!IsOnSurface<kCut>(photon.normal, is_behind ? -normal : normal, to_photon,
-                       std::max(squared, squared_radius))) {
+                             std::max(squared, squared_radius))) {
         return;
       }
       DiscPlace place;
@@ -292,7 +294,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
       Rgb scattered = photon.flux * EvaluateBsdf(material, wo, wi, Carried::kRadiance);
       if (source.caustic_weight != nullptr) {
         scattered *= source.caustic_weight->OfPhotons(grid.emission_density(i), wi.z,
-                                               PdfBsdf(material, wo, wi));
+                                                      PdfBsdf(material, wo, wi));
       }
       if (!scale.HasRoomFor(scattered)) {
         ++piece.excess;
@@ -340,10 +342,9 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
         const bool is_caustic = row >= first_caustic;
         if (is_caustic && photons.caustics == nullptr) continue;
         const bool is_cut =
-            photons.features != nullptr &&
-            cut.Cut(*photons.features, block.positions[row],
-                    DecodeOctahedral(block.normals_oct[row]), radii[row], EvidenceSums::kReach,
-                    kKernel);
+            photons.features != nullptr && cut.Cut(*photons.features, block.positions[row],
+                                                   DecodeOctahedral(block.normals_oct[row]),
+                                                   radii[row], EvidenceSums::kReach, kKernel);
         const auto gather_row = [&](auto with_normals, auto with_cut, const RowSource& source) {
           GatherRow<kKernel, EvidenceSums, with_normals(), with_cut()>(
               block, row, radii[row], lobe, materials, scale, source, is_cut ? &cut : nullptr,

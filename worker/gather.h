@@ -47,8 +47,8 @@ struct GatheredPhotons {
 // ends soon, with a result of no use.
 [[nodiscard]] Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
                                   const GatheredPhotons& photons,
-                                  const std::vector<Material>& materials,
-                                  const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,
+                                  const std::vector<Material>& materials, const Kernel& kernel,
+                                  const FluxScale& scale, ThreadTeam& team,
                                   const std::atomic<bool>& stop,
                                   Evidence evidence = Evidence::kNone);
 

@@ -1,9 +1,9 @@
 // The inner loop of photon_grid.h: eight photons at a time.
 #pragma once
 
-#include <immintrin.h>
-
 #include <bit>
+
+#include <immintrin.h>
 
 #include "worker/photon_grid.h"
 

@@ -176,10 +176,10 @@ template <bool kSpectrum>
 PhotonEnd PhotonPathTracer::WalkUnseen(const Key& key, Landed& landed) const {
   using Function = PhotonEnd (PhotonPathTracer::*)(const Key&, Landed&, NoWatcher&) const;
   static constexpr auto kWalks = []<std::size_t... kBits>(std::index_sequence<kBits...>) {
-    return std::array<Function, sizeof...(kBits)>{&PhotonPathTracer::Walk<
-        WalkParts{kSpectrum, (kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0 || kBits >= 8,
-                  kBits >= 8},
-        NoWatcher>...};
+    return std::array<Function, sizeof...(kBits)>{
+        &PhotonPathTracer::Walk<WalkParts{kSpectrum, (kBits & 1) != 0, (kBits & 2) != 0,
+                                          (kBits & 4) != 0 || kBits >= 8, kBits >= 8},
+                                NoWatcher>...};
   }
   (std::make_index_sequence<16>());
   NoWatcher nobody;
@@ -207,7 +207,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
   Ray ray = emission.ray;
   Rgb flux = emission.flux;
   if (!IsFinite(flux)) return PhotonEnd::kNotFinite;
-  EnergyBooks& energy = landed.energy;
+  EnergyCounters& energy = landed.energy;
   std::int64_t carried = WholeUnits(EnergyOf(flux));
   energy.emitted += carried;
   // What the photon has more before than after goes to an account.
@@ -339,11 +339,11 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     watcher.Played(scattered, survival);
     if (!(survival > 0)) return end(PhotonEnd::kAbsorbed, energy.absorbed);
     if (survival < 1) {
-      if (!(rng.Uniform() < survival)) return end(PhotonEnd::kRoulette, energy.roulette_took);
+      if (!(rng.Uniform() < survival)) return end(PhotonEnd::kRoulette, energy.roulette_loss);
       const float heavier_by = 1 / survival;
       scattered *= heavier_by;
       const std::int64_t heavier = WholeUnits(left * heavier_by);
-      energy.roulette_gave += heavier - carried;
+      energy.roulette_gain += heavier - carried;
       carried = heavier;
     }
     flux = scattered;

@@ -129,7 +129,7 @@ class PhotonPathTracer {
     std::vector<std::uint64_t> dropped_photons;
     // Landings of photons that are too bright to be a deposit (FluxScale::HasRoomFor).
     std::uint64_t excess = 0;
-    EnergyBooks energy;
+    EnergyCounters energy;
     std::array<std::uint64_t, kMaxLightGroups> sent{};  // photons by light
   };
 
@@ -152,7 +152,7 @@ class PhotonPathTracer {
     bool spectrum = false;  // of those that the photon carries
     bool textures = false;
     bool shading_normals = false;
-    bool lobes = false;  // other scattering than diffuse
+    bool lobes = false;     // other scattering than diffuse
     bool caustics = false;  // deposits for hitpoints of caustic photons
   };
   // The walk of one photon; with a watcher only for a replay.
@@ -161,7 +161,7 @@ class PhotonPathTracer {
   // The walk without a watcher that suits the job.
   template <bool kSpectrum>
   PhotonEnd WalkUnseen(const Key& key, Landed& landed) const;
-  // In units of EnergyBooks.
+  // In units of EnergyCounters.
   [[nodiscard]] float EnergyOf(Rgb flux) const;
 
   const Scene& scene_;

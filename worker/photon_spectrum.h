@@ -67,7 +67,7 @@ class SpectrumTracer {
   SpectrumLimits limits_;
   double edge_strength_;
   float reach_;
-  bool sees_glossily_;  // some hitpoints do
+  bool sees_glossily_;                      // some hitpoints do
   std::unique_ptr<SilhouetteEdges> edges_;  // nullptr where nothing casts a shadow
   SurfaceCurvature curvature_;
   // Of emitting meshes, each connected surface as one emitter, in however many meshes it comes.

@@ -1,12 +1,12 @@
 #include "render/base/parallel.h"
 
+#include <algorithm>
+#include <thread>
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 #include <xmmintrin.h>
-
-#include <algorithm>
-#include <thread>
 
 namespace lucerna {
 namespace {

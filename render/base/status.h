@@ -29,8 +29,8 @@ using absl::StatusOr;
   ((condition) ? static_cast<void>(0) : ::lucerna::CheckFailed(#condition, __FILE__, __LINE__))
 
 // Hands a failure on to the caller.
-#define LUCERNA_RETURN_IF_ERROR(expression)               \
-  do {                                                    \
+#define LUCERNA_RETURN_IF_ERROR(expression)                                 \
+  do {                                                                      \
     if (absl::Status status_ = (expression); !status_.ok()) return status_; \
   } while (false)
 

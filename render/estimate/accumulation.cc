@@ -41,8 +41,8 @@ void ForEachSum(Ours& ours, const BatchTally& theirs, const Visit& visit) {
   visit(ours.dropped, theirs.dropped);
   visit(ours.excess, theirs.excess);
   visit(ours.energy.emitted, theirs.energy.emitted);
-  visit(ours.energy.roulette_gave, theirs.energy.roulette_gave);
-  visit(ours.energy.roulette_took, theirs.energy.roulette_took);
+  visit(ours.energy.roulette_gain, theirs.energy.roulette_gain);
+  visit(ours.energy.roulette_loss, theirs.energy.roulette_loss);
   visit(ours.energy.absorbed, theirs.energy.absorbed);
   visit(ours.energy.escaped, theirs.energy.escaped);
   visit(ours.energy.smoothing, theirs.energy.smoothing);
@@ -57,9 +57,9 @@ void ForEachSum(Ours& ours, const BatchTally& theirs, const Visit& visit) {
 
 }  // namespace
 
-bool EnergyBooks::Balance() const {
-  return Wide{emitted} + roulette_gave ==
-         Wide{roulette_took} + absorbed + escaped + smoothing + cut_off + dropped;
+bool EnergyCounters::Balance() const {
+  return Wide{emitted} + roulette_gain ==
+         Wide{roulette_loss} + absorbed + escaped + smoothing + cut_off + dropped;
 }
 
 bool BatchTally::LightsFit() const {

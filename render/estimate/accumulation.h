@@ -19,20 +19,20 @@ namespace lucerna {
 // What became of the photons' power. In whole units, kEnergyBits of them to the power of the whole
 // scene, which is about what a photon carries (math/fixed_point.h): luminance, rounded once for
 // every change, so that what a photon loses here it has lost there, and sums balance to the unit.
-struct EnergyBooks {
+struct EnergyCounters {
   std::int64_t emitted = 0;
   // Survivors of the roulette are made heavier, and only on average by what the others had.
-  std::int64_t roulette_gave = 0;
-  std::int64_t roulette_took = 0;
+  std::int64_t roulette_gain = 0;
+  std::int64_t roulette_loss = 0;
   std::int64_t absorbed = 0;   // less what a BSDF's sampling gave: below 0 is possible
   std::int64_t escaped = 0;    // met nothing
   std::int64_t smoothing = 0;  // lost to shading normals, less what they gave
   std::int64_t cut_off = 0;    // still under way at the greatest depth
   std::int64_t dropped = 0;    // with photons that were not finite any more
 
-  // emitted + roulette_gave = the sum of all others, exactly.
+  // emitted + roulette_gain = the sum of all others, exactly.
   [[nodiscard]] bool Balance() const;
-  bool operator==(const EnergyBooks&) const = default;
+  bool operator==(const EnergyCounters&) const = default;
 };
 inline constexpr int kEnergyBits = 12;
 
@@ -67,7 +67,7 @@ struct BatchTally {
   // Landings, and contributions to hitpoints, left out because sums have no room for them
   // (FluxScale::HasRoomFor).
   std::uint64_t excess = 0;
-  EnergyBooks energy;
+  EnergyCounters energy;
   // By light, at most kMaxLightTallies; lights that are not there have sent nothing, and the last
   // one that is has sent some.
   std::vector<LightTally> lights = {};

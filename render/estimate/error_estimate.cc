@@ -154,9 +154,8 @@ std::vector<float> LeastAround(int width, int height, int reach, const std::vect
     for (std::size_t i = 0; i < line.size(); ++i)
       line[i] = least[start + i * step];
     for (int i = 0; i < length; ++i) {
-      least[start + static_cast<std::size_t>(i) * step] =
-          *std::min_element(line.begin() + std::max(0, i - reach),
-                            line.begin() + std::min(length, i + reach + 1));
+      least[start + static_cast<std::size_t>(i) * step] = *std::min_element(
+          line.begin() + std::max(0, i - reach), line.begin() + std::min(length, i + reach + 1));
     }
   };
   const auto w = static_cast<std::size_t>(width);
@@ -354,8 +353,7 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, Scale scale, doubl
   // Chance and what bias may be off by know nothing of each other.
   const double least_bias = kLeastBias * std::max(0.0, error.bias - std::max(less, 0.0) / count);
   const double most_bias = kMostBias * error.bias + std::max(more, 0.0) / count;
-  const double below =
-      std::log(total / std::max(error.noise + least_bias, kLeastShare * total));
+  const double below = std::log(total / std::max(error.noise + least_bias, kLeastShare * total));
   const double above = std::log((error.noise + most_bias) / total);
   error.low = total * std::exp(-std::hypot(chance, below) - kModelError);
   error.high = (total + lost / count) * std::exp(std::hypot(chance, above) + kModelError);
@@ -490,9 +488,9 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
       pixels[pixel].more_bias = static_cast<float>(
           product(color_over_value(even, even_bias, 1), color_over_value(odd, odd_bias, 1)) -
           relative_product);
-      pixels[pixel].less_bias = static_cast<float>(
-          relative_product -
-          product(color_over_value(even, even_bias, 0), color_over_value(odd, odd_bias, 0)));
+      pixels[pixel].less_bias =
+          static_cast<float>(relative_product - product(color_over_value(even, even_bias, 0),
+                                                        color_over_value(odd, odd_bias, 0)));
       const double of_color = std::sqrt(color_square / 3);
       biases.absolute.even[pixel] = static_cast<float>(even_bias * of_color);
       biases.absolute.odd[pixel] = static_cast<float>(odd_bias * of_color);
@@ -520,8 +518,7 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
                            &PixelError::Size);
   pixels.resize(kept);
-  const SquaredError relative =
-      Summarize(pixels, Scale::kRelative, chosen.relative_lost, spread);
+  const SquaredError relative = Summarize(pixels, Scale::kRelative, chosen.relative_lost, spread);
   return {.relative = relative,
           .absolute = Summarize(pixels, Scale::kAbsolute, chosen.absolute_lost, spread),
           // Products of the halves' biases may be below 0 in the pixels left out; errors are not.

@@ -10,19 +10,20 @@
 // changes, and, divided by 1 - kInnerShare², an estimate of all that it changes (exact for light
 // whose second derivative is even across the disc). The product of the two halves' estimates is
 // free of their noise. Where that product is too noisy, one of the two is smoothed over the pixels
-// around it, which takes chance out of the product, and on steps some of the bias. How far around is
-// chosen as by Lepskii 1991, "On a Problem of Adaptive Estimation in Gaussian White Noise": the
+// around it, which takes chance out of the product, and on steps some of the bias. How far around
+// is chosen as by Lepskii 1991, "On a Problem of Adaptive Estimation in Gaussian White Noise": the
 // widest that agrees with all narrower ones, none included. An inner kernel of a third finds 0.9 to
 // 1.3 of the squared bias of a straight step at radii of 1 to 5 pixels.
 // Source: Hachisuka, Jarosz & Jensen 2010, "A Progressive Error Estimation Framework for Photon
 // Density Estimation", with kernels' differences in place of derivatives.
 //
 // Relative errors are squares over (value² + floor), and the value is not known either. For noise,
-// what two halves and the pixels around agree on is one guess, the least of that and the pixel's own
-// mean another, and the mean of what they give is used. For bias it matters on the dark side of a
-// step, where the blur has made the value too large: a half's value less its estimated bias is used,
-// but no less than the least of the pixels within a kernel's reach. While the estimated bias is mostly
-// noise, less of it is taken off; what would come of all or nothing of it widens the interval.
+// what two halves and the pixels around agree on is one guess, the least of that and the pixel's
+// own mean another, and the mean of what they give is used. For bias it matters on the dark side of
+// a step, where the blur has made the value too large: a half's value less its estimated bias is
+// used, but no less than the least of the pixels within a kernel's reach. While the estimated bias
+// is mostly noise, less of it is taken off; what would come of all or nothing of it widens the
+// interval.
 //
 // Both errors leave out the kTrimmedShare of pixels in which the relative error is largest, of the
 // true error as of the estimated one: the mean of a squared relative error over an image is
@@ -122,10 +123,10 @@ using PixelSumsAt = std::function<PixelSums(std::size_t pixel)>;
 inline constexpr double kTrimmedShare = 0.001;
 
 // Passes before the first look at the error: halves of two passes each.
-inline constexpr std::int64_t kFirstLook = 4;
+inline constexpr std::int64_t kFirstCheckpoint = 4;
 // After how many passes to look next. Fifteen looks or so to a decade of passes: the more looks,
 // the wider each one's interval.
-[[nodiscard]] constexpr std::int64_t NextLook(std::int64_t passes) {
+[[nodiscard]] constexpr std::int64_t NextCheckpoint(std::int64_t passes) {
   return passes * 7 / 6 > passes ? passes * 7 / 6 : passes + 1;
 }
 

@@ -15,9 +15,9 @@
 namespace lucerna {
 
 // Always the first column: what the error estimate needs (see estimate/error_estimate.h). Sums of
-// luminance flux times K(x) - K(x/a)/a², where K is the kernel's shape and a = kInnerShare, in units
-// of the luminance of a quantum of each channel. In a disc that is cut both kernels are, and each has
-// the weights that make up for its own missing part.
+// luminance flux times K(x) - K(x/a)/a², where K is the kernel's shape and a = kInnerShare, in
+// units of the luminance of a quantum of each channel. In a disc that is cut both kernels are, and
+// each has the weights that make up for its own missing part.
 inline constexpr std::size_t kBlurColumn = 0;
 inline constexpr std::size_t kCommonColumns = 1;
 // Radius of the inner kernel over that of the whole one.
@@ -46,18 +46,20 @@ inline constexpr std::uint64_t kFrequencyPeriod = 4;
   return share < 1 ? share : 1;
 }
 
-// kSectors: photons in each of twelve cells of equal area: two rings of six sectors. Where a disc is
-// cut, photons also stand for the places opposite to them that are cut away, so that even light is
-// even across a straight edge. (Where three walls meet it is not, and `cppm` shrinks the radius.)
+// kSectors: photons in each of twelve cells of equal area: two rings of six sectors. Where a disc
+// is cut, photons also stand for the places opposite to them that are cut away, so that even light
+// is even across a straight edge. (Where three walls meet it is not, and `cppm` shrinks the
+// radius.)
 inline constexpr std::size_t kSectors = 12;
 
 // kCurvature, over the photons within kCurvatureReach radii: sums of w·(2u - 1) and w², where w is
 // the photon's luminance flux relative to the scene's power and u the squared distance over that of
 // the reach. The first is the Laplacian of the biweight kernel of that radius h: 24/(π h⁴) times it
 // estimates the Laplacian of the flux density. The disc is wider than the kernel's because a second
-// derivative is noisier than a value: by h⁻⁶ against r⁻². In a disc that is cut, 2u - 1 is replaced by
-// its part at right angles to 1, x and y over what is left, scaled to the noise of a whole disc: an
-// edge beside even or evenly changing light is no curvature. w² is divided by the share that is left.
+// derivative is noisier than a value: by h⁻⁶ against r⁻². In a disc that is cut, 2u - 1 is replaced
+// by its part at right angles to 1, x and y over what is left, scaled to the noise of a whole disc:
+// an edge beside even or evenly changing light is no curvature. w² is divided by the share that is
+// left.
 enum CurvatureColumn : std::size_t { kCurvatureLaplacian, kCurvatureWeight2, kCurvatureColumns };
 inline constexpr float kCurvatureReach = 1.5F;
 

@@ -26,8 +26,8 @@ namespace lucerna {
 
 // One glossy hitpoint: photons count by the BSDF towards `to_eye`.
 struct GlossyHitpoint {
-  std::uint32_t hitpoint = 0;   // row in the block
-  std::uint32_t material = 0;   // index into Scene::materials
+  std::uint32_t hitpoint = 0;    // row in the block
+  std::uint32_t material = 0;    // index into Scene::materials
   std::uint32_t to_eye_oct = 0;  // direction to the eye, octahedral
   std::uint32_t shading_normal_oct = 0;
 

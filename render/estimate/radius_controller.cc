@@ -50,13 +50,13 @@ class Pppm final : public RadiusController {
   double alpha_;
 };
 
-// Takes the radius of least mean squared error for the bias that the photons themselves show, in two
-// ways. Source: Kaplanyan & Dachsbacher 2013, "Adaptive Progressive Photon Mapping", restated.
+// Takes the radius of least mean squared error for the bias that the photons themselves show, in
+// two ways. Source: Kaplanyan & Dachsbacher 2013, "Adaptive Progressive Photon Mapping", restated.
 // The Laplacian is that of a biweight kernel which stays wider than the estimate's by
-// kCurvatureReach. By that its noise alone asks for a radius 1.5 times the present one, so even light
-// is not shrunk for nothing. But on the rim of a bright spot a Laplacian passes through zero while the
-// bias is largest, so what the kernel itself adds over one of a third of its radius counts too, as
-// far as it is surely more than noise.
+// kCurvatureReach. By that its noise alone asks for a radius 1.5 times the present one, so even
+// light is not shrunk for nothing. But on the rim of a bright spot a Laplacian passes through zero
+// while the bias is largest, so what the kernel itself adds over one of a third of its radius
+// counts too, as far as it is surely more than noise.
 class Appm final : public RadiusController {
  public:
   Appm(const RenderSettings& settings, float initial_radius)
@@ -72,8 +72,8 @@ class Appm final : public RadiusController {
     const auto column = [&](CurvatureColumn c) {
       return kWeightUnit * static_cast<double>(evidence.columns[c]);
     };
-    // Per pass and unit of flux: the Laplacian of the flux density, the density of squares, and blur
-    // over the squared radius.
+    // Per pass and unit of flux: the Laplacian of the flux density, the density of squares, and
+    // blur over the squared radius.
     memory[kLaplacian] += column(kCurvatureLaplacian) * 24 / (std::numbers::pi * h2 * h2);
     memory[kSquares] += column(kCurvatureWeight2) / (std::numbers::pi * h2);
     const double blur = evidence.blur / (evidence.radius * evidence.radius);

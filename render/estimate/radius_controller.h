@@ -30,8 +30,8 @@ struct PassEvidence {
   double radius = 0;   // in unit radii; at least PixelRadius::radius, since radii lag by a pass
   // One number a column, in the controller's order of columns; none in a pass without evidence.
   std::span<const std::int64_t> columns;
-  // What the kernel makes of light that is not even, as kBlurColumn measures it: estimate less truth
-  // [luminance flux relative to the scene's power, per squared unit radius].
+  // What the kernel makes of light that is not even, as kBlurColumn measures it: estimate less
+  // truth [luminance flux relative to the scene's power, per squared unit radius].
   double blur = 0;
 };
 

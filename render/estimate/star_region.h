@@ -97,10 +97,10 @@ class StarRegion {
 
 // How a photon at x counts, beside the kernel's shape: by constant + x·slope, so that over the
 // region the kernel keeps its integral and its first moments vanish, as far as that needs no weight
-// below 0. (At a straight border and for Epanechnikov's kernel, the estimate of light that changes by
-// 1 a radius is then off by 0.26, 0.13 and 0.015 at 0, 0.2 and 0.4 radii from it, and by 0 from 0.45
-// on; without a slope it is 0.34, 0.23 and 0.135. Slopes that take away all first moments everywhere
-// need weights below 0 and made the border 1.5 times as noisy.)
+// below 0. (At a straight border and for Epanechnikov's kernel, the estimate of light that changes
+// by 1 a radius is then off by 0.26, 0.13 and 0.015 at 0, 0.2 and 0.4 radii from it, and by 0 from
+// 0.45 on; without a slope it is 0.34, 0.23 and 0.135. Slopes that take away all first moments
+// everywhere need weights below 0 and made the border 1.5 times as noisy.)
 struct RegionWeight {
   float constant = 1;
   float slope_x = 0, slope_y = 0;

@@ -40,8 +40,7 @@ RadiusColumn PixelStatistics::Radii(const HitpointRows& rows, std::uint64_t pass
 
 void PixelStatistics::AddPhotons(const HitpointRows& rows, const RadiusColumn& radii,
                                  const PassSums& sums, const FluxScale& scale, const Kernel& kernel,
-                                 std::int64_t photons_per_pass,
-                                 const RadiusController& controller,
+                                 std::int64_t photons_per_pass, const RadiusController& controller,
                                  std::span<RgbSum> radiance, std::span<double> bias) {
   LUCERNA_CHECK(rows.first + rows.pixels.size() <= sums.size() && radii.size() == sums.size() &&
                 sums.evidence().size() >= kCommonColumns);

@@ -34,8 +34,8 @@ class PixelStatistics {
   // `initial_radius` in unit radii; `memory_per_pixel` as the radius controller asks.
   PixelStatistics(std::size_t pixels, float initial_radius, std::size_t memory_per_pixel = 0);
 
-  // The radius of each hitpoint of pass number `pass` [scene units], from the statistics of the passes
-  // before the one before it. Requires passes() <= pass <= passes() + 1.
+  // The radius of each hitpoint of pass number `pass` [scene units], from the statistics of the
+  // passes before the one before it. Requires passes() <= pass <= passes() + 1.
   [[nodiscard]] RadiusColumn Radii(const HitpointRows& rows, std::uint64_t pass) const;
 
   // Takes in the merged photons of a pass that were gathered with `radii`, both of all rows of the

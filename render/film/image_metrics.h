@@ -28,9 +28,9 @@ struct MetricsOptions {
 };
 
 struct ImageMetrics {
-  std::uint64_t pixels = 0;       // compared
-  double rmse = 0;                // sqrt of the mean over pixels and channels of (a - b)²
-  double rel_mse = 0;             // mean over pixels and channels of (a - b)² / (b² + floor)
+  std::uint64_t pixels = 0;  // compared
+  double rmse = 0;           // sqrt of the mean over pixels and channels of (a - b)²
+  double rel_mse = 0;        // mean over pixels and channels of (a - b)² / (b² + floor)
   // The same without the trim_share of pixels in which it is largest, kTrimmedShare where none is
   // asked for, and of all pixels.
   double rel_mse_trimmed = 0, rel_mse_untrimmed = 0;

@@ -321,9 +321,9 @@ double LargestNorm(const Symmetric& even, const Symmetric& cosine, const Symmetr
 }
 
 // Fits the normals around one vertex.
-class Surroundings {
+class NeighborhoodFit {
  public:
-  Surroundings(std::span<const Vec3> positions, std::span<const Vec3> normals)
+  NeighborhoodFit(std::span<const Vec3> positions, std::span<const Vec3> normals)
       : positions_(positions), normals_(normals) {}
 
   void Prepare(const Graph& graph) {
@@ -540,7 +540,7 @@ bool IsSettled(const BothBounds& bounds) {
 }
 
 // The level of `graph`, which is that of the selected of `finer`, if there is one.
-Level NextLevel(const Graph& graph, const Level* finer, Surroundings& surroundings) {
+Level NextLevel(const Graph& graph, const Level* finer, NeighborhoodFit& surroundings) {
   Level level;
   Selection selection = SelectFrom(graph);
   level.of = std::move(selection.of);
@@ -574,7 +574,7 @@ std::vector<CurvatureChange> CurvatureChanges(std::span<const Vec3> positions,
                                               std::span<const TriangleSide> sides) {
   const Graph all = GraphOf(normals, corners, sides);
   std::vector<Level> levels;
-  Surroundings surroundings(positions, normals);
+  NeighborhoodFit surroundings(positions, normals);
   for (bool is_settled = false; !is_settled;) {
     const Graph& graph = levels.empty() ? all : levels.back().selected;
     if (graph.neighbors.empty()) break;

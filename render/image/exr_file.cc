@@ -242,8 +242,7 @@ Status CheckBlocks(std::string_view bytes, const Extent& extent) {
   const auto width = static_cast<std::uint64_t>(extent.width);
   std::string_view table = bytes.substr(extent.header_bytes);
   for (std::int64_t line = 0; line < extent.height; line += lines_per_block) {
-    const auto lines =
-        static_cast<std::uint64_t>(std::min(lines_per_block, extent.height - line));
+    const auto lines = static_cast<std::uint64_t>(std::min(lines_per_block, extent.height - line));
     const std::uint64_t plain_bytes = width * lines * extent.pixel_bytes;
     const std::uint64_t expected =
         compression == kPxr24 ? width * lines * extent.packed_bytes : plain_bytes;

@@ -41,7 +41,8 @@ inline constexpr std::array<std::array<double, 3>, 3> kRec709FromWorking = {{
 [[nodiscard]] constexpr std::array<double, 3> ToRec709(const std::array<double, 3>& c) {
   std::array<double, 3> out{};
   for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t k = 0; k < 3; ++k) out[i] += kRec709FromWorking[i][k] * c[k];
+    for (std::size_t k = 0; k < 3; ++k)
+      out[i] += kRec709FromWorking[i][k] * c[k];
   }
   return out;
 }

@@ -18,19 +18,41 @@ struct Rgb {
   constexpr Rgb& operator*=(float s) { return *this = {r * s, g * s, b * s}; }
 };
 
-constexpr Rgb operator+(Rgb a, Rgb b) { return {a.r + b.r, a.g + b.g, a.b + b.b}; }
-constexpr Rgb operator-(Rgb a, Rgb b) { return {a.r - b.r, a.g - b.g, a.b - b.b}; }
-constexpr Rgb operator*(Rgb a, Rgb b) { return {a.r * b.r, a.g * b.g, a.b * b.b}; }
-constexpr Rgb operator*(Rgb a, float s) { return {a.r * s, a.g * s, a.b * s}; }
-constexpr Rgb operator*(float s, Rgb a) { return a * s; }
-constexpr Rgb operator/(Rgb a, float s) { return a * (1.0F / s); }
-constexpr Rgb Gray(float v) { return {v, v, v}; }
+constexpr Rgb operator+(Rgb a, Rgb b) {
+  return {a.r + b.r, a.g + b.g, a.b + b.b};
+}
+constexpr Rgb operator-(Rgb a, Rgb b) {
+  return {a.r - b.r, a.g - b.g, a.b - b.b};
+}
+constexpr Rgb operator*(Rgb a, Rgb b) {
+  return {a.r * b.r, a.g * b.g, a.b * b.b};
+}
+constexpr Rgb operator*(Rgb a, float s) {
+  return {a.r * s, a.g * s, a.b * s};
+}
+constexpr Rgb operator*(float s, Rgb a) {
+  return a * s;
+}
+constexpr Rgb operator/(Rgb a, float s) {
+  return a * (1.0F / s);
+}
+constexpr Rgb Gray(float v) {
+  return {v, v, v};
+}
 
 // Of a Rec. 709 colour; of a working-space colour, a weight about as large.
-constexpr float Luminance(Rgb c) { return 0.2126F * c.r + 0.7152F * c.g + 0.0722F * c.b; }
-constexpr float MaxChannel(Rgb c) { return std::max(c.r, std::max(c.g, c.b)); }
-constexpr bool IsBlack(Rgb c) { return c.r == 0 && c.g == 0 && c.b == 0; }
+constexpr float Luminance(Rgb c) {
+  return 0.2126F * c.r + 0.7152F * c.g + 0.0722F * c.b;
+}
+constexpr float MaxChannel(Rgb c) {
+  return std::max(c.r, std::max(c.g, c.b));
+}
+constexpr bool IsBlack(Rgb c) {
+  return c.r == 0 && c.g == 0 && c.b == 0;
+}
 // Zero times a number is zero, unless the number is infinite or none: one comparison for all three.
-constexpr bool IsFinite(Rgb c) { return c.r * 0 + c.g * 0 + c.b * 0 == 0; }
+constexpr bool IsFinite(Rgb c) {
+  return c.r * 0 + c.g * 0 + c.b * 0 == 0;
+}
 
 }  // namespace lucerna

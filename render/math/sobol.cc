@@ -41,7 +41,8 @@ constexpr std::array<Polynomial, kDimensions - 1> kPolynomials = {{
 constexpr std::array<std::uint32_t, 32> ReversedDirections(int dimension) {
   std::array<std::uint32_t, 32> m{};
   if (dimension == 0) {
-    for (std::size_t i = 0; i < 32; ++i) m[i] = 1U << i;
+    for (std::size_t i = 0; i < 32; ++i)
+      m[i] = 1U << i;
     return m;
   }
   const Polynomial& polynomial = kPolynomials[static_cast<std::size_t>(dimension - 1)];
@@ -57,7 +58,8 @@ constexpr std::array<std::uint32_t, 32> ReversedDirections(int dimension) {
       if ((polynomial.coefficients >> (degree - 1 - k)) & 1U) v[i] ^= v[i - k];
     }
   }
-  for (std::size_t i = 0; i < 32; ++i) m[i] = ReverseBits(v[i]);
+  for (std::size_t i = 0; i < 32; ++i)
+    m[i] = ReverseBits(v[i]);
   return m;
 }
 
@@ -118,7 +120,8 @@ SobolPoint Point(std::uint32_t index, std::uint64_t key) {
   }
   Lanes seed;
   std::array<std::uint64_t, 4> seeds{};
-  for (std::size_t i = 0; i < 4; ++i) seeds[i] = Mix64(key + (i + 1) * 0x9E3779B97F4A7C15ULL);
+  for (std::size_t i = 0; i < 4; ++i)
+    seeds[i] = Mix64(key + (i + 1) * 0x9E3779B97F4A7C15ULL);
   std::memcpy(&seed, seeds.data(), sizeof(seed));
   const Lanes scrambled = ReverseLanes(ScrambleReversed(sum, seed));
   using SignedLanes = std::int32_t __attribute__((vector_size(32)));

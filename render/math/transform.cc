@@ -8,14 +8,17 @@ namespace {
 
 using Row3 = std::array<double, 3>;
 
-double DotRow(const Row3& a, const Row3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double DotRow(const Row3& a, const Row3& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 Row3 CrossRow(const Row3& a, const Row3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 bool NormalizeRow(Row3& a) {
   const double length = std::sqrt(DotRow(a, a));
   if (!(length > 0) || !std::isfinite(length)) return false;
-  for (double& component : a) component /= length;
+  for (double& component : a)
+    component /= length;
   return true;
 }
 
@@ -70,7 +73,8 @@ Transform Transform::operator*(const Transform& other) const {
   for (std::size_t i = 0; i < 4; ++i) {
     for (std::size_t j = 0; j < 4; ++j) {
       double sum = 0;
-      for (std::size_t k = 0; k < 4; ++k) sum += m_[i][k] * other.m_[k][j];
+      for (std::size_t k = 0; k < 4; ++k)
+        sum += m_[i][k] * other.m_[k][j];
       product.m_[i][j] = sum;
     }
   }
@@ -115,7 +119,8 @@ Vec3 Transform::Point(Vec3 p) const {
              m_[i][2] * static_cast<double>(p.z) + m_[i][3];
   }
   if (out[3] != 1) {
-    for (std::size_t i = 0; i < 3; ++i) out[i] /= out[3];
+    for (std::size_t i = 0; i < 3; ++i)
+      out[i] /= out[3];
   }
   return {static_cast<float>(out[0]), static_cast<float>(out[1]), static_cast<float>(out[2])};
 }
@@ -157,12 +162,14 @@ bool Transform::SwapsHandedness() const {
 StatusOr<double> Transform::UniformScale() const {
   double squared = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    for (std::size_t j = 0; j < 3; ++j) squared += m_[i][j] * m_[i][j] / 3;
+    for (std::size_t j = 0; j < 3; ++j)
+      squared += m_[i][j] * m_[i][j] / 3;
   }
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       double dot = 0;
-      for (std::size_t k = 0; k < 3; ++k) dot += m_[k][i] * m_[k][j];
+      for (std::size_t k = 0; k < 3; ++k)
+        dot += m_[k][i] * m_[k][j];
       const double expected = i == j ? squared : 0;
       if (!(std::abs(dot - expected) <= 2e-5 * squared)) {
         return absl::InvalidArgumentError("the transformation does not scale all axes alike");

@@ -20,28 +20,52 @@ struct Vec3 {
   constexpr bool operator==(const Vec3&) const = default;
 };
 
-constexpr Vec3 operator+(Vec3 a, Vec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-constexpr Vec3 operator-(Vec3 a, Vec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-constexpr Vec3 operator*(Vec3 a, float s) { return {a.x * s, a.y * s, a.z * s}; }
-constexpr Vec3 operator*(float s, Vec3 a) { return a * s; }
-constexpr Vec3 operator/(Vec3 a, float s) { return a * (1.0F / s); }
-constexpr Vec3 operator-(Vec3 a) { return {-a.x, -a.y, -a.z}; }
+constexpr Vec3 operator+(Vec3 a, Vec3 b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+constexpr Vec3 operator-(Vec3 a, Vec3 b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+constexpr Vec3 operator*(Vec3 a, float s) {
+  return {a.x * s, a.y * s, a.z * s};
+}
+constexpr Vec3 operator*(float s, Vec3 a) {
+  return a * s;
+}
+constexpr Vec3 operator/(Vec3 a, float s) {
+  return a * (1.0F / s);
+}
+constexpr Vec3 operator-(Vec3 a) {
+  return {-a.x, -a.y, -a.z};
+}
 
-constexpr float Dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+constexpr float Dot(Vec3 a, Vec3 b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
 constexpr Vec3 Cross(Vec3 a, Vec3 b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-constexpr float LengthSquared(Vec3 a) { return Dot(a, a); }
-inline float Length(Vec3 a) { return std::sqrt(LengthSquared(a)); }
+constexpr float LengthSquared(Vec3 a) {
+  return Dot(a, a);
+}
+inline float Length(Vec3 a) {
+  return std::sqrt(LengthSquared(a));
+}
 // Requires a non-zero vector whose squared length neither overflows nor vanishes.
-inline Vec3 Normalize(Vec3 a) { return a * (1.0F / Length(a)); }
+inline Vec3 Normalize(Vec3 a) {
+  return a * (1.0F / Length(a));
+}
 inline float MaxAbs(Vec3 a) {
   return std::max(std::abs(a.x), std::max(std::abs(a.y), std::abs(a.z)));
 }
 // Zero times a number is zero, unless the number is infinite or none: one comparison for all three.
-constexpr bool IsFinite(Vec3 a) { return a.x * 0 + a.y * 0 + a.z * 0 == 0; }
+constexpr bool IsFinite(Vec3 a) {
+  return a.x * 0 + a.y * 0 + a.z * 0 == 0;
+}
 // `n`, turned to the side that `towards` points to.
-constexpr Vec3 FaceForward(Vec3 n, Vec3 towards) { return Dot(n, towards) < 0 ? -n : n; }
+constexpr Vec3 FaceForward(Vec3 n, Vec3 towards) {
+  return Dot(n, towards) < 0 ? -n : n;
+}
 
 // An orthonormal frame around a unit normal. Local z is the normal.
 // Source: Duff et al. 2017, "Building an Orthonormal Basis, Revisited".

@@ -16,8 +16,8 @@ struct SceneExtent {
 // The box around all shapes; that of a disk is that of its sphere.
 [[nodiscard]] Bounds BoundsOf(const Scene& scene);
 
-// Whether all of `box` lies behind, or on, the plane through `point` with `normal`: light that leaves
-// the plane's front meets nothing in the box.
+// Whether all of `box` lies behind, or on, the plane through `point` with `normal`: light that
+// leaves the plane's front meets nothing in the box.
 [[nodiscard]] bool FacesAway(Vec3 point, Vec3 normal, const Bounds& box);
 
 }  // namespace lucerna

@@ -9,9 +9,13 @@
 namespace lucerna {
 namespace {
 
-constexpr float Square(float v) { return v * v; }
+constexpr float Square(float v) {
+  return v * v;
+}
 
-Vec3 Mirror(Vec3 wo, Vec3 m) { return m * (2 * Dot(wo, m)) - wo; }
+Vec3 Mirror(Vec3 wo, Vec3 m) {
+  return m * (2 * Dot(wo, m)) - wo;
+}
 
 // The GGX distribution with widths alpha_u, alpha_v along local x and y.
 struct Ggx {
@@ -192,7 +196,8 @@ Rgb EvaluateDielectric(const Material& material, Vec3 wo, Vec3 wi, Carried carri
   const float cos_o = Dot(wo, half.m);
   const float cos_i = Dot(wi, half.m);
   const float denominator = Square(cos_i + cos_o / half.eta) * std::abs(wo.z * wi.z);
-  float f = (1 - half.reflectance) * shape * std::abs(cos_i * cos_o) / std::max(1e-20F, denominator);
+  float f =
+      (1 - half.reflectance) * shape * std::abs(cos_i * cos_o) / std::max(1e-20F, denominator);
   if (carried == Carried::kRadiance) f /= half.eta * half.eta;
   return Gray(f);
 }
@@ -248,8 +253,7 @@ Rgb FresnelConductor(float cos_i, Rgb eta, Rgb k) {
     const float a = std::sqrt(std::max(0.0F, 0.5F * (a2_plus_b2 + t)));
     // Both denominators vanish only together with their numerators.
     constexpr float kLeast = 1e-30F;
-    const float rs =
-        (a2_plus_b2 + c2 - 2 * c * a) / std::max(kLeast, a2_plus_b2 + c2 + 2 * c * a);
+    const float rs = (a2_plus_b2 + c2 - 2 * c * a) / std::max(kLeast, a2_plus_b2 + c2 + 2 * c * a);
     const float rp = rs * (c2 * a2_plus_b2 + s2 * s2 - 2 * c * a * s2) /
                      std::max(kLeast, c2 * a2_plus_b2 + s2 * s2 + 2 * c * a * s2);
     return std::clamp(0.5F * (rs + rp), 0.0F, 1.0F);

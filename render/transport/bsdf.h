@@ -22,8 +22,8 @@ enum class Carried : bool { kRadiance, kFlux };
 
 struct BsdfSample {
   Vec3 wi;
-  Rgb weight;      // f·|cosθi| / pdf; includes the choice of lobe
-  float pdf = 0;   // pdf_solid_angle [sr⁻¹]; meaningless when is_delta
+  Rgb weight;     // f·|cosθi| / pdf; includes the choice of lobe
+  float pdf = 0;  // pdf_solid_angle [sr⁻¹]; meaningless when is_delta
   bool is_delta = false;
 };
 

@@ -36,8 +36,8 @@ class CausticWeight {
   // receiver's BSDF draws that direction [sr⁻¹].
   [[nodiscard]] float OfPhotons(float emission_density, float cosine, float scatter_pdf) const {
     if (!(emission_density < HUGE_VALF)) return 1;
-    const double photons =
-        photon_area_ * static_cast<double>(emission_density) * static_cast<double>(std::abs(cosine));
+    const double photons = photon_area_ * static_cast<double>(emission_density) *
+                           static_cast<double>(std::abs(cosine));
     if (!(photons > 0)) return 0;
     const double ratio = static_cast<double>(scatter_pdf) / photons;
     return static_cast<float>(1 / (1 + ratio * ratio));

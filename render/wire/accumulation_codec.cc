@@ -116,9 +116,9 @@ std::string EncodeAccumulation(const Accumulation& accumulation, std::size_t hit
        {tally.photons, tally.rays, tally.deposits, tally.pairs, tally.dropped, tally.excess}) {
     writer.Varint(value);
   }
-  const EnergyBooks& energy = tally.energy;
+  const EnergyCounters& energy = tally.energy;
   for (const std::int64_t value :
-       {energy.emitted, energy.roulette_gave, energy.roulette_took, energy.absorbed, energy.escaped,
+       {energy.emitted, energy.roulette_gain, energy.roulette_loss, energy.absorbed, energy.escaped,
         energy.smoothing, energy.cut_off, energy.dropped}) {
     writer.Varint(ZigZag(value));
   }
@@ -181,9 +181,9 @@ StatusOr<Accumulation> DecodeAccumulation(std::string_view bytes, std::size_t hi
                                &tally.dropped, &tally.excess}) {
     *value = reader.Varint();
   }
-  EnergyBooks& energy = tally.energy;
+  EnergyCounters& energy = tally.energy;
   for (std::int64_t* value :
-       {&energy.emitted, &energy.roulette_gave, &energy.roulette_took, &energy.absorbed,
+       {&energy.emitted, &energy.roulette_gain, &energy.roulette_loss, &energy.absorbed,
         &energy.escaped, &energy.smoothing, &energy.cut_off, &energy.dropped}) {
     *value = UnZigZag(reader.Varint());
   }

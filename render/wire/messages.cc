@@ -208,8 +208,8 @@ v1::Tally ToProto(const BatchTally& tally) {
   message.set_excess(tally.excess);
   v1::Energy& energy = *message.mutable_energy();
   energy.set_emitted(tally.energy.emitted);
-  energy.set_roulette_gave(tally.energy.roulette_gave);
-  energy.set_roulette_took(tally.energy.roulette_took);
+  energy.set_roulette_gain(tally.energy.roulette_gain);
+  energy.set_roulette_loss(tally.energy.roulette_loss);
   energy.set_absorbed(tally.energy.absorbed);
   energy.set_escaped(tally.energy.escaped);
   energy.set_smoothing(tally.energy.smoothing);
@@ -238,8 +238,8 @@ BatchTally FromProto(const v1::Tally& message) {
           .dropped = message.dropped(),
           .excess = message.excess(),
           .energy = {.emitted = energy.emitted(),
-                     .roulette_gave = energy.roulette_gave(),
-                     .roulette_took = energy.roulette_took(),
+                     .roulette_gain = energy.roulette_gain(),
+                     .roulette_loss = energy.roulette_loss(),
                      .absorbed = energy.absorbed(),
                      .escaped = energy.escaped(),
                      .smoothing = energy.smoothing(),

@@ -163,8 +163,8 @@ std::vector<Deposits> TraceDeposits(const Bench& bench, std::uint64_t photons) {
   return deposits;
 }
 
-Accumulation GatherOnce(const Bench& bench, const std::vector<Deposits>& deposits,
-                        ThreadTeam& team, bool cuts = true) {
+Accumulation GatherOnce(const Bench& bench, const std::vector<Deposits>& deposits, ThreadTeam& team,
+                        bool cuts = true) {
   RadiusColumn sorted = bench.radii;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
                    sorted.end());
@@ -193,8 +193,7 @@ void GatherPairs(benchmark::State& state, const Bench& bench, bool cuts) {
                                      static_cast<double>(state.iterations()) /
                                      static_cast<double>(bench.eye.block.size());
   state.counters["s/hitpoint"] =
-      Counter(static_cast<double>(state.iterations()) *
-                  static_cast<double>(bench.eye.block.size()),
+      Counter(static_cast<double>(state.iterations()) * static_cast<double>(bench.eye.block.size()),
               Counter::kIsRate | Counter::kInvert);
 }
 
@@ -284,9 +283,12 @@ void Register(const std::string& name, const std::string& path) {
   add("photon_rays", PhotonRays)->Unit(benchmark::kMillisecond);
   add("eye_paths", EyePaths)->Unit(benchmark::kMillisecond);
   for (const bool cuts : {true, false}) {
-    add(cuts ? "gather" : "gather_whole_discs", [cuts](benchmark::State& s, const Bench& b) {
-      GatherPairs(s, b, cuts);
-    })->Arg(1)->Arg(1 << 16)->Arg(1 << 18)->Unit(benchmark::kMillisecond);
+    add(cuts ? "gather" : "gather_whole_discs",
+        [cuts](benchmark::State& s, const Bench& b) { GatherPairs(s, b, cuts); })
+        ->Arg(1)
+        ->Arg(1 << 16)
+        ->Arg(1 << 18)
+        ->Unit(benchmark::kMillisecond);
   }
   add("feature_edges", FindFeatures)->Unit(benchmark::kMillisecond);
   for (const auto controller : {RadiusControllerKind::kPpm, RadiusControllerKind::kFrequencyMse,

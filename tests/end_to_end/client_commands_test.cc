@@ -166,8 +166,11 @@ TEST_F(ClientCommandsTest, TheDigestDoesNotDependOnWorkersOrThreadsAndDoesOnTheS
 // Where nothing on an eye path is random but its place in the pixel, hitpoints are sent once.
 TEST_F(ClientCommandsTest, AStaticSceneIsSentRadiiOnlyAfterTheFirstRoundOfEyePaths) {
   const auto sent = [&](const std::string& passes, std::vector<std::string> more) {
-    std::vector<std::string> words = {"render",  SceneOfTests("corner.pbrt"), "--size", "48x48",
-                                      "--passes", passes, "--json", "-o", In("a.exr")};
+    std::vector<std::string> words = {"render",   SceneOfTests("corner.pbrt"),
+                                      "--size",   "48x48",
+                                      "--passes", passes,
+                                      "--json",   "-o",
+                                      In("a.exr")};
     words.insert(words.end(), more.begin(), more.end());
     const Ran ran = Run(words);
     EXPECT_EQ(ran.code, 0) << ran.err;

@@ -56,9 +56,9 @@ TEST(ServerIntrospectionTest, SaysThatItServesAndWhat) {
   EXPECT_EQ(FirstAnswer(address, "/grpc.health.v1.Health/Check", ""), "\x08\x01");
 
   // ServerReflectionRequest{list_services: ""}.
-  const std::string services = FirstAnswer(
-      address, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
-      std::string("\x3a\x00", 2));
+  const std::string services =
+      FirstAnswer(address, "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo",
+                  std::string("\x3a\x00", 2));
   for (const char* name : {"lucerna.v1.AssetService", "lucerna.v1.JobService",
                            "lucerna.v1.ImageService", "lucerna.v1.WorkerService"}) {
     EXPECT_NE(services.find(name), std::string::npos) << name;

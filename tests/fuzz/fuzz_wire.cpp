@@ -1,5 +1,5 @@
-// Any bytes as a hitpoint block, as radii or as an accumulation: no crash, no hang, no memory without
-// bound, and what decodes comes back from its own encoding.
+// Any bytes as a hitpoint block, as radii or as an accumulation: no crash, no hang, no memory
+// without bound, and what decodes comes back from its own encoding.
 #include <cstddef>
 #include <cstdint>
 #include <string_view>

@@ -66,9 +66,11 @@ v1::SubmitRequest RequestFor(const v1::SceneManifest& scene, const std::string& 
   v1::SubmitRequest request;
   request.set_request_id(request_id);
   *request.mutable_scene() = scene;
-  request.mutable_overrides()->set_passes(passes);
-  request.mutable_overrides()->set_photons_per_pass(1000);
-  request.mutable_overrides()->set_radius_controller("pppm");
+  RenderOverrides overrides;
+  overrides.passes = passes;
+  overrides.photons_per_pass = 1000;
+  overrides.radius_controller = RadiusControllerKind::kPppm;
+  *request.mutable_overrides() = ToProto(overrides);
   return request;
 }
 
@@ -194,7 +196,9 @@ Answer<v1::Job> TestClient::Extend(const std::string& job_id, std::int64_t passe
   Deadline context;
   v1::ExtendJobRequest request;
   request.set_job_id(job_id);
-  request.mutable_until()->set_passes(passes);
+  RenderOverrides until;
+  until.passes = passes;
+  *request.mutable_until() = ToProto(until);
   Answer<v1::Job> answer;
   answer.status = jobs_->Extend(&context, request, &answer.message);
   return answer;

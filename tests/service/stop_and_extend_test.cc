@@ -4,6 +4,7 @@
 
 #include "gtest/gtest.h"
 
+#include "render/wire/messages.h"
 #include "tests/service/service_under_test.h"
 
 namespace lucerna {
@@ -57,7 +58,7 @@ TEST(StopAndExtendTest, AJobThatHasNotBegunIsCancelledInstead) {
   const std::string first = client.Submit(RequestFor(scene, "first", 2)).message.job_id();
   const std::string second = client.Submit(RequestFor(scene, "second", 2)).message.job_id();
   EXPECT_EQ(client.Stop(second).code(), grpc::StatusCode::FAILED_PRECONDITION);
-  EXPECT_EQ(client.Extend(second, 3).message.settings().passes(), 3);
+  EXPECT_EQ(SettingsOf(client.Extend(second, 3).message).passes, 3);
   EXPECT_EQ(client.Image(second).code(), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_EQ(client.Cancel(second).message.state(), v1::JOB_STATE_CANCELLED);
   EXPECT_EQ(client.Extend(second, 4).code(), grpc::StatusCode::FAILED_PRECONDITION);

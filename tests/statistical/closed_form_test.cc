@@ -191,10 +191,9 @@ TEST(IrradianceTest, FromAnEnvironmentMapIsTheSumOverItsPatches) {
     constexpr int kLattice = 400 * kSide;
     for (int y = 0; y < kLattice; ++y) {
       for (int x = 0; x < kLattice; ++x) {
-        const float cosine =
-            EqualAreaDirection({(static_cast<float>(x) + 0.5F) / kLattice,
-                                (static_cast<float>(y) + 0.5F) / kLattice})
-                .z;
+        const float cosine = EqualAreaDirection({(static_cast<float>(x) + 0.5F) / kLattice,
+                                                 (static_cast<float>(y) + 0.5F) / kLattice})
+                                 .z;
         if (cosine <= 0) continue;
         irradiance += static_cast<double>(picture.At(x / 400, y / 400).g * cosine) * 4 * kPiD /
                       (static_cast<double>(kLattice) * kLattice);

@@ -34,9 +34,9 @@ TEST_P(ErrorEstimateTest, IsTrueAndItsIntervalsHoldTheTruthAtAllLooks) {
 }
 
 // Under waves the estimate is up to 1.37 times too large in the first passes, a known fault on the
-// safe side: bias is relative to values that are guessed from few photons, and the mean of 1/x² over
-// noisy x is too large. Giving noise more weight in the guess mends that and makes the estimate too
-// small at hard shadows (0.7), which is worse.
+// safe side: bias is relative to values that are guessed from few photons, and the mean of 1/x²
+// over noisy x is too large. Giving noise more weight in the guess mends that and makes the
+// estimate too small at hard shadows (0.7), which is worse.
 INSTANTIATE_TEST_SUITE_P(Scenes, ErrorEstimateTest,
                          testing::Values(EstimatedScene{"penumbra.pbrt", 1.25},
                                          EstimatedScene{"caustic.pbrt", 1.25},
@@ -61,15 +61,16 @@ TEST_P(ErrorEstimateAtStepsTest, IsNearTheTrueErrorAfterManyPasses) {
   RecordProperty("covered", study.Covered());
   EXPECT_GT(study.Ratios().back(), 0.8);
   EXPECT_LT(study.Ratios().back(), 1.25);
-  // Of twelve renders of which nineteen in twenty are covered, two or more are left out by chance in
-  // 12 %; three in 2 %.
+  // Of twelve renders of which nineteen in twenty are covered, two or more are left out by chance
+  // in 12 %; three in 2 %.
   EXPECT_GE(study.Covered(), 10);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, ErrorEstimateAtStepsTest,
                          testing::Values("hard-shadow.pbrt", "bars.pbrt", "water-sun.pbrt"));
 
-// A target that can be reached: the mean true error at the first look after a quarter of the passes.
+// A target that can be reached: the mean true error at the first look after a quarter of the
+// passes.
 double TargetOf(const ErrorStudy& study, const StudySize& size) {
   std::size_t look = 0;
   while (study.renders.front()[look].passes * 4 < size.passes)

@@ -61,11 +61,11 @@ TEST(MissingLightTest, TheIntervalHoldsWhatComesThroughAHole) {
     bool holds = true;
     bool stops = false;
     int look = 0;
-    std::int64_t next = kFirstLook;
+    std::int64_t next = kFirstCheckpoint;
     for (std::int64_t pass = 1; pass <= kPasses; ++pass) {
       render.AddPass();
       if (pass < next) continue;
-      next = NextLook(pass);
+      next = NextCheckpoint(pass);
       const double high = render.EstimateError(++look).relative.high;
       const double truth =
           Compare(render.MakeImage(), reference, {.trim_share = kTrimmedShare})->rel_mse;

@@ -133,7 +133,7 @@ class PartsOfError {
   const Image& reference_;
   std::vector<double> sum_, square_sum_;
   std::vector<double> bias_sum_, bias_square_sum_;  // of the layer
-  double floor_;  // of relative errors
+  double floor_;                                    // of relative errors
   StudiedParts estimated_;
   int renders_ = 0;
 };
@@ -188,11 +188,11 @@ ErrorStudy StudyErrors(const Scene& scene, const Image& reference, const StudySi
                        SettingsOf(scene, size.side, size.first_seed + static_cast<std::uint64_t>(i),
                                   size.photons_per_pixel));
     std::vector<StudiedLook>& looks = study.renders.emplace_back();
-    std::int64_t next = kFirstLook;
+    std::int64_t next = kFirstCheckpoint;
     for (int pass = 1; pass <= size.passes; ++pass) {
       render.AddPass();
       if (pass != next && pass != size.passes) continue;
-      next = NextLook(pass);
+      next = NextCheckpoint(pass);
       const SquaredError e = render.EstimateError(static_cast<int>(looks.size()) + 1).relative;
       const Image image = render.MakeImage();
       const ImageMetrics metrics = Compare(image, reference, {.trim_share = kTrimmedShare}).value();

@@ -119,7 +119,7 @@ PLANTED = [
     ("render/transport/a.cc", '#include "proto/lucerna/v1/jobs.pb.h"'),
     ("render/transport/a.cc", '#include "render/analysis/needs.h"'),
     ("server/a.cc", '#include "worker/gather.h"'),
-    ("worker/a.cc", '#include "client/report.h"'),
+    ("worker/a.cc", '#include "client/view/report.h"'),
     ("render/transport/a.cc", "#include <embree3/rtcore.h>"),
     ("render/film/film.cc", "#include <ImfOutputFile.h>"),
     ("render/image/a.cc", '#include "render/scene/scene.h"'),

@@ -18,7 +18,7 @@ Accumulation Make(std::vector<std::uint32_t> rows, std::int64_t flux) {
   accumulation.hitpoints = std::move(rows);
   accumulation.tally.photons = 10;
   accumulation.tally.rays = 30;
-  accumulation.tally.energy = {.emitted = 100, .roulette_gave = 7, .absorbed = 107};
+  accumulation.tally.energy = {.emitted = 100, .roulette_gain = 7, .absorbed = 107};
   return accumulation;
 }
 
@@ -131,13 +131,13 @@ TEST(PassSumsTest, RefusesATallyThatWouldWrap) {
   full[4].dropped = kMost;
   full[5].excess = kMost;
   // Each account of energy against the emitted one, which is at its end too, or against another.
-  full[6].energy = {.emitted = kMostSigned, .roulette_took = kMostSigned};
+  full[6].energy = {.emitted = kMostSigned, .roulette_loss = kMostSigned};
   full[7].energy = {.emitted = kMostSigned, .absorbed = kMostSigned};
   full[8].energy = {.emitted = kMostSigned, .escaped = kMostSigned};
   full[9].energy = {.emitted = kMostSigned, .smoothing = kMostSigned};
   full[10].energy = {.emitted = kMostSigned, .cut_off = kMostSigned};
   full[11].energy = {.emitted = kMostSigned, .dropped = kMostSigned};
-  full[12].energy = {.roulette_gave = kMostSigned, .absorbed = kMostSigned};
+  full[12].energy = {.roulette_gain = kMostSigned, .absorbed = kMostSigned};
   for (const BatchTally& tally : full) {
     Accumulation accumulation;
     accumulation.tally = tally;

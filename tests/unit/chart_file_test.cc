@@ -2,7 +2,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "client/chart.h"
+#include "client/view/chart.h"
 
 namespace lucerna {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "gtest/gtest.h"
 
-#include "client/chart.h"
+#include "client/view/chart.h"
 
 namespace lucerna {
 namespace {

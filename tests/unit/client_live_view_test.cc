@@ -4,9 +4,9 @@
 
 #include "gtest/gtest.h"
 
-#include "client/convergence.h"
-#include "client/live_view.h"
-#include "client/progress_view.h"
+#include "client/view/convergence.h"
+#include "client/view/live_view.h"
+#include "client/view/progress_view.h"
 #include "tests/support/converging_job.h"
 
 namespace lucerna {

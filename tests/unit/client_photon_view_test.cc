@@ -6,9 +6,9 @@
 #include "gtest/gtest.h"
 #include <nlohmann/json.hpp>
 
-#include "client/photon_view.h"
-#include "client/report.h"
-#include "client/report_page.h"
+#include "client/view/photon_view.h"
+#include "client/view/report.h"
+#include "client/view/report_page.h"
 
 namespace lucerna {
 namespace {
@@ -107,8 +107,8 @@ TEST(EnergyInWordsTest, GivesSharesAndSaysWhenTheBooksAreOff) {
   energy.set_emitted(400);
   energy.set_absorbed(300);
   energy.set_escaped(90);
-  energy.set_roulette_took(20);
-  energy.set_roulette_gave(10);
+  energy.set_roulette_loss(20);
+  energy.set_roulette_gain(10);
   EXPECT_EQ(EnergyImbalance(energy), 0);
   EXPECT_EQ(EnergyInWords(energy),
             "of what was emitted 75.00 % was absorbed, 22.50 % escaped, roulette took 5.00 % and "

@@ -6,8 +6,8 @@
 
 #include "gtest/gtest.h"
 
-#include "client/preview.h"
-#include "client/preview_source.h"
+#include "client/view/preview.h"
+#include "client/view/preview_source.h"
 #include "render/image/exr_file.h"
 
 namespace lucerna {

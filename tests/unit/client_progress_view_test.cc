@@ -4,8 +4,8 @@
 
 #include "gtest/gtest.h"
 
-#include "client/convergence.h"
-#include "client/progress_view.h"
+#include "client/view/convergence.h"
+#include "client/view/progress_view.h"
 #include "render/wire/messages.h"
 #include "tests/support/converging_job.h"
 #include "tests/support/job_settings.h"

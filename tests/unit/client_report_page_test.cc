@@ -1,7 +1,7 @@
 // A page must say what the job says, stand alone, and not be taken over by a worker's name.
 #include "gtest/gtest.h"
 
-#include "client/report_page.h"
+#include "client/view/report_page.h"
 #include "tests/support/converging_job.h"
 
 namespace lucerna {
@@ -14,7 +14,7 @@ bool Has(const std::string& page, const std::string& text) {
 TEST(ReportPageTest, TellsTheFacts) {
   const std::string page = ReportPage(ConvergingJob(), PageImage{"png bytes", Digest()});
   for (const char* text :
-       {"sphere-caustic.pbrt", "done: its error target was reached", "640 × 480 pixels", "2.96 %",
+       {"sphere-caustic.pbrt", "its error target reached", "640 × 480 pixels", "2.96 %",
         "target 3.50 %", "ppm, alpha 0.667", "render-2:4212", "−0.67", "5a5a5a5a",
         "Error against time", "Error against photons", "true error", "Warnings", "roughness 0.01",
         "src=\"data:image/png;base64,cG5nIGJ5dGVz\"", "<table>"}) {

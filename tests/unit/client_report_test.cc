@@ -5,7 +5,7 @@
 #include "gtest/gtest.h"
 #include <nlohmann/json.hpp>
 
-#include "client/report.h"
+#include "client/view/report.h"
 #include "render/wire/messages.h"
 #include "tests/support/converging_job.h"
 #include "tests/support/job_settings.h"

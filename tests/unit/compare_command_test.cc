@@ -1,5 +1,5 @@
 // What is compared must be what was typed, and what the coordinator recorded.
-#include "client/compare_command.h"
+#include "client/commands/compare_command.h"
 
 #include <chrono>
 #include <string>

@@ -1,6 +1,6 @@
 // A comparison decides which settings are better, so on curves whose truth is known it must say the
 // truth: on exact power laws every interpolated error, ratio and slope is exact.
-#include "client/comparison.h"
+#include "client/compare/comparison.h"
 
 #include <cmath>
 #include <vector>

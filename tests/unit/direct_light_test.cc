@@ -94,8 +94,8 @@ TEST_P(BulbOverFloor, IsSeenWholeHoweverSmall) {
 INSTANTIATE_TEST_SUITE_P(Radii, BulbOverFloor,
                          testing::Values(1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.5));
 
-// The light is small and faces along the surface; the receiver's coordinates are larger than those by
-// which the light's own clearance goes.
+// The light is small and faces along the surface; the receiver's coordinates are larger than those
+// by which the light's own clearance goes.
 TEST(LightSampledRadianceTest, FindsASmallLightWholeFromFarAlongAWall) {
   Scene scene;
   const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.5F));

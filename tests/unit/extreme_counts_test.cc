@@ -6,7 +6,7 @@
 
 #include "gtest/gtest.h"
 
-#include "client/progress_view.h"
+#include "client/view/progress_view.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/evidence.h"
 #include "render/estimate/radius_controller.h"

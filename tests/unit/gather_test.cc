@@ -142,8 +142,7 @@ TEST(GatherTest, CausticRowsTakeCausticPhotonsAloneAndWeighThem) {
   const double quanta = static_cast<double>(scale.quanta_per_watt.g);
   EXPECT_NEAR(static_cast<double>(of_point.flux[1][1]), 2 * f * quanta, 2);
   const float density = 3;
-  const double share =
-      static_cast<double>(weight.OfPhotons(density, 1, PdfBsdf(metal, n, n)));
+  const double share = static_cast<double>(weight.OfPhotons(density, 1, PdfBsdf(metal, n, n)));
   ASSERT_GT(share, 0.01);
   ASSERT_LT(share, 0.99);
   EXPECT_NEAR(static_cast<double>(sums(density).flux[1][1]), 2 * f * share * quanta, 2);

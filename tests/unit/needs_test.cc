@@ -294,8 +294,8 @@ TEST(SceneNeedsTest, CausticPhotonsAreForLightsThatRaysMissOrFindByChance) {
   const auto uses = [](const Scene& lit) { return NeedsWith(lit).Uses(Part::kCausticHitpoints); };
   EXPECT_FALSE(uses(scene));
   Scene with_area = scene;
-  AddQuad(with_area, {0, 0, -2}, {1, 0, 0}, {0, 1, 0},
-          AddMaterial(with_area, DiffuseMaterial(0)), AddAreaLight(with_area, 0.5F, true));
+  AddQuad(with_area, {0, 0, -2}, {1, 0, 0}, {0, 1, 0}, AddMaterial(with_area, DiffuseMaterial(0)),
+          AddAreaLight(with_area, 0.5F, true));
   EXPECT_TRUE(uses(with_area));
   Scene with_sun = scene;
   with_sun.distant_lights.push_back({{0, 0, 1}, Gray(1e-3F)});

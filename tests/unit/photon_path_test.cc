@@ -63,12 +63,12 @@ Scene OpenBox(float reflectance = 0.7F) {
 TEST(PhotonEnergyTest, BalancesToTheUnitWithEveryAccountInUse) {
   const Traced traced(OpenBox());
   const PhotonPathTracer::Landed landed = traced.Trace(20000);
-  const EnergyBooks& energy = landed.energy;
+  const EnergyCounters& energy = landed.energy;
   EXPECT_TRUE(energy.Balance());
   EXPECT_NE(energy.absorbed, 0);
   EXPECT_NE(energy.escaped, 0);
-  EXPECT_NE(energy.roulette_took, 0);
-  EXPECT_NE(energy.roulette_gave, 0);
+  EXPECT_NE(energy.roulette_loss, 0);
+  EXPECT_NE(energy.roulette_gain, 0);
   EXPECT_NE(energy.smoothing, 0);
   EXPECT_NE(energy.cut_off, 0);
   EXPECT_EQ(energy.dropped, 0);
@@ -93,7 +93,7 @@ TEST(PhotonEnergyTest, TellsHowMuchWallsAbsorb) {
   scene.point_lights.push_back({{0.1F, 0.2F, 0.3F}, Gray(1)});
   const Traced traced(scene, kDepth);
   constexpr std::uint64_t kPhotons = 20000;
-  const EnergyBooks energy = traced.Trace(kPhotons).energy;
+  const EnergyCounters energy = traced.Trace(kPhotons).energy;
   EXPECT_TRUE(energy.Balance());
   const double emitted = static_cast<double>(energy.emitted);
   // Alive at the last landing: rho^4 of the photons, each with its first flux; five standard

@@ -101,7 +101,8 @@ TEST(PixelSamplerTest, KeepsVerticesAndPixelsApart) {
     return ChiSquarePValue(observed, expected);
   };
   const auto vertex = [](int number, std::uint64_t pixel) {
-    return [=](std::uint64_t i) { return PixelSampler(1, pixel, 2 * i, 2 * i).ForVertex(number)[1]; };
+    return
+        [=](std::uint64_t i) { return PixelSampler(1, pixel, 2 * i, 2 * i).ForVertex(number)[1]; };
   };
   const auto camera = [](std::uint64_t pixel) {
     return [=](std::uint64_t i) { return PixelSampler(1, pixel, 2 * i, 2 * i).ForCamera()[1]; };

@@ -240,7 +240,7 @@ TEST(FrequencyTest, StopsAtThePredictedRadius) {
   // Even light: the radius stays, but for the first pass, whose five frequency photons say nothing
   // yet.
   EXPECT_DOUBLE_EQ(RunFrequency(RadiusControllerKind::kFrequency, 0, 100).radius,
-                  std::sqrt(2.0 / 3));
+                   std::sqrt(2.0 / 3));
   EXPECT_EQ(RunFrequency(RadiusControllerKind::kFrequencyMse, 0, 100).radius, 1);
 }
 

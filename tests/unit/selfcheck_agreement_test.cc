@@ -1,5 +1,5 @@
 // Equal up to noise must be told from different, and the odds must be those that are promised.
-#include "client/selfcheck_agreement.h"
+#include "client/selfcheck/selfcheck_agreement.h"
 
 #include <cmath>
 #include <vector>

@@ -1,6 +1,6 @@
 // Integer sums must be as near to real ones as the variance of their rounding allows, whatever lies
 // between the strongest and the weakest photon.
-#include "client/selfcheck_fixed_point.h"
+#include "client/selfcheck/selfcheck_fixed_point.h"
 
 #include <cmath>
 

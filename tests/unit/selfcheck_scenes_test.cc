@@ -1,6 +1,6 @@
 // The rooms of `lucerna selfcheck` must be sound pbrt-v4: a scene with a warning, or one that is
 // black, would agree with any other that is.
-#include "client/selfcheck_scenes.h"
+#include "client/selfcheck/selfcheck_scenes.h"
 
 #include "gtest/gtest.h"
 

@@ -1,0 +1,32 @@
+// What can a user ask about files on the own disk? No coordinator is needed for any of it.
+#pragma once
+
+#include <string>
+
+#include "client/commands/job_commands.h"
+#include "render/base/status.h"
+#include "render/film/image_metrics.h"
+
+namespace lucerna {
+
+// The image in an EXR file. Errors begin with the path.
+[[nodiscard]] StatusOr<Image> ReadImage(const std::string& path);
+
+// Says everything there is to say about the scene.
+// Errors: INVALID_ARGUMENT when it has errors, or, if `strict`, warnings.
+[[nodiscard]] Status Validate(const std::string& scene_path, bool strict,
+                              const OutputOptions& output_options);
+
+// Compares `image_path` with `reference_path`. `mask_path` may be empty; `options.mask` is not
+// used.
+[[nodiscard]] Status Diff(const std::string& image_path, const std::string& reference_path,
+                          const std::string& mask_path, MetricsOptions options,
+                          const OutputOptions& output_options);
+
+// Prints the digest of the pixels and settings.
+[[nodiscard]] Status PrintDigest(const std::string& exr_path, const OutputOptions& output_options);
+
+[[nodiscard]] Status ConvertToPng(const std::string& exr_path, const std::string& png_path,
+                                  double exposure_stops);
+
+}  // namespace lucerna

@@ -1,0 +1,231 @@
+#include "client/commands/job_commands.h"
+
+#include <cstdio>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_join.h"
+
+#include "client/connection.h"
+#include "client/exit_code.h"
+#include "client/job_run.h"
+#include "client/scene_reading.h"
+#include "client/view/progress_view.h"
+#include "client/view/report.h"
+#include "client/view/report_page.h"
+#include "render/base/files.h"
+#include "render/film/png_file.h"
+#include "render/image/exr_file.h"
+
+namespace lucerna {
+namespace {
+
+void Print(const std::string& text) {
+  std::fputs(text.c_str(), stdout);
+}
+
+Status CheckOutputs(const OutputPaths& outputs) {
+  if (!outputs.exr.empty() && !outputs.png.empty() && IsSameFile(outputs.exr, outputs.png)) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat("-o and --png both name ", outputs.exr,
+                                "; give the EXR and the PNG a file of its own each"));
+  }
+  for (const std::string& path : {outputs.exr, outputs.png}) {
+    if (!path.empty()) LUCERNA_RETURN_IF_ERROR(CheckWritable(path));
+  }
+  return absl::OkStatus();
+}
+
+// Fetches the image, makes sure that it is one, and writes it.
+StatusOr<SavedImage> Save(ClientConnection& connection, const std::string& job_id,
+                          const OutputPaths& outputs) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, connection.GetImage(job_id));
+  LUCERNA_ASSIGN_OR_RETURN(const Image image, DecodeImageOf(job_id, bytes));
+  SavedImage saved;
+  saved.digest = image.PixelDigest();
+  if (!outputs.exr.empty()) {
+    LUCERNA_RETURN_IF_ERROR(WriteFile(outputs.exr, bytes));
+    saved.paths.push_back(outputs.exr);
+  }
+  if (!outputs.png.empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(const std::string png, EncodePng(image));
+    LUCERNA_RETURN_IF_ERROR(WriteFile(outputs.png, png));
+    saved.paths.push_back(outputs.png);
+  }
+  return saved;
+}
+
+Status SaveAndReport(ClientConnection& connection, const v1::Job& job, const OutputPaths& outputs,
+                     const OutputOptions& output_options) {
+  LUCERNA_RETURN_IF_ERROR(CheckSucceeded(job));
+  LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved, Save(connection, job.job_id(), outputs));
+  if (output_options.json) {
+    Print(JobReport(job, saved));
+  } else if (!output_options.quiet) {
+    Print(absl::StrCat(SummaryLine(job), ": ", absl::StrJoin(saved.paths, ", "), "\n"));
+  }
+  return absl::OkStatus();
+}
+
+Status Nothing() {
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+Status Render(const RenderRequest& request, const ClusterOptions& cluster_options,
+              const OutputOptions& output_options) {
+  LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
+  LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
+                           ReadScene(request.scene_path, request.overrides, output_options.quiet));
+  LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster_options));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job,
+                           runs->Run(request.scene_path, manifest, request.overrides,
+                                     request.reference, output_options));
+  return SaveAndReport(runs->connection(), job, request.outputs, output_options);
+}
+
+Status Submit(const RenderRequest& request, const std::string& server,
+              const OutputOptions& output_options) {
+  LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
+  LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
+                           ReadScene(request.scene_path, request.overrides, output_options.quiet));
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  DirectoryFiles files(SplitScenePath(request.scene_path).folder);
+  LUCERNA_ASSIGN_OR_RETURN(
+      const v1::SubmitResponse submitted,
+      SendJob(*connection, files, manifest, request.overrides, request.reference));
+  if (request.outputs.empty()) {
+    Print(output_options.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
+    return absl::OkStatus();
+  }
+  const auto job = FollowToEnd(*connection, submitted.job_id(), true, output_options, Nothing);
+  if (!job.ok()) {
+    if (ExitCodeOf(job.status()) != ExitCode::kInterrupted) return job.status();
+    return Failure(ExitCode::kInterrupted,
+                   absl::StrCat("interrupted; job ", submitted.job_id(),
+                                " goes on, see lucerna watch and lucerna cancel"));
+  }
+  return SaveAndReport(*connection, *job, request.outputs, output_options);
+}
+
+Status ListJobs(const std::string& server, const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, connection->List());
+  if (output_options.json) {
+    Print(JobsReport(jobs));
+    return absl::OkStatus();
+  }
+  Print(TableHead() + "\n");
+  for (const v1::Job& job : jobs)
+    Print(TableLine(job) + "\n");
+  return absl::OkStatus();
+}
+
+Status Follow(const std::string& job_id, bool shows_progress, const std::string& server,
+              const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  LUCERNA_ASSIGN_OR_RETURN(
+      const v1::Job job, FollowToEnd(*connection, job_id, shows_progress, output_options, Nothing));
+  if (output_options.json) {
+    Print(JobReport(job));
+  } else if (!output_options.quiet) {
+    Print(SummaryLine(job) + "\n");
+  }
+  return CheckSucceeded(job);
+}
+
+Status Fetch(const std::string& job_id, const OutputPaths& outputs, const std::string& server,
+             const OutputOptions& output_options) {
+  LUCERNA_RETURN_IF_ERROR(CheckOutputs(outputs));
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved, Save(*connection, job_id, outputs));
+  if (output_options.json) {
+    Print(SavedReport(job_id, saved));
+  } else if (!output_options.quiet) {
+    Print(absl::StrJoin(saved.paths, "\n") + "\n");
+  }
+  return absl::OkStatus();
+}
+
+namespace {
+
+// The job's image for a page; absent when it has none.
+StatusOr<std::optional<PageImage>> ImageOf(ClientConnection& connection,
+                                           const std::string& job_id) {
+  const StatusOr<std::string> bytes = connection.GetImage(job_id);
+  // No pass is merged yet, or the image was dropped: the rest of the report is worth having.
+  if (absl::IsFailedPrecondition(bytes.status())) return std::optional<PageImage>();
+  LUCERNA_RETURN_IF_ERROR(bytes.status());
+  LUCERNA_ASSIGN_OR_RETURN(const Image image, DecodeExr(*bytes));
+  LUCERNA_ASSIGN_OR_RETURN(std::string png, EncodePng(image));
+  return std::optional<PageImage>({std::move(png), image.PixelDigest()});
+}
+
+}  // namespace
+
+Status Report(const std::string& job_id, const ReportPaths& paths, const std::string& server,
+              const OutputOptions& output_options) {
+  if (!paths.html.empty() && !paths.csv.empty() && IsSameFile(paths.html, paths.csv)) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat("-o and --csv both name ", paths.html,
+                                "; give the page and the table a file of its own each"));
+  }
+  for (const std::string& path : {paths.html, paths.csv}) {
+    if (!path.empty()) LUCERNA_RETURN_IF_ERROR(CheckWritable(path));
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, connection->Get(job_id));
+  std::vector<std::string> written;
+  if (!paths.html.empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(const auto image, ImageOf(*connection, job_id));
+    LUCERNA_RETURN_IF_ERROR(WriteFile(paths.html, ReportPage(job, image)));
+    written.push_back(paths.html);
+  }
+  if (!paths.csv.empty()) {
+    LUCERNA_RETURN_IF_ERROR(WriteFile(paths.csv, ConvergenceCsv(job)));
+    written.push_back(paths.csv);
+  }
+  if (output_options.json) {
+    Print(ConvergenceReport(job));
+  } else if (!output_options.quiet) {
+    Print(absl::StrJoin(written, "\n") + "\n");
+  }
+  return absl::OkStatus();
+}
+
+namespace {
+
+// Says where a job stands after it was told something.
+Status Acknowledge(const StatusOr<v1::Job>& job, const OutputOptions& output_options) {
+  if (!job.ok()) return job.status();
+  if (output_options.json) {
+    Print(JobReport(*job));
+  } else if (!output_options.quiet) {
+    Print(absl::StrCat("job ", job->job_id(), " ", NameOf(job->state()), "\n"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+Status Cancel(const std::string& job_id, const std::string& server,
+              const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  return Acknowledge(connection->Cancel(job_id), output_options);
+}
+
+Status StopJob(const std::string& job_id, const std::string& server,
+               const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  return Acknowledge(connection->Stop(job_id), output_options);
+}
+
+Status Extend(const std::string& job_id, const RenderOverrides& until, const std::string& server,
+              const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  return Acknowledge(connection->Extend(job_id, until), output_options);
+}
+
+}  // namespace lucerna

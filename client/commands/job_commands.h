@@ -1,0 +1,71 @@
+// What can a user ask of a coordinator?
+//
+// One function a command. Results go to stdout, everything else to stderr; the Status says how
+// the program ends (client/exit_code.h). An image is written whole or not at all.
+#pragma once
+
+#include <string>
+
+#include "client/local_cluster.h"
+#include "client/output_options.h"
+#include "render/base/status.h"
+#include "render/scene/render_settings.h"
+
+namespace lucerna {
+
+// Where an image goes; empty: not there.
+struct OutputPaths {
+  std::string exr;
+  std::string png;
+
+  [[nodiscard]] bool empty() const { return exr.empty() && png.empty(); }
+};
+
+struct RenderRequest {
+  std::string scene_path;
+  RenderOverrides overrides;
+  std::string reference;  // EXR file to tell the true error by; empty: none
+  OutputPaths outputs;
+};
+
+// Renders on a coordinator and workers of its own; an interruption cancels the job.
+[[nodiscard]] Status Render(const RenderRequest& request, const ClusterOptions& cluster,
+                            const OutputOptions& output_options);
+
+// Sends the job and prints its id; with outputs it waits and fetches too. An interruption leaves
+// the job running.
+[[nodiscard]] Status Submit(const RenderRequest& request, const std::string& server,
+                            const OutputOptions& output_options);
+
+[[nodiscard]] Status ListJobs(const std::string& server, const OutputOptions& output_options);
+
+// Waits until the job has ended, with or without showing its progress.
+// Errors: FAILED_PRECONDITION when it did not succeed.
+[[nodiscard]] Status Follow(const std::string& job_id, bool shows_progress,
+                            const std::string& server, const OutputOptions& output_options);
+
+[[nodiscard]] Status Fetch(const std::string& job_id, const OutputPaths& outputs,
+                           const std::string& server, const OutputOptions& output_options);
+
+// Where a report goes; empty: not there. As JSON it goes to stdout when the output_options says so.
+struct ReportPaths {
+  std::string html;
+  std::string csv;
+};
+
+// Tells how a job went, be it over or not: image, error, workers.
+[[nodiscard]] Status Report(const std::string& job_id, const ReportPaths& paths,
+                            const std::string& server, const OutputOptions& output_options);
+
+// Ends the job with the image as it is.
+[[nodiscard]] Status StopJob(const std::string& job_id, const std::string& server,
+                             const OutputOptions& output_options);
+
+// Gives the job a new end (passes, photons, time, error) and lets it go on.
+[[nodiscard]] Status Extend(const std::string& job_id, const RenderOverrides& until,
+                            const std::string& server, const OutputOptions& output_options);
+
+[[nodiscard]] Status Cancel(const std::string& job_id, const std::string& server,
+                            const OutputOptions& output_options);
+
+}  // namespace lucerna

@@ -1,0 +1,59 @@
+#include "client/commands/plan_command.h"
+
+#include <cstdio>
+
+#include "absl/strings/str_format.h"
+
+#include "client/scene_reading.h"
+#include "client/view/report.h"
+#include "render/analysis/expected_cost.h"
+#include "render/analysis/needs.h"
+#include "render/base/text.h"
+
+namespace lucerna {
+namespace {
+
+// "1.3 MB".
+std::string Bytes(double bytes) {
+  if (bytes >= 1e9) return absl::StrFormat("%.1f GB", bytes / 1e9);
+  if (bytes >= 1e6) return absl::StrFormat("%.1f MB", bytes / 1e6);
+  return absl::StrFormat("%.0f kB", bytes / 1e3);
+}
+
+}  // namespace
+
+Status PrintPlan(const std::string& scene_path, const RenderOverrides& overrides,
+                 const OutputOptions& output_options) {
+  Scene scene;
+  LUCERNA_ASSIGN_OR_RETURN(const SceneOfJobs read, ReadSceneOfJobs(scene_path, {&overrides, 1},
+                                                                   output_options.quiet, &scene));
+  const RenderSettings& settings = read.settings.front();
+  const SceneNeeds needs = NeedsOf(scene, settings);
+  const ExpectedCost cost = ExpectedCostOf(needs, settings);
+  if (output_options.json) {
+    std::fputs(PlanReport(needs, cost).c_str(), stdout);
+    return absl::OkStatus();
+  }
+  std::printf("%s, %d x %d pixels, %s\n", scene_path.c_str(), settings.crop_width(),
+              settings.crop_height(), std::string(NameOf(settings.radius_controller)).c_str());
+  for (const bool is_used : {true, false}) {
+    std::printf("\n%s\n", is_used ? "used" : "left out");
+    for (const Part part : AllParts()) {
+      if (needs.Uses(part) != is_used) continue;
+      std::printf("  %-18s %s\n", std::string(NameOf(part)).c_str(), needs.ReasonOf(part).c_str());
+    }
+  }
+  std::printf("\nexpected, beside the scene itself\n");
+  std::printf("  %-18s %s\n", "coordinator", Bytes(cost.coordinator).c_str());
+  std::printf("  %-18s %s\n", "each worker", Bytes(cost.worker).c_str());
+  if (cost.pass_sent < cost.first_pass_sent) {
+    std::printf("  %-18s %s to each worker, %s after %d passes\n", "sent a pass",
+                Bytes(cost.first_pass_sent).c_str(), Bytes(cost.pass_sent).c_str(),
+                needs.eye_sample_sets());
+  } else {
+    std::printf("  %-18s %s to each worker\n", "sent a pass", Bytes(cost.pass_sent).c_str());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace lucerna

@@ -1,0 +1,17 @@
+// What will a job use of the machine, what is left out, and why?
+#pragma once
+
+#include <string>
+
+#include "client/output_options.h"
+#include "render/base/status.h"
+#include "render/scene/render_settings.h"
+
+namespace lucerna {
+
+// Reads the scene and prints its plan; nothing is rendered.
+// Errors: as ReadSceneOfJobs.
+[[nodiscard]] Status PrintPlan(const std::string& scene_path, const RenderOverrides& overrides,
+                               const OutputOptions& output_options);
+
+}  // namespace lucerna

@@ -1,0 +1,91 @@
+#include "client/commands/reference_command.h"
+
+#include <array>
+#include <cstdio>
+
+#include "absl/strings/str_format.h"
+
+#include "client/exit_code.h"
+#include "client/job_run.h"
+#include "client/scene_reading.h"
+#include "client/view/report.h"
+#include "render/base/files.h"
+#include "render/film/reference.h"
+#include "render/image/exr_file.h"
+
+namespace lucerna {
+namespace {
+
+constexpr double kFirstFootprints = 0.5;
+// Eye paths cost about as much as one photon a pixel; with more photons less of the time goes
+// there. With too many, passes are few, and it is passes by which radii shrink.
+constexpr std::int64_t kPhotonsPerPixel = 4;
+
+std::string MetadataOf(const Image& image, const std::string& key) {
+  const auto found = image.metadata.find(key);
+  return found == image.metadata.end() ? std::string() : found->second;
+}
+
+}  // namespace
+
+Status RenderReference(const ReferenceRequest& request, const ClusterOptions& cluster,
+                       const OutputOptions& output_options) {
+  RenderOverrides overrides = request.overrides;
+  if (overrides.passes.has_value() == overrides.time_s.has_value()) {
+    return Failure(ExitCode::kUsage, "say how long to render, with --time SECONDS or --passes N");
+  }
+  if (overrides.passes && *overrides.passes < 2) {
+    return Failure(ExitCode::kUsage, "--passes must be at least 2: a reference has two halves");
+  }
+  if (IsSameFile(request.output_path, request.scene_path)) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat(request.output_path, " is the scene; name another file with -o"));
+  }
+  LUCERNA_RETURN_IF_ERROR(CheckWritable(request.output_path));
+  if (overrides.passes) overrides.passes = (*overrides.passes + 1) / 2;
+  if (overrides.time_s) overrides.time_s = *overrides.time_s / 2;
+  if (!overrides.radius_controller) overrides.radius_controller = RadiusControllerKind::kPppm;
+  if (!overrides.initial_radius) {
+    // Also where the scene names a radius, which is one for its own time.
+    overrides.initial_radius = 0;
+    overrides.initial_footprints = kFirstFootprints;
+  }
+  LUCERNA_ASSIGN_OR_RETURN(SceneOfJobs scene, ReadSceneOfJobs(request.scene_path, {&overrides, 1},
+                                                              output_options.quiet));
+  const RenderSettings settings = scene.settings.front();
+  if (!overrides.photons_per_pass) {
+    overrides.photons_per_pass = kPhotonsPerPixel * std::int64_t{settings.crop_width()} *
+                                 std::int64_t{settings.crop_height()};
+  }
+
+  LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster));
+  std::array<Image, 2> halves;
+  for (std::size_t half = 0; half < halves.size(); ++half) {
+    // Unsigned: after the largest seed comes 0.
+    overrides.seed = settings.seed + half;
+    if (!output_options.quiet) {
+      std::fprintf(stderr, "half %zu of 2, seed %llu\n", half + 1,
+                   static_cast<unsigned long long>(*overrides.seed));
+    }
+    LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, runs->Run(request.scene_path, scene.manifest,
+                                                          overrides, "", output_options));
+    LUCERNA_ASSIGN_OR_RETURN(halves[half], runs->ImageOf(job));
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const Image reference, MakeReference(halves[0], halves[1]));
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, EncodeExr(reference));
+  LUCERNA_RETURN_IF_ERROR(WriteFile(request.output_path, bytes));
+  if (output_options.json) {
+    std::fputs(ReferenceReport(reference, request.output_path).c_str(), stdout);
+  } else if (!output_options.quiet) {
+    std::printf("%s passes, %s photons, noise: relMSE trimmed %s, untrimmed %s; RMSE %s: %s\n",
+                MetadataOf(reference, "lucerna.reference.passes").c_str(),
+                MetadataOf(reference, "lucerna.reference.photons").c_str(),
+                MetadataOf(reference, "lucerna.reference.rel_mse_trimmed").c_str(),
+                MetadataOf(reference, "lucerna.reference.rel_mse").c_str(),
+                MetadataOf(reference, "lucerna.reference.rmse").c_str(),
+                request.output_path.c_str());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace lucerna

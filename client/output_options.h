@@ -1,0 +1,14 @@
+// Output options of a command.
+#pragma once
+
+namespace lucerna {
+
+struct OutputOptions {
+  bool json = false;   // results as one JSON value
+  bool quiet = false;  // no progress, no summary, no warnings
+  // Progress on a terminal may be redrawn in place, and may show the image.
+  bool redraws = false;
+  bool previews = false;
+};
+
+}  // namespace lucerna
