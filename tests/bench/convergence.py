@@ -10,8 +10,8 @@ and time it notes the estimated error with its interval and, against a reference
 taken off, the true error with and without the worst 0.1 % of pixels. Errors are roots of relMSE.
 
 The squared error falls about as time to the power of -2/3 to -1, so a reference should have some
-twenty times the longest time. It has the default radius: with a smaller one its noise would be more
-than the error that is judged. Its own bias, about a tenth of that of the longest time, is not seen.
+twenty times the longest time. It has the radii of a job's defaults: with smaller ones, as `lucerna
+reference` has them, its noise would be more than the error that is judged. Its own bias, about a tenth of that of the longest time, is not seen.
 
 Results are kept in docs/convergence/results.csv: what is there is not rendered again, so that the
 program can be stopped and started. References are kept in --work. At the end the page
@@ -244,7 +244,9 @@ def main():
                 reference = arguments.work / f"{name}-{arguments.size}-{arguments.reference_s:g}.exr"
                 if not reference.exists():
                     run([BIN / "lucerna", "reference", path, "--size", arguments.size, "--quiet",
-                         "--seed", "1000003", "--time", arguments.reference_s, "-o", reference])
+                         "--seed", "1000003", "--radius-controller", "appm",
+                         "--initial-radius", "3px", "--time", arguments.reference_s, "-o",
+                         reference])
                 for setting, seconds in wanted:
                     row = measure(cluster, name, path, setting, seconds, arguments, reference,
                                   pathlib.Path(folder))
