@@ -161,7 +161,7 @@ Status ClientConnection::Upload(const SceneManifest& manifest, SceneFiles& files
     LUCERNA_ASSIGN_OR_RETURN(const Digest digest, Digest::FromBytes(missing));
     const auto found = path_of.find(digest);
     if (found == path_of.end()) {
-      return absl::InternalError("the coordinator asks for a file that is not of this scene");
+      return absl::InternalError("the coordinator requests a file that is not of this scene");
     }
     LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, files.Read(found->second));
     if (Sha256(bytes) != digest) {

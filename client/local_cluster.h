@@ -40,7 +40,7 @@ class LocalCluster {
   // the one that ended.
   [[nodiscard]] Status Check();
 
-  // Asks all to leave, kills those that have not left after three seconds, and reaps them.
+  // Sends SIGTERM to all, kills those that have not left after three seconds, and reaps them.
   void Stop();
 
  private:

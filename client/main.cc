@@ -266,11 +266,27 @@ int Run(int argc, char** argv) {
   add_json(selfcheck);
   add_quiet(selfcheck);
 
-  CLI::App* help = command("help", "print the table of all settings of a job", [&] {
-    std::fputs(SettingsTable().c_str(), stdout);
+  CLI::App* help = command("help", "explain a command, or all settings of a job", [&]() -> Status {
+    if (topic == "settings") {
+      std::fputs(SettingsTable().c_str(), stdout);
+      return absl::OkStatus();
+    }
+    if (topic.empty()) {
+      // Not app.help(), which explains the command that was given: this one.
+      std::fputs(
+          app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal).c_str(),
+          stdout);
+      return absl::OkStatus();
+    }
+    const CLI::App* about = app.get_subcommand_no_throw(topic);
+    if (about == nullptr) {
+      return Failure(ExitCode::kUsage,
+                     absl::StrCat("there is no command ", topic, "; lucerna help lists them"));
+    }
+    std::fputs(about->help(app.get_name()).c_str(), stdout);
     return absl::OkStatus();
   });
-  help->add_option("TOPIC", topic, "settings")->required()->check(CLI::IsMember({"settings"}));
+  help->add_option("TOPIC", topic, "a command, or settings");
 
   CLI::App* digest = command("digest", "print the digest of an image's pixels and settings",
                              [&] { return PrintDigest(image_path, output_options); });

@@ -1,7 +1,7 @@
 // Which bytes does the coordinator hold, by their digest?
 //
 // Scene files, hitpoint blocks and radii, in memory, within a bound. Bytes that something needs
-// are pinned, once for every need. Bytes nobody needs stay for the next job until the room is
+// are pinned, once for every need. Bytes without a pin stay for the next job until the room is
 // wanted, least recently used first.
 //
 // Threads: any; what Get returned stays valid for as long as it is held.

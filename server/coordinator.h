@@ -90,7 +90,7 @@ class Coordinator {
   // and the worker's batches go back.
   void SyncBroke(std::uint64_t ticket);
 
-  // Bytes that a worker asks for. Errors: NOT_FOUND.
+  // Bytes for a worker. Errors: NOT_FOUND.
   [[nodiscard]] StatusOr<Blob> Fetch(const Digest& digest);
 
   // Rows of the hitpoint block that a batch is for; absent when its pass has ended.

@@ -177,7 +177,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   float scatter_pdf = 0;
   Vec3 scatter_position;
   // Emission at the end of a chain of smooth surfaces from the camera is collected from the whole
-  // tree of their branches: a small lamp seen in glass would otherwise be one bright speck in
+  // tree of their branches: a small light seen in glass would otherwise be one bright speck in
   // thousands of passes.
   bool emission_was_collected = false;
   // The last surface that gathers caustic photons, as long as only smooth ones have come since.

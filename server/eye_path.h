@@ -54,7 +54,7 @@ class EyePathTracer {
 
   // What is known of the first thing that an eye path meets.
   struct First {
-    std::uint32_t* shape = nullptr;  // nullptr: nobody wants to know
+    std::uint32_t* shape = nullptr;  // nullptr: cache disabled
     bool is_known = false;
   };
   // The eye path of a pixel of the crop window in one pass. Threads: any.

@@ -61,7 +61,7 @@ StatusOr<RenderResult> JobRunner::RunToEnd() {
   const SteadyTime started_at = hooks_.clock.Steady();
   StatusOr<RenderResult> result = RunPasses();
   ran_before_ += hooks_.clock.Steady() - started_at;
-  // Whatever ended it: workers must not go on with passes that nobody will take in.
+  // Whatever ended it: workers must not go on with passes that will not be merged.
   while (!open_.empty()) {
     hooks_.scheduler.ClosePass(KeyOf(open_.front().traced.eye.pass));
     hooks_.merger.Drop(KeyOf(open_.front().traced.eye.pass));

@@ -1,6 +1,6 @@
 // The door through which users ask for images and follow them.
 //
-// Turns messages into values, asks the coordinator, and turns the answer back. Nothing is decided
+// Turns messages into values, calls the coordinator, and turns the result back. Nothing is decided
 // here except when a watcher hears of a change: at most ten times a second, at least every five
 // seconds, and at once when the job's state is another.
 //

@@ -7,7 +7,7 @@ namespace lucerna {
 namespace {
 
 constexpr std::size_t kBatchTimesKept = 31;
-// With fewer batches than this nobody knows how long one usually takes.
+// With fewer batches than this the usual time of one is unknown.
 constexpr std::size_t kBatchTimesNeeded = 3;
 
 Status UnknownWorker(const std::string& worker) {

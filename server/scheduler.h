@@ -1,6 +1,6 @@
 // Who traces which photons next?
 //
-// The books of workers, open passes and leases. Decides and remembers, and does nothing else: no
+// The state of workers, open passes and leases. Pure decisions: no
 // clock (moments come in as arguments), no network, no bytes.
 //
 // A pass is cut into batches in photon order as workers ask for them. How large a batch is does

@@ -79,7 +79,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
       return;
     }
     if (is_superseded_) {
-      // Nobody needs the bytes: the answer goes out before they come.
+      // The bytes are not needed: the answer goes out before they come.
       response_->set_outcome(v1::COMMIT_OUTCOME_SUPERSEDED);
       Finish(grpc::Status::OK);
       return;

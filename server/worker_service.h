@@ -1,6 +1,6 @@
 // The door workers knock on.
 //
-// Turns messages into values, asks the coordinator, and turns the answer back. What each call
+// Turns messages into values, calls the coordinator, and turns the result back. What each call
 // promises and which errors it has is said in work.proto. Nothing is decided here.
 //
 // Threads: gRPC calls in from its own pool. A Sync that must wait is parked with the coordinator;

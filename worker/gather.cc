@@ -49,7 +49,7 @@ std::uint64_t PairBits(std::uint32_t photon_key, std::uint32_t hitpoint) {
   return x ^ (x >> 32);
 }
 
-// What a photon that counts adds to the columns that its radius controller asks for, one class for
+// What a photon that counts adds to the columns of its radius controller, one class for
 // each kind: chosen once per batch, so that a job pays for no other kind than its own.
 
 struct NoEvidence {

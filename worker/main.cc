@@ -1,4 +1,4 @@
-// A worker: asks its coordinator for batches of photons, traces them, and hands back what they
+// A worker: takes batches of photons from its coordinator, traces them, and returns what they
 // brought. Keeps nothing that cannot be fetched again.
 //
 // Exit: 0 after SIGTERM or SIGINT, 2 for wrong flags, 3 when no coordinator answers, 4 when the

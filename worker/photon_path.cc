@@ -30,11 +30,11 @@ bool Inside(const Bounds& region, Vec3 p) {
          p.y <= region.high.y && p.z >= region.low.z && p.z <= region.high.z;
 }
 
-// A photon of more power than 2^16 times the scene's is booked as that: then the books of 2^20
+// A photon of more power than 2^16 times the scene's is counted as that: then the counters of 2^20
 // photons of the greatest depth fit in 62 bits.
 constexpr float kLargestEnergy = 0x1p28F;
 
-// Halves go up: faster than to the even number, and the books are as exact.
+// Halves go up: faster than to the even number, and the counters are as exact.
 std::int64_t WholeUnits(float energy) {
   return static_cast<std::int64_t>(std::min(kLargestEnergy, energy + 0.5F));
 }
@@ -45,7 +45,7 @@ void KeepColumns(Deposits& deposits, const SurfacePoint& surface, Vec3 wo) {
   if constexpr (kDirections) deposits.arrivals_oct.push_back(EncodeOctahedral(wo));
 }
 
-// Sees nothing, for photons that nobody asks about.
+// Records nothing: for photons that are not replayed.
 struct NoWatcher {
   void Emitted(const Emission& /*emission*/) const {}
   void Landed(const Hit& /*hit*/, const SurfacePoint& /*surface*/, const Material& /*material*/,

@@ -5,7 +5,7 @@
 // Russian roulette keeps its flux near that of its emission, so that the density of photons, not
 // their flux, carries the signal.
 //
-// What becomes of a photon's power is booked at every change, and a photon that is not finite any
+// What becomes of a photon's power is counted at every change, and a photon that is not finite any
 // more is given up and named, so that it can be replayed: the walk of a photon is a function of
 // scene, settings, pass and index alone.
 #pragma once

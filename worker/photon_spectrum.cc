@@ -120,7 +120,7 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
                            std::acos(static_cast<double>(spot.cos_falloff_start));
       const double relative = static_cast<double>(Luminance(emission.flux)) /
                               std::max(1e-30, static_cast<double>(Luminance(emitter.power)));
-      // Inside the cone the light is even, but ends at the rim: as an edge seen from the lamp, and
+      // Inside the cone the light is even, but ends at the rim: as an edge seen from the light, and
       // no harder than the falloff is.
       double curvature = SmoothFalloffCurvature(width);
       if (Dot(direction, spot.direction) >= spot.cos_falloff_start) {

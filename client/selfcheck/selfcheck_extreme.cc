@@ -57,7 +57,7 @@ std::string InsideGlass() {
                       "Material \"dielectric\" \"float eta\" [1.5]\nShape \"sphere\"\n");
 }
 
-// The pane is met at 89.99 degrees; the lamp is seen through it, and only so.
+// The pane is met at 89.99 degrees; the light is seen through it, and only so.
 std::string GrazingPane() {
   return absl::StrCat(
       HeadText("0 0 1  10000 0 0  0 0 1", 1e-3, 4),
@@ -66,7 +66,7 @@ std::string GrazingPane() {
       QuadText("0 -5000 0  40000 -5000 0  40000 5000 0  0 5000 0"));
 }
 
-// A slab from z = 0 to 1 with a lamp across its end, and a camera in it that looks along 45
+// A slab from z = 0 to 1 with a light across its end, and a camera in it that looks along 45
 // degrees: beyond the critical angle, a bounce for every metre.
 std::string ThousandBounces() {
   return absl::StrCat(HeadText("0.25 0 0.5  1.25 0 1.5  0 1 0", 0.05, 4),
@@ -159,8 +159,8 @@ StatusOr<CaseOutcome> EveryRadius(SelfcheckBench& bench) {
   return AtMost(worst + not_finite, kRounding, "largest relative difference to 1.5");
 }
 
-// A lamp next door that has 1e20 times the power: what is seen directly stays.
-// The walls keep the light of the lamp next door from the camera, so no photon is spent on it.
+// A light next door that has 1e20 times the power: what is seen directly stays.
+// The walls keep the light of the light next door from the camera, so no photon is spent on it.
 std::string BrighterNextDoor() {
   return absl::StrCat(Furnace(0.5, 1e-10, 1),
                       "Translate 20 0 0\nAreaLightSource \"diffuse\" \"rgb L\" [1e10 1e10 1e10]\n"
@@ -219,9 +219,9 @@ std::vector<SelfcheckCase> ExtremeCases() {
       {"extreme-grazing-sun", "light from 89.9999 degrees gives its cosine",
        MeanIs(GrazingSun(89.9999), direct,
               3 * std::cos(89.9999 * std::numbers::pi / 180) * 0.5 / std::numbers::pi)},
-      {"extreme-lamp-areas", "lamps of areas 1e-12 and 1e6 add up",
+      {"extreme-lamp-areas", "lights of areas 1e-12 and 1e6 add up",
        MeanIs(TinyAndHugeLamp(), SmallRender(32, 1, 1), TinyAndHugeRadiance())},
-      {"extreme-next-door", "a lamp 1e20 times as strong next door changes nothing: L = 2 Le",
+      {"extreme-next-door", "a light 1e20 times as strong next door changes nothing: L = 2 Le",
        MeanIs(BrighterNextDoor(), WithRadius(SmallRender(16, 8000, 40), 0.3), 2e-10)},
       {"extreme-faint", "a light of 1e-20 of the power is told of", FaintLightIsTold},
       {"extreme-bad-triangles",

@@ -78,7 +78,7 @@ class RoomText {
   static std::string Words(const Point& p) {
     return absl::StrFormat("%.17g %.17g %.17g", p[0], p[1], p[2]);
   }
-  // A colour of the lamp; half of it when there are two of them.
+  // A colour of the light; half of it when there are two of them.
   [[nodiscard]] std::string Light(const Point& color, double factor) const {
     const double share = room_.has_halved_light ? 0.5 : 1;
     const double by = room_.light_scale * factor * share;
@@ -92,7 +92,7 @@ class RoomText {
   [[nodiscard]] std::string BallMesh(const Point& center, double radius) const;
   [[nodiscard]] std::string ObjectText() const;
   [[nodiscard]] std::string LightText() const;
-  [[nodiscard]] std::string Lamp(double low_x, double high_x) const;
+  [[nodiscard]] std::string AreaLight(double low_x, double high_x) const;
 
   const CheckRoom& room_;
 };
@@ -187,7 +187,7 @@ std::string RoomText::ObjectText() const {
 }
 
 // Looks down.
-std::string RoomText::Lamp(double low_x, double high_x) const {
+std::string RoomText::AreaLight(double low_x, double high_x) const {
   return Mesh(
       Quad({low_x, 0.96, -0.3}, {high_x, 0.96, -0.3}, {high_x, 0.96, 0.3}, {low_x, 0.96, 0.3}));
 }
@@ -204,9 +204,9 @@ std::string RoomText::LightText() const {
     case CheckRoom::Light::kLamp:
       // Two halves are side by side.
       if (room_.has_halved_light) {
-        return absl::StrCat(area({9, 8, 6}), Lamp(-0.3, 0), Lamp(0, 0.3));
+        return absl::StrCat(area({9, 8, 6}), AreaLight(-0.3, 0), AreaLight(0, 0.3));
       }
-      return absl::StrCat(area({9, 8, 6}), Lamp(-0.3, 0.3));
+      return absl::StrCat(area({9, 8, 6}), AreaLight(-0.3, 0.3));
     case CheckRoom::Light::kDisk:
       return absl::StrCat(
           area({9, 8, 6}),

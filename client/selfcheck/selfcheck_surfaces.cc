@@ -58,7 +58,7 @@ std::string RoomWith(const std::string& more) {
                       LampText("-0.3 -0.3 1.5  -0.3 0.3 1.5  0.3 0.3 1.5  0.3 -0.3 1.5", 3), more);
 }
 
-// Two panes with a gap of 10 microns between them and a lamp.
+// Two panes with a gap of 10 microns between them and a light.
 std::string Panes() {
   return absl::StrCat(HeadText("0 0 0.1  0 0 1  0 1 0", 0.05, 16),
                       LampText("-1 -1 3  -1 1 3  1 1 3  1 -1 3", 1), Glass(1.5), Slab(3, 1, 1.5),
@@ -132,7 +132,7 @@ StatusOr<CaseOutcome> Focus(SelfcheckBench& bench) {
                 "relative difference of the flux to that of the beam");
 }
 
-// A wall lit by a lamp that has a hundredth of the light, through a ball of index 1 and so by
+// A wall lit by a light that has a hundredth of the light, through a ball of index 1 and so by
 // photons alone; beside it a spot that is 1e6 times as bright, made by a beam of all the rest.
 std::string DarkWall(bool has_caustic) {
   std::string text =
@@ -193,7 +193,7 @@ std::vector<SelfcheckCase> SurfaceCases() {
   constexpr double kReflectance = 0.04;  // of a face of index 1.5, met straight
   const std::string no_glass = absl::StrCat(Glass(1), Ball("0.1 0 0.6", 0.5), Slab(0.9, 1.15, 1.3));
   return {
-      {"surface-same-index", "a ball and a slab of index 1 between lamp and floor change nothing",
+      {"surface-same-index", "a ball and a slab of index 1 between light and floor change nothing",
        MeansAgree(RoomWith(no_glass), RoomWith(""), WithRadius(SmallRender(3, 100000, 8), 0.12))},
       {"surface-panes", "two panes 1e-5 apart let (1 - R) / (1 + 3 R) through",
        MeanIs(Panes(), SmallRender(64, 1, 100), (1 - kReflectance) / (1 + 3 * kReflectance))},

@@ -18,7 +18,7 @@ namespace lucerna {
 [[nodiscard]] std::string EndInWords(v1::PhotonEnd end);
 [[nodiscard]] std::string FateInWords(v1::DepositFate fate);
 
-// What the books of energy are off by, in their smallest unit: 0 but for a fault of ours, or after
+// The imbalance of the energy counters, in their smallest unit: 0 but for a fault of ours, or after
 // some 10^15 photons.
 [[nodiscard]] std::int64_t EnergyImbalance(const v1::Energy& energy);
 // "62.1 % absorbed, 20.3 % escaped, ...": shares of what was emitted; empty when nothing was.

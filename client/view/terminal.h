@@ -1,6 +1,6 @@
 // How large is the terminal?
 //
-// The only file that asks it.
+// The only file that queries it.
 #pragma once
 
 #include <optional>

@@ -1,6 +1,6 @@
 // What time is it?
 //
-// The only file that asks the machine for the time. Everything that decides by time takes a
+// The only file that reads the machine's clock. Everything that decides by time takes a
 // Clock, so that a test can set it to the nanosecond.
 #pragma once
 

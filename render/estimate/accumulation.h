@@ -57,7 +57,7 @@ struct LightTally {
 // More lights than this are not counted one by one (kMaxLightGroups).
 inline constexpr std::size_t kMaxLightTallies = 64;
 
-// The books of a batch, for progress and for checking energy. Sums, so they merge like the rest.
+// The counters of a batch, for progress and for checking energy. Sums, so they merge like the rest.
 struct BatchTally {
   std::uint64_t photons = 0;   // photon paths emitted
   std::uint64_t rays = 0;      // rays traced for them

@@ -21,7 +21,7 @@ constexpr double kModelError = 0.3;
 constexpr double kLeastBias = 0.35;
 constexpr double kMostBias = 2.5;
 
-// No estimate is believed to be too large by more than this, as a share of its square.
+// The most by which an estimate is assumed to be too large, as a share of its square.
 constexpr double kLeastShare = 0.01;
 // How much noise of the estimated bias weighs against the bias in the share of it that is believed
 // of single pixels. Chosen on half A of tests/tools/make_study_scenes.py.
@@ -32,7 +32,7 @@ constexpr double kWidest = 3;
 // How much less than narrower ones a wider smoothing may say, in deviations of theirs.
 constexpr double kUnsure = 0.5;
 
-// Neighbours whose differences correlate less are strangers.
+// Neighbours whose differences correlate less count as independent.
 constexpr double kLeastCorrelation = 0.05;
 // What the correlation of neighbours is found from, in pixels.
 constexpr std::size_t kCorrelationSample = std::size_t{1} << 17;
@@ -169,7 +169,7 @@ std::vector<float> LeastAround(int width, int height, int reach, const std::vect
 // What a kernel at most blurs over, in pixels: the default first radius.
 constexpr int kKernelReach = 3;
 
-// The least luminance that a pixel can be believed to have without the blur.
+// The least luminance that a pixel can plausibly have without the blur.
 std::vector<float> LeastLuminance(int width, int height, std::vector<float> luminance) {
   return LeastAround(width, height, kKernelReach, Smoothed(width, height, 2, luminance));
 }
@@ -448,7 +448,7 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
         const double agreed = Middle(even, odd, around[c](x, y));
         const double least = std::min(own, agreed);
         // One over value² + floor. The agreed value is too large where rare light fell on the
-        // dark, the least one too small where lamps are seen in few samples.
+        // dark, the least one too small where lights are seen in few samples.
         const double weight = 0.5 / (agreed * agreed + floor) + 0.5 / (least * least + floor);
         const double noise = difference[c] * difference[c] * to_noise;
         noise_sum += noise;

@@ -23,7 +23,7 @@ inline constexpr std::size_t kCommonColumns = 1;
 // Radius of the inner kernel over that of the whole one.
 inline constexpr float kInnerShare = 1.0F / 3;
 
-// What a radius controller asks for behind it.
+// The columns that a radius controller needs after it.
 enum class Evidence : std::uint8_t { kNone, kSectors, kCurvature, kFrequency };
 
 // Frequency photons come in one pass of so many, and that many times as densely there: the same

@@ -2,7 +2,7 @@
 //
 // A controller is a pure rule, applied to every pixel that had a hitpoint after each pass, in
 // pass order. Radii are in units that the pass fixes per hitpoint (see HitpointRows::unit_radii).
-// It asks for the columns of evidence it uses (estimate/evidence.h) and for as many numbers of
+// It names the columns of evidence it uses (estimate/evidence.h) and for as many numbers of
 // memory a pixel as it needs; most use neither.
 #pragma once
 
@@ -35,7 +35,7 @@ struct PassEvidence {
   double blur = 0;
 };
 
-// What a frequency controller believes of a pixel.
+// What a frequency controller predicts for a pixel.
 struct BandwidthPrediction {
   double trace = 0;       // of the spatial spectral covariance [1/unit radius²]
   double min_radius = 0;  // that keeps the bias within the tolerance [unit radii]

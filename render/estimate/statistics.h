@@ -31,7 +31,7 @@ struct HitpointRows {
 
 class PixelStatistics {
  public:
-  // `initial_radius` in unit radii; `memory_per_pixel` as the radius controller asks.
+  // `initial_radius` in unit radii; `memory_per_pixel` as the radius controller needs.
   PixelStatistics(std::size_t pixels, float initial_radius, std::size_t memory_per_pixel = 0);
 
   // The radius of each hitpoint of pass number `pass` [scene units], from the statistics of the

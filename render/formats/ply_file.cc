@@ -170,7 +170,7 @@ StatusOr<Header> ParseHeader(std::string_view bytes) {
   }
 }
 
-// The values of the body, one after the other. Whoever asks for more than there is gets zeros,
+// The values of the body, one after the other. Reads beyond the end return zeros,
 // and is_truncated() says so.
 class Body {
  public:

@@ -492,7 +492,7 @@ using BothBounds = std::array<Bound, 2>;
 struct Level {
   std::vector<std::uint32_t> of;     // [nodes] the selected one that stands for it
   Graph selected;                    // the graph of the selected
-  std::vector<Estimates> estimates;  // [selected]; unknown where nobody asks
+  std::vector<Estimates> estimates;  // [selected]; unknown where not selected
   std::vector<BothBounds> bounds;    // [selected] from these estimates alone
 };
 

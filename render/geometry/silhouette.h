@@ -10,7 +10,7 @@
 //
 // An edge borders on the light of a segment when, looking along the segment, all faces that meet
 // in it lie on the side that is turned away from the segment. So the edges of a hollow corner, the
-// rim of the surface that is lit and that of the lamp are none; neither is what the segment passes
+// rim of the surface that is lit and that of the light are none; neither is what the segment passes
 // within a tenth of a percent of its length from either end.
 //
 // Of a chain of edges only the place that comes nearest is reported: an edge is left out when it

@@ -13,7 +13,7 @@ namespace {
 __extension__ using Wide = __int128;
 
 constexpr std::string_view kMagic = "LAC4";
-// More columns of evidence than any radius controller asks for.
+// More columns of evidence than any radius controller uses.
 constexpr std::uint64_t kMostEvidence = 32;
 constexpr std::uint8_t kIndicesAsVarints = 0;
 constexpr std::uint8_t kIndicesAsBitmap = 1;

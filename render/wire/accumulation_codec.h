@@ -6,7 +6,7 @@
 // batch's colour; guess and remainder are integers modulo 2^64, so every value comes back to the
 // last bit, however bad the guess.
 //
-// Decoding believes nothing: rows are below the block's size and strictly increasing, counts are
+// Decoding checks everything: rows are below the block's size and strictly increasing, counts are
 // >= 1, every plane unpacks to exactly its rows, and no byte is left over.
 #pragma once
 

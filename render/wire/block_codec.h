@@ -5,7 +5,7 @@
 // Radii are bytes of their own, because they become known later and change with every pass. The
 // same value gives the same bytes, so equal blocks have equal digests.
 //
-// Decoding believes nothing: it checks counts against what the caller allows before anything is
+// Decoding checks everything: counts against what the caller allows before anything is
 // allocated, that numbers are finite, that rows are in order, and that no byte is left over.
 #pragma once
 

@@ -5,7 +5,7 @@
 // level 1: the high planes of small numbers are nearly empty and cost nearly nothing.
 //
 // A reader is sticky: after the first thing that does not fit, every read gives zero and ok() is
-// false, so a codec reads on and asks once.
+// false, so a codec reads on and checks once.
 #pragma once
 
 #include <cstdint>

@@ -21,7 +21,7 @@ inline constexpr int kMaxMessageBytes = 16 << 20;
 // The deadline of a call that needs no waiting on the other side.
 inline constexpr std::chrono::seconds kCallTime{30};
 
-// `time` from now, as gRPC asks for it.
+// `time` from now, as gRPC expects it.
 [[nodiscard]] std::chrono::system_clock::time_point DeadlineIn(Duration time);
 
 // A channel to `address` ("host:port"). Does not connect yet, and connects again by itself.

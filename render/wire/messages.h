@@ -1,4 +1,4 @@
-// What do our values look like as messages, and may this message be believed?
+// Values to and from messages; messages are checked.
 //
 // ToProto never fails. FromProto checks every field and gives back a value that keeps all promises
 // of its type, or INVALID_ARGUMENT with one sentence.

@@ -24,6 +24,15 @@ TEST_P(HelpTest, SaysTheVersionAndTheUsage) {
   EXPECT_EQ(help.output, RunProgram({program, "--help"}).output);
 }
 
+TEST(HelpOfCommandsTest, ExplainsOneCommandOrSaysThatThereIsNone) {
+  const std::string program = kBin + "/lucerna";
+  EXPECT_EQ(RunProgram({program, "help", "render"}).output,
+            RunProgram({program, "render", "--help"}).output);
+  const auto unknown = RunProgram({program, "help", "paint"});
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.errors, testing::HasSubstr("there is no command paint"));
+}
+
 INSTANTIATE_TEST_SUITE_P(Programs, HelpTest,
                          testing::Values("lucerna", "lucerna-server", "lucerna-worker"),
                          [](const auto& program) {

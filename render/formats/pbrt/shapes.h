@@ -1,6 +1,6 @@
 // Reads Shape directives.
 //
-// Each function that reads a directive asks `parameters` for what it knows, reports what is wrong,
+// Each function that reads a directive reads the parameters that it knows, reports what is wrong,
 // and does its best to go on; after an error its outcome is never rendered.
 #pragma once
 
