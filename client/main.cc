@@ -278,12 +278,13 @@ int Run(int argc, char** argv) {
           stdout);
       return absl::OkStatus();
     }
-    const CLI::App* about = app.get_subcommand_no_throw(topic);
-    if (about == nullptr) {
+    const auto found =
+        app.get_subcommands([&](const CLI::App* about) { return about->get_name() == topic; });
+    if (found.empty()) {
       return Failure(ExitCode::kUsage,
                      absl::StrCat("there is no command ", topic, "; lucerna help lists them"));
     }
-    std::fputs(about->help(app.get_name()).c_str(), stdout);
+    std::fputs(found.front()->help(app.get_name()).c_str(), stdout);
     return absl::OkStatus();
   });
   help->add_option("TOPIC", topic, "a command, or settings");
