@@ -184,7 +184,9 @@ def write_page(rows, arguments):
             "\"True\" is against the reference with the reference's own noise taken off, \"all\" "
             "with the worst 0.1 % of pixels. Scenes b-* are half B of "
             "`tests/tools/make_study_scenes.py`, which no constant of the estimate has seen. All figures "
-            "are in [results.csv](convergence/results.csv).\n"]
+            "are in [results.csv](convergence/results.csv). The references have the radii of a job: bias that "
+            "falls as slowly as theirs (waves, hard shadows) is partly hidden in them, so that true "
+            "errors of such scenes may be larger than shown.\n"]
     judged = [row for row in rows if row["setting"] == "default"]
     half_b = [row for row in judged if row["scene"].startswith("b-")]
     page.append(share_line("Half B", half_b) +
