@@ -47,28 +47,29 @@ class Occupied {
   bool has_begun_ = false, may_end_ = false, has_ended_ = false;
 };
 
-// What a task was called with, once.
+// What a task was called with, once. Keeps the code alone: copies of a Status share a count that
+// the packaged library lowers where ThreadSanitizer does not see it.
 class Called {
  public:
   WorkPool::Task Task() {
     return [this](const Status& may_begin) {
       const MutexLock lock(mutex_);
-      EXPECT_FALSE(status_.has_value()) << "called twice";
-      status_ = may_begin;
+      EXPECT_FALSE(code_.has_value()) << "called twice";
+      code_ = may_begin.code();
       changed_.NotifyAll();
     };
   }
-  Status Wait() {
+  absl::StatusCode Wait() {
     const MutexLock lock(mutex_);
-    while (!status_)
+    while (!code_)
       changed_.Wait(mutex_);
-    return *status_;
+    return *code_;
   }
 
  private:
   Mutex mutex_;
   Condition changed_;
-  std::optional<Status> status_;
+  std::optional<absl::StatusCode> code_;
 };
 
 TEST(WorkPoolTest, RefusesATaskWhenTheQueueIsFullAndTakesOneWhenThereIsRoom) {
@@ -79,12 +80,12 @@ TEST(WorkPoolTest, RefusesATaskWhenTheQueueIsFullAndTakesOneWhenThereIsRoom) {
     const Occupied occupied(pool);
     pool.Run(Needed, waiting.Task());
     pool.Run(Needed, refused.Task());
-    EXPECT_TRUE(absl::IsResourceExhausted(refused.Wait()));
+    EXPECT_EQ(refused.Wait(), absl::StatusCode::kResourceExhausted);
   }
-  EXPECT_TRUE(waiting.Wait().ok());
+  EXPECT_EQ(waiting.Wait(), absl::StatusCode::kOk);
   Called later;
   pool.Run(Needed, later.Task());
-  EXPECT_TRUE(later.Wait().ok());
+  EXPECT_EQ(later.Wait(), absl::StatusCode::kOk);
 }
 
 TEST(WorkPoolTest, DoesNotBeginWhatNobodyNeedsAnyMore) {
@@ -100,7 +101,7 @@ TEST(WorkPoolTest, DoesNotBeginWhatNobodyNeedsAnyMore) {
         task.Task());
     is_needed = false;
   }
-  EXPECT_TRUE(absl::IsCancelled(task.Wait()));
+  EXPECT_EQ(task.Wait(), absl::StatusCode::kCancelled);
 }
 
 TEST(WorkPoolTest, RefusesWhatWaitsWhenItIsClosed) {
@@ -110,9 +111,9 @@ TEST(WorkPoolTest, RefusesWhatWaitsWhenItIsClosed) {
   const Occupied occupied(pool);
   pool.Run(Needed, waiting.Task());
   pool.Close();
-  EXPECT_TRUE(absl::IsUnavailable(waiting.Wait()));
+  EXPECT_EQ(waiting.Wait(), absl::StatusCode::kUnavailable);
   pool.Run(Needed, late.Task());
-  EXPECT_TRUE(absl::IsUnavailable(late.Wait()));
+  EXPECT_EQ(late.Wait(), absl::StatusCode::kUnavailable);
 }
 
 TEST(WorkPoolTest, CallsEveryTaskOnceWhoeverClosesIt) {
