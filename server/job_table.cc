@@ -1,6 +1,7 @@
 #include "server/job_table.h"
 
 #include <algorithm>
+#include <charconv>
 #include <utility>
 
 namespace lucerna {
@@ -14,14 +15,24 @@ Status UnknownJob(const std::string& job_id) {
 
 JobTable::JobTable(Options options) : options_(std::move(options)), queue_(options_.max_waiting) {}
 
+// Of the id that Add gave; 0, which is no serial, for any other text.
+std::uint64_t JobTable::SerialOf(std::string_view job_id) const {
+  const std::string prefix = absl::StrCat(options_.instance, "-");
+  if (!job_id.starts_with(prefix)) return 0;
+  job_id.remove_prefix(prefix.size());
+  std::uint64_t serial = 0;
+  const auto read = std::from_chars(job_id.data(), job_id.data() + job_id.size(), serial);
+  const bool is_plain =
+      read.ec == std::errc() && read.ptr == job_id.data() + job_id.size() && job_id.front() != '0';
+  return is_plain ? serial : 0;
+}
+
 JobTable::Entries::iterator JobTable::FindLocked(const std::string& job_id) {
-  return std::find_if(entries_.begin(), entries_.end(),
-                      [&](const auto& item) { return item.second.job.id == job_id; });
+  return entries_.find(SerialOf(job_id));
 }
 
 JobTable::Entries::const_iterator JobTable::FindLocked(const std::string& job_id) const {
-  return std::find_if(entries_.begin(), entries_.end(),
-                      [&](const auto& item) { return item.second.job.id == job_id; });
+  return entries_.find(SerialOf(job_id));
 }
 
 std::optional<JobTable::Submitted> JobTable::FindRequestLocked(

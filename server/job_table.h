@@ -15,6 +15,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -165,6 +166,7 @@ class JobTable {
     std::vector<Entries::node_type> entries;
   };
 
+  [[nodiscard]] std::uint64_t SerialOf(std::string_view job_id) const;
   Entries::iterator FindLocked(const std::string& job_id) LUCERNA_REQUIRES(mutex_);
   Entries::const_iterator FindLocked(const std::string& job_id) const LUCERNA_REQUIRES(mutex_);
   std::optional<Submitted> FindRequestLocked(const std::string& request_id) const

@@ -201,7 +201,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
     return KernelShape<kKernel>(t2);
   };
   const float reach = radius * EvidenceSums::kReach;
-  // What the inner kernel has more than the whole one: see kBlurColumn.
+  // The whole kernel less the inner one: see kBlurColumn.
   constexpr float kInnerArea = kInnerShare * kInnerShare;
   const auto blurred = [&](float squared, float whole) {
     const float t2 = squared * inverse_squared * (1 / kInnerArea);

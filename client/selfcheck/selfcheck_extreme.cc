@@ -219,7 +219,7 @@ std::vector<SelfcheckCase> ExtremeCases() {
       {"extreme-grazing-sun", "light from 89.9999 degrees gives its cosine",
        MeanIs(GrazingSun(89.9999), direct,
               3 * std::cos(89.9999 * std::numbers::pi / 180) * 0.5 / std::numbers::pi)},
-      {"extreme-lamp-areas", "lights of areas 1e-12 and 1e6 add up",
+      {"extreme-light-areas", "lights of areas 1e-12 and 1e6 add up",
        MeanIs(TinyAndHugeLamp(), SmallRender(32, 1, 1), TinyAndHugeRadiance())},
       {"extreme-next-door", "a light 1e20 times as strong next door changes nothing: L = 2 Le",
        MeanIs(BrighterNextDoor(), WithRadius(SmallRender(16, 8000, 40), 0.3), 2e-10)},

@@ -119,7 +119,7 @@ Status PassSums::Check(const Accumulation& accumulation, bool adding) const {
   if (accumulation.evidence.size() != evidence_.size()) {
     return absl::InvalidArgumentError(
         absl::StrCat("an accumulation has ", accumulation.evidence.size(),
-                     " columns of evidence where the job has  ", evidence_.size()));
+                     " columns of evidence where the job has ", evidence_.size()));
   }
   for (const std::vector<std::int64_t>& column : accumulation.evidence) {
     if (column.size() != rows) {

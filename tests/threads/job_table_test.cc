@@ -118,6 +118,16 @@ void RunTurns(JobTable& table) {
   }
 }
 
+TEST(JobTableTest, FindsAJobByItsOwnIdOnly) {
+  JobTable table(SmallTable());
+  ASSERT_EQ(Added(table, "a"), "t-1");
+  EXPECT_TRUE(table.Find("t-1"));
+  for (const char* other : {"", "t", "t-", "t-0", "t-2", "t-01", "t-1x", "t--1", "u-1", "t-1-1",
+                            "t-18446744073709551617"}) {
+    EXPECT_FALSE(table.Find(other)) << other;
+  }
+}
+
 TEST(JobTableTest, ACancelBeforeTheRunnerKeepsItFromRunning) {
   JobTable table(SmallTable());
   const std::string job = Added(table, "a");
