@@ -17,7 +17,7 @@
 #include "render/estimate/statistics.h"
 #include "render/film/film.h"
 #include "render/math/color_space.h"
-#include "server/eye_path.h"
+#include "render/tracing/eye_path.h"
 
 namespace lucerna {
 namespace {

@@ -28,7 +28,7 @@
 #include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
-#include "server/hitpoint_pass.h"
+#include "render/tracing/hitpoint_pass.h"
 #include "server/reference_image.h"
 
 namespace lucerna {

@@ -27,6 +27,7 @@ LINE = [
     "render/estimate",
     "render/film",
     "render/analysis",
+    "render/tracing",
     "render/wire",
 ]
 for number, floor in enumerate(LINE):

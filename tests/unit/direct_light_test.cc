@@ -3,7 +3,7 @@
 // Light sampling and BSDF sampling together estimate one integral: with the power heuristic the
 // weights of the two ways to draw one direction sum to one. And a light must never stand in its
 // own way: the shadow ray ends before it, however large the ground or small the light.
-#include "server/direct_light.h"
+#include "render/tracing/direct_light.h"
 
 #include <cmath>
 #include <numbers>

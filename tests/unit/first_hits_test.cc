@@ -1,13 +1,13 @@
 // What the camera's rays meet is found once for each set of eye paths, and changes nothing.
-#include "server/first_hits.h"
+#include "render/tracing/first_hits.h"
 
 #include <cmath>
 #include <cstdint>
 
 #include "gtest/gtest.h"
 
+#include "render/tracing/hitpoint_pass.h"
 #include "render/transport/working_space.h"
-#include "server/hitpoint_pass.h"
 #include "server/job_estimator.h"
 #include "tests/support/test_scenes.h"
 

@@ -1,5 +1,5 @@
 // A pixel draws its positions from its filter, and its numbers from sequences of its own.
-#include "server/pixel_sampler.h"
+#include "render/tracing/pixel_sampler.h"
 
 #include <algorithm>
 #include <cmath>

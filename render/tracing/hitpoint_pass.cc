@@ -1,4 +1,4 @@
-#include "server/hitpoint_pass.h"
+#include "render/tracing/hitpoint_pass.h"
 
 #include <algorithm>
 

@@ -13,8 +13,8 @@
 #include "render/estimate/statistics.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
-#include "server/eye_path.h"
-#include "server/first_hits.h"
+#include "render/tracing/eye_path.h"
+#include "render/tracing/first_hits.h"
 
 namespace lucerna {
 

@@ -9,9 +9,9 @@
 #include "render/math/vector.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
+#include "render/tracing/pixel_sampler.h"
 #include "render/transport/caustic_weight.h"
 #include "render/transport/light.h"
-#include "server/pixel_sampler.h"
 
 namespace lucerna {
 

@@ -1,4 +1,4 @@
-#include "server/pixel_sampler.h"
+#include "render/tracing/pixel_sampler.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "server/eye_path.h"
+#include "render/tracing/eye_path.h"
 
 #include <algorithm>
 #include <array>
@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "render/math/warp.h"
+#include "render/tracing/direct_light.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/material_at.h"
-#include "server/direct_light.h"
 
 namespace lucerna {
 namespace {

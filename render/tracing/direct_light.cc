@@ -1,4 +1,4 @@
-#include "server/direct_light.h"
+#include "render/tracing/direct_light.h"
 
 #include <algorithm>
 #include <cmath>
