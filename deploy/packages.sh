@@ -11,7 +11,7 @@ packages=(
   libspdlog-dev libzstd-dev libcli11-dev nlohmann-json3-dev
 )
 if [ "${1:-}" = tests ]; then
-  packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3 chromium)
+  packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3 chromium clang-format clang-tidy)
 fi
 
 missing=()

@@ -187,6 +187,9 @@ template <typename... Functions>
 struct Overloaded : Functions... {
   using Functions::operator()...;
 };
+// clang 14 does not deduce the arguments of aggregates.
+template <typename... Functions>
+Overloaded(Functions...) -> Overloaded<Functions...>;
 
 Status Invalid(const Setting& setting, std::string_view text) {
   return absl::InvalidArgumentError(Concat(NameInMessage(setting), " ", text));

@@ -357,7 +357,7 @@ TEST_F(ClientCommandsTest, AnInterruptionCancelsCleansUpAndLeavesNothing) {
     const pid_t client = Start({"render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--time",
                                 "1000", "-o", In("a.exr")});
     std::vector<pid_t> children;
-    for (int i = 0; i < 1000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
+    for (int i = 0; i < 6000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     children = ChildrenOf(client);
@@ -374,7 +374,7 @@ TEST_F(ClientCommandsTest, AnInterruptionCancelsCleansUpAndLeavesNothing) {
 TEST_F(ClientCommandsTest, ADeadCoordinatorEndsTheRenderWithASentence) {
   const pid_t client = Start({"render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--time",
                               "1000", "-o", In("a.exr")});
-  for (int i = 0; i < 1000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
+  for (int i = 0; i < 6000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   KillProgram("lucerna-server", client);
@@ -387,7 +387,7 @@ TEST_F(ClientCommandsTest, ADeadCoordinatorEndsTheRenderWithASentence) {
 TEST_F(ClientCommandsTest, ADeadWorkerEndsTheRenderWithASentence) {
   const pid_t client = Start({"render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--time",
                               "1000", "-o", In("a.exr")});
-  for (int i = 0; i < 1000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
+  for (int i = 0; i < 6000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   KillProgram("lucerna-worker", client);
@@ -527,7 +527,7 @@ TEST_F(ClientCommandsTest, AReferenceTellsItsNoiseAndDiffTakesItOff) {
 TEST_F(ClientCommandsTest, AnInterruptedReferenceLeavesNoFile) {
   const pid_t client = Start({"reference", SceneOfTests("caustic.pbrt"), "--size", "32x24",
                               "--time", "1000", "-o", In("ref.exr")});
-  for (int i = 0; i < 1000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
+  for (int i = 0; i < 6000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   ::kill(client, SIGINT);

@@ -28,7 +28,7 @@ std::string DigestOf(const std::string& scene, const std::string& controller, co
   ChildProcess server({kBin + "/lucerna-server", "--listen", "127.0.0.1:0", "--batch-photons",
                        std::to_string(fleet.batch_photons)});
   const std::string greeting = "listening on ";
-  EXPECT_TRUE(server.WaitForText("\n", std::chrono::seconds(20)));
+  EXPECT_TRUE(server.WaitForText("\n", std::chrono::seconds(60)));
   const std::string line = server.Output();
   const std::string address = line.substr(greeting.size(), line.find('\n') - greeting.size());
   std::vector<std::unique_ptr<ChildProcess>> workers;

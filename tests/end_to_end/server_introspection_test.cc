@@ -19,7 +19,7 @@ std::string FirstAnswer(const std::string& address, const std::string& method,
                         const std::string& request) {
   grpc::GenericStub stub(MakeChannel(address));
   grpc::ClientContext context;
-  context.set_deadline(DeadlineIn(std::chrono::seconds(10)));
+  context.set_deadline(DeadlineIn(std::chrono::seconds(60)));
   grpc::CompletionQueue queue;
   const auto wait = [&queue] {
     void* tag = nullptr;
@@ -47,7 +47,7 @@ std::string FirstAnswer(const std::string& address, const std::string& method,
 TEST(ServerIntrospectionTest, SaysThatItServesAndWhat) {
   ChildProcess server(
       {std::string(LUCERNA_BIN_DIR) + "/lucerna-server", "--listen", "127.0.0.1:0"});
-  ASSERT_TRUE(server.WaitForText("\n", std::chrono::seconds(20)));
+  ASSERT_TRUE(server.WaitForText("\n", std::chrono::seconds(60)));
   const std::string greeting = "listening on ";
   const std::string line = server.Output();
   const std::string address = line.substr(greeting.size(), line.find('\n') - greeting.size());

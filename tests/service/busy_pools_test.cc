@@ -95,8 +95,8 @@ TEST(BusyPoolsTest, ASubmitWhoseCallerHasLeftIsNotRead) {
   v1::SubmitResponse response;
   EXPECT_EQ(stub->Submit(&context, RequestFor(scene, "late", 2), &response).error_code(),
             grpc::StatusCode::DEADLINE_EXCEEDED);
-  // The server hears of it from gRPC; give it the time.
-  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  // gRPC cancels the call in the server some time later.
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
   occupation.Release();
   // Read after the first, by the same threads.
   const auto next = client.Submit(RequestFor(scene, "next", 2));

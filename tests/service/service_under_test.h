@@ -51,7 +51,7 @@ struct Answer {
   [[nodiscard]] grpc::StatusCode code() const { return status.error_code(); }
 };
 
-inline constexpr std::chrono::seconds kCallLimit{30};
+inline constexpr std::chrono::seconds kCallLimit{120};
 
 struct TestScene {
   std::map<std::string, std::string> files;  // by logical path

@@ -4,9 +4,8 @@
 set -eu
 cd "$(dirname "$0")/../.."
 live=$(clang-tidy --list-checks -- 2>/dev/null)
-for check in bugprone-use-after-move clang-analyzer-core.NullDereference \
-             concurrency-thread-canceltype-asynchronous cppcoreguidelines-slicing \
-             google-explicit-constructor misc-unused-parameters modernize-use-nodiscard \
-             performance-unnecessary-value-param readability-identifier-naming; do
+for check in bugprone-argument-comment bugprone-use-after-move cppcoreguidelines-slicing \
+             google-explicit-constructor misc-unused-parameters modernize-use-override \
+             performance-for-range-copy readability-identifier-naming readability-redundant-control-flow; do
   echo "$live" | grep -q " $check\$" || { echo "not live: $check"; exit 1; }
 done

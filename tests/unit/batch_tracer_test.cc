@@ -229,7 +229,9 @@ TEST(BatchTracerTest, GivesUpSoonAlsoWhileHitpointsGather) {
   const double waited_s = Seconds(SystemClock().Steady() - before);
   stopper.join();
   EXPECT_EQ(result.status().code(), absl::StatusCode::kCancelled);
-  EXPECT_LT(waited_s, 1.5);
+  // On an idle machine 0.5 s; all pairs would take far longer than the bound, which a busy one
+  // needs.
+  EXPECT_LT(waited_s, 6);
 }
 
 }  // namespace

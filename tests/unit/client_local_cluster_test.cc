@@ -43,7 +43,7 @@ class LocalClusterTest : public testing::Test {
   }
   // Waits for the script's number: a child may have been started and not have run yet.
   pid_t PidOf(const std::string& name) {
-    for (int i = 0; i < 500; ++i) {
+    for (int i = 0; i < 6000; ++i) {
       const std::string lines = Lines(name + ".pids");
       if (lines.find('\n') != std::string::npos) return std::stoi(lines);
       std::this_thread::sleep_for(milliseconds(10));
@@ -52,7 +52,7 @@ class LocalClusterTest : public testing::Test {
     return -1;
   }
   static bool EndsSoon(pid_t pid) {
-    for (int i = 0; i < 500; ++i) {
+    for (int i = 0; i < 6000; ++i) {
       if (::kill(pid, 0) != 0) return true;
       std::this_thread::sleep_for(milliseconds(10));
     }
@@ -124,7 +124,7 @@ TEST_F(LocalClusterTest, SaysWhyItsOnlyWorkerEnded) {
   auto cluster = LocalCluster::Start(Options(1));
   ASSERT_TRUE(cluster.ok()) << cluster.status();
   Status status;
-  for (int i = 0; i < 500 && status.ok(); ++i) {
+  for (int i = 0; i < 6000 && status.ok(); ++i) {
     status = (*cluster)->Check();
     std::this_thread::sleep_for(milliseconds(10));
   }
@@ -155,7 +155,7 @@ TEST_F(LocalClusterTest, ChildrenDieWithAClientThatIsKilled) {
     std::string state;
     return !(file >> number >> name >> state) || state == "Z" || state == "X";
   };
-  for (int i = 0; i < 500 && !(is_dead(worker) && is_dead(coordinator)); ++i) {
+  for (int i = 0; i < 6000 && !(is_dead(worker) && is_dead(coordinator)); ++i) {
     std::this_thread::sleep_for(milliseconds(10));
   }
   EXPECT_TRUE(is_dead(worker));
