@@ -9,7 +9,7 @@
 // them the image has, however long it takes. Edges of light are worse: their squared bias falls as
 // the radius itself, r/N^(1/6), and in the end is all that is left. Hence half a pixel, a sixth of
 // the automatic radius: 36 times the variance, which more time mends and which is known, for a
-// sixth of the bias at edges and a thousandth elsewhere (docs/measurements.md, "References"). The
+// sixth of the bias at edges and a thousandth elsewhere (docs/measurements/references.md). The
 // controller is pppm: every pixel's radius vanishes, also where few photons come, and does not
 // depend on the photons that it is used with.
 #pragma once

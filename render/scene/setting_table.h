@@ -5,7 +5,7 @@
 // table are made from it.
 //
 // To add a setting: its field in render_settings.h, its row in setting_table.cc, the code that uses
-// the value, and README's table (which a test compares with the rows).
+// the value, and the manual's table (which a test compares with the rows).
 #pragma once
 
 #include <cstdint>

@@ -177,6 +177,32 @@ def share_line(title, rows):
             "of what is judged.\n")
 
 
+def plot_overview(path, rows):
+    """Estimated over true error of all scenes and times, logarithmic, with lines at 0.8, 1 and 1.25."""
+    names = sorted({row["scene"] for row in rows})
+    left, step, width = 100, 15, 480
+    height = 60 + step * len(names)
+
+    def x_of(ratio):
+        return left + (width - left - 20) * math.log(max(0.5, min(ratio, 3)) / 0.5) / math.log(6)
+
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
+           'font-family="sans-serif" font-size="11">',
+           f'<rect width="{width}" height="{height}" fill="white"/>',
+           '<text x="8" y="18">Estimated over true error; filled: the true error is within the interval</text>']
+    for ratio in (0.5, 0.8, 1, 1.25, 2, 3):
+        out.append(f'<line x1="{x_of(ratio):.1f}" y1="40" x2="{x_of(ratio):.1f}" y2="{height - 12}" stroke="#ccc"/>')
+        out.append(f'<text x="{x_of(ratio):.1f}" y="35" text-anchor="middle">{ratio:g}</text>')
+    for row in rows:
+        if number(row, "true_trimmed") > 0:
+            y = 55 + step * names.index(row["scene"])
+            x = x_of(number(row, "estimated") / number(row, "true_trimmed"))
+            fill = "#05b" if is_inside(row) else "none"
+            out.append(f'<circle cx="{x:.1f}" cy="{y}" r="3.5" fill="{fill}" stroke="#05b"/>')
+    out += [f'<text x="8" y="{59 + step * i}">{name}</text>' for i, name in enumerate(names)]
+    path.write_text("\n".join(out + ["</svg>"]) + "\n", encoding="utf-8")
+
+
 def write_page(rows, arguments):
     page = ["# How the error falls\n",
             f"Made by `tests/bench/convergence.py` ({arguments.size} pixels, references of "
@@ -186,25 +212,14 @@ def write_page(rows, arguments):
             "`tests/tools/make_study_scenes.py`, which no constant of the estimate has seen. All figures "
             "are in [results.csv](convergence/results.csv). The references have the radii of a job: bias that "
             "falls as slowly as theirs (waves, hard shadows) is partly hidden in them, so that true "
-            "errors of such scenes may be larger than shown.\n"]
+            "errors of such scenes may be larger than shown. Columns: errors as fractions, `low` and `high` of the "
+            "95 % interval, `true_trimmed` without the worst 0.1 % of pixels.\n",
+            "![Estimated over true error](convergence/overview.svg)\n"]
     judged = [row for row in rows if row["setting"] == "default"]
     half_b = [row for row in judged if row["scene"].startswith("b-")]
     page.append(share_line("Half B", half_b) +
                 share_line("Other scenes", [row for row in judged if row not in half_b]))
-    for setting in sorted({row["setting"] for row in rows}):
-        page.append(f"## {setting}\n")
-        page.append("| scene | s | passes | true % | all % | estimated % (interval) | "
-                    "estimated/true | inside |\n|---|---|---|---|---|---|---|---|")
-        for row in sorted((row for row in rows if row["setting"] == setting),
-                          key=lambda row: (row["scene"], number(row, "time_s"))):
-            true = number(row, "true_trimmed")
-            ratio = f"{number(row, 'estimated') / true:.2f}" if true > 0 else "-"
-            page.append(
-                f"| {row['scene']} | {row['time_s']} | {row['passes']} | {100 * true:.2f} | "
-                f"{100 * number(row, 'true_untrimmed'):.2f} | {100 * number(row, 'estimated'):.2f} "
-                f"({100 * number(row, 'low'):.2f} to {100 * number(row, 'high'):.2f}) | {ratio} | "
-                f"{'yes' if is_inside(row) else 'no'} |")
-        page.append("")
+    plot_overview(arguments.docs / "convergence/overview.svg", judged)
     page.append("Plots: " + ", ".join(
         f"[{name}](convergence/{name}.svg)" for name in sorted({row["scene"] for row in judged})))
     (arguments.docs / "convergence.md").write_text("\n".join(page) + "\n", encoding="utf-8")

@@ -108,12 +108,12 @@ TEST(RenderFlagsTest, MessagesShowFlagsInPlaceOfNamesOfSettings) {
             "a.pbrt:1:1: error: \"alpha\" of passes, unknown setting \"x\"");
 }
 
-// README holds what `lucerna help settings` prints, between two empty lines.
-TEST(RenderFlagsTest, ReadmesTableOfSettingsIsUpToDate) {
-  const StatusOr<std::string> readme = ReadFile(LUCERNA_SOURCE_DIR "/README.md");
-  ASSERT_TRUE(readme.ok()) << readme.status();
-  EXPECT_NE(readme->find("\n\n" + SettingsTable() + "\n"), std::string::npos)
-      << "put the output of `lucerna help settings` into README.md:\n"
+// The manual holds what `lucerna help settings` prints, between two empty lines.
+TEST(RenderFlagsTest, TheManualsTableOfSettingsIsUpToDate) {
+  const StatusOr<std::string> manual = ReadFile(LUCERNA_SOURCE_DIR "/docs/manual.md");
+  ASSERT_TRUE(manual.ok()) << manual.status();
+  EXPECT_NE(manual->find("\n\n" + SettingsTable() + "\n"), std::string::npos)
+      << "put the output of `lucerna help settings` into docs/manual.md:\n"
       << SettingsTable();
 }
 
