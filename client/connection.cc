@@ -262,7 +262,7 @@ StatusOr<v1::Job> ClientConnection::Cancel(const std::string& job_id) {
   v1::CancelJobRequest request;
   request.set_job_id(job_id);
   v1::Job job;
-  // Also called to clean up after an interruption, so it does not ask whether there was one.
+  // Also called to clean up after an interruption, so it does not check whether there was one.
   grpc::ClientContext context;
   context.set_deadline(DeadlineIn(kCallTime));
   const grpc::Status status = jobs_->Cancel(&context, request, &job);

@@ -1,6 +1,6 @@
 // Has the user had enough?
 //
-// The first SIGINT or SIGTERM only raises a flag, and whoever waits asks for it several times a
+// The first SIGINT or SIGTERM only raises a flag, and whoever waits checks it several times a
 // second, cleans up and leaves. The second one ends the process at once: the local coordinator
 // and workers then die with it.
 #pragma once

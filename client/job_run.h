@@ -25,7 +25,7 @@ namespace lucerna {
                                                    const RenderOverrides& overrides,
                                                    const std::string& reference_path);
 
-// Follows the job to its end, and shows its progress unless told not to. `check` is asked several
+// Follows the job to its end, and shows its progress unless that is off. `check` is asked several
 // times a second.
 [[nodiscard]] StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& job_id,
                                             bool shows_progress,

@@ -75,8 +75,7 @@ int Run(int argc, char** argv) {
     to->add_flag("--json", output_options.json, "print the result as one JSON value");
   };
   const auto add_quiet = [&](CLI::App* to) {
-    to->add_flag("--quiet", output_options.quiet,
-                 "print nothing but errors and what was asked for");
+    to->add_flag("--quiet", output_options.quiet, "print nothing but errors and the result");
   };
   const auto add_no_preview = [&](CLI::App* to) {
     to->add_flag("--no-preview", hides_preview, "do not show the image on a terminal with colours");
@@ -95,7 +94,7 @@ int Run(int argc, char** argv) {
     to->add_option("--png", request.outputs.png, "PNG preview to write");
     add_image_flags(to, request.overrides);
     AddSettingFlags(*to, SettingRole::kStopsJob, request.overrides);
-    to->add_option("--reference", request.reference, "EXR file to tell the true error by");
+    to->add_option("--reference", request.reference, "EXR file to measure the true error by");
   };
 
   const auto find_programs = [&] {
@@ -142,7 +141,7 @@ int Run(int argc, char** argv) {
                              [&] { return Cancel(job_id, server, output_options); });
   add_no_preview(watch);
   CLI::App* report =
-      command("report", "tell how a job went: image, error, workers, on a page of its own",
+      command("report", "write a page about a job: image, error against time, workers",
               [&] { return Report(job_id, report_paths, server, output_options); });
   report->add_option("-o,--output", report_paths.html, "HTML file to write");
   report->add_option("--csv", report_paths.csv, "file to write samples and workers to, as a table");

@@ -35,7 +35,7 @@ struct SceneOfJobs {
   SceneManifest manifest;
   std::vector<RenderSettings> settings;  // as many as there are overrides
 };
-// The scene itself goes to `scene`, if somebody wants it.
+// The scene itself goes to `scene`, unless that is null.
 [[nodiscard]] StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
                                                     std::span<const RenderOverrides> overrides,
                                                     bool quiet, Scene* scene = nullptr);

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what Lucerna is built from and runs on, on Debian 12. Packages that are there already
-# cost nothing: without a missing one, apt-get is not even asked.
+# cost nothing: without a missing one, apt-get is not run.
 set -euo pipefail
 
 packages=(

@@ -9,7 +9,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 scene=$root/tests/scenes/caustic.pbrt
 if [ $# -gt 0 ] && [ "${1#-}" = "$1" ]; then
-  # Before anything is installed or built: the script's first look is at what the user typed.
+  # Before anything is installed or built: the arguments are checked.
   if [ ! -f "$1" ]; then
     echo "$1: there is no such scene file" >&2
     exit 1
@@ -55,4 +55,4 @@ done
 echo "coordinator on $address, two workers with $threads thread(s) each"
 
 "$bin/lucerna" submit "$scene" --server "$address" -o out.exr --png out.png "$@"
-echo "look at $here/out.png; lucerna and its programs are in $bin"
+echo "the image is $here/out.png; lucerna and its programs are in $bin"

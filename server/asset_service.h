@@ -1,4 +1,4 @@
-// The door through which the files of a scene come in.
+// The gRPC service that receives the files of a scene.
 //
 // Turns bytes into blobs of the store. Nothing is decided here.
 //

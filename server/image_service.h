@@ -1,4 +1,4 @@
-// The door through which images go out.
+// The gRPC service that streams images.
 //
 // Threads: gRPC calls in from its own pool. The image of a running job waits for one step of its
 // estimator and for the encoding, in the pool for images.

@@ -344,7 +344,7 @@ StatusOr<RenderResult> JobRunner::ImageSoFar() const {
     const MutexLock lock(estimator_mutex_);
     if (estimator_->passes_applied() > 0) return MakeResult(StopReason::kNone);
   }
-  return absl::FailedPreconditionError("no pass has been merged yet; ask again in a moment");
+  return absl::FailedPreconditionError("no pass has been merged yet; try again in a moment");
 }
 
 }  // namespace lucerna

@@ -1,4 +1,4 @@
-// The door through which users ask for images and follow them.
+// The gRPC service through which users submit jobs and follow them.
 //
 // Turns messages into values, calls the coordinator, and turns the result back. Nothing is decided
 // here except when a watcher hears of a change: at most ten times a second, at least every five
@@ -43,7 +43,7 @@ class JobService final : public v1::JobService::CallbackService {
   grpc::ServerWriteReactor<v1::Job>* Watch(grpc::CallbackServerContext* context,
                                            const v1::WatchJobRequest* request) override;
 
-  // To be called every 50 ms or so: tells watchers what has changed.
+  // To be called every 50 ms or so: sends watchers what has changed.
   void Tick();
   // Ends all watches with UNAVAILABLE.
   void Close();

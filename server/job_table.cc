@@ -235,7 +235,7 @@ StatusOr<JobTable::ImageSource> JobTable::FindImage(const std::string& job_id,
   }
   if (!entry.image && !entry.runner) {
     return absl::FailedPreconditionError(
-        absl::StrCat("job ", job_id, " has not begun to run; ask again later"));
+        absl::StrCat("job ", job_id, " has not begun to run; try again later"));
   }
   return MakeImageSource(entry, moment);
 }

@@ -7,7 +7,7 @@
 namespace lucerna {
 namespace {
 
-// Whoever is told to replay a photon must find it.
+// A photon that a message names must be replayable.
 Status CheckDropped(PhotonRange range, const Accumulation& accumulation) {
   const std::vector<std::uint64_t>& named = accumulation.dropped_photons;
   std::uint64_t least = range.first;
@@ -96,7 +96,7 @@ PassSums PassMerger::Take(const PassKey& key) {
     pass = std::move(found->second);
     passes_.erase(found);
   }
-  // A duplicate may still hold the pass; it changes nothing, but it looks.
+  // A duplicate may still hold the pass; it changes nothing, but it reads.
   const MutexLock lock(pass->mutex);
   LUCERNA_CHECK(pass->photons_merged == pass->photons);
   return std::move(pass->sums);

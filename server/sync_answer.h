@@ -21,7 +21,7 @@ struct PassBlobs {
   std::size_t hitpoints = 0;
 };
 
-// A batch with all that a worker must know of it.
+// A batch with all that a worker needs for it.
 struct Loan {
   BatchLease lease;
   SceneManifest scene;

@@ -21,7 +21,7 @@
 namespace lucerna {
 
 // Whether the result of some work is still needed: OK, or the reason why not (CANCELLED,
-// DEADLINE_EXCEEDED). Long work asks again between its steps.
+// DEADLINE_EXCEEDED). Long work checks again between its steps.
 using StillNeeded = std::function<Status()>;
 
 class WorkPool {

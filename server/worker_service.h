@@ -1,4 +1,4 @@
-// The door workers knock on.
+// The gRPC service of workers.
 //
 // Turns messages into values, calls the coordinator, and turns the result back. What each call
 // promises and which errors it has is said in work.proto. Nothing is decided here.

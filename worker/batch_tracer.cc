@@ -115,7 +115,7 @@ StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) 
         (from_a ? std::uint64_t{sum.counts[a]} : 0) + (from_b ? std::uint64_t{more.counts[b]} : 0);
     if (count > UINT32_MAX) {
       return absl::OutOfRangeError(
-          "a hitpoint found more than 2^32 photons of one batch; ask for fewer photons in a pass "
+          "a hitpoint found more than 2^32 photons of one batch; use fewer photons in a pass "
           "or a smaller radius");
     }
     out.counts.push_back(static_cast<std::uint32_t>(count));

@@ -1,7 +1,7 @@
 // How does a worker speak with its coordinator?
 //
 // The calls of WorkerService in values, with deadlines. Every call can be broken off from another
-// thread, so that a worker that is told to end does not wait for the network.
+// thread, so that a worker that must end does not wait for the network.
 //
 // Threads: any, several calls at once.
 #pragma once

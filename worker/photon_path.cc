@@ -276,7 +276,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
       }
     }
     if constexpr (kParts.spectrum) {
-      // A surface that scatters light broadly forgets the shadows on it: after a leg of length d at
+      // A surface that scatters light broadly blurs the shadows on it: after a leg of length d at
       // most 4/d² of any detail is left, of none at all 3/d² (see LeaveDiffuse).
       const bool shadows_count = is_found || material.kind != Material::Kind::kDiffuse;
       spectra_->Fly(

@@ -13,7 +13,7 @@ namespace {
 
 // Twice the largest radius that a job begins with: edges farther from a photon's leg than that are
 // farther than its kernel will ever reach. Follows from scene and settings alone, because every
-// worker must look equally far. With automatic radii it is judged for the middle of the scene.
+// worker must search equally far. With automatic radii it is judged for the middle of the scene.
 float ReachOf(const Scene& scene, const RenderSettings& settings, const Bounds& bounds) {
   if (settings.initial_radius > 0) {
     return 2 * static_cast<float>(settings.initial_radius / scene.unit);
@@ -58,7 +58,7 @@ SpectrumTracer::SpectrumTracer(const Scene& scene, const RenderSettings& setting
       curvature_(
           scene, [&](const Material&) { return needs.Uses(Part::kCurvature); },
           [&](const Material& material) {
-            // Only mirrors and glass ask for it (BendAt).
+            // Only mirrors and glass need it (BendAt).
             return needs.Uses(Part::kCurvedMirrors) && material.kind != Material::Kind::kDiffuse;
           }) {
   if (needs.Uses(Part::kTextureDetail)) texture_details_ = TextureDetails(scene.textures);
@@ -176,7 +176,7 @@ float SpectrumTracer::Received(const Carried& carried, const SurfacePoint& surfa
   // Two equal principal curvatures with the sum of squares that the surface has.
   const double bend = std::sqrt(0.5 * static_cast<double>(curvature_.SquaredPrincipals(surface)));
   const double trace = ReceivedTrace(seen, cosine, bend, bend, limits_);
-  // Held in the range of float; a trace that large asks for the smallest radius anyway.
+  // Held in the range of float; a trace that large gives the smallest radius anyway.
   return std::isfinite(trace) ? static_cast<float>(std::min(trace, 1e37)) : -1.0F;
 }
 

@@ -1,4 +1,4 @@
-// What does a frequency photon know of the light around it?
+// The light field around a frequency photon, as a spectrum.
 //
 // Carries a photon's spectrum (render/frequency) past every event of its path, looking up in the
 // scene what the events need: how large its light is, how the surfaces bend. One for all photons of

@@ -82,7 +82,7 @@ StatusOr<v1::RegisterResponse> Session::Join() {
     const auto connection = std::make_shared<Connection>(options_.server);
     {
       const MutexLock lock(mutex_);
-      if (is_stopped_) return absl::CancelledError("the worker was told to end");
+      if (is_stopped_) return absl::CancelledError("the worker was asked to end");
       connection_ = connection;
     }
     StatusOr<v1::RegisterResponse> response = connection->Register(request);
@@ -127,11 +127,11 @@ void Session::Stop() {
     worker_id = worker_id_;
     changed_.NotifyAll();
   }
-  // The goodbye first: calls that just break off look like a crash, and a batch that several
+  // The goodbye first: calls that just break off are taken for a crash, and a batch that several
   // workers crashed at is given up.
   if (runner) {
     SayGoodbye(*connection, worker_id);
-    runner->Stop(absl::CancelledError("the worker was told to end"));
+    runner->Stop(absl::CancelledError("the worker was asked to end"));
   } else if (connection) {
     connection->BreakOff();
   }

@@ -30,13 +30,13 @@ namespace {
 
 constexpr int kMostRepetitions = 1000;
 // A job stops by wall time, in which the processors are not always busy with it. The share of the
-// last run tells how long the next one needs; at first it is taken to be this.
+// last run gives how long the next one needs; at first it is taken to be this.
 constexpr double kFirstBusyShare = 0.9;
 constexpr double kLeastBusyShare = 0.05;
 // A run that ends farther from its time than this factor is made again, so often in all.
 constexpr double kNear = 1.2;
 constexpr int kAttempts = 4;
-// Between two asked times the plot shows as many more, when curves know them.
+// Between two asked times the plot shows as many more, where curves have them.
 constexpr int kPlotStepsBetween = 4;
 
 Status Misuse(const std::string& message) {

@@ -3,7 +3,7 @@
 // Renders one scene with several settings in turn on a cluster of its own, repetition by repetition
 // and setting by setting, so that slow moments of the machine hit all of them, and compares with a
 // reference. Errors against time come from the convergence record of one long job a run; with a
-// mask or another trimming, of which the coordinator knows nothing, from one job for each time.
+// mask or another trimming, which the coordinator does not have, from one job for each time.
 #pragma once
 
 #include <optional>

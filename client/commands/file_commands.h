@@ -1,4 +1,4 @@
-// What can a user ask about files on the own disk? No coordinator is needed for any of it.
+// Commands that read local files and need no coordinator.
 #pragma once
 
 #include <string>

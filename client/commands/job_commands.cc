@@ -197,7 +197,7 @@ Status Report(const std::string& job_id, const ReportPaths& paths, const std::st
 
 namespace {
 
-// Says where a job stands after it was told something.
+// Prints the state of a job after a command changed it.
 Status Acknowledge(const StatusOr<v1::Job>& job, const OutputOptions& output_options) {
   if (!job.ok()) return job.status();
   if (output_options.json) {

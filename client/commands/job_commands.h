@@ -1,4 +1,4 @@
-// What can a user ask of a coordinator?
+// Commands that need a coordinator.
 //
 // One function a command. Results go to stdout, everything else to stderr; the Status says how
 // the program ends (client/exit_code.h). An image is written whole or not at all.
@@ -24,7 +24,7 @@ struct OutputPaths {
 struct RenderRequest {
   std::string scene_path;
   RenderOverrides overrides;
-  std::string reference;  // EXR file to tell the true error by; empty: none
+  std::string reference;  // EXR file to measure the true error by; empty: none
   OutputPaths outputs;
 };
 

@@ -1,6 +1,6 @@
 // How is an image made that others are measured by?
 //
-// Two halves that know nothing of each other are rendered one after the other on a cluster of its
+// Two independent halves are rendered one after the other on a cluster of its
 // own and averaged (render/film/reference.h), so that the noise of the result is known and can be
 // taken off errors. The bias is not known, so it is made small against the noise.
 //

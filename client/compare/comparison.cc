@@ -51,7 +51,7 @@ std::vector<ErrorPoint> Corrected(std::span<const ErrorPoint> points) {
     point.untrimmed -= point.untrimmed_reference_noise;
     const bool counts = point.rel_mse > 0 && point.seconds > 0 && point.photons > 0 &&
                         point.wall_s > 0 && std::isfinite(point.rel_mse);
-    // Two looks can fall on one tick of a clock.
+    // Two estimates can fall on one tick of a clock.
     if (counts && (corrected.empty() || point.seconds > corrected.back().seconds)) {
       corrected.push_back(point);
     }
@@ -258,7 +258,7 @@ std::string ComparisonTable(const Comparison& comparison, const ComparisonSubjec
         *subject.reference_noise);
   } else {
     absl::StrAppend(&text,
-                    "The reference does not tell its own noise: errors hold it, and none can be "
+                    "The reference does not state its own noise: errors hold it, and none can be "
                     "smaller.\n");
   }
   absl::StrAppend(&text, "— where a run did not come near the time, or no error was left.\n\n");

@@ -102,7 +102,7 @@ struct PowerLawPoint {
 // 1)); Kaplanyan & Dachsbacher 2013 (appm).
 [[nodiscard]] std::optional<TheorySlopes> TheoryOf(const RenderSettings& settings);
 
-// What the table's head tells.
+// What the table's head holds.
 struct ComparisonSubject {
   std::string scene, reference;
   std::optional<double> reference_noise;  // relMSE of the whole reference

@@ -66,7 +66,7 @@ std::string GrazingPane() {
       QuadText("0 -5000 0  40000 -5000 0  40000 5000 0  0 5000 0"));
 }
 
-// A slab from z = 0 to 1 with a light across its end, and a camera in it that looks along 45
+// A slab from z = 0 to 1 with a light across its end, and a camera in it that points along 45
 // degrees: beyond the critical angle, a bounce for every metre.
 std::string ThousandBounces() {
   return absl::StrCat(HeadText("0.25 0 0.5  1.25 0 1.5  0 1 0", 0.05, 4),
@@ -160,7 +160,7 @@ StatusOr<CaseOutcome> EveryRadius(SelfcheckBench& bench) {
 }
 
 // A light next door that has 1e20 times the power: what is seen directly stays.
-// The walls keep the light of the light next door from the camera, so no photon is spent on it.
+// Its light is unreachable behind the walls, so no photon starts there.
 std::string BrighterNextDoor() {
   return absl::StrCat(Furnace(0.5, 1e-10, 1),
                       "Translate 20 0 0\nAreaLightSource \"diffuse\" \"rgb L\" [1e10 1e10 1e10]\n"
@@ -223,7 +223,7 @@ std::vector<SelfcheckCase> ExtremeCases() {
        MeanIs(TinyAndHugeLamp(), SmallRender(32, 1, 1), TinyAndHugeRadiance())},
       {"extreme-next-door", "a light 1e20 times as strong next door changes nothing: L = 2 Le",
        MeanIs(BrighterNextDoor(), WithRadius(SmallRender(16, 8000, 40), 0.3), 2e-10)},
-      {"extreme-faint", "a light of 1e-20 of the power is told of", FaintLightIsTold},
+      {"extreme-faint", "a light of 1e-20 of the power is warned of", FaintLightIsTold},
       {"extreme-bad-triangles",
        "needles, faces without area or twice there, zero normals: no change",
        MeansAgree(FloorWith(kBadTriangles), FloorWith(""),

@@ -11,7 +11,7 @@
 namespace lucerna {
 namespace {
 
-// Renders of a scene whose spread tells how sure their mean is.
+// Renders of a scene whose spread gives the standard error of their mean.
 constexpr int kSeeds = 8;
 // Student's t with seven degrees of freedom, two-sided at 1e-4.
 constexpr double kQuantile = 7.885;

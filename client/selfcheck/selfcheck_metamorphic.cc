@@ -1,4 +1,4 @@
-// Does a scene that is told otherwise give the same image?
+// Does a scene that is written otherwise give the same image?
 //
 // Two scenes whose images must agree, bit for bit or within noise, need no reference.
 #include <algorithm>

@@ -186,7 +186,7 @@ std::string RoomText::ObjectText() const {
   return {};
 }
 
-// Looks down.
+// Points down.
 std::string RoomText::AreaLight(double low_x, double high_x) const {
   return Mesh(
       Quad({low_x, 0.96, -0.3}, {high_x, 0.96, -0.3}, {high_x, 0.96, 0.3}, {low_x, 0.96, 0.3}));

@@ -1,8 +1,8 @@
 // Which scenes does `lucerna selfcheck` render?
 //
-// Small rooms as pbrt-v4 text. A room is told as it is and as it is changed: moved, turned, scaled,
-// cut up or lit by more. Numbers are written with all digits of a double, so a length times a power
-// of two is read as exactly that.
+// Small rooms as pbrt-v4 text. A room is written as it is and as it is changed: moved, turned,
+// scaled, cut up or lit by more. Numbers are written with all digits of a double, so a length times
+// a power of two is read as exactly that.
 #pragma once
 
 #include <array>

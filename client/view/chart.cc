@@ -350,8 +350,8 @@ std::string DrawChartFile(const Chart& chart) {
 }
 
 std::string ChartCss() {
-  // Okabe and Ito's colours, which people with any kind of colour vision tell apart; darker or
-  // lighter where that is what the ground asks for.
+  // Okabe and Ito's colours, which people with any kind of colour vision distinguish; darker or
+  // lighter where the background needs it.
   constexpr std::array<const char*, kChartColors> kOnLight = {
       "#0067a5", "#c24e00", "#00805c", "#a8578a", "#9a6a00", "#2f86b8", "#4d4d4d"};
   constexpr std::array<const char*, kChartColors> kOnDark = {

@@ -1,4 +1,4 @@
-// How does a relation over many powers of ten look as a picture?
+// A chart with logarithmic axes, as SVG or text.
 //
 // Pure: a Chart in, the text of an <svg> element out, to be put into an HTML page. Both axes are
 // logarithmic, so that a power law is a straight line. The element has no ids, no script and asks

@@ -13,7 +13,7 @@ namespace lucerna {
 namespace {
 
 constexpr int kFewestFitted = 3;
-// A curve this flat tells nothing about when it ends.
+// From a curve this flat no end can be predicted.
 constexpr double kFlattest = -0.05;
 
 // "350", "12000": two digits, as no trend has more.
@@ -167,7 +167,7 @@ std::optional<Duration> TimeToTarget(const v1::Job& job) {
       Abscissa(newest, ErrorAgainst::kTime) * std::pow(target * target / high, 1 / law->exponent);
   const double left_s = end_s - Seconds(FromProto(job.progress().running()));
   constexpr double kLongest = 10.0 * 365 * 86400;
-  // When the time has come and the error has not, the next sample knows more.
+  // When the time has come and the error has not, the next sample shows more.
   return std::chrono::duration_cast<Duration>(
       std::chrono::duration<double>(std::clamp(left_s, 0.0, kLongest)));
 }

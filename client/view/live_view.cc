@@ -17,7 +17,7 @@
 namespace lucerna {
 namespace {
 
-// A curve or a picture smaller than this tells nothing.
+// A curve or a picture smaller than this shows nothing.
 constexpr int kFewestRows = 4, kFewestColumns = 16;
 constexpr int kMostRows = 14, kMostCurveColumns = 56;
 // Words in front of the curve.
@@ -280,7 +280,7 @@ std::string FramePainter::Paint(const std::vector<std::string>& lines, TerminalS
   int rows_up = -1;
   for (const std::string& line : shown_)
     rows_up += std::max(1, (ColumnsOf(line) + size.columns - 1) / std::max(1, size.columns));
-  // As one update, where the terminal knows the word for it; others pass it over.
+  // As one update, where the terminal has the command for it; others ignore it.
   std::string text = "\x1b[?2026h\r";
   if (rows_up > 0) absl::StrAppend(&text, "\x1b[", std::min(rows_up, size.rows - 1), "A");
   for (std::size_t i = 0; i < lines.size(); ++i) {

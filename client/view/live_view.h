@@ -1,4 +1,4 @@
-// How does a job look on a terminal while it runs?
+// The view of a running job on a terminal.
 //
 // A frame is a few lines: the progress line, the error, a curve of the error and, where there are
 // colours, the image so far. Frames replace one another in place. Pure: a job, a picture and the

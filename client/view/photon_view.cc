@@ -78,7 +78,7 @@ std::string EndInWords(v1::PhotonEnd end) {
     case v1::PHOTON_END_NOT_FINITE:
       return "was left out: a number was not finite";
     default:
-      return "ended in a way that this program does not know";
+      return "ended for a reason that this build cannot name";
   }
 }
 
@@ -142,7 +142,7 @@ std::string EnergyInWords(const v1::Energy& energy) {
   add(energy.smoothing(), "went to shading normals");
   add(energy.cut_off(), "was cut off at the greatest depth");
   add(energy.dropped(), "went with photons that were not finite");
-  if (EnergyImbalance(energy) != 0) text += "; the books do not balance";
+  if (EnergyImbalance(energy) != 0) text += "; the counters do not balance";
   return text;
 }
 

@@ -25,7 +25,7 @@ namespace lucerna {
 [[nodiscard]] std::string EnergyInWords(const v1::Energy& energy);
 
 // One line without its end about photons and contributions that were left out because they were not
-// finite, and how to look at the first; empty when there are none.
+// finite, and how to replay the first; empty when there are none.
 [[nodiscard]] std::string DroppedLine(const v1::Job& job);
 
 }  // namespace lucerna

@@ -1,4 +1,4 @@
-// What does an image look like in the letters of a terminal?
+// An image as coloured characters of a terminal.
 //
 // Pure. Every cell is an upper half block, its ink the upper pixel and its ground the lower one, in
 // 24-bit colours; brightness is that of the PNG.

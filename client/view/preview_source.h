@@ -1,6 +1,6 @@
 // What is the newest image to show beside the progress?
 //
-// A thread fetches and decodes, so that progress never waits for an image. It asks at most every
+// A thread fetches and decodes, so that progress never waits for an image. It fetches at most every
 // two seconds and spends at most a twentieth of its time, because the coordinator that makes the
 // image is also the one that renders it.
 #pragma once

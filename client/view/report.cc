@@ -59,7 +59,7 @@ Json SettingsJson(const RenderSettings& settings) {
   return json;
 }
 
-// As shares of what was emitted. `balance` is what the books are off by, in their smallest unit.
+// As shares of what was emitted. `balance` is what the counters are off by, in their smallest unit.
 Json EnergyOf(const v1::Energy& energy) {
   const auto share = [&](std::int64_t part) {
     return static_cast<double>(part) / static_cast<double>(energy.emitted());

@@ -1,7 +1,7 @@
 // How do results read to a program?
 //
 // One JSON value each, indented, with a line end; or a table of comma-separated values. Names carry
-// their units; absent values are left out. The only file that knows the JSON library.
+// their units; absent values are left out. The only file that uses the JSON library.
 #pragma once
 
 #include <string>

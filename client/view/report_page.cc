@@ -185,7 +185,7 @@ std::string Headline(const v1::Job& job) {
   }
   const auto error = NewestError(job);
   if (!error) {
-    return "<p class=\"headline muted\">The error is not known: it has not been looked at "
+    return "<p class=\"headline muted\">The error is not known: it has not been estimated "
            "yet.</p>\n";
   }
   std::string html =
@@ -398,8 +398,8 @@ std::string Energy(const v1::Job& job) {
   if (rows.empty()) return {};
   return Concat(
       "<section>\n<h2>Energy</h2>\n<details><summary>",
-      is_balanced ? "The books of every pass balance to the last unit."
-                  : "The books of some passes do not balance.",
+      is_balanced ? "The counters of every pass balance to the last unit."
+                  : "The counters of some passes do not balance.",
       "</summary>\n",
       TableTop("Of the power that photons of a pass were emitted with.", {{"pass"},
                                                                           {"given by roulette"},
@@ -481,7 +481,7 @@ std::string ReportPage(const v1::Job& job, const std::optional<PageImage>& image
       "style-src 'unsafe-inline'\">\n"
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta name=\"color-scheme\" content=\"light dark\">\n"
-      // Without an icon of its own a browser would ask for one.
+      // Without an icon of its own a browser would request one.
       "<link rel=\"icon\" href=\"data:,\">\n"
       "<title>",
       name, ": Lucerna report</title>\n<style>\n", ChartCss(), kPageCss,

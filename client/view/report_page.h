@@ -1,4 +1,4 @@
-// How does a job read to people who want to judge it?
+// The report of a job as one HTML page.
 //
 // One HTML page that stands alone: the image, the facts, how the error fell, who did the work.
 // Pure: a Job and the image in, text out. The page has no script, asks for nothing from outside and

@@ -423,7 +423,7 @@ TEST_F(ClientCommandsTest, AnExtendedJobIsTheOneThatNeverStopped) {
   ASSERT_EQ(Run(with(with({"render"}, scene), {"--passes", "9", "-o", In("once.exr")})).code, 0);
   EXPECT_EQ(Run({"digest", In("extended.exr")}).out, Run({"digest", In("once.exr")}).out);
 
-  // The error so far as target: reached at the next look, or the photons' end.
+  // The error so far as target: reached at the next estimate, or the photons' end.
   ASSERT_EQ(Run({"extend", job, "--error", "1000%", "--passes", "40", "--server", server}).code, 0);
   const Ran reached = Run({"wait", job, "--server", server, "--json"});
   ASSERT_EQ(reached.code, 0) << reached.err;
@@ -543,7 +543,7 @@ TEST_F(ClientCommandsTest, AReferenceNeedsAnEndAndAFileOfItsOwn) {
   EXPECT_EQ(Run({"reference", scene, "-o", scene, "--time", "1"}).code, 2);
 }
 
-// A photon of a job that is over takes its way again, the same at every asking, and as the books of
+// A photon of a job that is over takes its way again, the same every time, and as the counters of
 // all photons say.
 TEST_F(ClientCommandsTest, TracePhotonShowsTheWayOfAPhotonOfAJobThatIsOver) {
   const auto cluster = LocalCluster::Start({LUCERNA_BIN_DIR, 1, 1});

@@ -36,7 +36,7 @@ class ReportPageInBrowserTest : public testing::Test {
     std::string pattern = testing::TempDir() + "report_pageXXXXXX";
     folder_ = mkdtemp(pattern.data());
   }
-  // What a failure saw is left for people to look at.
+  // After a failure the page is kept.
   ~ReportPageInBrowserTest() override {
     if (HasFailure()) {
       ADD_FAILURE() << "the page and its pictures are in " << folder_;

@@ -235,7 +235,7 @@ TEST(WorkerFaultsTest, AnIdleWorkerLeavesSoon) {
 TEST(WorkerFaultsTest, AnotherNumericProfileIsRefusedWithBothNames) {
   Coordinator coordinator;
   v1::RegisterRequest request;
-  request.set_name("stranger");
+  request.set_name("other build");
   request.set_numeric_profile("another build");
   v1::RegisterResponse response;
   grpc::ClientContext context;

@@ -22,8 +22,8 @@ TEST(CancelTest, AJobThatWaitsForWorkersEndsAndTheNextOneRuns) {
   EXPECT_EQ(client.WaitFor(second, {v1::JOB_STATE_SUCCEEDED}).message.progress().passes(), 2);
 }
 
-// A cancel that arrived between the moment in which it looked for the job's runner and the one in
-// which the job got it left the job's thread waiting for ever.
+// A cancel that arrived between the moment in which the handler searched for the job's runner and
+// the one in which the job got it left the job's thread waiting for ever.
 TEST(CancelTest, ClientsThatSubmitAndCancelLeaveTheCoordinatorAtWork) {
   ServiceUnderTest service;
   const v1::SceneManifest scene = TestClient(service).Upload(SmallScene());

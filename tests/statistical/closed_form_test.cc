@@ -108,7 +108,7 @@ Scene Floor() {
 }
 constexpr std::int32_t kBlack = 1;
 
-// The lamps' irradiance [W·m⁻²] at (x, y, 0).
+// The lights' irradiance [W·m⁻²] at (x, y, 0).
 using Irradiance = std::function<double(double x, double y)>;
 
 struct Lamp {
@@ -116,7 +116,7 @@ struct Lamp {
   Scene scene;
   Irradiance irradiance;
   Vec3 center;
-  float around;  // radius of a ball that holds the lamp and stays above the floor
+  float around;  // radius of a ball that holds the light and stays above the floor
 };
 
 std::vector<Lamp> Lamps() {
@@ -233,7 +233,8 @@ RenderSettings HeldRadius(const Scene& scene, std::int64_t photons, double radiu
   return settings;
 }
 
-// A ball of matter that bends nothing hides the lamp from sampling: all its light comes by photons.
+// A ball of matter that bends nothing hides the light from sampling: all its light comes by
+// photons.
 TEST(IrradianceTest, OfPhotonsIsTheClosedForm) {
   for (Lamp& lamp : Lamps()) {
     SCOPED_TRACE(lamp.name);

@@ -1,5 +1,5 @@
 // The error estimate of a render is true: near the true error, its intervals hold the truth at all
-// looks in at least nineteen renders of twenty, and stopping on it keeps the promise as often.
+// estimates in at least nineteen renders of twenty, and stopping on it keeps the promise as often.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -69,7 +69,7 @@ TEST_P(ErrorEstimateAtStepsTest, IsNearTheTrueErrorAfterManyPasses) {
 INSTANTIATE_TEST_SUITE_P(Scenes, ErrorEstimateAtStepsTest,
                          testing::Values("hard-shadow.pbrt", "bars.pbrt", "water-sun.pbrt"));
 
-// A target that can be reached: the mean true error at the first look after a quarter of the
+// A target that can be reached: the mean true error at the first estimate after a quarter of the
 // passes.
 double TargetOf(const ErrorStudy& study, const StudySize& size) {
   std::size_t look = 0;

@@ -1,6 +1,6 @@
 // Does the light stay right where sizes, angles, brightness and depth are extreme?
 //
-// Each scene has an answer that is known: a closed form, the books of the photons, or the scene
+// Each scene has an answer that is known: a closed form, the counters of the photons, or the scene
 // without what must not matter. docs/numerics.md lists them with the figures measured. Bounds are
 // those of closed_form_test.cc: Student's quantile of independent renders, and 2e-5 for floats.
 #include <cmath>
@@ -178,8 +178,8 @@ TEST(ExtremeGlassTest, OfTheSameIndexVanishesAtGrazingIncidence) {
   EXPECT_NEAR(ChannelMean(image, "G"), 1, 1e-6);
 }
 
-// A room with a lamp, and the same with a ball and a block of index 1 between lamp and floor: light
-// comes by photons instead of samples of the lamp.
+// A room with a light, and the same with a ball and a block of index 1 between light and floor:
+// light comes by photons instead of samples of the emitter.
 TEST(ExtremeGlassTest, OfTheSameIndexVanishesBetweenLampAndFloor) {
   Scene scene;
   const std::int32_t floor = AddMaterial(scene, DiffuseMaterial(0.5F));
@@ -258,7 +258,7 @@ TEST(ExtremeGlassTest, NestedAndTouchingBallsLoseNoPhoton) {
   EXPECT_NEAR(static_cast<double>(render.tally().deposits), static_cast<double>(kPhotons), 4);
 }
 
-// A slab between glass and air, turned so that no axis is along a face, and a lamp and a camera in
+// A slab between glass and air, turned so that no axis is along a face, and a light and a camera in
 // it: 1000 total reflections to the end.
 struct Rod {
   Vec3 along, across, up;
@@ -366,7 +366,7 @@ TEST(ExtremeLightTest, OfAreasEighteenDecadesApartAddsUp) {
              (1e12 * 1e-12 + kPiD * form) * 0.5 / kPiD);
 }
 
-// Two sealed rooms whose lamps are 1e20 apart in power; the camera is in one of them. No photon is
+// Two sealed rooms whose lights are 1e20 apart in power; the camera is in one of them. No photon is
 // spent on the other.
 TEST(ExtremeLightTest, TwentyDecadesBrighterNextDoorChangeNothing) {
   for (const float radiance : {1e10F, 1e-10F}) {
@@ -411,7 +411,7 @@ TEST(ExtremeRoughnessTest, MetalUnderAnEvenSkyReflectsItsAlbedo) {
 
 // --- foci --------------------------------------------------------------------------------------
 
-// A lamp before a hollow mirror, and a plate where its image is: all light arrives, on a spot some
+// A light before a hollow mirror, and a plate where its image is: all light arrives, on a spot some
 // 1e6 times as bright as the beam, and no number leaves its range with any controller.
 TEST(FocusTest, OfAHollowMirrorKeepsItsFlux) {
   Scene scene;
@@ -444,8 +444,8 @@ TEST(FocusTest, OfAHollowMirrorKeepsItsFlux) {
 
 // --- a caustic beside a dark wall --------------------------------------------------------------
 
-// A wall lit through a ball of index 1 by a lamp that has a hundredth of the light, and far enough
-// from it a spot that is 1e6 times as bright, which one beam makes of all the rest.
+// A wall lit through a ball of index 1 by an emitter that has a hundredth of the light, and far
+// enough from it a spot that is 1e6 times as bright, which one beam makes of all the rest.
 Scene DarkWall(bool has_caustic) {
   Scene scene;
   AddQuad(scene, {-1, -1, 0}, {4, 0, 0}, {0, 2, 0}, AddMaterial(scene, DiffuseMaterial(0.1F)));

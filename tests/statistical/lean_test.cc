@@ -38,7 +38,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, LeanTest,
                                          "textured.pbrt", "rough-metal.pbrt", "cardioid.pbrt",
                                          "furnace.pbrt"));
 
-// The light of a light next door, a hundred times as bright, never comes to the camera: with
+// A light behind closed walls, a hundred times as bright, is unreachable from the view: with
 // photons from it as without them, and with them nearly all photons are spent in vain.
 TEST(ShutOutTest, LeavingOutALightNextDoorChangesNothingButNoise) {
   Scene scene;

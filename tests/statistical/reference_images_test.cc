@@ -3,7 +3,7 @@
 // Scenes with reference images lie beside the project, not in it; where they are absent these
 // tests are skipped. Every reference was made by another program with another algorithm, so the
 // bound is the one asked for: 1 % in the mean of all channels and 2 % in the mean of each, with
-// channels clipped at 5 (a few pixels that see a lamp would decide the mean otherwise). The noise
+// channels clipped at 5 (a few pixels that see a light would decide the mean otherwise). The noise
 // of these means is below 0.1 % and is not allowed for. And more photons must bring the image
 // closer to the reference, not just its mean.
 #include <filesystem>
@@ -64,8 +64,8 @@ TEST_P(ReferenceImageTest, AgreesInTheMeanAndComesCloserWithPhotons) {
   int pass = 0;
   while (pass < c.passes / 4)
     render.AddPass(), ++pass;
-  // Of the error, without the worst six pixels: a lamp that an eye path meets once in a thousand by
-  // many bounces is one of them, and whether it has by now decides more than all photons do.
+  // Of the error, without the worst six pixels: a light that an eye path meets once in a thousand
+  // by many bounces is one of them, and whether it has by now decides more than all photons do.
   MetricsOptions trimmed = options;
   trimmed.trim_share = 1e-4;
   const double early = Compare(render.MakeImage(), reference, trimmed).value().rel_mse;

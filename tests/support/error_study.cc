@@ -24,8 +24,8 @@ RenderSettings SettingsOf(const Scene& scene, int side, std::uint64_t seed,
   return SettingsFor(scene, overrides);
 }
 
-// After how many passes a render's true error is at `square` or below for good, between looks by
-// the power law through them.
+// After how many passes a render's true error is at `square` or below for good, between estimates
+// by the power law through them.
 double PassesNeeded(const std::vector<StudiedLook>& looks, double square) {
   std::size_t last = looks.size();
   while (last > 0 && looks[last - 1].truth <= square)

@@ -40,13 +40,13 @@ struct ErrorStudy {
   std::vector<std::vector<StudiedLook>> renders;
   StudiedParts parts;
 
-  // Renders whose intervals hold the truth at every look.
+  // Renders whose intervals hold the truth at every estimate.
   [[nodiscard]] int Covered() const;
-  // Per look: root of mean estimate over mean truth.
+  // Per estimate: root of mean estimate over mean truth.
   [[nodiscard]] std::vector<double> Ratios() const;
 };
 
-// What comes of stopping at the first look whose interval ends at or below `target`, a relative
+// What comes of stopping at the first estimate whose interval ends at or below `target`, a relative
 // error.
 struct StopOutcome {
   double target = 0;

@@ -119,7 +119,7 @@ TEST(PassSumsTest, RefusesASumThatWouldWrap) {
   EXPECT_EQ(with_evidence.evidence()[0][1], std::numeric_limits<std::int64_t>::min());
 }
 
-// Every sum of the books, one after the other, at its end.
+// Every counter, one after the other, at its end.
 TEST(PassSumsTest, RefusesATallyThatWouldWrap) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
   constexpr std::int64_t kMostSigned = std::numeric_limits<std::int64_t>::max();
@@ -145,7 +145,7 @@ TEST(PassSumsTest, RefusesATallyThatWouldWrap) {
     ASSERT_TRUE(sums.Add(accumulation).ok());
     EXPECT_TRUE(absl::IsOutOfRange(sums.Add(accumulation)));
     EXPECT_EQ(sums.tally(), tally) << "nothing has changed";
-    // Books that are only read stand still at the end.
+    // Counters that are only read stand still at the end.
     BatchTally read = tally;
     read += tally;
     EXPECT_EQ(read, tally);

@@ -108,7 +108,7 @@ TEST(BatchTracerTest, CountsThePhotonsOfEachLightThatHitpointsFound) {
   Fixture f;
   AddBox(f.scene, {3, -1, -1}, {5, 1, 1}, 0);
   f.scene.point_lights.push_back({{4, 0, 0}, Gray(0.01F)});
-  // Were it proved to be shut off, it would send nothing.
+  // Were it proved unreachable, it would send nothing.
   const SceneNeeds needs(NeedsOf(f.scene, f.settings).parts(), 0, {});
   BatchTracer tracer(f.scene, 2);
   const auto run = [&](std::uint64_t first, std::uint64_t last) {
@@ -213,7 +213,7 @@ TEST(BatchTracerTest, GivesUpWhenStoppedBeforeItStarts) {
 }
 
 // With radii as large as the room every photon meets every hitpoint, and gathering takes far
-// longer than tracing: a worker that is asked to leave must not finish it first.
+// longer than tracing: a worker that must leave must not finish it first.
 TEST(BatchTracerTest, GivesUpSoonAlsoWhileHitpointsGather) {
   Fixture f;
   f.block = FloorBlock(300);

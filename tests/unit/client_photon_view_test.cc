@@ -1,5 +1,5 @@
 // A photon's way must read the same to people and to programs, with all digits, and a job must say
-// which photon to look at.
+// which photon to replay.
 #include <cmath>
 
 #include "gmock/gmock.h"
@@ -118,7 +118,7 @@ TEST(EnergyInWordsTest, GivesSharesAndSaysWhenTheBooksAreOff) {
   EXPECT_EQ(json["balance"], 0);
   energy.set_cut_off(-4);
   EXPECT_EQ(EnergyImbalance(energy), 4);
-  EXPECT_THAT(EnergyInWords(energy), HasSubstr("the books do not balance"));
+  EXPECT_THAT(EnergyInWords(energy), HasSubstr("the counters do not balance"));
   energy.set_absorbed(INT64_MIN);
   energy.set_escaped(INT64_MIN);
   EXPECT_EQ(EnergyImbalance(energy), INT64_MAX) << "does not wrap";

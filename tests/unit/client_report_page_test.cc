@@ -32,11 +32,11 @@ TEST(ReportPageTest, TellsTheEnergyOfPassesAndWhetherItBalances) {
   part.mutable_energy()->set_absorbed(600);
   part.mutable_energy()->set_escaped(400);
   const std::string balanced = ReportPage(job, std::nullopt);
-  EXPECT_TRUE(Has(balanced, "The books of every pass balance"));
+  EXPECT_TRUE(Has(balanced, "The counters of every pass balance"));
   EXPECT_TRUE(Has(balanced, "4 to 5</th><td>0.00 %</td><td>60.00 %</td><td>40.00 %</td>"));
   part.mutable_energy()->set_escaped(390);
   const std::string off = ReportPage(job, std::nullopt);
-  EXPECT_TRUE(Has(off, "The books of some passes do not balance"));
+  EXPECT_TRUE(Has(off, "The counters of some passes do not balance"));
   EXPECT_TRUE(Has(off, "<td>1.00 %</td></tr>"));
 }
 

@@ -174,7 +174,7 @@ TEST(ComparisonTest, TheTableSaysWhatWasComparedAndHow) {
                                .flags = {"", "--alpha 0.5 | x"}};
   const std::string table = ComparisonTable(comparison, subject);
   EXPECT_THAT(table, HasSubstr("# box.pbrt\n"));
-  EXPECT_THAT(table, HasSubstr("does not tell its own noise"));
+  EXPECT_THAT(table, HasSubstr("does not state its own noise"));
   EXPECT_THAT(table, HasSubstr("over 2 cores"));
   EXPECT_THAT(table, HasSubstr("| 1 | a | 1.00e-06 | 3.00e-06 | 1.00 | 1.25 | 1e+06 |\n"));
   EXPECT_THAT(table, HasSubstr("| 1 | b | 2.00e-06 | 6.00e-06 | 2.00 | 1.25 | 1e+06 |\n"));

@@ -73,7 +73,7 @@ TEST(SidesAgreeTest, ComparesTheScatteringWithTheGeometricSides) {
 class LampOverFloor : public testing::TestWithParam<double> {};
 
 // The larger the floor, the farther from it rays start (its clearance); what they start with must
-// not carry them into the lamp.
+// not carry them into the light.
 TEST_P(LampOverFloor, IsSeenWholeFromALargeFloor) {
   Scene scene = FloorOf(static_cast<float>(GetParam()));
   const std::int32_t black = AddMaterial(scene, DiffuseMaterial(0));

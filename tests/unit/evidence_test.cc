@@ -196,7 +196,7 @@ TEST(SpectrumTracerTest, TakesAConnectedLampAsOneInHoweverManyMeshesItComes) {
   const std::int32_t material = AddMaterial(whole, DiffuseMaterial(0.5F));
   AddQuad(whole, {0, 0, 0}, {0, 0.3F, 0}, {0.3F, 0, 0}, material, AddAreaLight(whole, 1));
   AddQuad(whole, {5, 5, 0}, {0, 0.1F, 0}, {0.1F, 0, 0}, material, AddAreaLight(whole, 1));
-  // The first lamp's triangles as two meshes.
+  // The first light's triangles as two meshes.
   Scene split = whole;
   TriangleMesh second = split.meshes[0];
   split.meshes[0].indices.resize(3);
@@ -215,7 +215,7 @@ TEST(SpectrumTracerTest, TakesAConnectedLampAsOneInHoweverManyMeshesItComes) {
   for (const std::uint32_t emitter : {0U, 1U}) {
     EXPECT_DOUBLE_EQ(parts.HeadOn(emitter, {0, 0, -1}, 0.01F, diffuse), one);
   }
-  // A lamp that does not touch it has its own size.
+  // A light that does not touch it has its own size.
   EXPECT_NEAR(parts.HeadOn(2, {0, 0, -1}, 0.01F, diffuse), expected(0.1), 1e-4 * expected(0.1));
 }
 
@@ -239,7 +239,7 @@ TEST(SpectrumTracerTest, SeesTheRimOfAHardSpot) {
   }
 }
 
-// A flat hitpoint that looks through a narrow lobe sees a point light's beam as its vergence makes
+// A flat hitpoint seen through a narrow lobe sees a point light's beam as its vergence makes
 // the direction change across the surface: s + v² q (1 + p q)⁻¹ in each axis, v = 1/d.
 TEST(SpectrumTracerTest, AGlossyHitpointSeesThroughItsLobe) {
   constexpr double kAlpha = 0.25;

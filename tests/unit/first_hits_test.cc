@@ -33,7 +33,7 @@ TEST(FirstHitsTest, AreNotKeptWhereEyePathsAreNew) {
   EXPECT_EQ(FirstHits(0, 10).Of(0), nullptr);
 }
 
-// A floor, seen in part, and a lamp.
+// A floor, seen in part, and a light.
 Scene Floor() {
   Scene scene;
   AddQuad(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, AddMaterial(scene, DiffuseMaterial(0.5F)));

@@ -13,7 +13,7 @@
 namespace lucerna {
 namespace {
 
-// A glass ball, a glossy metal ball and a lamp in a box.
+// A glass ball, a glossy metal ball and a light in a box.
 Scene Room() {
   Scene scene;
   AddBox(scene, {-1, -1, -1}, {1, 1, 1}, AddMaterial(scene, DiffuseMaterial(0.6F)));

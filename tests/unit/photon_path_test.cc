@@ -1,4 +1,4 @@
-// What photons carry away must be booked to the last unit, whatever becomes of them; a photon that
+// What photons carry away must be counted to the last unit, whatever becomes of them; a photon that
 // is not finite must be counted and named; and a replay must take the way that the photon took.
 #include "worker/photon_path.h"
 
@@ -41,7 +41,7 @@ struct Traced {
   PhotonPathTracer tracer;
 };
 
-// An open box with a lamp, glass, rough metal, and a floor whose shading normals are bent.
+// An open box with a light, glass, rough metal, and a floor whose shading normals are bent.
 Scene OpenBox(float reflectance = 0.7F) {
   Scene scene;
   const std::int32_t white = AddMaterial(scene, DiffuseMaterial(reflectance));
@@ -75,7 +75,7 @@ TEST(PhotonEnergyTest, BalancesToTheUnitWithEveryAccountInUse) {
   EXPECT_EQ(landed.dropped, 0U);
 }
 
-// All photons of the one lamp carry its whole power, so each is booked as 2^kEnergyBits: that is
+// All photons of the one light carry its whole power, so each is counted as 2^kEnergyBits: that is
 // the unit, and half of it is the rounding of one photon.
 TEST(PhotonEnergyTest, CountsInShareOfTheScenesPower) {
   const Traced traced(OpenBox());
@@ -192,7 +192,7 @@ TEST(PhotonPathTest, KeepsWhatIsAskedForOfADeposit) {
   SetCamera(floor, {0, -2, 1}, {0, 0, 0}, {0, 0, 1}, 60, 8);
   EXPECT_EQ(columns(floor), std::pair(false, false));
   floor.materials[2] = DiffuseMaterial(0.5F);
-  EXPECT_EQ(columns(floor), std::pair(true, false)) << "the lamp gathers too";
+  EXPECT_EQ(columns(floor), std::pair(true, false)) << "the emitter gathers too";
   EXPECT_EQ(columns(OpenBox()), std::pair(true, true));
 }
 

@@ -1,5 +1,5 @@
 // The edges that border on the light of a segment, and no others, at their exact distances. The
-// oracle knows nothing of hierarchies, wings or welding: it looks along the segment at every pair
+// oracle has no hierarchies, wings or welding: it tests the segment against every pair
 // of triangles.
 #include "render/geometry/silhouette.h"
 

@@ -1,4 +1,4 @@
-// Points fill the cube as a Sobol' sequence does, and keys are strangers to each other.
+// Points fill the cube as a Sobol' sequence does, and sequences of different keys are independent.
 //
 // Stratification is exact, so it is counted, not estimated: of the first 2^k points each
 // elementary interval of volume 2^-k holds one. That sets the direction numbers apart from wrong
