@@ -101,7 +101,7 @@ void LeaseRunner::FetchStage() {
     StatusOr<LentBatch> batch = ReadLease(response->lease());
     const auto held = std::make_shared<Held>();
     held->batch.lease_id = response->lease().lease_id();
-    if (batch.ok()) held->batch = *std::move(batch);
+    if (batch.ok()) held->batch = std::move(*batch);
     {
       const MutexLock lock(mutex_);
       if (is_stopped_) return;
