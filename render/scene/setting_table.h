@@ -1,8 +1,8 @@
 // Which settings does a job have, and what is known about each?
 //
 // One table with one row for each setting: name, type, unit, range, default, meaning. Flags,
-// parsing, the wire, JSON, the text in an image's header, `lucerna help settings` and README's
-// table are made from it.
+// parsing, the wire, JSON, the text in an image's header, `lucerna help settings` and the
+// manual's table are made from it.
 //
 // To add a setting: its field in render_settings.h, its row in setting_table.cc, the code that uses
 // the value, and the manual's table (which a test compares with the rows).
