@@ -19,7 +19,9 @@ std::vector<std::string> NamesOf(const Image& image) {
 }
 
 TEST(LayersTest, OfPassesAreNoiseAndBias) {
-  Image image{.width = 2, .height = 1};
+  Image image;
+  image.width = 2;
+  image.height = 1;
   AddLayers(
       LayerSource::kPasses,
       [](std::size_t pixel) {
@@ -35,7 +37,9 @@ TEST(LayersTest, OfPassesAreNoiseAndBias) {
 }
 
 TEST(LayersTest, OfEveryImageLimitTheBeautyImage) {
-  Image image{.width = 1, .height = 1};
+  Image image;
+  image.width = 1;
+  image.height = 1;
   AddLayers(
       LayerSource::kEveryImage,
       [](std::size_t) {
@@ -53,7 +57,9 @@ TEST(LayersTest, OfEveryImageLimitTheBeautyImage) {
 }
 
 TEST(LayersTest, LengthsTurnToTheUnitOfTheFile) {
-  Image image{.width = 1, .height = 1};
+  Image image;
+  image.width = 1;
+  image.height = 1;
   for (const char* name : {"Z", "bandwidth", "R", "photon_count", "of.another.program"})
     image.channels.push_back({name, {2}});
   ToFileUnit(image, 4);
