@@ -16,24 +16,12 @@
 #include "render/estimate/relative_error.h"
 #include "render/estimate/statistics.h"
 #include "render/film/film.h"
+#include "render/film/layers.h"
 #include "render/math/color_space.h"
 #include "render/tracing/eye_path.h"
 
 namespace lucerna {
 namespace {
-
-// Layers that are lengths, or one over a length, as the scene's file measures them.
-void ToFileUnit(Image& image, double unit) {
-  if (unit == 1) return;
-  for (ImageChannel& channel : image.channels) {
-    const bool is_length =
-        channel.name == "Z" || channel.name == "radius" || channel.name == "min_radius";
-    if (!is_length && channel.name != "bandwidth") continue;
-    const double factor = is_length ? unit : 1 / unit;
-    for (float& value : channel.pixels)
-      value = static_cast<float>(static_cast<double>(value) * factor);
-  }
-}
 
 constexpr double kPi64 = std::numbers::pi;
 
@@ -270,8 +258,15 @@ Image JobEstimator::MakeImage() const {
         .of_passes = (square - mean * mean) / (passes - 1),
         .largest_share = std::min(1.0, largest * largest / (passes * (square - mean * mean)))};
   }
-  image.channels.push_back({"noise", NoiseOfPixels(image.width, image.height, noise_area, noise)});
-  image.channels.push_back({"bias", std::move(bias)});
+  const std::vector<float> noise_layer =
+      NoiseOfPixels(image.width, image.height, noise_area, noise);
+  const auto errors_of = [&](std::size_t pixel) {
+    PixelValues values;
+    values.noise = static_cast<double>(noise_layer[pixel]);
+    values.bias = static_cast<double>(bias[pixel]);
+    return values;
+  };
+  AddLayers(LayerSource::kPasses, errors_of, image);
   return image;
 }
 
@@ -409,8 +404,7 @@ TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
   double untrimmed = 0;
   for (const TrueError& pixel : pixels)
     untrimmed += pixel.relative;
-  const auto kept =
-      pixels.size() - static_cast<std::size_t>(kTrimmedShare * static_cast<double>(pixels.size()));
+  const std::size_t kept = KeptPixels(pixels.size());
   std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
                            &TrueError::relative);
   pixels.resize(kept);

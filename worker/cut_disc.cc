@@ -7,8 +7,8 @@
 #include <span>
 
 #include "render/estimate/evidence.h"
-#include "render/estimate/kernel.h"
 #include "render/math/double3.h"
+#include "render/math/kernel.h"
 
 namespace lucerna {
 namespace {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <type_traits>
+#include <utility>
 
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
@@ -52,20 +53,21 @@ std::uint64_t PairBits(std::uint32_t photon_key, std::uint32_t hitpoint) {
 // What a photon that counts adds to the columns of its radius controller, one class for
 // each kind: chosen once per batch, so that a job pays for no other kind than its own.
 
-struct NoEvidence {
-  static constexpr std::size_t kColumns = 0;
-  static constexpr float kReach = 1;
-  NoEvidence(Vec3 /*normal*/, const FluxScale& /*scale*/) {}
+template <Evidence kEvidence>
+struct EvidenceSums;
+
+template <>
+struct EvidenceSums<Evidence::kNone> {
+  EvidenceSums(Vec3 /*normal*/, const FluxScale& /*scale*/) {}
   void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 /*to_photon*/,
            float /*squared*/, float /*squared_radius*/, float /*weight*/, const CutDisc* /*cut*/) {}
   void Store(std::vector<std::vector<std::int64_t>>& /*columns*/) const {}
 };
 
 // Counts by cell of the disc (see kSectors).
-struct SectorEvidence {
-  static constexpr std::size_t kColumns = kSectors;
-  static constexpr float kReach = 1;
-  SectorEvidence(Vec3 normal, const FluxScale& /*scale*/) : frame(normal) {}
+template <>
+struct EvidenceSums<Evidence::kSectors> {
+  EvidenceSums(Vec3 normal, const FluxScale& /*scale*/) : frame(normal) {}
   void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 to_photon, float squared,
            float squared_radius, float /*weight*/, const CutDisc* cut) {
     const std::size_t ring = 2 * squared < squared_radius ? 0 : 6;
@@ -86,12 +88,12 @@ struct SectorEvidence {
     return above ? third : 5 - third;
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
-    for (std::size_t i = 0; i < kColumns; ++i)
+    for (std::size_t i = 0; i < kSectors; ++i)
       columns[kCommonColumns + i].push_back(counts[i]);
   }
 
   Frame frame;
-  std::array<std::int64_t, kColumns> counts{};
+  std::array<std::int64_t, kSectors> counts{};
 };
 
 // From luminance [W] to the weights of evidence, and where those are held.
@@ -101,13 +103,12 @@ float WeightScale(const FluxScale& scale) {
 constexpr float kLargestWeight = 256;
 
 // Sums over a wider disc (see CurvatureColumn).
-struct CurvatureEvidence {
-  static constexpr std::size_t kColumns = kCurvatureColumns;
-  static constexpr float kReach = kCurvatureReach;
-  CurvatureEvidence(Vec3 /*normal*/, const FluxScale& scale) : weight_scale(WeightScale(scale)) {}
+template <>
+struct EvidenceSums<Evidence::kCurvature> {
+  EvidenceSums(Vec3 /*normal*/, const FluxScale& scale) : weight_scale(WeightScale(scale)) {}
   void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 to_photon, float squared,
            float squared_radius, float weight, const CutDisc* cut) {
-    constexpr float kPerRadius = 1 / (kReach * kReach);
+    constexpr float kPerRadius = 1 / (kCurvatureReach * kCurvatureReach);
     constexpr auto kUnits = static_cast<float>(1 / kWeightUnit);
     const float w = std::min(weight * weight_scale, kLargestWeight);
     const float u = squared / squared_radius * kPerRadius;
@@ -124,20 +125,19 @@ struct CurvatureEvidence {
         std::llrint(std::min(w * w * cut->inverse_share(), kLargest) * kUnits);
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
-    for (std::size_t i = 0; i < kColumns; ++i)
+    for (std::size_t i = 0; i < kCurvatureColumns; ++i)
       columns[kCommonColumns + i].push_back(sums[i]);
   }
 
   float weight_scale;
-  std::array<std::int64_t, kColumns> sums{};
+  std::array<std::int64_t, kCurvatureColumns> sums{};
 };
 
 // Sums over the frequency photons (see FrequencyColumn).
-struct FrequencyEvidence {
-  static constexpr std::size_t kColumns = kFrequencyColumns;
+template <>
+struct EvidenceSums<Evidence::kFrequency> {
   static constexpr std::int64_t kMostTrace2 = std::int64_t{1} << 62;
-  static constexpr float kReach = 1;
-  FrequencyEvidence(Vec3 /*normal*/, const FluxScale& scale) : weight_scale(WeightScale(scale)) {}
+  EvidenceSums(Vec3 /*normal*/, const FluxScale& scale) : weight_scale(WeightScale(scale)) {}
   void Add(const PhotonGrid& grid, std::size_t photon, Vec3 /*to_photon*/, float /*squared*/,
            float squared_radius, float weight, const CutDisc* /*cut*/) {
     const float trace = grid.has_traces() ? grid.trace(photon) : -1;
@@ -156,12 +156,12 @@ struct FrequencyEvidence {
         kMostTrace2, sums[kFrequencyTrace2] + std::llrint(w * x * x * kUnits));
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
-    for (std::size_t i = 0; i < kColumns; ++i)
+    for (std::size_t i = 0; i < kFrequencyColumns; ++i)
       columns[kCommonColumns + i].push_back(sums[i]);
   }
 
   float weight_scale;
-  std::array<std::int64_t, kColumns> sums{};
+  std::array<std::int64_t, kFrequencyColumns> sums{};
 };
 
 // What one hitpoint gathers from.
@@ -176,7 +176,7 @@ struct RowSource {
 constexpr float kLargestCutContribution = 8 * kLargestContribution;
 
 // Without kNormals every photon counts that lies in the disc. With kCut the disc is `cut`.
-template <KernelKind kKernel, typename EvidenceSums, bool kNormals, bool kCut>
+template <typename GatherKernel, Evidence kEvidence, bool kNormals, bool kCut>
 void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
                const GlossyHitpoint* glossy, const std::vector<Material>& materials,
                const FluxScale& scale, const RowSource& source, const CutDisc* cut, Piece& piece) {
@@ -191,21 +191,21 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
   std::int64_t sum_r = 0;
   std::int64_t sum_g = 0;
   std::int64_t sum_b = 0;
-  EvidenceSums evidence(normal, scale);
+  EvidenceSums<kEvidence> evidence(normal, scale);
   // Photons beyond the radius, for evidence that reaches further, have no part in the estimate.
   const auto shape = [&](float squared) {
     const float t2 = squared * inverse_squared;
-    if constexpr (EvidenceSums::kReach > 1) {
+    if constexpr (ReachOf(kEvidence) > 1) {
       if (!(t2 < 1)) return 0.0F;
     }
-    return KernelShape<kKernel>(t2);
+    return GatherKernel::Shape(t2);
   };
-  const float reach = radius * EvidenceSums::kReach;
+  const float reach = radius * ReachOf(kEvidence);
   // The whole kernel less the inner one: see kBlurColumn.
   constexpr float kInnerArea = kInnerShare * kInnerShare;
   const auto blurred = [&](float squared, float whole) {
     const float t2 = squared * inverse_squared * (1 / kInnerArea);
-    return t2 < 1 ? whole - KernelShape<kKernel>(t2) * (1 / kInnerArea) : whole;
+    return t2 < 1 ? whole - GatherKernel::Shape(t2) * (1 / kInnerArea) : whole;
   };
   std::int64_t blur = 0;
   const auto add = [&](std::size_t number, const PhotonRecord& photon, Rgb flux, float squared,
@@ -315,7 +315,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
   piece.pairs += count;
 }
 
-template <KernelKind kKernel, typename EvidenceSums, bool kNormals>
+template <typename GatherKernel, Evidence kEvidence, bool kNormals>
 Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
                        const GatheredPhotons& photons, const std::vector<Material>& materials,
                        const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
@@ -329,7 +329,7 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
   team.For(piece_count, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       Piece& piece = pieces[p];
-      piece.evidence.resize(kCommonColumns + EvidenceSums::kColumns);
+      piece.evidence.resize(EvidenceColumns(kEvidence));
       const std::size_t first = p * kRowsPerPiece;
       const std::size_t last = std::min(rows, first + kRowsPerPiece);
       auto glossy = std::lower_bound(
@@ -341,12 +341,12 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
         const GlossyHitpoint* lobe = is_glossy ? &*glossy++ : nullptr;
         const bool is_caustic = row >= first_caustic;
         if (is_caustic && photons.caustics == nullptr) continue;
-        const bool is_cut =
-            photons.features != nullptr && cut.Cut(*photons.features, block.positions[row],
-                                                   DecodeOctahedral(block.normals_oct[row]),
-                                                   radii[row], EvidenceSums::kReach, kKernel);
+        const bool is_cut = photons.features != nullptr &&
+                            cut.Cut(*photons.features, block.positions[row],
+                                    DecodeOctahedral(block.normals_oct[row]), radii[row],
+                                    ReachOf(kEvidence), GatherKernel::kKind);
         const auto gather_row = [&](auto with_normals, auto with_cut, const RowSource& source) {
-          GatherRow<kKernel, EvidenceSums, with_normals(), with_cut()>(
+          GatherRow<GatherKernel, kEvidence, with_normals(), with_cut()>(
               block, row, radii[row], lobe, materials, scale, source, is_cut ? &cut : nullptr,
               piece);
         };
@@ -369,7 +369,7 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
     to.reserve(touched);
     to.insert(to.end(), from.begin(), from.end());
   };
-  accumulation.evidence.resize(kCommonColumns + EvidenceSums::kColumns);
+  accumulation.evidence.resize(EvidenceColumns(kEvidence));
   for (const Piece& piece : pieces) {
     append(accumulation.hitpoints, piece.hitpoints);
     append(accumulation.counts, piece.counts);
@@ -384,43 +384,26 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
   return accumulation;
 }
 
-using GatherFunction = decltype(&GatherAll<KernelKind::kConstant, NoEvidence, true>);
+using GatherFunction = decltype(&GatherAll<ConstantKernel, Evidence::kNone, true>);
 
-template <typename EvidenceSums, bool kNormals>
+template <Evidence kEvidence, bool kNormals>
 GatherFunction ForKernel(KernelKind kernel) {
-  switch (kernel) {
-    case KernelKind::kConstant:
-      return &GatherAll<KernelKind::kConstant, EvidenceSums, kNormals>;
-    case KernelKind::kEpanechnikov:
-      return &GatherAll<KernelKind::kEpanechnikov, EvidenceSums, kNormals>;
-    case KernelKind::kBiweight:
-      return &GatherAll<KernelKind::kBiweight, EvidenceSums, kNormals>;
-    case KernelKind::kGaussian:
-      return &GatherAll<KernelKind::kGaussian, EvidenceSums, kNormals>;
-  }
-  return nullptr;
+  return WithKernel(kernel, [](auto k) -> GatherFunction {
+    return &GatherAll<decltype(k), kEvidence, kNormals>;
+  });
 }
 
+// Each kernel with each kind of evidence.
 template <bool kNormals>
 GatherFunction Specialised(KernelKind kernel, Evidence evidence) {
-  switch (evidence) {
-    case Evidence::kNone:
-      return ForKernel<NoEvidence, kNormals>(kernel);
-    case Evidence::kSectors:
-      return ForKernel<SectorEvidence, kNormals>(kernel);
-    case Evidence::kCurvature:
-      return ForKernel<CurvatureEvidence, kNormals>(kernel);
-    case Evidence::kFrequency:
-      return ForKernel<FrequencyEvidence, kNormals>(kernel);
+  return [&]<std::size_t... kKinds>(std::index_sequence<kKinds...>) {
+    constexpr std::array kForKernel = {&ForKernel<kAllEvidence[kKinds].kind, kNormals>...};
+    return kForKernel[static_cast<std::size_t>(evidence)](kernel);
   }
-  return nullptr;
+  (std::make_index_sequence<kAllEvidence.size()>());
 }
 
 }  // namespace
-
-float ReachOf(Evidence evidence) {
-  return evidence == Evidence::kCurvature ? kCurvatureReach : 1;
-}
 
 Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
                     const GatheredPhotons& photons, const std::vector<Material>& materials,

@@ -9,9 +9,9 @@
 #include "render/estimate/accumulation.h"
 #include "render/estimate/evidence.h"
 #include "render/estimate/hitpoint_block.h"
-#include "render/estimate/kernel.h"
 #include "render/geometry/feature_edges.h"
 #include "render/math/fixed_point.h"
+#include "render/math/kernel.h"
 #include "render/scene/scene.h"
 #include "render/transport/caustic_weight.h"
 #include "worker/photon_grid.h"
@@ -31,9 +31,6 @@ struct GatheredPhotons {
   std::span<std::uint8_t> was_found = {};
   std::span<std::uint8_t> caustic_was_found = {};
 };
-
-// How far from a hitpoint photons are looked for, in radii.
-[[nodiscard]] float ReachOf(Evidence evidence);
 
 // Every hitpoint adds up the photons within its radius that landed on its side of its surface (all
 // of them where photons have no normals), and of those the ones that no edge of `features`, where

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "render/estimate/kernel.h"
 #include "render/geometry/surface_uv.h"
+#include "render/math/kernel.h"
 #include "render/scene/mesh_edges.h"
 
 namespace lucerna {

@@ -156,26 +156,17 @@ std::optional<MeanOfRuns> MeanSlope(std::span<const ComparedRun> runs, std::size
 }  // namespace
 
 std::optional<double> FittedExponent(std::span<const PowerLawPoint> points) {
-  double mean_x = 0;
-  double mean_y = 0;
   double least = HUGE_VAL;
   double most = 0;
   for (const PowerLawPoint& point : points) {
     if (!(point.x > 0) || !(point.y > 0)) return std::nullopt;
-    mean_x += std::log(point.x) / static_cast<double>(points.size());
-    mean_y += std::log(point.y) / static_cast<double>(points.size());
     least = std::min(least, point.x);
     most = std::max(most, point.x);
   }
   if (!(most >= kLeastSpan * least)) return std::nullopt;
-  double squares = 0;
-  double products = 0;
-  for (const PowerLawPoint& point : points) {
-    const double x = std::log(point.x) - mean_x;
-    squares += x * x;
-    products += x * (std::log(point.y) - mean_y);
-  }
-  return products / squares;
+  const std::optional<PowerLaw> law = PowerLawThrough(points);
+  if (!law) return std::nullopt;
+  return law->exponent;
 }
 
 std::optional<ErrorPoint> PointAt(std::span<const ErrorPoint> points, double seconds) {
@@ -224,21 +215,7 @@ Comparison CompareRuns(const std::vector<SettingToCompare>& settings,
 }
 
 std::optional<TheorySlopes> TheoryOf(const RenderSettings& settings) {
-  switch (settings.radius_controller) {
-    case RadiusControllerKind::kPpm:
-    case RadiusControllerKind::kPppm:
-      return TheorySlopes{-settings.alpha, -2 * (1 - settings.alpha)};
-    case RadiusControllerKind::kAppm:
-      return TheorySlopes{-2.0 / 3, -2.0 / 3};
-    case RadiusControllerKind::kFrequency:
-      // Once its radius stands still.
-      return TheorySlopes{-1, 0};
-    case RadiusControllerKind::kCppm:
-    case RadiusControllerKind::kFrequencyConsistent:
-    case RadiusControllerKind::kFrequencyMse:
-      return std::nullopt;
-  }
-  return std::nullopt;
+  return MakeRadiusController(settings, 1)->Slopes();
 }
 
 std::string ComparisonTable(const Comparison& comparison, const ComparisonSubject& subject) {

@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include "render/estimate/radius_controller.h"
+#include "render/math/power_law.h"
 #include "render/scene/render_settings.h"
 
 namespace lucerna {
@@ -53,12 +55,6 @@ struct ComparedCell {
   bool is_mostly_reference = false;
 };
 
-// Exponents of photons at which the two parts of MSE fall.
-struct TheorySlopes {
-  double noise = 0;
-  double squared_bias = 0;
-};
-
 struct ComparedSetting {
   std::string name;
   // Absent where a run did not come near the time, or nothing was left beside the reference's
@@ -90,16 +86,12 @@ struct SettingToCompare {
 // as it was). Up to a quarter beyond its ends it is prolonged; nothing beyond.
 [[nodiscard]] std::optional<ErrorPoint> PointAt(std::span<const ErrorPoint> points, double seconds);
 
-// The exponent of the power law through the points, by least squares of logarithms; nothing when
-// they do not span a factor of 1.5 or are not above 0.
-struct PowerLawPoint {
-  double x = 0, y = 0;
-};
+// The exponent of the power law through the points; nothing when they do not span a factor of 1.5
+// or are not above 0.
 [[nodiscard]] std::optional<double> FittedExponent(std::span<const PowerLawPoint> points);
 
-// What theory says of light from photons; eye paths' noise always falls as 1/passes. Nothing where
-// no theory is known. Sources: Knaus & Zwicker 2011 (ppm, pppm: radius² falls as passes^(alpha -
-// 1)); Kaplanyan & Dachsbacher 2013 (appm).
+// What theory says of light from photons (RadiusController::Slopes); eye paths' noise always falls
+// as 1/passes.
 [[nodiscard]] std::optional<TheorySlopes> TheoryOf(const RenderSettings& settings);
 
 // What the table's head holds.

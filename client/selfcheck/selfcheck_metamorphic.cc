@@ -15,6 +15,7 @@
 #include "client/selfcheck/selfcheck_fixed_point.h"
 #include "client/selfcheck/selfcheck_scenes.h"
 #include "render/film/image_metrics.h"
+#include "render/film/layers.h"
 
 namespace lucerna {
 namespace {
@@ -35,10 +36,17 @@ RenderOverrides Small(Controller controller) {
 
 // By what a channel grows when lengths grow by 2^`length` and light by 2^`light`.
 int ExponentOf(std::string_view channel, int length, int light) {
-  if (channel == "Z" || channel == "radius" || channel == "min_radius") return length;
-  if (channel == "bandwidth") return -length;
-  if (channel.starts_with("albedo.") || channel.starts_with("N.")) return 0;
-  if (channel == "photon_count" || channel == "relative_bias") return 0;
+  const Layer* layer = LayerOfChannel(channel);
+  switch (layer == nullptr ? LayerUnit::kRadiance : layer->unit) {
+    case LayerUnit::kLength:
+      return length;
+    case LayerUnit::kPerLength:
+      return -length;
+    case LayerUnit::kNone:
+      return 0;
+    case LayerUnit::kRadiance:
+      break;
+  }
   return light;
 }
 

@@ -108,34 +108,16 @@ std::string MissingLightSentence(const v1::Job& job) {
   return text;
 }
 
-double PowerLaw::At(double x) const {
-  return factor * std::pow(x, exponent);
-}
-
 std::optional<PowerLaw> FitPowerLaw(const std::vector<ChartPoint>& points) {
-  std::vector<std::pair<double, double>> logs;
-  double mean_x = 0;
-  double mean_y = 0;
+  std::vector<PowerLawPoint> fitted;
   for (const ChartPoint& point : points) {
     if (!(point.x > 0 && point.y > 0) || !std::isfinite(point.x) || !std::isfinite(point.y)) {
       continue;
     }
-    logs.emplace_back(std::log(point.x), std::log(point.y));
-    mean_x += logs.back().first;
-    mean_y += logs.back().second;
+    fitted.push_back({point.x, point.y});
   }
-  if (logs.size() < kFewestFitted) return std::nullopt;
-  mean_x /= static_cast<double>(logs.size());
-  mean_y /= static_cast<double>(logs.size());
-  double xx = 0;
-  double xy = 0;
-  for (const auto& [x, y] : logs) {
-    xx += (x - mean_x) * (x - mean_x);
-    xy += (x - mean_x) * (y - mean_y);
-  }
-  // Spread over less than a millionth of x is none: the slope would be rounding.
-  if (!(xx > 1e-12 * static_cast<double>(logs.size()))) return std::nullopt;
-  return PowerLaw{std::exp(mean_y - xy / xx * mean_x), xy / xx};
+  if (fitted.size() < kFewestFitted) return std::nullopt;
+  return PowerLawThrough(fitted);
 }
 
 double Abscissa(const v1::ErrorSample& sample, ErrorAgainst against) {

@@ -12,6 +12,7 @@
 #include "client/view/chart.h"
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "render/base/clock.h"
+#include "render/math/power_law.h"
 
 namespace lucerna {
 
@@ -40,15 +41,8 @@ struct RelativeError {
 // upper end and, if there is a target, below half of it.
 [[nodiscard]] std::string MissingLightSentence(const v1::Job& job);
 
-// y = factor · x^exponent.
-struct PowerLaw {
-  double factor = 0, exponent = 0;
-
-  [[nodiscard]] double At(double x) const;
-};
-
-// Least squares in the logarithms of both. Points without them are left out; absent when fewer than
-// three are left or all have the same x.
+// Points that are not finite and above 0 are left out; absent when fewer than three are left or all
+// have the same x.
 [[nodiscard]] std::optional<PowerLaw> FitPowerLaw(const std::vector<ChartPoint>& points);
 
 // What the error is set against: wall time [s] or photons.

@@ -6,6 +6,7 @@
 #include "absl/strings/str_format.h"
 
 #include "render/base/text.h"
+#include "render/wire/messages.h"
 
 namespace lucerna {
 namespace {
@@ -118,12 +119,7 @@ std::string PhotonPathText(const v1::PhotonPath& path) {
 }
 
 std::int64_t EnergyImbalance(const v1::Energy& energy) {
-  // Without a wrap, whatever the numbers: they come from another process.
-  __extension__ using Wide = __int128;
-  const Wide in = Wide{energy.emitted()} + energy.roulette_gain();
-  const Wide out = Wide{energy.roulette_loss()} + energy.absorbed() + energy.escaped() +
-                   energy.smoothing() + energy.cut_off() + energy.dropped();
-  return static_cast<std::int64_t>(std::clamp<Wide>(in - out, INT64_MIN, INT64_MAX));
+  return FromProto(energy).Imbalance();
 }
 
 std::string EnergyInWords(const v1::Energy& energy) {

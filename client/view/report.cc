@@ -59,19 +59,25 @@ Json SettingsJson(const RenderSettings& settings) {
   return json;
 }
 
-// As shares of what was emitted. `balance` is what the counters are off by, in their smallest unit.
-Json EnergyOf(const v1::Energy& energy) {
-  const auto share = [&](std::int64_t part) {
-    return static_cast<double>(part) / static_cast<double>(energy.emitted());
-  };
-  return {{"absorbed", share(energy.absorbed())},
-          {"escaped", share(energy.escaped())},
-          {"roulette_loss", share(energy.roulette_loss())},
-          {"roulette_gain", share(energy.roulette_gain())},
-          {"smoothing", share(energy.smoothing())},
-          {"cut_off", share(energy.cut_off())},
-          {"dropped", share(energy.dropped())},
-          {"balance", EnergyImbalance(energy)}};
+// As shares of what was emitted. `balance` is the imbalance in the smallest unit.
+Json EnergyOf(const v1::Energy& message) {
+  const EnergyCounters energy = FromProto(message);
+  Json json;
+  for (const auto& counter : kEnergyCounters) {
+    if (counter.value == &EnergyCounters::emitted) continue;
+    json[std::string(counter.name)] =
+        static_cast<double>(energy.*counter.value) / static_cast<double>(energy.emitted);
+  }
+  json["balance"] = energy.Imbalance();
+  return json;
+}
+
+Json TallyOf(const v1::Tally& message) {
+  const BatchTally tally = FromProto(message);
+  Json json;
+  for (const auto& counter : kBatchCounters)
+    json[std::string(counter.name)] = tally.*counter.value;
+  return json;
 }
 
 Json JobOf(const v1::Job& job) {
@@ -93,10 +99,7 @@ Json JobOf(const v1::Job& job) {
   json["worker_cpu_s"] = Seconds(FromProto(progress.worker_cpu()));
   json["photons_per_second"] = progress.photons_per_second();
   json["workers"] = progress.workers();
-  json["tally"] = {
-      {"photons", progress.tally().photons()},   {"rays", progress.tally().rays()},
-      {"deposits", progress.tally().deposits()}, {"pairs", progress.tally().pairs()},
-      {"dropped", progress.tally().dropped()},   {"excess", progress.tally().excess()}};
+  json["tally"] = TallyOf(progress.tally());
   if (progress.tally().energy().emitted() != 0)
     json["energy"] = EnergyOf(progress.tally().energy());
   json["energy_of_passes"] = Json::array();

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "render/analysis/line_crossing.h"
+#include "render/math/union_find.h"
 #include "render/scene/mesh_edges.h"
 
 namespace lucerna {
@@ -25,27 +25,6 @@ bool LieOnOneSide(const Triangle& triangle, std::span<const Vec3> points, double
   }
   return lowest > limit || highest < -limit;
 }
-
-// The sets of numbers below some count that were united.
-class Unions {
- public:
-  explicit Unions(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0U);
-  }
-  std::uint32_t Find(std::uint32_t i) {
-    while (parent_[i] != i)
-      i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void Unite(std::uint32_t a, std::uint32_t b) {
-    a = Find(a);
-    b = Find(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 // Triangles of all meshes that count, by their welded corners.
 struct Walls {
@@ -93,8 +72,8 @@ Walls WallsOf(const Scene& scene, const MaterialPredicate& is_wall) {
 
 // Side 2t is the front of triangle t, 2t + 1 its back. Sides that face each other around an edge,
 // with no triangle between them, look into the same region.
-Unions RegionsOf(const Walls& walls, const std::vector<TriangleSide>& sides) {
-  Unions regions(2 * walls.size());
+UnionFind RegionsOf(const Walls& walls, const std::vector<TriangleSide>& sides) {
+  UnionFind regions(2 * walls.size());
   struct Around {
     double angle;
     std::uint32_t towards, away;  // its side that looks where angles grow, and the other
@@ -195,7 +174,7 @@ std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene, const MaterialPr
   std::vector<ClosedSurface> surfaces;
   const Walls walls = WallsOf(scene, is_wall);
   const std::vector<TriangleSide> sides = SidesByEdge(walls.corners, walls.positions.size());
-  Unions regions = RegionsOf(walls, sides);
+  UnionFind regions = RegionsOf(walls, sides);
   // A region is bounded by the triangles that have one side in it; those that have both are
   // surrounded by it. Around an edge one enters the region as often as one leaves it, so its
   // boundary has an even number of triangles there: it is closed.

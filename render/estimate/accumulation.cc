@@ -1,5 +1,6 @@
 #include "render/estimate/accumulation.h"
 
+#include <algorithm>
 #include <limits>
 
 namespace lucerna {
@@ -7,15 +8,11 @@ namespace {
 
 __extension__ using Wide = __int128;
 
-// Whether `a + b` (or `a - b`) leaves the range, without computing it.
-bool SumFits(std::int64_t a, std::int64_t b, bool adding) {
-  std::int64_t sum = 0;
-  return adding ? !__builtin_add_overflow(a, b, &sum) : !__builtin_sub_overflow(a, b, &sum);
-}
-
-bool SumFits(std::uint64_t a, std::uint64_t b, bool adding) {
-  std::uint64_t sum = 0;
-  return adding ? !__builtin_add_overflow(a, b, &sum) : !__builtin_sub_overflow(a, b, &sum);
+// Whether `a + b` stays in range.
+template <typename Integer>
+bool SumFits(Integer a, Integer b) {
+  Integer sum = 0;
+  return !__builtin_add_overflow(a, b, &sum);
 }
 
 std::uint64_t SaturatingSum(std::uint64_t a, std::uint64_t b) {
@@ -34,20 +31,10 @@ std::int64_t SaturatingSum(std::int64_t a, std::int64_t b) {
 // theirs.
 template <typename Ours, typename Visit>
 void ForEachSum(Ours& ours, const BatchTally& theirs, const Visit& visit) {
-  visit(ours.photons, theirs.photons);
-  visit(ours.rays, theirs.rays);
-  visit(ours.deposits, theirs.deposits);
-  visit(ours.pairs, theirs.pairs);
-  visit(ours.dropped, theirs.dropped);
-  visit(ours.excess, theirs.excess);
-  visit(ours.energy.emitted, theirs.energy.emitted);
-  visit(ours.energy.roulette_gain, theirs.energy.roulette_gain);
-  visit(ours.energy.roulette_loss, theirs.energy.roulette_loss);
-  visit(ours.energy.absorbed, theirs.energy.absorbed);
-  visit(ours.energy.escaped, theirs.energy.escaped);
-  visit(ours.energy.smoothing, theirs.energy.smoothing);
-  visit(ours.energy.cut_off, theirs.energy.cut_off);
-  visit(ours.energy.dropped, theirs.energy.dropped);
+  for (const auto& counter : kBatchCounters)
+    visit(ours.*counter.value, theirs.*counter.value);
+  for (const auto& counter : kEnergyCounters)
+    visit(ours.energy.*counter.value, theirs.energy.*counter.value);
   for (std::size_t i = 0; i < theirs.lights.size(); ++i) {
     visit(ours.lights[i].sent, theirs.lights[i].sent);
     for (std::size_t path = 0; path < kPathClasses; ++path)
@@ -57,9 +44,11 @@ void ForEachSum(Ours& ours, const BatchTally& theirs, const Visit& visit) {
 
 }  // namespace
 
-bool EnergyCounters::Balance() const {
-  return Wide{emitted} + roulette_gain ==
-         Wide{roulette_loss} + absorbed + escaped + smoothing + cut_off + dropped;
+std::int64_t EnergyCounters::Imbalance() const {
+  Wide sum = 0;
+  for (const auto& counter : kEnergyCounters)
+    sum += counter.is_gain ? Wide{this->*counter.value} : -Wide{this->*counter.value};
+  return static_cast<std::int64_t>(std::clamp<Wide>(sum, INT64_MIN, INT64_MAX));
 }
 
 bool BatchTally::LightsFit() const {
@@ -76,26 +65,18 @@ bool BatchTally::LightsFit() const {
   return true;
 }
 
-BatchTally& BatchTally::operator-=(const BatchTally& other) {
-  if (lights.size() < other.lights.size()) lights.resize(other.lights.size());
-  ForEachSum(*this, other, [](auto& ours, auto theirs) { ours -= theirs; });
-  while (!lights.empty() && lights.back() == LightTally())
-    lights.pop_back();
-  return *this;
-}
-
 BatchTally& BatchTally::operator+=(const BatchTally& other) {
   if (lights.size() < other.lights.size()) lights.resize(other.lights.size());
   ForEachSum(*this, other, [](auto& ours, auto theirs) { ours = SaturatingSum(ours, theirs); });
   return *this;
 }
 
-bool BatchTally::Fits(const BatchTally& other, bool adding) const {
+bool BatchTally::Fits(const BatchTally& other) const {
   BatchTally ours_with_lights = *this;
   if (lights.size() < other.lights.size()) ours_with_lights.lights.resize(other.lights.size());
   bool fits = true;
   ForEachSum(ours_with_lights, other,
-             [&](auto ours, auto theirs) { fits = fits && SumFits(ours, theirs, adding); });
+             [&](auto ours, auto theirs) { fits = fits && SumFits(ours, theirs); });
   return fits;
 }
 
@@ -106,7 +87,7 @@ PassSums::PassSums(std::size_t hitpoints, std::size_t evidence_columns)
 }
 
 // Everything is checked before anything is changed: that is what makes Add all or nothing.
-Status PassSums::Check(const Accumulation& accumulation, bool adding) const {
+Status PassSums::Check(const Accumulation& accumulation) const {
   const std::size_t rows = accumulation.size();
   if (accumulation.counts.size() != rows) {
     return absl::InvalidArgumentError("an accumulation's columns differ in length");
@@ -132,7 +113,7 @@ Status PassSums::Check(const Accumulation& accumulation, bool adding) const {
   if (!accumulation.tally.LightsFit()) {
     return absl::InvalidArgumentError("an accumulation's photons by light contradict its photons");
   }
-  if (!tally_.Fits(accumulation.tally, adding)) {
+  if (!tally_.Fits(accumulation.tally)) {
     return absl::OutOfRangeError("the tally of a pass would not fit in 64 bits");
   }
   std::uint64_t least = 0;  // the smallest row that may come next
@@ -149,12 +130,12 @@ Status PassSums::Check(const Accumulation& accumulation, bool adding) const {
     if (accumulation.counts[i] == 0) {
       return absl::InvalidArgumentError("an accumulation lists a hitpoint without photons");
     }
-    bool fits = SumFits(counts_[row], std::uint64_t{accumulation.counts[i]}, adding);
+    bool fits = SumFits(counts_[row], std::uint64_t{accumulation.counts[i]});
     for (std::size_t channel = 0; channel < 3; ++channel) {
-      fits = fits && SumFits(flux_[channel][row], accumulation.flux[channel][i], adding);
+      fits = fits && SumFits(flux_[channel][row], accumulation.flux[channel][i]);
     }
     for (std::size_t column = 0; column < evidence_.size(); ++column) {
-      fits = fits && SumFits(evidence_[column][row], accumulation.evidence[column][i], adding);
+      fits = fits && SumFits(evidence_[column][row], accumulation.evidence[column][i]);
     }
     if (!fits) {
       return absl::OutOfRangeError(
@@ -165,7 +146,7 @@ Status PassSums::Check(const Accumulation& accumulation, bool adding) const {
 }
 
 Status PassSums::Add(const Accumulation& accumulation) {
-  LUCERNA_RETURN_IF_ERROR(Check(accumulation, /*adding=*/true));
+  LUCERNA_RETURN_IF_ERROR(Check(accumulation));
   for (std::size_t i = 0; i < accumulation.size(); ++i) {
     counts_[accumulation.hitpoints[i]] += accumulation.counts[i];
   }
@@ -180,25 +161,6 @@ Status PassSums::Add(const Accumulation& accumulation) {
     }
   }
   tally_ += accumulation.tally;
-  return absl::OkStatus();
-}
-
-Status PassSums::Subtract(const Accumulation& accumulation) {
-  LUCERNA_RETURN_IF_ERROR(Check(accumulation, /*adding=*/false));
-  for (std::size_t i = 0; i < accumulation.size(); ++i) {
-    counts_[accumulation.hitpoints[i]] -= accumulation.counts[i];
-  }
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    for (std::size_t i = 0; i < accumulation.size(); ++i) {
-      flux_[channel][accumulation.hitpoints[i]] -= accumulation.flux[channel][i];
-    }
-  }
-  for (std::size_t column = 0; column < evidence_.size(); ++column) {
-    for (std::size_t i = 0; i < accumulation.size(); ++i) {
-      evidence_[column][accumulation.hitpoints[i]] -= accumulation.evidence[column][i];
-    }
-  }
-  tally_ -= accumulation.tally;
   return absl::OkStatus();
 }
 

@@ -2,14 +2,15 @@
 //
 // A photon count and, per channel, the sum of kernel-weighted flux as a 64-bit fixed-point
 // integer. Every photon's contribution is rounded once (math/fixed_point.h); after that there is
-// only integer addition, so accumulations can be merged, and taken out again, in any order with
-// the same result to the last bit.
+// only integer addition, so accumulations can be merged in any order with the same result to the
+// last bit.
 //
 // Sparse: only hitpoints that a photon touched are listed.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "render/base/status.h"
@@ -30,8 +31,10 @@ struct EnergyCounters {
   std::int64_t cut_off = 0;    // still under way at the greatest depth
   std::int64_t dropped = 0;    // with photons that were not finite any more
 
-  // emitted + roulette_gain = the sum of all others, exactly.
-  [[nodiscard]] bool Balance() const;
+  // emitted + roulette_gain less the sum of all others; where that does not fit, the nearest number
+  // that does.
+  [[nodiscard]] std::int64_t Imbalance() const;
+  [[nodiscard]] bool Balance() const { return Imbalance() == 0; }
   bool operator==(const EnergyCounters&) const = default;
 };
 inline constexpr int kEnergyBits = 12;
@@ -75,14 +78,44 @@ struct BatchTally {
   // Whether `lights` keeps its promises: no light has more photons in view than it has sent, and
   // all together have not sent more than `photons`.
   [[nodiscard]] bool LightsFit() const;
-  // Takes out what += put in. Requires Fits(other, false).
-  BatchTally& operator-=(const BatchTally& other);
   // A sum that would leave its range stays at its end.
   BatchTally& operator+=(const BatchTally& other);
-  // Whether no sum leaves its range when `other` is added (or taken out).
-  [[nodiscard]] bool Fits(const BatchTally& other, bool adding = true) const;
+  // Whether no sum leaves its range when `other` is added.
+  [[nodiscard]] bool Fits(const BatchTally& other) const;
   bool operator==(const BatchTally&) const = default;
 };
+
+// One row for each counter, in the order in which an accumulation is written. Sums, their checks,
+// bytes (wire/accumulation_codec.h), messages (wire/messages.h) and reports follow from the rows.
+template <typename Owner, typename Value>
+struct Counter {
+  // Of the field of the message (proto/lucerna/v1/values.proto), and in JSON.
+  std::string_view name;
+  Value Owner::*value;
+  bool is_gain = false;  // of energy, not a loss
+};
+inline constexpr std::array kBatchCounters = {
+    Counter<BatchTally, std::uint64_t>{"photons", &BatchTally::photons},
+    Counter<BatchTally, std::uint64_t>{"rays", &BatchTally::rays},
+    Counter<BatchTally, std::uint64_t>{"deposits", &BatchTally::deposits},
+    Counter<BatchTally, std::uint64_t>{"pairs", &BatchTally::pairs},
+    Counter<BatchTally, std::uint64_t>{"dropped", &BatchTally::dropped},
+    Counter<BatchTally, std::uint64_t>{"excess", &BatchTally::excess},
+};
+inline constexpr std::array kEnergyCounters = {
+    Counter<EnergyCounters, std::int64_t>{"emitted", &EnergyCounters::emitted, true},
+    Counter<EnergyCounters, std::int64_t>{"roulette_gain", &EnergyCounters::roulette_gain, true},
+    Counter<EnergyCounters, std::int64_t>{"roulette_loss", &EnergyCounters::roulette_loss},
+    Counter<EnergyCounters, std::int64_t>{"absorbed", &EnergyCounters::absorbed},
+    Counter<EnergyCounters, std::int64_t>{"escaped", &EnergyCounters::escaped},
+    Counter<EnergyCounters, std::int64_t>{"smoothing", &EnergyCounters::smoothing},
+    Counter<EnergyCounters, std::int64_t>{"cut_off", &EnergyCounters::cut_off},
+    Counter<EnergyCounters, std::int64_t>{"dropped", &EnergyCounters::dropped},
+};
+// A counter without a row would be lost on its way.
+static_assert(sizeof(EnergyCounters) == kEnergyCounters.size() * sizeof(std::int64_t));
+static_assert(sizeof(BatchTally) == kBatchCounters.size() * sizeof(std::uint64_t) +
+                                        sizeof(EnergyCounters) + sizeof(BatchTally::lights));
 
 // So many of a batch's dropped photons are named.
 inline constexpr std::size_t kDroppedNamed = 8;
@@ -114,8 +147,6 @@ class PassSums {
   // that does not exist, or its energy does not balance; OUT_OF_RANGE when a sum would not fit in
   // 64 bits.
   [[nodiscard]] Status Add(const Accumulation& accumulation);
-  // Takes out exactly what Add put in. Errors: as Add.
-  [[nodiscard]] Status Subtract(const Accumulation& accumulation);
 
   [[nodiscard]] std::size_t size() const { return counts_.size(); }
   [[nodiscard]] const std::vector<std::uint64_t>& counts() const { return counts_; }
@@ -127,7 +158,7 @@ class PassSums {
   [[nodiscard]] const BatchTally& tally() const { return tally_; }
 
  private:
-  [[nodiscard]] Status Check(const Accumulation& accumulation, bool adding) const;
+  [[nodiscard]] Status Check(const Accumulation& accumulation) const;
 
   std::vector<std::uint64_t> counts_;
   std::array<std::vector<std::int64_t>, 3> flux_;

@@ -513,8 +513,7 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   double untrimmed = 0;
   for (const PixelError& one : pixels)
     untrimmed += static_cast<double>(one.relative_noise) + static_cast<double>(one.relative_bias);
-  const std::size_t kept =
-      count - static_cast<std::size_t>(kTrimmedShare * static_cast<double>(count));
+  const std::size_t kept = KeptPixels(count);
   std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
                            &PixelError::Size);
   pixels.resize(kept);

@@ -47,6 +47,8 @@
 #include <span>
 #include <vector>
 
+#include "render/estimate/relative_error.h"
+
 namespace lucerna {
 
 // Sums of a colour over passes, in double.
@@ -118,9 +120,6 @@ struct PixelSums {
   double square = 0;                   // squared luminance
 };
 using PixelSumsAt = std::function<PixelSums(std::size_t pixel)>;
-
-// The share of pixels, those with the largest relative errors, that errors of images leave out.
-inline constexpr double kTrimmedShare = 0.001;
 
 // Passes before the first look at the error: halves of two passes each.
 inline constexpr std::int64_t kFirstCheckpoint = 4;

@@ -7,6 +7,7 @@
 // is in none of them; how each makes up for the missing part of a disc that is cut stands with it.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -23,22 +24,10 @@ inline constexpr std::size_t kCommonColumns = 1;
 // Radius of the inner kernel over that of the whole one.
 inline constexpr float kInnerShare = 1.0F / 3;
 
-// The columns that a radius controller needs after it.
-enum class Evidence : std::uint8_t { kNone, kSectors, kCurvature, kFrequency };
-
 // Frequency photons come in one pass of so many, and that many times as densely there: the same
 // share of all photons, while the passes between carry, send and merge no columns. The first pass
 // is one of them, for evidence is worth most before the radius has shrunk.
 inline constexpr std::uint64_t kFrequencyPeriod = 4;
-
-// What the photons of `pass` are asked for.
-[[nodiscard]] constexpr Evidence EvidenceOf(RadiusControllerKind kind, std::uint64_t pass) {
-  if (UsesFrequency(kind)) {
-    return pass % kFrequencyPeriod == 0 ? Evidence::kFrequency : Evidence::kNone;
-  }
-  if (kind == RadiusControllerKind::kAppm) return Evidence::kCurvature;
-  return kind == RadiusControllerKind::kCppm ? Evidence::kSectors : Evidence::kNone;
-}
 
 // The share of the photons of a pass with Evidence::kFrequency that carry a spectrum.
 [[nodiscard]] constexpr double FrequencyShareInPass(const RenderSettings& settings) {
@@ -79,19 +68,46 @@ inline constexpr double kWeightUnit = 0x1p-16;
 // Larger values of x ask for radii below a hundredth of the present one; they are held here.
 inline constexpr float kLargestTrace = 4096;
 
+// One row for each kind of evidence, in the order of Evidence. What a photon adds to the columns:
+// EvidenceSums in worker/gather.cc.
+struct EvidenceTraits {
+  Evidence kind;
+  std::size_t columns;       // after the common ones
+  float reach = 1;           // photons are looked for within so many radii
+  std::uint64_t period = 1;  // in one pass of so many, the first among them
+};
+inline constexpr std::array kAllEvidence = {
+    EvidenceTraits{.kind = Evidence::kNone, .columns = 0},
+    EvidenceTraits{.kind = Evidence::kSectors, .columns = kSectors},
+    EvidenceTraits{
+        .kind = Evidence::kCurvature, .columns = kCurvatureColumns, .reach = kCurvatureReach},
+    EvidenceTraits{
+        .kind = Evidence::kFrequency, .columns = kFrequencyColumns, .period = kFrequencyPeriod},
+};
+[[nodiscard]] constexpr const EvidenceTraits& TraitsOf(Evidence evidence) {
+  return kAllEvidence[static_cast<std::size_t>(evidence)];
+}
+static_assert([] {
+  for (std::size_t i = 0; i < kAllEvidence.size(); ++i) {
+    if (kAllEvidence[i].kind != static_cast<Evidence>(i)) return false;
+  }
+  return true;
+}());
+
+// The evidence that the photons of `pass` give.
+[[nodiscard]] constexpr Evidence EvidenceOf(RadiusControllerKind kind, std::uint64_t pass) {
+  const Evidence evidence = EvidenceOf(kind);
+  return pass % TraitsOf(evidence).period == 0 ? evidence : Evidence::kNone;
+}
+
 // All columns of an accumulation.
 [[nodiscard]] constexpr std::size_t EvidenceColumns(Evidence evidence) {
-  switch (evidence) {
-    case Evidence::kNone:
-      return kCommonColumns;
-    case Evidence::kSectors:
-      return kCommonColumns + kSectors;
-    case Evidence::kCurvature:
-      return kCommonColumns + kCurvatureColumns;
-    case Evidence::kFrequency:
-      return kCommonColumns + kFrequencyColumns;
-  }
-  return kCommonColumns;
+  return kCommonColumns + TraitsOf(evidence).columns;
+}
+
+// How far from a hitpoint photons are looked for [radii].
+[[nodiscard]] constexpr float ReachOf(Evidence evidence) {
+  return TraitsOf(evidence).reach;
 }
 
 }  // namespace lucerna

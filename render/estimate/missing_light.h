@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "render/estimate/accumulation.h"
+#include "render/estimate/relative_error.h"
 
 namespace lucerna {
 

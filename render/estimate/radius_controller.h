@@ -41,6 +41,13 @@ struct BandwidthPrediction {
   double min_radius = 0;  // that keeps the bias within the tolerance [unit radii]
 };
 
+// The powers of the photon count with which two parts of the mean squared error of converging
+// images fall, by theory.
+struct TheorySlopes {
+  double noise = 0;
+  double squared_bias = 0;
+};
+
 class RadiusController {
  public:
   virtual ~RadiusController() = default;
@@ -56,10 +63,18 @@ class RadiusController {
       std::span<const double> /*memory*/) const {
     return std::nullopt;
   }
+  // Absent when no theory says.
+  [[nodiscard]] virtual std::optional<TheorySlopes> Slopes() const { return std::nullopt; }
 };
 
-// `initial_radius` in unit radii.
+// The controller that `settings` name. `initial_radius` in unit radii.
 [[nodiscard]] std::unique_ptr<RadiusController> MakeRadiusController(const RenderSettings& settings,
                                                                      float initial_radius);
+// One controller each, defined in its own file in estimate/controllers/; called by the above alone.
+#define LUCERNA_DECLARE(Name, name, evidence)                                                \
+  [[nodiscard]] std::unique_ptr<RadiusController> Make##Name(const RenderSettings& settings, \
+                                                             float initial_radius);
+LUCERNA_RADIUS_CONTROLLERS(LUCERNA_DECLARE)
+#undef LUCERNA_DECLARE
 
 }  // namespace lucerna

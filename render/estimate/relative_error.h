@@ -9,6 +9,7 @@
 // only leaves a floor above 0 also in an image that is mostly black.
 #pragma once
 
+#include <cstddef>
 #include <span>
 
 namespace lucerna {
@@ -24,6 +25,13 @@ inline constexpr double kBrightShare = 0.01;
 // One term of relMSE. Where there is neither a value nor a floor: 0 for no error, else infinite.
 [[nodiscard]] constexpr double RelativeSquare(double squared_error, double value, double floor) {
   return squared_error == 0 ? 0 : squared_error / (value * value + floor);
+}
+
+// The share of pixels, those with the largest relative errors, that errors of images leave out.
+inline constexpr double kTrimmedShare = 0.001;
+// How many of `pixels` are left without `share` of them.
+[[nodiscard]] constexpr std::size_t KeptPixels(std::size_t pixels, double share = kTrimmedShare) {
+  return pixels - static_cast<std::size_t>(share * static_cast<double>(pixels));
 }
 
 }  // namespace lucerna

@@ -8,17 +8,6 @@
 namespace lucerna {
 namespace {
 
-// Nodes and weights of Gauss-Legendre quadrature on [-1, 1], the half with positive nodes.
-struct Node {
-  double at, weight;
-};
-constexpr std::array<Node, 2> kFourPoints = {
-    {{0.33998104358485626, 0.65214515486254614}, {0.86113631159405258, 0.34785484513745386}}};
-constexpr std::array<Node, 4> kEightPoints = {{{0.18343464249564981, 0.36268378337836198},
-                                               {0.52553240991632899, 0.31370664587788729},
-                                               {0.79666647741362674, 0.22238103445337447},
-                                               {0.96028985649753623, 0.10122853629037626}}};
-
 double Dot(Point2 a, Point2 b) {
   return a.x * b.x + a.y * b.y;
 }
@@ -43,44 +32,12 @@ double AngleBetween(Point2 from, Point2 to) {
   return angle < -1e-14 ? angle + 2 * std::numbers::pi : std::max(angle, 0.0);
 }
 
-// The integrals of K(s t²) t^(k+1) over t from 0 to 1, for k = 0, 1, 2: what a kernel leaves along
-// a ray that ends at distance sqrt(s), over sqrt(s)^(k+2).
-struct RayIntegrals {
-  double k0, k1, k2;
-};
-
-RayIntegrals Along(KernelKind kernel, double s) {
-  switch (kernel) {
-    case KernelKind::kConstant:
-      return {1.0 / 2, 1.0 / 3, 1.0 / 4};
-    case KernelKind::kEpanechnikov:
-      return {1.0 / 2 - s / 4, 1.0 / 3 - s / 5, 1.0 / 4 - s / 6};
-    case KernelKind::kBiweight:
-      return {1.0 / 2 - s / 2 + s * s / 6, 1.0 / 3 - 2 * s / 5 + s * s / 7,
-              1.0 / 4 - s / 3 + s * s / 8};
-    case KernelKind::kGaussian: {
-      RayIntegrals sum = {0, 0, 0};
-      for (const Node& node : kEightPoints) {
-        for (const double at : {-node.at, node.at}) {
-          const double t = 0.5 + 0.5 * at;
-          const double value = 0.5 * node.weight * t * std::exp(-4.5 * s * t * t);
-          sum.k0 += value;
-          sum.k1 += value * t;
-          sum.k2 += value * t * t;
-        }
-      }
-      return sum;
-    }
-  }
-  return {};
-}
-
 // Calls visit(y, weight) for the nodes of [y0, y1].
 template <typename Visit>
-void Quadrature(std::span<const Node> nodes, double y0, double y1, const Visit& visit) {
+void Quadrature(std::span<const QuadratureNode> nodes, double y0, double y1, const Visit& visit) {
   const double middle = (y0 + y1) / 2;
   const double half = (y1 - y0) / 2;
-  for (const Node& node : nodes) {
+  for (const QuadratureNode& node : nodes) {
     visit(middle - half * node.at, half * node.weight);
     visit(middle + half * node.at, half * node.weight);
   }
@@ -217,11 +174,10 @@ void StarRegion::ForEachPart(double scale, const OnArc& on_arc, const OnChord& o
   }
 }
 
-RegionMoments StarRegion::MomentsOf(KernelKind kernel, double scale) const {
+template <typename GatherKernel>
+RegionMoments StarRegion::MomentsWith(double scale) const {
   RegionMoments sum;
-  const RayIntegrals whole = Along(kernel, 1);
-  const std::span<const Node> nodes =
-      kernel == KernelKind::kGaussian ? std::span<const Node>(kEightPoints) : kFourPoints;
+  const RayIntegrals whole = GatherKernel::Along(1);
   ForEachPart(
       scale,
       [&](Point2 from, Point2 to, double angle) {
@@ -234,8 +190,8 @@ RegionMoments StarRegion::MomentsOf(KernelKind kernel, double scale) const {
         sum.xy += whole.k2 * (to.y * to.y - from.y * from.y) / 2;
       },
       [&](double h, Point2 foot, Point2 along, double y0, double y1) {
-        Quadrature(nodes, y0, y1, [&](double y, double weight) {
-          const RayIntegrals ray = Along(kernel, h * h + y * y);
+        Quadrature(GatherKernel::kNodes, y0, y1, [&](double y, double weight) {
+          const RayIntegrals ray = GatherKernel::Along(h * h + y * y);
           const Point2 p = {foot.x * h + along.x * y, foot.y * h + along.y * y};
           weight *= h;
           sum.zeroth += weight * ray.k0;
@@ -247,6 +203,10 @@ RegionMoments StarRegion::MomentsOf(KernelKind kernel, double scale) const {
         });
       });
   return sum;
+}
+
+RegionMoments StarRegion::MomentsOf(KernelKind kernel, double scale) const {
+  return WithKernel(kernel, [&](auto k) { return MomentsWith<decltype(k)>(scale); });
 }
 
 StarRegion::PowerMoments StarRegion::PowerMomentsOf(double scale) const {

@@ -12,7 +12,7 @@
 #include <array>
 #include <cstddef>
 
-#include "render/scene/render_settings.h"
+#include "render/math/kernel.h"
 
 namespace lucerna {
 
@@ -81,6 +81,8 @@ class StarRegion {
 
   void SplitWedge(Point2 from, Point2 to, const std::size_t* active, std::size_t count, int depth);
   void AddPiece(Point2 from, Point2 to, Point2 g);
+  template <typename GatherKernel>
+  [[nodiscard]] RegionMoments MomentsWith(double scale) const;
   template <typename OnArc, typename OnChord>
   void ForEachPart(double scale, const OnArc& on_arc, const OnChord& on_chord) const;
 

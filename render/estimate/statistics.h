@@ -14,9 +14,9 @@
 #include "render/estimate/accumulation.h"
 #include "render/estimate/error_estimate.h"
 #include "render/estimate/hitpoint_block.h"
-#include "render/estimate/kernel.h"
 #include "render/estimate/radius_controller.h"
 #include "render/math/fixed_point.h"
+#include "render/math/kernel.h"
 #include "render/math/rgb.h"
 
 namespace lucerna {

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "render/base/status.h"
+#include "render/film/layers.h"
+#include "render/frequency/bandwidth.h"
 #include "render/math/color_space.h"
 
 namespace lucerna {
@@ -42,83 +43,53 @@ Image Film::MakeImage(const PixelStatistics& statistics, const PixelStatistics* 
   Image image;
   image.width = width_;
   image.height = height_;
-  const std::size_t pixels = direct_sum_.size();
-  const auto channel = [&](std::string name) -> std::size_t {
-    image.channels.push_back({std::move(name), std::vector<float>(pixels)});
-    return image.channels.size() - 1;
-  };
-  const std::size_t beauty = channel("R");
-  channel("G");
-  channel("B");
-  const std::size_t direct = channel("direct.R");
-  channel("direct.G");
-  channel("direct.B");
-  const std::size_t photons = channel("photons.R");
-  channel("photons.G");
-  channel("photons.B");
-  const std::size_t albedo = channel("albedo.R");
-  channel("albedo.G");
-  channel("albedo.B");
-  const std::size_t normal = channel("N.X");
-  channel("N.Y");
-  channel("N.Z");
-  const std::size_t depth = channel("Z");
-  const std::size_t radius = channel("radius");
-  const std::size_t photon_count = channel("photon_count");
-
-  const auto set = [&](std::size_t number, std::size_t pixel, double value) {
-    image.channels[number].pixels[pixel] = static_cast<float>(value);
-  };
   const double to_pixel = exposure_ / static_cast<double>(statistics.passes());
-  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-    RgbSum from_direct = ToRec709(direct_sum_[pixel]);
-    RgbSum from_photons = statistics.radiance_sum()[pixel];
+  const auto values_of = [&](std::size_t pixel) {
+    PixelValues values;
+    values.direct = ToRec709(direct_sum_[pixel]);
+    values.photons = statistics.radiance_sum()[pixel];
     if (caustics != nullptr) {
       for (std::size_t c = 0; c < 3; ++c)
-        from_photons[c] += caustics->radiance_sum()[pixel][c];
+        values.photons[c] += caustics->radiance_sum()[pixel][c];
     }
-    from_photons = ToRec709(from_photons);
+    values.photons = ToRec709(values.photons);
     double largest = 0;
     for (std::size_t c = 0; c < 3; ++c) {
-      from_direct[c] *= to_pixel;
-      from_photons[c] *= to_pixel;
-      largest = std::max(largest, from_direct[c] + from_photons[c]);
+      values.direct[c] *= to_pixel;
+      values.photons[c] *= to_pixel;
+      largest = std::max(largest, values.direct[c] + values.photons[c]);
     }
-    const double limit = largest > max_component_ ? max_component_ / largest : 1;
-    for (std::size_t c = 0; c < 3; ++c) {
-      set(beauty + c, pixel, (from_direct[c] + from_photons[c]) * limit);
-      set(direct + c, pixel, from_direct[c] * limit);
-      set(photons + c, pixel, from_photons[c] * limit);
-    }
+    values.limit = largest > max_component_ ? max_component_ / largest : 1;
     const Features& features = feature_sum_[pixel];
     const double per_hit = features.hits == 0 ? 0 : 1.0 / features.hits;
-    const RgbSum albedo_sum =
+    values.albedo =
         ToRec709({static_cast<double>(features.albedo.r), static_cast<double>(features.albedo.g),
                   static_cast<double>(features.albedo.b)});
     for (int c = 0; c < 3; ++c) {
       const auto offset = static_cast<std::size_t>(c);
-      set(albedo + offset, pixel, albedo_sum[offset] * per_hit);
-      set(normal + offset, pixel, static_cast<double>(features.normal[c]) * per_hit);
+      values.albedo[offset] *= per_hit;
+      values.normal[offset] = static_cast<double>(features.normal[c]) * per_hit;
     }
-    set(depth, pixel,
-        features.hits == 0 ? HUGE_VAL : static_cast<double>(features.distance) * per_hit);
-    set(radius, pixel, static_cast<double>(statistics.last_radius()[pixel]));
-    set(photon_count, pixel, static_cast<double>(statistics.photon_count()[pixel]));
-  }
-  if (controller.Predicts()) {
-    const std::size_t bandwidth = channel("bandwidth");
-    const std::size_t min_radius = channel("min_radius");
-    const std::size_t bias = channel("relative_bias");
-    for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-      const auto prediction = controller.Predict(statistics.memory(pixel));
-      const auto unit = static_cast<double>(statistics.last_unit_radius()[pixel]);
-      if (!prediction || !(unit > 0)) continue;
-      const double in_units = static_cast<double>(statistics.last_radius()[pixel]) / unit;
-      set(bandwidth, pixel, std::sqrt(prediction->trace) / unit);
-      set(min_radius, pixel, prediction->min_radius * unit);
-      set(bias, pixel, RelativeBiasBound(prediction->trace, in_units, kernel.Moments()));
-    }
-  }
+    values.distance =
+        features.hits == 0 ? HUGE_VAL : static_cast<double>(features.distance) * per_hit;
+    values.radius = static_cast<double>(statistics.last_radius()[pixel]);
+    values.photon_count = static_cast<double>(statistics.photon_count()[pixel]);
+    return values;
+  };
+  AddLayers(LayerSource::kEveryImage, values_of, image);
+  if (!controller.Predicts()) return image;
+  const auto predictions_of = [&](std::size_t pixel) {
+    PixelValues values;
+    const auto prediction = controller.Predict(statistics.memory(pixel));
+    const auto unit = static_cast<double>(statistics.last_unit_radius()[pixel]);
+    if (!prediction || !(unit > 0)) return values;
+    const double in_units = static_cast<double>(statistics.last_radius()[pixel]) / unit;
+    values.bandwidth = std::sqrt(prediction->trace) / unit;
+    values.min_radius = prediction->min_radius * unit;
+    values.relative_bias = RelativeBiasBound(prediction->trace, in_units, kernel.Moments());
+    return values;
+  };
+  AddLayers(LayerSource::kPredictions, predictions_of, image);
   return image;
 }
 

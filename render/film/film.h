@@ -24,9 +24,7 @@ class Film {
 
   // The image of all passes that `statistics` holds; every pixel has been added as often. What the
   // hitpoints of `caustics` (or nullptr) gathered is added to the photons' light.
-  // Layers of the radius controller's predictions are added when it makes any:
-  // bandwidth [1/unit], the square root of the spectral trace; min_radius [scene units]; and
-  // relative_bias, the bias expected at the last radius. 0 where there is no prediction.
+  // The layers of kEveryImage, and of kPredictions if the controller makes any (film/layers.h).
   [[nodiscard]] Image MakeImage(const PixelStatistics& statistics, const PixelStatistics* caustics,
                                 const RadiusController& controller, const Kernel& kernel) const;
 

@@ -192,10 +192,7 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
     compared.push_back({relative_error, relative_noise, i});
   }
 
-  const auto kept_without = [&](double share) {
-    return compared.size() - static_cast<std::size_t>(share * static_cast<double>(compared.size()));
-  };
-  const std::size_t kept = kept_without(options.trim_share);
+  const std::size_t kept = KeptPixels(compared.size(), options.trim_share);
   if (kept == 0) return absl::InvalidArgumentError("there is no pixel left to compare");
   // Ties go by place, so that the same images always give the same figures.
   std::ranges::sort(compared, [](const Compared& left, const Compared& right) {
@@ -210,7 +207,7 @@ StatusOr<ImageMetrics> Compare(const Image& image, const Image& reference,
     return sum / (3 * static_cast<double>(pixels));
   };
   ImageMetrics metrics;
-  const std::size_t kept_trimmed = options.trim_share > 0 ? kept : kept_without(kTrimmedShare);
+  const std::size_t kept_trimmed = options.trim_share > 0 ? kept : KeptPixels(compared.size());
   metrics.rel_mse = mean_of(&Compared::relative_error, kept);
   metrics.rel_mse_trimmed = mean_of(&Compared::relative_error, kept_trimmed);
   metrics.rel_mse_untrimmed = mean_of(&Compared::relative_error, compared.size());

@@ -105,10 +105,8 @@ StatusOr<Image> MakeReference(const Image& a, const Image& b) {
     return absl::StrCat(sum / std::max(3.0 * static_cast<double>(pixels), 1.0));
   };
   std::ranges::sort(relative);
-  const auto left_out =
-      static_cast<std::size_t>(kTrimmedShare * static_cast<double>(relative.size()));
   reference.metadata[kRelMse] = mean_of(relative.size());
-  reference.metadata["lucerna.reference.rel_mse_trimmed"] = mean_of(relative.size() - left_out);
+  reference.metadata["lucerna.reference.rel_mse_trimmed"] = mean_of(KeptPixels(relative.size()));
   reference.metadata["lucerna.reference.rmse"] = absl::StrCat(std::sqrt(absolute / count));
   return reference;
 }

@@ -18,19 +18,9 @@
 
 #include <optional>
 
+#include "render/math/kernel.h"
+
 namespace lucerna {
-
-// Of a kernel K with integral 1 on the unit disc.
-struct KernelMoments {
-  double mu2;        // second moment per axis: what it makes of curvature
-  double roughness;  // integral of K²: what it makes of noise
-};
-
-inline constexpr KernelMoments kConstantMoments = {1.0 / 4, 0.31830988618379067};      // 1/π
-inline constexpr KernelMoments kEpanechnikovMoments = {1.0 / 6, 0.42441318157838756};  // 4/(3π)
-inline constexpr KernelMoments kBiweightMoments = {1.0 / 8, 0.57295779513082321};      // 9/(5π)
-// σ = r/3, cut off at r.
-inline constexpr KernelMoments kGaussianMoments = {0.10549421475986834, 0.7322884666579611};
 
 // Returns the radius [m] at which eq. (1) reaches `relative_bias`; very large for no trace.
 [[nodiscard]] double RadiusFor(double relative_bias, double trace, const KernelMoments& kernel);

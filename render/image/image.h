@@ -18,11 +18,7 @@ struct ImageChannel {
 };
 
 // The channels of one picture plus text metadata.
-//
-// Layers that a render has (with frequency controllers also those that Film names): R G B (beauty,
-// radiance [W·m⁻²·sr⁻¹] times exposure), direct.R/G/B, photons.R/G/B (beauty = direct + photons),
-// albedo.R/G/B, N.X/Y/Z (world), Z (distance from the camera [scene units]; +inf where nothing was
-// hit), radius [scene units], photon_count.
+// The layers of a render: film/layers.h.
 struct Image {
   int width = 0, height = 0;           // [pixels]
   std::vector<ImageChannel> channels;  // sorted by name once written

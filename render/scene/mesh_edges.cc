@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <bit>
 #include <limits>
-#include <numeric>
 #include <tuple>
 
 #include "render/base/status.h"
 #include "render/math/rng.h"
+#include "render/math/union_find.h"
 
 namespace lucerna {
 namespace {
@@ -48,29 +48,17 @@ std::vector<std::uint32_t> WeldVertices(std::span<const Vec3> positions,
 
 std::vector<std::uint32_t> ConnectedSurfaces(std::span<const std::uint32_t> corners,
                                              std::size_t vertex_count) {
-  // Union by the lowest vertex, with path halving.
-  std::vector<std::uint32_t> root(vertex_count);
-  std::iota(root.begin(), root.end(), 0U);
-  const auto find = [&](std::uint32_t vertex) {
-    while (root[vertex] != vertex) {
-      root[vertex] = root[root[vertex]];
-      vertex = root[vertex];
-    }
-    return vertex;
-  };
+  UnionFind surfaces(vertex_count);
   for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
-    for (std::size_t k = 1; k < 3; ++k) {
-      const std::uint32_t a = find(corners[i]);
-      const std::uint32_t b = find(corners[i + k]);
-      root[std::max(a, b)] = std::min(a, b);
-    }
+    surfaces.Unite(corners[i], corners[i + 1]);
+    surfaces.Unite(corners[i], corners[i + 2]);
   }
   constexpr std::uint32_t kNone = 0xFFFFFFFFU;
   std::vector<std::uint32_t> number(vertex_count, kNone);
   std::vector<std::uint32_t> surface_of;
   std::uint32_t count = 0;
   for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
-    std::uint32_t& surface = number[find(corners[i])];
+    std::uint32_t& surface = number[surfaces.Find(corners[i])];
     if (surface == kNone) surface = count++;
     surface_of.push_back(surface);
   }

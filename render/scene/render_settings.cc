@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <tuple>
 #include <utility>
 
 #include "render/base/text.h"
@@ -17,21 +18,15 @@ constexpr double kMaxRadius = 1e18;
 // the coordinator (server/memory_need.h).
 constexpr std::int64_t kMaxPixels = std::int64_t{1} << 28;
 
-constexpr std::array<std::pair<std::string_view, RadiusControllerKind>, 7> kControllers = {{
-    {"ppm", RadiusControllerKind::kPpm},
-    {"pppm", RadiusControllerKind::kPppm},
-    {"appm", RadiusControllerKind::kAppm},
-    {"cppm", RadiusControllerKind::kCppm},
-    {"frequency", RadiusControllerKind::kFrequency},
-    {"frequency-consistent", RadiusControllerKind::kFrequencyConsistent},
-    {"frequency-mse", RadiusControllerKind::kFrequencyMse},
-}};
-constexpr std::array<std::pair<std::string_view, KernelKind>, 4> kKernels = {{
-    {"constant", KernelKind::kConstant},
-    {"epanechnikov", KernelKind::kEpanechnikov},
-    {"biweight", KernelKind::kBiweight},
-    {"gaussian", KernelKind::kGaussian},
-}};
+constexpr std::array kControllers = {
+#define LUCERNA_NAME(Name, name, evidence) \
+  std::pair<std::string_view, RadiusControllerKind>(name, RadiusControllerKind::k##Name),
+    LUCERNA_RADIUS_CONTROLLERS(LUCERNA_NAME)
+#undef LUCERNA_NAME
+};
+constexpr std::array kKernels = std::apply(
+    [](auto... kernels) { return std::array{std::pair(kernels.kName, kernels.kKind)...}; },
+    Kernels());
 
 template <typename Names>
 StatusOr<typename Names::value_type::second_type> ParseName(const Names& names,

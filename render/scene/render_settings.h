@@ -13,27 +13,11 @@
 #include <vector>
 
 #include "render/base/status.h"
+#include "render/math/kernel.h"
+#include "render/scene/radius_controllers.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
-
-enum class RadiusControllerKind : std::uint8_t {
-  kPpm,
-  kPppm,
-  kAppm,
-  kCppm,
-  kFrequency,
-  kFrequencyConsistent,
-  kFrequencyMse,
-};
-enum class KernelKind : std::uint8_t { kConstant, kEpanechnikov, kBiweight, kGaussian };
-
-// Whether the job traces frequency photons.
-[[nodiscard]] constexpr bool UsesFrequency(RadiusControllerKind kind) {
-  return kind == RadiusControllerKind::kFrequency ||
-         kind == RadiusControllerKind::kFrequencyConsistent ||
-         kind == RadiusControllerKind::kFrequencyMse;
-}
 
 [[nodiscard]] std::string_view NameOf(RadiusControllerKind kind);
 [[nodiscard]] std::string_view NameOf(KernelKind kind);

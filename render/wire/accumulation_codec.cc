@@ -12,7 +12,7 @@ namespace {
 
 __extension__ using Wide = __int128;
 
-constexpr std::string_view kMagic = "LAC4";
+constexpr std::string_view kMagic = "LAC5";
 // More columns of evidence than any radius controller uses.
 constexpr std::uint64_t kMostEvidence = 32;
 constexpr std::uint8_t kIndicesAsVarints = 0;
@@ -112,16 +112,12 @@ std::string EncodeAccumulation(const Accumulation& accumulation, std::size_t hit
   writer.Varint(hitpoints);
   writer.Varint(accumulation.size());
   const BatchTally& tally = accumulation.tally;
-  for (const std::uint64_t value :
-       {tally.photons, tally.rays, tally.deposits, tally.pairs, tally.dropped, tally.excess}) {
-    writer.Varint(value);
-  }
-  const EnergyCounters& energy = tally.energy;
-  for (const std::int64_t value :
-       {energy.emitted, energy.roulette_gain, energy.roulette_loss, energy.absorbed, energy.escaped,
-        energy.smoothing, energy.cut_off, energy.dropped}) {
-    writer.Varint(ZigZag(value));
-  }
+  writer.Varint(kBatchCounters.size());
+  for (const auto& counter : kBatchCounters)
+    writer.Varint(tally.*counter.value);
+  writer.Varint(kEnergyCounters.size());
+  for (const auto& counter : kEnergyCounters)
+    writer.Varint(ZigZag(tally.energy.*counter.value));
   writer.Varint(tally.lights.size());
   for (const LightTally& light : tally.lights) {
     writer.Varint(light.sent);
@@ -177,17 +173,13 @@ StatusOr<Accumulation> DecodeAccumulation(std::string_view bytes, std::size_t hi
 
   Accumulation accumulation;
   BatchTally& tally = accumulation.tally;
-  for (std::uint64_t* value : {&tally.photons, &tally.rays, &tally.deposits, &tally.pairs,
-                               &tally.dropped, &tally.excess}) {
-    *value = reader.Varint();
-  }
-  EnergyCounters& energy = tally.energy;
-  for (std::int64_t* value :
-       {&energy.emitted, &energy.roulette_gain, &energy.roulette_loss, &energy.absorbed,
-        &energy.escaped, &energy.smoothing, &energy.cut_off, &energy.dropped}) {
-    *value = UnZigZag(reader.Varint());
-  }
-  if (!energy.Balance()) return Malformed("its energy does not balance");
+  if (reader.Varint() != kBatchCounters.size()) return Malformed("it has other counters");
+  for (const auto& counter : kBatchCounters)
+    tally.*counter.value = reader.Varint();
+  if (reader.Varint() != kEnergyCounters.size()) return Malformed("it has other counters");
+  for (const auto& counter : kEnergyCounters)
+    tally.energy.*counter.value = UnZigZag(reader.Varint());
+  if (!tally.energy.Balance()) return Malformed("its energy does not balance");
   const std::uint64_t lights = reader.Varint();
   if (lights > kMaxLightTallies) return Malformed("it counts the photons of too many lights");
   tally.lights.resize(lights);

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 
+#include <google/protobuf/descriptor.h>
 #include <google/protobuf/unknown_field_set.h>
 
 #include "render/base/text.h"
@@ -54,6 +56,39 @@ Status ReadSettings(const SettingList& list, RenderOverrides& overrides) {
     LUCERNA_RETURN_IF_ERROR(ParseSetting(*setting, item.value(), overrides));
   }
   return absl::OkStatus();
+}
+
+// The fields of a message that have the names of counters (estimate/accumulation.h).
+template <typename Message>
+const google::protobuf::FieldDescriptor* FieldOf(const Message& message, std::string_view counter) {
+  const auto* field = message.GetDescriptor()->FindFieldByName(std::string(counter));
+  LUCERNA_CHECK(field != nullptr);
+  return field;
+}
+
+template <typename Counters, typename Owner, typename Message>
+void PutCounters(const Counters& counters, const Owner& owner, Message& message) {
+  for (const auto& counter : counters) {
+    const auto* field = FieldOf(message, counter.name);
+    const auto value = owner.*counter.value;
+    if constexpr (std::is_signed_v<decltype(value)>) {
+      message.GetReflection()->SetInt64(&message, field, value);
+    } else {
+      message.GetReflection()->SetUInt64(&message, field, value);
+    }
+  }
+}
+
+template <typename Counters, typename Message, typename Owner>
+void TakeCounters(const Counters& counters, const Message& message, Owner& owner) {
+  for (const auto& counter : counters) {
+    const auto* field = FieldOf(message, counter.name);
+    if constexpr (std::is_signed_v<std::remove_reference_t<decltype(owner.*counter.value)>>) {
+      owner.*counter.value = message.GetReflection()->GetInt64(message, field);
+    } else {
+      owner.*counter.value = message.GetReflection()->GetUInt64(message, field);
+    }
+  }
 }
 
 }  // namespace
@@ -200,21 +235,8 @@ StatusOr<SceneNeeds> FromProto(const v1::SceneNeeds& message) {
 
 v1::Tally ToProto(const BatchTally& tally) {
   v1::Tally message;
-  message.set_photons(tally.photons);
-  message.set_rays(tally.rays);
-  message.set_deposits(tally.deposits);
-  message.set_pairs(tally.pairs);
-  message.set_dropped(tally.dropped);
-  message.set_excess(tally.excess);
-  v1::Energy& energy = *message.mutable_energy();
-  energy.set_emitted(tally.energy.emitted);
-  energy.set_roulette_gain(tally.energy.roulette_gain);
-  energy.set_roulette_loss(tally.energy.roulette_loss);
-  energy.set_absorbed(tally.energy.absorbed);
-  energy.set_escaped(tally.energy.escaped);
-  energy.set_smoothing(tally.energy.smoothing);
-  energy.set_cut_off(tally.energy.cut_off);
-  energy.set_dropped(tally.energy.dropped);
+  PutCounters(kBatchCounters, tally, message);
+  PutCounters(kEnergyCounters, tally.energy, *message.mutable_energy());
   for (const LightTally& light : tally.lights) {
     v1::LightTally& item = *message.add_lights();
     item.set_sent(light.sent);
@@ -224,28 +246,21 @@ v1::Tally ToProto(const BatchTally& tally) {
   return message;
 }
 
+EnergyCounters FromProto(const v1::Energy& message) {
+  EnergyCounters energy;
+  TakeCounters(kEnergyCounters, message, energy);
+  return energy;
+}
+
 BatchTally FromProto(const v1::Tally& message) {
-  const v1::Energy& energy = message.energy();
-  std::vector<LightTally> lights;
+  BatchTally tally;
+  TakeCounters(kBatchCounters, message, tally);
+  tally.energy = FromProto(message.energy());
   for (const v1::LightTally& light : message.lights()) {
-    if (lights.size() == kMaxLightTallies) break;
-    lights.push_back({light.sent(), {light.in_view_caustic(), light.in_view_other()}});
+    if (tally.lights.size() == kMaxLightTallies) break;
+    tally.lights.push_back({light.sent(), {light.in_view_caustic(), light.in_view_other()}});
   }
-  return {.photons = message.photons(),
-          .rays = message.rays(),
-          .deposits = message.deposits(),
-          .pairs = message.pairs(),
-          .dropped = message.dropped(),
-          .excess = message.excess(),
-          .energy = {.emitted = energy.emitted(),
-                     .roulette_gain = energy.roulette_gain(),
-                     .roulette_loss = energy.roulette_loss(),
-                     .absorbed = energy.absorbed(),
-                     .escaped = energy.escaped(),
-                     .smoothing = energy.smoothing(),
-                     .cut_off = energy.cut_off(),
-                     .dropped = energy.dropped()},
-          .lights = std::move(lights)};
+  return tally;
 }
 
 google::protobuf::Duration ToProto(Duration duration) {

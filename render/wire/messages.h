@@ -38,6 +38,7 @@ namespace lucerna {
 
 [[nodiscard]] v1::Tally ToProto(const BatchTally& tally);
 [[nodiscard]] BatchTally FromProto(const v1::Tally& message);
+[[nodiscard]] EnergyCounters FromProto(const v1::Energy& message);
 
 [[nodiscard]] google::protobuf::Duration ToProto(Duration duration);
 // Negative durations and such as do not fit become 0 and the longest there is.

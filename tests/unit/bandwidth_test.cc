@@ -18,16 +18,16 @@ namespace {
 constexpr KernelMoments kCone = {3.0 / 20, 3 / (2 * std::numbers::pi)};
 
 TEST(RadiusForTest, MeetsItsVectors) {  // U16
-  EXPECT_NEAR(RadiusFor(0.02, 6, kConstantMoments), 0.163299316, 1e-7);
-  EXPECT_NEAR(RadiusFor(0.02, 6, kEpanechnikovMoments), 0.2, 1e-7);
+  EXPECT_NEAR(RadiusFor(0.02, 6, ConstantKernel::kMoments), 0.163299316, 1e-7);
+  EXPECT_NEAR(RadiusFor(0.02, 6, EpanechnikovKernel::kMoments), 0.2, 1e-7);
   EXPECT_NEAR(RadiusFor(0.02, 6, kCone), 0.210818511, 1e-7);
-  EXPECT_NEAR(RadiusFor(0.02, 6, kBiweightMoments), 0.230940108, 1e-7);
+  EXPECT_NEAR(RadiusFor(0.02, 6, BiweightKernel::kMoments), 0.230940108, 1e-7);
 }
 
 TEST(RadiusForTest, IsTheInverseOfTraceForAndMeetsTheBound) {
-  const double trace = TraceFor(0.03, 0.2, kGaussianMoments);
-  EXPECT_NEAR(RadiusFor(0.03, trace, kGaussianMoments), 0.2, 1e-12);
-  EXPECT_NEAR(RelativeBiasBound(trace, 0.2, kGaussianMoments), 0.03, 1e-12);
+  const double trace = TraceFor(0.03, 0.2, GaussianKernel::kMoments);
+  EXPECT_NEAR(RadiusFor(0.03, trace, GaussianKernel::kMoments), 0.2, 1e-12);
+  EXPECT_NEAR(RelativeBiasBound(trace, 0.2, GaussianKernel::kMoments), 0.03, 1e-12);
 }
 
 // The moments, by the midpoint rule over the unit disc: error below 1e-6 for smooth kernels.
@@ -37,10 +37,10 @@ TEST(KernelMomentsTest, AreThoseOfTheKernels) {
     std::function<double(double)> shape;  // of t², not normalised
   };
   const std::array cases = {
-      Case{kConstantMoments, [](double) { return 1.0; }},
-      Case{kEpanechnikovMoments, [](double t2) { return 1 - t2; }},
-      Case{kBiweightMoments, [](double t2) { return (1 - t2) * (1 - t2); }},
-      Case{kGaussianMoments, [](double t2) { return std::exp(-4.5 * t2); }},
+      Case{ConstantKernel::kMoments, [](double) { return 1.0; }},
+      Case{EpanechnikovKernel::kMoments, [](double t2) { return 1 - t2; }},
+      Case{BiweightKernel::kMoments, [](double t2) { return (1 - t2) * (1 - t2); }},
+      Case{GaussianKernel::kMoments, [](double t2) { return std::exp(-4.5 * t2); }},
   };
   for (const Case& one : cases) {
     double sum = 0;
@@ -66,7 +66,7 @@ TEST(KernelMomentsTest, AreThoseOfTheKernels) {
 TEST(RadiusForTest, IsNeverTooLargeAtAPeakAndHardlyTooSmall) {
   for (const double bias : {0.01, 0.02, 0.05}) {
     const double s = 7;
-    const double r = RadiusFor(bias, 2 * s, kConstantMoments);
+    const double r = RadiusFor(bias, 2 * s, ConstantKernel::kMoments);
     const double y = s * r * r / 2;
     const double exact = 1 - (1 - std::exp(-y)) / y;
     EXPECT_LE(exact, bias);
@@ -86,46 +86,48 @@ const RadiusRange kWide = {1e-6, 1e6};
 
 TEST(PredictTraceTest, IsTheWeightedMeanPlusOneStandardError) {
   const FrequencySums sums = Sums({{1, 2}, {1, 2}, {1, 2}, {1, 2}, {1, 6}, {1, 6}, {1, 6}, {1, 6}});
-  const auto prediction = PredictTrace(sums, kWide, 0.02, kConstantMoments);
+  const auto prediction = PredictTrace(sums, kWide, 0.02, ConstantKernel::kMoments);
   ASSERT_TRUE(prediction);
   EXPECT_NEAR(prediction->effective_photons, 8, 1e-12);
   EXPECT_NEAR(prediction->trace, 4 + std::sqrt(4.0 / 8), 1e-12);
   // Flux is what counts, not the number of photons.
   const FrequencySums uneven =
       Sums({{3, 2}, {3, 2}, {3, 2}, {3, 2}, {1, 6}, {1, 6}, {1, 6}, {1, 6}});
-  EXPECT_NEAR(PredictTrace(uneven, kWide, 0.02, kConstantMoments)->trace,
+  EXPECT_NEAR(PredictTrace(uneven, kWide, 0.02, ConstantKernel::kMoments)->trace,
               3 + std::sqrt(3.0 / (256.0 / 40)), 1e-12);
 }
 
 // Equal traces, of which rounding makes a variance below zero.
 TEST(PredictTraceTest, TakesANegativeVarianceForNone) {
   const double below = 8 * 9 * (1 - 1e-15);
-  EXPECT_NEAR(PredictTrace({8, 8, 24, below, 8}, kWide, 0.02, kConstantMoments)->trace, 3, 1e-12);
+  EXPECT_NEAR(PredictTrace({8, 8, 24, below, 8}, kWide, 0.02, ConstantKernel::kMoments)->trace, 3,
+              1e-12);
 }
 
 TEST(PredictTraceTest, SaysNothingFromTooFewPhotons) {
   FrequencySums sums = Sums({{1, 2}, {1, 2}, {1, 2}, {1, 2}, {1, 2}, {1, 2}, {1, 2}});
-  EXPECT_FALSE(PredictTrace({}, kWide, 0.02, kConstantMoments));
-  EXPECT_FALSE(PredictTrace(sums, kWide, 0.02, kConstantMoments));
+  EXPECT_FALSE(PredictTrace({}, kWide, 0.02, ConstantKernel::kMoments));
+  EXPECT_FALSE(PredictTrace(sums, kWide, 0.02, ConstantKernel::kMoments));
   sums = sums + Sums({{1, 2}});
-  EXPECT_TRUE(PredictTrace(sums, kWide, 0.02, kConstantMoments));
+  EXPECT_TRUE(PredictTrace(sums, kWide, 0.02, ConstantKernel::kMoments));
   // Eight photons, one of which carries all the flux.
-  EXPECT_FALSE(PredictTrace(sums + Sums({{1000, 2}}), kWide, 0.02, kConstantMoments));
-  EXPECT_FALSE(PredictTrace({0, 0, 0, 0, 100}, kWide, 0.02, kConstantMoments));
+  EXPECT_FALSE(PredictTrace(sums + Sums({{1000, 2}}), kWide, 0.02, ConstantKernel::kMoments));
+  EXPECT_FALSE(PredictTrace({0, 0, 0, 0, 100}, kWide, 0.02, ConstantKernel::kMoments));
 }
 
 TEST(PredictTraceTest, StaysInTheRangeOfRadii) {
   const RadiusRange range = {0.01, 0.5};
   const FrequencySums even = Sums({{1, 0}, {1, 0}, {1, 0}, {1, 0}, {1, 0}, {1, 0}, {1, 0}, {1, 0}});
-  const double widest = PredictTrace(even, range, 0.02, kConstantMoments)->trace;
-  EXPECT_NEAR(RadiusFor(0.02, widest, kConstantMoments), 0.5, 1e-12);
+  const double widest = PredictTrace(even, range, 0.02, ConstantKernel::kMoments)->trace;
+  EXPECT_NEAR(RadiusFor(0.02, widest, ConstantKernel::kMoments), 0.5, 1e-12);
   FrequencySums sharp = even;
   sharp.weighted_trace = 1e20;
   sharp.weighted_trace2 = 1e40;
-  const double finest = PredictTrace(sharp, range, 0.02, kConstantMoments)->trace;
-  EXPECT_NEAR(RadiusFor(0.02, finest, kConstantMoments), 0.01, 1e-12);
+  const double finest = PredictTrace(sharp, range, 0.02, ConstantKernel::kMoments)->trace;
+  EXPECT_NEAR(RadiusFor(0.02, finest, ConstantKernel::kMoments), 0.01, 1e-12);
   sharp.weighted_trace = sharp.weighted_trace2 = std::numeric_limits<double>::max();
-  EXPECT_NEAR(PredictTrace(sharp, range, 0.02, kConstantMoments)->trace, finest, finest * 1e-12);
+  EXPECT_NEAR(PredictTrace(sharp, range, 0.02, ConstantKernel::kMoments)->trace, finest,
+              finest * 1e-12);
 }
 
 TEST(PredictTraceTest, FadesWithTheRadius) {
@@ -206,10 +208,10 @@ TEST(LeastErrorRadiusTest, MinimisesNoisePlusSquaredBias) {
   for (const double density : {10.0, 1e6}) {
     for (const double trace : {1e-3, 5.0, 1e7}) {
       const auto error = [&](double r) {
-        const double bias = RelativeBiasBound(trace, r, kBiweightMoments);
-        return kBiweightMoments.roughness / (density * r * r) + bias * bias;
+        const double bias = RelativeBiasBound(trace, r, BiweightKernel::kMoments);
+        return BiweightKernel::kMoments.roughness / (density * r * r) + bias * bias;
       };
-      const double best = LeastErrorRadius(density, trace, kBiweightMoments);
+      const double best = LeastErrorRadius(density, trace, BiweightKernel::kMoments);
       EXPECT_LT(error(best), error(best * 1.01));
       EXPECT_LT(error(best), error(best * 0.99));
       // To first order nothing changes there.
@@ -230,12 +232,13 @@ TEST(BandwidthTest, IsFiniteForAnyFiniteNumbers) {
   const std::array odd = {0.0, 1e-308, -1.0, 1.0, 0.02, 1e160, kMax, -kMax};
   for (const double a : odd) {
     for (const double b : odd) {
-      EXPECT_TRUE(std::isfinite(RadiusFor(a, b, kConstantMoments)));
-      EXPECT_TRUE(std::isfinite(TraceFor(a, b, kConstantMoments)));
-      EXPECT_TRUE(std::isfinite(RelativeBiasBound(a, b, kConstantMoments)));
-      EXPECT_TRUE(std::isfinite(LeastErrorRadius(a, b, kConstantMoments)));
+      EXPECT_TRUE(std::isfinite(RadiusFor(a, b, ConstantKernel::kMoments)));
+      EXPECT_TRUE(std::isfinite(TraceFor(a, b, ConstantKernel::kMoments)));
+      EXPECT_TRUE(std::isfinite(RelativeBiasBound(a, b, ConstantKernel::kMoments)));
+      EXPECT_TRUE(std::isfinite(LeastErrorRadius(a, b, ConstantKernel::kMoments)));
       for (const double c : odd) {
-        const auto prediction = PredictTrace({1, 0.01, a, b, 100}, {c, a}, 0.02, kConstantMoments);
+        const auto prediction =
+            PredictTrace({1, 0.01, a, b, 100}, {c, a}, 0.02, ConstantKernel::kMoments);
         ASSERT_TRUE(prediction);
         EXPECT_TRUE(std::isfinite(prediction->trace));
       }

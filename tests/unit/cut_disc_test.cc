@@ -11,7 +11,7 @@
 #include "gtest/gtest.h"
 
 #include "render/estimate/evidence.h"
-#include "render/estimate/kernel.h"
+#include "render/math/kernel.h"
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "tests/support/test_scenes.h"

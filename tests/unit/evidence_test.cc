@@ -144,9 +144,6 @@ TEST(EvidenceTest, IsMergedCheckedAndCarriedOnTheWire) {
   ASSERT_TRUE(sums.Add(sum).ok());
   EXPECT_EQ(sums.evidence()[kCommonColumns + kFrequencyTrace][0],
             2 * sum.evidence[kCommonColumns + kFrequencyTrace][0]);
-  ASSERT_TRUE(sums.Subtract(sum).ok());
-  EXPECT_EQ(sums.evidence()[kCommonColumns + kFrequencyTrace][0],
-            sum.evidence[kCommonColumns + kFrequencyTrace][0]);
   // A worker that thinks of another controller is refused.
   EXPECT_FALSE(sums.Add(cloud.Sum(Evidence::kNone)).ok());
   EXPECT_FALSE(PassSums(1, kCommonColumns).Add(sum).ok());

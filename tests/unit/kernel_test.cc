@@ -1,5 +1,5 @@
 // A kernel is a density: over the disc of its radius it integrates to one.
-#include "render/estimate/kernel.h"
+#include "render/math/kernel.h"
 
 #include <numbers>
 

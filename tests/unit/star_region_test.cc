@@ -8,7 +8,7 @@
 
 #include "gtest/gtest.h"
 
-#include "render/estimate/kernel.h"
+#include "render/math/kernel.h"
 #include "render/math/rng.h"
 
 namespace lucerna {

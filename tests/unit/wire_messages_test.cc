@@ -246,6 +246,18 @@ TEST(ChannelTest, AnAddressHasAHostAndAPortThatExists) {
   }
 }
 
+TEST(WireMessagesTest, CarriesEveryCounterInAFieldOfItsName) {
+  BatchTally tally;
+  std::uint64_t next = 1;
+  for (const auto& counter : kBatchCounters)
+    tally.*counter.value = next++;
+  for (const auto& counter : kEnergyCounters)
+    tally.energy.*counter.value = -static_cast<std::int64_t>(next++);
+  EXPECT_EQ(FromProto(ToProto(tally)), tally);
+  EXPECT_EQ(ToProto(tally).excess(), tally.excess);
+  EXPECT_EQ(ToProto(tally).energy().cut_off(), tally.energy.cut_off);
+}
+
 TEST(WireMessagesTest, ATallyKeepsItsLights) {
   BatchTally tally;
   tally.photons = 10;
