@@ -65,18 +65,6 @@ std::string NameOfShape(const SurfacePoint& surface, const Intersector& intersec
                       surface.primitive);
 }
 
-const char* NameOf(Material::Kind kind) {
-  switch (kind) {
-    case Material::Kind::kDiffuse:
-      return "diffuse";
-    case Material::Kind::kConductor:
-      return "conductor";
-    case Material::Kind::kDielectric:
-      return "dielectric";
-  }
-  return "";
-}
-
 v1::PhotonEnd EndToProto(PhotonEnd end) {
   switch (end) {
     case PhotonEnd::kNotEmitted:
@@ -104,8 +92,9 @@ v1::DepositFate FateOf(const PhotonLanding& landing) {
 }
 
 std::string ChosenIn(const PhotonLanding& landing) {
-  if (landing.material_kind == Material::Kind::kDiffuse) return "diffuse reflection";
-  return absl::StrCat(landing.is_smooth ? "smooth " : "rough ",
+  return absl::StrCat(!landing.has_narrow_lobes ? "diffuse "
+                      : landing.is_smooth       ? "smooth "
+                                                : "rough ",
                       landing.transmits ? "transmission" : "reflection");
 }
 
@@ -113,8 +102,8 @@ v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing,
                                        const Intersector& intersector) {
   v1::PhotonPath::Landing message;
   message.set_shape(NameOfShape(landing.surface, intersector));
-  message.set_material(
-      absl::StrCat(landing.surface.material, " (", NameOf(landing.material_kind), ")"));
+  message.set_material(absl::StrCat(landing.surface.material, " (",
+                                    std::string(NameOf(landing.material_kind)), ")"));
   message.set_distance(static_cast<double>(landing.distance));
   *message.mutable_position() = TripleOf(landing.surface.position);
   *message.mutable_geometric_normal() = TripleOf(landing.surface.geometric_normal);

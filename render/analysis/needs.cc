@@ -100,8 +100,7 @@ bool IsSmoothed(const TriangleMesh& mesh) {
 // Curved surfaces that reflect or refract, however roughly.
 bool HasCurvedMirrors(const Scene& scene) {
   const auto scatters = [&](const ShapeTraits& traits) {
-    return scene.materials[static_cast<std::size_t>(traits.material)].kind !=
-           Material::Kind::kDiffuse;
+    return HasNarrowLobes(scene.materials[static_cast<std::size_t>(traits.material)]);
   };
   return std::ranges::any_of(scene.spheres,
                              [&](const Sphere& sphere) { return scatters(sphere.traits); }) ||
@@ -243,13 +242,12 @@ class NeedsFinder {
   }
 
   void FindSurfaces() {
-    gathers_ = First([](const Material& m) { return Gathers(m); });
-    specular_ = First([](const Material& m) { return !Gathers(m) && !IsBlackDiffuse(m); });
+    gathers_ = First(Gathers);
+    specular_ = First([](const Material& m) { return !Gathers(m) && !ScattersNothing(m); });
     Set(Part::kSpecular, specular_ != nullptr,
         specular_ != nullptr ? Concat("paths go on at ", Quoted(*specular_))
                              : std::string("every surface gathers photons or is black"));
-    glossy_ =
-        First([](const Material& m) { return Gathers(m) && m.kind != Material::Kind::kDiffuse; });
+    glossy_ = First([](const Material& m) { return Gathers(m) && !IsDiffuse(m); });
     Set(Part::kGlossy, glossy_ != nullptr,
         glossy_ != nullptr
             ? Concat("photons are gathered on ", Quoted(*glossy_), ", which is not diffuse")

@@ -109,7 +109,7 @@ std::vector<NumberedLight> LightsOf(const Scene& scene) {
 }
 
 bool IsOpaque(const Material& material) {
-  return material.kind != Material::Kind::kDielectric;
+  return !Transmits(material);
 }
 
 // The shapes of the materials that some predicate accepts, as rays meet them.

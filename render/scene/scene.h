@@ -18,7 +18,6 @@
 //       pixels and scales of textures are >= 0.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -30,73 +29,10 @@
 #include "render/math/rgb.h"
 #include "render/math/transform.h"
 #include "render/math/vector.h"
+#include "render/scene/material.h"
 #include "render/scene/texture.h"
 
 namespace lucerna {
-
-// How a surface scatters. Only the members that the kind names are meaningful.
-struct Material {
-  enum class Kind : std::uint8_t { kDiffuse, kConductor, kDielectric };
-
-  Kind kind = Kind::kDiffuse;
-  Rgb reflectance = {0.5F, 0.5F, 0.5F};  // diffuse
-  Rgb eta = {1, 1, 1};                   // conductor: index of refraction per channel
-  Rgb k = {0, 0, 0};                     // conductor: absorption per channel
-  float ior = 1.5F;                      // dielectric: inside over outside
-  float alpha_u = 0;                     // conductor, dielectric: GGX widths; 0 and 0 = smooth
-  float alpha_v = 0;
-  // In place of the reflectance of a diffuse surface, and of a conductor's eta and k.
-  std::int32_t texture = kNoTexture;
-  std::string name;  // for messages and the plan
-
-  bool operator==(const Material&) const = default;
-};
-
-// A conductor given by its reflectance at right angles has eta = 1 and this k, capped as in
-// pbrt-v4.
-[[nodiscard]] inline float AbsorptionFor(float reflectance) {
-  const float capped = std::min(reflectance, 0.9999F);
-  return 2 * std::sqrt(capped) / std::sqrt(1 - capped);
-}
-
-// Smooth: all scattering goes into single directions.
-[[nodiscard]] inline bool IsSmooth(const Material& material) {
-  return material.kind != Material::Kind::kDiffuse && material.alpha_u == 0 &&
-         material.alpha_v == 0;
-}
-
-// Black: nothing is scattered.
-[[nodiscard]] inline bool IsBlackDiffuse(const Material& material) {
-  return material.kind == Material::Kind::kDiffuse && material.texture == kNoTexture &&
-         IsBlack(material.reflectance);
-}
-
-// Where direct light may be sampled: light is scattered, and not into single directions.
-[[nodiscard]] inline bool ScattersBroadly(const Material& material) {
-  return !IsSmooth(material) && !IsBlackDiffuse(material);
-}
-
-// Rougher than this, photons are gathered; smoother, eye paths go on. A narrow lobe accepts few of
-// the photons around it, while a direction drawn from it is a good guess.
-inline constexpr float kGatherAlpha = 0.2F;
-// The same for dielectrics: refraction bends less than reflection, so their lobes are narrower, and
-// what is seen through frosted glass has passed two of them.
-inline constexpr float kGatherAlphaDielectric = 0.5F;
-
-// Where eye paths stop and photons are kept. Black surfaces need none. What a metal with a texture
-// reflects depends on the place, which hitpoints do not tell the workers: there, paths go on.
-[[nodiscard]] inline bool Gathers(const Material& material) {
-  if (material.kind == Material::Kind::kDiffuse) return !IsBlack(material.reflectance);
-  if (material.texture != kNoTexture) return false;
-  return std::max(material.alpha_u, material.alpha_v) >=
-         (material.kind == Material::Kind::kConductor ? kGatherAlpha : kGatherAlphaDielectric);
-}
-
-// Where eye paths go on although a range of directions is scattered: what eye paths do not find of
-// the light there, caustic photons bring (transport/caustic_weight.h).
-[[nodiscard]] inline bool GathersCaustics(const Material& material) {
-  return ScattersBroadly(material) && !Gathers(material);
-}
 
 // Emission of the surface of a shape.
 struct AreaLight {

@@ -6,7 +6,7 @@ namespace lucerna {
 
 Scene InWorkingSpace(Scene scene) {
   for (Material& material : scene.materials)
-    material.reflectance = ToWorking(material.reflectance);
+    material.ForEachColor([](Rgb& color) { color = ToWorking(color); });
   for (AreaLight& light : scene.area_lights)
     light.radiance = ToWorking(light.radiance);
   for (PointLight& light : scene.point_lights)
