@@ -112,34 +112,14 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
                          direction, limits_),
               false};
     }
-    case EmitterKind::kPoint:
-      return {PointSource(limits_), false};
-    case EmitterKind::kSpot: {
-      const SpotLight& spot = scene_.spot_lights[emitter.primitive];
-      const double width = std::acos(static_cast<double>(spot.cos_total_width)) -
-                           std::acos(static_cast<double>(spot.cos_falloff_start));
-      const double relative = static_cast<double>(Luminance(emission.flux)) /
-                              std::max(1e-30, static_cast<double>(Luminance(emitter.power)));
-      // Inside the cone the light is even, but ends at the rim: as an edge seen from the light, and
-      // no harder than the falloff is.
-      double curvature = SmoothFalloffCurvature(width);
-      if (Dot(direction, spot.direction) >= spot.cos_falloff_start) {
-        const double to_rim =
-            std::acos(static_cast<double>(spot.cos_total_width)) -
-            std::acos(std::min(1.0, static_cast<double>(Dot(direction, spot.direction))));
-        curvature = std::min(curvature, edge_strength_ / std::max(to_rim * to_rim, 1e-12));
-      }
-      return {SpotSource(std::min(relative, 1.0), curvature, limits_), false};
-    }
-    case EmitterKind::kDistant:
-      return {DirectionalSource(limits_), false};
     case EmitterKind::kInfinite:
       // Even light from everywhere: no structure in place or direction.
       return {EnvironmentSource(0, 1, 1, 1, limits_), false};
     case EmitterKind::kEnvironment:
       return {sky_details_[emitter.primitive].Source(-direction, limits_), false};
+    default:
+      return {lights_.DeltaSource(emission, edge_strength_, limits_).value_or(Spectrum()), false};
   }
-  return {};
 }
 
 void SpectrumTracer::Fly(Carried& carried, const Ray& ray, float distance, Shadows shadows) const {

@@ -29,32 +29,11 @@ v1::Triple TripleOf(Rgb c) {
 }
 
 std::string NameOf(const Emitter& light) {
-  const char* kind = "light";
-  switch (light.kind) {
-    case EmitterKind::kTriangle:
-      return absl::StrCat("triangle ", light.primitive, " of mesh ", light.geometry);
-    case EmitterKind::kSphere:
-      kind = "sphere";
-      break;
-    case EmitterKind::kDisk:
-      kind = "disk";
-      break;
-    case EmitterKind::kPoint:
-      kind = "point light";
-      break;
-    case EmitterKind::kSpot:
-      kind = "spot light";
-      break;
-    case EmitterKind::kDistant:
-      kind = "distant light";
-      break;
-    case EmitterKind::kInfinite:
-      return "the even sky";
-    case EmitterKind::kEnvironment:
-      kind = "environment map";
-      break;
+  if (light.kind == EmitterKind::kTriangle) {
+    return absl::StrCat("triangle ", light.primitive, " of mesh ", light.geometry);
   }
-  return absl::StrCat(kind, " ", light.primitive);
+  if (light.kind == EmitterKind::kInfinite) return "the even sky";
+  return absl::StrCat(std::string(NameOf(light.kind)), " ", light.primitive);
 }
 
 std::string NameOfShape(const SurfacePoint& surface, const Intersector& intersector) {

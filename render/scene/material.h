@@ -1,4 +1,11 @@
 // How a surface scatters, as numbers, and the properties that follow from them.
+//
+// A kind of material is one row of LUCERNA_MATERIALS, with its numbers below where there are none
+// for them yet, and three files: its properties in render/scene/material_NAME.cc, how pbrt files
+// give it in render/formats/pbrt/material_NAME.cc, and its BSDF in render/transport/bsdf_NAME.cc
+// (docs/adding.md). Functions that differ between kinds are declared from the rows, here, in
+// formats/pbrt/material_readers.h and in transport/bsdf_kinds.h; the rest of the program asks
+// MaterialProperties.
 #pragma once
 
 #include <algorithm>
@@ -9,8 +16,14 @@
 #include <vector>
 
 #include "render/math/rgb.h"
-#include "render/scene/material_list.h"
 #include "render/scene/texture.h"
+
+// The kinds of material, in the order of Material::Kind.
+// ROW(Name, name): Material::Kind::kName, and its name in messages and in pbrt files.
+#define LUCERNA_MATERIALS(ROW) \
+  ROW(Diffuse, "diffuse")      \
+  ROW(Conductor, "conductor")  \
+  ROW(Dielectric, "dielectric")
 
 namespace lucerna {
 

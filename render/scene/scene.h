@@ -29,6 +29,7 @@
 #include "render/math/rgb.h"
 #include "render/math/transform.h"
 #include "render/math/vector.h"
+#include "render/scene/light_list.h"
 #include "render/scene/material.h"
 #include "render/scene/texture.h"
 
@@ -87,26 +88,6 @@ struct Disk {
   float inner_radius = 0;
   ShapeTraits traits;
   ShapeAxes axes = {};
-};
-
-struct PointLight {
-  Vec3 position;
-  Rgb intensity;  // [W·sr⁻¹]
-};
-
-// Intensity falls from 1 inside cos_falloff_start to 0 at cos_total_width as smoothstep of the
-// cosine, as pbrt has it.
-struct SpotLight {
-  Vec3 position;
-  Vec3 direction;  // unit, the way the light looks
-  Rgb intensity;   // [W·sr⁻¹] on the axis
-  float cos_falloff_start = 1;
-  float cos_total_width = 1;
-};
-
-struct DistantLight {
-  Vec3 direction;  // unit, the way the light travels
-  Rgb irradiance;  // [W·m⁻²] on a plane facing it
 };
 
 // Light from everywhere that no shape covers. Several of them add up.
@@ -180,9 +161,9 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<AreaLight> area_lights;
-  std::vector<PointLight> point_lights;
-  std::vector<SpotLight> spot_lights;
-  std::vector<DistantLight> distant_lights;
+#define LUCERNA_MEMBER(Name, list, name) std::vector<Name##Light> list;
+  LUCERNA_DELTA_LIGHTS(LUCERNA_MEMBER)  // point_lights and so on (scene/light_list.h)
+#undef LUCERNA_MEMBER
   std::vector<InfiniteLight> infinite_lights;
   Camera camera;
   FilmSettings film;
@@ -196,5 +177,19 @@ struct Scene {
     return count;
   }
 };
+
+// Calls `visit` for the list of each kind of delta light, in their order.
+template <typename SceneType, typename Visit>
+void ForEachDeltaList(SceneType& scene, const Visit& visit) {
+#define LUCERNA_VISIT(Name, list, name) visit(scene.list);
+  LUCERNA_DELTA_LIGHTS(LUCERNA_VISIT)
+#undef LUCERNA_VISIT
+}
+
+[[nodiscard]] inline std::size_t DeltaLightCount(const Scene& scene) {
+  std::size_t count = 0;
+  ForEachDeltaList(scene, [&](const auto& lights) { count += lights.size(); });
+  return count;
+}
 
 }  // namespace lucerna
