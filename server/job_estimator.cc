@@ -18,6 +18,7 @@
 #include "render/film/film.h"
 #include "render/film/layers.h"
 #include "render/math/color_space.h"
+#include "render/scene/shape_lists.h"
 #include "render/tracing/eye_path.h"
 
 namespace lucerna {
@@ -27,12 +28,11 @@ constexpr double kPi64 = std::numbers::pi;
 
 // Whether a path may be bent by a smooth surface.
 bool HasSmoothSurfaces(const Scene& scene) {
-  const auto is_smooth = [&](const auto& shape) {
-    return IsSmooth(scene.materials[static_cast<std::size_t>(shape.traits.material)]);
-  };
-  return std::ranges::any_of(scene.meshes, is_smooth) ||
-         std::ranges::any_of(scene.spheres, is_smooth) ||
-         std::ranges::any_of(scene.disks, is_smooth);
+  bool is_any_smooth = false;
+  ForEachShapeTraits(scene, [&](const ShapeTraits& traits) {
+    is_any_smooth |= IsSmooth(scene.materials[static_cast<std::size_t>(traits.material)]);
+  });
+  return is_any_smooth;
 }
 
 // "light 2 (a point light at (0, 1, 2))", in the units of the scene's file.
@@ -52,18 +52,15 @@ std::string NameOf(const LightGroup& light, std::size_t number, double unit) {
         return Concat("an area light, a sphere around ", at(unit));
       case EmitterKind::kDisk:
         return Concat("an area light, a disk around ", at(unit));
-      case EmitterKind::kPoint:
-        return Concat("a point light at ", at(unit));
-      case EmitterKind::kSpot:
-        return Concat("a spot light at ", at(unit));
-      case EmitterKind::kDistant:
-        return Concat("a distant light that shines towards ", at(1));
       case EmitterKind::kInfinite:
         return "the constant environment light";
       case EmitterKind::kEnvironment:
         return "an environment map";
+      default:
+        return Concat("a ", NameOf(light.kind),
+                      light.is_at_infinity ? " that shines towards " : " at ",
+                      at(light.is_at_infinity ? 1 : unit));
     }
-    return "";
   };
   return Concat("light ", number, " (", described(), ")");
 }

@@ -272,13 +272,13 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
     std::optional<Material> textured;
     if (!block.textured_k.empty() && untextured.texture != kNoTexture) {
       textured = untextured;
-      textured->eta = Gray(1);
-      textured->k = block.textured_k[static_cast<std::size_t>(glossy - block.glossy.data())];
+      SetTexturedParameter(
+          *textured, block.textured_k[static_cast<std::size_t>(glossy - block.glossy.data())]);
     }
     const Material& material = textured ? *textured : untextured;
     const Frame frame(DecodeOctahedral(glossy->shading_normal_oct));
     const Vec3 wo = frame.ToLocal(DecodeOctahedral(glossy->to_eye_oct));
-    const bool transmits = material.kind == Material::Kind::kDielectric;
+    const bool transmits = Transmits(material);
     grid.ForEachWithin(position, reach, [&](std::size_t i, float squared) {
       const FacingRecord& photon = grid.template record<true>(i);
       const Vec3 to_photon = grid.position(i) - position;

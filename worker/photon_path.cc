@@ -67,6 +67,7 @@ class HistoryWatcher {
     PhotonLanding& landing = history_.landings.emplace_back();
     landing.surface = surface;
     landing.material_kind = material.kind;
+    landing.has_narrow_lobes = HasNarrowLobes(material);
     landing.distance = hit.t;
     landing.arriving = arriving;
   }
@@ -114,14 +115,11 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       spectra_(spectra),
       region_(region),
       scale_(FluxScale::ForPower(lights.TotalPower())),
+      properties_(PropertiesOf(scene.materials)),
       walk_(WalkPartsOf(needs) | (needs.Uses(Part::kCausticHitpoints) ? 8U : 0U)),
       keep_(needs.Uses(Part::kPhotonDirections) ? KeepColumns<true, true>
             : needs.Uses(Part::kPhotonNormals)  ? KeepColumns<true, false>
                                                 : KeepColumns<false, false>) {
-  for (const Material& material : scene.materials) {
-    gathers_.push_back(Gathers(material) ? 1 : 0);
-    gathers_caustics_.push_back(GathersCaustics(material) ? 1 : 0);
-  }
   const double power = static_cast<double>(Luminance(lights.TotalPower()));
   // At the ends of the float range the scale is held where it is a normal number.
   if (power > 0) {
@@ -252,17 +250,17 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
       return end(PhotonEnd::kNotFinite, energy.dropped);
     }
     if (is_smoothed) book(EnergyOf(flux), energy.smoothing);
-    const bool gathers = landing > 0 && gathers_[surface.material] != 0;
+    const MaterialProperties& properties = properties_[surface.material];
+    const bool gathers = landing > 0 && properties.gathers;
     bool gathers_caustic = false;
     if constexpr (kParts.caustics) {
-      gathers_caustic = met_smooth_only && landing > 0 && gathers_caustics_[surface.material] != 0;
+      gathers_caustic = met_smooth_only && landing > 0 && properties.gathers_caustics();
     }
     const bool leaves_deposit = (gathers || gathers_caustic) && scale_.HasRoomFor(flux);
     if ((gathers || gathers_caustic) && !leaves_deposit) ++landed.excess;
     const bool is_kept = leaves_deposit && Inside(region_, surface.position);
     const bool is_found = is_kept && gathers;
-    watcher.Received(flux, gathers_[surface.material] != 0 || gathers_caustic, landing > 0,
-                     leaves_deposit);
+    watcher.Received(flux, properties.gathers || gathers_caustic, landing > 0, leaves_deposit);
     if constexpr (kParts.caustics) {
       if (is_kept && gathers_caustic) {
         // A key that is not drawn: the rest of the walk is that of a job without such hitpoints.
@@ -278,7 +276,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     if constexpr (kParts.spectrum) {
       // A surface that scatters light broadly blurs the shadows on it: after a leg of length d at
       // most 4/d² of any detail is left, of none at all 3/d² (see LeaveDiffuse).
-      const bool shadows_count = is_found || material.kind != Material::Kind::kDiffuse;
+      const bool shadows_count = is_found || properties.has_narrow_lobes();
       spectra_->Fly(
           spectrum, ray, hit.t,
           shadows_count ? SpectrumTracer::Shadows::kFound : SpectrumTracer::Shadows::kLeftOut);

@@ -85,12 +85,13 @@ enum class PhotonEnd : std::uint8_t {
 struct PhotonLanding {
   SurfacePoint surface;
   Material::Kind material_kind = Material::Kind::kDiffuse;
-  float distance = 0;         // flown [scene units]
-  Rgb arriving;               // flux [W]
-  Rgb landed;                 // the same after the ratio of cosines of shading normals
-  bool was_received = false;  // not below the horizon, and finite
-  bool gathers = false;       // the material
-  bool is_indirect = false;   // not the first landing
+  bool has_narrow_lobes = false;  // the material
+  float distance = 0;             // flown [scene units]
+  Rgb arriving;                   // flux [W]
+  Rgb landed;                     // the same after the ratio of cosines of shading normals
+  bool was_received = false;      // not below the horizon, and finite
+  bool gathers = false;           // the material
+  bool is_indirect = false;       // not the first landing
   bool leaves_deposit = false;
   bool was_scattered = false;
   bool transmits = false;
@@ -170,11 +171,10 @@ class PhotonPathTracer {
   const RenderSettings& settings_;
   const SpectrumTracer* spectra_;  // nullptr: no frequency photons
   Bounds region_;
-  std::vector<std::uint8_t> gathers_;           // [materials]
-  std::vector<std::uint8_t> gathers_caustics_;  // [materials]
   FluxScale scale_;
   float energy_per_watt_ = 1;
-  std::size_t walk_ = 0;  // see WalkPartsOf; bit 3: WalkParts::caustics
+  std::vector<MaterialProperties> properties_;  // [materials]
+  std::size_t walk_ = 0;                        // see WalkPartsOf; bit 3: WalkParts::caustics
   // Adds to the columns that the job has beside those of every job.
   using KeepFunction = void (*)(Deposits& deposits, const SurfacePoint& surface, Vec3 wo);
   KeepFunction keep_;

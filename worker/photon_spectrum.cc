@@ -59,7 +59,7 @@ SpectrumTracer::SpectrumTracer(const Scene& scene, const RenderSettings& setting
           scene, [&](const Material&) { return needs.Uses(Part::kCurvature); },
           [&](const Material& material) {
             // Only mirrors and glass need it (BendAt).
-            return needs.Uses(Part::kCurvedMirrors) && material.kind != Material::Kind::kDiffuse;
+            return needs.Uses(Part::kCurvedMirrors) && HasNarrowLobes(material);
           }) {
   if (needs.Uses(Part::kTextureDetail)) texture_details_ = TextureDetails(scene.textures);
   if (needs.Uses(Part::kSkyDetail)) {
@@ -112,34 +112,14 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
                          direction, limits_),
               false};
     }
-    case EmitterKind::kPoint:
-      return {PointSource(limits_), false};
-    case EmitterKind::kSpot: {
-      const SpotLight& spot = scene_.spot_lights[emitter.primitive];
-      const double width = std::acos(static_cast<double>(spot.cos_total_width)) -
-                           std::acos(static_cast<double>(spot.cos_falloff_start));
-      const double relative = static_cast<double>(Luminance(emission.flux)) /
-                              std::max(1e-30, static_cast<double>(Luminance(emitter.power)));
-      // Inside the cone the light is even, but ends at the rim: as an edge seen from the light, and
-      // no harder than the falloff is.
-      double curvature = SmoothFalloffCurvature(width);
-      if (Dot(direction, spot.direction) >= spot.cos_falloff_start) {
-        const double to_rim =
-            std::acos(static_cast<double>(spot.cos_total_width)) -
-            std::acos(std::min(1.0, static_cast<double>(Dot(direction, spot.direction))));
-        curvature = std::min(curvature, edge_strength_ / std::max(to_rim * to_rim, 1e-12));
-      }
-      return {SpotSource(std::min(relative, 1.0), curvature, limits_), false};
-    }
-    case EmitterKind::kDistant:
-      return {DirectionalSource(limits_), false};
     case EmitterKind::kInfinite:
       // Even light from everywhere: no structure in place or direction.
       return {EnvironmentSource(0, 1, 1, 1, limits_), false};
     case EmitterKind::kEnvironment:
       return {sky_details_[emitter.primitive].Source(-direction, limits_), false};
+    default:
+      return {lights_.DeltaSource(emission, edge_strength_, limits_).value_or(Spectrum()), false};
   }
-  return {};
 }
 
 void SpectrumTracer::Fly(Carried& carried, const Ray& ray, float distance, Shadows shadows) const {
@@ -166,9 +146,9 @@ float SpectrumTracer::Received(const Carried& carried, const SurfacePoint& surfa
                                const Material& material, Vec3 wo) const {
   const double cosine = static_cast<double>(std::abs(Dot(wo, surface.shading_normal)));
   Spectrum seen = carried.spectrum;
-  if (sees_glossily_ && material.kind != Material::Kind::kDiffuse) {
-    const double lobe =
-        ReflectedLobe(static_cast<double>(std::max(material.alpha_u, material.alpha_v)));
+  if (const MaterialProperties properties = PropertiesOf(material);
+      sees_glossily_ && properties.has_narrow_lobes()) {
+    const double lobe = ReflectedLobe(static_cast<double>(properties.lobe_width));
     if (lobe < kDiffuseLobe) {
       seen = SeeGlossily(seen, cosine, BendAt(surface, wo), ObliqueLobe(lobe, cosine), limits_);
     }
@@ -212,17 +192,18 @@ void SpectrumTracer::Scatter(Carried& carried, const SurfacePoint& surface,
         carried.spectrum, static_cast<double>(std::abs(Dot(wo, normal))), bend, bend, limits_);
     carried = {ScatterDiffusely(trace, TextureDetailAt(surface, material), limits_), true};
   };
-  if (material.kind == Material::Kind::kDiffuse) {
+  const MaterialProperties properties = PropertiesOf(material);
+  if (!properties.has_narrow_lobes()) {
     diffuse();
     return;
   }
   const bool transmits = Dot(wo, normal) * Dot(wi, normal) < 0;
   const bool from_outside = Dot(wo, normal) > 0;
-  const double ior = static_cast<double>(material.ior);
+  const double ior = static_cast<double>(properties.ior);
   const double ior_ratio = from_outside ? 1 / ior : ior;  // n1 / n2
   // A rough surface scatters at a facet; the lobe around it blurs.
   Vec3 facet = normal;
-  if (!IsSmooth(material)) {
+  if (!properties.is_smooth) {
     facet = transmits ? wo * static_cast<float>(ior_ratio) + wi : wo + wi;
     const float squared = LengthSquared(facet);
     if (!(squared > 0)) return diffuse();
@@ -230,8 +211,8 @@ void SpectrumTracer::Scatter(Carried& carried, const SurfacePoint& surface,
   }
   const double cosine = static_cast<double>(std::abs(Dot(wo, facet)));
   double lobe = 0;
-  if (!IsSmooth(material)) {
-    const auto alpha = static_cast<double>(std::max(material.alpha_u, material.alpha_v));
+  if (!properties.is_smooth) {
+    const auto alpha = static_cast<double>(properties.lobe_width);
     lobe = ObliqueLobe(transmits ? RefractedLobe(alpha, ior_ratio, cosine) : ReflectedLobe(alpha),
                        cosine);
     if (lobe > kDiffuseLobe) return diffuse();

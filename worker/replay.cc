@@ -29,32 +29,11 @@ v1::Triple TripleOf(Rgb c) {
 }
 
 std::string NameOf(const Emitter& light) {
-  const char* kind = "light";
-  switch (light.kind) {
-    case EmitterKind::kTriangle:
-      return absl::StrCat("triangle ", light.primitive, " of mesh ", light.geometry);
-    case EmitterKind::kSphere:
-      kind = "sphere";
-      break;
-    case EmitterKind::kDisk:
-      kind = "disk";
-      break;
-    case EmitterKind::kPoint:
-      kind = "point light";
-      break;
-    case EmitterKind::kSpot:
-      kind = "spot light";
-      break;
-    case EmitterKind::kDistant:
-      kind = "distant light";
-      break;
-    case EmitterKind::kInfinite:
-      return "the even sky";
-    case EmitterKind::kEnvironment:
-      kind = "environment map";
-      break;
+  if (light.kind == EmitterKind::kTriangle) {
+    return absl::StrCat("triangle ", light.primitive, " of mesh ", light.geometry);
   }
-  return absl::StrCat(kind, " ", light.primitive);
+  if (light.kind == EmitterKind::kInfinite) return "the even sky";
+  return absl::StrCat(std::string(NameOf(light.kind)), " ", light.primitive);
 }
 
 std::string NameOfShape(const SurfacePoint& surface, const Intersector& intersector) {
@@ -63,18 +42,6 @@ std::string NameOfShape(const SurfacePoint& surface, const Intersector& intersec
   }
   return absl::StrCat(surface.geometry == intersector.disk_geometry() ? "disk " : "sphere ",
                       surface.primitive);
-}
-
-const char* NameOf(Material::Kind kind) {
-  switch (kind) {
-    case Material::Kind::kDiffuse:
-      return "diffuse";
-    case Material::Kind::kConductor:
-      return "conductor";
-    case Material::Kind::kDielectric:
-      return "dielectric";
-  }
-  return "";
 }
 
 v1::PhotonEnd EndToProto(PhotonEnd end) {
@@ -104,8 +71,9 @@ v1::DepositFate FateOf(const PhotonLanding& landing) {
 }
 
 std::string ChosenIn(const PhotonLanding& landing) {
-  if (landing.material_kind == Material::Kind::kDiffuse) return "diffuse reflection";
-  return absl::StrCat(landing.is_smooth ? "smooth " : "rough ",
+  return absl::StrCat(!landing.has_narrow_lobes ? "diffuse "
+                      : landing.is_smooth       ? "smooth "
+                                                : "rough ",
                       landing.transmits ? "transmission" : "reflection");
 }
 
@@ -113,8 +81,8 @@ v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing,
                                        const Intersector& intersector) {
   v1::PhotonPath::Landing message;
   message.set_shape(NameOfShape(landing.surface, intersector));
-  message.set_material(
-      absl::StrCat(landing.surface.material, " (", NameOf(landing.material_kind), ")"));
+  message.set_material(absl::StrCat(landing.surface.material, " (",
+                                    std::string(NameOf(landing.material_kind)), ")"));
   message.set_distance(static_cast<double>(landing.distance));
   *message.mutable_position() = TripleOf(landing.surface.position);
   *message.mutable_geometric_normal() = TripleOf(landing.surface.geometric_normal);

@@ -11,6 +11,7 @@
 #include "render/base/text.h"
 #include "render/math/double3.h"
 #include "render/scene/scene_extent.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 namespace {
@@ -64,12 +65,9 @@ std::string Quoted(const Material& material) {
 // Which materials are on some shape.
 std::vector<std::uint8_t> MaterialsInUse(const Scene& scene) {
   std::vector<std::uint8_t> in_use(scene.materials.size());
-  for (const TriangleMesh& mesh : scene.meshes)
-    in_use[static_cast<std::size_t>(mesh.traits.material)] = 1;
-  for (const Sphere& sphere : scene.spheres)
-    in_use[static_cast<std::size_t>(sphere.traits.material)] = 1;
-  for (const Disk& disk : scene.disks)
-    in_use[static_cast<std::size_t>(disk.traits.material)] = 1;
+  ForEachShapeTraits(scene, [&](const ShapeTraits& traits) {
+    in_use[static_cast<std::size_t>(traits.material)] = 1;
+  });
   return in_use;
 }
 
@@ -100,8 +98,7 @@ bool IsSmoothed(const TriangleMesh& mesh) {
 // Curved surfaces that reflect or refract, however roughly.
 bool HasCurvedMirrors(const Scene& scene) {
   const auto scatters = [&](const ShapeTraits& traits) {
-    return scene.materials[static_cast<std::size_t>(traits.material)].kind !=
-           Material::Kind::kDiffuse;
+    return HasNarrowLobes(scene.materials[static_cast<std::size_t>(traits.material)]);
   };
   return std::ranges::any_of(scene.spheres,
                              [&](const Sphere& sphere) { return scatters(sphere.traits); }) ||
@@ -111,13 +108,11 @@ bool HasCurvedMirrors(const Scene& scene) {
 }
 
 std::size_t CountLights(const Scene& scene) {
-  const auto emitting = [](const auto& shapes) {
-    return static_cast<std::size_t>(std::ranges::count_if(
-        shapes, [](const auto& shape) { return shape.traits.area_light != kNoAreaLight; }));
-  };
-  return emitting(scene.meshes) + emitting(scene.spheres) + emitting(scene.disks) +
-         scene.point_lights.size() + scene.spot_lights.size() + scene.distant_lights.size() +
-         scene.infinite_lights.size();
+  std::size_t emitting = 0;
+  ForEachShapeTraits(scene, [&](const ShapeTraits& traits) {
+    emitting += traits.area_light != kNoAreaLight ? 1 : 0;
+  });
+  return emitting + DeltaLightCount(scene) + scene.infinite_lights.size();
 }
 
 // The faces of one-sided lights that nothing lies in front of.
@@ -243,13 +238,12 @@ class NeedsFinder {
   }
 
   void FindSurfaces() {
-    gathers_ = First([](const Material& m) { return Gathers(m); });
-    specular_ = First([](const Material& m) { return !Gathers(m) && !IsBlackDiffuse(m); });
+    gathers_ = First(Gathers);
+    specular_ = First([](const Material& m) { return !Gathers(m) && !ScattersNothing(m); });
     Set(Part::kSpecular, specular_ != nullptr,
         specular_ != nullptr ? Concat("paths go on at ", Quoted(*specular_))
                              : std::string("every surface gathers photons or is black"));
-    glossy_ =
-        First([](const Material& m) { return Gathers(m) && m.kind != Material::Kind::kDiffuse; });
+    glossy_ = First([](const Material& m) { return Gathers(m) && !IsDiffuse(m); });
     Set(Part::kGlossy, glossy_ != nullptr,
         glossy_ != nullptr
             ? Concat("photons are gathered on ", Quoted(*glossy_), ", which is not diffuse")
@@ -290,13 +284,12 @@ class NeedsFinder {
                     : std::string(none));
     };
     const std::size_t infinite = scene_.infinite_lights.size();
-    const std::size_t delta =
-        scene_.point_lights.size() + scene_.spot_lights.size() + scene_.distant_lights.size();
+    const std::size_t delta = DeltaLightCount(scene_);
     set_kind(Part::kEnvironment, infinite, numbers.infinite, numbers.end, "infinite lights",
              "there is no infinite light");
-    set_kind(Part::kAreaLights, count - delta - infinite, 0, numbers.points, "shapes that emit",
+    set_kind(Part::kAreaLights, count - delta - infinite, 0, numbers.delta, "shapes that emit",
              "no shape emits");
-    set_kind(Part::kDeltaLights, delta, numbers.points, numbers.infinite,
+    set_kind(Part::kDeltaLights, delta, numbers.delta, numbers.infinite,
              "points, spots and distant lights", "every light has an extent");
 
     std::string reason;
@@ -405,7 +398,7 @@ class NeedsFinder {
                       : has_it ? why
                                : why_not));
     };
-    const std::size_t shapes = scene_.meshes.size() + RoundShapes();
+    const std::size_t shapes = ShapeCount(scene_);
     set(Part::kOccluderEdges, shapes > 1 || scene_.TriangleCount() > 1,
         "shapes cast shadows on each other", "a single face shadows nothing");
     set(Part::kCurvature, needs_.Uses(Part::kShadingNormals) || !scene_.spheres.empty(),
@@ -449,7 +442,7 @@ class NeedsFinder {
   }
 
   [[nodiscard]] std::size_t RoundShapes() const {
-    return scene_.spheres.size() + scene_.disks.size();
+    return ShapeCount(scene_) - scene_.meshes.size();
   }
 
   static constexpr std::string_view kDark = "no light reaches what the camera can see";

@@ -96,20 +96,22 @@ std::vector<NumberedLight> LightsOf(const Scene& scene) {
   const auto around = [](const auto& shape) {
     return LightExtent(BoxAround(shape.center, shape.radius));
   };
-  const auto at = [](const auto& light) { return LightExtent(light.position); };
   const auto everywhere = [](const auto& /*light*/) { return LightExtent(); };
   add_shapes(0, scene.meshes, [](const TriangleMesh& mesh) { return LightExtent(mesh); });
   add_shapes(numbers.spheres, scene.spheres, around);
   add_shapes(numbers.disks, scene.disks, around);
-  add(numbers.points, scene.point_lights, at);
-  add(numbers.spots, scene.spot_lights, at);
-  add(numbers.distant, scene.distant_lights, everywhere);
+#define LUCERNA_ADD(Name, list, name)                                               \
+  add(numbers.list, scene.list, [](const Name##Light& light) {                      \
+    return Name##Light::kIsAtInfinity ? LightExtent() : LightExtent(light.Place()); \
+  });
+  LUCERNA_DELTA_LIGHTS(LUCERNA_ADD)
+#undef LUCERNA_ADD
   add(numbers.infinite, scene.infinite_lights, everywhere);
   return lights;
 }
 
 bool IsOpaque(const Material& material) {
-  return material.kind != Material::Kind::kDielectric;
+  return !Transmits(material);
 }
 
 // The shapes of the materials that some predicate accepts, as rays meet them.

@@ -9,6 +9,7 @@
 #include "render/formats/degenerate_triangles.h"
 #include "render/formats/scene_unit.h"
 #include "render/scene/scene_extent.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 namespace {
@@ -38,11 +39,10 @@ void WarnOfDistance(const Scene& scene, const SourceLocation& whole, Diagnostics
 }
 
 void WarnOfEmptiness(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
-  if (scene.meshes.empty() && scene.spheres.empty() && scene.disks.empty()) {
+  if (ShapeCount(scene) == 0) {
     diagnostics.Warning(whole, "the scene has no shapes");
   }
-  if (scene.area_lights.empty() && scene.point_lights.empty() && scene.spot_lights.empty() &&
-      scene.distant_lights.empty() && scene.infinite_lights.empty()) {
+  if (scene.area_lights.empty() && DeltaLightCount(scene) == 0 && scene.infinite_lights.empty()) {
     diagnostics.Warning(whole, "the scene has no light: the image will be black");
   }
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/scene/scaling.h"
 #include "render/scene/scene_extent.h"
 
 namespace lucerna {
@@ -18,26 +19,6 @@ constexpr int kChosen = 10;
 // 2^60. Whatever lies farther than this from a scene of common size neither sees nor lights it.
 constexpr int kFarthest = 50;
 
-Vec3 Times(Vec3 v, double factor) {
-  return {static_cast<float>(static_cast<double>(v.x) * factor),
-          static_cast<float>(static_cast<double>(v.y) * factor),
-          static_cast<float>(static_cast<double>(v.z) * factor)};
-}
-
-float Times(float value, double factor) {
-  return static_cast<float>(static_cast<double>(value) * factor);
-}
-
-// [W·sr⁻¹] is radiance times an area.
-Status ScaleIntensity(Rgb& intensity, double factor) {
-  for (float* channel : {&intensity.r, &intensity.g, &intensity.b})
-    *channel = Times(*channel, factor * factor);
-  if (std::isfinite(MaxChannel(intensity))) return absl::OkStatus();
-  return absl::OutOfRangeError(
-      "a point or spot light is too strong for the size of the scene: its light has no number in "
-      "single precision; scale the scene up or the intensity down");
-}
-
 double FarthestOf(const Scene& scene) {
   double farthest = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -45,10 +26,12 @@ double FarthestOf(const Scene& scene) {
     const double on_lens = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
     farthest = std::max(farthest, std::abs(row[3]) + scene.camera.lens_radius * on_lens);
   }
-  for (const PointLight& light : scene.point_lights)
-    farthest = std::max(farthest, static_cast<double>(MaxAbs(light.position)));
-  for (const SpotLight& light : scene.spot_lights)
-    farthest = std::max(farthest, static_cast<double>(MaxAbs(light.position)));
+  ForEachDeltaList(scene, [&](const auto& lights) {
+    for (const auto& light : lights) {
+      if (!light.kIsAtInfinity)
+        farthest = std::max(farthest, static_cast<double>(MaxAbs(light.Place())));
+    }
+  });
   return farthest;
 }
 
@@ -75,24 +58,26 @@ Status ChooseUnit(Scene& scene) {
 
   for (TriangleMesh& mesh : scene.meshes) {
     for (Vec3& position : mesh.positions)
-      position = Times(position, factor);
+      position = ScaledBy(position, factor);
   }
   for (Sphere& sphere : scene.spheres) {
-    sphere.center = Times(sphere.center, factor);
-    sphere.radius = Times(sphere.radius, factor);
+    sphere.center = ScaledBy(sphere.center, factor);
+    sphere.radius = ScaledBy(sphere.radius, factor);
   }
   for (Disk& disk : scene.disks) {
-    disk.center = Times(disk.center, factor);
-    disk.radius = Times(disk.radius, factor);
-    disk.inner_radius = Times(disk.inner_radius, factor);
+    disk.center = ScaledBy(disk.center, factor);
+    disk.radius = ScaledBy(disk.radius, factor);
+    disk.inner_radius = ScaledBy(disk.inner_radius, factor);
   }
-  for (PointLight& light : scene.point_lights) {
-    light.position = Times(light.position, factor);
-    LUCERNA_RETURN_IF_ERROR(ScaleIntensity(light.intensity, factor));
-  }
-  for (SpotLight& light : scene.spot_lights) {
-    light.position = Times(light.position, factor);
-    LUCERNA_RETURN_IF_ERROR(ScaleIntensity(light.intensity, factor));
+  bool has_strengths = true;
+  ForEachDeltaList(scene, [&](auto& lights) {
+    for (auto& light : lights)
+      has_strengths = light.Scale(factor) && has_strengths;
+  });
+  if (!has_strengths) {
+    return absl::OutOfRangeError(
+        "a point or spot light is too strong for the size of the scene: its light has no number in "
+        "single precision; scale the scene up or the intensity down");
   }
   Camera& camera = scene.camera;
   camera.camera_to_world = Transform::Scale(factor, factor, factor) * camera.camera_to_world *

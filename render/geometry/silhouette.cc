@@ -20,8 +20,7 @@ namespace {
 // and casts no shadow.
 bool CastsShadow(const Scene& scene, const ShapeTraits& traits) {
   const auto material = static_cast<std::size_t>(traits.material);
-  return material >= scene.materials.size() ||
-         scene.materials[material].kind != Material::Kind::kDielectric;
+  return material >= scene.materials.size() || !Transmits(scene.materials[material]);
 }
 
 // Nearer to an end of the segment than this part of its length is contact with the surface there.

@@ -18,7 +18,6 @@
 //       pixels and scales of textures are >= 0.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -30,73 +29,11 @@
 #include "render/math/rgb.h"
 #include "render/math/transform.h"
 #include "render/math/vector.h"
+#include "render/scene/light_list.h"
+#include "render/scene/material.h"
 #include "render/scene/texture.h"
 
 namespace lucerna {
-
-// How a surface scatters. Only the members that the kind names are meaningful.
-struct Material {
-  enum class Kind : std::uint8_t { kDiffuse, kConductor, kDielectric };
-
-  Kind kind = Kind::kDiffuse;
-  Rgb reflectance = {0.5F, 0.5F, 0.5F};  // diffuse
-  Rgb eta = {1, 1, 1};                   // conductor: index of refraction per channel
-  Rgb k = {0, 0, 0};                     // conductor: absorption per channel
-  float ior = 1.5F;                      // dielectric: inside over outside
-  float alpha_u = 0;                     // conductor, dielectric: GGX widths; 0 and 0 = smooth
-  float alpha_v = 0;
-  // In place of the reflectance of a diffuse surface, and of a conductor's eta and k.
-  std::int32_t texture = kNoTexture;
-  std::string name;  // for messages and the plan
-
-  bool operator==(const Material&) const = default;
-};
-
-// A conductor given by its reflectance at right angles has eta = 1 and this k, capped as in
-// pbrt-v4.
-[[nodiscard]] inline float AbsorptionFor(float reflectance) {
-  const float capped = std::min(reflectance, 0.9999F);
-  return 2 * std::sqrt(capped) / std::sqrt(1 - capped);
-}
-
-// Smooth: all scattering goes into single directions.
-[[nodiscard]] inline bool IsSmooth(const Material& material) {
-  return material.kind != Material::Kind::kDiffuse && material.alpha_u == 0 &&
-         material.alpha_v == 0;
-}
-
-// Black: nothing is scattered.
-[[nodiscard]] inline bool IsBlackDiffuse(const Material& material) {
-  return material.kind == Material::Kind::kDiffuse && material.texture == kNoTexture &&
-         IsBlack(material.reflectance);
-}
-
-// Where direct light may be sampled: light is scattered, and not into single directions.
-[[nodiscard]] inline bool ScattersBroadly(const Material& material) {
-  return !IsSmooth(material) && !IsBlackDiffuse(material);
-}
-
-// Rougher than this, photons are gathered; smoother, eye paths go on. A narrow lobe accepts few of
-// the photons around it, while a direction drawn from it is a good guess.
-inline constexpr float kGatherAlpha = 0.2F;
-// The same for dielectrics: refraction bends less than reflection, so their lobes are narrower, and
-// what is seen through frosted glass has passed two of them.
-inline constexpr float kGatherAlphaDielectric = 0.5F;
-
-// Where eye paths stop and photons are kept. Black surfaces need none. What a metal with a texture
-// reflects depends on the place, which hitpoints do not tell the workers: there, paths go on.
-[[nodiscard]] inline bool Gathers(const Material& material) {
-  if (material.kind == Material::Kind::kDiffuse) return !IsBlack(material.reflectance);
-  if (material.texture != kNoTexture) return false;
-  return std::max(material.alpha_u, material.alpha_v) >=
-         (material.kind == Material::Kind::kConductor ? kGatherAlpha : kGatherAlphaDielectric);
-}
-
-// Where eye paths go on although a range of directions is scattered: what eye paths do not find of
-// the light there, caustic photons bring (transport/caustic_weight.h).
-[[nodiscard]] inline bool GathersCaustics(const Material& material) {
-  return ScattersBroadly(material) && !Gathers(material);
-}
 
 // Emission of the surface of a shape.
 struct AreaLight {
@@ -151,26 +88,6 @@ struct Disk {
   float inner_radius = 0;
   ShapeTraits traits;
   ShapeAxes axes = {};
-};
-
-struct PointLight {
-  Vec3 position;
-  Rgb intensity;  // [W·sr⁻¹]
-};
-
-// Intensity falls from 1 inside cos_falloff_start to 0 at cos_total_width as smoothstep of the
-// cosine, as pbrt has it.
-struct SpotLight {
-  Vec3 position;
-  Vec3 direction;  // unit, the way the light looks
-  Rgb intensity;   // [W·sr⁻¹] on the axis
-  float cos_falloff_start = 1;
-  float cos_total_width = 1;
-};
-
-struct DistantLight {
-  Vec3 direction;  // unit, the way the light travels
-  Rgb irradiance;  // [W·m⁻²] on a plane facing it
 };
 
 // Light from everywhere that no shape covers. Several of them add up.
@@ -244,9 +161,9 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<AreaLight> area_lights;
-  std::vector<PointLight> point_lights;
-  std::vector<SpotLight> spot_lights;
-  std::vector<DistantLight> distant_lights;
+#define LUCERNA_MEMBER(Name, list, name) std::vector<Name##Light> list;
+  LUCERNA_DELTA_LIGHTS(LUCERNA_MEMBER)  // point_lights and so on (scene/light_list.h)
+#undef LUCERNA_MEMBER
   std::vector<InfiniteLight> infinite_lights;
   Camera camera;
   FilmSettings film;
@@ -260,5 +177,19 @@ struct Scene {
     return count;
   }
 };
+
+// Calls `visit` for the list of each kind of delta light, in their order.
+template <typename SceneType, typename Visit>
+void ForEachDeltaList(SceneType& scene, const Visit& visit) {
+#define LUCERNA_VISIT(Name, list, name) visit(scene.list);
+  LUCERNA_DELTA_LIGHTS(LUCERNA_VISIT)
+#undef LUCERNA_VISIT
+}
+
+[[nodiscard]] inline std::size_t DeltaLightCount(const Scene& scene) {
+  std::size_t count = 0;
+  ForEachDeltaList(scene, [&](const auto& lights) { count += lights.size(); });
+  return count;
+}
 
 }  // namespace lucerna

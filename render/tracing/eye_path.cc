@@ -49,6 +49,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       settings_(settings),
       eye_sets_(needs.eye_sample_sets()),
       walk_(WalkFor(needs)),
+      properties_(PropertiesOf(scene.materials)),
       has_lens_(needs.Uses(Part::kLens)),
       rays_find_lights_(needs.Uses(Part::kAreaLights) || needs.Uses(Part::kEnvironment)),
       caustic_weight_(scene, settings, intersector.bounds()),
@@ -111,14 +112,11 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, Key
     if (vertex >= settings_.max_depth) return;
     std::optional<Material> textured;
     const Material& material = MaterialAt(scene_, surface, textured);
-    if (!IsSmooth(material)) return;
+    if (!properties_[surface.material].is_smooth) return;
     const Frame frame(surface.shading_normal);
     // Lobe 0 is the reflection and lobe 1 - ulp the refraction, with the weight of its share.
     const Vec3 wo_local = frame.ToLocal(wo);
-    float cos_t = 0;
-    const bool is_dielectric = material.kind == Material::Kind::kDielectric;
-    const float reflectance =
-        is_dielectric ? FresnelDielectric(wo_local.z, material.ior, cos_t) : 1.0F;
+    const float reflectance = ReflectedShare(material, wo_local.z);
     for (const float lobe : {0.0F, 0x1.fffffep-1F}) {
       const float share = lobe == 0 ? reflectance : 1 - reflectance;
       if (!(share > 0)) continue;
@@ -221,14 +219,17 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       if constexpr (kParts.textures) return MaterialAt(scene_, surface, textured);
       return scene_.materials[surface.material];
     }();
-    if (vertex == 0 || Gathers(material)) {
+    [[maybe_unused]] const MaterialProperties changed =
+        textured ? PropertiesOf(*textured) : MaterialProperties();
+    const MaterialProperties& properties = textured ? changed : properties_[surface.material];
+    if (vertex == 0 || properties.gathers) {
       path.features = {AlbedoOf(material), FaceForward(surface.shading_normal, wo), length};
     }
     if (vertex >= settings_.max_depth) return path;
 
     const Frame frame(surface.shading_normal);
     const SobolPoint u = sampler.ForVertex(vertex);
-    if (kParts.lobes && IsSmooth(material)) {
+    if (kParts.lobes && properties.is_smooth) {
       if (vertex == 0 && rays_find_lights_) {
         path.direct += EmissionThrough(surface, wo, sampler.ForBranches(), path.rays);
         emission_was_collected = true;
@@ -266,12 +267,12 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       hitpoint.material = surface.material;
       hitpoint.to_eye = wo;
       hitpoint.shading_normal = surface.shading_normal;
-      if (here.texture != kNoTexture && is_glossy) hitpoint.textured_k = here.k;
+      if (here.texture != kNoTexture && is_glossy) hitpoint.textured_k = TexturedParameter(here);
       hitpoint.weight = weight;
       hitpoint.footprint = length * static_cast<float>(std::sqrt(pixel_width_ * pixel_height_));
       return hitpoint;
     };
-    if (Gathers(material)) {
+    if (properties.gathers) {
       // Half of the direct light: what a scattered ray finds of the lights themselves.
       if (kParts.lights && scattered && rays_find_lights_) {
         const Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
@@ -288,13 +289,13 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
           }
         }
       }
-      const bool is_glossy = kParts.lobes && material.kind != Material::Kind::kDiffuse;
+      const bool is_glossy = kParts.lobes && !properties.is_diffuse;
       path.hitpoint = hitpoint_here(is_glossy, material);
       if (!is_glossy) path.hitpoint.weight *= material.reflectance * kInversePi;
       return path;
     }
     if constexpr (kParts.caustics) {
-      if (IsSmooth(material)) {
+      if (properties.is_smooth) {
         receiver.was_left_smoothly = receiver.is_last;
       } else {
         receiver = {sample.pdf, sample.wi.z, true, false};

@@ -88,6 +88,7 @@ class EyePathTracer {
   const RenderSettings& settings_;
   const int eye_sets_;  // see EyeSetOf
   const WalkFunction walk_;
+  const std::vector<MaterialProperties> properties_;  // [materials]
   const bool has_lens_;
   const bool rays_find_lights_;  // some have an extent
   const CausticWeight caustic_weight_;

@@ -3,16 +3,13 @@
 // All directions are in the shading frame: unit, away from the surface, z along the shading
 // normal. `wo` goes to where radiance is asked for (the eye) or where a photon came from; Sample
 // returns `wi` for both. z > 0 is the outside of a dielectric.
-//
-// The microfacet model is GGX (Trowbridge-Reitz) with the height-correlated shadowing of Smith.
-// Sources: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces" (W07);
-// Heitz 2018, "Sampling the GGX Distribution of Visible Normals" (H18).
+// Each kind of material has a file of its own, bsdf_NAME.cc (transport/bsdf_kinds.h).
 #pragma once
 
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "render/math/warp.h"
-#include "render/scene/scene.h"
+#include "render/scene/material.h"
 
 namespace lucerna {
 
@@ -51,6 +48,10 @@ struct BsdfSample {
 
 // The reflectance that feature layers show.
 [[nodiscard]] Rgb AlbedoOf(const Material& material);
+
+// Of a smooth material: the share of reflection in what it scatters, in [0, 1]; the rest is
+// refracted. cos_o: of wo, negative from inside.
+[[nodiscard]] float ReflectedShare(const Material& material, float cos_o);
 
 // Fresnel reflectance of unpolarised light. cos_i in [-1, 1], negative from inside; `eta` =
 // inside over outside. cos_t: of the refracted direction, in [0, 1]; 0 with total reflection.

@@ -6,16 +6,22 @@
 #include "render/math/double3.h"
 #include "render/math/warp.h"
 #include "render/scene/scene_extent.h"
+#include "render/transport/light_kinds.h"
 
 namespace lucerna {
 namespace {
 
-// Smoothstep of the cosine between the two cones, as pbrt has it.
-float SpotFalloff(const SpotLight& spot, float cosine) {
-  if (cosine >= spot.cos_falloff_start) return 1;
-  if (cosine <= spot.cos_total_width) return 0;
-  const float x = (cosine - spot.cos_total_width) / (spot.cos_falloff_start - spot.cos_total_width);
-  return x * x * (3 - 2 * x);
+// The kinds of delta light that are.
+bool IsAtInfinity(EmitterKind kind) {
+  switch (kind) {
+#define LUCERNA_CASE(Name, list, name) \
+  case EmitterKind::k##Name:           \
+    return Name##Light::kIsAtInfinity;
+    LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    default:
+      return false;
+  }
 }
 
 // How much of the choice of direct light is even among the lights. By power alone, a light nearby
@@ -27,6 +33,27 @@ float OneMinusCosine(float sin2_max) {
 }
 
 }  // namespace
+
+std::string_view NameOf(EmitterKind kind) {
+  switch (kind) {
+    case EmitterKind::kTriangle:
+      return "triangle";
+    case EmitterKind::kSphere:
+      return "sphere";
+    case EmitterKind::kDisk:
+      return "disk";
+#define LUCERNA_CASE(Name, list, name) \
+  case EmitterKind::k##Name:           \
+    return name " light";
+      LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    case EmitterKind::kInfinite:
+      return "constant environment light";
+    case EmitterKind::kEnvironment:
+      return "environment map";
+  }
+  return "light";
+}
 
 LightSet::LightSet(const Scene& scene, const Intersector& intersector,
                    const LightSelection& selection)
@@ -41,8 +68,8 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
   };
   const Bounds& bounds = intersector.bounds();
   if (!bounds.empty()) {
-    center_ = bounds.Center();
-    radius_ = 0.5F * bounds.Diagonal();
+    sphere_.center = bounds.Center();
+    sphere_.radius = 0.5F * bounds.Diagonal();
   }
   first_emitter_.assign(scene.meshes.size(), -1);
   sphere_emitter_.assign(scene.spheres.size(), -1);
@@ -101,35 +128,18 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
     }
     add(emitter, numbers.disks + i);
   }
-  for (std::uint32_t i = 0; i < scene.point_lights.size(); ++i) {
-    Emitter emitter;
-    emitter.kind = Kind::kPoint;
-    emitter.primitive = i;
-    emitter.radiance = scene.point_lights[i].intensity;
-    emitter.power = emitter.radiance * (4 * kPi);
-    add(emitter, numbers.points + i);
+#define LUCERNA_ADD(Name, list, name)                      \
+  for (std::uint32_t i = 0; i < scene.list.size(); ++i) {  \
+    const Name##Light& light = scene.list[i];              \
+    Emitter emitter;                                       \
+    emitter.kind = Kind::k##Name;                          \
+    emitter.primitive = i;                                 \
+    emitter.radiance = light.Strength();                   \
+    emitter.power = Name##Emission::Power(light, sphere_); \
+    add(emitter, numbers.list + i);                        \
   }
-  for (std::uint32_t i = 0; i < scene.spot_lights.size(); ++i) {
-    const SpotLight& spot = scene.spot_lights[i];
-    Emitter emitter;
-    emitter.kind = Kind::kSpot;
-    emitter.primitive = i;
-    emitter.radiance = spot.intensity;
-    // The smoothstep's mean is one half.
-    emitter.power =
-        emitter.radiance *
-        (2 * kPi *
-         ((1 - spot.cos_falloff_start) + 0.5F * (spot.cos_falloff_start - spot.cos_total_width)));
-    add(emitter, numbers.spots + i);
-  }
-  for (std::uint32_t i = 0; i < scene.distant_lights.size(); ++i) {
-    Emitter emitter;
-    emitter.kind = Kind::kDistant;
-    emitter.primitive = i;
-    emitter.radiance = scene.distant_lights[i].irradiance;
-    emitter.power = emitter.radiance * (kPi * radius_ * radius_);
-    add(emitter, numbers.distant + i);
-  }
+  LUCERNA_DELTA_LIGHTS(LUCERNA_ADD)
+#undef LUCERNA_ADD
   for (const InfiniteLight& light : scene.infinite_lights) {
     if (light.map == nullptr) {
       infinite_radiance_ += light.radiance;
@@ -143,7 +153,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
     Emitter emitter;
     emitter.kind = Kind::kInfinite;
     emitter.radiance = infinite_radiance_;
-    emitter.power = emitter.radiance * (4 * kPi * kPi * radius_ * radius_);
+    emitter.power = emitter.radiance * (4 * kPi * kPi * sphere_.radius * sphere_.radius);
     // Infinite lights are unreachable together or not at all.
     add(emitter, numbers.infinite);
   }
@@ -153,7 +163,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
     emitter.kind = Kind::kEnvironment;
     emitter.primitive = i;
     emitter.radiance = environments_[i].MeanRadiance();
-    emitter.power = emitter.radiance * (4 * kPi * kPi * radius_ * radius_);
+    emitter.power = emitter.radiance * (4 * kPi * kPi * sphere_.radius * sphere_.radius);
     add(emitter, numbers.infinite);
   }
 
@@ -252,6 +262,7 @@ void LightSet::GroupLights(const std::vector<std::size_t>& light_of,
     light.kind = emitter.kind;
     light.power += emitter.power;
     light.position = light.position + CentreOf(emitter);
+    light.is_at_infinity = IsAtInfinity(emitter.kind);
     ++light.emitters;
   }
   for (LightGroup& light : lights_)
@@ -270,12 +281,11 @@ Vec3 LightSet::CentreOf(const Emitter& emitter) const {
       return scene_.spheres[emitter.primitive].center;
     case Kind::kDisk:
       return scene_.disks[emitter.primitive].center;
-    case Kind::kPoint:
-      return scene_.point_lights[emitter.primitive].position;
-    case Kind::kSpot:
-      return scene_.spot_lights[emitter.primitive].position;
-    case Kind::kDistant:
-      return scene_.distant_lights[emitter.primitive].direction;
+#define LUCERNA_CASE(Name, list, name) \
+  case Kind::k##Name:                  \
+    return scene_.list[emitter.primitive].Place();
+      LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
     default:
       return {};
   }
@@ -364,53 +374,55 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
       emission.density = AreaDensity(emitter);
       return local.z > 0;
     }
-    case Kind::kPoint:
-      emission.ray.origin = scene_.point_lights[emitter.primitive].position;
-      emission.ray.direction = SquareToSphere(u_direction1, u_direction2);
-      return true;
-    case Kind::kSpot: {
-      const SpotLight& spot = scene_.spot_lights[emitter.primitive];
-      emission.ray.origin = spot.position;
-      // Uniform in the outer cone, weighted by the falloff over its mean.
-      const float cone = 1 - spot.cos_total_width;
-      const Vec3 local = SquareToCone(u_direction1, u_direction2, cone);
-      emission.ray.direction = Frame(spot.direction).ToWorld(local);
-      const float falloff = SpotFalloff(spot, local.z);
-      emission.flux = emitter.radiance * (falloff * 2 * kPi * cone / emitter.choice);
-      return falloff > 0;
-    }
-    case Kind::kDistant: {
-      const Vec3 direction = scene_.distant_lights[emitter.primitive].direction;
-      const Frame frame(direction);
-      const Vec3 disk = SquareToDisk(u_place1, u_place2) * radius_;
-      emission.ray.origin = center_ - direction * radius_ + frame.s * disk.x + frame.t * disk.y;
-      emission.ray.direction = direction;
-      return true;
-    }
+#define LUCERNA_CASE(Name, list, name)                                                      \
+  case Kind::k##Name:                                                                       \
+    return Name##Emission::SampleEmission(scene_.list[emitter.primitive], emitter, sphere_, \
+                                          {u_place1, u_place2, u_direction1, u_direction2}, \
+                                          emission);
+      LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
     case Kind::kEnvironment: {
       const EnvironmentMap& sky = environments_[emitter.primitive];
       const Vec3 towards = sky.Sample(u_direction1, u_direction2);
       const float pdf = sky.PdfSolidAngle(towards);
       if (!(pdf > 0)) return false;
       const Frame frame(-towards);
-      const Vec3 disk = SquareToDisk(u_place1, u_place2) * radius_;
-      emission.ray.origin = center_ + towards * radius_ + frame.s * disk.x + frame.t * disk.y;
+      const Vec3 disk = SquareToDisk(u_place1, u_place2) * sphere_.radius;
+      emission.ray.origin =
+          sphere_.center + towards * sphere_.radius + frame.s * disk.x + frame.t * disk.y;
       emission.ray.direction = -towards;
-      emission.flux = sky.Radiance(towards) * (kPi * radius_ * radius_ / (pdf * emitter.choice));
+      emission.flux =
+          sky.Radiance(towards) * (kPi * sphere_.radius * sphere_.radius / (pdf * emitter.choice));
       emission.density = EmissionDensityInfinite(towards);
       return true;
     }
     case Kind::kInfinite: {
       const Vec3 direction = SquareToSphere(u_direction1, u_direction2);
       const Frame frame(direction);
-      const Vec3 disk = SquareToDisk(u_place1, u_place2) * radius_;
-      emission.ray.origin = center_ - direction * radius_ + frame.s * disk.x + frame.t * disk.y;
+      const Vec3 disk = SquareToDisk(u_place1, u_place2) * sphere_.radius;
+      emission.ray.origin =
+          sphere_.center - direction * sphere_.radius + frame.s * disk.x + frame.t * disk.y;
       emission.ray.direction = direction;
       emission.density = EmissionDensityInfinite(-direction);
       return true;
     }
   }
   return false;
+}
+
+std::optional<Spectrum> LightSet::DeltaSource(const Emission& emission, double edge_strength,
+                                              const SpectrumLimits& limits) const {
+  const Emitter& emitter = emitters_[emission.emitter];
+  switch (emitter.kind) {
+#define LUCERNA_CASE(Name, list, name)                                               \
+  case Kind::k##Name:                                                                \
+    return Name##Emission::Source(scene_.list[emitter.primitive], emitter, emission, \
+                                  edge_strength, limits);
+    LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    default:
+      return std::nullopt;
+  }
 }
 
 bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
@@ -447,34 +459,11 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
       }
       break;
     }
-    case Kind::kPoint: {
-      const Vec3 to = scene_.point_lights[emitter.primitive].position - from;
-      const float distance2 = LengthSquared(to);
-      sample.is_distant = false;
-      sample.target = scene_.point_lights[emitter.primitive].position;
-      sample.wi = to / std::sqrt(distance2);
-      sample.radiance_over_pdf = emitter.radiance / (distance2 * emitter.direct_choice);
-      sample.pdf = 0;
-      return distance2 > 0;
-    }
-    case Kind::kSpot: {
-      const SpotLight& spot = scene_.spot_lights[emitter.primitive];
-      const Vec3 to = spot.position - from;
-      const float distance2 = LengthSquared(to);
-      sample.is_distant = false;
-      sample.target = spot.position;
-      sample.wi = to / std::sqrt(distance2);
-      const float falloff = SpotFalloff(spot, -Dot(sample.wi, spot.direction));
-      sample.radiance_over_pdf = emitter.radiance * (falloff / (distance2 * emitter.direct_choice));
-      sample.pdf = 0;
-      return distance2 > 0 && falloff > 0;
-    }
-    case Kind::kDistant:
-      sample.wi = -scene_.distant_lights[emitter.primitive].direction;
-      sample.is_distant = true;
-      sample.radiance_over_pdf = emitter.radiance / emitter.direct_choice;
-      sample.pdf = 0;
-      return true;
+#define LUCERNA_CASE(Name, list, name) \
+  case Kind::k##Name:                  \
+    return Name##Emission::SampleDirect(scene_.list[emitter.primitive], emitter, from, sample);
+      LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
     case Kind::kInfinite:
     case Kind::kEnvironment:
       sample.wi = emitter.kind == Kind::kInfinite ? SquareToSphere(u1, u2)
@@ -577,7 +566,7 @@ float LightSet::EmissionDensityInfinite(Vec3 direction) const {
   for (std::size_t i = 0; i < environments_.size(); ++i) {
     pdf += emitters_[first_environment_ + i].choice * environments_[i].PdfSolidAngle(direction);
   }
-  return pdf / (kPi * radius_ * radius_);
+  return pdf / (kPi * sphere_.radius * sphere_.radius);
 }
 
 Rgb LightSet::InfiniteRadiance(Vec3 direction) const {

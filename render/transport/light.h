@@ -9,8 +9,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string_view>
 #include <vector>
 
+#include "render/frequency/spectrum.h"
 #include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
 #include "render/math/rgb.h"
@@ -35,12 +38,15 @@ enum class EmitterKind : std::uint8_t {
   kTriangle,
   kSphere,
   kDisk,
-  kPoint,
-  kSpot,
-  kDistant,
+#define LUCERNA_KIND(Name, list, name) k##Name,
+  LUCERNA_DELTA_LIGHTS(LUCERNA_KIND)  // scene/light_list.h
+#undef LUCERNA_KIND
   kInfinite,    // the same from everywhere
   kEnvironment  // a map
 };
+
+// "triangle", "sphere", "point light".
+[[nodiscard]] std::string_view NameOf(EmitterKind kind);
 
 struct Emitter {
   EmitterKind kind = EmitterKind::kPoint;
@@ -66,7 +72,8 @@ struct LightGroup {
   // More than 1: the faintest lights together, the other members but `power` are meaningless.
   std::uint32_t lights = 1;
   Rgb power;
-  Vec3 position;  // of an area light its centre; of a distant light the direction it travels
+  Vec3 position;  // of an area light its centre; at infinity, the direction its light travels in
+  bool is_at_infinity = false;
 };
 
 // Light that arrives at a point from one emitter.
@@ -77,6 +84,12 @@ struct LightSample {
   Rgb radiance_over_pdf;  // [W·m⁻²·sr⁻¹ / (choice × solid angle)]; for delta lights irradiance
                           // on a plane facing the light, over the choice
   float pdf = 0;  // choice × pdf_solid_angle [sr⁻¹]; 0 for delta lights
+};
+
+// Around all shapes.
+struct BoundingSphere {
+  Vec3 center;
+  float radius = 0;
 };
 
 class LightSet {
@@ -105,6 +118,11 @@ class LightSet {
   [[nodiscard]] bool SampleEmission(double u_choice, float u_place1, float u_place2,
                                     float u_direction1, float u_direction2,
                                     Emission& emission) const;
+
+  // The spectrum of a photon of a delta light, absent for other emitters. `edge_strength`: see
+  // frequency/bandwidth.h.
+  [[nodiscard]] std::optional<Spectrum> DeltaSource(const Emission& emission, double edge_strength,
+                                                    const SpectrumLimits& limits) const;
 
   // Draws light arriving at `from`, without asking whether anything is in the way. False when the
   // drawn emitter sends nothing there.
@@ -145,8 +163,7 @@ class LightSet {
                float& clearance) const;
 
   const Scene& scene_;
-  Vec3 center_;
-  float radius_ = 0;  // of the scene's bounding sphere
+  BoundingSphere sphere_;
   std::vector<Emitter> emitters_;
   std::vector<double> cumulative_, direct_cumulative_;  // [emitters] of the choices
   // [geometry]: number of its first emitter, or -1.

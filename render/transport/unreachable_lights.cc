@@ -2,13 +2,19 @@
 
 namespace lucerna {
 
-LightNumbers::LightNumbers(const Scene& scene)
-    : spheres(static_cast<std::uint32_t>(scene.meshes.size())),
-      disks(spheres + static_cast<std::uint32_t>(scene.spheres.size())),
-      points(disks + static_cast<std::uint32_t>(scene.disks.size())),
-      spots(points + static_cast<std::uint32_t>(scene.point_lights.size())),
-      distant(spots + static_cast<std::uint32_t>(scene.spot_lights.size())),
-      infinite(distant + static_cast<std::uint32_t>(scene.distant_lights.size())),
-      end(infinite + static_cast<std::uint32_t>(scene.infinite_lights.size())) {}
+LightNumbers::LightNumbers(const Scene& scene) {
+  const auto count = [](const auto& items) { return static_cast<std::uint32_t>(items.size()); };
+  spheres = count(scene.meshes);
+  disks = spheres + count(scene.spheres);
+  delta = disks + count(scene.disks);
+  std::uint32_t next = delta;
+#define LUCERNA_NUMBER(Name, list, name) \
+  list = next;                           \
+  next += count(scene.list);
+  LUCERNA_DELTA_LIGHTS(LUCERNA_NUMBER)
+#undef LUCERNA_NUMBER
+  infinite = next;
+  end = infinite + count(scene.infinite_lights);
+}
 
 }  // namespace lucerna

@@ -9,11 +9,17 @@
 namespace lucerna {
 
 // Lights are numbered: meshes, spheres, disks (shapes that do not emit have a number too), then
-// points, spots, distant and infinite lights.
+// delta lights in the order of their kinds (scene/light_list.h), then infinite lights. Each member
+// is the number of the first of a kind.
 struct LightNumbers {
   explicit LightNumbers(const Scene& scene);
 
-  std::uint32_t spheres, disks, points, spots, distant, infinite, end;
+  std::uint32_t spheres = 0, disks = 0;
+  std::uint32_t delta = 0;  // the first of any delta light
+#define LUCERNA_MEMBER(Name, list, name) std::uint32_t list = 0;
+  LUCERNA_DELTA_LIGHTS(LUCERNA_MEMBER)
+#undef LUCERNA_MEMBER
+  std::uint32_t infinite = 0, end = 0;
 };
 
 // Lights by number, ascending.

@@ -103,7 +103,7 @@ Scene LitOnlyBy(Scene scene, std::uint32_t number) {
   keep(scene.meshes, 0);
   keep(scene.spheres, numbers.spheres);
   keep(scene.disks, numbers.disks);
-  if (number != numbers.points) scene.point_lights.clear();
+  if (number != numbers.point_lights) scene.point_lights.clear();
   if (number != numbers.infinite) scene.infinite_lights.clear();
   return scene;
 }

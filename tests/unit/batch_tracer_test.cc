@@ -158,7 +158,7 @@ TEST(BatchTracerTest, MakesForEveryJobWhatItNeeds) {
   f.scene.point_lights.push_back({{0.5F, 0.5F, 0}, Gray(10)});
   const SceneNeeds all = NeedsOf(f.scene, f.settings);
   const LightNumbers numbers(f.scene);
-  const SceneNeeds less(all.parts(), all.eye_sample_sets(), {{numbers.points}, {}});
+  const SceneNeeds less(all.parts(), all.eye_sample_sets(), {{numbers.point_lights}, {}});
   const auto run = [&](BatchTracer& tracer, const SceneNeeds& needs) {
     return tracer.Run(f.settings, needs, 0, 0, 2000, f.block, f.radii, f.stop).value();
   };

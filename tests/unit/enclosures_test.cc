@@ -128,8 +128,9 @@ TEST(UnreachableLightsTest, AreThoseInAnotherRoom) {
   rooms.AddPoint({3, 1, 0.5F});
   rooms.scene.infinite_lights.push_back({Gray(1)});
   const LightNumbers numbers(rooms.scene);
-  EXPECT_EQ(FindUnreachableLights(rooms.scene).of_photons,
-            (Numbers{12, numbers.spheres, numbers.disks, numbers.points + 1, numbers.infinite}));
+  EXPECT_EQ(
+      FindUnreachableLights(rooms.scene).of_photons,
+      (Numbers{12, numbers.spheres, numbers.disks, numbers.point_lights + 1, numbers.infinite}));
 
   // A window of glass lets everything in, and so does a door.
   Scene window = rooms.scene;
@@ -144,7 +145,7 @@ TEST(UnreachableLightsTest, AreThoseInAnotherRoom) {
   Scene skylight = rooms.scene;
   skylight.meshes[5].traits.material = rooms.glass;
   EXPECT_EQ(FindUnreachableLights(skylight).of_photons,
-            (Numbers{12, numbers.spheres, numbers.disks, numbers.points + 1}));
+            (Numbers{12, numbers.spheres, numbers.disks, numbers.point_lights + 1}));
 }
 
 // What touches a wall, or reaches through it, may shine on both sides.

@@ -411,7 +411,7 @@ TEST(LightSetTest, LeavesOutWhatTheJobDoesNotNeed) {
   EXPECT_EQ(unseen.emitter(0).choice, 0);
   EXPECT_EQ(unseen.emitter(0).direct_choice, 0);
 
-  const LightSet unsampled = set({}, {numbers.points + 1, numbers.infinite});
+  const LightSet unsampled = set({}, {numbers.point_lights + 1, numbers.infinite});
   EXPECT_EQ(unsampled.TotalPower(), all.TotalPower());
   for (std::uint32_t i = 0; i < 4; ++i)
     EXPECT_EQ(unsampled.emitter(i).choice, all.emitter(i).choice);
@@ -428,7 +428,7 @@ TEST(LightSetTest, LeavesOutWhatTheJobDoesNotNeed) {
 
   LightSample sample;
   const LightSet none =
-      set({}, {numbers.spheres, numbers.points, numbers.points + 1, numbers.infinite});
+      set({}, {numbers.spheres, numbers.point_lights, numbers.point_lights + 1, numbers.infinite});
   EXPECT_FALSE(none.SampleDirect({3, 3, 3}, 0.5, 0.4F, 0.6F, sample));
   EXPECT_EQ(none.TotalPower(), all.TotalPower());
 }

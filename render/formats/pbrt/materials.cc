@@ -6,7 +6,7 @@
 
 #include "render/base/text.h"
 #include "render/formats/pbrt/kinds.h"
-#include "render/formats/pbrt/optical_constants.h"
+#include "render/formats/pbrt/material_readers.h"
 
 namespace lucerna {
 namespace {
@@ -14,7 +14,18 @@ namespace {
 // Below this width pbrt-v4 renders a surface as perfectly smooth.
 constexpr double kSmoothAlpha = 1e-3;
 constexpr Range kRoughness = {0, 1e3};
-constexpr Range kIndexRange = {0.01, 100};
+
+using MaterialReader = void (*)(ParameterList&, const TextureNames&, Material&);
+
+#define LUCERNA_READER(Name, name)                                                      \
+  {name, [](ParameterList& parameters, const TextureNames& names, Material& material) { \
+     material.kind = Material::Kind::k##Name;                                           \
+     Read##Name(parameters, names, material);                                           \
+   }},
+constexpr Kind<MaterialReader> kKinds[] = {LUCERNA_MATERIALS(LUCERNA_READER)};
+#undef LUCERNA_READER
+
+}  // namespace
 
 void ReadRoughness(ParameterList& parameters, Material& material) {
   const double roughness = parameters.Float("roughness", 0, kRoughness);
@@ -30,7 +41,6 @@ void ReadRoughness(ParameterList& parameters, Material& material) {
   material.alpha_v = static_cast<float>(std::max(alpha_v, kSmallestAlpha));
 }
 
-// The texture that `name` refers to, if it is one and can be used.
 std::int32_t FindTexture(std::string_view name, ParameterList& parameters,
                          const TextureNames& names) {
   if (!parameters.IsTexture(name)) return kNoTexture;
@@ -45,54 +55,6 @@ std::int32_t FindTexture(std::string_view name, ParameterList& parameters,
   if (named->second.number == kNoTexture) parameters.Error(name, named->second.why_not);
   return named->second.number;
 }
-
-void ReadDiffuse(ParameterList& parameters, const TextureNames& names, Material& material) {
-  material.kind = Material::Kind::kDiffuse;
-  if (parameters.IsTexture("reflectance")) {
-    material.texture = FindTexture("reflectance", parameters, names);
-  } else {
-    material.reflectance = parameters.FindReflectance("reflectance").value_or(Gray(0.5F));
-  }
-}
-
-void ReadConductor(ParameterList& parameters, const TextureNames& names, Material& material) {
-  material.kind = Material::Kind::kConductor;
-  const bool is_textured = parameters.IsTexture("reflectance");
-  if (is_textured) material.texture = FindTexture("reflectance", parameters, names);
-  const std::optional<Rgb> reflectance =
-      is_textured ? Gray(0.5F) : parameters.FindReflectance("reflectance");
-  if (reflectance.has_value()) {
-    if (parameters.Has("eta") || parameters.Has("k")) {
-      parameters.Error("reflectance", "and eta or k exclude each other; give one or the other");
-    }
-    parameters.Ignore("eta");
-    parameters.Ignore("k");
-    material.eta = Gray(1);
-    material.k = {AbsorptionFor(reflectance->r), AbsorptionFor(reflectance->g),
-                  AbsorptionFor(reflectance->b)};
-  } else {
-    const MetalConstants copper = MetalNamed("Cu").value();
-    material.eta = parameters.FindOpticalConstant("eta", kIndexRange).value_or(copper.eta);
-    material.k = parameters.FindOpticalConstant("k", {0, 1000}).value_or(copper.k);
-  }
-  ReadRoughness(parameters, material);
-}
-
-void ReadDielectric(ParameterList& parameters, const TextureNames& /*names*/, Material& material) {
-  material.kind = Material::Kind::kDielectric;
-  material.ior =
-      static_cast<float>(parameters.FindRefractiveIndex("eta", kIndexRange).value_or(1.5));
-  ReadRoughness(parameters, material);
-}
-
-using MaterialReader = void (*)(ParameterList&, const TextureNames&, Material&);
-constexpr Kind<MaterialReader> kKinds[] = {
-    {"diffuse", &ReadDiffuse},
-    {"conductor", &ReadConductor},
-    {"dielectric", &ReadDielectric},
-};
-
-}  // namespace
 
 bool IsPbrtV3Material(std::string_view type) {
   constexpr std::array<std::string_view, 11> kTypes = {

@@ -8,6 +8,7 @@
 #include "render/formats/pbrt/lights.h"
 #include "render/formats/pbrt/materials.h"
 #include "render/formats/pbrt/settings.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 
@@ -218,12 +219,7 @@ bool DirectiveReader::OnShape(Arguments& arguments) {
     if (!IsFinite(light.radiance)) list.Error("is too small for its power");
     const auto index = static_cast<std::int32_t>(scene_.area_lights.size());
     scene_.area_lights.push_back(light);
-    for (TriangleMesh& mesh : shapes.meshes)
-      mesh.traits.area_light = index;
-    for (Sphere& sphere : shapes.spheres)
-      sphere.traits.area_light = index;
-    for (Disk& disk : shapes.disks)
-      disk.traits.area_light = index;
+    ForEachShapeTraits(shapes, [&](ShapeTraits& traits) { traits.area_light = index; });
   }
   AddShapes(std::move(shapes));
   return true;

@@ -1,0 +1,100 @@
+// LightSource "infinite": constant light, or an environment map.
+#include <algorithm>
+
+#include "render/base/text.h"
+#include "render/formats/pbrt/light_readers.h"
+#include "render/formats/pbrt/shapes.h"
+#include "render/math/equal_area_square.h"
+
+namespace lucerna {
+namespace {
+
+// [W·m⁻²] luminance of what falls onto a plane that looks along z of the map. pbrt-v4 weighs each
+// pixel by half its solid angle and so renders a map with an illuminance twice as bright; here it
+// means what it means for a constant light.
+double IlluminanceOf(const Picture& map) {
+  // A pixel of a small map is large, and the horizon runs through some.
+  constexpr int kFineSide = 512;
+  const int parts = std::max(1, kFineSide / map.width);
+  const int side = map.width * parts;
+  double sum = 0;
+  for (int y = 0; y < side; ++y) {
+    for (int x = 0; x < side; ++x) {
+      const Vec3 direction =
+          EqualAreaDirection({(static_cast<float>(x) + 0.5F) / static_cast<float>(side),
+                              (static_cast<float>(y) + 0.5F) / static_cast<float>(side)});
+      if (!(direction.z > 0)) continue;
+      sum += static_cast<double>(Luminance(map.At(x / parts, y / parts)) * direction.z);
+    }
+  }
+  return sum * 4 * kPiD / (static_cast<double>(side) * side);
+}
+
+void ReadEnvironment(const LightInput& input, double scale, double illuminance) {
+  ParameterList& parameters = input.parameters;
+  if (parameters.Has("L")) {
+    parameters.Error("L", "and filename exclude each other; give one or the other");
+    parameters.Ignore("L");
+  }
+  const std::optional<std::string> file = parameters.FindString("filename");
+  if (!file.has_value()) return;
+  StatusOr<std::shared_ptr<const Picture>> map = input.assets.ReadPicture(*file, {});
+  if (!map.ok()) {
+    parameters.Error("filename", Concat("cannot be read: ", map.status().message()));
+    return;
+  }
+  if ((*map)->width != (*map)->height) {
+    parameters.Error("filename", Concat("has ", (*map)->width, " x ", (*map)->height,
+                                        " pixels; an environment is an equal-area map, which is "
+                                        "square (pbrt-v4 converts others: imgtool makeequiarea)"));
+    return;
+  }
+  const StatusOr<ShapeAxes> axes = AxesOf(input.to_world);
+  if (!axes.ok()) {
+    parameters.Error("is stretched by its transform, which is not supported; scale all axes alike");
+    return;
+  }
+  if (illuminance > 0) {
+    const double given = IlluminanceOf(**map);
+    if (!(given > 0)) {
+      parameters.Error("illuminance", "cannot be reached: the upper half of the map is black");
+      return;
+    }
+    scale *= illuminance / given;
+  }
+  InfiniteLight light;
+  light.radiance = Gray(static_cast<float>(scale));
+  light.axes = *axes;
+  // Summed over all pixels in single precision.
+  if (!(scale * static_cast<double>((*map)->Largest()) < 1e30)) {
+    parameters.Error("is too bright for single precision");
+    return;
+  }
+  light.map = *std::move(map);
+  input.scene.infinite_lights.push_back(std::move(light));
+}
+
+}  // namespace
+
+void ReadInfiniteLight(const LightInput& input) {
+  ParameterList& parameters = input.parameters;
+  if (parameters.Has("portal")) {
+    parameters.Error("portal", "is not supported");
+    parameters.Ignore("portal");
+  }
+  double scale = parameters.Float("scale", 1, kZeroOrMore);
+  const double illuminance = parameters.Float("illuminance", -1);
+  if (parameters.Has("filename")) {
+    ReadEnvironment(input, scale, illuminance);
+    return;
+  }
+  const Rgb color = parameters.FindEmission("L").value_or(Gray(1));
+  // A surface that sees constant radiance L over its hemisphere receives pi L.
+  if (illuminance > 0) scale *= illuminance / kPiD;
+  InfiniteLight light;
+  light.radiance = ScaledEmission(parameters, color, scale);
+  input.scene.infinite_lights.push_back(light);
+  WarnIfBlack(parameters, light.radiance);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,29 @@
+// The readers of each kind of material, defined in material_NAME.cc, and what they share.
+//
+// A reader sets the numbers of `material`, whose kind is set, from the parameters of its directive.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "render/formats/pbrt/parameter_list.h"
+#include "render/formats/pbrt/textures.h"
+#include "render/scene/material.h"
+
+namespace lucerna {
+
+#define LUCERNA_DECLARE(Name, name) \
+  void Read##Name(ParameterList& parameters, const TextureNames& names, Material& material);
+LUCERNA_MATERIALS(LUCERNA_DECLARE)
+#undef LUCERNA_DECLARE
+
+inline constexpr Range kIndexRange = {0.01, 100};  // of refraction
+
+// alpha_u and alpha_v, from roughness, uroughness, vroughness and remaproughness.
+void ReadRoughness(ParameterList& parameters, Material& material);
+
+// The texture that the parameter `name` refers to, if it is one and can be used; else kNoTexture.
+[[nodiscard]] std::int32_t FindTexture(std::string_view name, ParameterList& parameters,
+                                       const TextureNames& names);
+
+}  // namespace lucerna

@@ -1,0 +1,21 @@
+// Parallel light from infinity. Members as in scene/light_list.h.
+#pragma once
+
+#include "render/math/rgb.h"
+#include "render/math/vector.h"
+
+namespace lucerna {
+
+struct DistantLight {
+  static constexpr bool kIsAtInfinity = true;
+
+  Vec3 direction;  // unit, the way the light travels
+  Rgb irradiance;  // [W·m⁻²] on a plane facing it
+
+  [[nodiscard]] Vec3 Place() const { return direction; }
+  [[nodiscard]] const Rgb& Strength() const { return irradiance; }
+  [[nodiscard]] Rgb& Strength() { return irradiance; }
+  [[nodiscard]] static bool Scale(double /*factor*/) { return true; }
+};
+
+}  // namespace lucerna

@@ -1,0 +1,57 @@
+#include "render/scene/material.h"
+
+namespace lucerna {
+namespace {
+
+// Calls `visit` with what declares the functions of `kind`.
+template <typename Visit>
+auto WithKind(MaterialNumbers::Kind kind, const Visit& visit) {
+  using Kind = MaterialNumbers::Kind;
+  switch (kind) {
+#define LUCERNA_CASE(Name, name) \
+  case Kind::k##Name:            \
+    return visit(Name##Kind());
+    LUCERNA_MATERIALS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+  }
+  return visit(DiffuseKind());
+}
+
+}  // namespace
+
+MaterialProperties PropertiesOf(const MaterialNumbers& material) {
+  return WithKind(material.kind, [&](auto kind) { return kind.Properties(material); });
+}
+
+std::vector<MaterialProperties> PropertiesOf(const std::vector<Material>& materials) {
+  std::vector<MaterialProperties> properties;
+  properties.reserve(materials.size());
+  for (const Material& material : materials)
+    properties.push_back(PropertiesOf(material));
+  return properties;
+}
+
+std::string_view NameOf(MaterialNumbers::Kind kind) {
+  switch (kind) {
+#define LUCERNA_CASE(Name, name)       \
+  case MaterialNumbers::Kind::k##Name: \
+    return name;
+    LUCERNA_MATERIALS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+  }
+  return "";
+}
+
+Rgb TexturedParameter(const MaterialNumbers& material) {
+  return WithKind(material.kind, [&](auto kind) { return kind.Textured(material); });
+}
+
+void SetTexturedParameter(MaterialNumbers& material, Rgb value) {
+  WithKind(material.kind, [&](auto kind) { kind.SetTextured(material, value); });
+}
+
+Rgb TexturedValue(MaterialNumbers::Kind kind, Rgb color) {
+  return WithKind(kind, [&](auto of_kind) { return of_kind.TexturedValue(color); });
+}
+
+}  // namespace lucerna

@@ -1,0 +1,31 @@
+// A metal: `eta` and `k`, or with a texture of its reflectance at right angles eta = 1 and a k that
+// follows from it; `alpha_u` and `alpha_v`.
+#include "render/scene/material.h"
+
+namespace lucerna {
+
+MaterialProperties ConductorKind::Properties(const MaterialNumbers& material) {
+  MaterialProperties properties;
+  properties.is_smooth = material.alpha_u == 0 && material.alpha_v == 0;
+  properties.lobe_width = std::max(material.alpha_u, material.alpha_v);
+  // What a metal with a texture reflects depends on the place, which hitpoints do not tell the
+  // workers: there, paths go on.
+  properties.gathers = material.texture == kNoTexture && properties.lobe_width >= kGatherAlpha;
+  return properties;
+}
+
+Rgb ConductorKind::Textured(const MaterialNumbers& material) {
+  return material.k;
+}
+
+void ConductorKind::SetTextured(MaterialNumbers& material, Rgb value) {
+  material.eta = Gray(1);
+  material.k = value;
+}
+
+// Like the indices of all metals, it stays in Rec. 709.
+Rgb ConductorKind::TexturedValue(Rgb color) {
+  return {AbsorptionFor(color.r), AbsorptionFor(color.g), AbsorptionFor(color.b)};
+}
+
+}  // namespace lucerna

@@ -1,0 +1,39 @@
+// Light from a point.
+#include <cmath>
+
+#include "render/math/warp.h"
+#include "render/transport/light_kinds.h"
+
+namespace lucerna {
+
+Rgb PointEmission::Power(const PointLight& light, const BoundingSphere& /*scene*/) {
+  return light.intensity * (4 * kPi);
+}
+
+bool PointEmission::SampleEmission(const PointLight& light, const Emitter& /*emitter*/,
+                                   const BoundingSphere& /*scene*/, const EmissionNumbers& u,
+                                   Emission& emission) {
+  emission.ray.origin = light.position;
+  emission.ray.direction = SquareToSphere(u.direction1, u.direction2);
+  return true;
+}
+
+bool PointEmission::SampleDirect(const PointLight& light, const Emitter& emitter, Vec3 from,
+                                 LightSample& sample) {
+  const Vec3 to = light.position - from;
+  const float distance2 = LengthSquared(to);
+  sample.is_distant = false;
+  sample.target = light.position;
+  sample.wi = to / std::sqrt(distance2);
+  sample.radiance_over_pdf = emitter.radiance / (distance2 * emitter.direct_choice);
+  sample.pdf = 0;
+  return distance2 > 0;
+}
+
+Spectrum PointEmission::Source(const PointLight& /*light*/, const Emitter& /*emitter*/,
+                               const Emission& /*emission*/, double /*edge_strength*/,
+                               const SpectrumLimits& limits) {
+  return PointSource(limits);
+}
+
+}  // namespace lucerna
