@@ -3,34 +3,6 @@
 #include <openssl/evp.h>
 
 namespace lucerna {
-namespace {
-
-int HexValue(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-  return -1;
-}
-
-}  // namespace
-
-StatusOr<Digest> Digest::FromHex(std::string_view hex) {
-  std::array<std::uint8_t, kSize> bytes{};
-  if (hex.size() != 2 * kSize) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("a digest has 64 hexadecimal digits, not ", hex.size()));
-  }
-  for (std::size_t i = 0; i < kSize; ++i) {
-    const int high = HexValue(hex[2 * i]);
-    const int low = HexValue(hex[2 * i + 1]);
-    if (high < 0 || low < 0) {
-      return absl::InvalidArgumentError("a digest has only hexadecimal digits");
-    }
-    bytes[i] = static_cast<std::uint8_t>(16 * high + low);
-  }
-  return Digest(bytes);
-}
-
 StatusOr<Digest> Digest::FromBytes(std::string_view bytes) {
   if (bytes.size() != kSize) {
     return absl::InvalidArgumentError(absl::StrCat("a digest has 32 bytes, not ", bytes.size()));

@@ -25,8 +25,6 @@ class Digest {
   Digest() = default;
   explicit Digest(const std::array<std::uint8_t, kSize>& bytes) : bytes_(bytes) {}
 
-  // Errors: INVALID_ARGUMENT unless `hex` is 64 hexadecimal digits.
-  [[nodiscard]] static StatusOr<Digest> FromHex(std::string_view hex);
   // Errors: INVALID_ARGUMENT unless `bytes` is 32 bytes long.
   [[nodiscard]] static StatusOr<Digest> FromBytes(std::string_view bytes);
 

@@ -152,6 +152,13 @@ Spectrum RefractSagittalStep(Spectrum in, const Bending& bending, const SurfaceB
           in.h * ratio + gradients.second};
 }
 
+// The mean of s, v and p of two axes, the maximum of g and h.
+Spectrum BothAxes(const Spectrum& tangential, const Spectrum& sagittal) {
+  return {(tangential.s + sagittal.s) / 2, (tangential.v + sagittal.v) / 2,
+          (tangential.p + sagittal.p) / 2, std::max(tangential.g, sagittal.g),
+          std::max(tangential.h, sagittal.h)};
+}
+
 }  // namespace
 
 SpectrumLimits SpectrumLimits::ForDiagonal(double diagonal_m) {
@@ -297,10 +304,6 @@ Spectrum SphereSource(double radius_m, const SpectrumLimits& limits) {
 
 Spectrum DirectionalSource(const SpectrumLimits& limits) {
   return limits.Clamp({.p = kSmallestAngularVariance});
-}
-
-Spectrum SunSource(double angular_radius_rad, const SpectrumLimits& limits) {
-  return limits.Clamp({.p = angular_radius_rad * angular_radius_rad / 4});
 }
 
 Spectrum EnvironmentSource(double laplacian, double luminance, double mean_luminance,
@@ -452,14 +455,6 @@ Spectrum Blur(const Spectrum& spectrum, double lobe, const SpectrumLimits& limit
   return limits.Clamp(out);
 }
 
-Spectrum SeeThroughWindow(const Spectrum& spectrum, double precision,
-                          const SpectrumLimits& limits) {
-  const Spectrum in = limits.Clamp(spectrum);
-  const double q = std::clamp(precision, 0.0, 1 / kSmallestAngularVariance);
-  const double k = 1 / (1 + in.p * q);
-  return limits.Clamp({in.s + in.v * in.v * q * k, in.v * k, in.p * k, in.g, in.h});
-}
-
 Spectrum SeeGlossily(const Spectrum& spectrum, double cosine, const SurfaceBend& bend, double lobe,
                      const SpectrumLimits& limits) {
   Spectrum out = limits.Clamp(spectrum);
@@ -488,60 +483,6 @@ Spectrum Refract(const Spectrum& spectrum, double ior_ratio, double cosine, cons
   const SurfaceBend held = ClampBend(bend, limits);
   return limits.Clamp(
       BothAxes(RefractStep(in, bending, held), RefractSagittalStep(in, bending, held)));
-}
-
-Spectrum MirrorTangential(const Spectrum& spectrum, double cosine, const SurfaceBend& bend,
-                          const SpectrumLimits& limits) {
-  return limits.Clamp(
-      MirrorStep(limits.Clamp(spectrum), ClampCosine(cosine), ClampBend(bend, limits)));
-}
-
-Spectrum RefractTangential(const Spectrum& spectrum, double ior_ratio, double cosine,
-                           const SurfaceBend& bend, const SpectrumLimits& limits) {
-  return limits.Clamp(
-      RefractStep(limits.Clamp(spectrum), Bending(ior_ratio, cosine), ClampBend(bend, limits)));
-}
-
-Spectrum ParaxialMirrorTangential(const Spectrum& spectrum, double cosine, double curvature,
-                                  const SpectrumLimits& limits) {
-  Spectrum out = limits.Clamp(spectrum);
-  out.v += 2 * std::clamp(curvature, -limits.curvature, limits.curvature) / ClampCosine(cosine);
-  return limits.Clamp(out);
-}
-
-Spectrum ParaxialMirrorSagittal(const Spectrum& spectrum, double cosine, double curvature,
-                                const SpectrumLimits& limits) {
-  Spectrum out = limits.Clamp(spectrum);
-  out.v += 2 * std::clamp(curvature, -limits.curvature, limits.curvature) * ClampCosine(cosine);
-  return limits.Clamp(out);
-}
-
-Spectrum ParaxialRefractTangential(const Spectrum& spectrum, double ior_ratio, double cosine,
-                                   double curvature, const SpectrumLimits& limits) {
-  Spectrum out = limits.Clamp(spectrum);
-  const Bending bending(ior_ratio, cosine);
-  const double m = bending.cos2 / bending.cos1;
-  out.s /= m * m;
-  out.v = RefractedVergence(bending, bending.sin1, bending.cos1, out.v,
-                            std::clamp(curvature, -limits.curvature, limits.curvature));
-  out.p *= Square(bending.ratio / m);
-  return limits.Clamp(out);
-}
-
-Spectrum ParaxialRefractSagittal(const Spectrum& spectrum, double ior_ratio, double cosine,
-                                 double curvature, const SpectrumLimits& limits) {
-  Spectrum out = limits.Clamp(spectrum);
-  const Bending bending(ior_ratio, cosine);
-  out.v = bending.ratio * out.v -
-          bending.Power() * std::clamp(curvature, -limits.curvature, limits.curvature);
-  out.p *= bending.ratio * bending.ratio;
-  return limits.Clamp(out);
-}
-
-Spectrum BothAxes(const Spectrum& tangential, const Spectrum& sagittal) {
-  return {(tangential.s + sagittal.s) / 2, (tangential.v + sagittal.v) / 2,
-          (tangential.p + sagittal.p) / 2, std::max(tangential.g, sagittal.g),
-          std::max(tangential.h, sagittal.h)};
 }
 
 }  // namespace lucerna

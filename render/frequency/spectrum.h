@@ -12,8 +12,8 @@
 //
 // Each function is one event on a path: pure, in path order, without a look at the scene. All
 // that it needs comes in as a number. An axis is tangential (in the plane of incidence) or
-// sagittal (across it); a photon carries one spectrum for both, and the functions that name no
-// axis combine the two: means of s, v, p, maxima of g, h.
+// sagittal (across it); a photon carries one spectrum for both, and every function combines the
+// two: means of s, v, p, maxima of g, h.
 //
 // Promises of every function that returns a Spectrum
 //   1. Every number of the outcome is within the limits, whatever finite numbers come in.
@@ -96,8 +96,6 @@ struct EmitterMoments {
 [[nodiscard]] Spectrum SphereSource(double radius_m, const SpectrumLimits& limits);
 // All light from one direction.
 [[nodiscard]] Spectrum DirectionalSource(const SpectrumLimits& limits);
-// A distant disc of even brightness.
-[[nodiscard]] Spectrum SunSource(double angular_radius_rad, const SpectrumLimits& limits);
 // `laplacian` [rad⁻² × luminance] over the sphere of directions, of a map slightly blurred;
 // `mean_luminance` is that of the whole map.
 [[nodiscard]] Spectrum EnvironmentSource(double laplacian, double luminance, double mean_luminance,
@@ -171,10 +169,6 @@ inline constexpr double kDiffuseLobe = 0.25;
 // Directions blurred by a lobe of this variance [rad²], after Mirror or Refract.
 [[nodiscard]] Spectrum Blur(const Spectrum& spectrum, double lobe, const SpectrumLimits& limits);
 
-// One axis, seen through an angular window of precision `precision` [rad⁻²].
-[[nodiscard]] Spectrum SeeThroughWindow(const Spectrum& spectrum, double precision,
-                                        const SpectrumLimits& limits);
-
 // How a surface bends at a point.
 struct SurfaceBend {
   double tangential = 0;       // κ in the plane of incidence [m⁻¹]
@@ -190,7 +184,7 @@ struct SurfaceBend {
 [[nodiscard]] Spectrum SeeGlossily(const Spectrum& spectrum, double cosine, const SurfaceBend& bend,
                                    double lobe, const SpectrumLimits& limits);
 
-// Specular surfaces. Both axes and second order, for renders.
+// Specular surfaces, to second order.
 
 // A mirror, and total internal reflection: seen from inside, a convex body has κ < 0.
 [[nodiscard]] Spectrum Mirror(const Spectrum& spectrum, double cosine, const SurfaceBend& bend,
@@ -199,26 +193,5 @@ struct SurfaceBend {
 // gets through (beyond the critical angle) it is Mirror.
 [[nodiscard]] Spectrum Refract(const Spectrum& spectrum, double ior_ratio, double cosine,
                                const SurfaceBend& bend, const SpectrumLimits& limits);
-
-// One axis, second order: what Mirror and Refract do in the plane of incidence. The sagittal
-// curvature is not used.
-[[nodiscard]] Spectrum MirrorTangential(const Spectrum& spectrum, double cosine,
-                                        const SurfaceBend& bend, const SpectrumLimits& limits);
-[[nodiscard]] Spectrum RefractTangential(const Spectrum& spectrum, double ior_ratio, double cosine,
-                                         const SurfaceBend& bend, const SpectrumLimits& limits);
-
-// One axis, first order (Coddington's equations, Snell's law differentiated): g and h stay.
-[[nodiscard]] Spectrum ParaxialMirrorTangential(const Spectrum& spectrum, double cosine,
-                                                double curvature, const SpectrumLimits& limits);
-[[nodiscard]] Spectrum ParaxialMirrorSagittal(const Spectrum& spectrum, double cosine,
-                                              double curvature, const SpectrumLimits& limits);
-[[nodiscard]] Spectrum ParaxialRefractTangential(const Spectrum& spectrum, double ior_ratio,
-                                                 double cosine, double curvature,
-                                                 const SpectrumLimits& limits);
-[[nodiscard]] Spectrum ParaxialRefractSagittal(const Spectrum& spectrum, double ior_ratio,
-                                               double cosine, double curvature,
-                                               const SpectrumLimits& limits);
-// The mean of s, v and p of two axes, the maximum of g and h.
-[[nodiscard]] Spectrum BothAxes(const Spectrum& tangential, const Spectrum& sagittal);
 
 }  // namespace lucerna

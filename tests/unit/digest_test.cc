@@ -1,4 +1,4 @@
-// A digest is SHA-256 of the bytes, however they arrive, and survives being written down.
+// A digest is SHA-256 of the bytes, however they arrive.
 #include "render/base/digest.h"
 
 #include "gtest/gtest.h"
@@ -23,22 +23,12 @@ TEST(DigestTest, DoesNotDependOnThePieces) {
   EXPECT_EQ(stream.Finish(), Sha256("abc"));
 }
 
-TEST(DigestTest, ComesBackFromHexAndBytes) {
+TEST(DigestTest, ComesBackFromBytes) {
   const Digest digest = Sha256("abc");
-  EXPECT_EQ(Digest::FromHex(digest.Hex()).value(), digest);
-  EXPECT_EQ(
-      Digest::FromHex("BA7816BF8F01CFEA414140DE5DAE2223B00361A396177A9CB410FF61F20015AD").value(),
-      digest);
   EXPECT_EQ(Digest::FromBytes(digest.Bytes()).value(), digest);
 }
 
 TEST(DigestTest, RefusesWhatIsNotADigest) {
-  const std::string hex = kAbc;
-  EXPECT_FALSE(Digest::FromHex(hex.substr(1)).ok());
-  EXPECT_FALSE(Digest::FromHex(hex + hex).ok());
-  std::string wrong = hex;
-  wrong[0] = 'g';
-  EXPECT_FALSE(Digest::FromHex(wrong).ok());
   EXPECT_FALSE(Digest::FromBytes("short").ok());
 }
 

@@ -217,8 +217,9 @@ void Step(KeyedRng& rng, double reach, bool curved, Outcome& now) {
     case 5: {
       const double kappa = Signed(rng, any());
       const double c = 0.02 + 0.98 * static_cast<double>(rng.Uniform());
-      x = ParaxialMirrorTangential(x, c, kappa, kLimits);
-      r = Held({r.s, r.v + Tracked(2) * kappa / c, r.p, r.g, r.h});
+      const SurfaceBend bend = {.tangential = kappa};
+      x = Mirror(x, c, bend, kLimits);
+      r = MirrorReference(r, c, bend);
       return;
     }
     default: {
