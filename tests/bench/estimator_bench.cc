@@ -1,17 +1,20 @@
 // How fast are the parts that a render spends its time in?
 //
-// One thread each, so that numbers are per core. Scenes: the house's own, and water-caustic and
-// cornell-box where they lie beside the project, or those that the command line names.
-//   photon_paths    photon paths per second, tracing and keeping deposits
-//   photon_rays     the same rays again, intersection only: the ceiling
-//   eye_paths       eye paths per second with direct light
-//   batch           photons per second of a whole batch, for each kind of evidence, with the same
-//   radii gather          ns per (photon, hitpoint) pair, sorting the photons included wire bytes a
-//   hitpoint sent and a touched hitpoint returned, and codec speed merge           touched
-//   hitpoints merged per second; gather_whole_discs    the same without edges, and gathering one
-//   photon, where finding edges is all there is; feature_edges    finding all edges of the scene
+// One thread each, so that numbers are per core. Scenes: glass-box, and water-caustic,
+// cornell-box and others where they lie beside the project, or those that the command line names.
+// * photon_paths: photon paths per second, tracing and keeping deposits
+// * photon_rays: the same rays again, intersection only: the upper bound
+// * eye_paths: eye paths per second with direct light
+// * batch: photons per second of a whole batch, for each kind of evidence, with the same radii
+// * gather: seconds per pair of photon and hitpoint, sorting the photons included
+// * gather_whole_discs: the same without edges; with one photon only finding edges takes time
+// * feature_edges: finding all edges of the scene
+// * block_on_the_wire, accumulation_on_the_wire: bytes a hitpoint sent and a touched hitpoint
+//   returned, and speed of their codecs
+// * merge: touched hitpoints merged per second
+//
 // Run: build/release/bin/lucerna-bench --benchmark_repetitions=10
-// --benchmark_report_aggregates_only=true
+//      --benchmark_report_aggregates_only=true
 #include <atomic>
 #include <filesystem>
 #include <memory>
