@@ -2,6 +2,7 @@
 // exactly what was read.
 #include "render/scene/scene_files.h"
 
+#include <cstdlib>
 #include <filesystem>
 #include <string>
 
@@ -17,8 +18,9 @@ using ::testing::HasSubstr;
 
 class SceneFolder {
  public:
-  SceneFolder() : path_(testing::TempDir() + "lucerna_scene_files_test") {
-    std::filesystem::remove_all(path_);
+  // A folder of its own: tests of this file run at the same time.
+  SceneFolder() : path_(testing::TempDir() + "lucerna_scene_files_XXXXXX") {
+    EXPECT_NE(mkdtemp(path_.data()), nullptr);
     std::filesystem::create_directories(path_ + "/models");
     EXPECT_TRUE(WriteFile(path_ + "/scene.pbrt", "WorldBegin\n").ok());
     EXPECT_TRUE(WriteFile(path_ + "/models/a mesh.ply", "ply\n").ok());
@@ -48,7 +50,8 @@ TEST(SceneFilesTest, DirectoryFilesRemembersWhatWasRead) {
   EXPECT_TRUE(files.Read("scene.pbrt").ok());
   EXPECT_EQ(files.Read("missing.ply").status().code(), absl::StatusCode::kNotFound);
   EXPECT_FALSE(files.Read("models").ok());  // a folder
-  EXPECT_FALSE(files.Read("../lucerna_scene_files_test/scene.pbrt").ok());
+  const std::string folder_name = std::filesystem::path(folder.path()).filename();
+  EXPECT_FALSE(files.Read("../" + folder_name + "/scene.pbrt").ok());
 
   const SceneManifest manifest = files.Manifest("scene.pbrt");
   ASSERT_EQ(manifest.entries.size(), 2U);
