@@ -116,7 +116,7 @@ class SceneNeeds {
 
 [[nodiscard]] SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings);
 
-// Which of the walks compiled for eye paths and photons suits a job: bit 0 stands for textures,
+// Which of the walks compiled for photons suits a job: bit 0 stands for textures,
 // bit 1 for shading normals, bit 2 for other scattering than diffuse.
 [[nodiscard]] inline std::size_t WalkPartsOf(const SceneNeeds& needs) {
   return (needs.Uses(Part::kTextures) ? 1U : 0U) | (needs.Uses(Part::kShadingNormals) ? 2U : 0U) |

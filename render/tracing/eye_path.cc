@@ -1,11 +1,9 @@
 #include "render/tracing/eye_path.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <utility>
 
 #include "render/math/warp.h"
 #include "render/tracing/direct_light.h"
@@ -48,7 +46,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
     : scene_(scene),
       settings_(settings),
       eye_sets_(needs.eye_sample_sets()),
-      walk_(WalkFor(needs)),
+      parts_(WalkPartsFor(needs)),
       properties_(PropertiesOf(scene.materials)),
       has_lens_(needs.Uses(Part::kLens)),
       rays_find_lights_(needs.Uses(Part::kAreaLights) || needs.Uses(Part::kEnvironment)),
@@ -92,7 +90,7 @@ EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass, First first) cons
   const PixelSampler sampler(settings_.seed, pixel, pass, EyeSetOf(pass, eye_sets_));
   // The filter's weight is kept out of the walk, because it can be negative.
   float filter_weight = 1;
-  EyePath path = (this->*walk_)(CameraRay(sampler, x, y, filter_weight), sampler, first);
+  EyePath path = Walk(CameraRay(sampler, x, y, filter_weight), sampler, first);
   path.direct *= filter_weight;
   path.hitpoint.weight *= filter_weight;
   path.caustic.weight *= path.caustic_strength * filter_weight;
@@ -166,7 +164,6 @@ bool EyePathTracer::FindFirst(const Ray& ray, First first, Hit& hit) const {
   return true;
 }
 
-template <EyePathTracer::WalkParts kParts>
 EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) const {
   EyePath path;
   Rgb weight = Gray(1);
@@ -184,12 +181,12 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     bool is_last = false;
     bool was_left_smoothly = false;
   };
-  [[maybe_unused]] Receiver receiver;
+  Receiver receiver;
   const auto share_of_rays = [&](float emission_density) {
-    if (!kParts.caustics || !receiver.was_left_smoothly) return 1.0F;
+    if (!parts_.caustics || !receiver.was_left_smoothly) return 1.0F;
     return caustic_weight_.OfRays(emission_density, receiver.cosine, receiver.scatter_pdf);
   };
-  [[maybe_unused]] KeyedRng caustic_rng = sampler.ForCaustics();
+  KeyedRng caustic_rng = sampler.ForCaustics();
 
   for (int vertex = 0;; ++vertex) {
     Hit hit;
@@ -214,13 +211,12 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
               : 1;
       path.direct += weight * emitted * (mis * share_of_rays(lights_.EmissionDensity(surface)));
     }
-    [[maybe_unused]] std::optional<Material> textured;
+    std::optional<Material> textured;
     const Material& material = [&]() -> const Material& {
-      if constexpr (kParts.textures) return MaterialAt(scene_, surface, textured);
+      if (parts_.textures) return MaterialAt(scene_, surface, textured);
       return scene_.materials[surface.material];
     }();
-    [[maybe_unused]] const MaterialProperties changed =
-        textured ? PropertiesOf(*textured) : MaterialProperties();
+    const MaterialProperties changed = textured ? PropertiesOf(*textured) : MaterialProperties();
     const MaterialProperties& properties = textured ? changed : properties_[surface.material];
     if (vertex == 0 || properties.gathers) {
       path.features = {AlbedoOf(material), FaceForward(surface.shading_normal, wo), length};
@@ -229,14 +225,14 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
 
     const Frame frame(surface.shading_normal);
     const SobolPoint u = sampler.ForVertex(vertex);
-    if (kParts.lobes && properties.is_smooth) {
+    if (parts_.lobes && properties.is_smooth) {
       if (vertex == 0 && rays_find_lights_) {
         path.direct += EmissionThrough(surface, wo, sampler.ForBranches(), path.rays);
         emission_was_collected = true;
       }
     } else {
       emission_was_collected = false;
-      if constexpr (kParts.lights) {
+      if (parts_.lights) {
         const ShadingPoint point = {surface, material, frame, wo};
         path.direct += weight * LightSampledRadiance(intersector_, lights_, point, u, path.rays);
       }
@@ -245,7 +241,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     BsdfSample sample;
     bool scattered = [&] {
       const Vec3 wo_local = frame.ToLocal(wo);
-      if constexpr (kParts.lobes) {
+      if (parts_.lobes) {
         return SampleBsdf(material, wo_local, u[0], u[1], u[2], Carried::kRadiance, sample);
       }
       return SampleDiffuse(material, wo_local, u[1], u[2], sample);
@@ -253,7 +249,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     Vec3 wi;
     if (scattered) {
       wi = frame.ToWorld(sample.wi);
-      if constexpr (kParts.shading_normals) {
+      if (parts_.shading_normals) {
         const bool transmits = sample.wi.z * Dot(frame.n, wo) < 0;
         scattered = SidesAgree(surface, wo, wi, transmits);
       }
@@ -274,7 +270,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     };
     if (properties.gathers) {
       // Half of the direct light: what a scattered ray finds of the lights themselves.
-      if (kParts.lights && scattered && rays_find_lights_) {
+      if (parts_.lights && scattered && rays_find_lights_) {
         const Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
         ++path.rays;
         if (!intersector_.Intersect(probe, hit)) {
@@ -289,12 +285,12 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
           }
         }
       }
-      const bool is_glossy = kParts.lobes && !properties.is_diffuse;
+      const bool is_glossy = parts_.lobes && !properties.is_diffuse;
       path.hitpoint = hitpoint_here(is_glossy, material);
       if (!is_glossy) path.hitpoint.weight *= material.reflectance * kInversePi;
       return path;
     }
-    if constexpr (kParts.caustics) {
+    if (parts_.caustics) {
       if (properties.is_smooth) {
         receiver.was_left_smoothly = receiver.is_last;
       } else {
@@ -323,15 +319,13 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   }
 }
 
-EyePathTracer::WalkFunction EyePathTracer::WalkFor(const SceneNeeds& needs) {
-  static constexpr auto kWalks = []<std::size_t... kBits>(std::index_sequence<kBits...>) {
-    return std::array<WalkFunction, sizeof...(kBits)>{&EyePathTracer::Walk<WalkParts{
-        (kBits & 1) != 0, (kBits & 2) != 0, (kBits & 4) != 0 || kBits >= 16, (kBits & 8) != 0,
-        kBits >= 16}>...};
-  }
-  (std::make_index_sequence<32>());
-  return kWalks[WalkPartsOf(needs) | (needs.Uses(Part::kDirectSampling) ? 8U : 0U) |
-                (needs.Uses(Part::kCausticHitpoints) ? 16U : 0U)];
+EyePathTracer::WalkParts EyePathTracer::WalkPartsFor(const SceneNeeds& needs) {
+  const bool caustics = needs.Uses(Part::kCausticHitpoints);
+  return {.textures = needs.Uses(Part::kTextures),
+          .shading_normals = needs.Uses(Part::kShadingNormals),
+          .lobes = needs.Uses(Part::kSpecular) || needs.Uses(Part::kGlossy) || caustics,
+          .lights = needs.Uses(Part::kDirectSampling),
+          .caustics = caustics};
 }
 
 }  // namespace lucerna

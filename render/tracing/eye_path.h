@@ -64,8 +64,8 @@ class EyePathTracer {
 
  private:
   [[nodiscard]] Ray CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const;
-  // What a walk may meet. Walks are compiled for every combination, and the one that suits the job
-  // is chosen once.
+  // What a walk may meet. Tested at run time: a walk compiled for each combination was no faster
+  // (docs/lean.md).
   struct WalkParts {
     bool textures = false;
     bool shading_normals = false;
@@ -73,12 +73,10 @@ class EyePathTracer {
     bool lights = false;    // that are sampled
     bool caustics = false;  // hitpoints for caustic photons
   };
-  template <WalkParts kParts>
+  [[nodiscard]] static WalkParts WalkPartsFor(const SceneNeeds& needs);
   [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler, First first) const;
   // What the camera's ray meets. False when that is nothing.
   [[nodiscard]] bool FindFirst(const Ray& ray, First first, Hit& hit) const;
-  using WalkFunction = EyePath (EyePathTracer::*)(Ray, const PixelSampler&, First) const;
-  [[nodiscard]] static WalkFunction WalkFor(const SceneNeeds& needs);
   // Radiance that leaves a smooth surface towards `first_wo` and was emitted where a chain of
   // smooth surfaces ends: reflections and refractions are all followed, not drawn.
   [[nodiscard]] Rgb EmissionThrough(const SurfacePoint& first, Vec3 first_wo, KeyedRng rng,
@@ -87,7 +85,7 @@ class EyePathTracer {
   const Scene& scene_;
   const RenderSettings& settings_;
   const int eye_sets_;  // see EyeSetOf
-  const WalkFunction walk_;
+  const WalkParts parts_;
   const std::vector<MaterialProperties> properties_;  // [materials]
   const bool has_lens_;
   const bool rays_find_lights_;  // some have an extent
