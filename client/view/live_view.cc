@@ -36,7 +36,8 @@ class BrailleGrid {
 
   void Set(int x, int y) {
     if (x < 0 || y < 0 || x >= 2 * columns_ || y >= 4 * rows_) return;
-    cells_[static_cast<std::size_t>(y / 4 * columns_ + x / 2)] |= kDots[x % 2][y % 4];
+    const std::size_t row = static_cast<std::size_t>(y / 4) * static_cast<std::size_t>(columns_);
+    cells_[row + static_cast<std::size_t>(x / 2)] |= kDots[x % 2][y % 4];
   }
   [[nodiscard]] std::vector<std::string> Lines() const {
     std::vector<std::string> lines(static_cast<std::size_t>(rows_));
