@@ -42,6 +42,7 @@ const SceneFormat* FormatOf(std::string_view path, std::string_view text) {
 
 std::string NamesOfFormats() {
   std::vector<std::string> names;
+  names.reserve(std::size(kFormats));
   for (const SceneFormat& format : kFormats)
     names.push_back(Concat(format.name, " (", format.extension, ")"));
   return Concat(names.size() == 1 ? "there is " : "there are ", Listed(names));
