@@ -108,10 +108,12 @@ std::string SettingsTable() {
       "|---|---|---|---|---|\n";
   for (const Setting& setting : AllSettings()) {
     const std::string placeholder = ValuePlaceholder(setting);
-    table += Concat("| `", FlagOf(setting), placeholder.empty() ? "" : " ", Cell(placeholder),
-                    "` | ", Cell(setting.meaning), " | ", Cell(setting.unit), " | ",
-                    IsBool(setting) ? "" : Cell(RangeText(setting)), " | ",
-                    IsBool(setting) ? "not set" : Cell(DefaultText(setting)), " |\n");
+    table += Concat(
+        "| `", FlagOf(setting), placeholder.empty() ? "" : " ", Cell(placeholder), "` | ",
+        Cell(setting.meaning), " | ", Cell(setting.unit), " | ",
+        IsBool(setting) ? "" : Cell(RangeText(setting)), " | ",
+        IsBool(setting) && setting.default_text.empty() ? "not set" : Cell(DefaultText(setting)),
+        " |\n");
   }
   return table;
 }

@@ -2,20 +2,20 @@
 
 namespace lucerna {
 
-void CountCommit(Job& job, const Delivery& delivery, const Accumulation& accumulation,
+void CountCommit(Job& job, const Delivery& delivery, const DeliveredCounts& counts,
                  std::string_view worker_name, SteadyTime now) {
   JobCounters& counters = job.counters;
   if (!counters.to_first_photons) counters.to_first_photons = now - job.life.submitted_at();
-  counters.photons += accumulation.tally.photons;
-  counters.tally += accumulation.tally;
-  counters.NameDropped(delivery.pass.pass, accumulation.dropped_photons);
+  counters.photons += counts.tally.photons;
+  counters.tally += counts.tally;
+  counters.NameDropped(counts.dropped_photons);
   counters.worker_cpu = SaturatingSum(counters.worker_cpu, delivery.cpu);
   counters.bytes_received += delivery.size_bytes;
-  counters.hitpoints_returned += accumulation.size();
-  counters.rate.Add(accumulation.tally.photons, now);
+  counters.hitpoints_returned += counts.rows;
+  counters.rate.Add(counts.tally.photons, now);
   WorkerShare& share = job.workers[delivery.worker];
   if (share.name.empty()) share.name = worker_name;
-  share.photons += accumulation.tally.photons;
+  share.photons += counts.tally.photons;
   share.batches += 1;
   share.cpu = SaturatingSum(share.cpu, delivery.cpu);
 }

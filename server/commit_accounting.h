@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "render/base/clock.h"
 #include "render/estimate/accumulation.h"
@@ -17,14 +18,22 @@ namespace lucerna {
 // A batch that a worker hands in.
 struct Delivery {
   std::string worker;
+  WorkKind kind = WorkKind::kPhotons;
   PassKey pass;
-  PhotonRange range;
+  WorkRange range;
   Duration cpu{};                // as the worker says
   std::uint64_t size_bytes = 0;  // as it came over the wire
 };
 
+// What its result says of itself.
+struct DeliveredCounts {
+  BatchTally tally;
+  std::vector<PhotonKey> dropped_photons;
+  std::uint64_t rows = 0;  // hitpoints or pixels
+};
+
 // Counts a batch that was merged. `worker_name` is for people; kept from the first of its batches.
-void CountCommit(Job& job, const Delivery& delivery, const Accumulation& accumulation,
+void CountCommit(Job& job, const Delivery& delivery, const DeliveredCounts& counts,
                  std::string_view worker_name, SteadyTime now);
 
 // Counts a block of `hitpoints` rows, or radii (0 rows), that a worker fetched.

@@ -6,6 +6,8 @@
 #include <spdlog/spdlog.h>
 
 #include "render/base/memory.h"
+#include "render/wire/accumulation_codec.h"
+#include "render/wire/slice_codec.h"
 #include "server/job_image.h"
 
 namespace lucerna {
@@ -125,7 +127,8 @@ StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) const {
 StatusOr<Coordinator::Description> Coordinator::Describe(const std::string& job_id) const {
   const std::optional<Job> job = jobs_.Find(job_id);
   if (!job) return absl::NotFoundError(absl::StrCat("there is no job ", job_id));
-  return Description{job->manifest, job->settings, job->needs, options_.numeric_profile};
+  return Description{job->manifest, job->settings, job->needs, job->photon_steps,
+                     options_.numeric_profile};
 }
 
 StatusOr<Blob> Coordinator::Encode(const JobTable::ImageSource& source, RenderResult result) const {
@@ -167,16 +170,22 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
       RunnerHooks{
           .blobs = blobs_,
           .scheduler = scheduler_,
-          .merger = merger_,
+          .passes = passes_,
+          .rounds = rounds_,
           .clock = clock_,
+          .always_splits = options_.batch_photons > 0,
           .on_running = [this, id] { jobs_.OnRunning(id, Now()); },
           .on_warning = [this,
                          id](std::string warning) { jobs_.OnWarning(id, std::move(warning)); },
-          .on_pass_opened = [this] { AnswerParked(); },
-          .on_pass_merged =
-              [this, id](std::int64_t passes, const BatchTally& of_pass) {
-                jobs_.OnPassMerged(id, passes, of_pass);
-              },
+          .on_photon_steps = [this,
+                              id](PhotonSteps steps) { jobs_.OnPhotonSteps(id, std::move(steps)); },
+          .on_work_opened = [this] { AnswerParked(); },
+          .on_progress = [this, id](std::int64_t passes) { jobs_.OnProgress(id, passes); },
+          .on_round_merged = [this, id](
+                                 const BatchTally& tally,
+                                 std::int64_t passes) { jobs_.OnRoundMerged(id, tally, passes); },
+          .on_tail = [this, id](const BatchTally& tally,
+                                std::int64_t passes) { jobs_.OnTail(id, tally, passes); },
           .on_error_estimate =
               [this, id](const ErrorCheckpoint& checkpoint) {
                 ErrorSample sample;
@@ -231,13 +240,14 @@ StatusOr<std::string> Coordinator::Register(const std::string& name, int threads
 
 std::optional<StatusOr<SyncAnswer>> Coordinator::TryAnswer(const std::string& worker,
                                                            const Scheduler::Report& report) {
-  StatusOr<Scheduler::Answer> result = scheduler_.Tell(worker, report, clock_.Steady());
+  StatusOr<Scheduler::Answer> result = scheduler_.AnswerFor(worker, report, clock_.Steady());
   if (!result.ok()) return result.status();
   SyncAnswer answer;
   answer.revoked = std::move(result->revoked);
   // Without a loan the pass ended this moment, and its lease with it.
   if (result->lease) {
     answer.loan = jobs_.MakeLoan(*std::move(result->lease), scheduler_.LiveWorkers());
+    if (!answer.loan) scheduler_.WaitAgain(worker);
   }
   if (!answer.loan && answer.revoked.empty()) return std::nullopt;
   return answer;
@@ -246,7 +256,7 @@ std::optional<StatusOr<SyncAnswer>> Coordinator::TryAnswer(const std::string& wo
 std::uint64_t Coordinator::Sync(const std::string& worker, Scheduler::Report report, Duration wait,
                                 ParkedSyncs::Answer answer) {
   const SteadyTime now = clock_.Steady();
-  if (const Status heard = scheduler_.Hear(worker, report, now); !heard.ok()) {
+  if (const Status heard = scheduler_.TakeReport(worker, report, now); !heard.ok()) {
     answer(heard);
     return 0;
   }
@@ -262,10 +272,17 @@ std::uint64_t Coordinator::Sync(const std::string& worker, Scheduler::Report rep
     answer(SyncAnswer{});
     return 0;
   }
-  // A change between the try and the wait is found by the next tick.
   const std::uint64_t ticket =
       parked_.Park({worker, std::move(report), now + std::min(wait, kLongestSync), answer});
-  if (ticket == 0) answer(absl::UnavailableError("the coordinator is shutting down"));
+  if (ticket == 0) {
+    answer(absl::UnavailableError("the coordinator is shutting down"));
+    return 0;
+  }
+  // What changed between the try and the wait was announced to nobody.
+  parked_.AnswerWorkers(
+      {worker}, now,
+      [this](const std::string& id, const Scheduler::Report& r) { return TryAnswer(id, r); },
+      [this](const ParkedSyncs::Call& broken) { EndBroken(broken); });
   return ticket;
 }
 
@@ -283,13 +300,21 @@ void Coordinator::EndBroken(const ParkedSyncs::Call& broken) {
   StopPoisonedJobs();
 }
 
+// Calls of workers whose leases have ended, then of those that can be lent something, as long as
+// there is something to lend, then those whose time is over.
 void Coordinator::AnswerParked() {
-  parked_.AnswerReady(
-      clock_.Steady(),
-      [this](const std::string& worker, const Scheduler::Report& report) {
-        return TryAnswer(worker, report);
-      },
-      [this](const ParkedSyncs::Call& broken) { EndBroken(broken); });
+  const SteadyTime now = clock_.Steady();
+  const ParkedSyncs::TryAnswer try_answer = [this](const std::string& worker,
+                                                   const Scheduler::Report& report) {
+    return TryAnswer(worker, report);
+  };
+  const ParkedSyncs::OnBroken on_broken = [this](const ParkedSyncs::Call& broken) {
+    EndBroken(broken);
+  };
+  parked_.AnswerWorkers(scheduler_.TakeAffected(), now, try_answer, on_broken);
+  while (const std::optional<std::string> worker = scheduler_.TakeWaiting(now))
+    parked_.AnswerWorkers({*worker}, now, try_answer, on_broken);
+  parked_.AnswerOverdue(now, try_answer, on_broken);
 }
 
 StatusOr<Blob> Coordinator::Fetch(const Digest& digest) {
@@ -298,20 +323,63 @@ StatusOr<Blob> Coordinator::Fetch(const Digest& digest) {
   return blob;
 }
 
-StatusOr<PassMerger::Outcome> Coordinator::Commit(const Delivery& delivery,
-                                                  const Accumulation& accumulation) {
-  LUCERNA_ASSIGN_OR_RETURN(const PassMerger::Outcome outcome,
-                           merger_.Merge(delivery.pass, delivery.range, accumulation));
-  if (outcome != PassMerger::Outcome::kAccepted) return outcome;
+std::optional<std::size_t> Coordinator::RowsOf(const Delivery& delivery) const {
+  if (delivery.kind == WorkKind::kPhotons) return passes_.Hitpoints(delivery.pass);
+  const std::optional<SliceShape> shape = rounds_.ShapeOf(delivery.pass);
+  if (!shape) return std::nullopt;
+  return shape->pixels;
+}
+
+StatusOr<MergeOutcome> Coordinator::MergePhotons(const Delivery& delivery, std::string_view bytes,
+                                                 DeliveredCounts& counts) {
+  const std::optional<std::size_t> hitpoints = passes_.Hitpoints(delivery.pass);
+  if (!hitpoints) return MergeOutcome::kSuperseded;
+  LUCERNA_ASSIGN_OR_RETURN(const Accumulation accumulation, DecodeAccumulation(bytes, *hitpoints));
+  counts.tally = accumulation.tally;
+  counts.rows = accumulation.size();
+  for (const std::uint64_t index : accumulation.dropped_photons)
+    counts.dropped_photons.push_back({delivery.pass.pass, index});
+  return passes_.Merge(delivery.pass, delivery.range, accumulation);
+}
+
+StatusOr<MergeOutcome> Coordinator::MergeSlice(const Delivery& delivery, std::string_view bytes,
+                                               DeliveredCounts& counts) {
+  std::optional<SliceShape> shape = rounds_.ShapeOf(delivery.pass);
+  if (!shape) return MergeOutcome::kSuperseded;
+  shape->passes = {delivery.range.first, delivery.range.last};
+  if (!IsSlice(shape->passes) || RoundOf(shape->passes.first).first != delivery.pass.pass) {
+    return absl::InvalidArgumentError(absl::StrCat("passes ", delivery.range.first, " to ",
+                                                   delivery.range.last,
+                                                   " are not a slice of the round"));
+  }
+  // A slice of an earlier run of the job, or of a round that is split now, was lent in other parts.
+  if (!scheduler_.Expects(delivery.pass, WorkKind::kPasses, delivery.range)) {
+    return rounds_.Has(delivery.pass, shape->passes) ? MergeOutcome::kDuplicate
+                                                     : MergeOutcome::kSuperseded;
+  }
+  LUCERNA_ASSIGN_OR_RETURN(SliceSums slice, DecodeSlice(bytes, *shape));
+  counts.tally = slice.tally;
+  counts.rows = slice.pixels();
+  counts.dropped_photons = slice.dropped_photons;
+  return rounds_.Merge(delivery.pass, std::move(slice));
+}
+
+StatusOr<MergeOutcome> Coordinator::Commit(const Delivery& delivery, std::string_view bytes) {
+  DeliveredCounts counts;
+  LUCERNA_ASSIGN_OR_RETURN(const MergeOutcome outcome, delivery.kind == WorkKind::kPhotons
+                                                           ? MergePhotons(delivery, bytes, counts)
+                                                           : MergeSlice(delivery, bytes, counts));
+  if (outcome == MergeOutcome::kSuperseded) return outcome;
   const SteadyTime now = clock_.Steady();
+  // Also of a duplicate: nobody need trace it any more.
   scheduler_.Commit(delivery.pass, delivery.range, now);
-  jobs_.CountMerged(delivery, accumulation, scheduler_.NameOf(delivery.worker), now);
-  const BatchTally& tally = accumulation.tally;
-  if (tally.dropped > 0 || tally.excess > 0) {
+  if (outcome == MergeOutcome::kDuplicate) return outcome;
+  jobs_.CountMerged(delivery, counts, scheduler_.NameOf(delivery.worker), now);
+  if (counts.tally.dropped > 0 || counts.tally.excess > 0) {
     spdlog::warn(
         "job {}, pass {}: {} photons that were not finite and {} contributions that were too "
         "bright are left out",
-        delivery.pass.job_id, delivery.pass.pass, tally.dropped, tally.excess);
+        delivery.pass.job_id, delivery.pass.pass, counts.tally.dropped, counts.tally.excess);
   }
   return outcome;
 }

@@ -1,8 +1,9 @@
 // Where do jobs, workers and bytes meet?
 //
 // Wires the parts together and decides nothing itself: JobIntake checks submissions, JobTable holds
-// the jobs, Scheduler lends batches, PassMerger sums them, ParkedSyncs holds the calls of workers
-// that wait, BlobStore the bytes. One thread of its own renders one job after the other.
+// the jobs, Scheduler lends work, PassMerger and RoundMerger sum what comes back, ParkedSyncs holds
+// the calls of workers that wait, BlobStore the bytes. One thread of its own renders one job after
+// the other.
 //
 // Threads: any. Nothing here waits for the network. Submit, Commit and ImageOf may take long: they
 // are for the threads of a WorkPool.
@@ -12,6 +13,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -28,6 +30,7 @@
 #include "server/job_table.h"
 #include "server/parked_syncs.h"
 #include "server/pass_merger.h"
+#include "server/round_merger.h"
 #include "server/scheduler.h"
 #include "server/sync_answer.h"
 #include "server/work_pool.h"
@@ -71,6 +74,7 @@ class Coordinator {
     SceneManifest scene;
     RenderSettings settings;
     SceneNeeds needs;
+    PhotonSteps photon_steps;
     std::string numeric_profile;
   };
   // Errors: NOT_FOUND.
@@ -93,13 +97,13 @@ class Coordinator {
   // Bytes for a worker. Errors: NOT_FOUND.
   [[nodiscard]] StatusOr<Blob> Fetch(const Digest& digest);
 
-  // Rows of the hitpoint block that a batch is for; absent when its pass has ended.
-  [[nodiscard]] std::optional<std::size_t> HitpointsOf(const PassKey& pass) const {
-    return merger_.Hitpoints(pass);
-  }
-  // Errors: as PassMerger::Merge.
-  [[nodiscard]] StatusOr<PassMerger::Outcome> Commit(const Delivery& delivery,
-                                                     const Accumulation& accumulation);
+  // Rows of the hitpoint block that a batch of photons is for, or pixels of the image that a slice
+  // is for; absent when its pass or round has ended.
+  [[nodiscard]] std::optional<std::size_t> RowsOf(const Delivery& delivery) const;
+  // Decodes the result of a lease and merges it. May take long.
+  // Errors: INVALID_ARGUMENT for bytes that are not that result; as PassMerger::Merge and
+  // RoundMerger::Merge.
+  [[nodiscard]] StatusOr<MergeOutcome> Commit(const Delivery& delivery, std::string_view bytes);
 
   void Goodbye(const std::string& worker);
 
@@ -120,6 +124,10 @@ class Coordinator {
   // What becomes of a job whose runner has come back.
   void Conclude(const std::string& job_id, StatusOr<RenderResult> result);
   StatusOr<Blob> Encode(const JobTable::ImageSource& source, RenderResult result) const;
+  StatusOr<MergeOutcome> MergePhotons(const Delivery& delivery, std::string_view bytes,
+                                      DeliveredCounts& counts);
+  StatusOr<MergeOutcome> MergeSlice(const Delivery& delivery, std::string_view bytes,
+                                    DeliveredCounts& counts);
 
   void StopPoisonedJobs();
   // What there is for a worker now; absent when it should wait on.
@@ -134,7 +142,8 @@ class Coordinator {
   const std::string instance_;
   BlobStore blobs_;
   Scheduler scheduler_;
-  PassMerger merger_;
+  PassMerger passes_;
+  RoundMerger rounds_;
   const JobIntake intake_;
   ParkedSyncs parked_;
   JobTable jobs_;

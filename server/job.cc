@@ -55,9 +55,9 @@ Duration JobLife::Running(SteadyTime now) const {
   return ran_before_ + (ended_at_ ? *ended_at_ : now) - *started_at_;
 }
 
-void PassRecord::Add(const BatchTally& tally) {
+void PassRecord::Add(const BatchTally& tally, std::int64_t passes) {
   if (!tallies_.empty() && tallies_.back().passes < passes_each_) {
-    ++tallies_.back().passes;
+    tallies_.back().passes += passes;
     tallies_.back().tally += tally;
     return;
   }
@@ -73,12 +73,11 @@ void PassRecord::Add(const BatchTally& tally) {
   }
   const std::int64_t first =
       tallies_.empty() ? 0 : tallies_.back().first_pass + tallies_.back().passes;
-  tallies_.push_back({.first_pass = first, .passes = 1, .tally = tally});
+  tallies_.push_back({.first_pass = first, .passes = passes, .tally = tally});
 }
 
-void JobCounters::NameDropped(std::uint64_t pass, const std::vector<std::uint64_t>& indices) {
-  for (const std::uint64_t index : indices) {
-    const PhotonKey key = {pass, index};
+void JobCounters::NameDropped(const std::vector<PhotonKey>& named) {
+  for (const PhotonKey& key : named) {
     dropped_photons.insert(std::ranges::upper_bound(dropped_photons, key), key);
     if (dropped_photons.size() > kDroppedNamed) dropped_photons.pop_back();
   }

@@ -23,6 +23,7 @@
 #include "render/base/clock.h"
 #include "render/base/digest.h"
 #include "render/estimate/accumulation.h"
+#include "render/estimate/photon_steps.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 #include "server/job_estimator.h"
@@ -87,13 +88,6 @@ class SlidingRate {
   std::deque<std::pair<SteadyTime, std::uint64_t>> events_;
 };
 
-// What names one photon of a job.
-struct PhotonKey {
-  std::uint64_t pass = 0;
-  std::uint64_t index = 0;
-  auto operator<=>(const PhotonKey&) const = default;
-};
-
 // What a job has cost and brought.
 struct JobCounters {
   std::int64_t passes = 0;                   // merged into the image
@@ -108,8 +102,8 @@ struct JobCounters {
   std::uint64_t hitpoints_sent = 0, hitpoints_returned = 0;  // rows in them
   SlidingRate rate{std::chrono::seconds(5)};
 
-  // Takes in which photons of `pass` a batch has dropped, in any order of batches.
-  void NameDropped(std::uint64_t pass, const std::vector<std::uint64_t>& indices);
+  // Takes in which photons a batch has dropped, in any order of batches.
+  void NameDropped(const std::vector<PhotonKey>& named);
 };
 
 // What became of the photons of so many passes.
@@ -124,8 +118,8 @@ class PassRecord {
  public:
   static constexpr std::size_t kMostTallies = 256;
 
-  // Takes in the next pass.
-  void Add(const BatchTally& tally);
+  // Takes in the next passes.
+  void Add(const BatchTally& tally, std::int64_t passes = 1);
   [[nodiscard]] const std::vector<PassTally>& tallies() const { return tallies_; }
 
  private:
@@ -167,8 +161,10 @@ struct Job {
   JobCounters counters;
   std::optional<Digest> reference;  // of an EXR image
   std::vector<ErrorSample> convergence;
-  std::vector<LightFinding> lights;  // of the newest sample
-  PassRecord pass_record;
+  std::vector<LightFinding> lights;            // of the newest sample
+  PassRecord pass_record;                      // of whole rounds
+  PassTally tail;                              // of the passes after them, when the job has stopped
+  PhotonSteps photon_steps;                    // of the passes opened so far
   std::map<std::string, WorkerShare> workers;  // by id
   int most_workers = 0;                        // connected at one time while it ran
 };

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <utility>
 
@@ -11,10 +13,12 @@
 #include "render/analysis/prepared_scene.h"
 #include "render/base/parallel.h"
 #include "render/base/text.h"
+#include "render/estimate/evidence.h"
 #include "render/estimate/missing_light.h"
 #include "render/estimate/noise_layer.h"
+#include "render/estimate/photon_steps.h"
+#include "render/estimate/pixel_radii.h"
 #include "render/estimate/relative_error.h"
-#include "render/estimate/statistics.h"
 #include "render/film/film.h"
 #include "render/film/layers.h"
 #include "render/math/color_space.h"
@@ -25,6 +29,12 @@ namespace lucerna {
 namespace {
 
 constexpr double kPi64 = std::numbers::pi;
+// Photons of a pass over those of the first ones, at most.
+constexpr std::uint64_t kMostPhotonFactor = 8;
+// The variance is known well enough after so many passes; a power of two.
+constexpr std::uint64_t kFirstPhotonChoice = 4;
+// Between the best number and a half of it lies the one from which twice as many are better.
+constexpr double kWorthDoubling = std::numbers::sqrt2;
 
 // Whether a path may be bent by a smooth surface.
 bool HasSmoothSurfaces(const Scene& scene) {
@@ -86,39 +96,45 @@ struct JobEstimator::State {
   RenderSettings settings;
   ThreadTeam team;
   FirstHits first_hits;
+  float initial_radius = 0;  // [unit radii]
   std::unique_ptr<EyePathTracer> tracer;
   std::unique_ptr<RadiusController> controller;
-  std::unique_ptr<PixelStatistics> statistics;
-  // Of the hitpoints that gather caustic photons; nullptr where there are none.
-  std::unique_ptr<PixelStatistics> caustics;
-  // Theirs: a rule that asks for no evidence. Narrow lobes weigh photons so unevenly that a second
-  // derivative is lost in noise, and radii that follow it fall until single photons are seen.
-  std::unique_ptr<RadiusController> caustic_controller;
-  std::unique_ptr<Film> film;
-  std::unique_ptr<ErrorStatistics> errors;
-  std::uint64_t eye_rays = 0;
+  std::unique_ptr<PixelRadii> radii;
+  std::unique_ptr<ImageSums> sums;
+  // What rounds follow from that are planned by the state after so many passes.
+  struct After {
+    std::shared_ptr<const RadiusColumn> radii;
+    std::uint64_t photons_per_pass = 0;
+  };
+  std::map<std::uint64_t, After> after;
+  std::shared_ptr<const RadiusColumn> last_radii;  // of the last round added
+  // Of the last estimate, and after how many passes that was.
+  double noise_area = 1;
+  std::uint64_t noise_area_after = 0;
   // For light that may not have been found.
-  BatchTally tally;
   bool has_smooth_surfaces = false;
   Bounds view;              // of the hitpoints of the first pass
   float widest_radius = 0;  // of these hitpoints
   double hit_share = 0;     // of the pixels that have one
 
-  // Radiance over all passes that photons brought, in the working space.
-  [[nodiscard]] RgbSum PhotonSum(std::size_t pixel) const {
-    RgbSum sum = statistics->radiance_sum()[pixel];
-    if (caustics == nullptr) return sum;
-    for (std::size_t c = 0; c < 3; ++c)
-      sum[c] += caustics->radiance_sum()[pixel][c];
-    return sum;
+  // How many photons later passes have, given how many they would have by what was known before.
+  // Looks at the variance now and then, each time twice as many passes later.
+  [[nodiscard]] std::uint64_t ChoosePhotons(std::uint64_t before) const {
+    const std::uint64_t passes = sums->whole_passes();
+    const auto base = static_cast<std::uint64_t>(settings.photons_per_pass);
+    if (!settings.adaptive_photons || before >= kMostPhotonFactor * base ||
+        passes < kFirstPhotonChoice || !std::has_single_bit(passes)) {
+      return before;
+    }
+    const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
+    const double kernel_noise = kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach;
+    const double per_pixel = static_cast<double>(before) / static_cast<double>(sums->pixels());
+    const double factor = BestPhotonFactor(SplitVariance(*sums, kernel_noise), per_pixel);
+    return factor >= kWorthDoubling ? 2 * before : before;
   }
+
   // Radiance over all passes, Rec. 709.
-  [[nodiscard]] RgbSum Sum(std::size_t pixel) const {
-    RgbSum sum = PhotonSum(pixel);
-    for (std::size_t c = 0; c < 3; ++c)
-      sum[c] += film->direct_sum()[pixel][c];
-    return ToRec709(sum);
-  }
+  [[nodiscard]] RgbSum Sum(std::size_t pixel) const { return ToRec709(sums->At(pixel).radiance()); }
 };
 
 JobEstimator::JobEstimator(std::unique_ptr<State> state) : state_(std::move(state)) {}
@@ -139,19 +155,13 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   const auto initial = static_cast<float>(settings.initial_radius > 0
                                               ? settings.initial_radius / prepared.scene().unit
                                               : settings.initial_footprints);
+  state->initial_radius = initial;
   state->controller = MakeRadiusController(state->settings, initial);
-  state->statistics =
-      std::make_unique<PixelStatistics>(pixels, initial, state->controller->MemoryPerPixel());
-  if (prepared.needs().Uses(Part::kCausticHitpoints)) {
-    RenderSettings schedule = state->settings;
-    schedule.radius_controller = RadiusControllerKind::kPppm;
-    state->caustic_controller = MakeRadiusController(schedule, initial);
-    state->caustics = std::make_unique<PixelStatistics>(
-        pixels, initial, state->caustic_controller->MemoryPerPixel());
-  }
-  state->film = std::make_unique<Film>(width, height, prepared.scene().film.exposure,
-                                       prepared.scene().film.max_component);
-  state->errors = std::make_unique<ErrorStatistics>(pixels);
+  state->radii = std::make_unique<PixelRadii>(pixels, initial, *state->controller);
+  state->sums = std::make_unique<ImageSums>(pixels);
+  state->last_radii = std::make_shared<const RadiusColumn>(state->radii->Current());
+  state->after[0] = {.radii = state->last_radii,
+                     .photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass)};
   state->has_smooth_surfaces = HasSmoothSurfaces(prepared.scene());
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));
 }
@@ -160,53 +170,58 @@ EyePass JobEstimator::TraceEyePaths(std::uint64_t pass) const {
   return TraceHitpointPass(*state_->tracer, pass, state_->first_hits.Of(pass), state_->team);
 }
 
-RadiusColumn JobEstimator::Radii(const EyePass& pass) const {
-  RadiusColumn radii = state_->statistics->Radii(pass.rows(), pass.pass);
-  if (pass.block.caustic_rows > 0) {
-    const RadiusColumn caustic = state_->caustics->Radii(pass.caustic_rows(), pass.pass);
-    radii.insert(radii.end(), caustic.begin(), caustic.end());
-  }
-  return radii;
+std::optional<RoundPlan> JobEstimator::PlanFor(const PassRange& round) const {
+  const auto after = state_->after.find(RadiiFrom(round));
+  if (after == state_->after.end() || round.first < whole_passes()) return std::nullopt;
+  // Narrow lobes weigh photons so unevenly that a second derivative is lost in noise, and radii
+  // that follow it fall until single photons are seen: the radii of caustic hitpoints follow a
+  // schedule that asks for no evidence.
+  return RoundPlan{.photons_per_pass = after->second.photons_per_pass,
+                   .radii = after->second.radii,
+                   .caustic_radius = static_cast<float>(
+                       static_cast<double>(state_->initial_radius) *
+                       ScheduledShrink(state_->settings.alpha, {0, round.first}))};
 }
 
-void JobEstimator::Apply(const EyePass& pass, const RadiusColumn& radii, const PassSums& sums) {
-  LUCERNA_CHECK(static_cast<std::int64_t>(pass.pass) == passes_applied());
-  std::vector<RgbSum> photons(pass.direct.size());
-  std::vector<double> bias(photons.size());
-  const auto add = [&](PixelStatistics& statistics, const RadiusController& controller,
-                       const HitpointRows& rows) {
-    statistics.AddPhotons(rows, radii, sums, state_->prepared.flux_scale(),
-                          Kernel{state_->settings.kernel}, state_->settings.photons_per_pass,
-                          controller, photons, bias);
-  };
-  add(*state_->statistics, *state_->controller, pass.rows());
-  if (state_->caustics != nullptr) {
-    add(*state_->caustics, *state_->caustic_controller, pass.caustic_rows());
-  }
-  std::vector<RgbSum> radiance(photons.size());
-  for (std::size_t pixel = 0; pixel < radiance.size(); ++pixel) {
-    photons[pixel] = ToRec709(photons[pixel]);
-    const Rgb direct = pass.direct[pixel];
-    radiance[pixel] = ToRec709({static_cast<double>(direct.r), static_cast<double>(direct.g),
-                                static_cast<double>(direct.b)});
-    for (std::size_t c = 0; c < 3; ++c)
-      radiance[pixel][c] += photons[pixel][c];
-  }
-  state_->errors->AddPass(pass.pass, radiance, bias);
-  for (std::size_t pixel = 0; pixel < pass.direct.size(); ++pixel) {
-    const EyeFeatures& features = pass.features[pixel];
-    state_->film->Add(pixel, pass.direct[pixel], features.albedo, features.normal,
-                      features.distance);
-  }
-  state_->eye_rays += pass.rays;
-  state_->tally += sums.tally();
-  if (pass.pass > 0) return;
+SliceShape JobEstimator::ShapeOf(const PassRange& round, const RoundPlan& plan) const {
+  return {.passes = round,
+          .pixels = state_->sums->pixels(),
+          .evidence = ControllerColumns(state_->settings.radius_controller),
+          .photons_per_pass = plan.photons_per_pass};
+}
+
+SliceSums JobEstimator::SliceOf(const EyePass& pass, const RoundPlan& plan,
+                                const PassSums& sums) const {
+  return SliceOfPass(pass, plan, sums, state_->settings, state_->prepared.flux_scale());
+}
+
+void JobEstimator::LookAtFirstPass(const EyePass& pass, const RoundPlan& plan) {
+  const RadiusColumn radii = HitpointRadii(pass, plan);
   for (std::size_t row = 0; row < pass.block.size(); ++row) {
     state_->view.Add(pass.block.positions[row]);
     state_->widest_radius = std::max(state_->widest_radius, radii[row]);
   }
   state_->hit_share =
       static_cast<double>(pass.block.size()) / static_cast<double>(pass.direct.size());
+}
+
+void JobEstimator::AddRound(const SliceSums& round, const RoundPlan& plan) {
+  LUCERNA_CHECK(round.passes == RoundOf(whole_passes()));
+  State& state = *state_;
+  state.sums->Add(round);
+  state.radii->Step(round, *plan.radii, state.team);
+  state.last_radii = plan.radii;
+  const std::uint64_t passes = whole_passes();
+  state.after[passes] = {
+      .radii = std::make_shared<const RadiusColumn>(state.radii->Current()),
+      .photons_per_pass = state.ChoosePhotons(state.after.rbegin()->second.photons_per_pass)};
+  // Rounds that are still to be planned, or to be planned again by a job that goes on, need these.
+  state.after.erase(state.after.begin(), state.after.lower_bound(RadiiFrom(RoundOf(passes))));
+}
+
+void JobEstimator::SetTail(ImageSums::Slices tail, const RoundPlan& plan) {
+  if (!tail.empty()) state_->last_radii = plan.radii;
+  state_->sums->SetTail(std::move(tail));
 }
 
 const SceneNeeds& JobEstimator::needs() const {
@@ -217,43 +232,58 @@ std::size_t JobEstimator::faint_lights() const {
   return state_->prepared.lights().faint_lights();
 }
 
-std::int64_t JobEstimator::passes_applied() const {
-  return state_->statistics->passes();
+std::int64_t JobEstimator::passes() const {
+  return static_cast<std::int64_t>(state_->sums->passes());
+}
+
+std::uint64_t JobEstimator::whole_passes() const {
+  return state_->sums->whole_passes();
+}
+
+std::uint64_t JobEstimator::photons() const {
+  return state_->sums->tally().photons;
 }
 
 std::uint64_t JobEstimator::eye_rays() const {
-  return state_->eye_rays;
+  return state_->sums->eye_rays();
 }
 
 Image JobEstimator::MakeImage() const {
-  Image image = state_->film->MakeImage(*state_->statistics, state_->caustics.get(),
-                                        *state_->controller, Kernel{state_->settings.kernel});
-  ToFileUnit(image, state_->prepared.scene().unit);
-  if (passes_applied() < 2) return image;
-  const ErrorStatistics& errors = *state_->errors;
-  const auto passes = static_cast<double>(passes_applied());
-  const double exposure = state_->prepared.scene().film.exposure;
-  const double even_passes = std::ceil(passes / 2);
-  const double odd_passes = passes - even_passes;
-  const double noise_area = EstimateError(1).noise_area;
-  std::vector<PixelNoise> noise(image.channels[0].pixels.size());
-  std::vector<float> bias(noise.size());
-  for (std::size_t pixel = 0; pixel < noise.size(); ++pixel) {
-    const double sum = exposure * LuminanceOf(state_->Sum(pixel));
-    const double even_sum = exposure * LuminanceOf(errors.even_sum()[pixel]);
-    const double mean = sum / passes;
-    const double square = exposure * exposure * errors.square_sum()[pixel] / passes;
-    bias[pixel] = static_cast<float>(
-        exposure * (errors.even_bias()[pixel] + errors.odd_bias()[pixel]) / passes);
-    // Less than this is rounding of a pixel that is the same in every pass.
-    constexpr double kRounding = 1e-12;
-    if (!(square - mean * mean > kRounding * square)) continue;
+  const State& state = *state_;
+  const Scene& scene = state.prepared.scene();
+  const ImageSums& sums = *state.sums;
+  Image image = MakeFilmImage({.width = state.settings.crop_width(),
+                               .height = state.settings.crop_height(),
+                               .exposure = scene.film.exposure,
+                               .max_component = scene.film.max_component},
+                              sums, *state.last_radii, *state.radii, *state.controller,
+                              Kernel{state.settings.kernel});
+  ToFileUnit(image, scene.unit);
+  if (passes() < 2) return image;
+  const auto passes_so_far = static_cast<double>(passes());
+  const double exposure = scene.film.exposure;
+  const double even_passes = std::ceil(passes_so_far / 2);
+  const double odd_passes = passes_so_far - even_passes;
+  const double noise_area = state.noise_area_after == state.sums->passes()
+                                ? state.noise_area
+                                : EstimateError(1).noise_area;
+  std::vector<PixelNoise> noise(sums.pixels());
+  std::vector<float> bias(sums.pixels());
+  for (std::size_t pixel = 0; pixel < sums.pixels(); ++pixel) {
+    const ImageSums::Pixel of_pixel = sums.At(pixel);
+    const double sum = exposure * LuminanceOf(ToRec709(of_pixel.radiance()));
+    const double even_sum =
+        0.5 * (sum + exposure * LuminanceOf(ToRec709(of_pixel.half_difference)));
+    bias[pixel] =
+        static_cast<float>(exposure * (of_pixel.even_bias + of_pixel.odd_bias) / passes_so_far);
+    const double variance = exposure * exposure * of_pixel.squared_deviations / passes_so_far;
+    if (!(variance > 0)) continue;
     const double difference = even_sum / even_passes - (sum - even_sum) / odd_passes;
-    const double largest = exposure * static_cast<double>(errors.largest()[pixel]) - mean;
-    noise[pixel] = {
-        .of_halves = difference * difference * even_passes * odd_passes / (passes * passes),
-        .of_passes = (square - mean * mean) / (passes - 1),
-        .largest_share = std::min(1.0, largest * largest / (passes * (square - mean * mean)))};
+    const double largest = exposure * static_cast<double>(of_pixel.largest) - sum / passes_so_far;
+    noise[pixel] = {.of_halves = difference * difference * even_passes * odd_passes /
+                                 (passes_so_far * passes_so_far),
+                    .of_passes = variance / (passes_so_far - 1),
+                    .largest_share = std::min(1.0, largest * largest / (passes_so_far * variance))};
   }
   const std::vector<float> noise_layer =
       NoiseOfPixels(image.width, image.height, noise_area, noise);
@@ -268,28 +298,31 @@ Image JobEstimator::MakeImage() const {
 }
 
 ErrorEstimate JobEstimator::EstimateError(int look) const {
-  const ErrorStatistics& errors = *state_->errors;
   const double exposure = state_->prepared.scene().film.exposure;
+  const auto passes_so_far = static_cast<double>(passes());
   const auto sums_at = [&](std::size_t pixel) {
+    const ImageSums::Pixel of_pixel = state_->sums->At(pixel);
     PixelSums sums;
-    const RgbSum all = state_->Sum(pixel);
+    const RgbSum all = ToRec709(of_pixel.radiance());
+    const RgbSum difference = ToRec709(of_pixel.half_difference);
     // Bias is known as a luminance: it has the colour that the photons have.
-    RgbSum photons = state_->PhotonSum(pixel);
-    const double luminance = LuminanceOf(photons);
-    photons = ToRec709(photons);
+    const double luminance = LuminanceOf(of_pixel.photons);
+    const RgbSum photons = ToRec709(of_pixel.photons);
     for (std::size_t c = 0; c < 3; ++c) {
       sums.all[c] = exposure * all[c];
-      sums.even[c] = exposure * errors.even_sum()[pixel][c];
+      sums.even[c] = 0.5 * exposure * (all[c] + difference[c]);
       sums.bias_color[c] = luminance > 0 ? photons[c] / luminance : 0;
     }
-    sums.even_bias = exposure * errors.even_bias()[pixel];
-    sums.odd_bias = exposure * errors.odd_bias()[pixel];
-    sums.square = exposure * exposure * errors.square_sum()[pixel];
+    sums.even_bias = exposure * of_pixel.even_bias;
+    sums.odd_bias = exposure * of_pixel.odd_bias;
+    const double sum = LuminanceOf(sums.all);
+    sums.square = exposure * exposure * of_pixel.squared_deviations + sum * sum / passes_so_far;
     return sums;
   };
-  ErrorEstimate estimate =
-      lucerna::EstimateError(state_->settings.crop_width(), state_->settings.crop_height(),
-                             passes_applied(), look, sums_at);
+  ErrorEstimate estimate = lucerna::EstimateError(
+      state_->settings.crop_width(), state_->settings.crop_height(), passes(), look, sums_at);
+  state_->noise_area = estimate.noise_area;
+  state_->noise_area_after = state_->sums->passes();
   // Without any light a black image is exact.
   if (lucerna::IsBlack(state_->prepared.lights().TotalPower())) {
     estimate.relative = {};
@@ -302,7 +335,7 @@ ErrorEstimate JobEstimator::EstimateError(int look) const {
 }
 
 bool JobEstimator::IsBlack() const {
-  const std::size_t pixels = state_->film->direct_sum().size();
+  const std::size_t pixels = state_->sums->pixels();
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     if (LuminanceOf(state_->Sum(pixel)) > 0) return false;
   }
@@ -311,16 +344,17 @@ bool JobEstimator::IsBlack() const {
 
 MissingLight JobEstimator::FindMissingLight() const {
   const State& state = *state_;
-  const auto passes = static_cast<double>(passes_applied());
-  const std::size_t pixels = state.film->direct_sum().size();
+  const auto passes_so_far = static_cast<double>(passes());
+  const std::size_t pixels = state.sums->pixels();
   const auto pixel_count = static_cast<double>(pixels);
   std::vector<double> luminances(pixels);
   double sum = 0;
   double photon_sum = 0;
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-    luminances[pixel] = std::max(0.0, LuminanceOf(state.Sum(pixel)) / passes);
+    const ImageSums::Pixel of_pixel = state.sums->At(pixel);
+    luminances[pixel] = std::max(0.0, LuminanceOf(ToRec709(of_pixel.radiance())) / passes_so_far);
     sum += luminances[pixel];
-    photon_sum += LuminanceOf(ToRec709(state.PhotonSum(pixel))) / passes;
+    photon_sum += LuminanceOf(ToRec709(of_pixel.photons)) / passes_so_far;
   }
   PhotonView view;
   view.takes_photons = state.prepared.needs().Uses(Part::kPhotons) &&
@@ -352,7 +386,7 @@ MissingLight JobEstimator::FindMissingLight() const {
   MissingLight missing;
   std::vector<LightPhotons> lights;
   const auto total_power = static_cast<double>(Luminance(state.prepared.lights().TotalPower()));
-  const std::vector<LightTally>& tallies = state.tally.lights;
+  const std::vector<LightTally> tallies = state.sums->tally().lights;
   for (std::size_t i = 0; i < state.prepared.lights().lights().size(); ++i) {
     const LightGroup& light = state.prepared.lights().lights()[i];
     lights.push_back({.power_w = static_cast<double>(Luminance(light.power)),
@@ -379,8 +413,7 @@ MissingLight JobEstimator::FindMissingLight() const {
 }
 
 TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
-  const double to_pixel =
-      state_->prepared.scene().film.exposure / static_cast<double>(passes_applied());
+  const double to_pixel = state_->prepared.scene().film.exposure / static_cast<double>(passes());
   std::vector<double> luminances(reference.size());
   for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
     const Rgb right = reference[pixel];

@@ -1,22 +1,24 @@
 // What is the image, given the photons so far?
 //
-// The coordinator's side of the estimator for one job, without any knowledge of workers: it
-// traces the eye paths of a pass, says which radii its hitpoints use, takes in the pass's merged
-// sums, and turns statistics into an image.
+// The coordinator's side of the estimator for one job, without any knowledge of workers: it plans
+// rounds of passes, traces the eye paths of passes that are split, takes in what rounds brought,
+// and turns sums into an image.
 //
-// Order of calls for pass p (passes count from 0)
-//   1. TraceEyePaths(p): any time, also ahead of other passes; depends on p alone.
-//   2. Radii(pass): after Apply of pass p-2 and before Apply of pass p, and the same whether before
-//   or
-//      after that of pass p-1. So workers trace p while stragglers finish p-1, a job can go on
-//      after its end, and the result does not depend on when anything happens.
-//   3. Apply(pass, radii, sums): in pass order, each pass once, with the radii that 2 gave.
+// Order of calls for a round (estimate/rounds.h)
+//   1. PlanFor(round): from when all passes before RadiiFrom(round) have been added; the same
+//      whether more have been added by then or not. So workers trace it while stragglers finish
+//      earlier ones, a job can go on after its end, and the result does not depend on when anything
+//      happens.
+//   2. For passes that are split: TraceEyePaths(p) at any time, and SliceOf(p) once all photons
+//      have been gathered.
+//   3. AddRound(sums, plan): in order, each round once.
 //
 // Threads: one caller at a time, except that TraceEyePaths may run beside the others.
 #pragma once
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,10 +27,14 @@
 #include "render/estimate/accumulation.h"
 #include "render/estimate/error_estimate.h"
 #include "render/estimate/hitpoint_block.h"
+#include "render/estimate/image_sums.h"
+#include "render/estimate/rounds.h"
+#include "render/estimate/slice_sums.h"
 #include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/tracing/hitpoint_pass.h"
+#include "render/tracing/pass_slice.h"
 #include "server/reference_image.h"
 
 namespace lucerna {
@@ -65,27 +71,41 @@ class JobEstimator {
   ~JobEstimator();
 
   [[nodiscard]] EyePass TraceEyePaths(std::uint64_t pass) const;
-  [[nodiscard]] RadiusColumn Radii(const EyePass& pass) const;
-  // Requires radii and sums of pass.block.size() rows, and pass.pass == passes_applied().
-  void Apply(const EyePass& pass, const RadiusColumn& radii, const PassSums& sums);
+  // Absent while passes before RadiiFrom(round) have not been added, and for a round that has been.
+  [[nodiscard]] std::optional<RoundPlan> PlanFor(const PassRange& round) const;
+  [[nodiscard]] SliceShape ShapeOf(const PassRange& round, const RoundPlan& plan) const;
+  // The slice of a pass whose photons brought `sums`, of pass.block.size() rows.
+  [[nodiscard]] SliceSums SliceOf(const EyePass& pass, const RoundPlan& plan,
+                                  const PassSums& sums) const;
+  // What is known of the view from the first pass, which every job traces itself.
+  void LookAtFirstPass(const EyePass& pass, const RoundPlan& plan);
+  // Requires the next round, whole, and its plan.
+  void AddRound(const SliceSums& round, const RoundPlan& plan);
+  // Slices of the round after those added, from its first pass on without a gap, and its plan: they
+  // count in all that follows here until the next AddRound or SetTail, but radii do not follow from
+  // them.
+  void SetTail(ImageSums::Slices tail, const RoundPlan& plan);
 
-  [[nodiscard]] std::int64_t passes_applied() const;
-  // Rays traced for the passes applied so far.
+  // Passes added, and photons and rays traced for them; with the tail.
+  [[nodiscard]] std::int64_t passes() const;
+  [[nodiscard]] std::uint64_t photons() const;
   [[nodiscard]] std::uint64_t eye_rays() const;
-  // The image of the passes applied so far, without metadata. Requires passes_applied() > 0. Layers
+  // Passes added without the tail.
+  [[nodiscard]] std::uint64_t whole_passes() const;
+  // The image of the passes so far, without metadata. Requires passes() > 0. Layers
   // `noise` (standard deviation of each pixel's luminance) and `bias` from the second pass on.
   [[nodiscard]] Image MakeImage() const;
-  // `look` counts the looks at this job, from 1. The upper ends of its intervals hold what may be
-  // missing; they are infinite while nothing is found. Requires passes_applied() >= 2.
+  // `look` counts the estimates of this job, from 1. The upper ends of its intervals hold what may
+  // be missing; they are infinite while nothing is found. Requires passes() >= 2.
   [[nodiscard]] ErrorEstimate EstimateError(int look) const;
-  // Requires passes_applied() > 0.
+  // Requires passes() > 0.
   [[nodiscard]] MissingLight FindMissingLight() const;
-  // Whether all pixels are black. Requires passes_applied() > 0.
+  // Whether all pixels are black. Requires passes() > 0.
   [[nodiscard]] bool IsBlack() const;
   [[nodiscard]] const SceneNeeds& needs() const;
   // See LightSet.
   [[nodiscard]] std::size_t faint_lights() const;
-  // Requires passes_applied() > 0 and a reference as large as the image.
+  // Requires passes() > 0 and a reference as large as the image.
   [[nodiscard]] TrueError ErrorAgainst(const ReferenceImage& reference) const;
 
  private:

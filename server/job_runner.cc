@@ -9,6 +9,14 @@
 #include "render/wire/block_codec.h"
 
 namespace lucerna {
+namespace {
+
+// So many passes are split at once: while the last photons of one are out, workers trace the next.
+constexpr std::size_t kMostSplitPasses = 2;
+// The error is near its target when its upper end is below so many times that.
+constexpr double kNearTarget = 1.5;
+
+}  // namespace
 
 JobRunner::JobRunner(std::string job_id, RenderSettings settings, int threads, RunnerHooks hooks)
     : job_id_(std::move(job_id)),
@@ -20,19 +28,18 @@ JobRunner::JobRunner(std::string job_id, RenderSettings settings, int threads, R
 JobRunner::~JobRunner() = default;
 
 JobRunner::End JobRunner::EndOf(const RenderSettings& settings) {
-  End end;
-  end.passes = static_cast<std::uint64_t>(settings.passes);
-  end.time_s = settings.time_s;
-  end.error = settings.error;
-  if (settings.photons > 0) {
-    const auto a_pass = static_cast<std::uint64_t>(settings.photons_per_pass);
-    const std::uint64_t passes = (settings.photons - 1) / a_pass + 1;
-    if (end.passes == 0 || passes < end.passes) {
-      end.passes = passes;
-      end.is_photons = true;
-    }
+  return {.passes = static_cast<std::uint64_t>(settings.passes),
+          .time_s = settings.time_s,
+          .error = settings.error,
+          .photons = settings.photons};
+}
+
+std::uint64_t JobRunner::WantedPasses(const End& end) const {
+  std::uint64_t passes = end.passes > 0 ? end.passes : UINT64_MAX;
+  if (end.photons > 0 && !photon_steps_.empty()) {
+    passes = std::min(passes, PassesFor(photon_steps_, end.photons));
   }
-  return end;
+  return passes;
 }
 
 StatusOr<RenderResult> JobRunner::Run(Scene scene, const SceneNeeds& needs,
@@ -58,25 +65,49 @@ StatusOr<RenderResult> JobRunner::RunToEnd() {
   LUCERNA_RETURN_IF_ERROR(why_stopped());
   is_running_ = true;
   hooks_.on_running();
+  next_round_ = estimator_->whole_passes();
+  // Rounds that were open when the job stopped are planned again.
+  while (!photon_steps_.empty() && photon_steps_.back().first_pass >= next_round_)
+    photon_steps_.pop_back();
+  next_split_ = next_round_;
+  reported_passes_ = next_round_;
   const SteadyTime started_at = hooks_.clock.Steady();
-  StatusOr<RenderResult> result = RunPasses();
+  StatusOr<RenderResult> result = RunRounds();
   ran_before_ += hooks_.clock.Steady() - started_at;
   // Whatever ended it: workers must not go on with passes that will not be merged.
-  while (!open_.empty()) {
-    hooks_.scheduler.ClosePass(KeyOf(open_.front().traced.eye.pass));
-    hooks_.merger.Drop(KeyOf(open_.front().traced.eye.pass));
-    Withdraw(open_.front());
-    open_.pop_front();
-  }
-  ahead_.reset();
+  CloseAll();
   return result;
 }
 
+void JobRunner::CloseAll() {
+  for (const SplitPass& open : split_passes_) {
+    const PassKey key = KeyOf(open.traced.eye.pass);
+    hooks_.scheduler.Close(key);
+    hooks_.passes.Drop(key);
+    Withdraw(key.pass);
+  }
+  for (const OpenRound& open : open_rounds_) {
+    const PassKey key = KeyOf(open.round.first);
+    hooks_.scheduler.Close(key);
+    hooks_.rounds.Drop(key);
+    Withdraw(key.pass);
+  }
+  split_passes_.clear();
+  open_rounds_.clear();
+  ahead_.reset();
+}
+
+std::uint64_t JobRunner::PassesDone() const {
+  const std::uint64_t whole = estimator_->whole_passes();
+  if (open_rounds_.empty()) return whole;
+  return hooks_.rounds.PrefixEnd(KeyOf(open_rounds_.front().round.first)).value_or(whole);
+}
+
 StopReason JobRunner::ReasonToStop(const End& end, bool is_time_up) const {
-  const auto applied = static_cast<std::uint64_t>(estimator_->passes_applied());
-  if (applied == 0) return StopReason::kNone;
-  if (end.passes > 0 && applied >= end.passes) {
-    return end.is_photons ? StopReason::kPhotons : StopReason::kPasses;
+  const std::uint64_t done = PassesDone();
+  if (done == 0) return StopReason::kNone;
+  if (done >= WantedPasses(end)) {
+    return end.passes > 0 && done >= end.passes ? StopReason::kPasses : StopReason::kPhotons;
   }
   if (end.error > 0 && error_at_most_ <= end.error) return StopReason::kError;
   if (is_time_up) return StopReason::kTime;
@@ -84,10 +115,8 @@ StopReason JobRunner::ReasonToStop(const End& end, bool is_time_up) const {
   return shall_finish_ ? StopReason::kUser : StopReason::kNone;
 }
 
-StatusOr<RenderResult> JobRunner::RunPasses() {
+StatusOr<RenderResult> JobRunner::RunRounds() {
   const SteadyTime started_at = hooks_.clock.Steady() - ran_before_;
-  auto next_pass = static_cast<std::uint64_t>(estimator_->passes_applied());  // to be opened
-
   while (true) {
     LUCERNA_RETURN_IF_ERROR(why_stopped());
     End end;
@@ -95,69 +124,294 @@ StatusOr<RenderResult> JobRunner::RunPasses() {
       const MutexLock lock(mutex_);
       end = end_;
     }
-    std::optional<SteadyTime> time_is_up;
+    due_.reset();
     if (end.time_s > 0) {
       // A limit beyond a century is no limit, and would not fit.
       const double seconds = std::min(end.time_s, 3.2e9);
-      time_is_up =
+      due_ =
           started_at + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
     }
-    const bool is_time_up = time_is_up && hooks_.clock.Steady() >= *time_is_up;
+    const bool is_time_up = due_ && hooks_.clock.Steady() >= *due_;
     if (const StopReason reason = ReasonToStop(end, is_time_up); reason != StopReason::kNone) {
+      // Where the error decided when to stop, it knows nothing of later passes.
+      if (reason != StopReason::kError) TakeInTail();
+      ReportProgress();
       EstimateErrorIfDue(true);
       CheckImage();
       const MutexLock lock(estimator_mutex_);
       return MakeResult(reason);
     }
-    const auto applied = static_cast<std::uint64_t>(estimator_->passes_applied());
-    const bool wants_more =
-        (end.passes == 0 || next_pass < end.passes) && !(is_time_up && next_pass > 0);
-
-    // Radii of a pass follow from the passes up to two before it: it may be opened while the pass
-    // before it is out.
-    if (wants_more && next_pass <= applied + 1) {
-      TracedPass traced;
-      if (ahead_) {
-        traced = std::move(*ahead_);
-        ahead_.reset();
-      } else {
-        LUCERNA_ASSIGN_OR_RETURN(traced, Trace(next_pass));
-      }
-      LUCERNA_RETURN_IF_ERROR(Open(std::move(traced)));
-      ++next_pass;
-      continue;
+    if (WantedPasses(end) != opened_until_.first || due_ != opened_until_.second) {
+      SetRoundEnds(end);
     }
-    if (!open_.empty() && IsComplete(open_.front())) {
-      OpenPass complete = std::move(open_.front());
-      open_.pop_front();
-      TakeIn(std::move(complete));
-      EstimateErrorIfDue(false);
-      continue;
-    }
-    if (wants_more && !ahead_) {
-      LUCERNA_ASSIGN_OR_RETURN(ahead_, Trace(next_pass));
-      continue;
-    }
+    LUCERNA_ASSIGN_OR_RETURN(const bool has_done_something, Step(end, !is_time_up));
+    ReportProgress();
+    if (has_done_something) continue;
     // When time is up and nothing has been taken in, the first pass is waited for all the same.
-    if (!WaitForChange(applied > 0 ? time_is_up : std::nullopt)) return why_stopped();
+    if (!WaitForChange(PassesDone() > 0 ? due_ : std::nullopt)) return why_stopped();
   }
+}
+
+void JobRunner::ReportProgress() {
+  const std::uint64_t done = PassesDone();
+  if (done <= reported_passes_) return;
+  reported_passes_ = done;
+  hooks_.on_progress(static_cast<std::int64_t>(done));
+}
+
+bool JobRunner::TakeInIfWhole() {
+  if (open_rounds_.empty()) return false;
+  const OpenRound& oldest = open_rounds_.front();
+  if (hooks_.rounds.PrefixEnd(KeyOf(oldest.round.first)) != oldest.round.last) return false;
+  TakeIn(oldest);
+  open_rounds_.pop_front();
+  return true;
+}
+
+void JobRunner::TakeInTail() {
+  while (TakeInIfWhole()) {
+  }
+  if (open_rounds_.empty()) return;
+  tail_ = hooks_.rounds.Prefix(KeyOf(open_rounds_.front().round.first));
+  if (tail_.empty()) return;
+  BatchTally tally;
+  for (const auto& slice : tail_)
+    tally += slice->tally;
+  {
+    const MutexLock lock(estimator_mutex_);
+    estimator_->SetTail(tail_, open_rounds_.front().plan);
+  }
+  hooks_.on_tail(
+      tally, static_cast<std::int64_t>(tail_.back()->passes.last - tail_.front()->passes.first));
+}
+
+StatusOr<bool> JobRunner::Step(const End& end, bool wants_more) {
+  // First what gives workers something to do, then what makes the image grow, then what saves time
+  // later.
+  // Nothing is opened before the hitpoints of the first pass are out, so that its image comes
+  // first.
+  const bool first_is_out = next_round_ == 0 || next_split_ > 0;
+  if ((wants_more || next_round_ == 0) && first_is_out && next_round_ < WantedPasses(end)) {
+    std::optional<RoundPlan> plan;
+    {
+      const MutexLock lock(estimator_mutex_);
+      plan = estimator_->PlanFor(RoundOf(next_round_));
+    }
+    if (plan) {
+      LUCERNA_RETURN_IF_ERROR(OpenNextRound(end, *std::move(plan)));
+      return true;
+    }
+  }
+  const std::optional<std::uint64_t> to_split = NextToSplit(end);
+  if (to_split && split_passes_.size() < kMostSplitPasses) {
+    TracedPass traced;
+    if (ahead_) {
+      traced = std::move(*ahead_);
+      ahead_.reset();
+    } else {
+      LUCERNA_ASSIGN_OR_RETURN(traced, Trace(*to_split));
+    }
+    LUCERNA_RETURN_IF_ERROR(OpenSplitPass(std::move(traced)));
+    next_split_ = *to_split + 1;
+    return true;
+  }
+  for (auto open = split_passes_.begin(); open != split_passes_.end(); ++open) {
+    if (HasPhotons(*open) && !hooks_.passes.IsComplete(KeyOf(open->traced.eye.pass))) continue;
+    const SplitPass complete = std::move(*open);
+    split_passes_.erase(open);
+    LUCERNA_RETURN_IF_ERROR(TakeInSplitPass(complete));
+    return true;
+  }
+  if (TakeInIfWhole()) {
+    EstimateErrorIfDue(false);
+    return true;
+  }
+  if (to_split && !ahead_) {
+    LUCERNA_ASSIGN_OR_RETURN(ahead_, Trace(*to_split));
+    return true;
+  }
+  return false;
+}
+
+void JobRunner::SetRoundEnds(const End& end) {
+  opened_until_ = {WantedPasses(end), due_};
+  for (const OpenRound& open : open_rounds_) {
+    if (open.is_split) continue;
+    hooks_.scheduler.SetRoundEnd(KeyOf(open.round.first),
+                                 std::min(open.round.last, opened_until_.first), due_);
+  }
+  hooks_.on_work_opened();
+}
+
+Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
+  const PassRange round = RoundOf(next_round_);
+  OpenRound open;
+  open.round = round;
+  open.plan = std::move(plan);
+  // As many passes can be out at once as lie between this round's end and those that its radii
+  // follow from. While a job is young and these are fewer than the workers, several share one.
+  // Later that would cost more than it brings: hitpoints would travel to every worker. The first
+  // is split also when there is one worker, because this process has nothing better to do than its
+  // eye paths.
+  const std::uint64_t at_once = round.last - RadiiFrom(round);
+  const bool is_young = round.first < kFirstLongRound;
+  open.is_split =
+      hooks_.always_splits || round.first == 0 ||
+      (is_young && at_once < static_cast<std::uint64_t>(hooks_.scheduler.LiveWorkers()));
+  if (photon_steps_.empty() ||
+      photon_steps_.back().photons_per_pass != open.plan.photons_per_pass) {
+    photon_steps_.push_back({round.first, open.plan.photons_per_pass});
+    hooks_.on_photon_steps(photon_steps_);
+  }
+  const PassKey key = KeyOf(round.first);
+  hooks_.rounds.Open(key, estimator_->ShapeOf(round, open.plan));
+  // What a run that is over had of this round.
+  std::uint64_t first = round.first;
+  for (const auto& slice : std::exchange(tail_, {})) {
+    if (slice->passes.first != first || slice->passes.last > round.last) continue;
+    LUCERNA_RETURN_IF_ERROR(hooks_.rounds.Merge(key, *slice).status());
+    first = slice->passes.last;
+  }
+  if (first > round.first) next_split_ = first;
+  if (!open.is_split) {
+    std::string bytes = EncodeRadii(*open.plan.radii);
+    const Digest digest = Sha256(bytes);
+    LUCERNA_ASSIGN_OR_RETURN(open.radii,
+                             hooks_.blobs.PutPinned(digest, std::move(bytes), AfterLastPin::kDrop));
+    Publish(round.first, {.block = {},
+                          .radii = digest,
+                          .rows = open.plan.radii->size(),
+                          .photons_per_pass = open.plan.photons_per_pass,
+                          .caustic_radius = open.plan.caustic_radius});
+    hooks_.scheduler.OpenRound(
+        key, {first, std::max(first, std::min(round.last, WantedPasses(end)))}, due_);
+  }
+  open_rounds_.push_back(std::move(open));
+  next_round_ = round.last;
+  if (!open_rounds_.back().is_split) hooks_.on_work_opened();
+  return absl::OkStatus();
+}
+
+void JobRunner::TakeIn(const OpenRound& open) {
+  const PassKey key = KeyOf(open.round.first);
+  if (!open.is_split) hooks_.scheduler.Close(key);
+  const std::shared_ptr<const SliceSums> sums = hooks_.rounds.Take(key);
+  {
+    const MutexLock lock(estimator_mutex_);
+    estimator_->AddRound(*sums, open.plan);
+  }
+  if (!open.is_split) Withdraw(key.pass);
+  hooks_.on_round_merged(sums->tally, static_cast<std::int64_t>(open.round.size()));
+}
+
+std::optional<std::uint64_t> JobRunner::NextToSplit(const End& end) const {
+  for (const OpenRound& open : open_rounds_) {
+    if (!open.is_split || open.round.last <= next_split_) continue;
+    const std::uint64_t pass = std::max(next_split_, open.round.first);
+    if (pass >= WantedPasses(end)) return std::nullopt;
+    return pass;
+  }
+  return std::nullopt;
+}
+
+StatusOr<JobRunner::TracedPass> JobRunner::Trace(std::uint64_t pass) {
+  TracedPass traced;
+  traced.eye = estimator_->TraceEyePaths(pass);
+  std::string bytes = EncodeHitpointBlock(traced.eye.block);
+  const Digest digest = Sha256(bytes);
+  LUCERNA_ASSIGN_OR_RETURN(traced.block,
+                           hooks_.blobs.PutPinned(digest, std::move(bytes), AfterLastPin::kDrop));
+  return traced;
+}
+
+const RoundPlan& JobRunner::PlanOf(std::uint64_t pass) const {
+  const std::uint64_t first = RoundOf(pass).first;
+  const auto open = std::ranges::find(open_rounds_, first,
+                                      [](const OpenRound& round) { return round.round.first; });
+  LUCERNA_CHECK(open != open_rounds_.end());
+  return open->plan;
+}
+
+Status JobRunner::OpenSplitPass(TracedPass traced) {
+  const RoundPlan& plan = PlanOf(traced.eye.pass);
+  SplitPass open;
+  std::string bytes = EncodeRadii(HitpointRadii(traced.eye, plan));
+  open.blobs = {.block = traced.block.digest(),
+                .radii = Sha256(bytes),
+                .rows = traced.eye.block.size(),
+                .photons_per_pass = plan.photons_per_pass};
+  LUCERNA_ASSIGN_OR_RETURN(
+      open.radii, hooks_.blobs.PutPinned(open.blobs.radii, std::move(bytes), AfterLastPin::kDrop));
+  const std::uint64_t pass = traced.eye.pass;
+  open.traced = std::move(traced);
+  Publish(pass, open.blobs);
+  // Without photons a pass is complete as it is.
+  if (HasPhotons(open)) {
+    const std::uint64_t photons = open.blobs.photons_per_pass;
+    hooks_.passes.Open(KeyOf(pass), open.blobs.rows, photons,
+                       EvidenceColumns(EvidenceOf(settings_.radius_controller, pass)));
+    hooks_.scheduler.OpenPass(KeyOf(pass), photons);
+  }
+  split_passes_.push_back(std::move(open));
+  hooks_.on_work_opened();
+  return absl::OkStatus();
+}
+
+bool JobRunner::HasPhotons(const SplitPass& open) const {
+  // A camera that sees nothing needs none, and without light there are none.
+  return open.blobs.rows > 0 && estimator_->needs().Uses(Part::kPhotons);
+}
+
+Status JobRunner::TakeInSplitPass(const SplitPass& open) {
+  const PassKey key = KeyOf(open.traced.eye.pass);
+  PassSums sums(open.blobs.rows,
+                EvidenceColumns(EvidenceOf(settings_.radius_controller, key.pass)));
+  if (HasPhotons(open)) {
+    hooks_.scheduler.Close(key);
+    sums = hooks_.passes.Take(key);
+  }
+  Withdraw(key.pass);
+  SliceSums slice;
+  {
+    const MutexLock lock(estimator_mutex_);
+    const RoundPlan& plan = PlanOf(key.pass);
+    if (key.pass == 0) estimator_->LookAtFirstPass(open.traced.eye, plan);
+    slice = estimator_->SliceOf(open.traced.eye, plan, sums);
+  }
+  return hooks_.rounds.Merge(KeyOf(RoundOf(key.pass).first), std::move(slice)).status();
+}
+
+void JobRunner::Publish(std::uint64_t pass, const WorkBlobs& blobs) {
+  const MutexLock lock(mutex_);
+  blobs_[pass] = blobs;
+}
+
+void JobRunner::Withdraw(std::uint64_t pass) {
+  const MutexLock lock(mutex_);
+  blobs_.erase(pass);
 }
 
 void JobRunner::EstimateErrorIfDue(bool is_last) {
   ErrorCheckpoint checkpoint;
   {
     const MutexLock lock(estimator_mutex_);
-    checkpoint.passes = estimator_->passes_applied();
+    checkpoint.passes = estimator_->passes();
     if (checkpoint.passes < 2 || checkpoint.passes == passes_at_checkpoint_) return;
     if (!is_last && checkpoint.passes < next_checkpoint_) return;
-    checkpoint.photons = photons_applied_;
+    checkpoint.photons = estimator_->photons();
     checkpoint.estimate = estimator_->EstimateError(++checkpoints_);
     checkpoint.missing = estimator_->FindMissingLight();
     if (!reference_.empty()) checkpoint.truth = estimator_->ErrorAgainst(reference_);
   }
   passes_at_checkpoint_ = checkpoint.passes;
   error_at_most_ = std::sqrt(checkpoint.estimate.relative.high);
-  next_checkpoint_ = NextCheckpoint(checkpoint.passes);
+  double target = 0;
+  {
+    const MutexLock lock(mutex_);
+    target = end_.error;
+  }
+  next_checkpoint_ =
+      NextCheckpoint(checkpoint.passes, target > 0 && error_at_most_ < kNearTarget * target);
   hooks_.on_error_estimate(checkpoint);
 }
 
@@ -166,7 +420,7 @@ void JobRunner::CheckImage() {
   {
     const MutexLock lock(estimator_mutex_);
     if (has_warned_ || !estimator_->IsBlack()) return;
-    photons = photons_applied_;
+    photons = estimator_->photons();
   }
   has_warned_ = true;
   hooks_.on_warning(absl::StrCat(
@@ -174,94 +428,6 @@ void JobRunner::CheckImage() {
       " photons: no light has reached the"
       " view; check that the scene has lights, which way they and the camera face, and what stands"
       " between them"));
-}
-
-StatusOr<JobRunner::TracedPass> JobRunner::Trace(std::uint64_t pass) {
-  TracedPass traced;
-  traced.eye = estimator_->TraceEyePaths(pass);
-  // The hitpoints of a set are those of the pass that used it last.
-  const int sets = estimator_->needs().eye_sample_sets();
-  const std::uint64_t set = EyeSetOf(pass, sets);
-  if (const auto known = set_blocks_.find(set); known != set_blocks_.end()) {
-    if (auto pin = hooks_.blobs.Pin(known->second); pin.ok()) {
-      traced.block = *std::move(pin);
-      return traced;
-    }
-  }
-  std::string bytes = EncodeHitpointBlock(traced.eye.block);
-  const Digest digest = Sha256(bytes);
-  // A block stays for its next turn if it has one.
-  LUCERNA_ASSIGN_OR_RETURN(
-      traced.block, hooks_.blobs.PutPinned(digest, std::move(bytes),
-                                           sets > 0 ? AfterLastPin::kKeep : AfterLastPin::kDrop));
-  if (sets > 0) {
-    // Sets of an earlier round are not used again.
-    if (set_blocks_.size() >= static_cast<std::size_t>(sets)) set_blocks_.clear();
-    set_blocks_[set] = digest;
-  }
-  return traced;
-}
-
-Status JobRunner::Open(TracedPass traced) {
-  OpenPass open;
-  {
-    const MutexLock lock(estimator_mutex_);
-    open.radii = estimator_->Radii(traced.eye);
-  }
-  std::string bytes = EncodeRadii(open.radii);
-  open.blobs = {traced.block.digest(), Sha256(bytes), traced.eye.block.size()};
-  LUCERNA_ASSIGN_OR_RETURN(
-      open.encoded_radii,
-      hooks_.blobs.PutPinned(open.blobs.radii, std::move(bytes), AfterLastPin::kDrop));
-  const std::uint64_t pass = traced.eye.pass;
-  open.traced = std::move(traced);
-  {
-    const MutexLock lock(mutex_);
-    blobs_[pass] = open.blobs;
-  }
-  // Without photons a pass is complete as it is.
-  if (HasPhotons(open)) {
-    const auto photons = static_cast<std::uint64_t>(settings_.photons_per_pass);
-    hooks_.merger.Open(KeyOf(pass), open.blobs.hitpoints, photons,
-                       EvidenceColumns(EvidenceOf(settings_.radius_controller, pass)));
-    hooks_.scheduler.OpenPass(KeyOf(pass), photons);
-  }
-  open_.push_back(std::move(open));
-  hooks_.on_pass_opened();
-  return absl::OkStatus();
-}
-
-bool JobRunner::HasPhotons(const OpenPass& open) const {
-  // A camera that sees nothing needs none, and without light there are none.
-  return open.blobs.hitpoints > 0 && estimator_->needs().Uses(Part::kPhotons);
-}
-
-bool JobRunner::IsComplete(const OpenPass& open) const {
-  return !HasPhotons(open) || hooks_.merger.IsComplete(KeyOf(open.traced.eye.pass));
-}
-
-void JobRunner::TakeIn(OpenPass open) {
-  const PassKey key = KeyOf(open.traced.eye.pass);
-  PassSums sums(open.blobs.hitpoints,
-                EvidenceColumns(EvidenceOf(settings_.radius_controller, key.pass)));
-  if (HasPhotons(open)) {
-    hooks_.scheduler.ClosePass(key);
-    sums = hooks_.merger.Take(key);
-  }
-  std::int64_t passes = 0;
-  {
-    const MutexLock lock(estimator_mutex_);
-    estimator_->Apply(open.traced.eye, open.radii, sums);
-    photons_applied_ += sums.tally().photons;
-    passes = estimator_->passes_applied();
-  }
-  Withdraw(open);
-  hooks_.on_pass_merged(passes, sums.tally());
-}
-
-void JobRunner::Withdraw(const OpenPass& open) {
-  const MutexLock lock(mutex_);
-  blobs_.erase(open.traced.eye.pass);
 }
 
 bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {
@@ -314,7 +480,7 @@ void JobRunner::Wake() {
   changed_.NotifyAll();
 }
 
-std::optional<PassBlobs> JobRunner::BlobsOf(std::uint64_t pass) const {
+std::optional<WorkBlobs> JobRunner::BlobsOf(std::uint64_t pass) const {
   const MutexLock lock(mutex_);
   const auto found = blobs_.find(pass);
   if (found == blobs_.end()) return std::nullopt;
@@ -324,7 +490,7 @@ std::optional<PassBlobs> JobRunner::BlobsOf(std::uint64_t pass) const {
 std::optional<std::size_t> JobRunner::HitpointsIn(const Digest& digest) const {
   const MutexLock lock(mutex_);
   for (const auto& [pass, blobs] : blobs_) {
-    if (blobs.block == digest) return blobs.hitpoints;
+    if (blobs.block == digest) return blobs.rows;
     if (blobs.radii == digest) return std::size_t{0};
   }
   return std::nullopt;
@@ -334,15 +500,15 @@ RenderResult JobRunner::MakeResult(StopReason reason) const {
   RenderResult result;
   result.reason = reason;
   result.image = estimator_->MakeImage();
-  result.passes = estimator_->passes_applied();
-  result.photons = photons_applied_;
+  result.passes = estimator_->passes();
+  result.photons = estimator_->photons();
   return result;
 }
 
 StatusOr<RenderResult> JobRunner::ImageSoFar() const {
   if (is_running_) {
     const MutexLock lock(estimator_mutex_);
-    if (estimator_->passes_applied() > 0) return MakeResult(StopReason::kNone);
+    if (estimator_->passes() > 0) return MakeResult(StopReason::kNone);
   }
   return absl::FailedPreconditionError("no pass has been merged yet; try again in a moment");
 }

@@ -1,11 +1,12 @@
 // How does a job get from its scene to its image?
 //
-// The pass loop of one job, on a thread of its own: trace eye paths, publish hitpoints and radii,
-// open the pass for workers, take in its sums when every photon has come back, and again. Two
-// passes may be open at once, and the eye paths of a third are traced while workers are busy.
+// The loop of one job, on a thread of its own: plan rounds of passes as soon as their radii are
+// known, open them for workers, take in their sums in order, and again. While there are fewer open
+// passes than workers, and for the first image, passes are split: this thread traces their eye
+// paths and publishes their hitpoints, and several workers trace the photons of one pass.
 //
-// What a pass's radii are computed from is fixed (the passes up to two before it), so the image
-// does not depend on when batches come back.
+// What a round's radii are computed from is fixed (estimate/rounds.h), and a pass brings the same
+// bits however it was traced, so the image does not depend on when anything comes back.
 #pragma once
 
 #include <atomic>
@@ -28,6 +29,7 @@
 #include "server/job.h"
 #include "server/job_estimator.h"
 #include "server/pass_merger.h"
+#include "server/round_merger.h"
 #include "server/running_job.h"
 #include "server/scheduler.h"
 
@@ -45,13 +47,22 @@ struct ErrorCheckpoint {
 struct RunnerHooks {
   BlobStore& blobs;
   Scheduler& scheduler;
-  PassMerger& merger;
+  PassMerger& passes;
+  RoundMerger& rounds;
   const Clock& clock;
+  // Passes are never given out whole (for tests of batches of photons).
+  bool always_splits = false;
   // Called on the runner's thread, never under a lock.
   std::function<void()> on_running;
   std::function<void(std::string warning)> on_warning;
-  std::function<void()> on_pass_opened;
-  std::function<void(std::int64_t passes, const BatchTally& of_pass)> on_pass_merged;
+  // How many photons passes have, each time that it changes.
+  std::function<void(PhotonSteps steps)> on_photon_steps;
+  std::function<void()> on_work_opened;
+  // So many passes from the first on without a gap have come.
+  std::function<void(std::int64_t passes)> on_progress;
+  std::function<void(const BatchTally& tally, std::int64_t passes)> on_round_merged;
+  // At a stop: the same of the passes after the last round merged. They are part of a later round.
+  std::function<void(const BatchTally& tally, std::int64_t passes)> on_tail;
   std::function<void(const ErrorCheckpoint& checkpoint)> on_error_estimate;
 };
 
@@ -72,46 +83,76 @@ class JobRunner final : public RunningJob {
   void Finish() override;
   void Stop(Status why) override;
   void Wake() override;
-  [[nodiscard]] std::optional<PassBlobs> BlobsOf(std::uint64_t pass) const override;
+  [[nodiscard]] std::optional<WorkBlobs> BlobsOf(std::uint64_t pass) const override;
   [[nodiscard]] std::optional<std::size_t> HitpointsIn(const Digest& digest) const override;
   [[nodiscard]] StatusOr<RenderResult> ImageSoFar() const override;
 
  private:
+  // A round whose passes are out.
+  struct OpenRound {
+    PassRange round;
+    RoundPlan plan;
+    BlobPin radii;  // of pixels, encoded; of rounds that are not split
+    bool is_split = false;
+  };
   struct TracedPass {
     EyePass eye;
     BlobPin block;  // the hitpoints, encoded
   };
-  struct OpenPass {
+  // A pass whose photons are out.
+  struct SplitPass {
     TracedPass traced;
-    RadiusColumn radii;
-    BlobPin encoded_radii;
-    PassBlobs blobs;
+    BlobPin radii;  // of hitpoints, encoded
+    WorkBlobs blobs;
   };
 
   // When to stop.
   struct End {
-    std::uint64_t passes = 0;  // 0: no limit; also that of the photons
+    // 0: no limit.
+    std::uint64_t passes = 0;
     double time_s = 0;
     double error = 0;
-    bool is_photons = false;  // `passes` follows from a number of photons
+    std::uint64_t photons = 0;
   };
   static End EndOf(const RenderSettings& settings);
 
   StatusOr<RenderResult> RunToEnd();
-  StatusOr<RenderResult> RunPasses();
+  StatusOr<RenderResult> RunRounds();
+  // One thing that can be done now: opens, traces or takes in. False when there is nothing.
+  StatusOr<bool> Step(const End& end, bool wants_more);
   // Estimates the error at the next checkpoint, or if `is_last`.
   void EstimateErrorIfDue(bool is_last);
   // Warns of a black image.
   void CheckImage();
   // Why to stop now; kNone: go on.
   StopReason ReasonToStop(const End& end, bool is_time_up) const;
+  // Passes from the first on without a gap.
+  std::uint64_t PassesDone() const;
+
+  void ReportProgress();
+  // Takes in the oldest round if all of it has come.
+  bool TakeInIfWhole();
+  // At a stop: what has come of the oldest round counts too.
+  void TakeInTail();
+  Status OpenNextRound(const End& end, RoundPlan plan);
+  void TakeIn(const OpenRound& open);
+  // How many passes are wanted, as far as is known now.
+  std::uint64_t WantedPasses(const End& end) const;
+  // Lends more, or fewer, passes of the open rounds.
+  void SetRoundEnds(const End& end);
+  // The next pass of the open rounds that is to be split; absent when there is none.
+  std::optional<std::uint64_t> NextToSplit(const End& end) const;
+  // Requires that the round of the pass is open.
+  const RoundPlan& PlanOf(std::uint64_t pass) const;
   StatusOr<TracedPass> Trace(std::uint64_t pass);
-  Status Open(TracedPass traced);
-  bool HasPhotons(const OpenPass& open) const;
-  bool IsComplete(const OpenPass& open) const;
-  void TakeIn(OpenPass open);
-  // Workers are not given the pass any more.
-  void Withdraw(const OpenPass& open);
+  Status OpenSplitPass(TracedPass traced);
+  bool HasPhotons(const SplitPass& open) const;
+  Status TakeInSplitPass(const SplitPass& open);
+  void CloseAll();
+  // Publishes what workers need of a pass or round, or withdraws it.
+  void Publish(std::uint64_t pass, const WorkBlobs& blobs);
+  void Withdraw(std::uint64_t pass);
+
   // Waits for a wake, until `until` if there is one. False when Run must end now.
   bool WaitForChange(std::optional<SteadyTime> until);
   Status why_stopped() const;
@@ -127,7 +168,6 @@ class JobRunner final : public RunningJob {
   mutable Mutex estimator_mutex_;
   std::unique_ptr<JobEstimator> estimator_;  // set once, before any other thread may ask
   std::atomic<bool> is_running_ = false;
-  std::uint64_t photons_applied_ LUCERNA_GUARDED_BY(estimator_mutex_) = 0;
 
   // The runner's thread only.
   ReferenceImage reference_;
@@ -137,9 +177,17 @@ class JobRunner final : public RunningJob {
   bool has_warned_ = false;                // of a black image
   std::int64_t passes_at_checkpoint_ = 0;  // passes
   double error_at_most_ = HUGE_VAL;        // the upper end of the last interval
-  std::deque<OpenPass> open_;
+  std::optional<SteadyTime> due_;          // when time is up
+  // What the open rounds are lent for.
+  std::pair<std::uint64_t, std::optional<SteadyTime>> opened_until_;
+  std::uint64_t next_round_ = 0;  // its first pass
+  PhotonSteps photon_steps_;      // of the rounds opened so far
+  std::uint64_t reported_passes_ = 0;
+  std::deque<OpenRound> open_rounds_;
+  std::uint64_t next_split_ = 0;  // pass
+  ImageSums::Slices tail_;        // of the round that was not whole when the run before ended
+  std::deque<SplitPass> split_passes_;
   std::optional<TracedPass> ahead_;
-  std::map<std::uint64_t, Digest> set_blocks_;  // by set of eye paths, where they take turns
 
   mutable Mutex mutex_;
   Condition changed_;
@@ -147,7 +195,7 @@ class JobRunner final : public RunningJob {
   End end_ LUCERNA_GUARDED_BY(mutex_);
   bool shall_finish_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::optional<Status> why_stopped_ LUCERNA_GUARDED_BY(mutex_);
-  std::map<std::uint64_t, PassBlobs> blobs_ LUCERNA_GUARDED_BY(mutex_);
+  std::map<std::uint64_t, WorkBlobs> blobs_ LUCERNA_GUARDED_BY(mutex_);  // by first pass
 };
 
 }  // namespace lucerna

@@ -159,7 +159,11 @@ v1::Job JobToProto(const JobReport& report) {
   }
   AddShares(job.workers, message);
   message.set_has_reference(job.reference.has_value());
-  for (const PassTally& part : job.pass_record.tallies()) {
+  for (const PhotonStep& step : job.photon_steps)
+    *message.add_photon_steps() = ToProto(step);
+  std::vector<PassTally> parts = job.pass_record.tallies();
+  if (job.tail.passes > 0) parts.push_back(job.tail);
+  for (const PassTally& part : parts) {
     v1::PassEnergy& item = *message.add_energy_of_passes();
     item.set_first_pass(part.first_pass);
     item.set_passes(part.passes);

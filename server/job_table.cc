@@ -258,15 +258,15 @@ std::optional<Loan> JobTable::MakeLoan(BatchLease lease, int workers) {
   if (!blobs) return std::nullopt;
   Job& job = found->second.job;
   job.most_workers = std::max(job.most_workers, workers);
-  return Loan{std::move(lease), job.manifest, job.settings, job.needs, *blobs};
+  return Loan{std::move(lease), *blobs};
 }
 
-void JobTable::CountMerged(const Delivery& delivery, const Accumulation& accumulation,
+void JobTable::CountMerged(const Delivery& delivery, const DeliveredCounts& counts,
                            const std::string& worker_name, SteadyTime now) {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(delivery.pass.job_id);
   if (found == entries_.end()) return;
-  CountCommit(found->second.job, delivery, accumulation, worker_name, now);
+  CountCommit(found->second.job, delivery, counts, worker_name, now);
   ++found->second.version;
   if (found->second.runner) found->second.runner->Wake();
 }
@@ -365,13 +365,39 @@ void JobTable::OnWarning(const std::string& job_id, std::string warning) {
   ++found->second.version;
 }
 
-void JobTable::OnPassMerged(const std::string& job_id, std::int64_t passes,
-                            const BatchTally& of_pass) {
+void JobTable::OnPhotonSteps(const std::string& job_id, PhotonSteps steps) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  found->second.job.photon_steps = std::move(steps);
+}
+
+void JobTable::OnProgress(const std::string& job_id, std::int64_t passes) {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return;
   found->second.job.counters.passes = passes;
-  found->second.job.pass_record.Add(of_pass);
+  ++found->second.version;
+}
+
+void JobTable::OnTail(const std::string& job_id, const BatchTally& tally, std::int64_t passes) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  Job& job = found->second.job;
+  const std::vector<PassTally>& whole = job.pass_record.tallies();
+  const std::int64_t first = whole.empty() ? 0 : whole.back().first_pass + whole.back().passes;
+  job.tail = {.first_pass = first, .passes = passes, .tally = tally};
+  ++found->second.version;
+}
+
+void JobTable::OnRoundMerged(const std::string& job_id, const BatchTally& tally,
+                             std::int64_t passes) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  found->second.job.pass_record.Add(tally, passes);
+  found->second.job.tail = {};
   ++found->second.version;
 }
 

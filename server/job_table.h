@@ -103,10 +103,11 @@ class JobTable {
 
   // Workers ------------------------------------------------------------------------------------
 
-  // What a worker must know of a batch; absent when its pass has ended. `workers` are connected.
+  // What a worker must know of its work; absent when its pass or round has ended. `workers` are
+  // connected.
   [[nodiscard]] std::optional<Loan> MakeLoan(BatchLease lease, int workers);
   // Counts a batch that was merged, and wakes the job's runner.
-  void CountMerged(const Delivery& delivery, const Accumulation& accumulation,
+  void CountMerged(const Delivery& delivery, const DeliveredCounts& counts,
                    const std::string& worker_name, SteadyTime now);
   // Counts bytes that a worker fetched, if they belong to an open pass.
   void CountFetched(const Digest& digest, std::uint64_t size_bytes);
@@ -138,7 +139,10 @@ class JobTable {
   // What the runner reports.
   void OnRunning(const std::string& job_id, const Moment& moment);
   void OnWarning(const std::string& job_id, std::string warning);
-  void OnPassMerged(const std::string& job_id, std::int64_t passes, const BatchTally& of_pass);
+  void OnPhotonSteps(const std::string& job_id, PhotonSteps steps);
+  void OnProgress(const std::string& job_id, std::int64_t passes);
+  void OnTail(const std::string& job_id, const BatchTally& tally, std::int64_t passes);
+  void OnRoundMerged(const std::string& job_id, const BatchTally& tally, std::int64_t passes);
   void OnErrorEstimate(const std::string& job_id, ErrorSample sample,
                        std::vector<LightFinding> lights, const Moment& moment);
 

@@ -17,6 +17,7 @@
 #include <spdlog/spdlog.h>
 
 #include "render/base/clock.h"
+#include "render/base/memory.h"
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
@@ -149,5 +150,6 @@ int Main(int argc, char** argv) {
 }  // namespace lucerna
 
 int main(int argc, char** argv) {
+  lucerna::KeepFreedMemory();
   return lucerna::Main(argc, argv);
 }

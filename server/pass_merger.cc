@@ -8,7 +8,7 @@ namespace lucerna {
 namespace {
 
 // A photon that a message names must be replayable.
-Status CheckDropped(PhotonRange range, const Accumulation& accumulation) {
+Status CheckDropped(WorkRange range, const Accumulation& accumulation) {
   const std::vector<std::uint64_t>& named = accumulation.dropped_photons;
   std::uint64_t least = range.first;
   for (const std::uint64_t index : named) {
@@ -49,10 +49,10 @@ std::optional<std::size_t> PassMerger::Hitpoints(const PassKey& key) const {
   return pass->hitpoints;
 }
 
-StatusOr<PassMerger::Outcome> PassMerger::Merge(const PassKey& key, PhotonRange range,
-                                                const Accumulation& accumulation) {
+StatusOr<MergeOutcome> PassMerger::Merge(const PassKey& key, WorkRange range,
+                                         const Accumulation& accumulation) {
   const std::shared_ptr<OpenPass> pass = Find(key);
-  if (pass == nullptr) return Outcome::kSuperseded;
+  if (pass == nullptr) return MergeOutcome::kSuperseded;
   if (range.first >= range.last || range.last > pass->photons) {
     return absl::InvalidArgumentError(absl::StrCat("photons ", range.first, " to ", range.last,
                                                    " are not a range of a pass of ",
@@ -66,7 +66,7 @@ StatusOr<PassMerger::Outcome> PassMerger::Merge(const PassKey& key, PhotonRange 
   const MutexLock lock(pass->mutex);
   const auto next = pass->merged.lower_bound(range.first);
   if (next != pass->merged.end() && next->first == range.first && next->second == range.last) {
-    return Outcome::kDuplicate;
+    return MergeOutcome::kDuplicate;
   }
   const bool meets_next = next != pass->merged.end() && next->first < range.last;
   const bool meets_previous = next != pass->merged.begin() && std::prev(next)->second > range.first;
@@ -77,7 +77,7 @@ StatusOr<PassMerger::Outcome> PassMerger::Merge(const PassKey& key, PhotonRange 
   LUCERNA_RETURN_IF_ERROR(pass->sums.Add(accumulation));
   pass->merged.emplace(range.first, range.last);
   pass->photons_merged += range.size();
-  return Outcome::kAccepted;
+  return MergeOutcome::kAccepted;
 }
 
 bool PassMerger::IsComplete(const PassKey& key) const {

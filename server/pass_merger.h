@@ -24,8 +24,6 @@ namespace lucerna {
 
 class PassMerger {
  public:
-  enum class Outcome : std::uint8_t { kAccepted, kDuplicate, kSuperseded };
-
   // Requires that the pass is not open, and photons > 0.
   void Open(const PassKey& key, std::size_t hitpoints, std::uint64_t photons,
             std::size_t evidence_columns = 0);
@@ -36,8 +34,8 @@ class PassMerger {
   // kSuperseded when the pass is not open (any more).
   // Errors: INVALID_ARGUMENT when the range was never lent or the accumulation breaks its
   // promises, OUT_OF_RANGE when a sum would not fit. Then nothing has changed.
-  [[nodiscard]] StatusOr<Outcome> Merge(const PassKey& key, PhotonRange range,
-                                        const Accumulation& accumulation);
+  [[nodiscard]] StatusOr<MergeOutcome> Merge(const PassKey& key, WorkRange range,
+                                             const Accumulation& accumulation);
 
   // Whether every photon of the pass has been merged; false when it is not open.
   [[nodiscard]] bool IsComplete(const PassKey& key) const;

@@ -44,10 +44,11 @@ class RunningJob {
   virtual void Stop(Status why) = 0;
   // A batch was merged: the runner checks whether a pass is complete.
   virtual void Wake() = 0;
-  // What workers need for an open pass; absent when it is not open.
-  [[nodiscard]] virtual std::optional<PassBlobs> BlobsOf(std::uint64_t pass) const = 0;
+  // What workers need for an open pass or round, which `pass` is the first of; absent when it is
+  // not open.
+  [[nodiscard]] virtual std::optional<WorkBlobs> BlobsOf(std::uint64_t pass) const = 0;
   // How many hitpoints the bytes named `digest` describe: those of a block, 0 for radii; absent
-  // when they belong to no open pass.
+  // when they belong to no open pass or round.
   [[nodiscard]] virtual std::optional<std::size_t> HitpointsIn(const Digest& digest) const = 0;
   // The image of the passes merged so far. Waits for the step that the estimator is in.
   // Errors: FAILED_PRECONDITION before the first one.

@@ -2,32 +2,29 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "render/analysis/needs.h"
 #include "render/base/digest.h"
-#include "render/scene/render_settings.h"
-#include "render/scene/scene_files.h"
 #include "server/scheduler.h"
 
 namespace lucerna {
 
-// What a worker must fetch for a pass.
-struct PassBlobs {
-  Digest block;
+// What a worker must fetch, and know, of work besides its job.
+struct WorkBlobs {
+  Digest block;  // of photons
   Digest radii;
-  std::size_t hitpoints = 0;
+  std::size_t rows = 0;  // hitpoints of the block, or pixels
+  std::uint64_t photons_per_pass = 0;
+  float caustic_radius = 1;  // of passes
 };
 
-// A batch with all that a worker needs for it.
+// Work with all that a worker must know of it.
 struct Loan {
   BatchLease lease;
-  SceneManifest scene;
-  RenderSettings settings;
-  SceneNeeds needs;
-  PassBlobs blobs;
+  WorkBlobs blobs;
 };
 
 struct SyncAnswer {

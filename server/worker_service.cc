@@ -3,7 +3,6 @@
 #include <optional>
 #include <utility>
 
-#include "render/wire/accumulation_codec.h"
 #include "render/wire/chunks.h"
 #include "render/wire/grpc_status.h"
 #include "render/wire/messages.h"
@@ -13,33 +12,42 @@ namespace lucerna {
 namespace {
 
 constexpr Duration kSyncEvery = std::chrono::seconds(3);
-// An accumulation has up to 40 bytes a hitpoint before compression, which cannot double it.
-constexpr std::uint64_t kAccumulationHeadBytes = 4096;
-constexpr std::uint64_t kAccumulationBytesPerHitpoint = 64;
+// A slice has up to 100 bytes a pixel and an accumulation 40 a hitpoint before compression, which
+// cannot double it.
+constexpr std::uint64_t kResultHeadBytes = 4096;
+constexpr std::uint64_t kResultBytesPerRow = 128;
 constexpr int kMostLeases = 64;  // that one worker may speak of
 
 v1::Lease LoanToProto(const Loan& loan) {
+  const BatchLease& lease = loan.lease;
   v1::Lease message;
-  message.set_lease_id(loan.lease.id);
-  message.set_job_id(loan.lease.pass.job_id);
-  *message.mutable_scene() = ToProto(loan.scene);
-  *message.mutable_settings() = ToProto(loan.settings);
-  *message.mutable_needs() = ToProto(loan.needs);
-  message.set_pass(loan.lease.pass.pass);
-  message.set_first_photon(loan.lease.range.first);
-  message.set_last_photon(loan.lease.range.last);
-  message.set_block_digest(std::string(loan.blobs.block.Bytes()));
+  message.set_lease_id(lease.id);
+  message.set_job_id(lease.pass.job_id);
+  message.set_pass(lease.pass.pass);
+  message.set_first(lease.range.first);
+  message.set_last(lease.range.last);
   message.set_radii_digest(std::string(loan.blobs.radii.Bytes()));
+  message.set_photons_per_pass(loan.blobs.photons_per_pass);
+  switch (lease.kind) {
+    case WorkKind::kPhotons:
+      message.set_kind(v1::WORK_KIND_PHOTONS);
+      message.set_block_digest(std::string(loan.blobs.block.Bytes()));
+      break;
+    case WorkKind::kPasses:
+      message.set_kind(v1::WORK_KIND_PASSES);
+      message.set_caustic_radius(loan.blobs.caustic_radius);
+      break;
+  }
   return message;
 }
 
-v1::CommitOutcome OutcomeToProto(PassMerger::Outcome outcome) {
+v1::CommitOutcome OutcomeToProto(MergeOutcome outcome) {
   switch (outcome) {
-    case PassMerger::Outcome::kAccepted:
+    case MergeOutcome::kAccepted:
       return v1::COMMIT_OUTCOME_ACCEPTED;
-    case PassMerger::Outcome::kDuplicate:
+    case MergeOutcome::kDuplicate:
       return v1::COMMIT_OUTCOME_DUPLICATE;
-    case PassMerger::Outcome::kSuperseded:
+    case MergeOutcome::kSuperseded:
       return v1::COMMIT_OUTCOME_SUPERSEDED;
   }
   return v1::COMMIT_OUTCOME_UNSPECIFIED;
@@ -95,19 +103,24 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
     }
     if (collector_) return collector_->Add(part_.bytes());
     const v1::CommitBatchRequest::Header& header = part_.header();
+    if (header.kind() != v1::WORK_KIND_PHOTONS && header.kind() != v1::WORK_KIND_PASSES) {
+      return absl::InvalidArgumentError("a commit of an unknown kind of work");
+    }
     delivery_.worker = header.worker_id();
+    delivery_.kind =
+        header.kind() == v1::WORK_KIND_PHOTONS ? WorkKind::kPhotons : WorkKind::kPasses;
     delivery_.pass = {header.job_id(), header.pass()};
-    delivery_.range = {header.first_photon(), header.last_photon()};
+    delivery_.range = {header.first(), header.last()};
     delivery_.cpu = FromProto(header.cpu());
     delivery_.size_bytes = header.size_bytes();
     LUCERNA_ASSIGN_OR_RETURN(const Digest digest, Digest::FromBytes(header.digest()));
-    const std::optional<std::size_t> hitpoints = coordinator_.HitpointsOf(delivery_.pass);
-    is_superseded_ = !hitpoints;
+    const std::optional<std::size_t> rows = coordinator_.RowsOf(delivery_);
+    is_superseded_ = !rows;
     if (is_superseded_) return absl::OkStatus();
-    if (header.size_bytes() > kAccumulationHeadBytes + kAccumulationBytesPerHitpoint * *hitpoints) {
-      return absl::InvalidArgumentError(absl::StrCat("an accumulation of ", header.size_bytes(),
-                                                     " bytes is too large for ", *hitpoints,
-                                                     " hitpoints"));
+    if (header.size_bytes() > kResultHeadBytes + kResultBytesPerRow * *rows) {
+      return absl::InvalidArgumentError(absl::StrCat("a result of ", header.size_bytes(),
+                                                     " bytes is too large for ", *rows,
+                                                     " hitpoints or pixels"));
     }
     collector_.emplace(digest, header.size_bytes());
     return absl::OkStatus();
@@ -116,15 +129,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
   Status Merge() {
     if (!collector_) return absl::InvalidArgumentError("a commit begins with a header");
     LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, collector_->Finish());
-    const std::optional<std::size_t> hitpoints = coordinator_.HitpointsOf(delivery_.pass);
-    if (!hitpoints) {
-      response_->set_outcome(v1::COMMIT_OUTCOME_SUPERSEDED);
-      return absl::OkStatus();
-    }
-    LUCERNA_ASSIGN_OR_RETURN(const Accumulation accumulation,
-                             DecodeAccumulation(bytes, *hitpoints));
-    LUCERNA_ASSIGN_OR_RETURN(const PassMerger::Outcome outcome,
-                             coordinator_.Commit(delivery_, accumulation));
+    LUCERNA_ASSIGN_OR_RETURN(const MergeOutcome outcome, coordinator_.Commit(delivery_, bytes));
     response_->set_outcome(OutcomeToProto(outcome));
     return absl::OkStatus();
   }
@@ -207,6 +212,8 @@ grpc::ServerUnaryReactor* WorkerService::DescribeJob(grpc::CallbackServerContext
     *response->mutable_scene() = ToProto(job->scene);
     *response->mutable_settings() = ToProto(job->settings);
     *response->mutable_needs() = ToProto(job->needs);
+    for (const PhotonStep& step : job->photon_steps)
+      *response->add_photon_steps() = ToProto(step);
     response->set_numeric_profile(job->numeric_profile);
   }
   reactor->Finish(ToGrpc(job.status()));

@@ -183,7 +183,19 @@ struct BatchTracer::State {
   Status PrepareFor(const SceneNeeds& needs) {
     if (prepared.IsPreparedFor(needs)) return absl::OkStatus();
     spectra.reset();
+    eye_paths.reset();
     return prepared.PrepareFor(needs);
+  }
+
+  // Requires PrepareFor. Keeps what it knows of first hits while the settings stay.
+  void PrepareEyePaths(const RenderSettings& settings) {
+    if (eye_paths != nullptr && eye_settings == settings) return;
+    eye_settings = settings;
+    eye_paths = std::make_unique<EyePathTracer>(prepared.scene(), eye_settings, prepared.needs(),
+                                                prepared.intersector(), prepared.lights());
+    first_hits.emplace(prepared.needs().eye_sample_sets(),
+                       static_cast<std::size_t>(settings.crop_width()) *
+                           static_cast<std::size_t>(settings.crop_height()));
   }
 
   PreparedScene prepared;
@@ -191,6 +203,9 @@ struct BatchTracer::State {
   ThreadTeam team;
   // Made when a job uses it.
   std::unique_ptr<SpectrumTracer> spectra;
+  RenderSettings eye_settings;
+  std::unique_ptr<EyePathTracer> eye_paths;
+  std::optional<FirstHits> first_hits;
 };
 
 BatchTracer::BatchTracer(Scene scene, int threads)
@@ -200,7 +215,8 @@ BatchTracer::~BatchTracer() = default;
 StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const SceneNeeds& needs,
                                         std::uint64_t pass, std::uint64_t first, std::uint64_t last,
                                         const HitpointBlock& block, const RadiusColumn& radii,
-                                        const std::atomic<bool>& stop) {
+                                        const std::atomic<bool>& stop,
+                                        std::uint64_t photons_per_pass) {
   LUCERNA_RETURN_IF_ERROR(CheckBlock(block, radii, state_->prepared.scene(), needs));
   const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
   Accumulation sum;
@@ -225,7 +241,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
   const SpectrumTracer* spectra =
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
-                                settings, needs, spectra, region);
+                                settings, needs, spectra, region, photons_per_pass);
   const std::uint64_t per_chunk =
       std::clamp(kMostDepositsPerChunk / static_cast<std::uint64_t>(settings.max_depth),
                  std::uint64_t{1}, kPhotonsPerChunk);
@@ -310,6 +326,50 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     if (stop) return absl::CancelledError("the batch was given up");
   }
   return sum;
+}
+
+StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const SceneNeeds& needs,
+                                         std::uint64_t pass, const RoundPlan& plan,
+                                         const std::atomic<bool>& stop) {
+  State& state = *state_;
+  const EyePass eye =
+      TraceHitpointPass(*state.eye_paths, pass, state.first_hits->Of(pass), state.team);
+  if (stop) return absl::CancelledError("the slice was given up");
+  const std::size_t columns = EvidenceColumns(EvidenceOf(settings.radius_controller, pass));
+  PassSums sums(eye.block.size(), columns);
+  std::vector<PhotonKey> dropped;
+  // A camera that sees nothing needs no photons, and without light there are none.
+  if (eye.block.size() > 0 && needs.Uses(Part::kPhotons)) {
+    LUCERNA_ASSIGN_OR_RETURN(const Accumulation accumulation,
+                             Run(settings, needs, pass, 0, plan.photons_per_pass, eye.block,
+                                 HitpointRadii(eye, plan), stop, plan.photons_per_pass));
+    LUCERNA_RETURN_IF_ERROR(sums.Add(accumulation));
+    for (const std::uint64_t index : accumulation.dropped_photons)
+      dropped.push_back({pass, index});
+  }
+  SliceSums slice = SliceOfPass(eye, plan, sums, settings, state.prepared.flux_scale());
+  slice.dropped_photons = std::move(dropped);
+  return slice;
+}
+
+StatusOr<SliceSums> BatchTracer::RunSlice(const RenderSettings& settings, const SceneNeeds& needs,
+                                          const PassRange& passes, const RoundPlan& plan,
+                                          const std::atomic<bool>& stop) {
+  const std::size_t pixels = static_cast<std::size_t>(settings.crop_width()) *
+                             static_cast<std::size_t>(settings.crop_height());
+  if (!IsSlice(passes) || plan.radii == nullptr || plan.radii->size() != pixels) {
+    return absl::InvalidArgumentError("a slice's passes or radii do not fit its job");
+  }
+  LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(needs));
+  state_->PrepareEyePaths(settings);
+  if (passes.size() == 1) return RunPass(settings, needs, passes.first, plan, stop);
+  const std::uint64_t middle = passes.first + passes.size() / 2;
+  LUCERNA_ASSIGN_OR_RETURN(SliceSums sums,
+                           RunSlice(settings, needs, {passes.first, middle}, plan, stop));
+  LUCERNA_ASSIGN_OR_RETURN(const SliceSums second,
+                           RunSlice(settings, needs, {middle, passes.last}, plan, stop));
+  LUCERNA_RETURN_IF_ERROR(MergeSibling(sums, second));
+  return sums;
 }
 
 }  // namespace lucerna

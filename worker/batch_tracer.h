@@ -1,9 +1,10 @@
 // What do these photons bring to those hitpoints?
 //
-// The worker's side of the estimator, without any knowledge of the wire: traces a range of photon
-// paths of one pass, sorts where they land, lets the hitpoints gather, and returns the
-// accumulation. The result depends on the arguments alone, never on threads; two ranges side by
-// side give accumulations whose sum is that of the whole range.
+// The worker's side of the estimator, without any knowledge of the wire. Of a pass that is split it
+// traces a range of photon paths, sorts where they land, lets the hitpoints gather, and returns the
+// accumulation. Of a slice of passes it traces the eye paths too, and returns what they brought to
+// every pixel. The result depends on the arguments alone, never on threads; two ranges side by side
+// give results that make that of the whole range.
 #pragma once
 
 #include <atomic>
@@ -14,8 +15,10 @@
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/hitpoint_block.h"
+#include "render/estimate/slice_sums.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
+#include "render/tracing/pass_slice.h"
 
 namespace lucerna {
 
@@ -25,18 +28,28 @@ class BatchTracer {
   BatchTracer(Scene scene, int threads);
   ~BatchTracer();
 
-  // Traces photons [first, last) of `pass`. `needs` are those of the scene and these settings; what
-  // they ask for is made with the first batch of a job. One call at a time.
-  // Errors: INVALID_ARGUMENT when block and radii do not fit each other or the scene, CANCELLED
-  // soon (milliseconds) after `stop` becomes true, RESOURCE_EXHAUSTED when memory runs out,
-  // INTERNAL when Embree refuses the scene.
+  // Traces photons [first, last) of `pass`, which has `photons_per_pass` (0: as in `settings`).
+  // `needs` are those of the scene and these settings; what they ask for is made with the first
+  // batch of a job. One call at a time. Errors: INVALID_ARGUMENT when block and radii do not fit
+  // each other or the scene, CANCELLED soon (milliseconds) after `stop` becomes true,
+  // RESOURCE_EXHAUSTED when memory runs out, INTERNAL when Embree refuses the scene.
   [[nodiscard]] StatusOr<Accumulation> Run(const RenderSettings& settings, const SceneNeeds& needs,
                                            std::uint64_t pass, std::uint64_t first,
                                            std::uint64_t last, const HitpointBlock& block,
-                                           const RadiusColumn& radii,
-                                           const std::atomic<bool>& stop);
+                                           const RadiusColumn& radii, const std::atomic<bool>& stop,
+                                           std::uint64_t photons_per_pass = 0);
+
+  // Traces the passes of a slice, all photons of each. Otherwise as Run.
+  // Errors: also OUT_OF_RANGE when sums would not fit.
+  [[nodiscard]] StatusOr<SliceSums> RunSlice(const RenderSettings& settings,
+                                             const SceneNeeds& needs, const PassRange& passes,
+                                             const RoundPlan& plan, const std::atomic<bool>& stop);
 
  private:
+  StatusOr<SliceSums> RunPass(const RenderSettings& settings, const SceneNeeds& needs,
+                              std::uint64_t pass, const RoundPlan& plan,
+                              const std::atomic<bool>& stop);
+
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -1,7 +1,9 @@
 #include "worker/connection.h"
 
+#include <cmath>
 #include <string_view>
 
+#include "render/estimate/rounds.h"
 #include "render/wire/channel.h"
 #include "render/wire/chunks.h"
 #include "render/wire/grpc_status.h"
@@ -13,6 +15,7 @@ namespace {
 // A coordinator that is to answer at once and does not within this has gone.
 constexpr std::chrono::seconds kGoodbyeTime{1};
 constexpr std::chrono::minutes kTransferTime{10};
+constexpr std::uint64_t kMostPhotonsPerPass = std::uint64_t{1} << 40;
 
 }  // namespace
 
@@ -131,23 +134,45 @@ void Connection::BreakOff() {
     context->TryCancel();
 }
 
-StatusOr<LentBatch> ReadLease(const v1::Lease& message) {
-  LentBatch batch;
-  batch.lease_id = message.lease_id();
-  batch.job_id = message.job_id();
-  LUCERNA_ASSIGN_OR_RETURN(batch.scene, FromProto(message.scene()));
-  LUCERNA_ASSIGN_OR_RETURN(batch.settings, FromProto(message.settings()));
-  LUCERNA_ASSIGN_OR_RETURN(batch.needs, FromProto(message.needs()));
-  batch.pass = message.pass();
-  batch.first_photon = message.first_photon();
-  batch.last_photon = message.last_photon();
-  if (batch.first_photon >= batch.last_photon ||
-      batch.last_photon > static_cast<std::uint64_t>(batch.settings.photons_per_pass)) {
-    return absl::InvalidArgumentError("a lease's photons are not a range of its pass");
+StatusOr<LentWork> ReadLease(const v1::Lease& message) {
+  LentWork work;
+  work.lease_id = message.lease_id();
+  work.job_id = message.job_id();
+  work.kind = message.kind();
+  work.pass = message.pass();
+  work.first = message.first();
+  work.last = message.last();
+  work.photons_per_pass = message.photons_per_pass();
+  LUCERNA_ASSIGN_OR_RETURN(work.radii, Digest::FromBytes(message.radii_digest()));
+  if (work.photons_per_pass > kMostPhotonsPerPass) {
+    return absl::InvalidArgumentError("a lease's passes have too many photons");
   }
-  LUCERNA_ASSIGN_OR_RETURN(batch.block, Digest::FromBytes(message.block_digest()));
-  LUCERNA_ASSIGN_OR_RETURN(batch.radii, Digest::FromBytes(message.radii_digest()));
-  return batch;
+  if (work.kind == v1::WORK_KIND_PHOTONS) {
+    if (work.first >= work.last || work.last > work.photons_per_pass) {
+      return absl::InvalidArgumentError("a lease's photons are not a range of its pass");
+    }
+    LUCERNA_ASSIGN_OR_RETURN(work.block, Digest::FromBytes(message.block_digest()));
+    return work;
+  }
+  if (work.kind != v1::WORK_KIND_PASSES) {
+    return absl::InvalidArgumentError("a lease of an unknown kind of work");
+  }
+  work.caustic_radius = message.caustic_radius();
+  if (!IsSlice({work.first, work.last}) || RoundOf(work.first).first != work.pass) {
+    return absl::InvalidArgumentError("a lease's passes are not a slice of its round");
+  }
+  if (!(work.caustic_radius > 0) || !std::isfinite(work.caustic_radius)) {
+    return absl::InvalidArgumentError("a lease's radius is not finite and positive");
+  }
+  return work;
+}
+
+StatusOr<JobToTrace> ReadJob(const v1::JobDescription& message) {
+  JobToTrace job;
+  LUCERNA_ASSIGN_OR_RETURN(job.scene, FromProto(message.scene()));
+  LUCERNA_ASSIGN_OR_RETURN(job.settings, FromProto(message.settings()));
+  LUCERNA_ASSIGN_OR_RETURN(job.needs, FromProto(message.needs()));
+  return job;
 }
 
 }  // namespace lucerna

@@ -26,17 +26,24 @@
 
 namespace lucerna {
 
-// A batch that was lent to this worker.
-struct LentBatch {
-  std::string lease_id;
-  std::string job_id;
+// What all work of a job shares.
+struct JobToTrace {
   SceneManifest scene;
   RenderSettings settings;
   SceneNeeds needs;
+};
+
+// Work that was lent to this worker (see work.proto).
+struct LentWork {
+  std::string lease_id;
+  std::string job_id;
+  v1::WorkKind kind = v1::WORK_KIND_UNSPECIFIED;
   std::uint64_t pass = 0;
-  std::uint64_t first_photon = 0, last_photon = 0;
-  Digest block;
+  std::uint64_t first = 0, last = 0;  // photons or passes
+  Digest block;                       // of photons
   Digest radii;
+  std::uint64_t photons_per_pass = 0;
+  float caustic_radius = 1;
 };
 
 class Connection {
@@ -71,7 +78,8 @@ class Connection {
   std::set<grpc::ClientContext*> calls_ LUCERNA_GUARDED_BY(mutex_);
 };
 
-// Errors: INVALID_ARGUMENT for a lease that no coordinator of ours would lend.
-[[nodiscard]] StatusOr<LentBatch> ReadLease(const v1::Lease& message);
+// Errors: INVALID_ARGUMENT for a lease, or a job, that no coordinator of ours would give.
+[[nodiscard]] StatusOr<LentWork> ReadLease(const v1::Lease& message);
+[[nodiscard]] StatusOr<JobToTrace> ReadJob(const v1::JobDescription& message);
 
 }  // namespace lucerna

@@ -6,6 +6,7 @@
 
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/messages.h"
+#include "render/wire/slice_codec.h"
 
 namespace lucerna {
 namespace {
@@ -80,10 +81,10 @@ void LeaseRunner::Revoke(const v1::SyncResponse& response) {
 
 void LeaseRunner::Release(const Held& held, const Status& status) {
   const MutexLock lock(mutex_);
-  held_.erase(held.batch.lease_id);
+  held_.erase(held.work.lease_id);
   if (status.ok() || held.is_revoked) return;
-  spdlog::warn("batch {}: {}", held.batch.lease_id, std::string(status.message()));
-  failures_.emplace_back(held.batch.lease_id, std::string(status.message()));
+  spdlog::warn("lease {}: {}", held.work.lease_id, std::string(status.message()));
+  failures_.emplace_back(held.work.lease_id, std::string(status.message()));
 }
 
 void LeaseRunner::FetchStage() {
@@ -98,17 +99,17 @@ void LeaseRunner::FetchStage() {
     }
     Revoke(*response);
     if (!response->has_lease()) continue;
-    StatusOr<LentBatch> batch = ReadLease(response->lease());
+    StatusOr<LentWork> work = ReadLease(response->lease());
     const auto held = std::make_shared<Held>();
-    held->batch.lease_id = response->lease().lease_id();
-    if (batch.ok()) held->batch = std::move(*batch);
+    held->work.lease_id = response->lease().lease_id();
+    if (work.ok()) held->work = std::move(*work);
     {
       const MutexLock lock(mutex_);
       if (is_stopped_) return;
-      held_[held->batch.lease_id] = held;
+      held_[held->work.lease_id] = held;
     }
-    if (!batch.ok()) {
-      Release(*held, batch.status());
+    if (!work.ok()) {
+      Release(*held, work.status());
       continue;
     }
     StatusOr<Fetched> fetched = Fetch(held);
@@ -122,34 +123,66 @@ void LeaseRunner::FetchStage() {
   }
 }
 
+StatusOr<std::shared_ptr<const JobToTrace>> LeaseRunner::JobOf(const std::string& job_id) {
+  if (job_ == nullptr || job_id_ != job_id) {
+    LUCERNA_ASSIGN_OR_RETURN(const v1::JobDescription message, connection_.DescribeJob(job_id));
+    LUCERNA_ASSIGN_OR_RETURN(JobToTrace job, ReadJob(message));
+    job_ = std::make_shared<const JobToTrace>(std::move(job));
+    job_id_ = job_id;
+  }
+  return job_;
+}
+
 StatusOr<LeaseRunner::Fetched> LeaseRunner::Fetch(const std::shared_ptr<Held>& held) {
-  const LentBatch& batch = held->batch;
-  const std::size_t pixels = static_cast<std::size_t>(batch.settings.crop_width()) *
-                             static_cast<std::size_t>(batch.settings.crop_height());
-  const std::size_t per_pixel = batch.needs.Uses(Part::kCausticHitpoints) ? 2 : 1;
+  const LentWork& work = held->work;
   Fetched fetched;
   fetched.held = held;
-  LUCERNA_ASSIGN_OR_RETURN(fetched.tracer, cache_.TracerFor(batch.scene));
-  LUCERNA_ASSIGN_OR_RETURN(fetched.block, cache_.BlockFor(batch.block, pixels * per_pixel));
-  LUCERNA_ASSIGN_OR_RETURN(fetched.radii, cache_.RadiiFor(batch.radii, fetched.block->size()));
+  LUCERNA_ASSIGN_OR_RETURN(fetched.job, JobOf(work.job_id));
+  const RenderSettings& settings = fetched.job->settings;
+  const std::size_t pixels = static_cast<std::size_t>(settings.crop_width()) *
+                             static_cast<std::size_t>(settings.crop_height());
+  LUCERNA_ASSIGN_OR_RETURN(fetched.tracer, cache_.TracerFor(fetched.job->scene));
+  std::size_t rows = pixels;
+  if (work.kind == v1::WORK_KIND_PHOTONS) {
+    const std::size_t per_pixel = fetched.job->needs.Uses(Part::kCausticHitpoints) ? 2 : 1;
+    LUCERNA_ASSIGN_OR_RETURN(fetched.block, cache_.BlockFor(work.block, pixels * per_pixel));
+    rows = fetched.block->size();
+  }
+  LUCERNA_ASSIGN_OR_RETURN(fetched.radii, cache_.RadiiFor(work.radii, rows));
   return fetched;
 }
 
 void LeaseRunner::ComputeStage() {
   while (auto fetched = fetched_.Take()) {
-    const LentBatch& batch = fetched->held->batch;
     const Duration cpu_before = ProcessCpuTime();
-    StatusOr<Accumulation> accumulation = fetched->tracer->Run(
-        batch.settings, batch.needs, batch.pass, batch.first_photon, batch.last_photon,
-        *fetched->block, fetched->radii, fetched->held->is_revoked);
-    if (!accumulation.ok()) {
-      Release(*fetched->held, accumulation.status());
+    StatusOr<std::string> bytes = Compute(*fetched);
+    if (!bytes.ok()) {
+      Release(*fetched->held, bytes.status());
       continue;
     }
-    Computed computed{fetched->held, *std::move(accumulation), fetched->block->size(),
-                      ProcessCpuTime() - cpu_before};
+    Computed computed{fetched->held, *std::move(bytes), ProcessCpuTime() - cpu_before};
     if (!computed_.Give(std::move(computed))) return;
   }
+}
+
+StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
+  const LentWork& work = fetched.held->work;
+  const JobToTrace& job = *fetched.job;
+  const std::atomic<bool>& stop = fetched.held->is_revoked;
+  if (work.kind == v1::WORK_KIND_PHOTONS) {
+    LUCERNA_ASSIGN_OR_RETURN(
+        const Accumulation accumulation,
+        fetched.tracer->Run(job.settings, job.needs, work.pass, work.first, work.last,
+                            *fetched.block, *fetched.radii, stop, work.photons_per_pass));
+    return EncodeAccumulation(accumulation, fetched.block->size());
+  }
+  const RoundPlan plan = {.photons_per_pass = work.photons_per_pass,
+                          .radii = fetched.radii,
+                          .caustic_radius = work.caustic_radius};
+  LUCERNA_ASSIGN_OR_RETURN(
+      const SliceSums slice,
+      fetched.tracer->RunSlice(job.settings, job.needs, {work.first, work.last}, plan, stop));
+  return EncodeSlice(slice);
 }
 
 void LeaseRunner::CommitStage() {
@@ -167,15 +200,16 @@ void LeaseRunner::CommitStage() {
 }
 
 StatusOr<v1::CommitOutcome> LeaseRunner::Commit(const Computed& computed) {
-  const LentBatch& batch = computed.held->batch;
-  const std::string bytes = EncodeAccumulation(computed.accumulation, computed.hitpoints);
+  const LentWork& work = computed.held->work;
+  const std::string& bytes = computed.bytes;
   v1::CommitBatchRequest::Header header;
   header.set_worker_id(worker_id_);
-  header.set_lease_id(batch.lease_id);
-  header.set_job_id(batch.job_id);
-  header.set_pass(batch.pass);
-  header.set_first_photon(batch.first_photon);
-  header.set_last_photon(batch.last_photon);
+  header.set_lease_id(work.lease_id);
+  header.set_job_id(work.job_id);
+  header.set_kind(work.kind);
+  header.set_pass(work.pass);
+  header.set_first(work.first);
+  header.set_last(work.last);
   *header.mutable_cpu() = ToProto(computed.cpu);
   StatusOr<v1::CommitOutcome> outcome = connection_.Commit(header, bytes);
   // Bytes that were damaged on the way are sent again.

@@ -43,19 +43,19 @@ class LeaseRunner {
  private:
   // A lease that this worker has, from its arrival to its end.
   struct Held {
-    LentBatch batch;
+    LentWork work;
     std::atomic<bool> is_revoked = false;
   };
   struct Fetched {
     std::shared_ptr<Held> held;
+    std::shared_ptr<const JobToTrace> job;
     std::shared_ptr<BatchTracer> tracer;
-    std::shared_ptr<const HitpointBlock> block;
-    RadiusColumn radii;
+    std::shared_ptr<const HitpointBlock> block;  // of photons
+    std::shared_ptr<const RadiusColumn> radii;
   };
   struct Computed {
     std::shared_ptr<Held> held;
-    Accumulation accumulation;
-    std::size_t hitpoints = 0;
+    std::string bytes;  // of the result
     Duration cpu{};
   };
 
@@ -64,6 +64,9 @@ class LeaseRunner {
   void CommitStage();
   void Heartbeat();
   StatusOr<Fetched> Fetch(const std::shared_ptr<Held>& held);
+  StatusOr<std::shared_ptr<const JobToTrace>> JobOf(const std::string& job_id);
+  // The encoded result of a lease.
+  StatusOr<std::string> Compute(const Fetched& fetched);
   StatusOr<v1::CommitOutcome> Commit(const Computed& computed);
   // What is to be said of the leases held.
   v1::SyncRequest Report(bool wants_lease);
@@ -78,6 +81,10 @@ class LeaseRunner {
   SceneCache& cache_;
   const std::string worker_id_;
   const Duration sync_every_;
+
+  // Of the fetch stage alone: the job that the last lease was of.
+  std::string job_id_;
+  std::shared_ptr<const JobToTrace> job_;
 
   HandOver<Fetched> fetched_;
   HandOver<Computed> computed_;

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "render/base/clock.h"
+#include "render/base/memory.h"
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
@@ -143,5 +144,6 @@ int Main(int argc, char** argv) {
 }  // namespace lucerna
 
 int main(int argc, char** argv) {
+  lucerna::KeepFreedMemory();
   return lucerna::Main(argc, argv);
 }

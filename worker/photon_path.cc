@@ -107,8 +107,11 @@ class HistoryWatcher {
 PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& intersector,
                                    const LightSet& lights, const RenderSettings& settings,
                                    const SceneNeeds& needs, const SpectrumTracer* spectra,
-                                   const Bounds& region)
-    : scene_(scene),
+                                   const Bounds& region, std::uint64_t photons_per_pass)
+    : photons_per_pass_(photons_per_pass > 0
+                            ? photons_per_pass
+                            : static_cast<std::uint64_t>(settings.photons_per_pass)),
+      scene_(scene),
       intersector_(intersector),
       lights_(lights),
       settings_(settings),
@@ -135,8 +138,9 @@ float PhotonPathTracer::EnergyOf(Rgb flux) const {
 PhotonPathTracer::Key PhotonPathTracer::KeyOf(std::uint64_t pass, std::uint64_t index) const {
   constexpr std::uint64_t kPhotonKey = 0x50484F544F4E5321ULL;
   // One sequence over all even passes and one over all odd ones: each shares its photons out
-  // evenly, and the two halves are independent of each other (see estimate/error_estimate.h).
-  return {pass / 2 * static_cast<std::uint64_t>(settings_.photons_per_pass) + index,
+  // evenly, and the two halves are independent of each other (see estimate/error_estimate.h). Where
+  // passes get more photons, a part of the sequences is skipped and none is used twice.
+  return {pass / 2 * photons_per_pass_ + index,
           CombineKeys(CombineKeys(settings_.seed, kPhotonKey), pass % 2)};
 }
 

@@ -113,10 +113,12 @@ struct PhotonHistory {
 class PhotonPathTracer {
  public:
   // Keeps references to all but `needs`. Deposits outside `region` are not kept.
-  // `spectra`: for jobs with frequency photons, else nullptr.
+  // `spectra`: for jobs with frequency photons, else nullptr. `photons_per_pass`: of the passes to
+  // be traced; 0: as `settings` have it.
   PhotonPathTracer(const Scene& scene, const Intersector& intersector, const LightSet& lights,
                    const RenderSettings& settings, const SceneNeeds& needs,
-                   const SpectrumTracer* spectra, const Bounds& region);
+                   const SpectrumTracer* spectra, const Bounds& region,
+                   std::uint64_t photons_per_pass = 0);
 
   // What the photons of a range left.
   struct Landed {
@@ -165,6 +167,7 @@ class PhotonPathTracer {
   // In units of EnergyCounters.
   [[nodiscard]] float EnergyOf(Rgb flux) const;
 
+  const std::uint64_t photons_per_pass_;
   const Scene& scene_;
   const Intersector& intersector_;
   const LightSet& lights_;

@@ -109,17 +109,16 @@ v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing,
 
 StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& settings,
                                        const SceneNeeds& needs, std::uint64_t pass,
-                                       std::uint64_t index) {
-  if (pass >= kMostPasses || index >= static_cast<std::uint64_t>(settings.photons_per_pass)) {
-    return absl::OutOfRangeError(
-        absl::StrCat("there is no photon ", pass, ":", index,
-                     ": passes count from 0, and the photons of each from 0 to ",
-                     settings.photons_per_pass - 1));
+                                       std::uint64_t index, std::uint64_t photons_per_pass) {
+  if (pass >= kMostPasses || index >= photons_per_pass) {
+    return absl::OutOfRangeError(absl::StrCat(
+        "there is no photon ", pass, ":", index,
+        ": passes count from 0, and the photons of each from 0 to ", photons_per_pass - 1));
   }
   PreparedScene prepared(std::move(rec709));
   LUCERNA_RETURN_IF_ERROR(prepared.PrepareFor(needs));
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
-                                settings, needs, nullptr, Bounds());
+                                settings, needs, nullptr, Bounds(), photons_per_pass);
   const PhotonHistory history = tracer.Replay(pass, index);
 
   v1::PhotonPath path;
@@ -158,7 +157,12 @@ StatusOr<v1::PhotonPath> Replay(const ReplayOptions& options) {
                            FetchScene(manifest, [&](const Digest& digest, std::uint64_t max_bytes) {
                              return connection.Fetch(digest, max_bytes);
                            }));
-  return ReplayInScene(std::move(scene), settings, needs, options.pass, options.index);
+  auto photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass);
+  for (const v1::PhotonStep& step : job.photon_steps()) {
+    if (step.first_pass() <= options.pass) photons_per_pass = step.photons_per_pass();
+  }
+  return ReplayInScene(std::move(scene), settings, needs, options.pass, options.index,
+                       photons_per_pass);
 }
 
 }  // namespace lucerna

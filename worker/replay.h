@@ -31,9 +31,10 @@ struct ReplayOptions {
 // photon that no pass of the job has.
 [[nodiscard]] StatusOr<v1::PhotonPath> Replay(const ReplayOptions& options);
 
-// The same of a scene that is at hand, in Rec. 709.
+// The same of a scene that is at hand, in Rec. 709; the pass has `photons_per_pass`.
 [[nodiscard]] StatusOr<v1::PhotonPath> ReplayInScene(Scene scene, const RenderSettings& settings,
                                                      const SceneNeeds& needs, std::uint64_t pass,
-                                                     std::uint64_t index);
+                                                     std::uint64_t index,
+                                                     std::uint64_t photons_per_pass);
 
 }  // namespace lucerna

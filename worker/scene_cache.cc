@@ -11,9 +11,8 @@ namespace {
 constexpr std::size_t kTracersKept = 2;
 // Two passes may be open, and workers fetch one ahead.
 constexpr std::size_t kBlocksKept = 3;
-// More of them while they have at most so many hitpoints together: where eye paths take turns, all
-// blocks come again (see analysis/needs.h). 16 bytes each.
-constexpr std::size_t kHitpointsKept = std::size_t{1} << 24;
+// The slices of a round share theirs.
+constexpr std::size_t kRadiiKept = 2;
 // What a hitpoint and its radius may need at most before compression, which cannot double it.
 constexpr std::uint64_t kBytesPerHitpoint = 80;
 constexpr std::uint64_t kHeadBytes = 4096;
@@ -64,20 +63,23 @@ StatusOr<std::shared_ptr<const HitpointBlock>> SceneCache::BlockFor(const Digest
   LUCERNA_ASSIGN_OR_RETURN(HitpointBlock decoded, DecodeHitpointBlock(bytes, max_hitpoints));
   std::shared_ptr<const HitpointBlock> block = std::make_shared<HitpointBlock>(std::move(decoded));
   blocks_.emplace_front(digest, block);
-  std::size_t hitpoints = 0;
-  for (const auto& [of, kept] : blocks_)
-    hitpoints += kept->size();
-  while (blocks_.size() > kBlocksKept && hitpoints > kHitpointsKept) {
-    hitpoints -= blocks_.back().second->size();
+  while (blocks_.size() > kBlocksKept)
     blocks_.pop_back();
-  }
   return block;
 }
 
-StatusOr<RadiusColumn> SceneCache::RadiiFor(const Digest& digest, std::size_t hitpoints) {
+StatusOr<std::shared_ptr<const RadiusColumn>> SceneCache::RadiiFor(const Digest& digest,
+                                                                   std::size_t rows) {
+  if (auto radii = Find(radii_, digest); radii != nullptr && radii->size() == rows) return radii;
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes,
-                           fetch_(digest, kHeadBytes + kBytesPerHitpoint * hitpoints));
-  return DecodeRadii(bytes, hitpoints);
+                           fetch_(digest, kHeadBytes + kBytesPerHitpoint * rows));
+  LUCERNA_ASSIGN_OR_RETURN(RadiusColumn decoded, DecodeRadii(bytes, rows));
+  std::shared_ptr<const RadiusColumn> radii =
+      std::make_shared<const RadiusColumn>(std::move(decoded));
+  radii_.emplace_front(digest, radii);
+  while (radii_.size() > kRadiiKept)
+    radii_.pop_back();
+  return radii;
 }
 
 }  // namespace lucerna

@@ -2,7 +2,7 @@
 //
 // Everything a batch needs is named by digest, and what a worker holds is only a cache: the
 // tracers of the last two scenes, each with its acceleration structure, and the last hitpoint
-// blocks.
+// blocks and radii.
 //
 // Threads: one; what it returns may be used by another for as long as it is held.
 #pragma once
@@ -40,8 +40,9 @@ class SceneCache {
   // Errors: what fetching said, INVALID_ARGUMENT for bytes that are no block.
   [[nodiscard]] StatusOr<std::shared_ptr<const HitpointBlock>> BlockFor(const Digest& digest,
                                                                         std::size_t max_hitpoints);
-  // Radii are used once and not kept.
-  [[nodiscard]] StatusOr<RadiusColumn> RadiiFor(const Digest& digest, std::size_t hitpoints);
+  // Errors: what fetching said, INVALID_ARGUMENT for bytes that are not so many radii.
+  [[nodiscard]] StatusOr<std::shared_ptr<const RadiusColumn>> RadiiFor(const Digest& digest,
+                                                                       std::size_t rows);
 
  private:
   template <typename Value>
@@ -51,6 +52,7 @@ class SceneCache {
   const Fetch fetch_;
   Kept<BatchTracer> tracers_;
   Kept<const HitpointBlock> blocks_;
+  Kept<const RadiusColumn> radii_;
 };
 
 }  // namespace lucerna

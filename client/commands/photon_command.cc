@@ -46,11 +46,14 @@ Status TracePhoton(const PhotonRequest& request, const std::string& server,
   LUCERNA_ASSIGN_OR_RETURN(const v1::PhotonKey key, ReadKey(request));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, connection->Get(request.job_id));
-  const auto photons = static_cast<std::uint64_t>(SettingsOf(job).photons_per_pass);
+  auto photons = static_cast<std::uint64_t>(SettingsOf(job).photons_per_pass);
+  for (const v1::PhotonStep& step : job.photon_steps()) {
+    if (step.first_pass() <= key.pass()) photons = step.photons_per_pass();
+  }
   if (key.index() >= photons) {
-    return Failure(ExitCode::kUsage,
-                   absl::StrCat("the passes of job ", request.job_id, " have the photons 0 to ",
-                                photons - 1, "; there is no ", key.index()));
+    return Failure(ExitCode::kUsage, absl::StrCat("pass ", key.pass(), " of job ", request.job_id,
+                                                  " has the photons 0 to ", photons - 1,
+                                                  "; there is no ", key.index()));
   }
   LUCERNA_ASSIGN_OR_RETURN(
       const std::string bytes,

@@ -15,11 +15,29 @@ namespace {
 
 constexpr Duration kPlainLineEvery = std::chrono::seconds(2);
 
+// The photons of so many passes, as far as it is known how many later ones have.
+double PhotonsOfPasses(const v1::Job& job, double passes) {
+  double photons = 0;
+  double per_pass = static_cast<double>(SettingsOf(job).photons_per_pass);
+  double first = 0;
+  for (const v1::PhotonStep& step : job.photon_steps()) {
+    const double from = std::min(static_cast<double>(step.first_pass()), passes);
+    photons += per_pass * (from - first);
+    first = from;
+    per_pass = static_cast<double>(step.photons_per_pass());
+  }
+  return photons + per_pass * (passes - first);
+}
+
 // After how many photons the job stops, by its passes or its photons; 0: no limit.
-double PhotonsInAll(const RenderSettings& settings) {
-  const double per_pass = static_cast<double>(settings.photons_per_pass);
-  const double of_passes = static_cast<double>(settings.passes) * per_pass;
+double PhotonsInAll(const v1::Job& job) {
+  const RenderSettings settings = SettingsOf(job);
+  const double of_passes = PhotonsOfPasses(job, static_cast<double>(settings.passes));
   double of_photons = static_cast<double>(settings.photons);
+  const int steps = job.photon_steps_size();
+  const double per_pass = steps > 0
+                              ? static_cast<double>(job.photon_steps(steps - 1).photons_per_pass())
+                              : static_cast<double>(settings.photons_per_pass);
   // It ends with the pass that reaches them.
   if (per_pass > 0) of_photons = per_pass * std::ceil(of_photons / per_pass);
   if (of_passes > 0 && of_photons > 0) return std::min(of_passes, of_photons);
@@ -107,8 +125,8 @@ std::optional<double> ShareDone(const v1::Job& job) {
   if (settings.time_s > 0) {
     share = Seconds(FromProto(job.progress().running())) / settings.time_s;
   }
-  if (PhotonsInAll(settings) > 0) {
-    share = std::max(share, static_cast<double>(job.progress().photons()) / PhotonsInAll(settings));
+  if (PhotonsInAll(job) > 0) {
+    share = std::max(share, static_cast<double>(job.progress().photons()) / PhotonsInAll(job));
   }
   if (const auto left = TimeToTarget(job)) {
     const double running_s = Seconds(FromProto(job.progress().running()));
@@ -126,8 +144,8 @@ std::optional<Duration> TimeLeft(const v1::Job& job) {
     left_s = settings.time_s - Seconds(FromProto(job.progress().running()));
   }
   const double rate = job.progress().photons_per_second();
-  if (PhotonsInAll(settings) > 0 && rate > 0) {
-    const double photons = PhotonsInAll(settings) - static_cast<double>(job.progress().photons());
+  if (PhotonsInAll(job) > 0 && rate > 0) {
+    const double photons = PhotonsInAll(job) - static_cast<double>(job.progress().photons());
     left_s = left_s ? std::min(*left_s, photons / rate) : photons / rate;
   }
   if (const auto left = TimeToTarget(job)) {

@@ -10,18 +10,17 @@ namespace {
 
 // Bytes a pixel, measured (docs/numerics.md, docs/measurements.md): of the coordinator for a job
 // without evidence, and of a worker.
-constexpr double kCoordinator = 640;
-constexpr double kWorker = 311;
-// Bytes a hitpoint: compressed, with and without what glossy ones need, and as workers keep it.
+constexpr double kCoordinator = 600;
+constexpr double kWorker = 390;
+// Of both, for each column of evidence of the slices that they hold.
+constexpr double kEvidenceColumn = 16;
+// Bytes a hitpoint: compressed, with and without what glossy ones need.
 constexpr double kBlock = 6.5;
 constexpr double kGlossyBlock = 14;
-constexpr double kKeptBlock = 16;
 constexpr double kFirstHit = 4;
 constexpr double kRadius = 2.5;
-constexpr double kOpenPasses = 2;
-// Of the coordinator, by the columns of a second set of statistics, rows and sums; and of a worker.
-constexpr double kCausticHitpoint = 370;
-constexpr double kCausticOfWorker = 100;
+// Of hitpoints for caustic photons, wherever a pass is traced.
+constexpr double kCausticHitpoint = 150;
 
 }  // namespace
 
@@ -35,11 +34,11 @@ ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& setti
   const double caustic_rows = needs.Uses(Part::kCausticHitpoints) ? 1 : 0;
   ExpectedCost cost;
   cost.coordinator = pixels * (kCoordinator + caustic_rows * kCausticHitpoint +
-                               sizeof(std::int64_t) * kOpenPasses * columns +
-                               sizeof(double) * numbers + sets * (block + kFirstHit));
-  cost.worker = pixels * (kWorker + caustic_rows * kCausticOfWorker + sets * kKeptBlock);
+                               kEvidenceColumn * columns + sizeof(double) * numbers);
+  cost.worker = pixels * (kWorker + caustic_rows * kCausticHitpoint + kEvidenceColumn * columns +
+                          sets * kFirstHit);
   cost.first_pass_sent = pixels * (block + kRadius + caustic_rows * (kGlossyBlock + kRadius));
-  cost.pass_sent = sets > 0 ? pixels * kRadius : cost.first_pass_sent;
+  cost.pass_sent = pixels * kRadius;
   return cost;
 }
 

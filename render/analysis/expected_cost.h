@@ -11,12 +11,12 @@ namespace lucerna {
 
 // In bytes, memory beside the scene itself.
 struct ExpectedCost {
-  // At its largest: statistics, three passes on their way, their hitpoints as bytes, and the image
-  // as pixels and as a file.
+  // At its largest: sums over passes, a few slices on their way, and the image as pixels and as a
+  // file.
   double coordinator = 0;
-  double worker = 0;           // with as many photons in a batch as there are pixels
-  double first_pass_sent = 0;  // to each worker, while eye paths are new
-  double pass_sent = 0;        // to each worker, later
+  double worker = 0;           // with four photons a pixel and pass
+  double first_pass_sent = 0;  // to each worker, as of all passes that are split
+  double pass_sent = 0;        // to each worker, once a round of passes
 };
 [[nodiscard]] ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& settings);
 

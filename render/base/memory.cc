@@ -8,6 +8,8 @@
 #include <string>
 #include <string_view>
 
+#include <malloc.h>
+
 namespace lucerna {
 namespace {
 
@@ -41,6 +43,13 @@ std::uint64_t AvailableMemory() {
   const auto used = NumberInFile("/sys/fs/cgroup/memory.current", "");
   if (limit && used) available = std::min(available, *limit - std::min(*limit, *used));
   return available;
+}
+
+void KeepFreedMemory() {
+  constexpr int kLargestBlock = 32 << 20;  // the largest that the C library allows
+  constexpr int kLargestRest = 256 << 20;
+  mallopt(M_MMAP_THRESHOLD, kLargestBlock);
+  mallopt(M_TRIM_THRESHOLD, kLargestRest);
 }
 
 }  // namespace lucerna

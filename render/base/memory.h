@@ -1,4 +1,4 @@
-// How much memory may this process still take?
+// How much memory may this process still take, and how does it take it?
 #pragma once
 
 #include <cstdint>
@@ -8,5 +8,10 @@ namespace lucerna {
 // What is available on this machine, or within the limit of the process's control group where that
 // is less [bytes]; UINT64_MAX when the system does not say.
 [[nodiscard]] std::uint64_t AvailableMemory();
+
+// Keeps freed blocks of up to 32 MiB for the next ones instead of giving each back to the system:
+// columns of an image come and go with every pass, and a page that the system gives is cleared and
+// mapped anew. At the beginning of a program.
+void KeepFreedMemory();
 
 }  // namespace lucerna

@@ -82,16 +82,20 @@ class MeanAround {
   std::vector<float> rows_;  // sums over x
 };
 
+// The mean bias of a pixel in even passes and in odd ones [luminance].
+struct HalfBiases {
+  float even = 0, odd = 0;
+};
+
 // The share of the estimated bias that is taken off single pixels to guess their values without
 // blur: near 1 unless the estimate is mostly noise.
-double BelievedShare(const PixelSumsAt& sums_at, const std::vector<double>& luminances,
-                     double floor, double even_passes, double odd_passes) {
+double BelievedShare(const std::vector<HalfBiases>& biases, const std::vector<double>& luminances,
+                     double floor) {
   double bias = 0;
   double noise = 0;
   for (std::size_t i = 0; i < luminances.size(); ++i) {
-    const PixelSums sums = sums_at(i);
-    const double even = sums.even_bias / even_passes;
-    const double odd = sums.odd_bias / odd_passes;
+    const auto even = static_cast<double>(biases[i].even);
+    const auto odd = static_cast<double>(biases[i].odd);
     const double weight = 1 / (luminances[i] * luminances[i] + floor);
     bias += even * odd * weight;
     noise += 0.25 * (even - odd) * (even - odd) * weight;
@@ -362,30 +366,6 @@ SquaredError Summarize(const std::vector<PixelError>& pixels, Scale scale, doubl
 
 }  // namespace
 
-ErrorStatistics::ErrorStatistics(std::size_t pixels)
-    : even_sum_(pixels), square_sum_(pixels), largest_(pixels) {
-  for (std::vector<double>& sum : bias_sum_)
-    sum.resize(pixels);
-}
-
-void ErrorStatistics::AddPass(std::uint64_t pass, std::span<const RgbSum> radiance,
-                              std::span<const double> bias) {
-  LUCERNA_CHECK(radiance.size() == even_sum_.size() && bias.size() == even_sum_.size());
-  const bool is_even = pass % 2 == 0;
-  std::vector<double>& bias_sum = bias_sum_[is_even ? 0 : 1];
-  for (std::size_t pixel = 0; pixel < radiance.size(); ++pixel) {
-    const double luminance = LuminanceOf(radiance[pixel]);
-    square_sum_[pixel] += luminance * luminance;
-    largest_[pixel] = std::max(largest_[pixel], static_cast<float>(luminance));
-    bias_sum[pixel] += bias[pixel];
-    if (!is_even) continue;
-    for (std::size_t c = 0; c < 3; ++c) {
-      even_sum_[pixel][c] += radiance[pixel][c];
-    }
-  }
-  ++passes_;
-}
-
 double TwoSidedNormalQuantile(double probability) {
   double low = 0;
   double high = 40;
@@ -407,16 +387,22 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
   const double z = TwoSidedNormalQuantile((1 - kConfidence) * SpentAt(look));
 
   const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  const auto mean_around = [&](std::size_t channel) {
-    std::vector<float> means(count);
-    for (std::size_t i = 0; i < count; ++i)
-      means[i] = static_cast<float>(sums_at(i).all[channel] / passes);
-    return MeanAround(width, height, std::move(means));
-  };
-  const std::array<MeanAround, 3> around = {mean_around(0), mean_around(1), mean_around(2)};
+  std::array<std::vector<float>, 3> means;
+  for (std::vector<float>& channel : means)
+    channel.resize(count);
   std::vector<double> luminances(count);
-  for (std::size_t i = 0; i < count; ++i)
-    luminances[i] = LuminanceOf(sums_at(i).all) / passes;
+  std::vector<HalfBiases> half_biases(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const PixelSums sums = sums_at(i);
+    for (std::size_t c = 0; c < 3; ++c)
+      means[c][i] = static_cast<float>(sums.all[c] / passes);
+    luminances[i] = LuminanceOf(sums.all) / passes;
+    half_biases[i] = {static_cast<float>(sums.even_bias / even_passes),
+                      static_cast<float>(sums.odd_bias / odd_passes)};
+  }
+  const std::array<MeanAround, 3> around = {MeanAround(width, height, std::move(means[0])),
+                                            MeanAround(width, height, std::move(means[1])),
+                                            MeanAround(width, height, std::move(means[2]))};
   const std::vector<float> least_luminance =
       LeastLuminance(width, height, std::vector<float>(luminances.begin(), luminances.end()));
   const double floor = RelativeErrorFloor(luminances);
@@ -425,7 +411,7 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
     return {.relative = unknown, .absolute = {}, .untrimmed = HUGE_VAL};
   }
 
-  const double believed = BelievedShare(sums_at, luminances, floor, even_passes, odd_passes);
+  const double believed = BelievedShare(half_biases, luminances, floor);
   std::vector<PixelError> pixels(count);
   std::vector<float> differences(count);
   PixelBiases biases(count);

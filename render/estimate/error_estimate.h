@@ -57,34 +57,6 @@ using RgbSum = std::array<double, 3>;
   return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
 }
 
-// What is kept of all passes, per pixel.
-class ErrorStatistics {
- public:
-  explicit ErrorStatistics(std::size_t pixels);
-
-  // Takes in pass number `pass`: per pixel its radiance and the
-  // luminance of radiance by which its kernel is estimated to have changed it.
-  void AddPass(std::uint64_t pass, std::span<const RgbSum> radiance, std::span<const double> bias);
-
-  [[nodiscard]] std::int64_t passes() const { return passes_; }
-  // Sums over the even passes [pixels].
-  [[nodiscard]] const std::vector<RgbSum>& even_sum() const { return even_sum_; }
-  // Sums over all passes of the squared luminance [pixels].
-  [[nodiscard]] const std::vector<double>& square_sum() const { return square_sum_; }
-  // The largest luminance of a pass [pixels].
-  [[nodiscard]] const std::vector<float>& largest() const { return largest_; }
-  // Sums over even and odd passes of the bias [pixels].
-  [[nodiscard]] const std::vector<double>& even_bias() const { return bias_sum_[0]; }
-  [[nodiscard]] const std::vector<double>& odd_bias() const { return bias_sum_[1]; }
-
- private:
-  std::int64_t passes_ = 0;
-  std::vector<RgbSum> even_sum_;
-  std::vector<double> square_sum_;
-  std::vector<float> largest_;
-  std::array<std::vector<double>, 2> bias_sum_;
-};
-
 // An expected squared error and its parts.
 struct SquaredError {
   double noise = 0;
@@ -123,10 +95,14 @@ using PixelSumsAt = std::function<PixelSums(std::size_t pixel)>;
 
 // Passes before the first look at the error: halves of two passes each.
 inline constexpr std::int64_t kFirstCheckpoint = 4;
-// After how many passes to look next. Fifteen looks or so to a decade of passes: the more looks,
-// the wider each one's interval.
-[[nodiscard]] constexpr std::int64_t NextCheckpoint(std::int64_t passes) {
-  return passes * 7 / 6 > passes ? passes * 7 / 6 : passes + 1;
+// After how many passes to estimate next. An estimate takes as long as a tenth of a pass, so there
+// are few while passes are few: after twice as many passes, from 16 on after half as many again,
+// from 64 on after a sixth more, and so always where the error is near a target, `near_target`.
+[[nodiscard]] constexpr std::int64_t NextCheckpoint(std::int64_t passes, bool near_target) {
+  const std::int64_t next = near_target || passes >= 64 ? passes * 7 / 6
+                            : passes >= 16              ? passes * 3 / 2
+                                                        : passes * 2;
+  return next > passes ? next : passes + 1;
 }
 
 // The share of the error probability that look j (from 1) spends; of all looks the sum is 1.

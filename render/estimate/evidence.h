@@ -7,6 +7,7 @@
 // is in none of them; how each makes up for the missing part of a disc that is cut stands with it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -104,6 +105,17 @@ static_assert([] {
 [[nodiscard]] constexpr std::size_t EvidenceColumns(Evidence evidence) {
   return kCommonColumns + TraitsOf(evidence).columns;
 }
+
+// The columns of a radius controller, after the common ones; passes without evidence add nothing.
+[[nodiscard]] constexpr std::size_t ControllerColumns(RadiusControllerKind kind) {
+  return TraitsOf(EvidenceOf(kind)).columns;
+}
+inline constexpr std::size_t kMostControllerColumns = [] {
+  std::size_t most = 0;
+  for (const EvidenceTraits& traits : kAllEvidence)
+    most = std::max(most, traits.columns);
+  return most;
+}();
 
 // How far from a hitpoint photons are looked for [radii].
 [[nodiscard]] constexpr float ReachOf(Evidence evidence) {

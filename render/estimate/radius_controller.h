@@ -1,7 +1,7 @@
 // From what a pixel's photons were, how large is its next radius?
 //
-// A controller is a pure rule, applied to every pixel that had a hitpoint after each pass, in
-// pass order. Radii are in units that the pass fixes per hitpoint (see HitpointRows::unit_radii).
+// A controller is a pure rule, applied to every pixel after each round (estimate/rounds.h), in
+// order. Radii are in units that the pass fixes per hitpoint (see EyePass::unit_radii).
 // It names the columns of evidence it uses (estimate/evidence.h) and for as many numbers of
 // memory a pixel as it needs; most use neither.
 #pragma once
@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 
+#include "render/estimate/rounds.h"
 #include "render/scene/render_settings.h"
 
 namespace lucerna {
@@ -24,12 +25,12 @@ struct PixelRadius {
   double photons = 0;  // N, photons counted as kept so far
 };
 
-// What one pass brought to one pixel.
-struct PassEvidence {
+// What one round brought to one pixel: sums over its passes.
+struct RoundEvidence {
   double photons = 0;  // M, found with the radius below
-  double radius = 0;   // in unit radii; at least PixelRadius::radius, since radii lag by a pass
-  // One number a column, in the controller's order of columns; none in a pass without evidence.
-  std::span<const std::int64_t> columns;
+  double radius = 0;   // in unit radii; at least PixelRadius::radius, since radii lag
+  // One number a column, in the controller's order of columns.
+  std::span<const double> columns;
   // What the kernel makes of light that is not even, as kBlurColumn measures it: estimate less
   // truth [luminance flux relative to the scene's power, per squared unit radius].
   double blur = 0;
@@ -53,9 +54,10 @@ class RadiusController {
   virtual ~RadiusController() = default;
   // Numbers of memory a pixel, zero before the first pass.
   [[nodiscard]] virtual std::size_t MemoryPerPixel() const { return 0; }
-  // The state after `pass` (from 0) brought `evidence`. A radius never grows.
-  [[nodiscard]] virtual PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence,
-                                         std::uint64_t pass, std::span<double> memory) const = 0;
+  // The state after the round `passes` brought `evidence`. A radius never grows.
+  [[nodiscard]] virtual PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence,
+                                         const PassRange& passes,
+                                         std::span<double> memory) const = 0;
   // Whether Predict ever says anything.
   [[nodiscard]] virtual bool Predicts() const { return false; }
   // Absent when the controller makes none, or has too little evidence for the pixel yet.
@@ -66,6 +68,10 @@ class RadiusController {
   // Absent when no theory says.
   [[nodiscard]] virtual std::optional<TheorySlopes> Slopes() const { return std::nullopt; }
 };
+
+// By what factor a radius shrinks in `passes` on a schedule that is the same for every pixel.
+// Source: Knaus & Zwicker 2011, "Progressive Photon Mapping: A Probabilistic Approach", eq. (18).
+[[nodiscard]] double ScheduledShrink(double alpha, const PassRange& passes);
 
 // The controller that `settings` name. `initial_radius` in unit radii.
 [[nodiscard]] std::unique_ptr<RadiusController> MakeRadiusController(const RenderSettings& settings,

@@ -13,13 +13,19 @@ double RelativeErrorFloor(std::span<const double> luminances) {
   }
   if (lit.empty()) return 0;
   const auto bright = static_cast<std::size_t>(kBrightShare * static_cast<double>(lit.size()));
-  const auto first_kept = lit.begin() + static_cast<std::ptrdiff_t>(bright);
-  std::ranges::nth_element(lit, first_kept, std::greater<>());
-  // Sorted, so that the order of pixels does not show in the last digit.
-  std::sort(first_kept, lit.end());
+  std::vector<double> by_size = lit;
+  const auto first_kept = by_size.begin() + static_cast<std::ptrdiff_t>(bright);
+  std::ranges::nth_element(by_size, first_kept, std::greater<>());
+  // In the order of pixels; of those as large as the largest kept, as many as are.
+  const double largest = *first_kept;
   double sum = 0;
-  for (auto kept = first_kept; kept != lit.end(); ++kept)
-    sum += *kept;
+  std::size_t smaller = 0;
+  for (const double luminance : lit) {
+    if (luminance >= largest) continue;
+    sum += luminance;
+    ++smaller;
+  }
+  sum += largest * static_cast<double>(lit.size() - bright - smaller);
   const double mean = sum / static_cast<double>(luminances.size() - bright);
   return kFloorShare * mean * mean;
 }

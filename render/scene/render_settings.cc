@@ -154,9 +154,9 @@ StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const
                " are ", pixels, " pixels, more than the ", kMaxPixels,
                " of one job; render it in parts, with the film's cropwindow"));
   }
-  if (!overrides.photons_per_pass && !scene.integrator.photons_per_pass) {
-    settings.photons_per_pass = pixels;
-  }
+  const bool is_given = overrides.photons_per_pass || scene.integrator.photons_per_pass;
+  if (!is_given) settings.photons_per_pass = pixels;
+  if (!overrides.adaptive_photons) settings.adaptive_photons = !is_given;
   for (const Setting& setting : AllSettings()) {
     if (setting.role == SettingRole::kDecidesPixels) {
       LUCERNA_RETURN_IF_ERROR(CheckSetting(setting, settings));

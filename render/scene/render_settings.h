@@ -46,6 +46,8 @@ struct SettingFields {
   Field<std::uint64_t> photons{};
 
   Field<std::int64_t> photons_per_pass{};
+  // Later passes may have more photons (estimate/photon_steps.h).
+  Field<bool> adaptive_photons{};
   Field<std::uint64_t> seed{};
   Field<RadiusControllerKind> radius_controller{};
   Field<double> alpha{};

@@ -96,6 +96,12 @@ constexpr auto kSettings = std::to_array<Setting>({
              .low = 1,
              .high = 1'000'000'000'000,
              .of_scene = [](const Scene& scene) { return scene.integrator.photons_per_pass; }}},
+    {.name = "adaptive_photons",
+     .meaning =
+         "give later passes up to eight times as many photons, where that is best for the noise",
+     .default_text = "set unless the photons of a pass are given",
+     .type = SettingField<bool>{.given = &Overrides::adaptive_photons,
+                                .value = &Settings::adaptive_photons}},
     {.name = "seed",
      .meaning = "another seed gives other noise",
      .scene_default = "the scene's `seed`",

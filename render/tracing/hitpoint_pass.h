@@ -10,7 +10,6 @@
 
 #include "render/base/parallel.h"
 #include "render/estimate/hitpoint_block.h"
-#include "render/estimate/statistics.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "render/tracing/eye_path.h"
@@ -21,26 +20,15 @@ namespace lucerna {
 struct EyePass {
   std::uint64_t pass = 0;
   HitpointBlock block;
-  // Per hitpoint, in the block's order (see HitpointRows).
+  // Per hitpoint, in the block's order. A pixel has at most one among the caustic rows and one
+  // among the others.
   std::vector<std::uint32_t> pixels;  // row-major in the crop window
-  std::vector<Rgb> weights;
-  std::vector<float> unit_radii;
+  std::vector<Rgb> weights;           // from gathered flux density to radiance
+  std::vector<float> unit_radii;      // length of a radius of 1 [scene units]
   // Per pixel of the crop window.
   std::vector<Rgb> direct;
   std::vector<EyeFeatures> features;
   std::uint64_t rays = 0;
-
-  // The rows that gather all photons but caustic ones, and those that gather these.
-  [[nodiscard]] HitpointRows rows() const { return Rows(0, pixels.size() - block.caustic_rows); }
-  [[nodiscard]] HitpointRows caustic_rows() const {
-    return Rows(pixels.size() - block.caustic_rows, block.caustic_rows);
-  }
-
- private:
-  [[nodiscard]] HitpointRows Rows(std::size_t first, std::size_t count) const {
-    return {std::span(pixels).subspan(first, count), std::span(weights).subspan(first, count),
-            std::span(unit_radii).subspan(first, count), first};
-  }
 };
 
 // Traces one eye path for every pixel. Depends on the tracer's job and `pass` alone; `known` (or

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "render/wire/bytes.h"
+#include "render/wire/tally_codec.h"
 
 namespace lucerna {
 namespace {
@@ -111,19 +112,7 @@ std::string EncodeAccumulation(const Accumulation& accumulation, std::size_t hit
   writer.Bytes(kMagic);
   writer.Varint(hitpoints);
   writer.Varint(accumulation.size());
-  const BatchTally& tally = accumulation.tally;
-  writer.Varint(kBatchCounters.size());
-  for (const auto& counter : kBatchCounters)
-    writer.Varint(tally.*counter.value);
-  writer.Varint(kEnergyCounters.size());
-  for (const auto& counter : kEnergyCounters)
-    writer.Varint(ZigZag(tally.energy.*counter.value));
-  writer.Varint(tally.lights.size());
-  for (const LightTally& light : tally.lights) {
-    writer.Varint(light.sent);
-    for (const std::uint64_t in_view : light.in_view)
-      writer.Varint(in_view);
-  }
+  WriteTally(writer, accumulation.tally);
   writer.Varint(accumulation.dropped_photons.size());
   for (const std::uint64_t index : accumulation.dropped_photons)
     writer.Varint(index);
@@ -172,23 +161,9 @@ StatusOr<Accumulation> DecodeAccumulation(std::string_view bytes, std::size_t hi
   if (rows > hitpoints) return Malformed("more rows than the block has");
 
   Accumulation accumulation;
-  BatchTally& tally = accumulation.tally;
-  if (reader.Varint() != kBatchCounters.size()) return Malformed("it has other counters");
-  for (const auto& counter : kBatchCounters)
-    tally.*counter.value = reader.Varint();
-  if (reader.Varint() != kEnergyCounters.size()) return Malformed("it has other counters");
-  for (const auto& counter : kEnergyCounters)
-    tally.energy.*counter.value = UnZigZag(reader.Varint());
-  if (!tally.energy.Balance()) return Malformed("its energy does not balance");
-  const std::uint64_t lights = reader.Varint();
-  if (lights > kMaxLightTallies) return Malformed("it counts the photons of too many lights");
-  tally.lights.resize(lights);
-  for (LightTally& light : tally.lights) {
-    light.sent = reader.Varint();
-    for (std::uint64_t& in_view : light.in_view)
-      in_view = reader.Varint();
-  }
-  if (!tally.LightsFit()) return Malformed("its photons by light contradict its photons");
+  StatusOr<BatchTally> tally = ReadTally(reader);
+  if (!tally.ok()) return Malformed(std::string(tally.status().message()));
+  accumulation.tally = *std::move(tally);
   const std::uint64_t named = reader.Varint();
   if (named > kDroppedNamed) return Malformed("it names too many dropped photons");
   for (std::uint64_t i = 0; i < named; ++i) {

@@ -203,6 +203,13 @@ RenderSettings SettingsOf(const v1::Job& job) {
   return settings;
 }
 
+v1::PhotonStep ToProto(const PhotonStep& step) {
+  v1::PhotonStep message;
+  message.set_first_pass(step.first_pass);
+  message.set_photons_per_pass(step.photons_per_pass);
+  return message;
+}
+
 v1::SceneNeeds ToProto(const SceneNeeds& needs) {
   v1::SceneNeeds message;
   message.set_parts(needs.parts());

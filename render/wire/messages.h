@@ -10,10 +10,13 @@
 #include "render/base/clock.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
+#include "render/estimate/photon_steps.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
 
 namespace lucerna {
+
+[[nodiscard]] v1::PhotonStep ToProto(const PhotonStep& step);
 
 [[nodiscard]] v1::SceneManifest ToProto(const SceneManifest& manifest);
 // Also holds the manifest to `limits`, and its main file to be one of its files.

@@ -54,7 +54,7 @@ struct Bench {
     lights = std::make_unique<LightSet>(scene, *intersector, needs.lights());
     estimator = JobEstimator::Create(scene, settings, needs, 1).value();
     eye = estimator->TraceEyePaths(0);
-    radii = estimator->Radii(eye);
+    radii = HitpointRadii(eye, estimator->PlanFor({0, 1}).value());
     for (std::size_t row = 0; row < radii.size(); ++row) {
       const Vec3 reach = {radii[row], radii[row], radii[row]};
       region.Add(eye.block.positions[row] - reach);

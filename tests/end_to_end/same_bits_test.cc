@@ -1,15 +1,20 @@
 // The image does not depend on who rendered it.
 //
 // Real programs on loopback: one digest for one worker with one thread, one with two, and three
-// with one, and for batches of several sizes, down to some that cut a pass into dozens of ranges.
+// with one, and for batches of several sizes, down to some that cut a pass into dozens of ranges;
+// over few passes, and over so many that rounds of two and four passes are lent as slices; with
+// workers that are killed; and for a job that goes on after an end in the middle of a round.
 // The scene has smooth glass and a mirror, the other has rough metal, whose hitpoints travel with
 // their BSDF.
+#include <chrono>
 #include <memory>
 #include <ostream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "gtest/gtest.h"
+#include <signal.h>
 
 #include "tests/support/process.h"
 
@@ -21,29 +26,96 @@ const std::string kBin = LUCERNA_BIN_DIR;
 struct Fleet {
   int workers;
   int threads;
-  int batch_photons;  // 0: the coordinator's choice
+  int batch_photons;        // 0: the coordinator's choice
+  int killed_after_ms = 0;  // the first worker, and replaced; 0: none is
 };
 
-std::string DigestOf(const std::string& scene, const std::string& controller, const Fleet& fleet) {
-  ChildProcess server({kBin + "/lucerna-server", "--listen", "127.0.0.1:0", "--batch-photons",
-                       std::to_string(fleet.batch_photons)});
-  const std::string greeting = "listening on ";
-  EXPECT_TRUE(server.WaitForText("\n", std::chrono::seconds(60)));
-  const std::string line = server.Output();
-  const std::string address = line.substr(greeting.size(), line.find('\n') - greeting.size());
-  std::vector<std::unique_ptr<ChildProcess>> workers;
-  for (int i = 0; i < fleet.workers; ++i) {
-    workers.push_back(std::make_unique<ChildProcess>(
-        std::vector<std::string>{kBin + "/lucerna-worker", "--server", address, "--threads",
-                                 std::to_string(fleet.threads)}));
+struct Work {
+  const char* scene;
+  const char* controller;
+  int passes;
+  int photons_per_pass;
+  const char* size;
+};
+
+// A coordinator and its workers.
+class Farm {
+ public:
+  explicit Farm(const Fleet& fleet)
+      : fleet_(fleet),
+        server_({kBin + "/lucerna-server", "--listen", "127.0.0.1:0", "--batch-photons",
+                 std::to_string(fleet.batch_photons)}) {
+    const std::string greeting = "listening on ";
+    EXPECT_TRUE(server_.WaitForText("\n", std::chrono::seconds(60)));
+    const std::string line = server_.Output();
+    address_ = line.substr(greeting.size(), line.find('\n') - greeting.size());
+    for (int i = 0; i < fleet.workers; ++i)
+      workers_.push_back(NewWorker());
+    // The first round is planned for as many workers as there are.
+    for (const auto& worker : workers_)
+      EXPECT_TRUE(worker->WaitForText("joined", std::chrono::seconds(60)));
   }
-  const std::string image = testing::TempDir() + "same_bits.exr";
-  const Finished submitted = RunProgram(
-      {kBin + "/lucerna", "submit", std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/" + scene,
-       "--server", address, "-o", image, "--passes", "4", "--size", "96x72", "--photons-per-pass",
-       "60000", "--radius-controller", controller, "--quiet"});
-  EXPECT_EQ(submitted.exit_code, 0) << submitted.errors;
-  return RunProgram({kBin + "/lucerna", "digest", image}).output;
+
+  [[nodiscard]] std::string Submit(const Work& work) {
+    const Finished submitted = RunProgram(
+        {kBin + "/lucerna", "submit",
+         std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/" + work.scene, "--server", address_,
+         "--passes", std::to_string(work.passes), "--size", work.size, "--photons-per-pass",
+         std::to_string(work.photons_per_pass), "--radius-controller", work.controller, "--quiet"});
+    EXPECT_EQ(submitted.exit_code, 0) << submitted.errors;
+    return submitted.output.substr(0, submitted.output.find('\n'));
+  }
+
+  void Extend(const std::string& job, int passes) {
+    const Finished extended = RunProgram({kBin + "/lucerna", "extend", job, "--passes",
+                                          std::to_string(passes), "--server", address_, "--quiet"});
+    EXPECT_EQ(extended.exit_code, 0) << extended.errors;
+  }
+
+  // The digest of the job's image at its end.
+  [[nodiscard]] std::string DigestAtEnd(const std::string& job) {
+    if (fleet_.killed_after_ms > 0) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(fleet_.killed_after_ms));
+      workers_.front()->Signal(SIGKILL);
+      EXPECT_EQ(workers_.front()->WaitForExit(std::chrono::seconds(5)), 128 + SIGKILL);
+      workers_.front() = NewWorker();
+    }
+    const Finished waited = RunProgram({kBin + "/lucerna", "wait", job, "--server", address_},
+                                       std::chrono::seconds(120));
+    EXPECT_EQ(waited.exit_code, 0) << waited.errors;
+    const std::string image = testing::TempDir() + "same_bits.exr";
+    const Finished fetched =
+        RunProgram({kBin + "/lucerna", "fetch", job, "-o", image, "--server", address_});
+    EXPECT_EQ(fetched.exit_code, 0) << fetched.errors;
+    return RunProgram({kBin + "/lucerna", "digest", image}).output;
+  }
+
+ private:
+  [[nodiscard]] std::unique_ptr<ChildProcess> NewWorker() const {
+    return std::make_unique<ChildProcess>(
+        std::vector<std::string>{kBin + "/lucerna-worker", "--server", address_, "--threads",
+                                 std::to_string(fleet_.threads)});
+  }
+
+  const Fleet fleet_;
+  ChildProcess server_;
+  std::string address_;
+  std::vector<std::unique_ptr<ChildProcess>> workers_;
+};
+
+std::string DigestOf(const Work& work, const Fleet& fleet) {
+  Farm farm(fleet);
+  return farm.DigestAtEnd(farm.Submit(work));
+}
+
+void ExpectEqual(const Work& work, const std::vector<Fleet>& fleets) {
+  const std::string expected = DigestOf(work, {1, 1, 0});
+  ASSERT_GE(expected.size(), 64U) << expected;
+  for (const Fleet& fleet : fleets) {
+    EXPECT_EQ(DigestOf(work, fleet), expected)
+        << fleet.workers << " workers with " << fleet.threads << " threads, batches of "
+        << fleet.batch_photons << ", killed after " << fleet.killed_after_ms << " ms";
+  }
 }
 
 struct Case {
@@ -57,13 +129,42 @@ void PrintTo(const Case& c, std::ostream* out) {
 class SameBitsTest : public testing::TestWithParam<Case> {};
 
 TEST_P(SameBitsTest, ForAnyWorkersThreadsAndBatches) {
-  const std::string expected = DigestOf(GetParam().scene, GetParam().controller, {1, 1, 0});
-  ASSERT_GE(expected.size(), 64U) << expected;
-  for (const Fleet& fleet :
-       {Fleet{1, 2, 0}, Fleet{3, 1, 0}, Fleet{1, 1, 1000}, Fleet{3, 1, 7777}, Fleet{2, 2, 60000}}) {
-    EXPECT_EQ(DigestOf(GetParam().scene, GetParam().controller, fleet), expected)
-        << fleet.workers << " workers with " << fleet.threads << " threads, batches of "
-        << fleet.batch_photons;
+  ExpectEqual({GetParam().scene, GetParam().controller, 4, 60'000, "96x72"},
+              {{1, 2, 0}, {3, 1, 0}, {1, 1, 1000}, {3, 1, 7777}, {2, 2, 60000}});
+}
+
+class SameBitsOfRoundsTest : public testing::TestWithParam<Case> {};
+
+// Passes 16 to 31 are in rounds of two and those from 32 on in rounds of four, of which the last is
+// not whole. With five workers the passes up to 32 are split by photons.
+TEST_P(SameBitsOfRoundsTest, ForAnyWorkersThreadsBatchesAndKills) {
+  ExpectEqual({GetParam().scene, GetParam().controller, 47, 9000, "48x36"}, {{1, 2, 0},
+                                                                             {2, 1, 0},
+                                                                             {5, 1, 0},
+                                                                             {7, 2, 777},
+                                                                             {2, 1, 0, 150},
+                                                                             {2, 1, 0, 400},
+                                                                             {5, 1, 1000, 250}});
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, SameBitsOfRoundsTest,
+                         testing::Values(Case{"glass-box.pbrt", "appm"},
+                                         Case{"rough-metal.pbrt", "cppm"},
+                                         Case{"textured.pbrt", "frequency-mse"}));
+
+// Pass 21 ends in the middle of a round, and so does pass 45.
+TEST(SameBitsAfterExtendTest, AJobThatGoesOnIsOneThatNeverStopped) {
+  const char* const scene = "glass-box.pbrt";
+  const char* const controller = "appm";
+  const std::string short_digest = DigestOf({scene, controller, 21, 9000, "48x36"}, {1, 1, 0});
+  const std::string long_digest = DigestOf({scene, controller, 45, 9000, "48x36"}, {1, 1, 0});
+  ASSERT_NE(short_digest, long_digest);
+  for (const Fleet& fleet : {Fleet{1, 1, 0}, Fleet{3, 1, 0}, Fleet{5, 1, 1000}}) {
+    Farm farm(fleet);
+    const std::string job = farm.Submit({scene, controller, 21, 9000, "48x36"});
+    EXPECT_EQ(farm.DigestAtEnd(job), short_digest) << fleet.workers << " workers";
+    farm.Extend(job, 45);
+    EXPECT_EQ(farm.DigestAtEnd(job), long_digest) << fleet.workers << " workers";
   }
 }
 

@@ -283,7 +283,8 @@ TEST(WorkerFaultsTest, AForgedAccumulationIsRefusedAndChangesNothing) {
   const std::string garbage = "LAC1 and then nothing of sense";
   v1::CommitBatchRequest header;
   header.mutable_header()->set_job_id(job);
-  header.mutable_header()->set_last_photon(kPhotons);
+  header.mutable_header()->set_kind(v1::WORK_KIND_PHOTONS);
+  header.mutable_header()->set_last(kPhotons);
   header.mutable_header()->set_digest(std::string(Sha256(garbage).Bytes()));
   header.mutable_header()->set_size_bytes(garbage.size());
   v1::CommitBatchRequest bytes;

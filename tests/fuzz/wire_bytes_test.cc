@@ -11,6 +11,8 @@
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/block_codec.h"
 #include "render/wire/bytes.h"
+#include "render/wire/slice_codec.h"
+#include "tests/fuzz/mutation.h"
 
 namespace lucerna {
 namespace {
@@ -60,6 +62,60 @@ void CheckBlock(const std::string& bytes) {
     EXPECT_LT(glossy.hitpoint, decoded->size());
 }
 
+constexpr SliceShape kSlice = {
+    .passes = {16, 18}, .pixels = 5, .evidence = 2, .photons_per_pass = 100};
+
+SliceSums SomeSlice(const SliceShape& shape) {
+  SliceSums slice = EmptySlice(shape.passes, shape.pixels, shape.evidence);
+  for (std::size_t column = 0; column < slice.columns.size(); ++column) {
+    for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel) {
+      slice.columns[column][pixel] =
+          Rounded(std::exp(8 * static_cast<double>(pixel)) * (pixel % 3 == 0 ? -1 : 1) / 1000,
+                  PrecisionOf(column, shape.evidence));
+    }
+  }
+  slice.tally.photons = shape.photons_per_pass * shape.passes.size();
+  slice.tally.dropped = 2;
+  slice.dropped_photons = {{shape.passes.first, 5}, {shape.passes.first, 99}};
+  return slice;
+}
+
+// What decodes must keep the promises of SliceSums and be fit to merge.
+void CheckSliceOf(const std::string& bytes, const SliceShape& shape) {
+  auto decoded = DecodeSlice(bytes, shape);
+  if (!decoded.ok()) return;
+  ASSERT_EQ(decoded->passes, shape.passes);
+  ASSERT_EQ(decoded->columns.size(), ColumnsOf(shape.passes, shape.evidence));
+  bool is_kept = true;
+  for (std::size_t column = 0; column < decoded->columns.size(); ++column) {
+    ASSERT_EQ(decoded->columns[column].size(), shape.pixels);
+    const Precision precision = PrecisionOf(column, shape.evidence);
+    for (const float value : decoded->columns[column])
+      is_kept &= std::isfinite(value) && Rounded(static_cast<double>(value), precision) == value;
+  }
+  ASSERT_TRUE(is_kept);
+  ASSERT_EQ(decoded->tally.photons, shape.photons_per_pass * shape.passes.size());
+  ASSERT_TRUE(decoded->tally.energy.Balance() && decoded->tally.LightsFit());
+  for (const PhotonKey& photon : decoded->dropped_photons) {
+    ASSERT_TRUE(photon.pass >= shape.passes.first && photon.pass < shape.passes.last &&
+                photon.index < shape.photons_per_pass);
+  }
+  const auto again = DecodeSlice(EncodeSlice(*decoded), shape);
+  ASSERT_TRUE(again.ok() && *again == *decoded);
+  SliceShape of_sibling = shape;
+  of_sibling.passes = SiblingOf(shape.passes);
+  const Status merged = MergeSibling(*decoded, SomeSlice(of_sibling));
+  EXPECT_TRUE(merged.ok() || absl::IsOutOfRange(merged)) << merged;
+  for (const std::vector<float>& column : decoded->columns) {
+    for (const float value : column)
+      is_kept &= std::isfinite(value);
+  }
+  EXPECT_TRUE(is_kept);
+}
+void CheckSlice(const std::string& bytes) {
+  CheckSliceOf(bytes, kSlice);
+}
+
 template <typename Check>
 void TruncateAndFlip(const std::string& bytes, const Check& check) {
   for (std::size_t size = 0; size < bytes.size(); ++size)
@@ -96,6 +152,28 @@ TEST(WireBytesTest, DamagedRadiiAreRefusedOrFiniteAndPositive) {
   });
 }
 
+TEST(WireBytesTest, DamagedSlicesAreRefusedOrHarmless) {
+  TruncateAndFlip(EncodeSlice(SomeSlice(kSlice)), CheckSlice);
+}
+
+TEST(WireBytesTest, NoTruncatedSliceDecodes) {
+  const std::string bytes = EncodeSlice(SomeSlice(kSlice));
+  ASSERT_TRUE(DecodeSlice(bytes, kSlice).ok());
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_FALSE(DecodeSlice(bytes.substr(0, size), kSlice).ok()) << size;
+}
+
+TEST(WireBytesTest, MutatedSlicesAreRefusedOrHarmless) {
+  SliceShape with_features = kSlice;
+  with_features.passes = {7, 8};
+  with_features.evidence = 0;
+  for (const SliceShape& shape : {kSlice, with_features}) {
+    const std::string bytes = EncodeSlice(SomeSlice(shape));
+    for (std::uint64_t key = 0; key < 4000; ++key)
+      CheckSliceOf(Mutated(bytes, key), shape);
+  }
+}
+
 TEST(WireBytesTest, HugeCountsAreRefusedBeforeAnythingIsAllocated) {
   for (const std::uint64_t count : {std::uint64_t{1} << 40, ~std::uint64_t{0}}) {
     ByteWriter block;
@@ -108,6 +186,15 @@ TEST(WireBytesTest, HugeCountsAreRefusedBeforeAnythingIsAllocated) {
     accumulation.Varint(kHitpoints);
     accumulation.Varint(count);
     EXPECT_FALSE(DecodeAccumulation(accumulation.Take(), kHitpoints).ok());
+    for (const bool is_pixels : {true, false}) {
+      ByteWriter slice;
+      slice.Bytes("LSL1");
+      slice.Varint(kSlice.passes.first);
+      slice.Varint(kSlice.passes.size());
+      slice.Varint(is_pixels ? count : kSlice.pixels);
+      slice.Varint(is_pixels ? ColumnsOf(kSlice.passes, kSlice.evidence) : count);
+      EXPECT_FALSE(DecodeSlice(slice.Take(), kSlice).ok());
+    }
   }
 }
 

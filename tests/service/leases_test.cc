@@ -22,6 +22,15 @@ class LeasesTest : public testing::Test {
     return committed.message.outcome();
   }
 
+  // The photons of the first pass. While its eye paths are being traced, workers are lent the next
+  // one.
+  std::optional<v1::Lease> TakeFirstPass(IdleHandsWorker& worker) {
+    std::optional<v1::Lease> lease = worker.TakeLease();
+    while (lease && lease->pass() > 0)
+      lease = worker.TakeLease();
+    return lease;
+  }
+
   ServiceUnderTest service_;
   TestClient client_;
   v1::SceneManifest scene_;
@@ -30,7 +39,7 @@ class LeasesTest : public testing::Test {
 
 TEST_F(LeasesTest, ALeaseThatRanOutGoesToAnotherAndTheFirstToCommitCounts) {
   IdleHandsWorker slow(service_);
-  const std::optional<v1::Lease> lease = slow.TakeLease();
+  const std::optional<v1::Lease> lease = TakeFirstPass(slow);
   ASSERT_TRUE(lease);
   service_.clock().Move(std::chrono::seconds(11));
   IdleHandsWorker other(service_);
@@ -42,7 +51,7 @@ TEST_F(LeasesTest, ALeaseThatRanOutGoesToAnotherAndTheFirstToCommitCounts) {
   }
   ASSERT_TRUE(again);
   ASSERT_EQ(again->pass(), lease->pass());
-  EXPECT_EQ(again->first_photon(), lease->first_photon());
+  EXPECT_EQ(again->first(), lease->first());
   EXPECT_NE(again->lease_id(), lease->lease_id());
   // Answered at once when it is revoked.
   const auto revoked = slow.Sync(false, std::chrono::seconds(5), {lease->lease_id()});
@@ -56,7 +65,7 @@ TEST_F(LeasesTest, ALeaseThatRanOutGoesToAnotherAndTheFirstToCommitCounts) {
 
 TEST_F(LeasesTest, BatchesOfAConnectionThatBreaksGoBackWithoutAnyTimePassing) {
   IdleHandsWorker lost(service_);
-  const std::optional<v1::Lease> lease = lost.TakeLease();
+  const std::optional<v1::Lease> lease = TakeFirstPass(lost);
   ASSERT_TRUE(lease);
   IdleHandsWorker other(service_);
   std::optional<v1::Lease> found;
@@ -84,7 +93,7 @@ TEST_F(LeasesTest, BatchesOfAConnectionThatBreaksGoBackWithoutAnyTimePassing) {
 
 TEST_F(LeasesTest, ACommitCountsOnceAndNotAtAllWhenItsJobHasEnded) {
   IdleHandsWorker worker(service_);
-  const std::optional<v1::Lease> lease = worker.TakeLease();
+  const std::optional<v1::Lease> lease = TakeFirstPass(worker);
   ASSERT_TRUE(lease);
   EXPECT_EQ(Outcome(worker, *lease), v1::COMMIT_OUTCOME_ACCEPTED);
   const v1::CommitOutcome second = Outcome(worker, *lease);

@@ -10,12 +10,14 @@
 #include "render/estimate/accumulation.h"
 #include "render/estimate/evidence.h"
 #include "render/estimate/hitpoint_block.h"
+#include "render/estimate/slice_sums.h"
 #include "render/scene/scene_files.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/block_codec.h"
 #include "render/wire/channel.h"
 #include "render/wire/chunks.h"
 #include "render/wire/messages.h"
+#include "render/wire/slice_codec.h"
 
 namespace lucerna {
 namespace {
@@ -279,22 +281,33 @@ Answer<v1::SyncResponse> IdleHandsWorker::Sync(bool wants_lease, Duration wait,
   return answer;
 }
 
-Answer<v1::CommitBatchResponse> IdleHandsWorker::Commit(const v1::Lease& lease) {
+std::string IdleHandsWorker::ResultOf(const v1::Lease& lease) {
+  if (lease.kind() == v1::WORK_KIND_PASSES) {
+    SliceSums slice = EmptySlice({lease.first(), lease.last()}, kSmallScenePixels,
+                                 ControllerColumns(RadiusControllerKind::kPppm));
+    slice.tally.photons = lease.photons_per_pass() * slice.passes.size();
+    return EncodeSlice(slice);
+  }
   Accumulation accumulation;
   accumulation.evidence.resize(EvidenceColumns(Evidence::kNone));
-  accumulation.tally.photons = lease.last_photon() - lease.first_photon();
+  accumulation.tally.photons = lease.last() - lease.first();
   // Without a block the pass has ended, and the answer comes before the bytes.
   const StatusOr<HitpointBlock> block =
       DecodeHitpointBlock(Fetch(lease.block_digest()).message, kMostHitpoints);
-  const std::string bytes = EncodeAccumulation(accumulation, block.ok() ? block->size() : 0);
+  return EncodeAccumulation(accumulation, block.ok() ? block->size() : 0);
+}
+
+Answer<v1::CommitBatchResponse> IdleHandsWorker::CommitBytes(const v1::Lease& lease,
+                                                             const std::string& bytes) {
   v1::CommitBatchRequest part;
   v1::CommitBatchRequest::Header& header = *part.mutable_header();
   header.set_worker_id(id_);
   header.set_lease_id(lease.lease_id());
   header.set_job_id(lease.job_id());
+  header.set_kind(lease.kind());
   header.set_pass(lease.pass());
-  header.set_first_photon(lease.first_photon());
-  header.set_last_photon(lease.last_photon());
+  header.set_first(lease.first());
+  header.set_last(lease.last());
   header.set_digest(std::string(Sha256(bytes).Bytes()));
   header.set_size_bytes(bytes.size());
   Deadline context;
@@ -315,6 +328,15 @@ grpc::Status IdleHandsWorker::GiveUp(const v1::Lease& lease, const std::string& 
   return stub_->Sync(&context, request, &response);
 }
 
+Answer<v1::JobDescription> IdleHandsWorker::DescribeJob(const std::string& job_id) {
+  Deadline context;
+  v1::DescribeJobRequest request;
+  request.set_job_id(job_id);
+  Answer<v1::JobDescription> answer;
+  answer.status = stub_->DescribeJob(&context, request, &answer.message);
+  return answer;
+}
+
 Answer<std::string> IdleHandsWorker::Fetch(const std::string& digest) {
   Deadline context;
   v1::FetchBlobRequest request;
@@ -328,11 +350,11 @@ Answer<std::string> IdleHandsWorker::Fetch(const std::string& digest) {
   return answer;
 }
 
-std::optional<v1::Lease> IdleHandsWorker::TakeLease() {
+std::optional<v1::Lease> IdleHandsWorker::TakeLease(const std::vector<std::string>& held) {
   // The clock stands still, so an answer without a lease comes at once only when none is waited
   // for.
   for (int i = 0; i < 10'000; ++i) {
-    const Answer<v1::SyncResponse> answer = Sync(true, Duration::zero());
+    const Answer<v1::SyncResponse> answer = Sync(true, Duration::zero(), held);
     EXPECT_TRUE(answer.ok()) << answer.status.error_message();
     if (answer.message.has_lease()) return answer.message.lease();
     std::this_thread::sleep_for(std::chrono::milliseconds(1));

@@ -57,7 +57,8 @@ struct TestScene {
   std::map<std::string, std::string> files;  // by logical path
   std::string main_path = "scene.pbrt";
 };
-// Two quads and a point light in 8 x 8 pixels: a job with photons.
+// Two quads and a point light in kSmallScenePixels pixels: a job with photons.
+inline constexpr std::size_t kSmallScenePixels = 64;
 [[nodiscard]] TestScene SmallScene();
 
 class ServiceUnderTest {
@@ -125,7 +126,8 @@ class TestClient {
 [[nodiscard]] v1::SubmitRequest RequestFor(const v1::SceneManifest& scene,
                                            const std::string& request_id, std::int64_t passes);
 
-// A worker that traces nothing: its accumulations say that all photons escaped.
+// A worker that traces nothing: its results say that all photons escaped. Its slices are of jobs of
+// SmallScene with RequestFor.
 // Threads: one at a time.
 class IdleHandsWorker {
  public:
@@ -134,13 +136,19 @@ class IdleHandsWorker {
   [[nodiscard]] const std::string& id() const { return id_; }
   Answer<v1::SyncResponse> Sync(bool wants_lease, Duration wait, std::vector<std::string> held = {},
                                 grpc::ClientContext* context = nullptr);
-  Answer<v1::CommitBatchResponse> Commit(const v1::Lease& lease);
+  Answer<v1::CommitBatchResponse> Commit(const v1::Lease& lease) {
+    return CommitBytes(lease, ResultOf(lease));
+  }
+  // The bytes that Commit sends.
+  std::string ResultOf(const v1::Lease& lease);
+  Answer<v1::CommitBatchResponse> CommitBytes(const v1::Lease& lease, const std::string& bytes);
   // Hands a lease back as a failure.
   grpc::Status GiveUp(const v1::Lease& lease, const std::string& reason);
+  Answer<v1::JobDescription> DescribeJob(const std::string& job_id);
   // The bytes of a blob.
   Answer<std::string> Fetch(const std::string& digest);
-  // Asks until there is a lease; absent after many answers without one.
-  std::optional<v1::Lease> TakeLease();
+  // Asks until there is a lease; absent after many answers without one. Keeps `held`.
+  std::optional<v1::Lease> TakeLease(const std::vector<std::string>& held = {});
 
  private:
   std::unique_ptr<v1::WorkerService::Stub> stub_;

@@ -65,7 +65,7 @@ TEST(MissingLightTest, TheIntervalHoldsWhatComesThroughAHole) {
     for (std::int64_t pass = 1; pass <= kPasses; ++pass) {
       render.AddPass();
       if (pass < next) continue;
-      next = NextCheckpoint(pass);
+      next = NextCheckpoint(pass, true);
       const double high = render.EstimateError(++look).relative.high;
       const double truth =
           Compare(render.MakeImage(), reference, {.trim_share = kTrimmedShare})->rel_mse;

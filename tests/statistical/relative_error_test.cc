@@ -41,6 +41,10 @@ Errors ErrorsWithLightTimes(float factor) {
 // one choice in 2^23, of 18,000 photons with less than a hundred choices each. Were one photon in
 // 2000 another one, squared errors would change by about that share. With an absolute floor of
 // 0.01 relMSE between the seeds grows 500-fold from the first factor to the last.
+//
+// What kernels changed is a statistic of 8 significant bits, and the factor decides which way it is
+// rounded: by a share of 2^-8 at most, so that products of two of them, which intervals are made
+// of, change by 2^-7 at most.
 TEST(RelativeErrorTest, IsTheSameWhateverFactorScalesAllLight) {
   const Errors base = ErrorsWithLightTimes(1);
   EXPECT_GT(base.estimate.total(), 1e-4);
@@ -51,7 +55,7 @@ TEST(RelativeErrorTest, IsTheSameWhateverFactorScalesAllLight) {
     RecordProperty(absl::StrCat("seeds_", factor),
                    std::to_string(scaled.between_seeds / base.between_seeds));
     EXPECT_NEAR(scaled.estimate.noise / base.estimate.noise, 1, 1.0 / 2000) << factor;
-    EXPECT_NEAR(scaled.estimate.high / base.estimate.high, 1, 1.0 / 2000) << factor;
+    EXPECT_NEAR(scaled.estimate.high / base.estimate.high, 1, 1.0 / 2000 + 0x1p-7) << factor;
     EXPECT_NEAR(scaled.between_seeds / base.between_seeds, 1, 1.0 / 2000) << factor;
   }
 }

@@ -1,5 +1,6 @@
 #include "tests/support/local_render.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
@@ -29,29 +30,43 @@ LocalRender::LocalRender(const Scene& scene, const RenderSettings& settings, int
     : settings_(settings),
       needs_(NeedsOf(scene, settings)),
       estimator_(OrDie(JobEstimator::Create(scene, settings, needs_, threads))),
-      tracer_(std::make_unique<BatchTracer>(scene, threads)) {
-  next_ = estimator_->TraceEyePaths(0);
-  next_radii_ = estimator_->Radii(next_);
-}
+      tracer_(std::make_unique<BatchTracer>(scene, threads)) {}
 
 void LocalRender::AddPass(int batches) {
-  const EyePass pass = std::move(next_);
-  const RadiusColumn radii = std::move(next_radii_);
-  next_ = estimator_->TraceEyePaths(pass_ + 1);
-  next_radii_ = estimator_->Radii(next_);
-  PassSums sums(pass.block.size(), EvidenceColumns(EvidenceOf(settings_.radius_controller, pass_)));
-  const std::atomic<bool> stop = false;
-  const auto photons = static_cast<std::uint64_t>(settings_.photons_per_pass);
-  for (int batch = 0; batch < batches; ++batch) {
-    const auto b = static_cast<std::uint64_t>(batch);
-    const auto n = static_cast<std::uint64_t>(batches);
-    const Accumulation accumulation = OrDie(tracer_->Run(
-        settings_, needs_, pass_, photons * b / n, photons * (b + 1) / n, pass.block, radii, stop));
-    if (const Status added = sums.Add(accumulation); !added.ok()) Die(added);
+  const PassRange round = RoundOf(pass_);
+  if (pass_ == round.first) {
+    plan_ = estimator_->PlanFor(round);
+    round_.emplace(round);
+    if (!plan_) Die(absl::InternalError("no plan for the next round"));
   }
-  estimator_->Apply(pass, radii, sums);
-  tally_ += sums.tally();
+  const std::atomic<bool> stop = false;
+  SliceSums slice;
+  if (batches == 0 && pass_ > 0) {
+    slice = OrDie(tracer_->RunSlice(settings_, needs_, {pass_, pass_ + 1}, *plan_, stop));
+  } else {
+    const EyePass eye = estimator_->TraceEyePaths(pass_);
+    if (pass_ == 0) estimator_->LookAtFirstPass(eye, *plan_);
+    const RadiusColumn radii = HitpointRadii(eye, *plan_);
+    PassSums sums(eye.block.size(),
+                  EvidenceColumns(EvidenceOf(settings_.radius_controller, pass_)));
+    const std::uint64_t photons = plan_->photons_per_pass;
+    const auto n = static_cast<std::uint64_t>(std::max(batches, 1));
+    for (std::uint64_t b = 0; b < n; ++b) {
+      const Accumulation accumulation =
+          OrDie(tracer_->Run(settings_, needs_, pass_, photons * b / n, photons * (b + 1) / n,
+                             eye.block, radii, stop));
+      if (const Status added = sums.Add(accumulation); !added.ok()) Die(added);
+    }
+    slice = estimator_->SliceOf(eye, *plan_, sums);
+  }
+  tally_ += slice.tally;
+  if (const Status added = round_->Add(std::move(slice)); !added.ok()) Die(added);
   ++pass_;
+  if (round_->IsWhole()) {
+    estimator_->AddRound(*round_->Whole(), *plan_);
+  } else {
+    estimator_->SetTail(round_->Prefix(), *plan_);
+  }
 }
 
 Image RenderLocally(const Scene& scene, const RenderSettings& settings, int passes, int threads) {

@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "render/base/status.h"
+#include "render/estimate/slice_tree.h"
 #include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
@@ -19,7 +21,7 @@ class LocalRender {
   // Aborts when the scene cannot be prepared.
   LocalRender(const Scene& scene, const RenderSettings& settings, int threads = 0);
 
-  // Adds one pass, its photons in `batches` ranges.
+  // Adds one pass, its photons in `batches` ranges, or all of it as a worker traces a slice (0).
   void AddPass(int batches = 1);
   [[nodiscard]] Image MakeImage() const { return estimator_->MakeImage(); }
   [[nodiscard]] ErrorEstimate EstimateError(int look) const {
@@ -34,10 +36,9 @@ class LocalRender {
   SceneNeeds needs_;
   std::unique_ptr<JobEstimator> estimator_;
   std::unique_ptr<BatchTracer> tracer_;
-  // Radii lag by two passes: those of the next pass are taken before the current one is applied.
-  RadiusColumn next_radii_;
-  EyePass next_;
   std::uint64_t pass_ = 0;
+  std::optional<RoundPlan> plan_;   // of the pass's round
+  std::optional<SliceTree> round_;  // its passes so far
   BatchTally tally_;
 };
 

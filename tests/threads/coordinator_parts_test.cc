@@ -1,6 +1,6 @@
-// The scheduler, the merger and the store are asked by many threads at once. Whatever the
-// interleaving: every photon is merged exactly once, the sums are those of one thread, and no
-// bytes are lost. Links no gRPC, so that ThreadSanitizer can be believed.
+// The scheduler, the mergers and the store are asked by many threads at once. Whatever the
+// interleaving: every photon and every pass is merged exactly once, the sums are those of one
+// thread, and no bytes are lost. Links no gRPC, so that ThreadSanitizer can be believed.
 #include <atomic>
 #include <functional>
 #include <string>
@@ -11,6 +11,7 @@
 
 #include "server/blob_store.h"
 #include "server/pass_merger.h"
+#include "server/round_merger.h"
 #include "server/scheduler.h"
 
 namespace lucerna {
@@ -21,7 +22,7 @@ constexpr std::uint64_t kPhotons = 20'000;
 const PassKey kPass = {"job", 0};
 
 // What a batch brings depends on its range alone.
-Accumulation BatchOf(PhotonRange range) {
+Accumulation BatchOf(WorkRange range) {
   Accumulation accumulation;
   for (std::uint32_t i = 0; i < kHitpoints; ++i) {
     accumulation.hitpoints.push_back(i);
@@ -61,11 +62,11 @@ TEST(CoordinatorPartsTest, FaultyWorkersTogetherMergeEveryPhotonOnce) {
     for (int round = 0; !merger.IsComplete(kPass); ++round) {
       Scheduler::Report report;
       report.wants_lease = true;
-      if (!scheduler.Hear(worker, report, now()).ok()) {
+      if (!scheduler.TakeReport(worker, report, now()).ok()) {
         worker = scheduler.AddWorker("w", now());
         continue;
       }
-      const auto answer = scheduler.Tell(worker, report, now());
+      const auto answer = scheduler.AnswerFor(worker, report, now());
       if (!answer.ok() || !answer->lease) {
         scheduler.Expire(now());
         std::this_thread::yield();
@@ -78,7 +79,7 @@ TEST(CoordinatorPartsTest, FaultyWorkersTogetherMergeEveryPhotonOnce) {
       if (round % 7 == thread) continue;  // drops the batch
       const auto outcome = merger.Merge(lease.pass, lease.range, BatchOf(lease.range));
       ASSERT_TRUE(outcome.ok()) << outcome.status();
-      if (*outcome == PassMerger::Outcome::kAccepted) {
+      if (*outcome == MergeOutcome::kAccepted) {
         accepted += lease.range.size();
         scheduler.Commit(lease.pass, lease.range, now());
       }
@@ -105,11 +106,150 @@ TEST(CoordinatorPartsTest, ABatchThatManyDeliverAtOnceIsAcceptedOnce) {
     RunThreads(4, [&](int) {
       const auto outcome = merger.Merge(kPass, {0, 100}, BatchOf({0, 100}));
       ASSERT_TRUE(outcome.ok());
-      if (*outcome == PassMerger::Outcome::kAccepted) ++accepted;
+      if (*outcome == MergeOutcome::kAccepted) ++accepted;
     });
     EXPECT_EQ(accepted, 1);
     EXPECT_EQ(merger.Take(kPass).tally().photons, 100U);
   }
+}
+
+// What a slice brings depends on its passes alone.
+SliceSums SliceOf(const PassRange& passes) {
+  SliceSums sum = EmptySlice({passes.first, passes.first + 1}, kHitpoints, 0);
+  for (std::vector<float>& column : sum.columns) {
+    for (std::size_t pixel = 0; pixel < kHitpoints; ++pixel)
+      column[pixel] = static_cast<float>((passes.first * (pixel + 1)) % 251);
+  }
+  sum.tally.photons = 10;
+  sum.tally.rays = passes.first;
+  if (passes.size() == 1) return sum;
+  const std::uint64_t middle = passes.first + passes.size() / 2;
+  sum = SliceOf({passes.first, middle});
+  EXPECT_TRUE(MergeSibling(sum, SliceOf({middle, passes.last})).ok());
+  return sum;
+}
+
+// Workers take slices of two rounds at once, some of them die with theirs and deliver all the same,
+// while another thread looks at what has come, as the job's runner does.
+TEST(CoordinatorPartsTest, FaultyWorkersTogetherMergeEveryPassOnce) {
+  const std::vector<PassRange> rounds = {RoundOf(512), RoundOf(576)};
+  SchedulerOptions options;
+  options.poison_workers = 1'000'000;
+  options.poison_losses = 1'000'000;
+  Scheduler scheduler(options);
+  RoundMerger merger;
+  for (const PassRange& round : rounds) {
+    const PassKey key = {"job", round.first};
+    merger.Open(key,
+                {.passes = round, .pixels = kHitpoints, .evidence = 0, .photons_per_pass = 10});
+    scheduler.OpenRound(key, {round.first, round.last}, {});
+  }
+  const auto is_whole = [&] {
+    for (const PassRange& round : rounds) {
+      if (merger.PrefixEnd({"job", round.first}) != round.last) return false;
+    }
+    return true;
+  };
+  std::atomic<std::uint64_t> accepted = 0;
+  std::atomic<std::int64_t> now_ms = 0;
+  const auto now = [&] { return SteadyTime(std::chrono::milliseconds(now_ms++)); };
+
+  RunThreads(5, [&](int thread) {
+    if (thread == 4) {
+      // The runner: what has come never gets less, and is the sum of whole slices.
+      std::uint64_t end = rounds[0].first;
+      while (!is_whole()) {
+        const ImageSums::Slices prefix = merger.Prefix({"job", rounds[0].first});
+        std::uint64_t next = rounds[0].first;
+        for (const auto& slice : prefix) {
+          ASSERT_EQ(slice->passes.first, next);
+          next = slice->passes.last;
+          ASSERT_EQ(slice->tally.photons, 10 * slice->passes.size());
+        }
+        ASSERT_GE(next, end);
+        end = next;
+      }
+      return;
+    }
+    std::string worker = scheduler.AddWorker("w", now());
+    for (int step = 0; !is_whole(); ++step) {
+      Scheduler::Report report;
+      report.wants_lease = true;
+      if (!scheduler.TakeReport(worker, report, now()).ok()) {
+        worker = scheduler.AddWorker("w", now());
+        continue;
+      }
+      const auto answer = scheduler.AnswerFor(worker, report, now());
+      if (!answer.ok() || !answer->lease) {
+        scheduler.Expire(now());
+        std::this_thread::yield();
+        continue;
+      }
+      const BatchLease& lease = *answer->lease;
+      if (step % 5 == thread) scheduler.LoseWorker(worker);
+      if (step % 7 == thread) continue;  // drops the slice
+      const auto outcome = merger.Merge(lease.pass, SliceOf({lease.range.first, lease.range.last}));
+      ASSERT_TRUE(outcome.ok()) << outcome.status();
+      if (*outcome == MergeOutcome::kAccepted) {
+        accepted += lease.range.size();
+        scheduler.Commit(lease.pass, lease.range, now());
+      }
+    }
+  });
+
+  EXPECT_EQ(accepted, rounds[0].size() + rounds[1].size());
+  for (const PassRange& round : rounds)
+    EXPECT_EQ(*merger.Take({"job", round.first}), SliceOf(round));
+}
+
+TEST(CoordinatorPartsTest, ASliceThatManyDeliverAtOnceIsAcceptedOnce) {
+  const PassKey key = {"job", 32};
+  for (int i = 0; i < 50; ++i) {
+    RoundMerger merger;
+    merger.Open(
+        key, {.passes = RoundOf(32), .pixels = kHitpoints, .evidence = 0, .photons_per_pass = 10});
+    std::atomic<std::uint64_t> accepted = 0;
+    RunThreads(4, [&](int thread) {
+      for (std::uint64_t k = 0; k < 4; ++k) {
+        const std::uint64_t pass = 32 + (k + static_cast<std::uint64_t>(thread)) % 4;
+        const auto outcome = merger.Merge(key, SliceOf({pass, pass + 1}));
+        ASSERT_TRUE(outcome.ok());
+        if (*outcome == MergeOutcome::kAccepted) ++accepted;
+      }
+    });
+    EXPECT_EQ(accepted, 4U);
+    EXPECT_EQ(*merger.Take(key), SliceOf(RoundOf(32)));
+  }
+}
+
+// A job ends while slices are on their way: late ones find no round, or one that is opened anew.
+TEST(CoordinatorPartsTest, ARoundMayEndWhileSlicesCome) {
+  const PassKey key = {"job", 32};
+  RoundMerger merger;
+  std::atomic<bool> is_over = false;
+  RunThreads(3, [&](int thread) {
+    if (thread == 0) {
+      for (int i = 0; i < 300; ++i) {
+        merger.Open(
+            key,
+            {.passes = RoundOf(32), .pixels = kHitpoints, .evidence = 0, .photons_per_pass = 10});
+        while (i % 3 == 0 && merger.PrefixEnd(key) != RoundOf(32).last)
+          std::this_thread::yield();
+        if (i % 3 == 0) {
+          EXPECT_EQ(*merger.Take(key), SliceOf(RoundOf(32)));
+        } else {
+          merger.Drop(key);
+        }
+      }
+      is_over = true;
+      return;
+    }
+    for (std::uint64_t k = 0; !is_over; ++k) {
+      const std::uint64_t pass = 32 + k % 4;
+      const auto outcome = merger.Merge(key, SliceOf({pass, pass + 1}));
+      ASSERT_TRUE(outcome.ok()) << outcome.status();
+    }
+  });
 }
 
 TEST(CoordinatorPartsTest, ThePinnedBytesOfEveryThreadStay) {

@@ -60,13 +60,13 @@ TEST(CommitAccountingTest, CountsABatchForTheJobAndItsWorker) {
   delivery.pass = {"job", 3};
   delivery.cpu = std::chrono::seconds(2);
   delivery.size_bytes = 100;
-  Accumulation accumulation;
-  accumulation.hitpoints = {1, 5};
-  accumulation.tally.photons = 1000;
-  accumulation.tally.dropped = 1;
-  accumulation.dropped_photons = {42};
-  CountCommit(job, delivery, accumulation, "first name", SteadyTime(std::chrono::seconds(14)));
-  CountCommit(job, delivery, accumulation, "other name", SteadyTime(std::chrono::seconds(15)));
+  DeliveredCounts counts;
+  counts.tally.photons = 1000;
+  counts.tally.dropped = 1;
+  counts.dropped_photons = {{3, 42}};
+  counts.rows = 2;
+  CountCommit(job, delivery, counts, "first name", SteadyTime(std::chrono::seconds(14)));
+  CountCommit(job, delivery, counts, "other name", SteadyTime(std::chrono::seconds(15)));
   EXPECT_EQ(job.counters.to_first_photons, std::chrono::seconds(4));
   EXPECT_EQ(job.counters.photons, 2000U);
   EXPECT_EQ(job.counters.tally.dropped, 2U);
@@ -89,7 +89,7 @@ TEST(CommitAccountingTest, TimesThatDoNotFitAreAsLongAsThereIsRoomFor) {
   Delivery delivery;
   delivery.cpu = Duration::max();
   for (int i = 0; i < 3; ++i)
-    CountCommit(job, delivery, Accumulation(), "w", SteadyTime());
+    CountCommit(job, delivery, DeliveredCounts(), "w", SteadyTime());
   EXPECT_EQ(job.counters.worker_cpu, Duration::max() / 4);
 }
 

@@ -55,7 +55,7 @@ class FakeRunner final : public RunningJob {
     changed_.NotifyAll();
   }
   void Wake() override {}
-  std::optional<PassBlobs> BlobsOf(std::uint64_t) const override { return PassBlobs{}; }
+  std::optional<WorkBlobs> BlobsOf(std::uint64_t) const override { return WorkBlobs{}; }
   std::optional<std::size_t> HitpointsIn(const Digest&) const override { return 0; }
   StatusOr<RenderResult> ImageSoFar() const override { return RenderResult{}; }
 
@@ -237,7 +237,7 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
               (void)table.MakeLoan({}, 1);
               break;
             default:
-              table.CountMerged(delivery, Accumulation(), "w", At(1).now);
+              table.CountMerged(delivery, DeliveredCounts(), "w", At(1).now);
               table.CountFetched(Digest(), 1);
           }
         }

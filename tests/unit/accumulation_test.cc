@@ -169,5 +169,37 @@ TEST(PassSumsTest, CountsATrillionPhotonsToTheLastQuantum) {
   EXPECT_EQ(sums.flux(1)[0], (static_cast<std::int64_t>(kPhotons) << 18) + kBatches);
 }
 
+TEST(PassSumsTest, AddsUpAndRefusesWhatBreaksItsPromises) {
+  Accumulation a;
+  a.hitpoints = {0, 2};
+  a.counts = {1, 2};
+  for (auto& channel : a.flux)
+    channel = {5, -7};
+  a.tally.pairs = 3;
+  PassSums sums(3);
+  ASSERT_TRUE(sums.Add(a).ok());
+  ASSERT_TRUE(sums.Add(a).ok());
+  EXPECT_EQ(sums.flux(1), (std::vector<std::int64_t>{10, 0, -14}));
+
+  sums = PassSums(3);
+  Accumulation bad = a;
+  bad.hitpoints = {2, 0};
+  EXPECT_EQ(sums.Add(bad).code(), absl::StatusCode::kInvalidArgument);
+  bad.hitpoints = {0, 3};
+  EXPECT_EQ(sums.Add(bad).code(), absl::StatusCode::kInvalidArgument);
+  bad = a;
+  bad.counts = {1, 0};
+  EXPECT_EQ(sums.Add(bad).code(), absl::StatusCode::kInvalidArgument);
+  bad = a;
+  bad.flux[2].pop_back();
+  EXPECT_EQ(sums.Add(bad).code(), absl::StatusCode::kInvalidArgument);
+  // The second row overflows: the first must not have been added.
+  Accumulation large = a;
+  large.flux[0] = {1, INT64_MAX};
+  ASSERT_TRUE(sums.Add(large).ok());
+  EXPECT_EQ(sums.Add(large).code(), absl::StatusCode::kOutOfRange);
+  EXPECT_EQ(sums.flux(0), (std::vector<std::int64_t>{1, 0, INT64_MAX}));
+}
+
 }  // namespace
 }  // namespace lucerna

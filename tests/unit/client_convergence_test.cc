@@ -32,7 +32,7 @@ TEST(PowerLawTest, LeastSquaresLiesBetween) {
 }
 
 TEST(PowerLawTest, TooFewPointsOrNoSpreadGiveNone) {
-  EXPECT_FALSE(FitPowerLaw({}).has_value());
+  EXPECT_FALSE(FitPowerLaw(std::vector<ChartPoint>{}).has_value());
   EXPECT_FALSE(FitPowerLaw({{1, 1}, {2, 2}}).has_value());
   EXPECT_FALSE(FitPowerLaw({{1, 1}, {2, 2}, {0, 5}}).has_value()) << "no logarithm";
   EXPECT_FALSE(FitPowerLaw({{1, 1}, {2, 2}, {3, -5}, {4, std::nan("")}}).has_value());

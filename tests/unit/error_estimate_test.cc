@@ -9,6 +9,7 @@
 
 #include "render/estimate/relative_error.h"
 #include "render/math/rng.h"
+#include "tests/support/error_statistics.h"
 
 namespace lucerna {
 namespace {

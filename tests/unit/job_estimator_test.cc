@@ -2,16 +2,31 @@
 // paths are traced.
 #include "server/job_estimator.h"
 
+#include <algorithm>
+#include <array>
+#include <atomic>
 #include <cmath>
+#include <memory>
+#include <optional>
+#include <ostream>
 
 #include "gtest/gtest.h"
 
 #include "render/estimate/evidence.h"
+#include "render/estimate/slice_tree.h"
+#include "render/wire/slice_codec.h"
 #include "tests/support/local_render.h"
 #include "tests/support/test_scenes.h"
+#include "worker/batch_tracer.h"
 
 namespace lucerna {
 namespace {
+
+constexpr std::array kAllControllers = {
+#define LUCERNA_KIND(Name, name, evidence) RadiusControllerKind::k##Name,
+    LUCERNA_RADIUS_CONTROLLERS(LUCERNA_KIND)
+#undef LUCERNA_KIND
+};
 
 // A glass ball, a glossy metal ball and a light in a box.
 Scene Room() {
@@ -50,9 +65,11 @@ TEST(JobEstimatorTest, TracesTheEyePathsOfAPassAtAnyTime) {
   const RenderSettings settings = TestSettings(scene, 1000, 0.1, 8);
   const auto early = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 1).value();
   const auto late = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 3).value();
-  for (int pass = 0; pass < 3; ++pass) {
-    const EyePass now = late->TraceEyePaths(static_cast<std::uint64_t>(pass));
-    late->Apply(now, late->Radii(now), PassSums(now.block.size(), kCommonColumns));
+  for (std::uint64_t pass = 0; pass < 3; ++pass) {
+    const EyePass now = late->TraceEyePaths(pass);
+    const std::size_t columns = EvidenceColumns(EvidenceOf(settings.radius_controller, pass));
+    const RoundPlan plan = late->PlanFor(RoundOf(pass)).value();
+    late->AddRound(late->SliceOf(now, plan, PassSums(now.block.size(), columns)), plan);
   }
   const EyePass a = early->TraceEyePaths(3);
   const EyePass b = late->TraceEyePaths(3);
@@ -68,7 +85,7 @@ TEST(JobEstimatorTest, PutsHitpointsOnSurfacesWithEveryPixelAtMostOnce) {
   const RenderSettings settings = TestSettings(scene, 1000, 0, 8);
   const auto estimator = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 2).value();
   const EyePass pass = estimator->TraceEyePaths(0);
-  const RadiusColumn radii = estimator->Radii(pass);
+  const RadiusColumn radii = HitpointRadii(pass, estimator->PlanFor({0, 1}).value());
   std::vector<int> hitpoints(32 * 32);
   for (const std::uint32_t pixel : pass.pixels)
     ++hitpoints[pixel];
@@ -111,6 +128,320 @@ TEST(JobEstimatorTest, AddsPhotonsToDirectLight) {
     const float sum = image.Find("direct.R")->pixels[i] + image.Find("photons.R")->pixels[i];
     ASSERT_NEAR(image.Find("R")->pixels[i], sum, 1e-5F * (1 + sum));
   }
+}
+
+// Slices and rounds
+// ---------------------------------------------------------------------------------------------
+
+// The room with metal so smooth that photons of caustics are gathered beyond it.
+Scene RoomWithNarrowMetal() {
+  Scene scene = Room();
+  for (Material& material : scene.materials) {
+    if (material.kind == Material::Kind::kConductor) material.alpha_u = material.alpha_v = 0.1F;
+  }
+  return scene;
+}
+
+// A ball and a floor under a sky, at which some eye paths go past them.
+Scene Outdoors() {
+  Scene scene;
+  AddQuad(scene, {-1, -1, -1}, {0, 0, 2}, {2, 0, 0}, AddMaterial(scene, DiffuseMaterial(0.6F)));
+  AddSphere(scene, {0, -0.5F, 0}, 0.4F, AddMaterial(scene, DielectricMaterial(1.5F)));
+  InfiniteLight sky;
+  sky.radiance = {0.3F, 0.2F, 0.5F};
+  scene.infinite_lights.push_back(sky);
+  SetCamera(scene, {0, 0, -3}, {0, 0, 0}, {0, 1, 0}, 60, 16);
+  return scene;
+}
+
+Scene WithoutLight() {
+  Scene scene = Outdoors();
+  scene.infinite_lights.clear();
+  return scene;
+}
+
+Scene WithNothingInView() {
+  Scene scene = Room();
+  SetCamera(scene, {0, 0, -3}, {0, 0, -6}, {0, 1, 0}, 60, 16);
+  return scene;
+}
+
+// Radii between a half and three halves, another for each pixel.
+RoundPlan UnevenPlan(const RenderSettings& settings) {
+  RadiusColumn radii(static_cast<std::size_t>(settings.crop_width() * settings.crop_height()));
+  for (std::size_t pixel = 0; pixel < radii.size(); ++pixel)
+    radii[pixel] = 3 * (0.5F + static_cast<float>(pixel % 17) / 16);
+  return {.photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass),
+          .radii = std::make_shared<const RadiusColumn>(std::move(radii)),
+          .caustic_radius = 2.5F};
+}
+
+// What the coordinator makes of a pass whose photons came in `batches`.
+SliceSums SplitSlice(const JobEstimator& estimator, BatchTracer& tracer,
+                     const RenderSettings& settings, std::uint64_t pass, const RoundPlan& plan,
+                     std::uint64_t batches) {
+  const std::atomic<bool> stop = false;
+  const EyePass eye = estimator.TraceEyePaths(pass);
+  PassSums sums(eye.block.size(), EvidenceColumns(EvidenceOf(settings.radius_controller, pass)));
+  if (eye.block.size() > 0 && estimator.needs().Uses(Part::kPhotons)) {
+    for (std::uint64_t b = batches; b-- > 0;) {
+      const Accumulation batch =
+          tracer
+              .Run(settings, estimator.needs(), pass, plan.photons_per_pass * b / batches,
+                   plan.photons_per_pass * (b + 1) / batches, eye.block, HitpointRadii(eye, plan),
+                   stop)
+              .value();
+      EXPECT_TRUE(sums.Add(batch).ok());
+    }
+  }
+  return estimator.SliceOf(eye, plan, sums);
+}
+
+struct SliceCase {
+  const char* name;
+  Scene (*scene)();
+};
+void PrintTo(const SliceCase& c, std::ostream* out) {
+  *out << c.name;
+}
+
+class SlicesTest : public testing::TestWithParam<SliceCase> {};
+
+// A pass is the same whoever traced it: the coordinator and several workers, or one worker.
+TEST_P(SlicesTest, APassThatIsSplitEqualsOneThatAWorkerTraces) {
+  const Scene scene = GetParam().scene();
+  const std::atomic<bool> stop = false;
+  for (const RadiusControllerKind controller : kAllControllers) {
+    RenderSettings settings = TestSettings(scene, 1500, 0, 8);
+    settings.radius_controller = controller;
+    const SceneNeeds needs = NeedsOf(scene, settings);
+    const auto estimator = JobEstimator::Create(scene, settings, needs, 2).value();
+    BatchTracer splitter(scene, 2);
+    BatchTracer worker(scene, 1);
+    const RoundPlan plan = UnevenPlan(settings);
+    for (const std::uint64_t pass : {0, 5, 16, 36}) {
+      const SliceSums split = SplitSlice(*estimator, splitter, settings, pass, plan, 3);
+      SliceSums whole = worker.RunSlice(settings, needs, {pass, pass + 1}, plan, stop).value();
+      EXPECT_EQ(whole.dropped_photons.size(), whole.tally.dropped);
+      whole.dropped_photons.clear();  // of a split pass they are named with each batch
+      EXPECT_EQ(whole, split) << NameOf(controller) << ", pass " << pass;
+    }
+  }
+}
+
+// A slice of several passes is the sum of theirs, for any threads.
+TEST_P(SlicesTest, ASliceIsTheSumOfItsPasses) {
+  const Scene scene = GetParam().scene();
+  const std::atomic<bool> stop = false;
+  RenderSettings settings = TestSettings(scene, 1500, 0, 8);
+  settings.radius_controller = RadiusControllerKind::kAppm;
+  const SceneNeeds needs = NeedsOf(scene, settings);
+  BatchTracer alone(scene, 1);
+  BatchTracer team(scene, 3);
+  const RoundPlan plan = UnevenPlan(settings);
+  const auto pass_of = [&](std::uint64_t pass) {
+    return team.RunSlice(settings, needs, {pass, pass + 1}, plan, stop).value();
+  };
+  SliceSums sum = pass_of(33);
+  SliceSums second = pass_of(35);
+  ASSERT_TRUE(MergeSibling(sum, pass_of(32)).ok());
+  ASSERT_TRUE(MergeSibling(second, pass_of(34)).ok());
+  ASSERT_TRUE(MergeSibling(second, sum).ok());
+  EXPECT_EQ(alone.RunSlice(settings, needs, {32, 36}, plan, stop).value(), second);
+  EXPECT_EQ(team.RunSlice(settings, needs, {32, 36}, plan, stop).value(), second);
+}
+
+// What a worker sends is what the coordinator takes.
+TEST_P(SlicesTest, WhatAWorkerSendsIsAccepted) {
+  const Scene scene = GetParam().scene();
+  const std::atomic<bool> stop = false;
+  const RenderSettings settings = TestSettings(scene, 1500, 0, 8);
+  const SceneNeeds needs = NeedsOf(scene, settings);
+  const auto estimator = JobEstimator::Create(scene, settings, needs, 2).value();
+  BatchTracer worker(scene, 1);
+  for (const PassRange& passes : {PassRange{1, 2}, PassRange{16, 18}}) {
+    const RoundPlan plan = UnevenPlan(settings);
+    const SliceSums slice = worker.RunSlice(settings, needs, passes, plan, stop).value();
+    const auto decoded = DecodeSlice(EncodeSlice(slice), estimator->ShapeOf(passes, plan));
+    ASSERT_TRUE(decoded.ok()) << decoded.status();
+    EXPECT_EQ(*decoded, slice);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, SlicesTest,
+                         testing::Values(SliceCase{"room", Room},
+                                         SliceCase{"narrow metal", RoomWithNarrowMetal},
+                                         SliceCase{"outdoors", Outdoors},
+                                         SliceCase{"without light", WithoutLight},
+                                         SliceCase{"nothing in view", WithNothingInView}));
+
+TEST(SlicesTest, TheScenesHaveWhatTheyAreNamedFor) {
+  const auto needs = [](const Scene& scene) {
+    return NeedsOf(scene, TestSettings(scene, 1500, 0, 8));
+  };
+  EXPECT_TRUE(needs(Room()).Uses(Part::kPhotonDirections));
+  EXPECT_FALSE(needs(Room()).Uses(Part::kCausticHitpoints));
+  EXPECT_TRUE(needs(RoomWithNarrowMetal()).Uses(Part::kCausticHitpoints));
+  EXPECT_TRUE(needs(Outdoors()).Uses(Part::kPhotons));
+  EXPECT_FALSE(needs(WithoutLight()).Uses(Part::kPhotons));
+}
+
+TEST(SlicesTest, RefusesWhatDoesNotFitItsJobAndEndsSoonWhenStopped) {
+  const Scene scene = Room();
+  const RenderSettings settings = TestSettings(scene, 1500, 0, 8);
+  const SceneNeeds needs = NeedsOf(scene, settings);
+  BatchTracer worker(scene, 1);
+  const std::atomic<bool> stop = false;
+  const RoundPlan plan = UnevenPlan(settings);
+  const auto status_of = [&](const PassRange& passes, const RoundPlan& p) {
+    return worker.RunSlice(settings, needs, passes, p, stop).status();
+  };
+  for (const PassRange& passes :
+       {PassRange{3, 3}, PassRange{33, 35}, PassRange{32, 35}, PassRange{0, 2}, PassRange{5, 4}})
+    EXPECT_TRUE(absl::IsInvalidArgument(status_of(passes, plan))) << passes.first;
+  RoundPlan other = plan;
+  other.radii = nullptr;
+  EXPECT_TRUE(absl::IsInvalidArgument(status_of({3, 4}, other)));
+  other.radii = std::make_shared<const RadiusColumn>(7, 1.0F);
+  EXPECT_TRUE(absl::IsInvalidArgument(status_of({3, 4}, other)));
+  const std::atomic<bool> stopped = true;
+  EXPECT_TRUE(
+      absl::IsCancelled(worker.RunSlice(settings, needs, {32, 36}, plan, stopped).status()));
+}
+
+// A job whose passes workers trace, round by round.
+class RoundJob {
+ public:
+  RoundJob(const Scene& scene, const RenderSettings& settings)
+      : settings_(settings),
+        needs_(NeedsOf(scene, settings)),
+        estimator_(JobEstimator::Create(scene, settings, needs_, 1).value()),
+        tracer_(scene, 1) {}
+
+  // Goes on until there are `last` passes, some of which may be of a round that is not whole.
+  void RenderTo(std::uint64_t last) {
+    while (estimator_->whole_passes() < last) {
+      const PassRange round = RoundOf(estimator_->whole_passes());
+      const RoundPlan plan = PlanOf(round);
+      if (round.first == 0) estimator_->LookAtFirstPass(estimator_->TraceEyePaths(0), plan);
+      SliceTree tree(round);
+      const std::uint64_t end = std::min(round.last, last);
+      // From the back, so that slices come out of order.
+      for (std::uint64_t pass = end; pass-- > round.first;)
+        EXPECT_TRUE(tree.Add(Traced({pass, pass + 1}, plan)).ok());
+      if (!tree.IsWhole()) return estimator_->SetTail(tree.Prefix(), plan);
+      estimator_->AddRound(*tree.Whole(), plan);
+    }
+  }
+  RoundPlan PlanOf(const PassRange& round) const { return estimator_->PlanFor(round).value(); }
+  std::optional<RoundPlan> PlanIfKnown(const PassRange& round) const {
+    return estimator_->PlanFor(round);
+  }
+  JobEstimator& estimator() { return *estimator_; }
+
+ private:
+  SliceSums Traced(const PassRange& passes, const RoundPlan& plan) {
+    const std::atomic<bool> stop = false;
+    return tracer_.RunSlice(settings_, needs_, passes, plan, stop).value();
+  }
+
+  RenderSettings settings_;
+  SceneNeeds needs_;
+  std::unique_ptr<JobEstimator> estimator_;
+  BatchTracer tracer_;
+};
+
+Scene SmallRoom() {
+  Scene scene = Room();
+  SetCamera(scene, {0, 0, -0.95}, {0, 0, 0}, {0, 1, 0}, 80, 8);
+  return scene;
+}
+
+// Passes 16 to 31 are in rounds of two, and those from 32 on in rounds of four.
+TEST(RoundsOfAJobTest, GoingOnAfterAnEndWithinARoundLeavesNoTrace) {
+  const Scene scene = SmallRoom();
+  for (const RadiusControllerKind controller :
+       {RadiusControllerKind::kAppm, RadiusControllerKind::kPpm,
+        RadiusControllerKind::kFrequencyMse}) {
+    RenderSettings settings = TestSettings(scene, 300, 0, 8);
+    settings.radius_controller = controller;
+    RoundJob in_one_go(scene, settings);
+    in_one_go.RenderTo(47);
+    RoundJob in_parts(scene, settings);
+    for (const std::uint64_t passes : {1U, 21U, 21U, 33U, 34U, 46U, 47U})
+      in_parts.RenderTo(passes);
+    EXPECT_EQ(in_parts.estimator().passes(), 47);
+    EXPECT_EQ(in_parts.estimator().whole_passes(), 44U);
+    EXPECT_EQ(in_parts.estimator().photons(), 47U * 300);
+    EXPECT_EQ(in_parts.estimator().MakeImage().PixelDigest(),
+              in_one_go.estimator().MakeImage().PixelDigest())
+        << NameOf(controller);
+    EXPECT_EQ(in_parts.estimator().eye_rays(), in_one_go.estimator().eye_rays());
+    const ErrorEstimate a = in_parts.estimator().EstimateError(3);
+    const ErrorEstimate b = in_one_go.estimator().EstimateError(3);
+    EXPECT_EQ(a.relative.total(), b.relative.total());
+    EXPECT_EQ(a.relative.high, b.relative.high);
+  }
+}
+
+// The passes of a tail count as those of a whole round do: the image of 20 passes is the same
+// whether the last two came as a round or as a tail of the round that ends there.
+TEST(RoundsOfAJobTest, ATailCountsAsItsRoundWould) {
+  const Scene scene = SmallRoom();
+  const RenderSettings settings = TestSettings(scene, 300, 0, 8);
+  RoundJob whole(scene, settings);
+  whole.RenderTo(20);
+  RoundJob tailed(scene, settings);
+  tailed.RenderTo(18);
+  const RoundPlan plan = tailed.PlanOf({18, 20});
+  BatchTracer tracer(scene, 1);
+  const std::atomic<bool> stop = false;
+  tailed.estimator().SetTail(
+      {std::make_shared<const SliceSums>(
+          tracer.RunSlice(settings, NeedsOf(scene, settings), {18, 20}, plan, stop).value())},
+      plan);
+  EXPECT_EQ(tailed.estimator().passes(), 20);
+  EXPECT_EQ(tailed.estimator().whole_passes(), 18U);
+  EXPECT_EQ(tailed.estimator().photons(), whole.estimator().photons());
+  EXPECT_EQ(tailed.estimator().FindMissingLight().share,
+            whole.estimator().FindMissingLight().share);
+  // Which of the two a job ends with is a matter of moments, so no layer may tell.
+  const Image a = tailed.estimator().MakeImage();
+  const Image b = whole.estimator().MakeImage();
+  ASSERT_EQ(a.channels.size(), b.channels.size());
+  for (const ImageChannel& channel : b.channels)
+    EXPECT_EQ(a.Find(channel.name)->pixels, channel.pixels) << channel.name;
+}
+
+// Workers trace a round as soon as its radii are known, or when the job goes on after all others
+// have come.
+TEST(RoundsOfAJobTest, APlanIsTheSameWheneverItIsMade) {
+  const Scene scene = SmallRoom();
+  RenderSettings settings = TestSettings(scene, 300, 0, 8);
+  settings.radius_controller = RadiusControllerKind::kAppm;
+  RoundJob early(scene, settings);
+  RoundJob late(scene, settings);
+  int ahead = 0;
+  for (std::uint64_t pass = 0; pass < 64; pass = RoundOf(pass).last) {
+    const PassRange round = RoundOf(pass);
+    const std::uint64_t from = RadiiFrom(round);
+    early.RenderTo(from);
+    late.RenderTo(round.first);
+    const RoundPlan of_early = early.PlanOf(round);
+    const RoundPlan of_late = late.PlanOf(round);
+    EXPECT_EQ(*of_early.radii, *of_late.radii) << round.first;
+    EXPECT_EQ(of_early.caustic_radius, of_late.caustic_radius);
+    EXPECT_EQ(of_early.photons_per_pass, of_late.photons_per_pass);
+    if (from < round.first) ++ahead;
+    // Not before all passes that its radii follow from have come.
+    for (PassRange next = RoundOf(round.last); next.first < 100; next = RoundOf(next.last))
+      EXPECT_EQ(early.PlanIfKnown(next).has_value(), RadiiFrom(next) <= from) << next.first;
+    // And not again once it has.
+    if (round.first > 0) {
+      EXPECT_FALSE(late.PlanIfKnown(RoundOf(round.first - 1)));
+    }
+  }
+  EXPECT_GT(ahead, 10);
 }
 
 }  // namespace

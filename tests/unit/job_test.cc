@@ -5,6 +5,8 @@
 
 #include "gtest/gtest.h"
 
+#include "render/estimate/rounds.h"
+
 namespace lucerna {
 namespace {
 
@@ -16,9 +18,9 @@ TEST(JobCountersTest, NamesTheFirstDroppedPhotonsWhateverTheOrderOfBatches) {
   JobCounters forward;
   JobCounters backward;
   for (std::uint64_t pass = 0; pass < 4; ++pass)
-    forward.NameDropped(pass, {10 - pass, 20, 30});
+    forward.NameDropped({{pass, 10 - pass}, {pass, 20}, {pass, 30}});
   for (std::uint64_t pass = 4; pass-- > 0;)
-    backward.NameDropped(pass, {10 - pass, 20, 30});
+    backward.NameDropped({{pass, 10 - pass}, {pass, 20}, {pass, 30}});
   const std::vector<PhotonKey> first = {{0, 10}, {0, 20}, {0, 30}, {1, 9},
                                         {1, 20}, {1, 30}, {2, 8},  {2, 20}};
   EXPECT_EQ(forward.dropped_photons, first);
@@ -58,6 +60,28 @@ TEST(PassRecordTest, KeepsEveryPassAndJoinsNeighboursWhenThereAreMany) {
   expect(kMost + 1, 2);
   add(4 * kMost + 2);
   expect(5 * kMost + 3, 8);
+}
+
+// Rounds are taken in as a whole, so a record holds at least as many passes an entry as asked for.
+TEST(PassRecordTest, TakesInRoundsOfSeveralPasses) {
+  PassRecord record;
+  std::uint64_t next = 0;
+  while (next < 20'000) {
+    const PassRange round = RoundOf(next);
+    BatchTally tally;
+    tally.photons = 10 * round.size();
+    record.Add(tally, static_cast<std::int64_t>(round.size()));
+    next = round.last;
+  }
+  EXPECT_LE(record.tallies().size(), PassRecord::kMostTallies);
+  EXPECT_GE(record.tallies().size(), PassRecord::kMostTallies / 4);
+  std::int64_t passes = 0;
+  for (const PassTally& part : record.tallies()) {
+    EXPECT_EQ(part.first_pass, passes);
+    EXPECT_EQ(part.tally.photons, 10U * static_cast<std::uint64_t>(part.passes));
+    passes += part.passes;
+  }
+  EXPECT_EQ(passes, static_cast<std::int64_t>(next));
 }
 
 // A worker may say any time of a batch: a job's time stands still at its end and never wraps.

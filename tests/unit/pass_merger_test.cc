@@ -6,11 +6,11 @@
 namespace lucerna {
 namespace {
 
-using Outcome = PassMerger::Outcome;
+using Outcome = MergeOutcome;
 
 const PassKey kPass = {"job", 3};
 
-Accumulation Batch(PhotonRange range, std::int64_t flux = 5) {
+Accumulation Batch(WorkRange range, std::int64_t flux = 5) {
   Accumulation accumulation;
   accumulation.hitpoints = {1};
   accumulation.counts = {1};
@@ -20,7 +20,7 @@ Accumulation Batch(PhotonRange range, std::int64_t flux = 5) {
   return accumulation;
 }
 
-StatusOr<Outcome> Merge(PassMerger& merger, PhotonRange range) {
+StatusOr<Outcome> Merge(PassMerger& merger, WorkRange range) {
   return merger.Merge(kPass, range, Batch(range));
 }
 
@@ -43,14 +43,8 @@ TEST(PassMergerTest, RefusesRangesThatWereNeverLent) {
   PassMerger merger;
   merger.Open(kPass, 2, 100);
   ASSERT_TRUE(Merge(merger, {40, 60}).ok());
-  for (const PhotonRange range : {PhotonRange{30, 41},
-                                  {59, 70},
-                                  {45, 50},
-                                  {30, 70},
-                                  {40, 61},
-                                  {50, 50},
-                                  {70, 60},
-                                  {90, 101}}) {
+  for (const WorkRange range :
+       {WorkRange{30, 41}, {59, 70}, {45, 50}, {30, 70}, {40, 61}, {50, 50}, {70, 60}, {90, 101}}) {
     EXPECT_TRUE(absl::IsInvalidArgument(Merge(merger, range).status()))
         << range.first << " " << range.last;
   }
@@ -61,7 +55,7 @@ TEST(PassMergerTest, RefusesRangesThatWereNeverLent) {
 TEST(PassMergerTest, RefusesABatchWhoseTallyIsOfAnotherSizeAndForgetsIt) {
   PassMerger merger;
   merger.Open(kPass, 2, 100);
-  const PhotonRange range = {0, 50};
+  const WorkRange range = {0, 50};
   EXPECT_FALSE(merger.Merge(kPass, range, Batch({0, 49})).ok());
   Accumulation out_of_range = Batch(range);
   out_of_range.hitpoints = {2};
@@ -72,7 +66,7 @@ TEST(PassMergerTest, RefusesABatchWhoseTallyIsOfAnotherSizeAndForgetsIt) {
 TEST(PassMergerTest, RefusesABatchThatNamesPhotonsItDidNotTrace) {
   PassMerger merger;
   merger.Open(kPass, 2, 100);
-  const PhotonRange range = {20, 50};
+  const WorkRange range = {20, 50};
   const auto merge = [&](std::uint64_t dropped, std::vector<std::uint64_t> named) {
     Accumulation batch = Batch(range);
     batch.tally.dropped = dropped;

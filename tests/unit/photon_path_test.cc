@@ -234,7 +234,8 @@ TEST(PhotonReplayTest, TellsEveryStepOfAMirroredPhoton) {
   scene.spot_lights.push_back({{0, 0, 2}, {0, 0, -1}, Gray(1), 0.9999F, 0.9998F});
   scene.materials.push_back({});
   const RenderSettings settings = TestSettings(scene, 100, 0.1, 4);
-  const auto path = ReplayInScene(scene, settings, NeedsOf(scene, settings), 0, 5);
+  const auto path =
+      ReplayInScene(scene, settings, NeedsOf(scene, settings), 0, 5, settings.photons_per_pass);
   ASSERT_TRUE(path.ok()) << path.status();
   EXPECT_EQ(path->emission().light(), "spot light 0");
   EXPECT_EQ(path->emission().position().z(), 2);
@@ -251,8 +252,9 @@ TEST(PhotonReplayTest, TellsEveryStepOfAMirroredPhoton) {
             landing.scattering().survived() ? v1::PHOTON_END_ESCAPED : v1::PHOTON_END_ROULETTE);
 
   const auto is_out_of_range = [&](std::uint64_t pass, std::uint64_t index) {
-    return absl::IsOutOfRange(
-        ReplayInScene(scene, settings, NeedsOf(scene, settings), pass, index).status());
+    return absl::IsOutOfRange(ReplayInScene(scene, settings, NeedsOf(scene, settings), pass, index,
+                                            settings.photons_per_pass)
+                                  .status());
   };
   EXPECT_TRUE(is_out_of_range(0, 100));
   EXPECT_TRUE(is_out_of_range(std::uint64_t{1} << 60, 0));

@@ -22,20 +22,25 @@ std::unique_ptr<RadiusController> Make(RadiusControllerKind kind, double alpha) 
   return MakeRadiusController(settings, 1);
 }
 
+// The round of one pass.
+PassRange OnePass(std::uint64_t pass) {
+  return {pass, pass + 1};
+}
+
 // Hachisuka et al. 2008: N' = N + αM, r' = r sqrt((N + αM) / (N + M)).
 TEST(PpmTest, KeepsAShareOfThePhotons) {
   const auto ppm = Make(RadiusControllerKind::kPpm, 2.0 / 3);
-  const PixelRadius first = ppm->Next({1, 0}, {100, 1, {}}, 0, {});
+  const PixelRadius first = ppm->Next({1, 0}, {100, 1, {}}, OnePass(0), {});
   EXPECT_NEAR(first.photons, 66.66667, 1e-4);
   EXPECT_NEAR(first.radius, 0.8164966, 1e-6);
-  const PixelRadius next = ppm->Next({1, 100}, {50, 1, {}}, 1, {});
+  const PixelRadius next = ppm->Next({1, 100}, {50, 1, {}}, OnePass(1), {});
   EXPECT_NEAR(next.photons, 133.33333, 1e-4);
   EXPECT_NEAR(next.radius, 0.942809, 1e-6);
 }
 
 TEST(PpmTest, KeepsItsRadiusWithoutPhotons) {
   const auto ppm = Make(RadiusControllerKind::kPpm, 0.7);
-  const PixelRadius still = ppm->Next({0.3F, 12}, {0, 0.4F, {}}, 3, {});
+  const PixelRadius still = ppm->Next({0.3F, 12}, {0, 0.4F, {}}, OnePass(3), {});
   EXPECT_EQ(still.radius, 0.3F);
   EXPECT_EQ(still.photons, 12);
 }
@@ -43,8 +48,8 @@ TEST(PpmTest, KeepsItsRadiusWithoutPhotons) {
 // Gathered in a disc of twice the radius, a quarter of the photons belong to today's.
 TEST(PpmTest, CountsOnlyWhatTodaysDiscWouldHaveHeld) {
   const auto ppm = Make(RadiusControllerKind::kPpm, 2.0 / 3);
-  const PixelRadius lagging = ppm->Next({1, 100}, {200, 2, {}}, 4, {});
-  const PixelRadius direct = ppm->Next({1, 100}, {50, 1, {}}, 4, {});
+  const PixelRadius lagging = ppm->Next({1, 100}, {200, 2, {}}, OnePass(4), {});
+  const PixelRadius direct = ppm->Next({1, 100}, {50, 1, {}}, OnePass(4), {});
   EXPECT_DOUBLE_EQ(lagging.radius, direct.radius);
   EXPECT_DOUBLE_EQ(lagging.photons, direct.photons);
 }
@@ -56,8 +61,8 @@ TEST(PpmTest, KeepsTheDensityOverManyPasses) {
   PixelRadius pixel = {1, 0};
   for (std::uint64_t pass = 0; pass < 1000; ++pass) {
     const double r = pixel.radius;
-    pixel = ppm->Next(pixel, {100.0 * static_cast<double>(r) * static_cast<double>(r), r, {}}, pass,
-                      {});
+    pixel = ppm->Next(pixel, {100.0 * static_cast<double>(r) * static_cast<double>(r), r, {}},
+                      OnePass(pass), {});
     ASSERT_LT(pixel.radius, r);
     const double density = static_cast<double>(pixel.photons) /
                            (static_cast<double>(pixel.radius) * static_cast<double>(pixel.radius));
@@ -71,11 +76,22 @@ TEST(PppmTest, FollowsTheProductWhateverThePhotons) {
   PixelRadius pixel = {2, 0};
   double squared = 4;
   for (std::uint64_t pass = 0; pass < 200; ++pass) {
-    pixel = pppm->Next(pixel, {pass % 3 == 0 ? 0.0 : 7.0, pixel.radius, {}}, pass, {});
+    pixel = pppm->Next(pixel, {pass % 3 == 0 ? 0.0 : 7.0, pixel.radius, {}}, OnePass(pass), {});
     const auto i = static_cast<double>(pass + 1);
     squared *= (i + 0.6) / (i + 1);
     ASSERT_NEAR(pixel.radius / std::sqrt(squared), 1, 1e-5) << pass;
   }
+}
+
+// A round of eight passes shrinks the radius as eight rounds of one pass do.
+TEST(PppmTest, ARoundShrinksAsItsPassesDo) {
+  const auto pppm = Make(RadiusControllerKind::kPppm, 0.6);
+  PixelRadius one_by_one = {2, 0};
+  for (std::uint64_t pass = 64; pass < 72; ++pass)
+    one_by_one = pppm->Next(one_by_one, {7, 2, {}}, OnePass(pass), {});
+  const PixelRadius at_once = pppm->Next({2, 0}, {56, 2, {}}, {64, 72}, {});
+  EXPECT_NEAR(at_once.radius / one_by_one.radius, 1, 16 * 0x1p-53);
+  EXPECT_EQ(at_once.photons, one_by_one.photons);
 }
 
 // Twelve cells of equal counts keep the radius; a slope across them, or a peak in the middle, does
@@ -85,8 +101,8 @@ TEST(CppmTest, ShrinksOnlyWhereCountsAreUneven) {
   settings.radius_controller = RadiusControllerKind::kCppm;
   const auto cppm = MakeRadiusController(settings, 1);
   std::vector<double> memory(cppm->MemoryPerPixel());
-  const auto next = [&](const std::array<std::int64_t, 12>& counts) {
-    return cppm->Next({1, 0}, {120, 1, counts}, 0, memory).radius;
+  const auto next = [&](const std::array<double, 12>& counts) {
+    return cppm->Next({1, 0}, {120, 1, counts}, OnePass(0), memory).radius;
   };
   EXPECT_EQ(next({10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10, 10}), 1);
   EXPECT_DOUBLE_EQ(next({30, 25, 10, 0, 5, 10, 15, 10, 5, 5, 0, 5}), std::sqrt(0.8));
@@ -99,11 +115,11 @@ TEST(CppmTest, ShrinksOnlyWhereCountsAreUneven) {
 
 // What `photons` of weight 1 a unit of area, thinned by 1 - bend·|x|², add up to within the reach
 // of a hitpoint of this radius, in expectation: the Laplacian of the density is -4·bend.
-std::array<std::int64_t, kCurvatureColumns> ExpectedCurvature(double photons, double bend,
-                                                              double radius) {
+std::array<double, kCurvatureColumns> ExpectedCurvature(double photons, double bend,
+                                                        double radius) {
   const double h2 = std::pow(static_cast<double>(kCurvatureReach) * radius, 2);
   const double pi = std::numbers::pi;
-  const auto units = [](double v) { return std::llrint(v / kWeightUnit); };
+  const auto units = [](double v) { return std::rint(v / kWeightUnit); };
   return {units(-4 * bend * photons * pi * h2 * h2 / 24),
           units(photons * pi * h2 * (1 - bend * h2 / 2))};
 }
@@ -121,8 +137,8 @@ TEST(AppmTest, TakesTheRadiusOfLeastErrorForTheLaplacianItSees) {
   for (; pass < 4000; ++pass) {
     const auto r = static_cast<double>(pixel.radius);
     const auto columns = ExpectedCurvature(kPhotons, kBend, r);
-    pixel =
-        appm->Next(pixel, {100, pixel.radius, columns}, static_cast<std::uint64_t>(pass), memory);
+    pixel = appm->Next(pixel, {100, pixel.radius, columns},
+                       OnePass(static_cast<std::uint64_t>(pass)), memory);
   }
   // Epanechnikov: R2 = 4/(3π), mu2 = 1/6. The density in the middle is 400; the wider disc sees a
   // few percent less of it, of which the sixth root is taken, and the Laplacian's own noise.
@@ -165,9 +181,9 @@ TEST(AppmTest, KeepsItsRadiusInEvenLight) {
         weight2 += 1;
         blur += BlurOf(u, pixel.radius);
       }
-      const std::array<std::int64_t, kCurvatureColumns> columns = {
-          std::llrint(laplacian / kWeightUnit), std::llrint(weight2 / kWeightUnit)};
-      pixel = appm->Next(pixel, {weight2, pixel.radius, columns, blur}, pass, memory);
+      const std::array<double, kCurvatureColumns> columns = {std::rint(laplacian / kWeightUnit),
+                                                             std::rint(weight2 / kWeightUnit)};
+      pixel = appm->Next(pixel, {weight2, pixel.radius, columns, blur}, OnePass(pass), memory);
     }
     if (pixel.radius < 0.9F) ++shrunk;
   }
@@ -194,8 +210,8 @@ TEST(AppmTest, ShrinksOnTheRimOfASpotWhereTheLaplacianIsZero) {
       blur += BlurOf(distance * distance / static_cast<double>(kCurvatureReach * kCurvatureReach),
                      pixel.radius);
     }
-    const std::array<std::int64_t, kCurvatureColumns> columns = {0, std::llrint(20 / kWeightUnit)};
-    pixel = appm->Next(pixel, {20, pixel.radius, columns, blur}, pass, memory);
+    const std::array<double, kCurvatureColumns> columns = {0, std::rint(20 / kWeightUnit)};
+    pixel = appm->Next(pixel, {20, pixel.radius, columns, blur}, OnePass(pass), memory);
   }
   EXPECT_LT(pixel.radius, 1.05 * kSpot);
 }
@@ -214,14 +230,11 @@ PixelRadius RunFrequency(RadiusControllerKind kind, double trace, int passes) {
     const double photons = 50 * r * r;
     const double frequency_photons = photons / 10;
     const double x = trace * r * r;
-    const auto units = [&](double v) {
-      return static_cast<std::int64_t>(frequency_photons * v / kWeightUnit);
-    };
-    const std::array<std::int64_t, kFrequencyColumns> columns = {
-        static_cast<std::int64_t>(std::lround(frequency_photons)), units(1), units(1), units(x),
-        units(x * x)};
+    const auto units = [&](double v) { return std::trunc(frequency_photons * v / kWeightUnit); };
+    const std::array<double, kFrequencyColumns> columns = {std::round(frequency_photons), units(1),
+                                                           units(1), units(x), units(x * x)};
     pixel = controller->Next(pixel, {photons, pixel.radius, columns},
-                             static_cast<std::uint64_t>(pass), memory);
+                             OnePass(static_cast<std::uint64_t>(pass)), memory);
   }
   return pixel;
 }
@@ -250,14 +263,15 @@ TEST(FrequencyTest, PassesWithoutEvidenceLeaveThePredictionAlone) {
   settings.radius_controller = RadiusControllerKind::kFrequency;
   const auto controller = MakeRadiusController(settings, 1);
   std::vector<double> memory(controller->MemoryPerPixel());
-  const auto units = [](double v) { return std::llrint(v / kWeightUnit); };
-  const std::array<std::int64_t, kFrequencyColumns> columns = {20, units(20), units(20), units(5),
-                                                               units(1.25)};
-  PixelRadius pixel = controller->Next({1, 0}, {100, 1, columns}, 0, memory);
+  const auto units = [](double v) { return std::rint(v / kWeightUnit); };
+  const std::array<double, kFrequencyColumns> columns = {20, units(20), units(20), units(5),
+                                                         units(1.25)};
+  PixelRadius pixel = controller->Next({1, 0}, {100, 1, columns}, OnePass(0), memory);
   const auto before = controller->Predict(memory);
   ASSERT_TRUE(before.has_value());
+  const std::array<double, kFrequencyColumns> nothing{};
   for (std::uint64_t pass = 1; pass < 4; ++pass) {
-    pixel = controller->Next(pixel, {100, pixel.radius, {}}, pass, memory);
+    pixel = controller->Next(pixel, {100, pixel.radius, nothing}, OnePass(pass), memory);
   }
   EXPECT_DOUBLE_EQ(controller->Predict(memory)->trace, before->trace);
   EXPECT_GT(pixel.photons, 200);

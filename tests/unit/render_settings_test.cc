@@ -31,6 +31,7 @@ TEST(RenderSettingsTest, DefaultsStandWhereNothingIsGiven) {
   expected.height = expected.crop_y1 = 30;
   expected.passes = 16;
   expected.photons_per_pass = 1200;  // as many as pixels
+  expected.adaptive_photons = true;
   expected.max_depth = 5;
   expected.initial_radius = 0;
   EXPECT_EQ(settings, expected);

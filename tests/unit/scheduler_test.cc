@@ -3,7 +3,15 @@
 // waits.
 #include "server/scheduler.h"
 
+#include <algorithm>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
 #include "gtest/gtest.h"
+
+#include "render/estimate/rounds.h"
 
 namespace lucerna {
 namespace {
@@ -29,8 +37,8 @@ std::optional<BatchLease> Ask(Scheduler& scheduler, const std::string& worker, d
   Scheduler::Report report;
   report.held = std::move(held);
   report.wants_lease = true;
-  EXPECT_TRUE(scheduler.Hear(worker, report, At(now_s)).ok());
-  auto answer = scheduler.Tell(worker, report, At(now_s));
+  EXPECT_TRUE(scheduler.TakeReport(worker, report, At(now_s)).ok());
+  auto answer = scheduler.AnswerFor(worker, report, At(now_s));
   EXPECT_TRUE(answer.ok());
   return answer.ok() ? answer->lease : std::nullopt;
 }
@@ -39,8 +47,8 @@ std::vector<std::string> Revoked(Scheduler& scheduler, const std::string& worker
                                  std::vector<std::string> held, double now_s) {
   Scheduler::Report report;
   report.held = std::move(held);
-  EXPECT_TRUE(scheduler.Hear(worker, report, At(now_s)).ok());
-  return scheduler.Tell(worker, report, At(now_s))->revoked;
+  EXPECT_TRUE(scheduler.TakeReport(worker, report, At(now_s)).ok());
+  return scheduler.AnswerFor(worker, report, At(now_s))->revoked;
 }
 
 TEST(SchedulerTest, LendsAPassInOrderAndEachPhotonOnce) {
@@ -58,6 +66,21 @@ TEST(SchedulerTest, LendsAPassInOrderAndEachPhotonOnce) {
   EXPECT_FALSE(Ask(scheduler, scheduler.AddWorker("w", At(0)), 0));
 }
 
+// A lease whose job has gone cannot be handed over. The worker's call is still open, so the worker
+// must be served when there is other work, without asking again.
+TEST(SchedulerTest, AWorkerThatCouldNotBeToldOfItsLeaseWaitsOn) {
+  Scheduler scheduler(Batches(100));
+  scheduler.OpenPass(kFirst, 100);
+  const auto worker = scheduler.AddWorker("w", At(0));
+  ASSERT_TRUE(Ask(scheduler, worker, 0));
+  EXPECT_FALSE(scheduler.TakeWaiting(At(0)));
+  scheduler.WaitAgain(worker);
+  scheduler.Close(kFirst);
+  EXPECT_FALSE(scheduler.TakeWaiting(At(0))) << "there is nothing to lend";
+  scheduler.OpenPass(kSecond, 100);
+  EXPECT_EQ(scheduler.TakeWaiting(At(0)), worker);
+}
+
 TEST(SchedulerTest, CutsAPassByTheNumberOfWorkersButNotTooSmall) {
   Scheduler scheduler({});
   std::vector<std::string> workers;
@@ -65,14 +88,14 @@ TEST(SchedulerTest, CutsAPassByTheNumberOfWorkersButNotTooSmall) {
     workers.push_back(scheduler.AddWorker("w", At(0)));
   scheduler.OpenPass(kFirst, 1'000'001);
   EXPECT_EQ(Ask(scheduler, workers[0], 0)->range.size(), 250'001U);
-  scheduler.ClosePass(kFirst);
+  scheduler.Close(kFirst);
   scheduler.OpenPass(kFirst, 5000);
   EXPECT_EQ(Ask(scheduler, workers[0], 0)->range.size(), 4096U);
   EXPECT_EQ(Ask(scheduler, workers[1], 0)->range.size(), 904U);
-  scheduler.ClosePass(kFirst);
+  scheduler.Close(kFirst);
   scheduler.OpenPass(kFirst, 100);
   EXPECT_EQ(Ask(scheduler, workers[0], 0)->range.size(), 100U);
-  scheduler.ClosePass(kFirst);
+  scheduler.Close(kFirst);
   scheduler.OpenPass(kFirst, std::uint64_t{1} << 40);
   EXPECT_EQ(Ask(scheduler, workers[0], 0)->range.size(), std::uint64_t{1} << 22);
 }
@@ -112,7 +135,7 @@ TEST(SchedulerTest, TakesBackALeaseThatRunsOutAndLendsTheSameRangeFirst) {
   const auto other = scheduler.AddWorker("other", At(0));
   scheduler.OpenPass(kFirst, 150);
   const auto lost = Ask(scheduler, silent, 0);
-  EXPECT_EQ(Ask(scheduler, other, 9)->range, (PhotonRange{50, 100}));
+  EXPECT_EQ(Ask(scheduler, other, 9)->range, (WorkRange{50, 100}));
   scheduler.Expire(At(9.9));
   EXPECT_TRUE(Revoked(scheduler, silent, {lost->id}, 9.9).empty()) << "renewed by the report";
   scheduler.Expire(At(19.8));
@@ -138,11 +161,11 @@ TEST(SchedulerTest, ForgetsASilentWorkerAndTellsItSo) {
   Scheduler scheduler({});
   const auto worker = scheduler.AddWorker("w", At(0));
   scheduler.Expire(At(29));
-  EXPECT_TRUE(scheduler.Hear(worker, {}, At(29)).ok());
+  EXPECT_TRUE(scheduler.TakeReport(worker, {}, At(29)).ok());
   scheduler.Expire(At(58));
   EXPECT_EQ(scheduler.LiveWorkers(), 1);
   scheduler.Expire(At(59));
-  EXPECT_TRUE(absl::IsNotFound(scheduler.Hear(worker, {}, At(59))));
+  EXPECT_TRUE(absl::IsNotFound(scheduler.TakeReport(worker, {}, At(59))));
   EXPECT_EQ(scheduler.LiveWorkers(), 0);
 }
 
@@ -176,7 +199,7 @@ TEST(SchedulerTest, RevokesWhatIsOfNoUseAnyMore) {
   ASSERT_TRUE(second);
   scheduler.Commit(kFirst, first->range, At(1));
   EXPECT_EQ(Revoked(scheduler, worker, {first->id, second->id}, 1), (std::vector{first->id}));
-  scheduler.ClosePass(kSecond);
+  scheduler.Close(kSecond);
   EXPECT_EQ(Revoked(scheduler, worker, {second->id}, 1), (std::vector{second->id}));
 }
 
@@ -249,7 +272,7 @@ TEST(SchedulerTest, PoisonsABatchThatALoneWorkerCannotDo) {
     ASSERT_TRUE(lease);
     Scheduler::Report report;
     report.failures = {{lease->id, "out of memory"}};
-    ASSERT_TRUE(scheduler.Hear(worker, report, At(tries)).ok());
+    ASSERT_TRUE(scheduler.TakeReport(worker, report, At(tries)).ok());
   }
   EXPECT_EQ(tries, 6);
 }
@@ -263,6 +286,293 @@ TEST(SchedulerTest, AGoodbyeIsNoFailure) {
     scheduler.RemoveWorker(worker);
   }
   EXPECT_TRUE(scheduler.TakePoisoned().empty());
+}
+
+// Rounds: slices of passes instead of batches of photons.
+// ---------------------------------------------------------------------------------------------
+
+const PassKey kRound64 = {"job", 64};  // of 8 passes
+const PassKey kRound72 = {"job", 72};
+
+// Takes slices as `worker` and hands each in after `seconds_a_pass`, from `now_s` on, until there
+// are none.
+std::vector<WorkRange> TakeAll(Scheduler& scheduler, const std::string& worker,
+                               double seconds_a_pass = 1, double now_s = 0) {
+  std::vector<WorkRange> slices;
+  while (const auto lease = Ask(scheduler, worker, now_s)) {
+    slices.push_back(lease->range);
+    now_s += seconds_a_pass * static_cast<double>(lease->range.size());
+    scheduler.Commit(lease->pass, lease->range, At(now_s));
+  }
+  return slices;
+}
+
+void ExpectSlices(const std::vector<WorkRange>& slices, std::uint64_t first, std::uint64_t last) {
+  for (const WorkRange& slice : slices) {
+    EXPECT_EQ(slice.first, first) << "in order and without a gap";
+    EXPECT_TRUE(IsSlice({slice.first, slice.last})) << slice.first << " " << slice.last;
+    first = slice.last;
+  }
+  EXPECT_EQ(first, last);
+}
+
+TEST(SchedulerRoundTest, LendsEachPassOnceInSlicesOfTheRound) {
+  for (std::uint64_t first = 0; first < 700; first = RoundOf(first).last) {
+    for (const int workers : {1, 3, 100}) {
+      const PassRange round = RoundOf(first);
+      Scheduler scheduler({});
+      std::vector<std::string> all;
+      for (int i = 0; i < workers; ++i)
+        all.push_back(scheduler.AddWorker("w", At(0)));
+      const PassKey key = {"job", round.first};
+      scheduler.OpenRound(key, {round.first, round.last}, {});
+      const auto lease = Ask(scheduler, all[0], 0);
+      ASSERT_TRUE(lease);
+      EXPECT_EQ(lease->kind, WorkKind::kPasses);
+      EXPECT_EQ(lease->pass, key);
+      scheduler.Commit(key, lease->range, At(1));
+      std::vector<WorkRange> slices = TakeAll(scheduler, all[0]);
+      slices.insert(slices.begin(), lease->range);
+      ExpectSlices(slices, round.first, round.last);
+    }
+  }
+}
+
+// A job may end within a round: slices end there too, and are aligned all the same.
+TEST(SchedulerRoundTest, LendsPartOfARoundInSlices) {
+  for (std::uint64_t last = 65; last <= 72; ++last) {
+    Scheduler scheduler({});
+    const auto worker = scheduler.AddWorker("w", At(0));
+    scheduler.OpenRound(kRound64, {64, last}, {});
+    ExpectSlices(TakeAll(scheduler, worker), 64, last);
+  }
+}
+
+// One worker finds a second slice while it works on its first; many share the passes that are open,
+// two slices each, down to single passes.
+TEST(SchedulerRoundTest, SlicesAreShorterTheMoreWorkersThereAre) {
+  const PassKey key = {"job", 512};  // of 64 passes
+  const auto first_slice = [&](int workers) {
+    Scheduler scheduler({});
+    std::string worker;
+    for (int i = 0; i < workers; ++i)
+      worker = scheduler.AddWorker("w", At(0));
+    scheduler.OpenRound(key, {512, 576}, {});
+    return Ask(scheduler, worker, 0)->range.size();
+  };
+  EXPECT_EQ(first_slice(1), SchedulerOptions().max_slice);
+  EXPECT_EQ(first_slice(2), 16U);
+  EXPECT_EQ(first_slice(3), 8U);  // 64 / 6, rounded down to a power of two
+  EXPECT_EQ(first_slice(4), 8U);
+  EXPECT_EQ(first_slice(16), 2U);
+  EXPECT_EQ(first_slice(33), 1U);
+  EXPECT_EQ(first_slice(1000), 1U);
+}
+
+TEST(SchedulerRoundTest, AllRoundsThatAreOpenAreShared) {
+  Scheduler scheduler({});
+  const auto worker = scheduler.AddWorker("w", At(0));
+  scheduler.OpenRound(kRound64, {64, 72}, {});
+  scheduler.OpenRound(kRound72, {72, 80}, {});
+  // 16 passes for one worker, of which a round has 8.
+  EXPECT_EQ(Ask(scheduler, worker, 0)->range, (WorkRange{64, 72}));
+}
+
+TEST(SchedulerRoundTest, AWorkerThatHasLeftHasNoShare) {
+  Scheduler scheduler({});
+  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto lost = scheduler.AddWorker("lost", At(0));
+  scheduler.LoseWorker(lost);
+  scheduler.OpenRound(kRound64, {64, 72}, {});
+  EXPECT_EQ(Ask(scheduler, worker, 0)->range.size(), 4U);
+}
+
+// What is not done when time is up is lost. Until it is known how long a pass takes, slices are as
+// short as can be; then none takes more than a quarter of the time that is left.
+TEST(SchedulerRoundTest, SlicesAreShortWhenTimeRunsOut) {
+  const PassKey key = {"job", 512};
+  Scheduler scheduler({});
+  const auto worker = scheduler.AddWorker("w", At(0));
+  scheduler.OpenRound(key, {512, 576}, At(100));
+  double now = 0;
+  std::vector<std::uint64_t> sizes;
+  std::uint64_t next = 512;
+  while (const auto lease = Ask(scheduler, worker, now)) {
+    EXPECT_EQ(lease->range.first, next);
+    EXPECT_TRUE(IsSlice({lease->range.first, lease->range.last}));
+    next = lease->range.last;
+    sizes.push_back(lease->range.size());
+    // A second a pass.
+    if (sizes.size() > 3 && now < 99) {
+      EXPECT_LE(static_cast<double>(sizes.back()), std::max(1.0, 0.25 * (100 - now))) << now;
+    }
+    now += static_cast<double>(lease->range.size());
+    scheduler.Commit(key, lease->range, At(now));
+  }
+  EXPECT_EQ(next, 576U);
+  EXPECT_EQ((std::vector(sizes.begin(), sizes.begin() + 3)), (std::vector<std::uint64_t>{1, 1, 1}))
+      << "nothing is known of how long a pass takes";
+  EXPECT_EQ(*std::ranges::max_element(sizes), 16U);
+  // Near the end and after it.
+  scheduler.OpenRound({"job", 576}, {576, 640}, At(now + 3.9));
+  EXPECT_EQ(Ask(scheduler, worker, now)->range.size(), 1U);
+  scheduler.Close({"job", 576});
+  scheduler.OpenRound({"job", 640}, {640, 704}, At(now - 1));
+  EXPECT_EQ(Ask(scheduler, worker, now)->range.size(), 1U);
+}
+
+TEST(SchedulerRoundTest, TimesOfPhotonsSayNothingOfPasses) {
+  Scheduler scheduler(Batches(100));
+  const auto worker = scheduler.AddWorker("w", At(0));
+  scheduler.OpenPass(kFirst, 400);
+  for (int i = 0; i < 4; ++i)
+    scheduler.Commit(kFirst, Ask(scheduler, worker, i)->range, At(i + 1));
+  scheduler.Close(kFirst);
+  scheduler.OpenRound({"job", 512}, {512, 576}, At(1e6));
+  EXPECT_EQ(Ask(scheduler, worker, 4)->range.size(), 1U);
+}
+
+// A slice goes out again as it was: another part of the round would overlap it when it comes back
+// after all.
+TEST(SchedulerRoundTest, SlicesThatComeBackGoOutFirstAndUnchanged) {
+  const PassKey key = {"job", 512};
+  Scheduler scheduler({});
+  const auto lost = scheduler.AddWorker("lost", At(0));
+  scheduler.OpenRound(key, {512, 576}, {});
+  const auto lease = Ask(scheduler, lost, 0);
+  ASSERT_EQ(lease->range, (WorkRange{512, 528}));
+  std::vector<std::string> others;
+  for (int i = 0; i < 50; ++i)
+    others.push_back(scheduler.AddWorker("other", At(0)));
+  EXPECT_EQ(Ask(scheduler, others[0], 0)->range, (WorkRange{528, 529}));
+  scheduler.LoseWorker(lost);
+  const auto again = Ask(scheduler, others[1], 1);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->range, lease->range);
+  EXPECT_NE(again->id, lease->id);
+  EXPECT_EQ(Ask(scheduler, others[2], 1)->range, (WorkRange{529, 530}));
+}
+
+// After slices of one pass comes no slice of four before the next multiple of four.
+TEST(SchedulerRoundTest, SlicesStayAlignedWhenWorkersComeAndGo) {
+  const PassKey key = {"job", 512};
+  Scheduler scheduler({});
+  const auto worker = scheduler.AddWorker("w", At(0));
+  scheduler.OpenRound(key, {512, 576}, {});
+  std::vector<WorkRange> slices;
+  std::vector<std::string> others;
+  for (int step = 0; const auto lease = Ask(scheduler, worker, step); ++step) {
+    slices.push_back(lease->range);
+    scheduler.Commit(key, lease->range, At(step));
+    // 1, 41 and 11 workers in turn.
+    while (others.size() < (step % 3 == 0 ? 40U : 0U))
+      others.push_back(scheduler.AddWorker("other", At(step)));
+    while (others.size() > (step % 3 == 1 ? 10U : 0U) && step % 3 != 0) {
+      scheduler.RemoveWorker(others.back());
+      others.pop_back();
+    }
+  }
+  ExpectSlices(slices, 512, 576);
+  std::set<std::uint64_t> sizes;
+  for (const WorkRange& slice : slices)
+    sizes.insert(slice.size());
+  EXPECT_GE(sizes.size(), 3U);
+}
+
+TEST(SchedulerRoundTest, ASliceThatALateAnswerHasBroughtIsNotLentAgain) {
+  Scheduler scheduler({});
+  const auto late = scheduler.AddWorker("late", At(0));
+  scheduler.OpenRound(kRound64, {64, 65}, {});
+  const auto lease = Ask(scheduler, late, 0);
+  scheduler.LoseWorker(late);
+  scheduler.Commit(kRound64, lease->range, At(1));
+  EXPECT_FALSE(Ask(scheduler, scheduler.AddWorker("other", At(1)), 1));
+}
+
+TEST(SchedulerRoundTest, ARoundEndsEarlierAndLater) {
+  Scheduler scheduler({});
+  std::vector<std::string> workers;
+  for (int i = 0; i < 8; ++i)
+    workers.push_back(scheduler.AddWorker("w", At(0)));
+  scheduler.OpenRound(kRound64, {64, 72}, {});
+  const auto first = Ask(scheduler, workers[0], 0);
+  ASSERT_EQ(first->range, (WorkRange{64, 65}));
+  // Earlier than what has been lent: that stays, and no more is lent.
+  scheduler.SetRoundEnd(kRound64, 64, {});
+  EXPECT_FALSE(Ask(scheduler, workers[1], 0));
+  EXPECT_TRUE(Revoked(scheduler, workers[0], {first->id}, 0).empty());
+  // Later: goes on where it stopped.
+  scheduler.SetRoundEnd(kRound64, 67, {});
+  EXPECT_EQ(Ask(scheduler, workers[1], 0)->range, (WorkRange{65, 66}));
+  EXPECT_EQ(Ask(scheduler, workers[2], 0)->range, (WorkRange{66, 67}));
+  EXPECT_FALSE(Ask(scheduler, workers[3], 0));
+  scheduler.SetRoundEnd(kRound64, 72, {});
+  EXPECT_EQ(Ask(scheduler, workers[3], 0)->range, (WorkRange{67, 68}));
+  // Of what is not open, and of passes that are split, there is no end to change.
+  scheduler.SetRoundEnd(kRound72, 73, {});
+  scheduler.OpenPass(kFirst, 5000);
+  scheduler.SetRoundEnd(kFirst, 1, {});
+  EXPECT_EQ(Ask(scheduler, workers[4], 0)->range, (WorkRange{0, 4096}));
+}
+
+TEST(SchedulerRoundTest, ANewTimeLimitMakesSlicesShorter) {
+  Scheduler scheduler({});
+  const auto worker = scheduler.AddWorker("w", At(0));
+  scheduler.OpenRound(kRound64, {64, 72}, {});
+  scheduler.SetRoundEnd(kRound64, 72, At(10));
+  EXPECT_EQ(Ask(scheduler, worker, 0)->range.size(), 1U);
+}
+
+TEST(SchedulerRoundTest, AClosedRoundRevokesItsSlices) {
+  Scheduler scheduler({});
+  const auto worker = scheduler.AddWorker("w", At(0));
+  scheduler.OpenRound(kRound64, {64, 72}, {});
+  const auto lease = Ask(scheduler, worker, 0);
+  scheduler.Close(kRound64);
+  EXPECT_EQ(Revoked(scheduler, worker, {lease->id}, 1), (std::vector{lease->id}));
+  EXPECT_FALSE(Ask(scheduler, worker, 1));
+}
+
+// Slices of eight passes take eight times as long as those of one: a straggler is measured by the
+// passes it has.
+TEST(SchedulerRoundTest, ALongSliceIsNoStraggler) {
+  Scheduler scheduler({});
+  const auto quick = scheduler.AddWorker("quick", At(0));
+  for (std::uint64_t first = 0; first < 3; ++first) {
+    const PassKey key = {"job", first};
+    scheduler.OpenRound(key, {first, first + 1}, {});
+    const double now = 10.0 * static_cast<double>(first);
+    scheduler.Commit(key, Ask(scheduler, quick, now)->range, At(now + 10));
+    scheduler.Close(key);
+  }
+  scheduler.OpenRound(kRound64, {64, 72}, {});
+  scheduler.OpenRound(kRound72, {72, 80}, {});
+  const auto slow = scheduler.AddWorker("slow", At(30));
+  scheduler.RemoveWorker(quick);
+  ASSERT_EQ(Ask(scheduler, slow, 30)->range, (WorkRange{64, 72}));
+  const auto idle = scheduler.AddWorker("idle", At(30));
+  while (const auto lease = Ask(scheduler, idle, 30))
+    scheduler.Commit(lease->pass, lease->range,
+                     At(30.0 + 10.0 * static_cast<double>(lease->range.size())));
+  EXPECT_FALSE(Ask(scheduler, idle, 30 + 3 * 10 + 1)) << "three times the usual time of one pass";
+  EXPECT_FALSE(Ask(scheduler, idle, 30 + 3 * 80 - 1));
+  const auto doubled = Ask(scheduler, idle, 30 + 3 * 80 + 1);
+  ASSERT_TRUE(doubled);
+  EXPECT_EQ(doubled->range, (WorkRange{64, 72}));
+}
+
+TEST(SchedulerRoundTest, ASliceAtWhichThreeWorkersFailedNamesItsPasses) {
+  Scheduler scheduler({});
+  scheduler.OpenRound(kRound64, {64, 66}, {});
+  for (int i = 0; i < 3; ++i) {
+    const auto worker = scheduler.AddWorker("w", At(i));
+    ASSERT_TRUE(Ask(scheduler, worker, i));
+    scheduler.LoseWorker(worker);
+  }
+  const auto poisoned = scheduler.TakePoisoned();
+  ASSERT_EQ(poisoned.size(), 1U);
+  EXPECT_EQ(poisoned[0].pass, kRound64);
+  EXPECT_TRUE(poisoned[0].message.starts_with("passes 64 to ")) << poisoned[0].message;
 }
 
 }  // namespace

@@ -24,21 +24,21 @@ class Appm final : public RadiusController {
 
   std::size_t MemoryPerPixel() const override { return kNumbers; }
 
-  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
+  PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence, const PassRange& passes,
                    std::span<double> memory) const override {
     const double h = static_cast<double>(kCurvatureReach) * evidence.radius;
     const double h2 = h * h;
-    const auto column = [&](CurvatureColumn c) {
-      return kWeightUnit * static_cast<double>(evidence.columns[c]);
-    };
-    // Per pass and unit of flux: the Laplacian of the flux density, the density of squares, and
-    // blur over the squared radius.
+    const auto column = [&](CurvatureColumn c) { return kWeightUnit * evidence.columns[c]; };
+    // Sums over passes, per unit of flux: the Laplacian of the flux density, the density of
+    // squares, and blur over the squared radius.
     memory[kLaplacian] += column(kCurvatureLaplacian) * 24 / (std::numbers::pi * h2 * h2);
     memory[kSquares] += column(kCurvatureWeight2) / (std::numbers::pi * h2);
     const double blur = evidence.blur / (evidence.radius * evidence.radius);
     memory[kBlur] += blur;
-    memory[kBlurSquares] += blur * blur;
-    memory[kPasses] += 1;
+    const auto of_round = static_cast<double>(passes.size());
+    memory[kBlurSquares] += blur * blur / of_round;
+    memory[kPasses] += of_round;
+    memory[kRounds] += 1;
     PixelRadius next = {now.radius, now.photons + evidence.photons};
 
     const double n = memory[kPasses];
@@ -58,18 +58,28 @@ class Appm final : public RadiusController {
   }
 
  private:
-  enum Memory : std::size_t { kLaplacian, kSquares, kBlur, kBlurSquares, kPasses, kNumbers };
+  enum Memory : std::size_t {
+    kLaplacian,
+    kSquares,
+    kBlur,
+    kBlurSquares,
+    kPasses,
+    kRounds,
+    kNumbers
+  };
   static constexpr double kSmallestShare = 0.01;
-  // Blur counts from so many passes on, and so many times its standard deviation is taken from it:
+  // Blur counts from so many rounds on, and so many times its standard deviation is taken from it:
   // less than this is shown by noise in one of thousands of pixels.
-  static constexpr double kFirstPasses = 8;
+  static constexpr double kFirstRounds = 8;
   static constexpr double kSureDeviations = 8;
 
   static double SureSquareOfBlur(std::span<const double> memory) {
     const double n = memory[kPasses];
-    if (n < kFirstPasses) return 0;
+    const double rounds = memory[kRounds];
+    if (rounds < kFirstRounds) return 0;
     const double mean = memory[kBlur] / n;
-    const double variance = (memory[kBlurSquares] / n - mean * mean) / (n - 1);
+    // A round of k passes varies as one pass does, times k.
+    const double variance = (memory[kBlurSquares] / n - mean * mean) / (rounds - 1);
     return std::max(0.0, mean * mean - kSureDeviations * kSureDeviations * variance);
   }
 

@@ -14,15 +14,15 @@ class Cppm final : public RadiusController {
  public:
   std::size_t MemoryPerPixel() const override { return kSectors + 1; }
 
-  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
-                   std::span<double> memory) const override {
+  PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence,
+                   const PassRange& /*passes*/, std::span<double> memory) const override {
     PixelRadius next = {now.radius, now.photons + evidence.photons};
     // Photons of a disc that has been left behind say nothing about today's cells.
     // What was gathered with is rounded to a float.
     if (evidence.radius > now.radius * (1 + 1e-6)) return next;
     double total = 0;
     for (std::size_t i = 0; i < kSectors; ++i) {
-      memory[i] += static_cast<double>(evidence.columns[i]);
+      memory[i] += evidence.columns[i];
       total += memory[i];
     }
     double& wanted = memory[kSectors];

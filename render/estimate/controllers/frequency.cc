@@ -19,8 +19,8 @@ class FrequencyFloor final : public RadiusController {
 
   std::size_t MemoryPerPixel() const override { return FrequencyPrediction::kNumbers; }
 
-  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
-                   std::span<double> memory) const override {
+  PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence,
+                   const PassRange& /*passes*/, std::span<double> memory) const override {
     FrequencyPrediction::Add(evidence, memory);
     if (!(evidence.photons > 0)) return now;
     const std::optional<BandwidthPrediction> prediction = prediction_.Predict(memory);

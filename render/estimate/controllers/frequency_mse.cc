@@ -15,8 +15,8 @@ class FrequencyMse final : public RadiusController {
 
   std::size_t MemoryPerPixel() const override { return FrequencyPrediction::kNumbers + 1; }
 
-  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
-                   std::span<double> memory) const override {
+  PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence,
+                   const PassRange& /*passes*/, std::span<double> memory) const override {
     FrequencyPrediction::Add(evidence, memory);
     const double gathered = evidence.radius;
     double& photon_density = memory[FrequencyPrediction::kNumbers];

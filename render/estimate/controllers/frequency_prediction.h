@@ -26,12 +26,12 @@ class FrequencyPrediction {
   [[nodiscard]] const KernelMoments& moments() const { return moments_; }
 
   // Takes in a pass, then lets what is older fade with the disc's area.
-  static void Add(const PassEvidence& evidence, std::span<double> memory) {
+  static void Add(const RoundEvidence& evidence, std::span<double> memory) {
     if (evidence.columns.empty()) return;
     const double radius = evidence.radius;
     // Columns hold x = trace · radius²; memory holds traces, so that radii can change.
     const double to_trace = 1 / (radius * radius);
-    const auto column = [&](FrequencyColumn c) { return static_cast<double>(evidence.columns[c]); };
+    const auto column = [&](FrequencyColumn c) { return evidence.columns[c]; };
     Store(Sums(memory) + FrequencySums{kWeightUnit * column(kFrequencyWeight),
                                        kWeightUnit * column(kFrequencyWeight2),
                                        kWeightUnit * to_trace * column(kFrequencyTrace),

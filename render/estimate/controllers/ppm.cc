@@ -11,8 +11,8 @@ class Ppm final : public RadiusController {
  public:
   explicit Ppm(double alpha) : alpha_(alpha) {}
 
-  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t /*pass*/,
-                   std::span<double> /*memory*/) const override {
+  PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence,
+                   const PassRange& /*passes*/, std::span<double> /*memory*/) const override {
     if (!(evidence.photons > 0)) return now;
     // The photons were gathered in a disc that may be larger than today's: count those that
     // today's would have held.

@@ -11,10 +11,9 @@ class Pppm final : public RadiusController {
  public:
   explicit Pppm(double alpha) : alpha_(alpha) {}
 
-  PixelRadius Next(const PixelRadius& now, const PassEvidence& evidence, std::uint64_t pass,
+  PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence, const PassRange& passes,
                    std::span<double> /*memory*/) const override {
-    const auto i = static_cast<double>(pass + 1);
-    return {now.radius * std::sqrt((i + alpha_) / (i + 1)), now.photons + evidence.photons};
+    return {now.radius * ScheduledShrink(alpha_, passes), now.photons + evidence.photons};
   }
 
   // radius² falls as passes^(alpha - 1).

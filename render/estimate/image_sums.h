@@ -1,0 +1,79 @@
+// What have all passes so far brought to every pixel?
+//
+// Sums over passes in double, of slices taken in pass order. A round that is not whole yet stays
+// apart, as a tail: it counts in the image, and can be taken away again, so that a job that goes on
+// after its end has the same bits as one that never stopped.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "render/estimate/error_estimate.h"
+#include "render/estimate/slice_sums.h"
+#include "render/math/rgb.h"
+#include "render/math/vector.h"
+
+namespace lucerna {
+
+class ImageSums {
+ public:
+  explicit ImageSums(std::size_t pixels) : pixels_(pixels), features_(pixels) {}
+
+  using Slices = std::vector<std::shared_ptr<const SliceSums>>;
+
+  // Adds the passes that follow those added so far; takes the tail away.
+  // Requires slice.passes.first == whole_passes().
+  void Add(const SliceSums& slice);
+  // What comes after the passes added, in pass order. Requires slices without a gap.
+  void SetTail(Slices tail);
+
+  // Passes added, without the tail and with it.
+  [[nodiscard]] std::uint64_t whole_passes() const { return passes_; }
+  [[nodiscard]] std::uint64_t passes() const {
+    return tail_.empty() ? passes_ : tail_.back()->passes.last;
+  }
+  [[nodiscard]] std::size_t pixels() const { return pixels_.size(); }
+  // Of all passes.
+  [[nodiscard]] std::uint64_t eye_rays() const;
+  [[nodiscard]] BatchTally tally() const;
+
+  // Sums over passes. Radiance in the working space, luminances as of it.
+  struct Pixel {
+    RgbSum photons{}, direct{};
+    RgbSum half_difference{};       // even passes less odd ones
+    double squared_deviations = 0;  // of passes' luminances from their mean
+    double even_bias = 0, odd_bias = 0;
+    double photon_count = 0;
+    float largest = 0;  // luminance of a pass
+
+    [[nodiscard]] RgbSum radiance() const {
+      return {photons[0] + direct[0], photons[1] + direct[1], photons[2] + direct[2]};
+    }
+  };
+  [[nodiscard]] Pixel At(std::size_t pixel) const;
+
+  // What eye paths saw at their first gathering surfaces: sums over the passes that met one.
+  struct Features {
+    Rgb albedo;  // in the working space
+    Vec3 normal;
+    float distance = 0;     // [scene units]
+    float unit_radius = 0;  // [scene units] of hitpoints
+    float hits = 0;         // passes
+    float hitpoints = 0;    // passes
+  };
+  [[nodiscard]] Features FeaturesAt(std::size_t pixel) const;
+
+ private:
+  static void AddTo(Pixel& sum, std::uint64_t passes, const SliceSums& slice, std::size_t pixel);
+  static void AddTo(Features& sum, const SliceSums& slice, std::size_t pixel);
+
+  std::uint64_t passes_ = 0;
+  std::uint64_t eye_rays_ = 0;
+  BatchTally tally_;
+  std::vector<Pixel> pixels_;
+  std::vector<Features> features_;
+  Slices tail_;
+};
+
+}  // namespace lucerna

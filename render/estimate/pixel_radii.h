@@ -1,0 +1,41 @@
+// How large is the radius of every pixel, round after round?
+//
+// Applies a radius controller to what each round brought. Radii are in unit radii
+// (EyePass::unit_radii), so that a pixel's hitpoints at different distances share one.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "render/base/parallel.h"
+#include "render/estimate/hitpoint_block.h"
+#include "render/estimate/radius_controller.h"
+#include "render/estimate/slice_sums.h"
+
+namespace lucerna {
+
+class PixelRadii {
+ public:
+  // Keeps a reference to `controller`.
+  PixelRadii(std::size_t pixels, float initial_radius, const RadiusController& controller);
+
+  // Takes in a round whose hitpoints gathered with `used` [pixels].
+  void Step(const SliceSums& round, const RadiusColumn& used, ThreadTeam& team);
+
+  // The radii after the rounds so far [pixels].
+  [[nodiscard]] RadiusColumn Current() const;
+  // The radius controller's own numbers for a pixel.
+  [[nodiscard]] std::span<const double> memory(std::size_t pixel) const {
+    return std::span<const double>(memory_).subspan(pixel * memory_per_pixel_, memory_per_pixel_);
+  }
+
+ private:
+  const RadiusController& controller_;
+  std::vector<PixelRadius> radius_;
+  std::size_t memory_per_pixel_;
+  std::vector<double> memory_;  // [pixels × memory_per_pixel]
+};
+
+}  // namespace lucerna

@@ -1,0 +1,57 @@
+// Which passes share one set of radii, and which passes are those radii computed from?
+//
+// A round is a run of consecutive passes that share one set of radii. Its length and its lag follow
+// from the pass number alone, so the image stays a function of scene and settings, whoever traces
+// which pass and when. Rounds are of one pass each up to kFirstLongRound, so that early radii
+// follow the photons closely; from there on an eighth to a sixteenth of the passes before them. The
+// radii of a round follow from the passes that lie at least an eighth of the passes done before it:
+// a quarter of the passes done may be out at once, and nobody waits for a slow worker. Radii fall
+// as a small power of the passes, so that an eighth of lag is some 2 % of a radius.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstdint>
+
+namespace lucerna {
+
+// Passes [first, last).
+struct PassRange {
+  std::uint64_t first = 0, last = 0;
+  [[nodiscard]] constexpr std::uint64_t size() const { return last - first; }
+  auto operator<=>(const PassRange&) const = default;
+};
+
+inline constexpr std::uint64_t kFirstLongRound = 16;
+inline constexpr std::uint64_t kLongestRound = 64;
+
+// The round of a pass. Its length is a power of two and divides its first pass.
+[[nodiscard]] constexpr PassRange RoundOf(std::uint64_t pass) {
+  if (pass < kFirstLongRound) return {pass, pass + 1};
+  const std::uint64_t length = std::min(std::bit_floor(pass) / 8, kLongestRound);
+  const std::uint64_t first = pass / length * length;
+  return {first, first + length};
+}
+
+// The radii of a round follow from the passes before this one, which is the first of a round.
+[[nodiscard]] constexpr std::uint64_t RadiiFrom(const PassRange& round) {
+  if (round.first == 0) return 0;
+  const std::uint64_t lag = std::max<std::uint64_t>(1, round.first / 8);
+  return RoundOf(round.first - lag).first;
+}
+
+// A slice is a part of a round that is summed by itself: a power of two of passes that begins at a
+// multiple of its length. Two slices side by side that begin at a multiple of both together make
+// the next larger one.
+[[nodiscard]] constexpr bool IsSlice(const PassRange& range) {
+  return range.last > range.first && std::has_single_bit(range.size()) &&
+         range.first % range.size() == 0 && range.last <= RoundOf(range.first).last;
+}
+// The slice with which `slice` makes the next larger one.
+[[nodiscard]] constexpr PassRange SiblingOf(const PassRange& slice) {
+  const std::uint64_t size = slice.size();
+  const std::uint64_t first = slice.first % (2 * size) == 0 ? slice.last : slice.first - size;
+  return {first, first + size};
+}
+
+}  // namespace lucerna

@@ -1,0 +1,123 @@
+#include "render/tracing/pass_slice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "render/estimate/evidence.h"
+#include "render/math/color_space.h"
+#include "render/math/kernel.h"
+
+namespace lucerna {
+namespace {
+
+// The square of a radius is a float.
+constexpr double kSmallestRadius = 1e-18;
+constexpr double kLargestRadius = 1e18;
+
+float HitpointRadius(float radius, float unit_radius) {
+  return static_cast<float>(
+      std::clamp(static_cast<double>(radius) * static_cast<double>(unit_radius), kSmallestRadius,
+                 kLargestRadius));
+}
+
+// What a pass brings to one pixel.
+struct PixelOfPass {
+  std::array<double, 3> photons{};
+  double bias = 0;
+};
+
+}  // namespace
+
+RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan) {
+  RadiusColumn of_hitpoints(pass.pixels.size());
+  const std::size_t first_caustic = of_hitpoints.size() - pass.block.caustic_rows;
+  for (std::size_t row = 0; row < of_hitpoints.size(); ++row) {
+    const float radius =
+        row < first_caustic ? (*plan.radii)[pass.pixels[row]] : plan.caustic_radius;
+    of_hitpoints[row] = HitpointRadius(radius, pass.unit_radii[row]);
+  }
+  return of_hitpoints;
+}
+
+SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums& sums,
+                      const RenderSettings& settings, const FluxScale& scale) {
+  const std::size_t rows = pass.pixels.size();
+  const std::size_t pixels = pass.direct.size();
+  LUCERNA_CHECK(sums.size() == rows && plan.radii->size() == pixels &&
+                sums.evidence().size() >= kCommonColumns);
+  const std::size_t evidence = ControllerColumns(settings.radius_controller);
+  SliceSums slice = EmptySlice({pass.pass, pass.pass + 1}, pixels, evidence);
+  slice.tally = sums.tally();
+  slice.eye_rays = pass.rays;
+  const auto set = [&](std::size_t column, std::size_t pixel, double value) {
+    slice.columns[column][pixel] = Rounded(value, PrecisionOf(column, evidence));
+  };
+
+  std::vector<PixelOfPass> brought(pixels);
+  const double luminance_per_quantum = static_cast<double>(Luminance(scale.watts_per_quantum));
+  constexpr double kToBias = 1 / (1 - static_cast<double>(kInnerShare * kInnerShare));
+  const double norm = Kernel{settings.kernel}.Norm();
+  const double per_photon = norm / static_cast<double>(plan.photons_per_pass);
+  const std::size_t first_caustic = rows - pass.block.caustic_rows;
+  const std::size_t evidence_here = sums.evidence().size() - kCommonColumns;
+  for (std::size_t row = 0; row < rows; ++row) {
+    const std::uint32_t pixel = pass.pixels[row];
+    const bool is_caustic = row >= first_caustic;
+    const float in_units = is_caustic ? plan.caustic_radius : (*plan.radii)[pixel];
+    const auto radius = static_cast<double>(HitpointRadius(in_units, pass.unit_radii[row]));
+    const double to_density = per_photon / (radius * radius);
+    PixelOfPass& of_pixel = brought[pixel];
+    for (int channel = 0; channel < 3; ++channel) {
+      const double flux = static_cast<double>(sums.flux(channel)[row]) *
+                          static_cast<double>(scale.watts_per_quantum[channel]);
+      of_pixel.photons[static_cast<std::size_t>(channel)] +=
+          static_cast<double>(pass.weights[row][channel]) * flux * to_density;
+    }
+    const double blur = static_cast<double>(sums.evidence()[kBlurColumn][row]) * kToBias;
+    of_pixel.bias += blur * luminance_per_quantum * to_density *
+                     static_cast<double>(Luminance(pass.weights[row]));
+    if (is_caustic) continue;
+    set(kPhotonCount, pixel, static_cast<double>(sums.counts()[row]));
+    const auto unit_radius = static_cast<double>(in_units);
+    set(kBlur, pixel, blur * norm / ((1 << kFluxBits) * unit_radius * unit_radius));
+    for (std::size_t column = 0; column < evidence_here; ++column) {
+      set(kSliceColumns + column, pixel,
+          static_cast<double>(sums.evidence()[kCommonColumns + column][row]));
+    }
+    if (!HasFeatures(slice.passes)) continue;
+    set(slice.first_feature() + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
+    set(slice.first_feature() + kHitpoints, pixel, 1);
+  }
+
+  const double half = pass.pass % 2 == 0 ? 1 : -1;
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    std::array<double, 3> radiance = brought[pixel].photons;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto direct = static_cast<double>(pass.direct[pixel][static_cast<int>(c)]);
+      set(kPhotonRadiance + c, pixel, radiance[c]);
+      set(kDirectRadiance + c, pixel, direct);
+      radiance[c] += direct;
+      set(kHalfDifference + c, pixel, half * radiance[c]);
+    }
+    set(kLargestLuminance, pixel,
+        std::max(0.0, WorkingLuminance(radiance[0], radiance[1], radiance[2])));
+    set(half > 0 ? kEvenBias : kOddBias, pixel, brought[pixel].bias);
+  }
+  if (HasFeatures(slice.passes)) {
+    const std::size_t first = slice.first_feature();
+    for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+      const EyeFeatures& features = pass.features[pixel];
+      if (!std::isfinite(features.distance)) continue;
+      for (int c = 0; c < 3; ++c) {
+        const auto offset = static_cast<std::size_t>(c);
+        set(first + kAlbedo + offset, pixel, static_cast<double>(features.albedo[c]));
+        set(first + kNormal + offset, pixel, static_cast<double>(features.normal[c]));
+      }
+      set(first + kDistance, pixel, static_cast<double>(features.distance));
+      set(first + kHits, pixel, 1);
+    }
+  }
+  return slice;
+}
+
+}  // namespace lucerna

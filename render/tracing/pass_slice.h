@@ -1,0 +1,35 @@
+// What does one pass bring to every pixel?
+//
+// From a pass's hitpoints and what they gathered to the pass's slice (estimate/slice_sums.h). The
+// same function wherever the pass was traced: by a worker that traced all of it, or by the
+// coordinator from the batches of several workers.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "render/estimate/accumulation.h"
+#include "render/estimate/hitpoint_block.h"
+#include "render/estimate/slice_sums.h"
+#include "render/math/fixed_point.h"
+#include "render/scene/render_settings.h"
+#include "render/tracing/hitpoint_pass.h"
+
+namespace lucerna {
+
+// What the passes of a round share.
+struct RoundPlan {
+  std::uint64_t photons_per_pass = 0;
+  std::shared_ptr<const RadiusColumn> radii;  // [pixels of the crop window] in unit radii
+  float caustic_radius = 1;                   // of all caustic hitpoints, in unit radii
+};
+
+// The radius of every hitpoint of a pass [scene units].
+[[nodiscard]] RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan);
+
+// The slice of one pass. `sums` are those of all its photons, gathered with HitpointRadii.
+[[nodiscard]] SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan,
+                                    const PassSums& sums, const RenderSettings& settings,
+                                    const FluxScale& scale);
+
+}  // namespace lucerna

@@ -1,0 +1,119 @@
+#include "render/wire/slice_codec.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "render/wire/bytes.h"
+#include "render/wire/tally_codec.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::string_view kMagic = "LSL1";
+
+// The low bits of a float that its precision leaves zero.
+unsigned int EmptyBits(std::size_t column, std::size_t evidence) {
+  return 24U - static_cast<unsigned int>(PrecisionOf(column, evidence));
+}
+
+Status Malformed(std::string_view what) {
+  return absl::InvalidArgumentError(absl::StrCat("malformed slice: ", std::string(what)));
+}
+
+// A photon that a message names must be replayable.
+Status CheckDropped(const SliceSums& slice, std::uint64_t photons_per_pass) {
+  const std::vector<PhotonKey>& named = slice.dropped_photons;
+  for (std::size_t i = 0; i < named.size(); ++i) {
+    if (named[i].pass < slice.passes.first || named[i].pass >= slice.passes.last ||
+        named[i].index >= photons_per_pass || (i > 0 && !(named[i - 1] < named[i]))) {
+      return Malformed("it names a dropped photon out of order or out of range");
+    }
+  }
+  if (named.size() != std::min<std::uint64_t>(slice.tally.dropped, kDroppedNamed)) {
+    return Malformed("it names more or fewer dropped photons than it has");
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+std::string EncodeSlice(const SliceSums& slice) {
+  ByteWriter writer;
+  writer.Bytes(kMagic);
+  writer.Varint(slice.passes.first);
+  writer.Varint(slice.passes.size());
+  writer.Varint(slice.pixels());
+  writer.Varint(slice.columns.size());
+  writer.Varint(slice.eye_rays);
+  WriteTally(writer, slice.tally);
+  writer.Varint(slice.dropped_photons.size());
+  for (const PhotonKey& photon : slice.dropped_photons) {
+    writer.Varint(photon.pass - slice.passes.first);
+    writer.Varint(photon.index);
+  }
+  std::vector<std::uint32_t> codes(slice.pixels());
+  for (std::size_t column = 0; column < slice.columns.size(); ++column) {
+    const unsigned int empty = EmptyBits(column, slice.evidence);
+    std::ranges::transform(slice.columns[column], codes.begin(), [&](float value) {
+      return std::bit_cast<std::uint32_t>(value) >> empty;
+    });
+    writer.Planes(codes);
+  }
+  return writer.Take();
+}
+
+StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape) {
+  ByteReader reader(bytes);
+  if (reader.Bytes(kMagic.size()) != kMagic) return Malformed("wrong magic or version");
+  if (reader.Varint() != shape.passes.first || reader.Varint() != shape.passes.size()) {
+    return Malformed("it is of other passes");
+  }
+  const std::size_t columns = ColumnsOf(shape.passes, shape.evidence);
+  if (reader.Varint() != shape.pixels || reader.Varint() != columns) {
+    return Malformed("it has another shape");
+  }
+  SliceSums slice;
+  slice.passes = shape.passes;
+  slice.evidence = shape.evidence;
+  slice.eye_rays = reader.Varint();
+  StatusOr<BatchTally> tally = ReadTally(reader);
+  if (!reader.ok()) return Malformed("truncated");
+  if (!tally.ok()) return Malformed(std::string(tally.status().message()));
+  slice.tally = *std::move(tally);
+  // Passes that see nothing, and all of a job without light, have no photons.
+  if (shape.photons_per_pass == 0 || slice.tally.photons % shape.photons_per_pass != 0 ||
+      slice.tally.photons / shape.photons_per_pass > shape.passes.size()) {
+    return Malformed("its counters are of another number of photons");
+  }
+  const std::uint64_t named = reader.Varint();
+  if (named > kDroppedNamed) return Malformed("it names too many dropped photons");
+  for (std::uint64_t i = 0; i < named; ++i) {
+    const std::uint64_t pass = reader.Varint();
+    slice.dropped_photons.push_back({shape.passes.first + pass, reader.Varint()});
+  }
+  if (!reader.ok()) return Malformed("truncated");
+  LUCERNA_RETURN_IF_ERROR(CheckDropped(slice, shape.photons_per_pass));
+  slice.columns.reserve(columns);
+  for (std::size_t column = 0; column < columns; ++column) {
+    const std::vector<std::uint32_t> codes = reader.Planes32(shape.pixels);
+    if (!reader.ok()) return Malformed("its columns are truncated or damaged");
+    const unsigned int empty = EmptyBits(column, shape.evidence);
+    std::vector<float>& values = slice.columns.emplace_back(shape.pixels);
+    std::uint32_t all = 0;
+    bool is_finite = true;
+    for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel) {
+      all |= codes[pixel];
+      values[pixel] = std::bit_cast<float>(codes[pixel] << empty);
+      is_finite = is_finite && values[pixel] * 0 == 0;
+    }
+    if (empty > 0 && (all >> (32 - empty)) != 0) return Malformed("a value has too many bits");
+    if (!is_finite) return Malformed("a value is not finite");
+  }
+  if (!reader.finished()) return Malformed("bytes are left over");
+  return slice;
+}
+
+}  // namespace lucerna

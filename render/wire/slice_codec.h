@@ -1,0 +1,24 @@
+// How does a slice travel?
+//
+// A short head (magic with the version, passes, pixels, counters) and the columns as byte planes:
+// three bytes a value of 16 significant bits, two for one of 8 (estimate/slice_sums.h). The same
+// slice gives the same bytes.
+//
+// Decoding checks everything: shape against what the caller expects before anything is allocated,
+// that numbers are finite, that dropped photons belong to the slice, and that no byte is left over.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "render/base/status.h"
+#include "render/estimate/slice_sums.h"
+
+namespace lucerna {
+
+[[nodiscard]] std::string EncodeSlice(const SliceSums& slice);
+
+// Errors: INVALID_ARGUMENT when `bytes` is not a slice of this shape.
+[[nodiscard]] StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape);
+
+}  // namespace lucerna

@@ -1,0 +1,407 @@
+// Slices of passes that are lent come back once, whatever becomes of their workers, and what nobody
+// was asked for is refused and changes nothing.
+#include <chrono>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/estimate/rounds.h"
+#include "render/estimate/slice_sums.h"
+#include "render/wire/block_codec.h"
+#include "render/wire/messages.h"
+#include "render/wire/slice_codec.h"
+#include "tests/service/service_under_test.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::uint64_t kPhotons = 1000;  // of RequestFor, a pass
+
+PassRange PassesOf(const v1::Lease& lease) {
+  return {lease.first(), lease.last()};
+}
+
+class SlicesTest : public testing::Test {
+ protected:
+  SlicesTest() : client_(service_), scene_(client_.Upload(SmallScene())) {}
+
+  std::string Submit(std::int64_t passes) {
+    return client_.Submit(RequestFor(scene_, absl::StrCat("job ", ++requests_), passes))
+        .message.job_id();
+  }
+
+  // Commits what it is lent until that is of a round that begins at `pass` or later.
+  std::optional<v1::Lease> TakeSliceFrom(IdleHandsWorker& worker, std::uint64_t pass) {
+    while (std::optional<v1::Lease> lease = worker.TakeLease()) {
+      if (lease->pass() >= pass) return lease;
+      const auto committed = worker.Commit(*lease);
+      EXPECT_TRUE(committed.ok()) << committed.status.error_message();
+    }
+    return std::nullopt;
+  }
+
+  v1::CommitOutcome Outcome(IdleHandsWorker& worker, const v1::Lease& lease) {
+    const auto committed = worker.Commit(lease);
+    EXPECT_TRUE(committed.ok()) << committed.status.error_message();
+    return committed.message.outcome();
+  }
+
+  std::uint64_t PhotonsOf(const std::string& job) {
+    return client_.Get(job).message.progress().photons();
+  }
+
+  ServiceUnderTest service_;
+  TestClient client_;
+  v1::SceneManifest scene_;
+  int requests_ = 0;
+};
+
+TEST_F(SlicesTest, AJobIsLentAsASplitPassAndThenInSlicesOfItsRounds) {
+  const std::string job = Submit(41);
+  IdleHandsWorker worker(service_);
+  std::set<std::uint64_t> passes;
+  while (client_.Get(job).message.state() < v1::JOB_STATE_SUCCEEDED) {
+    const auto answer = worker.Sync(true, Duration::zero());
+    ASSERT_TRUE(answer.ok());
+    if (!answer.message.has_lease()) continue;
+    const v1::Lease& lease = answer.message.lease();
+    EXPECT_EQ(lease.job_id(), job);
+    EXPECT_EQ(lease.photons_per_pass(), kPhotons);
+    if (lease.pass() == 0) {
+      EXPECT_EQ(lease.kind(), v1::WORK_KIND_PHOTONS);
+      EXPECT_EQ(lease.last(), kPhotons);
+      EXPECT_TRUE(passes.insert(0).second);
+    } else {
+      ASSERT_EQ(lease.kind(), v1::WORK_KIND_PASSES);
+      EXPECT_TRUE(IsSlice(PassesOf(lease))) << lease.first() << " " << lease.last();
+      EXPECT_EQ(RoundOf(lease.first()).first, lease.pass());
+      EXPECT_LE(lease.last(), 41U) << "no pass that is not wanted";
+      EXPECT_GT(lease.caustic_radius(), 0);
+      EXPECT_TRUE(lease.block_digest().empty());
+      const auto radii = DecodeRadii(worker.Fetch(lease.radii_digest()).message, kSmallScenePixels);
+      ASSERT_TRUE(radii.ok()) << radii.status();
+      EXPECT_EQ(radii->size(), kSmallScenePixels);
+      for (std::uint64_t pass = lease.first(); pass < lease.last(); ++pass)
+        EXPECT_TRUE(passes.insert(pass).second) << pass;
+    }
+    EXPECT_EQ(Outcome(worker, lease), v1::COMMIT_OUTCOME_ACCEPTED);
+  }
+  EXPECT_EQ(passes.size(), 41U);
+  EXPECT_EQ(*passes.rbegin(), 40U);
+  const v1::Job ended = client_.Get(job).message;
+  EXPECT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
+  EXPECT_EQ(ended.progress().photons(), 41 * kPhotons);
+  EXPECT_EQ(ended.progress().passes(), 41);
+}
+
+TEST_F(SlicesTest, AJobIsDescribedAlsoAfterItsEndAndAnUnknownOneIsNot) {
+  const std::string job = Submit(2);
+  IdleHandsWorker worker(service_);
+  EXPECT_EQ(worker.DescribeJob("unknown").code(), grpc::StatusCode::NOT_FOUND);
+  const std::optional<v1::Lease> lease = worker.TakeLease();
+  ASSERT_TRUE(lease);
+  const auto described = worker.DescribeJob(lease->job_id());
+  ASSERT_TRUE(described.ok()) << described.status.error_message();
+  EXPECT_EQ(described.message.scene().SerializeAsString(), scene_.SerializeAsString());
+  EXPECT_EQ(described.message.numeric_profile(), ServiceUnderTest::kNumericProfile);
+  EXPECT_EQ(Outcome(worker, *lease), v1::COMMIT_OUTCOME_ACCEPTED);
+  const WorkerThread diligent(service_);
+  ASSERT_TRUE(client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).ok());
+  EXPECT_TRUE(worker.DescribeJob(job).ok());
+}
+
+TEST_F(SlicesTest, ASliceCountsOnce) {
+  const std::string job = Submit(100);
+  IdleHandsWorker worker(service_);
+  const auto slice = TakeSliceFrom(worker, 32);
+  ASSERT_TRUE(slice);
+  const std::uint64_t before = PhotonsOf(job);
+  EXPECT_EQ(Outcome(worker, *slice), v1::COMMIT_OUTCOME_ACCEPTED);
+  const v1::CommitOutcome second = Outcome(worker, *slice);
+  EXPECT_TRUE(second == v1::COMMIT_OUTCOME_DUPLICATE || second == v1::COMMIT_OUTCOME_SUPERSEDED);
+  EXPECT_EQ(PhotonsOf(job), before + kPhotons * PassesOf(*slice).size());
+}
+
+// The slice went to another worker meanwhile; the first to come counts.
+TEST_F(SlicesTest, ASliceThatComesLateCountsWhenItIsTheFirst) {
+  const std::string job = Submit(100);
+  IdleHandsWorker late(service_);
+  const auto lease = TakeSliceFrom(late, 32);
+  ASSERT_TRUE(lease);
+  const std::uint64_t before = PhotonsOf(job);
+  service_.clock().Move(std::chrono::seconds(11));
+  IdleHandsWorker other(service_);
+  std::optional<v1::Lease> again = other.TakeLease();
+  for (int i = 0; i < 1000 && again && again->first() != lease->first(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    again = other.TakeLease();
+  }
+  ASSERT_TRUE(again);
+  ASSERT_EQ(PassesOf(*again), PassesOf(*lease)) << "the same slice, however many workers there are";
+  const auto revoked = late.Sync(false, std::chrono::seconds(5), {lease->lease_id()});
+  ASSERT_EQ(revoked.message.revoked_lease_ids_size(), 1);
+  EXPECT_EQ(Outcome(late, *lease), v1::COMMIT_OUTCOME_ACCEPTED);
+  EXPECT_NE(Outcome(other, *again), v1::COMMIT_OUTCOME_ACCEPTED);
+  EXPECT_EQ(PhotonsOf(job), before + kPhotons * PassesOf(*lease).size());
+}
+
+TEST_F(SlicesTest, SlicesOfAConnectionThatBreaksGoBackWithoutAnyTimePassing) {
+  Submit(100);
+  IdleHandsWorker lost(service_);
+  const auto lease = TakeSliceFrom(lost, 32);
+  ASSERT_TRUE(lease);
+  IdleHandsWorker other(service_);
+  std::optional<v1::Lease> found;
+  for (int i = 0; i < 20 && !found; ++i) {
+    grpc::ClientContext context;
+    std::thread heartbeat([&] {
+      const auto answer = lost.Sync(false, std::chrono::seconds(5), {lease->lease_id()}, &context);
+      EXPECT_EQ(answer.code(), grpc::StatusCode::CANCELLED);
+    });
+    // Long enough for the call to arrive, else it is made again.
+    std::this_thread::sleep_for(std::chrono::milliseconds(50 * (i + 1)));
+    context.TryCancel();
+    heartbeat.join();
+    for (int tries = 0; tries < 100 && !found; ++tries) {
+      const auto answer = other.Sync(true, Duration::zero());
+      if (answer.message.has_lease() && answer.message.lease().first() == lease->first()) {
+        found = answer.message.lease();
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+  ASSERT_TRUE(found);
+  EXPECT_EQ(PassesOf(*found), PassesOf(*lease));
+  EXPECT_EQ(Outcome(other, *found), v1::COMMIT_OUTCOME_ACCEPTED);
+}
+
+TEST_F(SlicesTest, ASliceThatWasNotAskedForIsRefusedAndChangesNothing) {
+  const std::string job = Submit(100);
+  IdleHandsWorker worker(service_);
+  const auto lease = TakeSliceFrom(worker, 32);
+  ASSERT_TRUE(lease);
+  ASSERT_EQ(lease->first(), 32U);
+  const std::uint64_t before = PhotonsOf(job);
+  const auto refuses = [&](const v1::Lease& forged, const std::string& bytes) {
+    const auto answer = worker.CommitBytes(forged, bytes);
+    EXPECT_EQ(PhotonsOf(job), before);
+    return answer.code() == grpc::StatusCode::INVALID_ARGUMENT;
+  };
+  const std::string good = worker.ResultOf(*lease);
+  // Ranges that are no slice of the round.
+  for (const auto& [first, last] :
+       std::vector<std::pair<std::uint64_t, std::uint64_t>>{{33, 35},
+                                                            {32, 35},
+                                                            {32, 32},
+                                                            {34, 32},
+                                                            {36, 40},
+                                                            {28, 32},
+                                                            {32, 40},
+                                                            {0, 1},
+                                                            {32, ~std::uint64_t{0}}}) {
+    v1::Lease forged = *lease;
+    forged.set_first(first);
+    forged.set_last(last);
+    EXPECT_TRUE(refuses(forged, good)) << first << " " << last;
+  }
+  // Passes that the bytes do not have.
+  v1::Lease narrower = *lease;
+  narrower.set_last(33);
+  ASSERT_NE(PassesOf(narrower), PassesOf(*lease));
+  EXPECT_EQ(worker.CommitBytes(narrower, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
+  EXPECT_TRUE(refuses(*lease, worker.ResultOf(narrower)));
+  // Photons that were not asked for.
+  v1::Lease of_more_photons = *lease;
+  of_more_photons.set_photons_per_pass(kPhotons + 1);
+  EXPECT_TRUE(refuses(*lease, worker.ResultOf(of_more_photons)));
+  of_more_photons.set_photons_per_pass(2 * kPhotons);
+  EXPECT_TRUE(refuses(*lease, worker.ResultOf(of_more_photons)));
+  // An image of another size, and columns of another job's controller.
+  for (const auto& [pixels, evidence] : std::vector<std::pair<std::size_t, std::size_t>>{
+           {kSmallScenePixels + 1, 0}, {0, 0}, {kSmallScenePixels, 2}}) {
+    SliceSums slice = EmptySlice(PassesOf(*lease), pixels, evidence);
+    slice.tally.photons = kPhotons * slice.passes.size();
+    EXPECT_TRUE(refuses(*lease, EncodeSlice(slice))) << pixels << " " << evidence;
+  }
+  // No slice at all, and more bytes than a slice has.
+  EXPECT_TRUE(refuses(*lease, "LSL1 and then nothing of sense"));
+  EXPECT_TRUE(refuses(*lease, ""));
+  EXPECT_TRUE(refuses(*lease, good + "more"));
+  EXPECT_TRUE(refuses(*lease, std::string(1'000'000, 'x')));
+  v1::Lease of_no_kind = *lease;
+  of_no_kind.set_kind(v1::WORK_KIND_UNSPECIFIED);
+  EXPECT_TRUE(refuses(of_no_kind, good));
+  // Photons of a pass that is not split, and slices of rounds and jobs that are not open.
+  v1::Lease elsewhere = *lease;
+  elsewhere.set_kind(v1::WORK_KIND_PHOTONS);
+  EXPECT_EQ(worker.CommitBytes(elsewhere, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
+  elsewhere = *lease;
+  elsewhere.set_pass(8);
+  EXPECT_EQ(worker.CommitBytes(elsewhere, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
+  elsewhere.set_pass(33);
+  EXPECT_EQ(worker.CommitBytes(elsewhere, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
+  elsewhere = *lease;
+  elsewhere.set_job_id("another job");
+  EXPECT_EQ(worker.CommitBytes(elsewhere, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
+  EXPECT_EQ(PhotonsOf(job), before);
+  EXPECT_EQ(worker.CommitBytes(*lease, good).message.outcome(), v1::COMMIT_OUTCOME_ACCEPTED);
+}
+
+// A slice that overlaps one that has come would count passes twice.
+TEST_F(SlicesTest, APartOfASliceIsNotWhatWasLent) {
+  const std::string job = Submit(100);
+  IdleHandsWorker worker(service_);
+  const auto lease = TakeSliceFrom(worker, 32);
+  ASSERT_TRUE(lease);
+  const PassRange whole = PassesOf(*lease);
+  ASSERT_GE(whole.size(), 2U);
+  const auto commit = [&](const PassRange& passes) {
+    v1::Lease of_part = *lease;
+    of_part.set_first(passes.first);
+    of_part.set_last(passes.last);
+    return worker.Commit(of_part).message.outcome();
+  };
+  const std::uint64_t before = PhotonsOf(job);
+  EXPECT_EQ(commit({whole.first, whole.first + 1}), v1::COMMIT_OUTCOME_SUPERSEDED);
+  EXPECT_EQ(commit({whole.last - 1, whole.last}), v1::COMMIT_OUTCOME_SUPERSEDED);
+  EXPECT_EQ(PhotonsOf(job), before);
+  EXPECT_EQ(commit(whole), v1::COMMIT_OUTCOME_ACCEPTED);
+  EXPECT_NE(commit({whole.first, whole.first + 1}), v1::COMMIT_OUTCOME_ACCEPTED);
+  EXPECT_NE(commit(whole), v1::COMMIT_OUTCOME_ACCEPTED);
+  EXPECT_EQ(PhotonsOf(job), before + whole.size() * kPhotons);
+}
+
+TEST_F(SlicesTest, ASliceThatIsGivenUpAgainAndAgainFailsItsJobAndSaysWhichPasses) {
+  const std::string job = Submit(100);
+  IdleHandsWorker worker(service_);
+  std::optional<v1::Lease> lease = TakeSliceFrom(worker, 32);
+  ASSERT_TRUE(lease);
+  const std::string passes = absl::StrCat("passes ", lease->first(), " to ", lease->last());
+  for (int i = 0; i < 1000 && client_.Get(job).message.state() < v1::JOB_STATE_SUCCEEDED; ++i) {
+    const auto answer = worker.Sync(true, Duration::zero());
+    ASSERT_TRUE(answer.ok());
+    if (answer.message.has_lease()) {
+      ASSERT_TRUE(worker.GiveUp(answer.message.lease(), "on purpose").ok());
+    }
+  }
+  const v1::Job failed = client_.Get(job).message;
+  EXPECT_EQ(failed.state(), v1::JOB_STATE_FAILED);
+  EXPECT_NE(failed.failure().find(passes), std::string::npos) << failed.failure();
+  EXPECT_NE(failed.failure().find("on purpose"), std::string::npos) << failed.failure();
+}
+
+// The passes that have come without a gap count, also those of a round that is not whole.
+TEST_F(SlicesTest, AJobThatIsStoppedKeepsThePassesOfARoundThatIsNotWhole) {
+  const std::string job = Submit(100);
+  // So many that slices are single passes.
+  std::vector<std::unique_ptr<IdleHandsWorker>> workers;
+  for (int i = 0; i < 4; ++i)
+    workers.push_back(std::make_unique<IdleHandsWorker>(service_));
+  std::vector<v1::Lease> leases = {TakeSliceFrom(*workers[0], 32).value()};
+  for (std::size_t i = 1; i < 3; ++i)
+    leases.push_back(workers[i]->TakeLease().value());
+  ASSERT_EQ(PassesOf(leases[0]), (PassRange{32, 33}));
+  ASSERT_EQ(PassesOf(leases[2]), (PassRange{34, 35}));
+  ASSERT_EQ(Outcome(*workers[0], leases[0]), v1::COMMIT_OUTCOME_ACCEPTED);
+  // Beyond a gap.
+  ASSERT_EQ(Outcome(*workers[2], leases[2]), v1::COMMIT_OUTCOME_ACCEPTED);
+  EXPECT_TRUE(client_.Stop(job).ok());
+  const v1::Job stopped = client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message;
+  EXPECT_EQ(stopped.progress().passes(), 33);
+  EXPECT_TRUE(client_.Image(job).ok());
+  // It goes on from there: the pass of the tail is not traced again.
+  EXPECT_TRUE(client_.Extend(job, 40).ok());
+  const WorkerThread diligent(service_);
+  const v1::Job ended = client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message;
+  EXPECT_EQ(ended.stop_reason(), v1::STOP_REASON_PASSES);
+  EXPECT_EQ(ended.progress().passes(), 40);
+  // The pass beyond the gap was traced for nothing.
+  EXPECT_EQ(ended.progress().photons(), 41 * kPhotons);
+}
+
+// Three workers and more share the photons of the first passes, and whole passes later on.
+TEST_F(SlicesTest, EarlyPassesAreSplitWhenThereAreManyWorkers) {
+  std::vector<std::unique_ptr<IdleHandsWorker>> workers;
+  for (int i = 0; i < 3; ++i)
+    workers.push_back(std::make_unique<IdleHandsWorker>(service_));
+  const std::string job = Submit(40);
+  std::map<std::uint64_t, v1::WorkKind> kinds;  // by round
+  for (std::size_t i = 0; client_.Get(job).message.state() < v1::JOB_STATE_SUCCEEDED; ++i) {
+    const auto answer = workers[i % workers.size()]->Sync(true, Duration::zero());
+    ASSERT_TRUE(answer.ok());
+    if (!answer.message.has_lease()) continue;
+    const v1::Lease& lease = answer.message.lease();
+    const auto [found, is_new] = kinds.emplace(lease.pass(), lease.kind());
+    EXPECT_EQ(found->second, lease.kind());
+    EXPECT_EQ(Outcome(*workers[i % workers.size()], lease), v1::COMMIT_OUTCOME_ACCEPTED);
+  }
+  EXPECT_EQ(client_.Get(job).message.state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(kinds[0], v1::WORK_KIND_PHOTONS);
+  // Of pass 1, two passes can be out at once, of pass 16 four.
+  EXPECT_EQ(kinds[1], v1::WORK_KIND_PHOTONS);
+  EXPECT_EQ(kinds[16], v1::WORK_KIND_PASSES);
+  EXPECT_EQ(PhotonsOf(job), 40 * kPhotons);
+}
+
+// A worker that sends a whole pass where photons were asked for must not take the pass away from
+// under those who have its photons.
+TEST_F(SlicesTest, ASliceOfAPassThatIsSplitIsRefused) {
+  const std::string job = Submit(3);
+  IdleHandsWorker worker(service_);
+  std::optional<v1::Lease> lease = worker.TakeLease();
+  while (lease && lease->pass() > 0)
+    lease = worker.TakeLease();
+  ASSERT_TRUE(lease);
+  ASSERT_EQ(lease->kind(), v1::WORK_KIND_PHOTONS);
+  v1::Lease forged = *lease;
+  forged.set_kind(v1::WORK_KIND_PASSES);
+  forged.set_first(0);
+  forged.set_last(1);
+  SliceSums slice = EmptySlice({0, 1}, kSmallScenePixels, 0);
+  slice.tally.photons = kPhotons;
+  EXPECT_NE(worker.CommitBytes(forged, EncodeSlice(slice)).message.outcome(),
+            v1::COMMIT_OUTCOME_ACCEPTED);
+  EXPECT_EQ(PhotonsOf(job), 0U);
+  EXPECT_EQ(Outcome(worker, *lease), v1::COMMIT_OUTCOME_ACCEPTED);
+  const WorkerThread diligent(service_);
+  EXPECT_EQ(client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message.progress().photons(),
+            3 * kPhotons);
+}
+
+// A slice is still with its worker when its job ends. More workers come, the job goes on, and its
+// first round is split among them; then the slice comes after all.
+TEST_F(SlicesTest, ASliceOfARunThatIsOverIsHarmlessToTheNextRun) {
+  const std::string job = Submit(100);
+  IdleHandsWorker slow(service_);
+  const auto late = TakeSliceFrom(slow, 8);
+  ASSERT_TRUE(late);
+  ASSERT_EQ(late->first(), 8U);
+  EXPECT_TRUE(client_.Stop(job).ok());
+  ASSERT_TRUE(client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).ok());
+  std::vector<std::unique_ptr<IdleHandsWorker>> more;
+  for (int i = 0; i < 6; ++i)
+    more.push_back(std::make_unique<IdleHandsWorker>(service_));
+  EXPECT_TRUE(client_.Extend(job, 30).ok());
+  // Passes before it may have come and not been taken in when the job was stopped.
+  const std::optional<v1::Lease> photons = TakeSliceFrom(*more[0], 8);
+  ASSERT_TRUE(photons);
+  ASSERT_EQ(photons->kind(), v1::WORK_KIND_PHOTONS);
+  const auto committed = slow.Commit(*late);
+  EXPECT_TRUE(committed.ok() || committed.code() == grpc::StatusCode::INVALID_ARGUMENT)
+      << committed.status.error_message();
+  EXPECT_TRUE(more[0]->Commit(*photons).ok());
+  const WorkerThread diligent(service_);
+  const v1::Job ended = client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message;
+  EXPECT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
+  EXPECT_TRUE(client_.Image(job).ok());
+}
+
+}  // namespace
+}  // namespace lucerna

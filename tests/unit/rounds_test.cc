@@ -1,0 +1,65 @@
+// Do rounds, their lag and their slices keep what estimate/rounds.h promises, for every pass?
+#include "render/estimate/rounds.h"
+
+#include <gtest/gtest.h>
+
+namespace lucerna {
+namespace {
+
+TEST(RoundsTest, CoverEveryPassOnceAndInOrder) {
+  std::uint64_t next = 0;
+  while (next < 100'000) {
+    const PassRange round = RoundOf(next);
+    ASSERT_EQ(round.first, next);
+    ASSERT_GT(round.last, round.first);
+    for (std::uint64_t pass = round.first; pass < round.last; ++pass)
+      ASSERT_EQ(RoundOf(pass), round);
+    ASSERT_TRUE(IsSlice(round));
+    next = round.last;
+  }
+}
+
+TEST(RoundsTest, AreOneEighthOfThePassesBeforeThemAtMost) {
+  for (std::uint64_t pass = kFirstLongRound; pass < 10'000; ++pass) {
+    const PassRange round = RoundOf(pass);
+    EXPECT_LE(8 * round.size(), round.first);
+    EXPECT_LE(round.size(), kLongestRound);
+    if (round.size() < kLongestRound) {
+      EXPECT_GT(16 * round.size(), round.first);
+    }
+  }
+}
+
+// A round's radii follow from whole rounds, at least an eighth of the passes before it, and no more
+// than a quarter and a round.
+TEST(RoundsTest, LagAnEighthBehind) {
+  EXPECT_EQ(RadiiFrom(RoundOf(0)), 0U);
+  EXPECT_EQ(RadiiFrom(RoundOf(1)), 0U);
+  EXPECT_EQ(RadiiFrom(RoundOf(2)), 1U);
+  for (std::uint64_t pass = 2; pass < 10'000; ++pass) {
+    const PassRange round = RoundOf(pass);
+    const std::uint64_t from = RadiiFrom(round);
+    EXPECT_EQ(RoundOf(from).first, from);
+    EXPECT_LE(from, round.first - std::max<std::uint64_t>(1, round.first / 8));
+    EXPECT_GE(4 * from + 4 * round.size(), 3 * round.first) << pass;
+    if (from > 0) {
+      EXPECT_LE(RadiiFrom(RoundOf(round.first - 1)), from);
+    }
+  }
+}
+
+TEST(RoundsTest, SlicesArePowersOfTwoWithinARound) {
+  EXPECT_TRUE(IsSlice({64, 72}));
+  EXPECT_TRUE(IsSlice({68, 72}));
+  EXPECT_TRUE(IsSlice({70, 71}));
+  EXPECT_FALSE(IsSlice({66, 70}));
+  EXPECT_FALSE(IsSlice({64, 67}));
+  EXPECT_FALSE(IsSlice({64, 64}));
+  EXPECT_FALSE(IsSlice({64, 80}));  // two rounds
+  EXPECT_EQ(SiblingOf({68, 70}), (PassRange{70, 72}));
+  EXPECT_EQ(SiblingOf({70, 72}), (PassRange{68, 70}));
+  EXPECT_EQ(SiblingOf({64, 68}), (PassRange{68, 72}));
+}
+
+}  // namespace
+}  // namespace lucerna

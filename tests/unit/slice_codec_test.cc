@@ -1,0 +1,228 @@
+// A slice must come back to the last bit, cost few bytes, and be refused when it is anything but
+// what an encoder of ours wrote for the slice that was asked for.
+#include "render/wire/slice_codec.h"
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/estimate/evidence.h"
+#include "render/math/rng.h"
+#include "render/wire/bytes.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::uint64_t kPhotons = 1000;
+
+SliceShape Shape(const PassRange& passes, std::size_t pixels, std::size_t evidence) {
+  return {.passes = passes, .pixels = pixels, .evidence = evidence, .photons_per_pass = kPhotons};
+}
+
+// Numbers of both signs and of many magnitudes, zeros among them, in every column.
+SliceSums RandomSlice(const SliceShape& shape) {
+  SliceSums slice = EmptySlice(shape.passes, shape.pixels, shape.evidence);
+  KeyedRng rng(CombineKeys(11, shape.passes.first));
+  for (std::size_t column = 0; column < slice.columns.size(); ++column) {
+    for (float& value : slice.columns[column]) {
+      if (rng.Bits() % 4 == 0) continue;
+      const double sign = rng.Bits() % 2 == 0 ? 1 : -1;
+      value = Rounded(sign * std::exp(60 * static_cast<double>(rng.Uniform()) - 30),
+                      PrecisionOf(column, shape.evidence));
+    }
+  }
+  slice.eye_rays = 12'345;
+  slice.tally = {.photons = kPhotons * shape.passes.size(),
+                 .rays = std::uint64_t{1} << 60,
+                 .deposits = 2000,
+                 .pairs = 5000,
+                 .dropped = 2,
+                 .excess = 2,
+                 .energy = {.emitted = 4'096'000,
+                            .roulette_gain = 5,
+                            .roulette_loss = 1'000'000,
+                            .absorbed = -6,
+                            .escaped = 3'096'000,
+                            .smoothing = -1,
+                            .cut_off = 7,
+                            .dropped = 5},
+                 .lights = {{.sent = 700, .in_view = {3, 650}}, {.sent = 300}}};
+  slice.dropped_photons = {{shape.passes.first, 41}, {shape.passes.last - 1, kPhotons - 1}};
+  return slice;
+}
+
+TEST(SliceCodecTest, BringsSlicesOfAllShapesBack) {
+  for (const PassRange& passes : {PassRange{0, 1}, PassRange{15, 16}, PassRange{16, 18},
+                                  PassRange{40, 44}, PassRange{512, 576}}) {
+    for (const std::size_t evidence :
+         {std::size_t{0}, std::size_t{kCurvatureColumns}, std::size_t{kSectors}}) {
+      for (const std::size_t pixels : {std::size_t{1}, std::size_t{777}}) {
+        const SliceShape shape = Shape(passes, pixels, evidence);
+        const SliceSums slice = RandomSlice(shape);
+        const std::string bytes = EncodeSlice(slice);
+        const auto decoded = DecodeSlice(bytes, shape);
+        ASSERT_TRUE(decoded.ok()) << decoded.status() << ", from pass " << passes.first;
+        EXPECT_EQ(*decoded, slice);
+        EXPECT_EQ(EncodeSlice(*decoded), bytes) << "the same slice gives the same bytes";
+      }
+    }
+  }
+}
+
+// Each column keeps its largest, its smallest and its negative zero.
+TEST(SliceCodecTest, BringsTheEndsOfEveryColumnBack) {
+  const SliceShape shape = Shape({3, 4}, 6, kSectors);
+  SliceSums slice = RandomSlice(shape);
+  for (std::size_t column = 0; column < slice.columns.size(); ++column) {
+    const Precision precision = PrecisionOf(column, shape.evidence);
+    slice.columns[column] = {
+        Rounded(1e300, precision),
+        Rounded(-1e300, precision),
+        Rounded(std::numeric_limits<double>::denorm_min(), precision),
+        -0.0F,
+        std::bit_cast<float>(std::uint32_t{1} << (24 - static_cast<int>(precision))),
+        1};
+  }
+  const auto decoded = DecodeSlice(EncodeSlice(slice), shape);
+  ASSERT_TRUE(decoded.ok()) << decoded.status();
+  for (std::size_t column = 0; column < slice.columns.size(); ++column) {
+    for (std::size_t row = 0; row < shape.pixels; ++row) {
+      EXPECT_EQ(std::bit_cast<std::uint32_t>(decoded->At(column, row)),
+                std::bit_cast<std::uint32_t>(slice.At(column, row)))
+          << column << " " << row;
+    }
+  }
+}
+
+// Three bytes for 16 significant bits with exponent and sign, two for 8: at most 40 bytes a pixel
+// of a slice without evidence or features, whatever the numbers.
+TEST(SliceCodecTest, TakesAtMostFortyBytesAPixel) {
+  const SliceShape shape = Shape({64, 72}, 10'000, 0);
+  const std::string bytes = EncodeSlice(RandomSlice(shape));
+  EXPECT_LE(static_cast<double>(bytes.size()), 40.0 * static_cast<double>(shape.pixels) + 1000);
+  // Of a slice in which nothing was found, next to nothing.
+  SliceSums dark = EmptySlice(shape.passes, shape.pixels, shape.evidence);
+  dark.tally.photons = kPhotons * shape.passes.size();
+  EXPECT_LE(EncodeSlice(dark).size(), 1000U);
+}
+
+TEST(SliceCodecTest, RefusesASliceThatWasNotAskedFor) {
+  const SliceShape shape = Shape({16, 18}, 20, kSectors);
+  const std::string bytes = EncodeSlice(RandomSlice(shape));
+  ASSERT_TRUE(DecodeSlice(bytes, shape).ok());
+  const auto refuses = [&](SliceShape other) {
+    return absl::IsInvalidArgument(DecodeSlice(bytes, other).status());
+  };
+  SliceShape other = shape;
+  other.passes = {18, 20};
+  EXPECT_TRUE(refuses(other));
+  other.passes = {16, 17};
+  EXPECT_TRUE(refuses(other));
+  other = shape;
+  other.pixels = 19;
+  EXPECT_TRUE(refuses(other));
+  other.pixels = 21;
+  EXPECT_TRUE(refuses(other));
+  other = shape;
+  other.evidence = kCurvatureColumns;
+  EXPECT_TRUE(refuses(other));
+  other = shape;
+  other.photons_per_pass = kPhotons / 2;
+  EXPECT_TRUE(refuses(other));
+  EXPECT_TRUE(absl::IsInvalidArgument(DecodeSlice(bytes + '\0', shape).status()));
+  EXPECT_TRUE(absl::IsInvalidArgument(DecodeSlice("LAC1", shape).status()));
+  EXPECT_TRUE(absl::IsInvalidArgument(DecodeSlice("", shape).status()));
+}
+
+TEST(SliceCodecTest, RefusesNumbersThatAreNotFinite) {
+  const SliceShape shape = Shape({16, 18}, 20, kSectors);
+  for (const float value :
+       {std::numeric_limits<float>::infinity(), -std::numeric_limits<float>::infinity(),
+        std::numeric_limits<float>::quiet_NaN()}) {
+    for (std::size_t column = 0; column < ColumnsOf(shape.passes, shape.evidence); ++column) {
+      SliceSums slice = RandomSlice(shape);
+      slice.columns[column][7] = value;
+      EXPECT_TRUE(absl::IsInvalidArgument(DecodeSlice(EncodeSlice(slice), shape).status()))
+          << value << " in column " << column;
+    }
+  }
+}
+
+// The planes of a column may hold more bits than its precision has; what remained after the shift
+// would be another number.
+TEST(SliceCodecTest, RefusesAValueWithTooManyBits) {
+  const SliceShape shape = Shape({16, 17}, 2, 0);
+  const auto bytes_with = [&](std::uint32_t radiance, std::uint32_t statistic) {
+    ByteWriter writer;
+    SliceSums head = EmptySlice(shape.passes, 0, 0);
+    head.columns.clear();
+    head.tally.photons = kPhotons;
+    // The head of a slice of 2 pixels: that of none, with two numbers changed.
+    writer.Bytes("LSL1");
+    writer.Varint(shape.passes.first);
+    writer.Varint(shape.passes.size());
+    writer.Varint(shape.pixels);
+    writer.Varint(kSliceColumns);
+    const std::string of_none = EncodeSlice(head);
+    writer.Bytes(std::string_view(of_none).substr(4 + 4));
+    for (std::size_t column = 0; column < kSliceColumns; ++column) {
+      const bool is_radiance = PrecisionOf(column, 0) == Precision::kRadiance;
+      const std::vector<std::uint32_t> codes = {0, is_radiance ? radiance : statistic};
+      writer.Planes(codes);
+    }
+    return writer.Take();
+  };
+  EXPECT_TRUE(DecodeSlice(bytes_with(0xBF8000, 0xBF80), shape).ok());
+  EXPECT_FALSE(DecodeSlice(bytes_with(0x1000000, 0), shape).ok());
+  EXPECT_FALSE(DecodeSlice(bytes_with(0, 0x10000), shape).ok());
+}
+
+// Whoever is told to replay a photon must find it.
+TEST(SliceCodecTest, RefusesDroppedPhotonsThatItsPassesDoNotHave) {
+  const SliceShape shape = Shape({16, 18}, 3, 0);
+  const auto status_with = [&](std::uint64_t dropped, std::vector<PhotonKey> named) {
+    SliceSums slice = RandomSlice(shape);
+    slice.tally.dropped = dropped;
+    slice.dropped_photons = std::move(named);
+    return DecodeSlice(EncodeSlice(slice), shape).status();
+  };
+  EXPECT_TRUE(status_with(1, {{16, 0}}).ok());
+  EXPECT_TRUE(status_with(1, {{17, kPhotons - 1}}).ok());
+  EXPECT_TRUE(absl::IsInvalidArgument(status_with(1, {{15, 0}})));
+  EXPECT_TRUE(absl::IsInvalidArgument(status_with(1, {{18, 0}})));
+  EXPECT_TRUE(absl::IsInvalidArgument(status_with(1, {{16, kPhotons}})));
+  EXPECT_TRUE(absl::IsInvalidArgument(status_with(2, {{16, 5}, {16, 5}})));
+  EXPECT_TRUE(absl::IsInvalidArgument(status_with(2, {{17, 0}, {16, 5}})));
+  EXPECT_TRUE(absl::IsInvalidArgument(status_with(2, {{16, 5}})));
+  EXPECT_TRUE(absl::IsInvalidArgument(status_with(0, {{16, 5}})));
+  std::vector<PhotonKey> many;
+  for (std::uint64_t index = 0; index < kDroppedNamed; ++index)
+    many.push_back({16, index});
+  EXPECT_TRUE(status_with(100, many).ok());
+  many.push_back({17, 0});
+  EXPECT_TRUE(absl::IsInvalidArgument(status_with(100, many)));
+}
+
+TEST(SliceCodecTest, RefusesCountersThatContradictEachOther) {
+  const SliceShape shape = Shape({16, 18}, 3, 0);
+  SliceSums slice = RandomSlice(shape);
+  slice.tally.energy.escaped += 1;
+  EXPECT_TRUE(absl::IsInvalidArgument(DecodeSlice(EncodeSlice(slice), shape).status()));
+  slice = RandomSlice(shape);
+  slice.tally.lights[0].in_view[0] = slice.tally.lights[0].sent + 1;
+  EXPECT_TRUE(absl::IsInvalidArgument(DecodeSlice(EncodeSlice(slice), shape).status()));
+  slice = RandomSlice(shape);
+  slice.tally.photons -= 1;
+  EXPECT_TRUE(absl::IsInvalidArgument(DecodeSlice(EncodeSlice(slice), shape).status()));
+  slice = RandomSlice(shape);
+  slice.tally.lights.assign(kMaxLightTallies + 1, {.sent = 1});
+  EXPECT_TRUE(absl::IsInvalidArgument(DecodeSlice(EncodeSlice(slice), shape).status()));
+}
+
+}  // namespace
+}  // namespace lucerna

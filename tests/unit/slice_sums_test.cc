@@ -1,0 +1,142 @@
+// Are slices the same sums, whoever adds up what, and as exact as they say?
+#include "render/estimate/slice_sums.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "render/estimate/image_sums.h"
+#include "render/estimate/slice_tree.h"
+#include "render/math/rng.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::size_t kPixels = 64;
+constexpr std::size_t kEvidence = 2;
+
+// A pass of random columns.
+SliceSums RandomPass(std::uint64_t pass) {
+  SliceSums slice = EmptySlice({pass, pass + 1}, kPixels, kEvidence);
+  KeyedRng rng(CombineKeys(7, pass));
+  for (std::size_t column = 0; column < slice.columns.size(); ++column) {
+    if (column == kSquaredDeviations) continue;
+    for (float& value : slice.columns[column]) {
+      const double number = std::exp(8.0 * static_cast<double>(rng.Uniform()) - 4.0);
+      value = Rounded(number, PrecisionOf(column, kEvidence));
+    }
+  }
+  slice.tally.photons = 10 + pass;
+  slice.eye_rays = pass;
+  return slice;
+}
+
+double LuminanceAt(const SliceSums& slice, std::size_t pixel) {
+  const auto at = [&](std::size_t column) { return static_cast<double>(slice.At(column, pixel)); };
+  return WorkingLuminance(at(kPhotonRadiance) + at(kDirectRadiance),
+                          at(kPhotonRadiance + 1) + at(kDirectRadiance + 1),
+                          at(kPhotonRadiance + 2) + at(kDirectRadiance + 2));
+}
+
+TEST(SliceSumsTest, RoundsToNearestWithTiesToEven) {
+  EXPECT_EQ(Rounded(1, Precision::kStatistic), 1.0F);
+  // 8 significant bits: steps of 2^-7 from 1 on.
+  EXPECT_EQ(Rounded(1 + 0x1.8p-8, Precision::kStatistic), 1.0F + 0x1p-7F);
+  EXPECT_EQ(Rounded(1 + 0x0.8p-8, Precision::kStatistic), 1.0F);
+  EXPECT_EQ(Rounded(1 + 0x1p-8, Precision::kStatistic), 1.0F);            // tie, 1 is even
+  EXPECT_EQ(Rounded(1 + 0x3p-8, Precision::kStatistic), 1.0F + 0x4p-8F);  // tie, upwards
+  EXPECT_EQ(Rounded(-1 - 0x1.8p-8, Precision::kStatistic), -1.0F - 0x1p-7F);
+  EXPECT_EQ(Rounded(1 + 0x1p-16, Precision::kRadiance), 1.0F);
+  EXPECT_EQ(Rounded(1 + 0x1.8p-16, Precision::kRadiance), 1.0F + 0x1p-15F);
+  EXPECT_TRUE(std::isfinite(Rounded(1e300, Precision::kStatistic)));
+  EXPECT_TRUE(std::isfinite(Rounded(-1e300, Precision::kRadiance)));
+}
+
+TEST(SliceSumsTest, SiblingsMakeTheSameSumInEitherOrder) {
+  SliceSums forward = RandomPass(32);
+  SliceSums backward = RandomPass(33);
+  ASSERT_TRUE(MergeSibling(forward, RandomPass(33)).ok());
+  ASSERT_TRUE(MergeSibling(backward, RandomPass(32)).ok());
+  EXPECT_EQ(forward, backward);
+  EXPECT_EQ(forward.passes, (PassRange{32, 34}));
+  EXPECT_EQ(forward.tally.photons, 10U + 32 + 10 + 33);
+}
+
+TEST(SliceSumsTest, OnlySiblingsMakeASum) {
+  SliceSums slice = RandomPass(33);
+  EXPECT_TRUE(absl::IsInvalidArgument(MergeSibling(slice, RandomPass(34))));
+  EXPECT_EQ(slice, RandomPass(33));
+}
+
+// The deviations of a tree are those of all values from their mean, up to 8 bits at each of three
+// levels: 3 × 2^-9.
+TEST(SliceSumsTest, DeviationsAreThoseOfAllPasses) {
+  SliceTree tree({64, 72});
+  std::vector<double> luminances;
+  for (std::uint64_t pass = 64; pass < 72; ++pass) {
+    luminances.push_back(LuminanceAt(RandomPass(pass), 5));
+    ASSERT_TRUE(tree.Add(RandomPass(pass)).ok());
+  }
+  double mean = 0;
+  for (const double luminance : luminances)
+    mean += luminance / 8;
+  double squares = 0;
+  for (const double luminance : luminances)
+    squares += (luminance - mean) * (luminance - mean);
+  EXPECT_NEAR(static_cast<double>(tree.Whole()->At(kSquaredDeviations, 5)), squares,
+              0.006 * squares);
+}
+
+TEST(SliceTreeTest, TheOrderOfSlicesIsNotSeen) {
+  SliceTree forward({64, 72});
+  SliceTree shuffled({64, 72});
+  for (std::uint64_t pass = 64; pass < 72; ++pass)
+    ASSERT_TRUE(forward.Add(RandomPass(pass)).ok());
+  // Two passes as one slice, as a worker sends them.
+  SliceSums pair = RandomPass(66);
+  ASSERT_TRUE(MergeSibling(pair, RandomPass(67)).ok());
+  for (const std::uint64_t pass : {71U, 64U, 69U, 68U})
+    ASSERT_TRUE(shuffled.Add(RandomPass(pass)).ok());
+  ASSERT_TRUE(shuffled.Add(pair).ok());
+  EXPECT_EQ(shuffled.PrefixEnd(), 65U);
+  for (const std::uint64_t pass : {65U, 70U})
+    ASSERT_TRUE(shuffled.Add(RandomPass(pass)).ok());
+  ASSERT_TRUE(forward.IsWhole());
+  ASSERT_TRUE(shuffled.IsWhole());
+  EXPECT_EQ(*forward.Whole(), *shuffled.Whole());
+}
+
+TEST(SliceTreeTest, EachPassCountsOnce) {
+  SliceTree tree({64, 72});
+  SliceSums pair = RandomPass(66);
+  ASSERT_TRUE(MergeSibling(pair, RandomPass(67)).ok());
+  ASSERT_TRUE(tree.Add(pair).ok());
+  EXPECT_EQ(tree.Check({66, 68}).value(), SliceTree::Outcome::kDuplicate);
+  EXPECT_EQ(tree.Check({66, 67}).value(), SliceTree::Outcome::kDuplicate);
+  EXPECT_TRUE(absl::IsInvalidArgument(tree.Check({64, 68}).status()));
+  EXPECT_TRUE(absl::IsInvalidArgument(tree.Check({72, 73}).status()));
+  EXPECT_EQ(tree.Check({68, 72}).value(), SliceTree::Outcome::kAccepted);
+}
+
+// The tail counts as its passes would, and goes away again.
+TEST(ImageSumsTest, ATailCountsUntilItIsTakenAway) {
+  ImageSums sums(kPixels);
+  sums.Add(RandomPass(0));
+  sums.Add(RandomPass(1));
+  const ImageSums::Pixel before = sums.At(3);
+  sums.SetTail({std::make_shared<const SliceSums>(RandomPass(2))});
+  const ImageSums::Pixel with_tail = sums.At(3);
+  EXPECT_EQ(sums.passes(), 3U);
+  EXPECT_EQ(sums.whole_passes(), 2U);
+  sums.SetTail({});
+  EXPECT_EQ(sums.At(3).photons, before.photons);
+  // What is added takes the tail away, too.
+  sums.SetTail({std::make_shared<const SliceSums>(RandomPass(2))});
+  sums.Add(RandomPass(2));
+  EXPECT_EQ(sums.At(3).photons, with_tail.photons);
+  EXPECT_EQ(sums.At(3).squared_deviations, with_tail.squared_deviations);
+  EXPECT_EQ(sums.passes(), 3U);
+}
+
+}  // namespace
+}  // namespace lucerna
