@@ -5,7 +5,7 @@
 // which pass and when. Rounds are of one pass each up to kFirstLongRound, so that early radii
 // follow the photons closely; from there on an eighth to a sixteenth of the passes before them. The
 // radii of a round follow from the passes that lie at least an eighth of the passes done before it:
-// a quarter of the passes done may be out at once, and nobody waits for a slow worker. Radii fall
+// a quarter of the passes done may be out at once, and no worker waits for a slower one. Radii fall
 // as a small power of the passes, so that an eighth of lag is some 2 % of a radius.
 #pragma once
 
@@ -24,6 +24,9 @@ struct PassRange {
 
 inline constexpr std::uint64_t kFirstLongRound = 16;
 inline constexpr std::uint64_t kLongestRound = 64;
+// The coordinator keeps the sums of all rounds that are out while an older one is not whole:
+// without a limit these would grow with the passes.
+inline constexpr std::uint64_t kLongestLag = 512;
 
 // The round of a pass. Its length is a power of two and divides its first pass.
 [[nodiscard]] constexpr PassRange RoundOf(std::uint64_t pass) {
@@ -36,7 +39,7 @@ inline constexpr std::uint64_t kLongestRound = 64;
 // The radii of a round follow from the passes before this one, which is the first of a round.
 [[nodiscard]] constexpr std::uint64_t RadiiFrom(const PassRange& round) {
   if (round.first == 0) return 0;
-  const std::uint64_t lag = std::max<std::uint64_t>(1, round.first / 8);
+  const std::uint64_t lag = std::clamp<std::uint64_t>(round.first / 8, 1, kLongestLag);
   return RoundOf(round.first - lag).first;
 }
 

@@ -40,7 +40,8 @@ TEST(RoundsTest, LagAnEighthBehind) {
     const PassRange round = RoundOf(pass);
     const std::uint64_t from = RadiiFrom(round);
     EXPECT_EQ(RoundOf(from).first, from);
-    EXPECT_LE(from, round.first - std::max<std::uint64_t>(1, round.first / 8));
+    EXPECT_LE(from, round.first - std::clamp<std::uint64_t>(round.first / 8, 1, kLongestLag));
+    EXPECT_LE(round.last - from, kLongestLag + 2 * kLongestRound) << "sums that are kept";
     EXPECT_GE(4 * from + 4 * round.size(), 3 * round.first) << pass;
     if (from > 0) {
       EXPECT_LE(RadiiFrom(RoundOf(round.first - 1)), from);
