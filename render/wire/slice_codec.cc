@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -12,7 +11,7 @@
 namespace lucerna {
 namespace {
 
-constexpr std::string_view kMagic = "LSL1";
+constexpr std::string_view kMagic = "LSL2";
 
 // The low bits of a float that its precision leaves zero.
 unsigned int EmptyBits(std::size_t column, std::size_t evidence) {
@@ -56,6 +55,7 @@ std::string EncodeSlice(const SliceSums& slice) {
   }
   std::vector<std::uint32_t> codes(slice.pixels());
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
+    if (FollowsFromRadiance(slice.passes, column)) continue;
     const unsigned int empty = EmptyBits(column, slice.evidence);
     std::ranges::transform(slice.columns[column], codes.begin(), [&](float value) {
       return std::bit_cast<std::uint32_t>(value) >> empty;
@@ -98,21 +98,25 @@ StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape)
   LUCERNA_RETURN_IF_ERROR(CheckDropped(slice, shape.photons_per_pass));
   slice.columns.reserve(columns);
   for (std::size_t column = 0; column < columns; ++column) {
+    std::vector<float>& values = slice.columns.emplace_back(shape.pixels);
+    if (FollowsFromRadiance(shape.passes, column)) continue;
     const std::vector<std::uint32_t> codes = reader.Planes32(shape.pixels);
     if (!reader.ok()) return Malformed("its columns are truncated or damaged");
     const unsigned int empty = EmptyBits(column, shape.evidence);
-    std::vector<float>& values = slice.columns.emplace_back(shape.pixels);
+    constexpr std::uint32_t kExponent = 0x7F800000;  // all ones: infinite or not a number
     std::uint32_t all = 0;
-    bool is_finite = true;
+    std::uint32_t largest_exponent = 0;
     for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel) {
       all |= codes[pixel];
-      values[pixel] = std::bit_cast<float>(codes[pixel] << empty);
-      is_finite = is_finite && values[pixel] * 0 == 0;
+      const std::uint32_t bits = codes[pixel] << empty;
+      largest_exponent = std::max(largest_exponent, bits & kExponent);
+      values[pixel] = std::bit_cast<float>(bits);
     }
     if (empty > 0 && (all >> (32 - empty)) != 0) return Malformed("a value has too many bits");
-    if (!is_finite) return Malformed("a value is not finite");
+    if (largest_exponent == kExponent) return Malformed("a value is not finite");
   }
   if (!reader.finished()) return Malformed("bytes are left over");
+  if (shape.passes.size() == 1) SetWhatFollowsFromRadiance(slice);
   return slice;
 }
 

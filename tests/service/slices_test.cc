@@ -231,7 +231,7 @@ TEST_F(SlicesTest, ASliceThatWasNotAskedForIsRefusedAndChangesNothing) {
     EXPECT_TRUE(refuses(*lease, EncodeSlice(slice))) << pixels << " " << evidence;
   }
   // No slice at all, and more bytes than a slice has.
-  EXPECT_TRUE(refuses(*lease, "LSL1 and then nothing of sense"));
+  EXPECT_TRUE(refuses(*lease, "LSL2 and then nothing of sense"));
   EXPECT_TRUE(refuses(*lease, ""));
   EXPECT_TRUE(refuses(*lease, good + "more"));
   EXPECT_TRUE(refuses(*lease, std::string(1'000'000, 'x')));

@@ -36,6 +36,7 @@ SliceSums RandomSlice(const SliceShape& shape) {
                       PrecisionOf(column, shape.evidence));
     }
   }
+  if (shape.passes.size() == 1) SetWhatFollowsFromRadiance(slice);
   slice.eye_rays = 12'345;
   slice.tally = {.photons = kPhotons * shape.passes.size(),
                  .rays = std::uint64_t{1} << 60,
@@ -88,6 +89,7 @@ TEST(SliceCodecTest, BringsTheEndsOfEveryColumnBack) {
         std::bit_cast<float>(std::uint32_t{1} << (24 - static_cast<int>(precision))),
         1};
   }
+  SetWhatFollowsFromRadiance(slice);
   const auto decoded = DecodeSlice(EncodeSlice(slice), shape);
   ASSERT_TRUE(decoded.ok()) << decoded.status();
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
@@ -109,6 +111,22 @@ TEST(SliceCodecTest, TakesAtMostFortyBytesAPixel) {
   SliceSums dark = EmptySlice(shape.passes, shape.pixels, shape.evidence);
   dark.tally.photons = kPhotons * shape.passes.size();
   EXPECT_LE(EncodeSlice(dark).size(), 1000U);
+}
+
+// A pass alone differs from no other: what two halves, deviations and the largest pass are follows.
+TEST(SliceCodecTest, SendsNothingThatFollowsFromTheRadianceOfOnePass) {
+  const std::size_t pixels = 5000;
+  const auto size_of = [&](const PassRange& passes) {
+    const SliceShape shape = Shape(passes, pixels, 0);
+    SliceSums slice = RandomSlice(shape);
+    for (const std::size_t column : {std::size_t{kEvenBias}, std::size_t{kOddBias},
+                                     std::size_t{kPhotonCount}, std::size_t{kBlur}})
+      slice.columns[column].assign(pixels, 0);
+    return static_cast<double>(EncodeSlice(slice).size());
+  };
+  const double radiance = 6 * 3 * static_cast<double>(pixels);
+  EXPECT_LE(size_of({64, 65}), radiance + 1000);
+  EXPECT_GE(size_of({64, 66}), radiance + 1000);
 }
 
 TEST(SliceCodecTest, RefusesASliceThatWasNotAskedFor) {
@@ -156,14 +174,14 @@ TEST(SliceCodecTest, RefusesNumbersThatAreNotFinite) {
 // The planes of a column may hold more bits than its precision has; what remained after the shift
 // would be another number.
 TEST(SliceCodecTest, RefusesAValueWithTooManyBits) {
-  const SliceShape shape = Shape({16, 17}, 2, 0);
+  const SliceShape shape = Shape({16, 18}, 2, 0);
   const auto bytes_with = [&](std::uint32_t radiance, std::uint32_t statistic) {
     ByteWriter writer;
     SliceSums head = EmptySlice(shape.passes, 0, 0);
     head.columns.clear();
     head.tally.photons = kPhotons;
     // The head of a slice of 2 pixels: that of none, with two numbers changed.
-    writer.Bytes("LSL1");
+    writer.Bytes("LSL2");
     writer.Varint(shape.passes.first);
     writer.Varint(shape.passes.size());
     writer.Varint(shape.pixels);
