@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 
 #include "render/analysis/prepared_scene.h"
+#include "render/base/mutex.h"
 #include "render/base/parallel.h"
 #include "render/base/text.h"
 #include "render/estimate/evidence.h"
@@ -109,8 +110,9 @@ struct JobEstimator::State {
   std::map<std::uint64_t, After> after;
   std::shared_ptr<const RadiusColumn> last_radii;  // of the last round added
   // Of the last estimate, and after how many passes that was.
-  double noise_area = 1;
-  std::uint64_t noise_area_after = 0;
+  Mutex noise_area_mutex;
+  double noise_area LUCERNA_GUARDED_BY(noise_area_mutex) = 1;
+  std::int64_t noise_area_after LUCERNA_GUARDED_BY(noise_area_mutex) = 0;
   // For light that may not have been found.
   bool has_smooth_surfaces = false;
   Bounds view;              // of the hitpoints of the first pass
@@ -208,7 +210,7 @@ void JobEstimator::LookAtFirstPass(const EyePass& pass, const RoundPlan& plan) {
 void JobEstimator::AddRound(const SliceSums& round, const RoundPlan& plan) {
   LUCERNA_CHECK(round.passes == RoundOf(whole_passes()));
   State& state = *state_;
-  state.sums->Add(round);
+  state.sums->Add(round, state.team);
   state.radii->Step(round, *plan.radii, state.team);
   state.last_radii = plan.radii;
   const std::uint64_t passes = whole_passes();
@@ -264,9 +266,7 @@ Image JobEstimator::MakeImage() const {
   const double exposure = scene.film.exposure;
   const double even_passes = std::ceil(passes_so_far / 2);
   const double odd_passes = passes_so_far - even_passes;
-  const double noise_area = state.noise_area_after == state.sums->passes()
-                                ? state.noise_area
-                                : EstimateError(1).noise_area;
+  const double noise_area = NoiseArea();
   std::vector<PixelNoise> noise(sums.pixels());
   std::vector<float> bias(sums.pixels());
   for (std::size_t pixel = 0; pixel < sums.pixels(); ++pixel) {
@@ -297,38 +297,78 @@ Image JobEstimator::MakeImage() const {
   return image;
 }
 
-ErrorEstimate JobEstimator::EstimateError(int look) const {
-  const double exposure = state_->prepared.scene().film.exposure;
-  const auto passes_so_far = static_cast<double>(passes());
-  const auto sums_at = [&](std::size_t pixel) {
-    const ImageSums::Pixel of_pixel = state_->sums->At(pixel);
-    PixelSums sums;
-    const RgbSum all = ToRec709(of_pixel.radiance());
-    const RgbSum difference = ToRec709(of_pixel.half_difference);
-    // Bias is known as a luminance: it has the colour that the photons have.
-    const double luminance = LuminanceOf(of_pixel.photons);
-    const RgbSum photons = ToRec709(of_pixel.photons);
-    for (std::size_t c = 0; c < 3; ++c) {
-      sums.all[c] = exposure * all[c];
-      sums.even[c] = 0.5 * exposure * (all[c] + difference[c]);
-      sums.bias_color[c] = luminance > 0 ? photons[c] / luminance : 0;
-    }
-    sums.even_bias = exposure * of_pixel.even_bias;
-    sums.odd_bias = exposure * of_pixel.odd_bias;
-    const double sum = LuminanceOf(sums.all);
-    sums.square = exposure * exposure * of_pixel.squared_deviations + sum * sum / passes_so_far;
-    return sums;
+double JobEstimator::NoiseArea() const {
+  {
+    const MutexLock lock(state_->noise_area_mutex);
+    if (state_->noise_area_after == passes()) return state_->noise_area;
+  }
+  return EstimateError(Snapshot(), {}, 1).noise_area;
+}
+
+EstimatorSnapshot JobEstimator::Snapshot() const {
+  const State& state = *state_;
+  const double exposure = state.prepared.scene().film.exposure;
+  const std::size_t pixels = state.sums->pixels();
+  EstimatorSnapshot snapshot;
+  snapshot.photons = photons();
+  snapshot.lights = state.sums->tally().lights;
+  snapshot.image = {.width = state.settings.crop_width(),
+                    .height = state.settings.crop_height(),
+                    .passes = passes(),
+                    .pixels = std::vector<PixelStatistics>(pixels)};
+  const auto scaled = [](const RgbSum& color, double factor) {
+    return std::array<float, 3>{static_cast<float>(factor * color[0]),
+                                static_cast<float>(factor * color[1]),
+                                static_cast<float>(factor * color[2])};
   };
-  ErrorEstimate estimate = lucerna::EstimateError(
-      state_->settings.crop_width(), state_->settings.crop_height(), passes(), look, sums_at);
-  state_->noise_area = estimate.noise_area;
-  state_->noise_area_after = state_->sums->passes();
+  // Luminances and those by photons, of pieces of the image: added up in their order.
+  constexpr std::size_t kPixelsAtOnce = 4096;
+  std::vector<std::array<double, 2>> luminances((pixels + kPixelsAtOnce - 1) / kPixelsAtOnce);
+  state_->team.For(luminances.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t piece = begin; piece < end; ++piece) {
+      const std::size_t last = std::min(pixels, (piece + 1) * kPixelsAtOnce);
+      for (std::size_t pixel = piece * kPixelsAtOnce; pixel < last; ++pixel) {
+        const ImageSums::Pixel of_pixel = state.sums->At(pixel);
+        const RgbSum all = ToRec709(of_pixel.radiance());
+        const RgbSum photons = ToRec709(of_pixel.photons);
+        const double photon_luminance = LuminanceOf(photons);
+        PixelStatistics& statistics = snapshot.image.pixels[pixel];
+        statistics.all = scaled(all, exposure);
+        statistics.half_difference = scaled(ToRec709(of_pixel.half_difference), exposure);
+        statistics.squared_deviations =
+            static_cast<float>(exposure * exposure * of_pixel.squared_deviations);
+        statistics.even_bias = static_cast<float>(exposure * of_pixel.even_bias);
+        statistics.odd_bias = static_cast<float>(exposure * of_pixel.odd_bias);
+        // Bias is known as a luminance: it has the colour that the photons have.
+        if (photon_luminance > 0) statistics.bias_color = scaled(photons, 1 / photon_luminance);
+        luminances[piece][0] += std::max(0.0, LuminanceOf(all));
+        luminances[piece][1] += photon_luminance;
+      }
+    }
+  });
+  for (const std::array<double, 2>& of_piece : luminances) {
+    snapshot.luminance += of_piece[0];
+    snapshot.photon_luminance += of_piece[1];
+  }
+  const double per_pixel = 1 / (static_cast<double>(pixels) * static_cast<double>(passes()));
+  snapshot.luminance *= per_pixel;
+  snapshot.photon_luminance *= per_pixel;
+  return snapshot;
+}
+
+ErrorEstimate JobEstimator::EstimateError(const EstimatorSnapshot& snapshot,
+                                          const MissingLight& missing, int look) const {
+  ErrorEstimate estimate = lucerna::EstimateError(snapshot.image, look, state_->team);
+  {
+    const MutexLock lock(state_->noise_area_mutex);
+    state_->noise_area = estimate.noise_area;
+    state_->noise_area_after = snapshot.image.passes;
+  }
   // Without any light a black image is exact.
   if (lucerna::IsBlack(state_->prepared.lights().TotalPower())) {
     estimate.relative = {};
     estimate.untrimmed = 0;
   }
-  const MissingLight missing = FindMissingLight();
   estimate.relative.high += missing.relative;
   estimate.absolute.high += missing.absolute;
   return estimate;
@@ -342,32 +382,26 @@ bool JobEstimator::IsBlack() const {
   return true;
 }
 
-MissingLight JobEstimator::FindMissingLight() const {
+MissingLight JobEstimator::FindMissingLight(const EstimatorSnapshot& snapshot) const {
   const State& state = *state_;
-  const auto passes_so_far = static_cast<double>(passes());
-  const std::size_t pixels = state.sums->pixels();
-  const auto pixel_count = static_cast<double>(pixels);
-  std::vector<double> luminances(pixels);
-  double sum = 0;
-  double photon_sum = 0;
-  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-    const ImageSums::Pixel of_pixel = state.sums->At(pixel);
-    luminances[pixel] = std::max(0.0, LuminanceOf(ToRec709(of_pixel.radiance())) / passes_so_far);
-    sum += luminances[pixel];
-    photon_sum += LuminanceOf(ToRec709(of_pixel.photons)) / passes_so_far;
-  }
+  const double exposure = state.prepared.scene().film.exposure;
+  const auto pixel_count = static_cast<double>(snapshot.image.pixels.size());
   PhotonView view;
   view.takes_photons = state.prepared.needs().Uses(Part::kPhotons) &&
                        state.settings.max_depth > 1 && state.hit_share > 0;
   view.has_caustics = state.has_smooth_surfaces;
-  view.photon_radiance = photon_sum / pixel_count;
+  view.photon_radiance = snapshot.photon_luminance;
   // What relative errors are relative to, as their mean over pixels has it: dark pixels weigh most,
   // down to a tenth of the mean.
-  const double mean = sum / pixel_count;
+  const double mean = snapshot.luminance;
   if (mean > 0) {
+    const double to_mean = 1 / (mean * exposure * static_cast<double>(snapshot.image.passes));
     double inverse = 0;
-    for (const double luminance : luminances) {
-      const double of_mean = luminance / mean;
+    for (const PixelStatistics& pixel : snapshot.image.pixels) {
+      const double of_mean =
+          to_mean * std::max(0.0, LuminanceOf({static_cast<double>(pixel.all[0]),
+                                               static_cast<double>(pixel.all[1]),
+                                               static_cast<double>(pixel.all[2])}));
       inverse += 1 / (of_mean * of_mean + 0.01);
     }
     view.brightness = mean / std::sqrt(inverse / pixel_count);
@@ -386,7 +420,7 @@ MissingLight JobEstimator::FindMissingLight() const {
   MissingLight missing;
   std::vector<LightPhotons> lights;
   const auto total_power = static_cast<double>(Luminance(state.prepared.lights().TotalPower()));
-  const std::vector<LightTally> tallies = state.sums->tally().lights;
+  const std::vector<LightTally>& tallies = snapshot.lights;
   for (std::size_t i = 0; i < state.prepared.lights().lights().size(); ++i) {
     const LightGroup& light = state.prepared.lights().lights()[i];
     lights.push_back({.power_w = static_cast<double>(Luminance(light.power)),
@@ -400,7 +434,7 @@ MissingLight JobEstimator::FindMissingLight() const {
     missing.lights[i].missing_share = shares[i];
     missing.share += shares[i];
   }
-  missing.nothing_found = !state.prepared.lights().empty() && !(sum > 0);
+  missing.nothing_found = !state.prepared.lights().empty() && !(mean > 0);
   if (missing.nothing_found) {
     missing.relative = HUGE_VAL;
     missing.absolute = HUGE_VAL;
@@ -412,8 +446,9 @@ MissingLight JobEstimator::FindMissingLight() const {
   return missing;
 }
 
-TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
-  const double to_pixel = state_->prepared.scene().film.exposure / static_cast<double>(passes());
+TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference,
+                                     const EstimatorSnapshot& snapshot) {
+  const double to_pixel = 1 / static_cast<double>(snapshot.image.passes);
   std::vector<double> luminances(reference.size());
   for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
     const Rgb right = reference[pixel];
@@ -423,10 +458,10 @@ TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
   const double floor = RelativeErrorFloor(luminances);
   std::vector<TrueError> pixels(reference.size());
   for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
-    const RgbSum sum = state_->Sum(pixel);
+    const std::array<float, 3>& sum = snapshot.image.pixels[pixel].all;
     for (std::size_t c = 0; c < 3; ++c) {
       const auto right = static_cast<double>(reference[pixel][static_cast<int>(c)]);
-      const double off = sum[c] * to_pixel - right;
+      const double off = static_cast<double>(sum[c]) * to_pixel - right;
       pixels[pixel].absolute += off * off;
       pixels[pixel].relative += RelativeSquare(off * off, right, floor);
     }

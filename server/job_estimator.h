@@ -13,7 +13,8 @@
 //      have been gathered.
 //   3. AddRound(sums, plan): in order, each round once.
 //
-// Threads: one caller at a time, except that TraceEyePaths may run beside the others.
+// Threads: one caller at a time, except that TraceEyePaths and what is computed from a snapshot may
+// run beside the others.
 #pragma once
 
 #include <cstdint>
@@ -47,6 +48,15 @@ struct LightFinding {
   // What may be missing because too few photons have found the way, as a share of the image's
   // brightness (estimate/missing_light.h); infinite while the image is black.
   double missing_share = 0;
+};
+
+// What errors are estimated from: a copy, so that rounds can be added meanwhile.
+struct EstimatorSnapshot {
+  ImageStatistics image;
+  std::uint64_t photons = 0;
+  std::vector<LightTally> lights;
+  double luminance = 0;         // mean over pixels, without exposure
+  double photon_luminance = 0;  // of that, by photons
 };
 
 // Light that may not have been found yet.
@@ -95,21 +105,28 @@ class JobEstimator {
   // The image of the passes so far, without metadata. Requires passes() > 0. Layers
   // `noise` (standard deviation of each pixel's luminance) and `bias` from the second pass on.
   [[nodiscard]] Image MakeImage() const;
-  // `look` counts the estimates of this job, from 1. The upper ends of its intervals hold what may
-  // be missing; they are infinite while nothing is found. Requires passes() >= 2.
-  [[nodiscard]] ErrorEstimate EstimateError(int look) const;
   // Requires passes() > 0.
-  [[nodiscard]] MissingLight FindMissingLight() const;
+  [[nodiscard]] EstimatorSnapshot Snapshot() const;
+  // May run beside all others. Requires a snapshot of this estimator.
+  [[nodiscard]] MissingLight FindMissingLight(const EstimatorSnapshot& snapshot) const;
+  // `look` counts the estimates of this job, from 1. The upper ends of its intervals hold what is
+  // `missing`; they are infinite while nothing is found. May run beside all others, but not beside
+  // itself. Requires a snapshot of this estimator, of two passes or more.
+  [[nodiscard]] ErrorEstimate EstimateError(const EstimatorSnapshot& snapshot,
+                                            const MissingLight& missing, int look) const;
   // Whether all pixels are black. Requires passes() > 0.
   [[nodiscard]] bool IsBlack() const;
   [[nodiscard]] const SceneNeeds& needs() const;
   // See LightSet.
   [[nodiscard]] std::size_t faint_lights() const;
-  // Requires passes() > 0 and a reference as large as the image.
-  [[nodiscard]] TrueError ErrorAgainst(const ReferenceImage& reference) const;
+  // Requires a reference as large as the image.
+  [[nodiscard]] static TrueError ErrorAgainst(const ReferenceImage& reference,
+                                              const EstimatorSnapshot& snapshot);
 
  private:
   struct State;
+  // Of the image so far (ErrorEstimate::noise_area).
+  [[nodiscard]] double NoiseArea() const;
   explicit JobEstimator(std::unique_ptr<State> state);
   std::unique_ptr<State> state_;
 };

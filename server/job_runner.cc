@@ -1,6 +1,7 @@
 #include "server/job_runner.h"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -25,7 +26,9 @@ JobRunner::JobRunner(std::string job_id, RenderSettings settings, int threads, R
       hooks_(std::move(hooks)),
       end_(EndOf(settings_)) {}
 
-JobRunner::~JobRunner() = default;
+JobRunner::~JobRunner() {
+  if (estimate_thread_.joinable()) estimate_thread_.join();
+}
 
 JobRunner::End JobRunner::EndOf(const RenderSettings& settings) {
   return {.passes = static_cast<std::uint64_t>(settings.passes),
@@ -76,6 +79,7 @@ StatusOr<RenderResult> JobRunner::RunToEnd() {
   ran_before_ += hooks_.clock.Steady() - started_at;
   // Whatever ended it: workers must not go on with passes that will not be merged.
   CloseAll();
+  TakeInEstimate(true);
   return result;
 }
 
@@ -106,13 +110,17 @@ std::uint64_t JobRunner::PassesDone() const {
 StopReason JobRunner::ReasonToStop(const End& end, bool is_time_up) const {
   const std::uint64_t done = PassesDone();
   if (done == 0) return StopReason::kNone;
-  if (done >= WantedPasses(end)) {
+  if (done >= WantedPasses(end) && !MayMeetTarget(end)) {
     return end.passes > 0 && done >= end.passes ? StopReason::kPasses : StopReason::kPhotons;
   }
   if (end.error > 0 && error_at_most_ <= end.error) return StopReason::kError;
   if (is_time_up) return StopReason::kTime;
   const MutexLock lock(mutex_);
   return shall_finish_ ? StopReason::kUser : StopReason::kNone;
+}
+
+bool JobRunner::MayMeetTarget(const End& end) const {
+  return end.error > 0 && (IsEstimating() || IsOldestRoundWhole());
 }
 
 StatusOr<RenderResult> JobRunner::RunRounds() {
@@ -132,11 +140,13 @@ StatusOr<RenderResult> JobRunner::RunRounds() {
           started_at + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
     }
     const bool is_time_up = due_ && hooks_.clock.Steady() >= *due_;
+    TakeInEstimate(false);
     if (const StopReason reason = ReasonToStop(end, is_time_up); reason != StopReason::kNone) {
       // Where the error decided when to stop, it knows nothing of later passes.
       if (reason != StopReason::kError) TakeInTail();
       ReportProgress();
-      EstimateErrorIfDue(true);
+      BeginEstimateIfDue(true);
+      TakeInEstimate(true);
       CheckImage();
       const MutexLock lock(estimator_mutex_);
       return MakeResult(reason);
@@ -159,11 +169,15 @@ void JobRunner::ReportProgress() {
   hooks_.on_progress(static_cast<std::int64_t>(done));
 }
 
-bool JobRunner::TakeInIfWhole() {
+bool JobRunner::IsOldestRoundWhole() const {
   if (open_rounds_.empty()) return false;
-  const OpenRound& oldest = open_rounds_.front();
-  if (hooks_.rounds.PrefixEnd(KeyOf(oldest.round.first)) != oldest.round.last) return false;
-  TakeIn(oldest);
+  const PassRange& oldest = open_rounds_.front().round;
+  return hooks_.rounds.PrefixEnd(KeyOf(oldest.first)) == oldest.last;
+}
+
+bool JobRunner::TakeInIfWhole() {
+  if (!IsOldestRoundWhole()) return false;
+  TakeIn(open_rounds_.front());
   open_rounds_.pop_front();
   return true;
 }
@@ -222,8 +236,10 @@ StatusOr<bool> JobRunner::Step(const End& end, bool wants_more) {
     LUCERNA_RETURN_IF_ERROR(TakeInSplitPass(complete));
     return true;
   }
-  if (TakeInIfWhole()) {
-    EstimateErrorIfDue(false);
+  // With a target, the image must not grow beyond a checkpoint before it is known to miss it.
+  const bool must_wait = end.error > 0 && IsEstimating();
+  if (!must_wait && TakeInIfWhole()) {
+    BeginEstimateIfDue(false);
     return true;
   }
   if (to_split && !ahead_) {
@@ -391,27 +407,53 @@ void JobRunner::Withdraw(std::uint64_t pass) {
   blobs_.erase(pass);
 }
 
-void JobRunner::EstimateErrorIfDue(bool is_last) {
-  ErrorCheckpoint checkpoint;
+void JobRunner::BeginEstimateIfDue(bool is_last) {
+  EstimatorSnapshot snapshot;
   {
     const MutexLock lock(estimator_mutex_);
-    checkpoint.passes = estimator_->passes();
-    if (checkpoint.passes < 2 || checkpoint.passes == passes_at_checkpoint_) return;
-    if (!is_last && checkpoint.passes < next_checkpoint_) return;
-    checkpoint.photons = estimator_->photons();
-    checkpoint.estimate = estimator_->EstimateError(++checkpoints_);
-    checkpoint.missing = estimator_->FindMissingLight();
-    if (!reference_.empty()) checkpoint.truth = estimator_->ErrorAgainst(reference_);
+    const std::int64_t passes = estimator_->passes();
+    if (passes < 2 || passes == passes_at_checkpoint_) return;
+    if (!is_last && passes < next_checkpoint_) return;
+    snapshot = estimator_->Snapshot();
   }
-  passes_at_checkpoint_ = checkpoint.passes;
+  // One at a time, so that which passes are estimated does not depend on how long that takes.
+  TakeInEstimate(true);
+  passes_at_checkpoint_ = snapshot.image.passes;
+  next_checkpoint_ = NextCheckpoint(snapshot.image.passes, /*near_target=*/false);
+  std::packaged_task<ErrorCheckpoint()> task(
+      [this, look = ++checkpoints_, snapshot = std::move(snapshot)] {
+        ErrorCheckpoint checkpoint;
+        checkpoint.passes = snapshot.image.passes;
+        checkpoint.photons = snapshot.photons;
+        checkpoint.missing = estimator_->FindMissingLight(snapshot);
+        checkpoint.estimate = estimator_->EstimateError(snapshot, checkpoint.missing, look);
+        if (!reference_.empty())
+          checkpoint.truth = JobEstimator::ErrorAgainst(reference_, snapshot);
+        return checkpoint;
+      });
+  estimate_ = task.get_future();
+  estimate_thread_ = std::thread([this, task = std::move(task)]() mutable {
+    task();
+    Wake();
+  });
+}
+
+void JobRunner::TakeInEstimate(bool shall_wait) {
+  if (!IsEstimating()) return;
+  if (!shall_wait && estimate_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    return;
+  }
+  estimate_thread_.join();
+  const ErrorCheckpoint checkpoint = estimate_.get();
   error_at_most_ = std::sqrt(checkpoint.estimate.relative.high);
   double target = 0;
   {
     const MutexLock lock(mutex_);
     target = end_.error;
   }
-  next_checkpoint_ =
-      NextCheckpoint(checkpoint.passes, target > 0 && error_at_most_ < kNearTarget * target);
+  // Passes wait for the estimate where there is a target (Step).
+  if (target > 0 && error_at_most_ < kNearTarget * target)
+    next_checkpoint_ = NextCheckpoint(checkpoint.passes, /*near_target=*/true);
   hooks_.on_error_estimate(checkpoint);
 }
 

@@ -14,10 +14,12 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <future>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include "render/base/clock.h"
 #include "render/base/mutex.h"
@@ -120,8 +122,15 @@ class JobRunner final : public RunningJob {
   StatusOr<RenderResult> RunRounds();
   // One thing that can be done now: opens, traces or takes in. False when there is nothing.
   StatusOr<bool> Step(const End& end, bool wants_more);
-  // Estimates the error at the next checkpoint, or if `is_last`.
-  void EstimateErrorIfDue(bool is_last);
+  // Begins to estimate the error of the passes so far, on another thread and from a copy of the
+  // sums, at the next checkpoint or if `is_last`.
+  void BeginEstimateIfDue(bool is_last);
+  // Takes in the estimate that has been begun, if any, when it is there or `shall_wait`.
+  void TakeInEstimate(bool shall_wait);
+  bool IsEstimating() const { return estimate_.valid(); }
+  // Whether what has come, or the estimate under way, may still say that the target is met: a job
+  // stops at the first checkpoint that meets it, however much has come since.
+  bool MayMeetTarget(const End& end) const;
   // Warns of a black image.
   void CheckImage();
   // Why to stop now; kNone: go on.
@@ -132,6 +141,7 @@ class JobRunner final : public RunningJob {
   void ReportProgress();
   // Takes in the oldest round if all of it has come.
   bool TakeInIfWhole();
+  bool IsOldestRoundWhole() const;
   // At a stop: what has come of the oldest round counts too.
   void TakeInTail();
   Status OpenNextRound(const End& end, RoundPlan plan);
@@ -171,6 +181,8 @@ class JobRunner final : public RunningJob {
 
   // The runner's thread only.
   ReferenceImage reference_;
+  std::future<ErrorCheckpoint> estimate_;  // under way
+  std::thread estimate_thread_;
   Duration ran_before_{};
   std::int64_t next_checkpoint_ = kFirstCheckpoint;
   int checkpoints_ = 0;

@@ -37,6 +37,32 @@ constexpr double kLeastCorrelation = 0.05;
 // What the correlation of neighbours is found from, in pixels.
 constexpr std::size_t kCorrelationSample = std::size_t{1} << 17;
 
+// Rows, or columns, that one thread takes at once.
+constexpr std::size_t kLinesAtOnce = 16;
+
+// Calls body(row) for all rows.
+template <typename Body>
+void ForRows(ThreadTeam& team, int height, const Body& body) {
+  team.For(static_cast<std::size_t>(height), kLinesAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t row = begin; row < end; ++row)
+      body(row);
+  });
+}
+
+// The sum of what body(row) gives for all rows, in their order: the same bits whatever the number
+// of threads.
+template <std::size_t kSums, typename Body>
+std::array<double, kSums> SumOfRows(ThreadTeam& team, int height, const Body& body) {
+  std::vector<std::array<double, kSums>> rows(static_cast<std::size_t>(height));
+  ForRows(team, height, [&](std::size_t row) { rows[row] = body(row); });
+  std::array<double, kSums> sums{};
+  for (const std::array<double, kSums>& row : rows) {
+    for (std::size_t i = 0; i < kSums; ++i)
+      sums[i] += row[i];
+  }
+  return sums;
+}
+
 double Middle(double a, double b, double c) {
   return std::max(std::min(a, b), std::min(std::max(a, b), c));
 }
@@ -44,16 +70,17 @@ double Middle(double a, double b, double c) {
 // The mean of the pixels within kReach, without the pixel itself; its own value where it is alone.
 class MeanAround {
  public:
-  MeanAround(int width, int height, std::vector<float> values)
+  MeanAround(int width, int height, std::vector<float> values, ThreadTeam& team)
       : width_(width), height_(height), values_(std::move(values)), rows_(values_.size()) {
-    for (int y = 0; y < height; ++y) {
+    ForRows(team, height, [&](std::size_t row) {
+      const int y = static_cast<int>(row);
       for (int x = 0; x < width; ++x) {
         float sum = 0;
         for (int i = std::max(0, x - kReach); i <= std::min(width - 1, x + kReach); ++i)
           sum += values_[At(i, y)];
         rows_[At(x, y)] = sum;
       }
-    }
+    });
   }
 
   [[nodiscard]] double operator()(int x, int y) const {
@@ -89,18 +116,22 @@ struct HalfBiases {
 
 // The share of the estimated bias that is taken off single pixels to guess their values without
 // blur: near 1 unless the estimate is mostly noise.
-double BelievedShare(const std::vector<HalfBiases>& biases, const std::vector<double>& luminances,
-                     double floor) {
-  double bias = 0;
-  double noise = 0;
-  for (std::size_t i = 0; i < luminances.size(); ++i) {
-    const auto even = static_cast<double>(biases[i].even);
-    const auto odd = static_cast<double>(biases[i].odd);
-    const double weight = 1 / (luminances[i] * luminances[i] + floor);
-    bias += even * odd * weight;
-    noise += 0.25 * (even - odd) * (even - odd) * weight;
-  }
-  bias = std::max(bias, 0.0);
+double BelievedShare(int width, int height, const std::vector<HalfBiases>& biases,
+                     const std::vector<double>& luminances, double floor, ThreadTeam& team) {
+  const auto w = static_cast<std::size_t>(width);
+  const auto sums = SumOfRows<2>(team, height, [&](std::size_t row) {
+    std::array<double, 2> of_row{};
+    for (std::size_t i = row * w; i < (row + 1) * w; ++i) {
+      const auto even = static_cast<double>(biases[i].even);
+      const auto odd = static_cast<double>(biases[i].odd);
+      const double weight = 1 / (luminances[i] * luminances[i] + floor);
+      of_row[0] += even * odd * weight;
+      of_row[1] += 0.25 * (even - odd) * (even - odd) * weight;
+    }
+    return of_row;
+  });
+  const double bias = std::max(sums[0], 0.0);
+  const double noise = sums[1];
   return noise > 0 ? bias / (bias + kNoiseWeight * noise) : 1;
 }
 
@@ -115,58 +146,93 @@ struct PixelError {
   [[nodiscard]] float Size() const { return relative_noise + std::abs(relative_bias); }
 };
 
+// Sums over a window that moves along a line: from `back` places before to `ahead` behind, ends
+// repeated. Lines lie side by side, `lines` of them, and all move at once; the next place of a line
+// is `step` further on.
+void MoveBox(const float* in, float* out, std::size_t lines, std::size_t step, int length, int back,
+             int ahead) {
+  const auto at = [&](int place) {
+    return in + static_cast<std::size_t>(std::clamp(place, 0, length - 1)) * step;
+  };
+  std::vector<double> sums(lines, 0);
+  for (int place = -back; place <= ahead; ++place) {
+    for (std::size_t line = 0; line < lines; ++line)
+      sums[line] += static_cast<double>(at(place)[line]);
+  }
+  for (int place = 0; place < length; ++place) {
+    float* const here = out + static_cast<std::size_t>(place) * step;
+    const float* const comes = at(place + ahead + 1);
+    const float* const goes = at(place - back);
+    for (std::size_t line = 0; line < lines; ++line) {
+      here[line] = static_cast<float>(sums[line] / (back + ahead + 1));
+      sums[line] += static_cast<double>(comes[line]) - static_cast<double>(goes[line]);
+    }
+  }
+}
+
+// Calls body(first, lines) for runs of neighbouring columns.
+template <typename Body>
+void ForColumns(ThreadTeam& team, int width, const Body& body) {
+  constexpr std::size_t kColumnsAtOnce = 64;
+  team.For(static_cast<std::size_t>(width), kColumnsAtOnce,
+           [&](std::size_t begin, std::size_t end) { body(begin, end - begin); });
+}
+
 // `values` with triangular weights of `reach` pixels to either side, along rows and along columns;
 // edges repeat.
-std::vector<float> Smoothed(int width, int height, int reach, const std::vector<float>& values) {
-  std::vector<float> smooth = values;
-  std::vector<double> line;
-  // A triangle is a box over a box: one looks back, the other ahead.
-  const auto box = [&](std::size_t start, std::size_t step, int length, int back, int ahead) {
-    line.resize(static_cast<std::size_t>(length));
-    for (std::size_t i = 0; i < line.size(); ++i)
-      line[i] = static_cast<double>(smooth[start + i * step]);
-    const auto at = [&](int i) {
-      return line[static_cast<std::size_t>(std::clamp(i, 0, length - 1))];
-    };
-    double sum = 0;
-    for (int i = -back; i <= ahead; ++i)
-      sum += at(i);
-    for (int i = 0; i < length; ++i) {
-      smooth[start + static_cast<std::size_t>(i) * step] =
-          static_cast<float>(sum / (back + ahead + 1));
-      sum += at(i + ahead + 1) - at(i - back);
-    }
-  };
+std::vector<float> Smoothed(int width, int height, int reach, const std::vector<float>& values,
+                            ThreadTeam& team) {
+  if (reach <= 1) return values;
   const auto w = static_cast<std::size_t>(width);
-  for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
-    box(y * w, 1, width, reach - 1, 0);
-    box(y * w, 1, width, 0, reach - 1);
-  }
-  for (std::size_t x = 0; x < w; ++x) {
-    box(x, w, height, reach - 1, 0);
-    box(x, w, height, 0, reach - 1);
-  }
+  std::vector<float> smooth(values.size());
+  std::vector<float> half(values.size());
+  // A triangle is a box over a box: one looks back, the other ahead.
+  team.For(static_cast<std::size_t>(height), kLinesAtOnce, [&](std::size_t begin, std::size_t end) {
+    // As columns, so that the rows move at once.
+    const std::size_t rows = end - begin;
+    std::vector<float> block(rows * w);
+    std::vector<float> back(block.size());
+    for (std::size_t row = 0; row < rows; ++row) {
+      for (std::size_t x = 0; x < w; ++x)
+        block[x * rows + row] = values[(begin + row) * w + x];
+    }
+    MoveBox(block.data(), back.data(), rows, rows, width, reach - 1, 0);
+    MoveBox(back.data(), block.data(), rows, rows, width, 0, reach - 1);
+    for (std::size_t row = 0; row < rows; ++row) {
+      for (std::size_t x = 0; x < w; ++x)
+        smooth[(begin + row) * w + x] = block[x * rows + row];
+    }
+  });
+  ForColumns(team, width, [&](std::size_t first, std::size_t lines) {
+    MoveBox(smooth.data() + first, half.data() + first, lines, w, height, reach - 1, 0);
+    MoveBox(half.data() + first, smooth.data() + first, lines, w, height, 0, reach - 1);
+  });
   return smooth;
 }
 
 // The least of `values` within `reach` pixels along rows and columns.
-std::vector<float> LeastAround(int width, int height, int reach, const std::vector<float>& values) {
-  std::vector<float> least = values;
-  std::vector<float> line;
-  const auto along = [&](std::size_t start, std::size_t step, int length) {
-    line.resize(static_cast<std::size_t>(length));
-    for (std::size_t i = 0; i < line.size(); ++i)
-      line[i] = least[start + i * step];
-    for (int i = 0; i < length; ++i) {
-      least[start + static_cast<std::size_t>(i) * step] = *std::min_element(
-          line.begin() + std::max(0, i - reach), line.begin() + std::min(length, i + reach + 1));
-    }
-  };
+std::vector<float> LeastAround(int width, int height, int reach, const std::vector<float>& values,
+                               ThreadTeam& team) {
   const auto w = static_cast<std::size_t>(width);
-  for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y)
-    along(y * w, 1, width);
-  for (std::size_t x = 0; x < w; ++x)
-    along(x, w, height);
+  std::vector<float> of_rows(values.size());
+  std::vector<float> least(values.size());
+  ForRows(team, height, [&](std::size_t row) {
+    const float* const line = values.data() + row * w;
+    for (int x = 0; x < width; ++x) {
+      of_rows[row * w + static_cast<std::size_t>(x)] =
+          *std::min_element(line + std::max(0, x - reach), line + std::min(width, x + reach + 1));
+    }
+  });
+  ForRows(team, height, [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    float* const out = least.data() + row * w;
+    std::copy_n(of_rows.data() + row * w, w, out);
+    for (int near = std::max(0, y - reach); near <= std::min(height - 1, y + reach); ++near) {
+      const float* const line = of_rows.data() + static_cast<std::size_t>(near) * w;
+      for (std::size_t x = 0; x < w; ++x)
+        out[x] = std::min(out[x], line[x]);
+    }
+  });
   return least;
 }
 
@@ -174,8 +240,10 @@ std::vector<float> LeastAround(int width, int height, int reach, const std::vect
 constexpr int kKernelReach = 3;
 
 // The least luminance that a pixel can plausibly have without the blur.
-std::vector<float> LeastLuminance(int width, int height, std::vector<float> luminance) {
-  return LeastAround(width, height, kKernelReach, Smoothed(width, height, 2, luminance));
+std::vector<float> LeastLuminance(int width, int height, const std::vector<float>& luminance,
+                                  ThreadTeam& team) {
+  return LeastAround(width, height, kKernelReach, Smoothed(width, height, 2, luminance, team),
+                     team);
 }
 
 // What the kernel changed in each pixel, as the two halves have it.
@@ -185,11 +253,15 @@ struct BiasHalves {
   explicit BiasHalves(std::size_t pixels) : even(pixels), odd(pixels) {}
 
   // Squared bias, without the halves' noise: the product of one half with the other, smoothed.
-  [[nodiscard]] std::vector<float> Squares(int width, int height, int reach) const {
-    const std::vector<float> smooth_even = Smoothed(width, height, reach, even);
-    std::vector<float> squares = Smoothed(width, height, reach, odd);
-    for (std::size_t i = 0; i < squares.size(); ++i)
-      squares[i] = 0.5F * (even[i] * squares[i] + smooth_even[i] * odd[i]);
+  [[nodiscard]] std::vector<float> Squares(int width, int height, int reach,
+                                           ThreadTeam& team) const {
+    const std::vector<float> smooth_even = Smoothed(width, height, reach, even, team);
+    std::vector<float> squares = Smoothed(width, height, reach, odd, team);
+    const auto w = static_cast<std::size_t>(width);
+    ForRows(team, height, [&](std::size_t row) {
+      for (std::size_t i = row * w; i < (row + 1) * w; ++i)
+        squares[i] = 0.5F * (even[i] * squares[i] + smooth_even[i] * odd[i]);
+    });
     return squares;
   }
 };
@@ -233,15 +305,20 @@ double CorrelatedArea(int width, int height, const std::vector<float>& one,
 }
 
 // The squared correlation of two fields, pixel by pixel.
-double SquaredCorrelation(const std::vector<float>& one, const std::vector<float>& other) {
-  double both = 0, ones = 0, others = 0;
-  for (std::size_t i = 0; i < one.size(); ++i) {
-    const auto a = static_cast<double>(one[i]);
-    const auto b = static_cast<double>(other[i]);
-    both += a * b;
-    ones += a * a;
-    others += b * b;
-  }
+double SquaredCorrelation(int width, int height, const std::vector<float>& one,
+                          const std::vector<float>& other, ThreadTeam& team) {
+  const auto w = static_cast<std::size_t>(width);
+  const auto [both, ones, others] = SumOfRows<3>(team, height, [&](std::size_t row) {
+    std::array<double, 3> of_row{};
+    for (std::size_t i = row * w; i < (row + 1) * w; ++i) {
+      const auto a = static_cast<double>(one[i]);
+      const auto b = static_cast<double>(other[i]);
+      of_row[0] += a * b;
+      of_row[1] += a * a;
+      of_row[2] += b * b;
+    }
+    return of_row;
+  });
   return ones > 0 && others > 0 ? both * both / (ones * others) : 1;
 }
 
@@ -266,27 +343,33 @@ struct PixelBiases {
 
   explicit PixelBiases(std::size_t pixels) : absolute(pixels), to_even(pixels), to_odd(pixels) {}
 
-  [[nodiscard]] SmoothedBias Smooth(int width, int height, int reach) const {
+  [[nodiscard]] SmoothedBias Smooth(int width, int height, int reach, ThreadTeam& team) const {
+    const auto w = static_cast<std::size_t>(width);
     SmoothedBias smooth;
-    smooth.absolute = absolute.Squares(width, height, reach);
-    smooth.relative = to_even.Squares(width, height, reach);
-    const std::vector<float> relative_to_odd = to_odd.Squares(width, height, reach);
+    smooth.absolute = absolute.Squares(width, height, reach, team);
+    smooth.relative = to_even.Squares(width, height, reach, team);
+    const std::vector<float> relative_to_odd = to_odd.Squares(width, height, reach, team);
     std::vector<float> differences(relative_to_odd.size());
-    double square_sum = 0;
-    for (std::size_t i = 0; i < differences.size(); ++i) {
-      differences[i] = to_even.even[i] - to_even.odd[i];
-      smooth.relative[i] = 0.5F * (smooth.relative[i] + relative_to_odd[i]);
-      const auto square = static_cast<double>(smooth.relative[i]);
-      smooth.relative_sum += square;
-      smooth.absolute_sum += static_cast<double>(smooth.absolute[i]);
-      square_sum += square * square;
-    }
+    const auto sums = SumOfRows<3>(team, height, [&](std::size_t row) {
+      std::array<double, 3> of_row{};
+      for (std::size_t i = row * w; i < (row + 1) * w; ++i) {
+        differences[i] = to_even.even[i] - to_even.odd[i];
+        smooth.relative[i] = 0.5F * (smooth.relative[i] + relative_to_odd[i]);
+        const auto square = static_cast<double>(smooth.relative[i]);
+        of_row[0] += square;
+        of_row[1] += static_cast<double>(smooth.absolute[i]);
+        of_row[2] += square * square;
+      }
+      return of_row;
+    });
+    smooth.relative_sum = sums[0];
+    smooth.absolute_sum = sums[1];
     // The mean of the two ways to smooth one product varies as one of them does, but its square is
     // less by the second factor.
-    const std::vector<float> smoothed = Smoothed(width, height, reach, differences);
+    const std::vector<float> smoothed = Smoothed(width, height, reach, differences, team);
     smooth.area = CorrelatedArea(width, height, differences, smoothed) * 2 /
-                  (1 + SquaredCorrelation(differences, smoothed));
-    smooth.deviation = std::sqrt(smooth.area * square_sum);
+                  (1 + SquaredCorrelation(width, height, differences, smoothed, team));
+    smooth.deviation = std::sqrt(smooth.area * sums[2]);
     return smooth;
   }
 };
@@ -298,13 +381,14 @@ struct ChosenBias {
   double relative_lost = 0, absolute_lost = 0;
 };
 
-ChosenBias Choose(int width, int height, const PixelBiases& biases, double noise_area) {
-  ChosenBias chosen{.bias = biases.Smooth(width, height, 1)};
+ChosenBias Choose(int width, int height, const PixelBiases& biases, double noise_area,
+                  ThreadTeam& team) {
+  ChosenBias chosen{.bias = biases.Smooth(width, height, 1, team)};
   double most_relative = chosen.bias.relative_sum;
   double most_absolute = chosen.bias.absolute_sum;
   double least = most_relative - kUnsure * chosen.bias.deviation;
   for (int reach = 2; reach * reach <= 1 + kWidest * noise_area; reach *= 2) {
-    SmoothedBias wider = biases.Smooth(width, height, reach);
+    SmoothedBias wider = biases.Smooth(width, height, reach, team);
     if (wider.relative_sum < least) break;
     most_relative = std::max(most_relative, wider.relative_sum);
     most_absolute = std::max(most_absolute, wider.absolute_sum);
@@ -376,61 +460,79 @@ double TwoSidedNormalQuantile(double probability) {
   return 0.5 * (low + high);
 }
 
-ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int look,
-                            const PixelSumsAt& sums_at) {
-  LUCERNA_CHECK(pass_count >= 2 && look >= 1);
-  const auto passes = static_cast<double>(pass_count);
-  const auto even_passes = static_cast<double>((pass_count + 1) / 2);
-  const auto odd_passes = static_cast<double>(pass_count / 2);
+ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& team) {
+  LUCERNA_CHECK(image.passes >= 2 && look >= 1);
+  const int width = image.width;
+  const int height = image.height;
+  const auto passes = static_cast<double>(image.passes);
+  const auto even_passes = static_cast<double>((image.passes + 1) / 2);
+  const auto odd_passes = static_cast<double>(image.passes / 2);
   // From the squared difference of the halves' means to the squared noise of the whole mean.
   const double to_noise = even_passes * odd_passes / (passes * passes);
   const double z = TwoSidedNormalQuantile((1 - kConfidence) * SpentAt(look));
 
-  const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const auto w = static_cast<std::size_t>(width);
+  const std::size_t count = w * static_cast<std::size_t>(height);
+  LUCERNA_CHECK(image.pixels.size() == count);
+  const auto color_of = [](const std::array<float, 3>& sums) {
+    return RgbSum{static_cast<double>(sums[0]), static_cast<double>(sums[1]),
+                  static_cast<double>(sums[2])};
+  };
   std::array<std::vector<float>, 3> means;
   for (std::vector<float>& channel : means)
     channel.resize(count);
   std::vector<double> luminances(count);
+  std::vector<float> rounded_luminances(count);
   std::vector<HalfBiases> half_biases(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const PixelSums sums = sums_at(i);
-    for (std::size_t c = 0; c < 3; ++c)
-      means[c][i] = static_cast<float>(sums.all[c] / passes);
-    luminances[i] = LuminanceOf(sums.all) / passes;
-    half_biases[i] = {static_cast<float>(sums.even_bias / even_passes),
-                      static_cast<float>(sums.odd_bias / odd_passes)};
-  }
-  const std::array<MeanAround, 3> around = {MeanAround(width, height, std::move(means[0])),
-                                            MeanAround(width, height, std::move(means[1])),
-                                            MeanAround(width, height, std::move(means[2]))};
-  const std::vector<float> least_luminance =
-      LeastLuminance(width, height, std::vector<float>(luminances.begin(), luminances.end()));
+  ForRows(team, height, [&](std::size_t row) {
+    for (std::size_t i = row * w; i < (row + 1) * w; ++i) {
+      const PixelStatistics& sums = image.pixels[i];
+      const RgbSum all = color_of(sums.all);
+      for (std::size_t c = 0; c < 3; ++c)
+        means[c][i] = static_cast<float>(all[c] / passes);
+      luminances[i] = LuminanceOf(all) / passes;
+      rounded_luminances[i] = static_cast<float>(luminances[i]);
+      half_biases[i] = {static_cast<float>(static_cast<double>(sums.even_bias) / even_passes),
+                        static_cast<float>(static_cast<double>(sums.odd_bias) / odd_passes)};
+    }
+  });
   const double floor = RelativeErrorFloor(luminances);
   if (floor == 0) {
     const SquaredError unknown = {.noise = HUGE_VAL, .bias = 0, .low = 0, .high = HUGE_VAL};
     return {.relative = unknown, .absolute = {}, .untrimmed = HUGE_VAL};
   }
-
-  const double believed = BelievedShare(half_biases, luminances, floor);
+  const std::array<MeanAround, 3> around = {MeanAround(width, height, std::move(means[0]), team),
+                                            MeanAround(width, height, std::move(means[1]), team),
+                                            MeanAround(width, height, std::move(means[2]), team)};
+  const std::vector<float> least_luminance =
+      LeastLuminance(width, height, rounded_luminances, team);
+  const double believed = BelievedShare(width, height, half_biases, luminances, floor, team);
   std::vector<PixelError> pixels(count);
   std::vector<float> differences(count);
   PixelBiases biases(count);
-  double halves = 0;
-  double independent = 0;
-  std::size_t pixel = 0;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x, ++pixel) {
-      const PixelSums sums = sums_at(pixel);
+  const auto do_row = [&](std::size_t row) {
+    double halves = 0;
+    double independent = 0;
+    for (std::size_t column = 0; column < w; ++column) {
+      const std::size_t pixel = row * w + column;
+      const int x = static_cast<int>(column);
+      const int y = static_cast<int>(row);
+      const PixelStatistics& sums = image.pixels[pixel];
+      const RgbSum all = color_of(sums.all);
+      const RgbSum half_difference = color_of(sums.half_difference);
+      const RgbSum bias_color = color_of(sums.bias_color);
+      RgbSum even_sum{};
+      RgbSum odd_sum{};
       RgbSum difference{};
       double noise_sum = 0, relative_noise = 0, signed_noise = 0;
       double color_square = 0;
-      RgbSum odd_sum{};
       for (std::size_t c = 0; c < 3; ++c) {
-        const double even = sums.even[c] / even_passes;
-        odd_sum[c] = sums.all[c] - sums.even[c];
+        even_sum[c] = 0.5 * (all[c] + half_difference[c]);
+        odd_sum[c] = 0.5 * (all[c] - half_difference[c]);
+        const double even = even_sum[c] / even_passes;
         const double odd = odd_sum[c] / odd_passes;
         difference[c] = even - odd;
-        const double own = sums.all[c] / passes;
+        const double own = all[c] / passes;
         const double agreed = Middle(even, odd, around[c](x, y));
         const double least = std::min(own, agreed);
         // One over value² + floor. The agreed value is too large where rare light fell on the
@@ -440,13 +542,13 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
         noise_sum += noise;
         relative_noise += noise * weight;
         signed_noise += difference[c] * std::sqrt(weight);
-        color_square += sums.bias_color[c] * sums.bias_color[c];
+        color_square += bias_color[c] * bias_color[c];
       }
       pixels[pixel].noise = static_cast<float>(noise_sum / 3);
       pixels[pixel].relative_noise = static_cast<float>(relative_noise / 3);
       differences[pixel] = static_cast<float>(signed_noise);
-      const double even_bias = sums.even_bias / even_passes;
-      const double odd_bias = sums.odd_bias / odd_passes;
+      const double even_bias = static_cast<double>(sums.even_bias) / even_passes;
+      const double odd_bias = static_cast<double>(sums.odd_bias) / odd_passes;
       // One over value² + floor as a half has it without `share` of the bias, times the squared
       // colour of the bias.
       const double mean = luminances[pixel];
@@ -456,12 +558,12 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
         const double of_mean = mean > 0 ? unblurred / mean : 0;
         double sum = 0;
         for (std::size_t c = 0; c < 3; ++c) {
-          const double value = of_mean * sums.all[c] / passes;
-          sum += sums.bias_color[c] * sums.bias_color[c] / (value * value + floor);
+          const double value = of_mean * all[c] / passes;
+          sum += bias_color[c] * bias_color[c] / (value * value + floor);
         }
         return sum / 3;
       };
-      const double even = LuminanceOf(sums.even) / even_passes;
+      const double even = LuminanceOf(even_sum) / even_passes;
       const double odd = LuminanceOf(odd_sum) / odd_passes;
       const double square_to_even = color_over_value(even, even_bias, believed);
       const double square_to_odd = color_over_value(odd, odd_bias, believed);
@@ -486,11 +588,13 @@ ErrorEstimate EstimateError(int width, int height, std::int64_t pass_count, int 
       biases.to_odd.odd[pixel] = static_cast<float>(odd_bias * of_odd);
       const double luminance = LuminanceOf(difference);
       halves += luminance * luminance * to_noise;
-      independent += std::max(0.0, sums.square / passes - mean * mean) / (passes - 1);
+      independent += static_cast<double>(sums.squared_deviations) / (passes * (passes - 1));
     }
-  }
+    return std::array<double, 2>{halves, independent};
+  };
+  const auto [halves, independent] = SumOfRows<2>(team, height, do_row);
   Spread spread{.noise_area = CorrelatedArea(width, height, differences, differences), .z = z};
-  const ChosenBias chosen = Choose(width, height, biases, spread.noise_area);
+  const ChosenBias chosen = Choose(width, height, biases, spread.noise_area, team);
   spread.bias_area = chosen.bias.area;
   for (std::size_t i = 0; i < count; ++i) {
     pixels[i].bias = chosen.bias.absolute[i];

@@ -43,10 +43,10 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
+#include "render/base/parallel.h"
 #include "render/estimate/relative_error.h"
 
 namespace lucerna {
@@ -84,14 +84,19 @@ struct ErrorEstimate {
   double noise_area = 1;
 };
 
-// Sums over passes of what one pixel is made of, in the colours and the exposure of the image.
-struct PixelSums {
-  RgbSum all{}, even{};                // over all passes and the even ones
-  double even_bias = 0, odd_bias = 0;  // luminance, of even passes and of odd ones
-  RgbSum bias_color{};                 // of luminance 1
-  double square = 0;                   // squared luminance
+// What passes brought to one pixel, in the colours and the exposure of the image: sums over passes.
+struct PixelStatistics {
+  std::array<float, 3> all{};
+  std::array<float, 3> half_difference{};  // even passes less odd ones
+  float squared_deviations = 0;            // of passes' luminances from their mean
+  float even_bias = 0, odd_bias = 0;       // luminance, of even passes and of odd ones
+  std::array<float, 3> bias_color{};       // of luminance 1
 };
-using PixelSumsAt = std::function<PixelSums(std::size_t pixel)>;
+struct ImageStatistics {
+  int width = 0, height = 0;
+  std::int64_t passes = 0;
+  std::vector<PixelStatistics> pixels;  // row-major
+};
 
 // Passes before the first look at the error: halves of two passes each.
 inline constexpr std::int64_t kFirstCheckpoint = 4;
@@ -113,10 +118,9 @@ inline constexpr std::int64_t kFirstCheckpoint = 4;
 // The share of runs in which the true error lies within the interval at all looks.
 inline constexpr double kConfidence = 0.95;
 
-// `sums_at` gives the sums of each pixel, row-major; `look` counts the looks at this render,
-// from 1. Requires passes >= 2.
-[[nodiscard]] ErrorEstimate EstimateError(int width, int height, std::int64_t passes, int look,
-                                          const PixelSumsAt& sums_at);
+// `look` counts the looks at this render, from 1. The result does not depend on the number of
+// threads. Requires image.passes >= 2.
+[[nodiscard]] ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& team);
 
 // Returns z with P(|Z| > z) = probability for a standard normal Z. Requires 0 < probability < 1.
 [[nodiscard]] double TwoSidedNormalQuantile(double probability);

@@ -15,13 +15,16 @@ double LuminanceOfSum(const ImageSums::Pixel& sum) {
 
 }  // namespace
 
-void ImageSums::Add(const SliceSums& slice) {
+void ImageSums::Add(const SliceSums& slice, ThreadTeam& team) {
   LUCERNA_CHECK(slice.passes.first == passes_ && slice.pixels() == pixels_.size());
   tail_.clear();
-  for (std::size_t pixel = 0; pixel < pixels_.size(); ++pixel) {
-    AddTo(pixels_[pixel], passes_, slice, pixel);
-    AddTo(features_[pixel], slice, pixel);
-  }
+  constexpr std::size_t kPixelsAtOnce = 4096;
+  team.For(pixels_.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t pixel = begin; pixel < end; ++pixel) {
+      AddTo(pixels_[pixel], passes_, slice, pixel);
+      AddTo(features_[pixel], slice, pixel);
+    }
+  });
   passes_ = slice.passes.last;
   eye_rays_ += slice.eye_rays;
   tally_ += slice.tally;

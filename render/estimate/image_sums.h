@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "render/base/parallel.h"
 #include "render/estimate/error_estimate.h"
 #include "render/estimate/slice_sums.h"
 #include "render/math/rgb.h"
@@ -24,7 +25,7 @@ class ImageSums {
 
   // Adds the passes that follow those added so far; takes the tail away.
   // Requires slice.passes.first == whole_passes().
-  void Add(const SliceSums& slice);
+  void Add(const SliceSums& slice, ThreadTeam& team);
   // What comes after the passes added, in pass order. Requires slices without a gap.
   void SetTail(Slices tail);
 

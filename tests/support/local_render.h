@@ -25,9 +25,12 @@ class LocalRender {
   void AddPass(int batches = 1);
   [[nodiscard]] Image MakeImage() const { return estimator_->MakeImage(); }
   [[nodiscard]] ErrorEstimate EstimateError(int look) const {
-    return estimator_->EstimateError(look);
+    const EstimatorSnapshot snapshot = estimator_->Snapshot();
+    return estimator_->EstimateError(snapshot, estimator_->FindMissingLight(snapshot), look);
   }
-  [[nodiscard]] MissingLight FindMissingLight() const { return estimator_->FindMissingLight(); }
+  [[nodiscard]] MissingLight FindMissingLight() const {
+    return estimator_->FindMissingLight(estimator_->Snapshot());
+  }
   // Over all passes.
   [[nodiscard]] const BatchTally& tally() const { return tally_; }
 

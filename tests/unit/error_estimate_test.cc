@@ -17,19 +17,34 @@ namespace {
 constexpr int kSide = 96;
 constexpr std::size_t kPixels = static_cast<std::size_t>(kSide) * kSide;
 
-// Of grey passes whose sum is `all`.
+// Of passes whose sum is `all`.
+ImageStatistics StatisticsOf(const ErrorStatistics& statistics, const std::vector<RgbSum>& all,
+                             bool has_bias) {
+  ImageStatistics image = {
+      .width = kSide, .height = kSide, .passes = statistics.passes(), .pixels = {}};
+  image.pixels.resize(kPixels);
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    PixelStatistics& pixel = image.pixels[i];
+    for (std::size_t c = 0; c < 3; ++c) {
+      pixel.all[c] = static_cast<float>(all[i][c]);
+      pixel.half_difference[c] = static_cast<float>(2 * statistics.even_sum()[i][c] - all[i][c]);
+    }
+    const double luminance = LuminanceOf(all[i]);
+    pixel.squared_deviations =
+        static_cast<float>(statistics.square_sum()[i] -
+                           luminance * luminance / static_cast<double>(statistics.passes()));
+    if (!has_bias) continue;
+    pixel.even_bias = static_cast<float>(statistics.even_bias()[i]);
+    pixel.odd_bias = static_cast<float>(statistics.odd_bias()[i]);
+    pixel.bias_color = {1, 1, 1};
+  }
+  return image;
+}
+
 ErrorEstimate EstimateOf(const ErrorStatistics& statistics, const std::vector<RgbSum>& all,
                          int look) {
-  return EstimateError(kSide, kSide, statistics.passes(), look, [&](std::size_t pixel) {
-    PixelSums sums;
-    sums.all = all[pixel];
-    sums.even = statistics.even_sum()[pixel];
-    sums.even_bias = statistics.even_bias()[pixel];
-    sums.odd_bias = statistics.odd_bias()[pixel];
-    sums.bias_color = {1, 1, 1};
-    sums.square = statistics.square_sum()[pixel];
-    return sums;
-  });
+  ThreadTeam team(1);
+  return EstimateError(StatisticsOf(statistics, all, true), look, team);
 }
 
 // A grey image of value 2 with independent noise of standard deviation `noise` a pass, and `bias`.
@@ -279,13 +294,8 @@ TEST(ErrorEstimateTest, NoiseFactorSeesStratification) {
     }
     statistics.AddPass(static_cast<std::uint64_t>(pass), radiance, none);
   }
-  const ErrorEstimate estimate = EstimateError(kSide, kSide, 16, 1, [&](std::size_t pixel) {
-    PixelSums sums;
-    sums.all = all[pixel];
-    sums.even = statistics.even_sum()[pixel];
-    sums.square = statistics.square_sum()[pixel];
-    return sums;
-  });
+  ThreadTeam team(1);
+  const ErrorEstimate estimate = EstimateError(StatisticsOf(statistics, all, false), 1, team);
   EXPECT_LT(estimate.noise_factor, 0.01);
 }
 

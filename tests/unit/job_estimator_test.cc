@@ -338,6 +338,11 @@ class RoundJob {
     return estimator_->PlanFor(round);
   }
   JobEstimator& estimator() { return *estimator_; }
+  double MissingShare() { return estimator_->FindMissingLight(estimator_->Snapshot()).share; }
+  ErrorEstimate ErrorAtLook(int look) {
+    const EstimatorSnapshot snapshot = estimator_->Snapshot();
+    return estimator_->EstimateError(snapshot, estimator_->FindMissingLight(snapshot), look);
+  }
 
  private:
   SliceSums Traced(const PassRange& passes, const RoundPlan& plan) {
@@ -377,8 +382,8 @@ TEST(RoundsOfAJobTest, GoingOnAfterAnEndWithinARoundLeavesNoTrace) {
               in_one_go.estimator().MakeImage().PixelDigest())
         << NameOf(controller);
     EXPECT_EQ(in_parts.estimator().eye_rays(), in_one_go.estimator().eye_rays());
-    const ErrorEstimate a = in_parts.estimator().EstimateError(3);
-    const ErrorEstimate b = in_one_go.estimator().EstimateError(3);
+    const ErrorEstimate a = in_parts.ErrorAtLook(3);
+    const ErrorEstimate b = in_one_go.ErrorAtLook(3);
     EXPECT_EQ(a.relative.total(), b.relative.total());
     EXPECT_EQ(a.relative.high, b.relative.high);
   }
@@ -403,8 +408,7 @@ TEST(RoundsOfAJobTest, ATailCountsAsItsRoundWould) {
   EXPECT_EQ(tailed.estimator().passes(), 20);
   EXPECT_EQ(tailed.estimator().whole_passes(), 18U);
   EXPECT_EQ(tailed.estimator().photons(), whole.estimator().photons());
-  EXPECT_EQ(tailed.estimator().FindMissingLight().share,
-            whole.estimator().FindMissingLight().share);
+  EXPECT_EQ(tailed.MissingShare(), whole.MissingShare());
   // Which of the two a job ends with is a matter of moments, so no layer may tell.
   const Image a = tailed.estimator().MakeImage();
   const Image b = whole.estimator().MakeImage();

@@ -86,7 +86,7 @@ TEST(SliceOfPassTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
     const RoundPlan plan = Plan(kPhotons, radii.Current());
     const SliceSums slice =
         SliceOfPass(PassOfOneHitpoint(pass, 1, 0, {1, 1, 1}, 1), plan, sums, settings, scale);
-    image.Add(slice);
+    image.Add(slice, team);
     radii.Step(slice, *plan.radii, team);
     if (m == 0) continue;
     tau += static_cast<double>(quanta) * static_cast<double>(scale.watts_per_quantum.g);
@@ -128,7 +128,7 @@ TEST(SliceOfPassTest, KeepsItsDigitsWithATrillionPhotonsAPass) {
     expected += 1 / (std::numbers::pi_v<long double> * radius * radius);
     const SliceSums slice =
         SliceOfPass(PassOfOneHitpoint(pass, 1, 0, {1, 1, 1}, 1), plan, sums, settings, scale);
-    image.Add(slice);
+    image.Add(slice, team);
     radii.Step(slice, *plan.radii, team);
   }
   // Every term is rounded to 16 bits, and a few roundings of 2^-53 are nothing beside that.
@@ -158,9 +158,10 @@ TEST(SliceOfPassTest, CountsAPassWithoutHitpointAsDark) {
   without_hitpoint.direct[0] = {0, 0, 1};
   const SliceSums second =
       SliceOfPass(without_hitpoint, plan, PassSums(0, kCommonColumns), settings, scale);
+  ThreadTeam team(1);
   ImageSums image(2);
-  image.Add(first);
-  image.Add(second);
+  image.Add(first, team);
+  image.Add(second, team);
   EXPECT_EQ(image.passes(), 2U);
   EXPECT_EQ(image.eye_rays(), 17U);
   const ImageSums::Pixel dark = image.At(0);
@@ -254,6 +255,7 @@ TEST(SliceOfPassTest, PassesWithoutEvidenceBringColumnsOfZeros) {
 // Only the first passes carry features: sums over those of them that met a surface.
 TEST(SliceOfPassTest, FeaturesAreOfTheFirstPassesThatMetASurface) {
   const RenderSettings settings = Settings(RadiusControllerKind::kPpm, KernelKind::kEpanechnikov);
+  ThreadTeam team(1);
   ImageSums image(1);
   for (std::uint64_t pass = 0; pass < 2 * kFeaturePasses; ++pass) {
     EyePass eye = DarkPass(pass, 1);
@@ -266,7 +268,7 @@ TEST(SliceOfPassTest, FeaturesAreOfTheFirstPassesThatMetASurface) {
                                         FluxScale::ForPower(Gray(1)));
     EXPECT_EQ(slice.columns.size(),
               kSliceColumns + (pass < kFeaturePasses ? std::size_t{kFeatureColumns} : 0));
-    image.Add(slice);
+    image.Add(slice, team);
   }
   const ImageSums::Features features = image.FeaturesAt(0);
   EXPECT_EQ(features.hits, static_cast<float>(kFeaturePasses / 2));

@@ -120,9 +120,10 @@ TEST(SliceTreeTest, EachPassCountsOnce) {
 
 // The tail counts as its passes would, and goes away again.
 TEST(ImageSumsTest, ATailCountsUntilItIsTakenAway) {
+  ThreadTeam team(1);
   ImageSums sums(kPixels);
-  sums.Add(RandomPass(0));
-  sums.Add(RandomPass(1));
+  sums.Add(RandomPass(0), team);
+  sums.Add(RandomPass(1), team);
   const ImageSums::Pixel before = sums.At(3);
   sums.SetTail({std::make_shared<const SliceSums>(RandomPass(2))});
   const ImageSums::Pixel with_tail = sums.At(3);
@@ -132,7 +133,7 @@ TEST(ImageSumsTest, ATailCountsUntilItIsTakenAway) {
   EXPECT_EQ(sums.At(3).photons, before.photons);
   // What is added takes the tail away, too.
   sums.SetTail({std::make_shared<const SliceSums>(RandomPass(2))});
-  sums.Add(RandomPass(2));
+  sums.Add(RandomPass(2), team);
   EXPECT_EQ(sums.At(3).photons, with_tail.photons);
   EXPECT_EQ(sums.At(3).squared_deviations, with_tail.squared_deviations);
   EXPECT_EQ(sums.passes(), 3U);
