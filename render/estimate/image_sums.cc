@@ -13,27 +13,99 @@ double LuminanceOfSum(const ImageSums::Pixel& sum) {
   return WorkingLuminance(radiance[0], radiance[1], radiance[2]);
 }
 
+// The squared deviations of two groups of passes together.
+double TogetherDeviating(double one, double other, double passes, double luminance,
+                         double slice_passes, double slice_luminance) {
+  const double of_both = one + other;
+  if (!(passes > 0)) return of_both;
+  return of_both + DeviationBetween(passes, luminance, slice_passes, slice_luminance);
+}
+
+// A float that grows by another, as columns of floats do.
+void Grow(double& sum, float by) {
+  sum = static_cast<double>(static_cast<float>(sum) + by);
+}
+
 }  // namespace
 
+ImageSums::Columns::Columns(std::size_t pixels)
+    : squared_deviations(pixels),
+      even_bias(pixels),
+      odd_bias(pixels),
+      photon_count(pixels),
+      largest(pixels) {
+  for (std::vector<double>& column : radiance)
+    column.resize(pixels);
+  for (std::vector<float>& column : half_difference)
+    column.resize(pixels);
+}
+
 void ImageSums::Add(const SliceSums& slice, ThreadTeam& team) {
-  LUCERNA_CHECK(slice.passes.first == passes_ && slice.pixels() == pixels_.size());
+  LUCERNA_CHECK(slice.passes.first == passes_ && slice.pixels() == pixels());
   tail_.clear();
   constexpr std::size_t kPixelsAtOnce = 4096;
-  team.For(pixels_.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t pixel = begin; pixel < end; ++pixel) {
-      AddTo(pixels_[pixel], passes_, slice, pixel);
+  team.For(pixels(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
+    AddPixels(slice, begin, end);
+    if (!HasFeatures(slice.passes)) return;
+    for (std::size_t pixel = begin; pixel < end; ++pixel)
       AddTo(features_[pixel], slice, pixel);
-    }
   });
   passes_ = slice.passes.last;
   eye_rays_ += slice.eye_rays;
   tally_ += slice.tally;
 }
 
+// Column by column, as vectors. AddTo does the same to one pixel, with the same bits.
+void ImageSums::AddPixels(const SliceSums& slice, std::size_t begin, std::size_t end) {
+  const auto passes = static_cast<double>(passes_);
+  const auto slice_passes = static_cast<double>(slice.passes.size());
+  const auto column = [&](std::size_t c) { return slice.columns[c].data(); };
+  std::array<double*, 6> radiance{};
+  std::array<const float*, 6> added{};
+  for (std::size_t c = 0; c < 6; ++c) {
+    radiance[c] = columns_.radiance[c].data();
+    added[c] = column(kPhotonRadiance + c);
+  }
+  static_assert(kDirectRadiance == kPhotonRadiance + 3);
+  float* const deviations = columns_.squared_deviations.data();
+  const float* const slice_deviations = column(kSquaredDeviations);
+  // Before the radiance is added up.
+  for (std::size_t i = begin; i < end; ++i) {
+    const double before =
+        WorkingLuminance(radiance[0][i] + radiance[3][i], radiance[1][i] + radiance[4][i],
+                         radiance[2][i] + radiance[5][i]);
+    const auto of = [&](std::size_t c) {
+      return static_cast<double>(added[c][i]) + static_cast<double>(added[c + 3][i]);
+    };
+    deviations[i] = static_cast<float>(TogetherDeviating(
+        static_cast<double>(deviations[i]), static_cast<double>(slice_deviations[i]), passes,
+        before, slice_passes, WorkingLuminance(of(0), of(1), of(2))));
+  }
+  for (std::size_t c = 0; c < 6; ++c) {
+    for (std::size_t i = begin; i < end; ++i)
+      radiance[c][i] += static_cast<double>(added[c][i]);
+  }
+  const auto add = [&](std::vector<float>& sums, std::size_t c) {
+    float* const sum = sums.data();
+    const float* const of_slice = column(c);
+    for (std::size_t i = begin; i < end; ++i)
+      sum[i] += of_slice[i];
+  };
+  for (std::size_t c = 0; c < 3; ++c)
+    add(columns_.half_difference[c], kHalfDifference + c);
+  add(columns_.even_bias, kEvenBias);
+  add(columns_.odd_bias, kOddBias);
+  add(columns_.photon_count, kPhotonCount);
+  float* const largest = columns_.largest.data();
+  const float* const slice_largest = column(kLargestLuminance);
+  for (std::size_t i = begin; i < end; ++i)
+    largest[i] = std::max(largest[i], slice_largest[i]);
+}
+
 void ImageSums::SetTail(Slices tail) {
   std::uint64_t next = passes_;
   for (const auto& slice : tail) {
-    LUCERNA_CHECK(slice->passes.first == next && slice->pixels() == pixels_.size());
+    LUCERNA_CHECK(slice->passes.first == next && slice->pixels() == pixels());
     next = slice->passes.last;
   }
   tail_ = std::move(tail);
@@ -54,7 +126,17 @@ BatchTally ImageSums::tally() const {
 }
 
 ImageSums::Pixel ImageSums::At(std::size_t pixel) const {
-  Pixel sum = pixels_[pixel];
+  Pixel sum;
+  for (std::size_t c = 0; c < 3; ++c) {
+    sum.photons[c] = columns_.radiance[c][pixel];
+    sum.direct[c] = columns_.radiance[3 + c][pixel];
+    sum.half_difference[c] = static_cast<double>(columns_.half_difference[c][pixel]);
+  }
+  sum.squared_deviations = static_cast<double>(columns_.squared_deviations[pixel]);
+  sum.even_bias = static_cast<double>(columns_.even_bias[pixel]);
+  sum.odd_bias = static_cast<double>(columns_.odd_bias[pixel]);
+  sum.photon_count = static_cast<double>(columns_.photon_count[pixel]);
+  sum.largest = columns_.largest[pixel];
   std::uint64_t passes = passes_;
   for (const auto& slice : tail_) {
     AddTo(sum, passes, *slice, pixel);
@@ -71,31 +153,24 @@ ImageSums::Features ImageSums::FeaturesAt(std::size_t pixel) const {
 }
 
 void ImageSums::AddTo(Pixel& sum, std::uint64_t passes, const SliceSums& slice, std::size_t pixel) {
-  const auto at = [&](std::size_t column) {
-    return static_cast<double>(slice.columns[column][pixel]);
-  };
+  const auto at = [&](std::size_t column) { return slice.columns[column][pixel]; };
   const double before = LuminanceOfSum(sum);
-  double added = 0;
-  {
-    Pixel alone;
-    for (std::size_t c = 0; c < 3; ++c) {
-      alone.photons[c] = at(kPhotonRadiance + c);
-      alone.direct[c] = at(kDirectRadiance + c);
-      sum.photons[c] += alone.photons[c];
-      sum.direct[c] += alone.direct[c];
-      sum.half_difference[c] += at(kHalfDifference + c);
-    }
-    added = LuminanceOfSum(alone);
+  Pixel alone;
+  for (std::size_t c = 0; c < 3; ++c) {
+    alone.photons[c] = static_cast<double>(at(kPhotonRadiance + c));
+    alone.direct[c] = static_cast<double>(at(kDirectRadiance + c));
+    sum.photons[c] += alone.photons[c];
+    sum.direct[c] += alone.direct[c];
+    Grow(sum.half_difference[c], at(kHalfDifference + c));
   }
-  sum.squared_deviations += at(kSquaredDeviations);
-  if (passes > 0) {
-    sum.squared_deviations += DeviationBetween(static_cast<double>(passes), before,
-                                               static_cast<double>(slice.passes.size()), added);
-  }
-  sum.largest = std::max(sum.largest, slice.columns[kLargestLuminance][pixel]);
-  sum.even_bias += at(kEvenBias);
-  sum.odd_bias += at(kOddBias);
-  sum.photon_count += at(kPhotonCount);
+  sum.squared_deviations = static_cast<double>(static_cast<float>(
+      TogetherDeviating(sum.squared_deviations, static_cast<double>(at(kSquaredDeviations)),
+                        static_cast<double>(passes), before,
+                        static_cast<double>(slice.passes.size()), LuminanceOfSum(alone))));
+  sum.largest = std::max(sum.largest, at(kLargestLuminance));
+  Grow(sum.even_bias, at(kEvenBias));
+  Grow(sum.odd_bias, at(kOddBias));
+  Grow(sum.photon_count, at(kPhotonCount));
 }
 
 void ImageSums::AddTo(Features& sum, const SliceSums& slice, std::size_t pixel) {

@@ -1,10 +1,12 @@
 // What have all passes so far brought to every pixel?
 //
-// Sums over passes in double, of slices taken in pass order. A round that is not whole yet stays
+// Sums over passes of slices taken in pass order: radiance in double, what errors are estimated
+// from in float. A round that is not whole yet stays
 // apart, as a tail: it counts in the image, and can be taken away again, so that a job that goes on
 // after its end has the same bits as one that never stopped.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -19,7 +21,7 @@ namespace lucerna {
 
 class ImageSums {
  public:
-  explicit ImageSums(std::size_t pixels) : pixels_(pixels), features_(pixels) {}
+  explicit ImageSums(std::size_t pixels) : columns_(pixels), features_(pixels) {}
 
   using Slices = std::vector<std::shared_ptr<const SliceSums>>;
 
@@ -34,7 +36,7 @@ class ImageSums {
   [[nodiscard]] std::uint64_t passes() const {
     return tail_.empty() ? passes_ : tail_.back()->passes.last;
   }
-  [[nodiscard]] std::size_t pixels() const { return pixels_.size(); }
+  [[nodiscard]] std::size_t pixels() const { return features_.size(); }
   // Of all passes.
   [[nodiscard]] std::uint64_t eye_rays() const;
   [[nodiscard]] BatchTally tally() const;
@@ -66,13 +68,22 @@ class ImageSums {
   [[nodiscard]] Features FeaturesAt(std::size_t pixel) const;
 
  private:
+  // Sums over passes as columns [pixels]: those that image and error are the difference of in
+  // double.
+  struct Columns {
+    explicit Columns(std::size_t pixels);
+    std::array<std::vector<double>, 6> radiance;  // photons, direct
+    std::array<std::vector<float>, 3> half_difference;
+    std::vector<float> squared_deviations, even_bias, odd_bias, photon_count, largest;
+  };
+  void AddPixels(const SliceSums& slice, std::size_t begin, std::size_t end);
   static void AddTo(Pixel& sum, std::uint64_t passes, const SliceSums& slice, std::size_t pixel);
   static void AddTo(Features& sum, const SliceSums& slice, std::size_t pixel);
 
   std::uint64_t passes_ = 0;
   std::uint64_t eye_rays_ = 0;
   BatchTally tally_;
-  std::vector<Pixel> pixels_;
+  Columns columns_;
   std::vector<Features> features_;
   Slices tail_;
 };

@@ -6,8 +6,8 @@
 // its two halves, so that the bits do not depend on who adds up what.
 //
 // Sums of radiance are rounded to 16 significant bits and all others to 8, to nearest, when a pass
-// becomes a slice and at every node: far below the noise of the passes that they sum, and half the
-// bytes on the wire.
+// becomes a slice and at every node: far below the noise of the passes that
+// they sum, and half the bytes on the wire.
 //
 // Invariants
 //   S1  Every column that is present has pixels() rows, all finite, in its column's precision.

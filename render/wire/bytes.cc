@@ -1,6 +1,7 @@
 #include "render/wire/bytes.h"
 
 #include <algorithm>
+#include <bit>
 #include <memory>
 #include <utility>
 
@@ -31,46 +32,39 @@ void WritePlanes(ByteWriter& writer, std::span<const Value> column) {
   }
 }
 
-// The numbers whose byte planes follow one another in `bytes`. A fixed number of planes, so that
-// the loop is one over vectors.
-template <typename Value, unsigned int kPlanes>
-void JoinPlanes(const std::uint8_t* bytes, std::span<Value> column) {
-  const std::size_t rows = column.size();
+// Calls put(row, number) for the numbers whose byte planes follow one another in `bytes`. A fixed
+// number of planes, so that the loop is one over vectors.
+template <typename Value, unsigned int kPlanes, typename Put>
+void JoinPlanes(const std::uint8_t* bytes, std::size_t rows, const Put& put) {
   for (std::size_t i = 0; i < rows; ++i) {
     Value value = 0;
     for (unsigned int p = 0; p < kPlanes; ++p)
       value = static_cast<Value>(value | static_cast<Value>(Value{bytes[p * rows + i]} << (8 * p)));
-    column[i] = value;
+    put(i, value);
   }
 }
 
-template <typename Value, unsigned int... kPlanes>
-void JoinPlanes(unsigned int planes, const std::uint8_t* bytes, std::span<Value> column,
+template <typename Value, typename Put, unsigned int... kPlanes>
+void JoinPlanes(unsigned int planes, const std::uint8_t* bytes, std::size_t rows, const Put& put,
                 std::integer_sequence<unsigned int, kPlanes...> /*counts*/) {
-  ((planes == kPlanes + 1 ? JoinPlanes<Value, kPlanes + 1>(bytes, column) : void()), ...);
+  ((planes == kPlanes ? JoinPlanes<Value, kPlanes>(bytes, rows, put) : void()), ...);
+}
+
+template <typename Value, typename Put>
+void JoinPlanes(unsigned int planes, const std::uint8_t* bytes, std::size_t rows, const Put& put) {
+  JoinPlanes<Value>(planes, bytes, rows, put,
+                    std::make_integer_sequence<unsigned int, sizeof(Value) + 1>());
+}
+
+template <typename Value>
+std::vector<Value> Joined(unsigned int planes, const std::uint8_t* bytes, std::size_t rows) {
+  std::vector<Value> column(rows);
+  JoinPlanes<Value>(planes, bytes, rows,
+                    [to = column.data()](std::size_t i, Value value) { to[i] = value; });
+  return column;
 }
 
 }  // namespace
-
-template <typename Value>
-std::vector<Value> ByteReader::Planes(std::size_t rows) {
-  const std::uint8_t planes = Byte();
-  if (planes > sizeof(Value)) Fail();
-  if (!ok_) return {};
-  // Memory for as many planes as have been found to be there, and not for what the first byte says.
-  std::vector<std::string_view> packed;
-  for (unsigned int p = 0; p < planes; ++p)
-    packed.push_back(Packed(rows));
-  if (!ok_) return {};
-  const auto bytes = std::make_unique_for_overwrite<std::uint8_t[]>(planes * rows);
-  for (unsigned int p = 0; p < planes; ++p)
-    Unpack(packed[p], bytes.get() + p * rows, rows);
-  if (!ok_) return {};
-  std::vector<Value> column(rows);
-  JoinPlanes(planes, bytes.get(), std::span(column),
-             std::make_integer_sequence<unsigned int, sizeof(Value)>());
-  return column;
-}
 
 void ByteWriter::Varint(std::uint64_t value) {
   while (value >= 0x80) {
@@ -157,12 +151,47 @@ std::string ByteReader::Compressed(std::size_t size) {
   return ok_ ? bytes : std::string();
 }
 
+ByteReader::ColumnBytes ByteReader::ReadPlanes(unsigned int most_planes, std::size_t rows) {
+  const std::uint8_t planes = Byte();
+  if (planes > most_planes) Fail();
+  // Memory for as many planes as have been found to be there, and not for what the first byte says.
+  std::vector<std::string_view> packed;
+  for (unsigned int p = 0; p < planes && ok_; ++p)
+    packed.push_back(Packed(rows));
+  if (!ok_) return {};
+  ColumnBytes column = {planes, std::make_unique_for_overwrite<std::uint8_t[]>(planes * rows)};
+  for (unsigned int p = 0; p < planes; ++p)
+    Unpack(packed[p], column.bytes.get() + p * rows, rows);
+  return ok_ ? std::move(column) : ColumnBytes();
+}
+
 std::vector<std::uint32_t> ByteReader::Planes32(std::size_t rows) {
-  return Planes<std::uint32_t>(rows);
+  const ColumnBytes column = ReadPlanes(sizeof(std::uint32_t), rows);
+  if (!ok_) return {};
+  return Joined<std::uint32_t>(column.planes, column.bytes.get(), rows);
 }
 
 std::vector<std::uint64_t> ByteReader::Planes64(std::size_t rows) {
-  return Planes<std::uint64_t>(rows);
+  const ColumnBytes column = ReadPlanes(sizeof(std::uint64_t), rows);
+  if (!ok_) return {};
+  return Joined<std::uint64_t>(column.planes, column.bytes.get(), rows);
+}
+
+void ByteReader::Floats(unsigned int dropped, std::span<float> column) {
+  const ColumnBytes bytes = ReadPlanes(sizeof(std::uint32_t), column.size());
+  if (!ok_) return;
+  constexpr std::uint32_t kExponent = 0x7F800000;  // all ones: infinite or not a number
+  std::uint32_t all = 0;
+  std::uint32_t largest_exponent = 0;
+  JoinPlanes<std::uint32_t>(bytes.planes, bytes.bytes.get(), column.size(),
+                            [&, to = column.data()](std::size_t i, std::uint32_t code) {
+                              const std::uint32_t bits = code << dropped;
+                              all |= code;
+                              largest_exponent = std::max(largest_exponent, bits & kExponent);
+                              to[i] = std::bit_cast<float>(bits);
+                            });
+  const bool is_too_wide = dropped > 0 && (all >> (32 - dropped)) != 0;
+  if (is_too_wide || largest_exponent == kExponent) Fail();
 }
 
 }  // namespace lucerna

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -57,6 +58,9 @@ class ByteReader {
   // What Compressed wrote. Fails unless it unpacks to exactly `size` bytes; nothing is allocated
   // before the compressed bytes themselves have promised that size.
   std::string Compressed(std::size_t size);
+  // What Planes wrote of floats without their lowest `dropped` bits, which become 0, into `column`.
+  // Fails for numbers that have more bits or are not finite.
+  void Floats(unsigned int dropped, std::span<float> column);
   // What Planes wrote, `rows` of them.
   std::vector<std::uint32_t> Planes32(std::size_t rows);
   std::vector<std::uint64_t> Planes64(std::size_t rows);
@@ -73,8 +77,12 @@ class ByteReader {
   std::string_view Packed(std::size_t size);
   // Fails unless `packed` gives exactly `size` bytes.
   void Unpack(std::string_view packed, void* bytes, std::size_t size);
-  template <typename Value>
-  std::vector<Value> Planes(std::size_t rows);
+  // The byte planes of a column, one after the other, and how many they are; none after a failure.
+  struct ColumnBytes {
+    unsigned int planes = 0;
+    std::unique_ptr<std::uint8_t[]> bytes;
+  };
+  ColumnBytes ReadPlanes(unsigned int most_planes, std::size_t rows);
 
   std::string_view rest_;
   bool ok_ = true;

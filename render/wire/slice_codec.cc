@@ -100,20 +100,11 @@ StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape)
   for (std::size_t column = 0; column < columns; ++column) {
     std::vector<float>& values = slice.columns.emplace_back(shape.pixels);
     if (FollowsFromRadiance(shape.passes, column)) continue;
-    const std::vector<std::uint32_t> codes = reader.Planes32(shape.pixels);
-    if (!reader.ok()) return Malformed("its columns are truncated or damaged");
-    const unsigned int empty = EmptyBits(column, shape.evidence);
-    constexpr std::uint32_t kExponent = 0x7F800000;  // all ones: infinite or not a number
-    std::uint32_t all = 0;
-    std::uint32_t largest_exponent = 0;
-    for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel) {
-      all |= codes[pixel];
-      const std::uint32_t bits = codes[pixel] << empty;
-      largest_exponent = std::max(largest_exponent, bits & kExponent);
-      values[pixel] = std::bit_cast<float>(bits);
+    reader.Floats(EmptyBits(column, shape.evidence), values);
+    if (!reader.ok()) {
+      return Malformed(
+          "its columns are truncated or damaged, or a value is not finite or too long");
     }
-    if (empty > 0 && (all >> (32 - empty)) != 0) return Malformed("a value has too many bits");
-    if (largest_exponent == kExponent) return Malformed("a value is not finite");
   }
   if (!reader.finished()) return Malformed("bytes are left over");
   if (shape.passes.size() == 1) SetWhatFollowsFromRadiance(slice);

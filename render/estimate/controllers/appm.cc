@@ -48,8 +48,11 @@ class Appm final : public RadiusController {
     if (square == 0) return next;
     // The least of roughness · squares / (n r²) + square r⁴.
     const double sixth = moments_.roughness * (memory[kSquares] / n) / (n * 2 * square);
-    const double radius = std::max(std::cbrt(std::sqrt(sixth)), smallest_);
-    next.radius = std::min(next.radius, radius);
+    const double r2 = now.radius * now.radius;
+    // Mostly it is not: a root less for every pixel.
+    if (sixth < r2 * r2 * r2) {
+      next.radius = std::min(next.radius, std::max(std::cbrt(std::sqrt(sixth)), smallest_));
+    }
     return next;
   }
 
