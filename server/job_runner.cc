@@ -12,6 +12,8 @@
 namespace lucerna {
 namespace {
 
+// A job is young for so many passes.
+constexpr std::uint64_t kYoungPasses = 16;
 // So many passes are split at once: while the last photons of one are out, workers trace the next.
 constexpr std::size_t kMostSplitPasses = 2;
 // The error is near its target when its upper end is below so many times that.
@@ -270,7 +272,7 @@ Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
   // is split also when there is one worker, because this process has nothing better to do than its
   // eye paths.
   const std::uint64_t at_once = round.last - RadiiFrom(round);
-  const bool is_young = round.first < kFirstLongRound;
+  const bool is_young = round.first < kYoungPasses;
   open.is_split =
       hooks_.always_splits || round.first == 0 ||
       (is_young && at_once < static_cast<std::uint64_t>(hooks_.scheduler.LiveWorkers()));

@@ -123,6 +123,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
                                                      " hitpoints or pixels"));
     }
     collector_.emplace(digest, header.size_bytes());
+    collector_->Reserve();
     return absl::OkStatus();
   }
 

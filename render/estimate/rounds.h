@@ -3,10 +3,12 @@
 // A round is a run of consecutive passes that share one set of radii. Its length and its lag follow
 // from the pass number alone, so the image stays a function of scene and settings, whoever traces
 // which pass and when. Rounds are of one pass each up to kFirstLongRound, so that early radii
-// follow the photons closely; from there on an eighth to a sixteenth of the passes before them. The
-// radii of a round follow from the passes that lie at least an eighth of the passes done before it:
-// a quarter of the passes done may be out at once, and no worker waits for a slower one. Radii fall
-// as a small power of the passes, so that an eighth of lag is some 2 % of a radius.
+// follow the photons closely; then of a quarter to an eighth of the passes before them up to eight
+// passes, later of an eighth to a sixteenth. The radii of a round follow from the passes that lie
+// at least an eighth of the passes done before it: a quarter of the passes done may be out at once,
+// and no worker waits for a slower one. Radii fall as a small power of the passes, so that an
+// eighth of lag is some 2 % of a radius. A worker sends one sum for a slice of a round, so that
+// longer rounds cost the coordinator less (docs/decisions/rounds.md has the figures).
 #pragma once
 
 #include <algorithm>
@@ -22,7 +24,9 @@ struct PassRange {
   auto operator<=>(const PassRange&) const = default;
 };
 
-inline constexpr std::uint64_t kFirstLongRound = 16;
+inline constexpr std::uint64_t kFirstLongRound = 8;
+// So long, rounds grow with a quarter of the passes.
+inline constexpr std::uint64_t kLongestQuickRound = 8;
 inline constexpr std::uint64_t kLongestRound = 64;
 // The coordinator keeps the sums of all rounds that are out while an older one is not whole:
 // without a limit these would grow with the passes.
@@ -31,7 +35,9 @@ inline constexpr std::uint64_t kLongestLag = 512;
 // The round of a pass. Its length is a power of two and divides its first pass.
 [[nodiscard]] constexpr PassRange RoundOf(std::uint64_t pass) {
   if (pass < kFirstLongRound) return {pass, pass + 1};
-  const std::uint64_t length = std::min(std::bit_floor(pass) / 8, kLongestRound);
+  const std::uint64_t octave = std::bit_floor(pass);
+  const std::uint64_t length =
+      std::min(std::max(octave / 8, std::min(octave / 4, kLongestQuickRound)), kLongestRound);
   const std::uint64_t first = pass / length * length;
   return {first, first + length};
 }

@@ -30,6 +30,8 @@ class ChunkCollector {
   ChunkCollector(const Digest& digest, std::uint64_t size_bytes)
       : digest_(digest), size_bytes_(size_bytes) {}
 
+  // Takes memory for all bytes at once: for sizes that have been found to be plausible.
+  void Reserve() { bytes_.reserve(size_bytes_); }
   // Errors: INVALID_ARGUMENT for a chunk that is too long or goes past the announced size.
   [[nodiscard]] Status Add(std::string_view chunk);
   // The bytes. Errors: DATA_LOSS unless size and digest are as announced.

@@ -19,10 +19,17 @@ TEST(RoundsTest, CoverEveryPassOnceAndInOrder) {
   }
 }
 
-TEST(RoundsTest, AreOneEighthOfThePassesBeforeThemAtMost) {
+// Of a quarter of the passes before them up to eight, then of an eighth.
+TEST(RoundsTest, GrowWithThePassesBeforeThem) {
+  EXPECT_EQ(RoundOf(7).size(), 1U);
+  EXPECT_EQ(RoundOf(8).size(), 2U);
+  EXPECT_EQ(RoundOf(31).size(), 4U);
+  EXPECT_EQ(RoundOf(32).size(), 8U);
+  EXPECT_EQ(RoundOf(127).size(), 8U);
+  EXPECT_EQ(RoundOf(128).size(), 16U);
   for (std::uint64_t pass = kFirstLongRound; pass < 10'000; ++pass) {
     const PassRange round = RoundOf(pass);
-    EXPECT_LE(8 * round.size(), round.first);
+    EXPECT_LE((round.size() > kLongestQuickRound ? 8 : 4) * round.size(), round.first);
     EXPECT_LE(round.size(), kLongestRound);
     if (round.size() < kLongestRound) {
       EXPECT_GT(16 * round.size(), round.first);
