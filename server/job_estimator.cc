@@ -29,12 +29,9 @@ namespace lucerna {
 namespace {
 
 constexpr double kPi64 = std::numbers::pi;
-// Photons of a pass over those of the first ones, at most.
-constexpr std::uint64_t kMostPhotonFactor = 8;
-// The variance is known well enough after so many passes; a power of two.
-constexpr std::uint64_t kFirstPhotonChoice = 4;
-// Between the best number and a half of it lies the one from which twice as many are better.
-constexpr double kWorthDoubling = std::numbers::sqrt2;
+// The number of photons is chosen anew after so many passes: each time when the variance is known
+// from twice as many. The last time is the end of the rounds of one pass, which alone show it.
+constexpr std::array<std::uint64_t, 4> kPhotonChoices = {2, 4, 8, kFirstLongRound};
 
 // Whether a path may be bent by a smooth surface.
 bool HasSmoothSurfaces(const Scene& scene) {
@@ -101,6 +98,7 @@ struct JobEstimator::State {
   std::unique_ptr<RadiusController> controller;
   std::unique_ptr<PixelRadii> radii;
   std::unique_ptr<ImageSums> sums;
+  std::unique_ptr<PassVariance> variance;  // while the number of photons may change
   // What rounds follow from that are planned by the state after so many passes.
   struct After {
     std::shared_ptr<const RadiusColumn> radii;
@@ -117,20 +115,22 @@ struct JobEstimator::State {
   float widest_radius = 0;  // of these hitpoints
   double hit_share = 0;     // of the pixels that have one
 
-  // How many photons later passes have, given how many they would have by what was known before.
-  // Looks at the variance now and then, each time twice as many passes later.
-  [[nodiscard]] std::uint64_t ChoosePhotons(std::uint64_t before) const {
-    const std::uint64_t passes = sums->whole_passes();
-    const auto base = static_cast<std::uint64_t>(settings.photons_per_pass);
-    if (!settings.adaptive_photons || before >= kMostPhotonFactor * base ||
-        passes < kFirstPhotonChoice || !std::has_single_bit(passes)) {
-      return before;
+  // How many photons later passes have once `round` is added, given how many they would have by
+  // what was known before.
+  [[nodiscard]] std::uint64_t ChoosePhotons(const SliceSums& round, std::uint64_t before) {
+    if (variance == nullptr) return before;
+    variance->Add(round);
+    const bool is_last = variance->passes() == kPhotonChoices.back();
+    std::uint64_t next = before;
+    if (std::ranges::find(kPhotonChoices, variance->passes()) != kPhotonChoices.end()) {
+      const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
+      const double kernel_noise =
+          kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach;
+      next = NextPhotons(static_cast<std::uint64_t>(settings.photons_per_pass), before,
+                         variance->BestPhotons(kernel_noise));
     }
-    const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
-    const double kernel_noise = kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach;
-    const double per_pixel = static_cast<double>(before) / static_cast<double>(sums->pixels());
-    const double factor = BestPhotonFactor(SplitVariance(*sums, kernel_noise), per_pixel);
-    return factor >= kWorthDoubling ? 2 * before : before;
+    if (is_last) variance.reset();
+    return next;
   }
 
   // Radiance over all passes, Rec. 709.
@@ -159,6 +159,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   state->controller = MakeRadiusController(state->settings, initial);
   state->radii = std::make_unique<PixelRadii>(pixels, initial, *state->controller);
   state->sums = std::make_unique<ImageSums>(pixels);
+  if (settings.adaptive_photons) state->variance = std::make_unique<PassVariance>(pixels);
   state->last_radii = std::make_shared<const RadiusColumn>(state->radii->Current());
   state->after[0] = {.radii = state->last_radii,
                      .photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass)};
@@ -212,9 +213,9 @@ void JobEstimator::AddRound(const SliceSums& round, const RoundPlan& plan) {
   state.radii->Step(round, *plan.radii, state.team);
   state.last_radii = plan.radii;
   const std::uint64_t passes = whole_passes();
-  state.after[passes] = {
-      .radii = std::make_shared<const RadiusColumn>(state.radii->Current()),
-      .photons_per_pass = state.ChoosePhotons(state.after.rbegin()->second.photons_per_pass)};
+  state.after[passes] = {.radii = std::make_shared<const RadiusColumn>(state.radii->Current()),
+                         .photons_per_pass = state.ChoosePhotons(
+                             round, state.after.rbegin()->second.photons_per_pass)};
   // Rounds that are still to be planned, or to be planned again by a job that goes on, need these.
   state.after.erase(state.after.begin(), state.after.lower_bound(RadiiFrom(RoundOf(passes))));
 }
