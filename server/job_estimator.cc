@@ -29,9 +29,16 @@ namespace lucerna {
 namespace {
 
 constexpr double kPi64 = std::numbers::pi;
-// The number of photons is chosen anew after so many passes: each time when the variance is known
-// from twice as many. The last time is the end of the rounds of one pass, which alone show it.
-constexpr std::array<std::uint64_t, 4> kPhotonChoices = {2, 4, 8, kFirstLongRound};
+// The number of photons of later passes is chosen after so many passes, each time from twice as
+// many. The last time is the end of the rounds of one pass, which alone show where variance comes
+// from.
+struct PhotonChoice {
+  std::uint64_t passes;
+  // Over the photons of the first passes, at most. Two passes have seldom met rare light.
+  std::uint64_t most;
+};
+constexpr std::array kPhotonChoices = {PhotonChoice{2, 2}, PhotonChoice{4, 8}, PhotonChoice{8, 8},
+                                       PhotonChoice{kFirstLongRound, 8}};
 
 // Whether a path may be bent by a smooth surface.
 bool HasSmoothSurfaces(const Scene& scene) {
@@ -120,16 +127,17 @@ struct JobEstimator::State {
   [[nodiscard]] std::uint64_t ChoosePhotons(const SliceSums& round, std::uint64_t before) {
     if (variance == nullptr) return before;
     variance->Add(round);
-    const bool is_last = variance->passes() == kPhotonChoices.back();
     std::uint64_t next = before;
-    if (std::ranges::find(kPhotonChoices, variance->passes()) != kPhotonChoices.end()) {
+    for (const PhotonChoice& choice : kPhotonChoices) {
+      if (variance->passes() != choice.passes) continue;
       const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
       const double kernel_noise =
           kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach;
-      next = NextPhotons(static_cast<std::uint64_t>(settings.photons_per_pass), before,
-                         variance->BestPhotons(kernel_noise));
+      next =
+          NextPhotons(before, choice.most * static_cast<std::uint64_t>(settings.photons_per_pass),
+                      variance->BestPhotons(kernel_noise));
     }
-    if (is_last) variance.reset();
+    if (variance->passes() == kPhotonChoices.back().passes) variance.reset();
     return next;
   }
 

@@ -63,7 +63,10 @@ void PassVariance::Add(const SliceSums& pass) {
     }
     sum.photons += static_cast<float>(photons);
     sum.direct += static_cast<float>(direct);
-    if (passes_ % 2 == 0) sum.even += static_cast<float>(photons + direct);
+    if (passes_ % 2 == 0) {
+      sum.even_photons += static_cast<float>(photons);
+      sum.even += static_cast<float>(photons + direct);
+    }
     sum.count += pass.At(kPhotonCount, i);
   }
   photons_ += pass.tally.photons;
@@ -90,39 +93,46 @@ PassVariance::Parts PassVariance::Split(double kernel_noise) const {
 
   // Of one pixel, relative.
   struct Variances {
-    double passes = 0, halves = 0, photons = 0, photons_found = 0;
+    double all = 0;            // of passes
+    double photons = 0;        // of what photons brought
+    double photons_found = 0;  // that the number of photons found explains
+    double eye_paths = 0;      // of halves, beyond what photons brought to them
   };
   std::vector<Variances> variances;
   variances.reserve(pixels_.size());
+  const double halves = even_passes * odd_passes / passes;
   for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const Pixel& pixel = pixels_[i];
     const double weight = 1 / (luminances[i] * luminances[i] + floor);
-    const auto even = static_cast<double>(pixel.even);
-    const double difference = even / even_passes - (sum_of(pixel) - even) / odd_passes;
-    const double of_photons = static_cast<double>(pixel.photons) / passes;
+    const auto difference = [&](double sum, double even) {
+      return even / even_passes - (sum - even) / odd_passes;
+    };
+    const double all = difference(sum_of(pixel), static_cast<double>(pixel.even));
+    const double of_photons =
+        difference(static_cast<double>(pixel.photons), static_cast<double>(pixel.even_photons));
+    const double photons = static_cast<double>(pixel.photons) / passes;
     const auto count = static_cast<double>(pixel.count);
     variances.push_back(
-        {.passes = weight * static_cast<double>(pixel.deviations) / (passes - 1),
-         .halves = weight * difference * difference * even_passes * odd_passes / passes,
+        {.all = weight * static_cast<double>(pixel.deviations) / (passes - 1),
          .photons = weight * static_cast<double>(pixel.photon_deviations) / (passes - 1),
          .photons_found =
-             count > 0 ? weight * of_photons * of_photons * kernel_noise * passes / count : 0});
+             count > 0 ? weight * photons * photons * kernel_noise * passes / count : 0,
+         .eye_paths = weight * (all * all - of_photons * of_photons) * halves});
   }
   const std::size_t kept = KeptPixels(variances.size());
   std::ranges::nth_element(variances, variances.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
-                           &Variances::passes);
+                           &Variances::all);
   Variances mean;
   for (std::size_t i = 0; i < kept; ++i) {
-    mean.halves += variances[i].halves;
-    mean.photons += variances[i].photons;
-    mean.photons_found += variances[i].photons_found;
+    mean.photons += variances[i].photons / static_cast<double>(kept);
+    mean.photons_found += variances[i].photons_found / static_cast<double>(kept);
+    mean.eye_paths += variances[i].eye_paths / static_cast<double>(kept);
   }
-  const auto count = static_cast<double>(kept);
-  // Photons that arrive one by one as equals explain so much. It is too much where many pixels have
-  // found hardly any photon, or low discrepancy spaces them evenly; but what photons brought varies
-  // by all that they explain.
-  const double photons = std::min(mean.photons_found, mean.photons) / count;
-  return {.photons = photons, .eye_paths = std::max(0.0, mean.halves / count - photons)};
+  // What photons brought varies by their number, and by where eye paths end. Photons that arrive
+  // one by one as equals explain the first part; more than there is where many pixels have found
+  // hardly any, or where low discrepancy spaces them evenly.
+  const double photons = std::min(mean.photons_found, mean.photons);
+  return {.photons = photons, .eye_paths = std::max(0.0, mean.eye_paths) + mean.photons - photons};
 }
 
 PassVariance::Costs PassVariance::CostsSoFar() const {
@@ -141,13 +151,11 @@ double PassVariance::BestPhotons(double kernel_noise) const {
          std::sqrt(variance.photons * costs.eye_paths / (variance.eye_paths * costs.photons));
 }
 
-std::uint64_t NextPhotons(std::uint64_t first, std::uint64_t present, double best) {
+std::uint64_t NextPhotons(std::uint64_t present, std::uint64_t most, double best) {
   std::uint64_t next = present;
   // Between a number and twice as many lies the one from which twice as many are better.
-  while (next < kMostPhotonFactor * first &&
-         best >= std::numbers::sqrt2 * static_cast<double>(next)) {
+  while (2 * next <= most && best >= std::numbers::sqrt2 * static_cast<double>(next))
     next *= 2;
-  }
   return next;
 }
 

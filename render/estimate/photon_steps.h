@@ -42,10 +42,11 @@ class PassVariance {
   // Parts of the variance of a pass, as means over the pixels, relative to the squared value (with
   // the floor of relative errors). The pixels that vary most are left out, as in relative errors.
   struct Parts {
-    // Of photons: where eye paths end at the same places, it falls as one over their number.
+    // Of photons: falls as one over their number.
     double photons = 0;
-    // Of eye paths, direct light included. As the even and the odd passes differ: samples of low
-    // discrepancy make the mean of passes better than independent passes would.
+    // Of eye paths, direct light included: what more photons would not change. Of direct light it
+    // is what even and odd passes differ by: with samples of low discrepancy the mean of many
+    // passes varies less than deviations of single passes say.
     double eye_paths = 0;
   };
   // `kernel_noise` is the variance that one photon brings, over the squared flux expected of it:
@@ -69,7 +70,8 @@ class PassVariance {
  private:
   struct Pixel {
     float photons = 0, direct = 0;  // luminances
-    float even = 0;                 // luminance of the even passes
+    float even_photons = 0;         // luminance of the even passes
+    float even = 0;                 // the same with direct light
     float deviations = 0;           // squared, of passes from their mean
     float photon_deviations = 0;    // the same of what photons brought
     float count = 0;                // photons found
@@ -79,10 +81,8 @@ class PassVariance {
   std::uint64_t photons_ = 0, photon_rays_ = 0, pairs_ = 0, eye_rays_ = 0;
 };
 
-// How many photons later passes have, which is now `present`, where `best` would be best: a power
-// of two times `first`, the number of the first passes; never fewer than now and at most
-// kMostPhotonFactor times `first`.
-inline constexpr std::uint64_t kMostPhotonFactor = 8;
-[[nodiscard]] std::uint64_t NextPhotons(std::uint64_t first, std::uint64_t present, double best);
+// `present` times the power of two that comes closest to `best`; not less than `present`, and not
+// more than `most`. Requires present > 0.
+[[nodiscard]] std::uint64_t NextPhotons(std::uint64_t present, std::uint64_t most, double best);
 
 }  // namespace lucerna
