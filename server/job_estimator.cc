@@ -29,16 +29,18 @@ namespace lucerna {
 namespace {
 
 constexpr double kPi64 = std::numbers::pi;
-// The number of photons of later passes is chosen after so many passes, each time from twice as
-// many. The last time is the end of the rounds of one pass, which alone show where variance comes
-// from.
+// The number of photons of later passes is chosen after so many passes. What variance the choice
+// follows from is seen in rounds of one pass alone; the last choice follows from what was known
+// then.
 struct PhotonChoice {
   std::uint64_t passes;
-  // Over the photons of the first passes, at most. Two passes have seldom met rare light.
+  // Over the photons of the first passes, at most. An image is the mean of its passes, so those
+  // that came before with fewer photons must be few among all; and two passes have seldom met rare
+  // light.
   std::uint64_t most;
 };
-constexpr std::array kPhotonChoices = {PhotonChoice{2, 2}, PhotonChoice{4, 8}, PhotonChoice{8, 8},
-                                       PhotonChoice{kFirstLongRound, 8}};
+constexpr std::array kPhotonChoices = {PhotonChoice{2, 2}, PhotonChoice{4, 4}, PhotonChoice{8, 4},
+                                       PhotonChoice{16, 4}, PhotonChoice{64, 8}};
 
 // Whether a path may be bent by a smooth surface.
 bool HasSmoothSurfaces(const Scene& scene) {
@@ -105,7 +107,8 @@ struct JobEstimator::State {
   std::unique_ptr<RadiusController> controller;
   std::unique_ptr<PixelRadii> radii;
   std::unique_ptr<ImageSums> sums;
-  std::unique_ptr<PassVariance> variance;  // while the number of photons may change
+  std::unique_ptr<PassVariance> variance;  // of the rounds of one pass, while they come
+  double best_photons = 0;                 // as it was known after the last of kPhotonChoices
   // What rounds follow from that are planned by the state after so many passes.
   struct After {
     std::shared_ptr<const RadiusColumn> radii;
@@ -125,20 +128,18 @@ struct JobEstimator::State {
   // How many photons later passes have once `round` is added, given how many they would have by
   // what was known before.
   [[nodiscard]] std::uint64_t ChoosePhotons(const SliceSums& round, std::uint64_t before) {
-    if (variance == nullptr) return before;
-    variance->Add(round);
-    std::uint64_t next = before;
-    for (const PhotonChoice& choice : kPhotonChoices) {
-      if (variance->passes() != choice.passes) continue;
+    if (!settings.adaptive_photons) return before;
+    if (variance != nullptr) variance->Add(round);
+    const auto choice = std::ranges::find(kPhotonChoices, round.passes.last, &PhotonChoice::passes);
+    if (choice == kPhotonChoices.end()) return before;
+    if (variance != nullptr) {
       const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
-      const double kernel_noise =
-          kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach;
-      next =
-          NextPhotons(before, choice.most * static_cast<std::uint64_t>(settings.photons_per_pass),
-                      variance->BestPhotons(kernel_noise));
+      best_photons = variance->BestPhotons(kPi64 * Kernel{settings.kernel}.Moments().roughness *
+                                           reach * reach);
+      if (variance->passes() == kFirstLongRound) variance.reset();
     }
-    if (variance->passes() == kPhotonChoices.back().passes) variance.reset();
-    return next;
+    const auto first = static_cast<std::uint64_t>(settings.photons_per_pass);
+    return NextPhotons(before, choice->most * first, best_photons);
   }
 
   // Radiance over all passes, Rec. 709.

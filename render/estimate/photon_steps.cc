@@ -19,6 +19,12 @@ constexpr double kEyePathCost = 3;
 constexpr double kEyeRayCost = 0.75;
 constexpr double kPairCost = 0.1;
 
+// Squares of what a float holds may not fit in one.
+float Held(double value) {
+  return static_cast<float>(
+      std::min(value, static_cast<double>(std::numeric_limits<float>::max())));
+}
+
 }  // namespace
 
 std::uint64_t PhotonsOf(const PhotonSteps& steps, std::uint64_t pass) {
@@ -47,6 +53,7 @@ std::uint64_t PassesFor(const PhotonSteps& steps, std::uint64_t photons) {
 void PassVariance::Add(const SliceSums& pass) {
   LUCERNA_CHECK(pass.passes == PassRange(passes_, passes_ + 1) && pass.pixels() == pixels_.size());
   const auto passes = static_cast<double>(passes_);
+  const auto add = [](float& sum, double value) { sum = Held(static_cast<double>(sum) + value); };
   for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const auto at = [&](std::size_t column) { return static_cast<double>(pass.At(column, i)); };
     const auto luminance = [&](std::size_t column) {
@@ -57,17 +64,17 @@ void PassVariance::Add(const SliceSums& pass) {
     Pixel& sum = pixels_[i];
     if (passes_ > 0) {
       const auto before = static_cast<double>(sum.photons);
-      sum.photon_deviations += static_cast<float>(DeviationBetween(passes, before, 1, photons));
-      sum.deviations += static_cast<float>(
+      add(sum.photon_deviations, DeviationBetween(passes, before, 1, photons));
+      add(sum.deviations,
           DeviationBetween(passes, before + static_cast<double>(sum.direct), 1, photons + direct));
     }
-    sum.photons += static_cast<float>(photons);
-    sum.direct += static_cast<float>(direct);
+    add(sum.photons, photons);
+    add(sum.direct, direct);
     if (passes_ % 2 == 0) {
-      sum.even_photons += static_cast<float>(photons);
-      sum.even += static_cast<float>(photons + direct);
+      add(sum.even_photons, photons);
+      add(sum.even, photons + direct);
     }
-    sum.count += pass.At(kPhotonCount, i);
+    add(sum.count, at(kPhotonCount));
   }
   photons_ += pass.tally.photons;
   photon_rays_ += pass.tally.rays;
