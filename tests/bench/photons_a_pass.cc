@@ -4,9 +4,11 @@
 // the job chooses, all in one process. The renders take turns, the one that has used the least
 // processor time next, so that a machine that others use as well slows all of them alike. Errors
 // are read when a render has used so much processor time for each pixel.
-// Run: build/release/bin/lucerna-photons-check SCENE REFERENCE.exr|- [WIDTHxHEIGHT [SEED
-// [US_PER_PIXEL [PRINT]]]] Without a reference (-) one is rendered first, with another seed, for
-// eight times as long.
+//
+// Run: build/release/bin/lucerna-photons-check SCENE REFERENCE.exr
+//          [WIDTHxHEIGHT [SEED [US_PER_PIXEL [NUMBERS]]]]
+// NUMBERS are digits, 0 for the job's choice: 12480 by default. With "-" for a reference one is
+// rendered first, with another seed, for eight times as long.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -15,14 +17,17 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "render/base/clock.h"
 #include "render/base/files.h"
+#include "render/estimate/evidence.h"
 #include "render/estimate/photon_steps.h"
-#include "render/estimate/relative_error.h"
 #include "render/estimate/slice_tree.h"
+#include "render/math/kernel.h"
 #include "tests/support/local_render.h"
 
 namespace lucerna {
@@ -30,7 +35,6 @@ namespace {
 
 // Processor time for each pixel at which errors are read [µs].
 constexpr std::array<double, 6> kTimes = {8, 16, 32, 64, 128, 256};
-constexpr std::uint64_t kStudied = 16;
 const std::atomic<bool> kNeverStop = false;
 
 class TimedRender {
@@ -51,38 +55,20 @@ class TimedRender {
       plan_ = estimator_->PlanFor(round);
       round_.emplace(round);
     }
+    // As in a job: the coordinator knows the eye paths of the first pass.
     if (pass_ == 0) estimator_->LookAtFirstPass(estimator_->TraceEyePaths(0), *plan_);
     SliceSums slice = *tracer_.RunSlice(settings_, needs_, {pass_, pass_ + 1}, *plan_, kNeverStop);
     const Duration traced = ProcessCpuTime();
     trace_s_ += Seconds(traced - start);
-    if (pass_ < kStudied) {
-      auto& photons = of_photons_.emplace_back();
-      auto& all = of_all_.emplace_back();
-      auto& count = count_.emplace_back();
-      for (std::size_t i = 0; i < pixels_; ++i) {
-        const auto at = [&](std::size_t c) { return static_cast<double>(slice.columns[c][i]); };
-        const double p =
-            WorkingLuminance(at(kPhotonRadiance), at(kPhotonRadiance + 1), at(kPhotonRadiance + 2));
-        const double d =
-            WorkingLuminance(at(kDirectRadiance), at(kDirectRadiance + 1), at(kDirectRadiance + 2));
-        photons.push_back(p);
-        all.push_back(p + d);
-        count.push_back(at(kPhotonCount));
-      }
-    }
-    if (pass_ < kStudied) {
+    if (pass_ < kFirstLongRound) {
       variance_.Add(slice);
-      if (pass_ > 0 && std::has_single_bit(pass_ + 1)) {
-        const PassVariance::Parts parts = variance_.Split(3);
-        std::printf("  split %s passes %llu photons %.5f eye %.5f best %.2f\n", name_.c_str(),
-                    static_cast<unsigned long long>(pass_ + 1), parts.photons, parts.eye_paths,
-                    variance_.BestPhotons(3) / static_cast<double>(pixels_));
-      }
+      if (pass_ > 0 && std::has_single_bit(pass_ + 1)) PrintSplit();
     }
     eye_rays_ += slice.eye_rays;
     tally_ += slice.tally;
     steps_.push_back(plan_->photons_per_pass);
-    const Duration study = ProcessCpuTime();
+    // What is printed is not part of the render.
+    const Duration summed = ProcessCpuTime();
     LUCERNA_CHECK(round_->Add(std::move(slice)).ok());
     ++pass_;
     if (round_->IsWhole()) {
@@ -90,68 +76,19 @@ class TimedRender {
     } else {
       estimator_->SetTail(round_->Prefix(), *plan_);
     }
-    time_s_ += Seconds(traced - start) + Seconds(ProcessCpuTime() - study);
+    time_s_ += Seconds(traced - start) + Seconds(ProcessCpuTime() - summed);
   }
 
-  // Of a pass in the first `passes`, as means over the same pixels; relative to the squares.
-  void PrintStudy(std::uint64_t passes) const {
-    if (of_all_.size() < passes) return;
-    const auto k = static_cast<double>(passes);
-    std::vector<double> mean(pixels_);
-    for (std::size_t i = 0; i < pixels_; ++i)
-      for (std::uint64_t p = 0; p < passes; ++p)
-        mean[i] += of_all_[p][i] / k;
-    const double floor = RelativeErrorFloor(mean);
-    struct Row {
-      double all = 0, photons = 0, direct = 0, halves_all = 0, halves_photons = 0, poisson = 0;
-    };
-    std::vector<Row> rows(pixels_);
-    for (std::size_t i = 0; i < pixels_; ++i) {
-      const double w = 1 / (mean[i] * mean[i] + floor);
-      double photons = 0;
-      for (std::uint64_t p = 0; p < passes; ++p)
-        photons += of_photons_[p][i] / k;
-      Row& row = rows[i];
-      double even_a = 0, even_p = 0;
-      for (std::uint64_t p = 0; p < passes; ++p) {
-        const double a = of_all_[p][i] - mean[i];
-        const double q = of_photons_[p][i] - photons;
-        row.all += w * a * a / (k - 1);
-        row.photons += w * q * q / (k - 1);
-        row.direct += w * (a - q) * (a - q) / (k - 1);
-        even_a += (p % 2 == 0 ? a : -a);
-        even_p += (p % 2 == 0 ? q : -q);
-      }
-      row.halves_all = w * even_a * even_a / k;
-      row.halves_photons = w * even_p * even_p / k;
-      double count = 0;
-      for (std::uint64_t p = 0; p < passes; ++p)
-        count += count_[p][i];
-      if (count > 0) row.poisson = w * photons * photons * 3 * k / (count + 2);
-    }
-    for (const double trim : {0.001, 0.005}) {
-      const std::size_t kept = KeptPixels(pixels_, trim);
-      if (trim > 0)
-        std::ranges::nth_element(rows, rows.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
-                                 &Row::all);
-      Row sum;
-      for (std::size_t i = 0; i < kept; ++i) {
-        const auto cap = [&](double v) { return trim > 0 ? v : std::min(4.0, v); };
-        sum.all += cap(rows[i].all);
-        sum.photons += cap(rows[i].photons);
-        sum.direct += cap(rows[i].direct);
-        sum.halves_all += cap(rows[i].halves_all);
-        sum.halves_photons += cap(rows[i].halves_photons);
-        sum.poisson += cap(rows[i].poisson);
-      }
-      const double n = static_cast<double>(pixels_);
-      std::printf(
-          "  study %s passes %llu trim %g: all %.5f photons %.5f direct %.5f halves all %.5f "
-          "photons %.5f poisson %.5f\n",
-          name_.c_str(), static_cast<unsigned long long>(passes), trim, sum.all / n,
-          sum.photons / n, sum.direct / n, sum.halves_all / n, sum.halves_photons / n,
-          sum.poisson / n);
-    }
+  // What the job sees of its first passes, with controller and kernel of the defaults.
+  void PrintSplit() const {
+    const float reach = ReachOf(EvidenceOf(settings_.radius_controller));
+    const double kernel_noise = std::numbers::pi * Kernel{settings_.kernel}.Moments().roughness *
+                                static_cast<double>(reach * reach);
+    const PassVariance::Parts parts = variance_.Split(kernel_noise);
+    std::printf("  split %s passes %llu: photons %.5f eye paths %.5f best number %.2f\n",
+                name_.c_str(), static_cast<unsigned long long>(variance_.passes()), parts.photons,
+                parts.eye_paths,
+                variance_.BestPhotons(kernel_noise) / static_cast<double>(pixels_));
   }
   void PrintCosts() const {
     const double paths = static_cast<double>(pixels_) * static_cast<double>(pass_);
@@ -174,9 +111,6 @@ class TimedRender {
   [[nodiscard]] std::size_t pixels() const { return pixels_; }
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const JobEstimator& estimator() const { return *estimator_; }
-  [[nodiscard]] double now() const {
-    return static_cast<double>(steps_.back()) / static_cast<double>(pixels_);
-  }
 
  private:
   std::string name_;
@@ -190,8 +124,6 @@ class TimedRender {
   std::optional<RoundPlan> plan_;
   std::optional<SliceTree> round_;
   double time_s_ = 0, trace_s_ = 0;
-  std::vector<std::vector<double>> of_photons_, of_all_;
-  std::vector<std::vector<double>> count_;
   std::uint64_t eye_rays_ = 0;
   BatchTally tally_;
   std::vector<std::uint64_t> steps_;
@@ -284,11 +216,8 @@ int Main(int argc, char** argv) {
       entry.before_us = after;
     }
   }
-  for (Entry& entry : entries) {
-    for (const std::uint64_t passes : {2, 4, 8, 16})
-      entry.render->PrintStudy(passes);
+  for (const Entry& entry : entries)
     entry.render->PrintCosts();
-  }
   for (Entry& entry : entries) {
     std::printf("  error %s:", entry.render->name().c_str());
     for (std::size_t i = 0; i < entry.errors.size(); ++i)
