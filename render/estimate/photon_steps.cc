@@ -19,6 +19,9 @@ constexpr double kEyePathCost = 3;
 constexpr double kEyeRayCost = 0.75;
 constexpr double kPairCost = 0.1;
 
+// Photons that vary so many times less than independent ones are spaced by low discrepancy.
+constexpr double kEvenlySpaced = 1.25;
+
 // Squares of what a float holds may not fit in one.
 float Held(double value) {
   return static_cast<float>(
@@ -103,6 +106,7 @@ PassVariance::Parts PassVariance::Split(double kernel_noise) const {
     double all = 0;            // of passes
     double photons = 0;        // of what photons brought
     double photons_found = 0;  // that the number of photons found explains
+    double independent = 0;    // the same, without bias where few were found
     double eye_paths = 0;      // of halves, beyond what photons brought to them
   };
   std::vector<Variances> variances;
@@ -124,6 +128,11 @@ PassVariance::Parts PassVariance::Split(double kernel_noise) const {
          .photons = weight * static_cast<double>(pixel.photon_deviations) / (passes - 1),
          .photons_found =
              count > 0 ? weight * photons * photons * kernel_noise * passes / count : 0,
+         // N equals whose squares are expected to be k times that of their mean: of the square of
+         // their sum N k of N k + N (N - 1).
+         .independent = count > 0 ? weight * photons * photons * kernel_noise * passes /
+                                        (count + kernel_noise - 1)
+                                  : 0,
          .eye_paths = weight * (all * all - of_photons * of_photons) * halves});
   }
   const std::size_t kept = KeptPixels(variances.size());
@@ -133,13 +142,16 @@ PassVariance::Parts PassVariance::Split(double kernel_noise) const {
   for (std::size_t i = 0; i < kept; ++i) {
     mean.photons += variances[i].photons / static_cast<double>(kept);
     mean.photons_found += variances[i].photons_found / static_cast<double>(kept);
+    mean.independent += variances[i].independent / static_cast<double>(kept);
     mean.eye_paths += variances[i].eye_paths / static_cast<double>(kept);
   }
   // What photons brought varies by their number, and by where eye paths end. Photons that arrive
   // one by one as equals explain the first part; more than there is where many pixels have found
   // hardly any, or where low discrepancy spaces them evenly.
   const double photons = std::min(mean.photons_found, mean.photons);
-  return {.photons = photons, .eye_paths = std::max(0.0, mean.eye_paths) + mean.photons - photons};
+  return {.photons = photons,
+          .eye_paths = std::max(0.0, mean.eye_paths) + mean.photons - photons,
+          .is_evenly_spaced = mean.independent > kEvenlySpaced * mean.photons};
 }
 
 PassVariance::Costs PassVariance::CostsSoFar() const {
@@ -152,9 +164,11 @@ PassVariance::Costs PassVariance::CostsSoFar() const {
 double PassVariance::BestPhotons(double kernel_noise) const {
   const Parts variance = Split(kernel_noise);
   if (!(variance.photons > 0)) return 0;
+  const double present = static_cast<double>(photons_) / static_cast<double>(passes_);
+  if (variance.is_evenly_spaced) return present;
   if (!(variance.eye_paths > 0)) return std::numeric_limits<double>::infinity();
   const Costs costs = CostsSoFar();
-  return static_cast<double>(photons_) / static_cast<double>(passes_) *
+  return present *
          std::sqrt(variance.photons * costs.eye_paths / (variance.eye_paths * costs.photons));
 }
 

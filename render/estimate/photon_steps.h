@@ -48,6 +48,9 @@ class PassVariance {
     // is what even and odd passes differ by: with samples of low discrepancy the mean of many
     // passes varies less than deviations of single passes say.
     double eye_paths = 0;
+    // Photons vary less than independent ones: low discrepancy spaces them evenly, over the passes
+    // as well as within one. Then deviations of passes say little of the noise of their mean.
+    bool is_evenly_spaced = false;
   };
   // `kernel_noise` is the variance that one photon brings, over the squared flux expected of it:
   // the kernel's integral of K² times the area within which photons are counted.
@@ -63,7 +66,9 @@ class PassVariance {
 
   // The number of photons a pass that has the least variance for the time: with variances v and
   // costs c of photons and eye paths, sqrt(v_photons c_eye / (v_eye c_photons)) times the mean
-  // number so far. 0 where photons bring nothing, and infinite where all variance is theirs.
+  // number so far. 0 where photons bring nothing, and infinite where all variance is theirs. That
+  // mean number itself where photons are evenly spaced: with another number, later passes take up
+  // another place of their sequence, and lose more than they gain.
   // Requires passes() >= 2.
   [[nodiscard]] double BestPhotons(double kernel_noise) const;
 

@@ -205,6 +205,26 @@ TEST(PassVarianceTest, WhereAllVarianceIsOfPhotonsMoreAreAlwaysBetter) {
   EXPECT_EQ(variance.BestPhotons(3), kInfinity);
 }
 
+// Water under the sun: a sequence of low discrepancy is not left.
+TEST(PassVarianceTest, EvenlySpacedPhotonsKeepTheirNumber) {
+  // 9, 10 or 11 photons, where 10 independent ones vary by 3.
+  const PassVariance even = VarianceOf(4, [](KeyedRng& rng, std::uint64_t, std::size_t) {
+    const double count = 9 + std::floor(3 * Uniform(rng));
+    return Gathered{.photons = 0.1 * count, .count = count};
+  });
+  EXPECT_TRUE(even.Split(1).is_evenly_spaced);
+  EXPECT_EQ(even.BestPhotons(1), kPixels);
+  // Independent ones, many or few, are not taken for such.
+  for (const double mean : {10.0, 0.2}) {
+    const PassVariance random = VarianceOf(4, [&](KeyedRng& rng, std::uint64_t, std::size_t) {
+      const double count = Poisson(rng, mean);
+      return Gathered{.photons = count / mean, .count = count};
+    });
+    EXPECT_FALSE(random.Split(1).is_evenly_spaced) << mean;
+    EXPECT_GT(random.BestPhotons(1), 2.0 * kPixels) << mean;
+  }
+}
+
 TEST(NextPhotonsTest, IsThePowerOfTwoThatComesClosest) {
   EXPECT_EQ(NextPhotons(100, 800, 0), 100U);
   EXPECT_EQ(NextPhotons(100, 800, 141), 100U);
