@@ -30,12 +30,18 @@ namespace lucerna {
 namespace {
 
 constexpr double kPi64 = std::numbers::pi;
-// Photons of a pass over those of the first ones, at most.
-constexpr std::uint64_t kMostPhotonFactor = 8;
-// The variance is known well enough after so many passes; a power of two.
-constexpr std::uint64_t kFirstPhotonChoice = 4;
-// Between the best number and a half of it lies the one from which twice as many are better.
-constexpr double kWorthDoubling = std::numbers::sqrt2;
+// The number of photons of later passes is chosen after so many passes. What variance the choice
+// follows from is seen in rounds of one pass alone; the last choice follows from what was known
+// then.
+struct PhotonChoice {
+  std::uint64_t passes;
+  // Over the photons of the first passes, at most. An image is the mean of its passes, so those
+  // that came before with fewer photons must be few among all; and two passes have seldom met rare
+  // light.
+  std::uint64_t most;
+};
+constexpr std::array kPhotonChoices = {PhotonChoice{2, 2}, PhotonChoice{4, 4}, PhotonChoice{8, 4},
+                                       PhotonChoice{16, 4}, PhotonChoice{64, 8}};
 
 // Whether a path may be bent by a smooth surface.
 bool HasSmoothSurfaces(const Scene& scene) {
@@ -102,6 +108,8 @@ struct JobEstimator::State {
   std::unique_ptr<RadiusController> controller;
   std::unique_ptr<PixelRadii> radii;
   std::unique_ptr<ImageSums> sums;
+  std::unique_ptr<PassVariance> variance;  // of the rounds of one pass, while they come
+  double best_photons = 0;                 // as it was known after the last of kPhotonChoices
   // What rounds follow from that are planned by the state after so many passes.
   struct After {
     std::shared_ptr<const RadiusColumn> radii;
@@ -119,20 +127,21 @@ struct JobEstimator::State {
   float widest_radius = 0;  // of these hitpoints
   double hit_share = 0;     // of the pixels that have one
 
-  // How many photons later passes have, given how many they would have by what was known before.
-  // Looks at the variance now and then, each time twice as many passes later.
-  [[nodiscard]] std::uint64_t ChoosePhotons(std::uint64_t before) const {
-    const std::uint64_t passes = sums->whole_passes();
-    const auto base = static_cast<std::uint64_t>(settings.photons_per_pass);
-    if (!settings.adaptive_photons || before >= kMostPhotonFactor * base ||
-        passes < kFirstPhotonChoice || !std::has_single_bit(passes)) {
-      return before;
+  // How many photons later passes have once `round` is added, given how many they would have by
+  // what was known before.
+  [[nodiscard]] std::uint64_t ChoosePhotons(const SliceSums& round, std::uint64_t before) {
+    if (!settings.adaptive_photons) return before;
+    if (variance != nullptr) variance->Add(round);
+    const auto choice = std::ranges::find(kPhotonChoices, round.passes.last, &PhotonChoice::passes);
+    if (choice == kPhotonChoices.end()) return before;
+    if (variance != nullptr) {
+      const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
+      best_photons = variance->BestPhotons(kPi64 * Kernel{settings.kernel}.Moments().roughness *
+                                           reach * reach);
+      if (variance->passes() == kFirstLongRound) variance.reset();
     }
-    const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
-    const double kernel_noise = kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach;
-    const double per_pixel = static_cast<double>(before) / static_cast<double>(sums->pixels());
-    const double factor = BestPhotonFactor(SplitVariance(*sums, kernel_noise), per_pixel);
-    return factor >= kWorthDoubling ? 2 * before : before;
+    const auto first = static_cast<std::uint64_t>(settings.photons_per_pass);
+    return NextPhotons(before, choice->most * first, best_photons);
   }
 
   // Radiance over all passes, Rec. 709.
@@ -161,6 +170,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   state->controller = MakeRadiusController(state->settings, initial);
   state->radii = std::make_unique<PixelRadii>(pixels, initial, *state->controller);
   state->sums = std::make_unique<ImageSums>(pixels);
+  if (settings.adaptive_photons) state->variance = std::make_unique<PassVariance>(pixels);
   state->last_radii = std::make_shared<const RadiusColumn>(state->radii->Current());
   state->after[0] = {.radii = state->last_radii,
                      .photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass)};
@@ -214,9 +224,9 @@ void JobEstimator::AddRound(const SliceSums& round, const RoundPlan& plan) {
   state.radii->Step(round, *plan.radii, state.team);
   state.last_radii = plan.radii;
   const std::uint64_t passes = whole_passes();
-  state.after[passes] = {
-      .radii = std::make_shared<const RadiusColumn>(state.radii->Current()),
-      .photons_per_pass = state.ChoosePhotons(state.after.rbegin()->second.photons_per_pass)};
+  state.after[passes] = {.radii = std::make_shared<const RadiusColumn>(state.radii->Current()),
+                         .photons_per_pass = state.ChoosePhotons(
+                             round, state.after.rbegin()->second.photons_per_pass)};
   // Rounds that are still to be planned, or to be planned again by a job that goes on, need these.
   state.after.erase(state.after.begin(), state.after.lower_bound(RadiiFrom(RoundOf(passes))));
 }

@@ -423,6 +423,7 @@ TEST(RoundsOfAJobTest, APlanIsTheSameWheneverItIsMade) {
   const Scene scene = SmallRoom();
   RenderSettings settings = TestSettings(scene, 300, 0, 8);
   settings.radius_controller = RadiusControllerKind::kAppm;
+  settings.adaptive_photons = true;
   RoundJob early(scene, settings);
   RoundJob late(scene, settings);
   int ahead = 0;
