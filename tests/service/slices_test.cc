@@ -120,7 +120,7 @@ TEST_F(SlicesTest, AJobIsDescribedAlsoAfterItsEndAndAnUnknownOneIsNot) {
 TEST_F(SlicesTest, ASliceCountsOnce) {
   const std::string job = Submit(100);
   IdleHandsWorker worker(service_);
-  const auto slice = TakeSliceFrom(worker, 32);
+  const auto slice = TakeSliceFrom(worker, 16);
   ASSERT_TRUE(slice);
   const std::uint64_t before = PhotonsOf(job);
   EXPECT_EQ(Outcome(worker, *slice), v1::COMMIT_OUTCOME_ACCEPTED);
@@ -133,7 +133,7 @@ TEST_F(SlicesTest, ASliceCountsOnce) {
 TEST_F(SlicesTest, ASliceThatComesLateCountsWhenItIsTheFirst) {
   const std::string job = Submit(100);
   IdleHandsWorker late(service_);
-  const auto lease = TakeSliceFrom(late, 32);
+  const auto lease = TakeSliceFrom(late, 16);
   ASSERT_TRUE(lease);
   const std::uint64_t before = PhotonsOf(job);
   service_.clock().Move(std::chrono::seconds(11));
@@ -155,7 +155,7 @@ TEST_F(SlicesTest, ASliceThatComesLateCountsWhenItIsTheFirst) {
 TEST_F(SlicesTest, SlicesOfAConnectionThatBreaksGoBackWithoutAnyTimePassing) {
   Submit(100);
   IdleHandsWorker lost(service_);
-  const auto lease = TakeSliceFrom(lost, 32);
+  const auto lease = TakeSliceFrom(lost, 16);
   ASSERT_TRUE(lease);
   IdleHandsWorker other(service_);
   std::optional<v1::Lease> found;
@@ -185,9 +185,9 @@ TEST_F(SlicesTest, SlicesOfAConnectionThatBreaksGoBackWithoutAnyTimePassing) {
 TEST_F(SlicesTest, ASliceThatWasNotAskedForIsRefusedAndChangesNothing) {
   const std::string job = Submit(100);
   IdleHandsWorker worker(service_);
-  const auto lease = TakeSliceFrom(worker, 32);
+  const auto lease = TakeSliceFrom(worker, 16);
   ASSERT_TRUE(lease);
-  ASSERT_EQ(lease->first(), 32U);
+  ASSERT_EQ(lease->first(), 16U);
   const std::uint64_t before = PhotonsOf(job);
   const auto refuses = [&](const v1::Lease& forged, const std::string& bytes) {
     const auto answer = worker.CommitBytes(forged, bytes);
@@ -197,15 +197,15 @@ TEST_F(SlicesTest, ASliceThatWasNotAskedForIsRefusedAndChangesNothing) {
   const std::string good = worker.ResultOf(*lease);
   // Ranges that are no slice of the round.
   for (const auto& [first, last] :
-       std::vector<std::pair<std::uint64_t, std::uint64_t>>{{33, 35},
-                                                            {32, 35},
-                                                            {32, 32},
-                                                            {34, 32},
-                                                            {36, 40},
-                                                            {28, 32},
-                                                            {32, 40},
+       std::vector<std::pair<std::uint64_t, std::uint64_t>>{{17, 19},
+                                                            {16, 19},
+                                                            {16, 16},
+                                                            {18, 16},
+                                                            {20, 24},
+                                                            {12, 16},
+                                                            {16, 24},
                                                             {0, 1},
-                                                            {32, ~std::uint64_t{0}}}) {
+                                                            {16, ~std::uint64_t{0}}}) {
     v1::Lease forged = *lease;
     forged.set_first(first);
     forged.set_last(last);
@@ -213,7 +213,7 @@ TEST_F(SlicesTest, ASliceThatWasNotAskedForIsRefusedAndChangesNothing) {
   }
   // Passes that the bytes do not have.
   v1::Lease narrower = *lease;
-  narrower.set_last(33);
+  narrower.set_last(17);
   ASSERT_NE(PassesOf(narrower), PassesOf(*lease));
   EXPECT_EQ(worker.CommitBytes(narrower, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
   EXPECT_TRUE(refuses(*lease, worker.ResultOf(narrower)));
@@ -245,7 +245,7 @@ TEST_F(SlicesTest, ASliceThatWasNotAskedForIsRefusedAndChangesNothing) {
   elsewhere = *lease;
   elsewhere.set_pass(8);
   EXPECT_EQ(worker.CommitBytes(elsewhere, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
-  elsewhere.set_pass(33);
+  elsewhere.set_pass(17);
   EXPECT_EQ(worker.CommitBytes(elsewhere, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
   elsewhere = *lease;
   elsewhere.set_job_id("another job");
@@ -258,7 +258,7 @@ TEST_F(SlicesTest, ASliceThatWasNotAskedForIsRefusedAndChangesNothing) {
 TEST_F(SlicesTest, APartOfASliceIsNotWhatWasLent) {
   const std::string job = Submit(100);
   IdleHandsWorker worker(service_);
-  const auto lease = TakeSliceFrom(worker, 32);
+  const auto lease = TakeSliceFrom(worker, 16);
   ASSERT_TRUE(lease);
   const PassRange whole = PassesOf(*lease);
   ASSERT_GE(whole.size(), 2U);
@@ -281,7 +281,7 @@ TEST_F(SlicesTest, APartOfASliceIsNotWhatWasLent) {
 TEST_F(SlicesTest, ASliceThatIsGivenUpAgainAndAgainFailsItsJobAndSaysWhichPasses) {
   const std::string job = Submit(100);
   IdleHandsWorker worker(service_);
-  std::optional<v1::Lease> lease = TakeSliceFrom(worker, 32);
+  std::optional<v1::Lease> lease = TakeSliceFrom(worker, 16);
   ASSERT_TRUE(lease);
   const std::string passes = absl::StrCat("passes ", lease->first(), " to ", lease->last());
   for (int i = 0; i < 1000 && client_.Get(job).message.state() < v1::JOB_STATE_SUCCEEDED; ++i) {
@@ -304,17 +304,17 @@ TEST_F(SlicesTest, AJobThatIsStoppedKeepsThePassesOfARoundThatIsNotWhole) {
   std::vector<std::unique_ptr<IdleHandsWorker>> workers;
   for (int i = 0; i < 4; ++i)
     workers.push_back(std::make_unique<IdleHandsWorker>(service_));
-  std::vector<v1::Lease> leases = {TakeSliceFrom(*workers[0], 32).value()};
+  std::vector<v1::Lease> leases = {TakeSliceFrom(*workers[0], 16).value()};
   for (std::size_t i = 1; i < 3; ++i)
     leases.push_back(workers[i]->TakeLease().value());
-  ASSERT_EQ(PassesOf(leases[0]), (PassRange{32, 33}));
-  ASSERT_EQ(PassesOf(leases[2]), (PassRange{34, 35}));
+  ASSERT_EQ(PassesOf(leases[0]), (PassRange{16, 17}));
+  ASSERT_EQ(PassesOf(leases[2]), (PassRange{18, 19}));
   ASSERT_EQ(Outcome(*workers[0], leases[0]), v1::COMMIT_OUTCOME_ACCEPTED);
   // Beyond a gap.
   ASSERT_EQ(Outcome(*workers[2], leases[2]), v1::COMMIT_OUTCOME_ACCEPTED);
   EXPECT_TRUE(client_.Stop(job).ok());
   const v1::Job stopped = client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message;
-  EXPECT_EQ(stopped.progress().passes(), 33);
+  EXPECT_EQ(stopped.progress().passes(), 17);
   EXPECT_TRUE(client_.Image(job).ok());
   // It goes on from there: the pass of the tail is not traced again.
   EXPECT_TRUE(client_.Extend(job, 40).ok());

@@ -203,28 +203,28 @@ TEST(CoordinatorPartsTest, FaultyWorkersTogetherMergeEveryPassOnce) {
 }
 
 TEST(CoordinatorPartsTest, ASliceThatManyDeliverAtOnceIsAcceptedOnce) {
-  const PassKey key = {"job", 32};
+  const PassKey key = {"job", 16};
   for (int i = 0; i < 50; ++i) {
     RoundMerger merger;
     merger.Open(
-        key, {.passes = RoundOf(32), .pixels = kHitpoints, .evidence = 0, .photons_per_pass = 10});
+        key, {.passes = RoundOf(16), .pixels = kHitpoints, .evidence = 0, .photons_per_pass = 10});
     std::atomic<std::uint64_t> accepted = 0;
     RunThreads(4, [&](int thread) {
       for (std::uint64_t k = 0; k < 4; ++k) {
-        const std::uint64_t pass = 32 + (k + static_cast<std::uint64_t>(thread)) % 4;
+        const std::uint64_t pass = 16 + (k + static_cast<std::uint64_t>(thread)) % 4;
         const auto outcome = merger.Merge(key, SliceOf({pass, pass + 1}));
         ASSERT_TRUE(outcome.ok());
         if (*outcome == MergeOutcome::kAccepted) ++accepted;
       }
     });
     EXPECT_EQ(accepted, 4U);
-    EXPECT_EQ(*merger.Take(key), SliceOf(RoundOf(32)));
+    EXPECT_EQ(*merger.Take(key), SliceOf(RoundOf(16)));
   }
 }
 
 // A job ends while slices are on their way: late ones find no round, or one that is opened anew.
 TEST(CoordinatorPartsTest, ARoundMayEndWhileSlicesCome) {
-  const PassKey key = {"job", 32};
+  const PassKey key = {"job", 16};
   RoundMerger merger;
   std::atomic<bool> is_over = false;
   RunThreads(3, [&](int thread) {
@@ -232,11 +232,11 @@ TEST(CoordinatorPartsTest, ARoundMayEndWhileSlicesCome) {
       for (int i = 0; i < 300; ++i) {
         merger.Open(
             key,
-            {.passes = RoundOf(32), .pixels = kHitpoints, .evidence = 0, .photons_per_pass = 10});
-        while (i % 3 == 0 && merger.PrefixEnd(key) != RoundOf(32).last)
+            {.passes = RoundOf(16), .pixels = kHitpoints, .evidence = 0, .photons_per_pass = 10});
+        while (i % 3 == 0 && merger.PrefixEnd(key) != RoundOf(16).last)
           std::this_thread::yield();
         if (i % 3 == 0) {
-          EXPECT_EQ(*merger.Take(key), SliceOf(RoundOf(32)));
+          EXPECT_EQ(*merger.Take(key), SliceOf(RoundOf(16)));
         } else {
           merger.Drop(key);
         }
@@ -245,7 +245,7 @@ TEST(CoordinatorPartsTest, ARoundMayEndWhileSlicesCome) {
       return;
     }
     for (std::uint64_t k = 0; !is_over; ++k) {
-      const std::uint64_t pass = 32 + k % 4;
+      const std::uint64_t pass = 16 + k % 4;
       const auto outcome = merger.Merge(key, SliceOf({pass, pass + 1}));
       ASSERT_TRUE(outcome.ok()) << outcome.status();
     }

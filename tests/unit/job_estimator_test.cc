@@ -362,7 +362,7 @@ Scene SmallRoom() {
   return scene;
 }
 
-// Passes 16 to 31 are in rounds of two, and those from 32 on in rounds of four.
+// Passes 16 to 31 are in rounds of four, and those from 32 on in rounds of eight.
 TEST(RoundsOfAJobTest, GoingOnAfterAnEndWithinARoundLeavesNoTrace) {
   const Scene scene = SmallRoom();
   for (const RadiusControllerKind controller :
@@ -376,7 +376,7 @@ TEST(RoundsOfAJobTest, GoingOnAfterAnEndWithinARoundLeavesNoTrace) {
     for (const std::uint64_t passes : {1U, 21U, 21U, 33U, 34U, 46U, 47U})
       in_parts.RenderTo(passes);
     EXPECT_EQ(in_parts.estimator().passes(), 47);
-    EXPECT_EQ(in_parts.estimator().whole_passes(), 44U);
+    EXPECT_EQ(in_parts.estimator().whole_passes(), 40U);
     EXPECT_EQ(in_parts.estimator().photons(), 47U * 300);
     EXPECT_EQ(in_parts.estimator().MakeImage().PixelDigest(),
               in_one_go.estimator().MakeImage().PixelDigest())
@@ -390,23 +390,23 @@ TEST(RoundsOfAJobTest, GoingOnAfterAnEndWithinARoundLeavesNoTrace) {
 }
 
 // The passes of a tail count as those of a whole round do: the image of 20 passes is the same
-// whether the last two came as a round or as a tail of the round that ends there.
+// whether the last four came as a round or as a tail of the round that ends there.
 TEST(RoundsOfAJobTest, ATailCountsAsItsRoundWould) {
   const Scene scene = SmallRoom();
   const RenderSettings settings = TestSettings(scene, 300, 0, 8);
   RoundJob whole(scene, settings);
   whole.RenderTo(20);
   RoundJob tailed(scene, settings);
-  tailed.RenderTo(18);
-  const RoundPlan plan = tailed.PlanOf({18, 20});
+  tailed.RenderTo(16);
+  const RoundPlan plan = tailed.PlanOf({16, 20});
   BatchTracer tracer(scene, 1);
   const std::atomic<bool> stop = false;
   tailed.estimator().SetTail(
       {std::make_shared<const SliceSums>(
-          tracer.RunSlice(settings, NeedsOf(scene, settings), {18, 20}, plan, stop).value())},
+          tracer.RunSlice(settings, NeedsOf(scene, settings), {16, 20}, plan, stop).value())},
       plan);
   EXPECT_EQ(tailed.estimator().passes(), 20);
-  EXPECT_EQ(tailed.estimator().whole_passes(), 18U);
+  EXPECT_EQ(tailed.estimator().whole_passes(), 16U);
   EXPECT_EQ(tailed.estimator().photons(), whole.estimator().photons());
   EXPECT_EQ(tailed.MissingShare(), whole.MissingShare());
   // Which of the two a job ends with is a matter of moments, so no layer may tell.
