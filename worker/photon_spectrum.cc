@@ -103,15 +103,11 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
               surface_moments_[surface_of_[first_of_mesh_[emitter.geometry] + emitter.primitive]],
               direction, limits_),
           false};
-    case EmitterKind::kSphere:
-      return {SphereSource(static_cast<double>(scene_.spheres[emitter.primitive].radius), limits_),
-              false};
-    case EmitterKind::kDisk: {
-      const Disk& disk = scene_.disks[emitter.primitive];
-      return {AreaSource(DiscMoments(disk.center, disk.normal, static_cast<double>(disk.radius)),
-                         direction, limits_),
-              false};
-    }
+#define LUCERNA_CASE(Name, list, name) \
+  case EmitterKind::k##Name:           \
+    return {SpectrumOf(scene_.list[emitter.primitive], direction, limits_), false};
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
     case EmitterKind::kInfinite:
       // Even light from everywhere: no structure in place or direction.
       return {EnvironmentSource(0, 1, 1, 1, limits_), false};

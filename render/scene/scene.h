@@ -29,8 +29,10 @@
 #include "render/math/rgb.h"
 #include "render/math/transform.h"
 #include "render/math/vector.h"
+#include "render/scene/analytic_shapes.h"
 #include "render/scene/light_list.h"
 #include "render/scene/material.h"
+#include "render/scene/shape_traits.h"
 #include "render/scene/texture.h"
 
 namespace lucerna {
@@ -41,16 +43,6 @@ struct AreaLight {
   bool two_sided = false;  // else the side that the shape's outward normal points to
 
   bool operator==(const AreaLight&) const = default;
-};
-
-inline constexpr std::int32_t kNoAreaLight = -1;
-
-// What every shape carries.
-struct ShapeTraits {
-  std::int32_t material = 0;
-  std::int32_t area_light = kNoAreaLight;
-
-  bool operator==(const ShapeTraits&) const = default;
 };
 
 // The outward normal of a triangle is (p1 - p0) x (p2 - p0); meshes that the file turns inside
@@ -65,29 +57,6 @@ struct TriangleMesh {
   // [vertices], or empty: the corners of each triangle, as it is wound, are (0, 0), (1, 0), (1, 1).
   std::vector<Vec2> uvs;
   ShapeTraits traits;
-};
-
-// Where the axes of a shape's own space point in the world: unit, at right angles. The texture
-// coordinate u of spheres and disks grows from x to y.
-struct ShapeAxes {
-  Vec3 x = {1, 0, 0}, y = {0, 1, 0}, z = {0, 0, 1};
-};
-
-struct Sphere {
-  Vec3 center;
-  float radius = 1;     // > 0
-  bool inward = false;  // the outward normal points to the centre
-  ShapeTraits traits;
-  ShapeAxes axes = {};
-};
-
-struct Disk {
-  Vec3 center;
-  Vec3 normal;  // unit, outward
-  float radius = 1;
-  float inner_radius = 0;
-  ShapeTraits traits;
-  ShapeAxes axes = {};
 };
 
 // Light from everywhere that no shape covers. Several of them add up.
@@ -156,8 +125,9 @@ struct Scene {
   // (formats/scene_unit.h). Of what is below, the integrator's settings are the file's.
   double unit = 1;
   std::vector<TriangleMesh> meshes;
-  std::vector<Sphere> spheres;
-  std::vector<Disk> disks;
+#define LUCERNA_MEMBER(Name, list, name) std::vector<Name> list;
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_MEMBER)  // spheres and so on (scene/analytic_shapes.h)
+#undef LUCERNA_MEMBER
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<AreaLight> area_lights;

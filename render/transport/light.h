@@ -1,12 +1,13 @@
 // Which lights are there, how strong is each, and where does their light go?
 //
-// Every emitting triangle, sphere, disk and every other light is one emitter; all emitters of a
-// mesh are one light. Emitters are chosen in proportion to their power (luminance), so that all
+// Every emitting triangle and analytic shape and every other light is one emitter; all emitters of
+// a mesh are one light. Emitters are chosen in proportion to their power (luminance), so that all
 // photons carry about the same flux, but for kEvenPhotonShare of the photons, which is even among
 // the lights: a light with a millionth of the power is sampled all the same. With a single light
 // there is no such share.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
+#include "render/scene/shape_lists.h"
 #include "render/transport/environment_map.h"
 #include "render/transport/unreachable_lights.h"
 
@@ -36,10 +38,9 @@ struct Emission {
 
 enum class EmitterKind : std::uint8_t {
   kTriangle,
-  kSphere,
-  kDisk,
 #define LUCERNA_KIND(Name, list, name) k##Name,
-  LUCERNA_DELTA_LIGHTS(LUCERNA_KIND)  // scene/light_list.h
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_KIND)  // scene/analytic_shapes.h
+  LUCERNA_DELTA_LIGHTS(LUCERNA_KIND)     // scene/light_list.h
 #undef LUCERNA_KIND
   kInfinite,    // the same from everywhere
   kEnvironment  // a map
@@ -51,7 +52,7 @@ enum class EmitterKind : std::uint8_t {
 struct Emitter {
   EmitterKind kind = EmitterKind::kPoint;
   std::uint32_t geometry = 0;   // kTriangle: the mesh
-  std::uint32_t primitive = 0;  // triangle, sphere, disk, or index among lights or maps
+  std::uint32_t primitive = 0;  // triangle, or index among the shapes, lights or maps of the kind
   bool two_sided = false;
   bool is_sampled = true;  // for direct light
   float area = 0;
@@ -166,9 +167,10 @@ class LightSet {
   BoundingSphere sphere_;
   std::vector<Emitter> emitters_;
   std::vector<double> cumulative_, direct_cumulative_;  // [emitters] of the choices
-  // [geometry]: number of its first emitter, or -1.
+  // [meshes]: number of the first emitter, or -1.
   std::vector<std::int64_t> first_emitter_;
-  std::vector<std::int32_t> sphere_emitter_, disk_emitter_;
+  // [shapes of a kind]: number of its emitter, or -1.
+  std::array<std::vector<std::int32_t>, kShapeKinds> shape_emitter_;
   Rgb total_power_;
   Rgb infinite_radiance_;  // of the constant ones
   std::int64_t infinite_emitter_ = -1;

@@ -239,8 +239,10 @@ void DirectiveReader::AddShapes(ShapeSet shapes) {
     to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
   };
   append(open_object_ != nullptr ? open_object_->meshes : scene_.meshes, shapes.meshes);
-  append(open_object_ != nullptr ? open_object_->spheres : scene_.spheres, shapes.spheres);
-  append(open_object_ != nullptr ? open_object_->disks : scene_.disks, shapes.disks);
+#define LUCERNA_APPEND(Name, list, name) \
+  append(open_object_ != nullptr ? open_object_->list : scene_.list, shapes.list);
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_APPEND)
+#undef LUCERNA_APPEND
 }
 
 bool DirectiveReader::OnTexture(Arguments& arguments) {
