@@ -17,7 +17,7 @@
 #include "render/scene/scene.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/light.h"
-#include "worker/sky_detail.h"
+#include "render/transport/infinite_emission.h"
 #include "worker/texture_detail.h"
 
 namespace lucerna {
@@ -75,7 +75,7 @@ class SpectrumTracer {
   std::vector<std::uint32_t> surface_of_;       // [triangles of emitting meshes]
   std::vector<std::size_t> first_of_mesh_;      // [meshes] into surface_of_
   std::vector<TextureDetail> texture_details_;  // [textures]
-  std::vector<SkyDetail> sky_details_;          // [environments of the lights]
+  std::vector<std::unique_ptr<const InfiniteSpectrum>> infinite_spectra_;  // [infinite lights]
 };
 
 }  // namespace lucerna

@@ -339,7 +339,7 @@ class NeedsFinder {
   [[nodiscard]] bool HasSmallLights() const {
     return needs_.Uses(Part::kDeltaLights) || needs_.Uses(Part::kAreaLights) ||
            std::ranges::any_of(scene_.infinite_lights,
-                               [](const InfiniteLight& light) { return light.map != nullptr; });
+                               [](const InfiniteLight& light) { return light.HasDetail(); });
   }
 
   void FindCausticHitpoints() {
@@ -426,7 +426,7 @@ class NeedsFinder {
     set(Part::kTextureDetail, textured_ != nullptr, "surfaces have textures",
         "no surface has a texture");
     const bool has_map = std::ranges::any_of(
-        scene_.infinite_lights, [](const auto& light) { return light.map != nullptr; });
+        scene_.infinite_lights, [](const auto& light) { return light.HasDetail(); });
     set(Part::kSkyDetail, has_map, "an environment map lights the scene",
         "no environment map lights the scene");
     set(Part::kGlossyWindow, glossy_ != nullptr, "there are glossy hitpoints",

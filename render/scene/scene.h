@@ -30,6 +30,7 @@
 #include "render/math/transform.h"
 #include "render/math/vector.h"
 #include "render/scene/analytic_shapes.h"
+#include "render/scene/infinite_light.h"
 #include "render/scene/light_list.h"
 #include "render/scene/material.h"
 #include "render/scene/shape_traits.h"
@@ -57,15 +58,6 @@ struct TriangleMesh {
   // [vertices], or empty: the corners of each triangle, as it is wound, are (0, 0), (1, 0), (1, 1).
   std::vector<Vec2> uvs;
   ShapeTraits traits;
-};
-
-// Light from everywhere that no shape covers. Several of them add up.
-struct InfiniteLight {
-  Rgb radiance;  // the same everywhere, or what the pixels of `map` are multiplied by
-  // A square: its equal-area octahedral map to the sphere of directions is that of
-  // math/equal_area_square.h, each pixel an even patch. Row 0 is v = 0.
-  std::shared_ptr<const Picture> map = nullptr;
-  ShapeAxes axes = {};  // of the map, in the world
 };
 
 // A rectangle, from left to right and from bottom to top of the image.

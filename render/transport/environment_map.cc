@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <span>
+#include <utility>
 
 #include "render/base/status.h"
 #include "render/math/color_space.h"
 #include "render/math/equal_area_square.h"
 #include "render/math/warp.h"
+#include "render/transport/sky_detail.h"
 
 namespace lucerna {
 namespace {
@@ -96,6 +98,30 @@ Vec3 EnvironmentMap::Sample(float u1, float u2) const {
   const auto side = static_cast<float>(size_);
   const Vec3 local = EqualAreaDirection({x / side, y / side});
   return axes_.x * local.x + axes_.y * local.y + axes_.z * local.z;
+}
+
+bool EnvironmentMap::SampleEmission(const Emitter& emitter, const BoundingSphere& scene,
+                                    const EmissionNumbers& u, Emission& emission) const {
+  const Vec3 towards = Sample(u.direction1, u.direction2);
+  const float pdf = PdfSolidAngle(towards);
+  if (!(pdf > 0)) return false;
+  emission.ray = EnteringRay(towards, scene, u);
+  emission.flux = Radiance(towards) * (kPi * scene.radius * scene.radius / (pdf * emitter.choice));
+  return true;
+}
+
+std::unique_ptr<const InfiniteSpectrum> EnvironmentMap::MeasureSpectrum() const {
+  return std::make_unique<SkyDetail>(*this);
+}
+
+InfiniteEmissions MakeEnvironmentEmissions(const std::vector<InfiniteLight>& lights) {
+  InfiniteEmissions emissions;
+  for (const InfiniteLight& light : lights) {
+    if (light.kind != InfiniteLight::Kind::kEnvironment) continue;
+    auto environment = std::make_shared<EnvironmentMap>(light);
+    if (!IsBlack(environment->MeanRadiance())) emissions.push_back(std::move(environment));
+  }
+  return emissions;
 }
 
 }  // namespace lucerna

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <type_traits>
 
 #include "render/geometry/shape_geometry.h"
 #include "render/math/double3.h"
 #include "render/math/warp.h"
 #include "render/scene/scene_extent.h"
+#include "render/transport/infinite_emission.h"
 #include "render/transport/light_kinds.h"
 
 namespace lucerna {
@@ -59,10 +61,11 @@ std::string_view NameOf(EmitterKind kind) {
     return name " light";
       LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
 #undef LUCERNA_CASE
-    case EmitterKind::kInfinite:
-      return "constant environment light";
-    case EmitterKind::kEnvironment:
-      return "environment map";
+#define LUCERNA_CASE(Name, name) \
+  case EmitterKind::k##Name:     \
+    return name;
+      LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
   }
   return "light";
 }
@@ -151,30 +154,19 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
   }
   LUCERNA_DELTA_LIGHTS(LUCERNA_ADD)
 #undef LUCERNA_ADD
-  for (const InfiniteLight& light : scene.infinite_lights) {
-    if (light.map == nullptr) {
-      infinite_radiance_ += light.radiance;
-      continue;
-    }
-    EnvironmentMap environment(light);
-    if (!IsBlack(environment.MeanRadiance())) environments_.push_back(std::move(environment));
-  }
-  if (!IsBlack(infinite_radiance_)) {
-    infinite_emitter_ = static_cast<std::int64_t>(emitters_.size());
+  first_infinite_ = emitters_.size();
+#define LUCERNA_MAKE(Name, name)                                         \
+  std::ranges::move(Make##Name##Emissions(scene.infinite_lights),        \
+                    std::back_inserter(infinite_lights_));
+  LUCERNA_INFINITE_LIGHTS(LUCERNA_MAKE)
+#undef LUCERNA_MAKE
+  for (std::uint32_t i = 0; i < infinite_lights_.size(); ++i) {
     Emitter emitter;
-    emitter.kind = Kind::kInfinite;
-    emitter.radiance = infinite_radiance_;
+    emitter.kind = infinite_lights_[i]->kind();
+    emitter.primitive = i;
+    emitter.radiance = infinite_lights_[i]->MeanRadiance();
     emitter.power = emitter.radiance * (4 * kPi * kPi * sphere_.radius * sphere_.radius);
     // Infinite lights are unreachable together or not at all.
-    add(emitter, numbers.infinite);
-  }
-  first_environment_ = emitters_.size();
-  for (std::uint32_t i = 0; i < environments_.size(); ++i) {
-    Emitter emitter;
-    emitter.kind = Kind::kEnvironment;
-    emitter.primitive = i;
-    emitter.radiance = environments_[i].MeanRadiance();
-    emitter.power = emitter.radiance * (4 * kPi * kPi * sphere_.radius * sphere_.radius);
     add(emitter, numbers.infinite);
   }
 
@@ -383,31 +375,15 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
                                           emission);
       LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
 #undef LUCERNA_CASE
-    case Kind::kEnvironment: {
-      const EnvironmentMap& sky = environments_[emitter.primitive];
-      const Vec3 towards = sky.Sample(u_direction1, u_direction2);
-      const float pdf = sky.PdfSolidAngle(towards);
-      if (!(pdf > 0)) return false;
-      const Frame frame(-towards);
-      const Vec3 disk = SquareToDisk(u_place1, u_place2) * sphere_.radius;
-      emission.ray.origin =
-          sphere_.center + towards * sphere_.radius + frame.s * disk.x + frame.t * disk.y;
-      emission.ray.direction = -towards;
-      emission.flux =
-          sky.Radiance(towards) * (kPi * sphere_.radius * sphere_.radius / (pdf * emitter.choice));
-      emission.density = EmissionDensityInfinite(towards);
+#define LUCERNA_CASE(Name, name) case Kind::k##Name:
+      LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+      if (!infinite_lights_[emitter.primitive]->SampleEmission(
+              emitter, sphere_, {u_place1, u_place2, u_direction1, u_direction2}, emission)) {
+        return false;
+      }
+      emission.density = EmissionDensityInfinite(-emission.ray.direction);
       return true;
-    }
-    case Kind::kInfinite: {
-      const Vec3 direction = SquareToSphere(u_direction1, u_direction2);
-      const Frame frame(direction);
-      const Vec3 disk = SquareToDisk(u_place1, u_place2) * sphere_.radius;
-      emission.ray.origin =
-          sphere_.center - direction * sphere_.radius + frame.s * disk.x + frame.t * disk.y;
-      emission.ray.direction = direction;
-      emission.density = EmissionDensityInfinite(-direction);
-      return true;
-    }
   }
   return false;
 }
@@ -450,10 +426,10 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
     return Name##Emission::SampleDirect(scene_.list[emitter.primitive], emitter, from, sample);
     LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
 #undef LUCERNA_CASE
-    case Kind::kInfinite:
-    case Kind::kEnvironment:
-      sample.wi = emitter.kind == Kind::kInfinite ? SquareToSphere(u1, u2)
-                                                  : environments_[emitter.primitive].Sample(u1, u2);
+#define LUCERNA_CASE(Name, name) case Kind::k##Name:
+      LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+      sample.wi = infinite_lights_[emitter.primitive]->Sample(u1, u2);
       sample.is_distant = true;
       // Whichever drew it, light from this direction is that of all infinite lights.
       sample.pdf = PdfDirectInfinite(sample.wi);
@@ -523,9 +499,9 @@ float LightSet::LargestRadiance() const {
   for (const Emitter& emitter : emitters_) {
     if (IsOnShape(emitter.kind)) of_areas = std::max(of_areas, MaxChannel(emitter.radiance));
   }
-  float from_infinity = MaxChannel(infinite_radiance_);
-  for (const EnvironmentMap& sky : environments_)
-    from_infinity += sky.LargestRadiance();
+  float from_infinity = 0;
+  for (const auto& light : infinite_lights_)
+    from_infinity += light->LargestRadiance();
   return std::max(of_areas, from_infinity);
 }
 
@@ -541,32 +517,23 @@ float LightSet::EmissionDensity(const SurfacePoint& point) const {
 float LightSet::EmissionDensityInfinite(Vec3 direction) const {
   if (emitters_.empty()) return 0;
   float pdf = 0;
-  if (infinite_emitter_ >= 0) {
-    pdf = emitters_[static_cast<std::size_t>(infinite_emitter_)].choice / (4 * kPi);
-  }
-  for (std::size_t i = 0; i < environments_.size(); ++i) {
-    pdf += emitters_[first_environment_ + i].choice * environments_[i].PdfSolidAngle(direction);
-  }
+  for (std::size_t i = 0; i < infinite_lights_.size(); ++i)
+    pdf += infinite_lights_[i]->Density(direction, emitters_[first_infinite_ + i].choice);
   return pdf / (kPi * sphere_.radius * sphere_.radius);
 }
 
 Rgb LightSet::InfiniteRadiance(Vec3 direction) const {
-  Rgb radiance = infinite_radiance_;
-  for (const EnvironmentMap& sky : environments_)
-    radiance += sky.Radiance(direction);
+  Rgb radiance;
+  for (const auto& light : infinite_lights_)
+    radiance += light->Radiance(direction);
   return radiance;
 }
 
 float LightSet::PdfDirectInfinite(Vec3 direction) const {
   if (emitters_.empty()) return 0;
   float pdf = 0;
-  if (infinite_emitter_ >= 0) {
-    pdf = emitters_[static_cast<std::size_t>(infinite_emitter_)].direct_choice / (4 * kPi);
-  }
-  for (std::size_t i = 0; i < environments_.size(); ++i) {
-    pdf +=
-        emitters_[first_environment_ + i].direct_choice * environments_[i].PdfSolidAngle(direction);
-  }
+  for (std::size_t i = 0; i < infinite_lights_.size(); ++i)
+    pdf += infinite_lights_[i]->Density(direction, emitters_[first_infinite_ + i].direct_choice);
   return pdf;
 }
 

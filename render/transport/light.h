@@ -10,6 +10,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -21,7 +22,6 @@
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
 #include "render/scene/shape_lists.h"
-#include "render/transport/environment_map.h"
 #include "render/transport/unreachable_lights.h"
 
 namespace lucerna {
@@ -42,8 +42,9 @@ enum class EmitterKind : std::uint8_t {
   LUCERNA_ANALYTIC_SHAPES(LUCERNA_KIND)  // scene/analytic_shapes.h
   LUCERNA_DELTA_LIGHTS(LUCERNA_KIND)     // scene/light_list.h
 #undef LUCERNA_KIND
-  kInfinite,    // the same from everywhere
-  kEnvironment  // a map
+#define LUCERNA_KIND(Name, name) k##Name,
+  LUCERNA_INFINITE_LIGHTS(LUCERNA_KIND)  // scene/infinite_light.h
+#undef LUCERNA_KIND
 };
 
 // "triangle", "sphere", "point light".
@@ -52,7 +53,7 @@ enum class EmitterKind : std::uint8_t {
 struct Emitter {
   EmitterKind kind = EmitterKind::kPoint;
   std::uint32_t geometry = 0;   // kTriangle: the mesh
-  std::uint32_t primitive = 0;  // triangle, or index among the shapes, lights or maps of the kind
+  std::uint32_t primitive = 0;  // triangle, or index among the shapes or lights of the kind, or the infinite lights
   bool two_sided = false;
   bool is_sampled = true;  // for direct light
   float area = 0;
@@ -86,6 +87,8 @@ struct LightSample {
                           // on a plane facing the light, over the choice
   float pdf = 0;  // choice × pdf_solid_angle [sr⁻¹]; 0 for delta lights
 };
+
+class InfiniteEmission;
 
 // Around all shapes.
 struct BoundingSphere {
@@ -146,7 +149,12 @@ class LightSet {
   [[nodiscard]] Rgb InfiniteRadiance(Vec3 direction) const;
   // The density with which SampleDirect draws a direction by any of them [choice × sr⁻¹].
   [[nodiscard]] float PdfDirectInfinite(Vec3 direction) const;
-  [[nodiscard]] const std::vector<EnvironmentMap>& environments() const { return environments_; }
+  // [those that are not black], in the order of Emitter::primitive; see
+  // transport/infinite_emission.h.
+  [[nodiscard]] const std::vector<std::shared_ptr<const InfiniteEmission>>& infinite_lights()
+      const {
+    return infinite_lights_;
+  }
 
  private:
   using Kind = EmitterKind;
@@ -172,10 +180,8 @@ class LightSet {
   // [shapes of a kind]: number of its emitter, or -1.
   std::array<std::vector<std::int32_t>, kShapeKinds> shape_emitter_;
   Rgb total_power_;
-  Rgb infinite_radiance_;  // of the constant ones
-  std::int64_t infinite_emitter_ = -1;
-  std::vector<EnvironmentMap> environments_;  // those that are not black
-  std::size_t first_environment_ = 0;         // emitter of the first
+  std::vector<std::shared_ptr<const InfiniteEmission>> infinite_lights_;
+  std::size_t first_infinite_ = 0;  // emitter of the first
   std::vector<LightGroup> lights_;
   std::size_t faint_lights_ = 0;
 };
