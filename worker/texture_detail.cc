@@ -8,9 +8,9 @@ std::vector<TextureDetail> TextureDetails(const std::vector<Texture>& textures) 
   for (const Texture& texture : textures) {
     TextureStatistics here;
     switch (texture.kind) {
-#define LUCERNA_CASE(Name, name)                            \
-  case Texture::Kind::k##Name:                              \
-    here = StatisticsOf##Name(texture, statistics);         \
+#define LUCERNA_CASE(Name, name)                    \
+  case Texture::Kind::k##Name:                      \
+    here = StatisticsOf##Name(texture, statistics); \
     break;
       LUCERNA_TEXTURES(LUCERNA_CASE)
 #undef LUCERNA_CASE

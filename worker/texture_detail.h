@@ -25,7 +25,7 @@ struct TextureStatistics {
 
 // Of each kind of texture, defined in texture_detail_NAME.cc. `parts`: of textures with lower
 // numbers, by number.
-#define LUCERNA_DECLARE(Name, name)                                     \
+#define LUCERNA_DECLARE(Name, name)                                          \
   [[nodiscard]] TextureStatistics StatisticsOf##Name(const Texture& texture, \
                                                      std::span<const TextureStatistics> parts);
 LUCERNA_TEXTURES(LUCERNA_DECLARE)

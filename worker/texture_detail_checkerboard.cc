@@ -7,7 +7,7 @@
 namespace lucerna {
 
 TextureStatistics StatisticsOfCheckerboard(const Texture& texture,
-                                            std::span<const TextureStatistics> parts) {
+                                           std::span<const TextureStatistics> parts) {
   const TextureStatistics& even = parts[static_cast<std::size_t>(texture.parts[0])];
   const TextureStatistics& odd = parts[static_cast<std::size_t>(texture.parts[1])];
   constexpr double kTexels = 8;  // of a square's side

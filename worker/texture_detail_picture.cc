@@ -9,7 +9,7 @@
 namespace lucerna {
 
 TextureStatistics StatisticsOfPicture(const Texture& texture,
-                                       std::span<const TextureStatistics> /*parts*/) {
+                                      std::span<const TextureStatistics> /*parts*/) {
   const Picture& picture = *texture.picture;
   const auto width = static_cast<std::size_t>(picture.width);
   const auto height = static_cast<std::size_t>(picture.height);

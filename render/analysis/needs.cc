@@ -227,7 +227,7 @@ std::string_view NameOf(Part part) {
   return kNames[static_cast<std::size_t>(part)];
 }
 
-// Finds the needs of one job, group by group: later groups ask what earlier ones found.
+// Finds the needs of one job, group by group: later groups use what earlier ones found.
 class NeedsFinder {
  public:
   NeedsFinder(const Scene& scene, const RenderSettings& settings)
@@ -240,7 +240,7 @@ class NeedsFinder {
     FindRays();
     FindEyePaths();
     FindFrequency();
-    SayWhatIsNotRead();
+    AddPartsNotRead();
     if (settings_.use_everything) ForceEverything();
     return std::move(needs_);
   }
@@ -365,7 +365,7 @@ class NeedsFinder {
         : is_dark_ ? std::string(kDark)
                    : Concat("they are gathered on ", Quoted(*receiver)));
     Set(Part::kPhotonDirections, glossy_ != nullptr,
-        glossy_ != nullptr ? "glossy hitpoints ask where light comes from"
+        glossy_ != nullptr ? "glossy hitpoints need the directions of photons"
                            : "all hitpoints are diffuse");
     const bool is_one_floor = glossy_ == nullptr && GathersOnOneFloor(scene_);
     Set(Part::kPhotonNormals, gathers_ != nullptr && !is_one_floor,
@@ -409,7 +409,7 @@ class NeedsFinder {
     const bool is_used = UsesFrequency(settings_.radius_controller);
     Set(Part::kFrequency, is_used,
         Concat("radius controller ", NameOf(settings_.radius_controller),
-               is_used ? " asks for them" : " needs none"));
+               is_used ? " needs them" : " needs none"));
     const auto set = [&](Part part, bool has_it, std::string_view why, std::string_view why_not) {
       Set(part, is_used && has_it,
           std::string(!is_used ? "there are no frequency photons"
@@ -425,15 +425,15 @@ class NeedsFinder {
         "every mirror and all glass is flat");
     set(Part::kTextureDetail, textured_ != nullptr, "surfaces have textures",
         "no surface has a texture");
-    const bool has_map = std::ranges::any_of(
-        scene_.infinite_lights, [](const auto& light) { return light.HasDetail(); });
+    const bool has_map = std::ranges::any_of(scene_.infinite_lights,
+                                             [](const auto& light) { return light.HasDetail(); });
     set(Part::kSkyDetail, has_map, "an environment map lights the scene",
         "no environment map lights the scene");
     set(Part::kGlossyWindow, glossy_ != nullptr, "there are glossy hitpoints",
         "all hitpoints are diffuse");
   }
 
-  void SayWhatIsNotRead() {
+  void AddPartsNotRead() {
     Set(Part::kMotion, false, "scenes that move are not read");
     Set(Part::kMedia, false, "media are not read");
     Set(Part::kAlphaMasks, false, "alpha masks are not read");

@@ -33,7 +33,7 @@ struct NormalCurvature {
 
 class SurfaceCurvature {
  public:
-  // Of materials, which are asked for.
+  // Selects materials.
   using Choice = std::function<bool(const Material&)>;
   // Prepares the meshes with vertex normals whose material is one that `is_wanted`; others count
   // as flat. Gradients, by far the most work, are 0 on meshes whose `is_change_wanted` is not.

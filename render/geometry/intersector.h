@@ -1,4 +1,4 @@
-// What does a ray meet first? The only floor that knows Embree.
+// What does a ray meet first? The only floor that includes Embree.
 //
 // Triangles are Embree's; analytic shapes are exact, never tessellated. The instruction set is
 // pinned, and only single rays are traced, so that equal rays have equal hits in every process of
@@ -16,7 +16,7 @@
 
 namespace lucerna {
 
-// Which tree rays are traced through, and what hits are to tell.
+// Which tree rays are traced through, and what hits contain.
 struct RayNeeds {
   bool robust_rays = true;
   bool split_triangles = false;
@@ -27,7 +27,7 @@ struct RayNeeds {
 
 struct Ray {
   Vec3 origin;
-  Vec3 direction;  // unit, except where only occlusion is asked for
+  Vec3 direction;  // unit, except for tests of occlusion alone
   float t_max = HUGE_VALF;
 };
 

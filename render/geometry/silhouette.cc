@@ -17,7 +17,7 @@
 namespace lucerna {
 namespace {
 
-// Light goes on through glass: its outline bends light, which the operators of its surfaces tell,
+// Light goes on through glass: its outline bends light, which the operators of its surfaces model,
 // and casts no shadow.
 bool CastsShadow(const Scene& scene, const ShapeTraits& traits) {
   const auto material = static_cast<std::size_t>(traits.material);

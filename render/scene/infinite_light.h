@@ -14,8 +14,8 @@
 #include "render/scene/texture.h"
 
 // ROW(Name, name): InfiniteLight::Kind::kName, and its name in messages.
-#define LUCERNA_INFINITE_LIGHTS(ROW)           \
-  ROW(Infinite, "constant environment light")  \
+#define LUCERNA_INFINITE_LIGHTS(ROW)          \
+  ROW(Infinite, "constant environment light") \
   ROW(Environment, "environment map")
 
 namespace lucerna {
@@ -33,7 +33,9 @@ struct InfiniteLight {
   Kind kind = Kind::kInfinite;  // the same everywhere; kEnvironment: a map
 
   // Whether it is brighter from some directions than from others.
-  [[nodiscard]] bool HasDetail() const { return kind != Kind::kInfinite; }
+  [[nodiscard]] bool HasDetail() const {
+    return kind != Kind::kInfinite;
+  }
 };
 
 }  // namespace lucerna

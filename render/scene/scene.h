@@ -102,7 +102,7 @@ struct FilmSettings {
   std::string filename;
 };
 
-// What the file asks of the integrator; absent where it says nothing.
+// The integrator settings of the file; absent where the file has none.
 struct IntegratorSettings {
   std::string name = "sppm";
   std::optional<int> max_depth;

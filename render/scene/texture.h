@@ -4,8 +4,8 @@
 // them yet, and three files: lookup in render/scene/texture_NAME.cc, how pbrt files give it in
 // render/formats/pbrt/texture_NAME.cc, and its detail in worker/texture_detail_NAME.cc
 // (docs/adding.md). Functions that differ between kinds are declared from the rows, here, in
-// formats/pbrt/texture_readers.h and in worker/texture_detail.h. Colours are linear Rec. 709, as everything in a Scene. A place is (u, v), with v
-// upwards, while row 0 of a picture is its top.
+// formats/pbrt/texture_readers.h and in worker/texture_detail.h. Colours are linear Rec. 709, as
+// everything in a Scene. A place is (u, v), with v upwards, while row 0 of a picture is its top.
 //
 // Looking up is plain float arithmetic: the same bits on every machine of one numeric profile.
 #pragma once
@@ -57,8 +57,8 @@ struct Picture {
 struct UvMapping {
   float scale_u = 1, scale_v = 1, delta_u = 0, delta_v = 0;
 
-  // Requires a finite place. Returns 0 for a coordinate so far from the origin that floats there do
-  // not tell one place from the next; every result fits into an int.
+  // Returns 0 for a coordinate so far from the origin that neighbouring floats there are more than
+  // a texture apart, or that is no number; every result fits into an int.
   [[nodiscard]] Vec2 Map(Vec2 uv) const;
 
   bool operator==(const UvMapping&) const = default;

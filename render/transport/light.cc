@@ -155,8 +155,8 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
   LUCERNA_DELTA_LIGHTS(LUCERNA_ADD)
 #undef LUCERNA_ADD
   first_infinite_ = emitters_.size();
-#define LUCERNA_MAKE(Name, name)                                         \
-  std::ranges::move(Make##Name##Emissions(scene.infinite_lights),        \
+#define LUCERNA_MAKE(Name, name)                                  \
+  std::ranges::move(Make##Name##Emissions(scene.infinite_lights), \
                     std::back_inserter(infinite_lights_));
   LUCERNA_INFINITE_LIGHTS(LUCERNA_MAKE)
 #undef LUCERNA_MAKE
@@ -427,15 +427,15 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
     LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
 #undef LUCERNA_CASE
 #define LUCERNA_CASE(Name, name) case Kind::k##Name:
-      LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+    LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
 #undef LUCERNA_CASE
-      sample.wi = infinite_lights_[emitter.primitive]->Sample(u1, u2);
-      sample.is_distant = true;
-      // Whichever drew it, light from this direction is that of all infinite lights.
-      sample.pdf = PdfDirectInfinite(sample.wi);
-      if (!(sample.pdf > 0)) return false;
-      sample.radiance_over_pdf = InfiniteRadiance(sample.wi) / sample.pdf;
-      return true;
+    sample.wi = infinite_lights_[emitter.primitive]->Sample(u1, u2);
+    sample.is_distant = true;
+    // Whichever drew it, light from this direction is that of all infinite lights.
+    sample.pdf = PdfDirectInfinite(sample.wi);
+    if (!(sample.pdf > 0)) return false;
+    sample.radiance_over_pdf = InfiniteRadiance(sample.wi) / sample.pdf;
+    return true;
     default:
       break;
   }

@@ -52,8 +52,9 @@ enum class EmitterKind : std::uint8_t {
 
 struct Emitter {
   EmitterKind kind = EmitterKind::kPoint;
-  std::uint32_t geometry = 0;   // kTriangle: the mesh
-  std::uint32_t primitive = 0;  // triangle, or index among the shapes or lights of the kind, or the infinite lights
+  std::uint32_t geometry = 0;  // kTriangle: the mesh
+  std::uint32_t primitive =
+      0;  // triangle, or index among the shapes or lights of the kind, or the infinite lights
   bool two_sided = false;
   bool is_sampled = true;  // for direct light
   float area = 0;
@@ -128,7 +129,7 @@ class LightSet {
   [[nodiscard]] std::optional<Spectrum> DeltaSource(const Emission& emission, double edge_strength,
                                                     const SpectrumLimits& limits) const;
 
-  // Draws light arriving at `from`, without asking whether anything is in the way. False when the
+  // Draws light arriving at `from`, without a test whether anything is in the way. False when the
   // drawn emitter sends nothing there.
   [[nodiscard]] bool SampleDirect(Vec3 from, double u_choice, float u1, float u2,
                                   LightSample& sample) const;

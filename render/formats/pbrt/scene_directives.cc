@@ -227,14 +227,23 @@ bool DirectiveReader::OnShape(Arguments& arguments) {
 
 bool DirectiveReader::HasRoomFor(const ShapeSet& shapes, Arguments& arguments) {
   const std::uint64_t most = assets_.limits().max_triangles;
-  if (shapes.Cost() <= most - shapes_cost_) return true;
-  arguments.Error(Concat("the scene has more than ", most, " triangles"));
+  const std::uint64_t most_bytes = assets_.limits().max_shape_bytes;
+  if (shapes.Cost() > most - shapes_cost_) {
+    arguments.Error(Concat("the scene has more than ", most, " triangles"));
+  } else if (shapes.SizeBytes() > most_bytes - shapes_bytes_) {
+    arguments.Error(Concat("with this, the shapes of the scene take more than the ", most_bytes,
+                           " bytes of memory that there are for them; repeat meshes less often, or "
+                           "give meshes with fewer vertices"));
+  } else {
+    return true;
+  }
   is_stopped_ = true;
   return false;
 }
 
 void DirectiveReader::AddShapes(ShapeSet shapes) {
   shapes_cost_ += shapes.Cost();
+  shapes_bytes_ += shapes.SizeBytes();
   const auto append = [](auto& to, auto& from) {
     to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
   };

@@ -220,6 +220,17 @@ std::uint64_t ShapeSet::Cost() const {
   return cost;
 }
 
+std::uint64_t ShapeSet::SizeBytes() const {
+  std::uint64_t size = 0;
+  for (const TriangleMesh& mesh : meshes) {
+    size += sizeof(mesh) + mesh.positions.size() * sizeof(Vec3) +
+            mesh.indices.size() * sizeof(std::uint32_t) + mesh.normals.size() * sizeof(Vec3) +
+            mesh.uvs.size() * sizeof(Vec2);
+  }
+  ForEachAnalyticShape(*this, [&](const auto& shape) { size += sizeof(shape); });
+  return size;
+}
+
 double ShapeSet::Area() const {
   double area_m2 = 0;
   for (const TriangleMesh& mesh : meshes) {

@@ -30,6 +30,8 @@ struct ShapeSet {
   // What it costs to keep: triangles, every other shape as one, and vertices that no triangle
   // needs as a third of one.
   [[nodiscard]] std::uint64_t Cost() const;
+  // In memory.
+  [[nodiscard]] std::uint64_t SizeBytes() const;
   // [m²], of one side.
   [[nodiscard]] double Area() const;
 };

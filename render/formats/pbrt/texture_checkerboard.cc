@@ -19,8 +19,8 @@ NamedTexture ReadCheckerboardTexture(const TextureInput& input) {
   if (even.number == kNoTexture) return even;
   if (odd.number == kNoTexture) return odd;
   texture.parts = {even.number, odd.number};
-  return AppendTexture(texture, std::max(even.largest, odd.largest), std::max(even.depth, odd.depth) + 1,
-                input.textures);
+  return AppendTexture(texture, std::max(even.largest, odd.largest),
+                       std::max(even.depth, odd.depth) + 1, input.textures);
 }
 
 }  // namespace lucerna

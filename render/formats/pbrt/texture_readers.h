@@ -31,7 +31,7 @@ LUCERNA_TEXTURES(LUCERNA_DECLARE)
 [[nodiscard]] NamedTexture UnusableTexture(std::string why_not);
 // Gives `texture` the next number. `largest` and `depth`: see NamedTexture.
 [[nodiscard]] NamedTexture AppendTexture(Texture texture, float largest, int depth,
-                                  std::vector<Texture>& textures);
+                                         std::vector<Texture>& textures);
 [[nodiscard]] UvMapping ReadMapping(ParameterList& parameters);
 // A parameter that is a texture or a colour; `otherwise` where it is absent or wrong.
 [[nodiscard]] NamedTexture ReadPart(std::string_view name, float otherwise,

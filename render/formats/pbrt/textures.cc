@@ -26,7 +26,8 @@ NamedTexture UnusableTexture(std::string why_not) {
   return texture;
 }
 
-NamedTexture AppendTexture(Texture texture, float largest, int depth, std::vector<Texture>& textures) {
+NamedTexture AppendTexture(Texture texture, float largest, int depth,
+                           std::vector<Texture>& textures) {
   textures.push_back(std::move(texture));
   return {static_cast<std::int32_t>(textures.size()) - 1, "", largest, depth};
 }
@@ -68,7 +69,8 @@ NamedTexture ReadTexture(std::string_view type, ParameterList& parameters,
   const TextureReader read = FindReader<TextureReader>(kKinds, type);
   if (read == nullptr) {
     return UnusableTexture(Concat("refers to a texture of type ", Quoted(type),
-                           ", which is not supported; ", SupportedKinds<TextureReader>(kKinds)));
+                                  ", which is not supported; ",
+                                  SupportedKinds<TextureReader>(kKinds)));
   }
   NamedTexture made = read({parameters, names, assets, textures});
   if (made.depth > kMaxDepth) {
