@@ -1,24 +1,11 @@
 #include "render/scene/texture.h"
 
 #include <algorithm>
-#include <cmath>
+
+#include "render/scene/texture_lookup.h"
 
 namespace lucerna {
 namespace {
-
-// Into [0, 1]. What is not a number, as no colour times an infinite scale, becomes 0.
-float Held(float value) {
-  return value > 0 ? std::min(value, 1.0F) : 0.0F;
-}
-
-Rgb Held(Rgb color) {
-  return {Held(color.r), Held(color.g), Held(color.b)};
-}
-
-float Bounded(float place) {
-  constexpr float kFarthest = 1e9F;
-  return std::abs(place) <= kFarthest ? place : 0.0F;
-}
 
 TextureStep LookUp(const Texture& texture, Vec2 uv) {
   switch (texture.kind) {
@@ -41,19 +28,11 @@ float Picture::Largest() const {
   return largest;
 }
 
-Vec2 UvMapping::Map(Vec2 uv) const {
-  return {Bounded(scale_u * uv.x + delta_u), Bounded(scale_v * uv.y + delta_v)};
-}
-
-TextureStep TextureStep::To(Rgb color) {
-  return {.color = Held(color)};
-}
-
 Rgb TextureColor(std::span<const Texture> textures, std::int32_t number, Vec2 uv) {
   float factor = 1;
   while (true) {
     const TextureStep step = LookUp(textures[static_cast<std::size_t>(number)], uv);
-    if (step.next == kNoTexture) return Held(step.color * factor);
+    if (step.next == kNoTexture) return HeldInUnit(step.color * factor);
     factor *= step.factor;
     number = step.next;
   }

@@ -1,7 +1,7 @@
 // Squares of two other textures.
 #include <cmath>
 
-#include "render/scene/texture.h"
+#include "render/scene/texture_lookup.h"
 
 namespace lucerna {
 

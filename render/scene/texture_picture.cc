@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/scene/texture.h"
+#include "render/scene/texture_lookup.h"
 
 namespace lucerna {
 namespace {

@@ -105,18 +105,19 @@ TEST_F(JobIntakeTest, RefusesASmallUploadThatUnpacksToMoreThanTheMemory) {
   EXPECT_TRUE(NothingIsPinned());
 }
 
-// A picture of one colour packs well: its pixels count, and its size is in its first bytes.
+// A picture of one colour packs well: its pixels count, and their number is in its first bytes.
 TEST_F(JobIntakeTest, RefusesASmallPictureOfMorePixelsThanTheMemoryHolds) {
+  using namespace std::string_literals;
   Add("scene.pbrt", std::string(kScene) +
                         "Texture \"a\" \"spectrum\" \"imagemap\" \"string filename\" \"a.png\"\n");
   Add("floor.pbrt", kFloor);
-  using namespace std::string_literals;
-  // 16,384 x 16,384 pixels of three bytes.
-  Add("a.png",
-      "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x40\0\0\0\x40\0\x08\x02\0\0\0CRC."s + "\0\0\x02\0IDAT"s);
-  EXPECT_THAT(Check().status().message(),
-              testing::HasSubstr("a.png: the image would take 805306368 bytes of memory, and "
-                                 "268435456 are left for the scene's images"));
+  // 2048 x 2048 pixels of three bytes in a file of one kilobyte.
+  Add("a.png", "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x08\0\0\0\x08\0\x08\x02\0\0\0CRC."s +
+                   "\0\0\x04\0IDAT"s + std::string(1024, 'x'));
+  max_job_bytes_ = 32 << 20;
+  EXPECT_THAT(std::string(Check().status().message()),
+              testing::HasSubstr("a.png: the image would take 12582912 bytes of memory, and "
+                                 "8388608 are left for the scene's images"));
   EXPECT_TRUE(NothingIsPinned());
 }
 
