@@ -27,6 +27,12 @@ float PlaceIn(std::span<const Number> cumulative, float u) {
   return static_cast<float>(cell) + std::min(static_cast<float>(within), 0x1.fffffep-1F);
 }
 
+// The density [sr⁻¹] of a direction from which light of this radiance comes.
+float DensityOf(Rgb radiance, double mean_luminance) {
+  const double share = static_cast<double>(Luminance(radiance)) / mean_luminance;
+  return static_cast<float>(share) / (4 * kPi);
+}
+
 }  // namespace
 
 EnvironmentMap::EnvironmentMap(const InfiniteLight& light)
@@ -86,8 +92,7 @@ Rgb EnvironmentMap::Radiance(Vec3 direction) const {
 }
 
 float EnvironmentMap::PdfSolidAngle(Vec3 direction) const {
-  const double share = static_cast<double>(Luminance(Radiance(direction))) / mean_luminance_;
-  return static_cast<float>(share) / (4 * kPi);
+  return DensityOf(Radiance(direction), mean_luminance_);
 }
 
 Vec3 EnvironmentMap::Sample(float u1, float u2) const {
@@ -103,10 +108,11 @@ Vec3 EnvironmentMap::Sample(float u1, float u2) const {
 bool EnvironmentMap::SampleEmission(const Emitter& emitter, const BoundingSphere& scene,
                                     const EmissionNumbers& u, Emission& emission) const {
   const Vec3 towards = Sample(u.direction1, u.direction2);
-  const float pdf = PdfSolidAngle(towards);
+  const Rgb radiance = Radiance(towards);
+  const float pdf = DensityOf(radiance, mean_luminance_);
   if (!(pdf > 0)) return false;
-  emission.ray = EnteringRay(towards, scene, u);
-  emission.flux = Radiance(towards) * (kPi * scene.radius * scene.radius / (pdf * emitter.choice));
+  SetEnteringRay(towards, scene, u, emission.ray);
+  emission.flux = radiance * (kPi * scene.radius * scene.radius / (pdf * emitter.choice));
   return true;
 }
 

@@ -27,7 +27,7 @@ class ConstantEmission final : public InfiniteEmission {
   }
   [[nodiscard]] bool SampleEmission(const Emitter& /*emitter*/, const BoundingSphere& scene,
                                     const EmissionNumbers& u, Emission& emission) const override {
-    emission.ray = EnteringRay(-SquareToSphere(u.direction1, u.direction2), scene, u);
+    SetEnteringRay(-SquareToSphere(u.direction1, u.direction2), scene, u, emission.ray);
     return true;
   }
   [[nodiscard]] std::unique_ptr<const InfiniteSpectrum> MeasureSpectrum() const override {

@@ -9,6 +9,7 @@
 #include "render/frequency/spectrum.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
+#include "render/math/warp.h"
 #include "render/scene/scene.h"
 #include "render/transport/light.h"
 #include "render/transport/light_kinds.h"
@@ -57,8 +58,15 @@ using InfiniteEmissions = std::vector<std::shared_ptr<const InfiniteEmission>>;
 LUCERNA_INFINITE_LIGHTS(LUCERNA_DECLARE)
 #undef LUCERNA_DECLARE
 
-// The ray of a photon that travels against `towards`, from an even place on the disk through which
-// all rays of this direction enter the scene.
-[[nodiscard]] Ray EnteringRay(Vec3 towards, const BoundingSphere& scene, const EmissionNumbers& u);
+// Makes `ray`, but for its end, that of a photon that travels against `towards`, from an even place
+// on the disk through which all rays of this direction enter the scene. Inline: out of line it took
+// photons of an even sky 3 % longer.
+inline void SetEnteringRay(Vec3 towards, const BoundingSphere& scene, const EmissionNumbers& u,
+                           Ray& ray) {
+  const Frame frame(-towards);
+  const Vec3 disk = SquareToDisk(u.place1, u.place2) * scene.radius;
+  ray.origin = scene.center + towards * scene.radius + frame.s * disk.x + frame.t * disk.y;
+  ray.direction = -towards;
+}
 
 }  // namespace lucerna
