@@ -90,7 +90,7 @@ StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& j
   std::optional<Progress> progress;
   if (shows_progress && !output_options.quiet) progress.emplace(connection, job_id, output_options);
   auto job = connection.Watch(job_id, [&](const v1::Job& newest) {
-    // Of the end tells the summary.
+    // The summary reports the end.
     if (progress && newest.state() != v1::JOB_STATE_UNSPECIFIED && !HasEnded(newest.state())) {
       progress->Show(newest);
     }

@@ -42,7 +42,8 @@ class Coordinator {
   struct Options {
     int threads = 0;  // for eye paths; 0: all
     std::uint64_t max_store_bytes = std::uint64_t{8} << 30;
-    std::uint64_t max_job_bytes = 0;  // for the image of one job; 0: what is free at the start
+    std::uint64_t max_job_bytes =
+        0;  // of the image and the scene of one job; 0: what is free at the start
     std::uint64_t batch_photons = 0;  // 0: follows the number of workers
     std::string numeric_profile;
   };

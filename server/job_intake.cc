@@ -1,11 +1,24 @@
 #include "server/job_intake.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "render/formats/read_scene.h"
 #include "server/memory_need.h"
 
 namespace lucerna {
+namespace {
+
+// A small upload may hold a large scene: compressed meshes and pictures, a mesh that is read a
+// thousand times. The tree over the shapes takes about three times their own memory.
+SceneLimits LimitsFor(std::uint64_t max_job_bytes) {
+  SceneLimits limits;
+  limits.max_shape_bytes = std::min(limits.max_shape_bytes, max_job_bytes / 8);
+  limits.max_picture_bytes = std::min(limits.max_picture_bytes, max_job_bytes / 4);
+  return limits;
+}
+
+}  // namespace
 
 StatusOr<JobIntake::ReadResult> JobIntake::ReadScene(const SceneManifest& manifest,
                                                      const StillNeeded& still_needed) const {
@@ -14,7 +27,7 @@ StatusOr<JobIntake::ReadResult> JobIntake::ReadScene(const SceneManifest& manife
     LUCERNA_ASSIGN_OR_RETURN(const Blob blob, blobs_.Get(digest));
     return *blob;
   });
-  ParsedScene parsed = lucerna::ReadScene(files, manifest.main_path);
+  ParsedScene parsed = lucerna::ReadScene(files, manifest.main_path, LimitsFor(max_job_bytes_));
   // Before the errors of a scene whose files were not all read.
   LUCERNA_RETURN_IF_ERROR(still_needed());
   LUCERNA_RETURN_IF_ERROR(parsed.ToStatus());

@@ -44,7 +44,8 @@ struct CheckedJob {
 
 class JobIntake {
  public:
-  // The store outlives the intake. `max_job_bytes` is for the image of one job.
+  // The store outlives the intake. `max_job_bytes` is for the image of one job; the
+  // shapes of its scene, with the tree over them, may have half of that and its pictures a quarter.
   JobIntake(BlobStore& blobs, std::uint64_t max_job_bytes)
       : blobs_(blobs), max_job_bytes_(max_job_bytes) {}
 

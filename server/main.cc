@@ -113,8 +113,9 @@ int Main(int argc, char** argv) {
   app.add_option("--max-store-bytes", flags.coordinator.max_store_bytes,
                  "memory for scene files and hitpoints [bytes]")
       ->capture_default_str();
-  app.add_option("--max-job-bytes", flags.coordinator.max_job_bytes,
-                 "memory for the image of one job [bytes]; 0: what is free at the start")
+  app.add_option(
+         "--max-job-bytes", flags.coordinator.max_job_bytes,
+         "memory for the image and the scene of one job [bytes]; 0: what is free at the start")
       ->capture_default_str();
   app.add_option("--batch-photons", flags.coordinator.batch_photons,
                  "photons in every batch; 0: by the number of workers")

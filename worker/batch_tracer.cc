@@ -187,7 +187,7 @@ struct BatchTracer::State {
     return prepared.PrepareFor(needs);
   }
 
-  // Requires PrepareFor. Keeps what it knows of first hits while the settings stay.
+  // Requires PrepareFor. Keeps the first hits that it found while the settings stay.
   void PrepareEyePaths(const RenderSettings& settings) {
     if (eye_paths != nullptr && eye_settings == settings) return;
     eye_settings = settings;

@@ -29,7 +29,7 @@ class BatchTracer {
   ~BatchTracer();
 
   // Traces photons [first, last) of `pass`, which has `photons_per_pass` (0: as in `settings`).
-  // `needs` are those of the scene and these settings; what they ask for is made with the first
+  // `needs` are those of the scene and these settings; what they need is made with the first
   // batch of a job. One call at a time. Errors: INVALID_ARGUMENT when block and radii do not fit
   // each other or the scene, CANCELLED soon (milliseconds) after `stop` becomes true,
   // RESOURCE_EXHAUSTED when memory runs out, INTERNAL when Embree refuses the scene.

@@ -21,8 +21,8 @@ struct alignas(16) PhotonRecord {
   std::uint32_t key = 0;
 };
 
-// What it brings where jobs ask which way it faces: half a cache line, in one place, because every
-// photon that is near needs all of it. Columns of their own took a fifth longer to gather.
+// A photon of jobs that compare normals or directions: half a cache line, in one place, because
+// every photon that is near needs all of it. Columns of their own took a fifth longer to gather.
 struct alignas(32) FacingRecord : PhotonRecord {
   Vec3 normal;
   std::uint32_t arrival_oct = 0;  // 0 in jobs that have no such column

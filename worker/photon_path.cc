@@ -1,7 +1,6 @@
 #include "worker/photon_path.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -119,7 +118,11 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       region_(region),
       scale_(FluxScale::ForPower(lights.TotalPower())),
       properties_(PropertiesOf(scene.materials)),
-      walk_(WalkPartsOf(needs) | (needs.Uses(Part::kCausticHitpoints) ? 8U : 0U)),
+      has_textures_(needs.Uses(Part::kTextures)),
+      parts_{needs.Uses(Part::kShadingNormals),
+             needs.Uses(Part::kSpecular) || needs.Uses(Part::kGlossy) ||
+                 needs.Uses(Part::kCausticHitpoints),
+             needs.Uses(Part::kCausticHitpoints)},
       keep_(needs.Uses(Part::kPhotonDirections) ? KeepColumns<true, true>
             : needs.Uses(Part::kPhotonNormals)  ? KeepColumns<true, false>
                                                 : KeepColumns<false, false>) {
@@ -166,30 +169,22 @@ PhotonHistory PhotonPathTracer::Replay(std::uint64_t pass, std::uint64_t index) 
   PhotonHistory history;
   HistoryWatcher watcher(history);
   Landed landed;
-  // A spectrum follows the walk and never changes it.
+  // A spectrum follows the walk and never changes it; nor does a part that the scene does not have.
   history.end =
-      (walk_ & 8) != 0
-          ? Walk<WalkParts{false, true, true, true, true}>(KeyOf(pass, index), landed, watcher)
-          : Walk<WalkParts{false, true, true, true, false}>(KeyOf(pass, index), landed, watcher);
+      Walk<true, false>(KeyOf(pass, index), {true, true, parts_.caustics}, landed, watcher);
   return history;
 }
 
 template <bool kSpectrum>
 PhotonEnd PhotonPathTracer::WalkUnseen(const Key& key, Landed& landed) const {
-  using Function = PhotonEnd (PhotonPathTracer::*)(const Key&, Landed&, NoWatcher&) const;
-  static constexpr auto kWalks = []<std::size_t... kBits>(std::index_sequence<kBits...>) {
-    return std::array<Function, sizeof...(kBits)>{
-        &PhotonPathTracer::Walk<WalkParts{kSpectrum, (kBits & 1) != 0, (kBits & 2) != 0,
-                                          (kBits & 4) != 0 || kBits >= 8, kBits >= 8},
-                                NoWatcher>...};
-  }
-  (std::make_index_sequence<16>());
-  NoWatcher nobody;
-  return (this->*kWalks[walk_])(key, landed, nobody);
+  NoWatcher none;
+  return has_textures_ ? Walk<true, kSpectrum>(key, parts_, landed, none)
+                       : Walk<false, kSpectrum>(key, parts_, landed, none);
 }
 
-template <PhotonPathTracer::WalkParts kParts, typename Watcher>
-PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watcher) const {
+template <bool kTextures, bool kSpectrum, typename Watcher>
+PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& landed,
+                                 Watcher& watcher) const {
   const SobolPoint u = OwenSobol(key.number, key.job_key);
   KeyedRng rng(CombineKeys(key.job_key, key.number));
 
@@ -223,7 +218,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     return why;
   };
   [[maybe_unused]] SpectrumTracer::Carried spectrum;
-  if constexpr (kParts.spectrum) spectrum = spectra_->Leave(emission);
+  if constexpr (kSpectrum) spectrum = spectra_->Leave(emission);
   for (int landing = 0; landing < settings_.max_depth; ++landing) {
     Hit hit;
     ++landed.rays;
@@ -237,12 +232,12 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
     [[maybe_unused]] std::optional<Material> textured;
     const Material& material = [&]() -> const Material& {
-      if constexpr (kParts.textures) return MaterialAt(scene_, surface, textured);
+      if constexpr (kTextures) return MaterialAt(scene_, surface, textured);
       return scene_.materials[surface.material];
     }();
     watcher.Landed(hit, surface, material, flux);
     const Vec3 wo = -ray.direction;
-    const bool is_smoothed = kParts.shading_normals && surface.has_shading_normal;
+    const bool is_smoothed = parts.shading_normals && surface.has_shading_normal;
     if (is_smoothed) {
       const float shading = Dot(wo, surface.shading_normal);
       const float geometric = Dot(wo, surface.geometric_normal);
@@ -257,7 +252,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     const MaterialProperties& properties = properties_[surface.material];
     const bool gathers = landing > 0 && properties.gathers;
     bool gathers_caustic = false;
-    if constexpr (kParts.caustics) {
+    if (parts.caustics) {
       gathers_caustic = met_smooth_only && landing > 0 && properties.gathers_caustics();
     }
     const bool leaves_deposit = (gathers || gathers_caustic) && scale_.HasRoomFor(flux);
@@ -265,7 +260,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     const bool is_kept = leaves_deposit && Inside(region_, surface.position);
     const bool is_found = is_kept && gathers;
     watcher.Received(flux, properties.gathers || gathers_caustic, landing > 0, leaves_deposit);
-    if constexpr (kParts.caustics) {
+    if (parts.caustics) {
       if (is_kept && gathers_caustic) {
         // A key that is not drawn: the rest of the walk is that of a job without such hitpoints.
         constexpr std::uint64_t kCausticKey = 0x434155535449434BULL;
@@ -277,7 +272,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
         landed.caustics.emission_densities.push_back(emission.density);
       }
     }
-    if constexpr (kParts.spectrum) {
+    if constexpr (kSpectrum) {
       // A surface that scatters light broadly blurs the shadows on it: after a leg of length d at
       // most 4/d² of any detail is left, of none at all 3/d² (see LeaveDiffuse).
       const bool shadows_count = is_found || properties.has_narrow_lobes();
@@ -294,14 +289,14 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
             {surface.position, flux, deposit_key,
              source_of(met_smooth_only ? PathClass::kCaustic : PathClass::kOther)});
         keep_(landed.deposits, surface, wo);
-        if constexpr (kParts.spectrum) {
+        if constexpr (kSpectrum) {
           landed.deposits.traces.push_back(spectra_->Received(spectrum, surface, material, wo));
         }
       }
     }
     if (landing + 1 == settings_.max_depth) break;
 
-    [[maybe_unused]] float u_lobe = u[7];
+    float u_lobe = u[7];
     float u1 = u[5];
     float u2 = u[6];
     if (landing > 0) {
@@ -313,7 +308,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     BsdfSample sample;
     const Vec3 wo_local = frame.ToLocal(wo);
     const bool is_scattered = [&] {
-      if constexpr (kParts.lobes) {
+      if (parts.lobes) {
         return SampleBsdf(material, wo_local, u_lobe, u1, u2, Carried::kFlux, sample);
       }
       return SampleDiffuse(material, wo_local, u1, u2, sample);
@@ -350,7 +345,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, Landed& landed, Watcher& watche
     }
     flux = scattered;
     watcher.Left(flux);
-    if constexpr (kParts.spectrum) spectra_->Scatter(spectrum, surface, material, wo, wi);
+    if constexpr (kSpectrum) spectra_->Scatter(spectrum, surface, material, wo, wi);
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
   }
   return end(PhotonEnd::kDepth, energy.cut_off);

@@ -149,18 +149,16 @@ class PhotonPathTracer {
     std::uint64_t job_key = 0;
   };
   [[nodiscard]] Key KeyOf(std::uint64_t pass, std::uint64_t index) const;
-  // What a walk may meet. Walks are compiled for every combination, and the one that suits the job
-  // is chosen once: what the scene has not, its photons do not ask for.
+  // What the walks of a job may meet, tested at run time: none of these gains 3 % alone when walks
+  // are compiled without it. Textures and spectra are parameters of the template (docs/lean.md).
   struct WalkParts {
-    bool spectrum = false;  // of those that the photon carries
-    bool textures = false;
     bool shading_normals = false;
     bool lobes = false;     // other scattering than diffuse
     bool caustics = false;  // deposits for hitpoints of caustic photons
   };
   // The walk of one photon; with a watcher only for a replay.
-  template <WalkParts kParts, typename Watcher>
-  PhotonEnd Walk(const Key& key, Landed& landed, Watcher& watcher) const;
+  template <bool kTextures, bool kSpectrum, typename Watcher>
+  PhotonEnd Walk(const Key& key, WalkParts parts, Landed& landed, Watcher& watcher) const;
   // The walk without a watcher that suits the job.
   template <bool kSpectrum>
   PhotonEnd WalkUnseen(const Key& key, Landed& landed) const;
@@ -177,7 +175,8 @@ class PhotonPathTracer {
   FluxScale scale_;
   float energy_per_watt_ = 1;
   std::vector<MaterialProperties> properties_;  // [materials]
-  std::size_t walk_ = 0;                        // see WalkPartsOf; bit 3: WalkParts::caustics
+  bool has_textures_;
+  WalkParts parts_;
   // Adds to the columns that the job has beside those of every job.
   using KeepFunction = void (*)(Deposits& deposits, const SurfacePoint& surface, Vec3 wo);
   KeepFunction keep_;

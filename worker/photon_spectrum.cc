@@ -62,10 +62,8 @@ SpectrumTracer::SpectrumTracer(const Scene& scene, const RenderSettings& setting
             return needs.Uses(Part::kCurvedMirrors) && HasNarrowLobes(material);
           }) {
   if (needs.Uses(Part::kTextureDetail)) texture_details_ = TextureDetails(scene.textures);
-  if (needs.Uses(Part::kSkyDetail)) {
-    for (const EnvironmentMap& sky : lights.environments())
-      sky_details_.emplace_back(sky);
-  }
+  for (const auto& light : lights.infinite_lights())
+    infinite_spectra_.push_back(light->MeasureSpectrum());
   MeasureEmitters();
 }
 
@@ -103,20 +101,16 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
               surface_moments_[surface_of_[first_of_mesh_[emitter.geometry] + emitter.primitive]],
               direction, limits_),
           false};
-    case EmitterKind::kSphere:
-      return {SphereSource(static_cast<double>(scene_.spheres[emitter.primitive].radius), limits_),
-              false};
-    case EmitterKind::kDisk: {
-      const Disk& disk = scene_.disks[emitter.primitive];
-      return {AreaSource(DiscMoments(disk.center, disk.normal, static_cast<double>(disk.radius)),
-                         direction, limits_),
-              false};
-    }
-    case EmitterKind::kInfinite:
-      // Even light from everywhere: no structure in place or direction.
-      return {EnvironmentSource(0, 1, 1, 1, limits_), false};
-    case EmitterKind::kEnvironment:
-      return {sky_details_[emitter.primitive].Source(-direction, limits_), false};
+#define LUCERNA_CASE(Name, list, name) \
+  case EmitterKind::k##Name:           \
+    return {SpectrumOf(scene_.list[emitter.primitive], direction, limits_), false};
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+#define LUCERNA_CASE(Name, name) \
+  case EmitterKind::k##Name:     \
+    return {infinite_spectra_[emitter.primitive]->Source(-direction, limits_), false};
+      LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
     default:
       return {lights_.DeltaSource(emission, edge_strength_, limits_).value_or(Spectrum()), false};
   }

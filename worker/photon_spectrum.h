@@ -16,8 +16,8 @@
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/transport/bsdf.h"
+#include "render/transport/infinite_emission.h"
 #include "render/transport/light.h"
-#include "worker/sky_detail.h"
 #include "worker/texture_detail.h"
 
 namespace lucerna {
@@ -25,12 +25,12 @@ namespace lucerna {
 class SpectrumTracer {
  public:
   // Keeps references to scene and lights. Measures of the scene what `needs` of a job with these
-  // settings ask for. Errors: as SilhouetteEdges::Create.
+  // settings need. Errors: as SilhouetteEdges::Create.
   [[nodiscard]] static StatusOr<std::unique_ptr<SpectrumTracer>> Create(
       const Scene& scene, const RenderSettings& settings, const SceneNeeds& needs,
       const Intersector& intersector, const LightSet& lights);
 
-  // Whether it was made for settings that ask for the same.
+  // Whether it was made for settings with the same needs.
   [[nodiscard]] bool Suits(const RenderSettings& settings) const;
 
   // A spectrum on its way. After diffuse scattering it is complete once the next leg is known.
@@ -75,7 +75,7 @@ class SpectrumTracer {
   std::vector<std::uint32_t> surface_of_;       // [triangles of emitting meshes]
   std::vector<std::size_t> first_of_mesh_;      // [meshes] into surface_of_
   std::vector<TextureDetail> texture_details_;  // [textures]
-  std::vector<SkyDetail> sky_details_;          // [environments of the lights]
+  std::vector<std::unique_ptr<const InfiniteSpectrum>> infinite_spectra_;  // [infinite lights]
 };
 
 }  // namespace lucerna

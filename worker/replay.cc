@@ -36,12 +36,11 @@ std::string NameOf(const Emitter& light) {
   return absl::StrCat(std::string(NameOf(light.kind)), " ", light.primitive);
 }
 
-std::string NameOfShape(const SurfacePoint& surface, const Intersector& intersector) {
-  if (surface.geometry < intersector.sphere_geometry()) {
+std::string NameOfShape(const SurfacePoint& surface, const Scene& scene) {
+  if (surface.geometry < scene.meshes.size()) {
     return absl::StrCat("triangle ", surface.primitive, " of mesh ", surface.geometry);
   }
-  return absl::StrCat(surface.geometry == intersector.disk_geometry() ? "disk " : "sphere ",
-                      surface.primitive);
+  return absl::StrCat(std::string(NameOf(KindOf(scene, surface.geometry))), " ", surface.primitive);
 }
 
 v1::PhotonEnd EndToProto(PhotonEnd end) {
@@ -77,10 +76,9 @@ std::string ChosenIn(const PhotonLanding& landing) {
                       landing.transmits ? "transmission" : "reflection");
 }
 
-v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing,
-                                       const Intersector& intersector) {
+v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing, const Scene& scene) {
   v1::PhotonPath::Landing message;
-  message.set_shape(NameOfShape(landing.surface, intersector));
+  message.set_shape(NameOfShape(landing.surface, scene));
   message.set_material(absl::StrCat(landing.surface.material, " (",
                                     std::string(NameOf(landing.material_kind)), ")"));
   message.set_distance(static_cast<double>(landing.distance));
@@ -132,7 +130,7 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
   *emission.mutable_direction() = TripleOf(history.emission.ray.direction);
   *emission.mutable_flux() = TripleOf(history.emission.flux);
   for (const PhotonLanding& landing : history.landings) {
-    *path.add_landings() = LandingToProto(landing, prepared.intersector());
+    *path.add_landings() = LandingToProto(landing, prepared.scene());
   }
   return path;
 }

@@ -17,8 +17,8 @@ constexpr Duration kWarnEvery = std::chrono::seconds(5);
 constexpr Duration kShortestSync = std::chrono::milliseconds(500);
 
 void SayGoodbye(Connection& connection, const std::string& worker_id) {
-  if (const Status said = connection.Goodbye(worker_id); !said.ok()) {
-    spdlog::warn("no goodbye: {}", std::string(said.message()));
+  if (const Status status = connection.Goodbye(worker_id); !status.ok()) {
+    spdlog::warn("no goodbye: {}", std::string(status.message()));
   }
 }
 

@@ -1,108 +1,21 @@
 #include "worker/texture_detail.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
-
-#include "render/frequency/spectrum.h"
-
 namespace lucerna {
-namespace {
-
-// What is known of a texture: `luminance` is the mean.
-struct Known {
-  TextureDetail detail;
-  double luminance = 0;
-};
-
-Known OfPicture(const Texture& texture) {
-  const Picture& picture = *texture.picture;
-  const auto width = static_cast<std::size_t>(picture.width);
-  const auto height = static_cast<std::size_t>(picture.height);
-  std::vector<float> albedo;
-  albedo.reserve(width * height);
-  double sum = 0;
-  for (int y = 0; y < picture.height; ++y) {
-    for (int x = 0; x < picture.width; ++x) {
-      Rgb color = picture.At(x, y) * texture.scale;
-      if (texture.is_inverted) color = Gray(1) - color;
-      albedo.push_back(std::clamp(Luminance(color), 0.0F, 1.0F));
-      sum += static_cast<double>(albedo.back());
-    }
-  }
-  Known known;
-  known.luminance = sum / static_cast<double>(albedo.size());
-  // Beyond the edge lies the other edge, or more of this one.
-  const bool repeats = texture.wrap == Texture::Wrap::kRepeat;
-  const auto after = [&](std::size_t i, std::size_t count) {
-    return i + 1 < count ? i + 1 : repeats ? 0 : i;
-  };
-  const auto before = [&](std::size_t i, std::size_t count) {
-    return i > 0 ? i - 1 : repeats ? count - 1 : i;
-  };
-  const auto at = [&](std::size_t x, std::size_t y) {
-    return static_cast<double>(albedo[y * width + x]);
-  };
-  for (std::size_t y = 0; y < height; ++y) {
-    for (std::size_t x = 0; x < width; ++x) {
-      const double here = at(x, y);
-      const double along_u = at(before(x, width), y) + at(after(x, width), y) - 2 * here;
-      const double along_v = at(x, before(y, height)) + at(x, after(y, height)) - 2 * here;
-      known.detail.u += TexelDetail(along_u, here, known.luminance, 1);
-      known.detail.v += TexelDetail(along_v, here, known.luminance, 1);
-    }
-  }
-  // From pixels to u and v.
-  const auto texels = static_cast<double>(albedo.size());
-  const double per_u = static_cast<double>(texture.mapping.scale_u) * static_cast<double>(width);
-  const double per_v = static_cast<double>(texture.mapping.scale_v) * static_cast<double>(height);
-  known.detail.u *= per_u * per_u / texels;
-  known.detail.v *= per_v * per_v / texels;
-  return known;
-}
-
-Known OfCheckerboard(const Texture& texture, const Known& even, const Known& odd) {
-  constexpr double kTexels = 8;  // of a square's side
-  Known known;
-  known.luminance = 0.5 * (even.luminance + odd.luminance);
-  const double step = even.luminance - odd.luminance;
-  // The step is felt in the first and the last texel of each square.
-  const double detail = 2 / kTexels * 0.5 *
-                        (TexelDetail(step, even.luminance, known.luminance, 1) +
-                         TexelDetail(step, odd.luminance, known.luminance, 1));
-  const double per_u = static_cast<double>(texture.mapping.scale_u) * kTexels;
-  const double per_v = static_cast<double>(texture.mapping.scale_v) * kTexels;
-  known.detail = {detail * per_u * per_u + std::max(even.detail.u, odd.detail.u),
-                  detail * per_v * per_v + std::max(even.detail.v, odd.detail.v)};
-  return known;
-}
-
-}  // namespace
 
 std::vector<TextureDetail> TextureDetails(const std::vector<Texture>& textures) {
-  std::vector<Known> known;
+  std::vector<TextureStatistics> statistics;
   std::vector<TextureDetail> details;
   for (const Texture& texture : textures) {
-    const auto part = [&](std::size_t i) {  // made before its whole
-      return known[static_cast<std::size_t>(texture.parts[i])];
-    };
-    Known here;
+    TextureStatistics here;
     switch (texture.kind) {
-      case Texture::Kind::kConstant:
-        here.luminance = static_cast<double>(Luminance(texture.color));
-        break;
-      case Texture::Kind::kPicture:
-        here = OfPicture(texture);
-        break;
-      case Texture::Kind::kScaled:
-        here = part(0);
-        here.luminance *= static_cast<double>(texture.scale);
-        break;
-      case Texture::Kind::kCheckerboard:
-        here = OfCheckerboard(texture, part(0), part(1));
-        break;
+#define LUCERNA_CASE(Name, name)                    \
+  case Texture::Kind::k##Name:                      \
+    here = StatisticsOf##Name(texture, statistics); \
+    break;
+      LUCERNA_TEXTURES(LUCERNA_CASE)
+#undef LUCERNA_CASE
     }
-    known.push_back(here);
+    statistics.push_back(here);
     details.push_back(here.detail);
   }
   return details;

@@ -4,6 +4,7 @@
 // pair of numbers stands for a whole texture, computed once from its pixels.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "render/scene/texture.h"
@@ -16,8 +17,21 @@ struct TextureDetail {
   double u = 0, v = 0;
 };
 
-// [textures]. A constant has none; a checkerboard's edges, which have no end, are told apart to an
-// eighth of a square.
+// Detail and mean luminance.
+struct TextureStatistics {
+  TextureDetail detail;
+  double luminance = 0;
+};
+
+// Of each kind of texture, defined in texture_detail_NAME.cc. `parts`: of textures with lower
+// numbers, by number.
+#define LUCERNA_DECLARE(Name, name)                                          \
+  [[nodiscard]] TextureStatistics StatisticsOf##Name(const Texture& texture, \
+                                                     std::span<const TextureStatistics> parts);
+LUCERNA_TEXTURES(LUCERNA_DECLARE)
+#undef LUCERNA_DECLARE
+
+// [textures].
 [[nodiscard]] std::vector<TextureDetail> TextureDetails(const std::vector<Texture>& textures);
 
 }  // namespace lucerna

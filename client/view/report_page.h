@@ -1,7 +1,7 @@
 // The report of a job as one HTML page.
 //
 // One HTML page that stands alone: the image, the facts, how the error fell, who did the work.
-// Pure: a Job and the image in, text out. The page has no script, asks for nothing from outside and
+// Pure: a Job and the image in, text out. The page has no script, loads nothing from outside and
 // forbids itself to, and follows the reader's light or dark setting.
 #pragma once
 

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include "render/analysis/line_crossing.h"
 #include "render/math/union_find.h"
 #include "render/scene/mesh_edges.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 namespace {
@@ -110,17 +112,19 @@ ClosedSurface::ClosedSurface(std::vector<Triangle> triangles) : triangles_(std::
   near_ = kNear * LargestCoordinate(bounds_);
 }
 
-ClosedSurface::ClosedSurface(const Sphere& sphere)
-    : center_(sphere.center),
-      radius_(static_cast<double>(sphere.radius)),
-      bounds_(BoxAround(sphere.center, sphere.radius)),
+ClosedSurface::ClosedSurface(Vec3 center, float reach,
+                             std::function<double(Double3)> signed_distance)
+    : signed_distance_(std::move(signed_distance)),
+      center_(center),
+      reach_(static_cast<double>(reach)),
+      bounds_(BoxAround(center, reach)),
       near_(kNear * LargestCoordinate(bounds_)) {}
 
 std::optional<bool> ClosedSurface::Contains(Vec3 point) const {
   if (AreDisjoint(BoxAround({&point, 1}), bounds_, near_)) return false;
   const Double3 origin(point);
   if (triangles_.empty()) {
-    const double off = Length(origin - center_) - radius_;
+    const double off = signed_distance_(origin);
     if (std::abs(off) <= near_) return std::nullopt;
     return off < 0;
   }
@@ -161,10 +165,10 @@ bool ClosedSurface::IsApartFrom(std::span<const Vec3> points) const {
           {0.0, static_cast<double>(box.low[axis]) - c, c - static_cast<double>(box.high[axis])});
       nearest += off * off;
     }
-    if (std::sqrt(nearest) > radius_ + near_) return true;
-    return std::ranges::all_of(points, [&](const Vec3& point) {
-      return Length(Double3(point) - center_) < radius_ - near_;
-    });
+    if (std::sqrt(nearest) > reach_ + near_) return true;
+    // The body is convex: what holds the points holds all between them.
+    return std::ranges::all_of(
+        points, [&](const Vec3& point) { return signed_distance_(Double3(point)) < -near_; });
   }
   return std::ranges::all_of(
       triangles_, [&](const Triangle& triangle) { return IsOff(triangle, points, box); });
@@ -204,10 +208,14 @@ std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene, const MaterialPr
       placed.push_back(walls.At(t));
     surfaces.emplace_back(std::move(placed));
   }
-  for (const Sphere& sphere : scene.spheres) {
-    if (is_wall(scene.materials[static_cast<std::size_t>(sphere.traits.material)]))
-      surfaces.emplace_back(sphere);
-  }
+  ForEachAnalyticShape(scene, [&](const auto& shape) {
+    if constexpr (std::decay_t<decltype(shape)>::kIsClosed) {
+      if (is_wall(scene.materials[static_cast<std::size_t>(shape.traits.material)])) {
+        surfaces.emplace_back(shape.center, shape.Reach(),
+                              [shape](Double3 point) { return shape.SignedDistance(point); });
+      }
+    }
+  });
   return surfaces;
 }
 

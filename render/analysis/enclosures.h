@@ -8,7 +8,7 @@
 // Triangles bound a closed surface when each of their edges belongs to an even number of them;
 // vertices are the same when they lie in the same place exactly. The surfaces found are
 // the faces of every region that triangles enclose, found by walking from each side of a
-// triangle to the next one around their common edge, and every sphere.
+// triangle to the next one around their common edge, and every closed analytic shape.
 #pragma once
 
 #include <array>
@@ -26,7 +26,8 @@ namespace lucerna {
 class ClosedSurface {
  public:
   explicit ClosedSurface(std::vector<std::array<Vec3, 3>> triangles);
-  explicit ClosedSurface(const Sphere& sphere);
+  // Of a closed analytic shape within this ball (scene/analytic_shapes.h).
+  ClosedSurface(Vec3 center, float reach, std::function<double(Double3)> signed_distance);
 
   [[nodiscard]] const Bounds& bounds() const { return bounds_; }
   [[nodiscard]] std::size_t triangle_count() const { return triangles_.size(); }
@@ -40,14 +41,15 @@ class ClosedSurface {
   [[nodiscard]] bool IsOff(const std::array<Vec3, 3>& triangle, std::span<const Vec3> points,
                            const Bounds& box) const;
 
-  std::vector<std::array<Vec3, 3>> triangles_;  // empty: the sphere
+  std::vector<std::array<Vec3, 3>> triangles_;  // empty: the analytic shape
+  std::function<double(Double3)> signed_distance_;
   Double3 center_;
-  double radius_ = 0;
+  double reach_ = 0;
   Bounds bounds_;
   double near_ = 0;  // closer than this is too near
 };
 
-// The closed surfaces among the triangles and spheres of the materials that `is_wall` accepts.
+// The closed surfaces among the triangles and shapes of the materials that `is_wall` accepts.
 using MaterialPredicate = std::function<bool(const Material&)>;
 [[nodiscard]] std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene,
                                                           const MaterialPredicate& is_wall);

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <initializer_list>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -100,11 +101,28 @@ bool HasCurvedMirrors(const Scene& scene) {
   const auto scatters = [&](const ShapeTraits& traits) {
     return HasNarrowLobes(scene.materials[static_cast<std::size_t>(traits.material)]);
   };
-  return std::ranges::any_of(scene.spheres,
-                             [&](const Sphere& sphere) { return scatters(sphere.traits); }) ||
-         std::ranges::any_of(scene.meshes, [&](const TriangleMesh& mesh) {
-           return scatters(mesh.traits) && IsSmoothed(mesh);
-         });
+  bool has_curved = std::ranges::any_of(scene.meshes, [&](const TriangleMesh& mesh) {
+    return scatters(mesh.traits) && IsSmoothed(mesh);
+  });
+  ForEachAnalyticShape(scene, [&](const auto& shape) {
+    has_curved = has_curved || (!shape.kIsFlat && scatters(shape.traits));
+  });
+  return has_curved;
+}
+
+bool HasCurvedShapes(const Scene& scene) {
+  bool has_curved = false;
+  ForEachAnalyticShape(scene,
+                       [&](const auto& shape) { has_curved = has_curved || !shape.kIsFlat; });
+  return has_curved;
+}
+
+// Calls `visit` for each flat analytic shape.
+template <typename Visit>
+void ForEachFlatShape(const Scene& scene, const Visit& visit) {
+  ForEachAnalyticShape(scene, [&](const auto& shape) {
+    if constexpr (std::decay_t<decltype(shape)>::kIsFlat) visit(shape);
+  });
 }
 
 std::size_t CountLights(const Scene& scene) {
@@ -132,8 +150,9 @@ std::size_t FacesAwayFromScene(const Scene& scene) {
       count += FacesAway(p0, normal, box) ? 1 : 0;
     }
   }
-  for (const Disk& disk : scene.disks)
-    count += is_one_sided(disk.traits) && FacesAway(disk.center, disk.normal, box) ? 1 : 0;
+  ForEachFlatShape(scene, [&](const auto& shape) {
+    count += is_one_sided(shape.traits) && FacesAway(shape.center, shape.normal, box) ? 1 : 0;
+  });
   return count;
 }
 
@@ -143,9 +162,11 @@ bool GathersOnOneFloor(const Scene& scene) {
   const auto gathers = [&](const ShapeTraits& traits) {
     return Gathers(scene.materials[static_cast<std::size_t>(traits.material)]);
   };
-  for (const Sphere& sphere : scene.spheres) {
-    if (gathers(sphere.traits)) return false;
-  }
+  bool curves_gather = false;
+  ForEachAnalyticShape(scene, [&](const auto& shape) {
+    curves_gather = curves_gather || (!shape.kIsFlat && gathers(shape.traits));
+  });
+  if (curves_gather) return false;
   const Bounds box = BoundsOf(scene);
   const double near = 1e-6 * static_cast<double>(std::max(MaxAbs(box.low), MaxAbs(box.high)));
   bool has_floor = false;
@@ -171,36 +192,33 @@ bool GathersOnOneFloor(const Scene& scene) {
       if (!std::ranges::all_of(corners, lies_in_floor)) return false;
     }
   }
-  for (const Disk& disk : scene.disks) {
-    if (!gathers(disk.traits)) continue;
-    const Double3 normal(disk.normal);
-    take_floor(disk.center, normal);
+  bool all_in_floor = true;
+  ForEachFlatShape(scene, [&](const auto& shape) {
+    if (!gathers(shape.traits)) return;
+    const Double3 normal(shape.normal);
+    take_floor(shape.center, normal);
     // Tilted by less than what lifts its rim off the floor.
     const double tilt = Length(Cross(normal, up));
-    if (!lies_in_floor(disk.center) || tilt * static_cast<double>(disk.radius) > near) return false;
-  }
-  if (!has_floor) return false;
+    all_in_floor = all_in_floor && lies_in_floor(shape.center) &&
+                   tilt * static_cast<double>(shape.Reach()) <= near;
+  });
+  if (!has_floor || !all_in_floor) return false;
   const Vec3 eye = scene.camera.camera_to_world.Point({});
   if (Dot(Double3(eye) - origin, up) < 0) up = up * -1;
   if (!(Dot(Double3(eye) - origin, up) > LensReach(scene.camera) + near)) return false;
   const auto lies_in_front = [&](Vec3 point, double radius) {
     return Dot(Double3(point) - origin, up) >= radius - near;
   };
-  return std::ranges::all_of(scene.meshes,
-                             [&](const TriangleMesh& mesh) {
-                               return std::ranges::all_of(mesh.positions, [&](Vec3 point) {
-                                 return lies_in_front(point, 0);
-                               });
-                             }) &&
-         std::ranges::all_of(scene.spheres,
-                             [&](const Sphere& sphere) {
-                               return lies_in_front(sphere.center,
-                                                    static_cast<double>(sphere.radius));
-                             }) &&
-         std::ranges::all_of(scene.disks, [&](const Disk& disk) {
-           const double lean = Length(Cross(Double3(disk.normal), up));
-           return lies_in_front(disk.center, lean * static_cast<double>(disk.radius));
-         });
+  bool all_in_front = std::ranges::all_of(scene.meshes, [&](const TriangleMesh& mesh) {
+    return std::ranges::all_of(mesh.positions, [&](Vec3 point) { return lies_in_front(point, 0); });
+  });
+  ForEachAnalyticShape(scene, [&](const auto& shape) {
+    auto radius = static_cast<double>(shape.Reach());
+    if constexpr (std::decay_t<decltype(shape)>::kIsFlat)
+      radius *= Length(Cross(Double3(shape.normal), up));
+    all_in_front = all_in_front && lies_in_front(shape.center, radius);
+  });
+  return all_in_front;
 }
 
 }  // namespace
@@ -209,7 +227,7 @@ std::string_view NameOf(Part part) {
   return kNames[static_cast<std::size_t>(part)];
 }
 
-// Finds the needs of one job, group by group: later groups ask what earlier ones found.
+// Finds the needs of one job, group by group: later groups use what earlier ones found.
 class NeedsFinder {
  public:
   NeedsFinder(const Scene& scene, const RenderSettings& settings)
@@ -222,7 +240,7 @@ class NeedsFinder {
     FindRays();
     FindEyePaths();
     FindFrequency();
-    SayWhatIsNotRead();
+    AddPartsNotRead();
     if (settings_.use_everything) ForceEverything();
     return std::move(needs_);
   }
@@ -263,7 +281,7 @@ class NeedsFinder {
         textured_ != nullptr ? Concat(Quoted(*textured_), " has one")
                              : std::string("no surface has one"));
     Set(Part::kRoundShapes, RoundShapes() > 0,
-        RoundShapes() > 0 ? Concat("spheres and disks: ", RoundShapes())
+        RoundShapes() > 0 ? Concat("shapes that are given by a formula: ", RoundShapes())
                           : std::string("everything is made of triangles"));
   }
 
@@ -321,7 +339,7 @@ class NeedsFinder {
   [[nodiscard]] bool HasSmallLights() const {
     return needs_.Uses(Part::kDeltaLights) || needs_.Uses(Part::kAreaLights) ||
            std::ranges::any_of(scene_.infinite_lights,
-                               [](const InfiniteLight& light) { return light.map != nullptr; });
+                               [](const InfiniteLight& light) { return light.HasDetail(); });
   }
 
   void FindCausticHitpoints() {
@@ -347,7 +365,7 @@ class NeedsFinder {
         : is_dark_ ? std::string(kDark)
                    : Concat("they are gathered on ", Quoted(*receiver)));
     Set(Part::kPhotonDirections, glossy_ != nullptr,
-        glossy_ != nullptr ? "glossy hitpoints ask where light comes from"
+        glossy_ != nullptr ? "glossy hitpoints need the directions of photons"
                            : "all hitpoints are diffuse");
     const bool is_one_floor = glossy_ == nullptr && GathersOnOneFloor(scene_);
     Set(Part::kPhotonNormals, gathers_ != nullptr && !is_one_floor,
@@ -391,7 +409,7 @@ class NeedsFinder {
     const bool is_used = UsesFrequency(settings_.radius_controller);
     Set(Part::kFrequency, is_used,
         Concat("radius controller ", NameOf(settings_.radius_controller),
-               is_used ? " asks for them" : " needs none"));
+               is_used ? " needs them" : " needs none"));
     const auto set = [&](Part part, bool has_it, std::string_view why, std::string_view why_not) {
       Set(part, is_used && has_it,
           std::string(!is_used ? "there are no frequency photons"
@@ -401,21 +419,21 @@ class NeedsFinder {
     const std::size_t shapes = ShapeCount(scene_);
     set(Part::kOccluderEdges, shapes > 1 || scene_.TriangleCount() > 1,
         "shapes cast shadows on each other", "a single face shadows nothing");
-    set(Part::kCurvature, needs_.Uses(Part::kShadingNormals) || !scene_.spheres.empty(),
+    set(Part::kCurvature, needs_.Uses(Part::kShadingNormals) || HasCurvedShapes(scene_),
         "there are curved surfaces", "every surface is flat");
     set(Part::kCurvedMirrors, is_used && HasCurvedMirrors(scene_), "mirrors or glass are curved",
         "every mirror and all glass is flat");
     set(Part::kTextureDetail, textured_ != nullptr, "surfaces have textures",
         "no surface has a texture");
-    const bool has_map = std::ranges::any_of(
-        scene_.infinite_lights, [](const auto& light) { return light.map != nullptr; });
+    const bool has_map = std::ranges::any_of(scene_.infinite_lights,
+                                             [](const auto& light) { return light.HasDetail(); });
     set(Part::kSkyDetail, has_map, "an environment map lights the scene",
         "no environment map lights the scene");
     set(Part::kGlossyWindow, glossy_ != nullptr, "there are glossy hitpoints",
         "all hitpoints are diffuse");
   }
 
-  void SayWhatIsNotRead() {
+  void AddPartsNotRead() {
     Set(Part::kMotion, false, "scenes that move are not read");
     Set(Part::kMedia, false, "media are not read");
     Set(Part::kAlphaMasks, false, "alpha masks are not read");

@@ -116,13 +116,6 @@ class SceneNeeds {
 
 [[nodiscard]] SceneNeeds NeedsOf(const Scene& scene, const RenderSettings& settings);
 
-// Which of the walks compiled for photons suits a job: bit 0 stands for textures,
-// bit 1 for shading normals, bit 2 for other scattering than diffuse.
-[[nodiscard]] inline std::size_t WalkPartsOf(const SceneNeeds& needs) {
-  return (needs.Uses(Part::kTextures) ? 1U : 0U) | (needs.Uses(Part::kShadingNormals) ? 2U : 0U) |
-         (needs.Uses(Part::kSpecular) || needs.Uses(Part::kGlossy) ? 4U : 0U);
-}
-
 // How many passes use the same sets before new ones are drawn. With fewer the sets would hardly be
 // worth keeping; without new ones the edges of shapes would never get smoother.
 inline constexpr std::uint64_t kRoundsOfSets = 16;

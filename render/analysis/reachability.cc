@@ -94,12 +94,13 @@ std::vector<NumberedLight> LightsOf(const Scene& scene) {
     }
   };
   const auto around = [](const auto& shape) {
-    return LightExtent(BoxAround(shape.center, shape.radius));
+    return LightExtent(BoxAround(shape.center, shape.Reach()));
   };
   const auto everywhere = [](const auto& /*light*/) { return LightExtent(); };
   add_shapes(0, scene.meshes, [](const TriangleMesh& mesh) { return LightExtent(mesh); });
-  add_shapes(numbers.spheres, scene.spheres, around);
-  add_shapes(numbers.disks, scene.disks, around);
+#define LUCERNA_ADD(Name, list, name) add_shapes(numbers.list, scene.list, around);
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_ADD)
+#undef LUCERNA_ADD
 #define LUCERNA_ADD(Name, list, name)                                               \
   add(numbers.list, scene.list, [](const Name##Light& light) {                      \
     return Name##Light::kIsAtInfinity ? LightExtent() : LightExtent(light.Place()); \
@@ -130,9 +131,14 @@ class Walls {
       wall.positions = mesh.positions;
       wall.indices = mesh.indices;
     }
-    for (const Sphere& sphere : scene.spheres) {
-      if (accepts(sphere.traits)) walls->shapes_.spheres.push_back(sphere);
-    }
+#define LUCERNA_ADD(Name, list, name)                                  \
+  if constexpr (Name::kIsClosed) {                                     \
+    for (const Name& shape : scene.list) {                             \
+      if (accepts(shape.traits)) walls->shapes_.list.push_back(shape); \
+    }                                                                  \
+  }
+    LUCERNA_ANALYTIC_SHAPES(LUCERNA_ADD)
+#undef LUCERNA_ADD
     LUCERNA_ASSIGN_OR_RETURN(walls->intersector_, Intersector::Create(walls->shapes_));
     return walls;
   }
@@ -219,20 +225,19 @@ bool AllSampledLie(const Scene& scene, const ClosedSurface& surface, bool inside
     }
   }
   const LightNumbers numbers(scene);
-  // A sphere that emits outwards, and a disk, cast no light on themselves.
-  const auto lights_itself = [](const auto& shape) {
-    if constexpr (requires { shape.inward; }) return shape.inward;
-    return false;
-  };
   const auto all_lie = [&](const auto& shapes, std::uint32_t first) {
     for (std::uint32_t i = 0; i < shapes.size(); ++i) {
       if (!is_lit(shapes[i].traits)) continue;
-      if (first + i == but_light && !lights_itself(shapes[i])) continue;
-      if (!lies(CornersOf(BoxAround(shapes[i].center, shapes[i].radius)))) return false;
+      if (first + i == but_light && !shapes[i].LightsItself()) continue;
+      if (!lies(CornersOf(BoxAround(shapes[i].center, shapes[i].Reach())))) return false;
     }
     return true;
   };
-  return all_lie(scene.spheres, numbers.spheres) && all_lie(scene.disks, numbers.disks);
+  bool do_all_lie = true;
+#define LUCERNA_TEST(Name, list, name) do_all_lie = do_all_lie && all_lie(scene.list, numbers.list);
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_TEST)
+#undef LUCERNA_TEST
+  return do_all_lie;
 }
 
 bool ScattersNarrowly(const Material& material) {

@@ -1,6 +1,6 @@
 // What is a reference image made of, and how noisy is it?
 //
-// Two renders that know nothing of each other, a and b, are averaged. Their difference tells the
+// Two renders that are independent of each other, a and b, are averaged. Their difference tells the
 // noise of the average without the right image: the expectation of (a - b)²/4 is its variance, also
 // when one half had more passes than the other. It tells nothing of what both have in common, so
 // the bias must be made small by the settings of the halves.

@@ -5,6 +5,7 @@
 
 #include "render/scene/scaling.h"
 #include "render/scene/scene_extent.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 namespace {
@@ -60,15 +61,7 @@ Status ChooseUnit(Scene& scene) {
     for (Vec3& position : mesh.positions)
       position = ScaledBy(position, factor);
   }
-  for (Sphere& sphere : scene.spheres) {
-    sphere.center = ScaledBy(sphere.center, factor);
-    sphere.radius = ScaledBy(sphere.radius, factor);
-  }
-  for (Disk& disk : scene.disks) {
-    disk.center = ScaledBy(disk.center, factor);
-    disk.radius = ScaledBy(disk.radius, factor);
-    disk.inner_radius = ScaledBy(disk.inner_radius, factor);
-  }
+  ForEachAnalyticShape(scene, [&](auto& shape) { shape.Scale(factor); });
   bool has_strengths = true;
   ForEachDeltaList(scene, [&](auto& lights) {
     for (auto& light : lights)

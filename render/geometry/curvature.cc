@@ -6,11 +6,13 @@
 #include <cstddef>
 #include <numbers>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include "render/geometry/curvature_change.h"
 #include "render/math/double3.h"
 #include "render/scene/mesh_edges.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 namespace {
@@ -280,16 +282,32 @@ const SurfaceCurvature::Bending* SurfaceCurvature::BendingAt(const SurfacePoint&
   return &bendings_[static_cast<std::size_t>(first_[point.geometry]) + point.primitive];
 }
 
-float SurfaceCurvature::SphereCurvature(const Sphere& sphere) const {
-  const float clearance = kClearance * (MaxAbs(sphere.center) + sphere.radius);
-  const float limit = static_cast<float>(LargestCurvature(static_cast<double>(clearance)));
-  const float curvature = std::min(1 / sphere.radius, limit);
-  return sphere.inward ? -curvature : curvature;
+PrincipalCurvatures SurfaceCurvature::AnalyticAt(const SurfacePoint& point) const {
+  return VisitShape(scene_, KindOf(scene_, point.geometry), point.primitive,
+                    [&](const auto& shape) -> PrincipalCurvatures {
+                      if constexpr (std::decay_t<decltype(shape)>::kIsFlat) {
+                        return {};
+                      } else {
+                        const auto limit = static_cast<float>(
+                            LargestCurvature(static_cast<double>(ClearanceOf(shape))));
+                        PrincipalCurvatures k = CurvatureOf(shape, point.position);
+                        k.first = std::clamp(k.first, -limit, limit);
+                        k.second = std::clamp(k.second, -limit, limit);
+                        return k;
+                      }
+                    });
 }
 
 NormalCurvature SurfaceCurvature::Along(const SurfacePoint& point, Vec3 tangent) const {
-  if (point.geometry == scene_.meshes.size()) {
-    return {SphereCurvature(scene_.spheres[point.primitive]), 0, 0};
+  if (point.geometry >= scene_.meshes.size()) {
+    const PrincipalCurvatures k = AnalyticAt(point);
+    if (k.first == k.second) return {k.first, k.gradient, k.second_gradient};
+    const Vec3 t = tangent - point.geometric_normal * Dot(tangent, point.geometric_normal);
+    const float squared = LengthSquared(t);
+    const float cosine = Dot(t, k.direction);
+    // Euler's formula; without a direction the mean.
+    const float share = squared > 1e-8F ? cosine * cosine / squared : 0.5F;
+    return {k.second + (k.first - k.second) * share, k.gradient, k.second_gradient};
   }
   const Bending* bending = BendingAt(point);
   if (bending == nullptr) return {};
@@ -304,9 +322,9 @@ NormalCurvature SurfaceCurvature::Along(const SurfacePoint& point, Vec3 tangent)
 }
 
 float SurfaceCurvature::SquaredPrincipals(const SurfacePoint& point) const {
-  if (point.geometry == scene_.meshes.size()) {
-    const float curvature = SphereCurvature(scene_.spheres[point.primitive]);
-    return std::min(2 * curvature * curvature, static_cast<float>(kLargest));
+  if (point.geometry >= scene_.meshes.size()) {
+    const PrincipalCurvatures k = AnalyticAt(point);
+    return std::min(k.first * k.first + k.second * k.second, static_cast<float>(kLargest));
   }
   const Bending* k = BendingAt(point);
   if (k == nullptr) return 0;

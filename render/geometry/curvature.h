@@ -4,11 +4,11 @@
 // points to: a sphere of radius R has 1/R, one that is turned inside out -1/R. For light that
 // comes from the other side the caller changes the sign; gradients are magnitudes and stay.
 //
-// Spheres are exact. A mesh has the curvature of its vertex normals, which is what mirrors and
-// lenses made of it show: one tensor per triangle, fitted to the differences of the normals along
-// its sides. Its gradients do not grow with the fineness of the mesh (see curvature_change.h).
-// Meshes without vertex normals, disks, and triangles without area or with a normal missing are
-// flat.
+// Analytic shapes are exact. A mesh has the curvature of its vertex normals, which is what mirrors
+// and lenses made of it show: one tensor per triangle, fitted to the differences of the normals
+// along its sides. Its gradients do not grow with the fineness of the mesh (see
+// curvature_change.h). Meshes without vertex normals and triangles without area or with a normal
+// missing are flat.
 //
 // Promises: no result is NaN or infinite; a scene scaled by 2^n has curvatures scaled by 2^-n
 // exactly (within the range of float).
@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "render/geometry/intersector.h"
+#include "render/geometry/shape_geometry.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
@@ -32,7 +33,7 @@ struct NormalCurvature {
 
 class SurfaceCurvature {
  public:
-  // Of materials, which are asked for.
+  // Selects materials.
   using Choice = std::function<bool(const Material&)>;
   // Prepares the meshes with vertex normals whose material is one that `is_wanted`; others count
   // as flat. Gradients, by far the most work, are 0 on meshes whose `is_change_wanted` is not.
@@ -59,7 +60,8 @@ class SurfaceCurvature {
 
   void AddMesh(const TriangleMesh& mesh, bool with_change);
   [[nodiscard]] const Bending* BendingAt(const SurfacePoint& point) const;
-  [[nodiscard]] float SphereCurvature(const Sphere& sphere) const;
+  // Of an analytic shape, held below what rounding leaves of the surface.
+  [[nodiscard]] PrincipalCurvatures AnalyticAt(const SurfacePoint& point) const;
 
   const Scene& scene_;
   std::vector<std::int64_t> first_;  // [meshes] into bendings_; negative: flat

@@ -496,8 +496,8 @@ struct Level {
   std::vector<BothBounds> bounds;    // [selected] from these estimates alone
 };
 
-// What the estimates around a place say: those of the neighbors count, since a derivative has its
-// zeros.
+// The bound from the estimates around a place: those of the neighbors count, since a derivative has
+// its zeros.
 Bound BoundAround(const Level& level, std::uint32_t s, std::size_t order) {
   const Estimates& own = level.estimates[s];
   if (!own.IsKnown()) return {};
@@ -534,7 +534,7 @@ Bound Choose(const Bound& fine, const Bound& coarse) {
   return {std::min(fine.value, coarse.value), coarse.noise};
 }
 
-// Whether no coarser selection is asked about a place.
+// Whether a place needs no coarser selection.
 bool IsSettled(const BothBounds& bounds) {
   return bounds[0].trust != Bound::Trust::kUnsure && bounds[1].trust != Bound::Trust::kUnsure;
 }
@@ -545,7 +545,7 @@ Level NextLevel(const Graph& graph, const Level* finer, NeighborhoodFit& surroun
   Selection selection = SelectFrom(graph);
   level.of = std::move(selection.of);
   level.selected = Coarsen(graph, selection.nodes, level.of);
-  // With the neighbors of those that are asked.
+  // With the neighbors of those that are needed.
   std::vector<bool> is_wanted(selection.nodes.size(), finer == nullptr);
   for (std::uint32_t i = 0; finer != nullptr && i < graph.size(); ++i) {
     if (IsSettled(finer->bounds[i])) continue;

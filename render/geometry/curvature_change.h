@@ -26,7 +26,7 @@
 namespace lucerna {
 
 // The largest over the surroundings of a vertex, some sides wide, of the derivatives by arc length
-// of the normal curvature along any direction, in any direction. Infinity: cannot be told.
+// of the normal curvature along any direction, in any direction. Infinity: unknown.
 struct CurvatureChange {
   double first = 0;   // [1/unit²]
   double second = 0;  // [1/unit³]
@@ -34,7 +34,7 @@ struct CurvatureChange {
   bool first_is_clear = false, second_is_clear = false;
 };
 
-// For each vertex [positions]; vertices on no side, or without a normal, cannot be told. `corners`
+// For each vertex [positions]; vertices on no side, or without a normal, are unknown. `corners`
 // [triangles × 3] are welded with their normals, `sides` are theirs by edge: nothing is compared
 // across a crease. The result does not depend on how the vertices are numbered.
 [[nodiscard]] std::vector<CurvatureChange> CurvatureChanges(std::span<const Vec3> positions,

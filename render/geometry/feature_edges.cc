@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
+#include <type_traits>
 #include <utility>
 
 #include "render/math/double3.h"
 #include "render/scene/mesh_edges.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 namespace {
 
-constexpr int kRimSides = 256;
 // Of the finest grid, about. A room of few edges has cells of a 64th of its size.
 constexpr double kFewestCells = 0x1p18;
 constexpr double kMostCells = 0x1p23;
@@ -51,7 +51,9 @@ bool IsSmooth(std::span<const Double3> wings) {
 
 FeatureEdges::FeatureEdges(const Scene& scene) {
   AddMeshEdges(scene);
-  AddDisks(scene);
+  ForEachAnalyticShape(scene, [&](const auto& shape) {
+    if constexpr (!std::decay_t<decltype(shape)>::kIsClosed) AddRim(shape, segments_);
+  });
   const std::vector<FeatureSegment> crossings = SurfaceCrossings(scene);
   segments_.insert(segments_.end(), crossings.begin(), crossings.end());
   BuildLevels();
@@ -115,25 +117,6 @@ void FeatureEdges::AddMeshEdges(const Scene& scene) {
     if (wings.empty()) return;
     if (is_border || !IsSmooth(wings)) segments_.push_back(segment);
   });
-}
-
-void FeatureEdges::AddDisks(const Scene& scene) {
-  for (const Disk& disk : scene.disks) {
-    const Frame frame(disk.normal);
-    for (const bool is_inner : {false, true}) {
-      float radius = is_inner ? disk.inner_radius : disk.radius;
-      if (!(radius > 0)) continue;
-      if (is_inner) radius /= static_cast<float>(std::cos(std::numbers::pi / kRimSides));
-      const auto corner = [&](int i) {
-        const double angle = 2 * std::numbers::pi * (i % kRimSides) / kRimSides;
-        return disk.center + (frame.s * static_cast<float>(std::cos(angle)) +
-                              frame.t * static_cast<float>(std::sin(angle))) *
-                                 radius;
-      };
-      for (int i = 0; i < kRimSides; ++i)
-        segments_.push_back({{corner(i), corner(i + 1)}});
-    }
-  }
 }
 
 // Steps along the longest axis, a cell at a time: what lies between two steps is in few cells

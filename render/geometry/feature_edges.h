@@ -6,8 +6,7 @@
 //     (kSameSurfaceCosine) or at which more than two faces meet. Corners in the same place to the
 //     bit are the same corner, whatever mesh they belong to;
 //   * edges between a surface on which photons are kept and one on which none are;
-//   * rims of disks, as polygons of 256 sides with their corners on the outer rim, and
-//     around the inner one;
+//   * rims of open analytic shapes (AddRim in geometry/shape_NAME.cc);
 //   * where surfaces pass through each other (surface_crossings.h).
 //
 // A segment that a surface merely passes by is harmless: discs are normalised by what is left of
@@ -92,7 +91,6 @@ class FeatureEdges {
   };
 
   void AddMeshEdges(const Scene& scene);
-  void AddDisks(const Scene& scene);
   void BuildLevels();
   template <typename Visit>
   void ForEachCell(const Level& level, const FeatureSegment& segment, const Visit& visit) const;

@@ -7,54 +7,11 @@
 #include <embree3/rtcore.h>
 
 #include "render/geometry/embree_device.h"
+#include "render/geometry/shape_geometry.h"
 #include "render/math/double3.h"
 
 namespace lucerna {
 namespace {
-
-// The nearer root in (t_near, t_far), else the farther one; false without either. The roots are
-// found from the larger one, so that neither suffers cancellation.
-bool SphereRoot(const Sphere& sphere, Vec3 origin, Vec3 direction, float t_near, float t_far,
-                float& t) {
-  const Double3 o(origin);
-  const Double3 c(sphere.center);
-  const Double3 d(direction);
-  const Double3 oc = o - c;
-  const auto radius = static_cast<double>(sphere.radius);
-  const double dd = Dot(d, d);
-  const double b = -Dot(oc, d);
-  // The discriminant by the distance of the centre from the line: exact for far spheres too.
-  const double along = b / dd;
-  const Double3 nearest = oc + d * along;
-  const double discriminant = radius * radius - Dot(nearest, nearest);
-  if (!(discriminant >= 0)) return false;
-  const double root = std::sqrt(dd * discriminant);
-  const double q = b + std::copysign(root, b);
-  const double other = (Dot(oc, oc) - radius * radius);
-  double t0 = q == 0 ? 0 : other / q;
-  double t1 = q / dd;
-  if (t0 > t1) std::swap(t0, t1);
-  const auto near_f = static_cast<float>(t0);
-  if (near_f > t_near && near_f < t_far) {
-    t = near_f;
-    return true;
-  }
-  const auto far_f = static_cast<float>(t1);
-  if (far_f > t_near && far_f < t_far) {
-    t = far_f;
-    return true;
-  }
-  return false;
-}
-
-bool DiskRoot(const Disk& disk, Vec3 origin, Vec3 direction, float t_near, float t_far, float& t) {
-  const float slope = Dot(direction, disk.normal);
-  if (slope == 0) return false;
-  t = Dot(disk.center - origin, disk.normal) / slope;
-  if (!(t > t_near && t < t_far)) return false;
-  const float squared = LengthSquared(origin + direction * t - disk.center);
-  return squared <= disk.radius * disk.radius && squared >= disk.inner_radius * disk.inner_radius;
-}
 
 struct TriangleHit {
   float t, u, v;
@@ -82,53 +39,29 @@ TriangleHit HitTriangle(const std::array<Vec3, 3>& corners, const Ray& ray) {
   return {static_cast<float>(t), static_cast<float>(u), static_cast<float>(v)};
 }
 
-void SphereBounds(const RTCBoundsFunctionArguments* arguments) {
-  const Sphere& sphere =
-      static_cast<const Scene*>(arguments->geometryUserPtr)->spheres[arguments->primID];
-  // A little outwards, for the rounding of centre ± radius.
-  const float r = sphere.radius + kClearance * (MaxAbs(sphere.center) + sphere.radius);
+template <typename Shape, std::vector<Shape> Scene::*kShapes>
+void BoundsOfShape(const RTCBoundsFunctionArguments* arguments) {
+  const Bounds bounds =
+      BoxOf((static_cast<const Scene*>(arguments->geometryUserPtr)->*kShapes)[arguments->primID]);
   RTCBounds* box = arguments->bounds_o;
-  box->lower_x = sphere.center.x - r;
-  box->lower_y = sphere.center.y - r;
-  box->lower_z = sphere.center.z - r;
-  box->upper_x = sphere.center.x + r;
-  box->upper_y = sphere.center.y + r;
-  box->upper_z = sphere.center.z + r;
-}
-
-void DiskBounds(const RTCBoundsFunctionArguments* arguments) {
-  const Disk& disk =
-      static_cast<const Scene*>(arguments->geometryUserPtr)->disks[arguments->primID];
-  const float slack = kClearance * (MaxAbs(disk.center) + disk.radius);
-  const auto reach = [&](float n) {
-    return disk.radius * std::sqrt(std::max(0.0F, 1 - n * n)) + slack;
-  };
-  RTCBounds* box = arguments->bounds_o;
-  box->lower_x = disk.center.x - reach(disk.normal.x);
-  box->lower_y = disk.center.y - reach(disk.normal.y);
-  box->lower_z = disk.center.z - reach(disk.normal.z);
-  box->upper_x = disk.center.x + reach(disk.normal.x);
-  box->upper_y = disk.center.y + reach(disk.normal.y);
-  box->upper_z = disk.center.z + reach(disk.normal.z);
-}
-
-bool RootOf(const Sphere& shape, Vec3 o, Vec3 d, float t_near, float t_far, float& t) {
-  return SphereRoot(shape, o, d, t_near, t_far, t);
-}
-bool RootOf(const Disk& shape, Vec3 o, Vec3 d, float t_near, float t_far, float& t) {
-  return DiskRoot(shape, o, d, t_near, t_far, t);
+  box->lower_x = bounds.low.x;
+  box->lower_y = bounds.low.y;
+  box->lower_z = bounds.low.z;
+  box->upper_x = bounds.high.x;
+  box->upper_y = bounds.high.y;
+  box->upper_z = bounds.high.z;
 }
 
 template <typename Shape, std::vector<Shape> Scene::*kShapes>
-void IntersectShape(const RTCIntersectFunctionNArguments* arguments) {
+void IntersectedShape(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
   const Shape& shape =
       (static_cast<const Scene*>(arguments->geometryUserPtr)->*kShapes)[arguments->primID];
   auto* ray_hit = reinterpret_cast<RTCRayHit*>(arguments->rayhit);
   RTCRay& ray = ray_hit->ray;
   float t = 0;
-  if (!RootOf(shape, {ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z},
-              ray.tnear, ray.tfar, t)) {
+  if (!IntersectShape(shape, {ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z},
+                      ray.tnear, ray.tfar, t)) {
     return;
   }
   ray.tfar = t;
@@ -146,8 +79,8 @@ void OccludedByShape(const RTCOccludedFunctionNArguments* arguments) {
       (static_cast<const Scene*>(arguments->geometryUserPtr)->*kShapes)[arguments->primID];
   auto* ray = reinterpret_cast<RTCRay*>(arguments->ray);
   float t = 0;
-  if (RootOf(shape, {ray->org_x, ray->org_y, ray->org_z}, {ray->dir_x, ray->dir_y, ray->dir_z},
-             ray->tnear, ray->tfar, t)) {
+  if (IntersectShape(shape, {ray->org_x, ray->org_y, ray->org_z},
+                     {ray->dir_x, ray->dir_y, ray->dir_z}, ray->tnear, ray->tfar, t)) {
     ray->tfar = -HUGE_VALF;
   }
 }
@@ -184,15 +117,16 @@ struct Intersector::EmbreeScene {
 Intersector::Intersector(const Scene& scene, bool has_shading_normals)
     : scene_(scene),
       embree_(std::make_unique<EmbreeScene>()),
-      has_shading_normals_(has_shading_normals),
-      sphere_geometry_(static_cast<std::uint32_t>(scene.meshes.size())) {
+      has_shading_normals_(has_shading_normals) {
   std::uint32_t shapes = 0;
   for (const TriangleMesh& mesh : scene.meshes) {
     first_shape_.push_back(shapes);
     shapes += static_cast<std::uint32_t>(mesh.indices.size() / 3);
   }
-  first_shape_.push_back(shapes);
-  first_shape_.push_back(shapes + static_cast<std::uint32_t>(scene.spheres.size()));
+  ForEachAnalyticList(scene, [&](const auto& list) {
+    first_shape_.push_back(shapes);
+    shapes += static_cast<std::uint32_t>(list.size());
+  });
 }
 
 Intersector::~Intersector() = default;
@@ -227,7 +161,7 @@ StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, R
     rtcReleaseGeometry(geometry);
   }
 
-  const auto attach = [&](std::size_t count, RTCBoundsFunction bounds_of,
+  const auto attach = [&](std::size_t count, ShapeKind kind, RTCBoundsFunction bounds_of,
                           RTCIntersectFunctionN intersect, RTCOccludedFunctionN occluded) {
     RTCGeometry geometry = rtcNewGeometry(embree.device, RTC_GEOMETRY_TYPE_USER);
     rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned int>(count));
@@ -236,28 +170,21 @@ StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, R
     rtcSetGeometryIntersectFunction(geometry, intersect);
     rtcSetGeometryOccludedFunction(geometry, occluded);
     rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(embree.scene, geometry, number);
+    rtcAttachGeometryByID(embree.scene, geometry, GeometryOf(scene, kind));
     rtcReleaseGeometry(geometry);
   };
-  if (!scene.spheres.empty()) {
-    attach(scene.spheres.size(), SphereBounds, IntersectShape<Sphere, &Scene::spheres>,
-           OccludedByShape<Sphere, &Scene::spheres>);
+#define LUCERNA_ATTACH(Name, list, name)                                               \
+  if (!scene.list.empty()) {                                                           \
+    attach(scene.list.size(), ShapeKind::k##Name, BoundsOfShape<Name, &Scene::list>,   \
+           IntersectedShape<Name, &Scene::list>, OccludedByShape<Name, &Scene::list>); \
   }
-  ++number;
-  if (!scene.disks.empty()) {
-    attach(scene.disks.size(), DiskBounds, IntersectShape<Disk, &Scene::disks>,
-           OccludedByShape<Disk, &Scene::disks>);
-  }
-  for (const Sphere& sphere : scene.spheres) {
-    const Vec3 reach = {sphere.radius, sphere.radius, sphere.radius};
-    bounds.Add(sphere.center - reach);
-    bounds.Add(sphere.center + reach);
-  }
-  for (const Disk& disk : scene.disks) {
-    const Vec3 reach = {disk.radius, disk.radius, disk.radius};
-    bounds.Add(disk.center - reach);
-    bounds.Add(disk.center + reach);
-  }
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_ATTACH)
+#undef LUCERNA_ATTACH
+  ForEachAnalyticShape(scene, [&](const auto& shape) {
+    const Vec3 reach = {shape.Reach(), shape.Reach(), shape.Reach()};
+    bounds.Add(shape.center - reach);
+    bounds.Add(shape.center + reach);
+  });
   rtcCommitScene(embree.scene);
   LUCERNA_RETURN_IF_ERROR(EmbreeStatus(embree.device));
   return intersector;
@@ -297,11 +224,11 @@ Hit Intersector::HitOn(std::uint32_t shape, const Ray& ray) const {
   const auto geometry = static_cast<std::uint32_t>(next - first_shape_.begin() - 1);
   const std::uint32_t primitive = shape - first_shape_[geometry];
   Hit hit{.geometry = geometry, .primitive = primitive};
-  if (geometry == sphere_geometry_) {
-    // As Embree was told: the same bits.
-    SphereRoot(scene_.spheres[primitive], ray.origin, ray.direction, 0, ray.t_max, hit.t);
-  } else if (geometry > sphere_geometry_) {
-    DiskRoot(scene_.disks[primitive], ray.origin, ray.direction, 0, ray.t_max, hit.t);
+  if (geometry >= scene_.meshes.size()) {
+    // The function that Embree calls: the same bits.
+    VisitShape(scene_, KindOf(scene_, geometry), primitive, [&](const auto& s) {
+      return IntersectShape(s, ray.origin, ray.direction, 0, ray.t_max, hit.t);
+    });
   } else {
     const TriangleMesh& mesh = scene_.meshes[geometry];
     const std::uint32_t* corner = &mesh.indices[std::size_t{3} * primitive];
@@ -321,7 +248,7 @@ SurfacePoint Intersector::SurfaceAt(const Ray& ray, const Hit& hit) const {
   point.u = hit.u;
   point.v = hit.v;
   const ShapeTraits* traits = nullptr;
-  if (hit.geometry < sphere_geometry_) {
+  if (hit.geometry < scene_.meshes.size()) {
     const TriangleMesh& mesh = scene_.meshes[hit.geometry];
     const std::uint32_t* corner = &mesh.indices[std::size_t{3} * hit.primitive];
     const Vec3 p0 = mesh.positions[corner[0]];
@@ -343,24 +270,15 @@ SurfacePoint Intersector::SurfaceAt(const Ray& ray, const Hit& hit) const {
       }
     }
     traits = &mesh.traits;
-  } else if (hit.geometry == sphere_geometry_) {
-    const Sphere& sphere = scene_.spheres[hit.primitive];
-    const Vec3 from_center = ray.origin - sphere.center + ray.direction * hit.t;
-    const Vec3 outward = Normalize(from_center);
-    // Put back onto the sphere: whatever t lost, the point is on the surface.
-    point.position = sphere.center + outward * sphere.radius;
-    point.clearance = kClearance * (MaxAbs(sphere.center) + sphere.radius);
-    point.geometric_normal = sphere.inward ? -outward : outward;
-    point.shading_normal = point.geometric_normal;
-    traits = &sphere.traits;
   } else {
-    const Disk& disk = scene_.disks[hit.primitive];
-    const Vec3 p = ray.origin + ray.direction * hit.t;
-    point.position = p - disk.normal * Dot(p - disk.center, disk.normal);
-    point.clearance = kClearance * (MaxAbs(disk.center) + disk.radius);
-    point.geometric_normal = disk.normal;
-    point.shading_normal = disk.normal;
-    traits = &disk.traits;
+    traits = VisitShape(scene_, KindOf(scene_, hit.geometry), hit.primitive, [&](const auto& s) {
+      const ShapeFace face = FaceAt(s, ray, hit.t);
+      point.position = face.position;
+      point.clearance = ClearanceOf(s);
+      point.geometric_normal = face.normal;
+      point.shading_normal = face.normal;
+      return &s.traits;
+    });
   }
   point.material = static_cast<std::uint32_t>(traits->material);
   point.area_light = traits->area_light;

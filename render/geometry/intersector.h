@@ -1,8 +1,8 @@
-// What does a ray meet first? The only floor that knows Embree.
+// What does a ray meet first? The only floor that includes Embree.
 //
-// Triangles are Embree's; spheres (solved in double) and disks are exact, never tessellated. The
-// instruction set is pinned, and only single rays are traced, so that equal rays have equal hits
-// in every process of one numeric profile.
+// Triangles are Embree's; analytic shapes are exact, never tessellated. The instruction set is
+// pinned, and only single rays are traced, so that equal rays have equal hits in every process of
+// one numeric profile.
 #pragma once
 
 #include <cstdint>
@@ -12,10 +12,11 @@
 #include "render/base/status.h"
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 
-// Which tree rays are traced through, and what hits are to tell.
+// Which tree rays are traced through, and what hits contain.
 struct RayNeeds {
   bool robust_rays = true;
   bool split_triangles = false;
@@ -26,7 +27,7 @@ struct RayNeeds {
 
 struct Ray {
   Vec3 origin;
-  Vec3 direction;  // unit, except where only occlusion is asked for
+  Vec3 direction;  // unit, except for tests of occlusion alone
   float t_max = HUGE_VALF;
 };
 
@@ -38,12 +39,12 @@ inline constexpr float kClearance = 0x1p-22F;
 // In place of a shape's number where a ray meets nothing.
 inline constexpr std::uint32_t kNoShape = UINT32_MAX;
 
-// Geometry numbers: meshes in scene order, then one for all spheres, then one for all disks.
+// Geometry numbers: meshes in scene order, then one for all analytic shapes of a kind.
 struct Hit {
   float t = 0;
   float u = 0, v = 0;  // barycentric, of the triangle's second and third corner
   std::uint32_t geometry = 0;
-  std::uint32_t primitive = 0;  // triangle, sphere or disk
+  std::uint32_t primitive = 0;  // triangle, or analytic shape of the kind
 };
 
 // A point on a surface, ready for scattering.
@@ -77,7 +78,7 @@ class Intersector {
   // True when anything is met before ray.t_max. Threads: any.
   [[nodiscard]] bool Occluded(const Ray& ray) const;
 
-  // The number of the triangle, sphere or disk that was hit, among all of the scene.
+  // The number of the triangle or analytic shape that was hit, among all of the scene.
   [[nodiscard]] std::uint32_t ShapeOf(const Hit& hit) const;
   // The hit of a ray with the one shape that it is known to meet first: computed from that alone.
   // Where rounding has it just miss a triangle, the hit is on its edge.
@@ -86,8 +87,6 @@ class Intersector {
   [[nodiscard]] SurfacePoint SurfaceAt(const Ray& ray, const Hit& hit) const;
 
   [[nodiscard]] const Bounds& bounds() const { return bounds_; }
-  [[nodiscard]] std::uint32_t sphere_geometry() const { return sphere_geometry_; }
-  [[nodiscard]] std::uint32_t disk_geometry() const { return sphere_geometry_ + 1; }
 
  private:
   Intersector(const Scene& scene, bool has_shading_normals);
@@ -96,10 +95,17 @@ class Intersector {
   const Scene& scene_;
   std::unique_ptr<EmbreeScene> embree_;
   bool has_shading_normals_;
-  std::uint32_t sphere_geometry_;
   std::vector<std::uint32_t> first_shape_;  // [geometries] ascending
   Bounds bounds_;
 };
+
+// The kind of the analytic shapes that have this geometry number. Requires one that is no mesh's.
+[[nodiscard]] inline ShapeKind KindOf(const Scene& scene, std::uint32_t geometry) {
+  return static_cast<ShapeKind>(geometry - scene.meshes.size());
+}
+[[nodiscard]] inline std::uint32_t GeometryOf(const Scene& scene, ShapeKind kind) {
+  return static_cast<std::uint32_t>(scene.meshes.size()) + static_cast<std::uint32_t>(kind);
+}
 
 // Where a ray that leaves `point` towards `direction` starts.
 [[nodiscard]] inline Vec3 LeavingPoint(const SurfacePoint& point, Vec3 direction) {

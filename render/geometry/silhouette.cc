@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "render/geometry/embree_device.h"
@@ -16,7 +17,7 @@
 namespace lucerna {
 namespace {
 
-// Light goes on through glass: its outline bends light, which the operators of its surfaces tell,
+// Light goes on through glass: its outline bends light, which the operators of its surfaces model,
 // and casts no shadow.
 bool CastsShadow(const Scene& scene, const ShapeTraits& traits) {
   const auto material = static_cast<std::size_t>(traits.material);
@@ -168,17 +169,13 @@ struct SilhouetteEdges::Search {
     Keep({distance, t, number, nearest_end, is_covered});
   }
 
-  // The outline of a sphere, seen along the segment, is the circle around its centre that is
-  // perpendicular to the segment: it is nearest beside the centre.
-  void VisitSphere(std::uint32_t number) {
-    const Sphere& sphere = edges->scene_.spheres[number];
-    if (!CastsShadow(edges->scene_, sphere.traits)) return;
-    const Double3 to_center = Double3(sphere.center) - origin;
-    const double t = Dot(to_center, direction) / Dot(direction, direction);
-    if (IsContact(t)) return;
-    const double distance = Length(to_center - direction * t) - static_cast<double>(sphere.radius);
-    if (!(distance > 0 && distance < static_cast<double>(edges->reach_))) return;
-    Keep({distance, t, static_cast<std::uint32_t>(edges->edges_.size()) + number, -1, false});
+  template <typename Shape>
+  void VisitOutline(const Shape& shape, std::uint32_t number) {
+    if (!CastsShadow(edges->scene_, shape.traits)) return;
+    const OutlinePlace place = NearestOutline(shape, origin, direction);
+    if (IsContact(place.along)) return;
+    if (!(place.distance > 0 && place.distance < static_cast<double>(edges->reach_))) return;
+    Keep({place.distance, place.along, number, -1, false});
   }
 
   // True when another edge leads on to a nearer place: from the end at which `one` is nearest, or
@@ -222,19 +219,24 @@ struct SilhouetteEdges::EmbreeScene {
     bounds.Add(edge.ends[1]);
     SetBounds(arguments->bounds_o, bounds.low, bounds.high, owner->reach_);
   }
-  static void SphereBounds(const RTCBoundsFunctionArguments* arguments) {
+  template <typename Shape, std::vector<Shape> Scene::*kShapes>
+  static void OutlineBounds(const RTCBoundsFunctionArguments* arguments) {
     const auto* owner = static_cast<const SilhouetteEdges*>(arguments->geometryUserPtr);
-    const Sphere& sphere = owner->scene_.spheres[arguments->primID];
-    SetBounds(arguments->bounds_o, sphere.center, sphere.center, sphere.radius + owner->reach_);
+    const Shape& shape = (owner->scene_.*kShapes)[arguments->primID];
+    SetBounds(arguments->bounds_o, shape.center, shape.center, shape.Reach() + owner->reach_);
   }
   // Neither ever ends the ray, so Embree shows every candidate.
   static void VisitEdge(const RTCOccludedFunctionNArguments* arguments) {
     if (arguments->valid[0] == 0) return;
     reinterpret_cast<Search*>(arguments->context)->Visit(arguments->primID);
   }
-  static void VisitSphere(const RTCOccludedFunctionNArguments* arguments) {
+  template <typename Shape, std::vector<Shape> Scene::*kShapes, ShapeKind kKind>
+  static void VisitOutline(const RTCOccludedFunctionNArguments* arguments) {
     if (arguments->valid[0] == 0) return;
-    reinterpret_cast<Search*>(arguments->context)->VisitSphere(arguments->primID);
+    auto* search = reinterpret_cast<Search*>(arguments->context);
+    const SilhouetteEdges& owner = *search->edges;
+    search->VisitOutline((owner.scene_.*kShapes)[arguments->primID],
+                         owner.first_outline_[static_cast<std::size_t>(kKind)] + arguments->primID);
   }
 };
 
@@ -290,31 +292,12 @@ Status SilhouetteEdges::AddMeshes() {
   return absl::OkStatus();
 }
 
-void SilhouetteEdges::AddDisks() {
-  for (const Disk& disk : scene_.disks) {
-    if (!CastsShadow(scene_, disk.traits)) continue;
-    const Frame frame(disk.normal);
-    for (const float radius : {disk.radius, disk.inner_radius}) {
-      if (!(radius > 0)) continue;
-      // The face lies inside the outer rim and outside the inner one.
-      const double inwards = radius == disk.radius ? -1 : 1;
-      // Corners outside the circle by as much as the middles of the sides are inside.
-      const double half_side = std::numbers::pi / kRimSides;
-      const double corner_radius = static_cast<double>(radius) * 2 / (1 + std::cos(half_side));
-      const auto ray = [&](double angle) {
-        return Double3(frame.s) * std::cos(angle) + Double3(frame.t) * std::sin(angle);
-      };
-      const auto corner = [&](int i) {
-        return ToFloat(Double3(disk.center) + ray(2 * half_side * (i % kRimSides)) * corner_radius);
-      };
-      for (int i = 0; i < kRimSides; ++i) {
-        const Vec3 wing = ToFloat(ray(half_side * (2 * i + 1)) * inwards);
-        const Edge edge = {{corner(i), corner(i + 1)}, {wing, wing}};
-        // A rim below the spacing of floats has no sides.
-        if (!(edge.ends[0] == edge.ends[1])) edges_.push_back(edge);
-      }
+void SilhouetteEdges::AddRims() {
+  ForEachAnalyticShape(scene_, [&](const auto& shape) {
+    if constexpr (!std::decay_t<decltype(shape)>::kIsClosed) {
+      if (CastsShadow(scene_, shape.traits)) AddRimSilhouettes(shape, edges_);
     }
-  }
+  });
 }
 
 StatusOr<std::unique_ptr<SilhouetteEdges>> SilhouetteEdges::Create(const Scene& scene,
@@ -322,7 +305,7 @@ StatusOr<std::unique_ptr<SilhouetteEdges>> SilhouetteEdges::Create(const Scene& 
   LUCERNA_CHECK(reach > 0 && std::isfinite(reach));
   auto silhouettes = std::unique_ptr<SilhouetteEdges>(new SilhouetteEdges(scene, reach));
   LUCERNA_RETURN_IF_ERROR(silhouettes->AddMeshes());
-  silhouettes->AddDisks();
+  silhouettes->AddRims();
   silhouettes->edges_.shrink_to_fit();
 
   EmbreeScene& embree = *silhouettes->embree_;
@@ -342,7 +325,16 @@ StatusOr<std::unique_ptr<SilhouetteEdges>> SilhouetteEdges::Create(const Scene& 
     rtcReleaseGeometry(geometry);
   };
   attach(silhouettes->edges_.size(), EmbreeScene::EdgeBounds, EmbreeScene::VisitEdge);
-  attach(scene.spheres.size(), EmbreeScene::SphereBounds, EmbreeScene::VisitSphere);
+  auto number = static_cast<std::uint32_t>(silhouettes->edges_.size());
+#define LUCERNA_ATTACH(Name, list, name)                                              \
+  silhouettes->first_outline_[static_cast<std::size_t>(ShapeKind::k##Name)] = number; \
+  number += static_cast<std::uint32_t>(scene.list.size());                            \
+  if constexpr (!Name::kIsFlat) {                                                     \
+    attach(scene.list.size(), EmbreeScene::OutlineBounds<Name, &Scene::list>,         \
+           EmbreeScene::VisitOutline<Name, &Scene::list, ShapeKind::k##Name>);        \
+  }
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_ATTACH)
+#undef LUCERNA_ATTACH
   rtcCommitScene(embree.scene);
   LUCERNA_RETURN_IF_ERROR(EmbreeStatus(embree.device));
   return silhouettes;

@@ -4,9 +4,9 @@
 // through those):
 //   * open edges of meshes, and edges at which the faces turn by more than kSmallestTurnRad. Faces
 //     meet where their vertices have equal positions, whatever mesh or index they come from;
-//   * rims of disks, outer and inner, as polygons of kRimSides sides that leave the circle by at
+//   * rims of open analytic shapes; a circle is a polygon of kRimSides sides that leave it by at
 //     most 1.6e-4 of the radius to either side;
-//   * spheres, exactly: their outline as seen along the segment.
+//   * curved analytic shapes, exactly: their outline as seen along the segment.
 //
 // An edge borders on the light of a segment when, looking along the segment, all faces that meet
 // in it lie on the side that is turned away from the segment. So the edges of a hollow corner, the
@@ -26,8 +26,10 @@
 #include <vector>
 
 #include "render/base/status.h"
+#include "render/geometry/shape_geometry.h"
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 
@@ -41,7 +43,7 @@ inline constexpr int kRimSides = 128;
 struct NearbyEdge {
   float distance_along = 0;   // from the segment's origin to where the edge is nearest
   float distance_across = 0;  // between the two there; may be 0
-  std::uint32_t edge = 0;     // its number; spheres are numbered after all edges
+  std::uint32_t edge = 0;     // its number; curved shapes are numbered after all edges
 };
 
 // The nearest edges of one segment, by (distance_along, distance_across, edge).
@@ -80,23 +82,19 @@ class SilhouetteEdges {
   [[nodiscard]] std::size_t edge_count() const { return edges_.size(); }
 
  private:
-  // A candidate. A wing is the direction, perpendicular to the edge, in which a face leaves it.
-  // Of more than two faces, the two that enclose all others; of one face, the same twice.
-  struct Edge {
-    Vec3 ends[2];
-    Vec3 wings[2];
-  };
+  using Edge = SilhouetteEdge;  // a candidate
   struct EmbreeScene;
   struct Search;
 
   SilhouetteEdges(const Scene& scene, float reach);
 
   Status AddMeshes();
-  void AddDisks();
+  void AddRims();
 
   const Scene& scene_;
   float reach_;
   std::vector<Edge> edges_;
+  std::array<std::uint32_t, kShapeKinds> first_outline_{};  // number of the first shape of a kind
   std::unique_ptr<EmbreeScene> embree_;
 };
 

@@ -4,11 +4,13 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numbers>
 #include <optional>
+#include <type_traits>
+#include <utility>
 
 #include "render/math/double3.h"
 #include "render/scene/mesh_edges.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 namespace {
@@ -17,16 +19,13 @@ constexpr std::size_t kMostSegments = std::size_t{1} << 22;
 // Pairs of shapes whose boxes overlap, and per shape so many of boxes of the tree.
 constexpr std::uint64_t kPairsPerShape = 256;
 constexpr std::size_t kShapesPerLeaf = 4;
-constexpr int kCircleSides = 256;
 constexpr std::uint32_t kMixed = std::numeric_limits<std::uint32_t>::max();
-
-enum class Kind : std::uint8_t { kTriangle, kSphere, kDisk };
 
 struct Shape {
   Bounds bounds;
   std::uint32_t surface = 0;
-  std::uint32_t index = 0;  // of the triangle among all, the sphere or the disk
-  Kind kind = Kind::kTriangle;
+  std::uint32_t index = 0;        // of the triangle among all, or the shape among its kind
+  std::optional<ShapeKind> kind;  // absent: a triangle
 };
 
 struct Node {
@@ -98,10 +97,8 @@ class Crossings {
       vertex_count += mesh.positions.size();
       corner_count += mesh.indices.size();
     }
-    if (std::max(vertex_count, corner_count) + scene_.spheres.size() + scene_.disks.size() >=
-        kMixed) {
-      return false;
-    }
+    const std::size_t analytic_count = ShapeCount(scene_) - scene_.meshes.size();
+    if (std::max(vertex_count, corner_count) + analytic_count >= kMixed) return false;
     positions_.reserve(vertex_count);
     corners_.reserve(corner_count);
     for (const TriangleMesh& mesh : scene_.meshes) {
@@ -115,7 +112,7 @@ class Crossings {
       corner = welded[corner];
     welded = ConnectedSurfaces(corners_, positions_.size());
     std::uint32_t surfaces = 0;
-    shapes_.reserve(welded.size() + scene_.spheres.size() + scene_.disks.size());
+    shapes_.reserve(welded.size() + analytic_count);
     for (std::uint32_t i = 0; i < welded.size(); ++i) {
       Shape& shape = shapes_.emplace_back();
       shape.surface = welded[i];
@@ -124,15 +121,17 @@ class Crossings {
         shape.bounds.Add(positions_[corners_[3 * std::size_t{i} + k]]);
       surfaces = std::max(surfaces, welded[i] + 1);
     }
-    const auto add_round = [&](Kind kind, std::size_t index, Vec3 center, float radius) {
-      const Vec3 reach = {radius, radius, radius};
-      shapes_.push_back(
-          {{center - reach, center + reach}, surfaces++, static_cast<std::uint32_t>(index), kind});
-    };
-    for (std::size_t i = 0; i < scene_.spheres.size(); ++i)
-      add_round(Kind::kSphere, i, scene_.spheres[i].center, scene_.spheres[i].radius);
-    for (std::size_t i = 0; i < scene_.disks.size(); ++i)
-      add_round(Kind::kDisk, i, scene_.disks[i].center, scene_.disks[i].radius);
+    std::uint8_t kind = 0;
+    ForEachAnalyticList(scene_, [&](const auto& list) {
+      for (std::uint32_t i = 0; i < list.size(); ++i) {
+        const Vec3 reach = {list[i].Reach(), list[i].Reach(), list[i].Reach()};
+        shapes_.push_back({{list[i].center - reach, list[i].center + reach},
+                           surfaces++,
+                           i,
+                           static_cast<ShapeKind>(kind)});
+      }
+      ++kind;
+    });
     return true;
   }
 
@@ -230,22 +229,20 @@ class Crossings {
     const auto order = [](const Shape& s) { return std::pair(s.kind, s.index); };
     const Shape& a = order(one) < order(other) ? one : other;
     const Shape& b = &a == &one ? other : one;
-    Triangle triangle;
-    if (a.kind == Kind::kTriangle) {
+    if (!b.kind.has_value()) {
+      Triangle first;
+      Triangle second;
+      if (TriangleOf(a, first) && TriangleOf(b, second)) CrossTriangles(first, second);
+    } else if (!a.kind.has_value()) {
+      Triangle triangle;
       if (!TriangleOf(a, triangle)) return;
-      if (b.kind == Kind::kTriangle) {
-        Triangle second;
-        if (TriangleOf(b, second)) CrossTriangles(triangle, second);
-      } else if (b.kind == Kind::kSphere) {
-        CrossSphere(scene_.spheres[b.index], triangle.corners[0], triangle.normal, &triangle,
-                    nullptr);
-      } else {
-        CrossDisk(triangle, scene_.disks[b.index]);
-      }
-    } else if (a.kind == Kind::kSphere && b.kind == Kind::kDisk) {
-      const Disk& disk = scene_.disks[b.index];
-      CrossSphere(scene_.spheres[a.index], Double3(disk.center), Double3(disk.normal), nullptr,
-                  &disk);
+      VisitShape(scene_, *b.kind, b.index,
+                 [&](const auto& shape) { CrossTriangle(triangle, shape); });
+    } else {
+      VisitShape(scene_, *a.kind, a.index, [&](const auto& first) {
+        VisitShape(scene_, *b.kind, b.index,
+                   [&](const auto& second) { CrossShapes(first, second); });
+      });
     }
   }
 
@@ -269,70 +266,62 @@ class Crossings {
     if (Dot(end, line) > Dot(begin, line)) Add(begin, end);
   }
 
-  void CrossDisk(const Triangle& triangle, const Disk& disk) {
-    const Double3 center(disk.center);
-    const std::optional<Span> span = CutByPlane(triangle, center, Double3(disk.normal));
-    if (!span) return;
-    // The part of the span within the rim.
-    const Double3 from = span->ends[0] - center;
-    const Double3 along = span->ends[1] - span->ends[0];
-    const double squared = Dot(along, along);
-    if (!(squared > 0)) return;
-    const double middle = -Dot(from, along) / squared;
-    const Double3 nearest = from + along * middle;
-    const auto radius = static_cast<double>(disk.radius);
-    const double left = radius * radius - Dot(nearest, nearest);
-    if (!(left > 0)) return;
-    const double half = std::sqrt(left / squared);
-    const double begin = std::max(0.0, middle - half);
-    const double end = std::min(1.0, middle + half);
-    if (begin < end) Add(span->ends[0] + along * begin, span->ends[0] + along * end);
-  }
-
-  // The sphere's circle in a plane: what of the polygon around it lies in the triangle or disk.
-  void CrossSphere(const Sphere& sphere, Double3 origin, Double3 normal, const Triangle* triangle,
-                   const Disk* disk) {
-    const Double3 center(sphere.center);
-    const auto radius = static_cast<double>(sphere.radius);
-    const double height = Dot(center - origin, normal);
-    const double squared = radius * radius - height * height;
-    // Hardly more than a point of contact.
-    if (!(squared > 1e-8 * radius * radius)) return;
-    const double around = std::sqrt(squared) / std::cos(std::numbers::pi / kCircleSides);
-    const Double3 middle = center - normal * height;
-    const Frame frame(ToFloat(normal));
-    const Double3 s(frame.s);
-    const Double3 t = ::lucerna::Cross(normal, s);
-    const auto corner = [&](int i) {
-      const double angle = 2 * std::numbers::pi * (i % kCircleSides) / kCircleSides;
-      return middle + s * (around * std::cos(angle)) + t * (around * std::sin(angle));
-    };
-    for (int i = 0; i < kCircleSides && !IsOver(); ++i) {
-      const Double3 a = corner(i);
-      const Double3 along = corner(i + 1) - a;
+  template <typename AnalyticShape>
+  void CrossTriangle(const Triangle& triangle, const AnalyticShape& shape) {
+    if constexpr (AnalyticShape::kIsFlat) {
+      const std::optional<Span> span =
+          CutByPlane(triangle, Double3(shape.center), Double3(shape.normal));
+      if (!span) return;
+      const Double3 along = span->ends[1] - span->ends[0];
       double begin = 0;
       double end = 1;
-      if (triangle != nullptr) {
-        for (std::size_t k = 0; k < 3; ++k) {
-          const Double3 side = triangle->corners[(k + 1) % 3] - triangle->corners[k];
-          const Double3 inward = ::lucerna::Cross(triangle->normal, side);
-          const double at = Dot(a - triangle->corners[k], inward);
-          const double rise = Dot(along, inward);
-          if (rise > 0) {
-            begin = std::max(begin, -at / rise);
-          } else if (rise < 0) {
-            end = std::min(end, -at / rise);
-          } else if (at < 0) {
-            end = 0;
-          }
-        }
+      if (ClipToShape(shape, span->ends[0], along, begin, end))
+        Add(span->ends[0] + along * begin, span->ends[0] + along * end);
+    } else {
+      for (const LinePiece& piece :
+           ::lucerna::CutByPlane(shape, triangle.corners[0], triangle.normal)) {
+        AddWithin(triangle, piece);
+        if (IsOver()) return;
       }
-      if (disk != nullptr) {
-        const Double3 from_center = a + along * 0.5 - Double3(disk->center);
-        if (Length(from_center) > static_cast<double>(disk->radius)) continue;
-      }
-      if (begin < end) Add(a + along * begin, a + along * end);
     }
+  }
+
+  // A curved and a flat shape; two of either are not crossed.
+  template <typename One, typename Other>
+  void CrossShapes(const One& one, const Other& other) {
+    if constexpr (One::kIsFlat && !Other::kIsFlat) {
+      CrossShapes(other, one);
+    } else if constexpr (!One::kIsFlat && Other::kIsFlat) {
+      for (const LinePiece& piece :
+           ::lucerna::CutByPlane(one, Double3(other.center), Double3(other.normal))) {
+        // A short piece is taken whole when its middle is within the shape.
+        double begin = 0;
+        double end = 1;
+        if (ClipToShape(other, piece.from, piece.along, begin, end) && begin <= 0.5 && end >= 0.5)
+          Add(piece.from, piece.from + piece.along);
+        if (IsOver()) return;
+      }
+    }
+  }
+
+  // What of the piece, which lies in the triangle's plane, is within the triangle.
+  void AddWithin(const Triangle& triangle, const LinePiece& piece) {
+    double begin = 0;
+    double end = 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Double3 side = triangle.corners[(k + 1) % 3] - triangle.corners[k];
+      const Double3 inward = ::lucerna::Cross(triangle.normal, side);
+      const double at = Dot(piece.from - triangle.corners[k], inward);
+      const double rise = Dot(piece.along, inward);
+      if (rise > 0) {
+        begin = std::max(begin, -at / rise);
+      } else if (rise < 0) {
+        end = std::min(end, -at / rise);
+      } else if (at < 0) {
+        end = 0;
+      }
+    }
+    if (begin < end) Add(piece.from + piece.along * begin, piece.from + piece.along * end);
   }
 
   const Scene& scene_;

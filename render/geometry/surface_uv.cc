@@ -5,24 +5,17 @@
 #include <cmath>
 #include <numbers>
 
+#include "render/geometry/shape_geometry.h"
 #include "render/math/warp.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 namespace {
-
-constexpr double kPiD = std::numbers::pi;
 
 std::array<Vec2, 3> CornersOf(const TriangleMesh& mesh, std::uint32_t triangle) {
   if (mesh.uvs.empty()) return {Vec2{0, 0}, Vec2{1, 0}, Vec2{1, 1}};
   const std::uint32_t* corner = &mesh.indices[std::size_t{3} * triangle];
   return {mesh.uvs[corner[0]], mesh.uvs[corner[1]], mesh.uvs[corner[2]]};
-}
-
-// The share of a full turn from x to y, in [0, 1).
-float Turn(float x, float y) {
-  if (x == 0 && y == 0) return 0;
-  const float turn = std::atan2(y, x) * (0.5F * kInversePi);
-  return turn < 0 ? std::min(turn + 1, 0x1.fffffep-1F) : turn;
 }
 
 double DotDouble(Vec3 a, Vec3 b) {
@@ -33,6 +26,17 @@ double DotDouble(Vec3 a, Vec3 b) {
 
 }  // namespace
 
+float TurnOf(float x, float y) {
+  if (x == 0 && y == 0) return 0;
+  const float turn = std::atan2(y, x) * (0.5F * kInversePi);
+  return turn < 0 ? std::min(turn + 1, 0x1.fffffep-1F) : turn;
+}
+
+double TurnSlope(double distance) {
+  const double turn = 2 * std::numbers::pi * distance;
+  return 1 / (turn * turn);
+}
+
 Vec2 UvAt(const Scene& scene, const SurfacePoint& point) {
   if (point.geometry < scene.meshes.size()) {
     const std::array<Vec2, 3> uv = CornersOf(scene.meshes[point.geometry], point.primitive);
@@ -40,18 +44,8 @@ Vec2 UvAt(const Scene& scene, const SurfacePoint& point) {
     return {uv[0].x * rest + uv[1].x * point.u + uv[2].x * point.v,
             uv[0].y * rest + uv[1].y * point.u + uv[2].y * point.v};
   }
-  if (point.geometry == scene.meshes.size()) {
-    const Sphere& sphere = scene.spheres[point.primitive];
-    const Vec3 local = (point.position - sphere.center) / sphere.radius;
-    const float height = std::min(std::max(Dot(local, sphere.axes.z), -1.0F), 1.0F);
-    return {Turn(Dot(local, sphere.axes.x), Dot(local, sphere.axes.y)),
-            1 - std::acos(height) * kInversePi};
-  }
-  const Disk& disk = scene.disks[point.primitive];
-  const Vec3 local = point.position - disk.center;
-  const float x = Dot(local, disk.axes.x);
-  const float y = Dot(local, disk.axes.y);
-  return {Turn(x, y), (disk.radius - std::sqrt(x * x + y * y)) / (disk.radius - disk.inner_radius)};
+  return VisitShape(scene, KindOf(scene, point.geometry), point.primitive,
+                    [&](const auto& shape) { return UvOf(shape, point.position); });
 }
 
 UvSlopes UvSlopesAt(const Scene& scene, const SurfacePoint& point) {
@@ -74,24 +68,8 @@ UvSlopes UvSlopesAt(const Scene& scene, const SurfacePoint& point) {
     };
     return {squared(uv[0].x, uv[1].x, uv[2].x), squared(uv[0].y, uv[1].y, uv[2].y)};
   }
-  const auto around = [](double distance) {
-    // The pole, where the gradient has no end, is a point.
-    const double turn = 2 * kPiD * distance;
-    return 1 / (turn * turn);
-  };
-  if (point.geometry == scene.meshes.size()) {
-    const Sphere& sphere = scene.spheres[point.primitive];
-    const auto radius = static_cast<double>(sphere.radius);
-    const Vec3 local = point.position - sphere.center;
-    const auto height = static_cast<double>(Dot(local, sphere.axes.z));
-    const double from_axis = std::sqrt(std::max(radius * radius - height * height, 0.0));
-    return {around(std::max(from_axis, 1e-3 * radius)), 1 / (kPiD * radius * kPiD * radius)};
-  }
-  const Disk& disk = scene.disks[point.primitive];
-  const double from_center = static_cast<double>(Length(point.position - disk.center));
-  const double width = static_cast<double>(disk.radius) - static_cast<double>(disk.inner_radius);
-  return {around(std::max(from_center, 1e-3 * static_cast<double>(disk.radius))),
-          1 / (width * width)};
+  return VisitShape(scene, KindOf(scene, point.geometry), point.primitive,
+                    [&](const auto& shape) { return UvSlopesOf(shape, point.position); });
 }
 
 }  // namespace lucerna

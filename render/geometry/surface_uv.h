@@ -1,7 +1,7 @@
 // Where on its texture does a point of a surface lie, and how fast does that change?
 //
-// Texture coordinates are pbrt-v4's: those of a mesh's corners; on a sphere u runs around z from x
-// to y and v from -z to z; on a disk u the same and v from the rim to the centre.
+// Texture coordinates are pbrt-v4's: those of a mesh's corners; those of an analytic shape as in
+// its geometry/shape_NAME.cc.
 #pragma once
 
 #include "render/geometry/intersector.h"

@@ -230,7 +230,7 @@ std::uint64_t RunsSize(std::string_view packed, std::uint64_t limit) {
   return size;
 }
 
-// Every block of scanlines unpacks to all of its pixels. The library does not ask: where one has
+// Every block of scanlines unpacks to all of its pixels. The library does not check: where one has
 // fewer, it would go on with whatever lies in memory.
 Status CheckBlocks(std::string_view bytes, const Extent& extent) {
   enum : std::uint8_t { kNone, kRuns, kZips, kZip, kPiz, kPxr24 };
@@ -328,7 +328,7 @@ StatusOr<Image> DecodeExr(std::string_view bytes) {
     Image image;
     image.width = window.max.x - window.min.x + 1;
     image.height = window.max.y - window.min.y + 1;
-    // A header can name its window twice; the library then believes one of them.
+    // A header can name its window twice; the library then uses one of them.
     if (image.width != extent.width || image.height != extent.height) {
       return Garbage("its data window is ambiguous");
     }

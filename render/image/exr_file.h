@@ -1,4 +1,4 @@
-// How does an Image become an EXR, and back? The only file that knows OpenEXR.
+// How does an Image become an EXR, and back? The only file that includes OpenEXR.
 #pragma once
 
 #include <string>

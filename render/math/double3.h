@@ -1,4 +1,4 @@
-// Vectors in double, where float would lose what is asked for: differences of nearly equal points
+// Vectors in double, where float would lose the result: differences of nearly equal points
 // and normals.
 #pragma once
 

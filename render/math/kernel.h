@@ -3,7 +3,7 @@
 // A kernel is K(x) = norm · shape(|x|²/r²) / r², with integral 1 over the disc of radius r. The
 // worker applies the shape, in [0, 1]; the coordinator the norm and 1/r².
 //
-// All that the project knows of a kernel is one struct below. A new one: an enumerator, a struct
+// All that a kernel is made of is one struct below. A new one: an enumerator, a struct
 // and its entry in Kernels.
 #pragma once
 

@@ -4,7 +4,7 @@
 // for them yet, and three files: its properties in render/scene/material_NAME.cc, how pbrt files
 // give it in render/formats/pbrt/material_NAME.cc, and its BSDF in render/transport/bsdf_NAME.cc
 // (docs/adding.md). Functions that differ between kinds are declared from the rows, here, in
-// formats/pbrt/material_readers.h and in transport/bsdf_kinds.h; the rest of the program asks
+// formats/pbrt/material_readers.h and in transport/bsdf_kinds.h; the rest of the program uses
 // MaterialProperties.
 #pragma once
 
@@ -58,7 +58,7 @@ struct Material : MaterialNumbers {
   bool operator==(const Material&) const = default;
 };
 
-// What the renderer needs to know of a material besides its BSDF.
+// What the renderer uses of a material besides its BSDF.
 struct MaterialProperties {
   // The BSDF is reflectance / pi on the side of `wo` and 0 on the other.
   bool is_diffuse = false;

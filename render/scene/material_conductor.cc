@@ -8,8 +8,8 @@ MaterialProperties ConductorKind::Properties(const MaterialNumbers& material) {
   MaterialProperties properties;
   properties.is_smooth = material.alpha_u == 0 && material.alpha_v == 0;
   properties.lobe_width = std::max(material.alpha_u, material.alpha_v);
-  // What a metal with a texture reflects depends on the place, which hitpoints do not tell the
-  // workers: there, paths go on.
+  // What a metal with a texture reflects depends on the place, which hitpoints do not hold:
+  // paths go on there.
   properties.gathers = material.texture == kNoTexture && properties.lobe_width >= kGatherAlpha;
   return properties;
 }

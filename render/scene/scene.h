@@ -29,8 +29,11 @@
 #include "render/math/rgb.h"
 #include "render/math/transform.h"
 #include "render/math/vector.h"
+#include "render/scene/analytic_shapes.h"
+#include "render/scene/infinite_light.h"
 #include "render/scene/light_list.h"
 #include "render/scene/material.h"
+#include "render/scene/shape_traits.h"
 #include "render/scene/texture.h"
 
 namespace lucerna {
@@ -41,16 +44,6 @@ struct AreaLight {
   bool two_sided = false;  // else the side that the shape's outward normal points to
 
   bool operator==(const AreaLight&) const = default;
-};
-
-inline constexpr std::int32_t kNoAreaLight = -1;
-
-// What every shape carries.
-struct ShapeTraits {
-  std::int32_t material = 0;
-  std::int32_t area_light = kNoAreaLight;
-
-  bool operator==(const ShapeTraits&) const = default;
 };
 
 // The outward normal of a triangle is (p1 - p0) x (p2 - p0); meshes that the file turns inside
@@ -65,38 +58,6 @@ struct TriangleMesh {
   // [vertices], or empty: the corners of each triangle, as it is wound, are (0, 0), (1, 0), (1, 1).
   std::vector<Vec2> uvs;
   ShapeTraits traits;
-};
-
-// Where the axes of a shape's own space point in the world: unit, at right angles. The texture
-// coordinate u of spheres and disks grows from x to y.
-struct ShapeAxes {
-  Vec3 x = {1, 0, 0}, y = {0, 1, 0}, z = {0, 0, 1};
-};
-
-struct Sphere {
-  Vec3 center;
-  float radius = 1;     // > 0
-  bool inward = false;  // the outward normal points to the centre
-  ShapeTraits traits;
-  ShapeAxes axes = {};
-};
-
-struct Disk {
-  Vec3 center;
-  Vec3 normal;  // unit, outward
-  float radius = 1;
-  float inner_radius = 0;
-  ShapeTraits traits;
-  ShapeAxes axes = {};
-};
-
-// Light from everywhere that no shape covers. Several of them add up.
-struct InfiniteLight {
-  Rgb radiance;  // the same everywhere, or what the pixels of `map` are multiplied by
-  // A square: its equal-area octahedral map to the sphere of directions is that of
-  // math/equal_area_square.h, each pixel an even patch. Row 0 is v = 0.
-  std::shared_ptr<const Picture> map = nullptr;
-  ShapeAxes axes = {};  // of the map, in the world
 };
 
 // A rectangle, from left to right and from bottom to top of the image.
@@ -141,7 +102,7 @@ struct FilmSettings {
   std::string filename;
 };
 
-// What the file asks of the integrator; absent where it says nothing.
+// The integrator settings of the file; absent where the file has none.
 struct IntegratorSettings {
   std::string name = "sppm";
   std::optional<int> max_depth;
@@ -156,8 +117,9 @@ struct Scene {
   // (formats/scene_unit.h). Of what is below, the integrator's settings are the file's.
   double unit = 1;
   std::vector<TriangleMesh> meshes;
-  std::vector<Sphere> spheres;
-  std::vector<Disk> disks;
+#define LUCERNA_MEMBER(Name, list, name) std::vector<Name> list;
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_MEMBER)  // spheres and so on (scene/analytic_shapes.h)
+#undef LUCERNA_MEMBER
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<AreaLight> area_lights;

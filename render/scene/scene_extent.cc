@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/scene/shape_lists.h"
+
 namespace lucerna {
 namespace {
 
@@ -18,15 +20,11 @@ Bounds BoundsOf(const Scene& scene) {
     for (const Vec3& position : mesh.positions)
       box.Add(position);
   }
-  // A round shape may reach beyond the floats.
-  const auto add_around = [&](Vec3 center, float radius) {
-    box.Add(center - Everywhere(radius));
-    box.Add(center + Everywhere(radius));
-  };
-  for (const Sphere& sphere : scene.spheres)
-    add_around(sphere.center, sphere.radius);
-  for (const Disk& disk : scene.disks)
-    add_around(disk.center, disk.radius);
+  // An analytic shape may reach beyond the floats.
+  ForEachAnalyticShape(scene, [&](const auto& shape) {
+    box.Add(shape.center - Everywhere(shape.Reach()));
+    box.Add(shape.center + Everywhere(shape.Reach()));
+  });
   return box;
 }
 

@@ -13,7 +13,7 @@ struct SceneExtent {
 
 [[nodiscard]] SceneExtent ExtentOf(const Scene& scene);
 
-// The box around all shapes; that of a disk is that of its sphere.
+// The box around all shapes; that of an analytic shape is that of the ball that holds it.
 [[nodiscard]] Bounds BoundsOf(const Scene& scene);
 
 // Whether all of `box` lies behind, or on, the plane through `point` with `normal`: light that

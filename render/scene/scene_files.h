@@ -40,7 +40,9 @@ struct SceneLimits {
   std::uint64_t max_files = 20'000;
   std::uint64_t max_total_bytes = std::uint64_t{8} << 30;
   int max_include_depth = 32;
-  std::uint64_t max_triangles = 400'000'000;                 // after instances are laid out
+  std::uint64_t max_triangles = 400'000'000;  // after instances are laid out
+  // Of the vertices and triangles in memory, after that.
+  std::uint64_t max_shape_bytes = std::uint64_t{64} << 30;
   std::uint64_t max_picture_bytes = std::uint64_t{8} << 30;  // of all pixels in memory
 };
 

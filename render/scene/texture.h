@@ -1,8 +1,11 @@
 // What colour has a surface at a place of its texture?
 //
-// A texture is a constant, a picture, a checkerboard of two other textures, or another texture
-// times a number. Colours are linear Rec. 709, as everything in a Scene. A place is (u, v), with v
-// upwards, while row 0 of a picture is its top.
+// A kind of texture is one row of LUCERNA_TEXTURES, with its numbers below where there are none for
+// them yet, and three files: lookup in render/scene/texture_NAME.cc, how pbrt files give it in
+// render/formats/pbrt/texture_NAME.cc, and its detail in worker/texture_detail_NAME.cc
+// (docs/adding.md). Functions that differ between kinds are declared from the rows, here, in
+// formats/pbrt/texture_readers.h and in worker/texture_detail.h. Colours are linear Rec. 709, as
+// everything in a Scene. A place is (u, v), with v upwards, while row 0 of a picture is its top.
 //
 // Looking up is plain float arithmetic: the same bits on every machine of one numeric profile.
 #pragma once
@@ -16,6 +19,14 @@
 
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
+
+// The kinds of texture, in the order of Texture::Kind.
+// ROW(Name, name): Texture::Kind::kName, and its name in pbrt files.
+#define LUCERNA_TEXTURES(ROW) \
+  ROW(Picture, "imagemap")    \
+  ROW(Constant, "constant")   \
+  ROW(Scaled, "scale")        \
+  ROW(Checkerboard, "checkerboard")
 
 namespace lucerna {
 
@@ -46,12 +57,18 @@ struct Picture {
 struct UvMapping {
   float scale_u = 1, scale_v = 1, delta_u = 0, delta_v = 0;
 
+  // Returns 0 for a coordinate so far from the origin that neighbouring floats there are more than
+  // a texture apart, or that is no number; every result fits into an int.
+  [[nodiscard]] Vec2 Map(Vec2 uv) const;
+
   bool operator==(const UvMapping&) const = default;
 };
 
 // Only the members that the kind names are meaningful.
 struct Texture {
-  enum class Kind : std::uint8_t { kConstant, kPicture, kScaled, kCheckerboard };
+#define LUCERNA_KIND(Name, name) k##Name,
+  enum class Kind : std::uint8_t { LUCERNA_TEXTURES(LUCERNA_KIND) };
+#undef LUCERNA_KIND
   enum class Wrap : std::uint8_t { kRepeat, kClamp, kBlack };
 
   Kind kind = Kind::kConstant;
@@ -67,6 +84,22 @@ struct Texture {
 };
 
 inline constexpr std::int32_t kNoTexture = -1;
+
+// What one kind of texture makes of a lookup: a colour in [0, 1], or that of another texture times
+// a factor.
+struct TextureStep {
+  std::int32_t next = kNoTexture;  // the other texture
+  float factor = 1;
+  Rgb color;
+
+  // The colour, each channel held in [0, 1].
+  [[nodiscard]] static TextureStep To(Rgb color);
+};
+
+#define LUCERNA_DECLARE(Name, name) \
+  [[nodiscard]] TextureStep LookUp##Name(const Texture& texture, Vec2 uv);
+LUCERNA_TEXTURES(LUCERNA_DECLARE)
+#undef LUCERNA_DECLARE
 
 // The colour of texture `number` at `uv`, in [0, 1]. Pictures are interpolated between the centres
 // of their four nearest pixels.

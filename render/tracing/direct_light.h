@@ -13,7 +13,7 @@
 
 namespace lucerna {
 
-// A point where direct light is asked for.
+// A point where direct light is estimated.
 struct ShadingPoint {
   const SurfacePoint& surface;
   const Material& material;

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <span>
+#include <utility>
 
 #include "render/base/status.h"
 #include "render/math/color_space.h"
 #include "render/math/equal_area_square.h"
 #include "render/math/warp.h"
+#include "render/transport/sky_detail.h"
 
 namespace lucerna {
 namespace {
@@ -23,6 +25,12 @@ float PlaceIn(std::span<const Number> cumulative, float u) {
   const Number before = cell == 0 ? Number{0} : *(found - 1);
   const Number within = *found > before ? (value - before) / (*found - before) : Number{0};
   return static_cast<float>(cell) + std::min(static_cast<float>(within), 0x1.fffffep-1F);
+}
+
+// The density [sr⁻¹] of a direction from which light of this radiance comes.
+float DensityOf(Rgb radiance, double mean_luminance) {
+  const double share = static_cast<double>(Luminance(radiance)) / mean_luminance;
+  return static_cast<float>(share) / (4 * kPi);
 }
 
 }  // namespace
@@ -84,8 +92,7 @@ Rgb EnvironmentMap::Radiance(Vec3 direction) const {
 }
 
 float EnvironmentMap::PdfSolidAngle(Vec3 direction) const {
-  const double share = static_cast<double>(Luminance(Radiance(direction))) / mean_luminance_;
-  return static_cast<float>(share) / (4 * kPi);
+  return DensityOf(Radiance(direction), mean_luminance_);
 }
 
 Vec3 EnvironmentMap::Sample(float u1, float u2) const {
@@ -96,6 +103,31 @@ Vec3 EnvironmentMap::Sample(float u1, float u2) const {
   const auto side = static_cast<float>(size_);
   const Vec3 local = EqualAreaDirection({x / side, y / side});
   return axes_.x * local.x + axes_.y * local.y + axes_.z * local.z;
+}
+
+bool EnvironmentMap::SampleEmission(const Emitter& emitter, const BoundingSphere& scene,
+                                    const EmissionNumbers& u, Emission& emission) const {
+  const Vec3 towards = Sample(u.direction1, u.direction2);
+  const Rgb radiance = Radiance(towards);
+  const float pdf = DensityOf(radiance, mean_luminance_);
+  if (!(pdf > 0)) return false;
+  SetEnteringRay(towards, scene, u, emission.ray);
+  emission.flux = radiance * (kPi * scene.radius * scene.radius / (pdf * emitter.choice));
+  return true;
+}
+
+std::unique_ptr<const InfiniteSpectrum> EnvironmentMap::MeasureSpectrum() const {
+  return std::make_unique<SkyDetail>(*this);
+}
+
+InfiniteEmissions MakeEnvironmentEmissions(const std::vector<InfiniteLight>& lights) {
+  InfiniteEmissions emissions;
+  for (const InfiniteLight& light : lights) {
+    if (light.kind != InfiniteLight::Kind::kEnvironment) continue;
+    auto environment = std::make_shared<EnvironmentMap>(light);
+    if (!IsBlack(environment->MeanRadiance())) emissions.push_back(std::move(environment));
+  }
+  return emissions;
 }
 
 }  // namespace lucerna

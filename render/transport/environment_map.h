@@ -1,4 +1,4 @@
-// How bright is the sky in one direction, and where does its light come from?
+// Environment maps: an infinite light with a picture.
 //
 // Each pixel of an infinite light's square is an even patch of sky. Directions are drawn in
 // proportion to the luminance of the patches, so all light that is drawn carries about the same
@@ -12,25 +12,30 @@
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
+#include "render/transport/infinite_emission.h"
 
 namespace lucerna {
 
-class EnvironmentMap {
+class EnvironmentMap final : public InfiniteEmission {
  public:
   // Requires a light with a map.
   explicit EnvironmentMap(const InfiniteLight& light);
 
-  // In the working space.
-  [[nodiscard]] Rgb Radiance(Vec3 direction) const;
-  // The mean over all directions.
-  [[nodiscard]] Rgb MeanRadiance() const { return mean_; }
-  // The largest channel of any texel.
-  [[nodiscard]] float LargestRadiance() const { return largest_; }
+  [[nodiscard]] EmitterKind kind() const override { return EmitterKind::kEnvironment; }
+  [[nodiscard]] Rgb Radiance(Vec3 direction) const override;
+  [[nodiscard]] Rgb MeanRadiance() const override { return mean_; }
+  [[nodiscard]] float LargestRadiance() const override { return largest_; }
 
   // Zero where the sky is black. Requires a map that is not all black.
   [[nodiscard]] float PdfSolidAngle(Vec3 direction) const;
-  // Draws a direction with that density. u1, u2 in [0, 1).
-  [[nodiscard]] Vec3 Sample(float u1, float u2) const;
+  // Draws a direction with that density.
+  [[nodiscard]] Vec3 Sample(float u1, float u2) const override;
+  [[nodiscard]] float Density(Vec3 direction, float choice) const override {
+    return choice * PdfSolidAngle(direction);
+  }
+  [[nodiscard]] bool SampleEmission(const Emitter& emitter, const BoundingSphere& scene,
+                                    const EmissionNumbers& u, Emission& emission) const override;
+  [[nodiscard]] std::unique_ptr<const InfiniteSpectrum> MeasureSpectrum() const override;
 
   // [pixels] of a side.
   [[nodiscard]] int size() const { return size_; }

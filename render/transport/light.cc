@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <type_traits>
 
+#include "render/geometry/shape_geometry.h"
 #include "render/math/double3.h"
 #include "render/math/warp.h"
 #include "render/scene/scene_extent.h"
+#include "render/transport/infinite_emission.h"
 #include "render/transport/light_kinds.h"
 
 namespace lucerna {
@@ -27,9 +31,18 @@ bool IsAtInfinity(EmitterKind kind) {
 // How much of the choice of direct light is even among the lights. By power alone, a light nearby
 // that has a millionth of the power of another is found once in a million samples.
 constexpr double kEvenShare = 0.1;
-// 1 - cosine of the cone in which a sphere appears from outside, without cancellation.
-float OneMinusCosine(float sin2_max) {
-  return sin2_max / (1 + std::sqrt(std::max(0.0F, 1 - sin2_max)));
+
+// Those that rays find on shapes.
+bool IsOnShape(EmitterKind kind) {
+  switch (kind) {
+    case EmitterKind::kTriangle:
+#define LUCERNA_CASE(Name, list, name) case EmitterKind::k##Name:
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+      return true;
+    default:
+      return false;
+  }
 }
 
 }  // namespace
@@ -38,19 +51,21 @@ std::string_view NameOf(EmitterKind kind) {
   switch (kind) {
     case EmitterKind::kTriangle:
       return "triangle";
-    case EmitterKind::kSphere:
-      return "sphere";
-    case EmitterKind::kDisk:
-      return "disk";
+#define LUCERNA_CASE(Name, list, name) \
+  case EmitterKind::k##Name:           \
+    return name;
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
 #define LUCERNA_CASE(Name, list, name) \
   case EmitterKind::k##Name:           \
     return name " light";
       LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
 #undef LUCERNA_CASE
-    case EmitterKind::kInfinite:
-      return "constant environment light";
-    case EmitterKind::kEnvironment:
-      return "environment map";
+#define LUCERNA_CASE(Name, name) \
+  case EmitterKind::k##Name:     \
+    return name;
+      LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
   }
   return "light";
 }
@@ -72,8 +87,6 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
     sphere_.radius = 0.5F * bounds.Diagonal();
   }
   first_emitter_.assign(scene.meshes.size(), -1);
-  sphere_emitter_.assign(scene.spheres.size(), -1);
-  disk_emitter_.assign(scene.disks.size(), -1);
 
   const auto area_emitter = [&](Kind kind, const ShapeTraits& traits, float area) {
     const AreaLight& light = scene.area_lights[static_cast<std::size_t>(traits.area_light)];
@@ -105,29 +118,30 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
       add(emitter, m);
     }
   }
-  for (std::uint32_t i = 0; i < scene.spheres.size(); ++i) {
-    const Sphere& sphere = scene.spheres[i];
-    if (sphere.traits.area_light == kNoAreaLight) continue;
-    sphere_emitter_[i] = static_cast<std::int32_t>(emitters_.size());
-    Emitter emitter =
-        area_emitter(Kind::kSphere, sphere.traits, 4 * kPi * sphere.radius * sphere.radius);
-    emitter.primitive = i;
-    add(emitter, numbers.spheres + i);
-  }
-  for (std::uint32_t i = 0; i < scene.disks.size(); ++i) {
-    const Disk& disk = scene.disks[i];
-    if (disk.traits.area_light == kNoAreaLight) continue;
-    disk_emitter_[i] = static_cast<std::int32_t>(emitters_.size());
-    Emitter emitter =
-        area_emitter(Kind::kDisk, disk.traits,
-                     kPi * (disk.radius * disk.radius - disk.inner_radius * disk.inner_radius));
-    emitter.primitive = i;
-    if (!selection.includes_faces_away && !emitter.two_sided &&
-        FacesAway(disk.center, disk.normal, bounds)) {
-      emitter.power = {};
+  const auto add_shapes = [&](const auto& shapes, ShapeKind shape_kind, Kind kind,
+                              std::uint32_t first) {
+    std::vector<std::int32_t>& numbers_of_kind =
+        shape_emitter_[static_cast<std::size_t>(shape_kind)];
+    numbers_of_kind.assign(shapes.size(), -1);
+    for (std::uint32_t i = 0; i < shapes.size(); ++i) {
+      const auto& shape = shapes[i];
+      if (shape.traits.area_light == kNoAreaLight) continue;
+      numbers_of_kind[i] = static_cast<std::int32_t>(emitters_.size());
+      Emitter emitter = area_emitter(kind, shape.traits, shape.template Area<float>());
+      emitter.primitive = i;
+      if constexpr (std::decay_t<decltype(shape)>::kIsFlat) {
+        if (!selection.includes_faces_away && !emitter.two_sided &&
+            FacesAway(shape.center, shape.normal, bounds)) {
+          emitter.power = {};
+        }
+      }
+      add(emitter, first + i);
     }
-    add(emitter, numbers.disks + i);
-  }
+  };
+#define LUCERNA_ADD(Name, list, name) \
+  add_shapes(scene.list, ShapeKind::k##Name, Kind::k##Name, numbers.list);
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_ADD)
+#undef LUCERNA_ADD
 #define LUCERNA_ADD(Name, list, name)                      \
   for (std::uint32_t i = 0; i < scene.list.size(); ++i) {  \
     const Name##Light& light = scene.list[i];              \
@@ -140,30 +154,19 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
   }
   LUCERNA_DELTA_LIGHTS(LUCERNA_ADD)
 #undef LUCERNA_ADD
-  for (const InfiniteLight& light : scene.infinite_lights) {
-    if (light.map == nullptr) {
-      infinite_radiance_ += light.radiance;
-      continue;
-    }
-    EnvironmentMap environment(light);
-    if (!IsBlack(environment.MeanRadiance())) environments_.push_back(std::move(environment));
-  }
-  if (!IsBlack(infinite_radiance_)) {
-    infinite_emitter_ = static_cast<std::int64_t>(emitters_.size());
+  first_infinite_ = emitters_.size();
+#define LUCERNA_MAKE(Name, name)                                  \
+  std::ranges::move(Make##Name##Emissions(scene.infinite_lights), \
+                    std::back_inserter(infinite_lights_));
+  LUCERNA_INFINITE_LIGHTS(LUCERNA_MAKE)
+#undef LUCERNA_MAKE
+  for (std::uint32_t i = 0; i < infinite_lights_.size(); ++i) {
     Emitter emitter;
-    emitter.kind = Kind::kInfinite;
-    emitter.radiance = infinite_radiance_;
+    emitter.kind = infinite_lights_[i]->kind();
+    emitter.primitive = i;
+    emitter.radiance = infinite_lights_[i]->MeanRadiance();
     emitter.power = emitter.radiance * (4 * kPi * kPi * sphere_.radius * sphere_.radius);
     // Infinite lights are unreachable together or not at all.
-    add(emitter, numbers.infinite);
-  }
-  first_environment_ = emitters_.size();
-  for (std::uint32_t i = 0; i < environments_.size(); ++i) {
-    Emitter emitter;
-    emitter.kind = Kind::kEnvironment;
-    emitter.primitive = i;
-    emitter.radiance = environments_[i].MeanRadiance();
-    emitter.power = emitter.radiance * (4 * kPi * kPi * sphere_.radius * sphere_.radius);
     add(emitter, numbers.infinite);
   }
 
@@ -277,10 +280,11 @@ Vec3 LightSet::CentreOf(const Emitter& emitter) const {
       return (mesh.positions[corner[0]] + mesh.positions[corner[1]] + mesh.positions[corner[2]]) *
              (1.0F / 3);
     }
-    case Kind::kSphere:
-      return scene_.spheres[emitter.primitive].center;
-    case Kind::kDisk:
-      return scene_.disks[emitter.primitive].center;
+#define LUCERNA_CASE(Name, list, name) \
+  case Kind::k##Name:                  \
+    return scene_.list[emitter.primitive].center;
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
 #define LUCERNA_CASE(Name, list, name) \
   case Kind::k##Name:                  \
     return scene_.list[emitter.primitive].Place();
@@ -317,30 +321,19 @@ void LightSet::PointOn(const Emitter& emitter, float u1, float u2, Vec3& positio
       clearance = kClearance * (MaxAbs(p0) + MaxAbs(e1) + MaxAbs(e2));
       return;
     }
-    case Kind::kSphere: {
-      const Sphere& sphere = scene_.spheres[emitter.primitive];
-      const Vec3 outward = SquareToSphere(u1, u2);
-      position = sphere.center + outward * sphere.radius;
-      normal = sphere.inward ? -outward : outward;
-      clearance = kClearance * (MaxAbs(sphere.center) + sphere.radius);
-      return;
-    }
-    default: {
-      const Disk& disk = scene_.disks[emitter.primitive];
-      const Frame frame(disk.normal);
-      Vec3 on_unit = SquareToDisk(u1, u2);
-      if (disk.inner_radius > 0) {
-        // Squared radii are uniform on a disc; squeeze them into the ring.
-        const float squared = LengthSquared(on_unit);
-        const float inner2 = disk.inner_radius * disk.inner_radius / (disk.radius * disk.radius);
-        if (squared > 0) on_unit = on_unit * std::sqrt((inner2 + squared * (1 - inner2)) / squared);
-      }
-      position =
-          disk.center + frame.s * (on_unit.x * disk.radius) + frame.t * (on_unit.y * disk.radius);
-      normal = disk.normal;
-      clearance = kClearance * (MaxAbs(disk.center) + disk.radius);
-      return;
-    }
+#define LUCERNA_CASE(Name, list, name)                  \
+  case Kind::k##Name: {                                 \
+    const Name& shape = scene_.list[emitter.primitive]; \
+    const ShapeFace face = SampleFace(shape, u1, u2);   \
+    position = face.position;                           \
+    normal = face.normal;                               \
+    clearance = ClearanceOf(shape);                     \
+    return;                                             \
+  }
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    default:
+      LUCERNA_CHECK(false);
   }
 }
 
@@ -353,27 +346,28 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
   emission.emitter = static_cast<std::uint32_t>(&emitter - emitters_.data());
   emission.density = HUGE_VALF;
   switch (emitter.kind) {
+#define LUCERNA_CASE(Name, list, name) case Kind::k##Name:
     case Kind::kTriangle:
-    case Kind::kSphere:
-    case Kind::kDisk: {
-      Vec3 position;
-      Vec3 normal;
-      float clearance = 0;
-      PointOn(emitter, u_place1, u_place2, position, normal, clearance);
-      if (emitter.two_sided) {
-        if (u_direction1 < 0.5F) {
-          u_direction1 *= 2;
-        } else {
-          u_direction1 = 2 * u_direction1 - 1;
-          normal = -normal;
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE) {
+#undef LUCERNA_CASE
+        Vec3 position;
+        Vec3 normal;
+        float clearance = 0;
+        PointOn(emitter, u_place1, u_place2, position, normal, clearance);
+        if (emitter.two_sided) {
+          if (u_direction1 < 0.5F) {
+            u_direction1 *= 2;
+          } else {
+            u_direction1 = 2 * u_direction1 - 1;
+            normal = -normal;
+          }
         }
+        const Vec3 local = SquareToCosineHemisphere(u_direction1, u_direction2);
+        emission.ray.direction = Frame(normal).ToWorld(local);
+        emission.ray.origin = position + normal * clearance;
+        emission.density = AreaDensity(emitter);
+        return local.z > 0;
       }
-      const Vec3 local = SquareToCosineHemisphere(u_direction1, u_direction2);
-      emission.ray.direction = Frame(normal).ToWorld(local);
-      emission.ray.origin = position + normal * clearance;
-      emission.density = AreaDensity(emitter);
-      return local.z > 0;
-    }
 #define LUCERNA_CASE(Name, list, name)                                                      \
   case Kind::k##Name:                                                                       \
     return Name##Emission::SampleEmission(scene_.list[emitter.primitive], emitter, sphere_, \
@@ -381,31 +375,15 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
                                           emission);
       LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
 #undef LUCERNA_CASE
-    case Kind::kEnvironment: {
-      const EnvironmentMap& sky = environments_[emitter.primitive];
-      const Vec3 towards = sky.Sample(u_direction1, u_direction2);
-      const float pdf = sky.PdfSolidAngle(towards);
-      if (!(pdf > 0)) return false;
-      const Frame frame(-towards);
-      const Vec3 disk = SquareToDisk(u_place1, u_place2) * sphere_.radius;
-      emission.ray.origin =
-          sphere_.center + towards * sphere_.radius + frame.s * disk.x + frame.t * disk.y;
-      emission.ray.direction = -towards;
-      emission.flux =
-          sky.Radiance(towards) * (kPi * sphere_.radius * sphere_.radius / (pdf * emitter.choice));
-      emission.density = EmissionDensityInfinite(towards);
+#define LUCERNA_CASE(Name, name) case Kind::k##Name:
+      LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+      if (!infinite_lights_[emitter.primitive]->SampleEmission(
+              emitter, sphere_, {u_place1, u_place2, u_direction1, u_direction2}, emission)) {
+        return false;
+      }
+      emission.density = EmissionDensityInfinite(-emission.ray.direction);
       return true;
-    }
-    case Kind::kInfinite: {
-      const Vec3 direction = SquareToSphere(u_direction1, u_direction2);
-      const Frame frame(direction);
-      const Vec3 disk = SquareToDisk(u_place1, u_place2) * sphere_.radius;
-      emission.ray.origin =
-          sphere_.center - direction * sphere_.radius + frame.s * disk.x + frame.t * disk.y;
-      emission.ray.direction = direction;
-      emission.density = EmissionDensityInfinite(-direction);
-      return true;
-    }
   }
   return false;
 }
@@ -430,50 +408,34 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
   if (emitters_.empty() || direct_cumulative_.back() == 0) return false;
   const Emitter& emitter = Choose(direct_cumulative_, u_choice);
   switch (emitter.kind) {
-    case Kind::kSphere: {
-      const Sphere& sphere = scene_.spheres[emitter.primitive];
-      const Vec3 to_center = sphere.center - from;
-      const float distance2 = LengthSquared(to_center);
-      const float sin2_max = sphere.radius * sphere.radius / distance2;
-      if (!sphere.inward && sin2_max < 0.9999F) {
-        // Uniform in the cone in which the sphere appears.
-        const float distance = std::sqrt(distance2);
-        const float one_minus_cos = OneMinusCosine(sin2_max);
-        const Vec3 local = SquareToCone(u1, u2, one_minus_cos);
-        sample.wi = Frame(to_center / distance).ToWorld(local);
-        // Where the direction meets the sphere. The sine is taken from the sides: near the rim of
-        // a small sphere, the cosine alone would not tell hit from miss.
-        const float sin2 = local.x * local.x + local.y * local.y;
-        const float along =
-            distance * local.z -
-            std::sqrt(std::max(0.0F, sphere.radius * sphere.radius - distance2 * sin2));
-        const Vec3 outward = Normalize(sample.wi * along - to_center);
-        sample.is_distant = false;
-        sample.target =
-            sphere.center +
-            outward * (sphere.radius + kClearance * (MaxAbs(sphere.center) + sphere.radius));
-        const float pdf = emitter.direct_choice / (2 * kPi * one_minus_cos);
-        sample.pdf = pdf;
-        sample.radiance_over_pdf = emitter.radiance / pdf;
-        return true;
-      }
-      break;
-    }
+#define LUCERNA_CASE(Name, list, name)                                          \
+  case Kind::k##Name: {                                                         \
+    SeenPlace seen;                                                             \
+    if (!SampleSeen(scene_.list[emitter.primitive], from, u1, u2, seen)) break; \
+    sample.wi = seen.wi;                                                        \
+    sample.is_distant = false;                                                  \
+    sample.target = seen.target;                                                \
+    sample.pdf = emitter.direct_choice / seen.inverse_pdf;                      \
+    sample.radiance_over_pdf = emitter.radiance / sample.pdf;                   \
+    return true;                                                                \
+  }
+    LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
 #define LUCERNA_CASE(Name, list, name) \
   case Kind::k##Name:                  \
     return Name##Emission::SampleDirect(scene_.list[emitter.primitive], emitter, from, sample);
-      LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+    LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
 #undef LUCERNA_CASE
-    case Kind::kInfinite:
-    case Kind::kEnvironment:
-      sample.wi = emitter.kind == Kind::kInfinite ? SquareToSphere(u1, u2)
-                                                  : environments_[emitter.primitive].Sample(u1, u2);
-      sample.is_distant = true;
-      // Whichever drew it, light from this direction is that of all infinite lights.
-      sample.pdf = PdfDirectInfinite(sample.wi);
-      if (!(sample.pdf > 0)) return false;
-      sample.radiance_over_pdf = InfiniteRadiance(sample.wi) / sample.pdf;
-      return true;
+#define LUCERNA_CASE(Name, name) case Kind::k##Name:
+    LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    sample.wi = infinite_lights_[emitter.primitive]->Sample(u1, u2);
+    sample.is_distant = true;
+    // Whichever drew it, light from this direction is that of all infinite lights.
+    sample.pdf = PdfDirectInfinite(sample.wi);
+    if (!(sample.pdf > 0)) return false;
+    sample.radiance_over_pdf = InfiniteRadiance(sample.wi) / sample.pdf;
+    return true;
     default:
       break;
   }
@@ -510,10 +472,8 @@ const Emitter* LightSet::EmitterOf(const SurfacePoint& point) const {
   std::int64_t number = -1;
   if (point.geometry < first_emitter_.size()) {
     number = first_emitter_[point.geometry] + point.primitive;
-  } else if (point.geometry == first_emitter_.size()) {
-    number = sphere_emitter_[point.primitive];
   } else {
-    number = disk_emitter_[point.primitive];
+    number = shape_emitter_[point.geometry - first_emitter_.size()][point.primitive];
   }
   return &emitters_[static_cast<std::size_t>(number)];
 }
@@ -521,12 +481,11 @@ const Emitter* LightSet::EmitterOf(const SurfacePoint& point) const {
 float LightSet::PdfDirect(Vec3 from, const SurfacePoint& point) const {
   const Emitter* emitter = EmitterOf(point);
   if (emitter == nullptr) return 0;
-  if (emitter->kind == Kind::kSphere) {
-    const Sphere& sphere = scene_.spheres[emitter->primitive];
-    const float sin2_max = sphere.radius * sphere.radius / LengthSquared(sphere.center - from);
-    if (!sphere.inward && sin2_max < 0.9999F) {
-      return emitter->direct_choice / (2 * kPi * OneMinusCosine(sin2_max));
-    }
+  if (emitter->kind != Kind::kTriangle) {
+    const float inverse_pdf =
+        VisitShape(scene_, KindOf(scene_, point.geometry), point.primitive,
+                   [&](const auto& shape) { return SeenInversePdf(shape, from); });
+    if (inverse_pdf > 0) return emitter->direct_choice / inverse_pdf;
   }
   const Vec3 to = point.position - from;
   const float distance2 = LengthSquared(to);
@@ -538,13 +497,11 @@ float LightSet::PdfDirect(Vec3 from, const SurfacePoint& point) const {
 float LightSet::LargestRadiance() const {
   float of_areas = 0;
   for (const Emitter& emitter : emitters_) {
-    const bool has_area = emitter.kind == Kind::kTriangle || emitter.kind == Kind::kSphere ||
-                          emitter.kind == Kind::kDisk;
-    if (has_area) of_areas = std::max(of_areas, MaxChannel(emitter.radiance));
+    if (IsOnShape(emitter.kind)) of_areas = std::max(of_areas, MaxChannel(emitter.radiance));
   }
-  float from_infinity = MaxChannel(infinite_radiance_);
-  for (const EnvironmentMap& sky : environments_)
-    from_infinity += sky.LargestRadiance();
+  float from_infinity = 0;
+  for (const auto& light : infinite_lights_)
+    from_infinity += light->LargestRadiance();
   return std::max(of_areas, from_infinity);
 }
 
@@ -560,32 +517,23 @@ float LightSet::EmissionDensity(const SurfacePoint& point) const {
 float LightSet::EmissionDensityInfinite(Vec3 direction) const {
   if (emitters_.empty()) return 0;
   float pdf = 0;
-  if (infinite_emitter_ >= 0) {
-    pdf = emitters_[static_cast<std::size_t>(infinite_emitter_)].choice / (4 * kPi);
-  }
-  for (std::size_t i = 0; i < environments_.size(); ++i) {
-    pdf += emitters_[first_environment_ + i].choice * environments_[i].PdfSolidAngle(direction);
-  }
+  for (std::size_t i = 0; i < infinite_lights_.size(); ++i)
+    pdf += infinite_lights_[i]->Density(direction, emitters_[first_infinite_ + i].choice);
   return pdf / (kPi * sphere_.radius * sphere_.radius);
 }
 
 Rgb LightSet::InfiniteRadiance(Vec3 direction) const {
-  Rgb radiance = infinite_radiance_;
-  for (const EnvironmentMap& sky : environments_)
-    radiance += sky.Radiance(direction);
+  Rgb radiance;
+  for (const auto& light : infinite_lights_)
+    radiance += light->Radiance(direction);
   return radiance;
 }
 
 float LightSet::PdfDirectInfinite(Vec3 direction) const {
   if (emitters_.empty()) return 0;
   float pdf = 0;
-  if (infinite_emitter_ >= 0) {
-    pdf = emitters_[static_cast<std::size_t>(infinite_emitter_)].direct_choice / (4 * kPi);
-  }
-  for (std::size_t i = 0; i < environments_.size(); ++i) {
-    pdf +=
-        emitters_[first_environment_ + i].direct_choice * environments_[i].PdfSolidAngle(direction);
-  }
+  for (std::size_t i = 0; i < infinite_lights_.size(); ++i)
+    pdf += infinite_lights_[i]->Density(direction, emitters_[first_infinite_ + i].direct_choice);
   return pdf;
 }
 

@@ -1,14 +1,16 @@
 // Which lights are there, how strong is each, and where does their light go?
 //
-// Every emitting triangle, sphere, disk and every other light is one emitter; all emitters of a
-// mesh are one light. Emitters are chosen in proportion to their power (luminance), so that all
+// Every emitting triangle and analytic shape and every other light is one emitter; all emitters of
+// a mesh are one light. Emitters are chosen in proportion to their power (luminance), so that all
 // photons carry about the same flux, but for kEvenPhotonShare of the photons, which is even among
 // the lights: a light with a millionth of the power is sampled all the same. With a single light
 // there is no such share.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -19,7 +21,7 @@
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
-#include "render/transport/environment_map.h"
+#include "render/scene/shape_lists.h"
 #include "render/transport/unreachable_lights.h"
 
 namespace lucerna {
@@ -36,13 +38,13 @@ struct Emission {
 
 enum class EmitterKind : std::uint8_t {
   kTriangle,
-  kSphere,
-  kDisk,
 #define LUCERNA_KIND(Name, list, name) k##Name,
-  LUCERNA_DELTA_LIGHTS(LUCERNA_KIND)  // scene/light_list.h
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_KIND)  // scene/analytic_shapes.h
+  LUCERNA_DELTA_LIGHTS(LUCERNA_KIND)     // scene/light_list.h
 #undef LUCERNA_KIND
-  kInfinite,    // the same from everywhere
-  kEnvironment  // a map
+#define LUCERNA_KIND(Name, name) k##Name,
+  LUCERNA_INFINITE_LIGHTS(LUCERNA_KIND)  // scene/infinite_light.h
+#undef LUCERNA_KIND
 };
 
 // "triangle", "sphere", "point light".
@@ -50,8 +52,9 @@ enum class EmitterKind : std::uint8_t {
 
 struct Emitter {
   EmitterKind kind = EmitterKind::kPoint;
-  std::uint32_t geometry = 0;   // kTriangle: the mesh
-  std::uint32_t primitive = 0;  // triangle, sphere, disk, or index among lights or maps
+  std::uint32_t geometry = 0;  // kTriangle: the mesh
+  std::uint32_t primitive =
+      0;  // triangle, or index among the shapes or lights of the kind, or the infinite lights
   bool two_sided = false;
   bool is_sampled = true;  // for direct light
   float area = 0;
@@ -85,6 +88,8 @@ struct LightSample {
                           // on a plane facing the light, over the choice
   float pdf = 0;  // choice × pdf_solid_angle [sr⁻¹]; 0 for delta lights
 };
+
+class InfiniteEmission;
 
 // Around all shapes.
 struct BoundingSphere {
@@ -124,7 +129,7 @@ class LightSet {
   [[nodiscard]] std::optional<Spectrum> DeltaSource(const Emission& emission, double edge_strength,
                                                     const SpectrumLimits& limits) const;
 
-  // Draws light arriving at `from`, without asking whether anything is in the way. False when the
+  // Draws light arriving at `from`, without a test whether anything is in the way. False when the
   // drawn emitter sends nothing there.
   [[nodiscard]] bool SampleDirect(Vec3 from, double u_choice, float u1, float u2,
                                   LightSample& sample) const;
@@ -145,7 +150,12 @@ class LightSet {
   [[nodiscard]] Rgb InfiniteRadiance(Vec3 direction) const;
   // The density with which SampleDirect draws a direction by any of them [choice × sr⁻¹].
   [[nodiscard]] float PdfDirectInfinite(Vec3 direction) const;
-  [[nodiscard]] const std::vector<EnvironmentMap>& environments() const { return environments_; }
+  // [those that are not black], in the order of Emitter::primitive; see
+  // transport/infinite_emission.h.
+  [[nodiscard]] const std::vector<std::shared_ptr<const InfiniteEmission>>& infinite_lights()
+      const {
+    return infinite_lights_;
+  }
 
  private:
   using Kind = EmitterKind;
@@ -166,14 +176,13 @@ class LightSet {
   BoundingSphere sphere_;
   std::vector<Emitter> emitters_;
   std::vector<double> cumulative_, direct_cumulative_;  // [emitters] of the choices
-  // [geometry]: number of its first emitter, or -1.
+  // [meshes]: number of the first emitter, or -1.
   std::vector<std::int64_t> first_emitter_;
-  std::vector<std::int32_t> sphere_emitter_, disk_emitter_;
+  // [shapes of a kind]: number of its emitter, or -1.
+  std::array<std::vector<std::int32_t>, kShapeKinds> shape_emitter_;
   Rgb total_power_;
-  Rgb infinite_radiance_;  // of the constant ones
-  std::int64_t infinite_emitter_ = -1;
-  std::vector<EnvironmentMap> environments_;  // those that are not black
-  std::size_t first_environment_ = 0;         // emitter of the first
+  std::vector<std::shared_ptr<const InfiniteEmission>> infinite_lights_;
+  std::size_t first_infinite_ = 0;  // emitter of the first
   std::vector<LightGroup> lights_;
   std::size_t faint_lights_ = 0;
 };

@@ -8,15 +8,16 @@
 
 namespace lucerna {
 
-// Lights are numbered: meshes, spheres, disks (shapes that do not emit have a number too), then
-// delta lights in the order of their kinds (scene/light_list.h), then infinite lights. Each member
-// is the number of the first of a kind.
+// Lights are numbered: meshes, analytic shapes in the order of their kinds
+// (scene/analytic_shapes.h; shapes that do not emit have a number too), then delta lights in the
+// order of theirs (scene/light_list.h), then infinite lights. Each member is the number of the
+// first of a kind.
 struct LightNumbers {
   explicit LightNumbers(const Scene& scene);
 
-  std::uint32_t spheres = 0, disks = 0;
-  std::uint32_t delta = 0;  // the first of any delta light
 #define LUCERNA_MEMBER(Name, list, name) std::uint32_t list = 0;
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_MEMBER)
+  std::uint32_t delta = 0;  // the first of any delta light
   LUCERNA_DELTA_LIGHTS(LUCERNA_MEMBER)
 #undef LUCERNA_MEMBER
   std::uint32_t infinite = 0, end = 0;

@@ -194,7 +194,7 @@ int Main(int argc, char** argv) {
     const double after = 1e6 * render.time_s() / static_cast<double>(render.pixels());
     // Between two passes errors follow a power of the time.
     if (after >= kTimes[entry.errors.size()]) {
-      const TrueError now = render.estimator().ErrorAgainst(reference);
+      const TrueError now = JobEstimator::ErrorAgainst(reference, render.estimator().Snapshot());
       while (entry.errors.size() < kTimes.size() && after >= kTimes[entry.errors.size()]) {
         const double t = kTimes[entry.errors.size()];
         const double share = entry.before_us > 0
@@ -212,7 +212,7 @@ int Main(int argc, char** argv) {
       entry.before_us = 0;
     }
     if (entry.errors.size() < kTimes.size() && after >= 0.6 * kTimes[entry.errors.size()]) {
-      entry.before = render.estimator().ErrorAgainst(reference);
+      entry.before = JobEstimator::ErrorAgainst(reference, render.estimator().Snapshot());
       entry.before_us = after;
     }
   }

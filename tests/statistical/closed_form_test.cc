@@ -202,6 +202,7 @@ TEST(IrradianceTest, FromAnEnvironmentMapIsTheSumOverItsPatches) {
     Scene sky = Floor();
     InfiniteLight light;
     light.radiance = Gray(1);
+    light.kind = InfiniteLight::Kind::kEnvironment;
     light.map = std::make_shared<const Picture>(std::move(picture));
     sky.infinite_lights.push_back(light);
     ExpectMean(Measure(sky, TestSettings(sky, 1, 0.01, 1), 4096, kParts, "direct.G"),

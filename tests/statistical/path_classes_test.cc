@@ -217,6 +217,7 @@ Scene SceneOf(const PathClass& cell) {
         picture.linear.push_back(0.1F + 0.4F * static_cast<float>(i * 7 % 5));
       InfiniteLight light;
       light.radiance = Gray(1);
+      light.kind = InfiniteLight::Kind::kEnvironment;
       light.map = std::make_shared<const Picture>(std::move(picture));
       scene.infinite_lights.push_back(light);
       break;

@@ -321,7 +321,8 @@ class PathTracer {
     Hit hit;
     while (intersector_->Intersect(ray, hit)) {
       surface = intersector_->SurfaceAt(ray, hit);
-      if (hit.geometry != intersector_->sphere_geometry() || hit.primitive < first_stand_in_) {
+      if (hit.geometry != GeometryOf(scene_, ShapeKind::kSphere) ||
+          hit.primitive < first_stand_in_) {
         return true;
       }
       const Vec3 wo = -ray.direction;

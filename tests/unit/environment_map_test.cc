@@ -33,6 +33,7 @@ InfiniteLight SkyOf(int size, Pixel&& pixel, Rgb scale = Gray(1)) {
   }
   InfiniteLight light;
   light.radiance = scale;
+  light.kind = InfiniteLight::Kind::kEnvironment;
   light.map = std::make_shared<const Picture>(std::move(picture));
   return light;
 }

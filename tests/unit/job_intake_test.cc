@@ -2,10 +2,30 @@
 // nothing pinned.
 #include "server/job_intake.h"
 
+#include <string>
+
+#include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include <zlib.h>
+
+#include "render/math/rng.h"
 
 namespace lucerna {
 namespace {
+
+std::string Gzip(const std::string& bytes) {
+  z_stream stream{};
+  EXPECT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  std::string out(deflateBound(&stream, bytes.size()) + 64, '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  return out;
+}
 
 constexpr const char* kScene = R"(
 LookAt 0 -3 1  0 0 0  0 0 1
@@ -35,10 +55,11 @@ class JobIntakeTest : public testing::Test {
   }
   StatusOr<CheckedJob> Check(const StillNeeded& still_needed = [] { return absl::OkStatus(); }) {
     submission_.manifest.main_path = "scene.pbrt";
-    return JobIntake(blobs_, std::uint64_t{1} << 30).Check(submission_, still_needed);
+    return JobIntake(blobs_, max_job_bytes_).Check(submission_, still_needed);
   }
 
   static constexpr std::size_t kStoreBytes = 4096;
+  std::uint64_t max_job_bytes_ = std::uint64_t{1} << 30;
   BlobStore blobs_{kStoreBytes};
   Submission submission_;
 };
@@ -54,6 +75,49 @@ TEST_F(JobIntakeTest, KeepsTheFilesOfAGoodSceneForItsJob) {
     EXPECT_EQ(job->pinned.size(), 2U);
     EXPECT_FALSE(NothingIsPinned());
   }
+  EXPECT_TRUE(NothingIsPinned());
+}
+
+// One kilobyte that unpacks to 150 times its size, and is read sixteen times.
+TEST_F(JobIntakeTest, RefusesASmallUploadThatUnpacksToMoreThanTheMemory) {
+  std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 20000\nproperty float x\nproperty float y\nproperty "
+      "float z\nelement face 1\nproperty list uchar int vertex_indices\ncomment ";
+  KeyedRng rng(1);
+  for (int i = 0; i < 1000; ++i)
+    ply += static_cast<char>('!' + rng.Bits() % 90);  // does not pack
+  ply += "\nend_header\n0 0 0\n1 0 0\n0 1 0\n";
+  for (int i = 3; i < 20'000; ++i)
+    ply += "0 0 0\n";
+  ply += "3 0 1 2\n";
+  std::string scene = kScene;
+  for (int i = 0; i < 16; ++i)
+    scene += "Shape \"plymesh\" \"string filename\" \"m.ply\"\n";
+  Add("scene.pbrt", scene);
+  Add("floor.pbrt", kFloor);
+  Add("m.ply", Gzip(ply));
+  EXPECT_TRUE(Check().ok()) << Check().status();
+  max_job_bytes_ = 16 << 20;
+  EXPECT_THAT(std::string(Check().status().message()),
+              testing::HasSubstr("error: with this, the shapes of the scene take more than the "
+                                 "2097152 bytes of memory that there are for them; repeat meshes "
+                                 "less often, or give meshes with fewer vertices"));
+  EXPECT_TRUE(NothingIsPinned());
+}
+
+// A picture of one colour packs well: its pixels count, and their number is in its first bytes.
+TEST_F(JobIntakeTest, RefusesASmallPictureOfMorePixelsThanTheMemoryHolds) {
+  using namespace std::string_literals;
+  Add("scene.pbrt", std::string(kScene) +
+                        "Texture \"a\" \"spectrum\" \"imagemap\" \"string filename\" \"a.png\"\n");
+  Add("floor.pbrt", kFloor);
+  // 2048 x 2048 pixels of three bytes in a file of one kilobyte.
+  Add("a.png", "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x08\0\0\0\x08\0\x08\x02\0\0\0CRC."s +
+                   "\0\0\x04\0IDAT"s + std::string(1024, 'x'));
+  max_job_bytes_ = 32 << 20;
+  EXPECT_THAT(std::string(Check().status().message()),
+              testing::HasSubstr("a.png: the image would take 12582912 bytes of memory, and "
+                                 "8388608 are left for the scene's images"));
   EXPECT_TRUE(NothingIsPinned());
 }
 

@@ -613,6 +613,32 @@ TEST(PbrtTextureTest, WhatIsNotSupportedIsRefusedOnlyWhereItIsUsed) {
   EXPECT_EQ(std::count(float_used.begin(), float_used.end(), '\n'), 1);
 }
 
+TEST(PbrtParserTest, ShapesTakeNoMoreMemoryThanTheLimit) {
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float "
+      "z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 0 1 0 3 "
+      "0 1 2\n";
+  const std::string mesh = "Shape \"plymesh\" \"string filename\" \"m.ply\"\n";
+  const std::string instance = "ObjectInstance \"o\"\n";
+  SceneLimits limits;
+  // Of a triangle: three vertices, three indices, and what a mesh takes itself.
+  limits.max_shape_bytes = 3 * (3 * 12 + 3 * 4 + sizeof(TriangleMesh));
+  const auto said = [&](const std::string& text) {
+    return Said("Camera \"perspective\" WorldBegin LightSource \"infinite\"\n" + text,
+                {{"m.ply", ply}}, limits);
+  };
+  EXPECT_EQ(said(mesh + mesh + mesh), "");
+  EXPECT_THAT(
+      said(mesh + mesh + mesh + mesh),
+      HasSubstr("s.pbrt:5:1: error: with this, the shapes of the scene take more than the " +
+                std::to_string(limits.max_shape_bytes) +
+                " bytes of memory that there are for them; repeat meshes less often, or "
+                "give meshes with fewer vertices"));
+  // An object and its instances alike.
+  EXPECT_THAT(said("ObjectBegin \"o\"\n" + mesh + "ObjectEnd\n" + instance + instance + instance),
+              HasSubstr("s.pbrt:7:1: error: with this, the shapes"));
+}
+
 TEST(PbrtTextureTest, PicturesTakeNoMoreMemoryThanTheLimit) {
   SceneLimits limits;
   limits.max_picture_bytes = 40;

@@ -11,7 +11,7 @@
 #include "gtest/gtest.h"
 
 #include "render/math/equal_area_square.h"
-#include "worker/sky_detail.h"
+#include "render/transport/sky_detail.h"
 
 namespace lucerna {
 namespace {
@@ -101,6 +101,7 @@ TEST(SkyDetailTest, OfASlopeIsItsLaplacian) {
   constexpr double kSlope = 0.6;
   InfiniteLight light;
   light.radiance = Gray(1);
+  light.kind = InfiniteLight::Kind::kEnvironment;
   light.map = GreyPicture(kSize, kSize, [](int x, int y) {
     return 1 +
            kSlope * static_cast<double>(EqualAreaDirection({(static_cast<float>(x) + 0.5F) / kSize,
@@ -129,6 +130,7 @@ TEST(SkyDetailTest, OfASlopeIsItsLaplacian) {
 TEST(SkyDetailTest, OfAnEvenSkyIsNoneAndOfASunItsSize) {
   InfiniteLight even;
   even.radiance = Gray(2);
+  even.kind = InfiniteLight::Kind::kEnvironment;
   even.map = GreyPicture(7, 7, [](int, int) { return 1.0; });
   const SpectrumLimits limits = SpectrumLimits::ForDiagonal(1);
   {

@@ -125,7 +125,7 @@ void DirectiveReader::ReadDirectives(Tokenizer& tokens) {
     const Directive* directive =
         token.kind == Token::Kind::kWord ? FindDirective(token.text) : nullptr;
     if (directive == nullptr) {
-      SayUnknown(token);
+      ReportUnknown(token);
       SkipToDirective(tokens);
       continue;
     }
@@ -139,7 +139,7 @@ void DirectiveReader::ReadDirectives(Tokenizer& tokens) {
   }
 }
 
-void DirectiveReader::SayUnknown(const Token& token) {
+void DirectiveReader::ReportUnknown(const Token& token) {
   if (token.kind != Token::Kind::kWord) {
     diagnostics_.Error(token.location, Concat("expected a directive, not ", Quoted(token.text)));
     return;

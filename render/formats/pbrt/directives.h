@@ -57,7 +57,7 @@ class DirectiveReader {
   void IncludeFile(const std::string& path, const SourceLocation& location);
   void ReadText(const std::string& path, std::string_view text);
   void ReadDirectives(Tokenizer& tokens);
-  void SayUnknown(const Token& token);
+  void ReportUnknown(const Token& token);
   static void SkipToDirective(Tokenizer& tokens);
   [[nodiscard]] bool IsStopped() const { return is_stopped_ || assets_.is_over_limit(); }
   void ReportUnclosedScopes();
@@ -139,6 +139,7 @@ class DirectiveReader {
   int depth_ = 0;  // of files that include files
   std::uint64_t texts_read_ = 0;
   std::uint64_t shapes_cost_ = 0;
+  std::uint64_t shapes_bytes_ = 0;
   bool is_stopped_ = false;
 
   GraphicsStack graphics_;

@@ -63,6 +63,7 @@ void ReadEnvironment(const LightInput& input, double scale, double illuminance) 
     scale *= illuminance / given;
   }
   InfiniteLight light;
+  light.kind = InfiniteLight::Kind::kEnvironment;
   light.radiance = Gray(static_cast<float>(scale));
   light.axes = *axes;
   // Summed over all pixels in single precision.

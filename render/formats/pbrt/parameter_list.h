@@ -80,7 +80,7 @@ class ParameterList {
   // An index of refraction: a number, a named glass or a curve.
   std::optional<double> FindRefractiveIndex(std::string_view name, Range range);
 
-  // Says that a known parameter has no effect here.
+  // Warns that a known parameter has no effect here.
   void Ignore(std::string_view name);
 
   // Report about a parameter, or about the thing itself when the parameter is absent.

@@ -227,20 +227,31 @@ bool DirectiveReader::OnShape(Arguments& arguments) {
 
 bool DirectiveReader::HasRoomFor(const ShapeSet& shapes, Arguments& arguments) {
   const std::uint64_t most = assets_.limits().max_triangles;
-  if (shapes.Cost() <= most - shapes_cost_) return true;
-  arguments.Error(Concat("the scene has more than ", most, " triangles"));
+  const std::uint64_t most_bytes = assets_.limits().max_shape_bytes;
+  if (shapes.Cost() > most - shapes_cost_) {
+    arguments.Error(Concat("the scene has more than ", most, " triangles"));
+  } else if (shapes.SizeBytes() > most_bytes - shapes_bytes_) {
+    arguments.Error(Concat("with this, the shapes of the scene take more than the ", most_bytes,
+                           " bytes of memory that there are for them; repeat meshes less often, or "
+                           "give meshes with fewer vertices"));
+  } else {
+    return true;
+  }
   is_stopped_ = true;
   return false;
 }
 
 void DirectiveReader::AddShapes(ShapeSet shapes) {
   shapes_cost_ += shapes.Cost();
+  shapes_bytes_ += shapes.SizeBytes();
   const auto append = [](auto& to, auto& from) {
     to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
   };
   append(open_object_ != nullptr ? open_object_->meshes : scene_.meshes, shapes.meshes);
-  append(open_object_ != nullptr ? open_object_->spheres : scene_.spheres, shapes.spheres);
-  append(open_object_ != nullptr ? open_object_->disks : scene_.disks, shapes.disks);
+#define LUCERNA_APPEND(Name, list, name) \
+  append(open_object_ != nullptr ? open_object_->list : scene_.list, shapes.list);
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_APPEND)
+#undef LUCERNA_APPEND
 }
 
 bool DirectiveReader::OnTexture(Arguments& arguments) {

@@ -3,23 +3,22 @@
 // Which way shapes face, by pbrt-v4's rules. A mesh without normals faces along the cross product
 // of its world-space edges, turned over by ReverseOrientation and by a mirroring transform, one
 // undoing the other. A mesh with normals faces with its normals, which are mapped as normals and
-// turned over by ReverseOrientation alone. Spheres face outward, disks along +z of their own space;
-// only ReverseOrientation turns them over.
+// turned over by ReverseOrientation alone. Spheres face outward, flat shapes along +z of their own
+// space; only ReverseOrientation turns them over.
 #include <array>
 #include <cfloat>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "render/base/text.h"
 #include "render/formats/degenerate_triangles.h"
 #include "render/formats/pbrt/kinds.h"
+#include "render/formats/pbrt/shape_readers.h"
 #include "render/math/double3.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 constexpr std::array<std::string_view, 2> kPointTypes = {"point3", "point"};
 constexpr std::array<std::string_view, 2> kNormalTypes = {"normal", "normal3"};
@@ -64,13 +63,6 @@ Double3 EdgeCross(const TriangleMesh& mesh, std::size_t triangle) {
 
 // The area of what the unit of the scene may yet make large enough (scene_unit.h).
 constexpr double kLeastArea = 1e-90;
-
-// What the readers of all kinds of shape are given.
-struct ShapeInput {
-  ParameterList& parameters;
-  const ShapePlacement& placement;
-  AssetReader& assets;
-};
 
 // Puts a mesh with sound indices where `placement` says.
 void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
@@ -173,78 +165,15 @@ void ReadPlyMesh(const ShapeInput& input, ShapeSet& shapes) {
   PlaceMesh(*std::move(mesh), parameters, input.placement, shapes);
 }
 
-void ReadSphere(const ShapeInput& input, ShapeSet& shapes) {
-  ParameterList& parameters = input.parameters;
-  const ShapePlacement& placement = input.placement;
-  const double radius = parameters.Float("radius", 1, kAboveZero);
-  if (parameters.Float("zmin", -radius) > -radius || parameters.Float("zmax", radius) < radius ||
-      parameters.Float("phimax", 360) < 360) {
-    parameters.Error("is only a part of a sphere (zmin, zmax, phimax), which is not supported");
-    return;
-  }
-  const StatusOr<double> scale = placement.to_world.UniformScale();
-  if (!scale.ok()) {
-    parameters.Error(
-        "is made an ellipsoid by its transform, which is not supported; scale all "
-        "axes alike, or give a mesh");
-    return;
-  }
-  Sphere sphere;
-  sphere.center = placement.to_world.Point({0, 0, 0});
-  sphere.radius = static_cast<float>(radius * *scale);
-  sphere.inward = placement.reverse_orientation;
-  sphere.traits = placement.traits;
-  sphere.axes = AxesOf(placement.to_world).value_or(ShapeAxes());
-  if (!IsFinite(sphere.center) || !(sphere.radius >= FLT_MIN) || !std::isfinite(sphere.radius)) {
-    parameters.Error("is moved or scaled out of single precision by its transform");
-    return;
-  }
-  shapes.spheres.push_back(sphere);
-}
-
-void ReadDisk(const ShapeInput& input, ShapeSet& shapes) {
-  ParameterList& parameters = input.parameters;
-  const ShapePlacement& placement = input.placement;
-  const double radius = parameters.Float("radius", 1, kAboveZero);
-  const double inner_radius = parameters.Float("innerradius", 0, kZeroOrMore);
-  const double height = parameters.Float("height", 0);
-  if (parameters.Float("phimax", 360) < 360) {
-    parameters.Error("phimax", "makes it a part of a disk, which is not supported");
-    return;
-  }
-  if (inner_radius >= radius) {
-    parameters.Error("innerradius", "must be smaller than radius");
-    return;
-  }
-  const StatusOr<double> scale = placement.to_world.UniformScale();
-  if (!scale.ok()) {
-    parameters.Error(
-        "is made an ellipse by its transform, which is not supported; scale all axes "
-        "alike, or give a mesh");
-    return;
-  }
-  Disk disk;
-  disk.center = placement.to_world.Point({0, 0, static_cast<float>(height)});
-  disk.normal = Normalize(placement.to_world.Normal({0, 0, 1}));
-  if (placement.reverse_orientation) disk.normal = -disk.normal;
-  disk.radius = static_cast<float>(radius * *scale);
-  disk.inner_radius = static_cast<float>(inner_radius * *scale);
-  disk.traits = placement.traits;
-  disk.axes = AxesOf(placement.to_world).value_or(ShapeAxes());
-  if (!IsFinite(disk.center) || !(disk.radius >= FLT_MIN) || !std::isfinite(disk.radius)) {
-    parameters.Error("is moved or scaled out of single precision by its transform");
-    return;
-  }
-  shapes.disks.push_back(disk);
-}
-
 using ShapeReader = void (*)(const ShapeInput&, ShapeSet&);
+#define LUCERNA_ROW(Name, list, name) \
+  {name, [](const ShapeInput& input, ShapeSet& shapes) { Read##Name(input, shapes.list); }},
 constexpr Kind<ShapeReader> kKinds[] = {
     {"trianglemesh", &ReadTriangleMesh},
     {"plymesh", &ReadPlyMesh},
-    {"sphere", &ReadSphere},
-    {"disk", &ReadDisk},
+    LUCERNA_ANALYTIC_SHAPES(LUCERNA_ROW)  //
 };
+#undef LUCERNA_ROW
 
 }  // namespace
 
@@ -258,12 +187,48 @@ StatusOr<ShapeAxes> AxesOf(const Transform& to_world) {
   return ShapeAxes{axis({1, 0, 0}), axis({0, 1, 0}), axis({0, 0, 1})};
 }
 
+ShapeAxes Similarity::Axes(const ShapeAxes& axes) const {
+  const auto in_world = [&](Vec3 v) { return turned.x * v.x + turned.y * v.y + turned.z * v.z; };
+  return {in_world(axes.x), in_world(axes.y), in_world(axes.z)};
+}
+
+StatusOr<Similarity> SimilarityOf(const Transform& to_world, std::string_view name) {
+  const StatusOr<double> scale = to_world.UniformScale();
+  if (!scale.ok()) {
+    return absl::InvalidArgumentError(
+        Concat("the instance holds a ", name,
+               ", and its transform does not scale all axes alike, which is not supported"));
+  }
+  return Similarity{static_cast<float>(*scale), AxesOf(to_world).value_or(ShapeAxes())};
+}
+
+Status MovedAway() {
+  return absl::InvalidArgumentError(
+      "the instance is moved or scaled out of single precision by its transform");
+}
+
+bool IsInRange(Vec3 center, float radius) {
+  return IsFinite(center) && radius >= FLT_MIN && std::isfinite(radius);
+}
+
 std::uint64_t ShapeSet::Cost() const {
-  std::uint64_t cost = spheres.size() + disks.size();
+  std::uint64_t cost = 0;
+  ForEachAnalyticList(*this, [&](const auto& list) { cost += list.size(); });
   for (const TriangleMesh& mesh : meshes) {
     cost += std::max<std::uint64_t>({1, mesh.indices.size() / 3, mesh.positions.size() / 3});
   }
   return cost;
+}
+
+std::uint64_t ShapeSet::SizeBytes() const {
+  std::uint64_t size = 0;
+  for (const TriangleMesh& mesh : meshes) {
+    size += sizeof(mesh) + mesh.positions.size() * sizeof(Vec3) +
+            mesh.indices.size() * sizeof(std::uint32_t) + mesh.normals.size() * sizeof(Vec3) +
+            mesh.uvs.size() * sizeof(Vec2);
+  }
+  ForEachAnalyticShape(*this, [&](const auto& shape) { size += sizeof(shape); });
+  return size;
 }
 
 double ShapeSet::Area() const {
@@ -273,12 +238,7 @@ double ShapeSet::Area() const {
       area_m2 += Length(EdgeCross(mesh, triangle)) / 2;
     }
   }
-  const auto square = [](float x) { return static_cast<double>(x) * static_cast<double>(x); };
-  for (const Sphere& sphere : spheres)
-    area_m2 += 4 * kPi * square(sphere.radius);
-  for (const Disk& disk : disks) {
-    area_m2 += kPi * (square(disk.radius) - square(disk.inner_radius));
-  }
+  ForEachAnalyticShape(*this, [&](const auto& shape) { area_m2 += shape.template Area<double>(); });
   return area_m2;
 }
 
@@ -299,12 +259,10 @@ ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
 }
 
 StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world) {
-  const Status moved_away = absl::InvalidArgumentError(
-      "the instance is moved or scaled out of single precision by its transform");
   ShapeSet shapes;
   for (const TriangleMesh& original : object.meshes) {
     TriangleMesh mesh = original;
-    if (!Move(to_world, mesh)) return moved_away;
+    if (!Move(to_world, mesh)) return MovedAway();
     DropTriangles(mesh, kLeastArea);
     if (mesh.indices.empty()) continue;
     // The outward side stays outward: a mirror image is wound the other way round.
@@ -314,40 +272,13 @@ StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world
     }
     shapes.meshes.push_back(std::move(mesh));
   }
-  if (object.spheres.empty() && object.disks.empty()) return shapes;
-
-  const StatusOr<double> scale = to_world.UniformScale();
-  if (!scale.ok()) {
-    return absl::InvalidArgumentError(
-        "the instance holds a sphere or a disk, and its transform does not scale all axes alike, "
-        "which is not supported");
+#define LUCERNA_MOVE(Name, list, name)                    \
+  for (Name shape : object.list) {                        \
+    LUCERNA_RETURN_IF_ERROR(Move##Name(shape, to_world)); \
+    shapes.list.push_back(shape);                         \
   }
-  const auto factor = static_cast<float>(*scale);
-  const ShapeAxes turned = AxesOf(to_world).value_or(ShapeAxes());
-  const auto in_world = [&](Vec3 v) { return turned.x * v.x + turned.y * v.y + turned.z * v.z; };
-  const auto axes_in_world = [&](const ShapeAxes& axes) {
-    return ShapeAxes{in_world(axes.x), in_world(axes.y), in_world(axes.z)};
-  };
-  for (Sphere sphere : object.spheres) {
-    sphere.center = to_world.Point(sphere.center);
-    sphere.radius *= factor;
-    sphere.axes = axes_in_world(sphere.axes);
-    if (!IsFinite(sphere.center) || !(sphere.radius >= FLT_MIN) || !std::isfinite(sphere.radius)) {
-      return moved_away;
-    }
-    shapes.spheres.push_back(sphere);
-  }
-  for (Disk disk : object.disks) {
-    disk.center = to_world.Point(disk.center);
-    disk.normal = Normalize(to_world.Normal(disk.normal));
-    disk.radius *= factor;
-    disk.axes = axes_in_world(disk.axes);
-    disk.inner_radius *= factor;
-    if (!IsFinite(disk.center) || !(disk.radius >= FLT_MIN) || !std::isfinite(disk.radius)) {
-      return moved_away;
-    }
-    shapes.disks.push_back(disk);
-  }
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_MOVE)
+#undef LUCERNA_MOVE
   return shapes;
 }
 

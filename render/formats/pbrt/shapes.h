@@ -23,12 +23,15 @@ namespace lucerna {
 // those of the Shape directive that made them.
 struct ShapeSet {
   std::vector<TriangleMesh> meshes;
-  std::vector<Sphere> spheres;
-  std::vector<Disk> disks;
+#define LUCERNA_MEMBER(Name, list, name) std::vector<Name> list;
+  LUCERNA_ANALYTIC_SHAPES(LUCERNA_MEMBER)
+#undef LUCERNA_MEMBER
 
   // What it costs to keep: triangles, every other shape as one, and vertices that no triangle
   // needs as a third of one.
   [[nodiscard]] std::uint64_t Cost() const;
+  // In memory.
+  [[nodiscard]] std::uint64_t SizeBytes() const;
   // [m²], of one side.
   [[nodiscard]] double Area() const;
 };
@@ -43,7 +46,8 @@ struct ShapePlacement {
                                   const ShapePlacement& placement, AssetReader& assets);
 
 // The shapes of an object where an instance of it stands. Errors: INVALID_ARGUMENT when the
-// transform moves a position out of the finite numbers, or makes an ellipsoid of a sphere.
+// transform moves a position out of the finite numbers, or makes a shape of another kind of one,
+// such as an ellipsoid of a sphere.
 [[nodiscard]] StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world);
 
 }  // namespace lucerna

@@ -1,4 +1,4 @@
-#include "worker/sky_detail.h"
+#include "render/transport/sky_detail.h"
 
 #include <algorithm>
 #include <cmath>

@@ -9,13 +9,12 @@
 
 namespace lucerna {
 
-class SkyDetail {
+class SkyDetail final : public InfiniteSpectrum {
  public:
   // Keeps a reference to `sky`, and a blurred copy of its luminance.
   explicit SkyDetail(const EnvironmentMap& sky);
 
-  // The spectrum of light that comes from `direction`, which points towards the sky.
-  [[nodiscard]] Spectrum Source(Vec3 direction, const SpectrumLimits& limits) const;
+  [[nodiscard]] Spectrum Source(Vec3 direction, const SpectrumLimits& limits) const override;
 
  private:
   // Interpolated between the centres of the pixels.

@@ -1,0 +1,26 @@
+// What shapes of all kinds have in common.
+#pragma once
+
+#include <cstdint>
+
+#include "render/math/vector.h"
+
+namespace lucerna {
+
+inline constexpr std::int32_t kNoAreaLight = -1;
+
+// What every shape carries.
+struct ShapeTraits {
+  std::int32_t material = 0;
+  std::int32_t area_light = kNoAreaLight;
+
+  bool operator==(const ShapeTraits&) const = default;
+};
+
+// Where the axes of a shape's own space point in the world: unit, at right angles. The texture
+// coordinate u of spheres and disks grows from x to y.
+struct ShapeAxes {
+  Vec3 x = {1, 0, 0}, y = {0, 1, 0}, z = {0, 0, 1};
+};
+
+}  // namespace lucerna

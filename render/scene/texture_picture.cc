@@ -1,0 +1,53 @@
+// The pixels of a file, interpolated between the centres of the four nearest.
+#include <algorithm>
+#include <cmath>
+
+#include "render/scene/texture_lookup.h"
+
+namespace lucerna {
+namespace {
+
+// The two pixels around a place along one axis, -1 for one that is black, and the second's share.
+struct Neighbours {
+  int first = 0, second = 0;
+  float share = 0;
+};
+
+Neighbours Around(float place, int count, Texture::Wrap wrap) {
+  using Wrap = Texture::Wrap;
+  // Repeated before the pixels are counted, clamped to just beyond the picture.
+  const float within =
+      wrap == Wrap::kRepeat ? place - std::floor(place) : std::min(std::max(place, -1.0F), 2.0F);
+  const float pixel = within * static_cast<float>(count) - 0.5F;
+  const float below = std::floor(pixel);
+  const auto index = [&](int i) {
+    if (i >= 0 && i < count) return i;
+    if (wrap == Wrap::kBlack) return -1;
+    if (wrap == Wrap::kClamp) return i < 0 ? 0 : count - 1;
+    return i < 0 ? i + count : i - count;
+  };
+  const int first = static_cast<int>(below);
+  return {index(first), index(first + 1), pixel - below};
+}
+
+Rgb Interpolated(const Picture& picture, Texture::Wrap wrap, Vec2 uv) {
+  const Neighbours x = Around(uv.x, picture.width, wrap);
+  const Neighbours y = Around(1 - uv.y, picture.height, wrap);
+  const auto at = [&](int column, int row) {
+    return column < 0 || row < 0 ? Rgb{} : picture.At(column, row);
+  };
+  const Rgb above = at(x.first, y.first) * (1 - x.share) + at(x.second, y.first) * x.share;
+  const Rgb below = at(x.first, y.second) * (1 - x.share) + at(x.second, y.second) * x.share;
+  return above * (1 - y.share) + below * y.share;
+}
+
+}  // namespace
+
+TextureStep LookUpPicture(const Texture& texture, Vec2 uv) {
+  Rgb color = Interpolated(*texture.picture, texture.wrap, texture.mapping.Map(uv));
+  color *= texture.scale;
+  if (texture.is_inverted) color = Gray(1) - color;
+  return TextureStep::To(color);
+}
+
+}  // namespace lucerna

@@ -1,0 +1,52 @@
+// Light that is the same from everywhere.
+#include "render/math/warp.h"
+#include "render/transport/infinite_emission.h"
+
+namespace lucerna {
+namespace {
+
+class ConstantSpectrum final : public InfiniteSpectrum {
+ public:
+  [[nodiscard]] Spectrum Source(Vec3 /*direction*/, const SpectrumLimits& limits) const override {
+    // No structure in place or direction.
+    return EnvironmentSource(0, 1, 1, 1, limits);
+  }
+};
+
+class ConstantEmission final : public InfiniteEmission {
+ public:
+  explicit ConstantEmission(Rgb radiance) : radiance_(radiance) {}
+
+  [[nodiscard]] EmitterKind kind() const override { return EmitterKind::kInfinite; }
+  [[nodiscard]] Rgb Radiance(Vec3 /*direction*/) const override { return radiance_; }
+  [[nodiscard]] Rgb MeanRadiance() const override { return radiance_; }
+  [[nodiscard]] float LargestRadiance() const override { return MaxChannel(radiance_); }
+  [[nodiscard]] Vec3 Sample(float u1, float u2) const override { return SquareToSphere(u1, u2); }
+  [[nodiscard]] float Density(Vec3 /*direction*/, float choice) const override {
+    return choice / (4 * kPi);
+  }
+  [[nodiscard]] bool SampleEmission(const Emitter& /*emitter*/, const BoundingSphere& scene,
+                                    const EmissionNumbers& u, Emission& emission) const override {
+    SetEnteringRay(-SquareToSphere(u.direction1, u.direction2), scene, u, emission.ray);
+    return true;
+  }
+  [[nodiscard]] std::unique_ptr<const InfiniteSpectrum> MeasureSpectrum() const override {
+    return std::make_unique<ConstantSpectrum>();
+  }
+
+ private:
+  Rgb radiance_;
+};
+
+}  // namespace
+
+InfiniteEmissions MakeInfiniteEmissions(const std::vector<InfiniteLight>& lights) {
+  Rgb radiance;
+  for (const InfiniteLight& light : lights) {
+    if (light.kind == InfiniteLight::Kind::kInfinite) radiance += light.radiance;
+  }
+  if (IsBlack(radiance)) return {};
+  return {std::make_shared<ConstantEmission>(radiance)};
+}
+
+}  // namespace lucerna
