@@ -16,7 +16,9 @@
 //       sets them.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -26,6 +28,7 @@
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/rounds.h"
+#include "render/math/color_space.h"
 #include "render/math/rgb.h"
 
 namespace lucerna {
@@ -100,10 +103,33 @@ struct SliceShape {
 [[nodiscard]] constexpr std::size_t ColumnsOf(const PassRange& passes, std::size_t evidence) {
   return kSliceColumns + evidence + (HasFeatures(passes) ? std::size_t{kFeatureColumns} : 0);
 }
-[[nodiscard]] Precision PrecisionOf(std::size_t column, std::size_t evidence);
+[[nodiscard]] constexpr Precision PrecisionOf(std::size_t column, std::size_t evidence) {
+  const bool is_statistic =
+      column >= kSquaredDeviations && column < kSliceColumns + evidence && column != kPhotonCount;
+  return is_statistic ? Precision::kStatistic : Precision::kRadiance;
+}
 
+// These are made for every pixel of every pass, in loops over vectors.
+
+// The bits of a float that its precision leaves zero.
+[[nodiscard]] constexpr unsigned int DroppedBits(Precision precision) {
+  return 24U - static_cast<unsigned int>(precision);
+}
+// `value` without its lowest bits, to nearest, ties to even. Requires one whose rounding is finite.
+[[nodiscard]] constexpr float RoundedFloat(float value, unsigned int dropped_bits) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  const std::uint32_t mask = (std::uint32_t{1} << dropped_bits) - 1;
+  // Half of the last bit kept, less one where that bit is even: ties go to even.
+  const std::uint32_t half = (mask >> 1) + ((bits >> dropped_bits) & 1);
+  return std::bit_cast<float>((bits + half) & ~mask);
+}
 // `value` in this precision, to nearest, ties to even; what no float holds becomes the largest.
-[[nodiscard]] float Rounded(double value, Precision precision);
+[[nodiscard]] constexpr float Rounded(double value, Precision precision) {
+  // The largest float of any precision here, so that rounding up stays finite.
+  constexpr double kLargest = 0x1.fep127;
+  return RoundedFloat(static_cast<float>(std::clamp(value, -kLargest, kLargest)),
+                      DroppedBits(precision));
+}
 
 // All columns zero.
 [[nodiscard]] SliceSums EmptySlice(const PassRange& passes, std::size_t pixels,
@@ -123,9 +149,24 @@ void SetWhatFollowsFromRadiance(SliceSums& slice);
 
 // Chan, Golub & LeVeque 1983, "Algorithms for Computing the Sample Variance": what the squared
 // deviations of two groups together are more than their sum, of `n` and `m` values with these sums.
-[[nodiscard]] double DeviationBetween(double n, double sum_n, double m, double sum_m);
+[[nodiscard]] constexpr double DeviationBetween(double n, double sum_n, double m, double sum_m) {
+  const double difference = sum_n / n - sum_m / m;
+  return difference * difference * n * m / (n + m);
+}
 
+// The working space's luminance of each channel.
+inline constexpr std::array<double, 3> kLuminanceOfChannel = [] {
+  constexpr std::array<double, 3> kRec709 = {0.2126, 0.7152, 0.0722};
+  std::array<double, 3> weights{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t row = 0; row < 3; ++row)
+      weights[c] += kRec709[row] * kRec709FromWorking[row][c];
+  }
+  return weights;
+}();
 // The luminance of radiance in the working space.
-[[nodiscard]] double WorkingLuminance(double r, double g, double b);
+[[nodiscard]] constexpr double WorkingLuminance(double r, double g, double b) {
+  return kLuminanceOfChannel[0] * r + kLuminanceOfChannel[1] * g + kLuminanceOfChannel[2] * b;
+}
 
 }  // namespace lucerna

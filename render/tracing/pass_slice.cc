@@ -49,8 +49,11 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   SliceSums slice = EmptySlice({pass.pass, pass.pass + 1}, pixels, evidence);
   slice.tally = sums.tally();
   slice.eye_rays = pass.rays;
+  std::vector<float*> columns;
+  for (std::vector<float>& column : slice.columns)
+    columns.push_back(column.data());
   const auto set = [&](std::size_t column, std::size_t pixel, double value) {
-    slice.columns[column][pixel] = Rounded(value, PrecisionOf(column, evidence));
+    columns[column][pixel] = Rounded(value, PrecisionOf(column, evidence));
   };
 
   std::vector<PixelOfPass> brought(pixels);
@@ -93,8 +96,7 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     for (std::size_t c = 0; c < 3; ++c) {
       set(kPhotonRadiance + c, pixel, brought[pixel].photons[c]);
-      set(kDirectRadiance + c, pixel,
-          static_cast<double>(pass.direct[pixel][static_cast<int>(c)]));
+      set(kDirectRadiance + c, pixel, static_cast<double>(pass.direct[pixel][static_cast<int>(c)]));
     }
     set(bias, pixel, brought[pixel].bias);
   }
