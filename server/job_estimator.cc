@@ -24,6 +24,7 @@
 #include "render/math/color_space.h"
 #include "render/scene/shape_lists.h"
 #include "render/tracing/eye_path.h"
+#include "server/state/sums_codec.h"
 
 namespace lucerna {
 namespace {
@@ -240,6 +241,10 @@ std::uint64_t JobEstimator::whole_passes() const {
   return state_->sums->whole_passes();
 }
 
+const BatchTally& JobEstimator::whole_tally() const {
+  return state_->sums->whole().tally;
+}
+
 std::uint64_t JobEstimator::photons() const {
   return state_->sums->tally().photons;
 }
@@ -447,6 +452,69 @@ TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference) const {
   error.relative /= terms;
   error.absolute /= terms;
   return error;
+}
+
+void JobEstimator::Save(ByteWriter& writer) const {
+  const State& state = *state_;
+  WriteSums(writer, state.sums->whole());
+  WriteNumbers(writer, state.radii->numbers());
+  WriteRadii(writer, *state.last_radii);
+  writer.Varint(state.after.size());
+  for (const auto& [passes, after] : state.after) {
+    writer.Varint(passes);
+    writer.Varint(after.photons_per_pass);
+    WriteRadii(writer, *after.radii);
+  }
+  WriteDouble(writer, state.noise_area);
+  writer.Varint(state.noise_area_after);
+  for (const Vec3& corner : {state.view.low, state.view.high}) {
+    for (const float coordinate : {corner.x, corner.y, corner.z})
+      WriteFloat(writer, coordinate);
+  }
+  WriteFloat(writer, state.widest_radius);
+  WriteDouble(writer, state.hit_share);
+}
+
+Status JobEstimator::Restore(ByteReader& reader) {
+  State& state = *state_;
+  const std::size_t pixels = state.sums->pixels();
+  LUCERNA_ASSIGN_OR_RETURN(ImageSums::Whole sums, ReadSums(reader, pixels));
+  LUCERNA_ASSIGN_OR_RETURN(PixelRadii::Numbers numbers,
+                           ReadNumbers(reader, state.radii->numbers()));
+  const auto read_radii = [&]() -> StatusOr<std::shared_ptr<const RadiusColumn>> {
+    LUCERNA_ASSIGN_OR_RETURN(RadiusColumn radii, ReadRadii(reader, pixels));
+    return std::make_shared<const RadiusColumn>(std::move(radii));
+  };
+  LUCERNA_ASSIGN_OR_RETURN(std::shared_ptr<const RadiusColumn> last_radii, read_radii());
+  std::map<std::uint64_t, State::After> after;
+  for (std::uint64_t left = reader.Varint(); left > 0; --left) {
+    const std::uint64_t passes = reader.Varint();
+    State::After& of_passes = after[passes];
+    of_passes.photons_per_pass = reader.Varint();
+    LUCERNA_ASSIGN_OR_RETURN(of_passes.radii, read_radii());
+  }
+  const double noise_area = ReadDouble(reader);
+  const std::uint64_t noise_area_after = reader.Varint();
+  Bounds view;
+  for (Vec3* const corner : {&view.low, &view.high}) {
+    for (float* const coordinate : {&corner->x, &corner->y, &corner->z})
+      *coordinate = ReadFloat(reader);
+  }
+  const float widest_radius = ReadFloat(reader);
+  const double hit_share = ReadDouble(reader);
+  if (!reader.finished() || !after.contains(sums.passes)) {
+    return absl::InvalidArgumentError("malformed checkpoint: it ends too soon or too late");
+  }
+  state.sums->Restore(std::move(sums));
+  state.radii->Restore(std::move(numbers));
+  state.last_radii = std::move(last_radii);
+  state.after = std::move(after);
+  state.noise_area = noise_area;
+  state.noise_area_after = noise_area_after;
+  state.view = view;
+  state.widest_radius = widest_radius;
+  state.hit_share = hit_share;
+  return absl::OkStatus();
 }
 
 }  // namespace lucerna

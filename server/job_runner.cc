@@ -7,6 +7,8 @@
 
 #include "render/estimate/evidence.h"
 #include "render/wire/block_codec.h"
+#include "render/wire/bytes.h"
+#include "server/state/sums_codec.h"
 
 namespace lucerna {
 namespace {
@@ -15,6 +17,9 @@ namespace {
 constexpr std::size_t kMostSplitPasses = 2;
 // The error is near its target when its upper end is below so many times that.
 constexpr double kNearTarget = 1.5;
+// Checkpoints take a hundredth of the time.
+constexpr int kTimeBetweenSaves = 100;
+constexpr Duration kPauseBeforeRetry = std::chrono::seconds(1);
 
 }  // namespace
 
@@ -44,6 +49,11 @@ std::uint64_t JobRunner::WantedPasses(const End& end) const {
 
 StatusOr<RenderResult> JobRunner::Run(Scene scene, const SceneNeeds& needs,
                                       ReferenceImage reference) {
+  LUCERNA_RETURN_IF_ERROR(Prepare(std::move(scene), needs, std::move(reference)));
+  return RunToEnd();
+}
+
+Status JobRunner::Prepare(Scene scene, const SceneNeeds& needs, ReferenceImage reference) {
   LUCERNA_ASSIGN_OR_RETURN(estimator_,
                            JobEstimator::Create(std::move(scene), settings_, needs, threads_));
   reference_ = std::move(reference);
@@ -54,7 +64,7 @@ StatusOr<RenderResult> JobRunner::Run(Scene scene, const SceneNeeds& needs,
                      " beside the others, so what is lit by reflections of that light alone stays"
                      " dark; render it by itself and add the images"));
   }
-  return RunToEnd();
+  return absl::OkStatus();
 }
 
 StatusOr<RenderResult> JobRunner::Resume() {
@@ -71,9 +81,12 @@ StatusOr<RenderResult> JobRunner::RunToEnd() {
     photon_steps_.pop_back();
   next_split_ = next_round_;
   reported_passes_ = next_round_;
-  const SteadyTime started_at = hooks_.clock.Steady();
+  saved_passes_ = next_round_;
+  run_began_at_ = hooks_.clock.Steady() - ran_before_;
   StatusOr<RenderResult> result = RunRounds();
-  ran_before_ += hooks_.clock.Steady() - started_at;
+  // The process ends, and a later one may go on.
+  if (absl::IsUnavailable(result.status())) KeepWholeRounds();
+  ran_before_ = hooks_.clock.Steady() - run_began_at_;
   // Whatever ended it: workers must not go on with passes that will not be merged.
   CloseAll();
   return result;
@@ -116,7 +129,6 @@ StopReason JobRunner::ReasonToStop(const End& end, bool is_time_up) const {
 }
 
 StatusOr<RenderResult> JobRunner::RunRounds() {
-  const SteadyTime started_at = hooks_.clock.Steady() - ran_before_;
   while (true) {
     LUCERNA_RETURN_IF_ERROR(why_stopped());
     End end;
@@ -128,8 +140,8 @@ StatusOr<RenderResult> JobRunner::RunRounds() {
     if (end.time_s > 0) {
       // A limit beyond a century is no limit, and would not fit.
       const double seconds = std::min(end.time_s, 3.2e9);
-      due_ =
-          started_at + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+      due_ = run_began_at_ +
+             std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
     }
     const bool is_time_up = due_ && hooks_.clock.Steady() >= *due_;
     if (const StopReason reason = ReasonToStop(end, is_time_up); reason != StopReason::kNone) {
@@ -224,6 +236,7 @@ StatusOr<bool> JobRunner::Step(const End& end, bool wants_more) {
   }
   if (TakeInIfWhole()) {
     EstimateErrorIfDue(false);
+    CheckpointIfDue();
     return true;
   }
   if (to_split && !ahead_) {
@@ -428,6 +441,90 @@ void JobRunner::CheckImage() {
       " photons: no light has reached the"
       " view; check that the scene has lights, which way they and the camera face, and what stands"
       " between them"));
+}
+
+std::string JobRunner::Save() const {
+  ByteWriter writer;
+  writer.Varint(static_cast<std::uint64_t>((hooks_.clock.Steady() - run_began_at_).count()));
+  writer.Varint(static_cast<std::uint64_t>(next_checkpoint_));
+  writer.Varint(static_cast<std::uint64_t>(checkpoints_));
+  writer.Varint(has_warned_ ? 1 : 0);
+  writer.Varint(static_cast<std::uint64_t>(passes_at_checkpoint_));
+  WriteDouble(writer, error_at_most_);
+  writer.Varint(photon_steps_.size());
+  for (const PhotonStep& step : photon_steps_) {
+    writer.Varint(step.first_pass);
+    writer.Varint(step.photons_per_pass);
+  }
+  const MutexLock lock(estimator_mutex_);
+  estimator_->Save(writer);
+  return writer.Take();
+}
+
+Status JobRunner::Restore(std::string_view sums) {
+  ByteReader reader(sums);
+  const Duration ran{static_cast<std::int64_t>(reader.Varint())};
+  const auto next_checkpoint = static_cast<std::int64_t>(reader.Varint());
+  const auto checkpoints = static_cast<int>(reader.Varint());
+  const bool has_warned = reader.Varint() != 0;
+  const auto passes_at_checkpoint = static_cast<std::int64_t>(reader.Varint());
+  const double error_at_most = ReadDouble(reader);
+  PhotonSteps steps;
+  for (std::uint64_t left = reader.Varint(); left > 0 && reader.ok(); --left) {
+    const std::uint64_t first_pass = reader.Varint();
+    steps.push_back({first_pass, reader.Varint()});
+  }
+  const MutexLock lock(estimator_mutex_);
+  LUCERNA_RETURN_IF_ERROR(estimator_->Restore(reader));
+  ran_before_ = ran;
+  next_checkpoint_ = next_checkpoint;
+  checkpoints_ = checkpoints;
+  has_warned_ = has_warned;
+  passes_at_checkpoint_ = passes_at_checkpoint;
+  error_at_most_ = error_at_most;
+  photon_steps_ = std::move(steps);
+  return absl::OkStatus();
+}
+
+Status JobRunner::KeepCheckpoint() {
+  const SteadyTime began_at = hooks_.clock.Steady();
+  LUCERNA_RETURN_IF_ERROR(hooks_.on_checkpoint(
+      Save(), static_cast<std::int64_t>(estimator_->whole_passes()), estimator_->whole_tally()));
+  const SteadyTime now = hooks_.clock.Steady();
+  save_at_ = now + kTimeBetweenSaves * (now - began_at);
+  saved_passes_ = estimator_->whole_passes();
+  return absl::OkStatus();
+}
+
+void JobRunner::CheckpointIfDue() {
+  if (!hooks_.on_checkpoint || hooks_.clock.Steady() < save_at_) return;
+  Status kept = KeepCheckpoint();
+  if (kept.ok()) return;
+  SteadyTime paused_at = hooks_.clock.Steady();
+  while (!kept.ok()) {
+    hooks_.on_pause(kept);
+    {
+      // A cancel or a stop ends the pause too; wakes by workers do not.
+      const MutexLock lock(mutex_);
+      const SteadyTime until = hooks_.clock.Steady() + kPauseBeforeRetry;
+      while (!why_stopped_ && !shall_finish_ && hooks_.clock.Steady() < until)
+        changed_.WaitFor(mutex_, kPauseBeforeRetry);
+      if (why_stopped_ || shall_finish_) break;
+    }
+    // The time of a job is that in which it could go on.
+    const SteadyTime now = hooks_.clock.Steady();
+    run_began_at_ += now - std::exchange(paused_at, now);
+    kept = KeepCheckpoint();
+  }
+  hooks_.on_pause(absl::OkStatus());
+}
+
+void JobRunner::KeepWholeRounds() {
+  if (!hooks_.on_checkpoint) return;
+  while (TakeInIfWhole())
+    EstimateErrorIfDue(false);
+  // When it fails, the one before is there.
+  if (estimator_->whole_passes() > saved_passes_) KeepCheckpoint().IgnoreError();
 }
 
 bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {

@@ -18,6 +18,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "render/base/clock.h"
 #include "render/base/mutex.h"
@@ -64,6 +65,13 @@ struct RunnerHooks {
   // At a stop: the same of the passes after the last round merged. They are part of a later round.
   std::function<void(const BatchTally& tally, std::int64_t passes)> on_tail;
   std::function<void(const ErrorCheckpoint& checkpoint)> on_error_estimate;
+  // Keeps what Save gave, so that a later process can Restore it; absent: nothing is kept.
+  // `tally` is of the `passes` in it. When it fails the job pauses, and it is called again every
+  // second.
+  std::function<Status(std::string sums, std::int64_t passes, const BatchTally& tally)>
+      on_checkpoint;
+  // The job pauses and why, or goes on (OK).
+  std::function<void(const Status& why)> on_pause;
 };
 
 class JobRunner final : public RunningJob {
@@ -77,6 +85,11 @@ class JobRunner final : public RunningJob {
   [[nodiscard]] StatusOr<RenderResult> Run(Scene scene, const SceneNeeds& needs,
                                            ReferenceImage reference);
   [[nodiscard]] StatusOr<RenderResult> Resume() override;
+
+  // Run in its parts: Prepare once, then Restore as often as it fails, then Resume.
+  [[nodiscard]] Status Prepare(Scene scene, const SceneNeeds& needs, ReferenceImage reference);
+  // Goes on from a checkpoint of the same job. Errors: as JobEstimator::Restore.
+  [[nodiscard]] Status Restore(std::string_view sums);
 
   void SetEnd(const RenderSettings& settings) override;
   void Reopen(const RenderSettings& settings) override;
@@ -118,6 +131,13 @@ class JobRunner final : public RunningJob {
 
   StatusOr<RenderResult> RunToEnd();
   StatusOr<RenderResult> RunRounds();
+  // All that a later run follows from: the whole rounds taken in.
+  std::string Save() const;
+  // Hands a checkpoint on, at most kCheckpointShare of the time. Pauses while that fails.
+  void CheckpointIfDue();
+  Status KeepCheckpoint();
+  // Before the process ends: rounds that have come, and a checkpoint.
+  void KeepWholeRounds();
   // One thing that can be done now: opens, traces or takes in. False when there is nothing.
   StatusOr<bool> Step(const End& end, bool wants_more);
   // Estimates the error at the next checkpoint, or if `is_last`.
@@ -172,6 +192,9 @@ class JobRunner final : public RunningJob {
   // The runner's thread only.
   ReferenceImage reference_;
   Duration ran_before_{};
+  SteadyTime run_began_at_;  // less what ran before, without pauses
+  SteadyTime save_at_;       // no checkpoint is kept before this
+  std::uint64_t saved_passes_ = 0;
   std::int64_t next_checkpoint_ = kFirstCheckpoint;
   int checkpoints_ = 0;
   bool has_warned_ = false;                // of a black image

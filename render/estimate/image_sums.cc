@@ -16,43 +16,49 @@ double LuminanceOfSum(const ImageSums::Pixel& sum) {
 }  // namespace
 
 void ImageSums::Add(const SliceSums& slice) {
-  LUCERNA_CHECK(slice.passes.first == passes_ && slice.pixels() == pixels_.size());
+  LUCERNA_CHECK(slice.passes.first == whole_.passes && slice.pixels() == whole_.pixels.size());
   tail_.clear();
-  for (std::size_t pixel = 0; pixel < pixels_.size(); ++pixel) {
-    AddTo(pixels_[pixel], passes_, slice, pixel);
-    AddTo(features_[pixel], slice, pixel);
+  for (std::size_t pixel = 0; pixel < whole_.pixels.size(); ++pixel) {
+    AddTo(whole_.pixels[pixel], whole_.passes, slice, pixel);
+    AddTo(whole_.features[pixel], slice, pixel);
   }
-  passes_ = slice.passes.last;
-  eye_rays_ += slice.eye_rays;
-  tally_ += slice.tally;
+  whole_.passes = slice.passes.last;
+  whole_.eye_rays += slice.eye_rays;
+  whole_.tally += slice.tally;
+}
+
+void ImageSums::Restore(Whole whole) {
+  LUCERNA_CHECK(whole.pixels.size() == pixels() && whole.features.size() == pixels());
+  whole_ = std::move(whole);
+  tail_.clear();
 }
 
 void ImageSums::SetTail(Slices tail) {
-  std::uint64_t next = passes_;
+  std::uint64_t next = whole_.passes;
   for (const auto& slice : tail) {
-    LUCERNA_CHECK(slice->passes.first == next && slice->pixels() == pixels_.size());
+    LUCERNA_CHECK(slice->passes.first == next && slice->pixels() == whole_.pixels.size());
     next = slice->passes.last;
   }
   tail_ = std::move(tail);
 }
 
 std::uint64_t ImageSums::eye_rays() const {
-  std::uint64_t rays = eye_rays_;
+  std::uint64_t rays = whole_.eye_rays;
   for (const auto& slice : tail_)
     rays += slice->eye_rays;
   return rays;
 }
 
 BatchTally ImageSums::tally() const {
-  BatchTally tally = tally_;
+  BatchTally tally = whole_.tally;
   for (const auto& slice : tail_)
     tally += slice->tally;
   return tally;
 }
 
 ImageSums::Pixel ImageSums::At(std::size_t pixel) const {
-  Pixel sum = pixels_[pixel];
-  std::uint64_t passes = passes_;
+  Pixel sum = whole_.pixels[pixel];
+  std::uint64_t passes = whole_.passes;
   for (const auto& slice : tail_) {
     AddTo(sum, passes, *slice, pixel);
     passes = slice->passes.last;
@@ -61,7 +67,7 @@ ImageSums::Pixel ImageSums::At(std::size_t pixel) const {
 }
 
 ImageSums::Features ImageSums::FeaturesAt(std::size_t pixel) const {
-  Features sum = features_[pixel];
+  Features sum = whole_.features[pixel];
   for (const auto& slice : tail_)
     AddTo(sum, *slice, pixel);
   return sum;

@@ -18,7 +18,10 @@ namespace lucerna {
 
 class ImageSums {
  public:
-  explicit ImageSums(std::size_t pixels) : pixels_(pixels), features_(pixels) {}
+  explicit ImageSums(std::size_t pixels) {
+    whole_.pixels.resize(pixels);
+    whole_.features.resize(pixels);
+  }
 
   using Slices = std::vector<std::shared_ptr<const SliceSums>>;
 
@@ -29,11 +32,11 @@ class ImageSums {
   void SetTail(Slices tail);
 
   // Passes added, without the tail and with it.
-  [[nodiscard]] std::uint64_t whole_passes() const { return passes_; }
+  [[nodiscard]] std::uint64_t whole_passes() const { return whole_.passes; }
   [[nodiscard]] std::uint64_t passes() const {
-    return tail_.empty() ? passes_ : tail_.back()->passes.last;
+    return tail_.empty() ? whole_.passes : tail_.back()->passes.last;
   }
-  [[nodiscard]] std::size_t pixels() const { return pixels_.size(); }
+  [[nodiscard]] std::size_t pixels() const { return whole_.pixels.size(); }
   // Of all passes.
   [[nodiscard]] std::uint64_t eye_rays() const;
   [[nodiscard]] BatchTally tally() const;
@@ -64,15 +67,23 @@ class ImageSums {
   };
   [[nodiscard]] Features FeaturesAt(std::size_t pixel) const;
 
+  // All that is kept of the passes added, without the tail: for checkpoints.
+  struct Whole {
+    std::uint64_t passes = 0;
+    std::uint64_t eye_rays = 0;
+    BatchTally tally;
+    std::vector<Pixel> pixels;
+    std::vector<Features> features;  // as many
+  };
+  [[nodiscard]] const Whole& whole() const { return whole_; }
+  // Goes on from there, without a tail. Requires as many pixels.
+  void Restore(Whole whole);
+
  private:
   static void AddTo(Pixel& sum, std::uint64_t passes, const SliceSums& slice, std::size_t pixel);
   static void AddTo(Features& sum, const SliceSums& slice, std::size_t pixel);
 
-  std::uint64_t passes_ = 0;
-  std::uint64_t eye_rays_ = 0;
-  BatchTally tally_;
-  std::vector<Pixel> pixels_;
-  std::vector<Features> features_;
+  Whole whole_;
   Slices tail_;
 };
 
