@@ -176,6 +176,11 @@ int Run(int argc, char** argv) {
     if (setting.role != SettingRole::kStopsJob) continue;
     AddSettingFlag(*extend, setting.name, until, std::string(setting.meaning));
   }
+  CLI::App* remove = command("delete", "forget a job that has ended, and its image",
+                             [&] { return DeleteJob(job_id, server, output_options); });
+  remove->add_option("JOB", job_id, "the job's id")->required();
+  add_server(remove);
+  add_quiet(remove);
   for (CLI::App* about_job : {stop, extend}) {
     about_job->add_option("JOB", job_id, "the job's id")->required();
     add_server(about_job);

@@ -266,13 +266,7 @@ void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner
   // A job that had ended and was given a new end begins anew: what it had counted comes again.
   std::optional<Job> job = jobs_.Find(job_id);
   if (!job || job->counters.passes == 0) return;
-  job->counters = {};
-  job->convergence.clear();
-  job->lights.clear();
-  job->pass_record = {};
-  job->tail = {};
-  job->photon_steps.clear();
-  job->workers.clear();
+  job->ClearProgress();
   jobs_.GoOnFrom(job_id, *std::move(job), Duration::zero());
   note("there is no checkpoint of it that can be used: it begins anew");
 }
@@ -359,6 +353,7 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
                            const BatchTally&
                                tally) { return KeepCheckpoint(id, std::move(sums), passes, tally); }
                      : std::function<Status(std::string, std::int64_t, const BatchTally&)>(),
+          .checkpoint_share = options_.checkpoint_share,
           .on_pause =
               [this, id](const Status& why) {
                 const std::string condition = why.ok() ? "" : PauseCondition(state_->folder(), why);

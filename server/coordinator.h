@@ -50,6 +50,7 @@ class Coordinator {
     std::uint64_t batch_photons = 0;  // 0: follows the number of workers
     std::string numeric_profile;
     RetentionLimits retention;
+    double checkpoint_share = 0.01;  // of the time, in (0, 1]
   };
 
   // `state` is what outlives the process; nullptr: nothing does. Goes on with the jobs in it.

@@ -77,6 +77,16 @@ void Job::AddEvent(WallTime at, std::string what) {
   if (events.size() > kMostEvents) events.erase(events.begin());
 }
 
+void Job::ClearProgress() {
+  counters = JobCounters();
+  convergence.clear();
+  lights.clear();
+  pass_record = PassRecord();
+  tail = PassTally();
+  photon_steps.clear();
+  workers.clear();
+}
+
 PassRecord::PassRecord(std::vector<PassTally> tallies) : tallies_(std::move(tallies)) {
   // The first ones are of the passes before rounds were longer than one.
   if (!tallies_.empty()) passes_each_ = std::max<std::int64_t>(1, tallies_.front().passes);

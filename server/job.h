@@ -198,6 +198,8 @@ struct Job {
   std::vector<JobEvent> events;
 
   void AddEvent(WallTime at, std::string what);
+  // All that rendering has counted and found.
+  void ClearProgress();
 };
 
 }  // namespace lucerna

@@ -10,8 +10,6 @@
 namespace lucerna {
 namespace {
 
-// A job's warnings go with every message about it.
-constexpr std::size_t kMostWarnings = 200;
 constexpr std::size_t kMostShares = 1000;
 
 v1::JobState StateToProto(JobState state) {
@@ -342,8 +340,9 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
     job.lights.push_back(LightOf(light));
   std::vector<PassTally> tallies;
   for (const v1::PassEnergy& part : message.energy_of_passes()) {
-    PassTally& tally =
-        tallies.emplace_back(PassTally{.first_pass = part.first_pass(), .passes = part.passes()});
+    PassTally& tally = tallies.emplace_back();
+    tally.first_pass = part.first_pass();
+    tally.passes = part.passes();
     tally.tally.energy = FromProto(part.energy());
   }
   job.pass_record = PassRecord(std::move(tallies));

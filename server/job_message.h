@@ -12,6 +12,9 @@
 
 namespace lucerna {
 
+// A job's warnings go with every message about it.
+inline constexpr std::size_t kMostWarnings = 200;
+
 [[nodiscard]] v1::Job ToProto(const JobReport& report);
 
 // A record, as bytes. `running` is the time that the job has run.

@@ -17,8 +17,6 @@ namespace {
 constexpr std::size_t kMostSplitPasses = 2;
 // The error is near its target when its upper end is below so many times that.
 constexpr double kNearTarget = 1.5;
-// Checkpoints take a hundredth of the time.
-constexpr int kTimeBetweenSaves = 100;
 constexpr Duration kPauseBeforeRetry = std::chrono::seconds(1);
 
 }  // namespace
@@ -491,7 +489,9 @@ Status JobRunner::KeepCheckpoint() {
   LUCERNA_RETURN_IF_ERROR(hooks_.on_checkpoint(
       Save(), static_cast<std::int64_t>(estimator_->whole_passes()), estimator_->whole_tally()));
   const SteadyTime now = hooks_.clock.Steady();
-  save_at_ = now + kTimeBetweenSaves * (now - began_at);
+  // Decades at most, so that the sum fits.
+  const double pause_s = std::min(Seconds(now - began_at) * (1 / hooks_.checkpoint_share - 1), 1e9);
+  save_at_ = now + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(pause_s));
   saved_passes_ = estimator_->whole_passes();
   return absl::OkStatus();
 }

@@ -70,6 +70,8 @@ struct RunnerHooks {
   // second.
   std::function<Status(std::string sums, std::int64_t passes, const BatchTally& tally)>
       on_checkpoint;
+  // How much of the time checkpoints may take, in (0, 1]; 1: one after every round.
+  double checkpoint_share = 0.01;
   // The job pauses and why, or goes on (OK).
   std::function<void(const Status& why)> on_pause;
 };
@@ -133,7 +135,7 @@ class JobRunner final : public RunningJob {
   StatusOr<RenderResult> RunRounds();
   // All that a later run follows from: the whole rounds taken in.
   std::string Save() const;
-  // Hands a checkpoint on, at most kCheckpointShare of the time. Pauses while that fails.
+  // Hands a checkpoint on when enough time has passed since the last. Pauses while that fails.
   void CheckpointIfDue();
   Status KeepCheckpoint();
   // Before the process ends: rounds that have come, and a checkpoint.

@@ -148,6 +148,11 @@ int Main(int argc, char** argv) {
       "--state", flags.state,
       "folder that keeps jobs, images and checkpoints, so that a later start goes on with "
       "them; without it they end with the process");
+  app.add_option("--checkpoint-share", flags.coordinator.checkpoint_share,
+                 "share of a job's time that its checkpoints may take, above 0; 1: one after every "
+                 "round")
+      ->check(CLI::Range(1e-9, 1.0))
+      ->capture_default_str();
   app.add_option("--keep-jobs", flags.coordinator.retention.jobs,
                  "how many jobs that have ended are kept, the newest")
       ->check(CLI::Range(1, 1'000'000))

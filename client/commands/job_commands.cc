@@ -216,6 +216,14 @@ Status Cancel(const std::string& job_id, const std::string& server,
   return Acknowledge(connection->Cancel(job_id), output_options);
 }
 
+Status DeleteJob(const std::string& job_id, const std::string& server,
+                 const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  LUCERNA_RETURN_IF_ERROR(connection->Delete(job_id));
+  if (!output_options.quiet) Print(absl::StrCat("job ", job_id, " is deleted\n"));
+  return absl::OkStatus();
+}
+
 Status StopJob(const std::string& job_id, const std::string& server,
                const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));

@@ -57,6 +57,10 @@ struct ReportPaths {
 [[nodiscard]] Status Report(const std::string& job_id, const ReportPaths& paths,
                             const std::string& server, const OutputOptions& output_options);
 
+// Forgets a job that has ended.
+[[nodiscard]] Status DeleteJob(const std::string& job_id, const std::string& server,
+                               const OutputOptions& output_options);
+
 // Ends the job with the image as it is.
 [[nodiscard]] Status StopJob(const std::string& job_id, const std::string& server,
                              const OutputOptions& output_options);
