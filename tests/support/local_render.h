@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "render/base/status.h"
 #include "render/estimate/slice_tree.h"
@@ -28,6 +30,9 @@ class LocalRender {
     return estimator_->EstimateError(look);
   }
   [[nodiscard]] MissingLight FindMissingLight() const { return estimator_->FindMissingLight(); }
+  // A checkpoint of the whole rounds, and going on from one in a render without passes.
+  [[nodiscard]] std::string Save() const;
+  [[nodiscard]] Status Restore(std::string_view bytes);
   // Over all passes.
   [[nodiscard]] const BatchTally& tally() const { return tally_; }
 

@@ -23,7 +23,7 @@ StoredJob JobNumber(std::uint64_t serial, const std::string& record = "record") 
 }
 
 // Runs SQL on a database that nobody has open.
-void Run(const std::string& path, const std::string& sql) {
+void RunSql(const std::string& path, const std::string& sql) {
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
   EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
@@ -81,12 +81,12 @@ TEST(StateStoreTest, OneCoordinatorAtATime) {
 TEST(StateStoreTest, RefusesANewerVersionAndOtherPeoplesFiles) {
   const TemporaryFolder folder;
   ASSERT_TRUE(StateStore::Open(folder.At("db"), "i").ok());
-  Run(folder.At("db"), "PRAGMA user_version=2");
+  RunSql(folder.At("db"), "PRAGMA user_version=2");
   const auto newer = StateStore::Open(folder.At("db"), "i");
   EXPECT_TRUE(absl::IsFailedPrecondition(newer.status()));
   EXPECT_THAT(std::string(newer.status().message()), HasSubstr("newer version"));
 
-  Run(folder.At("foreign"), "CREATE TABLE t (x)");
+  RunSql(folder.At("foreign"), "CREATE TABLE t (x)");
   const auto foreign = StateStore::Open(folder.At("foreign"), "i");
   EXPECT_TRUE(absl::IsFailedPrecondition(foreign.status())) << foreign.status();
 
