@@ -21,7 +21,7 @@ struct ClusterOptions {
   int workers = 1;             // >= 1
   int threads = 0;             // of each worker; 0: the machine's, shared between the workers
   // Where the coordinator keeps its jobs, so that a later cluster can go on; empty: nowhere.
-  std::string state_folder;
+  std::string state_folder = {};
 };
 
 class LocalCluster {

@@ -49,8 +49,8 @@ class JobLife {
   struct Past {
     JobState state = JobState::kQueued;
     StopReason stop_reason = StopReason::kNone;
-    std::string failure;
-    SteadyTime submitted_at;
+    std::string failure = {};
+    SteadyTime submitted_at = {};
     Duration ran{};
   };
   explicit JobLife(Past past);

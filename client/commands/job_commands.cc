@@ -148,7 +148,13 @@ Status Render(const RenderRequest& request, const ClusterOptions& cluster_option
   const bool can_go_on = absl::IsInternal(job.status()) ||
                          ExitCodeOf(job.status()) == ExitCode::kUnreachable ||
                          (request.resumes && !job.ok());
-  if (!can_go_on) std::filesystem::remove_all(folder, ignored);
+  if (can_go_on) {
+    Status status = job.status();
+    if (!absl::IsInternal(status)) return status;
+    return absl::InternalError(
+        absl::StrCat(std::string(status.message()), "\nthe same command with --resume goes on"));
+  }
+  std::filesystem::remove_all(folder, ignored);
   return job.status();
 }
 

@@ -69,14 +69,4 @@ void BlobFiles::KeepOnly(const std::set<Digest>& needed) {
   }
 }
 
-std::uint64_t BlobFiles::SizeBytes() const {
-  std::uint64_t size_bytes = 0;
-  for (const auto& file : FilesIn(folder_)) {
-    std::error_code error;
-    const std::uintmax_t size = file.file_size(error);
-    if (!error) size_bytes += size;
-  }
-  return size_bytes;
-}
-
 }  // namespace lucerna

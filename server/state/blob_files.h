@@ -7,7 +7,6 @@
 // Threads: any.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <set>
 #include <string>
@@ -34,8 +33,6 @@ class BlobFiles {
 
   // Removes all blobs but these.
   void KeepOnly(const std::set<Digest>& needed);
-  // Of all blobs.
-  [[nodiscard]] std::uint64_t SizeBytes() const;
 
  private:
   explicit BlobFiles(std::string folder) : folder_(std::move(folder)) {}

@@ -144,13 +144,6 @@ bool CheckpointFiles::Has(const std::string& job_id) const {
          std::filesystem::exists(PathOf(job_id, 1), error);
 }
 
-void CheckpointFiles::Remove(const std::string& job_id) {
-  for (int slot = 0; slot < kSlots; ++slot)
-    ::unlink(PathOf(job_id, slot).c_str());
-  const MutexLock lock(mutex_);
-  newest_.erase(job_id);
-}
-
 void CheckpointFiles::KeepOnly(const std::set<std::string>& job_ids) {
   std::error_code error;
   std::vector<std::filesystem::path> dropped;

@@ -45,7 +45,6 @@ class CheckpointFiles {
   // Whether there is a file, damaged or not.
   [[nodiscard]] bool Has(const std::string& job_id) const;
 
-  void Remove(const std::string& job_id);
   // Removes those of all jobs but these.
   void KeepOnly(const std::set<std::string>& job_ids);
 

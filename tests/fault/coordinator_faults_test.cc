@@ -15,11 +15,13 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include <grpcpp/generic/generic_stub.h>
 #include <signal.h>
 #include <sys/mount.h>
 #include <unistd.h>
 
 #include "render/base/files.h"
+#include "render/wire/channel.h"
 #include "tests/fault/coordinator_process.h"
 #include "tests/support/temporary_folder.h"
 
@@ -170,7 +172,6 @@ class DamagedCheckpointTest : public testing::Test {
 };
 
 TEST_F(DamagedCheckpointTest, AFlippedBitInEitherOneFallsBackToTheOther) {
-  const std::string first = ReadFile(files_[0]).value();
   Flip(files_[0]);
   ExpectTheSameBitsAndAWord("is damaged");
 }
@@ -184,6 +185,58 @@ TEST_F(DamagedCheckpointTest, TruncatedOnesAreNotUsedAndTheJobBeginsAnew) {
   for (const std::string& file : files_)
     std::filesystem::resize_file(file, std::filesystem::file_size(file) * 9 / 10);
   ExpectTheSameBitsAndAWord("is damaged");
+}
+
+// A stream of gRPC's own health service; its messages are small enough to be read as bytes.
+class HealthWatch {
+ public:
+  explicit HealthWatch(const std::shared_ptr<grpc::Channel>& channel) : stub_(channel) {
+    context_.set_deadline(DeadlineIn(kPatience));
+    call_ = stub_.PrepareCall(&context_, "/grpc.health.v1.Health/Watch", &queue_);
+    call_->StartCall(nullptr);
+    EXPECT_TRUE(Wait());
+    const grpc::Slice empty;
+    call_->WriteLast(grpc::ByteBuffer(&empty, 1), grpc::WriteOptions(), nullptr);
+    EXPECT_TRUE(Wait());
+  }
+  ~HealthWatch() {
+    context_.TryCancel();
+    grpc::Status status;
+    call_->Finish(&status, nullptr);
+    Wait();
+  }
+  HealthWatch(const HealthWatch&) = delete;
+  HealthWatch& operator=(const HealthWatch&) = delete;
+
+  // HealthCheckResponse{status}, or nothing when the stream has ended.
+  std::string Next() {
+    grpc::ByteBuffer answer;
+    call_->Read(&answer, nullptr);
+    grpc::Slice whole;
+    if (!Wait() || !answer.DumpToSingleSlice(&whole).ok()) return "";
+    return {reinterpret_cast<const char*>(whole.begin()), whole.size()};
+  }
+
+ private:
+  bool Wait() {
+    void* tag = nullptr;
+    bool ok = false;
+    return queue_.Next(&tag, &ok) && ok;
+  }
+
+  grpc::GenericStub stub_;
+  grpc::ClientContext context_;
+  grpc::CompletionQueue queue_;
+  std::unique_ptr<grpc::GenericClientAsyncReaderWriter> call_;
+};
+
+TEST(TerminatedCoordinatorTest, SaysThatItServesNoMore) {
+  CoordinatorProcess coordinator;
+  HealthWatch health(coordinator.channel());
+  EXPECT_EQ(health.Next(), "\x08\x01") << "SERVING";
+  coordinator.process().Signal(SIGTERM);
+  EXPECT_EQ(health.Next(), "\x08\x02") << "NOT_SERVING";
+  EXPECT_EQ(coordinator.process().WaitForExit(kPatience), 0);
 }
 
 TEST(TerminatedCoordinatorTest, KeepsACheckpointAndLeavesWellAndTheNextOneGoesOnFromThere) {

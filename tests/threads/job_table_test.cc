@@ -337,7 +337,9 @@ TEST(JobTableTest, OldJobsAreDroppedFromTheJournalTooAndLaterWhenItIsFull) {
     const std::string job = Added(table, request);
     journal.is_full = std::string(request) == "c";
     EXPECT_TRUE(table.Cancel(job, At(1)).ok() || journal.is_full);
-    if (std::string(request) == "b") EXPECT_EQ(journal.rows.size(), 1U);
+    if (std::string(request) == "b") {
+      EXPECT_EQ(journal.rows.size(), 1U);
+    }
   }
   EXPECT_EQ(journal.rows.size(), 2U);
   journal.is_full = false;
