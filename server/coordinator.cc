@@ -107,8 +107,8 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
   StatusOr<JobTable::Submitted> submitted;
   {
     const MutexLock lock(files_mutex_);
-    LUCERNA_RETURN_IF_ERROR(KeepFiles(submission));
-    submitted = jobs_.Add(std::move(job), clock_.Wall(), Now());
+    const Status kept = KeepFiles(submission);
+    submitted = kept.ok() ? jobs_.Add(std::move(job), clock_.Wall(), Now()) : kept;
   }
   if (!submitted.ok()) {
     // Its files may have taken the last room.
@@ -128,7 +128,7 @@ Status Coordinator::KeepFiles(const Submission& submission) {
   for (const Digest& digest : digests) {
     LUCERNA_ASSIGN_OR_RETURN(const Blob blob, blobs_.Get(digest));
     if (const Status kept = state_->blobs().Put(digest, *blob); !kept.ok()) {
-      return SubmissionRefusal(state_->folder(), kept);
+      return state_->Refusal(kept);
     }
   }
   return absl::OkStatus();
@@ -280,10 +280,12 @@ Status Coordinator::KeepCheckpoint(const std::string& job_id, std::string sums, 
   run->job.counters.photons = tally.photons;
   run->job.counters.tally = tally;
   run->job.counters.coordinator_cpu = run->cpu;
+  const std::size_t size = sums.size();
   LUCERNA_RETURN_IF_ERROR(state_->checkpoints().Write(
       job_id, {options_.numeric_profile, EncodeRecord(run->job, std::nullopt, run->running),
                std::move(sums)}));
   jobs_.OnCheckpoint(job_id);
+  spdlog::debug("job {}: a checkpoint of {} bytes after {} passes", job_id, size, passes);
   return absl::OkStatus();
 }
 
@@ -303,7 +305,7 @@ Status Coordinator::EndWell(const std::string& job_id, StopReason reason, const 
         return absl::CancelledError("the job has ended");
       }
     }
-    const std::string condition = PauseCondition(state_->folder(), kept);
+    const std::string condition = state_->PauseCondition(kept);
     spdlog::warn("job {} {}", job_id, condition);
     jobs_.SetCondition(job_id, condition, Now());
     for (int i = 0; i < kPausesBeforeRetry; ++i) {
@@ -356,7 +358,7 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
           .checkpoint_share = options_.checkpoint_share,
           .on_pause =
               [this, id](const Status& why) {
-                const std::string condition = why.ok() ? "" : PauseCondition(state_->folder(), why);
+                const std::string condition = why.ok() ? "" : state_->PauseCondition(why);
                 spdlog::warn("job {} {}", id, why.ok() ? "goes on" : condition);
                 jobs_.SetCondition(id, condition, Now());
               },

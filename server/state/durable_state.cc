@@ -94,28 +94,29 @@ Status DurableState::Save(const JournalEntry& entry, Duration running) {
   row.state = NameOf(entry.job.life.state());
   const std::string record = EncodeRecord(entry.job, entry.image_digest, running);
   row.record = absl::StrCat(std::string(DigestOf(row, record).Bytes()), record);
-  return store_->Save(row);
+  const Status saved = store_->Save(row);
+  return saved.ok() ? saved : Refusal(saved);
 }
 
 Status DurableState::Remove(std::uint64_t serial) {
   return store_->Remove(serial);
 }
 
-std::string PauseCondition(const std::string& folder, const Status& why) {
+std::string DurableState::PauseCondition(const Status& why) const {
   if (absl::IsResourceExhausted(why)) {
-    return absl::StrCat("paused: no room in ", folder, "; it goes on when there is");
+    return absl::StrCat("paused: no room in ", folder_, "; it goes on when there is");
   }
-  return absl::StrCat("paused: ", folder, " cannot be written (", std::string(why.message()),
+  return absl::StrCat("paused: ", folder_, " cannot be written (", std::string(why.message()),
                       "); it goes on when it can");
 }
 
-Status SubmissionRefusal(const std::string& folder, const Status& why) {
+Status DurableState::Refusal(const Status& why) const {
   if (absl::IsResourceExhausted(why)) {
     return absl::ResourceExhaustedError(
-        absl::StrCat("the coordinator takes no job now: there is no room in ", folder,
+        absl::StrCat("the coordinator takes no job now: there is no room in ", folder_,
                      "; make room there, or delete jobs that are not needed, and submit again"));
   }
-  return absl::FailedPreconditionError(absl::StrCat("the coordinator takes no job now: ", folder,
+  return absl::FailedPreconditionError(absl::StrCat("the coordinator takes no job now: ", folder_,
                                                     " cannot be written (",
                                                     std::string(why.message()), ")"));
 }

@@ -46,8 +46,14 @@ class DurableState final : public JobJournal {
   // A sentence for each job whose row cannot be read; such rows stay as they are.
   [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
 
+  // Errors: Refusal of what StateStore says.
   [[nodiscard]] Status Save(const JournalEntry& entry, Duration running) override;
   [[nodiscard]] Status Remove(std::uint64_t serial) override;
+
+  // When `why` keeps bytes from the disk: what a running job shows ("paused: no room in DIR; ..."),
+  // and what a new job is refused with.
+  [[nodiscard]] std::string PauseCondition(const Status& why) const;
+  [[nodiscard]] Status Refusal(const Status& why) const;
 
  private:
   explicit DurableState(std::string folder) : folder_(std::move(folder)) {}
@@ -61,10 +67,5 @@ class DurableState final : public JobJournal {
   std::uint64_t next_serial_ = 1;
   std::vector<std::string> problems_;
 };
-
-// Why a job cannot go on when `why` kept its bytes from the disk: "paused: no room in DIR; ...".
-[[nodiscard]] std::string PauseCondition(const std::string& folder, const Status& why);
-// `why` as what a submission is refused with.
-[[nodiscard]] Status SubmissionRefusal(const std::string& folder, const Status& why);
 
 }  // namespace lucerna

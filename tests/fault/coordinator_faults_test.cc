@@ -4,11 +4,10 @@
 //
 // Real processes on loopback. A coordinator kills itself at a named step
 // (render/base/fail_point.h).
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -40,23 +39,30 @@ std::vector<std::string> KeptIn(const std::string& folder) {
   return {"--state", folder, "--checkpoint-share", "1"};
 }
 
-Digest QuietDigest() {
-  static const Digest digest = [] {
+// Several seconds, for tests that change something while a job runs.
+const SmallJob kLongJob = {.passes = 48, .photons = 150'000};
+
+Digest QuietDigest(const SmallJob& small_job) {
+  static std::map<int, Digest> digests;  // by passes
+  const auto [found, is_new] = digests.try_emplace(small_job.passes);
+  if (is_new) {
     CoordinatorProcess coordinator;
     const auto worker = coordinator.StartWorker();
-    const std::string job = coordinator.TrySubmit(kJob).value();
+    const std::string job = coordinator.TrySubmit(small_job).value();
     EXPECT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
-    return coordinator.ImageDigest(job);
-  }();
-  return digest;
+    found->second = coordinator.ImageDigest(job);
+  }
+  return found->second;
 }
 
 // A job that ended as the quiet one did, each photon counted once.
-void ExpectQuietEnd(CoordinatorProcess& coordinator, const v1::Job& job) {
+void ExpectQuietEnd(CoordinatorProcess& coordinator, const v1::Job& job,
+                    const SmallJob& small_job = kJob) {
   ASSERT_EQ(job.state(), v1::JOB_STATE_SUCCEEDED) << job.failure();
-  EXPECT_EQ(job.progress().passes(), kJob.passes);
-  EXPECT_EQ(job.progress().photons(), static_cast<std::uint64_t>(kJob.passes * kJob.photons));
-  EXPECT_EQ(coordinator.ImageDigest(job.job_id()).Hex(), QuietDigest().Hex());
+  EXPECT_EQ(job.progress().passes(), small_job.passes);
+  EXPECT_EQ(job.progress().photons(),
+            static_cast<std::uint64_t>(small_job.passes * small_job.photons));
+  EXPECT_EQ(coordinator.ImageDigest(job.job_id()).Hex(), QuietDigest(small_job).Hex());
 }
 
 // Waits until the job has merged so many passes.
@@ -246,7 +252,7 @@ TEST(TerminatedCoordinatorTest, KeepsACheckpointAndLeavesWellAndTheNextOneGoesOn
   const std::vector<std::string> flags = {"--state", folder.path(), "--checkpoint-share", "1e-9"};
   auto coordinator = std::make_unique<CoordinatorProcess>(flags, address);
   const auto worker = coordinator->StartWorker();
-  const std::string job = coordinator->TrySubmit(kJob).value();
+  const std::string job = coordinator->TrySubmit(kLongJob).value();
   WaitForPasses(*coordinator, job, 6);
   coordinator->process().Signal(SIGTERM);
   EXPECT_EQ(coordinator->process().WaitForExit(kPatience), 0) << coordinator->process().Errors();
@@ -255,7 +261,7 @@ TEST(TerminatedCoordinatorTest, KeepsACheckpointAndLeavesWellAndTheNextOneGoesOn
   ASSERT_TRUE(coordinator->process().WaitForText("goes on from its checkpoint", kPatience));
   EXPECT_THAT(coordinator->process().Errors(),
               testing::Not(HasSubstr("from its checkpoint after 1 passes")));
-  ExpectQuietEnd(*coordinator, coordinator->Wait(job));
+  ExpectQuietEnd(*coordinator, coordinator->Wait(job), kLongJob);
 }
 
 // Who waits for a job need not know that the coordinator was away for ten seconds.
@@ -264,7 +270,7 @@ TEST(RestartedCoordinatorTest, WorkersAndWatchersComeBackByThemselves) {
   const std::string address = FreeAddress();
   auto coordinator = std::make_unique<CoordinatorProcess>(KeptIn(folder.path()), address);
   const auto worker = coordinator->StartWorker();
-  const std::string job = coordinator->TrySubmit(kJob).value();
+  const std::string job = coordinator->TrySubmit(kLongJob).value();
   ChildProcess client({kBin + "/lucerna", "watch", job, "--server", address});
   WaitForPasses(*coordinator, job, 4);
   coordinator->process().Signal(SIGKILL);
@@ -273,7 +279,7 @@ TEST(RestartedCoordinatorTest, WorkersAndWatchersComeBackByThemselves) {
   coordinator = std::make_unique<CoordinatorProcess>(KeptIn(folder.path()), address);
   EXPECT_EQ(client.WaitForExit(5 * kPatience), 0) << client.Errors();
   EXPECT_THAT(client.Output(), HasSubstr("all passes done"));
-  ExpectQuietEnd(*coordinator, coordinator->Get(job));
+  ExpectQuietEnd(*coordinator, coordinator->Get(job), kLongJob);
 }
 
 TEST(RestartedCoordinatorTest, JobsThatWaitKeepTheirOrderAndEndedOnesTheirImages) {
@@ -298,7 +304,7 @@ TEST(RestartedCoordinatorTest, JobsThatWaitKeepTheirOrderAndEndedOnesTheirImages
   const v1::Job after = coordinator->Get(jobs[0]);
   EXPECT_EQ(after.state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(after.SerializeAsString(), before.SerializeAsString()) << "nothing of it is lost";
-  EXPECT_EQ(coordinator->ImageDigest(jobs[0]).Hex(), QuietDigest().Hex());
+  EXPECT_EQ(coordinator->ImageDigest(jobs[0]).Hex(), QuietDigest(kJob).Hex());
   const auto worker = coordinator->StartWorker();
   for (std::size_t i = 1; i < jobs.size(); ++i) {
     const v1::Job ended = coordinator->Wait(jobs[i]);
@@ -347,7 +353,7 @@ TEST(FullDiskTest, TheJobPausesAndSaysSoAndGoesOnWhenThereIsRoom) {
   if (!disk.is_mounted()) GTEST_SKIP() << "only root may mount a small disk";
   CoordinatorProcess coordinator(KeptIn(disk.state()));
   const auto worker = coordinator.StartWorker();
-  const std::string job = coordinator.TrySubmit(kJob).value();
+  const std::string job = coordinator.TrySubmit(kLongJob).value();
   WaitForPasses(coordinator, job, 3);
   disk.Fill();
   for (int i = 0; i < 6000 && coordinator.Get(job).condition().empty(); ++i)
@@ -357,7 +363,7 @@ TEST(FullDiskTest, TheJobPausesAndSaysSoAndGoesOnWhenThereIsRoom) {
             "paused: no room in " + disk.state() + "; it goes on when there is");
   EXPECT_EQ(paused.state(), v1::JOB_STATE_RUNNING);
 
-  SmallJob other = kJob;
+  SmallJob other = kLongJob;
   other.request_id = "other";
   const auto refused = coordinator.TrySubmit(other);
   EXPECT_TRUE(absl::IsResourceExhausted(refused.status())) << refused.status();
@@ -365,7 +371,7 @@ TEST(FullDiskTest, TheJobPausesAndSaysSoAndGoesOnWhenThereIsRoom) {
 
   disk.MakeRoom();
   const v1::Job ended = coordinator.Wait(job);
-  ExpectQuietEnd(coordinator, ended);
+  ExpectQuietEnd(coordinator, ended, kLongJob);
   EXPECT_EQ(ended.condition(), "");
   EXPECT_THAT(ended.DebugString(), HasSubstr("paused: no room in"));
   EXPECT_EQ(coordinator.List().size(), 1U);
@@ -378,14 +384,14 @@ TEST(FullDiskTest, AnImageThatDoesNotFitIsKeptWhenThereIsRoom) {
   // One checkpoint, at the beginning, so that the image is the first that finds no room.
   CoordinatorProcess coordinator({"--state", disk.state(), "--checkpoint-share", "1e-9"});
   const auto worker = coordinator.StartWorker();
-  const std::string job = coordinator.TrySubmit(kJob).value();
+  const std::string job = coordinator.TrySubmit(kLongJob).value();
   WaitForPasses(coordinator, job, 3);
   disk.Fill();
   for (int i = 0; i < 6000 && coordinator.Get(job).condition().empty(); ++i)
     std::this_thread::sleep_for(milliseconds(10));
   EXPECT_THAT(coordinator.Get(job).condition(), HasSubstr("no room in"));
   disk.MakeRoom();
-  ExpectQuietEnd(coordinator, coordinator.Wait(job));
+  ExpectQuietEnd(coordinator, coordinator.Wait(job), kLongJob);
 }
 
 TEST(FullDiskTest, AReadOnlyDiskPausesTheJobToo) {
@@ -393,7 +399,7 @@ TEST(FullDiskTest, AReadOnlyDiskPausesTheJobToo) {
   if (!disk.is_mounted()) GTEST_SKIP() << "only root may mount a small disk";
   CoordinatorProcess coordinator(KeptIn(disk.state()));
   const auto worker = coordinator.StartWorker();
-  const std::string job = coordinator.TrySubmit(kJob).value();
+  const std::string job = coordinator.TrySubmit(kLongJob).value();
   WaitForPasses(coordinator, job, 3);
   const std::string checkpoints = disk.state() + "/checkpoints";
   ASSERT_EQ(::mount(checkpoints.c_str(), checkpoints.c_str(), nullptr, MS_BIND, nullptr), 0);
@@ -403,7 +409,7 @@ TEST(FullDiskTest, AReadOnlyDiskPausesTheJobToo) {
     std::this_thread::sleep_for(milliseconds(10));
   EXPECT_THAT(coordinator.Get(job).condition(), HasSubstr("cannot be written"));
   ASSERT_EQ(::umount2(checkpoints.c_str(), MNT_DETACH), 0);
-  ExpectQuietEnd(coordinator, coordinator.Wait(job));
+  ExpectQuietEnd(coordinator, coordinator.Wait(job), kLongJob);
 }
 
 }  // namespace

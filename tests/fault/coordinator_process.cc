@@ -56,7 +56,7 @@ CoordinatorProcess::CoordinatorProcess(std::vector<std::string> flags, const std
 std::unique_ptr<CoordinatorProcess> CoordinatorProcess::Doomed(const std::string& fail_point,
                                                                std::vector<std::string> flags,
                                                                const std::string& address) {
-  auto coordinator = std::unique_ptr<CoordinatorProcess>(new CoordinatorProcess());
+  auto coordinator = std::unique_ptr<CoordinatorProcess>(new CoordinatorProcess(NotStarted()));
   coordinator->Start({"/usr/bin/env", "LUCERNA_FAIL_POINT=" + fail_point}, std::move(flags),
                      address);
   coordinator->address_ = address;

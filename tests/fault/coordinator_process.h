@@ -65,7 +65,8 @@ class CoordinatorProcess {
   Digest ImageDigest(const std::string& job_id);
 
  private:
-  CoordinatorProcess() = default;
+  enum class NotStarted {};
+  explicit CoordinatorProcess(NotStarted /*tag*/) {}
   void Start(std::vector<std::string> command, std::vector<std::string> flags,
              const std::string& address);
 
