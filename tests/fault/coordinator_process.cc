@@ -43,7 +43,7 @@ void CoordinatorProcess::Start(std::vector<std::string> command, std::vector<std
 
 CoordinatorProcess::CoordinatorProcess(std::vector<std::string> flags, const std::string& address) {
   Start({}, std::move(flags), address);
-  EXPECT_TRUE(process_->WaitForText("\n", kPatience));
+  EXPECT_TRUE(process_->WaitForText("listening on ", kPatience));
   const std::string line = process_->Output();
   const std::string begin = "listening on ";
   EXPECT_EQ(line.rfind(begin, 0), 0U) << line << process_->Errors();

@@ -22,8 +22,10 @@ Job FullJob() {
   job.manifest.main_path = "scene.pbrt";
   job.manifest.entries["scene.pbrt"] = {Sha256("scene"), 5};
   job.scene_digest = job.manifest.SceneDigest();
-  job.settings.width = job.settings.height = job.settings.crop_x1 = job.settings.crop_y1 = 8;
-  job.settings.alpha = 0.1 + 0.2;
+  RenderOverrides overrides;
+  overrides.width = overrides.height = 8;
+  overrides.alpha = 0.1 + 0.2;
+  job.settings = ResolveSettings(overrides, Scene()).value();
   job.warnings = {"scene.pbrt:1:2: a warning"};
   job.needs = SceneNeeds(5, 3, {});
   for (const Part part : AllParts())
@@ -104,6 +106,7 @@ TEST(JobMessageTest, ARecordHoldsAllThatClientsSee) {
   EXPECT_EQ(read->job.reference, job.reference);
   EXPECT_EQ(read->job.life.submitted_at(), job.life.submitted_at());
   EXPECT_EQ(read->job.life.state(), JobState::kSucceeded);
+  EXPECT_EQ(read->job.life.failure(), "");
   EXPECT_EQ(read->job.life.Running(kNow.now + std::chrono::hours(1)), running)
       << "time stands still when a job has ended";
 }
@@ -115,7 +118,7 @@ TEST(JobMessageTest, AJobThatHasNotEndedWaitsAgain) {
   ASSERT_TRUE(job.life.Run(kNow.now));
   const auto read = DecodeRecord(EncodeRecord(job, std::nullopt, std::chrono::seconds(3)), kNow);
   ASSERT_TRUE(read.ok()) << read.status();
-  EXPECT_EQ(read->job.life.state(), JobState::kQueued);
+  EXPECT_EQ(read->job.life.state(), JobState::kQueued) << read->job.life.failure();
   EXPECT_EQ(read->job.life.Running(kNow.now), std::chrono::seconds(3));
   EXPECT_FALSE(read->image);
 }
