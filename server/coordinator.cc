@@ -281,11 +281,13 @@ Status Coordinator::KeepCheckpoint(const std::string& job_id, std::string sums, 
   run->job.counters.tally = tally;
   run->job.counters.coordinator_cpu = run->cpu;
   const std::size_t size = sums.size();
+  const SteadyTime began_at = clock_.Steady();
   LUCERNA_RETURN_IF_ERROR(state_->checkpoints().Write(
       job_id, {options_.numeric_profile, EncodeRecord(run->job, std::nullopt, run->running),
                std::move(sums)}));
   jobs_.OnCheckpoint(job_id);
-  spdlog::debug("job {}: a checkpoint of {} bytes after {} passes", job_id, size, passes);
+  spdlog::debug("job {}: a checkpoint of {} bytes after {} passes was written in {:.3f} s", job_id,
+                size, passes, Seconds(clock_.Steady() - began_at));
   return absl::OkStatus();
 }
 

@@ -18,6 +18,15 @@ constexpr std::size_t kMostSplitPasses = 2;
 // The error is near its target when its upper end is below so many times that.
 constexpr double kNearTarget = 1.5;
 constexpr Duration kPauseBeforeRetry = std::chrono::seconds(1);
+// How long the first checkpoint is expected to take: a job of a few seconds needs none.
+constexpr Duration kFirstSave = std::chrono::milliseconds(100);
+
+// How long to wait after a checkpoint that took `time`, for `share` of the time. Decades at most,
+// so that sums fit.
+Duration PauseAfterSave(Duration time, double share) {
+  const double pause_s = std::min(Seconds(time) * (1 / share - 1), 1e9);
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(pause_s));
+}
 
 }  // namespace
 
@@ -80,7 +89,9 @@ StatusOr<RenderResult> JobRunner::RunToEnd() {
   next_split_ = next_round_;
   reported_passes_ = next_round_;
   saved_passes_ = next_round_;
-  run_began_at_ = hooks_.clock.Steady() - ran_before_;
+  const SteadyTime now = hooks_.clock.Steady();
+  run_began_at_ = now - ran_before_;
+  save_at_ = now + PauseAfterSave(kFirstSave, hooks_.checkpoint_share);
   StatusOr<RenderResult> result = RunRounds();
   // The process ends, and a later one may go on.
   if (absl::IsUnavailable(result.status())) KeepWholeRounds();
@@ -489,9 +500,7 @@ Status JobRunner::KeepCheckpoint() {
   LUCERNA_RETURN_IF_ERROR(hooks_.on_checkpoint(
       Save(), static_cast<std::int64_t>(estimator_->whole_passes()), estimator_->whole_tally()));
   const SteadyTime now = hooks_.clock.Steady();
-  // Decades at most, so that the sum fits.
-  const double pause_s = std::min(Seconds(now - began_at) * (1 / hooks_.checkpoint_share - 1), 1e9);
-  save_at_ = now + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(pause_s));
+  save_at_ = now + PauseAfterSave(now - began_at, hooks_.checkpoint_share);
   saved_passes_ = estimator_->whole_passes();
   return absl::OkStatus();
 }

@@ -248,7 +248,7 @@ TEST(TerminatedCoordinatorTest, SaysThatItServesNoMore) {
 TEST(TerminatedCoordinatorTest, KeepsACheckpointAndLeavesWellAndTheNextOneGoesOnFromThere) {
   const TemporaryFolder folder;
   const std::string address = FreeAddress();
-  // After the first one no checkpoint but that at the end.
+  // No checkpoint but that at the end.
   const std::vector<std::string> flags = {"--state", folder.path(), "--checkpoint-share", "1e-9"};
   auto coordinator = std::make_unique<CoordinatorProcess>(flags, address);
   const auto worker = coordinator->StartWorker();
@@ -259,8 +259,6 @@ TEST(TerminatedCoordinatorTest, KeepsACheckpointAndLeavesWellAndTheNextOneGoesOn
   EXPECT_THAT(coordinator->process().Errors(), HasSubstr("goes on when"));
   coordinator = std::make_unique<CoordinatorProcess>(flags, address);
   ASSERT_TRUE(coordinator->process().WaitForText("goes on from its checkpoint", kPatience));
-  EXPECT_THAT(coordinator->process().Errors(),
-              testing::Not(HasSubstr("from its checkpoint after 1 passes")));
   ExpectQuietEnd(*coordinator, coordinator->Wait(job), kLongJob);
 }
 
@@ -381,7 +379,7 @@ TEST(FullDiskTest, TheJobPausesAndSaysSoAndGoesOnWhenThereIsRoom) {
 TEST(FullDiskTest, AnImageThatDoesNotFitIsKeptWhenThereIsRoom) {
   const SmallDisk disk;
   if (!disk.is_mounted()) GTEST_SKIP() << "only root may mount a small disk";
-  // One checkpoint, at the beginning, so that the image is the first that finds no room.
+  // No checkpoint, so that the image is the first that finds no room.
   CoordinatorProcess coordinator({"--state", disk.state(), "--checkpoint-share", "1e-9"});
   const auto worker = coordinator.StartWorker();
   const std::string job = coordinator.TrySubmit(kLongJob).value();
