@@ -360,6 +360,7 @@ TEST(FullDiskTest, TheJobPausesAndSaysSoAndGoesOnWhenThereIsRoom) {
   EXPECT_EQ(paused.condition(),
             "paused: no room in " + disk.state() + "; it goes on when there is");
   EXPECT_EQ(paused.state(), v1::JOB_STATE_RUNNING);
+  EXPECT_LT(paused.progress().passes(), kLongJob.passes) << "no more than a crash may lose";
 
   SmallJob other = kLongJob;
   other.request_id = "other";
