@@ -246,6 +246,22 @@ StatusOr<v1::Job> ClientConnection::Stop(const std::string& job_id) {
   return job;
 }
 
+Status ClientConnection::Delete(const std::string& job_id) {
+  v1::DeleteJobRequest request;
+  request.set_job_id(job_id);
+  bool is_first = true;
+  const Status status = Retry(kCallTime, [&](grpc::ClientContext& context) {
+    v1::DeleteJobResponse response;
+    const grpc::Status deleted = jobs_->Delete(&context, request, &response);
+    // An attempt whose answer was lost may have done it.
+    if (!std::exchange(is_first, false) && deleted.error_code() == grpc::StatusCode::NOT_FOUND) {
+      return grpc::Status::OK;
+    }
+    return deleted;
+  });
+  return status;
+}
+
 StatusOr<v1::Job> ClientConnection::Extend(const std::string& job_id,
                                            const RenderOverrides& until) {
   v1::ExtendJobRequest request;

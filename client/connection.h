@@ -42,6 +42,7 @@ class ClientConnection {
   [[nodiscard]] StatusOr<std::vector<v1::Job>> List();
   [[nodiscard]] StatusOr<v1::Job> Get(const std::string& job_id);
   [[nodiscard]] StatusOr<v1::Job> Cancel(const std::string& job_id);
+  [[nodiscard]] Status Delete(const std::string& job_id);
   [[nodiscard]] StatusOr<v1::Job> Stop(const std::string& job_id);
   // Only the stop criteria of `until` may be set.
   [[nodiscard]] StatusOr<v1::Job> Extend(const std::string& job_id, const RenderOverrides& until);

@@ -30,6 +30,10 @@ bool IsInterrupted() {
   return interrupted;
 }
 
+void ClearInterruption() {
+  interrupted = false;
+}
+
 void SleepUnlessInterrupted(std::chrono::milliseconds duration) {
   constexpr std::chrono::milliseconds kSlice{20};
   while (duration.count() > 0 && !IsInterrupted()) {

@@ -14,6 +14,10 @@ void CatchInterruptions();
 
 [[nodiscard]] bool IsInterrupted();
 
+// The interruption is answered; what follows, to save what there is, goes on undisturbed. Another
+// signal ends the process at once.
+void ClearInterruption();
+
 // Waits, and stops waiting when interrupted.
 void SleepUnlessInterrupted(std::chrono::milliseconds duration);
 

@@ -16,6 +16,7 @@
 #include "render/base/clock.h"
 #include "render/base/files.h"
 #include "render/image/exr_file.h"
+#include "render/scene/setting_table.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {
@@ -28,6 +29,25 @@ std::string NewRequestId(const SceneManifest& manifest) {
   const Digest digest = Sha256(absl::StrCat(manifest.SceneDigest().Hex(), host, "/", ::getpid(),
                                             "/", SystemClock().Wall().time_since_epoch().count()));
   return digest.Hex();
+}
+
+// Whether a job is of this scene, and of all settings that are given and decide its pixels.
+Status CheckSameRender(const v1::Job& job, const RenderSettings& settings,
+                       const SceneManifest& manifest, const RenderOverrides& overrides) {
+  constexpr const char* kAnew = "; leave --resume away to render it anew";
+  if (job.scene_digest() != manifest.SceneDigest().Bytes()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("the scene is not the one whose render was interrupted", kAnew));
+  }
+  for (const Setting& setting : AllSettings()) {
+    if (setting.role == SettingRole::kStopsJob || !IsGiven(setting, overrides)) continue;
+    RenderSettings given = settings;
+    ResolveSetting(setting, overrides, nullptr, given);
+    if (given == settings) continue;
+    return absl::FailedPreconditionError(absl::StrCat(
+        "the render that was interrupted has another value of ", NameInMessage(setting), kAnew));
+  }
+  return absl::OkStatus();
 }
 
 // Shows a job as it moves on: redrawn in place on a terminal, else as plain lines, on stderr.
@@ -128,6 +148,7 @@ StatusOr<Image> DecodeImageOf(const std::string& job_id, const std::string& byte
 
 StatusOr<std::unique_ptr<LocalRuns>> LocalRuns::Start(const ClusterOptions& options) {
   auto runs = std::unique_ptr<LocalRuns>(new LocalRuns());
+  runs->has_state_ = !options.state_folder.empty();
   LUCERNA_ASSIGN_OR_RETURN(runs->cluster_, LocalCluster::Start(options));
   LUCERNA_ASSIGN_OR_RETURN(runs->connection_, ClientConnection::Open(runs->cluster_->address()));
   return runs;
@@ -139,18 +160,42 @@ StatusOr<v1::Job> LocalRuns::Run(SceneFiles& files, const SceneManifest& manifes
                                  const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
                            SendJob(*connection_, files, manifest, overrides, reference_path));
-  auto job = FollowToEnd(*connection_, submitted.job_id(), true, output_options,
+  job_id_ = submitted.job_id();
+  return FollowOwn(output_options);
+}
+
+StatusOr<v1::Job> LocalRuns::FollowOwn(const OutputOptions& output_options) {
+  auto job = FollowToEnd(*connection_, job_id_, true, output_options,
                          [this] { return cluster_->Check(); });
   if (!job.ok()) {
     // The coordinator ends with us; cancelling first lets the workers leave at once. Whether it
     // still hears that makes no difference to the user.
-    if (ExitCodeOf(job.status()) == ExitCode::kInterrupted) {
-      connection_->Cancel(submitted.job_id()).IgnoreError();
+    if (ExitCodeOf(job.status()) == ExitCode::kInterrupted && !has_state_) {
+      connection_->Cancel(job_id_).IgnoreError();
     }
     return job;
   }
   LUCERNA_RETURN_IF_ERROR(CheckSucceeded(*job));
   return job;
+}
+
+StatusOr<v1::Job> LocalRuns::Resume(const SceneManifest& manifest, const RenderOverrides& overrides,
+                                    const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, connection_->List());
+  if (jobs.empty()) return absl::FailedPreconditionError("there is no render to go on with");
+  const v1::Job& job = jobs.front();
+  const RenderSettings settings = SettingsOf(job);
+  LUCERNA_RETURN_IF_ERROR(CheckSameRender(job, settings, manifest, overrides));
+  job_id_ = job.job_id();
+  RenderOverrides until;
+  bool has_end = false;
+  for (const Setting& setting : AllSettings()) {
+    if (setting.role != SettingRole::kStopsJob || !IsGiven(setting, overrides)) continue;
+    LUCERNA_RETURN_IF_ERROR(ParseSetting(setting, *SettingText(setting, overrides), until));
+    has_end = true;
+  }
+  if (has_end) LUCERNA_RETURN_IF_ERROR(connection_->Extend(job_id_, until).status());
+  return FollowOwn(output_options);
 }
 
 StatusOr<v1::Job> LocalRuns::Run(const std::string& scene_path, const SceneManifest& manifest,

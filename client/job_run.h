@@ -45,7 +45,8 @@ class LocalRuns {
   // To be called by a thread that lives as long as the runs (LocalCluster::Start).
   [[nodiscard]] static StatusOr<std::unique_ptr<LocalRuns>> Start(const ClusterOptions& options);
 
-  // Renders to the end; an interruption cancels the job. Returns a job that succeeded.
+  // Renders to the end. An interruption cancels the job, unless the cluster has a state, in which
+  // it stays. Returns a job that succeeded.
   [[nodiscard]] StatusOr<v1::Job> Run(SceneFiles& files, const SceneManifest& manifest,
                                       const RenderOverrides& overrides,
                                       const std::string& reference_path,
@@ -55,14 +56,25 @@ class LocalRuns {
                                       const RenderOverrides& overrides,
                                       const std::string& reference_path,
                                       const OutputOptions& output_options);
+  // Goes on, to the end that `overrides` give if they give one, with the job that is in the
+  // cluster's state. Errors: also FAILED_PRECONDITION when there is none, or its scene or settings
+  // are others.
+  [[nodiscard]] StatusOr<v1::Job> Resume(const SceneManifest& manifest,
+                                         const RenderOverrides& overrides,
+                                         const OutputOptions& output_options);
   // The image of a job that succeeded.
   [[nodiscard]] StatusOr<Image> ImageOf(const v1::Job& job);
+  // Of the job that was run last; empty before.
+  [[nodiscard]] const std::string& job_id() const { return job_id_; }
 
   [[nodiscard]] ClientConnection& connection() { return *connection_; }
 
  private:
   LocalRuns() = default;
+  StatusOr<v1::Job> FollowOwn(const OutputOptions& output_options);
 
+  bool has_state_ = false;
+  std::string job_id_;
   std::unique_ptr<LocalCluster> cluster_;
   std::unique_ptr<ClientConnection> connection_;
 };

@@ -27,6 +27,7 @@ namespace {
 
 constexpr Duration kStartTime = std::chrono::seconds(20);
 constexpr Duration kTimeToLeave = std::chrono::seconds(3);
+constexpr Duration kTimeToKeep = std::chrono::minutes(1);
 constexpr std::chrono::milliseconds kPollEvery{10};
 constexpr std::size_t kKeptLines = 10;
 constexpr std::size_t kMaxLineBytes = 1000;
@@ -209,9 +210,14 @@ LocalCluster::~LocalCluster() {
 StatusOr<std::unique_ptr<LocalCluster>> LocalCluster::Start(const ClusterOptions& options) {
   LUCERNA_CHECK(options.workers >= 1);
   auto cluster = std::unique_ptr<LocalCluster>(new LocalCluster());
-  LUCERNA_ASSIGN_OR_RETURN(cluster->coordinator_,
-                           Child::Start("coordinator", options.program_folder + "/lucerna-server",
-                                        {"--listen", "127.0.0.1:0"}));
+  std::vector<std::string> flags = {"--listen", "127.0.0.1:0"};
+  if (!options.state_folder.empty()) {
+    flags.insert(flags.end(), {"--state", options.state_folder});
+    cluster->has_state_ = true;
+  }
+  LUCERNA_ASSIGN_OR_RETURN(
+      cluster->coordinator_,
+      Child::Start("coordinator", options.program_folder + "/lucerna-server", flags));
   const SteadyTime give_up = SystemClock().Steady() + kStartTime;
   for (;;) {
     if (const auto address = cluster->coordinator_->Announcement()) {
@@ -261,7 +267,7 @@ void LocalCluster::Stop() {
   workers_.clear();
   if (coordinator_ == nullptr) return;
   coordinator_->Signal(SIGTERM);
-  deadline = SystemClock().Steady() + kTimeToLeave;
+  deadline = SystemClock().Steady() + (has_state_ ? kTimeToKeep : kTimeToLeave);
   coordinator_->WaitUntil(deadline);
   coordinator_.reset();
 }

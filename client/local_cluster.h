@@ -20,6 +20,8 @@ struct ClusterOptions {
   std::string program_folder;  // holds lucerna-server and lucerna-worker
   int workers = 1;             // >= 1
   int threads = 0;             // of each worker; 0: the machine's, shared between the workers
+  // Where the coordinator keeps its jobs, so that a later cluster can go on; empty: nowhere.
+  std::string state_folder = {};
 };
 
 class LocalCluster {
@@ -40,7 +42,8 @@ class LocalCluster {
   // the one that ended.
   [[nodiscard]] Status Check();
 
-  // Sends SIGTERM to all, kills those that have not left after three seconds, and reaps them.
+  // Sends SIGTERM to all, kills those that have not left after three seconds, and reaps them. A
+  // coordinator with a state has a minute, to write its last checkpoint.
   void Stop();
 
  private:
@@ -48,6 +51,7 @@ class LocalCluster {
   LocalCluster();
 
   std::string address_;
+  bool has_state_ = false;
   std::unique_ptr<Child> coordinator_;
   std::vector<std::unique_ptr<Child>> workers_;
 };

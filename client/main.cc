@@ -60,6 +60,7 @@ int Run(int argc, char** argv) {
   std::string topic;
   double exposure_stops = 0;
   bool hides_preview = false;
+  bool keeps_no_checkpoints = false;
   bool strict = false;
   bool crops = false;
   bool scales = false;
@@ -104,9 +105,15 @@ int Run(int argc, char** argv) {
   };
   CLI::App* render = command("render", "render a scene on this machine", [&]() -> Status {
     LUCERNA_RETURN_IF_ERROR(find_programs());
+    request.keeps_checkpoints = !keeps_no_checkpoints;
     return Render(request, cluster, output_options);
   });
   add_render_flags(render);
+  CLI::Option* no_checkpoints =
+      render->add_flag("--no-checkpoints", keeps_no_checkpoints,
+                       "keep nothing beside the image to go on from after an interruption");
+  render->add_flag("--resume", request.resumes, "go on with a render that was interrupted")
+      ->excludes(no_checkpoints);
   render->add_option("--workers", cluster.workers, "worker processes")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
@@ -176,6 +183,11 @@ int Run(int argc, char** argv) {
     if (setting.role != SettingRole::kStopsJob) continue;
     AddSettingFlag(*extend, setting.name, until, std::string(setting.meaning));
   }
+  CLI::App* remove = command("delete", "forget a job that has ended, and its image",
+                             [&] { return DeleteJob(job_id, server, output_options); });
+  remove->add_option("JOB", job_id, "the job's id")->required();
+  add_server(remove);
+  add_quiet(remove);
   for (CLI::App* about_job : {stop, extend}) {
     about_job->add_option("JOB", job_id, "the job's id")->required();
     add_server(about_job);

@@ -19,29 +19,30 @@ void BlobPin::Release() {
 
 Status BlobStore::Put(const Digest& digest, std::string bytes) {
   const MutexLock lock(mutex_);
-  return PutLocked(digest, std::move(bytes), 0);
+  return PutLocked(digest, std::make_shared<const std::string>(std::move(bytes)), 0);
 }
 
 StatusOr<BlobPin> BlobStore::PutPinned(const Digest& digest, std::string bytes,
                                        AfterLastPin after) {
   const MutexLock lock(mutex_);
-  LUCERNA_RETURN_IF_ERROR(PutLocked(digest, std::move(bytes), 1));
+  LUCERNA_RETURN_IF_ERROR(
+      PutLocked(digest, std::make_shared<const std::string>(std::move(bytes)), 1));
   return BlobPin(*this, digest, after);
 }
 
-Status BlobStore::PutLocked(const Digest& digest, std::string bytes, int pins) {
+Status BlobStore::PutLocked(const Digest& digest, Blob bytes, int pins) {
   if (const auto found = entries_.find(digest); found != entries_.end()) {
     if (pins > 0) PinLocked(found->second);
     return absl::OkStatus();
   }
-  const std::uint64_t size = bytes.size();
+  const std::uint64_t size = bytes->size();
   if (!MakeRoom(size)) {
     return absl::ResourceExhaustedError(absl::StrCat(
         "the coordinator's store of ", max_bytes_, " bytes is full: ", pinned_bytes_,
         " are in use and ", size, " more do not fit; start it with a larger --max-store-bytes"));
   }
   Entry entry;
-  entry.bytes = std::make_shared<const std::string>(std::move(bytes));
+  entry.bytes = std::move(bytes);
   entry.pins = pins;
   if (pins == 0) {
     entry.place = unpinned_.insert(unpinned_.end(), digest);
@@ -64,30 +65,51 @@ bool BlobStore::MakeRoom(std::uint64_t bytes) {
   return true;
 }
 
+namespace {
+
+Status Missing(const Digest& digest) {
+  return absl::NotFoundError(absl::StrCat("there are no bytes named ", digest.Hex()));
+}
+
+}  // namespace
+
 StatusOr<Blob> BlobStore::Get(const Digest& digest) {
-  const MutexLock lock(mutex_);
-  const auto found = entries_.find(digest);
-  if (found == entries_.end()) {
-    return absl::NotFoundError(absl::StrCat("there are no bytes named ", digest.Hex()));
+  {
+    const MutexLock lock(mutex_);
+    if (const auto found = entries_.find(digest); found != entries_.end()) {
+      Entry& entry = found->second;
+      if (entry.pins == 0) unpinned_.splice(unpinned_.end(), unpinned_, entry.place);
+      return entry.bytes;
+    }
   }
-  Entry& entry = found->second;
-  if (entry.pins == 0) unpinned_.splice(unpinned_.end(), unpinned_, entry.place);
-  return entry.bytes;
+  if (files_ == nullptr || !files_->Has(digest)) return Missing(digest);
+  LUCERNA_ASSIGN_OR_RETURN(std::string bytes, files_->Get(digest));
+  const Blob blob = std::make_shared<const std::string>(std::move(bytes));
+  const MutexLock lock(mutex_);
+  // Without room it is read again the next time.
+  PutLocked(digest, blob, 0).IgnoreError();
+  return blob;
 }
 
 bool BlobStore::Has(const Digest& digest) const {
-  const MutexLock lock(mutex_);
-  return entries_.contains(digest);
+  {
+    const MutexLock lock(mutex_);
+    if (entries_.contains(digest)) return true;
+  }
+  return files_ != nullptr && files_->Has(digest);
 }
 
 StatusOr<BlobPin> BlobStore::Pin(const Digest& digest, AfterLastPin after) {
-  const MutexLock lock(mutex_);
-  const auto found = entries_.find(digest);
-  if (found == entries_.end()) {
-    return absl::NotFoundError(absl::StrCat("there are no bytes named ", digest.Hex()));
+  {
+    const MutexLock lock(mutex_);
+    if (const auto found = entries_.find(digest); found != entries_.end()) {
+      PinLocked(found->second);
+      return BlobPin(*this, digest, after);
+    }
   }
-  PinLocked(found->second);
-  return BlobPin(*this, digest, after);
+  if (files_ == nullptr || !files_->Has(digest)) return Missing(digest);
+  LUCERNA_ASSIGN_OR_RETURN(std::string bytes, files_->Get(digest));
+  return PutPinned(digest, std::move(bytes), after);
 }
 
 void BlobStore::PinLocked(Entry& entry) {

@@ -2,7 +2,8 @@
 //
 // Scene files, hitpoint blocks and radii, in memory, within a bound. Bytes that something needs
 // are pinned, once for every need. Bytes without a pin stay for the next job until the room is
-// wanted, least recently used first.
+// wanted, least recently used first. Where there are files of blobs on a disk (state/blob_files.h),
+// what is not in memory is read from there.
 //
 // Threads: any; what Get returned stays valid for as long as it is held.
 #pragma once
@@ -18,6 +19,7 @@
 #include "render/base/digest.h"
 #include "render/base/mutex.h"
 #include "render/base/status.h"
+#include "server/state/blob_files.h"
 
 namespace lucerna {
 
@@ -59,7 +61,9 @@ using PinnedBlobs = std::vector<BlobPin>;
 
 class BlobStore {
  public:
-  explicit BlobStore(std::uint64_t max_bytes) : max_bytes_(max_bytes) {}
+  // `files` outlive the store; nullptr: there are none.
+  explicit BlobStore(std::uint64_t max_bytes, const BlobFiles* files = nullptr)
+      : max_bytes_(max_bytes), files_(files) {}
 
   // Keeps `bytes`, whose digest the caller has made sure of. Bytes already there are kept once.
   // Errors: RESOURCE_EXHAUSTED when they do not fit beside what is pinned.
@@ -68,11 +72,12 @@ class BlobStore {
   [[nodiscard]] StatusOr<BlobPin> PutPinned(const Digest& digest, std::string bytes,
                                             AfterLastPin after = AfterLastPin::kKeep);
 
-  // Errors: NOT_FOUND.
+  // Errors: NOT_FOUND, or what BlobFiles says.
   [[nodiscard]] StatusOr<Blob> Get(const Digest& digest);
   [[nodiscard]] bool Has(const Digest& digest) const;
 
-  // The pin that is released last decides what becomes of the bytes. Errors: NOT_FOUND.
+  // The pin that is released last decides what becomes of the bytes.
+  // Errors: NOT_FOUND, RESOURCE_EXHAUSTED as Put, or what BlobFiles says.
   [[nodiscard]] StatusOr<BlobPin> Pin(const Digest& digest,
                                       AfterLastPin after = AfterLastPin::kKeep);
 
@@ -87,13 +92,14 @@ class BlobStore {
   };
   using Entries = std::unordered_map<Digest, Entry>;
 
-  Status PutLocked(const Digest& digest, std::string bytes, int pins) LUCERNA_REQUIRES(mutex_);
+  Status PutLocked(const Digest& digest, Blob bytes, int pins) LUCERNA_REQUIRES(mutex_);
   void PinLocked(Entry& entry) LUCERNA_REQUIRES(mutex_);
   friend class BlobPin;
   void Unpin(const Digest& digest, AfterLastPin after);
   bool MakeRoom(std::uint64_t bytes) LUCERNA_REQUIRES(mutex_);
 
   const std::uint64_t max_bytes_;
+  const BlobFiles* const files_;
   mutable Mutex mutex_;
   Entries entries_ LUCERNA_GUARDED_BY(mutex_);
   std::list<Digest> unpinned_ LUCERNA_GUARDED_BY(mutex_);  // least recently used first

@@ -5,15 +5,20 @@
 
 #include <spdlog/spdlog.h>
 
+#include "render/base/fail_point.h"
 #include "render/base/memory.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/slice_codec.h"
 #include "server/job_image.h"
+#include "server/job_message.h"
 
 namespace lucerna {
 namespace {
 
 constexpr Duration kLongestSync = std::chrono::seconds(5);
+constexpr Duration kSaveUnsavedEvery = std::chrono::seconds(1);
+constexpr std::chrono::milliseconds kRetryPause{100};
+constexpr int kPausesBeforeRetry = 10;
 
 // Different for every start of a coordinator on one machine.
 std::string InstanceName(const Clock& clock) {
@@ -36,22 +41,40 @@ SchedulerOptions OptionsFor(const Coordinator::Options& options, const std::stri
 
 }  // namespace
 
-Coordinator::Coordinator(Options options, const Clock& clock)
+Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<DurableState> state)
     : options_(WithMemory(std::move(options))),
       clock_(clock),
       instance_(InstanceName(clock)),
-      blobs_(options_.max_store_bytes),
+      state_(std::move(state)),
+      blobs_(options_.max_store_bytes, state_ ? &state_->blobs() : nullptr),
       scheduler_(OptionsFor(options_, instance_)),
       intake_(blobs_, options_.max_job_bytes),
-      jobs_({.instance = instance_, .retention = {}}),
-      job_thread_([this] { RunJobs(); }) {}
+      jobs_({.instance = state_ ? state_->instance() : instance_,
+             .retention = options_.retention,
+             .journal = state_.get()}) {
+  if (state_) {
+    for (const std::string& problem : state_->problems())
+      spdlog::error("{}", problem);
+    jobs_.Restore(state_->TakeJobs(), state_->next_serial(), Now());
+    RemoveUnneeded();
+  }
+  job_thread_ = std::thread([this] { RunJobs(); });
+}
 
 Coordinator::~Coordinator() {
   Close();
   job_thread_.join();
 }
 
+void Coordinator::StopLending() {
+  is_lending_ = false;
+  // Not an error: a worker would drop what it has on its way here.
+  for (const ParkedSyncs::Call& call : parked_.Close())
+    call.answer(SyncAnswer{});
+}
+
 void Coordinator::Close() {
+  is_closing_ = true;
   const Status why = absl::UnavailableError("the coordinator is shutting down");
   jobs_.Close(why);
   for (const ParkedSyncs::Call& call : parked_.Close())
@@ -62,6 +85,10 @@ void Coordinator::Tick() {
   scheduler_.Expire(clock_.Steady());
   StopPoisonedJobs();
   AnswerParked();
+  if (state_ && clock_.Steady() >= save_unsaved_at_) {
+    save_unsaved_at_ = clock_.Steady() + kSaveUnsavedEvery;
+    jobs_.SaveUnsaved(Now());
+  }
 }
 
 // Jobs
@@ -77,10 +104,49 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
   }
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
   if (submission.validate_only) return JobTable::Submitted{"", std::move(job.warnings)};
-  LUCERNA_ASSIGN_OR_RETURN(JobTable::Submitted submitted,
-                           jobs_.Add(std::move(job), clock_.Wall(), Now()));
-  spdlog::info("job {} submitted: {}", submitted.job_id, submission.manifest.main_path);
+  StatusOr<JobTable::Submitted> submitted;
+  {
+    const MutexLock lock(files_mutex_);
+    const Status kept = KeepFiles(submission);
+    submitted = kept.ok() ? jobs_.Add(std::move(job), clock_.Wall(), Now()) : kept;
+  }
+  if (!submitted.ok()) {
+    // Its files may have taken the last room.
+    RemoveUnneeded();
+    return submitted.status();
+  }
+  spdlog::info("job {} submitted: {}", submitted->job_id, submission.manifest.main_path);
   return submitted;
+}
+
+Status Coordinator::KeepFiles(const Submission& submission) {
+  if (!state_) return absl::OkStatus();
+  std::vector<Digest> digests;
+  for (const auto& [path, file] : submission.manifest.entries)
+    digests.push_back(file.digest);
+  if (submission.reference) digests.push_back(*submission.reference);
+  for (const Digest& digest : digests) {
+    LUCERNA_ASSIGN_OR_RETURN(const Blob blob, blobs_.Get(digest));
+    if (const Status kept = state_->blobs().Put(digest, *blob); !kept.ok()) {
+      return state_->Refusal(kept);
+    }
+  }
+  return absl::OkStatus();
+}
+
+void Coordinator::RemoveUnneeded() {
+  if (!state_) return;
+  const MutexLock lock(files_mutex_);
+  const JobTable::NeededFiles needed = jobs_.Needed();
+  state_->blobs().KeepOnly(needed.blobs);
+  state_->checkpoints().KeepOnly(needed.checkpoints);
+}
+
+Status Coordinator::Delete(const std::string& job_id) {
+  LUCERNA_RETURN_IF_ERROR(jobs_.Delete(job_id, Now()));
+  spdlog::info("job {} is deleted", job_id);
+  RemoveUnneeded();
+  return absl::OkStatus();
 }
 
 StatusOr<JobReport> Coordinator::WithWorkers(StatusOr<JobReport> report) const {
@@ -120,6 +186,10 @@ StatusOr<JobReport> Coordinator::Extend(const std::string& job_id, const RenderO
 StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) const {
   LUCERNA_ASSIGN_OR_RETURN(const JobTable::ImageSource source, jobs_.FindImage(job_id, Now()));
   if (source.image) return source.image;
+  if (source.image_digest) {
+    LUCERNA_ASSIGN_OR_RETURN(std::string bytes, state_->blobs().Get(*source.image_digest));
+    return std::make_shared<const std::string>(std::move(bytes));
+  }
   LUCERNA_ASSIGN_OR_RETURN(RenderResult result, source.runner->ImageSoFar());
   return Encode(source, std::move(result));
 }
@@ -160,7 +230,91 @@ StatusOr<RenderResult> Coordinator::Render(JobTable::Turn turn) {
   }
   const std::shared_ptr<JobRunner> runner = MakeRunner(turn);
   if (!jobs_.Attach(turn.job_id, runner)) return absl::CancelledError("the job has ended");
-  return runner->Run(*std::move(turn.scene), turn.needs, std::move(reference));
+  LUCERNA_RETURN_IF_ERROR(
+      runner->Prepare(*std::move(turn.scene), turn.needs, std::move(reference)));
+  RestoreCheckpoint(turn.job_id, *runner);
+  return runner->Resume();
+}
+
+void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner) {
+  if (!state_) return;
+  CheckpointFiles::Found found = state_->checkpoints().Read(job_id);
+  const auto note = [&](const std::string& what) {
+    spdlog::warn("job {}: {}", job_id, what);
+    jobs_.AddEvent(job_id, what, Now());
+  };
+  for (const std::string& damaged : found.damaged)
+    note(absl::StrCat("the checkpoint ", damaged));
+  for (Checkpoint& checkpoint : found.newest_first) {
+    if (checkpoint.numeric_profile != options_.numeric_profile) {
+      note("a checkpoint of another build is not used: its bits would differ");
+      continue;
+    }
+    StatusOr<DecodedRecord> record = DecodeRecord(checkpoint.record, Now());
+    const Status restored = record.ok() ? runner.Restore(checkpoint.sums) : record.status();
+    if (!restored.ok()) {
+      note(absl::StrCat("a checkpoint cannot be used: ", std::string(restored.message())));
+      continue;
+    }
+    const std::int64_t passes = record->job.counters.passes;
+    jobs_.GoOnFrom(job_id, std::move(record->job), record->running);
+    jobs_.AddEvent(job_id, absl::StrCat("goes on from its checkpoint after ", passes, " passes"),
+                   Now());
+    spdlog::info("job {} goes on from its checkpoint after {} passes", job_id, passes);
+    return;
+  }
+  // A job that had ended and was given a new end begins anew: what it had counted comes again.
+  std::optional<Job> job = jobs_.Find(job_id);
+  if (!job || job->counters.passes == 0) return;
+  job->ClearProgress();
+  jobs_.GoOnFrom(job_id, *std::move(job), Duration::zero());
+  note("there is no checkpoint of it that can be used: it begins anew");
+}
+
+Status Coordinator::KeepCheckpoint(const std::string& job_id, std::string sums, std::int64_t passes,
+                                   const BatchTally& tally) {
+  std::optional<JobTable::ImageSource> run = jobs_.DescribeRun(job_id, Now());
+  if (!run) return absl::OkStatus();
+  // What came of rounds that are still open is not in the sums and will come again.
+  run->job.counters.passes = passes;
+  run->job.counters.photons = tally.photons;
+  run->job.counters.tally = tally;
+  run->job.counters.coordinator_cpu = run->cpu;
+  const std::size_t size = sums.size();
+  const SteadyTime began_at = clock_.Steady();
+  LUCERNA_RETURN_IF_ERROR(state_->checkpoints().Write(
+      job_id, {options_.numeric_profile, EncodeRecord(run->job, std::nullopt, run->running),
+               std::move(sums)}));
+  jobs_.OnCheckpoint(job_id);
+  spdlog::debug("job {}: a checkpoint of {} bytes after {} passes was written in {:.3f} s", job_id,
+                size, passes, Seconds(clock_.Steady() - began_at));
+  return absl::OkStatus();
+}
+
+Status Coordinator::EndWell(const std::string& job_id, StopReason reason, const Blob& image) {
+  while (true) {
+    Status kept;
+    {
+      // Until the job's row names it, nothing says that the image is needed.
+      const MutexLock lock(files_mutex_);
+      std::optional<Digest> digest;
+      if (state_) {
+        digest = Sha256(*image);
+        kept = state_->blobs().Put(*digest, *image);
+      }
+      if (kept.ok()) {
+        if (jobs_.Succeed(job_id, reason, image, Now(), digest)) return absl::OkStatus();
+        return absl::CancelledError("the job has ended");
+      }
+    }
+    const std::string condition = state_->PauseCondition(kept);
+    spdlog::warn("job {} {}", job_id, condition);
+    jobs_.SetCondition(job_id, condition, Now());
+    for (int i = 0; i < kPausesBeforeRetry; ++i) {
+      LUCERNA_RETURN_IF_ERROR(jobs_.CheckStillNeeded(job_id));
+      std::this_thread::sleep_for(kRetryPause);
+    }
+  }
 }
 
 std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
@@ -197,6 +351,19 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
                 sample.nothing_found = checkpoint.missing.nothing_found;
                 jobs_.OnErrorEstimate(id, std::move(sample), checkpoint.missing.lights, Now());
               },
+          .on_checkpoint =
+              state_ ? [this, id](
+                           std::string sums, std::int64_t passes,
+                           const BatchTally&
+                               tally) { return KeepCheckpoint(id, std::move(sums), passes, tally); }
+                     : std::function<Status(std::string, std::int64_t, const BatchTally&)>(),
+          .checkpoint_share = options_.checkpoint_share,
+          .on_pause =
+              [this, id](const Status& why) {
+                const std::string condition = why.ok() ? "" : state_->PauseCondition(why);
+                spdlog::warn("job {} {}", id, why.ok() ? "goes on" : condition);
+                jobs_.SetCondition(id, condition, Now());
+              },
       });
 }
 
@@ -208,17 +375,22 @@ void Coordinator::Conclude(const std::string& job_id, StatusOr<RenderResult> res
     const std::optional<JobTable::ImageSource> source = jobs_.DescribeRun(job_id, Now());
     if (!source) return;
     StatusOr<Blob> image = Encode(*source, *std::move(result));
-    if (image.ok()) {
-      if (jobs_.Succeed(job_id, reason, *std::move(image), Now())) {
-        spdlog::info("job {} succeeded after {} passes and {:.1f} s", job_id, passes,
-                     Seconds(source->running));
-      }
+    failure = image.ok() ? EndWell(job_id, reason, *image) : image.status();
+    if (failure.ok()) {
+      spdlog::info("job {} succeeded after {} passes and {:.1f} s", job_id, passes,
+                   Seconds(source->running));
+      FailPoint("job.ended");
+      RemoveUnneeded();
       return;
     }
-    failure = image.status();
+  }
+  if (state_ && is_closing_) {
+    spdlog::info("job {} goes on when the coordinator is started again", job_id);
+    return;
   }
   jobs_.Fail(job_id, failure, Now());
   spdlog::info("job {} ended: {}", job_id, std::string(failure.message()));
+  RemoveUnneeded();
 }
 
 // Workers
@@ -240,6 +412,7 @@ StatusOr<std::string> Coordinator::Register(const std::string& name, int threads
 
 std::optional<StatusOr<SyncAnswer>> Coordinator::TryAnswer(const std::string& worker,
                                                            const Scheduler::Report& report) {
+  if (!is_lending_) return std::nullopt;
   StatusOr<Scheduler::Answer> result = scheduler_.AnswerFor(worker, report, clock_.Steady());
   if (!result.ok()) return result.status();
   SyncAnswer answer;
@@ -268,7 +441,7 @@ std::uint64_t Coordinator::Sync(const std::string& worker, Scheduler::Report rep
     answer(*std::move(ready));
     return 0;
   }
-  if (wait <= Duration::zero()) {
+  if (wait <= Duration::zero() || !is_lending_) {
     answer(SyncAnswer{});
     return 0;
   }

@@ -2,13 +2,15 @@
 //
 // Wires the parts together and decides nothing itself: JobIntake checks submissions, JobTable holds
 // the jobs, Scheduler lends work, PassMerger and RoundMerger sum what comes back, ParkedSyncs holds
-// the calls of workers that wait, BlobStore the bytes. One thread of its own renders one job after
+// the calls of workers that wait, BlobStore the bytes, DurableState what outlives the process. One
+// thread of its own renders one job after
 // the other.
 //
 // Threads: any. Nothing here waits for the network. Submit, Commit and ImageOf may take long: they
 // are for the threads of a WorkPool.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -19,6 +21,7 @@
 #include <vector>
 
 #include "render/base/clock.h"
+#include "render/base/mutex.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/scene/render_settings.h"
@@ -32,6 +35,7 @@
 #include "server/pass_merger.h"
 #include "server/round_merger.h"
 #include "server/scheduler.h"
+#include "server/state/durable_state.h"
 #include "server/sync_answer.h"
 #include "server/work_pool.h"
 
@@ -46,9 +50,12 @@ class Coordinator {
         0;  // of the image and the scene of one job; 0: what is free at the start
     std::uint64_t batch_photons = 0;  // 0: follows the number of workers
     std::string numeric_profile;
+    RetentionLimits retention;
+    double checkpoint_share = 0.01;  // of the time, in (0, 1]
   };
 
-  Coordinator(Options options, const Clock& clock);
+  // `state` is what outlives the process; nullptr: nothing does. Goes on with the jobs in it.
+  Coordinator(Options options, const Clock& clock, std::unique_ptr<DurableState> state = nullptr);
   ~Coordinator();
 
   [[nodiscard]] BlobStore& blobs() { return blobs_; }
@@ -67,6 +74,8 @@ class Coordinator {
   [[nodiscard]] StatusOr<JobReport> Cancel(const std::string& job_id);
   [[nodiscard]] StatusOr<JobReport> Stop(const std::string& job_id);
   [[nodiscard]] StatusOr<JobReport> Extend(const std::string& job_id, const RenderOverrides& until);
+  // Also removes what no other job needs from the disk: may take long.
+  [[nodiscard]] Status Delete(const std::string& job_id);
   // EXR bytes. Errors: NOT_FOUND, FAILED_PRECONDITION when there is no image (yet).
   [[nodiscard]] StatusOr<Blob> ImageOf(const std::string& job_id) const;
 
@@ -112,16 +121,30 @@ class Coordinator {
 
   // To be called every 50 ms or so: leases run out, waits end.
   void Tick();
-  // Ends the job that renders, answers every Sync with UNAVAILABLE, and takes no more work.
+  // Lends nothing any more, and answers every Sync: before the end, so that commits can still come.
+  void StopLending();
+  // Ends the job that renders, answers every Sync with UNAVAILABLE, and takes no more work. With a
+  // state the job is not over: a checkpoint is written, and a later process goes on with it.
   void Close();
 
  private:
-  Moment Now() const { return {clock_.Steady(), ProcessCpuTime()}; }
+  Moment Now() const { return {clock_.Steady(), ProcessCpuTime(), clock_.Wall()}; }
   StatusOr<JobReport> WithWorkers(StatusOr<JobReport> report) const;
 
   void RunJobs();
   StatusOr<RenderResult> Render(JobTable::Turn turn);
   std::shared_ptr<JobRunner> MakeRunner(const JobTable::Turn& turn);
+  // Hands the job's newest checkpoint that can be used to its runner, if there is one.
+  void RestoreCheckpoint(const std::string& job_id, JobRunner& runner);
+  Status KeepCheckpoint(const std::string& job_id, std::string sums, std::int64_t passes,
+                        const BatchTally& tally);
+  // The job succeeds when its image is on the disk, however long there is no room.
+  // Errors: CANCELLED when the job, or the process, has ended meanwhile.
+  Status EndWell(const std::string& job_id, StopReason reason, const Blob& image);
+  // Files of the scene, and of the reference, onto the disk.
+  Status KeepFiles(const Submission& submission) LUCERNA_REQUIRES(files_mutex_);
+  // Removes the files that no job needs.
+  void RemoveUnneeded();
   // What becomes of a job whose runner has come back.
   void Conclude(const std::string& job_id, StatusOr<RenderResult> result);
   StatusOr<Blob> Encode(const JobTable::ImageSource& source, RenderResult result) const;
@@ -140,7 +163,10 @@ class Coordinator {
 
   const Options options_;
   const Clock& clock_;
-  const std::string instance_;
+  const std::string instance_;  // of this process
+  const std::unique_ptr<DurableState> state_;
+  // Held while files are added for a job, and while those without one are removed.
+  Mutex files_mutex_;
   BlobStore blobs_;
   Scheduler scheduler_;
   PassMerger passes_;
@@ -148,6 +174,9 @@ class Coordinator {
   const JobIntake intake_;
   ParkedSyncs parked_;
   JobTable jobs_;
+  std::atomic<bool> is_lending_ = true;
+  std::atomic<bool> is_closing_ = false;
+  SteadyTime save_unsaved_at_;  // of the thread of Tick
 
   std::thread job_thread_;  // last, so that all it uses is there
 };

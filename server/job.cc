@@ -4,6 +4,13 @@
 
 namespace lucerna {
 
+JobLife::JobLife(Past past)
+    : state_(past.state >= JobState::kSucceeded ? past.state : JobState::kQueued),
+      stop_reason_(past.stop_reason),
+      failure_(std::move(past.failure)),
+      submitted_at_(past.submitted_at),
+      ran_before_(past.ran) {}
+
 bool JobLife::Prepare() {
   if (state_ != JobState::kQueued) return false;
   state_ = JobState::kPreparing;
@@ -32,7 +39,7 @@ bool JobLife::Succeed(StopReason reason, SteadyTime now) {
 
 bool JobLife::Extend() {
   if (state_ != JobState::kSucceeded) return false;
-  ran_before_ = Running(*ended_at_);
+  if (ended_at_) ran_before_ = Running(*ended_at_);
   started_at_.reset();
   ended_at_.reset();
   stop_reason_ = StopReason::kNone;
@@ -50,9 +57,39 @@ bool JobLife::Fail(std::string failure, SteadyTime now) {
   return true;
 }
 
+void JobLife::Pause(SteadyTime now) {
+  if (state_ != JobState::kRunning || !started_at_) return;
+  ran_before_ += now - *started_at_;
+  started_at_.reset();
+}
+
+void JobLife::GoOn(SteadyTime now) {
+  if (state_ == JobState::kRunning && !started_at_) started_at_ = now;
+}
+
 Duration JobLife::Running(SteadyTime now) const {
   if (!started_at_) return ran_before_;
   return ran_before_ + (ended_at_ ? *ended_at_ : now) - *started_at_;
+}
+
+void Job::AddEvent(WallTime at, std::string what) {
+  events.push_back({at, std::move(what)});
+  if (events.size() > kMostEvents) events.erase(events.begin());
+}
+
+void Job::ClearProgress() {
+  counters = JobCounters();
+  convergence.clear();
+  lights.clear();
+  pass_record = PassRecord();
+  tail = PassTally();
+  photon_steps.clear();
+  workers.clear();
+}
+
+PassRecord::PassRecord(std::vector<PassTally> tallies) : tallies_(std::move(tallies)) {
+  // The first ones are of the passes before rounds were longer than one.
+  if (!tallies_.empty()) passes_each_ = std::max<std::int64_t>(1, tallies_.front().passes);
 }
 
 void PassRecord::Add(const BatchTally& tally, std::int64_t passes) {
@@ -78,6 +115,8 @@ void PassRecord::Add(const BatchTally& tally, std::int64_t passes) {
 
 void JobCounters::NameDropped(const std::vector<PhotonKey>& named) {
   for (const PhotonKey& key : named) {
+    // Traced again after a restart.
+    if (std::ranges::binary_search(dropped_photons, key)) continue;
     dropped_photons.insert(std::ranges::upper_bound(dropped_photons, key), key);
     if (dropped_photons.size() > kDroppedNamed) dropped_photons.pop_back();
   }

@@ -45,6 +45,16 @@ class JobLife {
   JobLife() = default;
   explicit JobLife(SteadyTime submitted_at) : submitted_at_(submitted_at) {}
 
+  // What is known of a life that began in an earlier process; one that has not ended waits again.
+  struct Past {
+    JobState state = JobState::kQueued;
+    StopReason stop_reason = StopReason::kNone;
+    std::string failure = {};
+    SteadyTime submitted_at = {};
+    Duration ran{};
+  };
+  explicit JobLife(Past past);
+
   // Each returns whether the job could go there; if not, nothing has changed.
   bool Prepare();
   bool Run(SteadyTime now);
@@ -53,6 +63,11 @@ class JobLife {
   bool Extend();
   bool Cancel(SteadyTime now);
   bool Fail(std::string failure, SteadyTime now);
+  // While it runs: time stands still until GoOn.
+  void Pause(SteadyTime now);
+  void GoOn(SteadyTime now);
+  // Of one that has not begun to run in this process: it ran so long in earlier ones.
+  void SetRanBefore(Duration ran) { ran_before_ = ran; }
 
   [[nodiscard]] JobState state() const { return state_; }
   [[nodiscard]] StopReason stop_reason() const { return stop_reason_; }
@@ -118,6 +133,10 @@ class PassRecord {
  public:
   static constexpr std::size_t kMostTallies = 256;
 
+  PassRecord() = default;
+  // Of an earlier process.
+  explicit PassRecord(std::vector<PassTally> tallies);
+
   // Takes in the next passes.
   void Add(const BatchTally& tally, std::int64_t passes = 1);
   [[nodiscard]] const std::vector<PassTally>& tallies() const { return tallies_; }
@@ -139,6 +158,13 @@ struct ErrorSample {
   double missing_relative = 0;
   bool nothing_found = false;  // the image was black
 };
+
+// What happened to a job beside its progress.
+struct JobEvent {
+  WallTime at;
+  std::string what;  // a sentence
+};
+inline constexpr std::size_t kMostEvents = 100;  // that are kept of a job, the newest
 
 // A worker's part in a job.
 struct WorkerShare {
@@ -167,6 +193,13 @@ struct Job {
   PhotonSteps photon_steps;                    // of the passes opened so far
   std::map<std::string, WorkerShare> workers;  // by id
   int most_workers = 0;                        // connected at one time while it ran
+  std::optional<WallTime> ended_at;
+  std::string condition;  // why it does not go on though it runs; empty: it does
+  std::vector<JobEvent> events;
+
+  void AddEvent(WallTime at, std::string what);
+  // All that rendering has counted and found.
+  void ClearProgress();
 };
 
 }  // namespace lucerna

@@ -25,6 +25,7 @@
 #include "render/math/color_space.h"
 #include "render/scene/shape_lists.h"
 #include "render/tracing/eye_path.h"
+#include "server/state/sums_codec.h"
 
 namespace lucerna {
 namespace {
@@ -250,6 +251,10 @@ std::int64_t JobEstimator::passes() const {
 
 std::uint64_t JobEstimator::whole_passes() const {
   return state_->sums->whole_passes();
+}
+
+const BatchTally& JobEstimator::whole_tally() const {
+  return state_->sums->whole().tally;
 }
 
 std::uint64_t JobEstimator::photons() const {
@@ -492,6 +497,87 @@ TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference,
   error.relative /= terms;
   error.absolute /= terms;
   return error;
+}
+
+void JobEstimator::Save(ByteWriter& writer) const {
+  const State& state = *state_;
+  WriteSums(writer, state.sums->whole());
+  WriteNumbers(writer, state.radii->numbers());
+  WriteRadii(writer, *state.last_radii);
+  writer.Varint(state.after.size());
+  for (const auto& [passes, after] : state.after) {
+    writer.Varint(passes);
+    writer.Varint(after.photons_per_pass);
+    WriteRadii(writer, *after.radii);
+  }
+  {
+    const MutexLock lock(state_->noise_area_mutex);
+    WriteDouble(writer, state_->noise_area);
+    writer.Varint(static_cast<std::uint64_t>(state_->noise_area_after));
+  }
+  WriteDouble(writer, state.best_photons);
+  writer.Byte(state.variance != nullptr ? 1 : 0);
+  if (state.variance != nullptr) WriteVariance(writer, state.variance->numbers());
+  for (const Vec3& corner : {state.view.low, state.view.high}) {
+    for (const float coordinate : {corner.x, corner.y, corner.z})
+      WriteFloat(writer, coordinate);
+  }
+  WriteFloat(writer, state.widest_radius);
+  WriteDouble(writer, state.hit_share);
+}
+
+Status JobEstimator::Restore(ByteReader& reader) {
+  State& state = *state_;
+  const std::size_t pixels = state.sums->pixels();
+  LUCERNA_ASSIGN_OR_RETURN(ImageSums::Whole sums, ReadSums(reader, pixels));
+  LUCERNA_ASSIGN_OR_RETURN(PixelRadii::Numbers numbers,
+                           ReadNumbers(reader, state.radii->numbers()));
+  const auto read_radii = [&]() -> StatusOr<std::shared_ptr<const RadiusColumn>> {
+    LUCERNA_ASSIGN_OR_RETURN(RadiusColumn radii, ReadRadii(reader, pixels));
+    return std::make_shared<const RadiusColumn>(std::move(radii));
+  };
+  LUCERNA_ASSIGN_OR_RETURN(std::shared_ptr<const RadiusColumn> last_radii, read_radii());
+  std::map<std::uint64_t, State::After> after;
+  for (std::uint64_t left = reader.Varint(); left > 0; --left) {
+    const std::uint64_t passes = reader.Varint();
+    State::After& of_passes = after[passes];
+    of_passes.photons_per_pass = reader.Varint();
+    LUCERNA_ASSIGN_OR_RETURN(of_passes.radii, read_radii());
+  }
+  const double noise_area = ReadDouble(reader);
+  const auto noise_area_after = static_cast<std::int64_t>(reader.Varint());
+  const double best_photons = ReadDouble(reader);
+  std::unique_ptr<PassVariance> variance;
+  if (reader.Byte() != 0) {
+    LUCERNA_ASSIGN_OR_RETURN(PassVariance::Numbers numbers_of_variance,
+                             ReadVariance(reader, pixels));
+    variance = std::make_unique<PassVariance>(std::move(numbers_of_variance));
+  }
+  Bounds view;
+  for (Vec3* const corner : {&view.low, &view.high}) {
+    for (float* const coordinate : {&corner->x, &corner->y, &corner->z})
+      *coordinate = ReadFloat(reader);
+  }
+  const float widest_radius = ReadFloat(reader);
+  const double hit_share = ReadDouble(reader);
+  if (!reader.finished() || !after.contains(sums.passes)) {
+    return absl::InvalidArgumentError("malformed checkpoint: it ends too soon or too late");
+  }
+  state.sums->Restore(std::move(sums));
+  state.radii->Restore(std::move(numbers));
+  state.last_radii = std::move(last_radii);
+  state.after = std::move(after);
+  {
+    const MutexLock lock(state.noise_area_mutex);
+    state.noise_area = noise_area;
+    state.noise_area_after = noise_area_after;
+  }
+  state.best_photons = best_photons;
+  state.variance = std::move(variance);
+  state.view = view;
+  state.widest_radius = widest_radius;
+  state.hit_share = hit_share;
+  return absl::OkStatus();
 }
 
 }  // namespace lucerna

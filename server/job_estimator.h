@@ -36,6 +36,7 @@
 #include "render/scene/scene.h"
 #include "render/tracing/hitpoint_pass.h"
 #include "render/tracing/pass_slice.h"
+#include "render/wire/bytes.h"
 #include "server/reference_image.h"
 
 namespace lucerna {
@@ -102,6 +103,8 @@ class JobEstimator {
   [[nodiscard]] std::uint64_t eye_rays() const;
   // Passes added without the tail.
   [[nodiscard]] std::uint64_t whole_passes() const;
+  // Of the passes added without the tail.
+  [[nodiscard]] const BatchTally& whole_tally() const;
   // The image of the passes so far, without metadata. Requires passes() > 0. Layers
   // `noise` (standard deviation of each pixel's luminance) and `bias` from the second pass on.
   [[nodiscard]] Image MakeImage() const;
@@ -122,6 +125,13 @@ class JobEstimator {
   // Requires a reference as large as the image.
   [[nodiscard]] static TrueError ErrorAgainst(const ReferenceImage& reference,
                                               const EstimatorSnapshot& snapshot);
+
+  // All that later passes and images follow from, of the rounds added without the tail.
+  void Save(ByteWriter& writer) const;
+  // Goes on from what Save of an estimator of the same scene and settings wrote: all that follows
+  // is to the bit what would have followed there. Requires that no round has been added.
+  // Errors: INVALID_ARGUMENT for bytes of another shape; then nothing has changed.
+  [[nodiscard]] Status Restore(ByteReader& reader);
 
  private:
   struct State;

@@ -11,7 +11,8 @@ std::vector<KeptOfJob> DecideRetention(const std::vector<EndedJob>& newest_first
   std::size_t image_bytes = 0;
   for (const EndedJob& job : newest_first) {
     KeptOfJob& of_job = kept.emplace_back();
-    of_job.record = kept.size() <= limits.jobs;
+    of_job.record =
+        kept.size() <= limits.jobs && (limits.age == Duration::zero() || job.age <= limits.age);
     if (job.has_photons) {
       if (++with_photons > 1) pixels += job.pixels;
       of_job.photons = of_job.record && pixels <= limits.pixels;

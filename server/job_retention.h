@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/base/clock.h"
+
 namespace lucerna {
 
 struct RetentionLimits {
@@ -15,8 +17,9 @@ struct RetentionLimits {
   // Of jobs whose photons are kept, so that they can go on; the newest counts as none. At some 700
   // bytes a pixel.
   std::int64_t pixels = std::int64_t{1} << 21;
-  std::size_t images = 64;
+  std::size_t images = 64;  // in memory; those on a disk are kept with the record
   std::size_t image_bytes = std::size_t{2} << 30;  // the newest counts as none
+  Duration age{};                                  // since a job ended; 0: no limit
 };
 
 // What there is of an ended job.
@@ -25,6 +28,7 @@ struct EndedJob {
   std::int64_t pixels = 0;
   bool has_image = false;
   std::size_t image_bytes = 0;
+  Duration age{};
 };
 
 struct KeptOfJob {

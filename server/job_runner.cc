@@ -8,6 +8,8 @@
 
 #include "render/estimate/evidence.h"
 #include "render/wire/block_codec.h"
+#include "render/wire/bytes.h"
+#include "server/state/sums_codec.h"
 
 namespace lucerna {
 namespace {
@@ -18,6 +20,16 @@ constexpr std::uint64_t kYoungPasses = 16;
 constexpr std::size_t kMostSplitPasses = 2;
 // The error is near its target when its upper end is below so many times that.
 constexpr double kNearTarget = 1.5;
+constexpr Duration kPauseBeforeRetry = std::chrono::seconds(1);
+// How long the first checkpoint is expected to take: a job of a few seconds needs none.
+constexpr Duration kFirstSave = std::chrono::milliseconds(100);
+
+// How long to wait after a checkpoint that took `time`, for `share` of the time. Decades at most,
+// so that sums fit.
+Duration PauseAfterSave(Duration time, double share) {
+  const double pause_s = std::min(Seconds(time) * (1 / share - 1), 1e9);
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(pause_s));
+}
 
 }  // namespace
 
@@ -49,6 +61,11 @@ std::uint64_t JobRunner::WantedPasses(const End& end) const {
 
 StatusOr<RenderResult> JobRunner::Run(Scene scene, const SceneNeeds& needs,
                                       ReferenceImage reference) {
+  LUCERNA_RETURN_IF_ERROR(Prepare(std::move(scene), needs, std::move(reference)));
+  return RunToEnd();
+}
+
+Status JobRunner::Prepare(Scene scene, const SceneNeeds& needs, ReferenceImage reference) {
   LUCERNA_ASSIGN_OR_RETURN(estimator_,
                            JobEstimator::Create(std::move(scene), settings_, needs, threads_));
   reference_ = std::move(reference);
@@ -59,7 +76,7 @@ StatusOr<RenderResult> JobRunner::Run(Scene scene, const SceneNeeds& needs,
                      " beside the others, so what is lit by reflections of that light alone stays"
                      " dark; render it by itself and add the images"));
   }
-  return RunToEnd();
+  return absl::OkStatus();
 }
 
 StatusOr<RenderResult> JobRunner::Resume() {
@@ -76,9 +93,14 @@ StatusOr<RenderResult> JobRunner::RunToEnd() {
     photon_steps_.pop_back();
   next_split_ = next_round_;
   reported_passes_ = next_round_;
-  const SteadyTime started_at = hooks_.clock.Steady();
+  saved_passes_ = next_round_;
+  const SteadyTime now = hooks_.clock.Steady();
+  run_began_at_ = now - ran_before_;
+  save_at_ = now + PauseAfterSave(kFirstSave, hooks_.checkpoint_share);
   StatusOr<RenderResult> result = RunRounds();
-  ran_before_ += hooks_.clock.Steady() - started_at;
+  // The process ends, and a later one may go on.
+  if (absl::IsUnavailable(result.status())) KeepWholeRounds();
+  ran_before_ = hooks_.clock.Steady() - run_began_at_;
   // Whatever ended it: workers must not go on with passes that will not be merged.
   CloseAll();
   TakeInEstimate(true);
@@ -126,7 +148,6 @@ bool JobRunner::MayMeetTarget(const End& end) const {
 }
 
 StatusOr<RenderResult> JobRunner::RunRounds() {
-  const SteadyTime started_at = hooks_.clock.Steady() - ran_before_;
   while (true) {
     LUCERNA_RETURN_IF_ERROR(why_stopped());
     End end;
@@ -138,8 +159,8 @@ StatusOr<RenderResult> JobRunner::RunRounds() {
     if (end.time_s > 0) {
       // A limit beyond a century is no limit, and would not fit.
       const double seconds = std::min(end.time_s, 3.2e9);
-      due_ =
-          started_at + std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+      due_ = run_began_at_ +
+             std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
     }
     const bool is_time_up = due_ && hooks_.clock.Steady() >= *due_;
     TakeInEstimate(false);
@@ -242,6 +263,7 @@ StatusOr<bool> JobRunner::Step(const End& end, bool wants_more) {
   const bool must_wait = end.error > 0 && IsEstimating();
   if (!must_wait && TakeInIfWhole()) {
     BeginEstimateIfDue(false);
+    CheckpointIfDue();
     return true;
   }
   if (to_split && !ahead_) {
@@ -472,6 +494,100 @@ void JobRunner::CheckImage() {
       " photons: no light has reached the"
       " view; check that the scene has lights, which way they and the camera face, and what stands"
       " between them"));
+}
+
+std::string JobRunner::Save() const {
+  ByteWriter writer;
+  writer.Varint(static_cast<std::uint64_t>((hooks_.clock.Steady() - run_began_at_).count()));
+  writer.Varint(static_cast<std::uint64_t>(next_checkpoint_));
+  writer.Varint(static_cast<std::uint64_t>(checkpoints_));
+  writer.Varint(has_warned_ ? 1 : 0);
+  writer.Varint(static_cast<std::uint64_t>(passes_at_checkpoint_));
+  WriteDouble(writer, error_at_most_);
+  writer.Varint(photon_steps_.size());
+  for (const PhotonStep& step : photon_steps_) {
+    writer.Varint(step.first_pass);
+    writer.Varint(step.photons_per_pass);
+  }
+  const MutexLock lock(estimator_mutex_);
+  estimator_->Save(writer);
+  return writer.Take();
+}
+
+Status JobRunner::Restore(std::string_view sums) {
+  ByteReader reader(sums);
+  const Duration ran{static_cast<std::int64_t>(reader.Varint())};
+  const auto next_checkpoint = static_cast<std::int64_t>(reader.Varint());
+  const auto checkpoints = static_cast<int>(reader.Varint());
+  const bool has_warned = reader.Varint() != 0;
+  const auto passes_at_checkpoint = static_cast<std::int64_t>(reader.Varint());
+  const double error_at_most = ReadDouble(reader);
+  PhotonSteps steps;
+  for (std::uint64_t left = reader.Varint(); left > 0 && reader.ok(); --left) {
+    const std::uint64_t first_pass = reader.Varint();
+    steps.push_back({first_pass, reader.Varint()});
+  }
+  const MutexLock lock(estimator_mutex_);
+  LUCERNA_RETURN_IF_ERROR(estimator_->Restore(reader));
+  ran_before_ = ran;
+  next_checkpoint_ = next_checkpoint;
+  checkpoints_ = checkpoints;
+  has_warned_ = has_warned;
+  passes_at_checkpoint_ = passes_at_checkpoint;
+  error_at_most_ = error_at_most;
+  photon_steps_ = std::move(steps);
+  return absl::OkStatus();
+}
+
+Status JobRunner::KeepCheckpoint() {
+  // What is known of the error of these passes belongs to them.
+  TakeInEstimate(true);
+  const SteadyTime began_at = hooks_.clock.Steady();
+  LUCERNA_RETURN_IF_ERROR(hooks_.on_checkpoint(
+      Save(), static_cast<std::int64_t>(estimator_->whole_passes()), estimator_->whole_tally()));
+  const SteadyTime now = hooks_.clock.Steady();
+  save_at_ = now + PauseAfterSave(now - began_at, hooks_.checkpoint_share);
+  saved_passes_ = estimator_->whole_passes();
+  return absl::OkStatus();
+}
+
+void JobRunner::CheckpointIfDue() {
+  if (!hooks_.on_checkpoint || hooks_.clock.Steady() < save_at_) return;
+  Status kept = KeepCheckpoint();
+  if (kept.ok()) return;
+  SteadyTime paused_at = hooks_.clock.Steady();
+  while (!kept.ok()) {
+    hooks_.on_pause(kept);
+    {
+      // A cancel or a stop ends the pause too; wakes by workers do not.
+      const MutexLock lock(mutex_);
+      const SteadyTime until = hooks_.clock.Steady() + kPauseBeforeRetry;
+      while (!why_stopped_ && !shall_finish_ && hooks_.clock.Steady() < until)
+        changed_.WaitFor(mutex_, kPauseBeforeRetry);
+      if (why_stopped_ || shall_finish_) break;
+    }
+    // The time of a job is that in which it could go on.
+    const SteadyTime now = hooks_.clock.Steady();
+    run_began_at_ += now - std::exchange(paused_at, now);
+    kept = KeepCheckpoint();
+  }
+  hooks_.on_pause(absl::OkStatus());
+}
+
+void JobRunner::KeepWholeRounds() {
+  if (!hooks_.on_checkpoint) return;
+  double target = 0;
+  {
+    const MutexLock lock(mutex_);
+    target = end_.error;
+  }
+  // As while it runs: nothing is added to an image that meets the target.
+  while (!(target > 0 && error_at_most_ <= target) && TakeInIfWhole()) {
+    BeginEstimateIfDue(false);
+    TakeInEstimate(true);
+  }
+  // When it fails, the one before is there.
+  if (estimator_->whole_passes() > saved_passes_) KeepCheckpoint().IgnoreError();
 }
 
 bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {

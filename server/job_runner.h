@@ -19,6 +19,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include "render/base/clock.h"
@@ -66,6 +67,15 @@ struct RunnerHooks {
   // At a stop: the same of the passes after the last round merged. They are part of a later round.
   std::function<void(const BatchTally& tally, std::int64_t passes)> on_tail;
   std::function<void(const ErrorCheckpoint& checkpoint)> on_error_estimate;
+  // Keeps what Save gave, so that a later process can Restore it; absent: nothing is kept.
+  // `tally` is of the `passes` in it. When it fails the job pauses, and it is called again every
+  // second.
+  std::function<Status(std::string sums, std::int64_t passes, const BatchTally& tally)>
+      on_checkpoint;
+  // How much of the time checkpoints may take, in (0, 1]; 1: one after every round.
+  double checkpoint_share = 0.01;
+  // The job pauses and why, or goes on (OK).
+  std::function<void(const Status& why)> on_pause;
 };
 
 class JobRunner final : public RunningJob {
@@ -79,6 +89,11 @@ class JobRunner final : public RunningJob {
   [[nodiscard]] StatusOr<RenderResult> Run(Scene scene, const SceneNeeds& needs,
                                            ReferenceImage reference);
   [[nodiscard]] StatusOr<RenderResult> Resume() override;
+
+  // Run in its parts: Prepare once, then Restore as often as it fails, then Resume.
+  [[nodiscard]] Status Prepare(Scene scene, const SceneNeeds& needs, ReferenceImage reference);
+  // Goes on from a checkpoint of the same job. Errors: as JobEstimator::Restore.
+  [[nodiscard]] Status Restore(std::string_view sums);
 
   void SetEnd(const RenderSettings& settings) override;
   void Reopen(const RenderSettings& settings) override;
@@ -120,6 +135,13 @@ class JobRunner final : public RunningJob {
 
   StatusOr<RenderResult> RunToEnd();
   StatusOr<RenderResult> RunRounds();
+  // All that a later run follows from: the whole rounds taken in.
+  std::string Save() const;
+  // Hands a checkpoint on when enough time has passed since the last. Pauses while that fails.
+  void CheckpointIfDue();
+  Status KeepCheckpoint();
+  // Before the process ends: rounds that have come, and a checkpoint.
+  void KeepWholeRounds();
   // One thing that can be done now: opens, traces or takes in. False when there is nothing.
   StatusOr<bool> Step(const End& end, bool wants_more);
   // Begins to estimate the error of the passes so far, on another thread and from a copy of the
@@ -184,6 +206,9 @@ class JobRunner final : public RunningJob {
   std::future<ErrorCheckpoint> estimate_;  // under way
   std::thread estimate_thread_;
   Duration ran_before_{};
+  SteadyTime run_began_at_;  // less what ran before, without pauses
+  SteadyTime save_at_;       // no checkpoint is kept before this
+  std::uint64_t saved_passes_ = 0;
   std::int64_t next_checkpoint_ = kFirstCheckpoint;
   int checkpoints_ = 0;
   bool has_warned_ = false;                // of a black image

@@ -7,6 +7,7 @@
 
 #include "render/wire/grpc_status.h"
 #include "render/wire/messages.h"
+#include "server/job_message.h"
 #include "server/rpc_caller.h"
 
 namespace lucerna {
@@ -16,166 +17,6 @@ constexpr Duration kWatchAtMostEvery = std::chrono::milliseconds(100);
 constexpr Duration kWatchAtLeastEvery = std::chrono::seconds(5);
 constexpr std::size_t kLargestPage = 1000;
 constexpr std::size_t kUsualPage = 100;
-// A job's warnings go with every message about it.
-constexpr std::size_t kMostWarnings = 200;
-constexpr std::size_t kMostShares = 1000;
-
-v1::JobState StateToProto(JobState state) {
-  switch (state) {
-    case JobState::kQueued:
-      return v1::JOB_STATE_QUEUED;
-    case JobState::kPreparing:
-      return v1::JOB_STATE_PREPARING;
-    case JobState::kRunning:
-      return v1::JOB_STATE_RUNNING;
-    case JobState::kSucceeded:
-      return v1::JOB_STATE_SUCCEEDED;
-    case JobState::kCancelled:
-      return v1::JOB_STATE_CANCELLED;
-    case JobState::kFailed:
-      return v1::JOB_STATE_FAILED;
-  }
-  return v1::JOB_STATE_UNSPECIFIED;
-}
-
-v1::StopReason ReasonToProto(StopReason reason) {
-  switch (reason) {
-    case StopReason::kNone:
-      return v1::STOP_REASON_UNSPECIFIED;
-    case StopReason::kPasses:
-      return v1::STOP_REASON_PASSES;
-    case StopReason::kTime:
-      return v1::STOP_REASON_TIME;
-    case StopReason::kError:
-      return v1::STOP_REASON_ERROR;
-    case StopReason::kPhotons:
-      return v1::STOP_REASON_PHOTONS;
-    case StopReason::kUser:
-      return v1::STOP_REASON_USER;
-  }
-  return v1::STOP_REASON_UNSPECIFIED;
-}
-
-v1::Progress ProgressToProto(const JobReport& report) {
-  const JobCounters& counters = report.job.counters;
-  v1::Progress message;
-  message.set_passes(counters.passes);
-  message.set_photons(counters.photons);
-  *message.mutable_running() = ToProto(report.running);
-  if (counters.to_first_photons) {
-    *message.mutable_to_first_photons() = ToProto(*counters.to_first_photons);
-  }
-  *message.mutable_coordinator_cpu() = ToProto(counters.coordinator_cpu);
-  *message.mutable_worker_cpu() = ToProto(counters.worker_cpu);
-  message.set_photons_per_second(report.photons_per_second);
-  message.set_workers(report.workers);
-  *message.mutable_tally() = ToProto(counters.tally);
-  message.set_bytes_sent(counters.bytes_sent);
-  message.set_bytes_received(counters.bytes_received);
-  message.set_hitpoints_sent(counters.hitpoints_sent);
-  message.set_hitpoints_returned(counters.hitpoints_returned);
-  return message;
-}
-
-v1::SquaredError ErrorToProto(const SquaredError& error) {
-  v1::SquaredError message;
-  message.set_noise(error.noise);
-  message.set_bias(error.bias);
-  message.set_low(error.low);
-  message.set_high(error.high);
-  return message;
-}
-
-v1::ErrorSample SampleToProto(const ErrorSample& sample) {
-  v1::ErrorSample message;
-  message.set_passes(sample.passes);
-  message.set_photons(sample.photons);
-  *message.mutable_running() = ToProto(sample.running);
-  *message.mutable_cpu() = ToProto(sample.cpu);
-  *message.mutable_relative() = ErrorToProto(sample.estimate.relative);
-  *message.mutable_absolute() = ErrorToProto(sample.estimate.absolute);
-  message.set_relative_untrimmed(sample.estimate.untrimmed);
-  message.set_left_out_pixels(sample.estimate.left_out_pixels);
-  if (sample.truth) {
-    message.set_true_relative(sample.truth->relative);
-    message.set_true_absolute(sample.truth->absolute);
-    message.set_true_relative_untrimmed(sample.truth->untrimmed);
-  }
-  message.set_missing_relative(sample.missing_relative);
-  message.set_nothing_found(sample.nothing_found);
-  return message;
-}
-
-// The busiest first.
-void AddShares(const std::map<std::string, WorkerShare>& workers, v1::Job& message) {
-  std::vector<std::pair<std::string, WorkerShare>> shares(workers.begin(), workers.end());
-  std::stable_sort(shares.begin(), shares.end(), [](const auto& a, const auto& b) {
-    return a.second.photons > b.second.photons;
-  });
-  for (std::size_t i = 0; i < std::min(shares.size(), kMostShares); ++i) {
-    const auto& [id, share] = shares[i];
-    v1::WorkerShare& item = *message.add_worker_shares();
-    item.set_worker_id(id);
-    item.set_name(share.name);
-    item.set_photons(share.photons);
-    item.set_batches(share.batches);
-    *item.mutable_cpu() = ToProto(share.cpu);
-  }
-}
-
-v1::Job JobToProto(const JobReport& report) {
-  const Job& job = report.job;
-  const JobState state = job.life.state();
-  v1::Job message;
-  message.set_job_id(job.id);
-  message.set_name(job.name);
-  message.set_state(StateToProto(state));
-  message.set_stop_reason(ReasonToProto(job.life.stop_reason()));
-  message.set_failure(job.life.failure());
-  *message.mutable_settings() = ToProto(job.settings);
-  message.set_scene_digest(std::string(job.scene_digest.Bytes()));
-  for (std::size_t i = 0; i < std::min(job.warnings.size(), kMostWarnings); ++i) {
-    message.add_warnings(job.warnings[i]);
-  }
-  for (const Part part : AllParts()) {
-    v1::PartUse& use = *message.add_parts();
-    use.set_part(std::string(NameOf(part)));
-    use.set_is_used(job.needs.Uses(part));
-    use.set_reason(job.needs.ReasonOf(part));
-  }
-  *message.mutable_progress() = ProgressToProto(report);
-  *message.mutable_submitted_at() = ToProto(job.submitted_at);
-  message.set_no_workers(state == JobState::kRunning && report.workers == 0);
-  for (const ErrorSample& sample : job.convergence)
-    *message.add_convergence() = SampleToProto(sample);
-  for (const LightFinding& light : job.lights) {
-    v1::LightFinding& item = *message.add_lights();
-    item.set_name(light.name);
-    item.set_power_share(light.power_share);
-    item.set_photons_sent(light.photons.sent);
-    item.set_in_view_caustic(light.photons.InView(PathClass::kCaustic));
-    item.set_in_view_other(light.photons.InView(PathClass::kOther));
-    item.set_missing_share(light.missing_share);
-  }
-  AddShares(job.workers, message);
-  message.set_has_reference(job.reference.has_value());
-  for (const PhotonStep& step : job.photon_steps)
-    *message.add_photon_steps() = ToProto(step);
-  std::vector<PassTally> parts = job.pass_record.tallies();
-  if (job.tail.passes > 0) parts.push_back(job.tail);
-  for (const PassTally& part : parts) {
-    v1::PassEnergy& item = *message.add_energy_of_passes();
-    item.set_first_pass(part.first_pass);
-    item.set_passes(part.passes);
-    *item.mutable_energy() = ToProto(part.tally).energy();
-  }
-  for (const PhotonKey& key : job.counters.dropped_photons) {
-    v1::PhotonKey& item = *message.add_dropped_photons();
-    item.set_pass(key.pass);
-    item.set_index(key.index);
-  }
-  return message;
-}
 
 StatusOr<Submission> ReadSubmission(const v1::SubmitRequest& request) {
   Submission submission;
@@ -194,7 +35,7 @@ StatusOr<Submission> ReadSubmission(const v1::SubmitRequest& request) {
 }
 
 grpc::Status Put(const StatusOr<JobReport>& report, v1::Job* response) {
-  if (report.ok()) *response = JobToProto(*report);
+  if (report.ok()) *response = ToProto(*report);
   return ToGrpc(report.status());
 }
 
@@ -234,7 +75,7 @@ class JobService::WatchReactor final : public grpc::ServerWriteReactor<v1::Job> 
     sent_state_ = state;
     sent_version_ = report->version;
     has_sent_end_ = report->job.life.has_ended();
-    message_ = JobToProto(*report);
+    message_ = ToProto(*report);
     is_writing_ = true;
     StartWrite(&message_);
   }
@@ -339,7 +180,7 @@ grpc::ServerUnaryReactor* JobService::List(grpc::CallbackServerContext* context,
           : std::min(static_cast<std::size_t>(request->page_size()), kLargestPage);
   const auto [reports, next] = coordinator_.List(count, before);
   for (const JobReport& report : reports)
-    *response->add_jobs() = JobToProto(report);
+    *response->add_jobs() = ToProto(report);
   if (next != 0) response->set_next_page_token(absl::StrCat(next));
   reactor->Finish(grpc::Status::OK);
   return reactor;
@@ -350,6 +191,18 @@ grpc::ServerUnaryReactor* JobService::Cancel(grpc::CallbackServerContext* contex
                                              v1::Job* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(Put(coordinator_.Cancel(request->job_id()), response));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* JobService::Delete(grpc::CallbackServerContext* context,
+                                             const v1::DeleteJobRequest* request,
+                                             v1::DeleteJobResponse* /*response*/) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  // Removes files, which may take long.
+  pools_.scenes.Run(NeededByCaller(context), [this, reactor,
+                                              job_id = request->job_id()](const Status& may_begin) {
+    reactor->Finish(ToGrpc(may_begin.ok() ? coordinator_.Delete(job_id) : may_begin));
+  });
   return reactor;
 }
 

@@ -40,6 +40,9 @@ class JobService final : public v1::JobService::CallbackService {
                                    const v1::ExtendJobRequest* request, v1::Job* response) override;
   grpc::ServerUnaryReactor* Cancel(grpc::CallbackServerContext* context,
                                    const v1::CancelJobRequest* request, v1::Job* response) override;
+  grpc::ServerUnaryReactor* Delete(grpc::CallbackServerContext* context,
+                                   const v1::DeleteJobRequest* request,
+                                   v1::DeleteJobResponse* response) override;
   grpc::ServerWriteReactor<v1::Job>* Watch(grpc::CallbackServerContext* context,
                                            const v1::WatchJobRequest* request) override;
 

@@ -58,8 +58,10 @@ StatusOr<JobTable::Submitted> JobTable::Add(CheckedJob checked, WallTime submitt
     return absl::ResourceExhaustedError(
         absl::StrCat(queue_.size(), " jobs are waiting already; try again later"));
   }
-  const std::uint64_t serial = next_serial_++;
-  Entry& entry = entries_[serial];
+  const std::uint64_t serial = next_serial_;
+  Entry entry;
+  entry.serial = serial;
+  entry.turn = next_turn_;
   entry.request_id = std::move(checked.submission.request_id);
   entry.pinned = std::move(checked.pinned);
   Job& job = entry.job;
@@ -75,9 +77,84 @@ StatusOr<JobTable::Submitted> JobTable::Add(CheckedJob checked, WallTime submitt
   job.reference = checked.submission.reference;
   // A job that must wait is read again later, so that waiting jobs cost no memory.
   if (queue_.is_idle()) entry.scene = std::move(checked.scene);
+  // Before anybody can see it.
+  LUCERNA_RETURN_IF_ERROR(Save(entry, moment.now));
+  ++next_serial_;
+  ++next_turn_;
+  const Entry& added = entries_[serial] = std::move(entry);
   queue_.Push(serial);
   job_waits_.NotifyAll();
-  return Submitted{job.id, job.warnings};
+  return Submitted{added.job.id, added.job.warnings};
+}
+
+// The journal
+// ---------------------------------------------------------------------------------------------
+
+Status JobTable::Save(Entry& entry, SteadyTime now) {
+  if (options_.journal == nullptr) return absl::OkStatus();
+  const Status saved = options_.journal->Save(entry, entry.job.life.Running(now));
+  entry.is_unsaved = !saved.ok();
+  return saved;
+}
+
+void JobTable::Restore(std::vector<JournalEntry> jobs, std::uint64_t next_serial,
+                       const Moment& moment) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  next_serial_ = std::max(next_serial_, next_serial);
+  std::map<std::uint64_t, std::uint64_t> waiting;  // serials by turn
+  for (JournalEntry& job : jobs) {
+    next_turn_ = std::max(next_turn_, job.turn + 1);
+    if (!job.job.life.has_ended()) waiting[job.turn] = job.serial;
+    Entry& entry = entries_[job.serial];
+    static_cast<JournalEntry&>(entry) = std::move(job);
+  }
+  for (const auto& [turn, serial] : waiting)
+    queue_.Push(serial);
+  Retain(dropped, moment);
+}
+
+void JobTable::SaveUnsaved(const Moment& moment) {
+  const MutexLock lock(mutex_);
+  for (auto& [serial, entry] : entries_) {
+    // After the first failure the others would fail too.
+    if (entry.is_unsaved && !Save(entry, moment.now).ok()) return;
+  }
+  while (!unremoved_.empty()) {
+    if (!options_.journal->Remove(*unremoved_.begin()).ok()) return;
+    unremoved_.erase(unremoved_.begin());
+  }
+}
+
+JobTable::NeededFiles JobTable::Needed() const {
+  const MutexLock lock(mutex_);
+  NeededFiles needed;
+  for (const auto& [serial, entry] : entries_) {
+    for (const auto& [path, file] : entry.job.manifest.entries)
+      needed.blobs.insert(file.digest);
+    if (entry.job.reference) needed.blobs.insert(*entry.job.reference);
+    if (entry.image_digest) needed.blobs.insert(*entry.image_digest);
+    if (entry.has_checkpoint || !entry.job.life.has_ended()) {
+      needed.checkpoints.insert(entry.job.id);
+    }
+  }
+  return needed;
+}
+
+Status JobTable::Delete(const std::string& job_id, const Moment& /*moment*/) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  if (!found->second.job.life.has_ended()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("job ", job_id, " has not ended; cancel or stop it first"));
+  }
+  if (options_.journal != nullptr) {
+    LUCERNA_RETURN_IF_ERROR(options_.journal->Remove(found->first));
+  }
+  dropped.entries.push_back(entries_.extract(found));
+  return absl::OkStatus();
 }
 
 // Requests
@@ -132,6 +209,10 @@ void JobTable::End(std::uint64_t serial, Entry& entry, const Status& why, const 
   if (before == JobState::kRunning) {
     entry.job.counters.coordinator_cpu = moment.cpu - entry.cpu_at_start;
   }
+  entry.job.ended_at = moment.wall;
+  entry.job.condition.clear();
+  entry.has_checkpoint = false;
+  Save(entry, moment.now).IgnoreError();
   ++entry.version;
   dropped.scenes.push_back(std::exchange(entry.scene, std::nullopt));
   if (entry.runner) {
@@ -153,7 +234,7 @@ StatusOr<JobReport> JobTable::Cancel(const std::string& job_id, const Moment& mo
   End(found->first, found->second, absl::CancelledError("the user cancelled the job"), moment,
       dropped);
   JobReport report = MakeReport(found->second, moment);
-  Retain(dropped);
+  Retain(dropped, moment);
   return report;
 }
 
@@ -163,7 +244,7 @@ void JobTable::Fail(const std::string& job_id, const Status& why, const Moment& 
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return;
   End(found->first, found->second, why, moment, dropped);
-  Retain(dropped);
+  Retain(dropped, moment);
 }
 
 StatusOr<JobReport> JobTable::Stop(const std::string& job_id, const Moment& moment) {
@@ -196,15 +277,18 @@ StatusOr<JobReport> JobTable::Extend(const std::string& job_id, const RenderOver
       return absl::FailedPreconditionError(
           absl::StrCat("job ", job_id, " was cancelled or failed; submit it again"));
     }
-    if (!entry.runner || is_closed_) {
+    if ((!entry.runner && !entry.has_checkpoint) || is_closed_) {
       return absl::FailedPreconditionError(absl::StrCat(
           "job ", job_id,
           " ended so long ago that its photons are not kept any more; submit it again"));
     }
     job.life.Extend();
-    entry.runner->Reopen(settings);
+    if (entry.runner) entry.runner->Reopen(settings);
     // The image grows from now on.
     dropped.images.push_back(std::exchange(entry.image, nullptr));
+    entry.image_digest.reset();
+    job.ended_at.reset();
+    entry.turn = next_turn_++;
     queue_.Push(found->first);
     job_waits_.NotifyAll();
   } else if (entry.runner) {
@@ -212,11 +296,16 @@ StatusOr<JobReport> JobTable::Extend(const std::string& job_id, const RenderOver
   }
   job.settings = std::move(settings);
   ++entry.version;
+  Save(entry, moment.now).IgnoreError();
   return MakeReport(entry, moment);
 }
 
 JobTable::ImageSource JobTable::MakeImageSource(const Entry& entry, const Moment& moment) const {
-  return {entry.image, entry.runner, entry.job, entry.job.life.Running(moment.now),
+  return {entry.image,
+          entry.image_digest,
+          entry.runner,
+          entry.job,
+          entry.job.life.Running(moment.now),
           moment.cpu - entry.cpu_at_start};
 }
 
@@ -226,14 +315,15 @@ StatusOr<JobTable::ImageSource> JobTable::FindImage(const std::string& job_id,
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return UnknownJob(job_id);
   const Entry& entry = found->second;
-  if (!entry.image && entry.job.life.has_ended()) {
+  const bool has_image = entry.image || entry.image_digest;
+  if (!has_image && entry.job.life.has_ended()) {
     return absl::FailedPreconditionError(
         absl::StrCat("job ", job_id,
                      entry.job.life.state() == JobState::kSucceeded
                          ? " ended so long ago that its image is not kept any more; submit it again"
                          : " was cancelled or failed and has no image"));
   }
-  if (!entry.image && !entry.runner) {
+  if (!has_image && !entry.runner) {
     return absl::FailedPreconditionError(
         absl::StrCat("job ", job_id, " has not begun to run; try again later"));
   }
@@ -334,7 +424,7 @@ std::optional<JobTable::ImageSource> JobTable::DescribeRun(const std::string& jo
 }
 
 bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,
-                       const Moment& moment) {
+                       const Moment& moment, std::optional<Digest> image_digest) {
   Dropped dropped;
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
@@ -342,10 +432,62 @@ bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,
   Entry& entry = found->second;
   if (!entry.job.life.Succeed(reason, moment.now)) return false;
   entry.job.counters.coordinator_cpu = moment.cpu - entry.cpu_at_start;
+  entry.job.ended_at = moment.wall;
+  entry.job.condition.clear();
   entry.image = std::move(image);
+  entry.image_digest = image_digest;
   ++entry.version;
-  Retain(dropped);
+  Save(entry, moment.now).IgnoreError();
+  Retain(dropped, moment);
   return true;
+}
+
+void JobTable::GoOnFrom(const std::string& job_id, Job record, Duration ran) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  Job& job = found->second.job;
+  record.life = job.life;
+  record.life.SetRanBefore(ran);
+  record.settings = job.settings;
+  record.submitted_at = job.submitted_at;
+  record.events = job.events;
+  record.condition.clear();
+  record.ended_at.reset();
+  job = std::move(record);
+  found->second.has_checkpoint = true;
+  ++found->second.version;
+}
+
+void JobTable::SetCondition(const std::string& job_id, std::string condition,
+                            const Moment& moment) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  Job& job = found->second.job;
+  if (job.condition == condition || job.life.has_ended()) return;
+  if (condition.empty()) {
+    job.life.GoOn(moment.now);
+  } else {
+    job.life.Pause(moment.now);
+  }
+  job.AddEvent(moment.wall, condition.empty() ? "went on" : condition);
+  job.condition = std::move(condition);
+  ++found->second.version;
+}
+
+void JobTable::AddEvent(const std::string& job_id, std::string what, const Moment& moment) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  found->second.job.AddEvent(moment.wall, std::move(what));
+  ++found->second.version;
+}
+
+void JobTable::OnCheckpoint(const std::string& job_id) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found != entries_.end()) found->second.has_checkpoint = true;
 }
 
 void JobTable::OnRunning(const std::string& job_id, const Moment& moment) {
@@ -424,7 +566,7 @@ void JobTable::Close(const Status& why) {
   job_waits_.NotifyAll();
 }
 
-void JobTable::Retain(Dropped& dropped) {
+void JobTable::Retain(Dropped& dropped, const Moment& moment) {
   std::vector<std::uint64_t> serials;
   std::vector<EndedJob> ended;
   for (auto item = entries_.rbegin(); item != entries_.rend(); ++item) {
@@ -433,10 +575,11 @@ void JobTable::Retain(Dropped& dropped) {
     const RenderSettings& settings = entry.job.settings;
     serials.push_back(item->first);
     ended.push_back(
-        {.has_photons = entry.runner != nullptr,
+        {.has_photons = entry.runner != nullptr || entry.has_checkpoint,
          .pixels = std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()},
          .has_image = entry.image != nullptr,
-         .image_bytes = entry.image ? entry.image->size() : 0});
+         .image_bytes = entry.image ? entry.image->size() : 0,
+         .age = entry.job.ended_at ? moment.wall - *entry.job.ended_at : Duration::zero()});
   }
   const std::vector<KeptOfJob> kept = DecideRetention(ended, options_.retention);
   for (std::size_t i = 0; i < kept.size(); ++i) {
@@ -444,13 +587,19 @@ void JobTable::Retain(Dropped& dropped) {
     Entry& entry = found->second;
     if (!kept[i].photons) {
       dropped.runners.push_back(std::exchange(entry.runner, nullptr));
+      entry.has_checkpoint = false;
       // The one that has just ended is still in use by its thread; its files go with its turn.
       if (queue_.current() != found->first) {
         dropped.pinned.push_back(std::exchange(entry.pinned, {}));
       }
     }
     if (!kept[i].image) dropped.images.push_back(std::exchange(entry.image, nullptr));
-    if (!kept[i].record) dropped.entries.push_back(entries_.extract(found));
+    if (!kept[i].record) {
+      if (options_.journal != nullptr && !options_.journal->Remove(found->first).ok()) {
+        unremoved_.insert(found->first);
+      }
+      dropped.entries.push_back(entries_.extract(found));
+    }
   }
 }
 

@@ -7,13 +7,19 @@
 // Ended jobs are remembered, with the images of the newest; the very newest also with all their
 // photons, so that they can go on (server/job_retention.h).
 //
-// Threads: any. Only WaitForTurn waits. What is dropped is destroyed outside the lock.
+// With a journal, what a request changes is on the disk before it returns. Where that fails, a new
+// job is refused; any other change holds in memory and is written by SaveUnsaved as soon as it can
+// be.
+//
+// Threads: any. Only WaitForTurn waits, and others for the journal's disk. What is dropped is
+// destroyed outside the lock.
 #pragma once
 
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -27,6 +33,7 @@
 #include "server/commit_accounting.h"
 #include "server/job.h"
 #include "server/job_intake.h"
+#include "server/job_journal.h"
 #include "server/job_queue.h"
 #include "server/job_retention.h"
 #include "server/running_job.h"
@@ -37,6 +44,7 @@ namespace lucerna {
 struct Moment {
   SteadyTime now;
   Duration cpu{};
+  WallTime wall{};
 };
 
 // A job as it is now, for people.
@@ -54,8 +62,21 @@ class JobTable {
     std::string instance;  // in front of every job's id
     std::size_t max_waiting = 256;
     RetentionLimits retention;
+    JobJournal* journal = nullptr;  // outlives the table; nullptr: jobs end with the process
   };
   explicit JobTable(Options options);
+
+  // Takes in the jobs of earlier processes: those that have not ended wait for their turns.
+  // `next_serial` is larger than the numbers of all jobs there have been. Before all other calls.
+  void Restore(std::vector<JournalEntry> jobs, std::uint64_t next_serial, const Moment& moment);
+  // Writes what could not be written when it changed.
+  void SaveUnsaved(const Moment& moment);
+  // What jobs need on the disk.
+  struct NeededFiles {
+    std::set<Digest> blobs;
+    std::set<std::string> checkpoints;  // ids of jobs
+  };
+  [[nodiscard]] NeededFiles Needed() const;
 
   struct Submitted {
     std::string job_id;  // empty when only validated
@@ -64,7 +85,8 @@ class JobTable {
   // The job of an earlier submission with this request id.
   [[nodiscard]] std::optional<Submitted> FindRequest(const std::string& request_id) const;
   // The new job, or that of the same request id, if there is one by now.
-  // Errors: RESOURCE_EXHAUSTED when too many jobs wait, UNAVAILABLE after Close.
+  // Errors: RESOURCE_EXHAUSTED when too many jobs wait, UNAVAILABLE after Close, or what the
+  // journal says.
   [[nodiscard]] StatusOr<Submitted> Add(CheckedJob job, WallTime submitted_at,
                                         const Moment& moment);
 
@@ -84,12 +106,16 @@ class JobTable {
   // its photons are not kept any more.
   [[nodiscard]] StatusOr<JobReport> Extend(const std::string& job_id, const RenderOverrides& until,
                                            const Moment& moment);
+  // Forgets a job that has ended. Errors: FAILED_PRECONDITION when it has not, or what the journal
+  // says.
+  [[nodiscard]] Status Delete(const std::string& job_id, const Moment& moment);
   // Ends a job as failed. Nothing when there is no such job, or it has ended.
   void Fail(const std::string& job_id, const Status& why, const Moment& moment);
 
   // The image of a job, or what it can be made from.
   struct ImageSource {
-    Blob image;  // when the job has ended; else:
+    Blob image;                          // when the job has ended and it is in memory
+    std::optional<Digest> image_digest;  // when it has ended and it is on the disk; else:
     std::shared_ptr<RunningJob> runner;
     Job job;
     Duration running{};
@@ -133,9 +159,17 @@ class JobTable {
   // The job as it is now with what it has cost; absent when it has been dropped.
   [[nodiscard]] std::optional<ImageSource> DescribeRun(const std::string& job_id,
                                                        const Moment& moment) const;
-  // False when the job has ended meanwhile.
-  bool Succeed(const std::string& job_id, StopReason reason, Blob image, const Moment& moment);
+  // `image_digest` when the image is on the disk. False when the job has ended meanwhile.
+  bool Succeed(const std::string& job_id, StopReason reason, Blob image, const Moment& moment,
+               std::optional<Digest> image_digest = std::nullopt);
+  // The job goes on from a checkpoint: its record is what it was then, but for its settings.
+  void GoOnFrom(const std::string& job_id, Job record, Duration ran);
 
+  // Why the job does not go on though it runs; empty: it goes on.
+  void SetCondition(const std::string& job_id, std::string condition, const Moment& moment);
+  void AddEvent(const std::string& job_id, std::string what, const Moment& moment);
+  // The job's checkpoint is on the disk.
+  void OnCheckpoint(const std::string& job_id);
   // What the runner reports.
   void OnRunning(const std::string& job_id, const Moment& moment);
   void OnWarning(const std::string& job_id, std::string warning);
@@ -150,15 +184,14 @@ class JobTable {
   void Close(const Status& why);
 
  private:
-  struct Entry {
-    std::string request_id;
-    Job job;
+  struct Entry : JournalEntry {
     std::optional<Scene> scene;  // kept from Add when it will be rendered at once
     std::shared_ptr<RunningJob> runner;
     Blob image;
     std::uint64_t version = 0;
     Duration cpu_at_start{};  // less what earlier runs took
     PinnedBlobs pinned;       // while the job may need its files
+    bool is_unsaved = false;  // the journal has it as it was before
   };
   using Entries = std::map<std::uint64_t, Entry>;  // by serial number
   // What was taken from the table under the lock, to be destroyed after it.
@@ -181,13 +214,17 @@ class JobTable {
   // Ends a job's life and stops its runner. Nothing when it has ended.
   void End(std::uint64_t serial, Entry& entry, const Status& why, const Moment& moment,
            Dropped& dropped) LUCERNA_REQUIRES(mutex_);
-  void Retain(Dropped& dropped) LUCERNA_REQUIRES(mutex_);
+  void Retain(Dropped& dropped, const Moment& moment) LUCERNA_REQUIRES(mutex_);
+  // Of an entry that has changed.
+  Status Save(Entry& entry, SteadyTime now) LUCERNA_REQUIRES(mutex_);
 
   const Options options_;
   mutable Mutex mutex_;
   Condition job_waits_;
   bool is_closed_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::uint64_t next_serial_ LUCERNA_GUARDED_BY(mutex_) = 1;
+  std::uint64_t next_turn_ LUCERNA_GUARDED_BY(mutex_) = 1;
+  std::set<std::uint64_t> unremoved_ LUCERNA_GUARDED_BY(mutex_);  // from the journal
   Entries entries_ LUCERNA_GUARDED_BY(mutex_);
   JobQueue queue_ LUCERNA_GUARDED_BY(mutex_);
 };

@@ -2,10 +2,13 @@
 //
 // Says "listening on ADDRESS:PORT" on stdout once it accepts calls; everything else it has to say
 // is a log line on stderr. SIGTERM and SIGINT end it in order.
+#include <chrono>
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <memory>
+#include <ratio>
 #include <string>
 #include <string_view>
 
@@ -17,6 +20,7 @@
 #include <spdlog/spdlog.h>
 
 #include "render/base/clock.h"
+#include "render/base/fail_point.h"
 #include "render/base/memory.h"
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
@@ -25,6 +29,7 @@
 #include "server/coordinator.h"
 #include "server/image_service.h"
 #include "server/job_service.h"
+#include "server/state/durable_state.h"
 #include "server/work_pool.h"
 #include "server/worker_service.h"
 
@@ -32,13 +37,18 @@ namespace lucerna {
 namespace {
 
 constexpr int kExitUsage = 2;
+constexpr int kExitNoState = 1;
 constexpr int kExitCannotListen = 3;
+// For commits whose bytes are on their way when the process is to end.
+constexpr std::chrono::seconds kTimeForCommits{5};
 constexpr long kTickNanos = 50'000'000;
 
 struct Flags {
   std::string listen = "127.0.0.1:7400";
   bool allow_insecure_network = false;
   std::string log_level = "info";
+  std::string state;
+  double keep_days = 0;
   Coordinator::Options coordinator;
 };
 
@@ -54,7 +64,20 @@ sigset_t BlockEndSignals() {
 
 int Serve(const Flags& flags) {
   const sigset_t end_signals = BlockEndSignals();
-  Coordinator coordinator(flags.coordinator, SystemClock());
+  const Clock& clock = SystemClock();
+  std::unique_ptr<DurableState> state;
+  if (!flags.state.empty()) {
+    StatusOr<std::unique_ptr<DurableState>> opened = DurableState::Open(
+        flags.state, absl::StrCat(absl::Hex(clock.Wall().time_since_epoch().count() / 1000)),
+        {clock.Steady(), ProcessCpuTime(), clock.Wall()});
+    if (!opened.ok()) {
+      std::fprintf(stderr, "lucerna-server: --state %s: %s\n", flags.state.c_str(),
+                   std::string(opened.status().message()).c_str());
+      return kExitNoState;
+    }
+    state = *std::move(opened);
+  }
+  Coordinator coordinator(flags.coordinator, clock, std::move(state));
   WorkPools pools;
   AssetService assets(coordinator.blobs(), pools);
   JobService jobs(coordinator, pools, SystemClock());
@@ -90,11 +113,16 @@ int Serve(const Flags& flags) {
     jobs.Tick();
   }
   spdlog::info("ending");
-  coordinator.Close();
-  pools.Close();
+  server->GetHealthCheckService()->SetServingStatus(false);
+  // Calls that are under way end by themselves, commits well, before the job is stopped and kept.
+  coordinator.StopLending();
+  for (WorkPool* const pool : {&pools.scenes, &pools.uploads, &pools.images})
+    pool->Close();
   jobs.Close();
-  server->Shutdown(DeadlineIn(std::chrono::seconds(1)));
+  server->Shutdown(DeadlineIn(kTimeForCommits));
   server->Wait();
+  pools.Close();
+  coordinator.Close();
   return 0;
 }
 
@@ -116,6 +144,23 @@ int Main(int argc, char** argv) {
   app.add_option(
          "--max-job-bytes", flags.coordinator.max_job_bytes,
          "memory for the image and the scene of one job [bytes]; 0: what is free at the start")
+      ->capture_default_str();
+  app.add_option(
+      "--state", flags.state,
+      "folder that keeps jobs, images and checkpoints, so that a later start goes on with "
+      "them; without it they end with the process");
+  app.add_option("--checkpoint-share", flags.coordinator.checkpoint_share,
+                 "share of a job's time that its checkpoints may take, above 0; 1: one after every "
+                 "round")
+      ->check(CLI::Range(1e-9, 1.0))
+      ->capture_default_str();
+  app.add_option("--keep-jobs", flags.coordinator.retention.jobs,
+                 "how many jobs that have ended are kept, the newest")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  app.add_option("--keep-days", flags.keep_days,
+                 "how long jobs that have ended are kept [days]; 0: no limit")
+      ->check(CLI::Range(0.0, 36500.0))
       ->capture_default_str();
   app.add_option("--batch-photons", flags.coordinator.batch_photons,
                  "photons in every batch; 0: by the number of workers")
@@ -142,6 +187,9 @@ int Main(int argc, char** argv) {
                  flags.listen.c_str());
     return kExitUsage;
   }
+  flags.coordinator.retention.age = std::chrono::duration_cast<Duration>(
+      std::chrono::duration<double, std::ratio<86400>>(flags.keep_days));
+  if (const char* const fail_point = std::getenv("LUCERNA_FAIL_POINT")) ArmFailPoint(fail_point);
   spdlog::set_default_logger(spdlog::stderr_color_mt("lucerna-server"));
   spdlog::set_level(spdlog::level::from_str(flags.log_level));
   return Serve(flags);

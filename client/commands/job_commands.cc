@@ -1,7 +1,9 @@
 #include "client/commands/job_commands.h"
 
 #include <cstdio>
+#include <filesystem>
 #include <optional>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -9,6 +11,7 @@
 
 #include "client/connection.h"
 #include "client/exit_code.h"
+#include "client/interruption.h"
 #include "client/job_run.h"
 #include "client/scene_reading.h"
 #include "client/view/progress_view.h"
@@ -74,16 +77,85 @@ Status Nothing() {
 
 }  // namespace
 
+namespace {
+
+// Beside the image; empty when that is no file (a device, a pipe), or none are wanted.
+std::string CheckpointFolder(const RenderRequest& request) {
+  const std::string& image =
+      request.outputs.exr.empty() ? request.outputs.png : request.outputs.exr;
+  std::error_code error;
+  const auto type = std::filesystem::status(image, error).type();
+  const bool is_file =
+      type == std::filesystem::file_type::regular || type == std::filesystem::file_type::not_found;
+  return request.keeps_checkpoints && is_file ? image + ".checkpoints" : "";
+}
+
+// After an interruption: the image so far, and how to go on.
+Status EndInterrupted(LocalRuns& runs, const RenderRequest& request, bool has_checkpoints) {
+  if (!has_checkpoints) return Failure(ExitCode::kInterrupted, "interrupted");
+  ClearInterruption();
+  std::string message = "interrupted before the first image";
+  if (!runs.job_id().empty()) {
+    if (const auto saved = Save(runs.connection(), runs.job_id(), request.outputs); saved.ok()) {
+      message = absl::StrCat("interrupted; the image so far is in ",
+                             absl::StrJoin(saved->paths, " and "));
+    } else if (!absl::IsFailedPrecondition(saved.status())) {
+      message = absl::StrCat("interrupted; the image so far cannot be had: ",
+                             std::string(saved.status().message()));
+    }
+  }
+  return Failure(ExitCode::kInterrupted,
+                 absl::StrCat(message, "; the same command with --resume goes on"));
+}
+
+}  // namespace
+
 Status Render(const RenderRequest& request, const ClusterOptions& cluster_options,
               const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene_path, request.overrides, output_options.quiet));
-  LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster_options));
-  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job,
-                           runs->Run(request.scene_path, manifest, request.overrides,
-                                     request.reference, output_options));
-  return SaveAndReport(runs->connection(), job, request.outputs, output_options);
+  ClusterOptions options = cluster_options;
+  options.state_folder = CheckpointFolder(request);
+  const std::string& folder = options.state_folder;
+  std::error_code ignored;
+  if (request.resumes) {
+    if (folder.empty() || !std::filesystem::exists(folder, ignored)) {
+      return absl::FailedPreconditionError(absl::StrCat(
+          folder, ": there is no interrupted render to go on with; leave --resume away"));
+    }
+  } else if (!folder.empty()) {
+    // Of a render that was interrupted and is not wanted any more.
+    std::filesystem::remove_all(folder, ignored);
+  }
+  StatusOr<v1::Job> job;
+  {
+    LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(options));
+    job = request.resumes ? runs->Resume(manifest, request.overrides, output_options)
+                          : runs->Run(request.scene_path, manifest, request.overrides,
+                                      request.reference, output_options);
+    if (ExitCodeOf(job.status()) == ExitCode::kInterrupted) {
+      return EndInterrupted(*runs, request, !folder.empty());
+    }
+    if (job.ok()) {
+      // What cannot be written now is still in the folder.
+      LUCERNA_RETURN_IF_ERROR(
+          SaveAndReport(runs->connection(), *job, request.outputs, output_options));
+    }
+  }
+  if (folder.empty()) return job.status();
+  // A process that died says nothing about the job.
+  const bool can_go_on = absl::IsInternal(job.status()) ||
+                         ExitCodeOf(job.status()) == ExitCode::kUnreachable ||
+                         (request.resumes && !job.ok());
+  if (can_go_on) {
+    Status status = job.status();
+    if (!absl::IsInternal(status)) return status;
+    return absl::InternalError(
+        absl::StrCat(std::string(status.message()), "\nthe same command with --resume goes on"));
+  }
+  std::filesystem::remove_all(folder, ignored);
+  return job.status();
 }
 
 Status Submit(const RenderRequest& request, const std::string& server,
@@ -214,6 +286,14 @@ Status Cancel(const std::string& job_id, const std::string& server,
               const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   return Acknowledge(connection->Cancel(job_id), output_options);
+}
+
+Status DeleteJob(const std::string& job_id, const std::string& server,
+                 const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  LUCERNA_RETURN_IF_ERROR(connection->Delete(job_id));
+  if (!output_options.quiet) Print(absl::StrCat("job ", job_id, " is deleted\n"));
+  return absl::OkStatus();
 }
 
 Status StopJob(const std::string& job_id, const std::string& server,

@@ -26,9 +26,12 @@ struct RenderRequest {
   RenderOverrides overrides;
   std::string reference;  // EXR file to measure the true error by; empty: none
   OutputPaths outputs;
+  bool keeps_checkpoints = true;  // of `render`: in a folder beside the image
+  bool resumes = false;           // goes on from there
 };
 
-// Renders on a coordinator and workers of its own; an interruption cancels the job.
+// Renders on a coordinator and workers of its own. An interruption writes the image so far and
+// leaves the checkpoints.
 [[nodiscard]] Status Render(const RenderRequest& request, const ClusterOptions& cluster,
                             const OutputOptions& output_options);
 
@@ -56,6 +59,10 @@ struct ReportPaths {
 // Tells how a job went, be it over or not: image, error, workers.
 [[nodiscard]] Status Report(const std::string& job_id, const ReportPaths& paths,
                             const std::string& server, const OutputOptions& output_options);
+
+// Forgets a job that has ended.
+[[nodiscard]] Status DeleteJob(const std::string& job_id, const std::string& server,
+                               const OutputOptions& output_options);
 
 // Ends the job with the image as it is.
 [[nodiscard]] Status StopJob(const std::string& job_id, const std::string& server,

@@ -175,6 +175,7 @@ std::string ProgressLine(const v1::Job& job) {
   std::string line =
       absl::StrFormat("%s %3.0f %%  %s  %s photons", Bar(share), std::floor(100 * share),
                       Passes(job), ShortCount(static_cast<double>(job.progress().photons())));
+  if (!job.condition().empty()) return line + "  " + job.condition();
   if (job.no_workers()) return line + "  no worker is connected; waiting for one";
   absl::StrAppendFormat(&line, "  %s/s  %s", ShortCount(job.progress().photons_per_second()),
                         ShortTime(FromProto(job.progress().running())));

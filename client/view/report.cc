@@ -86,6 +86,7 @@ Json JobOf(const v1::Job& job) {
   if (job.state() == v1::JOB_STATE_SUCCEEDED) json["stop_reason"] = NameOf(job.stop_reason());
   if (job.state() == v1::JOB_STATE_FAILED) json["failure"] = job.failure();
   if (job.no_workers()) json["no_workers"] = true;
+  if (!job.condition().empty()) json["condition"] = job.condition();
   if (job.has_submitted_at()) {
     json["submitted_at"] = google::protobuf::util::TimeUtil::ToString(job.submitted_at());
   }
@@ -119,6 +120,11 @@ Json JobOf(const v1::Job& job) {
   json["warnings"] = Json::array();
   for (const std::string& warning : job.warnings())
     json["warnings"].push_back(warning);
+  json["events"] = Json::array();
+  for (const v1::JobEvent& event : job.events()) {
+    json["events"].push_back(
+        {{"at", google::protobuf::util::TimeUtil::ToString(event.at())}, {"what", event.what()}});
+  }
   json["parts"] = Json::array();
   for (const v1::PartUse& use : job.parts()) {
     json["parts"].push_back(

@@ -450,6 +450,17 @@ std::string Warnings(const v1::Job& job) {
   return html + "</ul>\n</section>\n";
 }
 
+std::string Events(const v1::Job& job) {
+  if (job.events().empty()) return {};
+  std::string html = "<section>\n<h2>Events</h2>\n<ul class=\"warnings\">\n";
+  for (const v1::JobEvent& event : job.events()) {
+    absl::StrAppend(&html, "<li>",
+                    EscapeMarkup(google::protobuf::util::TimeUtil::ToString(event.at())), ": ",
+                    EscapeMarkup(event.what()), "</li>\n");
+  }
+  return html + "</ul>\n</section>\n";
+}
+
 std::string Parts(const v1::Job& job) {
   if (job.parts().empty()) return {};
   std::string html = "<section>\n<h2>What was left out</h2>\n" +
@@ -488,7 +499,8 @@ std::string ReportPage(const v1::Job& job, const std::optional<PageImage>& image
       "</style>\n</head>\n<body>\n<main>\n<header>\n<h1>", name, "</h1>\n<p class=\"muted\">",
       subtitle, "</p>\n</header>\n<div class=\"top\">\n", ImageFigure(job, image), "<div>\n",
       Headline(job), RunFacts(job), "</div>\n</div>\n", Convergence(job), Workers(job),
-      Samples(job), Warnings(job), Lights(job), Energy(job), Parts(job), SettingFacts(job, image),
+      Samples(job), Warnings(job), Events(job), Lights(job), Energy(job), Parts(job),
+      SettingFacts(job, image),
       "<footer>Made by <code>lucerna report</code>. Time is wall time since the job "
       "began to run.</footer>\n</main>\n</body>\n</html>\n");
 }

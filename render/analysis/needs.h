@@ -86,6 +86,11 @@ class SceneNeeds {
     return entries_[Index(part)].reason;
   }
 
+  // For needs that come without reasons.
+  void GiveReason(Part part, std::string reason) {
+    entries_[Index(part)].reason = std::move(reason);
+  }
+
   // How many sets of eye paths there are, used in turn; 0: each pass has its own.
   [[nodiscard]] int eye_sample_sets() const { return eye_sample_sets_; }
   // Empty when Part::kUnreachableLights and Part::kDirectSampling are forced.

@@ -11,6 +11,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "render/base/fail_point.h"
+
 namespace lucerna {
 namespace {
 
@@ -35,6 +37,8 @@ Status FromErrno(int error, const std::string& path, const char* doing) {
       return absl::UnavailableError(message);
   }
 }
+
+constexpr std::string_view kTemporarySuffix = ".tmp";
 
 // An open descriptor that closes itself.
 class Descriptor {
@@ -70,7 +74,7 @@ std::string BehindLinks(const std::string& path) {
 // Two writers of one path in one process do not share a temporary name.
 std::string TemporaryBeside(const std::string& path) {
   static std::atomic<unsigned> serial = 0;
-  return absl::StrCat(path, ".", ::getpid(), ".", serial++, ".tmp");
+  return absl::StrCat(path, ".", ::getpid(), ".", serial++, std::string(kTemporarySuffix));
 }
 
 Status WriteAll(int descriptor, std::string_view bytes, const std::string& path) {
@@ -82,6 +86,13 @@ Status WriteAll(int descriptor, std::string_view bytes, const std::string& path)
     }
     bytes.remove_prefix(static_cast<std::size_t>(written));
   }
+  return absl::OkStatus();
+}
+
+Status WriteAndSync(int descriptor, std::span<const std::string_view> pieces,
+                    const std::string& path) {
+  for (const std::string_view piece : pieces)
+    LUCERNA_RETURN_IF_ERROR(WriteAll(descriptor, piece, path));
   if (::fsync(descriptor) != 0) return FromErrno(errno, path, "cannot write");
   return absl::OkStatus();
 }
@@ -117,18 +128,22 @@ StatusOr<std::string> ReadFile(const std::string& path, std::uint64_t max_size_b
   return bytes;
 }
 
-Status WriteFile(const std::string& path, std::string_view bytes) {
+Status WriteFile(const std::string& path, std::string_view bytes, std::string_view step) {
+  return WriteFile(path, std::span<const std::string_view>(&bytes, 1), step);
+}
+
+Status WriteFile(const std::string& path, std::span<const std::string_view> pieces,
+                 std::string_view step) {
+  const auto reach = [&](const char* part) {
+    if (!step.empty()) FailPoint(absl::StrCat(std::string(step), part));
+  };
   // A device or a pipe cannot be replaced by a rename; it takes the bytes as they come.
   struct stat existing {};
   if (::stat(path.c_str(), &existing) == 0 && !S_ISREG(existing.st_mode)) {
     Descriptor device(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
     if (device.number() < 0) return FromErrno(errno, path, "cannot open");
-    while (!bytes.empty()) {
-      const ssize_t written = ::write(device.number(), bytes.data(), bytes.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) return FromErrno(errno, path, "cannot write");
-      bytes.remove_prefix(static_cast<std::size_t>(written));
-    }
+    for (const std::string_view piece : pieces)
+      LUCERNA_RETURN_IF_ERROR(WriteAll(device.number(), piece, path));
     return absl::OkStatus();
   }
 
@@ -136,8 +151,9 @@ Status WriteFile(const std::string& path, std::string_view bytes) {
   const std::string temporary = TemporaryBeside(target);
   Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
   if (file.number() < 0) return FromErrno(errno, path, "cannot create");
-  Status status = WriteAll(file.number(), bytes, path);
+  Status status = WriteAndSync(file.number(), pieces, path);
   if (file.Close() != 0 && status.ok()) status = FromErrno(errno, path, "cannot write");
+  if (status.ok()) reach(".synced");
   if (status.ok() && ::rename(temporary.c_str(), target.c_str()) != 0) {
     status = FromErrno(errno, path, "cannot replace");
   }
@@ -148,7 +164,12 @@ Status WriteFile(const std::string& path, std::string_view bytes) {
   // The rename itself is on the disk only when the folder is.
   Descriptor folder(::open(FolderOf(target).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (folder.number() >= 0) ::fsync(folder.number());
+  reach(".renamed");
   return absl::OkStatus();
+}
+
+bool IsUnfinished(std::string_view path) {
+  return path.ends_with(kTemporarySuffix);
 }
 
 bool IsSameFile(const std::string& a, const std::string& b) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -19,9 +20,17 @@ namespace lucerna {
                                              std::uint64_t max_size_bytes = std::uint64_t{8} << 30);
 
 // Writes `bytes` beside `path`, syncs them, and renames them over it. A link stays a link, to the
-// new bytes.
+// new bytes. A `step` that is not empty names the fail points STEP.synced, before the rename, and
+// STEP.renamed, after it (base/fail_point.h).
 // Errors: what the system said, with the path; then no file of ours is left behind.
-[[nodiscard]] Status WriteFile(const std::string& path, std::string_view bytes);
+[[nodiscard]] Status WriteFile(const std::string& path, std::string_view bytes,
+                               std::string_view step = {});
+// The same with bytes that lie in several pieces, one after the other.
+[[nodiscard]] Status WriteFile(const std::string& path, std::span<const std::string_view> pieces,
+                               std::string_view step);
+
+// Whether the name of a file is that of one that WriteFile had not finished when the process ended.
+[[nodiscard]] bool IsUnfinished(std::string_view path);
 
 // Whether both paths lead to one place, be there a file or not: writing one would replace the
 // other.

@@ -41,33 +41,33 @@ ImageSums::Columns::Columns(std::size_t pixels)
 }
 
 void ImageSums::Add(const SliceSums& slice, ThreadTeam& team) {
-  LUCERNA_CHECK(slice.passes.first == passes_ && slice.pixels() == pixels());
+  LUCERNA_CHECK(slice.passes.first == whole_.passes && slice.pixels() == pixels());
   tail_.clear();
   constexpr std::size_t kPixelsAtOnce = 4096;
   team.For(pixels(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
     AddPixels(slice, begin, end);
     if (!HasFeatures(slice.passes)) return;
     for (std::size_t pixel = begin; pixel < end; ++pixel)
-      AddTo(features_[pixel], slice, pixel);
+      AddTo(whole_.features[pixel], slice, pixel);
   });
-  passes_ = slice.passes.last;
-  eye_rays_ += slice.eye_rays;
-  tally_ += slice.tally;
+  whole_.passes = slice.passes.last;
+  whole_.eye_rays += slice.eye_rays;
+  whole_.tally += slice.tally;
 }
 
 // Column by column, as vectors. AddTo does the same to one pixel, with the same bits.
 void ImageSums::AddPixels(const SliceSums& slice, std::size_t begin, std::size_t end) {
-  const auto passes = static_cast<double>(passes_);
+  const auto passes = static_cast<double>(whole_.passes);
   const auto slice_passes = static_cast<double>(slice.passes.size());
   const auto column = [&](std::size_t c) { return slice.columns[c].data(); };
   std::array<double*, 6> radiance{};
   std::array<const float*, 6> added{};
   for (std::size_t c = 0; c < 6; ++c) {
-    radiance[c] = columns_.radiance[c].data();
+    radiance[c] = whole_.columns.radiance[c].data();
     added[c] = column(kPhotonRadiance + c);
   }
   static_assert(kDirectRadiance == kPhotonRadiance + 3);
-  float* const deviations = columns_.squared_deviations.data();
+  float* const deviations = whole_.columns.squared_deviations.data();
   const float* const slice_deviations = column(kSquaredDeviations);
   // Before the radiance is added up.
   for (std::size_t i = begin; i < end; ++i) {
@@ -92,18 +92,24 @@ void ImageSums::AddPixels(const SliceSums& slice, std::size_t begin, std::size_t
       sum[i] += of_slice[i];
   };
   for (std::size_t c = 0; c < 3; ++c)
-    add(columns_.half_difference[c], kHalfDifference + c);
-  add(columns_.even_bias, kEvenBias);
-  add(columns_.odd_bias, kOddBias);
-  add(columns_.photon_count, kPhotonCount);
-  float* const largest = columns_.largest.data();
+    add(whole_.columns.half_difference[c], kHalfDifference + c);
+  add(whole_.columns.even_bias, kEvenBias);
+  add(whole_.columns.odd_bias, kOddBias);
+  add(whole_.columns.photon_count, kPhotonCount);
+  float* const largest = whole_.columns.largest.data();
   const float* const slice_largest = column(kLargestLuminance);
   for (std::size_t i = begin; i < end; ++i)
     largest[i] = std::max(largest[i], slice_largest[i]);
 }
 
+void ImageSums::Restore(Whole whole) {
+  LUCERNA_CHECK(whole.columns.pixels() == pixels() && whole.features.size() == pixels());
+  whole_ = std::move(whole);
+  tail_.clear();
+}
+
 void ImageSums::SetTail(Slices tail) {
-  std::uint64_t next = passes_;
+  std::uint64_t next = whole_.passes;
   for (const auto& slice : tail) {
     LUCERNA_CHECK(slice->passes.first == next && slice->pixels() == pixels());
     next = slice->passes.last;
@@ -112,14 +118,14 @@ void ImageSums::SetTail(Slices tail) {
 }
 
 std::uint64_t ImageSums::eye_rays() const {
-  std::uint64_t rays = eye_rays_;
+  std::uint64_t rays = whole_.eye_rays;
   for (const auto& slice : tail_)
     rays += slice->eye_rays;
   return rays;
 }
 
 BatchTally ImageSums::tally() const {
-  BatchTally tally = tally_;
+  BatchTally tally = whole_.tally;
   for (const auto& slice : tail_)
     tally += slice->tally;
   return tally;
@@ -128,16 +134,16 @@ BatchTally ImageSums::tally() const {
 ImageSums::Pixel ImageSums::At(std::size_t pixel) const {
   Pixel sum;
   for (std::size_t c = 0; c < 3; ++c) {
-    sum.photons[c] = columns_.radiance[c][pixel];
-    sum.direct[c] = columns_.radiance[3 + c][pixel];
-    sum.half_difference[c] = static_cast<double>(columns_.half_difference[c][pixel]);
+    sum.photons[c] = whole_.columns.radiance[c][pixel];
+    sum.direct[c] = whole_.columns.radiance[3 + c][pixel];
+    sum.half_difference[c] = static_cast<double>(whole_.columns.half_difference[c][pixel]);
   }
-  sum.squared_deviations = static_cast<double>(columns_.squared_deviations[pixel]);
-  sum.even_bias = static_cast<double>(columns_.even_bias[pixel]);
-  sum.odd_bias = static_cast<double>(columns_.odd_bias[pixel]);
-  sum.photon_count = static_cast<double>(columns_.photon_count[pixel]);
-  sum.largest = columns_.largest[pixel];
-  std::uint64_t passes = passes_;
+  sum.squared_deviations = static_cast<double>(whole_.columns.squared_deviations[pixel]);
+  sum.even_bias = static_cast<double>(whole_.columns.even_bias[pixel]);
+  sum.odd_bias = static_cast<double>(whole_.columns.odd_bias[pixel]);
+  sum.photon_count = static_cast<double>(whole_.columns.photon_count[pixel]);
+  sum.largest = whole_.columns.largest[pixel];
+  std::uint64_t passes = whole_.passes;
   for (const auto& slice : tail_) {
     AddTo(sum, passes, *slice, pixel);
     passes = slice->passes.last;
@@ -146,7 +152,7 @@ ImageSums::Pixel ImageSums::At(std::size_t pixel) const {
 }
 
 ImageSums::Features ImageSums::FeaturesAt(std::size_t pixel) const {
-  Features sum = features_[pixel];
+  Features sum = whole_.features[pixel];
   for (const auto& slice : tail_)
     AddTo(sum, *slice, pixel);
   return sum;

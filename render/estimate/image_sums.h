@@ -21,7 +21,10 @@ namespace lucerna {
 
 class ImageSums {
  public:
-  explicit ImageSums(std::size_t pixels) : columns_(pixels), features_(pixels) {}
+  explicit ImageSums(std::size_t pixels) {
+    whole_.columns = Columns(pixels);
+    whole_.features.resize(pixels);
+  }
 
   using Slices = std::vector<std::shared_ptr<const SliceSums>>;
 
@@ -32,11 +35,11 @@ class ImageSums {
   void SetTail(Slices tail);
 
   // Passes added, without the tail and with it.
-  [[nodiscard]] std::uint64_t whole_passes() const { return passes_; }
+  [[nodiscard]] std::uint64_t whole_passes() const { return whole_.passes; }
   [[nodiscard]] std::uint64_t passes() const {
-    return tail_.empty() ? passes_ : tail_.back()->passes.last;
+    return tail_.empty() ? whole_.passes : tail_.back()->passes.last;
   }
-  [[nodiscard]] std::size_t pixels() const { return features_.size(); }
+  [[nodiscard]] std::size_t pixels() const { return whole_.features.size(); }
   // Of all passes.
   [[nodiscard]] std::uint64_t eye_rays() const;
   [[nodiscard]] BatchTally tally() const;
@@ -67,24 +70,33 @@ class ImageSums {
   };
   [[nodiscard]] Features FeaturesAt(std::size_t pixel) const;
 
- private:
   // Sums over passes as columns [pixels]: those that image and error are the difference of in
   // double.
   struct Columns {
-    explicit Columns(std::size_t pixels);
+    explicit Columns(std::size_t pixels = 0);
+    [[nodiscard]] std::size_t pixels() const { return largest.size(); }
     std::array<std::vector<double>, 6> radiance;  // photons, direct
     std::array<std::vector<float>, 3> half_difference;
     std::vector<float> squared_deviations, even_bias, odd_bias, photon_count, largest;
   };
+  // All that is kept of the passes added, without the tail: for checkpoints.
+  struct Whole {
+    std::uint64_t passes = 0;
+    std::uint64_t eye_rays = 0;
+    BatchTally tally;
+    Columns columns;
+    std::vector<Features> features;  // as many
+  };
+  [[nodiscard]] const Whole& whole() const { return whole_; }
+  // Goes on from there, without a tail. Requires as many pixels.
+  void Restore(Whole whole);
+
+ private:
   void AddPixels(const SliceSums& slice, std::size_t begin, std::size_t end);
   static void AddTo(Pixel& sum, std::uint64_t passes, const SliceSums& slice, std::size_t pixel);
   static void AddTo(Features& sum, const SliceSums& slice, std::size_t pixel);
 
-  std::uint64_t passes_ = 0;
-  std::uint64_t eye_rays_ = 0;
-  BatchTally tally_;
-  Columns columns_;
-  std::vector<Features> features_;
+  Whole whole_;
   Slices tail_;
 };
 

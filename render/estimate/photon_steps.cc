@@ -54,18 +54,19 @@ std::uint64_t PassesFor(const PhotonSteps& steps, std::uint64_t photons) {
 }
 
 void PassVariance::Add(const SliceSums& pass) {
-  LUCERNA_CHECK(pass.passes == PassRange(passes_, passes_ + 1) && pass.pixels() == pixels_.size());
-  const auto passes = static_cast<double>(passes_);
+  LUCERNA_CHECK(pass.passes == PassRange(sums_.passes, sums_.passes + 1) &&
+                pass.pixels() == sums_.pixels.size());
+  const auto passes = static_cast<double>(sums_.passes);
   const auto add = [](float& sum, double value) { sum = Held(static_cast<double>(sum) + value); };
-  for (std::size_t i = 0; i < pixels_.size(); ++i) {
+  for (std::size_t i = 0; i < sums_.pixels.size(); ++i) {
     const auto at = [&](std::size_t column) { return static_cast<double>(pass.At(column, i)); };
     const auto luminance = [&](std::size_t column) {
       return WorkingLuminance(at(column), at(column + 1), at(column + 2));
     };
     const double photons = luminance(kPhotonRadiance);
     const double direct = luminance(kDirectRadiance);
-    Pixel& sum = pixels_[i];
-    if (passes_ > 0) {
+    Pixel& sum = sums_.pixels[i];
+    if (sums_.passes > 0) {
       const auto before = static_cast<double>(sum.photons);
       add(sum.photon_deviations, DeviationBetween(passes, before, 1, photons));
       add(sum.deviations,
@@ -73,30 +74,30 @@ void PassVariance::Add(const SliceSums& pass) {
     }
     add(sum.photons, photons);
     add(sum.direct, direct);
-    if (passes_ % 2 == 0) {
+    if (sums_.passes % 2 == 0) {
       add(sum.even_photons, photons);
       add(sum.even, photons + direct);
     }
     add(sum.count, at(kPhotonCount));
   }
-  photons_ += pass.tally.photons;
-  photon_rays_ += pass.tally.rays;
-  pairs_ += pass.tally.pairs;
-  eye_rays_ += pass.eye_rays;
-  ++passes_;
+  sums_.photons += pass.tally.photons;
+  sums_.photon_rays += pass.tally.rays;
+  sums_.pairs += pass.tally.pairs;
+  sums_.eye_rays += pass.eye_rays;
+  ++sums_.passes;
 }
 
 PassVariance::Parts PassVariance::Split(double kernel_noise) const {
-  LUCERNA_CHECK(passes_ >= 2);
-  const auto passes = static_cast<double>(passes_);
+  LUCERNA_CHECK(sums_.passes >= 2);
+  const auto passes = static_cast<double>(sums_.passes);
   const double even_passes = std::ceil(passes / 2);
   const double odd_passes = passes - even_passes;
   const auto sum_of = [](const Pixel& pixel) {
     return static_cast<double>(pixel.photons) + static_cast<double>(pixel.direct);
   };
   std::vector<double> luminances;
-  luminances.reserve(pixels_.size());
-  for (const Pixel& pixel : pixels_)
+  luminances.reserve(sums_.pixels.size());
+  for (const Pixel& pixel : sums_.pixels)
     luminances.push_back(sum_of(pixel) / passes);
   const double floor = RelativeErrorFloor(luminances);
   if (!(floor > 0)) return {};
@@ -110,10 +111,10 @@ PassVariance::Parts PassVariance::Split(double kernel_noise) const {
     double eye_paths = 0;      // of halves, beyond what photons brought to them
   };
   std::vector<Variances> variances;
-  variances.reserve(pixels_.size());
+  variances.reserve(sums_.pixels.size());
   const double halves = even_passes * odd_passes / passes;
-  for (std::size_t i = 0; i < pixels_.size(); ++i) {
-    const Pixel& pixel = pixels_[i];
+  for (std::size_t i = 0; i < sums_.pixels.size(); ++i) {
+    const Pixel& pixel = sums_.pixels[i];
     const double weight = 1 / (luminances[i] * luminances[i] + floor);
     const auto difference = [&](double sum, double even) {
       return even / even_passes - (sum - even) / odd_passes;
@@ -155,16 +156,17 @@ PassVariance::Parts PassVariance::Split(double kernel_noise) const {
 }
 
 PassVariance::Costs PassVariance::CostsSoFar() const {
-  return {.photons = static_cast<double>(photon_rays_) + kPairCost * static_cast<double>(pairs_),
-          .eye_paths =
-              kEyePathCost * static_cast<double>(passes_) * static_cast<double>(pixels_.size()) +
-              kEyeRayCost * static_cast<double>(eye_rays_)};
+  return {.photons =
+              static_cast<double>(sums_.photon_rays) + kPairCost * static_cast<double>(sums_.pairs),
+          .eye_paths = kEyePathCost * static_cast<double>(sums_.passes) *
+                           static_cast<double>(sums_.pixels.size()) +
+                       kEyeRayCost * static_cast<double>(sums_.eye_rays)};
 }
 
 double PassVariance::BestPhotons(double kernel_noise) const {
   const Parts variance = Split(kernel_noise);
   if (!(variance.photons > 0)) return 0;
-  const double present = static_cast<double>(photons_) / static_cast<double>(passes_);
+  const double present = static_cast<double>(sums_.photons) / static_cast<double>(sums_.passes);
   if (variance.is_evenly_spaced) return present;
   if (!(variance.eye_paths > 0)) return std::numeric_limits<double>::infinity();
   const Costs costs = CostsSoFar();

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "render/estimate/slice_sums.h"
@@ -33,11 +34,11 @@ using PhotonSteps = std::vector<PhotonStep>;
 // Sums over passes that come one by one. The photons of a pass may change on the way.
 class PassVariance {
  public:
-  explicit PassVariance(std::size_t pixels) : pixels_(pixels) {}
+  explicit PassVariance(std::size_t pixels) { sums_.pixels.resize(pixels); }
 
   // Requires a slice of one pass, that of passes().
   void Add(const SliceSums& pass);
-  [[nodiscard]] std::uint64_t passes() const { return passes_; }
+  [[nodiscard]] std::uint64_t passes() const { return sums_.passes; }
 
   // Parts of the variance of a pass, as means over the pixels, relative to the squared value (with
   // the floor of relative errors). The pixels that vary most are left out, as in relative errors.
@@ -72,7 +73,6 @@ class PassVariance {
   // Requires passes() >= 2.
   [[nodiscard]] double BestPhotons(double kernel_noise) const;
 
- private:
   struct Pixel {
     float photons = 0, direct = 0;  // luminances
     float even_photons = 0;         // luminance of the even passes
@@ -81,9 +81,18 @@ class PassVariance {
     float photon_deviations = 0;    // the same of what photons brought
     float count = 0;                // photons found
   };
-  std::vector<Pixel> pixels_;
-  std::uint64_t passes_ = 0;
-  std::uint64_t photons_ = 0, photon_rays_ = 0, pairs_ = 0, eye_rays_ = 0;
+  // All that is kept, for checkpoints.
+  struct Numbers {
+    std::vector<Pixel> pixels;
+    std::uint64_t passes = 0;
+    std::uint64_t photons = 0, photon_rays = 0, pairs = 0, eye_rays = 0;
+  };
+  [[nodiscard]] const Numbers& numbers() const { return sums_; }
+  // Goes on from there.
+  explicit PassVariance(Numbers numbers) : sums_(std::move(numbers)) {}
+
+ private:
+  Numbers sums_;
 };
 
 // `present` times the power of two that comes closest to `best`; not less than `present`, and not

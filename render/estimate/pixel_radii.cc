@@ -1,6 +1,7 @@
 #include "render/estimate/pixel_radii.h"
 
 #include <array>
+#include <utility>
 
 #include "render/base/status.h"
 #include "render/estimate/evidence.h"
@@ -9,35 +10,41 @@ namespace lucerna {
 
 PixelRadii::PixelRadii(std::size_t pixels, float initial_radius, const RadiusController& controller)
     : controller_(controller),
-      radius_(pixels, PixelRadius{static_cast<double>(initial_radius), 0}),
       memory_per_pixel_(controller.MemoryPerPixel()),
-      memory_(pixels * memory_per_pixel_) {}
+      numbers_{std::vector<PixelRadius>(pixels, {static_cast<double>(initial_radius), 0}),
+               std::vector<double>(pixels * memory_per_pixel_)} {}
+
+void PixelRadii::Restore(Numbers numbers) {
+  LUCERNA_CHECK(numbers.radius.size() == numbers_.radius.size() &&
+                numbers.memory.size() == numbers_.memory.size());
+  numbers_ = std::move(numbers);
+}
 
 void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, ThreadTeam& team) {
-  LUCERNA_CHECK(round.pixels() == radius_.size() && used.size() == radius_.size() &&
+  LUCERNA_CHECK(round.pixels() == numbers_.radius.size() && used.size() == numbers_.radius.size() &&
                 round.evidence <= kMostControllerColumns);
   constexpr std::size_t kPixelsAtOnce = 1024;
-  team.For(radius_.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
+  team.For(numbers_.radius.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
     std::array<double, kMostControllerColumns> columns{};
     for (std::size_t pixel = begin; pixel < end; ++pixel) {
       for (std::size_t column = 0; column < round.evidence; ++column)
         columns[column] = static_cast<double>(round.At(kSliceColumns + column, pixel));
-      radius_[pixel] = controller_.Next(
-          radius_[pixel],
+      numbers_.radius[pixel] = controller_.Next(
+          numbers_.radius[pixel],
           {.photons = static_cast<double>(round.At(kPhotonCount, pixel)),
            .radius = static_cast<double>(used[pixel]),
            .columns = std::span<const double>(columns).first(round.evidence),
            .blur = static_cast<double>(round.At(kBlur, pixel))},
           round.passes,
-          std::span<double>(memory_).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
+          std::span<double>(numbers_.memory).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
     }
   });
 }
 
 RadiusColumn PixelRadii::Current() const {
-  RadiusColumn radii(radius_.size());
+  RadiusColumn radii(numbers_.radius.size());
   for (std::size_t pixel = 0; pixel < radii.size(); ++pixel)
-    radii[pixel] = static_cast<float>(radius_[pixel].radius);
+    radii[pixel] = static_cast<float>(numbers_.radius[pixel].radius);
   return radii;
 }
 

@@ -28,14 +28,23 @@ class PixelRadii {
   [[nodiscard]] RadiusColumn Current() const;
   // The radius controller's own numbers for a pixel.
   [[nodiscard]] std::span<const double> memory(std::size_t pixel) const {
-    return std::span<const double>(memory_).subspan(pixel * memory_per_pixel_, memory_per_pixel_);
+    return std::span<const double>(numbers_.memory)
+        .subspan(pixel * memory_per_pixel_, memory_per_pixel_);
   }
+
+  // All that is kept of the rounds taken in: for checkpoints.
+  struct Numbers {
+    std::vector<PixelRadius> radius;
+    std::vector<double> memory;  // [pixels × MemoryPerPixel]
+  };
+  [[nodiscard]] const Numbers& numbers() const { return numbers_; }
+  // Goes on from there. Requires numbers of the same shape.
+  void Restore(Numbers numbers);
 
  private:
   const RadiusController& controller_;
-  std::vector<PixelRadius> radius_;
   std::size_t memory_per_pixel_;
-  std::vector<double> memory_;  // [pixels × memory_per_pixel]
+  Numbers numbers_;
 };
 
 }  // namespace lucerna

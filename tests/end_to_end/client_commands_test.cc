@@ -50,6 +50,8 @@ class ClientCommandsTest : public testing::Test {
   [[nodiscard]] std::vector<std::string> Images() const {
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(folder_)) {
+      // Checkpoints of a render that was interrupted.
+      if (entry.is_directory()) continue;
       const std::string name = entry.path().filename();
       if (name.find(".exr") != std::string::npos || name.find(".png") != std::string::npos) {
         names.push_back(name);
@@ -357,10 +359,10 @@ TEST_F(ClientCommandsTest, AnUnreachableCoordinatorIsNamedWithCodeThree) {
   }
 }
 
-TEST_F(ClientCommandsTest, AnInterruptionCancelsCleansUpAndLeavesNothing) {
+TEST_F(ClientCommandsTest, AnInterruptionWithoutCheckpointsCleansUpAndLeavesNothing) {
   for (const int number : {SIGINT, SIGTERM}) {
     const pid_t client = Start({"render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--time",
-                                "1000", "-o", In("a.exr")});
+                                "1000", "-o", In("a.exr"), "--no-checkpoints"});
     std::vector<pid_t> children;
     for (int i = 0; i < 6000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -373,7 +375,51 @@ TEST_F(ClientCommandsTest, AnInterruptionCancelsCleansUpAndLeavesNothing) {
     for (const pid_t child : children)
       EXPECT_NE(::kill(child, 0), 0) << "left running";
     EXPECT_TRUE(Images().empty());
+    EXPECT_FALSE(std::filesystem::exists(In("a.exr.checkpoints")));
   }
+}
+
+// The first end is far away; the image of the whole is that of a render without an interruption.
+TEST_F(ClientCommandsTest, AnInterruptedRenderWritesTheImageSoFarAndGoesOnWithTheSameBits) {
+  const auto render = [&](const std::string& image, const std::string& end,
+                          const std::string& value) {
+    return std::vector<std::string>{
+        "render", SceneOfTests("caustic.pbrt"), "--size", "32x24", end, value, "-o", In(image)};
+  };
+  const pid_t client = Start(render("a.exr", "--time", "1000"));
+  for (int i = 0; i < 6000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  const std::vector<pid_t> children = ChildrenOf(client);
+  ::kill(client, SIGINT);
+  const Ran interrupted = Finish(client);
+  EXPECT_EQ(interrupted.code, 130) << interrupted.err;
+  EXPECT_NE(interrupted.err.find("the image so far is in " + In("a.exr")), std::string::npos)
+      << interrupted.err;
+  EXPECT_NE(interrupted.err.find("--resume"), std::string::npos) << interrupted.err;
+  for (const pid_t child : children)
+    EXPECT_NE(::kill(child, 0), 0) << "left running";
+  EXPECT_TRUE(std::filesystem::exists(In("a.exr")));
+  EXPECT_TRUE(std::filesystem::exists(In("a.exr.checkpoints")));
+
+  std::vector<std::string> other = render("a.exr", "--alpha", "0.9");
+  other.push_back("--resume");
+  const Ran refused = Run(other);
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_NE(refused.err.find("another value of --alpha"), std::string::npos) << refused.err;
+
+  // More passes than there were.
+  const std::string passes = "2000";
+  std::vector<std::string> resume = render("a.exr", "--passes", passes);
+  resume.push_back("--resume");
+  const Ran resumed = Run(resume);
+  EXPECT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_FALSE(std::filesystem::exists(In("a.exr.checkpoints"))) << "not needed any more";
+  ASSERT_EQ(Run(render("b.exr", "--passes", passes)).code, 0);
+  EXPECT_EQ(Run({"digest", In("a.exr")}).out, Run({"digest", In("b.exr")}).out);
+
+  const Ran nothing = Run(resume);
+  EXPECT_EQ(nothing.code, 1);
+  EXPECT_NE(nothing.err.find("no interrupted render"), std::string::npos) << nothing.err;
 }
 
 TEST_F(ClientCommandsTest, ADeadCoordinatorEndsTheRenderWithASentence) {

@@ -12,19 +12,8 @@
 #include <grpcpp/grpcpp.h>
 #include <signal.h>
 
-#include "proto/lucerna/v1/assets.grpc.pb.h"
-#include "proto/lucerna/v1/images.grpc.pb.h"
-#include "proto/lucerna/v1/jobs.grpc.pb.h"
 #include "proto/lucerna/v1/work.grpc.pb.h"
-#include "render/base/files.h"
-#include "render/formats/read_scene.h"
-#include "render/image/exr_file.h"
-#include "render/scene/scene_files.h"
-#include "render/wire/channel.h"
-#include "render/wire/chunks.h"
-#include "render/wire/grpc_status.h"
-#include "render/wire/messages.h"
-#include "tests/support/process.h"
+#include "tests/fault/coordinator_process.h"
 
 namespace lucerna {
 namespace {
@@ -32,120 +21,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// For what must happen, however busy the machine is: ends only what hangs.
-constexpr seconds kPatience{60};
 // For what must come before the lease of 10 s, renewed every few seconds, can end by itself.
 constexpr seconds kBeforeLeasesEnd{5};
-
-const std::string kBin = LUCERNA_BIN_DIR;
-const std::string kScenes = LUCERNA_SOURCE_DIR "/tests/scenes";
-
-class Coordinator {
- public:
-  explicit Coordinator(std::vector<std::string> flags = {}) {
-    std::vector<std::string> command = {kBin + "/lucerna-server", "--listen", "127.0.0.1:0"};
-    command.insert(command.end(), flags.begin(), flags.end());
-    process_ = std::make_unique<ChildProcess>(command);
-    EXPECT_TRUE(process_->WaitForText("\n", kPatience));
-    const std::string line = process_->Output();
-    const std::string begin = "listening on ";
-    EXPECT_EQ(line.rfind(begin, 0), 0U) << line << process_->Errors();
-    if (line.size() > begin.size()) {
-      address_ = line.substr(begin.size(), line.find('\n') - begin.size());
-    }
-    channel_ = MakeChannel(address_);
-  }
-
-  [[nodiscard]] const std::string& address() const { return address_; }
-  [[nodiscard]] ChildProcess& process() { return *process_; }
-  [[nodiscard]] const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
-
-  [[nodiscard]] std::unique_ptr<ChildProcess> StartWorker() const {
-    return std::make_unique<ChildProcess>(
-        std::vector<std::string>{kBin + "/lucerna-worker", "--server", address_, "--threads", "1"});
-  }
-
-  // Uploads and submits a scene of ours; the job's id.
-  std::string Submit(const std::string& scene, int passes, std::int64_t photons) {
-    DirectoryFiles files(kScenes);
-    const ParsedScene parsed = ReadScene(files, scene);
-    EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
-    const SceneManifest manifest = files.Manifest(scene);
-    const auto assets = v1::AssetService::NewStub(channel_);
-    for (const auto& [path, entry] : manifest.entries) {
-      grpc::ClientContext context;
-      v1::UploadResponse response;
-      const auto writer = assets->Upload(&context, &response);
-      v1::UploadRequest part;
-      part.mutable_header()->set_digest(std::string(entry.digest.Bytes()));
-      part.mutable_header()->set_size_bytes(entry.size_bytes);
-      writer->Write(part);
-      part.set_bytes(ReadFile(kScenes + "/" + path).value());
-      writer->Write(part);
-      writer->WritesDone();
-      EXPECT_TRUE(writer->Finish().ok());
-    }
-    v1::SubmitRequest request;
-    request.set_request_id("the only one");
-    *request.mutable_scene() = ToProto(manifest);
-    RenderOverrides overrides;
-    overrides.passes = passes;
-    overrides.photons_per_pass = photons;
-    overrides.width = 64;
-    overrides.height = 64;
-    *request.mutable_overrides() = ToProto(overrides);
-    v1::SubmitResponse response;
-    grpc::ClientContext context;
-    const grpc::Status status =
-        v1::JobService::NewStub(channel_)->Submit(&context, request, &response);
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    return response.job_id();
-  }
-
-  v1::Job Get(const std::string& job_id) {
-    v1::GetJobRequest request;
-    request.set_job_id(job_id);
-    v1::Job job;
-    grpc::ClientContext context;
-    const grpc::Status status = v1::JobService::NewStub(channel_)->Get(&context, request, &job);
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    return job;
-  }
-
-  // The job when it has ended, or as it is after a minute.
-  v1::Job Wait(const std::string& job_id) {
-    v1::WatchJobRequest request;
-    request.set_job_id(job_id);
-    grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + 5 * kPatience);
-    const auto reader = v1::JobService::NewStub(channel_)->Watch(&context, request);
-    v1::Job job;
-    while (reader->Read(&job)) {
-    }
-    return job;
-  }
-
-  Digest ImageDigest(const std::string& job_id) {
-    v1::GetImageRequest request;
-    request.set_job_id(job_id);
-    grpc::ClientContext context;
-    const auto reader = v1::ImageService::NewStub(channel_)->GetImage(&context, request);
-    std::string bytes;
-    v1::Chunk chunk;
-    while (reader->Read(&chunk))
-      bytes += chunk.bytes();
-    const grpc::Status status = reader->Finish();
-    EXPECT_TRUE(status.ok()) << status.error_message();
-    const StatusOr<Image> image = DecodeExr(bytes);
-    EXPECT_TRUE(image.ok()) << image.status();
-    return image.ok() ? image->PixelDigest() : Digest();
-  }
-
- private:
-  std::unique_ptr<ChildProcess> process_;
-  std::string address_;
-  std::shared_ptr<grpc::Channel> channel_;
-};
 
 constexpr int kPasses = 6;
 constexpr std::int64_t kPhotons = 400'000;
@@ -154,7 +31,7 @@ const std::vector<std::string> kSmallBatches = {"--batch-photons", "50000"};
 
 Digest UnfaultedDigest() {
   static const Digest digest = [] {
-    Coordinator coordinator;
+    CoordinatorProcess coordinator;
     const auto worker = coordinator.StartWorker();
     const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
     EXPECT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
@@ -164,7 +41,8 @@ Digest UnfaultedDigest() {
 }
 
 // Waits until the job has merged so many photons; false when it ended or a minute passed.
-bool WaitForPhotons(Coordinator& coordinator, const std::string& job, std::uint64_t photons) {
+bool WaitForPhotons(CoordinatorProcess& coordinator, const std::string& job,
+                    std::uint64_t photons) {
   for (int i = 0; i < 6000; ++i) {
     const v1::Job now = coordinator.Get(job);
     if (now.state() > v1::JOB_STATE_RUNNING) return false;
@@ -177,7 +55,7 @@ bool WaitForPhotons(Coordinator& coordinator, const std::string& job, std::uint6
 class KilledWorkerTest : public testing::TestWithParam<int> {};
 
 TEST_P(KilledWorkerTest, IsReplacedAndTheImageIsTheSame) {
-  Coordinator coordinator(kSmallBatches);
+  CoordinatorProcess coordinator(kSmallBatches);
   auto worker = coordinator.StartWorker();
   const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
   ASSERT_TRUE(
@@ -195,7 +73,7 @@ TEST_P(KilledWorkerTest, IsReplacedAndTheImageIsTheSame) {
 INSTANTIATE_TEST_SUITE_P(AtSeveralMoments, KilledWorkerTest, testing::Values(0, 3, 7));
 
 TEST(WorkerFaultsTest, ABatchOfAKilledWorkerGoesBackAtOnceAndNotAfterTenSeconds) {
-  Coordinator coordinator;
+  CoordinatorProcess coordinator;
   auto worker = coordinator.StartWorker();
   const std::string job = coordinator.Submit(kScene, 2, 3'000'000);
   for (int i = 0; i < 12000 && coordinator.Get(job).state() < v1::JOB_STATE_RUNNING; ++i) {
@@ -208,7 +86,7 @@ TEST(WorkerFaultsTest, ABatchOfAKilledWorkerGoesBackAtOnceAndNotAfterTenSeconds)
 }
 
 TEST(WorkerFaultsTest, AWorkerThatIsTerminatedLeavesBeforeItsLeaseEndsAndItsBatchIsDoneByAnother) {
-  Coordinator coordinator;
+  CoordinatorProcess coordinator;
   auto worker = coordinator.StartWorker();
   const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
   ASSERT_TRUE(WaitForPhotons(coordinator, job, 1));
@@ -223,7 +101,7 @@ TEST(WorkerFaultsTest, AWorkerThatIsTerminatedLeavesBeforeItsLeaseEndsAndItsBatc
 }
 
 TEST(WorkerFaultsTest, AnIdleWorkerLeavesSoon) {
-  Coordinator coordinator;
+  CoordinatorProcess coordinator;
   auto worker = coordinator.StartWorker();
   ASSERT_TRUE(worker->WaitForText("joined", kPatience));
   const auto begin = std::chrono::steady_clock::now();
@@ -233,7 +111,7 @@ TEST(WorkerFaultsTest, AnIdleWorkerLeavesSoon) {
 }
 
 TEST(WorkerFaultsTest, AnotherNumericProfileIsRefusedWithBothNames) {
-  Coordinator coordinator;
+  CoordinatorProcess coordinator;
   v1::RegisterRequest request;
   request.set_name("other build");
   request.set_numeric_profile("another build");
@@ -256,7 +134,7 @@ TEST(WorkerFaultsTest, AnAbsentCoordinatorIsOneClearMessage) {
 }
 
 TEST(WorkerFaultsTest, AWorkerComesBackToACoordinatorThatWasStartedAnew) {
-  auto coordinator = std::make_unique<Coordinator>();
+  auto coordinator = std::make_unique<CoordinatorProcess>();
   const std::string address = coordinator->address();
   auto worker = coordinator->StartWorker();
   ASSERT_TRUE(worker->WaitForText("joined", kPatience));
@@ -275,7 +153,7 @@ TEST(WorkerFaultsTest, AnUnencryptedListenerBeyondThisMachineMustBeAskedFor) {
 }
 
 TEST(WorkerFaultsTest, AForgedAccumulationIsRefusedAndChangesNothing) {
-  Coordinator coordinator;
+  CoordinatorProcess coordinator;
   const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
   for (int i = 0; i < 12000 && coordinator.Get(job).state() != v1::JOB_STATE_RUNNING; ++i) {
     std::this_thread::sleep_for(milliseconds(5));

@@ -9,6 +9,7 @@
 #include "render/estimate/evidence.h"
 #include "render/formats/read_scene.h"
 #include "render/scene/scene_files.h"
+#include "render/wire/bytes.h"
 
 namespace lucerna {
 namespace {
@@ -67,6 +68,19 @@ void LocalRender::AddPass(int batches) {
   } else {
     estimator_->SetTail(round_->Prefix(), *plan_);
   }
+}
+
+std::string LocalRender::Save() const {
+  ByteWriter writer;
+  estimator_->Save(writer);
+  return writer.Take();
+}
+
+Status LocalRender::Restore(std::string_view bytes) {
+  ByteReader reader(bytes);
+  LUCERNA_RETURN_IF_ERROR(estimator_->Restore(reader));
+  pass_ = estimator_->whole_passes();
+  return absl::OkStatus();
 }
 
 Image RenderLocally(const Scene& scene, const RenderSettings& settings, int passes, int threads) {

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 
 #include "render/base/status.h"
 #include "render/estimate/slice_tree.h"
@@ -31,6 +33,9 @@ class LocalRender {
   [[nodiscard]] MissingLight FindMissingLight() const {
     return estimator_->FindMissingLight(estimator_->Snapshot());
   }
+  // A checkpoint of the whole rounds, and going on from one in a render without passes.
+  [[nodiscard]] std::string Save() const;
+  [[nodiscard]] Status Restore(std::string_view bytes);
   // Over all passes.
   [[nodiscard]] const BatchTally& tally() const { return tally_; }
 

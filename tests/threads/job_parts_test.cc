@@ -25,6 +25,17 @@ TEST(JobRetentionTest, TheNewestKeepsAllHoweverLargeAndOlderOnesWhatFits) {
                                     {false, false, false}}));
 }
 
+TEST(JobRetentionTest, NothingIsKeptOfJobsThatEndedTooLongAgo) {
+  const RetentionLimits limits = {.age = std::chrono::hours(24)};
+  const EndedJob young = {.age = std::chrono::hours(23)};
+  const EndedJob old = {.age = std::chrono::hours(25)};
+  const std::vector<KeptOfJob> kept = DecideRetention({young, old, young}, limits);
+  EXPECT_TRUE(kept[0].record);
+  EXPECT_FALSE(kept[1].record);
+  EXPECT_TRUE(kept[2].record);
+  EXPECT_TRUE(DecideRetention({old}, {})[0].record) << "no limit";
+}
+
 TEST(JobRetentionTest, JobsWithoutPhotonsOrImageTakeNoRoom) {
   const RetentionLimits limits = {.jobs = 10, .pixels = 0, .images = 1, .image_bytes = 0};
   const EndedJob cancelled = {.pixels = 1000};

@@ -198,6 +198,174 @@ TEST(JobTableTest, GivesFilesBackWhenAJobCannotNeedThemAnyMore) {
   }
 }
 
+// Remembers what a disk would, and may be full.
+class FakeJournal final : public JobJournal {
+ public:
+  Status Save(const JournalEntry& entry, Duration /*running*/) override {
+    if (is_full) return absl::ResourceExhaustedError("no room");
+    rows[entry.serial] = entry;
+    return absl::OkStatus();
+  }
+  Status Remove(std::uint64_t serial) override {
+    if (is_full) return absl::ResourceExhaustedError("no room");
+    rows.erase(serial);
+    return absl::OkStatus();
+  }
+  [[nodiscard]] std::vector<JournalEntry> AtTheNextStart() const {
+    std::vector<JournalEntry> jobs;
+    for (const auto& [serial, row] : rows) {
+      JournalEntry job = row;
+      job.job.life = JobLife({.state = row.job.life.state()});
+      jobs.push_back(job);
+    }
+    return jobs;
+  }
+
+  bool is_full = false;
+  std::map<std::uint64_t, JournalEntry> rows;
+};
+
+JobTable::Options TableWith(FakeJournal& journal) {
+  return {.instance = "t", .max_waiting = 4, .retention = {}, .journal = &journal};
+}
+
+TEST(JobTableTest, AJobThatCannotBeWrittenDownIsRefusedAndLeavesNoTrace) {
+  FakeJournal journal;
+  JobTable table(TableWith(journal));
+  journal.is_full = true;
+  EXPECT_TRUE(absl::IsResourceExhausted(table.Add(JobOf("a"), WallTime(), At(0)).status()));
+  EXPECT_FALSE(table.FindRequest("a"));
+  EXPECT_TRUE(table.List(10, 0, At(0)).first.empty());
+  journal.is_full = false;
+  EXPECT_EQ(Added(table, "a"), "t-1") << "no number is lost";
+}
+
+TEST(JobTableTest, ALaterTableHasTheSameJobsInTheSameOrder) {
+  FakeJournal journal;
+  const Digest image = Sha256("image");
+  {
+    JobTable table(TableWith(journal));
+    Added(table, "done");
+    Added(table, "running");
+    Added(table, "cancelled");
+    Added(table, "waiting");
+    ASSERT_EQ(table.WaitForTurn()->job_id, "t-1");
+    table.OnRunning("t-1", At(1));
+    ASSERT_TRUE(table.Succeed("t-1", StopReason::kPasses, nullptr, At(2), image));
+    ASSERT_EQ(table.WaitForTurn()->job_id, "t-2");
+    ASSERT_TRUE(table.Cancel("t-3", At(2)).ok());
+  }
+  JobTable table(TableWith(journal));
+  table.Restore(journal.AtTheNextStart(), 9, At(3));
+  EXPECT_EQ(StateOf(table, "t-1"), JobState::kSucceeded);
+  EXPECT_EQ(table.FindImage("t-1", At(3))->image_digest, image);
+  EXPECT_EQ(StateOf(table, "t-2"), JobState::kQueued);
+  EXPECT_EQ(StateOf(table, "t-3"), JobState::kCancelled);
+  EXPECT_EQ(Added(table, "done"), "t-1") << "the same request";
+  EXPECT_EQ(Added(table, "new"), "t-9");
+  EXPECT_EQ(table.WaitForTurn()->job_id, "t-2");
+  EXPECT_EQ(table.WaitForTurn()->job_id, "t-4");
+  EXPECT_EQ(table.WaitForTurn()->job_id, "t-9");
+}
+
+TEST(JobTableTest, AJobWithANewEndWaitsBehindTheOthersAlsoInALaterTable) {
+  FakeJournal journal;
+  {
+    JobTable table(TableWith(journal));
+    Added(table, "a");
+    Added(table, "b");
+    ASSERT_TRUE(table.WaitForTurn());
+    const auto runner = std::make_shared<FakeRunner>();
+    ASSERT_TRUE(table.Attach("t-1", runner));
+    table.OnRunning("t-1", At(1));
+    ASSERT_TRUE(table.Succeed("t-1", StopReason::kPasses, nullptr, At(2), Sha256("image")));
+    RenderOverrides until;
+    until.passes = 2000;
+    ASSERT_TRUE(table.Extend("t-1", until, At(3)).ok());
+    EXPECT_FALSE(journal.rows.at(1).image_digest) << "its image grows from now on";
+  }
+  JobTable table(TableWith(journal));
+  table.Restore(journal.AtTheNextStart(), 3, At(3));
+  EXPECT_EQ(table.WaitForTurn()->job_id, "t-2");
+  const auto turn = table.WaitForTurn();
+  EXPECT_EQ(turn->job_id, "t-1");
+  EXPECT_EQ(turn->settings.passes, 2000);
+}
+
+TEST(JobTableTest, WhatCouldNotBeWrittenIsWrittenLater) {
+  FakeJournal journal;
+  JobTable table(TableWith(journal));
+  const std::string job = Added(table, "a");
+  journal.is_full = true;
+  EXPECT_TRUE(table.Cancel(job, At(1)).ok());
+  EXPECT_EQ(StateOf(table, job), JobState::kCancelled);
+  table.SaveUnsaved(At(1));
+  EXPECT_EQ(journal.rows.at(1).job.life.state(), JobState::kQueued);
+  journal.is_full = false;
+  table.SaveUnsaved(At(1));
+  EXPECT_EQ(journal.rows.at(1).job.life.state(), JobState::kCancelled);
+}
+
+TEST(JobTableTest, ForgetsAJobOnRequestWhenItHasEndedAndSaysWhichFilesAreNeeded) {
+  FakeJournal journal;
+  JobTable table(TableWith(journal));
+  CheckedJob checked = JobOf("a");
+  checked.submission.manifest.entries["scene.pbrt"] = {Sha256("scene"), 5};
+  const std::string job = table.Add(std::move(checked), WallTime(), At(0))->job_id;
+  EXPECT_TRUE(absl::IsNotFound(table.Delete("t-2", At(0))));
+  EXPECT_TRUE(absl::IsFailedPrecondition(table.Delete(job, At(0))));
+  EXPECT_EQ(table.Needed().blobs, std::set<Digest>{Sha256("scene")});
+  EXPECT_EQ(table.Needed().checkpoints, std::set<std::string>{job});
+  EXPECT_TRUE(table.Cancel(job, At(1)).ok());
+  EXPECT_TRUE(table.Needed().checkpoints.empty());
+  journal.is_full = true;
+  EXPECT_TRUE(absl::IsResourceExhausted(table.Delete(job, At(1))));
+  EXPECT_TRUE(table.Find(job));
+  journal.is_full = false;
+  EXPECT_TRUE(table.Delete(job, At(1)).ok());
+  EXPECT_FALSE(table.Find(job));
+  EXPECT_TRUE(journal.rows.empty());
+  EXPECT_TRUE(table.Needed().blobs.empty());
+}
+
+TEST(JobTableTest, OldJobsAreDroppedFromTheJournalTooAndLaterWhenItIsFull) {
+  FakeJournal journal;
+  JobTable::Options options = TableWith(journal);
+  options.retention.jobs = 1;
+  JobTable table(options);
+  for (const char* request : {"a", "b", "c"}) {
+    const std::string job = Added(table, request);
+    journal.is_full = std::string(request) == "c";
+    EXPECT_TRUE(table.Cancel(job, At(1)).ok() || journal.is_full);
+    if (std::string(request) == "b") {
+      EXPECT_EQ(journal.rows.size(), 1U);
+    }
+  }
+  EXPECT_EQ(journal.rows.size(), 2U);
+  journal.is_full = false;
+  table.SaveUnsaved(At(1));
+  ASSERT_EQ(journal.rows.size(), 1U);
+  EXPECT_EQ(journal.rows.at(3).job.life.state(), JobState::kCancelled);
+}
+
+// Time that a job is paused is not time that it runs.
+TEST(JobTableTest, TimeStandsStillWhileAJobIsPausedAndItsEventsSayWhy) {
+  JobTable table(SmallTable());
+  const std::string job = Added(table, "a");
+  ASSERT_TRUE(table.WaitForTurn());
+  table.OnRunning(job, At(10));
+  table.SetCondition(job, "paused: no room", At(13));
+  table.SetCondition(job, "paused: no room", At(15));
+  EXPECT_EQ(table.ReportOf(job, At(20))->running, std::chrono::seconds(3));
+  EXPECT_EQ(table.ReportOf(job, At(20))->job.condition, "paused: no room");
+  table.SetCondition(job, "", At(20));
+  EXPECT_EQ(table.ReportOf(job, At(24))->running, std::chrono::seconds(7));
+  const std::vector<JobEvent> events = table.Find(job)->events;
+  ASSERT_EQ(events.size(), 2U);
+  EXPECT_EQ(events[0].what, "paused: no room");
+  EXPECT_EQ(events[1].what, "went on");
+}
+
 // Threads ask for everything, of all jobs and in an order of their own; the jobs that are left end
 // when they are cancelled, and the thread of jobs comes back.
 TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {

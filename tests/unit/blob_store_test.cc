@@ -3,6 +3,9 @@
 
 #include "gtest/gtest.h"
 
+#include "render/base/files.h"
+#include "tests/support/temporary_folder.h"
+
 namespace lucerna {
 namespace {
 
@@ -80,6 +83,31 @@ TEST(BlobStoreTest, APinMovesWithItsOwnerAndEndsOnce) {
   }
   EXPECT_TRUE(blobs.Put(Sha256("bbbb"), "bbbb").ok());
   EXPECT_FALSE(blobs.Has(a));
+}
+
+TEST(BlobStoreTest, ReadsFromTheDiskWhatIsNotInMemory) {
+  const TemporaryFolder folder;
+  const auto files = BlobFiles::Open(folder.path()).value();
+  BlobStore blobs(10, files.get());
+  const Digest kept = Sha256("kept");
+  ASSERT_TRUE(files->Put(kept, "kept").ok());
+  EXPECT_TRUE(blobs.Has(kept));
+  EXPECT_EQ(blobs.size_bytes(), 0U);
+  EXPECT_EQ(**blobs.Get(kept), "kept");
+  EXPECT_EQ(blobs.size_bytes(), 4U) << "memory is its cache";
+  Put(blobs, "0123456789");
+  EXPECT_EQ(blobs.size_bytes(), 10U) << "and makes room";
+  {
+    const auto pin = blobs.Pin(kept);
+    ASSERT_TRUE(pin.ok()) << pin.status();
+    EXPECT_EQ(blobs.size_bytes(), 4U);
+    EXPECT_TRUE(absl::IsResourceExhausted(blobs.Put(Sha256("0123456789"), "0123456789")));
+  }
+  BlobStore full(0, files.get());
+  EXPECT_EQ(**full.Get(kept), "kept") << "also without room in memory";
+  ASSERT_TRUE(WriteFile(folder.At(kept.Hex()), "kepT").ok());
+  EXPECT_TRUE(absl::IsDataLoss(full.Get(kept).status()));
+  EXPECT_TRUE(absl::IsNotFound(full.Get(kept).status()));
 }
 
 }  // namespace

@@ -60,6 +60,50 @@ TEST(JobEstimatorTest, GivesTheSameBitsForAnyThreadsAndBatches) {
   }
 }
 
+// After 18 passes a round of two passes is half done: it is traced again.
+TEST(JobEstimatorTest, GoesOnFromACheckpointWithTheSameBits) {
+  const Scene scene = Room();
+  for (const RadiusControllerKind kind : kAllControllers) {
+    RenderSettings settings = TestSettings(scene, 2000, 0.1, 8);
+    settings.radius_controller = kind;
+    LocalRender quiet(scene, settings, 2);
+    LocalRender killed(scene, settings, 2);
+    LocalRender restored(scene, settings, 2);
+    for (int pass = 0; pass < 23; ++pass)
+      quiet.AddPass();
+    for (int pass = 0; pass < 19; ++pass)
+      killed.AddPass();
+    const std::string checkpoint = killed.Save();
+    ASSERT_TRUE(restored.Restore(checkpoint).ok());
+    EXPECT_EQ(restored.Save(), checkpoint);
+    for (int pass = 18; pass < 23; ++pass)
+      restored.AddPass();
+    EXPECT_EQ(restored.MakeImage().PixelDigest(), quiet.MakeImage().PixelDigest());
+    EXPECT_EQ(restored.Save(), quiet.Save());
+    EXPECT_EQ(restored.EstimateError(2).relative.high, quiet.EstimateError(2).relative.high);
+  }
+}
+
+TEST(JobEstimatorTest, RefusesACheckpointOfAnotherShapeAndIsAsBefore) {
+  const Scene scene = Room();
+  RenderSettings settings = TestSettings(scene, 2000, 0.1, 8);
+  LocalRender render(scene, settings, 1);
+  for (int pass = 0; pass < 3; ++pass)
+    render.AddPass();
+  const std::string checkpoint = render.Save();
+  LocalRender other(scene, settings, 1);
+  const std::string before = other.Save();
+  for (const std::size_t size :
+       {std::size_t{0}, std::size_t{10}, checkpoint.size() / 2, checkpoint.size() - 1}) {
+    EXPECT_TRUE(absl::IsInvalidArgument(other.Restore(checkpoint.substr(0, size)))) << size;
+  }
+  EXPECT_TRUE(absl::IsInvalidArgument(other.Restore(checkpoint + "x")));
+  EXPECT_EQ(other.Save(), before);
+  settings.crop_x1 -= 1;
+  LocalRender narrower(scene, settings, 1);
+  EXPECT_TRUE(absl::IsInvalidArgument(narrower.Restore(checkpoint)));
+}
+
 TEST(JobEstimatorTest, TracesTheEyePathsOfAPassAtAnyTime) {
   const Scene scene = Room();
   const RenderSettings settings = TestSettings(scene, 1000, 0.1, 8);

@@ -1,0 +1,364 @@
+#include "server/job_message.h"
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "render/wire/messages.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::size_t kMostShares = 1000;
+
+v1::JobState StateToProto(JobState state) {
+  switch (state) {
+    case JobState::kQueued:
+      return v1::JOB_STATE_QUEUED;
+    case JobState::kPreparing:
+      return v1::JOB_STATE_PREPARING;
+    case JobState::kRunning:
+      return v1::JOB_STATE_RUNNING;
+    case JobState::kSucceeded:
+      return v1::JOB_STATE_SUCCEEDED;
+    case JobState::kCancelled:
+      return v1::JOB_STATE_CANCELLED;
+    case JobState::kFailed:
+      return v1::JOB_STATE_FAILED;
+  }
+  return v1::JOB_STATE_UNSPECIFIED;
+}
+
+v1::StopReason ReasonToProto(StopReason reason) {
+  switch (reason) {
+    case StopReason::kNone:
+      return v1::STOP_REASON_UNSPECIFIED;
+    case StopReason::kPasses:
+      return v1::STOP_REASON_PASSES;
+    case StopReason::kTime:
+      return v1::STOP_REASON_TIME;
+    case StopReason::kError:
+      return v1::STOP_REASON_ERROR;
+    case StopReason::kPhotons:
+      return v1::STOP_REASON_PHOTONS;
+    case StopReason::kUser:
+      return v1::STOP_REASON_USER;
+  }
+  return v1::STOP_REASON_UNSPECIFIED;
+}
+
+v1::Progress ProgressToProto(const JobReport& report) {
+  const JobCounters& counters = report.job.counters;
+  v1::Progress message;
+  message.set_passes(counters.passes);
+  message.set_photons(counters.photons);
+  *message.mutable_running() = ToProto(report.running);
+  if (counters.to_first_photons) {
+    *message.mutable_to_first_photons() = ToProto(*counters.to_first_photons);
+  }
+  *message.mutable_coordinator_cpu() = ToProto(counters.coordinator_cpu);
+  *message.mutable_worker_cpu() = ToProto(counters.worker_cpu);
+  message.set_photons_per_second(report.photons_per_second);
+  message.set_workers(report.workers);
+  *message.mutable_tally() = ToProto(counters.tally);
+  message.set_bytes_sent(counters.bytes_sent);
+  message.set_bytes_received(counters.bytes_received);
+  message.set_hitpoints_sent(counters.hitpoints_sent);
+  message.set_hitpoints_returned(counters.hitpoints_returned);
+  return message;
+}
+
+v1::SquaredError ErrorToProto(const SquaredError& error) {
+  v1::SquaredError message;
+  message.set_noise(error.noise);
+  message.set_bias(error.bias);
+  message.set_low(error.low);
+  message.set_high(error.high);
+  return message;
+}
+
+v1::ErrorSample SampleToProto(const ErrorSample& sample) {
+  v1::ErrorSample message;
+  message.set_passes(sample.passes);
+  message.set_photons(sample.photons);
+  *message.mutable_running() = ToProto(sample.running);
+  *message.mutable_cpu() = ToProto(sample.cpu);
+  *message.mutable_relative() = ErrorToProto(sample.estimate.relative);
+  *message.mutable_absolute() = ErrorToProto(sample.estimate.absolute);
+  message.set_relative_untrimmed(sample.estimate.untrimmed);
+  message.set_left_out_pixels(sample.estimate.left_out_pixels);
+  if (sample.truth) {
+    message.set_true_relative(sample.truth->relative);
+    message.set_true_absolute(sample.truth->absolute);
+    message.set_true_relative_untrimmed(sample.truth->untrimmed);
+  }
+  message.set_missing_relative(sample.missing_relative);
+  message.set_nothing_found(sample.nothing_found);
+  return message;
+}
+
+// The busiest first.
+void AddShares(const std::map<std::string, WorkerShare>& workers, v1::Job& message) {
+  std::vector<std::pair<std::string, WorkerShare>> shares(workers.begin(), workers.end());
+  std::stable_sort(shares.begin(), shares.end(), [](const auto& a, const auto& b) {
+    return a.second.photons > b.second.photons;
+  });
+  for (std::size_t i = 0; i < std::min(shares.size(), kMostShares); ++i) {
+    const auto& [id, share] = shares[i];
+    v1::WorkerShare& item = *message.add_worker_shares();
+    item.set_worker_id(id);
+    item.set_name(share.name);
+    item.set_photons(share.photons);
+    item.set_batches(share.batches);
+    *item.mutable_cpu() = ToProto(share.cpu);
+  }
+}
+
+}  // namespace
+
+v1::Job ToProto(const JobReport& report) {
+  const Job& job = report.job;
+  const JobState state = job.life.state();
+  v1::Job message;
+  message.set_job_id(job.id);
+  message.set_name(job.name);
+  message.set_state(StateToProto(state));
+  message.set_stop_reason(ReasonToProto(job.life.stop_reason()));
+  message.set_failure(job.life.failure());
+  *message.mutable_settings() = ToProto(job.settings);
+  message.set_scene_digest(std::string(job.scene_digest.Bytes()));
+  for (std::size_t i = 0; i < std::min(job.warnings.size(), kMostWarnings); ++i) {
+    message.add_warnings(job.warnings[i]);
+  }
+  for (const Part part : AllParts()) {
+    v1::PartUse& use = *message.add_parts();
+    use.set_part(std::string(NameOf(part)));
+    use.set_is_used(job.needs.Uses(part));
+    use.set_reason(job.needs.ReasonOf(part));
+  }
+  *message.mutable_progress() = ProgressToProto(report);
+  *message.mutable_submitted_at() = ToProto(job.submitted_at);
+  message.set_no_workers(state == JobState::kRunning && report.workers == 0);
+  for (const ErrorSample& sample : job.convergence)
+    *message.add_convergence() = SampleToProto(sample);
+  for (const LightFinding& light : job.lights) {
+    v1::LightFinding& item = *message.add_lights();
+    item.set_name(light.name);
+    item.set_power_share(light.power_share);
+    item.set_photons_sent(light.photons.sent);
+    item.set_in_view_caustic(light.photons.InView(PathClass::kCaustic));
+    item.set_in_view_other(light.photons.InView(PathClass::kOther));
+    item.set_missing_share(light.missing_share);
+  }
+  AddShares(job.workers, message);
+  message.set_has_reference(job.reference.has_value());
+  for (const PhotonStep& step : job.photon_steps)
+    *message.add_photon_steps() = ToProto(step);
+  std::vector<PassTally> parts = job.pass_record.tallies();
+  if (job.tail.passes > 0) parts.push_back(job.tail);
+  for (const PassTally& part : parts) {
+    v1::PassEnergy& item = *message.add_energy_of_passes();
+    item.set_first_pass(part.first_pass);
+    item.set_passes(part.passes);
+    *item.mutable_energy() = ToProto(part.tally).energy();
+  }
+  message.set_condition(job.condition);
+  for (const JobEvent& event : job.events) {
+    v1::JobEvent& item = *message.add_events();
+    *item.mutable_at() = ToProto(event.at);
+    item.set_what(event.what);
+  }
+  if (job.ended_at) *message.mutable_ended_at() = ToProto(*job.ended_at);
+  for (const PhotonKey& key : job.counters.dropped_photons) {
+    v1::PhotonKey& item = *message.add_dropped_photons();
+    item.set_pass(key.pass);
+    item.set_index(key.index);
+  }
+  return message;
+}
+
+namespace {
+
+WallTime TimeOf(const google::protobuf::Timestamp& message) {
+  return WallTime(std::chrono::seconds(message.seconds()) +
+                  std::chrono::nanoseconds(message.nanos()));
+}
+
+JobState StateOf(v1::JobState state) {
+  switch (state) {
+    case v1::JOB_STATE_SUCCEEDED:
+      return JobState::kSucceeded;
+    case v1::JOB_STATE_CANCELLED:
+      return JobState::kCancelled;
+    case v1::JOB_STATE_FAILED:
+      return JobState::kFailed;
+    default:
+      return JobState::kQueued;
+  }
+}
+
+StopReason ReasonOf(v1::StopReason reason) {
+  switch (reason) {
+    case v1::STOP_REASON_PASSES:
+      return StopReason::kPasses;
+    case v1::STOP_REASON_TIME:
+      return StopReason::kTime;
+    case v1::STOP_REASON_ERROR:
+      return StopReason::kError;
+    case v1::STOP_REASON_PHOTONS:
+      return StopReason::kPhotons;
+    case v1::STOP_REASON_USER:
+      return StopReason::kUser;
+    default:
+      return StopReason::kNone;
+  }
+}
+
+SquaredError ErrorOf(const v1::SquaredError& message) {
+  return {.noise = message.noise(),
+          .bias = message.bias(),
+          .low = message.low(),
+          .high = message.high()};
+}
+
+ErrorSample SampleOf(const v1::ErrorSample& message) {
+  ErrorSample sample;
+  sample.passes = message.passes();
+  sample.photons = message.photons();
+  sample.running = FromProto(message.running());
+  sample.cpu = FromProto(message.cpu());
+  sample.estimate.relative = ErrorOf(message.relative());
+  sample.estimate.absolute = ErrorOf(message.absolute());
+  sample.estimate.untrimmed = message.relative_untrimmed();
+  sample.estimate.left_out_pixels = message.left_out_pixels();
+  if (message.has_true_relative()) {
+    sample.truth.emplace();
+    sample.truth->relative = message.true_relative();
+    sample.truth->absolute = message.true_absolute();
+    sample.truth->untrimmed = message.true_relative_untrimmed();
+  }
+  sample.missing_relative = message.missing_relative();
+  sample.nothing_found = message.nothing_found();
+  return sample;
+}
+
+LightFinding LightOf(const v1::LightFinding& message) {
+  LightFinding light;
+  light.name = message.name();
+  light.power_share = message.power_share();
+  light.photons.sent = message.photons_sent();
+  light.photons.in_view = {message.in_view_caustic(), message.in_view_other()};
+  light.missing_share = message.missing_share();
+  return light;
+}
+
+JobCounters CountersOf(const v1::Job& message) {
+  const v1::Progress& progress = message.progress();
+  JobCounters counters;
+  counters.passes = progress.passes();
+  counters.photons = progress.photons();
+  if (progress.has_to_first_photons()) {
+    counters.to_first_photons = FromProto(progress.to_first_photons());
+  }
+  counters.coordinator_cpu = FromProto(progress.coordinator_cpu());
+  counters.worker_cpu = FromProto(progress.worker_cpu());
+  counters.tally = FromProto(progress.tally());
+  counters.bytes_sent = progress.bytes_sent();
+  counters.bytes_received = progress.bytes_received();
+  counters.hitpoints_sent = progress.hitpoints_sent();
+  counters.hitpoints_returned = progress.hitpoints_returned();
+  for (const v1::PhotonKey& key : message.dropped_photons())
+    counters.dropped_photons.push_back({key.pass(), key.index()});
+  return counters;
+}
+
+}  // namespace
+
+std::string EncodeRecord(const Job& job, const std::optional<Digest>& image, Duration running) {
+  JobReport report;
+  report.job = job;
+  report.running = running;
+  v1::JobRecord record;
+  *record.mutable_job() = ToProto(report);
+  *record.mutable_scene() = ToProto(job.manifest);
+  *record.mutable_needs() = ToProto(job.needs);
+  if (job.reference) record.set_reference_digest(std::string(job.reference->Bytes()));
+  if (image) record.set_image_digest(std::string(image->Bytes()));
+  return record.SerializeAsString();
+}
+
+StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& moment) {
+  v1::JobRecord record;
+  if (!record.ParseFromString(bytes)) {
+    return absl::InvalidArgumentError("malformed record of a job");
+  }
+  const v1::Job& message = record.job();
+  DecodedRecord result;
+  Job& job = result.job;
+  job.id = message.job_id();
+  job.name = message.name();
+  LUCERNA_ASSIGN_OR_RETURN(job.manifest, FromProto(record.scene()));
+  LUCERNA_ASSIGN_OR_RETURN(job.scene_digest, Digest::FromBytes(message.scene_digest()));
+  JobState state = StateOf(message.state());
+  std::string failure = message.failure();
+  if (StatusOr<RenderSettings> settings = FromProto(message.settings()); settings.ok()) {
+    job.settings = *std::move(settings);
+  } else {
+    // Another version of Lucerna has other settings: enough to show what has ended.
+    job.settings = SettingsOf(message);
+    if (state == JobState::kQueued) {
+      state = JobState::kFailed;
+      failure = absl::StrCat("the job was submitted to another version of Lucerna (",
+                             std::string(settings.status().message()), "); submit it again");
+    }
+  }
+  job.warnings.assign(message.warnings().begin(), message.warnings().end());
+  LUCERNA_ASSIGN_OR_RETURN(job.needs, FromProto(record.needs()));
+  for (const v1::PartUse& use : message.parts()) {
+    for (const Part part : AllParts()) {
+      if (NameOf(part) == std::string_view(use.part())) job.needs.GiveReason(part, use.reason());
+    }
+  }
+  job.submitted_at = TimeOf(message.submitted_at());
+  result.running = FromProto(message.progress().running());
+  job.life = JobLife({.state = state,
+                      .stop_reason = ReasonOf(message.stop_reason()),
+                      .failure = std::move(failure),
+                      .submitted_at = moment.now - (moment.wall - job.submitted_at),
+                      .ran = result.running});
+  job.counters = CountersOf(message);
+  if (!record.reference_digest().empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(job.reference, Digest::FromBytes(record.reference_digest()));
+  }
+  if (!record.image_digest().empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(result.image, Digest::FromBytes(record.image_digest()));
+  }
+  for (const v1::ErrorSample& sample : message.convergence())
+    job.convergence.push_back(SampleOf(sample));
+  for (const v1::LightFinding& light : message.lights())
+    job.lights.push_back(LightOf(light));
+  std::vector<PassTally> tallies;
+  for (const v1::PassEnergy& part : message.energy_of_passes()) {
+    PassTally& tally = tallies.emplace_back();
+    tally.first_pass = part.first_pass();
+    tally.passes = part.passes();
+    tally.tally.energy = FromProto(part.energy());
+  }
+  job.pass_record = PassRecord(std::move(tallies));
+  for (const v1::PhotonStep& step : message.photon_steps())
+    job.photon_steps.push_back({step.first_pass(), step.photons_per_pass()});
+  for (const v1::WorkerShare& share : message.worker_shares()) {
+    job.workers[share.worker_id()] = {.name = share.name(),
+                                      .photons = share.photons(),
+                                      .batches = share.batches(),
+                                      .cpu = FromProto(share.cpu())};
+  }
+  if (message.has_ended_at()) job.ended_at = TimeOf(message.ended_at());
+  job.condition = message.condition();
+  for (const v1::JobEvent& event : message.events())
+    job.events.push_back({TimeOf(event.at()), event.what()});
+  return result;
+}
+
+}  // namespace lucerna

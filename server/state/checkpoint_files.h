@@ -1,0 +1,65 @@
+// From where can a job go on after a crash?
+//
+// A checkpoint is three pieces of bytes: what it is of, the job's record, and its runner's sums,
+// each with its length and its digest. Each job has two files, which are written in turn: beside
+// the name, synced, renamed. A crash while one is written leaves the other, and so does a file
+// whose bytes are damaged later. What does not have its digest is never used.
+//
+// Threads: any; one at a time for one job.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "render/base/mutex.h"
+#include "render/base/status.h"
+
+namespace lucerna {
+
+struct Checkpoint {
+  std::string numeric_profile;  // sums of another one are of no use
+  std::string record;           // of the job, as it was then
+  std::string sums;             // of its runner
+  bool operator==(const Checkpoint&) const = default;
+};
+
+class CheckpointFiles {
+ public:
+  // Makes the folder unless it is there, and removes what a crash left unfinished.
+  // Errors: what the system said.
+  [[nodiscard]] static StatusOr<std::unique_ptr<CheckpointFiles>> Open(const std::string& folder);
+
+  // Replaces the older of the job's two. A job of an earlier process must have been Read before.
+  // Errors: as WriteFile; then the two are as they were.
+  [[nodiscard]] Status Write(const std::string& job_id, const Checkpoint& checkpoint);
+
+  struct Found {
+    std::vector<Checkpoint> newest_first;  // at most two
+    std::vector<std::string> damaged;      // a sentence for each file that cannot be used
+  };
+  [[nodiscard]] Found Read(const std::string& job_id);
+  // Whether there is a file, damaged or not.
+  [[nodiscard]] bool Has(const std::string& job_id) const;
+
+  // Removes those of all jobs but these.
+  void KeepOnly(const std::set<std::string>& job_ids);
+
+ private:
+  explicit CheckpointFiles(std::string folder) : folder_(std::move(folder)) {}
+  [[nodiscard]] std::string PathOf(const std::string& job_id, int slot) const;
+
+  // Where the newest that can be used is, and its number.
+  struct Newest {
+    int slot = 1;
+    std::uint64_t number = 0;
+  };
+  const std::string folder_;
+  Mutex mutex_;
+  std::map<std::string, Newest> newest_ LUCERNA_GUARDED_BY(mutex_);  // by job
+};
+
+}  // namespace lucerna

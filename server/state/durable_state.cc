@@ -1,0 +1,124 @@
+#include "server/state/durable_state.h"
+
+#include <filesystem>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "server/job_message.h"
+
+namespace lucerna {
+namespace {
+
+const char* NameOf(JobState state) {
+  switch (state) {
+    case JobState::kQueued:
+      return "queued";
+    case JobState::kPreparing:
+      return "preparing";
+    case JobState::kRunning:
+      return "running";
+    case JobState::kSucceeded:
+      return "succeeded";
+    case JobState::kCancelled:
+      return "cancelled";
+    case JobState::kFailed:
+      return "failed";
+  }
+  return "";
+}
+
+// The database does not see flipped bits in its rows.
+Digest DigestOf(const StoredJob& row, std::string_view record) {
+  return Sha256(
+      absl::StrCat(row.serial, "\n", row.turn, "\n", row.request_id, "\n", std::string(record)));
+}
+
+}  // namespace
+
+StatusOr<std::unique_ptr<DurableState>> DurableState::Open(const std::string& folder,
+                                                           const std::string& new_instance,
+                                                           const Moment& moment) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    return absl::UnavailableError(absl::StrCat(folder, ": cannot create: ", error.message()));
+  }
+  auto state = std::unique_ptr<DurableState>(new DurableState(folder));
+  // First, because it keeps other coordinators out.
+  LUCERNA_ASSIGN_OR_RETURN(state->store_, StateStore::Open(folder + "/lucerna.db", new_instance));
+  LUCERNA_ASSIGN_OR_RETURN(state->blobs_, BlobFiles::Open(folder + "/blobs"));
+  LUCERNA_ASSIGN_OR_RETURN(state->checkpoints_, CheckpointFiles::Open(folder + "/checkpoints"));
+  LUCERNA_RETURN_IF_ERROR(state->Load(moment));
+  return state;
+}
+
+Status DurableState::Load(const Moment& moment) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::vector<StoredJob> rows, store_->Load());
+  LUCERNA_ASSIGN_OR_RETURN(next_serial_, store_->NextSerial());
+  for (const StoredJob& row : rows) {
+    const auto put_aside = [&](std::string_view why) {
+      problems_.push_back(absl::StrCat("job ", instance(), "-", row.serial, " cannot be read from ",
+                                       folder_, "/lucerna.db: ", std::string(why)));
+    };
+    const std::string_view bytes = row.record;
+    if (bytes.size() < Digest::kSize ||
+        DigestOf(row, bytes.substr(Digest::kSize)).Bytes() != bytes.substr(0, Digest::kSize)) {
+      put_aside("its row is damaged");
+      continue;
+    }
+    StatusOr<DecodedRecord> record = DecodeRecord(std::string(bytes.substr(Digest::kSize)), moment);
+    if (!record.ok()) {
+      put_aside(std::string(record.status().message()));
+      continue;
+    }
+    JournalEntry entry;
+    entry.serial = row.serial;
+    entry.turn = row.turn;
+    entry.request_id = row.request_id;
+    entry.job = std::move(record->job);
+    entry.image_digest = record->image;
+    entry.has_checkpoint = checkpoints_->Has(entry.job.id);
+    jobs_.push_back(std::move(entry));
+  }
+  return absl::OkStatus();
+}
+
+Status DurableState::Save(const JournalEntry& entry, Duration running) {
+  StoredJob row;
+  row.serial = entry.serial;
+  row.request_id = entry.request_id;
+  row.turn = entry.turn;
+  row.name = entry.job.name;
+  row.state = NameOf(entry.job.life.state());
+  const std::string record = EncodeRecord(entry.job, entry.image_digest, running);
+  row.record = absl::StrCat(std::string(DigestOf(row, record).Bytes()), record);
+  const Status saved = store_->Save(row);
+  return saved.ok() ? saved : Refusal(saved);
+}
+
+Status DurableState::Remove(std::uint64_t serial) {
+  return store_->Remove(serial);
+}
+
+std::string DurableState::PauseCondition(const Status& why) const {
+  if (absl::IsResourceExhausted(why)) {
+    return absl::StrCat("paused: no room in ", folder_, "; it goes on when there is");
+  }
+  return absl::StrCat("paused: ", folder_, " cannot be written (", std::string(why.message()),
+                      "); it goes on when it can");
+}
+
+Status DurableState::Refusal(const Status& why) const {
+  if (absl::IsResourceExhausted(why)) {
+    return absl::ResourceExhaustedError(
+        absl::StrCat("the coordinator takes no job now: there is no room in ", folder_,
+                     "; make room there, or delete jobs that are not needed, and submit again"));
+  }
+  return absl::FailedPreconditionError(absl::StrCat("the coordinator takes no job now: ", folder_,
+                                                    " cannot be written (",
+                                                    std::string(why.message()), ")"));
+}
+
+}  // namespace lucerna

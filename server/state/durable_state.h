@@ -1,0 +1,71 @@
+// What does a coordinator keep on its disk, in one folder?
+//
+//   lucerna.db      all jobs (StateStore)
+//   blobs/          their scene files, references and images, by digest (BlobFiles)
+//   checkpoints/    sums of jobs that go on from them (CheckpointFiles)
+//
+// A job's files are on the disk before its row says so, and are removed after the row: whatever is
+// killed when, rows never name a file that was not written, and files without a row are removed by
+// KeepOnly.
+//
+// Threads: any.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/base/status.h"
+#include "server/job_journal.h"
+#include "server/job_table.h"
+#include "server/state/blob_files.h"
+#include "server/state/checkpoint_files.h"
+#include "server/state/state_store.h"
+
+namespace lucerna {
+
+class DurableState final : public JobJournal {
+ public:
+  // Makes the folder unless it is there. `new_instance` names a new one for good, `moment` is now.
+  // Errors: as StateStore::Open, with the folder.
+  [[nodiscard]] static StatusOr<std::unique_ptr<DurableState>> Open(const std::string& folder,
+                                                                    const std::string& new_instance,
+                                                                    const Moment& moment);
+
+  [[nodiscard]] const std::string& folder() const { return folder_; }
+  // In front of the ids of its jobs.
+  [[nodiscard]] const std::string& instance() const { return store_->instance(); }
+  [[nodiscard]] BlobFiles& blobs() { return *blobs_; }
+  [[nodiscard]] CheckpointFiles& checkpoints() { return *checkpoints_; }
+
+  // The jobs of earlier processes. Once.
+  [[nodiscard]] std::vector<JournalEntry> TakeJobs() { return std::move(jobs_); }
+  // Larger than the numbers of all jobs there have been, when it was opened.
+  [[nodiscard]] std::uint64_t next_serial() const { return next_serial_; }
+  // A sentence for each job whose row cannot be read; such rows stay as they are.
+  [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
+
+  // Errors: Refusal of what StateStore says.
+  [[nodiscard]] Status Save(const JournalEntry& entry, Duration running) override;
+  [[nodiscard]] Status Remove(std::uint64_t serial) override;
+
+  // When `why` keeps bytes from the disk: what a running job shows ("paused: no room in DIR; ..."),
+  // and what a new job is refused with.
+  [[nodiscard]] std::string PauseCondition(const Status& why) const;
+  [[nodiscard]] Status Refusal(const Status& why) const;
+
+ private:
+  explicit DurableState(std::string folder) : folder_(std::move(folder)) {}
+  [[nodiscard]] Status Load(const Moment& moment);
+
+  const std::string folder_;
+  std::unique_ptr<StateStore> store_;
+  std::unique_ptr<BlobFiles> blobs_;
+  std::unique_ptr<CheckpointFiles> checkpoints_;
+  std::vector<JournalEntry> jobs_;
+  std::uint64_t next_serial_ = 1;
+  std::vector<std::string> problems_;
+};
+
+}  // namespace lucerna

@@ -1,0 +1,74 @@
+// Which jobs has a coordinator had, in all its lives?
+//
+// One row a job in an SQLite database, written through to the disk before a call returns: what was
+// saved outlives a crash and a power cut, and a row is as it was before a call or as it is after
+// it. The record of a job is bytes to this class; the columns beside it are what order and requests
+// need, and what people look up. One process at a time may have the database open.
+//
+// Threads: any.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "render/base/mutex.h"
+#include "render/base/status.h"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace lucerna {
+
+struct StoredJob {
+  std::uint64_t serial = 0;  // > 0
+  std::string request_id;    // of no other job
+  std::uint64_t turn = 0;    // jobs that wait are rendered in this order
+  std::string name, state;   // for people
+  std::string record;
+  bool operator==(const StoredJob&) const = default;
+};
+
+class StateStore {
+ public:
+  // Makes the database unless it is there. `new_instance` is what a new one is called for good.
+  // Errors: FAILED_PRECONDITION when another process uses it or it is of a newer version of
+  // Lucerna, DATA_LOSS when it is damaged, else as Save.
+  [[nodiscard]] static StatusOr<std::unique_ptr<StateStore>> Open(const std::string& path,
+                                                                  const std::string& new_instance);
+  ~StateStore();
+  StateStore(const StateStore&) = delete;
+  StateStore& operator=(const StateStore&) = delete;
+
+  // In front of the ids of its jobs.
+  [[nodiscard]] const std::string& instance() const { return instance_; }
+
+  // Adds the job, or replaces what was saved of it, or of a job with its request id.
+  // Errors: RESOURCE_EXHAUSTED when the disk is full, PERMISSION_DENIED when it may not be written,
+  // UNAVAILABLE for other faults of it. Then nothing has changed.
+  [[nodiscard]] Status Save(const StoredJob& job);
+  // Errors: as Save.
+  [[nodiscard]] Status Remove(std::uint64_t serial);
+
+  // All jobs, by serial number. Errors: DATA_LOSS.
+  [[nodiscard]] StatusOr<std::vector<StoredJob>> Load() const;
+  // Larger than that of any job there has been, removed ones too. Errors: DATA_LOSS.
+  [[nodiscard]] StatusOr<std::uint64_t> NextSerial() const;
+
+ private:
+  StateStore(std::string path, sqlite3* database) : path_(std::move(path)), database_(database) {}
+
+  class Statement;
+  [[nodiscard]] Status Run(const char* sql) const LUCERNA_REQUIRES(mutex_);
+  [[nodiscard]] Status Fault() const LUCERNA_REQUIRES(mutex_);
+  [[nodiscard]] Status SetUp(const std::string& new_instance) LUCERNA_REQUIRES(mutex_);
+  [[nodiscard]] StatusOr<std::int64_t> Number(const char* sql) const LUCERNA_REQUIRES(mutex_);
+
+  const std::string path_;
+  mutable Mutex mutex_;
+  sqlite3* const database_;
+  std::string instance_;  // set once
+};
+
+}  // namespace lucerna

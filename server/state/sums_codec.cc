@@ -1,0 +1,171 @@
+#include "server/state/sums_codec.h"
+
+#include <bit>
+#include <cstring>
+
+#include "render/wire/tally_codec.h"
+
+namespace lucerna {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+
+template <typename Number>
+void Write(ByteWriter& writer, Number value) {
+  writer.Bytes({reinterpret_cast<const char*>(&value), sizeof(value)});
+}
+
+template <typename Number>
+Number Read(ByteReader& reader) {
+  Number value{};
+  const std::string_view bytes = reader.Bytes(sizeof(value));
+  if (bytes.size() == sizeof(value)) std::memcpy(&value, bytes.data(), sizeof(value));
+  return value;
+}
+
+Status Malformed(const char* what) {
+  return absl::InvalidArgumentError(absl::StrCat("malformed checkpoint: ", what));
+}
+
+// Calls `column` with each column of sums, in the order of the file.
+template <typename Columns, typename Visitor>
+void ForEachColumn(Columns& columns, const Visitor& column) {
+  for (auto& sums : columns.radiance)
+    column(sums);
+  for (auto& sums : columns.half_difference)
+    column(sums);
+  for (auto* sums : {&columns.squared_deviations, &columns.even_bias, &columns.odd_bias,
+                     &columns.photon_count, &columns.largest})
+    column(*sums);
+}
+constexpr std::size_t kPixelBytes = 6 * sizeof(double) + 8 * sizeof(float);
+// A column that is not in ForEachColumn would be lost.
+static_assert(sizeof(ImageSums::Columns) == 14 * sizeof(std::vector<float>));
+
+template <typename Features, typename Number>
+void ForEachFeature(Features& features, const Number& number) {
+  number(features.albedo.r);
+  number(features.albedo.g);
+  number(features.albedo.b);
+  number(features.normal.x);
+  number(features.normal.y);
+  number(features.normal.z);
+  number(features.distance);
+  number(features.unit_radius);
+  number(features.hits);
+  number(features.hitpoints);
+}
+constexpr std::size_t kFeatureBytes = 10 * sizeof(float);
+static_assert(sizeof(ImageSums::Features) == kFeatureBytes);
+
+// Whether so many rows can be there.
+bool HasRows(const ByteReader& reader, std::size_t rows, std::size_t row_bytes) {
+  return reader.ok() && rows <= reader.left() / row_bytes;
+}
+
+}  // namespace
+
+void WriteDouble(ByteWriter& writer, double value) {
+  Write(writer, value);
+}
+
+void WriteFloat(ByteWriter& writer, float value) {
+  Write(writer, value);
+}
+
+double ReadDouble(ByteReader& reader) {
+  return Read<double>(reader);
+}
+
+float ReadFloat(ByteReader& reader) {
+  return Read<float>(reader);
+}
+
+void WriteRadii(ByteWriter& writer, const RadiusColumn& radii) {
+  for (const float radius : radii)
+    Write(writer, radius);
+}
+
+StatusOr<RadiusColumn> ReadRadii(ByteReader& reader, std::size_t pixels) {
+  if (!HasRows(reader, pixels, sizeof(float))) return Malformed("radii are missing");
+  RadiusColumn radii(pixels);
+  for (float& radius : radii)
+    radius = Read<float>(reader);
+  return radii;
+}
+
+void WriteNumbers(ByteWriter& writer, const PixelRadii::Numbers& numbers) {
+  for (const PixelRadius& radius : numbers.radius) {
+    Write(writer, radius.radius);
+    Write(writer, radius.photons);
+  }
+  for (const double number : numbers.memory)
+    Write(writer, number);
+}
+
+StatusOr<PixelRadii::Numbers> ReadNumbers(ByteReader& reader, const PixelRadii::Numbers& shape) {
+  const std::size_t numbers = 2 * shape.radius.size() + shape.memory.size();
+  if (!HasRows(reader, numbers, sizeof(double))) return Malformed("radii are missing");
+  PixelRadii::Numbers result;
+  result.radius.resize(shape.radius.size());
+  result.memory.resize(shape.memory.size());
+  for (PixelRadius& radius : result.radius) {
+    radius.radius = Read<double>(reader);
+    radius.photons = Read<double>(reader);
+  }
+  for (double& number : result.memory)
+    number = Read<double>(reader);
+  return result;
+}
+
+void WriteVariance(ByteWriter& writer, const PassVariance::Numbers& numbers) {
+  for (const std::uint64_t count :
+       {numbers.passes, numbers.photons, numbers.photon_rays, numbers.pairs, numbers.eye_rays})
+    writer.Varint(count);
+  for (const PassVariance::Pixel& pixel : numbers.pixels)
+    Write(writer, pixel);
+}
+
+StatusOr<PassVariance::Numbers> ReadVariance(ByteReader& reader, std::size_t pixels) {
+  PassVariance::Numbers numbers;
+  for (std::uint64_t* const count :
+       {&numbers.passes, &numbers.photons, &numbers.photon_rays, &numbers.pairs, &numbers.eye_rays})
+    *count = reader.Varint();
+  if (!HasRows(reader, pixels, sizeof(PassVariance::Pixel))) return Malformed("sums are missing");
+  numbers.pixels.resize(pixels);
+  for (PassVariance::Pixel& pixel : numbers.pixels)
+    pixel = Read<PassVariance::Pixel>(reader);
+  return numbers;
+}
+
+void WriteSums(ByteWriter& writer, const ImageSums::Whole& sums) {
+  writer.Varint(sums.passes);
+  writer.Varint(sums.eye_rays);
+  WriteTally(writer, sums.tally);
+  const auto write = [&](const auto& number) { Write(writer, number); };
+  ForEachColumn(sums.columns, [&](const auto& column) {
+    writer.Bytes({reinterpret_cast<const char*>(column.data()), column.size() * sizeof(column[0])});
+  });
+  for (const ImageSums::Features& features : sums.features)
+    ForEachFeature(features, write);
+}
+
+StatusOr<ImageSums::Whole> ReadSums(ByteReader& reader, std::size_t pixels) {
+  ImageSums::Whole sums;
+  sums.passes = reader.Varint();
+  sums.eye_rays = reader.Varint();
+  LUCERNA_ASSIGN_OR_RETURN(sums.tally, ReadTally(reader));
+  if (!HasRows(reader, pixels, kPixelBytes + kFeatureBytes)) return Malformed("sums are missing");
+  sums.columns = ImageSums::Columns(pixels);
+  sums.features.resize(pixels);
+  const auto read = [&]<typename Number>(Number& number) { number = Read<Number>(reader); };
+  ForEachColumn(sums.columns, [&](auto& column) {
+    const std::string_view bytes = reader.Bytes(column.size() * sizeof(column[0]));
+    if (!bytes.empty()) std::memcpy(column.data(), bytes.data(), bytes.size());
+  });
+  for (ImageSums::Features& features : sums.features)
+    ForEachFeature(features, read);
+  return sums;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,36 @@
+// How are an estimator's sums laid out in a checkpoint?
+//
+// Numbers as they are in memory, little-endian, pixel by pixel: what is read is to the bit what was
+// written. Sums are of the same machine's build (the checkpoint names its numeric profile), so that
+// nothing is converted.
+#pragma once
+
+#include "render/base/status.h"
+#include "render/estimate/hitpoint_block.h"
+#include "render/estimate/image_sums.h"
+#include "render/estimate/photon_steps.h"
+#include "render/estimate/pixel_radii.h"
+#include "render/wire/bytes.h"
+
+namespace lucerna {
+
+void WriteDouble(ByteWriter& writer, double value);
+void WriteFloat(ByteWriter& writer, float value);
+// Zero from a reader that has failed.
+[[nodiscard]] double ReadDouble(ByteReader& reader);
+[[nodiscard]] float ReadFloat(ByteReader& reader);
+
+void WriteRadii(ByteWriter& writer, const RadiusColumn& radii);
+void WriteNumbers(ByteWriter& writer, const PixelRadii::Numbers& numbers);
+void WriteVariance(ByteWriter& writer, const PassVariance::Numbers& numbers);
+void WriteSums(ByteWriter& writer, const ImageSums::Whole& sums);
+
+// Errors of all: INVALID_ARGUMENT for bytes that are truncated or of another shape. Nothing is
+// allocated before the bytes are there.
+[[nodiscard]] StatusOr<RadiusColumn> ReadRadii(ByteReader& reader, std::size_t pixels);
+[[nodiscard]] StatusOr<PixelRadii::Numbers> ReadNumbers(ByteReader& reader,
+                                                        const PixelRadii::Numbers& shape);
+[[nodiscard]] StatusOr<PassVariance::Numbers> ReadVariance(ByteReader& reader, std::size_t pixels);
+[[nodiscard]] StatusOr<ImageSums::Whole> ReadSums(ByteReader& reader, std::size_t pixels);
+
+}  // namespace lucerna

@@ -1,0 +1,78 @@
+// A real coordinator on loopback, and a user of it: what fault tests start, kill and start again.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <grpcpp/grpcpp.h>
+
+#include "proto/lucerna/v1/jobs.pb.h"
+#include "render/base/digest.h"
+#include "render/base/status.h"
+#include "tests/support/process.h"
+
+namespace lucerna {
+
+// For what must happen, however busy the machine is: ends only what hangs.
+inline constexpr std::chrono::seconds kPatience{60};
+inline const std::string kBin = LUCERNA_BIN_DIR;
+inline const std::string kTestScenes = LUCERNA_SOURCE_DIR "/tests/scenes";
+
+// 127.0.0.1 with a port that was free a moment ago.
+[[nodiscard]] std::string FreeAddress();
+
+// What a job of these tests is: a scene of ours in 64×64 pixels.
+struct SmallJob {
+  std::string scene = "glass-box.pbrt";
+  int passes = 6;
+  std::int64_t photons = 400'000;  // a pass
+  std::string request_id = "the only one";
+};
+
+class CoordinatorProcess {
+ public:
+  // Waits until it listens. Of an `address` with port 0 it picks a free one.
+  explicit CoordinatorProcess(std::vector<std::string> flags = {},
+                              const std::string& address = "127.0.0.1:0");
+  // One that kills itself at a step (render/base/fail_point.h), perhaps before it listens: does not
+  // wait.
+  static std::unique_ptr<CoordinatorProcess> Doomed(const std::string& fail_point,
+                                                    std::vector<std::string> flags,
+                                                    const std::string& address);
+
+  [[nodiscard]] const std::string& address() const { return address_; }
+  [[nodiscard]] ChildProcess& process() { return *process_; }
+  [[nodiscard]] const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
+
+  [[nodiscard]] std::unique_ptr<ChildProcess> StartWorker() const;
+
+  // The errors of these are those of the calls.
+  // Uploads and submits; the job's id.
+  [[nodiscard]] StatusOr<std::string> TrySubmit(const SmallJob& job);
+  // Watches until the job has ended or the call breaks; its newest state.
+  [[nodiscard]] StatusOr<v1::Job> TryWait(const std::string& job_id);
+  [[nodiscard]] Status TryDelete(const std::string& job_id);
+
+  // These must succeed.
+  std::string Submit(const std::string& scene, int passes, std::int64_t photons);
+  v1::Job Get(const std::string& job_id);
+  std::vector<v1::Job> List();
+  // The job when it has ended, or as it is after some minutes.
+  v1::Job Wait(const std::string& job_id);
+  Digest ImageDigest(const std::string& job_id);
+
+ private:
+  enum class NotStarted {};
+  explicit CoordinatorProcess(NotStarted /*tag*/) {}
+  void Start(std::vector<std::string> command, std::vector<std::string> flags,
+             const std::string& address);
+
+  std::unique_ptr<ChildProcess> process_;
+  std::string address_;
+  std::shared_ptr<grpc::Channel> channel_;
+};
+
+}  // namespace lucerna

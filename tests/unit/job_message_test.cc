@@ -1,0 +1,177 @@
+// A record read by a later process says all that clients see of the job.
+#include "server/job_message.h"
+
+#include <limits>
+
+#include "gtest/gtest.h"
+
+#include "server/state/durable_state.h"
+#include "tests/support/temporary_folder.h"
+
+namespace lucerna {
+namespace {
+
+const Moment kNow = {SteadyTime(std::chrono::hours(5)), Duration::zero(),
+                     WallTime(std::chrono::hours(400'000))};
+
+// With something in every field that clients see.
+Job FullJob() {
+  Job job;
+  job.id = "i-7";
+  job.name = "a name";
+  job.manifest.main_path = "scene.pbrt";
+  job.manifest.entries["scene.pbrt"] = {Sha256("scene"), 5};
+  job.scene_digest = job.manifest.SceneDigest();
+  RenderOverrides overrides;
+  overrides.width = overrides.height = 8;
+  overrides.alpha = 0.1 + 0.2;
+  job.settings = ResolveSettings(overrides, Scene()).value();
+  job.warnings = {"scene.pbrt:1:2: a warning"};
+  job.needs = SceneNeeds(5, 3, {});
+  for (const Part part : AllParts())
+    job.needs.GiveReason(part, absl::StrCat("reason ", std::string(NameOf(part))));
+  job.submitted_at = kNow.wall - std::chrono::minutes(10);
+  job.life = JobLife({.state = JobState::kSucceeded,
+                      .stop_reason = StopReason::kError,
+                      .failure = "",
+                      .submitted_at = kNow.now - std::chrono::minutes(10),
+                      .ran = std::chrono::nanoseconds(123'456'789)});
+  job.counters.passes = 12;
+  job.counters.photons = 34;
+  job.counters.to_first_photons = std::chrono::milliseconds(5);
+  job.counters.coordinator_cpu = std::chrono::milliseconds(6);
+  job.counters.worker_cpu = std::chrono::milliseconds(7);
+  job.counters.tally.photons = 34;
+  job.counters.tally.energy.emitted = 4096;
+  job.counters.tally.energy.escaped = 4096;
+  job.counters.tally.lights = {{.sent = 34, .in_view = {1, 2}}};
+  job.counters.dropped_photons = {{1, 2}, {3, 4}};
+  job.counters.bytes_sent = 1;
+  job.counters.bytes_received = 2;
+  job.counters.hitpoints_sent = 3;
+  job.counters.hitpoints_returned = 4;
+  job.reference = Sha256("reference");
+  ErrorSample sample;
+  sample.passes = 4;
+  sample.photons = 8;
+  sample.running = std::chrono::seconds(1);
+  sample.cpu = std::chrono::seconds(2);
+  sample.estimate.relative = {0.1, 0.2, 0.3, std::numeric_limits<double>::infinity()};
+  sample.estimate.absolute = {1, 2, 3, 4};
+  sample.estimate.untrimmed = 0.7;
+  sample.estimate.left_out_pixels = 9;
+  sample.truth.emplace();
+  sample.truth->relative = 0.5;
+  sample.truth->absolute = 0.6;
+  sample.truth->untrimmed = 0.8;
+  sample.missing_relative = 0.25;
+  sample.nothing_found = true;
+  job.convergence = {sample, sample};
+  job.lights = {{.name = "light 1",
+                 .power_share = 0.5,
+                 .photons = {.sent = 3, .in_view = {1, 1}},
+                 .missing_share = 0.1}};
+  BatchTally tally;
+  tally.energy.emitted = 7;
+  tally.energy.escaped = 7;
+  job.pass_record.Add(tally, 2);
+  job.pass_record.Add(tally, 4);
+  job.photon_steps = {{0, 100}, {8, 200}};
+  job.workers["w-1"] = {
+      .name = "host", .photons = 34, .batches = 2, .cpu = std::chrono::seconds(3)};
+  job.ended_at = kNow.wall;
+  job.condition = "paused: no room";
+  job.events = {{kNow.wall, "went on"}};
+  return job;
+}
+
+std::string Seen(const Job& job, Duration running) {
+  JobReport report;
+  report.job = job;
+  report.running = running;
+  return ToProto(report).DebugString();
+}
+
+TEST(JobMessageTest, ARecordHoldsAllThatClientsSee) {
+  const Job job = FullJob();
+  const Duration running = job.life.Running(kNow.now);
+  const auto read = DecodeRecord(EncodeRecord(job, Sha256("image"), running), kNow);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(Seen(read->job, read->running), Seen(job, running));
+  EXPECT_EQ(read->running, running);
+  EXPECT_EQ(read->image, Sha256("image"));
+  EXPECT_EQ(read->job.manifest, job.manifest);
+  EXPECT_EQ(read->job.settings, job.settings) << "to the bit";
+  EXPECT_EQ(read->job.needs, job.needs);
+  EXPECT_EQ(read->job.reference, job.reference);
+  EXPECT_EQ(read->job.life.submitted_at(), job.life.submitted_at());
+  EXPECT_EQ(read->job.life.state(), JobState::kSucceeded);
+  EXPECT_EQ(read->job.life.failure(), "");
+  EXPECT_EQ(read->job.life.Running(kNow.now + std::chrono::hours(1)), running)
+      << "time stands still when a job has ended";
+}
+
+TEST(JobMessageTest, AJobThatHasNotEndedWaitsAgain) {
+  Job job = FullJob();
+  job.life = JobLife(kNow.now);
+  ASSERT_TRUE(job.life.Prepare());
+  ASSERT_TRUE(job.life.Run(kNow.now));
+  const auto read = DecodeRecord(EncodeRecord(job, std::nullopt, std::chrono::seconds(3)), kNow);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->job.life.state(), JobState::kQueued) << read->job.life.failure();
+  EXPECT_EQ(read->job.life.Running(kNow.now), std::chrono::seconds(3));
+  EXPECT_FALSE(read->image);
+}
+
+TEST(JobMessageTest, SettingsOfAnotherVersionFailAJobThatWaitsAndShowOneThatEnded) {
+  v1::JobRecord record;
+  Job job = FullJob();
+  ASSERT_TRUE(record.ParseFromString(EncodeRecord(job, std::nullopt, Duration::zero())));
+  record.mutable_job()->mutable_settings()->mutable_settings()->RemoveLast();
+  const auto ended = DecodeRecord(record.SerializeAsString(), kNow);
+  ASSERT_TRUE(ended.ok()) << ended.status();
+  EXPECT_EQ(ended->job.life.state(), JobState::kSucceeded);
+  record.mutable_job()->set_state(v1::JOB_STATE_RUNNING);
+  const auto waits = DecodeRecord(record.SerializeAsString(), kNow);
+  ASSERT_TRUE(waits.ok()) << waits.status();
+  EXPECT_EQ(waits->job.life.state(), JobState::kFailed);
+  EXPECT_NE(waits->job.life.failure().find("another version"), std::string::npos);
+}
+
+TEST(JobMessageTest, RefusesOtherBytes) {
+  EXPECT_FALSE(DecodeRecord("", kNow).ok());
+  EXPECT_FALSE(DecodeRecord("not a record", kNow).ok());
+}
+
+TEST(DurableStateTest, PutsADamagedRowAsideAndSaysSo) {
+  const TemporaryFolder folder;
+  JournalEntry entry;
+  {
+    const auto state = DurableState::Open(folder.At("state"), "i", kNow).value();
+    for (const std::uint64_t serial : {7U, 8U}) {
+      entry.serial = serial;
+      entry.request_id = absl::StrCat("request ", serial);
+      entry.job = FullJob();
+      entry.job.id = absl::StrCat("i-", serial);
+      ASSERT_TRUE(state->Save(entry, Duration::zero()).ok());
+    }
+  }
+  {
+    const auto store = StateStore::Open(folder.At("state/lucerna.db"), "i").value();
+    StoredJob row = store->Load()->front();
+    row.record[row.record.size() / 2] = static_cast<char>(row.record[row.record.size() / 2] ^ 1);
+    ASSERT_TRUE(store->Save(row).ok());
+  }
+  const auto state = DurableState::Open(folder.At("state"), "j", kNow).value();
+  EXPECT_EQ(state->instance(), "i");
+  EXPECT_EQ(state->next_serial(), 9U);
+  ASSERT_EQ(state->problems().size(), 1U);
+  EXPECT_NE(state->problems()[0].find("job i-7"), std::string::npos);
+  const std::vector<JournalEntry> jobs = state->TakeJobs();
+  ASSERT_EQ(jobs.size(), 1U);
+  EXPECT_EQ(jobs[0].job.id, "i-8");
+  EXPECT_EQ(jobs[0].request_id, "request 8");
+}
+
+}  // namespace
+}  // namespace lucerna

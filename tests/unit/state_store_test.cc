@@ -1,0 +1,101 @@
+// What was saved is there at the next start, in order, and nobody else's database is touched.
+#include "server/state/state_store.h"
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include <sqlite3.h>
+
+#include "render/base/files.h"
+#include "tests/support/temporary_folder.h"
+
+namespace lucerna {
+namespace {
+
+using testing::HasSubstr;
+
+StoredJob JobNumber(std::uint64_t serial, const std::string& record = "record") {
+  return {.serial = serial,
+          .request_id = absl::StrCat("request ", serial),
+          .turn = 100 - serial,
+          .name = "scene.pbrt",
+          .state = "queued",
+          .record = record};
+}
+
+// Runs SQL on a database that nobody has open.
+void RunSql(const std::string& path, const std::string& sql) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+  sqlite3_close(database);
+}
+
+TEST(StateStoreTest, HasAllJobsAtTheNextStart) {
+  const TemporaryFolder folder;
+  std::string bytes = "nul ";
+  bytes.push_back('\0');
+  bytes += "\xFF";
+  {
+    const auto store = StateStore::Open(folder.At("db"), "first").value();
+    EXPECT_EQ(store->instance(), "first");
+    EXPECT_EQ(store->NextSerial().value(), 1U);
+    ASSERT_TRUE(store->Save(JobNumber(2)).ok());
+    ASSERT_TRUE(store->Save(JobNumber(1, bytes)).ok());
+    ASSERT_TRUE(store->Save(JobNumber(3)).ok());
+    StoredJob changed = JobNumber(2, "changed");
+    changed.state = "succeeded";
+    changed.turn = 7;
+    ASSERT_TRUE(store->Save(changed).ok());
+  }
+  const auto store = StateStore::Open(folder.At("db"), "second").value();
+  EXPECT_EQ(store->instance(), "first") << "the ids of its jobs stay as they are";
+  StoredJob changed = JobNumber(2, "changed");
+  changed.state = "succeeded";
+  changed.turn = 7;
+  EXPECT_EQ(store->Load().value(),
+            (std::vector<StoredJob>{JobNumber(1, bytes), changed, JobNumber(3)}));
+}
+
+TEST(StateStoreTest, NeverGivesTheNumberOfARemovedJobAgain) {
+  const TemporaryFolder folder;
+  {
+    const auto store = StateStore::Open(folder.At("db"), "i").value();
+    ASSERT_TRUE(store->Save(JobNumber(1)).ok());
+    ASSERT_TRUE(store->Save(JobNumber(5)).ok());
+    ASSERT_TRUE(store->Remove(5).ok());
+    ASSERT_TRUE(store->Remove(4).ok());
+  }
+  const auto store = StateStore::Open(folder.At("db"), "i").value();
+  EXPECT_EQ(store->Load().value(), std::vector<StoredJob>{JobNumber(1)});
+  EXPECT_EQ(store->NextSerial().value(), 6U);
+}
+
+TEST(StateStoreTest, OneCoordinatorAtATime) {
+  const TemporaryFolder folder;
+  const auto store = StateStore::Open(folder.At("db"), "i").value();
+  const auto other = StateStore::Open(folder.At("db"), "j");
+  EXPECT_TRUE(absl::IsFailedPrecondition(other.status())) << other.status();
+  EXPECT_THAT(std::string(other.status().message()), HasSubstr("another coordinator"));
+}
+
+TEST(StateStoreTest, RefusesANewerVersionAndOtherPeoplesFiles) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(StateStore::Open(folder.At("db"), "i").ok());
+  RunSql(folder.At("db"), "PRAGMA user_version=2");
+  const auto newer = StateStore::Open(folder.At("db"), "i");
+  EXPECT_TRUE(absl::IsFailedPrecondition(newer.status()));
+  EXPECT_THAT(std::string(newer.status().message()), HasSubstr("newer version"));
+
+  RunSql(folder.At("foreign"), "CREATE TABLE t (x)");
+  const auto foreign = StateStore::Open(folder.At("foreign"), "i");
+  EXPECT_TRUE(absl::IsFailedPrecondition(foreign.status())) << foreign.status();
+
+  ASSERT_TRUE(WriteFile(folder.At("text"), std::string(4096, 'x')).ok());
+  EXPECT_TRUE(absl::IsDataLoss(StateStore::Open(folder.At("text"), "i").status()));
+
+  EXPECT_TRUE(
+      absl::IsPermissionDenied(StateStore::Open(folder.At("no/such/folder"), "i").status()));
+}
+
+}  // namespace
+}  // namespace lucerna
