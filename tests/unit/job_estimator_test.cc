@@ -60,27 +60,31 @@ TEST(JobEstimatorTest, GivesTheSameBitsForAnyThreadsAndBatches) {
   }
 }
 
-// After 18 passes a round of two passes is half done: it is traced again.
+// A round of several passes that is not whole is traced again, and the number of photons that later
+// passes have still follows from the first ones.
 TEST(JobEstimatorTest, GoesOnFromACheckpointWithTheSameBits) {
   const Scene scene = Room();
   for (const RadiusControllerKind kind : kAllControllers) {
     RenderSettings settings = TestSettings(scene, 2000, 0.1, 8);
     settings.radius_controller = kind;
-    LocalRender quiet(scene, settings, 2);
-    LocalRender killed(scene, settings, 2);
-    LocalRender restored(scene, settings, 2);
-    for (int pass = 0; pass < 23; ++pass)
-      quiet.AddPass();
-    for (int pass = 0; pass < 19; ++pass)
-      killed.AddPass();
-    const std::string checkpoint = killed.Save();
-    ASSERT_TRUE(restored.Restore(checkpoint).ok());
-    EXPECT_EQ(restored.Save(), checkpoint);
-    for (int pass = 18; pass < 23; ++pass)
-      restored.AddPass();
-    EXPECT_EQ(restored.MakeImage().PixelDigest(), quiet.MakeImage().PixelDigest());
-    EXPECT_EQ(restored.Save(), quiet.Save());
-    EXPECT_EQ(restored.EstimateError(2).relative.high, quiet.EstimateError(2).relative.high);
+    settings.adaptive_photons = true;
+    for (const auto& [killed_after, whole] : {std::pair{5, 5}, std::pair{19, 16}}) {
+      LocalRender quiet(scene, settings, 2);
+      LocalRender killed(scene, settings, 2);
+      LocalRender restored(scene, settings, 2);
+      for (int pass = 0; pass < 23; ++pass)
+        quiet.AddPass();
+      for (int pass = 0; pass < killed_after; ++pass)
+        killed.AddPass();
+      const std::string checkpoint = killed.Save();
+      ASSERT_TRUE(restored.Restore(checkpoint).ok());
+      EXPECT_TRUE(restored.Save() == checkpoint);
+      for (int pass = whole; pass < 23; ++pass)
+        restored.AddPass();
+      EXPECT_EQ(restored.MakeImage().PixelDigest(), quiet.MakeImage().PixelDigest());
+      EXPECT_TRUE(restored.Save() == quiet.Save());
+      EXPECT_EQ(restored.EstimateError(2).relative.high, quiet.EstimateError(2).relative.high);
+    }
   }
 }
 
