@@ -43,6 +43,9 @@ ImageSums::Columns::Columns(std::size_t pixels)
 void ImageSums::Add(const SliceSums& slice, ThreadTeam& team) {
   LUCERNA_CHECK(slice.passes.first == whole_.passes && slice.pixels() == pixels());
   tail_.clear();
+  // Of the radiance before, and by this thread: those of a team take floats that are not normal for
+  // zero, and the squares of faint light are such.
+  AddDeviations(slice);
   constexpr std::size_t kPixelsAtOnce = 4096;
   team.For(pixels(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
     AddPixels(slice, begin, end);
@@ -55,35 +58,38 @@ void ImageSums::Add(const SliceSums& slice, ThreadTeam& team) {
   whole_.tally += slice.tally;
 }
 
-// Column by column, as vectors. AddTo does the same to one pixel, with the same bits.
-void ImageSums::AddPixels(const SliceSums& slice, std::size_t begin, std::size_t end) {
+void ImageSums::AddDeviations(const SliceSums& slice) {
   const auto passes = static_cast<double>(whole_.passes);
   const auto slice_passes = static_cast<double>(slice.passes.size());
-  const auto column = [&](std::size_t c) { return slice.columns[c].data(); };
-  std::array<double*, 6> radiance{};
+  std::array<const double*, 6> radiance{};
   std::array<const float*, 6> added{};
+  static_assert(kDirectRadiance == kPhotonRadiance + 3);
   for (std::size_t c = 0; c < 6; ++c) {
     radiance[c] = whole_.columns.radiance[c].data();
-    added[c] = column(kPhotonRadiance + c);
+    added[c] = slice.columns[kPhotonRadiance + c].data();
   }
-  static_assert(kDirectRadiance == kPhotonRadiance + 3);
-  float* const deviations = whole_.columns.squared_deviations.data();
-  const float* const slice_deviations = column(kSquaredDeviations);
-  // Before the radiance is added up.
-  for (std::size_t i = begin; i < end; ++i) {
-    const double before =
-        WorkingLuminance(radiance[0][i] + radiance[3][i], radiance[1][i] + radiance[4][i],
-                         radiance[2][i] + radiance[5][i]);
-    const auto of = [&](std::size_t c) {
+  double* const deviations = whole_.columns.squared_deviations.data();
+  const float* const slice_deviations = slice.columns[kSquaredDeviations].data();
+  for (std::size_t i = 0; i < pixels(); ++i) {
+    const auto before = [&](std::size_t c) { return radiance[c][i] + radiance[c + 3][i]; };
+    const auto of_slice = [&](std::size_t c) {
       return static_cast<double>(added[c][i]) + static_cast<double>(added[c + 3][i]);
     };
-    deviations[i] = static_cast<float>(TogetherDeviating(
-        static_cast<double>(deviations[i]), static_cast<double>(slice_deviations[i]), passes,
-        before, slice_passes, WorkingLuminance(of(0), of(1), of(2))));
+    deviations[i] =
+        TogetherDeviating(deviations[i], static_cast<double>(slice_deviations[i]), passes,
+                          WorkingLuminance(before(0), before(1), before(2)), slice_passes,
+                          WorkingLuminance(of_slice(0), of_slice(1), of_slice(2)));
   }
+}
+
+// Column by column, as vectors. AddTo does the same to one pixel, with the same bits.
+void ImageSums::AddPixels(const SliceSums& slice, std::size_t begin, std::size_t end) {
+  const auto column = [&](std::size_t c) { return slice.columns[c].data(); };
   for (std::size_t c = 0; c < 6; ++c) {
+    double* const radiance = whole_.columns.radiance[c].data();
+    const float* const added = column(kPhotonRadiance + c);
     for (std::size_t i = begin; i < end; ++i)
-      radiance[c][i] += static_cast<double>(added[c][i]);
+      radiance[i] += static_cast<double>(added[i]);
   }
   const auto add = [&](std::vector<float>& sums, std::size_t c) {
     float* const sum = sums.data();
@@ -138,7 +144,7 @@ ImageSums::Pixel ImageSums::At(std::size_t pixel) const {
     sum.direct[c] = whole_.columns.radiance[3 + c][pixel];
     sum.half_difference[c] = static_cast<double>(whole_.columns.half_difference[c][pixel]);
   }
-  sum.squared_deviations = static_cast<double>(whole_.columns.squared_deviations[pixel]);
+  sum.squared_deviations = whole_.columns.squared_deviations[pixel];
   sum.even_bias = static_cast<double>(whole_.columns.even_bias[pixel]);
   sum.odd_bias = static_cast<double>(whole_.columns.odd_bias[pixel]);
   sum.photon_count = static_cast<double>(whole_.columns.photon_count[pixel]);
@@ -169,10 +175,10 @@ void ImageSums::AddTo(Pixel& sum, std::uint64_t passes, const SliceSums& slice, 
     sum.direct[c] += alone.direct[c];
     Grow(sum.half_difference[c], at(kHalfDifference + c));
   }
-  sum.squared_deviations = static_cast<double>(static_cast<float>(
+  sum.squared_deviations =
       TogetherDeviating(sum.squared_deviations, static_cast<double>(at(kSquaredDeviations)),
                         static_cast<double>(passes), before,
-                        static_cast<double>(slice.passes.size()), LuminanceOfSum(alone))));
+                        static_cast<double>(slice.passes.size()), LuminanceOfSum(alone));
   sum.largest = std::max(sum.largest, at(kLargestLuminance));
   Grow(sum.even_bias, at(kEvenBias));
   Grow(sum.odd_bias, at(kOddBias));

@@ -70,14 +70,15 @@ class ImageSums {
   };
   [[nodiscard]] Features FeaturesAt(std::size_t pixel) const;
 
-  // Sums over passes as columns [pixels]: those that image and error are the difference of in
-  // double.
+  // Sums over passes as columns [pixels]. Radiance in double, since passes are many; squares too,
+  // since those of faint light are no normal floats.
   struct Columns {
     explicit Columns(std::size_t pixels = 0);
     [[nodiscard]] std::size_t pixels() const { return largest.size(); }
     std::array<std::vector<double>, 6> radiance;  // photons, direct
     std::array<std::vector<float>, 3> half_difference;
-    std::vector<float> squared_deviations, even_bias, odd_bias, photon_count, largest;
+    std::vector<double> squared_deviations;
+    std::vector<float> even_bias, odd_bias, photon_count, largest;
   };
   // All that is kept of the passes added, without the tail: for checkpoints.
   struct Whole {
@@ -92,6 +93,7 @@ class ImageSums {
   void Restore(Whole whole);
 
  private:
+  void AddDeviations(const SliceSums& slice);
   void AddPixels(const SliceSums& slice, std::size_t begin, std::size_t end);
   static void AddTo(Pixel& sum, std::uint64_t passes, const SliceSums& slice, std::size_t pixel);
   static void AddTo(Features& sum, const SliceSums& slice, std::size_t pixel);

@@ -34,11 +34,12 @@ void ForEachColumn(Columns& columns, const Visitor& column) {
     column(sums);
   for (auto& sums : columns.half_difference)
     column(sums);
-  for (auto* sums : {&columns.squared_deviations, &columns.even_bias, &columns.odd_bias,
-                     &columns.photon_count, &columns.largest})
+  column(columns.squared_deviations);
+  for (auto* sums :
+       {&columns.even_bias, &columns.odd_bias, &columns.photon_count, &columns.largest})
     column(*sums);
 }
-constexpr std::size_t kPixelBytes = 6 * sizeof(double) + 8 * sizeof(float);
+constexpr std::size_t kPixelBytes = 7 * sizeof(double) + 7 * sizeof(float);
 // A column that is not in ForEachColumn would be lost.
 static_assert(sizeof(ImageSums::Columns) == 14 * sizeof(std::vector<float>));
 

@@ -187,7 +187,7 @@ TEST(SliceOfPassTest, CountsAPassWithoutHitpointAsDark) {
   EXPECT_NEAR(static_cast<double>(first.At(kBlur, 1)), blur, blur * kStatisticRounding);
   // Luminances of the two passes, L and 0, are L/2 from their mean.
   const double of_pass = WorkingLuminance(lit.photons[0], lit.photons[1], lit.photons[2]);
-  EXPECT_NEAR(lit.squared_deviations, of_pass * of_pass / 2, 0x1p-24 * of_pass * of_pass);
+  EXPECT_NEAR(lit.squared_deviations, of_pass * of_pass / 2, 1e-12 * of_pass * of_pass);
 }
 
 // A caustic hitpoint adds light to its pixel with its own radius, and nothing to the numbers that
