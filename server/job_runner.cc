@@ -134,10 +134,11 @@ std::uint64_t JobRunner::PassesDone() const {
 StopReason JobRunner::ReasonToStop(const End& end, bool is_time_up) const {
   const std::uint64_t done = PassesDone();
   if (done == 0) return StopReason::kNone;
+  // Before all others: passes that have come since do not count, however many they are.
+  if (end.error > 0 && error_at_most_ <= end.error) return StopReason::kError;
   if (done >= WantedPasses(end) && !MayMeetTarget(end)) {
     return end.passes > 0 && done >= end.passes ? StopReason::kPasses : StopReason::kPhotons;
   }
-  if (end.error > 0 && error_at_most_ <= end.error) return StopReason::kError;
   if (is_time_up) return StopReason::kTime;
   const MutexLock lock(mutex_);
   return shall_finish_ ? StopReason::kUser : StopReason::kNone;
