@@ -166,7 +166,7 @@ StatusOr<RenderResult> JobRunner::RunRounds() {
     const bool is_time_up = due_ && hooks_.clock.Steady() >= *due_;
     TakeInEstimate(false);
     if (const StopReason reason = ReasonToStop(end, is_time_up); reason != StopReason::kNone) {
-      // Where the error decided when to stop, it knows nothing of later passes.
+      // A stop by error leaves later passes out: no estimate covers them.
       if (reason != StopReason::kError) TakeInTail();
       ReportProgress();
       BeginEstimateIfDue(true);
