@@ -106,6 +106,7 @@ struct JobEstimator::State {
   FirstHits first_hits;
   float initial_radius = 0;  // [unit radii]
   std::unique_ptr<EyePathTracer> tracer;
+  std::unique_ptr<FilmSpread> film_spread;
   std::unique_ptr<RadiusController> controller;
   std::unique_ptr<PixelRadii> radii;
   std::unique_ptr<ImageSums> sums;
@@ -161,6 +162,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   state->tracer =
       std::make_unique<EyePathTracer>(prepared.scene(), state->settings, prepared.needs(),
                                       prepared.intersector(), prepared.lights());
+  state->film_spread = std::make_unique<FilmSpread>(*state->tracer);
   const int width = settings.crop_width();
   const int height = settings.crop_height();
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -180,7 +182,8 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
 }
 
 EyePass JobEstimator::TraceEyePaths(std::uint64_t pass) const {
-  return TraceHitpointPass(*state_->tracer, pass, state_->first_hits.Of(pass), state_->team);
+  return TraceHitpointPass(*state_->tracer, pass, state_->first_hits.Of(pass), *state_->film_spread,
+                           state_->team);
 }
 
 std::optional<RoundPlan> JobEstimator::PlanFor(const PassRange& round) const {

@@ -193,6 +193,7 @@ struct BatchTracer::State {
     eye_settings = settings;
     eye_paths = std::make_unique<EyePathTracer>(prepared.scene(), eye_settings, prepared.needs(),
                                                 prepared.intersector(), prepared.lights());
+    film_spread.emplace(*eye_paths);
     first_hits.emplace(prepared.needs().eye_sample_sets(),
                        static_cast<std::size_t>(settings.crop_width()) *
                            static_cast<std::size_t>(settings.crop_height()));
@@ -205,6 +206,7 @@ struct BatchTracer::State {
   std::unique_ptr<SpectrumTracer> spectra;
   RenderSettings eye_settings;
   std::unique_ptr<EyePathTracer> eye_paths;
+  std::optional<FilmSpread> film_spread;
   std::optional<FirstHits> first_hits;
 };
 
@@ -332,8 +334,8 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
                                          std::uint64_t pass, const RoundPlan& plan,
                                          const std::atomic<bool>& stop) {
   State& state = *state_;
-  const EyePass eye =
-      TraceHitpointPass(*state.eye_paths, pass, state.first_hits->Of(pass), state.team);
+  const EyePass eye = TraceHitpointPass(*state.eye_paths, pass, state.first_hits->Of(pass),
+                                        *state.film_spread, state.team);
   if (stop) return absl::CancelledError("the slice was given up");
   const std::size_t columns = EvidenceColumns(EvidenceOf(settings.radius_controller, pass));
   PassSums sums(eye.block.size(), columns);

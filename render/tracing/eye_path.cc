@@ -25,17 +25,33 @@ constexpr float kSmallestBranchWeight = 0x1p-16F;
 // About what a film shows as white over what it shows as middle grey.
 constexpr double kWhite = 5;
 
-float BranchWeight(const Intersector& intersector, const LightSet& lights) {
-  const auto brightest = static_cast<double>(lights.LargestRadiance());
-  if (!(brightest > 0) || intersector.bounds().empty()) return kLargestBranchWeight;
+// Requires that the bounds are not empty.
+double WhiteRadiance(const Intersector& intersector, const LightSet& lights) {
   // All power spread over a sphere around the scene, and scattered evenly.
   const auto diameter = static_cast<double>(intersector.bounds().Diagonal());
   const double area = std::numbers::pi * diameter * diameter;
   const double mean =
       static_cast<double>(MaxChannel(lights.TotalPower())) / (std::numbers::pi * area);
-  return static_cast<float>(std::clamp(kWhite * mean / brightest,
+  return kWhite * mean;
+}
+
+float BranchWeight(const Intersector& intersector, const LightSet& lights) {
+  const auto brightest = static_cast<double>(lights.LargestRadiance());
+  if (!(brightest > 0) || intersector.bounds().empty()) return kLargestBranchWeight;
+  return static_cast<float>(std::clamp(WhiteRadiance(intersector, lights) / brightest,
                                        static_cast<double>(kSmallestBranchWeight),
                                        static_cast<double>(kLargestBranchWeight)));
+}
+
+// Radiance above which emission that the camera sees is spread over the film. Infinite where no
+// light is so bright, and where no two pixels' filters overlap.
+float SpreadAbove(const Scene& scene, bool rays_find_lights, const Intersector& intersector,
+                  const LightSet& lights) {
+  const bool filters_overlap = scene.filter.radius_x > 0.5F || scene.filter.radius_y > 0.5F;
+  if (!filters_overlap || !rays_find_lights || intersector.bounds().empty()) return HUGE_VALF;
+  const double white = WhiteRadiance(intersector, lights);
+  if (!(static_cast<double>(lights.LargestRadiance()) > white)) return HUGE_VALF;
+  return static_cast<float>(white);
 }
 
 }  // namespace
@@ -52,6 +68,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       rays_find_lights_(needs.Uses(Part::kAreaLights) || needs.Uses(Part::kEnvironment)),
       caustic_weight_(scene, settings, intersector.bounds()),
       branch_weight_(BranchWeight(intersector, lights)),
+      white_(SpreadAbove(scene, rays_find_lights_, intersector, lights)),
       intersector_(intersector),
       lights_(lights),
       filter_x_(scene.filter, scene.filter.radius_x),
@@ -69,6 +86,11 @@ Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& w
       settings_.crop_x0 + x + 0.5 + static_cast<double>(filter_x_.Sample(u[0], weight));
   const double film_y =
       settings_.crop_y0 + y + 0.5 + static_cast<double>(filter_y_.Sample(u[1], weight));
+  return CameraRayThrough(film_x, film_y, u[2], u[3]);
+}
+
+Ray EyePathTracer::CameraRayThrough(double film_x, double film_y, float lens_u,
+                                    float lens_v) const {
   const Camera& camera = scene_.camera;
   Vec3 origin;
   Vec3 direction = {static_cast<float>(window_low_x_ + film_x * pixel_width_),
@@ -76,18 +98,57 @@ Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& w
   if (has_lens_) {
     // A thin lens: all rays of one film point meet on the plane of focus.
     const Vec3 focus = direction * static_cast<float>(camera.focal_distance);
-    origin = SquareToDisk(u[2], u[3]) * static_cast<float>(camera.lens_radius);
+    origin = SquareToDisk(lens_u, lens_v) * static_cast<float>(camera.lens_radius);
     direction = focus - origin;
   }
   return {camera.camera_to_world.Point(origin), Normalize(camera.camera_to_world.Vector(direction)),
           HUGE_VALF};
 }
 
-EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass, First first) const {
+PixelSampler EyePathTracer::SamplerOf(int x, int y, std::uint64_t pass) const {
   const auto pixel = static_cast<std::uint64_t>(settings_.crop_y0 + y) *
                          static_cast<std::uint64_t>(settings_.width) +
                      static_cast<std::uint64_t>(settings_.crop_x0 + x);
-  const PixelSampler sampler(settings_.seed, pixel, pass, EyeSetOf(pass, eye_sets_));
+  return {settings_.seed, pixel, pass, EyeSetOf(pass, eye_sets_)};
+}
+
+EyePathTracer::FilmOffset EyePathTracer::FilmOffsetOf(int x, int y, std::uint64_t pass) const {
+  const SobolPoint u = SamplerOf(x, y, pass).ForCamera();
+  float weight = 1;
+  return {filter_x_.Sample(u[0], weight), filter_y_.Sample(u[1], weight)};
+}
+
+Rgb EyePathTracer::BrightPart(Rgb emitted) const {
+  const float strength = MaxChannel(emitted);
+  return strength > white_ ? emitted * (1 - white_ / strength) : Rgb{};
+}
+
+Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
+  const PixelSampler sampler = SamplerOf(x, y, pass);
+  float filter_weight = 1;
+  const Ray ray = CameraRay(sampler, x, y, filter_weight);
+  Hit hit;
+  if (!FindFirst(ray, {}, hit)) return BrightPart(lights_.InfiniteRadiance(ray.direction));
+  const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+  const Vec3 wo = -ray.direction;
+  int rays = 0;
+  // Black unless the surface is smooth.
+  return BrightPart(lights_.EmittedRadiance(surface, wo)) +
+         BrightPart(EmissionThrough(surface, wo, sampler.ForBranches(), rays));
+}
+
+Rgb EyePathTracer::BrightAtCentre(int x, int y) const {
+  const Ray ray =
+      CameraRayThrough(settings_.crop_x0 + x + 0.5, settings_.crop_y0 + y + 0.5, 0.5F, 0.5F);
+  Hit hit;
+  if (!intersector_.Intersect(ray, hit)) {
+    return BrightPart(lights_.InfiniteRadiance(ray.direction));
+  }
+  return BrightPart(lights_.EmittedRadiance(intersector_.SurfaceAt(ray, hit), -ray.direction));
+}
+
+EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass, First first) const {
+  const PixelSampler sampler = SamplerOf(x, y, pass);
   // The filter's weight is kept out of the walk, because it can be negative.
   float filter_weight = 1;
   EyePath path = Walk(CameraRay(sampler, x, y, filter_weight), sampler, first);
@@ -187,12 +248,21 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     return caustic_weight_.OfRays(emission_density, receiver.cosine, receiver.scatter_pdf);
   };
   KeyedRng caustic_rng = sampler.ForCaustics();
+  const auto add_first_emission = [&](Rgb emitted) {
+    const Rgb bright = BrightPart(emitted);
+    path.bright += bright;
+    path.direct += emitted - bright;
+  };
 
   for (int vertex = 0;; ++vertex) {
     Hit hit;
     ++path.rays;
     if (!(vertex == 0 ? FindFirst(ray, first, hit) : intersector_.Intersect(ray, hit))) {
       if (emission_was_collected) return path;
+      if (vertex == 0) {
+        add_first_emission(lights_.InfiniteRadiance(ray.direction));
+        return path;
+      }
       const float mis = scatter_pdf > 0
                             ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(ray.direction))
                             : 1;
@@ -204,7 +274,9 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     const Vec3 wo = -ray.direction;
     length += hit.t;
     const Rgb emitted = lights_.EmittedRadiance(surface, wo);
-    if (!IsBlack(emitted) && !emission_was_collected) {
+    if (vertex == 0) {
+      add_first_emission(emitted);
+    } else if (!IsBlack(emitted) && !emission_was_collected) {
       const float mis =
           scatter_pdf > 0
               ? PowerHeuristic(scatter_pdf, lights_.PdfDirect(scatter_position, surface))
@@ -227,7 +299,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     const SobolPoint u = sampler.ForVertex(vertex);
     if (parts_.lobes && properties.is_smooth) {
       if (vertex == 0 && rays_find_lights_) {
-        path.direct += EmissionThrough(surface, wo, sampler.ForBranches(), path.rays);
+        add_first_emission(EmissionThrough(surface, wo, sampler.ForBranches(), path.rays));
         emission_was_collected = true;
       }
     } else {

@@ -36,7 +36,10 @@ struct EyeHitpoint {
 
 // The end of one eye path.
 struct EyePath {
-  Rgb direct;  // radiance that needs no photons
+  Rgb direct;  // radiance that needs no photons, but for `bright`
+  // Of the emission that the path meets before any rough surface, what is brighter than the image's
+  // white; not weighted by the filter (see film_spread.h).
+  Rgb bright;
   EyeFeatures features;
   EyeHitpoint hitpoint;
   // One of the surfaces on the way that gather caustic photons, with the weight that stands for all
@@ -60,10 +63,31 @@ class EyePathTracer {
   // The eye path of a pixel of the crop window in one pass. Threads: any.
   [[nodiscard]] EyePath Trace(int x, int y, std::uint64_t pass, First first) const;
 
+  // EyePath::bright alone, also of pixels outside the crop window.
+  [[nodiscard]] Rgb TraceBright(int x, int y, std::uint64_t pass) const;
+  // What EyePath::bright would be of a light straight ahead of the pixel's centre. The same in
+  // every pass.
+  [[nodiscard]] Rgb BrightAtCentre(int x, int y) const;
+  // Where the eye path of a pixel begins, from the pixel's centre [pixels].
+  struct FilmOffset {
+    float x = 0, y = 0;
+  };
+  [[nodiscard]] FilmOffset FilmOffsetOf(int x, int y, std::uint64_t pass) const;
+  // Whether EyePath::bright can be anything but black.
+  [[nodiscard]] bool MeetsBright() const { return white_ < HUGE_VALF; }
+  [[nodiscard]] const FilterSampler& filter_x() const { return filter_x_; }
+  [[nodiscard]] const FilterSampler& filter_y() const { return filter_y_; }
+
   [[nodiscard]] const RenderSettings& settings() const { return settings_; }
 
  private:
+  [[nodiscard]] PixelSampler SamplerOf(int x, int y, std::uint64_t pass) const;
   [[nodiscard]] Ray CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const;
+  // Through a point of the film [pixels of the image] and one of the lens.
+  [[nodiscard]] Ray CameraRayThrough(double film_x, double film_y, float lens_u,
+                                     float lens_v) const;
+  // The part of emitted radiance that is brighter than the image's white.
+  [[nodiscard]] Rgb BrightPart(Rgb emitted) const;
   // What a walk may meet. Tested at run time: a walk compiled for each combination was no faster
   // (docs/lean.md).
   struct WalkParts {
@@ -91,6 +115,8 @@ class EyePathTracer {
   const bool rays_find_lights_;  // some have an extent
   const CausticWeight caustic_weight_;
   const float branch_weight_;  // see BranchWeight
+  // Radiance above which emission is spread over the film; infinite where none is.
+  const float white_;
   const Intersector& intersector_;
   const LightSet& lights_;
   FilterSampler filter_x_, filter_y_;

@@ -20,7 +20,7 @@ float UnitRadius(const EyeHitpoint& hitpoint) {
 }  // namespace
 
 EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, FirstHitsOfSet* known,
-                          ThreadTeam& team) {
+                          FilmSpread& spread, ThreadTeam& team) {
   const int width = tracer.settings().crop_width();
   const int height = tracer.settings().crop_height();
   const int tiles_x = (width + kTile - 1) / kTile;
@@ -32,6 +32,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   out.pass = pass;
   out.direct.resize(pixels);
   out.features.resize(pixels);
+  std::vector<Rgb> bright(spread.is_needed() ? pixels : 0);
 
   // A hitpoint as a row, until all tiles are known.
   struct Row {
@@ -67,6 +68,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
                                                       .is_known = known->is_known};
           const EyePath path = tracer.Trace(x, y, pass, first);
           out.direct[pixel] = path.direct;
+          if (!bright.empty()) bright[pixel] = path.bright;
           out.features[pixel] = path.features;
           rays[tile] += static_cast<std::uint64_t>(path.rays);
           const auto keep = [&](const EyeHitpoint& hitpoint, Rows& rows) {
@@ -88,6 +90,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   });
 
   if (known != nullptr) known->is_known = true;
+  spread.Add(pass, bright, out.direct, team);
 
   std::size_t count = 0;
   bool has_textured_k = false;

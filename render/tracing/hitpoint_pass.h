@@ -13,6 +13,7 @@
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "render/tracing/eye_path.h"
+#include "render/tracing/film_spread.h"
 #include "render/tracing/first_hits.h"
 
 namespace lucerna {
@@ -32,8 +33,10 @@ struct EyePass {
 };
 
 // Traces one eye path for every pixel. Depends on the tracer's job and `pass` alone; `known` (or
-// nullptr), what the camera's rays meet, is used or filled and saves time alone.
+// nullptr), what the camera's rays meet, is used or filled and saves time alone. `spread` is of the
+// same tracer.
 [[nodiscard]] EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass,
-                                        FirstHitsOfSet* known, ThreadTeam& team);
+                                        FirstHitsOfSet* known, FilmSpread& spread,
+                                        ThreadTeam& team);
 
 }  // namespace lucerna

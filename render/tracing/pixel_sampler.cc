@@ -75,4 +75,13 @@ float FilterSampler::Sample(float u, float& weight) const {
   return radius_ * (2 * (static_cast<float>(cell) + inside) / static_cast<float>(kCells) - 1);
 }
 
+FilterSampler::Values FilterSampler::At(float offset) const {
+  const float place = (offset / radius_ + 1) * (0.5F * static_cast<float>(kCells));
+  if (!(place >= 0 && place < static_cast<float>(kCells))) return {};
+  const auto cell = static_cast<std::size_t>(place);
+  const float density =
+      (cumulative_[cell + 1] - cumulative_[cell]) * (static_cast<float>(kCells) / (2 * radius_));
+  return {density, density * weight_[cell]};
+}
+
 }  // namespace lucerna

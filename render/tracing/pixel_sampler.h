@@ -64,6 +64,16 @@ class FilterSampler {
   // to the fit of the table).
   [[nodiscard]] float Sample(float u, float& weight) const;
 
+  // Of an offset [pixels]: the density with which Sample draws it [1/pixel], and the filter, of
+  // which the integral is 1 [1/pixel]; both 0 beyond the radius. The filter is the density times
+  // the factor that Sample gives.
+  struct Values {
+    float density = 0, filter = 0;
+  };
+  [[nodiscard]] Values At(float offset) const;
+
+  [[nodiscard]] float radius() const { return radius_; }
+
  private:
   static constexpr std::size_t kCells = 128;
   float radius_;

@@ -74,12 +74,13 @@ TEST(FirstHitsTest, AreWhatEyePathsGoBy) {
   ThreadTeam team(1);
   FirstHitsOfSet known;
   known.shapes.resize(256);
-  const EyePass traced = TraceHitpointPass(tracer, 0, &known, team);
+  FilmSpread spread(tracer);
+  const EyePass traced = TraceHitpointPass(tracer, 0, &known, spread, team);
   ASSERT_TRUE(known.is_known);
   for (std::uint32_t& shape : known.shapes)
     shape = kNoShape;
   EXPECT_FALSE(traced.pixels.empty());
-  EXPECT_TRUE(TraceHitpointPass(tracer, 0, &known, team).pixels.empty());
+  EXPECT_TRUE(TraceHitpointPass(tracer, 0, &known, spread, team).pixels.empty());
 }
 
 }  // namespace

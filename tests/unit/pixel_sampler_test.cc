@@ -64,6 +64,41 @@ TEST(FilterSamplerTest, HasTheMomentsOfItsFilter) {
   }
 }
 
+// The density of the draws, by counting them, and the filter as density times weight.
+TEST(FilterSamplerTest, KnowsItsDensityAndItsFilter) {
+  for (const PixelFilter& filter :
+       {Filter(PixelFilter::Kind::kGaussian, 1.5F), Filter(PixelFilter::Kind::kMitchell, 2)}) {
+    const FilterSampler sampler(filter, filter.radius_x);
+    constexpr int kDraws = 1 << 18;
+    constexpr int kBins = 32;
+    std::vector<double> drawn(kBins);
+    for (int i = 0; i < kDraws; ++i) {
+      float weight = 1;
+      const float offset = sampler.Sample((static_cast<float>(i) + 0.5F) / kDraws, weight);
+      const FilterSampler::Values values = sampler.At(offset);
+      ASSERT_NEAR(values.filter, values.density * weight, 1e-5F) << offset;
+      const float place = (offset / filter.radius_x + 1) / 2 * kBins;
+      drawn[std::min(static_cast<std::size_t>(place), drawn.size() - 1)] += 1.0 / kDraws;
+    }
+    double whole = 0;
+    for (int bin = 0; bin < kBins; ++bin) {
+      constexpr int kSteps = 64;
+      const double width = 2 * static_cast<double>(filter.radius_x) / (kBins * kSteps);
+      double density = 0;
+      for (int k = 0; k < kSteps; ++k) {
+        const auto x = static_cast<float>((bin * kSteps + k + 0.5) * width -
+                                          static_cast<double>(filter.radius_x));
+        density += static_cast<double>(sampler.At(x).density) * width;
+        whole += static_cast<double>(sampler.At(x).filter) * width;
+      }
+      EXPECT_NEAR(drawn[static_cast<std::size_t>(bin)], density, 1e-4) << bin;
+    }
+    EXPECT_NEAR(whole, 1, 1e-5);
+    EXPECT_EQ(sampler.At(filter.radius_x * 1.001F).density, 0);
+    EXPECT_EQ(sampler.At(-filter.radius_x * 1.001F).filter, 0);
+  }
+}
+
 TEST(FilterSamplerTest, TakesTheEndsOfItsRange) {
   const FilterSampler sampler(Filter(PixelFilter::Kind::kGaussian, 1.5F), 1.5F);
   float weight = 1;

@@ -1,0 +1,57 @@
+// For which pixels does a bright light count that an eye path met at once?
+//
+// A pixel's eye paths begin where its filter says. Where the filter is weak they begin seldom, and
+// a small bright light there would be a speck in one pass of a thousand. But the paths of the
+// pixels around begin there often. So what a camera's ray finds of a light without a rough surface
+// between counts for every pixel p whose filter h_p reaches the path's place f on the film, with
+// the weight h_p(f) / Σ_q p_q(f), where p_q is the density with which the path of pixel q begins
+// at f: the balance heuristic (Veach & Guibas 1995, section 3.2) over the pixels. It is applied to
+// what exceeds a constant of the pixel, the radiance c_p straight ahead of its centre, because the
+// weights sum to 1 in the mean only: the inside of a light stays without noise.
+//
+//   I_p = c_p + Σ_q (L(f_q) - c_p) h_p(f_q) / Σ_s p_s(f_q)
+//
+// Only what is brighter than the image's white is treated so (EyePath::bright): a sky gains
+// nothing.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "render/base/parallel.h"
+#include "render/math/rgb.h"
+#include "render/tracing/eye_path.h"
+
+namespace lucerna {
+
+class FilmSpread {
+ public:
+  // Keeps a reference to the tracer.
+  explicit FilmSpread(const EyePathTracer& tracer);
+
+  // Whether Add does anything.
+  [[nodiscard]] bool is_needed() const { return tracer_.MeetsBright(); }
+
+  // Adds to `direct` what bright lights bring to the pixels of the crop window in a pass. `bright`:
+  // EyePath::bright of the same pixels. What lies straight ahead of pixels is found once.
+  void Add(std::uint64_t pass, const std::vector<Rgb>& bright, std::vector<Rgb>& direct,
+           ThreadTeam& team);
+
+ private:
+  // Pixels [x0, x1) × [y0, y1) in the crop window's coordinates.
+  struct Window {
+    int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  };
+  void AddTile(std::uint64_t pass, const Window& tile, const std::vector<Rgb>& bright,
+               std::vector<Rgb>& direct) const;
+  void FindCentres(ThreadTeam& team);
+
+  const EyePathTracer& tracer_;
+  const int width_, height_;     // of the crop window
+  const int reach_x_, reach_y_;  // how far a pixel may be whose paths count [pixels]
+  const Window image_;           // in the crop window's coordinates
+  bool centres_are_known_ = false;
+  std::vector<Rgb> centres_;  // [pixels], or empty: all black
+};
+
+}  // namespace lucerna

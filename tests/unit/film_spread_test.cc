@@ -1,0 +1,196 @@
+// A bright light counts for every pixel whose filter reaches it, by the filter's weight and with
+// little noise, whatever the crop window.
+#include "render/tracing/film_spread.h"
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/tracing/hitpoint_pass.h"
+#include "render/transport/working_space.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+constexpr int kSize = 16;
+constexpr float kRadiance = 1000;
+
+// A rectangle of the film [pixels].
+struct FilmRectangle {
+  double x0, y0, x1, y1;
+};
+
+// A light that fills a rectangle of the film, in front of nothing. A wall behind the camera makes
+// the scene large, so that the light is much brighter than the image's white.
+Scene SceneWithLight(const FilmRectangle& light, const PixelFilter& filter) {
+  Scene scene;
+  // A field of view of 90 degrees: the plane at a distance of 8 is a film of 16 pixels.
+  SetCamera(scene, {0, 0, 0}, {0, 0, 8}, {0, 1, 0}, 90, kSize);
+  scene.filter = filter;
+  // A lens, so that no pass uses the eye paths of another: deviations are of independent passes.
+  scene.camera.lens_radius = 1e-6F;
+  scene.camera.focal_distance = 8;
+  const Scene at_camera = scene;
+  const int material = AddMaterial(scene, DiffuseMaterial(0));
+  // The camera's own axes say which way the film's x grows.
+  const Vec3 right = at_camera.camera.camera_to_world.Vector({1, 0, 0});
+  const auto corner_x = static_cast<float>(light.x0 - kSize / 2.0);
+  const auto corner_y = static_cast<float>(kSize / 2.0 - light.y1);
+  const auto width = static_cast<float>(light.x1 - light.x0);
+  const auto height = static_cast<float>(light.y1 - light.y0);
+  const Vec3 corner = right * corner_x + Vec3{0, corner_y, 8};
+  const int emitter = AddAreaLight(scene, kRadiance, true);
+  AddQuad(scene, corner, right * width, {0, height, 0}, material, emitter);
+  AddQuad(scene, {-100, -100, -1}, {200, 0, 0}, {0, 200, 0}, material);
+  return InWorkingSpace(scene);
+}
+
+PixelFilter Filter(PixelFilter::Kind kind, float radius) {
+  PixelFilter filter;
+  filter.kind = kind;
+  filter.radius_x = radius;
+  filter.radius_y = radius;
+  return filter;
+}
+
+// The integral of the filter of a pixel over [low, high] of the film.
+double FilterOver(const FilterSampler& filter, int pixel, double low, double high) {
+  constexpr int kSteps = 20000;
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double x = low + (high - low) * (i + 0.5) / kSteps;
+    sum += static_cast<double>(filter.At(static_cast<float>(x - pixel - 0.5)).filter);
+  }
+  return sum * (high - low) / kSteps;
+}
+
+struct Traced {
+  std::vector<double> mean, deviation;  // [pixels] over passes, of the green channel
+};
+
+Traced TraceManyPasses(const Scene& scene, const RenderSettings& settings, int passes) {
+  const SceneNeeds needs = NeedsOf(scene, settings);
+  const auto intersector = Intersector::Create(scene).value();
+  const LightSet lights(scene, *intersector);
+  const EyePathTracer tracer(scene, settings, needs, *intersector, lights);
+  FilmSpread spread(tracer);
+  EXPECT_TRUE(spread.is_needed());
+  ThreadTeam team(1);
+  const auto pixels = static_cast<std::size_t>(settings.crop_width() * settings.crop_height());
+  std::vector<double> sum(pixels);
+  std::vector<double> squares(pixels);
+  for (int pass = 0; pass < passes; ++pass) {
+    const EyePass traced =
+        TraceHitpointPass(tracer, static_cast<std::uint64_t>(pass), nullptr, spread, team);
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const auto value = static_cast<double>(traced.direct[i].g);
+      sum[i] += value;
+      squares[i] += value * value;
+    }
+  }
+  Traced result;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    result.mean.push_back(sum[i] / passes);
+    result.deviation.push_back(
+        std::sqrt(std::max(0.0, squares[i] / passes - result.mean[i] * result.mean[i])));
+  }
+  return result;
+}
+
+// Passes are stratified, so that the deviation of a mean is at most that of independent ones.
+TEST(FilmSpreadTest, GivesEveryPixelTheIntegralOfItsFilterOverTheLight) {
+  constexpr int kPasses = 2048;
+  const FilmRectangle lights[] = {
+      {5.6, 7.1, 6.0, 7.3},    // a part of one pixel
+      {6.4, 6.45, 6.6, 6.55},  // around the centre of one
+      {2.3, 3.8, 12.1, 9.4},   // many pixels
+      {0, 0, 2.5, 16},         // at the image's edge
+  };
+  const PixelFilter filters[] = {Filter(PixelFilter::Kind::kTriangle, 1),
+                                 Filter(PixelFilter::Kind::kGaussian, 1.5F),
+                                 Filter(PixelFilter::Kind::kMitchell, 2)};
+  for (const PixelFilter& filter : filters) {
+    for (const FilmRectangle& light : lights) {
+      const Scene scene = SceneWithLight(light, filter);
+      const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
+      const Traced traced = TraceManyPasses(scene, settings, kPasses);
+      const FilterSampler sampler(filter, filter.radius_x);
+      for (int y = 0; y < kSize; ++y) {
+        for (int x = 0; x < kSize; ++x) {
+          const auto i = static_cast<std::size_t>(y * kSize + x);
+          const double expected = kRadiance * FilterOver(sampler, x, light.x0, light.x1) *
+                                  FilterOver(sampler, y, light.y0, light.y1);
+          const double standard_error = traced.deviation[i] / std::sqrt(kPasses);
+          ASSERT_NEAR(traced.mean[i], expected, 5 * standard_error + 2e-4 * kRadiance)
+              << x << ' ' << y << " filter " << static_cast<int>(filter.kind) << " light at "
+              << light.x0;
+        }
+      }
+    }
+  }
+}
+
+TEST(FilmSpreadTest, LeavesTheInsideOfALightWithoutNoise) {
+  const Scene scene = SceneWithLight({1, 1, 15, 15}, Filter(PixelFilter::Kind::kGaussian, 1.5F));
+  const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
+  const Traced traced = TraceManyPasses(scene, settings, 16);
+  for (int y = 5; y < 11; ++y) {
+    for (int x = 5; x < 11; ++x) {
+      const auto i = static_cast<std::size_t>(y * kSize + x);
+      EXPECT_NEAR(traced.mean[i], kRadiance, 1e-3 * kRadiance);
+      EXPECT_LT(traced.deviation[i], 1e-4 * kRadiance);
+    }
+  }
+}
+
+// A light of 0.2 × 0.1 pixels two pixels from the centre: a pixel's own paths, drawn by a filter
+// that has a ten-thousandth of its mass there, would deviate by a hundred times the mean and more.
+TEST(FilmSpreadTest, SeesALightInTheTailOfAFilterInMostPasses) {
+  const FilmRectangle light = {9.7, 8.45, 9.9, 8.55};
+  const PixelFilter filter = Filter(PixelFilter::Kind::kGaussian, 1.5F);
+  const Scene scene = SceneWithLight(light, filter);
+  const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
+  const FilterSampler sampler(filter, filter.radius_x);
+  const double mass =
+      FilterOver(sampler, 8, light.x0, light.x1) * FilterOver(sampler, 8, light.y0, light.y1);
+  const Traced traced = TraceManyPasses(scene, settings, 4096);
+  const double own_deviation = 1 / std::sqrt(mass);  // over the mean, of paths of its own
+  ASSERT_GT(own_deviation, 30);
+  const std::size_t i = 8 * kSize + 8;
+  EXPECT_LT(traced.deviation[i] / traced.mean[i], own_deviation / 3);
+}
+
+TEST(FilmSpreadTest, GivesACropWindowWhatTheWholeImageHas) {
+  const Scene scene =
+      SceneWithLight({2.3, 3.8, 12.1, 9.4}, Filter(PixelFilter::Kind::kGaussian, 1.5F));
+  const RenderSettings whole = TestSettings(scene, 1000, 0.1, 4);
+  RenderSettings crop = whole;
+  crop.crop_x0 = 4;
+  crop.crop_y0 = 6;
+  crop.crop_x1 = 13;
+  crop.crop_y1 = 11;
+  const Traced of_whole = TraceManyPasses(scene, whole, 4);
+  const Traced of_crop = TraceManyPasses(scene, crop, 4);
+  for (int y = 0; y < crop.crop_height(); ++y) {
+    for (int x = 0; x < crop.crop_width(); ++x) {
+      EXPECT_EQ(of_crop.mean[static_cast<std::size_t>(y * crop.crop_width() + x)],
+                of_whole.mean[static_cast<std::size_t>((y + 6) * kSize + x + 4)])
+          << x << ' ' << y;
+    }
+  }
+}
+
+TEST(FilmSpreadTest, IsNotNeededWhereFiltersDoNotOverlap) {
+  const Scene scene = SceneWithLight({5.6, 7.1, 6.0, 7.3}, Filter(PixelFilter::Kind::kBox, 0.5F));
+  const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
+  const auto intersector = Intersector::Create(scene).value();
+  const LightSet lights(scene, *intersector);
+  const EyePathTracer tracer(scene, settings, NeedsOf(scene, settings), *intersector, lights);
+  EXPECT_FALSE(FilmSpread(tracer).is_needed());
+}
+
+}  // namespace
+}  // namespace lucerna
