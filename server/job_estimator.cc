@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -231,8 +232,12 @@ void JobEstimator::AddRound(const SliceSums& round, const RoundPlan& plan) {
   state.after[passes] = {.radii = std::make_shared<const RadiusColumn>(state.radii->Current()),
                          .photons_per_pass = state.ChoosePhotons(
                              round, state.after.rbegin()->second.photons_per_pass)};
-  // Rounds that are still to be planned, or to be planned again by a job that goes on, need these.
-  state.after.erase(state.after.begin(), state.after.lower_bound(RadiiFrom(RoundOf(passes))));
+  // Rounds that are still to be planned, or to be planned again by a job that goes on, need these;
+  // the newest is what the next choice of photons follows from.
+  std::set<std::uint64_t> needed = {passes};
+  for (PassRange next = RoundOf(passes); RadiiFrom(next) < passes; next = RoundOf(next.last))
+    needed.insert(RadiiFrom(next));
+  std::erase_if(state.after, [&](const auto& entry) { return !needed.contains(entry.first); });
 }
 
 void JobEstimator::SetTail(ImageSums::Slices tail, const RoundPlan& plan) {

@@ -18,6 +18,12 @@ namespace {
 constexpr std::uint64_t kYoungPasses = 16;
 // So many passes are split at once: while the last photons of one are out, workers trace the next.
 constexpr std::size_t kMostSplitPasses = 2;
+// Rounds are opened no further than so many passes for each worker, at least and at most, from the
+// oldest one that is not whole on; those that are whole meanwhile have sums that are kept.
+constexpr std::uint64_t kOpenPassesPerWorker = 64;
+constexpr std::uint64_t kFewestOpenPasses = 512;
+constexpr std::uint64_t kMostOpenBytes = std::uint64_t{4} << 30;
+constexpr std::uint64_t kBytesOfSums = 48;  // a pixel and round
 // The error is near its target when its upper end is below so many times that.
 constexpr double kNearTarget = 1.5;
 constexpr Duration kPauseBeforeRetry = std::chrono::seconds(1);
@@ -49,6 +55,17 @@ JobRunner::End JobRunner::EndOf(const RenderSettings& settings) {
           .time_s = settings.time_s,
           .error = settings.error,
           .photons = settings.photons};
+}
+
+bool JobRunner::MayOpenMore() const {
+  if (open_rounds_.empty()) return true;
+  const auto pixels = static_cast<std::uint64_t>(settings_.crop_width()) *
+                      static_cast<std::uint64_t>(settings_.crop_height());
+  const std::uint64_t by_memory = kMostOpenBytes / (pixels * kBytesOfSums) * kLongestRound;
+  const auto workers = static_cast<std::uint64_t>(hooks_.scheduler.LiveWorkers());
+  const std::uint64_t by_workers = std::max(kFewestOpenPasses, kOpenPassesPerWorker * workers);
+  return next_round_ - open_rounds_.front().round.first <
+         std::max(std::min(by_memory, by_workers), 4 * kLongestRound);
 }
 
 std::uint64_t JobRunner::WantedPasses(const End& end) const {
@@ -229,7 +246,8 @@ StatusOr<bool> JobRunner::Step(const End& end, bool wants_more) {
   // Nothing is opened before the hitpoints of the first pass are out, so that its image comes
   // first.
   const bool first_is_out = next_round_ == 0 || next_split_ > 0;
-  if ((wants_more || next_round_ == 0) && first_is_out && next_round_ < WantedPasses(end)) {
+  if ((wants_more || next_round_ == 0) && first_is_out && next_round_ < WantedPasses(end) &&
+      MayOpenMore()) {
     std::optional<RoundPlan> plan;
     {
       const MutexLock lock(estimator_mutex_);

@@ -168,6 +168,8 @@ class JobRunner final : public RunningJob {
   void TakeInTail();
   Status OpenNextRound(const End& end, RoundPlan plan);
   void TakeIn(const OpenRound& open);
+  // Whether one more round may be opened, for the memory of those that are open.
+  bool MayOpenMore() const;
   // How many passes are wanted, as far as is known now.
   std::uint64_t WantedPasses(const End& end) const;
   // Lends more, or fewer, passes of the open rounds.

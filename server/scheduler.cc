@@ -310,7 +310,8 @@ std::string Scheduler::NameOf(const std::string& worker) const {
 std::uint64_t Scheduler::BatchSize(const Work& work, SteadyTime now) const {
   if (work.kind == WorkKind::kPasses) return SliceSize(work, now);
   if (options_.fixed_batch > 0) return std::min(options_.fixed_batch, work.rest.size());
-  const std::uint64_t share = CeilDivide(work.total, std::max<std::uint64_t>(live_workers_, 1));
+  const std::uint64_t ways = std::clamp<std::uint64_t>(live_workers_, 1, options_.max_split_ways);
+  const std::uint64_t share = CeilDivide(work.total, ways);
   return std::min(std::clamp(share, options_.min_batch, options_.max_batch), work.rest.size());
 }
 

@@ -49,6 +49,9 @@ struct SchedulerOptions {
   Duration worker_silence = std::chrono::seconds(30);
   std::uint64_t min_batch = 4096;  // [photons]
   std::uint64_t max_batch = std::uint64_t{1} << 22;
+  // A pass is split among so many workers at most: what every one of them is sent and sends takes
+  // longer than the photons that one more would take over.
+  std::uint64_t max_split_ways = 8;
   std::uint64_t fixed_batch = 0;  // all batches of this size; 0: as above
   std::uint64_t max_slice = 16;   // [passes]
   // Slices are cut so that open rounds have so many for every worker.

@@ -4,11 +4,13 @@
 // from the pass number alone, so the image stays a function of scene and settings, whoever traces
 // which pass and when. Rounds are of one pass each up to kFirstLongRound, so that early radii
 // follow the photons closely; then of a quarter to an eighth of the passes before them up to eight
-// passes, later of an eighth to a sixteenth. The radii of a round follow from the passes that lie
-// at least an eighth of the passes done before it: a quarter of the passes done may be out at once,
-// and no worker waits for a slower one. Radii fall as a small power of the passes, so that an
-// eighth of lag is some 2 % of a radius. A worker sends one sum for a slice of a round, so that
-// longer rounds cost the coordinator less (docs/decisions/rounds.md has the figures).
+// passes, later of an eighth to a sixteenth. The radii of a round lag behind it: up to pass
+// kFirstLongLag they follow from the passes that lie at least an eighth of the passes done before
+// it, and of the passes after kFirstLongLag half and more may be missing. So many may be out at
+// once that a large farm has slices of several passes for every worker, and no worker waits for a
+// slower one. Radii fall as a small power of the passes: an eighth of lag is some 2 % of a radius,
+// a half 12 % where the error is nearly flat. A worker sends one sum for a slice of a round, so
+// that longer rounds cost the coordinator less (docs/decisions/rounds.md has the figures).
 #pragma once
 
 #include <algorithm>
@@ -28,9 +30,8 @@ inline constexpr std::uint64_t kFirstLongRound = 8;
 // So long, rounds grow with a quarter of the passes.
 inline constexpr std::uint64_t kLongestQuickRound = 8;
 inline constexpr std::uint64_t kLongestRound = 64;
-// The coordinator keeps the sums of all rounds that are out while an older one is not whole:
-// without a limit these would grow with the passes.
-inline constexpr std::uint64_t kLongestLag = 512;
+// From here on the lag grows by a pass for every two, and rounds share their radii with others.
+inline constexpr std::uint64_t kFirstLongLag = 64;
 
 // The round of a pass. Its length is a power of two and divides its first pass.
 [[nodiscard]] constexpr PassRange RoundOf(std::uint64_t pass) {
@@ -42,11 +43,17 @@ inline constexpr std::uint64_t kLongestLag = 512;
   return {first, first + length};
 }
 
-// The radii of a round follow from the passes before this one, which is the first of a round.
+// The radii of a round follow from the passes before this one, which is the first of a round. In
+// the long run there are some eight such states of the radii between a round and what its own
+// follow from, however many rounds there are.
 [[nodiscard]] constexpr std::uint64_t RadiiFrom(const PassRange& round) {
   if (round.first == 0) return 0;
-  const std::uint64_t lag = std::clamp<std::uint64_t>(round.first / 8, 1, kLongestLag);
-  return RoundOf(round.first - lag).first;
+  const std::uint64_t early = std::min(round.first, kFirstLongLag);
+  const std::uint64_t lag = std::max<std::uint64_t>(early / 8 + (round.first - early) / 2, 1);
+  const std::uint64_t from = RoundOf(round.first - lag).first;
+  if (round.first <= kFirstLongLag) return from;
+  const std::uint64_t step = std::bit_floor(round.first) / 16;
+  return from / step * step;
 }
 
 // A slice is a part of a round that is summed by itself: a power of two of passes that begins at a

@@ -53,16 +53,16 @@ struct Costs {
   double photons_per_pixel = 4;   // and pass
   double eye_ns = 900;            // of a core: an eye path with direct light
   double photon_ns = 1250;        // of a core: a photon path with gathering
-  double merge_ns = 100;          // a pixel and slice: decode and merge
-  double statistics_ns = 120;     // a pixel and round, in parallel: statistics and radii
-  double estimate_ns = 400;       // a pixel and estimate, on the job's thread
+  double merge_ns = 60;           // a pixel and slice: decode and merge
+  double statistics_ns = 50;      // a pixel and round, in parallel: statistics and radii
+  double estimate_ns = 5;         // a pixel and estimate, on the job's thread
   double encode_block_ns = 30;    // a pixel and split pass, on the job's thread
   double encode_radii_ns = 9;     // a pixel and round, or split pass, on the job's thread
   double accumulation_ns = 75;    // a hitpoint that a batch of photons touched: decode and add
   double split_slice_ns = 60;     // a pixel and split pass, on the job's thread: its slice
   double rpc_us = 50;             // of a core of the coordinator, any call
-  double slice_bytes = 35;        // a pixel
-  double first_slice_bytes = 70;  // a pixel, in the first 16 passes
+  double slice_bytes = 30;        // a pixel
+  double first_slice_bytes = 26;  // a pixel, in the first 16 passes
   double radii_bytes = 2;         // a pixel, round and worker
   double block_bytes = 8;         // a pixel and worker, of a split pass
   double accumulation_bytes = 8;  // a hitpoint that a batch of photons touched
@@ -78,10 +78,10 @@ struct Costs {
   double max_slice = 16;          // [passes] SchedulerOptions::max_slice
   double slices_per_worker = 2;   // SchedulerOptions::slices_per_worker
   // Of a slice of one pass, a pixel; 0: as of other slices.
-  double single_slice_bytes = 0;
+  double single_slice_bytes = 19;
   // Rounds from this pass on are never split, whatever the policy says.
   double split_below = 16;
-  double split_ways = 0;      // so many workers share a split pass at most; 0: all
+  double split_ways = 8;      // SchedulerOptions::max_split_ways
   double split_passes = 2;    // are out at once at most
   double progress_every = 0;  // [s] lines to stderr; 0: none
   double seed = 1;
@@ -127,7 +127,7 @@ constexpr std::array kOptions = {
     Option{"slices-per-worker", &Costs::slices_per_worker, ""},
     Option{"single-slice-bytes", &Costs::single_slice_bytes, "bytes a pixel; 0: as others"},
     Option{"split-below", &Costs::split_below, "first pass of rounds that are never split"},
-    Option{"split-ways", &Costs::split_ways, "workers that share a split pass; 0: all"},
+    Option{"split-ways", &Costs::split_ways, "workers that share a split pass at most"},
     Option{"split-passes", &Costs::split_passes, "out at once"},
     Option{"progress-every", &Costs::progress_every, "s, lines to stderr; 0: none"},
     Option{"seed", &Costs::seed, ""},
@@ -163,10 +163,7 @@ class Farm {
     SchedulerOptions options;
     options.max_slice = static_cast<std::uint64_t>(c_.max_slice);
     options.slices_per_worker = static_cast<std::uint64_t>(c_.slices_per_worker);
-    if (c_.split_ways > 0) {
-      options.min_batch = PhotonsPerPass() / static_cast<std::uint64_t>(c_.split_ways) + 1;
-      options.max_batch = std::max(options.max_batch, options.min_batch);
-    }
+    options.max_split_ways = static_cast<std::uint64_t>(c_.split_ways);
     scheduler_ = std::make_unique<Scheduler>(options);
     workers_.resize(static_cast<std::size_t>(workers));
     for (std::size_t i = 0; i < workers_.size(); ++i) {
@@ -718,7 +715,9 @@ class Farm {
   void StepJob() {
     if (job_is_busy_) return;
     const PassRange round = RoundOf(next_round_);
-    if (added_ >= RadiiFrom(round)) {
+    const auto most_open =
+        std::max<std::uint64_t>(512, 64 * static_cast<std::uint64_t>(scheduler_->LiveWorkers()));
+    if (added_ >= RadiiFrom(round) && next_round_ < added_ + most_open) {
       const std::uint64_t at_once = round.last - RadiiFrom(round);
       const bool is_split =
           round.first == 0 || (static_cast<double>(round.first) < c_.split_below &&

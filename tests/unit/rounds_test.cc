@@ -37,9 +37,9 @@ TEST(RoundsTest, GrowWithThePassesBeforeThem) {
   }
 }
 
-// A round's radii follow from whole rounds, at least an eighth of the passes before it, and no more
-// than a quarter and a round.
-TEST(RoundsTest, LagAnEighthBehind) {
+// A round's radii follow from whole rounds: all but an eighth of the passes before it, at first; in
+// the long run all but a half; and no more of them are missing than that and a round.
+TEST(RoundsTest, LagBehind) {
   EXPECT_EQ(RadiiFrom(RoundOf(0)), 0U);
   EXPECT_EQ(RadiiFrom(RoundOf(1)), 0U);
   EXPECT_EQ(RadiiFrom(RoundOf(2)), 1U);
@@ -47,12 +47,26 @@ TEST(RoundsTest, LagAnEighthBehind) {
     const PassRange round = RoundOf(pass);
     const std::uint64_t from = RadiiFrom(round);
     EXPECT_EQ(RoundOf(from).first, from);
-    EXPECT_LE(from, round.first - std::clamp<std::uint64_t>(round.first / 8, 1, kLongestLag));
-    EXPECT_LE(round.last - from, kLongestLag + 2 * kLongestRound) << "sums that are kept";
-    EXPECT_GE(4 * from + 4 * round.size(), 3 * round.first) << pass;
+    if (round.first <= kFirstLongLag) {
+      EXPECT_LE(from, round.first - std::max<std::uint64_t>(round.first / 8, 1));
+      EXPECT_GE(8 * (from + round.size()), 7 * round.first) << pass;
+    } else {
+      EXPECT_LE(2 * from, round.first + kFirstLongLag) << pass;
+      EXPECT_GE(16 * (from + round.size()), 7 * round.first) << pass;
+    }
     if (from > 0) {
       EXPECT_LE(RadiiFrom(RoundOf(round.first - 1)), from);
     }
+  }
+}
+
+// What is kept of the radii does not grow with the passes.
+TEST(RoundsTest, FollowFromAFewStatesOfTheRadii) {
+  for (std::uint64_t pass = kFirstLongLag; pass < 100'000; pass = RoundOf(pass).last) {
+    std::set<std::uint64_t> states;
+    for (PassRange round = RoundOf(pass); RadiiFrom(round) <= pass; round = RoundOf(round.last))
+      states.insert(RadiiFrom(round));
+    EXPECT_LE(states.size(), 9U) << pass;
   }
 }
 

@@ -348,6 +348,26 @@ TEST(SchedulerRoundTest, LendsPartOfARoundInSlices) {
   }
 }
 
+// Every further worker would be sent all hitpoints.
+TEST(SchedulerTest, SplitsAPassAmongAFewWorkersAtMost) {
+  SchedulerOptions options;
+  options.max_split_ways = 4;
+  options.min_batch = 10;
+  Scheduler scheduler(options);
+  std::vector<std::string> workers;
+  for (int i = 0; i < 10; ++i)
+    workers.push_back(scheduler.AddWorker("w", At(0)));
+  scheduler.OpenPass({"job", 0}, 1000);
+  int lent = 0;
+  for (const std::string& worker : workers) {
+    const auto lease = Ask(scheduler, worker, 0);
+    if (!lease) continue;
+    ++lent;
+    EXPECT_EQ(lease->range.size(), 250U);
+  }
+  EXPECT_EQ(lent, 4);
+}
+
 // One worker finds a second slice while it works on its first; many share the passes that are open,
 // two slices each, down to single passes.
 TEST(SchedulerRoundTest, SlicesAreShorterTheMoreWorkersThereAre) {
