@@ -771,9 +771,10 @@ std::optional<Scheduler::Straggler> Scheduler::FindStraggler(SteadyTime now) con
   for (const auto& [kind_and_size, leases] : newest_leases_) {
     const auto& [kind, size] = kind_and_size;
     const std::optional<double> usual = UsualTime(kind);
-    if (!usual) continue;
-    const double patience = std::max(*usual * static_cast<double>(size) * options_.speculate_after,
-                                     Seconds(options_.speculate_at_least));
+    const double patience =
+        usual ? std::max(*usual * static_cast<double>(size) * options_.speculate_after,
+                         Seconds(options_.speculate_at_least))
+              : Seconds(options_.speculate_unknown);
     const auto& [lent_at, number, id] = *leases.begin();
     if (Seconds(now - lent_at) < patience) continue;
     const Lease& lease = leases_.at(id);

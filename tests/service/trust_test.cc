@@ -151,11 +151,12 @@ TEST_F(TrustTest, AWorkerThatOnlyReportsHoldsUpNothing) {
   const WorkerThread diligent(service_);
   bool is_revoked = false;
   for (int i = 0; i < 1000 && !is_revoked; ++i) {
-    service_.clock().Move(std::chrono::milliseconds(500));
+    // Slowly enough for the other worker to be heard of.
+    service_.clock().Move(std::chrono::milliseconds(250));
     const auto answer = hanging.Sync(false, Duration::zero(), {lease->lease_id()});
     ASSERT_TRUE(answer.ok()) << answer.status.error_message();
     is_revoked = answer.message.revoked_lease_ids_size() > 0;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   EXPECT_TRUE(is_revoked);
   EXPECT_EQ(client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message.state(),

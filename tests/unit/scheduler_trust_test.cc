@@ -322,6 +322,15 @@ TEST_F(SchedulerTrustTest, ALeaseThatIsOnlyRenewedIsTakenBack) {
   EXPECT_EQ(StandingOf(hanging, lease).value(), Standing::kExpected) << "it may still come";
 }
 
+TEST_F(SchedulerTrustTest, TheFirstBatchesAreLentASecondTimeToo) {
+  scheduler_.OpenPass(kPass, 100);
+  const std::string hanging = Join("hanging");
+  const BatchLease lease = Ask(hanging, 0).value();
+  const std::string idle = Join("idle");
+  EXPECT_FALSE(Ask(idle, 29)) << "it is not known how long a batch takes";
+  EXPECT_EQ(Ask(idle, 31)->range, lease.range);
+}
+
 TEST_F(SchedulerTrustTest, ABatchThatIsSlowForGoodReasonGetsMoreTimeEachTime) {
   SchedulerOptions options = Options();
   options.renew_unknown = std::chrono::seconds(100);
