@@ -14,7 +14,7 @@ void CountCommit(Job& job, const Delivery& delivery, const DeliveredCounts& coun
   counters.hitpoints_returned += counts.rows;
   counters.rate.Add(counts.tally.photons, now);
   WorkerShare& share = job.workers[delivery.record];
-  share.name = worker_name;
+  if (share.name.empty()) share.name = worker_name;
   share.photons += counts.tally.photons;
   share.batches += 1;
   share.cpu = SaturatingSum(share.cpu, delivery.cpu);

@@ -36,7 +36,7 @@ struct DeliveredCounts {
   std::uint64_t rows = 0;  // hitpoints or pixels
 };
 
-// Counts a batch that was merged. `worker_name` is for people; that of the last batch is kept.
+// Counts a batch that was merged. `worker_name` is for people; kept from the first of its batches.
 void CountCommit(Job& job, const Delivery& delivery, const DeliveredCounts& counts,
                  std::string_view worker_name, SteadyTime now);
 

@@ -149,6 +149,34 @@ TEST(ManyWorkersTest, OneThenEightThenTwoBringTheSameBits) {
   ExpectUnfaulted(coordinator, job);
 }
 
+TEST(WorkersCommandTest, ListsDrainsAndReleasesWorkers) {
+  CoordinatorProcess coordinator;
+  const auto worker = coordinator.StartWorker();
+  ASSERT_TRUE(WaitForWorkers(
+      coordinator, [](const std::vector<v1::Worker>& workers) { return workers.size() == 1; }));
+  const std::string id = WorkersOf(coordinator)[0].worker_id();
+  const auto run = [&](std::vector<std::string> arguments) {
+    std::vector<std::string> command = {kBin + "/lucerna", "workers"};
+    command.insert(command.end(), arguments.begin(), arguments.end());
+    command.insert(command.end(), {"--server", coordinator.address()});
+    return RunProgram(command, kPatience);
+  };
+  const auto shows = [](const Finished& finished, const std::string& text) {
+    return finished.exit_code == 0 && finished.output.find(text) != std::string::npos;
+  };
+  const Finished list = run({});
+  EXPECT_TRUE(shows(list, id)) << list.output << list.errors;
+  EXPECT_TRUE(shows(list, "active"));
+  EXPECT_TRUE(shows(run({"--json"}), "\"state\": \"active\""));
+  EXPECT_TRUE(shows(run({"drain", id}), "drained"));
+  EXPECT_TRUE(shows(run({"quarantine", id, "--json"}), "\"reason\": \"by an operator\""));
+  EXPECT_TRUE(shows(run({"release", id}), "active"));
+  const Finished unknown = run({"release", "nobody"});
+  EXPECT_EQ(unknown.exit_code, 1);
+  EXPECT_NE(unknown.errors.find("there is no worker nobody"), std::string::npos) << unknown.errors;
+  EXPECT_EQ(run({"release"}).exit_code, 2);
+}
+
 bool HasOneInQuarantine(const std::vector<v1::Worker>& workers) {
   int in_quarantine = 0;
   for (const v1::Worker& worker : workers)
