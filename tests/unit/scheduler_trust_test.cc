@@ -152,6 +152,9 @@ TEST_F(SchedulerTrustTest, ALateResultCountsWhileItsBatchHasNoOther) {
   const BatchLease lease = Ask(late, 0).value();
   scheduler_.Expire(At(10));
   EXPECT_EQ(StandingOf(late, lease).value(), Standing::kExpected) << "nobody has it";
+  BatchLease of_other_work = lease;
+  of_other_work.range = {0, 50};
+  EXPECT_TRUE(absl::IsFailedPrecondition(StandingOf(late, of_other_work).status()));
   const std::string other = Join("other", 11);
   ASSERT_TRUE(Ask(other, 11));
   EXPECT_EQ(StandingOf(late, lease).value(), Standing::kExpected) << "another has it";
@@ -181,7 +184,7 @@ TEST_F(SchedulerTrustTest, ARefusedResultIsAFailureOfItsWorkerAlone) {
   EXPECT_TRUE(absl::IsFailedPrecondition(StandingOf(bad, lease).status()));
   EXPECT_EQ(RecordOf(bad).leases.failed, 1U);
   EXPECT_EQ(RecordOf(good).leases, LeaseCounts());
-  EXPECT_EQ(Ask(good, 1)->range, lease.range);
+  EXPECT_EQ(Ask(good, 1).value().range, lease.range);
 }
 
 // Identity, losses and crashes --------------------------------------------------------------------
@@ -197,7 +200,7 @@ TEST_F(SchedulerTrustTest, AWorkerThatReconnectsIsTheSame) {
   EXPECT_EQ(scheduler_.Workers().size(), 1U);
   EXPECT_EQ(scheduler_.LiveWorkers(), 1);
   EXPECT_EQ(RecordOf(after).leases.lost, 1U);
-  EXPECT_EQ(Ask(after, 1)->range, held.range) << "what it held was dropped";
+  EXPECT_EQ(Ask(after, 1).value().range, held.range) << "what it held was dropped";
   EXPECT_TRUE(absl::IsFailedPrecondition(StandingOf(before, held).status()));
 }
 
@@ -318,7 +321,7 @@ TEST_F(SchedulerTrustTest, ALeaseThatIsOnlyRenewedIsTakenBack) {
   EXPECT_GE(now, 63);
   EXPECT_LE(now, 66);
   EXPECT_EQ(RecordOf(hanging).leases, (LeaseCounts{.stalled = 1}));
-  EXPECT_EQ(Ask(quick, now)->range, lease.range);
+  EXPECT_EQ(Ask(quick, now).value().range, lease.range);
   EXPECT_EQ(StandingOf(hanging, lease).value(), Standing::kExpected) << "it may still come";
 }
 
@@ -328,7 +331,7 @@ TEST_F(SchedulerTrustTest, TheFirstBatchesAreLentASecondTimeToo) {
   const BatchLease lease = Ask(hanging, 0).value();
   const std::string idle = Join("idle");
   EXPECT_FALSE(Ask(idle, 29)) << "it is not known how long a batch takes";
-  EXPECT_EQ(Ask(idle, 31)->range, lease.range);
+  EXPECT_EQ(Ask(idle, 31).value().range, lease.range);
 }
 
 TEST_F(SchedulerTrustTest, ABatchThatIsSlowForGoodReasonGetsMoreTimeEachTime) {
@@ -380,8 +383,11 @@ TEST_F(SchedulerTrustTest, AWorkerThatFailsOftenIsLentNothingUntilItIsReleased) 
   EXPECT_FALSE(Ask(again, 41)) << "also after it has joined again";
   EXPECT_FALSE(scheduler_.Release("unknown"));
   EXPECT_TRUE(scheduler_.Release(WorkerIdOf("bad")));
-  EXPECT_TRUE(Ask(again, 42));
+  const auto lease = Ask(again, 42);
+  ASSERT_TRUE(lease);
   EXPECT_EQ(scheduler_.LiveWorkers(), 2);
+  Fail(again, *lease, 43);
+  EXPECT_EQ(RecordOf(again).state, WorkerState::kActive) << "counted from the beginning";
 }
 
 TEST_F(SchedulerTrustTest, OldFailuresAreForgotten) {
@@ -417,7 +423,7 @@ TEST_F(SchedulerTrustTest, WhatAWorkerInQuarantineHoldsGoesBack) {
   const BatchLease lease = Ask(worker, 0).value();
   EXPECT_TRUE(scheduler_.Quarantine(WorkerIdOf("identity"), "by hand"));
   EXPECT_TRUE(absl::IsFailedPrecondition(StandingOf(worker, lease).status()));
-  EXPECT_EQ(Ask(Join("other"), 1)->range, lease.range);
+  EXPECT_EQ(Ask(Join("other"), 1).value().range, lease.range);
 }
 
 // Audits ------------------------------------------------------------------------------------------
@@ -477,7 +483,7 @@ TEST_F(SchedulerAuditTest, AThirdResultDecidesAndTheLiarIsLentNothing) {
   EXPECT_TRUE(absl::IsFailedPrecondition(Deliver(liar, held, 6, "wrong").status()))
       << "what it holds is taken from it";
   EXPECT_FALSE(Ask(liar, 7));
-  EXPECT_EQ(Ask(honest, 8)->range, held.range);
+  EXPECT_EQ(Ask(honest, 8).value().range, held.range);
 }
 
 TEST_F(SchedulerAuditTest, WithoutAThirdWorkerTheBatchWaitsAndSaysSo) {
