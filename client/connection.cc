@@ -100,6 +100,7 @@ class WatchStream {
 ClientConnection::ClientConnection(std::string address,
                                    const std::shared_ptr<grpc::Channel>& channel)
     : address_(std::move(address)),
+      admin_(v1::AdminService::NewStub(channel)),
       assets_(v1::AssetService::NewStub(channel)),
       jobs_(v1::JobService::NewStub(channel)),
       images_(v1::ImageService::NewStub(channel)) {}
@@ -272,6 +273,36 @@ StatusOr<v1::Job> ClientConnection::Extend(const std::string& job_id,
     return jobs_->Extend(&context, request, &job);
   }));
   return job;
+}
+
+StatusOr<std::vector<v1::Worker>> ClientConnection::ListWorkers() {
+  v1::ListWorkersResponse response;
+  LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
+    return admin_->ListWorkers(&context, v1::ListWorkersRequest(), &response);
+  }));
+  return std::vector<v1::Worker>(response.workers().begin(), response.workers().end());
+}
+
+StatusOr<v1::Worker> ClientConnection::Order(OrderWorker order, const std::string& worker_id) {
+  v1::WorkerRequest request;
+  request.set_worker_id(worker_id);
+  v1::Worker worker;
+  LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
+    return (admin_.get()->*order)(&context, request, &worker);
+  }));
+  return worker;
+}
+
+StatusOr<v1::Worker> ClientConnection::DrainWorker(const std::string& worker_id) {
+  return Order(&v1::AdminService::Stub::DrainWorker, worker_id);
+}
+
+StatusOr<v1::Worker> ClientConnection::QuarantineWorker(const std::string& worker_id) {
+  return Order(&v1::AdminService::Stub::QuarantineWorker, worker_id);
+}
+
+StatusOr<v1::Worker> ClientConnection::ReleaseWorker(const std::string& worker_id) {
+  return Order(&v1::AdminService::Stub::ReleaseWorker, worker_id);
 }
 
 StatusOr<v1::Job> ClientConnection::Cancel(const std::string& job_id) {

@@ -15,6 +15,7 @@
 
 #include <grpcpp/grpcpp.h>
 
+#include "proto/lucerna/v1/admin.grpc.pb.h"
 #include "proto/lucerna/v1/assets.grpc.pb.h"
 #include "proto/lucerna/v1/images.grpc.pb.h"
 #include "proto/lucerna/v1/jobs.grpc.pb.h"
@@ -47,6 +48,12 @@ class ClientConnection {
   // Only the stop criteria of `until` may be set.
   [[nodiscard]] StatusOr<v1::Job> Extend(const std::string& job_id, const RenderOverrides& until);
 
+  [[nodiscard]] StatusOr<std::vector<v1::Worker>> ListWorkers();
+  // Errors: also NOT_FOUND.
+  [[nodiscard]] StatusOr<v1::Worker> DrainWorker(const std::string& worker_id);
+  [[nodiscard]] StatusOr<v1::Worker> QuarantineWorker(const std::string& worker_id);
+  [[nodiscard]] StatusOr<v1::Worker> ReleaseWorker(const std::string& worker_id);
+
   // Called with the newest state of the job, several times a second. A failure ends the watch.
   using OnJob = std::function<Status(const v1::Job& job)>;
   // Follows the job until it has ended; returns its last state. `on_job` runs in the calling
@@ -68,6 +75,11 @@ class ClientConnection {
   [[nodiscard]] Status Unreachable() const;
 
   std::string address_;
+  using OrderWorker = grpc::Status (v1::AdminService::Stub::*)(grpc::ClientContext*,
+                                                               const v1::WorkerRequest&,
+                                                               v1::Worker*);
+  [[nodiscard]] StatusOr<v1::Worker> Order(OrderWorker order, const std::string& worker_id);
+  std::unique_ptr<v1::AdminService::Stub> admin_;
   std::unique_ptr<v1::AssetService::Stub> assets_;
   std::unique_ptr<v1::JobService::Stub> jobs_;
   std::unique_ptr<v1::ImageService::Stub> images_;

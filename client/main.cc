@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -14,6 +15,7 @@
 #include "client/commands/photon_command.h"
 #include "client/commands/plan_command.h"
 #include "client/commands/reference_command.h"
+#include "client/commands/worker_commands.h"
 #include "client/exit_code.h"
 #include "client/interruption.h"
 #include "client/local_cluster.h"
@@ -48,6 +50,8 @@ int Run(int argc, char** argv) {
   RenderOverrides planned;
   std::string server = "127.0.0.1:7400";
   std::string job_id;
+  std::string worker_id;
+  std::optional<WorkerOrder> worker_order;
   std::string scene_path;
   std::string image_path;
   std::string reference_path;
@@ -135,6 +139,24 @@ int Run(int argc, char** argv) {
                            [&] { return ListJobs(server, output_options); });
   add_server(jobs);
   add_json(jobs);
+
+  CLI::App* workers = command("workers", "list the workers of a coordinator", [&] {
+    if (!worker_order) return ListWorkers(server, output_options);
+    return OrderWorker(*worker_order, worker_id, server, output_options);
+  });
+  add_server(workers);
+  add_json(workers);
+  add_quiet(workers);
+  const auto add_worker_order = [&](const char* name, const char* description, WorkerOrder order) {
+    CLI::App* added = workers->add_subcommand(name, description);
+    added->add_option("WORKER", worker_id, "the worker's id, as in the list")->required();
+    added->fallthrough();
+    added->parse_complete_callback([&worker_order, order] { worker_order = order; });
+  };
+  add_worker_order("drain", "lend it nothing more; what it holds is finished", WorkerOrder::kDrain);
+  add_worker_order("quarantine", "lend it nothing more and refuse its results",
+                   WorkerOrder::kQuarantine);
+  add_worker_order("release", "lend to it again", WorkerOrder::kRelease);
 
   CLI::App* watch = command("watch", "show a job's progress until it has ended",
                             [&] { return Follow(job_id, true, server, output_options); });

@@ -13,7 +13,7 @@ void CountCommit(Job& job, const Delivery& delivery, const DeliveredCounts& coun
   counters.bytes_received += delivery.size_bytes;
   counters.hitpoints_returned += counts.rows;
   counters.rate.Add(counts.tally.photons, now);
-  WorkerShare& share = job.workers[delivery.worker];
+  WorkerShare& share = job.workers[delivery.record];
   if (share.name.empty()) share.name = worker_name;
   share.photons += counts.tally.photons;
   share.batches += 1;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "render/base/clock.h"
+#include "render/base/digest.h"
 #include "render/estimate/accumulation.h"
 #include "server/batch.h"
 #include "server/job.h"
@@ -17,7 +18,10 @@ namespace lucerna {
 
 // A batch that a worker hands in.
 struct Delivery {
-  std::string worker;
+  std::string worker;  // the id of its registration
+  std::string lease;
+  std::string record;  // of the worker (server/worker_records.h)
+  Digest digest;       // of the bytes
   WorkKind kind = WorkKind::kPhotons;
   PassKey pass;
   WorkRange range;

@@ -5,8 +5,10 @@
 
 #include <spdlog/spdlog.h>
 
+#include "render/base/escape.h"
 #include "render/base/fail_point.h"
 #include "render/base/memory.h"
+#include "render/base/random_id.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/slice_codec.h"
 #include "server/job_image.h"
@@ -19,6 +21,8 @@ constexpr Duration kLongestSync = std::chrono::seconds(5);
 constexpr Duration kSaveUnsavedEvery = std::chrono::seconds(1);
 constexpr std::chrono::milliseconds kRetryPause{100};
 constexpr int kPausesBeforeRetry = 10;
+constexpr std::size_t kSecretBytes = 32;
+constexpr std::size_t kMostIdentity = 128;
 
 // Different for every start of a coordinator on one machine.
 std::string InstanceName(const Clock& clock) {
@@ -32,11 +36,34 @@ Coordinator::Options WithMemory(Coordinator::Options options) {
   return options;
 }
 
-SchedulerOptions OptionsFor(const Coordinator::Options& options, const std::string& instance) {
+SchedulerOptions OptionsFor(const Coordinator::Options& options) {
   SchedulerOptions scheduler;
-  scheduler.instance = absl::StrCat("w", instance);
+  scheduler.audit_share = options.audit_share;
+  scheduler.audit_secret = RandomBytes(kSecretBytes);
   scheduler.fixed_batch = options.batch_photons;
   return scheduler;
+}
+
+BatchClaim ClaimOf(const Delivery& delivery) {
+  return {delivery.worker, {delivery.lease, delivery.pass, delivery.range, delivery.kind}};
+}
+
+// Absent when the result is needed.
+std::optional<MergeOutcome> KnownOutcome(Scheduler::Standing standing) {
+  switch (standing) {
+    case Scheduler::Standing::kDuplicate:
+      return MergeOutcome::kDuplicate;
+    case Scheduler::Standing::kSuperseded:
+      return MergeOutcome::kSuperseded;
+    case Scheduler::Standing::kExpected:
+      break;
+  }
+  return std::nullopt;
+}
+
+Status UnknownRecord(const std::string& id) {
+  return absl::NotFoundError(absl::StrCat("there is no worker ", Escaped(id.substr(0, 64)),
+                                          "; lucerna workers lists them"));
 }
 
 }  // namespace
@@ -47,7 +74,7 @@ Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<Du
       instance_(InstanceName(clock)),
       state_(std::move(state)),
       blobs_(options_.max_store_bytes, state_ ? &state_->blobs() : nullptr),
-      scheduler_(OptionsFor(options_, instance_)),
+      scheduler_(OptionsFor(options_)),
       intake_(blobs_, options_.max_job_bytes),
       jobs_({.instance = state_ ? state_->instance() : instance_,
              .retention = options_.retention,
@@ -84,6 +111,7 @@ void Coordinator::Close() {
 void Coordinator::Tick() {
   scheduler_.Expire(clock_.Steady());
   StopPoisonedJobs();
+  ShowDisputes();
   AnswerParked();
   if (state_ && clock_.Steady() >= save_unsaved_at_) {
     save_unsaved_at_ = clock_.Steady() + kSaveUnsavedEvery;
@@ -212,12 +240,21 @@ StatusOr<Blob> Coordinator::Encode(const JobTable::ImageSource& source, RenderRe
 void Coordinator::RunJobs() {
   while (std::optional<JobTable::Turn> turn = jobs_.WaitForTurn()) {
     const std::string job_id = turn->job_id;
-    Conclude(job_id, Render(*std::move(turn)));
+    Conclude(job_id, Render(*turn));
+    // Without the work of a worker whose results were wrong.
+    while (jobs_.TakeBeginsAgain(job_id)) {
+      turn->runner = nullptr;
+      turn->scene.reset();
+      Conclude(job_id, BeginRun(*turn));
+    }
   }
 }
 
-StatusOr<RenderResult> Coordinator::Render(JobTable::Turn turn) {
-  if (turn.runner) return turn.runner->Resume();
+StatusOr<RenderResult> Coordinator::Render(JobTable::Turn& turn) {
+  return turn.runner ? turn.runner->Resume() : BeginRun(turn);
+}
+
+StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
   ReferenceImage reference;
   if (turn.reference) {
     LUCERNA_ASSIGN_OR_RETURN(reference, intake_.ReadReference(*turn.reference, turn.settings));
@@ -237,8 +274,10 @@ StatusOr<RenderResult> Coordinator::Render(JobTable::Turn turn) {
 }
 
 void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner) {
-  if (!state_) return;
-  CheckpointFiles::Found found = state_->checkpoints().Read(job_id);
+  std::optional<Job> job = jobs_.Find(job_id);
+  if (!job) return;
+  CheckpointFiles::Found found;
+  if (state_) found = state_->checkpoints().Read(job_id);
   const auto note = [&](const std::string& what) {
     spdlog::warn("job {}: {}", job_id, what);
     jobs_.AddEvent(job_id, what, Now());
@@ -251,6 +290,13 @@ void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner
       continue;
     }
     StatusOr<DecodedRecord> record = DecodeRecord(checkpoint.record, Now());
+    const auto has_part = [&](const std::string& worker) {
+      return record->job.workers.contains(worker);
+    };
+    if (record.ok() && std::ranges::any_of(job->distrusted, has_part)) {
+      note("a checkpoint with the work of a worker whose results were wrong is not used");
+      continue;
+    }
     const Status restored = record.ok() ? runner.Restore(checkpoint.sums) : record.status();
     if (!restored.ok()) {
       note(absl::StrCat("a checkpoint cannot be used: ", std::string(restored.message())));
@@ -264,8 +310,7 @@ void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner
     return;
   }
   // A job that had ended and was given a new end begins anew: what it had counted comes again.
-  std::optional<Job> job = jobs_.Find(job_id);
-  if (!job || job->counters.passes == 0) return;
+  if (job->counters.photons == 0 && job->workers.empty()) return;
   job->ClearProgress();
   jobs_.GoOnFrom(job_id, *std::move(job), Duration::zero());
   note("there is no checkpoint of it that can be used: it begins anew");
@@ -384,6 +429,7 @@ void Coordinator::Conclude(const std::string& job_id, StatusOr<RenderResult> res
       return;
     }
   }
+  if (jobs_.BeginsAgain(job_id)) return;
   if (state_ && is_closing_) {
     spdlog::info("job {} goes on when the coordinator is started again", job_id);
     return;
@@ -397,16 +443,19 @@ void Coordinator::Conclude(const std::string& job_id, StatusOr<RenderResult> res
 // ---------------------------------------------------------------------------------------------
 
 StatusOr<std::string> Coordinator::Register(const std::string& name, int threads,
-                                            const std::string& numeric_profile) {
-  if (name.size() > 256) return absl::InvalidArgumentError("a worker's name is too long");
+                                            const std::string& numeric_profile,
+                                            const std::string& identity) {
+  if (name.size() > 256 || identity.size() > kMostIdentity) {
+    return absl::InvalidArgumentError("a worker's name or identity is too long");
+  }
   if (numeric_profile != options_.numeric_profile) {
     return absl::FailedPreconditionError(absl::StrCat(
-        "worker ", name, " has the numeric profile \"", numeric_profile.substr(0, 1024),
-        "\" and this coordinator \"", options_.numeric_profile,
-        "\"; their bits would differ, run the same build on both"));
+        "worker ", Escaped(name), " has the numeric profile \"",
+        Escaped(numeric_profile.substr(0, 1024)), "\" and this coordinator \"",
+        options_.numeric_profile, "\"; their bits would differ, run the same build on both"));
   }
-  std::string id = scheduler_.AddWorker(name, clock_.Steady());
-  spdlog::info("worker {} joined: {} with {} threads", id, name, threads);
+  std::string id = scheduler_.AddWorker(name, clock_.Steady(), identity);
+  spdlog::info("worker {} joined with {} threads", ShownWorker(id), threads);
   return id;
 }
 
@@ -467,7 +516,7 @@ void Coordinator::SyncBroke(std::uint64_t ticket) {
 }
 
 void Coordinator::EndBroken(const ParkedSyncs::Call& broken) {
-  spdlog::info("worker {} vanished", broken.worker);
+  spdlog::info("worker {} vanished", ShownWorker(broken.worker));
   scheduler_.LoseWorker(broken.worker);
   broken.answer(absl::CancelledError("the connection broke"));
   StopPoisonedJobs();
@@ -503,64 +552,160 @@ std::optional<std::size_t> Coordinator::RowsOf(const Delivery& delivery) const {
   return shape->pixels;
 }
 
-StatusOr<MergeOutcome> Coordinator::MergePhotons(const Delivery& delivery, std::string_view bytes,
-                                                 DeliveredCounts& counts) {
-  const std::optional<std::size_t> hitpoints = passes_.Hitpoints(delivery.pass);
-  if (!hitpoints) return MergeOutcome::kSuperseded;
-  LUCERNA_ASSIGN_OR_RETURN(const Accumulation accumulation, DecodeAccumulation(bytes, *hitpoints));
-  counts.tally = accumulation.tally;
-  counts.rows = accumulation.size();
-  for (const std::uint64_t index : accumulation.dropped_photons)
-    counts.dropped_photons.push_back({delivery.pass.pass, index});
-  return passes_.Merge(delivery.pass, delivery.range, accumulation);
-}
-
-StatusOr<MergeOutcome> Coordinator::MergeSlice(const Delivery& delivery, std::string_view bytes,
-                                               DeliveredCounts& counts) {
+StatusOr<std::optional<Coordinator::DecodedResult>> Coordinator::Decode(
+    const Delivery& delivery, std::string_view bytes) const {
+  DecodedResult decoded;
+  if (delivery.kind == WorkKind::kPhotons) {
+    const std::optional<std::size_t> hitpoints = passes_.Hitpoints(delivery.pass);
+    if (!hitpoints) return std::optional<DecodedResult>();
+    LUCERNA_ASSIGN_OR_RETURN(decoded.photons, DecodeAccumulation(bytes, *hitpoints));
+    decoded.counts.tally = decoded.photons->tally;
+    decoded.counts.rows = decoded.photons->size();
+    for (const std::uint64_t index : decoded.photons->dropped_photons)
+      decoded.counts.dropped_photons.push_back({delivery.pass.pass, index});
+    return decoded;
+  }
   std::optional<SliceShape> shape = rounds_.ShapeOf(delivery.pass);
-  if (!shape) return MergeOutcome::kSuperseded;
+  if (!shape) return std::optional<DecodedResult>();
   shape->passes = {delivery.range.first, delivery.range.last};
-  if (!IsSlice(shape->passes) || RoundOf(shape->passes.first).first != delivery.pass.pass) {
-    return absl::InvalidArgumentError(absl::StrCat("passes ", delivery.range.first, " to ",
-                                                   delivery.range.last,
-                                                   " are not a slice of the round"));
-  }
-  // A slice of an earlier run of the job, or of a round that is split now, was lent in other parts.
-  if (!scheduler_.Expects(delivery.pass, WorkKind::kPasses, delivery.range)) {
-    return rounds_.Has(delivery.pass, shape->passes) ? MergeOutcome::kDuplicate
-                                                     : MergeOutcome::kSuperseded;
-  }
-  LUCERNA_ASSIGN_OR_RETURN(SliceSums slice, DecodeSlice(bytes, *shape));
-  counts.tally = slice.tally;
-  counts.rows = slice.pixels();
-  counts.dropped_photons = slice.dropped_photons;
-  return rounds_.Merge(delivery.pass, std::move(slice));
+  LUCERNA_ASSIGN_OR_RETURN(decoded.slice, DecodeSlice(bytes, *shape));
+  decoded.counts.tally = decoded.slice->tally;
+  decoded.counts.rows = decoded.slice->pixels();
+  decoded.counts.dropped_photons = decoded.slice->dropped_photons;
+  return decoded;
 }
 
-StatusOr<MergeOutcome> Coordinator::Commit(const Delivery& delivery, std::string_view bytes) {
-  DeliveredCounts counts;
-  LUCERNA_ASSIGN_OR_RETURN(const MergeOutcome outcome, delivery.kind == WorkKind::kPhotons
-                                                           ? MergePhotons(delivery, bytes, counts)
-                                                           : MergeSlice(delivery, bytes, counts));
+StatusOr<MergeOutcome> Coordinator::Merge(const Delivery& delivery, DecodedResult decoded) {
+  // Before the bytes are part of any sum: a checkpoint may be written at any moment.
+  const std::optional<WorkerRecord> worker = scheduler_.RecordOf(delivery.worker);
+  if (!worker) return MergeOutcome::kSuperseded;
+  Delivery of_record = delivery;
+  of_record.record = worker->id;
+  jobs_.NoteContributor(delivery.pass.job_id, worker->id, worker->name);
+  LUCERNA_ASSIGN_OR_RETURN(const MergeOutcome outcome,
+                           decoded.photons
+                               ? passes_.Merge(delivery.pass, delivery.range, *decoded.photons)
+                               : rounds_.Merge(delivery.pass, *std::move(decoded.slice)));
   if (outcome == MergeOutcome::kSuperseded) return outcome;
   const SteadyTime now = clock_.Steady();
   // Also of a duplicate: nobody need trace it any more.
   scheduler_.Commit(delivery.pass, delivery.range, now);
   if (outcome == MergeOutcome::kDuplicate) return outcome;
-  jobs_.CountMerged(delivery, counts, scheduler_.NameOf(delivery.worker), now);
-  if (counts.tally.dropped > 0 || counts.tally.excess > 0) {
+  jobs_.CountMerged(of_record, decoded.counts, worker->name, now);
+  const BatchTally& tally = decoded.counts.tally;
+  if (tally.dropped > 0 || tally.excess > 0) {
     spdlog::warn(
         "job {}, pass {}: {} photons that were not finite and {} contributions that were too "
         "bright are left out",
-        delivery.pass.job_id, delivery.pass.pass, counts.tally.dropped, counts.tally.excess);
+        delivery.pass.job_id, delivery.pass.pass, tally.dropped, tally.excess);
   }
   return outcome;
 }
 
+StatusOr<std::optional<MergeOutcome>> Coordinator::OutcomeOf(const Delivery& delivery) const {
+  LUCERNA_ASSIGN_OR_RETURN(const Scheduler::Standing standing,
+                           scheduler_.StandingOf(ClaimOf(delivery)));
+  return KnownOutcome(standing);
+}
+
+StatusOr<MergeOutcome> Coordinator::TakeIn(const Delivery& delivery, std::string_view bytes) {
+  LUCERNA_ASSIGN_OR_RETURN(std::optional<DecodedResult> decoded, Decode(delivery, bytes));
+  if (!decoded) return MergeOutcome::kSuperseded;
+  LUCERNA_RETURN_IF_ERROR(jobs_.CheckEmission(delivery.pass.job_id, decoded->counts.tally));
+  Scheduler::Taken taken;
+  StatusOr<MergeOutcome> outcome = MergeOutcome::kAccepted;
+  {
+    const std::shared_lock merging(merging_);
+    LUCERNA_ASSIGN_OR_RETURN(
+        taken, scheduler_.TakeResult(ClaimOf(delivery), delivery.digest, clock_.Steady()));
+    if (const auto known = KnownOutcome(taken.standing)) return *known;
+    jobs_.CountAudit(delivery.pass.job_id, taken.audit);
+    if (!taken.is_held) outcome = Merge(delivery, *std::move(decoded));
+  }
+  if (taken.audit == AuditOutcome::kDisputed) {
+    spdlog::warn("job {}: two workers returned different results of pass {}", delivery.pass.job_id,
+                 delivery.range.first);
+  }
+  TakeOut(taken.wrong);
+  if (taken.is_held) AnswerParked();
+  return outcome;
+}
+
+StatusOr<MergeOutcome> Coordinator::Commit(const Delivery& delivery, std::string_view bytes) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::optional<MergeOutcome> known, OutcomeOf(delivery));
+  if (known) return *known;
+  StatusOr<MergeOutcome> outcome = TakeIn(delivery, bytes);
+  if (!outcome.ok()) Refuse(delivery, outcome.status());
+  return outcome;
+}
+
+void Coordinator::Refuse(const Delivery& delivery, const Status& why) {
+  spdlog::warn("worker {}: a result of job {} is refused: {}", ShownWorker(delivery.worker),
+               delivery.pass.job_id, std::string(why.message()));
+  scheduler_.RefuseResult(ClaimOf(delivery), std::string(why.message()));
+  StopPoisonedJobs();
+  AnswerParked();
+}
+
+void Coordinator::TakeOut(const std::vector<std::string>& records) {
+  for (const std::string& record : records) {
+    spdlog::error(
+        "worker {} returned a wrong result: it is in quarantine, and its work is taken out",
+        record);
+    // The scheduler takes no result of it any more.
+    { const std::unique_lock wait_for_merges(merging_); }
+    jobs_.TakeOut(record, Now());
+  }
+}
+
+void Coordinator::ShowDisputes() {
+  const std::map<std::string, std::string> disputes = scheduler_.Disputes();
+  for (const auto& [job_id, what] : disputes) {
+    if (!disputed_.insert(job_id).second) continue;
+    spdlog::warn("job {} {}", job_id, what);
+    jobs_.SetCondition(job_id, what, Now());
+  }
+  for (auto job_id = disputed_.begin(); job_id != disputed_.end();) {
+    if (disputes.contains(*job_id)) {
+      ++job_id;
+      continue;
+    }
+    jobs_.SetCondition(*job_id, "", Now());
+    job_id = disputed_.erase(job_id);
+  }
+}
+
 void Coordinator::Goodbye(const std::string& worker) {
-  spdlog::info("worker {} left", worker);
+  spdlog::info("worker {} left", ShownWorker(worker));
   scheduler_.RemoveWorker(worker);
   AnswerParked();
+}
+
+Status Coordinator::QuarantineWorker(const std::string& id, const std::string& reason) {
+  if (!scheduler_.Quarantine(id, reason)) return UnknownRecord(id);
+  spdlog::info("worker {} is put in quarantine", id);
+  AnswerParked();
+  return absl::OkStatus();
+}
+
+Status Coordinator::DrainWorker(const std::string& id) {
+  if (!scheduler_.Drain(id)) return UnknownRecord(id);
+  spdlog::info("worker {} is drained", id);
+  AnswerParked();
+  return absl::OkStatus();
+}
+
+Status Coordinator::ReleaseWorker(const std::string& id) {
+  if (!scheduler_.Release(id)) return UnknownRecord(id);
+  spdlog::info("worker {} is released", id);
+  AnswerParked();
+  return absl::OkStatus();
+}
+
+std::string Coordinator::ShownWorker(const std::string& worker) const {
+  const std::optional<WorkerRecord> record = scheduler_.RecordOf(worker);
+  if (!record) return "that is not known";
+  return absl::StrCat(record->id, " (", Escaped(record->name), ")");
 }
 
 void Coordinator::StopPoisonedJobs() {

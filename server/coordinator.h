@@ -14,6 +14,8 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <set>
+#include <shared_mutex>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -52,6 +54,7 @@ class Coordinator {
     std::string numeric_profile;
     RetentionLimits retention;
     double checkpoint_share = 0.01;  // of the time, in (0, 1]
+    double audit_share = 0.005;      // of batches, in [0, 1]
   };
 
   // `state` is what outlives the process; nullptr: nothing does. Goes on with the jobs in it.
@@ -92,9 +95,11 @@ class Coordinator {
 
   // Workers ------------------------------------------------------------------------------------
 
-  // The worker's id. Errors: FAILED_PRECONDITION for another numeric profile.
+  // The id of the registration. Errors: FAILED_PRECONDITION for another numeric profile,
+  // INVALID_ARGUMENT for a name or an identity that is too long.
   [[nodiscard]] StatusOr<std::string> Register(const std::string& name, int threads,
-                                               const std::string& numeric_profile);
+                                               const std::string& numeric_profile,
+                                               const std::string& identity = {});
 
   // Calls `answer` once: now, or from another thread when there is something to say or `wait` is
   // over. Returns a ticket for SyncBroke.
@@ -110,12 +115,25 @@ class Coordinator {
   // Rows of the hitpoint block that a batch of photons is for, or pixels of the image that a slice
   // is for; absent when its pass or round has ended.
   [[nodiscard]] std::optional<std::size_t> RowsOf(const Delivery& delivery) const;
-  // Decodes the result of a lease and merges it. May take long.
-  // Errors: INVALID_ARGUMENT for bytes that are not that result; as PassMerger::Merge and
-  // RoundMerger::Merge.
+  // What is to be answered before the bytes have come; absent when they are needed.
+  // Errors: as Scheduler::StandingOf.
+  [[nodiscard]] StatusOr<std::optional<MergeOutcome>> OutcomeOf(const Delivery& delivery) const;
+  // Decodes the result of a lease, checks it, and merges it unless another worker's is needed to
+  // compare it with. May take long.
+  // Errors: as Scheduler::StandingOf; INVALID_ARGUMENT for bytes that are not that result; as
+  // EmissionCheck::Check, PassMerger::Merge and RoundMerger::Merge. But for the first, the lease
+  // has ended as a failure of the worker.
   [[nodiscard]] StatusOr<MergeOutcome> Commit(const Delivery& delivery, std::string_view bytes);
+  // The result of a lease is not what it should be.
+  void Refuse(const Delivery& delivery, const Status& why);
 
   void Goodbye(const std::string& worker);
+
+  // Workers by the ids of their records (server/worker_records.h). Errors: NOT_FOUND.
+  [[nodiscard]] std::vector<WorkerRecord> ListWorkers() const { return scheduler_.Workers(); }
+  [[nodiscard]] Status QuarantineWorker(const std::string& id, const std::string& reason);
+  [[nodiscard]] Status DrainWorker(const std::string& id);
+  [[nodiscard]] Status ReleaseWorker(const std::string& id);
 
   // Time ---------------------------------------------------------------------------------------
 
@@ -132,7 +150,9 @@ class Coordinator {
   StatusOr<JobReport> WithWorkers(StatusOr<JobReport> report) const;
 
   void RunJobs();
-  StatusOr<RenderResult> Render(JobTable::Turn turn);
+  StatusOr<RenderResult> Render(JobTable::Turn& turn);
+  // Of a job without a runner: from its checkpoint, or from the beginning.
+  StatusOr<RenderResult> BeginRun(JobTable::Turn& turn);
   std::shared_ptr<JobRunner> MakeRunner(const JobTable::Turn& turn);
   // Hands the job's newest checkpoint that can be used to its runner, if there is one.
   void RestoreCheckpoint(const std::string& job_id, JobRunner& runner);
@@ -148,12 +168,26 @@ class Coordinator {
   // What becomes of a job whose runner has come back.
   void Conclude(const std::string& job_id, StatusOr<RenderResult> result);
   StatusOr<Blob> Encode(const JobTable::ImageSource& source, RenderResult result) const;
-  StatusOr<MergeOutcome> MergePhotons(const Delivery& delivery, std::string_view bytes,
-                                      DeliveredCounts& counts);
-  StatusOr<MergeOutcome> MergeSlice(const Delivery& delivery, std::string_view bytes,
-                                    DeliveredCounts& counts);
+  // A result whose bytes have been read.
+  struct DecodedResult {
+    std::optional<Accumulation> photons;
+    std::optional<SliceSums> slice;
+    DeliveredCounts counts;
+  };
+  // Absent when the pass or round has ended.
+  StatusOr<std::optional<DecodedResult>> Decode(const Delivery& delivery,
+                                                std::string_view bytes) const;
+  StatusOr<MergeOutcome> TakeIn(const Delivery& delivery, std::string_view bytes);
+  // Of a result that counts.
+  StatusOr<MergeOutcome> Merge(const Delivery& delivery, DecodedResult decoded);
+  // Takes all work of workers whose results were wrong out of the jobs.
+  void TakeOut(const std::vector<std::string>& records);
+  // Jobs in which workers disagree and none is left to decide wait, and say so.
+  void ShowDisputes();
 
   void StopPoisonedJobs();
+  // What a registration's worker is called in the log.
+  std::string ShownWorker(const std::string& worker) const;
   // What there is for a worker now; absent when it should wait on.
   std::optional<StatusOr<SyncAnswer>> TryAnswer(const std::string& worker,
                                                 const Scheduler::Report& report);
@@ -174,6 +208,11 @@ class Coordinator {
   const JobIntake intake_;
   ParkedSyncs parked_;
   JobTable jobs_;
+  // Held together by all that merge, from when the scheduler takes a result until the job counts
+  // it; alone, for a moment, by who takes a worker's work out: what was merged by then is counted,
+  // and what comes later is refused.
+  std::shared_mutex merging_;
+  std::set<std::string> disputed_;  // jobs that wait; of the thread of Tick
   std::atomic<bool> is_lending_ = true;
   std::atomic<bool> is_closing_ = false;
   SteadyTime save_unsaved_at_;  // of the thread of Tick

@@ -15,6 +15,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -103,6 +104,13 @@ class SlidingRate {
   std::deque<std::pair<SteadyTime, std::uint64_t>> events_;
 };
 
+// Of the batches that two workers were to compute (server/audit.h).
+struct AuditCounts {
+  std::uint64_t agreed = 0;
+  std::uint64_t not_audited = 0;  // no other worker was there
+  std::uint64_t disputed = 0;     // two results differed
+};
+
 // What a job has cost and brought.
 struct JobCounters {
   std::int64_t passes = 0;                   // merged into the image
@@ -115,6 +123,7 @@ struct JobCounters {
   std::vector<PhotonKey> dropped_photons;
   std::uint64_t bytes_sent = 0, bytes_received = 0;          // blocks and radii; accumulations
   std::uint64_t hitpoints_sent = 0, hitpoints_returned = 0;  // rows in them
+  AuditCounts audits;
   SlidingRate rate{std::chrono::seconds(5)};
 
   // Takes in which photons a batch has dropped, in any order of batches.
@@ -191,8 +200,10 @@ struct Job {
   PassRecord pass_record;                      // of whole rounds
   PassTally tail;                              // of the passes after them, when the job has stopped
   PhotonSteps photon_steps;                    // of the passes opened so far
-  std::map<std::string, WorkerShare> workers;  // by id
-  int most_workers = 0;                        // connected at one time while it ran
+  std::map<std::string, WorkerShare> workers;  // by id of their records
+  // Of them, those of which a result was found to be wrong: nothing of theirs may be in the image.
+  std::set<std::string> distrusted;
+  int most_workers = 0;  // connected at one time while it ran
   std::optional<WallTime> ended_at;
   std::string condition;  // why it does not go on though it runs; empty: it does
   std::vector<JobEvent> events;

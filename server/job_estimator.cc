@@ -249,6 +249,10 @@ const SceneNeeds& JobEstimator::needs() const {
   return state_->prepared.needs();
 }
 
+EmissionCheck JobEstimator::emission_check() const {
+  return EmissionCheck(state_->prepared.lights());
+}
+
 std::size_t JobEstimator::faint_lights() const {
   return state_->prepared.lights().faint_lights();
 }

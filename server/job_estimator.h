@@ -37,6 +37,7 @@
 #include "render/tracing/hitpoint_pass.h"
 #include "render/tracing/pass_slice.h"
 #include "render/wire/bytes.h"
+#include "server/emission_check.h"
 #include "server/reference_image.h"
 
 namespace lucerna {
@@ -122,6 +123,8 @@ class JobEstimator {
   [[nodiscard]] const SceneNeeds& needs() const;
   // See LightSet.
   [[nodiscard]] std::size_t faint_lights() const;
+  // For the results of workers.
+  [[nodiscard]] EmissionCheck emission_check() const;
   // Requires a reference as large as the image.
   [[nodiscard]] static TrueError ErrorAgainst(const ReferenceImage& reference,
                                               const EstimatorSnapshot& snapshot);

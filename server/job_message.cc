@@ -66,6 +66,9 @@ v1::Progress ProgressToProto(const JobReport& report) {
   message.set_bytes_received(counters.bytes_received);
   message.set_hitpoints_sent(counters.hitpoints_sent);
   message.set_hitpoints_returned(counters.hitpoints_returned);
+  message.set_audits_agreed(counters.audits.agreed);
+  message.set_not_audited(counters.audits.not_audited);
+  message.set_audits_disputed(counters.audits.disputed);
   return message;
 }
 
@@ -268,6 +271,9 @@ JobCounters CountersOf(const v1::Job& message) {
   counters.bytes_received = progress.bytes_received();
   counters.hitpoints_sent = progress.hitpoints_sent();
   counters.hitpoints_returned = progress.hitpoints_returned();
+  counters.audits = {.agreed = progress.audits_agreed(),
+                     .not_audited = progress.not_audited(),
+                     .disputed = progress.audits_disputed()};
   for (const v1::PhotonKey& key : message.dropped_photons())
     counters.dropped_photons.push_back({key.pass(), key.index()});
   return counters;
@@ -285,6 +291,8 @@ std::string EncodeRecord(const Job& job, const std::optional<Digest>& image, Dur
   *record.mutable_needs() = ToProto(job.needs);
   if (job.reference) record.set_reference_digest(std::string(job.reference->Bytes()));
   if (image) record.set_image_digest(std::string(image->Bytes()));
+  for (const std::string& worker : job.distrusted)
+    record.add_distrusted_worker_ids(worker);
   return record.SerializeAsString();
 }
 
@@ -354,6 +362,8 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
                                       .batches = share.batches(),
                                       .cpu = FromProto(share.cpu())};
   }
+  job.distrusted.insert(record.distrusted_worker_ids().begin(),
+                        record.distrusted_worker_ids().end());
   if (message.has_ended_at()) job.ended_at = TimeOf(message.ended_at());
   job.condition = message.condition();
   for (const v1::JobEvent& event : message.events())

@@ -85,6 +85,7 @@ StatusOr<RenderResult> JobRunner::Run(Scene scene, const SceneNeeds& needs,
 Status JobRunner::Prepare(Scene scene, const SceneNeeds& needs, ReferenceImage reference) {
   LUCERNA_ASSIGN_OR_RETURN(estimator_,
                            JobEstimator::Create(std::move(scene), settings_, needs, threads_));
+  emission_check_ = estimator_->emission_check();
   reference_ = std::move(reference);
   if (const std::size_t faint = estimator_->faint_lights(); faint > 0) {
     hooks_.on_warning(
@@ -651,6 +652,11 @@ void JobRunner::Stop(Status why) {
   const MutexLock lock(mutex_);
   if (!why_stopped_) why_stopped_ = std::move(why);
   changed_.NotifyAll();
+}
+
+// Called for results of leases, so after Prepare.
+Status JobRunner::CheckEmission(const BatchTally& tally) const {
+  return emission_check_.Check(tally);
 }
 
 void JobRunner::Wake() {

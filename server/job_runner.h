@@ -29,6 +29,7 @@
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "server/blob_store.h"
+#include "server/emission_check.h"
 #include "server/job.h"
 #include "server/job_estimator.h"
 #include "server/pass_merger.h"
@@ -99,6 +100,7 @@ class JobRunner final : public RunningJob {
   void Reopen(const RenderSettings& settings) override;
   void Finish() override;
   void Stop(Status why) override;
+  [[nodiscard]] Status CheckEmission(const BatchTally& tally) const override;
   void Wake() override;
   [[nodiscard]] std::optional<WorkBlobs> BlobsOf(std::uint64_t pass) const override;
   [[nodiscard]] std::optional<std::size_t> HitpointsIn(const Digest& digest) const override;
@@ -202,6 +204,7 @@ class JobRunner final : public RunningJob {
   mutable Mutex estimator_mutex_;
   std::unique_ptr<JobEstimator> estimator_;  // set once, before any other thread may ask
   std::atomic<bool> is_running_ = false;
+  EmissionCheck emission_check_;  // set with the estimator
 
   // The runner's thread only.
   ReferenceImage reference_;

@@ -351,6 +351,85 @@ std::optional<Loan> JobTable::MakeLoan(BatchLease lease, int workers) {
   return Loan{std::move(lease), *blobs};
 }
 
+void JobTable::NoteContributor(const std::string& job_id, const std::string& record,
+                               const std::string& worker_name) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found != entries_.end()) found->second.job.workers[record].name = worker_name;
+}
+
+Status JobTable::CheckEmission(const std::string& job_id, const BatchTally& tally) const {
+  std::shared_ptr<RunningJob> runner;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = FindLocked(job_id);
+    if (found != entries_.end()) runner = found->second.runner;
+  }
+  return runner ? runner->CheckEmission(tally) : absl::OkStatus();
+}
+
+void JobTable::CountAudit(const std::string& job_id, AuditOutcome outcome) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  AuditCounts& audits = found->second.job.counters.audits;
+  switch (outcome) {
+    case AuditOutcome::kNone:
+      return;
+    case AuditOutcome::kAgreed:
+      ++audits.agreed;
+      return;
+    case AuditOutcome::kNotAudited:
+      ++audits.not_audited;
+      return;
+    case AuditOutcome::kDisputed:
+      ++audits.disputed;
+      return;
+  }
+}
+
+void JobTable::TakeOut(const std::string& record, const Moment& moment) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  for (auto& [serial, entry] : entries_) {
+    Job& job = entry.job;
+    const auto share = job.workers.find(record);
+    if (share == job.workers.end() || job.distrusted.contains(record)) continue;
+    const std::string worker = absl::StrCat("worker ", record, " (", share->second.name,
+                                            "), of which a result was found to be wrong");
+    job.distrusted.insert(record);
+    if (!job.life.has_ended()) {
+      job.AddEvent(moment.wall, absl::StrCat("goes on without the work of ", worker));
+      if (entry.runner) {
+        entry.begins_again = true;
+        entry.runner->Stop(absl::AbortedError("the work of a worker is taken out"));
+      }
+    } else if (job.life.state() == JobState::kSucceeded) {
+      job.AddEvent(moment.wall, absl::StrCat("the image has a part by ", worker,
+                                             " after the job had ended; submit it again"));
+      dropped.runners.push_back(std::exchange(entry.runner, nullptr));
+      entry.has_checkpoint = false;
+    }
+    ++entry.version;
+    Save(entry, moment.now).IgnoreError();
+  }
+}
+
+bool JobTable::BeginsAgain(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  return found != entries_.end() && found->second.begins_again;
+}
+
+bool JobTable::TakeBeginsAgain(const std::string& job_id) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end() || !std::exchange(found->second.begins_again, false)) return false;
+  dropped.runners.push_back(std::exchange(found->second.runner, nullptr));
+  return !is_closed_ && !found->second.job.life.has_ended();
+}
+
 void JobTable::CountMerged(const Delivery& delivery, const DeliveredCounts& counts,
                            const std::string& worker_name, SteadyTime now) {
   const MutexLock lock(mutex_);
@@ -428,7 +507,7 @@ bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,
   Dropped dropped;
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
-  if (found == entries_.end()) return false;
+  if (found == entries_.end() || found->second.begins_again) return false;
   Entry& entry = found->second;
   if (!entry.job.life.Succeed(reason, moment.now)) return false;
   entry.job.counters.coordinator_cpu = moment.cpu - entry.cpu_at_start;
@@ -448,10 +527,12 @@ void JobTable::GoOnFrom(const std::string& job_id, Job record, Duration ran) {
   if (found == entries_.end()) return;
   Job& job = found->second.job;
   record.life = job.life;
-  record.life.SetRanBefore(ran);
+  // One that begins again has run all the time.
+  if (record.life.state() != JobState::kRunning) record.life.SetRanBefore(ran);
   record.settings = job.settings;
   record.submitted_at = job.submitted_at;
   record.events = job.events;
+  record.distrusted = job.distrusted;
   record.condition.clear();
   record.ended_at.reset();
   job = std::move(record);

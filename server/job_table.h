@@ -29,6 +29,7 @@
 #include "render/base/mutex.h"
 #include "render/base/status.h"
 #include "render/scene/scene.h"
+#include "server/audit.h"
 #include "server/blob_store.h"
 #include "server/commit_accounting.h"
 #include "server/job.h"
@@ -132,6 +133,15 @@ class JobTable {
   // What a worker must know of its work; absent when its pass or round has ended. `workers` are
   // connected.
   [[nodiscard]] std::optional<Loan> MakeLoan(BatchLease lease, int workers);
+  // The worker's result is about to be merged: from now on sums may hold its work.
+  void NoteContributor(const std::string& job_id, const std::string& record,
+                       const std::string& worker_name);
+  // Errors: as RunningJob::CheckEmission. OK for a job that does not run.
+  [[nodiscard]] Status CheckEmission(const std::string& job_id, const BatchTally& tally) const;
+  void CountAudit(const std::string& job_id, AuditOutcome outcome);
+  // A result of this worker was found to be wrong. Jobs that go on begin again without its work
+  // (TakeBeginsAgain), and jobs that have ended say that they have a part of it and cannot go on.
+  void TakeOut(const std::string& record, const Moment& moment);
   // Counts a batch that was merged, and wakes the job's runner.
   void CountMerged(const Delivery& delivery, const DeliveredCounts& counts,
                    const std::string& worker_name, SteadyTime now);
@@ -162,6 +172,10 @@ class JobTable {
   // `image_digest` when the image is on the disk. False when the job has ended meanwhile.
   bool Succeed(const std::string& job_id, StopReason reason, Blob image, const Moment& moment,
                std::optional<Digest> image_digest = std::nullopt);
+  // Whether the run that has ended is to be followed by one without the work of workers that are
+  // distrusted. Its runner is dropped.
+  [[nodiscard]] bool TakeBeginsAgain(const std::string& job_id);
+  [[nodiscard]] bool BeginsAgain(const std::string& job_id) const;
   // The job goes on from a checkpoint: its record is what it was then, but for its settings.
   void GoOnFrom(const std::string& job_id, Job record, Duration ran);
 
@@ -192,6 +206,7 @@ class JobTable {
     Duration cpu_at_start{};  // less what earlier runs took
     PinnedBlobs pinned;       // while the job may need its files
     bool is_unsaved = false;  // the journal has it as it was before
+    bool begins_again = false;
   };
   using Entries = std::map<std::uint64_t, Entry>;  // by serial number
   // What was taken from the table under the lock, to be destroyed after it.

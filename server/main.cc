@@ -25,6 +25,7 @@
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
+#include "server/admin_service.h"
 #include "server/asset_service.h"
 #include "server/coordinator.h"
 #include "server/image_service.h"
@@ -83,6 +84,7 @@ int Serve(const Flags& flags) {
   JobService jobs(coordinator, pools, SystemClock());
   ImageService images(coordinator, pools);
   WorkerService workers(coordinator, pools);
+  AdminService admin(coordinator, clock);
 
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -94,6 +96,7 @@ int Serve(const Flags& flags) {
   builder.RegisterService(&jobs);
   builder.RegisterService(&images);
   builder.RegisterService(&workers);
+  builder.RegisterService(&admin);
   const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
   if (!server || port == 0) {
     std::fprintf(stderr,
@@ -153,6 +156,10 @@ int Main(int argc, char** argv) {
                  "share of a job's time that its checkpoints may take, above 0; 1: one after every "
                  "round")
       ->check(CLI::Range(1e-9, 1.0))
+      ->capture_default_str();
+  app.add_option("--audit-share", flags.coordinator.audit_share,
+                 "share of batches that two workers compute, so that wrong results are found")
+      ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--keep-jobs", flags.coordinator.retention.jobs,
                  "how many jobs that have ended are kept, the newest")

@@ -12,6 +12,7 @@
 
 #include "render/base/digest.h"
 #include "render/base/status.h"
+#include "render/estimate/accumulation.h"
 #include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "server/job.h"
@@ -42,6 +43,9 @@ class RunningJob {
   virtual void Finish() = 0;
   // Ends the run soon with `why`. The first call counts.
   virtual void Stop(Status why) = 0;
+  // Whether the photons of a result can have been emitted with the energy that its counters say.
+  // Errors: as EmissionCheck::Check.
+  [[nodiscard]] virtual Status CheckEmission(const BatchTally& tally) const = 0;
   // A batch was merged: the runner checks whether a pass is complete.
   virtual void Wake() = 0;
   // What workers need for an open pass or round, which `pass` is the first of; absent when it is

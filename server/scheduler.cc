@@ -4,6 +4,10 @@
 #include <bit>
 #include <utility>
 
+#include "absl/strings/str_join.h"
+
+#include "render/base/escape.h"
+
 namespace lucerna {
 namespace {
 
@@ -12,10 +16,25 @@ constexpr std::size_t kTimesKept = 31;
 constexpr std::size_t kTimesNeeded = 3;
 // A slice shall take no more of the time that a job has left.
 constexpr double kShareOfTimeLeft = 0.25;
+// Of a registration, so many of its last leases are known.
+constexpr std::size_t kMostPast = 64;
+// So many audits are looked at for one worker. A worker is passed over only by audits that it has a
+// part in, and each has a few.
+constexpr int kMostLookedAt = 8;
+// A lease may become at most 2^10 times as old as at first.
+constexpr int kMostDoublings = 10;
+constexpr std::size_t kMostReason = 200;  // of what workers say, for messages
 
 Status UnknownWorker(const std::string& worker) {
-  return absl::NotFoundError(
-      absl::StrCat("the coordinator does not know worker ", worker, "; register again"));
+  return absl::NotFoundError(absl::StrCat("the coordinator does not know worker ",
+                                          Escaped(worker.substr(0, 8)), "; register again"));
+}
+
+// What a batch is called for people.
+std::string NameOf(const PassKey& key, WorkKind kind, WorkRange range) {
+  const std::string numbers = absl::StrCat(range.first, " to ", range.last);
+  return kind == WorkKind::kPasses ? absl::StrCat("passes ", numbers)
+                                   : absl::StrCat("photons ", numbers, " of pass ", key.pass);
 }
 
 std::uint64_t CeilDivide(std::uint64_t a, std::uint64_t b) {
@@ -37,7 +56,7 @@ std::optional<double> MedianOf(const std::deque<double>& known) {
 // ---------------------------------------------------------------------------------------------
 
 void Scheduler::Uncount(const Worker& worker) {
-  if (worker.is_connected) {
+  if (worker.is_live()) {
     --live_workers_;
     if (worker.leases.empty()) --idle_workers_;
   }
@@ -45,7 +64,7 @@ void Scheduler::Uncount(const Worker& worker) {
 }
 
 void Scheduler::Count(const std::string& id, const Worker& worker) {
-  if (worker.is_connected) {
+  if (worker.is_live()) {
     ++live_workers_;
     if (worker.leases.empty()) ++idle_workers_;
   }
@@ -77,15 +96,40 @@ void Scheduler::UpdateLendable(const PassKey& key, const Work& work) {
 // Reports and answers
 // ---------------------------------------------------------------------------------------------
 
-std::string Scheduler::AddWorker(std::string_view name, SteadyTime now) {
+std::string Scheduler::AddWorker(std::string_view name, SteadyTime now, std::string_view identity) {
   const MutexLock lock(mutex_);
-  std::string id = absl::StrCat(options_.instance, "-", next_worker_++);
+  std::string id = options_.new_id();
+  const std::string record = WorkerIdOf(identity.empty() ? RandomId() : std::string(identity));
+  if (const auto earlier = registrations_.find(record); earlier != registrations_.end()) {
+    const auto found = workers_.find(earlier->second);
+    TakeBackAll(found->second, Ending::kInterrupted);
+    ResolveInterrupted(found->second, /*has_crashed=*/false);
+    Forget(found, now);
+  }
+  records_.Join(record, name, now);
+  // A new process in the place of one that was not heard of: that one has crashed.
+  const auto [first, last] = missing_.equal_range(std::string(name));
+  std::vector<std::string> replaced;
+  for (auto missing = first; missing != last; ++missing)
+    replaced.push_back(missing->second);
+  for (const std::string& missing : replaced)
+    ResolveInterrupted(workers_.at(missing), /*has_crashed=*/true);
   Worker& worker = workers_[id];
-  worker.name = name;
+  worker.record = record;
   worker.heard_at = now;
+  worker.may_be_lent = records_.Find(record)->may_be_lent();
   Count(id, worker);
+  registrations_[record] = id;
   worker_deadlines_.emplace(now + options_.worker_silence, id);
   return id;
+}
+
+void Scheduler::Forget(std::map<std::string, Worker>::iterator worker, SteadyTime now) {
+  Uncount(worker->second);
+  registrations_.erase(worker->second.record);
+  records_.Leave(worker->second.record, now);
+  affected_.insert(worker->first);
+  workers_.erase(worker);
 }
 
 Status Scheduler::TakeReport(const std::string& worker_id, const Report& report, SteadyTime now) {
@@ -95,20 +139,39 @@ Status Scheduler::TakeReport(const std::string& worker_id, const Report& report,
   Worker& worker = found->second;
   worker.heard_at = now;
   SetConnected(worker_id, worker, true);
+  ResolveInterrupted(worker, /*has_crashed=*/false);
   for (const auto& [lease_id, reason] : report.failures) {
-    if (worker.leases.contains(lease_id)) TakeBack(lease_id, reason.empty() ? "failed" : reason);
+    if (!worker.leases.contains(lease_id)) continue;
+    TakeBack(lease_id, Ending::kFailed, reason.empty() ? "failed" : reason);
   }
   const std::set<std::string> held(report.held.begin(), report.held.end());
   const std::vector<std::string> leases(worker.leases.begin(), worker.leases.end());
   for (const std::string& lease_id : leases) {
     if (held.contains(lease_id)) {
-      leases_.at(lease_id).expires_at = now + options_.lease_time;
+      Lease& lease = leases_.at(lease_id);
+      const SteadyTime last = lease.lent_at + LongestAge(lease);
+      lease.is_too_old = last <= now + options_.lease_time;
+      lease.expires_at = std::max(lease.expires_at, std::min(now + options_.lease_time, last));
     } else if (report.wants_lease) {
       // Not a failure: the worker dropped it on purpose, or never got the answer that lent it.
-      TakeBack(lease_id, "");
+      TakeBack(lease_id, Ending::kGivenBack);
     }
   }
   return absl::OkStatus();
+}
+
+Duration Scheduler::LongestAge(const Lease& lease) const {
+  Duration age = options_.renew_unknown;
+  if (const std::optional<double> usual = UsualTime(lease.kind)) {
+    const double usual_s = std::min(*usual * static_cast<double>(lease.range.size()), 1e5);
+    age = std::max(options_.renew_at_least,
+                   std::chrono::duration_cast<Duration>(
+                       std::chrono::duration<double>(options_.renew_until * usual_s)));
+  }
+  const Work& work = open_.at(lease.pass);
+  const auto losses = work.losses.find(lease.range);
+  const int stalls = losses == work.losses.end() ? 0 : losses->second.stalls;
+  return age * (1 << std::min(stalls, kMostDoublings));
 }
 
 StatusOr<Scheduler::Answer> Scheduler::AnswerFor(const std::string& worker_id, const Report& report,
@@ -121,7 +184,7 @@ StatusOr<Scheduler::Answer> Scheduler::AnswerFor(const std::string& worker_id, c
   for (const std::string& lease_id : report.held) {
     if (!worker.leases.contains(lease_id)) answer.revoked.push_back(lease_id);
   }
-  if (report.wants_lease) {
+  if (report.wants_lease && worker.may_be_lent) {
     answer.lease = Lend(worker_id, now);
     if (!answer.lease) answer.lease = LendTwice(worker_id, now);
     if (answer.lease) {
@@ -136,7 +199,7 @@ StatusOr<Scheduler::Answer> Scheduler::AnswerFor(const std::string& worker_id, c
 void Scheduler::WaitAgain(const std::string& worker_id) {
   const MutexLock lock(mutex_);
   const auto found = workers_.find(worker_id);
-  if (found == workers_.end() || found->second.place != 0) return;
+  if (found == workers_.end() || found->second.place != 0 || !found->second.may_be_lent) return;
   SetPlace(worker_id, found->second, next_place_++);
 }
 
@@ -147,7 +210,18 @@ std::optional<std::string> Scheduler::TakeWaiting(SteadyTime now) {
   const bool may_be_idle = idle != idle_queue_.end() && (!lendable_.empty() || FindStraggler(now));
   const bool may_be_busy = busy != busy_queue_.end() &&
                            !(may_be_idle && idle->first < busy->first) && HasBatchesToSpare(now);
-  if (!may_be_idle && !may_be_busy) return std::nullopt;
+  if (!may_be_idle && !may_be_busy) {
+    if (waiting_audits_.empty()) return std::nullopt;
+    int looked_at = 0;
+    for (const auto& [place, waiting] : idle_queue_) {
+      if (++looked_at > kMostLookedAt) break;
+      if (!FindAudit(waiting, now)) continue;
+      std::string id = waiting;
+      SetPlace(id, workers_.at(id), 0);
+      return id;
+    }
+    return std::nullopt;
+  }
   std::string id = may_be_busy ? busy->second : idle->second;
   SetPlace(id, workers_.at(id), 0);
   return id;
@@ -165,17 +239,136 @@ void Scheduler::LoseWorker(const std::string& worker_id) {
   const auto found = workers_.find(worker_id);
   if (found == workers_.end()) return;
   SetConnected(worker_id, found->second, false);
-  TakeBackAll(found->second, "its connection broke");
+  TakeBackAll(found->second, Ending::kInterrupted);
 }
 
 void Scheduler::RemoveWorker(const std::string& worker_id) {
   const MutexLock lock(mutex_);
   const auto found = workers_.find(worker_id);
   if (found == workers_.end()) return;
-  TakeBackAll(found->second, "");
-  Uncount(found->second);
-  workers_.erase(found);
-  affected_.insert(worker_id);
+  TakeBackAll(found->second, Ending::kGivenBack);
+  ResolveInterrupted(found->second, /*has_crashed=*/false);
+  Forget(found, found->second.heard_at);
+}
+
+void Scheduler::ResolveInterrupted(Worker& worker, bool has_crashed) {
+  if (worker.interrupted.empty()) return;
+  const WorkerRecord* const record = records_.Find(worker.record);
+  const auto [first, last] = missing_.equal_range(record->name);
+  for (auto missing = first; missing != last; ++missing) {
+    if (missing->second != registrations_.at(worker.record)) continue;
+    missing_.erase(missing);
+    break;
+  }
+  for (const auto& [key, range] : std::exchange(worker.interrupted, {})) {
+    records_.Count(worker.record,
+                   has_crashed ? WorkerRecords::End::kCrashed : WorkerRecords::End::kLost);
+    if (has_crashed) CountFailure(key, range, worker.record, "it crashed or was cut off");
+  }
+}
+
+// Workers
+// ---------------------------------------------------------------------------------------------
+
+std::optional<WorkerRecord> Scheduler::RecordOf(const std::string& worker) const {
+  const MutexLock lock(mutex_);
+  const auto found = workers_.find(worker);
+  if (found == workers_.end()) return std::nullopt;
+  return *records_.Find(found->second.record);
+}
+
+std::vector<WorkerRecord> Scheduler::Workers() const {
+  const MutexLock lock(mutex_);
+  std::vector<WorkerRecord> all = records_.All();
+  for (WorkerRecord& record : all) {
+    const auto registration = registrations_.find(record.id);
+    if (registration == registrations_.end()) continue;
+    const Worker& worker = workers_.at(registration->second);
+    record.is_connected = worker.is_connected;
+    record.heard_at = worker.heard_at;
+    record.held = worker.leases.size();
+  }
+  return all;
+}
+
+void Scheduler::UpdateStanding(const std::string& record) {
+  const auto registration = registrations_.find(record);
+  if (registration == registrations_.end()) return;
+  Worker& worker = workers_.at(registration->second);
+  Uncount(worker);
+  worker.may_be_lent = records_.Find(record)->may_be_lent();
+  if (!worker.may_be_lent) worker.place = 0;
+  Count(registration->second, worker);
+  // Its call may wait for what it cannot get any more, or can get again.
+  affected_.insert(registration->second);
+}
+
+bool Scheduler::QuarantineLocked(const std::string& id, std::string_view reason, bool has_lied) {
+  if (!records_.Quarantine(id, reason, has_lied)) return false;
+  UpdateStanding(id);
+  if (const auto registration = registrations_.find(id); registration != registrations_.end()) {
+    TakeBackAll(workers_.at(registration->second), Ending::kGivenBack);
+  }
+  // What it returned for audits that are not decided says nothing.
+  for (auto& [key, work] : open_) {
+    std::vector<WorkRange> without_result;
+    for (auto& [range, audit] : work.audits) {
+      audit.Remove(id);
+      if (audit.results().empty()) without_result.push_back(range);
+    }
+    for (const WorkRange& range : without_result) {
+      work.audits.erase(range);
+      const bool was_waiting = waiting_audits_.erase({key, range}) > 0;
+      if (was_waiting) Return(key, work, range);
+      EnterNewest(work, range);
+    }
+  }
+  return true;
+}
+
+bool Scheduler::Quarantine(const std::string& id, std::string_view reason) {
+  const MutexLock lock(mutex_);
+  return QuarantineLocked(id, reason, /*has_lied=*/false);
+}
+
+bool Scheduler::Drain(const std::string& id) {
+  const MutexLock lock(mutex_);
+  if (!records_.Drain(id)) return false;
+  UpdateStanding(id);
+  return true;
+}
+
+bool Scheduler::Release(const std::string& id) {
+  const MutexLock lock(mutex_);
+  if (!records_.Release(id)) return false;
+  UpdateStanding(id);
+  return true;
+}
+
+template <typename Records>
+bool Scheduler::HasOthersThan(const Records& records) const {
+  std::uint64_t among = 0;
+  for (const std::string& record : records) {
+    const auto registration = registrations_.find(record);
+    if (registration != registrations_.end() && workers_.at(registration->second).is_live()) {
+      ++among;
+    }
+  }
+  return live_workers_ > among;
+}
+
+// A bad worker among others is left out; the last one goes on, and its batches are poisoned if it
+// cannot do them.
+void Scheduler::QuarantineIfUnreliable(const std::string& record, std::string_view failure) {
+  const WorkerRecord* const known = records_.Find(record);
+  if (known == nullptr || known->state == WorkerState::kQuarantined ||
+      !records_.IsUnreliable(record) || !HasOthersThan(std::array{record})) {
+    return;
+  }
+  records_.Quarantine(record, absl::StrCat(kBadOfRecent, " of its last ", kRecentLeases,
+                                           " leases failed or stalled, the last one: ",
+                                           std::string(failure.substr(0, kMostReason))));
+  UpdateStanding(record);
 }
 
 // Work
@@ -219,21 +412,174 @@ void Scheduler::Close(const PassKey& key) {
   const MutexLock lock(mutex_);
   const auto found = open_.find(key);
   if (found == open_.end()) return;
-  for (const auto& [range, lease_ids] : found->second.lent) {
-    const std::vector<std::string> ids(lease_ids.begin(), lease_ids.end());
-    for (const std::string& id : ids)
-      EraseLease(id);
+  Work& work = found->second;
+  while (!work.lent.empty()) {
+    const WorkRange range = work.lent.begin()->first;
+    Settle(key, work, range);
   }
-  if (found->second.kind == WorkKind::kPasses) round_passes_ -= found->second.total;
+  for (const auto& [range, audit] : work.audits)
+    waiting_audits_.erase({key, range});
+  if (work.kind == WorkKind::kPasses) round_passes_ -= work.total;
   open_.erase(found);
   lendable_.erase(key);
 }
 
-bool Scheduler::Expects(const PassKey& key, WorkKind kind, WorkRange range) const {
+void Scheduler::Settle(const PassKey& key, Work& work, WorkRange range) {
+  if (const auto lent = work.lent.find(range); lent != work.lent.end()) {
+    EraseNewest(work, range);
+    const std::vector<std::string> ids(lent->second.begin(), lent->second.end());
+    for (const std::string& id : ids)
+      EraseLease(id, Ending::kOvertaken);
+    work.lent.erase(lent);
+  }
+  work.returned.erase(range);
+  work.poisoned.erase(range);
+  work.losses.erase(range);
+  work.audits.erase(range);
+  work.not_audited.erase(range);
+  waiting_audits_.erase({key, range});
+}
+
+void Scheduler::Return(const PassKey& key, Work& work, WorkRange range) {
+  if (work.audits.contains(range)) {
+    waiting_audits_.insert({key, range});
+  } else {
+    work.returned.insert(range);
+    PoisonIfDue(key, work, range);
+  }
+  UpdateLendable(key, work);
+}
+
+// Results
+// ---------------------------------------------------------------------------------------------
+
+StatusOr<Scheduler::Standing> Scheduler::StandingLocked(const BatchClaim& claim) const {
+  const auto worker = workers_.find(claim.worker);
+  if (worker == workers_.end()) {
+    return absl::FailedPreconditionError(
+        "the coordinator does not know the worker of this result; register again");
+  }
+  const auto is_work_of = [&](const PassKey& pass, WorkKind kind, WorkRange range) {
+    return claim.lease.pass == pass && claim.lease.kind == kind && claim.lease.range == range;
+  };
+  const Status other_work =
+      absl::FailedPreconditionError("the result is of other work than its lease");
+  if (const auto lease = leases_.find(claim.lease.id); lease != leases_.end()) {
+    if (lease->second.worker != claim.worker) {
+      return absl::PermissionDeniedError("the lease is of another worker");
+    }
+    if (!is_work_of(lease->second.pass, lease->second.kind, lease->second.range)) {
+      return other_work;
+    }
+    return Standing::kExpected;
+  }
+  const std::deque<PastLease>& past = worker->second.past;
+  const auto ended =
+      std::ranges::find(past, claim.lease.id, [](const PastLease& item) { return item.lease.id; });
+  if (ended == past.end()) {
+    return absl::FailedPreconditionError("the worker has no such lease");
+  }
+  if (!is_work_of(ended->lease.pass, ended->lease.kind, ended->lease.range)) return other_work;
+  const auto open = open_.find(claim.lease.pass);
+  if (open == open_.end() || open->second.kind != claim.lease.kind) return Standing::kSuperseded;
+  switch (ended->ending) {
+    case Ending::kDelivered:
+    case Ending::kOvertaken:
+      return Standing::kDuplicate;
+    case Ending::kGivenBack:
+    case Ending::kFailed:
+      return absl::FailedPreconditionError("the lease was given back");
+    case Ending::kInterrupted:
+    case Ending::kStalled:
+      break;
+  }
+  const Work& work = open->second;
+  const WorkRange range = claim.lease.range;
+  if (const auto audit = work.audits.find(range); audit != work.audits.end()) {
+    return audit->second.HasResultOf(worker->second.record) ? Standing::kDuplicate
+                                                            : Standing::kExpected;
+  }
+  const bool is_pending =
+      work.lent.contains(range) || work.returned.contains(range) || work.poisoned.contains(range);
+  return is_pending ? Standing::kExpected : Standing::kDuplicate;
+}
+
+StatusOr<Scheduler::Standing> Scheduler::StandingOf(const BatchClaim& claim) const {
   const MutexLock lock(mutex_);
-  const auto found = open_.find(key);
-  if (found == open_.end() || found->second.kind != kind) return false;
-  return found->second.lent.contains(range) || found->second.returned.contains(range);
+  return StandingLocked(claim);
+}
+
+StatusOr<Scheduler::Taken> Scheduler::TakeResult(const BatchClaim& claim, const Digest& result,
+                                                 SteadyTime now) {
+  const MutexLock lock(mutex_);
+  Taken taken;
+  LUCERNA_ASSIGN_OR_RETURN(taken.standing, StandingLocked(claim));
+  if (taken.standing != Standing::kExpected) return taken;
+  const auto& [lease_id, key, range, kind] = claim.lease;
+  const std::string record = workers_.at(claim.worker).record;
+  Work& work = open_.at(key);
+  records_.Count(record, WorkerRecords::End::kCommitted);
+  auto audit = work.audits.find(range);
+  if (audit == work.audits.end()) {
+    if (!IsAudited(options_.audit_secret, options_.audit_share, key, kind, range)) return taken;
+    if (work.not_audited.contains(range) || !HasOthersThan(std::array{record})) {
+      taken.audit = AuditOutcome::kNotAudited;
+      return taken;
+    }
+    if (work.lent.contains(range)) EraseNewest(work, range);
+    audit = work.audits.emplace(range, Audit(now)).first;
+  }
+  const bool was_disputed = audit->second.is_disputed();
+  if (audit->second.Add(record, result)) {
+    taken.audit = AuditOutcome::kAgreed;
+    taken.wrong = audit->second.Wrong();
+    for (const std::string& wrong : taken.wrong) {
+      QuarantineLocked(wrong, "a result of it differs from what two other workers returned",
+                       /*has_lied=*/true);
+    }
+    return taken;
+  }
+  taken.is_held = true;
+  if (audit->second.is_disputed() && !was_disputed) taken.audit = AuditOutcome::kDisputed;
+  work.returned.erase(range);
+  work.poisoned.erase(range);
+  if (const auto lease = leases_.find(lease_id); lease != leases_.end()) {
+    NoteTime(kind, range, now - lease->second.lent_at);
+    EraseLease(lease_id, Ending::kDelivered);
+    const auto lent = work.lent.find(range);
+    lent->second.erase(lease_id);
+    if (lent->second.empty()) work.lent.erase(lent);
+  }
+  if (!work.lent.contains(range)) waiting_audits_.insert({key, range});
+  UpdateLendable(key, work);
+  return taken;
+}
+
+void Scheduler::RefuseResult(const BatchClaim& claim, std::string_view reason) {
+  const MutexLock lock(mutex_);
+  const StatusOr<Standing> standing = StandingLocked(claim);
+  if (!standing.ok() || *standing != Standing::kExpected) return;
+  const std::string failure =
+      absl::StrCat("its result was refused: ", std::string(reason.substr(0, kMostReason)));
+  if (leases_.contains(claim.lease.id)) {
+    TakeBack(claim.lease.id, Ending::kFailed, failure);
+    return;
+  }
+  Worker& worker = workers_.at(claim.worker);
+  std::ranges::find(worker.past, claim.lease.id, [](const PastLease& item) {
+    return item.lease.id;
+  })->ending = Ending::kFailed;
+  const std::string record = worker.record;
+  records_.Count(record, WorkerRecords::End::kFailed);
+  CountFailure(claim.lease.pass, claim.lease.range, record, failure);
+  QuarantineIfUnreliable(record, failure);
+}
+
+void Scheduler::NoteTime(WorkKind kind, WorkRange range, Duration lease_time) {
+  const auto of_kind = static_cast<std::size_t>(kind);
+  times_[of_kind].push_back(Seconds(lease_time) / static_cast<double>(range.size()));
+  if (times_[of_kind].size() > kTimesKept) times_[of_kind].pop_front();
+  usual_times_[of_kind] = MedianOf(times_[of_kind]);
 }
 
 void Scheduler::Commit(const PassKey& key, WorkRange range, SteadyTime now) {
@@ -241,22 +587,16 @@ void Scheduler::Commit(const PassKey& key, WorkRange range, SteadyTime now) {
   const auto found = open_.find(key);
   if (found == open_.end()) return;
   Work& work = found->second;
-  work.returned.erase(range);
-  UpdateLendable(key, work);
-  work.losses.erase(range);
-  const auto lent = work.lent.find(range);
-  if (lent == work.lent.end()) return;
   Duration lease_time = Duration::max();
-  for (const std::string& id : lent->second) {
+  const auto lent = work.lent.find(range);
+  if (lent != work.lent.end()) {
     // The shortest: a lease that had to be doubled says nothing of how long a batch takes.
-    lease_time = std::min(lease_time, now - leases_.at(id).lent_at);
-    EraseLease(id);
+    for (const std::string& id : lent->second)
+      lease_time = std::min(lease_time, now - leases_.at(id).lent_at);
+    NoteTime(work.kind, range, lease_time);
   }
-  work.lent.erase(lent);
-  const auto kind = static_cast<std::size_t>(work.kind);
-  times_[kind].push_back(Seconds(lease_time) / static_cast<double>(range.size()));
-  if (times_[kind].size() > kTimesKept) times_[kind].pop_front();
-  usual_times_[kind] = MedianOf(times_[kind]);
+  Settle(key, work, range);
+  UpdateLendable(key, work);
 }
 
 void Scheduler::Expire(SteadyTime now) {
@@ -268,8 +608,10 @@ void Scheduler::Expire(SteadyTime now) {
     if (lease == leases_.end()) continue;
     if (lease->second.expires_at > now) {
       lease_deadlines_.emplace(lease->second.expires_at, id);
+    } else if (lease->second.is_too_old) {
+      TakeBack(id, Ending::kStalled, "it was renewed and did not end");
     } else {
-      TakeBack(id, "it stopped answering");
+      TakeBack(id, Ending::kInterrupted);
     }
   }
   while (!worker_deadlines_.empty() && worker_deadlines_.top().first <= now) {
@@ -281,10 +623,9 @@ void Scheduler::Expire(SteadyTime now) {
       worker_deadlines_.emplace(until, id);
       continue;
     }
-    TakeBackAll(worker->second, "it stopped answering");
-    Uncount(worker->second);
-    workers_.erase(worker);
-    affected_.insert(id);
+    TakeBackAll(worker->second, Ending::kInterrupted);
+    ResolveInterrupted(worker->second, /*has_crashed=*/true);
+    Forget(worker, worker->second.heard_at);
   }
 }
 
@@ -293,15 +634,40 @@ std::vector<Scheduler::Poisoned> Scheduler::TakePoisoned() {
   return std::exchange(poisoned_, {});
 }
 
+void Scheduler::ReleasePoisoned(const std::string& job_id) {
+  const MutexLock lock(mutex_);
+  for (auto open = open_.lower_bound({job_id, 0});
+       open != open_.end() && open->first.job_id == job_id; ++open) {
+    Work& work = open->second;
+    for (const WorkRange& range : std::exchange(work.poisoned, {})) {
+      work.losses.erase(range);
+      work.returned.insert(range);
+    }
+    UpdateLendable(open->first, work);
+  }
+}
+
+std::map<std::string, std::string> Scheduler::Disputes() const {
+  const MutexLock lock(mutex_);
+  std::map<std::string, std::string> disputes;
+  for (const auto& [key, range] : waiting_audits_) {
+    const Audit& audit = open_.at(key).audits.at(range);
+    if (!audit.is_disputed() || disputes.contains(key.job_id)) continue;
+    std::vector<std::string> workers;
+    for (const auto& [worker, result] : audit.results())
+      workers.push_back(worker);
+    if (HasOthersThan(workers)) continue;
+    disputes[key.job_id] =
+        absl::StrCat("waits for another worker: workers ", absl::StrJoin(workers, ", "),
+                     " returned different results of ", NameOf(key, open_.at(key).kind, range),
+                     ", and one more must say which is right");
+  }
+  return disputes;
+}
+
 int Scheduler::LiveWorkers() const {
   const MutexLock lock(mutex_);
   return static_cast<int>(live_workers_);
-}
-
-std::string Scheduler::NameOf(const std::string& worker) const {
-  const MutexLock lock(mutex_);
-  const auto found = workers_.find(worker);
-  return found == workers_.end() ? std::string() : found->second.name;
 }
 
 // Leases
@@ -350,6 +716,15 @@ bool Scheduler::HasBatchesToSpare(SteadyTime now) const {
 }
 
 std::optional<BatchLease> Scheduler::Lend(const std::string& worker_id, SteadyTime now) {
+  if (const std::optional<WaitingAudit> audit = FindAudit(worker_id, now)) {
+    waiting_audits_.erase({audit->pass, audit->range});
+    if (audit->is_given_up) {
+      Work& work = open_.at(audit->pass);
+      work.audits.erase(audit->range);
+      work.not_audited.insert(audit->range);
+    }
+    return Enter(worker_id, audit->pass, audit->range, now);
+  }
   if (lendable_.empty()) return std::nullopt;
   // A worker that is busy fetches ahead only what the idle ones leave over; else one worker would
   // take a whole last pass and the others would stand by.
@@ -360,9 +735,10 @@ std::optional<BatchLease> Scheduler::Lend(const std::string& worker_id, SteadyTi
   if (!work.returned.empty()) {
     // One that this worker has not failed at, if there is one.
     const std::map<WorkRange, Losses>& losses = work.losses;
+    const std::string& record = workers_.at(worker_id).record;
     const auto is_new_to_worker = [&](const WorkRange& returned) {
       const auto found = losses.find(returned);
-      return found == losses.end() || !found->second.workers.contains(worker_id);
+      return found == losses.end() || !found->second.workers.contains(record);
     };
     auto choice = std::find_if(work.returned.begin(), work.returned.end(), is_new_to_worker);
     if (choice == work.returned.end()) choice = work.returned.begin();
@@ -376,15 +752,31 @@ std::optional<BatchLease> Scheduler::Lend(const std::string& worker_id, SteadyTi
   return Enter(worker_id, key, range, now);
 }
 
+std::optional<Scheduler::WaitingAudit> Scheduler::FindAudit(const std::string& worker_id,
+                                                            SteadyTime now) const {
+  const std::string& record = workers_.at(worker_id).record;
+  int looked_at = 0;
+  for (const auto& [key, range] : waiting_audits_) {
+    if (++looked_at > kMostLookedAt) break;
+    const Audit& audit = open_.at(key).audits.at(range);
+    const bool is_given_up =
+        !audit.is_disputed() && (now - audit.began_at() >= options_.audit_patience ||
+                                 !HasOthersThan(std::array{audit.results().begin()->first}));
+    if (is_given_up || !audit.HasResultOf(record)) return WaitingAudit{key, range, is_given_up};
+  }
+  return std::nullopt;
+}
+
 std::optional<Scheduler::Straggler> Scheduler::FindStraggler(SteadyTime now) const {
   std::optional<Straggler> first;
-  for (const auto& [kind_and_size, leases] : sole_leases_) {
+  for (const auto& [kind_and_size, leases] : newest_leases_) {
     const auto& [kind, size] = kind_and_size;
     const std::optional<double> usual = UsualTime(kind);
-    if (!usual) continue;
-    const double patience = std::max(*usual * static_cast<double>(size) * options_.speculate_after,
-                                     Seconds(options_.speculate_at_least));
-    const auto& [lent_at, id] = *leases.begin();
+    const double patience =
+        usual ? std::max(*usual * static_cast<double>(size) * options_.speculate_after,
+                         Seconds(options_.speculate_at_least))
+              : Seconds(options_.speculate_unknown);
+    const auto& [lent_at, number, id] = *leases.begin();
     if (Seconds(now - lent_at) < patience) continue;
     const Lease& lease = leases_.at(id);
     if (const Straggler found = {lease.pass, lease.range}; !first || found < *first) first = found;
@@ -393,7 +785,7 @@ std::optional<Scheduler::Straggler> Scheduler::FindStraggler(SteadyTime now) con
 }
 
 std::optional<BatchLease> Scheduler::LendTwice(const std::string& worker_id, SteadyTime now) {
-  // Only an idle worker, and only a batch that has one holder.
+  // Only an idle worker: it holds none of the batches.
   if (!workers_.at(worker_id).leases.empty()) return std::nullopt;
   const std::optional<Straggler> straggler = FindStraggler(now);
   if (!straggler) return std::nullopt;
@@ -402,85 +794,166 @@ std::optional<BatchLease> Scheduler::LendTwice(const std::string& worker_id, Ste
 
 BatchLease Scheduler::Enter(const std::string& worker_id, const PassKey& key, WorkRange range,
                             SteadyTime now) {
-  const std::string id = absl::StrCat(worker_id, "/", next_lease_++);
+  const std::string id = options_.new_id();
   Work& work = open_.at(key);
-  leases_[id] = {worker_id, key, range, work.kind, now, now + options_.lease_time};
+  Lease lease;
+  lease.worker = worker_id;
+  lease.pass = key;
+  lease.range = range;
+  lease.kind = work.kind;
+  lease.lent_at = now;
+  lease.expires_at = now + options_.lease_time;
+  lease.number = next_lease_++;
+  leases_[id] = std::move(lease);
   lease_deadlines_.emplace(now + options_.lease_time, id);
   Worker& worker = workers_.at(worker_id);
   Uncount(worker);
   worker.leases.insert(id);
   Count(worker_id, worker);
-  std::set<std::string>& holders = work.lent[range];
-  if (holders.empty()) {
-    AddSole(id);
-  } else {
-    for (const std::string& other : holders)
-      EraseSole(other, leases_.at(other));
-  }
-  holders.insert(id);
+  EraseNewest(work, range);
+  work.lent[range].insert(id);
+  EnterNewest(work, range);
   return {id, key, range, work.kind};
 }
 
-void Scheduler::AddSole(const std::string& lease_id) {
-  const Lease& lease = leases_.at(lease_id);
-  sole_leases_[{lease.kind, lease.range.size()}].emplace(lease.lent_at, lease_id);
-}
-
-void Scheduler::EraseSole(const std::string& lease_id, const Lease& lease) {
-  const auto found = sole_leases_.find({lease.kind, lease.range.size()});
-  if (found == sole_leases_.end()) return;
-  found->second.erase({lease.lent_at, lease_id});
-  if (found->second.empty()) sole_leases_.erase(found);
-}
-
-void Scheduler::EraseLease(const std::string& lease_id) {
-  const auto lease = leases_.find(lease_id);
-  EraseSole(lease_id, lease->second);
-  const auto found = workers_.find(lease->second.worker);
-  if (found != workers_.end()) {
-    Uncount(found->second);
-    found->second.leases.erase(lease_id);
-    Count(found->first, found->second);
-    affected_.insert(found->first);
+const std::string* Scheduler::NewestOf(const Work& work, WorkRange range) const {
+  const auto lent = work.lent.find(range);
+  if (lent == work.lent.end() || lent->second.size() >= options_.max_holders ||
+      work.audits.contains(range)) {
+    return nullptr;
   }
+  const std::string* newest = nullptr;
+  std::uint64_t number = 0;
+  for (const std::string& id : lent->second) {
+    if (const std::uint64_t of_lease = leases_.at(id).number; of_lease > number) {
+      number = of_lease;
+      newest = &id;
+    }
+  }
+  return newest;
+}
+
+void Scheduler::EnterNewest(const Work& work, WorkRange range) {
+  const std::string* const id = NewestOf(work, range);
+  if (id == nullptr) return;
+  const Lease& lease = leases_.at(*id);
+  newest_leases_[{lease.kind, range.size()}].emplace(lease.lent_at, lease.number, *id);
+}
+
+void Scheduler::EraseNewest(const Work& work, WorkRange range) {
+  const std::string* const id = NewestOf(work, range);
+  if (id == nullptr) return;
+  const Lease& lease = leases_.at(*id);
+  const auto found = newest_leases_.find({lease.kind, range.size()});
+  found->second.erase({lease.lent_at, lease.number, *id});
+  if (found->second.empty()) newest_leases_.erase(found);
+}
+
+void Scheduler::EraseLease(const std::string& lease_id, Ending ending) {
+  const auto lease = leases_.find(lease_id);
+  const auto found = workers_.find(lease->second.worker);
+  LUCERNA_CHECK(found != workers_.end());
+  Worker& worker = found->second;
+  Uncount(worker);
+  worker.leases.erase(lease_id);
+  Count(found->first, worker);
+  const Lease& ended = lease->second;
+  worker.past.push_back({{lease_id, ended.pass, ended.range, ended.kind}, ending});
+  if (worker.past.size() > kMostPast) worker.past.pop_front();
+  affected_.insert(found->first);
   leases_.erase(lease);
 }
 
-void Scheduler::TakeBack(const std::string& lease_id, std::string_view failure) {
+void Scheduler::TakeBack(const std::string& lease_id, Ending ending, std::string_view failure) {
   const Lease lease = leases_.at(lease_id);
-  const std::string worker_name = workers_.at(lease.worker).name;
-  EraseLease(lease_id);
   Work& work = open_.at(lease.pass);
+  const std::string record = workers_.at(lease.worker).record;
+  EraseNewest(work, lease.range);
+  EraseLease(lease_id, ending);
   const auto lent = work.lent.find(lease.range);
   lent->second.erase(lease_id);
-  if (lent->second.empty()) {
+  const bool is_held = !lent->second.empty();
+  if (is_held) {
+    EnterNewest(work, lease.range);
+  } else {
     work.lent.erase(lent);
-    work.returned.insert(lease.range);
-    UpdateLendable(lease.pass, work);
-  } else if (lent->second.size() == 1) {
-    AddSole(*lent->second.begin());
+    Return(lease.pass, work, lease.range);
   }
-  if (failure.empty()) return;
-  Losses& losses = work.losses[lease.range];
-  losses.workers.insert(lease.worker);
-  ++losses.leases;
-  if (losses.workers.size() < options_.poison_workers && losses.leases < options_.poison_losses) {
-    return;
+  switch (ending) {
+    case Ending::kFailed:
+      records_.Count(record, WorkerRecords::End::kFailed);
+      CountFailure(lease.pass, lease.range, record, failure);
+      break;
+    case Ending::kStalled:
+      records_.Count(record, WorkerRecords::End::kStalled);
+      ++work.losses[lease.range].stalls;
+      break;
+    case Ending::kInterrupted: {
+      Worker& worker = workers_.at(lease.worker);
+      if (worker.interrupted.empty()) {
+        missing_.emplace(records_.Find(record)->name, lease.worker);
+      }
+      if (worker.interrupted.size() < kMostPast) {
+        worker.interrupted.emplace_back(lease.pass, lease.range);
+      }
+      break;
+    }
+    case Ending::kDelivered:
+    case Ending::kOvertaken:
+    case Ending::kGivenBack:
+      break;
   }
-  const std::string range = absl::StrCat(lease.range.first, " to ", lease.range.last);
-  poisoned_.push_back(
-      {lease.pass,
-       absl::StrCat(work.kind == WorkKind::kPasses
-                        ? absl::StrCat("passes ", range)
-                        : absl::StrCat("photons ", range, " of pass ", lease.pass.pass),
-                    " were given up ", losses.leases, " times by ", losses.workers.size(),
-                    " workers, last by ", worker_name, ": ", std::string(failure))});
+  if (ending == Ending::kFailed || ending == Ending::kStalled) {
+    QuarantineIfUnreliable(record, failure);
+  }
 }
 
-void Scheduler::TakeBackAll(Worker& worker, std::string_view failure) {
+void Scheduler::TakeBackAll(Worker& worker, Ending ending) {
   const std::vector<std::string> ids(worker.leases.begin(), worker.leases.end());
   for (const std::string& id : ids)
-    TakeBack(id, failure);
+    TakeBack(id, ending);
+}
+
+// Poison
+// ---------------------------------------------------------------------------------------------
+
+void Scheduler::CountFailure(const PassKey& key, WorkRange range, const std::string& record,
+                             std::string_view failure) {
+  const auto open = open_.find(key);
+  if (open == open_.end()) return;
+  Work& work = open->second;
+  // Of one that has its result by now nothing need be known.
+  if (!work.lent.contains(range) && !work.returned.contains(range) &&
+      !work.poisoned.contains(range) && !work.audits.contains(range) &&
+      !work.losses.contains(range)) {
+    return;
+  }
+  Losses& losses = work.losses[range];
+  losses.workers.insert(record);
+  ++losses.failures;
+  const WorkerRecord* const worker = records_.Find(record);
+  losses.last = absl::StrCat(worker == nullptr ? record : Escaped(worker->name), ": ",
+                             Escaped(failure.substr(0, kMostReason)));
+  losses.is_poisoned =
+      losses.is_poisoned || losses.workers.size() >= options_.poison_workers ||
+      (losses.failures >= options_.poison_failures && !HasOthersThan(losses.workers));
+  PoisonIfDue(key, work, range);
+}
+
+void Scheduler::PoisonIfDue(const PassKey& key, Work& work, WorkRange range) {
+  const auto losses = work.losses.find(range);
+  // While somebody has it, it may still come.
+  if (losses == work.losses.end() || !losses->second.is_poisoned ||
+      !work.returned.contains(range)) {
+    return;
+  }
+  work.returned.erase(range);
+  work.poisoned.insert(range);
+  UpdateLendable(key, work);
+  poisoned_.push_back(
+      {key, absl::StrCat(NameOf(key, work.kind, range), " failed ", losses->second.failures,
+                         " times on ", losses->second.workers.size(), " workers, last on ",
+                         losses->second.last)});
 }
 
 }  // namespace lucerna

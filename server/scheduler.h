@@ -8,10 +8,23 @@
 // image, so it follows the number of workers. A batch that comes back without its result (the lease
 // ran out, the worker left or gave it up) keeps its range and goes out first.
 // When nothing is left to hand out and a lease is much older than a batch usually takes, the
-// batch is lent a second time; whoever commits first wins.
+// batch is lent a second time, and a third when that one is late too; whoever commits first wins.
 //
-// Batch: pending -> leased -> committed; back to pending; poisoned, and with it the job, when
-// poison_workers different workers, or poison_losses leases in all, failed at it.
+// Batch: pending -> leased -> committed; back to pending; poisoned when poison_workers different
+// workers failed or crashed at it, or all that there are, poison_failures times. A poisoned batch
+// is lent no more until ReleasePoisoned.
+//
+// A result counts only with the lease of the very worker and range (StandingOf). A lease that ended
+// because nothing was heard of its worker, or because it took too long, is as good as one that has
+// not ended until another result of its range has come.
+//
+// A lease is renewed by reports until it is much older than a batch usually takes: a worker that
+// only reports holds up nothing. Leases taken back because a worker was not heard of are counted
+// once it is known how that ended: as lost connections when it comes back, else as crashes.
+//
+// Some batches are audited (server/audit.h): after the first result they are lent to another
+// worker. Workers whose results were wrong, and such as fail often, are lent nothing
+// (worker_records.h).
 //
 // Workers that found nothing to do wait in a queue, in which an idle worker and one that fetches
 // ahead are served first come, first served. Counts of workers, the queue, the passes that have
@@ -31,19 +44,24 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "render/base/clock.h"
+#include "render/base/digest.h"
 #include "render/base/mutex.h"
+#include "render/base/random_id.h"
 #include "render/base/status.h"
+#include "server/audit.h"
 #include "server/batch.h"
+#include "server/worker_records.h"
 
 namespace lucerna {
 
 struct SchedulerOptions {
-  // In front of every worker's name: a worker of an earlier coordinator is not known here.
-  std::string instance = "w";
+  // Ids of registrations and leases: whoever knows them may use them.
+  std::function<std::string()> new_id = RandomId;
   Duration lease_time = std::chrono::seconds(10);  // renewed by every Sync
   // A worker that is silent for so long is forgotten.
   Duration worker_silence = std::chrono::seconds(30);
@@ -59,8 +77,21 @@ struct SchedulerOptions {
   // A lease this many times older than the median batch may be doubled.
   int speculate_after = 3;
   Duration speculate_at_least = std::chrono::seconds(1);
+  Duration speculate_unknown = std::chrono::seconds(30);  // while no median is known
+  std::size_t max_holders = 3;  // of one batch at a time
+  // A lease this many times older than the median batch is not renewed, but it is for
+  // renew_at_least, and while no median is known for renew_unknown. Each time that a batch is taken
+  // back so, its next lease may become twice as old: a batch that is slow for good reason ends too.
+  int renew_until = 20;
+  Duration renew_at_least = std::chrono::seconds(60);
+  Duration renew_unknown = std::chrono::minutes(10);
   std::size_t poison_workers = 3;
-  int poison_losses = 6;
+  int poison_failures = 3;  // when no other worker is left to try
+  // Of batches, which share is computed by two workers; and what only this process knows.
+  double audit_share = 0;
+  std::string audit_secret;
+  // An audit for which no other worker has come for so long is given up.
+  Duration audit_patience = std::chrono::seconds(30);
 };
 
 struct BatchLease {
@@ -70,12 +101,20 @@ struct BatchLease {
   WorkKind kind = WorkKind::kPhotons;
 };
 
+// Of which work a worker says that it hands in the result.
+struct BatchClaim {
+  std::string worker;
+  BatchLease lease;
+};
+
 class Scheduler {
  public:
   explicit Scheduler(SchedulerOptions options) : options_(std::move(options)) {}
 
-  // A new worker's id.
-  [[nodiscard]] std::string AddWorker(std::string_view name, SteadyTime now);
+  // The id of a new registration. `identity` is what the worker keeps through all its
+  // registrations; what an earlier one held goes back, because it was dropped. Empty: a new one.
+  [[nodiscard]] std::string AddWorker(std::string_view name, SteadyTime now,
+                                      std::string_view identity = {});
 
   // What a worker says of itself.
   struct Report {
@@ -121,8 +160,27 @@ class Scheduler {
   void SetRoundEnd(const PassKey& key, std::uint64_t last, std::optional<SteadyTime> due);
   // No more batches of it; its leases are revoked.
   void Close(const PassKey& key);
-  // Whether a batch of this range is lent, or has been lent and come back.
-  [[nodiscard]] bool Expects(const PassKey& key, WorkKind kind, WorkRange range) const;
+
+  enum class Standing : std::uint8_t { kExpected, kDuplicate, kSuperseded };
+  // Whether a result may count. kDuplicate: another result of the batch has, or this one;
+  // kSuperseded: the pass or round has ended.
+  // Errors: PERMISSION_DENIED for the lease of another worker, FAILED_PRECONDITION for an unknown
+  // worker, an unknown lease, one that the worker gave back, and work other than the lease's.
+  [[nodiscard]] StatusOr<Standing> StandingOf(const BatchClaim& claim) const;
+
+  struct Taken {
+    Standing standing = Standing::kExpected;
+    // The batch is audited and another worker's result is needed: this one is not merged.
+    bool is_held = false;
+    AuditOutcome audit = AuditOutcome::kNone;
+    std::vector<std::string> wrong;  // worker records: their results differ from what two returned
+  };
+  // Takes the digest of a result that is as it should be. It is to be merged when it is expected
+  // and not held; then Commit follows. Errors: as StandingOf.
+  [[nodiscard]] StatusOr<Taken> TakeResult(const BatchClaim& claim, const Digest& result,
+                                           SteadyTime now);
+  // The result of a claim is not what it should be: as if the worker had reported a failure.
+  void RefuseResult(const BatchClaim& claim, std::string_view reason);
   // The batch has been merged, by whomever.
   void Commit(const PassKey& key, WorkRange range, SteadyTime now);
 
@@ -135,19 +193,53 @@ class Scheduler {
   };
   // Batches found poisoned since the last call.
   [[nodiscard]] std::vector<Poisoned> TakePoisoned();
+  // The poisoned batches of a job may be lent again, and what was counted against them is not.
+  void ReleasePoisoned(const std::string& job_id);
+  // Batches of which two workers returned different results and no third is there to decide: the
+  // first of each job, for the user.
+  [[nodiscard]] std::map<std::string, std::string> Disputes() const;
 
-  // Workers that are connected.
+  // Workers that are connected and may be lent work.
   [[nodiscard]] int LiveWorkers() const;
-  // The worker's name for people; empty when unknown.
-  [[nodiscard]] std::string NameOf(const std::string& worker) const;
+  // What is known of the worker of a registration; absent when unknown.
+  [[nodiscard]] std::optional<WorkerRecord> RecordOf(const std::string& worker) const;
+
+  // Workers by the ids of their records.
+
+  [[nodiscard]] std::vector<WorkerRecord> Workers() const;
+  // Lends it nothing more; what it holds goes back. False when there is no such worker.
+  bool Quarantine(const std::string& id, std::string_view reason);
+  // Lends it nothing more; what it holds it may finish. False when there is no such worker.
+  bool Drain(const std::string& id);
+  // Lends to it again. False when there is no such worker.
+  bool Release(const std::string& id);
 
  private:
+  // How a lease ended.
+  enum class Ending : std::uint8_t {
+    kDelivered,    // by its result
+    kOvertaken,    // by another result, or the end of its pass or round
+    kGivenBack,    // the worker dropped it, or left, or must not deliver it
+    kFailed,       // the worker reported so, or its result was refused
+    kInterrupted,  // nothing was heard of the worker
+    kStalled,      // renewed for too long
+  };
+  struct PastLease {
+    BatchLease lease;
+    Ending ending = Ending::kDelivered;
+  };
+  // A registration.
   struct Worker {
-    std::string name;
+    std::string record;  // its id
     SteadyTime heard_at;
     bool is_connected = true;
+    bool may_be_lent = true;
     std::set<std::string> leases;
     std::uint64_t place = 0;  // in the queue for leases; 0: does not wait
+    // What it held when it was last heard of.
+    std::vector<std::pair<PassKey, WorkRange>> interrupted;
+    std::deque<PastLease> past;  // the newest
+    [[nodiscard]] bool is_live() const { return is_connected && may_be_lent; }
   };
   struct Lease {
     std::string worker;
@@ -156,10 +248,15 @@ class Scheduler {
     WorkKind kind = WorkKind::kPhotons;
     SteadyTime lent_at;
     SteadyTime expires_at;
+    std::uint64_t number = 0;  // leases are numbered as they are lent
+    bool is_too_old = false;   // to be renewed
   };
   struct Losses {
-    std::set<std::string> workers;
-    int leases = 0;
+    std::set<std::string> workers;  // records of those that failed or crashed
+    int failures = 0;               // and how often
+    int stalls = 0;
+    std::string last;  // what happened last, for the user
+    bool is_poisoned = false;
   };
   // An open pass or round.
   struct Work {
@@ -170,6 +267,9 @@ class Scheduler {
     std::set<WorkRange> returned;                     // go out first
     std::map<WorkRange, std::set<std::string>> lent;  // -> lease ids
     std::map<WorkRange, Losses> losses;
+    std::set<WorkRange> poisoned;       // of what has come back
+    std::map<WorkRange, Audit> audits;  // that have begun
+    std::set<WorkRange> not_audited;    // although they were to be: no other worker came
 
     [[nodiscard]] bool HasBatches() const { return rest.size() > 0 || !returned.empty(); }
   };
@@ -182,8 +282,10 @@ class Scheduler {
   // moment since is put in again, and what has ended is dropped.
   using Deadline = std::pair<SteadyTime, std::string>;
   using Deadlines = std::priority_queue<Deadline, std::vector<Deadline>, std::greater<>>;
+  // Of a lease, for what must not depend on its id.
+  using Age = std::tuple<SteadyTime, std::uint64_t, std::string>;
 
-  // Every change to a worker's connection, leases or place goes between these two.
+  // Every change to a worker's connection, standing, leases or place goes between these two.
   void Uncount(const Worker& worker) LUCERNA_REQUIRES(mutex_);
   void Count(const std::string& id, const Worker& worker) LUCERNA_REQUIRES(mutex_);
   void SetConnected(const std::string& id, Worker& worker, bool is_connected)
@@ -201,20 +303,57 @@ class Scheduler {
   bool HasBatchesToSpare(SteadyTime now) const LUCERNA_REQUIRES(mutex_);
   std::optional<BatchLease> Lend(const std::string& worker_id, SteadyTime now)
       LUCERNA_REQUIRES(mutex_);
+  // The batch of an audit that the worker may be lent. One that no other worker will come for is
+  // to be given up (`is_given_up`) and lent as any other.
+  struct WaitingAudit {
+    PassKey pass;
+    WorkRange range;
+    bool is_given_up = false;
+  };
+  std::optional<WaitingAudit> FindAudit(const std::string& worker_id, SteadyTime now) const
+      LUCERNA_REQUIRES(mutex_);
+  // Whether a worker may be lent work beside those of `records`.
+  template <typename Records>
+  bool HasOthersThan(const Records& records) const LUCERNA_REQUIRES(mutex_);
   // What may be lent a second time.
   std::optional<Straggler> FindStraggler(SteadyTime now) const LUCERNA_REQUIRES(mutex_);
   std::optional<BatchLease> LendTwice(const std::string& worker_id, SteadyTime now)
       LUCERNA_REQUIRES(mutex_);
   BatchLease Enter(const std::string& worker_id, const PassKey& key, WorkRange range,
                    SteadyTime now) LUCERNA_REQUIRES(mutex_);
-  // Ends a lease and makes its batch pending unless another holds it. A non-empty `failure` says
-  // how the worker failed at it.
-  void TakeBack(const std::string& lease_id, std::string_view failure) LUCERNA_REQUIRES(mutex_);
-  void TakeBackAll(Worker& worker, std::string_view failure) LUCERNA_REQUIRES(mutex_);
-  void EraseLease(const std::string& lease_id) LUCERNA_REQUIRES(mutex_);
-  // Enters a lease among those that are the only ones of their range, or takes it out.
-  void AddSole(const std::string& lease_id) LUCERNA_REQUIRES(mutex_);
-  void EraseSole(const std::string& lease_id, const Lease& lease) LUCERNA_REQUIRES(mutex_);
+  // Ends a lease and makes its batch pending unless another holds it. `failure` says how the worker
+  // failed at it, if it did.
+  void TakeBack(const std::string& lease_id, Ending ending, std::string_view failure = {})
+      LUCERNA_REQUIRES(mutex_);
+  void TakeBackAll(Worker& worker, Ending ending) LUCERNA_REQUIRES(mutex_);
+  void EraseLease(const std::string& lease_id, Ending ending) LUCERNA_REQUIRES(mutex_);
+  // A range that nobody holds any more waits to be lent again.
+  void Return(const PassKey& key, Work& work, WorkRange range) LUCERNA_REQUIRES(mutex_);
+  // The range has a result, or its pass or round has ended: it waits for nothing.
+  void Settle(const PassKey& key, Work& work, WorkRange range) LUCERNA_REQUIRES(mutex_);
+  // A worker failed or crashed at a batch.
+  void CountFailure(const PassKey& key, WorkRange range, const std::string& record,
+                    std::string_view failure) LUCERNA_REQUIRES(mutex_);
+  // Lends a batch no more, if it is poisoned and has come back.
+  void PoisonIfDue(const PassKey& key, Work& work, WorkRange range) LUCERNA_REQUIRES(mutex_);
+  // It is known now how the worker that was not heard of fared.
+  void ResolveInterrupted(Worker& worker, bool has_crashed) LUCERNA_REQUIRES(mutex_);
+  void QuarantineIfUnreliable(const std::string& record, std::string_view failure)
+      LUCERNA_REQUIRES(mutex_);
+  bool QuarantineLocked(const std::string& id, std::string_view reason, bool has_lied)
+      LUCERNA_REQUIRES(mutex_);
+  // What follows for its registration from the state of a worker's record.
+  void UpdateStanding(const std::string& record) LUCERNA_REQUIRES(mutex_);
+  void Forget(std::map<std::string, Worker>::iterator worker, SteadyTime now)
+      LUCERNA_REQUIRES(mutex_);
+  StatusOr<Standing> StandingLocked(const BatchClaim& claim) const LUCERNA_REQUIRES(mutex_);
+  void NoteTime(WorkKind kind, WorkRange range, Duration lease_time) LUCERNA_REQUIRES(mutex_);
+  // How old a lease may become by being renewed.
+  Duration LongestAge(const Lease& lease) const LUCERNA_REQUIRES(mutex_);
+  // Enters the newest lease of a range among those that another may join, or takes it out.
+  void EnterNewest(const Work& work, WorkRange range) LUCERNA_REQUIRES(mutex_);
+  void EraseNewest(const Work& work, WorkRange range) LUCERNA_REQUIRES(mutex_);
+  const std::string* NewestOf(const Work& work, WorkRange range) const LUCERNA_REQUIRES(mutex_);
   // How long a photon or a pass of a lease usually takes [s].
   std::optional<double> UsualTime(WorkKind kind) const LUCERNA_REQUIRES(mutex_) {
     return usual_times_[static_cast<std::size_t>(kind)];
@@ -229,12 +368,12 @@ class Scheduler {
   std::array<std::deque<double>, 2> times_ LUCERNA_GUARDED_BY(mutex_);
   std::array<std::optional<double>, 2> usual_times_ LUCERNA_GUARDED_BY(mutex_);
   std::vector<Poisoned> poisoned_ LUCERNA_GUARDED_BY(mutex_);
-  std::uint64_t next_worker_ LUCERNA_GUARDED_BY(mutex_) = 1;
+  WorkerRecords records_ LUCERNA_GUARDED_BY(mutex_);
   std::uint64_t next_lease_ LUCERNA_GUARDED_BY(mutex_) = 1;
   std::uint64_t next_place_ LUCERNA_GUARDED_BY(mutex_) = 1;
 
   // What follows from the above.
-  std::uint64_t live_workers_ LUCERNA_GUARDED_BY(mutex_) = 0;  // connected
+  std::uint64_t live_workers_ LUCERNA_GUARDED_BY(mutex_) = 0;  // connected, may be lent work
   std::uint64_t idle_workers_ LUCERNA_GUARDED_BY(mutex_) = 0;  // of those, without a lease
   // Workers that wait, by place: without a lease, and with one.
   std::map<std::uint64_t, std::string> idle_queue_ LUCERNA_GUARDED_BY(mutex_);
@@ -242,9 +381,15 @@ class Scheduler {
   std::set<std::string> affected_ LUCERNA_GUARDED_BY(mutex_);
   std::set<PassKey> lendable_ LUCERNA_GUARDED_BY(mutex_);      // where HasBatches()
   std::uint64_t round_passes_ LUCERNA_GUARDED_BY(mutex_) = 0;  // `total` of all open rounds
-  // Leases that are the only ones of their range, oldest first, by kind and size of the range.
-  std::map<std::pair<WorkKind, std::uint64_t>, std::set<Deadline>> sole_leases_
+  // The newest lease of each range that another worker may join, oldest first, by kind and size of
+  // the range.
+  std::map<std::pair<WorkKind, std::uint64_t>, std::set<Age>> newest_leases_
       LUCERNA_GUARDED_BY(mutex_);
+  std::map<std::string, std::string> registrations_ LUCERNA_GUARDED_BY(mutex_);  // by record
+  // Registrations that were not heard of while they held leases, by name.
+  std::multimap<std::string, std::string> missing_ LUCERNA_GUARDED_BY(mutex_);
+  // Batches of audits that nobody holds.
+  std::set<std::pair<PassKey, WorkRange>> waiting_audits_ LUCERNA_GUARDED_BY(mutex_);
   Deadlines lease_deadlines_ LUCERNA_GUARDED_BY(mutex_);
   Deadlines worker_deadlines_ LUCERNA_GUARDED_BY(mutex_);
 };

@@ -86,9 +86,8 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
       Finish(ToGrpc(status));
       return;
     }
-    if (is_superseded_) {
+    if (is_answered_) {
       // The bytes are not needed: the answer goes out before they come.
-      response_->set_outcome(v1::COMMIT_OUTCOME_SUPERSEDED);
       Finish(grpc::Status::OK);
       return;
     }
@@ -113,16 +112,24 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
     delivery_.range = {header.first(), header.last()};
     delivery_.cpu = FromProto(header.cpu());
     delivery_.size_bytes = header.size_bytes();
-    LUCERNA_ASSIGN_OR_RETURN(const Digest digest, Digest::FromBytes(header.digest()));
+    delivery_.lease = header.lease_id();
+    LUCERNA_ASSIGN_OR_RETURN(delivery_.digest, Digest::FromBytes(header.digest()));
+    LUCERNA_ASSIGN_OR_RETURN(const std::optional<MergeOutcome> known,
+                             coordinator_.OutcomeOf(delivery_));
     const std::optional<std::size_t> rows = coordinator_.RowsOf(delivery_);
-    is_superseded_ = !rows;
-    if (is_superseded_) return absl::OkStatus();
-    if (header.size_bytes() > kResultHeadBytes + kResultBytesPerRow * *rows) {
-      return absl::InvalidArgumentError(absl::StrCat("a result of ", header.size_bytes(),
-                                                     " bytes is too large for ", *rows,
-                                                     " hitpoints or pixels"));
+    if (known || !rows) {
+      is_answered_ = true;
+      response_->set_outcome(OutcomeToProto(known.value_or(MergeOutcome::kSuperseded)));
+      return absl::OkStatus();
     }
-    collector_.emplace(digest, header.size_bytes());
+    if (header.size_bytes() > kResultHeadBytes + kResultBytesPerRow * *rows) {
+      const Status too_large = absl::InvalidArgumentError(
+          absl::StrCat("a result of ", header.size_bytes(), " bytes is too large for ", *rows,
+                       " hitpoints or pixels"));
+      coordinator_.Refuse(delivery_, too_large);
+      return too_large;
+    }
+    collector_.emplace(delivery_.digest, header.size_bytes());
     collector_->Reserve();
     return absl::OkStatus();
   }
@@ -141,7 +148,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
   v1::CommitBatchResponse* const response_;
   v1::CommitBatchRequest part_;
   Delivery delivery_;
-  bool is_superseded_ = false;
+  bool is_answered_ = false;
   std::optional<ChunkCollector> collector_;
 };
 
@@ -151,8 +158,8 @@ grpc::ServerUnaryReactor* WorkerService::Register(grpc::CallbackServerContext* c
                                                   const v1::RegisterRequest* request,
                                                   v1::RegisterResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const StatusOr<std::string> id =
-      coordinator_.Register(request->name(), request->threads(), request->numeric_profile());
+  const StatusOr<std::string> id = coordinator_.Register(
+      request->name(), request->threads(), request->numeric_profile(), request->identity());
   if (id.ok()) {
     response->set_worker_id(*id);
     *response->mutable_sync_every() = ToProto(kSyncEvery);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "render/base/fail_point.h"
 #include "render/estimate/rounds.h"
 #include "render/wire/channel.h"
 #include "render/wire/chunks.h"
@@ -108,6 +109,7 @@ StatusOr<v1::CommitOutcome> Connection::Commit(v1::CommitBatchRequest::Header he
   // A write fails when the answer is there already; Finish then brings it.
   bool is_open = writer->Write(part);
   std::string_view rest = bytes;
+  FailPoint("commit.during");
   for (std::string_view chunk = NextChunk(rest); is_open && !chunk.empty();
        chunk = NextChunk(rest)) {
     part.set_bytes(chunk.data(), chunk.size());

@@ -4,6 +4,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "render/base/fail_point.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/messages.h"
 #include "render/wire/slice_codec.h"
@@ -171,24 +172,42 @@ StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
   const std::atomic<bool>& stop = fetched.held->is_revoked;
   if (work.kind == v1::WORK_KIND_PHOTONS) {
     LUCERNA_ASSIGN_OR_RETURN(
-        const Accumulation accumulation,
+        Accumulation accumulation,
         fetched.tracer->Run(job.settings, job.needs, work.pass, work.first, work.last,
                             *fetched.block, *fetched.radii, stop, work.photons_per_pass));
+    if (FaultIsDue("result.flipped") && accumulation.size() > 0) accumulation.flux[0][0] ^= 1;
+    if (FaultIsDue("result.zeros")) {
+      Accumulation zeros;
+      zeros.evidence.resize(accumulation.evidence.size());
+      zeros.tally.photons = accumulation.tally.photons;
+      accumulation = std::move(zeros);
+    }
     return EncodeAccumulation(accumulation, fetched.block->size());
   }
   const RoundPlan plan = {.photons_per_pass = work.photons_per_pass,
                           .radii = fetched.radii,
                           .caustic_radius = work.caustic_radius};
   LUCERNA_ASSIGN_OR_RETURN(
-      const SliceSums slice,
+      SliceSums slice,
       fetched.tracer->RunSlice(job.settings, job.needs, {work.first, work.last}, plan, stop));
+  if (FaultIsDue("result.flipped")) {
+    float& sum = slice.columns[kPhotonRadiance][0];
+    sum = Rounded(static_cast<double>(sum) + 1, Precision::kRadiance);
+  }
+  if (FaultIsDue("result.zeros")) {
+    const std::uint64_t photons = slice.tally.photons;
+    slice = EmptySlice(slice.passes, slice.pixels(), slice.evidence);
+    slice.tally.photons = photons;
+  }
   return EncodeSlice(slice);
 }
 
 void LeaseRunner::CommitStage() {
   while (auto computed = computed_.Take()) {
     if (computed->held->is_revoked) continue;
+    FailPoint("commit.before");
     const StatusOr<v1::CommitOutcome> outcome = Commit(*computed);
+    if (outcome.ok()) FailPoint("commit.after");
     if (outcome.ok()) {
       Release(*computed->held, absl::OkStatus());
     } else if (StopIfGone(outcome.status())) {

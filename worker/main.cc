@@ -7,6 +7,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -17,7 +18,9 @@
 #include <unistd.h>
 
 #include "render/base/clock.h"
+#include "render/base/fail_point.h"
 #include "render/base/memory.h"
+#include "render/base/random_id.h"
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
@@ -92,6 +95,7 @@ int Main(int argc, char** argv) {
   ReplayOptions replay;
   options.name = WorkerName();
   options.numeric_profile = NumericProfile();
+  options.identity = RandomId();
   std::string log_level = "info";
   double connect_timeout_s = 60;
   options.server = "127.0.0.1:7400";
@@ -129,6 +133,7 @@ int Main(int argc, char** argv) {
   }
   options.connect_timeout =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(connect_timeout_s));
+  if (const char* const fail_point = std::getenv("LUCERNA_FAIL_POINT")) ArmFailPoint(fail_point);
   spdlog::set_default_logger(spdlog::stderr_color_mt("lucerna-worker"));
   spdlog::set_level(spdlog::level::from_str(log_level));
   if (*job) {

@@ -78,6 +78,7 @@ StatusOr<v1::RegisterResponse> Session::Join() {
   request.set_name(options_.name);
   request.set_threads(ThreadTeam(options_.threads).threads());
   request.set_numeric_profile(options_.numeric_profile);
+  request.set_identity(options_.identity);
   while (true) {
     const auto connection = std::make_shared<Connection>(options_.server);
     {

@@ -24,6 +24,8 @@ class Session {
     Duration connect_timeout{};  // how long an absent coordinator is waited for
     std::string name;
     std::string numeric_profile;
+    // Random: what tells this worker from others through all its connections.
+    std::string identity;
   };
 
   Session(Options options, const Clock& clock);

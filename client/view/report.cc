@@ -115,6 +115,9 @@ Json JobOf(const v1::Job& job) {
   json["received_bytes"] = progress.bytes_received();
   json["hitpoints_sent"] = progress.hitpoints_sent();
   json["hitpoints_returned"] = progress.hitpoints_returned();
+  json["audits"] = {{"agreed", progress.audits_agreed()},
+                    {"not_audited", progress.not_audited()},
+                    {"disputed", progress.audits_disputed()}};
   if (job.has_settings()) json["settings"] = SettingsJson(SettingsOf(job));
   if (!job.scene_digest().empty()) json["scene_digest"] = HexOf(job.scene_digest());
   json["warnings"] = Json::array();

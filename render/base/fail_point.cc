@@ -37,4 +37,9 @@ void FailPoint(std::string_view name) {
   if (--visits_left == 0) ::raise(SIGKILL);
 }
 
+bool FaultIsDue(std::string_view name) {
+  if (!is_armed || name != ArmedName()) return false;
+  return --visits_left <= 0;
+}
+
 }  // namespace lucerna

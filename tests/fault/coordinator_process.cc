@@ -64,9 +64,11 @@ std::unique_ptr<CoordinatorProcess> CoordinatorProcess::Doomed(const std::string
   return coordinator;
 }
 
-std::unique_ptr<ChildProcess> CoordinatorProcess::StartWorker() const {
-  return std::make_unique<ChildProcess>(
-      std::vector<std::string>{kBin + "/lucerna-worker", "--server", address_, "--threads", "1"});
+std::unique_ptr<ChildProcess> CoordinatorProcess::StartWorker(const std::string& fault) const {
+  std::vector<std::string> command;
+  if (!fault.empty()) command = {"/usr/bin/env", "LUCERNA_FAIL_POINT=" + fault};
+  command.insert(command.end(), {kBin + "/lucerna-worker", "--server", address_, "--threads", "1"});
+  return std::make_unique<ChildProcess>(std::move(command));
 }
 
 StatusOr<std::string> CoordinatorProcess::TrySubmit(const SmallJob& job) {

@@ -47,7 +47,8 @@ class CoordinatorProcess {
   [[nodiscard]] ChildProcess& process() { return *process_; }
   [[nodiscard]] const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
 
-  [[nodiscard]] std::unique_ptr<ChildProcess> StartWorker() const;
+  // One with a `fault` kills itself at a step, or does wrong (render/base/fail_point.h).
+  [[nodiscard]] std::unique_ptr<ChildProcess> StartWorker(const std::string& fault = "") const;
 
   // The errors of these are those of the calls.
   // Uploads and submits; the job's id.

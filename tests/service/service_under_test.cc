@@ -50,6 +50,15 @@ grpc::Status Send(Writer& writer, Request header, std::string_view bytes) {
 
 }  // namespace
 
+void SetEscaped(BatchTally& tally, std::uint64_t photons) {
+  // Each photon of a single light has the whole power.
+  const auto energy = static_cast<std::int64_t>(photons) << kEnergyBits;
+  tally.photons = photons;
+  tally.energy.emitted = energy;
+  tally.energy.escaped = energy;
+  tally.lights = {{.sent = photons}};
+}
+
 TestScene SmallScene() {
   return {.files = {{"scene.pbrt", R"(
 LookAt 0 -3 1  0 0 0  0 0 1
@@ -79,16 +88,18 @@ v1::SubmitRequest RequestFor(const v1::SceneManifest& scene, const std::string& 
 // Server
 // ---------------------------------------------------------------------------------------------
 
-ServiceUnderTest::ServiceUnderTest() {
+ServiceUnderTest::ServiceUnderTest(double audit_share) {
   spdlog::set_level(spdlog::level::err);
   Coordinator::Options options;
   options.threads = 1;
+  options.audit_share = audit_share;
   options.numeric_profile = kNumericProfile;
   coordinator_ = std::make_unique<Coordinator>(options, clock_);
   assets_ = std::make_unique<AssetService>(coordinator_->blobs(), pools_);
   jobs_ = std::make_unique<JobService>(*coordinator_, pools_, clock_);
   images_ = std::make_unique<ImageService>(*coordinator_, pools_);
   workers_ = std::make_unique<WorkerService>(*coordinator_, pools_);
+  admin_ = std::make_unique<AdminService>(*coordinator_, clock_);
   grpc::ServerBuilder builder;
   SetUpConnections(builder);
   builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);
@@ -96,6 +107,7 @@ ServiceUnderTest::ServiceUnderTest() {
   builder.RegisterService(jobs_.get());
   builder.RegisterService(images_.get());
   builder.RegisterService(workers_.get());
+  builder.RegisterService(admin_.get());
   server_ = builder.BuildAndStart();
   EXPECT_NE(server_, nullptr);
   ticks_ = std::thread([this] {
@@ -253,12 +265,13 @@ Answer<std::string> TestClient::Image(const std::string& job_id) {
 // Worker
 // ---------------------------------------------------------------------------------------------
 
-IdleHandsWorker::IdleHandsWorker(const ServiceUnderTest& service)
+IdleHandsWorker::IdleHandsWorker(const ServiceUnderTest& service, const std::string& identity)
     : stub_(v1::WorkerService::NewStub(service.NewChannel())) {
   Deadline context;
   v1::RegisterRequest request;
   request.set_name("idle hands");
   request.set_threads(1);
+  request.set_identity(identity);
   request.set_numeric_profile(ServiceUnderTest::kNumericProfile);
   v1::RegisterResponse response;
   const grpc::Status status = stub_->Register(&context, request, &response);
@@ -285,12 +298,12 @@ std::string IdleHandsWorker::ResultOf(const v1::Lease& lease) {
   if (lease.kind() == v1::WORK_KIND_PASSES) {
     SliceSums slice = EmptySlice({lease.first(), lease.last()}, kSmallScenePixels,
                                  ControllerColumns(RadiusControllerKind::kPppm));
-    slice.tally.photons = lease.photons_per_pass() * slice.passes.size();
+    SetEscaped(slice.tally, lease.photons_per_pass() * slice.passes.size());
     return EncodeSlice(slice);
   }
   Accumulation accumulation;
   accumulation.evidence.resize(EvidenceColumns(Evidence::kNone));
-  accumulation.tally.photons = lease.last() - lease.first();
+  SetEscaped(accumulation.tally, lease.last() - lease.first());
   // Without a block the pass has ended, and the answer comes before the bytes.
   const StatusOr<HitpointBlock> block =
       DecodeHitpointBlock(Fetch(lease.block_digest()).message, kMostHitpoints);

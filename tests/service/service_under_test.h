@@ -22,6 +22,7 @@
 #include "proto/lucerna/v1/jobs.grpc.pb.h"
 #include "proto/lucerna/v1/work.grpc.pb.h"
 #include "render/base/clock.h"
+#include "server/admin_service.h"
 #include "server/asset_service.h"
 #include "server/coordinator.h"
 #include "server/image_service.h"
@@ -60,12 +61,15 @@ struct TestScene {
 // Two quads and a point light in kSmallScenePixels pixels: a job with photons.
 inline constexpr std::size_t kSmallScenePixels = 64;
 [[nodiscard]] TestScene SmallScene();
+// Makes a tally that of so many photons of SmallScene, which all escaped.
+void SetEscaped(BatchTally& tally, std::uint64_t photons);
 
 class ServiceUnderTest {
  public:
   static constexpr const char* kNumericProfile = "the profile of these tests";
 
-  ServiceUnderTest();
+  // `audit_share` of the batches are computed by two workers.
+  explicit ServiceUnderTest(double audit_share = 0);
   ~ServiceUnderTest();
   ServiceUnderTest(const ServiceUnderTest&) = delete;
   ServiceUnderTest& operator=(const ServiceUnderTest&) = delete;
@@ -87,6 +91,7 @@ class ServiceUnderTest {
   std::unique_ptr<JobService> jobs_;
   std::unique_ptr<ImageService> images_;
   std::unique_ptr<WorkerService> workers_;
+  std::unique_ptr<AdminService> admin_;
   std::unique_ptr<grpc::Server> server_;
   int port_ = 0;
   std::atomic<bool> is_shut_down_ = false;
@@ -131,7 +136,8 @@ class TestClient {
 // Threads: one at a time.
 class IdleHandsWorker {
  public:
-  explicit IdleHandsWorker(const ServiceUnderTest& service);
+  // Without an identity it is a new worker.
+  explicit IdleHandsWorker(const ServiceUnderTest& service, const std::string& identity = {});
 
   [[nodiscard]] const std::string& id() const { return id_; }
   Answer<v1::SyncResponse> Sync(bool wants_lease, Duration wait, std::vector<std::string> held = {},

@@ -1,6 +1,7 @@
 // Slices of passes that are lent come back once, whatever becomes of their workers, and what nobody
 // was asked for is refused and changes nothing.
 #include <chrono>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -182,22 +183,23 @@ TEST_F(SlicesTest, SlicesOfAConnectionThatBreaksGoBackWithoutAnyTimePassing) {
   EXPECT_EQ(Outcome(other, *found), v1::COMMIT_OUTCOME_ACCEPTED);
 }
 
-TEST_F(SlicesTest, ASliceThatWasNotAskedForIsRefusedAndChangesNothing) {
+// What the header says must be what was lent; the lease is then as it was.
+TEST_F(SlicesTest, ASliceThatWasNotLentIsRefusedAndChangesNothing) {
   const std::string job = Submit(100);
   IdleHandsWorker worker(service_);
   const auto lease = TakeSliceFrom(worker, 16);
   ASSERT_TRUE(lease);
   ASSERT_EQ(lease->first(), 16U);
   const std::uint64_t before = PhotonsOf(job);
-  const auto refuses = [&](const v1::Lease& forged, const std::string& bytes) {
-    const auto answer = worker.CommitBytes(forged, bytes);
-    EXPECT_EQ(PhotonsOf(job), before);
-    return answer.code() == grpc::StatusCode::INVALID_ARGUMENT;
-  };
   const std::string good = worker.ResultOf(*lease);
-  // Ranges that are no slice of the round.
+  const auto code_of = [&](const v1::Lease& forged) {
+    const auto answer = worker.CommitBytes(forged, good);
+    EXPECT_EQ(PhotonsOf(job), before);
+    return answer.code();
+  };
   for (const auto& [first, last] :
        std::vector<std::pair<std::uint64_t, std::uint64_t>>{{17, 19},
+                                                            {16, 17},
                                                             {16, 19},
                                                             {16, 16},
                                                             {18, 16},
@@ -209,49 +211,90 @@ TEST_F(SlicesTest, ASliceThatWasNotAskedForIsRefusedAndChangesNothing) {
     v1::Lease forged = *lease;
     forged.set_first(first);
     forged.set_last(last);
-    EXPECT_TRUE(refuses(forged, good)) << first << " " << last;
+    EXPECT_EQ(code_of(forged), grpc::StatusCode::FAILED_PRECONDITION) << first << " " << last;
   }
-  // Passes that the bytes do not have.
-  v1::Lease narrower = *lease;
-  narrower.set_last(17);
-  ASSERT_NE(PassesOf(narrower), PassesOf(*lease));
-  EXPECT_EQ(worker.CommitBytes(narrower, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
-  EXPECT_TRUE(refuses(*lease, worker.ResultOf(narrower)));
-  // Photons that were not asked for.
-  v1::Lease of_more_photons = *lease;
-  of_more_photons.set_photons_per_pass(kPhotons + 1);
-  EXPECT_TRUE(refuses(*lease, worker.ResultOf(of_more_photons)));
-  of_more_photons.set_photons_per_pass(2 * kPhotons);
-  EXPECT_TRUE(refuses(*lease, worker.ResultOf(of_more_photons)));
-  // An image of another size, and columns of another job's controller.
-  for (const auto& [pixels, evidence] : std::vector<std::pair<std::size_t, std::size_t>>{
-           {kSmallScenePixels + 1, 0}, {0, 0}, {kSmallScenePixels, 2}}) {
-    SliceSums slice = EmptySlice(PassesOf(*lease), pixels, evidence);
-    slice.tally.photons = kPhotons * slice.passes.size();
-    EXPECT_TRUE(refuses(*lease, EncodeSlice(slice))) << pixels << " " << evidence;
-  }
-  // No slice at all, and more bytes than a slice has.
-  EXPECT_TRUE(refuses(*lease, "LSL2 and then nothing of sense"));
-  EXPECT_TRUE(refuses(*lease, ""));
-  EXPECT_TRUE(refuses(*lease, good + "more"));
-  EXPECT_TRUE(refuses(*lease, std::string(1'000'000, 'x')));
   v1::Lease of_no_kind = *lease;
   of_no_kind.set_kind(v1::WORK_KIND_UNSPECIFIED);
-  EXPECT_TRUE(refuses(of_no_kind, good));
-  // Photons of a pass that is not split, and slices of rounds and jobs that are not open.
+  EXPECT_EQ(code_of(of_no_kind), grpc::StatusCode::INVALID_ARGUMENT);
   v1::Lease elsewhere = *lease;
   elsewhere.set_kind(v1::WORK_KIND_PHOTONS);
-  EXPECT_EQ(worker.CommitBytes(elsewhere, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
-  elsewhere = *lease;
-  elsewhere.set_pass(8);
-  EXPECT_EQ(worker.CommitBytes(elsewhere, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
-  elsewhere.set_pass(17);
-  EXPECT_EQ(worker.CommitBytes(elsewhere, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
+  EXPECT_EQ(code_of(elsewhere), grpc::StatusCode::FAILED_PRECONDITION);
+  for (const std::uint64_t pass : {8, 17}) {
+    elsewhere = *lease;
+    elsewhere.set_pass(pass);
+    EXPECT_EQ(code_of(elsewhere), grpc::StatusCode::FAILED_PRECONDITION);
+  }
   elsewhere = *lease;
   elsewhere.set_job_id("another job");
-  EXPECT_EQ(worker.CommitBytes(elsewhere, good).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
-  EXPECT_EQ(PhotonsOf(job), before);
+  EXPECT_EQ(code_of(elsewhere), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_EQ(worker.CommitBytes(*lease, good).message.outcome(), v1::COMMIT_OUTCOME_ACCEPTED);
+}
+
+// Bytes that are not the result of the lease end it as a failure; what was lent is lent again.
+TEST_F(SlicesTest, BytesThatAreNotTheResultAreRefusedAndChangeNothing) {
+  const std::string job = Submit(200);
+  IdleHandsWorker worker(service_);
+  using Forge = std::function<std::string(const v1::Lease&)>;
+  const auto slice_of = [](const v1::Lease& lease, std::size_t pixels, std::size_t evidence) {
+    SliceSums slice = EmptySlice(PassesOf(lease), pixels, evidence);
+    SetEscaped(slice.tally, kPhotons * slice.passes.size());
+    return slice;
+  };
+  const auto other_lease = [&](const std::function<void(v1::Lease&)>& change) -> Forge {
+    return [&worker, change](v1::Lease lease) {
+      change(lease);
+      return worker.ResultOf(lease);
+    };
+  };
+  const auto with_tally = [&](const std::function<void(BatchTally&)>& change) -> Forge {
+    return [&, change](const v1::Lease& lease) {
+      SliceSums slice = slice_of(lease, kSmallScenePixels, 0);
+      change(slice.tally);
+      return EncodeSlice(slice);
+    };
+  };
+  const std::vector<std::pair<std::string, Forge>> forgeries = {
+      {"fewer passes", other_lease([](v1::Lease& lease) { lease.set_last(lease.first() + 1); })},
+      {"a photon more", other_lease([](v1::Lease& l) { l.set_photons_per_pass(kPhotons + 1); })},
+      {"photons twice", other_lease([](v1::Lease& l) { l.set_photons_per_pass(2 * kPhotons); })},
+      {"more pixels",
+       [&](const v1::Lease& l) { return EncodeSlice(slice_of(l, kSmallScenePixels + 1, 0)); }},
+      {"no pixels", [&](const v1::Lease& l) { return EncodeSlice(slice_of(l, 0, 0)); }},
+      {"more columns",
+       [&](const v1::Lease& l) { return EncodeSlice(slice_of(l, kSmallScenePixels, 2)); }},
+      {"no slice", [](const v1::Lease&) { return "LSL2 and then nothing of sense"; }},
+      {"no bytes", [](const v1::Lease&) { return ""; }},
+      {"bytes behind it", [&](const v1::Lease& lease) { return worker.ResultOf(lease) + "more"; }},
+      {"too many bytes", [](const v1::Lease&) { return std::string(1'000'000, 'x'); }},
+      // The counters balance, and are not those of the scene's light.
+      {"no energy", with_tally([](BatchTally& tally) { tally.energy = {}; })},
+      {"energy twice", with_tally([](BatchTally& tally) {
+         tally.energy.emitted *= 2;
+         tally.energy.escaped *= 2;
+       })},
+      {"absurd energy", with_tally([](BatchTally& tally) {
+         tally.energy.emitted = tally.energy.escaped = std::int64_t{1} << 62;
+       })},
+      {"photons of no light", with_tally([](BatchTally& tally) { tally.lights.clear(); })},
+  };
+  std::optional<v1::Lease> lease = TakeSliceFrom(worker, 16);
+  std::uint64_t failed = 0;
+  for (const auto& [what, forge] : forgeries) {
+    ASSERT_TRUE(lease) << what;
+    if (what == "fewer passes" && PassesOf(*lease).size() == 1) continue;
+    const std::uint64_t before = PhotonsOf(job);
+    EXPECT_EQ(worker.CommitBytes(*lease, forge(*lease)).code(), grpc::StatusCode::INVALID_ARGUMENT)
+        << what;
+    EXPECT_EQ(worker.Commit(*lease).code(), grpc::StatusCode::FAILED_PRECONDITION)
+        << "the lease has ended";
+    EXPECT_EQ(PhotonsOf(job), before);
+    EXPECT_EQ(service_.coordinator().ListWorkers()[0].leases.failed, ++failed);
+    const auto again = worker.TakeLease();
+    ASSERT_TRUE(again);
+    EXPECT_EQ(PassesOf(*again), PassesOf(*lease)) << "what was lent is lent again";
+    EXPECT_EQ(Outcome(worker, *again), v1::COMMIT_OUTCOME_ACCEPTED);
+    lease = worker.TakeLease();
+  }
 }
 
 // A slice that overlaps one that has come would count passes twice.
@@ -269,8 +312,8 @@ TEST_F(SlicesTest, APartOfASliceIsNotWhatWasLent) {
     return worker.Commit(of_part).message.outcome();
   };
   const std::uint64_t before = PhotonsOf(job);
-  EXPECT_EQ(commit({whole.first, whole.first + 1}), v1::COMMIT_OUTCOME_SUPERSEDED);
-  EXPECT_EQ(commit({whole.last - 1, whole.last}), v1::COMMIT_OUTCOME_SUPERSEDED);
+  EXPECT_NE(commit({whole.first, whole.first + 1}), v1::COMMIT_OUTCOME_ACCEPTED);
+  EXPECT_NE(commit({whole.last - 1, whole.last}), v1::COMMIT_OUTCOME_ACCEPTED);
   EXPECT_EQ(PhotonsOf(job), before);
   EXPECT_EQ(commit(whole), v1::COMMIT_OUTCOME_ACCEPTED);
   EXPECT_NE(commit({whole.first, whole.first + 1}), v1::COMMIT_OUTCOME_ACCEPTED);

@@ -36,6 +36,7 @@ class LocalRender {
   // A checkpoint of the whole rounds, and going on from one in a render without passes.
   [[nodiscard]] std::string Save() const;
   [[nodiscard]] Status Restore(std::string_view bytes);
+  [[nodiscard]] EmissionCheck emission_check() const { return estimator_->emission_check(); }
   // Over all passes.
   [[nodiscard]] const BatchTally& tally() const { return tally_; }
 

@@ -48,7 +48,7 @@ TEST(CoordinatorPartsTest, FaultyWorkersTogetherMergeEveryPhotonOnce) {
   options.fixed_batch = 100;
   // Some workers here fail on purpose, again and again.
   options.poison_workers = 1'000'000;
-  options.poison_losses = 1'000'000;
+  options.poison_failures = 1'000'000;
   Scheduler scheduler(options);
   PassMerger merger;
   merger.Open(kPass, kHitpoints, kPhotons);
@@ -135,7 +135,7 @@ TEST(CoordinatorPartsTest, FaultyWorkersTogetherMergeEveryPassOnce) {
   const std::vector<PassRange> rounds = {RoundOf(512), RoundOf(576)};
   SchedulerOptions options;
   options.poison_workers = 1'000'000;
-  options.poison_losses = 1'000'000;
+  options.poison_failures = 1'000'000;
   Scheduler scheduler(options);
   RoundMerger merger;
   for (const PassRange& round : rounds) {

@@ -67,7 +67,8 @@ TEST(CommitAccountingTest, CountsABatchForTheJobAndItsWorker) {
   Job job;
   job.life = JobLife(SteadyTime(std::chrono::seconds(10)));
   Delivery delivery;
-  delivery.worker = "w-1";
+  delivery.worker = "a registration of w-1";
+  delivery.record = "w-1";
   delivery.pass = {"job", 3};
   delivery.cpu = std::chrono::seconds(2);
   delivery.size_bytes = 100;

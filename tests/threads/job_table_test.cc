@@ -54,6 +54,9 @@ class FakeRunner final : public RunningJob {
     if (!why_stopped_) why_stopped_ = std::move(why);
     changed_.NotifyAll();
   }
+  [[nodiscard]] Status CheckEmission(const BatchTally& /*tally*/) const override {
+    return absl::OkStatus();
+  }
   void Wake() override {}
   std::optional<WorkBlobs> BlobsOf(std::uint64_t) const override { return WorkBlobs{}; }
   std::optional<std::size_t> HitpointsIn(const Digest&) const override { return 0; }

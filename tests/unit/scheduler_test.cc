@@ -51,6 +51,12 @@ std::vector<std::string> Revoked(Scheduler& scheduler, const std::string& worker
   return scheduler.AnswerFor(worker, report, At(now_s))->revoked;
 }
 
+void Fail(Scheduler& scheduler, const std::string& worker, const BatchLease& lease, double now_s) {
+  Scheduler::Report report;
+  report.failures = {{lease.id, "out of memory"}};
+  EXPECT_TRUE(scheduler.TakeReport(worker, report, At(now_s)).ok());
+}
+
 TEST(SchedulerTest, LendsAPassInOrderAndEachPhotonOnce) {
   Scheduler scheduler(Batches(40));
   scheduler.OpenPass(kFirst, 100);
@@ -230,15 +236,21 @@ struct Straggling {
   }
 };
 
-TEST(SchedulerTest, LendsAStragglersBatchASecondTimeAndNotAThird) {
+TEST(SchedulerTest, LendsAStragglersBatchASecondTimeAndAThirdAndNotAFourth) {
   Straggling s;
   EXPECT_FALSE(Ask(s.scheduler, s.idle, 5.9)) << "not yet three times the median";
   const auto doubled = Ask(s.scheduler, s.idle, 6.1);
   ASSERT_TRUE(doubled);
   EXPECT_EQ(doubled->range, s.lease->range);
-  EXPECT_FALSE(Ask(s.scheduler, s.scheduler.AddWorker("third", At(7)), 7));
-  s.scheduler.Commit(kFirst, doubled->range, At(8));
-  EXPECT_EQ(Revoked(s.scheduler, s.slow, {s.lease->id}, 8), (std::vector{s.lease->id}));
+  const auto third_worker = s.scheduler.AddWorker("third", At(9));
+  EXPECT_FALSE(Ask(s.scheduler, third_worker, 9)) << "the second has not had its time";
+  const auto third = Ask(s.scheduler, third_worker, 9.2);
+  ASSERT_TRUE(third);
+  EXPECT_EQ(third->range, s.lease->range);
+  EXPECT_FALSE(Ask(s.scheduler, s.scheduler.AddWorker("fourth", At(20)), 20));
+  s.scheduler.Commit(kFirst, doubled->range, At(21));
+  EXPECT_EQ(Revoked(s.scheduler, s.slow, {s.lease->id}, 21), (std::vector{s.lease->id}));
+  EXPECT_EQ(Revoked(s.scheduler, third_worker, {third->id}, 21), (std::vector{third->id}));
 }
 
 TEST(SchedulerTest, DoesNotDoubleABatchWhileOthersArePending) {
@@ -253,8 +265,7 @@ TEST(SchedulerTest, PoisonsABatchAtWhichThreeWorkersFailed) {
   for (int i = 0; i < 3; ++i) {
     EXPECT_TRUE(scheduler.TakePoisoned().empty());
     const auto worker = scheduler.AddWorker(absl::StrCat("host", i), At(i));
-    ASSERT_TRUE(Ask(scheduler, worker, i));
-    scheduler.LoseWorker(worker);
+    Fail(scheduler, worker, Ask(scheduler, worker, i).value(), i);
   }
   const auto poisoned = scheduler.TakePoisoned();
   ASSERT_EQ(poisoned.size(), 1U);
@@ -268,13 +279,9 @@ TEST(SchedulerTest, PoisonsABatchThatALoneWorkerCannotDo) {
   const auto worker = scheduler.AddWorker("lone", At(0));
   int tries = 0;
   for (; tries < 100 && scheduler.TakePoisoned().empty(); ++tries) {
-    const auto lease = Ask(scheduler, worker, tries);
-    ASSERT_TRUE(lease);
-    Scheduler::Report report;
-    report.failures = {{lease->id, "out of memory"}};
-    ASSERT_TRUE(scheduler.TakeReport(worker, report, At(tries)).ok());
+    Fail(scheduler, worker, Ask(scheduler, worker, tries).value(), tries);
   }
-  EXPECT_EQ(tries, 6);
+  EXPECT_EQ(tries, 3);
 }
 
 TEST(SchedulerTest, AGoodbyeIsNoFailure) {
@@ -586,8 +593,7 @@ TEST(SchedulerRoundTest, ASliceAtWhichThreeWorkersFailedNamesItsPasses) {
   scheduler.OpenRound(kRound64, {64, 66}, {});
   for (int i = 0; i < 3; ++i) {
     const auto worker = scheduler.AddWorker("w", At(i));
-    ASSERT_TRUE(Ask(scheduler, worker, i));
-    scheduler.LoseWorker(worker);
+    Fail(scheduler, worker, Ask(scheduler, worker, i).value(), i);
   }
   const auto poisoned = scheduler.TakePoisoned();
   ASSERT_EQ(poisoned.size(), 1U);

@@ -1,0 +1,87 @@
+#include "server/emission_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace lucerna {
+namespace {
+
+// Powers at the ends of the range of floats are held where they are normal numbers; then energies
+// are not those of the sum of the lights.
+constexpr double kLeastPower = 1e-30, kMostPower = 1e30;
+// Rounding of a few float operations, and of a sum of n floats.
+constexpr double kRounding = 1e-4, kRoundingOfTerm = 0x1p-23;
+// The largest energy that is counted for a photon (worker/photon_path.cc).
+constexpr double kLargestEnergy = 0x1p28;
+// A spot's photons have at most so many times the mean: its falloff is at least one half on
+// average.
+constexpr double kMostOfSpot = 2;
+// Numbers that give no direction: one photon in 2^24. Of so many photons one may be missing, and of
+// any batch kMayBeMissing.
+constexpr std::uint64_t kOneMissingOf = 1 << 16;
+constexpr std::uint64_t kMayBeMissing = 16;
+
+}  // namespace
+
+EmissionCheck::EmissionCheck(const LightSet& lights) {
+  const auto total = static_cast<double>(Luminance(lights.TotalPower()));
+  const bool is_ordinary = total > kLeastPower && total < kMostPower;
+  double sending = 0;
+  double emitters = 0;
+  for (const LightGroup& light : lights.lights()) {
+    sending += light.lights;
+    emitters += light.emitters;
+  }
+  const double rounding = kRounding + kRoundingOfTerm * emitters;
+  const double even_share = sending > 1 ? kEvenPhotonShare : 0;
+  for (const LightGroup& light : lights.lights()) {
+    if (!is_ordinary) {
+      lights_.push_back({0, kLargestEnergy});
+      continue;
+    }
+    // Power over probability, as LightSet chooses (LightSet::ShareOut).
+    const auto power = static_cast<double>(Luminance(light.power));
+    const double even = even_share > 0 ? even_share / (power * sending) : 0;
+    const double flux = 1 / ((1 - even_share) / total + even);
+    const double units = std::ldexp(flux / total, kEnergyBits);
+    Range range = {units * (1 - rounding) - 1, units * (1 + rounding) + 1};
+    if (light.kind == EmitterKind::kSpot) range = {0, kMostOfSpot * range.most};
+    // Several lights together, of any kind: fainter ones have less.
+    if (light.lights > 1) range = {0, kMostOfSpot * range.most};
+    lights_.push_back({std::clamp(range.least, 0.0, kLargestEnergy),
+                       std::clamp(range.most, 0.0, kLargestEnergy)});
+  }
+}
+
+Status EmissionCheck::Check(const BatchTally& tally) const {
+  if (lights_.empty()) return absl::OkStatus();
+  if (tally.lights.size() > lights_.size()) {
+    return absl::InvalidArgumentError("its photons come from more lights than the scene has");
+  }
+  std::uint64_t sent = 0;
+  double least = 0;
+  double most = 0;
+  double most_of_photon = 0;
+  for (std::size_t i = 0; i < tally.lights.size(); ++i) {
+    const auto photons = static_cast<double>(tally.lights[i].sent);
+    sent += tally.lights[i].sent;
+    least += photons * lights_[i].least;
+    most += photons * lights_[i].most;
+    most_of_photon = std::max(most_of_photon, lights_[i].most);
+  }
+  if (sent != tally.photons) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("its lights sent ", sent, " of ", tally.photons, " photons"));
+  }
+  const double missing = static_cast<double>(kMayBeMissing + sent / kOneMissingOf + tally.dropped);
+  const auto emitted = static_cast<double>(tally.energy.emitted);
+  if (emitted > most || emitted < least - missing * most_of_photon) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("its photons were emitted with the energy ", tally.energy.emitted,
+                     ", and what the lights emit is between ", least, " and ", most));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace lucerna

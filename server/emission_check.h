@@ -1,0 +1,35 @@
+// Is the energy that a result says its photons were emitted with what the lights emit?
+//
+// Photons of one light carry the same flux when they leave it, or at most a known multiple of the
+// mean (spots). How many photons each light has sent is in the counters of a result, so the energy
+// emitted is known within rounding, without tracing anything.
+#pragma once
+
+#include <vector>
+
+#include "render/base/status.h"
+#include "render/estimate/accumulation.h"
+#include "render/transport/light.h"
+
+namespace lucerna {
+
+class EmissionCheck {
+ public:
+  // Of nothing: every tally passes.
+  EmissionCheck() = default;
+  explicit EmissionCheck(const LightSet& lights);
+
+  // Errors: INVALID_ARGUMENT when photons were sent by other lights than there are, not all were
+  // sent by some light, or the energy emitted is not that of so many photons. Takes a time that
+  // grows with the number of lights, of which there are at most kMaxLightTallies.
+  [[nodiscard]] Status Check(const BatchTally& tally) const;
+
+ private:
+  // Of one photon [units of EnergyCounters].
+  struct Range {
+    double least = 0, most = 0;
+  };
+  std::vector<Range> lights_;
+};
+
+}  // namespace lucerna

@@ -1,0 +1,130 @@
+// The energy that photons were emitted with is known from the lights: what workers really count
+// passes, for every kind of light, and what is zero, doubled or absurd does not.
+#include "server/emission_check.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "gtest/gtest.h"
+
+#include "tests/support/local_render.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+RenderOverrides FewPhotons() {
+  RenderOverrides overrides;
+  overrides.photons_per_pass = 20'000;
+  return overrides;
+}
+
+// A spot, a faint and a strong mesh, and an even sky: photons of each carry different powers.
+Scene ManyLights() {
+  Scene scene;
+  const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddBox(scene, {-1, -1, -1}, {1, 1, -0.9F}, white);
+  AddQuad(scene, {-1, -1, 1}, {0, 2, 0}, {2, 0, 0}, white, AddAreaLight(scene, 5));
+  AddSphere(scene, {0, 0, 0.5F}, 0.1F, white, AddAreaLight(scene, 0.001F));
+  SpotLight spot;
+  spot.position = {0, 0, 0.8F};
+  spot.direction = {0, 0, -1};
+  spot.cos_total_width = 0.5F;
+  spot.cos_falloff_start = 0.9F;
+  spot.intensity = {3, 2, 1};
+  scene.spot_lights.push_back(spot);
+  InfiniteLight sky;
+  sky.radiance = {0.1F, 0.2F, 0.3F};
+  scene.infinite_lights.push_back(sky);
+  SetCamera(scene, {0, 0, 3}, {0, 0, 0}, {0, 1, 0}, 40, 8);
+  return scene;
+}
+
+TEST(SceneEmissionTest, WhatWorkersCountPassesForEverySceneOfTheTests) {
+  int scenes = 0;
+  for (const auto& file : std::filesystem::directory_iterator(LUCERNA_SOURCE_DIR "/tests/scenes")) {
+    if (file.path().extension() != ".pbrt") continue;
+    const Scene scene = LoadScene(file.path());
+    LocalRender render(scene, SettingsFor(scene, FewPhotons()));
+    render.AddPass(1);
+    const Status checked = render.emission_check().Check(render.tally());
+    EXPECT_TRUE(checked.ok()) << file.path() << ": " << checked.message();
+    EXPECT_EQ(render.tally().photons, 20'000U);
+    ++scenes;
+  }
+  EXPECT_GE(scenes, 10);
+}
+
+class EmissionCheckTest : public testing::Test {
+ protected:
+  EmissionCheckTest() {
+    const Scene scene = ManyLights();
+    LocalRender render(scene, TestSettings(scene, 100'000, 0.1, 6));
+    render.AddPass(1);
+    tally_ = render.tally();
+    check_ = render.emission_check();
+  }
+  // With another energy, which escapes, so that the counters balance.
+  bool Passes(double factor) const {
+    BatchTally changed = tally_;
+    const std::int64_t emitted = changed.energy.emitted;
+    changed.energy.emitted = static_cast<std::int64_t>(static_cast<double>(emitted) * factor);
+    changed.energy.escaped += changed.energy.emitted - emitted;
+    EXPECT_TRUE(changed.energy.Balance());
+    return check_.Check(changed).ok();
+  }
+
+  BatchTally tally_;
+  EmissionCheck check_;
+};
+
+TEST_F(EmissionCheckTest, PassesWhatLightsOfAllKindsEmit) {
+  EXPECT_EQ(tally_.lights.size(), 4U);
+  EXPECT_TRUE(Passes(1));
+}
+
+TEST_F(EmissionCheckTest, RefusesNothingTwiceAndTheAbsurd) {
+  EXPECT_FALSE(Passes(0));
+  EXPECT_FALSE(Passes(2));
+  EXPECT_FALSE(Passes(-1));
+  BatchTally absurd = tally_;
+  absurd.energy = {.emitted = std::int64_t{1} << 62, .escaped = std::int64_t{1} << 62};
+  EXPECT_TRUE(absurd.energy.Balance());
+  EXPECT_FALSE(check_.Check(absurd).ok());
+}
+
+TEST_F(EmissionCheckTest, RefusesPhotonsOfNoLightAndOfLightsThatAreNotThere) {
+  BatchTally missing = tally_;
+  missing.lights[1].sent -= 1;
+  EXPECT_FALSE(check_.Check(missing).ok());
+  BatchTally none = tally_;
+  none.lights.clear();
+  EXPECT_FALSE(check_.Check(none).ok());
+  BatchTally more = tally_;
+  more.lights[0].sent -= 1;
+  more.lights.push_back({.sent = 1});
+  EXPECT_FALSE(check_.Check(more).ok());
+}
+
+// Where every photon of a light carries the same power, the check is exact but for rounding.
+TEST(OneLightTest, IsCheckedToAThousandth) {
+  Scene scene;
+  const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddQuad(scene, {-1, -1, 1}, {0, 2, 0}, {2, 0, 0}, white, AddAreaLight(scene, 5));
+  AddQuad(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, white);
+  SetCamera(scene, {0, -3, 0.5}, {0, 0, 0}, {0, 0, 1}, 40, 8);
+  LocalRender render(scene, TestSettings(scene, 100'000, 0.1, 6));
+  render.AddPass(1);
+  BatchTally tally = render.tally();
+  const EmissionCheck check = render.emission_check();
+  EXPECT_TRUE(check.Check(tally).ok()) << check.Check(tally).message();
+  const std::int64_t emitted = tally.energy.emitted;
+  for (const double factor : {0.999, 1.001}) {
+    tally.energy.emitted = static_cast<std::int64_t>(static_cast<double>(emitted) * factor);
+    EXPECT_FALSE(check.Check(tally).ok()) << factor;
+  }
+}
+
+}  // namespace
+}  // namespace lucerna
