@@ -61,6 +61,7 @@ CALLS = {
     ],
     r"\bgetenv\b": ["server/main.cc", "worker/main.cc", "client/main.cc"],
     r"\bofstream\b|\bfopen\b|\bO_CREAT\b|\bO_WRONLY\b|\bO_RDWR\b": ["render/base/files"],
+    r"\bgetrandom\(": ["render/base/random_id"],
     r"\bstd::mt19937|\brandom_device\b|\b(s?rand|drand48)\(": [],
 }
 
