@@ -5,8 +5,10 @@
 
 #include <spdlog/spdlog.h>
 
+#include "render/base/escape.h"
 #include "render/base/fail_point.h"
 #include "render/base/memory.h"
+#include "render/base/random_id.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/slice_codec.h"
 #include "server/job_image.h"
@@ -19,6 +21,7 @@ constexpr Duration kLongestSync = std::chrono::seconds(5);
 constexpr Duration kSaveUnsavedEvery = std::chrono::seconds(1);
 constexpr std::chrono::milliseconds kRetryPause{100};
 constexpr int kPausesBeforeRetry = 10;
+constexpr std::size_t kRandomDigits = 16;  // of a job's id: 64 bits, short enough to be typed
 
 // Different for every start of a coordinator on one machine.
 std::string InstanceName(const Clock& clock) {
@@ -50,11 +53,12 @@ Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<Du
       scheduler_(OptionsFor(options_, instance_)),
       intake_(blobs_, options_.max_job_bytes),
       jobs_({.instance = state_ ? state_->instance() : instance_,
+             .random_part = [] { return RandomId().substr(0, kRandomDigits); },
              .retention = options_.retention,
              .journal = state_.get()}) {
   if (state_) {
     for (const std::string& problem : state_->problems())
-      spdlog::error("{}", problem);
+      spdlog::error("{}", Escaped(problem));
     jobs_.Restore(state_->TakeJobs(), state_->next_serial(), Now());
     RemoveUnneeded();
   }
@@ -100,7 +104,9 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
     return absl::InvalidArgumentError("a request id has 1 to 128 characters");
   }
   if (!submission.validate_only) {
-    if (auto earlier = jobs_.FindRequest(submission.request_id)) return *std::move(earlier);
+    if (auto earlier = jobs_.FindRequest(submission.request_id, submission.owner)) {
+      return *std::move(earlier);
+    }
   }
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
   if (submission.validate_only) return JobTable::Submitted{"", std::move(job.warnings)};
@@ -115,7 +121,7 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
     RemoveUnneeded();
     return submitted.status();
   }
-  spdlog::info("job {} submitted: {}", submitted->job_id, submission.manifest.main_path);
+  spdlog::info("job {} submitted: {}", submitted->job_id, Escaped(submission.manifest.main_path));
   return submitted;
 }
 
@@ -152,6 +158,10 @@ Status Coordinator::Delete(const std::string& job_id) {
 StatusOr<JobReport> Coordinator::WithWorkers(StatusOr<JobReport> report) const {
   if (report.ok()) report->workers = scheduler_.LiveWorkers();
   return report;
+}
+
+StatusOr<std::string> Coordinator::OwnerOf(const std::string& job_id) const {
+  return jobs_.OwnerOf(job_id);
 }
 
 StatusOr<JobReport> Coordinator::ReportOf(const std::string& job_id) const {
@@ -389,7 +399,7 @@ void Coordinator::Conclude(const std::string& job_id, StatusOr<RenderResult> res
     return;
   }
   jobs_.Fail(job_id, failure, Now());
-  spdlog::info("job {} ended: {}", job_id, std::string(failure.message()));
+  spdlog::info("job {} ended: {}", job_id, Escaped(std::string(failure.message())));
   RemoveUnneeded();
 }
 
@@ -406,7 +416,7 @@ StatusOr<std::string> Coordinator::Register(const std::string& name, int threads
         "\"; their bits would differ, run the same build on both"));
   }
   std::string id = scheduler_.AddWorker(name, clock_.Steady());
-  spdlog::info("worker {} joined: {} with {} threads", id, name, threads);
+  spdlog::info("worker {} joined: {} with {} threads", id, Escaped(name), threads);
   return id;
 }
 
@@ -467,7 +477,7 @@ void Coordinator::SyncBroke(std::uint64_t ticket) {
 }
 
 void Coordinator::EndBroken(const ParkedSyncs::Call& broken) {
-  spdlog::info("worker {} vanished", broken.worker);
+  spdlog::info("worker {} vanished", Escaped(broken.worker));
   scheduler_.LoseWorker(broken.worker);
   broken.answer(absl::CancelledError("the connection broke"));
   StopPoisonedJobs();
@@ -558,7 +568,7 @@ StatusOr<MergeOutcome> Coordinator::Commit(const Delivery& delivery, std::string
 }
 
 void Coordinator::Goodbye(const std::string& worker) {
-  spdlog::info("worker {} left", worker);
+  spdlog::info("worker {} left", Escaped(worker));
   scheduler_.RemoveWorker(worker);
   AnswerParked();
 }

@@ -68,6 +68,7 @@ class Coordinator {
                                                      const StillNeeded& still_needed);
 
   // As the functions of JobTable.
+  [[nodiscard]] StatusOr<std::string> OwnerOf(const std::string& job_id) const;
   [[nodiscard]] StatusOr<JobReport> ReportOf(const std::string& job_id) const;
   [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(std::size_t count,
                                                                       std::uint64_t before) const;

@@ -208,6 +208,16 @@ grpc::ServerUnaryReactor* WorkerService::DescribeJob(grpc::CallbackServerContext
                                                      const v1::DescribeJobRequest* request,
                                                      v1::JobDescription* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  // A user traces photons of their own jobs again; workers trace those of all.
+  if (!Has(access_.CallerOf(*context).roles, Role::kWork)) {
+    const StatusOr<std::string> owner = coordinator_.OwnerOf(request->job_id());
+    const Status allowed =
+        owner.ok() ? access_.CheckOwns(*context, request->job_id(), *owner) : owner.status();
+    if (!allowed.ok()) {
+      reactor->Finish(ToGrpc(allowed));
+      return reactor;
+    }
+  }
   const StatusOr<Coordinator::Description> job = coordinator_.Describe(request->job_id());
   if (job.ok()) {
     *response->mutable_scene() = ToProto(job->scene);

@@ -3,6 +3,8 @@
 #include <charconv>
 #include <cstdio>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "client/connection.h"
 #include "client/exit_code.h"
@@ -41,7 +43,7 @@ StatusOr<v1::PhotonKey> ReadKey(const PhotonRequest& request) {
 
 }  // namespace
 
-Status TracePhoton(const PhotonRequest& request, const std::string& server,
+Status TracePhoton(const PhotonRequest& request, const Endpoint& server,
                    const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const v1::PhotonKey key, ReadKey(request));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
@@ -55,11 +57,19 @@ Status TracePhoton(const PhotonRequest& request, const std::string& server,
                                                   " has the photons 0 to ", photons - 1,
                                                   "; there is no ", key.index()));
   }
-  LUCERNA_ASSIGN_OR_RETURN(
-      const std::string bytes,
-      OutputOf(request.program_folder + "/lucerna-worker",
-               {"--server", server, "--replay", request.job_id, "--pass",
-                std::to_string(key.pass()), "--index", std::to_string(key.index())}));
+  std::vector<std::string> flags = {"--server", server.address,
+                                    "--replay", request.job_id,
+                                    "--pass",   std::to_string(key.pass()),
+                                    "--index",  std::to_string(key.index())};
+  if (!server.tls.empty()) {
+    flags.insert(flags.end(), {"--tls-ca", server.tls.authority, "--tls-cert",
+                               server.tls.certificate, "--tls-key", server.tls.key});
+  }
+  if (!request.token_file.empty()) {
+    flags.insert(flags.end(), {"--token-file", request.token_file});
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes,
+                           OutputOf(request.program_folder + "/lucerna-worker", std::move(flags)));
   v1::PhotonPath path;
   if (!path.ParseFromString(bytes)) {
     return absl::DataLossError(
