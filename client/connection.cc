@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "client/exit_code.h"
+#include "client/foreign_text.h"
 #include "client/interruption.h"
 #include "client/view/progress_view.h"
 #include "render/base/clock.h"
@@ -77,6 +78,7 @@ class WatchStream {
   void ReadAll() {
     v1::Job job;
     while (reader_->Read(&job)) {
+      EscapeTexts(job);
       const MutexLock lock(mutex_);
       news_.job = job;
       changed_.NotifyAll();
@@ -228,6 +230,7 @@ StatusOr<v1::SubmitResponse> ClientConnection::Submit(const v1::SubmitRequest& r
     const StallGuard guard(context, kNoDeadline, IsInterrupted);
     return jobs_->Submit(&context, request, &response);
   }));
+  EscapeTexts(response);
   return response;
 }
 
@@ -240,8 +243,10 @@ StatusOr<std::vector<v1::Job>> ClientConnection::List() {
     LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
       return jobs_->List(&context, request, &response);
     }));
-    for (v1::Job& job : *response.mutable_jobs())
+    for (v1::Job& job : *response.mutable_jobs()) {
+      EscapeTexts(job);
       jobs.push_back(std::move(job));
+    }
     // A page that leads back to itself would never end.
     if (response.next_page_token().empty() || response.next_page_token() == request.page_token()) {
       return jobs;
@@ -263,6 +268,7 @@ StatusOr<v1::Job> ClientConnection::Get(const std::string& job_id) {
   LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
     return jobs_->Get(&context, request, &job);
   }));
+  EscapeTexts(job);
   return job;
 }
 
@@ -273,6 +279,7 @@ StatusOr<v1::Job> ClientConnection::Stop(const std::string& job_id) {
   LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
     return jobs_->Stop(&context, request, &job);
   }));
+  EscapeTexts(job);
   return job;
 }
 
@@ -301,6 +308,7 @@ StatusOr<v1::Job> ClientConnection::Extend(const std::string& job_id,
   LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
     return jobs_->Extend(&context, request, &job);
   }));
+  EscapeTexts(job);
   return job;
 }
 
@@ -317,6 +325,7 @@ StatusOr<v1::Job> ClientConnection::Cancel(const std::string& job_id) {
     return Unreachable();
   }
   LUCERNA_RETURN_IF_ERROR(Said(status));
+  EscapeTexts(job);
   return job;
 }
 

@@ -4,6 +4,8 @@
 // own request_id) are tried again with growing pauses when the coordinator is starting, draining
 // or out of reach for a moment; a broken Watch is opened again.
 //
+// Texts in what it returns are escaped (client/foreign_text.h).
+//
 // Errors of every call: Failure(kUnreachable) when the coordinator stays silent,
 // Failure(kInterrupted) when the user ended the program, else what the coordinator said.
 #pragma once

@@ -289,9 +289,9 @@ int Run(int argc, char** argv) {
   add_json(selfcheck);
   add_quiet(selfcheck);
 
-  CLI::App* token = app.add_subcommand("token", "tokens of users and workers");
-  token->require_subcommand(1);
-  CLI::App* new_token = token->add_subcommand("new", "make a token, and the line that accepts it");
+  CLI::App* tokens = app.add_subcommand("token", "tokens of users and workers");
+  tokens->require_subcommand(1);
+  CLI::App* new_token = tokens->add_subcommand("new", "make a token, and the line that accepts it");
   new_token->callback(
       [&] { chosen = [&] { return NewToken(token_name, token_roles, output_options); }; });
   new_token->add_option("NAME", token_name, "whose it is")->required();

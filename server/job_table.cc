@@ -11,6 +11,12 @@ Status UnknownJob(const std::string& job_id) {
   return absl::NotFoundError(absl::StrCat("there is no job ", job_id));
 }
 
+// Owners choose their request ids without knowing of each other.
+std::string RequestKey(const std::string& request_id, const std::string& owner) {
+  if (owner.empty()) return request_id;
+  return absl::StrCat(owner.size(), " ", owner, " ", request_id);
+}
+
 }  // namespace
 
 JobTable::JobTable(Options options) : options_(std::move(options)), queue_(options_.max_waiting) {}
@@ -38,9 +44,9 @@ JobTable::Entries::const_iterator JobTable::FindLocked(const std::string& job_id
 
 std::optional<JobTable::Submitted> JobTable::FindRequestLocked(const std::string& request_id,
                                                                const std::string& owner) const {
+  const std::string key = RequestKey(request_id, owner);
   for (const auto& [serial, entry] : entries_) {
-    if (entry.request_id == request_id && entry.job.owner == owner)
-      return Submitted{entry.job.id, entry.job.warnings};
+    if (entry.request_id == key) return Submitted{entry.job.id, entry.job.warnings};
   }
   return std::nullopt;
 }
@@ -67,7 +73,7 @@ StatusOr<JobTable::Submitted> JobTable::Add(CheckedJob checked, WallTime submitt
   Entry entry;
   entry.serial = serial;
   entry.turn = next_turn_;
-  entry.request_id = std::move(checked.submission.request_id);
+  entry.request_id = RequestKey(checked.submission.request_id, checked.submission.owner);
   entry.pinned = std::move(checked.pinned);
   Job& job = entry.job;
   job.id = absl::StrCat(options_.instance, "-", serial);

@@ -1,7 +1,8 @@
 // An address at which some of the coordinator's services are offered.
 //
 // Each listener is a gRPC server of its own with its own health, so that one for workers offers
-// nothing that is for clients.
+// nothing that is for clients. Health says NOT_SERVING while there are no descriptors for
+// connections.
 #pragma once
 
 #include <memory>
@@ -12,6 +13,9 @@
 
 #include "render/base/certificate.h"
 #include "render/base/clock.h"
+#include "render/base/mutex.h"
+#include "render/base/status.h"
+#include "server/acceptor.h"
 #include "server/access.h"
 
 namespace lucerna {
@@ -23,9 +27,10 @@ class Listener {
     TlsFiles tls;                          // empty: in the clear
     const Access* access = nullptr;        // outlives the listener
     std::vector<grpc::Service*> services;  // outlive the listener
+    std::size_t max_connections_per_address = 16384;
   };
-  // nullptr when it cannot listen there.
-  [[nodiscard]] static std::unique_ptr<Listener> Start(const Options& options);
+  // Errors: UNAVAILABLE when it cannot listen there.
+  [[nodiscard]] static StatusOr<std::unique_ptr<Listener>> Start(const Options& options);
 
   // "host:port", with the port that it has.
   [[nodiscard]] const std::string& address() const { return address_; }
@@ -39,7 +44,11 @@ class Listener {
   Listener() = default;
 
   std::string address_;
+  std::unique_ptr<Acceptor> acceptor_;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> hand_over_;
   std::unique_ptr<grpc::Server> server_;
+  Mutex mutex_;
+  bool is_ending_ LUCERNA_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace lucerna

@@ -31,6 +31,7 @@
 #include "render/wire/channel.h"
 #include "render/wire/grpc_log.h"
 #include "render/wire/security_flags.h"
+#include "server/acceptor.h"
 #include "server/access.h"
 #include "server/asset_service.h"
 #include "server/coordinator.h"
@@ -58,6 +59,7 @@ struct Flags {
   TlsFiles tls;
   std::string tokens;
   bool offers_reflection = false;
+  std::size_t max_connections_per_address = 16384;
   bool allow_insecure_network = false;
   std::string log_level = "info";
   std::string state;
@@ -77,6 +79,7 @@ sigset_t BlockEndSignals() {
 
 int Serve(const Flags& flags) {
   const sigset_t end_signals = BlockEndSignals();
+  RaiseDescriptorLimit();
   const Clock& clock = SystemClock();
   std::unique_ptr<DurableState> state;
   if (!flags.state.empty()) {
@@ -109,21 +112,26 @@ int Serve(const Flags& flags) {
   std::vector<grpc::Service*> for_workers = {&workers};
   const bool is_one = flags.listen_workers.empty();
   if (is_one) for_clients.insert(for_clients.end(), for_workers.begin(), for_workers.end());
-  std::vector<std::unique_ptr<Listener>> listeners;
-  listeners.push_back(
-      Listener::Start({flags.listen, flags.tls, access->get(), std::move(for_clients)}));
+  std::vector<Listener::Options> wanted;
+  wanted.push_back({flags.listen, flags.tls, access->get(), std::move(for_clients),
+                    flags.max_connections_per_address});
   if (!is_one) {
-    listeners.push_back(
-        Listener::Start({flags.listen_workers, flags.tls, access->get(), std::move(for_workers)}));
+    wanted.push_back({flags.listen_workers, flags.tls, access->get(), std::move(for_workers),
+                      flags.max_connections_per_address});
   }
-  for (std::size_t i = 0; i < listeners.size(); ++i) {
-    if (listeners[i] == nullptr) {
+  std::vector<std::unique_ptr<Listener>> listeners;
+  for (const Listener::Options& options : wanted) {
+    StatusOr<std::unique_ptr<Listener>> listener = Listener::Start(options);
+    if (!listener.ok()) {
       std::fprintf(stderr,
-                   "lucerna-server: cannot listen on %s; is the port in use, or the address not "
-                   "of this machine?\n",
-                   (i == 0 ? flags.listen : flags.listen_workers).c_str());
+                   "lucerna-server: cannot listen on %s (%s); is the port in use, or the address "
+                   "not of this machine?\n",
+                   options.address.c_str(), std::string(listener.status().message()).c_str());
       return kExitCannotListen;
     }
+    listeners.push_back(*std::move(listener));
+  }
+  for (std::size_t i = 0; i < listeners.size(); ++i) {
     std::printf("%s %s\n", i == 0 ? "listening on" : "listening for workers on",
                 listeners[i]->address().c_str());
   }
@@ -192,6 +200,10 @@ int Main(int argc, char** argv) {
   app.add_option("--tokens", flags.tokens,
                  "file of the tokens that are accepted (lucerna token new); without it everybody "
                  "who can connect may do everything");
+  app.add_option("--max-connections", flags.max_connections_per_address,
+                 "connections that one address may have; a worker has two")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
   app.add_flag("--reflection", flags.offers_reflection, "describe the protocol to tools");
   app.add_flag("--allow-insecure-network", flags.allow_insecure_network,
                "listen beyond this machine although traffic is not encrypted");

@@ -8,6 +8,7 @@
 
 #include "client/connection.h"
 #include "client/exit_code.h"
+#include "client/foreign_text.h"
 #include "client/program_output.h"
 #include "client/view/photon_view.h"
 #include "client/view/report.h"
@@ -75,6 +76,7 @@ Status TracePhoton(const PhotonRequest& request, const Endpoint& server,
     return absl::DataLossError(
         "the worker program answered with something that is no photon's way");
   }
+  EscapeTexts(path);
   std::fputs((output_options.json ? PhotonReport(path) : PhotonPathText(path)).c_str(), stdout);
   return absl::OkStatus();
 }

@@ -64,9 +64,16 @@ std::unique_ptr<CoordinatorProcess> CoordinatorProcess::Doomed(const std::string
   return coordinator;
 }
 
-std::unique_ptr<ChildProcess> CoordinatorProcess::StartWorker() const {
-  return std::make_unique<ChildProcess>(
-      std::vector<std::string>{kBin + "/lucerna-worker", "--server", address_, "--threads", "1"});
+std::unique_ptr<ChildProcess> CoordinatorProcess::StartWorker(
+    std::vector<std::string> more_flags) const {
+  std::vector<std::string> command = {kBin + "/lucerna-worker", "--server", address_, "--threads",
+                                      "1"};
+  command.insert(command.end(), more_flags.begin(), more_flags.end());
+  return std::make_unique<ChildProcess>(std::move(command));
+}
+
+void CoordinatorProcess::UseSecurity(const TlsFiles& tls, const std::string& token) {
+  channel_ = MakeChannel({address_, tls, token});
 }
 
 StatusOr<std::string> CoordinatorProcess::TrySubmit(const SmallJob& job) {

@@ -10,6 +10,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include "proto/lucerna/v1/jobs.pb.h"
+#include "render/base/certificate.h"
 #include "render/base/digest.h"
 #include "render/base/status.h"
 #include "tests/support/process.h"
@@ -47,7 +48,11 @@ class CoordinatorProcess {
   [[nodiscard]] ChildProcess& process() { return *process_; }
   [[nodiscard]] const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
 
-  [[nodiscard]] std::unique_ptr<ChildProcess> StartWorker() const;
+  [[nodiscard]] std::unique_ptr<ChildProcess> StartWorker(
+      std::vector<std::string> more_flags = {}) const;
+
+  // From now on calls go over a connection of their own with these certificates and this token.
+  void UseSecurity(const TlsFiles& tls, const std::string& token);
 
   // The errors of these are those of the calls.
   // Uploads and submits; the job's id.
