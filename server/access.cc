@@ -161,6 +161,14 @@ Caller Access::CallerOf(const grpc::ServerContextBase& context) const {
   return caller;
 }
 
+std::string Access::LimitKeyOf(const grpc::CallbackServerContext& context) const {
+  const std::string name = CallerOf(context).name;
+  if (!name.empty()) return absl::StrCat("caller ", name);
+  // "ipv4:10.0.0.7:51234".
+  const std::string peer = context.peer();
+  return peer.substr(0, peer.rfind(':'));
+}
+
 Status Access::CheckOwns(const grpc::ServerContextBase& context, const std::string& job_id,
                          const std::string& owner) const {
   if (CallerOf(context).MayChangeWhatIsOf(owner)) return absl::OkStatus();

@@ -62,6 +62,10 @@ class Access {
   // The caller of a handler, which Check has let through.
   [[nodiscard]] Caller CallerOf(const grpc::ServerContextBase& context) const;
 
+  // Whose limits a call counts for: the caller's name, or for one without the address of its
+  // machine.
+  [[nodiscard]] std::string LimitKeyOf(const grpc::CallbackServerContext& context) const;
+
   // Whether the caller may change this job, or have its image: PERMISSION_DENIED unless they are
   // its owner or an admin.
   [[nodiscard]] Status CheckOwns(const grpc::ServerContextBase& context, const std::string& job_id,

@@ -49,6 +49,7 @@ Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<Du
       clock_(clock),
       instance_(InstanceName(clock)),
       state_(std::move(state)),
+      transfers_(clock, options_.transfers),
       blobs_(options_.max_store_bytes, state_ ? &state_->blobs() : nullptr),
       scheduler_(OptionsFor(options_, instance_)),
       intake_(blobs_, options_.max_job_bytes),
@@ -87,6 +88,7 @@ void Coordinator::Close() {
 
 void Coordinator::Tick() {
   scheduler_.Expire(clock_.Steady());
+  transfers_.Tick();
   StopPoisonedJobs();
   AnswerParked();
   if (state_ && clock_.Steady() >= save_unsaved_at_) {

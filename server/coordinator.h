@@ -31,6 +31,7 @@
 #include "server/job_intake.h"
 #include "server/job_runner.h"
 #include "server/job_table.h"
+#include "server/open_transfers.h"
 #include "server/parked_syncs.h"
 #include "server/pass_merger.h"
 #include "server/round_merger.h"
@@ -52,6 +53,7 @@ class Coordinator {
     std::string numeric_profile;
     RetentionLimits retention;
     double checkpoint_share = 0.01;  // of the time, in (0, 1]
+    OpenTransfers::Limits transfers;
   };
 
   // `state` is what outlives the process; nullptr: nothing does. Goes on with the jobs in it.
@@ -59,6 +61,7 @@ class Coordinator {
   ~Coordinator();
 
   [[nodiscard]] BlobStore& blobs() { return blobs_; }
+  [[nodiscard]] OpenTransfers& transfers() { return transfers_; }
 
   // Jobs ---------------------------------------------------------------------------------------
 
@@ -168,6 +171,7 @@ class Coordinator {
   const std::unique_ptr<DurableState> state_;
   // Held while files are added for a job, and while those without one are removed.
   Mutex files_mutex_;
+  OpenTransfers transfers_;
   BlobStore blobs_;
   Scheduler scheduler_;
   PassMerger passes_;

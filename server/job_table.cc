@@ -69,6 +69,15 @@ StatusOr<JobTable::Submitted> JobTable::Add(CheckedJob checked, WallTime submitt
     return absl::ResourceExhaustedError(
         absl::StrCat(queue_.size(), " jobs are waiting already; try again later"));
   }
+  const std::string& owner = checked.submission.owner;
+  const auto of_owner =
+      static_cast<std::size_t>(std::ranges::count_if(entries_, [&](const auto& e) {
+        return e.second.job.owner == owner && !e.second.job.life.has_ended();
+      }));
+  if (!owner.empty() && of_owner >= options_.max_waiting_of_owner) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        of_owner, " jobs of ", owner, " have not ended; wait for some, or cancel them"));
+  }
   const std::uint64_t serial = next_serial_;
   Entry entry;
   entry.serial = serial;

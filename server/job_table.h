@@ -64,6 +64,7 @@ class JobTable {
     // Makes what stands behind every job's id, so that none follows from another; absent: nothing.
     std::function<std::string()> random_part = {};
     std::size_t max_waiting = 256;
+    std::size_t max_waiting_of_owner = 128;  // of an owner that is known
     RetentionLimits retention;
     JobJournal* journal = nullptr;  // outlives the table; nullptr: jobs end with the process
   };

@@ -101,7 +101,7 @@ int Serve(const Flags& flags) {
   }
   Coordinator coordinator(flags.coordinator, clock, std::move(state));
   WorkPools pools;
-  AssetService assets(coordinator.blobs(), pools);
+  AssetService assets(coordinator.blobs(), pools, &coordinator.transfers(), **access);
   JobService jobs(coordinator, pools, SystemClock(), **access);
   ImageService images(coordinator, pools, **access);
   WorkerService workers(coordinator, pools, **access);

@@ -1,5 +1,6 @@
 #include "server/worker_service.h"
 
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -69,14 +70,23 @@ class SyncReactor final : public grpc::ServerUnaryReactor {
 
 class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchRequest> {
  public:
-  CommitReactor(Coordinator& coordinator, WorkPool& pool,
-                const grpc::CallbackServerContext* context, v1::CommitBatchResponse* response)
+  CommitReactor(Coordinator& coordinator, WorkPool& pool, const std::string& caller,
+                grpc::CallbackServerContext* context, v1::CommitBatchResponse* response)
       : coordinator_(coordinator), pool_(pool), context_(context), response_(response) {
+    StatusOr<std::unique_ptr<OpenTransfers::Transfer>> opened =
+        coordinator.transfers().Open(caller, [context] { context->TryCancel(); });
+    if (!opened.ok()) {
+      Finish(ToGrpc(opened.status()));
+      return;
+    }
+    transfer_ = *std::move(opened);
     StartRead(&part_);
   }
 
   void OnReadDone(bool ok) override {
+    transfer_->Progress();
     if (!ok) {
+      transfer_->Complete();
       pool_.Run(NeededByCaller(context_), [this](const Status& may_begin) {
         Finish(ToGrpc(may_begin.ok() ? Merge() : may_begin));
       });
@@ -122,6 +132,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
                                                      " bytes is too large for ", *rows,
                                                      " hitpoints or pixels"));
     }
+    LUCERNA_RETURN_IF_ERROR(transfer_->Announce(header.size_bytes()));
     collector_.emplace(digest, header.size_bytes());
     collector_->Reserve();
     return absl::OkStatus();
@@ -138,6 +149,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
   Coordinator& coordinator_;
   WorkPool& pool_;
   const grpc::CallbackServerContext* const context_;
+  std::unique_ptr<OpenTransfers::Transfer> transfer_;
   v1::CommitBatchResponse* const response_;
   v1::CommitBatchRequest part_;
   Delivery delivery_;
@@ -201,7 +213,8 @@ grpc::ServerWriteReactor<v1::Chunk>* WorkerService::FetchBlob(
 
 grpc::ServerReadReactor<v1::CommitBatchRequest>* WorkerService::CommitBatch(
     grpc::CallbackServerContext* context, v1::CommitBatchResponse* response) {
-  return new CommitReactor(coordinator_, pools_.commits, context, response);
+  return new CommitReactor(coordinator_, pools_.commits, access_.LimitKeyOf(*context), context,
+                           response);
 }
 
 grpc::ServerUnaryReactor* WorkerService::DescribeJob(grpc::CallbackServerContext* context,

@@ -64,6 +64,9 @@ std::unique_ptr<CoordinatorProcess> CoordinatorProcess::Doomed(const std::string
   return coordinator;
 }
 
+CoordinatorProcess::CoordinatorProcess(std::string address, Elsewhere /*tag*/)
+    : address_(std::move(address)), channel_(MakeChannel(address_)) {}
+
 std::unique_ptr<ChildProcess> CoordinatorProcess::StartWorker(
     std::vector<std::string> more_flags) const {
   std::vector<std::string> command = {kBin + "/lucerna-worker", "--server", address_, "--threads",

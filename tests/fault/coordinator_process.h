@@ -44,6 +44,10 @@ class CoordinatorProcess {
                                                     std::vector<std::string> flags,
                                                     const std::string& address);
 
+  // A user of a coordinator that the test has started itself; there is no process().
+  enum class Elsewhere {};
+  CoordinatorProcess(std::string address, Elsewhere tag);
+
   [[nodiscard]] const std::string& address() const { return address_; }
   [[nodiscard]] ChildProcess& process() { return *process_; }
   [[nodiscard]] const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }

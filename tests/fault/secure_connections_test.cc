@@ -119,6 +119,31 @@ TEST(SecureConnectionsTest, AnExpiredCertificateIsRefusedOnBothSides) {
   EXPECT_TRUE(Says(server, "this certificate expired at 20")) << server.errors;
 }
 
+TEST(SecureConnectionsTest, FilesThatCannotBeUsedAreNamed) {
+  const DevelopmentCertificates certificates;
+  const TlsFiles good = certificates.Of("client");
+  const TlsFiles other = certificates.Of("worker");
+  const auto error_of = [](const TlsFiles& files) {
+    const Finished told = ListJobs("127.0.0.1:1", Flags(files));
+    EXPECT_EQ(told.exit_code, 2) << told.errors;
+    return told.errors;
+  };
+  EXPECT_NE(error_of({good.authority, good.certificate, other.key})
+                .find("this key is not that of the certificate in"),
+            std::string::npos);
+  EXPECT_NE(error_of({good.authority, good.certificate, good.key + "x"}).find("--tls-key "),
+            std::string::npos);
+  EXPECT_NE(error_of({good.key, good.certificate, good.key})
+                .find("there is no certificate in PEM form in this file"),
+            std::string::npos);
+  EXPECT_NE(error_of({good.authority, good.certificate, good.certificate})
+                .find("there is no private key without passphrase in PEM form"),
+            std::string::npos);
+  const Finished half = ListJobs("127.0.0.1:1", {"--tls-ca", good.authority});
+  EXPECT_EQ(half.exit_code, 2);
+  EXPECT_NE(half.errors.find("--tls-cert is missing"), std::string::npos) << half.errors;
+}
+
 TEST(SecureConnectionsTest, CertificatesAreReadAgainAndConnectionsStay) {
   DevelopmentCertificates certificates;
   const DevelopmentCertificates next;
