@@ -24,6 +24,7 @@ namespace {
 
 constexpr int kTickMs = 100;
 constexpr int kBacklog = 1024;
+constexpr int kSweepEvery = 1024;  // connections, so that addresses that left are forgotten
 constexpr rlim_t kMostDescriptors = rlim_t{1} << 20;
 
 Status SystemError(const std::string& what) {
@@ -197,14 +198,24 @@ void Acceptor::Take(int listener) {
   options_.on_connection(listener, connection);
 }
 
-bool Acceptor::IsFull(const std::string& peer) {
-  std::vector<Open>& open = connections_[peer];
-  if (open.size() < options_.max_connections_per_address) return false;
-  // gRPC closes connections without a word: those whose number is another file by now, or none.
-  std::erase_if(open, [](const Open& connection) {
+void Acceptor::DropClosed(std::vector<Open>& connections) {
+  // Closed without a word: their number is another file by now, or none.
+  std::erase_if(connections, [](const Open& connection) {
     struct stat facts {};
     return ::fstat(connection.descriptor, &facts) != 0 || facts.st_ino != connection.inode;
   });
+}
+
+bool Acceptor::IsFull(const std::string& peer) {
+  if (++accepted_since_sweep_ >= kSweepEvery) {
+    accepted_since_sweep_ = 0;
+    for (auto& [address, open] : connections_)
+      DropClosed(open);
+    std::erase_if(connections_, [](const auto& each) { return each.second.empty(); });
+  }
+  std::vector<Open>& open = connections_[peer];
+  if (open.size() < options_.max_connections_per_address) return false;
+  DropClosed(open);
   if (open.size() < options_.max_connections_per_address) return false;
   static SteadyTime said_at;
   const SteadyTime now = SystemClock().Steady();

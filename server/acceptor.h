@@ -63,6 +63,8 @@ class Acceptor {
   void Take(int listener);
   // Whether the address has so many connections that it may have no other.
   bool IsFull(const std::string& peer);
+  // Drops the connections that gRPC has closed meanwhile.
+  static void DropClosed(std::vector<Open>& connections);
   void SetScarce(bool is_scarce);
   // The first number that is not for connections.
   [[nodiscard]] int FirstSpare() const;
@@ -73,7 +75,8 @@ class Acceptor {
   std::atomic<bool> is_stopped_ = false;
   bool is_scarce_ = false;
   std::map<std::string, std::vector<Open>> connections_;  // by address without port
-  std::thread thread_;                                    // last: it uses all of the above
+  int accepted_since_sweep_ = 0;
+  std::thread thread_;  // last: it uses all of the above
 };
 
 }  // namespace lucerna

@@ -34,6 +34,9 @@ constexpr int kLongestBackoffMs = 2'000;
 // How often certificates are looked at.
 constexpr unsigned int kRereadEveryS = 2;
 
+// Of one connection: a program that watches a thousand jobs needs no other.
+constexpr int kMostStreams = 4096;
+
 constexpr std::size_t kMaxTokenBytes = 4096;
 
 // Adds the token to every call. gRPC's own way to do so refuses connections in the clear, loopback
@@ -176,8 +179,7 @@ void SetUpConnections(grpc::ServerBuilder& builder) {
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS,
                              kPingAllowedEveryMs);
-  // Two coordinators on one port would share the connections between them.
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, kMostStreams);
 }
 
 std::shared_ptr<grpc::ServerCredentials> MakeServerCredentials(const TlsFiles& tls,

@@ -102,6 +102,7 @@ StatusOr<std::string> CoordinatorProcess::TrySubmit(const SmallJob& job) {
   }
   v1::SubmitRequest request;
   request.set_request_id(job.request_id);
+  request.set_name(job.name);
   *request.mutable_scene() = ToProto(manifest);
   RenderOverrides overrides;
   overrides.passes = job.passes;
@@ -139,9 +140,10 @@ Status CoordinatorProcess::TryDelete(const std::string& job_id) {
   return FromGrpc(v1::JobService::NewStub(channel_)->Delete(&context, request, &response));
 }
 
-std::string CoordinatorProcess::Submit(const std::string& scene, int passes, std::int64_t photons) {
+std::string CoordinatorProcess::Submit(const std::string& scene, int passes, std::int64_t photons,
+                                       const std::string& name) {
   const StatusOr<std::string> job =
-      TrySubmit({.scene = scene, .passes = passes, .photons = photons});
+      TrySubmit({.scene = scene, .passes = passes, .photons = photons, .name = name});
   EXPECT_TRUE(job.ok()) << job.status();
   return job.value_or("");
 }

@@ -31,6 +31,7 @@ struct SmallJob {
   int passes = 6;
   std::int64_t photons = 400'000;  // a pass
   std::string request_id = "the only one";
+  std::string name = {};  // empty: the scene's
 };
 
 class CoordinatorProcess {
@@ -66,7 +67,8 @@ class CoordinatorProcess {
   [[nodiscard]] Status TryDelete(const std::string& job_id);
 
   // These must succeed.
-  std::string Submit(const std::string& scene, int passes, std::int64_t photons);
+  std::string Submit(const std::string& scene, int passes, std::int64_t photons,
+                     const std::string& name = {});
   v1::Job Get(const std::string& job_id);
   std::vector<v1::Job> List();
   // The job when it has ended, or as it is after some minutes.
