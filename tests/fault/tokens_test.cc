@@ -7,12 +7,16 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "gtest/gtest.h"
 #include <google/protobuf/descriptor.h>
+#include <google/protobuf/descriptor.pb.h>
+#include <google/protobuf/dynamic_message.h>
 #include <grpcpp/generic/generic_stub.h>
 #include <grpcpp/grpcpp.h>
 #include <signal.h>
@@ -54,28 +58,60 @@ class TokensFile {
   TemporaryFolder folder_;
 };
 
-// All methods of all services of the protocol, "/package.Service/Method".
-std::vector<std::string> AllMethods() {
-  std::vector<std::string> methods;
-  const std::string folder = LUCERNA_SOURCE_DIR "/proto/lucerna/v1";
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string text = ReadFile(entry.path().string()).value();
-    if (text.find("\nservice ") == std::string::npos) continue;
-    const google::protobuf::FileDescriptor* const file =
-        google::protobuf::DescriptorPool::generated_pool()->FindFileByName(
-            "proto/lucerna/v1/" + entry.path().filename().string());
-    EXPECT_NE(file, nullptr) << entry.path() << " is not linked into this test";
-    for (int s = 0; file != nullptr && s < file->service_count(); ++s) {
-      const google::protobuf::ServiceDescriptor& service = *file->service(s);
-      for (int m = 0; m < service.method_count(); ++m)
-        methods.push_back("/" + service.full_name() + "/" + service.method(m)->name());
+// The protocol as its source files say.
+class Protocol {
+ public:
+  Protocol() {
+    std::vector<std::string> command = {"/usr/bin/protoc", "-I", LUCERNA_SOURCE_DIR,
+                                        "--include_imports",
+                                        "--descriptor_set_out=" + folder_.At("protocol")};
+    for (const auto& entry :
+         std::filesystem::directory_iterator(LUCERNA_SOURCE_DIR "/proto/lucerna/v1"))
+      command.push_back(entry.path().string());
+    const Finished compiled = RunProgram(command);
+    EXPECT_EQ(compiled.exit_code, 0) << compiled.errors;
+    google::protobuf::FileDescriptorSet files;
+    EXPECT_TRUE(files.ParseFromString(ReadFile(folder_.At("protocol")).value_or("")));
+    // Imports come before the files that need them.
+    for (const google::protobuf::FileDescriptorProto& each : files.file()) {
+      const google::protobuf::FileDescriptor* const file = pool_.BuildFile(each);
+      EXPECT_NE(file, nullptr) << each.name();
+      for (int s = 0; file != nullptr && s < file->service_count(); ++s) {
+        for (int m = 0; m < file->service(s)->method_count(); ++m)
+          methods_.push_back(file->service(s)->method(m));
+      }
     }
   }
-  return methods;
-}
 
-// Calls any method with an empty stream of requests.
-grpc::Status CallEmpty(const std::shared_ptr<grpc::Channel>& channel, const std::string& method) {
+  [[nodiscard]] const std::vector<const google::protobuf::MethodDescriptor*>& methods() const {
+    return methods_;
+  }
+  // "/package.Service/Method".
+  static std::string PathOf(const google::protobuf::MethodDescriptor& method) {
+    return "/" + method.service()->full_name() + "/" + method.name();
+  }
+  // A request with this job's id, as bytes; absent for methods that are not about one job.
+  std::optional<std::string> RequestFor(const google::protobuf::MethodDescriptor& method,
+                                        const std::string& job_id) {
+    const google::protobuf::FieldDescriptor* const field =
+        method.input_type()->FindFieldByName("job_id");
+    if (field == nullptr) return std::nullopt;
+    const std::unique_ptr<google::protobuf::Message> request(
+        factory_.GetPrototype(method.input_type())->New());
+    request->GetReflection()->SetString(request.get(), field, job_id);
+    return request->SerializeAsString();
+  }
+
+ private:
+  TemporaryFolder folder_;
+  google::protobuf::DescriptorPool pool_;
+  google::protobuf::DynamicMessageFactory factory_;
+  std::vector<const google::protobuf::MethodDescriptor*> methods_;
+};
+
+// Calls any method, with one request or an empty stream of them.
+grpc::Status Call(const std::shared_ptr<grpc::Channel>& channel, const std::string& method,
+                  const std::optional<std::string>& request) {
   grpc::GenericStub stub(channel);
   grpc::ClientContext context;
   context.set_deadline(DeadlineIn(kPatience));
@@ -88,6 +124,11 @@ grpc::Status CallEmpty(const std::shared_ptr<grpc::Channel>& channel, const std:
   const auto call = stub.PrepareCall(&context, method, &queue);
   call->StartCall(nullptr);
   wait();
+  if (request) {
+    const grpc::Slice slice(*request);
+    call->Write(grpc::ByteBuffer(&slice, 1), nullptr);
+    wait();
+  }
   call->WritesDone(nullptr);
   wait();
   grpc::Status status;
@@ -96,20 +137,25 @@ grpc::Status CallEmpty(const std::shared_ptr<grpc::Channel>& channel, const std:
   return status;
 }
 
+grpc::Status CallEmpty(const std::shared_ptr<grpc::Channel>& channel, const std::string& method) {
+  return Call(channel, method, std::nullopt);
+}
+
 std::shared_ptr<grpc::Channel> ChannelOf(const CoordinatorProcess& coordinator,
                                          const std::string& name) {
   return MakeChannel({coordinator.address(), {}, name.empty() ? "" : "token-of-" + name});
 }
 
 TEST(TokensTest, EveryMethodHasARuleAndKeepsIt) {
-  const std::vector<std::string> methods = AllMethods();
-  ASSERT_GE(methods.size(), 17U);
+  const Protocol protocol;
+  ASSERT_GE(protocol.methods().size(), 17U);
   const TokensFile tokens;
   CoordinatorProcess coordinator({"--tokens", tokens.path()});
   const std::map<std::string, Roles> callers = {{"alice", static_cast<Roles>(Role::kSubmit)},
                                                 {"farm", static_cast<Roles>(Role::kWork)},
                                                 {"root", static_cast<Roles>(Role::kAdmin)}};
-  for (const std::string& method : methods) {
+  for (const auto* const described : protocol.methods()) {
+    const std::string method = Protocol::PathOf(*described);
     const std::optional<MethodRule> rule = RuleOf(method);
     ASSERT_TRUE(rule) << method << ": what role does it need? (server/access.cc)";
     EXPECT_FALSE(rule->is_open) << method;
@@ -181,6 +227,29 @@ TEST(TokensTest, AJobIsChangedByItsOwnerAndByAdmins) {
   EXPECT_EQ(code_of_cancel(coordinator, "bob"), StatusCode::PERMISSION_DENIED);
   EXPECT_EQ(code_of_cancel(coordinator, "alice"), StatusCode::OK);
   EXPECT_EQ(code_of_cancel(coordinator, "root"), StatusCode::OK);
+}
+
+// Also of methods that are added later: whatever is about one job and not only shows it.
+TEST(TokensTest, NoMethodThatChangesAJobIsForOthers) {
+  Protocol protocol;
+  const TokensFile tokens;
+  CoordinatorProcess coordinator({"--tokens", tokens.path()});
+  coordinator.UseSecurity({}, "token-of-alice");
+  const std::string job = coordinator.Submit("glass-box.pbrt", 2, 10'000);
+  const std::set<std::string> only_show = {"/lucerna.v1.JobService/Get",
+                                           "/lucerna.v1.JobService/Watch"};
+  int changing = 0;
+  for (const auto* const method : protocol.methods()) {
+    const std::string path = Protocol::PathOf(*method);
+    const std::optional<std::string> request = protocol.RequestFor(*method, job);
+    const std::optional<MethodRule> rule = RuleOf(path);
+    if (!request || !rule || !Has(rule->roles, Role::kSubmit) || only_show.contains(path)) continue;
+    ++changing;
+    EXPECT_EQ(Call(ChannelOf(coordinator, "bob"), path, request).error_code(),
+              StatusCode::PERMISSION_DENIED)
+        << path;
+  }
+  EXPECT_GE(changing, 6) << "stop, extend, cancel, delete, the image, and what photons need";
 }
 
 TEST(TokensTest, AWorkerNeedsATokenAndRendersWithIt) {

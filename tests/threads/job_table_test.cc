@@ -132,6 +132,7 @@ TEST(JobTableTest, AnIdHasARandomPartAndEachOwnerHasRequestIdsOfTheirOwn) {
   JobTable::Options options = SmallTable();
   int random = 0;
   options.random_part = [&random] { return "r" + std::to_string(++random); };
+  options.max_waiting = 10;
   options.max_waiting_of_owner = 2;
   JobTable table(options);
   const auto add = [&table](const std::string& request_id, const std::string& owner) {
