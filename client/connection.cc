@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "client/exit_code.h"
+#include "client/foreign_text.h"
 #include "client/interruption.h"
 #include "client/view/progress_view.h"
 #include "render/base/clock.h"
@@ -17,15 +18,15 @@
 #include "render/wire/chunks.h"
 #include "render/wire/grpc_status.h"
 #include "render/wire/messages.h"
+#include "render/wire/stall_guard.h"
 
 namespace lucerna {
 namespace {
 
+// For a coordinator that is just being started.
 constexpr std::chrono::seconds kConnectTime{3};
-// A large scene is parsed before a submission is answered.
-constexpr std::chrono::seconds kSubmitTime{300};
-// A blob or an image of gigabytes over a slow line.
-constexpr std::chrono::seconds kStreamTime{1800};
+// For one that is far away: the connection is being made, and nothing has gone wrong yet.
+constexpr std::chrono::seconds kSlowConnectTime{30};
 // A watch that lasts longer is opened again.
 constexpr std::chrono::seconds kWatchTime{3600};
 constexpr std::chrono::milliseconds kFirstPause{100};
@@ -77,6 +78,7 @@ class WatchStream {
   void ReadAll() {
     v1::Job job;
     while (reader_->Read(&job)) {
+      EscapeTexts(job);
       const MutexLock lock(mutex_);
       news_.job = job;
       changed_.NotifyAll();
@@ -97,35 +99,61 @@ class WatchStream {
 
 }  // namespace
 
-ClientConnection::ClientConnection(std::string address,
-                                   const std::shared_ptr<grpc::Channel>& channel)
-    : address_(std::move(address)),
+ClientConnection::ClientConnection(Endpoint endpoint, const std::shared_ptr<grpc::Channel>& channel)
+    : endpoint_(std::move(endpoint)),
       admin_(v1::AdminService::NewStub(channel)),
       assets_(v1::AssetService::NewStub(channel)),
       jobs_(v1::JobService::NewStub(channel)),
       images_(v1::ImageService::NewStub(channel)) {}
 
-StatusOr<std::unique_ptr<ClientConnection>> ClientConnection::Open(const std::string& address) {
-  if (!IsAddress(address)) {
-    return Failure(ExitCode::kUsage,
-                   absl::StrCat("--server \"", address, "\": give host:port, like 127.0.0.1:7400"));
+StatusOr<std::unique_ptr<ClientConnection>> ClientConnection::Open(const Endpoint& endpoint) {
+  if (!IsAddress(endpoint.address)) {
+    return Failure(ExitCode::kUsage, absl::StrCat("--server \"", endpoint.address,
+                                                  "\": give host:port, like 127.0.0.1:7400"));
   }
-  const std::shared_ptr<grpc::Channel> channel = MakeChannel(address);
-  auto connection = std::unique_ptr<ClientConnection>(new ClientConnection(address, channel));
-  const WallTime give_up = SystemClock().Wall() + kConnectTime;
-  while (!channel->WaitForConnected(SystemClock().Wall() + kTick)) {
+  if (const Status security = CheckSecurity(endpoint); !security.ok()) {
+    return Failure(ExitCode::kUsage, std::string(security.message()));
+  }
+  const std::shared_ptr<grpc::Channel> channel = MakeChannel(endpoint);
+  auto connection = std::unique_ptr<ClientConnection>(new ClientConnection(endpoint, channel));
+  const SteadyTime begin = SystemClock().Steady();
+  while (!channel->WaitForConnected(DeadlineIn(kTick))) {
     if (IsInterrupted()) return Interrupted();
-    if (SystemClock().Wall() > give_up) return connection->Unreachable();
+    const Duration waited = SystemClock().Steady() - begin;
+    const bool is_connecting = channel->GetState(false) == GRPC_CHANNEL_CONNECTING;
+    if (waited > (is_connecting ? kSlowConnectTime : kConnectTime)) {
+      return connection->Unreachable(connection->WhyNotConnected());
+    }
   }
   return connection;
 }
 
-Status ClientConnection::Unreachable() const {
-  return Failure(ExitCode::kUnreachable, absl::StrCat("cannot reach the coordinator at ", address_,
-                                                      "; is lucerna-server running there?"));
+std::string ClientConnection::WhyNotConnected() {
+  // A channel has a state but no reason; a call has one.
+  grpc::ClientContext context;
+  context.set_deadline(DeadlineIn(kTick));
+  v1::Job job;
+  return jobs_->Get(&context, v1::GetJobRequest(), &job).error_message();
 }
 
-Status ClientConnection::Retry(std::chrono::seconds time_for_one,
+Status ClientConnection::Said(const grpc::Status& status) const {
+  if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED) {
+    return absl::UnimplementedError(
+        absl::StrCat("the coordinator does not offer this at ", endpoint_.address,
+                     "; is it of another version, or is that its address for workers?"));
+  }
+  return FromGrpc(status);
+}
+
+Status ClientConnection::Unreachable(const std::string& grpc_message) const {
+  const std::string tls = ExplainTls(endpoint_, grpc_message);
+  if (!tls.empty()) return Failure(ExitCode::kUnreachable, tls);
+  return Failure(ExitCode::kUnreachable,
+                 absl::StrCat("cannot reach the coordinator at ", endpoint_.address,
+                              "; is lucerna-server running there?"));
+}
+
+Status ClientConnection::Retry(Duration time_for_one,
                                const std::function<grpc::Status(grpc::ClientContext&)>& call) {
   std::chrono::milliseconds pause = kFirstPause;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
@@ -138,7 +166,7 @@ Status ClientConnection::Retry(std::chrono::seconds time_for_one,
     if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) return Unreachable();
     const bool again = IsWorthAnotherAttempt(status.error_code()) ||
                        status.error_code() == grpc::StatusCode::DATA_LOSS;
-    if (!again) return FromGrpc(status);
+    if (!again) return Said(status);
     SleepUnlessInterrupted(pause);
     pause = std::min(2 * pause, kLongestPause);
   }
@@ -175,7 +203,8 @@ Status ClientConnection::Upload(const SceneManifest& manifest, SceneFiles& files
 }
 
 Status ClientConnection::UploadBlob(const Digest& digest, std::string_view bytes) {
-  return Retry(kStreamTime, [&](grpc::ClientContext& context) {
+  return Retry(kNoDeadline, [&](grpc::ClientContext& context) {
+    StallGuard guard(context, kLongestSilence, IsInterrupted);
     v1::UploadResponse response;
     const auto writer = assets_->Upload(&context, &response);
     v1::UploadRequest request;
@@ -184,10 +213,10 @@ Status ClientConnection::UploadBlob(const Digest& digest, std::string_view bytes
     bool is_open = writer->Write(request);
     std::string_view rest = bytes;
     while (is_open && !rest.empty()) {
-      if (IsInterrupted()) context.TryCancel();
       request.set_bytes(std::string(NextChunk(rest)));
       // Waits while the other side is busy; false when the call is over, and Finish says why.
       is_open = writer->Write(request);
+      guard.Progress();
     }
     writer->WritesDone();
     return writer->Finish();
@@ -196,9 +225,13 @@ Status ClientConnection::UploadBlob(const Digest& digest, std::string_view bytes
 
 StatusOr<v1::SubmitResponse> ClientConnection::Submit(const v1::SubmitRequest& request) {
   v1::SubmitResponse response;
-  LUCERNA_RETURN_IF_ERROR(Retry(kSubmitTime, [&](grpc::ClientContext& context) {
+  // A large scene is read before the answer comes, which takes what it takes while the coordinator
+  // lives.
+  LUCERNA_RETURN_IF_ERROR(Retry(kNoDeadline, [&](grpc::ClientContext& context) {
+    const StallGuard guard(context, kNoDeadline, IsInterrupted);
     return jobs_->Submit(&context, request, &response);
   }));
+  EscapeTexts(response);
   return response;
 }
 
@@ -211,8 +244,10 @@ StatusOr<std::vector<v1::Job>> ClientConnection::List() {
     LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
       return jobs_->List(&context, request, &response);
     }));
-    for (v1::Job& job : *response.mutable_jobs())
+    for (v1::Job& job : *response.mutable_jobs()) {
+      EscapeTexts(job);
       jobs.push_back(std::move(job));
+    }
     // A page that leads back to itself would never end.
     if (response.next_page_token().empty() || response.next_page_token() == request.page_token()) {
       return jobs;
@@ -234,6 +269,7 @@ StatusOr<v1::Job> ClientConnection::Get(const std::string& job_id) {
   LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
     return jobs_->Get(&context, request, &job);
   }));
+  EscapeTexts(job);
   return job;
 }
 
@@ -244,6 +280,7 @@ StatusOr<v1::Job> ClientConnection::Stop(const std::string& job_id) {
   LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
     return jobs_->Stop(&context, request, &job);
   }));
+  EscapeTexts(job);
   return job;
 }
 
@@ -272,6 +309,7 @@ StatusOr<v1::Job> ClientConnection::Extend(const std::string& job_id,
   LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
     return jobs_->Extend(&context, request, &job);
   }));
+  EscapeTexts(job);
   return job;
 }
 
@@ -317,7 +355,8 @@ StatusOr<v1::Job> ClientConnection::Cancel(const std::string& job_id) {
       status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED) {
     return Unreachable();
   }
-  LUCERNA_RETURN_IF_ERROR(FromGrpc(status));
+  LUCERNA_RETURN_IF_ERROR(Said(status));
+  EscapeTexts(job);
   return job;
 }
 
@@ -341,7 +380,7 @@ StatusOr<v1::Job> ClientConnection::Watch(const std::string& job_id, const OnJob
       const grpc::StatusCode code = news.ended->error_code();
       if (!news.ended->ok() && code != grpc::StatusCode::DEADLINE_EXCEEDED &&
           !IsWorthAnotherAttempt(code)) {
-        return FromGrpc(*news.ended);
+        return Said(*news.ended);
       }
       break;
     }
@@ -357,14 +396,16 @@ StatusOr<std::string> ClientConnection::GetImage(const std::string& job_id,
   request.set_job_id(job_id);
   std::string bytes;
   bool is_too_long = false;
-  const Status status = Retry(kStreamTime, [&](grpc::ClientContext& context) {
+  const Status status = Retry(kNoDeadline, [&](grpc::ClientContext& context) {
     // Not a code that is worth another attempt.
     const grpc::Status given_up(grpc::StatusCode::ABORTED, "nobody waits for the image any more");
     if (gives_up()) return given_up;
     bytes.clear();
+    StallGuard guard(context, kLongestSilence, [&] { return IsInterrupted() || gives_up(); });
     const auto reader = images_->GetImage(&context, request);
     v1::Chunk chunk;
     while (!is_too_long && reader->Read(&chunk)) {
+      guard.Progress();
       bytes += chunk.bytes();
       is_too_long = bytes.size() > kMaxImageBytes;
       if (is_too_long || IsInterrupted() || gives_up()) context.TryCancel();

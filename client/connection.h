@@ -4,6 +4,8 @@
 // own request_id) are tried again with growing pauses when the coordinator is starting, draining
 // or out of reach for a moment; a broken Watch is opened again.
 //
+// Texts in what it returns are escaped (client/foreign_text.h).
+//
 // Errors of every call: Failure(kUnreachable) when the coordinator stays silent,
 // Failure(kInterrupted) when the user ended the program, else what the coordinator said.
 #pragma once
@@ -22,14 +24,16 @@
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
+#include "render/wire/channel.h"
 
 namespace lucerna {
 
 class ClientConnection {
  public:
-  // Connects to `address` ("host:port"), and waits a few seconds for it.
-  // Errors: also Failure(kUsage) for an address that is none.
-  [[nodiscard]] static StatusOr<std::unique_ptr<ClientConnection>> Open(const std::string& address);
+  // Connects, and waits a few seconds for a coordinator that is not there, longer for a slow line.
+  // Errors: also Failure(kUsage) for an address that is none, or for certificates or a token that
+  // cannot be used.
+  [[nodiscard]] static StatusOr<std::unique_ptr<ClientConnection>> Open(const Endpoint& endpoint);
 
   // Brings the files of `manifest` that the coordinator does not have. `files` reads them anew.
   // Errors: FAILED_PRECONDITION when a file is no longer what the manifest says.
@@ -61,24 +65,30 @@ class ClientConnection {
   [[nodiscard]] StatusOr<v1::Job> Watch(const std::string& job_id, const OnJob& on_job);
 
   // The bytes of the job's EXR file. Whoever may lose interest says so by `gives_up`, which is
-  // asked at every piece that arrives; then ABORTED. Threads: any, beside other calls.
+  // called several times a second, also from another thread; then ABORTED. Threads: any, beside
+  // other calls.
   [[nodiscard]] StatusOr<std::string> GetImage(
       const std::string& job_id, const std::function<bool()>& gives_up = [] { return false; });
 
  private:
-  ClientConnection(std::string address, const std::shared_ptr<grpc::Channel>& channel);
+  ClientConnection(Endpoint endpoint, const std::shared_ptr<grpc::Channel>& channel);
 
   // Makes `call` until it succeeds or trying again makes no sense.
-  [[nodiscard]] Status Retry(std::chrono::seconds time_for_one,
+  [[nodiscard]] Status Retry(Duration time_for_one,
                              const std::function<grpc::Status(grpc::ClientContext&)>& call);
   [[nodiscard]] Status UploadBlob(const Digest& digest, std::string_view bytes);
-  [[nodiscard]] Status Unreachable() const;
+  // What gRPC says of a connection that could not be made.
+  [[nodiscard]] std::string WhyNotConnected();
+  // What the coordinator said.
+  [[nodiscard]] Status Said(const grpc::Status& status) const;
+  [[nodiscard]] Status Unreachable(const std::string& grpc_message = "") const;
 
-  std::string address_;
   using OrderWorker = grpc::Status (v1::AdminService::Stub::*)(grpc::ClientContext*,
                                                                const v1::WorkerRequest&,
                                                                v1::Worker*);
   [[nodiscard]] StatusOr<v1::Worker> Order(OrderWorker order, const std::string& worker_id);
+
+  const Endpoint endpoint_;
   std::unique_ptr<v1::AdminService::Stub> admin_;
   std::unique_ptr<v1::AssetService::Stub> assets_;
   std::unique_ptr<v1::JobService::Stub> jobs_;

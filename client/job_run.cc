@@ -15,21 +15,13 @@
 #include "client/view/terminal.h"
 #include "render/base/clock.h"
 #include "render/base/files.h"
+#include "render/base/random_id.h"
 #include "render/image/exr_file.h"
 #include "render/scene/setting_table.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {
 namespace {
-
-// Unlike any other submission's, so that only a retry of this one finds its job.
-std::string NewRequestId(const SceneManifest& manifest) {
-  char host[65] = {};
-  ::gethostname(host, sizeof(host) - 1);
-  const Digest digest = Sha256(absl::StrCat(manifest.SceneDigest().Hex(), host, "/", ::getpid(),
-                                            "/", SystemClock().Wall().time_since_epoch().count()));
-  return digest.Hex();
-}
 
 // Whether a job is of this scene, and of all settings that are given and decide its pixels.
 Status CheckSameRender(const v1::Job& job, const RenderSettings& settings,
@@ -98,7 +90,8 @@ StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& f
     LUCERNA_ASSIGN_OR_RETURN(const Digest digest, connection.UploadBytes(reference));
     request.set_reference_digest(std::string(digest.Bytes()));
   }
-  request.set_request_id(NewRequestId(manifest));
+  // Only a retry of this submission has it, and finds its job.
+  request.set_request_id(RandomId());
   *request.mutable_scene() = ToProto(manifest);
   *request.mutable_overrides() = ToProto(overrides);
   return connection.Submit(request);
@@ -150,7 +143,8 @@ StatusOr<std::unique_ptr<LocalRuns>> LocalRuns::Start(const ClusterOptions& opti
   auto runs = std::unique_ptr<LocalRuns>(new LocalRuns());
   runs->has_state_ = !options.state_folder.empty();
   LUCERNA_ASSIGN_OR_RETURN(runs->cluster_, LocalCluster::Start(options));
-  LUCERNA_ASSIGN_OR_RETURN(runs->connection_, ClientConnection::Open(runs->cluster_->address()));
+  LUCERNA_ASSIGN_OR_RETURN(runs->connection_,
+                           ClientConnection::Open(Endpoint{runs->cluster_->address()}));
   return runs;
 }
 

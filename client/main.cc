@@ -15,6 +15,7 @@
 #include "client/commands/photon_command.h"
 #include "client/commands/plan_command.h"
 #include "client/commands/reference_command.h"
+#include "client/commands/token_command.h"
 #include "client/commands/worker_commands.h"
 #include "client/exit_code.h"
 #include "client/interruption.h"
@@ -22,7 +23,11 @@
 #include "client/render_flags.h"
 #include "client/selfcheck/selfcheck.h"
 #include "client/view/preview.h"
+#include "render/base/escape.h"
 #include "render/base/version.h"
+#include "render/wire/channel.h"
+#include "render/wire/grpc_log.h"
+#include "render/wire/security_flags.h"
 
 namespace lucerna {
 namespace {
@@ -48,7 +53,10 @@ int Run(int argc, char** argv) {
   RenderOverrides until;
   PhotonRequest photon;
   RenderOverrides planned;
-  std::string server = "127.0.0.1:7400";
+  Endpoint server{"127.0.0.1:7400"};
+  std::string token_file;
+  std::string token_name;
+  std::string token_roles = "submit";
   std::string job_id;
   std::string worker_id;
   std::optional<WorkerOrder> worker_order;
@@ -86,9 +94,12 @@ int Run(int argc, char** argv) {
     to->add_flag("--no-preview", hides_preview, "do not show the image on a terminal with colours");
   };
   const auto add_server = [&](CLI::App* to) {
-    to->add_option("--server", server, "the coordinator, as host:port")
+    to->add_option("--server", server.address, "the coordinator, as host:port")
         ->envname("LUCERNA_SERVER")
         ->capture_default_str();
+    AddTlsFlags(*to, server.tls, /*reads_environment=*/true);
+    to->add_option("--token-file", token_file,
+                   "file that holds your token (default: what LUCERNA_TOKEN says)");
   };
   const auto add_image_flags = [](CLI::App* to, RenderOverrides& overrides) {
     AddSettingFlags(*to, SettingRole::kDecidesPixels, overrides);
@@ -186,6 +197,7 @@ int Run(int argc, char** argv) {
         LUCERNA_RETURN_IF_ERROR(find_programs());
         photon.job_id = job_id;
         photon.program_folder = cluster.program_folder;
+        photon.token_file = token_file;
         return TracePhoton(photon, server, output_options);
       });
   trace_photon->add_option("JOB", job_id, "the job's id; it may have ended")->required();
@@ -299,6 +311,16 @@ int Run(int argc, char** argv) {
   add_json(selfcheck);
   add_quiet(selfcheck);
 
+  CLI::App* tokens = app.add_subcommand("token", "tokens of users and workers");
+  tokens->require_subcommand(1);
+  CLI::App* new_token = tokens->add_subcommand("new", "make a token, and the line that accepts it");
+  new_token->callback(
+      [&] { chosen = [&] { return NewToken(token_name, token_roles, output_options); }; });
+  new_token->add_option("NAME", token_name, "whose it is")->required();
+  new_token->add_option("--roles", token_roles, "submit, work or admin, with commas between them")
+      ->capture_default_str();
+  add_json(new_token);
+
   CLI::App* help = command("help", "explain a command, or all settings of a job", [&]() -> Status {
     if (topic == "settings") {
       std::fputs(SettingsTable().c_str(), stdout);
@@ -354,13 +376,23 @@ int Run(int argc, char** argv) {
   output_options.redraws = term != nullptr && std::string(term) != "dumb";
   output_options.previews = !hides_preview && HasColors(std::getenv("COLORTERM"), term);
 
+  StatusOr<std::string> token = ReadToken(token_file, std::getenv("LUCERNA_TOKEN"));
+  if (!token.ok()) {
+    std::fprintf(stderr, "lucerna: --token-file %s\n",
+                 std::string(token.status().message()).c_str());
+    return End(ExitCode::kUsage);
+  }
+  server.token = *std::move(token);
+
   CatchInterruptions();
+  IgnoreGrpcLog();
   Status status = chosen();
   if (std::fflush(stdout) != 0 && status.ok()) {
     status = absl::ResourceExhaustedError("cannot write to the standard output");
   }
   if (!status.ok()) {
-    std::fprintf(stderr, "lucerna: %s\n", WithFlagNames(std::string(status.message())).c_str());
+    std::fprintf(stderr, "lucerna: %s\n",
+                 EscapedLines(WithFlagNames(std::string(status.message()))).c_str());
   }
   return End(ExitCodeOf(status));
 }

@@ -6,6 +6,7 @@
 
 #include "client/exit_code.h"
 #include "client/render_flags.h"
+#include "render/base/escape.h"
 
 namespace lucerna {
 namespace {
@@ -56,7 +57,7 @@ StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
     const bool is_error = diagnostic.severity == Diagnostic::Severity::kError;
     errors += is_error ? 1 : 0;
     if (!is_error && (quiet || diagnostic.severity == Diagnostic::Severity::kNote)) continue;
-    std::fprintf(stderr, "%s\n", diagnostic.ToString().c_str());
+    std::fprintf(stderr, "%s\n", Escaped(diagnostic.ToString()).c_str());
   }
   if (!parsed.ok()) {
     return absl::InvalidArgumentError(absl::StrCat(path, " has ", errors,

@@ -8,7 +8,7 @@ packages=(
   libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc libssl-dev
   libembree-dev libtbb-dev
   libopenexr-dev libstb-dev zlib1g-dev
-  libspdlog-dev libzstd-dev libcli11-dev nlohmann-json3-dev libsqlite3-dev
+  openssl libspdlog-dev libzstd-dev libcli11-dev nlohmann-json3-dev libsqlite3-dev
 )
 if [ "${1:-}" = tests ]; then
   packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3 chromium clang-format clang-tidy)

@@ -1,5 +1,6 @@
 #include "server/asset_service.h"
 
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -13,13 +14,25 @@ namespace {
 
 class UploadReactor final : public grpc::ServerReadReactor<v1::UploadRequest> {
  public:
-  UploadReactor(BlobStore& blobs, WorkPool& pool, const grpc::CallbackServerContext* context)
+  UploadReactor(BlobStore& blobs, WorkPool& pool, OpenTransfers* transfers,
+                const std::string& caller, grpc::CallbackServerContext* context)
       : blobs_(blobs), pool_(pool), context_(context) {
+    if (transfers != nullptr) {
+      StatusOr<std::unique_ptr<OpenTransfers::Transfer>> opened =
+          transfers->Open(caller, [context] { context->TryCancel(); });
+      if (!opened.ok()) {
+        Finish(ToGrpc(opened.status()));
+        return;
+      }
+      transfer_ = *std::move(opened);
+    }
     StartRead(&part_);
   }
 
   void OnReadDone(bool ok) override {
+    if (transfer_) transfer_->Progress();
     if (!ok) {
+      if (transfer_) transfer_->Complete();
       pool_.Run(NeededByCaller(context_), [this](const Status& may_begin) {
         Finish(ToGrpc(may_begin.ok() ? Keep() : may_begin));
       });
@@ -45,6 +58,7 @@ class UploadReactor final : public grpc::ServerReadReactor<v1::UploadRequest> {
           absl::StrCat("a file of ", part_.header().size_bytes(), " bytes is larger than the ",
                        SceneLimits().max_total_bytes, " that are allowed"));
     }
+    if (transfer_) LUCERNA_RETURN_IF_ERROR(transfer_->Announce(part_.header().size_bytes()));
     collector_.emplace(digest_, part_.header().size_bytes());
     return absl::OkStatus();
   }
@@ -58,6 +72,7 @@ class UploadReactor final : public grpc::ServerReadReactor<v1::UploadRequest> {
   BlobStore& blobs_;
   WorkPool& pool_;
   const grpc::CallbackServerContext* const context_;
+  std::unique_ptr<OpenTransfers::Transfer> transfer_;
   v1::UploadRequest part_;
   Digest digest_;
   std::optional<ChunkCollector> collector_;
@@ -85,7 +100,8 @@ grpc::ServerUnaryReactor* AssetService::FindMissing(grpc::CallbackServerContext*
 
 grpc::ServerReadReactor<v1::UploadRequest>* AssetService::Upload(
     grpc::CallbackServerContext* context, v1::UploadResponse* /*response*/) {
-  return new UploadReactor(blobs_, pools_.uploads, context);
+  return new UploadReactor(blobs_, pools_.uploads, transfers_, access_.LimitKeyOf(*context),
+                           context);
 }
 
 }  // namespace lucerna

@@ -9,15 +9,19 @@
 #include <grpcpp/grpcpp.h>
 
 #include "proto/lucerna/v1/assets.grpc.pb.h"
+#include "server/access.h"
 #include "server/blob_store.h"
+#include "server/open_transfers.h"
 #include "server/work_pool.h"
 
 namespace lucerna {
 
 class AssetService final : public v1::AssetService::CallbackService {
  public:
-  // Both outlive the service.
-  AssetService(BlobStore& blobs, WorkPools& pools) : blobs_(blobs), pools_(pools) {}
+  // All outlive the service. Without `transfers` uploads have no limits of their own.
+  AssetService(BlobStore& blobs, WorkPools& pools, OpenTransfers* transfers = nullptr,
+               const Access& access = Access::Unrestricted())
+      : blobs_(blobs), pools_(pools), transfers_(transfers), access_(access) {}
 
   grpc::ServerUnaryReactor* FindMissing(grpc::CallbackServerContext* context,
                                         const v1::FindMissingRequest* request,
@@ -28,6 +32,8 @@ class AssetService final : public v1::AssetService::CallbackService {
  private:
   BlobStore& blobs_;
   WorkPools& pools_;
+  OpenTransfers* const transfers_;
+  const Access& access_;
 };
 
 }  // namespace lucerna

@@ -23,6 +23,7 @@ constexpr std::chrono::milliseconds kRetryPause{100};
 constexpr int kPausesBeforeRetry = 10;
 constexpr std::size_t kSecretBytes = 32;
 constexpr std::size_t kMostIdentity = 128;
+constexpr std::size_t kRandomDigits = 16;  // of a job's id: 64 bits, short enough to be typed
 
 // Different for every start of a coordinator on one machine.
 std::string InstanceName(const Clock& clock) {
@@ -73,15 +74,17 @@ Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<Du
       clock_(clock),
       instance_(InstanceName(clock)),
       state_(std::move(state)),
+      transfers_(clock, options_.transfers),
       blobs_(options_.max_store_bytes, state_ ? &state_->blobs() : nullptr),
       scheduler_(OptionsFor(options_)),
       intake_(blobs_, options_.max_job_bytes),
       jobs_({.instance = state_ ? state_->instance() : instance_,
+             .random_part = [] { return RandomId().substr(0, kRandomDigits); },
              .retention = options_.retention,
              .journal = state_.get()}) {
   if (state_) {
     for (const std::string& problem : state_->problems())
-      spdlog::error("{}", problem);
+      spdlog::error("{}", Escaped(problem));
     jobs_.Restore(state_->TakeJobs(), state_->next_serial(), Now());
     RemoveUnneeded();
   }
@@ -110,6 +113,7 @@ void Coordinator::Close() {
 
 void Coordinator::Tick() {
   scheduler_.Expire(clock_.Steady());
+  transfers_.Tick();
   StopPoisonedJobs();
   ShowDisputes();
   AnswerParked();
@@ -128,7 +132,9 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
     return absl::InvalidArgumentError("a request id has 1 to 128 characters");
   }
   if (!submission.validate_only) {
-    if (auto earlier = jobs_.FindRequest(submission.request_id)) return *std::move(earlier);
+    if (auto earlier = jobs_.FindRequest(submission.request_id, submission.owner)) {
+      return *std::move(earlier);
+    }
   }
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
   if (submission.validate_only) return JobTable::Submitted{"", std::move(job.warnings)};
@@ -143,7 +149,7 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
     RemoveUnneeded();
     return submitted.status();
   }
-  spdlog::info("job {} submitted: {}", submitted->job_id, submission.manifest.main_path);
+  spdlog::info("job {} submitted: {}", submitted->job_id, Escaped(submission.manifest.main_path));
   return submitted;
 }
 
@@ -180,6 +186,10 @@ Status Coordinator::Delete(const std::string& job_id) {
 StatusOr<JobReport> Coordinator::WithWorkers(StatusOr<JobReport> report) const {
   if (report.ok()) report->workers = scheduler_.LiveWorkers();
   return report;
+}
+
+StatusOr<std::string> Coordinator::OwnerOf(const std::string& job_id) const {
+  return jobs_.OwnerOf(job_id);
 }
 
 StatusOr<JobReport> Coordinator::ReportOf(const std::string& job_id) const {
@@ -435,7 +445,7 @@ void Coordinator::Conclude(const std::string& job_id, StatusOr<RenderResult> res
     return;
   }
   jobs_.Fail(job_id, failure, Now());
-  spdlog::info("job {} ended: {}", job_id, std::string(failure.message()));
+  spdlog::info("job {} ended: {}", job_id, Escaped(std::string(failure.message())));
   RemoveUnneeded();
 }
 

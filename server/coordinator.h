@@ -33,6 +33,7 @@
 #include "server/job_intake.h"
 #include "server/job_runner.h"
 #include "server/job_table.h"
+#include "server/open_transfers.h"
 #include "server/parked_syncs.h"
 #include "server/pass_merger.h"
 #include "server/round_merger.h"
@@ -55,6 +56,7 @@ class Coordinator {
     RetentionLimits retention;
     double checkpoint_share = 0.01;  // of the time, in (0, 1]
     double audit_share = 0.005;      // of batches, in [0, 1]
+    OpenTransfers::Limits transfers;
   };
 
   // `state` is what outlives the process; nullptr: nothing does. Goes on with the jobs in it.
@@ -62,6 +64,7 @@ class Coordinator {
   ~Coordinator();
 
   [[nodiscard]] BlobStore& blobs() { return blobs_; }
+  [[nodiscard]] OpenTransfers& transfers() { return transfers_; }
 
   // Jobs ---------------------------------------------------------------------------------------
 
@@ -71,6 +74,7 @@ class Coordinator {
                                                      const StillNeeded& still_needed);
 
   // As the functions of JobTable.
+  [[nodiscard]] StatusOr<std::string> OwnerOf(const std::string& job_id) const;
   [[nodiscard]] StatusOr<JobReport> ReportOf(const std::string& job_id) const;
   [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(std::size_t count,
                                                                       std::uint64_t before) const;
@@ -201,6 +205,7 @@ class Coordinator {
   const std::unique_ptr<DurableState> state_;
   // Held while files are added for a job, and while those without one are removed.
   Mutex files_mutex_;
+  OpenTransfers transfers_;
   BlobStore blobs_;
   Scheduler scheduler_;
   PassMerger passes_;

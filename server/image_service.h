@@ -1,4 +1,4 @@
-// The gRPC service that streams images.
+// The gRPC service that streams images, to the owners of their jobs.
 //
 // Threads: gRPC calls in from its own pool. The image of a running job waits for one step of its
 // estimator and for the encoding, in the pool for images.
@@ -7,6 +7,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include "proto/lucerna/v1/images.grpc.pb.h"
+#include "server/access.h"
 #include "server/bytes_reactor.h"
 #include "server/coordinator.h"
 #include "server/rpc_caller.h"
@@ -17,12 +18,20 @@ namespace lucerna {
 class ImageService final : public v1::ImageService::CallbackService {
  public:
   // Both outlive the service.
-  ImageService(Coordinator& coordinator, WorkPools& pools)
-      : coordinator_(coordinator), pools_(pools) {}
+  ImageService(Coordinator& coordinator, WorkPools& pools,
+               const Access& access = Access::Unrestricted())
+      : coordinator_(coordinator), pools_(pools), access_(access) {}
 
   grpc::ServerWriteReactor<v1::Chunk>* GetImage(grpc::CallbackServerContext* context,
                                                 const v1::GetImageRequest* request) override {
     auto* const reactor = new BytesReactor;
+    const StatusOr<std::string> owner = coordinator_.OwnerOf(request->job_id());
+    const Status allowed =
+        owner.ok() ? access_.CheckOwns(*context, request->job_id(), *owner) : owner.status();
+    if (!allowed.ok()) {
+      reactor->Send(allowed);
+      return reactor;
+    }
     pools_.images.Run(NeededByCaller(context), [this, reactor, job_id = request->job_id()](
                                                    const Status& may_begin) {
       reactor->Send(may_begin.ok() ? coordinator_.ImageOf(job_id) : StatusOr<Blob>(may_begin));
@@ -33,6 +42,7 @@ class ImageService final : public v1::ImageService::CallbackService {
  private:
   Coordinator& coordinator_;
   WorkPools& pools_;
+  const Access& access_;
 };
 
 }  // namespace lucerna

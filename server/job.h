@@ -186,6 +186,7 @@ struct WorkerShare {
 struct Job {
   std::string id;
   std::string name;
+  std::string owner;  // who submitted it; empty: unknown
   SceneManifest manifest;
   Digest scene_digest;
   RenderSettings settings;

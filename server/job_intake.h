@@ -30,6 +30,7 @@ struct Submission {
   RenderOverrides overrides;
   bool validate_only = false;
   std::optional<Digest> reference;  // of an EXR image among the blobs
+  std::string owner = {};           // who submits it; empty: unknown
 };
 
 // A submission that was found good.

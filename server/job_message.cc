@@ -167,6 +167,7 @@ v1::Job ToProto(const JobReport& report) {
     *item.mutable_energy() = ToProto(part.tally).energy();
   }
   message.set_condition(job.condition);
+  message.set_owner(job.owner);
   for (const JobEvent& event : job.events) {
     v1::JobEvent& item = *message.add_events();
     *item.mutable_at() = ToProto(event.at);
@@ -366,6 +367,7 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
                         record.distrusted_worker_ids().end());
   if (message.has_ended_at()) job.ended_at = TimeOf(message.ended_at());
   job.condition = message.condition();
+  job.owner = message.owner();
   for (const v1::JobEvent& event : message.events())
     job.events.push_back({TimeOf(event.at()), event.what()});
   return result;

@@ -134,13 +134,21 @@ class JobService::WatchReactor final : public grpc::ServerWriteReactor<v1::Job> 
   std::uint64_t sent_version_ LUCERNA_GUARDED_BY(mutex_) = 0;
 };
 
+Status JobService::CheckMayChange(const grpc::CallbackServerContext* context,
+                                  const std::string& job_id) const {
+  LUCERNA_ASSIGN_OR_RETURN(const std::string owner, coordinator_.OwnerOf(job_id));
+  return access_.CheckOwns(*context, job_id, owner);
+}
+
 grpc::ServerUnaryReactor* JobService::Submit(grpc::CallbackServerContext* context,
                                              const v1::SubmitRequest* request,
                                              v1::SubmitResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   const StillNeeded still_needed = NeededByCaller(context);
-  const auto submit = [this, request, response, still_needed]() -> Status {
-    LUCERNA_ASSIGN_OR_RETURN(const Submission submission, ReadSubmission(*request));
+  const auto submit = [this, request, response, still_needed,
+                       owner = access_.CallerOf(*context).name]() -> Status {
+    LUCERNA_ASSIGN_OR_RETURN(Submission submission, ReadSubmission(*request));
+    submission.owner = owner;
     LUCERNA_ASSIGN_OR_RETURN(const JobTable::Submitted submitted,
                              coordinator_.Submit(submission, still_needed));
     response->set_job_id(submitted.job_id);
@@ -190,7 +198,9 @@ grpc::ServerUnaryReactor* JobService::Cancel(grpc::CallbackServerContext* contex
                                              const v1::CancelJobRequest* request,
                                              v1::Job* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(Put(coordinator_.Cancel(request->job_id()), response));
+  const Status allowed = CheckMayChange(context, request->job_id());
+  reactor->Finish(allowed.ok() ? Put(coordinator_.Cancel(request->job_id()), response)
+                               : ToGrpc(allowed));
   return reactor;
 }
 
@@ -198,6 +208,10 @@ grpc::ServerUnaryReactor* JobService::Delete(grpc::CallbackServerContext* contex
                                              const v1::DeleteJobRequest* request,
                                              v1::DeleteJobResponse* /*response*/) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  if (const Status allowed = CheckMayChange(context, request->job_id()); !allowed.ok()) {
+    reactor->Finish(ToGrpc(allowed));
+    return reactor;
+  }
   // Removes files, which may take long.
   pools_.scenes.Run(NeededByCaller(context), [this, reactor,
                                               job_id = request->job_id()](const Status& may_begin) {
@@ -209,7 +223,9 @@ grpc::ServerUnaryReactor* JobService::Delete(grpc::CallbackServerContext* contex
 grpc::ServerUnaryReactor* JobService::Stop(grpc::CallbackServerContext* context,
                                            const v1::StopJobRequest* request, v1::Job* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(Put(coordinator_.Stop(request->job_id()), response));
+  const Status allowed = CheckMayChange(context, request->job_id());
+  reactor->Finish(allowed.ok() ? Put(coordinator_.Stop(request->job_id()), response)
+                               : ToGrpc(allowed));
   return reactor;
 }
 
@@ -217,6 +233,10 @@ grpc::ServerUnaryReactor* JobService::Extend(grpc::CallbackServerContext* contex
                                              const v1::ExtendJobRequest* request,
                                              v1::Job* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  if (const Status allowed = CheckMayChange(context, request->job_id()); !allowed.ok()) {
+    reactor->Finish(ToGrpc(allowed));
+    return reactor;
+  }
   const StatusOr<RenderOverrides> until = FromProto(request->until());
   reactor->Finish(until.ok() ? Put(coordinator_.Extend(request->job_id(), *until), response)
                              : ToGrpc(until.status()));

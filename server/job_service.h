@@ -15,6 +15,7 @@
 #include "proto/lucerna/v1/jobs.grpc.pb.h"
 #include "render/base/clock.h"
 #include "render/base/mutex.h"
+#include "server/access.h"
 #include "server/coordinator.h"
 #include "server/work_pool.h"
 
@@ -23,8 +24,9 @@ namespace lucerna {
 class JobService final : public v1::JobService::CallbackService {
  public:
   // All outlive the service.
-  JobService(Coordinator& coordinator, WorkPools& pools, const Clock& clock)
-      : coordinator_(coordinator), pools_(pools), clock_(clock) {}
+  JobService(Coordinator& coordinator, WorkPools& pools, const Clock& clock,
+             const Access& access = Access::Unrestricted())
+      : coordinator_(coordinator), pools_(pools), clock_(clock), access_(access) {}
 
   grpc::ServerUnaryReactor* Submit(grpc::CallbackServerContext* context,
                                    const v1::SubmitRequest* request,
@@ -54,9 +56,14 @@ class JobService final : public v1::JobService::CallbackService {
  private:
   class WatchReactor;
 
+  // OK when the caller may change this job. Errors: NOT_FOUND, PERMISSION_DENIED.
+  [[nodiscard]] Status CheckMayChange(const grpc::CallbackServerContext* context,
+                                      const std::string& job_id) const;
+
   Coordinator& coordinator_;
   WorkPools& pools_;
   const Clock& clock_;
+  const Access& access_;
   Mutex mutex_;
   bool is_closed_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::set<WatchReactor*> watches_ LUCERNA_GUARDED_BY(mutex_);

@@ -11,61 +11,83 @@ Status UnknownJob(const std::string& job_id) {
   return absl::NotFoundError(absl::StrCat("there is no job ", job_id));
 }
 
+// Owners choose their request ids without knowing of each other.
+std::string RequestKey(const std::string& request_id, const std::string& owner) {
+  if (owner.empty()) return request_id;
+  return absl::StrCat(owner.size(), " ", owner, " ", request_id);
+}
+
 }  // namespace
 
 JobTable::JobTable(Options options) : options_(std::move(options)), queue_(options_.max_waiting) {}
 
-// Of the id that Add gave; 0, which is no serial, for any other text.
+// In the id that Add gave, which the caller compares as a whole; 0, which is no serial, for a text
+// of another form.
 std::uint64_t JobTable::SerialOf(std::string_view job_id) const {
   const std::string prefix = absl::StrCat(options_.instance, "-");
   if (!job_id.starts_with(prefix)) return 0;
   job_id.remove_prefix(prefix.size());
   std::uint64_t serial = 0;
   const auto read = std::from_chars(job_id.data(), job_id.data() + job_id.size(), serial);
-  const bool is_plain =
-      read.ec == std::errc() && read.ptr == job_id.data() + job_id.size() && job_id.front() != '0';
-  return is_plain ? serial : 0;
+  return read.ec == std::errc() ? serial : 0;
 }
 
 JobTable::Entries::iterator JobTable::FindLocked(const std::string& job_id) {
-  return entries_.find(SerialOf(job_id));
+  const auto found = entries_.find(SerialOf(job_id));
+  return found != entries_.end() && found->second.job.id == job_id ? found : entries_.end();
 }
 
 JobTable::Entries::const_iterator JobTable::FindLocked(const std::string& job_id) const {
-  return entries_.find(SerialOf(job_id));
+  const auto found = entries_.find(SerialOf(job_id));
+  return found != entries_.end() && found->second.job.id == job_id ? found : entries_.end();
 }
 
-std::optional<JobTable::Submitted> JobTable::FindRequestLocked(
-    const std::string& request_id) const {
+std::optional<JobTable::Submitted> JobTable::FindRequestLocked(const std::string& request_id,
+                                                               const std::string& owner) const {
+  const std::string key = RequestKey(request_id, owner);
   for (const auto& [serial, entry] : entries_) {
-    if (entry.request_id == request_id) return Submitted{entry.job.id, entry.job.warnings};
+    if (entry.request_id == key) return Submitted{entry.job.id, entry.job.warnings};
   }
   return std::nullopt;
 }
 
-std::optional<JobTable::Submitted> JobTable::FindRequest(const std::string& request_id) const {
+std::optional<JobTable::Submitted> JobTable::FindRequest(const std::string& request_id,
+                                                         const std::string& owner) const {
   const MutexLock lock(mutex_);
-  return FindRequestLocked(request_id);
+  return FindRequestLocked(request_id, owner);
 }
 
 StatusOr<JobTable::Submitted> JobTable::Add(CheckedJob checked, WallTime submitted_at,
                                             const Moment& moment) {
   const MutexLock lock(mutex_);
   // The same request may have come twice at once.
-  if (auto earlier = FindRequestLocked(checked.submission.request_id)) return *std::move(earlier);
+  if (auto earlier = FindRequestLocked(checked.submission.request_id, checked.submission.owner)) {
+    return *std::move(earlier);
+  }
   if (is_closed_) return absl::UnavailableError("the coordinator is shutting down");
   if (queue_.is_full()) {
     return absl::ResourceExhaustedError(
         absl::StrCat(queue_.size(), " jobs are waiting already; try again later"));
   }
+  const std::string& owner = checked.submission.owner;
+  const auto of_owner =
+      static_cast<std::size_t>(std::ranges::count_if(entries_, [&](const auto& e) {
+        return e.second.job.owner == owner && !e.second.job.life.has_ended();
+      }));
+  if (!owner.empty() && of_owner >= options_.max_waiting_of_owner) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        of_owner, " jobs of ", owner, " have not ended; wait for some, or cancel them"));
+  }
   const std::uint64_t serial = next_serial_;
   Entry entry;
   entry.serial = serial;
   entry.turn = next_turn_;
-  entry.request_id = std::move(checked.submission.request_id);
+  entry.request_id = RequestKey(checked.submission.request_id, checked.submission.owner);
   entry.pinned = std::move(checked.pinned);
   Job& job = entry.job;
   job.id = absl::StrCat(options_.instance, "-", serial);
+  if (options_.random_part) absl::StrAppend(&job.id, "-", options_.random_part());
+  job.owner = std::move(checked.submission.owner);
   job.manifest = std::move(checked.submission.manifest);
   job.name = checked.submission.name.empty() ? job.manifest.main_path : checked.submission.name;
   job.scene_digest = job.manifest.SceneDigest();
@@ -175,6 +197,13 @@ JobReport JobTable::MakeReport(const Entry& entry, const Moment& moment) const {
         static_cast<double>(entry.job.counters.photons) / Seconds(report.running);
   }
   return report;
+}
+
+StatusOr<std::string> JobTable::OwnerOf(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  return found->second.job.owner;
 }
 
 StatusOr<JobReport> JobTable::ReportOf(const std::string& job_id, const Moment& moment) const {

@@ -16,6 +16,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -61,7 +62,10 @@ class JobTable {
  public:
   struct Options {
     std::string instance;  // in front of every job's id
+    // Makes what stands behind every job's id, so that none follows from another; absent: nothing.
+    std::function<std::string()> random_part = {};
     std::size_t max_waiting = 256;
+    std::size_t max_waiting_of_owner = 128;  // of an owner that is known
     RetentionLimits retention;
     JobJournal* journal = nullptr;  // outlives the table; nullptr: jobs end with the process
   };
@@ -83,8 +87,9 @@ class JobTable {
     std::string job_id;  // empty when only validated
     std::vector<std::string> warnings;
   };
-  // The job of an earlier submission with this request id.
-  [[nodiscard]] std::optional<Submitted> FindRequest(const std::string& request_id) const;
+  // The job of an earlier submission of this owner with this request id.
+  [[nodiscard]] std::optional<Submitted> FindRequest(const std::string& request_id,
+                                                     const std::string& owner = {}) const;
   // The new job, or that of the same request id, if there is one by now.
   // Errors: RESOURCE_EXHAUSTED when too many jobs wait, UNAVAILABLE after Close, or what the
   // journal says.
@@ -93,6 +98,8 @@ class JobTable {
 
   // Errors of all requests: NOT_FOUND.
 
+  // Who submitted it.
+  [[nodiscard]] StatusOr<std::string> OwnerOf(const std::string& job_id) const;
   [[nodiscard]] StatusOr<JobReport> ReportOf(const std::string& job_id, const Moment& moment) const;
   // At most `count` jobs older than `before` (0: from the newest), newest first, and where the
   // next page begins (0: nowhere).
@@ -221,7 +228,8 @@ class JobTable {
   [[nodiscard]] std::uint64_t SerialOf(std::string_view job_id) const;
   Entries::iterator FindLocked(const std::string& job_id) LUCERNA_REQUIRES(mutex_);
   Entries::const_iterator FindLocked(const std::string& job_id) const LUCERNA_REQUIRES(mutex_);
-  std::optional<Submitted> FindRequestLocked(const std::string& request_id) const
+  std::optional<Submitted> FindRequestLocked(const std::string& request_id,
+                                             const std::string& owner) const
       LUCERNA_REQUIRES(mutex_);
   JobReport MakeReport(const Entry& entry, const Moment& moment) const LUCERNA_REQUIRES(mutex_);
   ImageSource MakeImageSource(const Entry& entry, const Moment& moment) const

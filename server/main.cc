@@ -11,6 +11,8 @@
 #include <ratio>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
@@ -19,17 +21,25 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include "render/base/certificate.h"
 #include "render/base/clock.h"
+#include "render/base/escape.h"
 #include "render/base/fail_point.h"
 #include "render/base/memory.h"
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
+#include "render/wire/grpc_log.h"
+#include "render/wire/security_flags.h"
+#include "server/acceptor.h"
+#include "server/access.h"
 #include "server/admin_service.h"
 #include "server/asset_service.h"
 #include "server/coordinator.h"
 #include "server/image_service.h"
 #include "server/job_service.h"
+#include "server/listener.h"
+#include "server/security_files.h"
 #include "server/state/durable_state.h"
 #include "server/work_pool.h"
 #include "server/worker_service.h"
@@ -46,6 +56,11 @@ constexpr long kTickNanos = 50'000'000;
 
 struct Flags {
   std::string listen = "127.0.0.1:7400";
+  std::string listen_workers;
+  TlsFiles tls;
+  std::string tokens;
+  bool offers_reflection = false;
+  std::size_t max_connections_per_address = 16384;
   bool allow_insecure_network = false;
   std::string log_level = "info";
   std::string state;
@@ -65,6 +80,7 @@ sigset_t BlockEndSignals() {
 
 int Serve(const Flags& flags) {
   const sigset_t end_signals = BlockEndSignals();
+  RaiseDescriptorLimit();
   const Clock& clock = SystemClock();
   std::unique_ptr<DurableState> state;
   if (!flags.state.empty()) {
@@ -78,55 +94,99 @@ int Serve(const Flags& flags) {
     }
     state = *std::move(opened);
   }
+  StatusOr<std::unique_ptr<Access>> access = Access::Open(flags.tokens);
+  if (!access.ok()) {
+    std::fprintf(stderr, "lucerna-server: --tokens %s\n",
+                 EscapedLines(std::string(access.status().message())).c_str());
+    return kExitUsage;
+  }
   Coordinator coordinator(flags.coordinator, clock, std::move(state));
   WorkPools pools;
-  AssetService assets(coordinator.blobs(), pools);
-  JobService jobs(coordinator, pools, SystemClock());
-  ImageService images(coordinator, pools);
-  WorkerService workers(coordinator, pools);
+  AssetService assets(coordinator.blobs(), pools, &coordinator.transfers(), **access);
+  JobService jobs(coordinator, pools, SystemClock(), **access);
+  ImageService images(coordinator, pools, **access);
+  WorkerService workers(coordinator, pools, **access);
   AdminService admin(coordinator, clock);
 
   grpc::EnableDefaultHealthCheckService(true);
-  grpc::reflection::InitProtoReflectionServerBuilderPlugin();
-  grpc::ServerBuilder builder;
-  SetUpConnections(builder);
-  int port = 0;
-  builder.AddListeningPort(flags.listen, grpc::InsecureServerCredentials(), &port);
-  builder.RegisterService(&assets);
-  builder.RegisterService(&jobs);
-  builder.RegisterService(&images);
-  builder.RegisterService(&workers);
-  builder.RegisterService(&admin);
-  const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
-  if (!server || port == 0) {
-    std::fprintf(stderr,
-                 "lucerna-server: cannot listen on %s; is the port in use, or the address not of "
-                 "this machine?\n",
-                 flags.listen.c_str());
-    return kExitCannotListen;
+  if (flags.offers_reflection) grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  std::vector<grpc::Service*> for_clients = {&assets, &jobs, &images, &admin};
+  std::vector<grpc::Service*> for_workers = {&workers};
+  const bool is_one = flags.listen_workers.empty();
+  if (is_one) for_clients.insert(for_clients.end(), for_workers.begin(), for_workers.end());
+  std::vector<Listener::Options> wanted;
+  wanted.push_back({flags.listen, flags.tls, access->get(), std::move(for_clients),
+                    flags.max_connections_per_address});
+  if (!is_one) {
+    wanted.push_back({flags.listen_workers, flags.tls, access->get(), std::move(for_workers),
+                      flags.max_connections_per_address});
   }
-  std::printf("listening on %s:%d\n", flags.listen.substr(0, flags.listen.rfind(':')).c_str(),
-              port);
+  std::vector<std::unique_ptr<Listener>> listeners;
+  for (const Listener::Options& options : wanted) {
+    StatusOr<std::unique_ptr<Listener>> listener = Listener::Start(options);
+    if (!listener.ok()) {
+      std::fprintf(stderr,
+                   "lucerna-server: cannot listen on %s (%s); is the port in use, or the address "
+                   "not of this machine?\n",
+                   options.address.c_str(), std::string(listener.status().message()).c_str());
+      return kExitCannotListen;
+    }
+    listeners.push_back(*std::move(listener));
+  }
+  for (std::size_t i = 0; i < listeners.size(); ++i) {
+    std::printf("%s %s\n", i == 0 ? "listening on" : "listening for workers on",
+                listeners[i]->address().c_str());
+  }
   std::fflush(stdout);
   spdlog::info("numeric profile: {}", flags.coordinator.numeric_profile);
 
+  SecurityFiles security(flags.tls, **access, clock);
   const timespec tick = {0, kTickNanos};
   while (sigtimedwait(&end_signals, nullptr, &tick) < 0) {
     coordinator.Tick();
     jobs.Tick();
+    security.Tick();
   }
   spdlog::info("ending");
-  server->GetHealthCheckService()->SetServingStatus(false);
+  for (const auto& listener : listeners)
+    listener->StopServing();
   // Calls that are under way end by themselves, commits well, before the job is stopped and kept.
   coordinator.StopLending();
   for (WorkPool* const pool : {&pools.scenes, &pools.uploads, &pools.images})
     pool->Close();
   jobs.Close();
-  server->Shutdown(DeadlineIn(kTimeForCommits));
-  server->Wait();
+  for (const auto& listener : listeners)
+    listener->Shutdown(kTimeForCommits);
   pools.Close();
   coordinator.Close();
   return 0;
+}
+
+// Whether the flags say how it may be reached. Errors: INVALID_ARGUMENT, NOT_FOUND.
+Status CheckListening(const Flags& flags) {
+  for (const auto& [name, address] :
+       {std::pair("--listen", flags.listen), std::pair("--listen-workers", flags.listen_workers)}) {
+    const bool is_given = address != flags.listen_workers || !address.empty();
+    if (!is_given) continue;
+    if (!IsAddress(address)) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(name, " ", address, ": give HOST:PORT, such as 127.0.0.1:7400"));
+    }
+    if (!flags.tls.empty() || IsLoopback(address)) continue;
+    if (!flags.tokens.empty()) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          name, " ", address, " can be reached from other machines, and tokens would be readable ",
+          "on their way; give --tls-ca, --tls-cert and --tls-key"));
+    }
+    if (!flags.allow_insecure_network) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          name, " ", address, " can be reached from other machines and traffic is not encrypted; ",
+          "give --tls-ca, --tls-cert and --tls-key, or --allow-insecure-network if the network is ",
+          "trusted"));
+    }
+  }
+  if (flags.tls.empty()) return absl::OkStatus();
+  return CheckTlsFiles(flags.tls, SystemClock().Wall()).status();
 }
 
 int Main(int argc, char** argv) {
@@ -136,6 +196,17 @@ int Main(int argc, char** argv) {
   app.set_version_flag("--version", absl::StrCat("lucerna-server ", Version()));
   app.add_option("--listen", flags.listen, "HOST:PORT to listen on; port 0 picks a free one")
       ->capture_default_str();
+  app.add_option("--listen-workers", flags.listen_workers,
+                 "HOST:PORT for workers alone; then --listen is for clients alone");
+  AddTlsFlags(app, flags.tls);
+  app.add_option("--tokens", flags.tokens,
+                 "file of the tokens that are accepted (lucerna token new); without it everybody "
+                 "who can connect may do everything");
+  app.add_option("--max-connections", flags.max_connections_per_address,
+                 "connections that one address may have; a worker has two")
+      ->check(CLI::Range(1, 1'000'000))
+      ->capture_default_str();
+  app.add_flag("--reflection", flags.offers_reflection, "describe the protocol to tools");
   app.add_flag("--allow-insecure-network", flags.allow_insecure_network,
                "listen beyond this machine although traffic is not encrypted");
   app.add_option("--threads", flags.coordinator.threads, "threads for eye paths; 0: all")
@@ -182,16 +253,9 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
-  if (!IsAddress(flags.listen)) {
-    std::fprintf(stderr, "lucerna-server: --listen %s: give HOST:PORT, such as 127.0.0.1:7400\n",
-                 flags.listen.c_str());
-    return kExitUsage;
-  }
-  if (!flags.allow_insecure_network && !IsLoopback(flags.listen)) {
-    std::fprintf(stderr,
-                 "lucerna-server: --listen %s can be reached from other machines and traffic is "
-                 "not encrypted; give --allow-insecure-network if the network is trusted\n",
-                 flags.listen.c_str());
+  if (const Status checked = CheckListening(flags); !checked.ok()) {
+    std::fprintf(stderr, "lucerna-server: %s\n",
+                 EscapedLines(std::string(checked.message())).c_str());
     return kExitUsage;
   }
   flags.coordinator.retention.age = std::chrono::duration_cast<Duration>(
@@ -199,6 +263,7 @@ int Main(int argc, char** argv) {
   if (const char* const fail_point = std::getenv("LUCERNA_FAIL_POINT")) ArmFailPoint(fail_point);
   spdlog::set_default_logger(spdlog::stderr_color_mt("lucerna-server"));
   spdlog::set_level(spdlog::level::from_str(flags.log_level));
+  TakeGrpcErrors(LogGrpcError);
   return Serve(flags);
 }
 

@@ -1,5 +1,6 @@
 #include "server/worker_service.h"
 
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -69,14 +70,23 @@ class SyncReactor final : public grpc::ServerUnaryReactor {
 
 class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchRequest> {
  public:
-  CommitReactor(Coordinator& coordinator, WorkPool& pool,
-                const grpc::CallbackServerContext* context, v1::CommitBatchResponse* response)
+  CommitReactor(Coordinator& coordinator, WorkPool& pool, const std::string& caller,
+                grpc::CallbackServerContext* context, v1::CommitBatchResponse* response)
       : coordinator_(coordinator), pool_(pool), context_(context), response_(response) {
+    StatusOr<std::unique_ptr<OpenTransfers::Transfer>> opened =
+        coordinator.transfers().Open(caller, [context] { context->TryCancel(); });
+    if (!opened.ok()) {
+      Finish(ToGrpc(opened.status()));
+      return;
+    }
+    transfer_ = *std::move(opened);
     StartRead(&part_);
   }
 
   void OnReadDone(bool ok) override {
+    transfer_->Progress();
     if (!ok) {
+      transfer_->Complete();
       pool_.Run(NeededByCaller(context_), [this](const Status& may_begin) {
         Finish(ToGrpc(may_begin.ok() ? Merge() : may_begin));
       });
@@ -129,6 +139,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
       coordinator_.Refuse(delivery_, too_large);
       return too_large;
     }
+    LUCERNA_RETURN_IF_ERROR(transfer_->Announce(header.size_bytes()));
     collector_.emplace(delivery_.digest, header.size_bytes());
     collector_->Reserve();
     return absl::OkStatus();
@@ -145,6 +156,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
   Coordinator& coordinator_;
   WorkPool& pool_;
   const grpc::CallbackServerContext* const context_;
+  std::unique_ptr<OpenTransfers::Transfer> transfer_;
   v1::CommitBatchResponse* const response_;
   v1::CommitBatchRequest part_;
   Delivery delivery_;
@@ -208,13 +220,24 @@ grpc::ServerWriteReactor<v1::Chunk>* WorkerService::FetchBlob(
 
 grpc::ServerReadReactor<v1::CommitBatchRequest>* WorkerService::CommitBatch(
     grpc::CallbackServerContext* context, v1::CommitBatchResponse* response) {
-  return new CommitReactor(coordinator_, pools_.commits, context, response);
+  return new CommitReactor(coordinator_, pools_.commits, access_.LimitKeyOf(*context), context,
+                           response);
 }
 
 grpc::ServerUnaryReactor* WorkerService::DescribeJob(grpc::CallbackServerContext* context,
                                                      const v1::DescribeJobRequest* request,
                                                      v1::JobDescription* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  // A user traces photons of their own jobs again; workers trace those of all.
+  if (!Has(access_.CallerOf(*context).roles, Role::kWork)) {
+    const StatusOr<std::string> owner = coordinator_.OwnerOf(request->job_id());
+    const Status allowed =
+        owner.ok() ? access_.CheckOwns(*context, request->job_id(), *owner) : owner.status();
+    if (!allowed.ok()) {
+      reactor->Finish(ToGrpc(allowed));
+      return reactor;
+    }
+  }
   const StatusOr<Coordinator::Description> job = coordinator_.Describe(request->job_id());
   if (job.ok()) {
     *response->mutable_scene() = ToProto(job->scene);

@@ -10,6 +10,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include "proto/lucerna/v1/work.grpc.pb.h"
+#include "server/access.h"
 #include "server/bytes_reactor.h"
 #include "server/coordinator.h"
 #include "server/work_pool.h"
@@ -19,8 +20,9 @@ namespace lucerna {
 class WorkerService final : public v1::WorkerService::CallbackService {
  public:
   // Both outlive the service.
-  WorkerService(Coordinator& coordinator, WorkPools& pools)
-      : coordinator_(coordinator), pools_(pools) {}
+  WorkerService(Coordinator& coordinator, WorkPools& pools,
+                const Access& access = Access::Unrestricted())
+      : coordinator_(coordinator), pools_(pools), access_(access) {}
 
   grpc::ServerUnaryReactor* Register(grpc::CallbackServerContext* context,
                                      const v1::RegisterRequest* request,
@@ -42,6 +44,7 @@ class WorkerService final : public v1::WorkerService::CallbackService {
  private:
   Coordinator& coordinator_;
   WorkPools& pools_;
+  const Access& access_;
 };
 
 }  // namespace lucerna

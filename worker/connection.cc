@@ -5,17 +5,16 @@
 
 #include "render/base/fail_point.h"
 #include "render/estimate/rounds.h"
-#include "render/wire/channel.h"
 #include "render/wire/chunks.h"
 #include "render/wire/grpc_status.h"
 #include "render/wire/messages.h"
+#include "render/wire/stall_guard.h"
 
 namespace lucerna {
 namespace {
 
 // A coordinator that is to answer at once and does not within this has gone.
-constexpr std::chrono::seconds kGoodbyeTime{1};
-constexpr std::chrono::minutes kTransferTime{10};
+constexpr std::chrono::seconds kGoodbyeTime{5};
 constexpr std::uint64_t kMostPhotonsPerPass = std::uint64_t{1} << 40;
 
 }  // namespace
@@ -43,8 +42,14 @@ class Connection::Call {
   grpc::ClientContext context_;
 };
 
-Connection::Connection(const std::string& address)
-    : channel_(MakeChannel(address)), stub_(v1::WorkerService::NewStub(channel_)) {}
+Connection::Channels::Channels(const Endpoint& endpoint)
+    : messages(MakeChannel(endpoint, Traffic::kMessages)),
+      bulk(MakeChannel(endpoint, Traffic::kBulk)) {}
+
+Connection::Connection(const Channels& channels)
+    : channel_(channels.messages),
+      stub_(v1::WorkerService::NewStub(channels.messages)),
+      bulk_stub_(v1::WorkerService::NewStub(channels.bulk)) {}
 
 bool Connection::WaitUntilConnected(Duration wait) {
   return channel_->WaitForConnected(DeadlineIn(wait));
@@ -76,13 +81,15 @@ StatusOr<v1::JobDescription> Connection::DescribeJob(const std::string& job_id) 
 }
 
 StatusOr<std::string> Connection::Fetch(const Digest& digest, std::uint64_t max_bytes) {
-  Call call(*this, kTransferTime);
+  Call call(*this, kNoDeadline);
+  StallGuard guard(*call.context(), kLongestSilence);
   v1::FetchBlobRequest request;
   request.set_digest(std::string(digest.Bytes()));
-  const auto reader = stub_->FetchBlob(call.context(), request);
+  const auto reader = bulk_stub_->FetchBlob(call.context(), request);
   std::string bytes;
   v1::Chunk chunk;
   while (reader->Read(&chunk)) {
+    guard.Progress();
     if (chunk.bytes().size() > max_bytes - bytes.size()) {
       call.context()->TryCancel();
       return absl::InvalidArgumentError(
@@ -99,9 +106,10 @@ StatusOr<std::string> Connection::Fetch(const Digest& digest, std::uint64_t max_
 
 StatusOr<v1::CommitOutcome> Connection::Commit(v1::CommitBatchRequest::Header header,
                                                const std::string& bytes) {
-  Call call(*this, kTransferTime);
+  Call call(*this, kNoDeadline);
+  StallGuard guard(*call.context(), kLongestSilence);
   v1::CommitBatchResponse response;
-  const auto writer = stub_->CommitBatch(call.context(), &response);
+  const auto writer = bulk_stub_->CommitBatch(call.context(), &response);
   v1::CommitBatchRequest part;
   header.set_digest(std::string(Sha256(bytes).Bytes()));
   header.set_size_bytes(bytes.size());
@@ -114,6 +122,7 @@ StatusOr<v1::CommitOutcome> Connection::Commit(v1::CommitBatchRequest::Header he
        chunk = NextChunk(rest)) {
     part.set_bytes(chunk.data(), chunk.size());
     is_open = writer->Write(part);
+    guard.Progress();
   }
   writer->WritesDone();
   LUCERNA_RETURN_IF_ERROR(FromGrpc(writer->Finish()));

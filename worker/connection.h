@@ -23,6 +23,7 @@
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
+#include "render/wire/channel.h"
 
 namespace lucerna {
 
@@ -48,8 +49,14 @@ struct LentWork {
 
 class Connection {
  public:
-  // Does not connect yet.
-  explicit Connection(const std::string& address);
+  // The ways to one coordinator. They connect by themselves, and serve one Connection after
+  // another.
+  struct Channels {
+    explicit Channels(const Endpoint& endpoint);
+    // Heartbeats must not wait behind the bytes of a commit.
+    std::shared_ptr<grpc::Channel> messages, bulk;
+  };
+  explicit Connection(const Channels& channels);
 
   // Whether the coordinator could be reached within `wait`.
   [[nodiscard]] bool WaitUntilConnected(Duration wait);
@@ -72,7 +79,7 @@ class Connection {
   class Call;
 
   const std::shared_ptr<grpc::Channel> channel_;
-  const std::unique_ptr<v1::WorkerService::Stub> stub_;
+  const std::unique_ptr<v1::WorkerService::Stub> stub_, bulk_stub_;
   Mutex mutex_;
   bool is_broken_off_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::set<grpc::ClientContext*> calls_ LUCERNA_GUARDED_BY(mutex_);

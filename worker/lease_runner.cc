@@ -4,6 +4,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "render/base/escape.h"
 #include "render/base/fail_point.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/messages.h"
@@ -84,7 +85,7 @@ void LeaseRunner::Release(const Held& held, const Status& status) {
   const MutexLock lock(mutex_);
   held_.erase(held.work.lease_id);
   if (status.ok() || held.is_revoked) return;
-  spdlog::warn("lease {}: {}", held.work.lease_id, std::string(status.message()));
+  spdlog::warn("lease {}: {}", Escaped(held.work.lease_id), Escaped(std::string(status.message())));
   failures_.emplace_back(held.work.lease_id, std::string(status.message()));
 }
 

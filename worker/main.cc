@@ -18,12 +18,15 @@
 #include <unistd.h>
 
 #include "render/base/clock.h"
+#include "render/base/escape.h"
 #include "render/base/fail_point.h"
 #include "render/base/memory.h"
 #include "render/base/random_id.h"
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
+#include "render/wire/grpc_log.h"
+#include "render/wire/security_flags.h"
 #include "worker/replay.h"
 #include "worker/session.h"
 
@@ -39,7 +42,10 @@ constexpr long kSignalLookNanos = 100'000'000;
 int ExitCodeFor(const Status& status) {
   if (status.ok()) return 0;
   if (absl::IsUnavailable(status)) return kExitUnreachable;
-  if (absl::IsFailedPrecondition(status)) return kExitRefused;
+  if (absl::IsFailedPrecondition(status) || absl::IsUnauthenticated(status) ||
+      absl::IsPermissionDenied(status)) {
+    return kExitRefused;
+  }
   return kExitFailed;
 }
 
@@ -72,7 +78,8 @@ int Work(Session::Options options) {
   has_ended = true;
   listener.join();
   if (!status.ok()) {
-    std::fprintf(stderr, "lucerna-worker: %s\n", std::string(status.message()).c_str());
+    std::fprintf(stderr, "lucerna-worker: %s\n",
+                 EscapedLines(std::string(status.message())).c_str());
   }
   return ExitCodeFor(status);
 }
@@ -81,7 +88,8 @@ int Work(Session::Options options) {
 int ReplayPhoton(const ReplayOptions& options) {
   const StatusOr<v1::PhotonPath> path = Replay(options);
   if (!path.ok()) {
-    std::fprintf(stderr, "lucerna-worker: %s\n", std::string(path.status().message()).c_str());
+    std::fprintf(stderr, "lucerna-worker: %s\n",
+                 EscapedLines(std::string(path.status().message())).c_str());
     return ExitCodeFor(path.status());
   }
   const std::string bytes = path->SerializeAsString();
@@ -98,10 +106,15 @@ int Main(int argc, char** argv) {
   options.identity = RandomId();
   std::string log_level = "info";
   double connect_timeout_s = 60;
-  options.server = "127.0.0.1:7400";
+  options.server.address = "127.0.0.1:7400";
+  std::string token_file;
   CLI::App app("Lucerna's worker: traces batches of photons for a coordinator.");
   app.set_version_flag("--version", absl::StrCat("lucerna-worker ", Version()));
-  app.add_option("--server", options.server, "HOST:PORT of the coordinator")->capture_default_str();
+  app.add_option("--server", options.server.address, "HOST:PORT of the coordinator")
+      ->capture_default_str();
+  AddTlsFlags(app, options.server.tls);
+  app.add_option("--token-file", token_file,
+                 "file that holds this worker's token (default: what LUCERNA_TOKEN says)");
   app.add_option("--threads", options.threads, "threads to trace with; 0: all")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
@@ -125,10 +138,17 @@ int Main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
-  if (!IsAddress(options.server)) {
+  if (!IsAddress(options.server.address)) {
     std::fprintf(stderr,
                  "lucerna-worker: --server \"%s\": give HOST:PORT, such as 127.0.0.1:7400\n",
-                 options.server.c_str());
+                 options.server.address.c_str());
+    return kExitUsage;
+  }
+  StatusOr<std::string> token = ReadToken(token_file, std::getenv("LUCERNA_TOKEN"));
+  if (token.ok()) options.server.token = *std::move(token);
+  const Status security = token.ok() ? CheckSecurity(options.server) : token.status();
+  if (!security.ok()) {
+    std::fprintf(stderr, "lucerna-worker: %s\n", std::string(security.message()).c_str());
     return kExitUsage;
   }
   options.connect_timeout =
@@ -136,6 +156,7 @@ int Main(int argc, char** argv) {
   if (const char* const fail_point = std::getenv("LUCERNA_FAIL_POINT")) ArmFailPoint(fail_point);
   spdlog::set_default_logger(spdlog::stderr_color_mt("lucerna-worker"));
   spdlog::set_level(spdlog::level::from_str(log_level));
+  TakeGrpcErrors([](const std::string& message) { spdlog::debug("gRPC: {}", Escaped(message)); });
   if (*job) {
     replay.server = options.server;
     replay.connect_timeout = options.connect_timeout;

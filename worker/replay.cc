@@ -136,9 +136,9 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
 }
 
 StatusOr<v1::PhotonPath> Replay(const ReplayOptions& options) {
-  Connection connection(options.server);
+  Connection connection(Connection::Channels(options.server));
   if (!connection.WaitUntilConnected(options.connect_timeout)) {
-    return absl::UnavailableError(absl::StrCat("no coordinator answers at ", options.server,
+    return absl::UnavailableError(absl::StrCat("no coordinator answers at ", options.server.address,
                                                "; is lucerna-server running there?"));
   }
   LUCERNA_ASSIGN_OR_RETURN(const v1::JobDescription job, connection.DescribeJob(options.job_id));

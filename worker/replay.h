@@ -14,11 +14,12 @@
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
+#include "render/wire/channel.h"
 
 namespace lucerna {
 
 struct ReplayOptions {
-  std::string server;  // host:port
+  Endpoint server;
   Duration connect_timeout{};
   std::string numeric_profile;
   std::string job_id;

@@ -1,6 +1,8 @@
 #include "worker/scene_cache.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <map>
 
 #include "render/formats/read_scene.h"
 #include "render/wire/block_codec.h"
@@ -32,8 +34,11 @@ auto Find(Kept& kept, const Digest& digest) {
 StatusOr<Scene> FetchScene(const SceneManifest& manifest, const FetchBytes& fetch) {
   // The parser would report a broken connection as an error of the scene.
   Status fetched;
+  std::map<Digest, std::uint64_t> size_of;
+  for (const auto& [path, entry] : manifest.entries)
+    size_of[entry.digest] = entry.size_bytes;
   ManifestFiles files(manifest, [&](const Digest& file) {
-    StatusOr<std::string> bytes = fetch(file, SceneLimits().max_total_bytes);
+    StatusOr<std::string> bytes = fetch(file, size_of[file]);
     fetched.Update(bytes.status());
     return bytes;
   });

@@ -5,7 +5,9 @@
 
 #include <spdlog/spdlog.h>
 
+#include "render/base/escape.h"
 #include "render/base/parallel.h"
+#include "render/wire/channel.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {
@@ -18,8 +20,16 @@ constexpr Duration kShortestSync = std::chrono::milliseconds(500);
 
 void SayGoodbye(Connection& connection, const std::string& worker_id) {
   if (const Status status = connection.Goodbye(worker_id); !status.ok()) {
-    spdlog::warn("no goodbye: {}", std::string(status.message()));
+    spdlog::warn("no goodbye: {}", Escaped(std::string(status.message())));
   }
+}
+
+std::string WhyNoAnswer(const Endpoint& server, const Status& status) {
+  const std::string message(status.message());
+  const std::string tls = ExplainTls(server, message);
+  if (!tls.empty()) return tls;
+  return absl::StrCat("no coordinator answers at ", server.address, " (", message,
+                      "); is lucerna-server running there?");
 }
 
 }  // namespace
@@ -27,6 +37,7 @@ void SayGoodbye(Connection& connection, const std::string& worker_id) {
 Session::Session(Options options, const Clock& clock)
     : options_(std::move(options)),
       clock_(clock),
+      channels_(options_.server),
       cache_(options_.threads,
              [this](const Digest& digest, std::uint64_t max_bytes) -> StatusOr<std::string> {
                std::shared_ptr<Connection> connection;
@@ -57,15 +68,15 @@ Status Session::Run() {
       SayGoodbye(*connection, joined->worker_id());
       break;
     }
-    spdlog::info("joined {} as {}", options_.server, joined->worker_id());
+    spdlog::info("joined {} as {}", options_.server.address, Escaped(joined->worker_id()));
     const Status why = runner->Run();
     {
       const MutexLock lock(mutex_);
       runner_ = nullptr;
       if (is_stopped_) break;
     }
-    spdlog::warn("lost the coordinator at {}: {}; joining again", options_.server,
-                 std::string(why.message()));
+    spdlog::warn("lost the coordinator at {}: {}; joining again", options_.server.address,
+                 Escaped(std::string(why.message())));
   }
   return absl::OkStatus();
 }
@@ -80,7 +91,7 @@ StatusOr<v1::RegisterResponse> Session::Join() {
   request.set_numeric_profile(options_.numeric_profile);
   request.set_identity(options_.identity);
   while (true) {
-    const auto connection = std::make_shared<Connection>(options_.server);
+    const auto connection = std::make_shared<Connection>(channels_);
     {
       const MutexLock lock(mutex_);
       if (is_stopped_) return absl::CancelledError("the worker was asked to end");
@@ -89,16 +100,18 @@ StatusOr<v1::RegisterResponse> Session::Join() {
     StatusOr<v1::RegisterResponse> response = connection->Register(request);
     if (response.ok() || is_stopped()) return response;
     const Status& status = response.status();
+    if (absl::IsUnimplemented(status)) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("the coordinator does not take workers at ", options_.server.address,
+                       "; is it of another version, or is that its address for clients?"));
+    }
     if (!absl::IsUnavailable(status) && !absl::IsDeadlineExceeded(status)) return status;
     const SteadyTime now = clock_.Steady();
     if (now >= give_up_at) {
-      return absl::UnavailableError(absl::StrCat("no coordinator answers at ", options_.server,
-                                                 " (", std::string(status.message()),
-                                                 "); is lucerna-server running there?"));
+      return absl::UnavailableError(WhyNoAnswer(options_.server, status));
     }
     if (now >= warn_at) {
-      spdlog::warn("no coordinator answers at {} yet ({}); trying again", options_.server,
-                   std::string(status.message()));
+      spdlog::warn("{}; trying again", Escaped(WhyNoAnswer(options_.server, status)));
       warn_at = now + kWarnEvery;
     }
     Pause(std::min(pause, give_up_at - now));

@@ -10,6 +10,7 @@
 #include "render/base/clock.h"
 #include "render/base/mutex.h"
 #include "render/base/status.h"
+#include "render/wire/channel.h"
 #include "worker/connection.h"
 #include "worker/lease_runner.h"
 #include "worker/scene_cache.h"
@@ -19,7 +20,7 @@ namespace lucerna {
 class Session {
  public:
   struct Options {
-    std::string server;          // host:port
+    Endpoint server;
     int threads = 0;             // 0: all
     Duration connect_timeout{};  // how long an absent coordinator is waited for
     std::string name;
@@ -46,6 +47,7 @@ class Session {
 
   const Options options_;
   const Clock& clock_;
+  const Connection::Channels channels_;
   SceneCache cache_;
 
   mutable Mutex mutex_;

@@ -9,6 +9,7 @@
 #include "client/exit_code.h"
 #include "client/scene_reading.h"
 #include "client/view/report.h"
+#include "render/base/escape.h"
 #include "render/base/files.h"
 #include "render/estimate/error_estimate.h"
 #include "render/film/png_file.h"
@@ -41,7 +42,7 @@ Status Validate(const std::string& scene_path, bool strict, const OutputOptions&
     const bool is_error = diagnostic.severity == Diagnostic::Severity::kError;
     // As JSON they are the result itself.
     if (output_options.json || (output_options.quiet && !is_error)) continue;
-    std::fprintf(stderr, "%s\n", diagnostic.ToString().c_str());
+    std::fprintf(stderr, "%s\n", Escaped(diagnostic.ToString()).c_str());
   }
   const bool is_ok = parsed.ok() && !(strict && counts[1] > 0);
   if (output_options.json) std::fputs(SceneReport(parsed.diagnostics, is_ok).c_str(), stdout);
@@ -79,7 +80,7 @@ Status Diff(const std::string& image_path, const std::string& reference_path,
       metrics.pixels, metrics.rmse, metrics.rel_mse_trimmed, 100 * trimmed_share,
       metrics.rel_mse_untrimmed, metrics.mean_a, metrics.mean_b, metrics.mean_ratio,
       metrics.channel_mean_ratio[0], metrics.channel_mean_ratio[1], metrics.channel_mean_ratio[2]);
-  std::fputs(text.c_str(), stdout);
+  std::fputs(EscapedLines(text).c_str(), stdout);
   if (metrics.reference_rel_mse && metrics.reference_mse) {
     const std::string of_reference = absl::StrFormat(
         "the reference's noise: relMSE trimmed %.6g, untrimmed %.6g; RMSE %.6g\n"
@@ -97,7 +98,7 @@ Status PrintDigest(const std::string& exr_path, const OutputOptions& output_opti
   LUCERNA_ASSIGN_OR_RETURN(const Image image, ReadImage(exr_path));
   const std::string text =
       output_options.json ? DigestReport(image) : absl::StrCat(image.PixelDigest().Hex(), "\n");
-  std::fputs(text.c_str(), stdout);
+  std::fputs(EscapedLines(text).c_str(), stdout);
   return absl::OkStatus();
 }
 

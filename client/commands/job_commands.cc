@@ -158,7 +158,7 @@ Status Render(const RenderRequest& request, const ClusterOptions& cluster_option
   return job.status();
 }
 
-Status Submit(const RenderRequest& request, const std::string& server,
+Status Submit(const RenderRequest& request, const Endpoint& server,
               const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
@@ -182,7 +182,7 @@ Status Submit(const RenderRequest& request, const std::string& server,
   return SaveAndReport(*connection, *job, request.outputs, output_options);
 }
 
-Status ListJobs(const std::string& server, const OutputOptions& output_options) {
+Status ListJobs(const Endpoint& server, const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, connection->List());
   if (output_options.json) {
@@ -195,7 +195,7 @@ Status ListJobs(const std::string& server, const OutputOptions& output_options) 
   return absl::OkStatus();
 }
 
-Status Follow(const std::string& job_id, bool shows_progress, const std::string& server,
+Status Follow(const std::string& job_id, bool shows_progress, const Endpoint& server,
               const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(
@@ -208,7 +208,7 @@ Status Follow(const std::string& job_id, bool shows_progress, const std::string&
   return CheckSucceeded(job);
 }
 
-Status Fetch(const std::string& job_id, const OutputPaths& outputs, const std::string& server,
+Status Fetch(const std::string& job_id, const OutputPaths& outputs, const Endpoint& server,
              const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(outputs));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
@@ -237,7 +237,7 @@ StatusOr<std::optional<PageImage>> ImageOf(ClientConnection& connection,
 
 }  // namespace
 
-Status Report(const std::string& job_id, const ReportPaths& paths, const std::string& server,
+Status Report(const std::string& job_id, const ReportPaths& paths, const Endpoint& server,
               const OutputOptions& output_options) {
   if (!paths.html.empty() && !paths.csv.empty() && IsSameFile(paths.html, paths.csv)) {
     return Failure(ExitCode::kUsage,
@@ -282,13 +282,13 @@ Status Acknowledge(const StatusOr<v1::Job>& job, const OutputOptions& output_opt
 
 }  // namespace
 
-Status Cancel(const std::string& job_id, const std::string& server,
+Status Cancel(const std::string& job_id, const Endpoint& server,
               const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   return Acknowledge(connection->Cancel(job_id), output_options);
 }
 
-Status DeleteJob(const std::string& job_id, const std::string& server,
+Status DeleteJob(const std::string& job_id, const Endpoint& server,
                  const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_RETURN_IF_ERROR(connection->Delete(job_id));
@@ -296,13 +296,13 @@ Status DeleteJob(const std::string& job_id, const std::string& server,
   return absl::OkStatus();
 }
 
-Status StopJob(const std::string& job_id, const std::string& server,
+Status StopJob(const std::string& job_id, const Endpoint& server,
                const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   return Acknowledge(connection->Stop(job_id), output_options);
 }
 
-Status Extend(const std::string& job_id, const RenderOverrides& until, const std::string& server,
+Status Extend(const std::string& job_id, const RenderOverrides& until, const Endpoint& server,
               const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   return Acknowledge(connection->Extend(job_id, until), output_options);

@@ -10,6 +10,7 @@
 #include "client/output_options.h"
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
+#include "render/wire/channel.h"
 
 namespace lucerna {
 
@@ -37,18 +38,18 @@ struct RenderRequest {
 
 // Sends the job and prints its id; with outputs it waits and fetches too. An interruption leaves
 // the job running.
-[[nodiscard]] Status Submit(const RenderRequest& request, const std::string& server,
+[[nodiscard]] Status Submit(const RenderRequest& request, const Endpoint& server,
                             const OutputOptions& output_options);
 
-[[nodiscard]] Status ListJobs(const std::string& server, const OutputOptions& output_options);
+[[nodiscard]] Status ListJobs(const Endpoint& server, const OutputOptions& output_options);
 
 // Waits until the job has ended, with or without showing its progress.
 // Errors: FAILED_PRECONDITION when it did not succeed.
-[[nodiscard]] Status Follow(const std::string& job_id, bool shows_progress,
-                            const std::string& server, const OutputOptions& output_options);
+[[nodiscard]] Status Follow(const std::string& job_id, bool shows_progress, const Endpoint& server,
+                            const OutputOptions& output_options);
 
 [[nodiscard]] Status Fetch(const std::string& job_id, const OutputPaths& outputs,
-                           const std::string& server, const OutputOptions& output_options);
+                           const Endpoint& server, const OutputOptions& output_options);
 
 // Where a report goes; empty: not there. As JSON it goes to stdout when the output_options says so.
 struct ReportPaths {
@@ -58,21 +59,21 @@ struct ReportPaths {
 
 // Tells how a job went, be it over or not: image, error, workers.
 [[nodiscard]] Status Report(const std::string& job_id, const ReportPaths& paths,
-                            const std::string& server, const OutputOptions& output_options);
+                            const Endpoint& server, const OutputOptions& output_options);
 
 // Forgets a job that has ended.
-[[nodiscard]] Status DeleteJob(const std::string& job_id, const std::string& server,
+[[nodiscard]] Status DeleteJob(const std::string& job_id, const Endpoint& server,
                                const OutputOptions& output_options);
 
 // Ends the job with the image as it is.
-[[nodiscard]] Status StopJob(const std::string& job_id, const std::string& server,
+[[nodiscard]] Status StopJob(const std::string& job_id, const Endpoint& server,
                              const OutputOptions& output_options);
 
 // Gives the job a new end (passes, photons, time, error) and lets it go on.
 [[nodiscard]] Status Extend(const std::string& job_id, const RenderOverrides& until,
-                            const std::string& server, const OutputOptions& output_options);
+                            const Endpoint& server, const OutputOptions& output_options);
 
-[[nodiscard]] Status Cancel(const std::string& job_id, const std::string& server,
+[[nodiscard]] Status Cancel(const std::string& job_id, const Endpoint& server,
                             const OutputOptions& output_options);
 
 }  // namespace lucerna

@@ -3,9 +3,12 @@
 #include <charconv>
 #include <cstdio>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "client/connection.h"
 #include "client/exit_code.h"
+#include "client/foreign_text.h"
 #include "client/program_output.h"
 #include "client/view/photon_view.h"
 #include "client/view/report.h"
@@ -41,7 +44,7 @@ StatusOr<v1::PhotonKey> ReadKey(const PhotonRequest& request) {
 
 }  // namespace
 
-Status TracePhoton(const PhotonRequest& request, const std::string& server,
+Status TracePhoton(const PhotonRequest& request, const Endpoint& server,
                    const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const v1::PhotonKey key, ReadKey(request));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
@@ -55,16 +58,25 @@ Status TracePhoton(const PhotonRequest& request, const std::string& server,
                                                   " has the photons 0 to ", photons - 1,
                                                   "; there is no ", key.index()));
   }
-  LUCERNA_ASSIGN_OR_RETURN(
-      const std::string bytes,
-      OutputOf(request.program_folder + "/lucerna-worker",
-               {"--server", server, "--replay", request.job_id, "--pass",
-                std::to_string(key.pass()), "--index", std::to_string(key.index())}));
+  std::vector<std::string> flags = {"--server", server.address,
+                                    "--replay", request.job_id,
+                                    "--pass",   std::to_string(key.pass()),
+                                    "--index",  std::to_string(key.index())};
+  if (!server.tls.empty()) {
+    flags.insert(flags.end(), {"--tls-ca", server.tls.authority, "--tls-cert",
+                               server.tls.certificate, "--tls-key", server.tls.key});
+  }
+  if (!request.token_file.empty()) {
+    flags.insert(flags.end(), {"--token-file", request.token_file});
+  }
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes,
+                           OutputOf(request.program_folder + "/lucerna-worker", std::move(flags)));
   v1::PhotonPath path;
   if (!path.ParseFromString(bytes)) {
     return absl::DataLossError(
         "the worker program answered with something that is no photon's way");
   }
+  EscapeTexts(path);
   std::fputs((output_options.json ? PhotonReport(path) : PhotonPathText(path)).c_str(), stdout);
   return absl::OkStatus();
 }

@@ -10,6 +10,7 @@
 
 #include "client/output_options.h"
 #include "render/base/status.h"
+#include "render/wire/channel.h"
 
 namespace lucerna {
 
@@ -18,11 +19,12 @@ struct PhotonRequest {
   std::string photon;                 // "PASS:INDEX", or "INDEX"
   std::optional<std::uint64_t> pass;  // when `photon` names none; else 0
   std::string program_folder;         // holds lucerna-worker
+  std::string token_file = {};        // for lucerna-worker; empty: none
 };
 
 // Prints what the photon did, step by step.
 // Errors: Failure(kUsage) for a text that names no photon, or one that the job does not have.
-[[nodiscard]] Status TracePhoton(const PhotonRequest& request, const std::string& server,
+[[nodiscard]] Status TracePhoton(const PhotonRequest& request, const Endpoint& server,
                                  const OutputOptions& output_options);
 
 }  // namespace lucerna

@@ -245,15 +245,16 @@ std::vector<std::string> ErrorNotes(const v1::Job& job) {
 }
 
 std::string TableHead() {
-  return absl::StrFormat("%-24s %-10s %6s %10s %9s  %s", "JOB", "STATE", "PASSES", "PHOTONS",
-                         "TIME", "NAME");
+  return absl::StrFormat("%-33s %-10s %6s %10s %9s  %-12s %s", "JOB", "STATE", "PASSES", "PHOTONS",
+                         "TIME", "OWNER", "NAME");
 }
 
 std::string TableLine(const v1::Job& job) {
-  return absl::StrFormat("%-24s %-10s %6d %10s %9s  %s", job.job_id(), NameOf(job.state()),
+  return absl::StrFormat("%-33s %-10s %6d %10s %9s  %-12s %s", job.job_id(), NameOf(job.state()),
                          job.progress().passes(),
                          ShortCount(static_cast<double>(job.progress().photons())),
-                         ShortTime(FromProto(job.progress().running())), job.name());
+                         ShortTime(FromProto(job.progress().running())),
+                         job.owner().empty() ? "-" : job.owner(), job.name());
 }
 
 std::string ProgressPrinter::Update(const v1::Job& job, SteadyTime now) {

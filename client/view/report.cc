@@ -85,6 +85,7 @@ Json JobOf(const v1::Job& job) {
   Json json = {{"job_id", job.job_id()}, {"name", job.name()}, {"state", NameOf(job.state())}};
   if (job.state() == v1::JOB_STATE_SUCCEEDED) json["stop_reason"] = NameOf(job.stop_reason());
   if (job.state() == v1::JOB_STATE_FAILED) json["failure"] = job.failure();
+  if (!job.owner().empty()) json["owner"] = job.owner();
   if (job.no_workers()) json["no_workers"] = true;
   if (!job.condition().empty()) json["condition"] = job.condition();
   if (job.has_submitted_at()) {

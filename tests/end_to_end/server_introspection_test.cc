@@ -45,8 +45,8 @@ std::string FirstAnswer(const std::string& address, const std::string& method,
 }
 
 TEST(ServerIntrospectionTest, SaysThatItServesAndWhat) {
-  ChildProcess server(
-      {std::string(LUCERNA_BIN_DIR) + "/lucerna-server", "--listen", "127.0.0.1:0"});
+  ChildProcess server({std::string(LUCERNA_BIN_DIR) + "/lucerna-server", "--listen", "127.0.0.1:0",
+                       "--reflection"});
   ASSERT_TRUE(server.WaitForText("\n", std::chrono::seconds(60)));
   const std::string greeting = "listening on ";
   const std::string line = server.Output();

@@ -64,11 +64,26 @@ std::unique_ptr<CoordinatorProcess> CoordinatorProcess::Doomed(const std::string
   return coordinator;
 }
 
-std::unique_ptr<ChildProcess> CoordinatorProcess::StartWorker(const std::string& fault) const {
-  std::vector<std::string> command;
-  if (!fault.empty()) command = {"/usr/bin/env", "LUCERNA_FAIL_POINT=" + fault};
-  command.insert(command.end(), {kBin + "/lucerna-worker", "--server", address_, "--threads", "1"});
+std::unique_ptr<ChildProcess> CoordinatorProcess::StartFaultyWorker(
+    const std::string& fault) const {
+  return std::make_unique<ChildProcess>(std::vector<std::string>{
+      "/usr/bin/env", "LUCERNA_FAIL_POINT=" + fault, kBin + "/lucerna-worker", "--server",
+      address_, "--threads", "1"});
+}
+
+CoordinatorProcess::CoordinatorProcess(std::string address, Elsewhere /*tag*/)
+    : address_(std::move(address)), channel_(MakeChannel(address_)) {}
+
+std::unique_ptr<ChildProcess> CoordinatorProcess::StartWorker(
+    std::vector<std::string> more_flags) const {
+  std::vector<std::string> command = {kBin + "/lucerna-worker", "--server", address_, "--threads",
+                                      "1"};
+  command.insert(command.end(), more_flags.begin(), more_flags.end());
   return std::make_unique<ChildProcess>(std::move(command));
+}
+
+void CoordinatorProcess::UseSecurity(const TlsFiles& tls, const std::string& token) {
+  channel_ = MakeChannel({address_, tls, token});
 }
 
 StatusOr<std::string> CoordinatorProcess::TrySubmit(const SmallJob& job) {
@@ -94,6 +109,7 @@ StatusOr<std::string> CoordinatorProcess::TrySubmit(const SmallJob& job) {
   }
   v1::SubmitRequest request;
   request.set_request_id(job.request_id);
+  request.set_name(job.name);
   *request.mutable_scene() = ToProto(manifest);
   RenderOverrides overrides;
   overrides.passes = job.passes;
@@ -131,9 +147,10 @@ Status CoordinatorProcess::TryDelete(const std::string& job_id) {
   return FromGrpc(v1::JobService::NewStub(channel_)->Delete(&context, request, &response));
 }
 
-std::string CoordinatorProcess::Submit(const std::string& scene, int passes, std::int64_t photons) {
+std::string CoordinatorProcess::Submit(const std::string& scene, int passes, std::int64_t photons,
+                                       const std::string& name) {
   const StatusOr<std::string> job =
-      TrySubmit({.scene = scene, .passes = passes, .photons = photons});
+      TrySubmit({.scene = scene, .passes = passes, .photons = photons, .name = name});
   EXPECT_TRUE(job.ok()) << job.status();
   return job.value_or("");
 }

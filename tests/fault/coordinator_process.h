@@ -10,6 +10,7 @@
 #include <grpcpp/grpcpp.h>
 
 #include "proto/lucerna/v1/jobs.pb.h"
+#include "render/base/certificate.h"
 #include "render/base/digest.h"
 #include "render/base/status.h"
 #include "tests/support/process.h"
@@ -30,6 +31,7 @@ struct SmallJob {
   int passes = 6;
   std::int64_t photons = 400'000;  // a pass
   std::string request_id = "the only one";
+  std::string name = {};  // empty: the scene's
 };
 
 class CoordinatorProcess {
@@ -43,12 +45,21 @@ class CoordinatorProcess {
                                                     std::vector<std::string> flags,
                                                     const std::string& address);
 
+  // A user of a coordinator that the test has started itself; there is no process().
+  enum class Elsewhere {};
+  CoordinatorProcess(std::string address, Elsewhere tag);
+
   [[nodiscard]] const std::string& address() const { return address_; }
   [[nodiscard]] ChildProcess& process() { return *process_; }
   [[nodiscard]] const std::shared_ptr<grpc::Channel>& channel() const { return channel_; }
 
-  // One with a `fault` kills itself at a step, or does wrong (render/base/fail_point.h).
-  [[nodiscard]] std::unique_ptr<ChildProcess> StartWorker(const std::string& fault = "") const;
+  [[nodiscard]] std::unique_ptr<ChildProcess> StartWorker(
+      std::vector<std::string> more_flags = {}) const;
+  // One that kills itself at a step, or does wrong (render/base/fail_point.h).
+  [[nodiscard]] std::unique_ptr<ChildProcess> StartFaultyWorker(const std::string& fault) const;
+
+  // From now on calls go over a connection of their own with these certificates and this token.
+  void UseSecurity(const TlsFiles& tls, const std::string& token);
 
   // The errors of these are those of the calls.
   // Uploads and submits; the job's id.
@@ -58,7 +69,8 @@ class CoordinatorProcess {
   [[nodiscard]] Status TryDelete(const std::string& job_id);
 
   // These must succeed.
-  std::string Submit(const std::string& scene, int passes, std::int64_t photons);
+  std::string Submit(const std::string& scene, int passes, std::int64_t photons,
+                     const std::string& name = {});
   v1::Job Get(const std::string& job_id);
   std::vector<v1::Job> List();
   // The job when it has ended, or as it is after some minutes.

@@ -78,7 +78,7 @@ class KilledAtCommitTest : public testing::TestWithParam<const char*> {};
 
 TEST_P(KilledAtCommitTest, AnotherWorkerBringsTheSameBits) {
   CoordinatorProcess coordinator({"--batch-photons", "100000"});
-  const auto doomed = coordinator.StartWorker(GetParam());
+  const auto doomed = coordinator.StartFaultyWorker(GetParam());
   const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
   ASSERT_EQ(doomed->WaitForExit(kPatience), 128 + SIGKILL) << doomed->Errors();
   const auto replacement = coordinator.StartWorker();
@@ -94,7 +94,7 @@ class KilledAtSliceTest : public testing::TestWithParam<const char*> {};
 
 TEST_P(KilledAtSliceTest, AnotherWorkerBringsTheSameBits) {
   CoordinatorProcess coordinator;
-  const auto doomed = coordinator.StartWorker(GetParam());
+  const auto doomed = coordinator.StartFaultyWorker(GetParam());
   const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
   ASSERT_EQ(doomed->WaitForExit(kPatience), 128 + SIGKILL) << doomed->Errors();
   const auto replacement = coordinator.StartWorker();
@@ -187,7 +187,7 @@ bool HasOneInQuarantine(const std::vector<v1::Worker>& workers) {
 // Found without an audit: the energy is not that of the scene's lights.
 TEST(LiarTest, ThatReturnsZerosIsFoundAtOnce) {
   CoordinatorProcess coordinator({"--batch-photons", "20000", "--audit-share", "0"});
-  const auto liar = coordinator.StartWorker("result.zeros");
+  const auto liar = coordinator.StartFaultyWorker("result.zeros");
   ASSERT_TRUE(liar->WaitForText("joined", kPatience));
   const auto honest = coordinator.StartWorker();
   ASSERT_TRUE(honest->WaitForText("joined", kPatience));
@@ -201,7 +201,7 @@ TEST(LiarTest, ThatReturnsZerosIsFoundAtOnce) {
 // computed by the liar, and of every batch the chance to be audited is 0.3.
 TEST(LiarTest, ThatChangesOneBitIsFoundByAuditsAndItsWorkIsTakenOut) {
   CoordinatorProcess coordinator({"--batch-photons", "20000", "--audit-share", "0.3"});
-  const auto liar = coordinator.StartWorker("result.flipped");
+  const auto liar = coordinator.StartFaultyWorker("result.flipped");
   const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
   // While it is alone its work is believed.
   ASSERT_TRUE(WaitForPhotons(coordinator, job, 1));
@@ -220,7 +220,7 @@ TEST(LiarTest, IsTakenOutOfCheckpointsToo) {
   {
     CoordinatorProcess coordinator(
         {"--audit-share", "0.3", "--state", folder.path(), "--checkpoint-share", "1"});
-    const auto liar = coordinator.StartWorker("result.flipped");
+    const auto liar = coordinator.StartFaultyWorker("result.flipped");
     const SmallJob small = {.scene = kScene, .passes = 60, .photons = 20'000};
     const std::string job = coordinator.TrySubmit(small).value();
     ASSERT_TRUE(WaitForPhotons(coordinator, job, 5 * 20'000));

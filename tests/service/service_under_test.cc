@@ -95,7 +95,8 @@ ServiceUnderTest::ServiceUnderTest(double audit_share) {
   options.audit_share = audit_share;
   options.numeric_profile = kNumericProfile;
   coordinator_ = std::make_unique<Coordinator>(options, clock_);
-  assets_ = std::make_unique<AssetService>(coordinator_->blobs(), pools_);
+  assets_ =
+      std::make_unique<AssetService>(coordinator_->blobs(), pools_, &coordinator_->transfers());
   jobs_ = std::make_unique<JobService>(*coordinator_, pools_, clock_);
   images_ = std::make_unique<ImageService>(*coordinator_, pools_);
   workers_ = std::make_unique<WorkerService>(*coordinator_, pools_);

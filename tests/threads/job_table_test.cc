@@ -131,6 +131,37 @@ TEST(JobTableTest, FindsAJobByItsOwnIdOnly) {
   }
 }
 
+TEST(JobTableTest, AnIdHasARandomPartAndEachOwnerHasRequestIdsOfTheirOwn) {
+  JobTable::Options options = SmallTable();
+  int random = 0;
+  options.random_part = [&random] { return "r" + std::to_string(++random); };
+  options.max_waiting = 10;
+  options.max_waiting_of_owner = 2;
+  JobTable table(options);
+  const auto add = [&table](const std::string& request_id, const std::string& owner) {
+    CheckedJob job = JobOf(request_id);
+    job.submission.owner = owner;
+    return table.Add(std::move(job), WallTime(), At(0));
+  };
+  ASSERT_EQ(add("a", "alice")->job_id, "t-1-r1");
+  EXPECT_TRUE(table.Find("t-1-r1"));
+  for (const char* other : {"t-1", "t-1-", "t-1-r2", "t-1-r1-", "t-1-r", "t-2-r1"})
+    EXPECT_FALSE(table.Find(other)) << other;
+  EXPECT_EQ(add("a", "alice")->job_id, "t-1-r1") << "the same request";
+  EXPECT_EQ(add("a", "bob")->job_id, "t-2-r2");
+  EXPECT_EQ(add("a", "")->job_id, "t-3-r3");
+  EXPECT_EQ(*table.OwnerOf("t-2-r2"), "bob");
+  EXPECT_TRUE(absl::IsNotFound(table.OwnerOf("t-2").status()));
+  EXPECT_EQ(table.FindRequest("a", "bob")->job_id, "t-2-r2");
+  EXPECT_FALSE(table.FindRequest("a", "carol"));
+
+  ASSERT_TRUE(add("b", "alice").ok());
+  EXPECT_TRUE(absl::IsResourceExhausted(add("c", "alice").status())) << "two have not ended";
+  EXPECT_TRUE(add("c", "bob").ok()) << "others are not held up";
+  ASSERT_TRUE(table.Cancel("t-1-r1", At(1)).ok());
+  EXPECT_TRUE(add("c", "alice").ok());
+}
+
 TEST(JobTableTest, ACancelBeforeTheRunnerKeepsItFromRunning) {
   JobTable table(SmallTable());
   const std::string job = Added(table, "a");

@@ -123,7 +123,7 @@ class ConnectionTest : public testing::Test {
     builder.RegisterService(&jobs_);
     builder.RegisterService(&images_);
     server_ = builder.BuildAndStart();
-    auto opened = ClientConnection::Open("127.0.0.1:" + std::to_string(port));
+    auto opened = ClientConnection::Open(Endpoint{"127.0.0.1:" + std::to_string(port)});
     EXPECT_TRUE(opened.ok()) << opened.status();
     connection_ = std::move(opened).value();
     files_.bytes = {{"a.pbrt", "the main file"},
@@ -224,7 +224,7 @@ TEST_F(ConnectionTest, NamesACoordinatorThatIsGone) {
 }
 
 TEST(ConnectionOpenTest, NamesACoordinatorThatIsNotThere) {
-  const Status status = ClientConnection::Open("127.0.0.1:1").status();
+  const Status status = ClientConnection::Open(Endpoint{"127.0.0.1:1"}).status();
   EXPECT_EQ(ExitCodeOf(status), ExitCode::kUnreachable) << status;
   EXPECT_NE(std::string(status.message()).find("cannot reach the coordinator at 127.0.0.1:1"),
             std::string::npos);
