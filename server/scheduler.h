@@ -78,7 +78,7 @@ struct SchedulerOptions {
   int speculate_after = 3;
   Duration speculate_at_least = std::chrono::seconds(1);
   Duration speculate_unknown = std::chrono::seconds(30);  // while no median is known
-  std::size_t max_holders = 3;  // of one batch at a time
+  std::size_t max_holders = 3;                            // of one batch at a time
   // A lease this many times older than the median batch is not renewed, but it is for
   // renew_at_least, and while no median is known for renew_unknown. Each time that a batch is taken
   // back so, its next lease may become twice as old: a batch that is slow for good reason ends too.

@@ -195,13 +195,13 @@ TEST_F(TrustTest, AWorkerThatIsDrainedOrInQuarantineIsLentNothingUntilItIsReleas
   EXPECT_TRUE(list.workers(0).is_connected());
   EXPECT_GE(list.workers(0).committed(), 2U);
   order(&v1::AdminService::Stub::ReleaseWorker, id);
-  EXPECT_TRUE(is_lent());
+  EXPECT_TRUE(worker.TakeLease());
   EXPECT_EQ(order(&v1::AdminService::Stub::QuarantineWorker, id).message.reason(),
             "by an operator");
   EXPECT_FALSE(is_lent());
   EXPECT_EQ(order(&v1::AdminService::Stub::ReleaseWorker, id).message.state(),
             v1::WORKER_STATE_ACTIVE);
-  EXPECT_TRUE(is_lent());
+  EXPECT_TRUE(worker.TakeLease());
 }
 
 TEST_F(AuditedTest, WithTwoWorkersEveryBatchIsComparedAndThePhotonsCountOnce) {
