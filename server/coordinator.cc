@@ -1,6 +1,10 @@
 #include "server/coordinator.h"
 
 #include <algorithm>
+#include <exception>
+#include <future>
+#include <list>
+#include <new>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -50,6 +54,7 @@ Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<Du
       scheduler_(OptionsFor(options_, instance_)),
       intake_(blobs_, options_.max_job_bytes),
       jobs_({.instance = state_ ? state_->instance() : instance_,
+             .max_at_once = options_.jobs_at_once,
              .retention = options_.retention,
              .journal = state_.get()}) {
   if (state_) {
@@ -58,6 +63,7 @@ Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<Du
     jobs_.Restore(state_->TakeJobs(), state_->next_serial(), Now());
     RemoveUnneeded();
   }
+  jobs_.SetLiveWorkers(0, Now());
   job_thread_ = std::thread([this] { RunJobs(); });
 }
 
@@ -83,8 +89,9 @@ void Coordinator::Close() {
 
 void Coordinator::Tick() {
   scheduler_.Expire(clock_.Steady());
-  StopPoisonedJobs();
+  PausePoisonedJobs();
   AnswerParked();
+  jobs_.SetLiveWorkers(scheduler_.LiveWorkers(), Now());
   if (state_ && clock_.Steady() >= save_unsaved_at_) {
     save_unsaved_at_ = clock_.Steady() + kSaveUnsavedEvery;
     jobs_.SaveUnsaved(Now());
@@ -158,9 +165,10 @@ StatusOr<JobReport> Coordinator::ReportOf(const std::string& job_id) const {
   return WithWorkers(jobs_.ReportOf(job_id, Now()));
 }
 
-std::pair<std::vector<JobReport>, std::uint64_t> Coordinator::List(std::size_t count,
+std::pair<std::vector<JobReport>, std::uint64_t> Coordinator::List(const JobFilter& filter,
+                                                                   std::size_t count,
                                                                    std::uint64_t before) const {
-  auto page = jobs_.List(count, before, Now());
+  auto page = jobs_.List(filter, count, before, Now());
   const int workers = scheduler_.LiveWorkers();
   for (JobReport& report : page.first)
     report.workers = workers;
@@ -181,6 +189,35 @@ StatusOr<JobReport> Coordinator::Extend(const std::string& job_id, const RenderO
   StatusOr<JobReport> report = WithWorkers(jobs_.Extend(job_id, until, Now()));
   if (report.ok()) spdlog::info("job {} has a new end", job_id);
   return report;
+}
+
+StatusOr<JobReport> Coordinator::Pause(const std::string& job_id) {
+  StatusOr<JobReport> report =
+      WithWorkers(jobs_.Pause(job_id, PauseCause::kUser, "paused by its user", Now()));
+  if (report.ok()) spdlog::info("job {} is paused", job_id);
+  return report;
+}
+
+StatusOr<JobReport> Coordinator::Resume(const std::string& job_id) {
+  StatusOr<JobReport> report = WithWorkers(jobs_.Resume(job_id, Now()));
+  if (report.ok()) spdlog::info("job {} is resumed", job_id);
+  return report;
+}
+
+StatusOr<JobReport> Coordinator::SetPriority(const std::string& job_id, int priority) {
+  StatusOr<JobReport> report = WithWorkers(jobs_.SetPriority(job_id, priority, Now()));
+  if (report.ok()) {
+    spdlog::info("job {} has priority {}", job_id, priority);
+    UpdateClaim(job_id);
+  }
+  return report;
+}
+
+void Coordinator::UpdateClaim(const std::string& job_id) {
+  const MutexLock lock(claims_mutex_);
+  if (const std::optional<Job> job = jobs_.Find(job_id)) {
+    scheduler_.SetClaim(job_id, {.priority = job->priority, .owner = OwnerOf(*job)});
+  }
 }
 
 StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) const {
@@ -210,13 +247,43 @@ StatusOr<Blob> Coordinator::Encode(const JobTable::ImageSource& source, RenderRe
 }
 
 void Coordinator::RunJobs() {
+  std::list<std::future<void>> turns;
   while (std::optional<JobTable::Turn> turn = jobs_.WaitForTurn()) {
+    turns.remove_if([](const std::future<void>& under_way) {
+      return under_way.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    });
     const std::string job_id = turn->job_id;
-    Conclude(job_id, Render(*std::move(turn)));
+    try {
+      turns.push_back(std::async(std::launch::async, [this, turn = *std::move(turn)]() mutable {
+        RunTurn(std::move(turn));
+      }));
+    } catch (const std::exception& no_thread) {
+      Conclude(job_id, absl::ResourceExhaustedError(absl::StrCat(
+                           "the coordinator cannot begin a thread for the job (",
+                           no_thread.what(), "); submit it again later")));
+    }
   }
 }
 
-StatusOr<RenderResult> Coordinator::Render(JobTable::Turn turn) {
+void Coordinator::RunTurn(JobTable::Turn turn) {
+  const std::string job_id = turn.job_id;
+  StatusOr<RenderResult> result = absl::InternalError("no result");
+  try {
+    result = Render(turn);
+    if (result.ok() && result->gave_up_turn) {
+      jobs_.GiveUpTurn(job_id, Now());
+      return;
+    }
+    Conclude(job_id, std::move(result));
+  } catch (const std::bad_alloc&) {
+    // The job alone: what it had is freed with its runner.
+    Conclude(job_id, absl::ResourceExhaustedError(
+                         "the coordinator ran out of memory while it worked on the job; make the "
+                         "image or the scene smaller, or give the coordinator more memory"));
+  }
+}
+
+StatusOr<RenderResult> Coordinator::Render(JobTable::Turn& turn) {
   if (turn.runner) return turn.runner->Resume();
   ReferenceImage reference;
   if (turn.reference) {
@@ -328,7 +395,11 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
           .rounds = rounds_,
           .clock = clock_,
           .always_splits = options_.batch_photons > 0,
-          .on_running = [this, id] { jobs_.OnRunning(id, Now()); },
+          .on_running =
+              [this, id] {
+                jobs_.OnRunning(id, Now());
+                UpdateClaim(id);
+              },
           .on_warning = [this,
                          id](std::string warning) { jobs_.OnWarning(id, std::move(warning)); },
           .on_photon_steps = [this,
@@ -364,6 +435,8 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
                 spdlog::warn("job {} {}", id, why.ok() ? "goes on" : condition);
                 jobs_.SetCondition(id, condition, Now());
               },
+          .running = [this, id] { return jobs_.RunningOf(id, clock_.Steady()); },
+          .when_it_has_run = [this, id](Duration time) { return jobs_.WhenItHasRun(id, time); },
       });
 }
 
@@ -406,6 +479,7 @@ StatusOr<std::string> Coordinator::Register(const std::string& name, int threads
         "\"; their bits would differ, run the same build on both"));
   }
   std::string id = scheduler_.AddWorker(name, clock_.Steady());
+  jobs_.SetLiveWorkers(scheduler_.LiveWorkers(), Now());
   spdlog::info("worker {} joined: {} with {} threads", id, name, threads);
   return id;
 }
@@ -433,7 +507,7 @@ std::uint64_t Coordinator::Sync(const std::string& worker, Scheduler::Report rep
     answer(heard);
     return 0;
   }
-  StopPoisonedJobs();
+  PausePoisonedJobs();
   // What came back with this report may be what others wait for.
   if (report.wants_lease || !report.failures.empty()) AnswerParked();
   report.failures.clear();
@@ -470,7 +544,7 @@ void Coordinator::EndBroken(const ParkedSyncs::Call& broken) {
   spdlog::info("worker {} vanished", broken.worker);
   scheduler_.LoseWorker(broken.worker);
   broken.answer(absl::CancelledError("the connection broke"));
-  StopPoisonedJobs();
+  PausePoisonedJobs();
 }
 
 // Calls of workers whose leases have ended, then of those that can be lent something, as long as
@@ -547,6 +621,7 @@ StatusOr<MergeOutcome> Coordinator::Commit(const Delivery& delivery, std::string
   // Also of a duplicate: nobody need trace it any more.
   scheduler_.Commit(delivery.pass, delivery.range, now);
   if (outcome == MergeOutcome::kDuplicate) return outcome;
+  scheduler_.CountWork(delivery.pass.job_id, delivery.kind, delivery.range.size(), delivery.cpu);
   jobs_.CountMerged(delivery, counts, scheduler_.NameOf(delivery.worker), now);
   if (counts.tally.dropped > 0 || counts.tally.excess > 0) {
     spdlog::warn(
@@ -563,9 +638,13 @@ void Coordinator::Goodbye(const std::string& worker) {
   AnswerParked();
 }
 
-void Coordinator::StopPoisonedJobs() {
-  for (const Scheduler::Poisoned& poisoned : scheduler_.TakePoisoned())
-    jobs_.Fail(poisoned.pass.job_id, absl::AbortedError(poisoned.message), Now());
+void Coordinator::PausePoisonedJobs() {
+  for (const Scheduler::Poisoned& poisoned : scheduler_.TakePoisoned()) {
+    const std::string reason =
+        absl::StrCat("paused: ", poisoned.message, "; lucerna resume lends it again");
+    if (jobs_.Pause(poisoned.pass.job_id, PauseCause::kFailedBatch, reason, Now()).ok())
+      spdlog::warn("job {} is {}", poisoned.pass.job_id, reason);
+  }
 }
 
 }  // namespace lucerna

@@ -2,9 +2,8 @@
 //
 // Wires the parts together and decides nothing itself: JobIntake checks submissions, JobTable holds
 // the jobs, Scheduler lends work, PassMerger and RoundMerger sum what comes back, ParkedSyncs holds
-// the calls of workers that wait, BlobStore the bytes, DurableState what outlives the process. One
-// thread of its own renders one job after
-// the other.
+// the calls of workers that wait, BlobStore the bytes, DurableState what outlives the process.
+// Threads of its own render jobs, one for each turn of a job.
 //
 // Threads: any. Nothing here waits for the network. Submit, Commit and ImageOf may take long: they
 // are for the threads of a WorkPool.
@@ -51,6 +50,7 @@ class Coordinator {
     std::uint64_t batch_photons = 0;  // 0: follows the number of workers
     std::string numeric_profile;
     RetentionLimits retention;
+    std::size_t jobs_at_once = 2;    // in progress
     double checkpoint_share = 0.01;  // of the time, in (0, 1]
   };
 
@@ -69,11 +69,18 @@ class Coordinator {
 
   // As the functions of JobTable.
   [[nodiscard]] StatusOr<JobReport> ReportOf(const std::string& job_id) const;
-  [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(std::size_t count,
+  [[nodiscard]] StatusOr<JobTable::News> NewsOf(const std::string& job_id) const {
+    return jobs_.NewsOf(job_id);
+  }
+  [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(const JobFilter& filter,
+                                                                      std::size_t count,
                                                                       std::uint64_t before) const;
   [[nodiscard]] StatusOr<JobReport> Cancel(const std::string& job_id);
   [[nodiscard]] StatusOr<JobReport> Stop(const std::string& job_id);
   [[nodiscard]] StatusOr<JobReport> Extend(const std::string& job_id, const RenderOverrides& until);
+  [[nodiscard]] StatusOr<JobReport> Pause(const std::string& job_id);
+  [[nodiscard]] StatusOr<JobReport> Resume(const std::string& job_id);
+  [[nodiscard]] StatusOr<JobReport> SetPriority(const std::string& job_id, int priority);
   // Also removes what no other job needs from the disk: may take long.
   [[nodiscard]] Status Delete(const std::string& job_id);
   // EXR bytes. Errors: NOT_FOUND, FAILED_PRECONDITION when there is no image (yet).
@@ -131,8 +138,12 @@ class Coordinator {
   Moment Now() const { return {clock_.Steady(), ProcessCpuTime(), clock_.Wall()}; }
   StatusOr<JobReport> WithWorkers(StatusOr<JobReport> report) const;
 
+  // Begins turns as they come, each in a thread of its own.
   void RunJobs();
-  StatusOr<RenderResult> Render(JobTable::Turn turn);
+  void RunTurn(JobTable::Turn turn);
+  StatusOr<RenderResult> Render(JobTable::Turn& turn);
+  // Gives the scheduler what decides the job's share of the workers.
+  void UpdateClaim(const std::string& job_id);
   std::shared_ptr<JobRunner> MakeRunner(const JobTable::Turn& turn);
   // Hands the job's newest checkpoint that can be used to its runner, if there is one.
   void RestoreCheckpoint(const std::string& job_id, JobRunner& runner);
@@ -153,7 +164,7 @@ class Coordinator {
   StatusOr<MergeOutcome> MergeSlice(const Delivery& delivery, std::string_view bytes,
                                     DeliveredCounts& counts);
 
-  void StopPoisonedJobs();
+  void PausePoisonedJobs();
   // What there is for a worker now; absent when it should wait on.
   std::optional<StatusOr<SyncAnswer>> TryAnswer(const std::string& worker,
                                                 const Scheduler::Report& report);
@@ -174,6 +185,7 @@ class Coordinator {
   const JobIntake intake_;
   ParkedSyncs parked_;
   JobTable jobs_;
+  Mutex claims_mutex_;  // held from reading a job's claim to giving it to the scheduler
   std::atomic<bool> is_lending_ = true;
   std::atomic<bool> is_closing_ = false;
   SteadyTime save_unsaved_at_;  // of the thread of Tick

@@ -76,6 +76,10 @@ struct RunnerHooks {
   double checkpoint_share = 0.01;
   // The job pauses and why, or goes on (OK).
   std::function<void(const Status& why)> on_pause;
+  // How long the job has run, and when it will have run so long (absent while its time stands
+  // still).
+  std::function<Duration()> running;
+  std::function<std::optional<SteadyTime>(Duration time)> when_it_has_run;
 };
 
 class JobRunner final : public RunningJob {
@@ -98,6 +102,7 @@ class JobRunner final : public RunningJob {
   void SetEnd(const RenderSettings& settings) override;
   void Reopen(const RenderSettings& settings) override;
   void Finish() override;
+  void SetGivesUpTurn(bool gives_up_turn) override;
   void Stop(Status why) override;
   void Wake() override;
   [[nodiscard]] std::optional<WorkBlobs> BlobsOf(std::uint64_t pass) const override;
@@ -134,6 +139,8 @@ class JobRunner final : public RunningJob {
   static End EndOf(const RenderSettings& settings);
 
   StatusOr<RenderResult> RunToEnd();
+  // The beginning of a run without open rounds.
+  void BeginRounds();
   StatusOr<RenderResult> RunRounds();
   // All that a later run follows from: the whole rounds taken in.
   std::string Save() const;
@@ -188,6 +195,7 @@ class JobRunner final : public RunningJob {
   // Waits for a wake, until `until` if there is one. False when Run must end now.
   bool WaitForChange(std::optional<SteadyTime> until);
   Status why_stopped() const;
+  bool gives_up_turn() const;
   PassKey KeyOf(std::uint64_t pass) const { return {job_id_, pass}; }
   RenderResult MakeResult(StopReason reason) const LUCERNA_REQUIRES(estimator_mutex_);
 
@@ -205,9 +213,8 @@ class JobRunner final : public RunningJob {
   ReferenceImage reference_;
   std::future<ErrorCheckpoint> estimate_;  // under way
   std::thread estimate_thread_;
-  Duration ran_before_{};
-  SteadyTime run_began_at_;  // less what ran before, without pauses
-  SteadyTime save_at_;       // no checkpoint is kept before this
+  bool gave_up_turn_ = false;  // rounds may be open
+  SteadyTime save_at_;         // no checkpoint is kept before this
   std::uint64_t saved_passes_ = 0;
   std::int64_t next_checkpoint_ = kFirstCheckpoint;
   int checkpoints_ = 0;
@@ -231,6 +238,7 @@ class JobRunner final : public RunningJob {
   bool was_woken_ LUCERNA_GUARDED_BY(mutex_) = false;
   End end_ LUCERNA_GUARDED_BY(mutex_);
   bool shall_finish_ LUCERNA_GUARDED_BY(mutex_) = false;
+  bool gives_up_turn_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::optional<Status> why_stopped_ LUCERNA_GUARDED_BY(mutex_);
   std::map<std::uint64_t, WorkBlobs> blobs_ LUCERNA_GUARDED_BY(mutex_);  // by first pass
 };

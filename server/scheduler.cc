@@ -69,8 +69,17 @@ void Scheduler::SetPlace(const std::string& id, Worker& worker, std::uint64_t pl
 void Scheduler::UpdateLendable(const PassKey& key, const Work& work) {
   if (work.HasBatches()) {
     lendable_.insert(key);
+    shares_.SetLendable(key.job_id, true);
   } else {
-    lendable_.erase(key);
+    EraseLendable(key);
+  }
+}
+
+void Scheduler::EraseLendable(const PassKey& key) {
+  lendable_.erase(key);
+  const auto next = lendable_.lower_bound({key.job_id, 0});
+  if (next == lendable_.end() || next->job_id != key.job_id) {
+    shares_.SetLendable(key.job_id, false);
   }
 }
 
@@ -144,7 +153,7 @@ std::optional<std::string> Scheduler::TakeWaiting(SteadyTime now) {
   const MutexLock lock(mutex_);
   const auto idle = idle_queue_.begin();
   const auto busy = busy_queue_.begin();
-  const bool may_be_idle = idle != idle_queue_.end() && (!lendable_.empty() || FindStraggler(now));
+  const bool may_be_idle = idle != idle_queue_.end() && (shares_.Next() || FindStraggler(now));
   const bool may_be_busy = busy != busy_queue_.end() &&
                            !(may_be_idle && idle->first < busy->first) && HasBatchesToSpare(now);
   if (!may_be_idle && !may_be_busy) return std::nullopt;
@@ -226,7 +235,33 @@ void Scheduler::Close(const PassKey& key) {
   }
   if (found->second.kind == WorkKind::kPasses) round_passes_ -= found->second.total;
   open_.erase(found);
-  lendable_.erase(key);
+  EraseLendable(key);
+}
+
+void Scheduler::SetClaim(const std::string& job_id, FairShare::Claim claim) {
+  const MutexLock lock(mutex_);
+  shares_.SetClaim(job_id, std::move(claim));
+}
+
+void Scheduler::SetHeld(const std::string& job_id, bool is_held) {
+  const MutexLock lock(mutex_);
+  shares_.SetHeld(job_id, is_held);
+  if (is_held) return;
+  for (auto work = open_.lower_bound({job_id, 0});
+       work != open_.end() && work->first.job_id == job_id; ++work)
+    work->second.losses.clear();
+}
+
+void Scheduler::CountWork(const std::string& job_id, WorkKind kind, std::uint64_t size,
+                          Duration worker_cpu) {
+  const MutexLock lock(mutex_);
+  shares_.CountWork(job_id, kind, size, worker_cpu);
+}
+
+void Scheduler::ForgetJob(const std::string& job_id) {
+  const MutexLock lock(mutex_);
+  const auto work = open_.lower_bound({job_id, 0});
+  if (work == open_.end() || work->first.job_id != job_id) shares_.Forget(job_id);
 }
 
 bool Scheduler::Expects(const PassKey& key, WorkKind kind, WorkRange range) const {
@@ -340,6 +375,7 @@ std::uint64_t Scheduler::SliceSize(const Work& work, SteadyTime now) const {
 bool Scheduler::HasBatchesToSpare(SteadyTime now) const {
   std::uint64_t batches = 0;
   for (const PassKey& key : lendable_) {
+    if (shares_.IsHeld(key.job_id)) continue;
     const Work& work = open_.at(key);
     batches += work.returned.size();
     if (work.rest.size() > 0) batches += CeilDivide(work.rest.size(), BatchSize(work, now));
@@ -349,11 +385,12 @@ bool Scheduler::HasBatchesToSpare(SteadyTime now) const {
 }
 
 std::optional<BatchLease> Scheduler::Lend(const std::string& worker_id, SteadyTime now) {
-  if (lendable_.empty()) return std::nullopt;
+  const std::optional<std::string> job_id = shares_.Next();
+  if (!job_id) return std::nullopt;
   // A worker that is busy fetches ahead only what the idle ones leave over; else one worker would
   // take a whole last pass and the others would stand by.
   if (!workers_.at(worker_id).leases.empty() && !HasBatchesToSpare(now)) return std::nullopt;
-  const PassKey key = *lendable_.begin();
+  const PassKey key = *lendable_.lower_bound({*job_id, 0});
   Work& work = open_.at(key);
   WorkRange range;
   if (!work.returned.empty()) {
@@ -383,9 +420,11 @@ std::optional<Scheduler::Straggler> Scheduler::FindStraggler(SteadyTime now) con
     if (!usual) continue;
     const double patience = std::max(*usual * static_cast<double>(size) * options_.speculate_after,
                                      Seconds(options_.speculate_at_least));
-    const auto& [lent_at, id] = *leases.begin();
-    if (Seconds(now - lent_at) < patience) continue;
-    const Lease& lease = leases_.at(id);
+    auto oldest = leases.begin();
+    while (oldest != leases.end() && shares_.IsHeld(leases_.at(oldest->second).pass.job_id))
+      ++oldest;
+    if (oldest == leases.end() || Seconds(now - oldest->first) < patience) continue;
+    const Lease& lease = leases_.at(oldest->second);
     if (const Straggler found = {lease.pass, lease.range}; !first || found < *first) first = found;
   }
   return first;
@@ -403,6 +442,7 @@ BatchLease Scheduler::Enter(const std::string& worker_id, const PassKey& key, Wo
                             SteadyTime now) {
   const std::string id = absl::StrCat(worker_id, "/", next_lease_++);
   Work& work = open_.at(key);
+  shares_.CountLent(key.job_id, work.kind, range.size());
   leases_[id] = {worker_id, key, range, work.kind, now, now + options_.lease_time};
   lease_deadlines_.emplace(now + options_.lease_time, id);
   Worker& worker = workers_.at(worker_id);

@@ -235,7 +235,7 @@ TEST(JobTableTest, AJobThatCannotBeWrittenDownIsRefusedAndLeavesNoTrace) {
   journal.is_full = true;
   EXPECT_TRUE(absl::IsResourceExhausted(table.Add(JobOf("a"), WallTime(), At(0)).status()));
   EXPECT_FALSE(table.FindRequest("a"));
-  EXPECT_TRUE(table.List(10, 0, At(0)).first.empty());
+  EXPECT_TRUE(table.List({}, 10, 0, At(0)).first.empty());
   journal.is_full = false;
   EXPECT_EQ(Added(table, "a"), "t-1") << "no number is lost";
 }
@@ -401,7 +401,7 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
               (void)table.FindImage(job, At(1));
               break;
             case 6:
-              (void)table.List(10, 0, At(1));
+              (void)table.List({}, 10, 0, At(1));
               (void)table.MakeLoan({}, 1);
               break;
             default:
@@ -413,7 +413,7 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
     }
     for (std::thread& caller : callers)
       caller.join();
-    const auto [reports, next] = table.List(1000, 0, At(3));
+    const auto [reports, next] = table.List({}, 1000, 0, At(3));
     for (const JobReport& report : reports)
       (void)table.Cancel(report.job.id, At(3));
     // Its turn comes and it runs to its end: the thread of jobs is not stuck with one before it.
