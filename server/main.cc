@@ -138,6 +138,10 @@ int Main(int argc, char** argv) {
   app.add_option("--threads", flags.coordinator.threads, "threads for eye paths; 0: all")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
+  app.add_option("--jobs-at-once", flags.coordinator.jobs_at_once,
+                 "jobs in progress, which share the workers")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   app.add_option("--max-store-bytes", flags.coordinator.max_store_bytes,
                  "memory for scene files and hitpoints [bytes]")
       ->capture_default_str();

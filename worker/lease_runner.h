@@ -6,6 +6,7 @@
 // worker is gone and tells which leases are of no use any more.
 #pragma once
 
+#include <deque>
 #include <atomic>
 #include <cstdint>
 #include <map>
@@ -83,8 +84,7 @@ class LeaseRunner {
   const Duration sync_every_;
 
   // Of the fetch stage alone: the job that the last lease was of.
-  std::string job_id_;
-  std::shared_ptr<const JobToTrace> job_;
+  std::deque<std::pair<std::string, std::shared_ptr<const JobToTrace>>> jobs_;  // newest first
 
   HandOver<Fetched> fetched_;
   HandOver<Computed> computed_;

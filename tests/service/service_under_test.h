@@ -65,7 +65,7 @@ class ServiceUnderTest {
  public:
   static constexpr const char* kNumericProfile = "the profile of these tests";
 
-  ServiceUnderTest();
+  explicit ServiceUnderTest(std::size_t jobs_at_once = 1);
   ~ServiceUnderTest();
   ServiceUnderTest(const ServiceUnderTest&) = delete;
   ServiceUnderTest& operator=(const ServiceUnderTest&) = delete;
@@ -107,6 +107,10 @@ class TestClient {
   Answer<v1::Job> Cancel(const std::string& job_id);
   Answer<v1::Job> Stop(const std::string& job_id);
   Answer<v1::Job> Extend(const std::string& job_id, std::int64_t passes);
+  Answer<v1::Job> Pause(const std::string& job_id);
+  Answer<v1::Job> Resume(const std::string& job_id);
+  Answer<v1::Job> SetPriority(const std::string& job_id, int priority);
+  Answer<v1::ListJobsResponse> List(const v1::ListJobsRequest& request = {});
   // The job as the last message of a watch has it. `at_each` may return false to leave.
   Answer<v1::Job> Watch(
       const std::string& job_id,

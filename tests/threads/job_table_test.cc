@@ -26,10 +26,11 @@ class FakeRunner final : public RunningJob {
  public:
   StatusOr<RenderResult> Run() {
     const MutexLock lock(mutex_);
-    while (!why_stopped_ && !is_finished_ && passes_ > 1)
+    while (!why_stopped_ && !is_finished_ && !gives_up_turn_ && passes_ > 1)
       changed_.Wait(mutex_);
     if (why_stopped_) return *why_stopped_;
     RenderResult result;
+    result.gave_up_turn = gives_up_turn_;
     result.reason = is_finished_ ? StopReason::kUser : StopReason::kPasses;
     return result;
   }
@@ -54,6 +55,11 @@ class FakeRunner final : public RunningJob {
     if (!why_stopped_) why_stopped_ = std::move(why);
     changed_.NotifyAll();
   }
+  void SetGivesUpTurn(bool gives_up_turn) override {
+    const MutexLock lock(mutex_);
+    gives_up_turn_ = gives_up_turn;
+    changed_.NotifyAll();
+  }
   void Wake() override {}
   std::optional<WorkBlobs> BlobsOf(std::uint64_t) const override { return WorkBlobs{}; }
   std::optional<std::size_t> HitpointsIn(const Digest&) const override { return 0; }
@@ -69,6 +75,7 @@ class FakeRunner final : public RunningJob {
   Condition changed_;
   std::int64_t passes_ = 0;
   bool is_finished_ = false;
+  bool gives_up_turn_ = false;
   std::optional<Status> why_stopped_;
 };
 
@@ -109,7 +116,9 @@ void RunTurns(JobTable& table) {
         result = runner->Run();
       }
     }
-    if (result.ok()) {
+    if (result.ok() && result->gave_up_turn) {
+      table.GiveUpTurn(turn->job_id, At(2));
+    } else if (result.ok()) {
       const Blob image = std::make_shared<const std::string>("image");
       table.Succeed(turn->job_id, result->reason, image, At(2));
     } else {
