@@ -36,6 +36,7 @@ bool JobLife::Prepare() {
 
 bool JobLife::Run(SteadyTime now) {
   if (state_ != JobState::kPreparing && state_ != JobState::kPaused) return false;
+  has_run_ = true;
   return GoTo(JobState::kRunning, now);
 }
 
@@ -61,7 +62,7 @@ bool JobLife::End(JobState state, SteadyTime now) {
 }
 
 bool JobLife::Succeed(StopReason reason, SteadyTime now) {
-  if (!End(JobState::kSucceeded, now)) return false;
+  if (!has_run_ || !End(JobState::kSucceeded, now)) return false;
   stop_reason_ = reason;
   return true;
 }

@@ -80,7 +80,8 @@ class JobLife {
   bool Pause(SteadyTime now);
   // Of a paused job: it waits for its next turn.
   bool Resume();
-  // Of any that has not ended: one that was paused, or gave up its turn, may be done by then.
+  // Of any that has run and has not ended: one that was paused, or gave up its turn, may be done by
+  // then.
   bool Succeed(StopReason reason, SteadyTime now);
   // Of a job that succeeded: it waits to go on.
   bool Extend();
@@ -111,6 +112,7 @@ class JobLife {
   StopReason stop_reason_ = StopReason::kNone;
   std::string failure_;
   SteadyTime submitted_at_;
+  bool has_run_ = false;  // in this process
   bool has_workers_ = true;
   Duration ran_before_{};                 // until time began to count, the last time
   std::optional<SteadyTime> started_at_;  // counting; absent: time stands still

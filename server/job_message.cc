@@ -404,7 +404,7 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
   if (message.has_ended_at()) job.ended_at = TimeOf(message.ended_at());
   job.priority = message.priority();
   job.pause_cause = CauseOf(message);
-  if (state == JobState::kPaused) job.condition = message.condition();
+  if (message.pause_cause() != v1::PAUSE_CAUSE_DISK) job.condition = message.condition();
   for (const v1::JobEvent& event : message.events())
     job.events.push_back({TimeOf(event.at()), event.what()});
   return result;

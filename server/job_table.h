@@ -63,9 +63,9 @@ struct JobReport {
 
 // Which jobs a list shows.
 struct JobFilter {
-  std::set<JobState> states;  // empty: all
-  std::string owner;          // empty: of any
-  std::string name_contains;
+  std::set<JobState> states = {};  // empty: all
+  std::string owner = {};          // empty: of any
+  std::string name_contains = {};
 };
 
 class JobTable {
