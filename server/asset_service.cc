@@ -13,8 +13,9 @@ namespace {
 
 class UploadReactor final : public grpc::ServerReadReactor<v1::UploadRequest> {
  public:
-  UploadReactor(BlobStore& blobs, WorkPool& pool, const grpc::CallbackServerContext* context)
-      : blobs_(blobs), pool_(pool), context_(context) {
+  UploadReactor(BlobStore& blobs, MemoryBudget& budget, WorkPool& pool,
+                const grpc::CallbackServerContext* context)
+      : blobs_(blobs), budget_(budget), pool_(pool), context_(context) {
     StartRead(&part_);
   }
 
@@ -45,17 +46,25 @@ class UploadReactor final : public grpc::ServerReadReactor<v1::UploadRequest> {
           absl::StrCat("a file of ", part_.header().size_bytes(), " bytes is larger than the ",
                        SceneLimits().max_total_bytes, " that are allowed"));
     }
+    LUCERNA_ASSIGN_OR_RETURN(claim_,
+                             budget_.Claim(MemoryUse::kUploads, part_.header().size_bytes()));
     collector_.emplace(digest_, part_.header().size_bytes());
     return absl::OkStatus();
   }
 
   Status Keep() {
     if (!collector_) return absl::InvalidArgumentError("an upload begins with a header");
-    LUCERNA_ASSIGN_OR_RETURN(std::string bytes, collector_->Finish());
-    return blobs_.Put(digest_, std::move(bytes));
+    return WithinMemory([this]() -> Status {
+      LUCERNA_ASSIGN_OR_RETURN(std::string bytes, collector_->Finish());
+      // From here on they are claimed as a blob.
+      claim_ = MemoryClaim();
+      return blobs_.Put(digest_, std::move(bytes));
+    });
   }
 
   BlobStore& blobs_;
+  MemoryBudget& budget_;
+  MemoryClaim claim_;
   WorkPool& pool_;
   const grpc::CallbackServerContext* const context_;
   v1::UploadRequest part_;
@@ -85,7 +94,7 @@ grpc::ServerUnaryReactor* AssetService::FindMissing(grpc::CallbackServerContext*
 
 grpc::ServerReadReactor<v1::UploadRequest>* AssetService::Upload(
     grpc::CallbackServerContext* context, v1::UploadResponse* /*response*/) {
-  return new UploadReactor(blobs_, pools_.uploads, context);
+  return new UploadReactor(blobs_, budget_, pools_.uploads, context);
 }
 
 }  // namespace lucerna

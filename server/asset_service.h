@@ -16,8 +16,9 @@ namespace lucerna {
 
 class AssetService final : public v1::AssetService::CallbackService {
  public:
-  // Both outlive the service.
-  AssetService(BlobStore& blobs, WorkPools& pools) : blobs_(blobs), pools_(pools) {}
+  // All outlive the service.
+  AssetService(BlobStore& blobs, MemoryBudget& budget, WorkPools& pools)
+      : blobs_(blobs), budget_(budget), pools_(pools) {}
 
   grpc::ServerUnaryReactor* FindMissing(grpc::CallbackServerContext* context,
                                         const v1::FindMissingRequest* request,
@@ -27,6 +28,7 @@ class AssetService final : public v1::AssetService::CallbackService {
 
  private:
   BlobStore& blobs_;
+  MemoryBudget& budget_;
   WorkPools& pools_;
 };
 

@@ -15,6 +15,7 @@
 #include "render/wire/slice_codec.h"
 #include "server/job_image.h"
 #include "server/job_message.h"
+#include "server/memory_need.h"
 
 namespace lucerna {
 namespace {
@@ -32,8 +33,16 @@ std::string InstanceName(const Clock& clock) {
 }
 
 Coordinator::Options WithMemory(Coordinator::Options options) {
-  if (options.max_job_bytes == 0) options.max_job_bytes = AvailableMemory();
+  if (options.max_memory_bytes == 0) options.max_memory_bytes = AvailableMemory();
+  if (options.max_job_bytes == 0) options.max_job_bytes = options.max_memory_bytes;
   return options;
+}
+
+std::uint64_t SceneBytes(const SceneManifest& manifest) {
+  std::uint64_t bytes = 0;
+  for (const auto& [path, file] : manifest.entries)
+    bytes += file.size_bytes;
+  return bytes;
 }
 
 SchedulerOptions OptionsFor(const Coordinator::Options& options, const std::string& instance) {
@@ -50,13 +59,17 @@ Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<Du
       clock_(clock),
       instance_(InstanceName(clock)),
       state_(std::move(state)),
-      blobs_(options_.max_store_bytes, state_ ? &state_->blobs() : nullptr),
+      budget_(options_.max_memory_bytes),
+      blobs_(options_.max_store_bytes, state_ ? &state_->blobs() : nullptr, &budget_),
       scheduler_(OptionsFor(options_, instance_)),
       intake_(blobs_, options_.max_job_bytes),
       jobs_({.instance = state_ ? state_->instance() : instance_,
              .max_at_once = options_.jobs_at_once,
              .retention = options_.retention,
              .journal = state_.get()}) {
+  // What is easily had again first, then what only a job that goes on needs.
+  budget_.AddCache([this] { return blobs_.DropOldest(); });
+  budget_.AddCache([this] { return jobs_.DropOldestPhotons(); });
   if (state_) {
     for (const std::string& problem : state_->problems())
       spdlog::error("{}", problem);
@@ -109,6 +122,9 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
   if (!submission.validate_only) {
     if (auto earlier = jobs_.FindRequest(submission.request_id)) return *std::move(earlier);
   }
+  LUCERNA_ASSIGN_OR_RETURN(
+      const MemoryClaim for_reading,
+      budget_.Claim(MemoryUse::kScenes, SceneMemory(SceneBytes(submission.manifest))));
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
   if (submission.validate_only) return JobTable::Submitted{"", std::move(job.warnings)};
   StatusOr<JobTable::Submitted> submitted;
@@ -258,9 +274,9 @@ void Coordinator::RunJobs() {
         RunTurn(std::move(turn));
       }));
     } catch (const std::exception& no_thread) {
-      Conclude(job_id, absl::ResourceExhaustedError(absl::StrCat(
-                           "the coordinator cannot begin a thread for the job (",
-                           no_thread.what(), "); submit it again later")));
+      Conclude(job_id, absl::ResourceExhaustedError(
+                           absl::StrCat("the coordinator cannot begin a thread for the job (",
+                                        no_thread.what(), "); submit it again later")));
     }
   }
 }
@@ -285,6 +301,12 @@ void Coordinator::RunTurn(JobTable::Turn turn) {
 
 StatusOr<RenderResult> Coordinator::Render(JobTable::Turn& turn) {
   if (turn.runner) return turn.runner->Resume();
+  LUCERNA_ASSIGN_OR_RETURN(std::optional<MemoryClaim> memory, WaitForMemory(turn));
+  if (!memory) {
+    RenderResult later;
+    later.gave_up_turn = true;
+    return later;
+  }
   ReferenceImage reference;
   if (turn.reference) {
     LUCERNA_ASSIGN_OR_RETURN(reference, intake_.ReadReference(*turn.reference, turn.settings));
@@ -295,12 +317,44 @@ StatusOr<RenderResult> Coordinator::Render(JobTable::Turn& turn) {
     }));
     turn.scene = std::move(read.scene);
   }
-  const std::shared_ptr<JobRunner> runner = MakeRunner(turn);
+  const std::shared_ptr<JobRunner> runner = MakeRunner(turn, *std::move(memory));
   if (!jobs_.Attach(turn.job_id, runner)) return absl::CancelledError("the job has ended");
   LUCERNA_RETURN_IF_ERROR(
       runner->Prepare(*std::move(turn.scene), turn.needs, std::move(reference)));
   RestoreCheckpoint(turn.job_id, *runner);
   return runner->Resume();
+}
+
+StatusOr<std::optional<MemoryClaim>> Coordinator::WaitForMemory(const JobTable::Turn& turn) {
+  const std::uint64_t bytes = MemoryNeedOf(turn.needs, turn.settings, SceneBytes(turn.manifest),
+                                           /*keeps_checkpoints=*/state_ != nullptr);
+  bool has_waited = false;
+  while (true) {
+    StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kJobs, bytes);
+    if (!claim.ok() && bytes > budget_.max_bytes()) return claim.status();
+    if (claim.ok()) {
+      if (has_waited) jobs_.SetWaitsForMemory(turn.job_id, "", Now());
+      return std::optional<MemoryClaim>(*std::move(claim));
+    }
+    LUCERNA_RETURN_IF_ERROR(jobs_.CheckStillNeeded(turn.job_id));
+    if (!std::exchange(has_waited, true)) {
+      spdlog::info("job {} waits for memory", turn.job_id);
+      jobs_.SetWaitsForMemory(turn.job_id, "waits for memory that other jobs hold", Now());
+    }
+    if (jobs_.GivesUpTurn(turn.job_id)) return std::optional<MemoryClaim>();
+    budget_.WaitForRelease(kRetryPause);
+  }
+}
+
+Blob Coordinator::Claimed(Blob image) {
+  StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kImages, image->size());
+  if (!claim.ok()) return image;
+  struct Held {
+    Blob image;
+    MemoryClaim claim;
+  };
+  const std::string* const bytes = image.get();
+  return {std::make_shared<Held>(Held{std::move(image), *std::move(claim)}), bytes};
 }
 
 void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner) {
@@ -384,7 +438,7 @@ Status Coordinator::EndWell(const std::string& job_id, StopReason reason, const 
   }
 }
 
-std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
+std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, MemoryClaim memory) {
   const std::string id = turn.job_id;
   return std::make_shared<JobRunner>(
       id, turn.settings, options_.threads,
@@ -394,6 +448,7 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
           .passes = passes_,
           .rounds = rounds_,
           .clock = clock_,
+          .memory = std::make_shared<MemoryClaim>(std::move(memory)),
           .always_splits = options_.batch_photons > 0,
           .on_running =
               [this, id] {
@@ -448,7 +503,7 @@ void Coordinator::Conclude(const std::string& job_id, StatusOr<RenderResult> res
     const std::optional<JobTable::ImageSource> source = jobs_.DescribeRun(job_id, Now());
     if (!source) return;
     StatusOr<Blob> image = Encode(*source, *std::move(result));
-    failure = image.ok() ? EndWell(job_id, reason, *image) : image.status();
+    failure = image.ok() ? EndWell(job_id, reason, Claimed(*image)) : image.status();
     if (failure.ok()) {
       spdlog::info("job {} succeeded after {} passes and {:.1f} s", job_id, passes,
                    Seconds(source->running));

@@ -30,6 +30,7 @@
 #include "server/job_intake.h"
 #include "server/job_runner.h"
 #include "server/job_table.h"
+#include "server/memory_budget.h"
 #include "server/parked_syncs.h"
 #include "server/pass_merger.h"
 #include "server/round_merger.h"
@@ -43,7 +44,8 @@ namespace lucerna {
 class Coordinator {
  public:
   struct Options {
-    int threads = 0;  // for eye paths; 0: all
+    int threads = 0;                     // for eye paths; 0: all
+    std::uint64_t max_memory_bytes = 0;  // of all parts together; 0: what is free at the start
     std::uint64_t max_store_bytes = std::uint64_t{8} << 30;
     std::uint64_t max_job_bytes =
         0;  // of the image and the scene of one job; 0: what is free at the start
@@ -59,6 +61,7 @@ class Coordinator {
   ~Coordinator();
 
   [[nodiscard]] BlobStore& blobs() { return blobs_; }
+  [[nodiscard]] MemoryBudget& budget() { return budget_; }
 
   // Jobs ---------------------------------------------------------------------------------------
 
@@ -144,7 +147,13 @@ class Coordinator {
   StatusOr<RenderResult> Render(JobTable::Turn& turn);
   // Gives the scheduler what decides the job's share of the workers.
   void UpdateClaim(const std::string& job_id);
-  std::shared_ptr<JobRunner> MakeRunner(const JobTable::Turn& turn);
+  std::shared_ptr<JobRunner> MakeRunner(const JobTable::Turn& turn, MemoryClaim memory);
+  // Claims what the job needs, and waits for it while others have it; the job then leaves its place
+  // to others. Absent when the turn is to be given up.
+  // Errors: RESOURCE_EXHAUSTED when it will never fit, CANCELLED.
+  StatusOr<std::optional<MemoryClaim>> WaitForMemory(const JobTable::Turn& turn);
+  // The image as one that is claimed, if that is possible; it is kept in any case.
+  Blob Claimed(Blob image);
   // Hands the job's newest checkpoint that can be used to its runner, if there is one.
   void RestoreCheckpoint(const std::string& job_id, JobRunner& runner);
   Status KeepCheckpoint(const std::string& job_id, std::string sums, std::int64_t passes,
@@ -178,6 +187,7 @@ class Coordinator {
   const std::unique_ptr<DurableState> state_;
   // Held while files are added for a job, and while those without one are removed.
   Mutex files_mutex_;
+  MemoryBudget budget_;
   BlobStore blobs_;
   Scheduler scheduler_;
   PassMerger passes_;

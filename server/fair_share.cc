@@ -59,8 +59,8 @@ void FairShare::Forget(const std::string& job_id) {
   if (job == jobs_.end()) return;
   const Rank rank = RankOf(job->second);
   jobs_.erase(job);
-  const bool is_last = std::ranges::none_of(
-      jobs_, [&](const auto& item) { return RankOf(item.second) == rank; });
+  const bool is_last =
+      std::ranges::none_of(jobs_, [&](const auto& item) { return RankOf(item.second) == rank; });
   if (is_last) owners_.erase(rank);
 }
 

@@ -6,12 +6,13 @@
 //
 // What is lent is weighed by the processor time that workers say such work took, per photon or pass
 // of that job; before the first result of a job, a lease of it weighs as much as the one before it.
-// Only work lent while owners compete counts: who had nothing to lend for a while begins again where
-// the others are by then, neither with a credit nor with a debt. So jobs and owners of one priority
-// that always have work to lend never differ by more than one lease each, and none of them starves;
-// jobs of lower priority are lent what those of higher priority leave over.
+// Only work lent while owners compete counts: who had nothing to lend for a while begins again
+// where the others are by then, neither with a credit nor with a debt. So jobs and owners of one
+// priority that always have work to lend never differ by more than one lease each, and none of them
+// starves; jobs of lower priority are lent what those of higher priority leave over.
 //
-// Pure; locking is the caller's. There are a few jobs at a time, and each call looks at all of them.
+// Pure; locking is the caller's. There are a few jobs at a time, and each call looks at all of
+// them.
 #pragma once
 
 #include <array>

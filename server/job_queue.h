@@ -7,8 +7,8 @@
 // When all turns are taken, a job gives its turn up and waits again if the first of those that wait
 // has a higher priority, or the same priority and an owner with at least two turns fewer. So an
 // owner with one job never waits for several jobs of another owner, and turns do not change hands
-// back and forth: after the change, neither owner has two more than the other. Jobs of one owner and
-// one priority come in their order, each when one before it has ended.
+// back and forth: after the change, neither owner has two more than the other. Jobs of one owner
+// and one priority come in their order, each when one before it has ended.
 //
 // A job that cannot go on for now (no room on the disk, no worker) leaves its place to others and
 // keeps its turn: its thread waits where it is. When it goes on there may be one turn too many, and

@@ -31,6 +31,7 @@
 #include "server/blob_store.h"
 #include "server/job.h"
 #include "server/job_estimator.h"
+#include "server/memory_budget.h"
 #include "server/pass_merger.h"
 #include "server/round_merger.h"
 #include "server/running_job.h"
@@ -53,6 +54,8 @@ struct RunnerHooks {
   PassMerger& passes;
   RoundMerger& rounds;
   const Clock& clock;
+  // What the job holds; let go of with the runner.
+  std::shared_ptr<MemoryClaim> memory = nullptr;
   // Passes are never given out whole (for tests of batches of photons).
   bool always_splits = false;
   // Called on the runner's thread, never under a lock.

@@ -30,8 +30,8 @@ StatusOr<Submission> ReadSubmission(const v1::SubmitRequest& request) {
   submission.validate_only = request.validate_only();
   submission.priority = request.priority();
   if (submission.priority < kLowestPriority || submission.priority > kHighestPriority) {
-    return absl::InvalidArgumentError(absl::StrCat("a priority is a number from ", kLowestPriority,
-                                                   " to ", kHighestPriority));
+    return absl::InvalidArgumentError(
+        absl::StrCat("a priority is a number from ", kLowestPriority, " to ", kHighestPriority));
   }
   if (!request.reference_digest().empty()) {
     LUCERNA_ASSIGN_OR_RETURN(submission.reference, Digest::FromBytes(request.reference_digest()));
@@ -138,7 +138,7 @@ grpc::ServerUnaryReactor* JobService::Submit(grpc::CallbackServerContext* contex
     return absl::OkStatus();
   };
   pools_.scenes.Run(still_needed, [reactor, submit](const Status& may_begin) {
-    reactor->Finish(ToGrpc(may_begin.ok() ? submit() : may_begin));
+    reactor->Finish(ToGrpc(may_begin.ok() ? WithinMemory(submit) : may_begin));
   });
   return reactor;
 }
@@ -212,8 +212,7 @@ grpc::ServerUnaryReactor* JobService::SetPriority(grpc::CallbackServerContext* c
                                                   const v1::SetJobPriorityRequest* request,
                                                   v1::Job* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(
-      Put(coordinator_.SetPriority(request->job_id(), request->priority()), response));
+  reactor->Finish(Put(coordinator_.SetPriority(request->job_id(), request->priority()), response));
   return reactor;
 }
 

@@ -455,8 +455,8 @@ bool JobTable::ResumeLocked(std::uint64_t serial, Entry& entry) {
   return true;
 }
 
-StatusOr<JobReport> JobTable::Pause(const std::string& job_id, PauseCause cause,
-                                    std::string reason, const Moment& moment) {
+StatusOr<JobReport> JobTable::Pause(const std::string& job_id, PauseCause cause, std::string reason,
+                                    const Moment& moment) {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return UnknownJob(job_id);
@@ -500,8 +500,8 @@ StatusOr<JobReport> JobTable::Resume(const std::string& job_id, const Moment& mo
 StatusOr<JobReport> JobTable::SetPriority(const std::string& job_id, int priority,
                                           const Moment& moment) {
   if (priority < kLowestPriority || priority > kHighestPriority) {
-    return absl::InvalidArgumentError(absl::StrCat("a priority is a number from ", kLowestPriority,
-                                                   " to ", kHighestPriority));
+    return absl::InvalidArgumentError(
+        absl::StrCat("a priority is a number from ", kLowestPriority, " to ", kHighestPriority));
   }
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
@@ -557,14 +557,9 @@ std::optional<JobTable::Turn> JobTable::WaitForTurn() {
   // A job that ends while it waits leaves the queue in the same step.
   LUCERNA_CHECK(entry.job.life.Prepare());
   ++entry.version;
-  return Turn{entry.job.id,
-              entry.job.manifest,
-              entry.job.settings,
-              entry.job.needs,
-              entry.job.reference,
-              std::exchange(entry.scene, std::nullopt),
-              entry.runner,
-              TurnEnd(*this, *next)};
+  return Turn{entry.job.id,    entry.job.manifest,   entry.job.settings,
+              entry.job.needs, entry.job.reference,  std::exchange(entry.scene, std::nullopt),
+              entry.runner,    TurnEnd(*this, *next)};
 }
 
 void JobTable::EndTurn(std::uint64_t serial) {
@@ -589,6 +584,43 @@ void JobTable::GiveUpTurn(const std::string& job_id, const Moment& moment) {
                  [&](JobLife& life) { return life.GiveUpTurn(moment.now); })) {
     PushLocked(found->first, entry);
   }
+}
+
+void JobTable::SetWaitsForMemory(const std::string& job_id, std::string condition,
+                                 const Moment& moment) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  Entry& entry = found->second;
+  if (entry.job.life.state() != JobState::kPreparing) return;
+  queue_.SetHasPlace(found->first, condition.empty() && !entry.gives_up_turn);
+  if (!condition.empty()) entry.job.AddEvent(moment.wall, condition);
+  entry.job.condition = std::move(condition);
+  ++entry.version;
+  UpdateTurns();
+}
+
+bool JobTable::GivesUpTurn(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  return found != entries_.end() && found->second.gives_up_turn;
+}
+
+bool JobTable::DropOldestPhotons() {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  for (auto& [serial, entry] : entries_) {
+    if (!entry.job.life.has_ended() || queue_.HasTurn(serial)) continue;
+    const bool has_spare_image = entry.image && entry.image_digest;
+    if (!entry.runner && !has_spare_image) continue;
+    if (entry.runner) {
+      dropped.runners.push_back(std::exchange(entry.runner, nullptr));
+      dropped.pinned.push_back(std::exchange(entry.pinned, {}));
+    }
+    if (has_spare_image) dropped.images.push_back(std::exchange(entry.image, nullptr));
+    return true;
+  }
+  return false;
 }
 
 Duration JobTable::RunningOf(const std::string& job_id, SteadyTime now) const {
@@ -639,9 +671,8 @@ bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return false;
   Entry& entry = found->second;
-  const bool has_changed = ChangeLife(found->first, entry, moment, [&](JobLife& life) {
-    return life.Succeed(reason, moment.now);
-  });
+  const bool has_changed = ChangeLife(
+      found->first, entry, moment, [&](JobLife& life) { return life.Succeed(reason, moment.now); });
   if (!has_changed) return false;
   // One that was paused, or given another turn, when it was done already.
   queue_.Remove(found->first);

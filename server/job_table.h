@@ -6,8 +6,8 @@
 //
 // A job runs in turns (server/job_queue.h). A turn belongs to one thread from WaitForTurn until its
 // Turn is destroyed, and no other turn of the job begins meanwhile. It ends with the job, or before
-// that when the job is paused or gives way to another; the runner then keeps all it has, and goes on
-// in the next turn.
+// that when the job is paused or gives way to another; the runner then keeps all it has, and goes
+// on in the next turn.
 //
 // Ended jobs are remembered, with the images of the newest; the very newest also with all their
 // photons, so that they can go on (server/job_retention.h).
@@ -115,8 +115,10 @@ class JobTable {
   [[nodiscard]] StatusOr<News> NewsOf(const std::string& job_id) const;
   // Summaries of at most `count` jobs older than `before` (0: from the newest) that `filter` lets
   // pass, newest first, and where the next page begins (0: nowhere).
-  [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(
-      const JobFilter& filter, std::size_t count, std::uint64_t before, const Moment& moment) const;
+  [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(const JobFilter& filter,
+                                                                      std::size_t count,
+                                                                      std::uint64_t before,
+                                                                      const Moment& moment) const;
   [[nodiscard]] StatusOr<JobReport> Cancel(const std::string& job_id, const Moment& moment);
   // Pauses a job that has not ended, for `cause`; one that the user has paused stays so. Its place
   // is free at once; what is lent of it comes back and is kept. FAILED_PRECONDITION when it has
@@ -217,6 +219,15 @@ class JobTable {
   [[nodiscard]] bool Attach(const std::string& job_id, std::shared_ptr<RunningJob> runner);
   // The runner has given up its turn: unless it is paused or has ended, the job waits for its next.
   void GiveUpTurn(const std::string& job_id, const Moment& moment);
+  // The job whose turn it is waits for memory, and says so: it leaves its place to others. Empty:
+  // it goes on.
+  void SetWaitsForMemory(const std::string& job_id, std::string condition, const Moment& moment);
+  // Whether the turn of the job is to be given up.
+  [[nodiscard]] bool GivesUpTurn(const std::string& job_id) const;
+  // Lets go of the photons of the job that ended first of those that have some in memory, and of
+  // its image in memory if it is on the disk too; false when there is none. It can go on no more,
+  // unless its checkpoint is on the disk.
+  bool DropOldestPhotons();
   // How long the job has run, and JobLife::WhenItHasRun.
   [[nodiscard]] Duration RunningOf(const std::string& job_id, SteadyTime now) const;
   [[nodiscard]] std::optional<SteadyTime> WhenItHasRun(const std::string& job_id,

@@ -79,7 +79,7 @@ int Serve(const Flags& flags) {
   }
   Coordinator coordinator(flags.coordinator, clock, std::move(state));
   WorkPools pools;
-  AssetService assets(coordinator.blobs(), pools);
+  AssetService assets(coordinator.blobs(), coordinator.budget(), pools);
   JobService jobs(coordinator, pools, SystemClock());
   ImageService images(coordinator, pools);
   WorkerService workers(coordinator, pools);
@@ -141,6 +141,10 @@ int Main(int argc, char** argv) {
   app.add_option("--jobs-at-once", flags.coordinator.jobs_at_once,
                  "jobs in progress, which share the workers")
       ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  app.add_option("--max-memory", flags.coordinator.max_memory_bytes,
+                 "memory for all that the coordinator holds together [bytes]; 0: what is free at "
+                 "the start")
       ->capture_default_str();
   app.add_option("--max-store-bytes", flags.coordinator.max_store_bytes,
                  "memory for scene files and hitpoints [bytes]")

@@ -127,8 +127,8 @@ class Scheduler {
   // Sharing of workers among jobs (server/fair_share.h) ------------------------------------------
 
   void SetClaim(const std::string& job_id, FairShare::Claim claim);
-  // A held job is lent nothing, also not a second time; what is lent may come back. When it goes on,
-  // failures of its batches are forgotten.
+  // A held job is lent nothing, also not a second time; what is lent may come back. When it goes
+  // on, failures of its batches are forgotten.
   void SetHeld(const std::string& job_id, bool is_held);
   // A result of so many photons or passes came back, and took so long, as the worker says.
   void CountWork(const std::string& job_id, WorkKind kind, std::uint64_t size, Duration worker_cpu);
@@ -250,7 +250,7 @@ class Scheduler {
   std::map<std::uint64_t, std::string> idle_queue_ LUCERNA_GUARDED_BY(mutex_);
   std::map<std::uint64_t, std::string> busy_queue_ LUCERNA_GUARDED_BY(mutex_);
   std::set<std::string> affected_ LUCERNA_GUARDED_BY(mutex_);
-  std::set<PassKey> lendable_ LUCERNA_GUARDED_BY(mutex_);      // where HasBatches()
+  std::set<PassKey> lendable_ LUCERNA_GUARDED_BY(mutex_);  // where HasBatches()
   FairShare shares_ LUCERNA_GUARDED_BY(mutex_);
   std::uint64_t round_passes_ LUCERNA_GUARDED_BY(mutex_) = 0;  // `total` of all open rounds
   // Leases that are the only ones of their range, oldest first, by kind and size of the range.

@@ -6,9 +6,9 @@
 // worker is gone and tells which leases are of no use any more.
 #pragma once
 
-#include <deque>
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <string>

@@ -166,10 +166,9 @@ Status Submit(const RenderRequest& request, const std::string& server,
                            ReadScene(request.scene_path, request.overrides, output_options.quiet));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   DirectoryFiles files(SplitScenePath(request.scene_path).folder);
-  LUCERNA_ASSIGN_OR_RETURN(
-      const v1::SubmitResponse submitted,
-      SendJob(*connection, files, manifest, request.overrides, request.reference,
-              request.priority));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
+                           SendJob(*connection, files, manifest, request.overrides,
+                                   request.reference, request.priority));
   if (request.outputs.empty()) {
     Print(output_options.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
     return absl::OkStatus();

@@ -33,8 +33,7 @@ const std::vector<std::string>& QuietDigests() {
     const auto worker = coordinator.StartWorker();
     std::vector<std::string> found;
     for (const int passes : kPasses) {
-      const std::string job =
-          coordinator.TrySubmit(JobNamed(absl::StrCat(passes), passes)).value();
+      const std::string job = coordinator.TrySubmit(JobNamed(absl::StrCat(passes), passes)).value();
       EXPECT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
       found.push_back(coordinator.ImageDigest(job).Hex());
     }

@@ -116,8 +116,8 @@ TEST_F(ManyJobsTest, APausedJobIsLentNothingKeepsWhatComesBackAndGoesOnToItsEnd)
   const WorkerThread diligent(service_);
   const v1::Job ended = client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message;
   EXPECT_EQ(ended.progress().passes(), 12);
-  EXPECT_EQ(ended.progress().photons(), 12'000U) << "each once, also the " << photons
-                                                 << " from before the pause";
+  EXPECT_EQ(ended.progress().photons(), 12'000U)
+      << "each once, also the " << photons << " from before the pause";
   EXPECT_EQ(client_.Pause(job).code(), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_EQ(client_.Resume(job).code(), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_EQ(client_.Pause("unknown").code(), grpc::StatusCode::NOT_FOUND);

@@ -86,7 +86,7 @@ ServiceUnderTest::ServiceUnderTest(std::size_t jobs_at_once) {
   options.jobs_at_once = jobs_at_once;
   options.numeric_profile = kNumericProfile;
   coordinator_ = std::make_unique<Coordinator>(options, clock_);
-  assets_ = std::make_unique<AssetService>(coordinator_->blobs(), pools_);
+  assets_ = std::make_unique<AssetService>(coordinator_->blobs(), coordinator_->budget(), pools_);
   jobs_ = std::make_unique<JobService>(*coordinator_, pools_, clock_);
   images_ = std::make_unique<ImageService>(*coordinator_, pools_);
   workers_ = std::make_unique<WorkerService>(*coordinator_, pools_);
