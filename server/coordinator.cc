@@ -126,6 +126,12 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
       const MemoryClaim for_reading,
       budget_.Claim(MemoryUse::kScenes, SceneMemory(SceneBytes(submission.manifest))));
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
+  if (MemoryNeedOf(job.needs, job.settings, SceneBytes(submission.manifest), state_ != nullptr) >
+      budget_.max_bytes()) {
+    return absl::ResourceExhaustedError(
+        "the job needs more memory than the coordinator has for all jobs; make the image or the "
+        "scene smaller, or start the coordinator with a larger --max-memory");
+  }
   if (submission.validate_only) return JobTable::Submitted{"", std::move(job.warnings)};
   StatusOr<JobTable::Submitted> submitted;
   {
@@ -333,7 +339,7 @@ StatusOr<std::optional<MemoryClaim>> Coordinator::WaitForMemory(const JobTable::
     StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kJobs, bytes);
     if (!claim.ok() && bytes > budget_.max_bytes()) return claim.status();
     if (claim.ok()) {
-      if (has_waited) jobs_.SetWaitsForMemory(turn.job_id, "", Now());
+      jobs_.SetWaitsForMemory(turn.job_id, "", Now());
       return std::optional<MemoryClaim>(*std::move(claim));
     }
     LUCERNA_RETURN_IF_ERROR(jobs_.CheckStillNeeded(turn.job_id));

@@ -592,7 +592,7 @@ void JobTable::SetWaitsForMemory(const std::string& job_id, std::string conditio
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return;
   Entry& entry = found->second;
-  if (entry.job.life.state() != JobState::kPreparing) return;
+  if (entry.job.life.state() != JobState::kPreparing || entry.job.condition == condition) return;
   queue_.SetHasPlace(found->first, condition.empty() && !entry.gives_up_turn);
   if (!condition.empty()) entry.job.AddEvent(moment.wall, condition);
   entry.job.condition = std::move(condition);

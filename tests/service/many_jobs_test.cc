@@ -9,6 +9,7 @@
 #include "gtest/gtest.h"
 
 #include "render/math/rng.h"
+#include "render/wire/messages.h"
 #include "tests/service/service_under_test.h"
 
 namespace lucerna {
@@ -195,6 +196,59 @@ TEST_F(ManyJobsTest, OneRequestThirtyTimesAtOnceIsOneJob) {
     thread.join();
   EXPECT_EQ(std::set<std::string>(jobs.begin(), jobs.end()).size(), 1U);
   EXPECT_EQ(client_.List().message.jobs_size(), 1);
+}
+
+// The jobs of SmallScene need some 60 kB each.
+TEST(MemoryOfJobsTest, AJobThatDoesNotFitBesideOthersWaitsAndBlocksNobody) {
+  ServiceUnderTest service(2, 100'000);
+  TestClient client(service);
+  const v1::SceneManifest scene = client.Upload(SmallScene());
+  const std::string first = client.Submit(RequestFor(scene, "first", kEndless)).message.job_id();
+  ASSERT_TRUE(client.WaitFor(first, {v1::JOB_STATE_RUNNING}).ok());
+  const std::string second = client.Submit(RequestFor(scene, "second", 2)).message.job_id();
+  std::string condition;
+  for (int i = 0; i < 10'000 && condition.empty(); ++i) {
+    condition = client.Get(second).message.condition();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(condition, "waits for memory that other jobs hold");
+  EXPECT_EQ(client.Get(second).message.state(), v1::JOB_STATE_PREPARING);
+  // It has left its place to a smaller one.
+  v1::SubmitRequest small = RequestFor(scene, "small", 2);
+  RenderOverrides overrides;
+  overrides.passes = 2;
+  overrides.photons_per_pass = 1000;
+  overrides.radius_controller = RadiusControllerKind::kPppm;
+  overrides.width = 2;
+  overrides.height = 2;
+  *small.mutable_overrides() = ToProto(overrides);
+  const auto third = client.Submit(small);
+  ASSERT_TRUE(third.ok()) << third.status.error_message();
+  ASSERT_TRUE(client.WaitFor(third.message.job_id(), {v1::JOB_STATE_RUNNING}).ok());
+  EXPECT_TRUE(client.Cancel(first).ok());
+  EXPECT_TRUE(client.Cancel(third.message.job_id()).ok());
+  const WorkerThread worker(service);
+  const v1::Job ended = client.WaitFor(second, {v1::JOB_STATE_SUCCEEDED}).message;
+  EXPECT_EQ(ended.condition(), "");
+}
+
+TEST(MemoryOfJobsTest, WhatWillNeverFitIsRefusedAndEndedJobsLetGoOfTheirPhotons) {
+  ServiceUnderTest service(1, 100'000);
+  TestClient client(service);
+  EXPECT_EQ(client.UploadBytes(std::string(200'000, 'x')).error_code(),
+            grpc::StatusCode::RESOURCE_EXHAUSTED);
+  const v1::SceneManifest scene = client.Upload(SmallScene());
+  const WorkerThread worker(service);
+  std::string first;
+  for (const char* request : {"first", "second"}) {
+    const std::string job = client.Submit(RequestFor(scene, request, 2)).message.job_id();
+    EXPECT_TRUE(client.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).ok());
+    if (first.empty()) first = job;
+  }
+  EXPECT_EQ(client.Extend(first, 4).code(), grpc::StatusCode::FAILED_PRECONDITION)
+      << "the second needed its memory";
+  EXPECT_TRUE(client.Image(first).ok());
+  EXPECT_LE(service.coordinator().budget().held(), 100'000U);
 }
 
 // Whatever comes to them, jobs that are left to themselves in the end come to their ends, with each

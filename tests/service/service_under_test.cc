@@ -79,11 +79,12 @@ v1::SubmitRequest RequestFor(const v1::SceneManifest& scene, const std::string& 
 // Server
 // ---------------------------------------------------------------------------------------------
 
-ServiceUnderTest::ServiceUnderTest(std::size_t jobs_at_once) {
+ServiceUnderTest::ServiceUnderTest(std::size_t jobs_at_once, std::uint64_t max_memory_bytes) {
   spdlog::set_level(spdlog::level::err);
   Coordinator::Options options;
   options.threads = 1;
   options.jobs_at_once = jobs_at_once;
+  options.max_memory_bytes = max_memory_bytes;
   options.numeric_profile = kNumericProfile;
   coordinator_ = std::make_unique<Coordinator>(options, clock_);
   assets_ = std::make_unique<AssetService>(coordinator_->blobs(), coordinator_->budget(), pools_);

@@ -65,7 +65,7 @@ class ServiceUnderTest {
  public:
   static constexpr const char* kNumericProfile = "the profile of these tests";
 
-  explicit ServiceUnderTest(std::size_t jobs_at_once = 1);
+  explicit ServiceUnderTest(std::size_t jobs_at_once = 1, std::uint64_t max_memory_bytes = 0);
   ~ServiceUnderTest();
   ServiceUnderTest(const ServiceUnderTest&) = delete;
   ServiceUnderTest& operator=(const ServiceUnderTest&) = delete;
