@@ -8,8 +8,8 @@ namespace {
 
 // Of a lease, so that work without any time to speak of takes turns too [s].
 constexpr double kLeastWeight = 1e-3;
-// Of a lease, whatever a worker says [s].
-constexpr double kMostWeight = 1e5;
+// Of a lease, whatever a worker says [s]: one that lies must not starve a job for long.
+constexpr double kMostWeight = 600;
 // How much the newest result counts in what one photon or pass weighs.
 constexpr double kNewest = 0.25;
 

@@ -467,8 +467,9 @@ TEST(JobTableTest, PausesAndPrioritiesAreInALaterTableToo) {
   EXPECT_EQ(StateOf(table, "t-1"), JobState::kPaused);
   EXPECT_EQ(table.Find("t-1")->condition, "paused by its user");
   EXPECT_EQ(table.WaitForTurn()->job_id, "t-3");
+  EXPECT_EQ(table.WaitForTurn()->job_id, "t-2");
   ASSERT_TRUE(table.Resume("t-1", At(4)).ok());
-  EXPECT_EQ(table.WaitForTurn()->job_id, "t-1") << "by its number in the queue";
+  EXPECT_EQ(table.WaitForTurn()->job_id, "t-1");
 }
 
 // Time stands still; after a few seconds others are prepared, as if the jobs without workers were

@@ -130,8 +130,10 @@ TEST(FairShareTest, TimesThatCannotBeDoNotStarveAnybody) {
     shares.CountWork(job, kKind, 1, job == "a" ? -Duration::max() : Duration::zero());
   }
   EXPECT_EQ(leases["a"], 50);
-  shares.CountWork("a", kKind, 1, Duration::max());
   shares.CountWork("a", kKind, 0, Duration::max());
+  // One lie costs what some ten minutes of work cost, and is forgotten.
+  shares.CountWork("a", kKind, 4, Duration::max());
+  EXPECT_GT(Lend(shares, 4000, {{"a", 1}, {"b", 1}})["a"], 1000);
   for (int i = 0; i < 10; ++i)
     shares.CountLent(shares.Next().value(), kKind, UINT64_MAX);
   EXPECT_TRUE(shares.Next());
