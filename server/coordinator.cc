@@ -216,7 +216,11 @@ StatusOr<JobReport> Coordinator::Extend(const std::string& job_id, const RenderO
 StatusOr<JobReport> Coordinator::Pause(const std::string& job_id) {
   StatusOr<JobReport> report =
       WithWorkers(jobs_.Pause(job_id, PauseCause::kUser, "paused by its user", Now()));
-  if (report.ok()) spdlog::info("job {} is paused", job_id);
+  if (report.ok()) {
+    // From now on nothing is lent, though its thread may still be in the middle of a step.
+    UpdateClaim(job_id);
+    spdlog::info("job {} is paused", job_id);
+  }
   return report;
 }
 
@@ -237,9 +241,10 @@ StatusOr<JobReport> Coordinator::SetPriority(const std::string& job_id, int prio
 
 void Coordinator::UpdateClaim(const std::string& job_id) {
   const MutexLock lock(claims_mutex_);
-  if (const std::optional<Job> job = jobs_.Find(job_id)) {
-    scheduler_.SetClaim(job_id, {.priority = job->priority, .owner = OwnerOf(*job)});
-  }
+  const std::optional<JobTable::Share> share = jobs_.ShareOf(job_id);
+  if (!share) return;
+  scheduler_.SetClaim(job_id, {.priority = share->priority, .owner = share->owner});
+  scheduler_.SetHeld(job_id, share->is_held);
 }
 
 StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) const {
@@ -703,8 +708,9 @@ void Coordinator::PausePoisonedJobs() {
   for (const Scheduler::Poisoned& poisoned : scheduler_.TakePoisoned()) {
     const std::string reason =
         absl::StrCat("paused: ", poisoned.message, "; lucerna resume lends it again");
-    if (jobs_.Pause(poisoned.pass.job_id, PauseCause::kFailedBatch, reason, Now()).ok())
-      spdlog::warn("job {} is {}", poisoned.pass.job_id, reason);
+    if (!jobs_.Pause(poisoned.pass.job_id, PauseCause::kFailedBatch, reason, Now()).ok()) continue;
+    UpdateClaim(poisoned.pass.job_id);
+    spdlog::warn("job {} is {}", poisoned.pass.job_id, reason);
   }
 }
 

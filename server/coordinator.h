@@ -145,7 +145,7 @@ class Coordinator {
   void RunJobs();
   void RunTurn(JobTable::Turn turn);
   StatusOr<RenderResult> Render(JobTable::Turn& turn);
-  // Gives the scheduler what decides the job's share of the workers.
+  // Gives the scheduler what decides the job's share of the workers: after each change of that.
   void UpdateClaim(const std::string& job_id);
   std::shared_ptr<JobRunner> MakeRunner(const JobTable::Turn& turn, MemoryClaim memory);
   // Claims what the job needs, and waits for it while others have it; the job then leaves its place
@@ -195,7 +195,7 @@ class Coordinator {
   const JobIntake intake_;
   ParkedSyncs parked_;
   JobTable jobs_;
-  Mutex claims_mutex_;  // held from reading a job's claim to giving it to the scheduler
+  Mutex claims_mutex_;  // held from reading a job's share to giving it to the scheduler
   std::atomic<bool> is_lending_ = true;
   std::atomic<bool> is_closing_ = false;
   SteadyTime save_unsaved_at_;  // of the thread of Tick

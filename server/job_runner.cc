@@ -93,7 +93,6 @@ StatusOr<RenderResult> JobRunner::RunToEnd() {
   hooks_.on_running();
   if (!std::exchange(gave_up_turn_, false)) BeginRounds();
   save_at_ = hooks_.clock.Steady() + PauseAfterSave(kFirstSave, hooks_.checkpoint_share);
-  hooks_.scheduler.SetHeld(job_id_, false);
   hooks_.on_work_opened();
   StatusOr<RenderResult> result = RunRounds();
   // The process ends, and a later one may go on.

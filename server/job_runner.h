@@ -59,6 +59,7 @@ struct RunnerHooks {
   // Passes are never given out whole (for tests of batches of photons).
   bool always_splits = false;
   // Called on the runner's thread, never under a lock.
+  // A run begins; what is open may be lent from then on (Scheduler::SetHeld).
   std::function<void()> on_running;
   std::function<void(std::string warning)> on_warning;
   // How many photons passes have, each time that it changes.

@@ -237,6 +237,7 @@ void JobTable::End(std::uint64_t serial, Entry& entry, const Status& why, const 
   }
   // One whose turn it is keeps its files until the turn has ended.
   queue_.Remove(serial);
+  LeavePlace(serial);
   if (!queue_.HasTurn(serial)) dropped.pinned.push_back(std::exchange(entry.pinned, {}));
 }
 
@@ -439,6 +440,12 @@ void JobTable::SetGivesUpTurn(Entry& entry, bool gives_up_turn) {
   if (entry.runner) entry.runner->SetGivesUpTurn(gives_up_turn);
 }
 
+// The rest of its turn is short, and its record may be dropped before that has ended.
+void JobTable::LeavePlace(std::uint64_t serial) {
+  queue_.SetHasPlace(serial, false);
+  job_waits_.NotifyAll();
+}
+
 void JobTable::UpdateTurns() {
   while (const std::optional<std::uint64_t> serial = queue_.TakeYielding())
     SetGivesUpTurn(entries_.at(*serial), true);
@@ -600,6 +607,15 @@ void JobTable::SetWaitsForMemory(const std::string& job_id, std::string conditio
   UpdateTurns();
 }
 
+std::optional<JobTable::Share> JobTable::ShareOf(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end() || !found->second.runner) return std::nullopt;
+  const Job& job = found->second.job;
+  if (job.life.has_ended()) return std::nullopt;
+  return Share{job.priority, OwnerOf(job), found->second.gives_up_turn};
+}
+
 bool JobTable::GivesUpTurn(const std::string& job_id) const {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
@@ -676,6 +692,7 @@ bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,
   if (!has_changed) return false;
   // One that was paused, or given another turn, when it was done already.
   queue_.Remove(found->first);
+  LeavePlace(found->first);
   entry.is_finishing = false;
   entry.job.pause_cause = PauseCause::kNone;
   entry.job.ended_at = moment.wall;

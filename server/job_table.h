@@ -222,6 +222,13 @@ class JobTable {
   // The job whose turn it is waits for memory, and says so: it leaves its place to others. Empty:
   // it goes on.
   void SetWaitsForMemory(const std::string& job_id, std::string condition, const Moment& moment);
+  // What decides what is lent of a job that has a runner and has not ended; absent for others.
+  struct Share {
+    int priority = 0;
+    std::string owner;
+    bool is_held = false;  // nothing is lent
+  };
+  [[nodiscard]] std::optional<Share> ShareOf(const std::string& job_id) const;
   // Whether the turn of the job is to be given up.
   [[nodiscard]] bool GivesUpTurn(const std::string& job_id) const;
   // Lets go of the photons of the job that ended first of those that have some in memory, and of
@@ -300,6 +307,8 @@ class JobTable {
   // It waits for a turn.
   void PushLocked(std::uint64_t serial, Entry& entry) LUCERNA_REQUIRES(mutex_);
   void SetGivesUpTurn(Entry& entry, bool gives_up_turn) LUCERNA_REQUIRES(mutex_);
+  // Of a job that has ended, to others.
+  void LeavePlace(std::uint64_t serial) LUCERNA_REQUIRES(mutex_);
   // After a change of who waits, who has a place, or of priorities.
   void UpdateTurns() LUCERNA_REQUIRES(mutex_);
   bool ResumeLocked(std::uint64_t serial, Entry& entry) LUCERNA_REQUIRES(mutex_);

@@ -99,6 +99,7 @@ TEST_F(ManyJobsTest, APausedJobIsLentNothingKeepsWhatComesBackAndGoesOnToItsEnd)
   EXPECT_EQ(paused.state(), v1::JOB_STATE_PAUSED);
   EXPECT_EQ(paused.pause_cause(), v1::PAUSE_CAUSE_USER);
   EXPECT_EQ(paused.condition(), "paused by its user");
+  const std::uint64_t photons = paused.progress().photons();
   // Others have its place and its workers.
   const std::string other = Submit("other", 3);
   const std::string third = Submit("third", 3);
@@ -107,12 +108,13 @@ TEST_F(ManyJobsTest, APausedJobIsLentNothingKeepsWhatComesBackAndGoesOnToItsEnd)
     EXPECT_TRUE(client_.WaitFor(other, {v1::JOB_STATE_SUCCEEDED}).ok());
     EXPECT_TRUE(client_.WaitFor(third, {v1::JOB_STATE_SUCCEEDED}).ok());
   }
+  EXPECT_EQ(client_.Get(job).message.progress().photons(), photons) << "nothing of it was lent";
   const auto idle = worker.Sync(true, Duration::zero(), {lease.lease_id()});
   EXPECT_FALSE(idle.message.has_lease());
   EXPECT_EQ(idle.message.revoked_lease_ids_size(), 0);
   EXPECT_EQ(worker.Commit(lease).message.outcome(), v1::COMMIT_OUTCOME_ACCEPTED);
   EXPECT_TRUE(client_.Image(job).ok()) << "so far";
-  const std::uint64_t photons = client_.Get(job).message.progress().photons();
+  EXPECT_GT(client_.Get(job).message.progress().photons(), photons);
   EXPECT_EQ(client_.Resume(job).message.state(), v1::JOB_STATE_QUEUED);
   const WorkerThread diligent(service_);
   const v1::Job ended = client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message;
