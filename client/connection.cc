@@ -235,9 +235,9 @@ StatusOr<v1::SubmitResponse> ClientConnection::Submit(const v1::SubmitRequest& r
   return response;
 }
 
-StatusOr<std::vector<v1::Job>> ClientConnection::List() {
+StatusOr<std::vector<v1::Job>> ClientConnection::List(const v1::ListJobsRequest& filter) {
   std::vector<v1::Job> jobs;
-  v1::ListJobsRequest request;
+  v1::ListJobsRequest request = filter;
   request.set_page_size(200);
   for (;;) {
     v1::ListJobsResponse response;
@@ -281,6 +281,37 @@ StatusOr<v1::Job> ClientConnection::Stop(const std::string& job_id) {
     return jobs_->Stop(&context, request, &job);
   }));
   EscapeTexts(job);
+  return job;
+}
+
+StatusOr<v1::Job> ClientConnection::Pause(const std::string& job_id) {
+  v1::PauseJobRequest request;
+  request.set_job_id(job_id);
+  v1::Job job;
+  LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
+    return jobs_->Pause(&context, request, &job);
+  }));
+  return job;
+}
+
+StatusOr<v1::Job> ClientConnection::Resume(const std::string& job_id) {
+  v1::ResumeJobRequest request;
+  request.set_job_id(job_id);
+  v1::Job job;
+  LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
+    return jobs_->Resume(&context, request, &job);
+  }));
+  return job;
+}
+
+StatusOr<v1::Job> ClientConnection::SetPriority(const std::string& job_id, int priority) {
+  v1::SetJobPriorityRequest request;
+  request.set_job_id(job_id);
+  request.set_priority(priority);
+  v1::Job job;
+  LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
+    return jobs_->SetPriority(&context, request, &job);
+  }));
   return job;
 }
 

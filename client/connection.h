@@ -43,12 +43,15 @@ class ClientConnection {
   [[nodiscard]] StatusOr<Digest> UploadBytes(std::string_view bytes);
 
   [[nodiscard]] StatusOr<v1::SubmitResponse> Submit(const v1::SubmitRequest& request);
-  // All jobs, newest first.
-  [[nodiscard]] StatusOr<std::vector<v1::Job>> List();
+  // Summaries of all jobs that `filter` lets pass, newest first. Its page is not used.
+  [[nodiscard]] StatusOr<std::vector<v1::Job>> List(const v1::ListJobsRequest& filter = {});
   [[nodiscard]] StatusOr<v1::Job> Get(const std::string& job_id);
   [[nodiscard]] StatusOr<v1::Job> Cancel(const std::string& job_id);
   [[nodiscard]] Status Delete(const std::string& job_id);
   [[nodiscard]] StatusOr<v1::Job> Stop(const std::string& job_id);
+  [[nodiscard]] StatusOr<v1::Job> Pause(const std::string& job_id);
+  [[nodiscard]] StatusOr<v1::Job> Resume(const std::string& job_id);
+  [[nodiscard]] StatusOr<v1::Job> SetPriority(const std::string& job_id, int priority);
   // Only the stop criteria of `until` may be set.
   [[nodiscard]] StatusOr<v1::Job> Extend(const std::string& job_id, const RenderOverrides& until);
 

@@ -82,7 +82,7 @@ class Progress {
 StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& files,
                                      const SceneManifest& manifest,
                                      const RenderOverrides& overrides,
-                                     const std::string& reference_path) {
+                                     const std::string& reference_path, int priority) {
   LUCERNA_RETURN_IF_ERROR(connection.Upload(manifest, files));
   v1::SubmitRequest request;
   if (!reference_path.empty()) {
@@ -94,12 +94,13 @@ StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& f
   request.set_request_id(RandomId());
   *request.mutable_scene() = ToProto(manifest);
   *request.mutable_overrides() = ToProto(overrides);
+  request.set_priority(priority);
   return connection.Submit(request);
 }
 
 StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& job_id,
                               bool shows_progress, const OutputOptions& output_options,
-                              const std::function<Status()>& check) {
+                              const std::function<Status(const v1::Job&)>& check) {
   std::optional<Progress> progress;
   if (shows_progress && !output_options.quiet) progress.emplace(connection, job_id, output_options);
   auto job = connection.Watch(job_id, [&](const v1::Job& newest) {
@@ -107,7 +108,7 @@ StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& j
     if (progress && newest.state() != v1::JOB_STATE_UNSPECIFIED && !HasEnded(newest.state())) {
       progress->Show(newest);
     }
-    return check();
+    return check(newest);
   });
   if (progress) progress->Finish();
   if (job.ok() && !output_options.quiet) {
@@ -159,8 +160,14 @@ StatusOr<v1::Job> LocalRuns::Run(SceneFiles& files, const SceneManifest& manifes
 }
 
 StatusOr<v1::Job> LocalRuns::FollowOwn(const OutputOptions& output_options) {
-  auto job = FollowToEnd(*connection_, job_id_, true, output_options,
-                         [this] { return cluster_->Check(); });
+  auto job =
+      FollowToEnd(*connection_, job_id_, true, output_options, [this](const v1::Job& newest) {
+        // Nobody else will resume it.
+        if (newest.pause_cause() == v1::PAUSE_CAUSE_FAILED_BATCH) {
+          return absl::AbortedError(newest.condition());
+        }
+        return cluster_->Check();
+      });
   if (!job.ok()) {
     // The coordinator ends with us; cancelling first lets the workers leave at once. Whether it
     // still hears that makes no difference to the user.
@@ -189,6 +196,9 @@ StatusOr<v1::Job> LocalRuns::Resume(const SceneManifest& manifest, const RenderO
     has_end = true;
   }
   if (has_end) LUCERNA_RETURN_IF_ERROR(connection_->Extend(job_id_, until).status());
+  if (job.state() == v1::JOB_STATE_PAUSED) {
+    LUCERNA_RETURN_IF_ERROR(connection_->Resume(job_id_).status());
+  }
   return FollowOwn(output_options);
 }
 

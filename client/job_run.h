@@ -19,18 +19,19 @@
 namespace lucerna {
 
 // Uploads what the coordinator does not have and submits. `files` reads those of the manifest.
-// `reference_path` may be empty.
+// `reference_path` may be empty. `priority` is that of Job.
 [[nodiscard]] StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& files,
                                                    const SceneManifest& manifest,
                                                    const RenderOverrides& overrides,
-                                                   const std::string& reference_path);
+                                                   const std::string& reference_path,
+                                                   int priority = 0);
 
 // Follows the job to its end, and shows its progress unless that is off. `check` is asked several
-// times a second.
+// times a second; before the first news, of an empty job.
 [[nodiscard]] StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& job_id,
                                             bool shows_progress,
                                             const OutputOptions& output_options,
-                                            const std::function<Status()>& check);
+                                            const std::function<Status(const v1::Job&)>& check);
 
 // Errors: FAILED_PRECONDITION that says what became of the job instead.
 [[nodiscard]] Status CheckSucceeded(const v1::Job& job);

@@ -60,6 +60,8 @@ int Run(int argc, char** argv) {
   std::string job_id;
   std::string worker_id;
   std::optional<WorkerOrder> worker_order;
+  JobsRequest listed;
+  int priority = 0;
   std::string scene_path;
   std::string image_path;
   std::string reference_path;
@@ -141,13 +143,23 @@ int Run(int argc, char** argv) {
   CLI::App* submit = command("submit", "send a scene to a coordinator",
                              [&] { return Submit(request, server, output_options); });
   add_render_flags(submit);
+  submit
+      ->add_option("--priority", request.priority,
+                   "jobs of higher priority come first; -100 to 100")
+      ->check(CLI::Range(-100, 100))
+      ->capture_default_str();
   add_server(submit);
   add_json(submit);
   add_quiet(submit);
   add_no_preview(submit);
 
   CLI::App* jobs = command("jobs", "list the jobs of a coordinator",
-                           [&] { return ListJobs(server, output_options); });
+                           [&] { return ListJobs(listed, server, output_options); });
+  jobs->add_option("--state", listed.states,
+                   "only jobs in this state, such as running or paused; may be repeated")
+      ->allow_extra_args(false);
+  jobs->add_option("--user", listed.user, "only jobs of this user");
+  jobs->add_option("--name", listed.name_contains, "only jobs whose names contain this");
   add_server(jobs);
   add_json(jobs);
 
@@ -217,17 +229,27 @@ int Run(int argc, char** argv) {
     if (setting.role != SettingRole::kStopsJob) continue;
     AddSettingFlag(*extend, setting.name, until, std::string(setting.meaning));
   }
+  CLI::App* pause = command("pause", "let other jobs have a job's place until it is resumed",
+                            [&] { return PauseJob(job_id, server, output_options); });
+  CLI::App* resume = command("resume", "go on with a job that is paused",
+                             [&] { return ResumeJob(job_id, server, output_options); });
+  CLI::App* prioritize =
+      command("priority", "change the priority of a job that has not ended",
+              [&] { return SetPriority(job_id, priority, server, output_options); });
   CLI::App* remove = command("delete", "forget a job that has ended, and its image",
                              [&] { return DeleteJob(job_id, server, output_options); });
   remove->add_option("JOB", job_id, "the job's id")->required();
   add_server(remove);
   add_quiet(remove);
-  for (CLI::App* about_job : {stop, extend}) {
+  for (CLI::App* about_job : {stop, extend, pause, resume, prioritize}) {
     about_job->add_option("JOB", job_id, "the job's id")->required();
     add_server(about_job);
     add_json(about_job);
     add_quiet(about_job);
   }
+  prioritize->add_option("PRIORITY", priority, "jobs of higher priority come first; -100 to 100")
+      ->required()
+      ->check(CLI::Range(-100, 100));
 
   CLI::App* validate = command("validate", "say what is wrong with a scene",
                                [&] { return Validate(scene_path, strict, output_options); });

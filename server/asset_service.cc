@@ -14,9 +14,9 @@ namespace {
 
 class UploadReactor final : public grpc::ServerReadReactor<v1::UploadRequest> {
  public:
-  UploadReactor(BlobStore& blobs, WorkPool& pool, OpenTransfers* transfers,
+  UploadReactor(BlobStore& blobs, MemoryBudget& budget, WorkPool& pool, OpenTransfers* transfers,
                 const std::string& caller, grpc::CallbackServerContext* context)
-      : blobs_(blobs), pool_(pool), context_(context) {
+      : blobs_(blobs), budget_(budget), pool_(pool), context_(context) {
     if (transfers != nullptr) {
       StatusOr<std::unique_ptr<OpenTransfers::Transfer>> opened =
           transfers->Open(caller, [context] { context->TryCancel(); });
@@ -59,17 +59,25 @@ class UploadReactor final : public grpc::ServerReadReactor<v1::UploadRequest> {
                        SceneLimits().max_total_bytes, " that are allowed"));
     }
     if (transfer_) LUCERNA_RETURN_IF_ERROR(transfer_->Announce(part_.header().size_bytes()));
+    LUCERNA_ASSIGN_OR_RETURN(claim_,
+                             budget_.Claim(MemoryUse::kUploads, part_.header().size_bytes()));
     collector_.emplace(digest_, part_.header().size_bytes());
     return absl::OkStatus();
   }
 
   Status Keep() {
     if (!collector_) return absl::InvalidArgumentError("an upload begins with a header");
-    LUCERNA_ASSIGN_OR_RETURN(std::string bytes, collector_->Finish());
-    return blobs_.Put(digest_, std::move(bytes));
+    return WithinMemory([this]() -> Status {
+      LUCERNA_ASSIGN_OR_RETURN(std::string bytes, collector_->Finish());
+      // From here on they are claimed as a blob.
+      claim_ = MemoryClaim();
+      return blobs_.Put(digest_, std::move(bytes));
+    });
   }
 
   BlobStore& blobs_;
+  MemoryBudget& budget_;
+  MemoryClaim claim_;
   WorkPool& pool_;
   const grpc::CallbackServerContext* const context_;
   std::unique_ptr<OpenTransfers::Transfer> transfer_;
@@ -100,8 +108,8 @@ grpc::ServerUnaryReactor* AssetService::FindMissing(grpc::CallbackServerContext*
 
 grpc::ServerReadReactor<v1::UploadRequest>* AssetService::Upload(
     grpc::CallbackServerContext* context, v1::UploadResponse* /*response*/) {
-  return new UploadReactor(blobs_, pools_.uploads, transfers_, access_.LimitKeyOf(*context),
-                           context);
+  return new UploadReactor(blobs_, budget_, pools_.uploads, transfers_,
+                           access_.LimitKeyOf(*context), context);
 }
 
 }  // namespace lucerna

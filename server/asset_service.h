@@ -19,9 +19,9 @@ namespace lucerna {
 class AssetService final : public v1::AssetService::CallbackService {
  public:
   // All outlive the service. Without `transfers` uploads have no limits of their own.
-  AssetService(BlobStore& blobs, WorkPools& pools, OpenTransfers* transfers = nullptr,
-               const Access& access = Access::Unrestricted())
-      : blobs_(blobs), pools_(pools), transfers_(transfers), access_(access) {}
+  AssetService(BlobStore& blobs, MemoryBudget& budget, WorkPools& pools,
+               OpenTransfers* transfers = nullptr, const Access& access = Access::Unrestricted())
+      : blobs_(blobs), budget_(budget), pools_(pools), transfers_(transfers), access_(access) {}
 
   grpc::ServerUnaryReactor* FindMissing(grpc::CallbackServerContext* context,
                                         const v1::FindMissingRequest* request,
@@ -31,6 +31,7 @@ class AssetService final : public v1::AssetService::CallbackService {
 
  private:
   BlobStore& blobs_;
+  MemoryBudget& budget_;
   WorkPools& pools_;
   OpenTransfers* const transfers_;
   const Access& access_;

@@ -17,20 +17,30 @@ void BlobPin::Release() {
   if (store_ != nullptr) std::exchange(store_, nullptr)->Unpin(digest_, after_);
 }
 
+StatusOr<MemoryClaim> BlobStore::Claim(std::uint64_t bytes) {
+  return budget_ == nullptr ? MemoryClaim() : budget_->Claim(MemoryUse::kBlobs, bytes);
+}
+
 Status BlobStore::Put(const Digest& digest, std::string bytes) {
+  LUCERNA_ASSIGN_OR_RETURN(MemoryClaim claim, Claim(bytes.size()));
   const MutexLock lock(mutex_);
-  return PutLocked(digest, std::make_shared<const std::string>(std::move(bytes)), 0);
+  return PutLocked(digest, std::make_shared<const std::string>(std::move(bytes)), 0,
+                   std::move(claim));
 }
 
 StatusOr<BlobPin> BlobStore::PutPinned(const Digest& digest, std::string bytes,
                                        AfterLastPin after) {
+  MemoryClaim claim;
+  if (after == AfterLastPin::kKeep) {
+    LUCERNA_ASSIGN_OR_RETURN(claim, Claim(bytes.size()));
+  }
   const MutexLock lock(mutex_);
-  LUCERNA_RETURN_IF_ERROR(
-      PutLocked(digest, std::make_shared<const std::string>(std::move(bytes)), 1));
+  LUCERNA_RETURN_IF_ERROR(PutLocked(digest, std::make_shared<const std::string>(std::move(bytes)),
+                                    1, std::move(claim)));
   return BlobPin(*this, digest, after);
 }
 
-Status BlobStore::PutLocked(const Digest& digest, Blob bytes, int pins) {
+Status BlobStore::PutLocked(const Digest& digest, Blob bytes, int pins, MemoryClaim claim) {
   if (const auto found = entries_.find(digest); found != entries_.end()) {
     if (pins > 0) PinLocked(found->second);
     return absl::OkStatus();
@@ -43,6 +53,7 @@ Status BlobStore::PutLocked(const Digest& digest, Blob bytes, int pins) {
   }
   Entry entry;
   entry.bytes = std::move(bytes);
+  entry.claim = std::move(claim);
   entry.pins = pins;
   if (pins == 0) {
     entry.place = unpinned_.insert(unpinned_.end(), digest);
@@ -56,12 +67,22 @@ Status BlobStore::PutLocked(const Digest& digest, Blob bytes, int pins) {
 
 bool BlobStore::MakeRoom(std::uint64_t bytes) {
   if (bytes > max_bytes_ || pinned_bytes_ > max_bytes_ - bytes) return false;
-  while (size_bytes_ > max_bytes_ - bytes) {
-    const auto oldest = entries_.find(unpinned_.front());
-    size_bytes_ -= oldest->second.bytes->size();
-    entries_.erase(oldest);
-    unpinned_.pop_front();
-  }
+  while (size_bytes_ > max_bytes_ - bytes)
+    DropOldestLocked();
+  return true;
+}
+
+void BlobStore::DropOldestLocked() {
+  const auto oldest = entries_.find(unpinned_.front());
+  size_bytes_ -= oldest->second.bytes->size();
+  entries_.erase(oldest);
+  unpinned_.pop_front();
+}
+
+bool BlobStore::DropOldest() {
+  const MutexLock lock(mutex_);
+  if (unpinned_.empty()) return false;
+  DropOldestLocked();
   return true;
 }
 
@@ -85,9 +106,11 @@ StatusOr<Blob> BlobStore::Get(const Digest& digest) {
   if (files_ == nullptr || !files_->Has(digest)) return Missing(digest);
   LUCERNA_ASSIGN_OR_RETURN(std::string bytes, files_->Get(digest));
   const Blob blob = std::make_shared<const std::string>(std::move(bytes));
-  const MutexLock lock(mutex_);
   // Without room it is read again the next time.
-  PutLocked(digest, blob, 0).IgnoreError();
+  StatusOr<MemoryClaim> claim = Claim(blob->size());
+  if (!claim.ok()) return blob;
+  const MutexLock lock(mutex_);
+  PutLocked(digest, blob, 0, *std::move(claim)).IgnoreError();
   return blob;
 }
 

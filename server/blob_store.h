@@ -5,6 +5,9 @@
 // wanted, least recently used first. Where there are files of blobs on a disk (state/blob_files.h),
 // what is not in memory is read from there.
 //
+// Files are claimed from the budget of memory, if there is one; what is dropped with its last pin
+// belongs to a job, whose own claim covers it.
+//
 // Threads: any; what Get returned stays valid for as long as it is held.
 #pragma once
 
@@ -19,6 +22,7 @@
 #include "render/base/digest.h"
 #include "render/base/mutex.h"
 #include "render/base/status.h"
+#include "server/memory_budget.h"
 #include "server/state/blob_files.h"
 
 namespace lucerna {
@@ -61,12 +65,13 @@ using PinnedBlobs = std::vector<BlobPin>;
 
 class BlobStore {
  public:
-  // `files` outlive the store; nullptr: there are none.
-  explicit BlobStore(std::uint64_t max_bytes, const BlobFiles* files = nullptr)
-      : max_bytes_(max_bytes), files_(files) {}
+  // `files` and `budget` outlive the store; nullptr: there are none.
+  explicit BlobStore(std::uint64_t max_bytes, const BlobFiles* files = nullptr,
+                     MemoryBudget* budget = nullptr)
+      : max_bytes_(max_bytes), files_(files), budget_(budget) {}
 
   // Keeps `bytes`, whose digest the caller has made sure of. Bytes already there are kept once.
-  // Errors: RESOURCE_EXHAUSTED when they do not fit beside what is pinned.
+  // Errors: RESOURCE_EXHAUSTED when they do not fit beside what is pinned, or into the budget.
   [[nodiscard]] Status Put(const Digest& digest, std::string bytes);
   // As Put, and pinned in the same step.
   [[nodiscard]] StatusOr<BlobPin> PutPinned(const Digest& digest, std::string bytes,
@@ -81,18 +86,25 @@ class BlobStore {
   [[nodiscard]] StatusOr<BlobPin> Pin(const Digest& digest,
                                       AfterLastPin after = AfterLastPin::kKeep);
 
+  // Drops the bytes without a pin that were used least recently; false when there are none.
+  bool DropOldest();
+
   [[nodiscard]] std::uint64_t size_bytes() const;
 
  private:
   struct Entry {
     Blob bytes;
+    MemoryClaim claim;
     int pins = 0;
     // Its place in unpinned_; meaningful only when pins == 0.
     std::list<Digest>::iterator place;
   };
   using Entries = std::unordered_map<Digest, Entry>;
 
-  Status PutLocked(const Digest& digest, Blob bytes, int pins) LUCERNA_REQUIRES(mutex_);
+  StatusOr<MemoryClaim> Claim(std::uint64_t bytes);
+  Status PutLocked(const Digest& digest, Blob bytes, int pins, MemoryClaim claim)
+      LUCERNA_REQUIRES(mutex_);
+  void DropOldestLocked() LUCERNA_REQUIRES(mutex_);
   void PinLocked(Entry& entry) LUCERNA_REQUIRES(mutex_);
   friend class BlobPin;
   void Unpin(const Digest& digest, AfterLastPin after);
@@ -100,6 +112,7 @@ class BlobStore {
 
   const std::uint64_t max_bytes_;
   const BlobFiles* const files_;
+  MemoryBudget* const budget_;
   mutable Mutex mutex_;
   Entries entries_ LUCERNA_GUARDED_BY(mutex_);
   std::list<Digest> unpinned_ LUCERNA_GUARDED_BY(mutex_);  // least recently used first

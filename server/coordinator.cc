@@ -1,6 +1,10 @@
 #include "server/coordinator.h"
 
 #include <algorithm>
+#include <exception>
+#include <future>
+#include <list>
+#include <new>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -13,6 +17,7 @@
 #include "render/wire/slice_codec.h"
 #include "server/job_image.h"
 #include "server/job_message.h"
+#include "server/memory_need.h"
 
 namespace lucerna {
 namespace {
@@ -33,8 +38,16 @@ std::string InstanceName(const Clock& clock) {
 }
 
 Coordinator::Options WithMemory(Coordinator::Options options) {
-  if (options.max_job_bytes == 0) options.max_job_bytes = AvailableMemory();
+  if (options.max_memory_bytes == 0) options.max_memory_bytes = AvailableMemory();
+  if (options.max_job_bytes == 0) options.max_job_bytes = options.max_memory_bytes;
   return options;
+}
+
+std::uint64_t SceneBytes(const SceneManifest& manifest) {
+  std::uint64_t bytes = 0;
+  for (const auto& [path, file] : manifest.entries)
+    bytes += file.size_bytes;
+  return bytes;
 }
 
 SchedulerOptions OptionsFor(const Coordinator::Options& options) {
@@ -75,19 +88,25 @@ Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<Du
       instance_(InstanceName(clock)),
       state_(std::move(state)),
       transfers_(clock, options_.transfers),
-      blobs_(options_.max_store_bytes, state_ ? &state_->blobs() : nullptr),
+      budget_(options_.max_memory_bytes),
+      blobs_(options_.max_store_bytes, state_ ? &state_->blobs() : nullptr, &budget_),
       scheduler_(OptionsFor(options_)),
       intake_(blobs_, options_.max_job_bytes),
       jobs_({.instance = state_ ? state_->instance() : instance_,
              .random_part = [] { return RandomId().substr(0, kRandomDigits); },
+             .max_at_once = options_.jobs_at_once,
              .retention = options_.retention,
              .journal = state_.get()}) {
+  // What is easily had again first, then what only a job that goes on needs.
+  budget_.AddCache([this] { return blobs_.DropOldest(); });
+  budget_.AddCache([this] { return jobs_.DropOldestPhotons(); });
   if (state_) {
     for (const std::string& problem : state_->problems())
       spdlog::error("{}", Escaped(problem));
     jobs_.Restore(state_->TakeJobs(), state_->next_serial(), Now());
     RemoveUnneeded();
   }
+  jobs_.SetLiveWorkers(0, Now());
   job_thread_ = std::thread([this] { RunJobs(); });
 }
 
@@ -114,9 +133,10 @@ void Coordinator::Close() {
 void Coordinator::Tick() {
   scheduler_.Expire(clock_.Steady());
   transfers_.Tick();
-  StopPoisonedJobs();
+  PausePoisonedJobs();
   ShowDisputes();
   AnswerParked();
+  jobs_.SetLiveWorkers(scheduler_.LiveWorkers(), Now());
   if (state_ && clock_.Steady() >= save_unsaved_at_) {
     save_unsaved_at_ = clock_.Steady() + kSaveUnsavedEvery;
     jobs_.SaveUnsaved(Now());
@@ -136,7 +156,16 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
       return *std::move(earlier);
     }
   }
+  LUCERNA_ASSIGN_OR_RETURN(
+      const MemoryClaim for_reading,
+      budget_.Claim(MemoryUse::kScenes, SceneMemory(SceneBytes(submission.manifest))));
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
+  if (MemoryNeedOf(job.needs, job.settings, SceneBytes(submission.manifest), state_ != nullptr) >
+      budget_.max_bytes()) {
+    return absl::ResourceExhaustedError(
+        "the job needs more memory than the coordinator has for all jobs; make the image or the "
+        "scene smaller, or start the coordinator with a larger --max-memory");
+  }
   if (submission.validate_only) return JobTable::Submitted{"", std::move(job.warnings)};
   StatusOr<JobTable::Submitted> submitted;
   {
@@ -196,9 +225,10 @@ StatusOr<JobReport> Coordinator::ReportOf(const std::string& job_id) const {
   return WithWorkers(jobs_.ReportOf(job_id, Now()));
 }
 
-std::pair<std::vector<JobReport>, std::uint64_t> Coordinator::List(std::size_t count,
+std::pair<std::vector<JobReport>, std::uint64_t> Coordinator::List(const JobFilter& filter,
+                                                                   std::size_t count,
                                                                    std::uint64_t before) const {
-  auto page = jobs_.List(count, before, Now());
+  auto page = jobs_.List(filter, count, before, Now());
   const int workers = scheduler_.LiveWorkers();
   for (JobReport& report : page.first)
     report.workers = workers;
@@ -219,6 +249,40 @@ StatusOr<JobReport> Coordinator::Extend(const std::string& job_id, const RenderO
   StatusOr<JobReport> report = WithWorkers(jobs_.Extend(job_id, until, Now()));
   if (report.ok()) spdlog::info("job {} has a new end", job_id);
   return report;
+}
+
+StatusOr<JobReport> Coordinator::Pause(const std::string& job_id) {
+  StatusOr<JobReport> report =
+      WithWorkers(jobs_.Pause(job_id, PauseCause::kUser, "paused by its user", Now()));
+  if (report.ok()) {
+    // From now on nothing is lent, though its thread may still be in the middle of a step.
+    UpdateClaim(job_id);
+    spdlog::info("job {} is paused", job_id);
+  }
+  return report;
+}
+
+StatusOr<JobReport> Coordinator::Resume(const std::string& job_id) {
+  StatusOr<JobReport> report = WithWorkers(jobs_.Resume(job_id, Now()));
+  if (report.ok()) spdlog::info("job {} is resumed", job_id);
+  return report;
+}
+
+StatusOr<JobReport> Coordinator::SetPriority(const std::string& job_id, int priority) {
+  StatusOr<JobReport> report = WithWorkers(jobs_.SetPriority(job_id, priority, Now()));
+  if (report.ok()) {
+    spdlog::info("job {} has priority {}", job_id, priority);
+    UpdateClaim(job_id);
+  }
+  return report;
+}
+
+void Coordinator::UpdateClaim(const std::string& job_id) {
+  const MutexLock lock(claims_mutex_);
+  const std::optional<JobTable::Share> share = jobs_.ShareOf(job_id);
+  if (!share) return;
+  scheduler_.SetClaim(job_id, {.priority = share->priority, .owner = share->owner});
+  scheduler_.SetHeld(job_id, share->is_held);
 }
 
 StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) const {
@@ -248,15 +312,46 @@ StatusOr<Blob> Coordinator::Encode(const JobTable::ImageSource& source, RenderRe
 }
 
 void Coordinator::RunJobs() {
+  std::list<std::future<void>> turns;
   while (std::optional<JobTable::Turn> turn = jobs_.WaitForTurn()) {
+    turns.remove_if([](const std::future<void>& under_way) {
+      return under_way.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    });
     const std::string job_id = turn->job_id;
-    Conclude(job_id, Render(*turn));
-    // Without the work of a worker whose results were wrong.
-    while (jobs_.TakeBeginsAgain(job_id)) {
-      turn->runner = nullptr;
-      turn->scene.reset();
-      Conclude(job_id, BeginRun(*turn));
+    try {
+      turns.push_back(std::async(std::launch::async, [this, turn = *std::move(turn)]() mutable {
+        RunTurn(std::move(turn));
+      }));
+    } catch (const std::exception& no_thread) {
+      Conclude(job_id, absl::ResourceExhaustedError(
+                           absl::StrCat("the coordinator cannot begin a thread for the job (",
+                                        no_thread.what(), "); submit it again later")));
     }
+  }
+}
+
+void Coordinator::RunTurn(JobTable::Turn turn) {
+  const std::string job_id = turn.job_id;
+  StatusOr<RenderResult> result = absl::InternalError("no result");
+  try {
+    result = Render(turn);
+    while (true) {
+      if (result.ok() && result->gave_up_turn) {
+        jobs_.GiveUpTurn(job_id, Now());
+        return;
+      }
+      Conclude(job_id, std::move(result));
+      // Without the work of a worker whose results were wrong.
+      if (!jobs_.TakeBeginsAgain(job_id)) return;
+      turn.runner = nullptr;
+      turn.scene.reset();
+      result = BeginRun(turn);
+    }
+  } catch (const std::bad_alloc&) {
+    // The job alone: what it had is freed with its runner.
+    Conclude(job_id, absl::ResourceExhaustedError(
+                         "the coordinator ran out of memory while it worked on the job; make the "
+                         "image or the scene smaller, or give the coordinator more memory"));
   }
 }
 
@@ -265,6 +360,12 @@ StatusOr<RenderResult> Coordinator::Render(JobTable::Turn& turn) {
 }
 
 StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
+  LUCERNA_ASSIGN_OR_RETURN(std::optional<MemoryClaim> memory, WaitForMemory(turn));
+  if (!memory) {
+    RenderResult later;
+    later.gave_up_turn = true;
+    return later;
+  }
   ReferenceImage reference;
   if (turn.reference) {
     LUCERNA_ASSIGN_OR_RETURN(reference, intake_.ReadReference(*turn.reference, turn.settings));
@@ -275,12 +376,44 @@ StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
     }));
     turn.scene = std::move(read.scene);
   }
-  const std::shared_ptr<JobRunner> runner = MakeRunner(turn);
+  const std::shared_ptr<JobRunner> runner = MakeRunner(turn, *std::move(memory));
   if (!jobs_.Attach(turn.job_id, runner)) return absl::CancelledError("the job has ended");
   LUCERNA_RETURN_IF_ERROR(
       runner->Prepare(*std::move(turn.scene), turn.needs, std::move(reference)));
   RestoreCheckpoint(turn.job_id, *runner);
   return runner->Resume();
+}
+
+StatusOr<std::optional<MemoryClaim>> Coordinator::WaitForMemory(const JobTable::Turn& turn) {
+  const std::uint64_t bytes = MemoryNeedOf(turn.needs, turn.settings, SceneBytes(turn.manifest),
+                                           /*keeps_checkpoints=*/state_ != nullptr);
+  bool has_waited = false;
+  while (true) {
+    StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kJobs, bytes);
+    if (!claim.ok() && bytes > budget_.max_bytes()) return claim.status();
+    if (claim.ok()) {
+      jobs_.SetWaitsForMemory(turn.job_id, "", Now());
+      return std::optional<MemoryClaim>(*std::move(claim));
+    }
+    LUCERNA_RETURN_IF_ERROR(jobs_.CheckStillNeeded(turn.job_id));
+    if (!std::exchange(has_waited, true)) {
+      spdlog::info("job {} waits for memory", turn.job_id);
+      jobs_.SetWaitsForMemory(turn.job_id, "waits for memory that other jobs hold", Now());
+    }
+    if (jobs_.GivesUpTurn(turn.job_id)) return std::optional<MemoryClaim>();
+    budget_.WaitForRelease(kRetryPause);
+  }
+}
+
+Blob Coordinator::Claimed(Blob image) {
+  StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kImages, image->size());
+  if (!claim.ok()) return image;
+  struct Held {
+    Blob image;
+    MemoryClaim claim;
+  };
+  const std::string* const bytes = image.get();
+  return {std::make_shared<Held>(Held{std::move(image), *std::move(claim)}), bytes};
 }
 
 void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner) {
@@ -372,7 +505,7 @@ Status Coordinator::EndWell(const std::string& job_id, StopReason reason, const 
   }
 }
 
-std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
+std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, MemoryClaim memory) {
   const std::string id = turn.job_id;
   return std::make_shared<JobRunner>(
       id, turn.settings, options_.threads,
@@ -382,8 +515,13 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
           .passes = passes_,
           .rounds = rounds_,
           .clock = clock_,
+          .memory = std::make_shared<MemoryClaim>(std::move(memory)),
           .always_splits = options_.batch_photons > 0,
-          .on_running = [this, id] { jobs_.OnRunning(id, Now()); },
+          .on_running =
+              [this, id] {
+                jobs_.OnRunning(id, Now());
+                UpdateClaim(id);
+              },
           .on_warning = [this,
                          id](std::string warning) { jobs_.OnWarning(id, std::move(warning)); },
           .on_photon_steps = [this,
@@ -419,6 +557,8 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn) {
                 spdlog::warn("job {} {}", id, why.ok() ? "goes on" : condition);
                 jobs_.SetCondition(id, condition, Now());
               },
+          .running = [this, id] { return jobs_.RunningOf(id, clock_.Steady()); },
+          .when_it_has_run = [this, id](Duration time) { return jobs_.WhenItHasRun(id, time); },
       });
 }
 
@@ -430,7 +570,7 @@ void Coordinator::Conclude(const std::string& job_id, StatusOr<RenderResult> res
     const std::optional<JobTable::ImageSource> source = jobs_.DescribeRun(job_id, Now());
     if (!source) return;
     StatusOr<Blob> image = Encode(*source, *std::move(result));
-    failure = image.ok() ? EndWell(job_id, reason, *image) : image.status();
+    failure = image.ok() ? EndWell(job_id, reason, Claimed(*image)) : image.status();
     if (failure.ok()) {
       spdlog::info("job {} succeeded after {} passes and {:.1f} s", job_id, passes,
                    Seconds(source->running));
@@ -465,6 +605,7 @@ StatusOr<std::string> Coordinator::Register(const std::string& name, int threads
         options_.numeric_profile, "\"; their bits would differ, run the same build on both"));
   }
   std::string id = scheduler_.AddWorker(name, clock_.Steady(), identity);
+  jobs_.SetLiveWorkers(scheduler_.LiveWorkers(), Now());
   spdlog::info("worker {} joined with {} threads", ShownWorker(id), threads);
   return id;
 }
@@ -492,7 +633,7 @@ std::uint64_t Coordinator::Sync(const std::string& worker, Scheduler::Report rep
     answer(heard);
     return 0;
   }
-  StopPoisonedJobs();
+  PausePoisonedJobs();
   // What came back with this report may be what others wait for.
   if (report.wants_lease || !report.failures.empty()) AnswerParked();
   report.failures.clear();
@@ -529,7 +670,7 @@ void Coordinator::EndBroken(const ParkedSyncs::Call& broken) {
   spdlog::info("worker {} vanished", ShownWorker(broken.worker));
   scheduler_.LoseWorker(broken.worker);
   broken.answer(absl::CancelledError("the connection broke"));
-  StopPoisonedJobs();
+  PausePoisonedJobs();
 }
 
 // Calls of workers whose leases have ended, then of those that can be lent something, as long as
@@ -601,6 +742,7 @@ StatusOr<MergeOutcome> Coordinator::Merge(const Delivery& delivery, DecodedResul
   // Also of a duplicate: nobody need trace it any more.
   scheduler_.Commit(delivery.pass, delivery.range, now);
   if (outcome == MergeOutcome::kDuplicate) return outcome;
+  scheduler_.CountWork(delivery.pass.job_id, delivery.kind, delivery.range.size(), delivery.cpu);
   jobs_.CountMerged(of_record, decoded.counts, worker->name, now);
   const BatchTally& tally = decoded.counts.tally;
   if (tally.dropped > 0 || tally.excess > 0) {
@@ -653,7 +795,7 @@ void Coordinator::Refuse(const Delivery& delivery, const Status& why) {
   spdlog::warn("worker {}: a result of job {} is refused: {}", ShownWorker(delivery.worker),
                delivery.pass.job_id, std::string(why.message()));
   scheduler_.RefuseResult(ClaimOf(delivery), std::string(why.message()));
-  StopPoisonedJobs();
+  PausePoisonedJobs();
   AnswerParked();
 }
 
@@ -718,9 +860,14 @@ std::string Coordinator::ShownWorker(const std::string& worker) const {
   return absl::StrCat(record->id, " (", Escaped(record->name), ")");
 }
 
-void Coordinator::StopPoisonedJobs() {
-  for (const Scheduler::Poisoned& poisoned : scheduler_.TakePoisoned())
-    jobs_.Fail(poisoned.pass.job_id, absl::AbortedError(poisoned.message), Now());
+void Coordinator::PausePoisonedJobs() {
+  for (const Scheduler::Poisoned& poisoned : scheduler_.TakePoisoned()) {
+    const std::string reason =
+        absl::StrCat("paused: ", poisoned.message, "; lucerna resume lends it again");
+    if (!jobs_.Pause(poisoned.pass.job_id, PauseCause::kFailedBatch, reason, Now()).ok()) continue;
+    UpdateClaim(poisoned.pass.job_id);
+    spdlog::warn("job {} is {}", poisoned.pass.job_id, reason);
+  }
 }
 
 }  // namespace lucerna

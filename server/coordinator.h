@@ -2,9 +2,8 @@
 //
 // Wires the parts together and decides nothing itself: JobIntake checks submissions, JobTable holds
 // the jobs, Scheduler lends work, PassMerger and RoundMerger sum what comes back, ParkedSyncs holds
-// the calls of workers that wait, BlobStore the bytes, DurableState what outlives the process. One
-// thread of its own renders one job after
-// the other.
+// the calls of workers that wait, BlobStore the bytes, DurableState what outlives the process.
+// Threads of its own render jobs, one for each turn of a job.
 //
 // Threads: any. Nothing here waits for the network. Submit, Commit and ImageOf may take long: they
 // are for the threads of a WorkPool.
@@ -33,6 +32,7 @@
 #include "server/job_intake.h"
 #include "server/job_runner.h"
 #include "server/job_table.h"
+#include "server/memory_budget.h"
 #include "server/open_transfers.h"
 #include "server/parked_syncs.h"
 #include "server/pass_merger.h"
@@ -47,13 +47,15 @@ namespace lucerna {
 class Coordinator {
  public:
   struct Options {
-    int threads = 0;  // for eye paths; 0: all
+    int threads = 0;                     // for eye paths; 0: all
+    std::uint64_t max_memory_bytes = 0;  // of all parts together; 0: what is free at the start
     std::uint64_t max_store_bytes = std::uint64_t{8} << 30;
     std::uint64_t max_job_bytes =
         0;  // of the image and the scene of one job; 0: what is free at the start
     std::uint64_t batch_photons = 0;  // 0: follows the number of workers
     std::string numeric_profile;
     RetentionLimits retention;
+    std::size_t jobs_at_once = 2;    // in progress
     double checkpoint_share = 0.01;  // of the time, in (0, 1]
     double audit_share = 0.005;      // of batches, in [0, 1]
     OpenTransfers::Limits transfers;
@@ -65,6 +67,7 @@ class Coordinator {
 
   [[nodiscard]] BlobStore& blobs() { return blobs_; }
   [[nodiscard]] OpenTransfers& transfers() { return transfers_; }
+  [[nodiscard]] MemoryBudget& budget() { return budget_; }
 
   // Jobs ---------------------------------------------------------------------------------------
 
@@ -76,11 +79,18 @@ class Coordinator {
   // As the functions of JobTable.
   [[nodiscard]] StatusOr<std::string> OwnerOf(const std::string& job_id) const;
   [[nodiscard]] StatusOr<JobReport> ReportOf(const std::string& job_id) const;
-  [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(std::size_t count,
+  [[nodiscard]] StatusOr<JobTable::News> NewsOf(const std::string& job_id) const {
+    return jobs_.NewsOf(job_id);
+  }
+  [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(const JobFilter& filter,
+                                                                      std::size_t count,
                                                                       std::uint64_t before) const;
   [[nodiscard]] StatusOr<JobReport> Cancel(const std::string& job_id);
   [[nodiscard]] StatusOr<JobReport> Stop(const std::string& job_id);
   [[nodiscard]] StatusOr<JobReport> Extend(const std::string& job_id, const RenderOverrides& until);
+  [[nodiscard]] StatusOr<JobReport> Pause(const std::string& job_id);
+  [[nodiscard]] StatusOr<JobReport> Resume(const std::string& job_id);
+  [[nodiscard]] StatusOr<JobReport> SetPriority(const std::string& job_id, int priority);
   // Also removes what no other job needs from the disk: may take long.
   [[nodiscard]] Status Delete(const std::string& job_id);
   // EXR bytes. Errors: NOT_FOUND, FAILED_PRECONDITION when there is no image (yet).
@@ -153,11 +163,21 @@ class Coordinator {
   Moment Now() const { return {clock_.Steady(), ProcessCpuTime(), clock_.Wall()}; }
   StatusOr<JobReport> WithWorkers(StatusOr<JobReport> report) const;
 
+  // Begins turns as they come, each in a thread of its own.
   void RunJobs();
+  void RunTurn(JobTable::Turn turn);
   StatusOr<RenderResult> Render(JobTable::Turn& turn);
   // Of a job without a runner: from its checkpoint, or from the beginning.
   StatusOr<RenderResult> BeginRun(JobTable::Turn& turn);
-  std::shared_ptr<JobRunner> MakeRunner(const JobTable::Turn& turn);
+  // Gives the scheduler what decides the job's share of the workers: after each change of that.
+  void UpdateClaim(const std::string& job_id);
+  std::shared_ptr<JobRunner> MakeRunner(const JobTable::Turn& turn, MemoryClaim memory);
+  // Claims what the job needs, and waits for it while others have it; the job then leaves its place
+  // to others. Absent when the turn is to be given up.
+  // Errors: RESOURCE_EXHAUSTED when it will never fit, CANCELLED.
+  StatusOr<std::optional<MemoryClaim>> WaitForMemory(const JobTable::Turn& turn);
+  // The image as one that is claimed, if that is possible; it is kept in any case.
+  Blob Claimed(Blob image);
   // Hands the job's newest checkpoint that can be used to its runner, if there is one.
   void RestoreCheckpoint(const std::string& job_id, JobRunner& runner);
   Status KeepCheckpoint(const std::string& job_id, std::string sums, std::int64_t passes,
@@ -189,7 +209,7 @@ class Coordinator {
   // Jobs in which workers disagree and none is left to decide wait, and say so.
   void ShowDisputes();
 
-  void StopPoisonedJobs();
+  void PausePoisonedJobs();
   // What a registration's worker is called in the log.
   std::string ShownWorker(const std::string& worker) const;
   // What there is for a worker now; absent when it should wait on.
@@ -206,6 +226,7 @@ class Coordinator {
   // Held while files are added for a job, and while those without one are removed.
   Mutex files_mutex_;
   OpenTransfers transfers_;
+  MemoryBudget budget_;
   BlobStore blobs_;
   Scheduler scheduler_;
   PassMerger passes_;
@@ -218,6 +239,7 @@ class Coordinator {
   // and what comes later is refused.
   std::shared_mutex merging_;
   std::set<std::string> disputed_;  // jobs that wait; of the thread of Tick
+  Mutex claims_mutex_;              // held from reading a job's share to giving it to the scheduler
   std::atomic<bool> is_lending_ = true;
   std::atomic<bool> is_closing_ = false;
   SteadyTime save_unsaved_at_;  // of the thread of Tick

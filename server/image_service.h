@@ -34,7 +34,8 @@ class ImageService final : public v1::ImageService::CallbackService {
     }
     pools_.images.Run(NeededByCaller(context), [this, reactor, job_id = request->job_id()](
                                                    const Status& may_begin) {
-      reactor->Send(may_begin.ok() ? coordinator_.ImageOf(job_id) : StatusOr<Blob>(may_begin));
+      reactor->Send(may_begin.ok() ? WithinMemory([&] { return coordinator_.ImageOf(job_id); })
+                                   : StatusOr<Blob>(may_begin));
     });
     return reactor;
   }

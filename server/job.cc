@@ -5,11 +5,28 @@
 namespace lucerna {
 
 JobLife::JobLife(Past past)
-    : state_(past.state >= JobState::kSucceeded ? past.state : JobState::kQueued),
+    : state_(past.state >= JobState::kPaused ? past.state : JobState::kQueued),
       stop_reason_(past.stop_reason),
       failure_(std::move(past.failure)),
       submitted_at_(past.submitted_at),
       ran_before_(past.ran) {}
+
+bool JobLife::GoTo(JobState state, SteadyTime now) {
+  state_ = state;
+  SetClock(now);
+  return true;
+}
+
+void JobLife::SetClock(SteadyTime now) {
+  const bool counts = state_ == JobState::kRunning && has_workers_;
+  if (counts == started_at_.has_value()) return;
+  if (counts) {
+    started_at_ = now;
+  } else {
+    ran_before_ += now - *started_at_;
+    started_at_.reset();
+  }
+}
 
 bool JobLife::Prepare() {
   if (state_ != JobState::kQueued) return false;
@@ -18,30 +35,40 @@ bool JobLife::Prepare() {
 }
 
 bool JobLife::Run(SteadyTime now) {
-  if (state_ != JobState::kPreparing) return false;
-  state_ = JobState::kRunning;
-  started_at_ = now;
+  if (state_ != JobState::kPreparing && state_ != JobState::kPaused) return false;
+  has_run_ = true;
+  return GoTo(JobState::kRunning, now);
+}
+
+bool JobLife::GiveUpTurn(SteadyTime now) {
+  if (state_ != JobState::kPreparing && state_ != JobState::kRunning) return false;
+  return GoTo(JobState::kQueued, now);
+}
+
+bool JobLife::Pause(SteadyTime now) {
+  if (has_ended() || state_ == JobState::kPaused) return false;
+  return GoTo(JobState::kPaused, now);
+}
+
+bool JobLife::Resume() {
+  if (state_ != JobState::kPaused) return false;
+  state_ = JobState::kQueued;
   return true;
 }
 
 bool JobLife::End(JobState state, SteadyTime now) {
   if (has_ended()) return false;
-  state_ = state;
-  ended_at_ = now;
-  return true;
+  return GoTo(state, now);
 }
 
 bool JobLife::Succeed(StopReason reason, SteadyTime now) {
-  if (state_ != JobState::kRunning) return false;
+  if (!has_run_ || !End(JobState::kSucceeded, now)) return false;
   stop_reason_ = reason;
-  return End(JobState::kSucceeded, now);
+  return true;
 }
 
 bool JobLife::Extend() {
   if (state_ != JobState::kSucceeded) return false;
-  if (ended_at_) ran_before_ = Running(*ended_at_);
-  started_at_.reset();
-  ended_at_.reset();
   stop_reason_ = StopReason::kNone;
   state_ = JobState::kQueued;
   return true;
@@ -57,19 +84,40 @@ bool JobLife::Fail(std::string failure, SteadyTime now) {
   return true;
 }
 
-void JobLife::Pause(SteadyTime now) {
-  if (state_ != JobState::kRunning || !started_at_) return;
-  ran_before_ += now - *started_at_;
-  started_at_.reset();
-}
-
-void JobLife::GoOn(SteadyTime now) {
-  if (state_ == JobState::kRunning && !started_at_) started_at_ = now;
+void JobLife::SetHasWorkers(bool has_workers, SteadyTime now) {
+  has_workers_ = has_workers;
+  SetClock(now);
 }
 
 Duration JobLife::Running(SteadyTime now) const {
-  if (!started_at_) return ran_before_;
-  return ran_before_ + (ended_at_ ? *ended_at_ : now) - *started_at_;
+  return started_at_ ? ran_before_ + (now - *started_at_) : ran_before_;
+}
+
+std::optional<SteadyTime> JobLife::WhenItHasRun(Duration time) const {
+  if (!started_at_) return std::nullopt;
+  return *started_at_ + (time - ran_before_);
+}
+
+Job SummaryOf(const Job& job) {
+  Job summary;
+  summary.id = job.id;
+  summary.name = job.name;
+  summary.scene_digest = job.scene_digest;
+  summary.settings = job.settings;
+  summary.submitted_at = job.submitted_at;
+  summary.life = job.life;
+  summary.counters = job.counters;
+  summary.reference = job.reference;
+  summary.ended_at = job.ended_at;
+  summary.priority = job.priority;
+  summary.pause_cause = job.pause_cause;
+  summary.condition = job.condition;
+  return summary;
+}
+
+const std::string& OwnerOf(const Job& /*job*/) {
+  static const std::string kNobody;
+  return kNobody;
 }
 
 void Job::AddEvent(WallTime at, std::string what) {

@@ -3,11 +3,14 @@
 // A job's life is a small state machine that only moves forward:
 //
 //   queued -> preparing -> running -> succeeded
-//   any of the first three -> cancelled or failed
+//   any of the first three -> paused -> queued, when it is resumed
+//   preparing or running -> queued, when it gives up its turn to another job
+//   any that has not ended -> cancelled or failed
 //
 //   succeeded -> queued, when it is given a new end
 //
-// An ended job otherwise never changes again. Pure values: moments come in as arguments.
+// An ended job otherwise never changes again. The time of a job is the time in which it is running
+// and a worker is connected. Pure values: moments come in as arguments.
 #pragma once
 
 #include <compare>
@@ -35,18 +38,31 @@ enum class JobState : std::uint8_t {
   kQueued,
   kPreparing,
   kRunning,
+  kPaused,
   kSucceeded,
   kCancelled,
   kFailed,
 };
 enum class StopReason : std::uint8_t { kNone, kPasses, kTime, kError, kPhotons, kUser };
+// Why a job is paused.
+enum class PauseCause : std::uint8_t {
+  kNone,         // it is not
+  kUser,         // until the user resumes it
+  kDisk,         // its checkpoint or image cannot be written; until that can be done
+  kFailedBatch,  // a batch failed at all workers; until the user resumes it
+};
+
+// Of a job among the jobs of one coordinator.
+inline constexpr int kLowestPriority = -100;
+inline constexpr int kHighestPriority = 100;
 
 class JobLife {
  public:
   JobLife() = default;
   explicit JobLife(SteadyTime submitted_at) : submitted_at_(submitted_at) {}
 
-  // What is known of a life that began in an earlier process; one that has not ended waits again.
+  // What is known of a life that began in an earlier process; one that has neither ended nor is
+  // paused waits again.
   struct Past {
     JobState state = JobState::kQueued;
     StopReason stop_reason = StopReason::kNone;
@@ -58,15 +74,22 @@ class JobLife {
 
   // Each returns whether the job could go there; if not, nothing has changed.
   bool Prepare();
+  // Of a job that prepares, or that is paused with all that it needs to run.
   bool Run(SteadyTime now);
+  // Of a job that prepares or runs: it waits for its next turn.
+  bool GiveUpTurn(SteadyTime now);
+  bool Pause(SteadyTime now);
+  // Of a paused job: it waits for its next turn.
+  bool Resume();
+  // Of any that has run and has not ended: one that was paused, or gave up its turn, may be done by
+  // then.
   bool Succeed(StopReason reason, SteadyTime now);
   // Of a job that succeeded: it waits to go on.
   bool Extend();
   bool Cancel(SteadyTime now);
   bool Fail(std::string failure, SteadyTime now);
-  // While it runs: time stands still until GoOn.
-  void Pause(SteadyTime now);
-  void GoOn(SteadyTime now);
+  // Whether a worker is connected; true at first.
+  void SetHasWorkers(bool has_workers, SteadyTime now);
   // Of one that has not begun to run in this process: it ran so long in earlier ones.
   void SetRanBefore(Duration ran) { ran_before_ = ran; }
 
@@ -75,19 +98,25 @@ class JobLife {
   [[nodiscard]] const std::string& failure() const { return failure_; }
   [[nodiscard]] bool has_ended() const { return state_ >= JobState::kSucceeded; }
   [[nodiscard]] SteadyTime submitted_at() const { return submitted_at_; }
-  // In all its runs; stands still when it has ended; zero before.
+  // In all its runs; zero before.
   [[nodiscard]] Duration Running(SteadyTime now) const;
+  // When the job will have run so long; absent while its time stands still.
+  [[nodiscard]] std::optional<SteadyTime> WhenItHasRun(Duration time) const;
 
  private:
+  bool GoTo(JobState state, SteadyTime now);
   bool End(JobState state, SteadyTime now);
+  // After a change of what decides whether time counts.
+  void SetClock(SteadyTime now);
 
   JobState state_ = JobState::kQueued;
   StopReason stop_reason_ = StopReason::kNone;
   std::string failure_;
   SteadyTime submitted_at_;
-  Duration ran_before_{};  // in runs before this one
-  std::optional<SteadyTime> started_at_;
-  std::optional<SteadyTime> ended_at_;
+  bool has_run_ = false;  // in this process
+  bool has_workers_ = true;
+  Duration ran_before_{};                 // until time began to count, the last time
+  std::optional<SteadyTime> started_at_;  // counting; absent: time stands still
 };
 
 // Events per second over the last few seconds.
@@ -206,12 +235,20 @@ struct Job {
   std::set<std::string> distrusted;
   int most_workers = 0;  // connected at one time while it ran
   std::optional<WallTime> ended_at;
-  std::string condition;  // why it does not go on though it runs; empty: it does
+  int priority = 0;
+  PauseCause pause_cause = PauseCause::kNone;
+  std::string condition;  // why it does not go on; empty: it does, or waits for its turn
   std::vector<JobEvent> events;
 
   void AddEvent(WallTime at, std::string what);
   // All that rendering has counted and found.
   void ClearProgress();
 };
+
+// What a list of jobs shows: without the parts that grow with the length of a job.
+[[nodiscard]] Job SummaryOf(const Job& job);
+
+// Whose job it is, for fair shares and filters; empty: nobody's.
+[[nodiscard]] const std::string& OwnerOf(const Job& job);
 
 }  // namespace lucerna

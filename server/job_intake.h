@@ -29,6 +29,7 @@ struct Submission {
   SceneManifest manifest;
   RenderOverrides overrides;
   bool validate_only = false;
+  int priority = 0;
   std::optional<Digest> reference;  // of an EXR image among the blobs
   std::string owner = {};           // who submits it; empty: unknown
 };

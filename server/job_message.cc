@@ -20,6 +20,8 @@ v1::JobState StateToProto(JobState state) {
       return v1::JOB_STATE_PREPARING;
     case JobState::kRunning:
       return v1::JOB_STATE_RUNNING;
+    case JobState::kPaused:
+      return v1::JOB_STATE_PAUSED;
     case JobState::kSucceeded:
       return v1::JOB_STATE_SUCCEEDED;
     case JobState::kCancelled:
@@ -28,6 +30,20 @@ v1::JobState StateToProto(JobState state) {
       return v1::JOB_STATE_FAILED;
   }
   return v1::JOB_STATE_UNSPECIFIED;
+}
+
+v1::PauseCause CauseToProto(PauseCause cause) {
+  switch (cause) {
+    case PauseCause::kNone:
+      return v1::PAUSE_CAUSE_UNSPECIFIED;
+    case PauseCause::kUser:
+      return v1::PAUSE_CAUSE_USER;
+    case PauseCause::kDisk:
+      return v1::PAUSE_CAUSE_DISK;
+    case PauseCause::kFailedBatch:
+      return v1::PAUSE_CAUSE_FAILED_BATCH;
+  }
+  return v1::PAUSE_CAUSE_UNSPECIFIED;
 }
 
 v1::StopReason ReasonToProto(StopReason reason) {
@@ -120,7 +136,16 @@ void AddShares(const std::map<std::string, WorkerShare>& workers, v1::Job& messa
 
 }  // namespace
 
-v1::Job ToProto(const JobReport& report) {
+std::optional<JobState> FromProto(v1::JobState state) {
+  for (const JobState known :
+       {JobState::kQueued, JobState::kPreparing, JobState::kRunning, JobState::kPaused,
+        JobState::kSucceeded, JobState::kCancelled, JobState::kFailed}) {
+    if (StateToProto(known) == state) return known;
+  }
+  return std::nullopt;
+}
+
+v1::Job SummaryToProto(const JobReport& report) {
   const Job& job = report.job;
   const JobState state = job.life.state();
   v1::Job message;
@@ -131,6 +156,21 @@ v1::Job ToProto(const JobReport& report) {
   message.set_failure(job.life.failure());
   *message.mutable_settings() = ToProto(job.settings);
   message.set_scene_digest(std::string(job.scene_digest.Bytes()));
+  *message.mutable_progress() = ProgressToProto(report);
+  *message.mutable_submitted_at() = ToProto(job.submitted_at);
+  message.set_no_workers(state == JobState::kRunning && report.workers == 0);
+  message.set_has_reference(job.reference.has_value());
+  message.set_condition(job.condition);
+  if (job.ended_at) *message.mutable_ended_at() = ToProto(*job.ended_at);
+  message.set_owner(job.owner);
+  message.set_priority(job.priority);
+  message.set_pause_cause(CauseToProto(job.pause_cause));
+  return message;
+}
+
+v1::Job ToProto(const JobReport& report) {
+  const Job& job = report.job;
+  v1::Job message = SummaryToProto(report);
   for (std::size_t i = 0; i < std::min(job.warnings.size(), kMostWarnings); ++i) {
     message.add_warnings(job.warnings[i]);
   }
@@ -140,9 +180,6 @@ v1::Job ToProto(const JobReport& report) {
     use.set_is_used(job.needs.Uses(part));
     use.set_reason(job.needs.ReasonOf(part));
   }
-  *message.mutable_progress() = ProgressToProto(report);
-  *message.mutable_submitted_at() = ToProto(job.submitted_at);
-  message.set_no_workers(state == JobState::kRunning && report.workers == 0);
   for (const ErrorSample& sample : job.convergence)
     *message.add_convergence() = SampleToProto(sample);
   for (const LightFinding& light : job.lights) {
@@ -155,7 +192,6 @@ v1::Job ToProto(const JobReport& report) {
     item.set_missing_share(light.missing_share);
   }
   AddShares(job.workers, message);
-  message.set_has_reference(job.reference.has_value());
   for (const PhotonStep& step : job.photon_steps)
     *message.add_photon_steps() = ToProto(step);
   std::vector<PassTally> parts = job.pass_record.tallies();
@@ -166,14 +202,11 @@ v1::Job ToProto(const JobReport& report) {
     item.set_passes(part.passes);
     *item.mutable_energy() = ToProto(part.tally).energy();
   }
-  message.set_condition(job.condition);
-  message.set_owner(job.owner);
   for (const JobEvent& event : job.events) {
     v1::JobEvent& item = *message.add_events();
     *item.mutable_at() = ToProto(event.at);
     item.set_what(event.what);
   }
-  if (job.ended_at) *message.mutable_ended_at() = ToProto(*job.ended_at);
   for (const PhotonKey& key : job.counters.dropped_photons) {
     v1::PhotonKey& item = *message.add_dropped_photons();
     item.set_pass(key.pass);
@@ -189,8 +222,11 @@ WallTime TimeOf(const google::protobuf::Timestamp& message) {
                   std::chrono::nanoseconds(message.nanos()));
 }
 
-JobState StateOf(v1::JobState state) {
-  switch (state) {
+// Of a job that waits for the disk: it waits for a turn in the next process.
+JobState StateOf(const v1::Job& job) {
+  switch (job.state()) {
+    case v1::JOB_STATE_PAUSED:
+      return job.pause_cause() == v1::PAUSE_CAUSE_DISK ? JobState::kQueued : JobState::kPaused;
     case v1::JOB_STATE_SUCCEEDED:
       return JobState::kSucceeded;
     case v1::JOB_STATE_CANCELLED:
@@ -199,6 +235,17 @@ JobState StateOf(v1::JobState state) {
       return JobState::kFailed;
     default:
       return JobState::kQueued;
+  }
+}
+
+PauseCause CauseOf(const v1::Job& job) {
+  switch (job.pause_cause()) {
+    case v1::PAUSE_CAUSE_USER:
+      return PauseCause::kUser;
+    case v1::PAUSE_CAUSE_FAILED_BATCH:
+      return PauseCause::kFailedBatch;
+    default:
+      return PauseCause::kNone;
   }
 }
 
@@ -309,14 +356,14 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
   job.name = message.name();
   LUCERNA_ASSIGN_OR_RETURN(job.manifest, FromProto(record.scene()));
   LUCERNA_ASSIGN_OR_RETURN(job.scene_digest, Digest::FromBytes(message.scene_digest()));
-  JobState state = StateOf(message.state());
+  JobState state = StateOf(message);
   std::string failure = message.failure();
   if (StatusOr<RenderSettings> settings = FromProto(message.settings()); settings.ok()) {
     job.settings = *std::move(settings);
   } else {
     // Another version of Lucerna has other settings: enough to show what has ended.
     job.settings = SettingsOf(message);
-    if (state == JobState::kQueued) {
+    if (state == JobState::kQueued || state == JobState::kPaused) {
       state = JobState::kFailed;
       failure = absl::StrCat("the job was submitted to another version of Lucerna (",
                              std::string(settings.status().message()), "); submit it again");
@@ -366,8 +413,10 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
   job.distrusted.insert(record.distrusted_worker_ids().begin(),
                         record.distrusted_worker_ids().end());
   if (message.has_ended_at()) job.ended_at = TimeOf(message.ended_at());
-  job.condition = message.condition();
   job.owner = message.owner();
+  job.priority = message.priority();
+  job.pause_cause = CauseOf(message);
+  if (message.pause_cause() != v1::PAUSE_CAUSE_DISK) job.condition = message.condition();
   for (const v1::JobEvent& event : message.events())
     job.events.push_back({TimeOf(event.at()), event.what()});
   return result;

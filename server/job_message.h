@@ -16,6 +16,10 @@ namespace lucerna {
 inline constexpr std::size_t kMostWarnings = 200;
 
 [[nodiscard]] v1::Job ToProto(const JobReport& report);
+// What a list of jobs shows of it (JobService.List).
+[[nodiscard]] v1::Job SummaryToProto(const JobReport& report);
+// Absent for a value that is no state.
+[[nodiscard]] std::optional<JobState> FromProto(v1::JobState state);
 
 // A record, as bytes. `running` is the time that the job has run.
 [[nodiscard]] std::string EncodeRecord(const Job& job, const std::optional<Digest>& image,

@@ -48,6 +48,10 @@ JobRunner::JobRunner(std::string job_id, RenderSettings settings, int threads, R
 
 JobRunner::~JobRunner() {
   if (estimate_thread_.joinable()) estimate_thread_.join();
+  // A job that was ended while it had no turn.
+  const bool was_held = gave_up_turn_;
+  CloseAll();
+  if (was_held) hooks_.scheduler.ForgetJob(job_id_);
 }
 
 JobRunner::End JobRunner::EndOf(const RenderSettings& settings) {
@@ -105,6 +109,28 @@ StatusOr<RenderResult> JobRunner::RunToEnd() {
   LUCERNA_RETURN_IF_ERROR(why_stopped());
   is_running_ = true;
   hooks_.on_running();
+  if (!std::exchange(gave_up_turn_, false)) BeginRounds();
+  save_at_ = hooks_.clock.Steady() + PauseAfterSave(kFirstSave, hooks_.checkpoint_share);
+  hooks_.on_work_opened();
+  StatusOr<RenderResult> result = RunRounds();
+  // The process ends, and a later one may go on.
+  if (absl::IsUnavailable(result.status())) KeepWholeRounds();
+  if (result.ok() && result->gave_up_turn) {
+    // What is out comes back and is kept; nothing more is lent.
+    hooks_.scheduler.SetHeld(job_id_, true);
+    KeepWholeRounds();
+    TakeInEstimate(true);
+    gave_up_turn_ = true;
+    return result;
+  }
+  // Whatever ended it: workers must not go on with passes that will not be merged.
+  CloseAll();
+  hooks_.scheduler.ForgetJob(job_id_);
+  TakeInEstimate(true);
+  return result;
+}
+
+void JobRunner::BeginRounds() {
   next_round_ = estimator_->whole_passes();
   // Rounds that were open when the job stopped are planned again.
   while (!photon_steps_.empty() && photon_steps_.back().first_pass >= next_round_)
@@ -112,17 +138,6 @@ StatusOr<RenderResult> JobRunner::RunToEnd() {
   next_split_ = next_round_;
   reported_passes_ = next_round_;
   saved_passes_ = next_round_;
-  const SteadyTime now = hooks_.clock.Steady();
-  run_began_at_ = now - ran_before_;
-  save_at_ = now + PauseAfterSave(kFirstSave, hooks_.checkpoint_share);
-  StatusOr<RenderResult> result = RunRounds();
-  // The process ends, and a later one may go on.
-  if (absl::IsUnavailable(result.status())) KeepWholeRounds();
-  ran_before_ = hooks_.clock.Steady() - run_began_at_;
-  // Whatever ended it: workers must not go on with passes that will not be merged.
-  CloseAll();
-  TakeInEstimate(true);
-  return result;
 }
 
 void JobRunner::CloseAll() {
@@ -138,6 +153,7 @@ void JobRunner::CloseAll() {
     hooks_.rounds.Drop(key);
     Withdraw(key.pass);
   }
+  if (std::exchange(gave_up_turn_, false)) hooks_.scheduler.SetHeld(job_id_, false);
   split_passes_.clear();
   open_rounds_.clear();
   ahead_.reset();
@@ -169,19 +185,25 @@ bool JobRunner::MayMeetTarget(const End& end) const {
 StatusOr<RenderResult> JobRunner::RunRounds() {
   while (true) {
     LUCERNA_RETURN_IF_ERROR(why_stopped());
+    if (gives_up_turn()) {
+      RenderResult result;
+      result.gave_up_turn = true;
+      return result;
+    }
     End end;
     {
       const MutexLock lock(mutex_);
       end = end_;
     }
     due_.reset();
+    bool is_time_up = false;
     if (end.time_s > 0) {
       // A limit beyond a century is no limit, and would not fit.
-      const double seconds = std::min(end.time_s, 3.2e9);
-      due_ = run_began_at_ +
-             std::chrono::duration_cast<Duration>(std::chrono::duration<double>(seconds));
+      const auto limit = std::chrono::duration_cast<Duration>(
+          std::chrono::duration<double>(std::min(end.time_s, 3.2e9)));
+      due_ = hooks_.when_it_has_run(limit);
+      is_time_up = hooks_.running() >= limit;
     }
-    const bool is_time_up = due_ && hooks_.clock.Steady() >= *due_;
     TakeInEstimate(false);
     if (const StopReason reason = ReasonToStop(end, is_time_up); reason != StopReason::kNone) {
       // A stop by error leaves later passes out: no estimate covers them.
@@ -518,7 +540,7 @@ void JobRunner::CheckImage() {
 
 std::string JobRunner::Save() const {
   ByteWriter writer;
-  writer.Varint(static_cast<std::uint64_t>((hooks_.clock.Steady() - run_began_at_).count()));
+  writer.Varint(static_cast<std::uint64_t>(hooks_.running().count()));
   writer.Varint(static_cast<std::uint64_t>(next_checkpoint_));
   writer.Varint(static_cast<std::uint64_t>(checkpoints_));
   writer.Varint(has_warned_ ? 1 : 0);
@@ -536,7 +558,7 @@ std::string JobRunner::Save() const {
 
 Status JobRunner::Restore(std::string_view sums) {
   ByteReader reader(sums);
-  const Duration ran{static_cast<std::int64_t>(reader.Varint())};
+  reader.Varint();  // the time that the job has run: the record says so too
   const auto next_checkpoint = static_cast<std::int64_t>(reader.Varint());
   const auto checkpoints = static_cast<int>(reader.Varint());
   const bool has_warned = reader.Varint() != 0;
@@ -549,7 +571,6 @@ Status JobRunner::Restore(std::string_view sums) {
   }
   const MutexLock lock(estimator_mutex_);
   LUCERNA_RETURN_IF_ERROR(estimator_->Restore(reader));
-  ran_before_ = ran;
   next_checkpoint_ = next_checkpoint;
   checkpoints_ = checkpoints;
   has_warned_ = has_warned;
@@ -575,20 +596,16 @@ void JobRunner::CheckpointIfDue() {
   if (!hooks_.on_checkpoint || hooks_.clock.Steady() < save_at_) return;
   Status kept = KeepCheckpoint();
   if (kept.ok()) return;
-  SteadyTime paused_at = hooks_.clock.Steady();
   while (!kept.ok()) {
     hooks_.on_pause(kept);
     {
-      // A cancel or a stop ends the pause too; wakes by workers do not.
+      // A cancel, a stop and a pause by the user end the pause too; wakes by workers do not.
       const MutexLock lock(mutex_);
       const SteadyTime until = hooks_.clock.Steady() + kPauseBeforeRetry;
-      while (!why_stopped_ && !shall_finish_ && hooks_.clock.Steady() < until)
+      while (!why_stopped_ && !shall_finish_ && !gives_up_turn_ && hooks_.clock.Steady() < until)
         changed_.WaitFor(mutex_, kPauseBeforeRetry);
-      if (why_stopped_ || shall_finish_) break;
+      if (why_stopped_ || shall_finish_ || gives_up_turn_) break;
     }
-    // The time of a job is that in which it could go on.
-    const SteadyTime now = hooks_.clock.Steady();
-    run_began_at_ += now - std::exchange(paused_at, now);
     kept = KeepCheckpoint();
   }
   hooks_.on_pause(absl::OkStatus());
@@ -616,7 +633,7 @@ bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {
   Duration longest = kLongest;
   if (until) longest = std::clamp(*until - hooks_.clock.Steady(), Duration::zero(), kLongest);
   const MutexLock lock(mutex_);
-  if (!was_woken_ && !why_stopped_ && longest > Duration::zero()) {
+  if (!was_woken_ && !why_stopped_ && !gives_up_turn_ && longest > Duration::zero()) {
     changed_.WaitFor(mutex_, longest);
   }
   was_woken_ = false;
@@ -626,6 +643,17 @@ bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {
 Status JobRunner::why_stopped() const {
   const MutexLock lock(mutex_);
   return why_stopped_.value_or(absl::OkStatus());
+}
+
+bool JobRunner::gives_up_turn() const {
+  const MutexLock lock(mutex_);
+  return gives_up_turn_;
+}
+
+void JobRunner::SetGivesUpTurn(bool gives_up_turn) {
+  const MutexLock lock(mutex_);
+  gives_up_turn_ = gives_up_turn;
+  changed_.NotifyAll();
 }
 
 void JobRunner::SetEnd(const RenderSettings& settings) {

@@ -32,6 +32,7 @@
 #include "server/emission_check.h"
 #include "server/job.h"
 #include "server/job_estimator.h"
+#include "server/memory_budget.h"
 #include "server/pass_merger.h"
 #include "server/round_merger.h"
 #include "server/running_job.h"
@@ -54,9 +55,12 @@ struct RunnerHooks {
   PassMerger& passes;
   RoundMerger& rounds;
   const Clock& clock;
+  // What the job holds; let go of with the runner.
+  std::shared_ptr<MemoryClaim> memory = nullptr;
   // Passes are never given out whole (for tests of batches of photons).
   bool always_splits = false;
   // Called on the runner's thread, never under a lock.
+  // A run begins; what is open may be lent from then on (Scheduler::SetHeld).
   std::function<void()> on_running;
   std::function<void(std::string warning)> on_warning;
   // How many photons passes have, each time that it changes.
@@ -77,6 +81,10 @@ struct RunnerHooks {
   double checkpoint_share = 0.01;
   // The job pauses and why, or goes on (OK).
   std::function<void(const Status& why)> on_pause;
+  // How long the job has run, and when it will have run so long (absent while its time stands
+  // still).
+  std::function<Duration()> running;
+  std::function<std::optional<SteadyTime>(Duration time)> when_it_has_run;
 };
 
 class JobRunner final : public RunningJob {
@@ -99,6 +107,7 @@ class JobRunner final : public RunningJob {
   void SetEnd(const RenderSettings& settings) override;
   void Reopen(const RenderSettings& settings) override;
   void Finish() override;
+  void SetGivesUpTurn(bool gives_up_turn) override;
   void Stop(Status why) override;
   [[nodiscard]] Status CheckEmission(const BatchTally& tally) const override;
   void Wake() override;
@@ -136,6 +145,8 @@ class JobRunner final : public RunningJob {
   static End EndOf(const RenderSettings& settings);
 
   StatusOr<RenderResult> RunToEnd();
+  // The beginning of a run without open rounds.
+  void BeginRounds();
   StatusOr<RenderResult> RunRounds();
   // All that a later run follows from: the whole rounds taken in.
   std::string Save() const;
@@ -192,6 +203,7 @@ class JobRunner final : public RunningJob {
   // Waits for a wake, until `until` if there is one. False when Run must end now.
   bool WaitForChange(std::optional<SteadyTime> until);
   Status why_stopped() const;
+  bool gives_up_turn() const;
   PassKey KeyOf(std::uint64_t pass) const { return {job_id_, pass}; }
   RenderResult MakeResult(StopReason reason) const LUCERNA_REQUIRES(estimator_mutex_);
 
@@ -210,9 +222,8 @@ class JobRunner final : public RunningJob {
   ReferenceImage reference_;
   std::future<ErrorCheckpoint> estimate_;  // under way
   std::thread estimate_thread_;
-  Duration ran_before_{};
-  SteadyTime run_began_at_;  // less what ran before, without pauses
-  SteadyTime save_at_;       // no checkpoint is kept before this
+  bool gave_up_turn_ = false;  // rounds may be open
+  SteadyTime save_at_;         // no checkpoint is kept before this
   std::uint64_t saved_passes_ = 0;
   std::int64_t next_checkpoint_ = kFirstCheckpoint;
   int checkpoints_ = 0;
@@ -236,6 +247,7 @@ class JobRunner final : public RunningJob {
   bool was_woken_ LUCERNA_GUARDED_BY(mutex_) = false;
   End end_ LUCERNA_GUARDED_BY(mutex_);
   bool shall_finish_ LUCERNA_GUARDED_BY(mutex_) = false;
+  bool gives_up_turn_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::optional<Status> why_stopped_ LUCERNA_GUARDED_BY(mutex_);
   std::map<std::uint64_t, WorkBlobs> blobs_ LUCERNA_GUARDED_BY(mutex_);  // by first pass
 };

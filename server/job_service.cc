@@ -28,6 +28,11 @@ StatusOr<Submission> ReadSubmission(const v1::SubmitRequest& request) {
   LUCERNA_ASSIGN_OR_RETURN(submission.manifest, FromProto(request.scene()));
   LUCERNA_ASSIGN_OR_RETURN(submission.overrides, FromProto(request.overrides()));
   submission.validate_only = request.validate_only();
+  submission.priority = request.priority();
+  if (submission.priority < kLowestPriority || submission.priority > kHighestPriority) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("a priority is a number from ", kLowestPriority, " to ", kHighestPriority));
+  }
   if (!request.reference_digest().empty()) {
     LUCERNA_ASSIGN_OR_RETURN(submission.reference, Digest::FromBytes(request.reference_digest()));
   }
@@ -43,41 +48,28 @@ grpc::Status Put(const StatusOr<JobReport>& report, v1::Job* response) {
 
 // One watcher. All of it is touched under its own lock; gRPC's callbacks never run inside a call
 // of ours.
-class JobService::WatchReactor final : public grpc::ServerWriteReactor<v1::Job> {
+class JobService::WatchReactor final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
  public:
   WatchReactor(JobService& service, std::string job_id)
       : service_(service), job_id_(std::move(job_id)) {}
 
-  // Sends what is new, if it is time to.
-  void SendIfDue(SteadyTime now) {
+  [[nodiscard]] const std::string& job_id() const { return job_id_; }
+
+  // Sends `newest` unless it has been sent.
+  void SendIfNew(std::shared_ptr<const Snapshot> newest) {
     const MutexLock lock(mutex_);
     if (is_writing_ || is_finished_) return;
     if (is_cancelled_) {
       End(absl::CancelledError("the watcher left"));
-      return;
-    }
-    if (has_sent_end_) {
+    } else if (sent_ && sent_->has_ended) {
       End(absl::OkStatus());
-      return;
+    } else if (!newest->failure.ok()) {
+      End(newest->failure);
+    } else if (newest != sent_) {
+      sent_ = std::move(newest);
+      is_writing_ = true;
+      StartWrite(&sent_->bytes);
     }
-    const StatusOr<JobReport> report = service_.coordinator_.ReportOf(job_id_);
-    if (!report.ok()) {
-      End(report.status());
-      return;
-    }
-    const JobState state = report->job.life.state();
-    const bool is_news = !sent_at_ || state != sent_state_;
-    const bool is_time =
-        sent_at_ && ((report->version != sent_version_ && now - *sent_at_ >= kWatchAtMostEvery) ||
-                     now - *sent_at_ >= kWatchAtLeastEvery);
-    if (!is_news && !is_time) return;
-    sent_at_ = now;
-    sent_state_ = state;
-    sent_version_ = report->version;
-    has_sent_end_ = report->job.life.has_ended();
-    message_ = ToProto(*report);
-    is_writing_ = true;
-    StartWrite(&message_);
   }
 
   void Close() {
@@ -93,7 +85,7 @@ class JobService::WatchReactor final : public grpc::ServerWriteReactor<v1::Job> 
     if (is_finished_) return;
     if (!ok) {
       End(absl::CancelledError("the watcher left"));
-    } else if (has_sent_end_) {
+    } else if (sent_ && sent_->has_ended) {
       End(absl::OkStatus());
     } else if (is_closed_) {
       End(absl::UnavailableError("the coordinator shuts down"));
@@ -123,15 +115,11 @@ class JobService::WatchReactor final : public grpc::ServerWriteReactor<v1::Job> 
   JobService& service_;
   const std::string job_id_;
   Mutex mutex_;
-  v1::Job message_;
   bool is_writing_ LUCERNA_GUARDED_BY(mutex_) = false;
   bool is_finished_ LUCERNA_GUARDED_BY(mutex_) = false;
   bool is_cancelled_ LUCERNA_GUARDED_BY(mutex_) = false;
   bool is_closed_ LUCERNA_GUARDED_BY(mutex_) = false;
-  bool has_sent_end_ LUCERNA_GUARDED_BY(mutex_) = false;
-  std::optional<SteadyTime> sent_at_ LUCERNA_GUARDED_BY(mutex_);
-  JobState sent_state_ LUCERNA_GUARDED_BY(mutex_) = JobState::kQueued;
-  std::uint64_t sent_version_ LUCERNA_GUARDED_BY(mutex_) = 0;
+  std::shared_ptr<const Snapshot> sent_ LUCERNA_GUARDED_BY(mutex_);  // or being sent
 };
 
 Status JobService::CheckMayChange(const grpc::CallbackServerContext* context,
@@ -158,7 +146,7 @@ grpc::ServerUnaryReactor* JobService::Submit(grpc::CallbackServerContext* contex
     return absl::OkStatus();
   };
   pools_.scenes.Run(still_needed, [reactor, submit](const Status& may_begin) {
-    reactor->Finish(ToGrpc(may_begin.ok() ? submit() : may_begin));
+    reactor->Finish(ToGrpc(may_begin.ok() ? WithinMemory(submit) : may_begin));
   });
   return reactor;
 }
@@ -186,9 +174,20 @@ grpc::ServerUnaryReactor* JobService::List(grpc::CallbackServerContext* context,
       request->page_size() == 0
           ? kUsualPage
           : std::min(static_cast<std::size_t>(request->page_size()), kLargestPage);
-  const auto [reports, next] = coordinator_.List(count, before);
+  JobFilter filter;
+  for (const int state : request->states()) {
+    const std::optional<JobState> known = FromProto(static_cast<v1::JobState>(state));
+    if (!known) {
+      reactor->Finish(ToGrpc(absl::InvalidArgumentError("a state to list is none of a job")));
+      return reactor;
+    }
+    filter.states.insert(*known);
+  }
+  filter.owner = request->owner();
+  filter.name_contains = request->name_contains();
+  const auto [reports, next] = coordinator_.List(filter, count, before);
   for (const JobReport& report : reports)
-    *response->add_jobs() = ToProto(report);
+    *response->add_jobs() = SummaryToProto(report);
   if (next != 0) response->set_next_page_token(absl::StrCat(next));
   reactor->Finish(grpc::Status::OK);
   return reactor;
@@ -201,6 +200,29 @@ grpc::ServerUnaryReactor* JobService::Cancel(grpc::CallbackServerContext* contex
   const Status allowed = CheckMayChange(context, request->job_id());
   reactor->Finish(allowed.ok() ? Put(coordinator_.Cancel(request->job_id()), response)
                                : ToGrpc(allowed));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* JobService::Pause(grpc::CallbackServerContext* context,
+                                            const v1::PauseJobRequest* request, v1::Job* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(Put(coordinator_.Pause(request->job_id()), response));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* JobService::Resume(grpc::CallbackServerContext* context,
+                                             const v1::ResumeJobRequest* request,
+                                             v1::Job* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(Put(coordinator_.Resume(request->job_id()), response));
+  return reactor;
+}
+
+grpc::ServerUnaryReactor* JobService::SetPriority(grpc::CallbackServerContext* context,
+                                                  const v1::SetJobPriorityRequest* request,
+                                                  v1::Job* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  reactor->Finish(Put(coordinator_.SetPriority(request->job_id(), request->priority()), response));
   return reactor;
 }
 
@@ -243,19 +265,46 @@ grpc::ServerUnaryReactor* JobService::Extend(grpc::CallbackServerContext* contex
   return reactor;
 }
 
-grpc::ServerWriteReactor<v1::Job>* JobService::Watch(grpc::CallbackServerContext* /*context*/,
-                                                     const v1::WatchJobRequest* request) {
-  auto* const watch = new WatchReactor(*this, request->job_id());
-  bool is_closed = false;
-  {
-    const MutexLock lock(mutex_);
-    is_closed = is_closed_;
-    watches_.insert(watch);
+std::shared_ptr<const JobService::Snapshot> JobService::Refresh(const std::string& job_id) {
+  const SteadyTime now = clock_.Steady();
+  std::shared_ptr<const Snapshot>& newest = snapshots_[job_id];
+  const StatusOr<JobTable::News> news = coordinator_.NewsOf(job_id);
+  if (newest && news.ok()) {
+    const Duration age = now - newest->made_at;
+    const bool is_due = news->state != newest->news.state ||
+                        (*news != newest->news && age >= kWatchAtMostEvery) ||
+                        age >= kWatchAtLeastEvery;
+    if (!is_due) return newest;
   }
-  if (is_closed) {
+  auto snapshot = std::make_shared<Snapshot>();
+  snapshot->made_at = now;
+  const StatusOr<JobReport> report = coordinator_.ReportOf(job_id);
+  snapshot->failure = report.status();
+  if (report.ok()) {
+    snapshot->news = {report->job.life.state(), report->version};
+    snapshot->has_ended = report->job.life.has_ended();
+    const grpc::Slice bytes(ToProto(*report).SerializeAsString());
+    snapshot->bytes = grpc::ByteBuffer(&bytes, 1);
+  }
+  newest = std::move(snapshot);
+  return newest;
+}
+
+grpc::ServerWriteReactor<grpc::ByteBuffer>* JobService::Watch(
+    grpc::CallbackServerContext* /*context*/, const grpc::ByteBuffer* request) {
+  v1::WatchJobRequest message;
+  grpc::ByteBuffer bytes = *request;
+  const bool is_read =
+      grpc::SerializationTraits<v1::WatchJobRequest>::Deserialize(&bytes, &message).ok();
+  // What cannot be read names no job.
+  auto* const watch = new WatchReactor(*this, is_read ? message.job_id() : std::string());
+  // Under the lock, so that the watcher is not deleted meanwhile: OnDone needs it first.
+  const MutexLock lock(mutex_);
+  watches_.insert(watch);
+  if (is_closed_) {
     watch->Close();
   } else {
-    watch->SendIfDue(clock_.Steady());
+    watch->SendIfNew(Refresh(watch->job_id()));
   }
   return watch;
 }
@@ -263,8 +312,12 @@ grpc::ServerWriteReactor<v1::Job>* JobService::Watch(grpc::CallbackServerContext
 void JobService::Tick() {
   // Under the lock, so that no watcher is deleted meanwhile: OnDone needs it first.
   const MutexLock lock(mutex_);
-  for (WatchReactor* const watch : watches_)
-    watch->SendIfDue(clock_.Steady());
+  std::set<std::string> watched;
+  for (WatchReactor* const watch : watches_) {
+    const bool is_new = watched.insert(watch->job_id()).second;
+    watch->SendIfNew(is_new ? Refresh(watch->job_id()) : snapshots_.at(watch->job_id()));
+  }
+  std::erase_if(snapshots_, [&](const auto& item) { return !watched.contains(item.first); });
 }
 
 void JobService::Close() {

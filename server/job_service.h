@@ -2,13 +2,17 @@
 //
 // Turns messages into values, calls the coordinator, and turns the result back. Nothing is decided
 // here except when a watcher hears of a change: at most ten times a second, at least every five
-// seconds, and at once when the job's state is another.
+// seconds, and at once when the job's state is another. All watchers of a job are sent the same
+// bytes, which are made once; a watcher that is slow is sent the newest when it has taken the last.
 //
 // Threads: gRPC calls in from its own pool. Handlers never wait; Submit reads the scene in the pool
 // for scenes.
 #pragma once
 
+#include <map>
+#include <memory>
 #include <set>
+#include <string>
 
 #include <grpcpp/grpcpp.h>
 
@@ -21,7 +25,9 @@
 
 namespace lucerna {
 
-class JobService final : public v1::JobService::CallbackService {
+// Watch takes and gives bytes as they are on the wire.
+class JobService final
+    : public v1::JobService::WithRawCallbackMethod_Watch<v1::JobService::CallbackService> {
  public:
   // All outlive the service.
   JobService(Coordinator& coordinator, WorkPools& pools, const Clock& clock,
@@ -42,11 +48,18 @@ class JobService final : public v1::JobService::CallbackService {
                                    const v1::ExtendJobRequest* request, v1::Job* response) override;
   grpc::ServerUnaryReactor* Cancel(grpc::CallbackServerContext* context,
                                    const v1::CancelJobRequest* request, v1::Job* response) override;
+  grpc::ServerUnaryReactor* Pause(grpc::CallbackServerContext* context,
+                                  const v1::PauseJobRequest* request, v1::Job* response) override;
+  grpc::ServerUnaryReactor* Resume(grpc::CallbackServerContext* context,
+                                   const v1::ResumeJobRequest* request, v1::Job* response) override;
+  grpc::ServerUnaryReactor* SetPriority(grpc::CallbackServerContext* context,
+                                        const v1::SetJobPriorityRequest* request,
+                                        v1::Job* response) override;
   grpc::ServerUnaryReactor* Delete(grpc::CallbackServerContext* context,
                                    const v1::DeleteJobRequest* request,
                                    v1::DeleteJobResponse* response) override;
-  grpc::ServerWriteReactor<v1::Job>* Watch(grpc::CallbackServerContext* context,
-                                           const v1::WatchJobRequest* request) override;
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* Watch(grpc::CallbackServerContext* context,
+                                                    const grpc::ByteBuffer* request) override;
 
   // To be called every 50 ms or so: sends watchers what has changed.
   void Tick();
@@ -55,6 +68,16 @@ class JobService final : public v1::JobService::CallbackService {
 
  private:
   class WatchReactor;
+  // A job as it was at one moment.
+  struct Snapshot {
+    SteadyTime made_at;
+    JobTable::News news;
+    bool has_ended = false;
+    Status failure;  // of a job that there is not (any more)
+    grpc::ByteBuffer bytes;
+  };
+  // Makes a new snapshot of the job if it is time to; returns the newest.
+  std::shared_ptr<const Snapshot> Refresh(const std::string& job_id) LUCERNA_REQUIRES(mutex_);
 
   // OK when the caller may change this job. Errors: NOT_FOUND, PERMISSION_DENIED.
   [[nodiscard]] Status CheckMayChange(const grpc::CallbackServerContext* context,
@@ -67,6 +90,8 @@ class JobService final : public v1::JobService::CallbackService {
   Mutex mutex_;
   bool is_closed_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::set<WatchReactor*> watches_ LUCERNA_GUARDED_BY(mutex_);
+  // Of jobs that are watched.
+  std::map<std::string, std::shared_ptr<const Snapshot>> snapshots_ LUCERNA_GUARDED_BY(mutex_);
 };
 
 }  // namespace lucerna

@@ -7,6 +7,9 @@
 namespace lucerna {
 namespace {
 
+// A worker that comes back within this time finds its jobs as they were.
+constexpr Duration kPatienceWithoutWorkers = std::chrono::seconds(5);
+
 Status UnknownJob(const std::string& job_id) {
   return absl::NotFoundError(absl::StrCat("there is no job ", job_id));
 }
@@ -19,7 +22,8 @@ std::string RequestKey(const std::string& request_id, const std::string& owner) 
 
 }  // namespace
 
-JobTable::JobTable(Options options) : options_(std::move(options)), queue_(options_.max_waiting) {}
+JobTable::JobTable(Options options)
+    : options_(std::move(options)), queue_(options_.max_waiting, options_.max_at_once) {}
 
 // In the id that Add gave, which the caller compares as a whole; 0, which is no serial, for a text
 // of another form.
@@ -96,16 +100,17 @@ StatusOr<JobTable::Submitted> JobTable::Add(CheckedJob checked, WallTime submitt
   job.needs = std::move(checked.needs);
   job.submitted_at = submitted_at;
   job.life = JobLife(moment.now);
+  job.life.SetHasWorkers(has_workers_, moment.now);
+  job.priority = checked.submission.priority;
   job.reference = checked.submission.reference;
   // A job that must wait is read again later, so that waiting jobs cost no memory.
-  if (queue_.is_idle()) entry.scene = std::move(checked.scene);
+  if (queue_.has_room()) entry.scene = std::move(checked.scene);
   // Before anybody can see it.
   LUCERNA_RETURN_IF_ERROR(Save(entry, moment.now));
   ++next_serial_;
   ++next_turn_;
-  const Entry& added = entries_[serial] = std::move(entry);
-  queue_.Push(serial);
-  job_waits_.NotifyAll();
+  Entry& added = entries_[serial] = std::move(entry);
+  PushLocked(serial, added);
   return Submitted{added.job.id, added.job.warnings};
 }
 
@@ -127,12 +132,13 @@ void JobTable::Restore(std::vector<JournalEntry> jobs, std::uint64_t next_serial
   std::map<std::uint64_t, std::uint64_t> waiting;  // serials by turn
   for (JournalEntry& job : jobs) {
     next_turn_ = std::max(next_turn_, job.turn + 1);
-    if (!job.job.life.has_ended()) waiting[job.turn] = job.serial;
+    if (job.job.life.state() == JobState::kQueued) waiting[job.turn] = job.serial;
     Entry& entry = entries_[job.serial];
     static_cast<JournalEntry&>(entry) = std::move(job);
+    entry.job.life.SetHasWorkers(has_workers_, moment.now);
   }
   for (const auto& [turn, serial] : waiting)
-    queue_.Push(serial);
+    PushLocked(serial, entries_.at(serial));
   Retain(dropped, moment);
 }
 
@@ -182,16 +188,16 @@ Status JobTable::Delete(const std::string& job_id, const Moment& /*moment*/) {
 // Requests
 // ---------------------------------------------------------------------------------------------
 
-JobReport JobTable::MakeReport(const Entry& entry, const Moment& moment) const {
+JobReport JobTable::MakeReport(const Entry& entry, const Moment& moment, bool is_summary) const {
   JobReport report;
-  report.job = entry.job;
+  report.job = is_summary ? SummaryOf(entry.job) : entry.job;
   report.version = entry.version;
   const JobLife& life = entry.job.life;
   report.running = life.Running(moment.now);
   if (life.state() == JobState::kRunning) {
     report.photons_per_second =
         entry.job.counters.rate.PerSecond(moment.now - report.running, moment.now);
-    report.job.counters.coordinator_cpu = moment.cpu - entry.cpu_at_start;
+    report.job.counters.coordinator_cpu = CpuOf(entry, moment);
   } else if (life.has_ended() && report.running > Duration::zero()) {
     report.photons_per_second =
         static_cast<double>(entry.job.counters.photons) / Seconds(report.running);
@@ -213,15 +219,29 @@ StatusOr<JobReport> JobTable::ReportOf(const std::string& job_id, const Moment& 
   return MakeReport(found->second, moment);
 }
 
-std::pair<std::vector<JobReport>, std::uint64_t> JobTable::List(std::size_t count,
+StatusOr<JobTable::News> JobTable::NewsOf(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  return News{found->second.job.life.state(), found->second.version};
+}
+
+std::pair<std::vector<JobReport>, std::uint64_t> JobTable::List(const JobFilter& filter,
+                                                                std::size_t count,
                                                                 std::uint64_t before,
                                                                 const Moment& moment) const {
+  const auto passes = [&](const Job& job) {
+    return (filter.states.empty() || filter.states.contains(job.life.state())) &&
+           (filter.owner.empty() || filter.owner == OwnerOf(job)) &&
+           job.name.find(filter.name_contains) != std::string::npos;
+  };
   const MutexLock lock(mutex_);
   std::pair<std::vector<JobReport>, std::uint64_t> page;
   auto end = before == 0 ? entries_.end() : entries_.lower_bound(before);
   while (end != entries_.begin() && page.first.size() < count) {
     --end;
-    page.first.push_back(MakeReport(end->second, moment));
+    if (!passes(end->second.job)) continue;
+    page.first.push_back(MakeReport(end->second, moment, /*is_summary=*/true));
   }
   page.second = end == entries_.begin() ? 0 : end->first;
   return page;
@@ -229,30 +249,25 @@ std::pair<std::vector<JobReport>, std::uint64_t> JobTable::List(std::size_t coun
 
 void JobTable::End(std::uint64_t serial, Entry& entry, const Status& why, const Moment& moment,
                    Dropped& dropped) {
-  JobLife& life = entry.job.life;
-  const JobState before = life.state();
-  if (absl::IsCancelled(why) ? !life.Cancel(moment.now)
-                             : !life.Fail(std::string(why.message()), moment.now)) {
-    return;
-  }
-  if (before == JobState::kRunning) {
-    entry.job.counters.coordinator_cpu = moment.cpu - entry.cpu_at_start;
-  }
+  const bool has_changed = ChangeLife(serial, entry, moment, [&](JobLife& life) {
+    return absl::IsCancelled(why) ? life.Cancel(moment.now)
+                                  : life.Fail(std::string(why.message()), moment.now);
+  });
+  if (!has_changed) return;
   entry.job.ended_at = moment.wall;
+  entry.job.pause_cause = PauseCause::kNone;
   entry.job.condition.clear();
   entry.has_checkpoint = false;
   Save(entry, moment.now).IgnoreError();
-  ++entry.version;
   dropped.scenes.push_back(std::exchange(entry.scene, std::nullopt));
   if (entry.runner) {
     entry.runner->Stop(why);
     dropped.runners.push_back(std::exchange(entry.runner, nullptr));
   }
   // One whose turn it is keeps its files until the turn has ended.
-  if (before == JobState::kQueued) {
-    queue_.Remove(serial);
-    if (queue_.current() != serial) dropped.pinned.push_back(std::exchange(entry.pinned, {}));
-  }
+  queue_.Remove(serial);
+  LeavePlace(serial);
+  if (!queue_.HasTurn(serial)) dropped.pinned.push_back(std::exchange(entry.pinned, {}));
 }
 
 StatusOr<JobReport> JobTable::Cancel(const std::string& job_id, const Moment& moment) {
@@ -280,13 +295,19 @@ StatusOr<JobReport> JobTable::Stop(const std::string& job_id, const Moment& mome
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return UnknownJob(job_id);
-  const Entry& entry = found->second;
+  Entry& entry = found->second;
   if (!entry.job.life.has_ended()) {
     if (!entry.runner) {
       return absl::FailedPreconditionError(absl::StrCat(
-          "job ", job_id, " has not begun to run and has no image; cancel it instead"));
+          "job ", job_id, " has not begun to run",
+          entry.has_checkpoint ? " again; resume it, or wait for its turn, and stop it then"
+                               : " and has no image; cancel it instead"));
     }
     entry.runner->Finish();
+    entry.is_finishing = true;
+    queue_.SetPriority(found->first, ClaimOf(entry).priority);
+    UpdateTurns();
+    ResumeLocked(found->first, entry);
   }
   return MakeReport(entry, moment);
 }
@@ -318,8 +339,7 @@ StatusOr<JobReport> JobTable::Extend(const std::string& job_id, const RenderOver
     entry.image_digest.reset();
     job.ended_at.reset();
     entry.turn = next_turn_++;
-    queue_.Push(found->first);
-    job_waits_.NotifyAll();
+    PushLocked(found->first, entry);
   } else if (entry.runner) {
     entry.runner->SetEnd(settings);
   }
@@ -335,7 +355,7 @@ JobTable::ImageSource JobTable::MakeImageSource(const Entry& entry, const Moment
           entry.runner,
           entry.job,
           entry.job.life.Running(moment.now),
-          moment.cpu - entry.cpu_at_start};
+          CpuOf(entry, moment)};
 }
 
 StatusOr<JobTable::ImageSource> JobTable::FindImage(const std::string& job_id,
@@ -471,37 +491,273 @@ void JobTable::CountMerged(const Delivery& delivery, const DeliveredCounts& coun
 
 void JobTable::CountFetched(const Digest& digest, std::uint64_t size_bytes) {
   const MutexLock lock(mutex_);
-  if (!queue_.current()) return;
-  const auto found = entries_.find(*queue_.current());
-  if (found == entries_.end() || !found->second.runner) return;
-  if (const auto hitpoints = found->second.runner->HitpointsIn(digest)) {
-    CountFetch(found->second.job, size_bytes, *hitpoints);
+  for (const std::uint64_t serial : running_) {
+    Entry& entry = entries_.at(serial);
+    if (!entry.runner) continue;
+    if (const auto hitpoints = entry.runner->HitpointsIn(digest)) {
+      CountFetch(entry.job, size_bytes, *hitpoints);
+      return;
+    }
   }
 }
 
-// The thread of jobs
+// Turns
 // ---------------------------------------------------------------------------------------------
 
-std::optional<JobTable::Turn> JobTable::WaitForTurn() {
-  Dropped dropped;
+void JobTable::ShareCpu(const Moment& moment) {
+  const Duration taken = moment.cpu - shared_cpu_;
+  if (taken <= Duration::zero()) return;
+  for (const std::uint64_t serial : running_)
+    entries_.at(serial).job.counters.coordinator_cpu += taken / running_.size();
+  shared_cpu_ = moment.cpu;
+}
+
+Duration JobTable::CpuOf(const Entry& entry, const Moment& moment) const {
+  const Duration shared = entry.job.counters.coordinator_cpu;
+  if (!running_.contains(entry.serial)) return shared;
+  return shared + std::max(moment.cpu - shared_cpu_, Duration::zero()) / running_.size();
+}
+
+template <typename Change>
+bool JobTable::ChangeLife(std::uint64_t serial, Entry& entry, const Moment& moment,
+                          const Change& change) {
+  ShareCpu(moment);
+  if (!change(entry.job.life)) return false;
+  if (entry.job.life.state() == JobState::kRunning) {
+    running_.insert(serial);
+  } else {
+    running_.erase(serial);
+  }
+  ++entry.version;
+  return true;
+}
+
+JobQueue::Claim JobTable::ClaimOf(const Entry& entry) {
+  return {.priority = entry.is_finishing ? kHighestPriority + 1 : entry.job.priority,
+          .owner = OwnerOf(entry.job),
+          .number = entry.turn};
+}
+
+void JobTable::PushLocked(std::uint64_t serial, Entry& entry) {
+  queue_.Push(serial, ClaimOf(entry));
+  UpdateTurns();
+}
+
+void JobTable::SetGivesUpTurn(Entry& entry, bool gives_up_turn) {
+  entry.gives_up_turn = gives_up_turn;
+  if (entry.runner) entry.runner->SetGivesUpTurn(gives_up_turn);
+}
+
+// The rest of its turn is short, and its record may be dropped before that has ended.
+void JobTable::LeavePlace(std::uint64_t serial) {
+  queue_.SetHasPlace(serial, false);
+  job_waits_.NotifyAll();
+}
+
+void JobTable::UpdateTurns() {
+  while (const std::optional<std::uint64_t> serial = queue_.TakeYielding())
+    SetGivesUpTurn(entries_.at(*serial), true);
+  job_waits_.NotifyAll();
+}
+
+bool JobTable::ResumeLocked(std::uint64_t serial, Entry& entry) {
+  // What waits for the disk goes on by itself.
+  if (entry.job.pause_cause == PauseCause::kDisk || !entry.job.life.Resume()) return false;
+  entry.job.pause_cause = PauseCause::kNone;
+  entry.job.condition.clear();
+  ++entry.version;
+  PushLocked(serial, entry);
+  return true;
+}
+
+StatusOr<JobReport> JobTable::Pause(const std::string& job_id, PauseCause cause, std::string reason,
+                                    const Moment& moment) {
   const MutexLock lock(mutex_);
-  if (const auto last = queue_.current()) {
-    queue_.End();
-    const auto found = entries_.find(*last);
-    if (found != entries_.end() && !found->second.runner) {
-      dropped.pinned.push_back(std::exchange(found->second.pinned, {}));
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  const std::uint64_t serial = found->first;
+  Entry& entry = found->second;
+  Job& job = entry.job;
+  if (job.life.has_ended()) {
+    return absl::FailedPreconditionError(absl::StrCat("job ", job_id, " has ended"));
+  }
+  if (job.pause_cause == PauseCause::kUser || job.pause_cause == cause) {
+    return MakeReport(entry, moment);
+  }
+  ChangeLife(serial, entry, moment, [&](JobLife& life) { return life.Pause(moment.now); });
+  job.pause_cause = cause;
+  job.condition = std::move(reason);
+  job.AddEvent(moment.wall, job.condition);
+  ++entry.version;
+  queue_.Remove(serial);
+  queue_.SetHasPlace(serial, false);
+  SetGivesUpTurn(entry, true);
+  UpdateTurns();
+  Save(entry, moment.now).IgnoreError();
+  return MakeReport(entry, moment);
+}
+
+StatusOr<JobReport> JobTable::Resume(const std::string& job_id, const Moment& moment) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  Entry& entry = found->second;
+  if (entry.job.life.has_ended()) {
+    return absl::FailedPreconditionError(absl::StrCat("job ", job_id, " has ended"));
+  }
+  if (ResumeLocked(found->first, entry)) {
+    entry.job.AddEvent(moment.wall, "resumed");
+    Save(entry, moment.now).IgnoreError();
+  }
+  return MakeReport(entry, moment);
+}
+
+StatusOr<JobReport> JobTable::SetPriority(const std::string& job_id, int priority,
+                                          const Moment& moment) {
+  if (priority < kLowestPriority || priority > kHighestPriority) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("a priority is a number from ", kLowestPriority, " to ", kHighestPriority));
+  }
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return UnknownJob(job_id);
+  Entry& entry = found->second;
+  if (entry.job.life.has_ended()) {
+    return absl::FailedPreconditionError(absl::StrCat("job ", job_id, " has ended"));
+  }
+  if (entry.job.priority != priority) {
+    entry.job.priority = priority;
+    ++entry.version;
+    queue_.SetPriority(found->first, ClaimOf(entry).priority);
+    UpdateTurns();
+    Save(entry, moment.now).IgnoreError();
+  }
+  return MakeReport(entry, moment);
+}
+
+void JobTable::SetLiveWorkers(int workers, const Moment& moment) {
+  const bool has_workers = workers > 0;
+  const MutexLock lock(mutex_);
+  if (has_workers != has_workers_) {
+    has_workers_ = has_workers;
+    no_workers_since_ = moment.now;
+    for (auto& [serial, entry] : entries_) {
+      if (entry.job.life.has_ended()) continue;
+      entry.job.life.SetHasWorkers(has_workers, moment.now);
+      ++entry.version;
+      // When its time is up has changed.
+      if (entry.runner) entry.runner->Wake();
+    }
+    if (has_workers) {
+      for (const std::uint64_t serial : running_)
+        queue_.SetHasPlace(serial, !entries_.at(serial).gives_up_turn);
+      UpdateTurns();
     }
   }
-  while (!queue_.has_waiting() && !is_closed_)
+  if (has_workers || moment.now - no_workers_since_ < kPatienceWithoutWorkers) return;
+  for (const std::uint64_t serial : running_)
+    queue_.SetHasPlace(serial, false);
+  UpdateTurns();
+}
+
+std::optional<JobTable::Turn> JobTable::WaitForTurn() {
+  const MutexLock lock(mutex_);
+  std::optional<std::uint64_t> next;
+  while (!is_closed_ && !(next = queue_.Next()))
     job_waits_.Wait(mutex_);
   if (is_closed_) return std::nullopt;
-  Entry& entry = entries_.at(queue_.Begin());
+  Entry& entry = entries_.at(*next);
+  queue_.Begin(*next);
+  SetGivesUpTurn(entry, false);
   // A job that ends while it waits leaves the queue in the same step.
   LUCERNA_CHECK(entry.job.life.Prepare());
   ++entry.version;
-  return Turn{entry.job.id,    entry.job.manifest,  entry.job.settings,
-              entry.job.needs, entry.job.reference, std::exchange(entry.scene, std::nullopt),
-              entry.runner};
+  return Turn{entry.job.id,    entry.job.manifest,   entry.job.settings,
+              entry.job.needs, entry.job.reference,  std::exchange(entry.scene, std::nullopt),
+              entry.runner,    TurnEnd(*this, *next)};
+}
+
+void JobTable::EndTurn(std::uint64_t serial) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  queue_.End(serial);
+  job_waits_.NotifyAll();
+  const auto found = entries_.find(serial);
+  if (found == entries_.end()) return;
+  Entry& entry = found->second;
+  if (entry.job.life.has_ended() && !entry.runner) {
+    dropped.pinned.push_back(std::exchange(entry.pinned, {}));
+  }
+}
+
+void JobTable::GiveUpTurn(const std::string& job_id, const Moment& moment) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  Entry& entry = found->second;
+  if (ChangeLife(found->first, entry, moment,
+                 [&](JobLife& life) { return life.GiveUpTurn(moment.now); })) {
+    PushLocked(found->first, entry);
+  }
+}
+
+void JobTable::SetWaitsForMemory(const std::string& job_id, std::string condition,
+                                 const Moment& moment) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  Entry& entry = found->second;
+  if (entry.job.life.state() != JobState::kPreparing || entry.job.condition == condition) return;
+  queue_.SetHasPlace(found->first, condition.empty() && !entry.gives_up_turn);
+  if (!condition.empty()) entry.job.AddEvent(moment.wall, condition);
+  entry.job.condition = std::move(condition);
+  ++entry.version;
+  UpdateTurns();
+}
+
+std::optional<JobTable::Share> JobTable::ShareOf(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end() || !found->second.runner) return std::nullopt;
+  const Job& job = found->second.job;
+  if (job.life.has_ended()) return std::nullopt;
+  return Share{job.priority, OwnerOf(job), found->second.gives_up_turn};
+}
+
+bool JobTable::GivesUpTurn(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  return found != entries_.end() && found->second.gives_up_turn;
+}
+
+bool JobTable::DropOldestPhotons() {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  for (auto& [serial, entry] : entries_) {
+    if (!entry.job.life.has_ended() || queue_.HasTurn(serial)) continue;
+    const bool has_spare_image = entry.image && entry.image_digest;
+    if (!entry.runner && !has_spare_image) continue;
+    if (entry.runner) {
+      dropped.runners.push_back(std::exchange(entry.runner, nullptr));
+      dropped.pinned.push_back(std::exchange(entry.pinned, {}));
+    }
+    if (has_spare_image) dropped.images.push_back(std::exchange(entry.image, nullptr));
+    return true;
+  }
+  return false;
+}
+
+Duration JobTable::RunningOf(const std::string& job_id, SteadyTime now) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  return found == entries_.end() ? Duration::zero() : found->second.job.life.Running(now);
+}
+
+std::optional<SteadyTime> JobTable::WhenItHasRun(const std::string& job_id, Duration time) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return std::nullopt;
+  return found->second.job.life.WhenItHasRun(time);
 }
 
 Status JobTable::CheckStillNeeded(const std::string& job_id) const {
@@ -517,8 +773,9 @@ bool JobTable::Attach(const std::string& job_id, std::shared_ptr<RunningJob> run
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (is_closed_ || found == entries_.end() || found->second.job.life.has_ended()) return false;
-  // The end may have been changed since the turn began.
+  // Either may have been changed since the turn began.
   runner->SetEnd(found->second.job.settings);
+  runner->SetGivesUpTurn(found->second.gives_up_turn);
   found->second.runner = std::move(runner);
   return true;
 }
@@ -538,8 +795,14 @@ bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,
   const auto found = FindLocked(job_id);
   if (found == entries_.end() || found->second.begins_again) return false;
   Entry& entry = found->second;
-  if (!entry.job.life.Succeed(reason, moment.now)) return false;
-  entry.job.counters.coordinator_cpu = moment.cpu - entry.cpu_at_start;
+  const bool has_changed = ChangeLife(
+      found->first, entry, moment, [&](JobLife& life) { return life.Succeed(reason, moment.now); });
+  if (!has_changed) return false;
+  // One that was paused, or given another turn, when it was done already.
+  queue_.Remove(found->first);
+  LeavePlace(found->first);
+  entry.is_finishing = false;
+  entry.job.pause_cause = PauseCause::kNone;
   entry.job.ended_at = moment.wall;
   entry.job.condition.clear();
   entry.image = std::move(image);
@@ -560,9 +823,11 @@ void JobTable::GoOnFrom(const std::string& job_id, Job record, Duration ran) {
   if (record.life.state() != JobState::kRunning) record.life.SetRanBefore(ran);
   record.settings = job.settings;
   record.submitted_at = job.submitted_at;
+  record.priority = job.priority;
+  record.pause_cause = job.pause_cause;
   record.events = job.events;
   record.distrusted = job.distrusted;
-  record.condition.clear();
+  record.condition = job.condition;
   record.ended_at.reset();
   job = std::move(record);
   found->second.has_checkpoint = true;
@@ -574,16 +839,25 @@ void JobTable::SetCondition(const std::string& job_id, std::string condition,
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return;
-  Job& job = found->second.job;
-  if (job.condition == condition || job.life.has_ended()) return;
-  if (condition.empty()) {
-    job.life.GoOn(moment.now);
-  } else {
-    job.life.Pause(moment.now);
+  const std::uint64_t serial = found->first;
+  Entry& entry = found->second;
+  Job& job = entry.job;
+  const bool goes_on = condition.empty();
+  const bool waits = job.pause_cause == PauseCause::kDisk;
+  if (job.condition == condition || (goes_on && !waits)) return;
+  if (goes_on || !waits) {
+    const bool has_changed = ChangeLife(serial, entry, moment, [&](JobLife& life) {
+      if (goes_on) return life.Run(moment.now);
+      return life.state() == JobState::kRunning && life.Pause(moment.now);
+    });
+    if (!has_changed) return;
   }
-  job.AddEvent(moment.wall, condition.empty() ? "went on" : condition);
+  job.pause_cause = goes_on ? PauseCause::kNone : PauseCause::kDisk;
+  job.AddEvent(moment.wall, goes_on ? "went on" : condition);
   job.condition = std::move(condition);
-  ++found->second.version;
+  ++entry.version;
+  queue_.SetHasPlace(serial, goes_on && !entry.gives_up_turn);
+  UpdateTurns();
 }
 
 void JobTable::AddEvent(const std::string& job_id, std::string what, const Moment& moment) {
@@ -604,9 +878,9 @@ void JobTable::OnRunning(const std::string& job_id, const Moment& moment) {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return;
-  found->second.job.life.Run(moment.now);
-  found->second.cpu_at_start = moment.cpu - found->second.job.counters.coordinator_cpu;
-  ++found->second.version;
+  ChangeLife(found->first, found->second, moment, [&](JobLife& life) {
+    return life.state() == JobState::kPreparing && life.Run(moment.now);
+  });
 }
 
 void JobTable::OnWarning(const std::string& job_id, std::string warning) {
@@ -660,7 +934,7 @@ void JobTable::OnErrorEstimate(const std::string& job_id, ErrorSample sample,
   if (found == entries_.end()) return;
   Entry& entry = found->second;
   sample.running = entry.job.life.Running(moment.now);
-  sample.cpu = moment.cpu - entry.cpu_at_start + entry.job.counters.worker_cpu;
+  sample.cpu = CpuOf(entry, moment) + entry.job.counters.worker_cpu;
   entry.job.convergence.push_back(std::move(sample));
   entry.job.lights = std::move(lights);
   ++entry.version;
@@ -669,9 +943,8 @@ void JobTable::OnErrorEstimate(const std::string& job_id, ErrorSample sample,
 void JobTable::Close(const Status& why) {
   const MutexLock lock(mutex_);
   is_closed_ = true;
-  if (const auto current = queue_.current()) {
-    const auto found = entries_.find(*current);
-    if (found != entries_.end() && found->second.runner) found->second.runner->Stop(why);
+  for (auto& [serial, entry] : entries_) {
+    if (entry.runner && queue_.HasTurn(serial)) entry.runner->Stop(why);
   }
   job_waits_.NotifyAll();
 }
@@ -699,7 +972,7 @@ void JobTable::Retain(Dropped& dropped, const Moment& moment) {
       dropped.runners.push_back(std::exchange(entry.runner, nullptr));
       entry.has_checkpoint = false;
       // The one that has just ended is still in use by its thread; its files go with its turn.
-      if (queue_.current() != found->first) {
+      if (!queue_.HasTurn(found->first)) {
         dropped.pinned.push_back(std::exchange(entry.pinned, {}));
       }
     }

@@ -1,8 +1,13 @@
-// All jobs of a coordinator: which there are, where each stands, and which one runs.
+// All jobs of a coordinator: which there are, where each stands, and which ones run.
 //
 // Every request is one step under one lock, so a job and its runner cannot come apart: whoever ends
 // a job's life takes its runner in the same step and stops it, and a job that has ended is given no
-// runner. One job runs at a time, the others wait in order. Moments come in as arguments.
+// runner. Moments come in as arguments.
+//
+// A job runs in turns (server/job_queue.h). A turn belongs to one thread from WaitForTurn until its
+// Turn is destroyed, and no other turn of the job begins meanwhile. It ends with the job, or before
+// that when the job is paused or gives way to another; the runner then keeps all it has, and goes
+// on in the next turn.
 //
 // Ended jobs are remembered, with the images of the newest; the very newest also with all their
 // photons, so that they can go on (server/job_retention.h).
@@ -52,10 +57,17 @@ struct Moment {
 // A job as it is now, for people.
 struct JobReport {
   Job job;
-  int workers = 0;  // for the coordinator to fill in
+  int workers = 0;  // connected; for the coordinator to fill in
   Duration running{};
   double photons_per_second = 0;
   std::uint64_t version = 0;  // grows with every change
+};
+
+// Which jobs a list shows.
+struct JobFilter {
+  std::set<JobState> states = {};  // empty: all
+  std::string owner = {};          // empty: of any
+  std::string name_contains = {};
 };
 
 class JobTable {
@@ -66,6 +78,7 @@ class JobTable {
     std::function<std::string()> random_part = {};
     std::size_t max_waiting = 256;
     std::size_t max_waiting_of_owner = 128;  // of an owner that is known
+    std::size_t max_at_once = 1;             // jobs in progress
     RetentionLimits retention;
     JobJournal* journal = nullptr;  // outlives the table; nullptr: jobs end with the process
   };
@@ -101,13 +114,34 @@ class JobTable {
   // Who submitted it.
   [[nodiscard]] StatusOr<std::string> OwnerOf(const std::string& job_id) const;
   [[nodiscard]] StatusOr<JobReport> ReportOf(const std::string& job_id, const Moment& moment) const;
-  // At most `count` jobs older than `before` (0: from the newest), newest first, and where the
-  // next page begins (0: nowhere).
-  [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(std::size_t count,
+  // What changes with every change of a job. Errors: NOT_FOUND.
+  struct News {
+    JobState state = JobState::kQueued;
+    std::uint64_t version = 0;
+    auto operator<=>(const News&) const = default;
+  };
+  [[nodiscard]] StatusOr<News> NewsOf(const std::string& job_id) const;
+  // Summaries of at most `count` jobs older than `before` (0: from the newest) that `filter` lets
+  // pass, newest first, and where the next page begins (0: nowhere).
+  [[nodiscard]] std::pair<std::vector<JobReport>, std::uint64_t> List(const JobFilter& filter,
+                                                                      std::size_t count,
                                                                       std::uint64_t before,
                                                                       const Moment& moment) const;
   [[nodiscard]] StatusOr<JobReport> Cancel(const std::string& job_id, const Moment& moment);
-  // Ends a job well, with the image as it is. FAILED_PRECONDITION when it has not begun to run.
+  // Pauses a job that has not ended, for `cause`; one that the user has paused stays so. Its place
+  // is free at once; what is lent of it comes back and is kept. FAILED_PRECONDITION when it has
+  // ended.
+  [[nodiscard]] StatusOr<JobReport> Pause(const std::string& job_id, PauseCause cause,
+                                          std::string reason, const Moment& moment);
+  // A paused job waits for its next turn; nothing when it is not paused, or waits for the disk.
+  // FAILED_PRECONDITION when it has ended.
+  [[nodiscard]] StatusOr<JobReport> Resume(const std::string& job_id, const Moment& moment);
+  // INVALID_ARGUMENT outside kLowestPriority to kHighestPriority; FAILED_PRECONDITION when it has
+  // ended.
+  [[nodiscard]] StatusOr<JobReport> SetPriority(const std::string& job_id, int priority,
+                                                const Moment& moment);
+  // Ends a job well, with the image as it is, also one that is paused. FAILED_PRECONDITION when it
+  // has not begun to run.
   [[nodiscard]] StatusOr<JobReport> Stop(const std::string& job_id, const Moment& moment);
   // Gives a job that has not ended, or that succeeded, the stop criteria of `until`.
   // INVALID_ARGUMENT (SetStopCriteria), FAILED_PRECONDITION when the job was cancelled, failed, or
@@ -155,7 +189,33 @@ class JobTable {
   // Counts bytes that a worker fetched, if they belong to an open pass.
   void CountFetched(const Digest& digest, std::uint64_t size_bytes);
 
-  // The thread of jobs -------------------------------------------------------------------------
+  // So many workers are connected; to be called now and then, also without a change. The time of
+  // jobs stands still without workers, and after a few seconds without any, running jobs leave
+  // their places to others until there is one again.
+  void SetLiveWorkers(int workers, const Moment& moment);
+
+  // Threads of jobs ----------------------------------------------------------------------------
+
+  // Ends a turn when it is destroyed.
+  class TurnEnd {
+   public:
+    TurnEnd() = default;
+    TurnEnd(JobTable& table, std::uint64_t serial) : table_(&table), serial_(serial) {}
+    TurnEnd(TurnEnd&& other) noexcept
+        : table_(std::exchange(other.table_, nullptr)), serial_(other.serial_) {}
+    TurnEnd& operator=(TurnEnd&& other) noexcept {
+      std::swap(table_, other.table_);
+      std::swap(serial_, other.serial_);
+      return *this;
+    }
+    ~TurnEnd() {
+      if (table_ != nullptr) table_->EndTurn(serial_);
+    }
+
+   private:
+    JobTable* table_ = nullptr;
+    std::uint64_t serial_ = 0;
+  };
 
   // A job whose turn it is.
   struct Turn {
@@ -166,13 +226,36 @@ class JobTable {
     std::optional<Digest> reference;
     std::optional<Scene> scene;          // absent: to be read again
     std::shared_ptr<RunningJob> runner;  // of a job that goes on
+    TurnEnd end;
   };
-  // Ends the turn before, waits for a job and begins its turn. Absent after Close.
+  // Waits for a job and begins its turn. Absent after Close. The table outlives the turn.
   [[nodiscard]] std::optional<Turn> WaitForTurn();
   // Whether the job of this turn is still to be rendered: OK or CANCELLED.
   [[nodiscard]] Status CheckStillNeeded(const std::string& job_id) const;
   // Gives a job its runner. False when it has ended meanwhile, or after Close: it must not run.
   [[nodiscard]] bool Attach(const std::string& job_id, std::shared_ptr<RunningJob> runner);
+  // The runner has given up its turn: unless it is paused or has ended, the job waits for its next.
+  void GiveUpTurn(const std::string& job_id, const Moment& moment);
+  // The job whose turn it is waits for memory, and says so: it leaves its place to others. Empty:
+  // it goes on.
+  void SetWaitsForMemory(const std::string& job_id, std::string condition, const Moment& moment);
+  // What decides what is lent of a job that has a runner and has not ended; absent for others.
+  struct Share {
+    int priority = 0;
+    std::string owner;
+    bool is_held = false;  // nothing is lent
+  };
+  [[nodiscard]] std::optional<Share> ShareOf(const std::string& job_id) const;
+  // Whether the turn of the job is to be given up.
+  [[nodiscard]] bool GivesUpTurn(const std::string& job_id) const;
+  // Lets go of the photons of the job that ended first of those that have some in memory, and of
+  // its image in memory if it is on the disk too; false when there is none. It can go on no more,
+  // unless its checkpoint is on the disk.
+  bool DropOldestPhotons();
+  // How long the job has run, and JobLife::WhenItHasRun.
+  [[nodiscard]] Duration RunningOf(const std::string& job_id, SteadyTime now) const;
+  [[nodiscard]] std::optional<SteadyTime> WhenItHasRun(const std::string& job_id,
+                                                       Duration time) const;
   // The job as it is now with what it has cost; absent when it has been dropped.
   [[nodiscard]] std::optional<ImageSource> DescribeRun(const std::string& job_id,
                                                        const Moment& moment) const;
@@ -186,7 +269,8 @@ class JobTable {
   // The job goes on from a checkpoint: its record is what it was then, but for its settings.
   void GoOnFrom(const std::string& job_id, Job record, Duration ran);
 
-  // Why the job does not go on though it runs; empty: it goes on.
+  // The running job cannot go on for now, and why: it is paused, leaves its place to others and
+  // keeps its turn. Empty: it goes on. Nothing when it is paused for another cause, or has ended.
   void SetCondition(const std::string& job_id, std::string condition, const Moment& moment);
   void AddEvent(const std::string& job_id, std::string what, const Moment& moment);
   // The job's checkpoint is on the disk.
@@ -201,7 +285,7 @@ class JobTable {
   void OnErrorEstimate(const std::string& job_id, ErrorSample sample,
                        std::vector<LightFinding> lights, const Moment& moment);
 
-  // Stops the job that runs, with `why`, and begins no other.
+  // Stops the jobs that have turns, with `why`, and begins no other.
   void Close(const Status& why);
 
  private:
@@ -210,10 +294,11 @@ class JobTable {
     std::shared_ptr<RunningJob> runner;
     Blob image;
     std::uint64_t version = 0;
-    Duration cpu_at_start{};  // less what earlier runs took
-    PinnedBlobs pinned;       // while the job may need its files
-    bool is_unsaved = false;  // the journal has it as it was before
-    bool begins_again = false;
+    PinnedBlobs pinned;          // while the job may need its files
+    bool is_unsaved = false;     // the journal has it as it was before
+    bool begins_again = false;   // a wrong worker's part is taken out
+    bool gives_up_turn = false;  // as its runner was told, or will be
+    bool is_finishing = false;   // stopped: its turn is short and comes before all others
   };
   using Entries = std::map<std::uint64_t, Entry>;  // by serial number
   // What was taken from the table under the lock, to be destroyed after it.
@@ -231,13 +316,33 @@ class JobTable {
   std::optional<Submitted> FindRequestLocked(const std::string& request_id,
                                              const std::string& owner) const
       LUCERNA_REQUIRES(mutex_);
-  JobReport MakeReport(const Entry& entry, const Moment& moment) const LUCERNA_REQUIRES(mutex_);
+  // With the job, or with its summary.
+  JobReport MakeReport(const Entry& entry, const Moment& moment, bool is_summary = false) const
+      LUCERNA_REQUIRES(mutex_);
   ImageSource MakeImageSource(const Entry& entry, const Moment& moment) const
       LUCERNA_REQUIRES(mutex_);
   // Ends a job's life and stops its runner. Nothing when it has ended.
   void End(std::uint64_t serial, Entry& entry, const Status& why, const Moment& moment,
            Dropped& dropped) LUCERNA_REQUIRES(mutex_);
   void Retain(Dropped& dropped, const Moment& moment) LUCERNA_REQUIRES(mutex_);
+  void EndTurn(std::uint64_t serial);
+  static JobQueue::Claim ClaimOf(const Entry& entry);
+  // It waits for a turn.
+  void PushLocked(std::uint64_t serial, Entry& entry) LUCERNA_REQUIRES(mutex_);
+  void SetGivesUpTurn(Entry& entry, bool gives_up_turn) LUCERNA_REQUIRES(mutex_);
+  // Of a job that has ended, to others.
+  void LeavePlace(std::uint64_t serial) LUCERNA_REQUIRES(mutex_);
+  // After a change of who waits, who has a place, or of priorities.
+  void UpdateTurns() LUCERNA_REQUIRES(mutex_);
+  bool ResumeLocked(std::uint64_t serial, Entry& entry) LUCERNA_REQUIRES(mutex_);
+  // Before a job begins or ceases to run: gives each running job its part of the processor time
+  // that the process took since the last call. The time of a process cannot be told apart by jobs.
+  void ShareCpu(const Moment& moment) LUCERNA_REQUIRES(mutex_);
+  // Makes `change`, a function of JobLife that says whether the life has changed; returns that.
+  template <typename Change>
+  bool ChangeLife(std::uint64_t serial, Entry& entry, const Moment& moment, const Change& change)
+      LUCERNA_REQUIRES(mutex_);
+  Duration CpuOf(const Entry& entry, const Moment& moment) const LUCERNA_REQUIRES(mutex_);
   // Of an entry that has changed.
   Status Save(Entry& entry, SteadyTime now) LUCERNA_REQUIRES(mutex_);
 
@@ -250,6 +355,10 @@ class JobTable {
   std::set<std::uint64_t> unremoved_ LUCERNA_GUARDED_BY(mutex_);  // from the journal
   Entries entries_ LUCERNA_GUARDED_BY(mutex_);
   JobQueue queue_ LUCERNA_GUARDED_BY(mutex_);
+  std::set<std::uint64_t> running_ LUCERNA_GUARDED_BY(mutex_);  // whose state is kRunning
+  Duration shared_cpu_ LUCERNA_GUARDED_BY(mutex_){};            // up to where it was shared
+  bool has_workers_ LUCERNA_GUARDED_BY(mutex_) = true;
+  SteadyTime no_workers_since_ LUCERNA_GUARDED_BY(mutex_);
 };
 
 }  // namespace lucerna

@@ -102,7 +102,8 @@ int Serve(const Flags& flags) {
   }
   Coordinator coordinator(flags.coordinator, clock, std::move(state));
   WorkPools pools;
-  AssetService assets(coordinator.blobs(), pools, &coordinator.transfers(), **access);
+  AssetService assets(coordinator.blobs(), coordinator.budget(), pools, &coordinator.transfers(),
+                      **access);
   JobService jobs(coordinator, pools, SystemClock(), **access);
   ImageService images(coordinator, pools, **access);
   WorkerService workers(coordinator, pools, **access);
@@ -211,6 +212,14 @@ int Main(int argc, char** argv) {
                "listen beyond this machine although traffic is not encrypted");
   app.add_option("--threads", flags.coordinator.threads, "threads for eye paths; 0: all")
       ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  app.add_option("--jobs-at-once", flags.coordinator.jobs_at_once,
+                 "jobs in progress, which share the workers")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  app.add_option("--max-memory", flags.coordinator.max_memory_bytes,
+                 "memory for all that the coordinator holds together [bytes]; 0: what is free at "
+                 "the start")
       ->capture_default_str();
   app.add_option("--max-store-bytes", flags.coordinator.max_store_bytes,
                  "memory for scene files and hitpoints [bytes]")

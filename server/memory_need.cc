@@ -5,6 +5,31 @@
 #include "render/analysis/expected_cost.h"
 
 namespace lucerna {
+namespace {
+
+// Bytes a pixel, beside what ExpectedCostOf counts: of a checkpoint on its way to the disk, of the
+// copy that an error is estimated from and its work, and of the sums of squared deviations.
+constexpr std::uint64_t kCheckpoint = 220;
+constexpr std::uint64_t kEstimate = 48 + 200;
+constexpr std::uint64_t kPassVariance = 28;
+// Memory for a byte of a file: binary meshes become as much again with the tree over their
+// triangles three times; text becomes less.
+constexpr std::uint64_t kPerSceneByte = 4;
+
+}  // namespace
+
+std::uint64_t SceneMemory(std::uint64_t scene_bytes) {
+  return kPerSceneByte * scene_bytes;
+}
+
+std::uint64_t MemoryNeedOf(const SceneNeeds& needs, const RenderSettings& settings,
+                           std::uint64_t scene_bytes, bool keeps_checkpoints) {
+  const auto pixels = static_cast<std::uint64_t>(settings.crop_width()) *
+                      static_cast<std::uint64_t>(settings.crop_height());
+  const std::uint64_t each = kEstimate + kPassVariance + (keeps_checkpoints ? kCheckpoint : 0);
+  return static_cast<std::uint64_t>(ExpectedCostOf(needs, settings).coordinator) + pixels * each +
+         SceneMemory(scene_bytes);
+}
 
 Status CheckMemory(const SceneNeeds& needs, const RenderSettings& settings,
                    std::uint64_t available_bytes) {

@@ -25,14 +25,16 @@ struct RenderResult {
   Image image;  // without metadata
   std::int64_t passes = 0;
   std::uint64_t photons = 0;  // in the image
+  // The job is not over: it was asked to give up its turn, and Resume goes on. No image then.
+  bool gave_up_turn = false;
 };
 
 class RunningJob {
  public:
   virtual ~RunningJob() = default;
 
-  // Goes on after a run that ended well, and Reopen, to the end as it is now; by the thread of
-  // jobs. Errors: what Stop was given, or what rendering fails with.
+  // Goes on after a run that gave up its turn, or one that ended well, and Reopen, to the end as it
+  // is now; by one thread at a time. Errors: what Stop was given, or what rendering fails with.
   [[nodiscard]] virtual StatusOr<RenderResult> Resume() = 0;
 
   // A new end: passes, photons, time_s and error of `settings`.
@@ -41,6 +43,9 @@ class RunningJob {
   virtual void Reopen(const RenderSettings& settings) = 0;
   // Ends the run well as soon as there is an image; also before it has begun.
   virtual void Finish() = 0;
+  // Whether the run gives up its turn as soon as it can, with all that it has; also before it has
+  // begun. What is lent then comes back and is kept.
+  virtual void SetGivesUpTurn(bool gives_up_turn) = 0;
   // Ends the run soon with `why`. The first call counts.
   virtual void Stop(Status why) = 0;
   // Whether the photons of a result can have been emitted with the energy that its counters say.

@@ -88,8 +88,17 @@ void Scheduler::SetPlace(const std::string& id, Worker& worker, std::uint64_t pl
 void Scheduler::UpdateLendable(const PassKey& key, const Work& work) {
   if (work.HasBatches()) {
     lendable_.insert(key);
+    shares_.SetLendable(key.job_id, true);
   } else {
-    lendable_.erase(key);
+    EraseLendable(key);
+  }
+}
+
+void Scheduler::EraseLendable(const PassKey& key) {
+  lendable_.erase(key);
+  const auto next = lendable_.lower_bound({key.job_id, 0});
+  if (next == lendable_.end() || next->job_id != key.job_id) {
+    shares_.SetLendable(key.job_id, false);
   }
 }
 
@@ -207,7 +216,7 @@ std::optional<std::string> Scheduler::TakeWaiting(SteadyTime now) {
   const MutexLock lock(mutex_);
   const auto idle = idle_queue_.begin();
   const auto busy = busy_queue_.begin();
-  const bool may_be_idle = idle != idle_queue_.end() && (!lendable_.empty() || FindStraggler(now));
+  const bool may_be_idle = idle != idle_queue_.end() && (shares_.Next() || FindStraggler(now));
   const bool may_be_busy = busy != busy_queue_.end() &&
                            !(may_be_idle && idle->first < busy->first) && HasBatchesToSpare(now);
   if (!may_be_idle && !may_be_busy) {
@@ -421,7 +430,30 @@ void Scheduler::Close(const PassKey& key) {
     waiting_audits_.erase({key, range});
   if (work.kind == WorkKind::kPasses) round_passes_ -= work.total;
   open_.erase(found);
-  lendable_.erase(key);
+  EraseLendable(key);
+}
+
+void Scheduler::SetClaim(const std::string& job_id, FairShare::Claim claim) {
+  const MutexLock lock(mutex_);
+  shares_.SetClaim(job_id, std::move(claim));
+}
+
+void Scheduler::SetHeld(const std::string& job_id, bool is_held) {
+  const MutexLock lock(mutex_);
+  shares_.SetHeld(job_id, is_held);
+  if (!is_held) LendPoisonedAgain(job_id);
+}
+
+void Scheduler::CountWork(const std::string& job_id, WorkKind kind, std::uint64_t size,
+                          Duration worker_cpu) {
+  const MutexLock lock(mutex_);
+  shares_.CountWork(job_id, kind, size, worker_cpu);
+}
+
+void Scheduler::ForgetJob(const std::string& job_id) {
+  const MutexLock lock(mutex_);
+  const auto work = open_.lower_bound({job_id, 0});
+  if (work == open_.end() || work->first.job_id != job_id) shares_.Forget(job_id);
 }
 
 void Scheduler::Settle(const PassKey& key, Work& work, WorkRange range) {
@@ -636,6 +668,10 @@ std::vector<Scheduler::Poisoned> Scheduler::TakePoisoned() {
 
 void Scheduler::ReleasePoisoned(const std::string& job_id) {
   const MutexLock lock(mutex_);
+  LendPoisonedAgain(job_id);
+}
+
+void Scheduler::LendPoisonedAgain(const std::string& job_id) {
   for (auto open = open_.lower_bound({job_id, 0});
        open != open_.end() && open->first.job_id == job_id; ++open) {
     Work& work = open->second;
@@ -707,6 +743,7 @@ std::uint64_t Scheduler::SliceSize(const Work& work, SteadyTime now) const {
 bool Scheduler::HasBatchesToSpare(SteadyTime now) const {
   std::uint64_t batches = 0;
   for (const PassKey& key : lendable_) {
+    if (shares_.IsHeld(key.job_id)) continue;
     const Work& work = open_.at(key);
     batches += work.returned.size();
     if (work.rest.size() > 0) batches += CeilDivide(work.rest.size(), BatchSize(work, now));
@@ -725,11 +762,12 @@ std::optional<BatchLease> Scheduler::Lend(const std::string& worker_id, SteadyTi
     }
     return Enter(worker_id, audit->pass, audit->range, now);
   }
-  if (lendable_.empty()) return std::nullopt;
+  const std::optional<std::string> job_id = shares_.Next();
+  if (!job_id) return std::nullopt;
   // A worker that is busy fetches ahead only what the idle ones leave over; else one worker would
   // take a whole last pass and the others would stand by.
   if (!workers_.at(worker_id).leases.empty() && !HasBatchesToSpare(now)) return std::nullopt;
-  const PassKey key = *lendable_.begin();
+  const PassKey key = *lendable_.lower_bound({*job_id, 0});
   Work& work = open_.at(key);
   WorkRange range;
   if (!work.returned.empty()) {
@@ -758,6 +796,7 @@ std::optional<Scheduler::WaitingAudit> Scheduler::FindAudit(const std::string& w
   int looked_at = 0;
   for (const auto& [key, range] : waiting_audits_) {
     if (++looked_at > kMostLookedAt) break;
+    if (shares_.IsHeld(key.job_id)) continue;
     const Audit& audit = open_.at(key).audits.at(range);
     const bool is_given_up =
         !audit.is_disputed() && (now - audit.began_at() >= options_.audit_patience ||
@@ -776,7 +815,11 @@ std::optional<Scheduler::Straggler> Scheduler::FindStraggler(SteadyTime now) con
         usual ? std::max(*usual * static_cast<double>(size) * options_.speculate_after,
                          Seconds(options_.speculate_at_least))
               : Seconds(options_.speculate_unknown);
-    const auto& [lent_at, number, id] = *leases.begin();
+    auto newest = leases.begin();
+    while (newest != leases.end() && shares_.IsHeld(leases_.at(std::get<2>(*newest)).pass.job_id))
+      ++newest;
+    if (newest == leases.end()) continue;
+    const auto& [lent_at, number, id] = *newest;
     if (Seconds(now - lent_at) < patience) continue;
     const Lease& lease = leases_.at(id);
     if (const Straggler found = {lease.pass, lease.range}; !first || found < *first) first = found;
@@ -796,6 +839,7 @@ BatchLease Scheduler::Enter(const std::string& worker_id, const PassKey& key, Wo
                             SteadyTime now) {
   const std::string id = options_.new_id();
   Work& work = open_.at(key);
+  shares_.CountLent(key.job_id, work.kind, range.size());
   Lease lease;
   lease.worker = worker_id;
   lease.pass = key;

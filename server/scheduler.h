@@ -55,6 +55,7 @@
 #include "render/base/status.h"
 #include "server/audit.h"
 #include "server/batch.h"
+#include "server/fair_share.h"
 #include "server/worker_records.h"
 
 namespace lucerna {
@@ -184,6 +185,17 @@ class Scheduler {
   // The batch has been merged, by whomever.
   void Commit(const PassKey& key, WorkRange range, SteadyTime now);
 
+  // Sharing of workers among jobs (server/fair_share.h) ------------------------------------------
+
+  void SetClaim(const std::string& job_id, FairShare::Claim claim);
+  // A held job is lent nothing, also not a second time; what is lent may come back. When it goes
+  // on, failures of its batches are forgotten.
+  void SetHeld(const std::string& job_id, bool is_held);
+  // A result of so many photons or passes came back, and took so long, as the worker says.
+  void CountWork(const std::string& job_id, WorkKind kind, std::uint64_t size, Duration worker_cpu);
+  // The job has no open work, and will have none.
+  void ForgetJob(const std::string& job_id);
+
   // Takes back what has run out and forgets workers that are silent.
   void Expire(SteadyTime now);
 
@@ -294,6 +306,8 @@ class Scheduler {
       LUCERNA_REQUIRES(mutex_);
   // To be called when `rest` or `returned` of open work have changed.
   void UpdateLendable(const PassKey& key, const Work& work) LUCERNA_REQUIRES(mutex_);
+  void EraseLendable(const PassKey& key) LUCERNA_REQUIRES(mutex_);
+  void LendPoisonedAgain(const std::string& job_id) LUCERNA_REQUIRES(mutex_);
   void AddWork(const PassKey& key, Work work) LUCERNA_REQUIRES(mutex_);
 
   // Of the next batch. Requires work.rest.size() > 0.
@@ -379,7 +393,8 @@ class Scheduler {
   std::map<std::uint64_t, std::string> idle_queue_ LUCERNA_GUARDED_BY(mutex_);
   std::map<std::uint64_t, std::string> busy_queue_ LUCERNA_GUARDED_BY(mutex_);
   std::set<std::string> affected_ LUCERNA_GUARDED_BY(mutex_);
-  std::set<PassKey> lendable_ LUCERNA_GUARDED_BY(mutex_);      // where HasBatches()
+  std::set<PassKey> lendable_ LUCERNA_GUARDED_BY(mutex_);  // where HasBatches()
+  FairShare shares_ LUCERNA_GUARDED_BY(mutex_);
   std::uint64_t round_passes_ LUCERNA_GUARDED_BY(mutex_) = 0;  // `total` of all open rounds
   // The newest lease of each range that another worker may join, oldest first, by kind and size of
   // the range.

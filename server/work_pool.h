@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <new>
 #include <string>
 #include <thread>
 #include <vector>
@@ -23,6 +24,17 @@ namespace lucerna {
 // Whether the result of some work is still needed: OK, or the reason why not (CANCELLED,
 // DEADLINE_EXCEEDED). Long work checks again between its steps.
 using StillNeeded = std::function<Status()>;
+
+// What `work`, a function without arguments, returns, or RESOURCE_EXHAUSTED when memory runs out in
+// it: then the call fails and not the process.
+template <typename Work>
+[[nodiscard]] auto WithinMemory(const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return absl::ResourceExhaustedError("the coordinator ran out of memory; try again later");
+  }
+}
 
 class WorkPool {
  public:

@@ -140,15 +140,21 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
       return too_large;
     }
     LUCERNA_RETURN_IF_ERROR(transfer_->Announce(header.size_bytes()));
+    // The worker sends it again later.
+    LUCERNA_ASSIGN_OR_RETURN(claim_,
+                             coordinator_.budget().Claim(MemoryUse::kCommits, header.size_bytes()));
     collector_.emplace(delivery_.digest, header.size_bytes());
-    collector_->Reserve();
-    return absl::OkStatus();
+    return WithinMemory([this]() -> Status {
+      collector_->Reserve();
+      return absl::OkStatus();
+    });
   }
 
   Status Merge() {
     if (!collector_) return absl::InvalidArgumentError("a commit begins with a header");
     LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, collector_->Finish());
-    LUCERNA_ASSIGN_OR_RETURN(const MergeOutcome outcome, coordinator_.Commit(delivery_, bytes));
+    LUCERNA_ASSIGN_OR_RETURN(const MergeOutcome outcome,
+                             WithinMemory([&] { return coordinator_.Commit(delivery_, bytes); }));
     response_->set_outcome(OutcomeToProto(outcome));
     return absl::OkStatus();
   }
@@ -161,6 +167,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
   v1::CommitBatchRequest part_;
   Delivery delivery_;
   bool is_answered_ = false;
+  MemoryClaim claim_;
   std::optional<ChunkCollector> collector_;
 };
 

@@ -14,6 +14,8 @@ namespace lucerna {
 namespace {
 
 constexpr int kCommitTries = 3;
+// Descriptions of jobs, whose leases may alternate.
+constexpr std::size_t kJobsKept = 8;
 constexpr std::chrono::milliseconds kBusyPause{200};
 
 bool IsGone(const Status& status) {
@@ -126,13 +128,14 @@ void LeaseRunner::FetchStage() {
 }
 
 StatusOr<std::shared_ptr<const JobToTrace>> LeaseRunner::JobOf(const std::string& job_id) {
-  if (job_ == nullptr || job_id_ != job_id) {
-    LUCERNA_ASSIGN_OR_RETURN(const v1::JobDescription message, connection_.DescribeJob(job_id));
-    LUCERNA_ASSIGN_OR_RETURN(JobToTrace job, ReadJob(message));
-    job_ = std::make_shared<const JobToTrace>(std::move(job));
-    job_id_ = job_id;
+  for (const auto& [id, job] : jobs_) {
+    if (id == job_id) return job;
   }
-  return job_;
+  LUCERNA_ASSIGN_OR_RETURN(const v1::JobDescription message, connection_.DescribeJob(job_id));
+  LUCERNA_ASSIGN_OR_RETURN(JobToTrace job, ReadJob(message));
+  jobs_.emplace_front(job_id, std::make_shared<const JobToTrace>(std::move(job)));
+  if (jobs_.size() > kJobsKept) jobs_.pop_back();
+  return jobs_.front().second;
 }
 
 StatusOr<LeaseRunner::Fetched> LeaseRunner::Fetch(const std::shared_ptr<Held>& held) {

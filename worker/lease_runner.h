@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <string>
@@ -83,8 +84,7 @@ class LeaseRunner {
   const Duration sync_every_;
 
   // Of the fetch stage alone: the job that the last lease was of.
-  std::string job_id_;
-  std::shared_ptr<const JobToTrace> job_;
+  std::deque<std::pair<std::string, std::shared_ptr<const JobToTrace>>> jobs_;  // newest first
 
   HandOver<Fetched> fetched_;
   HandOver<Computed> computed_;

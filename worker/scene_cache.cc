@@ -11,10 +11,10 @@ namespace lucerna {
 namespace {
 
 constexpr std::size_t kTracersKept = 2;
-// Two passes may be open, and workers fetch one ahead.
-constexpr std::size_t kBlocksKept = 3;
+// Two passes of a job may be open, and workers fetch one ahead; leases of two jobs may alternate.
+constexpr std::size_t kBlocksKept = 6;
 // The slices of a round share theirs.
-constexpr std::size_t kRadiiKept = 2;
+constexpr std::size_t kRadiiKept = 4;
 // What a hitpoint and its radius may need at most before compression, which cannot double it.
 constexpr std::uint64_t kBytesPerHitpoint = 80;
 constexpr std::uint64_t kHeadBytes = 4096;

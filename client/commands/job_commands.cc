@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_join.h"
 
 #include "client/connection.h"
@@ -71,7 +72,7 @@ Status SaveAndReport(ClientConnection& connection, const v1::Job& job, const Out
   return absl::OkStatus();
 }
 
-Status Nothing() {
+Status Nothing(const v1::Job& /*job*/) {
   return absl::OkStatus();
 }
 
@@ -165,9 +166,9 @@ Status Submit(const RenderRequest& request, const Endpoint& server,
                            ReadScene(request.scene_path, request.overrides, output_options.quiet));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   DirectoryFiles files(SplitScenePath(request.scene_path).folder);
-  LUCERNA_ASSIGN_OR_RETURN(
-      const v1::SubmitResponse submitted,
-      SendJob(*connection, files, manifest, request.overrides, request.reference));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
+                           SendJob(*connection, files, manifest, request.overrides,
+                                   request.reference, request.priority));
   if (request.outputs.empty()) {
     Print(output_options.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
     return absl::OkStatus();
@@ -182,9 +183,34 @@ Status Submit(const RenderRequest& request, const Endpoint& server,
   return SaveAndReport(*connection, *job, request.outputs, output_options);
 }
 
-Status ListJobs(const Endpoint& server, const OutputOptions& output_options) {
+namespace {
+
+// Of a name as NameOf gives it, in any case.
+StatusOr<v1::JobState> StateNamed(const std::string& name) {
+  v1::JobState state{};
+  if (v1::JobState_Parse("JOB_STATE_" + absl::AsciiStrToUpper(name), &state) &&
+      state != v1::JOB_STATE_UNSPECIFIED) {
+    return state;
+  }
+  return Failure(ExitCode::kUsage,
+                 absl::StrCat("--state ", name,
+                              ": give queued, preparing, running, paused, succeeded, cancelled or "
+                              "failed"));
+}
+
+}  // namespace
+
+Status ListJobs(const JobsRequest& request, const Endpoint& server,
+                const OutputOptions& output_options) {
+  v1::ListJobsRequest filter;
+  for (const std::string& name : request.states) {
+    LUCERNA_ASSIGN_OR_RETURN(const v1::JobState state, StateNamed(name));
+    filter.add_states(state);
+  }
+  filter.set_owner(request.user);
+  filter.set_name_contains(request.name_contains);
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
-  LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, connection->List());
+  LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, connection->List(filter));
   if (output_options.json) {
     Print(JobsReport(jobs));
     return absl::OkStatus();
@@ -281,6 +307,24 @@ Status Acknowledge(const StatusOr<v1::Job>& job, const OutputOptions& output_opt
 }
 
 }  // namespace
+
+Status PauseJob(const std::string& job_id, const Endpoint& server,
+                const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  return Acknowledge(connection->Pause(job_id), output_options);
+}
+
+Status ResumeJob(const std::string& job_id, const Endpoint& server,
+                 const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  return Acknowledge(connection->Resume(job_id), output_options);
+}
+
+Status SetPriority(const std::string& job_id, int priority, const Endpoint& server,
+                   const OutputOptions& output_options) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  return Acknowledge(connection->SetPriority(job_id, priority), output_options);
+}
 
 Status Cancel(const std::string& job_id, const Endpoint& server,
               const OutputOptions& output_options) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "client/local_cluster.h"
 #include "client/output_options.h"
@@ -27,6 +28,7 @@ struct RenderRequest {
   RenderOverrides overrides;
   std::string reference;  // EXR file to measure the true error by; empty: none
   OutputPaths outputs;
+  int priority = 0;               // of `submit`
   bool keeps_checkpoints = true;  // of `render`: in a folder beside the image
   bool resumes = false;           // goes on from there
 };
@@ -41,7 +43,21 @@ struct RenderRequest {
 [[nodiscard]] Status Submit(const RenderRequest& request, const Endpoint& server,
                             const OutputOptions& output_options);
 
-[[nodiscard]] Status ListJobs(const Endpoint& server, const OutputOptions& output_options);
+// Which jobs are listed; what is empty lets all pass.
+struct JobsRequest {
+  std::vector<std::string> states;  // as in the table
+  std::string user;
+  std::string name_contains;
+};
+[[nodiscard]] Status ListJobs(const JobsRequest& request, const Endpoint& server,
+                              const OutputOptions& output_options);
+
+[[nodiscard]] Status PauseJob(const std::string& job_id, const Endpoint& server,
+                              const OutputOptions& output_options);
+[[nodiscard]] Status ResumeJob(const std::string& job_id, const Endpoint& server,
+                               const OutputOptions& output_options);
+[[nodiscard]] Status SetPriority(const std::string& job_id, int priority, const Endpoint& server,
+                                 const OutputOptions& output_options);
 
 // Waits until the job has ended, with or without showing its progress.
 // Errors: FAILED_PRECONDITION when it did not succeed.

@@ -164,6 +164,9 @@ std::string ProgressLine(const v1::Job& job) {
       return "queued";
     case v1::JOB_STATE_PREPARING:
       return "reading the scene";
+    case v1::JOB_STATE_PAUSED:
+      if (job.progress().passes() == 0) return job.condition();
+      break;
     case v1::JOB_STATE_SUCCEEDED:
     case v1::JOB_STATE_CANCELLED:
     case v1::JOB_STATE_FAILED:

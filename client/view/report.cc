@@ -88,6 +88,10 @@ Json JobOf(const v1::Job& job) {
   if (!job.owner().empty()) json["owner"] = job.owner();
   if (job.no_workers()) json["no_workers"] = true;
   if (!job.condition().empty()) json["condition"] = job.condition();
+  if (job.pause_cause() != v1::PAUSE_CAUSE_UNSPECIFIED) {
+    json["pause_cause"] = v1::PauseCause_Name(job.pause_cause()).substr(sizeof("PAUSE_CAUSE"));
+  }
+  json["priority"] = job.priority();
   if (job.has_submitted_at()) {
     json["submitted_at"] = google::protobuf::util::TimeUtil::ToString(job.submitted_at());
   }

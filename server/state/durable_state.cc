@@ -19,6 +19,8 @@ const char* NameOf(JobState state) {
       return "preparing";
     case JobState::kRunning:
       return "running";
+    case JobState::kPaused:
+      return "paused";
     case JobState::kSucceeded:
       return "succeeded";
     case JobState::kCancelled:

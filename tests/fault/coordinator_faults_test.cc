@@ -283,7 +283,9 @@ TEST(RestartedCoordinatorTest, WorkersAndWatchersComeBackByThemselves) {
 TEST(RestartedCoordinatorTest, JobsThatWaitKeepTheirOrderAndEndedOnesTheirImages) {
   const TemporaryFolder folder;
   const std::string address = FreeAddress();
-  auto coordinator = std::make_unique<CoordinatorProcess>(KeptIn(folder.path()), address);
+  std::vector<std::string> flags = KeptIn(folder.path());
+  flags.insert(flags.end(), {"--jobs-at-once", "1"});
+  auto coordinator = std::make_unique<CoordinatorProcess>(flags, address);
   std::vector<std::string> jobs;
   {
     const auto worker = coordinator->StartWorker();
@@ -298,7 +300,7 @@ TEST(RestartedCoordinatorTest, JobsThatWaitKeepTheirOrderAndEndedOnesTheirImages
   }
   coordinator->process().Signal(SIGKILL);
   ASSERT_TRUE(coordinator->process().WaitForExit(kPatience));
-  coordinator = std::make_unique<CoordinatorProcess>(KeptIn(folder.path()), address);
+  coordinator = std::make_unique<CoordinatorProcess>(flags, address);
   const v1::Job after = coordinator->Get(jobs[0]);
   EXPECT_EQ(after.state(), v1::JOB_STATE_SUCCEEDED);
   EXPECT_EQ(after.SerializeAsString(), before.SerializeAsString()) << "nothing of it is lost";
@@ -359,7 +361,8 @@ TEST(FullDiskTest, TheJobPausesAndSaysSoAndGoesOnWhenThereIsRoom) {
   const v1::Job paused = coordinator.Get(job);
   EXPECT_EQ(paused.condition(),
             "paused: no room in " + disk.state() + "; it goes on when there is");
-  EXPECT_EQ(paused.state(), v1::JOB_STATE_RUNNING);
+  EXPECT_EQ(paused.state(), v1::JOB_STATE_PAUSED);
+  EXPECT_EQ(paused.pause_cause(), v1::PAUSE_CAUSE_DISK);
   EXPECT_LT(paused.progress().passes(), kLongJob.passes) << "no more than a crash may lose";
 
   SmallJob other = kLongJob;

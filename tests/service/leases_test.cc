@@ -108,21 +108,25 @@ TEST_F(LeasesTest, ACommitCountsOnceAndNotAtAllWhenItsJobHasEnded) {
   EXPECT_EQ(client_.Get(job_).message.progress().photons(), 1000U);
 }
 
-TEST_F(LeasesTest, ABatchThatIsGivenUpAgainAndAgainFailsItsJobAndNotTheNextOne) {
+TEST_F(LeasesTest, ABatchThatIsGivenUpAgainAndAgainPausesItsJobAndNotTheNextOne) {
   IdleHandsWorker worker(service_);
-  for (int i = 0; i < 1000 && client_.Get(job_).message.state() < v1::JOB_STATE_SUCCEEDED; ++i) {
+  for (int i = 0; i < 1000 && client_.Get(job_).message.state() != v1::JOB_STATE_PAUSED; ++i) {
     const auto answer = worker.Sync(true, Duration::zero());
     ASSERT_TRUE(answer.ok());
     if (answer.message.has_lease()) {
       ASSERT_TRUE(worker.GiveUp(answer.message.lease(), "on purpose").ok());
     }
   }
-  const v1::Job failed = client_.Get(job_).message;
-  EXPECT_EQ(failed.state(), v1::JOB_STATE_FAILED);
-  EXPECT_NE(failed.failure().find("on purpose"), std::string::npos) << failed.failure();
+  const v1::Job paused = client_.Get(job_).message;
+  EXPECT_EQ(paused.state(), v1::JOB_STATE_PAUSED);
+  EXPECT_EQ(paused.pause_cause(), v1::PAUSE_CAUSE_FAILED_BATCH);
+  EXPECT_NE(paused.condition().find("on purpose"), std::string::npos) << paused.condition();
   const WorkerThread diligent(service_);
   const std::string next = client_.Submit(RequestFor(scene_, "next", 2)).message.job_id();
   EXPECT_TRUE(client_.WaitFor(next, {v1::JOB_STATE_SUCCEEDED}).ok());
+  // The batch is lent again.
+  EXPECT_TRUE(client_.Resume(job_).ok());
+  EXPECT_TRUE(client_.WaitFor(job_, {v1::JOB_STATE_SUCCEEDED}).ok());
 }
 
 TEST_F(LeasesTest, AParkedSyncIsAnsweredWithWorkAsSoonAsThereIsSome) {

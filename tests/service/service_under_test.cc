@@ -88,15 +88,17 @@ v1::SubmitRequest RequestFor(const v1::SceneManifest& scene, const std::string& 
 // Server
 // ---------------------------------------------------------------------------------------------
 
-ServiceUnderTest::ServiceUnderTest(double audit_share) {
+ServiceUnderTest::ServiceUnderTest(const ServiceChoices& choices) {
   spdlog::set_level(spdlog::level::err);
   Coordinator::Options options;
   options.threads = 1;
-  options.audit_share = audit_share;
+  options.audit_share = choices.audit_share;
+  options.jobs_at_once = choices.jobs_at_once;
+  options.max_memory_bytes = choices.max_memory_bytes;
   options.numeric_profile = kNumericProfile;
   coordinator_ = std::make_unique<Coordinator>(options, clock_);
-  assets_ =
-      std::make_unique<AssetService>(coordinator_->blobs(), pools_, &coordinator_->transfers());
+  assets_ = std::make_unique<AssetService>(coordinator_->blobs(), coordinator_->budget(), pools_,
+                                           &coordinator_->transfers());
   jobs_ = std::make_unique<JobService>(*coordinator_, pools_, clock_);
   images_ = std::make_unique<ImageService>(*coordinator_, pools_);
   workers_ = std::make_unique<WorkerService>(*coordinator_, pools_);
@@ -216,6 +218,41 @@ Answer<v1::Job> TestClient::Extend(const std::string& job_id, std::int64_t passe
   *request.mutable_until() = ToProto(until);
   Answer<v1::Job> answer;
   answer.status = jobs_->Extend(&context, request, &answer.message);
+  return answer;
+}
+
+Answer<v1::Job> TestClient::Pause(const std::string& job_id) {
+  Deadline context;
+  v1::PauseJobRequest request;
+  request.set_job_id(job_id);
+  Answer<v1::Job> answer;
+  answer.status = jobs_->Pause(&context, request, &answer.message);
+  return answer;
+}
+
+Answer<v1::Job> TestClient::Resume(const std::string& job_id) {
+  Deadline context;
+  v1::ResumeJobRequest request;
+  request.set_job_id(job_id);
+  Answer<v1::Job> answer;
+  answer.status = jobs_->Resume(&context, request, &answer.message);
+  return answer;
+}
+
+Answer<v1::Job> TestClient::SetPriority(const std::string& job_id, int priority) {
+  Deadline context;
+  v1::SetJobPriorityRequest request;
+  request.set_job_id(job_id);
+  request.set_priority(priority);
+  Answer<v1::Job> answer;
+  answer.status = jobs_->SetPriority(&context, request, &answer.message);
+  return answer;
+}
+
+Answer<v1::ListJobsResponse> TestClient::List(const v1::ListJobsRequest& request) {
+  Deadline context;
+  Answer<v1::ListJobsResponse> answer;
+  answer.status = jobs_->List(&context, request, &answer.message);
   return answer;
 }
 

@@ -64,12 +64,17 @@ inline constexpr std::size_t kSmallScenePixels = 64;
 // Makes a tally that of so many photons of SmallScene, which all escaped.
 void SetEscaped(BatchTally& tally, std::uint64_t photons);
 
+struct ServiceChoices {
+  double audit_share = 0;  // of the batches, which are computed by two workers
+  std::size_t jobs_at_once = 1;
+  std::uint64_t max_memory_bytes = 0;
+};
+
 class ServiceUnderTest {
  public:
   static constexpr const char* kNumericProfile = "the profile of these tests";
 
-  // `audit_share` of the batches are computed by two workers.
-  explicit ServiceUnderTest(double audit_share = 0);
+  explicit ServiceUnderTest(const ServiceChoices& choices = {});
   ~ServiceUnderTest();
   ServiceUnderTest(const ServiceUnderTest&) = delete;
   ServiceUnderTest& operator=(const ServiceUnderTest&) = delete;
@@ -112,6 +117,10 @@ class TestClient {
   Answer<v1::Job> Cancel(const std::string& job_id);
   Answer<v1::Job> Stop(const std::string& job_id);
   Answer<v1::Job> Extend(const std::string& job_id, std::int64_t passes);
+  Answer<v1::Job> Pause(const std::string& job_id);
+  Answer<v1::Job> Resume(const std::string& job_id);
+  Answer<v1::Job> SetPriority(const std::string& job_id, int priority);
+  Answer<v1::ListJobsResponse> List(const v1::ListJobsRequest& request = {});
   // The job as the last message of a watch has it. `at_each` may return false to leave.
   Answer<v1::Job> Watch(
       const std::string& job_id,

@@ -18,7 +18,7 @@ namespace {
 
 class TrustTest : public testing::Test {
  protected:
-  explicit TrustTest(double audit_share = 0) : service_(audit_share) {
+  explicit TrustTest(double audit_share = 0) : service_({.audit_share = audit_share}) {
     scene_ = client_.Upload(SmallScene());
   }
 

@@ -1,6 +1,7 @@
 // The small parts of the coordinator: what is kept of ended jobs, who is next, what is counted.
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -45,22 +46,91 @@ TEST(JobRetentionTest, JobsWithoutPhotonsOrImageTakeNoRoom) {
                 {true, true, true}, {true, true, true}, {true, true, true}, {true, false, false}}));
 }
 
-TEST(JobQueueTest, GivesOneJobATimeInOrder) {
-  JobQueue queue(2);
-  EXPECT_TRUE(queue.is_idle());
-  queue.Push(1);
-  queue.Push(2);
+// Begins the turn of the job whose turn it is; 0: of none.
+std::uint64_t BeginNext(JobQueue& queue) {
+  const std::optional<std::uint64_t> next = queue.Next();
+  if (next) queue.Begin(*next);
+  return next.value_or(0);
+}
+
+TEST(JobQueueTest, GivesSoManyJobsATurnInOrder) {
+  JobQueue queue(2, 2);
+  EXPECT_TRUE(queue.has_room());
+  queue.Push(11, {.number = 1});
+  queue.Push(12, {.number = 3});
   EXPECT_TRUE(queue.is_full());
-  queue.Push(3);
-  queue.Remove(2);
-  queue.Remove(7);
-  EXPECT_EQ(queue.Begin(), 1U);
-  EXPECT_EQ(queue.current(), 1U);
-  EXPECT_FALSE(queue.is_idle());
-  queue.End();
-  EXPECT_EQ(queue.Begin(), 3U);
-  queue.End();
-  EXPECT_TRUE(queue.is_idle());
+  queue.Push(13, {.number = 2});
+  queue.Push(14, {.number = 0});
+  queue.Remove(14);
+  queue.Remove(99);
+  EXPECT_EQ(BeginNext(queue), 11U);
+  EXPECT_FALSE(queue.has_room());
+  EXPECT_EQ(BeginNext(queue), 13U);
+  EXPECT_EQ(BeginNext(queue), 0U) << "two have a turn";
+  queue.End(11);
+  EXPECT_EQ(BeginNext(queue), 12U);
+  queue.End(13);
+  EXPECT_TRUE(queue.has_room());
+}
+
+// A job that was paused and resumed, or extended, while its last turn was still ending.
+TEST(JobQueueTest, AJobHasOneTurnAtATime) {
+  JobQueue queue(4, 2);
+  queue.Push(1, {});
+  ASSERT_EQ(BeginNext(queue), 1U);
+  queue.Push(1, {});
+  EXPECT_EQ(BeginNext(queue), 0U);
+  queue.End(1);
+  EXPECT_EQ(BeginNext(queue), 1U);
+}
+
+TEST(JobQueueTest, HigherPriorityComesFirstAndTakesTheTurnOfALowerOne) {
+  JobQueue queue(8, 2);
+  queue.Push(1, {.priority = 0, .number = 1});
+  queue.Push(2, {.priority = -5, .number = 2});
+  queue.Push(3, {.priority = -9, .number = 3});
+  ASSERT_EQ(BeginNext(queue), 1U);
+  ASSERT_EQ(BeginNext(queue), 2U);
+  EXPECT_EQ(queue.TakeYielding(), std::nullopt) << "the one that waits has a lower priority";
+  queue.SetPriority(3, 7);
+  EXPECT_EQ(queue.TakeYielding(), 2U) << "the lowest of those that run";
+  EXPECT_EQ(queue.TakeYielding(), std::nullopt) << "there is a place now";
+  EXPECT_EQ(BeginNext(queue), 3U);
+  queue.Push(2, {.priority = -5, .number = 2});
+  queue.End(2);
+  EXPECT_EQ(BeginNext(queue), 0U);
+  queue.SetPriority(1, -50);
+  EXPECT_EQ(queue.TakeYielding(), 1U) << "its priority fell below that of one that waits";
+}
+
+TEST(JobQueueTest, AnOwnerWithOneJobNeverWaitsForSeveralOfAnother) {
+  JobQueue queue(8, 2);
+  for (std::uint64_t i = 1; i <= 5; ++i)
+    queue.Push(i, {.owner = "many", .number = i});
+  ASSERT_EQ(BeginNext(queue), 1U);
+  ASSERT_EQ(BeginNext(queue), 2U);
+  EXPECT_EQ(queue.TakeYielding(), std::nullopt) << "of the same owner";
+  queue.Push(6, {.owner = "one", .number = 6});
+  EXPECT_EQ(queue.TakeYielding(), 2U) << "the newer of the two";
+  EXPECT_EQ(BeginNext(queue), 6U);
+  queue.Push(2, {.owner = "many", .number = 2});
+  queue.End(2);
+  EXPECT_EQ(queue.TakeYielding(), std::nullopt) << "back and forth";
+  queue.End(1);
+  EXPECT_EQ(BeginNext(queue), 2U) << "it came before the others of its owner";
+}
+
+TEST(JobQueueTest, AJobThatCannotGoOnLeavesItsPlaceAndTakesItAgain) {
+  JobQueue queue(8, 1);
+  queue.Push(1, {.number = 1});
+  queue.Push(2, {.number = 2});
+  ASSERT_EQ(BeginNext(queue), 1U);
+  queue.SetHasPlace(1, false);
+  ASSERT_EQ(BeginNext(queue), 2U);
+  EXPECT_TRUE(queue.HasTurn(1));
+  queue.SetHasPlace(1, true);
+  EXPECT_EQ(queue.TakeYielding(), 2U) << "one turn too many";
+  EXPECT_EQ(queue.TakeYielding(), std::nullopt);
 }
 
 TEST(CommitAccountingTest, CountsABatchForTheJobAndItsWorker) {

@@ -26,10 +26,11 @@ class FakeRunner final : public RunningJob {
  public:
   StatusOr<RenderResult> Run() {
     const MutexLock lock(mutex_);
-    while (!why_stopped_ && !is_finished_ && passes_ > 1)
+    while (!why_stopped_ && !is_finished_ && !gives_up_turn_ && passes_ > 1)
       changed_.Wait(mutex_);
     if (why_stopped_) return *why_stopped_;
     RenderResult result;
+    result.gave_up_turn = gives_up_turn_;
     result.reason = is_finished_ ? StopReason::kUser : StopReason::kPasses;
     return result;
   }
@@ -57,11 +58,20 @@ class FakeRunner final : public RunningJob {
   [[nodiscard]] Status CheckEmission(const BatchTally& /*tally*/) const override {
     return absl::OkStatus();
   }
+  void SetGivesUpTurn(bool gives_up_turn) override {
+    const MutexLock lock(mutex_);
+    gives_up_turn_ = gives_up_turn;
+    changed_.NotifyAll();
+  }
   void Wake() override {}
   std::optional<WorkBlobs> BlobsOf(std::uint64_t) const override { return WorkBlobs{}; }
   std::optional<std::size_t> HitpointsIn(const Digest&) const override { return 0; }
   StatusOr<RenderResult> ImageSoFar() const override { return RenderResult{}; }
 
+  [[nodiscard]] bool gives_up_turn() const {
+    const MutexLock lock(mutex_);
+    return gives_up_turn_;
+  }
   [[nodiscard]] bool is_stopped() const {
     const MutexLock lock(mutex_);
     return why_stopped_.has_value();
@@ -72,6 +82,7 @@ class FakeRunner final : public RunningJob {
   Condition changed_;
   std::int64_t passes_ = 0;
   bool is_finished_ = false;
+  bool gives_up_turn_ = false;
   std::optional<Status> why_stopped_;
 };
 
@@ -112,7 +123,9 @@ void RunTurns(JobTable& table) {
         result = runner->Run();
       }
     }
-    if (result.ok()) {
+    if (result.ok() && result->gave_up_turn) {
+      table.GiveUpTurn(turn->job_id, At(2));
+    } else if (result.ok()) {
       const Blob image = std::make_shared<const std::string>("image");
       table.Succeed(turn->job_id, result->reason, image, At(2));
     } else {
@@ -188,7 +201,8 @@ TEST(JobTableTest, ClosingStopsTheRunnerAndGivesNoOther) {
   JobTable table(SmallTable());
   const std::string job = Added(table, "a");
   const std::string next = Added(table, "b");
-  ASSERT_TRUE(table.WaitForTurn());
+  const auto turn = table.WaitForTurn();
+  ASSERT_TRUE(turn);
   const auto runner = std::make_shared<FakeRunner>();
   ASSERT_TRUE(table.Attach(job, runner));
   table.Close(absl::UnavailableError("closing"));
@@ -205,9 +219,11 @@ TEST(JobTableTest, JobsTakeTurnsInOrderAndTooManyAreRefused) {
   EXPECT_TRUE(absl::IsResourceExhausted(table.Add(JobOf("e"), WallTime(), At(0)).status()));
   EXPECT_EQ(table.Add(JobOf("b"), WallTime(), At(0))->job_id, jobs[1]) << "the same request";
   EXPECT_TRUE(table.Cancel(jobs[1], At(0)).ok());
-  const auto first = table.WaitForTurn();
-  EXPECT_EQ(first->job_id, jobs[0]);
-  EXPECT_TRUE(first->scene.has_value()) << "read already when it came";
+  {
+    const auto first = table.WaitForTurn();
+    EXPECT_EQ(first->job_id, jobs[0]);
+    EXPECT_TRUE(first->scene.has_value()) << "read already when it came";
+  }
   const auto second = table.WaitForTurn();
   EXPECT_EQ(second->job_id, jobs[2]);
   EXPECT_FALSE(second->scene.has_value());
@@ -223,11 +239,11 @@ TEST(JobTableTest, GivesFilesBackWhenAJobCannotNeedThemAnyMore) {
     CheckedJob job = JobOf("a");
     job.pinned.push_back(*blobs.Pin(file));
     const std::string id = table.Add(std::move(job), WallTime(), At(0))->job_id;
-    ASSERT_TRUE(table.WaitForTurn());
+    auto turn = table.WaitForTurn();
+    ASSERT_TRUE(turn);
     EXPECT_TRUE(table.Cancel(id, At(1)).ok());
     EXPECT_TRUE(is_pinned()) << "its thread may still read";
-    table.Close(absl::UnavailableError("closing"));
-    EXPECT_FALSE(table.WaitForTurn());
+    turn.reset();
     EXPECT_FALSE(is_pinned());
   }
 }
@@ -269,7 +285,7 @@ TEST(JobTableTest, AJobThatCannotBeWrittenDownIsRefusedAndLeavesNoTrace) {
   journal.is_full = true;
   EXPECT_TRUE(absl::IsResourceExhausted(table.Add(JobOf("a"), WallTime(), At(0)).status()));
   EXPECT_FALSE(table.FindRequest("a"));
-  EXPECT_TRUE(table.List(10, 0, At(0)).first.empty());
+  EXPECT_TRUE(table.List({}, 10, 0, At(0)).first.empty());
   journal.is_full = false;
   EXPECT_EQ(Added(table, "a"), "t-1") << "no number is lost";
 }
@@ -400,12 +416,171 @@ TEST(JobTableTest, TimeStandsStillWhileAJobIsPausedAndItsEventsSayWhy) {
   EXPECT_EQ(events[1].what, "went on");
 }
 
+JobTable::Options TwoAtOnce() {
+  return {.instance = "t", .max_waiting = 8, .max_at_once = 2, .retention = {}};
+}
+
+TEST(JobTableTest, APausedJobLetsAnotherHaveItsPlaceAndGoesOnWithItsRunner) {
+  JobTable table(SmallTable());
+  const std::string job = Added(table, "a");
+  const std::string next = Added(table, "b");
+  const auto runner = std::make_shared<FakeRunner>();
+  {
+    const auto turn = table.WaitForTurn();
+    ASSERT_TRUE(table.Attach(job, runner));
+    table.OnRunning(job, At(1));
+    const auto paused = table.Pause(job, PauseCause::kUser, "paused by its user", At(3));
+    EXPECT_EQ(paused->job.life.state(), JobState::kPaused);
+    EXPECT_EQ(paused->job.condition, "paused by its user");
+    // Before its own turn has ended.
+    const auto other = table.WaitForTurn();
+    EXPECT_EQ(other->job_id, next);
+    EXPECT_TRUE(runner->Run()->gave_up_turn);
+    table.GiveUpTurn(job, At(4));
+    EXPECT_EQ(StateOf(table, job), JobState::kPaused);
+    EXPECT_TRUE(table.Cancel(next, At(5)).ok());
+  }
+  EXPECT_EQ(table.ReportOf(job, At(9))->running, std::chrono::seconds(2));
+  EXPECT_EQ(table.Resume(job, At(9))->job.life.state(), JobState::kQueued);
+  EXPECT_EQ(table.Find(job)->condition, "");
+  const auto turn = table.WaitForTurn();
+  EXPECT_EQ(turn->job_id, job);
+  EXPECT_EQ(turn->runner, runner);
+  table.OnRunning(job, At(10));
+  EXPECT_EQ(table.ReportOf(job, At(13))->running, std::chrono::seconds(5));
+}
+
+TEST(JobTableTest, AJobThatIsResumedBeforeItsTurnHasEndedWaitsForThat) {
+  JobTable table(TwoAtOnce());
+  const std::string job = Added(table, "a");
+  auto turn = table.WaitForTurn();
+  ASSERT_TRUE(table.Pause(job, PauseCause::kUser, "paused", At(1)).ok());
+  ASSERT_TRUE(table.Resume(job, At(1)).ok());
+  const auto runner = std::make_shared<FakeRunner>();
+  ASSERT_TRUE(table.Attach(job, runner)) << "the turn was still preparing";
+  EXPECT_TRUE(runner->Run()->gave_up_turn);
+  const std::string other = Added(table, "b");
+  EXPECT_EQ(table.WaitForTurn()->job_id, other);
+  table.GiveUpTurn(job, At(2));
+  turn.reset();
+  const auto again = table.WaitForTurn();
+  EXPECT_EQ(again->job_id, job);
+  EXPECT_EQ(again->runner, runner);
+}
+
+TEST(JobTableTest, AStopOfAPausedJobEndsItBeforeOthersRun) {
+  JobTable table(SmallTable());
+  const std::string job = Added(table, "a");
+  const auto runner = std::make_shared<FakeRunner>();
+  {
+    const auto turn = table.WaitForTurn();
+    ASSERT_TRUE(table.Attach(job, runner));
+    table.OnRunning(job, At(1));
+    ASSERT_TRUE(table.Pause(job, PauseCause::kUser, "paused", At(2)).ok());
+  }
+  Added(table, "b");
+  ASSERT_TRUE(table.SetPriority("t-2", 100, At(2)).ok());
+  EXPECT_EQ(table.Stop(job, At(3))->job.life.state(), JobState::kQueued);
+  const auto turn = table.WaitForTurn();
+  EXPECT_EQ(turn->job_id, job);
+  EXPECT_EQ(turn->runner->Resume()->reason, StopReason::kUser);
+}
+
+TEST(JobTableTest, PausesAndPrioritiesAreInALaterTableToo) {
+  FakeJournal journal;
+  {
+    JobTable table(TableWith(journal));
+    for (const char* request : {"a", "b", "c"})
+      Added(table, request);
+    ASSERT_TRUE(table.Pause("t-1", PauseCause::kUser, "paused by its user", At(1)).ok());
+    ASSERT_TRUE(table.SetPriority("t-3", 5, At(1)).ok());
+    EXPECT_TRUE(absl::IsInvalidArgument(table.SetPriority("t-3", 101, At(1)).status()));
+  }
+  JobTable table(TableWith(journal));
+  table.Restore(journal.AtTheNextStart(), 4, At(3));
+  EXPECT_EQ(StateOf(table, "t-1"), JobState::kPaused);
+  EXPECT_EQ(table.Find("t-1")->condition, "paused by its user");
+  EXPECT_EQ(table.WaitForTurn()->job_id, "t-3");
+  EXPECT_EQ(table.WaitForTurn()->job_id, "t-2");
+  ASSERT_TRUE(table.Resume("t-1", At(4)).ok());
+  EXPECT_EQ(table.WaitForTurn()->job_id, "t-1");
+}
+
+// Time stands still; after a few seconds others are prepared, as if the jobs without workers were
+// paused.
+TEST(JobTableTest, JobsWithoutWorkersDoNotBlockOthersAndTheirTimeStandsStill) {
+  JobTable table(SmallTable());
+  table.SetLiveWorkers(1, At(0));
+  const std::string job = Added(table, "a");
+  const std::string next = Added(table, "b");
+  const auto turn = table.WaitForTurn();
+  const auto runner = std::make_shared<FakeRunner>();
+  ASSERT_TRUE(table.Attach(job, runner));
+  table.OnRunning(job, At(1));
+  table.SetLiveWorkers(0, At(4));
+  EXPECT_EQ(table.ReportOf(job, At(9))->running, std::chrono::seconds(3));
+  EXPECT_FALSE(table.WhenItHasRun(job, std::chrono::seconds(5)));
+  table.SetLiveWorkers(0, At(9));
+  const auto other = table.WaitForTurn();
+  EXPECT_EQ(other->job_id, next);
+  ASSERT_TRUE(table.Attach(next, std::make_shared<FakeRunner>()));
+  table.OnRunning(next, At(9));
+  table.SetLiveWorkers(1, At(10));
+  EXPECT_EQ(table.WhenItHasRun(job, std::chrono::seconds(5)), At(12).now);
+  EXPECT_FALSE(runner->gives_up_turn());
+  EXPECT_TRUE(dynamic_cast<FakeRunner&>(*table.DescribeRun(next, At(10))->runner).gives_up_turn())
+      << "two have a turn and one may";
+}
+
+// The processor time of the process is that of all that ran.
+TEST(JobTableTest, JobsThatRunAtTheSameTimeShareTheProcessorTime) {
+  JobTable table(TwoAtOnce());
+  const std::string a = Added(table, "a");
+  const std::string b = Added(table, "b");
+  const auto turn_of_a = table.WaitForTurn();
+  const auto turn_of_b = table.WaitForTurn();
+  table.OnRunning(a, At(10));
+  table.OnRunning(b, At(14));
+  EXPECT_EQ(table.ReportOf(a, At(20))->job.counters.coordinator_cpu, std::chrono::seconds(7));
+  EXPECT_EQ(table.ReportOf(b, At(20))->job.counters.coordinator_cpu, std::chrono::seconds(3));
+  ASSERT_TRUE(table.Pause(b, PauseCause::kUser, "paused", At(20)).ok());
+  EXPECT_EQ(table.ReportOf(a, At(24))->job.counters.coordinator_cpu, std::chrono::seconds(11));
+  EXPECT_EQ(table.ReportOf(b, At(24))->job.counters.coordinator_cpu, std::chrono::seconds(3));
+}
+
+TEST(JobTableTest, ListsTheJobsThatAFilterLetsPass) {
+  JobTable table(SmallTable());
+  for (const char* name : {"kitchen", "bath", "kitchen sink"}) {
+    CheckedJob job = JobOf(name);
+    job.submission.name = name;
+    ASSERT_TRUE(table.Add(std::move(job), WallTime(), At(0)).ok());
+  }
+  ASSERT_TRUE(table.Pause("t-1", PauseCause::kUser, "paused", At(0)).ok());
+  const auto ids = [&](const JobFilter& filter, std::size_t count = 10) {
+    std::string all;
+    for (const JobReport& report : table.List(filter, count, 0, At(1)).first)
+      all += report.job.id + " ";
+    return all;
+  };
+  EXPECT_EQ(ids({}), "t-3 t-2 t-1 ");
+  EXPECT_EQ(ids({.name_contains = "kitchen"}), "t-3 t-1 ");
+  EXPECT_EQ(ids({.name_contains = "kitchen"}, 1), "t-3 ");
+  EXPECT_EQ(ids({.states = {JobState::kPaused}}), "t-1 ");
+  EXPECT_EQ(ids({.states = {JobState::kPaused}, .name_contains = "bath"}), "");
+  EXPECT_EQ(ids({.owner = "somebody"}), "");
+}
+
 // Threads ask for everything, of all jobs and in an order of their own; the jobs that are left end
-// when they are cancelled, and the thread of jobs comes back.
+// when they are cancelled, and the threads of jobs come back.
 TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
-  for (std::uint64_t key = 0; key < 8; ++key) {
-    JobTable table({.instance = "t", .max_waiting = 16, .retention = {.jobs = 20, .pixels = 640}});
-    std::thread turns([&] { RunTurns(table); });
+  for (std::uint64_t key = 0; key < 12; ++key) {
+    JobTable table({.instance = "t",
+                    .max_waiting = 16,
+                    .max_at_once = 1 + key % 2,
+                    .retention = {.jobs = 20, .pixels = 640}});
+    std::vector<std::thread> turns;
+    for (int t = 0; t < 4; ++t)
+      turns.emplace_back([&] { RunTurns(table); });
     std::vector<std::thread> callers;
     for (std::uint64_t c = 0; c < 4; ++c) {
       callers.emplace_back([&table, key, c] {
@@ -417,7 +592,7 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
           const std::string request = absl::StrCat(c, " ", i);
           Delivery delivery;
           delivery.pass.job_id = job;
-          switch (rng.Bits() % 8) {
+          switch (rng.Bits() % 12) {
             case 0:
               (void)table.Add(JobOf(request, *until.passes), WallTime(), At(0));
               break;
@@ -435,8 +610,21 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
               (void)table.FindImage(job, At(1));
               break;
             case 6:
-              (void)table.List(10, 0, At(1));
+              (void)table.List({}, 10, 0, At(1));
               (void)table.MakeLoan({}, 1);
+              break;
+            case 7:
+              (void)table.Pause(job, PauseCause::kUser, "paused", At(1));
+              break;
+            case 8:
+              (void)table.Resume(job, At(1));
+              break;
+            case 9:
+              (void)table.SetPriority(job, static_cast<int>(rng.Bits() % 3), At(1));
+              break;
+            case 10:
+              table.SetCondition(job, rng.Bits() % 2 == 0 ? "" : "paused: no room", At(1));
+              table.SetLiveWorkers(static_cast<int>(rng.Bits() % 2), At(static_cast<int>(i)));
               break;
             default:
               table.CountMerged(delivery, DeliveredCounts(), "w", At(1).now);
@@ -447,7 +635,7 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
     }
     for (std::thread& caller : callers)
       caller.join();
-    const auto [reports, next] = table.List(1000, 0, At(3));
+    const auto [reports, next] = table.List({}, 1000, 0, At(3));
     for (const JobReport& report : reports)
       (void)table.Cancel(report.job.id, At(3));
     // Its turn comes and it runs to its end: the thread of jobs is not stuck with one before it.
@@ -455,7 +643,8 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
     while (StateOf(table, last) != JobState::kSucceeded)
       std::this_thread::yield();
     table.Close(absl::UnavailableError("closing"));
-    turns.join();
+    for (std::thread& thread : turns)
+      thread.join();
   }
 }
 

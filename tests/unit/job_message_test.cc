@@ -82,6 +82,7 @@ Job FullJob() {
   job.ended_at = kNow.wall;
   job.condition = "paused: no room";
   job.events = {{kNow.wall, "went on"}};
+  job.priority = -7;
   return job;
 }
 
@@ -90,6 +91,39 @@ std::string Seen(const Job& job, Duration running) {
   report.job = job;
   report.running = running;
   return ToProto(report).DebugString();
+}
+
+// What the user paused, or a batch that failed, stays so; what waited for the disk tries again.
+TEST(JobMessageTest, ARecordOfAPausedJobSaysWhoPausedIt) {
+  for (const PauseCause cause : {PauseCause::kUser, PauseCause::kFailedBatch, PauseCause::kDisk}) {
+    Job job = FullJob();
+    job.life = JobLife({.state = JobState::kPaused});
+    job.pause_cause = cause;
+    job.condition = "paused: why";
+    const auto read = DecodeRecord(EncodeRecord(job, std::nullopt, Duration::zero()), kNow);
+    ASSERT_TRUE(read.ok()) << read.status();
+    const bool goes_on = cause == PauseCause::kDisk;
+    EXPECT_EQ(read->job.life.state(), goes_on ? JobState::kQueued : JobState::kPaused);
+    EXPECT_EQ(read->job.pause_cause, goes_on ? PauseCause::kNone : cause);
+    EXPECT_EQ(read->job.condition, goes_on ? "" : "paused: why");
+  }
+}
+
+TEST(JobMessageTest, ASummaryLacksOnlyWhatGrowsWithTheJob) {
+  JobReport report;
+  report.job = FullJob();
+  v1::Job whole = ToProto(report);
+  report.job = SummaryOf(report.job);
+  whole.clear_warnings();
+  whole.clear_parts();
+  whole.clear_convergence();
+  whole.clear_lights();
+  whole.clear_worker_shares();
+  whole.clear_photon_steps();
+  whole.clear_energy_of_passes();
+  whole.clear_events();
+  whole.clear_dropped_photons();
+  EXPECT_EQ(SummaryToProto(report).DebugString(), whole.DebugString());
 }
 
 TEST(JobMessageTest, ARecordHoldsAllThatClientsSee) {

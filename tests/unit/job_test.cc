@@ -109,6 +109,33 @@ TEST(JobLifeTest, RunsToItsEnd) {
   EXPECT_EQ(life.Running(At(100)), std::chrono::seconds(5)) << "stands still";
 }
 
+TEST(JobLifeTest, ItsTimeIsThatInWhichItRunsAndAWorkerIsThere) {
+  JobLife life(At(0));
+  life.SetHasWorkers(false, At(1));
+  ASSERT_TRUE(life.Prepare());
+  ASSERT_TRUE(life.Run(At(2)));
+  EXPECT_EQ(life.Running(At(9)), Duration::zero());
+  EXPECT_FALSE(life.WhenItHasRun(std::chrono::seconds(5)));
+  life.SetHasWorkers(true, At(10));
+  life.SetHasWorkers(true, At(11));
+  EXPECT_EQ(life.WhenItHasRun(std::chrono::seconds(5)), At(15));
+  ASSERT_TRUE(life.Pause(At(12)));
+  EXPECT_FALSE(life.Pause(At(13)));
+  EXPECT_FALSE(life.WhenItHasRun(std::chrono::seconds(5)));
+  EXPECT_EQ(life.Running(At(20)), std::chrono::seconds(2));
+  ASSERT_TRUE(life.Resume());
+  EXPECT_FALSE(life.Resume());
+  EXPECT_EQ(life.state(), JobState::kQueued);
+  ASSERT_TRUE(life.Prepare());
+  ASSERT_TRUE(life.Run(At(30)));
+  EXPECT_EQ(life.WhenItHasRun(std::chrono::seconds(5)), At(33));
+  ASSERT_TRUE(life.GiveUpTurn(At(31)));
+  EXPECT_FALSE(life.GiveUpTurn(At(31)));
+  EXPECT_EQ(life.Running(At(40)), std::chrono::seconds(3));
+  ASSERT_TRUE(life.Succeed(StopReason::kUser, At(41))) << "it was done when it gave up its turn";
+  EXPECT_FALSE(life.Pause(At(42)));
+}
+
 TEST(JobLifeTest, CanBeCancelledOrFailAnywhereBeforeTheEndAndNeverAfter) {
   for (int steps = 0; steps < 4; ++steps) {
     JobLife cancelled(At(0));
