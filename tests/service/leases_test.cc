@@ -121,11 +121,16 @@ TEST_F(LeasesTest, ABatchThatIsGivenUpAgainAndAgainPausesItsJobAndNotTheNextOne)
   EXPECT_EQ(paused.state(), v1::JOB_STATE_PAUSED);
   EXPECT_EQ(paused.pause_cause(), v1::PAUSE_CAUSE_FAILED_BATCH);
   EXPECT_NE(paused.condition().find("on purpose"), std::string::npos) << paused.condition();
-  const WorkerThread diligent(service_);
   const std::string next = client_.Submit(RequestFor(scene_, "next", 2)).message.job_id();
-  EXPECT_TRUE(client_.WaitFor(next, {v1::JOB_STATE_SUCCEEDED}).ok());
-  // The batch is lent again.
+  {
+    const WorkerThread diligent(service_);
+    EXPECT_TRUE(client_.WaitFor(next, {v1::JOB_STATE_SUCCEEDED}).ok());
+  }
+  // The batch is lent again, and what failed before the pause does not count any more.
   EXPECT_TRUE(client_.Resume(job_).ok());
+  ASSERT_TRUE(worker.GiveUp(worker.TakeLease().value(), "once more").ok());
+  EXPECT_NE(client_.Get(job_).message.state(), v1::JOB_STATE_PAUSED);
+  const WorkerThread diligent(service_);
   EXPECT_TRUE(client_.WaitFor(job_, {v1::JOB_STATE_SUCCEEDED}).ok());
 }
 
