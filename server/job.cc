@@ -109,15 +109,11 @@ Job SummaryOf(const Job& job) {
   summary.counters = job.counters;
   summary.reference = job.reference;
   summary.ended_at = job.ended_at;
+  summary.owner = job.owner;
   summary.priority = job.priority;
   summary.pause_cause = job.pause_cause;
   summary.condition = job.condition;
   return summary;
-}
-
-const std::string& OwnerOf(const Job& /*job*/) {
-  static const std::string kNobody;
-  return kNobody;
 }
 
 void Job::AddEvent(WallTime at, std::string what) {

@@ -248,7 +248,4 @@ struct Job {
 // What a list of jobs shows: without the parts that grow with the length of a job.
 [[nodiscard]] Job SummaryOf(const Job& job);
 
-// Whose job it is, for fair shares and filters; empty: nobody's.
-[[nodiscard]] const std::string& OwnerOf(const Job& job);
-
 }  // namespace lucerna

@@ -206,7 +206,9 @@ grpc::ServerUnaryReactor* JobService::Cancel(grpc::CallbackServerContext* contex
 grpc::ServerUnaryReactor* JobService::Pause(grpc::CallbackServerContext* context,
                                             const v1::PauseJobRequest* request, v1::Job* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(Put(coordinator_.Pause(request->job_id()), response));
+  const Status allowed = CheckMayChange(context, request->job_id());
+  reactor->Finish(allowed.ok() ? Put(coordinator_.Pause(request->job_id()), response)
+                               : ToGrpc(allowed));
   return reactor;
 }
 
@@ -214,7 +216,9 @@ grpc::ServerUnaryReactor* JobService::Resume(grpc::CallbackServerContext* contex
                                              const v1::ResumeJobRequest* request,
                                              v1::Job* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(Put(coordinator_.Resume(request->job_id()), response));
+  const Status allowed = CheckMayChange(context, request->job_id());
+  reactor->Finish(allowed.ok() ? Put(coordinator_.Resume(request->job_id()), response)
+                               : ToGrpc(allowed));
   return reactor;
 }
 
@@ -222,7 +226,10 @@ grpc::ServerUnaryReactor* JobService::SetPriority(grpc::CallbackServerContext* c
                                                   const v1::SetJobPriorityRequest* request,
                                                   v1::Job* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  reactor->Finish(Put(coordinator_.SetPriority(request->job_id(), request->priority()), response));
+  const Status allowed = CheckMayChange(context, request->job_id());
+  reactor->Finish(
+      allowed.ok() ? Put(coordinator_.SetPriority(request->job_id(), request->priority()), response)
+                   : ToGrpc(allowed));
   return reactor;
 }
 

@@ -232,7 +232,7 @@ std::pair<std::vector<JobReport>, std::uint64_t> JobTable::List(const JobFilter&
                                                                 const Moment& moment) const {
   const auto passes = [&](const Job& job) {
     return (filter.states.empty() || filter.states.contains(job.life.state())) &&
-           (filter.owner.empty() || filter.owner == OwnerOf(job)) &&
+           (filter.owner.empty() || filter.owner == job.owner) &&
            job.name.find(filter.name_contains) != std::string::npos;
   };
   const MutexLock lock(mutex_);
@@ -534,7 +534,7 @@ bool JobTable::ChangeLife(std::uint64_t serial, Entry& entry, const Moment& mome
 
 JobQueue::Claim JobTable::ClaimOf(const Entry& entry) {
   return {.priority = entry.is_finishing ? kHighestPriority + 1 : entry.job.priority,
-          .owner = OwnerOf(entry.job),
+          .owner = entry.job.owner,
           .number = entry.turn};
 }
 
@@ -721,7 +721,7 @@ std::optional<JobTable::Share> JobTable::ShareOf(const std::string& job_id) cons
   if (found == entries_.end() || !found->second.runner) return std::nullopt;
   const Job& job = found->second.job;
   if (job.life.has_ended()) return std::nullopt;
-  return Share{job.priority, OwnerOf(job), found->second.gives_up_turn};
+  return Share{job.priority, job.owner, found->second.gives_up_turn};
 }
 
 bool JobTable::GivesUpTurn(const std::string& job_id) const {
@@ -823,6 +823,7 @@ void JobTable::GoOnFrom(const std::string& job_id, Job record, Duration ran) {
   if (record.life.state() != JobState::kRunning) record.life.SetRanBefore(ran);
   record.settings = job.settings;
   record.submitted_at = job.submitted_at;
+  record.owner = job.owner;
   record.priority = job.priority;
   record.pause_cause = job.pause_cause;
   record.events = job.events;

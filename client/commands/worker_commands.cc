@@ -8,7 +8,7 @@
 
 namespace lucerna {
 
-Status ListWorkers(const std::string& server, const OutputOptions& output_options) {
+Status ListWorkers(const Endpoint& server, const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Worker> workers, connection->ListWorkers());
   const std::string text = output_options.json ? WorkersReport(workers) : WorkersTable(workers);
@@ -16,7 +16,7 @@ Status ListWorkers(const std::string& server, const OutputOptions& output_option
   return absl::OkStatus();
 }
 
-Status OrderWorker(WorkerOrder order, const std::string& worker_id, const std::string& server,
+Status OrderWorker(WorkerOrder order, const std::string& worker_id, const Endpoint& server,
                    const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const v1::Worker worker, [&]() -> StatusOr<v1::Worker> {
