@@ -31,7 +31,7 @@ inline constexpr std::uint64_t kFirstLongRound = 8;
 inline constexpr std::uint64_t kLongestQuickRound = 8;
 inline constexpr std::uint64_t kLongestRound = 64;
 // From here on the lag grows by a pass for every two, and rounds share their radii with others.
-inline constexpr std::uint64_t kFirstLongLag = 64;
+inline constexpr std::uint64_t kFirstLongLag = 128;
 
 // The round of a pass. Its length is a power of two and divides its first pass.
 [[nodiscard]] constexpr PassRange RoundOf(std::uint64_t pass) {

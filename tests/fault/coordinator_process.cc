@@ -66,9 +66,9 @@ std::unique_ptr<CoordinatorProcess> CoordinatorProcess::Doomed(const std::string
 
 std::unique_ptr<ChildProcess> CoordinatorProcess::StartFaultyWorker(
     const std::string& fault) const {
-  return std::make_unique<ChildProcess>(std::vector<std::string>{
-      "/usr/bin/env", "LUCERNA_FAIL_POINT=" + fault, kBin + "/lucerna-worker", "--server",
-      address_, "--threads", "1"});
+  return std::make_unique<ChildProcess>(
+      std::vector<std::string>{"/usr/bin/env", "LUCERNA_FAIL_POINT=" + fault,
+                               kBin + "/lucerna-worker", "--server", address_, "--threads", "1"});
 }
 
 CoordinatorProcess::CoordinatorProcess(std::string address, Elsewhere /*tag*/)
