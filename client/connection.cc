@@ -291,6 +291,7 @@ StatusOr<v1::Job> ClientConnection::Pause(const std::string& job_id) {
   LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
     return jobs_->Pause(&context, request, &job);
   }));
+  EscapeTexts(job);
   return job;
 }
 
@@ -301,6 +302,7 @@ StatusOr<v1::Job> ClientConnection::Resume(const std::string& job_id) {
   LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
     return jobs_->Resume(&context, request, &job);
   }));
+  EscapeTexts(job);
   return job;
 }
 
@@ -312,6 +314,7 @@ StatusOr<v1::Job> ClientConnection::SetPriority(const std::string& job_id, int p
   LUCERNA_RETURN_IF_ERROR(Retry(kCallTime, [&](grpc::ClientContext& context) {
     return jobs_->SetPriority(&context, request, &job);
   }));
+  EscapeTexts(job);
   return job;
 }
 

@@ -160,7 +160,9 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
       const MemoryClaim for_reading,
       budget_.Claim(MemoryUse::kScenes, SceneMemory(SceneBytes(submission.manifest))));
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
-  if (MemoryNeedOf(job.needs, job.settings, SceneBytes(submission.manifest), state_ != nullptr) >
+  // Its files stay beside it.
+  const std::uint64_t files = SceneBytes(submission.manifest);
+  if (MemoryNeedOf(job.needs, job.settings, files, state_ != nullptr) + files >
       budget_.max_bytes()) {
     return absl::ResourceExhaustedError(
         "the job needs more memory than the coordinator has for all jobs; make the image or the "
@@ -323,6 +325,7 @@ void Coordinator::RunJobs() {
         RunTurn(std::move(turn));
       }));
     } catch (const std::exception& no_thread) {
+      static_cast<void>(jobs_.TakeBeginsAgain(job_id));
       Conclude(job_id, absl::ResourceExhaustedError(
                            absl::StrCat("the coordinator cannot begin a thread for the job (",
                                         no_thread.what(), "); submit it again later")));
@@ -343,15 +346,21 @@ void Coordinator::RunTurn(JobTable::Turn turn) {
       Conclude(job_id, std::move(result));
       // Without the work of a worker whose results were wrong.
       if (!jobs_.TakeBeginsAgain(job_id)) return;
+      // What was taken of the run before finds its rounds closed before new ones open.
+      WaitForMerges();
       turn.runner = nullptr;
       turn.scene.reset();
       result = BeginRun(turn);
     }
   } catch (const std::bad_alloc&) {
     // The job alone: what it had is freed with its runner.
+    static_cast<void>(jobs_.TakeBeginsAgain(job_id));
     Conclude(job_id, absl::ResourceExhaustedError(
                          "the coordinator ran out of memory while it worked on the job; make the "
                          "image or the scene smaller, or give the coordinator more memory"));
+  } catch (const std::exception& error) {
+    static_cast<void>(jobs_.TakeBeginsAgain(job_id));
+    Conclude(job_id, absl::InternalError(absl::StrCat("rendering failed: ", error.what())));
   }
 }
 
@@ -390,7 +399,9 @@ StatusOr<std::optional<MemoryClaim>> Coordinator::WaitForMemory(const JobTable::
   bool has_waited = false;
   while (true) {
     StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kJobs, bytes);
-    if (!claim.ok() && bytes > budget_.max_bytes()) return claim.status();
+    if (!claim.ok() && bytes + SceneBytes(turn.manifest) > budget_.max_bytes()) {
+      return claim.status();
+    }
     if (claim.ok()) {
       jobs_.SetWaitsForMemory(turn.job_id, "", Now());
       return std::optional<MemoryClaim>(*std::move(claim));
@@ -767,6 +778,8 @@ StatusOr<MergeOutcome> Coordinator::TakeIn(const Delivery& delivery, std::string
   Scheduler::Taken taken;
   StatusOr<MergeOutcome> outcome = MergeOutcome::kAccepted;
   {
+    // Whoever waits for all merges holds the gate, so that new ones do not keep it waiting.
+    { const MutexLock gate(merge_gate_); }
     const std::shared_lock merging(merging_);
     LUCERNA_ASSIGN_OR_RETURN(
         taken, scheduler_.TakeResult(ClaimOf(delivery), delivery.digest, clock_.Steady()));
@@ -805,16 +818,21 @@ void Coordinator::TakeOut(const std::vector<std::string>& records) {
         "worker {} returned a wrong result: it is in quarantine, and its work is taken out",
         record);
     // The scheduler takes no result of it any more.
-    { const std::unique_lock wait_for_merges(merging_); }
+    WaitForMerges();
     jobs_.TakeOut(record, Now());
   }
+}
+
+void Coordinator::WaitForMerges() {
+  const MutexLock gate(merge_gate_);
+  const std::unique_lock alone(merging_);
 }
 
 void Coordinator::ShowDisputes() {
   const std::map<std::string, std::string> disputes = scheduler_.Disputes();
   for (const auto& [job_id, what] : disputes) {
-    if (!disputed_.insert(job_id).second) continue;
-    spdlog::warn("job {} {}", job_id, what);
+    if (disputed_.insert(job_id).second) spdlog::warn("job {} {}", job_id, what);
+    // Again at each tick: the job may have been paused when the dispute began.
     jobs_.SetCondition(job_id, what, Now());
   }
   for (auto job_id = disputed_.begin(); job_id != disputed_.end();) {

@@ -209,6 +209,8 @@ class Coordinator {
   // Jobs in which workers disagree and none is left to decide wait, and say so.
   void ShowDisputes();
 
+  // Waits until all that is being merged has been counted.
+  void WaitForMerges();
   void PausePoisonedJobs();
   // What a registration's worker is called in the log.
   std::string ShownWorker(const std::string& worker) const;
@@ -238,6 +240,7 @@ class Coordinator {
   // it; alone, for a moment, by who takes a worker's work out: what was merged by then is counted,
   // and what comes later is refused.
   std::shared_mutex merging_;
+  Mutex merge_gate_;
   std::set<std::string> disputed_;  // jobs that wait; of the thread of Tick
   Mutex claims_mutex_;              // held from reading a job's share to giving it to the scheduler
   std::atomic<bool> is_lending_ = true;

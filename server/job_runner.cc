@@ -106,7 +106,12 @@ StatusOr<RenderResult> JobRunner::Resume() {
 }
 
 StatusOr<RenderResult> JobRunner::RunToEnd() {
-  LUCERNA_RETURN_IF_ERROR(why_stopped());
+  if (Status why = why_stopped(); !why.ok()) {
+    // What a turn before left open must be closed before another runner opens it.
+    CloseAll();
+    hooks_.scheduler.ForgetJob(job_id_);
+    return why;
+  }
   is_running_ = true;
   hooks_.on_running();
   if (!std::exchange(gave_up_turn_, false)) BeginRounds();

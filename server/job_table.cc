@@ -372,7 +372,8 @@ StatusOr<JobTable::ImageSource> JobTable::FindImage(const std::string& job_id,
                          ? " ended so long ago that its image is not kept any more; submit it again"
                          : " was cancelled or failed and has no image"));
   }
-  if (!has_image && !entry.runner) {
+  // Of one that begins again, the image so far has the work of a wrong worker.
+  if (!has_image && (!entry.runner || entry.begins_again)) {
     return absl::FailedPreconditionError(
         absl::StrCat("job ", job_id, " has not begun to run; try again later"));
   }
@@ -443,7 +444,8 @@ void JobTable::TakeOut(const std::string& record, const Moment& moment) {
   for (auto& [serial, entry] : entries_) {
     Job& job = entry.job;
     const auto share = job.workers.find(record);
-    if (share == job.workers.end() || job.distrusted.contains(record)) continue;
+    // Also when it was found before: where its work is named, it has been lent work again since.
+    if (share == job.workers.end()) continue;
     const std::string worker = absl::StrCat("worker ", record, " (", share->second.name,
                                             "), of which a result was found to be wrong");
     job.distrusted.insert(record);
@@ -695,8 +697,16 @@ void JobTable::GiveUpTurn(const std::string& job_id, const Moment& moment) {
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return;
   Entry& entry = found->second;
-  if (ChangeLife(found->first, entry, moment,
-                 [&](JobLife& life) { return life.GiveUpTurn(moment.now); })) {
+  // Something may have come that it waits for, after it was told to give its turn up; what ends
+  // that does not wake a job without a turn.
+  const bool waits = entry.job.pause_cause == PauseCause::kDisk;
+  if (ChangeLife(found->first, entry, moment, [&](JobLife& life) {
+        return waits ? life.Resume() : life.GiveUpTurn(moment.now);
+      })) {
+    if (waits) {
+      entry.job.pause_cause = PauseCause::kNone;
+      entry.job.condition.clear();
+    }
     PushLocked(found->first, entry);
   }
 }
@@ -707,12 +717,14 @@ void JobTable::SetWaitsForMemory(const std::string& job_id, std::string conditio
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return;
   Entry& entry = found->second;
-  if (entry.job.life.state() != JobState::kPreparing || entry.job.condition == condition) return;
+  const JobState state = entry.job.life.state();
+  if (state != JobState::kPreparing && (state != JobState::kRunning || entry.runner)) return;
   queue_.SetHasPlace(found->first, condition.empty() && !entry.gives_up_turn);
+  UpdateTurns();
+  if (entry.job.condition == condition) return;
   if (!condition.empty()) entry.job.AddEvent(moment.wall, condition);
   entry.job.condition = std::move(condition);
   ++entry.version;
-  UpdateTurns();
 }
 
 std::optional<JobTable::Share> JobTable::ShareOf(const std::string& job_id) const {
@@ -776,6 +788,8 @@ bool JobTable::Attach(const std::string& job_id, std::shared_ptr<RunningJob> run
   // Either may have been changed since the turn began.
   runner->SetEnd(found->second.job.settings);
   runner->SetGivesUpTurn(found->second.gives_up_turn);
+  // One that was stopped, and begins again, ends all the same.
+  if (found->second.is_finishing) runner->Finish();
   found->second.runner = std::move(runner);
   return true;
 }
@@ -831,7 +845,6 @@ void JobTable::GoOnFrom(const std::string& job_id, Job record, Duration ran) {
   record.condition = job.condition;
   record.ended_at.reset();
   job = std::move(record);
-  found->second.has_checkpoint = true;
   ++found->second.version;
 }
 

@@ -37,7 +37,7 @@ std::uint64_t MemoryBudget::HeldLocked() const {
 StatusOr<MemoryClaim> MemoryBudget::ClaimFree(MemoryUse use, std::uint64_t bytes) {
   const MutexLock lock(mutex_);
   const std::uint64_t held = HeldLocked();
-  if (bytes <= max_bytes_ - held) {
+  if (held <= max_bytes_ && bytes <= max_bytes_ - held) {
     held_[static_cast<std::size_t>(use)] += bytes;
     return MemoryClaim(*this, use, bytes);
   }
@@ -65,6 +65,14 @@ StatusOr<MemoryClaim> MemoryBudget::Claim(MemoryUse use, std::uint64_t bytes) {
       claim = ClaimFree(use, bytes);
   }
   return claim;
+}
+
+MemoryClaim MemoryBudget::ClaimOneAnyway(MemoryUse use, std::uint64_t bytes) {
+  const MutexLock lock(mutex_);
+  std::uint64_t& held = held_[static_cast<std::size_t>(use)];
+  if (held > 0) return {};
+  held = bytes;
+  return MemoryClaim(*this, use, bytes);
 }
 
 void MemoryBudget::Release(MemoryUse use, std::uint64_t bytes) {

@@ -45,6 +45,8 @@ class MemoryClaim {
   MemoryClaim& operator=(const MemoryClaim&) = delete;
   ~MemoryClaim() { Release(); }
 
+  [[nodiscard]] bool is_empty() const { return budget_ == nullptr; }
+
  private:
   friend class MemoryBudget;
   MemoryClaim(MemoryBudget& budget, MemoryUse use, std::uint64_t bytes)
@@ -67,6 +69,10 @@ class MemoryBudget {
   // May ask caches: not under a lock that they take.
   // Errors: RESOURCE_EXHAUSTED.
   [[nodiscard]] StatusOr<MemoryClaim> Claim(MemoryUse use, std::uint64_t bytes);
+
+  // Also beyond the budget, when nothing is held for this use: what others wait for comes one by
+  // one where they hold all memory. A claim of nothing (is_empty) when something is.
+  [[nodiscard]] MemoryClaim ClaimOneAnyway(MemoryUse use, std::uint64_t bytes);
 
   // Waits until something is let go, at most so long.
   void WaitForRelease(Duration at_most);

@@ -316,7 +316,14 @@ bool Scheduler::QuarantineLocked(const std::string& id, std::string_view reason,
   if (!records_.Quarantine(id, reason, has_lied)) return false;
   UpdateStanding(id);
   if (const auto registration = registrations_.find(id); registration != registrations_.end()) {
-    TakeBackAll(workers_.at(registration->second), Ending::kGivenBack);
+    Worker& worker = workers_.at(registration->second);
+    TakeBackAll(worker, Ending::kGivenBack);
+    // Its late results are refused too.
+    for (PastLease& past : worker.past) {
+      if (past.ending == Ending::kInterrupted || past.ending == Ending::kStalled) {
+        past.ending = Ending::kGivenBack;
+      }
+    }
   }
   // What it returned for audits that are not decided says nothing.
   for (auto& [key, work] : open_) {
@@ -385,6 +392,7 @@ void Scheduler::QuarantineIfUnreliable(const std::string& record, std::string_vi
 
 void Scheduler::AddWork(const PassKey& key, Work work) {
   if (work.kind == WorkKind::kPasses) round_passes_ += work.total;
+  work.opening = next_opening_++;
   const auto [added, is_new] = open_.emplace(key, std::move(work));
   LUCERNA_CHECK(is_new);
   UpdateLendable(key, added->second);
@@ -513,7 +521,11 @@ StatusOr<Scheduler::Standing> Scheduler::StandingLocked(const BatchClaim& claim)
   }
   if (!is_work_of(ended->lease.pass, ended->lease.kind, ended->lease.range)) return other_work;
   const auto open = open_.find(claim.lease.pass);
-  if (open == open_.end() || open->second.kind != claim.lease.kind) return Standing::kSuperseded;
+  // The same passes may have been opened again with other radii, by a job that began again.
+  if (open == open_.end() || open->second.kind != claim.lease.kind ||
+      open->second.opening != ended->opening) {
+    return Standing::kSuperseded;
+  }
   switch (ended->ending) {
     case Ending::kDelivered:
     case Ending::kOvertaken:
@@ -675,9 +687,13 @@ void Scheduler::LendPoisonedAgain(const std::string& job_id) {
   for (auto open = open_.lower_bound({job_id, 0});
        open != open_.end() && open->first.job_id == job_id; ++open) {
     Work& work = open->second;
-    for (const WorkRange& range : std::exchange(work.poisoned, {})) {
-      work.losses.erase(range);
+    for (const WorkRange& range : std::exchange(work.poisoned, {}))
       work.returned.insert(range);
+    // Failures are forgotten; how long leases may last, which follows from stalls, is kept.
+    for (auto& [range, losses] : work.losses) {
+      Losses anew;
+      anew.stalls = losses.stalls;
+      losses = std::move(anew);
     }
     UpdateLendable(open->first, work);
   }
@@ -795,8 +811,8 @@ std::optional<Scheduler::WaitingAudit> Scheduler::FindAudit(const std::string& w
   const std::string& record = workers_.at(worker_id).record;
   int looked_at = 0;
   for (const auto& [key, range] : waiting_audits_) {
-    if (++looked_at > kMostLookedAt) break;
     if (shares_.IsHeld(key.job_id)) continue;
+    if (++looked_at > kMostLookedAt) break;
     const Audit& audit = open_.at(key).audits.at(range);
     const bool is_given_up =
         !audit.is_disputed() && (now - audit.began_at() >= options_.audit_patience ||
@@ -902,7 +918,8 @@ void Scheduler::EraseLease(const std::string& lease_id, Ending ending) {
   worker.leases.erase(lease_id);
   Count(found->first, worker);
   const Lease& ended = lease->second;
-  worker.past.push_back({{lease_id, ended.pass, ended.range, ended.kind}, ending});
+  worker.past.push_back(
+      {{lease_id, ended.pass, ended.range, ended.kind}, ending, open_.at(ended.pass).opening});
   if (worker.past.size() > kMostPast) worker.past.pop_front();
   affected_.insert(found->first);
   leases_.erase(lease);

@@ -239,6 +239,7 @@ class Scheduler {
   struct PastLease {
     BatchLease lease;
     Ending ending = Ending::kDelivered;
+    std::uint64_t opening = 0;  // of its work
   };
   // A registration.
   struct Worker {
@@ -273,8 +274,9 @@ class Scheduler {
   // An open pass or round.
   struct Work {
     WorkKind kind = WorkKind::kPhotons;
-    WorkRange rest;           // not handed out yet
-    std::uint64_t total = 0;  // photons or passes
+    std::uint64_t opening = 0;  // which one it is: the same passes may be opened again
+    WorkRange rest;             // not handed out yet
+    std::uint64_t total = 0;    // photons or passes
     std::optional<SteadyTime> due;
     std::set<WorkRange> returned;                     // go out first
     std::map<WorkRange, std::set<std::string>> lent;  // -> lease ids
@@ -384,6 +386,7 @@ class Scheduler {
   std::vector<Poisoned> poisoned_ LUCERNA_GUARDED_BY(mutex_);
   WorkerRecords records_ LUCERNA_GUARDED_BY(mutex_);
   std::uint64_t next_lease_ LUCERNA_GUARDED_BY(mutex_) = 1;
+  std::uint64_t next_opening_ LUCERNA_GUARDED_BY(mutex_) = 1;
   std::uint64_t next_place_ LUCERNA_GUARDED_BY(mutex_) = 1;
 
   // What follows from the above.

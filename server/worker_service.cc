@@ -141,8 +141,15 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
     }
     LUCERNA_RETURN_IF_ERROR(transfer_->Announce(header.size_bytes()));
     // The worker sends it again later.
-    LUCERNA_ASSIGN_OR_RETURN(claim_,
-                             coordinator_.budget().Claim(MemoryUse::kCommits, header.size_bytes()));
+    StatusOr<MemoryClaim> claim =
+        coordinator_.budget().Claim(MemoryUse::kCommits, header.size_bytes());
+    // One may always come: jobs that hold all memory end only by results.
+    if (!claim.ok()) {
+      MemoryClaim one =
+          coordinator_.budget().ClaimOneAnyway(MemoryUse::kCommits, header.size_bytes());
+      if (!one.is_empty()) claim = std::move(one);
+    }
+    LUCERNA_ASSIGN_OR_RETURN(claim_, std::move(claim));
     collector_.emplace(delivery_.digest, header.size_bytes());
     return WithinMemory([this]() -> Status {
       collector_->Reserve();

@@ -31,7 +31,7 @@ TEST(HostileTextTest, NamesAreEscapedInTheLogAndOnTheTerminal) {
   ASSERT_TRUE(v1::WorkerService::NewStub(coordinator.channel())
                   ->Register(&context, worker, &registered)
                   .ok());
-  ASSERT_TRUE(coordinator.process().WaitForText("joined: x\\x1b[2J\\x0d\\x0a[info]", kPatience))
+  ASSERT_TRUE(coordinator.process().WaitForText("(x\\x1b[2J\\x0d\\x0a[info]", kPatience))
       << coordinator.process().Errors();
   v1::GoodbyeRequest goodbye;
   goodbye.set_worker_id(kEvil);

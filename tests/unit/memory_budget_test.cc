@@ -34,6 +34,21 @@ TEST(MemoryBudgetTest, HoldsWhatIsClaimedUntilTheClaimEnds) {
   EXPECT_TRUE(absl::IsResourceExhausted(budget.Claim(MemoryUse::kJobs, UINT64_MAX).status()));
 }
 
+// Jobs that hold all memory end only by results.
+TEST(MemoryBudgetTest, OneOfAKindComesEvenWhereNothingIsLeft) {
+  MemoryBudget budget(100);
+  const MemoryClaim job = budget.Claim(MemoryUse::kJobs, 95).value();
+  ASSERT_FALSE(budget.Claim(MemoryUse::kCommits, 40).ok());
+  {
+    const MemoryClaim one = budget.ClaimOneAnyway(MemoryUse::kCommits, 40);
+    EXPECT_FALSE(one.is_empty());
+    EXPECT_EQ(budget.held(), 135U);
+    EXPECT_TRUE(budget.ClaimOneAnyway(MemoryUse::kCommits, 40).is_empty());
+    EXPECT_FALSE(budget.Claim(MemoryUse::kUploads, 1).ok()) << "beyond the budget";
+  }
+  EXPECT_EQ(budget.held(), 95U);
+}
+
 TEST(MemoryBudgetTest, ARefusalNamesTheLargestHolders) {
   MemoryBudget budget(10'000'000);
   const MemoryClaim jobs = budget.Claim(MemoryUse::kJobs, 6'000'000).value();

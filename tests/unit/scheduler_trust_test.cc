@@ -294,6 +294,31 @@ TEST_F(SchedulerTrustTest, APoisonedBatchIsLentAgainWhenItIsReleased) {
   EXPECT_TRUE(scheduler_.TakePoisoned().empty()) << "counted from the beginning";
 }
 
+// Also of a batch that another worker still had when the job was paused.
+TEST_F(SchedulerTrustTest, AJobThatGoesOnBeginsItsCountOfFailuresAnew) {
+  scheduler_.OpenPass(kPass, 100);
+  const std::string lone = Join("lone");
+  for (int i = 0; i < 2; ++i)
+    Fail(lone, Ask(lone, i).value(), i);
+  scheduler_.SetHeld("job", true);
+  EXPECT_FALSE(Ask(lone, 3));
+  scheduler_.SetHeld("job", false);
+  Fail(lone, Ask(lone, 4).value(), 4);
+  EXPECT_TRUE(scheduler_.TakePoisoned().empty());
+}
+
+// The same passes with other radii: what was traced with the old ones must not count.
+TEST_F(SchedulerTrustTest, ALateResultDoesNotCountWhenItsWorkWasOpenedAnew) {
+  scheduler_.OpenPass(kPass, 100);
+  const std::string late = Join("late");
+  const BatchLease lease = Ask(late, 0).value();
+  scheduler_.Expire(At(11));
+  EXPECT_EQ(StandingOf(late, lease).value(), Standing::kExpected);
+  scheduler_.Close(kPass);
+  scheduler_.OpenPass(kPass, 100);
+  EXPECT_EQ(StandingOf(late, lease).value(), Standing::kSuperseded);
+}
+
 TEST_F(SchedulerTrustTest, TheLastWorkerIsNotLeftOutAndItsBatchIsPoisoned) {
   scheduler_.OpenPass(kPass, 100);
   const std::string lone = Join("lone");
@@ -484,6 +509,34 @@ TEST_F(SchedulerAuditTest, AThirdResultDecidesAndTheLiarIsLentNothing) {
       << "what it holds is taken from it";
   EXPECT_FALSE(Ask(liar, 7));
   EXPECT_EQ(Ask(honest, 8).value().range, held.range);
+}
+
+// A lease that had ended before the lie was found.
+TEST_F(SchedulerTrustTest, ALateResultOfAWorkerInQuarantineIsRefused) {
+  scheduler_.OpenPass(kPass, 100);
+  const std::string liar = Join("liar");
+  const BatchLease lease = Ask(liar, 0).value();
+  scheduler_.Expire(At(11));
+  ASSERT_EQ(StandingOf(liar, lease).value(), Standing::kExpected);
+  ASSERT_TRUE(scheduler_.Quarantine(RecordOf(liar).id, "it lies"));
+  EXPECT_TRUE(absl::IsFailedPrecondition(Deliver(liar, lease, 12).status()));
+}
+
+// Of a job whose turn is over, more audits may wait than are looked at.
+TEST_F(SchedulerAuditTest, AuditsOfAHeldJobDoNotHideThoseOfOthers) {
+  scheduler_.OpenPass({"a", 0}, 2000);
+  const std::string first = Join("first");
+  const std::string second = Join("second");
+  for (int i = 0; i < 20; ++i)
+    ASSERT_TRUE(Deliver(first, Ask(first, 0).value(), 0)->is_held);
+  scheduler_.SetHeld("a", true);
+  scheduler_.OpenPass({"b", 0}, 100);
+  const BatchLease lease = Ask(first, 1).value();
+  ASSERT_EQ(lease.pass.job_id, "b");
+  ASSERT_TRUE(Deliver(first, lease, 1)->is_held);
+  const auto again = Ask(second, 2);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->pass.job_id, "b");
 }
 
 TEST_F(SchedulerAuditTest, WithoutAThirdWorkerTheBatchWaitsAndSaysSo) {
