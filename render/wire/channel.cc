@@ -31,6 +31,9 @@ constexpr int kConnectMs = 20'000;
 // within a second.
 constexpr int kFirstBackoffMs = 100;
 constexpr int kLongestBackoffMs = 2'000;
+// After a failure gRPC asks for the address again before it connects, and by itself not sooner than
+// after 30 s.
+constexpr int kResolveEveryMs = 500;
 // How often certificates are looked at.
 constexpr unsigned int kRereadEveryS = 2;
 
@@ -122,6 +125,7 @@ std::shared_ptr<grpc::Channel> MakeChannel(const Endpoint& endpoint, Traffic tra
   // Despite its name the time that one attempt has.
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, kConnectMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kLongestBackoffMs);
+  arguments.SetInt(GRPC_ARG_DNS_MIN_TIME_BETWEEN_RESOLUTIONS_MS, kResolveEveryMs);
   // A proxy meant for the web would be asked for addresses of this network, loopback among them.
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   // gRPC would lead channels with the same arguments over one connection.

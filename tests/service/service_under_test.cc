@@ -140,8 +140,11 @@ void ServiceUnderTest::ShutDown() {
 std::shared_ptr<grpc::Channel> ServiceUnderTest::NewChannel() const {
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-  return grpc::CreateCustomChannel(absl::StrCat("127.0.0.1:", port_),
-                                   grpc::InsecureChannelCredentials(), arguments);
+  std::shared_ptr<grpc::Channel> channel = grpc::CreateCustomChannel(
+      absl::StrCat("127.0.0.1:", port_), grpc::InsecureChannelCredentials(), arguments);
+  // Calls of tests fail when a connection is not there; on a busy machine one attempt may not do.
+  EXPECT_TRUE(channel->WaitForConnected(DeadlineIn(std::chrono::seconds(60))));
+  return channel;
 }
 
 // Client
