@@ -162,7 +162,7 @@ StatusOr<v1::Job> LocalRuns::Run(SceneFiles& files, const SceneManifest& manifes
 StatusOr<v1::Job> LocalRuns::FollowOwn(const OutputOptions& output_options) {
   auto job =
       FollowToEnd(*connection_, job_id_, true, output_options, [this](const v1::Job& newest) {
-        // Nobody else will resume it.
+        // No other client knows of it, so that it would stay paused.
         if (newest.pause_cause() == v1::PAUSE_CAUSE_FAILED_BATCH) {
           return absl::AbortedError(newest.condition());
         }

@@ -18,11 +18,12 @@ namespace {
 constexpr std::uint64_t kYoungPasses = 16;
 // So many passes are split at once: while the last photons of one are out, workers trace the next.
 constexpr std::size_t kMostSplitPasses = 2;
-// Rounds are opened no further than so many passes for each worker, at least and at most, from the
-// oldest one that is not whole on; those that are whole meanwhile have sums that are kept.
+// Rounds are opened so many passes ahead for each worker, and at least so many in all.
 constexpr std::uint64_t kOpenPassesPerWorker = 64;
 constexpr std::uint64_t kFewestOpenPasses = 512;
+// While the oldest round is not whole, the sums of all others that are open are kept.
 constexpr std::uint64_t kMostOpenBytes = std::uint64_t{4} << 30;
+constexpr std::uint64_t kFewestOpenRounds = 4;
 constexpr std::uint64_t kBytesOfSums = 48;  // a pixel and round
 // The error is near its target when its upper end is below so many times that.
 constexpr double kNearTarget = 1.5;
@@ -65,11 +66,11 @@ bool JobRunner::MayOpenMore() const {
   if (open_rounds_.empty()) return true;
   const auto pixels = static_cast<std::uint64_t>(settings_.crop_width()) *
                       static_cast<std::uint64_t>(settings_.crop_height());
-  const std::uint64_t by_memory = kMostOpenBytes / (pixels * kBytesOfSums) * kLongestRound;
+  if (open_rounds_.size() < kFewestOpenRounds) return true;
+  if (open_rounds_.size() * pixels * kBytesOfSums > kMostOpenBytes) return false;
   const auto workers = static_cast<std::uint64_t>(hooks_.scheduler.LiveWorkers());
-  const std::uint64_t by_workers = std::max(kFewestOpenPasses, kOpenPassesPerWorker * workers);
   return next_round_ - open_rounds_.front().round.first <
-         std::max(std::min(by_memory, by_workers), 4 * kLongestRound);
+         std::max(kFewestOpenPasses, kOpenPassesPerWorker * workers);
 }
 
 std::uint64_t JobRunner::WantedPasses(const End& end) const {

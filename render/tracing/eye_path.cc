@@ -43,12 +43,17 @@ float BranchWeight(const Intersector& intersector, const LightSet& lights) {
                                        static_cast<double>(kLargestBranchWeight)));
 }
 
+// Radius of a pixel filter up to which lights are spread [pixels]. The cost grows with its square:
+// with 4 some 200 pixels count for each one near a light, with 16 a pass took four times as long.
+constexpr float kWidestSpread = 4;
+
 // Radiance above which emission that the camera sees is spread over the film. Infinite where no
-// light is so bright, and where no two pixels' filters overlap.
+// light is so bright, where no two pixels' filters overlap, and for very wide filters.
 float SpreadAbove(const Scene& scene, bool rays_find_lights, const Intersector& intersector,
                   const LightSet& lights) {
-  const bool filters_overlap = scene.filter.radius_x > 0.5F || scene.filter.radius_y > 0.5F;
-  if (!filters_overlap || !rays_find_lights || intersector.bounds().empty()) return HUGE_VALF;
+  const float radius = std::max(scene.filter.radius_x, scene.filter.radius_y);
+  const bool can_be_spread = radius > 0.5F && radius <= kWidestSpread;
+  if (!can_be_spread || !rays_find_lights || intersector.bounds().empty()) return HUGE_VALF;
   const double white = WhiteRadiance(intersector, lights);
   if (!(static_cast<double>(lights.LargestRadiance()) > white)) return HUGE_VALF;
   return static_cast<float>(white);

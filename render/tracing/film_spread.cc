@@ -93,6 +93,8 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
     float inverse_density = 0;  // 1 / Σ_s p_s(f)
   };
   std::vector<Path> paths;
+  paths.reserve(static_cast<std::size_t>(around.x1 - around.x0) *
+                static_cast<std::size_t>(around.y1 - around.y0));
   bool is_dark = true;
   for (int y = around.y0; y < around.y1; ++y) {
     for (int x = around.x0; x < around.x1; ++x) {

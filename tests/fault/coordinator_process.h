@@ -88,4 +88,8 @@ class CoordinatorProcess {
   std::shared_ptr<grpc::Channel> channel_;
 };
 
+// Of the image of such a job in which nothing fails, with one worker. Rendered once a process.
+// Threads: one.
+[[nodiscard]] Digest UnfaultedDigest(const std::string& scene, int passes, std::int64_t photons);
+
 }  // namespace lucerna

@@ -26,17 +26,6 @@ constexpr std::int64_t kPhotons = 400'000;
 constexpr std::uint64_t kAllPhotons = kPasses * static_cast<std::uint64_t>(kPhotons);
 const char* const kScene = "glass-box.pbrt";
 
-Digest UnfaultedDigest() {
-  static const Digest digest = [] {
-    CoordinatorProcess coordinator;
-    const auto worker = coordinator.StartWorker();
-    const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
-    EXPECT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
-    return coordinator.ImageDigest(job);
-  }();
-  return digest;
-}
-
 std::vector<v1::Worker> WorkersOf(CoordinatorProcess& coordinator) {
   grpc::ClientContext context;
   v1::ListWorkersResponse response;
@@ -71,7 +60,7 @@ void ExpectUnfaulted(CoordinatorProcess& coordinator, const std::string& job) {
   const v1::Job ended = coordinator.Wait(job);
   ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
   EXPECT_EQ(ended.progress().tally().photons(), kAllPhotons) << "each photon once";
-  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest().Hex());
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest(kScene, kPasses, kPhotons).Hex());
 }
 
 class KilledAtCommitTest : public testing::TestWithParam<const char*> {};

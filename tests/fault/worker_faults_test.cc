@@ -29,17 +29,6 @@ constexpr std::int64_t kPhotons = 400'000;
 const char* const kScene = "glass-box.pbrt";
 const std::vector<std::string> kSmallBatches = {"--batch-photons", "50000"};
 
-Digest UnfaultedDigest() {
-  static const Digest digest = [] {
-    CoordinatorProcess coordinator;
-    const auto worker = coordinator.StartWorker();
-    const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
-    EXPECT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
-    return coordinator.ImageDigest(job);
-  }();
-  return digest;
-}
-
 // Waits until the job has merged so many photons; false when it ended or a minute passed.
 bool WaitForPhotons(CoordinatorProcess& coordinator, const std::string& job,
                     std::uint64_t photons) {
@@ -67,7 +56,7 @@ TEST_P(KilledWorkerTest, IsReplacedAndTheImageIsTheSame) {
   ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
   EXPECT_EQ(ended.progress().tally().photons(), static_cast<std::uint64_t>(kPasses * kPhotons))
       << "each photon once";
-  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest().Hex());
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest(kScene, kPasses, kPhotons).Hex());
 }
 
 INSTANTIATE_TEST_SUITE_P(AtSeveralMoments, KilledWorkerTest, testing::Values(0, 3, 7));
@@ -97,7 +86,7 @@ TEST(WorkerFaultsTest, AWorkerThatIsTerminatedLeavesBeforeItsLeaseEndsAndItsBatc
   EXPECT_TRUE(coordinator.process().WaitForText("left", kPatience));
   const auto other = coordinator.StartWorker();
   ASSERT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest().Hex());
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest(kScene, kPasses, kPhotons).Hex());
 }
 
 TEST(WorkerFaultsTest, AnIdleWorkerLeavesSoon) {
@@ -183,7 +172,7 @@ TEST(WorkerFaultsTest, ACommitWithoutALeaseIsRefusedAndChangesNothing) {
 
   const auto worker = coordinator.StartWorker();
   ASSERT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest().Hex());
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest(kScene, kPasses, kPhotons).Hex());
 }
 
 }  // namespace

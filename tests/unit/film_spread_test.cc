@@ -183,13 +183,18 @@ TEST(FilmSpreadTest, GivesACropWindowWhatTheWholeImageHas) {
   }
 }
 
-TEST(FilmSpreadTest, IsNotNeededWhereFiltersDoNotOverlap) {
-  const Scene scene = SceneWithLight({5.6, 7.1, 6.0, 7.3}, Filter(PixelFilter::Kind::kBox, 0.5F));
-  const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
-  const auto intersector = Intersector::Create(scene).value();
-  const LightSet lights(scene, *intersector);
-  const EyePathTracer tracer(scene, settings, NeedsOf(scene, settings), *intersector, lights);
-  EXPECT_FALSE(FilmSpread(tracer).is_needed());
+TEST(FilmSpreadTest, IsNotNeededWhereFiltersDoNotOverlapAndTooDearWhereTheyAreVeryWide) {
+  const auto is_needed = [](const PixelFilter& filter) {
+    const Scene scene = SceneWithLight({5.6, 7.1, 6.0, 7.3}, filter);
+    const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
+    const auto intersector = Intersector::Create(scene).value();
+    const LightSet lights(scene, *intersector);
+    const EyePathTracer tracer(scene, settings, NeedsOf(scene, settings), *intersector, lights);
+    return FilmSpread(tracer).is_needed();
+  };
+  EXPECT_FALSE(is_needed(Filter(PixelFilter::Kind::kBox, 0.5F)));
+  EXPECT_TRUE(is_needed(Filter(PixelFilter::Kind::kTriangle, 4)));
+  EXPECT_FALSE(is_needed(Filter(PixelFilter::Kind::kTriangle, 5)));
 }
 
 }  // namespace
