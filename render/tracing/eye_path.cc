@@ -48,11 +48,11 @@ float BranchWeight(const Intersector& intersector, const LightSet& lights) {
 constexpr float kWidestSpread = 4;
 
 // Radiance above which emission that the camera sees is spread over the film. Infinite where no
-// light is so bright, where no two pixels' filters overlap, and for very wide filters.
+// light is so bright, and for very wide filters.
 float SpreadAbove(const Scene& scene, bool rays_find_lights, const Intersector& intersector,
                   const LightSet& lights) {
   const float radius = std::max(scene.filter.radius_x, scene.filter.radius_y);
-  const bool can_be_spread = radius > 0.5F && radius <= kWidestSpread;
+  const bool can_be_spread = radius <= kWidestSpread;
   if (!can_be_spread || !rays_find_lights || intersector.bounds().empty()) return HUGE_VALF;
   const double white = WhiteRadiance(intersector, lights);
   if (!(static_cast<double>(lights.LargestRadiance()) > white)) return HUGE_VALF;
@@ -78,6 +78,8 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       lights_(lights),
       filter_x_(scene.filter, scene.filter.radius_x),
       filter_y_(scene.filter, scene.filter.radius_y) {
+  // Readers let only invertible transforms pass.
+  world_to_camera_ = scene.camera.camera_to_world.Inverse().value_or(Transform());
   const Window window = ScreenWindow(scene.camera, settings.width, settings.height);
   window_low_x_ = window.low_x;
   window_high_y_ = window.high_y;
@@ -128,10 +130,7 @@ Rgb EyePathTracer::BrightPart(Rgb emitted) const {
   return strength > white_ ? emitted * (1 - white_ / strength) : Rgb{};
 }
 
-Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
-  const PixelSampler sampler = SamplerOf(x, y, pass);
-  float filter_weight = 1;
-  const Ray ray = CameraRay(sampler, x, y, filter_weight);
+Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng) const {
   Hit hit;
   if (!FindFirst(ray, {}, hit)) return BrightPart(lights_.InfiniteRadiance(ray.direction));
   const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
@@ -139,7 +138,43 @@ Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
   int rays = 0;
   // Black unless the surface is smooth.
   return BrightPart(lights_.EmittedRadiance(surface, wo)) +
-         BrightPart(EmissionThrough(surface, wo, sampler.ForBranches(), rays));
+         BrightPart(EmissionThrough(surface, wo, rng, rays));
+}
+
+Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
+  const PixelSampler sampler = SamplerOf(x, y, pass);
+  float filter_weight = 1;
+  const Ray ray = CameraRay(sampler, x, y, filter_weight);
+  return BrightOf(ray, sampler.ForBranches());
+}
+
+EyePathTracer::BrightPath EyePathTracer::TraceBrightPath(int x, int y, std::uint64_t pass,
+                                                         int number, int count) const {
+  const BrightSample sample = SamplerOf(x, y, pass).ForBright(number, count);
+  float filter_weight = 1;
+  BrightPath path;
+  path.x = filter_x_.Sample(sample.camera[0], filter_weight);
+  path.y = filter_y_.Sample(sample.camera[1], filter_weight);
+  const Ray ray = CameraRayThrough(settings_.crop_x0 + x + 0.5 + static_cast<double>(path.x),
+                                   settings_.crop_y0 + y + 0.5 + static_cast<double>(path.y),
+                                   sample.camera[2], sample.camera[3]);
+  path.bright = BrightOf(ray, sample.branches);
+  return path;
+}
+
+std::optional<EyePathTracer::FilmPoint> EyePathTracer::OnFilm(Vec3 point) const {
+  const Vec3 p = world_to_camera_.Point(point);
+  if (!(p.z > 0)) return std::nullopt;
+  const auto z = static_cast<double>(p.z);
+  FilmPoint film;
+  film.x = (static_cast<double>(p.x) / z - window_low_x_) / pixel_width_;
+  film.y = (window_high_y_ - static_cast<double>(p.y) / z) / pixel_height_;
+  const double per_tangent = 1 / std::min(pixel_width_, pixel_height_);
+  film.pixels_per_length = per_tangent / z;
+  const Camera& camera = scene_.camera;
+  film.blur = camera.lens_radius * std::abs(1 / z - 1 / camera.focal_distance) * per_tangent;
+  if (!std::isfinite(film.x) || !std::isfinite(film.y)) return std::nullopt;
+  return film;
 }
 
 Rgb EyePathTracer::BrightAtCentre(int x, int y) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "render/analysis/needs.h"
 #include "render/geometry/intersector.h"
@@ -65,6 +66,14 @@ class EyePathTracer {
 
   // EyePath::bright alone, also of pixels outside the crop window.
   [[nodiscard]] Rgb TraceBright(int x, int y, std::uint64_t pass) const;
+  // One of `count` paths of a pixel and pass that are traced for their bright part alone, and
+  // where each begins, from the pixel's centre [pixels].
+  struct BrightPath {
+    Rgb bright;
+    float x = 0, y = 0;
+  };
+  [[nodiscard]] BrightPath TraceBrightPath(int x, int y, std::uint64_t pass, int number,
+                                           int count) const;
   // What EyePath::bright would be of a light straight ahead of the pixel's centre. The same in
   // every pass.
   [[nodiscard]] Rgb BrightAtCentre(int x, int y) const;
@@ -75,6 +84,16 @@ class EyePathTracer {
   [[nodiscard]] FilmOffset FilmOffsetOf(int x, int y, std::uint64_t pass) const;
   // Whether EyePath::bright can be anything but black.
   [[nodiscard]] bool MeetsBright() const { return white_ < HUGE_VALF; }
+  [[nodiscard]] bool IsBright(Rgb emitted) const { return MaxChannel(emitted) > white_; }
+  // Where the middle of the lens sees a point, in pixels of the whole image; absent for points that
+  // are not in front of the camera.
+  struct FilmPoint {
+    double x = 0, y = 0;
+    double blur = 0;               // half the width of what the lens makes of the point [pixels]
+    double pixels_per_length = 0;  // of something at the point that faces the camera
+  };
+  [[nodiscard]] std::optional<FilmPoint> OnFilm(Vec3 point) const;
+  [[nodiscard]] const Scene& scene() const { return scene_; }
   [[nodiscard]] const FilterSampler& filter_x() const { return filter_x_; }
   [[nodiscard]] const FilterSampler& filter_y() const { return filter_y_; }
 
@@ -83,6 +102,8 @@ class EyePathTracer {
  private:
   [[nodiscard]] PixelSampler SamplerOf(int x, int y, std::uint64_t pass) const;
   [[nodiscard]] Ray CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const;
+  // The bright part of what the camera's ray meets; `rng` for branches of smooth surfaces.
+  [[nodiscard]] Rgb BrightOf(const Ray& ray, KeyedRng rng) const;
   // Through a point of the film [pixels of the image] and one of the lens.
   [[nodiscard]] Ray CameraRayThrough(double film_x, double film_y, float lens_u,
                                      float lens_v) const;
@@ -120,6 +141,7 @@ class EyePathTracer {
   const Intersector& intersector_;
   const LightSet& lights_;
   FilterSampler filter_x_, filter_y_;
+  Transform world_to_camera_;
   double window_low_x_, window_high_y_;  // of the whole image on the plane z = 1
   double pixel_width_, pixel_height_;    // on that plane
 };

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
+
+#include "render/tracing/bright_outlines.h"
 
 namespace lucerna {
 namespace {
@@ -36,28 +39,64 @@ FilmSpread::FilmSpread(const EyePathTracer& tracer)
               tracer.settings().width - tracer.settings().crop_x0,
               tracer.settings().height - tracer.settings().crop_y0}) {}
 
-void FilmSpread::FindCentres(ThreadTeam& team) {
-  if (centres_are_known_) return;
-  centres_are_known_ = true;
-  centres_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-  team.For(static_cast<std::size_t>(height_), 4, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t y = begin; y < end; ++y) {
-      for (int x = 0; x < width_; ++x) {
-        centres_[y * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)] =
-            tracer_.BrightAtCentre(x, static_cast<int>(y));
-      }
+void FilmSpread::Prepare(ThreadTeam& team) {
+  if (is_prepared_) return;
+  is_prepared_ = true;
+  // One more on each side: an outline lies between two centres that differ.
+  around_ = {std::max(-reach_x_ - 1, image_.x0), std::max(-reach_y_ - 1, image_.y0),
+             std::min(width_ + reach_x_ + 1, image_.x1),
+             std::min(height_ + reach_y_ + 1, image_.y1)};
+  const auto columns = static_cast<std::size_t>(around_.x1 - around_.x0);
+  const auto rows = static_cast<std::size_t>(around_.y1 - around_.y0);
+  centres_.resize(columns * rows);
+  team.For(rows, 4, [&](std::size_t begin, std::size_t end) {
+    for (int y = around_.y0 + static_cast<int>(begin); y < around_.y0 + static_cast<int>(end);
+         ++y) {
+      for (int x = around_.x0; x < around_.x1; ++x)
+        centres_[IndexOf(x, y)] = tracer_.BrightAtCentre(x, y);
     }
   });
-  if (std::ranges::all_of(centres_, [](const Rgb& c) { return IsBlack(c); })) {
-    centres_.clear();
-    centres_.shrink_to_fit();
+
+  const BrightOutlines outlines = FindBrightOutlines(tracer_);
+  const double pixels = static_cast<double>(tracer_.settings().width) *
+                        static_cast<double>(tracer_.settings().height);
+  const double affordable = outlines.count > 0 ? pixels / (2 * static_cast<double>(outlines.count))
+                                               : static_cast<double>(kMostBrightPaths);
+  bright_paths_ = static_cast<int>(std::min<double>(affordable, kMostBrightPaths));
+  if (bright_paths_ >= 2) {
+    is_near_outline_.resize(columns * rows);
+    bool is_any_near = false;
+    for (int y = around_.y0; y < around_.y1; ++y) {
+      for (int x = around_.x0; x < around_.x1; ++x) {
+        bool is_near = false;
+        if (!outlines.is_near.empty()) {
+          is_near = outlines.is_near[static_cast<std::size_t>(y - image_.y0) *
+                                         static_cast<std::size_t>(image_.x1 - image_.x0) +
+                                     static_cast<std::size_t>(x - image_.x0)] != 0;
+        }
+        const Rgb& centre = centres_[IndexOf(x, y)];
+        for (int ny = std::max(y - 1, around_.y0); ny < std::min(y + 2, around_.y1); ++ny) {
+          for (int nx = std::max(x - 1, around_.x0); nx < std::min(x + 2, around_.x1); ++nx)
+            is_near = is_near || centres_[IndexOf(nx, ny)] != centre;
+        }
+        is_near_outline_[IndexOf(x, y)] = is_near ? 1 : 0;
+        is_any_near = is_any_near || is_near;
+      }
+    }
+    if (!is_any_near) is_near_outline_ = {};
   }
+  if (std::ranges::all_of(centres_, [](const Rgb& c) { return IsBlack(c); })) centres_ = {};
+}
+
+int FilmSpread::BrightPathsOf(int x, int y) const {
+  if (is_near_outline_.empty()) return 0;
+  return is_near_outline_[IndexOf(x, y)] != 0 ? bright_paths_ : 0;
 }
 
 void FilmSpread::Add(std::uint64_t pass, const std::vector<Rgb>& bright, std::vector<Rgb>& direct,
                      ThreadTeam& team) {
   if (!is_needed()) return;
-  FindCentres(team);
+  Prepare(team);
   const int tiles_x = (width_ + kTile - 1) / kTile;
   const int tiles_y = (height_ + kTile - 1) / kTile;
   team.For(static_cast<std::size_t>(tiles_x) * static_cast<std::size_t>(tiles_y), 4,
@@ -81,7 +120,7 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
     return x >= 0 && x < width_ && y >= 0 && y < height_;
   };
   const auto centre_at = [&](int x, int y) {
-    return centres_.empty() ? Rgb{} : centres_[pixel_at(x, y)];
+    return centres_.empty() ? Rgb{} : centres_[IndexOf(x, y)];
   };
   // The pixels whose paths count in the tile.
   const Window around = {
@@ -90,34 +129,59 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
   struct Path {
     Rgb bright;
     float x = 0, y = 0;         // from the centre of its pixel
-    float inverse_density = 0;  // 1 / Σ_s p_s(f)
+    float inverse_density = 0;  // 1 / Σ_s p_s(f), over the paths of its pixel
   };
   std::vector<Path> paths;
-  paths.reserve(static_cast<std::size_t>(around.x1 - around.x0) *
-                static_cast<std::size_t>(around.y1 - around.y0));
+  // [pixels around + 1] of the first path of each, row by row.
+  std::vector<std::size_t> first_path;
+  const auto pixels_around = static_cast<std::size_t>(around.x1 - around.x0) *
+                             static_cast<std::size_t>(around.y1 - around.y0);
+  paths.reserve(pixels_around);
+  first_path.reserve(pixels_around + 1);
   bool is_dark = true;
   for (int y = around.y0; y < around.y1; ++y) {
     for (int x = around.x0; x < around.x1; ++x) {
+      first_path.push_back(paths.size());
+      if (const int count = BrightPathsOf(x, y); count > 0) {
+        for (int number = 0; number < count; ++number) {
+          const EyePathTracer::BrightPath path = tracer_.TraceBrightPath(x, y, pass, number, count);
+          is_dark = is_dark && IsBlack(path.bright);
+          paths.push_back({.bright = path.bright, .x = path.x, .y = path.y});
+        }
+        continue;
+      }
       const Rgb found = is_in_crop(x, y) ? bright[pixel_at(x, y)] : tracer_.TraceBright(x, y, pass);
       is_dark = is_dark && IsBlack(found);
       paths.push_back({.bright = found});
     }
   }
+  first_path.push_back(paths.size());
   for (int y = tile.y0; is_dark && y < tile.y1; ++y) {
     for (int x = tile.x0; is_dark && x < tile.x1; ++x)
       is_dark = IsBlack(centre_at(x, y));
   }
   if (is_dark) return;
 
-  auto path = paths.begin();
+  const auto paths_of = [&](int x, int y) {
+    const std::size_t pixel =
+        static_cast<std::size_t>(y - around.y0) * static_cast<std::size_t>(around.x1 - around.x0) +
+        static_cast<std::size_t>(x - around.x0);
+    return std::span(paths).subspan(first_path[pixel], first_path[pixel + 1] - first_path[pixel]);
+  };
   for (int y = around.y0; y < around.y1; ++y) {
-    for (int x = around.x0; x < around.x1; ++x, ++path) {
-      const EyePathTracer::FilmOffset offset = tracer_.FilmOffsetOf(x, y, pass);
-      path->x = offset.x;
-      path->y = offset.y;
-      const float density = DensityOfAll(tracer_.filter_x(), offset.x, x, image_.x0, image_.x1) *
-                            DensityOfAll(tracer_.filter_y(), offset.y, y, image_.y0, image_.y1);
-      path->inverse_density = density > 0 ? 1 / density : 0;
+    for (int x = around.x0; x < around.x1; ++x) {
+      const std::span<Path> of_pixel = paths_of(x, y);
+      if (BrightPathsOf(x, y) == 0) {
+        const EyePathTracer::FilmOffset offset = tracer_.FilmOffsetOf(x, y, pass);
+        of_pixel[0].x = offset.x;
+        of_pixel[0].y = offset.y;
+      }
+      for (Path& path : of_pixel) {
+        const float density = DensityOfAll(tracer_.filter_x(), path.x, x, image_.x0, image_.x1) *
+                              DensityOfAll(tracer_.filter_y(), path.y, y, image_.y0, image_.y1) *
+                              static_cast<float>(of_pixel.size());
+        path.inverse_density = density > 0 ? 1 / density : 0;
+      }
     }
   }
   for (int y = tile.y0; y < tile.y1; ++y) {
@@ -128,15 +192,14 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
            ++qy) {
         for (int qx = std::max(x - reach_x_, around.x0); qx < std::min(x + reach_x_ + 1, around.x1);
              ++qx) {
-          const Path& of_q = paths[static_cast<std::size_t>(qy - around.y0) *
-                                       static_cast<std::size_t>(around.x1 - around.x0) +
-                                   static_cast<std::size_t>(qx - around.x0)];
-          const Rgb excess = of_q.bright - centre;
-          if (IsBlack(excess)) continue;
-          const float weight = tracer_.filter_x().At(of_q.x + static_cast<float>(qx - x)).filter *
-                               tracer_.filter_y().At(of_q.y + static_cast<float>(qy - y)).filter *
-                               of_q.inverse_density;
-          sum += excess * weight;
+          for (const Path& of_q : paths_of(qx, qy)) {
+            const Rgb excess = of_q.bright - centre;
+            if (IsBlack(excess)) continue;
+            const float weight = tracer_.filter_x().At(of_q.x + static_cast<float>(qx - x)).filter *
+                                 tracer_.filter_y().At(of_q.y + static_cast<float>(qy - y)).filter *
+                                 of_q.inverse_density;
+            sum += excess * weight;
+          }
         }
       }
       direct[pixel_at(x, y)] += sum;

@@ -11,10 +11,16 @@
 //
 //   I_p = c_p + Σ_q (L(f_q) - c_p) h_p(f_q) / Σ_s p_s(f_q)
 //
+// Where the outline of such a light is near, a path meets it or does not, and one path a pass would
+// leave a pixel that has a thousandth of the light black in most passes. There
+// kMostBrightPaths paths a pixel are traced for the bright part alone, in place of the pixel's own
+// path, each with as much less weight.
+//
 // Only what is brighter than the image's white is treated so (EyePath::bright): a sky gains
 // nothing.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -23,6 +29,9 @@
 #include "render/tracing/eye_path.h"
 
 namespace lucerna {
+
+// As many where outlines are in few pixels: all together are at most half as many as pixels.
+inline constexpr int kMostBrightPaths = 16;
 
 class FilmSpread {
  public:
@@ -44,14 +53,27 @@ class FilmSpread {
   };
   void AddTile(std::uint64_t pass, const Window& tile, const std::vector<Rgb>& bright,
                std::vector<Rgb>& direct) const;
-  void FindCentres(ThreadTeam& team);
+  // Of a pixel in `around_`, for the columns below.
+  [[nodiscard]] std::size_t IndexOf(int x, int y) const {
+    return static_cast<std::size_t>(y - around_.y0) *
+               static_cast<std::size_t>(around_.x1 - around_.x0) +
+           static_cast<std::size_t>(x - around_.x0);
+  }
+  // Finds what does not change between passes.
+  void Prepare(ThreadTeam& team);
+  // Paths a pass that are traced for the bright part alone; 0: the pixel's own path counts.
+  [[nodiscard]] int BrightPathsOf(int x, int y) const;
 
   const EyePathTracer& tracer_;
   const int width_, height_;     // of the crop window
   const int reach_x_, reach_y_;  // how far a pixel may be whose paths count [pixels]
   const Window image_;           // in the crop window's coordinates
-  bool centres_are_known_ = false;
-  std::vector<Rgb> centres_;  // [pixels], or empty: all black
+  bool is_prepared_ = false;
+  // The crop window and the pixels around it whose paths count.
+  Window around_;
+  std::vector<Rgb> centres_;                   // [around], or empty: all black
+  std::vector<std::uint8_t> is_near_outline_;  // [around], or empty: none is
+  int bright_paths_ = 0;                       // near an outline
 };
 
 }  // namespace lucerna

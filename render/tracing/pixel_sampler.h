@@ -15,6 +15,12 @@
 
 namespace lucerna {
 
+// The random numbers of a path that is traced for the bright lights that it meets alone.
+struct BrightSample {
+  SobolPoint camera;  // as PixelSampler::ForCamera
+  KeyedRng branches;  // as PixelSampler::ForBranches
+};
+
 class PixelSampler {
  public:
   // Vertices beyond this use independent numbers.
@@ -28,6 +34,16 @@ class PixelSampler {
 
   // Film position (0, 1) and lens position (2, 3).
   [[nodiscard]] SobolPoint ForCamera() const { return OwenSobol(eye_set_, key_); }
+
+  // Of path `number` of `count` in this pass. Stratified over all passes: no two of them share a
+  // place on the film, as sets of eye paths do.
+  [[nodiscard]] BrightSample ForBright(int number, int count) const {
+    constexpr std::uint64_t kBrightKey = 0x4252494748545321ULL;
+    const std::uint64_t key = CombineKeys(key_, kBrightKey);
+    const std::uint64_t index =
+        pass_ * static_cast<std::uint64_t>(count) + static_cast<std::uint64_t>(number);
+    return {OwenSobol(index, key), KeyedRng(CombineKeys(~key, index))};
+  }
 
   // For the path's vertex number `vertex`: scattering (0 lobe, 1, 2), light (3 choice, 4, 5),
   // roulette (6), the finer part of the light's choice (7).
