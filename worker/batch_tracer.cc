@@ -45,6 +45,14 @@ Status CheckBlock(const HitpointBlock& block, const RadiusColumn& radii, const S
       return absl::InvalidArgumentError("a hitpoint's radius is not a positive number");
     }
   }
+  if (!block.segments.empty() && !needs.Uses(Part::kMedia)) {
+    return absl::InvalidArgumentError("there are segments in media, but the job needs none");
+  }
+  for (const MediumSegment& segment : block.segments) {
+    if (segment.medium >= scene.media.size()) {
+      return absl::InvalidArgumentError("a segment names a medium that is not there");
+    }
+  }
   std::int64_t previous = -1;
   for (const GlossyHitpoint& glossy : block.glossy) {
     if (glossy.hitpoint >= block.size() || static_cast<std::int64_t>(glossy.hitpoint) <= previous ||
@@ -59,11 +67,25 @@ Status CheckBlock(const HitpointBlock& block, const RadiusColumn& radii, const S
 // The box in which a photon can be found by some hitpoint.
 Bounds RegionOf(const HitpointBlock& block, const RadiusColumn& radii, float radii_reach) {
   Bounds region;
-  for (std::size_t row = 0; row < block.size(); ++row) {
+  for (std::size_t row = 0; row < block.first_segment(); ++row) {
     const float r = radii_reach * radii[row];
     const Vec3 reach = {r, r, r};
     region.Add(block.positions[row] - reach);
     region.Add(block.positions[row] + reach);
+  }
+  return region;
+}
+
+// The box in which a photon that a medium scattered can be found by some segment.
+Bounds MediaRegionOf(const HitpointBlock& block, const RadiusColumn& radii) {
+  Bounds region;
+  for (std::size_t i = 0; i < block.segments.size(); ++i) {
+    const std::size_t row = block.first_segment() + i;
+    const Vec3 reach = {radii[row], radii[row], radii[row]};
+    for (const Vec3 end : {block.positions[row], block.segments[i].end}) {
+      region.Add(end - reach);
+      region.Add(end + reach);
+    }
   }
   return region;
 }
@@ -145,7 +167,7 @@ std::vector<LightTally> TallyLights(
   }
   // [photons of the part × classes] whether the photon has been counted.
   std::vector<bool> is_counted(kPathClasses << DepositSource::kNumberBits);
-  const auto count = [&](const PhotonGrid& grid, std::span<const std::uint8_t> was_found) {
+  const auto count = [&](const auto& grid, std::span<const std::uint8_t> was_found) {
     for (std::size_t i = 0; i < was_found.size(); ++i) {
       if (was_found[i] == 0) continue;
       const DepositSource source = grid.source(i);
@@ -158,6 +180,7 @@ std::vector<LightTally> TallyLights(
   };
   count(photons.grid, photons.was_found);
   if (photons.caustics != nullptr) count(*photons.caustics, photons.caustic_was_found);
+  if (photons.scattered != nullptr) count(*photons.scattered, photons.scattered_was_found);
   while (!lights.empty() && lights.back().sent == 0)
     lights.pop_back();
   return lights;
@@ -230,9 +253,10 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
   LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(needs));
   const PreparedScene& prepared = state_->prepared;
   const Bounds region = RegionOf(block, radii, ReachOf(evidence));
-  const std::size_t first_caustic = block.size() - block.caustic_rows;
+  const Bounds media_region = MediaRegionOf(block, radii);
+  const std::size_t first_caustic = block.first_caustic();
   const float cell = CellWidth(std::span(radii).first(first_caustic));
-  const float caustic_cell = CellWidth(std::span(radii).subspan(first_caustic));
+  const float caustic_cell = CellWidth(std::span(radii).subspan(first_caustic, block.caustic_rows));
   const CausticWeight caustic_weight(prepared.scene(), settings, prepared.intersector().bounds());
   if (evidence == Evidence::kFrequency &&
       (state_->spectra == nullptr || !state_->spectra->Suits(settings))) {
@@ -243,7 +267,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
   const SpectrumTracer* spectra =
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
-                                settings, needs, spectra, region, photons_per_pass);
+                                settings, needs, spectra, region, photons_per_pass, media_region);
   const std::uint64_t per_chunk =
       std::clamp(kMostDepositsPerChunk / static_cast<std::uint64_t>(settings.max_depth),
                  std::uint64_t{1}, kPhotonsPerChunk);
@@ -254,6 +278,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     const std::uint64_t part_end = std::min(last, part + kPhotonsPerPart);
     std::vector<Deposits> deposits;
     std::vector<Deposits> caustics;
+    std::vector<Deposits> scattered;
     std::vector<BatchTally> tallies;
     std::vector<std::vector<std::uint64_t>> dropped;
     std::vector<std::array<std::uint64_t, kMaxLightGroups>> sent;
@@ -264,6 +289,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
       const auto chunks = static_cast<std::size_t>((round_end - next + per_chunk - 1) / per_chunk);
       deposits.resize(before + chunks);
       caustics.resize(before + chunks);
+      scattered.resize(before + chunks);
       tallies.resize(before + chunks);
       dropped.resize(before + chunks);
       sent.resize(before + chunks);
@@ -281,13 +307,15 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
           tally.photons = chunk_last - chunk_first;
           tally.rays = landed.rays;
           tally.dropped = landed.dropped;
-          tally.deposits = landed.deposits.size() + landed.caustics.size();
+          tally.deposits =
+              landed.deposits.size() + landed.caustics.size() + landed.scattered.size();
           tally.excess = landed.excess;
           tally.energy = landed.energy;
           dropped[before + chunk] = std::move(landed.dropped_photons);
           sent[before + chunk] = landed.sent;
           deposits[before + chunk] = std::move(landed.deposits);
           caustics[before + chunk] = std::move(landed.caustics);
+          scattered[before + chunk] = std::move(landed.scattered);
         }
       });
       for (std::size_t chunk = before; chunk < tallies.size(); ++chunk)
@@ -307,6 +335,15 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
       photons.caustics = &*caustic_grid;
       photons.caustic_was_found = caustic_was_found;
       photons.caustic_weight = &caustic_weight;
+    }
+    std::optional<PhotonTree> tree;
+    std::vector<std::uint8_t> scattered_was_found;
+    if (!block.segments.empty()) {
+      tree.emplace(scattered, state_->team);
+      scattered_was_found.resize(tree->size());
+      photons.scattered = &*tree;
+      photons.scattered_was_found = scattered_was_found;
+      photons.media = &prepared.scene().media;
     }
     Accumulation accumulation =
         Gather(block, radii, photons, prepared.scene().materials, Kernel{settings.kernel},

@@ -11,6 +11,8 @@
 #include "render/math/rng.h"
 #include "render/transport/bsdf.h"
 #include "worker/cut_disc.h"
+#include "worker/gather_piece.h"
+#include "worker/gather_segments.h"
 
 namespace lucerna {
 namespace {
@@ -29,25 +31,6 @@ bool IsOnSurface(Vec3 photon_normal, Vec3 normal, Vec3 to_photon, float squared_
   const float bend = cosine >= kSameSurfaceCosine ? 2 * std::max(0.0F, 1 - cosine) : 0;
   const float twice_height = Dot(to_photon, normal) + Dot(to_photon, photon_normal);
   return twice_height * twice_height <= (bend + kMostStep * kMostStep) * squared_reach;
-}
-
-constexpr std::size_t kRowsPerPiece = 2048;
-
-struct Piece {
-  std::vector<std::uint32_t> hitpoints;
-  std::vector<std::uint32_t> counts;
-  std::array<std::vector<std::int64_t>, 3> flux;
-  std::vector<std::vector<std::int64_t>> evidence;
-  std::uint64_t pairs = 0;
-  std::uint64_t excess = 0;
-};
-
-// 64 random bits that belong to a (photon, hitpoint) pair.
-std::uint64_t PairBits(std::uint32_t photon_key, std::uint32_t hitpoint) {
-  std::uint64_t x =
-      (static_cast<std::uint64_t>(photon_key) << 32 | hitpoint) * 0x9E3779B97F4A7C15ULL;
-  x = (x ^ (x >> 32)) * 0xD6E8FEB86659FD93ULL;
-  return x ^ (x >> 32);
 }
 
 // What a photon that counts adds to the columns of its radius controller, one class for
@@ -179,7 +162,8 @@ constexpr float kLargestCutContribution = 8 * kLargestContribution;
 template <typename GatherKernel, Evidence kEvidence, bool kNormals, bool kCut>
 void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
                const GlossyHitpoint* glossy, const std::vector<Material>& materials,
-               const FluxScale& scale, const RowSource& source, const CutDisc* cut, Piece& piece) {
+               const FluxScale& scale, const RowSource& source, const CutDisc* cut,
+               GatherPiece& piece) {
   const PhotonGrid& grid = source.grid;
   const auto hitpoint = static_cast<std::uint32_t>(row);
   const Vec3 position = block.positions[row];
@@ -217,10 +201,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
     }
     const float whole = shape(squared);
     const std::uint64_t bits = PairBits(photon.key, hitpoint);
-    constexpr std::uint64_t kMask = (1U << 21) - 1;
-    const auto dither = [&](int channel) {
-      return static_cast<std::uint32_t>((bits >> (21 * channel)) & kMask);
-    };
+    const auto dither = [&](int channel) { return DitherOf(bits, channel); };
     if constexpr (kCut) {
       const auto held = [](float value, float least) {
         return std::clamp(value, least, kLargestCutContribution);
@@ -319,16 +300,16 @@ template <typename GatherKernel, Evidence kEvidence, bool kNormals>
 Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
                        const GatheredPhotons& photons, const std::vector<Material>& materials,
                        const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
-  const std::size_t rows = block.size();
-  const std::size_t first_caustic = rows - block.caustic_rows;
+  const std::size_t rows = block.first_segment();
+  const std::size_t first_caustic = block.first_caustic();
   const RowSource ordinary = {photons.grid, nullptr, photons.was_found};
   const RowSource caustic = {photons.caustics != nullptr ? *photons.caustics : photons.grid,
                              photons.caustic_weight, photons.caustic_was_found};
   const std::size_t piece_count = (rows + kRowsPerPiece - 1) / kRowsPerPiece;
-  std::vector<Piece> pieces(piece_count);
+  std::vector<GatherPiece> pieces(piece_count);
   team.For(piece_count, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
-      Piece& piece = pieces[p];
+      GatherPiece& piece = pieces[p];
       piece.evidence.resize(EvidenceColumns(kEvidence));
       const std::size_t first = p * kRowsPerPiece;
       const std::size_t last = std::min(rows, first + kRowsPerPiece);
@@ -361,16 +342,23 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
     }
   });
 
+  if (photons.scattered != nullptr) {
+    for (GatherPiece& piece : GatherSegments<GatherKernel>(
+             block, radii, *photons.scattered, photons.scattered_was_found, *photons.media, scale,
+             EvidenceColumns(kEvidence), team, stop))
+      pieces.push_back(std::move(piece));
+  }
+
   Accumulation accumulation;
   std::size_t touched = 0;
-  for (const Piece& piece : pieces)
+  for (const GatherPiece& piece : pieces)
     touched += piece.hitpoints.size();
   const auto append = [touched](auto& to, const auto& from) {
     to.reserve(touched);
     to.insert(to.end(), from.begin(), from.end());
   };
   accumulation.evidence.resize(EvidenceColumns(kEvidence));
-  for (const Piece& piece : pieces) {
+  for (const GatherPiece& piece : pieces) {
     append(accumulation.hitpoints, piece.hitpoints);
     append(accumulation.counts, piece.counts);
     for (std::size_t c = 0; c < 3; ++c)
@@ -412,6 +400,7 @@ Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
   const bool has_normals = photons.grid.has_normals();
   LUCERNA_CHECK(photons.grid.size() == 0 || block.glossy.size() == block.caustic_rows ||
                 has_normals);
+  LUCERNA_CHECK(photons.scattered == nullptr || photons.media != nullptr);
   LUCERNA_CHECK(photons.caustics == nullptr || photons.caustic_weight != nullptr);
   const GatherFunction gather = has_normals ? Specialised<true>(kernel.kind, evidence)
                                             : Specialised<false>(kernel.kind, evidence);

@@ -15,6 +15,7 @@
 #include "render/scene/scene.h"
 #include "render/transport/caustic_weight.h"
 #include "worker/photon_grid.h"
+#include "worker/photon_tree.h"
 
 namespace lucerna {
 
@@ -30,6 +31,10 @@ struct GatheredPhotons {
   // [photons of either grid] or empty: become 1 for every photon that counted somewhere.
   std::span<std::uint8_t> was_found = {};
   std::span<std::uint8_t> caustic_was_found = {};
+  // Photons that media scattered, for the block's segments, or nullptr.
+  const PhotonTree* scattered = nullptr;
+  const std::vector<Medium>* media = nullptr;
+  std::span<std::uint8_t> scattered_was_found = {};
 };
 
 // Every hitpoint adds up the photons within its radius that landed on its side of its surface (all

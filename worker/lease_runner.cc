@@ -149,7 +149,9 @@ StatusOr<LeaseRunner::Fetched> LeaseRunner::Fetch(const std::shared_ptr<Held>& h
   LUCERNA_ASSIGN_OR_RETURN(fetched.tracer, cache_.TracerFor(fetched.job->scene));
   std::size_t rows = pixels;
   if (work.kind == v1::WORK_KIND_PHOTONS) {
-    const std::size_t per_pixel = fetched.job->needs.Uses(Part::kCausticHitpoints) ? 2 : 1;
+    const SceneNeeds& needs = fetched.job->needs;
+    const std::size_t per_pixel = std::size_t{1} + (needs.Uses(Part::kCausticHitpoints) ? 1 : 0) +
+                                  (needs.Uses(Part::kMedia) ? 1 : 0);
     LUCERNA_ASSIGN_OR_RETURN(fetched.block, cache_.BlockFor(work.block, pixels * per_pixel));
     rows = fetched.block->size();
   }

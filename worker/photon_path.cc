@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include "render/estimate/evidence.h"
+#include "render/math/double3.h"
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "render/math/sobol.h"
@@ -49,6 +51,9 @@ struct NoWatcher {
   void Emitted(const Emission& /*emission*/) const {}
   void Landed(const Hit& /*hit*/, const SurfacePoint& /*surface*/, const Material& /*material*/,
               Rgb /*arriving*/) const {}
+  void ScatteredByMedium(Vec3 /*position*/, std::int32_t /*medium*/, float /*length*/,
+                         Rgb /*arriving*/, bool /*leaves_deposit*/) const {}
+  void SentOn(Vec3 /*wi*/, Rgb /*scattered*/) const {}
   void Received(Rgb /*landed*/, bool /*gathers*/, bool /*is_indirect*/,
                 bool /*leaves_deposit*/) const {}
   void Scattered(const BsdfSample& /*sample*/, float /*wo_z*/, Vec3 /*wi*/,
@@ -69,6 +74,22 @@ class HistoryWatcher {
     landing.has_narrow_lobes = HasNarrowLobes(material);
     landing.distance = hit.t;
     landing.arriving = arriving;
+  }
+  void ScatteredByMedium(Vec3 position, std::int32_t medium, float length, Rgb arriving,
+                         bool leaves_deposit) {
+    PhotonLanding& landing = history_.landings.emplace_back();
+    landing.surface.position = position;
+    landing.medium = medium;
+    landing.distance = length;
+    landing.arriving = arriving;
+    Received(arriving, true, true, leaves_deposit);
+  }
+  void SentOn(Vec3 wi, Rgb scattered) {
+    PhotonLanding& landing = history_.landings.back();
+    landing.was_scattered = true;
+    landing.transmits = true;
+    landing.leaving = wi;
+    landing.scattered = scattered;
   }
   void Received(Rgb landed, bool gathers, bool is_indirect, bool leaves_deposit) {
     PhotonLanding& landing = history_.landings.back();
@@ -106,7 +127,8 @@ class HistoryWatcher {
 PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& intersector,
                                    const LightSet& lights, const RenderSettings& settings,
                                    const SceneNeeds& needs, const SpectrumTracer* spectra,
-                                   const Bounds& region, std::uint64_t photons_per_pass)
+                                   const Bounds& region, std::uint64_t photons_per_pass,
+                                   const Bounds& media_region)
     : photons_per_pass_(photons_per_pass > 0
                             ? photons_per_pass
                             : static_cast<std::uint64_t>(settings.photons_per_pass)),
@@ -116,13 +138,15 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       settings_(settings),
       spectra_(spectra),
       region_(region),
+      media_region_(media_region),
+      media_(scene, intersector),
       scale_(FluxScale::ForPower(lights.TotalPower())),
       properties_(PropertiesOf(scene.materials)),
       has_textures_(needs.Uses(Part::kTextures)),
       parts_{needs.Uses(Part::kShadingNormals),
              needs.Uses(Part::kSpecular) || needs.Uses(Part::kGlossy) ||
                  needs.Uses(Part::kCausticHitpoints),
-             needs.Uses(Part::kCausticHitpoints)},
+             needs.Uses(Part::kCausticHitpoints), needs.Uses(Part::kMedia)},
       keep_(needs.Uses(Part::kPhotonDirections) ? KeepColumns<true, true>
             : needs.Uses(Part::kPhotonNormals)  ? KeepColumns<true, false>
                                                 : KeepColumns<false, false>) {
@@ -132,6 +156,109 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
     energy_per_watt_ =
         static_cast<float>(std::clamp((1 << kEnergyBits) / power, 0x1p-126, 0x1p126));
   }
+  if (parts_.media) FindLightMedia();
+}
+
+void PhotonPathTracer::FindLightMedia() {
+  const auto at_shape = [&](const ShapeTraits& traits, Vec3 place, Vec3 normal) {
+    if (traits.SeparatesMedia()) return traits.medium_outside;
+    const float off = kClearance * (MaxAbs(place) + intersector_.bounds().Diagonal());
+    return media_.AtLight(place + normal * off, traits.medium_outside);
+  };
+  const auto at_analytic = [&](const auto& shape) {
+    if constexpr (std::decay_t<decltype(shape)>::kIsFlat) {
+      return at_shape(shape.traits, shape.center, shape.normal);
+    } else {
+      const Vec3 up = {0, 0, 1};
+      return at_shape(shape.traits, shape.center + up * shape.Reach(), up);
+    }
+  };
+  std::vector<std::optional<std::int32_t>> of_meshes(scene_.meshes.size());
+  for (std::uint32_t number = 0; number < lights_.size(); ++number) {
+    const Emitter& emitter = lights_.emitter(number);
+    std::int32_t medium = kNoMedium;
+    switch (emitter.kind) {
+      case EmitterKind::kTriangle: {
+        const TriangleMesh& mesh = scene_.meshes[emitter.geometry];
+        std::optional<std::int32_t>& of_mesh = of_meshes[emitter.geometry];
+        if (!of_mesh) {
+          const Vec3 a = mesh.positions[mesh.indices[3 * emitter.primitive]];
+          const Vec3 b = mesh.positions[mesh.indices[3 * emitter.primitive + 1]];
+          const Vec3 c = mesh.positions[mesh.indices[3 * emitter.primitive + 2]];
+          of_mesh = at_shape(mesh.traits, (a + b + c) / 3, TriangleNormal(a, b, c));
+        }
+        medium = *of_mesh;
+        break;
+      }
+#define LUCERNA_CASE(Name, list, name)                    \
+  case EmitterKind::k##Name: {                            \
+    medium = at_analytic(scene_.list[emitter.primitive]); \
+    break;                                                \
+  }
+        LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+#define LUCERNA_CASE(Name, list, name)                                                           \
+  case EmitterKind::k##Name:                                                                     \
+    medium = Name##Light::kIsAtInfinity ? scene_.list[emitter.primitive].medium                  \
+                                        : media_.AtLight(scene_.list[emitter.primitive].Place(), \
+                                                         scene_.list[emitter.primitive].medium); \
+    break;
+        LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+      default:
+        break;  // infinite lights are in no medium
+    }
+    light_media_.push_back(medium);
+  }
+}
+
+PhotonPathTracer::Flight PhotonPathTracer::Fly(Ray& ray, std::int32_t& medium, KeyedRng& rng,
+                                               std::uint64_t& rays) const {
+  Flight flight;
+  const auto mean = [](Rgb channels) { return (channels.r + channels.g + channels.b) / 3; };
+  for (int i = 0; i < kMostInterfaces; ++i) {
+    Hit hit;
+    ++rays;
+    const bool is_met = intersector_.Intersect(ray, hit);
+    const float length = is_met ? hit.t : HUGE_VALF;
+    if (medium != kNoMedium) {
+      const Medium& through = media_[medium];
+      if (through.Scatters()) {
+        // A free path of one of the channels, weighed as if drawn from all three together (the
+        // balance heuristic over channels).
+        const Rgb extinction = through.Extinction();
+        const int channel = std::min(static_cast<int>(rng.Uniform() * 3), 2);
+        const float u = rng.Uniform();
+        const float of_channel = extinction[channel];
+        const float free_path = of_channel > 0 ? -std::log1p(-u) / of_channel : HUGE_VALF;
+        if (free_path < length) {
+          const Rgb transmittance = through.Transmittance(free_path);
+          flight.end = Flight::End::kScattered;
+          flight.factor *=
+              through.scattering * transmittance * (1 / mean(extinction * transmittance));
+          flight.position = ray.origin + ray.direction * free_path;
+          flight.length += free_path;
+          return flight;
+        }
+        const Rgb transmittance = through.Transmittance(length);
+        if (const float passed = mean(transmittance); passed > 0)
+          flight.factor *= transmittance * (1 / passed);
+      } else {
+        flight.factor *= through.Transmittance(length);
+      }
+    }
+    if (!is_met) return flight;
+    flight.length += hit.t;
+    const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+    if (!media_.IsInterface(surface)) {
+      flight.end = Flight::End::kLanded;
+      flight.hit = hit;
+      return flight;
+    }
+    medium = media_.Beyond(surface, ray.direction, medium);
+    ray = {LeavingPoint(surface, ray.direction), ray.direction, HUGE_VALF};
+  }
+  return flight;
 }
 
 float PhotonPathTracer::EnergyOf(Rgb flux) const {
@@ -170,8 +297,8 @@ PhotonHistory PhotonPathTracer::Replay(std::uint64_t pass, std::uint64_t index) 
   HistoryWatcher watcher(history);
   Landed landed;
   // A spectrum follows the walk and never changes it; nor does a part that the scene does not have.
-  history.end =
-      Walk<true, false>(KeyOf(pass, index), {true, true, parts_.caustics}, landed, watcher);
+  history.end = Walk<true, false>(KeyOf(pass, index), {true, true, parts_.caustics, parts_.media},
+                                  landed, watcher);
   return history;
 }
 
@@ -217,18 +344,76 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
     account += carried;
     return why;
   };
+  // Russian roulette: survives with the share of flux that is left, and then has the flux it came
+  // with. How the walk ends, if it does.
+  const auto play = [&](float before, Rgb& scattered) -> std::optional<PhotonEnd> {
+    const float survival = MaxChannel(scattered) / before;
+    watcher.Played(scattered, survival);
+    if (!(survival > 0)) return end(PhotonEnd::kAbsorbed, energy.absorbed);
+    if (survival < 1) {
+      if (!(rng.Uniform() < survival)) return end(PhotonEnd::kRoulette, energy.roulette_loss);
+      const float heavier_by = 1 / survival;
+      const float left = EnergyOf(scattered);
+      scattered *= heavier_by;
+      const std::int64_t heavier = WholeUnits(left * heavier_by);
+      energy.roulette_gain += heavier - carried;
+      carried = heavier;
+    }
+    watcher.Left(scattered);
+    return std::nullopt;
+  };
   [[maybe_unused]] SpectrumTracer::Carried spectrum;
   if constexpr (kSpectrum) spectrum = spectra_->Leave(emission);
+  // A photon that a medium has scattered has no spectrum any more.
+  [[maybe_unused]] bool has_spectrum = true;
+  std::int32_t medium = parts.media ? light_media_[emission.emitter] : kNoMedium;
   for (int landing = 0; landing < settings_.max_depth; ++landing) {
     Hit hit;
-    ++landed.rays;
-    if (!intersector_.Intersect(ray, hit)) {
+    bool is_met = false;
+    Rgb before_flight = flux;
+    if (parts.media) {
+      const Flight flight = Fly(ray, medium, rng, landed.rays);
+      flux *= flight.factor;
+      if (!IsFinite(flux)) return end(PhotonEnd::kNotFinite, energy.dropped);
+      book(EnergyOf(flux), energy.absorbed);
+      if (IsBlack(flux)) return end(PhotonEnd::kAbsorbed, energy.absorbed);
+      if (flight.end == Flight::End::kScattered) {
+        if (!IsFinite(flight.position)) return end(PhotonEnd::kNotFinite, energy.dropped);
+        const bool has_room = scale_.HasRoomFor(flux);
+        if (!has_room) ++landed.excess;
+        watcher.ScatteredByMedium(flight.position, medium, flight.length, flux, has_room);
+        const auto deposit_key = static_cast<std::uint32_t>(rng.Bits() >> 32);
+        if (has_room && Inside(media_region_, flight.position)) {
+          landed.scattered.rows.push_back(
+              {flight.position, flux, deposit_key,
+               source_of(met_smooth_only ? PathClass::kCaustic : PathClass::kOther)});
+          landed.scattered.arrivals_oct.push_back(EncodeOctahedral(-ray.direction));
+        }
+        met_smooth_only = false;
+        has_spectrum = false;
+        if (landing + 1 == settings_.max_depth) break;
+        const float u1 = rng.Uniform();
+        const Vec3 wi = SamplePhase(ray.direction, media_[medium].g, u1, rng.Uniform());
+        watcher.SentOn(wi, flux);
+        const std::optional<PhotonEnd> over = play(MaxChannel(before_flight), flux);
+        if (over) return *over;
+        ray = {flight.position, wi, HUGE_VALF};
+        continue;
+      }
+      is_met = flight.end == Flight::End::kLanded;
+      hit = flight.hit;
+    } else {
+      ++landed.rays;
+      is_met = intersector_.Intersect(ray, hit);
+    }
+    if (!is_met) {
       // A ray that is not a number meets nothing either.
       if (IsFinite(ray.origin) && IsFinite(ray.direction)) {
         return end(PhotonEnd::kEscaped, energy.escaped);
       }
       return end(PhotonEnd::kNotFinite, energy.dropped);
     }
+    [[maybe_unused]] const float after_flight = parts.media ? MaxChannel(flux) : 1;
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
     [[maybe_unused]] std::optional<Material> textured;
     const Material& material = [&]() -> const Material& {
@@ -290,7 +475,8 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
              source_of(met_smooth_only ? PathClass::kCaustic : PathClass::kOther)});
         keep_(landed.deposits, surface, wo);
         if constexpr (kSpectrum) {
-          landed.deposits.traces.push_back(spectra_->Received(spectrum, surface, material, wo));
+          landed.deposits.traces.push_back(
+              has_spectrum ? spectra_->Received(spectrum, surface, material, wo) : -1.0F);
         }
       }
     }
@@ -319,33 +505,22 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
     Rgb scattered = flux * sample.weight;
     watcher.Scattered(sample, wo_local.z, wi, scattered);
     if (!IsFinite(scattered)) return end(PhotonEnd::kNotFinite, energy.dropped);
-    float left = EnergyOf(scattered);
-    book(left, energy.absorbed);
+    book(EnergyOf(scattered), energy.absorbed);
     if (is_smoothed) {
       const float geometric = Dot(wi, surface.geometric_normal);
       const bool transmits = Dot(wo, frame.n) * sample.wi.z < 0;
       const bool crosses = Dot(wo, surface.geometric_normal) * geometric < 0;
       if (transmits != crosses) return end(PhotonEnd::kSmoothing, energy.smoothing);
       scattered *= 1 / std::max(CosineRatio(sample.wi.z, geometric), 1 / kMaxCosineRatio);
-      left = EnergyOf(scattered);
-      book(left, energy.smoothing);
+      book(EnergyOf(scattered), energy.smoothing);
     }
-    // Survives with the share of flux that is left, and then has the flux it came with.
-    const float before = MaxChannel(flux);
-    const float survival = MaxChannel(scattered) / before;
-    watcher.Played(scattered, survival);
-    if (!(survival > 0)) return end(PhotonEnd::kAbsorbed, energy.absorbed);
-    if (survival < 1) {
-      if (!(rng.Uniform() < survival)) return end(PhotonEnd::kRoulette, energy.roulette_loss);
-      const float heavier_by = 1 / survival;
-      scattered *= heavier_by;
-      const std::int64_t heavier = WholeUnits(left * heavier_by);
-      energy.roulette_gain += heavier - carried;
-      carried = heavier;
-    }
+    // What media took on the way counts as lost here.
+    const float before = parts.media ? MaxChannel(flux) * (MaxChannel(before_flight) / after_flight)
+                                     : MaxChannel(flux);
+    if (const std::optional<PhotonEnd> over = play(before, scattered)) return *over;
     flux = scattered;
-    watcher.Left(flux);
     if constexpr (kSpectrum) spectra_->Scatter(spectrum, surface, material, wo, wi);
+    if (parts.media && wo_local.z * sample.wi.z < 0) medium = media_.Beyond(surface, wi, medium);
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
   }
   return end(PhotonEnd::kDepth, energy.cut_off);

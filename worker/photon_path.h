@@ -19,11 +19,13 @@
 #include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
 #include "render/math/rgb.h"
+#include "render/math/rng.h"
 #include "render/math/vector.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/light.h"
+#include "render/transport/media.h"
 #include "worker/photon_spectrum.h"
 
 namespace lucerna {
@@ -64,7 +66,7 @@ struct Deposits {
   std::vector<std::uint32_t> arrivals_oct;  // directions back to where it came from, octahedral
   // Spectral traces [1/length²], below 0 for photons without a spectrum.
   std::vector<float> traces;
-  // See Emission::density; of caustic photons.
+  // See Emission::density; of caustic photons only.
   std::vector<float> emission_densities;
 
   [[nodiscard]] std::size_t size() const { return rows.size(); }
@@ -81,9 +83,11 @@ enum class PhotonEnd : std::uint8_t {
   kNotFinite,
 };
 
-// One landing of a replayed photon. What lies behind the end of its walk is not set.
+// One landing of a replayed photon, or a scattering by a medium. What lies behind the end of its
+// walk is not set.
 struct PhotonLanding {
-  SurfacePoint surface;
+  SurfacePoint surface;             // of a scattering by a medium, its position alone
+  std::int32_t medium = kNoMedium;  // that scattered it
   Material::Kind material_kind = Material::Kind::kDiffuse;
   bool has_narrow_lobes = false;  // the material
   float distance = 0;             // flown [scene units]
@@ -113,18 +117,21 @@ struct PhotonHistory {
 class PhotonPathTracer {
  public:
   // Keeps references to all but `needs`. Deposits outside `region` are not kept.
-  // `spectra`: for jobs with frequency photons, else nullptr. `photons_per_pass`: of the passes to
+  // `spectra`: for jobs with frequency photons, else nullptr. `media_region` is for photons that
+  // media scattered. `photons_per_pass`: of the passes to
   // be traced; 0: as `settings` have it.
   PhotonPathTracer(const Scene& scene, const Intersector& intersector, const LightSet& lights,
                    const RenderSettings& settings, const SceneNeeds& needs,
                    const SpectrumTracer* spectra, const Bounds& region,
-                   std::uint64_t photons_per_pass = 0);
+                   std::uint64_t photons_per_pass = 0, const Bounds& media_region = {});
 
   // What the photons of a range left.
   struct Landed {
     Deposits deposits;
     // Photons that have met only smooth surfaces, on surfaces where eye paths go on.
     Deposits caustics;
+    // Photons where media scattered them, with the flux that was scattered.
+    Deposits scattered;
     std::uint64_t rays = 0;
     // Photons given up because a number was not finite, and the first kDroppedNamed of them by
     // index, when photons are traced in order of their indices.
@@ -155,7 +162,22 @@ class PhotonPathTracer {
     bool shading_normals = false;
     bool lobes = false;     // other scattering than diffuse
     bool caustics = false;  // deposits for hitpoints of caustic photons
+    bool media = false;
   };
+  // What becomes of a photon on its way to the next surface that is no interface.
+  struct Flight {
+    enum class End : std::uint8_t { kLanded, kScattered, kNothingMet };
+    End end = End::kNothingMet;
+    Hit hit;           // kLanded
+    Vec3 position;     // kScattered
+    float length = 0;  // [scene units]
+    // Of the flux: what is left, per channel, over the probability of this end.
+    Rgb factor = Gray(1);
+  };
+  [[nodiscard]] Flight Fly(Ray& ray, std::int32_t& medium, KeyedRng& rng,
+                           std::uint64_t& rays) const;
+  // The media where the lights are.
+  void FindLightMedia();
   // The walk of one photon; with a watcher only for a replay.
   template <bool kTextures, bool kSpectrum, typename Watcher>
   PhotonEnd Walk(const Key& key, WalkParts parts, Landed& landed, Watcher& watcher) const;
@@ -172,6 +194,9 @@ class PhotonPathTracer {
   const RenderSettings& settings_;
   const SpectrumTracer* spectra_;  // nullptr: no frequency photons
   Bounds region_;
+  Bounds media_region_;
+  const Media media_;
+  std::vector<std::int32_t> light_media_;  // [emitters], or empty: there are no media
   FluxScale scale_;
   float energy_per_watt_ = 1;
   std::vector<MaterialProperties> properties_;  // [materials]

@@ -70,6 +70,7 @@ v1::DepositFate FateOf(const PhotonLanding& landing) {
 }
 
 std::string ChosenIn(const PhotonLanding& landing) {
+  if (landing.medium != kNoMedium) return "phase function";
   return absl::StrCat(!landing.has_narrow_lobes ? "diffuse "
                       : landing.is_smooth       ? "smooth "
                                                 : "rough ",
@@ -78,9 +79,15 @@ std::string ChosenIn(const PhotonLanding& landing) {
 
 v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing, const Scene& scene) {
   v1::PhotonPath::Landing message;
-  message.set_shape(NameOfShape(landing.surface, scene));
-  message.set_material(absl::StrCat(landing.surface.material, " (",
-                                    std::string(NameOf(landing.material_kind)), ")"));
+  if (landing.medium != kNoMedium) {
+    const Medium& medium = scene.media[static_cast<std::size_t>(landing.medium)];
+    message.set_shape(absl::StrCat("medium ", landing.medium));
+    message.set_material(medium.name);
+  } else {
+    message.set_shape(NameOfShape(landing.surface, scene));
+    message.set_material(absl::StrCat(landing.surface.material, " (",
+                                      std::string(NameOf(landing.material_kind)), ")"));
+  }
   message.set_distance(static_cast<double>(landing.distance));
   *message.mutable_position() = TripleOf(landing.surface.position);
   *message.mutable_geometric_normal() = TripleOf(landing.surface.geometric_normal);

@@ -19,7 +19,7 @@ constexpr double kBlock = 6.5;
 constexpr double kGlossyBlock = 14;
 constexpr double kFirstHit = 4;
 constexpr double kRadius = 2.5;
-// Of hitpoints for caustic photons, wherever a pass is traced.
+// Of hitpoints for caustic photons and of segments in media, wherever a pass is traced.
 constexpr double kCausticHitpoint = 150;
 
 }  // namespace
@@ -31,13 +31,14 @@ ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& setti
   const auto numbers = static_cast<double>(MakeRadiusController(settings, 1)->MemoryPerPixel());
   const double block = needs.Uses(Part::kGlossy) ? kGlossyBlock : kBlock;
   const double sets = needs.eye_sample_sets();
-  const double caustic_rows = needs.Uses(Part::kCausticHitpoints) ? 1 : 0;
+  const double rows_beside =
+      (needs.Uses(Part::kCausticHitpoints) ? 1 : 0) + (needs.Uses(Part::kMedia) ? 1 : 0);
   ExpectedCost cost;
-  cost.coordinator = pixels * (kCoordinator + caustic_rows * kCausticHitpoint +
+  cost.coordinator = pixels * (kCoordinator + rows_beside * kCausticHitpoint +
                                kEvidenceColumn * columns + sizeof(double) * numbers);
-  cost.worker = pixels * (kWorker + caustic_rows * kCausticHitpoint + kEvidenceColumn * columns +
+  cost.worker = pixels * (kWorker + rows_beside * kCausticHitpoint + kEvidenceColumn * columns +
                           sets * kFirstHit);
-  cost.first_pass_sent = pixels * (block + kRadius + caustic_rows * (kGlossyBlock + kRadius));
+  cost.first_pass_sent = pixels * (block + kRadius + rows_beside * (kGlossyBlock + kRadius));
   cost.pass_sent = pixels * kRadius;
   return cost;
 }

@@ -257,7 +257,8 @@ class NeedsFinder {
 
   void FindSurfaces() {
     gathers_ = First(Gathers);
-    specular_ = First([](const Material& m) { return !Gathers(m) && !ScattersNothing(m); });
+    specular_ = First(
+        [](const Material& m) { return !Gathers(m) && !ScattersNothing(m) && !IsInterface(m); });
     Set(Part::kSpecular, specular_ != nullptr,
         specular_ != nullptr ? Concat("paths go on at ", Quoted(*specular_))
                              : std::string("every surface gathers photons or is black"));
@@ -359,8 +360,12 @@ class NeedsFinder {
   void FindPhotons() {
     FindCausticHitpoints();
     const Material* receiver = gathers_ != nullptr ? gathers_ : caustics_only_;
-    Set(Part::kPhotons, receiver != nullptr && !is_dark_,
-        receiver == nullptr
+    const auto scatters = std::ranges::find_if(scene_.media, &Medium::Scatters);
+    const bool has_scattering = scatters != scene_.media.end();
+    Set(Part::kPhotons, (receiver != nullptr || has_scattering) && !is_dark_,
+        receiver == nullptr && has_scattering && !is_dark_
+            ? Concat("the medium \"", scatters->name, "\" scatters them")
+        : receiver == nullptr
             ? std::string("no surface is rough enough for photons to be gathered on")
         : is_dark_ ? std::string(kDark)
                    : Concat("they are gathered on ", Quoted(*receiver)));
@@ -392,6 +397,8 @@ class NeedsFinder {
         std::int64_t{settings_.crop_width()} * std::int64_t{settings_.crop_height()};
     if (has_lens) {
       Set(Part::kFreshEyePaths, true, "the camera has a lens");
+    } else if (std::ranges::any_of(scene_.media, &Medium::Scatters)) {
+      Set(Part::kFreshEyePaths, true, "eye paths choose at random where they look into media");
     } else if (specular_ != nullptr) {
       Set(Part::kFreshEyePaths, true, Concat("eye paths choose at random at ", Quoted(*specular_)));
     } else if (pixels * kEyeSampleSets > kHitpointsOfSets) {
@@ -435,7 +442,10 @@ class NeedsFinder {
 
   void AddPartsNotRead() {
     Set(Part::kMotion, false, "scenes that move are not read");
-    Set(Part::kMedia, false, "media are not read");
+    const std::size_t media = scene_.media.size();
+    Set(Part::kMedia, media > 0,
+        media > 0 ? Concat("media that absorb or scatter light: ", media)
+                  : std::string("all space is empty"));
     Set(Part::kAlphaMasks, false, "alpha masks are not read");
     Set(Part::kInstances, false,
         "instances are written out as shapes of their own: one level of acceleration");

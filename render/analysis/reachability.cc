@@ -241,7 +241,7 @@ bool AllSampledLie(const Scene& scene, const ClosedSurface& surface, bool inside
 }
 
 bool ScattersNarrowly(const Material& material) {
-  return !ScattersBroadly(material);
+  return !ScattersBroadly(material) && !IsInterface(material);
 }
 
 // The lights that nothing which scatters their light has a line of sight to.

@@ -12,8 +12,9 @@
 //   H1  All columns that are present have `size()` rows; glossy columns have glossy.size() rows.
 //   H2  Positions are finite; normals are unit length up to the 2 × 16 bit octahedral rounding.
 //   H3  Glossy rows are in increasing order of hitpoint.
-//   H4  The last `caustic_rows` rows are glossy ones: they gather caustic photons, and all rows
-//       before them the other ones.
+//   H4  The last segments.size() rows are segments: `positions` is where they begin, and their
+//       normals mean nothing. The `caustic_rows` rows before them are glossy ones: they gather
+//       caustic photons, and all rows before those the other ones.
 #pragma once
 
 #include <cstdint>
@@ -34,6 +35,18 @@ struct GlossyHitpoint {
   bool operator==(const GlossyHitpoint&) const = default;
 };
 
+// A straight part of an eye path through a medium that scatters. Photons that the medium scattered
+// count when they are nearer to it than a radius that grows evenly along it: the beam radiance
+// estimate (Jarosz, Zwicker & Jensen 2008, "The Beam Radiance Estimate for Volumetric Photon
+// Mapping").
+struct MediumSegment {
+  Vec3 end;
+  std::uint32_t medium = 0;  // index into Scene::media
+  float narrowing = 1;       // the radius at the beginning over that at the end, in (0, 1]
+
+  bool operator==(const MediumSegment&) const = default;
+};
+
 struct HitpointBlock {
   std::vector<Vec3> positions;             // [hitpoints]
   std::vector<std::uint32_t> normals_oct;  // [hitpoints] geometric, on the eye's side
@@ -41,12 +54,15 @@ struct HitpointBlock {
   // [glossy hitpoints] or empty: absorption of conductors whose material has a texture, else 0.
   std::vector<Rgb> textured_k;
   std::size_t caustic_rows = 0;
+  std::vector<MediumSegment> segments;
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
+  [[nodiscard]] std::size_t first_segment() const { return size() - segments.size(); }
+  [[nodiscard]] std::size_t first_caustic() const { return first_segment() - caustic_rows; }
   bool operator==(const HitpointBlock&) const = default;
 };
 
-// The radius of every hitpoint of a pass [scene units]: finite and > 0.
+// The radius of every hitpoint of a pass [scene units]: finite and > 0. Of a segment, at its end.
 using RadiusColumn = std::vector<float>;
 
 }  // namespace lucerna

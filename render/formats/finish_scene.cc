@@ -65,6 +65,50 @@ void DropFlatTriangles(UnfinishedScene& unfinished, const SourceLocation& whole,
   }
 }
 
+// Light passes an interface unchanged: one that separates no media, and is no light, has no part in
+// the image.
+void DropInterfacesWithinMedia(Scene& scene, const SourceLocation& whole,
+                               Diagnostics& diagnostics) {
+  const auto is_interface = [&](const ShapeTraits& traits) {
+    return IsInterface(scene.materials[static_cast<std::size_t>(traits.material)]);
+  };
+  std::size_t lights = 0;
+  ForEachShapeTraits(scene, [&](ShapeTraits& traits) {
+    if (!is_interface(traits) || traits.area_light == kNoAreaLight) return;
+    traits.area_light = kNoAreaLight;
+    ++lights;
+  });
+  if (lights > 0) {
+    diagnostics.Warning(whole, Concat("shapes of the material interface emit no light: ", lights));
+  }
+  ForEachShapeList(scene, [&](auto& list) {
+    std::erase_if(list, [&](const auto& shape) {
+      return is_interface(shape.traits) && !shape.traits.SeparatesMedia();
+    });
+  });
+}
+
+bool UsesMedia(const Scene& scene) {
+  bool uses = scene.camera.medium != kNoMedium;
+  ForEachDeltaList(scene, [&](const auto& lights) {
+    for (const auto& light : lights)
+      uses = uses || light.medium != kNoMedium;
+  });
+  ForEachShapeTraits(scene, [&](const ShapeTraits& traits) {
+    const bool has_medium = traits.medium_inside != kNoMedium || traits.medium_outside != kNoMedium;
+    uses = uses || (has_medium && (traits.SeparatesMedia() || traits.area_light != kNoAreaLight));
+  });
+  return uses;
+}
+
+void ForgetMedia(Scene& scene) {
+  scene.media.clear();
+  ForEachShapeTraits(scene, [](ShapeTraits& traits) {
+    traits.medium_inside = kNoMedium;
+    traits.medium_outside = kNoMedium;
+  });
+}
+
 }  // namespace
 
 void WarnOfLightWithoutArea(const SourceLocation& location, const std::string& subject,
@@ -87,6 +131,8 @@ Scene FinishScene(UnfinishedScene unfinished, const std::string& main_file,
     diagnostics.Error(whole, std::string(chosen.message()));
   }
   DropFlatTriangles(unfinished, whole, diagnostics);
+  DropInterfacesWithinMedia(scene, whole, diagnostics);
+  if (!UsesMedia(scene)) ForgetMedia(scene);
   return std::move(scene);
 }
 

@@ -62,6 +62,11 @@ Status ChooseUnit(Scene& scene) {
       position = ScaledBy(position, factor);
   }
   ForEachAnalyticShape(scene, [&](auto& shape) { shape.Scale(factor); });
+  // Coefficients are per length.
+  for (Medium& medium : scene.media) {
+    medium.absorption *= static_cast<float>(scene.unit);
+    medium.scattering *= static_cast<float>(scene.unit);
+  }
   bool has_strengths = true;
   ForEachDeltaList(scene, [&](auto& lights) {
     for (auto& light : lights)

@@ -11,6 +11,7 @@ struct DistantLight {
 
   Vec3 direction;  // unit, the way the light travels
   Rgb irradiance;  // [W·m⁻²] on a plane facing it
+  std::int32_t medium = kNoMedium;
 
   [[nodiscard]] Vec3 Place() const { return direction; }
   [[nodiscard]] const Rgb& Strength() const { return irradiance; }

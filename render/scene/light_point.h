@@ -1,6 +1,9 @@
 // A light at a point that shines the same in all directions. Members as in scene/light_list.h.
 #pragma once
 
+#include <cstdint>
+
+#include "render/scene/medium.h"
 #include "render/scene/scaling.h"
 
 namespace lucerna {
@@ -10,6 +13,7 @@ struct PointLight {
 
   Vec3 position;
   Rgb intensity;  // [W·sr⁻¹]
+  std::int32_t medium = kNoMedium;
 
   [[nodiscard]] Vec3 Place() const { return position; }
   [[nodiscard]] const Rgb& Strength() const { return intensity; }

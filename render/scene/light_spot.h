@@ -1,6 +1,9 @@
 // A light at a point that shines into a cone. Members as in scene/light_list.h.
 #pragma once
 
+#include <cstdint>
+
+#include "render/scene/medium.h"
 #include "render/scene/scaling.h"
 
 namespace lucerna {
@@ -15,6 +18,7 @@ struct SpotLight {
   Rgb intensity;   // [W·sr⁻¹] on the axis
   float cos_falloff_start = 1;
   float cos_total_width = 1;
+  std::int32_t medium = kNoMedium;
 
   [[nodiscard]] Vec3 Place() const { return position; }
   [[nodiscard]] const Rgb& Strength() const { return intensity; }

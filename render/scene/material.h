@@ -20,10 +20,11 @@
 
 // The kinds of material, in the order of Material::Kind.
 // ROW(Name, name): Material::Kind::kName, and its name in messages and in pbrt files.
-#define LUCERNA_MATERIALS(ROW) \
-  ROW(Diffuse, "diffuse")      \
-  ROW(Conductor, "conductor")  \
-  ROW(Dielectric, "dielectric")
+#define LUCERNA_MATERIALS(ROW)  \
+  ROW(Diffuse, "diffuse")       \
+  ROW(Conductor, "conductor")   \
+  ROW(Dielectric, "dielectric") \
+  ROW(Interface, "interface")
 
 namespace lucerna {
 
@@ -64,6 +65,8 @@ struct MaterialProperties {
   bool is_diffuse = false;
   bool is_smooth = false;  // all scattering goes into single directions
   bool is_black = false;   // nothing is scattered
+  // Light passes unchanged: the surface only separates media. Paths never scatter there.
+  bool is_interface = false;
   // Some light goes to the other side: the surface casts no shadow and encloses nothing.
   bool transmits = false;
   // Where eye paths stop and photons are kept.
@@ -74,7 +77,7 @@ struct MaterialProperties {
   float ior = 1;  // inside over outside, of light that is refracted
 
   // Where direct light may be sampled: light is scattered, and not into single directions.
-  [[nodiscard]] bool scatters_broadly() const { return !is_smooth && !is_black; }
+  [[nodiscard]] bool scatters_broadly() const { return !is_smooth && !is_black && !is_interface; }
   // Where eye paths go on although a range of directions is scattered: what eye paths do not find
   // of the light there, caustic photons bring (transport/caustic_weight.h).
   [[nodiscard]] bool gathers_caustics() const { return scatters_broadly() && !gathers; }
@@ -131,6 +134,9 @@ void SetTexturedParameter(MaterialNumbers& material, Rgb value);
 }
 [[nodiscard]] inline bool ScattersNothing(const Material& material) {
   return PropertiesOf(material).is_black;
+}
+[[nodiscard]] inline bool IsInterface(const Material& material) {
+  return PropertiesOf(material).is_interface;
 }
 [[nodiscard]] inline bool Transmits(const Material& material) {
   return PropertiesOf(material).transmits;

@@ -11,8 +11,9 @@
 // Invariants, which the readers guarantee and everything above relies on
 //   S1  Every position, normal, texture coordinate, transform, colour and pixel is finite.
 //   S2  Every index is in range: triangle -> vertex, shape -> material, shape -> area light,
-//       material -> texture; a texture is made of textures before it. A texture that needs a
-//       picture has one, and the picture of an infinite light is square.
+//       material -> texture, shape, light and camera -> medium; a texture is made of textures
+//       before it. A texture that needs a picture has one, and the picture of an infinite light is
+//       square.
 //   S3  Normals are unit length or zero (zero: use the geometric normal).
 //   S4  Reflectances are in [0, 1], those of textures once they are looked up; emitted quantities,
 //       pixels and scales of textures are >= 0.
@@ -33,6 +34,7 @@
 #include "render/scene/infinite_light.h"
 #include "render/scene/light_list.h"
 #include "render/scene/material.h"
+#include "render/scene/medium.h"
 #include "render/scene/shape_traits.h"
 #include "render/scene/texture.h"
 
@@ -74,6 +76,7 @@ struct Camera {
   std::optional<Window> screen_window;
   double lens_radius = 0;
   double focal_distance = 1e6;
+  std::int32_t medium = kNoMedium;  // in which the camera is
 };
 
 // The window on the plane z = 1 in camera space that an image of `width` x `height` pixels shows
@@ -122,6 +125,7 @@ struct Scene {
 #undef LUCERNA_MEMBER
   std::vector<Material> materials;
   std::vector<Texture> textures;
+  std::vector<Medium> media;
   std::vector<AreaLight> area_lights;
 #define LUCERNA_MEMBER(Name, list, name) std::vector<Name##Light> list;
   LUCERNA_DELTA_LIGHTS(LUCERNA_MEMBER)  // point_lights and so on (scene/light_list.h)

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "render/math/vector.h"
+#include "render/scene/medium.h"
 
 namespace lucerna {
 
@@ -13,7 +14,11 @@ inline constexpr std::int32_t kNoAreaLight = -1;
 struct ShapeTraits {
   std::int32_t material = 0;
   std::int32_t area_light = kNoAreaLight;
+  // The media on the sides that the outward normal points away from and to, as the file names
+  // them. Where both are the same, the surface lies within whatever medium is there.
+  std::int32_t medium_inside = kNoMedium, medium_outside = kNoMedium;
 
+  [[nodiscard]] bool SeparatesMedia() const { return medium_inside != medium_outside; }
   bool operator==(const ShapeTraits&) const = default;
 };
 

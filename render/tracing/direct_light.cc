@@ -47,11 +47,16 @@ Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
     radiance *= PowerHeuristic(light.pdf, PdfBsdf(point.material, wo, wi));
   }
   if (IsBlack(radiance)) return {};
-  ++rays;
   // Both ends are clear of their surfaces, so nothing but a third surface can be met.
   const Vec3 origin = LeavingPoint(point.surface, light.wi);
   const Ray shadow = light.is_distant ? Ray{origin, light.wi, HUGE_VALF}
                                       : Ray{origin, light.target - origin, kShadowEnd};
+  if (point.media != nullptr) {
+    const std::int32_t medium =
+        wo.z * wi.z < 0 ? point.media->Beyond(point.surface, light.wi, point.medium) : point.medium;
+    return radiance * point.media->Transmittance(shadow, medium, rays);
+  }
+  ++rays;
   return intersector.Occluded(shadow) ? Rgb{} : radiance;
 }
 

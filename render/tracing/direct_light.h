@@ -10,6 +10,7 @@
 #include "render/math/sobol.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/light.h"
+#include "render/transport/media.h"
 
 namespace lucerna {
 
@@ -17,8 +18,10 @@ namespace lucerna {
 struct ShadingPoint {
   const SurfacePoint& surface;
   const Material& material;
-  const Frame& frame;  // around the shading normal, on the outside
-  Vec3 wo;             // towards the eye, world
+  const Frame& frame;               // around the shading normal, on the outside
+  Vec3 wo;                          // towards the eye, world
+  const Media* media = nullptr;     // nullptr: there are none
+  std::int32_t medium = kNoMedium;  // on the eye's side
 };
 
 // The weight of a sample drawn with density `drawn` beside one that could have been drawn with
@@ -26,8 +29,8 @@ struct ShadingPoint {
 // vanish.
 [[nodiscard]] float PowerHeuristic(float drawn, float other);
 
-// Radiance towards wo of light drawn from the lights: BSDF × light × MIS weight, zero when
-// something is in the way. `rays` counts what was traced.
+// Radiance towards wo of light drawn from the lights: BSDF × light × MIS weight × what media leave,
+// zero when something is in the way. `rays` counts what was traced.
 [[nodiscard]] Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
                                        const ShadingPoint& point, const SobolPoint& u, int& rays);
 

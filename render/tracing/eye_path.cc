@@ -48,11 +48,11 @@ float BranchWeight(const Intersector& intersector, const LightSet& lights) {
 constexpr float kWidestSpread = 4;
 
 // Radiance above which emission that the camera sees is spread over the film. Infinite where no
-// light is so bright, and for very wide filters.
+// light is so bright, for very wide filters, and where light is lost in media on its way.
 float SpreadAbove(const Scene& scene, bool rays_find_lights, const Intersector& intersector,
                   const LightSet& lights) {
   const float radius = std::max(scene.filter.radius_x, scene.filter.radius_y);
-  const bool can_be_spread = radius <= kWidestSpread;
+  const bool can_be_spread = radius <= kWidestSpread && scene.media.empty();
   if (!can_be_spread || !rays_find_lights || intersector.bounds().empty()) return HUGE_VALF;
   const double white = WhiteRadiance(intersector, lights);
   if (!(static_cast<double>(lights.LargestRadiance()) > white)) return HUGE_VALF;
@@ -76,6 +76,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       white_(SpreadAbove(scene, rays_find_lights_, intersector, lights)),
       intersector_(intersector),
       lights_(lights),
+      media_(scene, intersector),
       filter_x_(scene.filter, scene.filter.radius_x),
       filter_y_(scene.filter, scene.filter.radius_y) {
   // Readers let only invertible transforms pass.
@@ -138,7 +139,7 @@ Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng) const {
   int rays = 0;
   // Black unless the surface is smooth.
   return BrightPart(lights_.EmittedRadiance(surface, wo)) +
-         BrightPart(EmissionThrough(surface, wo, rng, rays));
+         BrightPart(EmissionThrough(surface, wo, kNoMedium, rng, rays));
 }
 
 Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
@@ -195,19 +196,53 @@ EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass, First first) cons
   path.direct *= filter_weight;
   path.hitpoint.weight *= filter_weight;
   path.caustic.weight *= path.caustic_strength * filter_weight;
+  path.segment.weight *= filter_weight;
   return path;
 }
 
-Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, KeyedRng rng,
-                                   int& rays) const {
+bool EyePathTracer::FindThroughMedia(Ray& ray, Hit& hit, std::int32_t& medium, Rgb& transmittance,
+                                     int& rays) const {
+  ++rays;
+  const bool is_met = intersector_.Intersect(ray, hit);
+  if (!parts_.media) return is_met;
+  return media_.Follow(ray, is_met, hit, medium, rays,
+                       [&](const Ray& /*leg*/, float t, std::int32_t of_leg) {
+                         if (of_leg != kNoMedium) transmittance *= media_[of_leg].Transmittance(t);
+                       });
+}
+
+EyeSegment EyePathTracer::SegmentOf(const Ray& ray, float t, std::int32_t medium, Rgb weight,
+                                    float length_before) const {
+  // What lies so many mean free paths away is not seen, and nothing lies far outside of the scene.
+  constexpr float kMostFreePaths = 40;
+  constexpr float kMostDiagonals = 8;
+  const Rgb extinction = media_[medium].Extinction();
+  const float least = std::min({extinction.r, extinction.g, extinction.b});
+  float end = std::min(t, kMostDiagonals * intersector_.bounds().Diagonal());
+  if (least > 0) end = std::min(end, kMostFreePaths / least);
+  const auto footprint_at = [&](float length) {
+    return length * static_cast<float>(std::sqrt(pixel_width_ * pixel_height_));
+  };
+  return {.from = ray.origin,
+          .to = ray.origin + ray.direction * end,
+          .medium = medium,
+          .weight = weight,
+          .from_footprint = footprint_at(length_before),
+          .to_footprint = footprint_at(length_before + end)};
+}
+
+Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, std::int32_t medium,
+                                   KeyedRng rng, int& rays) const {
   struct Branch {
     Ray ray;
+    std::int32_t medium;
     Rgb weight;
     int vertex;
   };
   // A pair at each vertex, of which one is followed at once: the stack grows by one a vertex.
   std::vector<Branch> branches;
-  const auto branch_at = [&](const SurfacePoint& surface, Vec3 wo, Rgb weight, int vertex) {
+  const auto branch_at = [&](const SurfacePoint& surface, Vec3 wo, std::int32_t before, Rgb weight,
+                             int vertex) {
     if (vertex >= settings_.max_depth) return;
     std::optional<Material> textured;
     const Material& material = MaterialAt(scene_, surface, textured);
@@ -222,31 +257,33 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, Key
       BsdfSample sample;
       if (!SampleBsdf(material, wo_local, lobe, 0, 0, Carried::kRadiance, sample)) continue;
       const Vec3 wi = frame.ToWorld(sample.wi);
-      if (!SidesAgree(surface, wo, wi, wo_local.z * sample.wi.z < 0)) continue;
+      const bool transmits = wo_local.z * sample.wi.z < 0;
+      if (!SidesAgree(surface, wo, wi, transmits)) continue;
       Rgb next = weight * sample.weight * share;
       const float strength = MaxChannel(next);
       if (strength < branch_weight_) {
         if (!(rng.Uniform() * branch_weight_ < strength)) continue;
         next *= branch_weight_ / strength;
       }
-      branches.push_back({{LeavingPoint(surface, wi), wi, HUGE_VALF}, next, vertex + 1});
+      const std::int32_t after =
+          parts_.media && transmits ? media_.Beyond(surface, wi, before) : before;
+      branches.push_back({{LeavingPoint(surface, wi), wi, HUGE_VALF}, after, next, vertex + 1});
     }
   };
   Rgb seen;
-  branch_at(first, first_wo, Gray(1), 0);
+  branch_at(first, first_wo, medium, Gray(1), 0);
   while (!branches.empty()) {
-    const Branch branch = branches.back();
+    Branch branch = branches.back();
     branches.pop_back();
     Hit hit;
-    ++rays;
-    if (!intersector_.Intersect(branch.ray, hit)) {
+    if (!FindThroughMedia(branch.ray, hit, branch.medium, branch.weight, rays)) {
       seen += branch.weight * lights_.InfiniteRadiance(branch.ray.direction);
       continue;
     }
     const SurfacePoint surface = intersector_.SurfaceAt(branch.ray, hit);
     const Vec3 wo = -branch.ray.direction;
     seen += branch.weight * lights_.EmittedRadiance(surface, wo);
-    branch_at(surface, wo, branch.weight, branch.vertex);
+    branch_at(surface, wo, branch.medium, branch.weight, branch.vertex);
   }
   return seen;
 }
@@ -288,6 +325,30 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     return caustic_weight_.OfRays(emission_density, receiver.cosine, receiver.scatter_pdf);
   };
   KeyedRng caustic_rng = sampler.ForCaustics();
+  std::int32_t medium = parts_.media ? media_.AtCamera() : kNoMedium;
+  KeyedRng segment_rng = sampler.ForSegments();
+  float segment_strength = 0;  // sum over the segments so far
+  const auto pass_leg = [&](const Ray& leg, float t, std::int32_t of_leg) {
+    if (of_leg != kNoMedium) {
+      const Rgb transmittance = media_[of_leg].Transmittance(t);
+      if (media_[of_leg].Scatters()) {
+        // One of them is drawn in proportion to about what it scatters, and stands for all.
+        const float strength =
+            MaxChannel(weight * (Gray(1) - transmittance) * media_[of_leg].ScatteredShare());
+        segment_strength += strength;
+        if (segment_rng.Uniform() * segment_strength < strength) {
+          path.segment = SegmentOf(leg, t, of_leg, weight * (1 / strength), length);
+        }
+      }
+      weight *= transmittance;
+    }
+    if (t < HUGE_VALF) length += t;
+  };
+  // After the walk.
+  const auto finish = [&]() -> EyePath& {
+    path.segment.weight *= segment_strength;
+    return path;
+  };
   const auto add_first_emission = [&](Rgb emitted) {
     const Rgb bright = BrightPart(emitted);
     path.bright += bright;
@@ -297,25 +358,30 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   for (int vertex = 0;; ++vertex) {
     Hit hit;
     ++path.rays;
-    if (!(vertex == 0 ? FindFirst(ray, first, hit) : intersector_.Intersect(ray, hit))) {
-      if (emission_was_collected) return path;
+    bool is_met = vertex == 0 ? FindFirst(ray, first, hit) : intersector_.Intersect(ray, hit);
+    if (parts_.media) {
+      is_met = media_.Follow(ray, is_met, hit, medium, path.rays, pass_leg);
+    } else if (is_met) {
+      length += hit.t;
+    }
+    if (!is_met) {
+      if (emission_was_collected) return finish();
       if (vertex == 0) {
-        add_first_emission(lights_.InfiniteRadiance(ray.direction));
-        return path;
+        add_first_emission(weight * lights_.InfiniteRadiance(ray.direction));
+        return finish();
       }
       const float mis = scatter_pdf > 0
                             ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(ray.direction))
                             : 1;
       path.direct += weight * lights_.InfiniteRadiance(ray.direction) *
                      (mis * share_of_rays(lights_.EmissionDensityInfinite(ray.direction)));
-      return path;
+      return finish();
     }
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
     const Vec3 wo = -ray.direction;
-    length += hit.t;
     const Rgb emitted = lights_.EmittedRadiance(surface, wo);
     if (vertex == 0) {
-      add_first_emission(emitted);
+      add_first_emission(weight * emitted);
     } else if (!IsBlack(emitted) && !emission_was_collected) {
       const float mis =
           scatter_pdf > 0
@@ -333,19 +399,21 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     if (vertex == 0 || properties.gathers) {
       path.features = {AlbedoOf(material), FaceForward(surface.shading_normal, wo), length};
     }
-    if (vertex >= settings_.max_depth) return path;
+    if (vertex >= settings_.max_depth) return finish();
 
     const Frame frame(surface.shading_normal);
     const SobolPoint u = sampler.ForVertex(vertex);
     if (parts_.lobes && properties.is_smooth) {
       if (vertex == 0 && rays_find_lights_) {
-        add_first_emission(EmissionThrough(surface, wo, sampler.ForBranches(), path.rays));
+        add_first_emission(weight *
+                           EmissionThrough(surface, wo, medium, sampler.ForBranches(), path.rays));
         emission_was_collected = true;
       }
     } else {
       emission_was_collected = false;
       if (parts_.lights) {
-        const ShadingPoint point = {surface, material, frame, wo};
+        const ShadingPoint point = {surface, material, frame, wo, parts_.media ? &media_ : nullptr,
+                                    medium};
         path.direct += weight * LightSampledRadiance(intersector_, lights_, point, u, path.rays);
       }
     }
@@ -359,12 +427,12 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       return SampleDiffuse(material, wo_local, u[1], u[2], sample);
     }();
     Vec3 wi;
+    std::int32_t medium_after = medium;
     if (scattered) {
       wi = frame.ToWorld(sample.wi);
-      if (parts_.shading_normals) {
-        const bool transmits = sample.wi.z * Dot(frame.n, wo) < 0;
-        scattered = SidesAgree(surface, wo, wi, transmits);
-      }
+      const bool transmits = sample.wi.z * Dot(frame.n, wo) < 0;
+      if (parts_.shading_normals) scattered = SidesAgree(surface, wo, wi, transmits);
+      if (parts_.media && transmits) medium_after = media_.Beyond(surface, wi, medium);
     }
 
     const auto hitpoint_here = [&](bool is_glossy, const Material& here) {
@@ -383,16 +451,16 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     if (properties.gathers) {
       // Half of the direct light: what a scattered ray finds of the lights themselves.
       if (parts_.lights && scattered && rays_find_lights_) {
-        const Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
-        ++path.rays;
-        if (!intersector_.Intersect(probe, hit)) {
-          path.direct += weight * sample.weight * lights_.InfiniteRadiance(wi) *
+        Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
+        Rgb carried = weight * sample.weight;
+        if (!FindThroughMedia(probe, hit, medium_after, carried, path.rays)) {
+          path.direct += carried * lights_.InfiniteRadiance(wi) *
                          PowerHeuristic(sample.pdf, lights_.PdfDirectInfinite(wi));
         } else {
           const SurfacePoint light = intersector_.SurfaceAt(probe, hit);
           const Rgb radiance = lights_.EmittedRadiance(light, -wi);
           if (!IsBlack(radiance)) {
-            path.direct += weight * sample.weight * radiance *
+            path.direct += carried * radiance *
                            PowerHeuristic(sample.pdf, lights_.PdfDirect(surface.position, light));
           }
         }
@@ -400,7 +468,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       const bool is_glossy = parts_.lobes && !properties.is_diffuse;
       path.hitpoint = hitpoint_here(is_glossy, material);
       if (!is_glossy) path.hitpoint.weight *= material.reflectance * kInversePi;
-      return path;
+      return finish();
     }
     if (parts_.caustics) {
       if (properties.is_smooth) {
@@ -417,17 +485,18 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       }
     }
 
-    if (!scattered) return path;
+    if (!scattered) return finish();
     weight *= sample.weight;
     scatter_pdf = sample.is_delta ? 0 : sample.pdf;
     scatter_position = surface.position;
     const float strength = MaxChannel(weight);
-    if (!(strength > 0)) return path;
+    if (!(strength > 0)) return finish();
     if (vertex > 3 && strength < kRouletteWeight) {
-      if (!(u[6] < strength)) return path;
+      if (!(u[6] < strength)) return finish();
       weight *= 1 / strength;
     }
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
+    medium = medium_after;
   }
 }
 
@@ -437,7 +506,8 @@ EyePathTracer::WalkParts EyePathTracer::WalkPartsFor(const SceneNeeds& needs) {
           .shading_normals = needs.Uses(Part::kShadingNormals),
           .lobes = needs.Uses(Part::kSpecular) || needs.Uses(Part::kGlossy) || caustics,
           .lights = needs.Uses(Part::kDirectSampling),
-          .caustics = caustics};
+          .caustics = caustics,
+          .media = needs.Uses(Part::kMedia)};
 }
 
 }  // namespace lucerna

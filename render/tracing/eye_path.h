@@ -13,6 +13,7 @@
 #include "render/tracing/pixel_sampler.h"
 #include "render/transport/caustic_weight.h"
 #include "render/transport/light.h"
+#include "render/transport/media.h"
 
 namespace lucerna {
 
@@ -35,6 +36,15 @@ struct EyeHitpoint {
   float footprint = 0;          // width of the pixel at the hitpoint [scene units]
 };
 
+// A straight part of an eye path through a medium that scatters: photons count that were scattered
+// near it.
+struct EyeSegment {
+  Vec3 from, to;
+  std::int32_t medium = kNoMedium;
+  Rgb weight;                                  // from radiance scattered at `from`; black: none
+  float from_footprint = 0, to_footprint = 0;  // widths of the pixel there [scene units]
+};
+
 // The end of one eye path.
 struct EyePath {
   Rgb direct;  // radiance that needs no photons, but for `bright`
@@ -47,6 +57,8 @@ struct EyePath {
   // of them; glossy.
   EyeHitpoint caustic;
   float caustic_strength = 0;  // sum of the weights of those surfaces, largest channels
+  // One of the segments, with the weight that stands for all of them.
+  EyeSegment segment;
   int rays = 0;
 };
 
@@ -117,6 +129,7 @@ class EyePathTracer {
     bool lobes = false;     // other scattering than diffuse
     bool lights = false;    // that are sampled
     bool caustics = false;  // hitpoints for caustic photons
+    bool media = false;
   };
   [[nodiscard]] static WalkParts WalkPartsFor(const SceneNeeds& needs);
   [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler, First first) const;
@@ -124,8 +137,15 @@ class EyePathTracer {
   [[nodiscard]] bool FindFirst(const Ray& ray, First first, Hit& hit) const;
   // Radiance that leaves a smooth surface towards `first_wo` and was emitted where a chain of
   // smooth surfaces ends: reflections and refractions are all followed, not drawn.
-  [[nodiscard]] Rgb EmissionThrough(const SurfacePoint& first, Vec3 first_wo, KeyedRng rng,
-                                    int& rays) const;
+  // `medium`: in which `first_wo` leaves.
+  [[nodiscard]] Rgb EmissionThrough(const SurfacePoint& first, Vec3 first_wo, std::int32_t medium,
+                                    KeyedRng rng, int& rays) const;
+  // What a ray in `medium` meets, behind interfaces; with media, what is left of light on the way.
+  [[nodiscard]] bool FindThroughMedia(Ray& ray, Hit& hit, std::int32_t& medium, Rgb& transmittance,
+                                      int& rays) const;
+  // A part of an eye path that ends after `t`.
+  [[nodiscard]] EyeSegment SegmentOf(const Ray& ray, float t, std::int32_t medium, Rgb weight,
+                                     float length_before) const;
 
   const Scene& scene_;
   const RenderSettings& settings_;
@@ -140,6 +160,7 @@ class EyePathTracer {
   const float white_;
   const Intersector& intersector_;
   const LightSet& lights_;
+  const Media media_;
   FilterSampler filter_x_, filter_y_;
   Transform world_to_camera_;
   double window_low_x_, window_high_y_;  // of the whole image on the plane z = 1

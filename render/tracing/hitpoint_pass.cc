@@ -13,9 +13,15 @@ constexpr int kTile = 16;
 
 // A pixel's width at the hitpoint, held where a radius in such units has a square. A camera that
 // touches a surface sees it in no width at all.
-float UnitRadius(const EyeHitpoint& hitpoint) {
-  return std::clamp(hitpoint.footprint, 1e-17F, 1e14F);
+float HeldWidth(float footprint) {
+  return std::clamp(footprint, 1e-17F, 1e14F);
 }
+
+// The radius of a segment over that of a surface: a segment finds the photons of its whole length.
+constexpr float kSegmentShare = 0.5F;
+// A photon near the beginning of a segment weighs up to the square of its inverse more than one at
+// the end.
+constexpr float kLeastNarrowing = 1.0F / 8;
 
 }  // namespace
 
@@ -50,6 +56,8 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   struct Tile {
     Rows rows;
     Rows caustic_rows;
+    Rows segment_rows;
+    std::vector<MediumSegment> segments;
   };
   const bool automatic = tracer.settings().initial_radius == 0;
   std::vector<Tile> per_tile(tiles);
@@ -80,10 +88,23 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
               rows.textured_k.push_back(hitpoint.textured_k);
             }
             rows.rows.push_back({pixel, hitpoint.position, EncodeOctahedral(hitpoint.normal),
-                                 hitpoint.weight, automatic ? UnitRadius(hitpoint) : 1.0F});
+                                 hitpoint.weight,
+                                 automatic ? HeldWidth(hitpoint.footprint) : 1.0F});
           };
           keep(path.hitpoint, per_tile[tile].rows);
           keep(path.caustic, per_tile[tile].caustic_rows);
+          if (const EyeSegment& segment = path.segment; !IsBlack(segment.weight)) {
+            Tile& of = per_tile[tile];
+            const float unit =
+                automatic ? kSegmentShare * HeldWidth(segment.to_footprint) : kSegmentShare;
+            of.segment_rows.rows.push_back(
+                {pixel, segment.from, EncodeOctahedral({0, 0, 1}), segment.weight, unit});
+            of.segments.push_back({segment.to, static_cast<std::uint32_t>(segment.medium),
+                                   automatic
+                                       ? std::clamp(segment.from_footprint / segment.to_footprint,
+                                                    kLeastNarrowing, 1.0F)
+                                       : 1.0F});
+          }
         }
       }
     }
@@ -95,7 +116,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   std::size_t count = 0;
   bool has_textured_k = false;
   for (const Tile& tile : per_tile) {
-    count += tile.rows.rows.size() + tile.caustic_rows.rows.size();
+    count += tile.rows.rows.size() + tile.caustic_rows.rows.size() + tile.segments.size();
     out.block.caustic_rows += tile.caustic_rows.rows.size();
     for (const Rows* rows : {&tile.rows, &tile.caustic_rows}) {
       has_textured_k = has_textured_k ||
@@ -133,6 +154,11 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   if (out.block.caustic_rows > 0) {
     for (Tile& tile : per_tile)
       append(tile.caustic_rows);
+  }
+  for (Tile& tile : per_tile) {
+    if (tile.segments.empty()) continue;
+    append(tile.segment_rows);
+    out.block.segments.insert(out.block.segments.end(), tile.segments.begin(), tile.segments.end());
   }
   return out;
 }

@@ -30,7 +30,7 @@ struct PixelOfPass {
 
 RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan) {
   RadiusColumn of_hitpoints(pass.pixels.size());
-  const std::size_t first_caustic = of_hitpoints.size() - pass.block.caustic_rows;
+  const std::size_t first_caustic = pass.block.first_caustic();
   for (std::size_t row = 0; row < of_hitpoints.size(); ++row) {
     const float radius =
         row < first_caustic ? (*plan.radii)[pass.pixels[row]] : plan.caustic_radius;
@@ -61,12 +61,12 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   constexpr double kToBias = 1 / (1 - static_cast<double>(kInnerShare * kInnerShare));
   const double norm = Kernel{settings.kernel}.Norm();
   const double per_photon = norm / static_cast<double>(plan.photons_per_pass);
-  const std::size_t first_caustic = rows - pass.block.caustic_rows;
+  const std::size_t first_caustic = pass.block.first_caustic();
   const std::size_t evidence_here = sums.evidence().size() - kCommonColumns;
   for (std::size_t row = 0; row < rows; ++row) {
     const std::uint32_t pixel = pass.pixels[row];
-    const bool is_caustic = row >= first_caustic;
-    const float in_units = is_caustic ? plan.caustic_radius : (*plan.radii)[pixel];
+    const bool has_common_radius = row >= first_caustic;
+    const float in_units = has_common_radius ? plan.caustic_radius : (*plan.radii)[pixel];
     const auto radius = static_cast<double>(HitpointRadius(in_units, pass.unit_radii[row]));
     const double to_density = per_photon / (radius * radius);
     PixelOfPass& of_pixel = brought[pixel];
@@ -79,7 +79,7 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
     const double blur = static_cast<double>(sums.evidence()[kBlurColumn][row]) * kToBias;
     of_pixel.bias += blur * luminance_per_quantum * to_density *
                      static_cast<double>(Luminance(pass.weights[row]));
-    if (is_caustic) continue;
+    if (has_common_radius) continue;
     set(kPhotonCount, pixel, static_cast<double>(sums.counts()[row]));
     const auto unit_radius = static_cast<double>(in_units);
     set(kBlur, pixel, blur * norm / ((1 << kFluxBits) * unit_radius * unit_radius));

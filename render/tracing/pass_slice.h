@@ -21,7 +21,7 @@ namespace lucerna {
 struct RoundPlan {
   std::uint64_t photons_per_pass = 0;
   std::shared_ptr<const RadiusColumn> radii;  // [pixels of the crop window] in unit radii
-  float caustic_radius = 1;                   // of all caustic hitpoints, in unit radii
+  float caustic_radius = 1;  // of all caustic hitpoints and segments, in unit radii
 };
 
 // The radius of every hitpoint of a pass [scene units].

@@ -64,6 +64,11 @@ class PixelSampler {
     return KeyedRng(CombineKeys(key_ ^ 0x4341555354494353ULL, pass_));
   }
 
+  // Independent numbers for the choice of the segment in media.
+  [[nodiscard]] KeyedRng ForSegments() const {
+    return KeyedRng(CombineKeys(key_ ^ 0x5345474D454E5453ULL, pass_));
+  }
+
  private:
   std::uint64_t key_;
   std::uint64_t pass_;

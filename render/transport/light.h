@@ -105,6 +105,8 @@ class LightSet {
            const LightSelection& selection = {});
 
   [[nodiscard]] bool empty() const { return emitters_.empty(); }
+  // How many emitters there are.
+  [[nodiscard]] std::uint32_t size() const { return static_cast<std::uint32_t>(emitters_.size()); }
   [[nodiscard]] const Emitter& emitter(std::uint32_t number) const { return emitters_[number]; }
   // [W] per channel, of all emitters.
   [[nodiscard]] Rgb TotalPower() const { return total_power_; }

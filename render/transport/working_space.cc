@@ -1,5 +1,7 @@
 #include "render/transport/working_space.h"
 
+#include <algorithm>
+
 #include "render/math/color_space.h"
 
 namespace lucerna {
@@ -7,6 +9,15 @@ namespace lucerna {
 Scene InWorkingSpace(Scene scene) {
   for (Material& material : scene.materials)
     material.ForEachColor([](Rgb& color) { color = ToWorking(color); });
+  // Coefficients are no colours, but mix as those of a thin layer do.
+  const auto coefficients = [](Rgb rec709) {
+    const Rgb mixed = ToWorking(rec709);
+    return Rgb{std::max(mixed.r, 0.0F), std::max(mixed.g, 0.0F), std::max(mixed.b, 0.0F)};
+  };
+  for (Medium& medium : scene.media) {
+    medium.absorption = coefficients(medium.absorption);
+    medium.scattering = coefficients(medium.scattering);
+  }
   for (AreaLight& light : scene.area_lights)
     light.radiance = ToWorking(light.radiance);
   ForEachDeltaList(scene, [](auto& lights) {

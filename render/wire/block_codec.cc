@@ -11,7 +11,7 @@ namespace lucerna {
 namespace {
 
 // The last character is the version.
-constexpr std::string_view kBlockMagic = "LHB2";
+constexpr std::string_view kBlockMagic = "LHB3";
 constexpr std::string_view kRadiiMagic = "LRC1";
 constexpr std::uint32_t kLargestOctahedralHalf = 65534;
 
@@ -57,6 +57,7 @@ std::string EncodeHitpointBlock(const HitpointBlock& block) {
   writer.Varint(block.glossy.size());
   writer.Varint(block.caustic_rows);
   writer.Varint(block.textured_k.size());
+  writer.Varint(block.segments.size());
   for (int axis = 0; axis < 3; ++axis) {
     WriteDeltas(writer, block.size(), [&](std::size_t i) {
       return std::bit_cast<std::uint32_t>(block.positions[i][axis]);
@@ -76,6 +77,16 @@ std::string EncodeHitpointBlock(const HitpointBlock& block) {
                   [&](std::size_t i) { return std::bit_cast<std::uint32_t>(k[i][channel]); });
     }
   }
+  if (const auto& segments = block.segments; !segments.empty()) {
+    for (int axis = 0; axis < 3; ++axis) {
+      WriteDeltas(writer, segments.size(), [&](std::size_t i) {
+        return std::bit_cast<std::uint32_t>(segments[i].end[axis]);
+      });
+    }
+    WriteDeltas(writer, segments.size(), [&](std::size_t i) { return segments[i].medium; });
+    WriteDeltas(writer, segments.size(),
+                [&](std::size_t i) { return std::bit_cast<std::uint32_t>(segments[i].narrowing); });
+  }
   return writer.Take();
 }
 
@@ -86,7 +97,9 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
   const std::uint64_t glossy_rows = reader.Varint();
   const std::uint64_t caustic_rows = reader.Varint();
   const std::uint64_t textured_rows = reader.Varint();
-  if (rows > max_hitpoints || glossy_rows > rows || caustic_rows > glossy_rows) {
+  const std::uint64_t segment_rows = reader.Varint();
+  if (rows > max_hitpoints || segment_rows > rows || glossy_rows > rows - segment_rows ||
+      caustic_rows > glossy_rows) {
     return Malformed("more rows than there can be");
   }
   if (textured_rows != 0 && textured_rows != glossy_rows) {
@@ -117,14 +130,15 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
     block.glossy.resize(glossy_rows);
     for (std::size_t i = 0; i < glossy_rows; ++i) {
       block.glossy[i] = {hitpoints[i], materials[i], to_eye[i], shading_normals[i]};
-      if (hitpoints[i] >= rows || (i > 0 && hitpoints[i] <= hitpoints[i - 1])) {
+      if (hitpoints[i] >= rows - segment_rows || (i > 0 && hitpoints[i] <= hitpoints[i - 1])) {
         return Malformed("glossy rows are out of order or out of range");
       }
       if (!IsOctahedral(to_eye[i]) || !IsOctahedral(shading_normals[i])) {
         return Malformed("a glossy direction is not a direction");
       }
     }
-    if (caustic_rows > 0 && hitpoints[glossy_rows - caustic_rows] != rows - caustic_rows) {
+    if (caustic_rows > 0 &&
+        hitpoints[glossy_rows - caustic_rows] != rows - segment_rows - caustic_rows) {
       return Malformed("a caustic hitpoint is not glossy");
     }
   }
@@ -141,6 +155,26 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
         return Malformed("an absorption is not a number");
       }
       block.textured_k[i] = k;
+    }
+  }
+  if (segment_rows > 0) {
+    const Column end_x = ReadDeltas(reader, segment_rows);
+    const Column end_y = ReadDeltas(reader, segment_rows);
+    const Column end_z = ReadDeltas(reader, segment_rows);
+    const Column media = ReadDeltas(reader, segment_rows);
+    const Column narrowing = ReadDeltas(reader, segment_rows);
+    if (!reader.ok()) return Malformed("truncated or damaged segments");
+    block.segments.resize(segment_rows);
+    for (std::size_t i = 0; i < segment_rows; ++i) {
+      MediumSegment& segment = block.segments[i];
+      segment.end = {std::bit_cast<float>(end_x[i]), std::bit_cast<float>(end_y[i]),
+                     std::bit_cast<float>(end_z[i])};
+      segment.medium = media[i];
+      segment.narrowing = std::bit_cast<float>(narrowing[i]);
+      if (!IsFinite(segment.end)) return Malformed("the end of a segment is not finite");
+      if (!(segment.narrowing > 0 && segment.narrowing <= 1)) {
+        return Malformed("a segment's radius does not grow");
+      }
     }
   }
   if (!reader.finished()) return Malformed("bytes are left over");

@@ -78,9 +78,6 @@ TEST_F(SharedScenesTest, SaysWhatItCannotRead) {
   const auto errors = [this](const char* path) {
     return std::string(Parse(path).ToStatus().message());
   };
-  EXPECT_THAT(errors("cornell-box-variants/cornell-box-volume.pbrt"),
-              HasSubstr("participating media are not supported"));
-  EXPECT_THAT(errors("volumetric-caustic/scene-v4.pbrt"), HasSubstr("participating media"));
   EXPECT_THAT(errors("coffee/scene-v4.pbrt"), HasSubstr("\"coateddiffuse\""));
   EXPECT_THAT(errors("classroom/scene-v4.pbrt"), HasSubstr("\"coateddiffuse\""));
   EXPECT_THAT(errors("staircase2/scene-v4.pbrt"), HasSubstr("\"coateddiffuse\""));

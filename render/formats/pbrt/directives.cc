@@ -79,6 +79,7 @@ UnfinishedScene DirectiveReader::Read(const std::string& main_path, std::string_
   if (IsStopped()) return std::move(unfinished_);
   ReportUnclosedScopes();
   ReportNamedMaterials();
+  ReportNamedMedia();
   scene_.film.exposure *= exposure_time_s_;
   if (!in_world_) unfinished_.missing.emplace_back("the scene has no WorldBegin");
   return std::move(unfinished_);
@@ -183,6 +184,15 @@ void DirectiveReader::ReportNamedMaterials() {
   }
 }
 
+void DirectiveReader::ReportNamedMedia() {
+  for (const auto& [name, medium] : named_media_) {
+    if (!medium.is_defined) {
+      diagnostics_.Error(medium.location, Concat("there is no medium ", Quoted(name),
+                                                 "; define it by MakeNamedMedium"));
+    }
+  }
+}
+
 // ---- arguments
 
 ParameterList DirectiveReader::ListFor(const Arguments& arguments, std::string_view type,
@@ -249,12 +259,11 @@ bool DirectiveReader::OnAttribute(Arguments& arguments) {
   if (target == "light") known = AttributeTarget::kLight;
   if (target == "material") known = AttributeTarget::kMaterial;
   if (target == "texture") known = AttributeTarget::kTexture;
+  if (target == "medium") known = AttributeTarget::kMedium;
   if (!known.has_value()) {
-    if (target != "medium") {
-      arguments.Error(Concat("Attribute takes shape, light, material, medium or texture, not ",
-                             Quoted(target)));
-    }
-    return true;  // media are refused where they are made
+    arguments.Error(
+        Concat("Attribute takes shape, light, material, medium or texture, not ", Quoted(target)));
+    return true;
   }
   // The newest first: of two defaults of one name the later counts.
   auto all = std::make_shared<std::vector<Parameter>>(std::move(parameters));

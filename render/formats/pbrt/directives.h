@@ -62,6 +62,7 @@ class DirectiveReader {
   [[nodiscard]] bool IsStopped() const { return is_stopped_ || assets_.is_over_limit(); }
   void ReportUnclosedScopes();
   void ReportNamedMaterials();
+  void ReportNamedMedia();
 
   // Arguments.
   ParameterList ListFor(const Arguments& arguments, std::string_view type,
@@ -110,6 +111,12 @@ class DirectiveReader {
     bool is_used = false;
   };
   NamedMaterial& Named(const std::string& name, const SourceLocation& location);
+  struct NamedMedium {
+    std::int32_t index = kNoMedium;
+    SourceLocation location;  // where it is first mentioned
+    bool is_defined = false;
+  };
+  NamedMedium& MediumCalled(const std::string& name, const SourceLocation& location);
   // Reports an error and stops the reading when the scene has no room for these shapes.
   bool HasRoomFor(const ShapeSet& shapes, Arguments& arguments);
   void AddShapes(ShapeSet shapes);
@@ -147,6 +154,7 @@ class DirectiveReader {
   double exposure_time_s_ = 1;
   std::map<std::string, Transform> coordinate_systems_;
   std::map<std::string, NamedMaterial> named_materials_;
+  std::map<std::string, NamedMedium> named_media_;
   TextureNames textures_;
   std::set<std::string> float_textures_;
   std::map<std::string, ShapeSet> objects_;

@@ -17,8 +17,8 @@
 namespace lucerna {
 
 // What the directive Attribute gives default parameters to.
-enum class AttributeTarget : std::uint8_t { kShape, kLight, kMaterial, kTexture };
-inline constexpr std::size_t kAttributeTargets = 4;
+enum class AttributeTarget : std::uint8_t { kShape, kLight, kMaterial, kTexture, kMedium };
+inline constexpr std::size_t kAttributeTargets = 5;
 
 // What AttributeBegin saves and AttributeEnd restores. Large parts are shared, so that a copy is
 // small however much the text put into them.
@@ -30,6 +30,9 @@ struct GraphicsState {
   std::int32_t material = 0;
   std::shared_ptr<const AreaEmission> area_emission;
   std::int32_t area_light = kNoAreaLight;  // of an emission without power: the same everywhere
+  // Of shapes, on the sides that their outward normals point away from and to; a camera and lights
+  // without extent are in the outer one.
+  std::int32_t medium_inside = kNoMedium, medium_outside = kNoMedium;
   std::array<Defaults, kAttributeTargets> defaults;
 
   [[nodiscard]] Defaults& DefaultsOf(AttributeTarget target) {

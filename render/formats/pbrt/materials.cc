@@ -25,6 +25,11 @@ using MaterialReader = void (*)(ParameterList&, const TextureNames&, Material&);
 constexpr Kind<MaterialReader> kKinds[] = {LUCERNA_MATERIALS(LUCERNA_READER)};
 #undef LUCERNA_READER
 
+// An interface has three names.
+std::string_view InOneWord(std::string_view type) {
+  return type.empty() || type == "none" ? "interface" : type;
+}
+
 }  // namespace
 
 void ReadRoughness(ParameterList& parameters, Material& material) {
@@ -64,17 +69,14 @@ bool IsPbrtV3Material(std::string_view type) {
 }
 
 bool IsSupportedMaterial(std::string_view type) {
-  return FindReader<MaterialReader>(kKinds, type) != nullptr;
+  return FindReader<MaterialReader>(kKinds, InOneWord(type)) != nullptr;
 }
 
 Material ReadMaterial(std::string_view type, ParameterList& parameters, const TextureNames& names) {
   Material material;
-  const MaterialReader read = FindReader<MaterialReader>(kKinds, type);
+  const MaterialReader read = FindReader<MaterialReader>(kKinds, InOneWord(type));
   if (read == nullptr) {
-    parameters.Error(Concat(type.empty() || type == "interface" || type == "none"
-                                ? "lets light through unchanged, which is not supported"
-                                : "is not supported",
-                            "; ", SupportedKinds<MaterialReader>(kKinds)));
+    parameters.Error(Concat("is not supported; ", SupportedKinds<MaterialReader>(kKinds)));
     return material;
   }
   read(parameters, names, material);

@@ -7,6 +7,7 @@
 #include "render/formats/pbrt/directives.h"
 #include "render/formats/pbrt/lights.h"
 #include "render/formats/pbrt/materials.h"
+#include "render/formats/pbrt/media.h"
 #include "render/formats/pbrt/settings.h"
 #include "render/scene/shape_lists.h"
 
@@ -23,6 +24,7 @@ bool DirectiveReader::OnCamera(Arguments& arguments) {
   // Replace() lets only invertible transforms pass.
   scene_.camera.camera_to_world = graphics_.state().to_world.Inverse().value();
   coordinate_systems_["camera"] = scene_.camera.camera_to_world;
+  scene_.camera.medium = graphics_.state().medium_outside;
   return true;
 }
 
@@ -181,7 +183,14 @@ bool DirectiveReader::OnLightSource(Arguments& arguments) {
   if (!arguments.ReadTyped(type, parameters)) return false;
   ParameterList list = ListFor(arguments, type, std::move(parameters),
                                graphics_.state().DefaultsOf(AttributeTarget::kLight));
+  std::vector<std::size_t> before;
+  ForEachDeltaList(scene_, [&](const auto& lights) { before.push_back(lights.size()); });
   ReadLight(type, list, graphics_.state().to_world, assets_, scene_);
+  auto first = before.begin();
+  ForEachDeltaList(scene_, [&](auto& lights) {
+    for (std::size_t i = *first++; i < lights.size(); ++i)
+      lights[i].medium = graphics_.state().medium_outside;
+  });
   return true;
 }
 
@@ -193,7 +202,9 @@ bool DirectiveReader::OnShape(Arguments& arguments) {
   ParameterList list =
       ListFor(arguments, type, std::move(parameters), state.DefaultsOf(AttributeTarget::kShape));
   ShapePlacement placement = {
-      state.to_world, state.reverse_orientation, {state.material, state.area_light}};
+      state.to_world,
+      state.reverse_orientation,
+      {state.material, state.area_light, state.medium_inside, state.medium_outside}};
   const bool emits = state.area_emission != nullptr;
   if (emits && open_object_ != nullptr) {
     list.Error("emits light inside an object, which is not supported; move it out of ObjectBegin");
@@ -288,16 +299,33 @@ bool DirectiveReader::OnTexture(Arguments& arguments) {
   return true;
 }
 
+DirectiveReader::NamedMedium& DirectiveReader::MediumCalled(const std::string& name,
+                                                            const SourceLocation& location) {
+  const auto [medium, is_new] = named_media_.try_emplace(name);
+  if (is_new) {
+    medium->second.index = static_cast<std::int32_t>(scene_.media.size());
+    medium->second.location = location;
+    scene_.media.emplace_back().name = name;
+  }
+  return medium->second;
+}
+
 bool DirectiveReader::OnMediumInterface(Arguments& arguments) {
   std::string inside;
   std::string outside;
   if (!arguments.ReadString("a name", inside)) return false;
-  if (arguments.tokens().Peek().kind == Token::Kind::kString &&
-      !arguments.ReadString("a name", outside))
+  // One name is that of both sides.
+  if (arguments.tokens().Peek().kind != Token::Kind::kString) {
+    outside = inside;
+  } else if (!arguments.ReadString("a name", outside)) {
     return false;
-  if (!inside.empty() || !outside.empty()) {
-    arguments.Error("participating media are not supported (MediumInterface)");
   }
+  // May be defined later.
+  const auto number_of = [&](const std::string& name) {
+    return name.empty() ? kNoMedium : MediumCalled(name, arguments.location()).index;
+  };
+  graphics_.state().medium_inside = number_of(inside);
+  graphics_.state().medium_outside = number_of(outside);
   return true;
 }
 
@@ -305,8 +333,14 @@ bool DirectiveReader::OnMakeNamedMedium(Arguments& arguments) {
   std::string name;
   std::vector<Parameter> parameters;
   if (!arguments.ReadString("a name", name) || !arguments.ReadParameters(parameters)) return false;
-  arguments.Error(
-      Concat("participating media are not supported (MakeNamedMedium ", Quoted(name), ")"));
+  ParameterList list = ListFor(arguments, name, std::move(parameters),
+                               graphics_.state().DefaultsOf(AttributeTarget::kMedium));
+  NamedMedium& named = MediumCalled(name, arguments.location());
+  if (named.is_defined) arguments.Error(Concat("the medium ", Quoted(name), " is defined twice"));
+  named.is_defined = true;
+  Medium medium = ReadMedium(list);
+  medium.name = name;
+  scene_.media[static_cast<std::size_t>(named.index)] = std::move(medium);
   return true;
 }
 

@@ -1,0 +1,50 @@
+#include "render/formats/pbrt/media.h"
+
+#include <optional>
+
+#include "render/base/text.h"
+
+namespace lucerna {
+namespace {
+
+// A phase function that scatters into a single direction has no density.
+constexpr Range kMeanCosine = {-0.999, 0.999};
+
+}  // namespace
+
+Medium ReadMedium(ParameterList& parameters) {
+  Medium medium;
+  const std::optional<std::string> type = parameters.FindString("type");
+  if (!type.has_value()) {
+    if (!parameters.Has("type")) parameters.Error("needs \"string type\"");
+    return medium;
+  }
+  if (*type != "homogeneous") {
+    parameters.Error(
+        "type", Concat("is ", Quoted(*type), ", which is not supported; there is homogeneous"));
+    return medium;
+  }
+  if (parameters.Has("preset")) {
+    parameters.Error("preset",
+                     "is not supported; give sigma_a and sigma_s, measured per scene unit");
+    parameters.Ignore("preset");
+  }
+  // As pbrt-v4: each 1 where it is not given.
+  medium.absorption = parameters.FindOpticalConstant("sigma_a", kZeroOrMore).value_or(Gray(1));
+  medium.scattering = parameters.FindOpticalConstant("sigma_s", kZeroOrMore).value_or(Gray(1));
+  const auto scale = static_cast<float>(parameters.Float("scale", 1, kZeroOrMore));
+  medium.absorption *= scale;
+  medium.scattering *= scale;
+  if (!IsFinite(medium.Extinction())) parameters.Error("scale", "makes a coefficient too large");
+  medium.g = static_cast<float>(parameters.Float("g", 0, kMeanCosine));
+  if (const std::optional<Rgb> emitted = parameters.FindEmission("Le");
+      emitted.has_value() && !IsBlack(*emitted) &&
+      parameters.Float("Lescale", 1, kZeroOrMore) > 0) {
+    parameters.Error("Le", "is not supported: media do not emit light here");
+  }
+  parameters.Ignore("Lescale");
+  parameters.WarnOfUnread();
+  return medium;
+}
+
+}  // namespace lucerna

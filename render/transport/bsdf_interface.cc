@@ -1,0 +1,29 @@
+// The border between two media: paths pass it before they could scatter (transport/media.h).
+#include "render/transport/bsdf_kinds.h"
+
+namespace lucerna {
+
+bool InterfaceBsdf::Sample(const Material& /*material*/, Vec3 /*wo*/, float /*u_lobe*/,
+                           float /*u1*/, float /*u2*/, Carried /*carried*/,
+                           BsdfSample& /*sample*/) {
+  return false;
+}
+
+Rgb InterfaceBsdf::Evaluate(const Material& /*material*/, Vec3 /*wo*/, Vec3 /*wi*/,
+                            Carried /*carried*/) {
+  return {};
+}
+
+float InterfaceBsdf::Pdf(const Material& /*material*/, Vec3 /*wo*/, Vec3 /*wi*/) {
+  return 0;
+}
+
+Rgb InterfaceBsdf::Albedo(const Material& /*material*/) {
+  return {};
+}
+
+float InterfaceBsdf::ReflectedShare(const Material& /*material*/, float /*cos_o*/) {
+  return 0;
+}
+
+}  // namespace lucerna

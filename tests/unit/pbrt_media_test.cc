@@ -1,0 +1,142 @@
+// Media as pbrt files name them.
+#include <map>
+#include <string>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "render/formats/read_scene.h"
+#include "render/wire/block_codec.h"
+#include "tests/support/memory_files.h"
+
+namespace lucerna {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kTriangle =
+    "Shape \"trianglemesh\" \"point3 P\" [0 0 0  1 0 0  0 1 0] \"integer indices\" [0 1 2]\n";
+constexpr const char* kFog =
+    "MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [0.1 0.2 0.3] "
+    "\"rgb sigma_s\" [1 2 3] \"float scale\" 2 \"float g\" -0.4\n";
+
+ParsedScene Parse(const std::string& text) {
+  MemoryFiles files(std::map<std::string, std::string>{{"s.pbrt", text}});
+  return ReadScene(files, "s.pbrt", {});
+}
+Scene Read(const std::string& text) {
+  ParsedScene parsed = Parse(text);
+  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+  return parsed.scene;
+}
+std::string Said(const std::string& world) {
+  std::string all;
+  for (const Diagnostic& diagnostic :
+       Parse("Camera \"perspective\" WorldBegin\n" + world).diagnostics)
+    all += diagnostic.ToString() + "\n";
+  return all;
+}
+
+TEST(PbrtMediaTest, HaveTheirCoefficients) {
+  const Scene scene = Read(std::string("Camera \"perspective\" WorldBegin\n") + kFog +
+                           "MediumInterface \"fog\" \"\" Material \"dielectric\"\n" + kTriangle);
+  ASSERT_EQ(scene.media.size(), 1U);
+  EXPECT_EQ(scene.media[0].name, "fog");
+  EXPECT_FLOAT_EQ(scene.media[0].absorption.g, 0.4F);
+  EXPECT_FLOAT_EQ(scene.media[0].scattering.b, 6);
+  EXPECT_FLOAT_EQ(scene.media[0].g, -0.4F);
+}
+
+TEST(PbrtMediaTest, AreAroundCameraAndLightsAndOnTheSidesOfShapes) {
+  const Scene scene = Read(std::string(kFog) +
+                           "MediumInterface \"\" \"fog\" Camera \"perspective\" WorldBegin\n"
+                           "LightSource \"point\" AttributeBegin MediumInterface \"\" \"\"\n"
+                           "LightSource \"spot\" AttributeEnd\n" +
+                           kTriangle + "MediumInterface \"fog\"\n" + kTriangle);
+  EXPECT_EQ(scene.camera.medium, 0);
+  EXPECT_EQ(scene.point_lights[0].medium, 0);
+  EXPECT_EQ(scene.spot_lights[0].medium, kNoMedium);
+  EXPECT_EQ(scene.meshes[0].traits.medium_inside, kNoMedium);
+  EXPECT_EQ(scene.meshes[0].traits.medium_outside, 0);
+  EXPECT_TRUE(scene.meshes[0].traits.SeparatesMedia());
+  EXPECT_FALSE(scene.meshes[1].traits.SeparatesMedia());
+}
+
+TEST(PbrtMediaTest, AreForgottenWhereNothingIsInThem) {
+  const Scene scene = Read(std::string("Camera \"perspective\" WorldBegin\n") + kFog + kTriangle);
+  EXPECT_TRUE(scene.media.empty());
+}
+
+TEST(PbrtMediaTest, InterfacesThatSeparateNoneAreDropped) {
+  for (const char* name : {"interface", "none", ""}) {
+    const std::string interface = std::string("Material \"") + name + "\"\n";
+    const Scene scene = Read(std::string("Camera \"perspective\" WorldBegin\n") + kFog + kTriangle +
+                             interface + kTriangle + "MediumInterface \"fog\" \"\"\n" + kTriangle);
+    ASSERT_EQ(scene.meshes.size(), 2U) << name;
+    EXPECT_TRUE(scene.meshes[1].traits.SeparatesMedia());
+  }
+  EXPECT_THAT(Said(std::string("AreaLightSource \"diffuse\" Material \"interface\"\n") + kTriangle),
+              HasSubstr("warning: shapes of the material interface emit no light: 1"));
+}
+
+// The unit of a scene that is a million kilometres wide is not a metre: coefficients follow.
+TEST(PbrtMediaTest, KeepTheirOpticalThicknessInAnotherUnit) {
+  const Scene scene = Read(
+      std::string("Camera \"perspective\" WorldBegin\n") + kFog +
+      "MediumInterface \"fog\" \"\" Material \"dielectric\" Scale 1e15 1e15 1e15\n" + kTriangle);
+  ASSERT_NE(scene.unit, 1);
+  EXPECT_FLOAT_EQ(scene.media[0].scattering.r, static_cast<float>(2 * scene.unit));
+}
+
+TEST(PbrtMediaTest, WhatIsWrongIsSaid) {
+  EXPECT_THAT(Said("MakeNamedMedium \"m\""), HasSubstr("needs \"string type\""));
+  EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"nanovdb\""),
+              HasSubstr("\"nanovdb\", which is not supported; there is homogeneous"));
+  EXPECT_THAT(Said("MediumInterface \"m\" \"\""), HasSubstr("there is no medium \"m\""));
+  EXPECT_THAT(Said(std::string(kFog) + kFog), HasSubstr("is defined twice"));
+  EXPECT_THAT(
+      Said("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"string preset\" \"Milk\""),
+      HasSubstr("preset"));
+  EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"rgb Le\" [1 1 1]"),
+              HasSubstr("media do not emit light"));
+  EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"float g\" 1"),
+              HasSubstr("g"));
+}
+
+HitpointBlock BlockWithSegments() {
+  HitpointBlock block;
+  block.positions = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
+  block.normals_oct = {0, 0, 0};
+  block.segments = {{{4, 5, 6}, 1, 0.5F}, {{7, 8, 9}, 0, 1}};
+  return block;
+}
+
+TEST(BlockCodecTest, BringsSegmentsBack) {
+  const HitpointBlock block = BlockWithSegments();
+  EXPECT_EQ(block.first_segment(), 1U);
+  const auto decoded = DecodeHitpointBlock(EncodeHitpointBlock(block), block.size());
+  ASSERT_TRUE(decoded.ok()) << decoded.status();
+  EXPECT_EQ(*decoded, block);
+}
+
+TEST(BlockCodecTest, RefusesSegmentsThatAreNone) {
+  const auto is_refused = [](const HitpointBlock& block) {
+    return DecodeHitpointBlock(EncodeHitpointBlock(block), 3).status().code() ==
+           absl::StatusCode::kInvalidArgument;
+  };
+  HitpointBlock block = BlockWithSegments();
+  block.segments[0].end.x = HUGE_VALF;
+  EXPECT_TRUE(is_refused(block));
+  block = BlockWithSegments();
+  block.segments[1].narrowing = 1.5F;
+  EXPECT_TRUE(is_refused(block));
+  block.segments[1].narrowing = 0;
+  EXPECT_TRUE(is_refused(block));
+  block = BlockWithSegments();
+  block.segments.push_back({});
+  block.segments.push_back({});
+  EXPECT_TRUE(is_refused(block));
+}
+
+}  // namespace
+}  // namespace lucerna

@@ -1,0 +1,36 @@
+// What some consecutive hitpoints have gathered, and the random bits of their pairs with photons.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace lucerna {
+
+inline constexpr std::size_t kRowsPerPiece = 2048;
+
+// Columns as in Accumulation.
+struct GatherPiece {
+  std::vector<std::uint32_t> hitpoints;
+  std::vector<std::uint32_t> counts;
+  std::array<std::vector<std::int64_t>, 3> flux;
+  std::vector<std::vector<std::int64_t>> evidence;
+  std::uint64_t pairs = 0;
+  std::uint64_t excess = 0;
+};
+
+// 64 random bits that belong to a (photon, hitpoint) pair.
+[[nodiscard]] inline std::uint64_t PairBits(std::uint32_t photon_key, std::uint32_t hitpoint) {
+  std::uint64_t x =
+      (static_cast<std::uint64_t>(photon_key) << 32 | hitpoint) * 0x9E3779B97F4A7C15ULL;
+  x = (x ^ (x >> 32)) * 0xD6E8FEB86659FD93ULL;
+  return x ^ (x >> 32);
+}
+// Of these, 21 for each channel (RoundDithered).
+[[nodiscard]] inline std::uint32_t DitherOf(std::uint64_t pair_bits, int channel) {
+  constexpr std::uint64_t kMask = (1U << 21) - 1;
+  return static_cast<std::uint32_t>((pair_bits >> (21 * channel)) & kMask);
+}
+
+}  // namespace lucerna

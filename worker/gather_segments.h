@@ -1,0 +1,108 @@
+// What do segments of eye paths find among the photons that media scattered?
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "render/base/parallel.h"
+#include "render/estimate/evidence.h"
+#include "render/estimate/hitpoint_block.h"
+#include "render/math/fixed_point.h"
+#include "render/scene/medium.h"
+#include "render/transport/media.h"
+#include "worker/gather_piece.h"
+#include "worker/photon_tree.h"
+
+namespace lucerna {
+
+// The beam radiance estimate (Jarosz, Zwicker & Jensen 2008) with radii that grow along the segment
+// as the width of a pixel does: a photon of flux Φ, scattered at distance t along the segment and d
+// from it, adds
+//
+//   Φ p(θ) T(t) K(d² / r(t)²) r² / r(t)²
+//
+// where p is the phase function, T the transmittance from the beginning, K the kernel's shape and r
+// the radius at the end, by whose square all sums are divided later. Photons carry the flux that
+// was scattered. Rows as in Gather, with zeros for the radius controller's evidence: radii of
+// segments follow a schedule (Knaus & Zwicker 2011, "Progressive Photon Mapping: A Probabilistic
+// Approach"), with the exponent of surfaces, because the kernel has two dimensions too.
+template <typename GatherKernel>
+std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const RadiusColumn& radii,
+                                        const PhotonTree& photons,
+                                        std::span<std::uint8_t> was_found,
+                                        const std::vector<Medium>& media, const FluxScale& scale,
+                                        std::size_t evidence_columns, ThreadTeam& team,
+                                        const std::atomic<bool>& stop) {
+  const std::size_t first_row = block.first_segment();
+  const std::size_t count = block.segments.size();
+  std::vector<GatherPiece> pieces((count + kRowsPerPiece - 1) / kRowsPerPiece);
+  const float quanta_per_luminance = 1 / Luminance(scale.watts_per_quantum);
+  constexpr float kInnerArea = kInnerShare * kInnerShare;
+
+  const auto gather_row = [&](std::size_t segment_number, GatherPiece& piece) {
+    const MediumSegment& segment = block.segments[segment_number];
+    const std::size_t row = first_row + segment_number;
+    const auto hitpoint = static_cast<std::uint32_t>(row);
+    const Medium& medium = media[segment.medium];
+    const Vec3 way = segment.end - block.positions[row];
+    const float length = Length(way);
+    if (!(length > 0)) return;
+    const Vec3 direction = way / length;
+    const PhotonTree::Cone cone = {block.positions[row], direction, length,
+                                   segment.narrowing * radii[row], radii[row]};
+    std::uint32_t found = 0;
+    std::int64_t sum_r = 0;
+    std::int64_t sum_g = 0;
+    std::int64_t sum_b = 0;
+    std::int64_t blur = 0;
+    photons.ForEachWithin(
+        cone, [&](std::size_t i, const ScatteredPhoton& photon, float t, float t2, float radius) {
+          const float cosine = Dot(photon.arrival, direction);
+          const float widening = radii[row] / radius;
+          const Rgb flux = photon.flux * medium.Transmittance(t) *
+                           (PhaseHenyeyGreenstein(cosine, medium.g) * widening * widening);
+          if (!scale.HasRoomFor(flux)) {
+            ++piece.excess;
+            return;
+          }
+          const std::atomic_ref<std::uint8_t> mark(was_found[i]);
+          if (mark.load(std::memory_order_relaxed) == 0) mark.store(1, std::memory_order_relaxed);
+          const float whole = GatherKernel::Shape(t2);
+          const float inner_t2 = t2 / kInnerArea;
+          const float inner = inner_t2 < 1 ? GatherKernel::Shape(inner_t2) / kInnerArea : 0;
+          const std::uint64_t bits = PairBits(photon.key, hitpoint);
+          const Rgb quanta = flux * scale.quanta_per_watt * whole;
+          sum_r += RoundDithered(quanta.r, DitherOf(bits, 0));
+          sum_g += RoundDithered(quanta.g, DitherOf(bits, 1));
+          sum_b += RoundDithered(quanta.b, DitherOf(bits, 2));
+          blur += std::llrint(Luminance(flux) * quanta_per_luminance * (whole - inner));
+          ++found;
+        });
+    if (found == 0) return;
+    piece.hitpoints.push_back(hitpoint);
+    piece.counts.push_back(found);
+    piece.flux[0].push_back(sum_r);
+    piece.flux[1].push_back(sum_g);
+    piece.flux[2].push_back(sum_b);
+    for (std::size_t column = 0; column < evidence_columns; ++column)
+      piece.evidence[column].push_back(column == kBlurColumn ? blur : 0);
+    piece.pairs += found;
+  };
+
+  team.For(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) {
+      pieces[p].evidence.resize(evidence_columns);
+      const std::size_t first = p * kRowsPerPiece;
+      const std::size_t last = std::min(count, first + kRowsPerPiece);
+      for (std::size_t i = first; i < last && !stop.load(std::memory_order_relaxed); ++i)
+        gather_row(i, pieces[p]);
+    }
+  });
+  return pieces;
+}
+
+}  // namespace lucerna
