@@ -86,12 +86,12 @@ class Marker {
     }
   }
 
-  // Half a pixel more than filter and blur reach: steps along edges are as long.
+  // A quarter of a pixel more than filter and blur reach: steps along edges are half a pixel.
   void Mark(double x, double y, double blur) {
     if (!(blur <= kMostBlur)) return;
     const auto range = [&](double at, double reach, int size) {
-      const double low = std::ceil(at - reach - blur - 1);
-      const double high = std::floor(at + reach + blur);
+      const double low = std::ceil(at - reach - blur - 0.75);
+      const double high = std::floor(at + reach + blur - 0.25);
       return std::array<int, 2>{static_cast<int>(std::clamp(low, 0.0, static_cast<double>(size))),
                                 static_cast<int>(std::clamp(high, -1.0, size - 1.0))};
     };

@@ -60,8 +60,9 @@ void FilmSpread::Prepare(ThreadTeam& team) {
   const BrightOutlines outlines = FindBrightOutlines(tracer_);
   const double pixels = static_cast<double>(tracer_.settings().width) *
                         static_cast<double>(tracer_.settings().height);
-  const double affordable = outlines.count > 0 ? pixels / (2 * static_cast<double>(outlines.count))
-                                               : static_cast<double>(kMostBrightPaths);
+  const double affordable = outlines.count > 0
+                                ? kBrightPathsAPixel * pixels / static_cast<double>(outlines.count)
+                                : static_cast<double>(kMostBrightPaths);
   bright_paths_ = static_cast<int>(std::min<double>(affordable, kMostBrightPaths));
   if (bright_paths_ >= 2) {
     is_near_outline_.resize(columns * rows);

@@ -30,8 +30,10 @@
 
 namespace lucerna {
 
-// As many where outlines are in few pixels: all together are at most half as many as pixels.
+// As many where outlines are in few pixels: all together are at most a sixteenth as many as pixels,
+// but for large shapes that are given by a formula.
 inline constexpr int kMostBrightPaths = 16;
+inline constexpr double kBrightPathsAPixel = 1.0 / 16;
 
 class FilmSpread {
  public:

@@ -188,20 +188,19 @@ TEST(FilmSpreadTest, GivesACropWindowWhatTheWholeImageHas) {
   }
 }
 
-// A corner of the light covers a thousandth of a pixel: a single path a pass would meet it in two
-// of 2048 passes, and the mean of those would be off by 70 % and more.
+// A corner of the light covers a thousandth of a pixel: a single path a pass would meet it in one of
+// two passes of 1000. Outlines are near four pixels of 256, which leaves four paths for each.
 TEST(FilmSpreadTest, KnowsHowMuchOfAPixelTheCornerOfALightCovers) {
   constexpr int kPasses = 512;
-  const FilmRectangle light = {5.97, 7.2, 9, 7.2333};
+  constexpr int kPaths = 4;
+  const FilmRectangle light = {5.97, 7.2, 6.2, 7.2333};
   const Scene scene = SceneWithLight(light, Filter(PixelFilter::Kind::kBox, 0.5F));
   const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
   const Traced traced = TraceManyPasses(scene, settings, kPasses);
   const double share = 0.03 * 0.0333;
-  const double expected = kRadiance * share;
-  // The deviation of a mean over kMostBrightPaths independent paths a pass.
-  const double bound = kRadiance * std::sqrt(share / (kMostBrightPaths * kPasses));
-  EXPECT_NEAR(traced.mean[7 * kSize + 5], expected, 3 * bound);
-  EXPECT_LT(traced.deviation[7 * kSize + 5], kRadiance * std::sqrt(2 * share / kMostBrightPaths));
+  const double deviation = kRadiance * std::sqrt(share / kPaths);
+  EXPECT_NEAR(traced.mean[7 * kSize + 5], kRadiance * share, 3 * deviation / std::sqrt(kPasses));
+  EXPECT_LT(traced.deviation[7 * kSize + 5], 1.2 * deviation);
 }
 
 TEST(FilmSpreadTest, IsTooDearWhereFiltersAreVeryWide) {
