@@ -54,7 +54,7 @@ ParsedScene ReadScene(SceneFiles& files, const std::string& main_path, const Sce
   Diagnostics diagnostics;
   AssetReader assets(files, limits);
   const SourceLocation whole = {&main_path, 0, 0};
-  const StatusOr<std::string> text = assets.ReadBytes(main_path);
+  const StatusOr<std::string> text = assets.ReadText(main_path);
   if (!text.ok()) {
     diagnostics.Error(whole, std::string(text.status().message()));
     return {Scene(), diagnostics.Take()};
