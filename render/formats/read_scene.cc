@@ -50,8 +50,9 @@ std::string NamesOfFormats() {
 
 }  // namespace
 
-ParsedScene ReadScene(SceneFiles& files, const std::string& main_path, const SceneLimits& limits) {
-  Diagnostics diagnostics;
+ParsedScene ReadScene(SceneFiles& files, const std::string& main_path, const SceneLimits& limits,
+                      std::size_t max_of_each) {
+  Diagnostics diagnostics(max_of_each);
   AssetReader assets(files, limits);
   const SourceLocation whole = {&main_path, 0, 0};
   const StatusOr<std::string> text = assets.ReadText(main_path);

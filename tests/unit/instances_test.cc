@@ -107,7 +107,9 @@ TEST(InstancesTest, RaysMeetTheSameSurfaceAsOnCopies) {
     ++on_instances;
     const SurfacePoint p = one->SurfaceAt(ray, a);
     const SurfacePoint q = other->SurfaceAt(ray, b);
-    ASSERT_LT(Length(p.position - q.position), 1e-5F);
+    // Some forty roundings of numbers up to 8, and farther along the surface for grazing rays.
+    ASSERT_LT(Length(p.position - q.position),
+              40 * 8 * 0x1p-24F / std::abs(Dot(ray.direction, p.geometric_normal)));
     ASSERT_GT(Dot(p.geometric_normal, q.geometric_normal), 0.9999F);
     ASSERT_GT(Dot(p.shading_normal, q.shading_normal), 0.9999F);
     ASSERT_EQ(p.material, q.material);

@@ -173,7 +173,24 @@ TEST(PbrtShapesTest, SubdivisionSurfaces) {
   // pbrt-v4's normals are on the other side of the cross products.
   ExpectOutward(scene.meshes.at(0), {0, 0, 0}, -1);
   EXPECT_EQ(World(octahedron + " \"integer levels\" 1").TriangleCount(), 32U);
-  EXPECT_THAT(Said(octahedron + " \"integer levels\" 14"), HasSubstr("which are too many"));
+  EXPECT_THAT(Said(octahedron + " \"integer levels\" 14"),
+              HasSubstr("more than the memory for shapes holds"));
+}
+
+// A short text may ask for a lot: what does not fit is refused before it is made.
+TEST(PbrtShapesTest, WhatTakesTooMuchMemoryIsRefusedFirst) {
+  SceneLimits limits;
+  limits.max_shape_bytes = 2048;
+  const auto said = [&](const std::string& shape) {
+    MemoryFiles files({{"s.pbrt", "Camera \"perspective\" WorldBegin " + shape}});
+    return std::string(ReadScene(files, "s.pbrt", limits).ToStatus().message());
+  };
+  EXPECT_THAT(said("Shape \"loopsubdiv\" \"point3 P\" [0 0 0 1 0 0 0 1 0]"),
+              HasSubstr("splits it into 64 triangles"));
+  EXPECT_THAT(said("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]"),
+              HasSubstr("more than the memory for shapes holds"));
+  EXPECT_THAT(said("Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]"),
+              HasSubstr("more than the memory for shapes holds"));
 }
 
 // A straight curve of even width is a cylinder with round ends.

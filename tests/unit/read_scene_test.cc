@@ -68,6 +68,15 @@ std::string Gzip(const std::string& bytes) {
   return out;
 }
 
+TEST(ReadSceneTest, AsManyErrorsAreKeptAsTheCallerTakes) {
+  std::string text(kText);
+  for (int i = 0; i < 150; ++i)
+    text += "Unknown\n";
+  MemoryFiles files({{"s.pbrt", text}});
+  EXPECT_EQ(ReadScene(files, "s.pbrt").diagnostics.size(), 100U);
+  EXPECT_EQ(ReadScene(files, "s.pbrt", {}, 1000).diagnostics.size(), 150U);
+}
+
 TEST(ReadSceneTest, TextsMayBePackedByGzip) {
   MemoryFiles files({{"scene.pbrt.gz", Gzip(std::string(kText) + "Include \"part.pbrt.gz\"")},
                      {"part.pbrt.gz", Gzip("Shape \"sphere\" Shape \"disk\"")},

@@ -175,6 +175,13 @@ void ReadCurvePiece(const ShapeInput& input, ShapeSet& shapes) {
   }
   const std::vector<Bezier> segments = SegmentsOf(parameters, points);
   if (segments.empty()) return;
+  // Before they take the memory.
+  const std::uint64_t most = std::uint64_t{kMaxPieces} * sizeof(CurvePiece) * segments.size();
+  if (most > input.assets.limits().max_shape_bytes) {
+    parameters.Error("P", Concat("makes ", segments.size(),
+                                 " segments, which are more than the memory for shapes holds"));
+    return;
+  }
   if (!(from_width > 0) && !(to_width > 0)) {
     parameters.diagnostics().Note(parameters.location(),
                                   Concat(parameters.subject(), " has no width and is left out"));

@@ -29,6 +29,14 @@ void ReadBilinearMesh(const ShapeInput& input, ShapeSet& shapes) {
     parameters.Ignore(name);
   const bool has_positions = ReadPositions(parameters, 4, control);
   if (!ReadNormals(parameters, control) || !ReadUvs(parameters, control) || !has_positions) return;
+  // Before they take the memory.
+  constexpr std::uint64_t kBytesPerPatch = 16'384;
+  if (control.indices.size() / 4 > input.assets.limits().max_shape_bytes / kBytesPerPatch) {
+    parameters.Error("indices",
+                     Concat("make ", control.indices.size() / 4,
+                            " patches, which are more than the memory for shapes holds"));
+    return;
+  }
   TriangleMesh mesh;
   for (std::size_t i = 0; i + 3 < control.indices.size(); i += 4) {
     BilinearPatch patch;
@@ -51,8 +59,13 @@ void ReadLoopSubdivision(const ShapeInput& input, ShapeSet& shapes) {
   TriangleMesh control;
   if (!ReadPositions(parameters, 3, control)) return;
   const double triangles = std::ldexp(static_cast<double>(control.indices.size()) / 3, 2 * levels);
-  if (triangles > static_cast<double>(input.assets.limits().max_triangles) || triangles > 0x1p31) {
-    parameters.Error("levels", Concat("make ", triangles, " triangles, which are too many"));
+  // While it is made: neighbours are looked up in tables.
+  constexpr std::uint64_t kBytesPerTriangle = 256;
+  constexpr double kMaxTriangles = 0x1p24;
+  const auto room = static_cast<double>(input.assets.limits().max_shape_bytes / kBytesPerTriangle);
+  if (triangles > std::min(kMaxTriangles, room)) {
+    parameters.Error("levels", Concat("splits it into ", triangles,
+                                      " triangles, more than the memory for shapes holds"));
     return;
   }
   StatusOr<TriangleMesh> mesh = LoopSubdivide(control, levels);
