@@ -270,9 +270,7 @@ EyeSegment EyePathTracer::SegmentOf(const Ray& ray, float t, std::int32_t medium
   const float least = std::min({extinction.r, extinction.g, extinction.b});
   float end = std::min(t, kMostDiagonals * intersector_.bounds().Diagonal());
   if (least > 0) end = std::min(end, kMostFreePaths / least);
-  const auto footprint_at = [&](float length) {
-    return length * static_cast<float>(std::sqrt(pixel_width_ * pixel_height_));
-  };
+  const auto footprint_at = [&](float length) { return footprint_ + footprint_slope_ * length; };
   return {.from = ray.origin,
           .to = ray.origin + ray.direction * end,
           .medium = medium,

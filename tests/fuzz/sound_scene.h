@@ -58,8 +58,7 @@ namespace lucerna {
     if (mesh.traits.area_light != kNoAreaLight) return "the light of an object";
   }
   for (const InstancedObject& object : scene.objects) {
-    if (object.mesh_count == 0 ||
-        std::size_t{object.first_mesh} + object.mesh_count > scene.object_meshes.size()) {
+    if (std::size_t{object.first_mesh} + object.mesh_count > scene.object_meshes.size()) {
       return "an object";
     }
   }

@@ -5,10 +5,12 @@ forest: 400 instances of three trees of some 25,000 triangles each under a low s
 would be ten million triangles. hair: a ball with curves of all types on a table, lit by a lamp.
 
     python3 tests/tools/make_shape_scenes.py
+    python3 tests/tools/make_shape_scenes.py --large large.pbrt   # 25,250 instances, to measure memory
 """
 import math
 import pathlib
 import random
+import sys
 
 SCENES = pathlib.Path(__file__).resolve().parent.parent / "scenes"
 
@@ -112,5 +114,29 @@ Material "conductor" "float roughness" 0.1 "rgb reflectance" [0.75 0.5 0.25]
     return text
 
 
+def large():
+    rng = random.Random(1)
+    text = f"""LookAt 0 -60 30  0 0 0  0 0 1
+Camera "perspective" "float fov" 40
+Film "rgb" "integer xresolution" 160 "integer yresolution" 90
+WorldBegin
+LightSource "distant" "point3 from" [-1 -0.6 0.8] "point3 to" [0 0 0] "rgb L" [2 2 2]
+LightSource "infinite" "rgb L" [0.2 0.3 0.4]
+Shape "bilinearmesh" "point3 P" [-100 -100 0  100 -100 0  -100 100 0  100 100 0]
+ObjectBegin "ball"
+Shape "loopsubdiv" "integer levels" 6 "point3 P" [1 0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1]
+  "integer indices" [{OCTAHEDRON}]
+ObjectEnd
+"""
+    for _ in range(25250):
+        place = numbers([rng.uniform(-95, 95), rng.uniform(-95, 95), 0.3])
+        size = numbers([rng.uniform(0.2, 0.5) for _ in range(3)])
+        text += f'AttributeBegin Translate {place} Scale {size} ObjectInstance "ball" AttributeEnd\n'
+    return text
+
+
+if len(sys.argv) == 3 and sys.argv[1] == "--large":
+    pathlib.Path(sys.argv[2]).write_text(large())
+    sys.exit()
 for name, scene in [("forest", forest()), ("hair", hair())]:
     (SCENES / f"{name}.pbrt").write_text(scene)
