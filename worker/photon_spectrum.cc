@@ -21,8 +21,13 @@ float ReachOf(const Scene& scene, const RenderSettings& settings, const Bounds& 
   const Window window = ScreenWindow(scene.camera, settings.width, settings.height);
   const auto pixel = static_cast<float>((window.high_x - window.low_x) / settings.width);
   const float distance = Length(scene.camera.camera_to_world.Point({}) - bounds.Center());
-  return 2 * static_cast<float>(settings.initial_footprints) * pixel *
-         std::max(distance, 0.1F * bounds.Diagonal());
+  const float to_scene = std::max(distance, 0.1F * bounds.Diagonal());
+  if (scene.camera.kind != Camera::Kind::kPerspective) {
+    return static_cast<float>(2 * settings.initial_footprints *
+                              PixelFootprint(scene.camera, settings.width, settings.height,
+                                             static_cast<double>(to_scene)));
+  }
+  return 2 * static_cast<float>(settings.initial_footprints) * pixel * to_scene;
 }
 
 }  // namespace

@@ -37,6 +37,10 @@ std::string NameOf(const Emitter& light) {
 }
 
 std::string NameOfShape(const SurfacePoint& surface, const Scene& scene) {
+  if (surface.instance != kNoInstance) {
+    return absl::StrCat("triangle ", surface.primitive, " of a mesh of instance ",
+                        surface.instance);
+  }
   if (surface.geometry < scene.meshes.size()) {
     return absl::StrCat("triangle ", surface.primitive, " of mesh ", surface.geometry);
   }

@@ -35,7 +35,10 @@ Status Validate(const std::string& scene_path, bool strict, const OutputOptions&
   LUCERNA_RETURN_IF_ERROR(CheckNamesFile(scene_path));
   const ScenePath place = SplitScenePath(scene_path);
   DirectoryFiles files(place.folder);
-  const ParsedScene parsed = ReadScene(files, place.main);
+  // A program gets them all, up to what fits in memory.
+  constexpr std::size_t kMaxForPrograms = 1'000'000;
+  const ParsedScene parsed = ReadScene(
+      files, place.main, {}, output_options.json ? kMaxForPrograms : Diagnostics::kMaxOfEach);
   std::array<std::size_t, 3> counts{};
   for (const Diagnostic& diagnostic : parsed.diagnostics) {
     ++counts[static_cast<std::size_t>(diagnostic.severity)];

@@ -44,6 +44,7 @@ Walls WallsOf(const Scene& scene, const MaterialPredicate& is_wall) {
   Walls walls;
   std::vector<std::uint32_t> corners;
   for (const TriangleMesh& mesh : scene.meshes) {
+    if (!IsWhole(mesh.traits)) continue;
     if (!is_wall(scene.materials[static_cast<std::size_t>(mesh.traits.material)])) continue;
     const auto first = static_cast<std::uint32_t>(walls.positions.size());
     walls.positions.insert(walls.positions.end(), mesh.positions.begin(), mesh.positions.end());
@@ -209,8 +210,10 @@ std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene, const MaterialPr
     surfaces.emplace_back(std::move(placed));
   }
   ForEachAnalyticShape(scene, [&](const auto& shape) {
-    if constexpr (std::decay_t<decltype(shape)>::kIsClosed) {
-      if (is_wall(scene.materials[static_cast<std::size_t>(shape.traits.material)])) {
+    using Shape = std::decay_t<decltype(shape)>;
+    if constexpr (Shape::kIsClosed && !Shape::kIsThin) {
+      if (IsWhole(shape.traits) &&
+          is_wall(scene.materials[static_cast<std::size_t>(shape.traits.material)])) {
         surfaces.emplace_back(shape.center, shape.Reach(),
                               [shape](Double3 point) { return shape.SignedDistance(point); });
       }

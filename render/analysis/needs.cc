@@ -101,6 +101,7 @@ bool HasCurvedMirrors(const Scene& scene) {
   const auto scatters = [&](const ShapeTraits& traits) {
     return HasNarrowLobes(scene.materials[static_cast<std::size_t>(traits.material)]);
   };
+  // Meshes of objects count as flat (geometry/curvature.h).
   bool has_curved = std::ranges::any_of(scene.meshes, [&](const TriangleMesh& mesh) {
     return scatters(mesh.traits) && IsSmoothed(mesh);
   });
@@ -166,7 +167,11 @@ bool GathersOnOneFloor(const Scene& scene) {
   ForEachAnalyticShape(scene, [&](const auto& shape) {
     curves_gather = curves_gather || (!shape.kIsFlat && gathers(shape.traits));
   });
-  if (curves_gather) return false;
+  // The camera is one point here, and instances may gather anywhere.
+  if (curves_gather || !scene.instances.empty() ||
+      scene.camera.kind == Camera::Kind::kOrthographic) {
+    return false;
+  }
   const Bounds box = BoundsOf(scene);
   const double near = 1e-6 * static_cast<double>(std::max(MaxAbs(box.low), MaxAbs(box.high)));
   bool has_floor = false;
@@ -240,7 +245,7 @@ class NeedsFinder {
     FindRays();
     FindEyePaths();
     FindFrequency();
-    AddPartsNotRead();
+    AddRareParts();
     if (settings_.use_everything) ForceEverything();
     return std::move(needs_);
   }
@@ -268,9 +273,11 @@ class NeedsFinder {
             ? Concat("photons are gathered on ", Quoted(*glossy_), ", which is not diffuse")
             : std::string("all hitpoints are diffuse"));
 
-    const auto smoothed = std::ranges::count_if(scene_.meshes, IsSmoothed);
-    const bool has_normals = std::ranges::any_of(
-        scene_.meshes, [](const TriangleMesh& mesh) { return !mesh.normals.empty(); });
+    const auto smoothed = std::ranges::count_if(scene_.meshes, IsSmoothed) +
+                          std::ranges::count_if(scene_.object_meshes, IsSmoothed);
+    const auto has_vertex_normals = [](const TriangleMesh& mesh) { return !mesh.normals.empty(); };
+    const bool has_normals = std::ranges::any_of(scene_.meshes, has_vertex_normals) ||
+                             std::ranges::any_of(scene_.object_meshes, has_vertex_normals);
     Set(Part::kShadingNormals, smoothed > 0,
         smoothed > 0  ? Concat(smoothed, smoothed == 1 ? " mesh is" : " meshes are",
                                " smoothed by vertex normals")
@@ -423,7 +430,7 @@ class NeedsFinder {
                       : has_it ? why
                                : why_not));
     };
-    const std::size_t shapes = ShapeCount(scene_);
+    const std::size_t shapes = ShapeCount(scene_) + scene_.instances.size();
     set(Part::kOccluderEdges, shapes > 1 || scene_.TriangleCount() > 1,
         "shapes cast shadows on each other", "a single face shadows nothing");
     set(Part::kCurvature, needs_.Uses(Part::kShadingNormals) || HasCurvedShapes(scene_),
@@ -440,15 +447,22 @@ class NeedsFinder {
         "all hitpoints are diffuse");
   }
 
-  void AddPartsNotRead() {
+  void AddRareParts() {
     Set(Part::kMotion, false, "scenes that move are not read");
     const std::size_t media = scene_.media.size();
     Set(Part::kMedia, media > 0,
         media > 0 ? Concat("media that absorb or scatter light: ", media)
                   : std::string("all space is empty"));
-    Set(Part::kAlphaMasks, false, "alpha masks are not read");
-    Set(Part::kInstances, false,
-        "instances are written out as shapes of their own: one level of acceleration");
+    bool has_masks = false;
+    ForEachShapeTraits(
+        scene_, [&](const ShapeTraits& traits) { has_masks = has_masks || traits.alpha < 1; });
+    Set(Part::kAlphaMasks, has_masks,
+        has_masks ? "rays pass through a share of a shape" : "every shape is met by all rays");
+    Set(Part::kInstances, !scene_.instances.empty(),
+        scene_.instances.empty()
+            ? std::string("everything is written out as shapes of its own: one tree")
+            : Concat("instances: ", scene_.instances.size(),
+                     ", of objects: ", scene_.objects.size(), ", which are in memory once"));
   }
 
   void ForceEverything() {

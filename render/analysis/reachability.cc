@@ -12,6 +12,7 @@
 #include "render/analysis/line_crossing.h"
 #include "render/base/status.h"
 #include "render/geometry/intersector.h"
+#include "render/scene/scene_extent.h"
 
 namespace lucerna {
 namespace {
@@ -123,7 +124,7 @@ class Walls {
                                                  const MaterialPredicate& is_wall) {
     std::unique_ptr<Walls> walls(new Walls);
     const auto accepts = [&](const ShapeTraits& traits) {
-      return is_wall(scene.materials[static_cast<std::size_t>(traits.material)]);
+      return IsWhole(traits) && is_wall(scene.materials[static_cast<std::size_t>(traits.material)]);
     };
     for (const TriangleMesh& mesh : scene.meshes) {
       if (!accepts(mesh.traits)) continue;
@@ -132,7 +133,7 @@ class Walls {
       wall.indices = mesh.indices;
     }
 #define LUCERNA_ADD(Name, list, name)                                  \
-  if constexpr (Name::kIsClosed) {                                     \
+  if constexpr (Name::kIsClosed && !Name::kIsThin) {                   \
     for (const Name& shape : scene.list) {                             \
       if (accepts(shape.traits)) walls->shapes_.list.push_back(shape); \
     }                                                                  \
@@ -178,6 +179,8 @@ class Walls {
 // The lights whose light cannot reach the camera, however it is scattered.
 std::vector<std::uint32_t> FindSeparated(const Scene& scene,
                                          const std::vector<NumberedLight>& lights) {
+  // Rays of an orthographic camera begin on a plane, which is not looked at here.
+  if (scene.camera.kind == Camera::Kind::kOrthographic) return {};
   const auto walls = Walls::Create(scene, IsOpaque);
   if (!walls.ok()) return {};
   const Vec3 eye = scene.camera.camera_to_world.Point({});
@@ -222,6 +225,14 @@ bool AllSampledLie(const Scene& scene, const ClosedSurface& surface, bool inside
     for (std::size_t i = 0; i < mesh.indices.size() / 3; ++i) {
       triangle_tests += static_cast<double>(surface.triangle_count());
       if (triangle_tests > kMaxTriangleTests || !lies(TriangleOf(mesh, i))) return false;
+    }
+  }
+  for (const Instance& instance : scene.instances) {
+    const InstancedObject& object = scene.objects[instance.object];
+    for (std::uint32_t i = 0; i < object.mesh_count; ++i) {
+      if (!is_lit(scene.object_meshes[object.first_mesh + i].traits)) continue;
+      if (!lies(CornersOf(BoundsOf(scene, instance)))) return false;
+      break;
     }
   }
   const LightNumbers numbers(scene);

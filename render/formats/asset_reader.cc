@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "render/base/text.h"
+#include "render/formats/gzip.h"
 #include "render/formats/ply_file.h"
 
 namespace lucerna {
@@ -14,6 +15,18 @@ StatusOr<std::string> AssetReader::ReadBytes(const std::string& path) {
   LUCERNA_ASSIGN_OR_RETURN(std::string bytes, files_.Read(normal_path));
   bytes_read_ += bytes.size();
   if (!is_over_limit()) return bytes;
+  return absl::ResourceExhaustedError(
+      Concat("the scene reads more than ", limits_.max_total_bytes, " bytes"));
+}
+
+StatusOr<std::string> AssetReader::ReadText(const std::string& path) {
+  LUCERNA_ASSIGN_OR_RETURN(std::string bytes, ReadBytes(path));
+  if (!IsGzip(bytes)) return bytes;
+  StatusOr<std::string> text = Gunzip(bytes);
+  if (!text.ok()) return absl::InvalidArgumentError(Concat(path, ": ", text.status().message()));
+  // Unpacked bytes count as those of a file do.
+  bytes_read_ += text->size();
+  if (!is_over_limit()) return text;
   return absl::ResourceExhaustedError(
       Concat("the scene reads more than ", limits_.max_total_bytes, " bytes"));
 }

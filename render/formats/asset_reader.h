@@ -23,6 +23,9 @@ class AssetReader {
 
   // The bytes of a file. Errors: what `files` says, RESOURCE_EXHAUSTED beyond the limits.
   [[nodiscard]] StatusOr<std::string> ReadBytes(const std::string& path);
+  // The text of a file, unpacked when it is packed by gzip. Errors: those of ReadBytes, and
+  // INVALID_ARGUMENT for a damaged stream, with the path.
+  [[nodiscard]] StatusOr<std::string> ReadText(const std::string& path);
   // Errors: those of ReadBytes and of the file's format, with the path.
   [[nodiscard]] StatusOr<TriangleMesh> ReadMesh(const std::string& path);
   [[nodiscard]] StatusOr<std::shared_ptr<const Picture>> ReadPicture(const std::string& path,

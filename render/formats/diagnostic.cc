@@ -94,7 +94,7 @@ void Diagnostics::Add(Diagnostic::Severity severity, const SourceLocation& locat
       return;
     }
   }
-  if (of.kept.size() == kMaxOfEach) {
+  if (of.kept.size() == max_of_each_) {
     ++of.dropped;
     return;
   }

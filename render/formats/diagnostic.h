@@ -48,6 +48,8 @@ class Diagnostics {
  public:
   static constexpr std::size_t kMaxOfEach = 100;  // errors, warnings, notes
 
+  explicit Diagnostics(std::size_t max_of_each = kMaxOfEach) : max_of_each_(max_of_each) {}
+
   // The name of a file, for locations in it; as long-lived as the diagnostics.
   [[nodiscard]] const std::string* NameOfFile(const std::string& file) {
     return &*file_names_.insert(file).first;
@@ -65,11 +67,11 @@ class Diagnostics {
 
   // True when one more of this kind would only be counted.
   [[nodiscard]] bool IsFull(Diagnostic::Severity severity) const {
-    return of_severity_[static_cast<std::size_t>(severity)].kept.size() == kMaxOfEach;
+    return of_severity_[static_cast<std::size_t>(severity)].kept.size() == max_of_each_;
   }
 
   // Errors first, then warnings, then notes, each in the order of the text. Where more than
-  // kMaxOfEach came, the last one kept says how many more there were.
+  // max_of_each came, the last one kept says how many more there were.
   [[nodiscard]] std::vector<Diagnostic> Take();
 
  private:
@@ -85,6 +87,7 @@ class Diagnostics {
 
   void Add(Diagnostic::Severity severity, const SourceLocation& location, std::string message);
 
+  const std::size_t max_of_each_;
   OfSeverity of_severity_[3];
   std::set<std::string> file_names_;
 };

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
+#include <cstdint>
+#include <map>
+#include <type_traits>
 #include <utility>
 
 #include "render/base/text.h"
@@ -19,13 +22,15 @@ namespace {
 constexpr double kFarSizes = 1e4;
 
 void WarnOfMissingUvs(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
-  for (const TriangleMesh& mesh : scene.meshes) {
+  const auto warn = [&](const TriangleMesh& mesh) {
     const Material& material = scene.materials[static_cast<std::size_t>(mesh.traits.material)];
     if (mesh.uvs.empty() && material.texture != kNoTexture) {
       diagnostics.Warning(whole,
                           "a mesh with a texture has no uv: every triangle shows half of it");
     }
-  }
+  };
+  std::ranges::for_each(scene.meshes, warn);
+  std::ranges::for_each(scene.object_meshes, warn);
 }
 
 void WarnOfDistance(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
@@ -39,7 +44,7 @@ void WarnOfDistance(const Scene& scene, const SourceLocation& whole, Diagnostics
 }
 
 void WarnOfEmptiness(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
-  if (ShapeCount(scene) == 0) {
+  if (ShapeCount(scene) == 0 && scene.instances.empty()) {
     diagnostics.Warning(whole, "the scene has no shapes");
   }
   if (scene.area_lights.empty() && DeltaLightCount(scene) == 0 && scene.infinite_lights.empty()) {
@@ -86,6 +91,18 @@ void DropInterfacesWithinMedia(Scene& scene, const SourceLocation& whole,
       return is_interface(shape.traits) && !shape.traits.SeparatesMedia();
     });
   });
+  std::vector<TriangleMesh> kept;
+  for (InstancedObject& object : scene.objects) {
+    const auto first = static_cast<std::uint32_t>(kept.size());
+    for (std::uint32_t i = 0; i < object.mesh_count; ++i) {
+      TriangleMesh& mesh = scene.object_meshes[object.first_mesh + i];
+      if (is_interface(mesh.traits) && !mesh.traits.SeparatesMedia()) continue;
+      kept.push_back(std::move(mesh));
+    }
+    object.first_mesh = first;
+    object.mesh_count = static_cast<std::uint32_t>(kept.size()) - first;
+  }
+  scene.object_meshes = std::move(kept);
 }
 
 bool UsesMedia(const Scene& scene) {
@@ -106,6 +123,24 @@ void ForgetMedia(Scene& scene) {
   ForEachShapeTraits(scene, [](ShapeTraits& traits) {
     traits.medium_inside = kNoMedium;
     traits.medium_outside = kNoMedium;
+  });
+}
+
+// A disc of photons is many times as wide as a hair, of which it would hold next to nothing: on
+// thin shapes eye paths go on, and direct light is sampled, as on surfaces with narrow lobes.
+void StopGatheringOnThinShapes(Scene& scene) {
+  std::map<std::int32_t, std::int32_t> thin;  // materials and their copies
+  ForEachAnalyticShape(scene, [&](auto& shape) {
+    if constexpr (std::decay_t<decltype(shape)>::kIsThin) {
+      const auto [known, is_new] = thin.try_emplace(
+          shape.traits.material, static_cast<std::int32_t>(scene.materials.size()));
+      if (is_new) {
+        Material copy = scene.materials[static_cast<std::size_t>(shape.traits.material)];
+        copy.is_on_thin_shapes = true;
+        scene.materials.push_back(std::move(copy));
+      }
+      shape.traits.material = known->second;
+    }
   });
 }
 
@@ -133,6 +168,7 @@ Scene FinishScene(UnfinishedScene unfinished, const std::string& main_file,
   DropFlatTriangles(unfinished, whole, diagnostics);
   DropInterfacesWithinMedia(scene, whole, diagnostics);
   if (!UsesMedia(scene)) ForgetMedia(scene);
+  StopGatheringOnThinShapes(scene);
   return std::move(scene);
 }
 

@@ -14,14 +14,12 @@
 #include <vector>
 
 #include "absl/strings/numbers.h"
-#include <zlib.h>
 
 #include "render/base/text.h"
+#include "render/formats/gzip.h"
 
 namespace lucerna {
 namespace {
-
-constexpr std::uint64_t kMaxInflation = 200;
 
 Status Bad(std::string_view what) {
   return absl::InvalidArgumentError(Concat("bad PLY file: ", what));
@@ -387,58 +385,14 @@ Status SkipElement(Body& body, Format format, const Element& element) {
   return absl::OkStatus();
 }
 
-// zlib's stream, which ends itself.
-class Inflater {
- public:
-  Inflater() { LUCERNA_CHECK(inflateInit2(&stream_, 15 + 16) == Z_OK); }  // +16: gzip
-  ~Inflater() { inflateEnd(&stream_); }
-  Inflater(const Inflater&) = delete;
-  Inflater& operator=(const Inflater&) = delete;
-  z_stream& stream() { return stream_; }
-
- private:
-  z_stream stream_{};
-};
-
-StatusOr<std::string> Gunzip(std::string_view bytes) {
-  const std::uint64_t limit = kMaxInflation * bytes.size();
-  std::string out;
-  std::vector<unsigned char> piece(std::size_t{1} << 18);
-  Inflater inflater;
-  z_stream& stream = inflater.stream();
-  int result = Z_OK;
-  std::size_t consumed = 0;
-  while (result != Z_STREAM_END) {
-    if (stream.avail_in == 0) {
-      // zlib counts in 32 bits.
-      const std::size_t given = std::min<std::size_t>(bytes.size() - consumed, 1U << 30);
-      if (given == 0) return Bad("its gzip stream is truncated");
-      stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data() + consumed));
-      stream.avail_in = static_cast<uInt>(given);
-      consumed += given;
-    }
-    stream.next_out = piece.data();
-    stream.avail_out = static_cast<uInt>(piece.size());
-    result = inflate(&stream, Z_NO_FLUSH);
-    if (result != Z_OK && result != Z_STREAM_END && result != Z_BUF_ERROR) {
-      return Bad("its gzip stream is damaged");
-    }
-    const std::size_t made = piece.size() - stream.avail_out;
-    if (out.size() + made > limit) {
-      return Bad(Concat("it unpacks to more than ", kMaxInflation, " times its size"));
-    }
-    out.append(reinterpret_cast<const char*>(piece.data()), made);
-  }
-  return out;
-}
-
 }  // namespace
 
 StatusOr<TriangleMesh> ParsePly(std::string_view bytes) {
   std::string unpacked;
-  if (bytes.starts_with("\x1f\x8b")) {
-    LUCERNA_ASSIGN_OR_RETURN(unpacked, Gunzip(bytes));
-    bytes = unpacked;
+  if (IsGzip(bytes)) {
+    StatusOr<std::string> inflated = Gunzip(bytes);
+    if (!inflated.ok()) return Bad(std::string(inflated.status().message()));
+    bytes = unpacked = *std::move(inflated);
   }
   LUCERNA_ASSIGN_OR_RETURN(const Header header, ParseHeader(bytes));
   // One element at a time, each against what the ones before it leave: no sum can overflow.

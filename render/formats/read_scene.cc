@@ -50,11 +50,12 @@ std::string NamesOfFormats() {
 
 }  // namespace
 
-ParsedScene ReadScene(SceneFiles& files, const std::string& main_path, const SceneLimits& limits) {
-  Diagnostics diagnostics;
+ParsedScene ReadScene(SceneFiles& files, const std::string& main_path, const SceneLimits& limits,
+                      std::size_t max_of_each) {
+  Diagnostics diagnostics(max_of_each);
   AssetReader assets(files, limits);
   const SourceLocation whole = {&main_path, 0, 0};
-  const StatusOr<std::string> text = assets.ReadBytes(main_path);
+  const StatusOr<std::string> text = assets.ReadText(main_path);
   if (!text.ok()) {
     diagnostics.Error(whole, std::string(text.status().message()));
     return {Scene(), diagnostics.Take()};

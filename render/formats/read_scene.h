@@ -5,6 +5,7 @@
 // common to all of them (finish_scene.h).
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 #include "render/formats/parsed_scene.h"
@@ -13,9 +14,10 @@
 namespace lucerna {
 
 // Reads the main file and everything it includes. Never fails otherwise than by diagnostics. Work
-// and memory are bounded by the limits whatever the bytes are. At most 100 errors are kept; the
-// last then says how many more there were.
+// and memory are bounded by the limits whatever the bytes are. At most `max_of_each`
+// errors, warnings and notes are kept; the last one then says how many more there were.
 [[nodiscard]] ParsedScene ReadScene(SceneFiles& files, const std::string& main_path,
-                                    const SceneLimits& limits = {});
+                                    const SceneLimits& limits = {},
+                                    std::size_t max_of_each = Diagnostics::kMaxOfEach);
 
 }  // namespace lucerna

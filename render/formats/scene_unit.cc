@@ -61,6 +61,8 @@ Status ChooseUnit(Scene& scene) {
     for (Vec3& position : mesh.positions)
       position = ScaledBy(position, factor);
   }
+  for (Instance& instance : scene.instances)
+    instance.to_world = Transform::Scale(factor, factor, factor) * instance.to_world;
   ForEachAnalyticShape(scene, [&](auto& shape) { shape.Scale(factor); });
   // Coefficients are per length.
   for (Medium& medium : scene.media) {
@@ -80,6 +82,7 @@ Status ChooseUnit(Scene& scene) {
   Camera& camera = scene.camera;
   camera.camera_to_world = Transform::Scale(factor, factor, factor) * camera.camera_to_world *
                            Transform::Scale(scene.unit, scene.unit, scene.unit);
+  camera.window_scale *= factor;
   camera.lens_radius *= factor;
   camera.focal_distance *= factor;
   return absl::OkStatus();

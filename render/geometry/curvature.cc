@@ -299,7 +299,7 @@ PrincipalCurvatures SurfaceCurvature::AnalyticAt(const SurfacePoint& point) cons
 }
 
 NormalCurvature SurfaceCurvature::Along(const SurfacePoint& point, Vec3 tangent) const {
-  if (point.geometry >= scene_.meshes.size()) {
+  if (MeshOf(scene_, point.geometry) == nullptr) {
     const PrincipalCurvatures k = AnalyticAt(point);
     if (k.first == k.second) return {k.first, k.gradient, k.second_gradient};
     const Vec3 t = tangent - point.geometric_normal * Dot(tangent, point.geometric_normal);
@@ -322,7 +322,7 @@ NormalCurvature SurfaceCurvature::Along(const SurfacePoint& point, Vec3 tangent)
 }
 
 float SurfaceCurvature::SquaredPrincipals(const SurfacePoint& point) const {
-  if (point.geometry >= scene_.meshes.size()) {
+  if (MeshOf(scene_, point.geometry) == nullptr) {
     const PrincipalCurvatures k = AnalyticAt(point);
     return std::min(k.first * k.first + k.second * k.second, static_cast<float>(kLargest));
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include <embree3/rtcore.h>
@@ -9,6 +10,8 @@
 #include "render/geometry/embree_device.h"
 #include "render/geometry/shape_geometry.h"
 #include "render/math/double3.h"
+#include "render/math/rng.h"
+#include "render/scene/scene_extent.h"
 
 namespace lucerna {
 namespace {
@@ -39,6 +42,20 @@ TriangleHit HitTriangle(const std::array<Vec3, 3>& corners, const Ray& ray) {
   return {static_cast<float>(t), static_cast<float>(u), static_cast<float>(v)};
 }
 
+// Whether a ray passes through a shape of this alpha as if it were not there. The number that
+// decides belongs to the ray and the shape, so that equal rays meet the same.
+bool PassesThrough(float alpha, const RTCRay& ray, std::uint32_t geometry,
+                   std::uint32_t primitive) {
+  const auto pair = [](float a, float b) {
+    return (std::uint64_t{std::bit_cast<std::uint32_t>(a)} << 32) | std::bit_cast<std::uint32_t>(b);
+  };
+  std::uint64_t key = (std::uint64_t{geometry} << 32) | primitive;
+  key = CombineKeys(key, pair(ray.org_x, ray.org_y));
+  key = CombineKeys(key, pair(ray.org_z, ray.dir_x));
+  key = CombineKeys(key, pair(ray.dir_y, ray.dir_z));
+  return !(KeyedRng(key).Uniform() < alpha);
+}
+
 template <typename Shape, std::vector<Shape> Scene::*kShapes>
 void BoundsOfShape(const RTCBoundsFunctionArguments* arguments) {
   const Bounds bounds =
@@ -64,6 +81,10 @@ void IntersectedShape(const RTCIntersectFunctionNArguments* arguments) {
                       ray.tnear, ray.tfar, t)) {
     return;
   }
+  if (shape.traits.alpha < 1 &&
+      PassesThrough(shape.traits.alpha, ray, arguments->geomID, arguments->primID)) {
+    return;
+  }
   ray.tfar = t;
   ray_hit->hit.geomID = arguments->geomID;
   ray_hit->hit.primID = arguments->primID;
@@ -80,9 +101,19 @@ void OccludedByShape(const RTCOccludedFunctionNArguments* arguments) {
   auto* ray = reinterpret_cast<RTCRay*>(arguments->ray);
   float t = 0;
   if (IntersectShape(shape, {ray->org_x, ray->org_y, ray->org_z},
-                     {ray->dir_x, ray->dir_y, ray->dir_z}, ray->tnear, ray->tfar, t)) {
+                     {ray->dir_x, ray->dir_y, ray->dir_z}, ray->tnear, ray->tfar, t) &&
+      !(shape.traits.alpha < 1 &&
+        PassesThrough(shape.traits.alpha, *ray, arguments->geomID, arguments->primID))) {
     ray->tfar = -HUGE_VALF;
   }
+}
+
+// Embree's filter of meshes with an alpha; their user data is the mesh.
+void FilterByAlpha(const RTCFilterFunctionNArguments* arguments) {
+  const auto& mesh = *static_cast<const TriangleMesh*>(arguments->geometryUserPtr);
+  const auto& ray = *reinterpret_cast<const RTCRay*>(arguments->ray);
+  const auto& hit = *reinterpret_cast<const RTCHit*>(arguments->hit);
+  if (PassesThrough(mesh.traits.alpha, ray, hit.geomID, hit.primID)) arguments->valid[0] = 0;
 }
 
 RTCRay ToEmbree(const Ray& ray) {
@@ -99,16 +130,65 @@ RTCRay ToEmbree(const Ray& ray) {
   return out;
 }
 
+// How far off its instance a point may lie, beyond what its corners tell. Embree brings rays into
+// the space of the object by a matrix of floats; there and back, rounding grows by as much as the
+// transform turns a ball into an ellipsoid.
+float ClearanceOf(const Scene& scene, const Instance& instance) {
+  const auto largest_row = [](const Transform& transform) {
+    double largest = 0;
+    for (std::size_t row = 0; row < 3; ++row) {
+      const auto& numbers = transform.rows()[row];
+      largest =
+          std::max(largest, std::abs(numbers[0]) + std::abs(numbers[1]) + std::abs(numbers[2]));
+    }
+    return largest;
+  };
+  const StatusOr<Transform> inverse = instance.to_world.Inverse();
+  const double stretch = largest_row(instance.to_world);
+  const double distortion = inverse.ok() ? stretch * largest_row(*inverse) : 1;
+  const Bounds& box = scene.objects[instance.object].box;
+  const Bounds around = BoundsOf(scene, instance);
+  const double size = stretch * static_cast<double>(std::max(MaxAbs(box.low), MaxAbs(box.high))) +
+                      static_cast<double>(std::max(MaxAbs(around.low), MaxAbs(around.high)));
+  return static_cast<float>(static_cast<double>(kClearance) * size * std::max(1.0, distortion));
+}
+
 }  // namespace
 
 struct Intersector::EmbreeScene {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
+  std::vector<RTCScene> objects;  // the trees of Scene::objects
   // Embree reads 16 bytes at a vertex, so the last one must have four more bytes after it; our
   // copies have one vertex too many.
   std::vector<std::vector<Vec3>> padded_positions;
 
+  // Adds a mesh to a scene, and keeps a copy of its positions.
+  void AttachMesh(RTCScene to, std::uint32_t number, const TriangleMesh& mesh) {
+    std::vector<Vec3>& padded = padded_positions.emplace_back();
+    padded.reserve(mesh.positions.size() + 1);
+    padded.assign(mesh.positions.begin(), mesh.positions.end());
+    padded.emplace_back();
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                               padded.data(), 0, sizeof(Vec3), mesh.positions.size());
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                               mesh.indices.data(), 0, 3 * sizeof(std::uint32_t),
+                               mesh.indices.size() / 3);
+    if (mesh.traits.alpha < 1) {
+      rtcSetGeometryUserData(geometry, const_cast<TriangleMesh*>(&mesh));
+      rtcSetGeometryIntersectFilterFunction(geometry, FilterByAlpha);
+      rtcSetGeometryOccludedFilterFunction(geometry, FilterByAlpha);
+    }
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(to, geometry, number);
+    rtcReleaseGeometry(geometry);
+  }
+
   ~EmbreeScene() {
+    for (RTCScene object : objects) {
+      if (object != nullptr) rtcReleaseScene(object);
+    }
     if (scene != nullptr) rtcReleaseScene(scene);
     if (device != nullptr) rtcReleaseDevice(device);
   }
@@ -127,6 +207,7 @@ Intersector::Intersector(const Scene& scene, bool has_shading_normals)
     first_shape_.push_back(shapes);
     shapes += static_cast<std::uint32_t>(list.size());
   });
+  shape_count_ = shapes;
 }
 
 Intersector::~Intersector() = default;
@@ -135,30 +216,22 @@ StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, R
   auto intersector = std::unique_ptr<Intersector>(new Intersector(scene, needs.shading_normals));
   EmbreeScene& embree = *intersector->embree_;
   LUCERNA_ASSIGN_OR_RETURN(embree.device, NewEmbreeDevice());
-  embree.scene = rtcNewScene(embree.device);
-  rtcSetSceneFlags(embree.scene, needs.robust_rays ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
-  rtcSetSceneBuildQuality(
-      embree.scene, needs.split_triangles ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
+  const auto new_scene = [&] {
+    RTCScene made = rtcNewScene(embree.device);
+    rtcSetSceneFlags(made, needs.robust_rays ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+    rtcSetSceneBuildQuality(
+        made, needs.split_triangles ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
+    return made;
+  };
+  embree.scene = new_scene();
 
   Bounds& bounds = intersector->bounds_;
   std::uint32_t number = 0;
-  embree.padded_positions.reserve(scene.meshes.size());
+  embree.padded_positions.reserve(scene.meshes.size() + scene.object_meshes.size());
   for (const TriangleMesh& mesh : scene.meshes) {
     for (const Vec3& p : mesh.positions)
       bounds.Add(p);
-    std::vector<Vec3>& padded = embree.padded_positions.emplace_back();
-    padded.reserve(mesh.positions.size() + 1);
-    padded.assign(mesh.positions.begin(), mesh.positions.end());
-    padded.emplace_back();
-    RTCGeometry geometry = rtcNewGeometry(embree.device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                               padded.data(), 0, sizeof(Vec3), mesh.positions.size());
-    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                               mesh.indices.data(), 0, 3 * sizeof(std::uint32_t),
-                               mesh.indices.size() / 3);
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(embree.scene, geometry, number++);
-    rtcReleaseGeometry(geometry);
+    embree.AttachMesh(embree.scene, number++, mesh);
   }
 
   const auto attach = [&](std::size_t count, ShapeKind kind, RTCBoundsFunction bounds_of,
@@ -185,9 +258,60 @@ StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, R
     bounds.Add(shape.center - reach);
     bounds.Add(shape.center + reach);
   });
+  for (const InstancedObject& object : scene.objects) {
+    RTCScene made = embree.objects.emplace_back(new_scene());
+    for (std::uint32_t i = 0; i < object.mesh_count; ++i)
+      embree.AttachMesh(made, i, scene.object_meshes[object.first_mesh + i]);
+    rtcCommitScene(made);
+  }
+  LUCERNA_RETURN_IF_ERROR(intersector->AddInstances());
   rtcCommitScene(embree.scene);
   LUCERNA_RETURN_IF_ERROR(EmbreeStatus(embree.device));
   return intersector;
+}
+
+Status Intersector::AddInstances() {
+  if (scene_.instances.empty()) return absl::OkStatus();
+  const auto first_id = static_cast<std::uint32_t>(scene_.meshes.size()) + kShapeKinds;
+  std::uint64_t triangles = 0;
+  std::vector<std::uint64_t> of_object;
+  // Analytic shapes come last among those that are in memory.
+  std::uint64_t before = shape_count_;
+  for (const InstancedObject& object : scene_.objects) {
+    triangles = 0;
+    for (std::uint32_t i = 0; i < object.mesh_count; ++i) {
+      first_of_mesh_.push_back(static_cast<std::uint32_t>(triangles));
+      triangles += scene_.object_meshes[object.first_mesh + i].indices.size() / 3;
+    }
+    of_object.push_back(triangles);
+  }
+  for (std::uint32_t i = 0; i < scene_.instances.size(); ++i) {
+    const Instance& instance = scene_.instances[i];
+    first_of_instance_.push_back(static_cast<std::uint32_t>(before));
+    before += of_object[instance.object];
+    if (before >= kNoShape) {
+      return absl::ResourceExhaustedError(
+          "the scene has more than 2^32 triangles, each counted wherever an instance repeats it");
+    }
+    const Bounds box = BoundsOf(scene_, instance);
+    bounds_.Add(box.low);
+    bounds_.Add(box.high);
+    instance_clearance_.push_back(ClearanceOf(scene_, instance));
+
+    const auto& rows = instance.to_world.rows();
+    std::array<float, 12> columns{};
+    for (std::size_t column = 0; column < 4; ++column) {
+      for (std::size_t row = 0; row < 3; ++row)
+        columns[3 * column + row] = static_cast<float>(rows[row][column]);
+    }
+    RTCGeometry geometry = rtcNewGeometry(embree_->device, RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(geometry, embree_->objects[instance.object]);
+    rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.data());
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(embree_->scene, geometry, first_id + i);
+    rtcReleaseGeometry(geometry);
+  }
+  return absl::OkStatus();
 }
 
 bool Intersector::Intersect(const Ray& ray, Hit& hit) const {
@@ -204,6 +328,12 @@ bool Intersector::Intersect(const Ray& ray, Hit& hit) const {
   hit.v = ray_hit.hit.v;
   hit.geometry = ray_hit.hit.geomID;
   hit.primitive = ray_hit.hit.primID;
+  hit.instance = kNoInstance;
+  if (ray_hit.hit.instID[0] != RTC_INVALID_GEOMETRY_ID) {
+    const auto first_id = static_cast<std::uint32_t>(scene_.meshes.size()) + kShapeKinds;
+    hit.instance = ray_hit.hit.instID[0] - first_id;
+    hit.geometry += first_id + scene_.objects[scene_.instances[hit.instance].object].first_mesh;
+  }
   return true;
 }
 
@@ -216,24 +346,36 @@ bool Intersector::Occluded(const Ray& ray) const {
 }
 
 std::uint32_t Intersector::ShapeOf(const Hit& hit) const {
-  return first_shape_[hit.geometry] + hit.primitive;
+  if (hit.instance == kNoInstance) return first_shape_[hit.geometry] + hit.primitive;
+  const std::size_t mesh = hit.geometry - first_shape_.size();
+  return first_of_instance_[hit.instance] + first_of_mesh_[mesh] + hit.primitive;
 }
 
 Hit Intersector::HitOn(std::uint32_t shape, const Ray& ray) const {
-  const auto next = std::upper_bound(first_shape_.begin(), first_shape_.end(), shape);
-  const auto geometry = static_cast<std::uint32_t>(next - first_shape_.begin() - 1);
-  const std::uint32_t primitive = shape - first_shape_[geometry];
-  Hit hit{.geometry = geometry, .primitive = primitive};
-  if (geometry >= scene_.meshes.size()) {
+  const auto index_of = [](auto begin, auto end, std::uint32_t number) {
+    return static_cast<std::uint32_t>(std::upper_bound(begin, end, number) - begin - 1);
+  };
+  Hit hit;
+  if (!first_of_instance_.empty() && shape >= first_of_instance_.front()) {
+    hit.instance = index_of(first_of_instance_.begin(), first_of_instance_.end(), shape);
+    const InstancedObject& object = scene_.objects[scene_.instances[hit.instance].object];
+    const std::uint32_t within = shape - first_of_instance_[hit.instance];
+    const auto meshes = first_of_mesh_.begin() + object.first_mesh;
+    const std::uint32_t mesh = index_of(meshes, meshes + object.mesh_count, within);
+    hit.geometry = static_cast<std::uint32_t>(first_shape_.size()) + object.first_mesh + mesh;
+    hit.primitive = within - meshes[mesh];
+  } else {
+    hit.geometry = index_of(first_shape_.begin(), first_shape_.end(), shape);
+    hit.primitive = shape - first_shape_[hit.geometry];
+  }
+  const TriangleMesh* mesh = MeshOf(scene_, hit.geometry);
+  if (mesh == nullptr) {
     // The function that Embree calls: the same bits.
-    VisitShape(scene_, KindOf(scene_, geometry), primitive, [&](const auto& s) {
+    VisitShape(scene_, KindOf(scene_, hit.geometry), hit.primitive, [&](const auto& s) {
       return IntersectShape(s, ray.origin, ray.direction, 0, ray.t_max, hit.t);
     });
   } else {
-    const TriangleMesh& mesh = scene_.meshes[geometry];
-    const std::uint32_t* corner = &mesh.indices[std::size_t{3} * primitive];
-    const TriangleHit at = HitTriangle(
-        {mesh.positions[corner[0]], mesh.positions[corner[1]], mesh.positions[corner[2]]}, ray);
+    const TriangleHit at = HitTriangle(CornersOf(scene_, *mesh, hit.primitive, hit.instance), ray);
     hit.t = at.t;
     hit.u = at.u;
     hit.v = at.v;
@@ -247,22 +389,37 @@ SurfacePoint Intersector::SurfaceAt(const Ray& ray, const Hit& hit) const {
   point.primitive = hit.primitive;
   point.u = hit.u;
   point.v = hit.v;
+  point.instance = hit.instance;
   const ShapeTraits* traits = nullptr;
-  if (hit.geometry < scene_.meshes.size()) {
-    const TriangleMesh& mesh = scene_.meshes[hit.geometry];
+  if (const TriangleMesh* of_hit = MeshOf(scene_, hit.geometry)) {
+    const TriangleMesh& mesh = *of_hit;
     const std::uint32_t* corner = &mesh.indices[std::size_t{3} * hit.primitive];
-    const Vec3 p0 = mesh.positions[corner[0]];
-    const Vec3 e1 = mesh.positions[corner[1]] - p0;
-    const Vec3 e2 = mesh.positions[corner[2]] - p0;
+    const auto [p0, p1, p2] = CornersOf(scene_, mesh, hit.primitive, hit.instance);
+    const Vec3 e1 = p1 - p0;
+    const Vec3 e2 = p2 - p0;
     // From the corners, not along the ray: the error then has the size of the triangle.
     point.position = p0 + e1 * hit.u + e2 * hit.v;
     point.clearance = kClearance * (MaxAbs(p0) + MaxAbs(e1) + MaxAbs(e2));
-    point.geometric_normal =
-        TriangleNormal(p0, mesh.positions[corner[1]], mesh.positions[corner[2]]);
+    const Transform* to_world = nullptr;
+    if (hit.instance == kNoInstance) {
+      point.geometric_normal = TriangleNormal(p0, p1, p2);
+    } else {
+      to_world = &scene_.instances[hit.instance].to_world;
+      point.clearance += instance_clearance_[hit.instance];
+      // Of the triangle in the space of the object: in the world it may be too small to have one.
+      const auto [o0, o1, o2] = CornersOf(scene_, mesh, hit.primitive, kNoInstance);
+      point.geometric_normal = Normalize(to_world->Normal(TriangleNormal(o0, o1, o2)));
+    }
     point.shading_normal = point.geometric_normal;
     if (has_shading_normals_ && !mesh.normals.empty()) {
-      const Vec3 n = mesh.normals[corner[0]] * (1 - hit.u - hit.v) +
-                     mesh.normals[corner[1]] * hit.u + mesh.normals[corner[2]] * hit.v;
+      const auto normal_at = [&](std::size_t i) {
+        const Vec3 own = mesh.normals[corner[i]];
+        if (to_world == nullptr || own == Vec3()) return own;
+        const Vec3 turned = to_world->Normal(own);
+        return turned == Vec3() ? turned : Normalize(turned);
+      };
+      const Vec3 n =
+          normal_at(0) * (1 - hit.u - hit.v) + normal_at(1) * hit.u + normal_at(2) * hit.v;
       const float squared = LengthSquared(n);
       if (squared > 1e-12F) {
         point.shading_normal = FaceForward(n * (1 / std::sqrt(squared)), point.geometric_normal);

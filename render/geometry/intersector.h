@@ -1,10 +1,13 @@
 // What does a ray meet first? The only floor that includes Embree.
 //
-// Triangles are Embree's; analytic shapes are exact, never tessellated. The instruction set is
-// pinned, and only single rays are traced, so that equal rays have equal hits in every process of
-// one numeric profile.
+// Triangles are Embree's; analytic shapes are exact, never tessellated. Objects that are not
+// written out have a tree of their own, which their instances share. Of a shape with an alpha below
+// 1 a ray meets so large a share: a number that follows from the ray's own bits decides. The
+// instruction set is pinned, and only single rays are traced, so that equal rays have equal hits in
+// every process of one numeric profile.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -38,13 +41,17 @@ inline constexpr float kClearance = 0x1p-22F;
 
 // In place of a shape's number where a ray meets nothing.
 inline constexpr std::uint32_t kNoShape = UINT32_MAX;
+// In place of an instance's number on shapes that are none of an instance.
+inline constexpr std::uint32_t kNoInstance = UINT32_MAX;
 
-// Geometry numbers: meshes in scene order, then one for all analytic shapes of a kind.
+// Geometry numbers: meshes in scene order, then one for all analytic shapes of a kind, then the
+// meshes of objects.
 struct Hit {
   float t = 0;
   float u = 0, v = 0;  // barycentric, of the triangle's second and third corner
   std::uint32_t geometry = 0;
-  std::uint32_t primitive = 0;  // triangle, or analytic shape of the kind
+  std::uint32_t primitive = 0;           // triangle, or analytic shape of the kind
+  std::uint32_t instance = kNoInstance;  // of an object's mesh
 };
 
 // A point on a surface, ready for scattering.
@@ -54,7 +61,7 @@ struct SurfacePoint {
   Vec3 shading_normal;    // unit, in the hemisphere of the geometric one
   std::uint32_t material = 0;
   std::int32_t area_light = kNoAreaLight;
-  std::uint32_t geometry = 0, primitive = 0;
+  std::uint32_t geometry = 0, primitive = 0, instance = kNoInstance;
   float u = 0, v = 0;  // barycentric, as in Hit
   // How far off the surface `position` may lie from rounding [scene units]; rays leave from a
   // point so far off that they do not meet the surface again.
@@ -66,7 +73,8 @@ class Intersector {
  public:
   // Keeps a reference to `scene`, which must outlive it and not change. Hits do not depend on
   // whether triangles are split. Without shading normals every surface is as flat as its triangles.
-  // Errors: RESOURCE_EXHAUSTED or INTERNAL with Embree's words.
+  // Errors: RESOURCE_EXHAUSTED or INTERNAL with Embree's words; RESOURCE_EXHAUSTED for 2^32
+  // triangles, each counted wherever it stands.
   [[nodiscard]] static StatusOr<std::unique_ptr<Intersector>> Create(const Scene& scene,
                                                                      RayNeeds needs = {});
   ~Intersector();
@@ -90,14 +98,36 @@ class Intersector {
 
  private:
   Intersector(const Scene& scene, bool has_shading_normals);
+  Status AddInstances();
   struct EmbreeScene;
 
   const Scene& scene_;
   std::unique_ptr<EmbreeScene> embree_;
   bool has_shading_normals_;
-  std::vector<std::uint32_t> first_shape_;  // [geometries] ascending
+  std::vector<std::uint32_t> first_shape_;        // [geometries but those of objects] ascending
+  std::uint32_t shape_count_ = 0;                 // without instances
+  std::vector<std::uint32_t> first_of_instance_;  // [instances] number of its first triangle
+  std::vector<std::uint32_t> first_of_mesh_;  // [object meshes] triangles before it in its object
+  std::vector<float> instance_clearance_;     // [instances] [scene units]
   Bounds bounds_;
 };
+
+// The mesh that has this geometry number; nullptr for analytic shapes.
+[[nodiscard]] inline const TriangleMesh* MeshOf(const Scene& scene, std::uint32_t geometry) {
+  if (geometry < scene.meshes.size()) return &scene.meshes[geometry];
+  const std::size_t of_objects = scene.meshes.size() + kShapeKinds;
+  return geometry < of_objects ? nullptr : &scene.object_meshes[geometry - of_objects];
+}
+// The corners of a triangle of that mesh in the world.
+[[nodiscard]] inline std::array<Vec3, 3> CornersOf(const Scene& scene, const TriangleMesh& mesh,
+                                                   std::uint32_t triangle, std::uint32_t instance) {
+  const std::uint32_t* corner = &mesh.indices[std::size_t{3} * triangle];
+  const std::array<Vec3, 3> own = {mesh.positions[corner[0]], mesh.positions[corner[1]],
+                                   mesh.positions[corner[2]]};
+  if (instance == kNoInstance) return own;
+  const Transform& to_world = scene.instances[instance].to_world;
+  return {to_world.Point(own[0]), to_world.Point(own[1]), to_world.Point(own[2])};
+}
 
 // The kind of the analytic shapes that have this geometry number. Requires one that is no mesh's.
 [[nodiscard]] inline ShapeKind KindOf(const Scene& scene, std::uint32_t geometry) {

@@ -123,7 +123,9 @@ class Crossings {
     }
     std::uint8_t kind = 0;
     ForEachAnalyticList(scene_, [&](const auto& list) {
-      for (std::uint32_t i = 0; i < list.size(); ++i) {
+      using Kind = std::decay_t<decltype(list)>::value_type;
+      // What is thin ends no disc.
+      for (std::uint32_t i = 0; i < list.size() && !Kind::kIsThin; ++i) {
         const Vec3 reach = {list[i].Reach(), list[i].Reach(), list[i].Reach()};
         shapes_.push_back({{list[i].center - reach, list[i].center + reach},
                            surfaces++,
@@ -268,7 +270,9 @@ class Crossings {
 
   template <typename AnalyticShape>
   void CrossTriangle(const Triangle& triangle, const AnalyticShape& shape) {
-    if constexpr (AnalyticShape::kIsFlat) {
+    if constexpr (AnalyticShape::kIsThin) {
+      return;
+    } else if constexpr (AnalyticShape::kIsFlat) {
       const std::optional<Span> span =
           CutByPlane(triangle, Double3(shape.center), Double3(shape.normal));
       if (!span) return;
@@ -289,7 +293,9 @@ class Crossings {
   // A curved and a flat shape; two of either are not crossed.
   template <typename One, typename Other>
   void CrossShapes(const One& one, const Other& other) {
-    if constexpr (One::kIsFlat && !Other::kIsFlat) {
+    if constexpr (One::kIsThin || Other::kIsThin) {
+      return;
+    } else if constexpr (One::kIsFlat && !Other::kIsFlat) {
       CrossShapes(other, one);
     } else if constexpr (!One::kIsFlat && Other::kIsFlat) {
       for (const LinePiece& piece :

@@ -12,7 +12,7 @@
 namespace lucerna {
 namespace {
 
-std::array<Vec2, 3> CornersOf(const TriangleMesh& mesh, std::uint32_t triangle) {
+std::array<Vec2, 3> UvsOf(const TriangleMesh& mesh, std::uint32_t triangle) {
   if (mesh.uvs.empty()) return {Vec2{0, 0}, Vec2{1, 0}, Vec2{1, 1}};
   const std::uint32_t* corner = &mesh.indices[std::size_t{3} * triangle];
   return {mesh.uvs[corner[0]], mesh.uvs[corner[1]], mesh.uvs[corner[2]]};
@@ -38,8 +38,8 @@ double TurnSlope(double distance) {
 }
 
 Vec2 UvAt(const Scene& scene, const SurfacePoint& point) {
-  if (point.geometry < scene.meshes.size()) {
-    const std::array<Vec2, 3> uv = CornersOf(scene.meshes[point.geometry], point.primitive);
+  if (const TriangleMesh* mesh = MeshOf(scene, point.geometry)) {
+    const std::array<Vec2, 3> uv = UvsOf(*mesh, point.primitive);
     const float rest = 1 - point.u - point.v;
     return {uv[0].x * rest + uv[1].x * point.u + uv[2].x * point.v,
             uv[0].y * rest + uv[1].y * point.u + uv[2].y * point.v};
@@ -49,12 +49,11 @@ Vec2 UvAt(const Scene& scene, const SurfacePoint& point) {
 }
 
 UvSlopes UvSlopesAt(const Scene& scene, const SurfacePoint& point) {
-  if (point.geometry < scene.meshes.size()) {
-    const TriangleMesh& mesh = scene.meshes[point.geometry];
-    const std::uint32_t* corner = &mesh.indices[std::size_t{3} * point.primitive];
-    const Vec3 e1 = mesh.positions[corner[1]] - mesh.positions[corner[0]];
-    const Vec3 e2 = mesh.positions[corner[2]] - mesh.positions[corner[0]];
-    const std::array<Vec2, 3> uv = CornersOf(mesh, point.primitive);
+  if (const TriangleMesh* mesh = MeshOf(scene, point.geometry)) {
+    const auto [p0, p1, p2] = CornersOf(scene, *mesh, point.primitive, point.instance);
+    const Vec3 e1 = p1 - p0;
+    const Vec3 e2 = p2 - p0;
+    const std::array<Vec2, 3> uv = UvsOf(*mesh, point.primitive);
     // The gradient g of a linear function lies in the plane and has g·e1 = d1, g·e2 = d2.
     const double a = DotDouble(e1, e1);
     const double b = DotDouble(e1, e2);

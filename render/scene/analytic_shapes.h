@@ -16,8 +16,13 @@
 //   kIsClosed              whether it is the surface of a convex body; then also
 //                          SignedDistance(point): to the surface, negative inside. One that is not
 //                          closed has a rim.
+//   kIsThin                whether it is much thinner than the discs of hitpoints: then nothing is
+//                          gathered on it (StopGatheringOnThinShapes in formats/finish_scene.cc),
+//                          no disc is cut where it passes through a surface, and it encloses
+//                          nothing
 #pragma once
 
+#include "render/scene/shape_curve.h"
 #include "render/scene/shape_disk.h"
 #include "render/scene/shape_sphere.h"
 
@@ -25,4 +30,5 @@
 // messages and in pbrt files.
 #define LUCERNA_ANALYTIC_SHAPES(ROW) \
   ROW(Sphere, spheres, "sphere")     \
-  ROW(Disk, disks, "disk")
+  ROW(Disk, disks, "disk")           \
+  ROW(CurvePiece, curve_pieces, "curve")

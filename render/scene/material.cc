@@ -20,7 +20,13 @@ auto WithKind(MaterialNumbers::Kind kind, const Visit& visit) {
 }  // namespace
 
 MaterialProperties PropertiesOf(const MaterialNumbers& material) {
-  return WithKind(material.kind, [&](auto kind) { return kind.Properties(material); });
+  MaterialProperties properties =
+      WithKind(material.kind, [&](auto kind) { return kind.Properties(material); });
+  if (material.is_on_thin_shapes) {
+    properties.is_thin = true;
+    properties.gathers = false;
+  }
+  return properties;
 }
 
 std::vector<MaterialProperties> PropertiesOf(const std::vector<Material>& materials) {

@@ -43,6 +43,8 @@ struct MaterialNumbers {
   float alpha_v = 0;
   // In place of the reflectance of a diffuse surface, and of a conductor's eta and k.
   std::int32_t texture = kNoTexture;
+  // On shapes much thinner than the discs of hitpoints: nothing is gathered there.
+  bool is_on_thin_shapes = false;
 
   bool operator==(const MaterialNumbers&) const = default;
 
@@ -71,6 +73,8 @@ struct MaterialProperties {
   bool transmits = false;
   // Where eye paths stop and photons are kept.
   bool gathers = false;
+  // Of a thin shape: eye paths go on, and no photons are kept.
+  bool is_thin = false;
   // The GGX width of the lobes, the larger one; +infinity: light is scattered so broadly that it
   // keeps no detail over angle.
   float lobe_width = HUGE_VALF;
@@ -80,7 +84,7 @@ struct MaterialProperties {
   [[nodiscard]] bool scatters_broadly() const { return !is_smooth && !is_black && !is_interface; }
   // Where eye paths go on although a range of directions is scattered: what eye paths do not find
   // of the light there, caustic photons bring (transport/caustic_weight.h).
-  [[nodiscard]] bool gathers_caustics() const { return scatters_broadly() && !gathers; }
+  [[nodiscard]] bool gathers_caustics() const { return scatters_broadly() && !gathers && !is_thin; }
   [[nodiscard]] bool has_narrow_lobes() const { return lobe_width < HUGE_VALF; }
 };
 

@@ -18,8 +18,28 @@ Window ScreenWindow(const Camera& camera, int width, int height) {
       window = {-1, 1, -1 / aspect, 1 / aspect};
     }
   }
-  const double scale = std::tan(camera.fov_deg * std::numbers::pi / 360);
+  const double scale = camera.kind == Camera::Kind::kOrthographic
+                           ? camera.window_scale
+                           : std::tan(camera.fov_deg * std::numbers::pi / 360);
   return {window.low_x * scale, window.high_x * scale, window.low_y * scale, window.high_y * scale};
+}
+
+double PixelFootprint(const Camera& camera, int width, int height, double distance) {
+  const Window window = ScreenWindow(camera, width, height);
+  const double pixel_width = (window.high_x - window.low_x) / width;
+  const double pixel_height = (window.high_y - window.low_y) / height;
+  const double of_window = std::sqrt(pixel_width * pixel_height);
+  switch (camera.kind) {
+    case Camera::Kind::kPerspective:
+      return of_window * distance;
+    case Camera::Kind::kOrthographic:
+      return of_window;
+    case Camera::Kind::kEqualArea:
+    case Camera::Kind::kEquirectangular:
+      break;
+  }
+  // Its mean share of all directions.
+  return std::sqrt(4 * std::numbers::pi / (static_cast<double>(width) * height)) * distance;
 }
 
 double LensReach(const Camera& camera) {

@@ -15,6 +15,7 @@
 //       before it. A texture that needs a picture has one, and the picture of an infinite light is
 //       square.
 //   S3  Normals are unit length or zero (zero: use the geometric normal).
+//       An object's meshes are not empty, and an instance's object exists.
 //   S4  Reflectances are in [0, 1], those of textures once they are looked up; emitted quantities,
 //       pixels and scales of textures are >= 0.
 #pragma once
@@ -68,8 +69,17 @@ struct Window {
 };
 
 struct Camera {
+  enum class Kind : std::uint8_t {
+    kPerspective,
+    kOrthographic,     // parallel rays along +z that begin on the plane z = 0
+    kEqualArea,        // all directions, by math/equal_area_square.h
+    kEquirectangular,  // all directions, by the angle around +y and the one from it
+  };
+
+  Kind kind = Kind::kPerspective;
   Transform camera_to_world;  // camera space: +z forward, +y up, +x right, as pbrt has it
-  double fov_deg = 90;        // full angle of the shorter side of the image
+  double fov_deg = 90;        // perspective: full angle of the shorter side of the image
+  double window_scale = 1;    // orthographic: the length of 1 in the window below
   // What the file sets in place of what follows from the image's size: width over height, and the
   // window of the image, where 1 is tan(fov / 2).
   std::optional<double> frame_aspect_ratio;
@@ -80,11 +90,28 @@ struct Camera {
 };
 
 // The window on the plane z = 1 in camera space that an image of `width` x `height` pixels shows
-// as a whole (a crop window shows a part of it).
+// as a whole (a crop window shows a part of it); of an orthographic camera on any plane.
+// Meaningless for cameras that look everywhere.
 [[nodiscard]] Window ScreenWindow(const Camera& camera, int width, int height);
+
+// How wide a pixel is on a surface that faces the camera at `distance`, about; for a pixel that is
+// not square the root of its area [in the unit of `distance`].
+[[nodiscard]] double PixelFootprint(const Camera& camera, int width, int height, double distance);
 
 // No point of the lens is farther than this from the camera's own [world]; 0 for a pinhole.
 [[nodiscard]] double LensReach(const Camera& camera);
+
+// Meshes that instances repeat, in a space of their own. None of them emits.
+struct InstancedObject {
+  std::uint32_t first_mesh = 0, mesh_count = 0;  // in Scene::object_meshes
+  Bounds box;                                    // around their positions, in that space
+};
+
+// One of the places at which an object stands.
+struct Instance {
+  std::uint32_t object = 0;  // index in Scene::objects
+  Transform to_world;        // affine, and it can be inverted
+};
 
 // The reconstruction filter of the film, separable, in pixels.
 struct PixelFilter {
@@ -120,6 +147,11 @@ struct Scene {
   // (formats/scene_unit.h). Of what is below, the integrator's settings are the file's.
   double unit = 1;
   std::vector<TriangleMesh> meshes;
+  // Objects that are in memory once, however often they stand in the scene; those that take little
+  // memory are written out in `meshes` (docs/decisions/instances.md).
+  std::vector<TriangleMesh> object_meshes;
+  std::vector<InstancedObject> objects;
+  std::vector<Instance> instances;
 #define LUCERNA_MEMBER(Name, list, name) std::vector<Name> list;
   LUCERNA_ANALYTIC_SHAPES(LUCERNA_MEMBER)  // spheres and so on (scene/analytic_shapes.h)
 #undef LUCERNA_MEMBER
@@ -136,10 +168,13 @@ struct Scene {
   PixelFilter filter;
   IntegratorSettings integrator;
 
+  // Of the triangles in memory: those of an object once.
   [[nodiscard]] std::size_t TriangleCount() const {
     std::size_t count = 0;
-    for (const TriangleMesh& mesh : meshes)
-      count += mesh.indices.size() / 3;
+    for (const std::vector<TriangleMesh>* list : {&meshes, &object_meshes}) {
+      for (const TriangleMesh& mesh : *list)
+        count += mesh.indices.size() / 3;
+    }
     return count;
   }
 };

@@ -14,11 +14,27 @@ Vec3 Everywhere(float length) {
 
 }  // namespace
 
+Bounds BoundsOf(const Scene& scene, const Instance& instance) {
+  const Bounds& own = scene.objects[instance.object].box;
+  Bounds box;
+  for (int corner = 0; corner < 8; ++corner) {
+    box.Add(instance.to_world.Point({(corner & 1) != 0 ? own.high.x : own.low.x,
+                                     (corner & 2) != 0 ? own.high.y : own.low.y,
+                                     (corner & 4) != 0 ? own.high.z : own.low.z}));
+  }
+  return box;
+}
+
 Bounds BoundsOf(const Scene& scene) {
   Bounds box;
   for (const TriangleMesh& mesh : scene.meshes) {
     for (const Vec3& position : mesh.positions)
       box.Add(position);
+  }
+  for (const Instance& instance : scene.instances) {
+    const Bounds around = BoundsOf(scene, instance);
+    box.Add(around.low);
+    box.Add(around.high);
   }
   // An analytic shape may reach beyond the floats.
   ForEachAnalyticShape(scene, [&](const auto& shape) {

@@ -13,6 +13,9 @@ struct SceneExtent {
 
 [[nodiscard]] SceneExtent ExtentOf(const Scene& scene);
 
+// The box around an instance.
+[[nodiscard]] Bounds BoundsOf(const Scene& scene, const Instance& instance);
+
 // The box around all shapes; that of an analytic shape is that of the ball that holds it.
 [[nodiscard]] Bounds BoundsOf(const Scene& scene);
 

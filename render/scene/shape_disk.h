@@ -11,6 +11,7 @@ namespace lucerna {
 struct Disk {
   static constexpr bool kIsFlat = true;
   static constexpr bool kIsClosed = false;
+  static constexpr bool kIsThin = false;
 
   Vec3 center;
   Vec3 normal;  // unit, outward

@@ -69,15 +69,20 @@ void ForEachShapeList(Shapes& shapes, const Visit& visit) {
   ForEachAnalyticList(shapes, visit);
 }
 
-// Calls `visit` for the traits of each shape.
+// Calls `visit` for the traits of each shape, and for those of the meshes that instances repeat.
 template <typename Shapes, typename Visit>
 void ForEachShapeTraits(Shapes& shapes, const Visit& visit) {
+  if constexpr (requires { shapes.object_meshes; }) {
+    for (auto& mesh : shapes.object_meshes)
+      visit(mesh.traits);
+  }
   ForEachShapeList(shapes, [&](auto& list) {
     for (auto& shape : list)
       visit(shape.traits);
   });
 }
 
+// Without instances.
 [[nodiscard]] inline std::size_t ShapeCount(const Scene& scene) {
   std::size_t count = 0;
   ForEachShapeList(scene, [&](const auto& list) { count += list.size(); });

@@ -12,6 +12,7 @@ namespace lucerna {
 struct Sphere {
   static constexpr bool kIsFlat = false;
   static constexpr bool kIsClosed = true;
+  static constexpr bool kIsThin = false;
 
   Vec3 center;
   float radius = 1;     // > 0

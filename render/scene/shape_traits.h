@@ -17,10 +17,18 @@ struct ShapeTraits {
   // The media on the sides that the outward normal points away from and to, as the file names
   // them. Where both are the same, the surface lies within whatever medium is there.
   std::int32_t medium_inside = kNoMedium, medium_outside = kNoMedium;
+  // The share of rays that meet the shape; which ones follows from the ray
+  // (geometry/intersector.h).
+  float alpha = 1;
 
   [[nodiscard]] bool SeparatesMedia() const { return medium_inside != medium_outside; }
   bool operator==(const ShapeTraits&) const = default;
 };
+
+// Whether all rays meet the shape.
+[[nodiscard]] inline bool IsWhole(const ShapeTraits& traits) {
+  return traits.alpha >= 1;
+}
 
 // Where the axes of a shape's own space point in the world: unit, at right angles. The texture
 // coordinate u of spheres and disks grows from x to y.

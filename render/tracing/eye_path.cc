@@ -5,6 +5,7 @@
 #include <numbers>
 #include <optional>
 
+#include "render/math/equal_area_square.h"
 #include "render/math/warp.h"
 #include "render/tracing/direct_light.h"
 #include "render/transport/bsdf.h"
@@ -59,6 +60,34 @@ float SpreadAbove(const Scene& scene, bool rays_find_lights, const Intersector& 
   return static_cast<float>(white);
 }
 
+// The direction in camera space of a place on the film, in [0, 1]² unless a filter reaches beyond.
+// As in pbrt-v4's spherical camera.
+Vec3 SphericalDirection(Camera::Kind kind, double x, double y) {
+  Vec3 z_up;
+  if (kind == Camera::Kind::kEquirectangular) {
+    const double theta = std::numbers::pi * y;
+    const double phi = 2 * std::numbers::pi * x;
+    z_up = {static_cast<float>(std::sin(theta) * std::cos(phi)),
+            static_cast<float>(std::sin(theta) * std::sin(phi)),
+            static_cast<float>(std::cos(theta))};
+  } else {
+    // Beyond an edge of the square lies what is on its other half, mirrored.
+    const auto mirror = [](double& across, double& along) {
+      if (across < 0)
+        across = -across;
+      else if (across > 1)
+        across = 2 - across;
+      else
+        return;
+      along = 1 - along;
+    };
+    mirror(x, y);
+    mirror(y, x);
+    z_up = EqualAreaDirection({static_cast<float>(x), static_cast<float>(y)});
+  }
+  return {z_up.x, z_up.z, z_up.y};
+}
+
 }  // namespace
 
 EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
@@ -86,6 +115,10 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
   window_high_y_ = window.high_y;
   pixel_width_ = (window.high_x - window.low_x) / settings.width;
   pixel_height_ = (window.high_y - window.low_y) / settings.height;
+  footprint_ = static_cast<float>(PixelFootprint(scene.camera, settings.width, settings.height, 0));
+  footprint_slope_ =
+      static_cast<float>(PixelFootprint(scene.camera, settings.width, settings.height, 1) -
+                         PixelFootprint(scene.camera, settings.width, settings.height, 0));
 }
 
 Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const {
@@ -100,17 +133,32 @@ Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& w
 Ray EyePathTracer::CameraRayThrough(double film_x, double film_y, float lens_u,
                                     float lens_v) const {
   const Camera& camera = scene_.camera;
+  const auto ray_from = [&](Vec3 from, Vec3 towards) {
+    return Ray{camera.camera_to_world.Point(from),
+               Normalize(camera.camera_to_world.Vector(towards)), HUGE_VALF};
+  };
+  if (camera.kind == Camera::Kind::kEqualArea || camera.kind == Camera::Kind::kEquirectangular) {
+    return ray_from(
+        {}, SphericalDirection(camera.kind, film_x / settings_.width, film_y / settings_.height));
+  }
   Vec3 origin;
   Vec3 direction = {static_cast<float>(window_low_x_ + film_x * pixel_width_),
                     static_cast<float>(window_high_y_ - film_y * pixel_height_), 1};
+  if (camera.kind == Camera::Kind::kOrthographic) {
+    origin = {direction.x, direction.y, 0};
+    direction = {0, 0, 1};
+    if (!has_lens_) return ray_from(origin, direction);
+    const Vec3 focus = origin + direction * static_cast<float>(camera.focal_distance);
+    origin = origin + SquareToDisk(lens_u, lens_v) * static_cast<float>(camera.lens_radius);
+    return ray_from(origin, focus - origin);
+  }
   if (has_lens_) {
     // A thin lens: all rays of one film point meet on the plane of focus.
     const Vec3 focus = direction * static_cast<float>(camera.focal_distance);
     origin = SquareToDisk(lens_u, lens_v) * static_cast<float>(camera.lens_radius);
     direction = focus - origin;
   }
-  return {camera.camera_to_world.Point(origin), Normalize(camera.camera_to_world.Vector(direction)),
-          HUGE_VALF};
+  return ray_from(origin, direction);
 }
 
 PixelSampler EyePathTracer::SamplerOf(int x, int y, std::uint64_t pass) const {
@@ -164,6 +212,8 @@ EyePathTracer::BrightPath EyePathTracer::TraceBrightPath(int x, int y, std::uint
 }
 
 std::optional<EyePathTracer::FilmPoint> EyePathTracer::OnFilm(Vec3 point) const {
+  // Outlines are only followed where they are straight on the film and grow with nearness.
+  if (scene_.camera.kind != Camera::Kind::kPerspective) return std::nullopt;
   const Vec3 p = world_to_camera_.Point(point);
   if (!(p.z > 0)) return std::nullopt;
   const auto z = static_cast<double>(p.z);
@@ -220,9 +270,7 @@ EyeSegment EyePathTracer::SegmentOf(const Ray& ray, float t, std::int32_t medium
   const float least = std::min({extinction.r, extinction.g, extinction.b});
   float end = std::min(t, kMostDiagonals * intersector_.bounds().Diagonal());
   if (least > 0) end = std::min(end, kMostFreePaths / least);
-  const auto footprint_at = [&](float length) {
-    return length * static_cast<float>(std::sqrt(pixel_width_ * pixel_height_));
-  };
+  const auto footprint_at = [&](float length) { return footprint_ + footprint_slope_ * length; };
   return {.from = ray.origin,
           .to = ray.origin + ray.direction * end,
           .medium = medium,
@@ -445,7 +493,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       hitpoint.shading_normal = surface.shading_normal;
       if (here.texture != kNoTexture && is_glossy) hitpoint.textured_k = TexturedParameter(here);
       hitpoint.weight = weight;
-      hitpoint.footprint = length * static_cast<float>(std::sqrt(pixel_width_ * pixel_height_));
+      hitpoint.footprint = footprint_ + footprint_slope_ * length;
       return hitpoint;
     };
     if (properties.gathers) {
@@ -473,6 +521,8 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     if (parts_.caustics) {
       if (properties.is_smooth) {
         receiver.was_left_smoothly = receiver.is_last;
+      } else if (properties.is_thin) {
+        receiver = {};
       } else {
         receiver = {sample.pdf, sample.wi.z, true, false};
         // One of them is drawn in proportion to what it weighs, and stands for all.

@@ -165,6 +165,7 @@ class EyePathTracer {
   Transform world_to_camera_;
   double window_low_x_, window_high_y_;  // of the whole image on the plane z = 1
   double pixel_width_, pixel_height_;    // on that plane
+  float footprint_, footprint_slope_;    // of a pixel on a surface: at no distance, and per length
 };
 
 }  // namespace lucerna

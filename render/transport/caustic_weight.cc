@@ -26,6 +26,10 @@ CausticWeight::CausticWeight(const Scene& scene, const RenderSettings& settings,
     const double distance =
         std::clamp(static_cast<double>(Length(to_middle)), extent / 4, extent * 4);
     radius = settings.initial_footprints * pixel * distance;
+    if (scene.camera.kind != Camera::Kind::kPerspective) {
+      radius = settings.initial_footprints *
+               PixelFootprint(scene.camera, settings.width, settings.height, distance);
+    }
   }
   radius *= kNominalShare;
   photon_area_ =

@@ -94,8 +94,11 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
     emitter.kind = kind;
     emitter.two_sided = light.two_sided;
     emitter.area = area;
-    emitter.radiance = light.radiance;
-    emitter.power = light.radiance * (kPi * area * (light.two_sided ? 2.0F : 1.0F));
+    // As pbrt-v4 has it: the share of the light that rays would find. A light that none would find
+    // shines with all its strength, unseen.
+    emitter.is_invisible = traits.alpha == 0;
+    emitter.radiance = light.radiance * (emitter.is_invisible ? 1 : traits.alpha);
+    emitter.power = emitter.radiance * (kPi * area * (light.two_sided ? 2.0F : 1.0F));
     return emitter;
   };
   for (std::uint32_t m = 0; m < scene.meshes.size(); ++m) {
@@ -365,7 +368,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
         const Vec3 local = SquareToCosineHemisphere(u_direction1, u_direction2);
         emission.ray.direction = Frame(normal).ToWorld(local);
         emission.ray.origin = position + normal * clearance;
-        emission.density = AreaDensity(emitter);
+        if (!emitter.is_invisible) emission.density = AreaDensity(emitter);
         return local.z > 0;
       }
 #define LUCERNA_CASE(Name, list, name)                                                      \
@@ -417,6 +420,7 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
     sample.target = seen.target;                                                \
     sample.pdf = emitter.direct_choice / seen.inverse_pdf;                      \
     sample.radiance_over_pdf = emitter.radiance / sample.pdf;                   \
+    if (emitter.is_invisible) sample.pdf = 0;                                   \
     return true;                                                                \
   }
     LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
@@ -458,6 +462,7 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
   sample.target = position + normal * clearance;
   sample.pdf = emitter.direct_choice * distance2 / (cosine * emitter.area);
   sample.radiance_over_pdf = emitter.radiance / sample.pdf;
+  if (emitter.is_invisible) sample.pdf = 0;
   return true;
 }
 

@@ -56,7 +56,8 @@ struct Emitter {
   std::uint32_t primitive =
       0;  // triangle, or index among the shapes or lights of the kind, or the infinite lights
   bool two_sided = false;
-  bool is_sampled = true;  // for direct light
+  bool is_invisible = false;  // no ray finds it: only sampling and photons do
+  bool is_sampled = true;     // for direct light
   float area = 0;
   float choice = 0;         // probability for a photon: its share of the power
   float direct_choice = 0;  // probability for direct light
@@ -86,7 +87,8 @@ struct LightSample {
   Vec3 target;              // else: where the light comes from, just off the light's own surface
   Rgb radiance_over_pdf;  // [W·m⁻²·sr⁻¹ / (choice × solid angle)]; for delta lights irradiance
                           // on a plane facing the light, over the choice
-  float pdf = 0;  // choice × pdf_solid_angle [sr⁻¹]; 0 for delta lights
+  // choice × pdf_solid_angle [sr⁻¹]; 0 for lights that no ray finds, such as delta lights
+  float pdf = 0;
 };
 
 class InfiniteEmission;

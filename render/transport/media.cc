@@ -40,7 +40,7 @@ Media::Media(const Scene& scene, const Intersector& intersector)
 }
 
 const ShapeTraits& Media::TraitsOf(const SurfacePoint& surface) const {
-  if (surface.geometry < scene_.meshes.size()) return scene_.meshes[surface.geometry].traits;
+  if (const TriangleMesh* mesh = MeshOf(scene_, surface.geometry)) return mesh->traits;
   return VisitShape(scene_, KindOf(scene_, surface.geometry), surface.primitive,
                     [](const auto& shape) -> const ShapeTraits& { return shape.traits; });
 }

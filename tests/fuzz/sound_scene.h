@@ -25,12 +25,12 @@ namespace lucerna {
   const auto traits_are_sound = [&](const ShapeTraits& traits) {
     return traits.material >= 0 &&
            static_cast<std::size_t>(traits.material) < scene.materials.size() &&
-           traits.area_light >= kNoAreaLight &&
+           traits.alpha >= 0 && traits.alpha <= 1 && traits.area_light >= kNoAreaLight &&
            traits.area_light < static_cast<std::int32_t>(scene.area_lights.size());
   };
   const auto is_unit = [](Vec3 v) { return std::abs(Length(v) - 1) < 1e-4F; };
   const auto is_light = [](Rgb c) { return IsFinite(c) && c.r >= 0 && c.g >= 0 && c.b >= 0; };
-  for (const TriangleMesh& mesh : scene.meshes) {
+  const auto unsound_part_of = [&](const TriangleMesh& mesh) -> std::string {
     if (!traits_are_sound(mesh.traits)) return "the traits of a mesh";
     if (mesh.indices.empty() || mesh.indices.size() % 3 != 0) return "the indices of a mesh";
     for (const std::uint32_t index : mesh.indices) {
@@ -46,6 +46,33 @@ namespace lucerna {
     }
     for (const Vec3 normal : mesh.normals) {
       if (normal != Vec3() && !is_unit(normal)) return "a normal";
+    }
+    return "";
+  };
+  for (const std::vector<TriangleMesh>* list : {&scene.meshes, &scene.object_meshes}) {
+    for (const TriangleMesh& mesh : *list) {
+      if (std::string part = unsound_part_of(mesh); !part.empty()) return part;
+    }
+  }
+  for (const TriangleMesh& mesh : scene.object_meshes) {
+    if (mesh.traits.area_light != kNoAreaLight) return "the light of an object";
+  }
+  for (const InstancedObject& object : scene.objects) {
+    if (std::size_t{object.first_mesh} + object.mesh_count > scene.object_meshes.size()) {
+      return "an object";
+    }
+  }
+  for (const Instance& instance : scene.instances) {
+    if (instance.object >= scene.objects.size() || !instance.to_world.Inverse().ok()) {
+      return "an instance";
+    }
+  }
+  for (const CurvePiece& piece : scene.curve_pieces) {
+    if (!traits_are_sound(piece.traits) || !IsFinite(piece.from) || !IsFinite(piece.to) ||
+        !IsFinite(piece.center) || !(piece.from_radius >= 0) || !(piece.to_radius >= 0) ||
+        !(piece.Reach() > 0) || !std::isfinite(piece.Reach()) ||
+        piece.traits.area_light != kNoAreaLight) {
+      return "a piece of a curve";
     }
   }
   for (const Sphere& sphere : scene.spheres) {

@@ -269,7 +269,7 @@ TEST(PbrtParserTest, InstancesAreLaidOut) {
   EXPECT_GT(Cross(p(1) - p(0), p(2) - p(0)).z, 0);
   EXPECT_THAT(
       SaidOfWorld("ObjectBegin \"o\" AreaLightSource \"diffuse\" Shape \"sphere\" ObjectEnd"),
-      HasSubstr("emits light inside an object"));
+      HasSubstr("is part of an object and emits no light"));
 }
 
 TEST(PbrtParserTest, InstancesCountAgainstTheLimit) {
@@ -459,12 +459,22 @@ TEST(PbrtParserTest, IncludeAndImport) {
 }
 
 TEST(PbrtParserTest, IncludesEnd) {
-  EXPECT_THAT(Said("Include \"s.pbrt\""), HasSubstr("include one another more than 32 deep"));
+  // One error, whatever else the file holds.
+  const std::string cycle =
+      Said("Scale 1 1 Include \"a.pbrt\"", {{"a.pbrt", "Include \"s.pbrt\""}});
+  EXPECT_THAT(cycle, HasSubstr("a.pbrt:1:1: error: the file \"s.pbrt\" includes itself"));
+  EXPECT_EQ(std::count(cycle.begin(), cycle.end(), '\n'), 2) << cycle;
+  std::map<std::string, std::string> chain;
+  for (int i = 0; i < 40; ++i)
+    chain[std::to_string(i)] = "Include \"" + std::to_string(i + 1) + "\"";
+  EXPECT_THAT(Said("Include \"0\"", chain), HasSubstr("include one another more than 32 deep"));
   SceneLimits limits;
   limits.max_files = 100;
-  // Doubles with every level: 2^32 readings, were they not counted.
-  EXPECT_THAT(Said("Include \"s.pbrt\" Include \"s.pbrt\"", {}, limits),
-              HasSubstr("more than 100 files"));
+  // Every reading counts, also of a file that was read before.
+  std::string many;
+  for (int i = 0; i < 101; ++i)
+    many += "Include \"a.pbrt\" ";
+  EXPECT_THAT(Said(many, {{"a.pbrt", ""}}, limits), HasSubstr("more than 100 files"));
 }
 
 TEST(PbrtParserTest, PlyMeshesAreReadAndTheirErrorsPlaced) {
@@ -691,11 +701,6 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
   expect("MakeNamedMaterial \"m\" \"string type\" \"mix\"", "\"mix\"");
   expect("LightSource \"goniometric\"", "there are point, spot, distant and infinite");
   expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "no such file");
-  expect("Scale 1 2 1 Shape \"sphere\"", "ellipsoid");
-  expect("Shape \"sphere\" \"float zmax\" 0.5", "part of a sphere");
-  expect("Shape \"disk\" \"float phimax\" 90", "part of a disk");
-  expect("ActiveTransform StartTime", "motion blur");
-  expect("Scale 0 1 1", "cannot be inverted");
   expect("Camera \"perspective\"", "before WorldBegin");
 }
 
@@ -705,6 +710,22 @@ TEST(PbrtParserTest, NeedsAWorldAndACamera) {
             "camera\ns.pbrt: warning: the scene has no shapes\ns.pbrt: warning: the scene "
             "has no light: the image will be black\n");
   EXPECT_THAT(Said("Shape \"sphere\""), HasSubstr("Shape must come after WorldBegin"));
+}
+
+TEST(PbrtParserTest, EveryUnknownDirectiveIsReported) {
+  const std::string said = SaidOfWorld("Foo \"a\" [1 true]\nBar 1 2\nShape \"sphere\"\nBaz");
+  EXPECT_THAT(said, HasSubstr("s.pbrt:2:1: error: unknown directive \"Foo\""));
+  EXPECT_THAT(said, HasSubstr("s.pbrt:3:1: error: unknown directive \"Bar\""));
+  EXPECT_THAT(said, HasSubstr("s.pbrt:5:1: error: unknown directive \"Baz\""));
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 3) << said;
+}
+
+TEST(PbrtParserTest, AByteOrderMarkIsSkipped) {
+  EXPECT_EQ(Parse("\xEF\xBB\xBF"
+                  "Camera \"perspective\" WorldBegin Include \"a.pbrt\"",
+                  {{"a.pbrt", "\xEF\xBB\xBFShape \"sphere\""}})
+                .scene.spheres.size(),
+            1U);
 }
 
 TEST(PbrtParserTest, BinaryFilesAndMissingFiles) {

@@ -9,6 +9,7 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include <zlib.h>
 
 #include "tests/support/memory_files.h"
 
@@ -51,6 +52,52 @@ TEST(ReadSceneTest, AFileThatIsNotThereIsMissing) {
   const ParsedScene parsed = ReadScene(none, "scene.xml");
   EXPECT_FALSE(parsed.ok());
   EXPECT_THAT(parsed.diagnostics.at(0).message, ::testing::Not(::testing::HasSubstr("format")));
+}
+
+std::string Gzip(const std::string& bytes) {
+  z_stream stream{};
+  EXPECT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  std::string out(deflateBound(&stream, bytes.size()) + 64, '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = static_cast<uInt>(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(out.data());
+  stream.avail_out = static_cast<uInt>(out.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  out.resize(stream.total_out);
+  deflateEnd(&stream);
+  return out;
+}
+
+TEST(ReadSceneTest, AsManyErrorsAreKeptAsTheCallerTakes) {
+  std::string text(kText);
+  for (int i = 0; i < 150; ++i)
+    text += "Unknown\n";
+  MemoryFiles files({{"s.pbrt", text}});
+  EXPECT_EQ(ReadScene(files, "s.pbrt").diagnostics.size(), 100U);
+  EXPECT_EQ(ReadScene(files, "s.pbrt", {}, 1000).diagnostics.size(), 150U);
+}
+
+TEST(ReadSceneTest, TextsMayBePackedByGzip) {
+  MemoryFiles files({{"scene.pbrt.gz", Gzip(std::string(kText) + "Include \"part.pbrt.gz\"")},
+                     {"part.pbrt.gz", Gzip("Shape \"sphere\" Shape \"disk\"")},
+                     {"cut.pbrt.gz", Gzip(std::string(kText)).substr(0, 30)},
+                     {"bomb.pbrt.gz", Gzip(std::string(1 << 20, ' '))}});
+  const ParsedScene scene = ReadScene(files, "scene.pbrt.gz");
+  EXPECT_TRUE(scene.ok()) << scene.ToStatus();
+  EXPECT_EQ(scene.scene.spheres.size(), 1U);
+  EXPECT_EQ(scene.scene.disks.size(), 1U);
+  EXPECT_THAT(std::string(ReadScene(files, "cut.pbrt.gz").ToStatus().message()),
+              ::testing::HasSubstr("cut.pbrt.gz: its gzip stream is truncated"));
+  EXPECT_THAT(std::string(ReadScene(files, "bomb.pbrt.gz").ToStatus().message()),
+              ::testing::HasSubstr("unpacks to more than 200 times its size"));
+  // What is unpacked counts against the limit.
+  SceneLimits limits;
+  limits.max_total_bytes = 200;
+  const std::string many = Gzip(std::string(kText) + std::string(150, ' ') + kText.data());
+  MemoryFiles large({{"s.pbrt", many}});
+  EXPECT_LT(many.size(), 200U);
+  EXPECT_THAT(std::string(ReadScene(large, "s.pbrt", limits).ToStatus().message()),
+              ::testing::HasSubstr("the scene reads more than 200 bytes"));
 }
 
 }  // namespace

@@ -1,12 +1,23 @@
 #include "render/formats/pbrt/directives.h"
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <utility>
 
+#include "absl/strings/ascii.h"
+
 #include "render/base/text.h"
 
 namespace lucerna {
+namespace {
+
+// 0 of an empty text.
+unsigned char BeginOf(std::string_view text) {
+  return text.empty() ? 0 : static_cast<unsigned char>(text.front());
+}
+
+}  // namespace
 
 std::span<const DirectiveReader::Directive> DirectiveReader::Directives() {
   using P = DirectiveReader;
@@ -80,6 +91,7 @@ UnfinishedScene DirectiveReader::Read(const std::string& main_path, std::string_
   ReportUnclosedScopes();
   ReportNamedMaterials();
   ReportNamedMedia();
+  ReplaceWrittenOut();
   scene_.film.exposure *= exposure_time_s_;
   if (!in_world_) unfinished_.missing.emplace_back("the scene has no WorldBegin");
   return std::move(unfinished_);
@@ -90,8 +102,14 @@ UnfinishedScene DirectiveReader::Read(const std::string& main_path, std::string_
 void DirectiveReader::IncludeFile(const std::string& path, const SourceLocation& location) {
   const SceneLimits& limits = assets_.limits();
   if (depth_ >= limits.max_include_depth) {
+    // What comes next may need what is left out.
     diagnostics_.Error(location, Concat("files include one another more than ",
                                         limits.max_include_depth, " deep"));
+    is_stopped_ = true;
+    return;
+  }
+  if (std::ranges::find(open_texts_, path) != open_texts_.end()) {
+    diagnostics_.Error(location, Concat("the file ", Quoted(path), " includes itself"));
     return;
   }
   if (++texts_read_ > limits.max_files) {
@@ -99,7 +117,7 @@ void DirectiveReader::IncludeFile(const std::string& path, const SourceLocation&
     is_stopped_ = true;
     return;
   }
-  const StatusOr<std::string> text = assets_.ReadBytes(path);
+  const StatusOr<std::string> text = assets_.ReadText(path);
   if (text.ok()) {
     ReadText(path, *text);
   } else {
@@ -109,13 +127,17 @@ void DirectiveReader::IncludeFile(const std::string& path, const SourceLocation&
 
 void DirectiveReader::ReadText(const std::string& path, std::string_view text) {
   const std::string* name = diagnostics_.NameOfFile(path);
+  // The mark with which some editors begin UTF-8.
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   if (text.find('\0') != std::string_view::npos) {
     diagnostics_.Error({name, 0, 0}, "this is not a pbrt text file: it holds binary data");
     return;
   }
   Tokenizer tokens(name, text, diagnostics_);
   ++depth_;
+  open_texts_.push_back(path);
   ReadDirectives(tokens);
+  open_texts_.pop_back();
   --depth_;
 }
 
@@ -162,7 +184,8 @@ void DirectiveReader::SkipToDirective(Tokenizer& tokens) {
   while (true) {
     const Token& token = tokens.Peek();
     if (token.kind == Token::Kind::kEnd) return;
-    if (token.kind == Token::Kind::kWord && IsDirective(token.text)) return;
+    // Unknown ones are reported too; they begin with a capital, as no value does.
+    if (token.kind == Token::Kind::kWord && absl::ascii_isupper(BeginOf(token.text))) return;
     tokens.Next();
   }
 }
@@ -315,14 +338,7 @@ bool DirectiveReader::OnObjectInstance(Arguments& arguments) {
         Concat("there is no object ", Quoted(name), "; define it by ObjectBegin first"));
     return true;
   }
-  // Before it is laid out, because that is what takes the memory.
-  if (!HasRoomFor(object->second, arguments)) return true;
-  StatusOr<ShapeSet> shapes = Instantiate(object->second, graphics_.state().to_world);
-  if (!shapes.ok()) {
-    arguments.Error(std::string(shapes.status().message()));
-    return true;
-  }
-  AddShapes(*std::move(shapes));
+  PlaceInstance(object->second, arguments);
   return true;
 }
 

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <span>
 #include <string>
@@ -73,6 +74,7 @@ class DirectiveReader {
   // Transforms (transform_directives.cc).
   bool Concatenate(Arguments& arguments, const StatusOr<Transform>& transform);
   bool Replace(Arguments& arguments, const Transform& transform);
+  void WarnOfMotion(const Arguments& arguments);
   bool ReadMatrix(Arguments& arguments, Transform& transform);
   bool OnIdentity(Arguments& arguments);
   bool OnTranslate(Arguments& arguments);
@@ -120,6 +122,26 @@ class DirectiveReader {
   // Reports an error and stops the reading when the scene has no room for these shapes.
   bool HasRoomFor(const ShapeSet& shapes, Arguments& arguments);
   void AddShapes(ShapeSet shapes);
+
+  // Instances (instance_directives.cc).
+  struct Object {
+    // Its meshes are in the scene once it is shared.
+    ShapeSet shapes;
+    std::uint64_t triangles = 0;
+    bool has_instance = false;
+    std::optional<std::uint32_t> shared;  // index in Scene::objects
+  };
+  // Copies of an object's meshes, which are replaced by an instance when the object is shared after
+  // all.
+  struct WrittenOutMeshes {
+    Object* object = nullptr;
+    Transform to_world;
+    std::size_t first = 0, count = 0;  // in Scene::meshes
+  };
+  void PlaceInstance(Object& object, Arguments& arguments);
+  void AddInstance(Object& object, const Transform& to_world, Arguments& arguments);
+  void Share(Object& object);
+  void ReplaceWrittenOut();
   bool OnCamera(Arguments& arguments);
   bool OnFilm(Arguments& arguments);
   bool OnPixelFilter(Arguments& arguments);
@@ -143,7 +165,8 @@ class DirectiveReader {
   UnfinishedScene unfinished_;
   Scene& scene_ = unfinished_.scene;
 
-  int depth_ = 0;  // of files that include files
+  int depth_ = 0;                        // of files that include files
+  std::vector<std::string> open_texts_;  // paths, the main file's first
   std::uint64_t texts_read_ = 0;
   std::uint64_t shapes_cost_ = 0;
   std::uint64_t shapes_bytes_ = 0;
@@ -157,8 +180,11 @@ class DirectiveReader {
   std::map<std::string, NamedMedium> named_media_;
   TextureNames textures_;
   std::set<std::string> float_textures_;
-  std::map<std::string, ShapeSet> objects_;
-  ShapeSet* open_object_ = nullptr;  // between ObjectBegin and ObjectEnd
+  std::map<std::string, Object> objects_;
+  Object* open_object_ = nullptr;  // between ObjectBegin and ObjectEnd
+  std::vector<WrittenOutMeshes> written_out_;
+  std::uint64_t written_out_triangles_ = 0;
+  std::uint64_t instanced_triangles_ = 0;  // each wherever it stands
 };
 
 }  // namespace lucerna

@@ -26,6 +26,9 @@ struct GraphicsState {
   using Defaults = std::shared_ptr<const std::vector<Parameter>>;
 
   Transform to_world;  // before WorldBegin: world to camera, as pbrt writes it
+  // After ActiveTransform EndTime, transforms change nothing: everything stands where it is when
+  // the shutter opens.
+  bool is_at_end_time = false;
   bool reverse_orientation = false;
   std::int32_t material = 0;
   std::shared_ptr<const AreaEmission> area_emission;

@@ -6,6 +6,7 @@
 namespace lucerna {
 
 bool BeginsAsPbrt(std::string_view text) {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
   Diagnostics diagnostics;
   Tokenizer tokens(diagnostics.NameOfFile(""), text, diagnostics);
   const Token& first = tokens.Peek();

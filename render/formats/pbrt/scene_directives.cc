@@ -12,6 +12,16 @@
 #include "render/scene/shape_lists.h"
 
 namespace lucerna {
+namespace {
+
+bool IsInvisible(const ShapeSet& shapes) {
+  bool is_seen = false;
+  ForEachShapeTraits(shapes,
+                     [&](const ShapeTraits& traits) { is_seen = is_seen || traits.alpha > 0; });
+  return !is_seen;
+}
+
+}  // namespace
 
 bool DirectiveReader::OnCamera(Arguments& arguments) {
   std::string type;
@@ -21,8 +31,12 @@ bool DirectiveReader::OnCamera(Arguments& arguments) {
   unfinished_.has_camera = true;
   ParameterList list = ListFor(arguments, type, std::move(parameters));
   ReadCamera(type, list, scene_.camera, exposure_time_s_);
-  // Replace() lets only invertible transforms pass.
-  scene_.camera.camera_to_world = graphics_.state().to_world.Inverse().value();
+  const StatusOr<Transform> camera_to_world = graphics_.state().to_world.Inverse();
+  if (!camera_to_world.ok()) {
+    arguments.Error("the camera's transform cannot be inverted");
+    return true;
+  }
+  scene_.camera.camera_to_world = *camera_to_world;
   coordinate_systems_["camera"] = scene_.camera.camera_to_world;
   scene_.camera.medium = graphics_.state().medium_outside;
   return true;
@@ -207,11 +221,13 @@ bool DirectiveReader::OnShape(Arguments& arguments) {
       {state.material, state.area_light, state.medium_inside, state.medium_outside}};
   const bool emits = state.area_emission != nullptr;
   if (emits && open_object_ != nullptr) {
-    list.Error("emits light inside an object, which is not supported; move it out of ObjectBegin");
+    list.Warning("", "is part of an object and emits no light, as in pbrt-v4");
     placement.traits.area_light = kNoAreaLight;
   }
   const bool is_light = emits && open_object_ == nullptr;
+  placement.emits = is_light;
   ShapeSet shapes = ReadShapes(type, list, placement, assets_);
+  if (!is_light && IsInvisible(shapes)) return true;  // no ray meets it, and nothing comes from it
   if (!HasRoomFor(shapes, arguments)) return true;
   if (is_light && !diagnostics_.has_error() && !(shapes.Area() > 0))
     WarnOfLightWithoutArea(arguments.location(), list.subject(), diagnostics_);
@@ -258,9 +274,13 @@ void DirectiveReader::AddShapes(ShapeSet shapes) {
   const auto append = [](auto& to, auto& from) {
     to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
   };
-  append(open_object_ != nullptr ? open_object_->meshes : scene_.meshes, shapes.meshes);
+  if (open_object_ != nullptr) {
+    for (const TriangleMesh& mesh : shapes.meshes)
+      open_object_->triangles += mesh.indices.size() / 3;
+  }
+  append(open_object_ != nullptr ? open_object_->shapes.meshes : scene_.meshes, shapes.meshes);
 #define LUCERNA_APPEND(Name, list, name) \
-  append(open_object_ != nullptr ? open_object_->list : scene_.list, shapes.list);
+  append(open_object_ != nullptr ? open_object_->shapes.list : scene_.list, shapes.list);
   LUCERNA_ANALYTIC_SHAPES(LUCERNA_APPEND)
 #undef LUCERNA_APPEND
 }

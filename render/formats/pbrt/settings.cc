@@ -22,8 +22,8 @@ std::span<const double> Four(ParameterList& parameters, std::string_view name,
   return {};
 }
 
-void ReadPerspective(ParameterList& parameters, Camera& camera, double& exposure_time_s) {
-  camera.fov_deg = parameters.Float("fov", camera.fov_deg, {0.001, 179.999});
+// What cameras with a window have in common.
+void ReadWindow(ParameterList& parameters, Camera& camera) {
   camera.lens_radius = parameters.Float("lensradius", 0, kZeroOrMore);
   camera.focal_distance = parameters.Float("focaldistance", 1e6, kAboveZero);
   camera.frame_aspect_ratio = parameters.FindFloat("frameaspectratio", {1e-4, 1e4});
@@ -35,14 +35,43 @@ void ReadPerspective(ParameterList& parameters, Camera& camera, double& exposure
       parameters.Error("screenwindow", "must have x0 < x1 and y0 < y1");
     }
   }
+}
+
+void ReadPerspective(ParameterList& parameters, Camera& camera) {
+  camera.fov_deg = parameters.Float("fov", camera.fov_deg, {0.001, 179.999});
+  ReadWindow(parameters, camera);
+}
+
+void ReadOrthographic(ParameterList& parameters, Camera& camera) {
+  camera.kind = Camera::Kind::kOrthographic;
+  ReadWindow(parameters, camera);
+}
+
+void ReadSpherical(ParameterList& parameters, Camera& camera) {
+  const std::string mapping = parameters.String("mapping", "equalarea");
+  if (mapping != "equalarea" && mapping != "equirectangular") {
+    parameters.Error("mapping",
+                     Concat("must be equalarea or equirectangular, not ", Quoted(mapping)));
+  }
+  camera.kind = mapping == "equalarea" ? Camera::Kind::kEqualArea : Camera::Kind::kEquirectangular;
+  for (const std::string_view name :
+       {"lensradius", "focaldistance", "frameaspectratio", "screenwindow"})
+    parameters.Ignore(name);
+}
+
+void ReadShutter(ParameterList& parameters, double& exposure_time_s) {
   const double open = parameters.Float("shutteropen", 0);
   const double close = parameters.Float("shutterclose", 1);
   if (!(close > open)) parameters.Error("shutterclose", "must be after shutteropen");
   exposure_time_s = close - open;
 }
 
-using CameraReader = void (*)(ParameterList&, Camera&, double& exposure_time_s);
-constexpr Kind<CameraReader> kCameras[] = {{"perspective", &ReadPerspective}};
+using CameraReader = void (*)(ParameterList&, Camera&);
+constexpr Kind<CameraReader> kCameras[] = {
+    {"perspective", &ReadPerspective},
+    {"orthographic", &ReadOrthographic},
+    {"spherical", &ReadSpherical},
+};
 
 // The readers of filters set all but the radii, and return the radius that is the default.
 double ReadBox(ParameterList& /*parameters*/, PixelFilter& filter) {
@@ -86,7 +115,8 @@ void ReadCamera(std::string_view type, ParameterList& parameters, Camera& camera
     parameters.Error(Concat("is not supported; ", SupportedKinds<CameraReader>(kCameras)));
     return;
   }
-  read(parameters, camera, exposure_time_s);
+  read(parameters, camera);
+  ReadShutter(parameters, exposure_time_s);
   parameters.WarnOfUnread();
 }
 

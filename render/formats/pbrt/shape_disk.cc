@@ -1,27 +1,25 @@
-// Shape "disk": whole disks and rings.
+// Shape "disk": whole disks and rings; parts of them and ellipses as meshes.
+#include <numbers>
+
+#include "render/formats/parametric_mesh.h"
 #include "render/formats/pbrt/shape_readers.h"
 
 namespace lucerna {
 
-void ReadDisk(const ShapeInput& input, std::vector<Disk>& disks) {
+void ReadDisk(const ShapeInput& input, ShapeSet& shapes) {
   ParameterList& parameters = input.parameters;
   const ShapePlacement& placement = input.placement;
   const double radius = parameters.Float("radius", 1, kAboveZero);
   const double inner_radius = parameters.Float("innerradius", 0, kZeroOrMore);
   const double height = parameters.Float("height", 0);
-  if (parameters.Float("phimax", 360) < 360) {
-    parameters.Error("phimax", "makes it a part of a disk, which is not supported");
-    return;
-  }
+  const double phi_max_rad = ReadPhiMax(parameters);
   if (inner_radius >= radius) {
     parameters.Error("innerradius", "must be smaller than radius");
     return;
   }
   const StatusOr<double> scale = placement.to_world.UniformScale();
-  if (!scale.ok()) {
-    parameters.Error(
-        "is made an ellipse by its transform, which is not supported; scale all axes "
-        "alike, or give a mesh");
+  if (phi_max_rad < 2 * std::numbers::pi || !scale.ok()) {
+    PlaceMesh(DiskMesh(radius, inner_radius, height, phi_max_rad), parameters, placement, shapes);
     return;
   }
   Disk disk;
@@ -36,7 +34,7 @@ void ReadDisk(const ShapeInput& input, std::vector<Disk>& disks) {
     parameters.Error("is moved or scaled out of single precision by its transform");
     return;
   }
-  disks.push_back(disk);
+  shapes.disks.push_back(disk);
 }
 
 Status MoveDisk(Disk& shape, const Transform& to_world) {
@@ -47,6 +45,13 @@ Status MoveDisk(Disk& shape, const Transform& to_world) {
   shape.axes = similarity.Axes(shape.axes);
   shape.inner_radius *= similarity.factor;
   return IsInRange(shape.center, shape.radius) ? absl::OkStatus() : MovedAway();
+}
+
+TriangleMesh MeshDisk(const Disk& shape) {
+  TriangleMesh mesh = DiskMesh(static_cast<double>(shape.radius),
+                               static_cast<double>(shape.inner_radius), 0, 2 * std::numbers::pi);
+  PutOnAxes(shape.center, shape.axes, Dot(shape.normal, shape.axes.z) < 0, mesh);
+  return mesh;
 }
 
 }  // namespace lucerna

@@ -1,8 +1,10 @@
 // The readers of each kind of analytic shape, defined in shape_NAME.cc, and what they share.
 //
-// Read  Adds a shape to `list`, or reports what is wrong.
+// Read  Adds a shape to `shapes`, or reports what is wrong. A part of the shape, or one that its
+//       transform stretches, becomes a mesh.
 // Move  Puts a shape of an object where an instance of the object stands. Errors: INVALID_ARGUMENT
 //       when the shape would then be of another kind or is moved out of single precision.
+// Mesh  The same shape as triangles, in the same space; of shapes that are not thin.
 #pragma once
 
 #include <string_view>
@@ -24,11 +26,36 @@ struct ShapeInput {
   AssetReader& assets;
 };
 
-#define LUCERNA_DECLARE(Name, list, name)                            \
-  void Read##Name(const ShapeInput& input, std::vector<Name>& list); \
-  [[nodiscard]] Status Move##Name(Name& shape, const Transform& to_world);
+#define LUCERNA_DECLARE(Name, list, name)                                  \
+  void Read##Name(const ShapeInput& input, ShapeSet& shapes);              \
+  [[nodiscard]] Status Move##Name(Name& shape, const Transform& to_world); \
+  [[nodiscard]] TriangleMesh Mesh##Name(const Name& shape);
 LUCERNA_ANALYTIC_SHAPES(LUCERNA_DECLARE)
 #undef LUCERNA_DECLARE
+
+// Shapes that are always meshes.
+void ReadCylinder(const ShapeInput& input, ShapeSet& shapes);
+void ReadBilinearMesh(const ShapeInput& input, ShapeSet& shapes);
+void ReadLoopSubdivision(const ShapeInput& input, ShapeSet& shapes);
+
+// Puts a mesh with sound indices, in the shape's own space, where `placement` says.
+void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
+               ShapeSet& shapes);
+
+// Positions "P" and their "indices", `corners` a face, which may be absent for one face. False, and
+// reported, when they are wrong.
+[[nodiscard]] bool ReadPositions(ParameterList& parameters, std::uint32_t corners,
+                                 TriangleMesh& mesh);
+// The optional "N", one for each position. False, and reported, when their number is wrong.
+[[nodiscard]] bool ReadNormals(ParameterList& parameters, TriangleMesh& mesh);
+// The optional "uv" or "st", one for each position.
+[[nodiscard]] bool ReadUvs(ParameterList& parameters, TriangleMesh& mesh);
+
+// True, with a note, when the transform leaves nothing of a shape with a volume, or of its extent.
+[[nodiscard]] bool IsFlattened(ParameterList& parameters, const Transform& to_world);
+
+// "phimax" in radians, in (0, 2 pi].
+[[nodiscard]] double ReadPhiMax(ParameterList& parameters);
 
 // A transform that keeps angles.
 struct Similarity {
@@ -40,6 +67,10 @@ struct Similarity {
 // Of the transform of an instance that holds a `name`, such as "sphere". Errors: INVALID_ARGUMENT
 // when it does not scale all axes alike.
 [[nodiscard]] StatusOr<Similarity> SimilarityOf(const Transform& to_world, std::string_view name);
+
+// Moves a mesh around the origin to `center`, its axes to `axes`, and winds it by its normals,
+// which are turned over for `is_reversed`.
+void PutOnAxes(Vec3 center, const ShapeAxes& axes, bool is_reversed, TriangleMesh& mesh);
 
 // INVALID_ARGUMENT: an instance is moved out of single precision.
 [[nodiscard]] Status MovedAway();

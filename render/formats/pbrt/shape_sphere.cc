@@ -1,22 +1,31 @@
-// Shape "sphere": whole spheres.
+// Shape "sphere": whole spheres; parts of spheres and ellipsoids as meshes.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "render/formats/parametric_mesh.h"
 #include "render/formats/pbrt/shape_readers.h"
 
 namespace lucerna {
 
-void ReadSphere(const ShapeInput& input, std::vector<Sphere>& spheres) {
+void ReadSphere(const ShapeInput& input, ShapeSet& shapes) {
   ParameterList& parameters = input.parameters;
   const ShapePlacement& placement = input.placement;
   const double radius = parameters.Float("radius", 1, kAboveZero);
-  if (parameters.Float("zmin", -radius) > -radius || parameters.Float("zmax", radius) < radius ||
-      parameters.Float("phimax", 360) < 360) {
-    parameters.Error("is only a part of a sphere (zmin, zmax, phimax), which is not supported");
+  const double one_end = std::clamp(parameters.Float("zmin", -radius), -radius, radius);
+  const double other_end = std::clamp(parameters.Float("zmax", radius), -radius, radius);
+  const double z_min = std::min(one_end, other_end);
+  const double z_max = std::max(one_end, other_end);
+  const double phi_max_rad = ReadPhiMax(parameters);
+  if (IsFlattened(parameters, placement.to_world)) return;
+  if (z_min == z_max) {
+    parameters.Error("zmin", "and zmax leave nothing of the sphere");
     return;
   }
+  const bool is_whole = z_min == -radius && z_max == radius && phi_max_rad >= 2 * std::numbers::pi;
   const StatusOr<double> scale = placement.to_world.UniformScale();
-  if (!scale.ok()) {
-    parameters.Error(
-        "is made an ellipsoid by its transform, which is not supported; scale all "
-        "axes alike, or give a mesh");
+  if (!is_whole || !scale.ok()) {
+    PlaceMesh(SphereMesh(radius, z_min, z_max, phi_max_rad), parameters, placement, shapes);
     return;
   }
   Sphere sphere;
@@ -29,7 +38,7 @@ void ReadSphere(const ShapeInput& input, std::vector<Sphere>& spheres) {
     parameters.Error("is moved or scaled out of single precision by its transform");
     return;
   }
-  spheres.push_back(sphere);
+  shapes.spheres.push_back(sphere);
 }
 
 Status MoveSphere(Sphere& shape, const Transform& to_world) {
@@ -38,6 +47,13 @@ Status MoveSphere(Sphere& shape, const Transform& to_world) {
   shape.radius *= similarity.factor;
   shape.axes = similarity.Axes(shape.axes);
   return IsInRange(shape.center, shape.radius) ? absl::OkStatus() : MovedAway();
+}
+
+TriangleMesh MeshSphere(const Sphere& shape) {
+  const auto radius = static_cast<double>(shape.radius);
+  TriangleMesh mesh = SphereMesh(radius, -radius, radius, 2 * std::numbers::pi);
+  PutOnAxes(shape.center, shape.axes, shape.inward, mesh);
+  return mesh;
 }
 
 }  // namespace lucerna

@@ -5,9 +5,11 @@
 // undoing the other. A mesh with normals faces with its normals, which are mapped as normals and
 // turned over by ReverseOrientation alone. Spheres face outward, flat shapes along +z of their own
 // space; only ReverseOrientation turns them over.
+#include <algorithm>
 #include <array>
 #include <cfloat>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "render/base/text.h"
@@ -61,28 +63,9 @@ Double3 EdgeCross(const TriangleMesh& mesh, std::size_t triangle) {
                        mesh.positions[mesh.indices[3 * triangle + 2]]);
 }
 
-// The area of what the unit of the scene may yet make large enough (scene_unit.h).
-constexpr double kLeastArea = 1e-90;
-
-// Puts a mesh with sound indices where `placement` says.
-void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
-               ShapeSet& shapes) {
-  if (!Move(placement.to_world, mesh)) {
-    parameters.Error("is moved out of the finite numbers by its transform");
-    return;
-  }
-  if (placement.reverse_orientation) {
-    for (Vec3& normal : mesh.normals)
-      normal = -normal;
-  }
-  const std::size_t dropped = DropTriangles(mesh, kLeastArea);
-  if (dropped > 0) {
-    parameters.diagnostics().Note(
-        parameters.location(),
-        Concat(parameters.subject(), ": ", dropped, " of ", dropped + mesh.indices.size() / 3,
-               " triangles have no area and are dropped"));
-  }
-  const bool turned_over = placement.reverse_orientation != placement.to_world.SwapsHandedness();
+// Winds the triangles so that their outward sides are those of the normals; without normals
+// `turned_over` tells.
+void WindByNormals(TriangleMesh& mesh, bool turned_over) {
   for (std::size_t triangle = 0; triangle < mesh.indices.size() / 3; ++triangle) {
     bool swap = turned_over;
     if (!mesh.normals.empty()) {
@@ -94,55 +77,19 @@ void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacemen
     }
     if (swap) SwapWinding(mesh, triangle);
   }
-  if (mesh.indices.empty()) return;
-  mesh.traits = placement.traits;
-  shapes.meshes.push_back(std::move(mesh));
 }
+
+// The area of what the unit of the scene may yet make large enough (scene_unit.h).
+constexpr double kLeastArea = 1e-90;
 
 void ReadTriangleMesh(const ShapeInput& input, ShapeSet& shapes) {
   ParameterList& parameters = input.parameters;
   TriangleMesh mesh;
-  mesh.positions = Triples(parameters.Numbers("P", kPointTypes, 3));
-  mesh.normals = Triples(parameters.Numbers("N", kNormalTypes, 3));
-  const std::span<const double> indices = parameters.Numbers("indices", kIntegerType, 3);
   for (const std::string_view name : {"S", "faceIndices"})
     parameters.Ignore(name);
-  const std::string_view uv_name = parameters.Has("uv") ? "uv" : "st";
-  const std::span<const double> uvs = parameters.Numbers(uv_name, kPoint2Types, 2);
-  for (std::size_t i = 0; i + 1 < uvs.size(); i += 2) {
-    mesh.uvs.push_back({static_cast<float>(uvs[i]), static_cast<float>(uvs[i + 1])});
-  }
-  if (mesh.positions.empty()) {
-    if (!parameters.Has("P")) parameters.Error("needs vertex positions: \"point3 P\" [ ... ]");
-    return;
-  }
-  if (!mesh.normals.empty() && mesh.normals.size() != mesh.positions.size()) {
-    parameters.Error("N", Concat("must have as many normals as P has vertices (",
-                                 mesh.positions.size(), "), not ", mesh.normals.size()));
-    return;
-  }
-  if (!mesh.uvs.empty() && mesh.uvs.size() != mesh.positions.size()) {
-    parameters.Error(uv_name, Concat("must have as many pairs as P has vertices (",
-                                     mesh.positions.size(), "), not ", mesh.uvs.size()));
-    return;
-  }
-  if (!parameters.Has("indices") && mesh.positions.size() == 3) {
-    mesh.indices = {0, 1, 2};
-  } else if (indices.empty()) {
-    if (!parameters.Has("indices")) {
-      parameters.Error("needs vertex indices, three for each triangle");
-    }
-    return;
-  }
-  for (const double index : indices) {
-    if (!(index >= 0 && index < static_cast<double>(mesh.positions.size()))) {
-      parameters.Error("indices",
-                       Concat("refers to vertex ", index, " of ", mesh.positions.size()));
-      return;
-    }
-    mesh.indices.push_back(static_cast<std::uint32_t>(index));
-  }
-  PlaceMesh(std::move(mesh), parameters, input.placement, shapes);
+  const bool has_positions = ReadPositions(parameters, 3, mesh);
+  if (ReadNormals(parameters, mesh) && ReadUvs(parameters, mesh) && has_positions)
+    PlaceMesh(std::move(mesh), parameters, input.placement, shapes);
 }
 
 void ReadPlyMesh(const ShapeInput& input, ShapeSet& shapes) {
@@ -166,16 +113,105 @@ void ReadPlyMesh(const ShapeInput& input, ShapeSet& shapes) {
 }
 
 using ShapeReader = void (*)(const ShapeInput&, ShapeSet&);
-#define LUCERNA_ROW(Name, list, name) \
-  {name, [](const ShapeInput& input, ShapeSet& shapes) { Read##Name(input, shapes.list); }},
+#define LUCERNA_ROW(Name, list, name) {name, &Read##Name},
 constexpr Kind<ShapeReader> kKinds[] = {
-    {"trianglemesh", &ReadTriangleMesh},
-    {"plymesh", &ReadPlyMesh},
+    {"trianglemesh", &ReadTriangleMesh}, {"plymesh", &ReadPlyMesh},
+    {"bilinearmesh", &ReadBilinearMesh}, {"loopsubdiv", &ReadLoopSubdivision},
+    {"cylinder", &ReadCylinder},
     LUCERNA_ANALYTIC_SHAPES(LUCERNA_ROW)  //
 };
 #undef LUCERNA_ROW
 
 }  // namespace
+
+void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
+               ShapeSet& shapes) {
+  if (!Move(placement.to_world, mesh)) {
+    parameters.Error("is moved out of the finite numbers by its transform");
+    return;
+  }
+  if (placement.reverse_orientation) {
+    for (Vec3& normal : mesh.normals)
+      normal = -normal;
+  }
+  const std::size_t dropped = DropTriangles(mesh, kLeastArea);
+  if (dropped > 0) {
+    parameters.diagnostics().Note(
+        parameters.location(),
+        Concat(parameters.subject(), ": ", dropped, " of ", dropped + mesh.indices.size() / 3,
+               " triangles have no area and are dropped"));
+  }
+  WindByNormals(mesh, placement.reverse_orientation != placement.to_world.SwapsHandedness());
+  if (mesh.indices.empty()) return;
+  mesh.traits = placement.traits;
+  shapes.meshes.push_back(std::move(mesh));
+}
+
+bool ReadPositions(ParameterList& parameters, std::uint32_t corners, TriangleMesh& mesh) {
+  mesh.positions = Triples(parameters.Numbers("P", kPointTypes, 3));
+  const std::span<const double> indices = parameters.Numbers("indices", kIntegerType, corners);
+  if (mesh.positions.empty()) {
+    if (!parameters.Has("P")) parameters.Error("needs vertex positions: \"point3 P\" [ ... ]");
+    return false;
+  }
+  if (!parameters.Has("indices") && mesh.positions.size() == corners) {
+    for (std::uint32_t i = 0; i < corners; ++i)
+      mesh.indices.push_back(i);
+    return true;
+  }
+  if (indices.empty()) {
+    if (!parameters.Has("indices")) {
+      parameters.Error(Concat("needs vertex indices, ", corners == 3 ? "three" : "four",
+                              " for each ", corners == 3 ? "triangle" : "patch"));
+    }
+    return false;
+  }
+  for (const double index : indices) {
+    if (!(index >= 0 && index < static_cast<double>(mesh.positions.size()))) {
+      parameters.Error("indices",
+                       Concat("refers to vertex ", index, " of ", mesh.positions.size()));
+      return false;
+    }
+    mesh.indices.push_back(static_cast<std::uint32_t>(index));
+  }
+  return true;
+}
+
+bool ReadNormals(ParameterList& parameters, TriangleMesh& mesh) {
+  mesh.normals = Triples(parameters.Numbers("N", kNormalTypes, 3));
+  if (mesh.normals.empty() || mesh.normals.size() == mesh.positions.size()) return true;
+  if (!mesh.positions.empty()) {
+    parameters.Error("N", Concat("must have as many normals as P has vertices (",
+                                 mesh.positions.size(), "), not ", mesh.normals.size()));
+  }
+  return false;
+}
+
+bool ReadUvs(ParameterList& parameters, TriangleMesh& mesh) {
+  const std::string_view name = parameters.Has("uv") ? "uv" : "st";
+  const std::span<const double> uvs = parameters.Numbers(name, kPoint2Types, 2);
+  for (std::size_t i = 0; i + 1 < uvs.size(); i += 2) {
+    mesh.uvs.push_back({static_cast<float>(uvs[i]), static_cast<float>(uvs[i + 1])});
+  }
+  if (mesh.uvs.empty() || mesh.uvs.size() == mesh.positions.size()) return true;
+  if (!mesh.positions.empty()) {
+    parameters.Error(name, Concat("must have as many pairs as P has vertices (",
+                                  mesh.positions.size(), "), not ", mesh.uvs.size()));
+  }
+  return false;
+}
+
+bool IsFlattened(ParameterList& parameters, const Transform& to_world) {
+  if (to_world.Inverse().ok()) return false;
+  parameters.diagnostics().Note(
+      parameters.location(),
+      Concat(parameters.subject(), " is flattened by its transform and left out"));
+  return true;
+}
+
+double ReadPhiMax(ParameterList& parameters) {
+  return parameters.Float("phimax", 360, {0, 360, false}) * std::numbers::pi / 180;
+}
 
 StatusOr<ShapeAxes> AxesOf(const Transform& to_world) {
   LUCERNA_ASSIGN_OR_RETURN(const double scale, to_world.UniformScale());
@@ -200,6 +236,15 @@ StatusOr<Similarity> SimilarityOf(const Transform& to_world, std::string_view na
                ", and its transform does not scale all axes alike, which is not supported"));
   }
   return Similarity{static_cast<float>(*scale), AxesOf(to_world).value_or(ShapeAxes())};
+}
+
+void PutOnAxes(Vec3 center, const ShapeAxes& axes, bool is_reversed, TriangleMesh& mesh) {
+  const auto turned = [&](Vec3 v) { return axes.x * v.x + axes.y * v.y + axes.z * v.z; };
+  for (Vec3& position : mesh.positions)
+    position = center + turned(position);
+  for (Vec3& normal : mesh.normals)
+    normal = turned(normal) * (is_reversed ? -1.0F : 1.0F);
+  WindByNormals(mesh, false);
 }
 
 Status MovedAway() {
@@ -250,10 +295,9 @@ ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
     parameters.Error(Concat("is not supported; ", SupportedKinds<ShapeReader>(kKinds)));
     return shapes;
   }
-  read({parameters, placement, assets}, shapes);
-  if (parameters.Has("alpha") && parameters.FindFloat("alpha").value_or(1) != 1) {
-    parameters.Error("alpha", "is not supported: shapes are opaque");
-  }
+  ShapePlacement with_alpha = placement;
+  with_alpha.traits.alpha = static_cast<float>(std::clamp(parameters.Float("alpha", 1), 0.0, 1.0));
+  read({parameters, with_alpha, assets}, shapes);
   parameters.WarnOfUnread();
   return shapes;
 }
@@ -272,10 +316,28 @@ StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world
     }
     shapes.meshes.push_back(std::move(mesh));
   }
-#define LUCERNA_MOVE(Name, list, name)                    \
-  for (Name shape : object.list) {                        \
-    LUCERNA_RETURN_IF_ERROR(Move##Name(shape, to_world)); \
-    shapes.list.push_back(shape);                         \
+  // What the transform makes another shape of is given as triangles.
+  const auto add_mesh = [&](TriangleMesh mesh, const ShapeTraits& traits) {
+    if (!Move(to_world, mesh)) return MovedAway();
+    DropTriangles(mesh, kLeastArea);
+    if (to_world.SwapsHandedness()) {
+      for (std::size_t i = 0; i < mesh.indices.size() / 3; ++i)
+        SwapWinding(mesh, i);
+    }
+    mesh.traits = traits;
+    if (!mesh.indices.empty()) shapes.meshes.push_back(std::move(mesh));
+    return absl::OkStatus();
+  };
+#define LUCERNA_MOVE(Name, list, name)                                      \
+  for (Name shape : object.list) {                                          \
+    if constexpr (!Name::kIsThin) {                                         \
+      if (!to_world.UniformScale().ok()) {                                  \
+        LUCERNA_RETURN_IF_ERROR(add_mesh(Mesh##Name(shape), shape.traits)); \
+        continue;                                                           \
+      }                                                                     \
+    }                                                                       \
+    LUCERNA_RETURN_IF_ERROR(Move##Name(shape, to_world));                   \
+    shapes.list.push_back(shape);                                           \
   }
   LUCERNA_ANALYTIC_SHAPES(LUCERNA_MOVE)
 #undef LUCERNA_MOVE

@@ -40,14 +40,15 @@ struct ShapePlacement {
   Transform to_world;
   bool reverse_orientation = false;
   ShapeTraits traits;
+  bool emits = false;  // also where the light is made after the shape
 };
 
 [[nodiscard]] ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
                                   const ShapePlacement& placement, AssetReader& assets);
 
-// The shapes of an object where an instance of it stands. Errors: INVALID_ARGUMENT when the
-// transform moves a position out of the finite numbers, or makes a shape of another kind of one,
-// such as an ellipsoid of a sphere.
+// The shapes of an object where an instance of it stands; an ellipsoid, which has no kind of its
+// own, as a mesh. Errors: INVALID_ARGUMENT when the transform moves a position out of the finite
+// numbers.
 [[nodiscard]] StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world);
 
 }  // namespace lucerna

@@ -6,10 +6,11 @@
 namespace lucerna {
 
 bool DirectiveReader::Replace(Arguments& arguments, const Transform& transform) {
-  if (transform.IsFinite() && transform.Inverse().ok()) {
+  if (graphics_.state().is_at_end_time) return true;
+  if (transform.IsFinite()) {
     graphics_.state().to_world = transform;
   } else {
-    arguments.Error(Concat(arguments.directive(), " makes a transform that cannot be inverted"));
+    arguments.Error(Concat(arguments.directive(), " makes a transform that is not finite"));
   }
   return true;
 }
@@ -98,15 +99,22 @@ bool DirectiveReader::OnActiveTransform(Arguments& arguments) {
     arguments.Error("ActiveTransform takes StartTime, EndTime or All");
     return false;
   }
-  if (token.text != "All") arguments.Error("motion blur is not supported (ActiveTransform)");
+  graphics_.state().is_at_end_time = token.text == "EndTime";
+  if (token.text != "All") WarnOfMotion(arguments);
   arguments.tokens().Next();
   return true;
 }
 
 bool DirectiveReader::OnTransformTimes(Arguments& arguments) {
   std::array<double, 2> v{};
-  arguments.Error("motion blur is not supported (TransformTimes)");
+  WarnOfMotion(arguments);
   return arguments.ReadNumbers(v);
+}
+
+void DirectiveReader::WarnOfMotion(const Arguments& arguments) {
+  diagnostics_.Warning(arguments.location(),
+                       "motion is not rendered: everything stands where it is when the shutter "
+                       "opens");
 }
 
 }  // namespace lucerna

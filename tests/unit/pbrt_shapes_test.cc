@@ -1,0 +1,343 @@
+// The shapes of pbrt-v4 that are read as triangles or pieces have the areas, normals and texture
+// coordinates of the surfaces that they stand for.
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <string>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "render/formats/read_scene.h"
+#include "render/math/double3.h"
+#include "tests/support/memory_files.h"
+
+namespace lucerna {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr double kPi = std::numbers::pi;
+
+ParsedScene Parse(const std::string& world, std::map<std::string, std::string> files = {}) {
+  files["s.pbrt"] = "Camera \"perspective\" WorldBegin LightSource \"infinite\"\n" + world;
+  MemoryFiles all(std::move(files));
+  return ReadScene(all, "s.pbrt");
+}
+
+Scene World(const std::string& world) {
+  ParsedScene parsed = Parse(world);
+  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+  return std::move(parsed.scene);
+}
+
+std::string Said(const std::string& world) {
+  std::string all;
+  for (const Diagnostic& diagnostic : Parse(world).diagnostics)
+    all += diagnostic.ToString() + "\n";
+  return all;
+}
+
+double AreaOf(const TriangleMesh& mesh) {
+  double area = 0;
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    area +=
+        Length(TriangleCross(mesh.positions[mesh.indices[i]], mesh.positions[mesh.indices[i + 1]],
+                             mesh.positions[mesh.indices[i + 2]])) /
+        2;
+  }
+  return area;
+}
+
+// Each triangle is wound as its normals point, and normals point away from `inside`.
+void ExpectOutward(const TriangleMesh& mesh, Vec3 inside, float sign = 1) {
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    const Vec3 p = mesh.positions[mesh.indices[i]];
+    const Vec3 n =
+        TriangleNormal(p, mesh.positions[mesh.indices[i + 1]], mesh.positions[mesh.indices[i + 2]]);
+    ASSERT_GT(sign * Dot(n, p - inside), 0) << i;
+    ASSERT_GT(Dot(n, mesh.normals[mesh.indices[i]]), 0) << i;
+  }
+}
+
+TEST(PbrtShapesTest, APartOfASphere) {
+  const TriangleMesh mesh =
+      World(
+          "Shape \"sphere\" \"float radius\" 2 \"float zmin\" -1 \"float zmax\" 1.5 \"float "
+          "phimax\" 90")
+          .meshes.at(0);
+  // A zone's area is that of its height on a cylinder; chords take at most 0.1 % (64 sides a turn).
+  EXPECT_NEAR(AreaOf(mesh) / (kPi / 2 * 2 * 2.5), 0.9995, 6e-4);
+  ExpectOutward(mesh, {0, 0, 0});
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const Vec3 p = mesh.positions[i];
+    ASSERT_NEAR(Length(p), 2, 1e-5);
+    ASSERT_LE(std::abs(Length(mesh.normals[i] - p * 0.5F)), 1e-5F);
+    ASSERT_TRUE(p.x >= -1e-6F && p.y >= -1e-6F && p.z >= -1.00001F && p.z <= 1.50001F);
+    // pbrt-v4: u is the share of phimax, v that of the angle from the pole between its ends.
+    const double u = std::atan2(static_cast<double>(p.y), static_cast<double>(p.x)) / (kPi / 2);
+    const double low = std::acos(-0.5);
+    const double v = (std::acos(static_cast<double>(p.z) / 2) - low) / (std::acos(0.75) - low);
+    ASSERT_NEAR(mesh.uvs[i].x, u, 1e-5);
+    ASSERT_NEAR(mesh.uvs[i].y, v, 1e-5);
+  }
+  const TriangleMesh reversed =
+      World("ReverseOrientation Shape \"sphere\" \"float zmax\" 0.5").meshes.at(0);
+  ExpectOutward(reversed, {0, 0, 0}, -1);
+}
+
+TEST(PbrtShapesTest, AnEllipsoidIsClosedAndHasItsVolume) {
+  const Scene scene = World("Translate 1 2 3 Scale 1 2 -3 Shape \"sphere\"");
+  const TriangleMesh& mesh = scene.meshes.at(0);
+  ExpectOutward(mesh, {1, 2, 3});
+  double volume = 0;
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+    const auto at = [&](std::size_t k) {
+      return Double3(mesh.positions[mesh.indices[i + k]]) - Double3{1, 2, 3};
+    };
+    volume += Dot(at(0), Cross(at(1), at(2))) / 6;
+  }
+  EXPECT_NEAR(volume / (4.0 / 3 * kPi * 6), 0.9985, 1e-3);
+  std::map<std::pair<std::array<float, 3>, std::array<float, 3>>, int> sides;
+  for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
+    const Vec3 a = mesh.positions[mesh.indices[i]];
+    const Vec3 b = mesh.positions[mesh.indices[i - i % 3 + (i + 1) % 3]];
+    ++sides[{{a.x, a.y, a.z}, {b.x, b.y, b.z}}];
+  }
+  for (const auto& [side, count] : sides) {
+    ASSERT_EQ(count, 1);
+    ASSERT_TRUE(sides.contains({side.second, side.first}));
+  }
+}
+
+TEST(PbrtShapesTest, PartsOfDisksAndCylinders) {
+  const TriangleMesh ring =
+      World(
+          "Shape \"disk\" \"float radius\" 2 \"float innerradius\" 1 \"float height\" 3 \"float "
+          "phimax\" 180")
+          .meshes.at(0);
+  EXPECT_NEAR(AreaOf(ring) / (kPi / 2 * 3), 0.9993, 4e-4);
+  for (const Vec3 normal : ring.normals)
+    ASSERT_EQ(normal, Vec3(0, 0, 1));
+  ExpectOutward(ring, {0, 0, 2});
+  const TriangleMesh tube =
+      World("Shape \"cylinder\" \"float radius\" 2 \"float zmin\" 3 \"float zmax\" -1")
+          .meshes.at(0);
+  EXPECT_NEAR(AreaOf(tube) / (2 * kPi * 2 * 4), 0.9998, 1e-4);
+  ExpectOutward(tube, {0, 0, 0});
+  for (std::size_t i = 0; i < tube.positions.size(); ++i) {
+    ASSERT_EQ(tube.normals[i].z, 0);
+    ASSERT_NEAR(tube.uvs[i].y, (tube.positions[i].z + 1) / 4, 1e-6);
+  }
+  EXPECT_TRUE(World("Shape \"disk\"").meshes.empty());
+  EXPECT_THAT(Said("Shape \"sphere\" \"float zmin\" 1"), HasSubstr("leave nothing of the sphere"));
+}
+
+TEST(PbrtShapesTest, BilinearPatches) {
+  const Scene flat = World("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 3 0 2 3 0]");
+  EXPECT_EQ(flat.TriangleCount(), 2U);
+  EXPECT_NEAR(AreaOf(flat.meshes.at(0)), 6, 1e-5);
+  EXPECT_EQ(flat.meshes[0].normals[0], Vec3(0, 0, 1));
+  // z = x y: the area over the unit square is the integral of sqrt(1 + x² + y²).
+  const TriangleMesh saddle =
+      World("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]").meshes.at(0);
+  double area = 0;
+  constexpr int kSteps = 500;
+  for (int i = 0; i < kSteps * kSteps; ++i) {
+    const double x = (i % kSteps + 0.5) / kSteps;
+    const double y = (i / kSteps + 0.5) / kSteps;
+    area += std::sqrt(1 + x * x + y * y) / (kSteps * kSteps);
+  }
+  EXPECT_NEAR(AreaOf(saddle), area, 1e-3);
+  for (std::size_t i = 0; i < saddle.positions.size(); ++i) {
+    const Vec3 p = saddle.positions[i];
+    ASSERT_NEAR(p.z, p.x * p.y, 1e-6);
+    ASSERT_LT(Length(saddle.normals[i] - Normalize({-p.y, -p.x, 1})), 1e-5F);
+    ASSERT_NEAR(saddle.uvs[i].x, p.x, 1e-6);
+  }
+  EXPECT_EQ(World("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0 2 0 0 2 1 0] "
+                  "\"integer indices\" [0 1 2 3 1 4 3 5]")
+                .TriangleCount(),
+            4U);
+  EXPECT_THAT(Said("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]"),
+              HasSubstr("four for each patch"));
+}
+
+TEST(PbrtShapesTest, SubdivisionSurfaces) {
+  const std::string octahedron =
+      "Shape \"loopsubdiv\" \"point3 P\" [1 0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1] \"integer "
+      "indices\" [0 2 4 2 1 4 1 3 4 3 0 4 2 0 5 1 2 5 3 1 5 0 3 5]";
+  const Scene scene = World(octahedron);
+  EXPECT_EQ(scene.TriangleCount(), 8U * 64);
+  // pbrt-v4's normals are on the other side of the cross products.
+  ExpectOutward(scene.meshes.at(0), {0, 0, 0}, -1);
+  EXPECT_EQ(World(octahedron + " \"integer levels\" 1").TriangleCount(), 32U);
+  EXPECT_THAT(Said(octahedron + " \"integer levels\" 14"),
+              HasSubstr("more than the memory for shapes holds"));
+}
+
+// A short text may ask for a lot: what does not fit is refused before it is made.
+TEST(PbrtShapesTest, WhatTakesTooMuchMemoryIsRefusedFirst) {
+  SceneLimits limits;
+  limits.max_shape_bytes = 2048;
+  const auto said = [&](const std::string& shape) {
+    MemoryFiles files({{"s.pbrt", "Camera \"perspective\" WorldBegin " + shape}});
+    return std::string(ReadScene(files, "s.pbrt", limits).ToStatus().message());
+  };
+  EXPECT_THAT(said("Shape \"loopsubdiv\" \"point3 P\" [0 0 0 1 0 0 0 1 0]"),
+              HasSubstr("splits it into 64 triangles"));
+  EXPECT_THAT(said("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]"),
+              HasSubstr("more than the memory for shapes holds"));
+  EXPECT_THAT(said("Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]"),
+              HasSubstr("more than the memory for shapes holds"));
+}
+
+// A straight curve of even width is a cylinder with round ends.
+TEST(PbrtShapesTest, StraightCurvesAreOnePiece) {
+  const Scene scene = World(
+      "Scale 2 2 2 Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0] \"float width\" 0.5 "
+      "\"string type\" \"cylinder\"");
+  ASSERT_EQ(scene.curve_pieces.size(), 1U);
+  const CurvePiece& piece = scene.curve_pieces[0];
+  EXPECT_EQ(piece.to, Vec3(6, 0, 0));
+  EXPECT_FLOAT_EQ(piece.from_radius, 0.5F);
+  EXPECT_NEAR(piece.Area<double>(), 2 * kPi * 0.5 * 6, 1e-6);
+  // Nothing is gathered on it; on shapes of the same material that are not thin it is.
+  const Scene both =
+      World("Shape \"sphere\" Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]");
+  EXPECT_TRUE(
+      Gathers(both.materials.at(static_cast<std::size_t>(both.spheres[0].traits.material))));
+  const Material& on_curve =
+      both.materials.at(static_cast<std::size_t>(both.curve_pieces[0].traits.material));
+  EXPECT_FALSE(Gathers(on_curve));
+  EXPECT_FALSE(GathersCaustics(on_curve));
+}
+
+// A circle's quarter, by the usual cubic (its radius is off by 3e-4), in both degrees and bases.
+TEST(PbrtShapesTest, CurvesStayNearTheirAxis) {
+  const Scene cubic = World(
+      "Shape \"curve\" \"point3 P\" [1 0 0 1 0.5522847 0 0.5522847 1 0 0 1 0] \"float width0\" "
+      "0.02 "
+      "\"float width1\" 0.04");
+  ASSERT_GT(cubic.curve_pieces.size(), 8U);
+  for (std::size_t i = 0; i < cubic.curve_pieces.size(); ++i) {
+    const CurvePiece& piece = cubic.curve_pieces[i];
+    EXPECT_NEAR(Length(piece.from), 1, 4e-4);
+    // The middle of a chord leaves the curve by no more than a twentieth of the radius.
+    EXPECT_GT(Length(piece.center), 1 - 4e-4F - 0.05F * 0.02F);
+    if (i > 0) {
+      EXPECT_EQ(piece.from, cubic.curve_pieces[i - 1].to);
+      EXPECT_EQ(piece.from_radius, cubic.curve_pieces[i - 1].to_radius);
+    }
+  }
+  EXPECT_FLOAT_EQ(cubic.curve_pieces.front().from_radius, 0.01F);
+  EXPECT_FLOAT_EQ(cubic.curve_pieces.back().to_radius, 0.02F);
+  EXPECT_EQ(cubic.curve_pieces.back().to_u, 1);
+  // A quadratic through its elevated form: its middle is a quarter of the ends and half the
+  // control.
+  const Scene quadratic = World(
+      "Shape \"curve\" \"integer degree\" 2 \"point3 P\" [0 0 0 1 2 0 2 0 0] \"float width\" 0.01");
+  double nearest = 1;
+  for (const CurvePiece& piece : quadratic.curve_pieces)
+    nearest = std::min(nearest, std::abs(piece.SignedDistance({1, 1, 0})));
+  EXPECT_LT(nearest, 0.006);
+  // A B-spline of points on a line runs between its inner points, evenly.
+  const Scene spline = World(
+      "Shape \"curve\" \"string basis\" \"bspline\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0 4 0 0] "
+      "\"float width\" 0.1");
+  EXPECT_NEAR(spline.curve_pieces.front().from.x, 1, 1e-6);
+  EXPECT_NEAR(spline.curve_pieces.back().to.x, 3, 1e-6);
+  const Scene quadratic_spline = World(
+      "Shape \"curve\" \"string basis\" \"bspline\" \"integer degree\" 2 \"point3 P\" [0 0 0 1 0 0 "
+      "2 0 0] \"float width\" 0.1");
+  EXPECT_NEAR(quadratic_spline.curve_pieces.front().from.x, 0.5, 1e-6);
+  EXPECT_NEAR(quadratic_spline.curve_pieces.back().to.x, 1.5, 1e-6);
+}
+
+TEST(PbrtShapesTest, RibbonsAreMeshes) {
+  const Scene scene = World(
+      "Shape \"curve\" \"string type\" \"ribbon\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0] \"float "
+      "width0\" 0.5 \"float width1\" 0.1 \"normal N\" [0 0 1 0 0 1]");
+  ASSERT_EQ(scene.meshes.size(), 1U);
+  EXPECT_NEAR(AreaOf(scene.meshes[0]), 3 * 0.3, 1e-5);
+  for (const Vec3 normal : scene.meshes[0].normals)
+    EXPECT_LT(Length(normal - Vec3{0, 0, 1}), 1e-6F);
+  EXPECT_THAT(Said("Shape \"curve\" \"string type\" \"ribbon\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 "
+                   "0]"),
+              HasSubstr("a normal for each end of a segment"));
+  EXPECT_THAT(Said("Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0]"),
+              HasSubstr("must have 3 n + 1 points"));
+  EXPECT_THAT(Said("AreaLightSource \"diffuse\" Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 "
+                   "0 0]"),
+              HasSubstr("cannot emit light"));
+}
+
+TEST(PbrtShapesTest, WhatATransformFlattensIsLeftOut) {
+  const std::string quad =
+      "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 1 1 0 0 1 0] \"integer indices\" [0 1 2 0 "
+      "2 "
+      "3]\n";
+  const std::string world = quad + "ObjectBegin \"o\" " + quad +
+                            "ObjectEnd Scale 1 0 1 Shape \"sphere\"\n" + quad +
+                            "ObjectInstance \"o\"";
+  EXPECT_EQ(World(world).TriangleCount(), 2U);
+  const std::string said = Said(world);
+  EXPECT_THAT(said, HasSubstr("Shape \"sphere\" is flattened by its transform and left out"));
+  EXPECT_THAT(said, HasSubstr("triangles have no area and are dropped"));
+  EXPECT_THAT(said, HasSubstr("an instance is flattened"));
+  // What lies in the plane stays.
+  EXPECT_EQ(World("Scale 1 1 0 " + quad).TriangleCount(), 2U);
+}
+
+TEST(PbrtShapesTest, AlphaIsAShareOfRaysAndZeroIsNothing) {
+  const Scene scene =
+      World("Shape \"sphere\" \"float alpha\" 0.25 Shape \"disk\" \"float alpha\" 0");
+  EXPECT_EQ(scene.spheres.at(0).traits.alpha, 0.25F);
+  EXPECT_TRUE(scene.disks.empty());
+  const Scene light = World("AreaLightSource \"diffuse\" Shape \"disk\" \"float alpha\" 0");
+  EXPECT_EQ(light.disks.size(), 1U);
+}
+
+TEST(PbrtShapesTest, MotionIsShownAsTheShutterOpens) {
+  const std::string world =
+      "AttributeBegin ActiveTransform EndTime Translate 5 0 0 ActiveTransform All Translate 1 0 0 "
+      "Shape \"sphere\" AttributeEnd";
+  EXPECT_EQ(World(world).spheres.at(0).center, Vec3(1, 0, 0));
+  EXPECT_THAT(Said(world), HasSubstr("warning: motion is not rendered"));
+  EXPECT_THAT(Said(world), Not(HasSubstr("error")));
+}
+
+TEST(PbrtShapesTest, ObjectsThatWouldTakeMuchMemoryAreShared) {
+  // 8192 triangles: 128 copies are as many as are written out.
+  const std::string object =
+      "ObjectBegin \"o\" Shape \"sphere\" Shape \"loopsubdiv\" \"integer levels\" 5 \"point3 P\" "
+      "[1 "
+      "0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1] \"integer indices\" [0 2 4 2 1 4 1 3 4 3 0 4 2 0 5 1 "
+      "2 "
+      "5 3 1 5 0 3 5] ObjectEnd\n";
+  std::string copies;
+  for (int i = 0; i < 128; ++i)
+    copies += "Translate 5 0 0 ObjectInstance \"o\"\n";
+  const Scene written_out = World(object + copies);
+  EXPECT_TRUE(written_out.instances.empty());
+  EXPECT_EQ(written_out.meshes.size(), 128U);
+  const std::string lights =
+      "AttributeBegin AreaLightSource \"diffuse\" Shape \"disk\" AttributeEnd ";
+  const std::string mesh_light =
+      "AttributeBegin AreaLightSource \"diffuse\" Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 "
+      "0 1 0] AttributeEnd\n";
+  const Scene shared =
+      World(object + lights + copies + mesh_light + "Scale 1 2 1 ObjectInstance \"o\"");
+  ASSERT_EQ(shared.objects.size(), 1U);
+  EXPECT_EQ(shared.instances.size(), 129U);
+  EXPECT_EQ(shared.object_meshes.size(), 1U);
+  // The light, and the stretched sphere; other spheres are written out.
+  ASSERT_EQ(shared.meshes.size(), 2U);
+  EXPECT_EQ(shared.meshes[0].traits.area_light, 1);
+  EXPECT_EQ(shared.spheres.size(), 128U);
+  EXPECT_EQ(shared.TriangleCount(), 8192 + 1 + shared.meshes[1].indices.size() / 3);
+}
+
+}  // namespace
+}  // namespace lucerna
