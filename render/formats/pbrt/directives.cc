@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "render/base/text.h"
+#include "render/formats/pbrt/spectrum_files.h"
 
 namespace lucerna {
 
@@ -198,6 +199,7 @@ void DirectiveReader::ReportNamedMedia() {
 ParameterList DirectiveReader::ListFor(const Arguments& arguments, std::string_view type,
                                        std::vector<Parameter> parameters,
                                        const GraphicsState::Defaults& defaults) {
+  ReadSpectrumFiles(assets_, parameters, diagnostics_);
   return ParameterList(Concat(arguments.directive(), " ", Quoted(type)), arguments.location(),
                        std::move(parameters), defaults.get(), diagnostics_);
 }
