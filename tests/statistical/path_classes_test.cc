@@ -149,10 +149,10 @@ Scene SceneOf(const PathClass& cell) {
               AddMaterial(scene, DiffuseMaterial(0.6F)));
       break;
     case Floor::kCoated:
-      floor(AddMaterial(scene, CoatedMaterial(0.6F, 0, 0.1F)));
+      floor(AddMaterial(scene, CoatedMaterial(0.9F, 0, 0.5F)));
       break;
     case Floor::kRoughCoated:
-      floor(AddMaterial(scene, CoatedMaterial(0.4F, 0.2F, 0.1F)));
+      floor(AddMaterial(scene, CoatedMaterial(0.8F, 0.2F, 0.5F)));
       break;
     case Floor::kSheet:
       // What it transmits comes back from below.
