@@ -13,8 +13,6 @@
 namespace lucerna {
 namespace {
 
-using ::testing::HasSubstr;
-
 ParsedScene ParseAt(const std::string& path) {
   const std::filesystem::path whole(path);
   DirectoryFiles files(whole.parent_path().string());
