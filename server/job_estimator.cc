@@ -49,7 +49,7 @@ constexpr std::array kPhotonChoices = {PhotonChoice{2, 2}, PhotonChoice{4, 4}, P
 bool HasSmoothSurfaces(const Scene& scene) {
   bool is_any_smooth = false;
   ForEachShapeTraits(scene, [&](const ShapeTraits& traits) {
-    is_any_smooth |= IsSmooth(scene.materials[static_cast<std::size_t>(traits.material)]);
+    is_any_smooth |= ScattersSmoothly(scene.materials[static_cast<std::size_t>(traits.material)]);
   });
   return is_any_smooth;
 }

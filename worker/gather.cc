@@ -256,6 +256,11 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
       SetTexturedParameter(
           *textured, block.textured_k[static_cast<std::size_t>(glossy - block.glossy.data())]);
     }
+    // Where a surface has two parts, caustic photons are gathered on the first.
+    if (source.caustic_weight != nullptr && PropertiesOf(untextured).has_parts) {
+      if (!textured) textured = untextured;
+      textured->parts = Parts::kFirst;
+    }
     const Material& material = textured ? *textured : untextured;
     const Frame frame(DecodeOctahedral(glossy->shading_normal_oct));
     const Vec3 wo = frame.ToLocal(DecodeOctahedral(glossy->to_eye_oct));

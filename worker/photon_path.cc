@@ -470,8 +470,12 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       // replay it without them.
       const auto deposit_key = static_cast<std::uint32_t>(rng.Bits() >> 32);
       if (is_found) {
+        Rgb deposited = flux;
+        if (properties.weighs_photons) {
+          deposited *= PhotonFactor(material, Frame(surface.shading_normal).ToLocal(wo));
+        }
         landed.deposits.rows.push_back(
-            {surface.position, flux, deposit_key,
+            {surface.position, deposited, deposit_key,
              source_of(met_smooth_only ? PathClass::kCaustic : PathClass::kOther)});
         keep_(landed.deposits, surface, wo);
         if constexpr (kSpectrum) {
@@ -519,7 +523,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
                                      : MaxChannel(flux);
     if (const std::optional<PhotonEnd> over = play(before, scattered)) return *over;
     flux = scattered;
-    if constexpr (kSpectrum) spectra_->Scatter(spectrum, surface, material, wo, wi);
+    if constexpr (kSpectrum) spectra_->Scatter(spectrum, surface, material, wo, wi, sample.part);
     if (parts.media && wo_local.z * sample.wi.z < 0) medium = media_.Beyond(surface, wi, medium);
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
   }

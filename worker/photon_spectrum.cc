@@ -146,7 +146,8 @@ float SpectrumTracer::Received(const Carried& carried, const SurfacePoint& surfa
   const double cosine = static_cast<double>(std::abs(Dot(wo, surface.shading_normal)));
   Spectrum seen = carried.spectrum;
   if (const MaterialProperties properties = PropertiesOf(material);
-      sees_glossily_ && properties.has_narrow_lobes()) {
+      // Of two parts, photons are gathered on one that is diffuse.
+      sees_glossily_ && properties.has_narrow_lobes() && !properties.has_parts) {
     const double lobe = ReflectedLobe(static_cast<double>(properties.lobe_width));
     if (lobe < kDiffuseLobe) {
       seen = SeeGlossily(seen, cosine, BendAt(surface, wo), ObliqueLobe(lobe, cosine), limits_);
@@ -183,7 +184,7 @@ SurfaceBend SpectrumTracer::BendAt(const SurfacePoint& surface, Vec3 wo) const {
 }
 
 void SpectrumTracer::Scatter(Carried& carried, const SurfacePoint& surface,
-                             const Material& material, Vec3 wo, Vec3 wi) const {
+                             const Material& material, Vec3 wo, Vec3 wi, Parts part) const {
   const Vec3 normal = surface.shading_normal;
   const auto diffuse = [&] {
     const double bend = std::sqrt(0.5 * static_cast<double>(curvature_.SquaredPrincipals(surface)));
@@ -191,7 +192,9 @@ void SpectrumTracer::Scatter(Carried& carried, const SurfacePoint& surface,
         carried.spectrum, static_cast<double>(std::abs(Dot(wo, normal))), bend, bend, limits_);
     carried = {ScatterDiffusely(trace, TextureDetailAt(surface, material), limits_), true};
   };
-  const MaterialProperties properties = PropertiesOf(material);
+  MaterialNumbers numbers = material;
+  numbers.parts = part;
+  const MaterialProperties properties = PropertiesOf(numbers);
   if (!properties.has_narrow_lobes()) {
     diffuse();
     return;

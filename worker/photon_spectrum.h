@@ -49,9 +49,9 @@ class SpectrumTracer {
   // not a number. A glossy material's hitpoints see it through their lobe.
   [[nodiscard]] float Received(const Carried& carried, const SurfacePoint& surface,
                                const Material& material, Vec3 wo) const;
-  // Scattering from `wo` to `wi`, world.
+  // Scattering from `wo` to `wi`, world, by `part` of the material.
   void Scatter(Carried& carried, const SurfacePoint& surface, const Material& material, Vec3 wo,
-               Vec3 wi) const;
+               Vec3 wi, Parts part = Parts::kAll) const;
 
  private:
   SpectrumTracer(const Scene& scene, const RenderSettings& settings, const SceneNeeds& needs,

@@ -461,7 +461,7 @@ std::string Events(const v1::Job& job) {
   return html + "</ul>\n</section>\n";
 }
 
-std::string Parts(const v1::Job& job) {
+std::string PartsUsed(const v1::Job& job) {
   if (job.parts().empty()) return {};
   std::string html = "<section>\n<h2>What was left out</h2>\n" +
                      TableTop("What this job used of the machine, what it left out, and why.",
@@ -499,7 +499,7 @@ std::string ReportPage(const v1::Job& job, const std::optional<PageImage>& image
       "</style>\n</head>\n<body>\n<main>\n<header>\n<h1>", name, "</h1>\n<p class=\"muted\">",
       subtitle, "</p>\n</header>\n<div class=\"top\">\n", ImageFigure(job, image), "<div>\n",
       Headline(job), RunFacts(job), "</div>\n</div>\n", Convergence(job), Workers(job),
-      Samples(job), Warnings(job), Events(job), Lights(job), Energy(job), Parts(job),
+      Samples(job), Warnings(job), Events(job), Lights(job), Energy(job), PartsUsed(job),
       SettingFacts(job, image),
       "<footer>Made by <code>lucerna report</code>. Time is wall time since the job "
       "began to run.</footer>\n</main>\n</body>\n</html>\n");

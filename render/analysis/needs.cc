@@ -262,12 +262,16 @@ class NeedsFinder {
 
   void FindSurfaces() {
     gathers_ = First(Gathers);
-    specular_ = First(
-        [](const Material& m) { return !Gathers(m) && !ScattersNothing(m) && !IsInterface(m); });
+    specular_ = First([](const Material& m) { return PropertiesOf(m).needs_choice(); });
     Set(Part::kSpecular, specular_ != nullptr,
-        specular_ != nullptr ? Concat("paths go on at ", Quoted(*specular_))
-                             : std::string("every surface gathers photons or is black"));
-    glossy_ = First([](const Material& m) { return Gathers(m) && !IsDiffuse(m); });
+        specular_ == nullptr ? std::string("every surface gathers photons or is black")
+        : PropertiesOf(*specular_).has_parts
+            ? Concat("paths choose between the two parts of ", Quoted(*specular_))
+            : Concat("paths go on at ", Quoted(*specular_)));
+    glossy_ = First([](const Material& m) {
+      const MaterialProperties properties = PropertiesOf(m);
+      return properties.gathers && !properties.has_parts && !properties.is_separable;
+    });
     Set(Part::kGlossy, glossy_ != nullptr,
         glossy_ != nullptr
             ? Concat("photons are gathered on ", Quoted(*glossy_), ", which is not diffuse")
@@ -284,7 +288,7 @@ class NeedsFinder {
         : has_normals ? std::string("every vertex normal is that of its triangles")
                       : std::string("no mesh has vertex normals"));
 
-    textured_ = First([](const Material& m) { return m.texture != kNoTexture; });
+    textured_ = First([](const Material& m) { return m.HasTexture(); });
     Set(Part::kTextures, textured_ != nullptr,
         textured_ != nullptr ? Concat(Quoted(*textured_), " has one")
                              : std::string("no surface has one"));
@@ -352,7 +356,7 @@ class NeedsFinder {
 
   void FindCausticHitpoints() {
     const Material* narrow = First(GathersCaustics);
-    const bool has_smooth = First(IsSmooth) != nullptr;
+    const bool has_smooth = First(ScattersSmoothly) != nullptr;
     const bool is_used = narrow != nullptr && has_smooth && !is_dark_ && HasSmallLights();
     Set(Part::kCausticHitpoints, is_used,
         is_used ? Concat("smooth surfaces throw light on ", Quoted(*narrow), ", where paths go on")
@@ -379,7 +383,9 @@ class NeedsFinder {
     Set(Part::kPhotonDirections, glossy_ != nullptr,
         glossy_ != nullptr ? "glossy hitpoints need the directions of photons"
                            : "all hitpoints are diffuse");
-    const bool is_one_floor = glossy_ == nullptr && GathersOnOneFloor(scene_);
+    const bool is_one_sided =
+        First([](const Material& m) { return Gathers(m) && Transmits(m); }) == nullptr;
+    const bool is_one_floor = glossy_ == nullptr && is_one_sided && GathersOnOneFloor(scene_);
     Set(Part::kPhotonNormals, gathers_ != nullptr && !is_one_floor,
         gathers_ == nullptr ? "no surface gathers light"
         : is_one_floor      ? "all hitpoints lie on one side of one plane"

@@ -24,7 +24,7 @@ constexpr double kFarSizes = 1e4;
 void WarnOfMissingUvs(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
   const auto warn = [&](const TriangleMesh& mesh) {
     const Material& material = scene.materials[static_cast<std::size_t>(mesh.traits.material)];
-    if (mesh.uvs.empty() && material.texture != kNoTexture) {
+    if (mesh.uvs.empty() && material.HasTexture()) {
       diagnostics.Warning(whole,
                           "a mesh with a texture has no uv: every triangle shows half of it");
     }

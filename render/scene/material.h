@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,13 +21,26 @@
 
 // The kinds of material, in the order of Material::Kind.
 // ROW(Name, name): Material::Kind::kName, and its name in messages and in pbrt files.
-#define LUCERNA_MATERIALS(ROW)  \
-  ROW(Diffuse, "diffuse")       \
-  ROW(Conductor, "conductor")   \
-  ROW(Dielectric, "dielectric") \
-  ROW(Interface, "interface")
+#define LUCERNA_MATERIALS(ROW)          \
+  ROW(Diffuse, "diffuse")               \
+  ROW(Conductor, "conductor")           \
+  ROW(Dielectric, "dielectric")         \
+  ROW(Interface, "interface")           \
+  ROW(CoatedDiffuse, "coateddiffuse")   \
+  ROW(ThinDielectric, "thindielectric") \
+  ROW(DiffuseTransmission, "diffusetransmission")
 
 namespace lucerna {
+
+// Of a material that scatters as the sum of two parts, all or one of them: eye paths choose one at
+// random and meet a surface of that part alone (docs/decisions/materials-in-parts.md).
+enum class Parts : std::uint8_t {
+  kAll,
+  kFirst,  // what a coat reflects; the reflection of a sheet
+  kSecond  // what the base under a coat scatters; the transmission of a sheet
+};
+
+struct CoatTable;  // scene/coat_table.h
 
 // What all kinds of material are made of. Each kind uses some of the members.
 struct MaterialNumbers {
@@ -35,14 +49,22 @@ struct MaterialNumbers {
 #undef LUCERNA_KIND
 
   Kind kind = Kind::kDiffuse;
-  Rgb reflectance = {0.5F, 0.5F, 0.5F};  // diffuse
+  Parts parts = Parts::kAll;             // of a material that has two
+  Rgb reflectance = {0.5F, 0.5F, 0.5F};  // diffuse, coated diffuse, diffuse transmission
+  Rgb transmittance;                     // diffuse transmission
   Rgb eta = {1, 1, 1};                   // conductor: index of refraction per channel
   Rgb k = {0, 0, 0};                     // conductor: absorption per channel
-  float ior = 1.5F;                      // dielectric: inside over outside
-  float alpha_u = 0;                     // conductor, dielectric: GGX widths; 0 and 0 = smooth
-  float alpha_v = 0;
-  // In place of the reflectance of a diffuse surface, and of a conductor's eta and k.
+  float ior = 1.5F;                      // dielectric, coat: inside over outside
+  float alpha_u = 0;                     // of metals, dielectrics and coats: GGX widths; 0 and 0:
+  float alpha_v = 0;                     // smooth
+  float thickness = 0;                   // of a coat [mean free paths], at right angles
+  std::int32_t base_hits = 5;            // how often light in a coat meets the base, at most
+  // Of a coated material, once it is prepared (transport/coat.h); owned by Material.
+  const CoatTable* coat = nullptr;
+  // In place of `reflectance`, and of a conductor's eta and k.
   std::int32_t texture = kNoTexture;
+  std::int32_t second_texture = kNoTexture;  // in place of `transmittance`
+  float texture_scale = 1;                   // of both textures' colours: diffuse transmission
   // On shapes much thinner than the discs of hitpoints: nothing is gathered there.
   bool is_on_thin_shapes = false;
 
@@ -52,11 +74,16 @@ struct MaterialNumbers {
   template <typename Visit>
   void ForEachColor(const Visit& visit) {
     visit(reflectance);
+    visit(transmittance);
+  }
+  [[nodiscard]] bool HasTexture() const {
+    return texture != kNoTexture || second_texture != kNoTexture;
   }
 };
 
 struct Material : MaterialNumbers {
   std::string name;  // for messages and the plan
+  std::shared_ptr<const CoatTable> owned_coat;
 
   bool operator==(const Material&) const = default;
 };
@@ -66,15 +93,25 @@ struct MaterialProperties {
   // The BSDF is reflectance / pi on the side of `wo` and 0 on the other.
   bool is_diffuse = false;
   bool is_smooth = false;  // all scattering goes into single directions
-  bool is_black = false;   // nothing is scattered
+  // The BSDF is a sum of two parts, of which eye paths choose one.
+  bool has_parts = false;
+  // Some scattering goes into single directions: that of the first part, or all.
+  bool scatters_smoothly = false;
+  // The BSDF is a factor of the direction to the eye (EyeFactor) times one of the direction to the
+  // light (PhotonFactor), on one side for each: hitpoints of it travel without a BSDF.
+  bool is_separable = false;
+  bool weighs_photons = false;  // PhotonFactor is not 1 everywhere
+  bool is_black = false;        // nothing is scattered
   // Light passes unchanged: the surface only separates media. Paths never scatter there.
   bool is_interface = false;
   // Some light goes to the other side: the surface casts no shadow and encloses nothing.
   bool transmits = false;
-  // Where eye paths stop and photons are kept.
+  // Where eye paths stop and photons are kept; with two parts, those that choose one of them.
   bool gathers = false;
   // Of a thin shape: eye paths go on, and no photons are kept.
   bool is_thin = false;
+  // With two parts: where eye paths go on at the first.
+  bool has_rough_coat = false;
   // The GGX width of the lobes, the larger one; +infinity: light is scattered so broadly that it
   // keeps no detail over angle.
   float lobe_width = HUGE_VALF;
@@ -84,7 +121,13 @@ struct MaterialProperties {
   [[nodiscard]] bool scatters_broadly() const { return !is_smooth && !is_black && !is_interface; }
   // Where eye paths go on although a range of directions is scattered: what eye paths do not find
   // of the light there, caustic photons bring (transport/caustic_weight.h).
-  [[nodiscard]] bool gathers_caustics() const { return scatters_broadly() && !gathers && !is_thin; }
+  [[nodiscard]] bool gathers_caustics() const {
+    return !is_thin && (has_rough_coat || (scatters_broadly() && !gathers));
+  }
+  // Where paths choose, or are scattered otherwise than diffusely and go on.
+  [[nodiscard]] bool needs_choice() const {
+    return has_parts || (!gathers && !is_black && !is_interface);
+  }
   [[nodiscard]] bool has_narrow_lobes() const { return lobe_width < HUGE_VALF; }
 };
 
@@ -153,6 +196,9 @@ void SetTexturedParameter(MaterialNumbers& material, Rgb value);
 }
 [[nodiscard]] inline bool ScattersBroadly(const Material& material) {
   return PropertiesOf(material).scatters_broadly();
+}
+[[nodiscard]] inline bool ScattersSmoothly(const Material& material) {
+  return PropertiesOf(material).scatters_smoothly;
 }
 [[nodiscard]] inline bool GathersCaustics(const Material& material) {
   return PropertiesOf(material).gathers_caustics();

@@ -7,6 +7,7 @@ namespace lucerna {
 MaterialProperties ConductorKind::Properties(const MaterialNumbers& material) {
   MaterialProperties properties;
   properties.is_smooth = material.alpha_u == 0 && material.alpha_v == 0;
+  properties.scatters_smoothly = properties.is_smooth;
   properties.lobe_width = std::max(material.alpha_u, material.alpha_v);
   // What a metal with a texture reflects depends on the place, which hitpoints do not hold:
   // paths go on there.

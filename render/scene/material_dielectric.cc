@@ -6,6 +6,7 @@ namespace lucerna {
 MaterialProperties DielectricKind::Properties(const MaterialNumbers& material) {
   MaterialProperties properties;
   properties.is_smooth = material.alpha_u == 0 && material.alpha_v == 0;
+  properties.scatters_smoothly = properties.is_smooth;
   properties.transmits = true;
   properties.lobe_width = std::max(material.alpha_u, material.alpha_v);
   properties.gathers =

@@ -7,6 +7,7 @@ namespace lucerna {
 MaterialProperties DiffuseKind::Properties(const MaterialNumbers& material) {
   MaterialProperties properties;
   properties.is_diffuse = true;
+  properties.is_separable = true;
   properties.is_black = material.texture == kNoTexture && IsBlack(material.reflectance);
   // Black surfaces need no photons.
   properties.gathers = !IsBlack(material.reflectance);

@@ -39,14 +39,26 @@ Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
     return {};
   const Vec3 wo = point.frame.ToLocal(point.wo);
   const Vec3 wi = point.frame.ToLocal(light.wi);
-  const Rgb bsdf = EvaluateBsdf(point.material, wo, wi, Carried::kRadiance);
-  if (IsBlack(bsdf)) return {};
-  if (!SidesAgree(point.surface, point.wo, light.wi, wo.z * wi.z < 0)) return {};
-  Rgb radiance = bsdf * light.radiance_over_pdf * std::abs(wi.z);
-  if (light.pdf > 0) {
-    radiance *= PowerHeuristic(light.pdf, PdfBsdf(point.material, wo, wi));
+  // `share`: the probability with which eye paths scatter by this material or part.
+  const auto reflected_by = [&](const Material& material, float share) {
+    const Rgb bsdf = EvaluateBsdf(material, wo, wi, Carried::kRadiance);
+    if (IsBlack(bsdf)) return Rgb{};
+    Rgb reflected = bsdf * light.radiance_over_pdf * std::abs(wi.z);
+    if (light.pdf > 0) {
+      reflected *= PowerHeuristic(light.pdf, share * PdfBsdf(material, wo, wi));
+    }
+    return reflected;
+  };
+  Rgb radiance;
+  if (point.share_of_first < 0) {
+    radiance = reflected_by(point.material, 1);
+  } else {
+    Material part;
+    radiance = reflected_by(PartOf(point.material, Parts::kFirst, part), point.share_of_first) +
+               reflected_by(PartOf(point.material, Parts::kSecond, part), 1 - point.share_of_first);
   }
   if (IsBlack(radiance)) return {};
+  if (!SidesAgree(point.surface, point.wo, light.wi, wo.z * wi.z < 0)) return {};
   // Both ends are clear of their surfaces, so nothing but a third surface can be met.
   const Vec3 origin = LeavingPoint(point.surface, light.wi);
   const Ray shadow = light.is_distant ? Ray{origin, light.wi, HUGE_VALF}

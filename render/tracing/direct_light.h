@@ -22,6 +22,9 @@ struct ShadingPoint {
   Vec3 wo;                          // towards the eye, world
   const Media* media = nullptr;     // nullptr: there are none
   std::int32_t medium = kNoMedium;  // on the eye's side
+  // Of a material with two parts, which are sampled apart: the probability of the first one. Below
+  // 0: of any other material.
+  float share_of_first = -1;
 };
 
 // The weight of a sample drawn with density `drawn` beside one that could have been drawn with

@@ -293,8 +293,11 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, std
                              int vertex) {
     if (vertex >= settings_.max_depth) return;
     std::optional<Material> textured;
-    const Material& material = MaterialAt(scene_, surface, textured);
-    if (!properties_[surface.material].is_smooth) return;
+    const MaterialProperties& properties = properties_[surface.material];
+    if (!properties.scatters_smoothly) return;
+    const Material& whole = MaterialAt(scene_, surface, textured);
+    Material part;
+    const Material& material = properties.has_parts ? PartOf(whole, Parts::kFirst, part) : whole;
     const Frame frame(surface.shading_normal);
     // Lobe 0 is the reflection and lobe 1 - ulp the refraction, with the weight of its share.
     const Vec3 wo_local = frame.ToLocal(wo);
@@ -397,6 +400,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     path.segment.weight *= segment_strength;
     return path;
   };
+  bool has_features = false;  // of a gathering surface
   const auto add_first_emission = [&](Rgb emitted) {
     const Rgb bright = BrightPart(emitted);
     path.bright += bright;
@@ -438,37 +442,51 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       path.direct += weight * emitted * (mis * share_of_rays(lights_.EmissionDensity(surface)));
     }
     std::optional<Material> textured;
-    const Material& material = [&]() -> const Material& {
+    const Material& whole = [&]() -> const Material& {
       if (parts_.textures) return MaterialAt(scene_, surface, textured);
       return scene_.materials[surface.material];
     }();
-    const MaterialProperties changed = textured ? PropertiesOf(*textured) : MaterialProperties();
-    const MaterialProperties& properties = textured ? changed : properties_[surface.material];
-    if (vertex == 0 || properties.gathers) {
-      path.features = {AlbedoOf(material), FaceForward(surface.shading_normal, wo), length};
+    MaterialProperties changed = textured ? PropertiesOf(*textured) : MaterialProperties();
+    const MaterialProperties& whole_properties = textured ? changed : properties_[surface.material];
+    if (!has_features && (vertex == 0 || whole_properties.gathers)) {
+      path.features = {AlbedoOf(whole), FaceForward(surface.shading_normal, wo), length};
+      has_features = whole_properties.gathers;
     }
     if (vertex >= settings_.max_depth) return finish();
 
     const Frame frame(surface.shading_normal);
     const SobolPoint u = sampler.ForVertex(vertex);
-    if (parts_.lobes && properties.is_smooth) {
-      if (vertex == 0 && rays_find_lights_) {
-        add_first_emission(weight *
-                           EmissionThrough(surface, wo, medium, sampler.ForBranches(), path.rays));
-        emission_was_collected = true;
-      }
-    } else {
-      emission_was_collected = false;
-      if (parts_.lights) {
-        const ShadingPoint point = {surface, material, frame, wo, parts_.media ? &media_ : nullptr,
-                                    medium};
-        path.direct += weight * LightSampledRadiance(intersector_, lights_, point, u, path.rays);
-      }
+    const Vec3 wo_local = frame.ToLocal(wo);
+    const bool has_parts = parts_.lobes && whole_properties.has_parts;
+    const float share_of_first = has_parts ? ShareOfFirst(whole, wo_local) : -1;
+    if (parts_.lobes && vertex == 0 && whole_properties.scatters_smoothly && rays_find_lights_) {
+      add_first_emission(weight *
+                         EmissionThrough(surface, wo, medium, sampler.ForBranches(), path.rays));
+      emission_was_collected = true;
     }
+    if (parts_.lights && !(parts_.lobes && whole_properties.is_smooth)) {
+      const ShadingPoint point = {
+          surface, whole, frame, wo, parts_.media ? &media_ : nullptr, medium, share_of_first};
+      path.direct += weight * LightSampledRadiance(intersector_, lights_, point, u, path.rays);
+    }
+
+    // From here on the surface has the chosen part alone.
+    std::optional<Material> part;
+    float share = 1;
+    if (has_parts) {
+      const bool is_first = u[0] < share_of_first;
+      share = is_first ? share_of_first : 1 - share_of_first;
+      if (!(share > 0)) return finish();
+      changed =
+          PropertiesOf(PartOf(whole, is_first ? Parts::kFirst : Parts::kSecond, part.emplace()));
+      weight *= 1 / share;
+    }
+    const Material& material = part ? *part : whole;
+    const MaterialProperties& properties = part ? changed : whole_properties;
+    if (!(parts_.lobes && properties.is_smooth)) emission_was_collected = false;
 
     BsdfSample sample;
     bool scattered = [&] {
-      const Vec3 wo_local = frame.ToLocal(wo);
       if (parts_.lobes) {
         return SampleBsdf(material, wo_local, u[0], u[1], u[2], Carried::kRadiance, sample);
       }
@@ -503,19 +521,22 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
         Rgb carried = weight * sample.weight;
         if (!FindThroughMedia(probe, hit, medium_after, carried, path.rays)) {
           path.direct += carried * lights_.InfiniteRadiance(wi) *
-                         PowerHeuristic(sample.pdf, lights_.PdfDirectInfinite(wi));
+                         PowerHeuristic(share * sample.pdf, lights_.PdfDirectInfinite(wi));
         } else {
           const SurfacePoint light = intersector_.SurfaceAt(probe, hit);
           const Rgb radiance = lights_.EmittedRadiance(light, -wi);
           if (!IsBlack(radiance)) {
-            path.direct += carried * radiance *
-                           PowerHeuristic(sample.pdf, lights_.PdfDirect(surface.position, light));
+            path.direct +=
+                carried * radiance *
+                PowerHeuristic(share * sample.pdf, lights_.PdfDirect(surface.position, light));
           }
         }
       }
-      const bool is_glossy = parts_.lobes && !properties.is_diffuse;
+      const bool is_glossy = parts_.lobes && !properties.is_separable;
       path.hitpoint = hitpoint_here(is_glossy, material);
-      if (!is_glossy) path.hitpoint.weight *= material.reflectance * kInversePi;
+      if (!is_glossy) path.hitpoint.weight *= EyeFactor(material, wo_local);
+      // Light comes from the other side.
+      if (!is_glossy && properties.transmits) path.hitpoint.normal = -path.hitpoint.normal;
       return finish();
     }
     if (parts_.caustics) {
@@ -537,7 +558,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
 
     if (!scattered) return finish();
     weight *= sample.weight;
-    scatter_pdf = sample.is_delta ? 0 : sample.pdf;
+    scatter_pdf = sample.is_delta ? 0 : share * sample.pdf;
     scatter_position = surface.position;
     const float strength = MaxChannel(weight);
     if (!(strength > 0)) return finish();

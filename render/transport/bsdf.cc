@@ -60,4 +60,43 @@ float ReflectedShare(const Material& material, float cos_o) {
   return 1;
 }
 
+float ShareOfFirst(const Material& material, Vec3 wo) {
+  switch (material.kind) {
+#define LUCERNA_CASE(Name, name) \
+  case Material::Kind::k##Name:  \
+    return Name##Bsdf::ShareOfFirst(material, wo);
+    LUCERNA_MATERIALS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+  }
+  return 1;
+}
+
+Rgb EyeFactor(const Material& material, Vec3 wo) {
+  switch (material.kind) {
+#define LUCERNA_CASE(Name, name) \
+  case Material::Kind::k##Name:  \
+    return Name##Bsdf::EyeFactor(material, wo);
+    LUCERNA_MATERIALS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+  }
+  return {};
+}
+
+float PhotonFactor(const Material& material, Vec3 wi) {
+  switch (material.kind) {
+#define LUCERNA_CASE(Name, name) \
+  case Material::Kind::k##Name:  \
+    return Name##Bsdf::PhotonFactor(material, wi);
+    LUCERNA_MATERIALS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+  }
+  return 1;
+}
+
+const Material& PartOf(const Material& material, Parts part, Material& storage) {
+  static_cast<MaterialNumbers&>(storage) = static_cast<const MaterialNumbers&>(material);
+  storage.parts = part;
+  return storage;
+}
+
 }  // namespace lucerna

@@ -22,6 +22,7 @@ struct BsdfSample {
   Rgb weight;     // f·|cosθi| / pdf; includes the choice of lobe
   float pdf = 0;  // pdf_solid_angle [sr⁻¹]; meaningless when is_delta
   bool is_delta = false;
+  Parts part = Parts::kAll;  // which one scattered, where that is known
 };
 
 // The same as SampleBsdf, for a material that is known to be diffuse.
@@ -48,6 +49,16 @@ struct BsdfSample {
 
 // The reflectance that feature layers show.
 [[nodiscard]] Rgb AlbedoOf(const Material& material);
+
+// Of a material with two parts: the probability with which SampleBsdf and eye paths choose the
+// first one, in [0, 1].
+[[nodiscard]] float ShareOfFirst(const Material& material, Vec3 wo);
+// Of a material, or one of its parts, that is separable: f(wo, wi) = EyeFactor(wo) [sr⁻¹] ·
+// PhotonFactor(wi), of radiance, where wi is on the side that light comes from.
+[[nodiscard]] Rgb EyeFactor(const Material& material, Vec3 wo);
+[[nodiscard]] float PhotonFactor(const Material& material, Vec3 wi);
+// `material` with one of its parts alone, in `storage`, without its name.
+[[nodiscard]] const Material& PartOf(const Material& material, Parts part, Material& storage);
 
 // Of a smooth material: the share of reflection in what it scatters, in [0, 1]; the rest is
 // refracted. cos_o: of wo, negative from inside.

@@ -71,6 +71,18 @@ float ConductorBsdf::ReflectedShare(const Material& /*material*/, float /*cos_o*
   return 1;
 }
 
+float ConductorBsdf::ShareOfFirst(const Material& /*material*/, Vec3 /*wo*/) {
+  return 1;
+}
+
+Rgb ConductorBsdf::EyeFactor(const Material& /*material*/, Vec3 /*wo*/) {
+  return {};
+}
+
+float ConductorBsdf::PhotonFactor(const Material& /*material*/, Vec3 /*wi*/) {
+  return 1;
+}
+
 Rgb FresnelConductor(float cos_i, Rgb eta, Rgb k) {
   const float c = std::clamp(cos_i, 0.0F, 1.0F);
   const float c2 = c * c;

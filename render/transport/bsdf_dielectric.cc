@@ -123,6 +123,18 @@ float DielectricBsdf::ReflectedShare(const Material& material, float cos_o) {
   return FresnelDielectric(cos_o, material.ior, cos_t);
 }
 
+float DielectricBsdf::ShareOfFirst(const Material& /*material*/, Vec3 /*wo*/) {
+  return 1;
+}
+
+Rgb DielectricBsdf::EyeFactor(const Material& /*material*/, Vec3 /*wo*/) {
+  return {};
+}
+
+float DielectricBsdf::PhotonFactor(const Material& /*material*/, Vec3 /*wi*/) {
+  return 1;
+}
+
 float FresnelDielectric(float cos_i, float eta, float& cos_t) {
   if (cos_i < 0) {
     eta = 1 / eta;

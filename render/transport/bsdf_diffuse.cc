@@ -26,4 +26,16 @@ float DiffuseBsdf::ReflectedShare(const Material& /*material*/, float /*cos_o*/)
   return 1;
 }
 
+float DiffuseBsdf::ShareOfFirst(const Material& /*material*/, Vec3 /*wo*/) {
+  return 1;
+}
+
+Rgb DiffuseBsdf::EyeFactor(const Material& material, Vec3 /*wo*/) {
+  return material.reflectance * kInversePi;
+}
+
+float DiffuseBsdf::PhotonFactor(const Material& /*material*/, Vec3 /*wi*/) {
+  return 1;
+}
+
 }  // namespace lucerna

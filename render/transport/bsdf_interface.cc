@@ -26,4 +26,16 @@ float InterfaceBsdf::ReflectedShare(const Material& /*material*/, float /*cos_o*
   return 0;
 }
 
+float InterfaceBsdf::ShareOfFirst(const Material& /*material*/, Vec3 /*wo*/) {
+  return 1;
+}
+
+Rgb InterfaceBsdf::EyeFactor(const Material& /*material*/, Vec3 /*wo*/) {
+  return {};
+}
+
+float InterfaceBsdf::PhotonFactor(const Material& /*material*/, Vec3 /*wi*/) {
+  return 1;
+}
+
 }  // namespace lucerna

@@ -18,7 +18,7 @@ namespace material_at_internal {
 [[nodiscard]] inline const Material& MaterialAt(const Scene& scene, const SurfacePoint& point,
                                                 std::optional<Material>& storage) {
   const Material& material = scene.materials[point.material];
-  if (material.texture == kNoTexture) [[likely]]
+  if (!material.HasTexture()) [[likely]]
     return material;
   return material_at_internal::Textured(scene, point, material, storage);
 }

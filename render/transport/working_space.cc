@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "render/math/color_space.h"
+#include "render/transport/coat.h"
 
 namespace lucerna {
 
@@ -18,6 +19,7 @@ Scene InWorkingSpace(Scene scene) {
     medium.absorption = coefficients(medium.absorption);
     medium.scattering = coefficients(medium.scattering);
   }
+  PrepareCoats(scene.materials);
   for (AreaLight& light : scene.area_lights)
     light.radiance = ToWorking(light.radiance);
   ForEachDeltaList(scene, [](auto& lights) {

@@ -1,4 +1,4 @@
-// The scene's colours, ready to be multiplied.
+// The scene's colours, ready to be multiplied, and its coated materials, ready to be evaluated.
 #pragma once
 
 #include "render/scene/scene.h"

@@ -36,13 +36,24 @@ enum class Chain {
   kRoughPane,
   kMirror,
   kNarrowWall,
+  kCoatedWall,
   kDiffuseWall,
   kPaneAndNarrowWall,
   kInBall,
   kInNarrowBall,
   kInRoughBall
 };
-enum class Floor { kDiffuse, kRoughMetal, kNarrowMetal, kTexturedMetal, kNarrowGlass, kRoughGlass };
+enum class Floor {
+  kDiffuse,
+  kRoughMetal,
+  kNarrowMetal,
+  kTexturedMetal,
+  kNarrowGlass,
+  kRoughGlass,
+  kCoated,
+  kRoughCoated,
+  kSheet
+};
 enum class View { kPlain, kThroughGlass, kInMirror };
 
 struct PathClass {
@@ -55,14 +66,21 @@ struct PathClass {
 std::string NameOf(const PathClass& cell) {
   constexpr std::array<std::string_view, 8> kLights = {"Triangles", "Sphere",  "Disk",     "Point",
                                                        "Spot",      "Distant", "Constant", "Map"};
-  constexpr std::array<std::string_view, 11> kChains = {"Directly",        "ByPane",
-                                                        "ByThinPane",      "ByRoughPane",
-                                                        "ByMirror",        "ByNarrowMetal",
-                                                        "ByDiffuseWall",   "ByPaneAndNarrowMetal",
-                                                        "InGlassBall",     "InNarrowGlassBall",
+  constexpr std::array<std::string_view, 12> kChains = {"Directly",
+                                                        "ByPane",
+                                                        "ByThinPane",
+                                                        "ByRoughPane",
+                                                        "ByMirror",
+                                                        "ByNarrowMetal",
+                                                        "ByCoat",
+                                                        "ByDiffuseWall",
+                                                        "ByPaneAndNarrowMetal",
+                                                        "InGlassBall",
+                                                        "InNarrowGlassBall",
                                                         "InRoughGlassBall"};
-  constexpr std::array<std::string_view, 6> kFloors = {
-      "Diffuse", "RoughMetal", "NarrowMetal", "TexturedMetal", "NarrowGlass", "RoughGlass"};
+  constexpr std::array<std::string_view, 9> kFloors = {
+      "Diffuse",    "RoughMetal", "NarrowMetal", "TexturedMetal", "NarrowGlass",
+      "RoughGlass", "Coated",     "RoughCoated", "Sheet"};
   constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
   std::string name(kLights[static_cast<std::size_t>(cell.light)]);
   name += kChains[static_cast<std::size_t>(cell.chain)];
@@ -74,11 +92,11 @@ std::string NameOf(const PathClass& cell) {
 
 bool GathersCaustics(Floor floor) {
   return floor == Floor::kNarrowMetal || floor == Floor::kTexturedMetal ||
-         floor == Floor::kNarrowGlass;
+         floor == Floor::kNarrowGlass || floor == Floor::kRoughCoated;
 }
 bool IsWall(Chain chain) {
   return chain == Chain::kMirror || chain == Chain::kNarrowWall || chain == Chain::kDiffuseWall ||
-         chain == Chain::kPaneAndNarrowWall;
+         chain == Chain::kPaneAndNarrowWall || chain == Chain::kCoatedWall;
 }
 
 // Of lights that come straight to the floor.
@@ -130,6 +148,18 @@ Scene SceneOf(const PathClass& cell) {
       AddQuad(scene, {-0.9F, -1, -0.1F}, {1.8F, 0, 0}, {0, 2, 0},
               AddMaterial(scene, DiffuseMaterial(0.6F)));
       break;
+    case Floor::kCoated:
+      floor(AddMaterial(scene, CoatedMaterial(0.9F, 0, 0.5F)));
+      break;
+    case Floor::kRoughCoated:
+      floor(AddMaterial(scene, CoatedMaterial(0.8F, 0.2F, 0.5F)));
+      break;
+    case Floor::kSheet:
+      // What it transmits comes back from below.
+      floor(AddMaterial(scene, SheetMaterial(0.2F, 0.6F)));
+      AddQuad(scene, {-0.9F, -1, -0.3F}, {1.8F, 0, 0}, {0, 2, 0},
+              AddMaterial(scene, DiffuseMaterial(0.8F)));
+      break;
   }
 
   const auto pane = [&](const Material& material) {
@@ -159,6 +189,9 @@ Scene SceneOf(const PathClass& cell) {
       break;
     case Chain::kNarrowWall:
       wall(Metal(0.1F));
+      break;
+    case Chain::kCoatedWall:
+      wall(CoatedMaterial(0.3F, 0));
       break;
     case Chain::kDiffuseWall:
       wall(DiffuseMaterial(0.8F));
@@ -383,6 +416,13 @@ std::vector<PathClass> Cells() {
   add({kTriangles, kPoint}, {kNone, kPane},
       {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kNarrowGlass}, View::kThroughGlass);
   add({kTriangles, kPoint}, {kNone, kPane}, two, View::kInMirror);
+  // Surfaces in two parts.
+  add({kTriangles, kPoint}, {kNone, kPane, kDiffuseWall},
+      {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
+  add({kMap}, {kNone, kPane}, {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
+  add({kTriangles, kPoint}, {kCoatedWall}, {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kCoated});
+  add({kTriangles}, {kNone}, {Floor::kCoated, Floor::kRoughCoated}, View::kThroughGlass);
+  add({kTriangles}, {kPane}, {Floor::kCoated, Floor::kRoughCoated}, View::kInMirror);
   return cells;
 }
 

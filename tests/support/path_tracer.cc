@@ -80,10 +80,14 @@ double ConductorReflectance(double cos_i, double n, double k) {
 struct Surface {
   Material::Kind kind = Material::Kind::kDiffuse;
   bool is_smooth = false;
+  bool is_coat_smooth = false;
   bool gathers = false;
   Color reflectance{};  // diffuse, working space
   Color eta{}, k{};     // conductor, Rec. 709
   double ior = 1, alpha_u = 0, alpha_v = 0;
+  Color transmittance{};  // of a sheet, working space
+  double thickness = 0;   // of a coat
+  int base_hits = 0;
 };
 
 Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
@@ -91,6 +95,7 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   Surface surface;
   surface.kind = material.kind;
   surface.is_smooth = IsSmooth(material);
+  surface.is_coat_smooth = material.alpha_u == 0 && material.alpha_v == 0;
   surface.gathers = Gathers(material);
   surface.reflectance = Working(FromFloat(material.reflectance));
   surface.eta = FromFloat(material.eta);
@@ -98,6 +103,9 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   surface.ior = static_cast<double>(material.ior);
   surface.alpha_u = static_cast<double>(std::max(material.alpha_u, 1e-4F));
   surface.alpha_v = static_cast<double>(std::max(material.alpha_v, 1e-4F));
+  surface.transmittance = Working(FromFloat(material.transmittance));
+  surface.thickness = static_cast<double>(material.thickness);
+  surface.base_hits = material.base_hits;
   if (material.texture != kNoTexture) {
     const Color color =
         FromFloat(TextureColor(scene.textures, material.texture, UvAt(scene, point)));
@@ -138,12 +146,93 @@ Double3 DrawFacet(const Surface& surface, double u1, double u2) {
       {surface.alpha_u * slope * std::cos(phi), surface.alpha_v * slope * std::sin(phi), 1});
 }
 
+// A facet that light meets, and the weight of a direction that it sends light to.
+struct Facet {
+  Double3 m;
+  double cos_m = 0;
+  double share = 0;  // of reflection
+  double cos_t = 0;
+};
+
+// `up`: where the light comes from, up.z > 0. False: no facet is seen.
+bool MeetFacet(const Surface& surface, Double3 up, double eta, double u1, double u2, Facet& facet) {
+  facet.m = surface.is_coat_smooth ? Double3{0, 0, 1} : DrawFacet(surface, u1, u2);
+  facet.cos_m = Dot(up, facet.m);
+  if (!(facet.cos_m > 0)) return false;
+  facet.share = DielectricReflectance(std::min(1.0, facet.cos_m), eta, facet.cos_t);
+  return true;
+}
+
+// Walter et al. eq. (41).
+double FacetWeight(const Surface& surface, const Facet& facet, Double3 up, Double3 leaving) {
+  if (surface.is_coat_smooth) return 1;
+  const double g2 = 1 / (1 + SmithLambda(surface, up) + SmithLambda(surface, leaving));
+  return facet.cos_m * g2 / (up.z * facet.m.z);
+}
+
 struct Scattered {
   Double3 wi;
   Color weight{};  // f·|cosθ| / density
   bool is_delta = false;
   double index = 1;  // where wi is over where wo is
 };
+
+Double3 CosineDirection(double u1, double u2) {
+  const double sine = std::sqrt(u1);
+  const double phi = 2 * kPiD * u2;
+  return {sine * std::cos(phi), sine * std::sin(phi), std::sqrt(1 - u1)};
+}
+
+// A walk through a coat: down through its surface, to the base and up again, as often as it takes.
+bool ScatterInCoat(const Surface& surface, Double3 up, double side, const std::array<double, 3>& u,
+                   Scattered& out) {
+  const double eta = surface.ior;
+  Facet facet;
+  if (!MeetFacet(surface, up, eta, u[1], u[2], facet)) return false;
+  if (u[0] < facet.share) {
+    const Double3 reflected = facet.m * (2 * facet.cos_m) - up;
+    if (!(reflected.z > 0)) return false;
+    const double weight = FacetWeight(surface, facet, up, reflected);
+    out.wi = reflected * side;
+    out.weight = {weight, weight, weight};
+    out.is_delta = surface.is_coat_smooth;
+    return true;
+  }
+  // More numbers than the caller has.
+  KeyedRng rng(CombineKeys(static_cast<std::uint64_t>(u[0] * 0x1p52),
+                           static_cast<std::uint64_t>(u[1] * 0x1p52)));
+  const auto next = [&] { return static_cast<double>(rng.Bits() >> 11) * 0x1p-53; };
+  Double3 down = facet.m * (facet.cos_m / eta - facet.cos_t) - up * (1 / eta);
+  if (!(down.z < 0)) return false;
+  const double entering = FacetWeight(surface, facet, up, down);
+  out.weight = {entering, entering, entering};
+  out.is_delta = false;
+  for (int hit = 0; hit < surface.base_hits; ++hit) {
+    out.weight = Times(out.weight, surface.reflectance);
+    const double u1 = next();
+    const double u2 = next();
+    const Double3 rising = CosineDirection(u1, u2);
+    out.weight =
+        Times(out.weight, std::exp(-surface.thickness * (1 / std::abs(down.z) + 1 / rising.z)));
+    const double u3 = next();
+    const double u4 = next();
+    if (!MeetFacet(surface, rising, 1 / eta, u3, u4, facet)) return false;
+    // Seen from below: what is reflected goes down.
+    if (next() < facet.share) {
+      const Double3 reflected = facet.m * (2 * facet.cos_m) - rising;
+      if (!(reflected.z > 0)) return false;
+      out.weight = Times(out.weight, FacetWeight(surface, facet, rising, reflected));
+      down = reflected * -1;
+      continue;
+    }
+    const Double3 leaving = facet.m * (facet.cos_m * eta - facet.cos_t) - rising * eta;
+    if (!(leaving.z < 0)) return false;
+    out.weight = Times(out.weight, FacetWeight(surface, facet, rising, leaving));
+    out.wi = leaving * -side;
+    return true;
+  }
+  return false;
+}
 
 // In the shading frame. False: absorbed.
 bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u, Scattered& out) {
@@ -157,6 +246,14 @@ bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
     const double phi = 2 * kPiD * u[2];
     out.wi = Double3{sine * std::cos(phi), sine * std::sin(phi), std::sqrt(1 - u[1])} * side;
     out.weight = surface.reflectance;
+    return true;
+  }
+  if (surface.kind == Material::Kind::kCoatedDiffuse)
+    return ScatterInCoat(surface, up, side, u, out);
+  if (surface.kind == Material::Kind::kDiffuseTransmission) {
+    const bool reflects = u[0] < 0.5;
+    out.wi = CosineDirection(u[1], u[2]) * (reflects ? side : -side);
+    out.weight = Times(reflects ? surface.reflectance : surface.transmittance, 2);
     return true;
   }
   const Double3 m = surface.is_smooth ? Double3{0, 0, 1} : DrawFacet(surface, u[1], u[2]);

@@ -1,5 +1,8 @@
 #include "tests/support/test_scenes.h"
 
+#include <vector>
+
+#include "render/transport/coat.h"
 #include "tests/support/local_render.h"
 
 namespace lucerna {
@@ -17,6 +20,24 @@ Material DielectricMaterial(float ior, float alpha) {
   material.ior = ior;
   material.alpha_u = alpha;
   material.alpha_v = alpha;
+  return material;
+}
+
+Material CoatedMaterial(float reflectance, float alpha, float thickness) {
+  Material material = DiffuseMaterial(reflectance);
+  material.kind = Material::Kind::kCoatedDiffuse;
+  material.alpha_u = alpha;
+  material.alpha_v = alpha;
+  material.thickness = thickness;
+  std::vector<Material> one = {material};
+  PrepareCoats(one);
+  return one[0];
+}
+
+Material SheetMaterial(float reflectance, float transmittance) {
+  Material material = DiffuseMaterial(reflectance);
+  material.kind = Material::Kind::kDiffuseTransmission;
+  material.transmittance = Gray(transmittance);
   return material;
 }
 

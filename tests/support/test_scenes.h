@@ -17,6 +17,10 @@ namespace lucerna {
 [[nodiscard]] Material DiffuseMaterial(float reflectance);
 // alpha = 0: smooth.
 [[nodiscard]] Material DielectricMaterial(float ior, float alpha = 0);
+// A diffuse base under a coat of index 1.5, ready to be evaluated. alpha = 0: a smooth coat.
+[[nodiscard]] Material CoatedMaterial(float reflectance, float alpha, float thickness = 0);
+// A thin sheet that scatters diffusely to both sides.
+[[nodiscard]] Material SheetMaterial(float reflectance, float transmittance);
 [[nodiscard]] Material ConductorMaterial(Rgb eta, Rgb k, float alpha_u, float alpha_v);
 
 // Each appends to the scene and returns the index of what it added.

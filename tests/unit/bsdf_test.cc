@@ -30,6 +30,12 @@ Material Anisotropic(Material material, float alpha_u, float alpha_v) {
   return material;
 }
 
+Material OnePart(const Material& material, Parts part) {
+  Material one = material;
+  one.parts = part;
+  return one;
+}
+
 const Rgb kGoldEta = {0.15F, 0.4F, 1.4F};
 const Rgb kGoldK = {3.5F, 2.4F, 1.8F};
 
@@ -41,7 +47,15 @@ std::vector<Material> RoughMaterials() {
           DielectricMaterial(1.5F, 0.2F),
           DielectricMaterial(1.5F, 0.6F),
           DielectricMaterial(0.75F, 0.4F),
-          Anisotropic(DielectricMaterial(1.33F), 0.5F, 0.2F)};
+          Anisotropic(DielectricMaterial(1.33F), 0.5F, 0.2F),
+          CoatedMaterial(0.7F, 0.3F, 0.1F),
+          CoatedMaterial(0.2F, 0.1F),
+          OnePart(CoatedMaterial(0.7F, 0.4F), Parts::kFirst),
+          OnePart(CoatedMaterial(0.7F, 0.4F), Parts::kSecond),
+          OnePart(CoatedMaterial(0.9F, 0), Parts::kSecond),
+          SheetMaterial(0.3F, 0.6F),
+          OnePart(SheetMaterial(0.3F, 0.6F), Parts::kFirst),
+          OnePart(SheetMaterial(0.3F, 0.6F), Parts::kSecond)};
 }
 
 const std::vector<Vec3> kViews = {Direction(0, 0),    Direction(30, 20),   Direction(60, 200),
@@ -167,6 +181,8 @@ TEST(BsdfTest, NeverScattersMoreThanItGets) {
   for (const Vec3 wo : kViews) {
     for (const float alpha : {0.05F, 0.3F, 0.8F}) {
       EXPECT_LE(MeanWeight(DielectricMaterial(1.5F, alpha), wo, Carried::kFlux), 1 + 1e-5);
+      // A mean of weights that differ: five standard errors more.
+      EXPECT_LE(MeanWeight(CoatedMaterial(1, alpha), wo, Carried::kFlux), 1 + 5e-3);
       EXPECT_LE(MeanWeight(ConductorMaterial({0, 0, 0}, Gray(1), alpha, alpha), wo, Carried::kFlux),
                 1 + 1e-5);
     }
@@ -179,6 +195,65 @@ TEST(BsdfTest, NeverScattersMoreThanItGets) {
   EXPECT_GT(MeanWeight(ConductorMaterial({0, 0, 0}, Gray(1), 0.1F, 0.1F), Direction(10, 0),
                        Carried::kFlux),
             0.98);
+}
+
+// What a separable part says of itself is its BSDF.
+TEST(BsdfTest, SeparablePartsAreTheProductOfTheirFactors) {
+  KeyedRng rng(11);
+  for (const Material& material :
+       {DiffuseMaterial(0.7F), OnePart(CoatedMaterial(0.7F, 0.4F, 0.2F), Parts::kSecond),
+        OnePart(CoatedMaterial(0.9F, 0), Parts::kSecond),
+        OnePart(SheetMaterial(0.3F, 0.6F), Parts::kFirst),
+        OnePart(SheetMaterial(0.3F, 0.6F), Parts::kSecond)}) {
+    ASSERT_TRUE(PropertiesOf(material).is_separable);
+    const float side = PropertiesOf(material).transmits ? -1 : 1;
+    for (int i = 0; i < 100; ++i) {
+      const float a1 = rng.Uniform();
+      const float a2 = rng.Uniform();
+      const Vec3 wo = SquareToSphere(a1, a2);
+      Vec3 wi = SquareToSphere(a2, a1);
+      if (wo.z * wi.z * side < 0) wi.z = -wi.z;
+      const Rgb product = EyeFactor(material, wo) * PhotonFactor(material, wi);
+      EXPECT_FLOAT_EQ(product.g, EvaluateBsdf(material, wo, wi, Carried::kRadiance).g);
+      wi.z = -wi.z;
+      EXPECT_EQ(EvaluateBsdf(material, wo, wi, Carried::kRadiance).g, 0);
+    }
+  }
+}
+
+// Both parts together are the whole.
+TEST(BsdfTest, PartsAddUpToTheWhole) {
+  KeyedRng rng(13);
+  for (const Material& material : {CoatedMaterial(0.7F, 0.4F, 0.2F), SheetMaterial(0.3F, 0.6F)}) {
+    for (int i = 0; i < 100; ++i) {
+      const float a1 = rng.Uniform();
+      const float a2 = rng.Uniform();
+      const Vec3 wo = SquareToSphere(a1, a2);
+      const Vec3 wi = SquareToSphere(a2, a1);
+      const Carried carried = Carried::kRadiance;
+      EXPECT_FLOAT_EQ(EvaluateBsdf(OnePart(material, Parts::kFirst), wo, wi, carried).g +
+                          EvaluateBsdf(OnePart(material, Parts::kSecond), wo, wi, carried).g,
+                      EvaluateBsdf(material, wo, wi, carried).g);
+    }
+  }
+}
+
+TEST(ThinDielectricTest, ReflectsAllOrdersAndSendsTheRestStraightOn) {
+  Material sheet;
+  sheet.kind = Material::Kind::kThinDielectric;
+  sheet.ior = 1.5F;
+  // R + T²R/(1 - R²) at right angles, R = 0.04.
+  EXPECT_NEAR(ReflectedShare(sheet, 1), 0.04 + 0.96 * 0.96 * 0.04 / (1 - 0.0016), 1e-6);
+  EXPECT_NEAR(ReflectedShare(sheet, -1), ReflectedShare(sheet, 1), 1e-7);
+  for (const Vec3 wo : kViews) {
+    BsdfSample sample;
+    ASSERT_TRUE(SampleBsdf(sheet, wo, 0.9999F, 0, 0, Carried::kRadiance, sample));
+    EXPECT_TRUE(sample.is_delta);
+    EXPECT_EQ(sample.wi, -wo);
+    EXPECT_EQ(sample.weight.g, 1);
+    ASSERT_TRUE(SampleBsdf(sheet, wo, 0, 0, 0, Carried::kRadiance, sample));
+    EXPECT_EQ(sample.wi, (Vec3{-wo.x, -wo.y, wo.z}));
+  }
 }
 
 TEST(SmoothDielectricTest, BendsBySnellAndCompressesRadianceOnly) {

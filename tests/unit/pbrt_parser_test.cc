@@ -697,11 +697,65 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
     EXPECT_THAT(said, HasSubstr(part));
   };
   expect("Material \"dielectric\" \"texture roughness\" \"t\"", "is a texture");
-  expect("Material \"coateddiffuse\"", "there are diffuse, conductor, dielectric and interface");
+  expect("Material \"coatedconductor\"", "there are diffuse, conductor, dielectric, interface");
+  expect("Material \"coateddiffuse\" \"rgb albedo\" [0.1 0 0]",
+         "the layer under a coat only absorbs");
+  expect("Material \"subsurface\"", "light does not travel below surfaces");
+  expect("Material \"measured\"", "measured BSDFs");
+  expect("Material \"fourier\"", "Fourier BSDFs");
+  expect("Material \"conductor\" \"spectrum eta\" \"none.spd\"", "\"none.spd\" cannot be read");
   expect("MakeNamedMaterial \"m\" \"string type\" \"mix\"", "\"mix\"");
   expect("LightSource \"goniometric\"", "there are point, spot, distant and infinite");
   expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "no such file");
   expect("Camera \"perspective\"", "before WorldBegin");
+}
+
+TEST(PbrtParserTest, ReadsCoatedDiffuse) {
+  const Scene scene = World(
+      "Material \"coateddiffuse\" Shape \"sphere\"\n"
+      "Material \"coateddiffuse\" \"rgb reflectance\" [0.1 0.2 0.3] \"float roughness\" 0.25 "
+      "\"float eta\" 1.3 \"float thickness\" 0.5 \"integer maxdepth\" 7 \"integer nsamples\" 2 "
+      "\"float g\" 0.5 Shape \"sphere\"");
+  ASSERT_EQ(scene.materials.size(), 3U);
+  const Material& plain = scene.materials[1];
+  EXPECT_EQ(plain.kind, Material::Kind::kCoatedDiffuse);
+  EXPECT_EQ(plain.reflectance, Gray(0.5F));
+  EXPECT_EQ(plain.alpha_u, 0);
+  EXPECT_EQ(plain.ior, 1.5F);
+  EXPECT_EQ(plain.thickness, 0.01F);
+  EXPECT_EQ(plain.base_hits, 5);
+  const Material& other = scene.materials[2];
+  EXPECT_EQ(other.reflectance, (Rgb{0.1F, 0.2F, 0.3F}));
+  EXPECT_EQ(other.alpha_u, 0.5F);
+  EXPECT_EQ(other.ior, 1.3F);
+  EXPECT_EQ(other.thickness, 0.5F);
+  EXPECT_EQ(other.base_hits, 4);
+}
+
+TEST(PbrtParserTest, ReadsSheets) {
+  const Scene scene = World(
+      "Texture \"t\" \"spectrum\" \"constant\" \"rgb value\" [0.5 0.5 0.5]\n"
+      "Material \"diffusetransmission\" Shape \"sphere\"\n"
+      "Material \"diffusetransmission\" \"rgb reflectance\" [0.4 0.4 0.4] "
+      "\"texture transmittance\" \"t\" \"float scale\" 0.5 Shape \"sphere\"\n"
+      "Material \"thindielectric\" \"float eta\" 1.7 Shape \"sphere\"");
+  ASSERT_EQ(scene.materials.size(), 4U);
+  EXPECT_EQ(scene.materials[1].reflectance, Gray(0.25F));
+  EXPECT_EQ(scene.materials[1].transmittance, Gray(0.25F));
+  EXPECT_EQ(scene.materials[2].reflectance, Gray(0.2F));
+  EXPECT_NE(scene.materials[2].second_texture, kNoTexture);
+  EXPECT_EQ(scene.materials[2].texture_scale, 0.5F);
+  EXPECT_EQ(scene.materials[3].kind, Material::Kind::kThinDielectric);
+  EXPECT_EQ(scene.materials[3].ior, 1.7F);
+}
+
+TEST(PbrtParserTest, ReadsSpectraFromFiles) {
+  const Scene scene = World(
+      "Material \"conductor\" \"spectrum eta\" \"n.spd\" \"spectrum k\" [400 1 700 3] "
+      "Shape \"sphere\"",
+      {{"n.spd", "# index\n400 0\n700\t3 # of refraction\r\n"}});
+  EXPECT_FLOAT_EQ(scene.materials[1].eta.r, 2.3F);  // at 630 nm
+  EXPECT_FLOAT_EQ(scene.materials[1].k.g, 1.88F);   // at 532 nm
 }
 
 TEST(PbrtParserTest, NeedsAWorldAndACamera) {

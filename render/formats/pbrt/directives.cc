@@ -8,6 +8,7 @@
 #include "absl/strings/ascii.h"
 
 #include "render/base/text.h"
+#include "render/formats/pbrt/spectrum_files.h"
 
 namespace lucerna {
 namespace {
@@ -221,6 +222,7 @@ void DirectiveReader::ReportNamedMedia() {
 ParameterList DirectiveReader::ListFor(const Arguments& arguments, std::string_view type,
                                        std::vector<Parameter> parameters,
                                        const GraphicsState::Defaults& defaults) {
+  ReadSpectrumFiles(assets_, parameters, diagnostics_);
   return ParameterList(Concat(arguments.directive(), " ", Quoted(type)), arguments.location(),
                        std::move(parameters), defaults.get(), diagnostics_);
 }

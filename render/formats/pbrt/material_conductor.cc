@@ -20,7 +20,7 @@ void ReadConductor(ParameterList& parameters, const TextureNames& names, Materia
                   AbsorptionFor(reflectance->b)};
   } else {
     const MetalConstants copper = MetalNamed("Cu").value();
-    material.eta = parameters.FindOpticalConstant("eta", kIndexRange).value_or(copper.eta);
+    material.eta = parameters.FindOpticalConstant("eta", {0, 100}).value_or(copper.eta);
     material.k = parameters.FindOpticalConstant("k", {0, 1000}).value_or(copper.k);
   }
   ReadRoughness(parameters, material);

@@ -22,6 +22,9 @@ inline constexpr Range kIndexRange = {0.01, 100};  // of refraction
 // alpha_u and alpha_v, from roughness, uroughness, vroughness and remaproughness.
 void ReadRoughness(ParameterList& parameters, Material& material);
 
+// `ior` of a coat, `thickness` and what else the parameters of pbrt's layered materials set.
+void ReadCoat(ParameterList& parameters, Material& material);
+
 // The texture that the parameter `name` refers to, if it is one and can be used; else kNoTexture.
 [[nodiscard]] std::int32_t FindTexture(std::string_view name, ParameterList& parameters,
                                        const TextureNames& names);

@@ -30,6 +30,19 @@ std::string_view InOneWord(std::string_view type) {
   return type.empty() || type == "none" ? "interface" : type;
 }
 
+// Materials of pbrt that are refused by name, and why.
+std::string_view WhyRefused(std::string_view type) {
+  if (type == "subsurface") {
+    return "is not supported: light does not travel below surfaces here";
+  }
+  if (type == "measured") return "is not supported: measured BSDFs (.bsdf files) are not read";
+  if (type == "fourier") {
+    return "is not supported, nor by pbrt-v4: Fourier BSDFs (.bsdf files) are not read";
+  }
+  if (type == "hair") return "is not supported: there is no scattering by hair";
+  return "is not supported";
+}
+
 }  // namespace
 
 void ReadRoughness(ParameterList& parameters, Material& material) {
@@ -44,6 +57,23 @@ void ReadRoughness(ParameterList& parameters, Material& material) {
   constexpr double kSmallestAlpha = 1e-4;
   material.alpha_u = static_cast<float>(std::max(alpha_u, kSmallestAlpha));
   material.alpha_v = static_cast<float>(std::max(alpha_v, kSmallestAlpha));
+}
+
+void ReadCoat(ParameterList& parameters, Material& material) {
+  material.ior =
+      static_cast<float>(parameters.FindRefractiveIndex("eta", kIndexRange).value_or(1.5));
+  material.thickness = static_cast<float>(parameters.Float("thickness", 0.01, {0, 1e6}));
+  const std::int64_t depth = parameters.FindInteger("maxdepth", {1, 1'000'000}).value_or(10);
+  // Every second event is at the base.
+  material.base_hits = static_cast<std::int32_t>(depth / 2 + depth % 2);
+  const bool scatters = parameters.IsTexture("albedo") ||
+                        !IsBlack(parameters.FindReflectance("albedo").value_or(Rgb{}));
+  if (scatters) {
+    parameters.Error("albedo", "above 0 is not supported: the layer under a coat only absorbs");
+  }
+  // Of what scatters in the layer, and of a random walk in it: neither is there.
+  parameters.Ignore("g");
+  parameters.Ignore("nsamples");
 }
 
 std::int32_t FindTexture(std::string_view name, ParameterList& parameters,
@@ -62,9 +92,9 @@ std::int32_t FindTexture(std::string_view name, ParameterList& parameters,
 }
 
 bool IsPbrtV3Material(std::string_view type) {
-  constexpr std::array<std::string_view, 11> kTypes = {
-      "matte",       "plastic",   "uber",   "glass",   "mirror",      "metal",
-      "translucent", "substrate", "disney", "fourier", "kdsubsurface"};
+  constexpr std::array<std::string_view, 10> kTypes = {
+      "matte", "plastic",     "uber",      "glass",  "mirror",
+      "metal", "translucent", "substrate", "disney", "kdsubsurface"};
   return std::find(kTypes.begin(), kTypes.end(), type) != kTypes.end();
 }
 
@@ -76,7 +106,7 @@ Material ReadMaterial(std::string_view type, ParameterList& parameters, const Te
   Material material;
   const MaterialReader read = FindReader<MaterialReader>(kKinds, InOneWord(type));
   if (read == nullptr) {
-    parameters.Error(Concat("is not supported; ", SupportedKinds<MaterialReader>(kKinds)));
+    parameters.Error(Concat(WhyRefused(type), "; ", SupportedKinds<MaterialReader>(kKinds)));
     return material;
   }
   read(parameters, names, material);

@@ -9,6 +9,7 @@
 #include "render/formats/pbrt/materials.h"
 #include "render/formats/pbrt/media.h"
 #include "render/formats/pbrt/settings.h"
+#include "render/formats/pbrt/spectrum_files.h"
 #include "render/scene/shape_lists.h"
 
 namespace lucerna {
@@ -311,6 +312,7 @@ bool DirectiveReader::OnTexture(Arguments& arguments) {
     arguments.Error(Concat("the texture ", Quoted(name), " is defined twice"));
     return true;
   }
+  ReadSpectrumFiles(assets_, parameters, diagnostics_);
   ParameterList list(Concat("Texture ", Quoted(name)), arguments.location(), std::move(parameters),
                      graphics_.state().DefaultsOf(AttributeTarget::kTexture).get(), diagnostics_);
   // Made first: a texture may not be a part of itself.

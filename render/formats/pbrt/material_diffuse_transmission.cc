@@ -1,0 +1,27 @@
+// Material "diffusetransmission".
+#include "render/formats/pbrt/material_readers.h"
+
+namespace lucerna {
+
+void ReadDiffuseTransmission(ParameterList& parameters, const TextureNames& names,
+                             Material& material) {
+  const float scale = static_cast<float>(parameters.Float("scale", 1, {0, 1}));
+  material.texture_scale = scale;
+  const auto read = [&](std::string_view name, Rgb& color, std::int32_t& texture) {
+    if (parameters.IsTexture(name)) {
+      texture = FindTexture(name, parameters, names);
+    } else {
+      color = parameters.FindReflectance(name).value_or(Gray(0.25F)) * scale;
+    }
+  };
+  read("reflectance", material.reflectance, material.texture);
+  read("transmittance", material.transmittance, material.second_texture);
+  if (!material.HasTexture() &&
+      MaxChannel(material.reflectance + material.transmittance) > 1 + 1e-5F) {
+    parameters.Warning("",
+                       "scatters more light than it gets: reflectance and transmittance "
+                       "together are above 1");
+  }
+}
+
+}  // namespace lucerna

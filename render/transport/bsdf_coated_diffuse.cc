@@ -1,0 +1,157 @@
+// A diffuse base under a dielectric coat, on both sides of a surface: what the coat's surface
+// reflects, and what comes out of the coat. Equations as in transport/coat.h.
+#include <algorithm>
+#include <cmath>
+
+#include "render/transport/bsdf_kinds.h"
+#include "render/transport/bsdf_parts.h"
+#include "render/transport/coat.h"
+#include "render/transport/microfacet.h"
+
+namespace lucerna {
+namespace {
+
+// ρ · (1 + ρK + ... ), as many terms as light may meet the base.
+Rgb BaseReflectance(const Material& material) {
+  const float inner = CoatInner(material);
+  const auto channel = [&](float reflectance) {
+    float sum = 0;
+    for (int i = 0; i < material.base_hits; ++i) {
+      const float before = sum;
+      sum = reflectance * (1 + inner * sum);
+      if (sum == before) break;
+    }
+    return sum;
+  };
+  return {channel(material.reflectance.r), channel(material.reflectance.g),
+          channel(material.reflectance.b)};
+}
+
+Vec3 Up(Vec3 w) {
+  return w.z < 0 ? -w : w;
+}
+
+// --- the coat's surface
+
+bool SampleCoat(const Material& material, Vec3 wo, float u1, float u2, BsdfSample& sample) {
+  const float side = wo.z < 0 ? -1.0F : 1.0F;
+  const Vec3 up = wo * side;
+  float cos_t = 0;
+  if (HasNoFacets(material)) {
+    const float reflected = FresnelDielectric(up.z, material.ior, cos_t);
+    sample = {{-wo.x, -wo.y, wo.z}, Gray(reflected), 0, true};
+    return reflected > 0;
+  }
+  const Ggx ggx(material);
+  const Vec3 m = ggx.SampleVisible(up, u1, u2);
+  const Vec3 wi = ReflectAt(up, m);
+  if (!(wi.z > 0)) return false;
+  const float cos_m = Dot(up, m);
+  const float reflected = FresnelDielectric(cos_m, material.ior, cos_t);
+  sample.wi = wi * side;
+  sample.pdf = ggx.PdfVisible(up, m) / (4 * cos_m);
+  sample.weight = Gray(reflected * ggx.G2(up, wi) / ggx.G1(up));
+  sample.is_delta = false;
+  return sample.pdf > 0;
+}
+
+bool CoatHalf(const Material& material, Vec3 wo, Vec3 wi, Vec3& m) {
+  if (HasNoFacets(material) || !(wo.z * wi.z > 0)) return false;
+  m = Up(wo) + Up(wi);
+  const float squared = LengthSquared(m);
+  if (squared == 0) return false;
+  m = m / std::sqrt(squared);
+  return true;
+}
+
+float EvaluateCoat(const Material& material, Vec3 wo, Vec3 wi) {
+  Vec3 m;
+  if (!CoatHalf(material, wo, wi, m)) return 0;
+  const Ggx ggx(material);
+  float cos_t = 0;
+  return FresnelDielectric(Dot(Up(wo), m), material.ior, cos_t) * ggx.D(m) *
+         ggx.G2(Up(wo), Up(wi)) / (4 * std::abs(wo.z * wi.z));
+}
+
+float PdfCoat(const Material& material, Vec3 wo, Vec3 wi) {
+  Vec3 m;
+  if (!CoatHalf(material, wo, wi, m)) return 0;
+  return Ggx(material).PdfVisible(Up(wo), m) / (4 * std::max(1e-12F, Dot(Up(wo), m)));
+}
+
+// --- the base, as seen through it
+
+Rgb EvaluateBase(const Material& material, Vec3 wo, Vec3 wi) {
+  if (!(wo.z * wi.z > 0)) return {};
+  return CoatedDiffuseBsdf::EyeFactor(material, wo) * CoatedDiffuseBsdf::PhotonFactor(material, wi);
+}
+
+float PdfBase(Vec3 wo, Vec3 wi) {
+  return wo.z * wi.z > 0 ? std::abs(wi.z) * kInversePi : 0.0F;
+}
+
+}  // namespace
+
+bool CoatedDiffuseBsdf::Sample(const Material& material, Vec3 wo, float u_lobe, float u1, float u2,
+                               Carried carried, BsdfSample& sample) {
+  if (wo.z == 0) return false;
+  switch (material.parts) {
+    case Parts::kFirst:
+      return SampleCoat(material, wo, u1, u2, sample);
+    case Parts::kSecond:
+      if (!SampleDiffuse(material, wo, u1, u2, sample)) return false;
+      sample.weight = EvaluateBase(material, wo, sample.wi) * kPi;
+      return true;
+    case Parts::kAll:
+      break;
+  }
+  return SampleParts<CoatedDiffuseBsdf>(material, ShareOfFirst(material, wo), wo, u_lobe, u1, u2,
+                                        carried, sample);
+}
+
+Rgb CoatedDiffuseBsdf::Evaluate(const Material& material, Vec3 wo, Vec3 wi, Carried /*carried*/) {
+  Rgb f;
+  if (material.parts != Parts::kSecond) f += Gray(EvaluateCoat(material, wo, wi));
+  if (material.parts != Parts::kFirst) f += EvaluateBase(material, wo, wi);
+  return f;
+}
+
+float CoatedDiffuseBsdf::Pdf(const Material& material, Vec3 wo, Vec3 wi) {
+  if (material.parts == Parts::kFirst) return PdfCoat(material, wo, wi);
+  if (material.parts == Parts::kSecond) return PdfBase(wo, wi);
+  const float share = ShareOfFirst(material, wo);
+  return share * PdfCoat(material, wo, wi) + (1 - share) * PdfBase(wo, wi);
+}
+
+Rgb CoatedDiffuseBsdf::Albedo(const Material& material) {
+  return material.parts == Parts::kFirst ? Gray(1) : material.reflectance;
+}
+
+float CoatedDiffuseBsdf::ReflectedShare(const Material& /*material*/, float /*cos_o*/) {
+  return 1;
+}
+
+// About what each part scatters of the light that falls in: any share is right, and this one keeps
+// weights even.
+float CoatedDiffuseBsdf::ShareOfFirst(const Material& material, Vec3 wo) {
+  // Facets that are turned away may reflect far more than the surface as a whole.
+  constexpr float kLeastShare = 0.02F;
+  const float base = CoatEntering(material, Up(wo)) * CoatLeaving(material) *
+                     MaxChannel(BaseReflectance(material));
+  float cos_t = 0;
+  const float coat = FresnelDielectric(std::abs(wo.z), material.ior, cos_t);
+  if (!(base > 0)) return 1;
+  const float share = coat / (coat + base);
+  return HasNoFacets(material) ? share : std::max(kLeastShare, share);
+}
+
+Rgb CoatedDiffuseBsdf::EyeFactor(const Material& material, Vec3 wo) {
+  return BaseReflectance(material) *
+         (kInversePi * CoatEntering(material, Up(wo)) / Square(material.ior));
+}
+
+float CoatedDiffuseBsdf::PhotonFactor(const Material& material, Vec3 wi) {
+  return CoatEntering(material, Up(wi));
+}
+
+}  // namespace lucerna
