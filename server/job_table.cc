@@ -154,17 +154,32 @@ void JobTable::SaveUnsaved(const Moment& moment) {
   }
 }
 
+void JobTable::AddNeeded(const Entry& entry, NeededFiles& needed) {
+  for (const auto& [path, file] : entry.job.manifest.entries)
+    needed.blobs.insert(file.digest);
+  if (entry.job.reference) needed.blobs.insert(*entry.job.reference);
+  if (entry.image_digest) needed.blobs.insert(*entry.image_digest);
+  if (entry.has_checkpoint || !entry.job.life.has_ended()) {
+    needed.checkpoints.insert(entry.job.id);
+  }
+  const RenderSettings& settings = entry.job.settings;
+  needed.pixels += static_cast<std::uint64_t>(settings.crop_width()) *
+                   static_cast<std::uint64_t>(settings.crop_height());
+}
+
 JobTable::NeededFiles JobTable::Needed() const {
   const MutexLock lock(mutex_);
   NeededFiles needed;
+  for (const auto& [serial, entry] : entries_)
+    AddNeeded(entry, needed);
+  return needed;
+}
+
+JobTable::NeededFiles JobTable::NeededByOpenJobs() const {
+  const MutexLock lock(mutex_);
+  NeededFiles needed;
   for (const auto& [serial, entry] : entries_) {
-    for (const auto& [path, file] : entry.job.manifest.entries)
-      needed.blobs.insert(file.digest);
-    if (entry.job.reference) needed.blobs.insert(*entry.job.reference);
-    if (entry.image_digest) needed.blobs.insert(*entry.image_digest);
-    if (entry.has_checkpoint || !entry.job.life.has_ended()) {
-      needed.checkpoints.insert(entry.job.id);
-    }
+    if (!entry.job.life.has_ended()) AddNeeded(entry, needed);
   }
   return needed;
 }
@@ -759,6 +774,18 @@ bool JobTable::DropOldestPhotons() {
   return false;
 }
 
+std::optional<std::string> JobTable::DropOldestEnded() {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto oldest = std::ranges::find_if(entries_, [&](const auto& item) {
+    return item.second.job.life.has_ended() && !queue_.HasTurn(item.first);
+  });
+  if (oldest == entries_.end()) return std::nullopt;
+  std::string job_id = oldest->second.job.id;
+  DropLocked(oldest, dropped);
+  return job_id;
+}
+
 Duration JobTable::RunningOf(const std::string& job_id, SteadyTime now) const {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
@@ -991,13 +1018,15 @@ void JobTable::Retain(Dropped& dropped, const Moment& moment) {
       }
     }
     if (!kept[i].image) dropped.images.push_back(std::exchange(entry.image, nullptr));
-    if (!kept[i].record) {
-      if (options_.journal != nullptr && !options_.journal->Remove(found->first).ok()) {
-        unremoved_.insert(found->first);
-      }
-      dropped.entries.push_back(entries_.extract(found));
-    }
+    if (!kept[i].record) DropLocked(found, dropped);
   }
+}
+
+void JobTable::DropLocked(Entries::iterator entry, Dropped& dropped) {
+  if (options_.journal != nullptr && !options_.journal->Remove(entry->first).ok()) {
+    unremoved_.insert(entry->first);
+  }
+  dropped.entries.push_back(entries_.extract(entry));
 }
 
 }  // namespace lucerna

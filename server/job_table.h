@@ -93,8 +93,11 @@ class JobTable {
   struct NeededFiles {
     std::set<Digest> blobs;
     std::set<std::string> checkpoints;  // ids of jobs
+    std::uint64_t pixels = 0;           // of all these jobs
   };
   [[nodiscard]] NeededFiles Needed() const;
+  // Of those that have not ended.
+  [[nodiscard]] NeededFiles NeededByOpenJobs() const;
 
   struct Submitted {
     std::string job_id;  // empty when only validated
@@ -252,6 +255,8 @@ class JobTable {
   // its image in memory if it is on the disk too; false when there is none. It can go on no more,
   // unless its checkpoint is on the disk.
   bool DropOldestPhotons();
+  // Forgets the oldest job that has ended, with all there is of it; absent when there is none.
+  [[nodiscard]] std::optional<std::string> DropOldestEnded();
   // How long the job has run, and JobLife::WhenItHasRun.
   [[nodiscard]] Duration RunningOf(const std::string& job_id, SteadyTime now) const;
   [[nodiscard]] std::optional<SteadyTime> WhenItHasRun(const std::string& job_id,
@@ -325,6 +330,9 @@ class JobTable {
   void End(std::uint64_t serial, Entry& entry, const Status& why, const Moment& moment,
            Dropped& dropped) LUCERNA_REQUIRES(mutex_);
   void Retain(Dropped& dropped, const Moment& moment) LUCERNA_REQUIRES(mutex_);
+  // From the table and the journal.
+  void DropLocked(Entries::iterator entry, Dropped& dropped) LUCERNA_REQUIRES(mutex_);
+  static void AddNeeded(const Entry& entry, NeededFiles& needed);
   void EndTurn(std::uint64_t serial);
   static JobQueue::Claim ClaimOf(const Entry& entry);
   // It waits for a turn.
