@@ -12,12 +12,12 @@
 // Ended jobs are remembered, with the images of the newest; the very newest also with all their
 // photons, so that they can go on (server/job_retention.h).
 //
-// With a journal, what a request changes is on the disk before it returns. Where that fails, a new
-// job is refused; any other change holds in memory and is written by SaveUnsaved as soon as it can
-// be.
+// With a journal, what a request changes is on the disk before it returns, and nobody sees a new
+// job before that. Where that fails, a new job is refused; any other change holds in memory and is
+// written by SaveUnsaved as soon as it can be.
 //
-// Threads: any. Only WaitForTurn waits, and others for the journal's disk. What is dropped is
-// destroyed outside the lock.
+// Threads: any. Only WaitForTurn waits, and others for the journal's disk, without the lock. What
+// is dropped is destroyed outside the lock.
 #pragma once
 
 #include <cstdint>
@@ -299,15 +299,41 @@ class JobTable {
     std::shared_ptr<RunningJob> runner;
     Blob image;
     std::uint64_t version = 0;
-    PinnedBlobs pinned;          // while the job may need its files
-    bool is_unsaved = false;     // the journal has it as it was before
+    PinnedBlobs pinned;       // while the job may need its files
+    bool is_unsaved = false;  // the journal has it as it was before
+    bool is_being_deleted = false;
     bool begins_again = false;   // a wrong worker's part is taken out
     bool gives_up_turn = false;  // as its runner was told, or will be
     bool is_finishing = false;   // stopped: its turn is short and comes before all others
   };
   using Entries = std::map<std::uint64_t, Entry>;  // by serial number
+  // Changes that are on their way to the journal's disk: made before the lock, waits for them after
+  // it.
+  class Writes {
+   public:
+    Writes() = default;
+    ~Writes() {
+      if (table_ != nullptr) table_->FinishWrites(writes_);
+    }
+    Writes(const Writes&) = delete;
+    Writes& operator=(const Writes&) = delete;
+    struct Write {
+      std::uint64_t serial = 0;
+      bool removes = false;
+      JobJournal::Written written;
+    };
+    void Add(JobTable& table, Write write) {
+      table_ = &table;
+      writes_.push_back(std::move(write));
+    }
+
+   private:
+    JobTable* table_ = nullptr;
+    std::vector<Write> writes_;
+  };
   // What was taken from the table under the lock, to be destroyed after it.
   struct Dropped {
+    Writes writes;
     std::vector<std::shared_ptr<RunningJob>> runners;
     std::vector<Blob> images;
     std::vector<PinnedBlobs> pinned;
@@ -320,6 +346,11 @@ class JobTable {
   Entries::const_iterator FindLocked(const std::string& job_id) const LUCERNA_REQUIRES(mutex_);
   std::optional<Submitted> FindRequestLocked(const std::string& request_id,
                                              const std::string& owner) const
+      LUCERNA_REQUIRES(mutex_);
+  // Whether one more job of `owner` may wait.
+  [[nodiscard]] Status CheckMayAdd(const std::string& owner) const LUCERNA_REQUIRES(mutex_);
+  // With the next numbers.
+  Entry MakeEntry(CheckedJob checked, WallTime submitted_at, const Moment& moment) const
       LUCERNA_REQUIRES(mutex_);
   // With the job, or with its summary.
   JobReport MakeReport(const Entry& entry, const Moment& moment, bool is_summary = false) const
@@ -352,14 +383,21 @@ class JobTable {
       LUCERNA_REQUIRES(mutex_);
   Duration CpuOf(const Entry& entry, const Moment& moment) const LUCERNA_REQUIRES(mutex_);
   // Of an entry that has changed.
-  Status Save(Entry& entry, SteadyTime now) LUCERNA_REQUIRES(mutex_);
+  void Save(Entry& entry, SteadyTime now, Writes& writes) LUCERNA_REQUIRES(mutex_);
+  // Waits for the writes, and remembers those that failed.
+  void FinishWrites(const std::vector<Writes::Write>& writes);
+  // What could not be written, first of all jobs; absent when all is written.
+  std::optional<Writes::Write> BeginUnsaved(SteadyTime now);
 
   const Options options_;
   mutable Mutex mutex_;
   Condition job_waits_;
+  Condition added_;
   bool is_closed_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::uint64_t next_serial_ LUCERNA_GUARDED_BY(mutex_) = 1;
   std::uint64_t next_turn_ LUCERNA_GUARDED_BY(mutex_) = 1;
+  // Owners of new jobs that are on their way to the disk, by request.
+  std::map<std::string, std::string> being_added_ LUCERNA_GUARDED_BY(mutex_);
   std::set<std::uint64_t> unremoved_ LUCERNA_GUARDED_BY(mutex_);  // from the journal
   Entries entries_ LUCERNA_GUARDED_BY(mutex_);
   JobQueue queue_ LUCERNA_GUARDED_BY(mutex_);

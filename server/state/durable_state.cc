@@ -94,7 +94,7 @@ Status DurableState::Load(const Moment& moment) {
   return absl::OkStatus();
 }
 
-Status DurableState::Save(const JournalEntry& entry, Duration running) {
+JobJournal::Written DurableState::BeginSave(const JournalEntry& entry, Duration running) {
   StoredJob row;
   row.serial = entry.serial;
   row.request_id = entry.request_id;
@@ -103,12 +103,14 @@ Status DurableState::Save(const JournalEntry& entry, Duration running) {
   row.state = NameOf(entry.job.life.state());
   const std::string record = EncodeRecord(entry.job, entry.image_digest, running);
   row.record = absl::StrCat(std::string(DigestOf(row, record).Bytes()), record);
-  const Status saved = store_->Save(row);
-  return saved.ok() ? saved : Refusal(saved);
+  return [this, written = store_->BeginSave(std::move(row))] {
+    const Status saved = written();
+    return saved.ok() ? saved : Refusal(saved);
+  };
 }
 
-Status DurableState::Remove(std::uint64_t serial) {
-  return store_->Remove(serial);
+JobJournal::Written DurableState::BeginRemove(std::uint64_t serial) {
+  return store_->BeginRemove(serial);
 }
 
 bool DurableState::MayHaveRoom(std::uint64_t bytes, const JobTable::NeededFiles& needed) const {

@@ -53,8 +53,8 @@ class DurableState final : public JobJournal {
   [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
 
   // Errors: Refusal of what StateStore says.
-  [[nodiscard]] Status Save(const JournalEntry& entry, Duration running) override;
-  [[nodiscard]] Status Remove(std::uint64_t serial) override;
+  [[nodiscard]] Written BeginSave(const JournalEntry& entry, Duration running) override;
+  [[nodiscard]] Written BeginRemove(std::uint64_t serial) override;
 
   // When `why` keeps bytes from the disk: what a running job shows ("paused: no room in DIR; ..."),
   // and what a new job is refused with.
