@@ -154,7 +154,7 @@ int Serve(const Flags& flags) {
     listener->StopServing();
   // Calls that are under way end by themselves, commits well, before the job is stopped and kept.
   coordinator.StopLending();
-  for (WorkPool* const pool : {&pools.scenes, &pools.uploads, &pools.images})
+  for (WorkPool* const pool : {&pools.scenes, &pools.uploads, &pools.images, &pools.changes})
     pool->Close();
   jobs.Close();
   for (const auto& listener : listeners)
