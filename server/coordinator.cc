@@ -613,6 +613,8 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, M
           .rounds = rounds_,
           .clock = clock_,
           .memory = std::make_shared<MemoryClaim>(std::move(memory)),
+          .claim_memory =
+              [this](std::uint64_t bytes) { return budget_.Claim(MemoryUse::kJobs, bytes); },
           .always_splits = options_.batch_photons > 0,
           .on_running =
               [this, id] {
