@@ -4,9 +4,11 @@
 #include <exception>
 #include <future>
 #include <list>
+#include <map>
 #include <new>
 #include <utility>
 
+#include "absl/strings/str_format.h"
 #include <spdlog/spdlog.h>
 
 #include "render/base/escape.h"
@@ -48,6 +50,11 @@ std::uint64_t SceneBytes(const SceneManifest& manifest) {
   for (const auto& [path, file] : manifest.entries)
     bytes += file.size_bytes;
   return bytes;
+}
+
+std::uint64_t PixelsOf(const RenderSettings& settings) {
+  return static_cast<std::uint64_t>(settings.crop_width()) *
+         static_cast<std::uint64_t>(settings.crop_height());
 }
 
 SchedulerOptions OptionsFor(const Coordinator::Options& options) {
@@ -104,7 +111,10 @@ Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<Du
     for (const std::string& problem : state_->problems())
       spdlog::error("{}", Escaped(problem));
     jobs_.Restore(state_->TakeJobs(), state_->next_serial(), Now());
-    RemoveUnneeded();
+    const MutexLock lock(files_mutex_);
+    RemoveUnneededLocked({});
+    // The limit may be a new one.
+    MakeDiskRoom(0, {});
   }
   jobs_.SetLiveWorkers(0, Now());
   job_thread_ = std::thread([this] { RunJobs(); });
@@ -168,11 +178,12 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
         "the job needs more memory than the coordinator has for all jobs; make the image or the "
         "scene smaller, or start the coordinator with a larger --max-memory");
   }
+  LUCERNA_RETURN_IF_ERROR(CheckDiskNeed(job));
   if (submission.validate_only) return JobTable::Submitted{"", std::move(job.warnings)};
   StatusOr<JobTable::Submitted> submitted;
   {
     const MutexLock lock(files_mutex_);
-    const Status kept = KeepFiles(submission);
+    const Status kept = KeepFiles(job);
     submitted = kept.ok() ? jobs_.Add(std::move(job), clock_.Wall(), Now()) : kept;
   }
   if (!submitted.ok()) {
@@ -184,14 +195,30 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
   return submitted;
 }
 
-Status Coordinator::KeepFiles(const Submission& submission) {
+Status Coordinator::KeepFiles(const CheckedJob& job) {
+  const Submission& submission = job.submission;
   if (!state_) return absl::OkStatus();
-  std::vector<Digest> digests;
-  for (const auto& [path, file] : submission.manifest.entries)
-    digests.push_back(file.digest);
-  if (submission.reference) digests.push_back(*submission.reference);
-  for (const Digest& digest : digests) {
+  std::map<Digest, Blob> files;
+  std::set<Digest> digests;
+  std::uint64_t missing_bytes = 0;
+  const auto add = [&](const Digest& digest) -> Status {
+    if (!digests.insert(digest).second) return absl::OkStatus();
     LUCERNA_ASSIGN_OR_RETURN(const Blob blob, blobs_.Get(digest));
+    if (!state_->blobs().Has(digest)) missing_bytes += blob->size();
+    files[digest] = blob;
+    return absl::OkStatus();
+  };
+  for (const auto& [path, file] : submission.manifest.entries)
+    LUCERNA_RETURN_IF_ERROR(add(file.digest));
+  if (submission.reference) LUCERNA_RETURN_IF_ERROR(add(*submission.reference));
+  JobTable::NeededFiles beside = jobs_.NeededByOpenJobs();
+  beside.blobs.insert(digests.begin(), digests.end());
+  if (!FitsOnDisk(missing_bytes, PixelsOf(job.settings), beside)) {
+    return state_->Refusal(OverDiskLimitError("jobs that have not ended need it"));
+  }
+  // For all at once: what is written first belongs to no job yet.
+  MakeDiskRoom(missing_bytes, digests);
+  for (const auto& [digest, blob] : files) {
     if (const Status kept = state_->blobs().Put(digest, *blob); !kept.ok()) {
       return state_->Refusal(kept);
     }
@@ -202,9 +229,58 @@ Status Coordinator::KeepFiles(const Submission& submission) {
 void Coordinator::RemoveUnneeded() {
   if (!state_) return;
   const MutexLock lock(files_mutex_);
-  const JobTable::NeededFiles needed = jobs_.Needed();
+  RemoveUnneededLocked({});
+}
+
+void Coordinator::RemoveUnneededLocked(const std::set<Digest>& also_needed) {
+  JobTable::NeededFiles needed = jobs_.Needed();
+  needed.blobs.insert(also_needed.begin(), also_needed.end());
   state_->blobs().KeepOnly(needed.blobs);
   state_->checkpoints().KeepOnly(needed.checkpoints);
+}
+
+bool Coordinator::MakeDiskRoom(std::uint64_t bytes, const std::set<Digest>& also_needed) {
+  const DiskBudget& budget = state_->budget();
+  if (budget.HasRoom(bytes)) return true;
+  JobTable::NeededFiles lasting = jobs_.NeededByOpenJobs();
+  lasting.blobs.insert(also_needed.begin(), also_needed.end());
+  if (!state_->MayHaveRoom(bytes, lasting)) return false;
+  while (!budget.HasRoom(bytes)) {
+    const std::optional<std::string> dropped = jobs_.DropOldestEnded();
+    if (!dropped) return false;
+    spdlog::info("job {} is removed: --max-disk has no room for it and what is new", *dropped);
+    RemoveUnneededLocked(also_needed);
+  }
+  return true;
+}
+
+Status Coordinator::PutFile(const Digest& digest, const std::string& bytes) {
+  if (!state_->blobs().Has(digest)) MakeDiskRoom(bytes.size(), {digest});
+  return state_->blobs().Put(digest, bytes);
+}
+
+bool Coordinator::FitsOnDisk(std::uint64_t bytes, std::uint64_t pixels,
+                             const JobTable::NeededFiles& beside) const {
+  // Two checkpoints of a job are kept while a third is written. Its image is smaller than one.
+  constexpr std::uint64_t kCheckpointsAtOnce = 3;
+  const std::uint64_t max_bytes = state_->budget().max_bytes();
+  return max_bytes == 0 || state_->budget().growing_bytes() + state_->blobs().SizeOf(beside.blobs) +
+                                   bytes +
+                                   kCheckpointsAtOnce * CheckpointBytes(beside.pixels + pixels) <=
+                               max_bytes;
+}
+
+Status Coordinator::CheckDiskNeed(const CheckedJob& job) const {
+  if (!state_) return absl::OkStatus();
+  const std::uint64_t files = SceneBytes(job.submission.manifest);
+  if (FitsOnDisk(files, PixelsOf(job.settings), {})) return absl::OkStatus();
+  constexpr double kMegabyte = 1e6;
+  return absl::ResourceExhaustedError(absl::StrFormat(
+      "the files (%.1f MB) and the checkpoints of the job do not fit into the %.1f MB of disk that "
+      "all jobs may have; make the image or the scene smaller, or start the coordinator with a "
+      "larger --max-disk",
+      static_cast<double>(files) / kMegabyte,
+      static_cast<double>(state_->budget().max_bytes()) / kMegabyte));
 }
 
 Status Coordinator::Delete(const std::string& job_id) {
@@ -481,9 +557,19 @@ Status Coordinator::KeepCheckpoint(const std::string& job_id, std::string sums, 
   run->job.counters.coordinator_cpu = run->cpu;
   const std::size_t size = sums.size();
   const SteadyTime began_at = clock_.Steady();
-  LUCERNA_RETURN_IF_ERROR(state_->checkpoints().Write(
-      job_id, {options_.numeric_profile, EncodeRecord(run->job, std::nullopt, run->running),
-               std::move(sums)}));
+  const Checkpoint checkpoint = {options_.numeric_profile,
+                                 EncodeRecord(run->job, std::nullopt, run->running),
+                                 std::move(sums)};
+  Status written = state_->checkpoints().Write(job_id, checkpoint);
+  if (IsOverDiskLimit(written)) {
+    bool has_room = false;
+    {
+      const MutexLock lock(files_mutex_);
+      has_room = MakeDiskRoom(CheckpointFiles::SizeAsFile(checkpoint), {});
+    }
+    if (has_room) written = state_->checkpoints().Write(job_id, checkpoint);
+  }
+  LUCERNA_RETURN_IF_ERROR(written);
   jobs_.OnCheckpoint(job_id);
   spdlog::debug("job {}: a checkpoint of {} bytes after {} passes was written in {:.3f} s", job_id,
                 size, passes, Seconds(clock_.Steady() - began_at));
@@ -499,7 +585,7 @@ Status Coordinator::EndWell(const std::string& job_id, StopReason reason, const 
       std::optional<Digest> digest;
       if (state_) {
         digest = Sha256(*image);
-        kept = state_->blobs().Put(*digest, *image);
+        kept = PutFile(*digest, *image);
       }
       if (kept.ok()) {
         if (jobs_.Succeed(job_id, reason, image, Now(), digest)) return absl::OkStatus();
@@ -527,6 +613,8 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, M
           .rounds = rounds_,
           .clock = clock_,
           .memory = std::make_shared<MemoryClaim>(std::move(memory)),
+          .claim_memory =
+              [this](std::uint64_t bytes) { return budget_.Claim(MemoryUse::kJobs, bytes); },
           .always_splits = options_.batch_photons > 0,
           .on_running =
               [this, id] {

@@ -186,9 +186,23 @@ class Coordinator {
   // Errors: CANCELLED when the job, or the process, has ended meanwhile.
   Status EndWell(const std::string& job_id, StopReason reason, const Blob& image);
   // Files of the scene, and of the reference, onto the disk.
-  Status KeepFiles(const Submission& submission) LUCERNA_REQUIRES(files_mutex_);
+  Status KeepFiles(const CheckedJob& job) LUCERNA_REQUIRES(files_mutex_);
+  // Makes room for `bytes` within --max-disk: the oldest jobs that have ended go with their files,
+  // unless even all of them would not be enough. Keeps `also_needed`. Whether there is room.
+  bool MakeDiskRoom(std::uint64_t bytes, const std::set<Digest>& also_needed)
+      LUCERNA_REQUIRES(files_mutex_);
+  // A blob onto the disk, with room made for it. Errors: as BlobFiles::Put.
+  Status PutFile(const Digest& digest, const std::string& bytes) LUCERNA_REQUIRES(files_mutex_);
   // Removes the files that no job needs.
   void RemoveUnneeded();
+  void RemoveUnneededLocked(const std::set<Digest>& also_needed) LUCERNA_REQUIRES(files_mutex_);
+  // Whether the files and checkpoints of so many more bytes and pixels fit into --max-disk beside
+  // all that jobs have, or may need, that have not ended. Otherwise such jobs could wait for each
+  // other's room for ever.
+  bool FitsOnDisk(std::uint64_t bytes, std::uint64_t pixels,
+                  const JobTable::NeededFiles& beside) const;
+  // Errors: RESOURCE_EXHAUSTED when the job would not fit into --max-disk with all others gone.
+  Status CheckDiskNeed(const CheckedJob& job) const;
   // What becomes of a job whose runner has come back.
   void Conclude(const std::string& job_id, StatusOr<RenderResult> result);
   StatusOr<Blob> Encode(const JobTable::ImageSource& source, RenderResult result) const;

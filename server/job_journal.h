@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -28,11 +29,15 @@ struct JournalEntry {
 class JobJournal {
  public:
   virtual ~JobJournal() = default;
-  // On the disk when it returns. `running` is the time that the job has run.
+
+  // Waits until a change is on the disk. To be called once, without a lock that others need.
   // Errors: as StateStore::Save; then nothing has changed.
-  [[nodiscard]] virtual Status Save(const JournalEntry& entry, Duration running) = 0;
-  // Errors: as Save.
-  [[nodiscard]] virtual Status Remove(std::uint64_t serial) = 0;
+  using Written = std::function<Status()>;
+
+  // Changes reach the disk in the order of these calls, which do not wait for it. `running` is the
+  // time that the job has run. The journal outlives what they return.
+  [[nodiscard]] virtual Written BeginSave(const JournalEntry& entry, Duration running) = 0;
+  [[nodiscard]] virtual Written BeginRemove(std::uint64_t serial) = 0;
 };
 
 }  // namespace lucerna

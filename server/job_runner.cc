@@ -73,6 +73,16 @@ bool JobRunner::MayOpenMore() const {
          std::max(kFewestOpenPasses, kOpenPassesPerWorker * workers);
 }
 
+bool JobRunner::ClaimNextRound() {
+  if (open_rounds_.size() < kFewestOpenRounds || !hooks_.claim_memory) return true;
+  if (!next_sums_.is_empty()) return true;
+  const auto pixels = static_cast<std::uint64_t>(settings_.crop_width()) *
+                      static_cast<std::uint64_t>(settings_.crop_height());
+  StatusOr<MemoryClaim> claim = hooks_.claim_memory(pixels * kBytesOfSums);
+  if (claim.ok()) next_sums_ = *std::move(claim);
+  return claim.ok();
+}
+
 std::uint64_t JobRunner::WantedPasses(const End& end) const {
   std::uint64_t passes = end.passes > 0 ? end.passes : UINT64_MAX;
   if (end.photons > 0 && !photon_steps_.empty()) {
@@ -162,6 +172,7 @@ void JobRunner::CloseAll() {
   if (std::exchange(gave_up_turn_, false)) hooks_.scheduler.SetHeld(job_id_, false);
   split_passes_.clear();
   open_rounds_.clear();
+  next_sums_ = MemoryClaim();
   ahead_.reset();
 }
 
@@ -276,7 +287,7 @@ StatusOr<bool> JobRunner::Step(const End& end, bool wants_more) {
   // first.
   const bool first_is_out = next_round_ == 0 || next_split_ > 0;
   if ((wants_more || next_round_ == 0) && first_is_out && next_round_ < WantedPasses(end) &&
-      MayOpenMore()) {
+      MayOpenMore() && ClaimNextRound()) {
     std::optional<RoundPlan> plan;
     {
       const MutexLock lock(estimator_mutex_);
@@ -336,6 +347,7 @@ Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
   OpenRound open;
   open.round = round;
   open.plan = std::move(plan);
+  open.sums = std::exchange(next_sums_, MemoryClaim());
   // As many passes can be out at once as lie between this round's end and those that its radii
   // follow from. While a job is young and these are fewer than the workers, several share one.
   // Later that would cost more than it brings: hitpoints would travel to every worker. The first

@@ -57,6 +57,9 @@ struct RunnerHooks {
   const Clock& clock;
   // What the job holds; let go of with the runner.
   std::shared_ptr<MemoryClaim> memory = nullptr;
+  // Claims memory for what the job holds beyond that; absent: there is enough.
+  // Errors: RESOURCE_EXHAUSTED.
+  std::function<StatusOr<MemoryClaim>(std::uint64_t bytes)> claim_memory = nullptr;
   // Passes are never given out whole (for tests of batches of photons).
   bool always_splits = false;
   // Called on the runner's thread, never under a lock.
@@ -122,6 +125,7 @@ class JobRunner final : public RunningJob {
     RoundPlan plan;
     BlobPin radii;  // of pixels, encoded; of rounds that are not split
     bool is_split = false;
+    MemoryClaim sums;  // of the slices that come; the first few rounds are part of the job's need
   };
   struct TracedPass {
     EyePass eye;
@@ -183,6 +187,9 @@ class JobRunner final : public RunningJob {
   void TakeIn(const OpenRound& open);
   // Whether one more round may be opened, for the memory of those that are open.
   bool MayOpenMore() const;
+  // Claims the memory of one more round, in next_sums_ until it is opened. False while others hold
+  // what it needs; the first few belong to the job's own claim, so that it goes on.
+  bool ClaimNextRound();
   // How many passes are wanted, as far as is known now.
   std::uint64_t WantedPasses(const End& end) const;
   // Lends more, or fewer, passes of the open rounds.
@@ -237,6 +244,7 @@ class JobRunner final : public RunningJob {
   PhotonSteps photon_steps_;      // of the rounds opened so far
   std::uint64_t reported_passes_ = 0;
   std::deque<OpenRound> open_rounds_;
+  MemoryClaim next_sums_;         // of the next one
   std::uint64_t next_split_ = 0;  // pass
   ImageSums::Slices tail_;        // of the round that was not whole when the run before ended
   std::deque<SplitPass> split_passes_;

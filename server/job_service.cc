@@ -128,6 +128,21 @@ Status JobService::CheckMayChange(const grpc::CallbackServerContext* context,
   return access_.CheckOwns(*context, job_id, owner);
 }
 
+grpc::ServerUnaryReactor* JobService::Change(grpc::CallbackServerContext* context,
+                                             const std::string& job_id, v1::Job* response,
+                                             std::function<StatusOr<JobReport>()> change) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  if (const Status allowed = CheckMayChange(context, job_id); !allowed.ok()) {
+    reactor->Finish(ToGrpc(allowed));
+    return reactor;
+  }
+  pools_.changes.Run(NeededByCaller(context), [reactor, response, change = std::move(change)](
+                                                  const Status& may_begin) {
+    reactor->Finish(may_begin.ok() ? Put(WithinMemory(change), response) : ToGrpc(may_begin));
+  });
+  return reactor;
+}
+
 grpc::ServerUnaryReactor* JobService::Submit(grpc::CallbackServerContext* context,
                                              const v1::SubmitRequest* request,
                                              v1::SubmitResponse* response) {
@@ -196,41 +211,29 @@ grpc::ServerUnaryReactor* JobService::List(grpc::CallbackServerContext* context,
 grpc::ServerUnaryReactor* JobService::Cancel(grpc::CallbackServerContext* context,
                                              const v1::CancelJobRequest* request,
                                              v1::Job* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const Status allowed = CheckMayChange(context, request->job_id());
-  reactor->Finish(allowed.ok() ? Put(coordinator_.Cancel(request->job_id()), response)
-                               : ToGrpc(allowed));
-  return reactor;
+  return Change(context, request->job_id(), response,
+                [this, request] { return coordinator_.Cancel(request->job_id()); });
 }
 
 grpc::ServerUnaryReactor* JobService::Pause(grpc::CallbackServerContext* context,
                                             const v1::PauseJobRequest* request, v1::Job* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const Status allowed = CheckMayChange(context, request->job_id());
-  reactor->Finish(allowed.ok() ? Put(coordinator_.Pause(request->job_id()), response)
-                               : ToGrpc(allowed));
-  return reactor;
+  return Change(context, request->job_id(), response,
+                [this, request] { return coordinator_.Pause(request->job_id()); });
 }
 
 grpc::ServerUnaryReactor* JobService::Resume(grpc::CallbackServerContext* context,
                                              const v1::ResumeJobRequest* request,
                                              v1::Job* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const Status allowed = CheckMayChange(context, request->job_id());
-  reactor->Finish(allowed.ok() ? Put(coordinator_.Resume(request->job_id()), response)
-                               : ToGrpc(allowed));
-  return reactor;
+  return Change(context, request->job_id(), response,
+                [this, request] { return coordinator_.Resume(request->job_id()); });
 }
 
 grpc::ServerUnaryReactor* JobService::SetPriority(grpc::CallbackServerContext* context,
                                                   const v1::SetJobPriorityRequest* request,
                                                   v1::Job* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const Status allowed = CheckMayChange(context, request->job_id());
-  reactor->Finish(
-      allowed.ok() ? Put(coordinator_.SetPriority(request->job_id(), request->priority()), response)
-                   : ToGrpc(allowed));
-  return reactor;
+  return Change(context, request->job_id(), response, [this, request] {
+    return coordinator_.SetPriority(request->job_id(), request->priority());
+  });
 }
 
 grpc::ServerUnaryReactor* JobService::Delete(grpc::CallbackServerContext* context,
@@ -251,25 +254,17 @@ grpc::ServerUnaryReactor* JobService::Delete(grpc::CallbackServerContext* contex
 
 grpc::ServerUnaryReactor* JobService::Stop(grpc::CallbackServerContext* context,
                                            const v1::StopJobRequest* request, v1::Job* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const Status allowed = CheckMayChange(context, request->job_id());
-  reactor->Finish(allowed.ok() ? Put(coordinator_.Stop(request->job_id()), response)
-                               : ToGrpc(allowed));
-  return reactor;
+  return Change(context, request->job_id(), response,
+                [this, request] { return coordinator_.Stop(request->job_id()); });
 }
 
 grpc::ServerUnaryReactor* JobService::Extend(grpc::CallbackServerContext* context,
                                              const v1::ExtendJobRequest* request,
                                              v1::Job* response) {
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  if (const Status allowed = CheckMayChange(context, request->job_id()); !allowed.ok()) {
-    reactor->Finish(ToGrpc(allowed));
-    return reactor;
-  }
-  const StatusOr<RenderOverrides> until = FromProto(request->until());
-  reactor->Finish(until.ok() ? Put(coordinator_.Extend(request->job_id(), *until), response)
-                             : ToGrpc(until.status()));
-  return reactor;
+  return Change(context, request->job_id(), response, [this, request]() -> StatusOr<JobReport> {
+    LUCERNA_ASSIGN_OR_RETURN(const RenderOverrides until, FromProto(request->until()));
+    return coordinator_.Extend(request->job_id(), until);
+  });
 }
 
 std::shared_ptr<const JobService::Snapshot> JobService::Refresh(const std::string& job_id) {

@@ -9,6 +9,7 @@
 // for scenes.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -79,6 +80,10 @@ class JobService final
   // Makes a new snapshot of the job if it is time to; returns the newest.
   std::shared_ptr<const Snapshot> Refresh(const std::string& job_id) LUCERNA_REQUIRES(mutex_);
 
+  // Answers with what `change` returns, if the caller may change the job: in a thread of the pool,
+  // because a change waits for the disk.
+  grpc::ServerUnaryReactor* Change(grpc::CallbackServerContext* context, const std::string& job_id,
+                                   v1::Job* response, std::function<StatusOr<JobReport>()> change);
   // OK when the caller may change this job. Errors: NOT_FOUND, PERMISSION_DENIED.
   [[nodiscard]] Status CheckMayChange(const grpc::CallbackServerContext* context,
                                       const std::string& job_id) const;

@@ -63,25 +63,65 @@ std::optional<JobTable::Submitted> JobTable::FindRequest(const std::string& requ
 
 StatusOr<JobTable::Submitted> JobTable::Add(CheckedJob checked, WallTime submitted_at,
                                             const Moment& moment) {
+  const std::string request_id = checked.submission.request_id;
+  const std::string owner = checked.submission.owner;
+  const std::string key = RequestKey(request_id, owner);
+  Entry entry;
+  JobJournal::Written written;
+  {
+    const MutexLock lock(mutex_);
+    // The same request may have come twice at once: the other one decides whether there is a job.
+    while (being_added_.contains(key))
+      added_.Wait(mutex_);
+    if (auto earlier = FindRequestLocked(request_id, owner)) return *std::move(earlier);
+    LUCERNA_RETURN_IF_ERROR(CheckMayAdd(owner));
+    entry = MakeEntry(std::move(checked), submitted_at, moment);
+    if (options_.journal != nullptr) {
+      written = options_.journal->BeginSave(entry, Duration::zero());
+    }
+    being_added_[key] = owner;
+    ++next_serial_;
+    ++next_turn_;
+  }
+  // Before anybody can see it.
+  const Status saved = written ? written() : absl::OkStatus();
   const MutexLock lock(mutex_);
-  // The same request may have come twice at once.
-  if (auto earlier = FindRequestLocked(checked.submission.request_id, checked.submission.owner)) {
-    return *std::move(earlier);
+  being_added_.erase(key);
+  added_.NotifyAll();
+  const std::uint64_t serial = entry.serial;
+  if (!saved.ok()) {
+    if (next_serial_ == serial + 1) next_serial_ = serial;
+    return saved;
   }
+  // It may have changed meanwhile.
+  entry.job.life.SetHasWorkers(has_workers_, moment.now);
+  Entry& added = entries_[serial] = std::move(entry);
+  PushLocked(serial, added);
+  return Submitted{added.job.id, added.job.warnings};
+}
+
+Status JobTable::CheckMayAdd(const std::string& owner) const {
   if (is_closed_) return absl::UnavailableError("the coordinator is shutting down");
-  if (queue_.is_full()) {
+  const std::size_t waiting = queue_.size() + being_added_.size();
+  if (waiting >= options_.max_waiting) {
     return absl::ResourceExhaustedError(
-        absl::StrCat(queue_.size(), " jobs are waiting already; try again later"));
+        absl::StrCat(waiting, " jobs are waiting already; try again later"));
   }
-  const std::string& owner = checked.submission.owner;
-  const auto of_owner =
-      static_cast<std::size_t>(std::ranges::count_if(entries_, [&](const auto& e) {
-        return e.second.job.owner == owner && !e.second.job.life.has_ended();
-      }));
+  const auto of_owner = static_cast<std::size_t>(
+      std::ranges::count_if(entries_,
+                            [&](const auto& e) {
+                              return e.second.job.owner == owner && !e.second.job.life.has_ended();
+                            }) +
+      std::ranges::count_if(being_added_, [&](const auto& item) { return item.second == owner; }));
   if (!owner.empty() && of_owner >= options_.max_waiting_of_owner) {
     return absl::ResourceExhaustedError(absl::StrCat(
         of_owner, " jobs of ", owner, " have not ended; wait for some, or cancel them"));
   }
+  return absl::OkStatus();
+}
+
+JobTable::Entry JobTable::MakeEntry(CheckedJob checked, WallTime submitted_at,
+                                    const Moment& moment) const {
   const std::uint64_t serial = next_serial_;
   Entry entry;
   entry.serial = serial;
@@ -105,23 +145,33 @@ StatusOr<JobTable::Submitted> JobTable::Add(CheckedJob checked, WallTime submitt
   job.reference = checked.submission.reference;
   // A job that must wait is read again later, so that waiting jobs cost no memory.
   if (queue_.has_room()) entry.scene = std::move(checked.scene);
-  // Before anybody can see it.
-  LUCERNA_RETURN_IF_ERROR(Save(entry, moment.now));
-  ++next_serial_;
-  ++next_turn_;
-  Entry& added = entries_[serial] = std::move(entry);
-  PushLocked(serial, added);
-  return Submitted{added.job.id, added.job.warnings};
+  return entry;
 }
 
 // The journal
 // ---------------------------------------------------------------------------------------------
 
-Status JobTable::Save(Entry& entry, SteadyTime now) {
-  if (options_.journal == nullptr) return absl::OkStatus();
-  const Status saved = options_.journal->Save(entry, entry.job.life.Running(now));
-  entry.is_unsaved = !saved.ok();
-  return saved;
+void JobTable::Save(Entry& entry, SteadyTime now, Writes& writes) {
+  if (options_.journal == nullptr) return;
+  entry.is_unsaved = entry.is_being_deleted;
+  // What is written now would come after the removal.
+  if (entry.is_being_deleted) return;
+  writes.Add(*this, {.serial = entry.serial,
+                     .removes = false,
+                     .written = options_.journal->BeginSave(entry, entry.job.life.Running(now))});
+}
+
+void JobTable::FinishWrites(const std::vector<Writes::Write>& writes) {
+  for (const Writes::Write& write : writes) {
+    if (write.written().ok()) continue;
+    const MutexLock lock(mutex_);
+    const auto found = entries_.find(write.serial);
+    if (write.removes) {
+      unremoved_.insert(write.serial);
+    } else if (found != entries_.end()) {
+      found->second.is_unsaved = true;
+    }
+  }
 }
 
 void JobTable::Restore(std::vector<JournalEntry> jobs, std::uint64_t next_serial,
@@ -142,47 +192,89 @@ void JobTable::Restore(std::vector<JournalEntry> jobs, std::uint64_t next_serial
   Retain(dropped, moment);
 }
 
-void JobTable::SaveUnsaved(const Moment& moment) {
+std::optional<JobTable::Writes::Write> JobTable::BeginUnsaved(SteadyTime now) {
   const MutexLock lock(mutex_);
   for (auto& [serial, entry] : entries_) {
-    // After the first failure the others would fail too.
-    if (entry.is_unsaved && !Save(entry, moment.now).ok()) return;
+    if (!entry.is_unsaved || entry.is_being_deleted) continue;
+    entry.is_unsaved = false;
+    return Writes::Write{serial, false,
+                         options_.journal->BeginSave(entry, entry.job.life.Running(now))};
   }
-  while (!unremoved_.empty()) {
-    if (!options_.journal->Remove(*unremoved_.begin()).ok()) return;
-    unremoved_.erase(unremoved_.begin());
+  if (unremoved_.empty()) return std::nullopt;
+  const std::uint64_t serial = *unremoved_.begin();
+  unremoved_.erase(unremoved_.begin());
+  return Writes::Write{serial, true, options_.journal->BeginRemove(serial)};
+}
+
+void JobTable::SaveUnsaved(const Moment& moment) {
+  while (const std::optional<Writes::Write> write = BeginUnsaved(moment.now)) {
+    const Status written = write->written();
+    if (written.ok()) continue;
+    // The others would fail too.
+    FinishWrites({{write->serial, write->removes, [written] { return written; }}});
+    return;
   }
+}
+
+void JobTable::AddNeeded(const Entry& entry, NeededFiles& needed) {
+  for (const auto& [path, file] : entry.job.manifest.entries)
+    needed.blobs.insert(file.digest);
+  if (entry.job.reference) needed.blobs.insert(*entry.job.reference);
+  if (entry.image_digest) needed.blobs.insert(*entry.image_digest);
+  if (entry.has_checkpoint || !entry.job.life.has_ended()) {
+    needed.checkpoints.insert(entry.job.id);
+  }
+  const RenderSettings& settings = entry.job.settings;
+  needed.pixels += static_cast<std::uint64_t>(settings.crop_width()) *
+                   static_cast<std::uint64_t>(settings.crop_height());
 }
 
 JobTable::NeededFiles JobTable::Needed() const {
   const MutexLock lock(mutex_);
   NeededFiles needed;
+  for (const auto& [serial, entry] : entries_)
+    AddNeeded(entry, needed);
+  return needed;
+}
+
+JobTable::NeededFiles JobTable::NeededByOpenJobs() const {
+  const MutexLock lock(mutex_);
+  NeededFiles needed;
   for (const auto& [serial, entry] : entries_) {
-    for (const auto& [path, file] : entry.job.manifest.entries)
-      needed.blobs.insert(file.digest);
-    if (entry.job.reference) needed.blobs.insert(*entry.job.reference);
-    if (entry.image_digest) needed.blobs.insert(*entry.image_digest);
-    if (entry.has_checkpoint || !entry.job.life.has_ended()) {
-      needed.checkpoints.insert(entry.job.id);
-    }
+    if (!entry.job.life.has_ended()) AddNeeded(entry, needed);
   }
   return needed;
 }
 
 Status JobTable::Delete(const std::string& job_id, const Moment& /*moment*/) {
   Dropped dropped;
+  std::uint64_t serial = 0;
+  JobJournal::Written written;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = FindLocked(job_id);
+    if (found == entries_.end()) return UnknownJob(job_id);
+    if (!found->second.job.life.has_ended()) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("job ", job_id, " has not ended; cancel or stop it first"));
+    }
+    serial = found->first;
+    if (options_.journal != nullptr) {
+      // It stays in the table, with its files, until it is gone from the disk.
+      found->second.is_being_deleted = true;
+      written = options_.journal->BeginRemove(serial);
+    }
+  }
+  const Status removed = written ? written() : absl::OkStatus();
   const MutexLock lock(mutex_);
-  const auto found = FindLocked(job_id);
-  if (found == entries_.end()) return UnknownJob(job_id);
-  if (!found->second.job.life.has_ended()) {
-    return absl::FailedPreconditionError(
-        absl::StrCat("job ", job_id, " has not ended; cancel or stop it first"));
+  const auto found = entries_.find(serial);
+  if (found == entries_.end()) return removed;
+  if (removed.ok()) {
+    dropped.entries.push_back(entries_.extract(found));
+  } else {
+    found->second.is_being_deleted = false;
   }
-  if (options_.journal != nullptr) {
-    LUCERNA_RETURN_IF_ERROR(options_.journal->Remove(found->first));
-  }
-  dropped.entries.push_back(entries_.extract(found));
-  return absl::OkStatus();
+  return removed;
 }
 
 // Requests
@@ -258,7 +350,7 @@ void JobTable::End(std::uint64_t serial, Entry& entry, const Status& why, const 
   entry.job.pause_cause = PauseCause::kNone;
   entry.job.condition.clear();
   entry.has_checkpoint = false;
-  Save(entry, moment.now).IgnoreError();
+  Save(entry, moment.now, dropped.writes);
   dropped.scenes.push_back(std::exchange(entry.scene, std::nullopt));
   if (entry.runner) {
     entry.runner->Stop(why);
@@ -322,6 +414,7 @@ StatusOr<JobReport> JobTable::Extend(const std::string& job_id, const RenderOver
   Job& job = entry.job;
   RenderSettings settings = job.settings;
   LUCERNA_RETURN_IF_ERROR(SetStopCriteria(until, settings));
+  if (entry.is_being_deleted) return UnknownJob(job_id);
   if (job.life.has_ended()) {
     if (job.life.state() != JobState::kSucceeded) {
       return absl::FailedPreconditionError(
@@ -345,7 +438,7 @@ StatusOr<JobReport> JobTable::Extend(const std::string& job_id, const RenderOver
   }
   job.settings = std::move(settings);
   ++entry.version;
-  Save(entry, moment.now).IgnoreError();
+  Save(entry, moment.now, dropped.writes);
   return MakeReport(entry, moment);
 }
 
@@ -462,7 +555,7 @@ void JobTable::TakeOut(const std::string& record, const Moment& moment) {
       entry.has_checkpoint = false;
     }
     ++entry.version;
-    Save(entry, moment.now).IgnoreError();
+    Save(entry, moment.now, dropped.writes);
   }
 }
 
@@ -574,6 +667,7 @@ bool JobTable::ResumeLocked(std::uint64_t serial, Entry& entry) {
 
 StatusOr<JobReport> JobTable::Pause(const std::string& job_id, PauseCause cause, std::string reason,
                                     const Moment& moment) {
+  Writes writes;
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return UnknownJob(job_id);
@@ -595,11 +689,12 @@ StatusOr<JobReport> JobTable::Pause(const std::string& job_id, PauseCause cause,
   queue_.SetHasPlace(serial, false);
   SetGivesUpTurn(entry, true);
   UpdateTurns();
-  Save(entry, moment.now).IgnoreError();
+  Save(entry, moment.now, writes);
   return MakeReport(entry, moment);
 }
 
 StatusOr<JobReport> JobTable::Resume(const std::string& job_id, const Moment& moment) {
+  Writes writes;
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return UnknownJob(job_id);
@@ -609,7 +704,7 @@ StatusOr<JobReport> JobTable::Resume(const std::string& job_id, const Moment& mo
   }
   if (ResumeLocked(found->first, entry)) {
     entry.job.AddEvent(moment.wall, "resumed");
-    Save(entry, moment.now).IgnoreError();
+    Save(entry, moment.now, writes);
   }
   return MakeReport(entry, moment);
 }
@@ -620,6 +715,7 @@ StatusOr<JobReport> JobTable::SetPriority(const std::string& job_id, int priorit
     return absl::InvalidArgumentError(
         absl::StrCat("a priority is a number from ", kLowestPriority, " to ", kHighestPriority));
   }
+  Writes writes;
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return UnknownJob(job_id);
@@ -632,7 +728,7 @@ StatusOr<JobReport> JobTable::SetPriority(const std::string& job_id, int priorit
     ++entry.version;
     queue_.SetPriority(found->first, ClaimOf(entry).priority);
     UpdateTurns();
-    Save(entry, moment.now).IgnoreError();
+    Save(entry, moment.now, writes);
   }
   return MakeReport(entry, moment);
 }
@@ -759,6 +855,18 @@ bool JobTable::DropOldestPhotons() {
   return false;
 }
 
+std::optional<std::string> JobTable::DropOldestEnded() {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto oldest = std::ranges::find_if(entries_, [&](const auto& item) {
+    return item.second.job.life.has_ended() && !queue_.HasTurn(item.first);
+  });
+  if (oldest == entries_.end()) return std::nullopt;
+  std::string job_id = oldest->second.job.id;
+  DropLocked(oldest, dropped);
+  return job_id;
+}
+
 Duration JobTable::RunningOf(const std::string& job_id, SteadyTime now) const {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
@@ -822,7 +930,7 @@ bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,
   entry.image = std::move(image);
   entry.image_digest = image_digest;
   ++entry.version;
-  Save(entry, moment.now).IgnoreError();
+  Save(entry, moment.now, dropped.writes);
   Retain(dropped, moment);
   return true;
 }
@@ -991,13 +1099,17 @@ void JobTable::Retain(Dropped& dropped, const Moment& moment) {
       }
     }
     if (!kept[i].image) dropped.images.push_back(std::exchange(entry.image, nullptr));
-    if (!kept[i].record) {
-      if (options_.journal != nullptr && !options_.journal->Remove(found->first).ok()) {
-        unremoved_.insert(found->first);
-      }
-      dropped.entries.push_back(entries_.extract(found));
-    }
+    if (!kept[i].record) DropLocked(found, dropped);
   }
+}
+
+void JobTable::DropLocked(Entries::iterator entry, Dropped& dropped) {
+  if (options_.journal != nullptr) {
+    dropped.writes.Add(*this, {.serial = entry->first,
+                               .removes = true,
+                               .written = options_.journal->BeginRemove(entry->first)});
+  }
+  dropped.entries.push_back(entries_.extract(entry));
 }
 
 }  // namespace lucerna

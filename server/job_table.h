@@ -12,12 +12,12 @@
 // Ended jobs are remembered, with the images of the newest; the very newest also with all their
 // photons, so that they can go on (server/job_retention.h).
 //
-// With a journal, what a request changes is on the disk before it returns. Where that fails, a new
-// job is refused; any other change holds in memory and is written by SaveUnsaved as soon as it can
-// be.
+// With a journal, what a request changes is on the disk before it returns, and nobody sees a new
+// job before that. Where that fails, a new job is refused; any other change holds in memory and is
+// written by SaveUnsaved as soon as it can be.
 //
-// Threads: any. Only WaitForTurn waits, and others for the journal's disk. What is dropped is
-// destroyed outside the lock.
+// Threads: any. Only WaitForTurn waits, and others for the journal's disk, without the lock. What
+// is dropped is destroyed outside the lock.
 #pragma once
 
 #include <cstdint>
@@ -93,8 +93,11 @@ class JobTable {
   struct NeededFiles {
     std::set<Digest> blobs;
     std::set<std::string> checkpoints;  // ids of jobs
+    std::uint64_t pixels = 0;           // of all these jobs
   };
   [[nodiscard]] NeededFiles Needed() const;
+  // Of those that have not ended.
+  [[nodiscard]] NeededFiles NeededByOpenJobs() const;
 
   struct Submitted {
     std::string job_id;  // empty when only validated
@@ -252,6 +255,8 @@ class JobTable {
   // its image in memory if it is on the disk too; false when there is none. It can go on no more,
   // unless its checkpoint is on the disk.
   bool DropOldestPhotons();
+  // Forgets the oldest job that has ended, with all there is of it; absent when there is none.
+  [[nodiscard]] std::optional<std::string> DropOldestEnded();
   // How long the job has run, and JobLife::WhenItHasRun.
   [[nodiscard]] Duration RunningOf(const std::string& job_id, SteadyTime now) const;
   [[nodiscard]] std::optional<SteadyTime> WhenItHasRun(const std::string& job_id,
@@ -294,15 +299,41 @@ class JobTable {
     std::shared_ptr<RunningJob> runner;
     Blob image;
     std::uint64_t version = 0;
-    PinnedBlobs pinned;          // while the job may need its files
-    bool is_unsaved = false;     // the journal has it as it was before
+    PinnedBlobs pinned;       // while the job may need its files
+    bool is_unsaved = false;  // the journal has it as it was before
+    bool is_being_deleted = false;
     bool begins_again = false;   // a wrong worker's part is taken out
     bool gives_up_turn = false;  // as its runner was told, or will be
     bool is_finishing = false;   // stopped: its turn is short and comes before all others
   };
   using Entries = std::map<std::uint64_t, Entry>;  // by serial number
+  // Changes that are on their way to the journal's disk: made before the lock, waits for them after
+  // it.
+  class Writes {
+   public:
+    Writes() = default;
+    ~Writes() {
+      if (table_ != nullptr) table_->FinishWrites(writes_);
+    }
+    Writes(const Writes&) = delete;
+    Writes& operator=(const Writes&) = delete;
+    struct Write {
+      std::uint64_t serial = 0;
+      bool removes = false;
+      JobJournal::Written written;
+    };
+    void Add(JobTable& table, Write write) {
+      table_ = &table;
+      writes_.push_back(std::move(write));
+    }
+
+   private:
+    JobTable* table_ = nullptr;
+    std::vector<Write> writes_;
+  };
   // What was taken from the table under the lock, to be destroyed after it.
   struct Dropped {
+    Writes writes;
     std::vector<std::shared_ptr<RunningJob>> runners;
     std::vector<Blob> images;
     std::vector<PinnedBlobs> pinned;
@@ -316,6 +347,11 @@ class JobTable {
   std::optional<Submitted> FindRequestLocked(const std::string& request_id,
                                              const std::string& owner) const
       LUCERNA_REQUIRES(mutex_);
+  // Whether one more job of `owner` may wait.
+  [[nodiscard]] Status CheckMayAdd(const std::string& owner) const LUCERNA_REQUIRES(mutex_);
+  // With the next numbers.
+  Entry MakeEntry(CheckedJob checked, WallTime submitted_at, const Moment& moment) const
+      LUCERNA_REQUIRES(mutex_);
   // With the job, or with its summary.
   JobReport MakeReport(const Entry& entry, const Moment& moment, bool is_summary = false) const
       LUCERNA_REQUIRES(mutex_);
@@ -325,6 +361,9 @@ class JobTable {
   void End(std::uint64_t serial, Entry& entry, const Status& why, const Moment& moment,
            Dropped& dropped) LUCERNA_REQUIRES(mutex_);
   void Retain(Dropped& dropped, const Moment& moment) LUCERNA_REQUIRES(mutex_);
+  // From the table and the journal.
+  void DropLocked(Entries::iterator entry, Dropped& dropped) LUCERNA_REQUIRES(mutex_);
+  static void AddNeeded(const Entry& entry, NeededFiles& needed);
   void EndTurn(std::uint64_t serial);
   static JobQueue::Claim ClaimOf(const Entry& entry);
   // It waits for a turn.
@@ -344,14 +383,21 @@ class JobTable {
       LUCERNA_REQUIRES(mutex_);
   Duration CpuOf(const Entry& entry, const Moment& moment) const LUCERNA_REQUIRES(mutex_);
   // Of an entry that has changed.
-  Status Save(Entry& entry, SteadyTime now) LUCERNA_REQUIRES(mutex_);
+  void Save(Entry& entry, SteadyTime now, Writes& writes) LUCERNA_REQUIRES(mutex_);
+  // Waits for the writes, and remembers those that failed.
+  void FinishWrites(const std::vector<Writes::Write>& writes);
+  // What could not be written, first of all jobs; absent when all is written.
+  std::optional<Writes::Write> BeginUnsaved(SteadyTime now);
 
   const Options options_;
   mutable Mutex mutex_;
   Condition job_waits_;
+  Condition added_;
   bool is_closed_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::uint64_t next_serial_ LUCERNA_GUARDED_BY(mutex_) = 1;
   std::uint64_t next_turn_ LUCERNA_GUARDED_BY(mutex_) = 1;
+  // Owners of new jobs that are on their way to the disk, by request.
+  std::map<std::string, std::string> being_added_ LUCERNA_GUARDED_BY(mutex_);
   std::set<std::uint64_t> unremoved_ LUCERNA_GUARDED_BY(mutex_);  // from the journal
   Entries entries_ LUCERNA_GUARDED_BY(mutex_);
   JobQueue queue_ LUCERNA_GUARDED_BY(mutex_);

@@ -64,6 +64,7 @@ struct Flags {
   bool allow_insecure_network = false;
   std::string log_level = "info";
   std::string state;
+  std::uint64_t max_disk_bytes = 0;
   double keep_days = 0;
   Coordinator::Options coordinator;
 };
@@ -86,7 +87,7 @@ int Serve(const Flags& flags) {
   if (!flags.state.empty()) {
     StatusOr<std::unique_ptr<DurableState>> opened = DurableState::Open(
         flags.state, absl::StrCat(absl::Hex(clock.Wall().time_since_epoch().count() / 1000)),
-        {clock.Steady(), ProcessCpuTime(), clock.Wall()});
+        {clock.Steady(), ProcessCpuTime(), clock.Wall()}, flags.max_disk_bytes);
     if (!opened.ok()) {
       std::fprintf(stderr, "lucerna-server: --state %s: %s\n", flags.state.c_str(),
                    std::string(opened.status().message()).c_str());
@@ -153,7 +154,7 @@ int Serve(const Flags& flags) {
     listener->StopServing();
   // Calls that are under way end by themselves, commits well, before the job is stopped and kept.
   coordinator.StopLending();
-  for (WorkPool* const pool : {&pools.scenes, &pools.uploads, &pools.images})
+  for (WorkPool* const pool : {&pools.scenes, &pools.uploads, &pools.images, &pools.changes})
     pool->Close();
   jobs.Close();
   for (const auto& listener : listeners)
@@ -228,10 +229,15 @@ int Main(int argc, char** argv) {
          "--max-job-bytes", flags.coordinator.max_job_bytes,
          "memory for the image and the scene of one job [bytes]; 0: what is free at the start")
       ->capture_default_str();
-  app.add_option(
+  CLI::Option* const state = app.add_option(
       "--state", flags.state,
       "folder that keeps jobs, images and checkpoints, so that a later start goes on with "
       "them; without it they end with the process");
+  app.add_option("--max-disk", flags.max_disk_bytes,
+                 "size of the files in that folder together [bytes]; jobs that ended first are "
+                 "removed for new ones; 0: no limit")
+      ->needs(state)
+      ->capture_default_str();
   app.add_option("--checkpoint-share", flags.coordinator.checkpoint_share,
                  "share of a job's time that its checkpoints may take, above 0; 1: one after every "
                  "round")

@@ -22,6 +22,10 @@ std::uint64_t SceneMemory(std::uint64_t scene_bytes) {
   return kPerSceneByte * scene_bytes;
 }
 
+std::uint64_t CheckpointBytes(std::uint64_t pixels) {
+  return kCheckpoint * pixels;
+}
+
 std::uint64_t MemoryNeedOf(const SceneNeeds& needs, const RenderSettings& settings,
                            std::uint64_t scene_bytes, bool keeps_checkpoints) {
   const auto pixels = static_cast<std::uint64_t>(settings.crop_width()) *

@@ -17,6 +17,8 @@ namespace lucerna {
 // files.
 [[nodiscard]] std::uint64_t MemoryNeedOf(const SceneNeeds& needs, const RenderSettings& settings,
                                          std::uint64_t scene_bytes, bool keeps_checkpoints);
+// About how large the checkpoint of a job of so many pixels is [bytes].
+[[nodiscard]] std::uint64_t CheckpointBytes(std::uint64_t pixels);
 // Of a scene of so many bytes as files, with the tree over its shapes [bytes].
 [[nodiscard]] std::uint64_t SceneMemory(std::uint64_t scene_bytes);
 

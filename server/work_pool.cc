@@ -67,7 +67,7 @@ int WorkPools::AllThreads() {
 }
 
 void WorkPools::Close() {
-  for (WorkPool* const pool : {&scenes, &uploads, &commits, &images})
+  for (WorkPool* const pool : {&scenes, &uploads, &commits, &images, &changes})
     pool->Close();
 }
 

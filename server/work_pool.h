@@ -1,9 +1,9 @@
 // Threads for work that an RPC thread must not do itself.
 //
 // gRPC's own threads answer every call, heartbeats among them, so they only hand work over: reading
-// scenes, checking and merging accumulations, encoding images. A pool has a fixed number of threads
-// and a bounded queue. A task is refused when the queue is full, and is not begun when nobody needs
-// its result any more.
+// scenes, checking and merging accumulations, encoding images, writing changes of jobs to the disk.
+// A pool has a fixed number of threads and a bounded queue. A task is refused when the queue is
+// full, and is not begun when nobody needs its result any more.
 //
 // Threads: any. A task may not wait for another one of the same pool.
 #pragma once
@@ -84,6 +84,8 @@ struct WorkPools {
   // As many threads as the machine has: workers wait for room here.
   WorkPool commits{{.work = "merging batches", .threads = AllThreads(), .max_waiting = 1024}};
   WorkPool images{{.work = "encoding images", .threads = 2, .max_waiting = 64}};
+  // These wait for the disk, so many at once; together they wait for one sync (state_store.h).
+  WorkPool changes{{.work = "changing jobs", .threads = 16, .max_waiting = 1024}};
 
   void Close();
 

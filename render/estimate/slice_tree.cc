@@ -48,15 +48,20 @@ Status SliceTree::Add(SliceSums slice) {
     passes = {std::min(passes.first, found->second->passes.first),
               std::max(passes.last, found->second->passes.last)};
   }
-  added_.insert(slice.passes);
-  auto sum = std::make_shared<SliceSums>(std::move(slice));
+  // All that may run out of memory comes before the first change.
+  std::set<PassRange> added = {slice.passes};
+  const auto sum = std::make_shared<SliceSums>(std::move(slice));
+  std::vector<Slices::iterator> merged;
   for (auto found = FindSibling(sum->passes); found != slices_.end();
        found = FindSibling(sum->passes)) {
     LUCERNA_RETURN_IF_ERROR(MergeSibling(*sum, *found->second));
-    slices_.erase(found);
+    merged.push_back(found);
   }
-  const std::uint64_t first = sum->passes.first;
-  slices_[first] = std::move(sum);
+  Slices larger = {{sum->passes.first, sum}};
+  for (const Slices::iterator& part : merged)
+    slices_.erase(part);
+  added_.merge(added);
+  slices_.merge(larger);
   return absl::OkStatus();
 }
 

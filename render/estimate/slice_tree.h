@@ -26,7 +26,8 @@ class SliceTree {
   // Errors: INVALID_ARGUMENT when it is no slice of the round or overlaps a shorter one.
   [[nodiscard]] StatusOr<Outcome> Check(const PassRange& passes) const;
   // Adds a slice that Check called new, of the shape of the others.
-  // Errors: OUT_OF_RANGE when counters would not fit. Then nothing has changed.
+  // Errors: OUT_OF_RANGE when counters would not fit. Then nothing has changed, nor when it throws
+  // std::bad_alloc.
   [[nodiscard]] Status Add(SliceSums slice);
 
   // Passes from the beginning of the round on without a gap.

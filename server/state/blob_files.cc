@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include <unistd.h>
@@ -24,7 +25,8 @@ std::vector<std::filesystem::directory_entry> FilesIn(const std::string& folder)
 
 }  // namespace
 
-StatusOr<std::unique_ptr<BlobFiles>> BlobFiles::Open(const std::string& folder) {
+StatusOr<std::unique_ptr<BlobFiles>> BlobFiles::Open(const std::string& folder,
+                                                     std::shared_ptr<DiskBudget> budget) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
@@ -33,7 +35,8 @@ StatusOr<std::unique_ptr<BlobFiles>> BlobFiles::Open(const std::string& folder) 
   for (const auto& file : FilesIn(folder)) {
     if (IsUnfinished(file.path().native())) ::unlink(file.path().c_str());
   }
-  return std::unique_ptr<BlobFiles>(new BlobFiles(folder));
+  budget->CountFolder(folder);
+  return std::unique_ptr<BlobFiles>(new BlobFiles(folder, std::move(budget)));
 }
 
 std::string BlobFiles::PathOf(const Digest& digest) const {
@@ -42,14 +45,14 @@ std::string BlobFiles::PathOf(const Digest& digest) const {
 
 Status BlobFiles::Put(const Digest& digest, std::string_view bytes) {
   if (Has(digest) && Get(digest).ok()) return absl::OkStatus();
-  return WriteFile(PathOf(digest), bytes, "blob");
+  return budget_->Write(PathOf(digest), {&bytes, 1}, "blob");
 }
 
 StatusOr<std::string> BlobFiles::Get(const Digest& digest) const {
   const std::string path = PathOf(digest);
   LUCERNA_ASSIGN_OR_RETURN(std::string bytes, ReadFile(path));
   if (Sha256(bytes) == digest) return bytes;
-  ::unlink(path.c_str());
+  budget_->Remove(path);
   return absl::DataLossError(
       absl::StrCat(path, ": the bytes on the disk are damaged; the file is removed"));
 }
@@ -65,8 +68,15 @@ void BlobFiles::KeepOnly(const std::set<Digest>& needed) {
     names.insert(digest.Hex());
   for (const auto& file : FilesIn(folder_)) {
     const std::string name = file.path().filename();
-    if (!names.contains(name) && !IsUnfinished(name)) ::unlink(file.path().c_str());
+    if (!names.contains(name) && !IsUnfinished(name)) budget_->Remove(file.path());
   }
+}
+
+std::uint64_t BlobFiles::SizeOf(const std::set<Digest>& digests) const {
+  std::uint64_t bytes = 0;
+  for (const Digest& digest : digests)
+    bytes += SizeOfFile(PathOf(digest));
+  return bytes;
 }
 
 }  // namespace lucerna

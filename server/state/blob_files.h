@@ -7,6 +7,7 @@
 // Threads: any.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <set>
 #include <string>
@@ -14,6 +15,7 @@
 
 #include "render/base/digest.h"
 #include "render/base/status.h"
+#include "server/state/disk_budget.h"
 
 namespace lucerna {
 
@@ -21,10 +23,12 @@ class BlobFiles {
  public:
   // Makes the folder unless it is there, and removes what a crash left unfinished.
   // Errors: what the system said.
-  [[nodiscard]] static StatusOr<std::unique_ptr<BlobFiles>> Open(const std::string& folder);
+  [[nodiscard]] static StatusOr<std::unique_ptr<BlobFiles>> Open(
+      const std::string& folder,
+      std::shared_ptr<DiskBudget> budget = std::make_shared<DiskBudget>());
 
   // Keeps `bytes`, whose digest the caller has made sure of. A damaged blob of that digest is
-  // replaced. Errors: as WriteFile.
+  // replaced. Errors: as DiskBudget::Write.
   [[nodiscard]] Status Put(const Digest& digest, std::string_view bytes);
   // Errors: NOT_FOUND; DATA_LOSS when the file does not have that digest, and then it is removed.
   [[nodiscard]] StatusOr<std::string> Get(const Digest& digest) const;
@@ -33,12 +37,16 @@ class BlobFiles {
 
   // Removes all blobs but these.
   void KeepOnly(const std::set<Digest>& needed);
+  // Of those of `digests` that are there [bytes].
+  [[nodiscard]] std::uint64_t SizeOf(const std::set<Digest>& digests) const;
 
  private:
-  explicit BlobFiles(std::string folder) : folder_(std::move(folder)) {}
+  BlobFiles(std::string folder, std::shared_ptr<DiskBudget> budget)
+      : folder_(std::move(folder)), budget_(std::move(budget)) {}
   [[nodiscard]] std::string PathOf(const Digest& digest) const;
 
   const std::string folder_;
+  const std::shared_ptr<DiskBudget> budget_;
 };
 
 }  // namespace lucerna

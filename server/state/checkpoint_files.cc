@@ -76,7 +76,8 @@ std::optional<Numbered> Decode(std::string_view bytes) {
 
 }  // namespace
 
-StatusOr<std::unique_ptr<CheckpointFiles>> CheckpointFiles::Open(const std::string& folder) {
+StatusOr<std::unique_ptr<CheckpointFiles>> CheckpointFiles::Open(
+    const std::string& folder, std::shared_ptr<DiskBudget> budget) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
@@ -85,7 +86,8 @@ StatusOr<std::unique_ptr<CheckpointFiles>> CheckpointFiles::Open(const std::stri
   for (const auto& file : std::filesystem::directory_iterator(folder, error)) {
     if (IsUnfinished(file.path().native())) ::unlink(file.path().c_str());
   }
-  return std::unique_ptr<CheckpointFiles>(new CheckpointFiles(folder));
+  budget->CountFolder(folder);
+  return std::unique_ptr<CheckpointFiles>(new CheckpointFiles(folder, std::move(budget)));
 }
 
 std::string CheckpointFiles::PathOf(const std::string& job_id, int slot) const {
@@ -105,10 +107,15 @@ Status CheckpointFiles::Write(const std::string& job_id, const Checkpoint& check
   const std::string sums_head = HeadOf(checkpoint.sums);
   const std::array<std::string_view, 7> pieces = {
       kMagic, head_head, head, record_head, checkpoint.record, sums_head, checkpoint.sums};
-  LUCERNA_RETURN_IF_ERROR(WriteFile(PathOf(job_id, next.slot), pieces, "checkpoint"));
+  LUCERNA_RETURN_IF_ERROR(budget_->Write(PathOf(job_id, next.slot), pieces, "checkpoint"));
   const MutexLock lock(mutex_);
   newest_[job_id] = next;
   return absl::OkStatus();
+}
+
+std::uint64_t CheckpointFiles::SizeAsFile(const Checkpoint& checkpoint) {
+  return kMagic.size() + 3 * kHeadBytes + kNumberBytes + checkpoint.numeric_profile.size() +
+         checkpoint.record.size() + checkpoint.sums.size();
 }
 
 CheckpointFiles::Found CheckpointFiles::Read(const std::string& job_id) {
@@ -153,7 +160,16 @@ void CheckpointFiles::KeepOnly(const std::set<std::string>& job_ids) {
     }
   }
   for (const auto& path : dropped)
-    ::unlink(path.c_str());
+    budget_->Remove(path);
+}
+
+std::uint64_t CheckpointFiles::SizeOf(const std::set<std::string>& job_ids) const {
+  std::uint64_t bytes = 0;
+  for (const std::string& job_id : job_ids) {
+    for (int slot = 0; slot < kSlots; ++slot)
+      bytes += SizeOfFile(PathOf(job_id, slot));
+  }
+  return bytes;
 }
 
 }  // namespace lucerna

@@ -17,6 +17,7 @@
 
 #include "render/base/mutex.h"
 #include "render/base/status.h"
+#include "server/state/disk_budget.h"
 
 namespace lucerna {
 
@@ -31,11 +32,16 @@ class CheckpointFiles {
  public:
   // Makes the folder unless it is there, and removes what a crash left unfinished.
   // Errors: what the system said.
-  [[nodiscard]] static StatusOr<std::unique_ptr<CheckpointFiles>> Open(const std::string& folder);
+  [[nodiscard]] static StatusOr<std::unique_ptr<CheckpointFiles>> Open(
+      const std::string& folder,
+      std::shared_ptr<DiskBudget> budget = std::make_shared<DiskBudget>());
 
   // Replaces the older of the job's two. A job of an earlier process must have been Read before.
-  // Errors: as WriteFile; then the two are as they were.
+  // Errors: as DiskBudget::Write; then the two are as they were.
   [[nodiscard]] Status Write(const std::string& job_id, const Checkpoint& checkpoint);
+
+  // Of the file that it is written to [bytes].
+  [[nodiscard]] static std::uint64_t SizeAsFile(const Checkpoint& checkpoint);
 
   struct Found {
     std::vector<Checkpoint> newest_first;  // at most two
@@ -47,9 +53,12 @@ class CheckpointFiles {
 
   // Removes those of all jobs but these.
   void KeepOnly(const std::set<std::string>& job_ids);
+  // Of the checkpoints of these jobs [bytes].
+  [[nodiscard]] std::uint64_t SizeOf(const std::set<std::string>& job_ids) const;
 
  private:
-  explicit CheckpointFiles(std::string folder) : folder_(std::move(folder)) {}
+  CheckpointFiles(std::string folder, std::shared_ptr<DiskBudget> budget)
+      : folder_(std::move(folder)), budget_(std::move(budget)) {}
   [[nodiscard]] std::string PathOf(const std::string& job_id, int slot) const;
 
   // Where the newest that can be used is, and its number.
@@ -58,6 +67,7 @@ class CheckpointFiles {
     std::uint64_t number = 0;
   };
   const std::string folder_;
+  const std::shared_ptr<DiskBudget> budget_;
   Mutex mutex_;
   std::map<std::string, Newest> newest_ LUCERNA_GUARDED_BY(mutex_);  // by job
 };

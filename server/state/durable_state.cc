@@ -6,6 +6,8 @@
 #include <system_error>
 #include <utility>
 
+#include "absl/strings/str_format.h"
+
 #include "server/job_message.h"
 
 namespace lucerna {
@@ -41,17 +43,22 @@ Digest DigestOf(const StoredJob& row, std::string_view record) {
 
 StatusOr<std::unique_ptr<DurableState>> DurableState::Open(const std::string& folder,
                                                            const std::string& new_instance,
-                                                           const Moment& moment) {
+                                                           const Moment& moment,
+                                                           std::uint64_t max_bytes) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
     return absl::UnavailableError(absl::StrCat(folder, ": cannot create: ", error.message()));
   }
-  auto state = std::unique_ptr<DurableState>(new DurableState(folder));
+  auto state = std::unique_ptr<DurableState>(new DurableState(folder, max_bytes));
   // First, because it keeps other coordinators out.
-  LUCERNA_ASSIGN_OR_RETURN(state->store_, StateStore::Open(folder + "/lucerna.db", new_instance));
-  LUCERNA_ASSIGN_OR_RETURN(state->blobs_, BlobFiles::Open(folder + "/blobs"));
-  LUCERNA_ASSIGN_OR_RETURN(state->checkpoints_, CheckpointFiles::Open(folder + "/checkpoints"));
+  const std::string database = folder + "/lucerna.db";
+  LUCERNA_ASSIGN_OR_RETURN(state->store_, StateStore::Open(database, new_instance));
+  state->budget_->AddGrowing(database);
+  state->budget_->AddGrowing(database + "-wal");
+  LUCERNA_ASSIGN_OR_RETURN(state->blobs_, BlobFiles::Open(folder + "/blobs", state->budget_));
+  LUCERNA_ASSIGN_OR_RETURN(state->checkpoints_,
+                           CheckpointFiles::Open(folder + "/checkpoints", state->budget_));
   LUCERNA_RETURN_IF_ERROR(state->Load(moment));
   return state;
 }
@@ -87,7 +94,7 @@ Status DurableState::Load(const Moment& moment) {
   return absl::OkStatus();
 }
 
-Status DurableState::Save(const JournalEntry& entry, Duration running) {
+JobJournal::Written DurableState::BeginSave(const JournalEntry& entry, Duration running) {
   StoredJob row;
   row.serial = entry.serial;
   row.request_id = entry.request_id;
@@ -96,17 +103,32 @@ Status DurableState::Save(const JournalEntry& entry, Duration running) {
   row.state = NameOf(entry.job.life.state());
   const std::string record = EncodeRecord(entry.job, entry.image_digest, running);
   row.record = absl::StrCat(std::string(DigestOf(row, record).Bytes()), record);
-  const Status saved = store_->Save(row);
-  return saved.ok() ? saved : Refusal(saved);
+  return [this, written = store_->BeginSave(std::move(row))] {
+    const Status saved = written();
+    return saved.ok() ? saved : Refusal(saved);
+  };
 }
 
-Status DurableState::Remove(std::uint64_t serial) {
-  return store_->Remove(serial);
+JobJournal::Written DurableState::BeginRemove(std::uint64_t serial) {
+  return store_->BeginRemove(serial);
+}
+
+bool DurableState::MayHaveRoom(std::uint64_t bytes, const JobTable::NeededFiles& needed) const {
+  if (budget_->max_bytes() == 0) return true;
+  const std::uint64_t lasting = budget_->growing_bytes() + blobs_->SizeOf(needed.blobs) +
+                                checkpoints_->SizeOf(needed.checkpoints);
+  return lasting <= budget_->max_bytes() && bytes <= budget_->max_bytes() - lasting;
+}
+
+std::string DurableState::NoRoom(const Status& why) const {
+  if (!IsOverDiskLimit(why)) return absl::StrCat("no room in ", folder_);
+  return absl::StrFormat("no room in %s within --max-disk (%.1f MB)", folder_,
+                         static_cast<double>(budget_->max_bytes()) / 1e6);
 }
 
 std::string DurableState::PauseCondition(const Status& why) const {
   if (absl::IsResourceExhausted(why)) {
-    return absl::StrCat("paused: no room in ", folder_, "; it goes on when there is");
+    return absl::StrCat("paused: ", NoRoom(why), "; it goes on when there is");
   }
   return absl::StrCat("paused: ", folder_, " cannot be written (", std::string(why.message()),
                       "); it goes on when it can");
@@ -114,9 +136,11 @@ std::string DurableState::PauseCondition(const Status& why) const {
 
 Status DurableState::Refusal(const Status& why) const {
   if (absl::IsResourceExhausted(why)) {
-    return absl::ResourceExhaustedError(
-        absl::StrCat("the coordinator takes no job now: there is no room in ", folder_,
-                     "; make room there, or delete jobs that are not needed, and submit again"));
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "the coordinator takes no job now: there is ", NoRoom(why), "; ",
+        IsOverDiskLimit(why) ? "delete jobs that are not needed, or wait for some, and submit again"
+                             : "make room there, or delete jobs that are not needed, and submit "
+                               "again"));
   }
   return absl::FailedPreconditionError(absl::StrCat("the coordinator takes no job now: ", folder_,
                                                     " cannot be written (",

@@ -21,23 +21,29 @@
 #include "server/job_table.h"
 #include "server/state/blob_files.h"
 #include "server/state/checkpoint_files.h"
+#include "server/state/disk_budget.h"
 #include "server/state/state_store.h"
 
 namespace lucerna {
 
 class DurableState final : public JobJournal {
  public:
-  // Makes the folder unless it is there. `new_instance` names a new one for good, `moment` is now.
+  // Makes the folder unless it is there. `new_instance` names a new one for good, `moment` is now,
+  // and its files may have `max_bytes` together; 0: no limit.
   // Errors: as StateStore::Open, with the folder.
   [[nodiscard]] static StatusOr<std::unique_ptr<DurableState>> Open(const std::string& folder,
                                                                     const std::string& new_instance,
-                                                                    const Moment& moment);
+                                                                    const Moment& moment,
+                                                                    std::uint64_t max_bytes = 0);
 
   [[nodiscard]] const std::string& folder() const { return folder_; }
   // In front of the ids of its jobs.
   [[nodiscard]] const std::string& instance() const { return store_->instance(); }
   [[nodiscard]] BlobFiles& blobs() { return *blobs_; }
   [[nodiscard]] CheckpointFiles& checkpoints() { return *checkpoints_; }
+  [[nodiscard]] const DiskBudget& budget() const { return *budget_; }
+  // Whether a file of `bytes` could be written if all files but those that are needed were removed.
+  [[nodiscard]] bool MayHaveRoom(std::uint64_t bytes, const JobTable::NeededFiles& needed) const;
 
   // The jobs of earlier processes. Once.
   [[nodiscard]] std::vector<JournalEntry> TakeJobs() { return std::move(jobs_); }
@@ -47,8 +53,8 @@ class DurableState final : public JobJournal {
   [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
 
   // Errors: Refusal of what StateStore says.
-  [[nodiscard]] Status Save(const JournalEntry& entry, Duration running) override;
-  [[nodiscard]] Status Remove(std::uint64_t serial) override;
+  [[nodiscard]] Written BeginSave(const JournalEntry& entry, Duration running) override;
+  [[nodiscard]] Written BeginRemove(std::uint64_t serial) override;
 
   // When `why` keeps bytes from the disk: what a running job shows ("paused: no room in DIR; ..."),
   // and what a new job is refused with.
@@ -56,10 +62,14 @@ class DurableState final : public JobJournal {
   [[nodiscard]] Status Refusal(const Status& why) const;
 
  private:
-  explicit DurableState(std::string folder) : folder_(std::move(folder)) {}
+  DurableState(std::string folder, std::uint64_t max_bytes)
+      : folder_(std::move(folder)), budget_(std::make_shared<DiskBudget>(max_bytes)) {}
+  // Where what `why` says has no room.
+  [[nodiscard]] std::string NoRoom(const Status& why) const;
   [[nodiscard]] Status Load(const Moment& moment);
 
   const std::string folder_;
+  const std::shared_ptr<DiskBudget> budget_;
   std::unique_ptr<StateStore> store_;
   std::unique_ptr<BlobFiles> blobs_;
   std::unique_ptr<CheckpointFiles> checkpoints_;

@@ -156,31 +156,89 @@ StateStore::~StateStore() {
   sqlite3_close(database_);
 }
 
-Status StateStore::Save(const StoredJob& job) {
+StateStore::Written StateStore::BeginSave(StoredJob job) {
+  Change change;
+  change.job = std::move(job);
+  return Begin(std::move(change));
+}
+
+StateStore::Written StateStore::BeginRemove(std::uint64_t serial) {
+  Change change;
+  change.removes = true;
+  change.job.serial = serial;
+  return Begin(std::move(change));
+}
+
+StateStore::Written StateStore::Begin(Change change) {
+  auto shared = std::make_shared<Change>(std::move(change));
+  const MutexLock lock(queue_mutex_);
+  queue_.push_back(shared);
+  return [this, shared = std::move(shared)] { return WaitFor(shared); };
+}
+
+Status StateStore::WaitFor(const std::shared_ptr<Change>& change) {
+  std::vector<std::shared_ptr<Change>> changes;
+  {
+    const MutexLock lock(queue_mutex_);
+    while (!change->is_done && is_writing_)
+      written_.Wait(queue_mutex_);
+    if (change->is_done) return change->result;
+    is_writing_ = true;
+    changes.swap(queue_);
+  }
+  Write(changes);
+  const MutexLock lock(queue_mutex_);
+  for (const std::shared_ptr<Change>& written : changes)
+    written->is_done = true;
+  is_writing_ = false;
+  written_.NotifyAll();
+  return change->result;
+}
+
+void StateStore::Write(const std::vector<std::shared_ptr<Change>>& changes) {
   const MutexLock lock(mutex_);
-  FailPoint("job.unsaved");
-  Statement statement(database_,
-                      "INSERT OR REPLACE INTO jobs (serial, request_id, turn, name, state, record) "
-                      "VALUES (?, ?, ?, ?, ?, ?)");
-  statement.Bind(1, job.serial);
-  statement.BindText(2, job.request_id);
-  statement.Bind(3, job.turn);
-  statement.BindText(4, job.name);
-  statement.BindText(5, job.state);
-  statement.BindBytes(6, job.record);
-  if (statement.Step() != SQLITE_DONE) return Fault();
-  FailPoint("job.saved");
+  const Status together = WriteTogether(changes);
+  // One that does not fit must not take the others with it: a removal needs no room.
+  const bool is_each_alone = !together.ok() && changes.size() > 1;
+  for (const std::shared_ptr<Change>& change : changes)
+    change->result = is_each_alone ? WriteTogether({&change, 1}) : together;
+}
+
+Status StateStore::WriteTogether(std::span<const std::shared_ptr<Change>> changes) {
+  for (const std::shared_ptr<Change>& change : changes)
+    FailPoint(change->removes ? "job.unremoved" : "job.unsaved");
+  Status result = Run("BEGIN IMMEDIATE");
+  for (const std::shared_ptr<Change>& change : changes) {
+    if (result.ok()) result = Make(*change);
+  }
+  if (result.ok()) result = Run("COMMIT");
+  if (!result.ok()) {
+    // Unless SQLite has done so by itself.
+    if (sqlite3_get_autocommit(database_) == 0) Run("ROLLBACK").IgnoreError();
+    return result;
+  }
+  for (const std::shared_ptr<Change>& change : changes)
+    FailPoint(change->removes ? "job.removed" : "job.saved");
   return absl::OkStatus();
 }
 
-Status StateStore::Remove(std::uint64_t serial) {
-  const MutexLock lock(mutex_);
-  FailPoint("job.unremoved");
-  Statement statement(database_, "DELETE FROM jobs WHERE serial = ?");
-  statement.Bind(1, serial);
-  if (statement.Step() != SQLITE_DONE) return Fault();
-  FailPoint("job.removed");
-  return absl::OkStatus();
+Status StateStore::Make(const Change& change) {
+  const StoredJob& job = change.job;
+  Statement statement(
+      database_,
+      change.removes
+          ? "DELETE FROM jobs WHERE serial = ?"
+          : "INSERT OR REPLACE INTO jobs (serial, request_id, turn, name, state, record) "
+            "VALUES (?, ?, ?, ?, ?, ?)");
+  statement.Bind(1, job.serial);
+  if (!change.removes) {
+    statement.BindText(2, job.request_id);
+    statement.Bind(3, job.turn);
+    statement.BindText(4, job.name);
+    statement.BindText(5, job.state);
+    statement.BindBytes(6, job.record);
+  }
+  return statement.Step() == SQLITE_DONE ? absl::OkStatus() : Fault();
 }
 
 StatusOr<std::vector<StoredJob>> StateStore::Load() const {

@@ -2,15 +2,20 @@
 //
 // One row a job in an SQLite database, written through to the disk before a call returns: what was
 // saved outlives a crash and a power cut, and a row is as it was before a call or as it is after
-// it. The record of a job is bytes to this class; the columns beside it are what order and requests
-// need, and what people look up. One process at a time may have the database open.
+// it. Changes of several threads that come while the disk is busy share one transaction, and so one
+// sync of the disk: the first of these threads that waits writes them all. The record of a job is
+// bytes to this class; the columns beside it are what order and requests need, and what people look
+// up. One process at a time may have the database open.
 //
 // Threads: any.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "render/base/mutex.h"
@@ -47,9 +52,16 @@ class StateStore {
   // Adds the job, or replaces what was saved of it, or of a job with its request id.
   // Errors: RESOURCE_EXHAUSTED when the disk is full, PERMISSION_DENIED when it may not be written,
   // UNAVAILABLE for other faults of it. Then nothing has changed.
-  [[nodiscard]] Status Save(const StoredJob& job);
+  [[nodiscard]] Status Save(StoredJob job) { return BeginSave(std::move(job))(); }
   // Errors: as Save.
-  [[nodiscard]] Status Remove(std::uint64_t serial);
+  [[nodiscard]] Status Remove(std::uint64_t serial) { return BeginRemove(serial)(); }
+
+  // The same in two steps. Changes are made in the order of these calls, which do not wait for the
+  // disk; what they return waits, is called once, and says what became of the change. The store
+  // outlives it.
+  using Written = std::function<Status()>;
+  [[nodiscard]] Written BeginSave(StoredJob job);
+  [[nodiscard]] Written BeginRemove(std::uint64_t serial);
 
   // All jobs, by serial number. Errors: DATA_LOSS.
   [[nodiscard]] StatusOr<std::vector<StoredJob>> Load() const;
@@ -60,6 +72,20 @@ class StateStore {
   StateStore(std::string path, sqlite3* database) : path_(std::move(path)), database_(database) {}
 
   class Statement;
+  struct Change {
+    bool removes = false;
+    StoredJob job;
+    bool is_done = false;  // guarded by queue_mutex_
+    Status result;         // set before that
+  };
+  [[nodiscard]] Written Begin(Change change);
+  [[nodiscard]] Status WaitFor(const std::shared_ptr<Change>& change);
+  // Sets the results.
+  void Write(const std::vector<std::shared_ptr<Change>>& changes);
+  // In one transaction: all or none.
+  [[nodiscard]] Status WriteTogether(std::span<const std::shared_ptr<Change>> changes)
+      LUCERNA_REQUIRES(mutex_);
+  [[nodiscard]] Status Make(const Change& change) LUCERNA_REQUIRES(mutex_);
   [[nodiscard]] Status Run(const char* sql) const LUCERNA_REQUIRES(mutex_);
   [[nodiscard]] Status Fault() const LUCERNA_REQUIRES(mutex_);
   [[nodiscard]] Status SetUp(const std::string& new_instance) LUCERNA_REQUIRES(mutex_);
@@ -69,6 +95,11 @@ class StateStore {
   mutable Mutex mutex_;
   sqlite3* const database_;
   std::string instance_;  // set once
+
+  Mutex queue_mutex_;
+  Condition written_;
+  bool is_writing_ LUCERNA_GUARDED_BY(queue_mutex_) = false;
+  std::vector<std::shared_ptr<Change>> queue_ LUCERNA_GUARDED_BY(queue_mutex_);
 };
 
 }  // namespace lucerna

@@ -1,4 +1,14 @@
-// What does a coordinator take with many watchers and idle workers?
+// What does a coordinator take with many watchers and idle workers, many changes, or many jobs?
+//
+//   lucerna-load changes ADDRESS JOB CALLERS SECONDS
+//
+// So many callers change the priority of a job, each as soon as its last change was answered.
+// Prints the changes a second and their latency.
+//
+//   lucerna-load jobs ADDRESS JOB PID COUNT
+//
+// Submits COUNT jobs of the scene of JOB, at 64 x 64 pixels and 4 passes, one after the other, and
+// prints the coordinator's memory after each 100.
 //
 //   lucerna-load ADDRESS JOB PID [WATCHERS WORKERS SECONDS]
 //
@@ -25,6 +35,7 @@
 #include "proto/lucerna/v1/jobs.grpc.pb.h"
 #include "proto/lucerna/v1/work.grpc.pb.h"
 #include "render/geometry/numeric_profile.h"
+#include "render/wire/messages.h"
 
 namespace lucerna {
 namespace {
@@ -139,9 +150,110 @@ class Load {
   std::vector<std::thread> threads_;
 };
 
+// Of latencies, in any order [ms].
+double Quantile(std::vector<double> latencies_ms, double share) {
+  if (latencies_ms.empty()) return 0;
+  std::sort(latencies_ms.begin(), latencies_ms.end());
+  return latencies_ms[static_cast<std::size_t>(share *
+                                               static_cast<double>(latencies_ms.size() - 1))];
+}
+
+int ChangeJobs(const std::string& address, const std::string& job, int callers, double seconds) {
+  std::vector<std::vector<double>> latencies_ms(static_cast<std::size_t>(callers));
+  std::atomic<std::uint64_t> failures = 0;
+  const Clock::time_point began_at = Clock::now();
+  std::vector<std::thread> threads;
+  for (int caller = 0; caller < callers; ++caller) {
+    threads.emplace_back([&, caller] {
+      const auto stub =
+          v1::JobService::NewStub(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()));
+      for (int i = 0; SecondsSince(began_at) < seconds; ++i) {
+        grpc::ClientContext context;
+        v1::SetJobPriorityRequest request;
+        request.set_job_id(job);
+        request.set_priority((caller + i) % 100);
+        v1::Job changed;
+        const Clock::time_point asked_at = Clock::now();
+        if (!stub->SetPriority(&context, request, &changed).ok()) ++failures;
+        latencies_ms[static_cast<std::size_t>(caller)].push_back(1e3 * SecondsSince(asked_at));
+      }
+    });
+  }
+  for (std::thread& thread : threads)
+    thread.join();
+  const double measured_s = SecondsSince(began_at);
+  std::vector<double> all;
+  for (const std::vector<double>& of_caller : latencies_ms)
+    all.insert(all.end(), of_caller.begin(), of_caller.end());
+  std::printf("%d callers: %.0f changes/s, median %.2f ms, p99 %.2f ms, failures: %llu\n", callers,
+              static_cast<double>(all.size()) / measured_s, Quantile(all, 0.5), Quantile(all, 0.99),
+              static_cast<unsigned long long>(failures));
+  return 0;
+}
+
+int RunJobs(const std::string& address, const std::string& job, const std::string& pid, int count) {
+  const auto channel = grpc::CreateChannel(address, grpc::InsecureChannelCredentials());
+  const auto jobs = v1::JobService::NewStub(channel);
+  v1::JobDescription description;
+  {
+    grpc::ClientContext context;
+    v1::DescribeJobRequest request;
+    request.set_job_id(job);
+    const grpc::Status described =
+        v1::WorkerService::NewStub(channel)->DescribeJob(&context, request, &description);
+    if (!described.ok()) {
+      std::fprintf(stderr, "%s\n", described.error_message().c_str());
+      return 1;
+    }
+  }
+  RenderOverrides overrides;
+  overrides.width = overrides.height = 64;
+  overrides.passes = 4;
+  overrides.photons_per_pass = 1000;
+  std::printf("jobs,memory_mb\n0,%.1f\n", MemoryOf(pid));
+  for (int i = 1; i <= count; ++i) {
+    v1::SubmitRequest request;
+    request.set_request_id(pid + " " + std::to_string(i));
+    *request.mutable_scene() = description.scene();
+    *request.mutable_overrides() = ToProto(overrides);
+    v1::SubmitResponse submitted;
+    grpc::ClientContext context;
+    const grpc::Status status = jobs->Submit(&context, request, &submitted);
+    if (!status.ok()) {
+      std::fprintf(stderr, "%s\n", status.error_message().c_str());
+      return 1;
+    }
+    grpc::ClientContext watching;
+    v1::WatchJobRequest watch;
+    watch.set_job_id(submitted.job_id());
+    const auto reader = jobs->Watch(&watching, watch);
+    v1::Job newest;
+    while (reader->Read(&newest)) {
+    }
+    if (!reader->Finish().ok() || newest.state() != v1::JOB_STATE_SUCCEEDED) {
+      std::fprintf(stderr, "job %d did not succeed\n", i);
+      return 1;
+    }
+    if (i % 100 == 0) {
+      std::printf("%d,%.1f\n", i, MemoryOf(pid));
+      std::fflush(stdout);
+    }
+  }
+  return 0;
+}
+
 int Main(int argc, char** argv) {
+  if (argc == 6 && std::string(argv[1]) == "changes") {
+    return ChangeJobs(argv[2], argv[3], std::atoi(argv[4]), std::atof(argv[5]));
+  }
+  if (argc == 6 && std::string(argv[1]) == "jobs") {
+    return RunJobs(argv[2], argv[3], argv[4], std::atoi(argv[5]));
+  }
   if (argc < 4) {
-    std::fprintf(stderr, "usage: lucerna-load ADDRESS JOB PID [WATCHERS WORKERS SECONDS]\n");
+    std::fprintf(stderr,
+                 "usage: lucerna-load ADDRESS JOB PID [WATCHERS WORKERS SECONDS]\n"
+                 "       lucerna-load changes ADDRESS JOB CALLERS SECONDS\n"
+                 "       lucerna-load jobs ADDRESS JOB PID COUNT\n");
     return 2;
   }
   const std::string pid = argv[3];
@@ -165,11 +277,7 @@ int Main(int argc, char** argv) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   const double measured_s = SecondsSince(began_at);
-  std::sort(latencies_ms.begin(), latencies_ms.end());
-  const auto quantile = [&](double share) {
-    return latencies_ms[static_cast<std::size_t>(share *
-                                                 static_cast<double>(latencies_ms.size() - 1))];
-  };
+  const auto quantile = [&](double share) { return Quantile(latencies_ms, share); };
   std::printf("with %d watchers and %d workers: %.1f MB, %.3f cores, %.0f messages/s\n", watchers,
               workers, MemoryOf(pid), (CpuOf(pid) - cpu) / measured_s,
               static_cast<double>(load.messages() - messages) / measured_s);

@@ -59,7 +59,8 @@ TEST(BusyPoolsTest, HeartbeatsAndStatesAreAnsweredWhileAllPoolsAreBusy) {
 
   WorkPools& pools = service.pools();
   std::vector<std::unique_ptr<Occupation>> occupations;
-  for (WorkPool* const pool : {&pools.scenes, &pools.uploads, &pools.commits, &pools.images})
+  for (WorkPool* const pool :
+       {&pools.scenes, &pools.uploads, &pools.commits, &pools.images, &pools.changes})
     occupations.push_back(std::make_unique<Occupation>(*pool, pool->threads()));
   // More calls than gRPC has threads wait for the pools.
   std::vector<std::thread> callers;
@@ -71,15 +72,16 @@ TEST(BusyPoolsTest, HeartbeatsAndStatesAreAnsweredWhileAllPoolsAreBusy) {
       EXPECT_TRUE(caller.Cancel(job.message.job_id()).ok());
       EXPECT_TRUE(caller.UploadBytes(absl::StrCat("bytes of ", c)).ok());
     });
+    callers.emplace_back([&] { EXPECT_TRUE(TestClient(service).Pause(running).ok()); });
   }
   for (int i = 0; i < 20; ++i) {
     EXPECT_TRUE(worker.Sync(false, Duration::zero(), {lease->lease_id()}).ok());
     EXPECT_EQ(client.Get(running).message.state(), v1::JOB_STATE_RUNNING);
   }
-  EXPECT_EQ(client.Cancel(running).message.state(), v1::JOB_STATE_CANCELLED);
   occupations.clear();
   for (std::thread& caller : callers)
     caller.join();
+  EXPECT_EQ(client.Get(running).message.state(), v1::JOB_STATE_PAUSED);
 }
 
 TEST(BusyPoolsTest, ASubmitWhoseCallerHasLeftIsNotRead) {

@@ -1,6 +1,7 @@
 // Several jobs at once share the workers, are paused, resumed and prioritised, and none blocks
 // another.
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <thread>
@@ -252,6 +253,30 @@ TEST(MemoryOfJobsTest, WhatWillNeverFitIsRefusedAndEndedJobsLetGoOfTheirPhotons)
       << "the second needed its memory";
   EXPECT_TRUE(client.Image(first).ok());
   EXPECT_LE(service.coordinator().budget().held(), 100'000U);
+}
+
+TEST_F(ManyJobsTest, RoundsThatAreOpenCountAsMemoryAndAJobGoesOnWithoutRoomForMany) {
+  MemoryBudget& budget = service_.coordinator().budget();
+  const std::string job = Submit("a", kEndless);
+  ASSERT_TRUE(client_.WaitFor(job, {v1::JOB_STATE_RUNNING}).ok());
+  const std::uint64_t alone = budget.HeldFor(MemoryUse::kJobs);
+  auto worker = std::make_unique<WorkerThread>(service_);
+  WaitForPasses(job, 2000);
+  worker.reset();
+  // Nothing comes any more: as many rounds are open as may be.
+  for (int i = 0; i < 10'000 && budget.HeldFor(MemoryUse::kJobs) == alone; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_GE(budget.HeldFor(MemoryUse::kJobs), alone + kSmallScenePixels * 48);
+
+  // Room for a result on its way in, and not for one more round.
+  const auto rest = budget.Claim(MemoryUse::kUploads, budget.max_bytes() - budget.held() - 2900);
+  ASSERT_TRUE(rest.ok()) << rest.status();
+  worker = std::make_unique<WorkerThread>(service_);
+  WaitForPasses(job, 4000);
+  EXPECT_TRUE(client_.Cancel(job).ok());
+  for (int i = 0; i < 10'000 && budget.HeldFor(MemoryUse::kJobs) > 0; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_EQ(budget.HeldFor(MemoryUse::kJobs), 0U);
 }
 
 // Whatever comes to them, jobs that are left to themselves in the end come to their ends, with each

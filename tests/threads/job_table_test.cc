@@ -5,6 +5,7 @@
 #include "server/job_table.h"
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
@@ -251,15 +252,21 @@ TEST(JobTableTest, GivesFilesBackWhenAJobCannotNeedThemAnyMore) {
 // Remembers what a disk would, and may be full.
 class FakeJournal final : public JobJournal {
  public:
-  Status Save(const JournalEntry& entry, Duration /*running*/) override {
-    if (is_full) return absl::ResourceExhaustedError("no room");
-    rows[entry.serial] = entry;
-    return absl::OkStatus();
+  Written BeginSave(const JournalEntry& entry, Duration /*running*/) override {
+    return [this, entry]() -> Status {
+      if (const auto call = at_write) call();  // a copy: it may be replaced meanwhile
+      if (is_full) return absl::ResourceExhaustedError("no room");
+      rows[entry.serial] = entry;
+      return absl::OkStatus();
+    };
   }
-  Status Remove(std::uint64_t serial) override {
-    if (is_full) return absl::ResourceExhaustedError("no room");
-    rows.erase(serial);
-    return absl::OkStatus();
+  Written BeginRemove(std::uint64_t serial) override {
+    return [this, serial]() -> Status {
+      if (const auto call = at_write) call();  // a copy: it may be replaced meanwhile
+      if (is_full) return absl::ResourceExhaustedError("no room");
+      rows.erase(serial);
+      return absl::OkStatus();
+    };
   }
   [[nodiscard]] std::vector<JournalEntry> AtTheNextStart() const {
     std::vector<JournalEntry> jobs;
@@ -272,6 +279,7 @@ class FakeJournal final : public JobJournal {
   }
 
   bool is_full = false;
+  std::function<void()> at_write;  // while the disk is written
   std::map<std::uint64_t, JournalEntry> rows;
 };
 
@@ -288,6 +296,74 @@ TEST(JobTableTest, AJobThatCannotBeWrittenDownIsRefusedAndLeavesNoTrace) {
   EXPECT_TRUE(table.List({}, 10, 0, At(0)).first.empty());
   journal.is_full = false;
   EXPECT_EQ(Added(table, "a"), "t-1") << "no number is lost";
+}
+
+TEST(JobTableTest, NobodySeesAJobBeforeItIsOnTheDiskAndNobodyWaitsForTheDiskOfAnother) {
+  FakeJournal journal;
+  JobTable table(TableWith(journal));
+  const std::string first = Added(table, "first");
+  int writes = 0;
+  journal.at_write = [&] {
+    ++writes;
+    // These would wait for ever if the table were locked.
+    EXPECT_FALSE(table.FindRequest("new"));
+    EXPECT_EQ(table.List({}, 10, 0, At(0)).first.size(), 1U);
+    EXPECT_TRUE(table.ReportOf(first, At(0)).ok());
+  };
+  const std::string job = Added(table, "new");
+  EXPECT_EQ(writes, 1);
+  journal.at_write = [&] {
+    ++writes;
+    EXPECT_TRUE(table.ReportOf(first, At(0)).ok());
+  };
+  EXPECT_TRUE(table.SetPriority(job, 1, At(0)).ok());
+  EXPECT_TRUE(table.Pause(job, PauseCause::kUser, "paused", At(0)).ok());
+  EXPECT_TRUE(table.Resume(job, At(0)).ok());
+  EXPECT_TRUE(table.Cancel(job, At(0)).ok());
+  EXPECT_TRUE(table.Delete(job, At(0)).ok());
+  EXPECT_EQ(writes, 6);
+  EXPECT_FALSE(journal.rows.contains(2));
+}
+
+TEST(JobTableTest, ARequestThatComesTwiceWaitsForTheDiskAndIsOneJob) {
+  FakeJournal journal;
+  JobTable table(TableWith(journal));
+  std::atomic<bool> has_come = false;
+  std::string second;
+  std::thread other;
+  journal.at_write = [&] {
+    journal.at_write = nullptr;
+    other = std::thread([&] {
+      has_come = true;
+      second = Added(table, "a");
+    });
+    while (!has_come)
+      std::this_thread::yield();
+  };
+  const std::string first = Added(table, "a");
+  other.join();
+  EXPECT_EQ(second, first);
+  EXPECT_EQ(journal.rows.size(), 1U);
+}
+
+TEST(JobTableTest, AJobThatIsBeingDeletedIsNotExtendedNorWrittenAgain) {
+  FakeJournal journal;
+  JobTable table(TableWith(journal));
+  const std::string job = Added(table, "a");
+  table.NoteContributor(job, "w", "worker");
+  ASSERT_TRUE(table.Cancel(job, At(0)).ok());
+  journal.at_write = [&] {
+    journal.at_write = nullptr;
+    RenderOverrides until;
+    until.passes = 2000;
+    EXPECT_TRUE(absl::IsNotFound(table.Extend(job, until, At(1)).status()));
+    table.TakeOut("w", At(1));
+    EXPECT_TRUE(table.Find(job));
+  };
+  EXPECT_TRUE(table.Delete(job, At(1)).ok());
+  EXPECT_TRUE(journal.rows.empty());
+  table.SaveUnsaved(At(1));
+  EXPECT_TRUE(journal.rows.empty());
 }
 
 TEST(JobTableTest, ALaterTableHasTheSameJobsInTheSameOrder) {

@@ -187,7 +187,7 @@ TEST(DurableStateTest, PutsADamagedRowAsideAndSaysSo) {
       entry.request_id = absl::StrCat("request ", serial);
       entry.job = FullJob();
       entry.job.id = absl::StrCat("i-", serial);
-      ASSERT_TRUE(state->Save(entry, Duration::zero()).ok());
+      ASSERT_TRUE(state->BeginSave(entry, Duration::zero())().ok());
     }
   }
   {

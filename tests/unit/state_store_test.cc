@@ -1,6 +1,9 @@
 // What was saved is there at the next start, in order, and nobody else's database is touched.
 #include "server/state/state_store.h"
 
+#include <thread>
+#include <vector>
+
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include <sqlite3.h>
@@ -54,6 +57,62 @@ TEST(StateStoreTest, HasAllJobsAtTheNextStart) {
   changed.turn = 7;
   EXPECT_EQ(store->Load().value(),
             (std::vector<StoredJob>{JobNumber(1, bytes), changed, JobNumber(3)}));
+}
+
+TEST(StateStoreTest, ChangesThatWaitReachTheDiskTogetherAndInOrder) {
+  const TemporaryFolder folder;
+  {
+    const auto store = StateStore::Open(folder.At("db"), "first").value();
+    const auto removed_later = store->BeginSave(JobNumber(1));
+    const auto saved = store->BeginSave(JobNumber(2));
+    const auto changed = store->BeginSave(JobNumber(2, "changed"));
+    const auto removed = store->BeginRemove(1);
+    const auto last = store->BeginSave(JobNumber(3));
+    EXPECT_TRUE(last().ok());
+    // All are there before the others have waited.
+    EXPECT_EQ(store->Load().value(),
+              (std::vector<StoredJob>{JobNumber(2, "changed"), JobNumber(3)}));
+    for (const auto& written : {removed_later, saved, changed, removed})
+      EXPECT_TRUE(written().ok());
+  }
+  EXPECT_EQ(StateStore::Open(folder.At("db"), "first").value()->Load().value().size(), 2U);
+}
+
+TEST(StateStoreTest, AChangeThatFailsDoesNotTakeOthersWithIt) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(StateStore::Open(folder.At("db"), "first").value()->Save(JobNumber(1)).ok());
+  RunSql(folder.At("db"),
+         "CREATE TRIGGER refuse BEFORE INSERT ON jobs WHEN NEW.serial = 3 "
+         "BEGIN SELECT RAISE(ABORT, 'refused'); END");
+  const auto store = StateStore::Open(folder.At("db"), "first").value();
+  const auto good = store->BeginSave(JobNumber(2));
+  const auto refused = store->BeginSave(JobNumber(3));
+  const auto removed = store->BeginRemove(1);
+  EXPECT_TRUE(good().ok());
+  EXPECT_FALSE(refused().ok());
+  EXPECT_TRUE(removed().ok());
+  EXPECT_EQ(store->Load().value(), (std::vector<StoredJob>{JobNumber(2)}));
+}
+
+TEST(StateStoreTest, ManyThreadsLoseNothing) {
+  constexpr std::uint64_t kThreads = 8;
+  constexpr std::uint64_t kJobs = 20;
+  const TemporaryFolder folder;
+  {
+    const auto store = StateStore::Open(folder.At("db"), "first").value();
+    std::vector<std::thread> threads;
+    for (std::uint64_t thread = 0; thread < kThreads; ++thread) {
+      threads.emplace_back([&, thread] {
+        for (std::uint64_t i = 1; i <= kJobs; ++i)
+          EXPECT_TRUE(store->Save(JobNumber(thread * kJobs + i)).ok());
+      });
+    }
+    for (std::thread& thread : threads)
+      thread.join();
+  }
+  const auto jobs = StateStore::Open(folder.At("db"), "first").value()->Load().value();
+  ASSERT_EQ(jobs.size(), kThreads * kJobs);
+  EXPECT_EQ(jobs.back(), JobNumber(kThreads * kJobs));
 }
 
 TEST(StateStoreTest, NeverGivesTheNumberOfARemovedJobAgain) {

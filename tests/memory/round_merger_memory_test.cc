@@ -1,0 +1,107 @@
+// When memory runs out while a slice is merged, the round is as it was, and the slice can come
+// again.
+//
+// This program's operator new fails at a chosen allocation of the thread. Every allocation of a
+// merge is made to fail, one after the other.
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <new>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "server/round_merger.h"
+
+namespace {
+
+constexpr int kNever = std::numeric_limits<int>::max();
+// So many allocations of this thread succeed, and the next one does not.
+thread_local int allocations_left = kNever;
+
+void* Allocate(std::size_t size) {
+  if (allocations_left != kNever && allocations_left-- == 0) {
+    allocations_left = kNever;
+    throw std::bad_alloc();
+  }
+  if (void* const bytes = std::malloc(size == 0 ? 1 : size)) return bytes;
+  throw std::bad_alloc();
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  return Allocate(size);
+}
+void* operator new[](std::size_t size) {
+  return Allocate(size);
+}
+void operator delete(void* bytes) noexcept {
+  std::free(bytes);
+}
+void operator delete[](void* bytes) noexcept {
+  std::free(bytes);
+}
+void operator delete(void* bytes, std::size_t /*size*/) noexcept {
+  std::free(bytes);
+}
+void operator delete[](void* bytes, std::size_t /*size*/) noexcept {
+  std::free(bytes);
+}
+
+namespace lucerna {
+namespace {
+
+constexpr std::size_t kPixels = 5;
+const PassKey kRound = {"job", 16};  // of 4 passes
+
+SliceSums Slice(std::uint64_t pass) {
+  SliceSums sum = EmptySlice({pass, pass + 1}, kPixels, 1);
+  for (std::vector<float>& column : sum.columns)
+    column.assign(kPixels, static_cast<float>(pass % 7));
+  sum.tally.photons = 100;
+  sum.dropped_photons = {{pass, 1}};
+  return sum;
+}
+
+std::unique_ptr<RoundMerger> RoundWith(const std::vector<std::uint64_t>& passes) {
+  auto merger = std::make_unique<RoundMerger>();
+  merger->Open(kRound,
+               {.passes = RoundOf(16), .pixels = kPixels, .evidence = 1, .photons_per_pass = 100});
+  for (const std::uint64_t pass : passes)
+    EXPECT_TRUE(merger->Merge(kRound, Slice(pass)).ok());
+  return merger;
+}
+
+TEST(RoundMergerMemoryTest, AMergeThatRunsOutOfMemoryChangesNothingAndCanBeMadeAgain) {
+  const std::shared_ptr<const SliceSums> whole = RoundWith({16, 18, 19, 17})->Take(kRound);
+  int failures = 0;
+  for (bool has_failed = true; has_failed; ++failures) {
+    SCOPED_TRACE(failures);
+    const auto merger = RoundWith({16, 18, 19});
+    const std::size_t before = merger->Prefix(kRound).size();
+    SliceSums last = Slice(17);
+    has_failed = false;
+    allocations_left = failures;
+    try {
+      EXPECT_TRUE(merger->Merge(kRound, std::move(last)).ok());
+    } catch (const std::bad_alloc&) {
+      has_failed = true;
+    }
+    allocations_left = kNever;
+    if (has_failed) {
+      EXPECT_FALSE(merger->Has(kRound, {17, 18}));
+      EXPECT_EQ(merger->PrefixEnd(kRound), 17U);
+      EXPECT_EQ(merger->Prefix(kRound).size(), before);
+      const auto again = merger->Merge(kRound, Slice(17));
+      ASSERT_TRUE(again.ok());
+      EXPECT_EQ(*again, MergeOutcome::kAccepted);
+    }
+    ASSERT_EQ(merger->PrefixEnd(kRound), 20U);
+    EXPECT_EQ(*merger->Take(kRound), *whole);
+  }
+  EXPECT_GT(failures, 5) << "a merge of three slices allocates";
+}
+
+}  // namespace
+}  // namespace lucerna
