@@ -54,7 +54,7 @@ std::uint64_t PassesFor(const PhotonSteps& steps, std::uint64_t photons) {
 }
 
 void PassVariance::Add(const SliceSums& pass) {
-  LUCERNA_CHECK(pass.passes == PassRange(sums_.passes, sums_.passes + 1) &&
+  LUCERNA_CHECK(pass.passes == (PassRange{sums_.passes, sums_.passes + 1}) &&
                 pass.pixels() == sums_.pixels.size());
   const auto passes = static_cast<double>(sums_.passes);
   const auto add = [](float& sum, double value) { sum = Held(static_cast<double>(sum) + value); };

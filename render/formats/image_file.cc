@@ -121,11 +121,12 @@ Status CheckHuffmanTables(std::string_view bytes) {
     if (rest.size() < 2) break;
     int left = ByteAt(rest, 0) * 256 + ByteAt(rest, 1) - 2;
     rest.remove_prefix(2);
-    while (left > 0 && rest.size() > kCounts) {
+    while (left > 0 && !rest.empty()) {
       const std::uint8_t table = ByteAt(rest, 0);
       if (table > 0x1F || (table & 0x0FU) > 3) break;  // which the decoder refuses
+      // The decoder reads zeros beyond the end.
       std::size_t codes = 0;
-      for (std::size_t i = 1; i <= kCounts; ++i)
+      for (std::size_t i = 1; i <= std::min(kCounts, rest.size() - 1); ++i)
         codes += ByteAt(rest, i);
       if (codes > 256) return Bad("one of its JPEG Huffman tables is too long");
       left -= static_cast<int>(1 + kCounts + codes);

@@ -1,41 +1,19 @@
 // Whatever the bytes of a scene, a mesh or an image are, reading them ends, in bounded memory, with
 // a sound value or with errors that name a place. The bad files of corpus/ stay refused.
-#include <filesystem>
 #include <string>
 #include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "render/base/files.h"
 #include "render/formats/image_file.h"
 #include "render/formats/ply_file.h"
-#include "render/formats/read_scene.h"
 #include "tests/fuzz/mutation.h"
+#include "tests/fuzz/scene_from_bytes.h"
 #include "tests/fuzz/sound_scene.h"
-#include "tests/support/memory_files.h"
 
 namespace lucerna {
 namespace {
-
-struct NamedBytes {
-  std::string name, bytes;
-};
-
-std::vector<NamedBytes> FilesOf(const std::string& folder) {
-  std::vector<NamedBytes> files;
-  for (const auto& entry :
-       std::filesystem::directory_iterator(std::string(LUCERNA_SOURCE_DIR) + "/tests/" + folder)) {
-    files.push_back({entry.path().filename().string(), ReadFile(entry.path().string()).value()});
-  }
-  std::sort(files.begin(), files.end(),
-            [](const NamedBytes& a, const NamedBytes& b) { return a.name < b.name; });
-  return files;
-}
-
-std::string BytesOf(const std::string& file) {
-  return ReadFile(std::string(LUCERNA_SOURCE_DIR) + "/tests/" + file).value();
-}
 
 StatusOr<Picture> ReadNamed(const std::string& bytes, const std::string& name) {
   return ReadPicture(bytes, name, {}, std::uint64_t{1} << 24);
@@ -44,20 +22,6 @@ StatusOr<Picture> ReadNamed(const std::string& bytes, const std::string& name) {
 // Every directive and most parameters in one small scene.
 std::string WholeScene() {
   return FilesOf("fuzz/seeds/pbrt").at(0).bytes;
-}
-
-ParsedScene ParseBytes(const std::string& bytes) {
-  MemoryFiles files({{"fuzz.pbrt", bytes},
-                     {"part.pbrt", "Shape \"sphere\"\n"},
-                     {"mesh.ply", FilesOf("fuzz/seeds/ply").at(0).bytes},
-                     {"sky.pfm", BytesOf("fuzz/seeds/image/square.pfm")},
-                     {"tiles.png", BytesOf("fuzz/seeds/image/rgb.png")}});
-  SceneLimits limits;
-  limits.max_files = 50;
-  limits.max_picture_bytes = 1 << 20;
-  limits.max_total_bytes = 1 << 20;
-  limits.max_triangles = 10'000;
-  return ReadScene(files, "fuzz.pbrt", limits);
 }
 
 void ExpectSoundOrRefused(const ParsedScene& parsed) {
@@ -70,7 +34,7 @@ void ExpectSoundOrRefused(const ParsedScene& parsed) {
 }
 
 TEST(SceneBytesTest, TheSeedsAreGood) {
-  const ParsedScene parsed = ParseBytes(WholeScene());
+  const ParsedScene parsed = SceneFromBytes(WholeScene());
   EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
   EXPECT_EQ(WhatIsUnsound(parsed.scene), "");
   for (const NamedBytes& seed : FilesOf("fuzz/seeds/ply")) {
@@ -86,7 +50,7 @@ TEST(SceneBytesTest, TheCorpusOfBadScenesIsRefused) {
   const std::vector<NamedBytes> corpus = FilesOf("fuzz/corpus/pbrt");
   EXPECT_GE(corpus.size(), 10U);
   for (const NamedBytes& bad : corpus) {
-    const ParsedScene parsed = ParseBytes(bad.bytes);
+    const ParsedScene parsed = SceneFromBytes(bad.bytes);
     EXPECT_FALSE(parsed.ok()) << bad.name;
     EXPECT_LE(parsed.diagnostics.size(), 300U) << bad.name;
   }
@@ -138,7 +102,7 @@ TEST(SceneBytesTest, ASceneCutOffAnywhereIsSoundOrRefused) {
   const std::string whole = WholeScene();
   for (std::size_t size = 0; size < whole.size(); ++size) {
     SCOPED_TRACE(size);
-    ExpectSoundOrRefused(ParseBytes(whole.substr(0, size)));
+    ExpectSoundOrRefused(SceneFromBytes(whole.substr(0, size)));
   }
 }
 
@@ -157,7 +121,7 @@ TEST(SceneBytesTest, MutatedScenesAreSoundOrRefused) {
   int accepted = 0;
   for (std::uint64_t key = 0; key < 20'000; ++key) {
     SCOPED_TRACE(key);
-    const ParsedScene parsed = ParseBytes(Mutated(whole, key));
+    const ParsedScene parsed = SceneFromBytes(Mutated(whole, key));
     ExpectSoundOrRefused(parsed);
     accepted += parsed.ok() ? 1 : 0;
   }
@@ -189,16 +153,16 @@ TEST(SceneBytesTest, HostileNestingAndListsEnd) {
       all += text;
     return all;
   };
-  EXPECT_FALSE(ParseBytes(repeated("AttributeBegin\n", 50'000)).ok());
-  EXPECT_FALSE(ParseBytes(repeated("Attribute \"shape\" \"float a\" 1\n", 10'000)).ok());
-  EXPECT_FALSE(ParseBytes(repeated("Scale 1e-30 1e-30 1e-30\n", 100)).ok());
-  EXPECT_FALSE(ParseBytes(repeated("Include \"fuzz.pbrt\"\n", 100)).ok());
-  EXPECT_FALSE(ParseBytes(repeated("unknown [ \"words\" ]\n", 40'000)).ok());
+  EXPECT_FALSE(SceneFromBytes(repeated("AttributeBegin\n", 50'000)).ok());
+  EXPECT_FALSE(SceneFromBytes(repeated("Attribute \"shape\" \"float a\" 1\n", 10'000)).ok());
+  EXPECT_FALSE(SceneFromBytes(repeated("Scale 1e-30 1e-30 1e-30\n", 100)).ok());
+  EXPECT_FALSE(SceneFromBytes(repeated("Include \"fuzz.pbrt\"\n", 100)).ok());
+  EXPECT_FALSE(SceneFromBytes(repeated("unknown [ \"words\" ]\n", 40'000)).ok());
   // Warned of, and at most a hundred times.
   std::string parameters = "Shape \"sphere\"";
   for (int i = 0; i < 40'000; ++i)
     parameters += " \"float p" + std::to_string(i) + "\" 1";
-  const ParsedScene parsed = ParseBytes(repeated(parameters, 1));
+  const ParsedScene parsed = SceneFromBytes(repeated(parameters, 1));
   EXPECT_TRUE(parsed.ok());
   EXPECT_LE(parsed.diagnostics.size(), 102U);
 }

@@ -1,0 +1,25 @@
+#include "tests/fuzz/fuzz_targets.h"
+
+#include <array>
+
+namespace lucerna {
+
+std::span<const FuzzTarget> AllFuzzTargets() {
+  static constexpr std::array kTargets = {
+      FuzzTarget{"pbrt", FuzzPbrt, PbrtSeeds},
+      FuzzTarget{"ply", FuzzPly, PlySeeds},
+      FuzzTarget{"image", FuzzImage, ImageSeeds},
+      FuzzTarget{"accumulation", FuzzAccumulation, AccumulationSeeds},
+      FuzzTarget{"block", FuzzBlock, BlockSeeds},
+      FuzzTarget{"radii", FuzzRadii, RadiiSeeds},
+      FuzzTarget{"slice", FuzzSlice, SliceSeeds},
+      FuzzTarget{"checkpoint", FuzzCheckpoint, CheckpointSeeds},
+      FuzzTarget{"sums", FuzzSums, SumsSeeds},
+      FuzzTarget{"record", FuzzRecord, RecordSeeds},
+      FuzzTarget{"manifest", FuzzManifest, ManifestSeeds},
+      FuzzTarget{"messages", FuzzMessages, MessagesSeeds},
+  };
+  return kTargets;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,67 @@
+// Any bytes as the files of a scene: no crash, no hang, no memory without bound, and what is
+// accepted is sound.
+#include <array>
+#include <cstdint>
+#include <utility>
+
+#include "render/formats/image_file.h"
+#include "render/formats/ply_file.h"
+#include "tests/fuzz/fuzz_targets.h"
+#include "tests/fuzz/scene_from_bytes.h"
+#include "tests/fuzz/sound_scene.h"
+
+namespace lucerna {
+namespace {
+
+std::vector<std::string> SeedsOf(const std::string& folder) {
+  std::vector<std::string> seeds;
+  for (NamedBytes& seed : FilesOf(folder))
+    seeds.push_back(std::move(seed.bytes));
+  return seeds;
+}
+
+}  // namespace
+
+bool FuzzPbrt(std::string_view bytes) {
+  const ParsedScene parsed = SceneFromBytes(bytes);
+  LUCERNA_CHECK(!parsed.ok() || WhatIsUnsound(parsed.scene).empty());
+  LUCERNA_CHECK(parsed.ok() || !parsed.ToStatus().ok());
+  return parsed.ok();
+}
+
+std::vector<std::string> PbrtSeeds() {
+  return SeedsOf("fuzz/seeds/pbrt");
+}
+
+bool FuzzPly(std::string_view bytes) {
+  const auto mesh = ParsePly(bytes);
+  if (!mesh.ok()) return false;
+  for (const std::uint32_t index : mesh->indices)
+    LUCERNA_CHECK(index < mesh->positions.size());
+  for (const Vec3 position : mesh->positions)
+    LUCERNA_CHECK(IsFinite(position));
+  return true;
+}
+
+std::vector<std::string> PlySeeds() {
+  return SeedsOf("fuzz/seeds/ply");
+}
+
+// As a file of each format.
+bool FuzzImage(std::string_view bytes) {
+  constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20;
+  bool is_accepted = false;
+  for (const char* name : {"a.png", "a.jpg", "a.tga", "a.hdr", "a.pfm", "a.exr"}) {
+    const auto picture = ReadPicture(bytes, name, {}, kMostBytes);
+    if (!picture.ok()) continue;
+    LUCERNA_CHECK(PictureIsSound(*picture) && SizeBytes(*picture) <= kMostBytes);
+    is_accepted = true;
+  }
+  return is_accepted;
+}
+
+std::vector<std::string> ImageSeeds() {
+  return SeedsOf("fuzz/seeds/image");
+}
+
+}  // namespace lucerna
