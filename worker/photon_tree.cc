@@ -55,25 +55,34 @@ PhotonTree::PhotonTree(const std::vector<Deposits>& deposits, ThreadTeam& team) 
     return std::tie(a.code, a.chunk, a.row) < std::tie(b.code, b.chunk, b.row);
   });
   photons_.resize(count);
+  positions_.resize(count);
   groups_ = std::bit_ceil((count + kGroup - 1) / kGroup);
-  nodes_.resize(2 * groups_);
+  std::vector<Bounds> boxes(2 * groups_);
   team.For(groups_, 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t group = begin; group < end; ++group) {
       for (std::size_t i = group * kGroup; i < std::min((group + 1) * kGroup, count); ++i) {
         const Deposits& chunk = deposits[order[i].chunk];
         const Deposit& row = chunk.rows[order[i].row];
-        photons_[i] = {row.position, row.key, row.flux, row.source,
-                       DecodeOctahedral(chunk.arrivals_oct[order[i].row])};
-        nodes_[groups_ + group].Add(row.position);
+        photons_[i] = {row.flux, row.key, DecodeOctahedral(chunk.arrivals_oct[order[i].row]),
+                       row.source};
+        positions_[i] = row.position;
+        boxes[groups_ + group].Add(row.position);
       }
     }
   });
   for (std::size_t node = groups_ - 1; node > 0; --node) {
-    for (const Bounds& child : {nodes_[2 * node], nodes_[2 * node + 1]}) {
+    for (const Bounds& child : {boxes[2 * node], boxes[2 * node + 1]}) {
       if (child.empty()) continue;
-      nodes_[node].Add(child.low);
-      nodes_[node].Add(child.high);
+      boxes[node].Add(child.low);
+      boxes[node].Add(child.high);
     }
+  }
+  nodes_.resize(2 * groups_);
+  for (std::size_t node = 1; node < nodes_.size(); ++node) {
+    if (boxes[node].empty()) continue;
+    // A little more, for rounding.
+    nodes_[node] = {boxes[node].Center(), 0.5F * boxes[node].Diagonal() * (1 + 0x1p-18F) +
+                                              0x1p-20F * MaxAbs(boxes[node].Center())};
   }
 }
 

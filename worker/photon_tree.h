@@ -1,8 +1,8 @@
 // Which photons are near a straight line?
 //
-// Photons in the order of a space-filling curve (Morton 1966), in groups of a few, with a box
-// around each group and around each pair of boxes: a segment finds the photons around it by
-// descending where a box comes near.
+// Photons in the order of a space-filling curve (Morton 1966), in groups of a few, with a ball
+// around each group and around each pair of balls: a segment finds the photons around it by
+// descending where a ball comes near.
 #pragma once
 
 #include <algorithm>
@@ -21,11 +21,10 @@ namespace lucerna {
 
 // A photon that a medium scattered.
 struct ScatteredPhoton {
-  Vec3 position;
-  std::uint32_t key = 0;
   Rgb flux;  // [W] scattered, of all photons of a pass together
-  std::uint32_t source = 0;
+  std::uint32_t key = 0;
   Vec3 arrival;  // direction back to where it came from, unit
+  std::uint32_t source = 0;
 };
 
 class PhotonTree {
@@ -52,10 +51,16 @@ class PhotonTree {
  private:
   static constexpr std::size_t kGroup = 8;  // photons
 
+  struct Ball {
+    Vec3 center;
+    float radius = -1;  // below 0: empty
+  };
+
   std::vector<ScatteredPhoton> photons_;
+  std::vector<Vec3> positions_;  // [photons] theirs, without what those that are near need
   // A heap: node 1 is the root, the children of n are 2n and 2n + 1, and node groups_ + g is group
   // g.
-  std::vector<Bounds> nodes_;
+  std::vector<Ball> nodes_;
   std::size_t groups_ = 0;  // a power of two, 0 without photons
 };
 
@@ -63,17 +68,15 @@ template <typename Visit>
 void PhotonTree::ForEachWithin(const Cone& cone, const Visit& visit) const {
   if (groups_ == 0) return;
   const float growth = (cone.last_radius - cone.first_radius) / cone.length;
-  const auto is_near = [&](const Bounds& box) {
-    if (box.empty()) return false;
-    // The ball around the box.
-    const Vec3 to_centre = box.Center() - cone.origin;
-    const float ball = 0.5F * box.Diagonal() * (1 + 0x1p-20F);
+  const auto is_near = [&](const Ball& ball) {
+    const Vec3 to_centre = ball.center - cone.origin;
     const float along = Dot(to_centre, cone.direction);
-    if (along < -ball || along > cone.length + ball) return false;
-    const float reach =
-        ball + cone.first_radius + growth * std::clamp(along + ball, 0.0F, cone.length);
-    const Vec3 aside = to_centre - cone.direction * along;
-    return LengthSquared(aside) <= reach * reach;
+    if (!(ball.radius >= 0 && along >= -ball.radius && along <= cone.length + ball.radius)) {
+      return false;
+    }
+    const float reach = ball.radius + cone.first_radius +
+                        growth * std::clamp(along + ball.radius, 0.0F, cone.length);
+    return LengthSquared(to_centre - cone.direction * along) <= reach * reach;
   };
   // Two entries a level at most.
   std::array<std::uint32_t, 128> stack;
@@ -90,7 +93,7 @@ void PhotonTree::ForEachWithin(const Cone& cone, const Visit& visit) const {
     const std::size_t first = (node - groups_) * kGroup;
     const std::size_t last = std::min(first + kGroup, photons_.size());
     for (std::size_t i = first; i < last; ++i) {
-      const Vec3 to_photon = photons_[i].position - cone.origin;
+      const Vec3 to_photon = positions_[i] - cone.origin;
       const float t = Dot(to_photon, cone.direction);
       if (!(t >= 0 && t <= cone.length)) continue;
       const float radius = cone.first_radius + growth * t;
