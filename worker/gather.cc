@@ -256,10 +256,12 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
       SetTexturedParameter(
           *textured, block.textured_k[static_cast<std::size_t>(glossy - block.glossy.data())]);
     }
-    // Where a surface has two parts, caustic photons are gathered on the first.
-    if (source.caustic_weight != nullptr && PropertiesOf(untextured).has_parts) {
+    // Where a surface has two parts, caustic photons are gathered on the one at which eye paths go
+    // on without being smooth: a rough coat, or what lies under a smooth one.
+    const MaterialProperties properties = PropertiesOf(untextured);
+    if (source.caustic_weight != nullptr && properties.has_parts) {
       if (!textured) textured = untextured;
-      textured->parts = Parts::kFirst;
+      textured->parts = properties.has_rough_coat ? Parts::kFirst : Parts::kSecond;
     }
     const Material& material = textured ? *textured : untextured;
     const Frame frame(DecodeOctahedral(glossy->shading_normal_oct));

@@ -145,9 +145,11 @@ float SpectrumTracer::Received(const Carried& carried, const SurfacePoint& surfa
                                const Material& material, Vec3 wo) const {
   const double cosine = static_cast<double>(std::abs(Dot(wo, surface.shading_normal)));
   Spectrum seen = carried.spectrum;
-  if (const MaterialProperties properties = PropertiesOf(material);
-      // Of two parts, photons are gathered on one that is diffuse.
-      sees_glossily_ && properties.has_narrow_lobes() && !properties.has_parts) {
+  // Of two parts, photons are gathered on the second.
+  MaterialNumbers gathers = material;
+  if (PropertiesOf(material).has_parts) gathers.parts = Parts::kSecond;
+  if (const MaterialProperties properties = PropertiesOf(gathers);
+      sees_glossily_ && properties.has_narrow_lobes()) {
     const double lobe = ReflectedLobe(static_cast<double>(properties.lobe_width));
     if (lobe < kDiffuseLobe) {
       seen = SeeGlossily(seen, cosine, BendAt(surface, wo), ObliqueLobe(lobe, cosine), limits_);

@@ -270,7 +270,10 @@ class NeedsFinder {
             : Concat("paths go on at ", Quoted(*specular_)));
     glossy_ = First([](const Material& m) {
       const MaterialProperties properties = PropertiesOf(m);
-      return properties.gathers && !properties.has_parts && !properties.is_separable;
+      if (!properties.has_parts) return properties.gathers && !properties.is_separable;
+      MaterialNumbers second = m;
+      second.parts = Parts::kSecond;
+      return properties.gathers && !PropertiesOf(second).is_separable;
     });
     Set(Part::kGlossy, glossy_ != nullptr,
         glossy_ != nullptr

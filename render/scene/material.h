@@ -21,14 +21,15 @@
 
 // The kinds of material, in the order of Material::Kind.
 // ROW(Name, name): Material::Kind::kName, and its name in messages and in pbrt files.
-#define LUCERNA_MATERIALS(ROW)          \
-  ROW(Diffuse, "diffuse")               \
-  ROW(Conductor, "conductor")           \
-  ROW(Dielectric, "dielectric")         \
-  ROW(Interface, "interface")           \
-  ROW(CoatedDiffuse, "coateddiffuse")   \
-  ROW(ThinDielectric, "thindielectric") \
-  ROW(DiffuseTransmission, "diffusetransmission")
+#define LUCERNA_MATERIALS(ROW)                    \
+  ROW(Diffuse, "diffuse")                         \
+  ROW(Conductor, "conductor")                     \
+  ROW(Dielectric, "dielectric")                   \
+  ROW(Interface, "interface")                     \
+  ROW(CoatedDiffuse, "coateddiffuse")             \
+  ROW(ThinDielectric, "thindielectric")           \
+  ROW(DiffuseTransmission, "diffusetransmission") \
+  ROW(CoatedConductor, "coatedconductor")
 
 namespace lucerna {
 
@@ -52,13 +53,15 @@ struct MaterialNumbers {
   Parts parts = Parts::kAll;             // of a material that has two
   Rgb reflectance = {0.5F, 0.5F, 0.5F};  // diffuse, coated diffuse, diffuse transmission
   Rgb transmittance;                     // diffuse transmission
-  Rgb eta = {1, 1, 1};                   // conductor: index of refraction per channel
-  Rgb k = {0, 0, 0};                     // conductor: absorption per channel
+  Rgb eta = {1, 1, 1};                   // conductor, under a coat too: index of refraction
+  Rgb k = {0, 0, 0};                     // the same: absorption
   float ior = 1.5F;                      // dielectric, coat: inside over outside
   float alpha_u = 0;                     // of metals, dielectrics and coats: GGX widths; 0 and 0:
   float alpha_v = 0;                     // smooth
-  float thickness = 0;                   // of a coat [mean free paths], at right angles
-  std::int32_t base_hits = 5;            // how often light in a coat meets the base, at most
+  float base_alpha_u = 0;                // of the metal under a coat: GGX widths; 0 and 0: smooth
+  float base_alpha_v = 0;
+  float thickness = 0;         // of a coat [mean free paths], at right angles
+  std::int32_t base_hits = 5;  // how often light in a coat meets the base, at most
   // Of a coated material, once it is prepared (transport/coat.h); owned by Material.
   const CoatTable* coat = nullptr;
   // In place of `reflectance`, and of a conductor's eta and k.
@@ -143,6 +146,15 @@ inline constexpr float kGatherAlphaDielectric = 0.5F;
 [[nodiscard]] inline float AbsorptionFor(float reflectance) {
   const float capped = std::min(reflectance, 0.9999F);
   return 2 * std::sqrt(capped) / std::sqrt(1 - capped);
+}
+
+// Of a metal under a coat, as light meets it that crosses the coat's surface twice: GGX widths of
+// the half vectors of directions that are refracted at the mean surface. A facet that is turned by
+// the angle t turns what crosses it by t·(1 - 1/ior), inside, to first order, and a half vector by
+// half of that; the squares of the widths add up.
+[[nodiscard]] inline float BaseWidthSeen(float base_alpha, float coat_alpha, float ior) {
+  const float turned = (1 - 1 / ior) * coat_alpha;
+  return std::sqrt(base_alpha * base_alpha + 0.5F * turned * turned);
 }
 
 // What differs between kinds, each in a file of its own, material_NAME.cc:

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "render/base/status.h"
+#include "render/math/rng.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/microfacet.h"
 
@@ -20,6 +21,9 @@ constexpr int kAngles = 32;
 constexpr int kSmoothAngles = 4096;
 // Azimuths of an anisotropic coat, over a quarter of a turn, both ends among them.
 constexpr int kAzimuths = 9;
+// Random walks for each cosine outside, of tables over metals.
+constexpr int kWalks = 4096;
+constexpr int kScalings = 8;
 
 float Crossing(float thickness, float cosine) {
   return thickness > 0 ? std::exp(-thickness / std::max(cosine, 1e-6F)) : 1.0F;
@@ -86,7 +90,7 @@ float MeanOverBase(int angles, const Function& of) {
   return static_cast<float>(sum / angles);
 }
 
-std::shared_ptr<const CoatTable> MakeTable(const MaterialNumbers& material) {
+std::shared_ptr<CoatTable> MakeTable(const MaterialNumbers& material) {
   const auto table = std::make_shared<CoatTable>();
   const float ior = material.ior;
   const float thickness = material.thickness;
@@ -131,14 +135,197 @@ std::shared_ptr<const CoatTable> MakeTable(const MaterialNumbers& material) {
   return table;
 }
 
+// One crossing of the coat's surface, at a facet drawn for `w`, w.z > 0 on the side that light
+// comes from; `index`: beyond over here. The shares of flux that go on, and their directions, each
+// on its side with z > 0; a share of 0 has no direction.
+struct Crossed {
+  float reflected = 0, transmitted = 0;
+  Vec3 back, beyond;
+};
+Crossed CrossSurface(const MaterialNumbers& material, Vec3 w, float index, KeyedRng& rng) {
+  Crossed crossed;
+  float cos_t = 0;
+  if (HasNoFacets(material)) {
+    crossed.reflected = FresnelDielectric(w.z, index, cos_t);
+    crossed.transmitted = 1 - crossed.reflected;
+    crossed.back = {-w.x, -w.y, w.z};
+    crossed.beyond = {-w.x / index, -w.y / index, cos_t};
+    return crossed;
+  }
+  const Ggx ggx(material);
+  const float u1 = rng.Uniform();
+  const float u2 = rng.Uniform();
+  const Vec3 m = ggx.SampleVisible(w, u1, u2);
+  const float cos_m = Dot(w, m);
+  if (!(cos_m > 0)) return crossed;
+  const float fresnel = FresnelDielectric(cos_m, index, cos_t);
+  const float visible = ggx.G1(w);
+  crossed.back = ReflectAt(w, m);
+  if (crossed.back.z > 0) crossed.reflected = fresnel * ggx.G2(w, crossed.back) / visible;
+  const Vec3 through = w * (-1 / index) + m * (cos_m / index - cos_t);
+  crossed.beyond = {through.x, through.y, -through.z};
+  if (fresnel < 1 && crossed.beyond.z > 0) {
+    crossed.transmitted = (1 - fresnel) * ggx.G2(w, crossed.beyond) / visible;
+  }
+  return crossed;
+}
+
+// Adds to `by_hits` the shares of flux from `w` that leave coat and metal after 1, 2, ... meetings
+// with a metal that reflects all.
+void WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng,
+                   std::array<double, CoatTable::kHits>& by_hits) {
+  constexpr float kLeastWeight = 1e-4F;
+  const bool is_base_smooth = material.base_alpha_u == 0 && material.base_alpha_v == 0;
+  const Ggx metal(material.base_alpha_u, material.base_alpha_v);
+  Crossed crossed = CrossSurface(material, w, material.ior, rng);
+  float weight = crossed.transmitted;
+  Vec3 down = crossed.beyond;  // as seen from above: where light comes from is (-x, -y, z)
+  for (int hit = 0; hit < material.base_hits && weight > kLeastWeight; ++hit) {
+    const Vec3 from = {-down.x, -down.y, down.z};
+    weight *= Crossing(material.thickness, from.z);
+    Vec3 up = {-from.x, -from.y, from.z};
+    if (!is_base_smooth) {
+      const float u1 = rng.Uniform();
+      const float u2 = rng.Uniform();
+      up = ReflectAt(from, metal.SampleVisible(from, u1, u2));
+      if (!(up.z > 0)) return;
+      weight *= metal.G2(from, up) / metal.G1(from);
+    }
+    weight *= Crossing(material.thickness, up.z);
+    // Seen from below, where light comes from is (-x, -y, z) of where it goes.
+    crossed = CrossSurface(material, {-up.x, -up.y, up.z}, 1 / material.ior, rng);
+    by_hits[static_cast<std::size_t>(std::min(hit, CoatTable::kHits - 1))] +=
+        static_cast<double>(weight * crossed.transmitted);
+    weight *= crossed.reflected;
+    down = crossed.back;
+  }
+}
+
+// What the first term of transport/coat.h brings of the flux from `w`, of a metal that reflects
+// all.
+float MetOnce(const Material& material, Vec3 w) {
+  Vec3 inside;
+  if (!CoatRefracted(material, w, inside)) return 0;
+  const Ggx facets(BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior),
+                   BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior));
+  const float visible = facets.G1(inside);
+  return CoatEntering(material, w) * MeanOverFacets(facets, inside, [&](Vec3 m) {
+           const Vec3 up = ReflectAt(inside, m);
+           const float x = up.x * material.ior;
+           const float y = up.y * material.ior;
+           const float squared = 1 - x * x - y * y;
+           if (!(up.z > 0) || !(squared > 0)) return 0.0F;
+           return CoatEntering(material, {x, y, std::sqrt(squared)}) * facets.G2(inside, up) /
+                  visible;
+         });
+}
+
+float CosineOf(int node) {
+  return Square(static_cast<float>(node) / (CoatTable::kCosines - 1));
+}
+
+// MetOnce over azimuths.
+double MeanMetOnce(const Material& material, float cosine) {
+  const int turns =
+      material.alpha_u == material.alpha_v && material.base_alpha_u == material.base_alpha_v ? 1
+                                                                                             : 8;
+  double sum = 0;
+  for (int turn = 0; turn < turns; ++turn) {
+    const float azimuth = 2 * kPi * (static_cast<float>(turn) + 0.5F) / static_cast<float>(turns);
+    sum += static_cast<double>(MetOnce(material, DirectionAt(cosine, azimuth)));
+  }
+  return sum / turns;
+}
+
+// Requires a material with a table for its coat alone, to which the rest is added.
+void AddResidual(const Material& material, CoatTable& table) {
+  KeyedRng rng(0x434f4154ULL);
+  table.residual.assign(CoatTable::kCosines, 0.0F);
+  std::vector<std::array<double, CoatTable::kHits>> walked(CoatTable::kCosines);
+  for (int i = 1; i < CoatTable::kCosines; ++i) {
+    auto& here = walked[static_cast<std::size_t>(i)];
+    for (int walk = 0; walk < kWalks; ++walk) {
+      const float azimuth = 2 * kPi * (static_cast<float>(walk) + 0.5F) / kWalks;
+      WalkOverMetal(material, DirectionAt(CosineOf(i), azimuth), rng, here);
+    }
+    for (double& share : here)
+      share /= kWalks;
+  }
+  // Facets of the coat throw some of the light back that comes near the critical angle, which the
+  // share that enters does not contain: the factor is scaled until the flux after one meeting is
+  // that of the walk. Half of the error goes to each of its two occurrences.
+  for (int round = 0; round < kScalings && !table.entering.empty(); ++round) {
+    std::vector<float> scaled = table.entering;
+    for (int i = 1; i < CoatTable::kCosines; ++i) {
+      const double once = MeanMetOnce(material, CosineOf(i));
+      if (!(once > 0)) continue;
+      const auto scale =
+          static_cast<float>(std::sqrt(walked[static_cast<std::size_t>(i)][0] / once));
+      for (std::size_t at = static_cast<std::size_t>(i); at < scaled.size();
+           at += CoatTable::kCosines) {
+        scaled[at] *= scale;
+      }
+    }
+    table.entering = std::move(scaled);
+  }
+  std::array<double, CoatTable::kHits> by_hits = {};
+  double sum = 0;
+  for (int i = 1; i < CoatTable::kCosines; ++i) {
+    const float cosine = CosineOf(i);
+    std::array<double, CoatTable::kHits>& here = walked[static_cast<std::size_t>(i)];
+    // Only what it brings too little can be made up for.
+    here[0] = std::max(0.0, here[0] - MeanMetOnce(material, cosine));
+    double residual = 0;
+    // Of 2 cosine d cosine, where cosine is (i / last)².
+    const double weight = (i == CoatTable::kCosines - 1 ? 0.5 : 1.0) * 4 *
+                          static_cast<double>(cosine) * std::sqrt(static_cast<double>(cosine)) /
+                          (CoatTable::kCosines - 1);
+    for (std::size_t hit = 0; hit < here.size(); ++hit) {
+      residual += here[hit];
+      by_hits[hit] += weight * here[hit];
+    }
+    table.residual[static_cast<std::size_t>(i)] = static_cast<float>(residual);
+    sum += weight * residual;
+  }
+  table.mean_residual = static_cast<float>(sum);
+  for (std::size_t hit = 0; hit < by_hits.size(); ++hit)
+    table.by_hits[hit] = sum > 0 ? static_cast<float>(by_hits[hit] / sum) : 0.0F;
+}
+
+// The node of a table of cosines below `cosine`, and the share of the next one.
+struct Node {
+  std::size_t below;
+  float share;
+};
+Node NodeAt(float cosine) {
+  constexpr int kLast = CoatTable::kCosines - 1;
+  const float node = std::sqrt(std::clamp(cosine, 0.0F, 1.0F)) * kLast;
+  const int below = std::min(static_cast<int>(node), kLast - 1);
+  return {static_cast<std::size_t>(below), node - static_cast<float>(below)};
+}
+
 }  // namespace
 
 void PrepareCoats(std::vector<Material>& materials) {
-  std::map<std::tuple<float, float, float, float>, std::shared_ptr<const CoatTable>> tables;
+  using Key = std::tuple<Material::Kind, float, float, float, float, float, float, std::int32_t>;
+  std::map<Key, std::shared_ptr<const CoatTable>> tables;
   for (Material& material : materials) {
-    if (material.kind != Material::Kind::kCoatedDiffuse) continue;
-    auto& table = tables[{material.ior, material.thickness, material.alpha_u, material.alpha_v}];
-    if (table == nullptr) table = MakeTable(material);
+    const bool has_metal = material.kind == Material::Kind::kCoatedConductor;
+    if (material.kind != Material::Kind::kCoatedDiffuse && !has_metal) continue;
+    // Smooth on smooth there is a closed form for all.
+    if (has_metal && PropertiesOf(material).is_smooth) continue;
+    auto& table =
+        tables[{material.kind, material.ior, material.thickness, material.alpha_u, material.alpha_v,
+                has_metal ? material.base_alpha_u : 0, has_metal ? material.base_alpha_v : 0,
+                has_metal ? material.base_hits : 0}];
+    if (table == nullptr) {
+      const std::shared_ptr<CoatTable> made = MakeTable(material);
+      if (has_metal) {
+        material.coat = made.get();
+        AddResidual(material, *made);
+      }
+      table = made;
+    }
     material.owned_coat = table;
     material.coat = table.get();
   }
@@ -148,13 +335,9 @@ float CoatEntering(const Material& material, Vec3 w) {
   if (HasNoFacets(material)) return SmoothEntering(w.z, material.ior, material.thickness);
   LUCERNA_CHECK(material.coat != nullptr);
   const CoatTable& table = *material.coat;
-  constexpr int kLast = CoatTable::kCosines - 1;
-  const float node = std::sqrt(std::clamp(w.z, 0.0F, 1.0F)) * kLast;
-  const int below = std::min(static_cast<int>(node), kLast - 1);
-  const float share = node - static_cast<float>(below);
-  const auto at = [&](int row) {
-    const std::size_t i =
-        static_cast<std::size_t>(row) * CoatTable::kCosines + static_cast<std::size_t>(below);
+  const auto [below, share] = NodeAt(w.z);
+  const auto at = [&, below = below, share = share](int row) {
+    const std::size_t i = static_cast<std::size_t>(row) * CoatTable::kCosines + below;
     return table.entering[i] * (1 - share) + table.entering[i + 1] * share;
   };
   if (table.rows == 1) return at(0);
@@ -173,6 +356,26 @@ float CoatInner(const Material& material) {
 float CoatLeaving(const Material& material) {
   LUCERNA_CHECK(material.coat != nullptr);
   return material.coat->leaving;
+}
+
+float CoatResidual(const Material& material, float cosine) {
+  LUCERNA_CHECK(material.coat != nullptr);
+  const auto [below, share] = NodeAt(cosine);
+  const std::vector<float>& residual = material.coat->residual;
+  return residual[below] * (1 - share) + residual[below + 1] * share;
+}
+
+float CoatCrossing(const Material& material, float cosine) {
+  return Crossing(material.thickness, cosine);
+}
+
+bool CoatRefracted(const Material& material, Vec3 w, Vec3& inside) {
+  const float x = w.x / material.ior;
+  const float y = w.y / material.ior;
+  const float squared = 1 - x * x - y * y;
+  if (!(squared > 0)) return false;
+  inside = {x, y, std::sqrt(squared)};
+  return true;
 }
 
 }  // namespace lucerna

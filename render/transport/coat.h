@@ -11,9 +11,21 @@
 // the base's light that comes back to it, and ρ the base's reflectance. No approximation is in it
 // but the tables: E and K of rough coats are averages over facets, computed once for a material.
 //
+// A metal remembers directions. Of light that meets it once the same product is taken with the
+// metal's own BSDF f_m in place of ρ/π, of the directions wo', wi' refracted at the mean surface:
+//
+//     f(wo, wi) = E(wo) · E(wi) / ior² · f_m(wo', wi') + C · M(wo) · M(wi) / (π · M̄)
+//
+// Under a smooth coat the first term is exact, and under a rough one its facets widen f_m
+// (BaseWidthSeen). M is what it leaves out of the flux that a random walk through coat and metal
+// brings, for a metal that reflects all, M̄ its mean, and C a sum of powers of the metal's
+// reflectance: the flux is that of the walk, the directions are only about those of light that
+// meets the metal more than once.
+//
 // Sources: Walter et al. 2007 (as in transport/microfacet.h); Weidlich & Wilkie 2007, "Arbitrarily
 // Layered Micro-Facet Surfaces"; Saunderson 1942, "Calculation of the Color of Pigmented Plastics"
-// (the sum).
+// (the sum); Kulla & Conty 2017, "Revisiting Physically Based Shading at Imageworks" (the second
+// term for metals).
 #pragma once
 
 #include <memory>
@@ -34,5 +46,13 @@ void PrepareCoats(std::vector<Material>& materials);
 // material.
 [[nodiscard]] float CoatInner(const Material& material);
 [[nodiscard]] float CoatLeaving(const Material& material);
+
+// Over a metal, of a prepared material: M for a direction at `cosine` outside, in [0, 1].
+[[nodiscard]] float CoatResidual(const Material& material, float cosine);
+// The share of light that is left after crossing the layer once at `cosine` inside.
+[[nodiscard]] float CoatCrossing(const Material& material, float cosine);
+// w, w.z > 0, as refracted at the mean surface, again away from it: away from the metal. False with
+// total reflection.
+[[nodiscard]] bool CoatRefracted(const Material& material, Vec3 w, Vec3& inside);
 
 }  // namespace lucerna

@@ -32,8 +32,8 @@ namespace lucerna {
 struct Ggx {
   float au, av;
 
-  explicit Ggx(const MaterialNumbers& material)
-      : au(std::max(material.alpha_u, 1e-4F)), av(std::max(material.alpha_v, 1e-4F)) {}
+  Ggx(float alpha_u, float alpha_v) : au(std::max(alpha_u, 1e-4F)), av(std::max(alpha_v, 1e-4F)) {}
+  explicit Ggx(const MaterialNumbers& material) : Ggx(material.alpha_u, material.alpha_v) {}
 
   // D(m) [sr⁻¹], W07 eq. (33) stretched to two widths.
   [[nodiscard]] float D(Vec3 m) const {

@@ -34,6 +34,17 @@ Material CoatedMaterial(float reflectance, float alpha, float thickness) {
   return one[0];
 }
 
+Material CoatedMetal(Rgb eta, Rgb k, float alpha, float base_alpha, float thickness) {
+  Material material = ConductorMaterial(eta, k, alpha, alpha);
+  material.kind = Material::Kind::kCoatedConductor;
+  material.base_alpha_u = base_alpha;
+  material.base_alpha_v = base_alpha;
+  material.thickness = thickness;
+  std::vector<Material> one = {material};
+  PrepareCoats(one);
+  return one[0];
+}
+
 Material SheetMaterial(float reflectance, float transmittance) {
   Material material = DiffuseMaterial(reflectance);
   material.kind = Material::Kind::kDiffuseTransmission;

@@ -19,6 +19,9 @@ namespace lucerna {
 [[nodiscard]] Material DielectricMaterial(float ior, float alpha = 0);
 // A diffuse base under a coat of index 1.5, ready to be evaluated. alpha = 0: a smooth coat.
 [[nodiscard]] Material CoatedMaterial(float reflectance, float alpha, float thickness = 0);
+// The same over a metal of width base_alpha.
+[[nodiscard]] Material CoatedMetal(Rgb eta, Rgb k, float alpha, float base_alpha,
+                                   float thickness = 0);
 // A thin sheet that scatters diffusely to both sides.
 [[nodiscard]] Material SheetMaterial(float reflectance, float transmittance);
 [[nodiscard]] Material ConductorMaterial(Rgb eta, Rgb k, float alpha_u, float alpha_v);

@@ -53,6 +53,9 @@ std::vector<Material> RoughMaterials() {
           OnePart(CoatedMaterial(0.7F, 0.4F), Parts::kFirst),
           OnePart(CoatedMaterial(0.7F, 0.4F), Parts::kSecond),
           OnePart(CoatedMaterial(0.9F, 0), Parts::kSecond),
+          CoatedMetal(kGoldEta, kGoldK, 0.3F, 0.2F, 0.1F),
+          CoatedMetal(kGoldEta, kGoldK, 0.4F, 0),
+          OnePart(CoatedMetal(kGoldEta, kGoldK, 0, 0.3F), Parts::kSecond),
           SheetMaterial(0.3F, 0.6F),
           OnePart(SheetMaterial(0.3F, 0.6F), Parts::kFirst),
           OnePart(SheetMaterial(0.3F, 0.6F), Parts::kSecond)};
@@ -183,6 +186,10 @@ TEST(BsdfTest, NeverScattersMoreThanItGets) {
       EXPECT_LE(MeanWeight(DielectricMaterial(1.5F, alpha), wo, Carried::kFlux), 1 + 1e-5);
       // A mean of weights that differ: five standard errors more.
       EXPECT_LE(MeanWeight(CoatedMaterial(1, alpha), wo, Carried::kFlux), 1 + 5e-3);
+      EXPECT_LE(MeanWeight(CoatedMetal({0, 0, 0}, Gray(1), alpha, alpha), wo, Carried::kFlux),
+                1 + 5e-3);
+      EXPECT_LE(MeanWeight(CoatedMetal({0, 0, 0}, Gray(1), 0, alpha), wo, Carried::kFlux),
+                1 + 5e-3);
       EXPECT_LE(MeanWeight(ConductorMaterial({0, 0, 0}, Gray(1), alpha, alpha), wo, Carried::kFlux),
                 1 + 1e-5);
     }
@@ -224,7 +231,9 @@ TEST(BsdfTest, SeparablePartsAreTheProductOfTheirFactors) {
 // Both parts together are the whole.
 TEST(BsdfTest, PartsAddUpToTheWhole) {
   KeyedRng rng(13);
-  for (const Material& material : {CoatedMaterial(0.7F, 0.4F, 0.2F), SheetMaterial(0.3F, 0.6F)}) {
+  for (const Material& material :
+       {CoatedMaterial(0.7F, 0.4F, 0.2F), CoatedMetal(kGoldEta, kGoldK, 0, 0.3F),
+        SheetMaterial(0.3F, 0.6F)}) {
     for (int i = 0; i < 100; ++i) {
       const float a1 = rng.Uniform();
       const float a2 = rng.Uniform();

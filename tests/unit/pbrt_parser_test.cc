@@ -697,7 +697,7 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
     EXPECT_THAT(said, HasSubstr(part));
   };
   expect("Material \"dielectric\" \"texture roughness\" \"t\"", "is a texture");
-  expect("Material \"coatedconductor\"", "there are diffuse, conductor, dielectric, interface");
+  expect("Material \"hair\"", "there are diffuse, conductor, dielectric, interface");
   expect("Material \"coateddiffuse\" \"rgb albedo\" [0.1 0 0]",
          "the layer under a coat only absorbs");
   expect("Material \"subsurface\"", "light does not travel below surfaces");
@@ -730,6 +730,37 @@ TEST(PbrtParserTest, ReadsCoatedDiffuse) {
   EXPECT_EQ(other.ior, 1.3F);
   EXPECT_EQ(other.thickness, 0.5F);
   EXPECT_EQ(other.base_hits, 4);
+}
+
+TEST(PbrtParserTest, ReadsCoatedConductor) {
+  const Scene scene = World(
+      "Material \"coatedconductor\" Shape \"sphere\"\n"
+      "Material \"coatedconductor\" \"rgb conductor.eta\" [1 2 3] \"rgb conductor.k\" [4 5 6] "
+      "\"float conductor.roughness\" 0.25 \"float interface.uroughness\" 0.04 "
+      "\"float interface.vroughness\" 0.09 \"float interface.eta\" 1.3 \"float thickness\" 0.5 "
+      "\"integer maxdepth\" 7 Shape \"sphere\"\n"
+      "Material \"coatedconductor\" \"rgb reflectance\" [0.5 0.5 0.5] Shape \"sphere\"");
+  ASSERT_EQ(scene.materials.size(), 4U);
+  const Material& plain = scene.materials[1];
+  EXPECT_EQ(plain.kind, Material::Kind::kCoatedConductor);
+  EXPECT_LT(plain.eta.r, plain.eta.b);  // copper
+  EXPECT_EQ(plain.alpha_u, 0);
+  EXPECT_EQ(plain.base_alpha_u, 0);
+  EXPECT_EQ(plain.ior, 1.5F);
+  EXPECT_EQ(plain.thickness, 0.01F);
+  EXPECT_EQ(plain.base_hits, 5);
+  const Material& other = scene.materials[2];
+  EXPECT_EQ(other.eta, (Rgb{1, 2, 3}));
+  EXPECT_EQ(other.k, (Rgb{4, 5, 6}));
+  EXPECT_EQ(other.base_alpha_u, 0.5F);
+  EXPECT_EQ(other.base_alpha_v, 0.5F);
+  EXPECT_EQ(other.alpha_u, 0.2F);
+  EXPECT_EQ(other.alpha_v, 0.3F);
+  EXPECT_EQ(other.ior, 1.3F);
+  EXPECT_EQ(other.thickness, 0.5F);
+  EXPECT_EQ(other.base_hits, 4);
+  EXPECT_EQ(scene.materials[3].eta, Gray(1));
+  EXPECT_EQ(scene.materials[3].k.g, AbsorptionFor(0.5F));
 }
 
 TEST(PbrtParserTest, ReadsSheets) {

@@ -9,8 +9,8 @@ void ReadCoatedDiffuse(ParameterList& parameters, const TextureNames& names, Mat
   } else {
     material.reflectance = parameters.FindReflectance("reflectance").value_or(Gray(0.5F));
   }
-  ReadRoughness(parameters, material);
-  ReadCoat(parameters, material);
+  ReadRoughness("", parameters, material);
+  ReadCoat("eta", parameters, material);
 }
 
 }  // namespace lucerna

@@ -1,29 +1,36 @@
-// Material "conductor".
+// Material "conductor", and the metal of "coatedconductor".
+#include "render/base/text.h"
 #include "render/formats/pbrt/material_readers.h"
 #include "render/formats/pbrt/optical_constants.h"
 
 namespace lucerna {
 
-void ReadConductor(ParameterList& parameters, const TextureNames& names, Material& material) {
+void ReadMetal(const MetalParameters& called, ParameterList& parameters, const TextureNames& names,
+               Material& material) {
   const bool is_textured = parameters.IsTexture("reflectance");
   if (is_textured) material.texture = FindTexture("reflectance", parameters, names);
   const std::optional<Rgb> reflectance =
       is_textured ? Gray(0.5F) : parameters.FindReflectance("reflectance");
   if (reflectance.has_value()) {
-    if (parameters.Has("eta") || parameters.Has("k")) {
-      parameters.Error("reflectance", "and eta or k exclude each other; give one or the other");
+    if (parameters.Has(called.eta) || parameters.Has(called.k)) {
+      parameters.Error("reflectance", Concat("and ", called.eta, " or ", called.k,
+                                             " exclude each other; give one or the other"));
     }
-    parameters.Ignore("eta");
-    parameters.Ignore("k");
+    parameters.Ignore(called.eta);
+    parameters.Ignore(called.k);
     material.eta = Gray(1);
     material.k = {AbsorptionFor(reflectance->r), AbsorptionFor(reflectance->g),
                   AbsorptionFor(reflectance->b)};
   } else {
     const MetalConstants copper = MetalNamed("Cu").value();
-    material.eta = parameters.FindOpticalConstant("eta", {0, 100}).value_or(copper.eta);
-    material.k = parameters.FindOpticalConstant("k", {0, 1000}).value_or(copper.k);
+    material.eta = parameters.FindOpticalConstant(called.eta, {0, 100}).value_or(copper.eta);
+    material.k = parameters.FindOpticalConstant(called.k, {0, 1000}).value_or(copper.k);
   }
-  ReadRoughness(parameters, material);
+}
+
+void ReadConductor(ParameterList& parameters, const TextureNames& names, Material& material) {
+  ReadMetal({"eta", "k"}, parameters, names, material);
+  ReadRoughness("", parameters, material);
 }
 
 }  // namespace lucerna

@@ -19,11 +19,20 @@ LUCERNA_MATERIALS(LUCERNA_DECLARE)
 
 inline constexpr Range kIndexRange = {0.01, 100};  // of refraction
 
-// alpha_u and alpha_v, from roughness, uroughness, vroughness and remaproughness.
-void ReadRoughness(ParameterList& parameters, Material& material);
+// alpha_u and alpha_v, from remaproughness and roughness, uroughness and vroughness, whose names
+// begin with `prefix`.
+void ReadRoughness(std::string_view prefix, ParameterList& parameters, Material& material);
 
-// `ior` of a coat, `thickness` and what else the parameters of pbrt's layered materials set.
-void ReadCoat(ParameterList& parameters, Material& material);
+// `ior` of a coat, from the parameter named `eta`; `thickness` and what else the parameters of
+// pbrt's layered materials set.
+void ReadCoat(std::string_view eta, ParameterList& parameters, Material& material);
+
+// `eta` and `k` of a metal, from the parameters of these names or from reflectance, or its texture.
+struct MetalParameters {
+  std::string_view eta, k;
+};
+void ReadMetal(const MetalParameters& called, ParameterList& parameters, const TextureNames& names,
+               Material& material);
 
 // The texture that the parameter `name` refers to, if it is one and can be used; else kNoTexture.
 [[nodiscard]] std::int32_t FindTexture(std::string_view name, ParameterList& parameters,

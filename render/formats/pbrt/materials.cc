@@ -45,10 +45,10 @@ std::string_view WhyRefused(std::string_view type) {
 
 }  // namespace
 
-void ReadRoughness(ParameterList& parameters, Material& material) {
-  const double roughness = parameters.Float("roughness", 0, kRoughness);
-  const double u = parameters.Float("uroughness", roughness, kRoughness);
-  const double v = parameters.Float("vroughness", roughness, kRoughness);
+void ReadRoughness(std::string_view prefix, ParameterList& parameters, Material& material) {
+  const double roughness = parameters.Float(Concat(prefix, "roughness"), 0, kRoughness);
+  const double u = parameters.Float(Concat(prefix, "uroughness"), roughness, kRoughness);
+  const double v = parameters.Float(Concat(prefix, "vroughness"), roughness, kRoughness);
   const bool remap = parameters.Bool("remaproughness", true);
   const double alpha_u = remap ? std::sqrt(u) : u;
   const double alpha_v = remap ? std::sqrt(v) : v;
@@ -59,9 +59,8 @@ void ReadRoughness(ParameterList& parameters, Material& material) {
   material.alpha_v = static_cast<float>(std::max(alpha_v, kSmallestAlpha));
 }
 
-void ReadCoat(ParameterList& parameters, Material& material) {
-  material.ior =
-      static_cast<float>(parameters.FindRefractiveIndex("eta", kIndexRange).value_or(1.5));
+void ReadCoat(std::string_view eta, ParameterList& parameters, Material& material) {
+  material.ior = static_cast<float>(parameters.FindRefractiveIndex(eta, kIndexRange).value_or(1.5));
   material.thickness = static_cast<float>(parameters.Float("thickness", 0.01, {0, 1e6}));
   const std::int64_t depth = parameters.FindInteger("maxdepth", {1, 1'000'000}).value_or(10);
   // Every second event is at the base.

@@ -1,0 +1,238 @@
+// A metal under a dielectric coat, on both sides of a surface. Equations as in transport/coat.h.
+#include <algorithm>
+#include <cmath>
+
+#include "render/math/color_space.h"
+#include "render/transport/bsdf_kinds.h"
+#include "render/transport/bsdf_parts.h"
+#include "render/transport/coat.h"
+#include "render/transport/microfacet.h"
+
+namespace lucerna {
+namespace {
+
+Ggx BaseFacets(const Material& material) {
+  return {BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior),
+          BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior)};
+}
+
+bool IsMirror(const Material& material) {
+  return PropertiesOf(material).is_smooth && material.parts == Parts::kAll;
+}
+
+Vec3 Up(Vec3 w) {
+  return w.z < 0 ? -w : w;
+}
+
+// What the metal reflects of light that comes to it through the coat, in the space of its indices.
+Rgb MetalInCoat(const Material& material, float cosine) {
+  return FresnelConductor(cosine, material.eta * (1 / material.ior),
+                          material.k * (1 / material.ior));
+}
+
+// The share of the residual that is left when the metal absorbs: a power of its reflectance for
+// each number of meetings.
+Rgb ResidualColor(const Material& material) {
+  // Light that meets the metal again comes more slanted than what comes first.
+  constexpr float kMeanCosine = 0.6F;
+  const Rgb metal = MetalInCoat(material, kMeanCosine);
+  const auto channel = [&](float reflectance) {
+    float sum = 0;
+    for (int i = CoatTable::kHits - 1; i >= 0; --i)
+      sum = reflectance * (sum + material.coat->by_hits[static_cast<std::size_t>(i)]);
+    return sum;
+  };
+  return {channel(metal.r), channel(metal.g), channel(metal.b)};
+}
+
+// A smooth coat over a smooth metal: the sum over all orders, all in one direction.
+Rgb MirrorReflectance(const Material& material, float cosine) {
+  float cos_t = 0;
+  const float reflected = FresnelDielectric(cosine, material.ior, cos_t);
+  if (!(reflected < 1)) return Gray(reflected);
+  // What one way down, to the metal and up brings back.
+  const Rgb metal = MetalInCoat(material, cos_t) * Square(CoatCrossing(material, cos_t));
+  Rgb sum;
+  for (int i = 0; i < material.base_hits; ++i) {
+    const Rgb before = sum;
+    sum = metal * (Gray(1) + sum * reflected);
+    if (sum == before) break;
+  }
+  return Gray(reflected) + ToWorking(sum * Square(1 - reflected));
+}
+
+// --- the lobes of what is scattered broadly
+
+// Which of them there are, and the probabilities with which they are drawn.
+struct Lobes {
+  float coat = 0;      // what facets of the coat reflect
+  float base = 0;      // what meets the metal once
+  float residual = 0;  // the rest
+};
+
+Lobes LobesOf(const Material& material, Vec3 up) {
+  // Facets that are turned away may reflect far more than the surface as a whole.
+  constexpr float kLeastShare = 0.02F;
+  float cos_t = 0;
+  const float metal = MaxChannel(MetalInCoat(material, 1));
+  Lobes lobes;
+  if (!HasNoFacets(material) && material.parts == Parts::kAll) {
+    lobes.coat = std::max(kLeastShare, FresnelDielectric(up.z, material.ior, cos_t));
+  }
+  lobes.base = std::max(kLeastShare, metal * CoatEntering(material, up));
+  lobes.residual = CoatResidual(material, up.z) * MaxChannel(ResidualColor(material));
+  const float sum = lobes.coat + lobes.base + lobes.residual;
+  return {lobes.coat / sum, lobes.base / sum, lobes.residual / sum};
+}
+
+// The half vector of two directions on the upper side; false where there is none.
+bool Half(Vec3 a, Vec3 b, Vec3& m) {
+  m = a + b;
+  const float squared = LengthSquared(m);
+  if (squared == 0) return false;
+  m = m / std::sqrt(squared);
+  return true;
+}
+
+// Of both, on the upper side.
+float PdfUp(const Material& material, Vec3 up, Vec3 wi) {
+  const Lobes lobes = LobesOf(material, up);
+  float pdf = lobes.residual * wi.z * kInversePi;
+  Vec3 m;
+  if (lobes.coat > 0 && Half(up, wi, m)) {
+    pdf += lobes.coat * Ggx(material).PdfVisible(up, m) / (4 * std::max(1e-12F, Dot(up, m)));
+  }
+  Vec3 up_in;
+  Vec3 wi_in;
+  if (CoatRefracted(material, up, up_in) && CoatRefracted(material, wi, wi_in) &&
+      Half(up_in, wi_in, m)) {
+    const float inside =
+        BaseFacets(material).PdfVisible(up_in, m) / (4 * std::max(1e-12F, Dot(up_in, m)));
+    // Snell's law, of solid angles.
+    pdf += lobes.base * inside * wi.z / (Square(material.ior) * wi_in.z);
+  }
+  return pdf;
+}
+
+Rgb EvaluateUp(const Material& material, Vec3 up, Vec3 wi) {
+  float coat = 0;
+  Vec3 m;
+  if (!HasNoFacets(material) && material.parts == Parts::kAll && Half(up, wi, m)) {
+    const Ggx ggx(material);
+    float cos_t = 0;
+    coat = FresnelDielectric(Dot(up, m), material.ior, cos_t) * ggx.D(m) * ggx.G2(up, wi) /
+           (4 * up.z * wi.z);
+  }
+  Rgb below;
+  Vec3 up_in;
+  Vec3 wi_in;
+  if (CoatRefracted(material, up, up_in) && CoatRefracted(material, wi, wi_in) &&
+      Half(up_in, wi_in, m)) {
+    const Ggx ggx = BaseFacets(material);
+    below = MetalInCoat(material, Dot(up_in, m)) *
+            (ggx.D(m) * ggx.G2(up_in, wi_in) / (4 * up_in.z * wi_in.z) *
+             CoatEntering(material, up) * CoatEntering(material, wi) / Square(material.ior));
+  }
+  if (material.coat->mean_residual > 0) {
+    below +=
+        ResidualColor(material) * (CoatResidual(material, up.z) * CoatResidual(material, wi.z) *
+                                   kInversePi / material.coat->mean_residual);
+  }
+  return Gray(coat) + ToWorking(below);
+}
+
+bool SampleUp(const Material& material, Vec3 up, float u1, float u2, Vec3& wi) {
+  const Lobes lobes = LobesOf(material, up);
+  // u1 chooses a lobe, and what is left of it a direction.
+  const auto rest = [](float u, float low, float share) {
+    return std::clamp((u - low) / share, 0.0F, 0x1.fffffep-1F);
+  };
+  if (u1 < lobes.coat) {
+    wi = ReflectAt(up, Ggx(material).SampleVisible(up, rest(u1, 0, lobes.coat), u2));
+  } else if (u1 < lobes.coat + lobes.base) {
+    Vec3 up_in;
+    if (!CoatRefracted(material, up, up_in)) return false;
+    const Vec3 m = BaseFacets(material).SampleVisible(up_in, rest(u1, lobes.coat, lobes.base), u2);
+    const Vec3 wi_in = ReflectAt(up_in, m);
+    // Beyond the critical angle nothing leaves at once.
+    const float x = wi_in.x * material.ior;
+    const float y = wi_in.y * material.ior;
+    const float squared = 1 - x * x - y * y;
+    if (!(wi_in.z > 0) || !(squared > 0)) return false;
+    wi = {x, y, std::sqrt(squared)};
+  } else {
+    wi = SquareToCosineHemisphere(rest(u1, lobes.coat + lobes.base, 1 - lobes.coat - lobes.base),
+                                  u2);
+  }
+  return wi.z > 0;
+}
+
+}  // namespace
+
+bool CoatedConductorBsdf::Sample(const Material& material, Vec3 wo, float u_lobe, float u1,
+                                 float u2, Carried carried, BsdfSample& sample) {
+  if (wo.z == 0) return false;
+  const Vec3 mirrored = {-wo.x, -wo.y, wo.z};
+  if (IsMirror(material)) {
+    sample = {mirrored, MirrorReflectance(material, std::abs(wo.z)), 0, true};
+    return true;
+  }
+  if (HasNoFacets(material) && material.parts == Parts::kFirst) {
+    float cos_t = 0;
+    sample = {mirrored, Gray(FresnelDielectric(std::abs(wo.z), material.ior, cos_t)), 0, true};
+    return sample.weight.g > 0;
+  }
+  if (HasNoFacets(material) && material.parts == Parts::kAll) {
+    return SampleParts<CoatedConductorBsdf>(material, ShareOfFirst(material, wo), wo, u_lobe, u1,
+                                            u2, carried, sample);
+  }
+  const Vec3 up = Up(wo);
+  Vec3 wi;
+  if (!SampleUp(material, up, u1, u2, wi)) return false;
+  sample.pdf = PdfUp(material, up, wi);
+  if (!(sample.pdf > 0)) return false;
+  sample.wi = wo.z < 0 ? -wi : wi;
+  sample.weight = EvaluateUp(material, up, wi) * (wi.z / sample.pdf);
+  sample.is_delta = false;
+  return true;
+}
+
+Rgb CoatedConductorBsdf::Evaluate(const Material& material, Vec3 wo, Vec3 wi, Carried /*carried*/) {
+  if (!(wo.z * wi.z > 0) || PropertiesOf(material).is_smooth) return {};
+  return EvaluateUp(material, Up(wo), Up(wi));
+}
+
+float CoatedConductorBsdf::Pdf(const Material& material, Vec3 wo, Vec3 wi) {
+  if (!(wo.z * wi.z > 0) || PropertiesOf(material).is_smooth) return 0;
+  const float pdf = PdfUp(material, Up(wo), Up(wi));
+  const bool chooses = HasNoFacets(material) && material.parts == Parts::kAll;
+  return chooses ? (1 - ShareOfFirst(material, wo)) * pdf : pdf;
+}
+
+Rgb CoatedConductorBsdf::Albedo(const Material& material) {
+  if (material.parts == Parts::kFirst) return Gray(1);
+  return ToWorking(MetalInCoat(material, 1));
+}
+
+float CoatedConductorBsdf::ReflectedShare(const Material& /*material*/, float /*cos_o*/) {
+  return 1;
+}
+
+// About what each part scatters, as for a diffuse base.
+float CoatedConductorBsdf::ShareOfFirst(const Material& material, Vec3 wo) {
+  float cos_t = 0;
+  const float coat = FresnelDielectric(std::abs(wo.z), material.ior, cos_t);
+  const float base =
+      CoatEntering(material, Up(wo)) * MaxChannel(MetalInCoat(material, std::max(0.1F, cos_t)));
+  return base > 0 ? coat / (coat + base) : 1;
+}
+
+Rgb CoatedConductorBsdf::EyeFactor(const Material& /*material*/, Vec3 /*wo*/) {
+  return {};
+}
+
+float CoatedConductorBsdf::PhotonFactor(const Material& /*material*/, Vec3 /*wi*/) {
+  return 1;
+}
+
+}  // namespace lucerna
