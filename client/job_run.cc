@@ -162,8 +162,9 @@ StatusOr<v1::Job> LocalRuns::Run(SceneFiles& files, const SceneManifest& manifes
 StatusOr<v1::Job> LocalRuns::FollowOwn(const OutputOptions& output_options) {
   auto job =
       FollowToEnd(*connection_, job_id_, true, output_options, [this](const v1::Job& newest) {
-        // No other client knows of it, so that it would stay paused.
-        if (newest.pause_cause() == v1::PAUSE_CAUSE_FAILED_BATCH) {
+        // No other client and no other worker knows of it, so that it would stay paused.
+        if (newest.pause_cause() == v1::PAUSE_CAUSE_FAILED_BATCH ||
+            newest.pause_cause() == v1::PAUSE_CAUSE_DISPUTE) {
           return absl::AbortedError(newest.condition());
         }
         return cluster_->Check();

@@ -62,6 +62,7 @@ SchedulerOptions OptionsFor(const Coordinator::Options& options) {
   scheduler.audit_share = options.audit_share;
   scheduler.audit_secret = RandomBytes(kSecretBytes);
   scheduler.fixed_batch = options.batch_photons;
+  scheduler.max_registrations = options.max_registrations;
   return scheduler;
 }
 
@@ -111,6 +112,8 @@ Coordinator::Coordinator(Options options, const Clock& clock, std::unique_ptr<Du
     for (const std::string& problem : state_->problems())
       spdlog::error("{}", Escaped(problem));
     jobs_.Restore(state_->TakeJobs(), state_->next_serial(), Now());
+    for (const WorkerStanding& standing : state_->TakeWorkers())
+      scheduler_.RestoreStanding(standing, clock_.Steady());
     const MutexLock lock(files_mutex_);
     RemoveUnneededLocked({});
     // The limit may be a new one.
@@ -147,9 +150,10 @@ void Coordinator::Tick() {
   ShowDisputes();
   AnswerParked();
   jobs_.SetLiveWorkers(scheduler_.LiveWorkers(), Now());
-  if (state_ && clock_.Steady() >= save_unsaved_at_) {
+  if (clock_.Steady() >= save_unsaved_at_) {
     save_unsaved_at_ = clock_.Steady() + kSaveUnsavedEvery;
-    jobs_.SaveUnsaved(Now());
+    SaveStandings();
+    if (state_) jobs_.SaveUnsaved(Now());
   }
 }
 
@@ -594,7 +598,7 @@ Status Coordinator::EndWell(const std::string& job_id, StopReason reason, const 
     }
     const std::string condition = state_->PauseCondition(kept);
     spdlog::warn("job {} {}", job_id, condition);
-    jobs_.SetCondition(job_id, condition, Now());
+    jobs_.SetCondition(job_id, PauseCause::kDisk, condition, Now());
     for (int i = 0; i < kPausesBeforeRetry; ++i) {
       LUCERNA_RETURN_IF_ERROR(jobs_.CheckStillNeeded(job_id));
       std::this_thread::sleep_for(kRetryPause);
@@ -654,7 +658,7 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, M
               [this, id](const Status& why) {
                 const std::string condition = why.ok() ? "" : state_->PauseCondition(why);
                 spdlog::warn("job {} {}", id, why.ok() ? "goes on" : condition);
-                jobs_.SetCondition(id, condition, Now());
+                jobs_.SetCondition(id, PauseCause::kDisk, condition, Now());
               },
           .running = [this, id] { return jobs_.RunningOf(id, clock_.Steady()); },
           .when_it_has_run = [this, id](Duration time) { return jobs_.WhenItHasRun(id, time); },
@@ -693,7 +697,7 @@ void Coordinator::Conclude(const std::string& job_id, StatusOr<RenderResult> res
 
 StatusOr<std::string> Coordinator::Register(const std::string& name, int threads,
                                             const std::string& numeric_profile,
-                                            const std::string& identity) {
+                                            const std::string& identity, const std::string& peer) {
   if (name.size() > 256 || identity.size() > kMostIdentity) {
     return absl::InvalidArgumentError("a worker's name or identity is too long");
   }
@@ -703,7 +707,8 @@ StatusOr<std::string> Coordinator::Register(const std::string& name, int threads
         Escaped(numeric_profile.substr(0, 1024)), "\" and this coordinator \"",
         options_.numeric_profile, "\"; their bits would differ, run the same build on both"));
   }
-  std::string id = scheduler_.AddWorker(name, clock_.Steady(), identity);
+  LUCERNA_ASSIGN_OR_RETURN(std::string id,
+                           scheduler_.AddWorker(name, clock_.Steady(), identity, peer));
   jobs_.SetLiveWorkers(scheduler_.LiveWorkers(), Now());
   spdlog::info("worker {} joined with {} threads", ShownWorker(id), threads);
   return id;
@@ -900,7 +905,20 @@ void Coordinator::Refuse(const Delivery& delivery, const Status& why) {
   AnswerParked();
 }
 
+void Coordinator::SaveStandings() {
+  const MutexLock lock(standings_mutex_);
+  const std::vector<WorkerStanding> changed = scheduler_.TakeChangedStandings();
+  if (!state_ || changed.empty()) return;
+  const Status saved = state_->SaveWorkers(changed);
+  if (saved.ok()) return;
+  spdlog::warn("which workers are drained or in quarantine cannot be written yet: {}",
+               Escaped(std::string(saved.message())));
+  for (const WorkerStanding& standing : changed)
+    scheduler_.NoteChangedStanding(standing.id);
+}
+
 void Coordinator::TakeOut(const std::vector<std::string>& records) {
+  if (!records.empty()) SaveStandings();
   for (const std::string& record : records) {
     spdlog::error(
         "worker {} returned a wrong result: it is in quarantine, and its work is taken out",
@@ -921,14 +939,14 @@ void Coordinator::ShowDisputes() {
   for (const auto& [job_id, what] : disputes) {
     if (disputed_.insert(job_id).second) spdlog::warn("job {} {}", job_id, what);
     // Again at each tick: the job may have been paused when the dispute began.
-    jobs_.SetCondition(job_id, what, Now());
+    jobs_.SetCondition(job_id, PauseCause::kDispute, what, Now());
   }
   for (auto job_id = disputed_.begin(); job_id != disputed_.end();) {
     if (disputes.contains(*job_id)) {
       ++job_id;
       continue;
     }
-    jobs_.SetCondition(*job_id, "", Now());
+    jobs_.SetCondition(*job_id, PauseCause::kDispute, "", Now());
     job_id = disputed_.erase(job_id);
   }
 }
@@ -941,6 +959,7 @@ void Coordinator::Goodbye(const std::string& worker) {
 
 Status Coordinator::QuarantineWorker(const std::string& id, const std::string& reason) {
   if (!scheduler_.Quarantine(id, reason)) return UnknownRecord(id);
+  SaveStandings();
   spdlog::info("worker {} is put in quarantine", id);
   AnswerParked();
   return absl::OkStatus();
@@ -948,6 +967,7 @@ Status Coordinator::QuarantineWorker(const std::string& id, const std::string& r
 
 Status Coordinator::DrainWorker(const std::string& id) {
   if (!scheduler_.Drain(id)) return UnknownRecord(id);
+  SaveStandings();
   spdlog::info("worker {} is drained", id);
   AnswerParked();
   return absl::OkStatus();
@@ -955,6 +975,7 @@ Status Coordinator::DrainWorker(const std::string& id) {
 
 Status Coordinator::ReleaseWorker(const std::string& id) {
   if (!scheduler_.Release(id)) return UnknownRecord(id);
+  SaveStandings();
   spdlog::info("worker {} is released", id);
   AnswerParked();
   return absl::OkStatus();

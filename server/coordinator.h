@@ -59,6 +59,9 @@ class Coordinator {
     double checkpoint_share = 0.01;  // of the time, in (0, 1]
     double audit_share = 0.005;      // of batches, in [0, 1]
     OpenTransfers::Limits transfers;
+    // Of one caller (Access::LimitKeyOf); a page that many people look at is one.
+    std::size_t max_watches = 16384;
+    std::size_t max_registrations = SchedulerOptions().max_registrations;
   };
 
   // `state` is what outlives the process; nullptr: nothing does. Goes on with the jobs in it.
@@ -68,6 +71,7 @@ class Coordinator {
   [[nodiscard]] BlobStore& blobs() { return blobs_; }
   [[nodiscard]] OpenTransfers& transfers() { return transfers_; }
   [[nodiscard]] MemoryBudget& budget() { return budget_; }
+  [[nodiscard]] std::size_t max_watches() const { return options_.max_watches; }
 
   // Jobs ---------------------------------------------------------------------------------------
 
@@ -110,10 +114,11 @@ class Coordinator {
   // Workers ------------------------------------------------------------------------------------
 
   // The id of the registration. Errors: FAILED_PRECONDITION for another numeric profile,
-  // INVALID_ARGUMENT for a name or an identity that is too long.
+  // INVALID_ARGUMENT for a name or an identity that is too long, and as Scheduler::AddWorker.
   [[nodiscard]] StatusOr<std::string> Register(const std::string& name, int threads,
                                                const std::string& numeric_profile,
-                                               const std::string& identity = {});
+                                               const std::string& identity = {},
+                                               const std::string& peer = {});
 
   // Calls `answer` once: now, or from another thread when there is something to say or `wait` is
   // over. Returns a ticket for SyncBroke.
@@ -143,7 +148,8 @@ class Coordinator {
 
   void Goodbye(const std::string& worker);
 
-  // Workers by the ids of their records (server/worker_records.h). Errors: NOT_FOUND.
+  // Workers by the ids of their records (server/worker_records.h). What is ordered is on the disk,
+  // if there is a state and it can be written, before the call returns. Errors: NOT_FOUND.
   [[nodiscard]] std::vector<WorkerRecord> ListWorkers() const { return scheduler_.Workers(); }
   [[nodiscard]] Status QuarantineWorker(const std::string& id, const std::string& reason);
   [[nodiscard]] Status DrainWorker(const std::string& id);
@@ -223,6 +229,9 @@ class Coordinator {
   // Jobs in which workers disagree and none is left to decide wait, and say so.
   void ShowDisputes();
 
+  // Keeps what has changed of workers' standings. What cannot be written is tried again by Tick.
+  void SaveStandings();
+
   // Waits until all that is being merged has been counted.
   void WaitForMerges();
   void PausePoisonedJobs();
@@ -260,6 +269,8 @@ class Coordinator {
   std::atomic<bool> is_lending_ = true;
   std::atomic<bool> is_closing_ = false;
   SteadyTime save_unsaved_at_;  // of the thread of Tick
+  // Held from taking changed standings until they are on the disk: the newest is written last.
+  Mutex standings_mutex_;
 
   std::thread job_thread_;  // last, so that all it uses is there
 };

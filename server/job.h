@@ -50,7 +50,12 @@ enum class PauseCause : std::uint8_t {
   kUser,         // until the user resumes it
   kDisk,         // its checkpoint or image cannot be written; until that can be done
   kFailedBatch,  // a batch failed at all workers; until the user resumes it
+  kDispute,      // workers returned different results of a batch; until another one has decided
 };
+// Whether a job that is paused for this goes on without its user.
+[[nodiscard]] constexpr bool GoesOnByItself(PauseCause cause) {
+  return cause == PauseCause::kDisk || cause == PauseCause::kDispute;
+}
 
 // Of a job among the jobs of one coordinator.
 inline constexpr int kLowestPriority = -100;

@@ -42,6 +42,8 @@ v1::PauseCause CauseToProto(PauseCause cause) {
       return v1::PAUSE_CAUSE_DISK;
     case PauseCause::kFailedBatch:
       return v1::PAUSE_CAUSE_FAILED_BATCH;
+    case PauseCause::kDispute:
+      return v1::PAUSE_CAUSE_DISPUTE;
   }
   return v1::PAUSE_CAUSE_UNSPECIFIED;
 }
@@ -222,11 +224,26 @@ WallTime TimeOf(const google::protobuf::Timestamp& message) {
                   std::chrono::nanoseconds(message.nanos()));
 }
 
-// Of a job that waits for the disk: it waits for a turn in the next process.
+PauseCause CauseOf(const v1::Job& job) {
+  switch (job.pause_cause()) {
+    case v1::PAUSE_CAUSE_USER:
+      return PauseCause::kUser;
+    case v1::PAUSE_CAUSE_DISK:
+      return PauseCause::kDisk;
+    case v1::PAUSE_CAUSE_FAILED_BATCH:
+      return PauseCause::kFailedBatch;
+    case v1::PAUSE_CAUSE_DISPUTE:
+      return PauseCause::kDispute;
+    default:
+      return PauseCause::kNone;
+  }
+}
+
+// Of a job that goes on by itself: it waits for a turn in the next process.
 JobState StateOf(const v1::Job& job) {
   switch (job.state()) {
     case v1::JOB_STATE_PAUSED:
-      return job.pause_cause() == v1::PAUSE_CAUSE_DISK ? JobState::kQueued : JobState::kPaused;
+      return GoesOnByItself(CauseOf(job)) ? JobState::kQueued : JobState::kPaused;
     case v1::JOB_STATE_SUCCEEDED:
       return JobState::kSucceeded;
     case v1::JOB_STATE_CANCELLED:
@@ -235,17 +252,6 @@ JobState StateOf(const v1::Job& job) {
       return JobState::kFailed;
     default:
       return JobState::kQueued;
-  }
-}
-
-PauseCause CauseOf(const v1::Job& job) {
-  switch (job.pause_cause()) {
-    case v1::PAUSE_CAUSE_USER:
-      return PauseCause::kUser;
-    case v1::PAUSE_CAUSE_FAILED_BATCH:
-      return PauseCause::kFailedBatch;
-    default:
-      return PauseCause::kNone;
   }
 }
 
@@ -415,8 +421,10 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
   if (message.has_ended_at()) job.ended_at = TimeOf(message.ended_at());
   job.owner = message.owner();
   job.priority = message.priority();
-  job.pause_cause = CauseOf(message);
-  if (message.pause_cause() != v1::PAUSE_CAUSE_DISK) job.condition = message.condition();
+  if (!GoesOnByItself(CauseOf(message))) {
+    job.pause_cause = CauseOf(message);
+    job.condition = message.condition();
+  }
   for (const v1::JobEvent& event : message.events())
     job.events.push_back({TimeOf(event.at()), event.what()});
   return result;

@@ -50,10 +50,17 @@ grpc::Status Put(const StatusOr<JobReport>& report, v1::Job* response) {
 // of ours.
 class JobService::WatchReactor final : public grpc::ServerWriteReactor<grpc::ByteBuffer> {
  public:
-  WatchReactor(JobService& service, std::string job_id)
-      : service_(service), job_id_(std::move(job_id)) {}
+  WatchReactor(JobService& service, std::string job_id, std::string caller)
+      : service_(service), job_id_(std::move(job_id)), caller_(std::move(caller)) {}
 
   [[nodiscard]] const std::string& job_id() const { return job_id_; }
+  [[nodiscard]] const std::string& caller() const { return caller_; }
+
+  // Before anything is sent.
+  void Refuse(const Status& why) {
+    const MutexLock lock(mutex_);
+    if (!is_finished_) End(why);
+  }
 
   // Sends `newest` unless it has been sent.
   void SendIfNew(std::shared_ptr<const Snapshot> newest) {
@@ -102,6 +109,8 @@ class JobService::WatchReactor final : public grpc::ServerWriteReactor<grpc::Byt
     {
       const MutexLock lock(service_.mutex_);
       service_.watches_.erase(this);
+      const auto of_caller = service_.watches_of_.find(caller_);
+      if (--of_caller->second == 0) service_.watches_of_.erase(of_caller);
     }
     delete this;
   }
@@ -114,6 +123,7 @@ class JobService::WatchReactor final : public grpc::ServerWriteReactor<grpc::Byt
 
   JobService& service_;
   const std::string job_id_;
+  const std::string caller_;
   Mutex mutex_;
   bool is_writing_ LUCERNA_GUARDED_BY(mutex_) = false;
   bool is_finished_ LUCERNA_GUARDED_BY(mutex_) = false;
@@ -292,19 +302,24 @@ std::shared_ptr<const JobService::Snapshot> JobService::Refresh(const std::strin
   return newest;
 }
 
-grpc::ServerWriteReactor<grpc::ByteBuffer>* JobService::Watch(
-    grpc::CallbackServerContext* /*context*/, const grpc::ByteBuffer* request) {
+grpc::ServerWriteReactor<grpc::ByteBuffer>* JobService::Watch(grpc::CallbackServerContext* context,
+                                                              const grpc::ByteBuffer* request) {
   v1::WatchJobRequest message;
   grpc::ByteBuffer bytes = *request;
   const bool is_read =
       grpc::SerializationTraits<v1::WatchJobRequest>::Deserialize(&bytes, &message).ok();
   // What cannot be read names no job.
-  auto* const watch = new WatchReactor(*this, is_read ? message.job_id() : std::string());
+  auto* const watch = new WatchReactor(*this, is_read ? message.job_id() : std::string(),
+                                       access_.LimitKeyOf(*context));
   // Under the lock, so that the watcher is not deleted meanwhile: OnDone needs it first.
   const MutexLock lock(mutex_);
   watches_.insert(watch);
+  const std::size_t of_caller = ++watches_of_[watch->caller()];
   if (is_closed_) {
     watch->Close();
+  } else if (of_caller > coordinator_.max_watches()) {
+    watch->Refuse(absl::ResourceExhaustedError(
+        absl::StrCat("you follow ", of_caller - 1, " jobs already; end some of that first")));
   } else {
     watch->SendIfNew(Refresh(watch->job_id()));
   }

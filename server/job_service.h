@@ -95,6 +95,7 @@ class JobService final
   Mutex mutex_;
   bool is_closed_ LUCERNA_GUARDED_BY(mutex_) = false;
   std::set<WatchReactor*> watches_ LUCERNA_GUARDED_BY(mutex_);
+  std::map<std::string, std::size_t> watches_of_ LUCERNA_GUARDED_BY(mutex_);  // by caller
   // Of jobs that are watched.
   std::map<std::string, std::shared_ptr<const Snapshot>> snapshots_ LUCERNA_GUARDED_BY(mutex_);
 };

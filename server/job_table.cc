@@ -656,8 +656,7 @@ void JobTable::UpdateTurns() {
 }
 
 bool JobTable::ResumeLocked(std::uint64_t serial, Entry& entry) {
-  // What waits for the disk goes on by itself.
-  if (entry.job.pause_cause == PauseCause::kDisk || !entry.job.life.Resume()) return false;
+  if (GoesOnByItself(entry.job.pause_cause) || !entry.job.life.Resume()) return false;
   entry.job.pause_cause = PauseCause::kNone;
   entry.job.condition.clear();
   ++entry.version;
@@ -795,7 +794,7 @@ void JobTable::GiveUpTurn(const std::string& job_id, const Moment& moment) {
   Entry& entry = found->second;
   // Something may have come that it waits for, after it was told to give its turn up; what ends
   // that does not wake a job without a turn.
-  const bool waits = entry.job.pause_cause == PauseCause::kDisk;
+  const bool waits = GoesOnByItself(entry.job.pause_cause);
   if (ChangeLife(found->first, entry, moment, [&](JobLife& life) {
         return waits ? life.Resume() : life.GiveUpTurn(moment.now);
       })) {
@@ -956,8 +955,9 @@ void JobTable::GoOnFrom(const std::string& job_id, Job record, Duration ran) {
   ++found->second.version;
 }
 
-void JobTable::SetCondition(const std::string& job_id, std::string condition,
+void JobTable::SetCondition(const std::string& job_id, PauseCause cause, std::string condition,
                             const Moment& moment) {
+  LUCERNA_CHECK(GoesOnByItself(cause));
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return;
@@ -965,7 +965,8 @@ void JobTable::SetCondition(const std::string& job_id, std::string condition,
   Entry& entry = found->second;
   Job& job = entry.job;
   const bool goes_on = condition.empty();
-  const bool waits = job.pause_cause == PauseCause::kDisk;
+  const bool waits = GoesOnByItself(job.pause_cause);
+  if (waits && job.pause_cause != cause && (goes_on || cause != PauseCause::kDisk)) return;
   if (job.condition == condition || (goes_on && !waits)) return;
   if (goes_on || !waits) {
     const bool has_changed = ChangeLife(serial, entry, moment, [&](JobLife& life) {
@@ -974,7 +975,7 @@ void JobTable::SetCondition(const std::string& job_id, std::string condition,
     });
     if (!has_changed) return;
   }
-  job.pause_cause = goes_on ? PauseCause::kNone : PauseCause::kDisk;
+  job.pause_cause = goes_on ? PauseCause::kNone : cause;
   job.AddEvent(moment.wall, goes_on ? "went on" : condition);
   job.condition = std::move(condition);
   ++entry.version;

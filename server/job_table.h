@@ -275,8 +275,12 @@ class JobTable {
   void GoOnFrom(const std::string& job_id, Job record, Duration ran);
 
   // The running job cannot go on for now, and why: it is paused, leaves its place to others and
-  // keeps its turn. Empty: it goes on. Nothing when it is paused for another cause, or has ended.
-  void SetCondition(const std::string& job_id, std::string condition, const Moment& moment);
+  // keeps its turn. Empty: this cause is over, and the job goes on. Nothing when it is paused for
+  // another cause, or has ended; but the disk's cause, which is reported once, takes the place of a
+  // dispute, which is reported again and again.
+  // Requires GoesOnByItself(cause).
+  void SetCondition(const std::string& job_id, PauseCause cause, std::string condition,
+                    const Moment& moment);
   void AddEvent(const std::string& job_id, std::string what, const Moment& moment);
   // The job's checkpoint is on the disk.
   void OnCheckpoint(const std::string& job_id);

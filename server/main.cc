@@ -39,6 +39,7 @@
 #include "server/image_service.h"
 #include "server/job_service.h"
 #include "server/listener.h"
+#include "server/replay_service.h"
 #include "server/security_files.h"
 #include "server/state/durable_state.h"
 #include "server/work_pool.h"
@@ -115,7 +116,12 @@ int Serve(const Flags& flags) {
   std::vector<grpc::Service*> for_clients = {&assets, &jobs, &images, &admin};
   std::vector<grpc::Service*> for_workers = {&workers};
   const bool is_one = flags.listen_workers.empty();
-  if (is_one) for_clients.insert(for_clients.end(), for_workers.begin(), for_workers.end());
+  ReplayService replays(workers);
+  if (is_one) {
+    for_clients.insert(for_clients.end(), for_workers.begin(), for_workers.end());
+  } else {
+    for_clients.push_back(&replays);
+  }
   std::vector<Listener::Options> wanted;
   wanted.push_back({flags.listen, flags.tls, access->get(), std::move(for_clients),
                     flags.max_connections_per_address});

@@ -105,11 +105,21 @@ void Scheduler::EraseLendable(const PassKey& key) {
 // Reports and answers
 // ---------------------------------------------------------------------------------------------
 
-std::string Scheduler::AddWorker(std::string_view name, SteadyTime now, std::string_view identity) {
+StatusOr<std::string> Scheduler::AddWorker(std::string_view name, SteadyTime now,
+                                           std::string_view identity, std::string_view peer) {
   const MutexLock lock(mutex_);
   std::string id = options_.new_id();
   const std::string record = WorkerIdOf(identity.empty() ? RandomId() : std::string(identity));
-  if (const auto earlier = registrations_.find(record); earlier != registrations_.end()) {
+  const auto earlier = registrations_.find(record);
+  const bool takes_place =
+      earlier != registrations_.end() && workers_.at(earlier->second).peer == peer;
+  const auto of_peer = peers_.find(std::string(peer));
+  if (!takes_place && of_peer != peers_.end() && of_peer->second >= options_.max_registrations) {
+    return absl::ResourceExhaustedError(absl::StrCat(
+        "you have ", of_peer->second, " workers here already; those that have gone are forgotten ",
+        Seconds(options_.worker_silence), " s after they were last heard of"));
+  }
+  if (earlier != registrations_.end()) {
     const auto found = workers_.find(earlier->second);
     TakeBackAll(found->second, Ending::kInterrupted);
     ResolveInterrupted(found->second, /*has_crashed=*/false);
@@ -125,6 +135,8 @@ std::string Scheduler::AddWorker(std::string_view name, SteadyTime now, std::str
     ResolveInterrupted(workers_.at(missing), /*has_crashed=*/true);
   Worker& worker = workers_[id];
   worker.record = record;
+  worker.peer = peer;
+  ++peers_[worker.peer];
   worker.heard_at = now;
   worker.may_be_lent = records_.Find(record)->may_be_lent();
   Count(id, worker);
@@ -136,6 +148,8 @@ std::string Scheduler::AddWorker(std::string_view name, SteadyTime now, std::str
 void Scheduler::Forget(std::map<std::string, Worker>::iterator worker, SteadyTime now) {
   Uncount(worker->second);
   registrations_.erase(worker->second.record);
+  const auto of_peer = peers_.find(worker->second.peer);
+  if (--of_peer->second == 0) peers_.erase(of_peer);
   records_.Leave(worker->second.record, now);
   affected_.insert(worker->first);
   workers_.erase(worker);
@@ -359,6 +373,21 @@ bool Scheduler::Release(const std::string& id) {
   if (!records_.Release(id)) return false;
   UpdateStanding(id);
   return true;
+}
+
+std::vector<WorkerStanding> Scheduler::TakeChangedStandings() {
+  const MutexLock lock(mutex_);
+  return records_.TakeChanged();
+}
+
+void Scheduler::NoteChangedStanding(const std::string& id) {
+  const MutexLock lock(mutex_);
+  records_.NoteChanged(id);
+}
+
+void Scheduler::RestoreStanding(const WorkerStanding& standing, SteadyTime now) {
+  const MutexLock lock(mutex_);
+  records_.Restore(standing, now);
 }
 
 template <typename Records>

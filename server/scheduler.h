@@ -91,6 +91,9 @@ struct SchedulerOptions {
   // Of batches, which share is computed by two workers; and what only this process knows.
   double audit_share = 0;
   std::string audit_secret;
+  // Of one peer, or it could fill the memory within worker_silence. A farm behind one address, or
+  // with one token, has one for each worker.
+  std::size_t max_registrations = 16384;
   // An audit for which no other worker has come for so long is given up.
   Duration audit_patience = std::chrono::seconds(30);
 };
@@ -114,8 +117,11 @@ class Scheduler {
 
   // The id of a new registration. `identity` is what the worker keeps through all its
   // registrations; what an earlier one held goes back, because it was dropped. Empty: a new one.
-  [[nodiscard]] std::string AddWorker(std::string_view name, SteadyTime now,
-                                      std::string_view identity = {});
+  // `peer` is whose limits the registration counts for.
+  // Errors: RESOURCE_EXHAUSTED when the peer has max_registrations; then nothing has changed.
+  [[nodiscard]] StatusOr<std::string> AddWorker(std::string_view name, SteadyTime now,
+                                                std::string_view identity = {},
+                                                std::string_view peer = {});
 
   // What a worker says of itself.
   struct Report {
@@ -225,6 +231,10 @@ class Scheduler {
   bool Drain(const std::string& id);
   // Lends to it again. False when there is no such worker.
   bool Release(const std::string& id);
+  // As the functions of WorkerRecords.
+  [[nodiscard]] std::vector<WorkerStanding> TakeChangedStandings();
+  void NoteChangedStanding(const std::string& id);
+  void RestoreStanding(const WorkerStanding& standing, SteadyTime now);
 
  private:
   // How a lease ended.
@@ -244,6 +254,7 @@ class Scheduler {
   // A registration.
   struct Worker {
     std::string record;  // its id
+    std::string peer;
     SteadyTime heard_at;
     bool is_connected = true;
     bool may_be_lent = true;
@@ -404,6 +415,7 @@ class Scheduler {
   std::map<std::pair<WorkKind, std::uint64_t>, std::set<Age>> newest_leases_
       LUCERNA_GUARDED_BY(mutex_);
   std::map<std::string, std::string> registrations_ LUCERNA_GUARDED_BY(mutex_);  // by record
+  std::map<std::string, std::size_t> peers_ LUCERNA_GUARDED_BY(mutex_);  // registrations of each
   // Registrations that were not heard of while they held leases, by name.
   std::multimap<std::string, std::string> missing_ LUCERNA_GUARDED_BY(mutex_);
   // Batches of audits that nobody holds.

@@ -1,6 +1,7 @@
 #include "server/worker_records.h"
 
 #include <bit>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 
@@ -35,9 +36,16 @@ void WorkerRecords::Leave(const std::string& id, SteadyTime now) {
   entry.is_connected = false;
   entry.heard_at = now;
   gone_.insert(GoneOf(entry));
-  if (gone_.size() <= max_gone_) return;
-  entries_.erase(std::get<std::string>(*gone_.begin()));
-  gone_.erase(gone_.begin());
+  DropOldestGone();
+}
+
+void WorkerRecords::DropOldestGone() {
+  while (gone_.size() > max_gone_) {
+    const auto oldest = entries_.find(std::get<std::string>(*gone_.begin()));
+    if (!oldest->second.may_be_lent()) changed_.insert(oldest->first);
+    entries_.erase(oldest);
+    gone_.erase(gone_.begin());
+  }
 }
 
 const WorkerRecord* WorkerRecords::Find(const std::string& id) const {
@@ -91,6 +99,35 @@ void WorkerRecords::SetState(Entry& entry, WorkerState state) {
   if (!entry.is_connected) gone_.erase(GoneOf(entry));
   entry.state = state;
   if (!entry.is_connected) gone_.insert(GoneOf(entry));
+  changed_.insert(entry.id);
+}
+
+std::vector<WorkerStanding> WorkerRecords::TakeChanged() {
+  std::vector<WorkerStanding> changed;
+  for (const std::string& id : std::exchange(changed_, {})) {
+    const auto found = entries_.find(id);
+    if (found == entries_.end()) {
+      changed.push_back({.id = id});
+    } else {
+      const Entry& entry = found->second;
+      changed.push_back({entry.id, entry.name, entry.state, entry.reason, entry.has_lied});
+    }
+  }
+  return changed;
+}
+
+void WorkerRecords::Restore(const WorkerStanding& standing, SteadyTime now) {
+  Entry& entry = entries_[standing.id];
+  if (entry.is_connected) return;
+  if (!entry.id.empty()) gone_.erase(GoneOf(entry));
+  entry.id = standing.id;
+  entry.name = standing.name;
+  entry.state = standing.state;
+  entry.reason = standing.reason;
+  entry.has_lied = standing.has_lied;
+  entry.heard_at = now;
+  gone_.insert(GoneOf(entry));
+  DropOldestGone();
 }
 
 bool WorkerRecords::Quarantine(const std::string& id, std::string_view reason, bool has_lied) {

@@ -6,7 +6,8 @@
 //
 // Quarantine: a worker is lent nothing after kBadOfRecent of its last kRecentLeases leases failed
 // or stalled, as long as another worker can go on, and after a result of it was found to be wrong,
-// in any case. It ends when a user releases the worker. Lost connections do not count.
+// in any case. It ends when a user releases the worker. Lost connections do not count. Quarantine
+// and drain outlive the process where a caller keeps them: TakeChanged, Restore.
 //
 // Pure values: moments come in as arguments. Time and memory of a call grow with the logarithm of
 // the number of workers; of workers that have gone, the newest are kept.
@@ -55,6 +56,16 @@ struct WorkerRecord {
   [[nodiscard]] bool may_be_lent() const { return state == WorkerState::kActive; }
 };
 
+// Whether a worker is lent work, and why not: what is kept of it beyond this process.
+struct WorkerStanding {
+  std::string id;
+  std::string name = {};
+  WorkerState state = WorkerState::kActive;
+  std::string reason = {};
+  bool has_lied = false;
+  bool operator==(const WorkerStanding&) const = default;
+};
+
 // What a worker of this identity is called; not empty.
 [[nodiscard]] std::string WorkerIdOf(std::string_view identity);
 
@@ -83,22 +94,33 @@ class WorkerRecords {
   // Ends quarantine and drain, and what was counted against it.
   bool Release(const std::string& id);
 
+  // Those whose standing has changed since the last call, as it is now; active, also of one that is
+  // not known any more: nothing is to be kept of it.
+  [[nodiscard]] std::vector<WorkerStanding> TakeChanged();
+  // The caller could not keep the standing of this worker: TakeChanged returns it again.
+  void NoteChanged(const std::string& id) { changed_.insert(id); }
+  // A worker of an earlier process, which has not registered yet.
+  void Restore(const WorkerStanding& standing, SteadyTime now);
+
  private:
   struct Entry : WorkerRecord {
     std::uint32_t recent = 0;  // a bit a lease, the newest lowest; 1: failed or stalled
   };
-  // Those that have gone, the first to be forgotten first: workers in quarantine last.
+  // Those that have gone, the first to be forgotten first: workers that may be lent nothing last.
   using Gone = std::tuple<bool, SteadyTime, std::string>;
 
   [[nodiscard]] static Gone GoneOf(const Entry& entry) {
-    return {entry.state == WorkerState::kQuarantined, entry.heard_at, entry.id};
+    return {!entry.may_be_lent(), entry.heard_at, entry.id};
   }
   // Changes the state of an entry wherever it is listed.
   void SetState(Entry& entry, WorkerState state);
+  // Forgets the oldest of those that have gone while they are too many.
+  void DropOldestGone();
 
   std::size_t max_gone_;
   std::map<std::string, Entry> entries_;
   std::set<Gone> gone_;
+  std::set<std::string> changed_;  // ids
 };
 
 }  // namespace lucerna

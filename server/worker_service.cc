@@ -184,8 +184,9 @@ grpc::ServerUnaryReactor* WorkerService::Register(grpc::CallbackServerContext* c
                                                   const v1::RegisterRequest* request,
                                                   v1::RegisterResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  const StatusOr<std::string> id = coordinator_.Register(
-      request->name(), request->threads(), request->numeric_profile(), request->identity());
+  const StatusOr<std::string> id =
+      coordinator_.Register(request->name(), request->threads(), request->numeric_profile(),
+                            request->identity(), access_.LimitKeyOf(*context));
   if (id.ok()) {
     response->set_worker_id(*id);
     *response->mutable_sync_every() = ToProto(kSyncEvery);

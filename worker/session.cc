@@ -105,8 +105,13 @@ StatusOr<v1::RegisterResponse> Session::Join() {
           absl::StrCat("the coordinator does not take workers at ", options_.server.address,
                        "; is it of another version, or is that its address for clients?"));
     }
-    if (!absl::IsUnavailable(status) && !absl::IsDeadlineExceeded(status)) return status;
+    // Workers that have gone may count for a while yet.
+    const bool has_too_many = absl::IsResourceExhausted(status);
+    if (!absl::IsUnavailable(status) && !absl::IsDeadlineExceeded(status) && !has_too_many) {
+      return status;
+    }
     const SteadyTime now = clock_.Steady();
+    if (now >= give_up_at && has_too_many) return status;
     if (now >= give_up_at) {
       return absl::UnavailableError(WhyNoAnswer(options_.server, status));
     }

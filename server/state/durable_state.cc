@@ -33,6 +33,9 @@ const char* NameOf(JobState state) {
   return "";
 }
 
+constexpr const char* kQuarantined = "quarantined";
+constexpr const char* kDraining = "draining";
+
 // The database does not see flipped bits in its rows.
 Digest DigestOf(const StoredJob& row, std::string_view record) {
   return Sha256(
@@ -91,7 +94,38 @@ Status DurableState::Load(const Moment& moment) {
     entry.has_checkpoint = checkpoints_->Has(entry.job.id);
     jobs_.push_back(std::move(entry));
   }
+  LUCERNA_ASSIGN_OR_RETURN(const std::vector<StoredWorker> workers, store_->LoadWorkers());
+  for (const StoredWorker& row : workers) {
+    if (row.state != kQuarantined && row.state != kDraining) {
+      problems_.push_back(absl::StrCat("worker ", row.id, " cannot be read from ", folder_,
+                                       "/lucerna.db: its state is \"", row.state, "\""));
+      continue;
+    }
+    workers_.push_back(
+        {.id = row.id,
+         .name = row.name,
+         .state = row.state == kDraining ? WorkerState::kDraining : WorkerState::kQuarantined,
+         .reason = row.reason,
+         .has_lied = row.has_lied});
+  }
   return absl::OkStatus();
+}
+
+Status DurableState::SaveWorkers(const std::vector<WorkerStanding>& standings) {
+  std::vector<StoredWorker> saved;
+  std::vector<std::string> removed;
+  for (const WorkerStanding& standing : standings) {
+    if (standing.state == WorkerState::kActive) {
+      removed.push_back(standing.id);
+      continue;
+    }
+    saved.push_back({.id = standing.id,
+                     .state = standing.state == WorkerState::kDraining ? kDraining : kQuarantined,
+                     .name = standing.name,
+                     .reason = standing.reason,
+                     .has_lied = standing.has_lied});
+  }
+  return store_->SaveWorkers(saved, removed);
 }
 
 JobJournal::Written DurableState::BeginSave(const JournalEntry& entry, Duration running) {

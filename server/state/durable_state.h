@@ -1,6 +1,6 @@
 // What does a coordinator keep on its disk, in one folder?
 //
-//   lucerna.db      all jobs (StateStore)
+//   lucerna.db      all jobs, and workers that are lent nothing (StateStore)
 //   blobs/          their scene files, references and images, by digest (BlobFiles)
 //   checkpoints/    sums of jobs that go on from them (CheckpointFiles)
 //
@@ -23,6 +23,7 @@
 #include "server/state/checkpoint_files.h"
 #include "server/state/disk_budget.h"
 #include "server/state/state_store.h"
+#include "server/worker_records.h"
 
 namespace lucerna {
 
@@ -49,8 +50,14 @@ class DurableState final : public JobJournal {
   [[nodiscard]] std::vector<JournalEntry> TakeJobs() { return std::move(jobs_); }
   // Larger than the numbers of all jobs there have been, when it was opened.
   [[nodiscard]] std::uint64_t next_serial() const { return next_serial_; }
-  // A sentence for each job whose row cannot be read; such rows stay as they are.
+  // A sentence for each job or worker whose row cannot be read; such rows stay as they are.
   [[nodiscard]] const std::vector<std::string>& problems() const { return problems_; }
+
+  // Workers that were lent nothing in earlier processes. Once.
+  [[nodiscard]] std::vector<WorkerStanding> TakeWorkers() { return std::move(workers_); }
+  // Keeps these, and nothing of those that are active. Waits for the disk. Errors: as
+  // StateStore::Save.
+  [[nodiscard]] Status SaveWorkers(const std::vector<WorkerStanding>& standings);
 
   // Errors: Refusal of what StateStore says.
   [[nodiscard]] Written BeginSave(const JournalEntry& entry, Duration running) override;
@@ -74,6 +81,7 @@ class DurableState final : public JobJournal {
   std::unique_ptr<BlobFiles> blobs_;
   std::unique_ptr<CheckpointFiles> checkpoints_;
   std::vector<JournalEntry> jobs_;
+  std::vector<WorkerStanding> workers_;
   std::uint64_t next_serial_ = 1;
   std::vector<std::string> problems_;
 };

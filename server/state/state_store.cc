@@ -12,7 +12,8 @@ namespace {
 
 // "Luce": what `file` shows of the database.
 constexpr std::int64_t kApplicationId = 0x4C756365;
-constexpr std::int64_t kVersion = 1;
+// 2 has workers.
+constexpr std::int64_t kVersion = 2;
 
 constexpr const char* kSchema = R"(
 CREATE TABLE coordinator (instance TEXT NOT NULL);
@@ -23,6 +24,15 @@ CREATE TABLE jobs (
   name TEXT NOT NULL,
   state TEXT NOT NULL,
   record BLOB NOT NULL
+);
+)";
+constexpr const char* kWorkersSchema = R"(
+CREATE TABLE workers (
+  id TEXT PRIMARY KEY NOT NULL,
+  state TEXT NOT NULL,
+  name TEXT NOT NULL,
+  reason TEXT NOT NULL,
+  has_lied INTEGER NOT NULL
 );
 )";
 
@@ -127,6 +137,7 @@ Status StateStore::SetUp(const std::string& new_instance) {
   if (tables == 0) {
     LUCERNA_RETURN_IF_ERROR(Run("BEGIN IMMEDIATE"));
     LUCERNA_RETURN_IF_ERROR(Run(kSchema));
+    LUCERNA_RETURN_IF_ERROR(Run(kWorkersSchema));
     {
       Statement insert(database_, "INSERT INTO coordinator VALUES (?)");
       insert.BindText(1, new_instance);
@@ -145,6 +156,10 @@ Status StateStore::SetUp(const std::string& new_instance) {
     return absl::FailedPreconditionError(absl::StrCat(
         path_, ": written by a newer version of Lucerna (format ", version,
         ", this one reads up to ", kVersion, "); start that version, or give another --state"));
+  } else if (version < kVersion) {
+    LUCERNA_RETURN_IF_ERROR(Run(absl::StrCat("BEGIN IMMEDIATE; ", kWorkersSchema,
+                                             "PRAGMA user_version=", kVersion, "; COMMIT")
+                                    .c_str()));
   }
   Statement select(database_, "SELECT instance FROM coordinator");
   if (select.Step() != SQLITE_ROW) return Fault();
@@ -211,15 +226,63 @@ Status StateStore::WriteTogether(std::span<const std::shared_ptr<Change>> change
   for (const std::shared_ptr<Change>& change : changes) {
     if (result.ok()) result = Make(*change);
   }
-  if (result.ok()) result = Run("COMMIT");
-  if (!result.ok()) {
-    // Unless SQLite has done so by itself.
-    if (sqlite3_get_autocommit(database_) == 0) Run("ROLLBACK").IgnoreError();
-    return result;
-  }
+  LUCERNA_RETURN_IF_ERROR(EndTransaction(result));
   for (const std::shared_ptr<Change>& change : changes)
     FailPoint(change->removes ? "job.removed" : "job.saved");
   return absl::OkStatus();
+}
+
+Status StateStore::EndTransaction(Status result) {
+  if (result.ok()) result = Run("COMMIT");
+  // Unless SQLite has done so by itself.
+  if (!result.ok() && sqlite3_get_autocommit(database_) == 0) Run("ROLLBACK").IgnoreError();
+  return result;
+}
+
+Status StateStore::SaveWorkers(std::span<const StoredWorker> saved,
+                               std::span<const std::string> removed) {
+  const MutexLock lock(mutex_);
+  FailPoint("workers.unsaved");
+  Status result = Run("BEGIN IMMEDIATE");
+  for (const StoredWorker& worker : saved) {
+    if (!result.ok()) break;
+    Statement statement(database_,
+                        "INSERT OR REPLACE INTO workers (id, state, name, reason, has_lied) "
+                        "VALUES (?, ?, ?, ?, ?)");
+    statement.BindText(1, worker.id);
+    statement.BindText(2, worker.state);
+    statement.BindText(3, worker.name);
+    statement.BindText(4, worker.reason);
+    statement.Bind(5, worker.has_lied ? 1 : 0);
+    if (statement.Step() != SQLITE_DONE) result = Fault();
+  }
+  for (const std::string& id : removed) {
+    if (!result.ok()) break;
+    Statement statement(database_, "DELETE FROM workers WHERE id = ?");
+    statement.BindText(1, id);
+    if (statement.Step() != SQLITE_DONE) result = Fault();
+  }
+  LUCERNA_RETURN_IF_ERROR(EndTransaction(result));
+  FailPoint("workers.saved");
+  return absl::OkStatus();
+}
+
+StatusOr<std::vector<StoredWorker>> StateStore::LoadWorkers() const {
+  const MutexLock lock(mutex_);
+  Statement statement(database_,
+                      "SELECT id, state, name, reason, has_lied FROM workers ORDER BY id");
+  std::vector<StoredWorker> workers;
+  int result = statement.Step();
+  for (; result == SQLITE_ROW; result = statement.Step()) {
+    sqlite3_stmt* const row = statement.get();
+    workers.push_back({.id = std::string(BytesOf(row, 0)),
+                       .state = std::string(BytesOf(row, 1)),
+                       .name = std::string(BytesOf(row, 2)),
+                       .reason = std::string(BytesOf(row, 3)),
+                       .has_lied = sqlite3_column_int64(row, 4) != 0});
+  }
+  if (result != SQLITE_DONE) return Fault();
+  return workers;
 }
 
 Status StateStore::Make(const Change& change) {

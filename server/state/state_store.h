@@ -1,11 +1,12 @@
-// Which jobs has a coordinator had, in all its lives?
+// Which jobs has a coordinator had, in all its lives, and which workers does it lend nothing?
 //
 // One row a job in an SQLite database, written through to the disk before a call returns: what was
 // saved outlives a crash and a power cut, and a row is as it was before a call or as it is after
 // it. Changes of several threads that come while the disk is busy share one transaction, and so one
 // sync of the disk: the first of these threads that waits writes them all. The record of a job is
 // bytes to this class; the columns beside it are what order and requests need, and what people look
-// up. One process at a time may have the database open.
+// up. Workers have rows of their own while they are in quarantine or drained. One process at a time
+// may have the database open.
 //
 // Threads: any.
 #pragma once
@@ -33,6 +34,14 @@ struct StoredJob {
   std::string name, state;   // for people
   std::string record;
   bool operator==(const StoredJob&) const = default;
+};
+
+struct StoredWorker {
+  std::string id;     // of its record
+  std::string state;  // "quarantined" or "draining"
+  std::string name, reason;
+  bool has_lied = false;
+  bool operator==(const StoredWorker&) const = default;
 };
 
 class StateStore {
@@ -63,6 +72,13 @@ class StateStore {
   [[nodiscard]] Written BeginSave(StoredJob job);
   [[nodiscard]] Written BeginRemove(std::uint64_t serial);
 
+  // Adds or replaces the rows of some workers and removes those of others, all or nothing; rows
+  // that are not there are removed already. Waits for the disk. Errors: as Save.
+  [[nodiscard]] Status SaveWorkers(std::span<const StoredWorker> saved,
+                                   std::span<const std::string> removed);
+  // By id. Errors: DATA_LOSS.
+  [[nodiscard]] StatusOr<std::vector<StoredWorker>> LoadWorkers() const;
+
   // All jobs, by serial number. Errors: DATA_LOSS.
   [[nodiscard]] StatusOr<std::vector<StoredJob>> Load() const;
   // Larger than that of any job there has been, removed ones too. Errors: DATA_LOSS.
@@ -86,6 +102,8 @@ class StateStore {
   [[nodiscard]] Status WriteTogether(std::span<const std::shared_ptr<Change>> changes)
       LUCERNA_REQUIRES(mutex_);
   [[nodiscard]] Status Make(const Change& change) LUCERNA_REQUIRES(mutex_);
+  // Ends a transaction with COMMIT, or without a change when what came before has failed.
+  [[nodiscard]] Status EndTransaction(Status result) LUCERNA_REQUIRES(mutex_);
   [[nodiscard]] Status Run(const char* sql) const LUCERNA_REQUIRES(mutex_);
   [[nodiscard]] Status Fault() const LUCERNA_REQUIRES(mutex_);
   [[nodiscard]] Status SetUp(const std::string& new_instance) LUCERNA_REQUIRES(mutex_);

@@ -343,7 +343,7 @@ class Farm {
     worker = std::move(fresh);
     worker.is_here = true;
     worker.arrived_at = now_;
-    worker.id = scheduler_->AddWorker(absl::StrCat("host", index), At(now_));
+    worker.id = scheduler_->AddWorker(absl::StrCat("host", index), At(now_)).value();
     CountCall();
     AfterFor(index, 0, [this, index] { Fetch(index); });
     AfterFor(index, 0, [this, index] { Heartbeat(index); });

@@ -208,6 +208,10 @@ TEST(SecureConnectionsTest, EachListenerOffersOnlyItsServices) {
   const ChildProcess worker({kBin + "/lucerna-worker", "--server", for_workers, "--threads", "1"});
   const std::string job = coordinator.Submit("glass-box.pbrt", 1, 10'000);
   EXPECT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
+  // Of what workers call, clients have what tracing a photon again needs.
+  const Finished traced = RunProgram(
+      {kBin + "/lucerna", "trace-photon", job, "0:7", "--server", coordinator.address()});
+  EXPECT_EQ(traced.exit_code, 0) << traced.errors;
 }
 
 }  // namespace

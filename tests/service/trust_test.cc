@@ -252,6 +252,25 @@ TEST_F(AuditedTest, AllWorkOfALiarIsTakenOut) {
   EXPECT_EQ(PixelsOf(job), QuietPixels(60));
 }
 
+TEST_F(AuditedTest, AJobInWhichTwoWorkersDisagreeWaitsForAThird) {
+  const std::string job = Submit(60);
+  IdleHandsWorker liar(service_, "liar");
+  const auto lie = TakeLeaseFrom(liar, 1);
+  ASSERT_TRUE(lie);
+  const WorkerThread second(service_);
+  while (service_.coordinator().ListWorkers().size() < 2)
+    std::this_thread::yield();
+  ASSERT_TRUE(liar.CommitBytes(*lie, Lie(liar, *lie)).ok());
+  const v1::Job paused = client_.WaitFor(job, {v1::JOB_STATE_PAUSED}).message;
+  EXPECT_EQ(paused.pause_cause(), v1::PAUSE_CAUSE_DISPUTE);
+  EXPECT_NE(paused.condition().find("different results"), std::string::npos) << paused.condition();
+  const WorkerThread third(service_);
+  const v1::Job ended = client_.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message;
+  ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
+  EXPECT_EQ(ended.pause_cause(), v1::PAUSE_CAUSE_UNSPECIFIED);
+  EXPECT_EQ(PixelsOf(job), QuietPixels(60));
+}
+
 TEST_F(AuditedTest, AnImageThatIsDoneSaysThatALiarHasAPartInIt) {
   const std::string done = Submit(4);
   IdleHandsWorker liar(service_, "liar");

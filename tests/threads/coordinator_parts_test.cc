@@ -58,12 +58,12 @@ TEST(CoordinatorPartsTest, FaultyWorkersTogetherMergeEveryPhotonOnce) {
   const auto now = [&] { return SteadyTime(std::chrono::milliseconds(now_ms++)); };
 
   RunThreads(4, [&](int thread) {
-    std::string worker = scheduler.AddWorker("w", now());
+    std::string worker = scheduler.AddWorker("w", now()).value();
     for (int round = 0; !merger.IsComplete(kPass); ++round) {
       Scheduler::Report report;
       report.wants_lease = true;
       if (!scheduler.TakeReport(worker, report, now()).ok()) {
-        worker = scheduler.AddWorker("w", now());
+        worker = scheduler.AddWorker("w", now()).value();
         continue;
       }
       const auto answer = scheduler.AnswerFor(worker, report, now());
@@ -171,12 +171,12 @@ TEST(CoordinatorPartsTest, FaultyWorkersTogetherMergeEveryPassOnce) {
       }
       return;
     }
-    std::string worker = scheduler.AddWorker("w", now());
+    std::string worker = scheduler.AddWorker("w", now()).value();
     for (int step = 0; !is_whole(); ++step) {
       Scheduler::Report report;
       report.wants_lease = true;
       if (!scheduler.TakeReport(worker, report, now()).ok()) {
-        worker = scheduler.AddWorker("w", now());
+        worker = scheduler.AddWorker("w", now()).value();
         continue;
       }
       const auto answer = scheduler.AnswerFor(worker, report, now());

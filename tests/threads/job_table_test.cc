@@ -480,16 +480,40 @@ TEST(JobTableTest, TimeStandsStillWhileAJobIsPausedAndItsEventsSayWhy) {
   const std::string job = Added(table, "a");
   ASSERT_TRUE(table.WaitForTurn());
   table.OnRunning(job, At(10));
-  table.SetCondition(job, "paused: no room", At(13));
-  table.SetCondition(job, "paused: no room", At(15));
+  table.SetCondition(job, PauseCause::kDisk, "paused: no room", At(13));
+  table.SetCondition(job, PauseCause::kDisk, "paused: no room", At(15));
   EXPECT_EQ(table.ReportOf(job, At(20))->running, std::chrono::seconds(3));
   EXPECT_EQ(table.ReportOf(job, At(20))->job.condition, "paused: no room");
-  table.SetCondition(job, "", At(20));
+  table.SetCondition(job, PauseCause::kDisk, "", At(20));
   EXPECT_EQ(table.ReportOf(job, At(24))->running, std::chrono::seconds(7));
   const std::vector<JobEvent> events = table.Find(job)->events;
   ASSERT_EQ(events.size(), 2U);
   EXPECT_EQ(events[0].what, "paused: no room");
   EXPECT_EQ(events[1].what, "went on");
+}
+
+// The disk's cause is reported once, a dispute at each tick.
+TEST(JobTableTest, ADisputeAndAFullDiskDoNotEndEachOther) {
+  JobTable table(SmallTable());
+  const std::string job = Added(table, "a");
+  ASSERT_TRUE(table.WaitForTurn());
+  table.OnRunning(job, At(0));
+  table.SetCondition(job, PauseCause::kDispute, "waits for another worker", At(1));
+  EXPECT_EQ(table.Find(job)->pause_cause, PauseCause::kDispute);
+  EXPECT_EQ(table.Find(job)->life.state(), JobState::kPaused);
+  table.SetCondition(job, PauseCause::kDisk, "", At(2));
+  EXPECT_EQ(table.Find(job)->pause_cause, PauseCause::kDispute);
+  table.SetCondition(job, PauseCause::kDisk, "paused: no room", At(3));
+  table.SetCondition(job, PauseCause::kDispute, "waits for another worker", At(4));
+  table.SetCondition(job, PauseCause::kDispute, "", At(5));
+  EXPECT_EQ(table.Find(job)->pause_cause, PauseCause::kDisk);
+  EXPECT_EQ(table.Find(job)->condition, "paused: no room");
+  table.SetCondition(job, PauseCause::kDisk, "", At(6));
+  EXPECT_EQ(table.Find(job)->pause_cause, PauseCause::kNone);
+  table.SetCondition(job, PauseCause::kDispute, "waits for another worker", At(7));
+  table.SetCondition(job, PauseCause::kDispute, "", At(8));
+  EXPECT_EQ(table.Find(job)->life.state(), JobState::kRunning);
+  EXPECT_EQ(table.Find(job)->condition, "");
 }
 
 JobTable::Options TwoAtOnce() {
@@ -699,7 +723,8 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
               (void)table.SetPriority(job, static_cast<int>(rng.Bits() % 3), At(1));
               break;
             case 10:
-              table.SetCondition(job, rng.Bits() % 2 == 0 ? "" : "paused: no room", At(1));
+              table.SetCondition(job, PauseCause::kDisk,
+                                 rng.Bits() % 2 == 0 ? "" : "paused: no room", At(1));
               table.SetLiveWorkers(static_cast<int>(rng.Bits() % 2), At(static_cast<int>(i)));
               break;
             default:

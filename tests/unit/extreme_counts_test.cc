@@ -56,7 +56,7 @@ TEST(ExtremeCountsTest, APassOfATrillionPhotonsIsLentAndMergedWhole) {
   const PassKey key = {"job", 0};
   merger.Open(key, 1, kTrillion, kCommonColumns);
   const SteadyTime now{};
-  const std::string worker = scheduler.AddWorker("w", now);
+  const std::string worker = scheduler.AddWorker("w", now).value();
   scheduler.OpenPass(key, kTrillion);
   Scheduler::Report report;
   report.wants_lease = true;

@@ -93,16 +93,18 @@ std::string Seen(const Job& job, Duration running) {
   return ToProto(report).DebugString();
 }
 
-// What the user paused, or a batch that failed, stays so; what waited for the disk tries again.
+// What the user paused, or a batch that failed, stays so; what waited for the disk, or for
+// a worker that decides, tries again.
 TEST(JobMessageTest, ARecordOfAPausedJobSaysWhoPausedIt) {
-  for (const PauseCause cause : {PauseCause::kUser, PauseCause::kFailedBatch, PauseCause::kDisk}) {
+  for (const PauseCause cause :
+       {PauseCause::kUser, PauseCause::kFailedBatch, PauseCause::kDisk, PauseCause::kDispute}) {
     Job job = FullJob();
     job.life = JobLife({.state = JobState::kPaused});
     job.pause_cause = cause;
     job.condition = "paused: why";
     const auto read = DecodeRecord(EncodeRecord(job, std::nullopt, Duration::zero()), kNow);
     ASSERT_TRUE(read.ok()) << read.status();
-    const bool goes_on = cause == PauseCause::kDisk;
+    const bool goes_on = cause == PauseCause::kDisk || cause == PauseCause::kDispute;
     EXPECT_EQ(read->job.life.state(), goes_on ? JobState::kQueued : JobState::kPaused);
     EXPECT_EQ(read->job.pause_cause, goes_on ? PauseCause::kNone : cause);
     EXPECT_EQ(read->job.condition, goes_on ? "" : "paused: why");

@@ -62,14 +62,14 @@ TEST(SchedulerTest, LendsAPassInOrderAndEachPhotonOnce) {
   scheduler.OpenPass(kFirst, 100);
   std::uint64_t next = 0;
   for (int i = 0; i < 3; ++i) {
-    const auto worker = scheduler.AddWorker("w", At(0));
+    const auto worker = scheduler.AddWorker("w", At(0)).value();
     const auto lease = Ask(scheduler, worker, 0);
     ASSERT_TRUE(lease);
     EXPECT_EQ(lease->range.first, next);
     next = lease->range.last;
   }
   EXPECT_EQ(next, 100U);
-  EXPECT_FALSE(Ask(scheduler, scheduler.AddWorker("w", At(0)), 0));
+  EXPECT_FALSE(Ask(scheduler, scheduler.AddWorker("w", At(0)).value(), 0));
 }
 
 // A lease whose job has gone cannot be handed over. The worker's call is still open, so the worker
@@ -77,7 +77,7 @@ TEST(SchedulerTest, LendsAPassInOrderAndEachPhotonOnce) {
 TEST(SchedulerTest, AWorkerThatCouldNotBeToldOfItsLeaseWaitsOn) {
   Scheduler scheduler(Batches(100));
   scheduler.OpenPass(kFirst, 100);
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   ASSERT_TRUE(Ask(scheduler, worker, 0));
   EXPECT_FALSE(scheduler.TakeWaiting(At(0)));
   scheduler.WaitAgain(worker);
@@ -91,7 +91,7 @@ TEST(SchedulerTest, CutsAPassByTheNumberOfWorkersButNotTooSmall) {
   Scheduler scheduler({});
   std::vector<std::string> workers;
   for (int i = 0; i < 4; ++i)
-    workers.push_back(scheduler.AddWorker("w", At(0)));
+    workers.push_back(scheduler.AddWorker("w", At(0)).value());
   scheduler.OpenPass(kFirst, 1'000'001);
   EXPECT_EQ(Ask(scheduler, workers[0], 0)->range.size(), 250'001U);
   scheduler.Close(kFirst);
@@ -110,14 +110,14 @@ TEST(SchedulerTest, GoesOnWithTheNextPassWhileTheFirstIsOut) {
   Scheduler scheduler(Batches(100));
   scheduler.OpenPass(kFirst, 100);
   scheduler.OpenPass(kSecond, 100);
-  EXPECT_EQ(Ask(scheduler, scheduler.AddWorker("a", At(0)), 0)->pass, kFirst);
-  EXPECT_EQ(Ask(scheduler, scheduler.AddWorker("b", At(0)), 0)->pass, kSecond);
+  EXPECT_EQ(Ask(scheduler, scheduler.AddWorker("a", At(0)).value(), 0)->pass, kFirst);
+  EXPECT_EQ(Ask(scheduler, scheduler.AddWorker("b", At(0)).value(), 0)->pass, kSecond);
 }
 
 TEST(SchedulerTest, LeavesTheLastBatchToAnIdleWorker) {
   Scheduler scheduler(Batches(50));
-  const auto busy = scheduler.AddWorker("busy", At(0));
-  const auto idle = scheduler.AddWorker("idle", At(0));
+  const auto busy = scheduler.AddWorker("busy", At(0)).value();
+  const auto idle = scheduler.AddWorker("idle", At(0)).value();
   scheduler.OpenPass(kFirst, 100);
   const auto held = Ask(scheduler, busy, 0);
   ASSERT_TRUE(held);
@@ -127,8 +127,8 @@ TEST(SchedulerTest, LeavesTheLastBatchToAnIdleWorker) {
 
 TEST(SchedulerTest, LendsAheadWhenThereIsEnoughForAll) {
   Scheduler scheduler(Batches(50));
-  const auto busy = scheduler.AddWorker("busy", At(0));
-  const auto idle = scheduler.AddWorker("idle", At(0));
+  const auto busy = scheduler.AddWorker("busy", At(0)).value();
+  const auto idle = scheduler.AddWorker("idle", At(0)).value();
   scheduler.OpenPass(kFirst, 150);
   const auto held = Ask(scheduler, busy, 0);
   EXPECT_TRUE(Ask(scheduler, busy, 0, {held->id}));
@@ -137,8 +137,8 @@ TEST(SchedulerTest, LendsAheadWhenThereIsEnoughForAll) {
 
 TEST(SchedulerTest, TakesBackALeaseThatRunsOutAndLendsTheSameRangeFirst) {
   Scheduler scheduler(Batches(50));
-  const auto silent = scheduler.AddWorker("silent", At(0));
-  const auto other = scheduler.AddWorker("other", At(0));
+  const auto silent = scheduler.AddWorker("silent", At(0)).value();
+  const auto other = scheduler.AddWorker("other", At(0)).value();
   scheduler.OpenPass(kFirst, 150);
   const auto lost = Ask(scheduler, silent, 0);
   EXPECT_EQ(Ask(scheduler, other, 9)->range, (WorkRange{50, 100}));
@@ -153,8 +153,8 @@ TEST(SchedulerTest, TakesBackALeaseThatRunsOutAndLendsTheSameRangeFirst) {
 
 TEST(SchedulerTest, GivesBackAtOnceWhatABrokenConnectionHeld) {
   Scheduler scheduler(Batches(100));
-  const auto killed = scheduler.AddWorker("killed", At(0));
-  const auto other = scheduler.AddWorker("other", At(0));
+  const auto killed = scheduler.AddWorker("killed", At(0)).value();
+  const auto other = scheduler.AddWorker("other", At(0)).value();
   scheduler.OpenPass(kFirst, 100);
   const auto lost = Ask(scheduler, killed, 0);
   EXPECT_EQ(scheduler.LiveWorkers(), 2);
@@ -165,7 +165,7 @@ TEST(SchedulerTest, GivesBackAtOnceWhatABrokenConnectionHeld) {
 
 TEST(SchedulerTest, ForgetsASilentWorkerAndTellsItSo) {
   Scheduler scheduler({});
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   scheduler.Expire(At(29));
   EXPECT_TRUE(scheduler.TakeReport(worker, {}, At(29)).ok());
   scheduler.Expire(At(58));
@@ -177,7 +177,7 @@ TEST(SchedulerTest, ForgetsASilentWorkerAndTellsItSo) {
 
 TEST(SchedulerTest, TakesBackWhatAWorkerThatAsksNoLongerMentions) {
   Scheduler scheduler(Batches(100));
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   scheduler.OpenPass(kFirst, 100);
   const auto dropped = Ask(scheduler, worker, 0);
   const auto again = Ask(scheduler, worker, 1);
@@ -188,7 +188,7 @@ TEST(SchedulerTest, TakesBackWhatAWorkerThatAsksNoLongerMentions) {
 
 TEST(SchedulerTest, AHeartbeatThatCrossesANewLeaseDoesNotTakeItBack) {
   Scheduler scheduler(Batches(100));
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   scheduler.OpenPass(kFirst, 100);
   const auto lease = Ask(scheduler, worker, 0);
   EXPECT_TRUE(Revoked(scheduler, worker, {}, 0.1).empty());
@@ -197,7 +197,7 @@ TEST(SchedulerTest, AHeartbeatThatCrossesANewLeaseDoesNotTakeItBack) {
 
 TEST(SchedulerTest, RevokesWhatIsOfNoUseAnyMore) {
   Scheduler scheduler(Batches(100));
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   scheduler.OpenPass(kFirst, 100);
   scheduler.OpenPass(kSecond, 100);
   const auto first = Ask(scheduler, worker, 0);
@@ -211,19 +211,19 @@ TEST(SchedulerTest, RevokesWhatIsOfNoUseAnyMore) {
 
 TEST(SchedulerTest, DoesNotLendARangeThatALateAnswerHasBrought) {
   Scheduler scheduler(Batches(100));
-  const auto late = scheduler.AddWorker("late", At(0));
+  const auto late = scheduler.AddWorker("late", At(0)).value();
   scheduler.OpenPass(kFirst, 100);
   const auto lease = Ask(scheduler, late, 0);
   scheduler.LoseWorker(late);
   scheduler.Commit(kFirst, lease->range, At(1));
-  EXPECT_FALSE(Ask(scheduler, scheduler.AddWorker("other", At(1)), 1));
+  EXPECT_FALSE(Ask(scheduler, scheduler.AddWorker("other", At(1)).value(), 1));
 }
 
 // Three batches of one second each, and a fourth that is out since `now_s` = 3.
 struct Straggling {
   Scheduler scheduler{Batches(100)};
-  std::string slow = scheduler.AddWorker("slow", At(0));
-  std::string idle = scheduler.AddWorker("idle", At(0));
+  std::string slow = scheduler.AddWorker("slow", At(0)).value();
+  std::string idle = scheduler.AddWorker("idle", At(0)).value();
   std::optional<BatchLease> lease;
 
   Straggling() {
@@ -242,12 +242,12 @@ TEST(SchedulerTest, LendsAStragglersBatchASecondTimeAndAThirdAndNotAFourth) {
   const auto doubled = Ask(s.scheduler, s.idle, 6.1);
   ASSERT_TRUE(doubled);
   EXPECT_EQ(doubled->range, s.lease->range);
-  const auto third_worker = s.scheduler.AddWorker("third", At(9));
+  const auto third_worker = s.scheduler.AddWorker("third", At(9)).value();
   EXPECT_FALSE(Ask(s.scheduler, third_worker, 9)) << "the second has not had its time";
   const auto third = Ask(s.scheduler, third_worker, 9.2);
   ASSERT_TRUE(third);
   EXPECT_EQ(third->range, s.lease->range);
-  EXPECT_FALSE(Ask(s.scheduler, s.scheduler.AddWorker("fourth", At(20)), 20));
+  EXPECT_FALSE(Ask(s.scheduler, s.scheduler.AddWorker("fourth", At(20)).value(), 20));
   s.scheduler.Commit(kFirst, doubled->range, At(21));
   EXPECT_EQ(Revoked(s.scheduler, s.slow, {s.lease->id}, 21), (std::vector{s.lease->id}));
   EXPECT_EQ(Revoked(s.scheduler, third_worker, {third->id}, 21), (std::vector{third->id}));
@@ -264,7 +264,7 @@ TEST(SchedulerTest, PoisonsABatchAtWhichThreeWorkersFailed) {
   scheduler.OpenPass(kFirst, 100);
   for (int i = 0; i < 3; ++i) {
     EXPECT_TRUE(scheduler.TakePoisoned().empty());
-    const auto worker = scheduler.AddWorker(absl::StrCat("host", i), At(i));
+    const auto worker = scheduler.AddWorker(absl::StrCat("host", i), At(i)).value();
     Fail(scheduler, worker, Ask(scheduler, worker, i).value(), i);
   }
   const auto poisoned = scheduler.TakePoisoned();
@@ -276,7 +276,7 @@ TEST(SchedulerTest, PoisonsABatchAtWhichThreeWorkersFailed) {
 TEST(SchedulerTest, PoisonsABatchThatALoneWorkerCannotDo) {
   Scheduler scheduler(Batches(100));
   scheduler.OpenPass(kFirst, 100);
-  const auto worker = scheduler.AddWorker("lone", At(0));
+  const auto worker = scheduler.AddWorker("lone", At(0)).value();
   int tries = 0;
   for (; tries < 100 && scheduler.TakePoisoned().empty(); ++tries) {
     Fail(scheduler, worker, Ask(scheduler, worker, tries).value(), tries);
@@ -288,7 +288,7 @@ TEST(SchedulerTest, AGoodbyeIsNoFailure) {
   Scheduler scheduler(Batches(100));
   scheduler.OpenPass(kFirst, 100);
   for (int i = 0; i < 10; ++i) {
-    const auto worker = scheduler.AddWorker("w", At(i));
+    const auto worker = scheduler.AddWorker("w", At(i)).value();
     ASSERT_TRUE(Ask(scheduler, worker, i));
     scheduler.RemoveWorker(worker);
   }
@@ -330,7 +330,7 @@ TEST(SchedulerRoundTest, LendsEachPassOnceInSlicesOfTheRound) {
       Scheduler scheduler({});
       std::vector<std::string> all;
       for (int i = 0; i < workers; ++i)
-        all.push_back(scheduler.AddWorker("w", At(0)));
+        all.push_back(scheduler.AddWorker("w", At(0)).value());
       const PassKey key = {"job", round.first};
       scheduler.OpenRound(key, {round.first, round.last}, {});
       const auto lease = Ask(scheduler, all[0], 0);
@@ -349,7 +349,7 @@ TEST(SchedulerRoundTest, LendsEachPassOnceInSlicesOfTheRound) {
 TEST(SchedulerRoundTest, LendsPartOfARoundInSlices) {
   for (std::uint64_t last = 65; last <= 72; ++last) {
     Scheduler scheduler({});
-    const auto worker = scheduler.AddWorker("w", At(0));
+    const auto worker = scheduler.AddWorker("w", At(0)).value();
     scheduler.OpenRound(kRound64, {64, last}, {});
     ExpectSlices(TakeAll(scheduler, worker), 64, last);
   }
@@ -363,7 +363,7 @@ TEST(SchedulerTest, SplitsAPassAmongAFewWorkersAtMost) {
   Scheduler scheduler(options);
   std::vector<std::string> workers;
   for (int i = 0; i < 10; ++i)
-    workers.push_back(scheduler.AddWorker("w", At(0)));
+    workers.push_back(scheduler.AddWorker("w", At(0)).value());
   scheduler.OpenPass({"job", 0}, 1000);
   int lent = 0;
   for (const std::string& worker : workers) {
@@ -383,7 +383,7 @@ TEST(SchedulerRoundTest, SlicesAreShorterTheMoreWorkersThereAre) {
     Scheduler scheduler({});
     std::string worker;
     for (int i = 0; i < workers; ++i)
-      worker = scheduler.AddWorker("w", At(0));
+      worker = scheduler.AddWorker("w", At(0)).value();
     scheduler.OpenRound(key, {512, 576}, {});
     return Ask(scheduler, worker, 0)->range.size();
   };
@@ -398,7 +398,7 @@ TEST(SchedulerRoundTest, SlicesAreShorterTheMoreWorkersThereAre) {
 
 TEST(SchedulerRoundTest, AllRoundsThatAreOpenAreShared) {
   Scheduler scheduler({});
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   scheduler.OpenRound(kRound64, {64, 72}, {});
   scheduler.OpenRound(kRound72, {72, 80}, {});
   // 16 passes for one worker, of which a round has 8.
@@ -407,8 +407,8 @@ TEST(SchedulerRoundTest, AllRoundsThatAreOpenAreShared) {
 
 TEST(SchedulerRoundTest, AWorkerThatHasLeftHasNoShare) {
   Scheduler scheduler({});
-  const auto worker = scheduler.AddWorker("w", At(0));
-  const auto lost = scheduler.AddWorker("lost", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
+  const auto lost = scheduler.AddWorker("lost", At(0)).value();
   scheduler.LoseWorker(lost);
   scheduler.OpenRound(kRound64, {64, 72}, {});
   EXPECT_EQ(Ask(scheduler, worker, 0)->range.size(), 4U);
@@ -419,7 +419,7 @@ TEST(SchedulerRoundTest, AWorkerThatHasLeftHasNoShare) {
 TEST(SchedulerRoundTest, SlicesAreShortWhenTimeRunsOut) {
   const PassKey key = {"job", 512};
   Scheduler scheduler({});
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   scheduler.OpenRound(key, {512, 576}, At(100));
   double now = 0;
   std::vector<std::uint64_t> sizes;
@@ -450,7 +450,7 @@ TEST(SchedulerRoundTest, SlicesAreShortWhenTimeRunsOut) {
 
 TEST(SchedulerRoundTest, TimesOfPhotonsSayNothingOfPasses) {
   Scheduler scheduler(Batches(100));
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   scheduler.OpenPass(kFirst, 400);
   for (int i = 0; i < 4; ++i)
     scheduler.Commit(kFirst, Ask(scheduler, worker, i)->range, At(i + 1));
@@ -464,13 +464,13 @@ TEST(SchedulerRoundTest, TimesOfPhotonsSayNothingOfPasses) {
 TEST(SchedulerRoundTest, SlicesThatComeBackGoOutFirstAndUnchanged) {
   const PassKey key = {"job", 512};
   Scheduler scheduler({});
-  const auto lost = scheduler.AddWorker("lost", At(0));
+  const auto lost = scheduler.AddWorker("lost", At(0)).value();
   scheduler.OpenRound(key, {512, 576}, {});
   const auto lease = Ask(scheduler, lost, 0);
   ASSERT_EQ(lease->range, (WorkRange{512, 528}));
   std::vector<std::string> others;
   for (int i = 0; i < 50; ++i)
-    others.push_back(scheduler.AddWorker("other", At(0)));
+    others.push_back(scheduler.AddWorker("other", At(0)).value());
   EXPECT_EQ(Ask(scheduler, others[0], 0)->range, (WorkRange{528, 529}));
   scheduler.LoseWorker(lost);
   const auto again = Ask(scheduler, others[1], 1);
@@ -484,7 +484,7 @@ TEST(SchedulerRoundTest, SlicesThatComeBackGoOutFirstAndUnchanged) {
 TEST(SchedulerRoundTest, SlicesStayAlignedWhenWorkersComeAndGo) {
   const PassKey key = {"job", 512};
   Scheduler scheduler({});
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   scheduler.OpenRound(key, {512, 576}, {});
   std::vector<WorkRange> slices;
   std::vector<std::string> others;
@@ -493,7 +493,7 @@ TEST(SchedulerRoundTest, SlicesStayAlignedWhenWorkersComeAndGo) {
     scheduler.Commit(key, lease->range, At(step));
     // 1, 41 and 11 workers in turn.
     while (others.size() < (step % 3 == 0 ? 40U : 0U))
-      others.push_back(scheduler.AddWorker("other", At(step)));
+      others.push_back(scheduler.AddWorker("other", At(step)).value());
     while (others.size() > (step % 3 == 1 ? 10U : 0U) && step % 3 != 0) {
       scheduler.RemoveWorker(others.back());
       others.pop_back();
@@ -508,19 +508,19 @@ TEST(SchedulerRoundTest, SlicesStayAlignedWhenWorkersComeAndGo) {
 
 TEST(SchedulerRoundTest, ASliceThatALateAnswerHasBroughtIsNotLentAgain) {
   Scheduler scheduler({});
-  const auto late = scheduler.AddWorker("late", At(0));
+  const auto late = scheduler.AddWorker("late", At(0)).value();
   scheduler.OpenRound(kRound64, {64, 65}, {});
   const auto lease = Ask(scheduler, late, 0);
   scheduler.LoseWorker(late);
   scheduler.Commit(kRound64, lease->range, At(1));
-  EXPECT_FALSE(Ask(scheduler, scheduler.AddWorker("other", At(1)), 1));
+  EXPECT_FALSE(Ask(scheduler, scheduler.AddWorker("other", At(1)).value(), 1));
 }
 
 TEST(SchedulerRoundTest, ARoundEndsEarlierAndLater) {
   Scheduler scheduler({});
   std::vector<std::string> workers;
   for (int i = 0; i < 8; ++i)
-    workers.push_back(scheduler.AddWorker("w", At(0)));
+    workers.push_back(scheduler.AddWorker("w", At(0)).value());
   scheduler.OpenRound(kRound64, {64, 72}, {});
   const auto first = Ask(scheduler, workers[0], 0);
   ASSERT_EQ(first->range, (WorkRange{64, 65}));
@@ -544,7 +544,7 @@ TEST(SchedulerRoundTest, ARoundEndsEarlierAndLater) {
 
 TEST(SchedulerRoundTest, ANewTimeLimitMakesSlicesShorter) {
   Scheduler scheduler({});
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   scheduler.OpenRound(kRound64, {64, 72}, {});
   scheduler.SetRoundEnd(kRound64, 72, At(10));
   EXPECT_EQ(Ask(scheduler, worker, 0)->range.size(), 1U);
@@ -552,7 +552,7 @@ TEST(SchedulerRoundTest, ANewTimeLimitMakesSlicesShorter) {
 
 TEST(SchedulerRoundTest, AClosedRoundRevokesItsSlices) {
   Scheduler scheduler({});
-  const auto worker = scheduler.AddWorker("w", At(0));
+  const auto worker = scheduler.AddWorker("w", At(0)).value();
   scheduler.OpenRound(kRound64, {64, 72}, {});
   const auto lease = Ask(scheduler, worker, 0);
   scheduler.Close(kRound64);
@@ -564,7 +564,7 @@ TEST(SchedulerRoundTest, AClosedRoundRevokesItsSlices) {
 // passes it has.
 TEST(SchedulerRoundTest, ALongSliceIsNoStraggler) {
   Scheduler scheduler({});
-  const auto quick = scheduler.AddWorker("quick", At(0));
+  const auto quick = scheduler.AddWorker("quick", At(0)).value();
   for (std::uint64_t first = 0; first < 3; ++first) {
     const PassKey key = {"job", first};
     scheduler.OpenRound(key, {first, first + 1}, {});
@@ -574,10 +574,10 @@ TEST(SchedulerRoundTest, ALongSliceIsNoStraggler) {
   }
   scheduler.OpenRound(kRound64, {64, 72}, {});
   scheduler.OpenRound(kRound72, {72, 80}, {});
-  const auto slow = scheduler.AddWorker("slow", At(30));
+  const auto slow = scheduler.AddWorker("slow", At(30)).value();
   scheduler.RemoveWorker(quick);
   ASSERT_EQ(Ask(scheduler, slow, 30)->range, (WorkRange{64, 72}));
-  const auto idle = scheduler.AddWorker("idle", At(30));
+  const auto idle = scheduler.AddWorker("idle", At(30)).value();
   while (const auto lease = Ask(scheduler, idle, 30))
     scheduler.Commit(lease->pass, lease->range,
                      At(30.0 + 10.0 * static_cast<double>(lease->range.size())));
@@ -592,7 +592,7 @@ TEST(SchedulerRoundTest, ASliceAtWhichThreeWorkersFailedNamesItsPasses) {
   Scheduler scheduler({});
   scheduler.OpenRound(kRound64, {64, 66}, {});
   for (int i = 0; i < 3; ++i) {
-    const auto worker = scheduler.AddWorker("w", At(i));
+    const auto worker = scheduler.AddWorker("w", At(i)).value();
     Fail(scheduler, worker, Ask(scheduler, worker, i).value(), i);
   }
   const auto poisoned = scheduler.TakePoisoned();

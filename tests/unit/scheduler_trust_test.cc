@@ -39,7 +39,7 @@ class SchedulerTrustTest : public testing::Test {
   explicit SchedulerTrustTest(const SchedulerOptions& options = Options()) : scheduler_(options) {}
 
   std::string Join(const std::string& name, double now_s = 0, const std::string& identity = {}) {
-    return scheduler_.AddWorker(name, At(now_s), identity);
+    return scheduler_.AddWorker(name, At(now_s), identity).value();
   }
   std::optional<BatchLease> Ask(const std::string& worker, double now_s,
                                 std::vector<std::string> held = {}) {
@@ -364,7 +364,7 @@ TEST_F(SchedulerTrustTest, ABatchThatIsSlowForGoodReasonGetsMoreTimeEachTime) {
   options.renew_unknown = std::chrono::seconds(100);
   Scheduler scheduler(options);
   scheduler.OpenPass(kPass, 100);
-  const std::string slow = scheduler.AddWorker("slow", At(0));
+  const std::string slow = scheduler.AddWorker("slow", At(0)).value();
   double now = 0;
   for (const double limit : {100.0, 200.0, 400.0}) {
     Scheduler::Report report;
@@ -624,6 +624,19 @@ TEST(AuditTest, TheShareOfBatchesThatAreAuditedIsThatOfTheOptions) {
   }
   // Of 1000 flips of a coin, six standard deviations.
   EXPECT_NEAR(same, 500, 95);
+}
+
+TEST(SchedulerLimitsTest, APeerHasSoManyRegistrationsAndOthersHaveTheirOwn) {
+  SchedulerOptions options;
+  options.max_registrations = 2;
+  Scheduler scheduler(options);
+  ASSERT_TRUE(scheduler.AddWorker("a", At(0), "one", "peer").ok());
+  ASSERT_TRUE(scheduler.AddWorker("b", At(0), "two", "peer").ok());
+  EXPECT_TRUE(absl::IsResourceExhausted(scheduler.AddWorker("c", At(0), "three", "peer").status()));
+  EXPECT_TRUE(scheduler.AddWorker("c", At(0), "three", "other").ok());
+  // A worker that comes back takes its own place.
+  EXPECT_TRUE(scheduler.AddWorker("a", At(1), "one", "peer").ok());
+  EXPECT_TRUE(absl::IsResourceExhausted(scheduler.AddWorker("d", At(1), "four", "peer").status()));
 }
 
 }  // namespace

@@ -59,6 +59,39 @@ TEST(StateStoreTest, HasAllJobsAtTheNextStart) {
             (std::vector<StoredJob>{JobNumber(1, bytes), changed, JobNumber(3)}));
 }
 
+TEST(StateStoreTest, HasTheWorkersThatWereSavedAndNotRemoved) {
+  const TemporaryFolder folder;
+  const StoredWorker liar = {"a", "quarantined", "host", "it lies", true};
+  StoredWorker slow = {"b", "quarantined", "slow", "it stalls", false};
+  const std::vector<StoredWorker> first = {liar, slow, {"c", "draining", "", "", false}};
+  {
+    const auto store = StateStore::Open(folder.At("db"), "first").value();
+    EXPECT_EQ(store->LoadWorkers().value().size(), 0U);
+    ASSERT_TRUE(store->SaveWorkers(first, {}).ok());
+    slow.state = "draining";
+    const std::vector<std::string> removed = {"c", "unknown"};
+    ASSERT_TRUE(store->SaveWorkers({&slow, 1}, removed).ok());
+  }
+  const auto store = StateStore::Open(folder.At("db"), "second").value();
+  EXPECT_EQ(store->LoadWorkers().value(), (std::vector<StoredWorker>{liar, slow}));
+}
+
+TEST(StateStoreTest, ADatabaseOfTheFirstVersionKeepsItsJobsAndMayHaveWorkers) {
+  const TemporaryFolder folder;
+  {
+    const auto store = StateStore::Open(folder.At("db"), "first").value();
+    ASSERT_TRUE(store->Save(JobNumber(1)).ok());
+  }
+  RunSql(folder.At("db"), "DROP TABLE workers; PRAGMA user_version=1");
+  const StoredWorker worker = {"a", "draining", "host", "", false};
+  for (int start = 0; start < 2; ++start) {
+    const auto store = StateStore::Open(folder.At("db"), "second").value();
+    EXPECT_EQ(store->Load().value(), std::vector{JobNumber(1)});
+    ASSERT_TRUE(store->SaveWorkers({&worker, 1}, {}).ok());
+    EXPECT_EQ(store->LoadWorkers().value(), std::vector{worker});
+  }
+}
+
 TEST(StateStoreTest, ChangesThatWaitReachTheDiskTogetherAndInOrder) {
   const TemporaryFolder folder;
   {
@@ -140,7 +173,7 @@ TEST(StateStoreTest, OneCoordinatorAtATime) {
 TEST(StateStoreTest, RefusesANewerVersionAndOtherPeoplesFiles) {
   const TemporaryFolder folder;
   ASSERT_TRUE(StateStore::Open(folder.At("db"), "i").ok());
-  RunSql(folder.At("db"), "PRAGMA user_version=2");
+  RunSql(folder.At("db"), "PRAGMA user_version=1000");
   const auto newer = StateStore::Open(folder.At("db"), "i");
   EXPECT_TRUE(absl::IsFailedPrecondition(newer.status()));
   EXPECT_THAT(std::string(newer.status().message()), HasSubstr("newer version"));
