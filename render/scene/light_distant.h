@@ -1,8 +1,11 @@
 // Parallel light from infinity. Members as in scene/light_list.h.
 #pragma once
 
+#include <cstdint>
+
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
+#include "render/scene/medium.h"
 
 namespace lucerna {
 

@@ -155,7 +155,9 @@ TEST(SceneBytesTest, HostileNestingAndListsEnd) {
   };
   EXPECT_FALSE(SceneFromBytes(repeated("AttributeBegin\n", 50'000)).ok());
   EXPECT_FALSE(SceneFromBytes(repeated("Attribute \"shape\" \"float a\" 1\n", 10'000)).ok());
-  EXPECT_FALSE(SceneFromBytes(repeated("Scale 1e-30 1e-30 1e-30\n", 100)).ok());
+  EXPECT_FALSE(SceneFromBytes(repeated("Scale 1e30 1e30 1e30\n", 100)).ok());
+  // A transform that flattens everything is none that a scene cannot have.
+  EXPECT_TRUE(SceneFromBytes(repeated("Scale 1e-30 1e-30 1e-30\n", 100)).ok());
   EXPECT_FALSE(SceneFromBytes(repeated("Include \"fuzz.pbrt\"\n", 100)).ok());
   EXPECT_FALSE(SceneFromBytes(repeated("unknown [ \"words\" ]\n", 40'000)).ok());
   // Warned of, and at most a hundred times.

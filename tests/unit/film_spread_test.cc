@@ -188,8 +188,8 @@ TEST(FilmSpreadTest, GivesACropWindowWhatTheWholeImageHas) {
   }
 }
 
-// A corner of the light covers a thousandth of a pixel: a single path a pass would meet it in one of
-// two passes of 1000. Outlines are near four pixels of 256, which leaves four paths for each.
+// A corner of the light covers a thousandth of a pixel: a single path a pass would meet it in one
+// of two passes of 1000. Outlines are near four pixels of 256, which leaves four paths for each.
 TEST(FilmSpreadTest, KnowsHowMuchOfAPixelTheCornerOfALightCovers) {
   constexpr int kPasses = 512;
   constexpr int kPaths = 4;
