@@ -271,7 +271,7 @@ class NeedsFinder {
     glossy_ = First([](const Material& m) {
       const MaterialProperties properties = PropertiesOf(m);
       if (!properties.has_parts) return properties.gathers && !properties.is_separable;
-      MaterialNumbers second = m;
+      Material second = m;
       second.parts = Parts::kSecond;
       return properties.gathers && !PropertiesOf(second).is_separable;
     });
