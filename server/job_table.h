@@ -12,7 +12,7 @@
 // Ended jobs are remembered, with the images of the newest; the very newest also with all their
 // photons, so that they can go on (server/job_retention.h).
 //
-// With a journal, what a request changes is on the disk before it returns, and nobody sees a new
+// With a journal, what a request changes is on the disk before it returns, and no client sees a new
 // job before that. Where that fails, a new job is refused; any other change holds in memory and is
 // written by SaveUnsaved as soon as it can be.
 //

@@ -99,7 +99,7 @@ TEST(PbrtMediaTest, WhatIsWrongIsSaid) {
       HasSubstr("preset"));
   EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"rgb Le\" [1 1 1]"),
               HasSubstr("media do not emit light"));
-  EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"float g\" 1"),
+  EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"float g\" 0.995"),
               HasSubstr("g"));
 }
 

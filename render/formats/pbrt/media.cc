@@ -7,8 +7,9 @@
 namespace lucerna {
 namespace {
 
-// A phase function that scatters into a single direction has no density.
-constexpr Range kMeanCosine = {-0.999, 0.999};
+// Nearer to 1, single photons straight ahead would weigh more than the sums of a pass have room for
+// (FluxScale::HasRoomFor), and the image would be too dark.
+constexpr Range kMeanCosine = {-0.99, 0.99};
 
 }  // namespace
 
