@@ -381,8 +381,8 @@ StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) const {
 StatusOr<Coordinator::Description> Coordinator::Describe(const std::string& job_id) const {
   const std::optional<Job> job = jobs_.Find(job_id);
   if (!job) return absl::NotFoundError(absl::StrCat("there is no job ", job_id));
-  return Description{job->manifest, job->settings, job->needs, job->photon_steps,
-                     options_.numeric_profile};
+  return Description{job->manifest,     job->settings, job->needs,
+                     job->photon_steps, job->guides,   options_.numeric_profile};
 }
 
 StatusOr<Blob> Coordinator::Encode(const JobTable::ImageSource& source, RenderResult result) const {
@@ -629,6 +629,7 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, M
                          id](std::string warning) { jobs_.OnWarning(id, std::move(warning)); },
           .on_photon_steps = [this,
                               id](PhotonSteps steps) { jobs_.OnPhotonSteps(id, std::move(steps)); },
+          .on_guides = [this, id](GuideSteps guides) { jobs_.OnGuides(id, std::move(guides)); },
           .on_work_opened = [this] { AnswerParked(); },
           .on_progress = [this, id](std::int64_t passes) { jobs_.OnProgress(id, passes); },
           .on_round_merged = [this, id](

@@ -106,6 +106,7 @@ class Coordinator {
     RenderSettings settings;
     SceneNeeds needs;
     PhotonSteps photon_steps;
+    GuideSteps guides;
     std::string numeric_profile;
   };
   // Errors: NOT_FOUND.

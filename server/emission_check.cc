@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "render/transport/photon_guide.h"
+
 namespace lucerna {
 namespace {
 
@@ -36,6 +38,7 @@ EmissionCheck::EmissionCheck(const LightSet& lights) {
   const double rounding = kRounding + kRoundingOfTerm * emitters;
   const double even_share = sending > 1 ? kEvenPhotonShare : 0;
   for (const LightGroup& light : lights.lights()) {
+    may_emit_less_ |= !is_ordinary || light.kind == EmitterKind::kSpot || light.lights > 1;
     if (!is_ordinary) {
       lights_.push_back({0, kLargestEnergy});
       continue;
@@ -54,11 +57,41 @@ EmissionCheck::EmissionCheck(const LightSet& lights) {
   }
 }
 
-Status EmissionCheck::Check(const BatchTally& tally) const {
+Status EmissionCheck::CheckGuided(const BatchTally& tally) const {
+  const auto photons = static_cast<double>(tally.photons);
+  if (photons == 0) return absl::OkStatus();
+  double most_of_photon = 0;
+  for (const Range& range : lights_)
+    most_of_photon = std::max(most_of_photon, range.most);
+  most_of_photon /= kUnguidedShare;
+  // Drawn by whatever density, a photon's energy is the scene's power on average, and its square at
+  // most that times the largest. Bernstein's inequality: with x = t / mean, the mean of n is off by
+  // t with a probability of at most 2 exp(-n x² / (2 (r + r x / 3))), r = largest / mean.
+  const double mean = std::ldexp(1.0, kEnergyBits);
+  const double r = most_of_photon / mean;
+  constexpr double kLogOfChance = 28.3;
+  const double b = 2 * kLogOfChance * r / (3 * photons);
+  const double x = 0.5 * (b + std::sqrt(b * b + 8 * kLogOfChance * r / photons));
+  const double missing =
+      static_cast<double>(kMayBeMissing + tally.photons / kOneMissingOf + tally.dropped);
+  const double most = photons * (mean * (1 + x + kRounding) + 1);
+  const double least =
+      may_emit_less_ ? 0 : photons * (mean * (1 - x - kRounding) - 1) - missing * most_of_photon;
+  const auto emitted = static_cast<double>(tally.energy.emitted);
+  if (emitted > most || emitted < least) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("its photons were emitted with the energy ", tally.energy.emitted,
+                     ", and what the lights emit is between ", least, " and ", most));
+  }
+  return absl::OkStatus();
+}
+
+Status EmissionCheck::Check(const BatchTally& tally, bool is_guided) const {
   if (lights_.empty()) return absl::OkStatus();
   if (tally.lights.size() > lights_.size()) {
     return absl::InvalidArgumentError("its photons come from more lights than the scene has");
   }
+  if (is_guided) return CheckGuided(tally);
   std::uint64_t sent = 0;
   double least = 0;
   double most = 0;

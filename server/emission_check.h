@@ -20,16 +20,21 @@ class EmissionCheck {
   explicit EmissionCheck(const LightSet& lights);
 
   // Errors: INVALID_ARGUMENT when photons were sent by other lights than there are, not all were
-  // sent by some light, or the energy emitted is not that of so many photons. Takes a time that
-  // grows with the number of lights, of which there are at most kMaxLightTallies.
-  [[nodiscard]] Status Check(const BatchTally& tally) const;
+  // sent by some light, or the energy emitted is not that of so many photons; of photons that are
+  // drawn by a guide (`is_guided`), whose flux differs, not what so many could have by chance in
+  // one result of a million million. Takes a time that grows with the number of lights, of which
+  // there are at most kMaxLightTallies.
+  [[nodiscard]] Status Check(const BatchTally& tally, bool is_guided = false) const;
 
  private:
   // Of one photon [units of EnergyCounters].
   struct Range {
     double least = 0, most = 0;
   };
+  [[nodiscard]] Status CheckGuided(const BatchTally& tally) const;
+
   std::vector<Range> lights_;
+  bool may_emit_less_ = false;  // spots, and lights that are counted together
 };
 
 }  // namespace lucerna

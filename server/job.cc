@@ -128,6 +128,7 @@ void Job::ClearProgress() {
   pass_record = PassRecord();
   tail = PassTally();
   photon_steps.clear();
+  guides.clear();
   workers.clear();
 }
 

@@ -27,6 +27,7 @@
 #include "render/base/clock.h"
 #include "render/base/digest.h"
 #include "render/estimate/accumulation.h"
+#include "render/estimate/guide_learning.h"
 #include "render/estimate/photon_steps.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
@@ -235,6 +236,7 @@ struct Job {
   PassRecord pass_record;                      // of whole rounds
   PassTally tail;                              // of the passes after them, when the job has stopped
   PhotonSteps photon_steps;                    // of the passes opened so far
+  GuideSteps guides;                           // the same
   std::map<std::string, WorkerShare> workers;  // by id of their records
   // Of them, those of which a result was found to be wrong: nothing of theirs may be in the image.
   std::set<std::string> distrusted;

@@ -16,6 +16,7 @@
 #include "render/base/parallel.h"
 #include "render/base/text.h"
 #include "render/estimate/evidence.h"
+#include "render/estimate/guide_learning.h"
 #include "render/estimate/missing_light.h"
 #include "render/estimate/noise_layer.h"
 #include "render/estimate/photon_steps.h"
@@ -84,6 +85,65 @@ std::string NameOf(const LightGroup& light, std::size_t number, double unit) {
   return Concat("light ", number, " (", described(), ")");
 }
 
+// Of every pixel, the square of what a photon of even flux found by it adds to its value, relative
+// to that value (GuideLearner::Next). Values are means over a few pixels: a photon must not make
+// its own pixel bright.
+std::vector<float> PhotonScores(const ImageSums& sums, const RadiusColumn& radii, int width) {
+  constexpr int kReach = 2;         // pixels
+  constexpr double kFloor = 0.1;    // of the mean value, as in relative errors
+  constexpr double kLargest = 1e4;  // of the mean score
+  const std::size_t pixels = sums.pixels();
+  const auto columns = static_cast<std::ptrdiff_t>(width);
+  const auto rows = static_cast<std::ptrdiff_t>(pixels) / columns;
+  std::vector<double> values(pixels);
+  std::vector<double> scores(pixels, -1);  // below 0: unknown
+  double mean_value = 0;
+  double mean_factor = 0;
+  double known = 0;
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    const RgbSum radiance = sums.At(pixel).radiance();
+    values[pixel] = std::max(0.0, WorkingLuminance(radiance[0], radiance[1], radiance[2])) /
+                    static_cast<double>(sums.passes());
+    mean_value += values[pixel] / static_cast<double>(pixels);
+    const ImageSums::Features features = sums.FeaturesAt(pixel);
+    if (!(features.hitpoints > 0 && features.hits > 0)) continue;
+    const double radius = static_cast<double>(radii[pixel]) *
+                          static_cast<double>(features.unit_radius / features.hitpoints);
+    const Rgb albedo = features.albedo / features.hits;
+    scores[pixel] = WorkingLuminance(static_cast<double>(albedo.r), static_cast<double>(albedo.g),
+                                     static_cast<double>(albedo.b)) /
+                    std::max(radius * radius, 1e-36);
+    mean_factor += scores[pixel];
+    ++known;
+  }
+  std::vector<float> result(pixels, 1.0F);
+  if (!(mean_value > 0) || !(mean_factor > 0)) return result;
+  mean_factor /= known;
+  double mean_score = 0;
+  for (std::ptrdiff_t y = 0; y < rows; ++y) {
+    for (std::ptrdiff_t x = 0; x < columns; ++x) {
+      double value = 0;
+      double around = 0;
+      for (std::ptrdiff_t v = std::max<std::ptrdiff_t>(0, y - kReach);
+           v <= std::min(rows - 1, y + kReach); ++v) {
+        for (std::ptrdiff_t u = std::max<std::ptrdiff_t>(0, x - kReach);
+             u <= std::min(columns - 1, x + kReach); ++u) {
+          value += values[static_cast<std::size_t>(v * columns + u)];
+          ++around;
+        }
+      }
+      double& score = scores[static_cast<std::size_t>(y * columns + x)];
+      const double factor = score < 0 ? 1 : score / mean_factor;
+      const double relative = factor / (value / around / mean_value + kFloor);
+      score = relative * relative;
+      mean_score += score / static_cast<double>(pixels);
+    }
+  }
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel)
+    result[pixel] = static_cast<float>(std::min(scores[pixel] / mean_score, kLargest));
+  return result;
+}
+
 Status CheckPower(Rgb power_w) {
   if (IsFinite(power_w) && std::isfinite(Luminance(power_w))) return absl::OkStatus();
   return absl::InvalidArgumentError(
@@ -117,8 +177,10 @@ struct JobEstimator::State {
   struct After {
     std::shared_ptr<const RadiusColumn> radii;
     std::uint64_t photons_per_pass = 0;
+    std::shared_ptr<const PhotonGuide> guide = nullptr;  // nullptr: photons are drawn evenly
   };
   std::map<std::uint64_t, After> after;
+  std::unique_ptr<GuideLearner> learner;           // of jobs whose photons are drawn by guides
   std::shared_ptr<const RadiusColumn> last_radii;  // of the last round added
   // Of the last estimate, and after how many passes that was.
   Mutex noise_area_mutex;
@@ -145,6 +207,32 @@ struct JobEstimator::State {
     }
     const auto first = static_cast<std::uint64_t>(settings.photons_per_pass);
     return NextPhotons(before, choice->most * first, best_photons);
+  }
+
+  // By what later passes draw their photons once `round` is added, given by what they would by what
+  // was known before.
+  [[nodiscard]] std::shared_ptr<const PhotonGuide> ChooseGuide(
+      const SliceSums& round, const RoundPlan& plan, std::uint64_t photons_per_pass,
+      const std::shared_ptr<const PhotonGuide>& before) {
+    if (learner == nullptr) return nullptr;
+    learner->Add(round.reports, plan.guide, round.tally.photons);
+    if (!IsGuidePass(round.passes.last)) return before;
+    return std::make_shared<const PhotonGuide>(
+        learner->Next(round.passes.last, photons_per_pass,
+                      PhotonScores(*sums, *plan.radii, settings.crop_width()),
+                      [this](const PrimaryNumbers& numbers) { return FluxAt(numbers); }));
+  }
+
+  // Luminance of the flux of a photon that is drawn evenly, over the power of all lights.
+  [[nodiscard]] double FluxAt(const PrimaryNumbers& numbers) const {
+    Emission emission;
+    const auto single = [&](std::size_t d) { return static_cast<float>(numbers[d]); };
+    if (!prepared.lights().SampleEmission(numbers[4], single(0), single(1), single(2), single(3),
+                                          emission)) {
+      return 0;
+    }
+    return static_cast<double>(Luminance(emission.flux)) /
+           static_cast<double>(Luminance(prepared.lights().TotalPower()));
   }
 
   // Radiance over all passes, Rec. 709.
@@ -176,8 +264,13 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   state->sums = std::make_unique<ImageSums>(pixels);
   if (settings.adaptive_photons) state->variance = std::make_unique<PassVariance>(pixels);
   state->last_radii = std::make_shared<const RadiusColumn>(state->radii->Current());
-  state->after[0] = {.radii = state->last_radii,
-                     .photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass)};
+  const auto photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass);
+  state->after[0] = {.radii = state->last_radii, .photons_per_pass = photons_per_pass};
+  if (!settings.unguided && prepared.needs().Uses(Part::kPhotons)) {
+    state->learner = std::make_unique<GuideLearner>();
+    state->after[0].guide =
+        std::make_shared<const PhotonGuide>(GuideLearner::First(photons_per_pass));
+  }
   state->has_smooth_surfaces = HasSmoothSurfaces(prepared.scene());
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));
 }
@@ -197,7 +290,8 @@ std::optional<RoundPlan> JobEstimator::PlanFor(const PassRange& round) const {
                    .radii = after->second.radii,
                    .caustic_radius = static_cast<float>(
                        static_cast<double>(state_->initial_radius) *
-                       ScheduledShrink(state_->settings.alpha, {0, round.first}))};
+                       ScheduledShrink(state_->settings.alpha, {0, round.first})),
+                   .guide = after->second.guide};
 }
 
 SliceShape JobEstimator::ShapeOf(const PassRange& round, const RoundPlan& plan) const {
@@ -229,9 +323,11 @@ void JobEstimator::AddRound(const SliceSums& round, const RoundPlan& plan) {
   state.radii->Step(round, *plan.radii, state.team);
   state.last_radii = plan.radii;
   const std::uint64_t passes = whole_passes();
-  state.after[passes] = {.radii = std::make_shared<const RadiusColumn>(state.radii->Current()),
-                         .photons_per_pass = state.ChoosePhotons(
-                             round, state.after.rbegin()->second.photons_per_pass)};
+  const State::After before = state.after.rbegin()->second;
+  State::After& after = state.after[passes];
+  after.radii = std::make_shared<const RadiusColumn>(state.radii->Current());
+  after.photons_per_pass = state.ChoosePhotons(round, before.photons_per_pass);
+  after.guide = state.ChooseGuide(round, plan, after.photons_per_pass, before.guide);
   // Rounds that are still to be planned, or to be planned again by a job that goes on, need these;
   // the newest is what the next choice of photons follows from.
   std::set<std::uint64_t> needed = {passes};
@@ -521,7 +617,9 @@ void JobEstimator::Save(ByteWriter& writer) const {
     writer.Varint(passes);
     writer.Varint(after.photons_per_pass);
     WriteRadii(writer, *after.radii);
+    if (state.learner != nullptr) WriteGuide(writer, *after.guide);
   }
+  if (state.learner != nullptr) WriteLearned(writer, state.learner->numbers());
   {
     const MutexLock lock(state_->noise_area_mutex);
     WriteDouble(writer, state_->noise_area);
@@ -555,6 +653,13 @@ Status JobEstimator::Restore(ByteReader& reader) {
     State::After& of_passes = after[passes];
     of_passes.photons_per_pass = reader.Varint();
     LUCERNA_ASSIGN_OR_RETURN(of_passes.radii, read_radii());
+    if (state.learner == nullptr) continue;
+    LUCERNA_ASSIGN_OR_RETURN(PhotonGuide guide, ReadGuide(reader));
+    of_passes.guide = std::make_shared<const PhotonGuide>(std::move(guide));
+  }
+  GuideLearner::Numbers learned;
+  if (state.learner != nullptr) {
+    LUCERNA_ASSIGN_OR_RETURN(learned, ReadLearned(reader, pixels));
   }
   const double noise_area = ReadDouble(reader);
   const auto noise_area_after = static_cast<std::int64_t>(reader.Varint());
@@ -579,6 +684,7 @@ Status JobEstimator::Restore(ByteReader& reader) {
   state.radii->Restore(std::move(numbers));
   state.last_radii = std::move(last_radii);
   state.after = std::move(after);
+  if (state.learner != nullptr) state.learner->Restore(std::move(learned));
   {
     const MutexLock lock(state.noise_area_mutex);
     state.noise_area = noise_area;

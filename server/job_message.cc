@@ -347,6 +347,8 @@ std::string EncodeRecord(const Job& job, const std::optional<Digest>& image, Dur
   if (image) record.set_image_digest(std::string(image->Bytes()));
   for (const std::string& worker : job.distrusted)
     record.add_distrusted_worker_ids(worker);
+  for (const GuideStep& step : job.guides)
+    *record.add_guides() = ToProto(step);
   return record.SerializeAsString();
 }
 
@@ -416,6 +418,7 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
                                       .batches = share.batches(),
                                       .cpu = FromProto(share.cpu())};
   }
+  LUCERNA_ASSIGN_OR_RETURN(job.guides, FromProto(record.guides()));
   job.distrusted.insert(record.distrusted_worker_ids().begin(),
                         record.distrusted_worker_ids().end());
   if (message.has_ended_at()) job.ended_at = TimeOf(message.ended_at());

@@ -151,6 +151,9 @@ void JobRunner::BeginRounds() {
   // Rounds that were open when the job stopped are planned again.
   while (!photon_steps_.empty() && photon_steps_.back().first_pass >= next_round_)
     photon_steps_.pop_back();
+  while (!guides_.empty() && guides_.back().first_pass >= next_round_)
+    guides_.pop_back();
+  hooks_.on_guides(guides_);
   next_split_ = next_round_;
   reported_passes_ = next_round_;
   saved_passes_ = next_round_;
@@ -363,6 +366,13 @@ Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
     photon_steps_.push_back({round.first, open.plan.photons_per_pass});
     hooks_.on_photon_steps(photon_steps_);
   }
+  if (open.plan.guide != nullptr &&
+      (guides_.empty() || *guides_.back().guide != *open.plan.guide)) {
+    if (!open.plan.guide->is_even()) is_guided_ = true;
+    guides_.push_back({round.first, open.plan.guide});
+    hooks_.on_guides(guides_);
+  }
+  open.guide = guides_.size();
   const PassKey key = KeyOf(round.first);
   hooks_.rounds.Open(key, estimator_->ShapeOf(round, open.plan));
   // What a run that is over had of this round.
@@ -382,7 +392,8 @@ Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
                           .radii = digest,
                           .rows = open.plan.radii->size(),
                           .photons_per_pass = open.plan.photons_per_pass,
-                          .caustic_radius = open.plan.caustic_radius});
+                          .caustic_radius = open.plan.caustic_radius,
+                          .guide = open.guide});
     hooks_.scheduler.OpenRound(
         key, {first, std::max(first, std::min(round.last, WantedPasses(end)))}, due_);
   }
@@ -424,22 +435,24 @@ StatusOr<JobRunner::TracedPass> JobRunner::Trace(std::uint64_t pass) {
   return traced;
 }
 
-const RoundPlan& JobRunner::PlanOf(std::uint64_t pass) const {
+const JobRunner::OpenRound& JobRunner::OpenRoundOf(std::uint64_t pass) const {
   const std::uint64_t first = RoundOf(pass).first;
   const auto open = std::ranges::find(open_rounds_, first,
                                       [](const OpenRound& round) { return round.round.first; });
   LUCERNA_CHECK(open != open_rounds_.end());
-  return open->plan;
+  return *open;
 }
 
 Status JobRunner::OpenSplitPass(TracedPass traced) {
-  const RoundPlan& plan = PlanOf(traced.eye.pass);
+  const OpenRound& round = OpenRoundOf(traced.eye.pass);
+  const RoundPlan& plan = round.plan;
   SplitPass open;
   std::string bytes = EncodeRadii(HitpointRadii(traced.eye, plan));
   open.blobs = {.block = traced.block.digest(),
                 .radii = Sha256(bytes),
                 .rows = traced.eye.block.size(),
-                .photons_per_pass = plan.photons_per_pass};
+                .photons_per_pass = plan.photons_per_pass,
+                .guide = round.guide};
   LUCERNA_ASSIGN_OR_RETURN(
       open.radii, hooks_.blobs.PutPinned(open.blobs.radii, std::move(bytes), AfterLastPin::kDrop));
   const std::uint64_t pass = traced.eye.pass;
@@ -474,7 +487,7 @@ Status JobRunner::TakeInSplitPass(const SplitPass& open) {
   SliceSums slice;
   {
     const MutexLock lock(estimator_mutex_);
-    const RoundPlan& plan = PlanOf(key.pass);
+    const RoundPlan& plan = OpenRoundOf(key.pass).plan;
     if (key.pass == 0) estimator_->LookAtFirstPass(open.traced.eye, plan);
     slice = estimator_->SliceOf(open.traced.eye, plan, sums);
   }
@@ -569,6 +582,11 @@ std::string JobRunner::Save() const {
     writer.Varint(step.first_pass);
     writer.Varint(step.photons_per_pass);
   }
+  writer.Varint(guides_.size());
+  for (const GuideStep& step : guides_) {
+    writer.Varint(step.first_pass);
+    WriteGuide(writer, *step.guide);
+  }
   const MutexLock lock(estimator_mutex_);
   estimator_->Save(writer);
   return writer.Take();
@@ -587,6 +605,12 @@ Status JobRunner::Restore(std::string_view sums) {
     const std::uint64_t first_pass = reader.Varint();
     steps.push_back({first_pass, reader.Varint()});
   }
+  GuideSteps guides;
+  for (std::uint64_t left = reader.Varint(); left > 0 && reader.ok(); --left) {
+    const std::uint64_t first_pass = reader.Varint();
+    LUCERNA_ASSIGN_OR_RETURN(PhotonGuide guide, ReadGuide(reader));
+    guides.push_back({first_pass, std::make_shared<const PhotonGuide>(std::move(guide))});
+  }
   const MutexLock lock(estimator_mutex_);
   LUCERNA_RETURN_IF_ERROR(estimator_->Restore(reader));
   next_checkpoint_ = next_checkpoint;
@@ -595,6 +619,9 @@ Status JobRunner::Restore(std::string_view sums) {
   passes_at_checkpoint_ = passes_at_checkpoint;
   error_at_most_ = error_at_most;
   photon_steps_ = std::move(steps);
+  guides_ = std::move(guides);
+  is_guided_ =
+      std::ranges::any_of(guides_, [](const GuideStep& step) { return !step.guide->is_even(); });
   return absl::OkStatus();
 }
 
@@ -702,7 +729,7 @@ void JobRunner::Stop(Status why) {
 
 // Called for results of leases, so after Prepare.
 Status JobRunner::CheckEmission(const BatchTally& tally) const {
-  return emission_check_.Check(tally);
+  return emission_check_.Check(tally, is_guided_);
 }
 
 void JobRunner::Wake() {

@@ -68,6 +68,8 @@ struct RunnerHooks {
   std::function<void(std::string warning)> on_warning;
   // How many photons passes have, each time that it changes.
   std::function<void(PhotonSteps steps)> on_photon_steps;
+  // The same of the guides that their photons are drawn by.
+  std::function<void(GuideSteps guides)> on_guides;
   std::function<void()> on_work_opened;
   // So many passes from the first on without a gap have come.
   std::function<void(std::int64_t passes)> on_progress;
@@ -123,7 +125,8 @@ class JobRunner final : public RunningJob {
   struct OpenRound {
     PassRange round;
     RoundPlan plan;
-    BlobPin radii;  // of pixels, encoded; of rounds that are not split
+    std::size_t guide = 0;  // so many of guides_ with its own
+    BlobPin radii;          // of pixels, encoded; of rounds that are not split
     bool is_split = false;
     MemoryClaim sums;  // of the slices that come; the first few rounds are part of the job's need
   };
@@ -197,7 +200,7 @@ class JobRunner final : public RunningJob {
   // The next pass of the open rounds that is to be split; absent when there is none.
   std::optional<std::uint64_t> NextToSplit(const End& end) const;
   // Requires that the round of the pass is open.
-  const RoundPlan& PlanOf(std::uint64_t pass) const;
+  const OpenRound& OpenRoundOf(std::uint64_t pass) const;
   StatusOr<TracedPass> Trace(std::uint64_t pass);
   Status OpenSplitPass(TracedPass traced);
   bool HasPhotons(const SplitPass& open) const;
@@ -223,7 +226,8 @@ class JobRunner final : public RunningJob {
   mutable Mutex estimator_mutex_;
   std::unique_ptr<JobEstimator> estimator_;  // set once, before any other thread may ask
   std::atomic<bool> is_running_ = false;
-  EmissionCheck emission_check_;  // set with the estimator
+  EmissionCheck emission_check_;         // set with the estimator
+  std::atomic<bool> is_guided_ = false;  // by a guide that is not even
 
   // The runner's thread only.
   ReferenceImage reference_;
@@ -242,6 +246,7 @@ class JobRunner final : public RunningJob {
   std::pair<std::uint64_t, std::optional<SteadyTime>> opened_until_;
   std::uint64_t next_round_ = 0;  // its first pass
   PhotonSteps photon_steps_;      // of the rounds opened so far
+  GuideSteps guides_;             // the same
   std::uint64_t reported_passes_ = 0;
   std::deque<OpenRound> open_rounds_;
   MemoryClaim next_sums_;         // of the next one

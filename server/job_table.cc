@@ -1021,6 +1021,13 @@ void JobTable::OnPhotonSteps(const std::string& job_id, PhotonSteps steps) {
   found->second.job.photon_steps = std::move(steps);
 }
 
+void JobTable::OnGuides(const std::string& job_id, GuideSteps guides) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return;
+  found->second.job.guides = std::move(guides);
+}
+
 void JobTable::OnProgress(const std::string& job_id, std::int64_t passes) {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);

@@ -288,6 +288,7 @@ class JobTable {
   void OnRunning(const std::string& job_id, const Moment& moment);
   void OnWarning(const std::string& job_id, std::string warning);
   void OnPhotonSteps(const std::string& job_id, PhotonSteps steps);
+  void OnGuides(const std::string& job_id, GuideSteps guides);
   void OnProgress(const std::string& job_id, std::int64_t passes);
   void OnTail(const std::string& job_id, const BatchTally& tally, std::int64_t passes);
   void OnRoundMerged(const std::string& job_id, const BatchTally& tally, std::int64_t passes);

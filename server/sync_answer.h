@@ -19,6 +19,7 @@ struct WorkBlobs {
   std::size_t rows = 0;  // hitpoints of the block, or pixels
   std::uint64_t photons_per_pass = 0;
   float caustic_radius = 1;  // of passes
+  std::size_t guide = 0;     // so many of the job's guides with its own; 0: none
 };
 
 // Work with all that a worker must know of it.

@@ -16,6 +16,8 @@ constexpr Duration kSyncEvery = std::chrono::seconds(3);
 // A slice has up to 100 bytes a pixel and an accumulation 40 a hitpoint before compression, which
 // cannot double it.
 constexpr std::uint64_t kResultHeadBytes = 4096;
+// Photons that the guide asks to be reported take up to 20 bytes, and are far fewer than this.
+constexpr std::uint64_t kResultReportBytes = 1 << 20;
 constexpr std::uint64_t kResultBytesPerRow = 128;
 constexpr int kMostLeases = 64;  // that one worker may speak of
 
@@ -29,6 +31,7 @@ v1::Lease LoanToProto(const Loan& loan) {
   message.set_last(lease.range.last);
   message.set_radii_digest(std::string(loan.blobs.radii.Bytes()));
   message.set_photons_per_pass(loan.blobs.photons_per_pass);
+  message.set_guide(loan.blobs.guide);
   switch (lease.kind) {
     case WorkKind::kPhotons:
       message.set_kind(v1::WORK_KIND_PHOTONS);
@@ -132,7 +135,7 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
       response_->set_outcome(OutcomeToProto(known.value_or(MergeOutcome::kSuperseded)));
       return absl::OkStatus();
     }
-    if (header.size_bytes() > kResultHeadBytes + kResultBytesPerRow * *rows) {
+    if (header.size_bytes() > kResultHeadBytes + kResultReportBytes + kResultBytesPerRow * *rows) {
       const Status too_large = absl::InvalidArgumentError(
           absl::StrCat("a result of ", header.size_bytes(), " bytes is too large for ", *rows,
                        " hitpoints or pixels"));
@@ -260,6 +263,8 @@ grpc::ServerUnaryReactor* WorkerService::DescribeJob(grpc::CallbackServerContext
     *response->mutable_needs() = ToProto(job->needs);
     for (const PhotonStep& step : job->photon_steps)
       *response->add_photon_steps() = ToProto(step);
+    for (const GuideStep& step : job->guides)
+      *response->add_guides() = ToProto(step);
     response->set_numeric_profile(job->numeric_profile);
   }
   reactor->Finish(ToGrpc(job.status()));

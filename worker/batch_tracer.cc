@@ -119,6 +119,8 @@ StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) 
   }
   out.tally = sum.tally;
   out.tally += more.tally;
+  out.found = sum.found;
+  out.found.insert(out.found.end(), more.found.begin(), more.found.end());
   out.evidence.resize(sum.evidence.size());
   const std::size_t upper = sum.size() + more.size();
   out.hitpoints.reserve(upper);
@@ -156,7 +158,8 @@ StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) 
   return out;
 }
 
-// The photons of a part by light: those that each has sent, and those that hitpoints found.
+// The photons of a part by light, of those that stand for photons drawn without a guide: those that
+// each has sent, and those that hitpoints found.
 std::vector<LightTally> TallyLights(
     const std::vector<std::array<std::uint64_t, kMaxLightGroups>>& sent,
     const GatheredPhotons& photons) {
@@ -167,10 +170,11 @@ std::vector<LightTally> TallyLights(
   }
   // [photons of the part × classes] whether the photon has been counted.
   std::vector<bool> is_counted(kPathClasses << DepositSource::kNumberBits);
-  const auto count = [&](const auto& grid, std::span<const std::uint8_t> was_found) {
-    for (std::size_t i = 0; i < was_found.size(); ++i) {
-      if (was_found[i] == 0) continue;
+  const auto count = [&](const auto& grid, std::span<const std::uint32_t> found_by) {
+    for (std::size_t i = 0; i < found_by.size(); ++i) {
+      if (found_by[i] == kNotFound) continue;
       const DepositSource source = grid.source(i);
+      if (!source.is_unguided) continue;
       const auto path = static_cast<std::size_t>(source.path);
       const std::size_t entry = kPathClasses * source.number + path;
       if (is_counted[entry]) continue;
@@ -178,12 +182,35 @@ std::vector<LightTally> TallyLights(
       ++lights[source.light].in_view[path];
     }
   };
-  count(photons.grid, photons.was_found);
-  if (photons.caustics != nullptr) count(*photons.caustics, photons.caustic_was_found);
-  if (photons.scattered != nullptr) count(*photons.scattered, photons.scattered_was_found);
+  count(photons.grid, photons.found_by);
+  if (photons.caustics != nullptr) count(*photons.caustics, photons.caustic_found_by);
+  if (photons.scattered != nullptr) count(*photons.scattered, photons.scattered_found_by);
   while (!lights.empty() && lights.back().sent == 0)
     lights.pop_back();
   return lights;
+}
+
+// Those found of the photons of a part from `first` on that the guide asks to be reported.
+std::vector<FoundPhoton> ReportFound(const PhotonPathTracer& tracer, std::uint64_t pass,
+                                     std::uint64_t first, const GatheredPhotons& photons) {
+  std::vector<FoundPhoton> found;
+  const auto add = [&](const auto& grid, std::span<const std::uint32_t> found_by) {
+    for (std::size_t i = 0; i < found_by.size(); ++i) {
+      if (found_by[i] == kNotFound) continue;
+      const std::uint64_t index = tracer.IndexOf(pass, first, grid.source(i).number);
+      if (const auto numbers = tracer.ReportOf(pass, index))
+        found.push_back({index, *numbers, found_by[i]});
+    }
+  };
+  add(photons.grid, photons.found_by);
+  if (photons.caustics != nullptr) add(*photons.caustics, photons.caustic_found_by);
+  if (photons.scattered != nullptr) add(*photons.scattered, photons.scattered_found_by);
+  std::ranges::sort(found, {},
+                    [](const FoundPhoton& photon) { return std::pair(photon.index, photon.row); });
+  // A photon may have left several deposits.
+  const auto repeated = std::ranges::unique(found, {}, &FoundPhoton::index);
+  found.erase(repeated.begin(), repeated.end());
+  return found;
 }
 
 // A photon path that leaves as many deposits as its greatest depth leaves few for others.
@@ -241,7 +268,7 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
                                         std::uint64_t pass, std::uint64_t first, std::uint64_t last,
                                         const HitpointBlock& block, const RadiusColumn& radii,
                                         const std::atomic<bool>& stop,
-                                        std::uint64_t photons_per_pass) {
+                                        std::uint64_t photons_per_pass, const PhotonGuide* guide) {
   LUCERNA_RETURN_IF_ERROR(CheckBlock(block, radii, state_->prepared.scene(), needs));
   const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
   Accumulation sum;
@@ -267,7 +294,8 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
   const SpectrumTracer* spectra =
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
-                                settings, needs, spectra, region, photons_per_pass, media_region);
+                                settings, needs, spectra, region, photons_per_pass, media_region,
+                                guide);
   const std::uint64_t per_chunk =
       std::clamp(kMostDepositsPerChunk / static_cast<std::uint64_t>(settings.max_depth),
                  std::uint64_t{1}, kPhotonsPerChunk);
@@ -325,24 +353,24 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     if (stop) return absl::CancelledError("the batch was given up");
     LUCERNA_RETURN_IF_ERROR(CheckDeposits(tallies));
     const PhotonGrid grid(deposits, region, cell, state_->team);
-    std::vector<std::uint8_t> was_found(grid.size());
+    std::vector<std::uint32_t> found_by(grid.size(), kNotFound);
     std::optional<PhotonGrid> caustic_grid;
-    std::vector<std::uint8_t> caustic_was_found;
-    GatheredPhotons photons{.grid = grid, .features = &state_->features, .was_found = was_found};
+    std::vector<std::uint32_t> caustic_found_by;
+    GatheredPhotons photons{.grid = grid, .features = &state_->features, .found_by = found_by};
     if (block.caustic_rows > 0) {
       caustic_grid.emplace(caustics, region, caustic_cell, state_->team);
-      caustic_was_found.resize(caustic_grid->size());
+      caustic_found_by.assign(caustic_grid->size(), kNotFound);
       photons.caustics = &*caustic_grid;
-      photons.caustic_was_found = caustic_was_found;
+      photons.caustic_found_by = caustic_found_by;
       photons.caustic_weight = &caustic_weight;
     }
     std::optional<PhotonTree> tree;
-    std::vector<std::uint8_t> scattered_was_found;
+    std::vector<std::uint32_t> scattered_found_by;
     if (!block.segments.empty()) {
       tree.emplace(scattered, state_->team);
-      scattered_was_found.resize(tree->size());
+      scattered_found_by.assign(tree->size(), kNotFound);
       photons.scattered = &*tree;
-      photons.scattered_was_found = scattered_was_found;
+      photons.scattered_found_by = scattered_found_by;
       photons.media = &prepared.scene().media;
     }
     Accumulation accumulation =
@@ -351,6 +379,8 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     for (const BatchTally& tally : tallies)
       accumulation.tally += tally;
     accumulation.tally.lights = TallyLights(sent, photons);
+    if (guide != nullptr && guide->reported() > 0)
+      accumulation.found = ReportFound(tracer, pass, part, photons);
     for (const std::vector<std::uint64_t>& named : dropped) {
       for (const std::uint64_t index : named) {
         if (accumulation.dropped_photons.size() == kDroppedNamed) break;
@@ -379,9 +409,10 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
   std::vector<PhotonKey> dropped;
   // A camera that sees nothing needs no photons, and without light there are none.
   if (eye.block.size() > 0 && needs.Uses(Part::kPhotons)) {
-    LUCERNA_ASSIGN_OR_RETURN(const Accumulation accumulation,
-                             Run(settings, needs, pass, 0, plan.photons_per_pass, eye.block,
-                                 HitpointRadii(eye, plan), stop, plan.photons_per_pass));
+    LUCERNA_ASSIGN_OR_RETURN(
+        const Accumulation accumulation,
+        Run(settings, needs, pass, 0, plan.photons_per_pass, eye.block, HitpointRadii(eye, plan),
+            stop, plan.photons_per_pass, plan.guide.get()));
     LUCERNA_RETURN_IF_ERROR(sums.Add(accumulation));
     for (const std::uint64_t index : accumulation.dropped_photons)
       dropped.push_back({pass, index});

@@ -28,7 +28,8 @@ class BatchTracer {
   BatchTracer(Scene scene, int threads);
   ~BatchTracer();
 
-  // Traces photons [first, last) of `pass`, which has `photons_per_pass` (0: as in `settings`).
+  // Traces photons [first, last) of `pass`, which has `photons_per_pass` (0: as in `settings`),
+  // drawn by `guide` (nullptr: evenly).
   // `needs` are those of the scene and these settings; what they need is made with the first
   // batch of a job. One call at a time. Errors: INVALID_ARGUMENT when block and radii do not fit
   // each other or the scene, CANCELLED soon (milliseconds) after `stop` becomes true,
@@ -37,7 +38,8 @@ class BatchTracer {
                                            std::uint64_t pass, std::uint64_t first,
                                            std::uint64_t last, const HitpointBlock& block,
                                            const RadiusColumn& radii, const std::atomic<bool>& stop,
-                                           std::uint64_t photons_per_pass = 0);
+                                           std::uint64_t photons_per_pass = 0,
+                                           const PhotonGuide* guide = nullptr);
 
   // Traces the passes of a slice, all photons of each. Otherwise as Run.
   // Errors: also OUT_OF_RANGE when sums would not fit.

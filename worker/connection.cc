@@ -154,6 +154,7 @@ StatusOr<LentWork> ReadLease(const v1::Lease& message) {
   work.first = message.first();
   work.last = message.last();
   work.photons_per_pass = message.photons_per_pass();
+  work.guide = message.guide();
   LUCERNA_ASSIGN_OR_RETURN(work.radii, Digest::FromBytes(message.radii_digest()));
   if (work.photons_per_pass > kMostPhotonsPerPass) {
     return absl::InvalidArgumentError("a lease's passes have too many photons");
@@ -183,6 +184,9 @@ StatusOr<JobToTrace> ReadJob(const v1::JobDescription& message) {
   LUCERNA_ASSIGN_OR_RETURN(job.scene, FromProto(message.scene()));
   LUCERNA_ASSIGN_OR_RETURN(job.settings, FromProto(message.settings()));
   LUCERNA_ASSIGN_OR_RETURN(job.needs, FromProto(message.needs()));
+  LUCERNA_ASSIGN_OR_RETURN(const GuideSteps steps, FromProto(message.guides()));
+  for (const GuideStep& step : steps)
+    job.guides.push_back(step.guide);
   return job;
 }
 

@@ -23,6 +23,7 @@
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
+#include "render/transport/photon_guide.h"
 #include "render/wire/channel.h"
 
 namespace lucerna {
@@ -32,6 +33,7 @@ struct JobToTrace {
   SceneManifest scene;
   RenderSettings settings;
   SceneNeeds needs;
+  std::vector<std::shared_ptr<const PhotonGuide>> guides;  // those that it had at that time
 };
 
 // Work that was lent to this worker (see work.proto).
@@ -45,6 +47,7 @@ struct LentWork {
   Digest radii;
   std::uint64_t photons_per_pass = 0;
   float caustic_radius = 1;
+  std::uint64_t guide = 0;  // of JobToTrace::guides the last of the first so many; 0: none
 };
 
 class Connection {

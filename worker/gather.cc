@@ -151,7 +151,7 @@ struct EvidenceSums<Evidence::kFrequency> {
 struct RowSource {
   const PhotonGrid& grid;
   const CausticWeight* caustic_weight = nullptr;  // of caustic photons
-  std::span<std::uint8_t> was_found;
+  std::span<std::uint32_t> found_by;
 };
 
 // Contributions to discs that are cut may weigh many times the kernel. Held here, kMostTerms of
@@ -194,11 +194,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
   std::int64_t blur = 0;
   const auto add = [&](std::size_t number, const PhotonRecord& photon, Rgb flux, float squared,
                        DiscPlace place) {
-    // Several threads may find a photon. Most have been found before, and are only read.
-    if (!source.was_found.empty()) {
-      const std::atomic_ref<std::uint8_t> mark(source.was_found[number]);
-      if (mark.load(std::memory_order_relaxed) == 0) mark.store(1, std::memory_order_relaxed);
-    }
+    if (!source.found_by.empty()) MarkFound(source.found_by[number], hitpoint);
     const float whole = shape(squared);
     const std::uint64_t bits = PairBits(photon.key, hitpoint);
     const auto dither = [&](int channel) { return DitherOf(bits, channel); };
@@ -309,9 +305,9 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
                        const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
   const std::size_t rows = block.first_segment();
   const std::size_t first_caustic = block.first_caustic();
-  const RowSource ordinary = {photons.grid, nullptr, photons.was_found};
+  const RowSource ordinary = {photons.grid, nullptr, photons.found_by};
   const RowSource caustic = {photons.caustics != nullptr ? *photons.caustics : photons.grid,
-                             photons.caustic_weight, photons.caustic_was_found};
+                             photons.caustic_weight, photons.caustic_found_by};
   const std::size_t piece_count = (rows + kRowsPerPiece - 1) / kRowsPerPiece;
   std::vector<GatherPiece> pieces(piece_count);
   team.For(piece_count, 1, [&](std::size_t begin, std::size_t end) {
@@ -351,7 +347,7 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
 
   if (photons.scattered != nullptr) {
     for (GatherPiece& piece : GatherSegments<GatherKernel>(
-             block, radii, *photons.scattered, photons.scattered_was_found, *photons.media, scale,
+             block, radii, *photons.scattered, photons.scattered_found_by, *photons.media, scale,
              EvidenceColumns(kEvidence), team, stop))
       pieces.push_back(std::move(piece));
   }

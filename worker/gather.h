@@ -19,6 +19,16 @@
 
 namespace lucerna {
 
+inline constexpr std::uint32_t kNotFound = UINT32_MAX;
+
+// Several threads may find a photon. Most have been found before, and are only read.
+inline void MarkFound(std::uint32_t& found_by, std::uint32_t row) {
+  const std::atomic_ref<std::uint32_t> first(found_by);
+  std::uint32_t before = first.load(std::memory_order_relaxed);
+  while (row < before && !first.compare_exchange_weak(before, row, std::memory_order_relaxed)) {
+  }
+}
+
 // What the hitpoints gather from.
 struct GatheredPhotons {
   const PhotonGrid& grid;
@@ -28,13 +38,14 @@ struct GatheredPhotons {
   const CausticWeight* caustic_weight = nullptr;
   // Edges at which discs end, or nullptr.
   const FeatureEdges* features = nullptr;
-  // [photons of either grid] or empty: become 1 for every photon that counted somewhere.
-  std::span<std::uint8_t> was_found = {};
-  std::span<std::uint8_t> caustic_was_found = {};
+  // [photons of either grid] or empty, kNotFound at first: become the first row of the block where
+  // the photon counted.
+  std::span<std::uint32_t> found_by = {};
+  std::span<std::uint32_t> caustic_found_by = {};
   // Photons that media scattered, for the block's segments, or nullptr.
   const PhotonTree* scattered = nullptr;
   const std::vector<Medium>* media = nullptr;
-  std::span<std::uint8_t> scattered_was_found = {};
+  std::span<std::uint32_t> scattered_found_by = {};
 };
 
 // Every hitpoint adds up the photons within its radius that landed on its side of its surface (all

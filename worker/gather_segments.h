@@ -33,7 +33,7 @@ namespace lucerna {
 template <typename GatherKernel>
 std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const RadiusColumn& radii,
                                         const PhotonTree& photons,
-                                        std::span<std::uint8_t> was_found,
+                                        std::span<std::uint32_t> found_by,
                                         const std::vector<Medium>& media, const FluxScale& scale,
                                         std::size_t evidence_columns, ThreadTeam& team,
                                         const std::atomic<bool>& stop) {
@@ -69,8 +69,7 @@ std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const Radius
             ++piece.excess;
             return;
           }
-          const std::atomic_ref<std::uint8_t> mark(was_found[i]);
-          if (mark.load(std::memory_order_relaxed) == 0) mark.store(1, std::memory_order_relaxed);
+          MarkFound(found_by[i], hitpoint);
           const float whole = GatherKernel::Shape(t2);
           const float inner_t2 = t2 / kInnerArea;
           const float inner = inner_t2 < 1 ? GatherKernel::Shape(inner_t2) / kInnerArea : 0;

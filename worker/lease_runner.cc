@@ -127,12 +127,17 @@ void LeaseRunner::FetchStage() {
   }
 }
 
-StatusOr<std::shared_ptr<const JobToTrace>> LeaseRunner::JobOf(const std::string& job_id) {
+StatusOr<std::shared_ptr<const JobToTrace>> LeaseRunner::JobOf(const std::string& job_id,
+                                                               std::uint64_t guides) {
   for (const auto& [id, job] : jobs_) {
-    if (id == job_id) return job;
+    if (id == job_id && job->guides.size() >= guides) return job;
   }
   LUCERNA_ASSIGN_OR_RETURN(const v1::JobDescription message, connection_.DescribeJob(job_id));
   LUCERNA_ASSIGN_OR_RETURN(JobToTrace job, ReadJob(message));
+  if (job.guides.size() < guides) {
+    return absl::InvalidArgumentError("a lease's photon guide is not one of its job");
+  }
+  std::erase_if(jobs_, [&](const auto& known) { return known.first == job_id; });
   jobs_.emplace_front(job_id, std::make_shared<const JobToTrace>(std::move(job)));
   if (jobs_.size() > kJobsKept) jobs_.pop_back();
   return jobs_.front().second;
@@ -142,7 +147,7 @@ StatusOr<LeaseRunner::Fetched> LeaseRunner::Fetch(const std::shared_ptr<Held>& h
   const LentWork& work = held->work;
   Fetched fetched;
   fetched.held = held;
-  LUCERNA_ASSIGN_OR_RETURN(fetched.job, JobOf(work.job_id));
+  LUCERNA_ASSIGN_OR_RETURN(fetched.job, JobOf(work.job_id, work.guide));
   const RenderSettings& settings = fetched.job->settings;
   const std::size_t pixels = static_cast<std::size_t>(settings.crop_width()) *
                              static_cast<std::size_t>(settings.crop_height());
@@ -176,11 +181,13 @@ StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
   const LentWork& work = fetched.held->work;
   const JobToTrace& job = *fetched.job;
   const std::atomic<bool>& stop = fetched.held->is_revoked;
+  const std::shared_ptr<const PhotonGuide> guide =
+      work.guide > 0 ? job.guides[work.guide - 1] : nullptr;
   if (work.kind == v1::WORK_KIND_PHOTONS) {
-    LUCERNA_ASSIGN_OR_RETURN(
-        Accumulation accumulation,
-        fetched.tracer->Run(job.settings, job.needs, work.pass, work.first, work.last,
-                            *fetched.block, *fetched.radii, stop, work.photons_per_pass));
+    LUCERNA_ASSIGN_OR_RETURN(Accumulation accumulation,
+                             fetched.tracer->Run(job.settings, job.needs, work.pass, work.first,
+                                                 work.last, *fetched.block, *fetched.radii, stop,
+                                                 work.photons_per_pass, guide.get()));
     if (FaultIsDue("result.flipped") && accumulation.size() > 0) accumulation.flux[0][0] ^= 1;
     if (FaultIsDue("result.zeros")) {
       Accumulation zeros;
@@ -192,7 +199,8 @@ StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
   }
   const RoundPlan plan = {.photons_per_pass = work.photons_per_pass,
                           .radii = fetched.radii,
-                          .caustic_radius = work.caustic_radius};
+                          .caustic_radius = work.caustic_radius,
+                          .guide = guide};
   LUCERNA_ASSIGN_OR_RETURN(
       SliceSums slice,
       fetched.tracer->RunSlice(job.settings, job.needs, {work.first, work.last}, plan, stop));

@@ -65,7 +65,9 @@ class LeaseRunner {
   void CommitStage();
   void Heartbeat();
   StatusOr<Fetched> Fetch(const std::shared_ptr<Held>& held);
-  StatusOr<std::shared_ptr<const JobToTrace>> JobOf(const std::string& job_id);
+  // Of a job that is described with at least so many guides.
+  StatusOr<std::shared_ptr<const JobToTrace>> JobOf(const std::string& job_id,
+                                                    std::uint64_t guides);
   // The encoded result of a lease.
   StatusOr<std::string> Compute(const Fetched& fetched);
   StatusOr<v1::CommitOutcome> Commit(const Computed& computed);

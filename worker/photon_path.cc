@@ -46,6 +46,12 @@ void KeepColumns(Deposits& deposits, const SurfacePoint& surface, Vec3 wo) {
   if constexpr (kDirections) deposits.arrivals_oct.push_back(EncodeOctahedral(wo));
 }
 
+// What a photon's emission is drawn with, by an even guide: the next number of `rng` is used.
+PrimaryNumbers EvenNumbers(const SobolPoint& u, KeyedRng& rng) {
+  return {static_cast<double>(u[0]), static_cast<double>(u[1]), static_cast<double>(u[2]),
+          static_cast<double>(u[3]), FineChoice(u[4], rng.Uniform())};
+}
+
 // Records nothing: for photons that are not replayed.
 struct NoWatcher {
   void Emitted(const Emission& /*emission*/) const {}
@@ -128,7 +134,7 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
                                    const LightSet& lights, const RenderSettings& settings,
                                    const SceneNeeds& needs, const SpectrumTracer* spectra,
                                    const Bounds& region, std::uint64_t photons_per_pass,
-                                   const Bounds& media_region)
+                                   const Bounds& media_region, const PhotonGuide* guide)
     : photons_per_pass_(photons_per_pass > 0
                             ? photons_per_pass
                             : static_cast<std::uint64_t>(settings.photons_per_pass)),
@@ -137,6 +143,7 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       lights_(lights),
       settings_(settings),
       spectra_(spectra),
+      guide_(guide),
       region_(region),
       media_region_(media_region),
       media_(scene, intersector),
@@ -274,6 +281,28 @@ PhotonPathTracer::Key PhotonPathTracer::KeyOf(std::uint64_t pass, std::uint64_t 
           CombineKeys(CombineKeys(settings_.seed, kPhotonKey), pass % 2)};
 }
 
+std::uint64_t PhotonPathTracer::IndexOf(std::uint64_t pass, std::uint64_t first,
+                                        std::uint32_t number) const {
+  constexpr std::uint64_t kNumbers = (1U << DepositSource::kNumberBits) - 1;
+  return first + ((number - KeyOf(pass, first).number) & kNumbers);
+}
+
+std::optional<std::array<std::uint16_t, kEmissionDimensions>> PhotonPathTracer::ReportOf(
+    std::uint64_t pass, std::uint64_t index) const {
+  if (guide_ == nullptr) return std::nullopt;
+  const Key key = KeyOf(pass, index);
+  constexpr std::uint64_t kReportKey = 0x5245504F52544544ULL;
+  const std::uint64_t bits = CombineKeys(key.job_key ^ kReportKey, key.number) >> 32;
+  if (bits >= guide_->reported()) return std::nullopt;
+  KeyedRng rng(CombineKeys(key.job_key, key.number));
+  PrimaryNumbers numbers = EvenNumbers(OwenSobol(key.number, key.job_key), rng);
+  guide_->Draw(numbers);
+  std::array<std::uint16_t, kEmissionDimensions> steps{};
+  for (std::size_t d = 0; d < kEmissionDimensions; ++d)
+    steps[d] = static_cast<std::uint16_t>(numbers[d] * 0x1p16);
+  return steps;
+}
+
 void PhotonPathTracer::Trace(std::uint64_t pass, std::uint64_t index, Landed& landed) const {
   const Key key = KeyOf(pass, index);
   const auto name_if_dropped = [&](PhotonEnd end) {
@@ -317,15 +346,33 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
 
   if (lights_.empty()) return PhotonEnd::kNotEmitted;
   Emission emission;
-  const bool is_emitted =
-      lights_.SampleEmission(FineChoice(u[4], rng.Uniform()), u[0], u[1], u[2], u[3], emission);
+  PrimaryNumbers numbers = EvenNumbers(u, rng);
+  float weight = 1;
+  bool is_unguided = true;
+  if (guide_ != nullptr && !guide_->is_even()) {
+    const double factor = guide_->Draw(numbers);
+    weight = static_cast<float>(factor);
+    // The guide's density is in part even: of the photons drawn here, those of that part have this
+    // share, and are distributed as all photons would be without a guide.
+    constexpr std::uint64_t kPartKey = 0x554E475549444544ULL;
+    const std::uint64_t bits = CombineKeys(key.job_key ^ kPartKey, key.number) >> 32;
+    is_unguided = static_cast<double>(bits) < factor * kUnguidedShare * 0x1p32;
+  }
+  const auto single = [](double number) {
+    return std::min(static_cast<float>(number), 0x1.fffffep-1F);
+  };
+  const bool is_emitted = lights_.SampleEmission(numbers[4], single(numbers[0]), single(numbers[1]),
+                                                 single(numbers[2]), single(numbers[3]), emission);
+  emission.flux *= weight;
   const std::uint8_t light = lights_.emitter(emission.emitter).light;
-  ++landed.sent[light];
+  if (is_unguided) ++landed.sent[light];
   if (!is_emitted) return PhotonEnd::kNotEmitted;
   bool met_smooth_only = true;
   const auto source_of = [&](PathClass path) {
     constexpr std::uint32_t kNumbers = (1U << DepositSource::kNumberBits) - 1;
-    return DepositSource{static_cast<std::uint32_t>(key.number) & kNumbers, light, path}.Packed();
+    return DepositSource{static_cast<std::uint32_t>(key.number) & kNumbers, light, path,
+                         is_unguided}
+        .Packed();
   };
   watcher.Emitted(emission);
   Ray ray = emission.ray;

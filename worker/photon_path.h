@@ -12,10 +12,12 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "render/analysis/needs.h"
 #include "render/estimate/accumulation.h"
+#include "render/estimate/emission_report.h"
 #include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
 #include "render/math/rgb.h"
@@ -26,6 +28,7 @@
 #include "render/transport/bsdf.h"
 #include "render/transport/light.h"
 #include "render/transport/media.h"
+#include "render/transport/photon_guide.h"
 #include "worker/photon_spectrum.h"
 
 namespace lucerna {
@@ -38,14 +41,17 @@ struct DepositSource {
   std::uint32_t number = 0;  // the lowest bits of what numbers the photon
   std::uint8_t light = 0;    // index into LightSet::lights()
   PathClass path = PathClass::kOther;
+  // Whether it is one of those that stand for all photons drawn without a guide.
+  bool is_unguided = true;
 
   [[nodiscard]] std::uint32_t Packed() const {
-    return number << 7U | static_cast<std::uint32_t>(light) << 1U |
-           static_cast<std::uint32_t>(path);
+    return static_cast<std::uint32_t>(is_unguided) << 31U | number << 7U |
+           static_cast<std::uint32_t>(light) << 1U | static_cast<std::uint32_t>(path);
   }
   [[nodiscard]] static DepositSource Unpacked(std::uint32_t bits) {
-    return {bits >> 7U, static_cast<std::uint8_t>(bits >> 1U & (kMaxLightGroups - 1)),
-            static_cast<PathClass>(bits & 1U)};
+    return {bits >> 7U & ((1U << kNumberBits) - 1),
+            static_cast<std::uint8_t>(bits >> 1U & (kMaxLightGroups - 1)),
+            static_cast<PathClass>(bits & 1U), bits >> 31U != 0};
   }
 };
 static_assert(kMaxLightGroups == 64 && kMaxLightTallies == kMaxLightGroups);
@@ -119,11 +125,12 @@ class PhotonPathTracer {
   // Keeps references to all but `needs`. Deposits outside `region` are not kept.
   // `spectra`: for jobs with frequency photons, else nullptr. `media_region` is for photons that
   // media scattered. `photons_per_pass`: of the passes to
-  // be traced; 0: as `settings` have it.
+  // be traced; 0: as `settings` have it. Photons are drawn by `guide`; nullptr: evenly.
   PhotonPathTracer(const Scene& scene, const Intersector& intersector, const LightSet& lights,
                    const RenderSettings& settings, const SceneNeeds& needs,
                    const SpectrumTracer* spectra, const Bounds& region,
-                   std::uint64_t photons_per_pass = 0, const Bounds& media_region = {});
+                   std::uint64_t photons_per_pass = 0, const Bounds& media_region = {},
+                   const PhotonGuide* guide = nullptr);
 
   // What the photons of a range left.
   struct Landed {
@@ -140,7 +147,8 @@ class PhotonPathTracer {
     // Landings of photons that are too bright to be a deposit (FluxScale::HasRoomFor).
     std::uint64_t excess = 0;
     EnergyCounters energy;
-    std::array<std::uint64_t, kMaxLightGroups> sent{};  // photons by light
+    // Photons by light, of those that stand for photons drawn without a guide.
+    std::array<std::uint64_t, kMaxLightGroups> sent{};
   };
 
   // Traces photon `index` of `pass`. Threads: any, each with its own `landed`.
@@ -148,6 +156,15 @@ class PhotonPathTracer {
 
   // What Trace does with that photon, step by step. Threads: any.
   [[nodiscard]] PhotonHistory Replay(std::uint64_t pass, std::uint64_t index) const;
+
+  // The index of the photon of `pass` that `number` names (DepositSource), of those from `first`
+  // on.
+  [[nodiscard]] std::uint64_t IndexOf(std::uint64_t pass, std::uint64_t first,
+                                      std::uint32_t number) const;
+  // The numbers of a photon's emission, times 2^16, where the guide asks for a report of it if it
+  // is found.
+  [[nodiscard]] std::optional<std::array<std::uint16_t, kEmissionDimensions>> ReportOf(
+      std::uint64_t pass, std::uint64_t index) const;
 
  private:
   // What names a photon's random numbers.
@@ -193,6 +210,7 @@ class PhotonPathTracer {
   const LightSet& lights_;
   const RenderSettings& settings_;
   const SpectrumTracer* spectra_;  // nullptr: no frequency photons
+  const PhotonGuide* guide_;       // nullptr: an even one
   Bounds region_;
   Bounds media_region_;
   const Media media_;

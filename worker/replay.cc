@@ -118,7 +118,8 @@ v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing, const Scene
 
 StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& settings,
                                        const SceneNeeds& needs, std::uint64_t pass,
-                                       std::uint64_t index, std::uint64_t photons_per_pass) {
+                                       std::uint64_t index, std::uint64_t photons_per_pass,
+                                       const PhotonGuide* guide) {
   if (pass >= kMostPasses || index >= photons_per_pass) {
     return absl::OutOfRangeError(absl::StrCat(
         "there is no photon ", pass, ":", index,
@@ -127,7 +128,8 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
   PreparedScene prepared(std::move(rec709));
   LUCERNA_RETURN_IF_ERROR(prepared.PrepareFor(needs));
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
-                                settings, needs, nullptr, Bounds(), photons_per_pass);
+                                settings, needs, nullptr, Bounds(), photons_per_pass, Bounds(),
+                                guide);
   const PhotonHistory history = tracer.Replay(pass, index);
 
   v1::PhotonPath path;
@@ -170,8 +172,13 @@ StatusOr<v1::PhotonPath> Replay(const ReplayOptions& options) {
   for (const v1::PhotonStep& step : job.photon_steps()) {
     if (step.first_pass() <= options.pass) photons_per_pass = step.photons_per_pass();
   }
+  LUCERNA_ASSIGN_OR_RETURN(const GuideSteps guides, FromProto(job.guides()));
+  std::shared_ptr<const PhotonGuide> guide;
+  for (const GuideStep& step : guides) {
+    if (step.first_pass <= options.pass) guide = step.guide;
+  }
   return ReplayInScene(std::move(scene), settings, needs, options.pass, options.index,
-                       photons_per_pass);
+                       photons_per_pass, guide.get());
 }
 
 }  // namespace lucerna

@@ -2,7 +2,7 @@
 //
 // Traces one photon of a job again, with the scene and settings that its coordinator still has, and
 // tells the way it took. Needs neither hitpoints nor radii, so a job may be over: a photon's walk
-// is a function of scene, settings, pass and index.
+// is a function of scene, settings, photon guide, pass and index.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +14,7 @@
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
+#include "render/transport/photon_guide.h"
 #include "render/wire/channel.h"
 
 namespace lucerna {
@@ -32,10 +33,12 @@ struct ReplayOptions {
 // photon that no pass of the job has.
 [[nodiscard]] StatusOr<v1::PhotonPath> Replay(const ReplayOptions& options);
 
-// The same of a scene that is at hand, in Rec. 709; the pass has `photons_per_pass`.
+// The same of a scene that is at hand, in Rec. 709; the pass has `photons_per_pass`, drawn by
+// `guide` (nullptr: evenly).
 [[nodiscard]] StatusOr<v1::PhotonPath> ReplayInScene(Scene scene, const RenderSettings& settings,
                                                      const SceneNeeds& needs, std::uint64_t pass,
                                                      std::uint64_t index,
-                                                     std::uint64_t photons_per_pass);
+                                                     std::uint64_t photons_per_pass,
+                                                     const PhotonGuide* guide = nullptr);
 
 }  // namespace lucerna

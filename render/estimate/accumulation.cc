@@ -116,6 +116,13 @@ Status PassSums::Check(const Accumulation& accumulation) const {
   if (!tally_.Fits(accumulation.tally)) {
     return absl::OutOfRangeError("the tally of a pass would not fit in 64 bits");
   }
+  for (std::size_t i = 0; i < accumulation.found.size(); ++i) {
+    const FoundPhoton& found = accumulation.found[i];
+    if (found.row >= counts_.size() || (i > 0 && found.index <= accumulation.found[i - 1].index)) {
+      return absl::InvalidArgumentError(
+          "an accumulation's photons are not strictly increasing, or of no hitpoint");
+    }
+  }
   std::uint64_t least = 0;  // the smallest row that may come next
   for (std::size_t i = 0; i < rows; ++i) {
     const std::uint32_t row = accumulation.hitpoints[i];
@@ -161,7 +168,14 @@ Status PassSums::Add(const Accumulation& accumulation) {
     }
   }
   tally_ += accumulation.tally;
+  found_.insert(found_.end(), accumulation.found.begin(), accumulation.found.end());
   return absl::OkStatus();
+}
+
+std::vector<FoundPhoton> PassSums::FoundInOrder() const {
+  std::vector<FoundPhoton> found = found_;
+  std::ranges::sort(found, {}, &FoundPhoton::index);
+  return found;
 }
 
 }  // namespace lucerna

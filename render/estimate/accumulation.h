@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "render/base/status.h"
+#include "render/estimate/emission_report.h"
 
 namespace lucerna {
 
@@ -132,6 +133,8 @@ struct Accumulation {
   // The first photons of the batch that were dropped, by index in their pass, strictly increasing,
   // at most kDroppedNamed. Not part of any sum.
   std::vector<std::uint64_t> dropped_photons;
+  // Those found of the photons that the guide asks to be reported, strictly increasing in index.
+  std::vector<FoundPhoton> found;
 
   [[nodiscard]] std::size_t size() const { return hitpoints.size(); }
   bool operator==(const Accumulation&) const = default;
@@ -156,6 +159,8 @@ class PassSums {
   }
   [[nodiscard]] const std::vector<std::vector<std::int64_t>>& evidence() const { return evidence_; }
   [[nodiscard]] const BatchTally& tally() const { return tally_; }
+  // Of all batches, in order of their indices.
+  [[nodiscard]] std::vector<FoundPhoton> FoundInOrder() const;
 
  private:
   [[nodiscard]] Status Check(const Accumulation& accumulation) const;
@@ -164,6 +169,7 @@ class PassSums {
   std::array<std::vector<std::int64_t>, 3> flux_;
   std::vector<std::vector<std::int64_t>> evidence_;
   BatchTally tally_;
+  std::vector<FoundPhoton> found_;
 };
 
 }  // namespace lucerna

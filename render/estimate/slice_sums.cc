@@ -97,6 +97,9 @@ Status MergeSibling(SliceSums& sum, const SliceSums& sibling) {
           RoundedFloat(std::clamp(ours[pixel] + theirs[pixel], -kLargest, kLargest), dropped);
     }
   }
+  const bool is_first = sum.passes.first < sibling.passes.first;
+  sum.reports.insert(is_first ? sum.reports.end() : sum.reports.begin(), sibling.reports.begin(),
+                     sibling.reports.end());
   sum.tally += sibling.tally;
   sum.eye_rays += sibling.eye_rays;
   sum.passes = {std::min(sum.passes.first, sibling.passes.first),

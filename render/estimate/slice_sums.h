@@ -27,6 +27,7 @@
 
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
+#include "render/estimate/emission_report.h"
 #include "render/estimate/rounds.h"
 #include "render/math/color_space.h"
 #include "render/math/rgb.h"
@@ -83,6 +84,9 @@ struct SliceSums {
   std::uint64_t eye_rays = 0;
   // The first photons that were dropped, strictly increasing, at most kDroppedNamed.
   std::vector<PhotonKey> dropped_photons;
+  // Of the photons that the guide asks to be reported those that were found, in order of passes and
+  // indices.
+  std::vector<EmissionReport> reports;
 
   [[nodiscard]] std::size_t pixels() const { return columns.empty() ? 0 : columns[0].size(); }
   [[nodiscard]] std::size_t first_feature() const { return kSliceColumns + evidence; }

@@ -48,6 +48,9 @@ struct SettingFields {
   Field<std::int64_t> photons_per_pass{};
   // Later passes may have more photons (estimate/photon_steps.h).
   Field<bool> adaptive_photons{};
+  // Photons are drawn in proportion to power alone, not by what earlier ones found
+  // (transport/photon_guide.h).
+  Field<bool> unguided{};
   Field<std::uint64_t> seed{};
   Field<RadiusControllerKind> radius_controller{};
   Field<double> alpha{};

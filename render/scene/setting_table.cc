@@ -102,6 +102,10 @@ constexpr auto kSettings = std::to_array<Setting>({
      .default_text = "set unless the photons of a pass are given",
      .type = SettingField<bool>{.given = &Overrides::adaptive_photons,
                                 .value = &Settings::adaptive_photons}},
+    {.name = "unguided",
+     .meaning = "send photons in proportion to power alone, not more where earlier ones have come "
+                "into view",
+     .type = SettingField<bool>{.given = &Overrides::unguided, .value = &Settings::unguided}},
     {.name = "seed",
      .meaning = "another seed gives other noise",
      .scene_default = "the scene's `seed`",

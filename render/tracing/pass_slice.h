@@ -14,6 +14,7 @@
 #include "render/math/fixed_point.h"
 #include "render/scene/render_settings.h"
 #include "render/tracing/hitpoint_pass.h"
+#include "render/transport/photon_guide.h"
 
 namespace lucerna {
 
@@ -22,6 +23,8 @@ struct RoundPlan {
   std::uint64_t photons_per_pass = 0;
   std::shared_ptr<const RadiusColumn> radii;  // [pixels of the crop window] in unit radii
   float caustic_radius = 1;  // of all caustic hitpoints and segments, in unit radii
+  // By which photons are drawn; nullptr: evenly, and none is reported.
+  std::shared_ptr<const PhotonGuide> guide = nullptr;
 };
 
 // The radius of every hitpoint of a pass [scene units].

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "render/wire/bytes.h"
+#include "render/wire/photon_guide_codec.h"
 #include "render/wire/tally_codec.h"
 
 namespace lucerna {
@@ -13,7 +14,7 @@ namespace {
 
 __extension__ using Wide = __int128;
 
-constexpr std::string_view kMagic = "LAC5";
+constexpr std::string_view kMagic = "LAC6";
 // More columns of evidence than any radius controller uses.
 constexpr std::uint64_t kMostEvidence = 32;
 constexpr std::uint8_t kIndicesAsVarints = 0;
@@ -116,6 +117,14 @@ std::string EncodeAccumulation(const Accumulation& accumulation, std::size_t hit
   writer.Varint(accumulation.dropped_photons.size());
   for (const std::uint64_t index : accumulation.dropped_photons)
     writer.Varint(index);
+  writer.Varint(accumulation.found.size());
+  std::uint64_t next = 0;
+  for (const FoundPhoton& found : accumulation.found) {
+    writer.Varint(found.index - next);
+    next = found.index + 1;
+    WriteEmission(writer, found.numbers);
+    writer.Varint(found.row);
+  }
 
   // The two forms are compared before compression, which shortens both much alike.
   const std::size_t bitmap_size = (hitpoints + 7) / 8;
@@ -168,6 +177,23 @@ StatusOr<Accumulation> DecodeAccumulation(std::string_view bytes, std::size_t hi
   if (named > kDroppedNamed) return Malformed("it names too many dropped photons");
   for (std::uint64_t i = 0; i < named; ++i) {
     accumulation.dropped_photons.push_back(reader.Varint());
+  }
+  const std::uint64_t reports = reader.Varint();
+  if (reports > kMostReports || reports > accumulation.tally.photons) {
+    return Malformed("it reports too many photons");
+  }
+  std::uint64_t next = 0;
+  for (std::uint64_t i = 0; i < reports && reader.ok(); ++i) {
+    FoundPhoton found;
+    const std::uint64_t step = reader.Varint();
+    if (step >= UINT64_MAX - next) return Malformed("it reports a photon that does not exist");
+    found.index = next + step;
+    next = found.index + 1;
+    found.numbers = ReadEmission(reader);
+    const std::uint64_t row = reader.Varint();
+    if (row >= hitpoints) return Malformed("it reports a photon of no hitpoint");
+    found.row = static_cast<std::uint32_t>(row);
+    accumulation.found.push_back(found);
   }
 
   const std::uint8_t form = reader.Byte();

@@ -12,6 +12,7 @@
 
 #include "render/base/text.h"
 #include "render/scene/setting_table.h"
+#include "render/wire/photon_guide_codec.h"
 
 namespace lucerna {
 namespace {
@@ -208,6 +209,22 @@ v1::PhotonStep ToProto(const PhotonStep& step) {
   message.set_first_pass(step.first_pass);
   message.set_photons_per_pass(step.photons_per_pass);
   return message;
+}
+
+v1::GuideStep ToProto(const GuideStep& step) {
+  v1::GuideStep message;
+  message.set_first_pass(step.first_pass);
+  message.set_guide(EncodePhotonGuide(*step.guide));
+  return message;
+}
+
+StatusOr<GuideSteps> FromProto(const google::protobuf::RepeatedPtrField<v1::GuideStep>& messages) {
+  GuideSteps steps;
+  for (const v1::GuideStep& message : messages) {
+    LUCERNA_ASSIGN_OR_RETURN(PhotonGuide guide, DecodePhotonGuide(message.guide()));
+    steps.push_back({message.first_pass(), std::make_shared<const PhotonGuide>(std::move(guide))});
+  }
+  return steps;
 }
 
 v1::SceneNeeds ToProto(const SceneNeeds& needs) {

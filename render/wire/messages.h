@@ -10,6 +10,7 @@
 #include "render/base/clock.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
+#include "render/estimate/guide_learning.h"
 #include "render/estimate/photon_steps.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene_files.h"
@@ -17,6 +18,9 @@
 namespace lucerna {
 
 [[nodiscard]] v1::PhotonStep ToProto(const PhotonStep& step);
+[[nodiscard]] v1::GuideStep ToProto(const GuideStep& step);
+[[nodiscard]] StatusOr<GuideSteps> FromProto(
+    const google::protobuf::RepeatedPtrField<v1::GuideStep>& messages);
 
 [[nodiscard]] v1::SceneManifest ToProto(const SceneManifest& manifest);
 // Also holds the manifest to `limits`, and its main file to be one of its files.

@@ -6,12 +6,13 @@
 #include <vector>
 
 #include "render/wire/bytes.h"
+#include "render/wire/photon_guide_codec.h"
 #include "render/wire/tally_codec.h"
 
 namespace lucerna {
 namespace {
 
-constexpr std::string_view kMagic = "LSL2";
+constexpr std::string_view kMagic = "LSL3";
 
 // The low bits of a float that its precision leaves zero.
 unsigned int EmptyBits(std::size_t column, std::size_t evidence) {
@@ -52,6 +53,11 @@ std::string EncodeSlice(const SliceSums& slice) {
   for (const PhotonKey& photon : slice.dropped_photons) {
     writer.Varint(photon.pass - slice.passes.first);
     writer.Varint(photon.index);
+  }
+  writer.Varint(slice.reports.size());
+  for (const EmissionReport& report : slice.reports) {
+    WriteEmission(writer, report.numbers);
+    writer.Varint(report.pixel);
   }
   std::vector<std::uint32_t> codes(slice.pixels());
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
@@ -96,6 +102,19 @@ StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape)
   }
   if (!reader.ok()) return Malformed("truncated");
   LUCERNA_RETURN_IF_ERROR(CheckDropped(slice, shape.photons_per_pass));
+  const std::uint64_t reports = reader.Varint();
+  if (reports > kMostReports || reports > slice.tally.photons) {
+    return Malformed("it reports too many photons");
+  }
+  for (std::uint64_t i = 0; i < reports && reader.ok(); ++i) {
+    EmissionReport report;
+    report.numbers = ReadEmission(reader);
+    const std::uint64_t pixel = reader.Varint();
+    if (pixel >= shape.pixels) return Malformed("it reports a photon of no pixel");
+    report.pixel = static_cast<std::uint32_t>(pixel);
+    slice.reports.push_back(report);
+  }
+  if (!reader.ok()) return Malformed("truncated");
   slice.columns.reserve(columns);
   for (std::size_t column = 0; column < columns; ++column) {
     std::vector<float>& values = slice.columns.emplace_back(shape.pixels);

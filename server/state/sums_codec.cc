@@ -1,8 +1,10 @@
 #include "server/state/sums_codec.h"
 
 #include <bit>
+#include <cmath>
 #include <cstring>
 
+#include "render/wire/photon_guide_codec.h"
 #include "render/wire/tally_codec.h"
 
 namespace lucerna {
@@ -136,6 +138,49 @@ StatusOr<PassVariance::Numbers> ReadVariance(ByteReader& reader, std::size_t pix
   numbers.pixels.resize(pixels);
   for (PassVariance::Pixel& pixel : numbers.pixels)
     pixel = Read<PassVariance::Pixel>(reader);
+  return numbers;
+}
+
+void WriteGuide(ByteWriter& writer, const PhotonGuide& guide) {
+  const std::string bytes = EncodePhotonGuide(guide);
+  writer.Varint(bytes.size());
+  writer.Bytes(bytes);
+}
+
+StatusOr<PhotonGuide> ReadGuide(ByteReader& reader) {
+  return DecodePhotonGuide(reader.Bytes(reader.Varint()));
+}
+
+void WriteLearned(ByteWriter& writer, const GuideLearner::Numbers& numbers) {
+  writer.Varint(numbers.drawn.size());
+  for (const GuideLearner::Drawn& drawn : numbers.drawn) {
+    WriteGuide(writer, *drawn.guide);
+    Write(writer, drawn.trials);
+  }
+  writer.Varint(numbers.reports.size());
+  for (const EmissionReport& report : numbers.reports) {
+    WriteEmission(writer, report.numbers);
+    Write(writer, report.pixel);
+  }
+}
+
+StatusOr<GuideLearner::Numbers> ReadLearned(ByteReader& reader, std::size_t pixels) {
+  constexpr std::size_t kReportBytes = 2 * kEmissionDimensions + sizeof(std::uint32_t);
+  GuideLearner::Numbers numbers;
+  for (std::uint64_t left = reader.Varint(); left > 0; --left) {
+    LUCERNA_ASSIGN_OR_RETURN(PhotonGuide guide, ReadGuide(reader));
+    const auto trials = Read<double>(reader);
+    if (!(trials > 0) || !std::isfinite(trials)) return Malformed("photons were drawn by no guide");
+    numbers.drawn.push_back({std::make_shared<const PhotonGuide>(std::move(guide)), trials});
+  }
+  const std::uint64_t reports = reader.Varint();
+  if (!HasRows(reader, reports, kReportBytes)) return Malformed("reports are missing");
+  numbers.reports.resize(reports);
+  for (EmissionReport& report : numbers.reports) {
+    report.numbers = ReadEmission(reader);
+    report.pixel = Read<std::uint32_t>(reader);
+    if (report.pixel >= pixels) return Malformed("a report is of no pixel");
+  }
   return numbers;
 }
 

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "render/base/status.h"
+#include "render/estimate/guide_learning.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/estimate/image_sums.h"
 #include "render/estimate/photon_steps.h"
@@ -24,6 +25,8 @@ void WriteRadii(ByteWriter& writer, const RadiusColumn& radii);
 void WriteNumbers(ByteWriter& writer, const PixelRadii::Numbers& numbers);
 void WriteVariance(ByteWriter& writer, const PassVariance::Numbers& numbers);
 void WriteSums(ByteWriter& writer, const ImageSums::Whole& sums);
+void WriteGuide(ByteWriter& writer, const PhotonGuide& guide);
+void WriteLearned(ByteWriter& writer, const GuideLearner::Numbers& numbers);
 
 // Errors of all: INVALID_ARGUMENT for bytes that are truncated or of another shape. Nothing is
 // allocated before the bytes are there.
@@ -31,6 +34,8 @@ void WriteSums(ByteWriter& writer, const ImageSums::Whole& sums);
 [[nodiscard]] StatusOr<PixelRadii::Numbers> ReadNumbers(ByteReader& reader,
                                                         const PixelRadii::Numbers& shape);
 [[nodiscard]] StatusOr<PassVariance::Numbers> ReadVariance(ByteReader& reader, std::size_t pixels);
+[[nodiscard]] StatusOr<PhotonGuide> ReadGuide(ByteReader& reader);
+[[nodiscard]] StatusOr<GuideLearner::Numbers> ReadLearned(ByteReader& reader, std::size_t pixels);
 [[nodiscard]] StatusOr<ImageSums::Whole> ReadSums(ByteReader& reader, std::size_t pixels);
 
 }  // namespace lucerna

@@ -8,6 +8,7 @@
 #include "render/math/octahedral.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/block_codec.h"
+#include "render/wire/photon_guide_codec.h"
 #include "render/wire/slice_codec.h"
 #include "tests/fuzz/fuzz_targets.h"
 
@@ -157,6 +158,29 @@ std::vector<std::string> SliceSeeds() {
     seeds.push_back(Joined(choice, EncodeSlice(slice)));
   }
   return seeds;
+}
+
+bool FuzzGuide(std::string_view bytes) {
+  const auto guide = DecodePhotonGuide(bytes);
+  if (!guide.ok()) return false;
+  LUCERNA_CHECK(DecodePhotonGuide(EncodePhotonGuide(*guide)).value() == *guide);
+  for (int i = 0; i < 64; ++i) {
+    PrimaryNumbers numbers;
+    numbers.fill((i + 0.5) / 64);
+    const double weight = guide->Draw(numbers);
+    LUCERNA_CHECK(weight > 0 && weight < 2 / kUnguidedShare);
+    LUCERNA_CHECK(guide->WeightAt(numbers) == weight);
+    for (const double number : numbers)
+      LUCERNA_CHECK(number >= 0 && number < 1);
+  }
+  return true;
+}
+
+std::vector<std::string> GuideSeeds() {
+  const std::uint32_t half = std::uint32_t{1} << 31;
+  return {
+      EncodePhotonGuide(PhotonGuide()),
+      EncodePhotonGuide(PhotonGuide::Create({{2, half / 2}, {4, half}, {}, {}, {}}, 77).value())};
 }
 
 }  // namespace lucerna

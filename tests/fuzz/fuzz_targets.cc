@@ -13,6 +13,7 @@ std::span<const FuzzTarget> AllFuzzTargets() {
       FuzzTarget{"block", FuzzBlock, BlockSeeds},
       FuzzTarget{"radii", FuzzRadii, RadiiSeeds},
       FuzzTarget{"slice", FuzzSlice, SliceSeeds},
+      FuzzTarget{"guide", FuzzGuide, GuideSeeds},
       FuzzTarget{"checkpoint", FuzzCheckpoint, CheckpointSeeds},
       FuzzTarget{"sums", FuzzSums, SumsSeeds},
       FuzzTarget{"record", FuzzRecord, RecordSeeds},

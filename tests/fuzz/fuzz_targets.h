@@ -40,6 +40,8 @@ bool FuzzRadii(std::string_view bytes);
 std::vector<std::string> RadiiSeeds();
 bool FuzzSlice(std::string_view bytes);
 std::vector<std::string> SliceSeeds();
+bool FuzzGuide(std::string_view bytes);
+std::vector<std::string> GuideSeeds();
 
 // state_targets.cc. An odd first byte of a checkpoint makes its digests right before it is read.
 bool FuzzCheckpoint(std::string_view bytes);

@@ -188,7 +188,7 @@ TEST(WireBytesTest, HugeCountsAreRefusedBeforeAnythingIsAllocated) {
     EXPECT_FALSE(DecodeAccumulation(accumulation.Take(), kHitpoints).ok());
     for (const bool is_pixels : {true, false}) {
       ByteWriter slice;
-      slice.Bytes("LSL2");
+      slice.Bytes("LSL3");
       slice.Varint(kSlice.passes.first);
       slice.Varint(kSlice.passes.size());
       slice.Varint(is_pixels ? count : kSlice.pixels);

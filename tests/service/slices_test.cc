@@ -262,7 +262,7 @@ TEST_F(SlicesTest, BytesThatAreNotTheResultAreRefusedAndChangeNothing) {
       {"no pixels", [&](const v1::Lease& l) { return EncodeSlice(slice_of(l, 0, 0)); }},
       {"more columns",
        [&](const v1::Lease& l) { return EncodeSlice(slice_of(l, kSmallScenePixels, 2)); }},
-      {"no slice", [](const v1::Lease&) { return "LSL2 and then nothing of sense"; }},
+      {"no slice", [](const v1::Lease&) { return "LSL3 and then nothing of sense"; }},
       {"no bytes", [](const v1::Lease&) { return ""; }},
       {"bytes behind it", [&](const v1::Lease& lease) { return worker.ResultOf(lease) + "more"; }},
       {"too many bytes", [](const v1::Lease&) { return std::string(1'000'000, 'x'); }},

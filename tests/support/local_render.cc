@@ -55,7 +55,7 @@ void LocalRender::AddPass(int batches) {
     for (std::uint64_t b = 0; b < n; ++b) {
       const Accumulation accumulation =
           OrDie(tracer_->Run(settings_, needs_, pass_, photons * b / n, photons * (b + 1) / n,
-                             eye.block, radii, stop));
+                             eye.block, radii, stop, photons, plan_->guide.get()));
       if (const Status added = sums.Add(accumulation); !added.ok()) Die(added);
     }
     slice = estimator_->SliceOf(eye, *plan_, sums);

@@ -181,7 +181,7 @@ TEST(SliceCodecTest, RefusesAValueWithTooManyBits) {
     head.columns.clear();
     head.tally.photons = kPhotons;
     // The head of a slice of 2 pixels: that of none, with two numbers changed.
-    writer.Bytes("LSL2");
+    writer.Bytes("LSL3");
     writer.Varint(shape.passes.first);
     writer.Varint(shape.passes.size());
     writer.Varint(shape.pixels);

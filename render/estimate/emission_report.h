@@ -1,0 +1,38 @@
+// Which photon was found, and by which hitpoint?
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "render/transport/photon_guide.h"
+
+namespace lucerna {
+
+// A photon that a hitpoint found, of those that its guide asks to be reported.
+struct EmissionReport {
+  // The numbers of its emission, times 2^16.
+  std::array<std::uint16_t, kEmissionDimensions> numbers{};
+  std::uint32_t pixel = 0;  // of the crop window, that found it first: that of the lowest row
+  bool operator==(const EmissionReport&) const = default;
+};
+
+// The same within one pass.
+struct FoundPhoton {
+  std::uint64_t index = 0;
+  std::array<std::uint16_t, kEmissionDimensions> numbers{};
+  std::uint32_t row = 0;  // the first of the hitpoint block that found it
+  bool operator==(const FoundPhoton&) const = default;
+};
+
+// No message has more: far beyond what guides ask for.
+inline constexpr std::uint64_t kMostReports = 1 << 20;
+
+[[nodiscard]] inline PrimaryNumbers NumbersOf(
+    const std::array<std::uint16_t, kEmissionDimensions>& in_steps) {
+  PrimaryNumbers numbers;
+  for (std::size_t d = 0; d < kEmissionDimensions; ++d)
+    numbers[d] = (static_cast<double>(in_steps[d]) + 0.5) * 0x1p-16;
+  return numbers;
+}
+
+}  // namespace lucerna

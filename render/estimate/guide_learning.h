@@ -1,0 +1,94 @@
+// Which emissions should later passes draw more often?
+//
+// Of the photons that hitpoints find, some are reported with the numbers that their emission was
+// drawn with and the pixel that found them. A photon of the flux Φ adds to the squared relative
+// error of its pixels what the score of its pixel says. Where the mean score of the photons drawn
+// in a box of emissions, found or not, is m, and the box has the volume V, the fewest photons are
+// needed when it gets a share in proportion to V sqrt(m): the least sum of V² m / share. The tree
+// of boxes is grown where that gains most, best first, as long as what photons say is significant.
+//
+// All follows from sums of whole rounds in order, with correctly rounded operations: the same
+// guides on every machine.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "render/estimate/emission_report.h"
+#include "render/transport/photon_guide.h"
+
+namespace lucerna {
+
+// From `first_pass` on, photons are drawn by this guide.
+struct GuideStep {
+  std::uint64_t first_pass = 0;
+  std::shared_ptr<const PhotonGuide> guide;
+};
+// In order of passes.
+using GuideSteps = std::vector<GuideStep>;
+
+// A new guide follows from the passes before each of these, all of which end rounds: powers of two
+// and the middles between them.
+inline constexpr std::uint64_t kLastGuidePass = 1024;
+[[nodiscard]] constexpr bool IsGuidePass(std::uint64_t passes) {
+  const bool is_middle = passes % 3 == 0 && std::has_single_bit(passes / 3);
+  return passes <= kLastGuidePass && (std::has_single_bit(passes) || is_middle);
+}
+
+// Of a photon drawn with these numbers.
+using FluxAt = std::function<double(const PrimaryNumbers& numbers)>;
+
+class GuideLearner {
+ public:
+  // What first passes of so many photons are drawn by: an even guide with reports.
+  [[nodiscard]] static PhotonGuide First(std::uint64_t photons_per_pass);
+
+  // Adds what a round reported whose `photons` were drawn by `guide`.
+  void Add(std::span<const EmissionReport> reports, std::shared_ptr<const PhotonGuide> guide,
+           std::uint64_t photons);
+
+  // The guide after `passes`, of `photons_per_pass` from now on. `scores` [pixels]: what a photon
+  // adds to the squared relative error, over its squared flux, in any unit, at least 0. `flux_at`:
+  // of a photon without a guide, in any unit, 0 where none is emitted.
+  [[nodiscard]] PhotonGuide Next(std::uint64_t passes, std::uint64_t photons_per_pass,
+                                 std::span<const float> scores, const FluxAt& flux_at) const;
+
+  // Photons drawn by one guide.
+  struct Drawn {
+    std::shared_ptr<const PhotonGuide> guide;
+    double trials = 0;  // how many would have been reported if found
+  };
+  // All that is kept, for checkpoints.
+  struct Numbers {
+    std::vector<EmissionReport> reports;
+    std::vector<Drawn> drawn;  // in order of passes
+  };
+  [[nodiscard]] const Numbers& numbers() const { return numbers_; }
+  void Restore(Numbers numbers) { numbers_ = std::move(numbers); }
+
+ private:
+  // Of a photon with these numbers: one over its density, in all that was drawn so far, in units of
+  // the even one (the balance heuristic of Veach & Guibas 1995 over the guides).
+  [[nodiscard]] double WeightAt(const PrimaryNumbers& numbers) const;
+
+  Numbers numbers_;
+};
+
+// The mass of a report of a photon with these numbers.
+using MassAt = std::function<double(const PrimaryNumbers& numbers)>;
+struct GrownGuide {
+  std::vector<PhotonGuide::Node> nodes;  // empty: an even guide
+  double gain = 1;                       // so many times less variance
+};
+// The guide with the least variance for photons like `reports`, each of which stands for a `mass`
+// of the even density times its score. `mass_at` says what a report that was not made yet would
+// have.
+[[nodiscard]] GrownGuide GrowGuide(std::span<const EmissionReport> reports,
+                                   std::span<const double> mass, const MassAt& mass_at);
+
+}  // namespace lucerna

@@ -1,0 +1,112 @@
+#include "render/transport/photon_guide.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lucerna {
+namespace {
+
+// A factor of flux beyond this would come of bytes that no coordinator has made.
+constexpr double kLargestWeight = 1.01 / kUnguidedShare;
+// So far below 1 that a number stays within its box wherever that is.
+constexpr double kBelowOne = 1 - 0x1p-32;
+
+double ShareOf(std::uint32_t times_2_32) {
+  return static_cast<double>(times_2_32) * 0x1p-32;
+}
+
+}  // namespace
+
+StatusOr<PhotonGuide> PhotonGuide::Create(std::vector<Node> nodes, std::uint32_t reported) {
+  const auto malformed = [](std::string_view what) {
+    return absl::InvalidArgumentError(absl::StrCat("malformed photon guide: ", std::string(what)));
+  };
+  if (nodes.size() > kMostGuideNodes) return malformed("it has too many nodes");
+  PhotonGuide guide;
+  guide.high_.resize(nodes.size());
+  // Boxes whose upper halves are still to come.
+  struct Open {
+    std::size_t node;
+    std::array<std::uint8_t, kEmissionDimensions> halvings;
+    double weight;
+  };
+  std::vector<Open> open;
+  Open here = {0, {}, 1};
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const Node& node = nodes[i];
+    if (node.dimension > kEmissionDimensions) return malformed("it halves an unknown dimension");
+    if (node.dimension < kEmissionDimensions) {
+      if (node.low_share == 0) return malformed("a half gets no photons");
+      if (++here.halvings[node.dimension] > kMostHalvings) return malformed("it is too deep");
+      open.push_back({i, here.halvings, here.weight});
+      here.weight *= 0.5 / ShareOf(node.low_share);
+      if (i + 1 == nodes.size()) return malformed("it ends too soon");
+      continue;
+    }
+    if (node.low_share != 0) return malformed("a leaf has halves");
+    if (!(here.weight <= kLargestWeight)) return malformed("a box gets too few photons");
+    if (open.empty()) {
+      if (i + 1 != nodes.size()) return malformed("nodes are left over");
+      break;
+    }
+    if (i + 1 == nodes.size()) return malformed("it ends too soon");
+    const Open parent = open.back();
+    open.pop_back();
+    guide.high_[parent.node] = static_cast<std::uint32_t>(i + 1);
+    here.halvings = parent.halvings;
+    here.weight = parent.weight * 0.5 / (1 - ShareOf(nodes[parent.node].low_share));
+  }
+  guide.nodes_ = std::move(nodes);
+  guide.reported_ = reported;
+  return guide;
+}
+
+double PhotonGuide::Draw(PrimaryNumbers& numbers) const {
+  if (is_even()) return 1;
+  PrimaryNumbers low{};
+  PrimaryNumbers size = {1, 1, 1, 1, 1};
+  double weight = 1;
+  std::size_t at = 0;
+  while (nodes_[at].dimension < kEmissionDimensions) {
+    const std::size_t d = nodes_[at].dimension;
+    const double share = ShareOf(nodes_[at].low_share);
+    size[d] *= 0.5;
+    if (numbers[d] < share) {
+      numbers[d] /= share;
+      weight *= 0.5 / share;
+      ++at;
+    } else {
+      numbers[d] = (numbers[d] - share) / (1 - share);
+      low[d] += size[d];
+      weight *= 0.5 / (1 - share);
+      at = high_[at];
+    }
+    // A quotient may be rounded to 1.
+    numbers[d] = std::min(numbers[d], kBelowOne);
+  }
+  for (std::size_t d = 0; d < kEmissionDimensions; ++d)
+    numbers[d] = low[d] + size[d] * numbers[d];
+  return weight;
+}
+
+double PhotonGuide::WeightAt(PrimaryNumbers numbers) const {
+  if (is_even()) return 1;
+  double weight = 1;
+  std::size_t at = 0;
+  while (nodes_[at].dimension < kEmissionDimensions) {
+    const std::size_t d = nodes_[at].dimension;
+    const double share = ShareOf(nodes_[at].low_share);
+    numbers[d] *= 2;
+    if (numbers[d] < 1) {
+      weight *= 0.5 / share;
+      ++at;
+    } else {
+      numbers[d] -= 1;
+      weight *= 0.5 / (1 - share);
+      at = high_[at];
+    }
+  }
+  return weight;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,73 @@
+// Which emissions does a job draw more often than others?
+//
+// A photon's emission follows from five numbers in [0, 1): which emitter, where on it and into
+// which direction. Drawn evenly, they send photons in proportion to power, most of which may land
+// where nobody looks. A guide is a piecewise constant density over these numbers, learned from the
+// photons that hitpoints found in earlier passes (estimate/guide_learning.h). It is a binary tree:
+// each node halves its box along one of the numbers and says which share of the photons goes to
+// the lower half. Numbers are warped on the way down, so that evenly spaced ones stay evenly spaced
+// in every box (Clarberg, Jarosz, Akenine-Möller & Jensen 2005, "Wavelet Importance Sampling").
+//
+// At least kUnguidedShare of the density is even, so that no emission is lost, and no photon has
+// more than 1/kUnguidedShare times the flux that it would have without a guide. Source: Hachisuka &
+// Jensen 2011, "Robust Adaptive Photon Tracing using Photon Path Visibility", from where the even
+// share and learning from visible photons come.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "render/base/status.h"
+
+namespace lucerna {
+
+inline constexpr std::size_t kEmissionDimensions = 5;
+// Two numbers for the place, two for the direction, then the choice of the emitter.
+using PrimaryNumbers = std::array<double, kEmissionDimensions>;
+
+inline constexpr double kUnguidedShare = 0.25;
+// At most so many nodes, and so many halvings along one dimension.
+inline constexpr std::size_t kMostGuideNodes = 2047;
+inline constexpr int kMostHalvings = 16;
+
+class PhotonGuide {
+ public:
+  struct Node {
+    std::uint8_t dimension = kEmissionDimensions;  // along which it is halved; of leaves: none
+    std::uint32_t low_share = 0;                   // of its photons, times 2^32
+    bool operator==(const Node&) const = default;
+  };
+
+  // Even.
+  PhotonGuide() = default;
+  // `nodes` in preorder, the lower half first; none or a single leaf: even. `reported` times 2^-32
+  // is the share of the found photons that workers name to the coordinator.
+  // Errors: INVALID_ARGUMENT for nodes that make no tree, or too large a one, or give a half too
+  // little.
+  [[nodiscard]] static StatusOr<PhotonGuide> Create(std::vector<Node> nodes,
+                                                    std::uint32_t reported);
+
+  [[nodiscard]] bool is_even() const { return nodes_.size() <= 1; }
+  [[nodiscard]] std::uint32_t reported() const { return reported_; }
+  [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
+
+  // Makes evenly distributed numbers those of this guide. Returns the even density over the guide's
+  // there: the factor of the photon's flux, at most about 1 / kUnguidedShare.
+  double Draw(PrimaryNumbers& numbers) const;
+  // The same factor for numbers that were drawn.
+  [[nodiscard]] double WeightAt(PrimaryNumbers numbers) const;
+
+  bool operator==(const PhotonGuide& other) const {
+    return nodes_ == other.nodes_ && reported_ == other.reported_;
+  }
+
+ private:
+  std::vector<Node> nodes_;
+  std::vector<std::uint32_t> high_;  // [nodes] the upper half's
+  std::uint32_t reported_ = 0;
+};
+
+}  // namespace lucerna

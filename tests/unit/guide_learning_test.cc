@@ -1,0 +1,184 @@
+// What is learned must be what the photons say, and no more.
+#include "render/estimate/guide_learning.h"
+
+#include <cmath>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/math/rng.h"
+
+namespace lucerna {
+namespace {
+
+double OneFlux(const PrimaryNumbers& /*numbers*/) {
+  return 1;
+}
+
+// A job whose photons are found where `is_found` says so.
+class Simulated {
+ public:
+  explicit Simulated(std::uint64_t photons_per_pass) : photons_(photons_per_pass) {
+    guide_ = std::make_shared<const PhotonGuide>(GuideLearner::First(photons_));
+  }
+
+  // Draws the photons of `passes` passes, and learns from them.
+  template <typename IsFound>
+  void Draw(int passes, const IsFound& is_found, std::uint32_t pixel = 0) {
+    std::vector<EmissionReport> reports;
+    found_ = 0;
+    for (std::uint64_t i = 0; i < photons_ * static_cast<std::uint64_t>(passes); ++i) {
+      PrimaryNumbers numbers;
+      for (double& number : numbers)
+        number = static_cast<double>(rng_.Uniform());
+      guide_->Draw(numbers);
+      const bool is_reported = static_cast<double>(rng_.Uniform()) * 0x1p32 < guide_->reported();
+      if (!is_found(numbers)) continue;
+      ++found_;
+      if (!is_reported) continue;
+      EmissionReport report = {.pixel = pixel};
+      for (std::size_t d = 0; d < kEmissionDimensions; ++d)
+        report.numbers[d] = static_cast<std::uint16_t>(numbers[d] * 0x1p16);
+      reports.push_back(report);
+    }
+    learner_.Add(reports, guide_, photons_ * static_cast<std::uint64_t>(passes));
+    passes_ += static_cast<std::uint64_t>(passes);
+  }
+  const PhotonGuide& Learn(const std::vector<float>& scores = {1, 1}) {
+    guide_ = std::make_shared<const PhotonGuide>(learner_.Next(passes_, photons_, scores, OneFlux));
+    return *guide_;
+  }
+  [[nodiscard]] const GuideLearner& learner() const { return learner_; }
+  [[nodiscard]] const PhotonGuide& guide() const { return *guide_; }
+  // Of the last passes drawn.
+  [[nodiscard]] int found() const { return found_; }
+
+ private:
+  std::uint64_t photons_;
+  KeyedRng rng_{7};
+  GuideLearner learner_;
+  std::shared_ptr<const PhotonGuide> guide_;
+  std::uint64_t passes_ = 0;
+  int found_ = 0;
+};
+
+// A small box in the middle of one dimension, where halves alone show nothing, and beside it in
+// another: 1/64 of all.
+bool InSmallBox(const PrimaryNumbers& u) {
+  return u[1] >= 0.4375 && u[1] < 0.5625 && u[3] >= 0.875;
+}
+
+TEST(GuideLearningTest, FindsASmallBoxAndSendsPhotonsThere) {
+  Simulated job(16384);
+  job.Draw(1, InSmallBox);
+  EXPECT_NEAR(job.found(), 256, 64);
+  EXPECT_FALSE(job.Learn().is_even());
+  job.Draw(8, InSmallBox);
+  const PhotonGuide& guide = job.Learn();
+  // With n reports the box has a share of sqrt(n / 64) against at most sqrt(volume) of every empty
+  // box, whose volumes are 1/2, 1/4, ...: of 2000 reports 5.6 against 2.4.
+  EXPECT_GT(job.learner().numbers().reports.size(), 2000U);
+  PrimaryNumbers inside;
+  inside.fill(0.5);
+  inside[3] = 0.95;
+  const double share = (1 - kUnguidedShare) * 5.6 / (5.6 + 2.4);
+  EXPECT_LT(guide.WeightAt(inside), 1 / (64 * share));
+  PrimaryNumbers outside = inside;
+  outside[3] = 0.2;
+  EXPECT_GT(guide.WeightAt(outside), 2);
+  EXPECT_LE(guide.WeightAt(outside), 1.001 / kUnguidedShare);
+  job.Draw(1, InSmallBox);
+  EXPECT_GT(job.found(), share * 16384);
+}
+
+// Of photons with the mean score m, a box of volume V should have a share of V sqrt(m).
+TEST(GuideLearningTest, SharesFollowTheRootOfTheScore) {
+  std::vector<EmissionReport> reports;
+  std::vector<double> mass;
+  KeyedRng rng(3);
+  for (int i = 0; i < 20000; ++i) {
+    EmissionReport report;
+    for (std::uint16_t& number : report.numbers)
+      number = static_cast<std::uint16_t>(rng.Bits());
+    const bool is_low = report.numbers[4] < 0x8000;
+    // Equal masses, nine times as many of them in the lower half.
+    if (!is_low && i % 9 != 0) continue;
+    reports.push_back(report);
+    mass.push_back(1);
+  }
+  const std::vector<PhotonGuide::Node> nodes = GrowGuide(reports, mass, OneFlux).nodes;
+  ASSERT_EQ(nodes.size(), 3U);
+  EXPECT_EQ(nodes[0].dimension, 4);
+  // Three to one, beside the even part.
+  const double expected = kUnguidedShare * 0.5 + (1 - kUnguidedShare) * 0.75;
+  EXPECT_NEAR(static_cast<double>(nodes[0].low_share) * 0x1p-32, expected, 0.01);
+}
+
+TEST(GuideLearningTest, ChanceIsNoReasonToHalve) {
+  for (std::uint64_t key = 0; key < 20; ++key) {
+    std::vector<EmissionReport> reports(5000);
+    KeyedRng rng(key);
+    for (EmissionReport& report : reports) {
+      for (std::uint16_t& number : report.numbers)
+        number = static_cast<std::uint16_t>(rng.Bits());
+    }
+    EXPECT_TRUE(GrowGuide(reports, std::vector<double>(reports.size(), 1), OneFlux).nodes.size() <=
+                1)
+        << key;
+  }
+}
+
+TEST(GuideLearningTest, WhereNothingIsFoundAllThatWillBeIsReported) {
+  Simulated job(1000);
+  job.Draw(1, [](const PrimaryNumbers&) { return false; });
+  const PhotonGuide& guide = job.Learn();
+  EXPECT_TRUE(guide.is_even());
+  EXPECT_EQ(guide.reported(), UINT32_MAX);
+}
+
+TEST(GuideLearningTest, AsksForFewReportsAndThenForNone) {
+  Simulated job(1 << 20);
+  const auto all = [](const PrimaryNumbers&) { return true; };
+  EXPECT_NEAR(static_cast<double>(job.guide().reported()) * 0x1p-32 * (1 << 20), 16384, 1);
+  job.Draw(1, all);
+  job.Learn();
+  // Of the next pass, about 8192.
+  EXPECT_NEAR(static_cast<double>(job.guide().reported()) * 0x1p-32 * (1 << 20), 8192, 100);
+  Simulated late(64);
+  late.Draw(static_cast<int>(kLastGuidePass), all);
+  EXPECT_EQ(late.Learn().reported(), 0U);
+}
+
+// Photons of all guides together must stand for the even density: where everything is found, an
+// even guide is best, whatever drew them.
+TEST(GuideLearningTest, PhotonsOfSeveralGuidesStandForTheEvenDensity) {
+  const auto low_share = static_cast<std::uint32_t>(0.85 * 0x1p32);
+  const auto skewed = std::make_shared<const PhotonGuide>(
+      PhotonGuide::Create({{0, low_share}, {}, {}}, UINT32_MAX).value());
+  const auto even =
+      std::make_shared<const PhotonGuide>(PhotonGuide::Create({}, UINT32_MAX / 2).value());
+  constexpr std::uint64_t kPhotons = 8192;
+  GuideLearner learner;
+  KeyedRng rng(11);
+  for (const auto& guide : {even, skewed, even, skewed}) {
+    std::vector<EmissionReport> reports;
+    for (std::uint64_t i = 0; i < kPhotons; ++i) {
+      if (guide == even && i % 2 == 1) continue;  // not reported
+      PrimaryNumbers numbers;
+      for (double& number : numbers)
+        number = static_cast<double>(rng.Uniform());
+      guide->Draw(numbers);
+      EmissionReport& report = reports.emplace_back();
+      for (std::size_t d = 0; d < kEmissionDimensions; ++d)
+        report.numbers[d] = static_cast<std::uint16_t>(numbers[d] * 0x1p16);
+    }
+    learner.Add(reports, guide, kPhotons);
+  }
+  EXPECT_TRUE(learner.Next(4, kPhotons, std::vector<float>{1}, OneFlux).is_even());
+  // As they were drawn, most lie in the lower half: without weights that would be seen.
+  const std::vector<EmissionReport>& reports = learner.numbers().reports;
+  EXPECT_GT(GrowGuide(reports, std::vector<double>(reports.size(), 1), OneFlux).nodes.size(), 1U);
+}
+
+}  // namespace
+}  // namespace lucerna
