@@ -19,6 +19,11 @@ constexpr double kEyePathCost = 3;
 constexpr double kEyeRayCost = 0.75;
 constexpr double kPairCost = 0.1;
 
+// Of fewer photons found for each pixel, over all passes, variances tell nothing, if they bring such
+// a share of the light.
+constexpr double kFewestFound = 1;
+constexpr double kShareThatCounts = 0.1;
+
 // Photons that vary so many times less than independent ones are spaced by low discrepancy.
 constexpr double kEvenlySpaced = 1.25;
 
@@ -163,7 +168,21 @@ PassVariance::Costs PassVariance::CostsSoFar() const {
                        kEyeRayCost * static_cast<double>(sums_.eye_rays)};
 }
 
+bool PassVariance::IsStarved() const {
+  double found = 0;
+  double photons = 0;
+  double all = 0;
+  for (const Pixel& pixel : sums_.pixels) {
+    found += static_cast<double>(pixel.count);
+    photons += static_cast<double>(pixel.photons);
+    all += static_cast<double>(pixel.photons) + static_cast<double>(pixel.direct);
+  }
+  return found < kFewestFound * static_cast<double>(sums_.pixels.size()) &&
+         photons > kShareThatCounts * all;
+}
+
 double PassVariance::BestPhotons(double kernel_noise) const {
+  if (IsStarved()) return std::numeric_limits<double>::infinity();
   const Parts variance = Split(kernel_noise);
   if (!(variance.photons > 0)) return 0;
   const double present = static_cast<double>(sums_.photons) / static_cast<double>(sums_.passes);

@@ -70,6 +70,8 @@ class PassVariance {
   // number so far. 0 where photons bring nothing, and infinite where all variance is theirs. That
   // mean number itself where photons are evenly spaced: with another number, later passes take up
   // another place of their sequence, and lose more than they gain.
+  // Infinite too where most pixels have found no photon yet, though those that were found bring a
+  // good part of the light: the variance of photons is not seen then.
   // Requires passes() >= 2.
   [[nodiscard]] double BestPhotons(double kernel_noise) const;
 
@@ -92,6 +94,8 @@ class PassVariance {
   explicit PassVariance(Numbers numbers) : sums_(std::move(numbers)) {}
 
  private:
+  [[nodiscard]] bool IsStarved() const;
+
   Numbers sums_;
 };
 

@@ -117,6 +117,21 @@ TEST(PassVarianceTest, ReckonsWithTheKernel) {
   EXPECT_LT(parts.eye_paths, 0.02);
 }
 
+// Where one pixel in ten has met a photon, deviations say nothing of photons, and much of the noise
+// of direct light: more photons all the same, unless they bring next to nothing.
+TEST(PassVarianceTest, WhereHardlyAnyPhotonIsFoundMoreAreNeeded) {
+  const auto with = [](double count_per_pass, double direct) {
+    return VarianceOf(2, [=](KeyedRng& rng, std::uint64_t, std::size_t) {
+      const double count = Poisson(rng, count_per_pass);
+      return Gathered{.photons = count, .direct = direct * Uniform(rng), .count = count};
+    });
+  };
+  EXPECT_EQ(with(0.05, 0.4).BestPhotons(3), kInfinity);
+  EXPECT_LT(with(0.05, 4).BestPhotons(3), kPixels) << "a fortieth of the light";
+  EXPECT_LT(with(0, 0.4).BestPhotons(3), kPixels) << "none at all";
+  EXPECT_LT(with(2, 40).BestPhotons(3), kPixels) << "many";
+}
+
 // One photon in twenty passes, taken for the whole truth, explains more than there is.
 TEST(PassVarianceTest, NeverFindsMoreOfPhotonsThanThereIs) {
   const PassVariance variance = VarianceOf(4, [](KeyedRng& rng, std::uint64_t, std::size_t) {
