@@ -83,6 +83,15 @@ TEST(PbrtMaterialsTest, RoughnessIsLookedUpBeforeItIsRemapped) {
   EXPECT_NEAR(stretched.alpha_v, 0.2F, 1e-6F);
 }
 
+// A texture in space stays where it is when the scene's unit is chosen.
+TEST(PbrtMaterialsTest, TexturesInSpaceKeepTheirPlaceInAnyUnit) {
+  const Scene scene = World("Scale 1e9 1e9 1e9 " + std::string(kPlanar) +
+                            "Material \"dielectric\" \"texture roughness\" \"r\" Shape \"sphere\"");
+  ASSERT_NE(scene.unit, 1);
+  const auto size = static_cast<float>(1e9 / scene.unit);
+  EXPECT_NEAR(MetOnSphere(scene, Vec3{0.3F, -5, 0.4F} * size).alpha_u, std::sqrt(0.5F), 1e-5F);
+}
+
 // What holds for the material as a whole follows from the smallest and the largest number.
 TEST(PbrtMaterialsTest, ATextureOfRoughnessDecidesByItsRange) {
   const std::string picture =
