@@ -485,14 +485,20 @@ class PathTracer {
   // Draws the material of a mix, and turns the normal where that has bumps.
   void Prepare(SurfacePoint& point, PathNumbers& numbers) const {
     const Material* material = &scene_.materials[point.material];
+    const TexturePlace place = {UvAt(scene_, point), point.position, point.geometric_normal};
     while (material->kind == Material::Kind::kMix) {
-      const bool is_second = numbers.Next() < static_cast<double>(material->amount);
+      const float amount = material->amount_texture == kNoTexture
+                               ? material->amount
+                               : TextureNumber(scene_.textures, material->amount_texture, place);
+      const bool is_second = numbers.Next() < static_cast<double>(amount);
       point.material = static_cast<std::uint32_t>(material->mixed[is_second ? 1 : 0]);
       material = &scene_.materials[point.material];
     }
-    if (!material->HasBumps()) return;
-    const TexturePlace place = {UvAt(scene_, point), point.position, point.geometric_normal};
-    TurnShadingNormal(scene_, *material, place, point);
+    if (material->HasBumps()) {
+      TurnShadingNormal(scene_, *material, place, point);
+    } else if (material->IsAnisotropic()) {
+      FindTangent(scene_, point);
+    }
   }
 
   Color Radiance(Ray ray, PathNumbers& numbers) const {
@@ -530,7 +536,7 @@ class PathTracer {
       }
       --events_left;
 
-      const Frame frame(point.shading_normal);
+      const Frame frame = ShadingFrame(point);
       Scattered scattered;
       const std::array<double, 3> u = {numbers.Next(), numbers.Next(), numbers.Next()};
       const Vec3 wo_local = frame.ToLocal(wo);

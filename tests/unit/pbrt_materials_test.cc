@@ -12,6 +12,7 @@
 #include "render/analysis/needs.h"
 #include "render/formats/read_scene.h"
 #include "render/geometry/intersector.h"
+#include "render/scene/noise.h"
 #include "render/scene/render_settings.h"
 #include "render/transport/material_at.h"
 #include "render/transport/working_space.h"
@@ -285,6 +286,58 @@ TEST(PbrtMaterialsTest, AlphaMayBeATextureOnAnyShape) {
   EXPECT_THAT(Said(textures + "AreaLightSource \"diffuse\" Shape \"sphere\" \"texture alpha\" "
                               "\"half\""),
               HasSubstr("must not be a texture on a shape that emits"));
+}
+
+// What a float texture that is declared by `text` as "t" is at a place.
+float NumberOf(const std::string& text, const TexturePlace& place) {
+  const Scene scene =
+      World(text + "\nMaterial \"conductor\" \"texture roughness\" \"t\" Shape \"sphere\"");
+  const std::int32_t texture = scene.materials.at(1).roughness_textures[0];
+  EXPECT_NE(texture, kNoTexture);
+  return texture == kNoTexture ? 0 : TextureNumber(scene.textures, texture, place);
+}
+
+TEST(PbrtMaterialsTest, KindsOfTexturesAreReadAsPbrtHasThem) {
+  const Vec3 p = {0.3F, 1.2F, -0.7F};
+  const TexturePlace place = {{0.25F, 0.75F}, p, {0, 0, 1}};
+  // The direction is in the space of the texture: y becomes z.
+  EXPECT_FLOAT_EQ(NumberOf("Rotate 90 1 0 0 Texture \"t\" \"float\" \"directionmix\" "
+                           "\"float tex1\" 0.2 \"float tex2\" 0.7",
+                           place),
+                  0.2F);
+  EXPECT_FLOAT_EQ(
+      NumberOf("Scale 0.5 0.5 0.5 Texture \"t\" \"float\" \"fbm\" \"integer octaves\" 3 "
+               "\"float roughness\" 0.25",
+               place),
+      FbmAt(p * 2, 0.25F, 3));
+  EXPECT_FLOAT_EQ(NumberOf("Translate 1 0 0 Texture \"t\" \"float\" \"wrinkled\"", place),
+                  TurbulenceAt(p - Vec3{1, 0, 0}, 0.5F, 8));
+  EXPECT_FLOAT_EQ(NumberOf("Texture \"t\" \"float\" \"windy\"", place),
+                  std::abs(FbmAt(p * 0.1F, 0.5F, 3)) * FbmAt(p, 0.5F, 6));
+  const std::string cubes =
+      "Texture \"t\" \"float\" \"checkerboard\" \"integer dimension\" 3 \"float tex1\" 0.1 "
+      "\"float tex2\" 0.9";
+  EXPECT_FLOAT_EQ(NumberOf(cubes, place), 0.1F);  // cube (0, 1, -1)
+  EXPECT_FLOAT_EQ(NumberOf("Translate 0 0 0.5 " + cubes, place), 0.9F);
+}
+
+TEST(PbrtMaterialsTest, DotsShowWhatPbrtShowsInThem) {
+  // Around whole numbers where noise is above 0 there is a dot, whose middle is at most 0.15 off.
+  float column = 0;
+  while (!(NoiseAt({column + 0.5F, 0.5F, 0.5F}) > 0))
+    ++column;
+  EXPECT_FLOAT_EQ(
+      NumberOf("Texture \"t\" \"float\" \"dots\" \"float inside\" 0.7 \"float outside\" 0.2",
+               {{column, 0}, {}, {}}),
+      0.2F);
+}
+
+TEST(PbrtMaterialsTest, MixesOfConstantsAreConstants) {
+  const Scene scene = World(
+      "Texture \"t\" \"float\" \"mix\" \"float tex2\" 0.5 \"float amount\" 0.5\n"
+      "Material \"conductor\" \"texture roughness\" \"t\" Shape \"sphere\"");
+  EXPECT_FALSE(scene.materials[1].DependsOnPlace());
+  EXPECT_FLOAT_EQ(scene.materials[1].alpha_u, 0.5F);
 }
 
 TEST(PbrtMaterialsTest, TexturesOfAKindThatGivesOnlyOneOfTheTwoAreRefused) {
