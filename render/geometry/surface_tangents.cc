@@ -10,6 +10,11 @@
 namespace lucerna {
 namespace {
 
+// In a scene of tiny or huge numbers squares of floats would vanish or have no end.
+bool AreParallel(const Double3& a, const Double3& b) {
+  return !(Length(Cross(a, b)) > 0);
+}
+
 // Any two tangents.
 SurfaceTangents AcrossNormal(Vec3 normal) {
   const Frame frame(normal);
@@ -45,12 +50,10 @@ SurfaceTangents OnTriangle(const Scene& scene, const TriangleMesh& mesh,
   const Derivatives p = DerivativesOf(uv, 1 / determinant, Double3(p0), Double3(p1), Double3(p2));
   SurfaceTangents tangents = {ToFloat(p.by_u), ToFloat(p.by_v), {}, {}};
   if (!point.has_shading_normal) {
-    if (!(LengthSquared(Cross(tangents.dpdu, tangents.dpdv)) > 0))
-      return AcrossNormal(point.shading_normal);
-    return tangents;
+    return AreParallel(p.by_u, p.by_v) ? AcrossNormal(point.shading_normal) : tangents;
   }
   tangents.dpdv = Cross(point.shading_normal, tangents.dpdu);
-  if (!(LengthSquared(tangents.dpdv) > 0)) return AcrossNormal(point.shading_normal);
+  if (!(MaxAbs(tangents.dpdv) > 0)) return AcrossNormal(point.shading_normal);
   tangents.dpdu = Cross(tangents.dpdv, point.shading_normal);
   const Transform* to_world =
       point.instance == kNoInstance ? nullptr : &scene.instances[point.instance].to_world;
@@ -77,9 +80,9 @@ SurfaceTangents TangentsAt(const Scene& scene, const SurfacePoint& point) {
       VisitShape(scene, KindOf(scene, point.geometry), point.primitive,
                  [&](const auto& shape) { return TangentsOf(shape, point.position); });
   // The poles.
-  if (!(LengthSquared(Cross(tangents.dpdu, tangents.dpdv)) > 0))
-    return AcrossNormal(point.shading_normal);
-  return tangents;
+  return AreParallel(Double3(tangents.dpdu), Double3(tangents.dpdv))
+             ? AcrossNormal(point.shading_normal)
+             : tangents;
 }
 
 }  // namespace lucerna

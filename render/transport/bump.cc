@@ -40,22 +40,28 @@ Turned Displaced(const Scene& scene, const Material& material, const TexturePlac
           tangents.dpdv + normal * ((height_at(along_v) - height) / dv) + tangents.dndv * height};
 }
 
-Turned Mapped(const Scene& scene, const Material& material, const TexturePlace& place,
-              const SurfaceTangents& tangents, Vec3 normal) {
-  const Rgb color = TextureColor(scene.textures, material.normal_map, place);
-  const Vec3 local = {2 * color.r - 1, 2 * color.g - 1, 2 * color.b - 1};
-  const Vec3 along = tangents.dpdu - normal * Dot(tangents.dpdu, normal);
-  if (!(LengthSquared(local) > 0) || !(LengthSquared(along) > 0)) return {};
-  const Vec3 turned = Normalize(Frame(Normalize(along), normal).ToWorld(Normalize(local)));
-  const Vec3 dpdu = tangents.dpdu - turned * Dot(tangents.dpdu, turned);
-  return {dpdu, Cross(turned, dpdu)};
+// Its direction, however small or large it is; zero where there is none.
+Vec3 DirectionOf(Vec3 v) {
+  const float size = MaxAbs(v);
+  return size > 0 && std::isfinite(size) ? Normalize(v / size) : Vec3();
 }
 
 // Unit, along dpdu at right angles to the normal; zero where there is none.
 Vec3 TangentAlong(Vec3 dpdu, Vec3 normal) {
-  const Vec3 along = dpdu - normal * Dot(dpdu, normal);
-  const float squared = LengthSquared(along);
-  return squared > 0 && std::isfinite(squared) ? along / std::sqrt(squared) : Vec3();
+  const Vec3 u = DirectionOf(dpdu);
+  return DirectionOf(u - normal * Dot(u, normal));
+}
+
+Turned Mapped(const Scene& scene, const Material& material, const TexturePlace& place,
+              const SurfaceTangents& tangents, Vec3 normal) {
+  const Rgb color = TextureColor(scene.textures, material.normal_map, place);
+  const Vec3 local = {2 * color.r - 1, 2 * color.g - 1, 2 * color.b - 1};
+  const Vec3 along = TangentAlong(tangents.dpdu, normal);
+  if (!(LengthSquared(local) > 0) || along == Vec3()) return {};
+  const Vec3 turned = Normalize(Frame(along, normal).ToWorld(Normalize(local)));
+  const Vec3 u = DirectionOf(tangents.dpdu);
+  const Vec3 dpdu = u - turned * Dot(u, turned);
+  return {dpdu, Cross(turned, dpdu)};
 }
 
 }  // namespace
@@ -67,10 +73,9 @@ void TurnShadingNormal(const Scene& scene, const Material& material, const Textu
   const Turned turned = material.normal_map != kNoTexture
                             ? Mapped(scene, material, place, tangents, point.shading_normal)
                             : Displaced(scene, material, place, tangents, point.shading_normal);
-  const Vec3 across = Cross(turned.dpdu, turned.dpdv);
-  const float squared = LengthSquared(across);
-  if (!(squared > 0) || !std::isfinite(squared)) return;
-  point.shading_normal = FaceForward(across / std::sqrt(squared), point.geometric_normal);
+  const Vec3 across = DirectionOf(Cross(DirectionOf(turned.dpdu), DirectionOf(turned.dpdv)));
+  if (across == Vec3()) return;
+  point.shading_normal = FaceForward(across, point.geometric_normal);
   point.has_shading_normal = true;
   point.tangent = TangentAlong(turned.dpdu, point.shading_normal);
 }

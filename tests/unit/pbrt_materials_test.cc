@@ -165,6 +165,31 @@ TEST(PbrtMaterialsTest, AMixIsOneOfItsMaterialsForEachRay) {
   EXPECT_TRUE(properties.needs_choice());
 }
 
+// Deposits of a mix are not weighed by one of its materials: each hitpoint does that by its own.
+TEST(PbrtMaterialsTest, MaterialsOfAMixDoNotWeighPhotons) {
+  const Scene scene =
+      World(std::string(kTwo) +
+            "MakeNamedMaterial \"c\" \"string type\" \"coateddiffuse\"\n"
+            "Material \"mix\" \"string materials\" [ \"a\" \"c\" ] Shape \"sphere\"\n"
+            "NamedMaterial \"c\" Shape \"sphere\"");
+  const auto properties_of = [&](std::int32_t material, Parts part) {
+    MaterialNumbers numbers = scene.materials[static_cast<std::size_t>(material)];
+    numbers.parts = part;
+    return PropertiesOf(numbers);
+  };
+  const std::int32_t mix = scene.spheres[0].traits.material;
+  EXPECT_FALSE(properties_of(mix, Parts::kAll).weighs_photons);
+  const std::int32_t coat = scene.materials[static_cast<std::size_t>(mix)].mixed[1];
+  EXPECT_FALSE(properties_of(coat, Parts::kAll).weighs_photons);
+  EXPECT_FALSE(properties_of(coat, Parts::kSecond).is_separable);
+  EXPECT_TRUE(properties_of(coat, Parts::kSecond).gathers);
+  // The material itself, outside of a mix, is as it was.
+  const std::int32_t own = scene.spheres[1].traits.material;
+  EXPECT_NE(own, coat);
+  EXPECT_TRUE(properties_of(own, Parts::kAll).weighs_photons);
+  EXPECT_TRUE(properties_of(own, Parts::kSecond).is_separable);
+}
+
 TEST(PbrtMaterialsTest, MixesOfMixesMultiplyTheirShares) {
   const auto shares = SharesOf(
       World(std::string(kTwo) +
