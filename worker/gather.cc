@@ -1,6 +1,7 @@
 #include "worker/gather.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <optional>
@@ -10,6 +11,7 @@
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "render/transport/bsdf.h"
+#include "render/transport/coat.h"
 #include "worker/cut_disc.h"
 #include "worker/gather_piece.h"
 #include "worker/gather_segments.h"
@@ -147,6 +149,27 @@ struct EvidenceSums<Evidence::kFrequency> {
   std::array<std::int64_t, kFrequencyColumns> sums{};
 };
 
+// Makes the widths of facets what a texture made them at a hitpoint.
+void SetWidths(MaterialNumbers& material, const std::array<float, 4>& widths) {
+  material.alpha_u = widths[0];
+  material.alpha_v = widths[1];
+  material.base_alpha_u = widths[2];
+  material.base_alpha_v = widths[3];
+  material.may_be_smooth = false;
+  material.base_may_be_smooth = false;
+  FitCoat(material);
+}
+
+// Around the shading normal of a hitpoint, turned as its surface is where that matters.
+Frame FrameOf(const GlossyHitpoint& glossy, const GlossyPlace* place) {
+  const Vec3 normal = DecodeOctahedral(glossy.shading_normal_oct);
+  if (place == nullptr || place->tangent_oct == kNoTangent) return Frame(normal);
+  const Vec3 tangent = DecodeOctahedral(place->tangent_oct);
+  // Rounding leaves both a little off a right angle.
+  const Vec3 along = tangent - normal * Dot(tangent, normal);
+  return LengthSquared(along) > 0 ? Frame(Normalize(along), normal) : Frame(normal);
+}
+
 // What one hitpoint gathers from.
 struct RowSource {
   const PhotonGrid& grid;
@@ -247,20 +270,25 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
   } else {
     const Material& untextured = materials[glossy->material];
     std::optional<Material> textured;
-    if (!block.textured_k.empty() && untextured.texture != kNoTexture) {
-      textured = untextured;
-      SetTexturedParameter(
-          *textured, block.textured_k[static_cast<std::size_t>(glossy - block.glossy.data())]);
+    const GlossyPlace* place_of = nullptr;
+    if (!block.places.empty() && untextured.DependsOnPlace()) {
+      place_of = &block.places[static_cast<std::size_t>(glossy - block.glossy.data())];
+      static_cast<MaterialNumbers&>(textured.emplace()) = untextured;
+      if (untextured.texture != kNoTexture) SetTexturedParameter(*textured, place_of->color);
+      if (untextured.HasRoughnessTexture()) SetWidths(*textured, place_of->widths);
     }
     // Where a surface has two parts, caustic photons are gathered on the one at which eye paths go
     // on without being smooth: a rough coat, or what lies under a smooth one.
-    const MaterialProperties properties = PropertiesOf(untextured);
-    if (source.caustic_weight != nullptr && properties.has_parts) {
-      if (!textured) textured = untextured;
-      textured->parts = properties.has_rough_coat ? Parts::kFirst : Parts::kSecond;
+    // Other photons are gathered on the second.
+    const MaterialProperties properties = PropertiesOf(textured ? *textured : untextured);
+    if (properties.has_parts) {
+      if (!textured) static_cast<MaterialNumbers&>(textured.emplace()) = untextured;
+      textured->parts = source.caustic_weight != nullptr && properties.has_rough_coat
+                            ? Parts::kFirst
+                            : Parts::kSecond;
     }
     const Material& material = textured ? *textured : untextured;
-    const Frame frame(DecodeOctahedral(glossy->shading_normal_oct));
+    const Frame frame = FrameOf(*glossy, place_of);
     const Vec3 wo = frame.ToLocal(DecodeOctahedral(glossy->to_eye_oct));
     const bool transmits = Transmits(material);
     grid.ForEachWithin(position, reach, [&](std::size_t i, float squared) {

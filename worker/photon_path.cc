@@ -461,14 +461,17 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       return end(PhotonEnd::kNotFinite, energy.dropped);
     }
     [[maybe_unused]] const float after_flight = parts.media ? MaxChannel(flux) : 1;
-    const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+    SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+    const Vec3 wo = -ray.direction;
+    // Of a mix those of all its materials: which one this photon meets says nothing of the
+    // hitpoints nearby.
+    const MaterialProperties& properties = properties_[surface.material];
     [[maybe_unused]] std::optional<Material> textured;
     const Material& material = [&]() -> const Material& {
-      if constexpr (kTextures) return MaterialAt(scene_, surface, textured);
+      if constexpr (kTextures) return MaterialAt(scene_, surface, wo, textured);
       return scene_.materials[surface.material];
     }();
     watcher.Landed(hit, surface, material, flux);
-    const Vec3 wo = -ray.direction;
     const bool is_smoothed = parts.shading_normals && surface.has_shading_normal;
     if (is_smoothed) {
       const float shading = Dot(wo, surface.shading_normal);
@@ -481,7 +484,6 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       return end(PhotonEnd::kNotFinite, energy.dropped);
     }
     if (is_smoothed) book(EnergyOf(flux), energy.smoothing);
-    const MaterialProperties& properties = properties_[surface.material];
     const bool gathers = landing > 0 && properties.gathers;
     bool gathers_caustic = false;
     if (parts.caustics) {
@@ -519,7 +521,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       if (is_found) {
         Rgb deposited = flux;
         if (properties.weighs_photons) {
-          deposited *= PhotonFactor(material, Frame(surface.shading_normal).ToLocal(wo));
+          deposited *= PhotonFactor(material, ShadingFrame(surface).ToLocal(wo));
         }
         landed.deposits.rows.push_back(
             {surface.position, deposited, deposit_key,
@@ -541,7 +543,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       u1 = rng.Uniform();
       u2 = rng.Uniform();
     }
-    const Frame frame(surface.shading_normal);
+    const Frame frame = ShadingFrame(surface);
     BsdfSample sample;
     const Vec3 wo_local = frame.ToLocal(wo);
     const bool is_scattered = [&] {

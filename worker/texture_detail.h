@@ -1,7 +1,8 @@
 // How fine is the detail of a texture?
 //
 // For photons that leave a textured surface diffusely: the pattern is then part of the source. One
-// pair of numbers stands for a whole texture, computed once from its pixels.
+// pair of numbers stands for a whole texture, computed once from its pixels. Textures that are not
+// placed by u and v, and noise, count as even.
 #pragma once
 
 #include <span>

@@ -13,6 +13,8 @@ TextureStatistics StatisticsOfCheckerboard(const Texture& texture,
   constexpr double kTexels = 8;  // of a square's side
   TextureStatistics known;
   known.luminance = 0.5 * (even.luminance + odd.luminance);
+  if (texture.is_in_space || texture.mapping.kind != TextureMapping::Kind::kUv)
+    return {{}, known.luminance};
   const double step = even.luminance - odd.luminance;
   // The step changes the first and the last texel of each square.
   const double detail = 2 / kTexels * 0.5 *

@@ -10,6 +10,7 @@ namespace lucerna {
 
 TextureStatistics StatisticsOfPicture(const Texture& texture,
                                       std::span<const TextureStatistics> /*parts*/) {
+  if (texture.is_number) return {};
   const Picture& picture = *texture.picture;
   const auto width = static_cast<std::size_t>(picture.width);
   const auto height = static_cast<std::size_t>(picture.height);
@@ -46,6 +47,7 @@ TextureStatistics StatisticsOfPicture(const Texture& texture,
       known.detail.v += TexelDetail(along_v, here, known.luminance, 1);
     }
   }
+  if (texture.mapping.kind != TextureMapping::Kind::kUv) return {{}, known.luminance};
   // From pixels to u and v.
   const auto texels = static_cast<double>(albedo.size());
   const double per_u = static_cast<double>(texture.mapping.scale_u) * static_cast<double>(width);

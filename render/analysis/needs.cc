@@ -69,6 +69,19 @@ std::vector<std::uint8_t> MaterialsInUse(const Scene& scene) {
   ForEachShapeTraits(scene, [&](const ShapeTraits& traits) {
     in_use[static_cast<std::size_t>(traits.material)] = 1;
   });
+  // And which ones mixes choose from.
+  std::vector<std::int32_t> to_look_at;
+  for (std::size_t i = 0; i < in_use.size(); ++i) {
+    if (in_use[i] != 0) to_look_at.push_back(static_cast<std::int32_t>(i));
+  }
+  while (!to_look_at.empty()) {
+    const Material& material = scene.materials[static_cast<std::size_t>(to_look_at.back())];
+    to_look_at.pop_back();
+    if (material.kind != Material::Kind::kMix) continue;
+    for (const std::int32_t part : material.mixed) {
+      if (std::exchange(in_use[static_cast<std::size_t>(part)], 1) == 0) to_look_at.push_back(part);
+    }
+  }
   return in_use;
 }
 
@@ -267,6 +280,8 @@ class NeedsFinder {
         specular_ == nullptr ? std::string("every surface gathers photons or is black")
         : PropertiesOf(*specular_).has_parts
             ? Concat("paths choose between the two parts of ", Quoted(*specular_))
+        : PropertiesOf(*specular_).is_mix
+            ? Concat("paths choose one of the materials of ", Quoted(*specular_))
             : Concat("paths go on at ", Quoted(*specular_)));
     glossy_ = First([](const Material& m) {
       const MaterialProperties properties = PropertiesOf(m);
@@ -285,15 +300,19 @@ class NeedsFinder {
     const auto has_vertex_normals = [](const TriangleMesh& mesh) { return !mesh.normals.empty(); };
     const bool has_normals = std::ranges::any_of(scene_.meshes, has_vertex_normals) ||
                              std::ranges::any_of(scene_.object_meshes, has_vertex_normals);
-    Set(Part::kShadingNormals, smoothed > 0,
-        smoothed > 0  ? Concat(smoothed, smoothed == 1 ? " mesh is" : " meshes are",
-                               " smoothed by vertex normals")
-        : has_normals ? std::string("every vertex normal is that of its triangles")
-                      : std::string("no mesh has vertex normals"));
+    const Material* bumpy = First([](const Material& m) { return m.HasBumps(); });
+    Set(Part::kShadingNormals, smoothed > 0 || bumpy != nullptr,
+        smoothed > 0       ? Concat(smoothed, smoothed == 1 ? " mesh is" : " meshes are",
+                                    " smoothed by vertex normals")
+        : bumpy != nullptr ? Concat(Quoted(*bumpy), " has bumps")
+        : has_normals      ? std::string("every vertex normal is that of its triangles")
+                           : std::string("no mesh has vertex normals"));
 
     textured_ = First([](const Material& m) { return m.HasTexture(); });
-    Set(Part::kTextures, textured_ != nullptr,
+    const Material* varied = First([](const Material& m) { return m.DependsOnPlace(); });
+    Set(Part::kTextures, varied != nullptr,
         textured_ != nullptr ? Concat(Quoted(*textured_), " has one")
+        : varied != nullptr  ? Concat(Quoted(*varied), " is another one at each place")
                              : std::string("no surface has one"));
     Set(Part::kRoundShapes, RoundShapes() > 0,
         RoundShapes() > 0 ? Concat("shapes that are given by a formula: ", RoundShapes())
@@ -464,7 +483,7 @@ class NeedsFinder {
                   : std::string("all space is empty"));
     bool has_masks = false;
     ForEachShapeTraits(
-        scene_, [&](const ShapeTraits& traits) { has_masks = has_masks || traits.alpha < 1; });
+        scene_, [&](const ShapeTraits& traits) { has_masks = has_masks || !IsWhole(traits); });
     Set(Part::kAlphaMasks, has_masks,
         has_masks ? "rays pass through a share of a shape" : "every shape is met by all rays");
     Set(Part::kInstances, !scene_.instances.empty(),

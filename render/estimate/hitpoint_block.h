@@ -17,6 +17,7 @@
 //       caustic photons, and all rows before those the other ones.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -35,6 +36,19 @@ struct GlossyHitpoint {
   bool operator==(const GlossyHitpoint&) const = default;
 };
 
+// In place of a tangent: none is needed.
+inline constexpr std::uint32_t kNoTangent = UINT32_MAX;
+
+// What depends on the place of a glossy hitpoint, where its material does
+// (transport/material_at.h).
+struct GlossyPlace {
+  Rgb color;                         // what SetTexturedParameter sets: >= 0
+  std::array<float, 4> widths = {};  // alpha_u, alpha_v, base_alpha_u, base_alpha_v: in [0, 1e4]
+  std::uint32_t tangent_oct = kNoTangent;  // octahedral
+
+  bool operator==(const GlossyPlace&) const = default;
+};
+
 // A straight part of an eye path through a medium that scatters. Photons that the medium scattered
 // count when they are nearer to it than a radius that grows evenly along it: the beam radiance
 // estimate (Jarosz, Zwicker & Jensen 2008, "The Beam Radiance Estimate for Volumetric Photon
@@ -51,8 +65,9 @@ struct HitpointBlock {
   std::vector<Vec3> positions;             // [hitpoints]
   std::vector<std::uint32_t> normals_oct;  // [hitpoints] geometric, on the eye's side
   std::vector<GlossyHitpoint> glossy;      // [glossy hitpoints]
-  // [glossy hitpoints] or empty: absorption of conductors whose material has a texture, else 0.
-  std::vector<Rgb> textured_k;
+  // [glossy hitpoints] or empty: of materials that do not depend on the place, no more than default
+  // values.
+  std::vector<GlossyPlace> places;
   std::size_t caustic_rows = 0;
   std::vector<MediumSegment> segments;
 

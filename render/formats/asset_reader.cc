@@ -39,20 +39,22 @@ StatusOr<TriangleMesh> AssetReader::ReadMesh(const std::string& path) {
 }
 
 StatusOr<std::shared_ptr<const Picture>> AssetReader::ReadPicture(const std::string& path,
-                                                                  const PixelEncoding& encoding) {
+                                                                  const PixelEncoding& encoding,
+                                                                  PictureUse use) {
   const auto [first, last] = pictures_.equal_range(path);
   for (auto known = first; known != last; ++known) {
-    if (known->second.encoding == encoding) return known->second.picture;
+    if (known->second.encoding == encoding && known->second.use == use)
+      return known->second.picture;
   }
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path));
   StatusOr<Picture> picture =
-      lucerna::ReadPicture(bytes, path, encoding, limits_.max_picture_bytes - picture_bytes_);
+      lucerna::ReadPicture(bytes, path, encoding, limits_.max_picture_bytes - picture_bytes_, use);
   if (!picture.ok()) {
     return Status(picture.status().code(), Concat(path, ": ", picture.status().message()));
   }
   picture_bytes_ += SizeBytes(*picture);
   auto shared = std::make_shared<const Picture>(*std::move(picture));
-  pictures_.emplace(path, KnownPicture{encoding, shared});
+  pictures_.emplace(path, KnownPicture{encoding, use, shared});
   return shared;
 }
 

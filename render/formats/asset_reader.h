@@ -28,8 +28,8 @@ class AssetReader {
   [[nodiscard]] StatusOr<std::string> ReadText(const std::string& path);
   // Errors: those of ReadBytes and of the file's format, with the path.
   [[nodiscard]] StatusOr<TriangleMesh> ReadMesh(const std::string& path);
-  [[nodiscard]] StatusOr<std::shared_ptr<const Picture>> ReadPicture(const std::string& path,
-                                                                     const PixelEncoding& encoding);
+  [[nodiscard]] StatusOr<std::shared_ptr<const Picture>> ReadPicture(
+      const std::string& path, const PixelEncoding& encoding, PictureUse use = PictureUse::kColors);
 
   [[nodiscard]] const SceneLimits& limits() const { return limits_; }
   // True once the files together have more bytes than the limits allow: reading must end.
@@ -38,6 +38,7 @@ class AssetReader {
  private:
   struct KnownPicture {
     PixelEncoding encoding;
+    PictureUse use;
     std::shared_ptr<const Picture> picture;
   };
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "render/base/text.h"
 #include "render/formats/degenerate_triangles.h"
@@ -21,10 +22,37 @@ namespace {
 // agree within their noise (docs/numerics.md).
 constexpr double kFarSizes = 1e4;
 
+// Whether a texture is placed by u and v, or one that it is made of.
+bool IsPlacedByUv(const Scene& scene, std::int32_t number) {
+  if (number == kNoTexture) return false;
+  using Kind = Texture::Kind;
+  const Texture& texture = scene.textures[static_cast<std::size_t>(number)];
+  const bool has_place = texture.kind == Kind::kPicture || texture.kind == Kind::kBilinear ||
+                         texture.kind == Kind::kDots ||
+                         (texture.kind == Kind::kCheckerboard && !texture.is_in_space);
+  if (has_place && texture.mapping.kind == TextureMapping::Kind::kUv) return true;
+  return std::ranges::any_of(texture.parts,
+                             [&](std::int32_t part) { return IsPlacedByUv(scene, part); });
+}
+
+bool HasUvTexture(const Scene& scene, const Material& material) {
+  if (!material.HasTexture()) return false;
+  const auto by_uv = [&](std::int32_t texture) { return IsPlacedByUv(scene, texture); };
+  return std::ranges::any_of(material.roughness_textures, by_uv) || by_uv(material.texture) ||
+         by_uv(material.second_texture) || by_uv(material.displacement) ||
+         by_uv(material.normal_map) || by_uv(material.amount_texture);
+}
+
 void WarnOfMissingUvs(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
+  std::vector<std::uint8_t> needs_uv;
+  for (const Material& material : scene.materials)
+    needs_uv.push_back(HasUvTexture(scene, material) ? 1 : 0);
   const auto warn = [&](const TriangleMesh& mesh) {
-    const Material& material = scene.materials[static_cast<std::size_t>(mesh.traits.material)];
-    if (mesh.uvs.empty() && material.HasTexture()) {
+    const auto number = static_cast<std::size_t>(mesh.traits.material);
+    bool is_textured = needs_uv[number] != 0;
+    for (const std::int32_t part : scene.materials[number].mixed)
+      is_textured = is_textured || (part >= 0 && needs_uv[static_cast<std::size_t>(part)] != 0);
+    if (mesh.uvs.empty() && is_textured) {
       diagnostics.Warning(whole,
                           "a mesh with a texture has no uv: every triangle shows half of it");
     }
@@ -132,14 +160,7 @@ void StopGatheringOnThinShapes(Scene& scene) {
   std::map<std::int32_t, std::int32_t> thin;  // materials and their copies
   ForEachAnalyticShape(scene, [&](auto& shape) {
     if constexpr (std::decay_t<decltype(shape)>::kIsThin) {
-      const auto [known, is_new] = thin.try_emplace(
-          shape.traits.material, static_cast<std::int32_t>(scene.materials.size()));
-      if (is_new) {
-        Material copy = scene.materials[static_cast<std::size_t>(shape.traits.material)];
-        copy.is_on_thin_shapes = true;
-        scene.materials.push_back(std::move(copy));
-      }
-      shape.traits.material = known->second;
+      shape.traits.material = CopyForThinShapes(scene.materials, shape.traits.material, thin);
     }
   });
 }
@@ -156,6 +177,7 @@ Scene FinishScene(UnfinishedScene unfinished, const std::string& main_file,
   Scene& scene = unfinished.scene;
   if (diagnostics.has_error()) return std::move(scene);
   const SourceLocation whole = {&main_file, 0, 0};
+  JoinMixes(scene.materials);
   WarnOfMissingUvs(scene, whole, diagnostics);
   WarnOfDistance(scene, whole, diagnostics);
   for (std::string& message : unfinished.missing)
@@ -169,6 +191,8 @@ Scene FinishScene(UnfinishedScene unfinished, const std::string& main_file,
   DropInterfacesWithinMedia(scene, whole, diagnostics);
   if (!UsesMedia(scene)) ForgetMedia(scene);
   StopGatheringOnThinShapes(scene);
+  // Of copies for thin shapes.
+  JoinMixes(scene.materials);
   return std::move(scene);
 }
 

@@ -216,8 +216,41 @@ struct StbFree {
   void operator()(void* pixels) const { stbi_image_free(pixels); }
 };
 
+// The numbers of a picture of colours.
+Picture MeansOf(const Picture& colors) {
+  if (colors.channels == 1) return colors;
+  Picture numbers;
+  numbers.width = colors.width;
+  numbers.height = colors.height;
+  numbers.channels = 1;
+  numbers.linear.reserve(static_cast<std::size_t>(colors.width) *
+                         static_cast<std::size_t>(colors.height));
+  for (int y = 0; y < colors.height; ++y) {
+    for (int x = 0; x < colors.width; ++x) {
+      const Rgb color = colors.At(x, y);
+      numbers.linear.push_back((color.r + color.g + color.b) / 3);
+    }
+  }
+  return numbers;
+}
+
+// Of a picture with four channels, whose values these are: leaves the opacity, or where all is
+// opaque the colours.
+template <typename Value>
+void TakeOpacity(std::vector<Value>& values, Value opaque, Picture& picture) {
+  bool is_opaque = true;
+  for (std::size_t i = 3; i < values.size(); i += 4)
+    is_opaque = is_opaque && values[i] == opaque;
+  picture.channels = is_opaque ? 3 : 1;
+  std::size_t to = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if ((i % 4 == 3) != is_opaque) values[to++] = values[i];
+  }
+  values.resize(to);
+}
+
 StatusOr<Picture> ReadByStb(std::string_view bytes, const PixelEncoding& encoding,
-                            std::uint64_t max_size_bytes) {
+                            std::uint64_t max_size_bytes, PictureUse use) {
   if (bytes.size() > INT_MAX) return Bad("the file is larger than 2 GiB");
   const auto* data = reinterpret_cast<const stbi_uc*>(bytes.data());
   const int size = static_cast<int>(bytes.size());
@@ -229,11 +262,15 @@ StatusOr<Picture> ReadByStb(std::string_view bytes, const PixelEncoding& encodin
   }
   const bool is_16_bit = stbi_is_16_bit_from_memory(data, size) != 0;
   Picture picture;
-  picture.channels = file_channels <= 2 ? 1 : 3;
+  const bool may_be_opacity = use == PictureUse::kNumbers && file_channels == 4;
+  picture.channels = file_channels <= 2 ? 1 : may_be_opacity ? 4 : 3;
   const auto channels = static_cast<std::uint64_t>(picture.channels);
+  // Of numbers, the means of the channels come beside them.
+  const std::uint64_t beside = use == PictureUse::kNumbers ? sizeof(float) : 0;
   LUCERNA_RETURN_IF_ERROR(CheckSize(static_cast<std::uint64_t>(std::max(width, 0)),
                                     static_cast<std::uint64_t>(std::max(height, 0)),
-                                    channels * (is_16_bit ? 4 : 1), bytes.size(), max_size_bytes));
+                                    channels * (is_16_bit ? 4 : 1) + beside, bytes.size(),
+                                    max_size_bytes));
   int decoded_width = 0;
   int decoded_height = 0;
   const auto values =
@@ -250,6 +287,7 @@ StatusOr<Picture> ReadByStb(std::string_view bytes, const PixelEncoding& encodin
     for (std::uint64_t i = 0; i < values; ++i) {
       picture.linear.push_back(static_cast<float>(encoding.Decode(pixels.get()[i] / 65535.0)));
     }
+    if (may_be_opacity) TakeOpacity(picture.linear, 1.0F, picture);
     return picture;
   }
   const std::unique_ptr<stbi_uc, StbFree> pixels(stbi_load_from_memory(
@@ -260,6 +298,7 @@ StatusOr<Picture> ReadByStb(std::string_view bytes, const PixelEncoding& encodin
   for (std::size_t i = 0; i < picture.decoded.size(); ++i) {
     picture.decoded[i] = static_cast<float>(encoding.Decode(static_cast<double>(i) / 255));
   }
+  if (may_be_opacity) TakeOpacity(picture.coded, std::uint8_t{255}, picture);
   return picture;
 }
 
@@ -369,15 +408,15 @@ StatusOr<Picture> ReadHdr(std::string_view bytes, std::uint64_t max_size_bytes) 
 // ---- floating point
 
 // S1: what is not finite is refused. Negative numbers, which filters leave, are no light.
-Status MakeSound(Picture& picture) {
+Status MakeSound(Picture& picture, PictureUse use) {
   for (float& value : picture.linear) {
     if (!std::isfinite(value)) return Bad("it has a pixel that is not finite");
-    value = std::max(value, 0.0F);
+    if (use == PictureUse::kColors) value = std::max(value, 0.0F);
   }
   return absl::OkStatus();
 }
 
-StatusOr<Picture> ReadPfm(std::string_view bytes, std::uint64_t max_size_bytes) {
+StatusOr<Picture> ReadPfm(std::string_view bytes, std::uint64_t max_size_bytes, PictureUse use) {
   const std::size_t file_bytes = bytes.size();
   std::vector<std::string> words;
   // Three lines by rule; some writers put the size on two.
@@ -418,16 +457,22 @@ StatusOr<Picture> ReadPfm(std::string_view bytes, std::uint64_t max_size_bytes) 
       to[i] *= static_cast<float>(std::abs(scale));
     }
   }
-  LUCERNA_RETURN_IF_ERROR(MakeSound(picture));
+  LUCERNA_RETURN_IF_ERROR(MakeSound(picture, use));
   return picture;
 }
 
-StatusOr<Picture> PictureOfExr(std::string_view bytes, std::uint64_t max_size_bytes) {
+StatusOr<Picture> PictureOfExr(std::string_view bytes, std::uint64_t max_size_bytes,
+                               PictureUse use) {
   LUCERNA_ASSIGN_OR_RETURN(Image image, DecodeExr(bytes));
   std::vector<const ImageChannel*> channels = {image.Find("R"), image.Find("G"), image.Find("B")};
   if (std::find(channels.begin(), channels.end(), nullptr) != channels.end()) {
     channels = {image.Find("Y")};
     if (channels[0] == nullptr) return Bad("it has neither the channels R, G and B nor Y");
+  }
+  const ImageChannel* opacity = image.Find("A");
+  if (use == PictureUse::kNumbers && channels.size() == 3 && opacity != nullptr &&
+      std::ranges::any_of(opacity->pixels, [](float value) { return value != 1; })) {
+    channels = {opacity};
   }
   Picture picture;
   picture.width = image.width;
@@ -443,9 +488,13 @@ StatusOr<Picture> PictureOfExr(std::string_view bytes, std::uint64_t max_size_by
       picture.linear[i * channels.size() + c] = channels[c]->pixels[i];
     }
   }
-  LUCERNA_RETURN_IF_ERROR(MakeSound(picture));
+  LUCERNA_RETURN_IF_ERROR(MakeSound(picture, use));
   return picture;
 }
+
+StatusOr<Picture> ReadOfEitherUse(std::string_view bytes, std::string_view path,
+                                  const PixelEncoding& encoding, std::uint64_t max_size_bytes,
+                                  PictureUse use);
 
 }  // namespace
 
@@ -462,30 +511,43 @@ double PixelEncoding::Decode(double coded) const {
 }
 
 StatusOr<Picture> ReadPicture(std::string_view bytes, std::string_view path,
-                              const PixelEncoding& encoding, std::uint64_t max_size_bytes) {
+                              const PixelEncoding& encoding, std::uint64_t max_size_bytes,
+                              PictureUse use) {
+  LUCERNA_ASSIGN_OR_RETURN(Picture picture,
+                           ReadOfEitherUse(bytes, path, encoding, max_size_bytes, use));
+  return use == PictureUse::kNumbers ? MeansOf(picture) : std::move(picture);
+}
+
+namespace {
+
+StatusOr<Picture> ReadOfEitherUse(std::string_view bytes, std::string_view path,
+                                  const PixelEncoding& encoding, std::uint64_t max_size_bytes,
+                                  PictureUse use) {
   const std::size_t dot = path.rfind('.');
   std::string extension(dot == std::string_view::npos ? "" : path.substr(dot + 1));
   for (char& c : extension)
     c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   if (extension == "png") {
     LUCERNA_RETURN_IF_ERROR(CheckPng(bytes));
-    return ReadByStb(bytes, encoding, max_size_bytes);
+    return ReadByStb(bytes, encoding, max_size_bytes, use);
   }
   if (extension == "jpg" || extension == "jpeg") {
     LUCERNA_RETURN_IF_ERROR(CheckJpeg(bytes));
     LUCERNA_RETURN_IF_ERROR(CheckHuffmanTables(bytes));
-    return ReadByStb(WithHuffmanTables(bytes), {}, max_size_bytes);
+    return ReadByStb(WithHuffmanTables(bytes), {}, max_size_bytes, use);
   }
   if (extension == "tga") {
     LUCERNA_RETURN_IF_ERROR(CheckTga(bytes));
-    return ReadByStb(bytes, {}, max_size_bytes);
+    return ReadByStb(bytes, {}, max_size_bytes, use);
   }
   if (extension == "hdr") return ReadHdr(bytes, max_size_bytes);
-  if (extension == "pfm") return ReadPfm(bytes, max_size_bytes);
-  if (extension == "exr") return PictureOfExr(bytes, max_size_bytes);
+  if (extension == "pfm") return ReadPfm(bytes, max_size_bytes, use);
+  if (extension == "exr") return PictureOfExr(bytes, max_size_bytes, use);
   return absl::InvalidArgumentError(
       "images are read as .png, .jpg, .tga, .hdr, .pfm and .exr only");
 }
+
+}  // namespace
 
 std::uint64_t SizeBytes(const Picture& picture) {
   return picture.coded.size() + picture.linear.size() * sizeof(float);

@@ -26,13 +26,19 @@ struct PixelEncoding {
   bool operator==(const PixelEncoding&) const = default;
 };
 
+// What a picture is of. Numbers are as in pbrt-v4: the mean of the three channels, or the opacity
+// where that is not 1 everywhere; in EXR and PFM files they may be negative.
+enum class PictureUse : std::uint8_t { kColors, kNumbers };
+
 // Reads PNG, JPEG, TGA, Radiance HDR, PFM or EXR, by the end of `path`. `encoding` is that of PNG;
-// JPEG and TGA are sRGB, the others linear. Negative numbers become 0; alpha is dropped.
+// JPEG and TGA are sRGB, the others linear. Of colours negative numbers become 0, and opacity is
+// dropped.
 // Errors: INVALID_ARGUMENT with what is wrong; RESOURCE_EXHAUSTED for more than
 // kMaxPicturePixels, or more than `max_size_bytes` of pixels in memory.
 [[nodiscard]] StatusOr<Picture> ReadPicture(std::string_view bytes, std::string_view path,
                                             const PixelEncoding& encoding,
-                                            std::uint64_t max_size_bytes);
+                                            std::uint64_t max_size_bytes,
+                                            PictureUse use = PictureUse::kColors);
 
 // The size that the pixels take in memory.
 [[nodiscard]] std::uint64_t SizeBytes(const Picture& picture);

@@ -64,6 +64,9 @@ Status ChooseUnit(Scene& scene) {
   for (Instance& instance : scene.instances)
     instance.to_world = Transform::Scale(factor, factor, factor) * instance.to_world;
   ForEachAnalyticShape(scene, [&](auto& shape) { shape.Scale(factor); });
+  const auto to_file = Transform::Scale(scene.unit, scene.unit, scene.unit);
+  for (Texture& texture : scene.textures)
+    texture.mapping.from_world = texture.mapping.from_world * to_file;
   // Coefficients are per length.
   for (Medium& medium : scene.media) {
     medium.absorption *= static_cast<float>(scene.unit);

@@ -56,6 +56,24 @@ bool PassesThrough(float alpha, const RTCRay& ray, std::uint32_t geometry,
   return !(KeyedRng(key).Uniform() < alpha);
 }
 
+// The alpha of a shape at a place of it.
+float AlphaAt(const Scene& scene, const ShapeTraits& traits, const TexturePlace& place) {
+  return TextureNumber(scene.textures, traits.alpha_texture, place);
+}
+
+template <typename Shape>
+bool PassesThroughShape(const Scene& scene, const Shape& shape, const RTCRay& ray, float t,
+                        std::uint32_t geometry, std::uint32_t primitive) {
+  float alpha = shape.traits.alpha;
+  if (shape.traits.alpha_texture != kNoTexture) {
+    const Ray along = {
+        {ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z}, HUGE_VALF};
+    const ShapeFace face = FaceAt(shape, along, t);
+    alpha = AlphaAt(scene, shape.traits, {UvOf(shape, face.position), face.position, face.normal});
+  }
+  return PassesThrough(alpha, ray, geometry, primitive);
+}
+
 template <typename Shape, std::vector<Shape> Scene::*kShapes>
 void BoundsOfShape(const RTCBoundsFunctionArguments* arguments) {
   const Bounds bounds =
@@ -72,8 +90,8 @@ void BoundsOfShape(const RTCBoundsFunctionArguments* arguments) {
 template <typename Shape, std::vector<Shape> Scene::*kShapes>
 void IntersectedShape(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
-  const Shape& shape =
-      (static_cast<const Scene*>(arguments->geometryUserPtr)->*kShapes)[arguments->primID];
+  const auto& scene = *static_cast<const Scene*>(arguments->geometryUserPtr);
+  const Shape& shape = (scene.*kShapes)[arguments->primID];
   auto* ray_hit = reinterpret_cast<RTCRayHit*>(arguments->rayhit);
   RTCRay& ray = ray_hit->ray;
   float t = 0;
@@ -81,8 +99,8 @@ void IntersectedShape(const RTCIntersectFunctionNArguments* arguments) {
                       ray.tnear, ray.tfar, t)) {
     return;
   }
-  if (shape.traits.alpha < 1 &&
-      PassesThrough(shape.traits.alpha, ray, arguments->geomID, arguments->primID)) {
+  if (!IsWhole(shape.traits) &&
+      PassesThroughShape(scene, shape, ray, t, arguments->geomID, arguments->primID)) {
     return;
   }
   ray.tfar = t;
@@ -96,24 +114,55 @@ void IntersectedShape(const RTCIntersectFunctionNArguments* arguments) {
 template <typename Shape, std::vector<Shape> Scene::*kShapes>
 void OccludedByShape(const RTCOccludedFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
-  const Shape& shape =
-      (static_cast<const Scene*>(arguments->geometryUserPtr)->*kShapes)[arguments->primID];
+  const auto& scene = *static_cast<const Scene*>(arguments->geometryUserPtr);
+  const Shape& shape = (scene.*kShapes)[arguments->primID];
   auto* ray = reinterpret_cast<RTCRay*>(arguments->ray);
   float t = 0;
   if (IntersectShape(shape, {ray->org_x, ray->org_y, ray->org_z},
                      {ray->dir_x, ray->dir_y, ray->dir_z}, ray->tnear, ray->tfar, t) &&
-      !(shape.traits.alpha < 1 &&
-        PassesThrough(shape.traits.alpha, *ray, arguments->geomID, arguments->primID))) {
+      !(!IsWhole(shape.traits) &&
+        PassesThroughShape(scene, shape, *ray, t, arguments->geomID, arguments->primID))) {
     ray->tfar = -HUGE_VALF;
   }
 }
 
-// Embree's filter of meshes with an alpha; their user data is the mesh.
+// What Embree's filter of meshes with an alpha gets.
+struct MaskedMesh {
+  const Scene* scene;
+  const TriangleMesh* mesh;
+};
+
+// The place of a triangle that a ray meets; within an instance the ray is in the space of the
+// object, and the place is in the world.
+TexturePlace PlaceOn(const MaskedMesh& masked, const RTCRay& ray, const RTCHit& hit) {
+  const Scene& scene = *masked.scene;
+  const std::array<Vec2, 3> uv = UvsOf(*masked.mesh, hit.primID);
+  const float rest = 1 - hit.u - hit.v;
+  TexturePlace place;
+  place.uv = {uv[0].x * rest + uv[1].x * hit.u + uv[2].x * hit.v,
+              uv[0].y * rest + uv[1].y * hit.u + uv[2].y * hit.v};
+  place.position =
+      Vec3{ray.org_x, ray.org_y, ray.org_z} + Vec3{ray.dir_x, ray.dir_y, ray.dir_z} * ray.tfar;
+  std::uint32_t instance = kNoInstance;
+  if (hit.instID[0] != RTC_INVALID_GEOMETRY_ID) {
+    instance = hit.instID[0] - (static_cast<std::uint32_t>(scene.meshes.size()) + kShapeKinds);
+    place.position = scene.instances[instance].to_world.Point(place.position);
+  }
+  const auto [p0, p1, p2] = CornersOf(scene, *masked.mesh, hit.primID, instance);
+  place.normal = TriangleNormal(p0, p1, p2);
+  return place;
+}
+
+// Their user data is a MaskedMesh.
 void FilterByAlpha(const RTCFilterFunctionNArguments* arguments) {
-  const auto& mesh = *static_cast<const TriangleMesh*>(arguments->geometryUserPtr);
+  const auto& masked = *static_cast<const MaskedMesh*>(arguments->geometryUserPtr);
   const auto& ray = *reinterpret_cast<const RTCRay*>(arguments->ray);
   const auto& hit = *reinterpret_cast<const RTCHit*>(arguments->hit);
-  if (PassesThrough(mesh.traits.alpha, ray, hit.geomID, hit.primID)) arguments->valid[0] = 0;
+  const ShapeTraits& traits = masked.mesh->traits;
+  const float alpha = traits.alpha_texture == kNoTexture
+                          ? traits.alpha
+                          : AlphaAt(*masked.scene, traits, PlaceOn(masked, ray, hit));
+  if (PassesThrough(alpha, ray, hit.geomID, hit.primID)) arguments->valid[0] = 0;
 }
 
 RTCRay ToEmbree(const Ray& ray) {
@@ -162,9 +211,10 @@ struct Intersector::EmbreeScene {
   // Embree reads 16 bytes at a vertex, so the last one must have four more bytes after it; our
   // copies have one vertex too many.
   std::vector<std::vector<Vec3>> padded_positions;
+  std::vector<std::unique_ptr<MaskedMesh>> masked_meshes;
 
   // Adds a mesh to a scene, and keeps a copy of its positions.
-  void AttachMesh(RTCScene to, std::uint32_t number, const TriangleMesh& mesh) {
+  void AttachMesh(RTCScene to, std::uint32_t number, const Scene& of, const TriangleMesh& mesh) {
     std::vector<Vec3>& padded = padded_positions.emplace_back();
     padded.reserve(mesh.positions.size() + 1);
     padded.assign(mesh.positions.begin(), mesh.positions.end());
@@ -175,8 +225,9 @@ struct Intersector::EmbreeScene {
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                mesh.indices.data(), 0, 3 * sizeof(std::uint32_t),
                                mesh.indices.size() / 3);
-    if (mesh.traits.alpha < 1) {
-      rtcSetGeometryUserData(geometry, const_cast<TriangleMesh*>(&mesh));
+    if (!IsWhole(mesh.traits)) {
+      masked_meshes.push_back(std::make_unique<MaskedMesh>(MaskedMesh{&of, &mesh}));
+      rtcSetGeometryUserData(geometry, masked_meshes.back().get());
       rtcSetGeometryIntersectFilterFunction(geometry, FilterByAlpha);
       rtcSetGeometryOccludedFilterFunction(geometry, FilterByAlpha);
     }
@@ -231,7 +282,7 @@ StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, R
   for (const TriangleMesh& mesh : scene.meshes) {
     for (const Vec3& p : mesh.positions)
       bounds.Add(p);
-    embree.AttachMesh(embree.scene, number++, mesh);
+    embree.AttachMesh(embree.scene, number++, scene, mesh);
   }
 
   const auto attach = [&](std::size_t count, ShapeKind kind, RTCBoundsFunction bounds_of,
@@ -261,7 +312,7 @@ StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, R
   for (const InstancedObject& object : scene.objects) {
     RTCScene made = embree.objects.emplace_back(new_scene());
     for (std::uint32_t i = 0; i < object.mesh_count; ++i)
-      embree.AttachMesh(made, i, scene.object_meshes[object.first_mesh + i]);
+      embree.AttachMesh(made, i, scene, scene.object_meshes[object.first_mesh + i]);
     rtcCommitScene(made);
   }
   LUCERNA_RETURN_IF_ERROR(intersector->AddInstances());

@@ -2,9 +2,9 @@
 //
 // Triangles are Embree's; analytic shapes are exact, never tessellated. Objects that are not
 // written out have a tree of their own, which their instances share. Of a shape with an alpha below
-// 1 a ray meets so large a share: a number that follows from the ray's own bits decides. The
-// instruction set is pinned, and only single rays are traced, so that equal rays have equal hits in
-// every process of one numeric profile.
+// 1, or a texture of it, a ray meets so large a share: a number that follows from the ray's own
+// bits decides. The instruction set is pinned, and only single rays are traced, so that equal rays
+// have equal hits in every process of one numeric profile.
 #pragma once
 
 #include <array>
@@ -67,7 +67,17 @@ struct SurfacePoint {
   // point so far off that they do not meet the surface again.
   float clearance = 0;
   bool has_shading_normal = false;  // the two normals may differ
+  // Where u grows, unit, at right angles to the shading normal. Zero: not needed
+  // (transport/material_at.h).
+  Vec3 tangent;
 };
+
+// Around the shading normal.
+[[nodiscard]] inline Frame ShadingFrame(const SurfacePoint& point) {
+  if (point.tangent == Vec3()) [[likely]]
+    return Frame(point.shading_normal);
+  return {point.tangent, point.shading_normal};
+}
 
 class Intersector {
  public:

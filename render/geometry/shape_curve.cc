@@ -136,6 +136,21 @@ UvSlopes UvSlopesOf(const CurvePiece& shape, Vec3 /*position*/) {
   return {change * change / length2, 0};
 }
 
+// u along the curve, and v around it.
+SurfaceTangents TangentsOf(const CurvePiece& shape, Vec3 position) {
+  const float change = shape.to_u - shape.from_u;
+  if (!(change != 0)) return {};
+  const Axis axis(shape);
+  const double s = axis.Nearest(Double3(position));
+  SurfaceTangents tangents;
+  tangents.dpdu = (shape.to - shape.from) / change;
+  const Vec3 across =
+      Cross(ToFloat(Double3(position) - (axis.from + axis.along * s)), tangents.dpdu);
+  if (!(LengthSquared(across) > 0)) return {};
+  tangents.dpdv = Normalize(across) * static_cast<float>(2 * (axis.radius + axis.growth * s));
+  return tangents;
+}
+
 // As fine as its thickness.
 Spectrum SpectrumOf(const CurvePiece& shape, Vec3 /*direction*/, const SpectrumLimits& limits) {
   return SphereSource(static_cast<double>(std::max(shape.from_radius, shape.to_radius)), limits);

@@ -80,6 +80,19 @@ UvSlopes UvSlopesOf(const Disk& shape, Vec3 position) {
           1 / (width * width)};
 }
 
+SurfaceTangents TangentsOf(const Disk& shape, Vec3 position) {
+  const Vec3 local = position - shape.center;
+  const float x = Dot(local, shape.axes.x);
+  const float y = Dot(local, shape.axes.y);
+  const float from_center = std::sqrt(x * x + y * y);
+  if (!(from_center > 0)) return {};
+  const Vec3 outward = (shape.axes.x * x + shape.axes.y * y) / from_center;
+  SurfaceTangents tangents;
+  tangents.dpdu = (shape.axes.y * x - shape.axes.x * y) * (2 * kPi);
+  tangents.dpdv = outward * (shape.inner_radius - shape.radius);
+  return tangents;
+}
+
 Spectrum SpectrumOf(const Disk& shape, Vec3 direction, const SpectrumLimits& limits) {
   return AreaSource(DiscMoments(shape.center, shape.normal, static_cast<double>(shape.radius)),
                     direction, limits);

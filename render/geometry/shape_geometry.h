@@ -10,7 +10,8 @@
 //                   area is as good.
 //   SeenInversePdf  The inverse of the density [sr] with which SampleSeen draws a direction to the
 //                   shape, 0 where it returns false.
-//   UvOf            Texture coordinates as in pbrt-v4; UvSlopesOf: see UvSlopesAt (surface_uv.h).
+//   UvOf            Texture coordinates as in pbrt-v4; UvSlopesOf: see UvSlopesAt (surface_uv.h);
+//                   TangentsOf: see surface_tangents.h, of zero length where there are none.
 //   SpectrumOf      The spectrum of light that the shape emits along `direction`.
 //   Curved:         CurvatureOf, at a point of the surface.
 //                   NearestOutline: of all lines of sight parallel to a line, those that graze
@@ -28,6 +29,7 @@
 
 #include "render/frequency/spectrum.h"
 #include "render/geometry/intersector.h"
+#include "render/geometry/surface_tangents.h"
 #include "render/geometry/surface_uv.h"
 #include "render/math/double3.h"
 #include "render/scene/scene.h"
@@ -88,6 +90,7 @@ struct SilhouetteEdge {
   [[nodiscard]] float SeenInversePdf(const Name& shape, Vec3 from);                                \
   [[nodiscard]] Vec2 UvOf(const Name& shape, Vec3 position);                                       \
   [[nodiscard]] UvSlopes UvSlopesOf(const Name& shape, Vec3 position);                             \
+  [[nodiscard]] SurfaceTangents TangentsOf(const Name& shape, Vec3 position);                      \
   [[nodiscard]] Spectrum SpectrumOf(const Name& shape, Vec3 direction,                             \
                                     const SpectrumLimits& limits);                                 \
   [[nodiscard]] PrincipalCurvatures CurvatureOf(const Name& shape, Vec3 position);                 \

@@ -117,6 +117,22 @@ UvSlopes UvSlopesOf(const Sphere& shape, Vec3 position) {
   return {TurnSlope(std::max(from_axis, 1e-3 * radius)), 1 / (kPiD * radius * kPiD * radius)};
 }
 
+SurfaceTangents TangentsOf(const Sphere& shape, Vec3 position) {
+  const Vec3 local = position - shape.center;
+  const float x = Dot(local, shape.axes.x);
+  const float y = Dot(local, shape.axes.y);
+  const float z = Dot(local, shape.axes.z);
+  const float from_axis = std::sqrt(x * x + y * y);
+  if (!(from_axis > 0)) return {};
+  const Vec3 outward = (shape.axes.x * x + shape.axes.y * y) / from_axis;
+  SurfaceTangents tangents;
+  tangents.dpdu = (shape.axes.y * x - shape.axes.x * y) * (2 * kPi);
+  tangents.dpdv = (shape.axes.z * from_axis - outward * z) * kPi;
+  tangents.dndu = tangents.dpdu / shape.radius;
+  tangents.dndv = tangents.dpdv / shape.radius;
+  return tangents;
+}
+
 Spectrum SpectrumOf(const Sphere& shape, Vec3 /*direction*/, const SpectrumLimits& limits) {
   return SphereSource(static_cast<double>(shape.radius), limits);
 }

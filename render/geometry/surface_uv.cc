@@ -10,13 +10,14 @@
 #include "render/scene/shape_lists.h"
 
 namespace lucerna {
-namespace {
 
 std::array<Vec2, 3> UvsOf(const TriangleMesh& mesh, std::uint32_t triangle) {
   if (mesh.uvs.empty()) return {Vec2{0, 0}, Vec2{1, 0}, Vec2{1, 1}};
   const std::uint32_t* corner = &mesh.indices[std::size_t{3} * triangle];
   return {mesh.uvs[corner[0]], mesh.uvs[corner[1]], mesh.uvs[corner[2]]};
 }
+
+namespace {
 
 double DotDouble(Vec3 a, Vec3 b) {
   return static_cast<double>(a.x) * static_cast<double>(b.x) +

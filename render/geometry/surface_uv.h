@@ -4,6 +4,9 @@
 // its geometry/shape_NAME.cc.
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "render/geometry/intersector.h"
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
@@ -11,6 +14,8 @@
 namespace lucerna {
 
 [[nodiscard]] Vec2 UvAt(const Scene& scene, const SurfacePoint& point);
+// Of the corners of a triangle, in their order.
+[[nodiscard]] std::array<Vec2, 3> UvsOf(const TriangleMesh& mesh, std::uint32_t triangle);
 
 // The squared lengths of the gradients of u and v along the surface [1/length²].
 struct UvSlopes {

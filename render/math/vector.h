@@ -79,6 +79,8 @@ struct Frame {
     s = {1.0F + sign * n.x * n.x * a, sign * b, -sign * n.x};
     t = {b, sign + n.y * n.y * a, -n.y};
   }
+  // With local x along `along`, which is not zero and at right angles to the unit normal.
+  Frame(Vec3 along, Vec3 normal) : s(along), t(Cross(normal, along)), n(normal) {}
   [[nodiscard]] Vec3 ToLocal(Vec3 world) const {
     return {Dot(world, s), Dot(world, t), Dot(world, n)};
   }

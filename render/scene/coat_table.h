@@ -2,7 +2,9 @@
 // (transport/coat.h).
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <vector>
 
 namespace lucerna {
@@ -26,6 +28,27 @@ struct CoatTable {
   std::vector<float> residual;            // [kCosines], averaged over azimuths
   float mean_residual = 0;                // over directions, with density cosine / pi
   std::array<float, kHits> by_hits = {};  // its shares after 1, 2, ... meetings; the last: or more
+};
+
+// The tables of a coated material with a texture of its roughness, of widths of facets between two:
+// those of the coat's surface, or of the metal under it.
+struct CoatFamily {
+  bool is_of_base = false;
+  float narrowest = 0, widest = 0;
+  std::vector<CoatTable> tables;  // at least 2, evenly spaced from the narrowest width
+
+  // The tables below and above a width, and the share of the second.
+  struct Place {
+    std::size_t below;
+    float share;
+  };
+  [[nodiscard]] Place PlaceOf(float width) const {
+    const auto last = static_cast<float>(tables.size() - 1);
+    const float place =
+        std::min(std::max((width - narrowest) / (widest - narrowest) * last, 0.0F), last);
+    const auto below = std::min(static_cast<std::size_t>(place), tables.size() - 2);
+    return {below, place - static_cast<float>(below)};
+  }
 };
 
 }  // namespace lucerna

@@ -26,6 +26,11 @@ MaterialProperties PropertiesOf(const MaterialNumbers& material) {
     properties.is_thin = true;
     properties.gathers = false;
   }
+  if (material.is_in_mix && properties.weighs_photons) {
+    // Photons that another material of the mix met are not weighed: hitpoints do all.
+    properties.weighs_photons = false;
+    properties.is_separable = false;
+  }
   return properties;
 }
 
@@ -35,6 +40,19 @@ std::vector<MaterialProperties> PropertiesOf(const std::vector<Material>& materi
   for (const Material& material : materials)
     properties.push_back(PropertiesOf(material));
   return properties;
+}
+
+FacetWidths WidthsOf(float roughness_u, float roughness_v, bool is_remapped) {
+  const auto width = [&](float roughness) {
+    const float held = roughness > 0 ? std::min(roughness, kMaxRoughness) : 0;
+    return is_remapped ? std::sqrt(held) : held;
+  };
+  const float u = width(roughness_u);
+  const float v = width(roughness_v);
+  if (std::max(u, v) < kSmoothAlpha) return {};
+  // A width of zero in one direction only would divide by zero.
+  constexpr float kSmallestAlpha = 1e-4F;
+  return {std::max(u, kSmallestAlpha), std::max(v, kSmallestAlpha)};
 }
 
 std::string_view NameOf(MaterialNumbers::Kind kind) {

@@ -9,8 +9,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -29,7 +31,8 @@
   ROW(CoatedDiffuse, "coateddiffuse")             \
   ROW(ThinDielectric, "thindielectric")           \
   ROW(DiffuseTransmission, "diffusetransmission") \
-  ROW(CoatedConductor, "coatedconductor")
+  ROW(CoatedConductor, "coatedconductor")         \
+  ROW(Mix, "mix")
 
 namespace lucerna {
 
@@ -41,7 +44,9 @@ enum class Parts : std::uint8_t {
   kSecond  // what the base under a coat scatters; the transmission of a sheet
 };
 
-struct CoatTable;  // scene/coat_table.h
+struct CoatTable;   // scene/coat_table.h
+struct CoatFamily;  // the same
+struct MaterialProperties;
 
 // What all kinds of material are made of. Each kind uses some of the members.
 struct MaterialNumbers {
@@ -62,12 +67,35 @@ struct MaterialNumbers {
   float base_alpha_v = 0;
   float thickness = 0;         // of a coat [mean free paths], at right angles
   std::int32_t base_hits = 5;  // how often light in a coat meets the base, at most
-  // Of a coated material, once it is prepared (transport/coat.h); owned by Material.
+  // Of a coated material, once it is prepared (transport/coat.h); owned by Material. `coat_above`
+  // and its share are those of a coat between two tables.
   const CoatTable* coat = nullptr;
+  const CoatTable* coat_above = nullptr;
+  float coat_above_share = 0;
+  const CoatFamily* coats = nullptr;  // of a coated material with a texture of its roughness
   // In place of `reflectance`, and of a conductor's eta and k.
   std::int32_t texture = kNoTexture;
   std::int32_t second_texture = kNoTexture;  // in place of `transmittance`
   float texture_scale = 1;                   // of both textures' colours: diffuse transmission
+  // Of the roughness from which alpha_u, alpha_v, base_alpha_u and base_alpha_v follow. Where there
+  // is one, the number in the material is the largest that it gives anywhere.
+  std::array<std::int32_t, 4> roughness_textures = {kNoTexture, kNoTexture, kNoTexture, kNoTexture};
+  bool remaps_roughness = true;  // a width is the root of the roughness
+  // With textures of roughness: the surface, or the metal under a coat, is smooth at some places.
+  bool may_be_smooth = false, base_may_be_smooth = false;
+  // What turns shading normals: heights [scene units], or a picture of normals (as a texture).
+  std::int32_t displacement = kNoTexture;
+  std::int32_t normal_map = kNoTexture;
+  Vec2 slope_step;  // of `displacement` (SlopeStep)
+  // Of a mix: indices of the two materials, and the share of the second.
+  std::array<std::int32_t, 2> mixed = {-1, -1};
+  std::int32_t mix_depth = 0;  // more than that of any mix that it is made of
+  float amount = 0.5F;
+  std::int32_t amount_texture = kNoTexture;  // in place of `amount`
+  // Of a mix: what holds for it as a whole (JoinMixes); owned by Material.
+  const MaterialProperties* mixed_properties = nullptr;
+  // One of the materials of a mix: photons that others of them met count here too.
+  bool is_in_mix = false;
   // On shapes much thinner than the discs of hitpoints: nothing is gathered there.
   bool is_on_thin_shapes = false;
 
@@ -80,13 +108,36 @@ struct MaterialNumbers {
     visit(transmittance);
   }
   [[nodiscard]] bool HasTexture() const {
-    return texture != kNoTexture || second_texture != kNoTexture;
+    const auto& rough = roughness_textures;
+    // kNoTexture has all bits.
+    return (texture & second_texture & rough[0] & rough[1] & rough[2] & rough[3] & displacement &
+            normal_map & amount_texture) != kNoTexture;
+  }
+  [[nodiscard]] bool HasRoughnessTexture() const {
+    const auto& rough = roughness_textures;
+    return (rough[0] & rough[1] & rough[2] & rough[3]) != kNoTexture;
+  }
+  // Whether it turns shading normals.
+  [[nodiscard]] bool HasBumps() const {
+    return (displacement & normal_map) != kNoTexture;
+  }
+  // Whether it matters how it is turned around the normal.
+  [[nodiscard]] bool IsAnisotropic() const {
+    return alpha_u != alpha_v || base_alpha_u != base_alpha_v ||
+           roughness_textures[0] != roughness_textures[1] ||
+           roughness_textures[2] != roughness_textures[3];
+  }
+  // Whether it is not known before a place on a surface is.
+  [[nodiscard]] bool DependsOnPlace() const {
+    return HasTexture() || kind == Kind::kMix || IsAnisotropic();
   }
 };
 
 struct Material : MaterialNumbers {
   std::string name;  // for messages and the plan
   std::shared_ptr<const CoatTable> owned_coat;
+  std::shared_ptr<const CoatFamily> owned_coats;
+  std::shared_ptr<const MaterialProperties> owned_mixed_properties;
 
   bool operator==(const Material&) const = default;
 };
@@ -98,6 +149,7 @@ struct MaterialProperties {
   bool is_smooth = false;  // all scattering goes into single directions
   // The BSDF is a sum of two parts, of which eye paths choose one.
   bool has_parts = false;
+  bool is_mix = false;  // one of several materials at each place, for each ray
   // Some scattering goes into single directions: that of the first part, or all.
   bool scatters_smoothly = false;
   // The BSDF is a factor of the direction to the eye (EyeFactor) times one of the direction to the
@@ -129,7 +181,7 @@ struct MaterialProperties {
   }
   // Where paths choose, or are scattered otherwise than diffusely and go on.
   [[nodiscard]] bool needs_choice() const {
-    return has_parts || (!gathers && !is_black && !is_interface);
+    return has_parts || is_mix || (!gathers && !is_black && !is_interface);
   }
   [[nodiscard]] bool has_narrow_lobes() const { return lobe_width < HUGE_VALF; }
 };
@@ -140,6 +192,15 @@ inline constexpr float kGatherAlpha = 0.2F;
 // The same for dielectrics: refraction bends less than reflection, so their lobes are narrower, and
 // what is seen through frosted glass has passed two of them.
 inline constexpr float kGatherAlphaDielectric = 0.5F;
+
+// The GGX width below which pbrt-v4 renders a surface as perfectly smooth.
+inline constexpr float kSmoothAlpha = 1e-3F;
+// Of a roughness as files give it. 0 and 0 where the surface is smooth.
+struct FacetWidths {
+  float u = 0, v = 0;
+};
+inline constexpr float kMaxRoughness = 1e3F;
+[[nodiscard]] FacetWidths WidthsOf(float roughness_u, float roughness_v, bool is_remapped);
 
 // A conductor given by its reflectance at right angles has eta = 1 and this k, capped as in
 // pbrt-v4.
@@ -183,6 +244,14 @@ LUCERNA_MATERIALS(LUCERNA_DECLARE)
 [[nodiscard]] Rgb TexturedParameter(const MaterialNumbers& material);
 void SetTexturedParameter(MaterialNumbers& material, Rgb value);
 [[nodiscard]] Rgb TexturedValue(MaterialNumbers::Kind kind, Rgb color);
+
+// Gives mixes the properties of what they are made of: each material of a mix becomes a copy that
+// says that it is one. Mixes that have their properties get them anew.
+void JoinMixes(std::vector<Material>& materials);
+// A copy of a material that stands on thin shapes, with copies of all that it mixes; JoinMixes
+// completes them. Returns its index. `copies`: indices of copies by those of their originals.
+std::int32_t CopyForThinShapes(std::vector<Material>& materials, std::int32_t index,
+                               std::map<std::int32_t, std::int32_t>& copies);
 
 // Single properties, where speed does not matter.
 [[nodiscard]] inline bool IsDiffuse(const Material& material) {

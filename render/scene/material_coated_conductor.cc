@@ -13,6 +13,8 @@ MaterialProperties CoatedConductorKind::Properties(const MaterialNumbers& materi
       std::max(BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior),
                BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior));
   const bool is_coat_smooth = coat_width == 0;
+  // Of either surface a texture may make places smooth, and so have the parts of another kind.
+  const bool may_have_parts = material.may_be_smooth && material.parts == Parts::kAll;
   MaterialProperties properties;
   if (base_width == 0 || (is_coat_smooth && material.parts == Parts::kFirst)) {
     properties.is_smooth = true;
@@ -22,11 +24,13 @@ MaterialProperties CoatedConductorKind::Properties(const MaterialNumbers& materi
   }
   const bool is_second = material.parts == Parts::kSecond;
   properties.lobe_width = is_second ? base_width : std::min(coat_width, base_width);
-  properties.has_parts = is_coat_smooth && !is_second;
-  properties.scatters_smoothly = properties.has_parts;
+  properties.has_parts = (is_coat_smooth || may_have_parts) && !is_second;
+  properties.scatters_smoothly =
+      properties.has_parts || (is_coat_smooth && material.base_may_be_smooth && !is_second);
   // The narrower lobe decides, but where it is the smooth part; textures as for conductors.
   const float narrower = is_coat_smooth ? base_width : std::min(coat_width, base_width);
-  properties.gathers = material.texture == kNoTexture && narrower >= kGatherAlpha;
+  properties.gathers =
+      material.texture == kNoTexture && !material.HasRoughnessTexture() && narrower >= kGatherAlpha;
   return properties;
 }
 

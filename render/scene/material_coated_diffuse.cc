@@ -1,6 +1,7 @@
 // A diffuse base under a dielectric coat: `reflectance`, or a texture in its place; `ior`,
-// `alpha_u` and `alpha_v` of the coat's surface, `thickness` of what lies between. The first part
-// is what the coat's surface reflects, the second what comes out of the coat.
+// `alpha_u` and `alpha_v` of the coat's surface, or textures of roughness in their places;
+// `thickness` of what lies between. The first part is what the coat's surface reflects, the second
+// what comes out of the coat.
 #include "render/math/color_space.h"
 #include "render/scene/material.h"
 
@@ -18,7 +19,7 @@ MaterialProperties CoatedDiffuseKind::Properties(const MaterialNumbers& material
     return properties;
   }
   properties.lobe_width = std::max(material.alpha_u, material.alpha_v);
-  properties.scatters_smoothly = is_smooth;
+  properties.scatters_smoothly = is_smooth || material.may_be_smooth;
   properties.has_rough_coat = !is_smooth;
   if (material.parts == Parts::kFirst) {
     properties.is_smooth = is_smooth;

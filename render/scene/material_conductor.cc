@@ -1,5 +1,5 @@
 // A metal: `eta` and `k`, or with a texture of its reflectance at right angles eta = 1 and a k that
-// follows from it; `alpha_u` and `alpha_v`.
+// follows from it; `alpha_u` and `alpha_v`, or textures of roughness in their places.
 #include "render/scene/material.h"
 
 namespace lucerna {
@@ -7,11 +7,11 @@ namespace lucerna {
 MaterialProperties ConductorKind::Properties(const MaterialNumbers& material) {
   MaterialProperties properties;
   properties.is_smooth = material.alpha_u == 0 && material.alpha_v == 0;
-  properties.scatters_smoothly = properties.is_smooth;
+  properties.scatters_smoothly = properties.is_smooth || material.may_be_smooth;
   properties.lobe_width = std::max(material.alpha_u, material.alpha_v);
-  // What a metal with a texture reflects depends on the place, which hitpoints do not hold:
-  // paths go on there.
-  properties.gathers = material.texture == kNoTexture && properties.lobe_width >= kGatherAlpha;
+  // Where a texture decides on lobe or colour paths go on, however rough the surface is.
+  properties.gathers = material.texture == kNoTexture && !material.HasRoughnessTexture() &&
+                       properties.lobe_width >= kGatherAlpha;
   return properties;
 }
 

@@ -5,6 +5,7 @@
 
 #include "render/math/vector.h"
 #include "render/scene/medium.h"
+#include "render/scene/texture.h"
 
 namespace lucerna {
 
@@ -20,6 +21,7 @@ struct ShapeTraits {
   // The share of rays that meet the shape; which ones follows from the ray
   // (geometry/intersector.h).
   float alpha = 1;
+  std::int32_t alpha_texture = kNoTexture;  // in place of `alpha`, which is its largest number
 
   [[nodiscard]] bool SeparatesMedia() const { return medium_inside != medium_outside; }
   bool operator==(const ShapeTraits&) const = default;
@@ -27,7 +29,7 @@ struct ShapeTraits {
 
 // Whether all rays meet the shape.
 [[nodiscard]] inline bool IsWhole(const ShapeTraits& traits) {
-  return traits.alpha >= 1;
+  return traits.alpha >= 1 && traits.alpha_texture == kNoTexture;
 }
 
 // Where the axes of a shape's own space point in the world: unit, at right angles. The texture

@@ -1,11 +1,12 @@
-// What colour has a surface at a place of its texture?
+// What colour, or which number, has a surface at a place of its texture?
 //
 // A kind of texture is one row of LUCERNA_TEXTURES, with its numbers below where there are none for
 // them yet, and three files: lookup in render/scene/texture_NAME.cc, how pbrt files give it in
 // render/formats/pbrt/texture_NAME.cc, and its detail in worker/texture_detail_NAME.cc
 // (docs/adding.md). Functions that differ between kinds are declared from the rows, here, in
 // formats/pbrt/texture_readers.h and in worker/texture_detail.h. Colours are linear Rec. 709, as
-// everything in a Scene. A place is (u, v), with v upwards, while row 0 of a picture is its top.
+// everything in a Scene. Textures of numbers have three equal channels, which may have any sign and
+// size. v points upwards, while row 0 of a picture is its top.
 //
 // Looking up is plain float arithmetic: the same bits on every machine of one numeric profile.
 #pragma once
@@ -18,15 +19,24 @@
 #include <vector>
 
 #include "render/math/rgb.h"
+#include "render/math/transform.h"
 #include "render/math/vector.h"
 
 // The kinds of texture, in the order of Texture::Kind.
 // ROW(Name, name): Texture::Kind::kName, and its name in pbrt files.
-#define LUCERNA_TEXTURES(ROW) \
-  ROW(Picture, "imagemap")    \
-  ROW(Constant, "constant")   \
-  ROW(Scaled, "scale")        \
-  ROW(Checkerboard, "checkerboard")
+#define LUCERNA_TEXTURES(ROW)         \
+  ROW(Picture, "imagemap")            \
+  ROW(Constant, "constant")           \
+  ROW(Scaled, "scale")                \
+  ROW(Checkerboard, "checkerboard")   \
+  ROW(Mixed, "mix")                   \
+  ROW(DirectionMixed, "directionmix") \
+  ROW(Bilinear, "bilerp")             \
+  ROW(Dots, "dots")                   \
+  ROW(Fbm, "fbm")                     \
+  ROW(Wrinkled, "wrinkled")           \
+  ROW(Windy, "windy")                 \
+  ROW(Marble, "marble")
 
 namespace lucerna {
 
@@ -34,7 +44,8 @@ namespace lucerna {
 struct Picture {
   int width = 0, height = 0;  // [pixels], at least 1
   int channels = 3;           // 3, or 1: grey
-  // One of the two holds [height × width × channels] values; those of `linear` are finite, >= 0.
+  // One of the two holds [height × width × channels] values; those of `linear` are finite, and of
+  // colours >= 0.
   std::vector<std::uint8_t> coded;
   std::vector<float> linear;
   std::array<float, 256> decoded{};  // what a byte of `coded` is, in [0, 1]
@@ -49,19 +60,39 @@ struct Picture {
     };
     return channels == 1 ? Gray(value(0)) : Rgb{value(0), value(1), value(2)};
   }
-  // The largest value of any channel.
+  // The largest and the smallest value of any channel.
   [[nodiscard]] float Largest() const;
+  [[nodiscard]] float Smallest() const;
 };
 
-// (u, v) -> (scale_u · u + delta_u, scale_v · v + delta_v).
-struct UvMapping {
+// A place on a surface.
+struct TexturePlace {
+  Vec2 uv;
+  Vec3 position;  // world
+  Vec3 normal;    // world, geometric, unit
+};
+
+// From a place to a texture's own coordinates, as in pbrt-v4.
+struct TextureMapping {
+  enum class Kind : std::uint8_t {
+    kUv,           // (scale_u · u + delta_u, scale_v · v + delta_v)
+    kPlanar,       // (axis_u · p + delta_u, axis_v · p + delta_v)
+    kSpherical,    // p's angle from +z over π, and around z over 2π
+    kCylindrical,  // p's angle around z from -x over 2π, and its z
+  };
+
   float scale_u = 1, scale_v = 1, delta_u = 0, delta_v = 0;
+  Kind kind = Kind::kUv;
+  Vec3 axis_u = {1, 0, 0}, axis_v = {0, 1, 0};
+  Transform from_world;  // to the space of p, and of textures in space
 
   // Returns 0 for a coordinate so far from the origin that neighbouring floats there are more than
   // a texture apart, or that is no number; every result fits into an int.
-  [[nodiscard]] Vec2 Map(Vec2 uv) const;
+  [[nodiscard]] Vec2 Map(const TexturePlace& place) const;
+  // The same for a place in space.
+  [[nodiscard]] Vec3 MapToSpace(const TexturePlace& place) const;
 
-  bool operator==(const UvMapping&) const = default;
+  bool operator==(const TextureMapping&) const = default;
 };
 
 // Only the members that the kind names are meaningful.
@@ -74,35 +105,43 @@ struct Texture {
   Kind kind = Kind::kConstant;
   Wrap wrap = Wrap::kRepeat;  // picture: what lies beyond its edges
   bool is_inverted = false;   // picture: 1 - colour, after `scale`
-  Rgb color;                  // constant, in [0, 1]
-  float scale = 1;            // picture, scaled; >= 0
-  UvMapping mapping;          // picture, checkerboard
-  // Numbers of other textures, below its own: of what is scaled, or of the squares where
-  // floor(u) + floor(v) is even and where it is odd.
-  std::array<std::int32_t, 2> parts = {-1, -1};
+  bool is_number = false;     // picture: numbers, which are not held in [0, 1]
+  bool is_in_space = false;   // checkerboard: of cubes
+  Rgb color;                  // constant
+  float scale = 1;            // picture, scaled, marble
+  TextureMapping mapping;
+  // Numbers of other textures, below its own. Scaled: of what is scaled, and of the numbers by
+  // which, or none. Checkerboard: where the sum of the whole parts of the coordinates is even, and
+  // where it is odd. Mixed: the first, the second, and the share of the second. Direction-mixed:
+  // along the direction, and across it. Bilinear: at (0, 0), (0, 1), (1, 0) and (1, 1). Dots: in
+  // dots, and between them.
+  std::array<std::int32_t, 4> parts = {-1, -1, -1, -1};
+  Vec3 direction = {0, 1, 0};  // direction-mixed: world, unit
+  std::int32_t octaves = 8;    // of noise
+  float roughness = 0.5F;      // of noise: the amplitude of an octave over that of the one before
+  float variation = 0.2F;      // marble
   std::shared_ptr<const Picture> picture;
 };
 
 inline constexpr std::int32_t kNoTexture = -1;
 
-// What one kind of texture makes of a lookup: a colour in [0, 1], or that of another texture times
-// a factor.
-struct TextureStep {
-  std::int32_t next = kNoTexture;  // the other texture
-  float factor = 1;
-  Rgb color;
-
-  // The colour, each channel held in [0, 1].
-  [[nodiscard]] static TextureStep To(Rgb color);
-};
-
-#define LUCERNA_DECLARE(Name, name) \
-  [[nodiscard]] TextureStep LookUp##Name(const Texture& texture, Vec2 uv);
+// What each kind of texture is at a place. `textures` are those of the scene, of which its parts
+// are some.
+#define LUCERNA_DECLARE(Name, name)                                                         \
+  [[nodiscard]] Rgb LookUp##Name(std::span<const Texture> textures, const Texture& texture, \
+                                 const TexturePlace& place);
 LUCERNA_TEXTURES(LUCERNA_DECLARE)
 #undef LUCERNA_DECLARE
 
-// The colour of texture `number` at `uv`, in [0, 1]. Pictures are interpolated between the centres
-// of their four nearest pixels.
-[[nodiscard]] Rgb TextureColor(std::span<const Texture> textures, std::int32_t number, Vec2 uv);
+// The colour of texture `number`, in [0, 1]. Pictures are interpolated between the centres of their
+// four nearest pixels.
+[[nodiscard]] Rgb TextureColor(std::span<const Texture> textures, std::int32_t number,
+                               const TexturePlace& place);
+// The number that texture `number` of numbers has there: finite.
+[[nodiscard]] float TextureNumber(std::span<const Texture> textures, std::int32_t number,
+                                  const TexturePlace& place);
+// By how much to shift a place along u and v for the slope of a texture of numbers: a quarter of
+// the smallest pixel of the pictures that it is made of, at most pbrt-v4's 0.0005.
+[[nodiscard]] Vec2 SlopeStep(std::span<const Texture> textures, std::int32_t number);
 
 }  // namespace lucerna

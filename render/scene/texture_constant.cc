@@ -3,8 +3,9 @@
 
 namespace lucerna {
 
-TextureStep LookUpConstant(const Texture& texture, Vec2 /*uv*/) {
-  return {.color = texture.color};
+Rgb LookUpConstant(std::span<const Texture> /*textures*/, const Texture& texture,
+                   const TexturePlace& /*place*/) {
+  return texture.color;
 }
 
 }  // namespace lucerna

@@ -1,5 +1,4 @@
-// What lookups of textures share, inline for the loops over paths: for render/scene/texture_NAME.cc
-// alone.
+// What lookups of textures share: for render/scene/texture_NAME.cc alone.
 #pragma once
 
 #include <algorithm>
@@ -15,16 +14,14 @@ inline Rgb HeldInUnit(Rgb color) {
   return {held(color.r), held(color.g), held(color.b)};
 }
 
-inline Vec2 UvMapping::Map(Vec2 uv) const {
-  const auto bounded = [](float place) {
-    constexpr float kFarthest = 1e9F;
-    return std::abs(place) <= kFarthest ? place : 0.0F;
-  };
-  return {bounded(scale_u * uv.x + delta_u), bounded(scale_v * uv.y + delta_v)};
+// 0 for a coordinate beyond 1e9 either way, and for what is no number.
+inline float HeldPlace(float place) {
+  constexpr float kFarthest = 1e9F;
+  return std::abs(place) <= kFarthest ? place : 0.0F;
 }
 
-inline TextureStep TextureStep::To(Rgb color) {
-  return {.color = HeldInUnit(color)};
-}
+// Of the texture with that number, not held in any range.
+[[nodiscard]] Rgb ValueAt(std::span<const Texture> textures, std::int32_t number,
+                          const TexturePlace& place);
 
 }  // namespace lucerna

@@ -43,11 +43,15 @@ Rgb Interpolated(const Picture& picture, Texture::Wrap wrap, Vec2 uv) {
 
 }  // namespace
 
-TextureStep LookUpPicture(const Texture& texture, Vec2 uv) {
-  Rgb color = Interpolated(*texture.picture, texture.wrap, texture.mapping.Map(uv));
+Rgb LookUpPicture(std::span<const Texture> /*textures*/, const Texture& texture,
+                  const TexturePlace& place) {
+  Rgb color = Interpolated(*texture.picture, texture.wrap, texture.mapping.Map(place));
   color *= texture.scale;
-  if (texture.is_inverted) color = Gray(1) - color;
-  return TextureStep::To(color);
+  if (texture.is_inverted) {
+    color = Gray(1) - color;
+    if (texture.is_number) return Gray(std::max(0.0F, color.g));
+  }
+  return texture.is_number ? color : HeldInUnit(color);
 }
 
 }  // namespace lucerna

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "render/math/equal_area_square.h"
+#include "render/math/octahedral.h"
 #include "render/math/warp.h"
 #include "render/tracing/direct_light.h"
 #include "render/transport/bsdf.h"
@@ -182,12 +183,14 @@ Rgb EyePathTracer::BrightPart(Rgb emitted) const {
 Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng) const {
   Hit hit;
   if (!FindFirst(ray, {}, hit)) return BrightPart(lights_.InfiniteRadiance(ray.direction));
-  const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+  SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
   const Vec3 wo = -ray.direction;
+  const Rgb bright = BrightPart(lights_.EmittedRadiance(surface, wo));
+  if (!properties_[surface.material].scatters_smoothly) return bright;
   int rays = 0;
-  // Black unless the surface is smooth.
-  return BrightPart(lights_.EmittedRadiance(surface, wo)) +
-         BrightPart(EmissionThrough(surface, wo, kNoMedium, rng, rays));
+  std::optional<Material> storage;
+  const Material& material = MaterialAt(scene_, surface, wo, storage);
+  return bright + BrightPart(EmissionThrough(surface, material, wo, kNoMedium, rng, rays));
 }
 
 Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
@@ -279,8 +282,9 @@ EyeSegment EyePathTracer::SegmentOf(const Ray& ray, float t, std::int32_t medium
           .to_footprint = footprint_at(length_before + end)};
 }
 
-Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, std::int32_t medium,
-                                   KeyedRng rng, int& rays) const {
+Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, const Material& first_material,
+                                   Vec3 first_wo, std::int32_t medium, KeyedRng rng,
+                                   int& rays) const {
   struct Branch {
     Ray ray;
     std::int32_t medium;
@@ -289,16 +293,17 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, std
   };
   // A pair at each vertex, of which one is followed at once: the stack grows by one a vertex.
   std::vector<Branch> branches;
-  const auto branch_at = [&](const SurfacePoint& surface, Vec3 wo, std::int32_t before, Rgb weight,
-                             int vertex) {
+  const auto branch_at = [&](const SurfacePoint& surface, const Material& whole, Vec3 wo,
+                             std::int32_t before, Rgb weight, int vertex) {
     if (vertex >= settings_.max_depth) return;
-    std::optional<Material> textured;
-    const MaterialProperties& properties = properties_[surface.material];
+    const MaterialProperties changed =
+        whole.DependsOnPlace() ? PropertiesOf(whole) : MaterialProperties();
+    const MaterialProperties& properties =
+        whole.DependsOnPlace() ? changed : properties_[surface.material];
     if (!properties.scatters_smoothly) return;
-    const Material& whole = MaterialAt(scene_, surface, textured);
     Material part;
     const Material& material = properties.has_parts ? PartOf(whole, Parts::kFirst, part) : whole;
-    const Frame frame(surface.shading_normal);
+    const Frame frame = ShadingFrame(surface);
     // Lobe 0 is the reflection and lobe 1 - ulp the refraction, with the weight of its share.
     const Vec3 wo_local = frame.ToLocal(wo);
     const float reflectance = ReflectedShare(material, wo_local.z);
@@ -322,7 +327,7 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, std
     }
   };
   Rgb seen;
-  branch_at(first, first_wo, medium, Gray(1), 0);
+  branch_at(first, first_material, first_wo, medium, Gray(1), 0);
   while (!branches.empty()) {
     Branch branch = branches.back();
     branches.pop_back();
@@ -331,10 +336,13 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, Vec3 first_wo, std
       seen += branch.weight * lights_.InfiniteRadiance(branch.ray.direction);
       continue;
     }
-    const SurfacePoint surface = intersector_.SurfaceAt(branch.ray, hit);
+    SurfacePoint surface = intersector_.SurfaceAt(branch.ray, hit);
     const Vec3 wo = -branch.ray.direction;
     seen += branch.weight * lights_.EmittedRadiance(surface, wo);
-    branch_at(surface, wo, branch.medium, branch.weight, branch.vertex);
+    if (!properties_[surface.material].scatters_smoothly) continue;
+    std::optional<Material> storage;
+    const Material& material = MaterialAt(scene_, surface, wo, storage);
+    branch_at(surface, material, wo, branch.medium, branch.weight, branch.vertex);
   }
   return seen;
 }
@@ -429,7 +437,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
                      (mis * share_of_rays(lights_.EmissionDensityInfinite(ray.direction)));
       return finish();
     }
-    const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+    SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
     const Vec3 wo = -ray.direction;
     const Rgb emitted = lights_.EmittedRadiance(surface, wo);
     if (vertex == 0) {
@@ -443,7 +451,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     }
     std::optional<Material> textured;
     const Material& whole = [&]() -> const Material& {
-      if (parts_.textures) return MaterialAt(scene_, surface, textured);
+      if (parts_.textures) return MaterialAt(scene_, surface, wo, textured);
       return scene_.materials[surface.material];
     }();
     MaterialProperties changed = textured ? PropertiesOf(*textured) : MaterialProperties();
@@ -454,14 +462,14 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     }
     if (vertex >= settings_.max_depth) return finish();
 
-    const Frame frame(surface.shading_normal);
+    const Frame frame = ShadingFrame(surface);
     const SobolPoint u = sampler.ForVertex(vertex);
     const Vec3 wo_local = frame.ToLocal(wo);
     const bool has_parts = parts_.lobes && whole_properties.has_parts;
     const float share_of_first = has_parts ? ShareOfFirst(whole, wo_local) : -1;
     if (parts_.lobes && vertex == 0 && whole_properties.scatters_smoothly && rays_find_lights_) {
-      add_first_emission(weight *
-                         EmissionThrough(surface, wo, medium, sampler.ForBranches(), path.rays));
+      add_first_emission(
+          weight * EmissionThrough(surface, whole, wo, medium, sampler.ForBranches(), path.rays));
       emission_was_collected = true;
     }
     if (parts_.lights && !(parts_.lobes && whole_properties.is_smooth)) {
@@ -509,7 +517,12 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       hitpoint.material = surface.material;
       hitpoint.to_eye = wo;
       hitpoint.shading_normal = surface.shading_normal;
-      if (here.texture != kNoTexture && is_glossy) hitpoint.textured_k = TexturedParameter(here);
+      if (is_glossy && here.DependsOnPlace()) {
+        hitpoint.place = {
+            TexturedParameter(here),
+            {here.alpha_u, here.alpha_v, here.base_alpha_u, here.base_alpha_v},
+            surface.tangent == Vec3() ? kNoTangent : EncodeOctahedral(surface.tangent)};
+      }
       hitpoint.weight = weight;
       hitpoint.footprint = footprint_ + footprint_slope_ * length;
       return hitpoint;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "render/analysis/needs.h"
+#include "render/estimate/hitpoint_block.h"
 #include "render/geometry/intersector.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
@@ -31,7 +32,7 @@ struct EyeHitpoint {
   bool is_glossy = false;
   std::uint32_t material = 0;
   Vec3 to_eye, shading_normal;  // glossy only
-  Rgb textured_k;               // of a conductor with a texture
+  GlossyPlace place;            // glossy only: what depends on the place
   Rgb weight;                   // from gathered flux density to radiance; black: no hitpoint
   float footprint = 0;          // width of the pixel at the hitpoint [scene units]
 };
@@ -137,9 +138,11 @@ class EyePathTracer {
   [[nodiscard]] bool FindFirst(const Ray& ray, First first, Hit& hit) const;
   // Radiance that leaves a smooth surface towards `first_wo` and was emitted where a chain of
   // smooth surfaces ends: reflections and refractions are all followed, not drawn.
-  // `medium`: in which `first_wo` leaves.
-  [[nodiscard]] Rgb EmissionThrough(const SurfacePoint& first, Vec3 first_wo, std::int32_t medium,
-                                    KeyedRng rng, int& rays) const;
+  // `first_material`: of `first`, which it has been applied to (MaterialAt). `medium`: in which
+  // `first_wo` leaves.
+  [[nodiscard]] Rgb EmissionThrough(const SurfacePoint& first, const Material& first_material,
+                                    Vec3 first_wo, std::int32_t medium, KeyedRng rng,
+                                    int& rays) const;
   // What a ray in `medium` meets, behind interfaces; with media, what is left of light on the way.
   [[nodiscard]] bool FindThroughMedia(Ray& ray, Hit& hit, std::int32_t& medium, Rgb& transmittance,
                                       int& rays) const;

@@ -52,7 +52,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   struct Rows {
     std::vector<Row> rows;
     std::vector<GlossyHitpoint> glossy;  // by row of the tile
-    std::vector<Rgb> textured_k;         // [glossy]
+    std::vector<GlossyPlace> places;     // [glossy]
   };
   struct Tile {
     Rows rows;
@@ -86,7 +86,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
               rows.glossy.push_back({static_cast<std::uint32_t>(rows.rows.size()),
                                      hitpoint.material, EncodeOctahedral(hitpoint.to_eye),
                                      EncodeOctahedral(hitpoint.shading_normal)});
-              rows.textured_k.push_back(hitpoint.textured_k);
+              rows.places.push_back(hitpoint.place);
             }
             rows.rows.push_back({pixel, hitpoint.position, EncodeOctahedral(hitpoint.normal),
                                  hitpoint.weight,
@@ -115,13 +115,14 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   spread.Add(pass, bright, out.direct, team);
 
   std::size_t count = 0;
-  bool has_textured_k = false;
+  bool has_places = false;
   for (const Tile& tile : per_tile) {
     count += tile.rows.rows.size() + tile.caustic_rows.rows.size() + tile.segments.size();
     out.block.caustic_rows += tile.caustic_rows.rows.size();
     for (const Rows* rows : {&tile.rows, &tile.caustic_rows}) {
-      has_textured_k = has_textured_k ||
-                       std::ranges::any_of(rows->textured_k, [](Rgb k) { return !IsBlack(k); });
+      has_places = has_places || std::ranges::any_of(rows->places, [](const GlossyPlace& place) {
+                     return place != GlossyPlace();
+                   });
     }
   }
   out.block.positions.reserve(count);
@@ -135,9 +136,8 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
       glossy.hitpoint += first;
       out.block.glossy.push_back(glossy);
     }
-    if (has_textured_k) {
-      out.block.textured_k.insert(out.block.textured_k.end(), rows.textured_k.begin(),
-                                  rows.textured_k.end());
+    if (has_places) {
+      out.block.places.insert(out.block.places.end(), rows.places.begin(), rows.places.end());
     }
     for (const Row& row : rows.rows) {
       out.block.positions.push_back(row.position);

@@ -39,7 +39,7 @@ Rgb ResidualColor(const Material& material) {
   const auto channel = [&](float reflectance) {
     float sum = 0;
     for (int i = CoatTable::kHits - 1; i >= 0; --i)
-      sum = reflectance * (sum + material.coat->by_hits[static_cast<std::size_t>(i)]);
+      sum = reflectance * (sum + CoatShareOfHits(material, static_cast<std::size_t>(i)));
     return sum;
   };
   return {channel(metal.r), channel(metal.g), channel(metal.b)};
@@ -133,10 +133,9 @@ Rgb EvaluateUp(const Material& material, Vec3 up, Vec3 wi) {
             (ggx.D(m) * ggx.G2(up_in, wi_in) / (4 * up_in.z * wi_in.z) *
              CoatEntering(material, up) * CoatEntering(material, wi) / Square(material.ior));
   }
-  if (material.coat->mean_residual > 0) {
-    below +=
-        ResidualColor(material) * (CoatResidual(material, up.z) * CoatResidual(material, wi.z) *
-                                   kInversePi / material.coat->mean_residual);
+  if (const float mean = CoatMeanResidual(material); mean > 0) {
+    below += ResidualColor(material) *
+             (CoatResidual(material, up.z) * CoatResidual(material, wi.z) * kInversePi / mean);
   }
   return Gray(coat) + ToWorking(below);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "render/base/status.h"
@@ -24,6 +25,9 @@ constexpr int kAzimuths = 9;
 // Random walks for each cosine outside, of tables over metals.
 constexpr int kWalks = 4096;
 constexpr int kScalings = 8;
+// Tables of a family, and the narrowest width. A coat that is smoother passes as much.
+constexpr int kFamily = 9;
+constexpr float kNarrowestOfFamily = 0.02F;
 
 float Crossing(float thickness, float cosine) {
   return thickness > 0 ? std::exp(-thickness / std::max(cosine, 1e-6F)) : 1.0F;
@@ -304,37 +308,17 @@ Node NodeAt(float cosine) {
   return {static_cast<std::size_t>(below), node - static_cast<float>(below)};
 }
 
-}  // namespace
-
-void PrepareCoats(std::vector<Material>& materials) {
-  using Key = std::tuple<Material::Kind, float, float, float, float, float, float, std::int32_t>;
-  std::map<Key, std::shared_ptr<const CoatTable>> tables;
-  for (Material& material : materials) {
-    const bool has_metal = material.kind == Material::Kind::kCoatedConductor;
-    if (material.kind != Material::Kind::kCoatedDiffuse && !has_metal) continue;
-    // Smooth on smooth there is a closed form for all.
-    if (has_metal && PropertiesOf(material).is_smooth) continue;
-    auto& table =
-        tables[{material.kind, material.ior, material.thickness, material.alpha_u, material.alpha_v,
-                has_metal ? material.base_alpha_u : 0, has_metal ? material.base_alpha_v : 0,
-                has_metal ? material.base_hits : 0}];
-    if (table == nullptr) {
-      const std::shared_ptr<CoatTable> made = MakeTable(material);
-      if (has_metal) {
-        material.coat = made.get();
-        AddResidual(material, *made);
-      }
-      table = made;
-    }
-    material.owned_coat = table;
-    material.coat = table.get();
-  }
+// What is read from the table of a coat, or from the two between which it lies.
+template <typename Read>
+float ReadTable(const Material& material, const Read& read) {
+  LUCERNA_CHECK(material.coat != nullptr);
+  const float below = read(*material.coat);
+  if (material.coat_above == nullptr) return below;
+  return below * (1 - material.coat_above_share) +
+         read(*material.coat_above) * material.coat_above_share;
 }
 
-float CoatEntering(const Material& material, Vec3 w) {
-  if (HasNoFacets(material)) return SmoothEntering(w.z, material.ior, material.thickness);
-  LUCERNA_CHECK(material.coat != nullptr);
-  const CoatTable& table = *material.coat;
+float EnteringIn(const CoatTable& table, Vec3 w) {
   const auto [below, share] = NodeAt(w.z);
   const auto at = [&, below = below, share = share](int row) {
     const std::size_t i = static_cast<std::size_t>(row) * CoatTable::kCosines + below;
@@ -348,21 +332,121 @@ float CoatEntering(const Material& material, Vec3 w) {
   return at(row) * (1 - next) + at(row + 1) * next;
 }
 
+std::shared_ptr<CoatTable> MakeCoat(const Material& original) {
+  const std::shared_ptr<CoatTable> made = MakeTable(original);
+  if (original.kind == Material::Kind::kCoatedConductor) {
+    Material material = original;
+    material.coat = made.get();
+    AddResidual(material, *made);
+  }
+  return made;
+}
+
+bool HasCoat(const Material& material) {
+  return material.kind == Material::Kind::kCoatedDiffuse ||
+         material.kind == Material::Kind::kCoatedConductor;
+}
+
+// The tables of a coat whose roughness is a texture, or of one over a metal whose roughness is.
+std::shared_ptr<const CoatFamily> MakeFamily(const Material& material) {
+  const auto family = std::make_shared<CoatFamily>();
+  family->is_of_base =
+      (material.roughness_textures[0] & material.roughness_textures[1]) == kNoTexture;
+  family->narrowest = kNarrowestOfFamily;
+  family->widest =
+      std::max(family->is_of_base ? std::max(material.base_alpha_u, material.base_alpha_v)
+                                  : std::max(material.alpha_u, material.alpha_v),
+               2 * kNarrowestOfFamily);
+  for (int i = 0; i < kFamily; ++i) {
+    Material one = material;
+    const float width = family->narrowest + (family->widest - family->narrowest) *
+                                                static_cast<float>(i) /
+                                                static_cast<float>(kFamily - 1);
+    (family->is_of_base ? one.base_alpha_u : one.alpha_u) = width;
+    (family->is_of_base ? one.base_alpha_v : one.alpha_v) = width;
+    family->tables.push_back(*MakeCoat(one));
+  }
+  return family;
+}
+
+}  // namespace
+
+void PrepareCoats(std::vector<Material>& materials) {
+  using Key = std::tuple<Material::Kind, float, float, float, float, float, float, std::int32_t>;
+  const auto key_of = [](const Material& material) {
+    const bool has_metal = material.kind == Material::Kind::kCoatedConductor;
+    return Key{material.kind,
+               material.ior,
+               material.thickness,
+               material.alpha_u,
+               material.alpha_v,
+               has_metal ? material.base_alpha_u : 0,
+               has_metal ? material.base_alpha_v : 0,
+               has_metal ? material.base_hits : 0};
+  };
+  std::map<Key, std::shared_ptr<const CoatTable>> tables;
+  // A texture of the coat's roughness, or of the metal's.
+  std::map<std::pair<Key, bool>, std::shared_ptr<const CoatFamily>> families;
+  for (Material& material : materials) {
+    if (!HasCoat(material)) continue;
+    if (material.HasRoughnessTexture()) {
+      const bool is_of_coat =
+          (material.roughness_textures[0] & material.roughness_textures[1]) != kNoTexture;
+      auto& family = families[{key_of(material), is_of_coat}];
+      if (family == nullptr) family = MakeFamily(material);
+      material.owned_coats = family;
+      material.coats = family.get();
+      FitCoat(material);
+      continue;
+    }
+    // Smooth on smooth there is a closed form for all.
+    if (material.kind == Material::Kind::kCoatedConductor && PropertiesOf(material).is_smooth)
+      continue;
+    auto& table = tables[key_of(material)];
+    if (table == nullptr) table = MakeCoat(material);
+    material.owned_coat = table;
+    material.coat = table.get();
+  }
+}
+
+void FitCoat(MaterialNumbers& material) {
+  if (material.coats == nullptr) return;
+  const CoatFamily& family = *material.coats;
+  // Of a surface that is stretched one way, as of a round one with facets as steep on average.
+  const float width = family.is_of_base ? std::sqrt(material.base_alpha_u * material.base_alpha_v)
+                                        : std::sqrt(material.alpha_u * material.alpha_v);
+  const CoatFamily::Place place = family.PlaceOf(width);
+  material.coat = &family.tables[place.below];
+  material.coat_above = &family.tables[place.below + 1];
+  material.coat_above_share = place.share;
+}
+
+float CoatEntering(const Material& material, Vec3 w) {
+  if (HasNoFacets(material)) return SmoothEntering(w.z, material.ior, material.thickness);
+  return ReadTable(material, [&](const CoatTable& table) { return EnteringIn(table, w); });
+}
+
 float CoatInner(const Material& material) {
-  LUCERNA_CHECK(material.coat != nullptr);
-  return material.coat->inner;
+  return ReadTable(material, [](const CoatTable& table) { return table.inner; });
 }
 
 float CoatLeaving(const Material& material) {
-  LUCERNA_CHECK(material.coat != nullptr);
-  return material.coat->leaving;
+  return ReadTable(material, [](const CoatTable& table) { return table.leaving; });
 }
 
 float CoatResidual(const Material& material, float cosine) {
-  LUCERNA_CHECK(material.coat != nullptr);
   const auto [below, share] = NodeAt(cosine);
-  const std::vector<float>& residual = material.coat->residual;
-  return residual[below] * (1 - share) + residual[below + 1] * share;
+  return ReadTable(material, [&, below = below, share = share](const CoatTable& table) {
+    return table.residual[below] * (1 - share) + table.residual[below + 1] * share;
+  });
+}
+
+float CoatMeanResidual(const Material& material) {
+  return ReadTable(material, [](const CoatTable& table) { return table.mean_residual; });
+}
+
+float CoatShareOfHits(const Material& material, std::size_t hits) {
+  return ReadTable(material, [&](const CoatTable& table) { return table.by_hits[hits]; });
 }
 
 float CoatCrossing(const Material& material, float cosine) {

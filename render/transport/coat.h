@@ -36,8 +36,12 @@
 
 namespace lucerna {
 
-// Gives coated materials their tables. Materials with equal coats share one.
+// Gives coated materials their tables. Materials with equal coats share one. With a texture of
+// roughness, tables of several widths, between which FitCoat interpolates.
 void PrepareCoats(std::vector<Material>& materials);
+// Of a prepared material whose widths a texture has changed: the tables that suit them. Does
+// nothing for other materials.
+void FitCoat(MaterialNumbers& material);
 
 // E(w), in [0, 1]: of a direction on the outside, w.z > 0, in flux. Requires a prepared material.
 [[nodiscard]] float CoatEntering(const Material& material, Vec3 w);
@@ -49,6 +53,10 @@ void PrepareCoats(std::vector<Material>& materials);
 
 // Over a metal, of a prepared material: M for a direction at `cosine` outside, in [0, 1].
 [[nodiscard]] float CoatResidual(const Material& material, float cosine);
+// The mean of M over directions with density cosine / π, and the shares of M after 1, 2, ...
+// meetings with the metal, hits in [0, CoatTable::kHits).
+[[nodiscard]] float CoatMeanResidual(const Material& material);
+[[nodiscard]] float CoatShareOfHits(const Material& material, std::size_t hits);
 // The share of light that is left after crossing the layer once at `cosine` inside.
 [[nodiscard]] float CoatCrossing(const Material& material, float cosine);
 // w, w.z > 0, as refracted at the mean surface, again away from it: away from the metal. False with

@@ -1,23 +1,106 @@
 #include "render/transport/material_at.h"
 
+#include <bit>
+
 #include "render/geometry/surface_uv.h"
+#include "render/math/rng.h"
+#include "render/transport/bump.h"
+#include "render/transport/coat.h"
 
-namespace lucerna::material_at_internal {
+namespace lucerna {
+namespace {
 
-const Material& Textured(const Scene& scene, const SurfacePoint& point, const Material& material,
-                         std::optional<Material>& storage) {
-  const Vec2 uv = UvAt(scene, point);
+// A number in [0, 1) that belongs to a place and a direction: their bits, mixed.
+float NumberOf(Vec3 position, Vec3 direction) {
+  const auto pair = [](float a, float b) {
+    return (std::uint64_t{std::bit_cast<std::uint32_t>(a)} << 32) | std::bit_cast<std::uint32_t>(b);
+  };
+  constexpr std::uint64_t kMix = 0x4D4958ULL;
+  std::uint64_t key = CombineKeys(kMix, pair(position.x, position.y));
+  key = CombineKeys(key, pair(position.z, direction.x));
+  key = CombineKeys(key, pair(direction.y, direction.z));
+  return KeyedRng(key).Uniform();
+}
+
+// The one of the materials of a mix that a ray meets. Each of mixes within mixes draws anew.
+const Material& Chosen(const Scene& scene, SurfacePoint& point, const TexturePlace& place,
+                       Vec3 wo) {
+  const Material* material = &scene.materials[point.material];
+  float left = material->kind == Material::Kind::kMix ? NumberOf(point.position, wo) : 0;
+  while (material->kind == Material::Kind::kMix) {
+    const float amount = material->amount_texture == kNoTexture
+                             ? material->amount
+                             : TextureNumber(scene.textures, material->amount_texture, place);
+    const bool is_second = left < amount;
+    // What is left of the number is as good as another one.
+    const float share = is_second ? amount : 1 - amount;
+    if (share > 0 && share < 1)
+      left = std::min((is_second ? left : left - amount) / share, 0x1.fffffep-1F);
+    point.material = static_cast<std::uint32_t>(material->mixed[is_second ? 1 : 0]);
+    material = &scene.materials[point.material];
+  }
+  return *material;
+}
+
+void LookUpRoughness(const Scene& scene, const TexturePlace& place, const Material& material,
+                     Material& here) {
+  const auto width = [&](std::size_t i, float constant) {
+    const std::int32_t texture = material.roughness_textures[i];
+    if (texture != kNoTexture) return TextureNumber(scene.textures, texture, place);
+    // Back to a roughness, with which the other one is to be compared.
+    return material.remaps_roughness ? constant * constant : constant;
+  };
+  const auto& textures = material.roughness_textures;
+  if ((textures[0] & textures[1]) != kNoTexture) {
+    const FacetWidths widths =
+        WidthsOf(width(0, material.alpha_u), width(1, material.alpha_v), material.remaps_roughness);
+    here.alpha_u = widths.u;
+    here.alpha_v = widths.v;
+  }
+  if ((textures[2] & textures[3]) != kNoTexture) {
+    const FacetWidths widths = WidthsOf(width(2, material.base_alpha_u),
+                                        width(3, material.base_alpha_v), material.remaps_roughness);
+    here.base_alpha_u = widths.u;
+    here.base_alpha_v = widths.v;
+  }
+  here.may_be_smooth = false;
+  here.base_may_be_smooth = false;
+  FitCoat(here);
+}
+
+}  // namespace
+
+TexturePlace PlaceOf(const Scene& scene, const SurfacePoint& point) {
+  return {UvAt(scene, point), point.position, point.geometric_normal};
+}
+
+namespace material_at_internal {
+
+const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
+                        std::optional<Material>& storage) {
+  const TexturePlace place = PlaceOf(scene, point);
+  const Material& material = Chosen(scene, point, place, wo);
+  if (!material.DependsOnPlace()) return material;
   Material& here = storage.emplace();
   static_cast<MaterialNumbers&>(here) = static_cast<const MaterialNumbers&>(material);
   if (material.texture != kNoTexture) {
-    const Rgb color = TextureColor(scene.textures, material.texture, uv);
+    const Rgb color = TextureColor(scene.textures, material.texture, place);
     SetTexturedParameter(here, TexturedValue(material.kind, color * material.texture_scale));
   }
   if (material.second_texture != kNoTexture) {
-    const Rgb color = TextureColor(scene.textures, material.second_texture, uv);
+    const Rgb color = TextureColor(scene.textures, material.second_texture, place);
     here.transmittance = TexturedValue(material.kind, color * material.texture_scale);
+  }
+  if (material.HasRoughnessTexture()) LookUpRoughness(scene, place, material, here);
+  const bool is_turned = here.alpha_u != here.alpha_v || here.base_alpha_u != here.base_alpha_v;
+  if (material.HasBumps()) {
+    TurnShadingNormal(scene, material, place, point);
+    if (!is_turned) point.tangent = {};
+  } else if (is_turned) {
+    FindTangent(scene, point);
   }
   return here;
 }
 
-}  // namespace lucerna::material_at_internal
+}  // namespace material_at_internal
+}  // namespace lucerna

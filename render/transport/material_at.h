@@ -1,6 +1,7 @@
 // Of what is a surface made at one of its points?
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "render/geometry/intersector.h"
@@ -9,18 +10,26 @@
 namespace lucerna {
 
 namespace material_at_internal {
-[[nodiscard]] const Material& Textured(const Scene& scene, const SurfacePoint& point,
-                                       const Material& material, std::optional<Material>& storage);
+[[nodiscard]] const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
+                                      std::optional<Material>& storage);
 }  // namespace material_at_internal
 
-// The material of `scene`, or with a texture, looked up at the point, in `storage` (without the
+// The material of `scene`, or what textures make of it at the point, in `storage` (without the
 // name). Scenes are in the working space but for textures, which are converted here.
-[[nodiscard]] inline const Material& MaterialAt(const Scene& scene, const SurfacePoint& point,
+//
+// `point` becomes what the material makes of it: bumps and normal maps turn its shading normal
+// (once: not to be called again for the same point), a material that must be turned the right way
+// around its normal gives it a tangent, and of a mix the material becomes the one that is chosen
+// for the ray that comes from `wo`. Equal points and rays choose alike.
+[[nodiscard]] inline const Material& MaterialAt(const Scene& scene, SurfacePoint& point, Vec3 wo,
                                                 std::optional<Material>& storage) {
   const Material& material = scene.materials[point.material];
-  if (!material.HasTexture()) [[likely]]
+  if (!material.DependsOnPlace()) [[likely]]
     return material;
-  return material_at_internal::Textured(scene, point, material, storage);
+  return material_at_internal::AtPlace(scene, point, wo, storage);
 }
+
+// Where textures are looked up for a point.
+[[nodiscard]] TexturePlace PlaceOf(const Scene& scene, const SurfacePoint& point);
 
 }  // namespace lucerna

@@ -11,7 +11,7 @@ namespace lucerna {
 namespace {
 
 // The last character is the version.
-constexpr std::string_view kBlockMagic = "LHB3";
+constexpr std::string_view kBlockMagic = "LHB4";
 constexpr std::string_view kRadiiMagic = "LRC1";
 constexpr std::uint32_t kLargestOctahedralHalf = 65534;
 
@@ -56,7 +56,7 @@ std::string EncodeHitpointBlock(const HitpointBlock& block) {
   writer.Varint(block.size());
   writer.Varint(block.glossy.size());
   writer.Varint(block.caustic_rows);
-  writer.Varint(block.textured_k.size());
+  writer.Varint(block.places.size());
   writer.Varint(block.segments.size());
   for (int axis = 0; axis < 3; ++axis) {
     WriteDeltas(writer, block.size(), [&](std::size_t i) {
@@ -71,11 +71,18 @@ std::string EncodeHitpointBlock(const HitpointBlock& block) {
     WriteDeltas(writer, glossy.size(), [&](std::size_t i) { return glossy[i].to_eye_oct; });
     WriteDeltas(writer, glossy.size(), [&](std::size_t i) { return glossy[i].shading_normal_oct; });
   }
-  if (const auto& k = block.textured_k; !k.empty()) {
+  if (const auto& places = block.places; !places.empty()) {
     for (int channel = 0; channel < 3; ++channel) {
-      WriteDeltas(writer, k.size(),
-                  [&](std::size_t i) { return std::bit_cast<std::uint32_t>(k[i][channel]); });
+      WriteDeltas(writer, places.size(), [&](std::size_t i) {
+        return std::bit_cast<std::uint32_t>(places[i].color[channel]);
+      });
     }
+    for (std::size_t width = 0; width < places[0].widths.size(); ++width) {
+      WriteDeltas(writer, places.size(), [&](std::size_t i) {
+        return std::bit_cast<std::uint32_t>(places[i].widths[width]);
+      });
+    }
+    WriteDeltas(writer, places.size(), [&](std::size_t i) { return places[i].tangent_oct; });
   }
   if (const auto& segments = block.segments; !segments.empty()) {
     for (int axis = 0; axis < 3; ++axis) {
@@ -147,14 +154,31 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
     const Column g = ReadDeltas(reader, textured_rows);
     const Column b = ReadDeltas(reader, textured_rows);
     if (!reader.ok()) return Malformed("truncated or damaged textures");
-    block.textured_k.resize(textured_rows);
+    block.places.resize(textured_rows);
     for (std::size_t i = 0; i < textured_rows; ++i) {
-      const Rgb k = {std::bit_cast<float>(r[i]), std::bit_cast<float>(g[i]),
-                     std::bit_cast<float>(b[i])};
-      if (!IsFinite(k) || !(k.r >= 0 && k.g >= 0 && k.b >= 0)) {
-        return Malformed("an absorption is not a number");
+      const Rgb color = {std::bit_cast<float>(r[i]), std::bit_cast<float>(g[i]),
+                         std::bit_cast<float>(b[i])};
+      if (!IsFinite(color) || !(color.r >= 0 && color.g >= 0 && color.b >= 0)) {
+        return Malformed("a colour is not a number");
       }
-      block.textured_k[i] = k;
+      block.places[i].color = color;
+    }
+    constexpr float kWidest = 1e4F;
+    for (std::size_t width = 0; width < block.places[0].widths.size(); ++width) {
+      const Column widths = ReadDeltas(reader, textured_rows);
+      if (!reader.ok()) return Malformed("truncated or damaged textures");
+      for (std::size_t i = 0; i < textured_rows; ++i) {
+        const auto value = std::bit_cast<float>(widths[i]);
+        if (!(value >= 0 && value <= kWidest)) return Malformed("a roughness is out of range");
+        block.places[i].widths[width] = value;
+      }
+    }
+    const Column tangents = ReadDeltas(reader, textured_rows);
+    if (!reader.ok()) return Malformed("truncated or damaged textures");
+    for (std::size_t i = 0; i < textured_rows; ++i) {
+      if (tangents[i] != kNoTangent && !IsOctahedral(tangents[i]))
+        return Malformed("a tangent is not a direction");
+      block.places[i].tangent_oct = tangents[i];
     }
   }
   if (segment_rows > 0) {

@@ -97,9 +97,20 @@ namespace lucerna {
         (material.alpha_u == 0) != (material.alpha_v == 0)) {
       return "a material";
     }
-    if (material.texture < kNoTexture ||
-        material.texture >= static_cast<std::int32_t>(scene.textures.size())) {
-      return "the texture of a material";
+    for (const std::int32_t texture :
+         {material.texture, material.second_texture, material.roughness_textures[0],
+          material.roughness_textures[1], material.roughness_textures[2],
+          material.roughness_textures[3], material.displacement, material.normal_map,
+          material.amount_texture}) {
+      if (texture < kNoTexture || texture >= static_cast<std::int32_t>(scene.textures.size()))
+        return "the texture of a material";
+    }
+    for (const std::int32_t part : material.mixed) {
+      if (material.kind == Material::Kind::kMix &&
+          !(part >= 0 && part < static_cast<std::int32_t>(scene.materials.size()) &&
+            material.mixed_properties != nullptr)) {
+        return "a mix";
+      }
     }
   }
   for (std::size_t i = 0; i < scene.textures.size(); ++i) {
@@ -108,17 +119,16 @@ namespace lucerna {
     if (is_picture && (texture.picture == nullptr || !PictureIsSound(*texture.picture))) {
       return "the picture of a texture";
     }
-    const std::size_t parts = texture.kind == Texture::Kind::kScaled         ? 1
-                              : texture.kind == Texture::Kind::kCheckerboard ? 2
-                                                                             : 0;
-    for (std::size_t part = 0; part < parts; ++part) {
-      if (texture.parts[part] < 0 || texture.parts[part] >= static_cast<std::int32_t>(i)) {
-        return "a part of a texture";
-      }
+    for (const std::int32_t part : texture.parts) {
+      if (part < kNoTexture || part >= static_cast<std::int32_t>(i)) return "a part of a texture";
     }
-    if (!(texture.scale >= 0) || !std::isfinite(texture.scale)) return "the scale of a texture";
+    if (!std::isfinite(texture.scale)) return "the scale of a texture";
     for (const Vec2 uv : {Vec2{0, 0}, Vec2{0.3F, 17}, Vec2{-3e38F, 3e38F}}) {
-      const Rgb color = TextureColor(scene.textures, static_cast<std::int32_t>(i), uv);
+      const auto number = static_cast<std::int32_t>(i);
+      const TexturePlace place = {uv, {uv.y, 0, uv.x}, {0, 0, 1}};
+      const Rgb color = TextureColor(scene.textures, number, place);
+      if (!std::isfinite(TextureNumber(scene.textures, number, place)))
+        return "the number of a texture";
       for (int c = 0; c < 3; ++c) {
         if (!(color[c] >= 0 && color[c] <= 1)) return "the colour of a texture";
       }

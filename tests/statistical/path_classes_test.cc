@@ -52,7 +52,11 @@ enum class Floor {
   kRoughGlass,
   kCoated,
   kRoughCoated,
-  kSheet
+  kSheet,
+  kMixed,
+  kPatchyMetal,
+  kPatchyCoat,
+  kBumpy
 };
 enum class View { kPlain, kThroughGlass, kInMirror };
 
@@ -78,9 +82,10 @@ std::string NameOf(const PathClass& cell) {
                                                         "InGlassBall",
                                                         "InNarrowGlassBall",
                                                         "InRoughGlassBall"};
-  constexpr std::array<std::string_view, 9> kFloors = {
-      "Diffuse",    "RoughMetal", "NarrowMetal", "TexturedMetal", "NarrowGlass",
-      "RoughGlass", "Coated",     "RoughCoated", "Sheet"};
+  constexpr std::array<std::string_view, 13> kFloors = {
+      "Diffuse",     "RoughMetal", "NarrowMetal", "TexturedMetal", "NarrowGlass",
+      "RoughGlass",  "Coated",     "RoughCoated", "Sheet",         "Mixed",
+      "PatchyMetal", "PatchyCoat", "Bumpy"};
   constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
   std::string name(kLights[static_cast<std::size_t>(cell.light)]);
   name += kChains[static_cast<std::size_t>(cell.chain)];
@@ -92,7 +97,8 @@ std::string NameOf(const PathClass& cell) {
 
 bool GathersCaustics(Floor floor) {
   return floor == Floor::kNarrowMetal || floor == Floor::kTexturedMetal ||
-         floor == Floor::kNarrowGlass || floor == Floor::kRoughCoated;
+         floor == Floor::kNarrowGlass || floor == Floor::kRoughCoated || floor == Floor::kMixed ||
+         floor == Floor::kPatchyMetal || floor == Floor::kPatchyCoat;
 }
 bool IsWall(Chain chain) {
   return chain == Chain::kMirror || chain == Chain::kNarrowWall || chain == Chain::kDiffuseWall ||
@@ -106,6 +112,50 @@ Material Metal(float alpha) {
   return ConductorMaterial(Gray(0.2F), Gray(3), alpha, alpha);
 }
 
+TextureMapping ByUv(float scale_u, float scale_v, float delta_u, float delta_v) {
+  TextureMapping mapping;
+  mapping.scale_u = scale_u;
+  mapping.scale_v = scale_v;
+  mapping.delta_u = delta_u;
+  mapping.delta_v = delta_v;
+  return mapping;
+}
+
+// Squares of two roughnesses, of which the first is smooth, as the scene's textures.
+void AddPatches(Scene& scene, float roughness) {
+  Texture smooth;
+  smooth.color = Gray(0);
+  Texture rough;
+  rough.color = Gray(roughness);
+  Texture board;
+  board.kind = Texture::Kind::kCheckerboard;
+  board.parts = {0, 1, -1, -1};
+  board.mapping = ByUv(5, 5, 0, 0);
+  scene.textures = {smooth, rough, board};
+}
+
+Material Patchy(Material material) {
+  material.roughness_textures[0] = material.roughness_textures[1] = 2;
+  material.may_be_smooth = true;
+  return material;
+}
+
+// Heights as a picture of 16 by 16 pixels, drawn.
+void AddHeights(Scene& scene) {
+  Picture picture;
+  picture.width = picture.height = 16;
+  picture.channels = 1;
+  KeyedRng rng(3);
+  for (int i = 0; i < picture.width * picture.height; ++i)
+    picture.linear.push_back(rng.Uniform());
+  Texture heights;
+  heights.kind = Texture::Kind::kPicture;
+  heights.is_number = true;
+  heights.scale = 0.05F;
+  heights.picture = std::make_shared<const Picture>(picture);
+  scene.textures = {heights};
+}
+
 // A floor z = 0. Light comes from above its far side (y > 0), or, with a wall there, from behind
 // the camera by way of the wall while a black shield shades the floor itself.
 Scene SceneOf(const PathClass& cell) {
@@ -114,6 +164,10 @@ Scene SceneOf(const PathClass& cell) {
 
   const auto floor = [&](std::int32_t material) {
     AddQuad(scene, {-0.7F, -0.8F, 0}, {1.4F, 0, 0}, {0, 1.6F, 0}, material);
+  };
+  const auto floor_with_uv = [&](std::int32_t material) {
+    floor(material);
+    scene.meshes.back().uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
   };
   switch (cell.floor) {
     case Floor::kDiffuse:
@@ -132,8 +186,8 @@ Scene SceneOf(const PathClass& cell) {
       bright.color = Gray(0.9F);
       Texture board;
       board.kind = Texture::Kind::kCheckerboard;
-      board.parts = {0, 1};
-      board.mapping = {6, 6, 0, 0};
+      board.parts = {0, 1, -1, -1};
+      board.mapping = ByUv(6, 6, 0, 0);
       scene.textures = {dark, bright, board};
       Material metal = Metal(0.3F);
       metal.texture = 2;
@@ -159,6 +213,42 @@ Scene SceneOf(const PathClass& cell) {
       floor(AddMaterial(scene, SheetMaterial(0.2F, 0.6F)));
       AddQuad(scene, {-0.9F, -1, -0.3F}, {1.8F, 0, 0}, {0, 2, 0},
               AddMaterial(scene, DiffuseMaterial(0.8F)));
+      break;
+    default:
+      break;
+  }
+
+  switch (cell.floor) {
+    case Floor::kMixed: {
+      // Diffuse under lacquer, and narrow metal.
+      const std::int32_t coat = AddMaterial(scene, CoatedMaterial(0.7F, 0, 0.2F));
+      const std::int32_t metal = AddMaterial(scene, Metal(0.1F));
+      Material mix;
+      mix.kind = Material::Kind::kMix;
+      mix.mixed = {coat, metal};
+      mix.mix_depth = 1;
+      mix.amount = 0.4F;
+      floor(AddMaterial(scene, mix));
+      JoinMixes(scene.materials);
+      break;
+    }
+    case Floor::kPatchyMetal:
+      AddPatches(scene, 0.02F);
+      floor_with_uv(AddMaterial(scene, Patchy(Metal(std::sqrt(0.02F)))));
+      break;
+    case Floor::kPatchyCoat:
+      AddPatches(scene, 0.04F);
+      floor_with_uv(AddMaterial(scene, Patchy(CoatedMaterial(0.8F, 0.2F, 0.5F))));
+      break;
+    case Floor::kBumpy: {
+      AddHeights(scene);
+      Material material = DiffuseMaterial(0.6F);
+      material.displacement = 0;
+      material.slope_step = SlopeStep(scene.textures, 0);
+      floor_with_uv(AddMaterial(scene, material));
+      break;
+    }
+    default:
       break;
   }
 
@@ -421,6 +511,10 @@ std::vector<PathClass> Cells() {
       {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
   add({kMap}, {kNone, kPane}, {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
   add({kTriangles, kPoint}, {kCoatedWall}, {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kCoated});
+  // Surfaces that are another one at each place.
+  add({kTriangles, kPoint}, {kNone, kPane},
+      {Floor::kMixed, Floor::kPatchyMetal, Floor::kPatchyCoat, Floor::kBumpy});
+  add({kMap}, {kPane}, {Floor::kMixed, Floor::kPatchyMetal, Floor::kBumpy});
   add({kTriangles}, {kNone}, {Floor::kCoated, Floor::kRoughCoated}, View::kThroughGlass);
   add({kTriangles}, {kPane}, {Floor::kCoated, Floor::kRoughCoated}, View::kInMirror);
   return cells;
@@ -442,6 +536,8 @@ Effort EffortFor(const PathClass& cell) {
       effort.delta_radius = 0.12F;
       break;
     case Floor::kNarrowMetal:
+    case Floor::kPatchyMetal:
+    case Floor::kMixed:
       effort.delta_radius = 0.08F;
       break;
     default:

@@ -19,6 +19,7 @@
 #include "render/math/equal_area_square.h"
 #include "render/math/rng.h"
 #include "render/scene/texture.h"
+#include "render/transport/bump.h"
 
 namespace lucerna {
 namespace {
@@ -90,8 +91,20 @@ struct Surface {
   int base_hits = 0;
 };
 
+// With what a texture of roughness says in place of the widths.
+Material RoughenedAt(const Scene& scene, const Material& material, const TexturePlace& place) {
+  Material here = material;
+  if (material.roughness_textures[0] == kNoTexture) return here;
+  const float roughness = TextureNumber(scene.textures, material.roughness_textures[0], place);
+  const float alpha = std::sqrt(roughness);
+  here.alpha_u = here.alpha_v = alpha < 1e-3F ? 0 : alpha;
+  here.may_be_smooth = false;
+  return here;
+}
+
 Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
-  const Material& material = scene.materials[point.material];
+  const TexturePlace place = {UvAt(scene, point), point.position, point.geometric_normal};
+  const Material material = RoughenedAt(scene, scene.materials[point.material], place);
   Surface surface;
   surface.kind = material.kind;
   surface.is_smooth = IsSmooth(material);
@@ -107,8 +120,7 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   surface.thickness = static_cast<double>(material.thickness);
   surface.base_hits = material.base_hits;
   if (material.texture != kNoTexture) {
-    const Color color =
-        FromFloat(TextureColor(scene.textures, material.texture, UvAt(scene, point)));
+    const Color color = FromFloat(TextureColor(scene.textures, material.texture, place));
     surface.reflectance = Working(color);
     surface.eta = {1, 1, 1};
     for (std::size_t c = 0; c < 3; ++c) {
@@ -470,6 +482,25 @@ class PathTracer {
     return seen;
   }
 
+  // Draws the material of a mix, and turns the normal where that has bumps.
+  void Prepare(SurfacePoint& point, PathNumbers& numbers) const {
+    const Material* material = &scene_.materials[point.material];
+    const TexturePlace place = {UvAt(scene_, point), point.position, point.geometric_normal};
+    while (material->kind == Material::Kind::kMix) {
+      const float amount = material->amount_texture == kNoTexture
+                               ? material->amount
+                               : TextureNumber(scene_.textures, material->amount_texture, place);
+      const bool is_second = numbers.Next() < static_cast<double>(amount);
+      point.material = static_cast<std::uint32_t>(material->mixed[is_second ? 1 : 0]);
+      material = &scene_.materials[point.material];
+    }
+    if (material->HasBumps()) {
+      TurnShadingNormal(scene_, *material, place, point);
+    } else if (material->IsAnisotropic()) {
+      FindTangent(scene_, point);
+    }
+  }
+
   Color Radiance(Ray ray, PathNumbers& numbers) const {
     Color seen{};
     Color weight = {1, 1, 1};
@@ -496,6 +527,7 @@ class PathTracer {
         }
       }
       if (events_left == 0) return seen;
+      Prepare(point, numbers);
       const Surface surface = SurfaceOf(scene_, point);
       // The event at the first gathering surface belongs to both ends of a path.
       if (surface.gathers && !gathered) {
@@ -504,7 +536,7 @@ class PathTracer {
       }
       --events_left;
 
-      const Frame frame(point.shading_normal);
+      const Frame frame = ShadingFrame(point);
       Scattered scattered;
       const std::array<double, 3> u = {numbers.Next(), numbers.Next(), numbers.Next()};
       const Vec3 wo_local = frame.ToLocal(wo);

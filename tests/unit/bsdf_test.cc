@@ -11,6 +11,7 @@
 
 #include "render/math/rng.h"
 #include "render/math/warp.h"
+#include "render/transport/coat.h"
 #include "tests/support/chi_square.h"
 #include "tests/support/test_scenes.h"
 
@@ -36,6 +37,17 @@ Material OnePart(const Material& material, Parts part) {
   return one;
 }
 
+// A coated material whose coat is as rough as a texture says at some place.
+Material FittedCoat(Material material, float widest, float here) {
+  material.alpha_u = material.alpha_v = widest;
+  material.roughness_textures = {0, 0, kNoTexture, kNoTexture};
+  std::vector<Material> one = {material};
+  PrepareCoats(one);
+  one[0].alpha_u = one[0].alpha_v = here;
+  FitCoat(one[0]);
+  return one[0];
+}
+
 const Rgb kGoldEta = {0.15F, 0.4F, 1.4F};
 const Rgb kGoldK = {3.5F, 2.4F, 1.8F};
 
@@ -58,7 +70,9 @@ std::vector<Material> RoughMaterials() {
           OnePart(CoatedMetal(kGoldEta, kGoldK, 0, 0.3F), Parts::kSecond),
           SheetMaterial(0.3F, 0.6F),
           OnePart(SheetMaterial(0.3F, 0.6F), Parts::kFirst),
-          OnePart(SheetMaterial(0.3F, 0.6F), Parts::kSecond)};
+          OnePart(SheetMaterial(0.3F, 0.6F), Parts::kSecond),
+          FittedCoat(CoatedMaterial(0.7F, 0.3F, 0.1F), 0.5F, 0.17F),
+          FittedCoat(CoatedMetal(kGoldEta, kGoldK, 0.3F, 0.2F, 0.1F), 0.4F, 0.23F)};
 }
 
 const std::vector<Vec3> kViews = {Direction(0, 0),    Direction(30, 20),   Direction(60, 200),

@@ -176,6 +176,47 @@ TEST(ImageFileTest, OtherFormatsAndNamesAreRefused) {
   EXPECT_THAT(Why("", "noextension"), HasSubstr(".png, .jpg"));
 }
 
+// Two pixels of 32 bits: blue, green, red and opacity.
+std::string OpacityTga(const std::vector<int>& pixels) {
+  std::string bytes = Bytes({0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 32, 0x28});
+  for (const int value : pixels)
+    bytes += static_cast<char>(value);
+  return bytes;
+}
+
+// As pbrt-v4 has it: the opacity where it is not 1 everywhere, else the mean of the channels.
+TEST(ImageFileTest, NumbersAreOpacitiesOrMeans) {
+  const auto numbers = [](const std::string& bytes, const std::string& path) {
+    const StatusOr<Picture> picture = ReadPicture(bytes, path, {}, kPlenty, PictureUse::kNumbers);
+    EXPECT_TRUE(picture.ok()) << picture.status();
+    EXPECT_EQ(picture->channels, 1);
+    return *picture;
+  };
+  const Picture cut = numbers(OpacityTga({9, 9, 9, 255, 9, 9, 9, 0}), "a.tga");
+  EXPECT_EQ(cut.At(0, 0).g, 1);
+  EXPECT_EQ(cut.At(1, 0).g, 0);
+  // 188 is 0.5029 in sRGB.
+  const Picture mean = numbers(OpacityTga({0, 255, 188, 255, 188, 188, 188, 255}), "a.tga");
+  EXPECT_NEAR(mean.At(0, 0).g, (0.5029 + 1) / 3, 1e-3);
+  EXPECT_NEAR(mean.At(1, 0).g, 0.5029, 1e-3);
+
+  Image image = Source();
+  image.channels[1].pixels[2] = -0.25F;
+  const auto mean_at_2 = [&] {
+    return (image.channels[0].pixels[2] + image.channels[1].pixels[2] +
+            image.channels[2].pixels[2]) /
+           3;
+  };
+  EXPECT_FLOAT_EQ(numbers(EncodeExr(image).value(), "a.exr").At(2, 0).g, mean_at_2());
+  image.channels.push_back({"A", image.channels[0].pixels});
+  for (float& value : image.channels[3].pixels)
+    value = 1;
+  EXPECT_FLOAT_EQ(numbers(EncodeExr(image).value(), "a.exr").At(2, 0).g, mean_at_2());
+  image.channels[3].pixels[2] = 0.25F;
+  EXPECT_FLOAT_EQ(numbers(EncodeExr(image).value(), "a.exr").At(2, 0).g, 0.25F);
+  EXPECT_FLOAT_EQ(numbers(EncodeExr(image).value(), "a.exr").At(0, 0).g, 1);
+}
+
 TEST(ImageFileTest, PixelsAreFiniteAndNotNegative) {
   Image image = Source();
   image.channels[1].pixels[2] = -0.25F;

@@ -28,7 +28,7 @@ struct Floor {
     const Texture black;
     Texture board;
     board.kind = Texture::Kind::kCheckerboard;
-    board.parts = {0, 1};
+    board.parts = {0, 1, -1, -1};
     board.mapping.scale_u = board.mapping.scale_v = 2;
     scene.textures = {orange, black, board};
     AddQuad(scene, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, AddMaterial(scene, material));
@@ -41,6 +41,11 @@ struct Floor {
     Hit hit;
     EXPECT_TRUE(intersector->Intersect(ray, hit));
     return intersector->SurfaceAt(ray, hit);
+  }
+  [[nodiscard]] const Material& MaterialOf(float x, float y,
+                                           std::optional<Material>& storage) const {
+    SurfacePoint point = At(x, y);
+    return MaterialAt(scene, point, {0, 0, 1}, storage);
   }
 
   Scene scene;
@@ -55,18 +60,17 @@ Material Textured(Material material) {
 TEST(MaterialAtTest, DiffuseSurfacesHaveTheTexturesColour) {
   const Floor floor(Textured(DiffuseMaterial(0.5F)));
   std::optional<Material> storage;
-  const Rgb bright = MaterialAt(floor.scene, floor.At(-1, -0.5F), storage).reflectance;
-  EXPECT_EQ(bright, ToWorking(kOrange));
-  EXPECT_EQ(MaterialAt(floor.scene, floor.At(1, 1.5F), storage).reflectance, ToWorking(kOrange));
-  EXPECT_EQ(MaterialAt(floor.scene, floor.At(1, -0.5F), storage).reflectance, Rgb{});
-  EXPECT_TRUE(Gathers(MaterialAt(floor.scene, floor.At(1, 1), storage)));
-  EXPECT_FALSE(Gathers(MaterialAt(floor.scene, floor.At(1, -1), storage)));
+  EXPECT_EQ(floor.MaterialOf(-1, -0.5F, storage).reflectance, ToWorking(kOrange));
+  EXPECT_EQ(floor.MaterialOf(1, 1.5F, storage).reflectance, ToWorking(kOrange));
+  EXPECT_EQ(floor.MaterialOf(1, -0.5F, storage).reflectance, Rgb{});
+  EXPECT_TRUE(Gathers(floor.MaterialOf(1, 1, storage)));
+  EXPECT_FALSE(Gathers(floor.MaterialOf(1, -1, storage)));
 }
 
 TEST(MaterialAtTest, MetalsReflectTheTexturesColourAtRightAnglesAndAreNotGatheredOn) {
   const Floor floor(Textured(ConductorMaterial(Gray(1), Gray(1), 0.4F, 0.3F)));
   std::optional<Material> storage;
-  const Material& metal = MaterialAt(floor.scene, floor.At(-1, -0.5F), storage);
+  const Material& metal = floor.MaterialOf(-1, -0.5F, storage);
   const Rgb expected = ToWorking(kOrange);
   for (int c = 0; c < 3; ++c)
     EXPECT_NEAR(AlbedoOf(metal)[c], expected[c], 1e-5) << c;
@@ -79,7 +83,7 @@ TEST(MaterialAtTest, MetalsReflectTheTexturesColourAtRightAnglesAndAreNotGathere
 TEST(MaterialAtTest, WithoutATextureItIsTheScenesOwn) {
   const Floor floor(DiffuseMaterial(0.5F));
   std::optional<Material> storage;
-  EXPECT_EQ(&MaterialAt(floor.scene, floor.At(0, 0), storage), &floor.scene.materials[0]);
+  EXPECT_EQ(&floor.MaterialOf(0, 0, storage), &floor.scene.materials[0]);
   EXPECT_FALSE(storage.has_value());
 }
 
@@ -98,12 +102,13 @@ double TraceAfterBounce(const Floor& floor, float distance) {
   auto carried = tracer->Leave(emission);
   Hit hit;
   EXPECT_TRUE(floor.intersector->Intersect(emission.ray, hit));
-  const SurfacePoint surface = floor.intersector->SurfaceAt(emission.ray, hit);
+  SurfacePoint surface = floor.intersector->SurfaceAt(emission.ray, hit);
   tracer->Fly(carried, emission.ray, hit.t, SpectrumTracer::Shadows::kFound);
   std::optional<Material> storage;
   const Vec3 wi = {0, 0, 1};
-  tracer->Scatter(carried, surface, MaterialAt(floor.scene, surface, storage),
-                  -emission.ray.direction, wi);
+  const Vec3 wo = -emission.ray.direction;
+  const Material& material = MaterialAt(floor.scene, surface, wo, storage);
+  tracer->Scatter(carried, surface, material, wo, wi);
   tracer->Fly(carried, {surface.position, wi, HUGE_VALF}, distance,
               SpectrumTracer::Shadows::kFound);
   SurfacePoint ceiling = surface;

@@ -543,6 +543,15 @@ TEST(PbrtParserTest, OlderDialectsAreRefusedByNameAndByThatAlone) {
 
 // ---- textures and environment maps
 
+TextureMapping ByUv(float scale_u, float scale_v, float delta_u, float delta_v) {
+  TextureMapping mapping;
+  mapping.scale_u = scale_u;
+  mapping.scale_v = scale_v;
+  mapping.delta_u = delta_u;
+  mapping.delta_v = delta_v;
+  return mapping;
+}
+
 // A PFM of grey `value`s, row by row from the bottom.
 std::string GreyPfm(int width, int height, float value) {
   std::string bytes = "Pf\n" + std::to_string(width) + " " + std::to_string(height) + "\n-1\n";
@@ -571,12 +580,12 @@ TEST(PbrtTextureTest, ReadsWhatItIsMadeOf) {
   EXPECT_EQ(a.wrap, Texture::Wrap::kClamp);
   EXPECT_EQ(a.scale, 2);
   EXPECT_TRUE(a.is_inverted);
-  EXPECT_EQ(a.mapping, (UvMapping{3, 4, 5, 6}));
+  EXPECT_EQ(a.mapping, (ByUv(3, 4, 5, 6)));
   EXPECT_EQ(a.picture, scene.textures[1].picture);  // in memory once
   const std::int32_t board =
       scene.materials[static_cast<std::size_t>(scene.spheres[0].traits.material)].texture;
-  EXPECT_EQ(TextureColor(scene.textures, board, {0.5F, 0.5F}), Gray(0.25F));
-  EXPECT_EQ(TextureColor(scene.textures, board, {1.5F, 0.5F}), (Rgb{0.1F, 0.2F, 0.3F}));
+  EXPECT_EQ(TextureColor(scene.textures, board, {{0.5F, 0.5F}, {}, {}}), Gray(0.25F));
+  EXPECT_EQ(TextureColor(scene.textures, board, {{1.5F, 0.5F}, {}, {}}), (Rgb{0.1F, 0.2F, 0.3F}));
   const Material& metal =
       scene.materials[static_cast<std::size_t>(scene.spheres[1].traits.material)];
   EXPECT_EQ(TextureColor(scene.textures, metal.texture, {}), (Rgb{0.4F, 0.5F, 0.6F}));
@@ -595,7 +604,8 @@ TEST(PbrtTextureTest, SaysWhereATextureIsWrong) {
                                                    "and is held at 1"));
   EXPECT_THAT(said(image + "\"a.pfm\" \"string wrap\" \"mirror\""),
               HasSubstr("must be repeat, clamp or black"));
-  EXPECT_THAT(said(image + "\"a.pfm\" \"string mapping\" \"planar\""), HasSubstr("there is uv"));
+  EXPECT_THAT(said(image + "\"a.pfm\" \"string mapping\" \"box\""),
+              HasSubstr("must be uv, planar, spherical or cylindrical"));
   EXPECT_THAT(said(image + "\"a.pfm\" \"string encoding\" \"gamma x\""),
               HasSubstr("sRGB, linear or gamma"));
   EXPECT_THAT(said("Material \"diffuse\" \"texture reflectance\" \"t\""),
@@ -609,17 +619,17 @@ TEST(PbrtTextureTest, SaysWhereATextureIsWrong) {
 // Scenes declare more than they use.
 TEST(PbrtTextureTest, WhatIsNotSupportedIsRefusedOnlyWhereItIsUsed) {
   const std::string declared =
-      "Texture \"f\" \"float\" \"imagemap\" \"string filename\" \"none.png\"\n"
-      "Texture \"m\" \"spectrum\" \"marble\"\n";
+      "Texture \"f\" \"float\" \"ptex\" \"string filename\" \"none.ptx\"\n"
+      "Texture \"m\" \"spectrum\" \"ptex\"\n";
   EXPECT_THAT(SaidOfWorld(declared), Not(HasSubstr("error")));
   EXPECT_THAT(SaidOfWorld(declared + "Material \"diffuse\" \"texture reflectance\" \"m\""),
               HasSubstr("s.pbrt:4:20: error: \"reflectance\" of Material \"diffuse\" refers to a "
-                        "texture of type \"marble\""));
+                        "texture of type \"ptex\""));
   const std::string float_used =
       SaidOfWorld(declared + "Material \"conductor\" \"texture roughness\" \"f\"");
   EXPECT_THAT(float_used,
-              HasSubstr("s.pbrt:4:22: error: \"roughness\" of Material \"conductor\" is "
-                        "a texture"));
+              HasSubstr("s.pbrt:4:22: error: \"roughness\" of Material \"conductor\" refers to a "
+                        "texture of type \"ptex\""));
   EXPECT_EQ(std::count(float_used.begin(), float_used.end(), '\n'), 1);
 }
 
@@ -696,7 +706,7 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
     EXPECT_THAT(said, HasSubstr("error: "));
     EXPECT_THAT(said, HasSubstr(part));
   };
-  expect("Material \"dielectric\" \"texture roughness\" \"t\"", "is a texture");
+  expect("Material \"dielectric\" \"texture eta\" \"t\"", "is a texture");
   expect("Material \"hair\"", "there are diffuse, conductor, dielectric, interface");
   expect("Material \"coateddiffuse\" \"rgb albedo\" [0.1 0 0]",
          "the layer under a coat only absorbs");
@@ -704,7 +714,7 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
   expect("Material \"measured\"", "measured BSDFs");
   expect("Material \"fourier\"", "Fourier BSDFs");
   expect("Material \"conductor\" \"spectrum eta\" \"none.spd\"", "\"none.spd\" cannot be read");
-  expect("MakeNamedMaterial \"m\" \"string type\" \"mix\"", "\"mix\"");
+  expect("MakeNamedMaterial \"m\" \"string type\" \"hair\"", "\"hair\"");
   expect("LightSource \"goniometric\"", "there are point, spot, distant and infinite");
   expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "no such file");
   expect("Camera \"perspective\"", "before WorldBegin");

@@ -105,7 +105,8 @@ TEST(OwnScenesTest, PicturesAreOfTheScenesFiles) {
   EXPECT_EQ(scene.infinite_lights[0].map->At(9, 10), (Rgb{90, 75, 50}));
   // The corner of the bricks that tells up from down: red at the top left.
   const auto wall = static_cast<std::size_t>(scene.meshes.at(1).traits.material);
-  const Rgb corner = TextureColor(scene.textures, scene.materials[wall].texture, {0.05F, 0.95F});
+  const Rgb corner =
+      TextureColor(scene.textures, scene.materials[wall].texture, {{0.05F, 0.95F}, {}, {}});
   EXPECT_GT(corner.r, 0.9F);
   EXPECT_LT(corner.g, 0.05F);
 }

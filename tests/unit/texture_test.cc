@@ -12,6 +12,15 @@ namespace {
 
 using Wrap = Texture::Wrap;
 
+TextureMapping ByUv(float scale_u, float scale_v, float delta_u, float delta_v) {
+  TextureMapping mapping;
+  mapping.scale_u = scale_u;
+  mapping.scale_v = scale_v;
+  mapping.delta_u = delta_u;
+  mapping.delta_v = delta_v;
+  return mapping;
+}
+
 // Two by two pixels, bytes: black and red above, green and white below.
 std::shared_ptr<const Picture> FourPixels() {
   Picture picture;
@@ -36,7 +45,8 @@ Texture Constant(Rgb color) {
 }
 
 void ExpectColor(const std::vector<Texture>& textures, Vec2 uv, Rgb expected) {
-  const Rgb color = TextureColor(textures, static_cast<std::int32_t>(textures.size()) - 1, uv);
+  const Rgb color =
+      TextureColor(textures, static_cast<std::int32_t>(textures.size()) - 1, {uv, {}, {}});
   for (int c = 0; c < 3; ++c)
     EXPECT_NEAR(color[c], expected[c], 1e-6F) << "channel " << c << " at " << uv.x << " " << uv.y;
 }
@@ -69,7 +79,7 @@ TEST(TextureTest, EdgesRepeatClampOrAreBlack) {
 
 TEST(TextureTest, MappingScaleAndInversionAreApplied) {
   Texture texture = PictureTexture();
-  texture.mapping = {2, 4, 0.5F, 0.25F};
+  texture.mapping = ByUv(2, 4, 0.5F, 0.25F);
   ExpectColor({texture}, {0.125F, 0}, {0.5F, 0.5F, 0.5F});  // at (0.75, 0.25)
   texture.scale = 1.5F;
   ExpectColor({texture}, {0.125F, 0}, {0.75F, 0.75F, 0.75F});
@@ -87,7 +97,7 @@ TEST(TextureTest, ScaledAndCheckeredTexturesAreMadeOfOthers) {
   half.parts[0] = 0;
   Texture checkers;
   checkers.kind = Texture::Kind::kCheckerboard;
-  checkers.parts = {1, 0};
+  checkers.parts = {1, 0, -1, -1};
   checkers.mapping.scale_u = 2;
   const std::vector<Texture> textures = {Constant({0.8F, 0.4F, 0.2F}), half, checkers};
   const Rgb whole = {0.8F, 0.4F, 0.2F};
@@ -101,19 +111,19 @@ TEST(TextureTest, ScaledAndCheckeredTexturesAreMadeOfOthers) {
 TEST(TextureTest, FarPlacesAndHugeScalesStayColours) {
   Texture checkers;
   checkers.kind = Texture::Kind::kCheckerboard;
-  checkers.parts = {0, 0};
+  checkers.parts = {0, 0, -1, -1};
   Texture huge;
   huge.kind = Texture::Kind::kScaled;
   huge.scale = 3e38F;
   for (const Wrap wrap : {Wrap::kRepeat, Wrap::kClamp, Wrap::kBlack}) {
     Texture picture = PictureTexture(wrap);
-    picture.mapping = {3e38F, -3e38F, 3e38F, -3e38F};
+    picture.mapping = ByUv(3e38F, -3e38F, 3e38F, -3e38F);
     std::vector<Texture> textures = {picture, checkers, huge, huge};
     textures[2].parts[0] = 1;
     textures[3].parts[0] = 2;
     for (const float place : {0.0F, 1.0F, -1.0F, 1e30F, -3e38F, 5e8F}) {
       for (std::int32_t number = 0; number < 4; ++number) {
-        const Rgb color = TextureColor(textures, number, {place, -place});
+        const Rgb color = TextureColor(textures, number, {{place, -place}, {}, {}});
         for (int c = 0; c < 3; ++c)
           EXPECT_TRUE(color[c] >= 0 && color[c] <= 1) << place << " " << number << " " << color[c];
       }

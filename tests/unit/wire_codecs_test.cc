@@ -131,7 +131,7 @@ HitpointBlock CausticBlock() {
   block.positions = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}};
   block.normals_oct = {up, up, up};
   block.glossy = {{1, 0, up, up}, {2, 1, up, up}};
-  block.textured_k = {{0, 0, 0}, {3, 2.5F, 0.125F}};
+  block.places = {{}, {{3, 2.5F, 0.125F}, {0.1F, 0.5F, 0, 2}, EncodeOctahedral({0, 1, 0})}};
   block.caustic_rows = 1;
   return block;
 }
@@ -157,12 +157,12 @@ TEST(BlockCodecTest, RefusesCausticRowsThatAreNotGlossyAndColumnsOfAnotherLength
   block.glossy[0].hitpoint = 0;
   EXPECT_TRUE(is_refused(block));
   block = CausticBlock();
-  block.textured_k.pop_back();
+  block.places.pop_back();
   EXPECT_TRUE(is_refused(block));
   block = CausticBlock();
-  block.textured_k[1].g = -1;
+  block.places[1].color.g = -1;
   EXPECT_TRUE(is_refused(block));
-  block.textured_k[1].g = HUGE_VALF;
+  block.places[1].color.g = HUGE_VALF;
   EXPECT_TRUE(is_refused(block));
 }
 

@@ -198,11 +198,17 @@ void DirectiveReader::ReportUnclosedScopes() {
 }
 
 void DirectiveReader::ReportNamedMaterials() {
+  std::vector<std::uint8_t> is_mixed(scene_.materials.size());
+  for (const Material& material : scene_.materials) {
+    for (const std::int32_t part : material.mixed) {
+      if (part >= 0) is_mixed[static_cast<std::size_t>(part)] = 1;
+    }
+  }
   for (const auto& [name, material] : named_materials_) {
     if (!material.is_defined) {
       diagnostics_.Error(material.location, Concat("there is no material ", Quoted(name),
                                                    "; define it by MakeNamedMaterial"));
-    } else if (!material.is_used) {
+    } else if (!material.is_used && is_mixed[static_cast<std::size_t>(material.index)] == 0) {
       diagnostics_.Note(material.location, Concat("the material ", Quoted(name), " is not used"));
     }
   }

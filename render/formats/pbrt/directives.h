@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,6 +19,7 @@
 #include "render/formats/finish_scene.h"
 #include "render/formats/pbrt/arguments.h"
 #include "render/formats/pbrt/graphics_state.h"
+#include "render/formats/pbrt/materials.h"
 #include "render/formats/pbrt/parameter_list.h"
 #include "render/formats/pbrt/shapes.h"
 #include "render/formats/pbrt/textures.h"
@@ -113,6 +113,7 @@ class DirectiveReader {
     bool is_used = false;
   };
   NamedMaterial& Named(const std::string& name, const SourceLocation& location);
+  MaterialSources MaterialSourcesHere();
   struct NamedMedium {
     std::int32_t index = kNoMedium;
     SourceLocation location;  // where it is first mentioned
@@ -178,8 +179,8 @@ class DirectiveReader {
   std::map<std::string, Transform> coordinate_systems_;
   std::map<std::string, NamedMaterial> named_materials_;
   std::map<std::string, NamedMedium> named_media_;
-  TextureNames textures_;
-  std::set<std::string> float_textures_;
+  MaterialNames defined_materials_;
+  DeclaredTextures textures_;
   std::map<std::string, Object> objects_;
   Object* open_object_ = nullptr;  // between ObjectBegin and ObjectEnd
   std::vector<WrittenOutMeshes> written_out_;

@@ -3,15 +3,16 @@
 
 namespace lucerna {
 
-void ReadCoatedConductor(ParameterList& parameters, const TextureNames& names, Material& material) {
-  ReadMetal({"conductor.eta", "conductor.k"}, parameters, names, material);
-  ReadRoughness("conductor.", parameters, material);
-  material.base_alpha_u = material.alpha_u;
-  material.base_alpha_v = material.alpha_v;
-  material.alpha_u = 0;
-  material.alpha_v = 0;
-  ReadRoughness("interface.", parameters, material);
-  ReadCoat("interface.eta", parameters, material);
+void ReadCoatedConductor(const MaterialInput& input, Material& material) {
+  ReadMetal({"conductor.eta", "conductor.k"}, input, material);
+  ReadRoughness("conductor.", Facets::kBase, input, material);
+  ReadRoughness("interface.", Facets::kSurface, input, material);
+  const auto& textures = material.roughness_textures;
+  if ((textures[0] & textures[1]) != kNoTexture && (textures[2] & textures[3]) != kNoTexture) {
+    input.parameters.Error("conductor.roughness",
+                           "and interface.roughness cannot both be textures; give one a number");
+  }
+  ReadCoat("interface.eta", input.parameters, material);
 }
 
 }  // namespace lucerna

@@ -3,14 +3,14 @@
 
 namespace lucerna {
 
-void ReadCoatedDiffuse(ParameterList& parameters, const TextureNames& names, Material& material) {
-  if (parameters.IsTexture("reflectance")) {
-    material.texture = FindTexture("reflectance", parameters, names);
+void ReadCoatedDiffuse(const MaterialInput& input, Material& material) {
+  if (input.parameters.IsTexture("reflectance")) {
+    material.texture = FindTexture("reflectance", input);
   } else {
-    material.reflectance = parameters.FindReflectance("reflectance").value_or(Gray(0.5F));
+    material.reflectance = input.parameters.FindReflectance("reflectance").value_or(Gray(0.5F));
   }
-  ReadRoughness("", parameters, material);
-  ReadCoat("eta", parameters, material);
+  ReadRoughness("", Facets::kSurface, input, material);
+  ReadCoat("eta", input.parameters, material);
 }
 
 }  // namespace lucerna

@@ -5,10 +5,10 @@
 
 namespace lucerna {
 
-void ReadMetal(const MetalParameters& called, ParameterList& parameters, const TextureNames& names,
-               Material& material) {
+void ReadMetal(const MetalParameters& called, const MaterialInput& input, Material& material) {
+  ParameterList& parameters = input.parameters;
   const bool is_textured = parameters.IsTexture("reflectance");
-  if (is_textured) material.texture = FindTexture("reflectance", parameters, names);
+  if (is_textured) material.texture = FindTexture("reflectance", input);
   const std::optional<Rgb> reflectance =
       is_textured ? Gray(0.5F) : parameters.FindReflectance("reflectance");
   if (reflectance.has_value()) {
@@ -28,9 +28,9 @@ void ReadMetal(const MetalParameters& called, ParameterList& parameters, const T
   }
 }
 
-void ReadConductor(ParameterList& parameters, const TextureNames& names, Material& material) {
-  ReadMetal({"eta", "k"}, parameters, names, material);
-  ReadRoughness("", parameters, material);
+void ReadConductor(const MaterialInput& input, Material& material) {
+  ReadMetal({"eta", "k"}, input, material);
+  ReadRoughness("", Facets::kSurface, input, material);
 }
 
 }  // namespace lucerna

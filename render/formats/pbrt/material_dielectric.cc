@@ -3,10 +3,10 @@
 
 namespace lucerna {
 
-void ReadDielectric(ParameterList& parameters, const TextureNames& /*names*/, Material& material) {
+void ReadDielectric(const MaterialInput& input, Material& material) {
   material.ior =
-      static_cast<float>(parameters.FindRefractiveIndex("eta", kIndexRange).value_or(1.5));
-  ReadRoughness("", parameters, material);
+      static_cast<float>(input.parameters.FindRefractiveIndex("eta", kIndexRange).value_or(1.5));
+  ReadRoughness("", Facets::kSurface, input, material);
 }
 
 }  // namespace lucerna

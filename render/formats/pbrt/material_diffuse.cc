@@ -3,11 +3,11 @@
 
 namespace lucerna {
 
-void ReadDiffuse(ParameterList& parameters, const TextureNames& names, Material& material) {
-  if (parameters.IsTexture("reflectance")) {
-    material.texture = FindTexture("reflectance", parameters, names);
+void ReadDiffuse(const MaterialInput& input, Material& material) {
+  if (input.parameters.IsTexture("reflectance")) {
+    material.texture = FindTexture("reflectance", input);
   } else {
-    material.reflectance = parameters.FindReflectance("reflectance").value_or(Gray(0.5F));
+    material.reflectance = input.parameters.FindReflectance("reflectance").value_or(Gray(0.5F));
   }
 }
 

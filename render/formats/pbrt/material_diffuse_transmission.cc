@@ -3,13 +3,13 @@
 
 namespace lucerna {
 
-void ReadDiffuseTransmission(ParameterList& parameters, const TextureNames& names,
-                             Material& material) {
+void ReadDiffuseTransmission(const MaterialInput& input, Material& material) {
+  ParameterList& parameters = input.parameters;
   const float scale = static_cast<float>(parameters.Float("scale", 1, {0, 1}));
   material.texture_scale = scale;
   const auto read = [&](std::string_view name, Rgb& color, std::int32_t& texture) {
     if (parameters.IsTexture(name)) {
-      texture = FindTexture(name, parameters, names);
+      texture = FindTexture(name, input);
     } else {
       color = parameters.FindReflectance(name).value_or(Gray(0.25F)) * scale;
     }

@@ -3,7 +3,6 @@
 
 namespace lucerna {
 
-void ReadInterface(ParameterList& /*parameters*/, const TextureNames& /*names*/,
-                   Material& /*material*/) {}
+void ReadInterface(const MaterialInput& /*input*/, Material& /*material*/) {}
 
 }  // namespace lucerna

@@ -6,22 +6,31 @@
 #include <cstdint>
 #include <string_view>
 
+#include "render/formats/pbrt/materials.h"
 #include "render/formats/pbrt/parameter_list.h"
 #include "render/formats/pbrt/textures.h"
 #include "render/scene/material.h"
 
 namespace lucerna {
 
-#define LUCERNA_DECLARE(Name, name) \
-  void Read##Name(ParameterList& parameters, const TextureNames& names, Material& material);
+// What the readers of all kinds of material are given.
+struct MaterialInput {
+  ParameterList& parameters;
+  const MaterialSources& from;
+};
+
+#define LUCERNA_DECLARE(Name, name) void Read##Name(const MaterialInput& input, Material& material);
 LUCERNA_MATERIALS(LUCERNA_DECLARE)
 #undef LUCERNA_DECLARE
 
 inline constexpr Range kIndexRange = {0.01, 100};  // of refraction
 
-// alpha_u and alpha_v, from remaproughness and roughness, uroughness and vroughness, whose names
-// begin with `prefix`.
-void ReadRoughness(std::string_view prefix, ParameterList& parameters, Material& material);
+// Widths of facets: of a surface, or of the metal under a coat.
+enum class Facets : std::uint8_t { kSurface, kBase };
+// These widths, or the textures in their places, from remaproughness and roughness, uroughness and
+// vroughness, whose names begin with `prefix`.
+void ReadRoughness(std::string_view prefix, Facets facets, const MaterialInput& input,
+                   Material& material);
 
 // `ior` of a coat, from the parameter named `eta`; `thickness` and what else the parameters of
 // pbrt's layered materials set.
@@ -31,11 +40,10 @@ void ReadCoat(std::string_view eta, ParameterList& parameters, Material& materia
 struct MetalParameters {
   std::string_view eta, k;
 };
-void ReadMetal(const MetalParameters& called, ParameterList& parameters, const TextureNames& names,
-               Material& material);
+void ReadMetal(const MetalParameters& called, const MaterialInput& input, Material& material);
 
-// The texture that the parameter `name` refers to, if it is one and can be used; else kNoTexture.
-[[nodiscard]] std::int32_t FindTexture(std::string_view name, ParameterList& parameters,
-                                       const TextureNames& names);
+// The texture of colours that the parameter `name` refers to, if it is one and can be used; else
+// kNoTexture.
+[[nodiscard]] std::int32_t FindTexture(std::string_view name, const MaterialInput& input);
 
 }  // namespace lucerna

@@ -3,10 +3,9 @@
 
 namespace lucerna {
 
-void ReadThinDielectric(ParameterList& parameters, const TextureNames& /*names*/,
-                        Material& material) {
+void ReadThinDielectric(const MaterialInput& input, Material& material) {
   material.ior =
-      static_cast<float>(parameters.FindRefractiveIndex("eta", kIndexRange).value_or(1.5));
+      static_cast<float>(input.parameters.FindRefractiveIndex("eta", kIndexRange).value_or(1.5));
 }
 
 }  // namespace lucerna

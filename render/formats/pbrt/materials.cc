@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
 
 #include "render/base/text.h"
 #include "render/formats/pbrt/kinds.h"
@@ -11,16 +15,14 @@
 namespace lucerna {
 namespace {
 
-// Below this width pbrt-v4 renders a surface as perfectly smooth.
-constexpr double kSmoothAlpha = 1e-3;
-constexpr Range kRoughness = {0, 1e3};
+constexpr Range kRoughness = {0, static_cast<double>(kMaxRoughness)};
 
-using MaterialReader = void (*)(ParameterList&, const TextureNames&, Material&);
+using MaterialReader = void (*)(const MaterialInput&, Material&);
 
-#define LUCERNA_READER(Name, name)                                                      \
-  {name, [](ParameterList& parameters, const TextureNames& names, Material& material) { \
-     material.kind = Material::Kind::k##Name;                                           \
-     Read##Name(parameters, names, material);                                           \
+#define LUCERNA_READER(Name, name)                            \
+  {name, [](const MaterialInput& input, Material& material) { \
+     material.kind = Material::Kind::k##Name;                 \
+     Read##Name(input, material);                             \
    }},
 constexpr Kind<MaterialReader> kKinds[] = {LUCERNA_MATERIALS(LUCERNA_READER)};
 #undef LUCERNA_READER
@@ -43,20 +45,101 @@ std::string_view WhyRefused(std::string_view type) {
   return "is not supported";
 }
 
+// `displacement` and `normalmap`. As in pbrt-v4 the map counts where there are both, and those of a
+// mix are ignored.
+void ReadBumps(const MaterialInput& input, Material& material) {
+  ParameterList& parameters = input.parameters;
+  const std::optional<std::string> map = parameters.FindString("normalmap");
+  const NamedTexture* heights = nullptr;
+  if (parameters.IsTexture("displacement")) {
+    heights = FindNumbers("displacement", parameters, input.from.declared.numbers);
+  } else if (parameters.Has("displacement")) {
+    parameters.Error("displacement", "must be a texture");
+    parameters.Ignore("displacement");
+  }
+  if (material.kind == Material::Kind::kMix || material.kind == Material::Kind::kInterface) {
+    for (const std::string_view name : {"displacement", "normalmap"}) {
+      if (parameters.Has(name)) parameters.Warning(name, "is ignored, as by pbrt-v4");
+    }
+    return;
+  }
+  if (!map.has_value() || map->empty()) {
+    // Even heights leave a surface as it is.
+    if (heights == nullptr || !(heights->largest > heights->least)) return;
+    material.displacement = heights->number;
+    material.slope_step = SlopeStep(input.from.textures, heights->number);
+    return;
+  }
+  Texture normals;
+  normals.kind = Texture::Kind::kPicture;
+  StatusOr<std::shared_ptr<const Picture>> picture =
+      input.from.assets.ReadPicture(*map, {PixelEncoding::Kind::kLinear});
+  if (!picture.ok()) {
+    parameters.Error("normalmap", Concat("cannot be read: ", picture.status().message()));
+    return;
+  }
+  if ((*picture)->channels != 3) {
+    parameters.Error("normalmap", "must have the channels R, G and B");
+    return;
+  }
+  normals.picture = *std::move(picture);
+  material.normal_map = static_cast<std::int32_t>(input.from.textures.size());
+  input.from.textures.push_back(std::move(normals));
+}
+
 }  // namespace
 
-void ReadRoughness(std::string_view prefix, ParameterList& parameters, Material& material) {
-  const double roughness = parameters.Float(Concat(prefix, "roughness"), 0, kRoughness);
-  const double u = parameters.Float(Concat(prefix, "uroughness"), roughness, kRoughness);
-  const double v = parameters.Float(Concat(prefix, "vroughness"), roughness, kRoughness);
+void ReadRoughness(std::string_view prefix, Facets facets, const MaterialInput& input,
+                   Material& material) {
+  ParameterList& parameters = input.parameters;
+  struct Found {
+    double number = 0;
+    const NamedTexture* texture = nullptr;
+  };
+  const auto find = [&](const std::string& name, const Found& otherwise) {
+    if (!parameters.IsTexture(name))
+      return Found{parameters.Float(name, otherwise.number, kRoughness),
+                   parameters.Has(name) ? nullptr : otherwise.texture};
+    const NamedTexture* texture = FindNumbers(name, parameters, input.from.declared.numbers);
+    if (texture != nullptr && !(texture->largest > texture->least)) {
+      // A constant needs no lookups.
+      return Found{std::clamp(static_cast<double>(texture->least), kRoughness.low, kRoughness.high),
+                   nullptr};
+    }
+    return Found{0, texture};
+  };
+  const Found both = find(Concat(prefix, "roughness"), {});
+  const Found u = find(Concat(prefix, "uroughness"), both);
+  const Found v = find(Concat(prefix, "vroughness"), both);
   const bool remap = parameters.Bool("remaproughness", true);
-  const double alpha_u = remap ? std::sqrt(u) : u;
-  const double alpha_v = remap ? std::sqrt(v) : v;
-  if (std::max(alpha_u, alpha_v) < kSmoothAlpha) return;
-  // A width of zero in one direction only would divide by zero.
-  constexpr double kSmallestAlpha = 1e-4;
-  material.alpha_u = static_cast<float>(std::max(alpha_u, kSmallestAlpha));
-  material.alpha_v = static_cast<float>(std::max(alpha_v, kSmallestAlpha));
+  material.remaps_roughness = remap;
+  const bool is_base = facets == Facets::kBase;
+  float& alpha_u = is_base ? material.base_alpha_u : material.alpha_u;
+  float& alpha_v = is_base ? material.base_alpha_v : material.alpha_v;
+  if (u.texture == nullptr && v.texture == nullptr) {
+    const double width_u = remap ? std::sqrt(u.number) : u.number;
+    const double width_v = remap ? std::sqrt(v.number) : v.number;
+    if (std::max(width_u, width_v) < static_cast<double>(kSmoothAlpha)) return;
+    // A width of zero in one direction only would divide by zero.
+    constexpr double kSmallestAlpha = 1e-4;
+    alpha_u = static_cast<float>(std::max(width_u, kSmallestAlpha));
+    alpha_v = static_cast<float>(std::max(width_v, kSmallestAlpha));
+    return;
+  }
+  const auto least = [](const Found& found) {
+    return found.texture != nullptr ? found.texture->least : static_cast<float>(found.number);
+  };
+  const auto largest = [](const Found& found) {
+    return found.texture != nullptr ? found.texture->largest : static_cast<float>(found.number);
+  };
+  const FacetWidths widest = WidthsOf(largest(u), largest(v), remap);
+  const FacetWidths narrowest = WidthsOf(least(u), least(v), remap);
+  alpha_u = widest.u;
+  alpha_v = widest.v;
+  (is_base ? material.base_may_be_smooth : material.may_be_smooth) = narrowest.u == 0;
+  const std::size_t first = is_base ? 2 : 0;
+  if (u.texture != nullptr) material.roughness_textures[first] = u.texture->number;
+  if (v.texture != nullptr) material.roughness_textures[first + 1] = v.texture->number;
 }
 
 void ReadCoat(std::string_view eta, ParameterList& parameters, Material& material) {
@@ -75,11 +158,12 @@ void ReadCoat(std::string_view eta, ParameterList& parameters, Material& materia
   parameters.Ignore("nsamples");
 }
 
-std::int32_t FindTexture(std::string_view name, ParameterList& parameters,
-                         const TextureNames& names) {
+std::int32_t FindTexture(std::string_view name, const MaterialInput& input) {
+  ParameterList& parameters = input.parameters;
   if (!parameters.IsTexture(name)) return kNoTexture;
   const std::optional<std::string> texture = parameters.FindTexture(name);
   if (!texture.has_value()) return kNoTexture;
+  const TextureNames& names = input.from.declared.colors;
   const auto named = names.find(*texture);
   if (named == names.end()) {
     parameters.Error(name, Concat("refers to the spectrum texture ", Quoted(*texture),
@@ -101,20 +185,17 @@ bool IsSupportedMaterial(std::string_view type) {
   return FindReader<MaterialReader>(kKinds, InOneWord(type)) != nullptr;
 }
 
-Material ReadMaterial(std::string_view type, ParameterList& parameters, const TextureNames& names) {
+Material ReadMaterial(std::string_view type, ParameterList& parameters,
+                      const MaterialSources& sources) {
   Material material;
   const MaterialReader read = FindReader<MaterialReader>(kKinds, InOneWord(type));
   if (read == nullptr) {
     parameters.Error(Concat(WhyRefused(type), "; ", SupportedKinds<MaterialReader>(kKinds)));
     return material;
   }
-  read(parameters, names, material);
-  if (parameters.Has("displacement") || parameters.Has("normalmap")) {
-    parameters.Warning(parameters.Has("normalmap") ? "normalmap" : "displacement",
-                       "is ignored: bumps are not rendered");
-    parameters.Ignore("displacement");
-    parameters.Ignore("normalmap");
-  }
+  const MaterialInput input = {parameters, sources};
+  read(input, material);
+  ReadBumps(input, material);
   parameters.WarnOfUnread();
   return material;
 }

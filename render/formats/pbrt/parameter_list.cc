@@ -16,6 +16,7 @@ constexpr std::array<std::string_view, 1> kBool = {"bool"};
 constexpr std::array<std::string_view, 1> kString = {"string"};
 constexpr std::array<std::string_view, 1> kTexture = {"texture"};
 constexpr std::array<std::string_view, 2> kPoint = {"point3", "point"};
+constexpr std::array<std::string_view, 2> kVector = {"vector3", "vector"};
 constexpr std::array<std::string_view, 2> kReflectanceTypes = {"rgb", "spectrum"};
 constexpr std::array<std::string_view, 3> kEmissionTypes = {"rgb", "spectrum", "blackbody"};
 constexpr std::array<std::string_view, 3> kOpticalTypes = {"spectrum", "rgb", "float"};
@@ -96,10 +97,8 @@ const Parameter* ParameterList::Take(std::string_view name, std::span<const std:
     const std::string wanted = Listed(types, " or ");
     if (parameter->type == "texture") {
       diagnostics_.Error(parameter->location,
-                         Concat(Called(*parameter), " is a texture; ",
-                                "textures are supported for the reflectance of diffuse and "
-                                "conductor only, give a ",
-                                wanted, " instead"));
+                         Concat(Called(*parameter), " is a texture, which is not supported here; ",
+                                "give a ", wanted, " instead"));
     } else {
       diagnostics_.Error(parameter->location, Concat(Called(*parameter), " must be of type ",
                                                      wanted, ", not ", parameter->type));
@@ -185,6 +184,19 @@ Vec3 ParameterList::Point(std::string_view name, Vec3 otherwise) {
   if (parameter == nullptr) return otherwise;
   const Rgb three = ToRgb(parameter->numbers);
   return {three.r, three.g, three.b};
+}
+
+Vec3 ParameterList::Vector(std::string_view name, Vec3 otherwise) {
+  const Parameter* parameter = Take(name, kVector, 3);
+  if (parameter == nullptr) return otherwise;
+  const Rgb three = ToRgb(parameter->numbers);
+  return {three.r, three.g, three.b};
+}
+
+std::span<const std::string> ParameterList::Strings(std::string_view name) {
+  const Parameter* parameter = Take(name, kString, 0);
+  if (parameter == nullptr) return {};
+  return parameter->strings;
 }
 
 std::span<const double> ParameterList::Numbers(std::string_view name,

@@ -62,6 +62,9 @@ class ParameterList {
   std::optional<std::string> FindString(std::string_view name);
   std::string String(std::string_view name, std::string otherwise);
   Vec3 Point(std::string_view name, Vec3 otherwise);
+  Vec3 Vector(std::string_view name, Vec3 otherwise);
+  // All strings of one parameter, empty when it is absent. Valid as long as the list.
+  std::span<const std::string> Strings(std::string_view name);
 
   // All numbers of one parameter, empty when it is absent. `types` are the type names it may
   // have; their count is a multiple of `group`. Valid as long as the list.

@@ -108,6 +108,10 @@ bool DirectiveReader::OnOption(Arguments& arguments) {
   return true;
 }
 
+MaterialSources DirectiveReader::MaterialSourcesHere() {
+  return {textures_, defined_materials_, scene_.materials, assets_, scene_.textures};
+}
+
 bool DirectiveReader::OnMaterial(Arguments& arguments) {
   std::string type;
   std::vector<Parameter> parameters;
@@ -116,7 +120,7 @@ bool DirectiveReader::OnMaterial(Arguments& arguments) {
   ParameterList list = ListFor(arguments, type, std::move(parameters),
                                graphics_.state().DefaultsOf(AttributeTarget::kMaterial));
   graphics_.state().material = static_cast<std::int32_t>(scene_.materials.size());
-  scene_.materials.push_back(ReadMaterial(type, list, textures_));
+  scene_.materials.push_back(ReadMaterial(type, list, MaterialSourcesHere()));
   return true;
 }
 
@@ -148,15 +152,16 @@ bool DirectiveReader::OnMakeNamedMaterial(Arguments& arguments) {
   }
   Material material;
   if (IsSupportedMaterial(*type)) {
-    material = ReadMaterial(*type, list, textures_);
+    material = ReadMaterial(*type, list, MaterialSourcesHere());
   } else {
     // Names the type, which the subject of the list does not.
     ParameterList unsupported(Concat("the type ", Quoted(*type), " of ", list.subject()),
                               arguments.location(), {}, nullptr, diagnostics_);
-    material = ReadMaterial(*type, unsupported, textures_);
+    material = ReadMaterial(*type, unsupported, MaterialSourcesHere());
   }
   material.name = name;
   scene_.materials[static_cast<std::size_t>(named.index)] = std::move(material);
+  defined_materials_.emplace(name, named.index);
   return true;
 }
 
@@ -227,7 +232,7 @@ bool DirectiveReader::OnShape(Arguments& arguments) {
   }
   const bool is_light = emits && open_object_ == nullptr;
   placement.emits = is_light;
-  ShapeSet shapes = ReadShapes(type, list, placement, assets_);
+  ShapeSet shapes = ReadShapes(type, list, placement, textures_.numbers, assets_);
   if (!is_light && IsInvisible(shapes)) return true;  // no ray meets it, and nothing comes from it
   if (!HasRoomFor(shapes, arguments)) return true;
   if (is_light && !diagnostics_.has_error() && !(shapes.Area() > 0))
@@ -295,29 +300,26 @@ bool DirectiveReader::OnTexture(Arguments& arguments) {
       !arguments.ReadString("a type", type) || !arguments.ReadParameters(parameters)) {
     return false;
   }
-  if (kind == "float") {
-    // Nothing here takes one: a parameter that refers to it is refused, whatever it is.
-    if (!float_textures_.insert(name).second) {
-      arguments.Error(Concat("the float texture ", Quoted(name), " is defined twice"));
-    }
-    return true;
-  }
   if (kind == "color") return RefusePbrtV3(arguments);
-  if (kind != "spectrum") {
+  const bool is_number = kind == "float";
+  if (!is_number && kind != "spectrum") {
     arguments.Error(
         Concat("Texture ", Quoted(name), " must be of spectrum or float, not ", Quoted(kind)));
     return true;
   }
-  if (textures_.contains(name)) {
-    arguments.Error(Concat("the texture ", Quoted(name), " is defined twice"));
+  TextureNames& names = is_number ? textures_.numbers : textures_.colors;
+  if (names.contains(name)) {
+    arguments.Error(Concat("the ", is_number ? "float texture " : "texture ", Quoted(name),
+                           " is defined twice"));
     return true;
   }
   ReadSpectrumFiles(assets_, parameters, diagnostics_);
   ParameterList list(Concat("Texture ", Quoted(name)), arguments.location(), std::move(parameters),
                      graphics_.state().DefaultsOf(AttributeTarget::kTexture).get(), diagnostics_);
   // Made first: a texture may not be a part of itself.
-  NamedTexture made = ReadTexture(type, list, textures_, assets_, scene_.textures);
-  textures_.emplace(name, std::move(made));
+  NamedTexture made = ReadTexture(type, is_number, list, textures_, graphics_.state().to_world,
+                                  assets_, scene_.textures);
+  names.emplace(name, std::move(made));
   return true;
 }
 

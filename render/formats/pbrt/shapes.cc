@@ -122,6 +122,23 @@ constexpr Kind<ShapeReader> kKinds[] = {
 };
 #undef LUCERNA_ROW
 
+void ReadAlpha(ParameterList& parameters, const TextureNames& numbers, bool emits,
+               ShapeTraits& traits) {
+  if (!parameters.IsTexture("alpha")) {
+    traits.alpha = static_cast<float>(std::clamp(parameters.Float("alpha", 1), 0.0, 1.0));
+    return;
+  }
+  const NamedTexture* alpha = FindNumbers("alpha", parameters, numbers);
+  if (alpha == nullptr) return;
+  traits.alpha = std::clamp(alpha->largest, 0.0F, 1.0F);
+  if (alpha->least >= 1 || alpha->largest <= 0) return;
+  if (emits) {
+    parameters.Error("alpha", "must not be a texture on a shape that emits");
+    return;
+  }
+  traits.alpha_texture = alpha->number;
+}
+
 }  // namespace
 
 void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
@@ -288,7 +305,8 @@ double ShapeSet::Area() const {
 }
 
 ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
-                    const ShapePlacement& placement, AssetReader& assets) {
+                    const ShapePlacement& placement, const TextureNames& numbers,
+                    AssetReader& assets) {
   ShapeSet shapes;
   const ShapeReader read = FindReader<ShapeReader>(kKinds, type);
   if (read == nullptr) {
@@ -296,7 +314,7 @@ ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
     return shapes;
   }
   ShapePlacement with_alpha = placement;
-  with_alpha.traits.alpha = static_cast<float>(std::clamp(parameters.Float("alpha", 1), 0.0, 1.0));
+  ReadAlpha(parameters, numbers, placement.emits, with_alpha.traits);
   read({parameters, with_alpha, assets}, shapes);
   parameters.WarnOfUnread();
   return shapes;

@@ -11,6 +11,7 @@
 #include "render/base/status.h"
 #include "render/formats/asset_reader.h"
 #include "render/formats/pbrt/parameter_list.h"
+#include "render/formats/pbrt/textures.h"
 #include "render/math/transform.h"
 #include "render/scene/scene.h"
 
@@ -44,7 +45,8 @@ struct ShapePlacement {
 };
 
 [[nodiscard]] ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
-                                  const ShapePlacement& placement, AssetReader& assets);
+                                  const ShapePlacement& placement, const TextureNames& numbers,
+                                  AssetReader& assets);
 
 // The shapes of an object where an instance of it stands; an ellipsoid, which has no kind of its
 // own, as a mesh. Errors: INVALID_ARGUMENT when the transform moves a position out of the finite

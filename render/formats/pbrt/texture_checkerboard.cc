@@ -1,26 +1,16 @@
-// Texture "checkerboard": squares of two other textures or colours.
-#include <algorithm>
-
-#include "render/base/text.h"
+// Texture "checkerboard": squares of two other textures or constants, or cubes in space.
 #include "render/formats/pbrt/texture_readers.h"
 
 namespace lucerna {
 
 NamedTexture ReadCheckerboardTexture(const TextureInput& input) {
-  ParameterList& parameters = input.parameters;
-  if (parameters.FindInteger("dimension", {2, 3}).value_or(2) != 2) {
-    parameters.Error("dimension", "must be 2: checkerboards in space are not supported");
-  }
   Texture texture;
   texture.kind = Texture::Kind::kCheckerboard;
-  texture.mapping = ReadMapping(parameters);
-  const NamedTexture even = ReadPart("tex1", 1, input);
-  const NamedTexture odd = ReadPart("tex2", 0, input);
-  if (even.number == kNoTexture) return even;
-  if (odd.number == kNoTexture) return odd;
-  texture.parts = {even.number, odd.number};
-  return AppendTexture(texture, std::max(even.largest, odd.largest),
-                       std::max(even.depth, odd.depth) + 1, input.textures);
+  texture.is_in_space = input.parameters.FindInteger("dimension", {2, 3}).value_or(2) == 3;
+  texture.mapping = texture.is_in_space ? SpaceMapping(input) : ReadMapping(input);
+  const std::array<NamedTexture, 2> parts = {ReadPart("tex1", 1, input),
+                                             ReadPart("tex2", 0, input)};
+  return AppendMade(texture, RangeOf(parts[0]).Joined(RangeOf(parts[1])), parts, input);
 }
 
 }  // namespace lucerna

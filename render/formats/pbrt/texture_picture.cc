@@ -1,6 +1,7 @@
 // Texture "imagemap": the pixels of a file.
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <utility>
 
 #include "render/base/text.h"
@@ -41,9 +42,11 @@ NamedTexture ReadPictureTexture(const TextureInput& input) {
   ParameterList& parameters = input.parameters;
   Texture texture;
   texture.kind = Texture::Kind::kPicture;
-  texture.mapping = ReadMapping(parameters);
+  texture.is_number = input.is_number;
+  texture.mapping = ReadMapping(input);
   texture.wrap = ReadWrap(parameters);
-  texture.scale = static_cast<float>(parameters.Float("scale", 1, kZeroOrMore));
+  texture.scale =
+      static_cast<float>(parameters.Float("scale", 1, input.is_number ? kAnyNumber : kZeroOrMore));
   texture.is_inverted = parameters.Bool("invert", false);
   const PixelEncoding encoding = ReadEncoding(parameters);
   // Every pixel has many samples, over which a look-up between four pixels averages out.
@@ -52,26 +55,29 @@ NamedTexture ReadPictureTexture(const TextureInput& input) {
   const std::optional<std::string> file = parameters.FindString("filename");
   if (!file.has_value()) {
     if (!parameters.Has("filename")) parameters.Error("needs \"string filename\"");
-    return UnusableTexture("refers to a texture that has an error");
+    return FaultyTexture();
   }
-  StatusOr<std::shared_ptr<const Picture>> picture = input.assets.ReadPicture(*file, encoding);
+  StatusOr<std::shared_ptr<const Picture>> picture = input.assets.ReadPicture(
+      *file, encoding, input.is_number ? PictureUse::kNumbers : PictureUse::kColors);
   if (!picture.ok()) {
     parameters.Error("filename", Concat("cannot be read: ", picture.status().message()));
-    return UnusableTexture("refers to a texture that has an error");
+    return FaultyTexture();
   }
   texture.picture = *std::move(picture);
-  const double brightest =
-      static_cast<double>(texture.picture->Largest()) * static_cast<double>(texture.scale);
-  if (!(brightest <= 3e38)) {
+  ValueRange range = {texture.picture->Smallest(), texture.picture->Largest()};
+  if (texture.wrap == Texture::Wrap::kBlack) range = range.Joined({0, 0});
+  range = range * ValueRange{texture.scale, texture.scale};
+  if (!(std::max(std::abs(range.least), std::abs(range.largest)) <= 3e38F)) {
     parameters.Error("scale", "is too large for single precision");
-    return UnusableTexture("refers to a texture that has an error");
+    return FaultyTexture();
   }
-  if (brightest > 1 && !texture.is_inverted) {
-    parameters.Warning("", Concat("is up to ", brightest, " and is held at 1: no surface reflects ",
-                                  "more light than it gets"));
+  if (texture.is_inverted) {
+    range = {std::max(0.0F, 1 - range.largest), std::max(0.0F, 1 - range.least)};
+  } else if (!input.is_number) {
+    WarnOfBright(range.largest, parameters);
   }
-  const float largest = texture.is_inverted ? 1.0F : std::min(1.0F, static_cast<float>(brightest));
-  return AppendTexture(std::move(texture), largest, 1, input.textures);
+  if (!input.is_number) range = {std::min(1.0F, range.least), std::min(1.0F, range.largest)};
+  return AppendTexture(std::move(texture), range, {}, input);
 }
 
 }  // namespace lucerna

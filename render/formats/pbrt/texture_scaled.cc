@@ -1,29 +1,27 @@
-// Texture "scale": another texture times a number.
-#include "render/base/text.h"
+// Texture "scale": another texture times a number or a texture of numbers.
+#include <vector>
+
 #include "render/formats/pbrt/texture_readers.h"
 
 namespace lucerna {
 
 NamedTexture ReadScaledTexture(const TextureInput& input) {
   ParameterList& parameters = input.parameters;
-  if (parameters.IsTexture("scale")) {
-    parameters.Ignore("tex");
-    parameters.Ignore("scale");
-    return UnusableTexture(
-        "refers to a texture that is scaled by a float texture, which is not supported");
-  }
-  const NamedTexture part = ReadPart("tex", 1, input);
+  std::vector<NamedTexture> parts = {ReadPart("tex", 1, input)};
+  ValueRange range = RangeOf(parts[0]);
   Texture texture;
   texture.kind = Texture::Kind::kScaled;
-  texture.scale = static_cast<float>(parameters.Float("scale", 1, kZeroOrMore));
-  if (part.number == kNoTexture) return part;
-  texture.parts[0] = part.number;
-  const float largest = part.largest * texture.scale;
-  if (largest > 1) {
-    parameters.Warning("", Concat("is up to ", largest, " and is held at 1: no surface reflects ",
-                                  "more light than it gets"));
+  if (parameters.IsTexture("scale")) {
+    parts.push_back(ReadNumberPart("scale", 1, input));
+    range = range * RangeOf(parts[1]);
+  } else {
+    texture.scale = static_cast<float>(
+        parameters.Float("scale", 1, input.is_number ? kAnyNumber : kZeroOrMore));
+    range = range * ValueRange{texture.scale, texture.scale};
   }
-  return AppendTexture(texture, largest, part.depth + 1, input.textures);
+  NamedTexture made = AppendMade(texture, range, parts, input);
+  if (made.number != kNoTexture && !input.is_number) WarnOfBright(range.largest, parameters);
+  return made;
 }
 
 }  // namespace lucerna

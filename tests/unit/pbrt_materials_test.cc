@@ -1,0 +1,389 @@
+// Textures of numbers, mixes, bumps and masks, as pbrt-v4 texts give them.
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "render/analysis/needs.h"
+#include "render/formats/read_scene.h"
+#include "render/geometry/intersector.h"
+#include "render/scene/noise.h"
+#include "render/scene/render_settings.h"
+#include "render/transport/material_at.h"
+#include "render/transport/working_space.h"
+#include "tests/support/memory_files.h"
+
+namespace lucerna {
+namespace {
+
+using ::testing::HasSubstr;
+
+ParsedScene Parse(const std::string& world, std::map<std::string, std::string> others) {
+  others["s.pbrt"] = "Camera \"perspective\" WorldBegin\n" + world;
+  MemoryFiles files(std::move(others));
+  return ReadScene(files, "s.pbrt");
+}
+Scene World(const std::string& world, std::map<std::string, std::string> others = {}) {
+  const ParsedScene parsed = Parse(world, std::move(others));
+  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
+  return parsed.scene;
+}
+std::string Said(const std::string& world) {
+  std::string all;
+  for (const Diagnostic& diagnostic : Parse(world, {}).diagnostics)
+    all += diagnostic.ToString() + "\n";
+  return all;
+}
+
+// Of numbers, in a row.
+std::string Pfm(const std::vector<float>& values, int channels = 1) {
+  std::string bytes = channels == 1 ? "Pf\n" : "PF\n";
+  bytes += std::to_string(values.size() / static_cast<std::size_t>(channels)) + " 1\n-1\n";
+  for (const float value : values) {
+    char raw[4];
+    std::memcpy(raw, &value, 4);
+    bytes.append(raw, 4);
+  }
+  return bytes;
+}
+
+// The material of the first sphere, where a ray meets it that comes along -y.
+Material MetOnSphere(const Scene& rec709, Vec3 from = {0.3F, -5, 0.4F}) {
+  const Scene scene = InWorkingSpace(rec709);
+  const std::unique_ptr<Intersector> intersector = Intersector::Create(scene).value();
+  const Ray ray = {from, {0, 1, 0}, HUGE_VALF};
+  Hit hit;
+  EXPECT_TRUE(intersector->Intersect(ray, hit));
+  SurfacePoint point = intersector->SurfaceAt(ray, hit);
+  std::optional<Material> storage;
+  return MaterialAt(scene, point, -ray.direction, storage);
+}
+
+constexpr const char* kPlanar =
+    "Texture \"r\" \"float\" \"bilerp\" \"string mapping\" \"planar\" \"vector3 v1\" [1 0 0] "
+    "\"vector3 v2\" [0 0 1] \"float v00\" 0 \"float v01\" 0.5 \"float v10\" 1 \"float v11\" 1.5\n";
+
+TEST(PbrtMaterialsTest, RoughnessIsLookedUpBeforeItIsRemapped) {
+  const std::string dielectric = "Material \"dielectric\" \"texture roughness\" \"r\" ";
+  const Material remapped = MetOnSphere(World(kPlanar + dielectric + "Shape \"sphere\""));
+  // At x = 0.3, z = 0.4: 0.3 + 0.5 * 0.4.
+  EXPECT_NEAR(remapped.alpha_u, std::sqrt(0.5F), 1e-5F);
+  EXPECT_EQ(remapped.alpha_u, remapped.alpha_v);
+  const Material plain =
+      MetOnSphere(World(kPlanar + dielectric + "\"bool remaproughness\" false Shape \"sphere\""));
+  EXPECT_NEAR(plain.alpha_u, 0.5F, 1e-5F);
+  const Material stretched = MetOnSphere(
+      World(std::string(kPlanar) + "Material \"conductor\" \"texture uroughness\" \"r\" "
+                                   "\"float vroughness\" 0.04 Shape \"sphere\""));
+  EXPECT_NEAR(stretched.alpha_u, std::sqrt(0.5F), 1e-5F);
+  EXPECT_NEAR(stretched.alpha_v, 0.2F, 1e-6F);
+}
+
+// A texture in space stays where it is when the scene's unit is chosen.
+TEST(PbrtMaterialsTest, TexturesInSpaceKeepTheirPlaceInAnyUnit) {
+  const Scene scene = World("Scale 1e9 1e9 1e9 " + std::string(kPlanar) +
+                            "Material \"dielectric\" \"texture roughness\" \"r\" Shape \"sphere\"");
+  ASSERT_NE(scene.unit, 1);
+  const auto size = static_cast<float>(1e9 / scene.unit);
+  EXPECT_NEAR(MetOnSphere(scene, Vec3{0.3F, -5, 0.4F} * size).alpha_u, std::sqrt(0.5F), 1e-5F);
+}
+
+// What holds for the material as a whole follows from the smallest and the largest number.
+TEST(PbrtMaterialsTest, ATextureOfRoughnessDecidesByItsRange) {
+  const std::string picture =
+      "Texture \"r\" \"float\" \"imagemap\" \"string filename\" \"r.pfm\"\n"
+      "Material \"conductor\" \"texture roughness\" \"r\" Shape \"sphere\"";
+  const Material patchy = World(picture, {{"r.pfm", Pfm({0, 0.25F})}}).materials[1];
+  EXPECT_EQ(patchy.alpha_u, 0.5F);
+  EXPECT_FALSE(IsSmooth(patchy));
+  EXPECT_TRUE(ScattersSmoothly(patchy));
+  EXPECT_TRUE(GathersCaustics(patchy));
+  const Material rough = World(picture, {{"r.pfm", Pfm({0.09F, 0.25F})}}).materials[1];
+  EXPECT_FALSE(ScattersSmoothly(rough));
+  EXPECT_FALSE(Gathers(rough));
+  // A picture of one number is that number: nothing is looked up.
+  const Scene even = World(picture, {{"r.pfm", Pfm({0.25F, 0.25F})}});
+  EXPECT_FALSE(even.materials[1].DependsOnPlace());
+  EXPECT_EQ(even.materials[1].alpha_u, 0.5F);
+  EXPECT_TRUE(Gathers(even.materials[1]));
+}
+
+TEST(PbrtMaterialsTest, ACoatIsFittedToItsRoughness) {
+  const Scene textured =
+      World(std::string(kPlanar) +
+            "Texture \"small\" \"float\" \"scale\" \"texture tex\" \"r\" \"float scale\" 0.32\n"
+            "Material \"coateddiffuse\" \"texture roughness\" \"small\" Shape \"sphere\"");
+  const Material here = MetOnSphere(textured);
+  EXPECT_NEAR(here.alpha_u, 0.4F, 1e-5F);
+  ASSERT_NE(here.coat, nullptr);
+  EXPECT_NE(here.coat_above, nullptr);
+}
+
+constexpr const char* kTwo =
+    "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" \"rgb reflectance\" [0.25 0.25 0.25]\n"
+    "MakeNamedMaterial \"b\" \"string type\" \"conductor\" \"float roughness\" 0.01\n";
+
+// Shares of rays that meet the first, the second and the third of materials by their kinds.
+std::map<Material::Kind, double> SharesOf(const Scene& rec709) {
+  const Scene scene = InWorkingSpace(rec709);
+  const std::unique_ptr<Intersector> intersector = Intersector::Create(scene).value();
+  std::map<Material::Kind, double> shares;
+  constexpr int kRays = 10000;
+  for (int i = 0; i < kRays; ++i) {
+    const Ray ray = {{-0.5F + static_cast<float>(i) / kRays, -5, 0.1F}, {0, 1, 0}, HUGE_VALF};
+    Hit hit;
+    EXPECT_TRUE(intersector->Intersect(ray, hit));
+    SurfacePoint point = intersector->SurfaceAt(ray, hit);
+    SurfacePoint again = point;
+    std::optional<Material> storage;
+    const Material& chosen = MaterialAt(scene, point, -ray.direction, storage);
+    EXPECT_EQ(&chosen, &scene.materials[point.material]);
+    EXPECT_EQ(&chosen, &MaterialAt(scene, again, -ray.direction, storage));
+    shares[chosen.kind] += 1.0 / kRays;
+  }
+  return shares;
+}
+
+// Five standard errors of 10,000 draws: 0.025.
+TEST(PbrtMaterialsTest, AMixIsOneOfItsMaterialsForEachRay) {
+  const Scene scene = World(std::string(kTwo) +
+                            "Material \"mix\" \"string materials\" [ \"a\" \"b\" ] "
+                            "\"float amount\" 0.3 Shape \"sphere\"");
+  const auto shares = SharesOf(scene);
+  EXPECT_NEAR(shares.at(Material::Kind::kDiffuse), 0.7, 0.025);
+  EXPECT_NEAR(shares.at(Material::Kind::kConductor), 0.3, 0.025);
+  const auto mix = static_cast<std::size_t>(scene.spheres[0].traits.material);
+  const MaterialProperties properties = PropertiesOf(scene.materials[mix]);
+  EXPECT_TRUE(properties.gathers);
+  EXPECT_TRUE(properties.gathers_caustics());
+  EXPECT_FALSE(properties.is_smooth);
+  EXPECT_TRUE(properties.needs_choice());
+}
+
+// Deposits of a mix are not weighed by one of its materials: each hitpoint does that by its own.
+TEST(PbrtMaterialsTest, MaterialsOfAMixDoNotWeighPhotons) {
+  const Scene scene =
+      World(std::string(kTwo) +
+            "MakeNamedMaterial \"c\" \"string type\" \"coateddiffuse\"\n"
+            "Material \"mix\" \"string materials\" [ \"a\" \"c\" ] Shape \"sphere\"\n"
+            "NamedMaterial \"c\" Shape \"sphere\"");
+  const auto properties_of = [&](std::int32_t material, Parts part) {
+    MaterialNumbers numbers = scene.materials[static_cast<std::size_t>(material)];
+    numbers.parts = part;
+    return PropertiesOf(numbers);
+  };
+  const std::int32_t mix = scene.spheres[0].traits.material;
+  EXPECT_FALSE(properties_of(mix, Parts::kAll).weighs_photons);
+  const std::int32_t coat = scene.materials[static_cast<std::size_t>(mix)].mixed[1];
+  EXPECT_FALSE(properties_of(coat, Parts::kAll).weighs_photons);
+  EXPECT_FALSE(properties_of(coat, Parts::kSecond).is_separable);
+  EXPECT_TRUE(properties_of(coat, Parts::kSecond).gathers);
+  // The material itself, outside of a mix, is as it was.
+  const std::int32_t own = scene.spheres[1].traits.material;
+  EXPECT_NE(own, coat);
+  EXPECT_TRUE(properties_of(own, Parts::kAll).weighs_photons);
+  EXPECT_TRUE(properties_of(own, Parts::kSecond).is_separable);
+}
+
+TEST(PbrtMaterialsTest, MixesOfMixesMultiplyTheirShares) {
+  const auto shares = SharesOf(
+      World(std::string(kTwo) +
+            "MakeNamedMaterial \"c\" \"string type\" \"mix\" \"string materials\" [ \"a\" \"b\" ]\n"
+            "MakeNamedMaterial \"d\" \"string type\" \"dielectric\"\n"
+            "Material \"mix\" \"string materials\" [ \"c\" \"d\" ] \"float amount\" 0.2 "
+            "Shape \"sphere\""));
+  EXPECT_NEAR(shares.at(Material::Kind::kDiffuse), 0.4, 0.025);
+  EXPECT_NEAR(shares.at(Material::Kind::kConductor), 0.4, 0.025);
+  EXPECT_NEAR(shares.at(Material::Kind::kDielectric), 0.2, 0.025);
+}
+
+TEST(PbrtMaterialsTest, AMixFollowsATexture) {
+  const auto shares = SharesOf(
+      World(std::string(kTwo) + kPlanar +
+            "Material \"mix\" \"string materials\" [ \"a\" \"b\" ] \"texture amount\" \"r\" "
+            "Shape \"sphere\""));
+  // x + z / 2 over x from -0.5 to 0.5 at z = 0.1, held at 0.
+  EXPECT_NEAR(shares.at(Material::Kind::kConductor), 0.55 * 0.55 / 2, 0.025);
+}
+
+TEST(PbrtMaterialsTest, MaterialsOfAMixAreInUse) {
+  const Scene scene = World(std::string(kTwo) +
+                            "Material \"mix\" \"string materials\" [ \"a\" \"b\" ] Shape "
+                            "\"sphere\" LightSource \"point\"");
+  const SceneNeeds needs = NeedsOf(scene, RenderSettings());
+  EXPECT_TRUE(needs.Uses(Part::kSpecular));
+  EXPECT_TRUE(needs.Uses(Part::kTextures));
+  EXPECT_TRUE(needs.Uses(Part::kPhotons));
+  EXPECT_TRUE(needs.Uses(Part::kFreshEyePaths));
+}
+
+TEST(PbrtMaterialsTest, SaysWhatIsWrongWithAMix) {
+  const std::string two(kTwo);
+  EXPECT_THAT(Said("Material \"mix\""), HasSubstr("needs \"string materials\""));
+  EXPECT_THAT(Said(two + "Material \"mix\" \"string materials\" [ \"a\" ]"),
+              HasSubstr("must be the names of two materials"));
+  EXPECT_THAT(Said(two + "MakeNamedMaterial \"c\" \"string type\" \"mix\" "
+                         "\"string materials\" [ \"a\" \"c\" ]"),
+              HasSubstr("refers to the material \"c\", which is not defined before it"));
+  EXPECT_THAT(Said(two + "MakeNamedMaterial \"i\" \"string type\" \"interface\" "
+                         "Material \"mix\" \"string materials\" [ \"a\" \"i\" ]"),
+              HasSubstr("cannot be part of a mix"));
+}
+
+TEST(PbrtMaterialsTest, BumpsAndNormalMapsAreRead) {
+  const Scene scene = World(
+      "Texture \"h\" \"float\" \"imagemap\" \"string filename\" \"h.pfm\" \"float scale\" -2\n"
+      "Texture \"e\" \"float\" \"constant\" \"float value\" 3\n"
+      "Material \"diffuse\" \"texture displacement\" \"h\" Shape \"sphere\"\n"
+      "Material \"diffuse\" \"texture displacement\" \"e\" Shape \"sphere\"\n"
+      "Material \"diffuse\" \"texture displacement\" \"h\" \"string normalmap\" \"n.pfm\" "
+      "Shape \"sphere\"",
+      {{"h.pfm", Pfm({-1, 1, 0, 0, 0})}, {"n.pfm", Pfm({0.5F, 0.5F, 1}, 3)}});
+  const Material& bumpy = scene.materials[1];
+  ASSERT_NE(bumpy.displacement, kNoTexture);
+  EXPECT_FLOAT_EQ(TextureNumber(scene.textures, bumpy.displacement, {{0.1F, 0.5F}, {}, {}}), 2);
+  EXPECT_GT(bumpy.slope_step.x, 0);
+  EXPECT_FALSE(scene.materials[2].HasBumps());
+  // The map counts, as in pbrt-v4.
+  EXPECT_EQ(scene.materials[3].displacement, kNoTexture);
+  EXPECT_NE(scene.materials[3].normal_map, kNoTexture);
+  const SceneNeeds needs = NeedsOf(scene, RenderSettings());
+  EXPECT_TRUE(needs.Uses(Part::kShadingNormals));
+  EXPECT_THAT(Said("Material \"diffuse\" \"string normalmap\" \"none.png\""),
+              HasSubstr("\"normalmap\" of Material \"diffuse\" cannot be read"));
+  EXPECT_THAT(Said("Material \"diffuse\" \"float displacement\" 1"),
+              HasSubstr("must be a texture"));
+}
+
+TEST(PbrtMaterialsTest, OpacityOfAPictureIsItsNumber) {
+  // PFM has none: the mean of the channels.
+  const Scene scene = World(
+      "Texture \"m\" \"float\" \"imagemap\" \"string filename\" \"m.pfm\"\n"
+      "Material \"conductor\" \"texture roughness\" \"m\" Shape \"sphere\"",
+      {{"m.pfm", Pfm({0.3F, 0.6F, 0.9F, 0, 0, 0}, 3)}});
+  EXPECT_FLOAT_EQ(scene.materials[1].alpha_u, std::sqrt(0.6F));
+}
+
+// Of rays through a mask, as many meet it as its texture says there.
+TEST(PbrtMaterialsTest, AlphaMayBeATextureOnAnyShape) {
+  const std::string textures =
+      "Texture \"half\" \"float\" \"checkerboard\" \"float tex1\" 0.25 \"float tex2\" 1 "
+      "\"string mapping\" \"planar\" \"vector3 v1\" [1 0 0] \"vector3 v2\" [0 0 0]\n";
+  const std::string triangles =
+      "Shape \"trianglemesh\" \"point3 P\" [-1 0 -1 1 0 -1 1 0 1 -1 0 1] "
+      "\"integer indices\" [0 1 2 0 2 3] \"texture alpha\" \"half\"\n";
+  const std::string instanced =
+      "ObjectBegin \"o\" " + triangles + "ObjectEnd ObjectInstance \"o\"\n";
+  for (const std::string& shape :
+       {triangles, instanced, std::string("Shape \"sphere\" \"texture alpha\" \"half\"\n"),
+        std::string("Rotate 90 1 0 0 Shape \"disk\" \"texture alpha\" \"half\"\n")}) {
+    SCOPED_TRACE(shape);
+    const Scene scene = World(textures + shape);
+    const std::unique_ptr<Intersector> intersector = Intersector::Create(scene).value();
+    int met_left = 0;
+    int met_right = 0;
+    constexpr int kRays = 4000;
+    for (int i = 0; i < kRays; ++i) {
+      const float x = (static_cast<float>(i) + 0.5F) / kRays * 0.8F;
+      for (const float side : {-1.0F, 1.0F}) {
+        const Ray ray = {{side * x, -5, 0.01F}, {0, 1, 0}, HUGE_VALF};
+        Hit hit;
+        const bool is_met = intersector->Intersect(ray, hit) && hit.t < 5.1F;
+        // The back of a sphere may be met where the front is not.
+        if (scene.spheres.empty()) {
+          EXPECT_EQ(intersector->Occluded(ray), is_met);
+        }
+        (side < 0 ? met_left : met_right) += is_met ? 1 : 0;
+      }
+    }
+    // Left of x = 0 the square is odd. Five standard errors of 4,000 draws: 0.035.
+    EXPECT_EQ(met_left, kRays);
+    EXPECT_NEAR(met_right / static_cast<double>(kRays), 0.25, 0.035);
+    EXPECT_FALSE(IsWhole(scene.meshes.empty() ? scene.spheres.empty() ? scene.disks[0].traits
+                                                                      : scene.spheres[0].traits
+                                              : scene.meshes[0].traits));
+  }
+  EXPECT_THAT(Said(textures + "AreaLightSource \"diffuse\" Shape \"sphere\" \"texture alpha\" "
+                              "\"half\""),
+              HasSubstr("must not be a texture on a shape that emits"));
+}
+
+// What a float texture that is declared by `text` as "t" is at a place.
+float NumberOf(const std::string& text, const TexturePlace& place) {
+  const Scene scene =
+      World(text + "\nMaterial \"conductor\" \"texture roughness\" \"t\" Shape \"sphere\"");
+  const std::int32_t texture = scene.materials.at(1).roughness_textures[0];
+  EXPECT_NE(texture, kNoTexture);
+  return texture == kNoTexture ? 0 : TextureNumber(scene.textures, texture, place);
+}
+
+TEST(PbrtMaterialsTest, KindsOfTexturesAreReadAsPbrtHasThem) {
+  const Vec3 p = {0.3F, 1.2F, -0.7F};
+  const TexturePlace place = {{0.25F, 0.75F}, p, {0, 0, 1}};
+  // The direction is in the space of the texture: y becomes z.
+  EXPECT_FLOAT_EQ(NumberOf("Rotate 90 1 0 0 Texture \"t\" \"float\" \"directionmix\" "
+                           "\"float tex1\" 0.2 \"float tex2\" 0.7",
+                           place),
+                  0.2F);
+  EXPECT_FLOAT_EQ(
+      NumberOf("Scale 0.5 0.5 0.5 Texture \"t\" \"float\" \"fbm\" \"integer octaves\" 3 "
+               "\"float roughness\" 0.25",
+               place),
+      FbmAt(p * 2, 0.25F, 3));
+  EXPECT_FLOAT_EQ(NumberOf("Translate 1 0 0 Texture \"t\" \"float\" \"wrinkled\"", place),
+                  TurbulenceAt(p - Vec3{1, 0, 0}, 0.5F, 8));
+  EXPECT_FLOAT_EQ(NumberOf("Texture \"t\" \"float\" \"windy\"", place),
+                  std::abs(FbmAt(p * 0.1F, 0.5F, 3)) * FbmAt(p, 0.5F, 6));
+  const std::string cubes =
+      "Texture \"t\" \"float\" \"checkerboard\" \"integer dimension\" 3 \"float tex1\" 0.1 "
+      "\"float tex2\" 0.9";
+  EXPECT_FLOAT_EQ(NumberOf(cubes, place), 0.1F);  // cube (0, 1, -1)
+  EXPECT_FLOAT_EQ(NumberOf("Translate 0 0 0.5 " + cubes, place), 0.9F);
+}
+
+TEST(PbrtMaterialsTest, DotsShowWhatPbrtShowsInThem) {
+  // Around whole numbers where noise is above 0 there is a dot, whose middle is at most 0.15 off.
+  float column = 0;
+  while (!(NoiseAt({column + 0.5F, 0.5F, 0.5F}) > 0))
+    ++column;
+  EXPECT_FLOAT_EQ(
+      NumberOf("Texture \"t\" \"float\" \"dots\" \"float inside\" 0.7 \"float outside\" 0.2",
+               {{column, 0}, {}, {}}),
+      0.2F);
+}
+
+TEST(PbrtMaterialsTest, MixesOfConstantsAreConstants) {
+  const Scene scene = World(
+      "Texture \"t\" \"float\" \"mix\" \"float tex2\" 0.5 \"float amount\" 0.5\n"
+      "Material \"conductor\" \"texture roughness\" \"t\" Shape \"sphere\"");
+  EXPECT_FALSE(scene.materials[1].DependsOnPlace());
+  EXPECT_FLOAT_EQ(scene.materials[1].alpha_u, 0.5F);
+}
+
+TEST(PbrtMaterialsTest, TexturesOfAKindThatGivesOnlyOneOfTheTwoAreRefused) {
+  EXPECT_THAT(Said("Texture \"t\" \"spectrum\" \"fbm\"\n"
+                   "Material \"diffuse\" \"texture reflectance\" \"t\""),
+              HasSubstr("gives numbers only"));
+  EXPECT_THAT(Said("Texture \"t\" \"float\" \"marble\"\n"
+                   "Material \"conductor\" \"texture roughness\" \"t\""),
+              HasSubstr("gives colours only"));
+}
+
+// Two textures of the one before each: 2^n lookups.
+TEST(PbrtMaterialsTest, TexturesThatDoubleAreRefused) {
+  std::string text = "Texture \"t0\" \"float\" \"wrinkled\"\n";
+  for (int i = 1; i < 20; ++i) {
+    const std::string before = "\"t" + std::to_string(i - 1) + "\"";
+    text += "Texture \"t" + std::to_string(i) + "\" \"float\" \"mix\" \"texture tex1\" " + before +
+            " \"texture tex2\" " + before + "\n";
+  }
+  EXPECT_THAT(Said(text), HasSubstr("is made of more than 1024 textures"));
+}
+
+}  // namespace
+}  // namespace lucerna
