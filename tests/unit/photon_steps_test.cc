@@ -129,7 +129,7 @@ TEST(PassVarianceTest, WhereHardlyAnyPhotonIsFoundMoreAreNeeded) {
   EXPECT_EQ(with(0.05, 0.4).BestPhotons(3), kInfinity);
   EXPECT_LT(with(0.05, 4).BestPhotons(3), kPixels) << "a fortieth of the light";
   EXPECT_LT(with(0, 0.4).BestPhotons(3), kPixels) << "none at all";
-  EXPECT_LT(with(2, 40).BestPhotons(3), kPixels) << "many";
+  EXPECT_LE(with(2, 40).BestPhotons(3), kPixels) << "many";
 }
 
 // One photon in twenty passes, taken for the whole truth, explains more than there is.
