@@ -21,12 +21,18 @@ constexpr int kTile = 16;
 // Reflections and refractions of a chain, at most. What light is left after more is mostly below
 // the image's white.
 constexpr int kMostHits = 8;
+// Chains from one place of the film that are searched, at most.
+constexpr std::size_t kMostChains = 64;
 // Of the smallest ellipse that holds the light's image where the film is mapped linearly to the
 // light's place. More holds curved images better, less is hit more often.
 constexpr double kMargin = 1.75;
 // A larger image is met often enough by the pixels' own paths, but for few pixels at its rim
 // [pixel²].
 constexpr double kLargestArea = 4;
+// With a lens the ellipse is larger by what its middle misses the image's [the image's radii], up
+// to this; so many times more paths are drawn for that, at most.
+constexpr double kLargestBend = 8;
+constexpr double kMostForBend = 4;
 // What reaches farther, over all points of the lens, is left out [pixels].
 constexpr double kFarthestReach = 8;
 // Paths in a pass: of a glint, where the tile has enough, and for each pixel² of a large one; of a
@@ -43,6 +49,8 @@ constexpr double kSmallestCell = 1.0 / 8;
 constexpr int kMostSplits = 200;
 // Cells are split where directions at their corners differ by more [cosine of the angle].
 constexpr double kStraight = 0.9;
+// Walks in a tile, at most, and steps of each.
+constexpr int kMostWalks = 128;
 constexpr int kNewtonSteps = 12;
 
 constexpr std::uint64_t kGlintKey = 0x474C494E54530000ULL;
@@ -225,26 +233,25 @@ class TileSearch {
     double strength = 0;  // radiance
   };
 
-  // All chains at a place of the film that leave enough of the brightest light.
+  // The chains at a place of the film that leave enough of the brightest light, short ones first.
   [[nodiscard]] Chains ChainsAt(FilmPoint place) const {
     Chains chains;
+    const auto add_after = [&](const Chain& chain) {
+      SurfacePoint surface;
+      if (chain.hits >= MostHits() || !MeetsSmooth(chain.last, surface)) return;
+      const auto branches = tracer_.SmoothBranches(surface, -chain.last.direction);
+      for (std::uint32_t lobe = 0; lobe < EyePathTracer::kSmoothLobes; ++lobe) {
+        if (!branches[lobe].exists) continue;
+        const Chain next = After(chain, surface, branches[lobe], lobe);
+        if (tracer_.IsBright(next.weight * brightest_)) chains.push_back(next);
+      }
+    };
     Chain start;
     start.weight = Gray(1);
     start.last = tracer_.CameraRayThrough(place.x, place.y, {});
-    std::vector<Chain> open = {start};
-    while (!open.empty()) {
-      const Chain chain = open.back();
-      open.pop_back();
-      SurfacePoint surface;
-      if (chain.hits >= MostHits() || !MeetsSmooth(chain.last, surface)) continue;
-      const auto branches = tracer_.SmoothBranches(surface, -chain.last.direction);
-      for (std::uint32_t lobe = 0; lobe < EyePathTracer::kSmoothLobes; ++lobe) {
-        const Chain next = After(chain, surface, branches[lobe], lobe);
-        if (!branches[lobe].exists || !tracer_.IsBright(next.weight * brightest_)) continue;
-        chains.push_back(next);
-        open.push_back(next);
-      }
-    }
+    add_after(start);
+    for (std::size_t i = 0; i < chains.size() && chains.size() < kMostChains; ++i)
+      add_after(Chain(chains[i]));
     return chains;
   }
 
@@ -365,6 +372,8 @@ class TileSearch {
   // walk on the manifold of specular paths (Jakob & Marschner 2012, section 4) in the film's
   // coordinates, with derivatives from differences. Keeps what it arrives at.
   void Refine(FilmPoint place, double step, const Chain& chain, const Ball& light) {
+    if (walks_ == kMostWalks) return;
+    ++walks_;
     std::optional<Ray> ray = Follow(place, {}, chain);
     for (int i = 0; ray && i < kNewtonSteps; ++i) {
       const Double3 from(ray->origin);
@@ -417,22 +426,44 @@ class TileSearch {
     return IsFinite(inverse);
   }
 
-  // How far the image moves with the place on the lens.
-  [[nodiscard]] Matrix FromLens(FilmPoint place, const Matrix& image, const Target& target,
-                                const Chain& chain, const Ball& light) const {
-    if (!tracer_.has_lens()) return {};
-    constexpr float kStep = 0x1p-4F;  // [lens radii]
+  // Where the chain at a place meets the target, for a point of the lens [the light's radii].
+  [[nodiscard]] std::optional<FilmPoint> MissAt(FilmPoint place, Vec3 on_lens, const Chain& chain,
+                                                const Target& target, const Ball& light) const {
+    const std::optional<Ray> ray = Follow(place, on_lens, chain);
+    const std::optional<FilmPoint> miss = ray ? target.Meets(*ray) : std::nullopt;
+    if (!miss) return std::nullopt;
+    return *miss * (1 / light.radius);
+  }
+
+  // How far the image moves with the place on the lens, and by how many of its own radii it
+  // misses that at the lens' rim.
+  struct LensMove {
+    Matrix from_lens;
+    double bend = 0;
+  };
+  [[nodiscard]] LensMove MoveOf(FilmPoint place, const Matrix& image, const Chain& chain,
+                                const Target& target, const Ball& light) const {
+    LensMove move;
+    if (!tracer_.has_lens()) return move;
     std::array<FilmPoint, 2> slope;
-    const std::optional<Ray> middle = Follow(place, {}, chain);
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      const std::optional<Ray> ray =
-          Follow(place, axis == 0 ? Vec3{kStep, 0, 0} : Vec3{0, kStep, 0}, chain);
-      const std::optional<FilmPoint> from = middle ? target.Meets(*middle) : std::nullopt;
-      const std::optional<FilmPoint> to = ray ? target.Meets(*ray) : std::nullopt;
-      if (!from || !to) continue;
-      slope[axis] = (*to - *from) * (-1 / (static_cast<double>(kStep) * light.radius));
+      constexpr float kStep = 0.5F;  // [lens radii]
+      const Vec3 aside = axis == 0 ? Vec3{kStep, 0, 0} : Vec3{0, kStep, 0};
+      const std::optional<FilmPoint> low = MissAt(place, -aside, chain, target, light);
+      const std::optional<FilmPoint> high = MissAt(place, aside, chain, target, light);
+      if (low && high) slope[axis] = (*low - *high) * (0.5 / static_cast<double>(kStep));
     }
-    return image * Matrix{slope[0].x, slope[1].x, slope[0].y, slope[1].y};
+    move.from_lens = image * Matrix{slope[0].x, slope[1].x, slope[0].y, slope[1].y};
+    constexpr int kRimPoints = 8;
+    for (int i = 0; i < kRimPoints; ++i) {
+      const double angle = 2 * std::numbers::pi * i / kRimPoints;
+      const FilmPoint rim = {std::cos(angle), std::sin(angle)};
+      const Vec3 on_lens = {static_cast<float>(rim.x), static_cast<float>(rim.y), 0};
+      const std::optional<FilmPoint> miss =
+          MissAt(place + move.from_lens * rim, on_lens, chain, target, light);
+      if (miss) move.bend = std::max(move.bend, std::hypot(miss->x, miss->y));
+    }
+    return move;
   }
 
   // Whether the camera sees the light by the chain, at its middle or halfway to its rim.
@@ -459,8 +490,10 @@ class TileSearch {
     found.area = std::numbers::pi * std::abs(image.Determinant());
     if (!(found.area > 0) || found.area > kLargestArea) return;
     found.glint.middle = place;
-    found.glint.axes = image * kMargin;
-    found.glint.from_lens = FromLens(place, image, target, chain, light);
+    const LensMove move = MoveOf(place, image, chain, target, light);
+    if (!(move.bend <= kLargestBend)) return;
+    found.glint.axes = image * (kMargin + move.bend);
+    found.glint.from_lens = move.from_lens;
     found.strength = static_cast<double>(MaxChannel(chain.weight * light.radiance));
     const FilmPoint half = found.glint.HalfExtent();
     if (!(half.x <= kFarthestReach && half.y <= kFarthestReach)) return;
@@ -488,10 +521,13 @@ class TileSearch {
     std::vector<Glint> glints;
     double wanted = 0;
     for (const Found& found : found_) {
-      const double area = kMargin * kMargin * found.area;
+      const double area = 1 / found.glint.LargestDensity();
+      const double usual_area = kMargin * kMargin * found.area;
+      const double paths =
+          std::max(kPathsOfGlint * std::min(area / usual_area, kMostForBend), kPathsAPixel * area);
       glints.push_back(found.glint);
       glints.back().key = CombineKeys(key, glints.size());
-      glints.back().paths = static_cast<int>(std::max(kPathsOfGlint, kPathsAPixel * area));
+      glints.back().paths = static_cast<int>(std::min(paths, static_cast<double>(kPathsOfTile)));
       wanted += glints.back().paths;
     }
     const double share = std::min(1.0, static_cast<double>(kPathsOfTile) / wanted);
@@ -504,6 +540,7 @@ class TileSearch {
   const std::vector<Ball>& lights_;
   const int x0_, y0_;
   float brightest_ = 0;
+  int walks_ = 0;
   std::deque<Chains> chains_of_parts_;
   std::vector<Found> found_;
 };
@@ -536,12 +573,9 @@ FilmPoint Glint::HalfExtent() const {
 Glints::Glints(const EyePathTracer& tracer, const FilmRegion& region, ThreadTeam& team) {
   const std::vector<Ball> lights = SearchedLights(tracer);
   if (lights.empty()) return;
-  const auto tile_of = [](double at) { return static_cast<int>(std::floor(at / kTile)); };
-  tiles_ = {
-      std::max(tile_of(region.x0 - kFarthestReach), 0),
-      std::max(tile_of(region.y0 - kFarthestReach), 0),
-      std::min(tile_of(region.x1 + kFarthestReach), (tracer.settings().width - 1) / kTile) + 1,
-      std::min(tile_of(region.y1 + kFarthestReach), (tracer.settings().height - 1) / kTile) + 1};
+  const RenderSettings& settings = tracer.settings();
+  const Tiles whole = {0, 0, (settings.width - 1) / kTile + 1, (settings.height - 1) / kTile + 1};
+  tiles_ = TilesNear(region, whole);
   const auto columns = static_cast<std::size_t>(tiles_.x1 - tiles_.x0);
   const auto rows = static_cast<std::size_t>(tiles_.y1 - tiles_.y0);
   std::vector<std::vector<Glint>> of_tile(columns * rows);
@@ -561,14 +595,17 @@ Glints::Glints(const EyePathTracer& tracer, const FilmRegion& region, ThreadTeam
   }
 }
 
-Glints::Tiles Glints::TilesOf(const FilmRegion& region) const {
+Glints::Glints(std::vector<Glint> glints)
+    : tiles_({0, 0, 1, 1}), all_(std::move(glints)), first_of_tile_({0, all_.size()}) {}
+
+Glints::Tiles Glints::TilesNear(const FilmRegion& region, const Tiles& all) {
   const auto tile_of = [](double at, int low, int high) {
-    return std::clamp(static_cast<int>(std::floor(at / kTile)), low, high);
+    return std::clamp(static_cast<int>(std::floor(at / kTile)), low, high - 1);
   };
-  return {tile_of(region.x0 - kFarthestReach, tiles_.x0, tiles_.x1),
-          tile_of(region.y0 - kFarthestReach, tiles_.y0, tiles_.y1),
-          tile_of(region.x1 + kFarthestReach + kTile, tiles_.x0, tiles_.x1),
-          tile_of(region.y1 + kFarthestReach + kTile, tiles_.y0, tiles_.y1)};
+  return {tile_of(region.x0 - kFarthestReach, all.x0, all.x1),
+          tile_of(region.y0 - kFarthestReach, all.y0, all.y1),
+          tile_of(region.x1 + kFarthestReach, all.x0, all.x1) + 1,
+          tile_of(region.y1 + kFarthestReach, all.y0, all.y1) + 1};
 }
 
 }  // namespace lucerna

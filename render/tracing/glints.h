@@ -59,12 +59,15 @@ class Glints {
   // Those that matter within `region`. The same for equal places, whatever the region.
   Glints(const EyePathTracer& tracer, const FilmRegion& region, ThreadTeam& team);
 
+  // These, wherever they come from. Each image pixel is compared with all of them.
+  explicit Glints(std::vector<Glint> glints);
+
   [[nodiscard]] const std::vector<Glint>& all() const { return all_; }
   // Calls visit(index in `all`) for those that may reach into `region`, in ascending order.
   template <typename Visit>
   void ForEachNear(const FilmRegion& region, const Visit& visit) const {
     if (all_.empty()) return;
-    const Tiles near = TilesOf(region);
+    const Tiles near = TilesNear(region, tiles_);
     for (int y = near.y0; y < near.y1; ++y) {
       const std::size_t row =
           static_cast<std::size_t>(y - tiles_.y0) * static_cast<std::size_t>(tiles_.x1 - tiles_.x0);
@@ -86,8 +89,8 @@ class Glints {
   struct Tiles {
     int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   };
-  // In which glints that reach into `region` have their middle; of those that were searched.
-  [[nodiscard]] Tiles TilesOf(const FilmRegion& region) const;
+  // Those of `all` in which glints that reach into `region` have their middle; at least one.
+  [[nodiscard]] static Tiles TilesNear(const FilmRegion& region, const Tiles& all);
 
   Tiles tiles_;                             // that were searched
   std::vector<Glint> all_;                  // by tile
