@@ -162,9 +162,14 @@ TEST(FilmSpreadTest, HasTheSameMeansWithGlintsThatAreWrong) {
       glint({2.3, 4.1}, {.xx = 0.3, .xy = 0.2, .yx = -0.2, .yy = 0.3},
             {.xx = 1, .xy = 0, .yx = 0.5, .yy = 0.2}, 16),
       glint({0, 8}, {.xx = 0.5, .xy = 0, .yx = 0, .yy = 0.5}, {}, 4),
+      // Wide enough for the light between them, which every pass then finds.
+      glint({9.5, 9.5}, {.xx = 0.3, .xy = 0, .yx = 0, .yy = 0.15}, {}, 16),
+      glint({9.5, 9.5}, {.xx = 0.25, .xy = 0, .yx = 0, .yy = 0.25},
+            {.xx = 0.3, .xy = 0, .yx = 0, .yy = 0.3}, 16),
       glint({11.5, 12}, {.xx = 1e-3, .xy = 0, .yx = 0, .yy = 1e-3}, {}, 1),
   });
-  const FilmRectangle lights[] = {{5.6, 7.1, 6.0, 7.3}, {2.3, 3.8, 12.1, 9.4}, {0, 0, 2.5, 16}};
+  const FilmRectangle lights[] = {
+      {5.6, 7.1, 6.0, 7.3}, {2.3, 3.8, 12.1, 9.4}, {0, 0, 2.5, 16}, {9.4, 9.45, 9.6, 9.55}};
   for (const PixelFilter& filter : kFilters) {
     for (const FilmRectangle& light : lights)
       ExpectIntegrals(filter, light, glints);

@@ -284,6 +284,10 @@ TEST(GlintsTest, AreWhereTheLightIsSmallAndBrightAndSeen) {
   EXPECT_TRUE(GlintsOf(Job(SceneOf({.light = {{5, 4, 2.5F}, 3}}))).all().empty());
   // In the shadow of the ball.
   EXPECT_TRUE(GlintsOf(Job(SceneOf({.light = {{0.3F, 0.2F, 14}, 0.02F}}))).all().empty());
+  // Behind something black.
+  Scene hidden = SceneOf({});
+  AddDisk(hidden, {4.933F, 3.945F, 2.049F}, {-0.67F, -0.55F, 0.49F}, 0.09F, 1);
+  EXPECT_TRUE(GlintsOf(Job(hidden)).all().empty());
   // Nothing smooth to be seen in.
   Scene rough = SceneOf({});
   for (Material& material : rough.materials)
