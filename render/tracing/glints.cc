@@ -5,6 +5,7 @@
 #include <cmath>
 #include <deque>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "render/math/double3.h"

@@ -8,11 +8,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <vector>
 
 #include "render/base/parallel.h"
-#include "render/scene/scene.h"
+#include "render/math/vector.h"
 #include "render/tracing/eye_path.h"
 
 namespace lucerna {
