@@ -128,11 +128,14 @@ Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& w
       settings_.crop_x0 + x + 0.5 + static_cast<double>(filter_x_.Sample(u[0], weight));
   const double film_y =
       settings_.crop_y0 + y + 0.5 + static_cast<double>(filter_y_.Sample(u[1], weight));
-  return CameraRayThrough(film_x, film_y, u[2], u[3]);
+  return CameraRayThrough(film_x, film_y, OnLens(u[2], u[3]));
 }
 
-Ray EyePathTracer::CameraRayThrough(double film_x, double film_y, float lens_u,
-                                    float lens_v) const {
+Vec3 EyePathTracer::OnLens(float u, float v) const {
+  return has_lens_ ? SquareToDisk(u, v) : Vec3{};
+}
+
+Ray EyePathTracer::CameraRayThrough(double film_x, double film_y, Vec3 on_lens) const {
   const Camera& camera = scene_.camera;
   const auto ray_from = [&](Vec3 from, Vec3 towards) {
     return Ray{camera.camera_to_world.Point(from),
@@ -150,13 +153,13 @@ Ray EyePathTracer::CameraRayThrough(double film_x, double film_y, float lens_u,
     direction = {0, 0, 1};
     if (!has_lens_) return ray_from(origin, direction);
     const Vec3 focus = origin + direction * static_cast<float>(camera.focal_distance);
-    origin = origin + SquareToDisk(lens_u, lens_v) * static_cast<float>(camera.lens_radius);
+    origin = origin + on_lens * static_cast<float>(camera.lens_radius);
     return ray_from(origin, focus - origin);
   }
   if (has_lens_) {
     // A thin lens: all rays of one film point meet on the plane of focus.
     const Vec3 focus = direction * static_cast<float>(camera.focal_distance);
-    origin = SquareToDisk(lens_u, lens_v) * static_cast<float>(camera.lens_radius);
+    origin = on_lens * static_cast<float>(camera.lens_radius);
     direction = focus - origin;
   }
   return ray_from(origin, direction);
@@ -172,7 +175,7 @@ PixelSampler EyePathTracer::SamplerOf(int x, int y, std::uint64_t pass) const {
 EyePathTracer::FilmOffset EyePathTracer::FilmOffsetOf(int x, int y, std::uint64_t pass) const {
   const SobolPoint u = SamplerOf(x, y, pass).ForCamera();
   float weight = 1;
-  return {filter_x_.Sample(u[0], weight), filter_y_.Sample(u[1], weight)};
+  return {filter_x_.Sample(u[0], weight), filter_y_.Sample(u[1], weight), OnLens(u[2], u[3])};
 }
 
 Rgb EyePathTracer::BrightPart(Rgb emitted) const {
@@ -205,11 +208,12 @@ EyePathTracer::BrightPath EyePathTracer::TraceBrightPath(int x, int y, std::uint
   const BrightSample sample = SamplerOf(x, y, pass).ForBright(number, count);
   float filter_weight = 1;
   BrightPath path;
-  path.x = filter_x_.Sample(sample.camera[0], filter_weight);
-  path.y = filter_y_.Sample(sample.camera[1], filter_weight);
-  const Ray ray = CameraRayThrough(settings_.crop_x0 + x + 0.5 + static_cast<double>(path.x),
-                                   settings_.crop_y0 + y + 0.5 + static_cast<double>(path.y),
-                                   sample.camera[2], sample.camera[3]);
+  path.from = {filter_x_.Sample(sample.camera[0], filter_weight),
+               filter_y_.Sample(sample.camera[1], filter_weight),
+               OnLens(sample.camera[2], sample.camera[3])};
+  const Ray ray = CameraRayThrough(settings_.crop_x0 + x + 0.5 + static_cast<double>(path.from.x),
+                                   settings_.crop_y0 + y + 0.5 + static_cast<double>(path.from.y),
+                                   path.from.on_lens);
   path.bright = BrightOf(ray, sample.branches);
   return path;
 }
@@ -233,7 +237,7 @@ std::optional<EyePathTracer::FilmPoint> EyePathTracer::OnFilm(Vec3 point) const 
 
 Rgb EyePathTracer::BrightAtCentre(int x, int y) const {
   const Ray ray =
-      CameraRayThrough(settings_.crop_x0 + x + 0.5, settings_.crop_y0 + y + 0.5, 0.5F, 0.5F);
+      CameraRayThrough(settings_.crop_x0 + x + 0.5, settings_.crop_y0 + y + 0.5, Vec3{});
   Hit hit;
   if (!intersector_.Intersect(ray, hit)) {
     return BrightPart(lights_.InfiniteRadiance(ray.direction));
@@ -282,6 +286,43 @@ EyeSegment EyePathTracer::SegmentOf(const Ray& ray, float t, std::int32_t medium
           .to_footprint = footprint_at(length_before + end)};
 }
 
+std::array<EyePathTracer::SmoothBranch, EyePathTracer::kSmoothLobes> EyePathTracer::SmoothBranches(
+    const SurfacePoint& surface, Vec3 wo) const {
+  SurfacePoint completed = surface;
+  std::optional<Material> storage;
+  const Material& material = MaterialAt(scene_, completed, wo, storage);
+  return SmoothBranches(completed, material, wo);
+}
+
+std::array<EyePathTracer::SmoothBranch, EyePathTracer::kSmoothLobes> EyePathTracer::SmoothBranches(
+    const SurfacePoint& surface, const Material& whole, Vec3 wo) const {
+  std::array<SmoothBranch, kSmoothLobes> branches;
+  const MaterialProperties changed =
+      whole.DependsOnPlace() ? PropertiesOf(whole) : MaterialProperties();
+  const MaterialProperties& properties =
+      whole.DependsOnPlace() ? changed : properties_[surface.material];
+  if (!properties.scatters_smoothly) return branches;
+  Material part;
+  const Material& material = properties.has_parts ? PartOf(whole, Parts::kFirst, part) : whole;
+  const Frame frame = ShadingFrame(surface);
+  const Vec3 wo_local = frame.ToLocal(wo);
+  const float reflectance = ReflectedShare(material, wo_local.z);
+  for (std::size_t lobe = 0; lobe < kSmoothLobes; ++lobe) {
+    SmoothBranch& branch = branches[lobe];
+    branch.share = lobe == 0 ? reflectance : 1 - reflectance;
+    if (!(branch.share > 0)) continue;
+    BsdfSample sample;
+    // 0 draws the reflection and 1 - ulp the refraction.
+    const float u = lobe == 0 ? 0.0F : 0x1.fffffep-1F;
+    if (!SampleBsdf(material, wo_local, u, 0, 0, Carried::kRadiance, sample)) continue;
+    branch.wi = frame.ToWorld(sample.wi);
+    branch.transmits = wo_local.z * sample.wi.z < 0;
+    branch.weight = sample.weight;
+    branch.exists = SidesAgree(surface, wo, branch.wi, branch.transmits);
+  }
+  return branches;
+}
+
 Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, const Material& first_material,
                                    Vec3 first_wo, std::int32_t medium, KeyedRng rng,
                                    int& rays) const {
@@ -296,34 +337,18 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, const Material& fi
   const auto branch_at = [&](const SurfacePoint& surface, const Material& whole, Vec3 wo,
                              std::int32_t before, Rgb weight, int vertex) {
     if (vertex >= settings_.max_depth) return;
-    const MaterialProperties changed =
-        whole.DependsOnPlace() ? PropertiesOf(whole) : MaterialProperties();
-    const MaterialProperties& properties =
-        whole.DependsOnPlace() ? changed : properties_[surface.material];
-    if (!properties.scatters_smoothly) return;
-    Material part;
-    const Material& material = properties.has_parts ? PartOf(whole, Parts::kFirst, part) : whole;
-    const Frame frame = ShadingFrame(surface);
-    // Lobe 0 is the reflection and lobe 1 - ulp the refraction, with the weight of its share.
-    const Vec3 wo_local = frame.ToLocal(wo);
-    const float reflectance = ReflectedShare(material, wo_local.z);
-    for (const float lobe : {0.0F, 0x1.fffffep-1F}) {
-      const float share = lobe == 0 ? reflectance : 1 - reflectance;
-      if (!(share > 0)) continue;
-      BsdfSample sample;
-      if (!SampleBsdf(material, wo_local, lobe, 0, 0, Carried::kRadiance, sample)) continue;
-      const Vec3 wi = frame.ToWorld(sample.wi);
-      const bool transmits = wo_local.z * sample.wi.z < 0;
-      if (!SidesAgree(surface, wo, wi, transmits)) continue;
-      Rgb next = weight * sample.weight * share;
+    for (const SmoothBranch& branch : SmoothBranches(surface, whole, wo)) {
+      if (!branch.exists) continue;
+      Rgb next = weight * branch.weight * branch.share;
       const float strength = MaxChannel(next);
       if (strength < branch_weight_) {
         if (!(rng.Uniform() * branch_weight_ < strength)) continue;
         next *= branch_weight_ / strength;
       }
       const std::int32_t after =
-          parts_.media && transmits ? media_.Beyond(surface, wi, before) : before;
-      branches.push_back({{LeavingPoint(surface, wi), wi, HUGE_VALF}, after, next, vertex + 1});
+          parts_.media && branch.transmits ? media_.Beyond(surface, branch.wi, before) : before;
+      branches.push_back(
+          {{LeavingPoint(surface, branch.wi), branch.wi, HUGE_VALF}, after, next, vertex + 1});
     }
   };
   Rgb seen;

@@ -1,6 +1,7 @@
 // What does one eye path see?
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
@@ -79,21 +80,23 @@ class EyePathTracer {
 
   // EyePath::bright alone, also of pixels outside the crop window.
   [[nodiscard]] Rgb TraceBright(int x, int y, std::uint64_t pass) const;
-  // One of `count` paths of a pixel and pass that are traced for their bright part alone, and
-  // where each begins, from the pixel's centre [pixels].
+  // Where an eye path begins, from the pixel's centre [pixels], and on the lens, in the
+  // unit disc.
+  struct FilmOffset {
+    float x = 0, y = 0;
+    Vec3 on_lens;
+  };
+  // One of `count` paths of a pixel and pass that are traced for their bright part alone.
   struct BrightPath {
     Rgb bright;
-    float x = 0, y = 0;
+    FilmOffset from;
   };
   [[nodiscard]] BrightPath TraceBrightPath(int x, int y, std::uint64_t pass, int number,
                                            int count) const;
   // What EyePath::bright would be of a light straight ahead of the pixel's centre. The same in
   // every pass.
   [[nodiscard]] Rgb BrightAtCentre(int x, int y) const;
-  // Where the eye path of a pixel begins, from the pixel's centre [pixels].
-  struct FilmOffset {
-    float x = 0, y = 0;
-  };
+  // Of the eye path of a pixel.
   [[nodiscard]] FilmOffset FilmOffsetOf(int x, int y, std::uint64_t pass) const;
   // Whether EyePath::bright can be anything but black.
   [[nodiscard]] bool MeetsBright() const { return white_ < HUGE_VALF; }
@@ -106,7 +109,32 @@ class EyePathTracer {
     double pixels_per_length = 0;  // of something at the point that faces the camera
   };
   [[nodiscard]] std::optional<FilmPoint> OnFilm(Vec3 point) const;
+  // In the unit disc, of two numbers in [0, 1); its middle without a lens.
+  [[nodiscard]] Vec3 OnLens(float u, float v) const;
+  // Through a point of the film [pixels of the whole image] and one of the lens, in the unit disc.
+  [[nodiscard]] Ray CameraRayThrough(double film_x, double film_y, Vec3 on_lens) const;
+  // The bright part of what a camera's ray meets; `rng` for branches of smooth surfaces.
+  [[nodiscard]] Rgb BrightOf(const Ray& ray, KeyedRng rng) const;
+  // A reflection (`lobe` 0) or refraction (1) at a smooth surface.
+  struct SmoothBranch {
+    bool exists = false;
+    Vec3 wi;
+    bool transmits = false;
+    // Of the radiance that comes from `wi`, `weight` times `share` leaves.
+    Rgb weight;
+    float share = 0;
+  };
+  static constexpr int kSmoothLobes = 2;
+  // Of a surface as it was met; none where it does not scatter smoothly.
+  [[nodiscard]] std::array<SmoothBranch, kSmoothLobes> SmoothBranches(const SurfacePoint& surface,
+                                                                      Vec3 wo) const;
+  [[nodiscard]] bool ScattersSmoothly(const SurfacePoint& surface) const {
+    return properties_[surface.material].scatters_smoothly;
+  }
   [[nodiscard]] const Scene& scene() const { return scene_; }
+  [[nodiscard]] const Intersector& intersector() const { return intersector_; }
+  [[nodiscard]] const LightSet& lights() const { return lights_; }
+  [[nodiscard]] bool has_lens() const { return has_lens_; }
   [[nodiscard]] const FilterSampler& filter_x() const { return filter_x_; }
   [[nodiscard]] const FilterSampler& filter_y() const { return filter_y_; }
 
@@ -115,11 +143,6 @@ class EyePathTracer {
  private:
   [[nodiscard]] PixelSampler SamplerOf(int x, int y, std::uint64_t pass) const;
   [[nodiscard]] Ray CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const;
-  // The bright part of what the camera's ray meets; `rng` for branches of smooth surfaces.
-  [[nodiscard]] Rgb BrightOf(const Ray& ray, KeyedRng rng) const;
-  // Through a point of the film [pixels of the image] and one of the lens.
-  [[nodiscard]] Ray CameraRayThrough(double film_x, double film_y, float lens_u,
-                                     float lens_v) const;
   // The part of emitted radiance that is brighter than the image's white.
   [[nodiscard]] Rgb BrightPart(Rgb emitted) const;
   // What a walk may meet. Tested at run time: a walk compiled for each combination was no faster
@@ -136,6 +159,10 @@ class EyePathTracer {
   [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler, First first) const;
   // What the camera's ray meets. False when that is nothing.
   [[nodiscard]] bool FindFirst(const Ray& ray, First first, Hit& hit) const;
+  // Of a surface with its material where it was met (MaterialAt).
+  [[nodiscard]] std::array<SmoothBranch, kSmoothLobes> SmoothBranches(const SurfacePoint& surface,
+                                                                      const Material& whole,
+                                                                      Vec3 wo) const;
   // Radiance that leaves a smooth surface towards `first_wo` and was emitted where a chain of
   // smooth surfaces ends: reflections and refractions are all followed, not drawn.
   // `first_material`: of `first`, which it has been applied to (MaterialAt). `medium`: in which

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <span>
+#include <utility>
 
 #include "render/tracing/bright_outlines.h"
 
@@ -38,6 +40,18 @@ FilmSpread::FilmSpread(const EyePathTracer& tracer)
       image_({-tracer.settings().crop_x0, -tracer.settings().crop_y0,
               tracer.settings().width - tracer.settings().crop_x0,
               tracer.settings().height - tracer.settings().crop_y0}) {}
+
+FilmSpread::FilmSpread(const EyePathTracer& tracer, Glints glints) : FilmSpread(tracer) {
+  finds_glints_ = false;
+  glints_ = std::move(glints);
+}
+
+FilmRegion FilmSpread::OnFilm(const Window& pixels) const {
+  const auto reach_x = static_cast<double>(tracer_.filter_x().radius());
+  const auto reach_y = static_cast<double>(tracer_.filter_y().radius());
+  return {pixels.x0 - image_.x0 + 0.5 - reach_x, pixels.y0 - image_.y0 + 0.5 - reach_y,
+          pixels.x1 - image_.x0 - 0.5 + reach_x, pixels.y1 - image_.y0 - 0.5 + reach_y};
+}
 
 void FilmSpread::Prepare(ThreadTeam& team) {
   if (is_prepared_) return;
@@ -87,6 +101,41 @@ void FilmSpread::Prepare(ThreadTeam& team) {
     if (!is_any_near) is_near_outline_ = {};
   }
   if (std::ranges::all_of(centres_, [](const Rgb& c) { return IsBlack(c); })) centres_ = {};
+
+  if (finds_glints_) glints_ = Glints(tracer_, OnFilm({0, 0, width_, height_}), team);
+  first_path_of_glint_ = {0};
+  for (const Glint& glint : glints_.all()) {
+    first_path_of_glint_.push_back(first_path_of_glint_.back() +
+                                   static_cast<std::size_t>(glint.paths));
+  }
+}
+
+std::vector<FilmSpread::GlintPath> FilmSpread::TraceGlints(std::uint64_t pass,
+                                                           ThreadTeam& team) const {
+  std::vector<GlintPath> paths(first_path_of_glint_.back());
+  team.For(glints_.all().size(), 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Glint& glint = glints_.all()[i];
+      const PixelSampler sampler(tracer_.settings().seed, glint.key, pass, pass);
+      for (int number = 0; number < glint.paths; ++number) {
+        const BrightSample sample = sampler.ForBright(number, glint.paths);
+        GlintPath& path = paths[first_path_of_glint_[i] + static_cast<std::size_t>(number)];
+        path.glint = i;
+        path.from.on_lens = tracer_.OnLens(sample.camera[2], sample.camera[3]);
+        const Glint::FilmPoint place =
+            glint.Sample(sample.camera[0], sample.camera[1], path.from.on_lens);
+        const double column = std::floor(place.x);
+        const double row = std::floor(place.y);
+        path.x = image_.x0 + static_cast<int>(column);
+        path.y = image_.y0 + static_cast<int>(row);
+        path.from.x = static_cast<float>(place.x - column - 0.5);
+        path.from.y = static_cast<float>(place.y - row - 0.5);
+        path.bright = tracer_.BrightOf(
+            tracer_.CameraRayThrough(place.x, place.y, path.from.on_lens), sample.branches);
+      }
+    }
+  });
+  return paths;
 }
 
 int FilmSpread::BrightPathsOf(int x, int y) const {
@@ -98,6 +147,7 @@ void FilmSpread::Add(std::uint64_t pass, const std::vector<Rgb>& bright, std::ve
                      ThreadTeam& team) {
   if (!is_needed()) return;
   Prepare(team);
+  const std::vector<GlintPath> glint_paths = TraceGlints(pass, team);
   const int tiles_x = (width_ + kTile - 1) / kTile;
   const int tiles_y = (height_ + kTile - 1) / kTile;
   team.For(static_cast<std::size_t>(tiles_x) * static_cast<std::size_t>(tiles_y), 4,
@@ -106,12 +156,13 @@ void FilmSpread::Add(std::uint64_t pass, const std::vector<Rgb>& bright, std::ve
                const int x0 = static_cast<int>(tile % static_cast<std::size_t>(tiles_x)) * kTile;
                const int y0 = static_cast<int>(tile / static_cast<std::size_t>(tiles_x)) * kTile;
                AddTile(pass, {x0, y0, std::min(x0 + kTile, width_), std::min(y0 + kTile, height_)},
-                       bright, direct);
+                       bright, glint_paths, direct);
              }
            });
 }
 
 void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vector<Rgb>& bright,
+                         const std::vector<GlintPath>& glint_paths,
                          std::vector<Rgb>& direct) const {
   const auto pixel_at = [&](int x, int y) {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
@@ -129,8 +180,8 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
       std::min(tile.x1 + reach_x_, image_.x1), std::min(tile.y1 + reach_y_, image_.y1)};
   struct Path {
     Rgb bright;
-    float x = 0, y = 0;         // from the centre of its pixel
-    float inverse_density = 0;  // 1 / Σ_s p_s(f), over the paths of its pixel
+    EyePathTracer::FilmOffset from;  // the centre of its pixel
+    float inverse_density = 0;       // of all that could have drawn it, over the paths of its pixel
   };
   std::vector<Path> paths;
   // [pixels around + 1] of the first path of each, row by row.
@@ -147,16 +198,22 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
         for (int number = 0; number < count; ++number) {
           const EyePathTracer::BrightPath path = tracer_.TraceBrightPath(x, y, pass, number, count);
           is_dark = is_dark && IsBlack(path.bright);
-          paths.push_back({.bright = path.bright, .x = path.x, .y = path.y});
+          paths.push_back({.bright = path.bright, .from = path.from});
         }
         continue;
       }
       const Rgb found = is_in_crop(x, y) ? bright[pixel_at(x, y)] : tracer_.TraceBright(x, y, pass);
       is_dark = is_dark && IsBlack(found);
-      paths.push_back({.bright = found});
+      paths.push_back({.bright = found, .from = {}});
     }
   }
   first_path.push_back(paths.size());
+  std::vector<std::size_t> glints_near;
+  glints_.ForEachNear(OnFilm(tile), [&](std::size_t glint) { glints_near.push_back(glint); });
+  for (const std::size_t glint : glints_near) {
+    for (const GlintPath& path : PathsOf(glint_paths, glint))
+      is_dark = is_dark && IsBlack(path.bright);
+  }
   for (int y = tile.y0; is_dark && y < tile.y1; ++y) {
     for (int x = tile.x0; is_dark && x < tile.x1; ++x)
       is_dark = IsBlack(centre_at(x, y));
@@ -169,22 +226,40 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
         static_cast<std::size_t>(x - around.x0);
     return std::span(paths).subspan(first_path[pixel], first_path[pixel + 1] - first_path[pixel]);
   };
+  // Σ_s p_s(f) + Σ_g n_g p_g(f); `drawn_by`: the glint that a path was drawn for, if any.
+  const auto density_at = [&](int x, int y, const EyePathTracer::FilmOffset& from,
+                              std::optional<std::size_t> drawn_by) {
+    const float of_pixels = DensityOfAll(tracer_.filter_x(), from.x, x, image_.x0, image_.x1) *
+                            DensityOfAll(tracer_.filter_y(), from.y, y, image_.y0, image_.y1);
+    const Glint::FilmPoint place = {x - image_.x0 + 0.5 + static_cast<double>(from.x),
+                                    y - image_.y0 + 0.5 + static_cast<double>(from.y)};
+    double of_glints = 0;
+    for (const std::size_t i : glints_near) {
+      const Glint& glint = glints_.all()[i];
+      // Of its own a path is no nearer than rounding to the rim.
+      of_glints += glint.paths *
+                   (drawn_by == i ? glint.LargestDensity() : glint.Density(place, from.on_lens));
+    }
+    return of_pixels + static_cast<float>(of_glints);
+  };
   for (int y = around.y0; y < around.y1; ++y) {
     for (int x = around.x0; x < around.x1; ++x) {
       const std::span<Path> of_pixel = paths_of(x, y);
-      if (BrightPathsOf(x, y) == 0) {
-        const EyePathTracer::FilmOffset offset = tracer_.FilmOffsetOf(x, y, pass);
-        of_pixel[0].x = offset.x;
-        of_pixel[0].y = offset.y;
-      }
+      if (BrightPathsOf(x, y) == 0) of_pixel[0].from = tracer_.FilmOffsetOf(x, y, pass);
       for (Path& path : of_pixel) {
-        const float density = DensityOfAll(tracer_.filter_x(), path.x, x, image_.x0, image_.x1) *
-                              DensityOfAll(tracer_.filter_y(), path.y, y, image_.y0, image_.y1) *
-                              static_cast<float>(of_pixel.size());
+        const float density =
+            density_at(x, y, path.from, std::nullopt) * static_cast<float>(of_pixel.size());
         path.inverse_density = density > 0 ? 1 / density : 0;
       }
     }
   }
+  const int filter_reach_x = static_cast<int>(std::ceil(tracer_.filter_x().radius() + 0.5F));
+  const int filter_reach_y = static_cast<int>(std::ceil(tracer_.filter_y().radius() + 0.5F));
+  // Of a pixel whose neighbour (dx, dy) the path belongs to.
+  const auto filter_at = [&](int dx, int dy, const EyePathTracer::FilmOffset& from) {
+    return tracer_.filter_x().At(from.x + static_cast<float>(dx)).filter *
+           tracer_.filter_y().At(from.y + static_cast<float>(dy)).filter;
+  };
   for (int y = tile.y0; y < tile.y1; ++y) {
     for (int x = tile.x0; x < tile.x1; ++x) {
       const Rgb centre = centre_at(x, y);
@@ -196,14 +271,25 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
           for (const Path& of_q : paths_of(qx, qy)) {
             const Rgb excess = of_q.bright - centre;
             if (IsBlack(excess)) continue;
-            const float weight = tracer_.filter_x().At(of_q.x + static_cast<float>(qx - x)).filter *
-                                 tracer_.filter_y().At(of_q.y + static_cast<float>(qy - y)).filter *
-                                 of_q.inverse_density;
-            sum += excess * weight;
+            sum += excess * (filter_at(qx - x, qy - y, of_q.from) * of_q.inverse_density);
           }
         }
       }
       direct[pixel_at(x, y)] += sum;
+    }
+  }
+  for (const std::size_t glint : glints_near) {
+    for (const GlintPath& path : PathsOf(glint_paths, glint)) {
+      const float density = density_at(path.x, path.y, path.from, glint);
+      const int low_x = std::max(path.x - filter_reach_x, tile.x0);
+      const int high_x = std::min(path.x + filter_reach_x + 1, tile.x1);
+      for (int y = std::max(path.y - filter_reach_y, tile.y0);
+           y < std::min(path.y + filter_reach_y + 1, tile.y1); ++y) {
+        for (int x = low_x; x < high_x; ++x) {
+          direct[pixel_at(x, y)] += (path.bright - centre_at(x, y)) *
+                                    (filter_at(path.x - x, path.y - y, path.from) / density);
+        }
+      }
     }
   }
 }

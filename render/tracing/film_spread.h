@@ -16,17 +16,24 @@
 // kMostBrightPaths paths a pixel are traced for the bright part alone, in place of the pixel's own
 // path, each with as much less weight.
 //
+// A light seen by way of smooth surfaces may be far smaller than a pixel. Around such images (see
+// glints.h) n_g paths a pass are drawn with a density p_g each, which counts in the balance
+// heuristic with all others: the weight is h_p(f) / (Σ_s p_s(f) + Σ_g n_g p_g(f)), of the lens'
+// given point, which all draw alike.
+//
 // Only what is brighter than the image's white is treated so (EyePath::bright): a sky gains
 // nothing.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "render/base/parallel.h"
 #include "render/math/rgb.h"
 #include "render/tracing/eye_path.h"
+#include "render/tracing/glints.h"
 
 namespace lucerna {
 
@@ -39,6 +46,8 @@ class FilmSpread {
  public:
   // Keeps a reference to the tracer.
   explicit FilmSpread(const EyePathTracer& tracer);
+  // With these in place of the glints that would be found. The mean over passes is the same.
+  FilmSpread(const EyePathTracer& tracer, Glints glints);
 
   // Whether Add does anything.
   [[nodiscard]] bool is_needed() const { return tracer_.MeetsBright(); }
@@ -53,8 +62,24 @@ class FilmSpread {
   struct Window {
     int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   };
+  // A path that was drawn around a glint.
+  struct GlintPath {
+    Rgb bright;
+    int x = 0, y = 0;  // its pixel, in the crop window's coordinates
+    EyePathTracer::FilmOffset from;
+    std::size_t glint = 0;
+  };
+  // Of a glint, of all.
+  [[nodiscard]] std::span<const GlintPath> PathsOf(const std::vector<GlintPath>& paths,
+                                                   std::size_t glint) const {
+    return std::span(paths).subspan(first_path_of_glint_[glint],
+                                    first_path_of_glint_[glint + 1] - first_path_of_glint_[glint]);
+  }
+  // What the filters of the pixels reach.
+  [[nodiscard]] FilmRegion OnFilm(const Window& pixels) const;
+  [[nodiscard]] std::vector<GlintPath> TraceGlints(std::uint64_t pass, ThreadTeam& team) const;
   void AddTile(std::uint64_t pass, const Window& tile, const std::vector<Rgb>& bright,
-               std::vector<Rgb>& direct) const;
+               const std::vector<GlintPath>& glint_paths, std::vector<Rgb>& direct) const;
   // Of a pixel in `around_`, for the columns below.
   [[nodiscard]] std::size_t IndexOf(int x, int y) const {
     return static_cast<std::size_t>(y - around_.y0) *
@@ -76,6 +101,9 @@ class FilmSpread {
   std::vector<Rgb> centres_;                   // [around], or empty: all black
   std::vector<std::uint8_t> is_near_outline_;  // [around], or empty: none is
   int bright_paths_ = 0;                       // near an outline
+  bool finds_glints_ = true;
+  Glints glints_;
+  std::vector<std::size_t> first_path_of_glint_;  // [glints + 1]
 };
 
 }  // namespace lucerna

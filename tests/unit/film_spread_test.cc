@@ -76,12 +76,13 @@ struct Traced {
   std::vector<double> mean, deviation;  // [pixels] over passes, of the green channel
 };
 
-Traced TraceManyPasses(const Scene& scene, const RenderSettings& settings, int passes) {
+Traced TraceManyPasses(const Scene& scene, const RenderSettings& settings, int passes,
+                       const Glints& glints = {}) {
   const SceneNeeds needs = NeedsOf(scene, settings);
   const auto intersector = Intersector::Create(scene).value();
   const LightSet lights(scene, *intersector);
   const EyePathTracer tracer(scene, settings, needs, *intersector, lights);
-  FilmSpread spread(tracer);
+  FilmSpread spread(tracer, glints);
   EXPECT_TRUE(spread.is_needed());
   ThreadTeam team(1);
   const auto pixels = static_cast<std::size_t>(settings.crop_width() * settings.crop_height());
@@ -105,36 +106,73 @@ Traced TraceManyPasses(const Scene& scene, const RenderSettings& settings, int p
   return result;
 }
 
-// Passes are stratified, so that the deviation of a mean is at most that of independent ones.
-TEST(FilmSpreadTest, GivesEveryPixelTheIntegralOfItsFilterOverTheLight) {
+const PixelFilter kFilters[] = {
+    Filter(PixelFilter::Kind::kBox, 0.5F), Filter(PixelFilter::Kind::kTriangle, 1),
+    Filter(PixelFilter::Kind::kGaussian, 1.5F), Filter(PixelFilter::Kind::kMitchell, 2)};
+
+// Each pixel's mean over many passes is the integral of its filter over the light. Passes are
+// stratified, so that the deviation of a mean is at most that of independent ones.
+void ExpectIntegrals(const PixelFilter& filter, const FilmRectangle& light, const Glints& glints) {
   constexpr int kPasses = 512;
+  const Scene scene = SceneWithLight(light, filter);
+  const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
+  const Traced traced = TraceManyPasses(scene, settings, kPasses, glints);
+  const FilterSampler sampler(filter, filter.radius_x);
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      const auto i = static_cast<std::size_t>(y * kSize + x);
+      const double expected = kRadiance * FilterOver(sampler, x, light.x0, light.x1) *
+                              FilterOver(sampler, y, light.y0, light.y1);
+      const double standard_error = traced.deviation[i] / std::sqrt(kPasses);
+      ASSERT_NEAR(traced.mean[i], expected, 5 * standard_error + 2e-4 * kRadiance)
+          << x << ' ' << y << " filter " << static_cast<int>(filter.kind) << " light at "
+          << light.x0;
+    }
+  }
+}
+
+TEST(FilmSpreadTest, GivesEveryPixelTheIntegralOfItsFilterOverTheLight) {
   const FilmRectangle lights[] = {
       {5.6, 7.1, 6.0, 7.3},    // a part of one pixel
       {6.4, 6.45, 6.6, 6.55},  // around the centre of one
       {2.3, 3.8, 12.1, 9.4},   // many pixels
       {0, 0, 2.5, 16},         // at the image's edge
   };
-  const PixelFilter filters[] = {
-      Filter(PixelFilter::Kind::kBox, 0.5F), Filter(PixelFilter::Kind::kTriangle, 1),
-      Filter(PixelFilter::Kind::kGaussian, 1.5F), Filter(PixelFilter::Kind::kMitchell, 2)};
-  for (const PixelFilter& filter : filters) {
-    for (const FilmRectangle& light : lights) {
-      const Scene scene = SceneWithLight(light, filter);
-      const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
-      const Traced traced = TraceManyPasses(scene, settings, kPasses);
-      const FilterSampler sampler(filter, filter.radius_x);
-      for (int y = 0; y < kSize; ++y) {
-        for (int x = 0; x < kSize; ++x) {
-          const auto i = static_cast<std::size_t>(y * kSize + x);
-          const double expected = kRadiance * FilterOver(sampler, x, light.x0, light.x1) *
-                                  FilterOver(sampler, y, light.y0, light.y1);
-          const double standard_error = traced.deviation[i] / std::sqrt(kPasses);
-          ASSERT_NEAR(traced.mean[i], expected, 5 * standard_error + 2e-4 * kRadiance)
-              << x << ' ' << y << " filter " << static_cast<int>(filter.kind) << " light at "
-              << light.x0;
-        }
-      }
-    }
+  for (const PixelFilter& filter : kFilters) {
+    for (const FilmRectangle& light : lights)
+      ExpectIntegrals(filter, light, {});
+  }
+}
+
+// Wherever paths are drawn, across the light's edges, beside it, several times over, beyond the
+// image, and however the place depends on the lens: the means are the same.
+TEST(FilmSpreadTest, HasTheSameMeansWithGlintsThatAreWrong) {
+  const auto glint = [](Glint::FilmPoint middle, Glint::Matrix axes, Glint::Matrix from_lens,
+                        int paths) {
+    return Glint{.middle = middle,
+                 .axes = axes,
+                 .from_lens = from_lens,
+                 .key = static_cast<std::uint64_t>(100 * middle.x + middle.y),
+                 .paths = paths};
+  };
+  const Glints glints({
+      glint({6.05, 7.2}, {.xx = 0.3, .xy = 0.1, .yx = 0, .yy = 0.2}, {}, 8),
+      glint({6.05, 7.3}, {.xx = 0.1, .xy = 0.7, .yx = 1.2, .yy = 0}, {}, 3),
+      glint({6.5, 6.5}, {.xx = 0.02, .xy = 0, .yx = 0, .yy = 0.4}, {}, 8),
+      glint({2.3, 4.1}, {.xx = 0.3, .xy = 0.2, .yx = -0.2, .yy = 0.3},
+            {.xx = 1, .xy = 0, .yx = 0.5, .yy = 0.2}, 16),
+      glint({0, 8}, {.xx = 0.5, .xy = 0, .yx = 0, .yy = 0.5}, {}, 4),
+      // Wide enough for the light between them, which every pass then finds.
+      glint({9.5, 9.5}, {.xx = 0.3, .xy = 0, .yx = 0, .yy = 0.15}, {}, 16),
+      glint({9.5, 9.5}, {.xx = 0.25, .xy = 0, .yx = 0, .yy = 0.25},
+            {.xx = 0.3, .xy = 0, .yx = 0, .yy = 0.3}, 16),
+      glint({11.5, 12}, {.xx = 1e-3, .xy = 0, .yx = 0, .yy = 1e-3}, {}, 1),
+  });
+  const FilmRectangle lights[] = {
+      {5.6, 7.1, 6.0, 7.3}, {2.3, 3.8, 12.1, 9.4}, {0, 0, 2.5, 16}, {9.4, 9.45, 9.6, 9.55}};
+  for (const PixelFilter& filter : kFilters) {
+    for (const FilmRectangle& light : lights)
+      ExpectIntegrals(filter, light, glints);
   }
 }
 
