@@ -5,7 +5,6 @@
 #include <cmath>
 #include <deque>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 #include "render/math/double3.h"

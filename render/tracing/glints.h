@@ -8,10 +8,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "render/base/parallel.h"
-#include "render/math/vector.h"
+#include "render/scene/scene.h"
 #include "render/tracing/eye_path.h"
 
 namespace lucerna {
