@@ -4,9 +4,12 @@
 // profile.
 #pragma once
 
+#include <cmath>
+
 #include <embree3/rtcore.h>
 
 #include "render/base/status.h"
+#include "render/math/vector.h"
 
 namespace lucerna {
 
@@ -30,6 +33,14 @@ namespace lucerna {
     default:
       return absl::InternalError("Embree refuses the scene's geometry");
   }
+}
+
+// Whether Embree takes a ray. With numbers beyond its range, and with what is no number, it ends
+// the process where it was built with assertions, as Debian builds it.
+[[nodiscard]] inline bool IsInEmbreesRange(Vec3 origin, Vec3 direction) {
+  constexpr float kLargest = 1.8e18F;
+  const auto sum = [](Vec3 v) { return std::abs(v.x) + std::abs(v.y) + std::abs(v.z); };
+  return sum(origin) + sum(direction) < kLargest;
 }
 
 }  // namespace lucerna

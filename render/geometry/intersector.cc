@@ -366,6 +366,7 @@ Status Intersector::AddInstances() {
 }
 
 bool Intersector::Intersect(const Ray& ray, Hit& hit) const {
+  if (!IsInEmbreesRange(ray.origin, ray.direction)) return false;
   RTCRayHit ray_hit;
   ray_hit.ray = ToEmbree(ray);
   ray_hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
@@ -389,6 +390,7 @@ bool Intersector::Intersect(const Ray& ray, Hit& hit) const {
 }
 
 bool Intersector::Occluded(const Ray& ray) const {
+  if (!IsInEmbreesRange(ray.origin, ray.direction)) return false;
   RTCRay embree_ray = ToEmbree(ray);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);

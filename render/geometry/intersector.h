@@ -91,7 +91,8 @@ class Intersector {
   Intersector(const Intersector&) = delete;
   Intersector& operator=(const Intersector&) = delete;
 
-  // True and `hit` when something is met before ray.t_max. Threads: any.
+  // True and `hit` when something is met before ray.t_max. Rays that are no numbers, or begin more
+  // than 1.8e18 from the origin, meet nothing, here and in Occluded. Threads: any.
   [[nodiscard]] bool Intersect(const Ray& ray, Hit& hit) const;
   // True when anything is met before ray.t_max. Threads: any.
   [[nodiscard]] bool Occluded(const Ray& ray) const;

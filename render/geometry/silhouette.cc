@@ -342,6 +342,7 @@ StatusOr<std::unique_ptr<SilhouetteEdges>> SilhouetteEdges::Create(const Scene& 
 
 NearbyEdges SilhouetteEdges::Find(Vec3 origin, Vec3 direction, float length) const {
   Search search;
+  if (!IsInEmbreesRange(origin, direction)) return {};
   rtcInitIntersectContext(&search.context);
   search.edges = this;
   search.origin = Double3(origin);

@@ -2,6 +2,7 @@
 #include "render/geometry/intersector.h"
 
 #include <cmath>
+#include <limits>
 #include <set>
 #include <vector>
 
@@ -395,6 +396,26 @@ TEST(IntersectorTest, GivesEveryThreadTheSameHits) {
     ASSERT_EQ(one[i].u, three[i].u);
     ASSERT_EQ(one[i].geometry, three[i].geometry);
     ASSERT_EQ(one[i].primitive, three[i].primitive);
+  }
+}
+
+// Debian's Embree ends the process for such rays when there are shapes beside triangles.
+TEST(IntersectorTest, RaysThatAreNoNumbersOrBeyondAllRangeMeetNothing) {
+  Scene scene;
+  const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddSphere(scene, {0, 0, 0}, 1, white);
+  AddQuad(scene, {-1, -1, 2}, {2, 0, 0}, {0, 2, 0}, white);
+  const auto intersector = Intersector::Create(scene).value();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const float odd : {nan, infinity, -infinity, 1e30F, -3e18F}) {
+    for (const Ray& ray :
+         {Ray{{odd, 0, -3}, {0, 0, 1}, HUGE_VALF}, Ray{{0, odd, 5}, {0, 0, -1}, 10},
+          Ray{{0, 0, -3}, {0, odd, 1}, HUGE_VALF}}) {
+      Hit hit;
+      EXPECT_FALSE(intersector->Intersect(ray, hit)) << odd;
+      EXPECT_FALSE(intersector->Occluded(ray)) << odd;
+    }
   }
 }
 
