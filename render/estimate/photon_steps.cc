@@ -19,8 +19,8 @@ constexpr double kEyePathCost = 3;
 constexpr double kEyeRayCost = 0.75;
 constexpr double kPairCost = 0.1;
 
-// Of fewer photons found for each pixel, over all passes, variances tell nothing, if they bring such
-// a share of the light.
+// Of fewer photons found for each pixel, over all passes, variances tell nothing, if they bring
+// such a share of the light.
 constexpr double kFewestFound = 1;
 constexpr double kShareThatCounts = 0.1;
 

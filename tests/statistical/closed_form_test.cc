@@ -240,7 +240,7 @@ TEST(IrradianceTest, OfPhotonsIsTheClosedForm) {
   for (Lamp& lamp : Lamps()) {
     SCOPED_TRACE(lamp.name);
     AddSphere(lamp.scene, lamp.center, lamp.around, AddMaterial(lamp.scene, DielectricMaterial(1)));
-    const RenderSettings settings = HeldRadius(lamp.scene, 100000, 0.3, 4);
+    const RenderSettings settings = HeldRadius(lamp.scene, 150000, 0.3, 4);
     const double expected =
         Smoothed(lamp.irradiance, 0.3) * static_cast<double>(kFloorReflectance) / kPiD;
     ExpectMean(Measure(lamp.scene, settings, 3, kParts, "photons.G"), expected);
