@@ -267,9 +267,9 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   const auto photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass);
   state->after[0] = {.radii = state->last_radii, .photons_per_pass = photons_per_pass};
   if (!settings.unguided && prepared.needs().Uses(Part::kPhotons)) {
-    state->learner = std::make_unique<GuideLearner>();
+    state->learner = std::make_unique<GuideLearner>(pixels);
     state->after[0].guide =
-        std::make_shared<const PhotonGuide>(GuideLearner::First(photons_per_pass));
+        std::make_shared<const PhotonGuide>(state->learner->First(photons_per_pass));
   }
   state->has_smooth_surfaces = HasSmoothSurfaces(prepared.scene());
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));

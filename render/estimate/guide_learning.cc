@@ -11,11 +11,11 @@
 namespace lucerna {
 namespace {
 
-// So many reports are asked for of the first pass, and between one guide and the next.
-constexpr double kFirstReports = 16384;
-constexpr double kReportsPerGuide = 8192;
-// With so many reports a guide is as good as it will be.
-constexpr std::size_t kEnoughReports = 65536;
+// With so many reports for each pixel, within these bounds, a guide is as good as it will be.
+constexpr double kReportsPerPixel = 4;
+constexpr double kFewestEnough = 4096, kMostEnough = 65536;
+// So many of them are asked for of the first pass, and between one guide and the next.
+constexpr double kShareOfFirst = 0.25, kSharePerGuide = 0.125;
 // Photons are looked at in so many bins along each dimension of a box: in halves alone, what lies
 // in the middle would not be seen.
 constexpr std::size_t kBins = 8;
@@ -208,9 +208,13 @@ GrownGuide GrowGuide(std::span<const EmissionReport> reports, std::span<const do
   return Grower(reports, mass, mass_at).Grow();
 }
 
-PhotonGuide GuideLearner::First(std::uint64_t photons_per_pass) {
+GuideLearner::GuideLearner(std::size_t pixels)
+    : enough_reports_(
+          std::clamp(kReportsPerPixel * static_cast<double>(pixels), kFewestEnough, kMostEnough)) {}
+
+PhotonGuide GuideLearner::First(std::uint64_t photons_per_pass) const {
   const auto photons = static_cast<double>(std::max<std::uint64_t>(photons_per_pass, 1));
-  return PhotonGuide::Create({}, ReportedShare(kFirstReports / photons)).value();
+  return PhotonGuide::Create({}, ReportedShare(kShareOfFirst * enough_reports_ / photons)).value();
 }
 
 void GuideLearner::Add(std::span<const EmissionReport> reports,
@@ -262,7 +266,7 @@ PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_p
     StatusOr<PhotonGuide> created = PhotonGuide::Create(std::move(grown.nodes), 0);
     if (created.ok()) guide = *std::move(created);
   }
-  if (passes >= kLastGuidePass || reports.size() >= kEnoughReports) return guide;
+  if (passes >= kLastGuidePass || count >= enough_reports_) return guide;
   // Of the photons that the guide draws; where none was found, all are reported that are.
   double found = 1;
   for (const EmissionReport& report : reports) {
@@ -270,8 +274,9 @@ PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_p
     found += WeightAt(numbers) / guide.WeightAt(numbers);
   }
   const double found_share = std::min(1.0, found / std::max(1.0, trials));
-  const double asked = kReportsPerGuide / (static_cast<double>(passes) *
-                                           static_cast<double>(photons_per_pass) * found_share);
+  const double asked =
+      kSharePerGuide * enough_reports_ /
+      (static_cast<double>(passes) * static_cast<double>(photons_per_pass) * found_share);
   return PhotonGuide::Create(guide.nodes(), ReportedShare(asked)).value();
 }
 

@@ -45,8 +45,11 @@ using FluxAt = std::function<double(const PrimaryNumbers& numbers)>;
 
 class GuideLearner {
  public:
+  // Of an image of so many pixels: small ones need fewer reports.
+  explicit GuideLearner(std::size_t pixels);
+
   // What first passes of so many photons are drawn by: an even guide with reports.
-  [[nodiscard]] static PhotonGuide First(std::uint64_t photons_per_pass);
+  [[nodiscard]] PhotonGuide First(std::uint64_t photons_per_pass) const;
 
   // Adds what a round reported whose `photons` were drawn by `guide`.
   void Add(std::span<const EmissionReport> reports, std::shared_ptr<const PhotonGuide> guide,
@@ -76,6 +79,7 @@ class GuideLearner {
   // the even one (the balance heuristic of Veach & Guibas 1995 over the guides).
   [[nodiscard]] double WeightAt(const PrimaryNumbers& numbers) const;
 
+  double enough_reports_;
   Numbers numbers_;
 };
 

@@ -11,6 +11,9 @@
 namespace lucerna {
 namespace {
 
+// Of an image that has as many reports as any.
+constexpr std::size_t kPixels = 1 << 14;
+
 double OneFlux(const PrimaryNumbers& /*numbers*/) {
   return 1;
 }
@@ -19,7 +22,7 @@ double OneFlux(const PrimaryNumbers& /*numbers*/) {
 class Simulated {
  public:
   explicit Simulated(std::uint64_t photons_per_pass) : photons_(photons_per_pass) {
-    guide_ = std::make_shared<const PhotonGuide>(GuideLearner::First(photons_));
+    guide_ = std::make_shared<const PhotonGuide>(learner_.First(photons_));
   }
 
   // Draws the photons of `passes` passes, and learns from them.
@@ -56,7 +59,7 @@ class Simulated {
  private:
   std::uint64_t photons_;
   KeyedRng rng_{7};
-  GuideLearner learner_;
+  GuideLearner learner_{kPixels};
   std::shared_ptr<const PhotonGuide> guide_;
   std::uint64_t passes_ = 0;
   int found_ = 0;
@@ -136,6 +139,12 @@ TEST(GuideLearningTest, WhereNothingIsFoundAllThatWillBeIsReported) {
   EXPECT_EQ(guide.reported(), UINT32_MAX);
 }
 
+TEST(GuideLearningTest, SmallImagesAskForFewReports) {
+  EXPECT_EQ(GuideLearner(1).First(1 << 20).reported(), std::uint32_t{1024} << 12);
+  EXPECT_EQ(GuideLearner(2048).First(1 << 20).reported(), std::uint32_t{2048} << 12);
+  EXPECT_EQ(GuideLearner(1 << 20).First(1 << 20).reported(), std::uint32_t{16384} << 12);
+}
+
 TEST(GuideLearningTest, AsksForFewReportsAndThenForNone) {
   Simulated job(1 << 20);
   const auto all = [](const PrimaryNumbers&) { return true; };
@@ -158,7 +167,7 @@ TEST(GuideLearningTest, PhotonsOfSeveralGuidesStandForTheEvenDensity) {
   const auto even =
       std::make_shared<const PhotonGuide>(PhotonGuide::Create({}, UINT32_MAX / 2).value());
   constexpr std::uint64_t kPhotons = 8192;
-  GuideLearner learner;
+  GuideLearner learner(kPixels);
   KeyedRng rng(11);
   for (const auto& guide : {even, skewed, even, skewed}) {
     std::vector<EmissionReport> reports;
