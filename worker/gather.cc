@@ -269,11 +269,12 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
     });
   } else {
     const Material& untextured = materials[glossy->material];
+    const MaterialNumbers& numbers = untextured;
     std::optional<Material> textured;
     const GlossyPlace* place_of = nullptr;
     if (!block.places.empty() && untextured.DependsOnPlace()) {
       place_of = &block.places[static_cast<std::size_t>(glossy - block.glossy.data())];
-      static_cast<MaterialNumbers&>(textured.emplace()) = untextured;
+      static_cast<MaterialNumbers&>(textured.emplace()) = numbers;
       if (untextured.texture != kNoTexture) SetTexturedParameter(*textured, place_of->color);
       if (untextured.HasRoughnessTexture()) SetWidths(*textured, place_of->widths);
     }
@@ -282,7 +283,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
     // Other photons are gathered on the second.
     const MaterialProperties properties = PropertiesOf(textured ? *textured : untextured);
     if (properties.has_parts) {
-      if (!textured) static_cast<MaterialNumbers&>(textured.emplace()) = untextured;
+      if (!textured) static_cast<MaterialNumbers&>(textured.emplace()) = numbers;
       textured->parts = source.caustic_weight != nullptr && properties.has_rough_coat
                             ? Parts::kFirst
                             : Parts::kSecond;

@@ -14,6 +14,7 @@
 #include "render/math/fixed_point.h"
 #include "render/scene/medium.h"
 #include "render/transport/media.h"
+#include "worker/gather.h"
 #include "worker/gather_piece.h"
 #include "worker/photon_tree.h"
 
