@@ -85,63 +85,75 @@ std::string NameOf(const LightGroup& light, std::size_t number, double unit) {
   return Concat("light ", number, " (", described(), ")");
 }
 
-// Of every pixel, the square of what a photon of even flux found by it adds to its value, relative
-// to that value (GuideLearner::Next). Values are means over a few pixels: a photon must not make
-// its own pixel bright.
-std::vector<float> PhotonScores(const ImageSums& sums, const RadiusColumn& radii, int width) {
-  constexpr int kReach = 2;         // pixels
-  constexpr double kFloor = 0.1;    // of the mean value, as in relative errors
-  constexpr double kLargest = 1e4;  // of the mean score
-  const std::size_t pixels = sums.pixels();
-  const auto columns = static_cast<std::ptrdiff_t>(width);
-  const auto rows = static_cast<std::ptrdiff_t>(pixels) / columns;
-  std::vector<double> values(pixels);
-  std::vector<double> scores(pixels, -1);  // below 0: unknown
-  double mean_value = 0;
-  double mean_factor = 0;
-  double known = 0;
-  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-    const RgbSum radiance = sums.At(pixel).radiance();
-    values[pixel] = std::max(0.0, WorkingLuminance(radiance[0], radiance[1], radiance[2])) /
-                    static_cast<double>(sums.passes());
-    mean_value += values[pixel] / static_cast<double>(pixels);
-    const ImageSums::Features features = sums.FeaturesAt(pixel);
-    if (!(features.hitpoints > 0 && features.hits > 0)) continue;
-    const double radius = static_cast<double>(radii[pixel]) *
-                          static_cast<double>(features.unit_radius / features.hitpoints);
-    const Rgb albedo = features.albedo / features.hits;
-    scores[pixel] = WorkingLuminance(static_cast<double>(albedo.r), static_cast<double>(albedo.g),
-                                     static_cast<double>(albedo.b)) /
-                    std::max(radius * radius, 1e-36);
-    mean_factor += scores[pixel];
-    ++known;
-  }
-  std::vector<float> result(pixels, 1.0F);
-  if (!(mean_value > 0) || !(mean_factor > 0)) return result;
-  mean_factor /= known;
-  double mean_score = 0;
-  for (std::ptrdiff_t y = 0; y < rows; ++y) {
-    for (std::ptrdiff_t x = 0; x < columns; ++x) {
-      double value = 0;
-      double around = 0;
-      for (std::ptrdiff_t v = std::max<std::ptrdiff_t>(0, y - kReach);
-           v <= std::min(rows - 1, y + kReach); ++v) {
-        for (std::ptrdiff_t u = std::max<std::ptrdiff_t>(0, x - kReach);
-             u <= std::min(columns - 1, x + kReach); ++u) {
-          value += values[static_cast<std::size_t>(v * columns + u)];
-          ++around;
-        }
+// Luminance of a pixel.
+double ValueAt(const ImageSums& sums, std::size_t pixel) {
+  const RgbSum radiance = sums.At(pixel).radiance();
+  return std::max(0.0, WorkingLuminance(radiance[0], radiance[1], radiance[2])) /
+         static_cast<double>(sums.passes());
+}
+
+// What a photon found by a pixel adds to its radiance, over its flux, but for a common factor:
+// albedo over the disc's area; 0 where no surface was met in the first passes (media).
+double FactorAt(const ImageSums& sums, const RadiusColumn& radii, std::size_t pixel) {
+  const ImageSums::Features features = sums.FeaturesAt(pixel);
+  if (!(features.hitpoints > 0 && features.hits > 0)) return 0;
+  const Rgb albedo = features.albedo / features.hits;
+  const double radius = static_cast<double>(radii[pixel]) *
+                        static_cast<double>(features.unit_radius / features.hitpoints);
+  return WorkingLuminance(static_cast<double>(albedo.r), static_cast<double>(albedo.g),
+                          static_cast<double>(albedo.b)) /
+         std::max(radius * radius, 1e-36);
+}
+
+// Means over pixels.
+struct PixelMeans {
+  double value = 0, factor = 0;
+};
+
+PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, ThreadTeam& team) {
+  // Of pieces, added up in their order.
+  constexpr std::size_t kPixelsAtOnce = 4096;
+  std::vector<PixelMeans> pieces((sums.pixels() + kPixelsAtOnce - 1) / kPixelsAtOnce);
+  team.For(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t piece = begin; piece < end; ++piece) {
+      const std::size_t last = std::min(sums.pixels(), (piece + 1) * kPixelsAtOnce);
+      for (std::size_t pixel = piece * kPixelsAtOnce; pixel < last; ++pixel) {
+        pieces[piece].value += ValueAt(sums, pixel);
+        pieces[piece].factor += FactorAt(sums, radii, pixel);
       }
-      double& score = scores[static_cast<std::size_t>(y * columns + x)];
-      const double factor = score < 0 ? 1 : score / mean_factor;
-      const double relative = factor / (value / around / mean_value + kFloor);
-      score = relative * relative;
-      mean_score += score / static_cast<double>(pixels);
+    }
+  });
+  PixelMeans means;
+  for (const PixelMeans& piece : pieces) {
+    means.value += piece.value / static_cast<double>(sums.pixels());
+    means.factor += piece.factor / static_cast<double>(sums.pixels());
+  }
+  return means;
+}
+
+// The square of what a photon of even flux found by a pixel adds to its value, relative to that
+// value (ScoreAt). Values are means over a few pixels: a photon must not make its own pixel bright.
+double PhotonScore(const ImageSums& sums, const RadiusColumn& radii, int width,
+                   const PixelMeans& means, std::size_t pixel) {
+  constexpr std::size_t kReach = 2;  // pixels
+  constexpr double kFloor = 0.1;     // of the mean value, as in relative errors
+  if (!(means.value > 0)) return 1;
+  const auto columns = static_cast<std::size_t>(width);
+  const std::size_t rows = sums.pixels() / columns;
+  const std::size_t x = pixel % columns;
+  const std::size_t y = pixel / columns;
+  double value = 0;
+  double around = 0;
+  for (std::size_t v = y - std::min(y, kReach); v <= std::min(rows - 1, y + kReach); ++v) {
+    for (std::size_t u = x - std::min(x, kReach); u <= std::min(columns - 1, x + kReach); ++u) {
+      value += ValueAt(sums, v * columns + u);
+      ++around;
     }
   }
-  for (std::size_t pixel = 0; pixel < pixels; ++pixel)
-    result[pixel] = static_cast<float>(std::min(scores[pixel] / mean_score, kLargest));
-  return result;
+  const double factor = FactorAt(sums, radii, pixel);
+  const double of_mean = factor > 0 && means.factor > 0 ? factor / means.factor : 1;
+  const double relative = of_mean / (value / around / means.value + kFloor);
+  return relative * relative;
 }
 
 Status CheckPower(Rgb power_w) {
@@ -216,11 +228,15 @@ struct JobEstimator::State {
       const std::shared_ptr<const PhotonGuide>& before) {
     if (learner == nullptr) return nullptr;
     learner->Add(round.reports, plan.guide, round.tally.photons);
-    if (!IsGuidePass(round.passes.last)) return before;
-    return std::make_shared<const PhotonGuide>(
-        learner->Next(round.passes.last, photons_per_pass,
-                      PhotonScores(*sums, *plan.radii, settings.crop_width()),
-                      [this](const PrimaryNumbers& numbers) { return FluxAt(numbers); }));
+    // A guide that asks for no reports was learned from enough of them.
+    if (!IsGuidePass(round.passes.last) || before->reported() == 0) return before;
+    const PixelMeans means = MeansOf(*sums, *plan.radii, team);
+    return std::make_shared<const PhotonGuide>(learner->Next(
+        round.passes.last, photons_per_pass,
+        [&](std::uint32_t pixel) {
+          return PhotonScore(*sums, *plan.radii, settings.crop_width(), means, pixel);
+        },
+        [this](const PrimaryNumbers& numbers) { return FluxAt(numbers); }));
   }
 
   // Luminance of the flux of a photon that is drawn evenly, over the power of all lights.

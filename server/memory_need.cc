@@ -10,7 +10,7 @@ namespace {
 // Bytes a pixel, beside what ExpectedCostOf counts: of a checkpoint on its way to the disk (220 of
 // sums, and of the photons that were reported), of the
 // copy that an error is estimated from and its work, and of the sums of squared deviations.
-constexpr std::uint64_t kCheckpoint = 220 + 4 * 14;
+constexpr std::uint64_t kCheckpoint = 220 + 2 * 14;
 constexpr std::uint64_t kEstimate = 48 + 200;
 constexpr std::uint64_t kPassVariance = 28;
 // Memory for a byte of a file: binary meshes become as much again with the tree over their

@@ -16,8 +16,8 @@ constexpr Duration kSyncEvery = std::chrono::seconds(3);
 // A slice has up to 100 bytes a pixel and an accumulation 40 a hitpoint before compression, which
 // cannot double it.
 constexpr std::uint64_t kResultHeadBytes = 4096;
-// Photons that the guide asks to be reported take up to 20 bytes, and are far fewer than this.
-constexpr std::uint64_t kResultReportBytes = 1 << 20;
+// Photons that the guide asks to be reported take up to 20 bytes.
+constexpr std::uint64_t kResultReportBytes = 20 * kMostReports;
 constexpr std::uint64_t kResultBytesPerRow = 128;
 constexpr int kMostLeases = 64;  // that one worker may speak of
 
@@ -258,13 +258,15 @@ grpc::ServerUnaryReactor* WorkerService::DescribeJob(grpc::CallbackServerContext
   }
   const StatusOr<Coordinator::Description> job = coordinator_.Describe(request->job_id());
   if (job.ok()) {
+    for (const GuideStep& step : job->guides)
+      *response->add_guides() = ToProto(step);
+  }
+  if (job.ok() && !request->guides_only()) {
     *response->mutable_scene() = ToProto(job->scene);
     *response->mutable_settings() = ToProto(job->settings);
     *response->mutable_needs() = ToProto(job->needs);
     for (const PhotonStep& step : job->photon_steps)
       *response->add_photon_steps() = ToProto(step);
-    for (const GuideStep& step : job->guides)
-      *response->add_guides() = ToProto(step);
     response->set_numeric_profile(job->numeric_profile);
   }
   reactor->Finish(ToGrpc(job.status()));

@@ -71,10 +71,11 @@ StatusOr<v1::SyncResponse> Connection::Sync(const v1::SyncRequest& request, Dura
   return response;
 }
 
-StatusOr<v1::JobDescription> Connection::DescribeJob(const std::string& job_id) {
+StatusOr<v1::JobDescription> Connection::DescribeJob(const std::string& job_id, bool guides_only) {
   Call call(*this, kCallTime);
   v1::DescribeJobRequest request;
   request.set_job_id(job_id);
+  request.set_guides_only(guides_only);
   v1::JobDescription response;
   LUCERNA_RETURN_IF_ERROR(FromGrpc(stub_->DescribeJob(call.context(), request, &response)));
   return response;
@@ -179,14 +180,20 @@ StatusOr<LentWork> ReadLease(const v1::Lease& message) {
   return work;
 }
 
+Status ReadGuides(const v1::JobDescription& message, JobToTrace& job) {
+  LUCERNA_ASSIGN_OR_RETURN(const GuideSteps steps, FromProto(message.guides()));
+  job.guides.clear();
+  for (const GuideStep& step : steps)
+    job.guides.push_back(step.guide);
+  return absl::OkStatus();
+}
+
 StatusOr<JobToTrace> ReadJob(const v1::JobDescription& message) {
   JobToTrace job;
   LUCERNA_ASSIGN_OR_RETURN(job.scene, FromProto(message.scene()));
   LUCERNA_ASSIGN_OR_RETURN(job.settings, FromProto(message.settings()));
   LUCERNA_ASSIGN_OR_RETURN(job.needs, FromProto(message.needs()));
-  LUCERNA_ASSIGN_OR_RETURN(const GuideSteps steps, FromProto(message.guides()));
-  for (const GuideStep& step : steps)
-    job.guides.push_back(step.guide);
+  LUCERNA_RETURN_IF_ERROR(ReadGuides(message, job));
   return job;
 }
 

@@ -68,7 +68,8 @@ class Connection {
   // when the coordinator is gone or the call was broken off.
   [[nodiscard]] StatusOr<v1::RegisterResponse> Register(const v1::RegisterRequest& request);
   [[nodiscard]] StatusOr<v1::SyncResponse> Sync(const v1::SyncRequest& request, Duration wait);
-  [[nodiscard]] StatusOr<v1::JobDescription> DescribeJob(const std::string& job_id);
+  [[nodiscard]] StatusOr<v1::JobDescription> DescribeJob(const std::string& job_id,
+                                                         bool guides_only = false);
   // Errors: also DATA_LOSS when the bytes do not have that digest.
   [[nodiscard]] StatusOr<std::string> Fetch(const Digest& digest, std::uint64_t max_bytes);
   [[nodiscard]] StatusOr<v1::CommitOutcome> Commit(v1::CommitBatchRequest::Header header,
@@ -91,5 +92,7 @@ class Connection {
 // Errors: INVALID_ARGUMENT for a lease, or a job, that no coordinator of ours would give.
 [[nodiscard]] StatusOr<LentWork> ReadLease(const v1::Lease& message);
 [[nodiscard]] StatusOr<JobToTrace> ReadJob(const v1::JobDescription& message);
+// Sets the guides alone, from a description of that job.
+[[nodiscard]] Status ReadGuides(const v1::JobDescription& message, JobToTrace& job);
 
 }  // namespace lucerna

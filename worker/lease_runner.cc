@@ -1,5 +1,6 @@
 #include "worker/lease_runner.h"
 
+#include <algorithm>
 #include <thread>
 
 #include <spdlog/spdlog.h>
@@ -21,6 +22,10 @@ constexpr std::chrono::milliseconds kBusyPause{200};
 bool IsGone(const Status& status) {
   return absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status) ||
          absl::IsCancelled(status) || absl::IsUnimplemented(status);
+}
+
+Status NoSuchGuide() {
+  return absl::InvalidArgumentError("a lease's photon guide is not one of its job");
 }
 
 }  // namespace
@@ -129,15 +134,20 @@ void LeaseRunner::FetchStage() {
 
 StatusOr<std::shared_ptr<const JobToTrace>> LeaseRunner::JobOf(const std::string& job_id,
                                                                std::uint64_t guides) {
-  for (const auto& [id, job] : jobs_) {
-    if (id == job_id && job->guides.size() >= guides) return job;
+  const auto known = std::ranges::find(jobs_, job_id, [](const auto& job) { return job.first; });
+  if (known != jobs_.end()) {
+    if (known->second->guides.size() >= guides) return known->second;
+    LUCERNA_ASSIGN_OR_RETURN(const v1::JobDescription message,
+                             connection_.DescribeJob(job_id, /*guides_only=*/true));
+    JobToTrace job = *known->second;
+    LUCERNA_RETURN_IF_ERROR(ReadGuides(message, job));
+    if (job.guides.size() < guides) return NoSuchGuide();
+    known->second = std::make_shared<const JobToTrace>(std::move(job));
+    return known->second;
   }
   LUCERNA_ASSIGN_OR_RETURN(const v1::JobDescription message, connection_.DescribeJob(job_id));
   LUCERNA_ASSIGN_OR_RETURN(JobToTrace job, ReadJob(message));
-  if (job.guides.size() < guides) {
-    return absl::InvalidArgumentError("a lease's photon guide is not one of its job");
-  }
-  std::erase_if(jobs_, [&](const auto& known) { return known.first == job_id; });
+  if (job.guides.size() < guides) return NoSuchGuide();
   jobs_.emplace_front(job_id, std::make_shared<const JobToTrace>(std::move(job)));
   if (jobs_.size() > kJobsKept) jobs_.pop_back();
   return jobs_.front().second;

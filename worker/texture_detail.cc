@@ -1,6 +1,16 @@
 #include "worker/texture_detail.h"
 
+#include <algorithm>
+
 namespace lucerna {
+
+TextureStatistics StatisticsBetween(const Texture& texture,
+                                    std::span<const TextureStatistics> parts) {
+  const TextureStatistics& first = parts[static_cast<std::size_t>(texture.parts[0])];
+  const TextureStatistics& second = parts[static_cast<std::size_t>(texture.parts[1])];
+  return {{std::max(first.detail.u, second.detail.u), std::max(first.detail.v, second.detail.v)},
+          0.5 * (first.luminance + second.luminance)};
+}
 
 std::vector<TextureDetail> TextureDetails(const std::vector<Texture>& textures) {
   std::vector<TextureStatistics> statistics;

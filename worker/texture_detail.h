@@ -32,6 +32,10 @@ struct TextureStatistics {
 LUCERNA_TEXTURES(LUCERNA_DECLARE)
 #undef LUCERNA_DECLARE
 
+// Of a texture between two of `parts`, as fine as the finer one.
+[[nodiscard]] TextureStatistics StatisticsBetween(const Texture& texture,
+                                                  std::span<const TextureStatistics> parts);
+
 // [textures].
 [[nodiscard]] std::vector<TextureDetail> TextureDetails(const std::vector<Texture>& textures);
 

@@ -12,8 +12,8 @@ namespace lucerna {
 namespace {
 
 // With so many reports for each pixel, within these bounds, a guide is as good as it will be.
-constexpr double kReportsPerPixel = 4;
-constexpr double kFewestEnough = 4096, kMostEnough = 65536;
+constexpr double kReportsPerPixel = 2;
+constexpr double kFewestEnough = 4096, kMostEnough = 32768;
 // So many of them are asked for of the first pass, and between one guide and the next.
 constexpr double kShareOfFirst = 0.25, kSharePerGuide = 0.125;
 // Photons are looked at in so many bins along each dimension of a box: in halves alone, what lies
@@ -239,28 +239,36 @@ double GuideLearner::WeightAt(const PrimaryNumbers& numbers) const {
 }
 
 PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_pass,
-                               std::span<const float> scores, const FluxAt& flux_at) const {
+                               const ScoreAt& score_at, const FluxAt& flux_at) const {
   const std::vector<EmissionReport>& reports = numbers_.reports;
   const auto count = static_cast<double>(reports.size());
   double trials = 0;
   for (const Drawn& drawn : numbers_.drawn)
     trials += drawn.trials;
+  std::vector<double> scores;
+  scores.reserve(reports.size());
   double mean_score = 0;
-  for (const EmissionReport& report : reports)
-    mean_score += static_cast<double>(scores[report.pixel]) / count;
+  for (const EmissionReport& report : reports) {
+    scores.push_back(score_at(report.pixel));
+    mean_score += scores.back() / count;
+  }
   const double largest = kLargestScore * mean_score;
   // Of a report there with this score.
-  const auto mass_of = [&](const PrimaryNumbers& numbers, double score) {
+  const auto mass_of = [&](const PrimaryNumbers& numbers, double weight, double score) {
     const double flux = flux_at(numbers);
-    return WeightAt(numbers) * flux * flux * score;
+    return weight * flux * flux * score;
   };
+  // Each weight takes a walk down every guide so far.
+  std::vector<double> weights(reports.size());
   std::vector<double> mass(reports.size());
   for (std::size_t i = 0; i < reports.size(); ++i) {
-    mass[i] = mass_of(NumbersOf(reports[i].numbers),
-                      std::min(static_cast<double>(scores[reports[i].pixel]), largest));
+    const PrimaryNumbers numbers = NumbersOf(reports[i].numbers);
+    weights[i] = WeightAt(numbers);
+    mass[i] = mass_of(numbers, weights[i], std::min(scores[i], largest));
   }
-  GrownGuide grown = GrowGuide(
-      reports, mass, [&](const PrimaryNumbers& numbers) { return mass_of(numbers, mean_score); });
+  GrownGuide grown = GrowGuide(reports, mass, [&](const PrimaryNumbers& numbers) {
+    return mass_of(numbers, WeightAt(numbers), mean_score);
+  });
   PhotonGuide guide;
   if (grown.gain >= kLeastGain) {
     StatusOr<PhotonGuide> created = PhotonGuide::Create(std::move(grown.nodes), 0);
@@ -269,14 +277,13 @@ PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_p
   if (passes >= kLastGuidePass || count >= enough_reports_) return guide;
   // Of the photons that the guide draws; where none was found, all are reported that are.
   double found = 1;
-  for (const EmissionReport& report : reports) {
-    const PrimaryNumbers numbers = NumbersOf(report.numbers);
-    found += WeightAt(numbers) / guide.WeightAt(numbers);
-  }
+  for (std::size_t i = 0; i < reports.size(); ++i)
+    found += weights[i] / guide.WeightAt(NumbersOf(reports[i].numbers));
   const double found_share = std::min(1.0, found / std::max(1.0, trials));
-  const double asked =
-      kSharePerGuide * enough_reports_ /
-      (static_cast<double>(passes) * static_cast<double>(photons_per_pass) * found_share);
+  const auto photons = static_cast<double>(photons_per_pass);
+  const double asked = std::min(
+      kSharePerGuide * enough_reports_ / (static_cast<double>(passes) * photons * found_share),
+      static_cast<double>(kMostReports) / photons);  // even if all are found
   return PhotonGuide::Create(guide.nodes(), ReportedShare(asked)).value();
 }
 

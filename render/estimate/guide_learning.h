@@ -40,7 +40,10 @@ inline constexpr std::uint64_t kLastGuidePass = 1024;
   return passes <= kLastGuidePass && (std::has_single_bit(passes) || is_middle);
 }
 
-// Of a photon drawn with these numbers.
+// What a photon found by a pixel adds to the squared relative error, over its squared flux, in any
+// unit, at least 0.
+using ScoreAt = std::function<double(std::uint32_t pixel)>;
+// Of a photon drawn with these numbers without a guide, in any unit; 0 where none is emitted.
 using FluxAt = std::function<double(const PrimaryNumbers& numbers)>;
 
 class GuideLearner {
@@ -55,11 +58,9 @@ class GuideLearner {
   void Add(std::span<const EmissionReport> reports, std::shared_ptr<const PhotonGuide> guide,
            std::uint64_t photons);
 
-  // The guide after `passes`, of `photons_per_pass` from now on. `scores` [pixels]: what a photon
-  // adds to the squared relative error, over its squared flux, in any unit, at least 0. `flux_at`:
-  // of a photon without a guide, in any unit, 0 where none is emitted.
+  // The guide after `passes`, of `photons_per_pass` from now on.
   [[nodiscard]] PhotonGuide Next(std::uint64_t passes, std::uint64_t photons_per_pass,
-                                 std::span<const float> scores, const FluxAt& flux_at) const;
+                                 const ScoreAt& score_at, const FluxAt& flux_at) const;
 
   // Photons drawn by one guide.
   struct Drawn {

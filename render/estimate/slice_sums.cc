@@ -100,6 +100,7 @@ Status MergeSibling(SliceSums& sum, const SliceSums& sibling) {
   const bool is_first = sum.passes.first < sibling.passes.first;
   sum.reports.insert(is_first ? sum.reports.end() : sum.reports.begin(), sibling.reports.begin(),
                      sibling.reports.end());
+  if (sum.reports.size() > kMostReports) sum.reports.resize(kMostReports);
   sum.tally += sibling.tally;
   sum.eye_rays += sibling.eye_rays;
   sum.passes = {std::min(sum.passes.first, sibling.passes.first),

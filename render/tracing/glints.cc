@@ -110,8 +110,8 @@ struct Chain {
 };
 using Chains = std::vector<Chain>;
 
-// The key of a chain's surfaces with another one behind: analytic shapes are told apart, triangles
-// of a mesh are not.
+// The key of a chain's surfaces with another one behind: each analytic shape has its own, all
+// triangles of a mesh have one.
 std::uint64_t WithSurface(std::uint64_t surfaces, const Scene& scene, const SurfacePoint& surface) {
   const std::uint64_t part =
       MeshOf(scene, surface.geometry) == nullptr ? surface.primitive : surface.instance;

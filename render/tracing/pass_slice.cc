@@ -49,8 +49,10 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   SliceSums slice = EmptySlice({pass.pass, pass.pass + 1}, pixels, evidence);
   slice.tally = sums.tally();
   slice.eye_rays = pass.rays;
-  for (const FoundPhoton& found : sums.FoundInOrder())
+  for (const FoundPhoton& found : sums.FoundInOrder()) {
+    if (slice.reports.size() == kMostReports) break;
     slice.reports.push_back({found.numbers, pass.pixels[found.row]});
+  }
   std::vector<float*> columns;
   for (std::vector<float>& column : slice.columns)
     columns.push_back(column.data());

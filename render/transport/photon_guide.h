@@ -2,7 +2,7 @@
 //
 // A photon's emission follows from five numbers in [0, 1): which emitter, where on it and into
 // which direction. Drawn evenly, they send photons in proportion to power, most of which may land
-// where nobody looks. A guide is a piecewise constant density over these numbers, learned from the
+// out of view. A guide is a piecewise constant density over these numbers, learned from the
 // photons that hitpoints found in earlier passes (estimate/guide_learning.h). It is a binary tree:
 // each node halves its box along one of the numbers and says which share of the photons goes to
 // the lower half. Numbers are warped on the way down, so that evenly spaced ones stay evenly spaced

@@ -1,6 +1,7 @@
 // Are slices the same sums, whoever adds up what, and as exact as they say?
 #include "render/estimate/slice_sums.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -137,6 +138,27 @@ TEST(ImageSumsTest, ATailCountsUntilItIsTakenAway) {
   EXPECT_EQ(sums.At(3).photons, with_tail.photons);
   EXPECT_EQ(sums.At(3).squared_deviations, with_tail.squared_deviations);
   EXPECT_EQ(sums.passes(), 3U);
+}
+
+// Whichever half is added to which, the reports of the first pass come first, and those that there
+// is no room for are left out from behind.
+TEST(SliceSumsTest, ReportsAreInOrderAndBounded) {
+  const auto with = [](std::uint64_t pass, std::size_t reports) {
+    SliceSums slice = EmptySlice({pass, pass + 1}, 3, 0);
+    slice.reports.assign(reports, {.pixel = static_cast<std::uint32_t>(pass - 16)});
+    return slice;
+  };
+  for (const bool is_first : {true, false}) {
+    for (const std::size_t many : {std::size_t{5}, kMostReports - 1}) {
+      const SliceSums first = with(16, many);
+      const SliceSums second = with(17, 3);
+      SliceSums sum = is_first ? first : second;
+      ASSERT_TRUE(MergeSibling(sum, is_first ? second : first).ok());
+      ASSERT_EQ(sum.reports.size(), std::min(many + 3, kMostReports));
+      EXPECT_EQ(sum.reports[many - 1].pixel, 0U);
+      EXPECT_EQ(sum.reports[many].pixel, 1U);
+    }
+  }
 }
 
 }  // namespace
