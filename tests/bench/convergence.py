@@ -9,19 +9,23 @@ seen them) and twelve others through a coordinator and a worker of its own. For 
 and time it notes the estimated error with its interval and, against a reference whose own noise is
 taken off, the true error with and without the worst 0.1 % of pixels. Errors are roots of relMSE.
 
-The squared error falls about as time to the power of -2/3 to -1, so a reference should have some
-twenty times the longest time. It has the radii of a job's defaults: with smaller ones, as `lucerna
-reference` has them, its noise would be more than the error that is judged. Its own bias, about a tenth of that of the longest time, is not seen.
+Times are processor time of coordinator and worker over two, seconds of a machine of two idle cores:
+what else runs on the machine does not matter. One job of each scene goes on from one time to the
+next.
+
+The squared error falls about as time to the power of -2/3 to -1, so a reference should have many times
+the longest time. It has the radii of a job's defaults: with smaller ones, as `lucerna
+reference` has them, its noise would be more than the error that is judged. Its own bias is not seen.
 
 Results are kept in docs/convergence/results.csv: what is there is not rendered again, so that the
-program can be stopped and started. References are kept in --work. At the end the page
-docs/convergence.md and a plot for each scene are written from the table. In full it takes about
-an hour on an idle machine of two cores.
+program can be stopped and started. References are kept in --work. At the end, and after every
+scene, the page docs/convergence.md and a plot for each scene are written from the table.
 """
 import argparse
 import csv
 import json
 import math
+import os
 import pathlib
 import subprocess
 import sys
@@ -71,14 +75,47 @@ class Cluster:
             process.terminate()
             process.wait()
 
-    def render(self, scene, flags, seconds, image):
-        """The job's report after `seconds`; its image goes to `image`."""
-        at = ["--server", self.address]
-        job = json.loads(run([BIN / "lucerna", "submit", scene, *at, "--time", seconds, *flags,
-                              "--json"]))["job_id"]
-        run([BIN / "lucerna", "watch", job, *at, "--quiet"])
-        run([BIN / "lucerna", "fetch", job, *at, "-o", image, "--quiet"])
-        return json.loads(run([BIN / "lucerna", "report", job, *at, "--json"]))
+    def seconds(self):
+        """Processor time of both programs over two."""
+        ticks = 0
+        for process in (self.worker, self.server):
+            stat = pathlib.Path(f"/proc/{process.pid}/stat").read_text(encoding="utf-8")
+            ticks += sum(map(int, stat.rpartition(")")[2].split()[11:13]))
+        return ticks / os.sysconf("SC_CLK_TCK") / 2
+
+    def lucerna(self, *words):
+        return run([BIN / "lucerna", *words, "--server", self.address])
+
+
+class Job:
+    """A job that goes on from one time to the next."""
+
+    FIRST_PASSES = 4
+
+    def __init__(self, cluster, scene, flags):
+        self.cluster = cluster
+        self.start = cluster.seconds()
+        self.passes = self.FIRST_PASSES
+        self.name = json.loads(cluster.lucerna("submit", scene, "--passes", self.passes, *flags,
+                                               "--json"))["job_id"]
+        self.wait()
+
+    def wait(self):
+        self.cluster.lucerna("watch", self.name, "--quiet")
+        self.seconds = self.cluster.seconds() - self.start
+
+    def go_on_to(self, seconds):
+        """At least to 95 % of this time. The first passes tell little of what later ones take."""
+        while self.seconds < 0.95 * seconds:
+            grown = min(seconds / self.seconds, 2 if self.passes < 32 else 100)
+            self.passes = max(self.passes + 1, round(self.passes * grown))
+            self.cluster.lucerna("extend", self.name, "--passes", self.passes)
+            self.wait()
+
+    def fetch(self, image):
+        """The report; the image goes to `image`."""
+        self.cluster.lucerna("fetch", self.name, "-o", image, "--quiet")
+        return json.loads(self.cluster.lucerna("report", self.name, "--json"))
 
 
 def true_error(image, reference, trim):
@@ -88,18 +125,34 @@ def true_error(image, reference, trim):
     return math.sqrt(max(diff["rel_mse"] - noise, 0.0)), math.sqrt(max(noise, 0.0))
 
 
-def measure(cluster, name, path, setting, seconds, arguments, reference, folder):
-    image = folder / "image.exr"
-    flags = ["--size", arguments.size, *FLAGS[setting]]
-    job = cluster.render(path, flags, seconds, image)
-    error = job["convergence"][-1]["relative"]
+def row_of(name, setting, seconds, report, image, reference):
+    error = report["convergence"][-1]["relative"]
     trimmed, noise = true_error(image, reference, trim=True)
     untrimmed, _ = true_error(image, reference, trim=False)
-    return {"scene": name, "setting": setting, "time_s": f"{seconds:g}", "passes": job["passes"],
-            "photons": job["photons"],
+    return {"scene": name, "setting": setting, "time_s": f"{seconds:g}", "passes": report["passes"],
+            "photons": report["photons"],
             "estimated": math.sqrt(error["noise"] + error["bias"]),
             "low": math.sqrt(error["low"]), "high": math.sqrt(error["high"]),
             "true_trimmed": trimmed, "true_untrimmed": untrimmed, "reference_noise": noise}
+
+
+def measure(cluster, name, path, wanted, arguments, folder):
+    """Rows of `wanted` [(setting, seconds)], in order of time for each setting."""
+    reference = arguments.work / f"{name}-{arguments.size}-{arguments.reference_s:g}.exr"
+    reports = []
+    job = None
+    for setting, seconds in wanted:
+        if job is None or setting != reports[-1][0]:
+            job = Job(cluster, path, ["--size", arguments.size, *FLAGS[setting]])
+        job.go_on_to(seconds)
+        image = folder / f"{setting}-{seconds:g}.exr"
+        reports.append((setting, seconds, job.fetch(image), image))
+        passes_per_s = job.passes / job.seconds
+    if not reference.exists():
+        run([BIN / "lucerna", "reference", path, "--size", arguments.size, "--quiet",
+             "--seed", "1000003", "--radius-controller", "appm", "--initial-radius", "3px",
+             "--passes", math.ceil(passes_per_s * arguments.reference_s), "-o", reference])
+    return [row_of(name, *report, reference) for report in reports]
 
 
 def read_rows(path):
@@ -247,7 +300,7 @@ def main():
         scenes = {name: scenes[name] for name in arguments.scenes.split(",")}
     table = arguments.docs / "convergence" / "results.csv"
     done = {(row["scene"], row["setting"], float(row["time_s"])) for row in read_rows(table)}
-    times = [float(word) for word in arguments.times.split(",")]
+    times = sorted(float(word) for word in arguments.times.split(","))
     with tempfile.TemporaryDirectory() as folder, \
             (arguments.work / "cluster.log").open("w", encoding="utf-8") as log:
         cluster = Cluster(log)
@@ -258,18 +311,12 @@ def main():
                 if not wanted:
                     continue
                 print(f"{index} of {len(scenes)}: {name}", flush=True)
-                reference = arguments.work / f"{name}-{arguments.size}-{arguments.reference_s:g}.exr"
-                if not reference.exists():
-                    run([BIN / "lucerna", "reference", path, "--size", arguments.size, "--quiet",
-                         "--seed", "1000003", "--radius-controller", "appm",
-                         "--initial-radius", "3px", "--time", arguments.reference_s, "-o",
-                         reference])
-                for setting, seconds in wanted:
-                    row = measure(cluster, name, path, setting, seconds, arguments, reference,
-                                  pathlib.Path(folder))
+                for row in measure(cluster, name, path, wanted, arguments, pathlib.Path(folder)):
                     append_row(table, row)
-                    print(f"  {setting} {seconds:g} s: true {100 * row['true_trimmed']:.2f} %, "
-                          f"estimated {100 * row['estimated']:.2f} %", flush=True)
+                    print(f"  {row['setting']} {row['time_s']} s: true "
+                          f"{100 * row['true_trimmed']:.2f} %, estimated "
+                          f"{100 * row['estimated']:.2f} %", flush=True)
+                write_page(read_rows(table), arguments)
         finally:
             cluster.close()
     write_page(read_rows(table), arguments)
