@@ -87,7 +87,7 @@ std::string NameOf(const LightGroup& light, std::size_t number, double unit) {
 
 // Luminance of a pixel.
 double ValueAt(const ImageSums& sums, std::size_t pixel) {
-  const RgbSum radiance = sums.At(pixel).radiance();
+  const RgbSum radiance = sums.RadianceAt(pixel);
   return std::max(0.0, WorkingLuminance(radiance[0], radiance[1], radiance[2])) /
          static_cast<double>(sums.passes());
 }

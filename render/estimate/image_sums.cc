@@ -157,6 +157,20 @@ ImageSums::Pixel ImageSums::At(std::size_t pixel) const {
   return sum;
 }
 
+RgbSum ImageSums::RadianceAt(std::size_t pixel) const {
+  RgbSum radiance{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    double photons = whole_.columns.radiance[c][pixel];
+    double direct = whole_.columns.radiance[3 + c][pixel];
+    for (const auto& slice : tail_) {
+      photons += static_cast<double>(slice->columns[kPhotonRadiance + c][pixel]);
+      direct += static_cast<double>(slice->columns[kDirectRadiance + c][pixel]);
+    }
+    radiance[c] = photons + direct;
+  }
+  return radiance;
+}
+
 ImageSums::Features ImageSums::FeaturesAt(std::size_t pixel) const {
   Features sum = whole_.features[pixel];
   for (const auto& slice : tail_)

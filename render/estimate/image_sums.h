@@ -58,6 +58,8 @@ class ImageSums {
     }
   };
   [[nodiscard]] Pixel At(std::size_t pixel) const;
+  // At(pixel).radiance(), read from fewer columns.
+  [[nodiscard]] RgbSum RadianceAt(std::size_t pixel) const;
 
   // What eye paths saw at their first gathering surfaces: sums over the passes that met one.
   struct Features {

@@ -128,6 +128,7 @@ TEST(ImageSumsTest, ATailCountsUntilItIsTakenAway) {
   const ImageSums::Pixel before = sums.At(3);
   sums.SetTail({std::make_shared<const SliceSums>(RandomPass(2))});
   const ImageSums::Pixel with_tail = sums.At(3);
+  EXPECT_EQ(sums.RadianceAt(3), with_tail.radiance());
   EXPECT_EQ(sums.passes(), 3U);
   EXPECT_EQ(sums.whole_passes(), 2U);
   sums.SetTail({});
