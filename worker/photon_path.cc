@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -55,6 +56,7 @@ PrimaryNumbers EvenNumbers(const SobolPoint& u, KeyedRng& rng) {
 // Records nothing: for photons that are not replayed.
 struct NoWatcher {
   void Emitted(const Emission& /*emission*/) const {}
+  void TookWavelength(float /*nm*/) const {}
   void Landed(const Hit& /*hit*/, const SurfacePoint& /*surface*/, const Material& /*material*/,
               Rgb /*arriving*/) const {}
   void ScatteredByMedium(Vec3 /*position*/, std::int32_t /*medium*/, float /*length*/,
@@ -73,6 +75,7 @@ class HistoryWatcher {
   explicit HistoryWatcher(PhotonHistory& history) : history_(history) {}
 
   void Emitted(const Emission& emission) { history_.emission = emission; }
+  void TookWavelength(float nm) { history_.wavelength_nm = nm; }
   void Landed(const Hit& hit, const SurfacePoint& surface, const Material& material, Rgb arriving) {
     PhotonLanding& landing = history_.landings.emplace_back();
     landing.surface = surface;
@@ -153,7 +156,8 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       parts_{needs.Uses(Part::kShadingNormals),
              needs.Uses(Part::kSpecular) || needs.Uses(Part::kGlossy) ||
                  needs.Uses(Part::kCausticHitpoints),
-             needs.Uses(Part::kCausticHitpoints), needs.Uses(Part::kMedia)},
+             needs.Uses(Part::kCausticHitpoints), needs.Uses(Part::kMedia),
+             needs.Uses(Part::kDispersion)},
       keep_(needs.Uses(Part::kPhotonDirections) ? KeepColumns<true, true>
             : needs.Uses(Part::kPhotonNormals)  ? KeepColumns<true, false>
                                                 : KeepColumns<false, false>) {
@@ -326,7 +330,8 @@ PhotonHistory PhotonPathTracer::Replay(std::uint64_t pass, std::uint64_t index) 
   HistoryWatcher watcher(history);
   Landed landed;
   // A spectrum follows the walk and never changes it; nor does a part that the scene does not have.
-  history.end = Walk<true, false>(KeyOf(pass, index), {true, true, parts_.caustics, parts_.media},
+  history.end = Walk<true, false>(KeyOf(pass, index),
+                                  {true, true, parts_.caustics, parts_.media, parts_.dispersion},
                                   landed, watcher);
   return history;
 }
@@ -413,6 +418,12 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
   if constexpr (kSpectrum) spectrum = spectra_->Leave(emission);
   // A photon that a medium has scattered has no spectrum any more.
   [[maybe_unused]] bool has_spectrum = true;
+  PathWavelength wavelength;
+  if (parts.dispersion) {
+    constexpr std::uint64_t kWavelengthKey = 0x574156454C454E47ULL;
+    wavelength =
+        PathWavelength(KeyedRng(CombineKeys(key.job_key ^ kWavelengthKey, key.number)).Uniform());
+  }
   std::int32_t medium = parts.media ? light_media_[emission.emitter] : kNoMedium;
   for (int landing = 0; landing < settings_.max_depth; ++landing) {
     Hit hit;
@@ -468,9 +479,17 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
     const MaterialProperties& properties = properties_[surface.material];
     [[maybe_unused]] std::optional<Material> textured;
     const Material& material = [&]() -> const Material& {
-      if constexpr (kTextures) return MaterialAt(scene_, surface, wo, textured);
+      if constexpr (kTextures) return MaterialAt(scene_, surface, wo, textured, wavelength);
       return scene_.materials[surface.material];
     }();
+    if (parts.dispersion && wavelength.IsFirstUsedAt(material)) {
+      flux *= wavelength.color();
+      // As with a roulette, some photons get more energy and others less.
+      const std::int64_t units = WholeUnits(EnergyOf(flux));
+      (units > carried ? energy.roulette_gain : energy.roulette_loss) += std::abs(units - carried);
+      carried = units;
+      watcher.TookWavelength(wavelength.nm());
+    }
     watcher.Landed(hit, surface, material, flux);
     const bool is_smoothed = parts.shading_normals && surface.has_shading_normal;
     if (is_smoothed) {

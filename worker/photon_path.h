@@ -115,7 +115,8 @@ struct PhotonLanding {
 
 // All that a photon did.
 struct PhotonHistory {
-  Emission emission;  // meaningless when it was not emitted
+  Emission emission;        // meaningless when it was not emitted
+  float wavelength_nm = 0;  // of one that met glass that disperses
   std::vector<PhotonLanding> landings;
   PhotonEnd end = PhotonEnd::kNotEmitted;
 };
@@ -180,6 +181,7 @@ class PhotonPathTracer {
     bool lobes = false;     // other scattering than diffuse
     bool caustics = false;  // deposits for hitpoints of caustic photons
     bool media = false;
+    bool dispersion = false;
   };
   // What becomes of a photon on its way to the next surface that is no interface.
   struct Flight {

@@ -142,6 +142,7 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
   *emission.mutable_position() = TripleOf(history.emission.ray.origin);
   *emission.mutable_direction() = TripleOf(history.emission.ray.direction);
   *emission.mutable_flux() = TripleOf(history.emission.flux);
+  path.set_wavelength_nm(static_cast<double>(history.wavelength_nm));
   for (const PhotonLanding& landing : history.landings) {
     *path.add_landings() = LandingToProto(landing, prepared.scene());
   }

@@ -106,6 +106,8 @@ std::string PhotonPathText(const v1::PhotonPath& path) {
     text += Line("from", Point(path.emission().position()));
     text += Line("towards", Point(path.emission().direction()));
     text += Line("flux", Flux(path.emission().flux()));
+    if (path.wavelength_nm() > 0)
+      text += Line("wavelength", absl::StrFormat("%.1f nm", path.wavelength_nm()));
   } else {
     text += "\n";
   }

@@ -47,6 +47,7 @@ constexpr std::array<std::string_view, kParts> kNames = {
     "media",
     "alpha-masks",
     "instances",
+    "dispersion",
 };
 
 // Sets of eye paths: with fewer the edges of shapes would be seen not to be smooth.
@@ -312,8 +313,13 @@ class NeedsFinder {
     const Material* varied = First([](const Material& m) { return m.DependsOnPlace(); });
     Set(Part::kTextures, varied != nullptr,
         textured_ != nullptr ? Concat(Quoted(*textured_), " has one")
-        : varied != nullptr  ? Concat(Quoted(*varied), " is another one at each place")
-                             : std::string("no surface has one"));
+        : varied != nullptr ? Concat(Quoted(*varied), " is another one at each place or wavelength")
+                            : std::string("no surface has one"));
+    const Material* dispersive = First([](const Material& m) { return m.Disperses(); });
+    Set(Part::kDispersion, dispersive != nullptr,
+        dispersive != nullptr
+            ? Concat(Quoted(*dispersive), " bends each wavelength differently")
+            : std::string("no glass has an index that depends on the wavelength"));
     Set(Part::kRoundShapes, RoundShapes() > 0,
         RoundShapes() > 0 ? Concat("shapes that are given by a formula: ", RoundShapes())
                           : std::string("everything is made of triangles"));

@@ -50,9 +50,10 @@ enum class Part : std::uint8_t {
   kMotion,
   kMedia,
   kAlphaMasks,
-  kInstances,  // a second level of the acceleration structure
+  kInstances,   // a second level of the acceleration structure
+  kDispersion,  // a wavelength for each path
 };
-inline constexpr std::size_t kParts = static_cast<std::size_t>(Part::kInstances) + 1;
+inline constexpr std::size_t kParts = static_cast<std::size_t>(Part::kDispersion) + 1;
 
 [[nodiscard]] constexpr std::array<Part, kParts> AllParts() {
   std::array<Part, kParts> parts{};

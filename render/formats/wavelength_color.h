@@ -1,10 +1,7 @@
 // What colour is light, or a surface, that is described by wavelength?
 //
-// Through the CIE 1931 observer to linear Rec. 709. Colours outside Rec. 709 are cut off at zero.
-//
-// Source: Wyman, Sloan and Shirley 2013, "Simple Analytic Approximations to the CIE XYZ Color
-// Matching Functions" (the multi-lobe fit, within about 1 % of the observer); CIE 15 for the
-// daylight illuminant D65.
+// Through the CIE 1931 observer (math/color_matching.h) to linear Rec. 709. Colours outside Rec.
+// 709 are cut off at zero.
 #pragma once
 
 #include <vector>

@@ -18,6 +18,7 @@
 #include <string_view>
 #include <vector>
 
+#include "render/math/dispersion.h"
 #include "render/math/rgb.h"
 #include "render/scene/texture.h"
 
@@ -61,6 +62,7 @@ struct MaterialNumbers {
   Rgb eta = {1, 1, 1};                   // conductor, under a coat too: index of refraction
   Rgb k = {0, 0, 0};                     // the same: absorption
   float ior = 1.5F;                      // dielectric, coat: inside over outside
+  Dispersion dispersion;                 // dielectric; `ior` is that at the d line
   float alpha_u = 0;                     // of metals, dielectrics and coats: GGX widths; 0 and 0:
   float alpha_v = 0;                     // smooth
   float base_alpha_u = 0;                // of the metal under a coat: GGX widths; 0 and 0: smooth
@@ -127,9 +129,14 @@ struct MaterialNumbers {
            roughness_textures[0] != roughness_textures[1] ||
            roughness_textures[2] != roughness_textures[3];
   }
-  // Whether it is not known before a place on a surface is.
+  // Whether it sends each wavelength into another direction.
+  [[nodiscard]] bool Disperses() const {
+    return kind == Kind::kDielectric && !dispersion.is_none() && alpha_u == 0 && alpha_v == 0 &&
+           !HasRoughnessTexture();
+  }
+  // Whether it is not known before a place on a surface, and a path's wavelength, is.
   [[nodiscard]] bool DependsOnPlace() const {
-    return HasTexture() || kind == Kind::kMix || IsAnisotropic();
+    return HasTexture() || kind == Kind::kMix || IsAnisotropic() || Disperses();
   }
 };
 

@@ -183,7 +183,7 @@ Rgb EyePathTracer::BrightPart(Rgb emitted) const {
   return strength > white_ ? emitted * (1 - white_ / strength) : Rgb{};
 }
 
-Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng) const {
+Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, float u_wavelength) const {
   Hit hit;
   if (!FindFirst(ray, {}, hit)) return BrightPart(lights_.InfiniteRadiance(ray.direction));
   SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
@@ -192,15 +192,18 @@ Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng) const {
   if (!properties_[surface.material].scatters_smoothly) return bright;
   int rays = 0;
   std::optional<Material> storage;
-  const Material& material = MaterialAt(scene_, surface, wo, storage);
-  return bright + BrightPart(EmissionThrough(surface, material, wo, kNoMedium, rng, rays));
+  PathWavelength wavelength = WavelengthOf(u_wavelength);
+  const Material& material = MaterialAt(scene_, surface, wo, storage, wavelength);
+  const Rgb color = wavelength.IsFirstUsedAt(material) ? wavelength.color() : Gray(1);
+  return bright + BrightPart(color * EmissionThrough(surface, material, wo, kNoMedium, wavelength,
+                                                     rng, rays));
 }
 
 Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
   const PixelSampler sampler = SamplerOf(x, y, pass);
   float filter_weight = 1;
   const Ray ray = CameraRay(sampler, x, y, filter_weight);
-  return BrightOf(ray, sampler.ForBranches());
+  return BrightOf(ray, sampler.ForBranches(), sampler.ForWavelength());
 }
 
 EyePathTracer::BrightPath EyePathTracer::TraceBrightPath(int x, int y, std::uint64_t pass,
@@ -214,7 +217,7 @@ EyePathTracer::BrightPath EyePathTracer::TraceBrightPath(int x, int y, std::uint
   const Ray ray = CameraRayThrough(settings_.crop_x0 + x + 0.5 + static_cast<double>(path.from.x),
                                    settings_.crop_y0 + y + 0.5 + static_cast<double>(path.from.y),
                                    path.from.on_lens);
-  path.bright = BrightOf(ray, sample.branches);
+  path.bright = BrightOf(ray, sample.branches, sample.wavelength());
   return path;
 }
 
@@ -324,18 +327,21 @@ std::array<EyePathTracer::SmoothBranch, EyePathTracer::kSmoothLobes> EyePathTrac
 }
 
 Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, const Material& first_material,
-                                   Vec3 first_wo, std::int32_t medium, KeyedRng rng,
+                                   Vec3 first_wo, std::int32_t medium,
+                                   const PathWavelength& wavelength, KeyedRng rng,
                                    int& rays) const {
   struct Branch {
     Ray ray;
     std::int32_t medium;
+    PathWavelength wavelength;
     Rgb weight;
     int vertex;
   };
   // A pair at each vertex, of which one is followed at once: the stack grows by one a vertex.
   std::vector<Branch> branches;
   const auto branch_at = [&](const SurfacePoint& surface, const Material& whole, Vec3 wo,
-                             std::int32_t before, Rgb weight, int vertex) {
+                             std::int32_t before, const PathWavelength& of_path, Rgb weight,
+                             int vertex) {
     if (vertex >= settings_.max_depth) return;
     for (const SmoothBranch& branch : SmoothBranches(surface, whole, wo)) {
       if (!branch.exists) continue;
@@ -347,12 +353,15 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, const Material& fi
       }
       const std::int32_t after =
           parts_.media && branch.transmits ? media_.Beyond(surface, branch.wi, before) : before;
-      branches.push_back(
-          {{LeavingPoint(surface, branch.wi), branch.wi, HUGE_VALF}, after, next, vertex + 1});
+      branches.push_back({{LeavingPoint(surface, branch.wi), branch.wi, HUGE_VALF},
+                          after,
+                          of_path,
+                          next,
+                          vertex + 1});
     }
   };
   Rgb seen;
-  branch_at(first, first_material, first_wo, medium, Gray(1), 0);
+  branch_at(first, first_material, first_wo, medium, wavelength, Gray(1), 0);
   while (!branches.empty()) {
     Branch branch = branches.back();
     branches.pop_back();
@@ -366,8 +375,10 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, const Material& fi
     seen += branch.weight * lights_.EmittedRadiance(surface, wo);
     if (!properties_[surface.material].scatters_smoothly) continue;
     std::optional<Material> storage;
-    const Material& material = MaterialAt(scene_, surface, wo, storage);
-    branch_at(surface, material, wo, branch.medium, branch.weight, branch.vertex);
+    const Material& material = MaterialAt(scene_, surface, wo, storage, branch.wavelength);
+    if (branch.wavelength.IsFirstUsedAt(material)) branch.weight *= branch.wavelength.color();
+    branch_at(surface, material, wo, branch.medium, branch.wavelength, branch.weight,
+              branch.vertex);
   }
   return seen;
 }
@@ -433,6 +444,8 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     path.segment.weight *= segment_strength;
     return path;
   };
+  PathWavelength wavelength =
+      parts_.dispersion ? PathWavelength(sampler.ForWavelength()) : PathWavelength();
   bool has_features = false;  // of a gathering surface
   const auto add_first_emission = [&](Rgb emitted) {
     const Rgb bright = BrightPart(emitted);
@@ -476,9 +489,10 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     }
     std::optional<Material> textured;
     const Material& whole = [&]() -> const Material& {
-      if (parts_.textures) return MaterialAt(scene_, surface, wo, textured);
+      if (parts_.textures) return MaterialAt(scene_, surface, wo, textured, wavelength);
       return scene_.materials[surface.material];
     }();
+    if (parts_.dispersion && wavelength.IsFirstUsedAt(whole)) weight *= wavelength.color();
     MaterialProperties changed = textured ? PropertiesOf(*textured) : MaterialProperties();
     const MaterialProperties& whole_properties = textured ? changed : properties_[surface.material];
     if (!has_features && (vertex == 0 || whole_properties.gathers)) {
@@ -493,8 +507,8 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     const bool has_parts = parts_.lobes && whole_properties.has_parts;
     const float share_of_first = has_parts ? ShareOfFirst(whole, wo_local) : -1;
     if (parts_.lobes && vertex == 0 && whole_properties.scatters_smoothly && rays_find_lights_) {
-      add_first_emission(
-          weight * EmissionThrough(surface, whole, wo, medium, sampler.ForBranches(), path.rays));
+      add_first_emission(weight * EmissionThrough(surface, whole, wo, medium, wavelength,
+                                                  sampler.ForBranches(), path.rays));
       emission_was_collected = true;
     }
     if (parts_.lights && !(parts_.lobes && whole_properties.is_smooth)) {
@@ -616,7 +630,8 @@ EyePathTracer::WalkParts EyePathTracer::WalkPartsFor(const SceneNeeds& needs) {
           .lobes = needs.Uses(Part::kSpecular) || needs.Uses(Part::kGlossy) || caustics,
           .lights = needs.Uses(Part::kDirectSampling),
           .caustics = caustics,
-          .media = needs.Uses(Part::kMedia)};
+          .media = needs.Uses(Part::kMedia),
+          .dispersion = needs.Uses(Part::kDispersion)};
 }
 
 }  // namespace lucerna

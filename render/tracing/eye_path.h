@@ -16,6 +16,7 @@
 #include "render/transport/caustic_weight.h"
 #include "render/transport/light.h"
 #include "render/transport/media.h"
+#include "render/transport/path_wavelength.h"
 
 namespace lucerna {
 
@@ -113,8 +114,9 @@ class EyePathTracer {
   [[nodiscard]] Vec3 OnLens(float u, float v) const;
   // Through a point of the film [pixels of the whole image] and one of the lens, in the unit disc.
   [[nodiscard]] Ray CameraRayThrough(double film_x, double film_y, Vec3 on_lens) const;
-  // The bright part of what a camera's ray meets; `rng` for branches of smooth surfaces.
-  [[nodiscard]] Rgb BrightOf(const Ray& ray, KeyedRng rng) const;
+  // The bright part of what a camera's ray meets; `rng` for branches of smooth surfaces,
+  // `u_wavelength` in [0, 1) for the wavelength.
+  [[nodiscard]] Rgb BrightOf(const Ray& ray, KeyedRng rng, float u_wavelength) const;
   // A reflection (`lobe` 0) or refraction (1) at a smooth surface.
   struct SmoothBranch {
     bool exists = false;
@@ -154,6 +156,7 @@ class EyePathTracer {
     bool lights = false;    // that are sampled
     bool caustics = false;  // hitpoints for caustic photons
     bool media = false;
+    bool dispersion = false;
   };
   [[nodiscard]] static WalkParts WalkPartsFor(const SceneNeeds& needs);
   [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler, First first) const;
@@ -166,10 +169,14 @@ class EyePathTracer {
   // Radiance that leaves a smooth surface towards `first_wo` and was emitted where a chain of
   // smooth surfaces ends: reflections and refractions are all followed, not drawn.
   // `first_material`: of `first`, which it has been applied to (MaterialAt). `medium`: in which
-  // `first_wo` leaves.
+  // `first_wo` leaves. `wavelength`: has met `first_material`.
   [[nodiscard]] Rgb EmissionThrough(const SurfacePoint& first, const Material& first_material,
-                                    Vec3 first_wo, std::int32_t medium, KeyedRng rng,
+                                    Vec3 first_wo, std::int32_t medium,
+                                    const PathWavelength& wavelength, KeyedRng rng,
                                     int& rays) const;
+  [[nodiscard]] PathWavelength WavelengthOf(float u) const {
+    return parts_.dispersion ? PathWavelength(u) : PathWavelength();
+  }
   // What a ray in `medium` meets, behind interfaces; with media, what is left of light on the way.
   [[nodiscard]] bool FindThroughMedia(Ray& ray, Hit& hit, std::int32_t& medium, Rgb& transmittance,
                                       int& rays) const;

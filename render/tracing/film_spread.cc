@@ -130,8 +130,9 @@ std::vector<FilmSpread::GlintPath> FilmSpread::TraceGlints(std::uint64_t pass,
         path.y = image_.y0 + static_cast<int>(row);
         path.from.x = static_cast<float>(place.x - column - 0.5);
         path.from.y = static_cast<float>(place.y - row - 0.5);
-        path.bright = tracer_.BrightOf(
-            tracer_.CameraRayThrough(place.x, place.y, path.from.on_lens), sample.branches);
+        path.bright =
+            tracer_.BrightOf(tracer_.CameraRayThrough(place.x, place.y, path.from.on_lens),
+                             sample.branches, sample.wavelength());
       }
     }
   });

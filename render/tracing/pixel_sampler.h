@@ -19,6 +19,7 @@ namespace lucerna {
 struct BrightSample {
   SobolPoint camera;  // as PixelSampler::ForCamera
   KeyedRng branches;  // as PixelSampler::ForBranches
+  [[nodiscard]] float wavelength() const { return camera[4]; }
 };
 
 class PixelSampler {
@@ -55,6 +56,11 @@ class PixelSampler {
     for (float& u : point)
       u = rng.Uniform();
     return point;
+  }
+
+  // For the path's wavelength, in [0, 1).
+  [[nodiscard]] float ForWavelength() const {
+    return OwenSobol(pass_, CombineKeys(key_, 0x574156454C454E47ULL))[0];
   }
 
   // Independent numbers for the tree of specular branches.

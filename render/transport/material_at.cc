@@ -77,7 +77,7 @@ TexturePlace PlaceOf(const Scene& scene, const SurfacePoint& point) {
 namespace material_at_internal {
 
 const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
-                        std::optional<Material>& storage) {
+                        std::optional<Material>& storage, const PathWavelength& wavelength) {
   const TexturePlace place = PlaceOf(scene, point);
   const Material& material = Chosen(scene, point, place, wo);
   if (!material.DependsOnPlace()) return material;
@@ -91,6 +91,8 @@ const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
     const Rgb color = TextureColor(scene.textures, material.second_texture, place);
     here.transmittance = TexturedValue(material.kind, color * material.texture_scale);
   }
+  if (material.Disperses() && wavelength.is_drawn())
+    here.ior = IndexAt(wavelength.nm(), material.ior, material.dispersion);
   if (material.HasRoughnessTexture()) LookUpRoughness(scene, place, material, here);
   const bool is_turned = here.alpha_u != here.alpha_v || here.base_alpha_u != here.base_alpha_v;
   if (material.HasBumps()) {

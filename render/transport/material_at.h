@@ -6,12 +6,14 @@
 
 #include "render/geometry/intersector.h"
 #include "render/scene/scene.h"
+#include "render/transport/path_wavelength.h"
 
 namespace lucerna {
 
 namespace material_at_internal {
 [[nodiscard]] const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
-                                      std::optional<Material>& storage);
+                                      std::optional<Material>& storage,
+                                      const PathWavelength& wavelength);
 }  // namespace material_at_internal
 
 // The material of `scene`, or what textures make of it at the point, in `storage` (without the
@@ -20,13 +22,15 @@ namespace material_at_internal {
 // `point` becomes what the material makes of it: bumps and normal maps turn its shading normal
 // (once: not to be called again for the same point), a material that must be turned the right way
 // around its normal gives it a tangent, and of a mix the material becomes the one that is chosen
-// for the ray that comes from `wo`. Equal points and rays choose alike.
+// for the ray that comes from `wo`. Equal points and rays choose alike. Glass that disperses has
+// its index at the path's wavelength.
 [[nodiscard]] inline const Material& MaterialAt(const Scene& scene, SurfacePoint& point, Vec3 wo,
-                                                std::optional<Material>& storage) {
+                                                std::optional<Material>& storage,
+                                                const PathWavelength& wavelength = {}) {
   const Material& material = scene.materials[point.material];
   if (!material.DependsOnPlace()) [[likely]]
     return material;
-  return material_at_internal::AtPlace(scene, point, wo, storage);
+  return material_at_internal::AtPlace(scene, point, wo, storage, wavelength);
 }
 
 // Where textures are looked up for a point.

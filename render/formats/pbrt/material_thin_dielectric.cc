@@ -4,8 +4,7 @@
 namespace lucerna {
 
 void ReadThinDielectric(const MaterialInput& input, Material& material) {
-  material.ior =
-      static_cast<float>(input.parameters.FindRefractiveIndex("eta", kIndexRange).value_or(1.5));
+  material.ior = input.parameters.OneRefractiveIndex("eta", kIndexRange);
 }
 
 }  // namespace lucerna

@@ -143,7 +143,7 @@ void ReadRoughness(std::string_view prefix, Facets facets, const MaterialInput& 
 }
 
 void ReadCoat(std::string_view eta, ParameterList& parameters, Material& material) {
-  material.ior = static_cast<float>(parameters.FindRefractiveIndex(eta, kIndexRange).value_or(1.5));
+  material.ior = parameters.OneRefractiveIndex(eta, kIndexRange);
   material.thickness = static_cast<float>(parameters.Float("thickness", 0.01, {0, 1e6}));
   const std::int64_t depth = parameters.FindInteger("maxdepth", {1, 1'000'000}).value_or(10);
   // Every second event is at the base.

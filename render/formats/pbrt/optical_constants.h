@@ -1,16 +1,18 @@
 // What are the optical constants of the materials that pbrt knows by name?
 //
 // Metals as index of refraction and absorption at 630, 532 and 465 nm, glasses as the index at
-// the helium d line (587.6 nm). Dispersion within a glass is not rendered.
+// the helium d line (587.6 nm) and its dispersion.
 //
 // Source: Palik, "Handbook of Optical Constants of Solids" (Ag, Al, Au, Cu); Querry 1985,
 // "Optical constants" (CuZn, brass); Stephens and Malitson 1952 (MgO); DeVore 1951, the ordinary
-// ray of rutile (TiO2); Schott's data sheets (glasses); Peter 1923 (diamond).
+// ray of rutile (TiO2); Schott's data sheets (glasses, in the
+// form of Sellmeier 1871); Peter 1923 (diamond).
 #pragma once
 
 #include <optional>
 #include <string_view>
 
+#include "render/math/dispersion.h"
 #include "render/math/rgb.h"
 
 namespace lucerna {
@@ -27,6 +29,6 @@ struct MetalConstants {
 [[nodiscard]] std::optional<Rgb> MetalCurveNamed(std::string_view name);
 
 // By pbrt's name: "glass-BK7", "glass-F11" (which is Schott's SF11) and so on, "diamond".
-[[nodiscard]] std::optional<float> GlassNamed(std::string_view name);
+[[nodiscard]] std::optional<RefractiveIndex> GlassNamed(std::string_view name);
 
 }  // namespace lucerna

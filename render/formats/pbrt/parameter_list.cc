@@ -10,6 +10,8 @@
 namespace lucerna {
 namespace {
 
+// Of what Cauchy's equation makes of a curve of indices.
+constexpr double kLargestIndexError = 2e-3;
 constexpr std::array<std::string_view, 1> kFloat = {"float"};
 constexpr std::array<std::string_view, 1> kInteger = {"integer"};
 constexpr std::array<std::string_view, 1> kBool = {"bool"};
@@ -300,7 +302,7 @@ std::optional<Rgb> ParameterList::FindOpticalConstant(std::string_view name, Ran
   Rgb constant;
   if (!parameter->strings.empty()) {
     const std::optional<Rgb> metal = MetalCurveNamed(parameter->strings[0]);
-    const std::optional<float> glass = GlassNamed(parameter->strings[0]);
+    const std::optional<RefractiveIndex> glass = GlassNamed(parameter->strings[0]);
     if (parameter->strings.size() != 1 || !(metal.has_value() || glass.has_value())) {
       diagnostics_.Error(
           parameter->location,
@@ -309,7 +311,7 @@ std::optional<Rgb> ParameterList::FindOpticalConstant(std::string_view name, Ran
                  "MgO and TiO2"));
       return std::nullopt;
     }
-    constant = metal.has_value() ? *metal : Gray(*glass);
+    constant = metal.has_value() ? *metal : Gray(glass->at_d);
   } else if (parameter->type == "rgb") {
     if (!CheckCount(*parameter, 3)) return std::nullopt;
     constant = ToRgb(parameter->numbers);
@@ -329,37 +331,58 @@ std::optional<Rgb> ParameterList::FindOpticalConstant(std::string_view name, Ran
   return constant;
 }
 
-std::optional<double> ParameterList::FindRefractiveIndex(std::string_view name, Range range) {
+std::optional<RefractiveIndex> ParameterList::FindRefractiveIndex(std::string_view name,
+                                                                  Range range) {
   const Parameter* parameter = Take(name, kIndexTypes, 0);
   if (parameter == nullptr) return std::nullopt;
-  double index = 0;
   if (parameter->type == "float") {
     if (!CheckCount(*parameter, 1)) return std::nullopt;
-    index = parameter->numbers[0];
-  } else {
-    if (!parameter->strings.empty()) {
-      const std::optional<float> glass = GlassNamed(parameter->strings[0]);
-      if (parameter->strings.size() != 1 || !glass.has_value()) {
-        diagnostics_.Error(
-            parameter->location,
-            Concat(Called(*parameter), ": unknown named spectrum ", Quoted(parameter->strings[0]),
-                   "; there are glass-BK7, glass-BAF10, glass-FK51A, glass-LASF9, glass-F5, ",
-                   "glass-F10, glass-F11 and diamond"));
-        return std::nullopt;
-      }
-      index = static_cast<double>(*glass);
-    } else {
-      const std::optional<WavelengthCurve> curve = CurveOf(*parameter);
-      if (!curve.has_value()) return std::nullopt;
-      constexpr double kHeliumDNm = 587.6;
-      index = curve->AtClamped(kHeliumDNm);
-    }
-    diagnostics_.Warning(parameter->location,
-                         Concat(Called(*parameter), ": dispersion is not rendered, one ",
-                                "index of refraction (at 587.6 nm) stands for all colours"));
+    if (!CheckRange(*parameter, parameter->numbers[0], range)) return std::nullopt;
+    return RefractiveIndex{static_cast<float>(parameter->numbers[0]), {}};
   }
-  if (!CheckRange(*parameter, index, range)) return std::nullopt;
+  if (!parameter->strings.empty()) {
+    const std::optional<RefractiveIndex> glass = GlassNamed(parameter->strings[0]);
+    if (parameter->strings.size() == 1 && glass.has_value()) return glass;
+    diagnostics_.Error(
+        parameter->location,
+        Concat(Called(*parameter), ": unknown named spectrum ", Quoted(parameter->strings[0]),
+               "; there are glass-BK7, glass-BAF10, glass-FK51A, glass-LASF9, glass-F5, ",
+               "glass-F10, glass-F11 and diamond"));
+    return std::nullopt;
+  }
+  const std::optional<WavelengthCurve> curve = CurveOf(*parameter);
+  if (!curve.has_value()) return std::nullopt;
+  for (const double value : curve->value) {
+    if (!CheckRange(*parameter, value, range)) return std::nullopt;
+  }
+  const auto index_at = [&](double nm) { return curve->AtClamped(nm); };
+  RefractiveIndex index = {static_cast<float>(index_at(kHeliumDNm)), FitDispersion(index_at)};
+  for (double nm = kFirstVisibleNm; nm <= kLastVisibleNm; nm += 1) {
+    const auto fitted =
+        static_cast<double>(IndexAt(static_cast<float>(nm), index.at_d, index.dispersion));
+    if (std::abs(fitted - index_at(nm)) > kLargestIndexError) {
+      diagnostics_.Warning(
+          parameter->location,
+          Concat(Called(*parameter), ": Cauchy's equation with three terms does not come within ",
+                 kLargestIndexError, " of this curve, so one index of refraction (at 587.6 nm) ",
+                 "stands for all colours"));
+      index.dispersion = {};
+      break;
+    }
+  }
   return index;
+}
+
+float ParameterList::OneRefractiveIndex(std::string_view name, Range range) {
+  const RefractiveIndex index = FindRefractiveIndex(name, range).value_or(RefractiveIndex{});
+  if (!index.dispersion.is_none()) WarnOfOneIndex(name);
+  return index.at_d;
+}
+
+void ParameterList::WarnOfOneIndex(std::string_view name) {
+  Warning(name,
+          "dispersion is rendered of smooth surfaces of material \"dielectric\" alone, here one "
+          "index of refraction (at 587.6 nm) stands for all colours");
 }
 
 void ParameterList::Ignore(std::string_view name) {

@@ -15,6 +15,7 @@
 
 #include "render/formats/diagnostic.h"
 #include "render/formats/wavelength_color.h"
+#include "render/math/dispersion.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 
@@ -81,7 +82,11 @@ class ParameterList {
   // An optical constant per channel: a colour, a number, a named metal or a curve.
   std::optional<Rgb> FindOpticalConstant(std::string_view name, Range range);
   // An index of refraction: a number, a named glass or a curve.
-  std::optional<double> FindRefractiveIndex(std::string_view name, Range range);
+  std::optional<RefractiveIndex> FindRefractiveIndex(std::string_view name, Range range);
+  // The same at the d line, 1.5 when it is absent, with a warning where it is not the same at all
+  // wavelengths.
+  float OneRefractiveIndex(std::string_view name, Range range);
+  void WarnOfOneIndex(std::string_view name);
 
   // Warns that a known parameter has no effect here.
   void Ignore(std::string_view name);

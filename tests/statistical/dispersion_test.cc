@@ -1,0 +1,128 @@
+// Is an image with glass that disperses the one of all wavelengths together?
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "render/math/color_space.h"
+#include "render/transport/path_wavelength.h"
+#include "tests/support/local_render.h"
+#include "tests/support/measure.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+constexpr int kSeeds = 16;
+constexpr int kWavelengths = 8;
+constexpr std::array<std::string_view, 3> kChannels = {"R", "G", "B"};
+
+// More dispersive than any: 1.43 to 1.77.
+constexpr float kAtD = 1.5F;
+constexpr Dispersion kStrong = {0.08F, 0};
+
+// What is looked at: a floor where a ball of glass gathers the light of a spot, or a wall, the
+// right part of it black, through the ball.
+enum class View : std::uint8_t { kFocus, kThroughBall };
+
+Scene BallScene(const Material& glass, View view) {
+  Scene scene;
+  const std::int32_t ball = AddMaterial(scene, glass);
+  const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.7F));
+  AddSphere(scene, {0, 0, 1.3F}, 1, ball);
+  if (view == View::kFocus) {
+    AddQuad(scene, {-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, white);
+    scene.spot_lights.push_back({.position = {0, 0, 9},
+                                 .direction = {0, 0, -1},
+                                 .intensity = Gray(50),
+                                 .cos_falloff_start = 0.991F,
+                                 .cos_total_width = 0.99F});
+    SetCamera(scene, {0, -6, 6}, {0, 0, 0}, {0, 0, 1}, 3, 12);
+  } else {
+    AddQuad(scene, {-8, 4, -8}, {9, 0, 0}, {0, 0, 16}, white);
+    AddQuad(scene, {1, 4, -8}, {7, 0, 0}, {0, 0, 16}, AddMaterial(scene, DiffuseMaterial(0)));
+    scene.point_lights.push_back({.position = {0, 3, 6}, .intensity = Gray(50)});
+    SetCamera(scene, {0, -6, 1.3}, {0, 0, 1.3}, {0, 0, 1}, 16, 32);
+  }
+  return scene;
+}
+
+// Of the left and the right half of the image: [channel + 3 * half].
+using Halves = std::array<double, 6>;
+
+Halves HalvesOf(const Image& image) {
+  Halves halves{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::vector<float>& pixels = image.Find(kChannels[c])->pixels;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      const bool is_right =
+          i % static_cast<std::size_t>(image.width) * 2 >= static_cast<std::size_t>(image.width);
+      halves[c + (is_right ? 3 : 0)] +=
+          static_cast<double>(pixels[i]) * 2 / static_cast<double>(pixels.size());
+    }
+  }
+  return halves;
+}
+
+class DispersionTest : public testing::TestWithParam<View> {
+ protected:
+  static Halves Render(const Material& glass, std::uint64_t seed) {
+    const Scene scene = BallScene(glass, GetParam());
+    // Photons bring the focus, eye paths what is seen through the ball.
+    const bool needs_photons = GetParam() == View::kFocus;
+    const RenderSettings settings =
+        TestSettings(scene, needs_photons ? 20000 : 2000, 0.05, 6, seed);
+    return HalvesOf(RenderLocally(scene, settings, needs_photons ? 8 : 48));
+  }
+};
+
+TEST_P(DispersionTest, TheImageIsThatOfPlainGlassesInTheColorsOfTheirWavelengths) {
+  Material strong = DielectricMaterial(kAtD);
+  strong.dispersion = kStrong;
+  std::array<std::vector<double>, 6> dispersed;
+  std::array<std::vector<double>, 6> together;
+  for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+    const Halves whole = Render(strong, seed);
+    Halves sum{};
+    for (int i = 0; i < kWavelengths; ++i) {
+      const PathWavelength wavelength((static_cast<float>(i) + 0.5F) / kWavelengths);
+      const Halves plain = Render(DielectricMaterial(IndexAt(wavelength.nm(), kAtD, kStrong)),
+                                  1000 * seed + static_cast<std::uint64_t>(i));
+      const Rgb color = wavelength.color();
+      const std::array<double, 3> rec709 =
+          ToRec709({static_cast<double>(color.r), static_cast<double>(color.g),
+                    static_cast<double>(color.b)});
+      for (std::size_t k = 0; k < 6; ++k)
+        sum[k] += rec709[k % 3] * plain[k] / kWavelengths;
+    }
+    for (std::size_t k = 0; k < 6; ++k) {
+      dispersed[k].push_back(whole[k]);
+      together[k].push_back(sum[k]);
+    }
+  }
+  // Twelve comparisons, a false alarm in a thousand runs.
+  const double quantile = StudentQuantile(SidakLevel(1e-3, 12), kSeeds);
+  bool is_seen = false;
+  for (std::size_t k = 0; k < 6; ++k) {
+    const MeasuredMean a = MeanOf(dispersed[k]);
+    const MeasuredMean b = MeanOf(together[k]);
+    const double bound = quantile * std::hypot(a.standard_error, b.standard_error);
+    EXPECT_NEAR(a.mean, b.mean, bound) << k;
+    // One index would make all channels of a half equal.
+    const MeasuredMean green = MeanOf(dispersed[k / 3 * 3 + 1]);
+    is_seen = is_seen || std::abs(a.mean - green.mean) > 2 * bound;
+  }
+  EXPECT_TRUE(is_seen) << "the bound would let a wrong result pass";
+}
+
+INSTANTIATE_TEST_SUITE_P(Views, DispersionTest, testing::Values(View::kFocus, View::kThroughBall),
+                         [](const testing::TestParamInfo<View>& view) {
+                           return view.param == View::kFocus ? "OfAFocus" : "ThroughTheBall";
+                         });
+
+}  // namespace
+}  // namespace lucerna
