@@ -17,8 +17,10 @@
 namespace lucerna {
 namespace {
 
-constexpr int kSeeds = 16;
-constexpr int kWavelengths = 8;
+constexpr int kSeeds = 12;
+// With half as many their sum is off by 3 % in blue, so with these by 0.8 %: errors of a sum over
+// midpoints fall with the square.
+constexpr int kWavelengths = 16;
 constexpr std::array<std::string_view, 3> kChannels = {"R", "G", "B"};
 
 // More dispersive than any: 1.43 to 1.77.
@@ -75,7 +77,7 @@ class DispersionTest : public testing::TestWithParam<View> {
     // Photons bring the focus, eye paths what is seen through the ball.
     const bool needs_photons = GetParam() == View::kFocus;
     const RenderSettings settings =
-        TestSettings(scene, needs_photons ? 20000 : 2000, 0.05, 6, seed);
+        TestSettings(scene, needs_photons ? 10000 : 2000, 0.05, 6, seed);
     return HalvesOf(RenderLocally(scene, settings, needs_photons ? 8 : 48));
   }
 };
@@ -106,15 +108,20 @@ TEST_P(DispersionTest, TheImageIsThatOfPlainGlassesInTheColorsOfTheirWavelengths
   }
   // Twelve comparisons, a false alarm in a thousand runs.
   const double quantile = StudentQuantile(SidakLevel(1e-3, 12), kSeeds);
-  bool is_seen = false;
+  std::array<double, 6> expected{};
+  std::array<double, 6> bound{};
   for (std::size_t k = 0; k < 6; ++k) {
     const MeasuredMean a = MeanOf(dispersed[k]);
     const MeasuredMean b = MeanOf(together[k]);
-    const double bound = quantile * std::hypot(a.standard_error, b.standard_error);
-    EXPECT_NEAR(a.mean, b.mean, bound) << k;
-    // One index would make all channels of a half equal.
-    const MeasuredMean green = MeanOf(dispersed[k / 3 * 3 + 1]);
-    is_seen = is_seen || std::abs(a.mean - green.mean) > 2 * bound;
+    expected[k] = b.mean;
+    bound[k] = quantile * std::hypot(a.standard_error, b.standard_error);
+    EXPECT_NEAR(a.mean, b.mean, bound[k]) << k;
+  }
+  // With one index all channels of a half are equal.
+  bool is_seen = false;
+  for (std::size_t k = 0; k < 6; ++k) {
+    for (std::size_t l = k / 3 * 3; l < k; ++l)
+      is_seen = is_seen || std::abs(expected[k] - expected[l]) > bound[k] + bound[l];
   }
   EXPECT_TRUE(is_seen) << "the bound would let a wrong result pass";
 }
