@@ -126,6 +126,25 @@ TEST(PbrtMaterialsTest, ACoatIsFittedToItsRoughness) {
   EXPECT_NE(here.coat_above, nullptr);
 }
 
+// Along u and v each a texture of its own, of the metal or of its coat.
+TEST(PbrtMaterialsTest, ACoatedMetalMayHaveATextureForEachWidth) {
+  const std::string textures =
+      std::string(kPlanar) +
+      "Texture \"u\" \"float\" \"scale\" \"texture tex\" \"r\" \"float scale\" 0.32\n"
+      "Texture \"v\" \"float\" \"scale\" \"texture tex\" \"r\" \"float scale\" 0.08\n";
+  for (const std::string part : {"conductor", "interface"}) {
+    const Material here = MetOnSphere(World(textures + "Material \"coatedconductor\" \"texture " +
+                                            part + ".uroughness\" \"u\" \"texture " + part +
+                                            ".vroughness\" \"v\" Shape \"sphere\""));
+    const bool is_base = part == "conductor";
+    // Roots of half of the scales.
+    EXPECT_NEAR(is_base ? here.base_alpha_u : here.alpha_u, 0.4F, 1e-5F);
+    EXPECT_NEAR(is_base ? here.base_alpha_v : here.alpha_v, 0.2F, 1e-5F);
+    EXPECT_NE(here.coat, nullptr);
+    EXPECT_NE(here.coat_above, nullptr);
+  }
+}
+
 constexpr const char* kTwo =
     "MakeNamedMaterial \"a\" \"string type\" \"diffuse\" \"rgb reflectance\" [0.25 0.25 0.25]\n"
     "MakeNamedMaterial \"b\" \"string type\" \"conductor\" \"float roughness\" 0.01\n";
