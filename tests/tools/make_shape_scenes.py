@@ -127,12 +127,12 @@ LightSource "infinite" "rgb L" [0.12 0.13 0.15]
 AttributeBegin
   AreaLightSource "diffuse" "rgb L" [16 15 13]
   Translate -2.4 -1.8 3
-  Rotate 140 0.6 -0.8 0
+  Rotate 140 -0.6 0.8 0
   Shape "disk" "float radius" 0.5
 AttributeEnd
 AttributeBegin
   AreaLightSource "diffuse" "rgb L" [20 18 15]
-  Translate 1.2 1.1 2.7
+  Translate 1.2 1.1 3.2
   Rotate 155 1 0 0
   Shape "disk" "float radius" 0.3
 AttributeEnd
