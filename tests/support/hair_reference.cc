@@ -19,7 +19,8 @@ double Reflectance(double cosine, double eta) {
 }
 
 double Longitudinal(double theta_o, double theta_i, double v) {
-  const double a = std::cos(theta_o) * std::cos(theta_i) / v;
+  // Tilted beyond the pole, a direction is on the other side of the fibre; I0 is even.
+  const double a = std::abs(std::cos(theta_o)) * std::cos(theta_i) / v;
   const double b = std::sin(theta_o) * std::sin(theta_i) / v;
   // Narrower lobes than the tests use would overflow.
   return std::cyl_bessel_i(0.0, a) * std::exp(-b) / (2 * v * std::sinh(1 / v));

@@ -139,7 +139,7 @@ TEST(OwnScenesTest, MeshesOfTheScenesAreSmooth) {
 
 TEST(OwnScenesTest, TheLocksAreHair) {
   const ParsedScene parsed = ParseOwn("locks.pbrt");
-  EXPECT_TRUE(parsed.diagnostics.empty()) << parsed.ToStatus();
+  ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
   EXPECT_GT(parsed.scene.curve_pieces.size(), 1000U);
   for (const CurvePiece& piece : parsed.scene.curve_pieces) {
     const Material& material =
