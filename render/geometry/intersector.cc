@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <type_traits>
 
 #include <embree3/rtcore.h>
 
@@ -87,6 +88,18 @@ void BoundsOfShape(const RTCBoundsFunctionArguments* arguments) {
   box->upper_z = bounds.high.z;
 }
 
+// Rays leave a tube unseen, by whichever of its pieces.
+template <typename Shape>
+bool LeavesTube(const std::vector<Shape>& shapes, const RTCRay& ray, float t, std::uint32_t index) {
+  if constexpr (std::is_same_v<Shape, CurvePiece>) {
+    return IsWithinNextPiece(
+        shapes, index,
+        {{ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z}, HUGE_VALF}, t);
+  } else {
+    return false;
+  }
+}
+
 template <typename Shape, std::vector<Shape> Scene::*kShapes>
 void IntersectedShape(const RTCIntersectFunctionNArguments* arguments) {
   if (arguments->valid[0] == 0) return;
@@ -99,6 +112,7 @@ void IntersectedShape(const RTCIntersectFunctionNArguments* arguments) {
                       ray.tnear, ray.tfar, t)) {
     return;
   }
+  if (LeavesTube(scene.*kShapes, ray, t, arguments->primID)) return;
   if (!IsWhole(shape.traits) &&
       PassesThroughShape(scene, shape, ray, t, arguments->geomID, arguments->primID)) {
     return;
@@ -120,6 +134,7 @@ void OccludedByShape(const RTCOccludedFunctionNArguments* arguments) {
   float t = 0;
   if (IntersectShape(shape, {ray->org_x, ray->org_y, ray->org_z},
                      {ray->dir_x, ray->dir_y, ray->dir_z}, ray->tnear, ray->tfar, t) &&
+      !LeavesTube(scene.*kShapes, *ray, t, arguments->primID) &&
       !(!IsWhole(shape.traits) &&
         PassesThroughShape(scene, shape, *ray, t, arguments->geomID, arguments->primID))) {
     ray->tfar = -HUGE_VALF;

@@ -93,6 +93,23 @@ ShapeFace FaceAt(const CurvePiece& shape, const Ray& ray, float t) {
   return {ToFloat(middle + outward * (axis.radius + axis.growth * s)), ToFloat(outward)};
 }
 
+// What lies deeper in the other piece than rounding can move it is no surface of the tube.
+bool IsWithinNextPiece(const std::vector<CurvePiece>& pieces, std::size_t index, const Ray& ray,
+                       float t) {
+  const auto follows = [](const CurvePiece& one, const CurvePiece& next) {
+    return one.to == next.from && one.to_radius == next.from_radius;
+  };
+  const bool has_before = index > 0 && follows(pieces[index - 1], pieces[index]);
+  const bool has_after = index + 1 < pieces.size() && follows(pieces[index], pieces[index + 1]);
+  if (!has_before && !has_after) return false;
+  const Double3 place(FaceAt(pieces[index], ray, t).position);
+  const auto is_within = [&](const CurvePiece& other) {
+    return other.SignedDistance(place) < -static_cast<double>(ClearanceOf(other));
+  };
+  return (has_before && is_within(pieces[index - 1])) ||
+         (has_after && is_within(pieces[index + 1]));
+}
+
 // On the side of the cone (CurvePiece::Area).
 ShapeFace SampleFace(const CurvePiece& shape, float u1, float u2) {
   const Axis axis(shape);

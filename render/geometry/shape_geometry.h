@@ -110,6 +110,12 @@ template <typename Shape>
   return kClearance * (MaxAbs(shape.center) + shape.Reach());
 }
 
+// Whether a ray that enters a piece of a tube here has come through a piece next to it, and so was
+// within the tube before. Pieces are next to each other when one begins where the one before it in
+// `pieces` ends.
+[[nodiscard]] bool IsWithinNextPiece(const std::vector<CurvePiece>& pieces, std::size_t index,
+                                     const Ray& ray, float t);
+
 // The share of a full turn from x to y, in [0, 1): the texture coordinate around an axis.
 [[nodiscard]] float TurnOf(float x, float y);
 // The squared slope of that coordinate at this distance from the axis [1/length²].

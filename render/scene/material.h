@@ -33,7 +33,8 @@
   ROW(ThinDielectric, "thindielectric")           \
   ROW(DiffuseTransmission, "diffusetransmission") \
   ROW(CoatedConductor, "coatedconductor")         \
-  ROW(Mix, "mix")
+  ROW(Mix, "mix")                                 \
+  ROW(Hair, "hair")
 
 namespace lucerna {
 
@@ -57,11 +58,11 @@ struct MaterialNumbers {
 
   Kind kind = Kind::kDiffuse;
   Parts parts = Parts::kAll;             // of a material that has two
-  Rgb reflectance = {0.5F, 0.5F, 0.5F};  // diffuse, coated diffuse, diffuse transmission
+  Rgb reflectance = {0.5F, 0.5F, 0.5F};  // diffuse, coated diffuse, diffuse transmission, hair
   Rgb transmittance;                     // diffuse transmission
   Rgb eta = {1, 1, 1};                   // conductor, under a coat too: index of refraction
   Rgb k = {0, 0, 0};                     // the same: absorption
-  float ior = 1.5F;                      // dielectric, coat: inside over outside
+  float ior = 1.5F;                      // dielectric, coat, hair: inside over outside
   Dispersion dispersion;                 // dielectric; `ior` is that at the d line
   float alpha_u = 0;                     // of metals, dielectrics and coats: GGX widths; 0 and 0:
   float alpha_v = 0;                     // smooth
@@ -75,7 +76,12 @@ struct MaterialNumbers {
   const CoatTable* coat_above = nullptr;
   float coat_above_share = 0;
   const CoatFamily* coats = nullptr;  // of a coated material with a texture of its roughness
-  // In place of `reflectance`, and of a conductor's eta and k.
+  // Of hair: roughness along the fibre and around it, in [0.01, 1], and the angle by which its
+  // scales are tilted [rad].
+  float beta_m = 0.3F, beta_n = 0.3F, scale_tilt = 0;
+  Rgb absorption;                        // of hair, per radius of the fibre
+  bool absorbs_for_reflectance = false;  // the absorption follows from `reflectance`
+  // In place of `reflectance`, of a conductor's eta and k, and of `absorption`.
   std::int32_t texture = kNoTexture;
   std::int32_t second_texture = kNoTexture;  // in place of `transmittance`
   float texture_scale = 1;                   // of both textures' colours: diffuse transmission
@@ -127,7 +133,7 @@ struct MaterialNumbers {
   [[nodiscard]] bool IsAnisotropic() const {
     return alpha_u != alpha_v || base_alpha_u != base_alpha_v ||
            roughness_textures[0] != roughness_textures[1] ||
-           roughness_textures[2] != roughness_textures[3];
+           roughness_textures[2] != roughness_textures[3] || kind == Kind::kHair;
   }
   // Whether it sends each wavelength into another direction.
   [[nodiscard]] bool Disperses() const {
@@ -215,6 +221,12 @@ inline constexpr float kMaxRoughness = 1e3F;
   const float capped = std::min(reflectance, 0.9999F);
   return 2 * std::sqrt(capped) / std::sqrt(1 - capped);
 }
+
+// The absorption with which hair of roughness `beta_n` has this reflectance, about, when light is
+// scattered by many of its fibres (Chiang et al. 2016, section 4), and the reflectance that goes
+// with an absorption.
+[[nodiscard]] Rgb HairAbsorption(Rgb reflectance, float beta_n);
+[[nodiscard]] Rgb HairReflectance(Rgb absorption, float beta_n);
 
 // Of a metal under a coat, as light meets it that crosses the coat's surface twice: GGX widths of
 // the half vectors of directions that are refracted at the mean surface. A facet that is turned by

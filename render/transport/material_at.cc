@@ -94,7 +94,8 @@ const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
   if (material.Disperses() && wavelength.is_drawn())
     here.ior = IndexAt(wavelength.nm(), material.ior, material.dispersion);
   if (material.HasRoughnessTexture()) LookUpRoughness(scene, place, material, here);
-  const bool is_turned = here.alpha_u != here.alpha_v || here.base_alpha_u != here.base_alpha_v;
+  const bool is_turned = here.alpha_u != here.alpha_v || here.base_alpha_u != here.base_alpha_v ||
+                         here.kind == Material::Kind::kHair;
   if (material.HasBumps()) {
     TurnShadingNormal(scene, material, place, point);
     if (!is_turned) point.tangent = {};

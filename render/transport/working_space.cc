@@ -8,13 +8,17 @@
 namespace lucerna {
 
 Scene InWorkingSpace(Scene scene) {
-  for (Material& material : scene.materials)
-    material.ForEachColor([](Rgb& color) { color = ToWorking(color); });
   // Coefficients are no colours, but mix as those of a thin layer do.
   const auto coefficients = [](Rgb rec709) {
     const Rgb mixed = ToWorking(rec709);
     return Rgb{std::max(mixed.r, 0.0F), std::max(mixed.g, 0.0F), std::max(mixed.b, 0.0F)};
   };
+  for (Material& material : scene.materials) {
+    material.ForEachColor([](Rgb& color) { color = ToWorking(color); });
+    material.absorption = material.absorbs_for_reflectance
+                              ? HairAbsorption(material.reflectance, material.beta_n)
+                              : coefficients(material.absorption);
+  }
   for (Medium& medium : scene.media) {
     medium.absorption = coefficients(medium.absorption);
     medium.scattering = coefficients(medium.scattering);

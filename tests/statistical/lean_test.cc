@@ -36,7 +36,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, LeanTest,
                                          "caustic.pbrt", "glass-box.pbrt", "glass-sphere.pbrt",
                                          "lamp-in-glass.pbrt", "water-sun.pbrt", "water-lamp.pbrt",
                                          "textured.pbrt", "rough-metal.pbrt", "cardioid.pbrt",
-                                         "furnace.pbrt"));
+                                         "furnace.pbrt", "locks.pbrt"));
 
 // A light behind closed walls, a hundred times as bright, is unreachable from the view: with
 // photons from it as without them, and with them nearly all photons are spent in vain.

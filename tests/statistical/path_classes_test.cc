@@ -38,6 +38,7 @@ enum class Chain {
   kNarrowWall,
   kCoatedWall,
   kDiffuseWall,
+  kHairs,
   kPaneAndNarrowWall,
   kInBall,
   kInNarrowBall,
@@ -56,7 +57,8 @@ enum class Floor {
   kMixed,
   kPatchyMetal,
   kPatchyCoat,
-  kBumpy
+  kBumpy,
+  kHairs
 };
 enum class View { kPlain, kThroughGlass, kInMirror };
 
@@ -70,22 +72,17 @@ struct PathClass {
 std::string NameOf(const PathClass& cell) {
   constexpr std::array<std::string_view, 8> kLights = {"Triangles", "Sphere",  "Disk",     "Point",
                                                        "Spot",      "Distant", "Constant", "Map"};
-  constexpr std::array<std::string_view, 12> kChains = {"Directly",
-                                                        "ByPane",
-                                                        "ByThinPane",
-                                                        "ByRoughPane",
-                                                        "ByMirror",
-                                                        "ByNarrowMetal",
-                                                        "ByCoat",
-                                                        "ByDiffuseWall",
-                                                        "ByPaneAndNarrowMetal",
-                                                        "InGlassBall",
-                                                        "InNarrowGlassBall",
+  constexpr std::array<std::string_view, 13> kChains = {"Directly",        "ByPane",
+                                                        "ByThinPane",      "ByRoughPane",
+                                                        "ByMirror",        "ByNarrowMetal",
+                                                        "ByCoat",          "ByDiffuseWall",
+                                                        "ByHair",          "ByPaneAndNarrowMetal",
+                                                        "InGlassBall",     "InNarrowGlassBall",
                                                         "InRoughGlassBall"};
-  constexpr std::array<std::string_view, 13> kFloors = {
+  constexpr std::array<std::string_view, 14> kFloors = {
       "Diffuse",     "RoughMetal", "NarrowMetal", "TexturedMetal", "NarrowGlass",
       "RoughGlass",  "Coated",     "RoughCoated", "Sheet",         "Mixed",
-      "PatchyMetal", "PatchyCoat", "Bumpy"};
+      "PatchyMetal", "PatchyCoat", "Bumpy",       "Hair"};
   constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
   std::string name(kLights[static_cast<std::size_t>(cell.light)]);
   name += kChains[static_cast<std::size_t>(cell.chain)];
@@ -154,6 +151,22 @@ void AddHeights(Scene& scene) {
   heights.scale = 0.05F;
   heights.picture = std::make_shared<const Picture>(picture);
   scene.textures = {heights};
+}
+
+// Straight hairs side by side over the whole floor, at a height above it.
+void AddHairs(Scene& scene, float height, float radius, float distance, float inclination) {
+  const std::int32_t hair = AddMaterial(scene, HairMaterial(0.15F, 0.5F, 0.5F));
+  const auto count = static_cast<int>(2.4F / distance);
+  for (int i = 0; i < count; ++i) {
+    const float x = (static_cast<float>(i) + 0.5F) * distance - 1.2F;
+    CurvePiece piece;
+    piece.from = {x, -1, height - inclination};
+    piece.to = {x, 1, height + inclination};
+    piece.center = {x, 0, height};
+    piece.from_radius = piece.to_radius = radius;
+    piece.traits.material = hair;
+    scene.curve_pieces.push_back(piece);
+  }
 }
 
 // A floor z = 0. Light comes from above its far side (y > 0), or, with a wall there, from behind
@@ -248,6 +261,12 @@ Scene SceneOf(const PathClass& cell) {
       floor_with_uv(AddMaterial(scene, material));
       break;
     }
+    case Floor::kHairs:
+      // Two layers, and what comes through them.
+      AddHairs(scene, 0.05F, 0.004F, 0.013F, 0);
+      AddHairs(scene, 0.1F, 0.004F, 0.017F, 0.03F);
+      floor(AddMaterial(scene, DiffuseMaterial(0.6F)));
+      break;
     default:
       break;
   }
@@ -285,6 +304,10 @@ Scene SceneOf(const PathClass& cell) {
       break;
     case Chain::kDiffuseWall:
       wall(DiffuseMaterial(0.8F));
+      break;
+    case Chain::kHairs:
+      // Closed enough that most light is scattered by them; the camera is below.
+      AddHairs(scene, 1, 0.004F, 0.01F, 0.1F);
       break;
     case Chain::kPaneAndNarrowWall:
       wall(Metal(0.1F));
@@ -515,6 +538,11 @@ std::vector<PathClass> Cells() {
   add({kTriangles, kPoint}, {kNone, kPane},
       {Floor::kMixed, Floor::kPatchyMetal, Floor::kPatchyCoat, Floor::kBumpy});
   add({kMap}, {kPane}, {Floor::kMixed, Floor::kPatchyMetal, Floor::kBumpy});
+  // Thin, and to be scattered by.
+  add({kTriangles, kPoint, kMap}, {kNone, kDiffuseWall}, {Floor::kHairs});
+  add({kTriangles, kMap}, {kPane}, {Floor::kHairs});
+  add({kTriangles, kPoint, kDistant, kMap}, {kHairs}, two);
+  add({kTriangles}, {kHairs}, {Floor::kHairs});
   add({kTriangles}, {kNone}, {Floor::kCoated, Floor::kRoughCoated}, View::kThroughGlass);
   add({kTriangles}, {kPane}, {Floor::kCoated, Floor::kRoughCoated}, View::kInMirror);
   return cells;

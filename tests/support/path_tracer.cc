@@ -20,6 +20,7 @@
 #include "render/math/rng.h"
 #include "render/scene/texture.h"
 #include "render/transport/bump.h"
+#include "tests/support/hair_reference.h"
 
 namespace lucerna {
 namespace {
@@ -89,6 +90,7 @@ struct Surface {
   Color transmittance{};  // of a sheet, working space
   double thickness = 0;   // of a coat
   int base_hits = 0;
+  ReferenceFibre fibre;  // hair
 };
 
 // With what a texture of roughness says in place of the widths.
@@ -119,6 +121,9 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   surface.transmittance = Working(FromFloat(material.transmittance));
   surface.thickness = static_cast<double>(material.thickness);
   surface.base_hits = material.base_hits;
+  surface.fibre = {static_cast<double>(material.ior), static_cast<double>(material.beta_m),
+                   static_cast<double>(material.beta_n), static_cast<double>(material.scale_tilt),
+                   Working(FromFloat(material.absorption))};
   if (material.texture != kNoTexture) {
     const Color color = FromFloat(TextureColor(scene.textures, material.texture, place));
     surface.reflectance = Working(color);
@@ -258,6 +263,15 @@ bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
     const double phi = 2 * kPiD * u[2];
     out.wi = Double3{sine * std::cos(phi), sine * std::sin(phi), std::sqrt(1 - u[1])} * side;
     out.weight = surface.reflectance;
+    return true;
+  }
+  if (surface.kind == Material::Kind::kHair) {
+    // Evenly to all sides.
+    const double cosine = 1 - 2 * u[1];
+    const double sine = std::sqrt(1 - cosine * cosine);
+    const double phi = 2 * kPiD * u[2];
+    out.wi = {sine * std::cos(phi), sine * std::sin(phi), cosine};
+    out.weight = Times(ReferenceHairShare(surface.fibre, wo, out.wi), 4 * kPiD);
     return true;
   }
   if (surface.kind == Material::Kind::kCoatedDiffuse)

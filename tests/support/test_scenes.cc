@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "render/math/warp.h"
 #include "render/transport/coat.h"
 #include "tests/support/local_render.h"
 
@@ -49,6 +50,18 @@ Material SheetMaterial(float reflectance, float transmittance) {
   Material material = DiffuseMaterial(reflectance);
   material.kind = Material::Kind::kDiffuseTransmission;
   material.transmittance = Gray(transmittance);
+  return material;
+}
+
+Material HairMaterial(float absorption, float beta_m, float beta_n) {
+  Material material;
+  material.kind = Material::Kind::kHair;
+  material.absorption = Gray(absorption);
+  material.beta_m = beta_m;
+  material.beta_n = beta_n;
+  material.ior = 1.55F;
+  material.scale_tilt = 2 * kPi / 180;
+  material.is_on_thin_shapes = true;
   return material;
 }
 

@@ -24,6 +24,8 @@ namespace lucerna {
                                    float thickness = 0);
 // A thin sheet that scatters diffusely to both sides.
 [[nodiscard]] Material SheetMaterial(float reflectance, float transmittance);
+// Of grey absorption per radius, with pbrt's index and tilt of the scales.
+[[nodiscard]] Material HairMaterial(float absorption, float beta_m, float beta_n);
 [[nodiscard]] Material ConductorMaterial(Rgb eta, Rgb k, float alpha_u, float alpha_v);
 
 // Each appends to the scene and returns the index of what it added.

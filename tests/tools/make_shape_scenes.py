@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Writes tests/scenes/forest.pbrt and tests/scenes/hair.pbrt, the same bytes every time.
+"""Writes tests/scenes/forest.pbrt, hair.pbrt and locks.pbrt, the same bytes every time.
 
 forest: 400 instances of three trees of some 25,000 triangles each under a low sun; written out they
 would be ten million triangles. hair: a ball with curves of all types on a table, lit by a lamp.
+locks: four locks of the material hair before a wall, lit from the side and from behind.
 
     python3 tests/tools/make_shape_scenes.py
     python3 tests/tools/make_shape_scenes.py --large large.pbrt   # 25,250 instances, to measure memory
@@ -114,6 +115,57 @@ Material "conductor" "float roughness" 0.1 "rgb reflectance" [0.75 0.5 0.25]
     return text
 
 
+def locks():
+    rng = random.Random(11)
+    text = """# Made by tests/tools/make_shape_scenes.py: locks of hair, by melanin, reflectance and absorption.
+LookAt 0 -5.2 1.3  0 0 1.05  0 0 1
+Camera "perspective" "float fov" 34
+Film "rgb" "integer xresolution" 240 "integer yresolution" 180 "string filename" "locks.exr"
+Integrator "sppm" "integer maxdepth" 24
+WorldBegin
+LightSource "infinite" "rgb L" [0.12 0.13 0.15]
+AttributeBegin
+  AreaLightSource "diffuse" "rgb L" [16 15 13]
+  Translate -2.4 -1.8 3
+  Rotate 140 -0.6 0.8 0
+  Shape "disk" "float radius" 0.5
+AttributeEnd
+AttributeBegin
+  AreaLightSource "diffuse" "rgb L" [20 18 15]
+  Translate 1.2 1.1 3.2
+  Rotate 155 1 0 0
+  Shape "disk" "float radius" 0.3
+AttributeEnd
+Material "diffuse" "rgb reflectance" [0.6 0.6 0.6]
+Shape "bilinearmesh" "point3 P" [-4 -4 0  4 -4 0  -4 1.6 0  4 1.6 0]
+Shape "bilinearmesh" "point3 P" [-4 1.6 0  4 1.6 0  -4 1.6 4  4 1.6 4]
+"""
+    kinds = ['"float eumelanin" 0.3 "float pheomelanin" 0.2',
+             '"float pheomelanin" 1.2 "float beta_m" 0.2',
+             '"rgb reflectance" [0.25 0.3 0.75] "float beta_n" 0.5',
+             '"rgb sigma_a" [0.6 0.9 1.6] "float alpha" 3 "float beta_m" 0.4']
+    for number, kind in enumerate(kinds):
+        text += f'Material "hair" {kind}\n'
+        middle = 1.04 * (number - 1.5)
+        for _ in range(80):
+            radius = 0.24 * math.sqrt(rng.uniform(0, 1))
+            phi = rng.uniform(0, 2 * math.pi)
+            curl = rng.uniform(0.04, 0.09)
+            start = rng.uniform(-0.5, 0.5)
+            end = rng.uniform(0.15, 0.35)
+            points = []
+            for step in range(7):
+                share = step / 6
+                turn = start + 1.5 * step
+                points += [middle + radius * (0.5 + share) * math.cos(phi)
+                           + curl * share * math.cos(turn),
+                           radius * (0.5 + share) * math.sin(phi) + curl * share * math.sin(turn),
+                           2.1 - (2.1 - end) * share]
+            text += (f'Shape "curve" "string type" "cylinder" "string basis" "bspline" '
+                     f'"point3 P" [{numbers(points)}] "float width0" 0.014 "float width1" 0.006\n')
+    return text
+
+
 def large():
     rng = random.Random(1)
     text = f"""LookAt 0 -60 30  0 0 0  0 0 1
@@ -138,5 +190,5 @@ ObjectEnd
 if len(sys.argv) == 3 and sys.argv[1] == "--large":
     pathlib.Path(sys.argv[2]).write_text(large())
     sys.exit()
-for name, scene in [("forest", forest()), ("hair", hair())]:
+for name, scene in [("forest", forest()), ("hair", hair()), ("locks", locks())]:
     (SCENES / f"{name}.pbrt").write_text(scene)

@@ -12,6 +12,7 @@
 #include "render/analysis/needs.h"
 #include "render/formats/read_scene.h"
 #include "render/geometry/intersector.h"
+#include "render/math/color_space.h"
 #include "render/scene/noise.h"
 #include "render/scene/render_settings.h"
 #include "render/transport/material_at.h"
@@ -22,6 +23,7 @@ namespace lucerna {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 ParsedScene Parse(const std::string& world, std::map<std::string, std::string> others) {
   others["s.pbrt"] = "Camera \"perspective\" WorldBegin\n" + world;
@@ -122,6 +124,25 @@ TEST(PbrtMaterialsTest, ACoatIsFittedToItsRoughness) {
   EXPECT_NEAR(here.alpha_u, 0.4F, 1e-5F);
   ASSERT_NE(here.coat, nullptr);
   EXPECT_NE(here.coat_above, nullptr);
+}
+
+// Along u and v each a texture of its own, of the metal or of its coat.
+TEST(PbrtMaterialsTest, ACoatedMetalMayHaveATextureForEachWidth) {
+  const std::string textures =
+      std::string(kPlanar) +
+      "Texture \"u\" \"float\" \"scale\" \"texture tex\" \"r\" \"float scale\" 0.32\n"
+      "Texture \"v\" \"float\" \"scale\" \"texture tex\" \"r\" \"float scale\" 0.08\n";
+  for (const std::string part : {"conductor", "interface"}) {
+    const Material here = MetOnSphere(World(textures + "Material \"coatedconductor\" \"texture " +
+                                            part + ".uroughness\" \"u\" \"texture " + part +
+                                            ".vroughness\" \"v\" Shape \"sphere\""));
+    const bool is_base = part == "conductor";
+    // Roots of half of the scales.
+    EXPECT_NEAR(is_base ? here.base_alpha_u : here.alpha_u, 0.4F, 1e-5F);
+    EXPECT_NEAR(is_base ? here.base_alpha_v : here.alpha_v, 0.2F, 1e-5F);
+    EXPECT_NE(here.coat, nullptr);
+    EXPECT_NE(here.coat_above, nullptr);
+  }
 }
 
 constexpr const char* kTwo =
@@ -383,6 +404,111 @@ TEST(PbrtMaterialsTest, TexturesThatDoubleAreRefused) {
             " \"texture tex2\" " + before + "\n";
   }
   EXPECT_THAT(Said(text), HasSubstr("is made of more than 1024 textures"));
+}
+
+constexpr const char* kCurve =
+    " Shape \"curve\" \"point3 P\" [0 0 0 0 0 1 0 0 2 0 0 3] \"float width\" 0.1\n";
+
+// The material of the first curve.
+Material OnCurve(const std::string& world, std::map<std::string, std::string> others = {}) {
+  const Scene scene = World(world + kCurve, std::move(others));
+  EXPECT_FALSE(scene.curve_pieces.empty());
+  return scene.materials[static_cast<std::size_t>(scene.curve_pieces[0].traits.material)];
+}
+
+TEST(PbrtMaterialsTest, ReadsHair) {
+  const Material plain = OnCurve("Material \"hair\"");
+  EXPECT_EQ(plain.kind, Material::Kind::kHair);
+  EXPECT_TRUE(plain.is_on_thin_shapes);
+  EXPECT_EQ(plain.ior, 1.55F);
+  EXPECT_EQ(plain.beta_m, 0.3F);
+  EXPECT_EQ(plain.beta_n, 0.3F);
+  EXPECT_NEAR(plain.scale_tilt, 0.0349066F, 1e-6F);
+  // 1.3 of eumelanin.
+  EXPECT_NEAR(plain.absorption.r, 1.3F * 0.419F, 1e-6F);
+  EXPECT_NEAR(plain.absorption.g, 1.3F * 0.697F, 1e-6F);
+  EXPECT_NEAR(plain.absorption.b, 1.3F * 1.37F, 1e-6F);
+  const Material other = OnCurve(
+      "Material \"hair\" \"float beta_m\" 0.2 \"float beta_n\" 0.001 \"float alpha\" 0 \"float "
+      "eta\" "
+      "1.4 \"float eumelanin\" 0.5 \"float pheomelanin\" 2");
+  EXPECT_EQ(other.beta_m, 0.2F);
+  EXPECT_EQ(other.beta_n, 0.01F);  // as smooth as pbrt-v4 makes it
+  EXPECT_EQ(other.scale_tilt, 0);
+  EXPECT_EQ(other.ior, 1.4F);
+  EXPECT_NEAR(other.absorption.g, 0.5F * 0.697F + 2 * 0.4F, 1e-6F);
+  // One melanin alone: nothing of the other.
+  EXPECT_NEAR(OnCurve("Material \"hair\" \"float pheomelanin\" 1").absorption.r, 0.187F, 1e-6F);
+}
+
+// sigma_a before reflectance before melanin; what is left out is named.
+TEST(PbrtMaterialsTest, HairHasTheColourThatIsGivenFirst) {
+  const std::string all =
+      "Material \"hair\" \"float eumelanin\" 9 \"rgb reflectance\" [0.5 0.25 0.125] ";
+  const Material by_absorption = OnCurve(all + "\"rgb sigma_a\" [1 2 3]");
+  EXPECT_FALSE(by_absorption.absorbs_for_reflectance);
+  EXPECT_EQ(by_absorption.absorption, (Rgb{1, 2, 3}));
+  EXPECT_THAT(Said(all + "\"rgb sigma_a\" [1 2 3]" + kCurve),
+              HasSubstr("because sigma_a is given"));
+  EXPECT_THAT(Said(all + kCurve), HasSubstr("because reflectance is given"));
+  EXPECT_THAT(Said(all + kCurve), Not(HasSubstr("unknown parameter")));
+  EXPECT_THAT(
+      Said("Material \"hair\" \"rgb color\" [1 1 1] \"float pheomelanin\" 1" + std::string(kCurve)),
+      HasSubstr("because color is given"));
+  // The absorption belongs to the reflectance in the space that light is multiplied in.
+  const Scene scene = InWorkingSpace(World(all + kCurve));
+  const Material& material =
+      scene.materials[static_cast<std::size_t>(scene.curve_pieces[0].traits.material)];
+  const Rgb back = HairReflectance(material.absorption, material.beta_n);
+  const Rgb expected = ToWorking({0.5F, 0.25F, 0.125F});
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(back[c], expected[c], 1e-5F);
+}
+
+TEST(PbrtMaterialsTest, HairTakesTexturesOfColour) {
+  const std::string texture =
+      "Texture \"c\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [0.2 0.4 0.8] "
+      "\"rgb tex2\" [0.2 0.4 0.8]\n";
+  for (const std::string name : {"sigma_a", "reflectance"}) {
+    Scene scene = World(texture + "Material \"hair\" \"texture " + name + "\" \"c\"" + kCurve);
+    scene = InWorkingSpace(scene);
+    const std::unique_ptr<Intersector> intersector = Intersector::Create(scene).value();
+    const float size = scene.unit == 1 ? 1 : static_cast<float>(1 / scene.unit);
+    const Ray ray = {Vec3{0, -5, 0.5F} * size, {0, 1, 0}, HUGE_VALF};
+    Hit hit;
+    ASSERT_TRUE(intersector->Intersect(ray, hit));
+    SurfacePoint point = intersector->SurfaceAt(ray, hit);
+    std::optional<Material> storage;
+    const Material& here = MaterialAt(scene, point, -ray.direction, storage);
+    const Rgb color = ToWorking({0.2F, 0.4F, 0.8F});
+    if (name == "sigma_a") {
+      EXPECT_EQ(here.absorption, color);
+    } else {
+      EXPECT_EQ(here.absorption, HairAbsorption(color, 0.3F));
+    }
+  }
+}
+
+TEST(PbrtMaterialsTest, SaysWhatHairCannotBe) {
+  const auto said = [](const std::string& parameters, const std::string& shape) {
+    return Said(std::string(kPlanar) + "Material \"hair\" " + parameters + shape);
+  };
+  EXPECT_THAT(said("", "Shape \"sphere\""), HasSubstr("for curves of type flat or cylinder alone"));
+  EXPECT_THAT(said("",
+                   "Shape \"curve\" \"string type\" \"ribbon\" \"point3 P\" [0 0 0 0 0 1 0 0 2 0 0 "
+                   "3] \"normal N\" [1 0 0 1 0 0]"),
+              HasSubstr("for curves of type flat or cylinder alone"));
+  EXPECT_THAT(
+      Said("MakeNamedMaterial \"h\" \"string type\" \"hair\" MakeNamedMaterial \"d\" \"string "
+           "type\" \"diffuse\" Material \"mix\" \"string materials\" [\"d\" \"h\"] Shape \"disk\""),
+      HasSubstr("for curves of type flat or cylinder alone"));
+  EXPECT_THAT(said("\"texture beta_m\" \"r\"", kCurve),
+              HasSubstr("must not be a texture that varies"));
+  EXPECT_THAT(said("\"float beta_n\" 1.5", kCurve), HasSubstr("\"beta_n\""));
+  EXPECT_THAT(said("\"rgb sigma_a\" [-1 0 0]", kCurve), HasSubstr("\"sigma_a\""));
+  EXPECT_THAT(said("\"texture displacement\" \"r\"", kCurve),
+              HasSubstr("is ignored, as by pbrt-v4"));
+  EXPECT_THAT(said("", kCurve), Not(HasSubstr("hair")));
 }
 
 }  // namespace

@@ -707,14 +707,16 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
     EXPECT_THAT(said, HasSubstr(part));
   };
   expect("Material \"dielectric\" \"texture eta\" \"t\"", "is a texture");
-  expect("Material \"hair\"", "there are diffuse, conductor, dielectric, interface");
+  expect("Material \"subsurface\"", "there are diffuse, conductor, dielectric, interface");
   expect("Material \"coateddiffuse\" \"rgb albedo\" [0.1 0 0]",
          "the layer under a coat only absorbs");
   expect("Material \"subsurface\"", "light does not travel below surfaces");
+  expect("Material \"subsurface\"", "medium inside");
   expect("Material \"measured\"", "measured BSDFs");
+  expect("Material \"measured\"", "use a conductor, coateddiffuse or coatedconductor");
   expect("Material \"fourier\"", "Fourier BSDFs");
   expect("Material \"conductor\" \"spectrum eta\" \"none.spd\"", "\"none.spd\" cannot be read");
-  expect("MakeNamedMaterial \"m\" \"string type\" \"hair\"", "\"hair\"");
+  expect("MakeNamedMaterial \"m\" \"string type\" \"measured\"", "\"measured\"");
   expect("LightSource \"goniometric\"", "there are point, spot, distant and infinite");
   expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "no such file");
   expect("Camera \"perspective\"", "before WorldBegin");

@@ -137,6 +137,18 @@ TEST(OwnScenesTest, MeshesOfTheScenesAreSmooth) {
   }
 }
 
+TEST(OwnScenesTest, TheLocksAreHair) {
+  const ParsedScene parsed = ParseOwn("locks.pbrt");
+  ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
+  EXPECT_GT(parsed.scene.curve_pieces.size(), 1000U);
+  for (const CurvePiece& piece : parsed.scene.curve_pieces) {
+    const Material& material =
+        parsed.scene.materials[static_cast<std::size_t>(piece.traits.material)];
+    ASSERT_EQ(material.kind, Material::Kind::kHair);
+    ASSERT_FALSE(Gathers(material));
+  }
+}
+
 TEST(OwnScenesTest, TheLightsOfTheShadowsAreHiddenFromTheFloor) {
   // In glass: the light is within the box that the fourth mesh is.
   const Scene penumbra = ParseOwn("penumbra.pbrt").scene;

@@ -35,18 +35,21 @@ std::string_view InOneWord(std::string_view type) {
 // Materials of pbrt that are refused by name, and why.
 std::string_view WhyRefused(std::string_view type) {
   if (type == "subsurface") {
-    return "is not supported: light does not travel below surfaces here";
+    return "is not supported: light does not travel below surfaces here; use a dielectric with an "
+           "absorbing and scattering medium inside, or diffusetransmission for thin shapes";
   }
-  if (type == "measured") return "is not supported: measured BSDFs (.bsdf files) are not read";
+  if (type == "measured") {
+    return "is not supported: measured BSDFs (.bsdf files) are not read; use a conductor, "
+           "coateddiffuse or coatedconductor with a roughness that looks alike";
+  }
   if (type == "fourier") {
     return "is not supported, nor by pbrt-v4: Fourier BSDFs (.bsdf files) are not read";
   }
-  if (type == "hair") return "is not supported: there is no scattering by hair";
   return "is not supported";
 }
 
 // `displacement` and `normalmap`. As in pbrt-v4 the map counts where there are both, and those of a
-// mix are ignored.
+// mix and of hair are ignored.
 void ReadBumps(const MaterialInput& input, Material& material) {
   ParameterList& parameters = input.parameters;
   const std::optional<std::string> map = parameters.FindString("normalmap");
@@ -57,7 +60,8 @@ void ReadBumps(const MaterialInput& input, Material& material) {
     parameters.Error("displacement", "must be a texture");
     parameters.Ignore("displacement");
   }
-  if (material.kind == Material::Kind::kMix || material.kind == Material::Kind::kInterface) {
+  if (material.kind == Material::Kind::kMix || material.kind == Material::Kind::kInterface ||
+      material.kind == Material::Kind::kHair) {
     for (const std::string_view name : {"displacement", "normalmap"}) {
       if (parameters.Has(name)) parameters.Warning(name, "is ignored, as by pbrt-v4");
     }

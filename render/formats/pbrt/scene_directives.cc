@@ -1,7 +1,9 @@
+#include <cstdint>
 #include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
+#include <vector>
 
 #include "render/base/text.h"
 #include "render/formats/pbrt/directives.h"
@@ -20,6 +22,20 @@ bool IsInvisible(const ShapeSet& shapes) {
   ForEachShapeTraits(shapes,
                      [&](const ShapeTraits& traits) { is_seen = is_seen || traits.alpha > 0; });
   return !is_seen;
+}
+
+// Whether it is hair, or mixes it.
+bool IsOfHair(const std::vector<Material>& materials, std::int32_t index) {
+  if (index < 0) return false;
+  const Material& material = materials[static_cast<std::size_t>(index)];
+  return material.kind == Material::Kind::kHair || IsOfHair(materials, material.mixed[0]) ||
+         IsOfHair(materials, material.mixed[1]);
+}
+
+bool IsTubesAlone(const ShapeSet& shapes) {
+  bool is_tubes = shapes.meshes.empty();
+  ForEachAnalyticShape(shapes, [&](const auto& shape) { is_tubes = is_tubes && shape.kIsThin; });
+  return is_tubes;
 }
 
 }  // namespace
@@ -233,6 +249,9 @@ bool DirectiveReader::OnShape(Arguments& arguments) {
   const bool is_light = emits && open_object_ == nullptr;
   placement.emits = is_light;
   ShapeSet shapes = ReadShapes(type, list, placement, textures_.numbers, assets_);
+  if (IsOfHair(scene_.materials, state.material) && !IsTubesAlone(shapes)) {
+    list.Error("has the material hair, which is for curves of type flat or cylinder alone");
+  }
   if (!is_light && IsInvisible(shapes)) return true;  // no ray meets it, and nothing comes from it
   if (!HasRoomFor(shapes, arguments)) return true;
   if (is_light && !diagnostics_.has_error() && !(shapes.Area() > 0))
