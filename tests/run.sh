@@ -9,5 +9,5 @@ bash "$root/deploy/packages.sh" tests
 cd "$root"
 cmake --preset release -D LUCERNA_BUILD_TESTS=ON
 cmake --build --preset release
-# Tests that start the programs run alone (see tests/CMakeLists.txt).
-exec ctest --preset release --parallel "$(nproc)" "$@"
+# Twice as many as cores: many tests wait for processes and lines most of the time (see tests/CMakeLists.txt).
+exec ctest --preset release --parallel "$((2 * $(nproc)))" "$@"

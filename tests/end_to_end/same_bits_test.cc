@@ -17,6 +17,7 @@
 #include <signal.h>
 
 #include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
 
 namespace lucerna {
 namespace {
@@ -83,7 +84,8 @@ class Farm {
     const Finished waited = RunProgram({kBin + "/lucerna", "wait", job, "--server", address_},
                                        std::chrono::seconds(120));
     EXPECT_EQ(waited.exit_code, 0) << waited.errors;
-    const std::string image = testing::TempDir() + "same_bits.exr";
+    const TemporaryFolder folder;
+    const std::string image = folder.At("image.exr");
     const Finished fetched =
         RunProgram({kBin + "/lucerna", "fetch", job, "-o", image, "--server", address_});
     EXPECT_EQ(fetched.exit_code, 0) << fetched.errors;

@@ -39,8 +39,9 @@ std::vector<std::string> KeptIn(const std::string& folder) {
   return {"--state", folder, "--checkpoint-share", "1"};
 }
 
-// Several seconds, for tests that change something while a job runs.
-const SmallJob kLongJob = {.passes = 48, .photons = 150'000};
+// More than a second after the passes that tests wait for, so that something can change while the
+// job runs.
+const SmallJob kLongJob = {.passes = 48, .photons = 50'000};
 
 Digest QuietDigest(const SmallJob& small_job) {
   static std::map<int, Digest> digests;  // by passes
@@ -292,6 +293,9 @@ TEST(RestartedCoordinatorTest, JobsThatWaitKeepTheirOrderAndEndedOnesTheirImages
     jobs.push_back(coordinator->TrySubmit(kJob).value());
     ASSERT_EQ(coordinator->Wait(jobs[0]).state(), v1::JOB_STATE_SUCCEEDED);
   }
+  // The number of workers is of now, and a lost one is noticed a little later.
+  for (int i = 0; i < 6000 && coordinator->Get(jobs[0]).progress().workers() > 0; ++i)
+    std::this_thread::sleep_for(milliseconds(10));
   const v1::Job before = coordinator->Get(jobs[0]);
   for (const char* request : {"a", "b", "c"}) {
     SmallJob job = kJob;

@@ -25,15 +25,20 @@
 namespace lucerna {
 
 std::string FreeAddress() {
+  // 127.0.0.0/8 is this machine, and the last three bytes of an address hold any process number: 22
+  // bits.
+  const auto process = static_cast<std::uint32_t>(getpid());
+  const std::string host = absl::StrCat("127.", 1 + (process >> 16 & 0x7F), ".",
+                                        process >> 8 & 0xFF, ".", process & 0xFF);
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(::inet_pton(AF_INET, host.c_str(), &address.sin_addr), 1);
   socklen_t size = sizeof(address);
   EXPECT_EQ(::bind(socket, reinterpret_cast<sockaddr*>(&address), size), 0);
   EXPECT_EQ(::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size), 0);
   ::close(socket);
-  return absl::StrCat("127.0.0.1:", ntohs(address.sin_port));
+  return absl::StrCat(host, ":", ntohs(address.sin_port));
 }
 
 void CoordinatorProcess::Start(std::vector<std::string> command, std::vector<std::string> flags,

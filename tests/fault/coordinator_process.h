@@ -22,7 +22,9 @@ inline constexpr std::chrono::seconds kPatience{60};
 inline const std::string kBin = LUCERNA_BIN_DIR;
 inline const std::string kTestScenes = LUCERNA_SOURCE_DIR "/tests/scenes";
 
-// 127.0.0.1 with a port that was free a moment ago.
+// A loopback address of this process alone, with a port that was free a moment ago: tests that run
+// at the same time, and the ports that the system gives to connections of 127.0.0.1, cannot take
+// it.
 [[nodiscard]] std::string FreeAddress();
 
 // What a job of these tests is: a scene of ours in 64×64 pixels.

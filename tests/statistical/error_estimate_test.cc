@@ -24,7 +24,7 @@ class ErrorEstimateTest : public testing::TestWithParam<EstimatedScene> {};
 TEST_P(ErrorEstimateTest, IsTrueAndItsIntervalsHoldTheTruthAtAllLooks) {
   const StudySize size;
   const Scene scene = LoadScene(GetParam().file);
-  const ErrorStudy study = StudyErrors(scene, StudyReference(scene, size.side), size);
+  const ErrorStudy study = StudyErrors(scene, HalvedReference(scene, size.side, 200, 10), size);
   RecordProperty("covered", study.Covered());
   EXPECT_GE(study.Covered(), size.renders * 95 / 100);
   for (const double ratio : study.Ratios()) {
@@ -81,13 +81,17 @@ double TargetOf(const ErrorStudy& study, const StudySize& size) {
   return std::sqrt(square);
 }
 
+// Of the references here half the photons are enough: their noise is taken off the errors, and what
+// is uncertain of it is 6 % of the squared error after all passes, where a render stops at less
+// than half of its target.
+//
 // Intervals of images as small as those above are wide, so this one is larger. What stopping costs
 // follows from the width of intervals that hold on scenes that no constant was chosen on: 2.5 to 3
 // times the photons needed (docs/measurements.md).
 TEST(StopOnErrorTest, EndsBelowTheTargetWithAtMostFourTimesThePhotonsNeeded) {
   const StudySize size = {.side = 96, .renders = 6, .passes = 100};
   const Scene scene = LoadScene("glass-box.pbrt");
-  const ErrorStudy study = StudyErrors(scene, StudyReference(scene, size.side), size);
+  const ErrorStudy study = StudyErrors(scene, HalvedReference(scene, size.side, 100, 10), size);
   const StopOutcome outcome = StopAt(study, TargetOf(study, size));
   RecordProperty("kept", outcome.kept);
   EXPECT_EQ(outcome.stopped, size.renders);
@@ -103,7 +107,7 @@ TEST(StopOnErrorTest, EndsBelowTheTargetInAPenumbraToo) {
   constexpr int kPassesNeeded = 25;
   const StudySize size = {.side = 96, .renders = 6, .passes = 6 * kPassesNeeded};
   const Scene scene = LoadScene("penumbra.pbrt");
-  const ErrorStudy study = StudyErrors(scene, StudyReference(scene, size.side), size);
+  const ErrorStudy study = StudyErrors(scene, HalvedReference(scene, size.side, 100, 10), size);
   StudySize needed = size;
   needed.passes = 4 * kPassesNeeded;
   const StopOutcome outcome = StopAt(study, TargetOf(study, needed));

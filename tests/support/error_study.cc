@@ -206,17 +206,6 @@ ErrorStudy StudyErrors(const Scene& scene, const Image& reference, const StudySi
   return study;
 }
 
-Image StudyReference(const Scene& scene, int side) {
-  RenderSettings settings = SettingsOf(scene, side, 12345);
-  settings.radius_controller = RadiusControllerKind::kPppm;
-  settings.alpha = 0.2;
-  settings.photons_per_pass = 64 * side * side;
-  LocalRender render(scene, settings);
-  for (int pass = 0; pass < 150; ++pass)
-    render.AddPass();
-  return render.MakeImage();
-}
-
 Image HalvedReference(const Scene& scene, int side, int passes, int photons_per_pixel) {
   std::array<Image, 2> halves;
   for (std::size_t half = 0; half < halves.size(); ++half) {

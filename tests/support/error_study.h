@@ -62,10 +62,6 @@ struct StopOutcome {
 [[nodiscard]] ErrorStudy StudyErrors(const Scene& scene, const Image& reference,
                                      const StudySize& size);
 
-// A reference whose radius falls so fast that its bias is a hundredth of a small render's, with so
-// many photons that its noise is below a thirtieth of that.
-[[nodiscard]] Image StudyReference(const Scene& scene, int side);
-
 // A reference of two halves of `passes` passes each, which knows its noise: radii begin at a pixel.
 [[nodiscard]] Image HalvedReference(const Scene& scene, int side, int passes,
                                     int photons_per_pixel);
