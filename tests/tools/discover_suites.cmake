@@ -1,8 +1,8 @@
-# Makes one ctest test of each suite of a gtest program. A test of each case, as gtest_discover_tests makes, would start a
-# process for each of a thousand cases of a millisecond, and cases could not share what is made once a process.
+# Makes one ctest test of each suite of a gtest program. With a test of each case, as gtest_discover_tests makes them, cases
+# could not share what is made once a process: references, prepared scenes.
 #
-#   cmake -D LABEL=unit -D "PROPERTIES=COST 1" -D PROGRAM=build/release/tests/unit_tests
-#         -D LIST=build/release/tests/unit_suites.cmake -P discover_suites.cmake
+#   cmake -D LABEL=statistical -D "PROPERTIES=COST 1" -D PROGRAM=build/release/tests/statistical_tests
+#         -D LIST=build/release/tests/statistical_suites.cmake -P discover_suites.cmake
 #
 # LIST is for ctest to include. A suite of which cases were skipped is shown as skipped, unless another case failed.
 execute_process(COMMAND ${PROGRAM} --gtest_list_tests OUTPUT_VARIABLE listed COMMAND_ERROR_IS_FATAL ANY)

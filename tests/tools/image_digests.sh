@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Which bits do the programs in a folder render? Prints one line for each of 66 small renders: all
+# Which bits do the programs in a folder render? Prints one line for each of 78 small renders: all
 # scenes of the project, all controllers and kernels, and several workers and threads.
 #   tests/tools/image_digests.sh [FOLDER WITH PROGRAMS] > after.txt; diff before.txt after.txt
 # A change of structure leaves every line as it was.

@@ -264,8 +264,9 @@ TEST(SceneNeedsTest, EverythingIsAllThatCanBeForced) {
   for (const Part part : AllParts()) {
     if (!needs.Uses(part)) left_out.insert(std::string(NameOf(part)));
   }
-  EXPECT_EQ(left_out, (Names{"round-shapes", "environment", "area-lights", "lens", "motion",
-                             "media", "alpha-masks", "instances", "caustic-hitpoints"}));
+  EXPECT_EQ(left_out,
+            (Names{"round-shapes", "environment", "area-lights", "lens", "motion", "media",
+                   "alpha-masks", "instances", "caustic-hitpoints", "dispersion"}));
 }
 
 TEST(SceneNeedsTest, CausticPhotonsAreForNarrowSurfacesBehindSmoothOnes) {
