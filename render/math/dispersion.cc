@@ -1,5 +1,8 @@
 #include "render/math/dispersion.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace lucerna {
 namespace {
 
@@ -30,6 +33,7 @@ Dispersion FitDispersion(const std::function<double(double nm)>& index_at) {
   double cc = 0;
   double bn = 0;
   double cn = 0;
+  double largest = 0;
   for (double nm = kFirstVisibleNm; nm <= kLastVisibleNm; nm += kStepNm) {
     const Terms terms = TermsAt(nm);
     const double above = index_at(nm) - at_d;
@@ -38,7 +42,10 @@ Dispersion FitDispersion(const std::function<double(double nm)>& index_at) {
     cc += terms.c * terms.c;
     bn += terms.b * above;
     cn += terms.c * above;
+    largest = std::max(largest, std::abs(above));
   }
+  // Rounding, which no float can hold beside the index.
+  if (largest < 1e-7 * at_d) return {};
   const double determinant = bb * cc - bc * bc;
   return {static_cast<float>((bn * cc - cn * bc) / determinant),
           static_cast<float>((cn * bb - bn * bc) / determinant)};

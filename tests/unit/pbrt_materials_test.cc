@@ -511,5 +511,40 @@ TEST(PbrtMaterialsTest, SaysWhatHairCannotBe) {
   EXPECT_THAT(said("", kCurve), Not(HasSubstr("hair")));
 }
 
+// Named glasses and curves disperse where they are smooth dielectrics; else it is said that they do
+// not.
+TEST(PbrtMaterialsTest, GlassDispersesWhereItIsSmooth) {
+  const auto glass = [](const std::string& parameters) {
+    return World("Material \"dielectric\" " + parameters + " Shape \"sphere\"").materials.back();
+  };
+  const auto said = [](const std::string& material) {
+    return Said("Material " + material + " Shape \"sphere\"");
+  };
+  const Material flint = glass("\"spectrum eta\" \"glass-F11\"");
+  EXPECT_TRUE(flint.Disperses());
+  EXPECT_EQ(flint.ior, 1.78472F);
+  EXPECT_THAT(said("\"dielectric\" \"spectrum eta\" \"glass-F11\""), Not(HasSubstr("index")));
+  // Between 400 and 700 nm by a straight line, of which Cauchy's equation keeps all but a
+  // thousandth.
+  const Material curve = glass("\"spectrum eta\" [400 1.52 700 1.5]");
+  ASSERT_TRUE(curve.Disperses());
+  for (const float nm : {400.0F, 550.0F, 700.0F}) {
+    EXPECT_NEAR(IndexAt(nm, curve.ior, curve.dispersion), 1.52F - 0.02F * (nm - 400) / 300, 2e-3F)
+        << nm;
+  }
+  EXPECT_FALSE(glass("\"spectrum eta\" [400 1.5 700 1.5]").Disperses());
+  EXPECT_FALSE(glass("\"float eta\" 1.5").Disperses());
+  for (const std::string other :
+       {"\"dielectric\" \"spectrum eta\" \"glass-F11\" \"float roughness\" 0.3",
+        "\"thindielectric\" \"spectrum eta\" \"glass-F11\"",
+        "\"coateddiffuse\" \"spectrum eta\" \"glass-F11\""}) {
+    EXPECT_THAT(said(other), HasSubstr("one index of refraction (at 587.6 nm)")) << other;
+  }
+  // A resonance in the middle of what is seen.
+  EXPECT_THAT(said("\"dielectric\" \"spectrum eta\" [400 1.5 540 1.5 550 1.9 560 1.5 700 1.5]"),
+              HasSubstr("Cauchy's equation"));
+  EXPECT_THAT(said("\"dielectric\" \"spectrum eta\" [400 1.5 700 0]"), HasSubstr("error"));
+}
+
 }  // namespace
 }  // namespace lucerna
