@@ -183,7 +183,7 @@ Rgb EyePathTracer::BrightPart(Rgb emitted) const {
   return strength > white_ ? emitted * (1 - white_ / strength) : Rgb{};
 }
 
-Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, float u_wavelength) const {
+Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, PathWavelength wavelength) const {
   Hit hit;
   if (!FindFirst(ray, {}, hit)) return BrightPart(lights_.InfiniteRadiance(ray.direction));
   SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
@@ -192,7 +192,6 @@ Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, float u_wavelength) co
   if (!properties_[surface.material].scatters_smoothly) return bright;
   int rays = 0;
   std::optional<Material> storage;
-  PathWavelength wavelength = WavelengthOf(u_wavelength);
   const Material& material = MaterialAt(scene_, surface, wo, storage, wavelength);
   const Rgb color = wavelength.IsFirstUsedAt(material) ? wavelength.color() : Gray(1);
   return bright + BrightPart(color * EmissionThrough(surface, material, wo, kNoMedium, wavelength,
@@ -203,7 +202,7 @@ Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
   const PixelSampler sampler = SamplerOf(x, y, pass);
   float filter_weight = 1;
   const Ray ray = CameraRay(sampler, x, y, filter_weight);
-  return BrightOf(ray, sampler.ForBranches(), sampler.ForWavelength());
+  return BrightOf(ray, sampler.ForBranches(), WavelengthOf(sampler));
 }
 
 EyePathTracer::BrightPath EyePathTracer::TraceBrightPath(int x, int y, std::uint64_t pass,
@@ -217,7 +216,7 @@ EyePathTracer::BrightPath EyePathTracer::TraceBrightPath(int x, int y, std::uint
   const Ray ray = CameraRayThrough(settings_.crop_x0 + x + 0.5 + static_cast<double>(path.from.x),
                                    settings_.crop_y0 + y + 0.5 + static_cast<double>(path.from.y),
                                    path.from.on_lens);
-  path.bright = BrightOf(ray, sample.branches, sample.wavelength());
+  path.bright = BrightOf(ray, sample.branches, WavelengthOf(sample.wavelength()));
   return path;
 }
 
@@ -444,8 +443,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     path.segment.weight *= segment_strength;
     return path;
   };
-  PathWavelength wavelength =
-      parts_.dispersion ? PathWavelength(sampler.ForWavelength()) : PathWavelength();
+  PathWavelength wavelength = WavelengthOf(sampler);
   bool has_features = false;  // of a gathering surface
   const auto add_first_emission = [&](Rgb emitted) {
     const Rgb bright = BrightPart(emitted);

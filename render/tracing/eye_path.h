@@ -114,9 +114,12 @@ class EyePathTracer {
   [[nodiscard]] Vec3 OnLens(float u, float v) const;
   // Through a point of the film [pixels of the whole image] and one of the lens, in the unit disc.
   [[nodiscard]] Ray CameraRayThrough(double film_x, double film_y, Vec3 on_lens) const;
-  // The bright part of what a camera's ray meets; `rng` for branches of smooth surfaces,
-  // `u_wavelength` in [0, 1) for the wavelength.
-  [[nodiscard]] Rgb BrightOf(const Ray& ray, KeyedRng rng, float u_wavelength) const;
+  // The bright part of what a camera's ray meets; `rng` for branches of smooth surfaces.
+  [[nodiscard]] Rgb BrightOf(const Ray& ray, KeyedRng rng, PathWavelength wavelength) const;
+  // Of a number in [0, 1); none where no glass disperses.
+  [[nodiscard]] PathWavelength WavelengthOf(float u) const {
+    return parts_.dispersion ? PathWavelength(u) : PathWavelength();
+  }
   // A reflection (`lobe` 0) or refraction (1) at a smooth surface.
   struct SmoothBranch {
     bool exists = false;
@@ -174,8 +177,8 @@ class EyePathTracer {
                                     Vec3 first_wo, std::int32_t medium,
                                     const PathWavelength& wavelength, KeyedRng rng,
                                     int& rays) const;
-  [[nodiscard]] PathWavelength WavelengthOf(float u) const {
-    return parts_.dispersion ? PathWavelength(u) : PathWavelength();
+  [[nodiscard]] PathWavelength WavelengthOf(const PixelSampler& sampler) const {
+    return parts_.dispersion ? PathWavelength(sampler.ForWavelength()) : PathWavelength();
   }
   // What a ray in `medium` meets, behind interfaces; with media, what is left of light on the way.
   [[nodiscard]] bool FindThroughMedia(Ray& ray, Hit& hit, std::int32_t& medium, Rgb& transmittance,

@@ -132,7 +132,7 @@ std::vector<FilmSpread::GlintPath> FilmSpread::TraceGlints(std::uint64_t pass,
         path.from.y = static_cast<float>(place.y - row - 0.5);
         path.bright =
             tracer_.BrightOf(tracer_.CameraRayThrough(place.x, place.y, path.from.on_lens),
-                             sample.branches, sample.wavelength());
+                             sample.branches, tracer_.WavelengthOf(sample.wavelength()));
       }
     }
   });

@@ -546,5 +546,18 @@ TEST(PbrtMaterialsTest, GlassDispersesWhereItIsSmooth) {
   EXPECT_THAT(said("\"dielectric\" \"spectrum eta\" [400 1.5 700 0]"), HasSubstr("error"));
 }
 
+// Thirty mixes of two equal mixes each have 2^30 ways down. Does not end where each way is taken.
+TEST(PbrtMaterialsTest, MixesThatDoubleAreReadAtOnce) {
+  std::string world = "MakeNamedMaterial \"m0\" \"string type\" \"diffuse\"\n";
+  for (int i = 1; i <= 30; ++i) {
+    const std::string below = "\"m" + std::to_string(i - 1) + "\"";
+    world += "MakeNamedMaterial \"m" + std::to_string(i) +
+             "\" \"string type\" \"mix\" \"string materials\" [" + below + " " + below + "]\n";
+  }
+  const Scene scene = World(world + "NamedMaterial \"m30\" Shape \"sphere\"");
+  EXPECT_EQ(scene.materials[static_cast<std::size_t>(scene.spheres[0].traits.material)].kind,
+            Material::Kind::kMix);
+}
+
 }  // namespace
 }  // namespace lucerna

@@ -2,6 +2,7 @@
 #include <iterator>
 #include <memory>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -24,12 +25,19 @@ bool IsInvisible(const ShapeSet& shapes) {
   return !is_seen;
 }
 
-// Whether it is hair, or mixes it.
+// Whether it is hair, or mixes it. Each material is looked at once: mixes of mixes double.
 bool IsOfHair(const std::vector<Material>& materials, std::int32_t index) {
-  if (index < 0) return false;
-  const Material& material = materials[static_cast<std::size_t>(index)];
-  return material.kind == Material::Kind::kHair || IsOfHair(materials, material.mixed[0]) ||
-         IsOfHair(materials, material.mixed[1]);
+  std::vector<std::int32_t> open = {index};
+  std::set<std::int32_t> seen = {-1};
+  while (!open.empty()) {
+    const std::int32_t next = open.back();
+    open.pop_back();
+    if (!seen.insert(next).second) continue;
+    const Material& material = materials[static_cast<std::size_t>(next)];
+    if (material.kind == Material::Kind::kHair) return true;
+    open.insert(open.end(), material.mixed.begin(), material.mixed.end());
+  }
+  return false;
 }
 
 bool IsTubesAlone(const ShapeSet& shapes) {
