@@ -4,11 +4,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
+#include "client/commands/bake_command.h"
 #include "client/commands/compare_command.h"
 #include "client/commands/file_commands.h"
 #include "client/commands/job_commands.h"
@@ -70,6 +72,8 @@ int Run(int argc, char** argv) {
   MetricsOptions metrics;
   CompareRequest comparison;
   ReferenceRequest to_refer;
+  BakeRequest baked;
+  bool bakes_on_server = false;
   std::string only;
   std::string topic;
   double exposure_stops = 0;
@@ -115,6 +119,14 @@ int Run(int argc, char** argv) {
     to->add_option("--reference", request.reference, "EXR file to measure the true error by");
   };
 
+  const auto add_workers = [&](CLI::App* to) {
+    to->add_option("--workers", cluster.workers, "worker processes")
+        ->check(CLI::Range(1, 256))
+        ->capture_default_str();
+    to->add_option("--threads", cluster.threads, "threads of each worker (default: all in all)")
+        ->check(CLI::Range(1, 4096));
+  };
+
   const auto find_programs = [&] {
     StatusOr<std::string> folder = ProgramFolder();
     if (folder.ok()) cluster.program_folder = *folder;
@@ -131,11 +143,7 @@ int Run(int argc, char** argv) {
                        "keep nothing beside the image to go on from after an interruption");
   render->add_flag("--resume", request.resumes, "go on with a render that was interrupted")
       ->excludes(no_checkpoints);
-  render->add_option("--workers", cluster.workers, "worker processes")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
-  render->add_option("--threads", cluster.threads, "threads of each worker (default: all in all)")
-      ->check(CLI::Range(1, 4096));
+  add_workers(render);
   add_json(render);
   add_quiet(render);
   add_no_preview(render);
@@ -323,6 +331,46 @@ int Run(int argc, char** argv) {
   add_no_preview(reference);
   add_json(reference);
   add_quiet(reference);
+
+  CLI::App* bake =
+      command("bake", "measure the irradiance of a scene's surfaces, as a mesh", [&]() -> Status {
+        LUCERNA_RETURN_IF_ERROR(find_programs());
+        return Bake(baked, cluster, bakes_on_server ? std::optional(server) : std::nullopt,
+                    output_options);
+      });
+  bake->add_option("SCENE", baked.scene_path, "scene file")->required();
+  bake->add_option("-o,--output", baked.output_path, ".ply or .glb file to write")->required();
+  bake->add_flag("--ascii", baked.is_ascii, "write a PLY file as text");
+  bake->add_option("--spacing", baked.spacing,
+                   "distance of neighbouring points where the mesh is finest, in scene units "
+                   "(default: a 512th of the scene's diagonal)")
+      ->check(CLI::PositiveNumber);
+  bake->add_option("--tolerance", baked.tolerance,
+                   "refine where linear interpolation is wrong by more than this share; 0: "
+                   "everywhere")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  bake->add_option("--material", baked.materials,
+                   "measure surfaces of this material alone; may be repeated")
+      ->allow_extra_args(false);
+  const std::map<std::string, MeasuredSides> sides = {{"brighter", MeasuredSides::kBrighter},
+                                                      {"front", MeasuredSides::kFront},
+                                                      {"back", MeasuredSides::kBack},
+                                                      {"both", MeasuredSides::kBoth}};
+  bake->add_option("--sides", baked.sides, "brighter, front, back or both sides of each shape")
+      ->transform(CLI::Transformer(sides))
+      ->default_str("brighter");
+  bake->add_flag("--indirect-only", baked.indirect_only,
+                 "leave out light that comes straight from lights");
+  bake->add_flag("--lux", baked.in_lux, "print illuminance: 683 lm/W times the luminance");
+  add_image_flags(bake, baked.overrides);
+  AddSettingFlags(*bake, SettingRole::kStopsJob, baked.overrides);
+  add_workers(bake);
+  bake->add_flag("--on-server", bakes_on_server, "run the jobs on the coordinator of --server");
+  add_server(bake);
+  add_no_preview(bake);
+  add_json(bake);
+  add_quiet(bake);
 
   CLI::App* selfcheck =
       command("selfcheck", "say whether the numbers are right on this machine", [&]() -> Status {

@@ -477,6 +477,40 @@ std::string ReferenceReport(const Image& reference, const std::string& path) {
                  {"metadata", reference.metadata}});
 }
 
+std::string BakeReport(const std::vector<BakeRound>& rounds,
+                       const std::vector<SurfaceFigures>& figures, double interpolation_error,
+                       const std::string& path) {
+  Json json;
+  json["rounds"] = Json::array();
+  for (const BakeRound& round : rounds) {
+    Json item = {{"points", round.points},
+                 {"job_id", round.job.job_id()},
+                 {"passes", round.job.progress().passes()},
+                 {"photons", round.job.progress().photons()}};
+    if (const auto error = NewestError(round.job)) {
+      item["relative_error"] = {
+          {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
+    }
+    json["rounds"].push_back(std::move(item));
+  }
+  json["surfaces"] = Json::array();
+  for (const SurfaceFigures& of : figures) {
+    json["surfaces"].push_back({{"name", of.name},
+                                {"triangles", of.triangles},
+                                {"area_m2", of.area},
+                                {"min_w_m2", of.lowest},
+                                {"mean_w_m2", of.mean},
+                                {"max_w_m2", of.highest},
+                                {"min_lx", of.lowest * kLumensPerWatt},
+                                {"mean_lx", of.mean * kLumensPerWatt},
+                                {"max_lx", of.highest * kLumensPerWatt},
+                                {"uniformity", of.uniformity()}});
+  }
+  json["interpolation_error"] = interpolation_error;
+  json["path"] = path;
+  return ToText(json);
+}
+
 std::string PhotonReport(const v1::PhotonPath& path) {
   Json json = {{"pass", path.key().pass()}, {"index", path.key().index()}};
   if (path.has_emission()) {

@@ -1,12 +1,13 @@
 // How do results read to a program?
 //
 // One JSON value each, indented, with a line end; or a table of comma-separated values. Names carry
-// their units; absent values are left out. The only file that uses the JSON library.
+// their units; absent values are left out.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "client/bake/surface_figures.h"
 #include "client/compare/comparison.h"
 #include "client/selfcheck/selfcheck.h"
 #include "proto/lucerna/v1/jobs.pb.h"
@@ -43,6 +44,15 @@ struct SavedImage {
                                            const std::vector<ComparedRun>& runs);
 // Of an image that MakeReference made.
 [[nodiscard]] std::string ReferenceReport(const Image& reference, const std::string& path);
+// One job of a bake.
+struct BakeRound {
+  std::size_t points = 0;
+  v1::Job job;
+};
+// What was measured, and of the mesh: figures of its surfaces and SurfaceMesh::InterpolationError.
+[[nodiscard]] std::string BakeReport(const std::vector<BakeRound>& rounds,
+                                     const std::vector<SurfaceFigures>& figures,
+                                     double interpolation_error, const std::string& path);
 [[nodiscard]] std::string PhotonReport(const v1::PhotonPath& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
 [[nodiscard]] std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost);

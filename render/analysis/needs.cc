@@ -183,7 +183,8 @@ bool GathersOnOneFloor(const Scene& scene) {
   });
   // The camera is one point here, and instances may gather anywhere.
   if (curves_gather || !scene.instances.empty() ||
-      scene.camera.kind == Camera::Kind::kOrthographic) {
+      scene.camera.kind == Camera::Kind::kOrthographic ||
+      scene.camera.kind == Camera::Kind::kSensors) {
     return false;
   }
   const Bounds box = BoundsOf(scene);

@@ -179,8 +179,12 @@ class Walls {
 // The lights whose light cannot reach the camera, however it is scattered.
 std::vector<std::uint32_t> FindSeparated(const Scene& scene,
                                          const std::vector<NumberedLight>& lights) {
-  // Rays of an orthographic camera begin on a plane, which is not looked at here.
-  if (scene.camera.kind == Camera::Kind::kOrthographic) return {};
+  // Rays of an orthographic camera begin on a plane, and sensors are anywhere: neither is looked at
+  // here.
+  if (scene.camera.kind == Camera::Kind::kOrthographic ||
+      scene.camera.kind == Camera::Kind::kSensors) {
+    return {};
+  }
   const auto walls = Walls::Create(scene, IsOpaque);
   if (!walls.ok()) return {};
   const Vec3 eye = scene.camera.camera_to_world.Point({});

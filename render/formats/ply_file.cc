@@ -98,6 +98,7 @@ struct Element {
 struct Header {
   Format format = Format::kAscii;
   std::vector<Element> elements;
+  std::vector<std::string> comments;
   std::size_t body_offset = 0;
 };
 
@@ -120,7 +121,12 @@ StatusOr<Header> ParseHeader(std::string_view bytes) {
       continue;
     }
     const std::vector<std::string_view> words = WordsOf(line);
-    if (words.empty() || words[0] == "comment" || words[0] == "obj_info") continue;
+    if (words.empty() || words[0] == "obj_info") continue;
+    if (words[0] == "comment") {
+      constexpr std::size_t kWord = std::string_view("comment ").size();
+      if (line.size() > kWord) header.comments.emplace_back(line.substr(kWord));
+      continue;
+    }
     if (words[0] == "end_header") {
       if (!has_format) return Bad("the header has no format line");
       header.body_offset = position;
@@ -385,16 +391,15 @@ Status SkipElement(Body& body, Format format, const Element& element) {
   return absl::OkStatus();
 }
 
-}  // namespace
-
-StatusOr<TriangleMesh> ParsePly(std::string_view bytes) {
-  std::string unpacked;
+// The header of a file, of which `bytes` are unpacked into `unpacked` when they are packed. Its
+// counts are no more than the size can hold.
+StatusOr<Header> Open(std::string_view& bytes, std::string& unpacked) {
   if (IsGzip(bytes)) {
     StatusOr<std::string> inflated = Gunzip(bytes);
     if (!inflated.ok()) return Bad(std::string(inflated.status().message()));
     bytes = unpacked = *std::move(inflated);
   }
-  LUCERNA_ASSIGN_OR_RETURN(const Header header, ParseHeader(bytes));
+  LUCERNA_ASSIGN_OR_RETURN(Header header, ParseHeader(bytes));
   // One element at a time, each against what the ones before it leave: no sum can overflow.
   std::uint64_t left = bytes.size() - header.body_offset;
   for (const Element& element : header.elements) {
@@ -408,6 +413,14 @@ StatusOr<TriangleMesh> ParsePly(std::string_view bytes) {
     }
     left -= std::min(left, element.count * size_bytes);
   }
+  return header;
+}
+
+}  // namespace
+
+StatusOr<TriangleMesh> ParsePly(std::string_view bytes) {
+  std::string unpacked;
+  LUCERNA_ASSIGN_OR_RETURN(const Header header, Open(bytes, unpacked));
   TriangleMesh mesh;
   bool has_vertices = false;
   bool has_faces = false;
@@ -427,6 +440,27 @@ StatusOr<TriangleMesh> ParsePly(std::string_view bytes) {
   }
   if (!has_vertices || !has_faces) return Bad("it has no vertices or no faces");
   return mesh;
+}
+
+StatusOr<PlyPoints> ParsePlyPoints(std::string_view bytes) {
+  std::string unpacked;
+  LUCERNA_ASSIGN_OR_RETURN(Header header, Open(bytes, unpacked));
+  Body body(bytes.substr(header.body_offset), header.format);
+  for (const Element& element : header.elements) {
+    if (element.name != "vertex") {
+      LUCERNA_RETURN_IF_ERROR(SkipElement(body, header.format, element));
+      continue;
+    }
+    if (element.count > 0xFFFFFFFFU) return Bad("it has more than 2^32 vertices");
+    TriangleMesh mesh;
+    LUCERNA_RETURN_IF_ERROR(ReadVertices(body, header.format, element, mesh));
+    if (mesh.normals.empty() && !mesh.positions.empty()) {
+      return Bad("its vertices have no nx, ny and nz");
+    }
+    return PlyPoints{std::move(mesh.positions), std::move(mesh.normals),
+                     std::move(header.comments)};
+  }
+  return Bad("it has no vertices");
 }
 
 }  // namespace lucerna

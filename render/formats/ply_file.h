@@ -3,8 +3,10 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "render/base/status.h"
+#include "render/math/vector.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
@@ -21,5 +23,15 @@ namespace lucerna {
 // allocated), an index out of range, a position that is not finite, a face with fewer than 3 or
 // more than 4 corners, a decompressed size above 200 times the compressed one.
 [[nodiscard]] StatusOr<TriangleMesh> ParsePly(std::string_view bytes);
+
+// The vertices of a PLY file that need no faces, and what its comments say.
+struct PlyPoints {
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals;          // [positions], as the file has them
+  std::vector<std::string> comments;  // without the word "comment"
+};
+
+// Errors: those of ParsePly but for faces, which are skipped, and INVALID_ARGUMENT without normals.
+[[nodiscard]] StatusOr<PlyPoints> ParsePlyPoints(std::string_view bytes);
 
 }  // namespace lucerna

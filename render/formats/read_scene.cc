@@ -10,6 +10,7 @@
 #include "render/formats/asset_reader.h"
 #include "render/formats/finish_scene.h"
 #include "render/formats/pbrt/pbrt_reader.h"
+#include "render/formats/sensors/sensors_reader.h"
 
 namespace lucerna {
 namespace {
@@ -28,6 +29,7 @@ struct SceneFormat {
 
 constexpr std::array kFormats = {
     SceneFormat{"pbrt-v4", ".pbrt", &BeginsAsPbrt, &ReadPbrt},
+    SceneFormat{"points to measure irradiance at", ".ply", &BeginsAsSensors, &ReadSensors},
 };
 
 const SceneFormat* FormatOf(std::string_view path, std::string_view text) {
@@ -50,24 +52,29 @@ std::string NamesOfFormats() {
 
 }  // namespace
 
-ParsedScene ReadScene(SceneFiles& files, const std::string& main_path, const SceneLimits& limits,
-                      std::size_t max_of_each) {
-  Diagnostics diagnostics(max_of_each);
-  AssetReader assets(files, limits);
+UnfinishedScene ReadUnfinishedScene(const std::string& main_path, AssetReader& assets,
+                                    Diagnostics& diagnostics) {
   const SourceLocation whole = {&main_path, 0, 0};
   const StatusOr<std::string> text = assets.ReadText(main_path);
   if (!text.ok()) {
     diagnostics.Error(whole, std::string(text.status().message()));
-    return {Scene(), diagnostics.Take()};
+    return {};
   }
   const SceneFormat* format = FormatOf(main_path, *text);
   if (format == nullptr) {
     diagnostics.Error(whole,
                       Concat("this is no scene in a format that is read here; ", NamesOfFormats()));
-    return {Scene(), diagnostics.Take()};
+    return {};
   }
+  return format->read(main_path, *text, assets, diagnostics);
+}
+
+ParsedScene ReadScene(SceneFiles& files, const std::string& main_path, const SceneLimits& limits,
+                      std::size_t max_of_each) {
+  Diagnostics diagnostics(max_of_each);
+  AssetReader assets(files, limits);
   Scene scene =
-      FinishScene(format->read(main_path, *text, assets, diagnostics), main_path, diagnostics);
+      FinishScene(ReadUnfinishedScene(main_path, assets, diagnostics), main_path, diagnostics);
   return {std::move(scene), diagnostics.Take()};
 }
 

@@ -8,10 +8,18 @@
 #include <cstddef>
 #include <string>
 
+#include "render/formats/asset_reader.h"
+#include "render/formats/diagnostic.h"
+#include "render/formats/finish_scene.h"
 #include "render/formats/parsed_scene.h"
 #include "render/scene/scene_files.h"
 
 namespace lucerna {
+
+// For formats that build on another file. Reads a main file by its own format's reader; after an
+// error in `diagnostics` the scene is not meaningful. `main_path` outlives the diagnostics.
+[[nodiscard]] UnfinishedScene ReadUnfinishedScene(const std::string& main_path, AssetReader& assets,
+                                                  Diagnostics& diagnostics);
 
 // Reads the main file and everything it includes. Never fails otherwise than by diagnostics. Work
 // and memory are bounded by the limits whatever the bytes are. At most `max_of_each`

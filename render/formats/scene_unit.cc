@@ -27,6 +27,8 @@ double FarthestOf(const Scene& scene) {
     const double on_lens = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
     farthest = std::max(farthest, std::abs(row[3]) + scene.camera.lens_radius * on_lens);
   }
+  for (const Sensor& sensor : scene.sensors)
+    farthest = std::max(farthest, static_cast<double>(MaxAbs(sensor.position)));
   ForEachDeltaList(scene, [&](const auto& lights) {
     for (const auto& light : lights) {
       if (!light.kIsAtInfinity)
@@ -88,6 +90,9 @@ Status ChooseUnit(Scene& scene) {
   camera.window_scale *= factor;
   camera.lens_radius *= factor;
   camera.focal_distance *= factor;
+  camera.sensor_spacing *= factor;
+  for (Sensor& sensor : scene.sensors)
+    sensor.position = ScaledBy(sensor.position, factor);
   return absl::OkStatus();
 }
 

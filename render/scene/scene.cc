@@ -34,6 +34,8 @@ double PixelFootprint(const Camera& camera, int width, int height, double distan
       return of_window * distance;
     case Camera::Kind::kOrthographic:
       return of_window;
+    case Camera::Kind::kSensors:
+      return camera.sensor_spacing;
     case Camera::Kind::kEqualArea:
     case Camera::Kind::kEquirectangular:
       break;

@@ -74,6 +74,9 @@ struct Camera {
     kOrthographic,     // parallel rays along +z that begin on the plane z = 0
     kEqualArea,        // all directions, by math/equal_area_square.h
     kEquirectangular,  // all directions, by the angle around +y and the one from it
+    // No camera: each pixel, in rows, is one of Scene::sensors. Its radiance is that of a white
+    // diffuse surface there, which is the irradiance over pi.
+    kSensors,
   };
 
   Kind kind = Kind::kPerspective;
@@ -86,7 +89,16 @@ struct Camera {
   std::optional<Window> screen_window;
   double lens_radius = 0;
   double focal_distance = 1e6;
-  std::int32_t medium = kNoMedium;  // in which the camera is
+  double sensor_spacing = 0;        // of sensors: about the distance between neighbours, > 0
+  std::int32_t medium = kNoMedium;  // in which the camera is, or all sensors are
+};
+
+// A point on a surface whose irradiance is measured, on the side that the normal points to.
+struct Sensor {
+  Vec3 position;  // on the surface, up to rounding
+  Vec3 normal;    // unit
+
+  bool operator==(const Sensor&) const = default;
 };
 
 // The window on the plane z = 1 in camera space that an image of `width` x `height` pixels shows
@@ -164,6 +176,7 @@ struct Scene {
 #undef LUCERNA_MEMBER
   std::vector<InfiniteLight> infinite_lights;
   Camera camera;
+  std::vector<Sensor> sensors;  // not empty when the camera is none but these
   FilmSettings film;
   PixelFilter filter;
   IntegratorSettings integrator;

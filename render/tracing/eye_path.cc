@@ -54,7 +54,9 @@ constexpr float kWidestSpread = 4;
 float SpreadAbove(const Scene& scene, bool rays_find_lights, const Intersector& intersector,
                   const LightSet& lights) {
   const float radius = std::max(scene.filter.radius_x, scene.filter.radius_y);
-  const bool can_be_spread = radius <= kWidestSpread && scene.media.empty();
+  // A sensor sees no light itself.
+  const bool can_be_spread =
+      radius <= kWidestSpread && scene.media.empty() && scene.camera.kind != Camera::Kind::kSensors;
   if (!can_be_spread || !rays_find_lights || intersector.bounds().empty()) return HUGE_VALF;
   const double white = WhiteRadiance(intersector, lights);
   if (!(static_cast<double>(lights.LargestRadiance()) > white)) return HUGE_VALF;
@@ -249,6 +251,12 @@ Rgb EyePathTracer::BrightAtCentre(int x, int y) const {
 
 EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass, First first) const {
   const PixelSampler sampler = SamplerOf(x, y, pass);
+  if (scene_.camera.kind == Camera::Kind::kSensors) {
+    return AtSensor(static_cast<std::size_t>(settings_.crop_y0 + y) *
+                            static_cast<std::size_t>(settings_.width) +
+                        static_cast<std::size_t>(settings_.crop_x0 + x),
+                    sampler);
+  }
   // The filter's weight is kept out of the walk, because it can be negative.
   float filter_weight = 1;
   EyePath path = Walk(CameraRay(sampler, x, y, filter_weight), sampler, first);
@@ -394,6 +402,60 @@ bool EyePathTracer::FindFirst(const Ray& ray, First first, Hit& hit) const {
   // Found or known, the hit has the same bits.
   hit = intersector_.HitOn(shape, ray);
   return true;
+}
+
+Rgb EyePathTracer::ScatteredDirect(const SurfacePoint& surface, Vec3 wi, float pdf,
+                                   std::int32_t medium, Rgb weight, int& rays) const {
+  Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
+  Hit hit;
+  if (!FindThroughMedia(probe, hit, medium, weight, rays)) {
+    return weight * lights_.InfiniteRadiance(wi) *
+           PowerHeuristic(pdf, lights_.PdfDirectInfinite(wi));
+  }
+  const SurfacePoint light = intersector_.SurfaceAt(probe, hit);
+  const Rgb radiance = lights_.EmittedRadiance(light, -wi);
+  if (IsBlack(radiance)) return {};
+  return weight * radiance * PowerHeuristic(pdf, lights_.PdfDirect(surface.position, light));
+}
+
+EyePath EyePathTracer::AtSensor(std::size_t number, const PixelSampler& sampler) const {
+  EyePath path;
+  // The last row may be longer than there are sensors.
+  if (number >= scene_.sensors.size()) return path;
+  const Sensor& sensor = scene_.sensors[number];
+  SurfacePoint surface;
+  surface.position = sensor.position;
+  surface.geometric_normal = sensor.normal;
+  surface.shading_normal = sensor.normal;
+  // The surface under it is not known: as far off as for one that is as large as the scene.
+  surface.clearance = kClearance * (MaxAbs(sensor.position) + intersector_.bounds().Diagonal());
+  static const Material white = [] {
+    Material material;
+    material.reflectance = Gray(1);
+    return material;
+  }();
+  const Frame frame = ShadingFrame(surface);
+  constexpr Vec3 kUp = {0, 0, 1};
+  const std::int32_t medium =
+      parts_.media ? media_.AtLight(LeavingPoint(surface, sensor.normal), scene_.camera.medium)
+                   : kNoMedium;
+  path.features = {white.reflectance, sensor.normal, 0};
+  if (parts_.lights) {
+    const SobolPoint u = sampler.ForVertex(0);
+    const ShadingPoint point = {
+        surface, white, frame, sensor.normal, parts_.media ? &media_ : nullptr, medium};
+    path.direct += LightSampledRadiance(intersector_, lights_, point, u, path.rays);
+    BsdfSample sample;
+    if (rays_find_lights_ && SampleDiffuse(white, kUp, u[1], u[2], sample)) {
+      path.direct += ScatteredDirect(surface, frame.ToWorld(sample.wi), sample.pdf, medium,
+                                     sample.weight, path.rays);
+    }
+  }
+  path.hitpoint.position = sensor.position;
+  path.hitpoint.normal = sensor.normal;
+  path.hitpoint.weight = EyeFactor(white, kUp);
+  path.hitpoint.footprint = footprint_;
+  return path;
 }
 
 EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) const {
@@ -565,22 +627,9 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       return hitpoint;
     };
     if (properties.gathers) {
-      // Half of the direct light: what a scattered ray finds of the lights themselves.
       if (parts_.lights && scattered && rays_find_lights_) {
-        Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
-        Rgb carried = weight * sample.weight;
-        if (!FindThroughMedia(probe, hit, medium_after, carried, path.rays)) {
-          path.direct += carried * lights_.InfiniteRadiance(wi) *
-                         PowerHeuristic(share * sample.pdf, lights_.PdfDirectInfinite(wi));
-        } else {
-          const SurfacePoint light = intersector_.SurfaceAt(probe, hit);
-          const Rgb radiance = lights_.EmittedRadiance(light, -wi);
-          if (!IsBlack(radiance)) {
-            path.direct +=
-                carried * radiance *
-                PowerHeuristic(share * sample.pdf, lights_.PdfDirect(surface.position, light));
-          }
-        }
+        path.direct += ScatteredDirect(surface, wi, share * sample.pdf, medium_after,
+                                       weight * sample.weight, path.rays);
       }
       const bool is_glossy = parts_.lobes && !properties.is_separable;
       path.hitpoint = hitpoint_here(is_glossy, material);

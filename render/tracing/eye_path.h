@@ -163,6 +163,12 @@ class EyePathTracer {
   };
   [[nodiscard]] static WalkParts WalkPartsFor(const SceneNeeds& needs);
   [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler, First first) const;
+  // The path of a pixel that is no more than a sensor.
+  [[nodiscard]] EyePath AtSensor(std::size_t number, const PixelSampler& sampler) const;
+  // Radiance of the lights that a ray from a gathering surface meets: the half of direct light that
+  // is not drawn from the lights. `weight` includes the sample's, `pdf` is its density [sr⁻¹].
+  [[nodiscard]] Rgb ScatteredDirect(const SurfacePoint& surface, Vec3 wi, float pdf,
+                                    std::int32_t medium, Rgb weight, int& rays) const;
   // What the camera's ray meets. False when that is nothing.
   [[nodiscard]] bool FindFirst(const Ray& ray, First first, Hit& hit) const;
   // Of a surface with its material where it was met (MaterialAt).

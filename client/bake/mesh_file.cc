@@ -1,0 +1,253 @@
+#include "client/bake/mesh_file.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <map>
+#include <utility>
+
+#include "absl/strings/str_format.h"
+#include <nlohmann/json.hpp>
+
+#include "render/base/text.h"
+#include "render/base/version.h"
+
+namespace lucerna {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+
+// Of glTF 2.0.
+constexpr int kFloat = 5126;
+constexpr int kUnsignedInt = 5125;
+constexpr int kArrayBuffer = 34962;
+constexpr int kElementArrayBuffer = 34963;
+// What is this many times as bright as the mean is white for viewers.
+constexpr double kWhite = 4;
+
+template <typename T>
+void Append(std::string& bytes, const std::vector<T>& values) {
+  if (!values.empty()) {
+    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+  }
+}
+
+void AppendUint32(std::string& bytes, std::size_t value) {
+  const auto word = static_cast<std::uint32_t>(value);
+  std::array<char, sizeof(word)> raw{};
+  std::memcpy(raw.data(), &word, sizeof(word));
+  bytes.append(raw.data(), raw.size());
+}
+
+// Without line ends, which would end a comment.
+std::string OneLine(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return c == '\n' || c == '\r'; }, ' ');
+  return text;
+}
+
+double MeanOf(const BakedMesh& mesh) {
+  double sum = 0;
+  double count = 0;
+  for (const BakedMesh::Surface& surface : mesh.surfaces) {
+    for (const Rgb irradiance : surface.irradiance)
+      sum += static_cast<double>(Luminance(irradiance));
+    count += static_cast<double>(surface.irradiance.size());
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+// Builds the parts of a glTF file that lie in its one buffer.
+class Buffer {
+ public:
+  template <typename T>
+  std::size_t Add(const std::vector<T>& values, const char* type, int component, int target) {
+    views_.push_back({{"buffer", 0},
+                      {"byteOffset", bytes_.size()},
+                      {"byteLength", values.size() * sizeof(T)},
+                      {"target", target}});
+    Append(bytes_, values);
+    accessors_.push_back({{"bufferView", views_.size() - 1},
+                          {"componentType", component},
+                          {"count", values.size()},
+                          {"type", type}});
+    return accessors_.size() - 1;
+  }
+  // glTF asks for the box of positions.
+  std::size_t AddPositions(const std::vector<Vec3>& positions) {
+    const std::size_t accessor = Add(positions, "VEC3", kFloat, kArrayBuffer);
+    Bounds box;
+    for (const Vec3 position : positions)
+      box.Add(position);
+    accessors_.back()["min"] = {box.low.x, box.low.y, box.low.z};
+    accessors_.back()["max"] = {box.high.x, box.high.y, box.high.z};
+    return accessor;
+  }
+
+  [[nodiscard]] const std::string& bytes() const { return bytes_; }
+  [[nodiscard]] const nlohmann::ordered_json& views() const { return views_; }
+  [[nodiscard]] const nlohmann::ordered_json& accessors() const { return accessors_; }
+
+ private:
+  std::string bytes_;
+  nlohmann::ordered_json views_ = nlohmann::ordered_json::array();
+  nlohmann::ordered_json accessors_ = nlohmann::ordered_json::array();
+};
+
+}  // namespace
+
+BakedMesh BakedMeshOf(const SurfaceMesh& mesh) {
+  BakedMesh baked;
+  // Of the surfaces of `mesh`, where they are in `baked`.
+  std::map<std::uint32_t, std::size_t> at;
+  std::map<std::uint32_t, std::uint32_t> vertex_at;
+  for (const MeshFace& face : mesh.faces()) {
+    const auto [found, is_new] = at.try_emplace(face.surface, baked.surfaces.size());
+    if (is_new) {
+      const MeshSurface& surface = mesh.surfaces()[face.surface];
+      baked.surfaces.emplace_back().name = Concat(surface.shape, surface.name.empty() ? "" : " ",
+                                                  surface.name, surface.is_back ? ", back" : "");
+    }
+    BakedMesh::Surface& to = baked.surfaces[found->second];
+    std::array<std::uint32_t, 3> corners{};
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const MeshVertex& vertex = mesh.vertices()[face.vertices[i]];
+      const auto [known, is_first] =
+          vertex_at.try_emplace(face.vertices[i], static_cast<std::uint32_t>(to.positions.size()));
+      if (is_first) {
+        to.positions.push_back(vertex.position);
+        to.normals.push_back(vertex.normal);
+        to.irradiance.push_back(vertex.irradiance->value);
+        to.noise.push_back(vertex.irradiance->noise);
+      }
+      corners[i] = known->second;
+    }
+    to.faces.push_back(corners);
+  }
+  return baked;
+}
+
+std::string MeshPly(const BakedMesh& mesh, bool is_ascii) {
+  std::size_t vertices = 0;
+  std::size_t faces = 0;
+  for (const BakedMesh::Surface& surface : mesh.surfaces) {
+    vertices += surface.positions.size();
+    faces += surface.faces.size();
+  }
+  std::string bytes = Concat("ply\nformat ", is_ascii ? "ascii" : "binary_little_endian",
+                             " 1.0\ncomment irradiance of ", OneLine(mesh.scene), " by lucerna ",
+                             Version(), ", W/m^2\nelement vertex ", vertices, "\n");
+  for (const char* name :
+       {"x", "y", "z", "nx", "ny", "nz", "irradiance_r", "irradiance_g", "irradiance_b", "noise"}) {
+    bytes += Concat("property float ", name, "\n");
+  }
+  bytes += Concat("element face ", faces, "\nproperty list uchar int vertex_indices\nend_header\n");
+  for (const BakedMesh::Surface& surface : mesh.surfaces) {
+    for (std::size_t i = 0; i < surface.positions.size(); ++i) {
+      const Vec3 p = surface.positions[i];
+      const Vec3 n = surface.normals[i];
+      const Rgb e = surface.irradiance[i];
+      const std::vector<float> row = {p.x, p.y, p.z, n.x, n.y,
+                                      n.z, e.r, e.g, e.b, surface.noise[i]};
+      if (!is_ascii) {
+        Append(bytes, row);
+        continue;
+      }
+      for (std::size_t column = 0; column < row.size(); ++column) {
+        // Nine digits read back as the same float.
+        bytes += absl::StrFormat(column == 0 ? "%.9g" : " %.9g", row[column]);
+      }
+      bytes += '\n';
+    }
+  }
+  std::uint32_t first = 0;
+  for (const BakedMesh::Surface& surface : mesh.surfaces) {
+    for (const auto& face : surface.faces) {
+      const std::vector<std::uint32_t> corners = {first + face[0], first + face[1],
+                                                  first + face[2]};
+      if (is_ascii) {
+        bytes += Concat("3 ", corners[0], " ", corners[1], " ", corners[2], "\n");
+      } else {
+        bytes += '\x03';
+        Append(bytes, corners);
+      }
+    }
+    first += static_cast<std::uint32_t>(surface.positions.size());
+  }
+  return bytes;
+}
+
+std::string MeshGlb(const BakedMesh& mesh) {
+  using Json = nlohmann::ordered_json;
+  const double mean = MeanOf(mesh);
+  const auto scale = static_cast<float>(mean > 0 ? 1 / (kWhite * mean) : 0);
+  Buffer buffer;
+  Json meshes = Json::array();
+  Json nodes = Json::array();
+  Json roots = Json::array();
+  for (const BakedMesh::Surface& surface : mesh.surfaces) {
+    std::vector<std::array<float, 4>> colors;
+    colors.reserve(surface.irradiance.size());
+    for (const Rgb irradiance : surface.irradiance) {
+      const auto shown = [&](float value) { return std::clamp(value * scale, 0.0F, 1.0F); };
+      colors.push_back({shown(irradiance.r), shown(irradiance.g), shown(irradiance.b), 1});
+    }
+    Json attributes;
+    attributes["POSITION"] = buffer.AddPositions(surface.positions);
+    attributes["NORMAL"] = buffer.Add(surface.normals, "VEC3", kFloat, kArrayBuffer);
+    attributes["COLOR_0"] = buffer.Add(colors, "VEC4", kFloat, kArrayBuffer);
+    attributes["_IRRADIANCE"] = buffer.Add(surface.irradiance, "VEC3", kFloat, kArrayBuffer);
+    attributes["_NOISE"] = buffer.Add(surface.noise, "SCALAR", kFloat, kArrayBuffer);
+    std::vector<std::uint32_t> indices;
+    indices.reserve(3 * surface.faces.size());
+    for (const auto& face : surface.faces)
+      indices.insert(indices.end(), face.begin(), face.end());
+    const std::size_t index_accessor =
+        buffer.Add(indices, "SCALAR", kUnsignedInt, kElementArrayBuffer);
+    meshes.push_back({{"name", surface.name},
+                      {"primitives",
+                       {{{"attributes", attributes},
+                         {"indices", index_accessor},
+                         {"material", 0},
+                         {"mode", 4}}}}});
+    nodes.push_back({{"mesh", meshes.size() - 1}, {"name", surface.name}});
+    roots.push_back(nodes.size() - 1);
+  }
+  Json file;
+  file["asset"] = {{"version", "2.0"}, {"generator", Concat("lucerna ", Version())}};
+  file["extensionsUsed"] = {"KHR_materials_unlit"};
+  file["scene"] = 0;
+  file["scenes"] = {{{"nodes", roots}}};
+  file["nodes"] = nodes;
+  file["meshes"] = meshes;
+  file["materials"] = {{{"name", "irradiance"},
+                        {"doubleSided", true},
+                        {"pbrMetallicRoughness", {{"metallicFactor", 0}}},
+                        {"extensions", {{"KHR_materials_unlit", Json::object()}}}}};
+  file["accessors"] = buffer.accessors();
+  file["bufferViews"] = buffer.views();
+  file["buffers"] = {{{"byteLength", buffer.bytes().size()}}};
+  file["extras"] = {{"irradiance_unit", "W/m^2"},
+                    {"scene", mesh.scene},
+                    {"spacing", mesh.spacing},
+                    {"relative_error", mesh.estimate}};
+
+  std::string json = file.dump(-1, ' ', false, Json::error_handler_t::replace);
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const std::size_t binary = buffer.bytes().size();  // of floats and integers: a multiple of 4
+  std::string bytes = "glTF";
+  AppendUint32(bytes, 2);
+  AppendUint32(bytes, 12 + 8 + json.size() + 8 + binary);
+  AppendUint32(bytes, json.size());
+  bytes += "JSON";
+  bytes += json;
+  AppendUint32(bytes, binary);
+  bytes.append("BIN\0", 4);
+  bytes += buffer.bytes();
+  return bytes;
+}
+
+}  // namespace lucerna

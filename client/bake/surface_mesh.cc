@@ -1,0 +1,546 @@
+#include "client/bake/surface_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "render/base/text.h"
+#include "render/math/double3.h"
+#include "render/math/union_find.h"
+#include "render/scene/material.h"
+#include "render/scene/shape_lists.h"
+
+namespace lucerna {
+namespace {
+
+// Faces that bend by more have vertices of their own.
+const double kCreaseCosine = std::cos(30 * std::numbers::pi / 180);
+// Sensors lie so far inside of the faces of their vertices, in spacings: beside what stands on an
+// edge, and on one side of it.
+constexpr double kInset = 0.001;
+// And at most this share of the way to the middle of the face.
+constexpr double kLargestInset = 0.1;
+// Irradiance below this share of the mean is as good as none.
+constexpr double kDarkShare = 0.1;
+// Differences below so many standard deviations are noise.
+constexpr double kNoiseDeviations = 2;
+// Into so many parts a disk's rim and a sphere's equator are divided.
+constexpr int kRoundParts = 32;
+
+constexpr std::uint32_t kNoVertex = UINT32_MAX;
+
+using Triangles = std::vector<std::array<std::uint32_t, 3>>;
+
+Vec3 ToFile(Vec3 position, double unit) {
+  return ToFloat(Double3(position) * unit);
+}
+
+// Two vectors that make a right-handed frame with `axis`, which is unit length.
+std::pair<Double3, Double3> AcrossOf(Double3 axis) {
+  const Double3 other = std::abs(axis.x) < 0.6 ? Double3(1, 0, 0) : Double3(0, 1, 0);
+  const Double3 u = Cross(other, axis);
+  const Double3 unit_u = u * (1 / Length(u));
+  return {unit_u, Cross(axis, unit_u)};
+}
+
+struct Triangulated {
+  std::vector<Vec3> positions;
+  Triangles triangles;
+  std::optional<MeshSurface::Ball> ball;
+};
+
+Triangulated Triangulate(const TriangleMesh& mesh, const Transform& to_world, double unit) {
+  Triangulated out;
+  out.positions.reserve(mesh.positions.size());
+  for (const Vec3 position : mesh.positions)
+    out.positions.push_back(ToFile(to_world.Point(position), unit));
+  const bool is_mirrored = to_world.SwapsHandedness();
+  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+    out.triangles.push_back({mesh.indices[i], mesh.indices[i + 1], mesh.indices[i + 2]});
+    if (is_mirrored) std::swap(out.triangles.back()[1], out.triangles.back()[2]);
+  }
+  return out;
+}
+
+Triangulated Triangulate(const Disk& disk, double unit) {
+  Triangulated out;
+  const auto [u, v] = AcrossOf(Double3(disk.normal));
+  const Double3 center(disk.center);
+  const auto ring = [&](float radius) {
+    for (int i = 0; i < kRoundParts; ++i) {
+      const double angle = 2 * std::numbers::pi * i / kRoundParts;
+      const auto r = static_cast<double>(radius);
+      out.positions.push_back(
+          ToFile(ToFloat(center + u * (r * std::cos(angle)) + v * (r * std::sin(angle))), unit));
+    }
+  };
+  ring(disk.radius);
+  const bool is_ring = disk.inner_radius > 0;
+  if (is_ring) {
+    ring(disk.inner_radius);
+  } else {
+    out.positions.push_back(ToFile(disk.center, unit));
+  }
+  for (std::uint32_t i = 0; i < kRoundParts; ++i) {
+    const std::uint32_t next = (i + 1) % kRoundParts;
+    if (is_ring) {
+      out.triangles.push_back({i, next, kRoundParts + i});
+      out.triangles.push_back({next, kRoundParts + next, kRoundParts + i});
+    } else {
+      out.triangles.push_back({i, next, static_cast<std::uint32_t>(kRoundParts)});
+    }
+  }
+  return out;
+}
+
+// An octahedron, each face of which is split twice: 128 faces.
+Triangulated Triangulate(const Sphere& sphere, double unit) {
+  Triangulated out;
+  out.ball = MeshSurface::Ball{ToFile(sphere.center, unit),
+                               static_cast<float>(static_cast<double>(sphere.radius) * unit)};
+  std::vector<Double3> directions = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0},
+                                     {0, -1, 0}, {0, 0, 1},  {0, 0, -1}};
+  out.triangles = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
+                   {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+  for (int level = 0; level < 2; ++level) {
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
+    const auto middle = [&](std::uint32_t a, std::uint32_t b) {
+      const auto [found, is_new] =
+          middles.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(directions.size()));
+      if (is_new) {
+        const Double3 sum = directions[a] + directions[b];
+        directions.push_back(sum * (1 / Length(sum)));
+      }
+      return found->second;
+    };
+    Triangles finer;
+    for (const auto& [a, b, c] : out.triangles) {
+      const std::uint32_t ab = middle(a, b);
+      const std::uint32_t bc = middle(b, c);
+      const std::uint32_t ca = middle(c, a);
+      finer.insert(finer.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+    }
+    out.triangles = std::move(finer);
+  }
+  for (const Double3 direction : directions) {
+    out.positions.push_back(ToFile(
+        ToFloat(Double3(sphere.center) + direction * static_cast<double>(sphere.radius)), unit));
+  }
+  if (sphere.inward) {
+    for (auto& triangle : out.triangles)
+      std::swap(triangle[1], triangle[2]);
+  }
+  return out;
+}
+
+Triangulated Triangulate(const CurvePiece& /*curve*/, double /*unit*/) {
+  return {};
+}
+
+double LuminanceOf(const Irradiance& irradiance) {
+  return static_cast<double>(Luminance(irradiance.value));
+}
+
+}  // namespace
+
+StatusOr<SurfaceMesh> SurfaceMesh::FromScene(const Scene& scene, const Options& options) {
+  SurfaceMesh mesh;
+  mesh.spacing_ = options.spacing;
+  mesh.sides_ = options.sides;
+  std::set<std::string> names;
+  std::uint32_t shape = 0;
+  const auto is_wanted = [&](const ShapeTraits& traits) {
+    const Material& material = scene.materials[static_cast<std::size_t>(traits.material)];
+    if (!Gathers(material)) return false;
+    names.insert(material.name);
+    return options.names.empty() || std::ranges::count(options.names, material.name) > 0;
+  };
+  const auto add = [&](const ShapeTraits& traits, Triangulated triangulated) {
+    if (triangulated.triangles.empty()) return;
+    MeshSurface surface;
+    surface.name = scene.materials[static_cast<std::size_t>(traits.material)].name;
+    surface.shape = shape++;
+    surface.ball = triangulated.ball;
+    if (options.sides != MeasuredSides::kBack) {
+      mesh.AddSurface(triangulated.positions, triangulated.triangles, surface);
+    }
+    if (options.sides == MeasuredSides::kFront) return;
+    surface.is_back = true;
+    for (auto& triangle : triangulated.triangles)
+      std::swap(triangle[1], triangle[2]);
+    mesh.AddSurface(triangulated.positions, triangulated.triangles, surface);
+  };
+  for (const TriangleMesh& triangles : scene.meshes) {
+    if (is_wanted(triangles.traits)) {
+      add(triangles.traits, Triangulate(triangles, Transform(), scene.unit));
+    }
+  }
+  for (const Instance& instance : scene.instances) {
+    const InstancedObject& object = scene.objects[instance.object];
+    for (std::uint32_t i = 0; i < object.mesh_count; ++i) {
+      const TriangleMesh& triangles = scene.object_meshes[object.first_mesh + i];
+      if (is_wanted(triangles.traits)) {
+        add(triangles.traits, Triangulate(triangles, instance.to_world, scene.unit));
+      }
+    }
+  }
+  ForEachAnalyticShape(scene, [&](const auto& analytic) {
+    if (is_wanted(analytic.traits)) add(analytic.traits, Triangulate(analytic, scene.unit));
+  });
+  if (!mesh.faces_.empty()) return mesh;
+  if (names.empty()) {
+    return absl::NotFoundError("no surface of the scene keeps photons: all are smooth or black");
+  }
+  return absl::NotFoundError(Concat("no surface has such a material; there are ", Listed(names)));
+}
+
+std::uint32_t SurfaceMesh::PlaceOf(Vec3 position) {
+  // Of two zeros the positive one.
+  const std::array<float, 3> key = {position.x + 0.0F, position.y + 0.0F, position.z + 0.0F};
+  return places_.try_emplace(key, static_cast<std::uint32_t>(places_.size())).first->second;
+}
+
+void SurfaceMesh::AddSurface(const std::vector<Vec3>& positions, const Triangles& triangles,
+                             MeshSurface surface) {
+  const auto number = static_cast<std::uint32_t>(surfaces_.size());
+  std::vector<std::uint32_t> places;
+  places.reserve(positions.size());
+  for (const Vec3 position : positions)
+    places.push_back(PlaceOf(position));
+  const auto normal_of = [&](const std::array<std::uint32_t, 3>& triangle) {
+    return TriangleCross(positions[triangle[0]], positions[triangle[1]], positions[triangle[2]]);
+  };
+
+  // Corners of faces that share an edge without a crease are one vertex.
+  UnionFind corners(3 * triangles.size());
+  struct Side {
+    std::uint32_t face;
+    std::uint32_t first, second;  // corners, by their places
+  };
+  std::map<Pair, std::vector<Side>> sides;
+  for (std::uint32_t face = 0; face < triangles.size(); ++face) {
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      std::uint32_t a = 3 * face + i;
+      std::uint32_t b = 3 * face + (i + 1) % 3;
+      std::uint32_t place_a = places[triangles[face][a % 3]];
+      std::uint32_t place_b = places[triangles[face][b % 3]];
+      if (place_a == place_b) continue;
+      if (place_a > place_b) {
+        std::swap(a, b);
+        std::swap(place_a, place_b);
+      }
+      sides[{place_a, place_b}].push_back({face, a, b});
+    }
+  }
+  for (const auto& [edge, faces] : sides) {
+    for (std::size_t i = 1; i < faces.size(); ++i) {
+      const Double3 n0 = normal_of(triangles[faces[i - 1].face]);
+      const Double3 n1 = normal_of(triangles[faces[i].face]);
+      if (!(Dot(n0, n1) >= kCreaseCosine * Length(n0) * Length(n1))) continue;
+      corners.Unite(faces[i - 1].first, faces[i].first);
+      corners.Unite(faces[i - 1].second, faces[i].second);
+    }
+  }
+
+  std::map<std::uint32_t, std::uint32_t> vertex_of;  // by the set of corners
+  std::vector<Double3> normals;
+  const auto first_face = static_cast<std::uint32_t>(faces_.size());
+  const auto first_vertex = static_cast<std::uint32_t>(vertices_.size());
+  for (std::uint32_t face = 0; face < triangles.size(); ++face) {
+    const Double3 normal = normal_of(triangles[face]);
+    if (!(Length(normal) > 0)) continue;  // no area in the file's unit
+    MeshFace added;
+    added.surface = number;
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      const auto [found, is_new] = vertex_of.try_emplace(
+          corners.Find(3 * face + i), static_cast<std::uint32_t>(vertices_.size()));
+      if (is_new) {
+        MeshVertex vertex;
+        vertex.position = positions[triangles[face][i]];
+        vertex.place = places[triangles[face][i]];
+        vertex.surface = number;
+        vertices_.push_back(vertex);
+        normals.emplace_back();
+      }
+      added.vertices[i] = found->second;
+      Double3& sum = normals[found->second - first_vertex];
+      sum = sum + normal;
+    }
+    faces_.push_back(added);
+  }
+  surfaces_.push_back(std::move(surface));
+  for (std::uint32_t face = first_face; face < faces_.size(); ++face) {
+    for (const std::uint32_t number_of : faces_[face].vertices) {
+      MeshVertex& vertex = vertices_[number_of];
+      if (vertex.normal != Vec3()) continue;
+      const Double3 sum = normals[number_of - first_vertex];
+      const Double3 own = TriangleCross(vertices_[faces_[face].vertices[0]].position,
+                                        vertices_[faces_[face].vertices[1]].position,
+                                        vertices_[faces_[face].vertices[2]].position);
+      // Faces that cancel each other have the first one's.
+      const Double3 normal = Length(sum) > 1e-6 * Length(own) ? sum : own;
+      vertex.normal = ToFloat(normal * (1 / Length(normal)));
+      vertex.sensor = SensorOn(faces_[face], vertex.position, vertex.normal);
+    }
+  }
+}
+
+Sensor SurfaceMesh::SensorOn(const MeshFace& face, Vec3 position, Vec3 normal) const {
+  const Double3 at(position);
+  if (const auto& ball = surfaces_[face.surface].ball; ball) {
+    const Double3 out = at - Double3(ball->center);
+    const double length = Length(out);
+    if (length > 0) {
+      const Double3 radial = out * (1 / length);
+      const bool is_same = Dot(radial, Double3(normal)) > 0;
+      return {position, ToFloat(radial * (is_same ? 1 : -1))};
+    }
+  }
+  Double3 middle;
+  for (const std::uint32_t vertex : face.vertices)
+    middle = middle + Double3(vertices_[vertex].position) * (1.0 / 3);
+  const Double3 inward = middle - at;
+  const double length = Length(inward);
+  if (!(length > 0)) return {position, normal};
+  const double inset = std::min(kInset * spacing_, kLargestInset * length);
+  return {ToFloat(at + inward * (inset / length)), normal};
+}
+
+double SurfaceMesh::AreaOf(const MeshFace& face) const {
+  return Length(TriangleCross(vertices_[face.vertices[0]].position,
+                              vertices_[face.vertices[1]].position,
+                              vertices_[face.vertices[2]].position)) /
+         2;
+}
+
+SurfaceMesh::Pair SurfaceMesh::EdgeOf(const MeshFace& face, int edge) const {
+  return std::minmax(face.vertices[static_cast<std::size_t>(edge)],
+                     face.vertices[static_cast<std::size_t>((edge + 1) % 3)]);
+}
+
+SurfaceMesh::Pair SurfaceMesh::PlacesOf(Pair edge) const {
+  return std::minmax(vertices_[edge.first].place, vertices_[edge.second].place);
+}
+
+double SurfaceMesh::LengthOf(Pair edge) const {
+  return Length(Double3(vertices_[edge.first].position) - Double3(vertices_[edge.second].position));
+}
+
+int SurfaceMesh::LongestEdgeOf(const MeshFace& face) const {
+  int longest = 0;
+  for (int edge = 1; edge < 3; ++edge) {
+    // Of equally long ones, faces on both sides choose the same.
+    const auto rank = [&](int of) {
+      const Pair vertices = EdgeOf(face, of);
+      return std::pair(LengthOf(vertices), PlacesOf(vertices));
+    };
+    if (rank(edge) > rank(longest)) longest = edge;
+  }
+  return longest;
+}
+
+MeshVertex SurfaceMesh::MiddleOf(const MeshFace& face, Pair edge) {
+  const MeshVertex& a = vertices_[edge.first];
+  const MeshVertex& b = vertices_[edge.second];
+  MeshVertex middle;
+  middle.surface = face.surface;
+  Double3 position = (Double3(a.position) + Double3(b.position)) * 0.5;
+  const Double3 sum = Double3(a.normal) + Double3(b.normal);
+  middle.normal = Length(sum) > 0 ? ToFloat(sum * (1 / Length(sum))) : a.normal;
+  if (const auto& ball = surfaces_[face.surface].ball; ball) {
+    const Double3 out = position - Double3(ball->center);
+    if (Length(out) > 0) {
+      position = Double3(ball->center) + out * (static_cast<double>(ball->radius) / Length(out));
+    }
+  }
+  middle.position = ToFloat(position);
+  middle.sensor = SensorOn(face, middle.position, middle.normal);
+  return middle;
+}
+
+void SurfaceMesh::Split(std::set<Pair> places) {
+  // A face with an edge that is split is split at its longest one too.
+  for (bool has_grown = true; has_grown;) {
+    has_grown = false;
+    for (const MeshFace& face : faces_) {
+      bool is_split = false;
+      for (int edge = 0; edge < 3; ++edge)
+        is_split = is_split || places.contains(PlacesOf(EdgeOf(face, edge)));
+      if (!is_split) continue;
+      has_grown = places.insert(PlacesOf(EdgeOf(face, LongestEdgeOf(face)))).second || has_grown;
+    }
+  }
+  std::map<Pair, std::uint32_t> middles;  // new vertices, by the vertices of the edge
+  std::vector<MeshFace> finer;
+  finer.reserve(faces_.size());
+  for (const MeshFace& face : faces_) {
+    const int longest = LongestEdgeOf(face);
+    // The longest edge goes from the first corner to the second.
+    std::array<std::uint32_t, 3> v{};
+    std::array<std::uint32_t, 3> m{};  // middles of the edges, or kNoVertex
+    for (int i = 0; i < 3; ++i) {
+      const int edge = (longest + i) % 3;
+      const auto index = static_cast<std::size_t>(i);
+      v[index] = face.vertices[static_cast<std::size_t>(edge)];
+      m[index] = kNoVertex;
+      const Pair vertices = EdgeOf(face, edge);
+      if (!places.contains(PlacesOf(vertices))) continue;
+      const auto [found, is_new] =
+          middles.try_emplace(vertices, static_cast<std::uint32_t>(vertices_.size()));
+      if (is_new) {
+        const auto probe = probes_.find(vertices);
+        MeshVertex middle =
+            probe == probes_.end() ? MiddleOf(face, vertices) : probe->second.middle;
+        if (probe != probes_.end()) probe->second.is_used = true;
+        middle.place = PlaceOf(middle.position);
+        vertices_.push_back(std::move(middle));
+      }
+      m[index] = found->second;
+    }
+    const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+      finer.push_back({{a, b, c}, face.surface});
+    };
+    if (m[0] == kNoVertex) {
+      finer.push_back(face);
+    } else if (m[1] != kNoVertex && m[2] != kNoVertex) {
+      add(v[0], m[0], m[2]);
+      add(m[0], v[1], m[1]);
+      add(m[2], m[1], v[2]);
+      add(m[0], m[1], m[2]);
+    } else if (m[1] != kNoVertex) {
+      add(v[0], m[0], v[2]);
+      add(m[0], v[1], m[1]);
+      add(m[0], m[1], v[2]);
+    } else if (m[2] != kNoVertex) {
+      add(v[0], m[0], m[2]);
+      add(m[2], m[0], v[2]);
+      add(m[0], v[1], v[2]);
+    } else {
+      add(v[0], m[0], v[2]);
+      add(m[0], v[1], v[2]);
+    }
+  }
+  faces_ = std::move(finer);
+}
+
+void SurfaceMesh::SplitLongEdges(double longest) {
+  for (;;) {
+    std::set<Pair> places;
+    for (const MeshFace& face : faces_) {
+      for (int edge = 0; edge < 3; ++edge) {
+        const Pair vertices = EdgeOf(face, edge);
+        if (LengthOf(vertices) > longest) places.insert(PlacesOf(vertices));
+      }
+    }
+    if (places.empty()) return;
+    Split(std::move(places));
+  }
+}
+
+std::vector<Sensor> SurfaceMesh::NextSensors(bool with_edges) {
+  asked_vertices_.clear();
+  asked_edges_.clear();
+  std::vector<Sensor> sensors;
+  std::vector<std::uint8_t> is_used(vertices_.size());
+  for (const MeshFace& face : faces_) {
+    for (const std::uint32_t number : face.vertices) {
+      if (std::exchange(is_used[number], 1) != 0 || vertices_[number].irradiance) continue;
+      asked_vertices_.push_back(number);
+      sensors.push_back(vertices_[number].sensor);
+    }
+  }
+  if (!with_edges) return sensors;
+  for (const MeshFace& face : faces_) {
+    for (int edge = 0; edge < 3; ++edge) {
+      const Pair vertices = EdgeOf(face, edge);
+      if (!(LengthOf(vertices) > spacing_)) continue;
+      const auto [probe, is_new] = probes_.try_emplace(vertices);
+      if (!is_new) continue;
+      probe->second.middle = MiddleOf(face, vertices);
+      asked_edges_.push_back(vertices);
+      sensors.push_back(probe->second.middle.sensor);
+    }
+  }
+  return sensors;
+}
+
+void SurfaceMesh::SetMeasured(const std::vector<Irradiance>& measured) {
+  for (std::size_t i = 0; i < asked_vertices_.size(); ++i)
+    vertices_[asked_vertices_[i]].irradiance = measured[i];
+  for (std::size_t i = 0; i < asked_edges_.size(); ++i)
+    probes_.at(asked_edges_[i]).middle.irradiance = measured[asked_vertices_.size() + i];
+}
+
+void SurfaceMesh::DropDarkerSides() {
+  if (sides_ != MeasuredSides::kBrighter) return;
+  std::vector<double> flux(surfaces_.size());
+  for (const MeshFace& face : faces_) {
+    for (const std::uint32_t vertex : face.vertices)
+      flux[face.surface] += AreaOf(face) / 3 * LuminanceOf(*vertices_[vertex].irradiance);
+  }
+  // The two sides of a shape follow each other.
+  for (std::size_t i = 0; i + 1 < surfaces_.size(); i += 2) {
+    const bool is_back_brighter = flux[i + 1] > flux[i];
+    surfaces_[is_back_brighter ? i : i + 1].is_kept = false;
+  }
+  std::erase_if(faces_, [&](const MeshFace& face) { return !surfaces_[face.surface].is_kept; });
+  std::erase_if(probes_,
+                [&](const auto& probe) { return !surfaces_[probe.second.middle.surface].is_kept; });
+  std::erase_if(asked_edges_, [&](const Pair& edge) { return !probes_.contains(edge); });
+}
+
+double SurfaceMesh::MeanIrradiance() const {
+  double sum = 0;
+  double area = 0;
+  for (const MeshFace& face : faces_) {
+    for (const std::uint32_t vertex : face.vertices) {
+      if (!vertices_[vertex].irradiance) continue;
+      sum += AreaOf(face) * LuminanceOf(*vertices_[vertex].irradiance);
+      area += AreaOf(face);
+    }
+  }
+  return area > 0 ? sum / area : 0;
+}
+
+std::size_t SurfaceMesh::Refine(double tolerance) {
+  const double floor = kDarkShare * MeanIrradiance();
+  std::set<Pair> places;
+  for (const Pair& edge : asked_edges_) {
+    const Irradiance& at_middle = *probes_.at(edge).middle.irradiance;
+    const Irradiance& at_a = *vertices_[edge.first].irradiance;
+    const Irradiance& at_b = *vertices_[edge.second].irradiance;
+    const double middle = LuminanceOf(at_middle);
+    const double ends = (LuminanceOf(at_a) + LuminanceOf(at_b)) / 2;
+    const double difference = std::abs(middle - ends);
+    const double noise =
+        std::hypot(static_cast<double>(at_middle.noise), static_cast<double>(at_a.noise) / 2,
+                   static_cast<double>(at_b.noise) / 2);
+    const bool is_noise = tolerance > 0 && difference <= kNoiseDeviations * noise;
+    if (!is_noise && difference >= tolerance * std::max({middle, ends, floor})) {
+      places.insert(PlacesOf(edge));
+    }
+  }
+  const std::size_t count = places.size();
+  if (count > 0) Split(std::move(places));
+  return count;
+}
+
+double SurfaceMesh::InterpolationError() const {
+  double sum = 0;
+  double weight = 0;
+  for (const auto& [edge, probe] : probes_) {
+    if (probe.is_used || !probe.middle.irradiance) continue;
+    const auto& a = vertices_[edge.first].irradiance;
+    const auto& b = vertices_[edge.second].irradiance;
+    if (!a || !b) continue;
+    const double difference =
+        LuminanceOf(*probe.middle.irradiance) - (LuminanceOf(*a) + LuminanceOf(*b)) / 2;
+    const double length = LengthOf(edge);
+    sum += length * length * difference * difference;
+    weight += length * length;
+  }
+  const double mean = MeanIrradiance();
+  return weight > 0 && mean > 0 ? std::sqrt(sum / weight) / mean : 0;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,148 @@
+// A mesh that carries the irradiance of a scene's surfaces.
+//
+// Each shape on which photons are kept becomes one or two surfaces of triangles, one for each side
+// that is measured. A surface has a vertex of its own at each corner of its faces where it bends by
+// more than 30 degrees, and a common one elsewhere. Irradiance is measured at the vertices and
+// linear between them.
+//
+// The mesh is refined where that is wrong: the irradiance is measured in the middle of an edge too,
+// and where it differs from the mean of the ends by more than is allowed, the faces beside the edge
+// are split. Faces are split at their longest edge first, whatever edge asks for it (Rivara 1984,
+// "Algorithms for refining triangular grids suitable for adaptive and multigrid techniques"), so
+// that they do not become thinner; and the two faces of an edge are split together, also where they
+// are of different surfaces with corners at the same places: there are no cracks.
+//
+// Lengths and positions are those of the scene's file.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "render/base/status.h"
+#include "render/math/rgb.h"
+#include "render/math/vector.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+// Of a sensor: irradiance and its standard deviation [W·m⁻²].
+struct Irradiance {
+  Rgb value;
+  float noise = 0;  // of the luminance
+};
+
+struct MeshVertex {
+  Vec3 position;
+  Vec3 normal;              // unit, on the measured side
+  Sensor sensor;            // beside the corner, on one of the faces
+  std::uint32_t place = 0;  // equal for vertices at equal positions
+  std::uint32_t surface = 0;
+  std::optional<Irradiance> irradiance;  // absent: not measured yet
+};
+
+struct MeshFace {
+  std::array<std::uint32_t, 3> vertices;  // counter-clockwise seen from the measured side
+  std::uint32_t surface = 0;
+};
+
+// One side of one shape.
+struct MeshSurface {
+  std::string name;         // of its material; empty where the file gives none
+  std::uint32_t shape = 0;  // a number of its own for each shape, from 0
+  bool is_back = false;     // the side that the outward normal points away from
+  bool is_kept = true;      // else it has no faces any more
+  // A ball on which new vertices are placed.
+  struct Ball {
+    Vec3 center;
+    float radius = 0;
+  };
+  std::optional<Ball> ball;
+};
+
+// Which sides of each shape are kept.
+enum class MeasuredSides : std::uint8_t { kBrighter, kFront, kBack, kBoth };
+
+class SurfaceMesh {
+ public:
+  struct Options {
+    MeasuredSides sides = MeasuredSides::kBrighter;
+    std::vector<std::string> names;  // of materials; empty: all
+    double spacing = 0;              // of neighbouring vertices where the mesh is finest, > 0
+  };
+  // Shapes of other materials than those that keep photons, and curves, have no part in it.
+  // Errors: NOT_FOUND when nothing is left, with the names that there are.
+  [[nodiscard]] static StatusOr<SurfaceMesh> FromScene(const Scene& scene, const Options& options);
+
+  // Splits edges until none is longer.
+  void SplitLongEdges(double longest);
+
+  // Where irradiance is to be measured next: at vertices that have none, then, with `with_edges`,
+  // in the middle of all edges that are longer than the spacing and were not measured before.
+  [[nodiscard]] std::vector<Sensor> NextSensors(bool with_edges);
+  // Takes what was measured at the sensors that were asked for last, in their order.
+  void SetMeasured(const std::vector<Irradiance>& measured);
+
+  // Of each shape with two sides, drops the one that receives less. Once, after all vertices were
+  // measured; does nothing unless the sides were to be chosen by that.
+  void DropDarkerSides();
+
+  // Splits the edges whose middle, as it was measured last, differs from the mean of its ends by
+  // more than `tolerance` times the luminance there, or a tenth of the mean where that is more, and
+  // by more than twice the standard deviation of the difference. With a tolerance of 0: all of
+  // them. Returns how many.
+  std::size_t Refine(double tolerance);
+
+  // Root of the mean squared difference between irradiance that was measured in the middle of
+  // edges, which were not split for it, and that of the mesh, over the mean luminance; noise
+  // included. Each edge counts by the square of its length. 0 when there are none.
+  [[nodiscard]] double InterpolationError() const;
+
+  [[nodiscard]] const std::vector<MeshVertex>& vertices() const { return vertices_; }
+  [[nodiscard]] const std::vector<MeshFace>& faces() const { return faces_; }
+  [[nodiscard]] const std::vector<MeshSurface>& surfaces() const { return surfaces_; }
+  [[nodiscard]] double AreaOf(const MeshFace& face) const;
+  // Of the luminance over the area; 0 of an empty mesh.
+  [[nodiscard]] double MeanIrradiance() const;
+
+ private:
+  // Two numbers in order.
+  using Pair = std::pair<std::uint32_t, std::uint32_t>;
+  struct Probe {
+    MeshVertex middle;
+    bool is_used = false;  // it became a vertex
+  };
+
+  SurfaceMesh() = default;
+  std::uint32_t PlaceOf(Vec3 position);
+  void AddSurface(const std::vector<Vec3>& positions,
+                  const std::vector<std::array<std::uint32_t, 3>>& triangles, MeshSurface surface);
+  [[nodiscard]] Pair EdgeOf(const MeshFace& face, int edge) const;
+  [[nodiscard]] Pair PlacesOf(Pair edge) const;
+  [[nodiscard]] double LengthOf(Pair edge) const;
+  [[nodiscard]] int LongestEdgeOf(const MeshFace& face) const;
+  [[nodiscard]] MeshVertex MiddleOf(const MeshFace& face, Pair edge);
+  // A sensor near `position`, which is in or on the edge of the face.
+  [[nodiscard]] Sensor SensorOn(const MeshFace& face, Vec3 position, Vec3 normal) const;
+  // Splits the faces beside edges between these places, and what must be split with them.
+  void Split(std::set<Pair> places);
+
+  double spacing_ = 0;
+  MeasuredSides sides_ = MeasuredSides::kBrighter;
+  std::vector<MeshVertex> vertices_;
+  std::vector<MeshFace> faces_;
+  std::vector<MeshSurface> surfaces_;
+  std::map<std::array<float, 3>, std::uint32_t> places_;
+  std::map<Pair, Probe> probes_;  // by the vertices of the edge
+  // What NextSensors asked for: vertices, then edges.
+  std::vector<std::uint32_t> asked_vertices_;
+  std::vector<Pair> asked_edges_;
+};
+
+}  // namespace lucerna

@@ -1,0 +1,220 @@
+#include "client/commands/bake_command.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <numbers>
+#include <utility>
+
+#include "client/bake/mesh_file.h"
+#include "client/bake/surface_figures.h"
+#include "client/connection.h"
+#include "client/exit_code.h"
+#include "client/job_run.h"
+#include "client/scene_reading.h"
+#include "client/view/convergence.h"
+#include "client/view/report.h"
+#include "render/base/files.h"
+#include "render/formats/sensors/sensors_reader.h"
+#include "render/scene/scene_extent.h"
+
+namespace lucerna {
+namespace {
+
+// The main file of the jobs, beside the scene's own in their manifest. A file of the scene that has
+// this name is not seen.
+constexpr const char* kSensorsPath = "lucerna-sensors.ply";
+constexpr std::int64_t kPasses = 64;
+// Few points need as many photons as many do.
+constexpr std::int64_t kFewestPhotons = 1 << 16;
+constexpr double kSpacingsOfDiagonal = 512;
+// Edges of the first mesh in spacings. What lies between its vertices and the middles of its edges
+// is not seen.
+constexpr double kCoarsest = 16;
+
+// The files of a scene on disk, and the sensors.
+class FilesWithSensors final : public SceneFiles {
+ public:
+  FilesWithSensors(std::string folder, std::string sensors)
+      : files_(std::move(folder)), sensors_(std::move(sensors)) {}
+  [[nodiscard]] StatusOr<std::string> Read(const std::string& logical_path) override {
+    if (logical_path == kSensorsPath) return sensors_;
+    return files_.Read(logical_path);
+  }
+
+ private:
+  DirectoryFiles files_;
+  std::string sensors_;
+};
+
+// Runs jobs on a coordinator, or on one of its own.
+class Jobs {
+ public:
+  [[nodiscard]] static StatusOr<Jobs> Open(const ClusterOptions& cluster,
+                                           const std::optional<Endpoint>& server) {
+    Jobs jobs;
+    if (server) {
+      LUCERNA_ASSIGN_OR_RETURN(jobs.connection_, ClientConnection::Open(*server));
+    } else {
+      LUCERNA_ASSIGN_OR_RETURN(jobs.runs_, LocalRuns::Start(cluster));
+    }
+    return jobs;
+  }
+
+  struct Result {
+    v1::Job job;
+    Image image;
+  };
+  [[nodiscard]] StatusOr<Result> Run(SceneFiles& files, const SceneManifest& manifest,
+                                     const RenderOverrides& overrides,
+                                     const OutputOptions& output_options) {
+    Result result;
+    if (runs_) {
+      LUCERNA_ASSIGN_OR_RETURN(result.job,
+                               runs_->Run(files, manifest, overrides, "", output_options));
+      LUCERNA_ASSIGN_OR_RETURN(result.image, runs_->ImageOf(result.job));
+      return result;
+    }
+    LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
+                             SendJob(*connection_, files, manifest, overrides, ""));
+    StatusOr<v1::Job> job = FollowToEnd(*connection_, submitted.job_id(), true, output_options,
+                                        [](const v1::Job& /*newest*/) { return absl::OkStatus(); });
+    if (ExitCodeOf(job.status()) == ExitCode::kInterrupted) {
+      connection_->Cancel(submitted.job_id()).IgnoreError();
+    }
+    LUCERNA_RETURN_IF_ERROR(job.status());
+    LUCERNA_RETURN_IF_ERROR(CheckSucceeded(*job));
+    LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, connection_->GetImage(job->job_id()));
+    LUCERNA_ASSIGN_OR_RETURN(result.image, DecodeImageOf(job->job_id(), bytes));
+    result.job = *std::move(job);
+    return result;
+  }
+
+ private:
+  Jobs() = default;
+
+  std::unique_ptr<LocalRuns> runs_;
+  std::unique_ptr<ClientConnection> connection_;
+};
+
+// What was measured at each of `count` sensors.
+// Errors: DATA_LOSS when the image does not have what is asked for.
+StatusOr<std::vector<Irradiance>> MeasuredIn(const Image& image, std::size_t count,
+                                             bool indirect_only) {
+  const std::string layer = indirect_only ? "photons." : "";
+  const ImageChannel* const r = image.Find(layer + "R");
+  const ImageChannel* const g = image.Find(layer + "G");
+  const ImageChannel* const b = image.Find(layer + "B");
+  // Absent after a single pass.
+  const ImageChannel* const noise = image.Find("noise");
+  if (r == nullptr || g == nullptr || b == nullptr || r->pixels.size() < count) {
+    return absl::DataLossError("the image of a job has not a pixel for each sensor");
+  }
+  // From the radiance of a white diffuse surface.
+  const auto irradiance_of = [](float radiance) { return std::numbers::pi_v<float> * radiance; };
+  std::vector<Irradiance> measured(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    measured[i].value = {irradiance_of(r->pixels[i]), irradiance_of(g->pixels[i]),
+                         irradiance_of(b->pixels[i])};
+    if (noise != nullptr) measured[i].noise = irradiance_of(noise->pixels[i]);
+  }
+  return measured;
+}
+
+bool IsPly(const std::string& path) {
+  return path.ends_with(".ply");
+}
+
+Status CheckRequest(const BakeRequest& request) {
+  if (!IsPly(request.output_path) && !request.output_path.ends_with(".glb")) {
+    return Failure(ExitCode::kUsage, absl::StrCat("-o ", request.output_path,
+                                                  ": the name must end with .ply or .glb"));
+  }
+  if (request.is_ascii && !IsPly(request.output_path)) {
+    return Failure(ExitCode::kUsage, "--ascii is for .ply files");
+  }
+  if (request.overrides.width) {
+    return Failure(ExitCode::kUsage, "--size has no meaning here: --spacing says how fine to be");
+  }
+  if (IsSameFile(request.output_path, request.scene_path)) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat(request.output_path, " is the scene; name another file with -o"));
+  }
+  return CheckWritable(request.output_path);
+}
+
+}  // namespace
+
+Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
+            const std::optional<Endpoint>& server, const OutputOptions& output_options) {
+  LUCERNA_RETURN_IF_ERROR(CheckRequest(request));
+  RenderOverrides overrides = request.overrides;
+  const bool has_end = overrides.passes || overrides.time_s || overrides.error || overrides.photons;
+  if (!has_end) overrides.passes = kPasses;
+  Scene scene;
+  LUCERNA_ASSIGN_OR_RETURN(
+      const SceneOfJobs read,
+      ReadSceneOfJobs(request.scene_path, {&overrides, 1}, output_options.quiet, &scene));
+  const double diagonal = ExtentOf(scene).size * scene.unit;
+  SurfaceMesh::Options options;
+  options.sides = request.sides;
+  options.names = request.materials;
+  options.spacing = request.spacing.value_or(diagonal / kSpacingsOfDiagonal);
+  LUCERNA_ASSIGN_OR_RETURN(SurfaceMesh mesh, SurfaceMesh::FromScene(scene, options));
+  mesh.SplitLongEdges(kCoarsest * options.spacing);
+
+  LUCERNA_ASSIGN_OR_RETURN(Jobs jobs, Jobs::Open(cluster, server));
+  std::vector<BakeRound> rounds;
+  const auto measure = [&](bool with_edges) -> Status {
+    const std::vector<Sensor> sensors = mesh.NextSensors(with_edges);
+    if (sensors.empty()) return absl::OkStatus();
+    if (!output_options.quiet) {
+      std::fprintf(stderr, "round %zu: %zu points\n", rounds.size() + 1, sensors.size());
+    }
+    const std::string bytes = SensorsFile(read.manifest.main_path, options.spacing, sensors);
+    SceneManifest manifest = read.manifest;
+    manifest.entries[kSensorsPath] = {Sha256(bytes), bytes.size()};
+    manifest.main_path = kSensorsPath;
+    FilesWithSensors files(SplitScenePath(request.scene_path).folder, bytes);
+    RenderOverrides of_round = overrides;
+    if (!of_round.photons_per_pass && !scene.integrator.photons_per_pass) {
+      of_round.photons_per_pass =
+          std::max(kFewestPhotons, static_cast<std::int64_t>(sensors.size()));
+    }
+    LUCERNA_ASSIGN_OR_RETURN(const Jobs::Result result,
+                             jobs.Run(files, manifest, of_round, output_options));
+    LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured,
+                             MeasuredIn(result.image, sensors.size(), request.indirect_only));
+    mesh.SetMeasured(measured);
+    rounds.push_back({sensors.size(), result.job});
+    return absl::OkStatus();
+  };
+
+  LUCERNA_RETURN_IF_ERROR(measure(true));
+  mesh.DropDarkerSides();
+  while (mesh.Refine(request.tolerance) > 0)
+    LUCERNA_RETURN_IF_ERROR(measure(true));
+  LUCERNA_RETURN_IF_ERROR(measure(false));
+
+  BakedMesh baked = BakedMeshOf(mesh);
+  baked.scene = read.manifest.main_path;
+  baked.spacing = options.spacing;
+  if (!rounds.empty()) {
+    if (const auto error = NewestError(rounds.front().job)) baked.estimate = error->value;
+  }
+  LUCERNA_RETURN_IF_ERROR(WriteFile(request.output_path, IsPly(request.output_path)
+                                                             ? MeshPly(baked, request.is_ascii)
+                                                             : MeshGlb(baked)));
+  const std::vector<SurfaceFigures> figures = FiguresOf(baked);
+  if (output_options.json) {
+    std::fputs(BakeReport(rounds, figures, mesh.InterpolationError(), request.output_path).c_str(),
+               stdout);
+  } else if (!output_options.quiet) {
+    std::fputs(FiguresTable(figures, request.in_lux).c_str(), stdout);
+    std::printf("between vertices the mesh differs by %.2g %% of the mean: %s\n",
+                100 * mesh.InterpolationError(), request.output_path.c_str());
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace lucerna

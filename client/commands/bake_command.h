@@ -1,0 +1,43 @@
+// How is the irradiance of a scene's surfaces measured?
+//
+// By jobs like any other, on scenes whose camera is a set of sensors
+// (render/formats/sensors/sensors_reader.h): the first one measures at the vertices of a coarse
+// mesh and in the middle of its edges, each further one where the mesh was refined
+// (client/bake/surface_mesh.h).
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/bake/surface_mesh.h"
+#include "client/local_cluster.h"
+#include "client/output_options.h"
+#include "render/base/status.h"
+#include "render/scene/render_settings.h"
+#include "render/wire/channel.h"
+
+namespace lucerna {
+
+struct BakeRequest {
+  std::string scene_path;
+  RenderOverrides overrides;  // of each job
+  std::string output_path;    // .ply or .glb
+  bool is_ascii = false;      // of a PLY file
+  MeasuredSides sides = MeasuredSides::kBrighter;
+  std::vector<std::string> materials;  // whose surfaces are measured; empty: all
+  // Between neighbouring vertices where the mesh is finest [scene units]; absent: a 512th of the
+  // scene's diagonal.
+  std::optional<double> spacing;
+  double tolerance = 0.05;     // see SurfaceMesh::Refine
+  bool indirect_only = false;  // without light that comes straight from lights
+  bool in_lux = false;         // the table
+};
+
+// Writes the mesh whole or not at all, and prints figures of its surfaces. The jobs run on `server`
+// when it is there, else on a coordinator and workers of their own.
+[[nodiscard]] Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
+                          const std::optional<Endpoint>& server,
+                          const OutputOptions& output_options);
+
+}  // namespace lucerna

@@ -1,0 +1,116 @@
+#include "render/formats/sensors/sensors_reader.h"
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/numbers.h"
+
+#include "render/base/text.h"
+#include "render/formats/ply_file.h"
+#include "render/formats/read_scene.h"
+#include "render/math/vector.h"
+
+namespace lucerna {
+namespace {
+
+constexpr std::string_view kScene = "lucerna scene ";
+constexpr std::string_view kSpacing = "lucerna spacing ";
+// Lengths of normals may differ from 1 by what few digits in a text leave.
+constexpr float kUnitLength = 1e-2F;
+
+// The rest of the first comment that begins with `key`; empty when there is none.
+std::string CommentAfter(const std::vector<std::string>& comments, std::string_view key) {
+  for (const std::string& comment : comments) {
+    if (comment.starts_with(key)) return comment.substr(key.size());
+  }
+  return {};
+}
+
+// An image with a pixel for each sensor.
+void SetFilm(Scene& scene) {
+  const auto count = static_cast<double>(scene.sensors.size());
+  FilmSettings& film = scene.film;
+  film = FilmSettings();
+  film.width = static_cast<int>(std::ceil(std::sqrt(count)));
+  film.height = static_cast<int>(std::ceil(count / film.width));
+  film.crop_x0 = 0;
+  film.crop_y0 = 0;
+  film.crop_x1 = film.width;
+  film.crop_y1 = film.height;
+}
+
+}  // namespace
+
+bool BeginsAsSensors(std::string_view text) {
+  return text.starts_with("ply\n") || text.starts_with("ply\r");
+}
+
+UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
+                            AssetReader& assets, Diagnostics& diagnostics) {
+  const SourceLocation whole = {&main_path, 0, 0};
+  const auto fail = [&](std::string message) -> UnfinishedScene {
+    diagnostics.Error(whole, std::move(message));
+    return {};
+  };
+  StatusOr<PlyPoints> points = ParsePlyPoints(text);
+  if (!points.ok()) return fail(std::string(points.status().message()));
+  const std::string scene_path = CommentAfter(points->comments, kScene);
+  if (scene_path.empty()) {
+    return fail("its header does not name a scene; add a line \"comment lucerna scene FILE\"");
+  }
+  if (scene_path == main_path || scene_path.ends_with(".ply")) {
+    return fail("the scene that it names must not be a PLY file itself");
+  }
+  double spacing = 0;
+  const std::string spacing_text = CommentAfter(points->comments, kSpacing);
+  if (!absl::SimpleAtod(spacing_text, &spacing) || !std::isfinite(spacing) || !(spacing > 0)) {
+    return fail(
+        "its header has no distance between points; add a line \"comment lucerna spacing NUMBER\" "
+        "with a number above 0");
+  }
+  if (points->positions.empty()) return fail("it has no points");
+  // As many as an image may have pixels.
+  constexpr std::size_t kMostPoints = std::size_t{65536} * 65536;
+  if (points->positions.size() > kMostPoints) return fail("it has too many points");
+
+  UnfinishedScene unfinished =
+      ReadUnfinishedScene(*diagnostics.NameOfFile(scene_path), assets, diagnostics);
+  if (diagnostics.has_error()) return unfinished;
+  Scene& scene = unfinished.scene;
+  scene.sensors.resize(points->positions.size());
+  for (std::size_t i = 0; i < scene.sensors.size(); ++i) {
+    const Vec3 normal = points->normals[i];
+    if (!(std::abs(Length(normal) - 1) <= kUnitLength)) {
+      return fail(Concat("the normal of point ", i, " does not have length 1"));
+    }
+    scene.sensors[i] = {points->positions[i], Normalize(normal)};
+  }
+  scene.camera.kind = Camera::Kind::kSensors;
+  scene.camera.camera_to_world = Transform();
+  scene.camera.lens_radius = 0;
+  scene.camera.sensor_spacing = spacing;
+  SetFilm(scene);
+  scene.filter = {.kind = PixelFilter::Kind::kBox, .radius_x = 0.5F, .radius_y = 0.5F};
+  unfinished.has_camera = true;
+  return unfinished;
+}
+
+std::string SensorsFile(const std::string& scene_path, double spacing,
+                        const std::vector<Sensor>& sensors) {
+  std::string bytes = Concat("ply\nformat binary_little_endian 1.0\ncomment ", kScene, scene_path,
+                             "\ncomment ", kSpacing, spacing, "\nelement vertex ", sensors.size(),
+                             "\nproperty float x\nproperty float y\nproperty float z\n"
+                             "property float nx\nproperty float ny\nproperty float nz\n"
+                             "end_header\n");
+  for (const Sensor& sensor : sensors) {
+    const std::array<float, 6> row = {sensor.position.x, sensor.position.y, sensor.position.z,
+                                      sensor.normal.x,   sensor.normal.y,   sensor.normal.z};
+    bytes.append(reinterpret_cast<const char*>(row.data()), sizeof(row));
+  }
+  return bytes;
+}
+
+}  // namespace lucerna

@@ -1,0 +1,35 @@
+// Reads a scene whose irradiance is measured at points of its surfaces.
+//
+// A PLY file with positions and unit normals, and two comments in its header:
+//
+//   comment lucerna scene FILE      the scene, a logical path; its camera and film do not count
+//   comment lucerna spacing NUMBER  about the distance between neighbouring points [scene units],
+//                                   which takes the place of a pixel's width
+//
+// The image of such a scene has a pixel for each point, row by row, in about as many rows as
+// columns.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "render/formats/asset_reader.h"
+#include "render/formats/diagnostic.h"
+#include "render/formats/finish_scene.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+// Whether a text begins as PLY files do.
+[[nodiscard]] bool BeginsAsSensors(std::string_view text);
+
+// Reads the main file, whose text is given, and the scene that it names.
+[[nodiscard]] UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
+                                          AssetReader& assets, Diagnostics& diagnostics);
+
+// The bytes of such a file. Requires a spacing above 0.
+[[nodiscard]] std::string SensorsFile(const std::string& scene_path, double spacing,
+                                      const std::vector<Sensor>& sensors);
+
+}  // namespace lucerna

@@ -1,0 +1,260 @@
+// Sensors measure the irradiance that theory says: straight from lights of several shapes, in
+// penumbras, on curved surfaces, at edges and in corners, and by photons alone.
+//
+// Deterministic cases are exact up to rounding. The others are means of independent renders, and
+// their bounds Student's quantile of the spread, at a chance of a false alarm of 1e-3 for all of
+// this file.
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+#include "tests/support/chi_square.h"
+#include "tests/support/local_render.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr int kParts = 16;
+constexpr int kComparisons = 40;
+
+void SetSensors(Scene& scene, std::vector<Sensor> sensors, double spacing) {
+  scene.camera = Camera();
+  scene.camera.kind = Camera::Kind::kSensors;
+  scene.camera.sensor_spacing = spacing;
+  scene.sensors = std::move(sensors);
+  scene.film.width = static_cast<int>(scene.sensors.size());
+  scene.film.height = 1;
+  scene.film.crop_x0 = 0;
+  scene.film.crop_y0 = 0;
+  scene.film.crop_x1 = scene.film.width;
+  scene.film.crop_y1 = 1;
+}
+
+// Of each sensor.
+std::vector<MeasuredMean> IrradianceOf(const Scene& scene, RenderSettings settings, int passes) {
+  std::vector<std::vector<double>> parts(scene.sensors.size());
+  for (int part = 0; part < kParts; ++part) {
+    settings.seed = 100 + static_cast<std::uint64_t>(part);
+    const Image image = RenderLocally(scene, settings, passes);
+    for (std::size_t i = 0; i < parts.size(); ++i)
+      parts[i].push_back(kPi * static_cast<double>(image.Find("G")->pixels[i]));
+  }
+  std::vector<MeasuredMean> measured;
+  for (const std::vector<double>& of : parts)
+    measured.push_back(MeanOf(of));
+  return measured;
+}
+
+double Bound(const MeasuredMean& measured) {
+  return StudentQuantile(SidakLevel(1e-3, kComparisons), kParts) * measured.standard_error;
+}
+
+// Measures, and compares with `expected` up to `slack` of it and chance, which must be below
+// `precision`.
+void ExpectIrradiance(const Scene& scene, const RenderSettings& settings, int passes,
+                      const std::vector<double>& expected, double slack = 1e-4,
+                      double precision = 0.03) {
+  const std::vector<MeasuredMean> measured = IrradianceOf(scene, settings, passes);
+  ASSERT_EQ(measured.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const double bound = Bound(measured[i]);
+    EXPECT_NEAR(measured[i].mean, expected[i], slack * expected[i] + bound)
+        << "sensor " << i << ", bound " << bound;
+    EXPECT_LT(bound, precision * expected[i] + 1e-12) << "sensor " << i;
+  }
+}
+
+// Without a depth: no light that was scattered.
+RenderSettings SettingsOfSensors(const Scene& scene, std::int64_t photons_per_pass = 1000,
+                                 int max_depth = 1) {
+  RenderOverrides overrides;
+  overrides.photons_per_pass = photons_per_pass;
+  overrides.max_depth = max_depth;
+  return SettingsFor(scene, overrides);
+}
+
+// A floor of 8 × 8 at z = 0 and sensors on it.
+Scene Floor(const std::vector<Vec3>& places) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddQuad(scene, {-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, 0);
+  std::vector<Sensor> sensors;
+  for (const Vec3 place : places)
+    sensors.push_back({place, {0, 0, 1}});
+  SetSensors(scene, std::move(sensors), 0.1);
+  return scene;
+}
+
+// Under the corner of a rectangle a × b of radiance 1 that is parallel to the floor at height h.
+double UnderCorner(double a, double b, double h) {
+  const double ra = std::hypot(a, h);
+  const double rb = std::hypot(b, h);
+  return (a / ra * std::atan(b / ra) + b / rb * std::atan(a / rb)) / 2;
+}
+
+TEST(SensorsTest, OfAPointLightFallsWithTheSquareOfTheDistance) {
+  const std::vector<Vec3> places = {{0, 0, 0}, {1, 0, 0}, {2, -3, 0}, {-4, 4, 0}};
+  Scene scene = Floor(places);
+  PointLight light;
+  light.position = {0.5F, 0, 2};
+  light.intensity = Gray(3);
+  scene.point_lights.push_back(light);
+  std::vector<double> expected;
+  for (const Vec3 place : places) {
+    const double distance =
+        std::hypot(static_cast<double>(place.x) - 0.5, static_cast<double>(place.y), 2.0);
+    expected.push_back(3 * 2 / (distance * distance * distance));
+  }
+  ExpectIrradiance(scene, SettingsOfSensors(scene), 2, expected);
+}
+
+TEST(SensorsTest, OfADiskOnItsAxisAndBesideIt) {
+  const std::vector<Vec3> places = {{0, 0, 0}, {0.5F, 0, 0}, {0, -2, 0}, {3, 3, 0}};
+  Scene scene = Floor(places);
+  AddDisk(scene, {0, 0, 1.5F}, {0, 0, -1}, 0.8F, 0, AddAreaLight(scene, 2));
+  std::vector<double> expected;
+  for (const Vec3 place : places) {
+    const double r = std::hypot(static_cast<double>(place.x), static_cast<double>(place.y));
+    const double h = 1.5;
+    const double a = 0.8;
+    const double sum = h * h + r * r + a * a;
+    expected.push_back(2 * kPi / 2 *
+                       (1 - (sum - 2 * a * a) / std::sqrt(sum * sum - 4 * r * r * a * a)));
+  }
+  // The radius is that of a float.
+  ExpectIrradiance(scene, SettingsOfSensors(scene), 1024, expected);
+}
+
+TEST(SensorsTest, OfARectangleUnderItsCornerAndItsMiddle) {
+  Scene scene = Floor({{0, 0, 0}, {1, 0.5F, 0}});
+  AddQuad(scene, {0, 0, 1}, {0, 1, 0}, {2, 0, 0}, 0, AddAreaLight(scene, 1));
+  ExpectIrradiance(scene, SettingsOfSensors(scene), 1024,
+                   {UnderCorner(2, 1, 1), 4 * UnderCorner(1, 0.5, 1)});
+}
+
+TEST(SensorsTest, OfAPenumbra) {
+  // Half-way up a sheet hides the light's half x > c, where c is seen along its rim x = 0.
+  const std::vector<Vec3> places = {{-0.2F, 0, 0}, {-0.05F, 0, 0}, {0.3F, 0, 0}, {-1.5F, 0, 0}};
+  Scene scene = Floor(places);
+  AddQuad(scene, {-0.5F, -0.5F, 2}, {0, 1, 0}, {1, 0, 0}, 0, AddAreaLight(scene, 1));
+  AddQuad(scene, {0, -3, 1}, {3, 0, 0}, {0, 6, 0}, 0);
+  std::vector<double> expected;
+  for (const Vec3 place : places) {
+    const auto x = static_cast<double>(place.x);
+    // Seen from `place`, the rim hides what lies beyond -x on the light's plane.
+    const double end = std::min(std::max(-x, -0.5), 0.5);
+    const auto up_to = [&](double to) {
+      const double width = to - x;
+      return std::copysign(2 * UnderCorner(std::abs(width), 0.5, 2), width);
+    };
+    expected.push_back(up_to(end) - up_to(-0.5));
+  }
+  ExpectIrradiance(scene, SettingsOfSensors(scene), 4096, expected);
+}
+
+TEST(SensorsTest, OfTheSunOnASphereFallsWithTheCosine) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddSphere(scene, {1, 2, 3}, 0.5F, 0);
+  DistantLight sun;
+  sun.direction = {0, 0, -1};
+  sun.irradiance = Gray(4);
+  scene.distant_lights.push_back(sun);
+  std::vector<Sensor> sensors;
+  std::vector<double> expected;
+  for (const double angle : {0.0, 0.5, 1.0, 1.5, 2.0, 3.0}) {
+    const Vec3 normal = {static_cast<float>(std::sin(angle)), 0,
+                         static_cast<float>(std::cos(angle))};
+    sensors.push_back({Vec3{1, 2, 3} + normal * 0.5F, normal});
+    expected.push_back(std::max(0.0, 4 * std::cos(angle)));
+  }
+  SetSensors(scene, std::move(sensors), 0.05);
+  ExpectIrradiance(scene, SettingsOfSensors(scene), 2, expected, 1e-3);
+}
+
+// A closed room in which everything shines 1 and reflects half: radiance 2 arrives everywhere, half
+// of it by photons.
+TEST(SensorsTest, OfAFurnaceIsTheSameInCornersAndAtEdges) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddAreaLight(scene, 1);
+  AddBox(scene, {-1, -1, -1}, {1, 1, 1}, 0);
+  TriangleMesh& walls = scene.meshes.back();
+  walls.traits.area_light = 0;
+  for (std::size_t i = 0; i < walls.indices.size(); i += 3)
+    std::swap(walls.indices[i + 1], walls.indices[i + 2]);
+  constexpr float kBeside = 1 - 1e-4F;
+  std::vector<Sensor> sensors;
+  // In the middle of the floor, near an edge of it, beside it, near a corner, beside it.
+  for (const Vec3 place : {Vec3{0.1F, 0.2F, -1}, Vec3{0.97F, 0.2F, -1}, Vec3{kBeside, 0.2F, -1},
+                           Vec3{-0.97F, 0.96F, -1}, Vec3{-kBeside, kBeside, -1}}) {
+    sensors.push_back({place, {0, 0, 1}});
+  }
+  sensors.push_back({{-1, kBeside, kBeside}, {1, 0, 0}});
+  SetSensors(scene, std::move(sensors), 0.15);
+  ExpectIrradiance(scene, SettingsOfSensors(scene, 60000, 40), 24, std::vector<double>(6, 2 * kPi),
+                   0.0005, 0.06);
+}
+
+TEST(SensorsTest, DoesNotPassAThinWall) {
+  Scene scene = Floor({});
+  // A lamp in the half x < 0 of a closed box without light in the other half.
+  AddBox(scene, {-1, -1, -1}, {1, 1, 1}, 0);
+  AddQuad(scene, {0, -1, -1}, {0, 2, 0}, {0, 0, 2}, 0);
+  PointLight light;
+  light.position = {-0.5F, 0, 0};
+  light.intensity = Gray(1);
+  scene.point_lights.push_back(light);
+  SetSensors(
+      scene,
+      {{{0, 0.3F, 0.2F}, {1, 0, 0}}, {{0.001F, 0, -1}, {0, 0, 1}}, {{0, 0.3F, 0.2F}, {-1, 0, 0}}},
+      0.1);
+  const Image image = RenderLocally(scene, SettingsOfSensors(scene, 20000, 5), 4);
+  EXPECT_EQ(image.Find("G")->pixels[0], 0);
+  EXPECT_EQ(image.Find("G")->pixels[1], 0);
+  EXPECT_GT(image.Find("G")->pixels[2], 0.1F);
+}
+
+// The same as a camera sees: a diffuse surface shows its irradiance times its reflectance over pi.
+TEST(SensorsTest, IsWhatACameraSeesOfADiffuseSurface) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.6F));
+  AddQuad(scene, {-2, -2, 0}, {4, 0, 0}, {0, 4, 0}, 0);
+  AddQuad(scene, {-2, -2, 0}, {0, 4, 0}, {0, 0, 3}, 0);
+  AddMaterial(scene, DielectricMaterial(1.5F));
+  AddSphere(scene, {0.3F, 0, 1}, 0.5F, 1);
+  PointLight light;
+  light.position = {0.4F, 0.2F, 3};
+  light.intensity = Gray(5);
+  scene.point_lights.push_back(light);
+  Scene seen = scene;
+  // Nearly one point of the floor, from the side: in the light that the ball gathers, a tenth
+  // beside its axis, where it has no bound.
+  SetCamera(seen, {1.5, -1.5, 0.9}, {0.33, -0.04, 0}, {0, 0, 1}, 0.2, 1);
+  RenderOverrides overrides;
+  overrides.photons_per_pass = 30000;
+  overrides.initial_radius = 0.05;
+  constexpr int kPasses = 32;
+  std::vector<double> of_camera;
+  for (int part = 0; part < kParts; ++part) {
+    overrides.seed = 500 + static_cast<std::uint64_t>(part);
+    const Image image = RenderLocally(seen, SettingsFor(seen, overrides), kPasses);
+    of_camera.push_back(static_cast<double>(image.Find("G")->pixels[0]) * kPi / 0.6);
+  }
+  const MeasuredMean camera = MeanOf(of_camera);
+  SetSensors(scene, {{{0.33F, -0.04F, 0}, {0, 0, 1}}}, 0.05);
+  const MeasuredMean sensor = IrradianceOf(scene, SettingsFor(scene, overrides), kPasses).front();
+  const double bound = std::hypot(Bound(camera), Bound(sensor));
+  EXPECT_NEAR(sensor.mean, camera.mean, bound);
+  EXPECT_LT(bound, 0.05 * camera.mean);
+}
+
+}  // namespace
+}  // namespace lucerna

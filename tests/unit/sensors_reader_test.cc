@@ -1,0 +1,113 @@
+// A file of points on surfaces takes the place of a scene's camera; what is wrong with it is said
+// in one sentence.
+#include "render/formats/sensors/sensors_reader.h"
+
+#include <map>
+#include <string>
+#include <utility>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "render/formats/read_scene.h"
+#include "tests/support/memory_files.h"
+
+namespace lucerna {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kScene =
+    "LookAt 1 2 3  0 0 0  0 0 1 Camera \"perspective\" "
+    "Film \"rgb\" \"integer xresolution\" 640 \"float iso\" 400 \"float cropwindow\" [0 .5 0 1]\n"
+    "WorldBegin LightSource \"point\"\n"
+    "Shape \"sphere\"\n";
+
+ParsedScene Read(const std::string& sensors, const std::string& scene = kScene) {
+  std::map<std::string, std::string> named;
+  named["points.ply"] = sensors;
+  named["scene.pbrt"] = scene;
+  MemoryFiles files(std::move(named));
+  return ReadScene(files, "points.ply");
+}
+
+std::string File(const std::string& comments, const std::string& rows, int count) {
+  return "ply\nformat ascii 1.0\n" + comments + "element vertex " + std::to_string(count) +
+         "\nproperty float x\nproperty float y\nproperty float z\n"
+         "property float nx\nproperty float ny\nproperty float nz\nend_header\n" +
+         rows;
+}
+constexpr const char* kComments =
+    "comment lucerna scene scene.pbrt\ncomment lucerna spacing 0.25\n";
+
+std::string ErrorOf(const std::string& sensors) {
+  return std::string(Read(sensors).ToStatus().message());
+}
+
+TEST(SensorsReaderTest, PointsReplaceTheCamera) {
+  const ParsedScene parsed =
+      Read(File(kComments, "0 0 1 0 0 1\n1 0 0 1 0 0\n0 1 0 0 2.001 0\n", 2));
+  ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
+  const Scene& scene = parsed.scene;
+  EXPECT_EQ(scene.camera.kind, Camera::Kind::kSensors);
+  EXPECT_EQ(scene.camera.sensor_spacing, 0.25);
+  ASSERT_EQ(scene.sensors.size(), 2U);
+  EXPECT_EQ(scene.sensors[1], (Sensor{{1, 0, 0}, {1, 0, 0}}));
+  EXPECT_EQ(scene.film.width * scene.film.height, 2);
+  EXPECT_EQ(scene.film.crop_x1, scene.film.width);
+  EXPECT_EQ(scene.film.exposure, 1);
+  EXPECT_EQ(scene.spheres.size(), 1U);
+}
+
+TEST(SensorsReaderTest, WhatIsWrittenIsRead) {
+  const std::vector<Sensor> sensors = {
+      {{1, 2, 3}, {0, 0, 1}}, {{4, 5, 6}, {0.6F, 0.8F, 0}}, {{7, 8, 9}, {-1, 0, 0}}};
+  const ParsedScene parsed = Read(SensorsFile("scene.pbrt", 0.125, sensors));
+  ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
+  EXPECT_EQ(parsed.scene.sensors, sensors);
+  EXPECT_EQ(parsed.scene.film.width, 2);
+  EXPECT_EQ(parsed.scene.film.height, 2);
+}
+
+TEST(SensorsReaderTest, FollowTheUnitOfTheScene) {
+  const ParsedScene parsed = Read(SensorsFile("scene.pbrt", 1e9, {{{0, 0, 3e10F}, {0, 0, 1}}}),
+                                  "Camera \"perspective\" WorldBegin LightSource \"distant\"\n"
+                                  "Shape \"sphere\" \"float radius\" 3e10\n");
+  ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
+  const Scene& scene = parsed.scene;
+  ASSERT_NE(scene.unit, 1);
+  EXPECT_EQ(static_cast<double>(scene.sensors[0].position.z) * scene.unit, 3e10F);
+  EXPECT_EQ(scene.camera.sensor_spacing * scene.unit, 1e9);
+  EXPECT_EQ(scene.spheres[0].radius, scene.sensors[0].position.z);
+}
+
+TEST(SensorsReaderTest, SaysWhatIsMissing) {
+  const std::string row = "0 0 1 0 0 1\n";
+  EXPECT_THAT(ErrorOf(File("", row, 1)), HasSubstr("does not name a scene"));
+  EXPECT_THAT(ErrorOf(File("comment lucerna scene scene.pbrt\n", row, 1)),
+              HasSubstr("no distance between points"));
+  for (const std::string spacing : {"0", "-1", "nan", "inf", "far"}) {
+    EXPECT_THAT(
+        ErrorOf(File("comment lucerna scene scene.pbrt\ncomment lucerna spacing " + spacing + "\n",
+                     row, 1)),
+        HasSubstr("no distance between points"))
+        << spacing;
+  }
+  EXPECT_THAT(
+      ErrorOf(File("comment lucerna scene other.pbrt\ncomment lucerna spacing 1\n", row, 1)),
+      HasSubstr("other.pbrt"));
+  EXPECT_THAT(ErrorOf(File("comment lucerna scene ../x.pbrt\ncomment lucerna spacing 1\n", row, 1)),
+              HasSubstr(".."));
+  EXPECT_THAT(
+      ErrorOf(File("comment lucerna scene points.ply\ncomment lucerna spacing 1\n", row, 1)),
+      HasSubstr("must not be a PLY file"));
+  EXPECT_THAT(ErrorOf(File(kComments, "", 0)), HasSubstr("no points"));
+  EXPECT_THAT(ErrorOf(File(kComments, "0 0 1 0 0 0\n", 1)), HasSubstr("normal of point 0"));
+  EXPECT_THAT(ErrorOf(File(kComments, "0 0 1 0 0 3\n", 1)), HasSubstr("normal of point 0"));
+  EXPECT_THAT(ErrorOf(File(kComments, "nan 0 1 0 0 1\n", 1)), HasSubstr("position of vertex 0"));
+  EXPECT_THAT(ErrorOf(File(kComments, row, 4000000)), HasSubstr("more than its"));
+  EXPECT_THAT(ErrorOf("ply\n"), HasSubstr("end_header"));
+}
+
+}  // namespace
+}  // namespace lucerna

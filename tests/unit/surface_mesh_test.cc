@@ -1,0 +1,335 @@
+// A mesh of surfaces stays whole however it is refined: no cracks, no area lost, no thin faces, and
+// sensors on the faces that they measure.
+#include "client/bake/surface_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include <nlohmann/json.hpp>
+
+#include "client/bake/mesh_file.h"
+#include "client/bake/surface_figures.h"
+#include "render/formats/ply_file.h"
+#include "render/math/double3.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+using testing::HasSubstr;
+
+Scene Box() {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddBox(scene, {0, 0, 0}, {1, 2, 3}, 0);
+  return scene;
+}
+
+SurfaceMesh MeshOf(const Scene& scene, MeasuredSides sides = MeasuredSides::kFront,
+                   double spacing = 0.1) {
+  StatusOr<SurfaceMesh> mesh =
+      SurfaceMesh::FromScene(scene, {.sides = sides, .names = {}, .spacing = spacing});
+  EXPECT_TRUE(mesh.ok()) << mesh.status();
+  return *std::move(mesh);
+}
+
+using Field = std::function<double(const Sensor&)>;
+
+std::vector<Irradiance> Measure(const std::vector<Sensor>& sensors, const Field& field) {
+  std::vector<Irradiance> measured;
+  for (const Sensor& sensor : sensors)
+    measured.push_back({Gray(static_cast<float>(field(sensor))), 0});
+  return measured;
+}
+
+// As `lucerna bake` refines. Returns how many sensors were used.
+std::size_t Bake(SurfaceMesh& mesh, const Field& field, double tolerance) {
+  std::size_t count = 0;
+  bool is_first = true;
+  do {
+    const std::vector<Sensor> sensors = mesh.NextSensors(true);
+    count += sensors.size();
+    mesh.SetMeasured(Measure(sensors, field));
+    if (std::exchange(is_first, false)) mesh.DropDarkerSides();
+  } while (mesh.Refine(tolerance) > 0);
+  const std::vector<Sensor> rest = mesh.NextSensors(false);
+  mesh.SetMeasured(Measure(rest, field));
+  return count + rest.size();
+}
+
+double AreaOf(const SurfaceMesh& mesh) {
+  double area = 0;
+  for (const MeshFace& face : mesh.faces())
+    area += mesh.AreaOf(face);
+  return area;
+}
+
+// How often each edge is used, by places: in each direction once where there is no crack.
+std::map<std::pair<std::uint32_t, std::uint32_t>, int> EdgesOf(const SurfaceMesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
+  for (const MeshFace& face : mesh.faces()) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint32_t a = mesh.vertices()[face.vertices[i]].place;
+      const std::uint32_t b = mesh.vertices()[face.vertices[(i + 1) % 3]].place;
+      EXPECT_NE(a, b);
+      ++edges[{a, b}];
+    }
+  }
+  return edges;
+}
+
+void ExpectNoCracks(const SurfaceMesh& closed) {
+  const auto edges = EdgesOf(closed);
+  for (const auto& [edge, count] : edges) {
+    EXPECT_EQ(count, 1);
+    EXPECT_EQ(edges.count({edge.second, edge.first}), 1U) << "an edge with one face";
+  }
+}
+
+double SmallestAngleOf(const SurfaceMesh& mesh) {
+  double smallest = std::numbers::pi;
+  for (const MeshFace& face : mesh.faces()) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const Double3 at(mesh.vertices()[face.vertices[i]].position);
+      const Double3 a = Double3(mesh.vertices()[face.vertices[(i + 1) % 3]].position) - at;
+      const Double3 b = Double3(mesh.vertices()[face.vertices[(i + 2) % 3]].position) - at;
+      smallest = std::min(smallest, std::acos(Dot(a, b) / (Length(a) * Length(b))));
+    }
+  }
+  return smallest;
+}
+
+// A light spot with a sharp rim around one corner of the box.
+double Spot(const Sensor& sensor) {
+  return Length(sensor.position - Vec3{1, 2, 3}) < 0.77F ? 1.0 : 0.2;
+}
+
+TEST(SurfaceMeshTest, ABoxHasAVertexAtEachCornerOfEachSide) {
+  const SurfaceMesh mesh = MeshOf(Box());
+  EXPECT_EQ(mesh.vertices().size(), 24U);
+  EXPECT_EQ(mesh.faces().size(), 12U);
+  EXPECT_NEAR(AreaOf(mesh), 22, 1e-5);
+  ExpectNoCracks(mesh);
+  for (const MeshVertex& vertex : mesh.vertices())
+    EXPECT_NEAR(Length(vertex.normal), 1, 1e-6);
+}
+
+TEST(SurfaceMeshTest, StaysWholeAroundARim) {
+  SurfaceMesh mesh = MeshOf(Box());
+  mesh.SplitLongEdges(1.6);
+  Bake(mesh, Spot, 0.05);
+  ExpectNoCracks(mesh);
+  EXPECT_NEAR(AreaOf(mesh), 22, 1e-4);
+  // Of the first faces, halved at their longest edges, none is less than half as pointed (Rivara).
+  EXPECT_GT(SmallestAngleOf(mesh), 0.5 * std::atan(1.0 / 3) - 1e-6);
+  // Finest at the rim, coarse elsewhere.
+  double shortest = HUGE_VAL;
+  std::size_t coarse = 0;
+  for (const MeshFace& face : mesh.faces()) {
+    shortest = std::min(shortest, std::sqrt(mesh.AreaOf(face)));
+    coarse += mesh.AreaOf(face) > 0.2 ? 1 : 0;
+  }
+  EXPECT_LT(shortest, 0.1);
+  EXPECT_GT(coarse, 10U);
+}
+
+TEST(SurfaceMeshTest, WhatIsLinearIsNotRefinedAndExact) {
+  SurfaceMesh mesh = MeshOf(Box());
+  const auto linear = [](const Sensor& sensor) {
+    return 1 + static_cast<double>(sensor.position.x + 2 * sensor.position.y);
+  };
+  Bake(mesh, linear, 0.01);
+  EXPECT_EQ(mesh.faces().size(), 12U);
+  // Sensors are a little beside corners.
+  EXPECT_LT(mesh.InterpolationError(), 1e-3);
+}
+
+TEST(SurfaceMeshTest, AToleranceOfZeroRefinesEverywhere) {
+  SurfaceMesh uniform = MeshOf(Box());
+  Bake(uniform, Spot, 0);
+  SurfaceMesh adaptive = MeshOf(Box());
+  adaptive.SplitLongEdges(1.6);
+  Bake(adaptive, Spot, 0.05);
+  for (const MeshFace& face : uniform.faces())
+    EXPECT_LT(std::sqrt(uniform.AreaOf(face)), 0.1);
+  EXPECT_GT(uniform.faces().size(), 5 * adaptive.faces().size());
+}
+
+TEST(SurfaceMeshTest, DifferencesWithinTheNoiseAreNotRefined) {
+  SurfaceMesh mesh = MeshOf(Box());
+  const std::vector<Sensor> sensors = mesh.NextSensors(true);
+  std::vector<Irradiance> measured = Measure(sensors, Spot);
+  for (Irradiance& of : measured)
+    of.noise = 0.4F;
+  mesh.SetMeasured(measured);
+  EXPECT_EQ(mesh.Refine(0.05), 0U);
+}
+
+TEST(SurfaceMeshTest, TheBrighterSideIsKept) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddQuad(scene, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0);
+  AddQuad(scene, {0, 0, 1}, {0, 1, 0}, {1, 0, 0}, 0);
+  const auto from_above = [](const Sensor& sensor) { return sensor.normal.z > 0 ? 1.0 : 0.1; };
+  SurfaceMesh mesh = MeshOf(scene, MeasuredSides::kBrighter, 10);
+  Bake(mesh, from_above, 0.05);
+  ASSERT_EQ(mesh.faces().size(), 4U);
+  for (const MeshFace& face : mesh.faces()) {
+    EXPECT_EQ(mesh.vertices()[face.vertices[0]].normal.z, 1);
+    // Seen from the measured side faces are counter-clockwise.
+    const Vec3 normal = TriangleNormal(mesh.vertices()[face.vertices[0]].position,
+                                       mesh.vertices()[face.vertices[1]].position,
+                                       mesh.vertices()[face.vertices[2]].position);
+    EXPECT_EQ(normal.z, 1);
+  }
+  SurfaceMesh both = MeshOf(scene, MeasuredSides::kBoth, 10);
+  Bake(both, from_above, 0.05);
+  EXPECT_EQ(both.faces().size(), 8U);
+}
+
+TEST(SurfaceMeshTest, NewVerticesOfASphereAreOnIt) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddSphere(scene, {1, 2, 3}, 2, 0);
+  SurfaceMesh mesh = MeshOf(scene, MeasuredSides::kFront, 0.2);
+  mesh.SplitLongEdges(0.5);
+  Bake(
+      mesh, [](const Sensor& sensor) { return sensor.position.x > 1.5F ? 1.0 : 0.3; }, 0.05);
+  ExpectNoCracks(mesh);
+  for (const MeshVertex& vertex : mesh.vertices()) {
+    const Vec3 out = vertex.sensor.position - Vec3{1, 2, 3};
+    EXPECT_NEAR(Length(out), 2, 1e-5);
+    EXPECT_NEAR(Dot(Normalize(out), vertex.sensor.normal), 1, 1e-5);
+  }
+  // Triangles of a circumradius of at most 0.3 lie 1 % or less below the sphere.
+  EXPECT_LT(AreaOf(mesh), 16 * std::numbers::pi);
+  EXPECT_GT(AreaOf(mesh), 0.98 * 16 * std::numbers::pi);
+}
+
+TEST(SurfaceMeshTest, SensorsLieOnTheirFaces) {
+  SurfaceMesh mesh = MeshOf(Box(), MeasuredSides::kFront, 0.5);
+  Bake(mesh, Spot, 0.05);
+  for (const MeshVertex& vertex : mesh.vertices()) {
+    const Vec3 p = vertex.sensor.position;
+    const Vec3 n = vertex.sensor.normal;
+    // In the plane of the side, and inside of its rim.
+    const Vec3 high = {1, 2, 3};
+    int on_faces = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto at = [&](Vec3 v) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; };
+      if (at(n) != 0) {
+        EXPECT_NEAR(at(p), at(n) > 0 ? at(high) : 0, 1e-6);
+        ++on_faces;
+      } else {
+        EXPECT_GT(at(p), 0);
+        EXPECT_LT(at(p), at(high));
+      }
+    }
+    EXPECT_EQ(on_faces, 1);
+    EXPECT_LT(Length(p - vertex.position), 1e-3F);
+  }
+}
+
+TEST(SurfaceMeshTest, ChoosesByMaterial) {
+  Scene scene = Box();
+  scene.materials[0].name = "box";
+  Material glass = DielectricMaterial(1.5F);
+  glass.name = "glass";
+  AddMaterial(scene, glass);
+  AddSphere(scene, {0, 0, 9}, 1, 1);
+  EXPECT_EQ(MeshOf(scene).faces().size(), 12U);  // nothing is kept on glass
+  const auto none = SurfaceMesh::FromScene(
+      scene, {.sides = MeasuredSides::kFront, .names = {"glass"}, .spacing = 1});
+  EXPECT_EQ(none.status().code(), absl::StatusCode::kNotFound);
+  EXPECT_THAT(std::string(none.status().message()), HasSubstr("there are box"));
+}
+
+BakedMesh SmallBake() {
+  Scene scene = Box();
+  scene.materials[0].name = "box";
+  SurfaceMesh mesh = MeshOf(scene);
+  Bake(mesh, Spot, 10);
+  return BakedMeshOf(mesh);
+}
+
+TEST(MeshFileTest, PlyIsReadBack) {
+  const BakedMesh baked = SmallBake();
+  for (const bool is_ascii : {false, true}) {
+    const std::string bytes = MeshPly(baked, is_ascii);
+    const StatusOr<TriangleMesh> read = ParsePly(bytes);
+    ASSERT_TRUE(read.ok()) << read.status();
+    EXPECT_EQ(read->indices.size(), 36U);
+    ASSERT_EQ(read->positions.size(), 24U);
+    for (std::size_t i = 0; i < 24; ++i) {
+      EXPECT_EQ(read->positions[i], baked.surfaces[0].positions[i]);
+      EXPECT_EQ(read->normals[i], baked.surfaces[0].normals[i]);
+    }
+  }
+}
+
+TEST(MeshFileTest, GlbIsWhatItsHeaderSays) {
+  const BakedMesh baked = SmallBake();
+  const std::string bytes = MeshGlb(baked);
+  const auto word = [&](std::size_t at) {
+    std::uint32_t value = 0;
+    std::memcpy(&value, bytes.data() + at, sizeof(value));
+    return value;
+  };
+  ASSERT_EQ(bytes.substr(0, 4), "glTF");
+  EXPECT_EQ(word(4), 2U);
+  ASSERT_EQ(word(8), bytes.size());
+  const std::uint32_t json_size = word(12);
+  EXPECT_EQ(json_size % 4, 0U);
+  const auto file = nlohmann::json::parse(bytes.substr(20, json_size));
+  const std::size_t binary_at = 20 + json_size + 8;
+  ASSERT_EQ(word(20 + json_size), bytes.size() - binary_at);
+  EXPECT_EQ(file["buffers"][0]["byteLength"], bytes.size() - binary_at);
+  const auto& attributes = file["meshes"][0]["primitives"][0]["attributes"];
+  const auto float_at = [&](const nlohmann::json& accessor_number, std::size_t index) {
+    const auto& accessor = file["accessors"][accessor_number.get<std::size_t>()];
+    const auto& view = file["bufferViews"][accessor["bufferView"].get<std::size_t>()];
+    float value = 0;
+    std::memcpy(&value,
+                bytes.data() + binary_at + view["byteOffset"].get<std::size_t>() + 4 * index, 4);
+    return value;
+  };
+  for (std::size_t vertex = 0; vertex < 24; ++vertex) {
+    EXPECT_EQ(float_at(attributes["POSITION"], 3 * vertex), baked.surfaces[0].positions[vertex].x);
+    EXPECT_EQ(float_at(attributes["_IRRADIANCE"], 3 * vertex + 1),
+              baked.surfaces[0].irradiance[vertex].g);
+  }
+  const auto& positions = file["accessors"][attributes["POSITION"].get<std::size_t>()];
+  EXPECT_EQ(positions["min"], (std::vector<float>{0, 0, 0}));
+  EXPECT_EQ(positions["max"], (std::vector<float>{1, 2, 3}));
+  EXPECT_EQ(positions["count"], 24);
+}
+
+TEST(SurfaceFiguresTest, AreThoseOfLinearTriangles) {
+  BakedMesh mesh;
+  mesh.surfaces.push_back({.name = "0 desk",
+                           .positions = {{0, 0, 0}, {2, 0, 0}, {0, 1, 0}},
+                           .normals = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}},
+                           .irradiance = {Gray(1), Gray(2), Gray(6)},
+                           .noise = {0, 0, 0},
+                           .faces = {{0, 1, 2}}});
+  const std::vector<SurfaceFigures> figures = FiguresOf(mesh);
+  ASSERT_EQ(figures.size(), 1U);
+  EXPECT_DOUBLE_EQ(figures[0].area, 1);
+  EXPECT_NEAR(figures[0].mean, 3, 1e-6);
+  EXPECT_NEAR(figures[0].lowest, 1, 1e-6);
+  EXPECT_NEAR(figures[0].highest, 6, 1e-6);
+  EXPECT_NEAR(figures[0].uniformity(), 1.0 / 3, 1e-6);
+  EXPECT_THAT(FiguresTable(figures, true), HasSubstr("2049"));  // 3 · 683 lx
+}
+
+}  // namespace
+}  // namespace lucerna
