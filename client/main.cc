@@ -353,6 +353,15 @@ int Run(int argc, char** argv) {
   bake->add_option("--material", baked.materials,
                    "measure surfaces of this material alone; may be repeated")
       ->allow_extra_args(false);
+  const std::map<std::string, BakeEstimator> estimators = {
+      {"kernel", BakeEstimator::kKernel},
+      {"nearest", BakeEstimator::kNearest},
+      {"histogram", BakeEstimator::kHistogram}};
+  bake->add_option("--estimator", baked.estimator,
+                   "kernel, nearest (about the k nearest photons of each vertex) or histogram (the "
+                   "photons on each triangle of an even mesh)")
+      ->transform(CLI::Transformer(estimators))
+      ->default_str("kernel");
   const std::map<std::string, MeasuredSides> sides = {{"brighter", MeasuredSides::kBrighter},
                                                       {"front", MeasuredSides::kFront},
                                                       {"back", MeasuredSides::kBack},

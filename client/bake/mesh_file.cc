@@ -115,6 +115,14 @@ BakedMesh BakedMeshOf(const SurfaceMesh& mesh) {
     std::array<std::uint32_t, 3> corners{};
     for (std::size_t i = 0; i < corners.size(); ++i) {
       const MeshVertex& vertex = mesh.vertices()[face.vertices[i]];
+      if (face.bucket) {
+        corners[i] = static_cast<std::uint32_t>(to.positions.size());
+        to.positions.push_back(vertex.position);
+        to.normals.push_back(vertex.normal);
+        to.irradiance.push_back(face.bucket->value);
+        to.noise.push_back(face.bucket->noise);
+        continue;
+      }
       const auto [known, is_first] =
           vertex_at.try_emplace(face.vertices[i], static_cast<std::uint32_t>(to.positions.size()));
       if (is_first) {

@@ -27,7 +27,8 @@ struct BakedMesh {
   double estimate = 0;  // relative error that the last job estimated, over its points
 };
 
-// Requires that all vertices of faces are measured.
+// Of a histogram, each face has vertices of its own. Requires that all vertices of faces, or all
+// faces, are measured.
 [[nodiscard]] BakedMesh BakedMeshOf(const SurfaceMesh& mesh);
 
 // A PLY file, binary or text: vertices with x y z nx ny nz irradiance_r irradiance_g irradiance_b

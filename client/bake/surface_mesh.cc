@@ -27,6 +27,9 @@ constexpr double kNoiseDeviations = 2;
 // Into so many parts a disk's rim and a sphere's equator are divided.
 constexpr int kRoundParts = 32;
 
+// A bucket's disc holds its corners, whatever rounding does.
+constexpr double kBeyondCorners = 1.001;
+
 constexpr std::uint32_t kNoVertex = UINT32_MAX;
 
 using Triangles = std::vector<std::array<std::uint32_t, 3>>;
@@ -293,7 +296,7 @@ Sensor SurfaceMesh::SensorOn(const MeshFace& face, Vec3 position, Vec3 normal) c
     if (length > 0) {
       const Double3 radial = out * (1 / length);
       const bool is_same = Dot(radial, Double3(normal)) > 0;
-      return {position, ToFloat(radial * (is_same ? 1 : -1))};
+      return {position, ToFloat(radial * (is_same ? 1 : -1)), static_cast<float>(spacing_)};
     }
   }
   Double3 middle;
@@ -301,9 +304,9 @@ Sensor SurfaceMesh::SensorOn(const MeshFace& face, Vec3 position, Vec3 normal) c
     middle = middle + Double3(vertices_[vertex].position) * (1.0 / 3);
   const Double3 inward = middle - at;
   const double length = Length(inward);
-  if (!(length > 0)) return {position, normal};
+  if (!(length > 0)) return {position, normal, static_cast<float>(spacing_)};
   const double inset = std::min(kInset * spacing_, kLargestInset * length);
-  return {ToFloat(at + inward * (inset / length)), normal};
+  return {ToFloat(at + inward * (inset / length)), normal, static_cast<float>(spacing_)};
 }
 
 double SurfaceMesh::AreaOf(const MeshFace& face) const {
@@ -398,7 +401,7 @@ void SurfaceMesh::Split(std::set<Pair> places) {
       m[index] = found->second;
     }
     const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-      finer.push_back({{a, b, c}, face.surface});
+      finer.push_back({{a, b, c}, face.surface, std::nullopt});
     };
     if (m[0] == kNoVertex) {
       finer.push_back(face);
@@ -471,12 +474,58 @@ void SurfaceMesh::SetMeasured(const std::vector<Irradiance>& measured) {
     probes_.at(asked_edges_[i]).middle.irradiance = measured[asked_vertices_.size() + i];
 }
 
+std::vector<Sensor> SurfaceMesh::BucketSensors() const {
+  std::vector<Sensor> sensors;
+  sensors.reserve(faces_.size());
+  for (const MeshFace& face : faces_) {
+    Double3 middle;
+    for (const std::uint32_t vertex : face.vertices)
+      middle = middle + Double3(vertices_[vertex].position) * (1.0 / 3);
+    const Vec3 normal =
+        TriangleNormal(vertices_[face.vertices[0]].position, vertices_[face.vertices[1]].position,
+                       vertices_[face.vertices[2]].position);
+    Sensor sensor = {ToFloat(middle), normal, 0};
+    if (const auto& ball = surfaces_[face.surface].ball; ball) {
+      const Double3 out = middle - Double3(ball->center);
+      middle = Double3(ball->center) + out * (static_cast<double>(ball->radius) / Length(out));
+      sensor = SensorOn(face, ToFloat(middle), normal);
+    }
+    double reach = 0;
+    for (const std::uint32_t vertex : face.vertices)
+      reach = std::max(reach, Length(Double3(vertices_[vertex].position) - middle));
+    sensor.spacing = static_cast<float>(kBeyondCorners * reach);
+    sensors.push_back(sensor);
+  }
+  return sensors;
+}
+
+std::vector<std::array<Vec3, 2>> SurfaceMesh::BucketBorders() const {
+  std::map<Pair, std::array<Vec3, 2>> borders;  // by places
+  for (const MeshFace& face : faces_) {
+    for (int edge = 0; edge < 3; ++edge) {
+      const Pair vertices = EdgeOf(face, edge);
+      borders.try_emplace(PlacesOf(vertices), std::array{vertices_[vertices.first].position,
+                                                         vertices_[vertices.second].position});
+    }
+  }
+  std::vector<std::array<Vec3, 2>> list;
+  list.reserve(borders.size());
+  for (const auto& [places, border] : borders)
+    list.push_back(border);
+  return list;
+}
+
+void SurfaceMesh::SetBuckets(const std::vector<Irradiance>& measured) {
+  for (std::size_t i = 0; i < faces_.size(); ++i)
+    faces_[i].bucket = measured[i];
+}
+
 void SurfaceMesh::DropDarkerSides() {
   if (sides_ != MeasuredSides::kBrighter) return;
   std::vector<double> flux(surfaces_.size());
   for (const MeshFace& face : faces_) {
     for (const std::uint32_t vertex : face.vertices)
-      flux[face.surface] += AreaOf(face) / 3 * LuminanceOf(*vertices_[vertex].irradiance);
+      flux[face.surface] += AreaOf(face) / 3 * LuminanceOf(AtCorner(face, vertex));
   }
   // The two sides of a shape follow each other.
   for (std::size_t i = 0; i + 1 < surfaces_.size(); i += 2) {

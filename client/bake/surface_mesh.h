@@ -50,6 +50,7 @@ struct MeshVertex {
 struct MeshFace {
   std::array<std::uint32_t, 3> vertices;  // counter-clockwise seen from the measured side
   std::uint32_t surface = 0;
+  std::optional<Irradiance> bucket;  // of a histogram
 };
 
 // One side of one shape.
@@ -89,8 +90,15 @@ class SurfaceMesh {
   // Takes what was measured at the sensors that were asked for last, in their order.
   void SetMeasured(const std::vector<Irradiance>& measured);
 
-  // Of each shape with two sides, drops the one that receives less. Once, after all vertices were
-  // measured; does nothing unless the sides were to be chosen by that.
+  // For histograms, in place of sensors at vertices: one in the middle of each face, whose spacing
+  // reaches its corners, and the faces' borders.
+  [[nodiscard]] std::vector<Sensor> BucketSensors() const;
+  [[nodiscard]] std::vector<std::array<Vec3, 2>> BucketBorders() const;
+  // [faces] of their sensors.
+  void SetBuckets(const std::vector<Irradiance>& measured);
+
+  // Of each shape with two sides, drops the one that receives less. Once, after all vertices or
+  // faces were measured; does nothing unless the sides were to be chosen by that.
   void DropDarkerSides();
 
   // Splits the edges whose middle, as it was measured last, differs from the mean of its ends by
@@ -128,6 +136,9 @@ class SurfaceMesh {
   [[nodiscard]] double LengthOf(Pair edge) const;
   [[nodiscard]] int LongestEdgeOf(const MeshFace& face) const;
   [[nodiscard]] MeshVertex MiddleOf(const MeshFace& face, Pair edge);
+  [[nodiscard]] Irradiance AtCorner(const MeshFace& face, std::uint32_t vertex) const {
+    return face.bucket ? *face.bucket : *vertices_[vertex].irradiance;
+  }
   // A sensor near `position`, which is in or on the edge of the face.
   [[nodiscard]] Sensor SensorOn(const MeshFace& face, Vec3 position, Vec3 normal) const;
   // Splits the faces beside edges between these places, and what must be split with them.

@@ -1,6 +1,7 @@
 #include "client/commands/bake_command.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <numbers>
@@ -133,6 +134,12 @@ Status CheckRequest(const BakeRequest& request) {
   if (request.is_ascii && !IsPly(request.output_path)) {
     return Failure(ExitCode::kUsage, "--ascii is for .ply files");
   }
+  const bool is_chosen = request.overrides.radius_controller || request.overrides.kernel;
+  if (request.estimator == BakeEstimator::kHistogram &&
+      (is_chosen || request.overrides.initial_radius)) {
+    return Failure(ExitCode::kUsage,
+                   "a histogram has no kernel and no radius: its triangles are its buckets");
+  }
   if (request.overrides.width) {
     return Failure(ExitCode::kUsage, "--size has no meaning here: --spacing says how fine to be");
   }
@@ -151,6 +158,18 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
   RenderOverrides overrides = request.overrides;
   const bool has_end = overrides.passes || overrides.time_s || overrides.error || overrides.photons;
   if (!has_end) overrides.passes = kPasses;
+  const bool is_histogram = request.estimator == BakeEstimator::kHistogram;
+  if (request.estimator != BakeEstimator::kKernel) {
+    if (!overrides.kernel) overrides.kernel = KernelKind::kConstant;
+    if (!overrides.radius_controller) {
+      overrides.radius_controller =
+          is_histogram ? RadiusControllerKind::kFixed : RadiusControllerKind::kNearest;
+    }
+  }
+  if (is_histogram) {
+    overrides.initial_radius = 0;
+    overrides.initial_footprints = 1;
+  }
   Scene scene;
   LUCERNA_ASSIGN_OR_RETURN(
       const SceneOfJobs read,
@@ -161,17 +180,17 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
   options.names = request.materials;
   options.spacing = request.spacing.value_or(diagonal / kSpacingsOfDiagonal);
   LUCERNA_ASSIGN_OR_RETURN(SurfaceMesh mesh, SurfaceMesh::FromScene(scene, options));
-  mesh.SplitLongEdges(kCoarsest * options.spacing);
+  mesh.SplitLongEdges((is_histogram ? 1 : kCoarsest) * options.spacing);
 
   LUCERNA_ASSIGN_OR_RETURN(Jobs jobs, Jobs::Open(cluster, server));
   std::vector<BakeRound> rounds;
-  const auto measure = [&](bool with_edges) -> Status {
-    const std::vector<Sensor> sensors = mesh.NextSensors(with_edges);
-    if (sensors.empty()) return absl::OkStatus();
+  const auto measure =
+      [&](const std::vector<Sensor>& sensors,
+          const std::vector<std::array<Vec3, 2>>& borders) -> StatusOr<std::vector<Irradiance>> {
     if (!output_options.quiet) {
       std::fprintf(stderr, "round %zu: %zu points\n", rounds.size() + 1, sensors.size());
     }
-    const std::string bytes = SensorsFile(read.manifest.main_path, options.spacing, sensors);
+    const std::string bytes = SensorsFile(read.manifest.main_path, sensors, borders);
     SceneManifest manifest = read.manifest;
     manifest.entries[kSensorsPath] = {Sha256(bytes), bytes.size()};
     manifest.main_path = kSensorsPath;
@@ -183,18 +202,29 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
     }
     LUCERNA_ASSIGN_OR_RETURN(const Jobs::Result result,
                              jobs.Run(files, manifest, of_round, output_options));
-    LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured,
-                             MeasuredIn(result.image, sensors.size(), request.indirect_only));
-    mesh.SetMeasured(measured);
     rounds.push_back({sensors.size(), result.job});
+    return MeasuredIn(result.image, sensors.size(), request.indirect_only);
+  };
+  const auto measure_mesh = [&](bool with_edges) -> Status {
+    const std::vector<Sensor> sensors = mesh.NextSensors(with_edges);
+    if (sensors.empty()) return absl::OkStatus();
+    LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured, measure(sensors, {}));
+    mesh.SetMeasured(measured);
     return absl::OkStatus();
   };
 
-  LUCERNA_RETURN_IF_ERROR(measure(true));
-  mesh.DropDarkerSides();
-  while (mesh.Refine(request.tolerance) > 0)
-    LUCERNA_RETURN_IF_ERROR(measure(true));
-  LUCERNA_RETURN_IF_ERROR(measure(false));
+  if (is_histogram) {
+    LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured,
+                             measure(mesh.BucketSensors(), mesh.BucketBorders()));
+    mesh.SetBuckets(measured);
+    mesh.DropDarkerSides();
+  } else {
+    LUCERNA_RETURN_IF_ERROR(measure_mesh(true));
+    mesh.DropDarkerSides();
+    while (mesh.Refine(request.tolerance) > 0)
+      LUCERNA_RETURN_IF_ERROR(measure_mesh(true));
+    LUCERNA_RETURN_IF_ERROR(measure_mesh(false));
+  }
 
   BakedMesh baked = BakedMeshOf(mesh);
   baked.scene = read.manifest.main_path;
@@ -211,8 +241,11 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
                stdout);
   } else if (!output_options.quiet) {
     std::fputs(FiguresTable(figures, request.in_lux).c_str(), stdout);
-    std::printf("between vertices the mesh differs by %.2g %% of the mean: %s\n",
-                100 * mesh.InterpolationError(), request.output_path.c_str());
+    if (!is_histogram) {
+      std::printf("between vertices the mesh differs by %.2g %% of the mean\n",
+                  100 * mesh.InterpolationError());
+    }
+    std::printf("%s\n", request.output_path.c_str());
   }
   return absl::OkStatus();
 }

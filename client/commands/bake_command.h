@@ -6,6 +6,7 @@
 // (client/bake/surface_mesh.h).
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,6 +20,13 @@
 
 namespace lucerna {
 
+// How irradiance is estimated from the photons.
+enum class BakeEstimator : std::uint8_t {
+  kKernel,     // a kernel at each vertex, whose width a radius controller chooses
+  kNearest,    // about the k nearest photons of each vertex
+  kHistogram,  // the photons on each triangle, over its area; the mesh is even
+};
+
 struct BakeRequest {
   std::string scene_path;
   RenderOverrides overrides;  // of each job
@@ -29,7 +37,8 @@ struct BakeRequest {
   // Between neighbouring vertices where the mesh is finest [scene units]; absent: a 512th of the
   // scene's diagonal.
   std::optional<double> spacing;
-  double tolerance = 0.05;     // see SurfaceMesh::Refine
+  BakeEstimator estimator = BakeEstimator::kKernel;
+  double tolerance = 0.05;     // see SurfaceMesh::Refine; not of histograms
   bool indirect_only = false;  // without light that comes straight from lights
   bool in_lux = false;         // the table
 };

@@ -8,7 +8,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <initializer_list>
 #include <optional>
+#include <span>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -279,48 +281,94 @@ Status Broken(const Body& body, const Element& element, std::uint64_t index) {
                     element.name, " ", index, " of ", element.count));
 }
 
-Status ReadVertices(Body& body, Format format, const Element& element, TriangleMesh& mesh) {
-  constexpr std::array<std::string_view, 10> kColumns = {"x",  "y", "z", "nx", "ny",
-                                                         "nz", "u", "v", "s",  "t"};
-  // Where each property goes: one of kColumns, or nowhere.
-  std::vector<std::size_t> column_of(element.properties.size(), kColumns.size());
-  std::array<bool, kColumns.size()> is_there{};
-  for (std::size_t i = 0; i < element.properties.size(); ++i) {
-    for (std::size_t column = 0; column < kColumns.size(); ++column) {
-      if (element.properties[i].name != kColumns[column] || element.properties[i].is_list) continue;
-      column_of[i] = column;
-      is_there[column] = true;
+// Numbers of some of an element's properties, by rows; the others are passed over.
+class Rows {
+ public:
+  Rows(Body& body, Format format, const Element& element, std::span<const std::string_view> names)
+      : body_(body), format_(format), element_(element), there_(names.size()) {
+    for (const Property& property : element.properties) {
+      const auto known = std::ranges::find(names, property.name);
+      const bool is_column = known != names.end() && !property.is_list;
+      const auto column = static_cast<std::size_t>(known - names.begin());
+      columns_.push_back(is_column ? column : names.size());
+      if (is_column) there_[column] = true;
     }
+    values_.resize(names.size() + 1);  // the last takes what goes nowhere
   }
-  if (!(is_there[0] && is_there[1] && is_there[2])) return Bad("its vertices have no x, y and z");
-  const bool has_normals = is_there[3] && is_there[4] && is_there[5];
-  const bool has_uv = is_there[6] && is_there[7];
-  const bool has_st = is_there[8] && is_there[9];
+
+  [[nodiscard]] bool Has(std::initializer_list<std::size_t> columns) const {
+    return std::ranges::all_of(columns, [&](std::size_t column) { return there_[column]; });
+  }
+  [[nodiscard]] Status Next(std::uint64_t row) {
+    for (std::size_t i = 0; i < columns_.size(); ++i) {
+      const Property& property = element_.properties[i];
+      if (property.is_list) {
+        SkipList(body_, format_, property);
+      } else {
+        values_[columns_[i]] = static_cast<float>(body_.Read(property.type));
+      }
+    }
+    return body_.ok() ? absl::OkStatus() : Broken(body_, element_, row);
+  }
+  [[nodiscard]] float operator[](std::size_t column) const { return values_[column]; }
+  // Of three columns.
+  [[nodiscard]] Vec3 VectorAt(std::size_t first) const {
+    return {values_[first], values_[first + 1], values_[first + 2]};
+  }
+
+ private:
+  Body& body_;
+  Format format_;
+  const Element& element_;
+  std::vector<std::size_t> columns_;  // [properties]
+  std::vector<bool> there_;
+  std::vector<float> values_;
+};
+
+Status ReadVertices(Body& body, Format format, const Element& element, TriangleMesh& mesh,
+                    std::vector<float>* spacings = nullptr) {
+  constexpr std::array<std::string_view, 11> kColumns = {"x", "y", "z", "nx", "ny",     "nz",
+                                                         "u", "v", "s", "t",  "spacing"};
+  Rows rows(body, format, element, kColumns);
+  if (!rows.Has({0, 1, 2})) return Bad("its vertices have no x, y and z");
+  const bool has_normals = rows.Has({3, 4, 5});
+  const bool has_uv = rows.Has({6, 7});
+  const bool has_st = rows.Has({8, 9});
+  const bool has_spacings = spacings != nullptr && rows.Has({10});
   mesh.positions.resize(element.count);
   if (has_uv || has_st) mesh.uvs.resize(element.count);
   if (has_normals) mesh.normals.resize(element.count);
+  if (has_spacings) spacings->resize(element.count);
   for (std::uint64_t vertex = 0; vertex < element.count; ++vertex) {
-    std::array<float, kColumns.size() + 1> value{};  // the last takes what goes nowhere
-    for (std::size_t i = 0; i < element.properties.size(); ++i) {
-      const Property& property = element.properties[i];
-      if (property.is_list) {
-        SkipList(body, format, property);
-      } else {
-        value[column_of[i]] = static_cast<float>(body.Read(property.type));
-      }
-    }
-    if (!body.ok()) return Broken(body, element, vertex);
-    mesh.positions[vertex] = {value[0], value[1], value[2]};
+    LUCERNA_RETURN_IF_ERROR(rows.Next(vertex));
+    mesh.positions[vertex] = rows.VectorAt(0);
     if (!IsFinite(mesh.positions[vertex])) {
       return Bad(Concat("the position of vertex ", vertex, " is not finite"));
     }
     if (has_normals) {
-      const Vec3 normal = {value[3], value[4], value[5]};
+      const Vec3 normal = rows.VectorAt(3);
       mesh.normals[vertex] = IsFinite(normal) ? normal : Vec3();
     }
     if (has_uv || has_st) {
-      const Vec2 uv = has_uv ? Vec2{value[6], value[7]} : Vec2{value[8], value[9]};
+      const Vec2 uv = has_uv ? Vec2{rows[6], rows[7]} : Vec2{rows[8], rows[9]};
       mesh.uvs[vertex] = std::isfinite(uv.x) && std::isfinite(uv.y) ? uv : Vec2();
+    }
+    if (has_spacings) (*spacings)[vertex] = rows[10];
+  }
+  return absl::OkStatus();
+}
+
+Status ReadSegments(Body& body, Format format, const Element& element,
+                    std::vector<std::array<Vec3, 2>>& segments) {
+  constexpr std::array<std::string_view, 6> kColumns = {"ax", "ay", "az", "bx", "by", "bz"};
+  Rows rows(body, format, element, kColumns);
+  if (!rows.Has({0, 1, 2, 3, 4, 5})) return Bad("its segments have no ax, ay, az, bx, by and bz");
+  segments.resize(element.count);
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    LUCERNA_RETURN_IF_ERROR(rows.Next(i));
+    segments[i] = {rows.VectorAt(0), rows.VectorAt(3)};
+    if (!IsFinite(segments[i][0]) || !IsFinite(segments[i][1])) {
+      return Bad(Concat("segment ", i, " is not finite"));
     }
   }
   return absl::OkStatus();
@@ -446,21 +494,32 @@ StatusOr<PlyPoints> ParsePlyPoints(std::string_view bytes) {
   std::string unpacked;
   LUCERNA_ASSIGN_OR_RETURN(Header header, Open(bytes, unpacked));
   Body body(bytes.substr(header.body_offset), header.format);
+  PlyPoints points;
+  bool has_vertices = false;
+  bool has_segments = false;
   for (const Element& element : header.elements) {
-    if (element.name != "vertex") {
+    if (element.count > 0xFFFFFFFFU) {
+      return Bad(Concat("it has more than 2^32 times ", element.name));
+    }
+    if (element.name == "vertex") {
+      if (std::exchange(has_vertices, true)) return Bad("it has two elements vertex");
+      TriangleMesh mesh;
+      LUCERNA_RETURN_IF_ERROR(ReadVertices(body, header.format, element, mesh, &points.spacings));
+      if (mesh.normals.empty() && !mesh.positions.empty()) {
+        return Bad("its vertices have no nx, ny and nz");
+      }
+      points.positions = std::move(mesh.positions);
+      points.normals = std::move(mesh.normals);
+    } else if (element.name == "segment") {
+      if (std::exchange(has_segments, true)) return Bad("it has two elements segment");
+      LUCERNA_RETURN_IF_ERROR(ReadSegments(body, header.format, element, points.segments));
+    } else {
       LUCERNA_RETURN_IF_ERROR(SkipElement(body, header.format, element));
-      continue;
     }
-    if (element.count > 0xFFFFFFFFU) return Bad("it has more than 2^32 vertices");
-    TriangleMesh mesh;
-    LUCERNA_RETURN_IF_ERROR(ReadVertices(body, header.format, element, mesh));
-    if (mesh.normals.empty() && !mesh.positions.empty()) {
-      return Bad("its vertices have no nx, ny and nz");
-    }
-    return PlyPoints{std::move(mesh.positions), std::move(mesh.normals),
-                     std::move(header.comments)};
   }
-  return Bad("it has no vertices");
+  if (!has_vertices) return Bad("it has no vertices");
+  points.comments = std::move(header.comments);
+  return points;
 }
 
 }  // namespace lucerna

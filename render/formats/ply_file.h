@@ -1,6 +1,7 @@
 // Reads meshes from PLY files.
 #pragma once
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,11 +25,13 @@ namespace lucerna {
 // more than 4 corners, a decompressed size above 200 times the compressed one.
 [[nodiscard]] StatusOr<TriangleMesh> ParsePly(std::string_view bytes);
 
-// The vertices of a PLY file that need no faces, and what its comments say.
+// The vertices of a PLY file that need no faces, segments, and what its comments say.
 struct PlyPoints {
   std::vector<Vec3> positions;
-  std::vector<Vec3> normals;          // [positions], as the file has them
-  std::vector<std::string> comments;  // without the word "comment"
+  std::vector<Vec3> normals;    // [positions], as the file has them
+  std::vector<float> spacings;  // [positions] or empty: the property `spacing`, as the file has it
+  std::vector<std::array<Vec3, 2>> segments;  // the element `segment`: ax ay az bx by bz, finite
+  std::vector<std::string> comments;          // without the word "comment"
 };
 
 // Errors: those of ParsePly but for faces, which are skipped, and INVALID_ARGUMENT without normals.

@@ -90,9 +90,14 @@ Status ChooseUnit(Scene& scene) {
   camera.window_scale *= factor;
   camera.lens_radius *= factor;
   camera.focal_distance *= factor;
-  camera.sensor_spacing *= factor;
-  for (Sensor& sensor : scene.sensors)
+  for (Sensor& sensor : scene.sensors) {
     sensor.position = ScaledBy(sensor.position, factor);
+    sensor.spacing = ScaledBy(sensor.spacing, factor);
+  }
+  for (auto& border : scene.sensor_borders) {
+    for (Vec3& end : border)
+      end = ScaledBy(end, factor);
+  }
   return absl::OkStatus();
 }
 

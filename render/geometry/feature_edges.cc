@@ -56,6 +56,8 @@ FeatureEdges::FeatureEdges(const Scene& scene) {
   });
   const std::vector<FeatureSegment> crossings = SurfaceCrossings(scene);
   segments_.insert(segments_.end(), crossings.begin(), crossings.end());
+  for (const auto& border : scene.sensor_borders)
+    segments_.push_back({border});
   BuildLevels();
 }
 

@@ -7,7 +7,8 @@
 //     bit are the same corner, whatever mesh they belong to;
 //   * edges between a surface on which photons are kept and one on which none are;
 //   * rims of open analytic shapes (AddRim in geometry/shape_NAME.cc);
-//   * where surfaces pass through each other (surface_crossings.h).
+//   * where surfaces pass through each other (surface_crossings.h);
+//   * the borders that a scene's sensors bring (Scene::sensor_borders).
 //
 // A segment that a surface merely passes by is harmless: discs are normalised by what is left of
 // them, so cutting too much costs noise and no bias. So near misses (corners that are equal but for

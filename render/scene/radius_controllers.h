@@ -19,7 +19,9 @@ enum class Evidence : std::uint8_t { kNone, kSectors, kCurvature, kFrequency };
   ROW(Cppm, "cppm", kSectors)                                  \
   ROW(Frequency, "frequency", kFrequency)                      \
   ROW(FrequencyConsistent, "frequency-consistent", kFrequency) \
-  ROW(FrequencyMse, "frequency-mse", kFrequency)
+  ROW(FrequencyMse, "frequency-mse", kFrequency)               \
+  ROW(Nearest, "nearest", kNone)                               \
+  ROW(Fixed, "fixed", kNone)
 
 enum class RadiusControllerKind : std::uint8_t {
 #define LUCERNA_ENUMERATOR(Name, name, evidence) k##Name,

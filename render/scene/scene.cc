@@ -35,7 +35,7 @@ double PixelFootprint(const Camera& camera, int width, int height, double distan
     case Camera::Kind::kOrthographic:
       return of_window;
     case Camera::Kind::kSensors:
-      return camera.sensor_spacing;
+      return camera.window_scale;
     case Camera::Kind::kEqualArea:
     case Camera::Kind::kEquirectangular:
       break;

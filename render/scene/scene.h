@@ -20,6 +20,7 @@
 //       pixels and scales of textures are >= 0.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -82,21 +83,22 @@ struct Camera {
   Kind kind = Kind::kPerspective;
   Transform camera_to_world;  // camera space: +z forward, +y up, +x right, as pbrt has it
   double fov_deg = 90;        // perspective: full angle of the shorter side of the image
-  double window_scale = 1;    // orthographic: the length of 1 in the window below
+  // Orthographic: the length of 1 in the window below. Sensors: the mean of their spacings.
+  double window_scale = 1;
   // What the file sets in place of what follows from the image's size: width over height, and the
   // window of the image, where 1 is tan(fov / 2).
   std::optional<double> frame_aspect_ratio;
   std::optional<Window> screen_window;
   double lens_radius = 0;
   double focal_distance = 1e6;
-  double sensor_spacing = 0;        // of sensors: about the distance between neighbours, > 0
   std::int32_t medium = kNoMedium;  // in which the camera is, or all sensors are
 };
 
 // A point on a surface whose irradiance is measured, on the side that the normal points to.
 struct Sensor {
-  Vec3 position;  // on the surface, up to rounding
-  Vec3 normal;    // unit
+  Vec3 position;      // on the surface, up to rounding
+  Vec3 normal;        // unit
+  float spacing = 0;  // takes the place of a pixel's width, > 0
 
   bool operator==(const Sensor&) const = default;
 };
@@ -177,6 +179,8 @@ struct Scene {
   std::vector<InfiniteLight> infinite_lights;
   Camera camera;
   std::vector<Sensor> sensors;  // not empty when the camera is none but these
+  // Borders at which discs are cut besides the edges of surfaces: those of a histogram's buckets.
+  std::vector<std::array<Vec3, 2>> sensor_borders;
   FilmSettings film;
   PixelFilter filter;
   IntegratorSettings integrator;

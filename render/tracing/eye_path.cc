@@ -454,7 +454,7 @@ EyePath EyePathTracer::AtSensor(std::size_t number, const PixelSampler& sampler)
   path.hitpoint.position = sensor.position;
   path.hitpoint.normal = sensor.normal;
   path.hitpoint.weight = EyeFactor(white, kUp);
-  path.hitpoint.footprint = footprint_;
+  path.hitpoint.footprint = sensor.spacing;
   return path;
 }
 

@@ -94,6 +94,37 @@ TEST(PppmTest, ARoundShrinksAsItsPassesDo) {
   EXPECT_EQ(at_once.photons, one_by_one.photons);
 }
 
+TEST(FixedTest, NeverChanges) {
+  const auto fixed = Make(RadiusControllerKind::kFixed, 0.5);
+  const PixelRadius next = fixed->Next({2, 5}, {100, 2, {}}, OnePass(7), {});
+  EXPECT_EQ(next.radius, 2);
+  EXPECT_EQ(next.photons, 105);
+}
+
+// In even light of `density` photons a pass and unit radius, the disc holds 28 n^(2/3) of the
+// photons of n passes, as soon as that is less than the first radius does.
+TEST(NearestTest, HoldsTheNearestOfAllPhotons) {
+  const auto nearest = Make(RadiusControllerKind::kNearest, 0.5);
+  for (const double density : {40.0, 3000.0}) {
+    std::vector<double> memory(nearest->MemoryPerPixel());
+    PixelRadius pixel = {1, 0};
+    for (std::uint64_t pass = 0; pass < 1000; ++pass) {
+      const double used = pixel.radius;
+      pixel = nearest->Next(pixel, {density * used * used, used, {}}, OnePass(pass), memory);
+      const auto n = static_cast<double>(pass + 1);
+      const double held = n * density * pixel.radius * pixel.radius;
+      ASSERT_NEAR(held, std::min(n * density, 28 * std::pow(n, 2.0 / 3)), 1e-6 * held) << pass;
+      ASSERT_LE(pixel.radius, used);
+    }
+  }
+}
+
+TEST(NearestTest, KeepsItsRadiusWithoutPhotons) {
+  const auto nearest = Make(RadiusControllerKind::kNearest, 0.5);
+  std::vector<double> memory(nearest->MemoryPerPixel());
+  EXPECT_EQ(nearest->Next({0.5, 0}, {0, 0.5, {}}, OnePass(0), memory).radius, 0.5);
+}
+
 // Twelve cells of equal counts keep the radius; a slope across them, or a peak in the middle, does
 // not, and what was counted is forgotten after each test.
 TEST(CppmTest, ShrinksOnlyWhereCountsAreUneven) {

@@ -2,9 +2,11 @@
 // in one sentence.
 #include "render/formats/sensors/sensors_reader.h"
 
+#include <array>
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -50,9 +52,9 @@ TEST(SensorsReaderTest, PointsReplaceTheCamera) {
   ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
   const Scene& scene = parsed.scene;
   EXPECT_EQ(scene.camera.kind, Camera::Kind::kSensors);
-  EXPECT_EQ(scene.camera.sensor_spacing, 0.25);
+  EXPECT_EQ(PixelFootprint(scene.camera, 1, 2, 9), 0.25);
   ASSERT_EQ(scene.sensors.size(), 2U);
-  EXPECT_EQ(scene.sensors[1], (Sensor{{1, 0, 0}, {1, 0, 0}}));
+  EXPECT_EQ(scene.sensors[1], (Sensor{{1, 0, 0}, {1, 0, 0}, 0.25F}));
   EXPECT_EQ(scene.film.width * scene.film.height, 2);
   EXPECT_EQ(scene.film.crop_x1, scene.film.width);
   EXPECT_EQ(scene.film.exposure, 1);
@@ -61,23 +63,27 @@ TEST(SensorsReaderTest, PointsReplaceTheCamera) {
 
 TEST(SensorsReaderTest, WhatIsWrittenIsRead) {
   const std::vector<Sensor> sensors = {
-      {{1, 2, 3}, {0, 0, 1}}, {{4, 5, 6}, {0.6F, 0.8F, 0}}, {{7, 8, 9}, {-1, 0, 0}}};
-  const ParsedScene parsed = Read(SensorsFile("scene.pbrt", 0.125, sensors));
+      {{1, 2, 3}, {0, 0, 1}, 0.5F}, {{4, 5, 6}, {0.6F, 0.8F, 0}, 2}, {{7, 8, 9}, {-1, 0, 0}, 1}};
+  const std::vector<std::array<Vec3, 2>> borders = {{Vec3{0, 1, 2}, Vec3{3, 4, 5}}};
+  const ParsedScene parsed = Read(SensorsFile("scene.pbrt", sensors, borders));
   ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
   EXPECT_EQ(parsed.scene.sensors, sensors);
+  EXPECT_EQ(parsed.scene.sensor_borders, borders);
   EXPECT_EQ(parsed.scene.film.width, 2);
   EXPECT_EQ(parsed.scene.film.height, 2);
 }
 
 TEST(SensorsReaderTest, FollowTheUnitOfTheScene) {
-  const ParsedScene parsed = Read(SensorsFile("scene.pbrt", 1e9, {{{0, 0, 3e10F}, {0, 0, 1}}}),
+  const ParsedScene parsed = Read(SensorsFile("scene.pbrt", {{{0, 0, 3e10F}, {0, 0, 1}, 1e9F}},
+                                              {{Vec3{0, 0, 0}, Vec3{0, 0, 3e10F}}}),
                                   "Camera \"perspective\" WorldBegin LightSource \"distant\"\n"
                                   "Shape \"sphere\" \"float radius\" 3e10\n");
   ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
   const Scene& scene = parsed.scene;
   ASSERT_NE(scene.unit, 1);
   EXPECT_EQ(static_cast<double>(scene.sensors[0].position.z) * scene.unit, 3e10F);
-  EXPECT_EQ(scene.camera.sensor_spacing * scene.unit, 1e9);
+  EXPECT_EQ(static_cast<double>(scene.sensors[0].spacing) * scene.unit, 1e9F);
+  EXPECT_EQ(scene.sensor_borders[0][1].z, scene.sensors[0].position.z);
   EXPECT_EQ(scene.spheres[0].radius, scene.sensors[0].position.z);
 }
 
@@ -104,6 +110,11 @@ TEST(SensorsReaderTest, SaysWhatIsMissing) {
   EXPECT_THAT(ErrorOf(File(kComments, "", 0)), HasSubstr("no points"));
   EXPECT_THAT(ErrorOf(File(kComments, "0 0 1 0 0 0\n", 1)), HasSubstr("normal of point 0"));
   EXPECT_THAT(ErrorOf(File(kComments, "0 0 1 0 0 3\n", 1)), HasSubstr("normal of point 0"));
+  const std::string segments =
+      "ply\nformat ascii 1.0\ncomment lucerna scene scene.pbrt\ncomment lucerna spacing 1\n"
+      "element segment 1\nproperty float ax\nproperty float ay\nproperty float az\n"
+      "property float bx\nproperty float by\nproperty float bz\nend_header\n0 0 0 1 inf 1\n";
+  EXPECT_THAT(ErrorOf(segments), HasSubstr("segment 0 is not finite"));
   EXPECT_THAT(ErrorOf(File(kComments, "nan 0 1 0 0 1\n", 1)), HasSubstr("position of vertex 0"));
   EXPECT_THAT(ErrorOf(File(kComments, row, 4000000)), HasSubstr("more than its"));
   EXPECT_THAT(ErrorOf("ply\n"), HasSubstr("end_header"));

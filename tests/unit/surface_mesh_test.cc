@@ -239,6 +239,29 @@ TEST(SurfaceMeshTest, SensorsLieOnTheirFaces) {
   }
 }
 
+TEST(SurfaceMeshTest, BucketsAreTheFaces) {
+  SurfaceMesh mesh = MeshOf(Box(), MeasuredSides::kBrighter);
+  mesh.SplitLongEdges(0.9);
+  const std::vector<Sensor> sensors = mesh.BucketSensors();
+  ASSERT_EQ(sensors.size(), mesh.faces().size());
+  // As many borders as edges, each once: of a box with both sides, 3/2 to two faces.
+  EXPECT_EQ(mesh.BucketBorders().size(), 3 * mesh.faces().size() / 4);
+  mesh.SetBuckets(Measure(sensors, [](const Sensor& sensor) {
+    const Vec3 middle = {0.5F, 1, 1.5F};
+    return Dot(sensor.position - middle, sensor.normal) > 0 ? 1.0 + sensor.position.x : 0.5;
+  }));
+  mesh.DropDarkerSides();
+  EXPECT_NEAR(AreaOf(mesh), 22, 1e-5);
+  const BakedMesh baked = BakedMeshOf(mesh);
+  ASSERT_EQ(baked.surfaces.size(), 1U);
+  EXPECT_EQ(baked.surfaces[0].positions.size(), 3 * mesh.faces().size());
+  double flux = 0;
+  for (const MeshFace& face : mesh.faces())
+    flux += mesh.AreaOf(face) * static_cast<double>(face.bucket->value.g);
+  // 1 + x over the box: 6 on x = 0, 12 on x = 1, and 1.5 times 10 on the others.
+  EXPECT_NEAR(flux, 6 + 12 + 15, 1e-3);
+}
+
 TEST(SurfaceMeshTest, ChoosesByMaterial) {
   Scene scene = Box();
   scene.materials[0].name = "box";

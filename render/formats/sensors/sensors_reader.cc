@@ -1,8 +1,10 @@
 #include "render/formats/sensors/sensors_reader.h"
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <initializer_list>
 #include <utility>
 #include <vector>
 
@@ -66,10 +68,11 @@ UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
   }
   double spacing = 0;
   const std::string spacing_text = CommentAfter(points->comments, kSpacing);
-  if (!absl::SimpleAtod(spacing_text, &spacing) || !std::isfinite(spacing) || !(spacing > 0)) {
+  if (points->spacings.empty() &&
+      (!absl::SimpleAtod(spacing_text, &spacing) || !std::isfinite(spacing) || !(spacing > 0))) {
     return fail(
         "its header has no distance between points; add a line \"comment lucerna spacing NUMBER\" "
-        "with a number above 0");
+        "with a number above 0, or give each point a property \"spacing\"");
   }
   if (points->positions.empty()) return fail("it has no points");
   // As many as an image may have pixels.
@@ -81,35 +84,55 @@ UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
   if (diagnostics.has_error()) return unfinished;
   Scene& scene = unfinished.scene;
   scene.sensors.resize(points->positions.size());
+  double sum = 0;
   for (std::size_t i = 0; i < scene.sensors.size(); ++i) {
     const Vec3 normal = points->normals[i];
     if (!(std::abs(Length(normal) - 1) <= kUnitLength)) {
       return fail(Concat("the normal of point ", i, " does not have length 1"));
     }
-    scene.sensors[i] = {points->positions[i], Normalize(normal)};
+    const float own = points->spacings.empty() ? static_cast<float>(spacing) : points->spacings[i];
+    if (!(own > 0) || !std::isfinite(own)) {
+      return fail(Concat("the spacing of point ", i, " is not above 0"));
+    }
+    scene.sensors[i] = {points->positions[i], Normalize(normal), own};
+    sum += static_cast<double>(own);
   }
+  scene.sensor_borders = std::move(points->segments);
   scene.camera.kind = Camera::Kind::kSensors;
   scene.camera.camera_to_world = Transform();
   scene.camera.lens_radius = 0;
-  scene.camera.sensor_spacing = spacing;
+  scene.camera.window_scale = sum / static_cast<double>(scene.sensors.size());
   SetFilm(scene);
   scene.filter = {.kind = PixelFilter::Kind::kBox, .radius_x = 0.5F, .radius_y = 0.5F};
   unfinished.has_camera = true;
   return unfinished;
 }
 
-std::string SensorsFile(const std::string& scene_path, double spacing,
-                        const std::vector<Sensor>& sensors) {
+std::string SensorsFile(const std::string& scene_path, const std::vector<Sensor>& sensors,
+                        const std::vector<std::array<Vec3, 2>>& borders) {
   std::string bytes = Concat("ply\nformat binary_little_endian 1.0\ncomment ", kScene, scene_path,
-                             "\ncomment ", kSpacing, spacing, "\nelement vertex ", sensors.size(),
-                             "\nproperty float x\nproperty float y\nproperty float z\n"
-                             "property float nx\nproperty float ny\nproperty float nz\n"
-                             "end_header\n");
+                             "\nelement vertex ", sensors.size(), "\n");
+  const auto add_properties = [&](std::initializer_list<std::string_view> names) {
+    for (const std::string_view name : names)
+      bytes += Concat("property float ", name, "\n");
+  };
+  add_properties({"x", "y", "z", "nx", "ny", "nz", "spacing"});
+  bytes += Concat("element segment ", borders.size(), "\n");
+  add_properties({"ax", "ay", "az", "bx", "by", "bz"});
+  bytes += "end_header\n";
+  const auto add = [&](std::initializer_list<float> row) {
+    for (const float value : row) {
+      const auto raw = std::bit_cast<std::array<char, sizeof(float)>>(value);
+      bytes.append(raw.data(), raw.size());
+    }
+  };
   for (const Sensor& sensor : sensors) {
-    const std::array<float, 6> row = {sensor.position.x, sensor.position.y, sensor.position.z,
-                                      sensor.normal.x,   sensor.normal.y,   sensor.normal.z};
-    bytes.append(reinterpret_cast<const char*>(row.data()), sizeof(row));
+    const Vec3 p = sensor.position;
+    const Vec3 n = sensor.normal;
+    add({p.x, p.y, p.z, n.x, n.y, n.z, sensor.spacing});
   }
+  for (const auto& [a, b] : borders)
+    add({a.x, a.y, a.z, b.x, b.y, b.z});
   return bytes;
 }
 

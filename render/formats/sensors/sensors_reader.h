@@ -1,15 +1,20 @@
 // Reads a scene whose irradiance is measured at points of its surfaces.
 //
-// A PLY file with positions and unit normals, and two comments in its header:
+// A PLY file with positions and unit normals, and comments in its header:
 //
 //   comment lucerna scene FILE      the scene, a logical path; its camera and film do not count
 //   comment lucerna spacing NUMBER  about the distance between neighbouring points [scene units],
-//                                   which takes the place of a pixel's width
+//                                   which takes the place of a pixel's width; each point may have a
+//                                   property `spacing` of its own instead
+//
+// Segments, an element `segment` with the properties ax ay az bx by bz, are borders at which discs
+// of photons are cut.
 //
 // The image of such a scene has a pixel for each point, row by row, in about as many rows as
 // columns.
 #pragma once
 
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,6 +22,7 @@
 #include "render/formats/asset_reader.h"
 #include "render/formats/diagnostic.h"
 #include "render/formats/finish_scene.h"
+#include "render/math/vector.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
@@ -28,8 +34,9 @@ namespace lucerna {
 [[nodiscard]] UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
                                           AssetReader& assets, Diagnostics& diagnostics);
 
-// The bytes of such a file. Requires a spacing above 0.
-[[nodiscard]] std::string SensorsFile(const std::string& scene_path, double spacing,
-                                      const std::vector<Sensor>& sensors);
+// The bytes of such a file. Requires spacings above 0.
+[[nodiscard]] std::string SensorsFile(const std::string& scene_path,
+                                      const std::vector<Sensor>& sensors,
+                                      const std::vector<std::array<Vec3, 2>>& borders);
 
 }  // namespace lucerna
