@@ -36,7 +36,7 @@ MESH_EDGES = 40  # of the diagonal
 
 def bake(scene, out, flags):
     done = subprocess.run([BIN / "lucerna", "bake", scene, "-o", out, "--indirect-only", "--quiet",
-                           "--json", "--unguided", "--seed", "1", *map(str, flags)],
+                           "--unguided", *map(str, flags)],
                           capture_output=True, text=True, check=False)
     if done.returncode != 0:
         sys.exit(done.stderr)
@@ -44,7 +44,8 @@ def bake(scene, out, flags):
 
 
 def end_after(photons):
-    return ["--passes", photons // PHOTONS_PER_PASS, "--photons-per-pass", PHOTONS_PER_PASS]
+    return ["--passes", photons // PHOTONS_PER_PASS, "--photons-per-pass", PHOTONS_PER_PASS,
+            "--seed", 1]
 
 
 def mse(values, truth):
@@ -60,9 +61,8 @@ def measure(scene, folder):
     # One round: edges are longest of 16 spacings, and nothing is refined.
     mesh = ["--spacing", diagonal / MESH_EDGES / 16, "--tolerance", 10]
     width = diagonal / 24
-    truth, _ = bake(path, out, [*mesh, *end_after(1 << 25), "--seed", 2, "--photons-per-pass", 1 << 18,
-                                "--passes", 1 << 7, "--radius-controller", "ppm", "--initial-radius",
-                                width / 4])
+    truth, _ = bake(path, out, [*mesh, "--photons-per-pass", 1 << 18, "--passes", 1 << 7, "--seed", 2,
+                                "--radius-controller", "ppm", "--initial-radius", width / 4])
     rows = []
     for photons in PHOTONS:
         grown = photons / PHOTONS[0]
