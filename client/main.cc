@@ -107,7 +107,7 @@ int Run(int argc, char** argv) {
     AddSettingFlags(*to, SettingRole::kDecidesPixels, overrides);
   };
   const auto add_render_flags = [&](CLI::App* to) {
-    to->add_option("SCENE", request.scene_path, "pbrt-v4 scene file")->required();
+    to->add_option("SCENE", request.scene_path, "scene file: pbrt-v4 or glTF 2.0")->required();
     to->add_option("-o,--output", request.outputs.exr, "EXR file to write");
     to->add_option("--png", request.outputs.png, "PNG preview to write");
     add_image_flags(to, request.overrides);
@@ -253,14 +253,14 @@ int Run(int argc, char** argv) {
 
   CLI::App* validate = command("validate", "say what is wrong with a scene",
                                [&] { return Validate(scene_path, strict, output_options); });
-  validate->add_option("SCENE", scene_path, "pbrt-v4 scene file")->required();
+  validate->add_option("SCENE", scene_path, "scene file: pbrt-v4 or glTF 2.0")->required();
   validate->add_flag("--strict", strict, "warnings are errors");
   add_json(validate);
   add_quiet(validate);
 
   CLI::App* plan = command("plan", "say what a job will use, what is left out, and why",
                            [&] { return PrintPlan(scene_path, planned, output_options); });
-  plan->add_option("SCENE", scene_path, "pbrt-v4 scene file")->required();
+  plan->add_option("SCENE", scene_path, "scene file: pbrt-v4 or glTF 2.0")->required();
   add_image_flags(plan, planned);
   add_json(plan);
   add_quiet(plan);
@@ -289,7 +289,7 @@ int Run(int argc, char** argv) {
         LUCERNA_RETURN_IF_ERROR(find_programs());
         return CompareSettings(comparison, cluster, output_options);
       });
-  compare->add_option("SCENE", comparison.scene_path, "pbrt-v4 scene file")->required();
+  compare->add_option("SCENE", comparison.scene_path, "scene file: pbrt-v4 or glTF 2.0")->required();
   compare->add_option("--reference", comparison.reference_path, "EXR file to measure errors by")
       ->required();
   compare->add_option("--mask", comparison.mask_path,
@@ -315,7 +315,7 @@ int Run(int argc, char** argv) {
         LUCERNA_RETURN_IF_ERROR(find_programs());
         return RenderReference(to_refer, cluster, output_options);
       });
-  reference->add_option("SCENE", to_refer.scene_path, "pbrt-v4 scene file")->required();
+  reference->add_option("SCENE", to_refer.scene_path, "scene file: pbrt-v4 or glTF 2.0")->required();
   reference->add_option("-o,--output", to_refer.output_path, "EXR file to write")->required();
   AddSettingFlag(*reference, "time_s", to_refer.overrides, "seconds, of both halves together");
   AddSettingFlag(*reference, "passes", to_refer.overrides, "passes, of both halves together");

@@ -36,7 +36,7 @@ ScenePath SplitScenePath(const std::string& path) {
 Status CheckNamesFile(const std::string& path) {
   if (!path.empty() && !path.ends_with('/')) return absl::OkStatus();
   return Failure(ExitCode::kUsage,
-                 absl::StrCat("\"", path, "\" is not a scene file; name its .pbrt file"));
+                 absl::StrCat("\"", path, "\" is not a scene file; name its .pbrt, .gltf or .glb file"));
 }
 
 StatusOr<SceneManifest> ReadScene(const std::string& path, const RenderOverrides& overrides,

@@ -9,6 +9,7 @@
 #include "render/base/text.h"
 #include "render/formats/asset_reader.h"
 #include "render/formats/finish_scene.h"
+#include "render/formats/gltf/gltf_reader.h"
 #include "render/formats/pbrt/pbrt_reader.h"
 
 namespace lucerna {
@@ -28,6 +29,8 @@ struct SceneFormat {
 
 constexpr std::array kFormats = {
     SceneFormat{"pbrt-v4", ".pbrt", &BeginsAsPbrt, &ReadPbrt},
+    SceneFormat{"glTF 2.0", ".gltf", &BeginsAsGltf, &ReadGltf},
+    SceneFormat{"binary glTF 2.0", ".glb", &BeginsAsGltf, &ReadGltf},
 };
 
 const SceneFormat* FormatOf(std::string_view path, std::string_view text) {

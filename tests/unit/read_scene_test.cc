@@ -38,11 +38,11 @@ TEST(ReadSceneTest, WithoutAKnownNameTheFirstWordDoes) {
 }
 
 TEST(ReadSceneTest, AFileOfNoKnownFormatIsRefused) {
-  for (const std::string bytes : {"<scene version=\"3.0.0\"/>", "", "ply\nformat ascii 1.0\n",
-                                  "# only a comment", "\"Camera\""}) {
+  for (const std::string bytes : {"{\"scene\": 0}", "<scene version=\"3.0.0\"/>", "",
+                                  "ply\nformat ascii 1.0\n", "# only a comment", "\"Camera\""}) {
     EXPECT_EQ(ReadNamed("scene.xml", bytes).ToStatus().message(),
-              "scene.xml: error: this is no scene in a format that is read here; there is pbrt-v4 "
-              "(.pbrt)")
+              "scene.xml: error: this is no scene in a format that is read here; there are "
+              "pbrt-v4 (.pbrt), glTF 2.0 (.gltf) and binary glTF 2.0 (.glb)")
         << bytes;
   }
 }
