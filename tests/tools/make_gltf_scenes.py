@@ -128,7 +128,10 @@ def grid(columns, rows, place):
         for column in range(columns):
             a = row * (columns + 1) + column
             b = a + columns + 1
-            indices += [a, a + 1, b + 1, a, b + 1, b]
+            for corners in ((a, a + 1, b + 1), (a, b + 1, b)):
+                places = {tuple(round(x, 9) for x in positions[i]) for i in corners}
+                if len(places) == 3:  # no triangle of a pole
+                    indices += corners
     return positions, normals, [], indices
 
 
@@ -180,12 +183,14 @@ def still_life():
     d.json["images"] = [{"uri": "textures/bricks.png"}]
     d.json["samplers"] = [{"wrapS": 10497, "wrapT": 33648}]
     d.json["textures"] = [{"source": 0, "sampler": 0}]
-    floor = d.add("materials", {
-        "name": "tiles", "extensions": matte,
+    floor = d.add("materials", {"name": "floor", "extensions": matte,
+                                "pbrMetallicRoughness": pbr([0.75, 0.72, 0.68], 0, 1)})
+    bricks = d.add("materials", {
+        "name": "bricks", "extensions": matte,
         "pbrMetallicRoughness": pbr(
             [0.9, 0.85, 0.8], 0, 1,
             {"index": 0, "extensions": {"KHR_texture_transform": {
-                "scale": [1.5, 1.5], "rotation": 0.6}}})})
+                "scale": [0.9, 0.6], "rotation": 0.2}}})})
     wall = d.add("materials", {"name": "wall", "extensions": matte,
                                "pbrMetallicRoughness": pbr([0.7, 0.72, 0.75], 0, 1)})
     glass = d.add("materials", {
@@ -207,12 +212,13 @@ def still_life():
                                "pbrMetallicRoughness": pbr([0.6, 0.35, 0.2], 0.4, 0.5)})
     lamp = d.add("materials", {
         "name": "lamp", "emissiveFactor": [1, 0.85, 0.6],
-        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 4}}})
+        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 6}}})
 
     d.node({"name": "floor",
             "mesh": d.mesh("floor", quad([-3, 0, 3], [6, 0, 0], [0, 0, -6], 3), floor)})
-    walls = joined([quad([-3, 0, -3], [6, 0, 0], [0, 4, 0]),
-                    quad([-3, 0, 3], [0, 0, -6], [0, 4, 0]),
+    d.node({"name": "back wall",
+            "mesh": d.mesh("back wall", quad([-3, 0, -3], [6, 0, 0], [0, 4, 0], 2), bricks)})
+    walls = joined([quad([-3, 0, 3], [0, 0, -6], [0, 4, 0]),
                     quad([3, 0, -3], [0, 0, 6], [0, 4, 0]),
                     quad([-3, 4, -3], [6, 0, 0], [0, 0, 6])])
     d.node({"name": "walls", "mesh": d.mesh("walls", walls, wall)})

@@ -119,8 +119,18 @@ TEST(OwnScenesTest, BuffersAndImagesOfGltfAreOfTheScenesFiles) {
   EXPECT_EQ(manifest.entries.size(), 3U);
   EXPECT_TRUE(manifest.entries.contains("meshes/still-life.bin"));
   EXPECT_TRUE(manifest.entries.contains("textures/bricks.png"));
+  // The same from those files alone, as the coordinator and workers read them.
+  ManifestFiles sent(manifest, [&](const Digest& digest) -> StatusOr<std::string> {
+    for (const auto& [path, entry] : manifest.entries) {
+      if (entry.digest == digest) return files.Read(path);
+    }
+    return absl::NotFoundError("no such file");
+  });
+  const ParsedScene again = ReadScene(sent, "still-life.gltf");
+  ASSERT_TRUE(again.ok()) << again.ToStatus();
+  EXPECT_EQ(again.scene.TriangleCount(), parsed.scene.TriangleCount());
   // Of nine nodes with meshes one has seven instances.
-  EXPECT_EQ(parsed.scene.meshes.size(), 14U);
+  EXPECT_EQ(parsed.scene.meshes.size(), 15U);
   EXPECT_EQ(parsed.scene.spot_lights.size(), 1U);
   EXPECT_EQ(parsed.scene.area_lights.size(), 1U);
   EXPECT_EQ(parsed.scene.media.size(), 1U);
