@@ -190,7 +190,7 @@ def still_life():
         "pbrMetallicRoughness": pbr(
             [0.9, 0.85, 0.8], 0, 1,
             {"index": 0, "extensions": {"KHR_texture_transform": {
-                "scale": [0.9, 0.6], "rotation": 0.2}}})})
+                "scale": [2.4, 1.6], "rotation": 0.2}}})})
     wall = d.add("materials", {"name": "wall", "extensions": matte,
                                "pbrMetallicRoughness": pbr([0.7, 0.72, 0.75], 0, 1)})
     glass = d.add("materials", {
