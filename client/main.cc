@@ -64,7 +64,7 @@ int Run(int argc, char** argv) {
   std::optional<WorkerOrder> worker_order;
   JobsRequest listed;
   int priority = 0;
-  std::string scene_path;
+  SceneSource scene;
   std::string image_path;
   std::string reference_path;
   std::string mask_path;
@@ -107,11 +107,17 @@ int Run(int argc, char** argv) {
     to->add_option("--token-file", token_file,
                    "file that holds your token (default: what LUCERNA_TOKEN says)");
   };
+  const auto add_scene = [](CLI::App* to, SceneSource& source) {
+    to->add_option("SCENE", source.path, "scene file: pbrt-v4 or glTF 2.0")->required();
+    to->add_option("--allow-path", source.allowed_folders,
+                   "the scene may name files below this folder by absolute paths and by ..")
+        ->allow_extra_args(false);
+  };
   const auto add_image_flags = [](CLI::App* to, RenderOverrides& overrides) {
     AddSettingFlags(*to, SettingRole::kDecidesPixels, overrides);
   };
   const auto add_render_flags = [&](CLI::App* to) {
-    to->add_option("SCENE", request.scene_path, "pbrt-v4 scene file")->required();
+    add_scene(to, request.scene);
     to->add_option("-o,--output", request.outputs.exr, "EXR file to write");
     to->add_option("--png", request.outputs.png, "PNG preview to write");
     add_image_flags(to, request.overrides);
@@ -260,15 +266,15 @@ int Run(int argc, char** argv) {
       ->check(CLI::Range(-100, 100));
 
   CLI::App* validate = command("validate", "say what is wrong with a scene",
-                               [&] { return Validate(scene_path, strict, output_options); });
-  validate->add_option("SCENE", scene_path, "pbrt-v4 scene file")->required();
+                               [&] { return Validate(scene, strict, output_options); });
+  add_scene(validate, scene);
   validate->add_flag("--strict", strict, "warnings are errors");
   add_json(validate);
   add_quiet(validate);
 
   CLI::App* plan = command("plan", "say what a job will use, what is left out, and why",
-                           [&] { return PrintPlan(scene_path, planned, output_options); });
-  plan->add_option("SCENE", scene_path, "pbrt-v4 scene file")->required();
+                           [&] { return PrintPlan(scene, planned, output_options); });
+  add_scene(plan, scene);
   add_image_flags(plan, planned);
   add_json(plan);
   add_quiet(plan);
@@ -297,7 +303,8 @@ int Run(int argc, char** argv) {
         LUCERNA_RETURN_IF_ERROR(find_programs());
         return CompareSettings(comparison, cluster, output_options);
       });
-  compare->add_option("SCENE", comparison.scene_path, "pbrt-v4 scene file")->required();
+  compare->add_option("SCENE", comparison.scene_path, "scene file: pbrt-v4 or glTF 2.0")
+      ->required();
   compare->add_option("--reference", comparison.reference_path, "EXR file to measure errors by")
       ->required();
   compare->add_option("--mask", comparison.mask_path,
@@ -323,7 +330,8 @@ int Run(int argc, char** argv) {
         LUCERNA_RETURN_IF_ERROR(find_programs());
         return RenderReference(to_refer, cluster, output_options);
       });
-  reference->add_option("SCENE", to_refer.scene_path, "pbrt-v4 scene file")->required();
+  reference->add_option("SCENE", to_refer.scene_path, "scene file: pbrt-v4 or glTF 2.0")
+      ->required();
   reference->add_option("-o,--output", to_refer.output_path, "EXR file to write")->required();
   AddSettingFlag(*reference, "time_s", to_refer.overrides, "seconds, of both halves together");
   AddSettingFlag(*reference, "passes", to_refer.overrides, "passes, of both halves together");
@@ -338,7 +346,7 @@ int Run(int argc, char** argv) {
         return Bake(baked, cluster, bakes_on_server ? std::optional(server) : std::nullopt,
                     output_options);
       });
-  bake->add_option("SCENE", baked.scene_path, "scene file")->required();
+  add_scene(bake, baked.scene);
   bake->add_option("-o,--output", baked.output_path, ".ply or .glb file to write")->required();
   bake->add_flag("--ascii", baked.is_ascii, "write a PLY file as text");
   bake->add_option("--spacing", baked.spacing,

@@ -33,24 +33,30 @@ ScenePath SplitScenePath(const std::string& path) {
   return {slash == 0 ? "/" : path.substr(0, slash), path.substr(slash + 1)};
 }
 
-Status CheckNamesFile(const std::string& path) {
-  if (!path.empty() && !path.ends_with('/')) return absl::OkStatus();
-  return Failure(ExitCode::kUsage,
-                 absl::StrCat("\"", path, "\" is not a scene file; name its .pbrt file"));
+DirectoryFiles FilesOf(const SceneSource& source) {
+  return DirectoryFiles(SplitScenePath(source.path).folder, {}, source.allowed_folders);
 }
 
-StatusOr<SceneManifest> ReadScene(const std::string& path, const RenderOverrides& overrides,
+Status CheckNamesFile(const std::string& path) {
+  if (!path.empty() && !path.ends_with('/')) return absl::OkStatus();
+  return Failure(
+      ExitCode::kUsage,
+      absl::StrCat("\"", path, "\" is not a scene file; name its .pbrt, .gltf or .glb file"));
+}
+
+StatusOr<SceneManifest> ReadScene(const SceneSource& source, const RenderOverrides& overrides,
                                   bool quiet) {
-  LUCERNA_ASSIGN_OR_RETURN(SceneOfJobs scene, ReadSceneOfJobs(path, {&overrides, 1}, quiet));
+  LUCERNA_ASSIGN_OR_RETURN(SceneOfJobs scene, ReadSceneOfJobs(source, {&overrides, 1}, quiet));
   return std::move(scene.manifest);
 }
 
-StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
+StatusOr<SceneOfJobs> ReadSceneOfJobs(const SceneSource& source,
                                       std::span<const RenderOverrides> overrides, bool quiet,
                                       Scene* scene) {
+  const std::string& path = source.path;
   LUCERNA_RETURN_IF_ERROR(CheckNamesFile(path));
   const ScenePath place = SplitScenePath(path);
-  DirectoryFiles files(place.folder);
+  DirectoryFiles files = FilesOf(source);
   ParsedScene parsed = ReadScene(files, place.main);
   std::size_t errors = 0;
   for (const Diagnostic& diagnostic : parsed.diagnostics) {

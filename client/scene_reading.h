@@ -20,6 +20,14 @@ struct ScenePath {
 
 [[nodiscard]] ScenePath SplitScenePath(const std::string& path);
 
+// A scene on this machine, and the folders outside its own from which it may read.
+struct SceneSource {
+  std::string path;
+  std::vector<std::string> allowed_folders = {};
+};
+
+[[nodiscard]] DirectoryFiles FilesOf(const SceneSource& source);
+
 // Errors: Failure(kUsage) when `path` is empty or ends as only a folder's does.
 [[nodiscard]] Status CheckNamesFile(const std::string& path);
 
@@ -27,7 +35,7 @@ struct ScenePath {
 // every error and warning to stderr (warnings not when `quiet`). Also checks the flags against the
 // scene. Returns its manifest.
 // Errors: INVALID_ARGUMENT when the scene has errors, Failure(kUsage) for a flag out of range.
-[[nodiscard]] StatusOr<SceneManifest> ReadScene(const std::string& path,
+[[nodiscard]] StatusOr<SceneManifest> ReadScene(const SceneSource& source,
                                                 const RenderOverrides& overrides, bool quiet);
 
 // The same for several jobs of one scene, which is read once.
@@ -36,7 +44,7 @@ struct SceneOfJobs {
   std::vector<RenderSettings> settings;  // as many as there are overrides
 };
 // The scene itself goes to `scene`, unless that is null.
-[[nodiscard]] StatusOr<SceneOfJobs> ReadSceneOfJobs(const std::string& path,
+[[nodiscard]] StatusOr<SceneOfJobs> ReadSceneOfJobs(const SceneSource& source,
                                                     std::span<const RenderOverrides> overrides,
                                                     bool quiet, Scene* scene = nullptr);
 

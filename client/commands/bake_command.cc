@@ -36,8 +36,8 @@ constexpr double kCoarsest = 16;
 // The files of a scene on disk, and the sensors.
 class FilesWithSensors final : public SceneFiles {
  public:
-  FilesWithSensors(std::string folder, std::string sensors)
-      : files_(std::move(folder)), sensors_(std::move(sensors)) {}
+  FilesWithSensors(const SceneSource& scene, std::string sensors)
+      : files_(FilesOf(scene)), sensors_(std::move(sensors)) {}
   [[nodiscard]] StatusOr<std::string> Read(const std::string& logical_path) override {
     if (logical_path == kSensorsPath) return sensors_;
     return files_.Read(logical_path);
@@ -143,7 +143,7 @@ Status CheckRequest(const BakeRequest& request) {
   if (request.overrides.width) {
     return Failure(ExitCode::kUsage, "--size has no meaning here: --spacing says how fine to be");
   }
-  if (IsSameFile(request.output_path, request.scene_path)) {
+  if (IsSameFile(request.output_path, request.scene.path)) {
     return Failure(ExitCode::kUsage,
                    absl::StrCat(request.output_path, " is the scene; name another file with -o"));
   }
@@ -173,7 +173,7 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
   Scene scene;
   LUCERNA_ASSIGN_OR_RETURN(
       const SceneOfJobs read,
-      ReadSceneOfJobs(request.scene_path, {&overrides, 1}, output_options.quiet, &scene));
+      ReadSceneOfJobs(request.scene, {&overrides, 1}, output_options.quiet, &scene));
   const double diagonal = ExtentOf(scene).size * scene.unit;
   SurfaceMesh::Options options;
   options.sides = request.sides;
@@ -194,7 +194,7 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
     SceneManifest manifest = read.manifest;
     manifest.entries[kSensorsPath] = {Sha256(bytes), bytes.size()};
     manifest.main_path = kSensorsPath;
-    FilesWithSensors files(SplitScenePath(request.scene_path).folder, bytes);
+    FilesWithSensors files(request.scene, bytes);
     RenderOverrides of_round = overrides;
     if (!of_round.photons_per_pass && !scene.integrator.photons_per_pass) {
       of_round.photons_per_pass =

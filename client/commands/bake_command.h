@@ -14,6 +14,7 @@
 #include "client/bake/surface_mesh.h"
 #include "client/local_cluster.h"
 #include "client/output_options.h"
+#include "client/scene_reading.h"
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
 #include "render/wire/channel.h"
@@ -28,7 +29,7 @@ enum class BakeEstimator : std::uint8_t {
 };
 
 struct BakeRequest {
-  std::string scene_path;
+  SceneSource scene;
   RenderOverrides overrides;  // of each job
   std::string output_path;    // .ply or .glb
   bool is_ascii = false;      // of a PLY file

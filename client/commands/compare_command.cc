@@ -328,7 +328,7 @@ Status CompareSettings(const CompareRequest& request, const ClusterOptions& clus
   LUCERNA_RETURN_IF_ERROR(CheckFiles(request));
   LUCERNA_ASSIGN_OR_RETURN(const auto yardstick, ReadYardstick(request));
   LUCERNA_ASSIGN_OR_RETURN(const SceneOfJobs scene,
-                           ReadSceneOfJobs(request.scene_path, overrides, output_options.quiet));
+                           ReadSceneOfJobs({request.scene_path}, overrides, output_options.quiet));
   LUCERNA_RETURN_IF_ERROR(CheckSizes(settings, scene, yardstick->reference));
   LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster));
 

@@ -31,10 +31,11 @@ StatusOr<Image> ReadImage(const std::string& path) {
   return absl::InvalidArgumentError(absl::StrCat(path, ": ", image.status().message()));
 }
 
-Status Validate(const std::string& scene_path, bool strict, const OutputOptions& output_options) {
+Status Validate(const SceneSource& source, bool strict, const OutputOptions& output_options) {
+  const std::string& scene_path = source.path;
   LUCERNA_RETURN_IF_ERROR(CheckNamesFile(scene_path));
   const ScenePath place = SplitScenePath(scene_path);
-  DirectoryFiles files(place.folder);
+  DirectoryFiles files = FilesOf(source);
   // A program gets them all, up to what fits in memory.
   constexpr std::size_t kMaxForPrograms = 1'000'000;
   const ParsedScene parsed = ReadScene(

@@ -14,7 +14,7 @@ namespace lucerna {
 
 // Says everything there is to say about the scene.
 // Errors: INVALID_ARGUMENT when it has errors, or, if `strict`, warnings.
-[[nodiscard]] Status Validate(const std::string& scene_path, bool strict,
+[[nodiscard]] Status Validate(const SceneSource& source, bool strict,
                               const OutputOptions& output_options);
 
 // Compares `image_path` with `reference_path`. `mask_path` may be empty; `options.mask` is not

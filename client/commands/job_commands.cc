@@ -115,7 +115,7 @@ Status Render(const RenderRequest& request, const ClusterOptions& cluster_option
               const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
-                           ReadScene(request.scene_path, request.overrides, output_options.quiet));
+                           ReadScene(request.scene, request.overrides, output_options.quiet));
   ClusterOptions options = cluster_options;
   options.state_folder = CheckpointFolder(request);
   const std::string& folder = options.state_folder;
@@ -132,9 +132,10 @@ Status Render(const RenderRequest& request, const ClusterOptions& cluster_option
   StatusOr<v1::Job> job;
   {
     LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(options));
-    job = request.resumes ? runs->Resume(manifest, request.overrides, output_options)
-                          : runs->Run(request.scene_path, manifest, request.overrides,
-                                      request.reference, output_options);
+    DirectoryFiles files = FilesOf(request.scene);
+    job = request.resumes
+              ? runs->Resume(manifest, request.overrides, output_options)
+              : runs->Run(files, manifest, request.overrides, request.reference, output_options);
     if (ExitCodeOf(job.status()) == ExitCode::kInterrupted) {
       return EndInterrupted(*runs, request, !folder.empty());
     }
@@ -163,9 +164,9 @@ Status Submit(const RenderRequest& request, const Endpoint& server,
               const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
-                           ReadScene(request.scene_path, request.overrides, output_options.quiet));
+                           ReadScene(request.scene, request.overrides, output_options.quiet));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
-  DirectoryFiles files(SplitScenePath(request.scene_path).folder);
+  DirectoryFiles files = FilesOf(request.scene);
   LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
                            SendJob(*connection, files, manifest, request.overrides,
                                    request.reference, request.priority));

@@ -9,6 +9,7 @@
 
 #include "client/local_cluster.h"
 #include "client/output_options.h"
+#include "client/scene_reading.h"
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
 #include "render/wire/channel.h"
@@ -24,7 +25,7 @@ struct OutputPaths {
 };
 
 struct RenderRequest {
-  std::string scene_path;
+  SceneSource scene;
   RenderOverrides overrides;
   std::string reference;  // EXR file to measure the true error by; empty: none
   OutputPaths outputs;

@@ -22,11 +22,11 @@ std::string Bytes(double bytes) {
 
 }  // namespace
 
-Status PrintPlan(const std::string& scene_path, const RenderOverrides& overrides,
+Status PrintPlan(const SceneSource& source, const RenderOverrides& overrides,
                  const OutputOptions& output_options) {
   Scene scene;
-  LUCERNA_ASSIGN_OR_RETURN(const SceneOfJobs read, ReadSceneOfJobs(scene_path, {&overrides, 1},
-                                                                   output_options.quiet, &scene));
+  LUCERNA_ASSIGN_OR_RETURN(const SceneOfJobs read,
+                           ReadSceneOfJobs(source, {&overrides, 1}, output_options.quiet, &scene));
   const RenderSettings& settings = read.settings.front();
   const SceneNeeds needs = NeedsOf(scene, settings);
   const ExpectedCost cost = ExpectedCostOf(needs, settings);
@@ -34,7 +34,7 @@ Status PrintPlan(const std::string& scene_path, const RenderOverrides& overrides
     std::fputs(PlanReport(needs, cost).c_str(), stdout);
     return absl::OkStatus();
   }
-  std::printf("%s, %d x %d pixels, %s\n", scene_path.c_str(), settings.crop_width(),
+  std::printf("%s, %d x %d pixels, %s\n", source.path.c_str(), settings.crop_width(),
               settings.crop_height(), std::string(NameOf(settings.radius_controller)).c_str());
   for (const bool is_used : {true, false}) {
     std::printf("\n%s\n", is_used ? "used" : "left out");

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "client/output_options.h"
+#include "client/scene_reading.h"
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
 
@@ -11,7 +12,7 @@ namespace lucerna {
 
 // Reads the scene and prints its plan; nothing is rendered.
 // Errors: as ReadSceneOfJobs.
-[[nodiscard]] Status PrintPlan(const std::string& scene_path, const RenderOverrides& overrides,
+[[nodiscard]] Status PrintPlan(const SceneSource& source, const RenderOverrides& overrides,
                                const OutputOptions& output_options);
 
 }  // namespace lucerna

@@ -50,7 +50,7 @@ Status RenderReference(const ReferenceRequest& request, const ClusterOptions& cl
     overrides.initial_radius = 0;
     overrides.initial_footprints = kFirstFootprints;
   }
-  LUCERNA_ASSIGN_OR_RETURN(SceneOfJobs scene, ReadSceneOfJobs(request.scene_path, {&overrides, 1},
+  LUCERNA_ASSIGN_OR_RETURN(SceneOfJobs scene, ReadSceneOfJobs({request.scene_path}, {&overrides, 1},
                                                               output_options.quiet));
   const RenderSettings settings = scene.settings.front();
   if (!overrides.photons_per_pass) {

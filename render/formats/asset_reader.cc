@@ -41,20 +41,49 @@ StatusOr<TriangleMesh> AssetReader::ReadMesh(const std::string& path) {
 StatusOr<std::shared_ptr<const Picture>> AssetReader::ReadPicture(const std::string& path,
                                                                   const PixelEncoding& encoding,
                                                                   PictureUse use) {
+  if (std::shared_ptr<const Picture> known = FindPicture(path, encoding, use)) return known;
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path));
+  StatusOr<std::shared_ptr<const Picture>> picture = Keep(path, bytes, path, encoding, use);
+  if (picture.ok()) return picture;
+  return Status(picture.status().code(), Concat(path, ": ", picture.status().message()));
+}
+
+StatusOr<std::shared_ptr<const Picture>> AssetReader::ReadNamedPicture(
+    const std::string& name, const PixelEncoding& encoding, PictureUse use,
+    const std::function<StatusOr<std::string>()>& bytes) {
+  if (std::shared_ptr<const Picture> known = FindPicture(name, encoding, use)) return known;
+  const StatusOr<std::string> read = bytes();
+  if (!read.ok()) return read.status();
+  const std::string_view start = std::string_view(*read).substr(0, 4);
+  const bool is_png = start == "\x89PNG";
+  if (!is_png && !start.starts_with("\xFF\xD8")) {
+    return absl::InvalidArgumentError("it begins neither like a PNG nor like a JPEG");
+  }
+  return Keep(name, *read, is_png ? ".png" : ".jpg", encoding, use);
+}
+
+std::shared_ptr<const Picture> AssetReader::FindPicture(const std::string& path,
+                                                        const PixelEncoding& encoding,
+                                                        PictureUse use) const {
   const auto [first, last] = pictures_.equal_range(path);
   for (auto known = first; known != last; ++known) {
     if (known->second.encoding == encoding && known->second.use == use)
       return known->second.picture;
   }
-  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path));
-  StatusOr<Picture> picture =
-      lucerna::ReadPicture(bytes, path, encoding, limits_.max_picture_bytes - picture_bytes_, use);
-  if (!picture.ok()) {
-    return Status(picture.status().code(), Concat(path, ": ", picture.status().message()));
-  }
-  picture_bytes_ += SizeBytes(*picture);
-  auto shared = std::make_shared<const Picture>(*std::move(picture));
-  pictures_.emplace(path, KnownPicture{encoding, use, shared});
+  return nullptr;
+}
+
+StatusOr<std::shared_ptr<const Picture>> AssetReader::Keep(const std::string& name,
+                                                           std::string_view bytes,
+                                                           std::string_view path,
+                                                           const PixelEncoding& encoding,
+                                                           PictureUse use) {
+  LUCERNA_ASSIGN_OR_RETURN(
+      Picture picture,
+      lucerna::ReadPicture(bytes, path, encoding, limits_.max_picture_bytes - picture_bytes_, use));
+  picture_bytes_ += SizeBytes(picture);
+  auto shared = std::make_shared<const Picture>(std::move(picture));
+  pictures_.emplace(name, KnownPicture{encoding, use, shared});
   return shared;
 }
 

@@ -5,9 +5,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "render/base/status.h"
 #include "render/formats/image_file.h"
@@ -30,6 +32,12 @@ class AssetReader {
   [[nodiscard]] StatusOr<TriangleMesh> ReadMesh(const std::string& path);
   [[nodiscard]] StatusOr<std::shared_ptr<const Picture>> ReadPicture(
       const std::string& path, const PixelEncoding& encoding, PictureUse use = PictureUse::kColors);
+  // A PNG or JPEG, by how its bytes begin, that a file holds within it or names by its own rules.
+  // `name` is the same for the same bytes, and no path. `bytes` is called when the picture is not
+  // known yet. Errors: those of `bytes`, and of the image without a path.
+  [[nodiscard]] StatusOr<std::shared_ptr<const Picture>> ReadNamedPicture(
+      const std::string& name, const PixelEncoding& encoding, PictureUse use,
+      const std::function<StatusOr<std::string>()>& bytes);
 
   [[nodiscard]] const SceneLimits& limits() const { return limits_; }
   // True once the files together have more bytes than the limits allow: reading must end.
@@ -42,11 +50,21 @@ class AssetReader {
     std::shared_ptr<const Picture> picture;
   };
 
+  [[nodiscard]] std::shared_ptr<const Picture> FindPicture(const std::string& path,
+                                                           const PixelEncoding& encoding,
+                                                           PictureUse use) const;
+  // By the end of `path`, as the readers of image files are chosen.
+  [[nodiscard]] StatusOr<std::shared_ptr<const Picture>> Keep(const std::string& name,
+                                                              std::string_view bytes,
+                                                              std::string_view path,
+                                                              const PixelEncoding& encoding,
+                                                              PictureUse use);
+
   SceneFiles& files_;
   const SceneLimits limits_;
   std::uint64_t bytes_read_ = 0;
   std::uint64_t picture_bytes_ = 0;
-  std::multimap<std::string, KnownPicture> pictures_;  // by path
+  std::multimap<std::string, KnownPicture> pictures_;  // by path or name
 };
 
 }  // namespace lucerna

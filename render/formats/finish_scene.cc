@@ -30,7 +30,7 @@ bool IsPlacedByUv(const Scene& scene, std::int32_t number) {
   const bool has_place = texture.kind == Kind::kPicture || texture.kind == Kind::kBilinear ||
                          texture.kind == Kind::kDots ||
                          (texture.kind == Kind::kCheckerboard && !texture.is_in_space);
-  if (has_place && texture.mapping.kind == TextureMapping::Kind::kUv) return true;
+  if (has_place && texture.mapping.IsOfUv()) return true;
   return std::ranges::any_of(texture.parts,
                              [&](std::int32_t part) { return IsPlacedByUv(scene, part); });
 }

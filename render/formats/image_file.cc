@@ -212,6 +212,36 @@ Status CheckTga(std::string_view bytes) {
   return at <= bytes.size() ? absl::OkStatus() : Bad("it is cut off");
 }
 
+// Of a use that takes one channel of four, its number.
+std::optional<std::size_t> OneChannelOf(PictureUse use) {
+  switch (use) {
+    case PictureUse::kRed:
+      return 0;
+    case PictureUse::kGreen:
+      return 1;
+    case PictureUse::kBlue:
+      return 2;
+    case PictureUse::kOpacity:
+      return 3;
+    case PictureUse::kColors:
+    case PictureUse::kNumbers:
+    case PictureUse::kVectors:
+      break;
+  }
+  return std::nullopt;
+}
+
+// Of a picture with four channels, whose values these are: leaves one of them.
+template <typename Value>
+void TakeChannel(std::vector<Value>& values, std::size_t channel, Picture& picture) {
+  picture.channels = 1;
+  const std::size_t pixels = values.size() / 4;
+  for (std::size_t i = 0; i < pixels; ++i)
+    values[i] = values[4 * i + channel];
+  values.resize(pixels);
+  values.shrink_to_fit();
+}
+
 struct StbFree {
   void operator()(void* pixels) const { stbi_image_free(pixels); }
 };
@@ -263,7 +293,12 @@ StatusOr<Picture> ReadByStb(std::string_view bytes, const PixelEncoding& encodin
   const bool is_16_bit = stbi_is_16_bit_from_memory(data, size) != 0;
   Picture picture;
   const bool may_be_opacity = use == PictureUse::kNumbers && file_channels == 4;
-  picture.channels = file_channels <= 2 ? 1 : may_be_opacity ? 4 : 3;
+  const std::optional<std::size_t> one_channel = OneChannelOf(use);
+  picture.channels = one_channel.has_value()       ? 4
+                     : use == PictureUse::kVectors ? 3
+                     : file_channels <= 2          ? 1
+                     : may_be_opacity              ? 4
+                                                   : 3;
   const auto channels = static_cast<std::uint64_t>(picture.channels);
   // Of numbers, the means of the channels come beside them.
   const std::uint64_t beside = use == PictureUse::kNumbers ? sizeof(float) : 0;
@@ -288,6 +323,7 @@ StatusOr<Picture> ReadByStb(std::string_view bytes, const PixelEncoding& encodin
       picture.linear.push_back(static_cast<float>(encoding.Decode(pixels.get()[i] / 65535.0)));
     }
     if (may_be_opacity) TakeOpacity(picture.linear, 1.0F, picture);
+    if (one_channel.has_value()) TakeChannel(picture.linear, *one_channel, picture);
     return picture;
   }
   const std::unique_ptr<stbi_uc, StbFree> pixels(stbi_load_from_memory(
@@ -299,6 +335,7 @@ StatusOr<Picture> ReadByStb(std::string_view bytes, const PixelEncoding& encodin
     picture.decoded[i] = static_cast<float>(encoding.Decode(static_cast<double>(i) / 255));
   }
   if (may_be_opacity) TakeOpacity(picture.coded, std::uint8_t{255}, picture);
+  if (one_channel.has_value()) TakeChannel(picture.coded, *one_channel, picture);
   return picture;
 }
 
@@ -506,6 +543,8 @@ double PixelEncoding::Decode(double coded) const {
       return coded;
     case Kind::kGamma:
       return std::pow(coded, gamma);
+    case Kind::kStep:
+      return coded >= threshold ? 1 : 0;
   }
   return coded;
 }
@@ -534,7 +573,9 @@ StatusOr<Picture> ReadOfEitherUse(std::string_view bytes, std::string_view path,
   if (extension == "jpg" || extension == "jpeg") {
     LUCERNA_RETURN_IF_ERROR(CheckJpeg(bytes));
     LUCERNA_RETURN_IF_ERROR(CheckHuffmanTables(bytes));
-    return ReadByStb(WithHuffmanTables(bytes), {}, max_size_bytes, use);
+    const bool is_srgb = use == PictureUse::kColors || use == PictureUse::kNumbers;
+    return ReadByStb(WithHuffmanTables(bytes), is_srgb ? PixelEncoding() : encoding, max_size_bytes,
+                     use);
   }
   if (extension == "tga") {
     LUCERNA_RETURN_IF_ERROR(CheckTga(bytes));

@@ -16,10 +16,12 @@ inline constexpr std::uint64_t kMaxPicturePixels = std::uint64_t{1} << 28;
 
 // What the whole numbers in a file stand for.
 struct PixelEncoding {
-  enum class Kind : std::uint8_t { kSrgb, kLinear, kGamma };
+  // kStep: 0 below `threshold`, else 1.
+  enum class Kind : std::uint8_t { kSrgb, kLinear, kGamma, kStep };
 
   Kind kind = Kind::kSrgb;
-  double gamma = 1;  // kGamma
+  double gamma = 1;      // kGamma
+  double threshold = 0;  // kStep
 
   // [0, 1] -> [0, 1].
   [[nodiscard]] double Decode(double coded) const;
@@ -28,11 +30,13 @@ struct PixelEncoding {
 
 // What a picture is of. Numbers are as in pbrt-v4: the mean of the three channels, or the opacity
 // where that is not 1 everywhere; in EXR and PFM files they may be negative.
-enum class PictureUse : std::uint8_t { kColors, kNumbers };
+// The uses after them are as in glTF 2.0, of PNG and JPEG alone: three channels that are no
+// colours, or one channel of four.
+enum class PictureUse : std::uint8_t { kColors, kNumbers, kVectors, kRed, kGreen, kBlue, kOpacity };
 
-// Reads PNG, JPEG, TGA, Radiance HDR, PFM or EXR, by the end of `path`. `encoding` is that of PNG;
-// JPEG and TGA are sRGB, the others linear. Of colours negative numbers become 0, and opacity is
-// dropped.
+// Reads PNG, JPEG, TGA, Radiance HDR, PFM or EXR, by the end of `path`. `encoding` is that of PNG,
+// and of JPEG for the uses of glTF 2.0; else JPEG and TGA are sRGB. The others are linear. Of
+// colours negative numbers become 0, and opacity is dropped.
 // Errors: INVALID_ARGUMENT with what is wrong; RESOURCE_EXHAUSTED for more than
 // kMaxPicturePixels, or more than `max_size_bytes` of pixels in memory.
 [[nodiscard]] StatusOr<Picture> ReadPicture(std::string_view bytes, std::string_view path,

@@ -9,6 +9,7 @@
 #include "render/base/text.h"
 #include "render/formats/asset_reader.h"
 #include "render/formats/finish_scene.h"
+#include "render/formats/gltf/gltf_reader.h"
 #include "render/formats/pbrt/pbrt_reader.h"
 #include "render/formats/sensors/sensors_reader.h"
 
@@ -29,6 +30,8 @@ struct SceneFormat {
 
 constexpr std::array kFormats = {
     SceneFormat{"pbrt-v4", ".pbrt", &BeginsAsPbrt, &ReadPbrt},
+    SceneFormat{"glTF 2.0", ".gltf", &BeginsAsGltf, &ReadGltf},
+    SceneFormat{"binary glTF 2.0", ".glb", &BeginsAsGltf, &ReadGltf},
     SceneFormat{"points to measure irradiance at", ".ply", &BeginsAsSensors, &ReadSensors},
 };
 

@@ -11,8 +11,10 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "render/base/digest.h"
 #include "render/base/status.h"
@@ -49,6 +51,13 @@ struct SceneLimits {
 // Errors: INVALID_ARGUMENT with the reason when `path` is not a logical path.
 [[nodiscard]] Status CheckLogicalPath(std::string_view path);
 
+// Files outside the scene's folder, which a local user may allow. In a manifest such a file has a
+// logical path that follows from the path in the scene alone, so that the coordinator and workers,
+// which parse the same scene, find it there; they open no file by any path.
+[[nodiscard]] std::string OutsideName(std::string_view path);
+// The path that OutsideName made `name` of; nullopt for other names.
+[[nodiscard]] std::optional<std::string> OutsidePath(std::string_view name);
+
 class SceneFiles {
  public:
   virtual ~SceneFiles() = default;
@@ -57,17 +66,24 @@ class SceneFiles {
   [[nodiscard]] virtual StatusOr<std::string> Read(const std::string& logical_path) = 0;
 };
 
-// A folder on disk. Remembers what was read: the manifest of the parse that ran on it.
+// A folder on disk. Remembers what was read: the manifest of the parse that ran on it. Absolute
+// paths and such with ".." are read as well where they lead into one of `allowed_folders`, or below
+// it, once symbolic links are resolved.
 class DirectoryFiles final : public SceneFiles {
  public:
-  explicit DirectoryFiles(std::string folder, SceneLimits limits = {});
+  explicit DirectoryFiles(std::string folder, SceneLimits limits = {},
+                          std::vector<std::string> allowed_folders = {});
   [[nodiscard]] StatusOr<std::string> Read(const std::string& logical_path) override;
   // What was read so far, named by `main_path`.
   [[nodiscard]] SceneManifest Manifest(std::string main_path) const;
 
  private:
+  // The path on disk of one that is no logical path, for the reason `why`.
+  [[nodiscard]] StatusOr<std::string> AllowedPath(const std::string& path, const Status& why) const;
+
   std::string folder_;
   SceneLimits limits_;
+  std::vector<std::string> allowed_folders_;
   std::uint64_t total_bytes_ = 0;
   std::map<std::string, SceneManifest::Entry> entries_;
 };

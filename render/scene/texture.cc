@@ -41,9 +41,14 @@ Vec2 TextureMapping::Map(const TexturePlace& place) const {
   if (kind == Kind::kUv) [[likely]] {
     return {HeldPlace(scale_u * place.uv.x + delta_u), HeldPlace(scale_v * place.uv.y + delta_v)};
   }
+  if (kind == Kind::kUvAffine) {
+    return {HeldPlace(axis_u.x * place.uv.x + axis_u.y * place.uv.y + delta_u),
+            HeldPlace(axis_v.x * place.uv.x + axis_v.y * place.uv.y + delta_v)};
+  }
   const Vec3 p = MapToSpace(place);
   switch (kind) {
     case Kind::kUv:
+    case Kind::kUvAffine:
       break;
     case Kind::kPlanar:
       return {HeldPlace(Dot(p, axis_u) + delta_u), HeldPlace(Dot(p, axis_v) + delta_v)};

@@ -76,6 +76,7 @@ struct TexturePlace {
 struct TextureMapping {
   enum class Kind : std::uint8_t {
     kUv,           // (scale_u · u + delta_u, scale_v · v + delta_v)
+    kUvAffine,     // (axis_u · (u, v, 0) + delta_u, axis_v · (u, v, 0) + delta_v)
     kPlanar,       // (axis_u · p + delta_u, axis_v · p + delta_v)
     kSpherical,    // p's angle from +z over π, and around z over 2π
     kCylindrical,  // p's angle around z from -x over 2π, and its z
@@ -91,6 +92,8 @@ struct TextureMapping {
   [[nodiscard]] Vec2 Map(const TexturePlace& place) const;
   // The same for a place in space.
   [[nodiscard]] Vec3 MapToSpace(const TexturePlace& place) const;
+  // Whether it follows from u and v alone.
+  [[nodiscard]] bool IsOfUv() const { return kind == Kind::kUv || kind == Kind::kUvAffine; }
 
   bool operator==(const TextureMapping&) const = default;
 };
@@ -100,15 +103,17 @@ struct Texture {
 #define LUCERNA_KIND(Name, name) k##Name,
   enum class Kind : std::uint8_t { LUCERNA_TEXTURES(LUCERNA_KIND) };
 #undef LUCERNA_KIND
-  enum class Wrap : std::uint8_t { kRepeat, kClamp, kBlack };
+  enum class Wrap : std::uint8_t { kRepeat, kClamp, kBlack, kMirror };
 
   Kind kind = Kind::kConstant;
-  Wrap wrap = Wrap::kRepeat;  // picture: what lies beyond its edges
-  bool is_inverted = false;   // picture: 1 - colour, after `scale`
-  bool is_number = false;     // picture: numbers, which are not held in [0, 1]
-  bool is_in_space = false;   // checkerboard: of cubes
-  Rgb color;                  // constant
-  float scale = 1;            // picture, scaled, marble
+  // Picture: what lies beyond its edges, along u and along v.
+  Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
+  bool is_inverted = false;  // picture: 1 - colour, after `scale`
+  bool is_number = false;    // picture: numbers, which are not held in [0, 1]
+  bool is_in_space = false;  // checkerboard: of cubes
+  Rgb color;                 // constant
+  Rgb tint = {1, 1, 1};      // picture of colours: the factor of each channel, beside `scale`
+  float scale = 1;           // picture, scaled, marble
   TextureMapping mapping;
   // Numbers of other textures, below its own. Scaled: of what is scaled, and of the numbers by
   // which, or none. Checkerboard: where the sum of the whole parts of the coordinates is even, and

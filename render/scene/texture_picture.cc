@@ -13,26 +13,34 @@ struct Neighbours {
   float share = 0;
 };
 
+// Every second copy is turned over: into [0, 1].
+float Mirrored(float place) {
+  const float within = place - 2 * std::floor(place * 0.5F);
+  return within > 1 ? 2 - within : within;
+}
+
 Neighbours Around(float place, int count, Texture::Wrap wrap) {
   using Wrap = Texture::Wrap;
   // Repeated before the pixels are counted, clamped to just beyond the picture.
-  const float within =
-      wrap == Wrap::kRepeat ? place - std::floor(place) : std::min(std::max(place, -1.0F), 2.0F);
+  const float within = wrap == Wrap::kRepeat   ? place - std::floor(place)
+                       : wrap == Wrap::kMirror ? Mirrored(place)
+                                               : std::min(std::max(place, -1.0F), 2.0F);
   const float pixel = within * static_cast<float>(count) - 0.5F;
   const float below = std::floor(pixel);
   const auto index = [&](int i) {
     if (i >= 0 && i < count) return i;
     if (wrap == Wrap::kBlack) return -1;
-    if (wrap == Wrap::kClamp) return i < 0 ? 0 : count - 1;
+    if (wrap == Wrap::kClamp || wrap == Wrap::kMirror) return i < 0 ? 0 : count - 1;
     return i < 0 ? i + count : i - count;
   };
   const int first = static_cast<int>(below);
   return {index(first), index(first + 1), pixel - below};
 }
 
-Rgb Interpolated(const Picture& picture, Texture::Wrap wrap, Vec2 uv) {
-  const Neighbours x = Around(uv.x, picture.width, wrap);
-  const Neighbours y = Around(1 - uv.y, picture.height, wrap);
+Rgb Interpolated(const Texture& texture, Vec2 uv) {
+  const Picture& picture = *texture.picture;
+  const Neighbours x = Around(uv.x, picture.width, texture.wrap_u);
+  const Neighbours y = Around(1 - uv.y, picture.height, texture.wrap_v);
   const auto at = [&](int column, int row) {
     return column < 0 || row < 0 ? Rgb{} : picture.At(column, row);
   };
@@ -45,8 +53,9 @@ Rgb Interpolated(const Picture& picture, Texture::Wrap wrap, Vec2 uv) {
 
 Rgb LookUpPicture(std::span<const Texture> /*textures*/, const Texture& texture,
                   const TexturePlace& place) {
-  Rgb color = Interpolated(*texture.picture, texture.wrap, texture.mapping.Map(place));
+  Rgb color = Interpolated(texture, texture.mapping.Map(place));
   color *= texture.scale;
+  color *= texture.tint;
   if (texture.is_inverted) {
     color = Gray(1) - color;
     if (texture.is_number) return Gray(std::max(0.0F, color.g));

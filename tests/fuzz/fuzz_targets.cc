@@ -7,6 +7,7 @@ namespace lucerna {
 std::span<const FuzzTarget> AllFuzzTargets() {
   static constexpr std::array kTargets = {
       FuzzTarget{"pbrt", FuzzPbrt, PbrtSeeds},
+      FuzzTarget{"gltf", FuzzGltf, GltfSeeds},
       FuzzTarget{"ply", FuzzPly, PlySeeds},
       FuzzTarget{"image", FuzzImage, ImageSeeds},
       FuzzTarget{"accumulation", FuzzAccumulation, AccumulationSeeds},

@@ -26,6 +26,8 @@ struct FuzzTarget {
 // scene_targets.cc
 bool FuzzPbrt(std::string_view bytes);
 std::vector<std::string> PbrtSeeds();
+bool FuzzGltf(std::string_view bytes);
+std::vector<std::string> GltfSeeds();
 bool FuzzPly(std::string_view bytes);
 std::vector<std::string> PlySeeds();
 bool FuzzImage(std::string_view bytes);

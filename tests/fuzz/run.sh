@@ -11,13 +11,14 @@ executions=$2
 shift 2
 targets=("$@")
 if [ ${#targets[@]} -eq 0 ]; then
-  targets=(pbrt ply image accumulation block radii slice checkpoint sums record manifest messages)
+  targets=(pbrt gltf ply image accumulation block radii slice checkpoint sums record manifest messages)
 fi
 failed=0
 for target in "${targets[@]}"; do
   program="$root/build/fuzz/tests/fuzz_$target"
   most_bytes=512
   case $target in
+    gltf) most_bytes=8192 ;;
     pbrt | ply | image | sums) most_bytes=4096 ;;
   esac
   mkdir -p "$folder/$target"

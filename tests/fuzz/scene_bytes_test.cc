@@ -129,6 +129,47 @@ TEST(SceneBytesTest, MutatedScenesAreSoundOrRefused) {
   EXPECT_GT(accepted, 100);
 }
 
+TEST(SceneBytesTest, TheGltfSeedsAreGood) {
+  for (const NamedBytes& seed : FilesOf("fuzz/seeds/gltf")) {
+    const ParsedScene parsed = SceneFromBytes(seed.bytes, seed.name);
+    EXPECT_TRUE(parsed.ok()) << seed.name << " " << parsed.ToStatus();
+    EXPECT_EQ(WhatIsUnsound(parsed.scene), "") << seed.name;
+    EXPECT_EQ(parsed.scene.meshes.size(), 7U) << seed.name;
+  }
+}
+
+TEST(SceneBytesTest, TheCorpusOfBadGltfIsRefused) {
+  const std::vector<NamedBytes> corpus = FilesOf("fuzz/corpus/gltf");
+  EXPECT_GE(corpus.size(), 10U);
+  for (const NamedBytes& bad : corpus) {
+    const ParsedScene parsed = SceneFromBytes(bad.bytes, bad.name);
+    EXPECT_FALSE(parsed.ok()) << bad.name;
+    EXPECT_LE(parsed.diagnostics.size(), 300U) << bad.name;
+  }
+}
+
+TEST(SceneBytesTest, GltfCutOffAnywhereIsRefused) {
+  for (const NamedBytes& seed : FilesOf("fuzz/seeds/gltf")) {
+    for (std::size_t size = 0; size < seed.bytes.size(); ++size) {
+      EXPECT_FALSE(SceneFromBytes(seed.bytes.substr(0, size), seed.name).ok())
+          << seed.name << " " << size;
+    }
+  }
+}
+
+TEST(SceneBytesTest, MutatedGltfIsSoundOrRefused) {
+  for (const NamedBytes& seed : FilesOf("fuzz/seeds/gltf")) {
+    int accepted = 0;
+    for (std::uint64_t key = 0; key < 10'000; ++key) {
+      SCOPED_TRACE(key);
+      const ParsedScene parsed = SceneFromBytes(Mutated(seed.bytes, key), seed.name);
+      ExpectSoundOrRefused(parsed);
+      accepted += parsed.ok() ? 1 : 0;
+    }
+    EXPECT_GT(accepted, 100) << seed.name;
+  }
+}
+
 TEST(SceneBytesTest, MutatedMeshesAreSoundOrRefused) {
   for (const NamedBytes& seed : FilesOf("fuzz/seeds/ply")) {
     for (std::uint64_t key = 0; key < 20'000; ++key) {

@@ -33,21 +33,24 @@ struct NamedBytes {
   return ReadFile(std::string(LUCERNA_SOURCE_DIR) + "/tests/" + file).value();
 }
 
-[[nodiscard]] inline ParsedScene SceneFromBytes(std::string_view bytes) {
+// `name` of the main file chooses the format.
+[[nodiscard]] inline ParsedScene SceneFromBytes(std::string_view bytes,
+                                                const std::string& name = "fuzz.pbrt") {
   static const std::map<std::string, std::string>& good =
       *new std::map<std::string, std::string>{{"part.pbrt", "Shape \"sphere\"\n"},
                                               {"mesh.ply", FilesOf("fuzz/seeds/ply").at(0).bytes},
                                               {"sky.pfm", BytesOf("fuzz/seeds/image/square.pfm")},
                                               {"tiles.png", BytesOf("fuzz/seeds/image/rgb.png")}};
   std::map<std::string, std::string> all = good;
-  all["fuzz.pbrt"] = bytes;
+  all[name] = bytes;
   MemoryFiles files(std::move(all));
   SceneLimits limits;
   limits.max_files = 50;
   limits.max_picture_bytes = 1 << 20;
   limits.max_total_bytes = 1 << 20;
   limits.max_triangles = 10'000;
-  return ReadScene(files, "fuzz.pbrt", limits);
+  limits.max_shape_bytes = 1 << 24;
+  return ReadScene(files, name, limits);
 }
 
 }  // namespace lucerna

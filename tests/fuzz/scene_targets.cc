@@ -20,17 +20,30 @@ std::vector<std::string> SeedsOf(const std::string& folder) {
   return seeds;
 }
 
-}  // namespace
-
-bool FuzzPbrt(std::string_view bytes) {
-  const ParsedScene parsed = SceneFromBytes(bytes);
+// Returns whether it was accepted.
+bool IsSoundOrRefused(const ParsedScene& parsed) {
   LUCERNA_CHECK(!parsed.ok() || WhatIsUnsound(parsed.scene).empty());
   LUCERNA_CHECK(parsed.ok() || !parsed.ToStatus().ok());
   return parsed.ok();
 }
 
+}  // namespace
+
+bool FuzzPbrt(std::string_view bytes) {
+  return IsSoundOrRefused(SceneFromBytes(bytes));
+}
+
 std::vector<std::string> PbrtSeeds() {
   return SeedsOf("fuzz/seeds/pbrt");
+}
+
+// As text and as one file with its buffer: the first bytes decide.
+bool FuzzGltf(std::string_view bytes) {
+  return IsSoundOrRefused(SceneFromBytes(bytes, "fuzz.gltf"));
+}
+
+std::vector<std::string> GltfSeeds() {
+  return SeedsOf("fuzz/seeds/gltf");
 }
 
 bool FuzzPly(std::string_view bytes) {

@@ -577,7 +577,8 @@ TEST(PbrtTextureTest, ReadsWhatItIsMadeOf) {
       {{"m/a.pfm", GreyPfm(2, 1, 0.25F)}});
   ASSERT_EQ(scene.textures.size(), 6U);
   const Texture& a = scene.textures[0];
-  EXPECT_EQ(a.wrap, Texture::Wrap::kClamp);
+  EXPECT_EQ(a.wrap_u, Texture::Wrap::kClamp);
+  EXPECT_EQ(a.wrap_v, Texture::Wrap::kClamp);
   EXPECT_EQ(a.scale, 2);
   EXPECT_TRUE(a.is_inverted);
   EXPECT_EQ(a.mapping, (ByUv(3, 4, 5, 6)));

@@ -84,7 +84,7 @@ TEST(OwnScenesTest, AllAreReadWithoutErrorsOrWarnings) {
   int count = 0;
   for (const auto& entry :
        std::filesystem::directory_iterator(std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes")) {
-    if (entry.path().extension() != ".pbrt") continue;
+    if (!entry.is_regular_file()) continue;
     ++count;
     for (const Diagnostic& diagnostic : ParseAt(entry.path().string()).diagnostics) {
       EXPECT_EQ(diagnostic.severity, Diagnostic::Severity::kNote) << diagnostic.ToString();
@@ -109,6 +109,31 @@ TEST(OwnScenesTest, PicturesAreOfTheScenesFiles) {
       TextureColor(scene.textures, scene.materials[wall].texture, {{0.05F, 0.95F}, {}, {}});
   EXPECT_GT(corner.r, 0.9F);
   EXPECT_LT(corner.g, 0.05F);
+}
+
+TEST(OwnScenesTest, BuffersAndImagesOfGltfAreOfTheScenesFiles) {
+  DirectoryFiles files(std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes");
+  const ParsedScene parsed = ReadScene(files, "still-life.gltf");
+  ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
+  const SceneManifest manifest = files.Manifest("still-life.gltf");
+  EXPECT_EQ(manifest.entries.size(), 3U);
+  EXPECT_TRUE(manifest.entries.contains("meshes/still-life.bin"));
+  EXPECT_TRUE(manifest.entries.contains("textures/bricks.png"));
+  // The same from those files alone, as the coordinator and workers read them.
+  ManifestFiles sent(manifest, [&](const Digest& digest) -> StatusOr<std::string> {
+    for (const auto& [path, entry] : manifest.entries) {
+      if (entry.digest == digest) return files.Read(path);
+    }
+    return absl::NotFoundError("no such file");
+  });
+  const ParsedScene again = ReadScene(sent, "still-life.gltf");
+  ASSERT_TRUE(again.ok()) << again.ToStatus();
+  EXPECT_EQ(again.scene.TriangleCount(), parsed.scene.TriangleCount());
+  // Of nine nodes with meshes one has seven instances.
+  EXPECT_EQ(parsed.scene.meshes.size(), 15U);
+  EXPECT_EQ(parsed.scene.spot_lights.size(), 1U);
+  EXPECT_EQ(parsed.scene.area_lights.size(), 1U);
+  EXPECT_EQ(parsed.scene.media.size(), 1U);
 }
 
 TEST(OwnScenesTest, TheFurnaceEmitsInward) {

@@ -39,10 +39,11 @@ TEST(ReadSceneTest, WithoutAKnownNameTheFirstWordDoes) {
 
 TEST(ReadSceneTest, AFileOfNoKnownFormatIsRefused) {
   for (const std::string bytes :
-       {"<scene version=\"3.0.0\"/>", "", "# only a comment", "\"Camera\""}) {
+       {"{\"scene\": 0}", "<scene version=\"3.0.0\"/>", "", "# only a comment", "\"Camera\""}) {
     EXPECT_EQ(ReadNamed("scene.xml", bytes).ToStatus().message(),
               "scene.xml: error: this is no scene in a format that is read here; there are "
-              "pbrt-v4 (.pbrt) and points to measure irradiance at (.ply)")
+              "pbrt-v4 (.pbrt), glTF 2.0 (.gltf), binary glTF 2.0 (.glb) and points to measure "
+              "irradiance at (.ply)")
         << bytes;
   }
 }

@@ -4,6 +4,8 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <string>
 
 #include "gmock/gmock.h"
@@ -57,6 +59,66 @@ TEST(SceneFilesTest, DirectoryFilesRemembersWhatWasRead) {
   ASSERT_EQ(manifest.entries.size(), 2U);
   EXPECT_EQ(manifest.entries.at("scene.pbrt").digest, Sha256("WorldBegin\n"));
   EXPECT_EQ(manifest.entries.at("models/a mesh.ply").size_bytes, 4U);
+}
+
+TEST(SceneFilesTest, NamesOfOutsideFilesAreLogicalPathsAndLeadBack) {
+  for (const char* path : {"../up.ply", "/data/wood.png", "a/../../b", "/", "..", "a//b", "%/../x",
+                           "../%outside/./y"}) {
+    EXPECT_TRUE(CheckLogicalPath(OutsideName(path)).ok()) << OutsideName(path);
+    EXPECT_EQ(OutsidePath(OutsideName(path)), path);
+  }
+  EXPECT_EQ(OutsideName("../up.ply"), "%outside/%../up.ply");
+  EXPECT_EQ(OutsidePath("scene.pbrt"), std::nullopt);
+  EXPECT_EQ(OutsidePath("%outsider/x"), std::nullopt);
+}
+
+TEST(SceneFilesTest, FilesOutsideAreReadBelowAllowedFoldersOnly) {
+  const SceneFolder scene;
+  const SceneFolder shared;
+  const SceneFolder secret;
+  const std::string up = "../" + std::filesystem::path(shared.path()).filename().string();
+  const std::string by_parent = up + "/models/a mesh.ply";
+  const std::string absolute = shared.path() + "/models/a mesh.ply";
+  std::filesystem::create_symlink(secret.path() + "/scene.pbrt", shared.path() + "/models/link");
+
+  DirectoryFiles by_default(scene.path());
+  for (const std::string& path : {by_parent, absolute}) {
+    const Status refused = by_default.Read(path).status();
+    EXPECT_EQ(refused.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_THAT(std::string(refused.message()), HasSubstr("--allow-path"));
+  }
+  DirectoryFiles files(scene.path(), {}, {secret.path() + "/none", shared.path() + "/models"});
+  EXPECT_EQ(files.Read(by_parent).value(), "ply\n");
+  EXPECT_EQ(files.Read(absolute).value(), "ply\n");
+  EXPECT_EQ(files.Read("scene.pbrt").value(), "WorldBegin\n");
+  // Beside the folder, in one whose name begins alike, and where a link leads out of it.
+  std::filesystem::create_directories(shared.path() + "/models2");
+  EXPECT_TRUE(WriteFile(shared.path() + "/models2/a", "a").ok());
+  for (const std::string& path :
+       {up + "/scene.pbrt", up + "/models/../scene.pbrt", up + "/models2/a", up + "/models/link",
+        secret.path() + "/scene.pbrt", std::string("/etc/passwd"), up + "/models/a\nb"}) {
+    EXPECT_EQ(files.Read(path).status().code(), absl::StatusCode::kInvalidArgument) << path;
+  }
+
+  // The manifest has them by logical paths, by which the client reads them again to send them, and
+  // the coordinator finds them for the paths of the scene.
+  const SceneManifest manifest = files.Manifest("scene.pbrt");
+  ASSERT_EQ(manifest.entries.size(), 3U);
+  DirectoryFiles again(scene.path(), {}, {shared.path() + "/models"});
+  std::map<Digest, std::string> sent;
+  for (const auto& [path, entry] : manifest.entries) {
+    EXPECT_TRUE(CheckLogicalPath(path).ok()) << path;
+    sent[entry.digest] = again.Read(path).value();
+  }
+  EXPECT_EQ(again.Manifest("scene.pbrt"), manifest);
+  ManifestFiles of_manifest(
+      manifest, [&](const Digest& digest) -> StatusOr<std::string> { return sent.at(digest); });
+  EXPECT_EQ(of_manifest.Read(by_parent).value(), "ply\n");
+  EXPECT_EQ(of_manifest.Read(absolute).value(), "ply\n");
+  // What the manifest does not have is not looked for anywhere.
+  EXPECT_EQ(of_manifest.Read("/etc/passwd").status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(of_manifest.Read(up + "/scene.pbrt").status().code(),
+            absl::StatusCode::kInvalidArgument);
 }
 
 TEST(SceneFilesTest, DirectoryFilesKeepsToItsLimits) {

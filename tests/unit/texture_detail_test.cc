@@ -76,6 +76,23 @@ TEST(TextureDetailTest, OfFlatTexturesIsNone) {
   }
 }
 
+TEST(TextureDetailTest, TurnsWithItsTexture) {
+  Texture texture = OfPicture(GreyPicture(
+      64, 32, [](int x, int y) { return 0.5 + 0.3 * std::cos(0.1 * x * x) * std::sin(0.3 * y); }));
+  texture.mapping.scale_u = 2;
+  const TextureDetail plain = TextureDetails({texture})[0];
+  // The same by its matrix, and a quarter turn.
+  texture.mapping.kind = TextureMapping::Kind::kUvAffine;
+  texture.mapping.axis_u = {2, 0, 0};
+  texture.mapping.axis_v = {0, 1, 0};
+  EXPECT_EQ(TextureDetails({texture})[0].u, plain.u);
+  EXPECT_EQ(TextureDetails({texture})[0].v, plain.v);
+  texture.mapping.axis_u = {0, 2, 0};
+  texture.mapping.axis_v = {-1, 0, 0};
+  EXPECT_EQ(TextureDetails({texture})[0].u, plain.v);
+  EXPECT_EQ(TextureDetails({texture})[0].v, plain.u);
+}
+
 TEST(TextureDetailTest, OfACheckerboardIsThatOfItsPicture) {
   // Eight pixels a square, two squares: the board as a picture.
   const auto picture =

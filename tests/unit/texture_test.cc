@@ -33,7 +33,7 @@ std::shared_ptr<const Picture> FourPixels() {
 Texture PictureTexture(Wrap wrap = Wrap::kRepeat) {
   Texture texture;
   texture.kind = Texture::Kind::kPicture;
-  texture.wrap = wrap;
+  texture.wrap_u = texture.wrap_v = wrap;
   texture.picture = FourPixels();
   return texture;
 }
@@ -77,12 +77,30 @@ TEST(TextureTest, EdgesRepeatClampOrAreBlack) {
   ExpectColor({PictureTexture(Wrap::kRepeat)}, {-5.25F, 4.25F}, {0.5F, 0.5F, 0.5F});
 }
 
+TEST(TextureTest, MirroredCopiesMeetWithEqualPixels) {
+  const std::vector<Texture> mirrored = {PictureTexture(Wrap::kMirror)};
+  for (const Vec2 place : {Vec2{0.25F, 0.75F}, Vec2{0.7F, 0.1F}, Vec2{0.95F, 0.55F}}) {
+    const Rgb color = TextureColor(mirrored, 0, {place, {}, {}});
+    ExpectColor(mirrored, {2 - place.x, place.y}, color);
+    ExpectColor(mirrored, {-place.x, -place.y}, color);
+    ExpectColor(mirrored, {place.x + 4, 2 - place.y}, color);
+  }
+  // Along one axis alone: as a clamped picture beyond the edge, and as a repeated one.
+  Texture mixed = PictureTexture(Wrap::kMirror);
+  mixed.wrap_v = Wrap::kRepeat;
+  ExpectColor({mixed}, {1.25F, 1.75F},
+              TextureColor(std::vector<Texture>{PictureTexture()}, 0, {{0.75F, 0.75F}, {}, {}}));
+}
+
 TEST(TextureTest, MappingScaleAndInversionAreApplied) {
   Texture texture = PictureTexture();
   texture.mapping = ByUv(2, 4, 0.5F, 0.25F);
   ExpectColor({texture}, {0.125F, 0}, {0.5F, 0.5F, 0.5F});  // at (0.75, 0.25)
   texture.scale = 1.5F;
   ExpectColor({texture}, {0.125F, 0}, {0.75F, 0.75F, 0.75F});
+  texture.tint = {1, 0.5F, 0};
+  ExpectColor({texture}, {0.125F, 0}, {0.75F, 0.375F, 0});
+  texture.tint = {1, 1, 1};
   texture.is_inverted = true;
   ExpectColor({texture}, {0.125F, 0}, {0.25F, 0.25F, 0.25F});
   texture.is_inverted = false;
@@ -115,7 +133,7 @@ TEST(TextureTest, FarPlacesAndHugeScalesStayColours) {
   Texture huge;
   huge.kind = Texture::Kind::kScaled;
   huge.scale = 3e38F;
-  for (const Wrap wrap : {Wrap::kRepeat, Wrap::kClamp, Wrap::kBlack}) {
+  for (const Wrap wrap : {Wrap::kRepeat, Wrap::kClamp, Wrap::kBlack, Wrap::kMirror}) {
     Texture picture = PictureTexture(wrap);
     picture.mapping = ByUv(3e38F, -3e38F, 3e38F, -3e38F);
     std::vector<Texture> textures = {picture, checkers, huge, huge};

@@ -6,20 +6,11 @@
 #include <utility>
 
 #include "render/base/text.h"
+#include "render/formats/mesh_placement.h"
 #include "render/formats/pbrt/directives.h"
 #include "render/scene/scene_extent.h"
 
 namespace lucerna {
-namespace {
-
-// Triangles of all copies together, some 200 MB with their trees.
-constexpr std::uint64_t kMaxWrittenOut = std::uint64_t{1} << 20;
-// In the scene and in Embree's tree, measured.
-constexpr std::uint64_t kInstanceBytes = 1024;
-// Shapes have numbers of 32 bits.
-constexpr std::uint64_t kMaxInstanced = std::uint64_t{4'000'000'000};
-
-}  // namespace
 
 void DirectiveReader::PlaceInstance(Object& object, Arguments& arguments) {
   const Transform& to_world = graphics_.state().to_world;

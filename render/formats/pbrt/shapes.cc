@@ -14,6 +14,7 @@
 
 #include "render/base/text.h"
 #include "render/formats/degenerate_triangles.h"
+#include "render/formats/mesh_placement.h"
 #include "render/formats/pbrt/kinds.h"
 #include "render/formats/pbrt/shape_readers.h"
 #include "render/math/double3.h"
@@ -36,51 +37,6 @@ std::vector<Vec3> Triples(std::span<const double> numbers) {
   }
   return triples;
 }
-
-// Moves the mesh; its winding is not touched. Returns false when a position leaves the finite
-// numbers.
-bool Move(const Transform& to_world, TriangleMesh& mesh) {
-  for (Vec3& position : mesh.positions) {
-    position = to_world.Point(position);
-    if (!IsFinite(position)) return false;
-  }
-  for (Vec3& normal : mesh.normals) {
-    const float size = MaxAbs(normal);
-    normal = size > 0 ? to_world.Normal(normal / size) : Vec3();
-    // Normal() leaves zero when there is no direction left: S3 lets that stand.
-    if (normal != Vec3()) normal = Normalize(normal);
-  }
-  return true;
-}
-
-void SwapWinding(TriangleMesh& mesh, std::size_t triangle) {
-  std::swap(mesh.indices[3 * triangle + 1], mesh.indices[3 * triangle + 2]);
-}
-
-Double3 EdgeCross(const TriangleMesh& mesh, std::size_t triangle) {
-  return TriangleCross(mesh.positions[mesh.indices[3 * triangle]],
-                       mesh.positions[mesh.indices[3 * triangle + 1]],
-                       mesh.positions[mesh.indices[3 * triangle + 2]]);
-}
-
-// Winds the triangles so that their outward sides are those of the normals; without normals
-// `turned_over` tells.
-void WindByNormals(TriangleMesh& mesh, bool turned_over) {
-  for (std::size_t triangle = 0; triangle < mesh.indices.size() / 3; ++triangle) {
-    bool swap = turned_over;
-    if (!mesh.normals.empty()) {
-      const Vec3 towards = mesh.normals[mesh.indices[3 * triangle]] +
-                           mesh.normals[mesh.indices[3 * triangle + 1]] +
-                           mesh.normals[mesh.indices[3 * triangle + 2]];
-      const double agreement = Dot(EdgeCross(mesh, triangle), Double3(towards));
-      if (agreement != 0) swap = agreement < 0;
-    }
-    if (swap) SwapWinding(mesh, triangle);
-  }
-}
-
-// The area of what the unit of the scene may yet make large enough (scene_unit.h).
-constexpr double kLeastArea = 1e-90;
 
 void ReadTriangleMesh(const ShapeInput& input, ShapeSet& shapes) {
   ParameterList& parameters = input.parameters;
@@ -143,7 +99,7 @@ void ReadAlpha(ParameterList& parameters, const TextureNames& numbers, bool emit
 
 void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacement& placement,
                ShapeSet& shapes) {
-  if (!Move(placement.to_world, mesh)) {
+  if (!MoveMesh(placement.to_world, mesh)) {
     parameters.Error("is moved out of the finite numbers by its transform");
     return;
   }
@@ -285,9 +241,7 @@ std::uint64_t ShapeSet::Cost() const {
 std::uint64_t ShapeSet::SizeBytes() const {
   std::uint64_t size = 0;
   for (const TriangleMesh& mesh : meshes) {
-    size += sizeof(mesh) + mesh.positions.size() * sizeof(Vec3) +
-            mesh.indices.size() * sizeof(std::uint32_t) + mesh.normals.size() * sizeof(Vec3) +
-            mesh.uvs.size() * sizeof(Vec2);
+    size += lucerna::SizeBytes(mesh);
   }
   ForEachAnalyticShape(*this, [&](const auto& shape) { size += sizeof(shape); });
   return size;
@@ -324,24 +278,18 @@ StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world
   ShapeSet shapes;
   for (const TriangleMesh& original : object.meshes) {
     TriangleMesh mesh = original;
-    if (!Move(to_world, mesh)) return MovedAway();
+    if (!MoveMesh(to_world, mesh)) return MovedAway();
     DropTriangles(mesh, kLeastArea);
     if (mesh.indices.empty()) continue;
     // The outward side stays outward: a mirror image is wound the other way round.
-    if (to_world.SwapsHandedness()) {
-      for (std::size_t i = 0; i < mesh.indices.size() / 3; ++i)
-        SwapWinding(mesh, i);
-    }
+    if (to_world.SwapsHandedness()) SwapWinding(mesh);
     shapes.meshes.push_back(std::move(mesh));
   }
   // What the transform makes another shape of is given as triangles.
   const auto add_mesh = [&](TriangleMesh mesh, const ShapeTraits& traits) {
-    if (!Move(to_world, mesh)) return MovedAway();
+    if (!MoveMesh(to_world, mesh)) return MovedAway();
     DropTriangles(mesh, kLeastArea);
-    if (to_world.SwapsHandedness()) {
-      for (std::size_t i = 0; i < mesh.indices.size() / 3; ++i)
-        SwapWinding(mesh, i);
-    }
+    if (to_world.SwapsHandedness()) SwapWinding(mesh);
     mesh.traits = traits;
     if (!mesh.indices.empty()) shapes.meshes.push_back(std::move(mesh));
     return absl::OkStatus();

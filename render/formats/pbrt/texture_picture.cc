@@ -44,7 +44,7 @@ NamedTexture ReadPictureTexture(const TextureInput& input) {
   texture.kind = Texture::Kind::kPicture;
   texture.is_number = input.is_number;
   texture.mapping = ReadMapping(input);
-  texture.wrap = ReadWrap(parameters);
+  texture.wrap_u = texture.wrap_v = ReadWrap(parameters);
   texture.scale =
       static_cast<float>(parameters.Float("scale", 1, input.is_number ? kAnyNumber : kZeroOrMore));
   texture.is_inverted = parameters.Bool("invert", false);
@@ -65,7 +65,7 @@ NamedTexture ReadPictureTexture(const TextureInput& input) {
   }
   texture.picture = *std::move(picture);
   ValueRange range = {texture.picture->Smallest(), texture.picture->Largest()};
-  if (texture.wrap == Texture::Wrap::kBlack) range = range.Joined({0, 0});
+  if (texture.wrap_u == Texture::Wrap::kBlack) range = range.Joined({0, 0});
   range = range * ValueRange{texture.scale, texture.scale};
   if (!(std::max(std::abs(range.least), std::abs(range.largest)) <= 3e38F)) {
     parameters.Error("scale", "is too large for single precision");

@@ -1,0 +1,21 @@
+// The camera of a glTF document, or a view of the whole scene where there is none.
+#pragma once
+
+#include <vector>
+
+#include "render/formats/gltf/document.h"
+#include "render/formats/gltf/nodes.h"
+#include "render/scene/scene.h"
+
+namespace lucerna {
+
+// The first of the cameras. Sets the size of the film too, from the camera's aspect ratio. Errors
+// are in the diagnostics.
+void SetGltfCamera(const GltfDocument& document, const std::vector<GltfPlace>& places,
+                   Scene& scene);
+
+// A camera that sees all shapes of the scene, from the front and a little from above. Requires that
+// there are some.
+void FrameWholeScene(Scene& scene);
+
+}  // namespace lucerna
