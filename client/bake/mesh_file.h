@@ -24,7 +24,7 @@ struct BakedMesh {
   std::vector<Surface> surfaces;
   std::string scene;    // the scene's file
   double spacing = 0;   // as asked for
-  double estimate = 0;  // relative error that the last job estimated, over its points
+  double estimate = 0;  // SurfaceMesh::RelativeError
 };
 
 // Of a histogram, each face has vertices of its own. Requires that all vertices of faces, or all

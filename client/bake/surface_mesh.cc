@@ -140,6 +140,11 @@ Triangulated Triangulate(const CurvePiece& /*curve*/, double /*unit*/) {
   return {};
 }
 
+Status TooManyFaces() {
+  return absl::ResourceExhaustedError(Concat("the mesh has more than ", SurfaceMesh::kMostFaces,
+                                             " triangles; give a larger spacing"));
+}
+
 double LuminanceOf(const Irradiance& irradiance) {
   return static_cast<double>(Luminance(irradiance.value));
 }
@@ -149,7 +154,6 @@ double LuminanceOf(const Irradiance& irradiance) {
 StatusOr<SurfaceMesh> SurfaceMesh::FromScene(const Scene& scene, const Options& options) {
   SurfaceMesh mesh;
   mesh.spacing_ = options.spacing;
-  mesh.sides_ = options.sides;
   std::set<std::string> names;
   std::uint32_t shape = 0;
   const auto is_wanted = [&](const ShapeTraits& traits) {
@@ -361,7 +365,7 @@ MeshVertex SurfaceMesh::MiddleOf(const MeshFace& face, Pair edge) {
   return middle;
 }
 
-void SurfaceMesh::Split(std::set<Pair> places) {
+Status SurfaceMesh::Split(std::set<Pair> places) {
   // A face with an edge that is split is split at its longest one too.
   for (bool has_grown = true; has_grown;) {
     has_grown = false;
@@ -424,9 +428,15 @@ void SurfaceMesh::Split(std::set<Pair> places) {
     }
   }
   faces_ = std::move(finer);
+  return faces_.size() <= kMostFaces ? absl::OkStatus() : TooManyFaces();
 }
 
-void SurfaceMesh::SplitLongEdges(double longest) {
+Status SurfaceMesh::SplitLongEdges(double longest) {
+  // A triangle with such an edge has at most an area of sqrt(3)/4 of its square.
+  double area = 0;
+  for (const MeshFace& face : faces_)
+    area += AreaOf(face);
+  if (!(area < kMostFaces * std::sqrt(3.0) / 4 * longest * longest)) return TooManyFaces();
   for (;;) {
     std::set<Pair> places;
     for (const MeshFace& face : faces_) {
@@ -435,8 +445,8 @@ void SurfaceMesh::SplitLongEdges(double longest) {
         if (LengthOf(vertices) > longest) places.insert(PlacesOf(vertices));
       }
     }
-    if (places.empty()) return;
-    Split(std::move(places));
+    if (places.empty()) return absl::OkStatus();
+    LUCERNA_RETURN_IF_ERROR(Split(std::move(places)));
   }
 }
 
@@ -521,7 +531,6 @@ void SurfaceMesh::SetBuckets(const std::vector<Irradiance>& measured) {
 }
 
 void SurfaceMesh::DropDarkerSides() {
-  if (sides_ != MeasuredSides::kBrighter) return;
   std::vector<double> flux(surfaces_.size());
   for (const MeshFace& face : faces_) {
     for (const std::uint32_t vertex : face.vertices)
@@ -533,9 +542,10 @@ void SurfaceMesh::DropDarkerSides() {
     surfaces_[is_back_brighter ? i : i + 1].is_kept = false;
   }
   std::erase_if(faces_, [&](const MeshFace& face) { return !surfaces_[face.surface].is_kept; });
-  std::erase_if(probes_,
-                [&](const auto& probe) { return !surfaces_[probe.second.middle.surface].is_kept; });
-  std::erase_if(asked_edges_, [&](const Pair& edge) { return !probes_.contains(edge); });
+  for (MeshVertex& vertex : vertices_)
+    vertex.irradiance.reset();
+  for (MeshFace& face : faces_)
+    face.bucket.reset();
 }
 
 double SurfaceMesh::MeanIrradiance() const {
@@ -543,15 +553,33 @@ double SurfaceMesh::MeanIrradiance() const {
   double area = 0;
   for (const MeshFace& face : faces_) {
     for (const std::uint32_t vertex : face.vertices) {
-      if (!vertices_[vertex].irradiance) continue;
-      sum += AreaOf(face) * LuminanceOf(*vertices_[vertex].irradiance);
+      if (!face.bucket && !vertices_[vertex].irradiance) continue;
+      sum += AreaOf(face) * LuminanceOf(AtCorner(face, vertex));
       area += AreaOf(face);
     }
   }
   return area > 0 ? sum / area : 0;
 }
 
-std::size_t SurfaceMesh::Refine(double tolerance) {
+double SurfaceMesh::RelativeError() const {
+  const double floor = kDarkShare * MeanIrradiance();
+  if (!(floor > 0)) return 0;
+  double sum = 0;
+  double area = 0;
+  for (const MeshFace& face : faces_) {
+    for (const std::uint32_t vertex : face.vertices) {
+      const Irradiance at = AtCorner(face, vertex);
+      const auto noise = static_cast<double>(at.noise);
+      const auto bias = static_cast<double>(at.bias);
+      const double value = LuminanceOf(at);
+      sum += AreaOf(face) * (noise * noise + bias * bias) / (value * value + floor * floor);
+      area += AreaOf(face);
+    }
+  }
+  return std::sqrt(sum / area);
+}
+
+StatusOr<std::size_t> SurfaceMesh::Refine(double tolerance) {
   const double floor = kDarkShare * MeanIrradiance();
   std::set<Pair> places;
   for (const Pair& edge : asked_edges_) {
@@ -570,7 +598,7 @@ std::size_t SurfaceMesh::Refine(double tolerance) {
     }
   }
   const std::size_t count = places.size();
-  if (count > 0) Split(std::move(places));
+  if (count > 0) LUCERNA_RETURN_IF_ERROR(Split(std::move(places)));
   return count;
 }
 

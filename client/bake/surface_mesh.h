@@ -32,10 +32,11 @@
 
 namespace lucerna {
 
-// Of a sensor: irradiance and its standard deviation [W·m⁻²].
+// Of a sensor [W·m⁻²].
 struct Irradiance {
   Rgb value;
-  float noise = 0;  // of the luminance
+  float noise = 0;  // standard deviation of the luminance
+  float bias = 0;   // of the luminance, as it is estimated
 };
 
 struct MeshVertex {
@@ -82,7 +83,9 @@ class SurfaceMesh {
   [[nodiscard]] static StatusOr<SurfaceMesh> FromScene(const Scene& scene, const Options& options);
 
   // Splits edges until none is longer.
-  void SplitLongEdges(double longest);
+  // Errors: RESOURCE_EXHAUSTED once there are more than kMostFaces.
+  [[nodiscard]] Status SplitLongEdges(double longest);
+  static constexpr std::size_t kMostFaces = std::size_t{1} << 24;
 
   // Where irradiance is to be measured next: at vertices that have none, then, with `with_edges`,
   // in the middle of all edges that are longer than the spacing and were not measured before.
@@ -97,15 +100,15 @@ class SurfaceMesh {
   // [faces] of their sensors.
   void SetBuckets(const std::vector<Irradiance>& measured);
 
-  // Of each shape with two sides, drops the one that receives less. Once, after all vertices or
-  // faces were measured; does nothing unless the sides were to be chosen by that.
+  // Of each shape with two sides, drops the one that receives less, and forgets what was measured.
+  // Once, after all vertices or faces were.
   void DropDarkerSides();
 
   // Splits the edges whose middle, as it was measured last, differs from the mean of its ends by
   // more than `tolerance` times the luminance there, or a tenth of the mean where that is more, and
   // by more than twice the standard deviation of the difference. With a tolerance of 0: all of
-  // them. Returns how many.
-  std::size_t Refine(double tolerance);
+  // them. Returns how many. Errors: RESOURCE_EXHAUSTED as before.
+  [[nodiscard]] StatusOr<std::size_t> Refine(double tolerance);
 
   // Root of the mean squared difference between irradiance that was measured in the middle of
   // edges, which were not split for it, and that of the mesh, over the mean luminance; noise
@@ -118,6 +121,10 @@ class SurfaceMesh {
   [[nodiscard]] double AreaOf(const MeshFace& face) const;
   // Of the luminance over the area; 0 of an empty mesh.
   [[nodiscard]] double MeanIrradiance() const;
+  // Root of the mean over the area of (noise² + bias²) / (value² + (a tenth of the mean)²), as for
+  // images (render/estimate/relative_error.h); 0 where there is no light. Requires that all is
+  // measured.
+  [[nodiscard]] double RelativeError() const;
 
  private:
   // Two numbers in order.
@@ -142,10 +149,9 @@ class SurfaceMesh {
   // A sensor near `position`, which is in or on the edge of the face.
   [[nodiscard]] Sensor SensorOn(const MeshFace& face, Vec3 position, Vec3 normal) const;
   // Splits the faces beside edges between these places, and what must be split with them.
-  void Split(std::set<Pair> places);
+  [[nodiscard]] Status Split(std::set<Pair> places);
 
   double spacing_ = 0;
-  MeasuredSides sides_ = MeasuredSides::kBrighter;
   std::vector<MeshVertex> vertices_;
   std::vector<MeshFace> faces_;
   std::vector<MeshSurface> surfaces_;

@@ -13,7 +13,6 @@
 #include "client/exit_code.h"
 #include "client/job_run.h"
 #include "client/scene_reading.h"
-#include "client/view/convergence.h"
 #include "client/view/report.h"
 #include "render/base/files.h"
 #include "render/formats/sensors/sensors_reader.h"
@@ -26,6 +25,8 @@ namespace {
 // this name is not seen.
 constexpr const char* kSensorsPath = "lucerna-sensors.ply";
 constexpr std::int64_t kPasses = 64;
+// Which side of a shape receives more shows at once.
+constexpr std::int64_t kPassesForSides = 8;
 // Few points need as many photons as many do.
 constexpr std::int64_t kFewestPhotons = 1 << 16;
 constexpr double kSpacingsOfDiagonal = 512;
@@ -108,6 +109,7 @@ StatusOr<std::vector<Irradiance>> MeasuredIn(const Image& image, std::size_t cou
   const ImageChannel* const b = image.Find(layer + "B");
   // Absent after a single pass.
   const ImageChannel* const noise = image.Find("noise");
+  const ImageChannel* const bias = image.Find("bias");
   if (r == nullptr || g == nullptr || b == nullptr || r->pixels.size() < count) {
     return absl::DataLossError("the image of a job has not a pixel for each sensor");
   }
@@ -118,6 +120,7 @@ StatusOr<std::vector<Irradiance>> MeasuredIn(const Image& image, std::size_t cou
     measured[i].value = {irradiance_of(r->pixels[i]), irradiance_of(g->pixels[i]),
                          irradiance_of(b->pixels[i])};
     if (noise != nullptr) measured[i].noise = irradiance_of(noise->pixels[i]);
+    if (bias != nullptr) measured[i].bias = irradiance_of(bias->pixels[i]);
   }
   return measured;
 }
@@ -171,81 +174,103 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
     overrides.initial_footprints = 1;
   }
   Scene scene;
-  LUCERNA_ASSIGN_OR_RETURN(
-      const SceneOfJobs read,
-      ReadSceneOfJobs(request.scene, {&overrides, 1}, output_options.quiet, &scene));
+  LUCERNA_ASSIGN_OR_RETURN(const SceneOfJobs read, ReadSceneOfJobs(request.scene, {&overrides, 1},
+                                                                   output_options.quiet, &scene));
   const double diagonal = ExtentOf(scene).size * scene.unit;
   SurfaceMesh::Options options;
   options.sides = request.sides;
   options.names = request.materials;
   options.spacing = request.spacing.value_or(diagonal / kSpacingsOfDiagonal);
   LUCERNA_ASSIGN_OR_RETURN(SurfaceMesh mesh, SurfaceMesh::FromScene(scene, options));
-  mesh.SplitLongEdges((is_histogram ? 1 : kCoarsest) * options.spacing);
+  LUCERNA_RETURN_IF_ERROR(mesh.SplitLongEdges((is_histogram ? 1 : kCoarsest) * options.spacing));
 
   LUCERNA_ASSIGN_OR_RETURN(Jobs jobs, Jobs::Open(cluster, server));
   std::vector<BakeRound> rounds;
-  const auto measure =
-      [&](const std::vector<Sensor>& sensors,
-          const std::vector<std::array<Vec3, 2>>& borders) -> StatusOr<std::vector<Irradiance>> {
-    if (!output_options.quiet) {
-      std::fprintf(stderr, "round %zu: %zu points\n", rounds.size() + 1, sensors.size());
-    }
+  const auto measure = [&](const std::vector<Sensor>& sensors,
+                           const std::vector<std::array<Vec3, 2>>& borders,
+                           const RenderOverrides& of_job) -> StatusOr<Jobs::Result> {
     const std::string bytes = SensorsFile(read.manifest.main_path, sensors, borders);
     SceneManifest manifest = read.manifest;
     manifest.entries[kSensorsPath] = {Sha256(bytes), bytes.size()};
     manifest.main_path = kSensorsPath;
     FilesWithSensors files(request.scene, bytes);
-    RenderOverrides of_round = overrides;
-    if (!of_round.photons_per_pass && !scene.integrator.photons_per_pass) {
-      of_round.photons_per_pass =
+    RenderOverrides with_photons = of_job;
+    if (!of_job.photons_per_pass && !scene.integrator.photons_per_pass) {
+      with_photons.photons_per_pass =
           std::max(kFewestPhotons, static_cast<std::int64_t>(sensors.size()));
     }
-    LUCERNA_ASSIGN_OR_RETURN(const Jobs::Result result,
-                             jobs.Run(files, manifest, of_round, output_options));
+    return jobs.Run(files, manifest, with_photons, output_options);
+  };
+  const auto measure_round =
+      [&](const std::vector<Sensor>& sensors,
+          const std::vector<std::array<Vec3, 2>>& borders) -> StatusOr<std::vector<Irradiance>> {
+    if (!output_options.quiet) {
+      std::fprintf(stderr, "round %zu: %zu points\n", rounds.size() + 1, sensors.size());
+    }
+    LUCERNA_ASSIGN_OR_RETURN(const Jobs::Result result, measure(sensors, borders, overrides));
     rounds.push_back({sensors.size(), result.job});
     return MeasuredIn(result.image, sensors.size(), request.indirect_only);
   };
   const auto measure_mesh = [&](bool with_edges) -> Status {
     const std::vector<Sensor> sensors = mesh.NextSensors(with_edges);
     if (sensors.empty()) return absl::OkStatus();
-    LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured, measure(sensors, {}));
+    LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured, measure_round(sensors, {}));
     mesh.SetMeasured(measured);
     return absl::OkStatus();
   };
 
+  if (request.sides == MeasuredSides::kBrighter) {
+    // Apart from what is kept, whose estimated error would be too good with dark sides among it.
+    const std::vector<Sensor> sensors = mesh.NextSensors(false);
+    RenderOverrides few_passes = overrides;
+    few_passes.passes = kPassesForSides;
+    few_passes.time_s.reset();
+    few_passes.error.reset();
+    few_passes.photons.reset();
+    if (!output_options.quiet) {
+      std::fprintf(stderr, "which sides are lit: %zu points\n", sensors.size());
+    }
+    LUCERNA_ASSIGN_OR_RETURN(const Jobs::Result result, measure(sensors, {}, few_passes));
+    LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured,
+                             MeasuredIn(result.image, sensors.size(), request.indirect_only));
+    mesh.SetMeasured(measured);
+    mesh.DropDarkerSides();
+  }
   if (is_histogram) {
     LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured,
-                             measure(mesh.BucketSensors(), mesh.BucketBorders()));
+                             measure_round(mesh.BucketSensors(), mesh.BucketBorders()));
     mesh.SetBuckets(measured);
-    mesh.DropDarkerSides();
   } else {
     LUCERNA_RETURN_IF_ERROR(measure_mesh(true));
-    mesh.DropDarkerSides();
-    while (mesh.Refine(request.tolerance) > 0)
+    for (;;) {
+      LUCERNA_ASSIGN_OR_RETURN(const std::size_t split, mesh.Refine(request.tolerance));
+      if (split == 0) break;
       LUCERNA_RETURN_IF_ERROR(measure_mesh(true));
+    }
     LUCERNA_RETURN_IF_ERROR(measure_mesh(false));
   }
 
   BakedMesh baked = BakedMeshOf(mesh);
   baked.scene = read.manifest.main_path;
   baked.spacing = options.spacing;
-  if (!rounds.empty()) {
-    if (const auto error = NewestError(rounds.front().job)) baked.estimate = error->value;
-  }
+  baked.estimate = mesh.RelativeError();
   LUCERNA_RETURN_IF_ERROR(WriteFile(request.output_path, IsPly(request.output_path)
                                                              ? MeshPly(baked, request.is_ascii)
                                                              : MeshGlb(baked)));
   const std::vector<SurfaceFigures> figures = FiguresOf(baked);
   if (output_options.json) {
-    std::fputs(BakeReport(rounds, figures, mesh.InterpolationError(), request.output_path).c_str(),
-               stdout);
+    std::fputs(
+        BakeReport(rounds, figures, baked.estimate, mesh.InterpolationError(), request.output_path)
+            .c_str(),
+        stdout);
   } else if (!output_options.quiet) {
     std::fputs(FiguresTable(figures, request.in_lux).c_str(), stdout);
+    std::printf("estimated error %.2g %%", 100 * baked.estimate);
     if (!is_histogram) {
-      std::printf("between vertices the mesh differs by %.2g %% of the mean\n",
+      std::printf("; between vertices the mesh differs by %.2g %% of the mean",
                   100 * mesh.InterpolationError());
     }
-    std::printf("%s\n", request.output_path.c_str());
+    std::printf(": %s\n", request.output_path.c_str());
   }
   return absl::OkStatus();
 }

@@ -49,10 +49,12 @@ struct BakeRound {
   std::size_t points = 0;
   v1::Job job;
 };
-// What was measured, and of the mesh: figures of its surfaces and SurfaceMesh::InterpolationError.
+// What was measured, and of the mesh: figures of its surfaces, SurfaceMesh::RelativeError and
+// InterpolationError.
 [[nodiscard]] std::string BakeReport(const std::vector<BakeRound>& rounds,
                                      const std::vector<SurfaceFigures>& figures,
-                                     double interpolation_error, const std::string& path);
+                                     double relative_error, double interpolation_error,
+                                     const std::string& path);
 [[nodiscard]] std::string PhotonReport(const v1::PhotonPath& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
 [[nodiscard]] std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost);

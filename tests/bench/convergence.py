@@ -258,8 +258,8 @@ def plot_overview(path, rows):
 
 def write_page(rows, arguments):
     page = ["# How the error falls\n",
-            f"Made by `tests/bench/convergence.py` ({arguments.size} pixels, references of "
-            f"{arguments.reference_s:g} s). The error is the root of relMSE; its floor follows the image. "
+            f"Made by `tests/bench/convergence.py` ({arguments.size} pixels, references of ten times "
+            "the longest time of a scene). The error is the root of relMSE; its floor follows the image. "
             "\"True\" is against the reference with the reference's own noise taken off, \"all\" "
             "with the worst 0.1 % of pixels. Scenes b-* are half B of "
             "`tests/tools/make_study_scenes.py`, which no constant of the estimate has seen. All figures "

@@ -110,6 +110,9 @@ def plot(path, rows):
             return f"{x + index * width:.1f},{y:.1f}"  # pylint: disable=cell-var-from-loop
 
         out.append(f'<text x="{index * width + 40}" y="20">{scene}: relative MSE against photons</text>')
+        for error in (low * 1.4, high / 1.4):
+            y = place(PHOTONS[0], error).split(",")[1]
+            out.append(f'<text x="{index * width + 2}" y="{y}">{error:.2g}</text>')
         for name, color in colors.items():
             line = " ".join(place(r[2], r[3]) for r in own if r[1] == name)
             out.append(f'<polyline points="{line}" fill="none" stroke="{color}"/>')

@@ -101,6 +101,9 @@ TEST_F(BakeTest, PrintsTheFiguresOfSurfaces) {
   EXPECT_NEAR(floor["max_lx"].get<double>(), 683 * 10.0 / 4, 0.1);
   EXPECT_GT(report["rounds"].size(), 2U);
   EXPECT_LT(report["interpolation_error"].get<double>(), 0.05);
+  // What is written is glTF.
+  const Finished valid = RunProgram({kBin + "/lucerna", "validate", Path("out.glb")}, seconds(60));
+  EXPECT_EQ(valid.exit_code, 0) << valid.errors;
 }
 
 TEST_F(BakeTest, LeavesOutDirectLightWhenTold) {

@@ -9,6 +9,7 @@ std::span<const FuzzTarget> AllFuzzTargets() {
       FuzzTarget{"pbrt", FuzzPbrt, PbrtSeeds},
       FuzzTarget{"gltf", FuzzGltf, GltfSeeds},
       FuzzTarget{"ply", FuzzPly, PlySeeds},
+      FuzzTarget{"sensors", FuzzSensors, SensorsSeeds},
       FuzzTarget{"image", FuzzImage, ImageSeeds},
       FuzzTarget{"accumulation", FuzzAccumulation, AccumulationSeeds},
       FuzzTarget{"block", FuzzBlock, BlockSeeds},

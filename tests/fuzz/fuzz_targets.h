@@ -30,6 +30,8 @@ bool FuzzGltf(std::string_view bytes);
 std::vector<std::string> GltfSeeds();
 bool FuzzPly(std::string_view bytes);
 std::vector<std::string> PlySeeds();
+bool FuzzSensors(std::string_view bytes);
+std::vector<std::string> SensorsSeeds();
 bool FuzzImage(std::string_view bytes);
 std::vector<std::string> ImageSeeds();
 

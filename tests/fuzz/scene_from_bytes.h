@@ -38,6 +38,9 @@ struct NamedBytes {
                                                 const std::string& name = "fuzz.pbrt") {
   static const std::map<std::string, std::string>& good =
       *new std::map<std::string, std::string>{{"part.pbrt", "Shape \"sphere\"\n"},
+                                              {"whole.pbrt",
+                                               "Camera \"perspective\" WorldBegin "
+                                               "LightSource \"point\" Shape \"sphere\"\n"},
                                               {"mesh.ply", FilesOf("fuzz/seeds/ply").at(0).bytes},
                                               {"sky.pfm", BytesOf("fuzz/seeds/image/square.pfm")},
                                               {"tiles.png", BytesOf("fuzz/seeds/image/rgb.png")}};

@@ -60,6 +60,14 @@ std::vector<std::string> PlySeeds() {
   return SeedsOf("fuzz/seeds/ply");
 }
 
+bool FuzzSensors(std::string_view bytes) {
+  return IsSoundOrRefused(SceneFromBytes(bytes, "fuzz.ply"));
+}
+
+std::vector<std::string> SensorsSeeds() {
+  return SeedsOf("fuzz/seeds/sensors");
+}
+
 // As a file of each format.
 bool FuzzImage(std::string_view bytes) {
   constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 20;

@@ -162,6 +162,14 @@ namespace lucerna {
     return "the crop window";
   }
   if (!scene.camera.camera_to_world.IsFinite()) return "the camera";
+  if (scene.sensors.empty() == (scene.camera.kind == Camera::Kind::kSensors)) return "no sensors";
+  for (const Sensor& sensor : scene.sensors) {
+    if (!IsFinite(sensor.position) || !is_unit(sensor.normal) || !(sensor.spacing > 0))
+      return "a sensor";
+  }
+  for (const auto& [a, b] : scene.sensor_borders) {
+    if (!IsFinite(a) || !IsFinite(b)) return "a border of sensors";
+  }
   return "";
 }
 

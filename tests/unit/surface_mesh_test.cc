@@ -47,20 +47,18 @@ using Field = std::function<double(const Sensor&)>;
 std::vector<Irradiance> Measure(const std::vector<Sensor>& sensors, const Field& field) {
   std::vector<Irradiance> measured;
   for (const Sensor& sensor : sensors)
-    measured.push_back({Gray(static_cast<float>(field(sensor))), 0});
+    measured.push_back({Gray(static_cast<float>(field(sensor))), 0, 0});
   return measured;
 }
 
 // As `lucerna bake` refines. Returns how many sensors were used.
 std::size_t Bake(SurfaceMesh& mesh, const Field& field, double tolerance) {
   std::size_t count = 0;
-  bool is_first = true;
   do {
     const std::vector<Sensor> sensors = mesh.NextSensors(true);
     count += sensors.size();
     mesh.SetMeasured(Measure(sensors, field));
-    if (std::exchange(is_first, false)) mesh.DropDarkerSides();
-  } while (mesh.Refine(tolerance) > 0);
+  } while (mesh.Refine(tolerance).value() > 0);
   const std::vector<Sensor> rest = mesh.NextSensors(false);
   mesh.SetMeasured(Measure(rest, field));
   return count + rest.size();
@@ -125,7 +123,7 @@ TEST(SurfaceMeshTest, ABoxHasAVertexAtEachCornerOfEachSide) {
 
 TEST(SurfaceMeshTest, StaysWholeAroundARim) {
   SurfaceMesh mesh = MeshOf(Box());
-  mesh.SplitLongEdges(1.6);
+  ASSERT_TRUE(mesh.SplitLongEdges(1.6).ok());
   Bake(mesh, Spot, 0.05);
   ExpectNoCracks(mesh);
   EXPECT_NEAR(AreaOf(mesh), 22, 1e-4);
@@ -157,7 +155,7 @@ TEST(SurfaceMeshTest, AToleranceOfZeroRefinesEverywhere) {
   SurfaceMesh uniform = MeshOf(Box());
   Bake(uniform, Spot, 0);
   SurfaceMesh adaptive = MeshOf(Box());
-  adaptive.SplitLongEdges(1.6);
+  ASSERT_TRUE(adaptive.SplitLongEdges(1.6).ok());
   Bake(adaptive, Spot, 0.05);
   for (const MeshFace& face : uniform.faces())
     EXPECT_LT(std::sqrt(uniform.AreaOf(face)), 0.1);
@@ -171,7 +169,7 @@ TEST(SurfaceMeshTest, DifferencesWithinTheNoiseAreNotRefined) {
   for (Irradiance& of : measured)
     of.noise = 0.4F;
   mesh.SetMeasured(measured);
-  EXPECT_EQ(mesh.Refine(0.05), 0U);
+  EXPECT_EQ(mesh.Refine(0.05).value(), 0U);
 }
 
 TEST(SurfaceMeshTest, TheBrighterSideIsKept) {
@@ -181,6 +179,8 @@ TEST(SurfaceMeshTest, TheBrighterSideIsKept) {
   AddQuad(scene, {0, 0, 1}, {0, 1, 0}, {1, 0, 0}, 0);
   const auto from_above = [](const Sensor& sensor) { return sensor.normal.z > 0 ? 1.0 : 0.1; };
   SurfaceMesh mesh = MeshOf(scene, MeasuredSides::kBrighter, 10);
+  mesh.SetMeasured(Measure(mesh.NextSensors(false), from_above));
+  mesh.DropDarkerSides();
   Bake(mesh, from_above, 0.05);
   ASSERT_EQ(mesh.faces().size(), 4U);
   for (const MeshFace& face : mesh.faces()) {
@@ -201,7 +201,7 @@ TEST(SurfaceMeshTest, NewVerticesOfASphereAreOnIt) {
   AddMaterial(scene, DiffuseMaterial(0.5F));
   AddSphere(scene, {1, 2, 3}, 2, 0);
   SurfaceMesh mesh = MeshOf(scene, MeasuredSides::kFront, 0.2);
-  mesh.SplitLongEdges(0.5);
+  ASSERT_TRUE(mesh.SplitLongEdges(0.5).ok());
   Bake(
       mesh, [](const Sensor& sensor) { return sensor.position.x > 1.5F ? 1.0 : 0.3; }, 0.05);
   ExpectNoCracks(mesh);
@@ -241,16 +241,18 @@ TEST(SurfaceMeshTest, SensorsLieOnTheirFaces) {
 
 TEST(SurfaceMeshTest, BucketsAreTheFaces) {
   SurfaceMesh mesh = MeshOf(Box(), MeasuredSides::kBrighter);
-  mesh.SplitLongEdges(0.9);
+  ASSERT_TRUE(mesh.SplitLongEdges(0.9).ok());
   const std::vector<Sensor> sensors = mesh.BucketSensors();
   ASSERT_EQ(sensors.size(), mesh.faces().size());
   // As many borders as edges, each once: of a box with both sides, 3/2 to two faces.
   EXPECT_EQ(mesh.BucketBorders().size(), 3 * mesh.faces().size() / 4);
-  mesh.SetBuckets(Measure(sensors, [](const Sensor& sensor) {
+  const auto from_outside = [](const Sensor& sensor) {
     const Vec3 middle = {0.5F, 1, 1.5F};
     return Dot(sensor.position - middle, sensor.normal) > 0 ? 1.0 + sensor.position.x : 0.5;
-  }));
+  };
+  mesh.SetBuckets(Measure(sensors, from_outside));
   mesh.DropDarkerSides();
+  mesh.SetBuckets(Measure(mesh.BucketSensors(), from_outside));
   EXPECT_NEAR(AreaOf(mesh), 22, 1e-5);
   const BakedMesh baked = BakedMeshOf(mesh);
   ASSERT_EQ(baked.surfaces.size(), 1U);
@@ -260,6 +262,20 @@ TEST(SurfaceMeshTest, BucketsAreTheFaces) {
     flux += mesh.AreaOf(face) * static_cast<double>(face.bucket->value.g);
   // 1 + x over the box: 6 on x = 0, 12 on x = 1, and 1.5 times 10 on the others.
   EXPECT_NEAR(flux, 6 + 12 + 15, 1e-3);
+}
+
+// Over a mesh of even irradiance 2 with noise 0.3 and bias 0.4: sqrt(0.25 / (4 + 0.04)).
+TEST(SurfaceMeshTest, TheErrorOfTheMeshIsThatOfItsVertices) {
+  SurfaceMesh mesh = MeshOf(Box());
+  mesh.SetMeasured(std::vector<Irradiance>(mesh.NextSensors(false).size(), {Gray(2), 0.3F, 0.4F}));
+  EXPECT_NEAR(mesh.RelativeError(), std::sqrt(0.25 / 4.04), 1e-6);
+}
+
+TEST(SurfaceMeshTest, ASpacingThatIsTooFineIsRefused) {
+  SurfaceMesh mesh = MeshOf(Box());
+  const Status status = mesh.SplitLongEdges(1e-9);
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("larger spacing"));
 }
 
 TEST(SurfaceMeshTest, ChoosesByMaterial) {
