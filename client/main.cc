@@ -379,6 +379,9 @@ int Run(int argc, char** argv) {
       ->default_str("brighter");
   bake->add_flag("--indirect-only", baked.indirect_only,
                  "leave out light that comes straight from lights");
+  bake->add_option("--plan", baked.plan_path,
+                   "SVG file to write: the largest surface, and what faces the same way, in false "
+                   "colours");
   bake->add_flag("--lux", baked.in_lux, "print illuminance: 683 lm/W times the luminance");
   add_image_flags(bake, baked.overrides);
   AddSettingFlags(*bake, SettingRole::kStopsJob, baked.overrides);
@@ -471,7 +474,9 @@ int Run(int argc, char** argv) {
   }
   server.token = *std::move(token);
 
-  CatchInterruptions();
+  // Where nobody waits for a job there is nothing to leave behind: these end at once.
+  const bool has_no_job = *validate || *plan || *diff || *digest || *png;
+  if (!has_no_job) CatchInterruptions();
   IgnoreGrpcLog();
   Status status = chosen();
   if (std::fflush(stdout) != 0 && status.ok()) {

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <utility>
 
+#include "client/bake/irradiance_picture.h"
 #include "client/bake/mesh_file.h"
 #include "client/bake/surface_figures.h"
 #include "client/connection.h"
@@ -150,6 +151,13 @@ Status CheckRequest(const BakeRequest& request) {
     return Failure(ExitCode::kUsage,
                    absl::StrCat(request.output_path, " is the scene; name another file with -o"));
   }
+  if (!request.plan_path.empty()) {
+    if (!request.plan_path.ends_with(".svg")) {
+      return Failure(ExitCode::kUsage,
+                     absl::StrCat("--plan ", request.plan_path, ": the name must end with .svg"));
+    }
+    LUCERNA_RETURN_IF_ERROR(CheckWritable(request.plan_path));
+  }
   return CheckWritable(request.output_path);
 }
 
@@ -257,6 +265,9 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
   LUCERNA_RETURN_IF_ERROR(WriteFile(request.output_path, IsPly(request.output_path)
                                                              ? MeshPly(baked, request.is_ascii)
                                                              : MeshGlb(baked)));
+  if (!request.plan_path.empty()) {
+    LUCERNA_RETURN_IF_ERROR(WriteFile(request.plan_path, IrradiancePlan(baked, request.in_lux)));
+  }
   const std::vector<SurfaceFigures> figures = FiguresOf(baked);
   if (output_options.json) {
     std::fputs(

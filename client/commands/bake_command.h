@@ -32,6 +32,7 @@ struct BakeRequest {
   SceneSource scene;
   RenderOverrides overrides;  // of each job
   std::string output_path;    // .ply or .glb
+  std::string plan_path;      // .svg; empty: none
   bool is_ascii = false;      // of a PLY file
   MeasuredSides sides = MeasuredSides::kBrighter;
   std::vector<std::string> materials;  // whose surfaces are measured; empty: all

@@ -240,6 +240,20 @@ TEST_F(ClientCommandsTest, AMissingSceneIsNamed) {
   EXPECT_NE(ran.err.find("none.pbrt"), std::string::npos) << ran.err;
 }
 
+TEST_F(ClientCommandsTest, ReadingASceneEndsAtOnceWhenToldTo) {
+  {
+    std::ofstream file(In("long.pbrt"));
+    file << "Camera \"perspective\" WorldBegin\n";
+    // Takes seconds to read.
+    for (int i = 0; i < 3'000'000; ++i)
+      file << "Shape \"sphere\"\n";
+  }
+  const pid_t pid = Start({"validate", In("long.pbrt")});
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  ::kill(pid, SIGTERM);
+  EXPECT_EQ(Finish(pid).code, -SIGTERM);
+}
+
 TEST_F(ClientCommandsTest, MisuseIsRefusedWithCodeTwo) {
   EXPECT_EQ(Run({}).code, 2);
   EXPECT_EQ(Run({"paint"}).code, 2);

@@ -16,6 +16,7 @@
 #include "gtest/gtest.h"
 #include <nlohmann/json.hpp>
 
+#include "client/bake/irradiance_picture.h"
 #include "client/bake/mesh_file.h"
 #include "client/bake/surface_figures.h"
 #include "render/formats/ply_file.h"
@@ -368,6 +369,40 @@ TEST(SurfaceFiguresTest, AreThoseOfLinearTriangles) {
   EXPECT_NEAR(figures[0].highest, 6, 1e-6);
   EXPECT_NEAR(figures[0].uniformity(), 1.0 / 3, 1e-6);
   EXPECT_THAT(FiguresTable(figures, true), HasSubstr("2049"));  // 3 · 683 lx
+}
+
+// A square of 1 m from which irradiance falls from 10 to 0 along x, and a smaller one that lies
+// above it, even: bands of 1, and nine lines of equal irradiance across the first.
+TEST(IrradiancePlanTest, HasBandsLinesAndAScale) {
+  BakedMesh mesh;
+  mesh.surfaces.push_back({.name = "0 floor",
+                           .positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}},
+                           .normals = std::vector<Vec3>(4, Vec3{0, 0, 1}),
+                           .irradiance = {Gray(0), Gray(10), Gray(10), Gray(0)},
+                           .noise = {0, 0, 0, 0},
+                           .faces = {{0, 1, 2}, {0, 2, 3}}});
+  mesh.surfaces.push_back({.name = "1 wall",
+                           .positions = {{0, 0, 0}, {0, 1, 0}, {0, 0, .5F}},
+                           .normals = std::vector<Vec3>(3, Vec3{1, 0, 0}),
+                           .irradiance = std::vector<Rgb>(3, Gray(99)),
+                           .noise = {0, 0, 0},
+                           .faces = {{0, 1, 2}}});
+  const std::string svg = IrradiancePlan(mesh, false);
+  const auto count = [&](const std::string& text) {
+    int found = 0;
+    for (std::size_t at = svg.find(text); at != std::string::npos; at = svg.find(text, at + 1))
+      ++found;
+    return found;
+  };
+  EXPECT_EQ(svg.find("<svg"), 0U);
+  EXPECT_THAT(svg, HasSubstr("W/m"));
+  // Means of the two triangles are 10/3 and 20/3: up to the larger one bands are of 0.5.
+  EXPECT_EQ(count("<rect x="), 14);
+  EXPECT_THAT(svg, HasSubstr(">6.5</text>"));
+  // Of each band a part in each triangle that has it, none of the wall.
+  EXPECT_EQ(count("<path d=\"M"), 2 * 14 + 1);
+  // The line at 5 W/m² runs across the middle of the square, which is 800 pixels wide.
+  EXPECT_THAT(svg, HasSubstr("420.0 "));
 }
 
 }  // namespace
