@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -30,6 +31,7 @@ using Polygon = std::vector<Corner>;
 
 struct PlanFace {
   std::array<Corner, 3> corners;
+  std::size_t surface = 0;
   double depth = 0;  // towards the eye
   double area = 0;
 };
@@ -145,11 +147,15 @@ std::string IrradiancePlan(const BakedMesh& mesh, bool in_lux) {
   std::vector<PlanFace> faces;
   std::array<double, 2> low = {HUGE_VAL, HUGE_VAL};
   std::array<double, 2> high = {-HUGE_VAL, -HUGE_VAL};
-  for (const BakedMesh::Surface& surface : mesh.surfaces) {
+  std::vector<double> depths(mesh.surfaces.size());  // means over the area
+  for (std::size_t number = 0; number < mesh.surfaces.size(); ++number) {
+    const BakedMesh::Surface& surface = mesh.surfaces[number];
+    double area = 0;
     for (const auto& face : surface.faces) {
       const Double3 normal = NormalOf(surface, face);
       if (!(Dot(normal, view) > kSameDirection * Length(normal))) continue;
       PlanFace plan;
+      plan.surface = number;
       plan.area = Length(normal) / 2;
       for (std::size_t i = 0; i < 3; ++i) {
         const Double3 at(surface.positions[face[i]]);
@@ -159,11 +165,17 @@ std::string IrradiancePlan(const BakedMesh& mesh, bool in_lux) {
         low = {std::min(low[0], plan.corners[i].x), std::min(low[1], plan.corners[i].y)};
         high = {std::max(high[0], plan.corners[i].x), std::max(high[1], plan.corners[i].y)};
       }
+      depths[number] += plan.area * plan.depth;
+      area += plan.area;
       faces.push_back(plan);
     }
+    if (area > 0) depths[number] /= area;
   }
-  std::ranges::stable_sort(faces,
-                           [](const PlanFace& a, const PlanFace& b) { return a.depth < b.depth; });
+  // Lines of a surface must not be seen through the ones above it.
+  std::ranges::stable_sort(faces, [&](const PlanFace& a, const PlanFace& b) {
+    return std::tuple(depths[a.surface], a.surface, a.depth) <
+           std::tuple(depths[b.surface], b.surface, b.depth);
+  });
   const double extent = std::max({high[0] - low[0], high[1] - low[1], 1e-30});
   const double pixels = kWidth / extent;
   const double height = std::max((high[1] - low[1]) * pixels, 260.0);
@@ -184,7 +196,14 @@ std::string IrradiancePlan(const BakedMesh& mesh, bool in_lux) {
       "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n",
       width, height + 2 * kMargin);
   std::string lines;
+  const auto finish_surface = [&] {
+    if (lines.empty()) return;
+    svg += "<path d=\"" + lines + "\" fill=\"none\" stroke=\"black\" stroke-width=\".6\"/>\n";
+    lines.clear();
+  };
+  std::size_t surface = faces.empty() ? 0 : faces.front().surface;
   for (const PlanFace& face : faces) {
+    if (std::exchange(surface, face.surface) != face.surface) finish_surface();
     const Polygon whole(face.corners.begin(), face.corners.end());
     const auto [least, most] =
         std::ranges::minmax({face.corners[0].value, face.corners[1].value, face.corners[2].value});
@@ -211,7 +230,7 @@ std::string IrradiancePlan(const BakedMesh& mesh, bool in_lux) {
       }
     }
   }
-  svg += "<path d=\"" + lines + "\" fill=\"none\" stroke=\"black\" stroke-width=\".6\"/>\n";
+  finish_surface();
 
   const double left = kWidth + 2 * kMargin;
   const double part_height = std::min(24.0, height / (bands + 1));

@@ -24,7 +24,7 @@ struct BakedMesh {
   std::vector<Surface> surfaces;
   std::string scene;    // the scene's file
   double spacing = 0;   // as asked for
-  double estimate = 0;  // SurfaceMesh::RelativeError
+  double estimate = 0;  // of the relative error at evenly spread points; 0: none
 };
 
 // Of a histogram, each face has vertices of its own. Requires that all vertices of faces, or all

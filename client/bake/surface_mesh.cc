@@ -561,24 +561,6 @@ double SurfaceMesh::MeanIrradiance() const {
   return area > 0 ? sum / area : 0;
 }
 
-double SurfaceMesh::RelativeError() const {
-  const double floor = kDarkShare * MeanIrradiance();
-  if (!(floor > 0)) return 0;
-  double sum = 0;
-  double area = 0;
-  for (const MeshFace& face : faces_) {
-    for (const std::uint32_t vertex : face.vertices) {
-      const Irradiance at = AtCorner(face, vertex);
-      const auto noise = static_cast<double>(at.noise);
-      const auto bias = static_cast<double>(at.bias);
-      const double value = LuminanceOf(at);
-      sum += AreaOf(face) * (noise * noise + bias * bias) / (value * value + floor * floor);
-      area += AreaOf(face);
-    }
-  }
-  return std::sqrt(sum / area);
-}
-
 StatusOr<std::size_t> SurfaceMesh::Refine(double tolerance) {
   const double floor = kDarkShare * MeanIrradiance();
   std::set<Pair> places;

@@ -36,7 +36,6 @@ namespace lucerna {
 struct Irradiance {
   Rgb value;
   float noise = 0;  // standard deviation of the luminance
-  float bias = 0;   // of the luminance, as it is estimated
 };
 
 struct MeshVertex {
@@ -121,10 +120,6 @@ class SurfaceMesh {
   [[nodiscard]] double AreaOf(const MeshFace& face) const;
   // Of the luminance over the area; 0 of an empty mesh.
   [[nodiscard]] double MeanIrradiance() const;
-  // Root of the mean over the area of (noise² + bias²) / (value² + (a tenth of the mean)²), as for
-  // images (render/estimate/relative_error.h); 0 where there is no light. Requires that all is
-  // measured.
-  [[nodiscard]] double RelativeError() const;
 
  private:
   // Two numbers in order.

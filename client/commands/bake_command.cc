@@ -14,6 +14,7 @@
 #include "client/exit_code.h"
 #include "client/job_run.h"
 #include "client/scene_reading.h"
+#include "client/view/convergence.h"
 #include "client/view/report.h"
 #include "render/base/files.h"
 #include "render/formats/sensors/sensors_reader.h"
@@ -110,7 +111,6 @@ StatusOr<std::vector<Irradiance>> MeasuredIn(const Image& image, std::size_t cou
   const ImageChannel* const b = image.Find(layer + "B");
   // Absent after a single pass.
   const ImageChannel* const noise = image.Find("noise");
-  const ImageChannel* const bias = image.Find("bias");
   if (r == nullptr || g == nullptr || b == nullptr || r->pixels.size() < count) {
     return absl::DataLossError("the image of a job has not a pixel for each sensor");
   }
@@ -121,7 +121,6 @@ StatusOr<std::vector<Irradiance>> MeasuredIn(const Image& image, std::size_t cou
     measured[i].value = {irradiance_of(r->pixels[i]), irradiance_of(g->pixels[i]),
                          irradiance_of(b->pixels[i])};
     if (noise != nullptr) measured[i].noise = irradiance_of(noise->pixels[i]);
-    if (bias != nullptr) measured[i].bias = irradiance_of(bias->pixels[i]);
   }
   return measured;
 }
@@ -261,7 +260,9 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
   BakedMesh baked = BakedMeshOf(mesh);
   baked.scene = read.manifest.main_path;
   baked.spacing = options.spacing;
-  baked.estimate = mesh.RelativeError();
+  // Its points are spread evenly over the surfaces.
+  const std::optional<RelativeError> error = NewestError(rounds.front().job);
+  if (error) baked.estimate = error->value;
   LUCERNA_RETURN_IF_ERROR(WriteFile(request.output_path, IsPly(request.output_path)
                                                              ? MeshPly(baked, request.is_ascii)
                                                              : MeshGlb(baked)));
@@ -270,13 +271,16 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
   }
   const std::vector<SurfaceFigures> figures = FiguresOf(baked);
   if (output_options.json) {
-    std::fputs(
-        BakeReport(rounds, figures, baked.estimate, mesh.InterpolationError(), request.output_path)
-            .c_str(),
-        stdout);
+    std::fputs(BakeReport(rounds, figures, mesh.InterpolationError(), request.output_path).c_str(),
+               stdout);
   } else if (!output_options.quiet) {
     std::fputs(FiguresTable(figures, request.in_lux).c_str(), stdout);
-    std::printf("estimated error %.2g %%", 100 * baked.estimate);
+    if (error) {
+      std::printf("estimated error %.2g %% (95 %%: %.2g %% to %.2g %%)", 100 * error->value,
+                  100 * error->low, 100 * error->high);
+    } else {
+      std::printf("no estimate of the error");
+    }
     if (!is_histogram) {
       std::printf("; between vertices the mesh differs by %.2g %% of the mean",
                   100 * mesh.InterpolationError());

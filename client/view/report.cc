@@ -478,8 +478,8 @@ std::string ReferenceReport(const Image& reference, const std::string& path) {
 }
 
 std::string BakeReport(const std::vector<BakeRound>& rounds,
-                       const std::vector<SurfaceFigures>& figures, double relative_error,
-                       double interpolation_error, const std::string& path) {
+                       const std::vector<SurfaceFigures>& figures, double interpolation_error,
+                       const std::string& path) {
   Json json;
   json["rounds"] = Json::array();
   for (const BakeRound& round : rounds) {
@@ -506,7 +506,8 @@ std::string BakeReport(const std::vector<BakeRound>& rounds,
                                 {"max_lx", of.highest * kLumensPerWatt},
                                 {"uniformity", of.uniformity()}});
   }
-  json["relative_error"] = relative_error;
+  if (json["rounds"].front().contains("relative_error"))
+    json["relative_error"] = json["rounds"].front()["relative_error"];
   json["interpolation_error"] = interpolation_error;
   json["path"] = path;
   return ToText(json);

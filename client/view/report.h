@@ -49,12 +49,12 @@ struct BakeRound {
   std::size_t points = 0;
   v1::Job job;
 };
-// What was measured, and of the mesh: figures of its surfaces, SurfaceMesh::RelativeError and
-// InterpolationError.
+// What was measured, and of the mesh: figures of its surfaces, SurfaceMesh::InterpolationError, and
+// the error that the first round estimated at its points, which are spread evenly. Requires a
+// round.
 [[nodiscard]] std::string BakeReport(const std::vector<BakeRound>& rounds,
                                      const std::vector<SurfaceFigures>& figures,
-                                     double relative_error, double interpolation_error,
-                                     const std::string& path);
+                                     double interpolation_error, const std::string& path);
 [[nodiscard]] std::string PhotonReport(const v1::PhotonPath& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
 [[nodiscard]] std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost);

@@ -4,6 +4,7 @@
 // Deterministic cases are exact up to rounding. The others are means of independent renders, and
 // their bounds Student's quantile of the spread, at a chance of a false alarm of 1e-3 for all of
 // this file.
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -22,7 +23,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr int kParts = 16;
-constexpr int kComparisons = 75;
+constexpr int kComparisons = 80;
 
 void SetSensors(Scene& scene, std::vector<Sensor> sensors, double spacing) {
   scene.camera = Camera();
@@ -139,6 +140,29 @@ TEST(SensorsTest, OfARectangleUnderItsCornerAndItsMiddle) {
   AddQuad(scene, {0, 0, 1}, {0, 1, 0}, {2, 0, 0}, 0, AddAreaLight(scene, 1));
   ExpectIrradiance(scene, SettingsOfSensors(scene), 1024,
                    {UnderCorner(2, 1, 1), 4 * UnderCorner(1, 0.5, 1)});
+}
+
+// The direct light of the two luminaires of an office on its desks.
+TEST(SensorsTest, OfTwoLuminairesOverADesk) {
+  Scene scene = LoadScene("office.pbrt");
+  std::vector<Sensor> sensors;
+  std::vector<double> expected;
+  for (const auto& [x, y] : {std::pair(1.8, 2.0), std::pair(1.1, 1.7), std::pair(4.9, 2.3)}) {
+    sensors.push_back({{static_cast<float>(x), static_cast<float>(y), 0.75F}, {0, 0, 1}, 0});
+    // Of the rectangle from (0, 0) to (a, b), seen from below (0, 0); odd in both.
+    const auto up_to = [](double a, double b) {
+      return std::copysign(1.0, a * b) * UnderCorner(std::abs(a), std::abs(b), 2.7 - 0.75);
+    };
+    double sum = 0;
+    for (const double left : {1.2, 3.6}) {
+      const double right = left + 1.2;
+      sum += up_to(right - x, 2.15 - y) - up_to(left - x, 2.15 - y) - up_to(right - x, 1.85 - y) +
+             up_to(left - x, 1.85 - y);
+    }
+    expected.push_back(6.0 * sum);
+  }
+  SetSensors(scene, std::move(sensors), 0.05);
+  ExpectIrradiance(scene, SettingsOfSensors(scene), 512, expected, 1e-3);
 }
 
 TEST(SensorsTest, OfAPenumbra) {
