@@ -265,7 +265,7 @@ def write_page(rows, arguments):
             "`tests/tools/make_study_scenes.py`, which no constant of the estimate has seen. All figures "
             "are in [results.csv](convergence/results.csv). The references have the radii of a job: bias that "
             "falls as slowly as theirs (waves, hard shadows) is partly hidden in them, so that true "
-            "errors of such scenes may be larger than shown. Columns: errors as fractions, `low` and `high` of the "
+            "errors of such scenes may be larger than shown ([how much](measurements/estimate-on-unseen-scenes.md)). Columns: errors as fractions, `low` and `high` of the "
             "95 % interval, `true_trimmed` without the worst 0.1 % of pixels.\n",
             "![Estimated over true error](convergence/overview.svg)\n"]
     judged = [row for row in rows if row["setting"] == "default"]
