@@ -474,7 +474,7 @@ int Run(int argc, char** argv) {
   }
   server.token = *std::move(token);
 
-  // Where nobody waits for a job there is nothing to leave behind: these end at once.
+  // These commands start no job and no process, so a signal may end them at once.
   const bool has_no_job = *validate || *plan || *diff || *digest || *png;
   if (!has_no_job) CatchInterruptions();
   IgnoreGrpcLog();

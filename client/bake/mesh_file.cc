@@ -28,10 +28,10 @@ constexpr int kElementArrayBuffer = 34963;
 // What is this many times as bright as the mean is white for viewers.
 constexpr double kWhite = 4;
 
-template <typename T>
-void Append(std::string& bytes, const std::vector<T>& values) {
+template <typename Values>
+void Append(std::string& bytes, const Values& values) {
   if (!values.empty()) {
-    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0]));
   }
 }
 
@@ -158,8 +158,8 @@ std::string MeshPly(const BakedMesh& mesh, bool is_ascii) {
       const Vec3 p = surface.positions[i];
       const Vec3 n = surface.normals[i];
       const Rgb e = surface.irradiance[i];
-      const std::vector<float> row = {p.x, p.y, p.z, n.x, n.y,
-                                      n.z, e.r, e.g, e.b, surface.noise[i]};
+      const std::array<float, 10> row = {p.x, p.y, p.z, n.x, n.y,
+                                         n.z, e.r, e.g, e.b, surface.noise[i]};
       if (!is_ascii) {
         Append(bytes, row);
         continue;
@@ -174,8 +174,8 @@ std::string MeshPly(const BakedMesh& mesh, bool is_ascii) {
   std::uint32_t first = 0;
   for (const BakedMesh::Surface& surface : mesh.surfaces) {
     for (const auto& face : surface.faces) {
-      const std::vector<std::uint32_t> corners = {first + face[0], first + face[1],
-                                                  first + face[2]};
+      const std::array<std::uint32_t, 3> corners = {first + face[0], first + face[1],
+                                                    first + face[2]};
       if (is_ascii) {
         bytes += Concat("3 ", corners[0], " ", corners[1], " ", corners[2], "\n");
       } else {

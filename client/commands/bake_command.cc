@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "client/bake/irradiance_picture.h"
+#include "client/bake/irradiance_plan.h"
 #include "client/bake/mesh_file.h"
 #include "client/bake/surface_figures.h"
 #include "client/connection.h"

@@ -25,7 +25,7 @@ using testing::HasSubstr;
 
 const std::string kBin = LUCERNA_BIN_DIR;
 
-// A lamp without extent over a grey floor and a glass ball.
+// A point light over a grey floor and a glass ball.
 constexpr const char* kScene = R"(
 LookAt 2 2 2  0 0 0  0 0 1
 Camera "perspective"
@@ -95,7 +95,7 @@ TEST_F(BakeTest, PrintsTheFiguresOfSurfaces) {
   const json& floor = report["surfaces"][0];
   EXPECT_EQ(floor["name"], "0 floor");
   EXPECT_NEAR(floor["area_m2"].get<double>(), 16, 1e-4);
-  // Under the lamp, and in the corner that the ball does not shade.
+  // Under the light, and in the corner that the ball does not shade.
   EXPECT_NEAR(floor["max_w_m2"].get<double>(), 10.0 / 4, 1e-4);
   EXPECT_LT(floor["min_w_m2"].get<double>(), 10 * 2 / std::pow(12, 1.5) + 1e-4);
   EXPECT_NEAR(floor["max_lx"].get<double>(), 683 * 10.0 / 4, 0.1);

@@ -231,7 +231,7 @@ TEST(SensorsTest, OfAFurnaceIsTheSameInCornersAndAtEdges) {
 
 TEST(SensorsTest, DoesNotPassAThinWall) {
   Scene scene = Floor({});
-  // A lamp in the half x < 0 of a closed box without light in the other half.
+  // A point light in the half x < 0 of a closed box without light in the other half.
   AddBox(scene, {-1, -1, -1}, {1, 1, 1}, 0);
   AddQuad(scene, {0, -1, -1}, {0, 2, 0}, {0, 0, 2}, 0);
   PointLight light;
@@ -249,11 +249,11 @@ TEST(SensorsTest, DoesNotPassAThinWall) {
   EXPECT_GT(image.Find("G")->pixels[2], 0.1F);
 }
 
-// A lamp behind a film that bends next to nothing: all its light is carried by photons. Each
-// triangle of the floor is a bucket.
+// A point light within glass of an index of nearly 1: photons carry all its light. Each triangle of
+// the floor is a bucket.
 TEST(SensorsTest, BucketsHoldThePhotonsOfTheirTriangles) {
   constexpr int kSide = 4;       // squares along a side of the floor
-  constexpr double kHeight = 3;  // of the lamp
+  constexpr double kHeight = 3;  // of the light
   Scene scene;
   AddMaterial(scene, DiffuseMaterial(0.5F));
   AddQuad(scene, {-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, 0);

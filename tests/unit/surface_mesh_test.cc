@@ -16,7 +16,7 @@
 #include "gtest/gtest.h"
 #include <nlohmann/json.hpp>
 
-#include "client/bake/irradiance_picture.h"
+#include "client/bake/irradiance_plan.h"
 #include "client/bake/mesh_file.h"
 #include "client/bake/surface_figures.h"
 #include "render/formats/ply_file.h"
@@ -362,6 +362,26 @@ TEST(SurfaceFiguresTest, AreThoseOfLinearTriangles) {
   EXPECT_NEAR(figures[0].highest, 6, 1e-6);
   EXPECT_NEAR(figures[0].uniformity(), 1.0 / 3, 1e-6);
   EXPECT_THAT(FiguresTable(figures, true), HasSubstr("2049"));  // 3 · 683 lx
+}
+
+TEST(IrradiancePlanTest, HoldsWhatIsFarBrighterThanTheRest) {
+  BakedMesh mesh;
+  mesh.surfaces.push_back({.name = "0 floor",
+                           .positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {2, 0, 0}},
+                           .normals = std::vector<Vec3>(5, Vec3{0, 0, 1}),
+                           .irradiance = {Gray(1), Gray(1), Gray(1), Gray(1), Gray(1e30F)},
+                           .noise = {0, 0, 0, 0, 0},
+                           .faces = {{0, 1, 2}, {0, 2, 3}}});
+  // One triangle of a thousandth of the area has a corner that is 1e30 times as bright.
+  mesh.surfaces[0].positions[4] = {1.002F, 0, 0};
+  mesh.surfaces[0].faces.push_back({1, 4, 2});
+  const std::string svg = IrradiancePlan(mesh, false);
+  EXPECT_THAT(svg, HasSubstr(">0.9</text>"));
+  // Each triangle is there, in the last band alone.
+  std::size_t paths = 0;
+  for (std::size_t at = svg.find("<path"); at != std::string::npos; at = svg.find("<path", at + 1))
+    ++paths;
+  EXPECT_EQ(paths, 3U);
 }
 
 // A square of 1 m from which irradiance falls from 10 to 0 along x, and a smaller one that lies

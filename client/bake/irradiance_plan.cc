@@ -1,4 +1,4 @@
-#include "client/bake/irradiance_picture.h"
+#include "client/bake/irradiance_plan.h"
 
 #include <algorithm>
 #include <array>
@@ -86,7 +86,7 @@ Double3 NormalOf(const BakedMesh::Surface& surface, const std::array<std::uint32
                        surface.positions[face[2]]);
 }
 
-// Unit, of the surface with the largest area; zero when its faces cancel each other.
+// Unit, of the surface with the largest area; from above when its faces cancel each other.
 Double3 ViewOf(const BakedMesh& mesh) {
   double largest = -1;
   Double3 view;
@@ -207,8 +207,12 @@ std::string IrradiancePlan(const BakedMesh& mesh, bool in_lux) {
     const Polygon whole(face.corners.begin(), face.corners.end());
     const auto [least, most] =
         std::ranges::minmax({face.corners[0].value, face.corners[1].value, face.corners[2].value});
-    const int first = std::clamp(static_cast<int>(least / step), 0, bands - 1);
-    const int last = std::clamp(static_cast<int>(most / step), 0, bands - 1);
+    // Clamped as doubles: the brightest places may have more steps than an int holds.
+    const auto band_of = [&](double value) {
+      return static_cast<int>(std::clamp(value / step, 0.0, bands - 1.0));
+    };
+    const int first = band_of(least);
+    const int last = band_of(most);
     for (int band = first; band <= last; ++band) {
       Polygon part = band > first ? Clip(whole, band * step, 1) : whole;
       if (band < last) part = Clip(part, (band + 1) * step, -1);
