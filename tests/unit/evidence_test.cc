@@ -153,7 +153,7 @@ TEST(EvidenceTest, IsMergedCheckedAndCarriedOnTheWire) {
   EXPECT_EQ(*decoded, sum);
 }
 
-// A scene ready for spectra, with kernels of radius 0.01.
+// A scene ready for spectra, with kernels of radius 0.01. Its last mesh is flat, and receives.
 struct SpectrumScene {
   explicit SpectrumScene(Scene s) : scene(std::move(s)) {
     intersector = Intersector::Create(scene).value();
@@ -177,7 +177,7 @@ struct SpectrumScene {
     auto carried = tracer->Leave(emission);
     tracer->Fly(carried, emission.ray, distance, SpectrumTracer::Shadows::kLeftOut);
     SurfacePoint receiver;
-    receiver.geometry = UINT32_MAX;  // no shape of the scene: flat
+    receiver.geometry = static_cast<std::uint32_t>(scene.meshes.size()) - 1;
     receiver.shading_normal = receiver.geometric_normal = -direction;
     return static_cast<double>(tracer->Received(carried, receiver, material, -direction));
   }
@@ -193,6 +193,7 @@ TEST(SpectrumTracerTest, TakesAConnectedLampAsOneInHoweverManyMeshesItComes) {
   const std::int32_t material = AddMaterial(whole, DiffuseMaterial(0.5F));
   AddQuad(whole, {0, 0, 0}, {0, 0.3F, 0}, {0.3F, 0, 0}, material, AddAreaLight(whole, 1));
   AddQuad(whole, {5, 5, 0}, {0, 0.1F, 0}, {0.1F, 0, 0}, material, AddAreaLight(whole, 1));
+  AddQuad(whole, {-5, -5, -3}, {10, 0, 0}, {0, 10, 0}, material);
   // The first light's triangles as two meshes.
   Scene split = whole;
   TriangleMesh second = split.meshes[0];
