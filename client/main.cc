@@ -28,7 +28,7 @@
 #include "render/base/escape.h"
 #include "render/base/version.h"
 #include "render/wire/channel.h"
-#include "render/wire/grpc_log.h"
+#include "render/wire/grpc_process.h"
 #include "render/wire/security_flags.h"
 
 namespace lucerna {

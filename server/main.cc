@@ -29,7 +29,7 @@
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
-#include "render/wire/grpc_log.h"
+#include "render/wire/grpc_process.h"
 #include "render/wire/security_flags.h"
 #include "server/acceptor.h"
 #include "server/access.h"
@@ -82,6 +82,7 @@ sigset_t BlockEndSignals() {
 
 int Serve(const Flags& flags) {
   const sigset_t end_signals = BlockEndSignals();
+  KeepGrpc();
   RaiseDescriptorLimit();
   const Clock& clock = SystemClock();
   std::unique_ptr<DurableState> state;

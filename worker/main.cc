@@ -25,7 +25,7 @@
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
-#include "render/wire/grpc_log.h"
+#include "render/wire/grpc_process.h"
 #include "render/wire/security_flags.h"
 #include "worker/replay.h"
 #include "worker/session.h"

@@ -13,6 +13,8 @@
 #include <grpcpp/security/tls_credentials_options.h>
 #include <grpcpp/support/client_interceptor.h>
 
+#include "render/wire/grpc_process.h"
+
 namespace lucerna {
 namespace {
 
@@ -134,6 +136,7 @@ std::shared_ptr<grpc::Channel> MakeChannel(const Endpoint& endpoint, Traffic tra
   if (!endpoint.token.empty()) {
     interceptors.push_back(std::make_unique<TokenInterceptorFactory>(endpoint.token));
   }
+  KeepGrpc();
   return grpc::experimental::CreateCustomChannelWithInterceptors(
       endpoint.address, MakeChannelCredentials(endpoint.tls), arguments, std::move(interceptors));
 }

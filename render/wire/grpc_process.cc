@@ -1,5 +1,6 @@
-#include "render/wire/grpc_log.h"
+#include "render/wire/grpc_process.h"
 
+#include <grpc/grpc.h>
 #include <grpc/support/log.h>
 
 namespace lucerna {
@@ -19,6 +20,14 @@ void TakeGrpcErrors(void (*on_error)(const std::string& message)) {
   gpr_set_log_function([](gpr_log_func_args* line) {
     if (line->severity == GPR_LOG_SEVERITY_ERROR) error_sink(line->message);
   });
+}
+
+void KeepGrpc() {
+  // Never undone, so that no object is the last one.
+  [[maybe_unused]] static const bool is_kept = [] {
+    grpc_init();
+    return true;
+  }();
 }
 
 }  // namespace lucerna
