@@ -288,6 +288,10 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
         std::make_shared<const PhotonGuide>(state->learner->First(photons_per_pass));
   }
   state->has_smooth_surfaces = HasSmoothSurfaces(prepared.scene());
+  const HitpointExtent extent = SampleExtent(*state->tracer);
+  state->view = extent.bounds;
+  state->widest_radius = HitpointRadius(initial, extent.widest_unit_radius);
+  state->hit_share = extent.rows_per_pixel;
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));
 }
 
@@ -320,16 +324,6 @@ SliceShape JobEstimator::ShapeOf(const PassRange& round, const RoundPlan& plan) 
 SliceSums JobEstimator::SliceOf(const EyePass& pass, const RoundPlan& plan,
                                 const PassSums& sums) const {
   return SliceOfPass(pass, plan, sums, state_->settings, state_->prepared.flux_scale());
-}
-
-void JobEstimator::LookAtFirstPass(const EyePass& pass, const RoundPlan& plan) {
-  const RadiusColumn radii = HitpointRadii(pass, plan);
-  for (std::size_t row = 0; row < pass.block.size(); ++row) {
-    state_->view.Add(pass.block.positions[row]);
-    state_->widest_radius = std::max(state_->widest_radius, radii[row]);
-  }
-  state_->hit_share =
-      static_cast<double>(pass.block.size()) / static_cast<double>(pass.direct.size());
 }
 
 void JobEstimator::AddRound(const SliceSums& round, const RoundPlan& plan) {

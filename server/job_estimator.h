@@ -89,8 +89,6 @@ class JobEstimator {
   // The slice of a pass whose photons brought `sums`, of pass.block.size() rows.
   [[nodiscard]] SliceSums SliceOf(const EyePass& pass, const RoundPlan& plan,
                                   const PassSums& sums) const;
-  // What is known of the view from the first pass, which every job traces itself.
-  void LookAtFirstPass(const EyePass& pass, const RoundPlan& plan);
   // Requires the next round, whole, and its plan.
   void AddRound(const SliceSums& round, const RoundPlan& plan);
   // Slices of the round after those added, from its first pass on without a gap, and its plan: they

@@ -353,14 +353,13 @@ Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
   open.sums = std::exchange(next_sums_, MemoryClaim());
   // As many passes can be out at once as lie between this round's end and those that its radii
   // follow from. While a job is young and these are fewer than the workers, several share one.
-  // Later that would cost more than it brings: hitpoints would travel to every worker. The first
-  // is split also when there is one worker, because this process has nothing better to do than its
-  // eye paths.
+  // Later that would cost more than it brings: hitpoints would travel to every worker. Before any
+  // worker has come this process has nothing better to do than the eye paths of the first.
   const std::uint64_t at_once = round.last - RadiiFrom(round);
   const bool is_young = round.first < kYoungPasses;
+  const auto workers = static_cast<std::uint64_t>(hooks_.scheduler.LiveWorkers());
   open.is_split =
-      hooks_.always_splits || round.first == 0 ||
-      (is_young && at_once < static_cast<std::uint64_t>(hooks_.scheduler.LiveWorkers()));
+      hooks_.always_splits || (is_young && at_once < workers) || (round.first == 0 && workers == 0);
   if (photon_steps_.empty() ||
       photon_steps_.back().photons_per_pass != open.plan.photons_per_pass) {
     photon_steps_.push_back({round.first, open.plan.photons_per_pass});
@@ -383,6 +382,7 @@ Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
     first = slice->passes.last;
   }
   if (first > round.first) next_split_ = first;
+  if (round.first == 0 && !open.is_split) next_split_ = round.last;
   if (!open.is_split) {
     std::string bytes = EncodeRadii(*open.plan.radii);
     const Digest digest = Sha256(bytes);
@@ -488,7 +488,6 @@ Status JobRunner::TakeInSplitPass(const SplitPass& open) {
   {
     const MutexLock lock(estimator_mutex_);
     const RoundPlan& plan = OpenRoundOf(key.pass).plan;
-    if (key.pass == 0) estimator_->LookAtFirstPass(open.traced.eye, plan);
     slice = estimator_->SliceOf(open.traced.eye, plan, sums);
   }
   return hooks_.rounds.Merge(KeyOf(RoundOf(key.pass).first), std::move(slice)).status();

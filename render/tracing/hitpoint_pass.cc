@@ -1,6 +1,7 @@
 #include "render/tracing/hitpoint_pass.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "render/math/octahedral.h"
 
@@ -23,6 +24,17 @@ constexpr float kSegmentShare = 0.5F;
 // there weighs up to the square of the inverse more than one at the end: with an eighth, few
 // photons near a camera in fog were bright dots over the whole image.
 constexpr float kLeastNarrowing = 0.5F;
+
+// Of an image, at most about so many pixels tell where its hitpoints are.
+constexpr double kExtentPixels = 16384;
+
+float UnitRadiusOf(const EyePathTracer& tracer, const EyeHitpoint& hitpoint) {
+  return tracer.settings().initial_radius == 0 ? HeldWidth(hitpoint.footprint) : 1.0F;
+}
+float UnitRadiusOf(const EyePathTracer& tracer, const EyeSegment& segment) {
+  return tracer.settings().initial_radius == 0 ? kSegmentShare * HeldWidth(segment.to_footprint)
+                                               : kSegmentShare;
+}
 
 }  // namespace
 
@@ -89,17 +101,14 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
               rows.places.push_back(hitpoint.place);
             }
             rows.rows.push_back({pixel, hitpoint.position, EncodeOctahedral(hitpoint.normal),
-                                 hitpoint.weight,
-                                 automatic ? HeldWidth(hitpoint.footprint) : 1.0F});
+                                 hitpoint.weight, UnitRadiusOf(tracer, hitpoint)});
           };
           keep(path.hitpoint, per_tile[tile].rows);
           keep(path.caustic, per_tile[tile].caustic_rows);
           if (const EyeSegment& segment = path.segment; !IsBlack(segment.weight)) {
             Tile& of = per_tile[tile];
-            const float unit =
-                automatic ? kSegmentShare * HeldWidth(segment.to_footprint) : kSegmentShare;
-            of.segment_rows.rows.push_back(
-                {pixel, segment.from, EncodeOctahedral({0, 0, 1}), segment.weight, unit});
+            of.segment_rows.rows.push_back({pixel, segment.from, EncodeOctahedral({0, 0, 1}),
+                                            segment.weight, UnitRadiusOf(tracer, segment)});
             of.segments.push_back({segment.to, static_cast<std::uint32_t>(segment.medium),
                                    automatic
                                        ? std::clamp(segment.from_footprint / segment.to_footprint,
@@ -162,6 +171,33 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     out.block.segments.insert(out.block.segments.end(), tile.segments.begin(), tile.segments.end());
   }
   return out;
+}
+
+HitpointExtent SampleExtent(const EyePathTracer& tracer) {
+  const int width = tracer.settings().crop_width();
+  const int height = tracer.settings().crop_height();
+  const double pixels = static_cast<double>(width) * static_cast<double>(height);
+  const int step = std::max(1, static_cast<int>(std::sqrt(pixels / kExtentPixels)));
+  HitpointExtent extent;
+  std::size_t sampled = 0;
+  std::size_t rows = 0;
+  const auto add = [&](const auto& place, Vec3 position) {
+    if (IsBlack(place.weight)) return;
+    ++rows;
+    extent.bounds.Add(position);
+    extent.widest_unit_radius = std::max(extent.widest_unit_radius, UnitRadiusOf(tracer, place));
+  };
+  for (int y = std::min(step, height) / 2; y < height; y += step) {
+    for (int x = std::min(step, width) / 2; x < width; x += step) {
+      const EyePath path = tracer.Trace(x, y, /*pass=*/0, {});
+      ++sampled;
+      add(path.hitpoint, path.hitpoint.position);
+      add(path.caustic, path.caustic.position);
+      add(path.segment, path.segment.from);
+    }
+  }
+  extent.rows_per_pixel = static_cast<double>(rows) / static_cast<double>(sampled);
+  return extent;
 }
 
 }  // namespace lucerna

@@ -39,4 +39,14 @@ struct EyePass {
                                         FirstHitsOfSet* known, FilmSpread& spread,
                                         ThreadTeam& team);
 
+// Where the hitpoints of the first pass are, and how many pixels have one.
+struct HitpointExtent {
+  Bounds bounds;
+  float widest_unit_radius = 0;
+  double rows_per_pixel = 0;
+};
+
+// Of evenly spaced pixels, 16,384 of a larger image.
+[[nodiscard]] HitpointExtent SampleExtent(const EyePathTracer& tracer);
+
 }  // namespace lucerna

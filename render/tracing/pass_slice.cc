@@ -14,12 +14,6 @@ namespace {
 constexpr double kSmallestRadius = 1e-18;
 constexpr double kLargestRadius = 1e18;
 
-float HitpointRadius(float radius, float unit_radius) {
-  return static_cast<float>(
-      std::clamp(static_cast<double>(radius) * static_cast<double>(unit_radius), kSmallestRadius,
-                 kLargestRadius));
-}
-
 // What a pass brings to one pixel.
 struct PixelOfPass {
   std::array<double, 3> photons{};
@@ -27,6 +21,12 @@ struct PixelOfPass {
 };
 
 }  // namespace
+
+float HitpointRadius(float radius, float unit_radius) {
+  return static_cast<float>(
+      std::clamp(static_cast<double>(radius) * static_cast<double>(unit_radius), kSmallestRadius,
+                 kLargestRadius));
+}
 
 RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan) {
   RadiusColumn of_hitpoints(pass.pixels.size());

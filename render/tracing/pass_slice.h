@@ -27,6 +27,9 @@ struct RoundPlan {
   std::shared_ptr<const PhotonGuide> guide = nullptr;
 };
 
+// Of a radius [units of the settings] whose unit has this length there [scene units].
+[[nodiscard]] float HitpointRadius(float radius, float unit_radius);
+
 // The radius of every hitpoint of a pass [scene units].
 [[nodiscard]] RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan);
 

@@ -56,7 +56,6 @@ class TimedRender {
       round_.emplace(round);
     }
     // As in a job: the coordinator knows the eye paths of the first pass.
-    if (pass_ == 0) estimator_->LookAtFirstPass(estimator_->TraceEyePaths(0), *plan_);
     SliceSums slice = *tracer_.RunSlice(settings_, needs_, {pass_, pass_ + 1}, *plan_, kNeverStop);
     const Duration traced = ProcessCpuTime();
     trace_s_ += Seconds(traced - start);

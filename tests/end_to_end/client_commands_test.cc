@@ -165,8 +165,8 @@ TEST_F(ClientCommandsTest, TheDigestDoesNotDependOnWorkersOrThreadsAndDoesOnTheS
   EXPECT_EQ(json::parse(diff.out)["rmse"], 0);
 }
 
-// After the first pass, whose hitpoints the coordinator traces, only radii go out: one column a
-// round, from pass 64 to 128 eight of them.
+// After the first pass, whose hitpoints the coordinator traces if no worker has come yet, only
+// radii go out: one column a round, from pass 64 to 128 eight of them.
 TEST_F(ClientCommandsTest, WholePassesAreLentWithOneColumnOfRadiiARound) {
   const auto sent = [&](const std::string& passes, std::vector<std::string> more) {
     std::vector<std::string> words = {"render",   SceneOfTests("corner.pbrt"),
@@ -183,15 +183,12 @@ TEST_F(ClientCommandsTest, WholePassesAreLentWithOneColumnOfRadiiARound) {
   const auto [once, bytes_once] = sent("64", {});
   const auto [again, bytes_again] = sent("128", {});
   const auto [fresh, bytes_fresh] = sent("128", {"--use-everything"});
-  EXPECT_LE(once, 48 * 48);
-  EXPECT_GT(once, 0);
-  EXPECT_EQ(again, once);
-  EXPECT_EQ(fresh, once);
+  for (const double hitpoints : {once, again, fresh})
+    EXPECT_LE(hitpoints, 48 * 48);
   // A radius is four bytes before compression. Each of the eight columns may be fetched by a slice
   // of its own.
   constexpr double kColumn = 4.0 * 48 * 48;
-  EXPECT_LT(bytes_again - bytes_once, 8 * 2 * kColumn);
-  EXPECT_GT(bytes_again, bytes_once);
+  EXPECT_LT(bytes_again, bytes_once + 8 * 2 * kColumn + 16 * 48 * 48);
 }
 
 TEST_F(ClientCommandsTest, PlanSaysWhatIsLeftOut) {

@@ -65,8 +65,10 @@ class SlicesTest : public testing::Test {
 };
 
 TEST_F(SlicesTest, AJobIsLentAsASplitPassAndThenInSlicesOfItsRounds) {
-  const std::string job = Submit(41);
   IdleHandsWorker worker(service_);
+  // Among several workers the first pass is split.
+  const IdleHandsWorker other(service_, "other");
+  const std::string job = Submit(41);
   std::set<std::uint64_t> passes;
   while (client_.Get(job).message.state() < v1::JOB_STATE_SUCCEEDED) {
     const auto answer = worker.Sync(true, Duration::zero());
@@ -396,8 +398,10 @@ TEST_F(SlicesTest, EarlyPassesAreSplitWhenThereAreManyWorkers) {
 // A worker that sends a whole pass where photons were asked for must not take the pass away from
 // under those who have its photons.
 TEST_F(SlicesTest, ASliceOfAPassThatIsSplitIsRefused) {
-  const std::string job = Submit(3);
   IdleHandsWorker worker(service_);
+  // Among several workers the first pass is split.
+  const IdleHandsWorker other(service_, "other");
+  const std::string job = Submit(3);
   std::optional<v1::Lease> lease = worker.TakeLease();
   while (lease && lease->pass() > 0)
     lease = worker.TakeLease();

@@ -46,7 +46,6 @@ void LocalRender::AddPass(int batches) {
     slice = OrDie(tracer_->RunSlice(settings_, needs_, {pass_, pass_ + 1}, *plan_, stop));
   } else {
     const EyePass eye = estimator_->TraceEyePaths(pass_);
-    if (pass_ == 0) estimator_->LookAtFirstPass(eye, *plan_);
     const RadiusColumn radii = HitpointRadii(eye, *plan_);
     PassSums sums(eye.block.size(),
                   EvidenceColumns(EvidenceOf(settings_.radius_controller, pass_)));

@@ -371,7 +371,6 @@ class RoundJob {
     while (estimator_->whole_passes() < last) {
       const PassRange round = RoundOf(estimator_->whole_passes());
       const RoundPlan plan = PlanOf(round);
-      if (round.first == 0) estimator_->LookAtFirstPass(estimator_->TraceEyePaths(0), plan);
       SliceTree tree(round);
       const std::uint64_t end = std::min(round.last, last);
       // From the back, so that slices come out of order.
