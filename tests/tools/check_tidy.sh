@@ -28,6 +28,6 @@ fi
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 sed -E 's/ -Winvalid-pch| -fpch-preprocess| -include [^ ]*cmake_pch\.hxx//g;
-        s/ -Wno-(restrict|stringop-overflow|array-bounds)//g' \
+        s/ -Wno-(restrict|stringop-overflow|stringop-overread|array-bounds)//g' \
   "$build/compile_commands.json" > "$scratch/compile_commands.json"
 printf '%s\n' "$@" | xargs -P "$(nproc)" -n 1 clang-tidy -p "$scratch" --quiet
