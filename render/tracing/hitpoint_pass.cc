@@ -25,7 +25,7 @@ constexpr float kSegmentShare = 0.5F;
 // photons near a camera in fog were bright dots over the whole image.
 constexpr float kLeastNarrowing = 0.5F;
 
-// Of an image, at most about so many pixels tell where its hitpoints are.
+// At most about so many pixels tell where the hitpoints of an image are.
 constexpr double kExtentPixels = 16384;
 
 float UnitRadiusOf(const EyePathTracer& tracer, const EyeHitpoint& hitpoint) {
@@ -177,7 +177,7 @@ HitpointExtent SampleExtent(const EyePathTracer& tracer) {
   const int width = tracer.settings().crop_width();
   const int height = tracer.settings().crop_height();
   const double pixels = static_cast<double>(width) * static_cast<double>(height);
-  const int step = std::max(1, static_cast<int>(std::sqrt(pixels / kExtentPixels)));
+  const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kExtentPixels))));
   HitpointExtent extent;
   std::size_t sampled = 0;
   std::size_t rows = 0;

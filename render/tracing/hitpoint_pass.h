@@ -46,7 +46,7 @@ struct HitpointExtent {
   double rows_per_pixel = 0;
 };
 
-// Of evenly spaced pixels, 16,384 of a larger image.
+// Of all pixels, or of at most about 16,384 evenly spaced ones.
 [[nodiscard]] HitpointExtent SampleExtent(const EyePathTracer& tracer);
 
 }  // namespace lucerna

@@ -55,7 +55,6 @@ class TimedRender {
       plan_ = estimator_->PlanFor(round);
       round_.emplace(round);
     }
-    // As in a job: the coordinator knows the eye paths of the first pass.
     SliceSums slice = *tracer_.RunSlice(settings_, needs_, {pass_, pass_ + 1}, *plan_, kNeverStop);
     const Duration traced = ProcessCpuTime();
     trace_s_ += Seconds(traced - start);
