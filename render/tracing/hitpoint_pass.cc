@@ -177,7 +177,7 @@ HitpointExtent SampleExtent(const EyePathTracer& tracer) {
   const int width = tracer.settings().crop_width();
   const int height = tracer.settings().crop_height();
   const double pixels = static_cast<double>(width) * static_cast<double>(height);
-  const int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kExtentPixels))));
+  int step = std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / kExtentPixels))));
   HitpointExtent extent;
   std::size_t sampled = 0;
   std::size_t rows = 0;
@@ -187,14 +187,23 @@ HitpointExtent SampleExtent(const EyePathTracer& tracer) {
     extent.bounds.Add(position);
     extent.widest_unit_radius = std::max(extent.widest_unit_radius, UnitRadiusOf(tracer, place));
   };
-  for (int y = std::min(step, height) / 2; y < height; y += step) {
-    for (int x = std::min(step, width) / 2; x < width; x += step) {
-      const EyePath path = tracer.Trace(x, y, /*pass=*/0, {});
-      ++sampled;
-      add(path.hitpoint, path.hitpoint.position);
-      add(path.caustic, path.caustic.position);
-      add(path.segment, path.segment.from);
+  const auto sample = [&] {
+    sampled = 0;
+    for (int y = std::min(step, height) / 2; y < height; y += step) {
+      for (int x = std::min(step, width) / 2; x < width; x += step) {
+        const EyePath path = tracer.Trace(x, y, /*pass=*/0, {});
+        ++sampled;
+        add(path.hitpoint, path.hitpoint.position);
+        add(path.caustic, path.caustic.position);
+        add(path.segment, path.segment.from);
+      }
     }
+  };
+  sample();
+  // All that is seen may lie between them.
+  if (rows == 0 && step > 1) {
+    step = 1;
+    sample();
   }
   extent.rows_per_pixel = static_cast<double>(rows) / static_cast<double>(sampled);
   return extent;

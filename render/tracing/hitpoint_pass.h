@@ -46,7 +46,7 @@ struct HitpointExtent {
   double rows_per_pixel = 0;
 };
 
-// Of all pixels, or of at most about 16,384 evenly spaced ones.
+// Of at most about 16,384 evenly spaced pixels, or of all where these have no hitpoint.
 [[nodiscard]] HitpointExtent SampleExtent(const EyePathTracer& tracer);
 
 }  // namespace lucerna
