@@ -236,19 +236,7 @@ struct JobEstimator::State {
         [&](std::uint32_t pixel) {
           return PhotonScore(*sums, *plan.radii, settings.crop_width(), means, pixel);
         },
-        [this](const PrimaryNumbers& numbers) { return FluxAt(numbers); }));
-  }
-
-  // Luminance of the flux of a photon that is drawn evenly, over the power of all lights.
-  [[nodiscard]] double FluxAt(const PrimaryNumbers& numbers) const {
-    Emission emission;
-    const auto single = [&](std::size_t d) { return static_cast<float>(numbers[d]); };
-    if (!prepared.lights().SampleEmission(numbers[4], single(0), single(1), single(2), single(3),
-                                          emission)) {
-      return 0;
-    }
-    return static_cast<double>(Luminance(emission.flux)) /
-           static_cast<double>(Luminance(prepared.lights().TotalPower()));
+        [this](const PrimaryNumbers& numbers) { return EvenFlux(prepared.lights(), numbers); }));
   }
 
   // Radiance over all passes, Rec. 709.
@@ -638,12 +626,6 @@ void JobEstimator::Save(ByteWriter& writer) const {
   WriteDouble(writer, state.best_photons);
   writer.Byte(state.variance != nullptr ? 1 : 0);
   if (state.variance != nullptr) WriteVariance(writer, state.variance->numbers());
-  for (const Vec3& corner : {state.view.low, state.view.high}) {
-    for (const float coordinate : {corner.x, corner.y, corner.z})
-      WriteFloat(writer, coordinate);
-  }
-  WriteFloat(writer, state.widest_radius);
-  WriteDouble(writer, state.hit_share);
 }
 
 Status JobEstimator::Restore(ByteReader& reader) {
@@ -680,13 +662,6 @@ Status JobEstimator::Restore(ByteReader& reader) {
                              ReadVariance(reader, pixels));
     variance = std::make_unique<PassVariance>(std::move(numbers_of_variance));
   }
-  Bounds view;
-  for (Vec3* const corner : {&view.low, &view.high}) {
-    for (float* const coordinate : {&corner->x, &corner->y, &corner->z})
-      *coordinate = ReadFloat(reader);
-  }
-  const float widest_radius = ReadFloat(reader);
-  const double hit_share = ReadDouble(reader);
   if (!reader.finished() || !after.contains(sums.passes)) {
     return absl::InvalidArgumentError("malformed checkpoint: it ends too soon or too late");
   }
@@ -702,9 +677,6 @@ Status JobEstimator::Restore(ByteReader& reader) {
   }
   state.best_photons = best_photons;
   state.variance = std::move(variance);
-  state.view = view;
-  state.widest_radius = widest_radius;
-  state.hit_share = hit_share;
   return absl::OkStatus();
 }
 

@@ -301,6 +301,8 @@ std::optional<std::array<std::uint16_t, kEmissionDimensions>> PhotonPathTracer::
   KeyedRng rng(CombineKeys(key.job_key, key.number));
   PrimaryNumbers numbers = EvenNumbers(OwenSobol(key.number, key.job_key), rng);
   guide_->Draw(numbers);
+  const double reported = guide_->reported() * ReportFactor(EvenFlux(lights_, numbers));
+  if (static_cast<double>(bits) >= reported) return std::nullopt;
   std::array<std::uint16_t, kEmissionDimensions> steps{};
   for (std::size_t d = 0; d < kEmissionDimensions; ++d)
     steps[d] = static_cast<std::uint16_t>(numbers[d] * 0x1p16);

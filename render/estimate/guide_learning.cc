@@ -228,14 +228,15 @@ void GuideLearner::Add(std::span<const EmissionReport> reports,
   numbers_.reports.insert(numbers_.reports.end(), reports.begin(), reports.end());
 }
 
-double GuideLearner::WeightAt(const PrimaryNumbers& numbers) const {
+double GuideLearner::WeightAt(const PrimaryNumbers& numbers, double flux) const {
   double trials = 0;
   double density = 0;
   for (const Drawn& drawn : numbers_.drawn) {
     trials += drawn.trials;
     density += drawn.trials / drawn.guide->WeightAt(numbers);
   }
-  return trials / density;
+  const double factor = ReportFactor(flux);
+  return factor > 0 ? trials / (density * factor) : 0;
 }
 
 PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_pass,
@@ -253,21 +254,22 @@ PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_p
     mean_score += scores.back() / count;
   }
   const double largest = kLargestScore * mean_score;
-  // Of a report there with this score.
-  const auto mass_of = [&](const PrimaryNumbers& numbers, double weight, double score) {
-    const double flux = flux_at(numbers);
-    return weight * flux * flux * score;
-  };
   // Each weight takes a walk down every guide so far.
   std::vector<double> weights(reports.size());
+  std::vector<double> fluxes(reports.size());
   std::vector<double> mass(reports.size());
+  const auto mass_of = [](double weight, double flux, double score) {
+    return weight * flux * flux * score;
+  };
   for (std::size_t i = 0; i < reports.size(); ++i) {
     const PrimaryNumbers numbers = NumbersOf(reports[i].numbers);
-    weights[i] = WeightAt(numbers);
-    mass[i] = mass_of(numbers, weights[i], std::min(scores[i], largest));
+    fluxes[i] = flux_at(numbers);
+    weights[i] = WeightAt(numbers, fluxes[i]);
+    mass[i] = mass_of(weights[i], fluxes[i], std::min(scores[i], largest));
   }
   GrownGuide grown = GrowGuide(reports, mass, [&](const PrimaryNumbers& numbers) {
-    return mass_of(numbers, WeightAt(numbers), mean_score);
+    const double flux = flux_at(numbers);
+    return mass_of(WeightAt(numbers, flux), flux, mean_score);
   });
   PhotonGuide guide;
   if (grown.gain >= kLeastGain) {
@@ -278,7 +280,7 @@ PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_p
   // Of the photons that the guide draws; where none was found, all are reported that are.
   double found = 1;
   for (std::size_t i = 0; i < reports.size(); ++i)
-    found += weights[i] / guide.WeightAt(NumbersOf(reports[i].numbers));
+    found += weights[i] * ReportFactor(fluxes[i]) / guide.WeightAt(NumbersOf(reports[i].numbers));
   const double found_share = std::min(1.0, found / std::max(1.0, trials));
   const auto photons = static_cast<double>(photons_per_pass);
   const double asked = std::min(

@@ -34,7 +34,7 @@ using GuideSteps = std::vector<GuideStep>;
 
 // A new guide follows from the passes before each of these, all of which end rounds: powers of two
 // and the middles between them.
-inline constexpr std::uint64_t kLastGuidePass = 1024;
+inline constexpr std::uint64_t kLastGuidePass = 1 << 16;
 [[nodiscard]] constexpr bool IsGuidePass(std::uint64_t passes) {
   const bool is_middle = passes % 3 == 0 && std::has_single_bit(passes / 3);
   return passes <= kLastGuidePass && (std::has_single_bit(passes) || is_middle);
@@ -43,7 +43,7 @@ inline constexpr std::uint64_t kLastGuidePass = 1024;
 // What a photon found by a pixel adds to the squared relative error, over its squared flux, in any
 // unit, at least 0.
 using ScoreAt = std::function<double(std::uint32_t pixel)>;
-// Of a photon drawn with these numbers without a guide, in any unit; 0 where none is emitted.
+// Of a photon drawn with these numbers without a guide (transport/photon_guide.h, EvenFlux).
 using FluxAt = std::function<double(const PrimaryNumbers& numbers)>;
 
 class GuideLearner {
@@ -65,7 +65,7 @@ class GuideLearner {
   // Photons drawn by one guide.
   struct Drawn {
     std::shared_ptr<const PhotonGuide> guide;
-    double trials = 0;  // how many would have been reported if found
+    double trials = 0;  // how many would have been reported if found, at the largest ReportFactor
   };
   // All that is kept, for checkpoints.
   struct Numbers {
@@ -76,9 +76,10 @@ class GuideLearner {
   void Restore(Numbers numbers) { numbers_ = std::move(numbers); }
 
  private:
-  // Of a photon with these numbers: one over its density, in all that was drawn so far, in units of
-  // the even one (the balance heuristic of Veach & Guibas 1995 over the guides).
-  [[nodiscard]] double WeightAt(const PrimaryNumbers& numbers) const;
+  // Of a photon with these numbers and this flux: one over its density, in all that would have been
+  // reported so far, in units of the even one (the balance heuristic of Veach & Guibas 1995 over
+  // the guides).
+  [[nodiscard]] double WeightAt(const PrimaryNumbers& numbers, double flux) const;
 
   double enough_reports_;
   Numbers numbers_;

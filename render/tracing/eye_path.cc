@@ -196,8 +196,12 @@ Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, PathWavelength wavelen
   std::optional<Material> storage;
   const Material& material = MaterialAt(scene_, surface, wo, storage, wavelength);
   const Rgb color = wavelength.IsFirstUsedAt(material) ? wavelength.color() : Gray(1);
-  return bright + BrightPart(color * EmissionThrough(surface, material, wo, kNoMedium, wavelength,
-                                                     rng, rays));
+  return bright + BrightPart(EmissionThrough({.surface = surface,
+                                              .material = material,
+                                              .wo = wo,
+                                              .wavelength = wavelength,
+                                              .weight = color},
+                                             rng, rays));
 }
 
 Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
@@ -333,16 +337,17 @@ std::array<EyePathTracer::SmoothBranch, EyePathTracer::kSmoothLobes> EyePathTrac
   return branches;
 }
 
-Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, const Material& first_material,
-                                   Vec3 first_wo, std::int32_t medium,
-                                   const PathWavelength& wavelength, KeyedRng rng,
-                                   int& rays) const {
+Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int& rays) const {
   struct Branch {
     Ray ray;
     std::int32_t medium;
     PathWavelength wavelength;
     Rgb weight;
     int vertex;
+  };
+  const auto share_of_rays = [&](float emission_density) {
+    if (!chain.is_shared) return 1.0F;
+    return caustic_weight_.OfRays(emission_density, chain.cosine, chain.scatter_pdf);
   };
   // A pair at each vertex, of which one is followed at once: the stack grows by one a vertex.
   std::vector<Branch> branches;
@@ -368,18 +373,23 @@ Rgb EyePathTracer::EmissionThrough(const SurfacePoint& first, const Material& fi
     }
   };
   Rgb seen;
-  branch_at(first, first_material, first_wo, medium, wavelength, Gray(1), 0);
+  branch_at(chain.surface, chain.material, chain.wo, chain.medium, chain.wavelength, chain.weight,
+            chain.vertex);
   while (!branches.empty()) {
     Branch branch = branches.back();
     branches.pop_back();
     Hit hit;
     if (!FindThroughMedia(branch.ray, hit, branch.medium, branch.weight, rays)) {
-      seen += branch.weight * lights_.InfiniteRadiance(branch.ray.direction);
+      const Vec3 direction = branch.ray.direction;
+      seen += branch.weight * lights_.InfiniteRadiance(direction) *
+              share_of_rays(lights_.EmissionDensityInfinite(direction));
       continue;
     }
     SurfacePoint surface = intersector_.SurfaceAt(branch.ray, hit);
     const Vec3 wo = -branch.ray.direction;
-    seen += branch.weight * lights_.EmittedRadiance(surface, wo);
+    const Rgb emitted = lights_.EmittedRadiance(surface, wo);
+    if (!IsBlack(emitted))
+      seen += branch.weight * emitted * share_of_rays(lights_.EmissionDensity(surface));
     if (!properties_[surface.material].scatters_smoothly) continue;
     std::optional<Material> storage;
     const Material& material = MaterialAt(scene_, surface, wo, storage, branch.wavelength);
@@ -465,10 +475,11 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   // The density of the last scattering [sr⁻¹] when the lights were sampled there too, and where.
   float scatter_pdf = 0;
   Vec3 scatter_position;
-  // Emission at the end of a chain of smooth surfaces from the camera is collected from the whole
-  // tree of their branches: a small light seen in glass would otherwise be one bright speck in
-  // thousands of passes.
+  // Emission at the end of a chain of smooth surfaces is collected from the whole tree of their
+  // branches where the chain begins: a small light seen in glass would otherwise be one bright
+  // speck in thousands of passes.
   bool emission_was_collected = false;
+  KeyedRng branch_rng = sampler.ForBranches();
   // The last surface that gathers caustic photons, as long as only smooth ones have come since.
   struct Receiver {
     float scatter_pdf = 0, cosine = 0;
@@ -566,9 +577,24 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     const Vec3 wo_local = frame.ToLocal(wo);
     const bool has_parts = parts_.lobes && whole_properties.has_parts;
     const float share_of_first = has_parts ? ShareOfFirst(whole, wo_local) : -1;
-    if (parts_.lobes && vertex == 0 && whole_properties.scatters_smoothly && rays_find_lights_) {
-      add_first_emission(weight * EmissionThrough(surface, whole, wo, medium, wavelength,
-                                                  sampler.ForBranches(), path.rays));
+    if (parts_.lobes && whole_properties.scatters_smoothly && rays_find_lights_ &&
+        !emission_was_collected) {
+      const Rgb emission = EmissionThrough({.surface = surface,
+                                            .material = whole,
+                                            .wo = wo,
+                                            .medium = medium,
+                                            .wavelength = wavelength,
+                                            .weight = weight,
+                                            .vertex = vertex,
+                                            .is_shared = parts_.caustics && receiver.is_last,
+                                            .cosine = receiver.cosine,
+                                            .scatter_pdf = receiver.scatter_pdf},
+                                           branch_rng, path.rays);
+      if (vertex == 0) {
+        add_first_emission(emission);
+      } else {
+        path.direct += emission;
+      }
       emission_was_collected = true;
     }
     if (parts_.lights && !(parts_.lobes && whole_properties.is_smooth)) {

@@ -175,14 +175,23 @@ class EyePathTracer {
   [[nodiscard]] std::array<SmoothBranch, kSmoothLobes> SmoothBranches(const SurfacePoint& surface,
                                                                       const Material& whole,
                                                                       Vec3 wo) const;
-  // Radiance that leaves a smooth surface towards `first_wo` and was emitted where a chain of
-  // smooth surfaces ends: reflections and refractions are all followed, not drawn.
-  // `first_material`: of `first`, which it has been applied to (MaterialAt). `medium`: in which
-  // `first_wo` leaves. `wavelength`: has met `first_material`.
-  [[nodiscard]] Rgb EmissionThrough(const SurfacePoint& first, const Material& first_material,
-                                    Vec3 first_wo, std::int32_t medium,
-                                    const PathWavelength& wavelength, KeyedRng rng,
-                                    int& rays) const;
+  // Where a path meets the first of a chain of smooth surfaces.
+  struct SmoothChain {
+    const SurfacePoint& surface;
+    const Material& material;  // applied to `surface` (MaterialAt)
+    Vec3 wo;
+    std::int32_t medium = kNoMedium;  // in which `wo` leaves
+    PathWavelength wavelength;        // has met `material`
+    Rgb weight;                       // of the path so far
+    int vertex = 0;
+    // Whether the surface before it gathers caustic photons: which share of the light that comes
+    // through the chain is theirs follows from the cosine and the density [sr⁻¹] of its scattering.
+    bool is_shared = false;
+    float cosine = 0, scatter_pdf = 0;
+  };
+  // Radiance, times the weight of the path, that was emitted where the chain ends: reflections and
+  // refractions are all followed, not drawn.
+  [[nodiscard]] Rgb EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int& rays) const;
   [[nodiscard]] PathWavelength WavelengthOf(const PixelSampler& sampler) const {
     return parts_.dispersion ? PathWavelength(sampler.ForWavelength()) : PathWavelength();
   }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/transport/light.h"
+
 namespace lucerna {
 namespace {
 
@@ -107,6 +109,20 @@ double PhotonGuide::WeightAt(PrimaryNumbers numbers) const {
     }
   }
   return weight;
+}
+
+double EvenFlux(const LightSet& lights, const PrimaryNumbers& numbers) {
+  const auto single = [&](std::size_t d) { return static_cast<float>(numbers[d]); };
+  Emission emission;
+  if (!lights.SampleEmission(numbers[4], single(0), single(1), single(2), single(3), emission))
+    return 0;
+  return static_cast<double>(Luminance(emission.flux)) /
+         static_cast<double>(Luminance(lights.TotalPower()));
+}
+
+double ReportFactor(double flux) {
+  // A power of two: the same for numbers that were rounded for a report.
+  return flux > 0 ? std::min(1.0, std::exp2(std::rint(std::log2(flux)))) : 0;
 }
 
 }  // namespace lucerna

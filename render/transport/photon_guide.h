@@ -24,6 +24,8 @@
 
 namespace lucerna {
 
+class LightSet;
+
 inline constexpr std::size_t kEmissionDimensions = 5;
 // Two numbers for the place, two for the direction, then the choice of the emitter.
 using PrimaryNumbers = std::array<double, kEmissionDimensions>;
@@ -69,5 +71,13 @@ class PhotonGuide {
   std::vector<std::uint32_t> high_;  // [nodes] the upper half's
   std::uint32_t reported_ = 0;
 };
+
+// Luminance of the flux of a photon that is drawn evenly with these numbers, over the power of all
+// lights; 0 where none is emitted.
+[[nodiscard]] double EvenFlux(const LightSet& lights, const PrimaryNumbers& numbers);
+// How much less often a found photon of this EvenFlux is reported than PhotonGuide::reported says:
+// at most 1, and in proportion to the flux of weak ones. Else a weak light in view would leave no
+// room for the few photons that are found of a strong one.
+[[nodiscard]] double ReportFactor(double flux);
 
 }  // namespace lucerna

@@ -6,7 +6,7 @@
 namespace lucerna {
 namespace {
 
-constexpr std::string_view kMagic = "LPG1";
+constexpr std::string_view kMagic = "LPG2";
 
 }  // namespace
 

@@ -72,16 +72,8 @@ void WriteDouble(ByteWriter& writer, double value) {
   Write(writer, value);
 }
 
-void WriteFloat(ByteWriter& writer, float value) {
-  Write(writer, value);
-}
-
 double ReadDouble(ByteReader& reader) {
   return Read<double>(reader);
-}
-
-float ReadFloat(ByteReader& reader) {
-  return Read<float>(reader);
 }
 
 void WriteRadii(ByteWriter& writer, const RadiusColumn& radii) {

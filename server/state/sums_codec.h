@@ -16,10 +16,8 @@
 namespace lucerna {
 
 void WriteDouble(ByteWriter& writer, double value);
-void WriteFloat(ByteWriter& writer, float value);
 // Zero from a reader that has failed.
 [[nodiscard]] double ReadDouble(ByteReader& reader);
-[[nodiscard]] float ReadFloat(ByteReader& reader);
 
 void WriteRadii(ByteWriter& writer, const RadiusColumn& radii);
 void WriteNumbers(ByteWriter& writer, const PixelRadii::Numbers& numbers);

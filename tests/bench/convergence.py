@@ -15,7 +15,8 @@ next.
 
 The squared error falls about as time to the power of -2/3 to -1, so a reference should have many times
 the longest time. It has the radii of a job's defaults: with smaller ones, as `lucerna
-reference` has them, its noise would be more than the error that is judged. Its own bias is not seen.
+reference` has them, its noise would be more than the error that is judged. Its own bias is not seen:
+where most of the error is bias, --reference-radius 1px shows more of it.
 
 Results are kept in docs/convergence/results.csv: what is there is not rendered again, so that the
 program can be stopped and started. References are kept in --work. At the end, and after every
@@ -138,7 +139,8 @@ def row_of(name, setting, seconds, report, image, reference):
 
 def measure(cluster, name, path, wanted, arguments, folder):
     """Rows of `wanted` [(setting, seconds)], in order of time for each setting."""
-    reference = arguments.work / f"{name}-{arguments.size}-{arguments.reference_s:g}.exr"
+    radius = "" if arguments.reference_radius == "3px" else f"-{arguments.reference_radius}"
+    reference = arguments.work / f"{name}-{arguments.size}-{arguments.reference_s:g}{radius}.exr"
     reports = []
     job = None
     for setting, seconds in wanted:
@@ -150,7 +152,8 @@ def measure(cluster, name, path, wanted, arguments, folder):
         passes_per_s = job.passes / job.seconds
     if not reference.exists():
         run([BIN / "lucerna", "reference", path, "--size", arguments.size, "--quiet",
-             "--seed", "1000003", "--radius-controller", "appm", "--initial-radius", "3px",
+             "--seed", "1000003", "--radius-controller", "appm", "--initial-radius",
+             arguments.reference_radius,
              "--passes", math.ceil(passes_per_s * arguments.reference_s), "-o", reference])
     return [row_of(name, *report, reference) for report in reports]
 
@@ -285,6 +288,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--times", default="1,5")
     parser.add_argument("--reference-s", type=float, default=120)
+    parser.add_argument("--reference-radius", default="3px", help="first radius of references")
     parser.add_argument("--size", default="128x128")
     parser.add_argument("--settings", default="default")
     parser.add_argument("--scenes", default="", help="names, by commas; empty: all 24")

@@ -2,6 +2,7 @@
 #include "render/estimate/guide_learning.h"
 
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -25,7 +26,8 @@ double OneFlux(const PrimaryNumbers& /*numbers*/) {
 // A job whose photons are found where `is_found` says so.
 class Simulated {
  public:
-  explicit Simulated(std::uint64_t photons_per_pass) : photons_(photons_per_pass) {
+  explicit Simulated(std::uint64_t photons_per_pass, FluxAt flux_at = OneFlux)
+      : photons_(photons_per_pass), flux_at_(std::move(flux_at)) {
     guide_ = std::make_shared<const PhotonGuide>(learner_.First(photons_));
   }
 
@@ -39,7 +41,8 @@ class Simulated {
       for (double& number : numbers)
         number = static_cast<double>(rng_.Uniform());
       guide_->Draw(numbers);
-      const bool is_reported = static_cast<double>(rng_.Uniform()) * 0x1p32 < guide_->reported();
+      const bool is_reported = static_cast<double>(rng_.Uniform()) * 0x1p32 <
+                               guide_->reported() * ReportFactor(flux_at_(numbers));
       if (!is_found(numbers)) continue;
       ++found_;
       if (!is_reported) continue;
@@ -53,7 +56,7 @@ class Simulated {
   }
   const PhotonGuide& Learn() {
     guide_ =
-        std::make_shared<const PhotonGuide>(learner_.Next(passes_, photons_, SameScore, OneFlux));
+        std::make_shared<const PhotonGuide>(learner_.Next(passes_, photons_, SameScore, flux_at_));
     return *guide_;
   }
   [[nodiscard]] const GuideLearner& learner() const { return learner_; }
@@ -63,6 +66,7 @@ class Simulated {
 
  private:
   std::uint64_t photons_;
+  FluxAt flux_at_;
   KeyedRng rng_{7};
   GuideLearner learner_{kPixels};
   std::shared_ptr<const PhotonGuide> guide_;
@@ -97,6 +101,26 @@ TEST(GuideLearningTest, FindsASmallBoxAndSendsPhotonsThere) {
   EXPECT_LE(guide.WeightAt(outside), 1.001 / kUnguidedShare);
   job.Draw(1, InSmallBox);
   EXPECT_GT(job.found(), share * 16384);
+}
+
+// A weak light in view, which gets its even share of the photons, and a strong one whose photons
+// are hardly ever found: reports of the weak one must not be all there is room for.
+TEST(GuideLearningTest, FindsASeldomSeenStrongLightBesideAWeakOneInView) {
+  const auto is_weak = [](const PrimaryNumbers& u) { return u[4] < 0.05; };
+  const auto is_seen = [](const PrimaryNumbers& u) {
+    return u[2] >= 0.5 && u[2] < 0.5 + 0x1p-9 && u[3] >= 0.25 && u[3] < 0.25 + 0x1p-10;
+  };
+  Simulated job(16384, [&](const PrimaryNumbers& u) { return is_weak(u) ? 1e-6 : 1 / 0.95; });
+  int passes = 0;
+  for (const int until : {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512}) {
+    job.Draw(until - passes, [&](const PrimaryNumbers& u) { return is_weak(u) || is_seen(u); });
+    job.Learn();
+    passes = until;
+  }
+  // Some 15 were found without a guide.
+  const double step = 0x1p-11;
+  EXPECT_LT(job.guide().WeightAt({0.5, 0.5, 0.5 + step, 0.25 + step, 0.5}), 0.01);
+  EXPECT_GT(job.guide().reported(), 0U) << "reports of the weak light are enough";
 }
 
 // Of photons with the mean score m, a box of volume V should have a share of V sqrt(m).

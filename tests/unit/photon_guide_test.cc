@@ -9,7 +9,9 @@
 #include "gtest/gtest.h"
 
 #include "render/math/sobol.h"
+#include "render/transport/light.h"
 #include "render/wire/photon_guide_codec.h"
+#include "tests/support/test_scenes.h"
 
 namespace lucerna {
 namespace {
@@ -153,6 +155,32 @@ TEST(PhotonGuideTest, TravelsAsItIs) {
     EXPECT_FALSE(DecodePhotonGuide(bytes.substr(0, bytes.size() - 1)).ok());
   }
   EXPECT_FALSE(DecodePhotonGuide("LPG2").ok());
+}
+
+TEST(PhotonGuideTest, WeakPhotonsAreReportedInProportionToTheirFlux) {
+  EXPECT_EQ(ReportFactor(0), 0);
+  EXPECT_EQ(ReportFactor(1), 1);
+  EXPECT_EQ(ReportFactor(1.3), 1);
+  EXPECT_EQ(ReportFactor(1e30), 1);
+  EXPECT_EQ(ReportFactor(0.75), 1);
+  EXPECT_EQ(ReportFactor(0.26), 0.25);
+  for (double flux = 1e-12; flux < 0.7; flux *= 1.7) {
+    EXPECT_GT(ReportFactor(flux), 0.7 * flux);
+    EXPECT_LT(ReportFactor(flux), 1.42 * flux);
+  }
+}
+
+// One light of a thousandth of the power has half of the even share.
+TEST(PhotonGuideTest, EvenFluxIsPowerOverTheShareOfThePhotons) {
+  Scene scene;
+  AddQuad(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, AddMaterial(scene, DiffuseMaterial(0.5F)));
+  scene.point_lights.push_back({{0, 0, 1}, Gray(1)});
+  scene.point_lights.push_back({{1, 0, 1}, Gray(999)});
+  const auto intersector = Intersector::Create(scene).value();
+  const LightSet lights(scene, *intersector);
+  const double share = 0.001 * (1 - kEvenPhotonShare) + 0.5 * kEvenPhotonShare;
+  EXPECT_NEAR(EvenFlux(lights, {0.5, 0.5, 0.5, 0.5, share / 2}), 0.001 / share, 1e-5);
+  EXPECT_NEAR(EvenFlux(lights, {0.5, 0.5, 0.5, 0.5, 0.9}), 0.999 / (1 - share), 1e-5);
 }
 
 }  // namespace
