@@ -73,7 +73,7 @@ class Connection {
   // Errors: also DATA_LOSS when the bytes do not have that digest.
   [[nodiscard]] StatusOr<std::string> Fetch(const Digest& digest, std::uint64_t max_bytes);
   [[nodiscard]] StatusOr<v1::CommitOutcome> Commit(v1::CommitBatchRequest::Header header,
-                                                   const std::string& bytes);
+                                                   std::string_view bytes);
   [[nodiscard]] Status Goodbye(const std::string& worker_id);
 
   // Breaks off the calls that are under way, and refuses new ones but Goodbye.

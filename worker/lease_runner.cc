@@ -244,7 +244,8 @@ void LeaseRunner::CommitStage() {
 
 StatusOr<v1::CommitOutcome> LeaseRunner::Commit(const Computed& computed) {
   const LentWork& work = computed.held->work;
-  const std::string& bytes = computed.bytes;
+  std::string_view bytes = computed.bytes;
+  if (FaultIsDue("commit.truncated")) bytes.remove_suffix(bytes.size() / 2);
   v1::CommitBatchRequest::Header header;
   header.set_worker_id(worker_id_);
   header.set_lease_id(work.lease_id);
@@ -254,7 +255,9 @@ StatusOr<v1::CommitOutcome> LeaseRunner::Commit(const Computed& computed) {
   header.set_first(work.first);
   header.set_last(work.last);
   *header.mutable_cpu() = ToProto(computed.cpu);
+  if (FaultIsDue("commit.forged")) header.set_first(work.first + 1);
   StatusOr<v1::CommitOutcome> outcome = connection_.Commit(header, bytes);
+  if (FaultIsDue("commit.twice")) outcome = connection_.Commit(header, bytes);
   // Bytes that were damaged on the way are sent again.
   for (int i = 1; i < kCommitTries && absl::IsDataLoss(outcome.status()); ++i) {
     outcome = connection_.Commit(header, bytes);

@@ -48,8 +48,10 @@ std::uint64_t AvailableMemory() {
 void KeepFreedMemory() {
   constexpr int kLargestBlock = 32 << 20;  // the largest that the C library allows
   constexpr int kLargestRest = 256 << 20;
+  constexpr int kArenas = 2;
   mallopt(M_MMAP_THRESHOLD, kLargestBlock);
   mallopt(M_TRIM_THRESHOLD, kLargestRest);
+  mallopt(M_ARENA_MAX, kArenas);
 }
 
 }  // namespace lucerna

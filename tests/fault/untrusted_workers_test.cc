@@ -93,6 +93,43 @@ TEST_P(KilledAtSliceTest, AnotherWorkerBringsTheSameBits) {
 INSTANTIATE_TEST_SUITE_P(Steps, KilledAtSliceTest,
                          testing::Values("commit.before:3", "commit.during:3", "commit.after:3"));
 
+// The first commit of this name, and all that follow, are not as they should be.
+struct CommitFault {
+  const char* name;
+  const char* answer;  // what the worker is told
+};
+
+class FaultyCommitTest : public testing::TestWithParam<CommitFault> {
+ protected:
+  void ExpectUnfaultedWith(const std::vector<std::string>& flags) {
+    CoordinatorProcess coordinator(flags);
+    const auto faulty = coordinator.StartFaultyWorker(GetParam().name);
+    ASSERT_TRUE(faulty->WaitForText("joined", kPatience));
+    const auto sound = coordinator.StartWorker();
+    ASSERT_TRUE(sound->WaitForText("joined", kPatience));
+    const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+    ExpectUnfaulted(coordinator, job);
+    EXPECT_NE(faulty->Errors().find(GetParam().answer), std::string::npos) << faulty->Errors();
+  }
+};
+
+TEST_P(FaultyCommitTest, OfABatchChangesNothing) {
+  ExpectUnfaultedWith({"--batch-photons", "100000"});
+}
+
+TEST_P(FaultyCommitTest, OfASliceChangesNothing) {
+  ExpectUnfaultedWith({});
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Faults, FaultyCommitTest,
+    testing::Values(CommitFault{"commit.twice", ""}, CommitFault{"commit.truncated", "malformed"},
+                    CommitFault{"commit.short", "the stream ended after"},
+                    CommitFault{"commit.forged", "of other work than its lease"}),
+    [](const auto& fault) {
+      return std::string(fault.param.name).substr(std::string("commit.").size());
+    });
+
 // Its lease runs out after ten seconds and goes to another; when it wakes up, what it has is late.
 TEST(StoppedWorkerTest, IsReplacedWhileItStandsStillAndIsHarmlessAfterwards) {
   CoordinatorProcess coordinator({"--batch-photons", "100000"});
