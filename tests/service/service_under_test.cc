@@ -95,6 +95,7 @@ ServiceUnderTest::ServiceUnderTest(const ServiceChoices& choices) {
   options.audit_share = choices.audit_share;
   options.jobs_at_once = choices.jobs_at_once;
   options.max_memory_bytes = choices.max_memory_bytes;
+  options.max_watches = choices.max_watches;
   options.numeric_profile = kNumericProfile;
   coordinator_ = std::make_unique<Coordinator>(options, clock_);
   assets_ = std::make_unique<AssetService>(coordinator_->blobs(), coordinator_->budget(), pools_,

@@ -68,6 +68,7 @@ struct ServiceChoices {
   double audit_share = 0;  // of the batches, which are computed by two workers
   std::size_t jobs_at_once = 1;
   std::uint64_t max_memory_bytes = 0;
+  std::size_t max_watches = Coordinator::Options().max_watches;
 };
 
 class ServiceUnderTest {
