@@ -47,7 +47,8 @@ class Progress {
  public:
   Progress(ClientConnection& connection, const std::string& job_id,
            const OutputOptions& output_options)
-      : redraws_(output_options.redraws && SizeOfTerminal(STDERR_FILENO).has_value()) {
+      : redraws_(output_options.redraws && SizeOfTerminal(STDERR_FILENO).has_value()),
+        display_(output_options.display) {
     if (!redraws_ || !output_options.previews) return;
     previews_.emplace([&connection, job_id](const std::function<bool()>& gives_up) {
       return connection.GetImage(job_id, gives_up);
@@ -61,7 +62,7 @@ class Progress {
     std::shared_ptr<const Image> image;
     // There is none before the first pass.
     if (previews_ && job.progress().passes() > 0) image = previews_->Newest();
-    Write(frames_.Paint(LiveLines(job, image.get(), size), size));
+    Write(frames_.Paint(LiveLines(job, image.get(), size, display_), size));
   }
   void Finish() { Write(frames_.Finish()); }
 
@@ -72,6 +73,7 @@ class Progress {
   }
 
   bool redraws_;
+  Display display_;
   ProgressPrinter lines_;
   FramePainter frames_;
   std::optional<PreviewSource> previews_;

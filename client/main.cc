@@ -1,12 +1,14 @@
 // What did the user type, and which command answers it?
 //
 // Only wires: flags in, one command called, its Status out as a message and an exit code.
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -24,6 +26,7 @@
 #include "client/local_cluster.h"
 #include "client/render_flags.h"
 #include "client/selfcheck/selfcheck.h"
+#include "client/usage.h"
 #include "client/view/preview.h"
 #include "render/base/escape.h"
 #include "render/base/version.h"
@@ -36,6 +39,26 @@ namespace {
 
 int End(ExitCode code) {
   return static_cast<int>(code);
+}
+
+// [stops]; absent for auto. Errors: CLI::ValidationError.
+std::optional<double> StopsOf(const std::string& text) {
+  if (text == "auto") return std::nullopt;
+  double stops = 0;
+  if (!CLI::detail::lexical_cast(text, stops) || !(std::abs(stops) <= 1000)) {
+    throw CLI::ValidationError(
+        absl::StrCat("--exposure must be a number of stops, or auto, not \"", text, "\""));
+  }
+  return stops;
+}
+
+ToneCurve CurveOf(const std::string& name) {
+  const StatusOr<ToneCurve> curve = ParseToneCurve(name);
+  if (!curve.ok()) {
+    throw CLI::ValidationError(
+        absl::StrCat("--tonemap ", name, ": ", std::string(curve.status().message())));
+  }
+  return *curve;
 }
 
 int Run(int argc, char** argv) {
@@ -68,7 +91,6 @@ int Run(int argc, char** argv) {
   std::string image_path;
   std::string reference_path;
   std::string mask_path;
-  std::string png_path;
   MetricsOptions metrics;
   CompareRequest comparison;
   ReferenceRequest to_refer;
@@ -76,7 +98,8 @@ int Run(int argc, char** argv) {
   bool bakes_on_server = false;
   std::string only;
   std::string topic;
-  double exposure_stops = 0;
+  PictureRequest to_convert;
+  std::vector<std::string> job_ids;
   bool hides_preview = false;
   bool keeps_no_checkpoints = false;
   bool strict = false;
@@ -113,13 +136,33 @@ int Run(int argc, char** argv) {
                    "the scene may name files below this folder by absolute paths and by ..")
         ->allow_extra_args(false);
   };
+  const auto add_display = [&](CLI::App* to) {
+    to->add_option_function<std::string>(
+          "--exposure",
+          [&](const std::string& text) { output_options.display.exposure_stops = StopsOf(text); },
+          "stops by which pictures and previews are brighter, or auto: 0 unless that would be "
+          "mostly "
+          "white or black (default: auto)")
+        ->type_name("STOPS|auto");
+    to->add_option_function<std::string>(
+          "--tonemap",
+          [&](const std::string& name) { output_options.display.curve = CurveOf(name); },
+          "what becomes of light brighter than white: clip, reinhard, filmic or aces (default: "
+          "clip)")
+        ->type_name("CURVE");
+  };
+  const auto add_outputs = [&](CLI::App* to, OutputPaths& outputs) {
+    to->add_option("-o,--output", outputs.image, "image to write: .exr, .png, .pfm or .hdr");
+    to->add_option("--png", outputs.png, "PNG file to write beside it");
+    to->add_flag("--force", outputs.replaces, "replace files that lucerna has not written");
+    add_display(to);
+  };
   const auto add_image_flags = [](CLI::App* to, RenderOverrides& overrides) {
     AddSettingFlags(*to, SettingRole::kDecidesPixels, overrides);
   };
   const auto add_render_flags = [&](CLI::App* to) {
     add_scene(to, request.scene);
-    to->add_option("-o,--output", request.outputs.exr, "EXR file to write");
-    to->add_option("--png", request.outputs.png, "PNG preview to write");
+    add_outputs(to, request.outputs);
     add_image_flags(to, request.overrides);
     AddSettingFlags(*to, SettingRole::kStopsJob, request.overrides);
     to->add_option("--reference", request.reference, "EXR file to measure the true error by");
@@ -201,17 +244,27 @@ int Run(int argc, char** argv) {
                            [&] { return Follow(job_id, false, server, output_options); });
   CLI::App* fetch = command("fetch", "fetch a job's image, also of one that still runs",
                             [&] { return Fetch(job_id, fetched, server, output_options); });
-  fetch->add_option("-o,--output", fetched.exr, "EXR file to write");
-  fetch->add_option("--png", fetched.png, "PNG preview to write");
-  CLI::App* cancel = command("cancel", "end a job and drop its image",
-                             [&] { return Cancel(job_id, server, output_options); });
+  add_outputs(fetch, fetched);
+  const auto for_each_job = [&](auto change) {
+    return [&, change] {
+      Status status;
+      for (const std::string& job : job_ids)
+        status.Update(change(job));
+      return status;
+    };
+  };
+  CLI::App* cancel = command(
+      "cancel", "end jobs and drop their images",
+      for_each_job([&](const std::string& job) { return Cancel(job, server, output_options); }));
   add_no_preview(watch);
+  add_display(watch);
   CLI::App* report =
       command("report", "write a page about a job: image, error against time, workers",
               [&] { return Report(job_id, report_paths, server, output_options); });
   report->add_option("-o,--output", report_paths.html, "HTML file to write");
+  add_display(report);
   report->add_option("--csv", report_paths.csv, "file to write samples and workers to, as a table");
-  for (CLI::App* about_job : {watch, wait, fetch, report, cancel}) {
+  for (CLI::App* about_job : {watch, wait, fetch, report}) {
     about_job->add_option("JOB", job_id, "the job's id")->required();
     add_server(about_job);
     add_json(about_job);
@@ -234,8 +287,9 @@ int Run(int argc, char** argv) {
   add_server(trace_photon);
   add_json(trace_photon);
 
-  CLI::App* stop = command("stop", "end a job and keep its image",
-                           [&] { return StopJob(job_id, server, output_options); });
+  CLI::App* stop = command(
+      "stop", "end jobs and keep their images",
+      for_each_job([&](const std::string& job) { return StopJob(job, server, output_options); }));
   CLI::App* extend = command("extend", "go on with a job, from all its photons, to a new end",
                              [&] { return Extend(job_id, until, server, output_options); });
   for (const Setting& setting : AllSettings()) {
@@ -243,19 +297,28 @@ int Run(int argc, char** argv) {
     if (setting.role != SettingRole::kStopsJob) continue;
     AddSettingFlag(*extend, setting.name, until, std::string(setting.meaning));
   }
-  CLI::App* pause = command("pause", "let other jobs have a job's place until it is resumed",
-                            [&] { return PauseJob(job_id, server, output_options); });
-  CLI::App* resume = command("resume", "go on with a job that is paused",
-                             [&] { return ResumeJob(job_id, server, output_options); });
+  CLI::App* pause = command(
+      "pause", "let other jobs have the place of these until they are resumed",
+      for_each_job([&](const std::string& job) { return PauseJob(job, server, output_options); }));
+  CLI::App* resume = command(
+      "resume", "go on with jobs that are paused",
+      for_each_job([&](const std::string& job) { return ResumeJob(job, server, output_options); }));
   CLI::App* prioritize =
       command("priority", "change the priority of a job that has not ended",
               [&] { return SetPriority(job_id, priority, server, output_options); });
-  CLI::App* remove = command("delete", "forget a job that has ended, and its image",
-                             [&] { return DeleteJob(job_id, server, output_options); });
-  remove->add_option("JOB", job_id, "the job's id")->required();
+  CLI::App* remove = command(
+      "delete", "forget jobs that have ended, and their images",
+      for_each_job([&](const std::string& job) { return DeleteJob(job, server, output_options); }));
+  remove->add_option("JOB", job_ids, "ids of jobs")->required();
   add_server(remove);
   add_quiet(remove);
-  for (CLI::App* about_job : {stop, extend, pause, resume, prioritize}) {
+  for (CLI::App* about_jobs : {cancel, stop, pause, resume}) {
+    about_jobs->add_option("JOB", job_ids, "ids of jobs")->required();
+    add_server(about_jobs);
+    add_json(about_jobs);
+    add_quiet(about_jobs);
+  }
+  for (CLI::App* about_job : {extend, prioritize}) {
     about_job->add_option("JOB", job_id, "the job's id")->required();
     add_server(about_job);
     add_json(about_job);
@@ -423,13 +486,12 @@ int Run(int argc, char** argv) {
           stdout);
       return absl::OkStatus();
     }
-    const auto found =
-        app.get_subcommands([&](const CLI::App* about) { return about->get_name() == topic; });
-    if (found.empty()) {
+    const CLI::App* about = FindCommand(app, topic);
+    if (about == nullptr) {
       return Failure(ExitCode::kUsage,
                      absl::StrCat("there is no command ", topic, "; lucerna help lists them"));
     }
-    std::fputs(found.front()->help(app.get_name()).c_str(), stdout);
+    std::fputs(about->help(app.get_name()).c_str(), stdout);
     return absl::OkStatus();
   });
   help->add_option("TOPIC", topic, "a command, or settings");
@@ -439,20 +501,30 @@ int Run(int argc, char** argv) {
   digest->add_option("FILE", image_path, "EXR file")->required();
   add_json(digest);
 
-  CLI::App* png = command("png", "turn an EXR file into a PNG file",
-                          [&] { return ConvertToPng(image_path, png_path, exposure_stops); });
-  png->add_option("FILE", image_path, "EXR file")->required();
-  png->add_option("OUT", png_path, "PNG file to write")->required();
-  png->add_option("--exposure", exposure_stops, "brighter by so many stops");
+  CLI::App* png =
+      command("png", "turn an EXR file, or a layer of it, into a PNG file",
+              [&]() -> Status { return ConvertToPicture(to_convert, output_options.display); });
+  png->add_option("FILE", to_convert.exr_path, "EXR file")->required();
+  png->add_option("OUT", to_convert.path, "file to write: .png, .pfm or .hdr")->required();
+  png->add_option("--layer", to_convert.layer, "a layer, such as direct, albedo, N or noise");
+  add_display(png);
 
+  std::vector<std::string> words(argv + 1, argv + argc);
+  if (!words.empty() && FindCommand(app, words.front()) == nullptr &&
+      LooksLikeScene(words.front())) {
+    words.insert(words.begin(), "render");
+  }
   try {
-    app.parse(argc, argv);
+    std::vector<std::string> last_first(words.rbegin(), words.rend());
+    app.parse(std::move(last_first));
   } catch (const CLI::ParseError& error) {
     // Help is asked for by an exception too, with code 0.
-    return End(app.exit(error) == 0 ? ExitCode::kDone : ExitCode::kUsage);
+    const bool is_done = app.exit(error) == 0;
+    if (!is_done) std::fputs(Suggestion(app, words).c_str(), stderr);
+    return End(is_done ? ExitCode::kDone : ExitCode::kUsage);
   }
-  const bool needs_output = (*render && request.outputs.empty()) || (*fetch && fetched.empty());
-  if (needs_output) {
+  if (*render && request.outputs.empty()) request.outputs.image = ImageNameOf(request.scene.path);
+  if (*fetch && fetched.empty()) {
     std::fputs("lucerna: say where the image goes, with -o FILE.exr or --png FILE.png\n", stderr);
     return End(ExitCode::kUsage);
   }
@@ -464,7 +536,8 @@ int Run(int argc, char** argv) {
   }
   const char* term = std::getenv("TERM");
   output_options.redraws = term != nullptr && std::string(term) != "dumb";
-  output_options.previews = !hides_preview && HasColors(std::getenv("COLORTERM"), term);
+  output_options.previews =
+      !hides_preview && HasColors(std::getenv("COLORTERM"), term, std::getenv("NO_COLOR"));
 
   StatusOr<std::string> token = ReadToken(token_file, std::getenv("LUCERNA_TOKEN"));
   if (!token.ok()) {

@@ -1,6 +1,10 @@
 // Output options of a command.
 #pragma once
 
+#include <optional>
+
+#include "render/film/display.h"
+
 namespace lucerna {
 
 struct OutputOptions {
@@ -9,6 +13,7 @@ struct OutputOptions {
   // Progress on a terminal may be redrawn in place, and may show the image.
   bool redraws = false;
   bool previews = false;
+  Display display = {.exposure_stops = std::nullopt};  // of PNG files and previews
 };
 
 }  // namespace lucerna

@@ -12,7 +12,7 @@
 #include "render/base/escape.h"
 #include "render/base/files.h"
 #include "render/estimate/error_estimate.h"
-#include "render/film/png_file.h"
+#include "render/film/picture_file.h"
 #include "render/image/exr_file.h"
 
 namespace lucerna {
@@ -106,15 +106,22 @@ Status PrintDigest(const std::string& exr_path, const OutputOptions& output_opti
   return absl::OkStatus();
 }
 
-Status ConvertToPng(const std::string& exr_path, const std::string& png_path,
-                    double exposure_stops) {
-  if (IsSameFile(exr_path, png_path)) {
-    return Failure(ExitCode::kUsage,
-                   absl::StrCat(png_path, ": the PNG would replace the EXR; give it another name"));
+Status ConvertToPicture(const PictureRequest& request, const Display& display) {
+  if (IsSameFile(request.exr_path, request.path)) {
+    return Failure(
+        ExitCode::kUsage,
+        absl::StrCat(request.path, ": the picture would replace the EXR; give it another name"));
   }
-  LUCERNA_ASSIGN_OR_RETURN(const Image image, ReadImage(exr_path));
-  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, EncodePng(image, exposure_stops));
-  return WriteFile(png_path, bytes);
+  const StatusOr<PictureFormat> format = PictureFormatOf(request.path);
+  // As ever: a name without an ending of these is a PNG.
+  LUCERNA_ASSIGN_OR_RETURN(Image image, ReadImage(request.exr_path));
+  if (!request.layer.empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(image, PictureOfLayer(image, request.layer));
+  }
+  LUCERNA_ASSIGN_OR_RETURN(
+      const std::string bytes,
+      EncodePicture(image, format.ok() ? *format : PictureFormat::kPng, display));
+  return WriteFile(request.path, bytes);
 }
 
 }  // namespace lucerna

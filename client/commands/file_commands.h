@@ -26,7 +26,12 @@ namespace lucerna {
 // Prints the digest of the pixels and settings.
 [[nodiscard]] Status PrintDigest(const std::string& exr_path, const OutputOptions& output_options);
 
-[[nodiscard]] Status ConvertToPng(const std::string& exr_path, const std::string& png_path,
-                                  double exposure_stops);
+// Turns an EXR file, or one of its layers, into a file of another format.
+struct PictureRequest {
+  std::string exr_path;
+  std::string path;   // .png, .pfm or .hdr
+  std::string layer;  // empty: the image
+};
+[[nodiscard]] Status ConvertToPicture(const PictureRequest& request, const Display& display);
 
 }  // namespace lucerna

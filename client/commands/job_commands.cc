@@ -1,7 +1,9 @@
 #include "client/commands/job_commands.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -19,6 +21,7 @@
 #include "client/view/report.h"
 #include "client/view/report_page.h"
 #include "render/base/files.h"
+#include "render/film/picture_file.h"
 #include "render/film/png_file.h"
 #include "render/image/exr_file.h"
 
@@ -29,41 +32,80 @@ void Print(const std::string& text) {
   std::fputs(text.c_str(), stdout);
 }
 
+// Devices and pipes have no ending, and take an EXR file.
+bool IsDevice(const std::string& path) {
+  std::error_code error;
+  const auto type = std::filesystem::status(path, error).type();
+  return type != std::filesystem::file_type::regular &&
+         type != std::filesystem::file_type::not_found && !std::filesystem::is_directory(path);
+}
+
+StatusOr<PictureFormat> FormatOf(const std::string& path) {
+  if (IsDevice(path)) return PictureFormat::kExr;
+  StatusOr<PictureFormat> format = PictureFormatOf(path);
+  if (format.ok()) return format;
+  return Failure(ExitCode::kUsage, absl::StrCat(path, ": ", format.status().message()));
+}
+
+// A file that something else has written is not replaced unasked.
+Status CheckMayReplace(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return absl::OkStatus();
+  std::ifstream file(path, std::ios::binary);
+  std::string first(kBytesThatTell, '\0');
+  file.read(first.data(), static_cast<std::streamsize>(first.size()));
+  first.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, file.gcount())));
+  if (first.empty() || IsOwnPicture(first)) return absl::OkStatus();
+  return Failure(
+      ExitCode::kUsage,
+      absl::StrCat(path, " exists, and was not written by lucerna; --force replaces it"));
+}
+
 Status CheckOutputs(const OutputPaths& outputs) {
-  if (!outputs.exr.empty() && !outputs.png.empty() && IsSameFile(outputs.exr, outputs.png)) {
-    return Failure(ExitCode::kUsage,
-                   absl::StrCat("-o and --png both name ", outputs.exr,
-                                "; give the EXR and the PNG a file of its own each"));
+  if (!outputs.image.empty() && !outputs.png.empty() && IsSameFile(outputs.image, outputs.png)) {
+    return Failure(ExitCode::kUsage, absl::StrCat("-o and --png both name ", outputs.image,
+                                                  "; give each image a file of its own"));
   }
-  for (const std::string& path : {outputs.exr, outputs.png}) {
-    if (!path.empty()) LUCERNA_RETURN_IF_ERROR(CheckWritable(path));
+  if (!outputs.image.empty()) LUCERNA_RETURN_IF_ERROR(FormatOf(outputs.image).status());
+  for (const std::string& path : {outputs.image, outputs.png}) {
+    if (path.empty()) continue;
+    LUCERNA_RETURN_IF_ERROR(CheckWritable(path));
+    if (!outputs.replaces) LUCERNA_RETURN_IF_ERROR(CheckMayReplace(path));
   }
   return absl::OkStatus();
 }
 
-// Fetches the image, makes sure that it is one, and writes it.
+// Fetches the image, makes sure that it is one, and writes it. What cannot be written leaves no
+// other file out.
 StatusOr<SavedImage> Save(ClientConnection& connection, const std::string& job_id,
-                          const OutputPaths& outputs) {
+                          const OutputPaths& outputs, const Display& display) {
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, connection.GetImage(job_id));
   LUCERNA_ASSIGN_OR_RETURN(const Image image, DecodeImageOf(job_id, bytes));
   SavedImage saved;
   saved.digest = image.PixelDigest();
-  if (!outputs.exr.empty()) {
-    LUCERNA_RETURN_IF_ERROR(WriteFile(outputs.exr, bytes));
-    saved.paths.push_back(outputs.exr);
-  }
-  if (!outputs.png.empty()) {
-    LUCERNA_ASSIGN_OR_RETURN(const std::string png, EncodePng(image));
-    LUCERNA_RETURN_IF_ERROR(WriteFile(outputs.png, png));
-    saved.paths.push_back(outputs.png);
-  }
+  Status status;
+  const auto write = [&](const std::string& path, PictureFormat format) -> Status {
+    if (format == PictureFormat::kExr) return WriteFile(path, bytes);
+    LUCERNA_ASSIGN_OR_RETURN(const std::string picture, EncodePicture(image, format, display));
+    return WriteFile(path, picture);
+  };
+  const auto save = [&](const std::string& path, const StatusOr<PictureFormat>& format) {
+    if (path.empty()) return;
+    const Status written = format.ok() ? write(path, *format) : format.status();
+    if (written.ok()) saved.paths.push_back(path);
+    if (status.ok()) status = written;
+  };
+  if (!outputs.image.empty()) save(outputs.image, FormatOf(outputs.image));
+  save(outputs.png, PictureFormat::kPng);
+  if (!status.ok()) return status;
   return saved;
 }
 
 Status SaveAndReport(ClientConnection& connection, const v1::Job& job, const OutputPaths& outputs,
                      const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckSucceeded(job));
-  LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved, Save(connection, job.job_id(), outputs));
+  LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved,
+                           Save(connection, job.job_id(), outputs, output_options.display));
   if (output_options.json) {
     Print(JobReport(job, saved));
   } else if (!output_options.quiet) {
@@ -83,7 +125,7 @@ namespace {
 // Beside the image; empty when that is no file (a device, a pipe), or none are wanted.
 std::string CheckpointFolder(const RenderRequest& request) {
   const std::string& image =
-      request.outputs.exr.empty() ? request.outputs.png : request.outputs.exr;
+      request.outputs.image.empty() ? request.outputs.png : request.outputs.image;
   std::error_code error;
   const auto type = std::filesystem::status(image, error).type();
   const bool is_file =
@@ -92,12 +134,14 @@ std::string CheckpointFolder(const RenderRequest& request) {
 }
 
 // After an interruption: the image so far, and how to go on.
-Status EndInterrupted(LocalRuns& runs, const RenderRequest& request, bool has_checkpoints) {
+Status EndInterrupted(LocalRuns& runs, const RenderRequest& request, bool has_checkpoints,
+                      const Display& display) {
   if (!has_checkpoints) return Failure(ExitCode::kInterrupted, "interrupted");
   ClearInterruption();
   std::string message = "interrupted before the first image";
   if (!runs.job_id().empty()) {
-    if (const auto saved = Save(runs.connection(), runs.job_id(), request.outputs); saved.ok()) {
+    if (const auto saved = Save(runs.connection(), runs.job_id(), request.outputs, display);
+        saved.ok()) {
       message = absl::StrCat("interrupted; the image so far is in ",
                              absl::StrJoin(saved->paths, " and "));
     } else if (!absl::IsFailedPrecondition(saved.status())) {
@@ -137,7 +181,7 @@ Status Render(const RenderRequest& request, const ClusterOptions& cluster_option
               ? runs->Resume(manifest, request.overrides, output_options)
               : runs->Run(files, manifest, request.overrides, request.reference, output_options);
     if (ExitCodeOf(job.status()) == ExitCode::kInterrupted) {
-      return EndInterrupted(*runs, request, !folder.empty());
+      return EndInterrupted(*runs, request, !folder.empty(), output_options.display);
     }
     if (job.ok()) {
       // What cannot be written now is still in the folder.
@@ -239,7 +283,8 @@ Status Fetch(const std::string& job_id, const OutputPaths& outputs, const Endpoi
              const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(outputs));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
-  LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved, Save(*connection, job_id, outputs));
+  LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved,
+                           Save(*connection, job_id, outputs, output_options.display));
   if (output_options.json) {
     Print(SavedReport(job_id, saved));
   } else if (!output_options.quiet) {
@@ -251,14 +296,14 @@ Status Fetch(const std::string& job_id, const OutputPaths& outputs, const Endpoi
 namespace {
 
 // The job's image for a page; absent when it has none.
-StatusOr<std::optional<PageImage>> ImageOf(ClientConnection& connection,
-                                           const std::string& job_id) {
+StatusOr<std::optional<PageImage>> ImageOf(ClientConnection& connection, const std::string& job_id,
+                                           const Display& display) {
   const StatusOr<std::string> bytes = connection.GetImage(job_id);
   // No pass is merged yet, or the image was dropped: the rest of the report is worth having.
   if (absl::IsFailedPrecondition(bytes.status())) return std::optional<PageImage>();
   LUCERNA_RETURN_IF_ERROR(bytes.status());
   LUCERNA_ASSIGN_OR_RETURN(const Image image, DecodeExr(*bytes));
-  LUCERNA_ASSIGN_OR_RETURN(std::string png, EncodePng(image));
+  LUCERNA_ASSIGN_OR_RETURN(std::string png, EncodePng(image, display));
   return std::optional<PageImage>({std::move(png), image.PixelDigest()});
 }
 
@@ -278,7 +323,8 @@ Status Report(const std::string& job_id, const ReportPaths& paths, const Endpoin
   LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, connection->Get(job_id));
   std::vector<std::string> written;
   if (!paths.html.empty()) {
-    LUCERNA_ASSIGN_OR_RETURN(const auto image, ImageOf(*connection, job_id));
+    LUCERNA_ASSIGN_OR_RETURN(const auto image,
+                             ImageOf(*connection, job_id, output_options.display));
     LUCERNA_RETURN_IF_ERROR(WriteFile(paths.html, ReportPage(job, image)));
     written.push_back(paths.html);
   }

@@ -18,10 +18,11 @@ namespace lucerna {
 
 // Where an image goes; empty: not there.
 struct OutputPaths {
-  std::string exr;
-  std::string png;
+  std::string image;      // .exr, .png, .pfm or .hdr
+  std::string png;        // a PNG file beside it
+  bool replaces = false;  // files that this program has not written too
 
-  [[nodiscard]] bool empty() const { return exr.empty() && png.empty(); }
+  [[nodiscard]] bool empty() const { return image.empty() && png.empty(); }
 };
 
 struct RenderRequest {

@@ -238,7 +238,8 @@ std::string CutTo(const std::string& text, int columns) {
   return at < text.size() && cut.find('\x1b') != std::string::npos ? cut + "\x1b[0m" : cut;
 }
 
-std::vector<std::string> LiveLines(const v1::Job& job, const Image* image, TerminalSize size) {
+std::vector<std::string> LiveLines(const v1::Job& job, const Image* image, TerminalSize size,
+                                   const Display& display) {
   std::vector<std::string> lines = Broken(ProgressLine(job), size.columns);
   for (std::string& line : Broken(ErrorLine(job), size.columns))
     lines.push_back(std::move(line));
@@ -259,7 +260,8 @@ std::vector<std::string> LiveLines(const v1::Job& job, const Image* image, Termi
   if (!curve.empty() && !is_beside)
     rows = size.rows - 1 - static_cast<int>(lines.size() + curve.size());
   if (image != nullptr && rows >= kFewestRows && size.columns - used >= kFewestColumns) {
-    const auto preview = MakePreview(*image, size.columns - used, std::min(rows, kMostRows));
+    const auto preview =
+        MakePreview(*image, size.columns - used, std::min(rows, kMostRows), display);
     if (preview.ok()) picture = preview->Lines();
   }
   if (is_beside) {

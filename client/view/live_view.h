@@ -13,6 +13,7 @@
 #include "client/view/chart.h"
 #include "client/view/terminal.h"
 #include "proto/lucerna/v1/jobs.pb.h"
+#include "render/film/display.h"
 #include "render/image/image.h"
 
 namespace lucerna {
@@ -34,7 +35,7 @@ namespace lucerna {
 // The lines of a frame. None is wider than the terminal, and there are fewer than it has rows.
 // `image` may be null.
 [[nodiscard]] std::vector<std::string> LiveLines(const v1::Job& job, const Image* image,
-                                                 TerminalSize size);
+                                                 TerminalSize size, const Display& display = {});
 
 // Writes frames over one another.
 class FramePainter {

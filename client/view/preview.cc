@@ -10,8 +10,8 @@
 namespace lucerna {
 namespace {
 
-// The mean over the box of pixels that falls on one pixel of the smaller picture. What is not a
-// number is left out, as the PNG shows it black.
+// The mean over the box of pixels that falls on one pixel of the smaller picture. None is brighter
+// than white: one speck must not light up its whole neighbourhood.
 ImageChannel Shrunk(const ImageChannel& channel, int from_width, int from_height, int to_width,
                     int to_height) {
   ImageChannel shrunk{channel.name, {}};
@@ -27,11 +27,9 @@ ImageChannel Shrunk(const ImageChannel& channel, int from_width, int from_height
       double sum = 0;
       for (int row = y0; row < y1; ++row) {
         for (int column = x0; column < x1; ++column) {
-          const double value =
+          sum += static_cast<double>(
               channel.pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(from_width) +
-                             static_cast<std::size_t>(column)];
-          // Each is clipped first: one speck must not light up its whole neighbourhood.
-          if (value > 0) sum += std::min(value, 1.0);
+                             static_cast<std::size_t>(column)]);
         }
       }
       shrunk.pixels.push_back(static_cast<float>(sum / ((y1 - y0) * (x1 - x0))));
@@ -42,7 +40,8 @@ ImageChannel Shrunk(const ImageChannel& channel, int from_width, int from_height
 
 }  // namespace
 
-bool HasColors(const char* colorterm, const char* term) {
+bool HasColors(const char* colorterm, const char* term, const char* no_color) {
+  if (no_color != nullptr && *no_color != '\0') return false;
   const std::string_view colors = colorterm == nullptr ? "" : colorterm;
   const std::string_view name = term == nullptr ? "" : term;
   return colors == "truecolor" || colors == "24bit" || name.ends_with("256color");
@@ -70,7 +69,7 @@ std::vector<std::string> Preview::Lines() const {
   return lines;
 }
 
-StatusOr<Preview> MakePreview(const Image& image, int columns, int rows) {
+StatusOr<Preview> MakePreview(const Image& image, int columns, int rows, const Display& display) {
   LUCERNA_CHECK(columns >= 1 && rows >= 1);
   if (image.width < 1 || image.height < 1) {
     return absl::InvalidArgumentError("an image without pixels has no preview");
@@ -81,16 +80,10 @@ StatusOr<Preview> MakePreview(const Image& image, int columns, int rows) {
   preview.width = std::clamp(static_cast<int>(std::lround(scale * image.width)), 1, columns);
   // An even number, so that the last row of text has both its pixels.
   preview.height = 2 * std::clamp(static_cast<int>(std::lround(scale * image.height / 2)), 1, rows);
-  Image shrunk{.width = preview.width, .height = preview.height, .channels = {}, .metadata = {}};
-  for (const char* name : {"R", "G", "B"}) {
-    const ImageChannel* channel = image.Find(name);
-    if (channel == nullptr) {
-      return absl::InvalidArgumentError("a preview needs the channels R, G and B");
-    }
-    shrunk.channels.push_back(
-        Shrunk(*channel, image.width, image.height, preview.width, preview.height));
-  }
-  LUCERNA_ASSIGN_OR_RETURN(preview.pixels, ScreenPixels(shrunk));
+  LUCERNA_ASSIGN_OR_RETURN(auto shown, DisplayedChannels(image, display));
+  for (ImageChannel& channel : shown)
+    channel = Shrunk(channel, image.width, image.height, preview.width, preview.height);
+  preview.pixels = ScreenPixels(shown);
   return preview;
 }
 

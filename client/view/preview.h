@@ -10,13 +10,14 @@
 #include <vector>
 
 #include "render/base/status.h"
+#include "render/film/display.h"
 #include "render/image/image.h"
 
 namespace lucerna {
 
 // Whether a terminal shows colours, by what the environment says of it (null: nothing): COLORTERM
-// is "truecolor" or "24bit", or TERM ends with "256color".
-[[nodiscard]] bool HasColors(const char* colorterm, const char* term);
+// is "truecolor" or "24bit", or TERM ends with "256color"; never where NO_COLOR says something.
+[[nodiscard]] bool HasColors(const char* colorterm, const char* term, const char* no_color);
 
 // A picture small enough for a terminal, two pixels a row of text.
 struct Preview {
@@ -30,6 +31,7 @@ struct Preview {
 // The image averaged down to at most `columns` letters and `rows` rows of text, its proportions
 // kept as well as whole pixels can, never larger than it is. Requires columns >= 1, rows >= 1.
 // Errors: INVALID_ARGUMENT without R, G, B or pixels.
-[[nodiscard]] StatusOr<Preview> MakePreview(const Image& image, int columns, int rows);
+[[nodiscard]] StatusOr<Preview> MakePreview(const Image& image, int columns, int rows,
+                                            const Display& display = {});
 
 }  // namespace lucerna

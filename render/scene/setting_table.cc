@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <type_traits>
 
 #include "render/base/text.h"
@@ -231,6 +232,34 @@ std::optional<Number> ToNumber(std::string_view text) {
   return value;
 }
 
+// Ends of numbers. Of times [s]:
+struct NumberUnit {
+  std::string_view ending;
+  double factor;
+};
+constexpr std::array<NumberUnit, 4> kTimes = {{{"ms", 1e-3}, {"s", 1}, {"m", 60}, {"h", 3600}}};
+// Of all others:
+constexpr std::array<NumberUnit, 4> kMultiples = {
+    {{"k", 1e3}, {"M", 1e6}, {"G", 1e9}, {"T", 1e12}}};
+
+// A number with one of these ends; of whole numbers, only what is whole.
+template <typename Number>
+std::optional<Number> WithUnit(std::span<const NumberUnit> units, std::string_view text) {
+  for (const NumberUnit& unit : units) {
+    if (!text.ends_with(unit.ending)) continue;
+    const auto number = ToNumber<double>(text.substr(0, text.size() - unit.ending.size()));
+    if (!number) return std::nullopt;
+    const double value = *number * unit.factor;
+    if constexpr (!std::is_floating_point_v<Number>) {
+      // Beyond 2^53 doubles skip whole numbers.
+      const bool fits = value >= (std::is_unsigned_v<Number> ? 0.0 : -0x1p53) && value <= 0x1p53;
+      if (!fits || value != std::floor(value)) return std::nullopt;
+    }
+    return static_cast<Number>(value);
+  }
+  return std::nullopt;
+}
+
 // Parsing, by type.
 
 template <typename Number>
@@ -239,13 +268,16 @@ Status Parse(const Setting& setting, const SettingField<Number>& field, std::str
   std::string_view digits = text;
   const bool is_percent = setting.is_share && digits.ends_with('%');
   if (is_percent) digits.remove_suffix(1);
-  const std::optional<Number> number = ToNumber<Number>(digits);
+  const bool is_time = setting.unit == "s";
+  std::optional<Number> number = ToNumber<Number>(digits);
+  if (!number) number = WithUnit<Number>(is_time ? kTimes : kMultiples, digits);
   if (!number) {
     return NotOfTheType(setting,
                         setting.is_share                   ? "a share, like 2% or 0.02"
+                        : is_time                          ? "a time, like 90, 90s, 5m or 1.5h"
                         : std::is_floating_point_v<Number> ? "a number"
-                        : std::is_unsigned_v<Number>       ? "a whole number from 0"
-                                                           : "a whole number",
+                        : std::is_unsigned_v<Number> ? "a whole number from 0, like 2000, 10k or 5M"
+                                                     : "a whole number, like 2000, 10k or 5M",
                         text);
   }
   overrides.*field.given = is_percent ? *number / 100 : *number;

@@ -62,7 +62,7 @@ class ClientCommandsTest : public testing::Test {
     return names;
   }
 
-  // Starts `lucerna` with the words; its output goes to files of the test's folder.
+  // Starts `lucerna` with the words, in the test's folder; its output goes to files there.
   [[nodiscard]] pid_t Start(std::vector<std::string> words) const {
     words.insert(words.begin(), std::string(LUCERNA_BIN_DIR) + "/lucerna");
     std::vector<char*> argv;
@@ -75,7 +75,7 @@ class ClientCommandsTest : public testing::Test {
     std::filesystem::remove(err);
     const pid_t pid = ::fork();
     if (pid == 0) {
-      if (std::freopen(out.c_str(), "w", stdout) == nullptr ||
+      if (::chdir(folder_.c_str()) != 0 || std::freopen(out.c_str(), "w", stdout) == nullptr ||
           std::freopen(err.c_str(), "w", stderr) == nullptr) {
         ::_exit(125);
       }
@@ -267,7 +267,7 @@ TEST_F(ClientCommandsTest, ReadingASceneEndsAtOnceWhenToldTo) {
 TEST_F(ClientCommandsTest, MisuseIsRefusedWithCodeTwo) {
   EXPECT_EQ(Run({}).code, 2);
   EXPECT_EQ(Run({"paint"}).code, 2);
-  EXPECT_EQ(Run({"render", SceneOfTests("caustic.pbrt")}).code, 2) << "no output";
+  EXPECT_EQ(Run({"fetch", "j"}).code, 2) << "no output";
   EXPECT_EQ(Run(SmallRender({"-o", In("a.exr"), "--workers", "0"})).code, 2);
   EXPECT_EQ(Run(SmallRender({"-o", In("a.exr"), "--alpha", "1.5"})).code, 2);
   EXPECT_EQ(Run({"diff", "a", "b", "--crop", "--scale"}).code, 2);
@@ -279,6 +279,57 @@ TEST_F(ClientCommandsTest, MisuseIsRefusedWithCodeTwo) {
   EXPECT_EQ(too_large.code, 2);
   EXPECT_NE(too_large.err.find("2500000000 pixels"), std::string::npos) << too_large.err;
   EXPECT_EQ(Run({"render", "--help"}).code, 0);
+}
+
+TEST_F(ClientCommandsTest, ASceneAloneIsRenderedToAnImageOfItsName) {
+  const Ran ran = Run({SceneOfTests("caustic.pbrt"), "--size", "16x12", "--photons", "2k"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(Images(), std::vector<std::string>{"caustic.exr"});
+}
+
+TEST_F(ClientCommandsTest, TheNameOfTheImageIsItsFormat) {
+  for (const char* name : {"a.png", "a.pfm", "a.hdr", "a.exr"})
+    EXPECT_EQ(Run(SmallRender({"-o", name})).code, 0) << name;
+  EXPECT_EQ(Contents(In("a.png")).substr(1, 3), "PNG");
+  EXPECT_EQ(Contents(In("a.pfm")).substr(0, 3), "PF\n");
+  EXPECT_EQ(Contents(In("a.hdr")).substr(0, 10), "#?RADIANCE");
+  const Ran other = Run(SmallRender({"-o", "a.jpg"}));
+  EXPECT_EQ(other.code, 2);
+  EXPECT_NE(other.err.find("a.jpg: its name must end with .exr, .png, .pfm or .hdr"),
+            std::string::npos)
+      << other.err;
+}
+
+TEST_F(ClientCommandsTest, AFileOfSomethingElseIsReplacedOnlyByForce) {
+  std::ofstream(In("notes.png")) << "my notes";
+  const Ran refused = Run(SmallRender({"--png", "notes.png"}));
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("notes.png exists, and was not written by lucerna; --force"),
+            std::string::npos)
+      << refused.err;
+  EXPECT_EQ(Contents(In("notes.png")), "my notes");
+  EXPECT_EQ(Run(SmallRender({"--png", "notes.png", "--force"})).code, 0);
+  EXPECT_EQ(Run(SmallRender({"--png", "notes.png"})).code, 0) << "its own now";
+  EXPECT_EQ(Run(SmallRender({"-o", "a.exr"})).code, 0);
+  EXPECT_EQ(Run(SmallRender({"-o", "a.exr"})).code, 0);
+}
+
+// One may be gone: the others are changed all the same.
+TEST_F(ClientCommandsTest, SeveralJobsAreChangedByOneCommand) {
+  const auto cluster = LocalCluster::Start({LUCERNA_BIN_DIR, 1, 1});
+  ASSERT_TRUE(cluster.ok()) << cluster.status();
+  const std::string server = (*cluster)->address();
+  const auto submit = [&](const std::string& seed) {
+    const Ran submitted = Run({"submit", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--seed",
+                               seed, "--time", "1h", "--server", server});
+    return submitted.out.substr(0, submitted.out.find('\n'));
+  };
+  const std::string first = submit("1");
+  const std::string second = submit("2");
+  EXPECT_EQ(Run({"cancel", first, "nobodys", second, "--server", server}).code, 1);
+  const Ran jobs = Run({"jobs", "--state", "cancelled", "--json", "--server", server});
+  EXPECT_EQ(json::parse(jobs.out).size(), 2U) << jobs.out;
+  EXPECT_EQ(Run({"delete", first, second, "--server", server}).code, 0);
 }
 
 // Below the client a setting is named by its name, which is no flag.

@@ -44,12 +44,12 @@ BELOW["render/wire"].append("proto")
 OWNERS = {
     r"embree3/": ["render/geometry/"],
     r"(Imf|Imath|Iex|OpenEXR/)": ["render/image/exr_file"],
-    r"stb": ["render/film/png_file", "render/formats/image_file"],
+    r"stb": ["render/film/png_file", "render/film/picture_file", "render/formats/image_file"],
     r"(google/protobuf|grpcpp|grpc)/": ["render/wire/", "server/", "worker/", "client/"],
     r"zstd\.h": ["render/wire/"],
     r"openssl/": ["render/base/"],
     r"tbb/": ["render/base/parallel"],
-    r"zlib\.h": ["render/formats/", "render/image/"],
+    r"zlib\.h": ["render/formats/", "render/image/", "render/film/png_file"],
     r"sqlite3\.h": ["server/"],
     r"random>?$": [],
 }

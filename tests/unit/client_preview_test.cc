@@ -21,12 +21,14 @@ Image ImageOf(int width, int height, const std::vector<float>& red) {
 }
 
 TEST(PreviewTest, ColorsAreForTerminalsThatSaySo) {
-  EXPECT_TRUE(HasColors("truecolor", "xterm"));
-  EXPECT_TRUE(HasColors("24bit", nullptr));
-  EXPECT_TRUE(HasColors(nullptr, "xterm-256color"));
-  EXPECT_FALSE(HasColors(nullptr, "xterm"));
-  EXPECT_FALSE(HasColors("yes", "256color-not"));
-  EXPECT_FALSE(HasColors(nullptr, nullptr));
+  EXPECT_TRUE(HasColors("truecolor", "xterm", nullptr));
+  EXPECT_TRUE(HasColors("24bit", nullptr, nullptr));
+  EXPECT_TRUE(HasColors(nullptr, "xterm-256color", nullptr));
+  EXPECT_FALSE(HasColors(nullptr, "xterm", nullptr));
+  EXPECT_FALSE(HasColors("yes", "256color-not", nullptr));
+  EXPECT_FALSE(HasColors(nullptr, nullptr, nullptr));
+  EXPECT_FALSE(HasColors("truecolor", "xterm-256color", "1"));
+  EXPECT_TRUE(HasColors("truecolor", "xterm", "")) << "an empty NO_COLOR says nothing";
 }
 
 TEST(PreviewTest, ACellIsItsUpperPixelOverItsLower) {

@@ -86,10 +86,12 @@ TEST(PngFileTest, EncodesTheSrgbCurveAndClips) {
 }
 
 TEST(PngFileTest, ExposureIsInStopsOfLinearLight) {
-  const StatusOr<std::string> png = EncodePng(FromRed(2, 1, {0.05396513F, 4}), 2);
+  const StatusOr<std::string> png =
+      EncodePng(FromRed(2, 1, {0.05396513F, 4}), {.exposure_stops = 2});
   ASSERT_TRUE(png.ok());
   EXPECT_EQ(Pixels(*png)[0], 128);
-  const StatusOr<std::string> darker = EncodePng(FromRed(2, 1, {0.05396513F, 4}), -2);
+  const StatusOr<std::string> darker =
+      EncodePng(FromRed(2, 1, {0.05396513F, 4}), {.exposure_stops = -2});
   ASSERT_TRUE(darker.ok());
   EXPECT_EQ(Pixels(*darker)[3], 255);
 }

@@ -100,6 +100,26 @@ TEST(SettingTableTest, RefusesWhatIsNotOfTheTypeByTheSettingsName) {
   EXPECT_LT(WhyRefused("alpha", std::string(100'000, 'x')).size(), 200U);
 }
 
+TEST(SettingTableTest, TimesAndCountsMayHaveUnits) {
+  const auto overrides = [](const char* name, const char* text) {
+    RenderOverrides given;
+    EXPECT_TRUE(ParseSetting(*FindSetting(name), text, given).ok()) << text;
+    return given;
+  };
+  EXPECT_EQ(overrides("time_s", "90").time_s, 90);
+  EXPECT_EQ(overrides("time_s", "90s").time_s, 90);
+  EXPECT_EQ(overrides("time_s", "500ms").time_s, 0.5);
+  EXPECT_EQ(overrides("time_s", "5m").time_s, 300);
+  EXPECT_EQ(overrides("time_s", "1.5h").time_s, 5400);
+  EXPECT_EQ(overrides("photons", "10M").photons, 10'000'000U);
+  EXPECT_EQ(overrides("photons", "1.5k").photons, 1500U);
+  EXPECT_EQ(overrides("passes", "2k").passes, 2000);
+  for (const char* text : {"5x", "m", "5 m", "5M", "-", "1e400h", "5mm"})
+    EXPECT_THAT(WhyRefused("time_s", text), HasSubstr("must be a time, like 90, 90s, 5m")) << text;
+  for (const char* text : {"1.0005k", "-1k", "10m", "1e300M", "nanM", "k"})
+    EXPECT_THAT(WhyRefused("photons", text), HasSubstr("must be a whole number")) << text;
+}
+
 TEST(SettingTableTest, ARadiusIsALengthOrPixelWidthsOrAutomatic) {
   const auto parsed = [](std::string_view text) {
     RenderOverrides overrides;

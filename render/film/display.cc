@@ -1,0 +1,122 @@
+#include "render/film/display.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace lucerna {
+namespace {
+
+constexpr double kMiddleGrey = 0.18;
+constexpr double kDarkest = 0x1p-7, kBrightest = 1;  // mean luminances that are shown as they are
+constexpr double kReinhardWhite = 4;                 // two stops above white
+
+constexpr std::array<std::pair<std::string_view, ToneCurve>, 4> kCurves = {
+    {{"clip", ToneCurve::kClip},
+     {"reinhard", ToneCurve::kReinhard},
+     {"filmic", ToneCurve::kFilmic},
+     {"aces", ToneCurve::kAces}}};
+
+StatusOr<std::array<const ImageChannel*, 3>> ColorsOf(const Image& image) {
+  const std::array channels = {image.Find("R"), image.Find("G"), image.Find("B")};
+  for (const ImageChannel* channel : channels) {
+    if (channel != nullptr) continue;
+    return absl::InvalidArgumentError(
+        "a picture needs the channels R, G and B, and this image does not have all of them");
+  }
+  return channels;
+}
+
+using Color = std::array<double, 3>;
+
+double LuminanceOf(const Color& color) {
+  return 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2];
+}
+
+double Positive(float value) {
+  return value > 0 ? static_cast<double>(value) : 0;  // also of what is not a number
+}
+
+// Of values from 0, rising, 1 at its white.
+double Filmic(double value) {
+  constexpr double kWhite = 11.2;
+  const auto curve = [](double x) {
+    constexpr double kA = 0.15, kB = 0.50, kC = 0.10, kD = 0.20, kE = 0.02, kF = 0.30;
+    return (x * (kA * x + kC * kB) + kD * kE) / (x * (kA * x + kB) + kD * kF) - kE / kF;
+  };
+  // Twice as bright, so that middle grey stays near its place.
+  return curve(2 * std::min(value, kWhite)) / curve(kWhite);
+}
+
+double Aces(double value) {
+  const double x = std::min(value, 1e6);
+  return (x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14);
+}
+
+Color Curved(const Color& color, ToneCurve curve) {
+  Color shown = color;
+  if (curve == ToneCurve::kReinhard) {
+    const double luminance = std::min(LuminanceOf(color), 1e6);
+    const double factor = (1 + luminance / (kReinhardWhite * kReinhardWhite)) / (1 + luminance);
+    for (double& value : shown)
+      value *= factor;
+  } else if (curve == ToneCurve::kFilmic) {
+    std::ranges::transform(color, shown.begin(), Filmic);
+  } else if (curve == ToneCurve::kAces) {
+    std::ranges::transform(color, shown.begin(), Aces);
+  }
+  for (double& value : shown)
+    value = std::clamp(value, 0.0, 1.0);
+  return shown;
+}
+
+}  // namespace
+
+StatusOr<ToneCurve> ParseToneCurve(std::string_view name) {
+  for (const auto& [known, curve] : kCurves) {
+    if (known == name) return curve;
+  }
+  return absl::InvalidArgumentError("there are clip, reinhard, filmic and aces");
+}
+
+double AutoExposure(const Image& image) {
+  const auto channels = ColorsOf(image);
+  if (!channels.ok()) return 0;
+  double sum = 0;
+  double count = 0;
+  for (std::size_t i = 0; i < (*channels)[0]->pixels.size(); ++i) {
+    Color color;
+    for (std::size_t c = 0; c < 3; ++c)
+      color[c] = Positive((*channels)[c]->pixels[i]);
+    const double luminance = LuminanceOf(color);
+    if (!(luminance > 0) || !std::isfinite(luminance)) continue;
+    sum += std::log2(luminance);
+    ++count;
+  }
+  if (count == 0) return 0;
+  const double mean = sum / count;
+  if (mean >= std::log2(kDarkest) && mean <= std::log2(kBrightest)) return 0;
+  return std::round(std::log2(kMiddleGrey) - mean);
+}
+
+StatusOr<std::array<ImageChannel, 3>> DisplayedChannels(const Image& image,
+                                                        const Display& display) {
+  LUCERNA_ASSIGN_OR_RETURN(const auto channels, ColorsOf(image));
+  const double gain =
+      std::exp2(display.exposure_stops ? *display.exposure_stops : AutoExposure(image));
+  std::array<ImageChannel, 3> shown;
+  const std::size_t pixels = channels[0]->pixels.size();
+  for (std::size_t c = 0; c < 3; ++c)
+    shown[c] = {channels[c]->name, std::vector<float>(pixels)};
+  for (std::size_t i = 0; i < pixels; ++i) {
+    Color color;
+    for (std::size_t c = 0; c < 3; ++c)
+      color[c] = std::min(gain * Positive(channels[c]->pixels[i]), 1e30);
+    color = Curved(color, display.curve);
+    for (std::size_t c = 0; c < 3; ++c)
+      shown[c].pixels[i] = static_cast<float>(color[c]);
+  }
+  return shown;
+}
+
+}  // namespace lucerna

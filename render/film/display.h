@@ -1,0 +1,39 @@
+// How does radiance become what a screen shows?
+//
+// Exposure multiplies by a power of two; a tone curve brings what is brighter than white back below
+// it. Both change PNG files and previews, and never the EXR.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string_view>
+
+#include "render/base/status.h"
+#include "render/image/image.h"
+
+namespace lucerna {
+
+enum class ToneCurve : unsigned char {
+  kClip,      // white and brighter are white
+  kReinhard,  // Reinhard, Stark, Shirley & Ferwerda 2002, eq. 4; keeps hues
+  kFilmic,    // Hable 2010, "Filmic Tonemapping for Real-time Rendering"
+  kAces,      // Narkowicz 2016, a fit of the ACES reference rendering transform
+};
+[[nodiscard]] StatusOr<ToneCurve> ParseToneCurve(std::string_view name);
+
+struct Display {
+  std::optional<double> exposure_stops = 0;  // absent: AutoExposure
+  ToneCurve curve = ToneCurve::kClip;
+};
+
+// The exposure [stops, whole] that brings the geometric mean of the luminances above 0 near middle
+// grey (0.18), and 0 where that mean is between 2^-7 and 1 already, so that images which are
+// exposed by their scene stay as they are.
+[[nodiscard]] double AutoExposure(const Image& image);
+
+// R, G and B in [0, 1], linear, of the sRGB primaries; what is not a number is black.
+// Errors: INVALID_ARGUMENT without R, G, B.
+[[nodiscard]] StatusOr<std::array<ImageChannel, 3>> DisplayedChannels(const Image& image,
+                                                                      const Display& display);
+
+}  // namespace lucerna
