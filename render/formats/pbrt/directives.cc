@@ -8,6 +8,7 @@
 #include "absl/strings/ascii.h"
 
 #include "render/base/text.h"
+#include "render/formats/pbrt/rgb_space.h"
 #include "render/formats/pbrt/spectrum_files.h"
 
 namespace lucerna {
@@ -229,6 +230,7 @@ ParameterList DirectiveReader::ListFor(const Arguments& arguments, std::string_v
                                        std::vector<Parameter> parameters,
                                        const GraphicsState::Defaults& defaults) {
   ReadSpectrumFiles(assets_, parameters, diagnostics_);
+  ToRec709(parameters, graphics_.state().rgb_space);
   return ParameterList(Concat(arguments.directive(), " ", Quoted(type)), arguments.location(),
                        std::move(parameters), defaults.get(), diagnostics_);
 }
@@ -296,6 +298,7 @@ bool DirectiveReader::OnAttribute(Arguments& arguments) {
         Concat("Attribute takes shape, light, material, medium or texture, not ", Quoted(target)));
     return true;
   }
+  ToRec709(parameters, graphics_.state().rgb_space);
   // The newest first: of two defaults of one name the later counts.
   auto all = std::make_shared<std::vector<Parameter>>(std::move(parameters));
   GraphicsState::Defaults& defaults = graphics_.state().DefaultsOf(*known);

@@ -16,6 +16,8 @@
 
 namespace lucerna {
 
+struct RgbSpace;
+
 // What the directive Attribute gives default parameters to.
 enum class AttributeTarget : std::uint8_t { kShape, kLight, kMaterial, kTexture, kMedium };
 inline constexpr std::size_t kAttributeTargets = 5;
@@ -37,6 +39,7 @@ struct GraphicsState {
   // without extent are in the outer one.
   std::int32_t medium_inside = kNoMedium, medium_outside = kNoMedium;
   std::array<Defaults, kAttributeTargets> defaults;
+  const RgbSpace* rgb_space = nullptr;  // of colours given as rgb; nullptr: Rec. 709
 
   [[nodiscard]] Defaults& DefaultsOf(AttributeTarget target) {
     return defaults[static_cast<std::size_t>(target)];

@@ -80,7 +80,9 @@ void ReadEnvironment(const LightInput& input, double scale, double illuminance) 
 void ReadInfiniteLight(const LightInput& input) {
   ParameterList& parameters = input.parameters;
   if (parameters.Has("portal")) {
-    parameters.Error("portal", "is not supported");
+    parameters.Warning("portal",
+                       "is ignored: light comes in wherever nothing is in its way, and photons "
+                       "are sent where they come into view anyway");
     parameters.Ignore("portal");
   }
   double scale = parameters.Float("scale", 1, kZeroOrMore);

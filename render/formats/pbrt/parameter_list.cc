@@ -245,6 +245,10 @@ std::optional<Rgb> ParameterList::FindReflectance(std::string_view name) {
   if (parameter == nullptr) return std::nullopt;
   if (parameter->type == "rgb") {
     if (!CheckCount(*parameter, 3)) return std::nullopt;
+    if (parameter->is_converted) {
+      const Rgb color = ToRgb(parameter->numbers);
+      return Rgb{std::min(color.r, 1.0F), std::min(color.g, 1.0F), std::min(color.b, 1.0F)};
+    }
     for (const double value : parameter->numbers) {
       if (!CheckRange(*parameter, value, {0, 1})) return std::nullopt;
     }

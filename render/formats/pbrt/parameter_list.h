@@ -28,6 +28,8 @@ struct Parameter {
   std::vector<double> numbers;  // numeric types and colours; finite, within single precision
   std::vector<std::string> strings;
   std::vector<bool> bools;
+  // Its rgb was given in other primaries; what Rec. 709 cannot show is to be clamped.
+  bool is_converted = false;
 
   [[nodiscard]] std::size_t count() const { return numbers.size() + strings.size() + bools.size(); }
 };

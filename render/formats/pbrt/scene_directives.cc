@@ -11,6 +11,7 @@
 #include "render/formats/pbrt/lights.h"
 #include "render/formats/pbrt/materials.h"
 #include "render/formats/pbrt/media.h"
+#include "render/formats/pbrt/rgb_space.h"
 #include "render/formats/pbrt/settings.h"
 #include "render/formats/pbrt/spectrum_files.h"
 #include "render/scene/shape_lists.h"
@@ -115,20 +116,36 @@ bool DirectiveReader::OnAccelerator(Arguments& arguments) {
 bool DirectiveReader::OnColorSpace(Arguments& arguments) {
   std::string name;
   if (!arguments.ReadString("a name", name)) return false;
-  if (name != "srgb") {
-    diagnostics_.Warning(
-        arguments.location(),
-        Concat("ColorSpace ", Quoted(name), " is not supported; colours are read as srgb"));
+  const RgbSpace* const space = FindRgbSpace(name);
+  if (space == nullptr) {
+    arguments.Error(Concat("there is no colour space ", Quoted(name), "; ", RgbSpaceNames()));
+    return true;
   }
+  graphics_.state().rgb_space = space;
   return true;
 }
 
 bool DirectiveReader::OnOption(Arguments& arguments) {
+  const auto ignore = [&](const SourceLocation& location, std::string_view name) {
+    diagnostics_.Note(location, Concat("Option ", Quoted(name), " is ignored"));
+  };
+  // pbrt-v4 writes a name and a value; some files have parameters with a type.
+  const Token& first = arguments.tokens().Peek();
+  if (first.kind == Token::Kind::kString && first.text.find(' ') == std::string_view::npos) {
+    const SourceLocation location = first.location;
+    std::string name;
+    if (!arguments.ReadString("a name", name)) return false;
+    if (arguments.tokens().Next().kind == Token::Kind::kEnd) {
+      diagnostics_.Error(location, Concat("Option ", Quoted(name), " has no value"));
+      return true;
+    }
+    ignore(location, name);
+    return true;
+  }
   std::vector<Parameter> parameters;
   if (!arguments.ReadParameters(parameters)) return false;
-  for (const Parameter& parameter : parameters) {
-    diagnostics_.Note(parameter.location, Concat("Option ", Quoted(parameter.name), " is ignored"));
-  }
+  for (const Parameter& parameter : parameters)
+    ignore(parameter.location, parameter.name);
   return true;
 }
 
