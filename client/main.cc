@@ -70,6 +70,10 @@ int Run(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 coordinator unreachable, 130 interrupted.");
 
+  app.set_config("--config", ConfigPath(std::getenv("XDG_CONFIG_HOME"), std::getenv("HOME")),
+                 "file of flags, as [render] and size = \"640x480\"");
+  app.allow_config_extras(CLI::config_extras_mode::error);
+
   OutputOptions output_options;
   RenderRequest request;
   ClusterOptions cluster;
@@ -496,6 +500,18 @@ int Run(int argc, char** argv) {
   });
   help->add_option("TOPIC", topic, "a command, or settings");
 
+  Shell shell = Shell::kBash;
+  CLI::App* completion =
+      command("completion", "print a script that completes commands in a shell", [&]() -> Status {
+        std::fputs(CompletionScript(app, shell).c_str(), stdout);
+        return absl::OkStatus();
+      });
+  const std::map<std::string, Shell> shells = {
+      {"bash", Shell::kBash}, {"zsh", Shell::kZsh}, {"fish", Shell::kFish}};
+  completion->add_option("SHELL", shell, "bash, zsh or fish")
+      ->required()
+      ->transform(CLI::Transformer(shells));
+
   CLI::App* digest = command("digest", "print the digest of an image's pixels and settings",
                              [&] { return PrintDigest(image_path, output_options); });
   digest->add_option("FILE", image_path, "EXR file")->required();
@@ -548,7 +564,7 @@ int Run(int argc, char** argv) {
   server.token = *std::move(token);
 
   // These commands start no job and no process, so a signal may end them at once.
-  const bool has_no_job = *validate || *plan || *diff || *digest || *png;
+  const bool has_no_job = *validate || *plan || *diff || *digest || *png || *completion;
   if (!has_no_job) CatchInterruptions();
   IgnoreGrpcLog();
   Status status = chosen();

@@ -15,6 +15,19 @@ namespace {
 constexpr std::array<std::string_view, 5> kSceneEndings = {".pbrt.gz", ".pbrt", ".gltf", ".glb",
                                                            ".gz"};
 
+std::vector<std::string> FlagsOf(const CLI::App& command) {
+  std::vector<std::string> flags;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames())
+      flags.push_back("--" + name);
+  }
+  return flags;
+}
+
+std::vector<const CLI::App*> CommandsOf(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
 std::string_view EndingOf(std::string_view path) {
   const auto found = std::ranges::find_if(
       kSceneEndings, [&](std::string_view ending) { return path.ends_with(ending); });
@@ -86,20 +99,90 @@ std::string Suggestion(const CLI::App& app, const std::vector<std::string>& word
   if (command == nullptr) {
     if (is_flag(words.front())) return "";
     std::vector<std::string> commands;
-    for (const CLI::App* known : app.get_subcommands({}))
+    for (const CLI::App* known : CommandsOf(app))
       commands.push_back(known->get_name());
     return Proposal(words.front(), Nearest(words.front(), commands));
   }
-  std::vector<std::string> flags;
-  for (const CLI::Option* option : command->get_options()) {
-    for (const std::string& name : option->get_lnames())
-      flags.push_back("--" + name);
-  }
+  const std::vector<std::string> flags = FlagsOf(*command);
   for (const std::string& word : words) {
     const std::string flag = word.substr(0, word.find('='));
     if (!is_flag(flag) || std::ranges::find(flags, flag) != flags.end()) continue;
     if (std::string line = Proposal(flag, Nearest(flag, flags)); !line.empty()) return line;
   }
+  return "";
+}
+
+namespace {
+
+std::string Joined(const std::vector<std::string>& words) {
+  std::string all;
+  for (const std::string& word : words)
+    all += (all.empty() ? "" : " ") + word;
+  return all;
+}
+
+std::string BashScript(const CLI::App& app) {
+  std::vector<std::string> names;
+  std::string cases;
+  for (const CLI::App* command : CommandsOf(app)) {
+    names.push_back(command->get_name());
+    std::vector<std::string> words = FlagsOf(*command);
+    for (const CLI::App* below : CommandsOf(*command))
+      words.push_back(below->get_name());
+    cases += absl::StrCat("    ", command->get_name(), ") words=\"", Joined(words), "\" ;;\n");
+  }
+  return absl::StrCat(
+      "_lucerna() {\n"
+      "  local word=\"${COMP_WORDS[COMP_CWORD]}\" words=\"\"\n"
+      "  case \"${COMP_WORDS[1]}\" in\n",
+      cases,
+      "  esac\n"
+      "  if [ \"$COMP_CWORD\" -eq 1 ]; then words=\"",
+      Joined(names),
+      "\"; fi\n"
+      "  COMPREPLY=($(compgen -W \"$words\" -- \"$word\"))\n"
+      "}\n"
+      "complete -o default -F _lucerna lucerna\n");
+}
+
+// Within single quotes of fish.
+std::string Quoted(const std::string& text) {
+  std::string quoted;
+  for (const char letter : text) {
+    if (letter == '\'' || letter == '\\') quoted += '\\';
+    quoted += letter;
+  }
+  return absl::StrCat("'", quoted, "'");
+}
+
+std::string FishScript(const CLI::App& app) {
+  std::string script;
+  for (const CLI::App* command : CommandsOf(app)) {
+    const std::string& name = command->get_name();
+    script += absl::StrCat("complete -c lucerna -n __fish_use_subcommand -a ", name, " -d ",
+                           Quoted(command->get_description()), "\n");
+    for (const CLI::Option* option : command->get_options()) {
+      for (const std::string& flag : option->get_lnames()) {
+        script += absl::StrCat("complete -c lucerna -n '__fish_seen_subcommand_from ", name,
+                               "' -l ", flag, " -d ", Quoted(option->get_description()), "\n");
+      }
+    }
+  }
+  return script;
+}
+
+}  // namespace
+
+std::string CompletionScript(const CLI::App& app, Shell shell) {
+  if (shell == Shell::kFish) return FishScript(app);
+  const std::string script = BashScript(app);
+  return shell == Shell::kBash ? script : "autoload -U +X bashcompinit && bashcompinit\n" + script;
+}
+
+std::string ConfigPath(const char* config_home, const char* home) {
+  const auto is_given = [](const char* path) { return path != nullptr && *path == '/'; };
+  if (is_given(config_home)) return absl::StrCat(config_home, "/lucerna.toml");
+  if (is_given(home)) return absl::StrCat(home, "/.config/lucerna.toml");
   return "";
 }
 

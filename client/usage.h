@@ -29,4 +29,12 @@ namespace lucerna {
 // none is near.
 [[nodiscard]] std::string Suggestion(const CLI::App& app, const std::vector<std::string>& words);
 
+enum class Shell : unsigned char { kBash, kZsh, kFish };
+// A script that completes commands, flags and names of files.
+[[nodiscard]] std::string CompletionScript(const CLI::App& app, Shell shell);
+
+// The file of flags that is read when none is named: lucerna.toml in $XDG_CONFIG_HOME, else in
+// ~/.config; empty when both are unknown. Either argument may be null.
+[[nodiscard]] std::string ConfigPath(const char* config_home, const char* home);
+
 }  // namespace lucerna

@@ -75,6 +75,20 @@ Status CheckOutputs(const OutputPaths& outputs) {
   return absl::OkStatus();
 }
 
+// The image of hours is not thrown away because its place is full. Returns `why`, with the name of
+// the file in the folder for temporary files that has it instead.
+Status SaveElsewhere(const std::string& path, const std::string& bytes, const Status& why) {
+  std::error_code error;
+  const std::filesystem::path folder = std::filesystem::temp_directory_path(error);
+  if (error) return why;
+  const std::string other = (folder / std::filesystem::path(path).filename()).string();
+  if (IsSameFile(other, path) || std::filesystem::exists(other, error) ||
+      !WriteFile(other, bytes).ok()) {
+    return why;
+  }
+  return Status(why.code(), absl::StrCat(why.message(), "; it is in ", other, " instead"));
+}
+
 // Fetches the image, makes sure that it is one, and writes it. What cannot be written leaves no
 // other file out.
 StatusOr<SavedImage> Save(ClientConnection& connection, const std::string& job_id,
@@ -84,15 +98,16 @@ StatusOr<SavedImage> Save(ClientConnection& connection, const std::string& job_i
   SavedImage saved;
   saved.digest = image.PixelDigest();
   Status status;
-  const auto write = [&](const std::string& path, PictureFormat format) -> Status {
-    if (format == PictureFormat::kExr) return WriteFile(path, bytes);
-    LUCERNA_ASSIGN_OR_RETURN(const std::string picture, EncodePicture(image, format, display));
-    return WriteFile(path, picture);
-  };
   const auto save = [&](const std::string& path, const StatusOr<PictureFormat>& format) {
     if (path.empty()) return;
-    const Status written = format.ok() ? write(path, *format) : format.status();
+    StatusOr<std::string> picture = !format.ok() ? format.status()
+                                    : *format == PictureFormat::kExr
+                                        ? bytes
+                                        : EncodePicture(image, *format, display);
+    Status written = picture.ok() ? WriteFile(path, *picture) : picture.status();
     if (written.ok()) saved.paths.push_back(path);
+    if (!written.ok() && picture.ok() && !IsDevice(path))
+      written = SaveElsewhere(path, *picture, written);
     if (status.ok()) status = written;
   };
   if (!outputs.image.empty()) save(outputs.image, FormatOf(outputs.image));

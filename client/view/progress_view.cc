@@ -248,16 +248,19 @@ std::vector<std::string> ErrorNotes(const v1::Job& job) {
 }
 
 std::string TableHead() {
-  return absl::StrFormat("%-33s %-10s %6s %10s %9s  %-12s %s", "JOB", "STATE", "PASSES", "PHOTONS",
-                         "TIME", "OWNER", "NAME");
+  return absl::StrFormat("%-33s %-10s %5s %6s %10s %9s %9s  %-12s %s", "JOB", "STATE", "DONE",
+                         "PASSES", "PHOTONS", "TIME", "ETA", "OWNER", "NAME");
 }
 
 std::string TableLine(const v1::Job& job) {
-  return absl::StrFormat("%-33s %-10s %6d %10s %9s  %-12s %s", job.job_id(), NameOf(job.state()),
-                         job.progress().passes(),
-                         ShortCount(static_cast<double>(job.progress().photons())),
-                         ShortTime(FromProto(job.progress().running())),
-                         job.owner().empty() ? "-" : job.owner(), job.name());
+  const std::optional<double> share = ShareDone(job);
+  const std::optional<Duration> left = TimeLeft(job);
+  return absl::StrFormat(
+      "%-33s %-10s %5s %6d %10s %9s %9s  %-12s %s", job.job_id(), NameOf(job.state()),
+      share ? absl::StrFormat("%.0f %%", std::floor(100 * *share)) : "-", job.progress().passes(),
+      ShortCount(static_cast<double>(job.progress().photons())),
+      ShortTime(FromProto(job.progress().running())), left ? ShortTime(*left) : "-",
+      job.owner().empty() ? "-" : job.owner(), job.name());
 }
 
 std::string ProgressPrinter::Update(const v1::Job& job, SteadyTime now) {

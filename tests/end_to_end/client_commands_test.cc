@@ -314,6 +314,26 @@ TEST_F(ClientCommandsTest, AFileOfSomethingElseIsReplacedOnlyByForce) {
   EXPECT_EQ(Run(SmallRender({"-o", "a.exr"})).code, 0);
 }
 
+TEST_F(ClientCommandsTest, FlagsMayComeFromAFile) {
+  std::ofstream(In("flags.toml")) << "[render]\nsize = \"20x10\"\npasses = 2\nquiet = true\n";
+  const auto render = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {
+        "--config", "flags.toml", "render", SceneOfTests("caustic.pbrt"), "-o", "a.exr"};
+    words.insert(words.end(), more.begin(), more.end());
+    return Run(words);
+  };
+  const Ran ran = render({});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(ran.out + ran.err, "");
+  EXPECT_EQ(DecodeExr(Contents(In("a.exr")))->width, 20);
+  EXPECT_EQ(render({"--size", "30x10"}).code, 0) << "those of the command line come first";
+  EXPECT_EQ(DecodeExr(Contents(In("a.exr")))->width, 30);
+  std::ofstream(In("flags.toml")) << "[render]\nsiz = 3\n";
+  const Ran unknown = render({});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_NE(unknown.err.find("siz"), std::string::npos) << unknown.err;
+}
+
 // One may be gone: the others are changed all the same.
 TEST_F(ClientCommandsTest, SeveralJobsAreChangedByOneCommand) {
   const auto cluster = LocalCluster::Start({LUCERNA_BIN_DIR, 1, 1});
@@ -422,6 +442,25 @@ TEST_F(ClientCommandsTest, AFullDiskIsReported) {
   EXPECT_NE(ran.err.find("/dev/full: cannot write: No space left"), std::string::npos) << ran.err;
 }
 
+// The folder of the image is gone when the render ends.
+TEST_F(ClientCommandsTest, AnImageWithoutItsPlaceIsKeptElsewhere) {
+  std::filesystem::create_directory(In("gone"));
+  std::filesystem::create_directory(In("other"));
+  ::setenv("TMPDIR", In("other").c_str(), 1);
+  const pid_t pid = Start({"render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--time",
+                           "3s", "-o", "gone/a.exr", "--png", "b.png", "--no-checkpoints"});
+  ::unsetenv("TMPDIR");
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  std::filesystem::remove_all(In("gone"));
+  const Ran ran = Finish(pid);
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_NE(ran.err.find("gone/a.exr"), std::string::npos) << ran.err;
+  EXPECT_NE(ran.err.find("; it is in " + In("other/a.exr") + " instead"), std::string::npos)
+      << ran.err;
+  EXPECT_TRUE(DecodeExr(Contents(In("other/a.exr"))).ok());
+  EXPECT_TRUE(std::filesystem::exists(In("b.png"))) << "the other image is written all the same";
+}
+
 TEST_F(ClientCommandsTest, AnUnreachableCoordinatorIsNamedWithCodeThree) {
   const std::vector<std::vector<std::string>> commands = {
       {"jobs"}, {"fetch", "j", "-o", In("a.exr")}, {"submit", SceneOfTests("caustic.pbrt")}};
@@ -462,7 +501,16 @@ TEST_F(ClientCommandsTest, AnInterruptedRenderWritesTheImageSoFarAndGoesOnWithTh
         "render", SceneOfTests("caustic.pbrt"), "--size", "32x24", end, value, "-o", In(image)};
   };
   const pid_t client = Start(render("a.exr", "--time", "1000"));
-  for (int i = 0; i < 6000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i)
+  // "pass 0" is said before there is an image.
+  const auto has_passes = [&] {
+    const std::string lines = Contents(In("stderr.txt"));
+    for (std::size_t at = lines.find("pass "); at != std::string::npos;
+         at = lines.find("pass ", at + 1)) {
+      if (at + 5 < lines.size() && lines[at + 5] >= '1' && lines[at + 5] <= '9') return true;
+    }
+    return false;
+  };
+  for (int i = 0; i < 6000 && !has_passes(); ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   const std::vector<pid_t> children = ChildrenOf(client);
   ::kill(client, SIGINT);

@@ -57,6 +57,24 @@ TEST(ProgressViewTest, ARunningJobShowsItsShareRateAndTimeLeft) {
             "  ETA 12.0 s");
 }
 
+TEST(ProgressViewTest, ALineOfTheTableTellsProgressOwnerAndTimeLeft) {
+  v1::Job job = Running();
+  EXPECT_EQ(
+      TableLine(job),
+      "j1                                RUNNING     25 %      3     4.00 M    4.00 s    12.0 s  "
+      "-            pool.pbrt");
+  EXPECT_EQ(
+      TableHead(),
+      "JOB                               STATE       DONE PASSES    PHOTONS      TIME       ETA  "
+      "OWNER        NAME");
+  job.set_owner("anna");
+  job.set_state(v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(
+      TableLine(job),
+      "j1                                SUCCEEDED  100 %      3     4.00 M    4.00 s         -  "
+      "anna         pool.pbrt");
+}
+
 TEST(ProgressViewTest, TheLimitThatStopsFirstDecides) {
   v1::Job job = Running();
   SetSetting(job, &RenderSettings::time_s, 8);

@@ -52,5 +52,31 @@ TEST(UsageTest, TheNearestCommandOrFlagIsProposed) {
   EXPECT_EQ(of({}), "");
 }
 
+TEST(UsageTest, ShellsCompleteCommandsAndFlags) {
+  CLI::App app;
+  CLI::App* render = app.add_subcommand("render", "render the user's scene");
+  CLI::App* token = app.add_subcommand("token", "tokens");
+  token->add_subcommand("new", "");
+  std::string value;
+  render->add_option("--passes", value, "how many");
+  const std::string bash = CompletionScript(app, Shell::kBash);
+  EXPECT_NE(bash.find("render) words=\"--help --passes\""), std::string::npos) << bash;
+  EXPECT_NE(bash.find("token) words=\"--help new\""), std::string::npos) << bash;
+  EXPECT_NE(bash.find("words=\"render token\""), std::string::npos) << bash;
+  EXPECT_NE(CompletionScript(app, Shell::kZsh).find(bash), std::string::npos);
+  const std::string fish = CompletionScript(app, Shell::kFish);
+  EXPECT_NE(fish.find("-a render -d 'render the user\\'s scene'\n"), std::string::npos) << fish;
+  EXPECT_NE(fish.find("'__fish_seen_subcommand_from render' -l passes -d 'how many'\n"),
+            std::string::npos)
+      << fish;
+}
+
+TEST(UsageTest, TheFileOfFlagsIsWhereOthersKeepTheirs) {
+  EXPECT_EQ(ConfigPath("/c", "/home/u"), "/c/lucerna.toml");
+  EXPECT_EQ(ConfigPath("", "/home/u"), "/home/u/.config/lucerna.toml");
+  EXPECT_EQ(ConfigPath(nullptr, "/home/u"), "/home/u/.config/lucerna.toml");
+  EXPECT_EQ(ConfigPath("relative", nullptr), "") << "as the XDG base directories have it";
+}
+
 }  // namespace
 }  // namespace lucerna
