@@ -17,16 +17,6 @@ constexpr std::array<std::pair<std::string_view, ToneCurve>, 4> kCurves = {
      {"filmic", ToneCurve::kFilmic},
      {"aces", ToneCurve::kAces}}};
 
-StatusOr<std::array<const ImageChannel*, 3>> ColorsOf(const Image& image) {
-  const std::array channels = {image.Find("R"), image.Find("G"), image.Find("B")};
-  for (const ImageChannel* channel : channels) {
-    if (channel != nullptr) continue;
-    return absl::InvalidArgumentError(
-        "a picture needs the channels R, G and B, and this image does not have all of them");
-  }
-  return channels;
-}
-
 using Color = std::array<double, 3>;
 
 double LuminanceOf(const Color& color) {
@@ -72,6 +62,16 @@ Color Curved(const Color& color, ToneCurve curve) {
 
 }  // namespace
 
+StatusOr<std::array<const ImageChannel*, 3>> ColorChannels(const Image& image) {
+  const std::array channels = {image.Find("R"), image.Find("G"), image.Find("B")};
+  for (const ImageChannel* channel : channels) {
+    if (channel != nullptr) continue;
+    return absl::InvalidArgumentError(
+        "a picture needs the channels R, G and B, and this image does not have all of them");
+  }
+  return channels;
+}
+
 StatusOr<ToneCurve> ParseToneCurve(std::string_view name) {
   for (const auto& [known, curve] : kCurves) {
     if (known == name) return curve;
@@ -80,7 +80,7 @@ StatusOr<ToneCurve> ParseToneCurve(std::string_view name) {
 }
 
 double AutoExposure(const Image& image) {
-  const auto channels = ColorsOf(image);
+  const auto channels = ColorChannels(image);
   if (!channels.ok()) return 0;
   double sum = 0;
   double count = 0;
@@ -101,7 +101,7 @@ double AutoExposure(const Image& image) {
 
 StatusOr<std::array<ImageChannel, 3>> DisplayedChannels(const Image& image,
                                                         const Display& display) {
-  LUCERNA_ASSIGN_OR_RETURN(const auto channels, ColorsOf(image));
+  LUCERNA_ASSIGN_OR_RETURN(const auto channels, ColorChannels(image));
   const double gain =
       std::exp2(display.exposure_stops ? *display.exposure_stops : AutoExposure(image));
   std::array<ImageChannel, 3> shown;

@@ -26,6 +26,9 @@ struct Display {
   ToneCurve curve = ToneCurve::kClip;
 };
 
+// R, G and B of an image. Errors: INVALID_ARGUMENT when one is missing.
+[[nodiscard]] StatusOr<std::array<const ImageChannel*, 3>> ColorChannels(const Image& image);
+
 // The exposure [stops, whole] that brings the geometric mean of the luminances above 0 near middle
 // grey (0.18), and 0 where that mean is between 2^-7 and 1 already, so that images which are
 // exposed by their scene stay as they are.

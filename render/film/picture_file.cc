@@ -19,16 +19,9 @@ namespace {
 constexpr std::string_view kHdrMagic = "#?RADIANCE\n";
 constexpr std::string_view kHdrOwner = "# Lucerna\n";  // a comment
 
-StatusOr<std::array<const ImageChannel*, 3>> ColorsOf(const Image& image) {
-  const std::array channels = {image.Find("R"), image.Find("G"), image.Find("B")};
-  if (std::ranges::find(channels, nullptr) != channels.end())
-    return absl::InvalidArgumentError("a picture needs the channels R, G and B");
-  return channels;
-}
-
-// [height × width × 3], rows from `first_row` on by `step`.
+// [height × width × 3].
 StatusOr<std::vector<float>> Interleaved(const Image& image, bool is_bottom_up) {
-  LUCERNA_ASSIGN_OR_RETURN(const auto channels, ColorsOf(image));
+  LUCERNA_ASSIGN_OR_RETURN(const auto channels, ColorChannels(image));
   const auto width = static_cast<std::size_t>(image.width);
   const auto height = static_cast<std::size_t>(image.height);
   std::vector<float> values;
