@@ -450,7 +450,9 @@ TEST_F(ClientCommandsTest, AnImageWithoutItsPlaceIsKeptElsewhere) {
   const pid_t pid = Start({"render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--time",
                            "3s", "-o", "gone/a.exr", "--png", "b.png", "--no-checkpoints"});
   ::unsetenv("TMPDIR");
-  std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+  // Its place was there when it began.
+  for (int i = 0; i < 6000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
   std::filesystem::remove_all(In("gone"));
   const Ran ran = Finish(pid);
   EXPECT_EQ(ran.code, 1);
