@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "absl/strings/numbers.h"
 #include <CLI/CLI.hpp>
 
 #include "client/commands/bake_command.h"
@@ -45,7 +46,7 @@ int End(ExitCode code) {
 std::optional<double> StopsOf(const std::string& text) {
   if (text == "auto") return std::nullopt;
   double stops = 0;
-  if (!CLI::detail::lexical_cast(text, stops) || !(std::abs(stops) <= 1000)) {
+  if (!absl::SimpleAtod(text, &stops) || !(std::abs(stops) <= 1000)) {
     throw CLI::ValidationError(
         absl::StrCat("--exposure must be a number of stops, or auto, not \"", text, "\""));
   }
@@ -145,8 +146,7 @@ int Run(int argc, char** argv) {
           "--exposure",
           [&](const std::string& text) { output_options.display.exposure_stops = StopsOf(text); },
           "stops by which pictures and previews are brighter, or auto: 0 unless that would be "
-          "mostly "
-          "white or black (default: auto)")
+          "mostly white or black (default: auto)")
         ->type_name("STOPS|auto");
     to->add_option_function<std::string>(
           "--tonemap",
@@ -319,7 +319,7 @@ int Run(int argc, char** argv) {
   for (CLI::App* about_jobs : {cancel, stop, pause, resume}) {
     about_jobs->add_option("JOB", job_ids, "ids of jobs")->required();
     add_server(about_jobs);
-    add_json(about_jobs);
+    about_jobs->add_flag("--json", output_options.json, "print one JSON value for each job");
     add_quiet(about_jobs);
   }
   for (CLI::App* about_job : {extend, prioritize}) {

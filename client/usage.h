@@ -17,7 +17,7 @@ namespace lucerna {
 // Whether a first word is a scene and not a command: `lucerna room.pbrt` renders it.
 [[nodiscard]] bool LooksLikeScene(std::string_view word);
 
-// Where the image of a scene goes when nobody says: "room.exr" in this folder, of
+// Where the image of a scene goes when no output is given: "room.exr" in this folder, of
 // "rooms/room.pbrt.gz".
 [[nodiscard]] std::string ImageNameOf(std::string_view scene_path);
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 
 #include "absl/strings/str_format.h"
 
@@ -112,15 +113,17 @@ Status ConvertToPicture(const PictureRequest& request, const Display& display) {
         ExitCode::kUsage,
         absl::StrCat(request.path, ": the picture would replace the EXR; give it another name"));
   }
-  const StatusOr<PictureFormat> format = PictureFormatOf(request.path);
-  // As ever: a name without an ending of these is a PNG.
+  std::error_code ignored;
+  StatusOr<PictureFormat> format = PictureFormatOf(request.path);
+  if (std::filesystem::is_other(request.path, ignored)) format = PictureFormat::kPng;
+  if (!format.ok()) {
+    return Failure(ExitCode::kUsage, absl::StrCat(request.path, ": ", format.status().message()));
+  }
   LUCERNA_ASSIGN_OR_RETURN(Image image, ReadImage(request.exr_path));
   if (!request.layer.empty()) {
     LUCERNA_ASSIGN_OR_RETURN(image, PictureOfLayer(image, request.layer));
   }
-  LUCERNA_ASSIGN_OR_RETURN(
-      const std::string bytes,
-      EncodePicture(image, format.ok() ? *format : PictureFormat::kPng, display));
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, EncodePicture(image, *format, display));
   return WriteFile(request.path, bytes);
 }
 

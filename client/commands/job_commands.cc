@@ -35,9 +35,7 @@ void Print(const std::string& text) {
 // Devices and pipes have no ending, and take an EXR file.
 bool IsDevice(const std::string& path) {
   std::error_code error;
-  const auto type = std::filesystem::status(path, error).type();
-  return type != std::filesystem::file_type::regular &&
-         type != std::filesystem::file_type::not_found && !std::filesystem::is_directory(path);
+  return std::filesystem::is_other(path, error);
 }
 
 StatusOr<PictureFormat> FormatOf(const std::string& path) {
@@ -98,20 +96,21 @@ StatusOr<SavedImage> Save(ClientConnection& connection, const std::string& job_i
   SavedImage saved;
   saved.digest = image.PixelDigest();
   Status status;
-  const auto save = [&](const std::string& path, const StatusOr<PictureFormat>& format) {
-    if (path.empty()) return;
-    StatusOr<std::string> picture = !format.ok() ? format.status()
-                                    : *format == PictureFormat::kExr
-                                        ? bytes
-                                        : EncodePicture(image, *format, display);
-    Status written = picture.ok() ? WriteFile(path, *picture) : picture.status();
+  const auto save = [&](const std::string& path, PictureFormat format) -> Status {
+    std::string encoded;
+    if (format != PictureFormat::kExr) {
+      LUCERNA_ASSIGN_OR_RETURN(encoded, EncodePicture(image, format, display));
+    }
+    const std::string& picture = format == PictureFormat::kExr ? bytes : encoded;
+    const Status written = WriteFile(path, picture);
     if (written.ok()) saved.paths.push_back(path);
-    if (!written.ok() && picture.ok() && !IsDevice(path))
-      written = SaveElsewhere(path, *picture, written);
-    if (status.ok()) status = written;
+    return written.ok() || IsDevice(path) ? written : SaveElsewhere(path, picture, written);
   };
-  if (!outputs.image.empty()) save(outputs.image, FormatOf(outputs.image));
-  save(outputs.png, PictureFormat::kPng);
+  if (!outputs.image.empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(const PictureFormat format, FormatOf(outputs.image));
+    status = save(outputs.image, format);
+  }
+  if (!outputs.png.empty()) status.Update(save(outputs.png, PictureFormat::kPng));
   if (!status.ok()) return status;
   return saved;
 }

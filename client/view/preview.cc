@@ -1,6 +1,7 @@
 #include "client/view/preview.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "absl/strings/str_format.h"
@@ -10,32 +11,23 @@
 namespace lucerna {
 namespace {
 
-// The mean over the box of pixels that falls on one pixel of the smaller picture. None is brighter
-// than white: one speck must not light up its whole neighbourhood.
-ImageChannel Shrunk(const ImageChannel& channel, int from_width, int from_height, int to_width,
-                    int to_height) {
-  ImageChannel shrunk{channel.name, {}};
-  const auto first = [](int index, int from, int to) {
-    return static_cast<int>(std::int64_t{index} * from / to);
-  };
-  for (int y = 0; y < to_height; ++y) {
-    const int y0 = first(y, from_height, to_height);
-    const int y1 = std::max(y0 + 1, first(y + 1, from_height, to_height));
-    for (int x = 0; x < to_width; ++x) {
-      const int x0 = first(x, from_width, to_width);
-      const int x1 = std::max(x0 + 1, first(x + 1, from_width, to_width));
-      double sum = 0;
-      for (int row = y0; row < y1; ++row) {
-        for (int column = x0; column < x1; ++column) {
-          sum += static_cast<double>(
-              channel.pixels[static_cast<std::size_t>(row) * static_cast<std::size_t>(from_width) +
-                             static_cast<std::size_t>(column)]);
-        }
-      }
-      shrunk.pixels.push_back(static_cast<float>(sum / ((y1 - y0) * (x1 - x0))));
+// The mean over the pixels [x0, x1) × [y0, y1). None is brighter than white: one speck must not
+// light up its whole neighbourhood.
+std::array<double, 3> MeanOf(const DisplayedImage& shown, int width, int x0, int x1, int y0,
+                             int y1) {
+  std::array<double, 3> sum{};
+  for (int y = y0; y < y1; ++y) {
+    for (int x = x0; x < x1; ++x) {
+      const std::array<double, 3> color =
+          shown.At(static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                   static_cast<std::size_t>(x));
+      for (std::size_t c = 0; c < 3; ++c)
+        sum[c] += color[c];
     }
   }
-  return shrunk;
+  for (double& value : sum)
+    value /= static_cast<double>(x1 - x0) * (y1 - y0);
+  return sum;
 }
 
 }  // namespace
@@ -80,10 +72,21 @@ StatusOr<Preview> MakePreview(const Image& image, int columns, int rows, const D
   preview.width = std::clamp(static_cast<int>(std::lround(scale * image.width)), 1, columns);
   // An even number, so that the last row of text has both its pixels.
   preview.height = 2 * std::clamp(static_cast<int>(std::lround(scale * image.height / 2)), 1, rows);
-  LUCERNA_ASSIGN_OR_RETURN(auto shown, DisplayedChannels(image, display));
-  for (ImageChannel& channel : shown)
-    channel = Shrunk(channel, image.width, image.height, preview.width, preview.height);
-  preview.pixels = ScreenPixels(shown);
+  LUCERNA_ASSIGN_OR_RETURN(const DisplayedImage shown, DisplayedImage::Create(image, display));
+  // The box of pixels that falls on one of the smaller picture.
+  const auto first = [](int index, int from, int to) {
+    return static_cast<int>(std::int64_t{index} * from / to);
+  };
+  for (int y = 0; y < preview.height; ++y) {
+    const int y0 = first(y, image.height, preview.height);
+    const int y1 = std::max(y0 + 1, first(y + 1, image.height, preview.height));
+    for (int x = 0; x < preview.width; ++x) {
+      const int x0 = first(x, image.width, preview.width);
+      const int x1 = std::max(x0 + 1, first(x + 1, image.width, preview.width));
+      for (const double value : MeanOf(shown, image.width, x0, x1, y0, y1))
+        preview.pixels.push_back(EncodeSrgb(value));
+    }
+  }
   return preview;
 }
 

@@ -7,6 +7,7 @@
 namespace lucerna {
 namespace {
 
+constexpr std::size_t kPixelsForExposure = 1 << 16;
 constexpr double kMiddleGrey = 0.18;
 constexpr double kDarkest = 0x1p-7, kBrightest = 1;  // mean luminances that are shown as they are
 constexpr double kReinhardWhite = 4;                 // two stops above white
@@ -82,41 +83,41 @@ StatusOr<ToneCurve> ParseToneCurve(std::string_view name) {
 double AutoExposure(const Image& image) {
   const auto channels = ColorChannels(image);
   if (!channels.ok()) return 0;
+  const std::size_t pixels = (*channels)[0]->pixels.size();
   double sum = 0;
   double count = 0;
-  for (std::size_t i = 0; i < (*channels)[0]->pixels.size(); ++i) {
-    Color color;
-    for (std::size_t c = 0; c < 3; ++c)
-      color[c] = Positive((*channels)[c]->pixels[i]);
-    const double luminance = LuminanceOf(color);
-    if (!(luminance > 0) || !std::isfinite(luminance)) continue;
-    sum += std::log2(luminance);
-    ++count;
-  }
+  const auto look_at_every = [&](std::size_t step) {
+    for (std::size_t i = 0; i < pixels; i += step) {
+      Color color;
+      for (std::size_t c = 0; c < 3; ++c)
+        color[c] = Positive((*channels)[c]->pixels[i]);
+      const double luminance = LuminanceOf(color);
+      if (!(luminance > 0) || !std::isfinite(luminance)) continue;
+      sum += std::log2(luminance);
+      ++count;
+    }
+  };
+  // Odd, so that it is no divisor of a usual width.
+  const std::size_t step = pixels / kPixelsForExposure | 1U;
+  look_at_every(step);
+  if (count == 0 && step > 1) look_at_every(1);
   if (count == 0) return 0;
   const double mean = sum / count;
   if (mean >= std::log2(kDarkest) && mean <= std::log2(kBrightest)) return 0;
   return std::round(std::log2(kMiddleGrey) - mean);
 }
 
-StatusOr<std::array<ImageChannel, 3>> DisplayedChannels(const Image& image,
-                                                        const Display& display) {
+StatusOr<DisplayedImage> DisplayedImage::Create(const Image& image, const Display& display) {
   LUCERNA_ASSIGN_OR_RETURN(const auto channels, ColorChannels(image));
-  const double gain =
-      std::exp2(display.exposure_stops ? *display.exposure_stops : AutoExposure(image));
-  std::array<ImageChannel, 3> shown;
-  const std::size_t pixels = channels[0]->pixels.size();
+  const double stops = display.exposure_stops ? *display.exposure_stops : AutoExposure(image);
+  return DisplayedImage(channels, std::exp2(stops), display.curve);
+}
+
+std::array<double, 3> DisplayedImage::At(std::size_t pixel) const {
+  Color color;
   for (std::size_t c = 0; c < 3; ++c)
-    shown[c] = {channels[c]->name, std::vector<float>(pixels)};
-  for (std::size_t i = 0; i < pixels; ++i) {
-    Color color;
-    for (std::size_t c = 0; c < 3; ++c)
-      color[c] = std::min(gain * Positive(channels[c]->pixels[i]), 1e30);
-    color = Curved(color, display.curve);
-    for (std::size_t c = 0; c < 3; ++c)
-      shown[c].pixels[i] = static_cast<float>(color[c]);
-  }
-  return shown;
+    color[c] = std::min(gain_ * Positive(channels_[c]->pixels[pixel]), 1e30);
+  return Curved(color, curve_);
 }
 
 }  // namespace lucerna

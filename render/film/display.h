@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string_view>
 
@@ -31,12 +32,25 @@ struct Display {
 
 // The exposure [stops, whole] that brings the geometric mean of the luminances above 0 near middle
 // grey (0.18), and 0 where that mean is between 2^-7 and 1 already, so that images which are
-// exposed by their scene stay as they are.
+// exposed by their scene stay as they are. Of about 65,536 evenly spaced pixels; of all, where
+// these are black.
 [[nodiscard]] double AutoExposure(const Image& image);
 
-// R, G and B in [0, 1], linear, of the sRGB primaries; what is not a number is black.
-// Errors: INVALID_ARGUMENT without R, G, B.
-[[nodiscard]] StatusOr<std::array<ImageChannel, 3>> DisplayedChannels(const Image& image,
-                                                                      const Display& display);
+// Keeps a reference to the image.
+class DisplayedImage {
+ public:
+  // Errors: INVALID_ARGUMENT without R, G, B.
+  [[nodiscard]] static StatusOr<DisplayedImage> Create(const Image& image, const Display& display);
+  // R, G and B in [0, 1], linear, of the sRGB primaries; what is not a number is black.
+  [[nodiscard]] std::array<double, 3> At(std::size_t pixel) const;
+
+ private:
+  DisplayedImage(const std::array<const ImageChannel*, 3>& channels, double gain, ToneCurve curve)
+      : channels_(channels), gain_(gain), curve_(curve) {}
+
+  std::array<const ImageChannel*, 3> channels_;
+  double gain_;
+  ToneCurve curve_;
+};
 
 }  // namespace lucerna

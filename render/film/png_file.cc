@@ -2,21 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <stb/stb_image_write.h>
 #include <zlib.h>
 
 namespace lucerna {
 namespace {
-
-// `linear` is clipped to [0, 1]; what is not a number becomes black.
-std::uint8_t EncodeSrgb(double linear) {
-  if (!(linear > 0)) return 0;
-  const double clipped = std::min(linear, 1.0);
-  const double encoded =
-      clipped <= 0.0031308 ? 12.92 * clipped : 1.055 * std::pow(clipped, 1 / 2.4) - 0.055;
-  return static_cast<std::uint8_t>(std::lround(255 * encoded));
-}
 
 std::string BigEndian(std::uint32_t number) {
   return {static_cast<char>(number >> 24), static_cast<char>(number >> 16),
@@ -40,18 +32,23 @@ void Append(void* target, void* bytes, int size_bytes) {
 
 }  // namespace
 
-std::vector<std::uint8_t> ScreenPixels(const std::array<ImageChannel, 3>& shown) {
-  std::vector<std::uint8_t> pixels(3 * shown[0].pixels.size());
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    for (std::size_t i = 0; i < shown[channel].pixels.size(); ++i)
-      pixels[3 * i + channel] = EncodeSrgb(static_cast<double>(shown[channel].pixels[i]));
-  }
-  return pixels;
+std::uint8_t EncodeSrgb(double linear) {
+  if (!(linear > 0)) return 0;
+  const double clipped = std::min(linear, 1.0);
+  const double encoded =
+      clipped <= 0.0031308 ? 12.92 * clipped : 1.055 * std::pow(clipped, 1 / 2.4) - 0.055;
+  return static_cast<std::uint8_t>(std::lround(255 * encoded));
 }
 
 StatusOr<std::string> EncodePng(const Image& image, const Display& display) {
-  LUCERNA_ASSIGN_OR_RETURN(const auto shown, DisplayedChannels(image, display));
-  const std::vector<std::uint8_t> pixels = ScreenPixels(shown);
+  LUCERNA_ASSIGN_OR_RETURN(const DisplayedImage shown, DisplayedImage::Create(image, display));
+  const std::size_t count = image.Find("R")->pixels.size();
+  std::vector<std::uint8_t> pixels;
+  pixels.reserve(3 * count);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (const double value : shown.At(i))
+      pixels.push_back(EncodeSrgb(value));
+  }
   std::string bytes;
   if (stbi_write_png_to_func(Append, &bytes, image.width, image.height, 3, pixels.data(),
                              3 * image.width) == 0) {

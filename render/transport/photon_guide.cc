@@ -121,8 +121,14 @@ double EvenFlux(const LightSet& lights, const PrimaryNumbers& numbers) {
 }
 
 double ReportFactor(double flux) {
-  // A power of two: the same for numbers that were rounded for a report.
-  return flux > 0 ? std::min(1.0, std::exp2(std::rint(std::log2(flux)))) : 0;
+  if (!(flux > 0)) return 0;
+  if (flux >= 1) return 1;
+  // The power of two nearest in its logarithm: the same for numbers that were rounded for a report,
+  // and on every machine.
+  constexpr double kRootOfHalf = 0.70710678118654752;
+  int exponent = 0;
+  const double fraction = std::frexp(flux, &exponent);
+  return std::ldexp(1.0, fraction < kRootOfHalf ? exponent - 1 : exponent);
 }
 
 }  // namespace lucerna

@@ -96,7 +96,7 @@ INSTANTIATE_TEST_SUITE_P(Steps, KilledAtSliceTest,
 // The first commit of this name, and all that follow, are not as they should be.
 struct CommitFault {
   const char* name;
-  const char* answer;  // what the worker is told
+  const char* answer;  // part of the worker's log
 };
 
 class FaultyCommitTest : public testing::TestWithParam<CommitFault> {

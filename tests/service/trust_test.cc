@@ -46,7 +46,7 @@ class TrustTest : public testing::Test {
     EXPECT_TRUE(image.ok()) << image.status();
     return image.ok() ? image->PixelDigest() : Digest();
   }
-  // Of a job in which nobody lied. With two workers the coordinator traces the first pass's eye
+  // Of a job without wrong results. With two workers the coordinator traces the first pass's eye
   // paths, which idle hands do not.
   Digest QuietPixels(std::int64_t passes) {
     const ServiceUnderTest quiet;

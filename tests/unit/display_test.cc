@@ -1,6 +1,7 @@
 // What a screen shows of radiance.
 #include "render/film/display.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -15,6 +16,18 @@ Image GreyImage(const std::vector<float>& values) {
       .width = static_cast<int>(values.size()), .height = 1, .channels = {}, .metadata = {}};
   image.channels = {{"R", values}, {"G", values}, {"B", values}};
   return image;
+}
+
+// [channel][pixel].
+StatusOr<std::array<ImageChannel, 3>> DisplayedChannels(const Image& image,
+                                                        const Display& display) {
+  LUCERNA_ASSIGN_OR_RETURN(const DisplayedImage shown, DisplayedImage::Create(image, display));
+  std::array<ImageChannel, 3> channels;
+  for (std::size_t i = 0; i < image.channels[0].pixels.size(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c)
+      channels[c].pixels.push_back(static_cast<float>(shown.At(i)[c]));
+  }
+  return channels;
 }
 
 constexpr ToneCurve kAll[] = {ToneCurve::kClip, ToneCurve::kReinhard, ToneCurve::kFilmic,
@@ -35,7 +48,7 @@ TEST(DisplayTest, CurvesRiseFromBlackAndNeverLeaveTheScreen) {
       EXPECT_LE(red[i], 1);
     }
     EXPECT_GT(red.back(), 0.99F);
-    // Four times white is told from white, but for the one that clips.
+    // Twice white is brighter than white, but for the curve that clips.
     const auto bright = DisplayedChannels(GreyImage({1, 2}), {.curve = curve}).value();
     EXPECT_EQ(bright[0].pixels[0] < bright[0].pixels[1], curve != ToneCurve::kClip);
   }
@@ -72,6 +85,12 @@ TEST(DisplayTest, ExposureIsFoundForImagesThatAreFarFromWhite) {
   EXPECT_EQ(AutoExposure(GreyImage({0, 0})), 0);
   EXPECT_EQ(AutoExposure(GreyImage({std::nanf(""), std::numeric_limits<float>::infinity()})), 0);
   EXPECT_EQ(AutoExposure(Image()), 0);
+  // Of many pixels only some are looked at, unless these are black.
+  std::vector<float> many(1'000'003, 0.18F / 1024);
+  EXPECT_EQ(AutoExposure(GreyImage(many)), 10);
+  many.assign(many.size(), 0);
+  many[1] = 0.18F * 1024;
+  EXPECT_EQ(AutoExposure(GreyImage(many)), -10);
 }
 
 TEST(DisplayTest, ExposureAboveAllIsThatOfAuto) {
