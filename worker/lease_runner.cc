@@ -91,8 +91,10 @@ void LeaseRunner::Revoke(const v1::SyncResponse& response) {
 void LeaseRunner::Release(const Held& held, const Status& status) {
   const MutexLock lock(mutex_);
   held_.erase(held.work.lease_id);
-  if (status.ok() || held.is_revoked) return;
+  // A refused result ends its lease too, and the news of that may come before the answer.
+  if (status.ok() || (held.is_revoked && !absl::IsInvalidArgument(status))) return;
   spdlog::warn("lease {}: {}", Escaped(held.work.lease_id), Escaped(std::string(status.message())));
+  if (held.is_revoked) return;
   failures_.emplace_back(held.work.lease_id, std::string(status.message()));
 }
 
