@@ -27,6 +27,7 @@
 #include "render/math/color_space.h"
 #include "render/scene/shape_lists.h"
 #include "render/tracing/eye_path.h"
+#include "render/tracing/pilot_paths.h"
 #include "server/state/sums_codec.h"
 
 namespace lucerna {
@@ -131,13 +132,12 @@ PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, ThreadTeam&
   return means;
 }
 
-// The square of what a photon of even flux found by a pixel adds to its value, relative to that
-// value (ScoreAt). Values are means over a few pixels: a photon must not make its own pixel bright.
-double PhotonScore(const ImageSums& sums, const RadiusColumn& radii, int width,
-                   const PixelMeans& means, std::size_t pixel) {
+// The value of a pixel over the mean of all: of a few pixels around it, for a photon must not make
+// its own pixel bright, and with a floor.
+double BrightnessAround(const ImageSums& sums, int width, const PixelMeans& means,
+                        std::size_t pixel) {
   constexpr std::size_t kReach = 2;  // pixels
   constexpr double kFloor = 0.1;     // of the mean value, as in relative errors
-  if (!(means.value > 0)) return 1;
   const auto columns = static_cast<std::size_t>(width);
   const std::size_t rows = sums.pixels() / columns;
   const std::size_t x = pixel % columns;
@@ -150,9 +150,17 @@ double PhotonScore(const ImageSums& sums, const RadiusColumn& radii, int width,
       ++around;
     }
   }
+  return value / around / means.value + kFloor;
+}
+
+// The square of what a photon of even flux found by a pixel adds to its value, relative to that
+// value (ScoreAt).
+double PhotonScore(const ImageSums& sums, const RadiusColumn& radii, int width,
+                   const PixelMeans& means, std::size_t pixel) {
+  if (!(means.value > 0)) return 1;
   const double factor = FactorAt(sums, radii, pixel);
   const double of_mean = factor > 0 && means.factor > 0 ? factor / means.factor : 1;
-  const double relative = of_mean / (value / around / means.value + kFloor);
+  const double relative = of_mean / BrightnessAround(sums, width, means, pixel);
   return relative * relative;
 }
 
@@ -193,6 +201,7 @@ struct JobEstimator::State {
   };
   std::map<std::uint64_t, After> after;
   std::unique_ptr<GuideLearner> learner;           // of jobs whose photons are drawn by guides
+  std::optional<PilotReports> pilots;              // traced when the first guide is learned
   std::shared_ptr<const RadiusColumn> last_radii;  // of the last round added
   // Of the last estimate, and after how many passes that was.
   Mutex noise_area_mutex;
@@ -236,7 +245,68 @@ struct JobEstimator::State {
         [&](std::uint32_t pixel) {
           return PhotonScore(*sums, *plan.radii, settings.crop_width(), means, pixel);
         },
-        [this](const PrimaryNumbers& numbers) { return EvenFlux(prepared.lights(), numbers); }));
+        [this](const PrimaryNumbers& numbers) { return EvenFlux(prepared.lights(), numbers); },
+        PilotEmissions(*plan.radii, means)));
+  }
+
+  // The share of the photons drawn without a guide that hitpoints have found so far.
+  [[nodiscard]] double EvenFoundShare() const {
+    double sent = 0;
+    double found = 0;
+    for (const LightTally& light : sums->tally().lights) {
+      sent += static_cast<double>(light.sent);
+      for (const std::uint64_t of_class : light.in_view)
+        found += static_cast<double>(of_class);
+    }
+    return sent > 0 ? found / sent : 0;
+  }
+
+  // What pilot paths say of the emissions that the image needs, given what is known of its pixels.
+  // None where photons tell enough.
+  [[nodiscard]] std::vector<PilotEmission> PilotEmissions(const RadiusColumn& in_use,
+                                                          const PixelMeans& means) {
+    constexpr double kEnoughFound = 0.125;
+    // A path's value over that of the pixel where it began. What few paths find is rare, not large.
+    constexpr double kLargestValue = 64;
+    if (EvenFoundShare() >= kEnoughFound) return {};
+    if (!pilots) pilots = TracePilotPaths(*tracer, prepared.needs(), team);
+    const auto power = static_cast<double>(Luminance(prepared.lights().TotalPower()));
+    std::vector<PilotEmission> emissions;
+    emissions.reserve(pilots->reports.size());
+    const double paths_per_pixel =
+        static_cast<double>(pilots->paths) / static_cast<double>(sums->pixels());
+    for (const PilotReport& report : pilots->reports) {
+      const double factor = FactorAt(*sums, in_use, report.pixel);
+      const double flux = EvenFlux(prepared.lights(), report.numbers);
+      if (!(factor > 0 && flux > 0)) continue;
+      double brought = report.brought;
+      if (means.value > 0) {
+        brought = std::min(brought,
+                           kLargestValue * means.value *
+                               BrightnessAround(*sums, settings.crop_width(), means, report.pixel));
+      }
+      // A photon of flux f that a pixel finds adds f albedo / (π² radius²) to its radiance.
+      const double per_value =
+          kPi64 * kPi64 / (factor * power * flux * FoundBy(in_use, report.pixel));
+      emissions.push_back({.numbers = report.numbers,
+                           .pixel = report.pixel,
+                           .found = brought / paths_per_pixel * per_value});
+    }
+    return emissions;
+  }
+
+  // How many pixels find a photon that this pixel finds: as many as its disc covers.
+  [[nodiscard]] double FoundBy(const RadiusColumn& in_use, std::size_t pixel) const {
+    const Camera& camera = prepared.scene().camera;
+    const ImageSums::Features features = sums->FeaturesAt(pixel);
+    auto radius = static_cast<double>(in_use[pixel]);  // in pixels, unless
+    if (settings.initial_radius != 0 && camera.kind != Camera::Kind::kSensors &&
+        features.hits > 0) {
+      const double distance =
+          static_cast<double>(features.distance) / static_cast<double>(features.hits);
+      radius /= std::max(PixelFootprint(camera, settings.width, settings.height, distance), 1e-18);
+    }
+    return std::max(1.0, kPi64 * radius * radius);
   }
 
   // Radiance over all passes, Rec. 709.

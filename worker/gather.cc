@@ -87,6 +87,14 @@ float WeightScale(const FluxScale& scale) {
 }
 constexpr float kLargestWeight = 256;
 
+// Adds a squared weight to a sum in units of kWeight2Unit. A term has up to 44 bits, so that
+// kMostTerms of them might not fit: the sum, which never falls, stays where a few more fit.
+void AddSquare(double square, std::int64_t& sum) {
+  constexpr std::int64_t kMost = std::int64_t{1} << 56;
+  constexpr double kUnits = 1 / kWeight2Unit;
+  sum = std::min(kMost, sum + std::max<std::int64_t>(1, std::llrint(square * kUnits)));
+}
+
 // Sums over a wider disc (see CurvatureColumn).
 template <>
 struct EvidenceSums<Evidence::kCurvature> {
@@ -99,15 +107,15 @@ struct EvidenceSums<Evidence::kCurvature> {
     const float u = squared / squared_radius * kPerRadius;
     if (cut == nullptr) {
       sums[kCurvatureLaplacian] += std::llrint(w * (2 * u - 1) * kUnits);
-      sums[kCurvatureWeight2] += std::llrint(w * w * kUnits);
+      AddSquare(static_cast<double>(w * w), sums[kCurvatureWeight2]);
       return;
     }
     // At most 16 times what a whole disc may add: 36 bits, so that kMostTerms fit.
     constexpr float kLargest = 16 * kLargestWeight * kLargestWeight;
     const float laplacian = w * cut->LaplacianAt(cut->PlaceOf(to_photon), u);
     sums[kCurvatureLaplacian] += std::llrint(std::clamp(laplacian, -kLargest, kLargest) * kUnits);
-    sums[kCurvatureWeight2] +=
-        std::llrint(std::min(w * w * cut->inverse_share(), kLargest) * kUnits);
+    AddSquare(static_cast<double>(std::min(w * w * cut->inverse_share(), kLargest)),
+              sums[kCurvatureWeight2]);
   }
   void Store(std::vector<std::vector<std::int64_t>>& columns) const {
     for (std::size_t i = 0; i < kCurvatureColumns; ++i)
@@ -133,7 +141,7 @@ struct EvidenceSums<Evidence::kFrequency> {
     constexpr double kUnits = 1 / kWeightUnit;
     ++sums[kFrequencyCount];
     sums[kFrequencyWeight] += std::llrint(w * kUnits);
-    sums[kFrequencyWeight2] += std::llrint(w * w * kUnits);
+    AddSquare(w * w, sums[kFrequencyWeight2]);
     sums[kFrequencyTrace] += std::llrint(w * x * kUnits);
     // A term has up to 48 bits, so that here alone kMostTerms of them might not fit: the sum, which
     // never falls, stays at kMostTrace2.

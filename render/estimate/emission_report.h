@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 #include "render/transport/photon_guide.h"
 
@@ -24,6 +25,19 @@ struct FoundPhoton {
   bool operator==(const FoundPhoton&) const = default;
 };
 
+// An emission that a pilot path led to (tracing/pilot_paths.h).
+struct PilotReport {
+  PrimaryNumbers numbers{};
+  std::uint32_t pixel = 0;  // of the crop window
+  // What the path says the light of this emission adds to the pixel, luminance: the sum over the
+  // reports of a pixel, over its paths, estimates what photons bring to it.
+  double brought = 0;
+};
+struct PilotReports {
+  std::vector<PilotReport> reports;
+  std::uint64_t paths = 0;  // that began at random pixels
+};
+
 // No pass or slice has more. What guides ask for is far below; where more photons are found than
 // was foreseen, those of later passes and indices are left out.
 inline constexpr std::size_t kMostReports = 1 << 17;
@@ -34,6 +48,15 @@ inline constexpr std::size_t kMostReports = 1 << 17;
   for (std::size_t d = 0; d < kEmissionDimensions; ++d)
     numbers[d] = (static_cast<double>(in_steps[d]) + 0.5) * 0x1p-16;
   return numbers;
+}
+
+// The numbers of an emission in the steps of a report.
+[[nodiscard]] inline std::array<std::uint16_t, kEmissionDimensions> InSteps(
+    const PrimaryNumbers& numbers) {
+  std::array<std::uint16_t, kEmissionDimensions> in_steps{};
+  for (std::size_t d = 0; d < kEmissionDimensions; ++d)
+    in_steps[d] = static_cast<std::uint16_t>(numbers[d] * 0x1p16);
+  return in_steps;
 }
 
 }  // namespace lucerna

@@ -64,8 +64,11 @@ enum FrequencyColumn : std::size_t {
   kFrequencyTrace2,
   kFrequencyColumns,
 };
-// Sums of weights are counted in units of 2^-16.
+// Sums of weights are counted in units of 2^-16, those of w² in units of 2^-24. No w² is counted as
+// nothing: a radius would be as small as it can where the weights of all photons are, for their
+// Laplacian would have no noise.
 inline constexpr double kWeightUnit = 0x1p-16;
+inline constexpr double kWeight2Unit = 0x1p-24;
 // Larger values of x ask for radii below a hundredth of the present one; they are held here.
 inline constexpr float kLargestTrace = 4096;
 

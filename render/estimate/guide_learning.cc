@@ -201,6 +201,30 @@ std::uint32_t ReportedShare(double share) {
   return static_cast<std::uint32_t>(std::clamp(std::rint(share * 0x1p32), 0.0, 0x1p32 - 1));
 }
 
+// As many equal masses as would say as much.
+double EqualsOf(std::span<const double> masses) {
+  double sum = 0;
+  double squares = 0;
+  for (const double mass : masses) {
+    sum += mass;
+    squares += mass * mass;
+  }
+  return squares > 0 ? sum * sum / squares : 0;
+}
+
+// Two estimates of the same masses become parts of one, each in proportion to what it knows.
+// Returns the share of `a`.
+double BalanceMasses(std::span<double> a, std::span<double> b) {
+  const double of_a = EqualsOf(a);
+  const double of_b = EqualsOf(b);
+  const double share = of_b > 0 ? of_a / (of_a + of_b) : 1;
+  for (double& mass : a)
+    mass *= share;
+  for (double& mass : b)
+    mass *= 1 - share;
+  return share;
+}
+
 }  // namespace
 
 GrownGuide GrowGuide(std::span<const EmissionReport> reports, std::span<const double> mass,
@@ -240,20 +264,27 @@ double GuideLearner::WeightAt(const PrimaryNumbers& numbers, double flux) const 
 }
 
 PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_pass,
-                               const ScoreAt& score_at, const FluxAt& flux_at) const {
-  const std::vector<EmissionReport>& reports = numbers_.reports;
-  const auto count = static_cast<double>(reports.size());
+                               const ScoreAt& score_at, const FluxAt& flux_at,
+                               std::span<const PilotEmission> pilots) const {
+  // What photons reported, then what pilot paths did.
+  std::vector<EmissionReport> reports = numbers_.reports;
+  const std::size_t by_photons = reports.size();
+  for (const PilotEmission& pilot : pilots)
+    reports.push_back({InSteps(pilot.numbers), pilot.pixel});
+  const double count = std::max(1.0, static_cast<double>(reports.size()));
   double trials = 0;
   for (const Drawn& drawn : numbers_.drawn)
     trials += drawn.trials;
   std::vector<double> scores;
   scores.reserve(reports.size());
-  double mean_score = 0;
-  for (const EmissionReport& report : reports) {
+  for (const EmissionReport& report : reports)
     scores.push_back(score_at(report.pixel));
-    mean_score += scores.back() / count;
+  const double largest = kLargestScore * std::accumulate(scores.begin(), scores.end(), 0.0) / count;
+  double mean_score = 0;
+  for (double& score : scores) {
+    score = std::min(score, largest);
+    mean_score += score / count;
   }
-  const double largest = kLargestScore * mean_score;
   // Each weight takes a walk down every guide so far.
   std::vector<double> weights(reports.size());
   std::vector<double> fluxes(reports.size());
@@ -264,24 +295,33 @@ PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_p
   for (std::size_t i = 0; i < reports.size(); ++i) {
     const PrimaryNumbers numbers = NumbersOf(reports[i].numbers);
     fluxes[i] = flux_at(numbers);
-    weights[i] = WeightAt(numbers, fluxes[i]);
-    mass[i] = mass_of(weights[i], fluxes[i], std::min(scores[i], largest));
+    weights[i] =
+        i < by_photons ? WeightAt(numbers, fluxes[i]) : trials * pilots[i - by_photons].found;
+    mass[i] = mass_of(weights[i], fluxes[i], scores[i]);
   }
+  const std::span of_pilots = std::span(mass).subspan(by_photons);
+  const double share = BalanceMasses(std::span(mass).first(by_photons), of_pilots);
+  const double of_pilot = std::accumulate(of_pilots.begin(), of_pilots.end(), 0.0) /
+                          std::max(1.0, static_cast<double>(of_pilots.size()));
   GrownGuide grown = GrowGuide(reports, mass, [&](const PrimaryNumbers& numbers) {
     const double flux = flux_at(numbers);
-    return mass_of(WeightAt(numbers, flux), flux, mean_score);
+    return share * mass_of(WeightAt(numbers, flux), flux, mean_score) + of_pilot;
   });
   PhotonGuide guide;
   if (grown.gain >= kLeastGain) {
     StatusOr<PhotonGuide> created = PhotonGuide::Create(std::move(grown.nodes), 0);
     if (created.ok()) guide = *std::move(created);
   }
-  if (passes >= kLastGuidePass || count >= enough_reports_) return guide;
+  if (passes >= kLastGuidePass || static_cast<double>(by_photons) >= enough_reports_) return guide;
   // Of the photons that the guide draws; where none was found, all are reported that are.
   double found = 1;
-  for (std::size_t i = 0; i < reports.size(); ++i)
-    found += weights[i] * ReportFactor(fluxes[i]) / guide.WeightAt(NumbersOf(reports[i].numbers));
-  const double found_share = std::min(1.0, found / std::max(1.0, trials));
+  double found_by_pilots = 0;
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    (i < by_photons ? found : found_by_pilots) +=
+        weights[i] * ReportFactor(fluxes[i]) / guide.WeightAt(NumbersOf(reports[i].numbers));
+  }
+  const double found_share =
+      std::min(1.0, std::max(found, found_by_pilots) / std::max(1.0, trials));
   const auto photons = static_cast<double>(photons_per_pass);
   const double asked = std::min(
       kSharePerGuide * enough_reports_ / (static_cast<double>(passes) * photons * found_share),

@@ -7,6 +7,11 @@
 // needed when it gets a share in proportion to V sqrt(m): the least sum of V² m / share. The tree
 // of boxes is grown where that gains most, best first, as long as what photons say is significant.
 //
+// Where few photons come into view there is little to learn from. So emissions that pilot paths
+// found from the eye (tracing/pilot_paths.h) count beside those of found photons. Both estimate the
+// same masses, but pilot paths find hardly any light that smooth surfaces focus. Added up, they
+// count what both find twice, which changes the share of a box by the root of two at most.
+//
 // All follows from sums of whole rounds in order, with correctly rounded operations: the same
 // guides on every machine.
 #pragma once
@@ -46,6 +51,15 @@ using ScoreAt = std::function<double(std::uint32_t pixel)>;
 // Of a photon drawn with these numbers without a guide (transport/photon_guide.h, EvenFlux).
 using FluxAt = std::function<double(const PrimaryNumbers& numbers)>;
 
+// An emission that a pilot path found, as the image sees it.
+struct PilotEmission {
+  PrimaryNumbers numbers{};
+  std::uint32_t pixel = 0;
+  // Stands for so many found photons of one photon that is drawn evenly: the sum over all pilots is
+  // the share of such photons that hitpoints find.
+  double found = 0;
+};
+
 class GuideLearner {
  public:
   // Of an image of so many pixels: small ones need fewer reports.
@@ -60,7 +74,8 @@ class GuideLearner {
 
   // The guide after `passes`, of `photons_per_pass` from now on.
   [[nodiscard]] PhotonGuide Next(std::uint64_t passes, std::uint64_t photons_per_pass,
-                                 const ScoreAt& score_at, const FluxAt& flux_at) const;
+                                 const ScoreAt& score_at, const FluxAt& flux_at,
+                                 std::span<const PilotEmission> pilots = {}) const;
 
   // Photons drawn by one guide.
   struct Drawn {

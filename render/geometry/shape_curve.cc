@@ -131,6 +131,28 @@ ShapeFace SampleFace(const CurvePiece& shape, float u1, float u2) {
           ToFloat(outward)};
 }
 
+Vec2 FaceNumbers(const CurvePiece& shape, Vec3 position) {
+  const Axis axis(shape);
+  const double end = axis.radius + axis.growth;
+  const double length = Length(axis.along);
+  const double slope = length > 0 ? std::clamp(axis.growth / length, -1.0, 1.0) : 0;
+  const Vec3 along = length > 0 ? ToFloat(axis.along * (1 / length)) : Vec3{0, 0, 1};
+  const Double3 offset = Double3(position) - axis.from;
+  // The place is the axis' at s, and the radius there in a direction that leans back by the slope.
+  const double per_s = length - slope * axis.growth;
+  const double s =
+      per_s > 0 ? std::clamp((Dot(offset, Double3(along)) + slope * axis.radius) / per_s, 0.0, 1.0)
+                : 0.5;
+  const double radius = axis.radius + axis.growth * s;
+  const double u1 = axis.growth == 0 ? s
+                                     : (radius * radius - axis.radius * axis.radius) /
+                                           (end * end - axis.radius * axis.radius);
+  const Frame frame(along);
+  return {static_cast<float>(std::clamp(u1, 0.0, 1.0)),
+          TurnOf(static_cast<float>(Dot(offset, Double3(frame.s))),
+                 static_cast<float>(Dot(offset, Double3(frame.t))))};
+}
+
 bool SampleSeen(const CurvePiece& /*shape*/, Vec3 /*from*/, float /*u1*/, float /*u2*/,
                 SeenPlace& /*seen*/) {
   return false;

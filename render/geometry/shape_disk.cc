@@ -54,6 +54,20 @@ ShapeFace SampleFace(const Disk& shape, float u1, float u2) {
       shape.normal};
 }
 
+Vec2 FaceNumbers(const Disk& shape, Vec3 position) {
+  const Frame frame(shape.normal);
+  const Vec3 offset = (position - shape.center) / shape.radius;
+  float x = Dot(offset, frame.s);
+  float y = Dot(offset, frame.t);
+  if (const float squared = x * x + y * y; shape.inner_radius > 0 && squared > 0) {
+    const float inner2 = shape.inner_radius * shape.inner_radius / (shape.radius * shape.radius);
+    const float scale = std::sqrt(std::max(0.0F, squared - inner2) / ((1 - inner2) * squared));
+    x *= scale;
+    y *= scale;
+  }
+  return DiskToSquare(x, y);
+}
+
 bool SampleSeen(const Disk& /*shape*/, Vec3 /*from*/, float /*u1*/, float /*u2*/,
                 SeenPlace& /*seen*/) {
   return false;

@@ -6,6 +6,7 @@
 //   IntersectShape  True and `t`, in (t_near, t_far), where origin + t·direction first meets it.
 //   FaceAt          Of the place origin + t·direction at which the ray meets the shape.
 //   SampleFace      Draws a place evenly by area. u1, u2 in [0, 1).
+//   FaceNumbers     With which u1, u2 SampleFace draws this place, about.
 //   SampleSeen      Draws a direction from `from` to the shape otherwise than by area; false when
 //                   area is as good.
 //   SeenInversePdf  The inverse of the density [sr] with which SampleSeen draws a direction to the
@@ -85,6 +86,7 @@ struct SilhouetteEdge {
                                     float t_far, float& t);                                        \
   [[nodiscard]] ShapeFace FaceAt(const Name& shape, const Ray& ray, float t);                      \
   [[nodiscard]] ShapeFace SampleFace(const Name& shape, float u1, float u2);                       \
+  [[nodiscard]] Vec2 FaceNumbers(const Name& shape, Vec3 position);                                \
   [[nodiscard]] bool SampleSeen(const Name& shape, Vec3 from, float u1, float u2,                  \
                                 SeenPlace& seen);                                                  \
   [[nodiscard]] float SeenInversePdf(const Name& shape, Vec3 from);                                \
@@ -116,9 +118,8 @@ template <typename Shape>
 [[nodiscard]] bool IsWithinNextPiece(const std::vector<CurvePiece>& pieces, std::size_t index,
                                      const Ray& ray, float t);
 
-// The share of a full turn from x to y, in [0, 1): the texture coordinate around an axis.
-[[nodiscard]] float TurnOf(float x, float y);
-// The squared slope of that coordinate at this distance from the axis [1/length²].
+// The squared slope of the texture coordinate around an axis (TurnOf) at this distance from it
+// [1/length²].
 [[nodiscard]] double TurnSlope(double distance);
 
 }  // namespace lucerna

@@ -76,6 +76,10 @@ ShapeFace SampleFace(const Sphere& shape, float u1, float u2) {
   return {shape.center + outward * shape.radius, shape.inward ? -outward : outward};
 }
 
+Vec2 FaceNumbers(const Sphere& shape, Vec3 position) {
+  return SphereToSquare(Normalize(position - shape.center));
+}
+
 // Uniform in the cone in which the sphere appears.
 bool SampleSeen(const Sphere& shape, Vec3 from, float u1, float u2, SeenPlace& seen) {
   const Vec3 to_center = shape.center - from;

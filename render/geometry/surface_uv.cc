@@ -27,12 +27,6 @@ double DotDouble(Vec3 a, Vec3 b) {
 
 }  // namespace
 
-float TurnOf(float x, float y) {
-  if (x == 0 && y == 0) return 0;
-  const float turn = std::atan2(y, x) * (0.5F * kInversePi);
-  return turn < 0 ? std::min(turn + 1, 0x1.fffffep-1F) : turn;
-}
-
 double TurnSlope(double distance) {
   const double turn = 2 * std::numbers::pi * distance;
   return 1 / (turn * turn);

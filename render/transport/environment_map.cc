@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 #include <utility>
 
@@ -25,6 +26,15 @@ float PlaceIn(std::span<const Number> cumulative, float u) {
   const Number before = cell == 0 ? Number{0} : *(found - 1);
   const Number within = *found > before ? (value - before) / (*found - before) : Number{0};
   return static_cast<float>(cell) + std::min(static_cast<float>(within), 0x1.fffffep-1F);
+}
+
+// The number in [0, 1] of which PlaceIn is `place`.
+template <typename Number>
+float NumberAt(std::span<const Number> cumulative, float place) {
+  const auto cell = static_cast<std::size_t>(place);
+  const Number before = cell == 0 ? Number{0} : cumulative[cell - 1];
+  return static_cast<float>(before + (cumulative[cell] - before) *
+                                         static_cast<Number>(place - static_cast<float>(cell)));
 }
 
 // The density [sr⁻¹] of a direction from which light of this radiance comes.
@@ -114,6 +124,19 @@ bool EnvironmentMap::SampleEmission(const Emitter& emitter, const BoundingSphere
   SetEnteringRay(towards, scene, u, emission.ray);
   emission.flux = radiance * (kPi * scene.radius * scene.radius / (pdf * emitter.choice));
   return true;
+}
+
+EmissionNumbers EnvironmentMap::FindNumbers(const BoundingSphere& scene, Vec3 point,
+                                            Vec3 direction) const {
+  const auto size = static_cast<std::size_t>(size_);
+  const auto side = static_cast<float>(size_);
+  const Vec2 on_map = PlaceOf(direction);
+  const Vec2 place = EnteringPlace(direction, scene, point);
+  const float y = std::min(on_map.y * side, std::nextafter(side, 0.0F));
+  const float x = std::min(on_map.x * side, std::nextafter(side, 0.0F));
+  const auto row = static_cast<std::size_t>(y);
+  return {place.x, place.y, NumberAt<double>(rows_, y),
+          NumberAt<float>(std::span(columns_).subspan(row * size, size), x)};
 }
 
 std::unique_ptr<const InfiniteSpectrum> EnvironmentMap::MeasureSpectrum() const {

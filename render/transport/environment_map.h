@@ -35,6 +35,8 @@ class EnvironmentMap final : public InfiniteEmission {
   }
   [[nodiscard]] bool SampleEmission(const Emitter& emitter, const BoundingSphere& scene,
                                     const EmissionNumbers& u, Emission& emission) const override;
+  [[nodiscard]] EmissionNumbers FindNumbers(const BoundingSphere& scene, Vec3 point,
+                                            Vec3 direction) const override;
   [[nodiscard]] std::unique_ptr<const InfiniteSpectrum> MeasureSpectrum() const override;
 
   // [pixels] of a side.

@@ -30,6 +30,12 @@ class ConstantEmission final : public InfiniteEmission {
     SetEnteringRay(-SquareToSphere(u.direction1, u.direction2), scene, u, emission.ray);
     return true;
   }
+  [[nodiscard]] EmissionNumbers FindNumbers(const BoundingSphere& scene, Vec3 point,
+                                            Vec3 direction) const override {
+    const Vec2 place = EnteringPlace(direction, scene, point);
+    const Vec2 numbers = SphereToSquare(-direction);
+    return {place.x, place.y, numbers.x, numbers.y};
+  }
   [[nodiscard]] std::unique_ptr<const InfiniteSpectrum> MeasureSpectrum() const override {
     return std::make_unique<ConstantSpectrum>();
   }

@@ -45,6 +45,10 @@ class InfiniteEmission {
   // emitter.power / emitter.choice as flux and a ray without an end.
   [[nodiscard]] virtual bool SampleEmission(const Emitter& emitter, const BoundingSphere& scene,
                                             const EmissionNumbers& u, Emission& emission) const = 0;
+  // With which numbers SampleEmission draws the photon that comes from `direction` along a line
+  // through `point`, about.
+  [[nodiscard]] virtual EmissionNumbers FindNumbers(const BoundingSphere& scene, Vec3 point,
+                                                    Vec3 direction) const = 0;
 
   // May measure the whole light. Keeps a reference to this.
   [[nodiscard]] virtual std::unique_ptr<const InfiniteSpectrum> MeasureSpectrum() const = 0;
@@ -67,6 +71,13 @@ inline void SetEnteringRay(Vec3 towards, const BoundingSphere& scene, const Emis
   const Vec3 disk = SquareToDisk(u.place1, u.place2) * scene.radius;
   ray.origin = scene.center + towards * scene.radius + frame.s * disk.x + frame.t * disk.y;
   ray.direction = -towards;
+}
+
+// The place on that disk, in [0, 1]², through which the ray of this direction meets `point`.
+inline Vec2 EnteringPlace(Vec3 towards, const BoundingSphere& scene, Vec3 point) {
+  const Frame frame(-towards);
+  const Vec3 offset = point - scene.center;
+  return DiskToSquare(Dot(offset, frame.s) / scene.radius, Dot(offset, frame.t) / scene.radius);
 }
 
 }  // namespace lucerna

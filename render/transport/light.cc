@@ -391,6 +391,99 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
   return false;
 }
 
+std::optional<PrimaryNumbers> LightSet::NumbersOf(std::uint32_t number, const Ray& ray,
+                                                  KeyedRng& rng) const {
+  const double before = number == 0 ? 0 : cumulative_[number - 1];
+  const double share = cumulative_[number] - before;
+  if (!(share > 0)) return std::nullopt;
+  const Emitter& emitter = emitters_[number];
+  EmissionNumbers u;
+  for (float* const value : {&u.place1, &u.place2, &u.direction1, &u.direction2})
+    *value = rng.Uniform();
+  const double choice = before + share * static_cast<double>(rng.Uniform());
+  switch (emitter.kind) {
+#define LUCERNA_CASE(Name, list, name) case Kind::k##Name:
+    case Kind::kTriangle:
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+      u = AreaNumbers(emitter, ray);
+      break;
+#define LUCERNA_CASE(Name, list, name)                                            \
+  case Kind::k##Name:                                                             \
+    Name##Emission::FindNumbers(scene_.list[emitter.primitive], sphere_, ray, u); \
+    break;
+      LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+#define LUCERNA_CASE(Name, name) case Kind::k##Name:
+      LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+      u = infinite_lights_[emitter.primitive]->FindNumbers(sphere_, ray.origin, -ray.direction);
+      break;
+  }
+  PrimaryNumbers numbers = {u.place1, u.place2, u.direction1, u.direction2, choice};
+  for (double& value : numbers)
+    value = std::clamp(value, 0.0, 1 - 0x1p-32);
+  return numbers;
+}
+
+EmissionNumbers LightSet::AreaNumbers(const Emitter& emitter, const Ray& ray) const {
+  // With which numbers PointOn draws about this place.
+  const Vec2 place = [&]() -> Vec2 {
+    switch (emitter.kind) {
+#define LUCERNA_CASE(Name, list, name) \
+  case Kind::k##Name:                  \
+    return FaceNumbers(scene_.list[emitter.primitive], ray.origin);
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+      default:
+        break;
+    }
+    const TriangleMesh& mesh = scene_.meshes[emitter.geometry];
+    const std::uint32_t* corner = &mesh.indices[std::size_t{3} * emitter.primitive];
+    const Vec3 p0 = mesh.positions[corner[0]];
+    const Vec3 p1 = mesh.positions[corner[1]];
+    const Vec3 p2 = mesh.positions[corner[2]];
+    const Double3 cross = TriangleCross(p0, p1, p2);
+    const double area2 = Dot(cross, cross);
+    if (!(area2 > 0)) return {};
+    return TriangleToSquare(
+        static_cast<float>(Dot(TriangleCross(p0, ray.origin, p2), cross) / area2),
+        static_cast<float>(Dot(TriangleCross(p0, p1, ray.origin), cross) / area2));
+  }();
+  constexpr float kBelowOne = 0x1.fffffep-1F;
+  Vec3 position;
+  Vec3 normal;
+  float clearance = 0;
+  PointOn(emitter, std::min(place.x, kBelowOne), std::min(place.y, kBelowOne), position, normal,
+          clearance);
+  const Vec3 leaving = Normalize(ray.direction);
+  const bool is_other_side = emitter.two_sided && Dot(leaving, normal) < 0;
+  const Vec3 local = Frame(is_other_side ? -normal : normal).ToLocal(leaving);
+  Vec2 direction = DiskToSquare(local.x, local.y);
+  if (emitter.two_sided) direction.x = 0.5F * (direction.x + (is_other_side ? 1.0F : 0.0F));
+  return {place.x, place.y, direction.x, direction.y};
+}
+
+std::optional<std::uint32_t> LightSet::EmitterAt(const SurfacePoint& point) const {
+  const Emitter* emitter = EmitterOf(point);
+  if (emitter == nullptr) return std::nullopt;
+  return static_cast<std::uint32_t>(emitter - emitters_.data());
+}
+
+std::optional<std::uint32_t> LightSet::InfiniteEmitter(Vec3 direction) const {
+  std::optional<std::uint32_t> likeliest;
+  float largest = 0;
+  for (std::size_t i = 0; i < infinite_lights_.size() && !emitters_.empty(); ++i) {
+    const std::size_t number = first_infinite_ + i;
+    const float density = infinite_lights_[i]->Density(direction, emitters_[number].choice);
+    if (density > largest) {
+      largest = density;
+      likeliest = static_cast<std::uint32_t>(number);
+    }
+  }
+  return likeliest;
+}
+
 std::optional<Spectrum> LightSet::DeltaSource(const Emission& emission, double edge_strength,
                                               const SpectrumLimits& limits) const {
   const Emitter& emitter = emitters_[emission.emitter];
@@ -410,6 +503,7 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
                             LightSample& sample) const {
   if (emitters_.empty() || direct_cumulative_.back() == 0) return false;
   const Emitter& emitter = Choose(direct_cumulative_, u_choice);
+  sample.emitter = static_cast<std::uint32_t>(&emitter - emitters_.data());
   switch (emitter.kind) {
 #define LUCERNA_CASE(Name, list, name)                                          \
   case Kind::k##Name: {                                                         \

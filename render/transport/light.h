@@ -19,9 +19,11 @@
 #include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
 #include "render/math/rgb.h"
+#include "render/math/rng.h"
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
 #include "render/scene/shape_lists.h"
+#include "render/transport/primary_numbers.h"
 #include "render/transport/unreachable_lights.h"
 
 namespace lucerna {
@@ -89,9 +91,11 @@ struct LightSample {
                           // on a plane facing the light, over the choice
   // choice × pdf_solid_angle [sr⁻¹]; 0 for lights that no ray finds, such as delta lights
   float pdf = 0;
+  std::uint32_t emitter = 0;  // number of the light that was drawn
 };
 
 class InfiniteEmission;
+struct EmissionNumbers;
 
 // Around all shapes.
 struct BoundingSphere {
@@ -127,6 +131,18 @@ class LightSet {
   [[nodiscard]] bool SampleEmission(double u_choice, float u_place1, float u_place2,
                                     float u_direction1, float u_direction2,
                                     Emission& emission) const;
+
+  // With which numbers SampleEmission draws a photon of this emitter that leaves along `ray`,
+  // about: the inverse, for guides (photon_guide.h). What the photon does not depend on is drawn
+  // from `rng`. Of light from infinity the ray may begin anywhere on its line. Absent for emitters
+  // that send no photons.
+  [[nodiscard]] std::optional<PrimaryNumbers> NumbersOf(std::uint32_t emitter, const Ray& ray,
+                                                        KeyedRng& rng) const;
+  // The emitter at a point of a surface, if any.
+  [[nodiscard]] std::optional<std::uint32_t> EmitterAt(const SurfacePoint& point) const;
+  // Of the infinite lights the one that most likely sent a photon that came from `direction`, if
+  // any.
+  [[nodiscard]] std::optional<std::uint32_t> InfiniteEmitter(Vec3 direction) const;
 
   // The spectrum of a photon of a delta light, absent for other emitters. `edge_strength`: see
   // frequency/bandwidth.h.
@@ -173,6 +189,8 @@ class LightSet {
   [[nodiscard]] const Emitter& Choose(const std::vector<double>& cumulative, double u) const;
   [[nodiscard]] const Emitter* EmitterOf(const SurfacePoint& point) const;
   [[nodiscard]] static float AreaDensity(const Emitter& emitter);
+  // NumbersOf for emitters on shapes.
+  [[nodiscard]] EmissionNumbers AreaNumbers(const Emitter& emitter, const Ray& ray) const;
   void PointOn(const Emitter& emitter, float u1, float u2, Vec3& position, Vec3& normal,
                float& clearance) const;
 

@@ -19,6 +19,16 @@ bool DistantEmission::SampleEmission(const DistantLight& light, const Emitter& /
   return true;
 }
 
+void DistantEmission::FindNumbers(const DistantLight& light, const BoundingSphere& scene,
+                                  const Ray& ray, EmissionNumbers& u) {
+  const Frame frame(light.direction);
+  const Vec3 offset = ray.origin - scene.center;
+  const Vec2 place =
+      DiskToSquare(Dot(offset, frame.s) / scene.radius, Dot(offset, frame.t) / scene.radius);
+  u.place1 = place.x;
+  u.place2 = place.y;
+}
+
 bool DistantEmission::SampleDirect(const DistantLight& light, const Emitter& emitter, Vec3 /*from*/,
                                    LightSample& sample) {
   sample.wi = -light.direction;

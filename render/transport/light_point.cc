@@ -18,6 +18,13 @@ bool PointEmission::SampleEmission(const PointLight& light, const Emitter& /*emi
   return true;
 }
 
+void PointEmission::FindNumbers(const PointLight& /*light*/, const BoundingSphere& /*scene*/,
+                                const Ray& ray, EmissionNumbers& u) {
+  const Vec2 direction = SphereToSquare(Normalize(ray.direction));
+  u.direction1 = direction.x;
+  u.direction2 = direction.y;
+}
+
 bool PointEmission::SampleDirect(const PointLight& light, const Emitter& emitter, Vec3 from,
                                  LightSample& sample) {
   const Vec3 to = light.position - from;

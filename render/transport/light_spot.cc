@@ -38,6 +38,14 @@ bool SpotEmission::SampleEmission(const SpotLight& spot, const Emitter& emitter,
   return falloff > 0;
 }
 
+void SpotEmission::FindNumbers(const SpotLight& spot, const BoundingSphere& /*scene*/,
+                               const Ray& ray, EmissionNumbers& u) {
+  const Vec3 local = Frame(spot.direction).ToLocal(Normalize(ray.direction));
+  const Vec2 direction = ConeToSquare(local, 1 - spot.cos_total_width);
+  u.direction1 = direction.x;
+  u.direction2 = direction.y;
+}
+
 bool SpotEmission::SampleDirect(const SpotLight& spot, const Emitter& emitter, Vec3 from,
                                 LightSample& sample) {
   const Vec3 to = spot.position - from;

@@ -21,14 +21,11 @@
 #include <vector>
 
 #include "render/base/status.h"
+#include "render/transport/primary_numbers.h"
 
 namespace lucerna {
 
 class LightSet;
-
-inline constexpr std::size_t kEmissionDimensions = 5;
-// Two numbers for the place, two for the direction, then the choice of the emitter.
-using PrimaryNumbers = std::array<double, kEmissionDimensions>;
 
 inline constexpr double kUnguidedShare = 0.25;
 // At most so many nodes, and so many halvings along one dimension.

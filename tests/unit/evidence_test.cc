@@ -74,6 +74,28 @@ TEST(EvidenceTest, HoldsTheSumOfSquaredTracesBelowItsEnd) {
   }
 }
 
+// Where every photon is weak, as where guides send many, the noise of the Laplacian must not be
+// lost: the radius follows from its ratio to the Laplacian.
+TEST(EvidenceTest, CountsTheSquaresOfSmallWeights) {
+  for (const float flux : {0.25F, 0.01F, 0x1p-10F, 0x1p-12F, 0x1p-15F}) {
+    Cloud cloud(2000);
+    for (Deposit& deposit : cloud.deposits.rows)
+      deposit.flux = Gray(flux);
+    const auto count = static_cast<double>(cloud.Sum(Evidence::kCurvature).counts[0]);
+    const double expected = count * static_cast<double>(flux) * static_cast<double>(flux);
+    const Accumulation curvature = cloud.Sum(Evidence::kCurvature);
+    const double square =
+        kWeight2Unit *
+        static_cast<double>(curvature.evidence[kCommonColumns + kCurvatureWeight2][0]);
+    // Never less, and the same where a square has a few units.
+    EXPECT_GE(square, 0.99 * expected) << flux;
+    EXPECT_GT(square, 0) << flux;
+    if (flux >= 0x1p-10F) {
+      EXPECT_LE(square, 1.07 * expected) << flux;
+    }
+  }
+}
+
 TEST(EvidenceTest, SectorsAreTwelveCellsOfEqualAreaAndHoldEveryPhotonOnce) {
   const Accumulation sum = Cloud(120000).Sum(Evidence::kSectors);
   ASSERT_EQ(sum.evidence.size(), kCommonColumns + kSectors);
@@ -106,7 +128,8 @@ TEST(EvidenceTest, FrequencyColumnsAreTheSumsTheySay) {
   // Flux and power are both 1 here, so every weight is 1 up to the luminance's own rounding.
   EXPECT_EQ(sum.evidence[kCommonColumns + kFrequencyCount][0], static_cast<std::int64_t>(count));
   const auto value = [&](FrequencyColumn c) {
-    return kWeightUnit * static_cast<double>(sum.evidence[kCommonColumns + c][0]);
+    return (c == kFrequencyWeight2 ? kWeight2Unit : kWeightUnit) *
+           static_cast<double>(sum.evidence[kCommonColumns + c][0]);
   };
   EXPECT_NEAR(value(kFrequencyWeight), count, 1e-4 * count);
   EXPECT_NEAR(value(kFrequencyWeight2), count, 1e-4 * count);
@@ -129,7 +152,8 @@ TEST(EvidenceTest, CurvatureColumnsReachFurtherThanTheFluxDoes) {
   }
   EXPECT_EQ(sum.counts[0], count);
   const auto value = [&](CurvatureColumn c) {
-    return kWeightUnit * static_cast<double>(sum.evidence[kCommonColumns + c][0]);
+    return (c == kCurvatureWeight2 ? kWeight2Unit : kWeightUnit) *
+           static_cast<double>(sum.evidence[kCommonColumns + c][0]);
   };
   EXPECT_NEAR(value(kCurvatureWeight2), count, 1e-4 * count);
   EXPECT_NEAR(value(kCurvatureLaplacian), laplacian, 1e-4 * count);

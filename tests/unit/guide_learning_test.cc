@@ -103,6 +103,66 @@ TEST(GuideLearningTest, FindsASmallBoxAndSendsPhotonsThere) {
   EXPECT_GT(job.found(), share * 16384);
 }
 
+// Before any photon was found, pilot paths say where to send some.
+TEST(GuideLearningTest, LearnsFromPilotPathsAlone) {
+  constexpr std::uint64_t kPhotons = 16384;
+  GuideLearner learner(kPixels);
+  learner.Add({}, std::make_shared<const PhotonGuide>(learner.First(kPhotons)), kPhotons);
+  KeyedRng rng(23);
+  std::vector<PilotEmission> pilots;
+  while (pilots.size() < 1000) {
+    PrimaryNumbers u;
+    for (double& number : u)
+      number = static_cast<double>(rng.Uniform());
+    u[1] = 0.4375 + 0.125 * u[1];
+    u[3] = 0.875 + 0.125 * u[3];
+    pilots.push_back({.numbers = u, .pixel = 0, .found = 1.0 / 64 / 1000});
+  }
+  const PhotonGuide guide = learner.Next(1, kPhotons, SameScore, OneFlux, pilots);
+  PrimaryNumbers inside;
+  inside.fill(0.5);
+  inside[3] = 0.95;
+  EXPECT_LT(guide.WeightAt(inside), 1.0 / 32);
+  // Of the photons that it will draw a part will be found, and of these so many are asked for.
+  const double found = kUnguidedShare / 64 + (1 - kUnguidedShare);
+  EXPECT_NEAR(guide.reported() * 0x1p-32 * kPhotons * found, 4096, 2000);
+  EXPECT_TRUE(learner.Next(1, kPhotons, SameScore, OneFlux).is_even());
+}
+
+// Found photons and pilot paths that know as much of two boxes of one size count alike.
+TEST(GuideLearningTest, WeighsPilotPathsAsFoundPhotons) {
+  constexpr std::uint64_t kPhotons = 1 << 16;
+  GuideLearner learner(kPixels);
+  const auto even = std::make_shared<const PhotonGuide>(learner.First(kPhotons));
+  // So many are reported of so many trials: one of 128.
+  const double trials = kPhotons * (even->reported() * 0x1p-32);
+  const auto count = static_cast<int>(trials / 128);
+  KeyedRng rng(29);
+  const auto within = [&](double low) {
+    PrimaryNumbers u;
+    for (double& number : u)
+      number = static_cast<double>(rng.Uniform());
+    u[0] = low + u[0] / 128;
+    return u;
+  };
+  std::vector<EmissionReport> reports;
+  std::vector<PilotEmission> pilots;
+  for (int i = 0; i < count; ++i) {
+    reports.push_back({.numbers = InSteps(within(0.25))});
+    pilots.push_back({.numbers = within(0.75), .found = 1.0 / 128 / count});
+  }
+  learner.Add(reports, even, kPhotons);
+  const PhotonGuide guide = learner.Next(1, kPhotons, SameScore, OneFlux, pilots);
+  PrimaryNumbers at;
+  at.fill(0.5);
+  at[0] = 0.25 + 0.5 / 128;
+  const double by_photons = guide.WeightAt(at);
+  at[0] = 0.75 + 0.5 / 128;
+  const double by_pilots = guide.WeightAt(at);
+  EXPECT_LT(by_photons, 0.1);
+  EXPECT_NEAR(by_pilots, by_photons, 0.1 * by_photons);
+}
+
 // A weak light in view, which gets its even share of the photons, and a strong one whose photons
 // are hardly ever found: reports of the weak one must not be all there is room for.
 TEST(GuideLearningTest, FindsASeldomSeenStrongLightBesideAWeakOneInView) {

@@ -292,6 +292,107 @@ TEST(SampleEmissionTest, GivesDeltaLightsNoBoundToTheirDensity) {
   }
 }
 
+// A scene of lights of all kinds in reach of each other.
+Scene LightsOfAllKinds() {
+  Scene scene = Mixed();
+  AddDisk(scene, {0, 0.3F, 1}, Normalize({0, 1, 0.2F}), 1, 0, AddAreaLight(scene, 3, true));
+  AddDisk(scene, {1, 1, 1}, Normalize({-1, -1, -1}), 1, 0, AddAreaLight(scene, 3));
+  scene.disks.back().inner_radius = 0.5F;
+  CurvePiece piece;
+  piece.from = {0, 1, 0};
+  piece.to = {0.5F, 2, 0.3F};
+  piece.from_radius = 0.1F;
+  piece.to_radius = 0.03F;
+  piece.traits.area_light = AddAreaLight(scene, 30);
+  scene.curve_pieces.push_back(piece);
+  scene.point_lights.push_back({{0, 0.2F, 1}, Gray(20)});
+  scene.spot_lights.push_back({{0, 0, 1}, Normalize({0.1F, 0.3F, -1}), Gray(50), 0.9F, 0.8F});
+  scene.distant_lights.push_back({Normalize({0.3F, 0, -1}), Gray(5)});
+  Picture picture;
+  picture.width = picture.height = 8;
+  for (int i = 0; i < 64; ++i) {
+    const auto value = static_cast<float>(i % 5);
+    picture.linear.insert(picture.linear.end(), {value, value, value});
+  }
+  InfiniteLight sky = {Gray(0.5F)};
+  sky.kind = InfiniteLight::Kind::kEnvironment;
+  sky.map = std::make_shared<const Picture>(std::move(picture));
+  scene.infinite_lights.push_back(sky);
+  return scene;
+}
+
+// Numbers that are drawn again give the same photon.
+TEST(SampleEmissionTest, FindsTheNumbersOfAPhoton) {
+  const Lit lit(LightsOfAllKinds());
+  const float size = lit.intersector->bounds().Diagonal();
+  KeyedRng rng(91);
+  std::vector<int> found(static_cast<std::size_t>(lit.lights.size()));
+  for (int i = 0; i < 20'000; ++i) {
+    const auto choice = static_cast<double>(rng.Uniform());
+    const float u1 = rng.Uniform();
+    const float u2 = rng.Uniform();
+    const float u3 = rng.Uniform();
+    const float u4 = rng.Uniform();
+    Emission emission;
+    if (!lit.lights.SampleEmission(choice, u1, u2, u3, u4, emission)) continue;
+    Ray ray = emission.ray;
+    const EmitterKind kind = lit.lights.emitter(emission.emitter).kind;
+    // Anywhere on its line.
+    if (kind == EmitterKind::kDistant || kind == EmitterKind::kInfinite ||
+        kind == EmitterKind::kEnvironment) {
+      ray.origin = ray.origin + ray.direction * (rng.Uniform() * size);
+    }
+    const auto numbers = lit.lights.NumbersOf(emission.emitter, ray, rng);
+    ASSERT_TRUE(numbers);
+    Emission again;
+    ASSERT_TRUE(lit.lights.SampleEmission(
+        (*numbers)[4], static_cast<float>((*numbers)[0]), static_cast<float>((*numbers)[1]),
+        static_cast<float>((*numbers)[2]), static_cast<float>((*numbers)[3]), again));
+    ASSERT_EQ(again.emitter, emission.emitter);
+    ++found[emission.emitter];
+    // Where a map jumps, the smallest step leads to another direction; seldom.
+    EXPECT_LT(Length(again.ray.direction - emission.ray.direction), 2e-3F) << NameOf(kind);
+    EXPECT_LT(Length(again.ray.origin - emission.ray.origin), 2e-3F * size) << NameOf(kind);
+  }
+  for (std::uint32_t emitter = 0; emitter < lit.lights.size(); ++emitter) {
+    EXPECT_EQ(found[emitter] > 0, lit.lights.emitter(emitter).choice > 0)
+        << NameOf(lit.lights.emitter(emitter).kind);
+  }
+}
+
+// Those that a photon does not depend on must be as even as photons draw them: a guide that learns
+// from them would take what they have in common for a place where light is.
+TEST(SampleEmissionTest, DrawsNumbersThatDoNotMatter) {
+  Scene scene = BlackRoom();
+  AddQuad(scene, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0);
+  scene.point_lights.push_back({{0, 0, 1}, Gray(1)});
+  scene.spot_lights.push_back({{0, 0, 1}, {0, 0, -1}, Gray(1), 0.9F, 0.8F});
+  scene.distant_lights.push_back({{0, 0, -1}, Gray(1)});
+  const Lit lit(std::move(scene));
+  KeyedRng rng(5);
+  constexpr int kDraws = 4000;
+  for (std::uint32_t emitter = 0; emitter < lit.lights.size(); ++emitter) {
+    const bool is_distant = lit.lights.emitter(emitter).kind == EmitterKind::kDistant;
+    // The photons are all the same.
+    const Ray ray = {{0.1F, 0, 1}, {0, 0, -1}, HUGE_VALF};
+    PrimaryNumbers sum{};
+    PrimaryNumbers squares{};
+    for (int i = 0; i < kDraws; ++i) {
+      const PrimaryNumbers numbers = lit.lights.NumbersOf(emitter, ray, rng).value();
+      for (std::size_t d = 0; d < kEmissionDimensions; ++d) {
+        sum[d] += numbers[d] / kDraws;
+        squares[d] += numbers[d] * numbers[d] / kDraws;
+      }
+    }
+    for (const std::size_t d :
+         is_distant ? std::array<std::size_t, 2>{2, 3} : std::array<std::size_t, 2>{0, 1}) {
+      // Of even numbers the mean has the variance 1/12 and that of squares 4/45, over their number.
+      EXPECT_NEAR(sum[d], 0.5, 4.5 * std::sqrt(1.0 / 12 / kDraws)) << emitter << " " << d;
+      EXPECT_NEAR(squares[d], 1.0 / 3, 4.5 * std::sqrt(4.0 / 45 / kDraws)) << emitter << " " << d;
+    }
+  }
+}
+
 TEST(SampleEmissionTest, HasThePowerOfEachLightInClosedForm) {
   const auto power = [](const Scene& scene) {
     return static_cast<double>(Lit(scene).lights.TotalPower().g);

@@ -150,9 +150,8 @@ std::array<double, kCurvatureColumns> ExpectedCurvature(double photons, double b
                                                         double radius) {
   const double h2 = std::pow(static_cast<double>(kCurvatureReach) * radius, 2);
   const double pi = std::numbers::pi;
-  const auto units = [](double v) { return std::rint(v / kWeightUnit); };
-  return {units(-4 * bend * photons * pi * h2 * h2 / 24),
-          units(photons * pi * h2 * (1 - bend * h2 / 2))};
+  return {std::rint(-4 * bend * photons * pi * h2 * h2 / 24 / kWeightUnit),
+          std::rint(photons * pi * h2 * (1 - bend * h2 / 2) / kWeight2Unit)};
 }
 
 // Kaplanyan & Dachsbacher 2013: the least of R2 E/(n ν r²) + (mu2 L r²/2)².
@@ -213,7 +212,7 @@ TEST(AppmTest, KeepsItsRadiusInEvenLight) {
         blur += BlurOf(u, pixel.radius);
       }
       const std::array<double, kCurvatureColumns> columns = {std::rint(laplacian / kWeightUnit),
-                                                             std::rint(weight2 / kWeightUnit)};
+                                                             std::rint(weight2 / kWeight2Unit)};
       pixel = appm->Next(pixel, {weight2, pixel.radius, columns, blur}, OnePass(pass), memory);
     }
     if (pixel.radius < 0.9F) ++shrunk;
@@ -241,7 +240,7 @@ TEST(AppmTest, ShrinksOnTheRimOfASpotWhereTheLaplacianIsZero) {
       blur += BlurOf(distance * distance / static_cast<double>(kCurvatureReach * kCurvatureReach),
                      pixel.radius);
     }
-    const std::array<double, kCurvatureColumns> columns = {0, std::rint(20 / kWeightUnit)};
+    const std::array<double, kCurvatureColumns> columns = {0, std::rint(20 / kWeight2Unit)};
     pixel = appm->Next(pixel, {20, pixel.radius, columns, blur}, OnePass(pass), memory);
   }
   EXPECT_LT(pixel.radius, 1.05 * kSpot);
@@ -262,8 +261,9 @@ PixelRadius RunFrequency(RadiusControllerKind kind, double trace, int passes) {
     const double frequency_photons = photons / 10;
     const double x = trace * r * r;
     const auto units = [&](double v) { return std::trunc(frequency_photons * v / kWeightUnit); };
-    const std::array<double, kFrequencyColumns> columns = {std::round(frequency_photons), units(1),
-                                                           units(1), units(x), units(x * x)};
+    const std::array<double, kFrequencyColumns> columns = {
+        std::round(frequency_photons), units(1), std::trunc(frequency_photons / kWeight2Unit),
+        units(x), units(x * x)};
     pixel = controller->Next(pixel, {photons, pixel.radius, columns},
                              OnePass(static_cast<std::uint64_t>(pass)), memory);
   }
@@ -295,7 +295,7 @@ TEST(FrequencyTest, PassesWithoutEvidenceLeaveThePredictionAlone) {
   const auto controller = MakeRadiusController(settings, 1);
   std::vector<double> memory(controller->MemoryPerPixel());
   const auto units = [](double v) { return std::rint(v / kWeightUnit); };
-  const std::array<double, kFrequencyColumns> columns = {20, units(20), units(20), units(5),
+  const std::array<double, kFrequencyColumns> columns = {20, units(20), 20 / kWeight2Unit, units(5),
                                                          units(1.25)};
   PixelRadius pixel = controller->Next({1, 0}, {100, 1, columns}, OnePass(0), memory);
   const auto before = controller->Predict(memory);

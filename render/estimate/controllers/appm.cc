@@ -28,11 +28,12 @@ class Appm final : public RadiusController {
                    std::span<double> memory) const override {
     const double h = static_cast<double>(kCurvatureReach) * evidence.radius;
     const double h2 = h * h;
-    const auto column = [&](CurvatureColumn c) { return kWeightUnit * evidence.columns[c]; };
     // Sums over passes, per unit of flux: the Laplacian of the flux density, the density of
     // squares, and blur over the squared radius.
-    memory[kLaplacian] += column(kCurvatureLaplacian) * 24 / (std::numbers::pi * h2 * h2);
-    memory[kSquares] += column(kCurvatureWeight2) / (std::numbers::pi * h2);
+    memory[kLaplacian] +=
+        kWeightUnit * evidence.columns[kCurvatureLaplacian] * 24 / (std::numbers::pi * h2 * h2);
+    memory[kSquares] +=
+        kWeight2Unit * evidence.columns[kCurvatureWeight2] / (std::numbers::pi * h2);
     const double blur = evidence.blur / (evidence.radius * evidence.radius);
     memory[kBlur] += blur;
     const auto of_round = static_cast<double>(passes.size());

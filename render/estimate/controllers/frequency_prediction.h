@@ -33,7 +33,7 @@ class FrequencyPrediction {
     const double to_trace = 1 / (radius * radius);
     const auto column = [&](FrequencyColumn c) { return evidence.columns[c]; };
     Store(Sums(memory) + FrequencySums{kWeightUnit * column(kFrequencyWeight),
-                                       kWeightUnit * column(kFrequencyWeight2),
+                                       kWeight2Unit * column(kFrequencyWeight2),
                                        kWeightUnit * to_trace * column(kFrequencyTrace),
                                        kWeightUnit * to_trace * to_trace * column(kFrequencyTrace2),
                                        column(kFrequencyCount)},

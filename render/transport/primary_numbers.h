@@ -1,0 +1,13 @@
+// With which random numbers is the emission of a photon drawn?
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace lucerna {
+
+inline constexpr std::size_t kEmissionDimensions = 5;
+// In [0, 1): two for the place, two for the direction, then the choice of the emitter.
+using PrimaryNumbers = std::array<double, kEmissionDimensions>;
+
+}  // namespace lucerna
