@@ -38,7 +38,9 @@ EmissionCheck::EmissionCheck(const LightSet& lights) {
   const double rounding = kRounding + kRoundingOfTerm * emitters;
   const double even_share = sending > 1 ? kEvenPhotonShare : 0;
   for (const LightGroup& light : lights.lights()) {
-    may_emit_less_ |= !is_ordinary || light.kind == EmitterKind::kSpot || light.lights > 1;
+    // Within a cone or a pixel of a picture photons differ.
+    const bool differ = light.kind == EmitterKind::kSpot || light.kind == EmitterKind::kProjection;
+    may_emit_less_ |= !is_ordinary || differ || light.lights > 1;
     if (!is_ordinary) {
       lights_.push_back({0, kLargestEnergy});
       continue;
@@ -49,7 +51,7 @@ EmissionCheck::EmissionCheck(const LightSet& lights) {
     const double flux = 1 / ((1 - even_share) / total + even);
     const double units = std::ldexp(flux / total, kEnergyBits);
     Range range = {units * (1 - rounding) - 1, units * (1 + rounding) + 1};
-    if (light.kind == EmitterKind::kSpot) range = {0, kMostOfSpot * range.most};
+    if (differ) range = {0, kMostOfSpot * range.most};
     // Several lights together, of any kind: fainter ones have less.
     if (light.lights > 1) range = {0, kMostOfSpot * range.most};
     lights_.push_back({std::clamp(range.least, 0.0, kLargestEnergy),

@@ -16,12 +16,16 @@
 #pragma once
 
 #include "render/scene/light_distant.h"
+#include "render/scene/light_goniometric.h"
 #include "render/scene/light_point.h"
+#include "render/scene/light_projection.h"
 #include "render/scene/light_spot.h"
 
 // ROW(Name, list, name): NameLight, the member of Scene that holds them all, and their name in
 // messages and in pbrt files.
-#define LUCERNA_DELTA_LIGHTS(ROW)   \
-  ROW(Point, point_lights, "point") \
-  ROW(Spot, spot_lights, "spot")    \
+#define LUCERNA_DELTA_LIGHTS(ROW)                     \
+  ROW(Point, point_lights, "point")                   \
+  ROW(Spot, spot_lights, "spot")                      \
+  ROW(Goniometric, goniometric_lights, "goniometric") \
+  ROW(Projection, projection_lights, "projection")    \
   ROW(Distant, distant_lights, "distant")

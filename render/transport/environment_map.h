@@ -9,6 +9,7 @@
 #include <memory>
 #include <vector>
 
+#include "render/math/piecewise_constant.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
@@ -59,9 +60,7 @@ class EnvironmentMap final : public InfiniteEmission {
   Rgb mean_;
   float largest_ = 0;
   double mean_luminance_ = 0;
-  // Shares of the luminance before the end of each row in all rows, and of each pixel in its row.
-  std::vector<double> rows_;
-  std::vector<float> columns_;  // [rows × columns]
+  PiecewiseConstant2D texels_;  // by luminance
 };
 
 }  // namespace lucerna

@@ -4,6 +4,7 @@
 // illuminance set the luminance that a colour of luminance 1 and a scale of 1 would have.
 #pragma once
 
+#include <memory>
 #include <numbers>
 
 #include "render/formats/asset_reader.h"
@@ -35,6 +36,9 @@ void ReadInfiniteLight(const LightInput& input);
 // The unit direction from `from` to `to`, in the world.
 [[nodiscard]] Vec3 Direction(ParameterList& parameters, const Transform& to_world, Vec3 from,
                              Vec3 to);
+
+// The picture that "filename" names. nullptr, and an error, when there is none that can be used.
+[[nodiscard]] std::shared_ptr<const Picture> ReadLightPicture(const LightInput& input);
 
 void WarnIfBlack(ParameterList& parameters, Rgb emitted);
 

@@ -63,6 +63,26 @@ Vec3 Direction(ParameterList& parameters, const Transform& to_world, Vec3 from, 
   return {0, 0, 1};
 }
 
+std::shared_ptr<const Picture> ReadLightPicture(const LightInput& input) {
+  ParameterList& parameters = input.parameters;
+  const std::optional<std::string> file = parameters.FindString("filename");
+  if (!file.has_value()) {
+    parameters.Error("needs \"string filename\": the picture that says how strong it is");
+    return nullptr;
+  }
+  StatusOr<std::shared_ptr<const Picture>> map = input.assets.ReadPicture(*file, {});
+  if (!map.ok()) {
+    parameters.Error("filename", Concat("cannot be read: ", map.status().message()));
+    return nullptr;
+  }
+  // Summed over all pixels in single precision.
+  if (!((*map)->Largest() < 1e20F)) {
+    parameters.Error("filename", "is too bright for single precision");
+    return nullptr;
+  }
+  return *std::move(map);
+}
+
 void WarnIfBlack(ParameterList& parameters, Rgb emitted) {
   if (IsBlack(emitted)) parameters.Warning("", "emits nothing: its colour or scale is 0");
 }
