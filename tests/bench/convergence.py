@@ -261,12 +261,13 @@ def plot_overview(path, rows):
 
 def write_page(rows, arguments):
     page = ["# How the error falls\n",
-            f"Made by `tests/bench/convergence.py` ({arguments.size} pixels, references of ten times "
-            "the longest time of a scene). The error is the root of relMSE; its floor follows the image. "
+            f"Made by `tests/bench/convergence.py` ({arguments.size} pixels). The error is the root of relMSE; its floor follows the image. "
             "\"True\" is against the reference with the reference's own noise taken off, \"all\" "
             "with the worst 0.1 % of pixels. Scenes b-* are half B of "
             "`tests/tools/make_study_scenes.py`, which no constant of the estimate has seen. All figures "
-            "are in [results.csv](convergence/results.csv). The references have the radii of a job: bias that "
+            "are in [results.csv](convergence/results.csv). Scenes with 60 s were made with `--times 1,2,5,10,20,60 --reference-s 300 "
+            "--reference-radius 1px`: their references show bias that falls slowly, and have more noise, after 60 s up to as much as what is judged. "
+            "The other references have the radii of a job: bias that "
             "falls as slowly as theirs (waves, hard shadows) is partly hidden in them, so that true "
             "errors of such scenes may be larger than shown ([how much](measurements/estimate-on-unseen-scenes.md)). Columns: errors as fractions, `low` and `high` of the "
             "95 % interval, `true_trimmed` without the worst 0.1 % of pixels.\n",
