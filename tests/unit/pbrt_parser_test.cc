@@ -718,7 +718,8 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
   expect("Material \"fourier\"", "Fourier BSDFs");
   expect("Material \"conductor\" \"spectrum eta\" \"none.spd\"", "\"none.spd\" cannot be read");
   expect("MakeNamedMaterial \"m\" \"string type\" \"measured\"", "\"measured\"");
-  expect("LightSource \"goniometric\"", "there are point, spot, distant and infinite");
+  expect("LightSource \"laser\"",
+         "there are point, spot, goniometric, projection, distant and infinite");
   expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "no such file");
   expect("Camera \"perspective\"", "before WorldBegin");
 }
