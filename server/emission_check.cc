@@ -62,6 +62,18 @@ EmissionCheck::EmissionCheck(const LightSet& lights) {
 Status EmissionCheck::CheckGuided(const BatchTally& tally) const {
   const auto photons = static_cast<double>(tally.photons);
   if (photons == 0) return absl::OkStatus();
+  constexpr double kLogOfChance = 28.3;
+  // Each photon stands for one that is drawn evenly with a probability of kUnguidedShare on
+  // average, and only those count for their lights. Hoeffding's inequality: fewer by t with a
+  // probability of at most exp(-2 t² / n).
+  std::uint64_t sent = 0;
+  for (const LightTally& light : tally.lights)
+    sent += light.sent;
+  const double fewest = kUnguidedShare * photons - std::sqrt(kLogOfChance * photons / 2);
+  if (sent > tally.photons || static_cast<double>(sent) < fewest) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("its lights sent ", sent, " of ", tally.photons, " photons"));
+  }
   double most_of_photon = 0;
   for (const Range& range : lights_)
     most_of_photon = std::max(most_of_photon, range.most);
@@ -71,7 +83,6 @@ Status EmissionCheck::CheckGuided(const BatchTally& tally) const {
   // t with a probability of at most 2 exp(-n x² / (2 (r + r x / 3))), r = largest / mean.
   const double mean = std::ldexp(1.0, kEnergyBits);
   const double r = most_of_photon / mean;
-  constexpr double kLogOfChance = 28.3;
   const double b = 2 * kLogOfChance * r / (3 * photons);
   const double x = 0.5 * (b + std::sqrt(b * b + 8 * kLogOfChance * r / photons));
   const double missing =
