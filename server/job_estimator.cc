@@ -288,6 +288,7 @@ struct JobEstimator::State {
       // A photon of flux f that a pixel finds adds f albedo / (π² radius²) to its radiance.
       const double per_value =
           kPi64 * kPi64 / (factor * power * flux * FoundBy(in_use, report.pixel));
+      if (!std::isfinite(brought * per_value)) continue;
       emissions.push_back({.numbers = report.numbers,
                            .pixel = report.pixel,
                            .found = brought / paths_per_pixel * per_value});

@@ -212,8 +212,8 @@ double EqualsOf(std::span<const double> masses) {
   return squares > 0 ? sum * sum / squares : 0;
 }
 
-// Two estimates of the same masses become parts of one, each in proportion to what it knows.
-// Returns the share of `a`.
+// Two estimates of the same masses become parts of one, each in proportion to its EqualsOf. Returns
+// the share of `a`.
 double BalanceMasses(std::span<double> a, std::span<double> b) {
   const double of_a = EqualsOf(a);
   const double of_b = EqualsOf(b);

@@ -9,8 +9,8 @@
 //
 // Where few photons come into view there is little to learn from. So emissions that pilot paths
 // found from the eye (tracing/pilot_paths.h) count beside those of found photons. Both estimate the
-// same masses, but pilot paths find hardly any light that smooth surfaces focus. Added up, they
-// count what both find twice, which changes the share of a box by the root of two at most.
+// same masses, but pilot paths find hardly any light that smooth surfaces focus. Each counts in
+// proportion to the number of equal reports that would say as much, (sum)² / sum of squares.
 //
 // All follows from sums of whole rounds in order, with correctly rounded operations: the same
 // guides on every machine.

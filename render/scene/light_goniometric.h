@@ -1,4 +1,4 @@
-// A light at a point whose intensity is a picture over the directions, as lamps are measured.
+// A light at a point whose intensity is a picture over the directions, as luminaires are measured.
 // Members as in scene/light_list.h.
 #pragma once
 

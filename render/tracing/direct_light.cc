@@ -32,6 +32,12 @@ bool SidesAgree(const SurfacePoint& surface, Vec3 wo, Vec3 wi, bool transmits) {
   return same_side != transmits;
 }
 
+Ray ShadowRay(const SurfacePoint& surface, const LightSample& light) {
+  const Vec3 origin = LeavingPoint(surface, light.wi);
+  if (light.is_distant) return {origin, light.wi, HUGE_VALF};
+  return {origin, light.target - origin, kShadowEnd};
+}
+
 Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
                          const ShadingPoint& point, const SobolPoint& u, int& rays) {
   LightSample light;
@@ -59,10 +65,7 @@ Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
   }
   if (IsBlack(radiance)) return {};
   if (!SidesAgree(point.surface, point.wo, light.wi, wo.z * wi.z < 0)) return {};
-  // Both ends are clear of their surfaces, so nothing but a third surface can be met.
-  const Vec3 origin = LeavingPoint(point.surface, light.wi);
-  const Ray shadow = light.is_distant ? Ray{origin, light.wi, HUGE_VALF}
-                                      : Ray{origin, light.target - origin, kShadowEnd};
+  const Ray shadow = ShadowRay(point.surface, light);
   if (point.media != nullptr) {
     const std::int32_t medium =
         wo.z * wi.z < 0 ? point.media->Beyond(point.surface, light.wi, point.medium) : point.medium;

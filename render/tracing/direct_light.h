@@ -32,6 +32,10 @@ struct ShadingPoint {
 // vanish.
 [[nodiscard]] float PowerHeuristic(float drawn, float other);
 
+// From a surface to a light that was drawn there. Both ends are clear of their surfaces, so nothing
+// but a third surface can be met.
+[[nodiscard]] Ray ShadowRay(const SurfacePoint& surface, const LightSample& light);
+
 // Radiance towards wo of light drawn from the lights: BSDF × light × MIS weight × what media leave,
 // zero when something is in the way. `rays` counts what was traced.
 [[nodiscard]] Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,

@@ -118,11 +118,9 @@ class PilotPath {
     Rgb brought = weight * bsdf * light.radiance_over_pdf * std::abs(wi_local.z);
     if (light.pdf > 0) brought *= PowerHeuristic(light.pdf, PdfBsdf(material, wo_local, wi_local));
     if (!SidesAgree(surface, wo, light.wi, wo_local.z * wi_local.z < 0)) return;
-    const Vec3 origin = LeavingPoint(surface, light.wi);
-    const Ray shadow = light.is_distant ? Ray{origin, light.wi, HUGE_VALF}
-                                        : Ray{origin, light.target - origin, 1 - 0x1p-17F};
+    const Ray shadow = ShadowRay(surface, light);
     if (intersector_.Occluded(shadow)) return;
-    Report(light.emitter, {light.is_distant ? origin : light.target, -light.wi, HUGE_VALF},
+    Report(light.emitter, {light.is_distant ? shadow.origin : light.target, -light.wi, HUGE_VALF},
            brought);
   }
 

@@ -421,8 +421,9 @@ std::optional<PrimaryNumbers> LightSet::NumbersOf(std::uint32_t number, const Ra
       break;
   }
   PrimaryNumbers numbers = {u.place1, u.place2, u.direction1, u.direction2, choice};
+  // Of cones too narrow for a float they are no numbers.
   for (double& value : numbers)
-    value = std::clamp(value, 0.0, 1 - 0x1p-32);
+    value = value > 0 ? std::min(value, 1 - 0x1p-32) : 0;
   return numbers;
 }
 
