@@ -862,7 +862,10 @@ StatusOr<MergeOutcome> Coordinator::Merge(const Delivery& delivery, DecodedResul
 StatusOr<std::optional<MergeOutcome>> Coordinator::OutcomeOf(const Delivery& delivery) const {
   LUCERNA_ASSIGN_OR_RETURN(const Scheduler::Standing standing,
                            scheduler_.StandingOf(ClaimOf(delivery)));
-  return KnownOutcome(standing);
+  if (const auto known = KnownOutcome(standing)) return known;
+  // Its thread, which closes its passes, may be in the middle of a step.
+  if (jobs_.HasEnded(delivery.pass.job_id)) return MergeOutcome::kSuperseded;
+  return std::nullopt;
 }
 
 StatusOr<MergeOutcome> Coordinator::TakeIn(const Delivery& delivery, std::string_view bytes) {

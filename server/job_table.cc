@@ -879,6 +879,12 @@ std::optional<SteadyTime> JobTable::WhenItHasRun(const std::string& job_id, Dura
   return found->second.job.life.WhenItHasRun(time);
 }
 
+bool JobTable::HasEnded(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  return found == entries_.end() || found->second.job.life.has_ended();
+}
+
 Status JobTable::CheckStillNeeded(const std::string& job_id) const {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);

@@ -235,6 +235,8 @@ class JobTable {
   [[nodiscard]] std::optional<Turn> WaitForTurn();
   // Whether the job of this turn is still to be rendered: OK or CANCELLED.
   [[nodiscard]] Status CheckStillNeeded(const std::string& job_id) const;
+  // Whether nothing more counts for the job, be it that it is not known any more.
+  [[nodiscard]] bool HasEnded(const std::string& job_id) const;
   // Gives a job its runner. False when it has ended meanwhile, or after Close: it must not run.
   [[nodiscard]] bool Attach(const std::string& job_id, std::shared_ptr<RunningJob> runner);
   // The runner has given up its turn: unless it is paused or has ended, the job waits for its next.
