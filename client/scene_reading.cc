@@ -41,7 +41,7 @@ Status CheckNamesFile(const std::string& path) {
   if (!path.empty() && !path.ends_with('/')) return absl::OkStatus();
   return Failure(
       ExitCode::kUsage,
-      absl::StrCat("\"", path, "\" is not a scene file; name its .pbrt, .gltf or .glb file"));
+      absl::StrCat("\"", path, "\" is not a scene file; name its .pbrt, .gltf, .glb or .xml file"));
 }
 
 StatusOr<SceneManifest> ReadScene(const SceneSource& source, const RenderOverrides& overrides,

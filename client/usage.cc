@@ -12,8 +12,8 @@
 namespace lucerna {
 namespace {
 
-constexpr std::array<std::string_view, 5> kSceneEndings = {".pbrt.gz", ".pbrt", ".gltf", ".glb",
-                                                           ".gz"};
+constexpr std::array<std::string_view, 6> kSceneEndings = {".pbrt.gz", ".pbrt", ".gltf",
+                                                           ".glb",     ".xml",  ".gz"};
 
 std::vector<std::string> FlagsOf(const CLI::App& command) {
   std::vector<std::string> flags;

@@ -10,6 +10,7 @@
 #include "render/formats/asset_reader.h"
 #include "render/formats/finish_scene.h"
 #include "render/formats/gltf/gltf_reader.h"
+#include "render/formats/mitsuba/mitsuba_reader.h"
 #include "render/formats/pbrt/pbrt_reader.h"
 #include "render/formats/sensors/sensors_reader.h"
 
@@ -32,6 +33,7 @@ constexpr std::array kFormats = {
     SceneFormat{"pbrt-v4", ".pbrt", &BeginsAsPbrt, &ReadPbrt},
     SceneFormat{"glTF 2.0", ".gltf", &BeginsAsGltf, &ReadGltf},
     SceneFormat{"binary glTF 2.0", ".glb", &BeginsAsGltf, &ReadGltf},
+    SceneFormat{"Mitsuba", ".xml", &BeginsAsMitsuba, &ReadMitsuba},
     SceneFormat{"points to measure irradiance at", ".ply", &BeginsAsSensors, &ReadSensors},
 };
 

@@ -1,6 +1,7 @@
 #include "render/formats/scene_unit.h"
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 
 #include "render/scene/scaling.h"
@@ -92,7 +93,8 @@ Status ChooseUnit(Scene& scene) {
   camera.focal_distance *= factor;
   for (Sensor& sensor : scene.sensors) {
     sensor.position = ScaledBy(sensor.position, factor);
-    sensor.spacing = ScaledBy(sensor.spacing, factor);
+    // Above 0 however small it is beside the scene.
+    sensor.spacing = std::max(ScaledBy(sensor.spacing, factor), FLT_MIN);
   }
   for (auto& border : scene.sensor_borders) {
     for (Vec3& end : border)

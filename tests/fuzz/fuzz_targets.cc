@@ -8,6 +8,8 @@ std::span<const FuzzTarget> AllFuzzTargets() {
   static constexpr std::array kTargets = {
       FuzzTarget{"pbrt", FuzzPbrt, PbrtSeeds},
       FuzzTarget{"gltf", FuzzGltf, GltfSeeds},
+      FuzzTarget{"mitsuba", FuzzMitsuba, MitsubaSeeds},
+      FuzzTarget{"obj", FuzzObj, ObjSeeds},
       FuzzTarget{"ply", FuzzPly, PlySeeds},
       FuzzTarget{"sensors", FuzzSensors, SensorsSeeds},
       FuzzTarget{"image", FuzzImage, ImageSeeds},

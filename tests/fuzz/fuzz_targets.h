@@ -26,6 +26,10 @@ struct FuzzTarget {
 // scene_targets.cc
 bool FuzzPbrt(std::string_view bytes);
 std::vector<std::string> PbrtSeeds();
+bool FuzzMitsuba(std::string_view bytes);
+std::vector<std::string> MitsubaSeeds();
+bool FuzzObj(std::string_view bytes);
+std::vector<std::string> ObjSeeds();
 bool FuzzGltf(std::string_view bytes);
 std::vector<std::string> GltfSeeds();
 bool FuzzPly(std::string_view bytes);

@@ -170,6 +170,30 @@ TEST(SceneBytesTest, MutatedGltfIsSoundOrRefused) {
   }
 }
 
+TEST(SceneBytesTest, MutatedMitsubaScenesAreSoundOrRefused) {
+  for (const NamedBytes& seed : FilesOf("fuzz/seeds/mitsuba")) {
+    EXPECT_TRUE(SceneFromBytes(seed.bytes, seed.name).ok()) << seed.name;
+    int accepted = 0;
+    for (std::uint64_t key = 0; key < 10'000; ++key) {
+      SCOPED_TRACE(key);
+      const ParsedScene parsed = SceneFromBytes(Mutated(seed.bytes, key), seed.name);
+      ExpectSoundOrRefused(parsed);
+      accepted += parsed.ok() ? 1 : 0;
+    }
+    EXPECT_GT(accepted, 100) << seed.name;
+  }
+}
+
+TEST(SceneBytesTest, TheCorpusOfBadMitsubaScenesIsRefused) {
+  const std::vector<NamedBytes> corpus = FilesOf("fuzz/corpus/mitsuba");
+  EXPECT_GE(corpus.size(), 10U);
+  for (const NamedBytes& bad : corpus) {
+    const ParsedScene parsed = SceneFromBytes(bad.bytes, bad.name);
+    EXPECT_FALSE(parsed.ok()) << bad.name;
+    EXPECT_LE(parsed.diagnostics.size(), 300U) << bad.name;
+  }
+}
+
 TEST(SceneBytesTest, MutatedMeshesAreSoundOrRefused) {
   for (const NamedBytes& seed : FilesOf("fuzz/seeds/ply")) {
     for (std::uint64_t key = 0; key < 20'000; ++key) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "render/formats/image_file.h"
+#include "render/formats/mitsuba/meshes.h"
 #include "render/formats/ply_file.h"
 #include "tests/fuzz/fuzz_targets.h"
 #include "tests/fuzz/scene_from_bytes.h"
@@ -44,6 +45,34 @@ bool FuzzGltf(std::string_view bytes) {
 
 std::vector<std::string> GltfSeeds() {
   return SeedsOf("fuzz/seeds/gltf");
+}
+
+bool FuzzMitsuba(std::string_view bytes) {
+  return IsSoundOrRefused(SceneFromBytes(bytes, "fuzz.xml"));
+}
+
+std::vector<std::string> MitsubaSeeds() {
+  return SeedsOf("fuzz/seeds/mitsuba");
+}
+
+// Mitsuba's files of meshes, of both formats.
+bool FuzzObj(std::string_view bytes) {
+  constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 24;
+  bool is_accepted = false;
+  for (const bool is_obj : {true, false}) {
+    const auto mesh = is_obj ? ParseObj(bytes) : ParseSerialized(bytes, 0, kMostBytes);
+    if (!mesh.ok()) continue;
+    for (const std::uint32_t index : mesh->indices)
+      LUCERNA_CHECK(index < mesh->positions.size());
+    for (const Vec3 position : mesh->positions)
+      LUCERNA_CHECK(IsFinite(position));
+    is_accepted = true;
+  }
+  return is_accepted;
+}
+
+std::vector<std::string> ObjSeeds() {
+  return SeedsOf("fuzz/seeds/obj");
 }
 
 bool FuzzPly(std::string_view bytes) {

@@ -49,6 +49,8 @@ OWNERS = {
     r"zstd\.h": ["render/wire/"],
     r"openssl/": ["render/base/"],
     r"tbb/": ["render/base/parallel"],
+    r"pugixml": ["render/formats/mitsuba/"],
+    r"tiny_obj_loader": ["render/formats/mitsuba/"],
     r"zlib\.h": ["render/formats/", "render/image/", "render/film/png_file"],
     r"sqlite3\.h": ["server/"],
     r"random>?$": [],

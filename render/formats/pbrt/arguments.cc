@@ -33,11 +33,25 @@ bool IsNumeric(std::string_view type) {
 
 }  // namespace
 
+std::string Arguments::SubjectOf(std::string_view type) const {
+  return made_ != nullptr ? made_->subject : Concat(directive_, " ", Quoted(type));
+}
+
+bool Arguments::HasString() {
+  if (made_ != nullptr) return strings_read_ < made_->strings.size();
+  return tokens_->Peek().kind == Token::Kind::kString;
+}
+
 bool Arguments::ReadNumbers(std::span<double> numbers) {
-  const bool has_brackets = tokens_.Peek().kind == Token::Kind::kOpen;
-  if (has_brackets) tokens_.Next();
+  if (made_ != nullptr) {
+    if (made_->numbers.size() != numbers.size()) return false;
+    std::ranges::copy(made_->numbers, numbers.begin());
+    return true;
+  }
+  const bool has_brackets = tokens_->Peek().kind == Token::Kind::kOpen;
+  if (has_brackets) tokens_->Next();
   for (double& number : numbers) {
-    const Token& token = tokens_.Peek();
+    const Token& token = tokens_->Peek();
     const std::optional<double> value =
         token.kind == Token::Kind::kWord ? ParseNumber(token.text) : std::nullopt;
     if (!value.has_value() || !std::isfinite(*value)) {
@@ -46,12 +60,12 @@ bool Arguments::ReadNumbers(std::span<double> numbers) {
       return false;
     }
     number = *value;
-    tokens_.Next();
+    tokens_->Next();
   }
   if (!has_brackets) return true;
-  const Token& token = tokens_.Peek();
+  const Token& token = tokens_->Peek();
   if (token.kind == Token::Kind::kClose) {
-    tokens_.Next();
+    tokens_->Next();
     return true;
   }
   diagnostics_.Error(token.location, Concat(directive_, " takes ", numbers.size(),
@@ -60,26 +74,35 @@ bool Arguments::ReadNumbers(std::span<double> numbers) {
 }
 
 bool Arguments::ReadString(std::string_view what, std::string& out) {
-  const Token& token = tokens_.Peek();
+  if (made_ != nullptr) {
+    if (!HasString()) return false;
+    out = made_->strings[strings_read_++];
+    return true;
+  }
+  const Token& token = tokens_->Peek();
   if (token.kind != Token::Kind::kString) {
     diagnostics_.Error(token.location,
                        Concat(directive_, " takes ", what, " in quotes, not ", Quoted(token.text)));
     return false;
   }
   out = std::string(token.text);
-  tokens_.Next();
+  tokens_->Next();
   return true;
 }
 
 bool Arguments::ReadParameters(std::vector<Parameter>& parameters) {
-  while (tokens_.Peek().kind == Token::Kind::kString) {
+  if (made_ != nullptr) {
+    parameters = std::move(made_->parameters);
+    return true;
+  }
+  while (tokens_->Peek().kind == Token::Kind::kString) {
     if (!ReadParameter(parameters)) return false;
   }
   return true;
 }
 
 bool Arguments::ReadParameter(std::vector<Parameter>& parameters) {
-  const Token declaration = tokens_.Next();
+  const Token declaration = tokens_->Next();
   const std::vector<std::string_view> words = WordsOf(declaration.text);
   if (words.size() != 2) {
     diagnostics_.Error(declaration.location, Concat("expected a parameter as \"type name\", not ",
@@ -96,12 +119,12 @@ bool Arguments::ReadParameter(std::vector<Parameter>& parameters) {
     diagnostics_.Error(parameter.location, Concat("unknown parameter type ", Quoted(parameter.type),
                                                   "; there are ", Listed(types)));
   }
-  if (tokens_.Peek().kind != Token::Kind::kOpen) {
+  if (tokens_->Peek().kind != Token::Kind::kOpen) {
     if (!ReadValue(parameter, is_known_type)) return false;
   } else {
-    const SourceLocation open = tokens_.Next().location;
-    while (tokens_.Peek().kind != Token::Kind::kClose) {
-      const Token& token = tokens_.Peek();
+    const SourceLocation open = tokens_->Next().location;
+    while (tokens_->Peek().kind != Token::Kind::kClose) {
+      const Token& token = tokens_->Peek();
       const bool is_next_directive = token.kind == Token::Kind::kWord && IsDirective(token.text);
       if (token.kind == Token::Kind::kEnd || token.kind == Token::Kind::kOpen ||
           is_next_directive) {
@@ -111,21 +134,21 @@ bool Arguments::ReadParameter(std::vector<Parameter>& parameters) {
       }
       if (!ReadValue(parameter, is_known_type)) return false;
     }
-    tokens_.Next();
+    tokens_->Next();
   }
   if (is_known_type) parameters.push_back(std::move(parameter));
   return true;
 }
 
 bool Arguments::ReadValue(Parameter& parameter, bool is_known_type) {
-  const Token token = tokens_.Peek();
+  const Token token = tokens_->Peek();
   const auto unexpected = [&](std::string_view wanted) {
     diagnostics_.Error(token.location, Concat(Quoted(parameter.name), " of ", directive_, " takes ",
                                               wanted, ", not ", Quoted(token.text)));
     // A wrong word among values is one mistake; what follows it may still be right.
     const bool is_value = token.kind == Token::Kind::kWord || token.kind == Token::Kind::kString;
     if (!is_value || IsDirective(token.text)) return false;
-    tokens_.Next();
+    tokens_->Next();
     // It is counted as a value, so that its absence is not a second error.
     if (parameter.type == "bool") {
       parameter.bools.push_back(false);
@@ -138,7 +161,7 @@ bool Arguments::ReadValue(Parameter& parameter, bool is_known_type) {
   };
   if (!is_known_type) {
     if (token.kind != Token::Kind::kWord && token.kind != Token::Kind::kString) return false;
-    tokens_.Next();
+    tokens_->Next();
     return true;
   }
   const bool takes_string =
@@ -165,7 +188,7 @@ bool Arguments::ReadValue(Parameter& parameter, bool is_known_type) {
   } else {
     return unexpected("text in quotes");
   }
-  tokens_.Next();
+  tokens_->Next();
   return true;
 }
 

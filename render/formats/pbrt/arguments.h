@@ -1,6 +1,9 @@
 // Reads the arguments of one directive: numbers, strings and parameters.
+//
+// They come from a text, or from a reader of another format that translates into directives.
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 #include <string_view>
@@ -12,6 +15,16 @@
 
 namespace lucerna {
 
+// A directive that another format's reader has made.
+struct MadeDirective {
+  std::string_view name;
+  SourceLocation location;
+  std::string subject;  // what messages call the thing
+  std::vector<std::string> strings;
+  std::vector<double> numbers;
+  std::vector<Parameter> parameters;
+};
+
 // Functions that return bool return false when the arguments break off at something unexpected,
 // which is then reported; the text is to be skipped to the next directive.
 class Arguments {
@@ -19,11 +32,19 @@ class Arguments {
   // `directive`, `tokens` and `diagnostics` outlive the arguments.
   Arguments(std::string_view directive, SourceLocation location, Tokenizer& tokens,
             Diagnostics& diagnostics)
-      : directive_(directive), location_(location), tokens_(tokens), diagnostics_(diagnostics) {}
+      : directive_(directive), location_(location), tokens_(&tokens), diagnostics_(diagnostics) {}
+  // `made` and `diagnostics` outlive the arguments.
+  Arguments(MadeDirective& made, Diagnostics& diagnostics)
+      : directive_(made.name), location_(made.location), made_(&made), diagnostics_(diagnostics) {}
 
   [[nodiscard]] std::string_view directive() const { return directive_; }
   [[nodiscard]] const SourceLocation& location() const { return location_; }
-  [[nodiscard]] Tokenizer& tokens() { return tokens_; }
+  // What messages call the thing of this type or name that the directive makes.
+  [[nodiscard]] std::string SubjectOf(std::string_view type) const;
+  // Of a directive in a text.
+  [[nodiscard]] Tokenizer& tokens() { return *tokens_; }
+  // Whether a string comes next.
+  [[nodiscard]] bool HasString();
 
   // As many numbers as the span has, with or without brackets.
   bool ReadNumbers(std::span<double> numbers);
@@ -43,7 +64,9 @@ class Arguments {
 
   const std::string_view directive_;
   const SourceLocation location_;
-  Tokenizer& tokens_;
+  Tokenizer* const tokens_ = nullptr;  // one of the two
+  MadeDirective* const made_ = nullptr;
+  std::size_t strings_read_ = 0;  // of `made_`
   Diagnostics& diagnostics_;
 };
 

@@ -86,9 +86,22 @@ bool IsDirective(std::string_view word) {
 }
 
 UnfinishedScene DirectiveReader::Read(const std::string& main_path, std::string_view text) {
-  scene_.materials.emplace_back();  // of shapes that name none
   ++texts_read_;
   ReadText(main_path, text);
+  return Finish();
+}
+
+bool DirectiveReader::CarryOut(MadeDirective made) {
+  Arguments arguments(made, diagnostics_);
+  return (this->*FindDirective(made.name)->handler)(arguments) && !IsStopped();
+}
+
+bool DirectiveReader::AddMesh(MadeDirective made, TriangleMesh mesh) {
+  Arguments arguments(made, diagnostics_);
+  return AddShape(arguments, std::move(mesh)) && !IsStopped();
+}
+
+UnfinishedScene DirectiveReader::Finish() {
   if (IsStopped()) return std::move(unfinished_);
   ReportUnclosedScopes();
   ReportNamedMaterials();
@@ -231,8 +244,8 @@ ParameterList DirectiveReader::ListFor(const Arguments& arguments, std::string_v
                                        const GraphicsState::Defaults& defaults) {
   ReadSpectrumFiles(assets_, parameters, diagnostics_);
   ToRec709(parameters, graphics_.state().rgb_space);
-  return ParameterList(Concat(arguments.directive(), " ", Quoted(type)), arguments.location(),
-                       std::move(parameters), defaults.get(), diagnostics_);
+  return ParameterList(arguments.SubjectOf(type), arguments.location(), std::move(parameters),
+                       defaults.get(), diagnostics_);
 }
 
 bool DirectiveReader::RefusePbrtV3(const Arguments& arguments) {

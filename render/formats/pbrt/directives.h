@@ -35,10 +35,20 @@ class DirectiveReader {
  public:
   // Both outlive the reader.
   DirectiveReader(AssetReader& assets, Diagnostics& diagnostics)
-      : assets_(assets), diagnostics_(diagnostics) {}
+      : assets_(assets), diagnostics_(diagnostics) {
+    scene_.materials.emplace_back();  // of shapes that name none
+  }
 
   // Call it once.
   [[nodiscard]] UnfinishedScene Read(const std::string& main_path, std::string_view text);
+
+  // For formats that are translated into directives, in place of Read: any number of directives,
+  // where a text may have them, then Finish. False when nothing more is to be read.
+  bool CarryOut(MadeDirective made);
+  // Shape "trianglemesh" with this mesh, whose indices are sound.
+  bool AddMesh(MadeDirective made, TriangleMesh mesh);
+  [[nodiscard]] UnfinishedScene Finish();
+  [[nodiscard]] Scene& scene() { return scene_; }
 
  private:
   // Reads the directive's arguments and carries it out. Returns false when the arguments broke off
@@ -120,6 +130,7 @@ class DirectiveReader {
     bool is_defined = false;
   };
   NamedMedium& MediumCalled(const std::string& name, const SourceLocation& location);
+  bool AddShape(Arguments& arguments, std::optional<TriangleMesh> mesh);
   // Reports an error and stops the reading when the scene has no room for these shapes.
   bool HasRoomFor(const ShapeSet& shapes, Arguments& arguments);
   void AddShapes(ShapeSet shapes);

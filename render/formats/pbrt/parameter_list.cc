@@ -85,7 +85,8 @@ bool ParameterList::MarkRead(const Parameter& parameter) {
 }
 
 std::string ParameterList::Called(const Parameter& parameter) const {
-  return Concat(Quoted(parameter.name), " of ", subject_);
+  const std::string& called = parameter.called.empty() ? parameter.name : parameter.called;
+  return Concat(Quoted(called), " of ", subject_);
 }
 
 const Parameter* ParameterList::Take(std::string_view name, std::span<const std::string_view> types,
@@ -108,6 +109,13 @@ const Parameter* ParameterList::Take(std::string_view name, std::span<const std:
     return nullptr;
   }
   if (count != 0 && !CheckCount(*parameter, count)) return nullptr;
+  return parameter;
+}
+
+const Parameter* ParameterList::FindWhole(std::string_view name) {
+  known_names_.push_back(name);
+  const Parameter* parameter = Find(name);
+  if (parameter != nullptr) MarkRead(*parameter);
   return parameter;
 }
 

@@ -25,6 +25,7 @@ struct Parameter {
   SourceLocation location;
   std::string type;  // one of KnownParameterTypes()
   std::string name;
+  std::string called = {};      // by messages, where that is not `name`
   std::vector<double> numbers;  // numeric types and colours; finite, within single precision
   std::vector<std::string> strings;
   std::vector<bool> bools;
@@ -89,6 +90,10 @@ class ParameterList {
   // wavelengths.
   float OneRefractiveIndex(std::string_view name, Range range);
   void WarnOfOneIndex(std::string_view name);
+
+  // The parameter as it stands, whatever its type; nullptr when it is absent. Valid as long as the
+  // list.
+  [[nodiscard]] const Parameter* FindWhole(std::string_view name);
 
   // Warns that a known parameter has no effect here.
   void Ignore(std::string_view name);

@@ -256,6 +256,10 @@ bool DirectiveReader::OnLightSource(Arguments& arguments) {
 }
 
 bool DirectiveReader::OnShape(Arguments& arguments) {
+  return AddShape(arguments, std::nullopt);
+}
+
+bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh> mesh) {
   std::string type;
   std::vector<Parameter> parameters;
   if (!arguments.ReadTyped(type, parameters)) return false;
@@ -273,7 +277,9 @@ bool DirectiveReader::OnShape(Arguments& arguments) {
   }
   const bool is_light = emits && open_object_ == nullptr;
   placement.emits = is_light;
-  ShapeSet shapes = ReadShapes(type, list, placement, textures_.numbers, assets_);
+  ShapeSet shapes = mesh.has_value()
+                        ? PlaceMadeMesh(*std::move(mesh), list, placement, textures_.numbers)
+                        : ReadShapes(type, list, placement, textures_.numbers, assets_);
   if (IsOfHair(scene_.materials, state.material) && !IsTubesAlone(shapes)) {
     list.Error("has the material hair, which is for curves of type flat or cylinder alone");
   }
@@ -358,7 +364,7 @@ bool DirectiveReader::OnTexture(Arguments& arguments) {
     return true;
   }
   ReadSpectrumFiles(assets_, parameters, diagnostics_);
-  ParameterList list(Concat("Texture ", Quoted(name)), arguments.location(), std::move(parameters),
+  ParameterList list(arguments.SubjectOf(name), arguments.location(), std::move(parameters),
                      graphics_.state().DefaultsOf(AttributeTarget::kTexture).get(), diagnostics_);
   // Made first: a texture may not be a part of itself.
   NamedTexture made = ReadTexture(type, is_number, list, textures_, graphics_.state().to_world,
@@ -383,7 +389,7 @@ bool DirectiveReader::OnMediumInterface(Arguments& arguments) {
   std::string outside;
   if (!arguments.ReadString("a name", inside)) return false;
   // One name is that of both sides.
-  if (arguments.tokens().Peek().kind != Token::Kind::kString) {
+  if (!arguments.HasString()) {
     outside = inside;
   } else if (!arguments.ReadString("a name", outside)) {
     return false;

@@ -274,6 +274,16 @@ ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
   return shapes;
 }
 
+ShapeSet PlaceMadeMesh(TriangleMesh mesh, ParameterList& parameters,
+                       const ShapePlacement& placement, const TextureNames& numbers) {
+  ShapeSet shapes;
+  ShapePlacement with_alpha = placement;
+  ReadAlpha(parameters, numbers, placement.emits, with_alpha.traits);
+  PlaceMesh(std::move(mesh), parameters, with_alpha, shapes);
+  parameters.WarnOfUnread();
+  return shapes;
+}
+
 StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world) {
   ShapeSet shapes;
   for (const TriangleMesh& original : object.meshes) {

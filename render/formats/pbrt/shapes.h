@@ -48,6 +48,10 @@ struct ShapePlacement {
                                   const ShapePlacement& placement, const TextureNames& numbers,
                                   AssetReader& assets);
 
+// The same of a mesh that was read otherwise, with sound indices, in the shape's own space.
+[[nodiscard]] ShapeSet PlaceMadeMesh(TriangleMesh mesh, ParameterList& parameters,
+                                     const ShapePlacement& placement, const TextureNames& numbers);
+
 // The shapes of an object where an instance of it stands; an ellipsoid, which has no kind of its
 // own, as a mesh. Errors: INVALID_ARGUMENT when the transform moves a position out of the finite
 // numbers.

@@ -1,0 +1,210 @@
+// Shapes, and groups of them that instances repeat.
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "render/base/text.h"
+#include "render/formats/mitsuba/meshes.h"
+#include "render/formats/mitsuba/translator.h"
+
+namespace lucerna {
+namespace {
+
+// From z to the axis of a cylinder that begins at `from`; absent when it has no length.
+std::optional<Transform> AlongAxis(Vec3 from, Vec3 to, double& length) {
+  const std::array<double, 3> axis = {static_cast<double>(to.x) - static_cast<double>(from.x),
+                                      static_cast<double>(to.y) - static_cast<double>(from.y),
+                                      static_cast<double>(to.z) - static_cast<double>(from.z)};
+  length = std::hypot(axis[0], axis[1], axis[2]);
+  if (!(length > 0)) return std::nullopt;
+  const std::array<double, 3> z = {axis[0] / length, axis[1] / length, axis[2] / length};
+  // Turned around the direction that is at right angles to both.
+  const double across = std::hypot(z[0], z[1]);
+  Transform turn;
+  if (across > 0) {
+    const double angle_deg = std::atan2(across, z[2]) * 180 / std::numbers::pi;
+    turn = Transform::Rotate(angle_deg, -z[1], z[0], 0).value_or(Transform());
+  } else if (z[2] < 0) {
+    turn = Transform::Rotate(180, 1, 0, 0).value_or(Transform());
+  }
+  return Transform::Translate(static_cast<double>(from.x), static_cast<double>(from.y),
+                              static_cast<double>(from.z)) *
+         turn;
+}
+
+}  // namespace
+
+std::optional<TriangleMesh> MitsubaTranslator::ReadMeshOf(const MitsubaObject& shape,
+                                                          ParameterList& list) {
+  // Whether v = 0 is at the top of pictures, as Mitsuba's textures have it.
+  bool is_from_top = true;
+  TriangleMesh mesh;
+  if (shape.type == "rectangle") {
+    mesh = UnitSquare();
+  } else if (shape.type == "cube") {
+    mesh = UnitCube();
+  } else {
+    const std::optional<std::string> file = list.FindString("filename");
+    const bool is_obj = shape.type == "obj";
+    const bool is_flipped = list.Bool("flip_tex_coords", is_obj);
+    const bool has_flat_faces = list.Bool("face_normals", false);
+    for (const std::string_view name : {"max_smooth_angle", "collapse", "srgb"})
+      list.Ignore(name);
+    const std::int64_t index = list.FindInteger("shape_index", {0, 1 << 30}).value_or(0);
+    if (!file.has_value()) {
+      list.Error("needs <string name=\"filename\">");
+      return std::nullopt;
+    }
+    StatusOr<TriangleMesh> read;
+    if (shape.type == "ply") {
+      read = assets_.ReadMesh(*file);
+    } else if (const StatusOr<std::string> bytes = assets_.ReadBytes(*file); bytes.ok()) {
+      read = is_obj ? ParseObj(*bytes)
+                    : ParseSerialized(*bytes, static_cast<std::uint64_t>(index),
+                                      assets_.limits().max_shape_bytes);
+      if (!read.ok()) {
+        read = absl::InvalidArgumentError(
+            Concat(Quoted(*file), " ", std::string(read.status().message())));
+      }
+    } else {
+      read = bytes.status();
+    }
+    if (!read.ok()) {
+      list.Error("filename", Concat("cannot be read: ", std::string(read.status().message())));
+      return std::nullopt;
+    }
+    mesh = *std::move(read);
+    is_from_top = !is_flipped;
+    if (has_flat_faces) {
+      mesh.normals.clear();
+    } else if (mesh.normals.empty()) {
+      ComputeNormals(mesh);
+    }
+  }
+  if (is_from_top) {
+    for (Vec2& uv : mesh.uvs)
+      uv.y = 1 - uv.y;
+  }
+  return mesh;
+}
+
+void MitsubaTranslator::AddGeometry(const MitsubaObject& shape, ParameterList& list,
+                                    MadeDirective made) {
+  Transform to_world = ToWorld(shape);
+  const auto number = [&](const char* name, double value) {
+    made.parameters.push_back(MakeNumber(name, value, shape.location));
+  };
+  const std::string_view type = shape.type;
+  if (type == "sphere") {
+    made.strings = {"sphere"};
+    number("radius", list.Float("radius", 1, kAboveZero));
+    const Vec3 center = list.Point("center", {});
+    to_world = to_world * Transform::Translate(static_cast<double>(center.x),
+                                               static_cast<double>(center.y),
+                                               static_cast<double>(center.z));
+  } else if (type == "disk") {
+    made.strings = {"disk"};
+  } else if (type == "cylinder") {
+    made.strings = {"cylinder"};
+    const Vec3 from = list.Point("p0", {0, 0, 0});
+    const Vec3 to = list.Point("p1", {0, 0, 1});
+    double length = 0;
+    const std::optional<Transform> along = AlongAxis(from, to, length);
+    if (!along.has_value()) {
+      list.Error("has no length: p0 and p1 are the same");
+      return;
+    }
+    number("radius", list.Float("radius", 1, kAboveZero));
+    number("zmin", 0);
+    number("zmax", length);
+    to_world = to_world * *along;
+  } else if (type == "rectangle" || type == "cube" || type == "obj" || type == "ply" ||
+             type == "serialized") {
+    std::optional<TriangleMesh> mesh = ReadMeshOf(shape, list);
+    if (!mesh.has_value()) return;
+    SetTransform(to_world, shape);
+    made.strings = {"trianglemesh"};
+    reader_.AddMesh(std::move(made), *std::move(mesh));
+    return;
+  } else {
+    list.Error(
+        "is not supported; there are obj, ply, serialized, sphere, rectangle, cube, disk, "
+        "cylinder, shapegroup and instance");
+    return;
+  }
+  SetTransform(to_world, shape);
+  reader_.CarryOut(std::move(made));
+}
+
+void MitsubaTranslator::TranslateGroup(const MitsubaObject& group) {
+  const std::string name = NewName(group);
+  groups_.emplace(&group, name);
+  MadeDirective begin = Directive("ObjectBegin", group);
+  begin.strings = {name};
+  reader_.CarryOut(std::move(begin));
+  for (const MitsubaObject& child : group.children) {
+    const MitsubaObject* shape = Resolve(child);
+    if (shape == nullptr || shape->tag != "shape") continue;
+    if (shape->type == "instance" || shape->type == "shapegroup") {
+      diagnostics_.Error(child.location, Concat(SubjectOf(*shape), " must not be in a shapegroup"));
+      continue;
+    }
+    TranslateShape(*shape);
+  }
+  reader_.CarryOut(Directive("ObjectEnd", group));
+}
+
+void MitsubaTranslator::TranslateInstance(const MitsubaObject& instance) {
+  const MitsubaObject* group = nullptr;
+  for (const MitsubaObject& child : instance.children) {
+    const MitsubaObject* resolved = Resolve(child);
+    if (resolved != nullptr && resolved->tag == "shape" && resolved->type == "shapegroup")
+      group = resolved;
+  }
+  if (group == nullptr) {
+    diagnostics_.Error(instance.location,
+                       Concat(SubjectOf(instance), " needs a reference to a shapegroup"));
+    return;
+  }
+  if (!groups_.contains(group)) TranslateGroup(*group);
+  reader_.CarryOut(Directive("AttributeBegin", instance));
+  SetTransform(ToWorld(instance), instance);
+  MadeDirective made = Directive("ObjectInstance", instance);
+  made.strings = {groups_.at(group)};
+  reader_.CarryOut(std::move(made));
+  reader_.CarryOut(Directive("AttributeEnd", instance));
+}
+
+void MitsubaTranslator::TranslateShape(const MitsubaObject& shape) {
+  if (shape.type == "instance") {
+    TranslateInstance(shape);
+    return;
+  }
+  ParameterList list = ListOf(shape);
+  MadeDirective made = Directive("Shape", shape);
+  reader_.CarryOut(Directive("AttributeBegin", shape));
+  if (const MitsubaObject* bsdf = ChildOf(shape, "bsdf")) {
+    if (const std::optional<Surface> surface = SurfaceOf(*bsdf); surface.has_value()) {
+      MadeDirective material = Directive("NamedMaterial", shape);
+      material.strings = {surface->material};
+      reader_.CarryOut(std::move(material));
+      if (surface->alpha.has_value()) made.parameters.push_back(*surface->alpha);
+    }
+  }
+  const std::string inside = MediumOf(shape, "interior");
+  const std::string outside = MediumOf(shape, "exterior");
+  if (!inside.empty() || !outside.empty()) {
+    MadeDirective interface = Directive("MediumInterface", shape);
+    interface.strings = {inside, outside};
+    reader_.CarryOut(std::move(interface));
+  }
+  if (const MitsubaObject* emitter = ChildOf(shape, "emitter")) TranslateAreaEmitter(*emitter);
+  if (list.Bool("flip_normals", false)) reader_.CarryOut(Directive("ReverseOrientation", shape));
+  AddGeometry(shape, list, std::move(made));
+  list.WarnOfUnread();
+  RefuseOthers(shape, {"bsdf", "medium", "emitter"});
+  reader_.CarryOut(Directive("AttributeEnd", shape));
+}
+
+}  // namespace lucerna
