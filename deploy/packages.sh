@@ -9,10 +9,10 @@ packages=(
   libembree-dev libtbb-dev
   libopenexr-dev libstb-dev zlib1g-dev
   openssl libspdlog-dev libzstd-dev libcli11-dev nlohmann-json3-dev libsqlite3-dev
-  libpugixml-dev libtinyobjloader-dev
+  libpugixml-dev libtinyobjloader-dev prometheus-cpp-dev libcpp-httplib-dev
 )
 if [ "${1:-}" = tests ]; then
-  packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3 chromium clang-format clang-tidy)
+  packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3 chromium clang-format clang-tidy prometheus)
 fi
 
 missing=()

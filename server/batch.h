@@ -30,5 +30,6 @@ enum class MergeOutcome : std::uint8_t {
   kDuplicate,   // was merged before
   kSuperseded,  // its pass or round is not open (any more)
 };
+inline constexpr std::size_t kMergeOutcomes = 3;
 
 }  // namespace lucerna

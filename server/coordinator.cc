@@ -850,6 +850,7 @@ StatusOr<MergeOutcome> Coordinator::Merge(const Delivery& delivery, DecodedResul
   scheduler_.CountWork(delivery.pass.job_id, delivery.kind, delivery.range.size(), delivery.cpu);
   jobs_.CountMerged(of_record, decoded.counts, worker->name, now);
   const BatchTally& tally = decoded.counts.tally;
+  results_.photons += tally.photons;
   if (tally.dropped > 0 || tally.excess > 0) {
     spdlog::warn(
         "job {}, pass {}: {} photons that were not finite and {} contributions that were too "
@@ -896,14 +897,21 @@ StatusOr<MergeOutcome> Coordinator::TakeIn(const Delivery& delivery, std::string
 StatusOr<MergeOutcome> Coordinator::Commit(const Delivery& delivery, std::string_view bytes) {
   LUCERNA_ASSIGN_OR_RETURN(const std::optional<MergeOutcome> known, OutcomeOf(delivery));
   if (known) return *known;
+  const SteadyTime began_at = clock_.Steady();
   StatusOr<MergeOutcome> outcome = TakeIn(delivery, bytes);
-  if (!outcome.ok()) Refuse(delivery, outcome.status());
+  results_.taking_in.Count(clock_.Steady() - began_at);
+  if (outcome.ok()) {
+    ++results_.of_outcome[static_cast<std::size_t>(*outcome)];
+  } else {
+    Refuse(delivery, outcome.status());
+  }
   return outcome;
 }
 
 void Coordinator::Refuse(const Delivery& delivery, const Status& why) {
   spdlog::warn("worker {}: a result of job {} is refused: {}", ShownWorker(delivery.worker),
                delivery.pass.job_id, std::string(why.message()));
+  ++results_.refused;
   scheduler_.RefuseResult(ClaimOf(delivery), std::string(why.message()));
   PausePoisonedJobs();
   AnswerParked();

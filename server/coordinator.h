@@ -9,8 +9,11 @@
 // are for the threads of a WorkPool.
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -22,6 +25,7 @@
 #include <vector>
 
 #include "render/base/clock.h"
+#include "render/base/latency_counts.h"
 #include "render/base/mutex.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
@@ -156,6 +160,22 @@ class Coordinator {
   [[nodiscard]] Status DrainWorker(const std::string& id);
   [[nodiscard]] Status ReleaseWorker(const std::string& id);
 
+  // Metrics, since the process began -----------------------------------------------------------
+
+  struct ResultCounts {
+    std::atomic<std::uint64_t> photons = 0;  // of results that were merged
+    // [outcomes]
+    std::array<std::atomic<std::uint64_t>, kMergeOutcomes> of_outcome{};
+    std::atomic<std::uint64_t> refused = 0;
+    LatencyCounts taking_in;  // decoding, checking and merging
+  };
+  [[nodiscard]] const ResultCounts& results() const { return results_; }
+  [[nodiscard]] std::map<JobState, std::size_t> JobsByState() const { return jobs_.CountByState(); }
+  [[nodiscard]] Scheduler::Load LoadNow() const { return scheduler_.LoadAt(clock_.Steady()); }
+  [[nodiscard]] const MemoryBudget& memory() const { return budget_; }
+  // nullptr: nothing is kept on a disk.
+  [[nodiscard]] const DiskBudget* disk() const { return state_ ? &state_->budget() : nullptr; }
+
   // Time ---------------------------------------------------------------------------------------
 
   // To be called every 50 ms or so: leases run out, waits end.
@@ -249,6 +269,7 @@ class Coordinator {
   const Clock& clock_;
   const std::string instance_;  // of this process
   const std::unique_ptr<DurableState> state_;
+  ResultCounts results_;
   // Held while files are added for a job, and while those without one are removed.
   Mutex files_mutex_;
   OpenTransfers transfers_;

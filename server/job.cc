@@ -4,6 +4,26 @@
 
 namespace lucerna {
 
+const char* NameOf(JobState state) {
+  switch (state) {
+    case JobState::kQueued:
+      return "queued";
+    case JobState::kPreparing:
+      return "preparing";
+    case JobState::kRunning:
+      return "running";
+    case JobState::kPaused:
+      return "paused";
+    case JobState::kSucceeded:
+      return "succeeded";
+    case JobState::kCancelled:
+      return "cancelled";
+    case JobState::kFailed:
+      return "failed";
+  }
+  return "";
+}
+
 JobLife::JobLife(Past past)
     : state_(past.state >= JobState::kPaused ? past.state : JobState::kQueued),
       stop_reason_(past.stop_reason),

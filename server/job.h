@@ -44,6 +44,8 @@ enum class JobState : std::uint8_t {
   kCancelled,
   kFailed,
 };
+// "queued".
+[[nodiscard]] const char* NameOf(JobState state);
 enum class StopReason : std::uint8_t { kNone, kPasses, kTime, kError, kPhotons, kUser };
 // Why a job is paused.
 enum class PauseCause : std::uint8_t {

@@ -885,6 +885,14 @@ bool JobTable::HasEnded(const std::string& job_id) const {
   return found == entries_.end() || found->second.job.life.has_ended();
 }
 
+std::map<JobState, std::size_t> JobTable::CountByState() const {
+  const MutexLock lock(mutex_);
+  std::map<JobState, std::size_t> counts;
+  for (const auto& [serial, entry] : entries_)
+    ++counts[entry.job.life.state()];
+  return counts;
+}
+
 Status JobTable::CheckStillNeeded(const std::string& job_id) const {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);

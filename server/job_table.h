@@ -237,6 +237,8 @@ class JobTable {
   [[nodiscard]] Status CheckStillNeeded(const std::string& job_id) const;
   // Whether nothing more counts for the job, be it that it is not known any more.
   [[nodiscard]] bool HasEnded(const std::string& job_id) const;
+  // States that no job is in are left out.
+  [[nodiscard]] std::map<JobState, std::size_t> CountByState() const;
   // Gives a job its runner. False when it has ended meanwhile, or after Close: it must not run.
   [[nodiscard]] bool Attach(const std::string& job_id, std::shared_ptr<RunningJob> runner);
   // The runner has given up its turn: unless it is paused or has ended, the job waits for its next.

@@ -1,5 +1,7 @@
 #include "server/listener.h"
 
+#include <utility>
+
 #include <grpcpp/health_check_service_interface.h>
 
 #include "render/wire/channel.h"
@@ -20,6 +22,11 @@ StatusOr<std::unique_ptr<Listener>> Listener::Start(const Options& options) {
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials);
   for (grpc::Service* const service : options.services)
     builder.RegisterService(service);
+  if (options.latencies != nullptr) {
+    std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> factories;
+    factories.push_back(options.latencies->Factory());
+    builder.experimental().SetInterceptorCreators(std::move(factories));
+  }
   listener->server_ = builder.BuildAndStart();
   if (!listener->server_) return absl::UnavailableError("gRPC cannot be started");
   listener->address_ = absl::StrCat(options.address.substr(0, options.address.rfind(':')), ":",

@@ -5,6 +5,7 @@
 // connections.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "render/base/status.h"
 #include "server/acceptor.h"
 #include "server/access.h"
+#include "server/call_latencies.h"
 
 namespace lucerna {
 
@@ -28,6 +30,7 @@ class Listener {
     const Access* access = nullptr;        // outlives the listener
     std::vector<grpc::Service*> services;  // outlive the listener
     std::size_t max_connections_per_address = 16384;
+    CallLatencies* latencies = nullptr;  // outlives the listener; nullptr: are not measured
   };
   // Errors: UNAVAILABLE when it cannot listen there.
   [[nodiscard]] static StatusOr<std::unique_ptr<Listener>> Start(const Options& options);

@@ -18,6 +18,7 @@
 #include <grpcpp/ext/proto_server_reflection_plugin.h>
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <spdlog/sinks/ringbuffer_sink.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
@@ -39,9 +40,11 @@
 #include "server/image_service.h"
 #include "server/job_service.h"
 #include "server/listener.h"
+#include "server/metrics.h"
 #include "server/replay_service.h"
 #include "server/security_files.h"
 #include "server/state/durable_state.h"
+#include "server/web/web_listener.h"
 #include "server/work_pool.h"
 #include "server/worker_service.h"
 
@@ -54,10 +57,14 @@ constexpr int kExitCannotListen = 3;
 // For commits whose bytes are on their way when the process is to end.
 constexpr std::chrono::seconds kTimeForCommits{5};
 constexpr long kTickNanos = 50'000'000;
+// Of the log, for the page.
+constexpr std::size_t kLogLines = 200;
 
 struct Flags {
   std::string listen = "127.0.0.1:7400";
   std::string listen_workers;
+  std::string metrics;
+  std::string web;
   TlsFiles tls;
   std::string tokens;
   bool offers_reflection = false;
@@ -70,6 +77,8 @@ struct Flags {
   Coordinator::Options coordinator;
 };
 
+using LogLines = spdlog::sinks::ringbuffer_sink_mt;
+
 // Both signals wait to be asked for, in this thread and in every thread it starts.
 sigset_t BlockEndSignals() {
   sigset_t signals;
@@ -80,7 +89,7 @@ sigset_t BlockEndSignals() {
   return signals;
 }
 
-int Serve(const Flags& flags) {
+int Serve(const Flags& flags, const std::shared_ptr<LogLines>& log) {
   const sigset_t end_signals = BlockEndSignals();
   KeepGrpc();
   RaiseDescriptorLimit();
@@ -123,12 +132,14 @@ int Serve(const Flags& flags) {
   } else {
     for_clients.push_back(&replays);
   }
+  CallLatencies latencies(clock);
+  CallLatencies* const measured = flags.metrics.empty() ? nullptr : &latencies;
   std::vector<Listener::Options> wanted;
   wanted.push_back({flags.listen, flags.tls, access->get(), std::move(for_clients),
-                    flags.max_connections_per_address});
+                    flags.max_connections_per_address, measured});
   if (!is_one) {
     wanted.push_back({flags.listen_workers, flags.tls, access->get(), std::move(for_workers),
-                      flags.max_connections_per_address});
+                      flags.max_connections_per_address, measured});
   }
   std::vector<std::unique_ptr<Listener>> listeners;
   for (const Listener::Options& options : wanted) {
@@ -146,6 +157,30 @@ int Serve(const Flags& flags) {
     std::printf("%s %s\n", i == 0 ? "listening on" : "listening for workers on",
                 listeners[i]->address().c_str());
   }
+  std::unique_ptr<MetricsListener> metrics;
+  if (!flags.metrics.empty()) {
+    StatusOr<std::unique_ptr<MetricsListener>> started = MetricsListener::Start(
+        flags.metrics, [&](MetricsPage& page) { FillMetrics(coordinator, latencies, page); });
+    if (!started.ok()) {
+      std::fprintf(stderr, "lucerna-server: --metrics: %s\n",
+                   std::string(started.status().message()).c_str());
+      return kExitCannotListen;
+    }
+    metrics = *std::move(started);
+    std::printf("metrics at http://%s/metrics\n", metrics->address().c_str());
+  }
+  std::unique_ptr<WebListener> web;
+  if (!flags.web.empty()) {
+    StatusOr<std::unique_ptr<WebListener>> started = WebListener::Start(
+        coordinator, {flags.web, access->get(), [log] { return log->last_formatted(); }});
+    if (!started.ok()) {
+      std::fprintf(stderr, "lucerna-server: --web: %s\n",
+                   std::string(started.status().message()).c_str());
+      return kExitCannotListen;
+    }
+    web = *std::move(started);
+    std::printf("page at http://%s/\n", web->address().c_str());
+  }
   std::fflush(stdout);
   spdlog::info("numeric profile: {}", flags.coordinator.numeric_profile);
 
@@ -161,6 +196,8 @@ int Serve(const Flags& flags) {
     listener->StopServing();
   // Calls that are under way end by themselves, commits well, before the job is stopped and kept.
   coordinator.StopLending();
+  metrics.reset();
+  web.reset();
   for (WorkPool* const pool : {&pools.scenes, &pools.uploads, &pools.images, &pools.changes})
     pool->Close();
   jobs.Close();
@@ -194,6 +231,25 @@ Status CheckListening(const Flags& flags) {
           "trusted"));
     }
   }
+  if (!flags.metrics.empty() && !IsAddress(flags.metrics)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--metrics ", flags.metrics, ": give HOST:PORT, such as 127.0.0.1:7480"));
+  }
+  if (!flags.metrics.empty() && !IsLoopback(flags.metrics) && !flags.allow_insecure_network) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--metrics ", flags.metrics, " can be reached from other machines, and whoever can may ",
+        "read the names of workers; give --allow-insecure-network if the network is trusted"));
+  }
+  if (!flags.web.empty() && !IsAddress(flags.web)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--web ", flags.web, ": give HOST:PORT, such as 127.0.0.1:8400"));
+  }
+  if (!flags.web.empty() && !IsLoopback(flags.web) && !flags.allow_insecure_network) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--web ", flags.web, " can be reached from other machines and its traffic is not ",
+        "encrypted; put a proxy with TLS before a loopback address, or give ",
+        "--allow-insecure-network if the network is trusted"));
+  }
   if (flags.tls.empty()) return absl::OkStatus();
   return CheckTlsFiles(flags.tls, SystemClock().Wall()).status();
 }
@@ -207,6 +263,12 @@ int Main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--listen-workers", flags.listen_workers,
                  "HOST:PORT for workers alone; then --listen is for clients alone");
+  app.add_option("--web", flags.web,
+                 "HOST:PORT of a page for browsers: jobs, images, errors, workers, log; port 0 "
+                 "picks a free one");
+  app.add_option("--metrics", flags.metrics,
+                 "HOST:PORT at which GET /metrics tells Prometheus about jobs, workers, memory and "
+                 "calls; port 0 picks a free one");
   AddTlsFlags(app, flags.tls);
   app.add_option("--tokens", flags.tokens,
                  "file of the tokens that are accepted (lucerna token new); without it everybody "
@@ -283,10 +345,12 @@ int Main(int argc, char** argv) {
   flags.coordinator.retention.age = std::chrono::duration_cast<Duration>(
       std::chrono::duration<double, std::ratio<86400>>(flags.keep_days));
   if (const char* const fail_point = std::getenv("LUCERNA_FAIL_POINT")) ArmFailPoint(fail_point);
+  const auto log = std::make_shared<LogLines>(kLogLines);
   spdlog::set_default_logger(spdlog::stderr_color_mt("lucerna-server"));
+  spdlog::default_logger()->sinks().push_back(log);
   spdlog::set_level(spdlog::level::from_str(flags.log_level));
   TakeGrpcErrors(LogGrpcError);
-  return Serve(flags);
+  return Serve(flags, log);
 }
 
 }  // namespace

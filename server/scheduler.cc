@@ -293,6 +293,19 @@ void Scheduler::ResolveInterrupted(Worker& worker, bool has_crashed) {
 // Workers
 // ---------------------------------------------------------------------------------------------
 
+Scheduler::Load Scheduler::LoadAt(SteadyTime now) const {
+  const MutexLock lock(mutex_);
+  Load load;
+  load.live_workers = live_workers_;
+  load.idle_workers = idle_workers_;
+  load.leases = leases_.size();
+  for (const auto& [id, lease] : leases_)
+    load.oldest_lease = std::max(load.oldest_lease, now - lease.lent_at);
+  load.lent = next_lease_ - 1;
+  load.lent_again = load.lent - lent_anew_;
+  return load;
+}
+
 std::optional<WorkerRecord> Scheduler::RecordOf(const std::string& worker) const {
   const MutexLock lock(mutex_);
   const auto found = workers_.find(worker);
@@ -830,6 +843,7 @@ std::optional<BatchLease> Scheduler::Lend(const std::string& worker_id, SteadyTi
   } else {
     range = {work.rest.first, work.rest.first + BatchSize(work, now)};
     work.rest.first = range.last;
+    ++lent_anew_;
   }
   UpdateLendable(key, work);
   return Enter(worker_id, key, range, now);

@@ -219,6 +219,16 @@ class Scheduler {
 
   // Workers that are connected and may be lent work.
   [[nodiscard]] int LiveWorkers() const;
+  struct Load {
+    std::uint64_t live_workers = 0;
+    std::uint64_t idle_workers = 0;  // of those, that hold no lease
+    std::uint64_t leases = 0;
+    Duration oldest_lease{};  // how long ago it was lent
+    // Leases, since the process began, and those of work that had been lent before: it came back,
+    // or its worker is late, or the result is audited.
+    std::uint64_t lent = 0, lent_again = 0;
+  };
+  [[nodiscard]] Load LoadAt(SteadyTime now) const;
   // What is known of the worker of a registration; absent when unknown.
   [[nodiscard]] std::optional<WorkerRecord> RecordOf(const std::string& worker) const;
 
@@ -399,6 +409,7 @@ class Scheduler {
   std::uint64_t next_lease_ LUCERNA_GUARDED_BY(mutex_) = 1;
   std::uint64_t next_opening_ LUCERNA_GUARDED_BY(mutex_) = 1;
   std::uint64_t next_place_ LUCERNA_GUARDED_BY(mutex_) = 1;
+  std::uint64_t lent_anew_ LUCERNA_GUARDED_BY(mutex_) = 0;  // leases of work never lent before
 
   // What follows from the above.
   std::uint64_t live_workers_ LUCERNA_GUARDED_BY(mutex_) = 0;  // connected, may be lent work

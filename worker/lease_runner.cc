@@ -95,6 +95,7 @@ void LeaseRunner::Release(const Held& held, const Status& status) {
   if (status.ok() || (held.is_revoked && !absl::IsInvalidArgument(status))) return;
   spdlog::warn("lease {}: {}", Escaped(held.work.lease_id), Escaped(std::string(status.message())));
   if (held.is_revoked) return;
+  ++counts_.failed;
   failures_.emplace_back(held.work.lease_id, std::string(status.message()));
 }
 
@@ -179,7 +180,9 @@ StatusOr<LeaseRunner::Fetched> LeaseRunner::Fetch(const std::shared_ptr<Held>& h
 void LeaseRunner::ComputeStage() {
   while (auto fetched = fetched_.Take()) {
     const Duration cpu_before = ProcessCpuTime();
+    const SteadyTime began_at = SystemClock().Steady();
     StatusOr<std::string> bytes = Compute(*fetched);
+    counts_.computing.Count(SystemClock().Steady() - began_at);
     if (!bytes.ok()) {
       Release(*fetched->held, bytes.status());
       continue;
@@ -200,6 +203,7 @@ StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
                              fetched.tracer->Run(job.settings, job.needs, work.pass, work.first,
                                                  work.last, *fetched.block, *fetched.radii, stop,
                                                  work.photons_per_pass, guide.get()));
+    counts_.photons += accumulation.tally.photons;
     if (FaultIsDue("result.flipped") && accumulation.size() > 0) accumulation.flux[0][0] ^= 1;
     if (FaultIsDue("result.zeros")) {
       Accumulation zeros;
@@ -216,6 +220,7 @@ StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
   LUCERNA_ASSIGN_OR_RETURN(
       SliceSums slice,
       fetched.tracer->RunSlice(job.settings, job.needs, {work.first, work.last}, plan, stop));
+  counts_.photons += slice.tally.photons;
   if (FaultIsDue("result.flipped")) {
     float& sum = slice.columns[kPhotonRadiance][0];
     sum = Rounded(static_cast<double>(sum) + 1, Precision::kRadiance);
@@ -235,6 +240,7 @@ void LeaseRunner::CommitStage() {
     const StatusOr<v1::CommitOutcome> outcome = Commit(*computed);
     if (outcome.ok()) FailPoint("commit.after");
     if (outcome.ok()) {
+      ++counts_.committed;
       Release(*computed->held, absl::OkStatus());
     } else if (StopIfGone(outcome.status())) {
       return;

@@ -22,15 +22,18 @@
 #include "worker/connection.h"
 #include "worker/hand_over.h"
 #include "worker/scene_cache.h"
+#include "worker/work_counts.h"
 
 namespace lucerna {
 
 class LeaseRunner {
  public:
-  // Connection and cache outlive the runner.
-  LeaseRunner(Connection& connection, SceneCache& cache, std::string worker_id, Duration sync_every)
+  // Connection, cache and counts outlive the runner.
+  LeaseRunner(Connection& connection, SceneCache& cache, WorkCounts& counts, std::string worker_id,
+              Duration sync_every)
       : connection_(connection),
         cache_(cache),
+        counts_(counts),
         worker_id_(std::move(worker_id)),
         sync_every_(sync_every) {}
 
@@ -82,6 +85,7 @@ class LeaseRunner {
 
   Connection& connection_;
   SceneCache& cache_;
+  WorkCounts& counts_;
   const std::string worker_id_;
   const Duration sync_every_;
 

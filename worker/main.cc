@@ -8,9 +8,11 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <thread>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <spdlog/sinks/stdout_color_sinks.h>
@@ -26,6 +28,7 @@
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
 #include "render/wire/grpc_process.h"
+#include "render/wire/metrics.h"
 #include "render/wire/security_flags.h"
 #include "worker/replay.h"
 #include "worker/session.h"
@@ -55,7 +58,7 @@ std::string WorkerName() {
   return absl::StrCat(host, ":", getpid());
 }
 
-int Work(Session::Options options) {
+int Work(Session::Options options, const std::string& metrics_address) {
   // Both signals wait to be asked for, in this thread and in every thread it starts.
   sigset_t signals;
   sigemptyset(&signals);
@@ -64,6 +67,19 @@ int Work(Session::Options options) {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 
   Session session(std::move(options), SystemClock());
+  std::unique_ptr<MetricsListener> metrics;
+  if (!metrics_address.empty()) {
+    StatusOr<std::unique_ptr<MetricsListener>> started = MetricsListener::Start(
+        metrics_address, [&](MetricsPage& page) { session.counts().Fill(page); });
+    if (!started.ok()) {
+      std::fprintf(stderr, "lucerna-worker: --metrics: %s\n",
+                   std::string(started.status().message()).c_str());
+      return kExitUnreachable;
+    }
+    metrics = *std::move(started);
+    std::printf("metrics at http://%s/metrics\n", metrics->address().c_str());
+    std::fflush(stdout);
+  }
   std::atomic<bool> has_ended = false;
   std::thread listener([&] {
     const timespec look = {0, kSignalLookNanos};
@@ -108,6 +124,7 @@ int Main(int argc, char** argv) {
   double connect_timeout_s = 60;
   options.server.address = "127.0.0.1:7400";
   std::string token_file;
+  std::string metrics;
   CLI::App app("Lucerna's worker: traces batches of photons for a coordinator.");
   app.set_version_flag("--version", absl::StrCat("lucerna-worker ", Version()));
   app.add_option("--server", options.server.address, "HOST:PORT of the coordinator")
@@ -122,6 +139,12 @@ int Main(int argc, char** argv) {
                  "how long to wait for a coordinator that does not answer [s]")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
+  app.add_option("--metrics", metrics,
+                 "HOST:PORT at which GET /metrics tells Prometheus what this worker does; port 0 "
+                 "picks a free one")
+      ->check([](const std::string& address) {
+        return IsAddress(address) ? "" : "give HOST:PORT, such as 127.0.0.1:7481";
+      });
   app.add_option("--log-level", log_level, "debug, info, warn, error or off")
       ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
       ->capture_default_str();
@@ -163,7 +186,7 @@ int Main(int argc, char** argv) {
     replay.numeric_profile = options.numeric_profile;
     return ReplayPhoton(replay);
   }
-  return Work(std::move(options));
+  return Work(std::move(options), metrics);
 }
 
 }  // namespace

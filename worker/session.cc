@@ -59,7 +59,7 @@ Status Session::Run() {
       const MutexLock lock(mutex_);
       connection = connection_;
       runner =
-          std::make_shared<LeaseRunner>(*connection, cache_, joined->worker_id(),
+          std::make_shared<LeaseRunner>(*connection, cache_, counts_, joined->worker_id(),
                                         std::max(FromProto(joined->sync_every()), kShortestSync));
       runner_ = runner;
       worker_id_ = joined->worker_id();
@@ -69,7 +69,10 @@ Status Session::Run() {
       break;
     }
     spdlog::info("joined {} as {}", options_.server.address, Escaped(joined->worker_id()));
+    counts_.is_connected = true;
     const Status why = runner->Run();
+    counts_.is_connected = false;
+    if (!is_stopped()) ++counts_.lost;
     {
       const MutexLock lock(mutex_);
       runner_ = nullptr;

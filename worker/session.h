@@ -36,6 +36,8 @@ class Session {
   // when it refused this worker.
   [[nodiscard]] Status Run();
 
+  [[nodiscard]] const WorkCounts& counts() const { return counts_; }
+
   // Ends Run within a second or so, after a goodbye. Threads: any.
   void Stop();
 
@@ -49,6 +51,7 @@ class Session {
   const Clock& clock_;
   const Connection::Channels channels_;
   SceneCache cache_;
+  WorkCounts counts_;
 
   mutable Mutex mutex_;
   Condition changed_;

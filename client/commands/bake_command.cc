@@ -14,10 +14,10 @@
 #include "client/exit_code.h"
 #include "client/job_run.h"
 #include "client/scene_reading.h"
-#include "client/view/convergence.h"
 #include "client/view/report.h"
 #include "render/base/files.h"
 #include "render/formats/sensors/sensors_reader.h"
+#include "render/report/convergence.h"
 #include "render/scene/scene_extent.h"
 
 namespace lucerna {

@@ -17,12 +17,12 @@
 #include "client/job_run.h"
 #include "client/render_flags.h"
 #include "client/scene_reading.h"
-#include "client/view/chart.h"
-#include "client/view/progress_view.h"
 #include "client/view/report.h"
 #include "render/base/files.h"
 #include "render/film/image_metrics.h"
 #include "render/film/reference.h"
+#include "render/report/chart.h"
+#include "render/report/progress_view.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {

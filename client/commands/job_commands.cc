@@ -17,13 +17,13 @@
 #include "client/interruption.h"
 #include "client/job_run.h"
 #include "client/scene_reading.h"
-#include "client/view/progress_view.h"
 #include "client/view/report.h"
-#include "client/view/report_page.h"
 #include "render/base/files.h"
 #include "render/film/picture_file.h"
 #include "render/film/png_file.h"
 #include "render/image/exr_file.h"
+#include "render/report/progress_view.h"
+#include "render/report/report_page.h"
 
 namespace lucerna {
 namespace {

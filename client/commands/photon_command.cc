@@ -10,8 +10,8 @@
 #include "client/exit_code.h"
 #include "client/foreign_text.h"
 #include "client/program_output.h"
-#include "client/view/photon_view.h"
 #include "client/view/report.h"
+#include "render/report/photon_view.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {

@@ -7,11 +7,11 @@
 
 #include "absl/strings/str_format.h"
 
-#include "client/view/convergence.h"
 #include "client/view/preview.h"
-#include "client/view/progress_view.h"
 #include "render/base/status.h"
 #include "render/base/text.h"
+#include "render/report/convergence.h"
+#include "render/report/progress_view.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {

@@ -10,11 +10,11 @@
 #include <string_view>
 #include <vector>
 
-#include "client/view/chart.h"
 #include "client/view/terminal.h"
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "render/film/display.h"
 #include "render/image/image.h"
+#include "render/report/chart.h"
 
 namespace lucerna {
 

@@ -11,9 +11,9 @@
 #include <google/protobuf/util/time_util.h>
 #include <nlohmann/json.hpp>
 
-#include "client/view/convergence.h"
-#include "client/view/photon_view.h"
-#include "client/view/progress_view.h"
+#include "render/report/convergence.h"
+#include "render/report/photon_view.h"
+#include "render/report/progress_view.h"
 #include "render/scene/setting_table.h"
 #include "render/wire/messages.h"
 

@@ -4,8 +4,8 @@
 #include "absl/strings/str_format.h"
 #include <nlohmann/json.hpp>
 
-#include "client/view/progress_view.h"
 #include "render/base/escape.h"
+#include "render/report/progress_view.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {

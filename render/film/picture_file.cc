@@ -68,7 +68,9 @@ Image PictureOf(const Image& image, const std::array<const ImageChannel*, 3>& ch
   Image picture{.width = image.width, .height = image.height, .channels = {}, .metadata = {}};
   constexpr std::array kNames = {"R", "G", "B"};
   for (std::size_t c = 0; c < 3; ++c) {
-    ImageChannel& channel = picture.channels.emplace_back(kNames[c], channels[c]->pixels);
+    ImageChannel& channel = picture.channels.emplace_back();
+    channel.name = kNames[c];
+    channel.pixels = channels[c]->pixels;
     if (!are_directions) continue;
     for (float& value : channel.pixels)
       value = 0.5F * value + 0.5F;

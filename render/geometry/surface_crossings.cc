@@ -123,7 +123,7 @@ class Crossings {
     }
     std::uint8_t kind = 0;
     ForEachAnalyticList(scene_, [&](const auto& list) {
-      using Kind = std::decay_t<decltype(list)>::value_type;
+      using Kind = typename std::decay_t<decltype(list)>::value_type;
       // What is thin ends no disc.
       for (std::uint32_t i = 0; i < list.size() && !Kind::kIsThin; ++i) {
         const Vec3 reach = {list[i].Reach(), list[i].Reach(), list[i].Reach()};

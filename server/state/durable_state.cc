@@ -13,26 +13,6 @@
 namespace lucerna {
 namespace {
 
-const char* NameOf(JobState state) {
-  switch (state) {
-    case JobState::kQueued:
-      return "queued";
-    case JobState::kPreparing:
-      return "preparing";
-    case JobState::kRunning:
-      return "running";
-    case JobState::kPaused:
-      return "paused";
-    case JobState::kSucceeded:
-      return "succeeded";
-    case JobState::kCancelled:
-      return "cancelled";
-    case JobState::kFailed:
-      return "failed";
-  }
-  return "";
-}
-
 constexpr const char* kQuarantined = "quarantined";
 constexpr const char* kDraining = "draining";
 

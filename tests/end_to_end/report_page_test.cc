@@ -3,7 +3,7 @@
 //
 // Skipped, and says so, where there is no chromium. The browser's own requests are kept from
 // leaving the machine; those of the page are counted.
-#include "client/view/report_page.h"
+#include "render/report/report_page.h"
 
 #include <array>
 #include <cstdlib>

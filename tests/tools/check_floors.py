@@ -29,6 +29,7 @@ LINE = [
     "render/analysis",
     "render/tracing",
     "render/wire",
+    "render/report",
 ]
 for number, floor in enumerate(LINE):
     BELOW[floor] = (
@@ -39,16 +40,19 @@ for program in ("server", "worker", "client"):
     BELOW[program] = list(BELOW) + ["proto"]
     BELOW[program] = [floor for floor in BELOW[program] if floor.startswith(("render", "proto"))]
 BELOW["render/wire"].append("proto")
+BELOW["render/report"].append("proto")
 
 # Libraries that one place owns: header pattern -> path prefixes that may include it.
 OWNERS = {
     r"embree3/": ["render/geometry/"],
     r"(Imf|Imath|Iex|OpenEXR/)": ["render/image/exr_file"],
     r"stb": ["render/film/png_file", "render/film/picture_file", "render/formats/image_file"],
-    r"(google/protobuf|grpcpp|grpc)/": ["render/wire/", "server/", "worker/", "client/"],
+    r"(google/protobuf|grpcpp|grpc)/": ["render/wire/", "render/report/", "server/", "worker/", "client/"],
     r"zstd\.h": ["render/wire/"],
     r"openssl/": ["render/base/"],
     r"tbb/": ["render/base/parallel"],
+    r"httplib": ["server/web/"],
+    r"prometheus/": ["render/wire/metrics"],
     r"pugixml": ["render/formats/mitsuba/"],
     r"tiny_obj_loader": ["render/formats/mitsuba/"],
     r"zlib\.h": ["render/formats/", "render/image/", "render/film/png_file"],

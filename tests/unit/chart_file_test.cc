@@ -2,7 +2,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
-#include "client/view/chart.h"
+#include "render/report/chart.h"
 
 namespace lucerna {
 namespace {

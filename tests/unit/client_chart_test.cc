@@ -5,7 +5,7 @@
 
 #include "gtest/gtest.h"
 
-#include "client/view/chart.h"
+#include "render/report/chart.h"
 
 namespace lucerna {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "client/connection.h"
 #include "client/exit_code.h"
-#include "client/view/progress_view.h"
+#include "render/report/progress_view.h"
 
 namespace lucerna {
 namespace {

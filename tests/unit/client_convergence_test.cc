@@ -4,7 +4,7 @@
 
 #include "gtest/gtest.h"
 
-#include "client/view/convergence.h"
+#include "render/report/convergence.h"
 #include "render/wire/messages.h"
 #include "tests/support/converging_job.h"
 #include "tests/support/job_settings.h"

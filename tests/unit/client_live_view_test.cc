@@ -4,9 +4,9 @@
 
 #include "gtest/gtest.h"
 
-#include "client/view/convergence.h"
 #include "client/view/live_view.h"
-#include "client/view/progress_view.h"
+#include "render/report/convergence.h"
+#include "render/report/progress_view.h"
 #include "tests/support/converging_job.h"
 
 namespace lucerna {

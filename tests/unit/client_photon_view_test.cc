@@ -6,9 +6,9 @@
 #include "gtest/gtest.h"
 #include <nlohmann/json.hpp>
 
-#include "client/view/photon_view.h"
 #include "client/view/report.h"
-#include "client/view/report_page.h"
+#include "render/report/photon_view.h"
+#include "render/report/report_page.h"
 
 namespace lucerna {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "gtest/gtest.h"
 
-#include "client/view/convergence.h"
-#include "client/view/progress_view.h"
+#include "render/report/convergence.h"
+#include "render/report/progress_view.h"
 #include "render/wire/messages.h"
 #include "tests/support/converging_job.h"
 #include "tests/support/job_settings.h"

@@ -1,7 +1,7 @@
 // A page must say what the job says, stand alone, and not be taken over by a worker's name.
 #include "gtest/gtest.h"
 
-#include "client/view/report_page.h"
+#include "render/report/report_page.h"
 #include "tests/support/converging_job.h"
 
 namespace lucerna {

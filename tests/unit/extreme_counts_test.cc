@@ -7,10 +7,10 @@
 
 #include "gtest/gtest.h"
 
-#include "client/view/progress_view.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/evidence.h"
 #include "render/estimate/radius_controller.h"
+#include "render/report/progress_view.h"
 #include "server/pass_merger.h"
 #include "server/scheduler.h"
 #include "tests/support/job_settings.h"

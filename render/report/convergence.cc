@@ -1,4 +1,4 @@
-#include "client/view/convergence.h"
+#include "render/report/convergence.h"
 
 #include <algorithm>
 #include <cmath>

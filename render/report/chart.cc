@@ -1,4 +1,4 @@
-#include "client/view/chart.h"
+#include "render/report/chart.h"
 
 #include <algorithm>
 #include <array>

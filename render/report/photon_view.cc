@@ -1,4 +1,4 @@
-#include "client/view/photon_view.h"
+#include "render/report/photon_view.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "client/view/report_page.h"
+#include "render/report/report_page.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,11 +9,11 @@
 #include "absl/strings/str_format.h"
 #include <google/protobuf/util/time_util.h>
 
-#include "client/view/chart.h"
-#include "client/view/convergence.h"
-#include "client/view/photon_view.h"
-#include "client/view/progress_view.h"
 #include "render/base/text.h"
+#include "render/report/chart.h"
+#include "render/report/convergence.h"
+#include "render/report/photon_view.h"
+#include "render/report/progress_view.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {

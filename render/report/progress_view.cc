@@ -1,4 +1,4 @@
-#include "client/view/progress_view.h"
+#include "render/report/progress_view.h"
 
 #include <algorithm>
 #include <array>
@@ -6,8 +6,8 @@
 
 #include "absl/strings/str_format.h"
 
-#include "client/view/convergence.h"
 #include "render/base/text.h"
+#include "render/report/convergence.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "client/view/chart.h"
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "render/base/clock.h"
 #include "render/math/power_law.h"
+#include "render/report/chart.h"
 
 namespace lucerna {
 
