@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """How does the error fall with time, and how true is what the program says of it?
 
-  tests/bench/convergence.py [--times 1,5] [--reference-s 120] [--size 128x128]
+  tests/bench/convergence.py [--times 1,5] [--reference-s 300] [--size 128x128]
                              [--settings default,pppm,frequency-mse] [--scenes NAME,...]
 
 Renders the twelve scenes of half B of make_study_scenes.py (no constant of the error estimate has
@@ -14,9 +14,8 @@ what else runs on the machine does not matter. One job of each scene goes on fro
 next.
 
 The squared error falls about as time to the power of -2/3 to -1, so a reference should have many times
-the longest time. It has the radii of a job's defaults: with smaller ones, as `lucerna
-reference` has them, its noise would be more than the error that is judged. Its own bias is not seen:
-where most of the error is bias, --reference-radius 1px shows more of it.
+the longest time; its noise is taken off. Its first radius is smaller than that of a job, or bias that
+falls slowly would be hidden in it. All 24 scenes take about three hours of two cores.
 
 Results are kept in docs/convergence/results.csv: what is there is not rendered again, so that the
 program can be stopped and started. References are kept in --work. At the end, and after every
@@ -265,11 +264,9 @@ def write_page(rows, arguments):
             "\"True\" is against the reference with the reference's own noise taken off, \"all\" "
             "with the worst 0.1 % of pixels. Scenes b-* are half B of "
             "`tests/tools/make_study_scenes.py`, which no constant of the estimate has seen. All figures "
-            "are in [results.csv](convergence/results.csv). Scenes with 60 s were made with `--times 1,2,5,10,20,60 --reference-s 300 "
-            "--reference-radius 1px`: their references show bias that falls slowly, and have more noise, after 60 s up to as much as what is judged. "
-            "The other references have the radii of a job: bias that "
-            "falls as slowly as theirs (waves, hard shadows) is partly hidden in them, so that true "
-            "errors of such scenes may be larger than shown ([how much](measurements/estimate-on-unseen-scenes.md)). Columns: errors as fractions, `low` and `high` of the "
+            "are in [results.csv](convergence/results.csv). References have 300 s and a first radius of "
+            "1 px: they show bias that falls slowly, and have more noise, after 60 s up to as much as "
+            "what is judged. Columns: errors as fractions, `low` and `high` of the "
             "95 % interval, `true_trimmed` without the worst 0.1 % of pixels.\n",
             "![Estimated over true error](convergence/overview.svg)\n"]
     judged = [row for row in rows if row["setting"] == "default"]
@@ -287,9 +284,9 @@ def write_page(rows, arguments):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--times", default="1,5")
-    parser.add_argument("--reference-s", type=float, default=120)
-    parser.add_argument("--reference-radius", default="3px", help="first radius of references")
+    parser.add_argument("--times", default="1,2,5,10,20,60")
+    parser.add_argument("--reference-s", type=float, default=300)
+    parser.add_argument("--reference-radius", default="1px", help="first radius of references")
     parser.add_argument("--size", default="128x128")
     parser.add_argument("--settings", default="default")
     parser.add_argument("--scenes", default="", help="names, by commas; empty: all 24")
