@@ -188,7 +188,8 @@ void WebListener::AddPages() {
   page("/page.js", kWebScript, "text/javascript; charset=utf-8");
   page("/page.css", kWebStyle, "text/css; charset=utf-8");
   server.Get("/api/farm", [this](const httplib::Request& request, httplib::Response& response) {
-    if (MayRead(request, response)) response.set_content(Farm(request.get_param_value("job")), "application/json");
+    if (MayRead(request, response))
+      response.set_content(Farm(request.get_param_value("job")), "application/json");
   });
   const auto of_job = [&](const char* path, const char* type, auto make) {
     server.Get(path,

@@ -5,7 +5,8 @@
 // answers only requests that name one, or a page from elsewhere could read through the browser.
 //
 //   GET /                                    the page, with /page.js and /page.css
-//   GET /api/farm?job=ID                     jobs, that one (or the newest) in full, workers and the
+//   GET /api/farm?job=ID                     jobs, that one (or the newest) in full, workers and
+//   the
 //                                            newest log lines, as JSON
 //   GET /jobs/ID/image.png?stops=S&curve=C   the image so far; S: a number or "auto", C: as
 //                                            --tonemap
