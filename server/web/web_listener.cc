@@ -22,6 +22,7 @@
 #include "render/wire/channel.h"
 #include "server/job_message.h"
 #include "server/web/web_page.h"
+#include "server/work_pool.h"
 
 namespace lucerna {
 namespace {
@@ -195,7 +196,7 @@ void WebListener::AddPages() {
     server.Get(path,
                [this, type, make](const httplib::Request& request, httplib::Response& response) {
                  if (!MayRead(request, response)) return;
-                 StatusOr<std::string> made = make(request);
+                 StatusOr<std::string> made = WithinMemory([&] { return make(request); });
                  if (!made.ok()) return AnswerWith(made.status(), response);
                  response.set_content(*std::move(made), type);
                  if (std::string_view(type).starts_with("text/html"))
@@ -237,9 +238,20 @@ std::string WebListener::Farm(const std::string& chosen) const {
   return farm.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+StatusOr<WebListener::ClaimedImage> WebListener::ImageOf(const std::string& job_id) {
+  LUCERNA_ASSIGN_OR_RETURN(const Blob exr, coordinator_.ImageOf(job_id));
+  // Pixels are packed to a half or less, and become a picture.
+  constexpr std::uint64_t kUnpacked = 4;
+  LUCERNA_ASSIGN_OR_RETURN(
+      MemoryClaim claim, coordinator_.budget().Claim(MemoryUse::kImages, kUnpacked * exr->size()));
+  LUCERNA_ASSIGN_OR_RETURN(Image pixels, DecodeExr(*exr));
+  return ClaimedImage{std::move(claim), std::move(pixels)};
+}
+
 StatusOr<std::string> WebListener::PictureOf(const std::string& job_id, const std::string& stops,
                                              const std::string& curve) {
   LUCERNA_ASSIGN_OR_RETURN(const Display display, DisplayOf(stops, curve));
+  const MutexLock making(making_);
   LUCERNA_ASSIGN_OR_RETURN(const JobReport report, coordinator_.ReportOf(job_id));
   const std::string key =
       Concat(job_id, " ", ToProto(report).progress().passes(), " ", stops, " ", curve);
@@ -249,9 +261,8 @@ StatusOr<std::string> WebListener::PictureOf(const std::string& job_id, const st
       if (picture.key == key) return picture.png;
     }
   }
-  LUCERNA_ASSIGN_OR_RETURN(const Blob exr, coordinator_.ImageOf(job_id));
-  LUCERNA_ASSIGN_OR_RETURN(const Image image, DecodeExr(*exr));
-  LUCERNA_ASSIGN_OR_RETURN(std::string png, EncodePng(image, display));
+  LUCERNA_ASSIGN_OR_RETURN(const ClaimedImage image, ImageOf(job_id));
+  LUCERNA_ASSIGN_OR_RETURN(std::string png, EncodePng(image.pixels, display));
   const MutexLock lock(mutex_);
   pictures_.push_front({key, png});
   if (pictures_.size() > kPictures) pictures_.pop_back();
@@ -261,10 +272,10 @@ StatusOr<std::string> WebListener::PictureOf(const std::string& job_id, const st
 StatusOr<std::string> WebListener::ReportOf(const std::string& job_id) {
   LUCERNA_ASSIGN_OR_RETURN(const JobReport report, coordinator_.ReportOf(job_id));
   std::optional<PageImage> image;
-  if (const StatusOr<Blob> exr = coordinator_.ImageOf(job_id); exr.ok()) {
-    LUCERNA_ASSIGN_OR_RETURN(const Image pixels, DecodeExr(**exr));
-    LUCERNA_ASSIGN_OR_RETURN(std::string png, EncodePng(pixels, Display{std::nullopt, {}}));
-    image = PageImage{std::move(png), pixels.PixelDigest()};
+  const MutexLock making(making_);
+  if (const StatusOr<ClaimedImage> found = ImageOf(job_id); found.ok()) {
+    LUCERNA_ASSIGN_OR_RETURN(std::string png, EncodePng(found->pixels, Display{std::nullopt, {}}));
+    image = PageImage{std::move(png), found->pixels.PixelDigest()};
   }
   return ReportPage(ToProto(report), image);
 }

@@ -25,8 +25,10 @@
 
 #include "render/base/mutex.h"
 #include "render/base/status.h"
+#include "render/image/image.h"
 #include "server/access.h"
 #include "server/coordinator.h"
+#include "server/memory_budget.h"
 
 namespace httplib {
 class Server;
@@ -55,6 +57,13 @@ class WebListener {
   [[nodiscard]] const std::string& address() const { return address_; }
 
  private:
+  // The image of a job, with memory claimed for it and what is made of it.
+  struct ClaimedImage {
+    MemoryClaim claim;
+    Image pixels;
+  };
+  [[nodiscard]] StatusOr<ClaimedImage> ImageOf(const std::string& job_id);
+
   // A picture that may be asked for again.
   struct Picture {
     std::string key;
@@ -74,6 +83,7 @@ class WebListener {
   const Options options_;
   std::string address_;
   bool is_loopback_ = false;
+  Mutex making_;  // one picture or report at a time
   Mutex mutex_;
   std::list<Picture> pictures_ LUCERNA_GUARDED_BY(mutex_);  // newest first
   const std::unique_ptr<httplib::Server> server_;
