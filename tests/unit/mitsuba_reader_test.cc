@@ -703,7 +703,9 @@ TEST(MitsubaReaderTest, LinesAreThoseOfTheFile) {
 TEST(MitsubaReaderTest, WhatIsApproximatedOrUnknownIsWarnedOf) {
   const ParsedScene parsed =
       ReadXml(Around("<shape type='sphere'><float name='raduis' value='2'/>"
-                     "<bsdf type='roughconductor'/></shape>"));
+                     "<bsdf type='roughconductor'/></shape><medium type='homogeneous' id='fog'/>"
+                     "<emitter type='point'><ref id='fog'/></emitter>"));
+  EXPECT_THAT(Said(parsed), HasSubstr("<medium type=\"homogeneous\"> in <emitter type=\"point\">"));
   EXPECT_TRUE(parsed.ok()) << Said(parsed);
   EXPECT_THAT(Said(parsed), HasSubstr("did you mean \"radius\"?"));
   EXPECT_THAT(Said(parsed), HasSubstr("rendered as \"ggx\""));

@@ -144,6 +144,7 @@ void MitsubaTranslator::TranslateEmitter(const MitsubaObject& emitter) {
     return;
   }
   list.WarnOfUnread();
+  RefuseOthers(emitter, {"texture"});
   reader_.CarryOut(Directive("AttributeBegin", emitter));
   SetTransform(to_world, emitter);
   reader_.CarryOut(std::move(made));
