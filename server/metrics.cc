@@ -20,18 +20,6 @@ constexpr std::array<std::pair<MemoryUse, const char*>, kMemoryUses> kUses = {
      {MemoryUse::kImages, "images"},
      {MemoryUse::kCommits, "commits"}}};
 
-const char* NameOf(WorkerState state) {
-  switch (state) {
-    case WorkerState::kActive:
-      return "active";
-    case WorkerState::kDraining:
-      return "draining";
-    case WorkerState::kQuarantined:
-      return "quarantined";
-  }
-  return "";
-}
-
 void FillWorkers(const std::vector<WorkerRecord>& workers, MetricsPage& page) {
   std::array<double, 3> connected{};
   for (const WorkerRecord& worker : workers)

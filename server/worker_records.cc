@@ -16,6 +16,18 @@ constexpr std::uint32_t kRecentMask = (1U << kRecentLeases) - 1;
 
 }  // namespace
 
+const char* NameOf(WorkerState state) {
+  switch (state) {
+    case WorkerState::kActive:
+      return "active";
+    case WorkerState::kDraining:
+      return "draining";
+    case WorkerState::kQuarantined:
+      return "quarantined";
+  }
+  return "";
+}
+
 std::string WorkerIdOf(std::string_view identity) {
   return Sha256(absl::StrCat("worker ", std::string(identity))).Hex().substr(0, kIdDigits);
 }

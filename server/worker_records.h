@@ -32,6 +32,9 @@ inline constexpr int kBadOfRecent = 3;
 
 enum class WorkerState : std::uint8_t { kActive, kDraining, kQuarantined };
 
+// "active".
+[[nodiscard]] const char* NameOf(WorkerState state);
+
 // How the leases of a worker ended, as far as that says something of the worker.
 struct LeaseCounts {
   std::uint64_t committed = 0;

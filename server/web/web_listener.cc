@@ -42,18 +42,6 @@ constexpr const char* kPolicy =
 constexpr const char* kReportPolicy =
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; frame-ancestors 'self'";
 
-const char* StateName(WorkerState state) {
-  switch (state) {
-    case WorkerState::kActive:
-      return "active";
-    case WorkerState::kDraining:
-      return "draining";
-    case WorkerState::kQuarantined:
-      return "quarantine";
-  }
-  return "";
-}
-
 // Without the port.
 std::string HostIn(const std::string& host) {
   if (host.starts_with('[')) return host.substr(0, host.find(']') + 1);
@@ -225,7 +213,7 @@ std::string WebListener::Farm(const std::string& chosen) const {
   for (const WorkerRecord& worker : coordinator_.ListWorkers()) {
     farm["workers"].push_back({{"id", worker.id},
                                {"name", worker.name},
-                               {"state", StateName(worker.state)},
+                               {"state", NameOf(worker.state)},
                                {"reason", worker.reason},
                                {"is_connected", worker.is_connected},
                                {"held", worker.held},

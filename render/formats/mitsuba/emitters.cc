@@ -19,7 +19,7 @@ Picture EqualAreaOf(const Picture& map) {
   const int side = std::clamp(static_cast<int>(std::ceil(std::sqrt(pixels))), 8, 8192);
   // Pixels near the poles are narrow: several places of each pixel are looked up.
   constexpr int kPlaces = 4096;
-  const int parts = std::clamp(kPlaces / side, 4, 16);
+  const int parts = std::clamp(kPlaces / side, 2, 16);
   Picture square;
   square.width = square.height = side;
   square.channels = 3;
