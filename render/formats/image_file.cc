@@ -155,6 +155,7 @@ std::string WithHuffmanTables(std::string_view bytes) {
   return with;
 }
 
+// Walks the chunks: the decoder makes room for what one says it holds before it reads it.
 Status CheckPng(std::string_view bytes) {
   constexpr std::string_view kSignature = "\x89PNG\r\n\x1A\n";
   constexpr std::size_t kSizeOffset = 16;  // of width and height in the first chunk
@@ -166,6 +167,13 @@ Status CheckPng(std::string_view bytes) {
       value = value << 8 | ByteAt(bytes, at + i);
     return value;
   };
+  constexpr std::size_t kAroundChunk = 12;  // length, type; behind the data a checksum
+  for (std::size_t at = kSignature.size(); bytes.substr(at + 4, 4) != "IEND";) {
+    const std::size_t left = bytes.size() - at;
+    if (left < kAroundChunk || number(at) > left - kAroundChunk) return Bad("it is cut off");
+    at += number(at) + kAroundChunk;
+    if (bytes.size() - at < kAroundChunk - 4) return Bad("it is cut off");
+  }
   return CheckSize(number(kSizeOffset), number(kSizeOffset + 4), 1, bytes.size(), UINT64_MAX);
 }
 

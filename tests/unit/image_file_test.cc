@@ -158,6 +158,9 @@ TEST(ImageFileTest, SizesAreCheckedBeforeTheyAreBelieved) {
   EXPECT_THAT(Why(png, "a.png"), HasSubstr("2^28"));
   png.replace(16, 8, Bytes({0, 0, 0x40, 0, 0, 0, 0x40, 0}));  // 16384 x 16384
   EXPECT_THAT(Why(png, "a.png"), HasSubstr("too short for its size"));
+  std::string chunk = EncodePng(Source()).value();
+  chunk.replace(chunk.find("IDAT") - 4, 1, "\x3F");  // of 1 GB
+  EXPECT_THAT(Why(chunk, "a.png"), HasSubstr("cut off"));
   EXPECT_THAT(Why(PfmBytes("PF\n65536 65536\n-1\n"), "a.pfm"), HasSubstr("2^28"));
   EXPECT_THAT(Why(PfmBytes("PF\n300 200\n-1\n"), "a.pfm"), HasSubstr("cut off"));
   EXPECT_THAT(Why("#?RGBE\nFORMAT=32-bit_rle_rgbe\n\n-Y 99999 +X 99999\n", "a.hdr"),

@@ -528,6 +528,18 @@ TEST(PbrtParserTest, AllErrorsAreSaidAtOnceEachAtItsPlace) {
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 12);
 }
 
+// Names that are put together while a material is read, with a prefix or without.
+TEST(PbrtParserTest, MisspeltRoughnessesAreNamed) {
+  const std::string said = Said(
+      "WorldBegin\n"
+      "Material \"conductor\" \"float rougness\" 0.1 \"float vroughnes\" 0.1\n"
+      "Material \"coatedconductor\" \"float interface.uroughnes\" 0.1\n"
+      "Material \"coatedconductor\" \"float conductor.rougness\" 0.1\n");
+  for (const char* name :
+       {"roughness", "vroughness", "interface.uroughness", "conductor.roughness"})
+    EXPECT_THAT(said, HasSubstr(std::string("did you mean \"") + name + "\"?"));
+}
+
 TEST(PbrtParserTest, OlderDialectsAreRefusedByNameAndByThatAlone) {
   for (const char* sign :
        {"Film \"image\" \"integer xresolution\" 9", "WorldBegin Material \"matte\"",

@@ -91,7 +91,7 @@ std::string ParameterList::Called(const Parameter& parameter) const {
 
 const Parameter* ParameterList::Take(std::string_view name, std::span<const std::string_view> types,
                                      std::size_t count) {
-  known_names_.push_back(name);
+  known_names_.emplace_back(name);
   const Parameter* parameter = Find(name);
   if (parameter == nullptr) return nullptr;
   const bool is_first_time = MarkRead(*parameter);
@@ -113,7 +113,7 @@ const Parameter* ParameterList::Take(std::string_view name, std::span<const std:
 }
 
 const Parameter* ParameterList::FindWhole(std::string_view name) {
-  known_names_.push_back(name);
+  known_names_.emplace_back(name);
   const Parameter* parameter = Find(name);
   if (parameter != nullptr) MarkRead(*parameter);
   return parameter;
@@ -398,7 +398,7 @@ void ParameterList::WarnOfOneIndex(std::string_view name) {
 }
 
 void ParameterList::Ignore(std::string_view name) {
-  known_names_.push_back(name);
+  known_names_.emplace_back(name);
   if (const Parameter* parameter = Find(name)) MarkRead(*parameter);
 }
 
@@ -419,9 +419,10 @@ void ParameterList::WarnOfUnread() {
     if (was_read_[i]) continue;
     const Parameter& parameter = parameters_[i];
     // Looking for the nearest name is slow; it is left out once no more warnings are kept.
-    const std::string_view closest = diagnostics_.IsFull(Diagnostic::Severity::kWarning)
-                                         ? std::string_view()
-                                         : ClosestOf(parameter.name, known_names_);
+    const std::string_view closest =
+        diagnostics_.IsFull(Diagnostic::Severity::kWarning)
+            ? std::string_view()
+            : ClosestOf(parameter.name, {known_names_.begin(), known_names_.end()});
     diagnostics_.Warning(
         parameter.location,
         Concat("unknown parameter ", Called(parameter), " is ignored",

@@ -128,7 +128,7 @@ class ParameterList {
   std::vector<Parameter> parameters_;
   std::vector<bool> was_read_;  // one for each parameter
   const std::vector<Parameter>* defaults_;
-  std::vector<std::string_view> known_names_;  // for suggestions; literals of the callers
+  std::vector<std::string> known_names_;  // for suggestions
   Diagnostics& diagnostics_;
 };
 
