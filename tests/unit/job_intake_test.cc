@@ -113,7 +113,7 @@ TEST_F(JobIntakeTest, RefusesASmallPictureOfMorePixelsThanTheMemoryHolds) {
   Add("floor.pbrt", kFloor);
   // 2048 x 2048 pixels of three bytes in a file of one kilobyte.
   Add("a.png", "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x08\0\0\0\x08\0\x08\x02\0\0\0CRC."s +
-                   "\0\0\x04\0IDAT"s + std::string(1024, 'x'));
+                   "\0\0\x04\0IDAT"s + std::string(1024, 'x') + "CRC.\0\0\0\0IEND"s);
   max_job_bytes_ = 32 << 20;
   EXPECT_THAT(std::string(Check().status().message()),
               testing::HasSubstr("a.png: the image would take 12582912 bytes of memory, and "
