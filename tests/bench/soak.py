@@ -182,31 +182,33 @@ def main():
         begin = time.monotonic()
         next_row, next_kill, next_restart = 0.0, KILL_WORKER_EVERY_S, arguments.restart
         results = 0
-        while results < arguments.results and len(wrong) < 20:
-            time.sleep(1)
-            results = farm.results()
-            seconds = time.monotonic() - begin
-            if seconds >= next_row:
-                next_row += 10
-                with lock:
-                    done, failures = jobs, len(wrong)
-                pid = farm.coordinator.pid
-                writer.writerow([round(seconds), results, done, failures, farm.kills, farm.restarts,
-                                 round(resident_mb(pid), 1),
-                                 round(max(resident_mb(w.pid) for w in farm.workers), 1),
-                                 len(os.listdir(f"/proc/{pid}/fd")),
-                                 round(disk_mb(folder / "state"), 1)])
-                out.flush()
-            if seconds >= next_kill:
-                next_kill += KILL_WORKER_EVERY_S
-                farm.kill_a_worker()
-            if results >= next_restart:
-                next_restart += arguments.restart
-                farm.kill_coordinator()
-        is_over.set()
-        for submitter in submitters:
-            submitter.join()
-        farm.stop()
+        try:
+            while results < arguments.results and len(wrong) < 20:
+                time.sleep(1)
+                results = farm.results()
+                seconds = time.monotonic() - begin
+                if seconds >= next_row:
+                    next_row += 10
+                    with lock:
+                        done, failures = jobs, len(wrong)
+                    pid = farm.coordinator.pid
+                    writer.writerow([round(seconds), results, done, failures, farm.kills, farm.restarts,
+                                     round(resident_mb(pid), 1),
+                                     round(max(resident_mb(w.pid) for w in farm.workers), 1),
+                                     len(os.listdir(f"/proc/{pid}/fd")),
+                                     round(disk_mb(folder / "state"), 1)])
+                    out.flush()
+                if seconds >= next_kill:
+                    next_kill += KILL_WORKER_EVERY_S
+                    farm.kill_a_worker()
+                if results >= next_restart:
+                    next_restart += arguments.restart
+                    farm.kill_coordinator()
+        finally:  # processes do not outlive this one
+            is_over.set()
+            for submitter in submitters:
+                submitter.join()
+            farm.stop()
     print(f"{results} results, {jobs} jobs, {farm.kills} workers killed, {farm.restarts} restarts, "
           f"{len(wrong)} failures")
     for line in wrong[:20]:
