@@ -57,6 +57,9 @@ std::string_view ClosestOf(std::string_view text, const std::vector<std::string_
   std::string_view closest;
   std::size_t smallest = std::max<std::size_t>(1, (text.size() + 1) / 3) + 1;
   for (const std::string_view candidate : known) {
+    // The distance is at least the difference of the lengths.
+    const std::size_t shorter = std::min(text.size(), candidate.size());
+    if (std::max(text.size(), candidate.size()) - shorter >= smallest) continue;
     const std::size_t distance = EditDistance(text, candidate);
     if (distance < smallest) {
       smallest = distance;

@@ -51,7 +51,7 @@ struct NamedBytes {
   limits.max_files = 50;
   limits.max_picture_bytes = 1 << 20;
   limits.max_total_bytes = 1 << 20;
-  limits.max_triangles = 10'000;
+  limits.max_triangles = 2'000;
   limits.max_shape_bytes = 1 << 24;
   return ReadScene(files, name, limits);
 }
