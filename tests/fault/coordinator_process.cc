@@ -119,7 +119,10 @@ StatusOr<std::string> CoordinatorProcess::TrySubmit(const SmallJob& job) {
   request.set_name(job.name);
   *request.mutable_scene() = ToProto(manifest);
   RenderOverrides overrides;
-  overrides.passes = job.passes;
+  if (job.time_s > 0)
+    overrides.time_s = job.time_s;
+  else
+    overrides.passes = job.passes;
   overrides.photons_per_pass = job.photons;
   overrides.width = 64;
   overrides.height = 64;

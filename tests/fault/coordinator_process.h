@@ -34,6 +34,7 @@ struct SmallJob {
   std::int64_t photons = 400'000;  // a pass
   std::string request_id = "the only one";
   std::string name = {};  // empty: the scene's
+  double time_s = 0;      // above 0: ends after so long, and not by passes
 };
 
 class CoordinatorProcess {

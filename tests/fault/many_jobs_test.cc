@@ -171,5 +171,87 @@ TEST(ManyJobsFaultTest, AJobThatIsPausedStaysSoAfterACrashAndGoesOnWithTheQuietB
   ExpectQuietEnds(*coordinator, jobs);
 }
 
+// A coordinator that keeps everything in a folder, and one worker; both can be replaced.
+class RestartTest : public testing::Test {
+ protected:
+  void Start() { coordinator_ = std::make_unique<CoordinatorProcess>(flags_, address_); }
+  void End(int signal) {
+    coordinator_->process().Signal(signal);
+    ASSERT_TRUE(coordinator_->process().WaitForExit(kPatience));
+  }
+
+  const TemporaryFolder folder_;
+  const std::string address_ = FreeAddress();
+  const std::vector<std::string> flags_ = {"--state", folder_.path(), "--checkpoint-share", "1"};
+  std::unique_ptr<CoordinatorProcess> coordinator_;
+};
+
+TEST_F(RestartTest, ANewEndOfAJobThatRunsSurvivesACrash) {
+  Start();
+  const auto worker = coordinator_->StartWorker();
+  const std::string job = coordinator_->TrySubmit(JobNamed("one", 1'000'000)).value();
+  WaitFor(*coordinator_, job, [](const v1::Job& now) { return now.progress().passes() >= 3; });
+  ASSERT_TRUE(Pause(*coordinator_, job).ok());
+  // Passes that are done stay; an end before them would end the job there.
+  ASSERT_LT(coordinator_->Get(job).progress().passes(), kPasses[1]);
+  ASSERT_TRUE(Extend(*coordinator_, job, kPasses[1]).ok());
+  End(SIGKILL);
+  Start();
+  ASSERT_TRUE(Resume(*coordinator_, job).ok());
+  const v1::Job ended = coordinator_->Wait(job);
+  ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
+  EXPECT_EQ(ended.progress().passes(), kPasses[1]);
+  EXPECT_EQ(coordinator_->ImageDigest(job).Hex(), QuietDigests()[1]);
+}
+
+TEST_F(RestartTest, AnEndedJobGoesOnAfterACrashWhenItIsExtended) {
+  Start();
+  const auto worker = coordinator_->StartWorker();
+  const std::string job = coordinator_->TrySubmit(JobNamed("one", kPasses[0])).value();
+  ASSERT_EQ(coordinator_->Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
+  End(SIGKILL);
+  Start();
+  ASSERT_TRUE(Extend(*coordinator_, job, kPasses[1]).ok());
+  const v1::Job ended = coordinator_->Wait(job);
+  ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
+  EXPECT_EQ(ended.progress().passes(), kPasses[1]);
+  EXPECT_EQ(ended.progress().photons(), static_cast<std::uint64_t>(kPasses[1]) * 20'000);
+  EXPECT_EQ(coordinator_->ImageDigest(job).Hex(), QuietDigests()[1]);
+}
+
+double RunningSeconds(const v1::Job& job) {
+  return static_cast<double>(job.progress().running().seconds()) +
+         1e-9 * static_cast<double>(job.progress().running().nanos());
+}
+
+TEST_F(RestartTest, TimeBeforeARestartCountsAndTimeWithoutAWorkerDoesNot) {
+  constexpr double kLimit = 4;
+  Start();
+  std::string job;
+  v1::Job before;
+  {
+    const auto worker = coordinator_->StartWorker();
+    job = coordinator_->TrySubmit({.photons = 20'000, .time_s = kLimit}).value();
+    WaitFor(*coordinator_, job, [](const v1::Job& now) { return RunningSeconds(now) >= 1; });
+    before = coordinator_->Get(job);
+    ASSERT_EQ(before.state(), v1::JOB_STATE_RUNNING);
+    End(SIGTERM);  // which keeps a checkpoint
+  }
+  Start();
+  const v1::Job after = coordinator_->Get(job);
+  EXPECT_GE(RunningSeconds(after), RunningSeconds(before));
+  EXPECT_GE(after.progress().passes(), before.progress().passes());
+  // Longer than the limit: a clock that went on would end the job.
+  std::this_thread::sleep_for(std::chrono::seconds(6));
+  const v1::Job waiting = coordinator_->Get(job);
+  EXPECT_LT(waiting.state(), v1::JOB_STATE_SUCCEEDED);
+  EXPECT_EQ(RunningSeconds(waiting), RunningSeconds(after));
+  const auto worker = coordinator_->StartWorker();
+  const v1::Job ended = coordinator_->Wait(job);
+  ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
+  EXPECT_GE(RunningSeconds(ended), kLimit);
+  EXPECT_GT(ended.progress().passes(), after.progress().passes());
+}
+
 }  // namespace
 }  // namespace lucerna
