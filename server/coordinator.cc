@@ -130,6 +130,8 @@ Coordinator::~Coordinator() {
 
 void Coordinator::StopLending() {
   is_lending_ = false;
+  // The time of jobs stands still: nothing is rendered any more, and none may end by it.
+  jobs_.SetLiveWorkers(0, Now());
   // Not an error: a worker would drop what it has on its way here.
   for (const ParkedSyncs::Call& call : parked_.Close())
     call.answer(SyncAnswer{});
@@ -710,7 +712,7 @@ StatusOr<std::string> Coordinator::Register(const std::string& name, int threads
   }
   LUCERNA_ASSIGN_OR_RETURN(std::string id,
                            scheduler_.AddWorker(name, clock_.Steady(), identity, peer));
-  jobs_.SetLiveWorkers(scheduler_.LiveWorkers(), Now());
+  if (is_lending_) jobs_.SetLiveWorkers(scheduler_.LiveWorkers(), Now());
   spdlog::info("worker {} joined with {} threads", ShownWorker(id), threads);
   return id;
 }
