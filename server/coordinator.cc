@@ -130,11 +130,14 @@ Coordinator::~Coordinator() {
 
 void Coordinator::StopLending() {
   is_lending_ = false;
-  // The time of jobs stands still: nothing is rendered any more, and none may end by it.
-  jobs_.SetLiveWorkers(0, Now());
+  CountWorkers();
   // Not an error: a worker would drop what it has on its way here.
   for (const ParkedSyncs::Call& call : parked_.Close())
     call.answer(SyncAnswer{});
+}
+
+void Coordinator::CountWorkers() {
+  jobs_.SetLiveWorkers(is_lending_ ? scheduler_.LiveWorkers() : 0, Now());
 }
 
 void Coordinator::Close() {
@@ -151,7 +154,7 @@ void Coordinator::Tick() {
   PausePoisonedJobs();
   ShowDisputes();
   AnswerParked();
-  jobs_.SetLiveWorkers(scheduler_.LiveWorkers(), Now());
+  CountWorkers();
   if (clock_.Steady() >= save_unsaved_at_) {
     save_unsaved_at_ = clock_.Steady() + kSaveUnsavedEvery;
     SaveStandings();
@@ -712,7 +715,7 @@ StatusOr<std::string> Coordinator::Register(const std::string& name, int threads
   }
   LUCERNA_ASSIGN_OR_RETURN(std::string id,
                            scheduler_.AddWorker(name, clock_.Steady(), identity, peer));
-  if (is_lending_) jobs_.SetLiveWorkers(scheduler_.LiveWorkers(), Now());
+  CountWorkers();
   spdlog::info("worker {} joined with {} threads", ShownWorker(id), threads);
   return id;
 }

@@ -247,6 +247,9 @@ class Coordinator {
   StatusOr<MergeOutcome> Merge(const Delivery& delivery, DecodedResult decoded);
   // Takes all work of workers whose results were wrong out of the jobs.
   void TakeOut(const std::vector<std::string>& records);
+  // Tells the jobs how many workers there are for them: none while nothing is lent, so that the
+  // time of jobs stands still and none ends by it.
+  void CountWorkers();
   // Jobs in which workers disagree and none is left to decide wait, and say so.
   void ShowDisputes();
 

@@ -186,13 +186,13 @@ class RestartTest : public testing::Test {
   std::unique_ptr<CoordinatorProcess> coordinator_;
 };
 
-TEST_F(RestartTest, ANewEndOfAJobThatRunsSurvivesACrash) {
+TEST_F(RestartTest, ANewEndOfAPausedJobSurvivesACrash) {
   Start();
   const auto worker = coordinator_->StartWorker();
   const std::string job = coordinator_->TrySubmit(JobNamed("one", 1'000'000)).value();
   WaitFor(*coordinator_, job, [](const v1::Job& now) { return now.progress().passes() >= 3; });
   ASSERT_TRUE(Pause(*coordinator_, job).ok());
-  // Passes that are done stay; an end before them would end the job there.
+  // Else the quiet run would have fewer passes.
   ASSERT_LT(coordinator_->Get(job).progress().passes(), kPasses[1]);
   ASSERT_TRUE(Extend(*coordinator_, job, kPasses[1]).ok());
   End(SIGKILL);
@@ -252,7 +252,7 @@ TEST_F(RestartTest, TimeBeforeARestartCountsAndTimeWithoutAWorkerDoesNot) {
   EXPECT_GT(ended.progress().passes(), after.progress().passes());
 }
 
-// Three seconds for commits that are under way are not time of the job.
+// The seconds in which it waits for commits are not time of the job.
 TEST_F(RestartTest, AnOrderlyEndOfTheCoordinatorDoesNotEndAJobByItsTime) {
   Start();
   const auto worker = coordinator_->StartWorker();
