@@ -106,26 +106,32 @@ double FactorAt(const ImageSums& sums, const RadiusColumn& radii, std::size_t pi
          std::max(radius * radius, 1e-36);
 }
 
-// Means over pixels.
+// The luminance of every pixel, and means over all.
 struct PixelMeans {
+  std::vector<double> values;
   double value = 0, factor = 0;
 };
 
 PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, ThreadTeam& team) {
   // Of pieces, added up in their order.
   constexpr std::size_t kPixelsAtOnce = 4096;
-  std::vector<PixelMeans> pieces((sums.pixels() + kPixelsAtOnce - 1) / kPixelsAtOnce);
+  struct Piece {
+    double value = 0, factor = 0;
+  };
+  std::vector<Piece> pieces((sums.pixels() + kPixelsAtOnce - 1) / kPixelsAtOnce);
+  PixelMeans means;
+  means.values.resize(sums.pixels());
   team.For(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t piece = begin; piece < end; ++piece) {
       const std::size_t last = std::min(sums.pixels(), (piece + 1) * kPixelsAtOnce);
       for (std::size_t pixel = piece * kPixelsAtOnce; pixel < last; ++pixel) {
-        pieces[piece].value += ValueAt(sums, pixel);
+        means.values[pixel] = ValueAt(sums, pixel);
+        pieces[piece].value += means.values[pixel];
         pieces[piece].factor += FactorAt(sums, radii, pixel);
       }
     }
   });
-  PixelMeans means;
-  for (const PixelMeans& piece : pieces) {
+  for (const Piece& piece : pieces) {
     means.value += piece.value / static_cast<double>(sums.pixels());
     means.factor += piece.factor / static_cast<double>(sums.pixels());
   }
@@ -134,19 +140,18 @@ PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, ThreadTeam&
 
 // The value of a pixel over the mean of all: of a few pixels around it, for a photon must not make
 // its own pixel bright, and with a floor.
-double BrightnessAround(const ImageSums& sums, int width, const PixelMeans& means,
-                        std::size_t pixel) {
+double BrightnessAround(const PixelMeans& means, int width, std::size_t pixel) {
   constexpr std::size_t kReach = 2;  // pixels
   constexpr double kFloor = 0.1;     // of the mean value, as in relative errors
   const auto columns = static_cast<std::size_t>(width);
-  const std::size_t rows = sums.pixels() / columns;
+  const std::size_t rows = means.values.size() / columns;
   const std::size_t x = pixel % columns;
   const std::size_t y = pixel / columns;
   double value = 0;
   double around = 0;
   for (std::size_t v = y - std::min(y, kReach); v <= std::min(rows - 1, y + kReach); ++v) {
     for (std::size_t u = x - std::min(x, kReach); u <= std::min(columns - 1, x + kReach); ++u) {
-      value += ValueAt(sums, v * columns + u);
+      value += means.values[v * columns + u];
       ++around;
     }
   }
@@ -160,7 +165,7 @@ double PhotonScore(const ImageSums& sums, const RadiusColumn& radii, int width,
   if (!(means.value > 0)) return 1;
   const double factor = FactorAt(sums, radii, pixel);
   const double of_mean = factor > 0 && means.factor > 0 ? factor / means.factor : 1;
-  const double relative = of_mean / BrightnessAround(sums, width, means, pixel);
+  const double relative = of_mean / BrightnessAround(means, width, pixel);
   return relative * relative;
 }
 
@@ -281,9 +286,9 @@ struct JobEstimator::State {
       if (!(factor > 0 && flux > 0)) continue;
       double brought = report.brought;
       if (means.value > 0) {
-        brought = std::min(brought,
-                           kLargestValue * means.value *
-                               BrightnessAround(*sums, settings.crop_width(), means, report.pixel));
+        brought =
+            std::min(brought, kLargestValue * means.value *
+                                  BrightnessAround(means, settings.crop_width(), report.pixel));
       }
       // A photon of flux f that a pixel finds adds f albedo / (π² radius²) to its radiance.
       const double per_value =
@@ -382,7 +387,8 @@ SliceShape JobEstimator::ShapeOf(const PassRange& round, const RoundPlan& plan) 
 
 SliceSums JobEstimator::SliceOf(const EyePass& pass, const RoundPlan& plan,
                                 const PassSums& sums) const {
-  return SliceOfPass(pass, plan, sums, state_->settings, state_->prepared.flux_scale());
+  return SliceOfPass(pass, plan, sums, state_->settings, state_->prepared.flux_scale(),
+                     state_->team);
 }
 
 void JobEstimator::AddRound(const SliceSums& round, const RoundPlan& plan) {

@@ -100,64 +100,6 @@ float CellWidth(std::span<const float> of_hitpoints) {
   return 2 * *middle;
 }
 
-// `fits` becomes false when the sum would wrap.
-std::int64_t SumOf(std::int64_t a, std::int64_t b, bool& fits) {
-  std::int64_t sum = 0;
-  if (__builtin_add_overflow(a, b, &sum)) fits = false;
-  return sum;
-}
-
-// The sum of both, row by row. Errors: OUT_OF_RANGE when a sum does not fit.
-StatusOr<Accumulation> Merge(const Accumulation& sum, const Accumulation& more) {
-  if (!sum.tally.Fits(more.tally)) {
-    return absl::OutOfRangeError("the tally of a batch would not fit in 64 bits");
-  }
-  Accumulation out;
-  out.dropped_photons = sum.dropped_photons;
-  for (const std::uint64_t index : more.dropped_photons) {
-    if (out.dropped_photons.size() < kDroppedNamed) out.dropped_photons.push_back(index);
-  }
-  out.tally = sum.tally;
-  out.tally += more.tally;
-  out.found = sum.found;
-  out.found.insert(out.found.end(), more.found.begin(), more.found.end());
-  out.evidence.resize(sum.evidence.size());
-  const std::size_t upper = sum.size() + more.size();
-  out.hitpoints.reserve(upper);
-  out.counts.reserve(upper);
-  for (auto& channel : out.flux)
-    channel.reserve(upper);
-  std::size_t a = 0;
-  std::size_t b = 0;
-  while (a < sum.size() || b < more.size()) {
-    const bool from_a =
-        b == more.size() || (a < sum.size() && sum.hitpoints[a] <= more.hitpoints[b]);
-    const bool from_b =
-        a == sum.size() || (b < more.size() && more.hitpoints[b] <= sum.hitpoints[a]);
-    out.hitpoints.push_back(from_a ? sum.hitpoints[a] : more.hitpoints[b]);
-    const std::uint64_t count =
-        (from_a ? std::uint64_t{sum.counts[a]} : 0) + (from_b ? std::uint64_t{more.counts[b]} : 0);
-    if (count > UINT32_MAX) {
-      return absl::OutOfRangeError(
-          "a hitpoint found more than 2^32 photons of one batch; use fewer photons in a pass "
-          "or a smaller radius");
-    }
-    out.counts.push_back(static_cast<std::uint32_t>(count));
-    bool fits = true;
-    for (std::size_t c = 0; c < 3; ++c) {
-      out.flux[c].push_back(SumOf(from_a ? sum.flux[c][a] : 0, from_b ? more.flux[c][b] : 0, fits));
-    }
-    for (std::size_t c = 0; c < out.evidence.size(); ++c) {
-      out.evidence[c].push_back(
-          SumOf(from_a ? sum.evidence[c][a] : 0, from_b ? more.evidence[c][b] : 0, fits));
-    }
-    if (!fits) return absl::OutOfRangeError("the sums of a batch would not fit in 64 bits");
-    a += from_a ? 1 : 0;
-    b += from_b ? 1 : 0;
-  }
-  return out;
-}
-
 // The photons of a part by light, of those that stand for photons drawn without a guide: those that
 // each has sent, and those that hitpoints found.
 std::vector<LightTally> TallyLights(
@@ -270,13 +212,31 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
                                         const std::atomic<bool>& stop,
                                         std::uint64_t photons_per_pass, const PhotonGuide* guide) {
   LUCERNA_RETURN_IF_ERROR(CheckBlock(block, radii, state_->prepared.scene(), needs));
-  const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
-  Accumulation sum;
+  const std::size_t columns = EvidenceColumns(EvidenceOf(settings.radius_controller, pass));
   if (block.size() == 0 || first >= last) {
-    sum.tally.photons = last > first ? last - first : 0;
-    sum.evidence.resize(EvidenceColumns(evidence));
-    return sum;
+    Accumulation none;
+    none.tally.photons = last > first ? last - first : 0;
+    none.evidence.resize(columns);
+    return none;
   }
+  PassSums sums(block.size(), columns);
+  std::vector<std::uint64_t> dropped;
+  const PhotonRange photons = {pass, first, last, photons_per_pass, guide};
+  LUCERNA_RETURN_IF_ERROR(
+      GatherPhotons(settings, needs, photons, block, radii, stop, sums, dropped));
+  LUCERNA_ASSIGN_OR_RETURN(Accumulation accumulation, sums.ToAccumulation());
+  accumulation.dropped_photons = std::move(dropped);
+  return accumulation;
+}
+
+Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNeeds& needs,
+                                  const PhotonRange& range, const HitpointBlock& block,
+                                  const RadiusColumn& radii, const std::atomic<bool>& stop,
+                                  PassSums& sums, std::vector<std::uint64_t>& dropped_photons) {
+  const std::uint64_t pass = range.pass;
+  const std::uint64_t last = range.last;
+  const PhotonGuide* const guide = range.guide;
+  const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
   LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(needs));
   const PreparedScene& prepared = state_->prepared;
   const Bounds region = RegionOf(block, radii, ReachOf(evidence));
@@ -294,14 +254,14 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
   const SpectrumTracer* spectra =
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
-                                settings, needs, spectra, region, photons_per_pass, media_region,
-                                guide);
+                                settings, needs, spectra, region, range.photons_per_pass,
+                                media_region, guide);
   const std::uint64_t per_chunk =
       std::clamp(kMostDepositsPerChunk / static_cast<std::uint64_t>(settings.max_depth),
                  std::uint64_t{1}, kPhotonsPerChunk);
   const std::uint64_t per_round = per_chunk * kChunksPerThread *
                                   static_cast<std::uint64_t>(std::max(1, state_->team.threads()));
-  for (std::uint64_t next = first; next < last;) {
+  for (std::uint64_t next = range.first; next < last;) {
     const std::uint64_t part = next;
     const std::uint64_t part_end = std::min(last, part + kPhotonsPerPart);
     std::vector<Deposits> deposits;
@@ -352,13 +312,16 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     }
     if (stop) return absl::CancelledError("the batch was given up");
     LUCERNA_RETURN_IF_ERROR(CheckDeposits(tallies));
+    // Sorted deposits are copies: those they were made of go.
     const PhotonGrid grid(deposits, region, cell, state_->team);
+    deposits = {};
     std::vector<std::uint32_t> found_by(grid.size(), kNotFound);
     std::optional<PhotonGrid> caustic_grid;
     std::vector<std::uint32_t> caustic_found_by;
     GatheredPhotons photons{.grid = grid, .features = &state_->features, .found_by = found_by};
     if (block.caustic_rows > 0) {
       caustic_grid.emplace(caustics, region, caustic_cell, state_->team);
+      caustics = {};
       caustic_found_by.assign(caustic_grid->size(), kNotFound);
       photons.caustics = &*caustic_grid;
       photons.caustic_found_by = caustic_found_by;
@@ -368,33 +331,33 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     std::vector<std::uint32_t> scattered_found_by;
     if (!block.segments.empty()) {
       tree.emplace(scattered, state_->team);
+      scattered = {};
       scattered_found_by.assign(tree->size(), kNotFound);
       photons.scattered = &*tree;
       photons.scattered_found_by = scattered_found_by;
       photons.media = &prepared.scene().media;
     }
-    Accumulation accumulation =
+    Accumulation counted;
+    counted.evidence.resize(sums.evidence().size());
+    LUCERNA_ASSIGN_OR_RETURN(
+        counted.tally,
         Gather(block, radii, photons, prepared.scene().materials, Kernel{settings.kernel},
-               prepared.flux_scale(), state_->team, stop, evidence);
+               prepared.flux_scale(), state_->team, stop, evidence, sums));
+    if (stop) return absl::CancelledError("the batch was given up");
     for (const BatchTally& tally : tallies)
-      accumulation.tally += tally;
-    accumulation.tally.lights = TallyLights(sent, photons);
+      counted.tally += tally;
+    counted.tally.lights = TallyLights(sent, photons);
     if (guide != nullptr && guide->reported() > 0)
-      accumulation.found = ReportFound(tracer, pass, part, photons);
+      counted.found = ReportFound(tracer, pass, part, photons);
+    LUCERNA_RETURN_IF_ERROR(sums.Add(counted));
     for (const std::vector<std::uint64_t>& named : dropped) {
       for (const std::uint64_t index : named) {
-        if (accumulation.dropped_photons.size() == kDroppedNamed) break;
-        accumulation.dropped_photons.push_back(index);
+        if (dropped_photons.size() == kDroppedNamed) break;
+        dropped_photons.push_back(index);
       }
     }
-    if (part == first) {
-      sum = std::move(accumulation);
-    } else {
-      LUCERNA_ASSIGN_OR_RETURN(sum, Merge(sum, accumulation));
-    }
-    if (stop) return absl::CancelledError("the batch was given up");
   }
-  return sum;
+  return absl::OkStatus();
 }
 
 StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const SceneNeeds& needs,
@@ -409,15 +372,15 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
   std::vector<PhotonKey> dropped;
   // A camera that sees nothing needs no photons, and without light there are none.
   if (eye.block.size() > 0 && needs.Uses(Part::kPhotons)) {
-    LUCERNA_ASSIGN_OR_RETURN(
-        const Accumulation accumulation,
-        Run(settings, needs, pass, 0, plan.photons_per_pass, eye.block, HitpointRadii(eye, plan),
-            stop, plan.photons_per_pass, plan.guide.get()));
-    LUCERNA_RETURN_IF_ERROR(sums.Add(accumulation));
-    for (const std::uint64_t index : accumulation.dropped_photons)
+    std::vector<std::uint64_t> named;
+    const PhotonRange photons = {pass, 0, plan.photons_per_pass, plan.photons_per_pass,
+                                 plan.guide.get()};
+    LUCERNA_RETURN_IF_ERROR(GatherPhotons(settings, needs, photons, eye.block,
+                                          HitpointRadii(eye, plan), stop, sums, named));
+    for (const std::uint64_t index : named)
       dropped.push_back({pass, index});
   }
-  SliceSums slice = SliceOfPass(eye, plan, sums, settings, state.prepared.flux_scale());
+  SliceSums slice = SliceOfPass(eye, plan, sums, settings, state.prepared.flux_scale(), state.team);
   slice.dropped_photons = std::move(dropped);
   return slice;
 }

@@ -10,6 +10,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "render/analysis/needs.h"
 #include "render/base/status.h"
@@ -48,6 +49,18 @@ class BatchTracer {
                                              const RoundPlan& plan, const std::atomic<bool>& stop);
 
  private:
+  // Photons of a pass, drawn by `guide` (nullptr: evenly).
+  struct PhotonRange {
+    std::uint64_t pass, first, last;
+    std::uint64_t photons_per_pass;  // 0: as in the settings
+    const PhotonGuide* guide;
+  };
+  // Adds what the hitpoints gather of these photons, and the names of the first that were dropped.
+  // Requires hitpoints, photons and radii that fit.
+  Status GatherPhotons(const RenderSettings& settings, const SceneNeeds& needs,
+                       const PhotonRange& range, const HitpointBlock& block,
+                       const RadiusColumn& radii, const std::atomic<bool>& stop, PassSums& sums,
+                       std::vector<std::uint64_t>& dropped_photons);
   StatusOr<SliceSums> RunPass(const RenderSettings& settings, const SceneNeeds& needs,
                               std::uint64_t pass, const RoundPlan& plan,
                               const std::atomic<bool>& stop);

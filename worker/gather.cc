@@ -5,8 +5,9 @@
 #include <atomic>
 #include <cmath>
 #include <optional>
+#include <span>
 #include <type_traits>
-#include <utility>
+#include <vector>
 
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
@@ -46,7 +47,7 @@ struct EvidenceSums<Evidence::kNone> {
   EvidenceSums(Vec3 /*normal*/, const FluxScale& /*scale*/) {}
   void Add(const PhotonGrid& /*grid*/, std::size_t /*photon*/, Vec3 /*to_photon*/,
            float /*squared*/, float /*squared_radius*/, float /*weight*/, const CutDisc* /*cut*/) {}
-  void Store(std::vector<std::vector<std::int64_t>>& /*columns*/) const {}
+  void Store(std::span<std::int64_t> /*columns*/) const {}
 };
 
 // Counts by cell of the disc (see kSectors).
@@ -72,9 +73,8 @@ struct EvidenceSums<Evidence::kSectors> {
     const std::size_t third = side < kSqrt3 * x ? 0 : side < -kSqrt3 * x ? 2 : 1;
     return above ? third : 5 - third;
   }
-  void Store(std::vector<std::vector<std::int64_t>>& columns) const {
-    for (std::size_t i = 0; i < kSectors; ++i)
-      columns[kCommonColumns + i].push_back(counts[i]);
+  void Store(std::span<std::int64_t> columns) const {
+    std::ranges::copy(counts, columns.begin() + kCommonColumns);
   }
 
   Frame frame;
@@ -117,9 +117,8 @@ struct EvidenceSums<Evidence::kCurvature> {
     AddSquare(static_cast<double>(std::min(w * w * cut->inverse_share(), kLargest)),
               sums[kCurvatureWeight2]);
   }
-  void Store(std::vector<std::vector<std::int64_t>>& columns) const {
-    for (std::size_t i = 0; i < kCurvatureColumns; ++i)
-      columns[kCommonColumns + i].push_back(sums[i]);
+  void Store(std::span<std::int64_t> columns) const {
+    std::ranges::copy(sums, columns.begin() + kCommonColumns);
   }
 
   float weight_scale;
@@ -148,9 +147,8 @@ struct EvidenceSums<Evidence::kFrequency> {
     sums[kFrequencyTrace2] = std::min<std::int64_t>(
         kMostTrace2, sums[kFrequencyTrace2] + std::llrint(w * x * x * kUnits));
   }
-  void Store(std::vector<std::vector<std::int64_t>>& columns) const {
-    for (std::size_t i = 0; i < kFrequencyColumns; ++i)
-      columns[kCommonColumns + i].push_back(sums[i]);
+  void Store(std::span<std::int64_t> columns) const {
+    std::ranges::copy(sums, columns.begin() + kCommonColumns);
   }
 
   float weight_scale;
@@ -194,7 +192,7 @@ template <typename GatherKernel, Evidence kEvidence, bool kNormals, bool kCut>
 void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
                const GlossyHitpoint* glossy, const std::vector<Material>& materials,
                const FluxScale& scale, const RowSource& source, const CutDisc* cut,
-               GatherPiece& piece) {
+               GatherPiece& piece, PassSums& sums) {
   const PhotonGrid& grid = source.grid;
   const auto hitpoint = static_cast<std::uint32_t>(row);
   const Vec3 position = block.positions[row];
@@ -326,20 +324,19 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
     });
   }
   if (count == 0) return;
-  piece.hitpoints.push_back(hitpoint);
-  piece.counts.push_back(count);
-  piece.flux[0].push_back(sum_r);
-  piece.flux[1].push_back(sum_g);
-  piece.flux[2].push_back(sum_b);
-  piece.evidence[kBlurColumn].push_back(blur);
-  evidence.Store(piece.evidence);
+  std::array<std::int64_t, EvidenceColumns(kEvidence)> columns{};
+  columns[kBlurColumn] = blur;
+  evidence.Store(columns);
+  piece.fits = sums.AddRow(row, count, {sum_r, sum_g, sum_b}, columns) && piece.fits;
   piece.pairs += count;
 }
 
 template <typename GatherKernel, Evidence kEvidence, bool kNormals>
-Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
-                       const GatheredPhotons& photons, const std::vector<Material>& materials,
-                       const FluxScale& scale, ThreadTeam& team, const std::atomic<bool>& stop) {
+std::vector<GatherPiece> GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
+                                   const GatheredPhotons& photons,
+                                   const std::vector<Material>& materials, const FluxScale& scale,
+                                   ThreadTeam& team, const std::atomic<bool>& stop,
+                                   PassSums& sums) {
   const std::size_t rows = block.first_segment();
   const std::size_t first_caustic = block.first_caustic();
   const RowSource ordinary = {photons.grid, nullptr, photons.found_by};
@@ -350,7 +347,6 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
   team.For(piece_count, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
       GatherPiece& piece = pieces[p];
-      piece.evidence.resize(EvidenceColumns(kEvidence));
       const std::size_t first = p * kRowsPerPiece;
       const std::size_t last = std::min(rows, first + kRowsPerPiece);
       auto glossy = std::lower_bound(
@@ -369,7 +365,7 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
         const auto gather_row = [&](auto with_normals, auto with_cut, const RowSource& source) {
           GatherRow<GatherKernel, kEvidence, with_normals(), with_cut()>(
               block, row, radii[row], lobe, materials, scale, source, is_cut ? &cut : nullptr,
-              piece);
+              piece, sums);
         };
         if (is_caustic) {
           is_cut ? gather_row(std::true_type(), std::true_type(), caustic)
@@ -383,33 +379,12 @@ Accumulation GatherAll(const HitpointBlock& block, const RadiusColumn& radii,
   });
 
   if (photons.scattered != nullptr) {
-    for (GatherPiece& piece : GatherSegments<GatherKernel>(
-             block, radii, *photons.scattered, photons.scattered_found_by, *photons.media, scale,
-             EvidenceColumns(kEvidence), team, stop))
-      pieces.push_back(std::move(piece));
+    for (const GatherPiece& piece :
+         GatherSegments<GatherKernel>(block, radii, *photons.scattered, photons.scattered_found_by,
+                                      *photons.media, scale, team, stop, sums))
+      pieces.push_back(piece);
   }
-
-  Accumulation accumulation;
-  std::size_t touched = 0;
-  for (const GatherPiece& piece : pieces)
-    touched += piece.hitpoints.size();
-  const auto append = [touched](auto& to, const auto& from) {
-    to.reserve(touched);
-    to.insert(to.end(), from.begin(), from.end());
-  };
-  accumulation.evidence.resize(EvidenceColumns(kEvidence));
-  for (const GatherPiece& piece : pieces) {
-    append(accumulation.hitpoints, piece.hitpoints);
-    append(accumulation.counts, piece.counts);
-    for (std::size_t c = 0; c < 3; ++c)
-      append(accumulation.flux[c], piece.flux[c]);
-    for (std::size_t c = 0; c < piece.evidence.size(); ++c) {
-      append(accumulation.evidence[c], piece.evidence[c]);
-    }
-    accumulation.tally.pairs += piece.pairs;
-    accumulation.tally.excess += piece.excess;
-  }
-  return accumulation;
+  return pieces;
 }
 
 using GatherFunction = decltype(&GatherAll<ConstantKernel, Evidence::kNone, true>);
@@ -433,20 +408,27 @@ GatherFunction Specialised(KernelKind kernel, Evidence evidence) {
 
 }  // namespace
 
-Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
-                    const GatheredPhotons& photons, const std::vector<Material>& materials,
-                    const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,
-                    const std::atomic<bool>& stop, Evidence evidence) {
+StatusOr<BatchTally> Gather(const HitpointBlock& block, const RadiusColumn& radii,
+                            const GatheredPhotons& photons, const std::vector<Material>& materials,
+                            const Kernel& kernel, const FluxScale& scale, ThreadTeam& team,
+                            const std::atomic<bool>& stop, Evidence evidence, PassSums& sums) {
   const bool has_normals = photons.grid.has_normals();
   LUCERNA_CHECK(photons.grid.size() == 0 || block.glossy.size() == block.caustic_rows ||
                 has_normals);
   LUCERNA_CHECK(photons.scattered == nullptr || photons.media != nullptr);
   LUCERNA_CHECK(photons.caustics == nullptr || photons.caustic_weight != nullptr);
+  LUCERNA_CHECK(sums.size() == block.size() && sums.evidence().size() == EvidenceColumns(evidence));
   const GatherFunction gather = has_normals ? Specialised<true>(kernel.kind, evidence)
                                             : Specialised<false>(kernel.kind, evidence);
   GatheredPhotons found = photons;
   if (found.features != nullptr && found.features->empty()) found.features = nullptr;
-  return gather(block, radii, found, materials, scale, team, stop);
+  BatchTally tally;
+  for (const GatherPiece& piece : gather(block, radii, found, materials, scale, team, stop, sums)) {
+    if (!piece.fits) return absl::OutOfRangeError("the sums of a batch would not fit in 64 bits");
+    tally.pairs += piece.pairs;
+    tally.excess += piece.excess;
+  }
+  return tally;
 }
 
 }  // namespace lucerna

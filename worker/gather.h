@@ -6,6 +6,7 @@
 #include <span>
 
 #include "render/base/parallel.h"
+#include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/evidence.h"
 #include "render/estimate/hitpoint_block.h"
@@ -53,16 +54,18 @@ struct GatheredPhotons {
 // there are any, separates from it (worker/cut_disc.h):
 // kernel-weighted flux for diffuse ones, times the BSDF for glossy ones, and what `evidence` names.
 // Counts are of the photons within reach, flux of those within the radius.
-// Fills everything of the accumulation but the tally, of which it adds `pairs` and `excess`.
+// Adds to `sums` (block.size() rows, EvidenceColumns(evidence)) all but the tally, of which it
+// returns `pairs` and `excess`.
 // Requires normals and arrivals of photons where there are glossy hitpoints, and at most kMostTerms
-// photons that `scale` has room for each: then no sum wraps. Pairs are independent of each other,
-// so neither threads nor the order of photons can be seen in the result. Once `stop` is true it
-// ends soon, with a result of no use.
-[[nodiscard]] Accumulation Gather(const HitpointBlock& block, const RadiusColumn& radii,
-                                  const GatheredPhotons& photons,
-                                  const std::vector<Material>& materials, const Kernel& kernel,
-                                  const FluxScale& scale, ThreadTeam& team,
-                                  const std::atomic<bool>& stop,
-                                  Evidence evidence = Evidence::kNone);
+// photons that `scale` has room for each: then no sum of theirs wraps. Pairs are independent of
+// each other, so neither threads nor the order of photons can be seen in the result. Once `stop` is
+// true it ends soon, with sums of no use. Errors: OUT_OF_RANGE when a sum would not fit beside what
+// `sums` held before; then they are of no use either.
+[[nodiscard]] StatusOr<BatchTally> Gather(const HitpointBlock& block, const RadiusColumn& radii,
+                                          const GatheredPhotons& photons,
+                                          const std::vector<Material>& materials,
+                                          const Kernel& kernel, const FluxScale& scale,
+                                          ThreadTeam& team, const std::atomic<bool>& stop,
+                                          Evidence evidence, PassSums& sums);
 
 }  // namespace lucerna

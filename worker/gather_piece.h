@@ -1,23 +1,18 @@
-// What some consecutive hitpoints have gathered, and the random bits of their pairs with photons.
+// What is counted while some consecutive hitpoints gather, and the random bits of their pairs with
+// photons.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <vector>
 
 namespace lucerna {
 
 inline constexpr std::size_t kRowsPerPiece = 2048;
 
-// Columns as in Accumulation.
 struct GatherPiece {
-  std::vector<std::uint32_t> hitpoints;
-  std::vector<std::uint32_t> counts;
-  std::array<std::vector<std::int64_t>, 3> flux;
-  std::vector<std::vector<std::int64_t>> evidence;
   std::uint64_t pairs = 0;
   std::uint64_t excess = 0;
+  bool fits = true;  // whether all sums did
 };
 
 // 64 random bits that belong to a (photon, hitpoint) pair.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "render/base/parallel.h"
+#include "render/estimate/accumulation.h"
 #include "render/estimate/evidence.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/math/fixed_point.h"
@@ -30,14 +32,15 @@ namespace lucerna {
 // the radius at the end, by whose square all sums are divided later. Photons carry the flux that
 // was scattered. Rows as in Gather, with zeros for the radius controller's evidence: radii of
 // segments follow a schedule (Knaus & Zwicker 2011, "Progressive Photon Mapping: A Probabilistic
-// Approach"), with the exponent of surfaces, because the kernel has two dimensions too.
+// Approach"), with the exponent of surfaces, because the kernel has two dimensions too. Adds to
+// `sums` as Gather does.
 template <typename GatherKernel>
 std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const RadiusColumn& radii,
                                         const PhotonTree& photons,
                                         std::span<std::uint32_t> found_by,
                                         const std::vector<Medium>& media, const FluxScale& scale,
-                                        std::size_t evidence_columns, ThreadTeam& team,
-                                        const std::atomic<bool>& stop) {
+                                        ThreadTeam& team, const std::atomic<bool>& stop,
+                                        PassSums& sums) {
   const std::size_t first_row = block.first_segment();
   const std::size_t count = block.segments.size();
   std::vector<GatherPiece> pieces((count + kRowsPerPiece - 1) / kRowsPerPiece);
@@ -83,19 +86,14 @@ std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const Radius
           ++found;
         });
     if (found == 0) return;
-    piece.hitpoints.push_back(hitpoint);
-    piece.counts.push_back(found);
-    piece.flux[0].push_back(sum_r);
-    piece.flux[1].push_back(sum_g);
-    piece.flux[2].push_back(sum_b);
-    for (std::size_t column = 0; column < evidence_columns; ++column)
-      piece.evidence[column].push_back(column == kBlurColumn ? blur : 0);
+    std::array<std::int64_t, kCommonColumns + kMostControllerColumns> columns{};
+    columns[kBlurColumn] = blur;
+    piece.fits = sums.AddRow(row, found, {sum_r, sum_g, sum_b}, columns) && piece.fits;
     piece.pairs += found;
   };
 
   team.For(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
-      pieces[p].evidence.resize(evidence_columns);
       const std::size_t first = p * kRowsPerPiece;
       const std::size_t last = std::min(count, first + kRowsPerPiece);
       for (std::size_t i = first; i < last && !stop.load(std::memory_order_relaxed); ++i)

@@ -172,6 +172,50 @@ Status PassSums::Add(const Accumulation& accumulation) {
   return absl::OkStatus();
 }
 
+bool PassSums::AddRow(std::size_t hitpoint, std::uint64_t count,
+                      const std::array<std::int64_t, 3>& flux,
+                      std::span<const std::int64_t> evidence) {
+  bool fits = SumFits(counts_[hitpoint], count);
+  for (std::size_t channel = 0; channel < 3; ++channel)
+    fits = fits && SumFits(flux_[channel][hitpoint], flux[channel]);
+  for (std::size_t column = 0; column < evidence_.size(); ++column)
+    fits = fits && SumFits(evidence_[column][hitpoint], evidence[column]);
+  if (!fits) return false;
+  counts_[hitpoint] += count;
+  for (std::size_t channel = 0; channel < 3; ++channel)
+    flux_[channel][hitpoint] += flux[channel];
+  for (std::size_t column = 0; column < evidence_.size(); ++column)
+    evidence_[column][hitpoint] += evidence[column];
+  return true;
+}
+
+StatusOr<Accumulation> PassSums::ToAccumulation() const {
+  Accumulation out;
+  for (std::size_t row = 0; row < counts_.size(); ++row) {
+    if (counts_[row] == 0) continue;
+    if (counts_[row] > UINT32_MAX) {
+      return absl::OutOfRangeError(
+          "a hitpoint found more than 2^32 photons of one batch; use fewer photons in a pass "
+          "or a smaller radius");
+    }
+    out.hitpoints.push_back(static_cast<std::uint32_t>(row));
+    out.counts.push_back(static_cast<std::uint32_t>(counts_[row]));
+  }
+  const auto copy = [&](const std::vector<std::int64_t>& from, std::vector<std::int64_t>& to) {
+    to.reserve(out.size());
+    for (const std::uint32_t row : out.hitpoints)
+      to.push_back(from[row]);
+  };
+  for (std::size_t channel = 0; channel < 3; ++channel)
+    copy(flux_[channel], out.flux[channel]);
+  out.evidence.resize(evidence_.size());
+  for (std::size_t column = 0; column < evidence_.size(); ++column)
+    copy(evidence_[column], out.evidence[column]);
+  out.tally = tally_;
+  out.found = FoundInOrder();
+  return out;
+}
+
 std::vector<FoundPhoton> PassSums::FoundInOrder() const {
   std::vector<FoundPhoton> found = found_;
   std::ranges::sort(found, {}, &FoundPhoton::index);

@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -150,6 +151,15 @@ class PassSums {
   // that does not exist, or its energy does not balance; OUT_OF_RANGE when a sum would not fit in
   // 64 bits.
   [[nodiscard]] Status Add(const Accumulation& accumulation);
+  // Adds what photons brought to one hitpoint, `evidence` a number for each column; no tally.
+  // Returns false, and adds nothing, when a sum would not fit in 64 bits. May run beside itself for
+  // different hitpoints.
+  [[nodiscard]] bool AddRow(std::size_t hitpoint, std::uint64_t count,
+                            const std::array<std::int64_t, 3>& flux,
+                            std::span<const std::int64_t> evidence);
+  // All that was added, but for the names of dropped photons, as one accumulation.
+  // Errors: OUT_OF_RANGE when a hitpoint found 2^32 photons or more.
+  [[nodiscard]] StatusOr<Accumulation> ToAccumulation() const;
 
   [[nodiscard]] std::size_t size() const { return counts_.size(); }
   [[nodiscard]] const std::vector<std::uint64_t>& counts() const { return counts_; }

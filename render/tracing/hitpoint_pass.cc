@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/estimate/slice_sums.h"
 #include "render/math/octahedral.h"
 
 namespace lucerna {
@@ -50,7 +51,8 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   EyePass out;
   out.pass = pass;
   out.direct.resize(pixels);
-  out.features.resize(pixels);
+  const bool has_features = HasFeatures({pass, pass + 1});
+  if (has_features) out.features.resize(pixels);
   std::vector<Rgb> bright(spread.is_needed() ? pixels : 0);
 
   // A hitpoint as a row, until all tiles are known.
@@ -90,7 +92,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
           const EyePath path = tracer.Trace(x, y, pass, first);
           out.direct[pixel] = path.direct;
           if (!bright.empty()) bright[pixel] = path.bright;
-          out.features[pixel] = path.features;
+          if (has_features) out.features[pixel] = path.features;
           rays[tile] += static_cast<std::uint64_t>(path.rays);
           const auto keep = [&](const EyeHitpoint& hitpoint, Rows& rows) {
             if (IsBlack(hitpoint.weight)) return;
@@ -123,53 +125,70 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   if (known != nullptr) known->is_known = true;
   spread.Add(pass, bright, out.direct, team);
 
-  std::size_t count = 0;
+  // Where the rows of each tile begin: first all ordinary ones, then the caustic ones, then the
+  // segments.
+  struct FirstRows {
+    std::size_t row, glossy;
+  };
+  std::vector<FirstRows> first_ordinary(tiles), first_caustic(tiles), first_segment(tiles);
+  FirstRows next = {0, 0};
   bool has_places = false;
-  for (const Tile& tile : per_tile) {
-    count += tile.rows.rows.size() + tile.caustic_rows.rows.size() + tile.segments.size();
-    out.block.caustic_rows += tile.caustic_rows.rows.size();
-    for (const Rows* rows : {&tile.rows, &tile.caustic_rows}) {
-      has_places = has_places || std::ranges::any_of(rows->places, [](const GlossyPlace& place) {
+  const auto count = [&](Rows Tile::*kind, std::vector<FirstRows>& first) {
+    for (std::size_t tile = 0; tile < tiles; ++tile) {
+      const Rows& rows = per_tile[tile].*kind;
+      first[tile] = next;
+      next.row += rows.rows.size();
+      next.glossy += rows.glossy.size();
+      has_places = has_places || std::ranges::any_of(rows.places, [](const GlossyPlace& place) {
                      return place != GlossyPlace();
                    });
     }
-  }
-  out.block.positions.reserve(count);
-  out.block.normals_oct.reserve(count);
-  out.pixels.reserve(count);
-  out.weights.reserve(count);
-  out.unit_radii.reserve(count);
-  const auto append = [&](Rows& rows) {
-    const auto first = static_cast<std::uint32_t>(out.block.size());
-    for (GlossyHitpoint glossy : rows.glossy) {
-      glossy.hitpoint += first;
-      out.block.glossy.push_back(glossy);
+  };
+  count(&Tile::rows, first_ordinary);
+  const std::size_t ordinary = next.row;
+  count(&Tile::caustic_rows, first_caustic);
+  out.block.caustic_rows = next.row - ordinary;
+  const std::size_t segments_begin = next.row;
+  count(&Tile::segment_rows, first_segment);
+  out.block.positions.resize(next.row);
+  out.block.normals_oct.resize(next.row);
+  out.block.glossy.resize(next.glossy);
+  if (has_places) out.block.places.resize(next.glossy);
+  out.block.segments.resize(next.row - segments_begin);
+  out.pixels.resize(next.row);
+  out.weights.resize(next.row);
+  out.unit_radii.resize(next.row);
+  const auto place_rows = [&](Rows& rows, const FirstRows& first) {
+    for (std::size_t i = 0; i < rows.rows.size(); ++i) {
+      const Row& row = rows.rows[i];
+      const std::size_t to = first.row + i;
+      out.block.positions[to] = row.position;
+      out.block.normals_oct[to] = row.normal_oct;
+      out.pixels[to] = row.pixel;
+      out.weights[to] = row.weight;
+      out.unit_radii[to] = row.unit_radius;
     }
-    if (has_places) {
-      out.block.places.insert(out.block.places.end(), rows.places.begin(), rows.places.end());
-    }
-    for (const Row& row : rows.rows) {
-      out.block.positions.push_back(row.position);
-      out.block.normals_oct.push_back(row.normal_oct);
-      out.pixels.push_back(row.pixel);
-      out.weights.push_back(row.weight);
-      out.unit_radii.push_back(row.unit_radius);
+    for (std::size_t i = 0; i < rows.glossy.size(); ++i) {
+      GlossyHitpoint& glossy = out.block.glossy[first.glossy + i];
+      glossy = rows.glossy[i];
+      glossy.hitpoint += static_cast<std::uint32_t>(first.row);
+      if (has_places) out.block.places[first.glossy + i] = rows.places[i];
     }
     rows = {};
   };
-  for (std::size_t tile = 0; tile < tiles; ++tile) {
-    out.rays += rays[tile];
-    append(per_tile[tile].rows);
-  }
-  if (out.block.caustic_rows > 0) {
-    for (Tile& tile : per_tile)
-      append(tile.caustic_rows);
-  }
-  for (Tile& tile : per_tile) {
-    if (tile.segments.empty()) continue;
-    append(tile.segment_rows);
-    out.block.segments.insert(out.block.segments.end(), tile.segments.begin(), tile.segments.end());
-  }
+  team.For(tiles, 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t number = begin; number < end; ++number) {
+      Tile& tile = per_tile[number];
+      place_rows(tile.rows, first_ordinary[number]);
+      place_rows(tile.caustic_rows, first_caustic[number]);
+      place_rows(tile.segment_rows, first_segment[number]);
+      std::ranges::copy(tile.segments, out.block.segments.begin() +
+                                           static_cast<std::ptrdiff_t>(first_segment[number].row -
+                                                                       segments_begin));
+    }
+  });
+  for (const std::uint64_t of_tile : rays)
+    out.rays += of_tile;
   return out;
 }
 

@@ -28,7 +28,7 @@ struct EyePass {
   std::vector<float> unit_radii;      // length of a radius of 1 [scene units]
   // Per pixel of the crop window.
   std::vector<Rgb> direct;
-  std::vector<EyeFeatures> features;
+  std::vector<EyeFeatures> features;  // empty in passes whose slices have none (HasFeatures)
   std::uint64_t rays = 0;
 };
 

@@ -1,6 +1,7 @@
 #include "render/tracing/pass_slice.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "render/estimate/evidence.h"
@@ -40,7 +41,7 @@ RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan) {
 }
 
 SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums& sums,
-                      const RenderSettings& settings, const FluxScale& scale) {
+                      const RenderSettings& settings, const FluxScale& scale, ThreadTeam& team) {
   const std::size_t rows = pass.pixels.size();
   const std::size_t pixels = pass.direct.size();
   LUCERNA_CHECK(sums.size() == rows && plan.radii->size() == pixels &&
@@ -67,7 +68,7 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   const double per_photon = norm / static_cast<double>(plan.photons_per_pass);
   const std::size_t first_caustic = pass.block.first_caustic();
   const std::size_t evidence_here = sums.evidence().size() - kCommonColumns;
-  for (std::size_t row = 0; row < rows; ++row) {
+  const auto add_row = [&](std::size_t row) {
     const std::uint32_t pixel = pass.pixels[row];
     const bool has_common_radius = row >= first_caustic;
     const float in_units = has_common_radius ? plan.caustic_radius : (*plan.radii)[pixel];
@@ -83,7 +84,7 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
     const double blur = static_cast<double>(sums.evidence()[kBlurColumn][row]) * kToBias;
     of_pixel.bias += blur * luminance_per_quantum * to_density *
                      static_cast<double>(Luminance(pass.weights[row]));
-    if (has_common_radius) continue;
+    if (has_common_radius) return;
     set(kPhotonCount, pixel, static_cast<double>(sums.counts()[row]));
     const auto unit_radius = static_cast<double>(in_units);
     set(kBlur, pixel, blur * norm / ((1 << kFluxBits) * unit_radius * unit_radius));
@@ -91,34 +92,44 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
       set(kSliceColumns + column, pixel,
           static_cast<double>(sums.evidence()[kCommonColumns + column][row]));
     }
-    if (!HasFeatures(slice.passes)) continue;
+    if (!HasFeatures(slice.passes)) return;
     set(slice.first_feature() + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
     set(slice.first_feature() + kHitpoints, pixel, 1);
+  };
+  // A pixel has at most one row of each kind, so that rows of a kind are independent of each other.
+  constexpr std::size_t kRowsAtOnce = 4096;
+  const std::array bounds = {std::size_t{0}, first_caustic, pass.block.first_segment(), rows};
+  for (std::size_t kind = 0; kind + 1 < bounds.size(); ++kind) {
+    team.For(bounds[kind + 1] - bounds[kind], kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t row = bounds[kind] + begin; row < bounds[kind] + end; ++row)
+        add_row(row);
+    });
   }
 
   const SliceColumn bias = pass.pass % 2 == 0 ? kEvenBias : kOddBias;
-  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+  const std::size_t first_feature = slice.first_feature();
+  const auto set_pixel = [&](std::size_t pixel) {
     for (std::size_t c = 0; c < 3; ++c) {
       set(kPhotonRadiance + c, pixel, brought[pixel].photons[c]);
       set(kDirectRadiance + c, pixel, static_cast<double>(pass.direct[pixel][static_cast<int>(c)]));
     }
     set(bias, pixel, brought[pixel].bias);
-  }
-  SetWhatFollowsFromRadiance(slice);
-  if (HasFeatures(slice.passes)) {
-    const std::size_t first = slice.first_feature();
-    for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-      const EyeFeatures& features = pass.features[pixel];
-      if (!std::isfinite(features.distance)) continue;
-      for (int c = 0; c < 3; ++c) {
-        const auto offset = static_cast<std::size_t>(c);
-        set(first + kAlbedo + offset, pixel, static_cast<double>(features.albedo[c]));
-        set(first + kNormal + offset, pixel, static_cast<double>(features.normal[c]));
-      }
-      set(first + kDistance, pixel, static_cast<double>(features.distance));
-      set(first + kHits, pixel, 1);
+    if (!HasFeatures(slice.passes)) return;
+    const EyeFeatures& features = pass.features[pixel];
+    if (!std::isfinite(features.distance)) return;
+    for (int c = 0; c < 3; ++c) {
+      const auto offset = static_cast<std::size_t>(c);
+      set(first_feature + kAlbedo + offset, pixel, static_cast<double>(features.albedo[c]));
+      set(first_feature + kNormal + offset, pixel, static_cast<double>(features.normal[c]));
     }
-  }
+    set(first_feature + kDistance, pixel, static_cast<double>(features.distance));
+    set(first_feature + kHits, pixel, 1);
+  };
+  team.For(pixels, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t pixel = begin; pixel < end; ++pixel)
+      set_pixel(pixel);
+  });
+  SetWhatFollowsFromRadiance(slice);
   return slice;
 }
 

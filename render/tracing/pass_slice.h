@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "render/base/parallel.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/estimate/slice_sums.h"
@@ -36,6 +37,6 @@ struct RoundPlan {
 // The slice of one pass. `sums` are those of all its photons, gathered with HitpointRadii.
 [[nodiscard]] SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan,
                                     const PassSums& sums, const RenderSettings& settings,
-                                    const FluxScale& scale);
+                                    const FluxScale& scale, ThreadTeam& team);
 
 }  // namespace lucerna

@@ -30,6 +30,7 @@
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/block_codec.h"
 #include "server/job_estimator.h"
+#include "tests/support/gather_sums.h"
 #include "tests/support/local_render.h"
 #include "worker/batch_tracer.h"
 #include "worker/gather.h"
@@ -174,8 +175,8 @@ Accumulation GatherOnce(const Bench& bench, const std::vector<Deposits>& deposit
   const PhotonGrid grid(deposits, bench.region, 2 * sorted[sorted.size() / 2], team);
   GatheredPhotons photons{.grid = grid};
   if (cuts) photons.features = bench.features.get();
-  return Gather(bench.eye.block, bench.radii, photons, bench.scene.materials,
-                Kernel{bench.settings.kernel}, bench.scale, team, std::atomic<bool>(false));
+  return GatherSums(bench.eye.block, bench.radii, photons, bench.scene.materials,
+                    Kernel{bench.settings.kernel}, bench.scale, team);
 }
 
 void GatherPairs(benchmark::State& state, const Bench& bench, bool cuts) {

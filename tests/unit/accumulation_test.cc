@@ -3,6 +3,7 @@
 #include "render/estimate/accumulation.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 
 #include "gtest/gtest.h"
@@ -101,6 +102,46 @@ TEST(PassSumsTest, RefusesASumThatWouldWrap) {
   ASSERT_TRUE(with_evidence.Add(evidence).ok());
   EXPECT_TRUE(absl::IsOutOfRange(with_evidence.Add(evidence)));
   EXPECT_EQ(with_evidence.evidence()[0][1], std::numeric_limits<std::int64_t>::min());
+}
+
+TEST(PassSumsTest, RowsOneByOneAreThoseOfAnAccumulation) {
+  Accumulation whole = Make({0, 2, 3}, 7);
+  whole.evidence = {{5, -6, 8}};
+  PassSums by_rows(4, 1);
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    const std::array<std::int64_t, 1> evidence = {whole.evidence[0][i]};
+    EXPECT_TRUE(by_rows.AddRow(whole.hitpoints[i], whole.counts[i], {7, 7, 7}, evidence));
+  }
+  // The rest has a tally and no rows.
+  Accumulation rest = Make({}, 0);
+  rest.evidence = {{}};
+  ASSERT_TRUE(by_rows.Add(rest).ok());
+  EXPECT_EQ(by_rows.ToAccumulation().value(), whole);
+
+  PassSums sums(4, 1);
+  ASSERT_TRUE(sums.Add(whole).ok());
+  EXPECT_EQ(sums.ToAccumulation().value(), whole) << "there and back";
+}
+
+TEST(PassSumsTest, ARowThatWouldWrapAddsNothing) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
+  const std::array<std::int64_t, 1> one = {1};
+  const std::array<std::int64_t, 1> most = {kMost};
+  PassSums sums(1, 1);
+  ASSERT_TRUE(sums.AddRow(0, 2, {1, kMost, 1}, one));
+  const auto is_as_before = [&] {
+    return sums.counts()[0] == 2 && sums.flux(0)[0] == 1 && sums.flux(1)[0] == kMost &&
+           sums.flux(2)[0] == 1 && sums.evidence()[0][0] == 1;
+  };
+  EXPECT_FALSE(sums.AddRow(0, 1, {1, 1, 1}, one));
+  EXPECT_TRUE(is_as_before());
+  EXPECT_FALSE(sums.AddRow(0, 1, {1, 0, 1}, most));
+  EXPECT_TRUE(is_as_before());
+  EXPECT_FALSE(sums.AddRow(0, std::numeric_limits<std::uint64_t>::max(), {1, 0, 1}, one));
+  EXPECT_TRUE(is_as_before());
+  // An accumulation has no room for as many photons of one hitpoint.
+  ASSERT_TRUE(sums.AddRow(0, std::uint64_t{1} << 32, {0, 0, 0}, one));
+  EXPECT_TRUE(absl::IsOutOfRange(sums.ToAccumulation().status()));
 }
 
 // Every counter, one after the other, at its end.

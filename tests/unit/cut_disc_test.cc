@@ -14,6 +14,7 @@
 #include "render/math/kernel.h"
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
+#include "tests/support/gather_sums.h"
 #include "tests/support/test_scenes.h"
 #include "worker/gather.h"
 
@@ -59,8 +60,8 @@ Gathered At(const Scene& scene, const Deposits& deposits, Vec3 position, Vec3 no
   const FeatureEdges features(scene);
   const FluxScale scale = FluxScale::ForPower(Gray(1));
   const Accumulation sum =
-      Gather(block, {radius}, {.grid = grid, .features = &features}, scene.materials,
-             Kernel{kernel}, scale, team, std::atomic<bool>(false), Evidence::kCurvature);
+      GatherSums(block, {radius}, {.grid = grid, .features = &features}, scene.materials,
+                 Kernel{kernel}, scale, team, Evidence::kCurvature);
   if (sum.size() == 0) return {};
   const auto r = static_cast<double>(radius);
   const double per_area = static_cast<double>(kStep) * static_cast<double>(kStep) / (r * r);
@@ -207,8 +208,8 @@ TEST(CutDiscTest, FillsTheSectorsBeyondAnEdge) {
     block.positions = {{-distance, 0.1F, 0}};
     block.normals_oct = {EncodeOctahedral({0, 0, 1})};
     const Accumulation sum =
-        Gather(block, {0.4F}, {.grid = grid, .features = &features}, scene.materials, Kernel{},
-               FluxScale::ForPower(Gray(1)), team, std::atomic<bool>(false), Evidence::kSectors);
+        GatherSums(block, {0.4F}, {.grid = grid, .features = &features}, scene.materials, Kernel{},
+                   FluxScale::ForPower(Gray(1)), team, Evidence::kSectors);
     ASSERT_EQ(sum.size(), 1U);
     // Photons a cell: a twelfth of the disc's area, over the lattice's step squared.
     const double expected = 3.14159 * 0.16 / 12 * 160 * 160;
@@ -246,9 +247,9 @@ TEST(CutDiscTest, HoldsContributionsInTheirRange) {
       radii.push_back(radius);
     }
   }
-  const Accumulation sum = Gather(block, radii, {.grid = grid, .features = &features},
-                                  scene.materials, Kernel{KernelKind::kConstant}, scale, team,
-                                  std::atomic<bool>(false), Evidence::kCurvature);
+  const Accumulation sum =
+      GatherSums(block, radii, {.grid = grid, .features = &features}, scene.materials,
+                 Kernel{KernelKind::kConstant}, scale, team, Evidence::kCurvature);
   ASSERT_GT(sum.size(), 20U);
   const auto most = static_cast<std::int64_t>(8 * kLargestContribution);
   for (std::size_t i = 0; i < sum.size(); ++i) {

@@ -11,6 +11,7 @@
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "render/wire/accumulation_codec.h"
+#include "tests/support/gather_sums.h"
 #include "tests/support/test_scenes.h"
 #include "worker/gather.h"
 #include "worker/photon_spectrum.h"
@@ -44,9 +45,8 @@ struct Cloud {
   [[nodiscard]] Accumulation Sum(Evidence evidence) const {
     ThreadTeam team(1);
     const PhotonGrid grid({deposits}, region, 0.3F, team);
-    const std::atomic<bool> stop = false;
-    return Gather(block, radii, {grid}, {DiffuseMaterial(0.5F)}, Kernel{},
-                  FluxScale::ForPower(Gray(1)), team, stop, evidence);
+    return GatherSums(block, radii, {grid}, {DiffuseMaterial(0.5F)}, Kernel{},
+                      FluxScale::ForPower(Gray(1)), team, evidence);
   }
 };
 

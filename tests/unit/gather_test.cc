@@ -15,6 +15,7 @@
 #include "render/math/rng.h"
 #include "render/math/warp.h"
 #include "render/transport/bsdf.h"
+#include "tests/support/gather_sums.h"
 #include "tests/support/test_scenes.h"
 
 namespace lucerna {
@@ -94,8 +95,7 @@ Accumulation GatherAll(const Case& input, const Kernel& kernel, const FluxScale&
                        int threads) {
   ThreadTeam team(threads);
   const PhotonGrid grid(Columns(input.deposits), input.region, 0.02F, team);
-  return Gather(input.block, input.radii, {grid}, input.materials, kernel, scale, team,
-                std::atomic<bool>(false));
+  return GatherSums(input.block, input.radii, {grid}, input.materials, kernel, scale, team);
 }
 
 // Caustic rows and the others gather from photons of their own; a caustic photon from a point light
@@ -129,8 +129,8 @@ TEST(GatherTest, CausticRowsTakeCausticPhotonsAloneAndWeighThem) {
     caustics[0].emission_densities = {emission_density, emission_density};
     const PhotonGrid grid(Columns(input.deposits), input.region, 0.1F, team);
     const PhotonGrid caustic_grid(caustics, input.region, 0.1F, team);
-    return Gather(input.block, input.radii, {grid, &caustic_grid, &weight}, input.materials,
-                  Kernel{KernelKind::kConstant}, scale, team, std::atomic<bool>(false));
+    return GatherSums(input.block, input.radii, {grid, &caustic_grid, &weight}, input.materials,
+                      Kernel{KernelKind::kConstant}, scale, team);
   };
   const Accumulation of_point = sums(HUGE_VALF);
   ASSERT_EQ(of_point.hitpoints, (std::vector<std::uint32_t>{0, 1}));
@@ -329,8 +329,7 @@ TEST(GatherTest, TakesEveryPhotonWithoutNormals) {
     ThreadTeam team(1);
     const PhotonGrid grid(columns, input.region, 0.02F, team);
     EXPECT_FALSE(grid.has_normals());
-    return Gather(input.block, input.radii, {grid}, input.materials, Kernel{}, scale, team,
-                  std::atomic<bool>(false));
+    return GatherSums(input.block, input.radii, {grid}, input.materials, Kernel{}, scale, team);
   };
   EXPECT_NE(without(), GatherAll(input, Kernel{}, scale, 1)) << "normals at random";
   const Vec3 up = {0, 0, 1};

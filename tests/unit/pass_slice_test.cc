@@ -55,6 +55,12 @@ RenderSettings Settings(RadiusControllerKind controller, KernelKind kernel) {
   return settings;
 }
 
+SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums& sums,
+                      const RenderSettings& settings, const FluxScale& scale) {
+  ThreadTeam team(2);
+  return lucerna::SliceOfPass(pass, plan, sums, settings, scale, team);
+}
+
 // One pixel, one hitpoint a pass, PPM with immediate radii: tau' = (tau + Phi) r'^2 / r^2 and
 // L = tau / (pi r^2 P passes), as in Hachisuka et al. 2008, against the sum that is kept here.
 TEST(SliceOfPassTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
