@@ -169,6 +169,7 @@ StatusOr<v1::Job> LocalRuns::FollowOwn(const OutputOptions& output_options) {
             newest.pause_cause() == v1::PAUSE_CAUSE_DISPUTE) {
           return absl::AbortedError(newest.condition());
         }
+        if (on_news_) on_news_(newest);
         return cluster_->Check();
       });
   if (!job.ok()) {

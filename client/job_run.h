@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "client/connection.h"
 #include "client/local_cluster.h"
@@ -65,6 +66,8 @@ class LocalRuns {
                                          const OutputOptions& output_options);
   // The image of a job that succeeded.
   [[nodiscard]] StatusOr<Image> ImageOf(const v1::Job& job);
+  // Called several times a second while a job runs, with the newest news of it; the job goes on.
+  void WhileItRuns(std::function<void(const v1::Job&)> on_news) { on_news_ = std::move(on_news); }
   // Of the job that was run last; empty before.
   [[nodiscard]] const std::string& job_id() const { return job_id_; }
 
@@ -75,6 +78,7 @@ class LocalRuns {
   StatusOr<v1::Job> FollowOwn(const OutputOptions& output_options);
 
   bool has_state_ = false;
+  std::function<void(const v1::Job&)> on_news_;
   std::string job_id_;
   std::unique_ptr<LocalCluster> cluster_;
   std::unique_ptr<ClientConnection> connection_;

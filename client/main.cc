@@ -53,6 +53,18 @@ std::optional<double> StopsOf(const std::string& text) {
   return stops;
 }
 
+// [s]. Errors: CLI::ValidationError.
+double SecondsOf(const char* flag, const std::string& text) {
+  const Setting& time = *FindSetting("time_s");
+  RenderOverrides parsed;
+  const Status status = ParseSetting(time, text, parsed);
+  if (!status.ok() || !(*parsed.time_s > 0)) {
+    throw CLI::ValidationError(
+        absl::StrCat(flag, " must be a time above 0, like 90s, 5m or 1.5h, not \"", text, "\""));
+  }
+  return *parsed.time_s;
+}
+
 ToneCurve CurveOf(const std::string& name) {
   const StatusOr<ToneCurve> curve = ParseToneCurve(name);
   if (!curve.ok()) {
@@ -77,6 +89,8 @@ int Run(int argc, char** argv) {
 
   OutputOptions output_options;
   RenderRequest request;
+  std::vector<std::string> scenes;
+  std::string frames;
   ClusterOptions cluster;
   OutputPaths fetched;
   ReportPaths report_paths;
@@ -135,11 +149,14 @@ int Run(int argc, char** argv) {
     to->add_option("--token-file", token_file,
                    "file that holds your token (default: what LUCERNA_TOKEN says)");
   };
-  const auto add_scene = [](CLI::App* to, SceneSource& source) {
-    to->add_option("SCENE", source.path, "scene file: pbrt-v4 or glTF 2.0")->required();
+  const auto add_allowed = [](CLI::App* to, SceneSource& source) {
     to->add_option("--allow-path", source.allowed_folders,
                    "the scene may name files below this folder by absolute paths and by ..")
         ->allow_extra_args(false);
+  };
+  const auto add_scene = [&](CLI::App* to, SceneSource& source) {
+    to->add_option("SCENE", source.path, "scene file: pbrt-v4, glTF 2.0 or Mitsuba")->required();
+    add_allowed(to, source);
   };
   const auto add_display = [&](CLI::App* to) {
     to->add_option_function<std::string>(
@@ -165,8 +182,18 @@ int Run(int argc, char** argv) {
     AddSettingFlags(*to, SettingRole::kDecidesPixels, overrides);
   };
   const auto add_render_flags = [&](CLI::App* to) {
-    add_scene(to, request.scene);
+    to->add_option("SCENE", scenes,
+                   "scene files: pbrt-v4, glTF 2.0 or Mitsuba; #### stands for the number of a "
+                   "frame")
+        ->required();
+    add_allowed(to, request.scene);
+    to->add_option("--frames", frames, "numbers of frames, like 1-24 or 1,5,8-10");
     add_outputs(to, request.outputs);
+    to->add_option_function<std::string>(
+          "--save-every",
+          [&](const std::string& text) { request.save_every_s = SecondsOf("--save-every", text); },
+          "write the image so far so often, like 10m")
+        ->type_name("TIME");
     add_image_flags(to, request.overrides);
     AddSettingFlags(*to, SettingRole::kStopsJob, request.overrides);
     to->add_option("--reference", request.reference, "EXR file to measure the true error by");
@@ -188,7 +215,9 @@ int Run(int argc, char** argv) {
   CLI::App* render = command("render", "render a scene on this machine", [&]() -> Status {
     LUCERNA_RETURN_IF_ERROR(find_programs());
     request.keeps_checkpoints = !keeps_no_checkpoints;
-    return Render(request, cluster, output_options);
+    LUCERNA_ASSIGN_OR_RETURN(const std::vector<RenderRequest> requests,
+                             RequestsOf(request, scenes, frames, /*names_images=*/true));
+    return Render(requests, cluster, output_options);
   });
   add_render_flags(render);
   CLI::Option* no_checkpoints =
@@ -201,8 +230,13 @@ int Run(int argc, char** argv) {
   add_quiet(render);
   add_no_preview(render);
 
-  CLI::App* submit = command("submit", "send a scene to a coordinator",
-                             [&] { return Submit(request, server, output_options); });
+  CLI::App* submit = command("submit", "send scenes to a coordinator", [&]() -> Status {
+    LUCERNA_ASSIGN_OR_RETURN(const std::vector<RenderRequest> requests,
+                             RequestsOf(request, scenes, frames, /*names_images=*/false));
+    for (const RenderRequest& one : requests)
+      LUCERNA_RETURN_IF_ERROR(Submit(one, server, output_options));
+    return absl::OkStatus();
+  });
   add_render_flags(submit);
   submit
       ->add_option("--priority", request.priority,
@@ -539,7 +573,6 @@ int Run(int argc, char** argv) {
     if (!is_done) std::fputs(Suggestion(app, words).c_str(), stderr);
     return End(is_done ? ExitCode::kDone : ExitCode::kUsage);
   }
-  if (*render && request.outputs.empty()) request.outputs.image = ImageNameOf(request.scene.path);
   if (*fetch && fetched.empty()) {
     std::fputs("lucerna: say where the image goes, with -o FILE.exr or --png FILE.png\n", stderr);
     return End(ExitCode::kUsage);

@@ -1,10 +1,12 @@
 #include "client/commands/job_commands.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <set>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -14,10 +16,14 @@
 
 #include "client/connection.h"
 #include "client/exit_code.h"
+#include "client/frames.h"
 #include "client/interruption.h"
 #include "client/job_run.h"
 #include "client/scene_reading.h"
+#include "client/usage.h"
 #include "client/view/report.h"
+#include "render/base/clock.h"
+#include "render/base/escape.h"
 #include "render/base/files.h"
 #include "render/film/picture_file.h"
 #include "render/film/png_file.h"
@@ -115,6 +121,33 @@ StatusOr<SavedImage> Save(ClientConnection& connection, const std::string& job_i
   return saved;
 }
 
+// Writes the image so far from time to time. What fails is said once, and tried again.
+class PeriodicSave {
+ public:
+  PeriodicSave(const RenderRequest& request, const Display& display)
+      : request_(request), display_(display), last_(SystemClock().Steady()) {}
+
+  void Consider(ClientConnection& connection, const v1::Job& job) {
+    const std::chrono::duration<double> since = SystemClock().Steady() - last_;
+    if (!(request_.save_every_s > 0) || since.count() < request_.save_every_s) return;
+    if (job.progress().passes() == 0 || HasEnded(job.state())) return;
+    const Status status = Save(connection, job.job_id(), request_.outputs, display_).status();
+    // From here, so that a slow disk does not take all of the time.
+    last_ = SystemClock().Steady();
+    if (!status.ok() && !has_warned_) {
+      std::fprintf(stderr, "lucerna: warning: the image so far was not saved: %s\n",
+                   EscapedLines(std::string(status.message())).c_str());
+    }
+    has_warned_ = !status.ok();
+  }
+
+ private:
+  const RenderRequest& request_;
+  const Display& display_;
+  SteadyTime last_;
+  bool has_warned_ = false;
+};
+
 Status SaveAndReport(ClientConnection& connection, const v1::Job& job, const OutputPaths& outputs,
                      const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckSucceeded(job));
@@ -131,10 +164,6 @@ Status SaveAndReport(ClientConnection& connection, const v1::Job& job, const Out
 Status Nothing(const v1::Job& /*job*/) {
   return absl::OkStatus();
 }
-
-}  // namespace
-
-namespace {
 
 // Beside the image; empty when that is no file (a device, a pipe), or none are wanted.
 std::string CheckpointFolder(const RenderRequest& request) {
@@ -169,8 +198,33 @@ Status EndInterrupted(LocalRuns& runs, const RenderRequest& request, bool has_ch
 
 }  // namespace
 
-Status Render(const RenderRequest& request, const ClusterOptions& cluster_options,
-              const OutputOptions& output_options) {
+StatusOr<std::vector<RenderRequest>> RequestsOf(const RenderRequest& request,
+                                                const std::vector<std::string>& scenes,
+                                                std::string_view frames, bool names_images) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::vector<SceneFrame> found, FramesOf(scenes, frames));
+  std::vector<RenderRequest> requests;
+  std::set<std::string> images;
+  for (const SceneFrame& frame : found) {
+    RenderRequest& one = requests.emplace_back(request);
+    one.scene.path = frame.scene;
+    one.outputs.image = WithFrameNumber(request.outputs.image, frame.number);
+    one.outputs.png = WithFrameNumber(request.outputs.png, frame.number);
+    if (names_images && one.outputs.empty()) one.outputs.image = ImageNameOf(frame.scene);
+    for (const std::string& image : {one.outputs.image, one.outputs.png}) {
+      if (image.empty() || images.insert(image).second) continue;
+      return Failure(
+          ExitCode::kUsage,
+          absl::StrCat("two scenes would be written to ", image,
+                       "; put #### in its name, which the number of the frame replaces"));
+    }
+  }
+  return requests;
+}
+
+namespace {
+
+Status RenderOne(const RenderRequest& request, const ClusterOptions& cluster_options,
+                 const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene, request.overrides, output_options.quiet));
@@ -191,6 +245,9 @@ Status Render(const RenderRequest& request, const ClusterOptions& cluster_option
   {
     LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(options));
     DirectoryFiles files = FilesOf(request.scene);
+    PeriodicSave periodic(request, output_options.display);
+    runs->WhileItRuns(
+        [&](const v1::Job& newest) { periodic.Consider(runs->connection(), newest); });
     job = request.resumes
               ? runs->Resume(manifest, request.overrides, output_options)
               : runs->Run(files, manifest, request.overrides, request.reference, output_options);
@@ -218,6 +275,24 @@ Status Render(const RenderRequest& request, const ClusterOptions& cluster_option
   return job.status();
 }
 
+}  // namespace
+
+Status Render(const std::vector<RenderRequest>& requests, const ClusterOptions& cluster,
+              const OutputOptions& output_options) {
+  for (RenderRequest request : requests) {
+    std::error_code ignored;
+    if (request.resumes && requests.size() > 1 &&
+        !std::filesystem::exists(CheckpointFolder(request), ignored)) {
+      const OutputPaths& outputs = request.outputs;
+      if (std::filesystem::exists(outputs.image.empty() ? outputs.png : outputs.image, ignored))
+        continue;
+      request.resumes = false;
+    }
+    LUCERNA_RETURN_IF_ERROR(RenderOne(request, cluster, output_options));
+  }
+  return absl::OkStatus();
+}
+
 Status Submit(const RenderRequest& request, const Endpoint& server,
               const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
@@ -232,7 +307,12 @@ Status Submit(const RenderRequest& request, const Endpoint& server,
     Print(output_options.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
     return absl::OkStatus();
   }
-  const auto job = FollowToEnd(*connection, submitted.job_id(), true, output_options, Nothing);
+  PeriodicSave periodic(request, output_options.display);
+  const auto job = FollowToEnd(*connection, submitted.job_id(), true, output_options,
+                               [&](const v1::Job& newest) {
+                                 periodic.Consider(*connection, newest);
+                                 return absl::OkStatus();
+                               });
   if (!job.ok()) {
     if (ExitCodeOf(job.status()) != ExitCode::kInterrupted) return job.status();
     return Failure(ExitCode::kInterrupted,

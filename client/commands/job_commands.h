@@ -5,6 +5,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "client/local_cluster.h"
@@ -30,15 +31,26 @@ struct RenderRequest {
   RenderOverrides overrides;
   std::string reference;  // EXR file to measure the true error by; empty: none
   OutputPaths outputs;
+  // The image so far is written so often [s]; 0: at the end alone.
+  double save_every_s = 0;
   int priority = 0;               // of `submit`
   bool keeps_checkpoints = true;  // of `render`: in a folder beside the image
   bool resumes = false;           // goes on from there
 };
 
-// Renders on a coordinator and workers of its own. An interruption writes the image so far and
-// leaves the checkpoints.
-[[nodiscard]] Status Render(const RenderRequest& request, const ClusterOptions& cluster,
-                            const OutputOptions& output_options);
+// The requests of a command for several scenes: `request` with each of them, and with the number of
+// its frame in the names of its images (client/frames.h). An image without a name is called as the
+// scene when `names_images`.
+// Errors: Failure(kUsage) when two would write the same file.
+[[nodiscard]] StatusOr<std::vector<RenderRequest>> RequestsOf(
+    const RenderRequest& request, const std::vector<std::string>& scenes, std::string_view frames,
+    bool names_images);
+
+// Renders on a coordinator and workers of its own, one after the other. An interruption writes the
+// image so far and leaves the checkpoints. Of several that go on after one, those whose image is
+// there without checkpoints are done.
+[[nodiscard]] Status Render(const std::vector<RenderRequest>& requests,
+                            const ClusterOptions& cluster, const OutputOptions& output_options);
 
 // Sends the job and prints its id; with outputs it waits and fetches too. An interruption leaves
 // the job running.

@@ -287,6 +287,56 @@ TEST_F(ClientCommandsTest, ASceneAloneIsRenderedToAnImageOfItsName) {
   EXPECT_EQ(Images(), std::vector<std::string>{"caustic.exr"});
 }
 
+TEST_F(ClientCommandsTest, FramesAreRenderedToImagesOfTheirNumbers) {
+  // Frames 7 and 8 have other seeds.
+  for (const std::string seed : {"7", "8"}) {
+    std::string scene = Contents(SceneOfTests("corner.pbrt"));
+    const std::string integrator = "Integrator \"sppm\"";
+    const std::size_t at = scene.find(integrator);
+    ASSERT_NE(at, std::string::npos);
+    scene.insert(at + integrator.size(), " \"integer seed\" [" + seed + "]");
+    std::ofstream(In("room.000" + seed + ".pbrt")) << scene;
+  }
+  const std::vector<std::string> small = {"--size", "16x16", "--passes", "2", "--quiet"};
+  const auto with_small = [&](std::vector<std::string> words) {
+    words.insert(words.end(), small.begin(), small.end());
+    return Run(words);
+  };
+  const Ran frames =
+      with_small({"render", "room.####.pbrt", "--frames", "7-8", "-o", "out.###.exr"});
+  ASSERT_EQ(frames.code, 0) << frames.err;
+  const auto digest = [&](const std::string& file) { return Run({"digest", file}).out; };
+  EXPECT_NE(digest("out.007.exr"), digest("out.008.exr"));
+  ASSERT_EQ(with_small({"render", "room.0008.pbrt", "-o", "alone.exr"}).code, 0);
+  EXPECT_EQ(digest("out.008.exr").substr(0, 64), digest("alone.exr").substr(0, 64));
+  // Scenes by their names, to images of their names.
+  ASSERT_EQ(with_small({"render", "room.0007.pbrt", "room.0008.pbrt"}).code, 0);
+  EXPECT_TRUE(std::filesystem::exists(In("room.0007.exr")));
+  EXPECT_EQ(digest("room.0008.exr").substr(0, 64), digest("alone.exr").substr(0, 64));
+
+  const Ran one_file = with_small({"render", "room.0007.pbrt", "room.0008.pbrt", "-o", "x.exr"});
+  EXPECT_EQ(one_file.code, 2);
+  EXPECT_NE(one_file.err.find("two scenes would be written to x.exr"), std::string::npos)
+      << one_file.err;
+  EXPECT_EQ(with_small({"render", "room.####.pbrt"}).code, 2);
+}
+
+TEST_F(ClientCommandsTest, TheImageSoFarIsSavedFromTimeToTime) {
+  const pid_t pid = Start({"render", SceneOfTests("corner.pbrt"), "--size", "16x16", "--passes",
+                           "1000000", "--save-every", "50ms", "-o", "out.exr", "--quiet"});
+  // An image is there while the render goes on.
+  bool is_there = false;
+  for (int i = 0; i < 600 && !is_there; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    const StatusOr<std::string> bytes = ReadFile(In("out.exr"));
+    is_there = bytes.ok() && DecodeExr(*bytes).ok();
+  }
+  EXPECT_TRUE(is_there);
+  EXPECT_EQ(::waitpid(pid, nullptr, WNOHANG), 0) << "it goes on";
+  ::kill(pid, SIGINT);
+  EXPECT_EQ(Finish(pid).code, 130);
+}
+
 TEST_F(ClientCommandsTest, TheNameOfTheImageIsItsFormat) {
   for (const char* name : {"a.png", "a.pfm", "a.hdr", "a.exr"})
     EXPECT_EQ(Run(SmallRender({"-o", name})).code, 0) << name;
