@@ -14,8 +14,10 @@ namespace {
 constexpr std::size_t kTimesKept = 31;
 // With fewer commits than this the usual time of one is unknown.
 constexpr std::size_t kTimesNeeded = 3;
-// A slice shall take no more of the time that a job has left.
-constexpr double kShareOfTimeLeft = 0.25;
+// A slice shall be there when so much of the time that a job has left is over, by the usual time
+// from lending to merging. With a quarter, slices of the last minute of a large farm were so short
+// that they filled its link.
+constexpr double kShareOfTimeLeft = 0.5;
 // Of a registration, so many of its last leases are known.
 constexpr std::size_t kMostPast = 64;
 // So many audits are looked at for one worker. A worker is passed over only by audits that it has a
