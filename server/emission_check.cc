@@ -38,9 +38,11 @@ EmissionCheck::EmissionCheck(const LightSet& lights) {
   const double rounding = kRounding + kRoundingOfTerm * emitters;
   const double even_share = sending > 1 ? kEvenPhotonShare : 0;
   for (const LightGroup& light : lights.lights()) {
-    // Within a cone or a pixel of a picture photons differ.
-    const bool differ = light.kind == EmitterKind::kSpot || light.kind == EmitterKind::kProjection;
-    may_emit_less_ |= !is_ordinary || differ || light.lights > 1;
+    // Within a cone, a pixel or a cell of a picture photons differ.
+    const bool is_mixed = light.kind == EmitterKind::kSpot ||
+                          light.kind == EmitterKind::kProjection || light.lights > 1;
+    const bool differ = is_mixed || light.largest_share > 1;
+    may_emit_less_ |= !is_ordinary || differ;
     if (!is_ordinary) {
       lights_.push_back({0, kLargestEnergy});
       continue;
@@ -51,9 +53,9 @@ EmissionCheck::EmissionCheck(const LightSet& lights) {
     const double flux = 1 / ((1 - even_share) / total + even);
     const double units = std::ldexp(flux / total, kEnergyBits);
     Range range = {units * (1 - rounding) - 1, units * (1 + rounding) + 1};
-    if (differ) range = {0, kMostOfSpot * range.most};
-    // Several lights together, of any kind: fainter ones have less.
-    if (light.lights > 1) range = {0, kMostOfSpot * range.most};
+    // Of several lights together, of any kind, fainter ones have less.
+    const auto largest = static_cast<double>(light.largest_share);
+    if (differ) range = {0, std::max(is_mixed ? kMostOfSpot : 1, largest) * range.most};
     lights_.push_back({std::clamp(range.least, 0.0, kLargestEnergy),
                        std::clamp(range.most, 0.0, kLargestEnergy)});
   }

@@ -439,6 +439,8 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       if (IsBlack(flux)) return end(PhotonEnd::kAbsorbed, energy.absorbed);
       if (flight.end == Flight::End::kScattered) {
         if (!IsFinite(flight.position)) return end(PhotonEnd::kNotFinite, energy.dropped);
+        if (landing == 0 && !lights_.Lights(emission.emitter, flight.position))
+          return end(PhotonEnd::kAbsorbed, energy.absorbed);
         const bool has_room = scale_.HasRoomFor(flux);
         if (!has_room) ++landed.excess;
         watcher.ScatteredByMedium(flight.position, medium, flight.length, flux, has_room);
@@ -493,6 +495,8 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       watcher.TookWavelength(wavelength.nm());
     }
     watcher.Landed(hit, surface, material, flux);
+    if (landing == 0 && !lights_.Lights(emission.emitter, surface.position))
+      return end(PhotonEnd::kAbsorbed, energy.absorbed);
     const bool is_smoothed = parts.shading_normals && surface.has_shading_normal;
     if (is_smoothed) {
       const float shading = Dot(wo, surface.shading_normal);

@@ -11,6 +11,16 @@
 namespace lucerna {
 namespace {
 
+// As of a texture whose colours are in [0, 1].
+TextureDetail PictureDetail(const AreaLight& light) {
+  Texture texture;
+  texture.kind = Texture::Kind::kPicture;
+  texture.wrap_u = texture.wrap_v = Texture::Wrap::kClamp;
+  texture.picture = light.picture;
+  if (light.largest_pixel > 0) texture.scale = 1 / light.largest_pixel;
+  return TextureDetails({texture}).front();
+}
+
 // Twice the largest radius that a job begins with: edges farther from a photon's leg than that are
 // farther than its kernel will ever reach. Follows from scene and settings alone, because every
 // worker must search equally far. With automatic radii it is judged for the middle of the scene.
@@ -67,6 +77,11 @@ SpectrumTracer::SpectrumTracer(const Scene& scene, const RenderSettings& setting
             return needs.Uses(Part::kCurvedMirrors) && HasNarrowLobes(material);
           }) {
   if (needs.Uses(Part::kTextureDetail)) texture_details_ = TextureDetails(scene.textures);
+  const auto has_picture = [](const AreaLight& light) { return light.picture != nullptr; };
+  if (std::ranges::any_of(scene.area_lights, has_picture)) {
+    for (const AreaLight& light : scene.area_lights)
+      picture_details_.push_back(has_picture(light) ? PictureDetail(light) : TextureDetail());
+  }
   for (const auto& light : lights.infinite_lights())
     infinite_spectra_.push_back(light->MeasureSpectrum());
   MeasureEmitters();
@@ -101,14 +116,16 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
   const Vec3 direction = emission.ray.direction;
   switch (emitter.kind) {
     case EmitterKind::kTriangle:
-      return {
-          AreaSource(
-              surface_moments_[surface_of_[first_of_mesh_[emitter.geometry] + emitter.primitive]],
-              direction, limits_),
-          false};
-#define LUCERNA_CASE(Name, list, name) \
-  case EmitterKind::k##Name:           \
-    return {SpectrumOf(scene_.list[emitter.primitive], direction, limits_), false};
+      return {WithPicture(AreaSource(surface_moments_[surface_of_[first_of_mesh_[emitter.geometry] +
+                                                                  emitter.primitive]],
+                                     direction, limits_),
+                          emitter, emission.ray.origin),
+              false};
+#define LUCERNA_CASE(Name, list, name)                                                           \
+  case EmitterKind::k##Name:                                                                     \
+    return {WithPicture(SpectrumOf(scene_.list[emitter.primitive], direction, limits_), emitter, \
+                        emission.ray.origin),                                                    \
+            false};
       LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
 #undef LUCERNA_CASE
 #define LUCERNA_CASE(Name, name) \
@@ -119,6 +136,31 @@ SpectrumTracer::Carried SpectrumTracer::Leave(const Emission& emission) const {
     default:
       return {lights_.DeltaSource(emission, edge_strength_, limits_).value_or(Spectrum()), false};
   }
+}
+
+Spectrum SpectrumTracer::WithPicture(Spectrum source, const Emitter& emitter, Vec3 place) const {
+  if (emitter.spread < 0) return source;
+  SurfacePoint point;
+  point.position = place;
+  point.primitive = emitter.primitive;
+  const ShapeTraits* traits = nullptr;
+  switch (emitter.kind) {
+#define LUCERNA_CASE(Name, list, name)                       \
+  case EmitterKind::k##Name:                                 \
+    point.geometry = GeometryOf(scene_, ShapeKind::k##Name); \
+    traits = &scene_.list[emitter.primitive].traits;         \
+    break;
+    LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    default:
+      point.geometry = emitter.geometry;
+      traits = &scene_.meshes[emitter.geometry].traits;
+      break;
+  }
+  const TextureDetail& detail = picture_details_[static_cast<std::size_t>(traits->area_light)];
+  const UvSlopes slopes = UvSlopesAt(scene_, point);
+  source.s += detail.u * slopes.u + detail.v * slopes.v;
+  return limits_.Clamp(source);
 }
 
 void SpectrumTracer::Fly(Carried& carried, const Ray& ray, float distance, Shadows shadows) const {

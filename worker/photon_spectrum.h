@@ -58,6 +58,8 @@ class SpectrumTracer {
                  const Bounds& bounds, const LightSet& lights);
   void MeasureEmitters();
   [[nodiscard]] SurfaceBend BendAt(const SurfacePoint& surface, Vec3 wo) const;
+  // Adds the detail of the picture that the emitter shows, if any.
+  [[nodiscard]] Spectrum WithPicture(Spectrum source, const Emitter& emitter, Vec3 place) const;
   // Of the surface's texture, along the surface [1/length²].
   [[nodiscard]] double TextureDetailAt(const SurfacePoint& surface, const Material& material) const;
 
@@ -75,6 +77,7 @@ class SpectrumTracer {
   std::vector<std::uint32_t> surface_of_;       // [triangles of emitting meshes]
   std::vector<std::size_t> first_of_mesh_;      // [meshes] into surface_of_
   std::vector<TextureDetail> texture_details_;  // [textures]
+  std::vector<TextureDetail> picture_details_;  // [area lights], or empty: none has a picture
   std::vector<std::unique_ptr<const InfiniteSpectrum>> infinite_spectra_;  // [infinite lights]
 };
 

@@ -52,6 +52,10 @@ void WarnOfMissingUvs(const Scene& scene, const SourceLocation& whole, Diagnosti
     bool is_textured = needs_uv[number] != 0;
     for (const std::int32_t part : scene.materials[number].mixed)
       is_textured = is_textured || (part >= 0 && needs_uv[static_cast<std::size_t>(part)] != 0);
+    if (const std::int32_t light = mesh.traits.area_light; light != kNoAreaLight) {
+      is_textured =
+          is_textured || scene.area_lights[static_cast<std::size_t>(light)].picture != nullptr;
+    }
     if (mesh.uvs.empty() && is_textured) {
       diagnostics.Warning(whole,
                           "a mesh with a texture has no uv: every triangle shows half of it");

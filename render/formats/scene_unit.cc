@@ -30,6 +30,14 @@ double FarthestOf(const Scene& scene) {
   }
   for (const Sensor& sensor : scene.sensors)
     farthest = std::max(farthest, static_cast<double>(MaxAbs(sensor.position)));
+  for (const InfiniteLight& light : scene.infinite_lights) {
+    if (light.portal) {
+      const Portal& portal = *light.portal;
+      farthest = std::max({farthest, static_cast<double>(MaxAbs(portal.corner)),
+                           static_cast<double>(MaxAbs(portal.along_x)),
+                           static_cast<double>(MaxAbs(portal.along_y))});
+    }
+  }
   ForEachDeltaList(scene, [&](const auto& lights) {
     for (const auto& light : lights) {
       if (!light.kIsAtInfinity)
@@ -74,6 +82,12 @@ Status ChooseUnit(Scene& scene) {
   for (Medium& medium : scene.media) {
     medium.absorption *= static_cast<float>(scene.unit);
     medium.scattering *= static_cast<float>(scene.unit);
+  }
+  for (InfiniteLight& light : scene.infinite_lights) {
+    if (!light.portal) continue;
+    for (Vec3* const vector :
+         {&light.portal->corner, &light.portal->along_x, &light.portal->along_y})
+      *vector = ScaledBy(*vector, factor);
   }
   bool has_strengths = true;
   ForEachDeltaList(scene, [&](auto& lights) {

@@ -46,6 +46,19 @@ class PiecewiseConstant2D {
     const auto row = std::min(static_cast<std::size_t>(y), rows_.size() - 1);
     return {PlaceIn<float>(RowOf(row), u2), y};
   }
+  // The density with which Sample draws a place, over that of an even one.
+  [[nodiscard]] float Density(Vec2 place) const {
+    const auto cell = [](float at, std::size_t cells) {
+      return std::min(static_cast<std::size_t>(std::max(at, 0.0F)), cells - 1);
+    };
+    const std::size_t y = cell(place.y, rows_.size());
+    const std::size_t x = cell(place.x, width_);
+    const std::span<const float> row = RowOf(y);
+    const double of_row = rows_[y] - (y == 0 ? 0 : rows_[y - 1]);
+    const float in_row = row[x] - (x == 0 ? 0 : row[x - 1]);
+    return static_cast<float>(of_row * static_cast<double>(rows_.size())) *
+           (in_row * static_cast<float>(width_));
+  }
   // With which u1 (x) and u2 (y), in [0, 1], Sample draws this place, about.
   [[nodiscard]] Vec2 NumbersAt(Vec2 place) const {
     const auto within = [](float at, std::size_t cells) {

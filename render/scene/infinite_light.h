@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "render/math/rgb.h"
 #include "render/scene/shape_traits.h"
@@ -16,9 +17,18 @@
 // ROW(Name, name): InfiniteLight::Kind::kName, and its name in messages.
 #define LUCERNA_INFINITE_LIGHTS(ROW)          \
   ROW(Infinite, "constant environment light") \
-  ROW(Environment, "environment map")
+  ROW(Environment, "environment map")         \
+  ROW(Portal, "environment light behind a portal")
 
 namespace lucerna {
+
+// A rectangle through which light comes: corner + s·along_x + t·along_y for s and t in [0, 1].
+// Light goes against along_x × along_y. As in pbrt-v4, a point on the other side sees none, and
+// neither do rays that begin there.
+struct Portal {
+  Vec3 corner;
+  Vec3 along_x, along_y;  // at right angles, not zero
+};
 
 struct InfiniteLight {
 #define LUCERNA_KIND(Name, name) k##Name,
@@ -30,7 +40,8 @@ struct InfiniteLight {
   // math/equal_area_square.h, each pixel an even patch. Row 0 is v = 0.
   std::shared_ptr<const Picture> map = nullptr;
   ShapeAxes axes = {};          // of the map, in the world
-  Kind kind = Kind::kInfinite;  // the same everywhere; kEnvironment: a map
+  Kind kind = Kind::kInfinite;  // the same everywhere; kEnvironment: a map; kPortal: either
+  std::optional<Portal> portal = std::nullopt;  // of kPortal
 
   // Whether it is brighter from some directions than from others.
   [[nodiscard]] bool HasDetail() const {

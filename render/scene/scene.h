@@ -13,7 +13,7 @@
 //   S2  Every index is in range: triangle -> vertex, shape -> material, shape -> area light,
 //       material -> texture, shape, light and camera -> medium; a texture is made of textures
 //       before it. A texture that needs a picture has one, and the picture of an infinite light is
-//       square.
+//       square. A light behind a portal has one, and no other has.
 //   S3  Normals are unit length or zero (zero: use the geometric normal).
 //       An object's meshes are not empty, and an instance's object exists.
 //   S4  Reflectances are in [0, 1], those of textures once they are looked up; emitted quantities,
@@ -44,9 +44,18 @@ namespace lucerna {
 
 // Emission of the surface of a shape.
 struct AreaLight {
-  Rgb radiance;            // [W·m⁻²·sr⁻¹], scale and power already applied
+  // [W·m⁻²·sr⁻¹], scale and power already applied; with a picture, what its pixels are multiplied
+  // by.
+  Rgb radiance;
   bool two_sided = false;  // else the side that the shape's outward normal points to
+  // Over the shape's u and v, as PictureColor has it with its edges clamped.
+  std::shared_ptr<const Picture> picture = nullptr;
+  float largest_pixel = 1;  // of `picture`, any channel
 
+  // No channel of the radiance is anywhere larger.
+  [[nodiscard]] Rgb Largest() const {
+    return picture == nullptr ? radiance : radiance * largest_pixel;
+  }
   bool operator==(const AreaLight&) const = default;
 };
 

@@ -130,6 +130,10 @@ struct Texture {
 
 inline constexpr std::int32_t kNoTexture = -1;
 
+// A picture at (u, v), interpolated between the centres of its four nearest pixels.
+[[nodiscard]] Rgb PictureColor(const Picture& picture, Vec2 uv, Texture::Wrap wrap_u,
+                               Texture::Wrap wrap_v);
+
 // What each kind of texture is at a place. `textures` are those of the scene, of which its parts
 // are some.
 #define LUCERNA_DECLARE(Name, name)                                                         \

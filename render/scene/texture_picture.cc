@@ -37,10 +37,11 @@ Neighbours Around(float place, int count, Texture::Wrap wrap) {
   return {index(first), index(first + 1), pixel - below};
 }
 
-Rgb Interpolated(const Texture& texture, Vec2 uv) {
-  const Picture& picture = *texture.picture;
-  const Neighbours x = Around(uv.x, picture.width, texture.wrap_u);
-  const Neighbours y = Around(1 - uv.y, picture.height, texture.wrap_v);
+}  // namespace
+
+Rgb PictureColor(const Picture& picture, Vec2 uv, Texture::Wrap wrap_u, Texture::Wrap wrap_v) {
+  const Neighbours x = Around(uv.x, picture.width, wrap_u);
+  const Neighbours y = Around(1 - uv.y, picture.height, wrap_v);
   const auto at = [&](int column, int row) {
     return column < 0 || row < 0 ? Rgb{} : picture.At(column, row);
   };
@@ -49,11 +50,10 @@ Rgb Interpolated(const Texture& texture, Vec2 uv) {
   return above * (1 - y.share) + below * y.share;
 }
 
-}  // namespace
-
 Rgb LookUpPicture(std::span<const Texture> /*textures*/, const Texture& texture,
                   const TexturePlace& place) {
-  Rgb color = Interpolated(texture, texture.mapping.Map(place));
+  Rgb color =
+      PictureColor(*texture.picture, texture.mapping.Map(place), texture.wrap_u, texture.wrap_v);
   color *= texture.scale;
   color *= texture.tint;
   if (texture.is_inverted) {

@@ -126,7 +126,8 @@ BrightOutlines FindBrightOutlines(const EyePathTracer& tracer) {
   Marker marker(tracer);
   const auto is_bright = [&](const ShapeTraits& traits) {
     return traits.area_light != kNoAreaLight &&
-           tracer.IsBright(scene.area_lights[static_cast<std::size_t>(traits.area_light)].radiance);
+           tracer.IsBright(
+               scene.area_lights[static_cast<std::size_t>(traits.area_light)].Largest());
   };
   for (const TriangleMesh& mesh : scene.meshes) {
     if (!is_bright(mesh.traits)) continue;

@@ -187,7 +187,8 @@ Rgb EyePathTracer::BrightPart(Rgb emitted) const {
 
 Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, PathWavelength wavelength) const {
   Hit hit;
-  if (!FindFirst(ray, {}, hit)) return BrightPart(lights_.InfiniteRadiance(ray.direction));
+  if (!FindFirst(ray, {}, hit))
+    return BrightPart(lights_.InfiniteRadiance(ray.origin, ray.direction));
   SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
   const Vec3 wo = -ray.direction;
   const Rgb bright = BrightPart(lights_.EmittedRadiance(surface, wo));
@@ -248,7 +249,7 @@ Rgb EyePathTracer::BrightAtCentre(int x, int y) const {
       CameraRayThrough(settings_.crop_x0 + x + 0.5, settings_.crop_y0 + y + 0.5, Vec3{});
   Hit hit;
   if (!intersector_.Intersect(ray, hit)) {
-    return BrightPart(lights_.InfiniteRadiance(ray.direction));
+    return BrightPart(lights_.InfiniteRadiance(ray.origin, ray.direction));
   }
   return BrightPart(lights_.EmittedRadiance(intersector_.SurfaceAt(ray, hit), -ray.direction));
 }
@@ -379,10 +380,11 @@ Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int&
     Branch branch = branches.back();
     branches.pop_back();
     Hit hit;
+    const Vec3 from = branch.ray.origin;
     if (!FindThroughMedia(branch.ray, hit, branch.medium, branch.weight, rays)) {
       const Vec3 direction = branch.ray.direction;
-      seen += branch.weight * lights_.InfiniteRadiance(direction) *
-              share_of_rays(lights_.EmissionDensityInfinite(direction));
+      seen += branch.weight * lights_.InfiniteRadiance(from, direction) *
+              share_of_rays(lights_.EmissionDensityInfinite(from, direction));
       continue;
     }
     SurfacePoint surface = intersector_.SurfaceAt(branch.ray, hit);
@@ -419,8 +421,8 @@ Rgb EyePathTracer::ScatteredDirect(const SurfacePoint& surface, Vec3 wi, float p
   Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
   Hit hit;
   if (!FindThroughMedia(probe, hit, medium, weight, rays)) {
-    return weight * lights_.InfiniteRadiance(wi) *
-           PowerHeuristic(pdf, lights_.PdfDirectInfinite(wi));
+    return weight * lights_.InfiniteRadiance(surface.position, wi) *
+           PowerHeuristic(pdf, lights_.PdfDirectInfinite(surface.position, wi));
   }
   const SurfacePoint light = intersector_.SurfaceAt(probe, hit);
   const Rgb radiance = lights_.EmittedRadiance(light, -wi);
@@ -527,6 +529,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   for (int vertex = 0;; ++vertex) {
     Hit hit;
     ++path.rays;
+    const Vec3 from = ray.origin;
     bool is_met = vertex == 0 ? FindFirst(ray, first, hit) : intersector_.Intersect(ray, hit);
     if (parts_.media) {
       is_met = media_.Follow(ray, is_met, hit, medium, path.rays, pass_leg);
@@ -536,14 +539,15 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     if (!is_met) {
       if (emission_was_collected) return finish();
       if (vertex == 0) {
-        add_first_emission(weight * lights_.InfiniteRadiance(ray.direction));
+        add_first_emission(weight * lights_.InfiniteRadiance(from, ray.direction));
         return finish();
       }
       const float mis = scatter_pdf > 0
-                            ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(ray.direction))
+                            ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(
+                                                              scatter_position, ray.direction))
                             : 1;
-      path.direct += weight * lights_.InfiniteRadiance(ray.direction) *
-                     (mis * share_of_rays(lights_.EmissionDensityInfinite(ray.direction)));
+      path.direct += weight * lights_.InfiniteRadiance(from, ray.direction) *
+                     (mis * share_of_rays(lights_.EmissionDensityInfinite(from, ray.direction)));
       return finish();
     }
     SurfacePoint surface = intersector_.SurfaceAt(ray, hit);

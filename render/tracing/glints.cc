@@ -126,7 +126,7 @@ std::vector<Ball> SearchedLights(const EyePathTracer& tracer) {
     return balls;
   const auto radiance_of = [&](const ShapeTraits& traits) {
     if (traits.area_light == kNoAreaLight) return Rgb{};
-    return scene.area_lights[static_cast<std::size_t>(traits.area_light)].radiance;
+    return scene.area_lights[static_cast<std::size_t>(traits.area_light)].Largest();
   };
   for (const TriangleMesh& mesh : scene.meshes) {
     const Rgb radiance = radiance_of(mesh.traits);

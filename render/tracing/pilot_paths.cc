@@ -60,9 +60,9 @@ class PilotPath {
       if (!intersector_.Intersect(ray, hit)) {
         if (!counts) return;
         const float mis =
-            scatter_pdf > 0 ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(wi)) : 1;
-        Report(lights_.InfiniteEmitter(wi), {ray.origin, -wi, HUGE_VALF},
-               weight * lights_.InfiniteRadiance(wi) * mis);
+            scatter_pdf > 0 ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(from, wi)) : 1;
+        Report(lights_.InfiniteEmitter(from, wi), {ray.origin, -wi, HUGE_VALF},
+               weight * lights_.InfiniteRadiance(from, wi) * mis);
         return;
       }
       surface = intersector_.SurfaceAt(ray, hit);

@@ -23,15 +23,22 @@ class EnvironmentMap final : public InfiniteEmission {
   explicit EnvironmentMap(const InfiniteLight& light);
 
   [[nodiscard]] EmitterKind kind() const override { return EmitterKind::kEnvironment; }
-  [[nodiscard]] Rgb Radiance(Vec3 direction) const override;
+  [[nodiscard]] Rgb Radiance(Vec3 direction) const;
+  [[nodiscard]] Rgb Radiance(Vec3 /*from*/, Vec3 direction) const override {
+    return Radiance(direction);
+  }
   [[nodiscard]] Rgb MeanRadiance() const override { return mean_; }
   [[nodiscard]] float LargestRadiance() const override { return largest_; }
 
   // Zero where the sky is black. Requires a map that is not all black.
   [[nodiscard]] float PdfSolidAngle(Vec3 direction) const;
   // Draws a direction with that density.
-  [[nodiscard]] Vec3 Sample(float u1, float u2) const override;
-  [[nodiscard]] float Density(Vec3 direction, float choice) const override {
+  [[nodiscard]] Vec3 Sample(float u1, float u2) const;
+  [[nodiscard]] bool Sample(Vec3 /*from*/, float u1, float u2, Vec3& direction) const override {
+    direction = Sample(u1, u2);
+    return true;
+  }
+  [[nodiscard]] float Density(Vec3 /*from*/, Vec3 direction, float choice) const override {
     return choice * PdfSolidAngle(direction);
   }
   [[nodiscard]] bool SampleEmission(const Emitter& emitter, const BoundingSphere& scene,

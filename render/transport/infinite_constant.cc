@@ -18,11 +18,14 @@ class ConstantEmission final : public InfiniteEmission {
   explicit ConstantEmission(Rgb radiance) : radiance_(radiance) {}
 
   [[nodiscard]] EmitterKind kind() const override { return EmitterKind::kInfinite; }
-  [[nodiscard]] Rgb Radiance(Vec3 /*direction*/) const override { return radiance_; }
+  [[nodiscard]] Rgb Radiance(Vec3 /*from*/, Vec3 /*direction*/) const override { return radiance_; }
   [[nodiscard]] Rgb MeanRadiance() const override { return radiance_; }
   [[nodiscard]] float LargestRadiance() const override { return MaxChannel(radiance_); }
-  [[nodiscard]] Vec3 Sample(float u1, float u2) const override { return SquareToSphere(u1, u2); }
-  [[nodiscard]] float Density(Vec3 /*direction*/, float choice) const override {
+  [[nodiscard]] bool Sample(Vec3 /*from*/, float u1, float u2, Vec3& direction) const override {
+    direction = SquareToSphere(u1, u2);
+    return true;
+  }
+  [[nodiscard]] float Density(Vec3 /*from*/, Vec3 /*direction*/, float choice) const override {
     return choice / (4 * kPi);
   }
   [[nodiscard]] bool SampleEmission(const Emitter& /*emitter*/, const BoundingSphere& scene,

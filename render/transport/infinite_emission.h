@@ -1,6 +1,7 @@
 // Radiance, sampling and spectrum of infinite lights: one class for each kind, in infinite_NAME.cc.
 //
-// Directions are unit, in the world, and point towards the light, away from the scene.
+// Directions are unit, in the world, and point towards the light, away from the scene. Light that
+// comes through a portal depends on where one stands: `from` is a point of the scene.
 #pragma once
 
 #include <memory>
@@ -31,16 +32,31 @@ class InfiniteEmission {
 
   [[nodiscard]] virtual EmitterKind kind() const = 0;
   // In the working space.
-  [[nodiscard]] virtual Rgb Radiance(Vec3 direction) const = 0;
+  [[nodiscard]] virtual Rgb Radiance(Vec3 from, Vec3 direction) const = 0;
   // The mean over all directions.
   [[nodiscard]] virtual Rgb MeanRadiance() const = 0;
+  // [W] of the light that enters the scene.
+  [[nodiscard]] virtual Rgb Power(const BoundingSphere& scene) const {
+    return MeanRadiance() * (4 * kPi * kPi * scene.radius * scene.radius);
+  }
   // The largest channel of any direction.
   [[nodiscard]] virtual float LargestRadiance() const = 0;
 
-  // Draws a direction. u1, u2 in [0, 1).
-  [[nodiscard]] virtual Vec3 Sample(float u1, float u2) const = 0;
+  // Draws a direction; false where no light comes from any. u1, u2 in [0, 1).
+  [[nodiscard]] virtual bool Sample(Vec3 from, float u1, float u2, Vec3& direction) const = 0;
   // The density [sr⁻¹] with which Sample draws `direction`, times `choice`.
-  [[nodiscard]] virtual float Density(Vec3 direction, float choice) const = 0;
+  [[nodiscard]] virtual float Density(Vec3 from, Vec3 direction, float choice) const = 0;
+  // The density with which photons come along the line through `from`, per solid angle and, across
+  // the line, per area of the disk through which all rays of a direction enter the scene [sr⁻¹],
+  // times `choice`.
+  [[nodiscard]] virtual float PhotonDensity(Vec3 from, Vec3 direction, float choice,
+                                            const BoundingSphere& /*scene*/) const {
+    return Density(from, direction, choice);
+  }
+  // The largest flux of a photon over the mean, at least [luminance].
+  [[nodiscard]] virtual float LargestShare() const { return 1; }
+  // Whether a photon has passed what it must pass before it may land: false before a portal.
+  [[nodiscard]] virtual bool Lights(Vec3 /*landing*/) const { return true; }
   // Draws a photon as LightSet::SampleEmission does, its density excepted. `emission` comes with
   // emitter.power / emitter.choice as flux and a ray without an end.
   [[nodiscard]] virtual bool SampleEmission(const Emitter& emitter, const BoundingSphere& scene,

@@ -6,6 +6,8 @@
 #include <type_traits>
 
 #include "render/geometry/shape_geometry.h"
+#include "render/geometry/surface_uv.h"
+#include "render/math/color_space.h"
 #include "render/math/double3.h"
 #include "render/math/warp.h"
 #include "render/scene/scene_extent.h"
@@ -32,17 +34,13 @@ bool IsAtInfinity(EmitterKind kind) {
 // that has a millionth of the power of another is found once in a million samples.
 constexpr double kEvenShare = 0.1;
 
-// Those that rays find on shapes.
-bool IsOnShape(EmitterKind kind) {
-  switch (kind) {
-    case EmitterKind::kTriangle:
-#define LUCERNA_CASE(Name, list, name) case EmitterKind::k##Name:
-      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
-#undef LUCERNA_CASE
-      return true;
-    default:
-      return false;
-  }
+// Cells of pictures on area lights: of a side of one emitter, and of all together.
+constexpr int kMostSpreadSide = 256;
+constexpr double kMostSpreadCells = 1 << 22;
+
+// Of the picture of a light, in the working space.
+Rgb PixelsAt(const AreaLight& light, Vec2 uv) {
+  return ToWorking(PictureColor(*light.picture, uv, Texture::Wrap::kClamp, Texture::Wrap::kClamp));
 }
 
 }  // namespace
@@ -89,7 +87,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
   first_emitter_.assign(scene.meshes.size(), -1);
 
   const auto area_emitter = [&](Kind kind, const ShapeTraits& traits, float area) {
-    const AreaLight& light = scene.area_lights[static_cast<std::size_t>(traits.area_light)];
+    const AreaLight& light = LightOf(traits);
     Emitter emitter;
     emitter.kind = kind;
     emitter.two_sided = light.two_sided;
@@ -97,9 +95,34 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
     // As pbrt-v4 has it: the share of the light that rays would find. A light that none would find
     // shines with all its strength, unseen.
     emitter.is_invisible = traits.alpha == 0;
-    emitter.radiance = light.radiance * (emitter.is_invisible ? 1 : traits.alpha);
+    const float factor = emitter.is_invisible ? 1 : traits.alpha;
+    emitter.radiance = light.radiance * factor;
     emitter.power = emitter.radiance * (kPi * area * (light.two_sided ? 2.0F : 1.0F));
+    if (light.picture != nullptr) emitter.spread = 0;  // numbered below
+    largest_of_areas_ = std::max(largest_of_areas_, MaxChannel(light.Largest() * factor));
     return emitter;
+  };
+  const auto most_cells = [&] {
+    double emitters = 0;
+    const auto count = [&](const ShapeTraits& traits, double of_shape) {
+      if (traits.area_light == kNoAreaLight) return;
+      if (LightOf(traits).picture != nullptr) emitters += of_shape;
+    };
+    for (const TriangleMesh& mesh : scene.meshes)
+      count(mesh.traits, static_cast<double>(mesh.indices.size() / 3));
+    ForEachAnalyticShape(scene, [&](const auto& shape) { count(shape.traits, 1); });
+    int side = kMostSpreadSide;
+    while (side > 1 && emitters * side * side > kMostSpreadCells)
+      side /= 2;
+    return side;
+  }();
+  // Takes the place of an even power.
+  const auto spread = [&](Emitter& emitter, const AreaLight& light, PictureSpread of_picture) {
+    const float factor = emitter.is_invisible ? 1 : TraitsOf(emitter).alpha;
+    emitter.power =
+        of_picture.mean() * (factor * kPi * emitter.area * (light.two_sided ? 2.0F : 1.0F));
+    emitter.spread = static_cast<std::int32_t>(spreads_.size());
+    spreads_.push_back(std::move(of_picture));
   };
   for (std::uint32_t m = 0; m < scene.meshes.size(); ++m) {
     const TriangleMesh& mesh = scene.meshes[m];
@@ -113,6 +136,10 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
       Emitter emitter = area_emitter(Kind::kTriangle, mesh.traits, area);
       emitter.geometry = m;
       emitter.primitive = t;
+      if (emitter.spread >= 0) {
+        const AreaLight& light = LightOf(mesh.traits);
+        spread(emitter, light, PictureSpread::OfTriangle(light, UvsOf(mesh, t), most_cells));
+      }
       const Vec3 normal = TriangleNormal(p0, mesh.positions[corner[1]], mesh.positions[corner[2]]);
       // What nothing can receive is not sent.
       if (!selection.includes_faces_away && !emitter.two_sided && FacesAway(p0, normal, bounds)) {
@@ -132,6 +159,13 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
       numbers_of_kind[i] = static_cast<std::int32_t>(emitters_.size());
       Emitter emitter = area_emitter(kind, shape.traits, shape.template Area<float>());
       emitter.primitive = i;
+      if (emitter.spread >= 0) {
+        const AreaLight& light = LightOf(shape.traits);
+        const auto uv_of = [&](Vec2 u) {
+          return UvOf(shape, SampleFace(shape, u.x, u.y).position);
+        };
+        spread(emitter, light, PictureSpread::OfSurface(light, uv_of, most_cells));
+      }
       if constexpr (std::decay_t<decltype(shape)>::kIsFlat) {
         if (!selection.includes_faces_away && !emitter.two_sided &&
             FacesAway(shape.center, shape.normal, bounds)) {
@@ -168,7 +202,7 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
     emitter.kind = infinite_lights_[i]->kind();
     emitter.primitive = i;
     emitter.radiance = infinite_lights_[i]->MeanRadiance();
-    emitter.power = emitter.radiance * (4 * kPi * kPi * sphere_.radius * sphere_.radius);
+    emitter.power = infinite_lights_[i]->Power(sphere_);
     // Infinite lights are unreachable together or not at all.
     add(emitter, numbers.infinite);
   }
@@ -269,10 +303,23 @@ void LightSet::GroupLights(const std::vector<std::size_t>& light_of,
     light.power += emitter.power;
     light.position = light.position + CentreOf(emitter);
     light.is_at_infinity = IsAtInfinity(emitter.kind);
+    light.largest_share = std::max(light.largest_share, LargestShareOf(emitter));
     ++light.emitters;
   }
   for (LightGroup& light : lights_)
     light.position = light.position / static_cast<float>(std::max(1U, light.emitters));
+}
+
+float LightSet::LargestShareOf(const Emitter& emitter) const {
+  if (emitter.spread >= 0) return SpreadOf(emitter).largest_share();
+  switch (emitter.kind) {
+#define LUCERNA_CASE(Name, name) case Kind::k##Name:
+    LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    return infinite_lights_[emitter.primitive]->LargestShare();
+    default:
+      return 1;
+  }
 }
 
 Vec3 LightSet::CentreOf(const Emitter& emitter) const {
@@ -356,7 +403,20 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
         Vec3 position;
         Vec3 normal;
         float clearance = 0;
+        float density = 1;
+        if (emitter.spread >= 0) {
+          const Vec2 place = SpreadOf(emitter).Sample(u_place1, u_place2, density);
+          u_place1 = place.x;
+          u_place2 = place.y;
+        }
         PointOn(emitter, u_place1, u_place2, position, normal, clearance);
+        if (emitter.spread >= 0) {
+          if (!(density > 0)) return false;
+          emission.flux =
+              PictureRadiance(emitter, UvOn(emitter, u_place1, u_place2, position)) *
+              (kPi * emitter.area * (emitter.two_sided ? 2.0F : 1.0F) / (emitter.choice * density));
+          if (IsBlack(emission.flux)) return false;
+        }
         if (emitter.two_sided) {
           if (u_direction1 < 0.5F) {
             u_direction1 *= 2;
@@ -368,7 +428,10 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
         const Vec3 local = SquareToCosineHemisphere(u_direction1, u_direction2);
         emission.ray.direction = Frame(normal).ToWorld(local);
         emission.ray.origin = position + normal * clearance;
-        if (!emitter.is_invisible) emission.density = AreaDensity(emitter);
+        if (!emitter.is_invisible) {
+          emission.density = AreaDensity(emitter);
+          if (emitter.spread >= 0) emission.density *= density;
+        }
         return local.z > 0;
       }
 #define LUCERNA_CASE(Name, list, name)                                                      \
@@ -385,7 +448,7 @@ bool LightSet::SampleEmission(double u_choice, float u_place1, float u_place2, f
               emitter, sphere_, {u_place1, u_place2, u_direction1, u_direction2}, emission)) {
         return false;
       }
-      emission.density = EmissionDensityInfinite(-emission.ray.direction);
+      emission.density = EmissionDensityInfinite(emission.ray.origin, -emission.ray.direction);
       return true;
   }
   return false;
@@ -462,7 +525,8 @@ EmissionNumbers LightSet::AreaNumbers(const Emitter& emitter, const Ray& ray) co
   const Vec3 local = Frame(is_other_side ? -normal : normal).ToLocal(leaving);
   Vec2 direction = DiskToSquare(local.x, local.y);
   if (emitter.two_sided) direction.x = 0.5F * (direction.x + (is_other_side ? 1.0F : 0.0F));
-  return {place.x, place.y, direction.x, direction.y};
+  const Vec2 numbers = emitter.spread >= 0 ? SpreadOf(emitter).NumbersAt(place) : place;
+  return {numbers.x, numbers.y, direction.x, direction.y};
 }
 
 std::optional<std::uint32_t> LightSet::EmitterAt(const SurfacePoint& point) const {
@@ -471,12 +535,12 @@ std::optional<std::uint32_t> LightSet::EmitterAt(const SurfacePoint& point) cons
   return static_cast<std::uint32_t>(emitter - emitters_.data());
 }
 
-std::optional<std::uint32_t> LightSet::InfiniteEmitter(Vec3 direction) const {
+std::optional<std::uint32_t> LightSet::InfiniteEmitter(Vec3 from, Vec3 direction) const {
   std::optional<std::uint32_t> likeliest;
   float largest = 0;
   for (std::size_t i = 0; i < infinite_lights_.size() && !emitters_.empty(); ++i) {
     const std::size_t number = first_infinite_ + i;
-    const float density = infinite_lights_[i]->Density(direction, emitters_[number].choice);
+    const float density = infinite_lights_[i]->Density(from, direction, emitters_[number].choice);
     if (density > largest) {
       largest = density;
       likeliest = static_cast<std::uint32_t>(number);
@@ -515,6 +579,10 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
     sample.target = seen.target;                                                \
     sample.pdf = emitter.direct_choice / seen.inverse_pdf;                      \
     sample.radiance_over_pdf = emitter.radiance / sample.pdf;                   \
+    if (emitter.spread >= 0) {                                                  \
+      const Vec2 uv = UvOf(scene_.list[emitter.primitive], seen.target);        \
+      sample.radiance_over_pdf = PictureRadiance(emitter, uv) / sample.pdf;     \
+    }                                                                           \
     if (emitter.is_invisible) sample.pdf = 0;                                   \
     return true;                                                                \
   }
@@ -528,12 +596,12 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
 #define LUCERNA_CASE(Name, name) case Kind::k##Name:
     LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
 #undef LUCERNA_CASE
-    sample.wi = infinite_lights_[emitter.primitive]->Sample(u1, u2);
+    if (!infinite_lights_[emitter.primitive]->Sample(from, u1, u2, sample.wi)) return false;
     sample.is_distant = true;
     // Whichever drew it, light from this direction is that of all infinite lights.
-    sample.pdf = PdfDirectInfinite(sample.wi);
+    sample.pdf = PdfDirectInfinite(from, sample.wi);
     if (!(sample.pdf > 0)) return false;
-    sample.radiance_over_pdf = InfiniteRadiance(sample.wi) / sample.pdf;
+    sample.radiance_over_pdf = InfiniteRadiance(from, sample.wi) / sample.pdf;
     return true;
     default:
       break;
@@ -542,6 +610,12 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
   Vec3 position;
   Vec3 normal;
   float clearance = 0;
+  float density = 1;
+  if (emitter.spread >= 0) {
+    const Vec2 place = SpreadOf(emitter).Sample(u1, u2, density);
+    u1 = place.x;
+    u2 = place.y;
+  }
   PointOn(emitter, u1, u2, position, normal, clearance);
   const Vec3 to = position - from;
   const float distance2 = LengthSquared(to);
@@ -556,7 +630,11 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
   sample.is_distant = false;
   sample.target = position + normal * clearance;
   sample.pdf = emitter.direct_choice * distance2 / (cosine * emitter.area);
-  sample.radiance_over_pdf = emitter.radiance / sample.pdf;
+  if (emitter.spread >= 0) sample.pdf *= density;
+  sample.radiance_over_pdf =
+      (emitter.spread >= 0 ? PictureRadiance(emitter, UvOn(emitter, u1, u2, position))
+                           : emitter.radiance) /
+      sample.pdf;
   if (emitter.is_invisible) sample.pdf = 0;
   return true;
 }
@@ -564,7 +642,60 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
 Rgb LightSet::EmittedRadiance(const SurfacePoint& point, Vec3 wo) const {
   if (point.area_light == kNoAreaLight) return {};
   const AreaLight& light = scene_.area_lights[static_cast<std::size_t>(point.area_light)];
-  return light.two_sided || Dot(point.geometric_normal, wo) > 0 ? light.radiance : Rgb{};
+  if (!light.two_sided && !(Dot(point.geometric_normal, wo) > 0)) return {};
+  if (light.picture == nullptr) return light.radiance;
+  return light.radiance * PixelsAt(light, UvAt(scene_, point));
+}
+
+const AreaLight& LightSet::LightOf(const ShapeTraits& traits) const {
+  return scene_.area_lights[static_cast<std::size_t>(traits.area_light)];
+}
+
+const ShapeTraits& LightSet::TraitsOf(const Emitter& emitter) const {
+  switch (emitter.kind) {
+#define LUCERNA_CASE(Name, list, name) \
+  case Kind::k##Name:                  \
+    return scene_.list[emitter.primitive].traits;
+    LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    default:
+      return scene_.meshes[emitter.geometry].traits;
+  }
+}
+
+Rgb LightSet::PictureRadiance(const Emitter& emitter, Vec2 uv) const {
+  return emitter.radiance * PixelsAt(LightOf(TraitsOf(emitter)), uv);
+}
+
+Vec2 LightSet::UvOn(const Emitter& emitter, float u1, float u2, Vec3 position) const {
+  switch (emitter.kind) {
+#define LUCERNA_CASE(Name, list, name) \
+  case Kind::k##Name:                  \
+    return UvOf(scene_.list[emitter.primitive], position);
+    LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    default:
+      break;
+  }
+  float b1 = 0;
+  float b2 = 0;
+  SquareToTriangle(u1, u2, b1, b2);
+  const std::array<Vec2, 3> uv = UvsOf(scene_.meshes[emitter.geometry], emitter.primitive);
+  const float rest = 1 - b1 - b2;
+  return {uv[0].x * rest + uv[1].x * b1 + uv[2].x * b2,
+          uv[0].y * rest + uv[1].y * b1 + uv[2].y * b2};
+}
+
+float LightSet::SpreadAt(const Emitter& emitter, const SurfacePoint& point) const {
+  switch (emitter.kind) {
+#define LUCERNA_CASE(Name, list, name) \
+  case Kind::k##Name:                  \
+    return SpreadOf(emitter).Density(FaceNumbers(scene_.list[emitter.primitive], point.position));
+    LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    default:
+      return SpreadOf(emitter).Density(TriangleToSquare(point.u, point.v));
+  }
 }
 
 const Emitter* LightSet::EmitterOf(const SurfacePoint& point) const {
@@ -591,14 +722,12 @@ float LightSet::PdfDirect(Vec3 from, const SurfacePoint& point) const {
   const float distance2 = LengthSquared(to);
   const float cosine = std::abs(Dot(to, point.geometric_normal)) / std::sqrt(distance2);
   if (!(cosine > 0)) return 0;
-  return emitter->direct_choice * distance2 / (cosine * emitter->area);
+  const float pdf = emitter->direct_choice * distance2 / (cosine * emitter->area);
+  return emitter->spread >= 0 ? pdf * SpreadAt(*emitter, point) : pdf;
 }
 
 float LightSet::LargestRadiance() const {
-  float of_areas = 0;
-  for (const Emitter& emitter : emitters_) {
-    if (IsOnShape(emitter.kind)) of_areas = std::max(of_areas, MaxChannel(emitter.radiance));
-  }
+  const float of_areas = emitters_.empty() ? 0 : largest_of_areas_;
   float from_infinity = 0;
   for (const auto& light : infinite_lights_)
     from_infinity += light->LargestRadiance();
@@ -611,29 +740,37 @@ float LightSet::AreaDensity(const Emitter& emitter) {
 
 float LightSet::EmissionDensity(const SurfacePoint& point) const {
   const Emitter* emitter = EmitterOf(point);
-  return emitter == nullptr ? 0 : AreaDensity(*emitter);
+  if (emitter == nullptr) return 0;
+  const float density = AreaDensity(*emitter);
+  return emitter->spread >= 0 ? density * SpreadAt(*emitter, point) : density;
 }
 
-float LightSet::EmissionDensityInfinite(Vec3 direction) const {
+bool LightSet::IsBehindPortal(std::uint32_t emitter, Vec3 landing) const {
+  return infinite_lights_[emitters_[emitter].primitive]->Lights(landing);
+}
+
+float LightSet::EmissionDensityInfinite(Vec3 from, Vec3 direction) const {
   if (emitters_.empty()) return 0;
   float pdf = 0;
   for (std::size_t i = 0; i < infinite_lights_.size(); ++i)
-    pdf += infinite_lights_[i]->Density(direction, emitters_[first_infinite_ + i].choice);
+    pdf += infinite_lights_[i]->PhotonDensity(from, direction,
+                                              emitters_[first_infinite_ + i].choice, sphere_);
   return pdf / (kPi * sphere_.radius * sphere_.radius);
 }
 
-Rgb LightSet::InfiniteRadiance(Vec3 direction) const {
+Rgb LightSet::InfiniteRadiance(Vec3 from, Vec3 direction) const {
   Rgb radiance;
   for (const auto& light : infinite_lights_)
-    radiance += light->Radiance(direction);
+    radiance += light->Radiance(from, direction);
   return radiance;
 }
 
-float LightSet::PdfDirectInfinite(Vec3 direction) const {
+float LightSet::PdfDirectInfinite(Vec3 from, Vec3 direction) const {
   if (emitters_.empty()) return 0;
   float pdf = 0;
   for (std::size_t i = 0; i < infinite_lights_.size(); ++i)
-    pdf += infinite_lights_[i]->Density(direction, emitters_[first_infinite_ + i].direct_choice);
+    pdf +=
+        infinite_lights_[i]->Density(from, direction, emitters_[first_infinite_ + i].direct_choice);
   return pdf;
 }
 

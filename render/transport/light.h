@@ -23,6 +23,7 @@
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
 #include "render/scene/shape_lists.h"
+#include "render/transport/picture_spread.h"
 #include "render/transport/primary_numbers.h"
 #include "render/transport/unreachable_lights.h"
 
@@ -60,10 +61,11 @@ struct Emitter {
   bool two_sided = false;
   bool is_invisible = false;  // no ray finds it: only sampling and photons do
   bool is_sampled = true;     // for direct light
+  std::int32_t spread = -1;   // of an area light with a picture: index of its spread
   float area = 0;
   float choice = 0;         // probability for a photon: its share of the power
   float direct_choice = 0;  // probability for direct light
-  Rgb radiance;             // or intensity, or irradiance
+  Rgb radiance;             // or intensity, or irradiance, or what a picture is multiplied by
   Rgb power;
   std::uint8_t light = 0;  // index into LightSet::lights()
 };
@@ -80,6 +82,9 @@ struct LightGroup {
   Rgb power;
   Vec3 position;  // of an area light its centre; at infinity, the direction its light travels in
   bool is_at_infinity = false;
+  // The largest flux that one of its photons has, over their mean [luminance]: 1 where all photons
+  // carry the same.
+  float largest_share = 1;
 };
 
 // Light that arrives at a point from one emitter.
@@ -140,9 +145,14 @@ class LightSet {
                                                         KeyedRng& rng) const;
   // The emitter at a point of a surface, if any.
   [[nodiscard]] std::optional<std::uint32_t> EmitterAt(const SurfacePoint& point) const;
-  // Of the infinite lights the one that most likely sent a photon that came from `direction`, if
-  // any.
-  [[nodiscard]] std::optional<std::uint32_t> InfiniteEmitter(Vec3 direction) const;
+  // Of the infinite lights the one that most likely sent a photon that came to `from` from
+  // `direction`, if any.
+  [[nodiscard]] std::optional<std::uint32_t> InfiniteEmitter(Vec3 from, Vec3 direction) const;
+  // Whether a photon of this emitter that lands there first, or is scattered there, brings light:
+  // not before it has come through its portal.
+  [[nodiscard]] bool Lights(std::uint32_t emitter, Vec3 landing) const {
+    return emitters_[emitter].kind != EmitterKind::kPortal || IsBehindPortal(emitter, landing);
+  }
 
   // The spectrum of a photon of a delta light, absent for other emitters. `edge_strength`: see
   // frequency/bandwidth.h.
@@ -163,13 +173,13 @@ class LightSet {
   // The density with which photons leave `point`, in every direction into which it emits (see
   // Emission::density).
   [[nodiscard]] float EmissionDensity(const SurfacePoint& point) const;
-  // The same of photons from infinity that travel against `direction`.
-  [[nodiscard]] float EmissionDensityInfinite(Vec3 direction) const;
+  // The same of photons from infinity that travel against `direction` on the line through `from`.
+  [[nodiscard]] float EmissionDensityInfinite(Vec3 from, Vec3 direction) const;
 
-  // Radiance of all infinite lights from a direction in which no shape is.
-  [[nodiscard]] Rgb InfiniteRadiance(Vec3 direction) const;
+  // Radiance of all infinite lights that arrives at `from` from a direction in which no shape is.
+  [[nodiscard]] Rgb InfiniteRadiance(Vec3 from, Vec3 direction) const;
   // The density with which SampleDirect draws a direction by any of them [choice × sr⁻¹].
-  [[nodiscard]] float PdfDirectInfinite(Vec3 direction) const;
+  [[nodiscard]] float PdfDirectInfinite(Vec3 from, Vec3 direction) const;
   // [those that are not black], in the order of Emitter::primitive; see
   // transport/infinite_emission.h.
   [[nodiscard]] const std::vector<std::shared_ptr<const InfiniteEmission>>& infinite_lights()
@@ -186,9 +196,23 @@ class LightSet {
   void GroupLights(const std::vector<std::size_t>& light_of,
                    const std::vector<double>& light_power);
   [[nodiscard]] Vec3 CentreOf(const Emitter& emitter) const;
+  [[nodiscard]] float LargestShareOf(const Emitter& emitter) const;
   [[nodiscard]] const Emitter& Choose(const std::vector<double>& cumulative, double u) const;
   [[nodiscard]] const Emitter* EmitterOf(const SurfacePoint& point) const;
   [[nodiscard]] static float AreaDensity(const Emitter& emitter);
+  [[nodiscard]] bool IsBehindPortal(std::uint32_t emitter, Vec3 landing) const;
+
+  // Of emitters with a picture (transport/picture_spread.h):
+  [[nodiscard]] const AreaLight& LightOf(const ShapeTraits& traits) const;
+  [[nodiscard]] const ShapeTraits& TraitsOf(const Emitter& emitter) const;
+  [[nodiscard]] const PictureSpread& SpreadOf(const Emitter& emitter) const {
+    return spreads_[static_cast<std::size_t>(emitter.spread)];
+  }
+  [[nodiscard]] Rgb PictureRadiance(const Emitter& emitter, Vec2 uv) const;
+  // Texture coordinates of the place that PointOn draws with these numbers.
+  [[nodiscard]] Vec2 UvOn(const Emitter& emitter, float u1, float u2, Vec3 position) const;
+  // The share of the light at a point of the emitter, over its share of the area.
+  [[nodiscard]] float SpreadAt(const Emitter& emitter, const SurfacePoint& point) const;
   // NumbersOf for emitters on shapes.
   [[nodiscard]] EmissionNumbers AreaNumbers(const Emitter& emitter, const Ray& ray) const;
   void PointOn(const Emitter& emitter, float u1, float u2, Vec3& position, Vec3& normal,
@@ -207,6 +231,8 @@ class LightSet {
   std::size_t first_infinite_ = 0;  // emitter of the first
   std::vector<LightGroup> lights_;
   std::size_t faint_lights_ = 0;
+  std::vector<PictureSpread> spreads_;
+  float largest_of_areas_ = 0;
 };
 
 // The share of photons that is even among the lights of a scene with several.

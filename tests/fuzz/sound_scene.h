@@ -135,7 +135,9 @@ namespace lucerna {
     }
   }
   for (const AreaLight& light : scene.area_lights) {
-    if (!is_light(light.radiance)) return "an area light";
+    if (!is_light(light.radiance) || !is_light(light.Largest())) return "an area light";
+    if (light.picture != nullptr && !PictureIsSound(*light.picture))
+      return "the picture of a light";
   }
   for (const PointLight& light : scene.point_lights) {
     if (!is_light(light.intensity) || !IsFinite(light.position)) return "a point light";
@@ -154,6 +156,14 @@ namespace lucerna {
         (light.map->width != light.map->height || !PictureIsSound(*light.map) ||
          !is_unit(light.axes.x) || !is_unit(light.axes.y) || !is_unit(light.axes.z))) {
       return "an environment";
+    }
+    if (light.portal.has_value() != (light.kind == InfiniteLight::Kind::kPortal)) return "a portal";
+    if (light.portal &&
+        !(IsFinite(light.portal->corner) && LengthSquared(light.portal->along_x) > 0 &&
+          LengthSquared(light.portal->along_y) > 0 &&
+          std::isfinite(LengthSquared(light.portal->along_x)) &&
+          std::isfinite(LengthSquared(light.portal->along_y)))) {
+      return "a portal's sides";
     }
   }
   const FilmSettings& film = scene.film;

@@ -26,7 +26,7 @@ namespace {
 constexpr double kPiD = std::numbers::pi;
 constexpr int kParts = 10;
 // At least as many comparisons as this folder makes.
-constexpr int kQuestions = 60;
+constexpr int kQuestions = 70;
 
 void ExpectMean(const MeasuredMean& measured, double expected, double bias = 0) {
   static const double quantile = StudentQuantile(SidakLevel(1e-3, kQuestions), kParts);
@@ -150,6 +150,39 @@ std::vector<Lamp> Lamps() {
     };
     lamps.push_back(lamp);
   }
+  {
+    // A screen of 4 by 3 pixels that faces down; its patches as many small lights.
+    Lamp lamp{"screen", Floor(), {}, {0.2F, 0, 1}, 0.7F};
+    Picture picture;
+    picture.width = 4;
+    picture.height = 3;
+    picture.channels = 1;
+    picture.linear = {0, 0, 20, 1, 0.5F, 0, 0, 3, 4, 1, 0, 0};
+    const auto shared = std::make_shared<const Picture>(picture);
+    lamp.scene.area_lights.push_back({Gray(0.5F), false, shared, picture.Largest()});
+    const Vec3 corner = lamp.center - Vec3{0.5F, 0.4F, 0};
+    AddQuad(lamp.scene, corner, {0, 0.8F, 0}, {1, 0, 0}, kBlack, 0);
+    lamp.scene.meshes.back().uvs = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+    lamp.irradiance = [shared](double x, double y) {
+      constexpr int kPatches = 120;
+      double sum = 0;
+      for (int i = 0; i < kPatches; ++i) {
+        for (int j = 0; j < kPatches; ++j) {
+          const double u = (i + 0.5) / kPatches;
+          const double v = (j + 0.5) / kPatches;
+          const double dx = 0.2 - 0.5 + u - x;
+          const double dy = -0.4 + 0.8 * v - y;
+          const double squared = dx * dx + dy * dy + 1;
+          const float pixel = PictureColor(*shared, {static_cast<float>(u), static_cast<float>(v)},
+                                           Texture::Wrap::kClamp, Texture::Wrap::kClamp)
+                                  .g;
+          sum += 0.5 * static_cast<double>(pixel) / (squared * squared);
+        }
+      }
+      return sum * 0.8 / (kPatches * kPatches);
+    };
+    lamps.push_back(lamp);
+  }
   return lamps;
 }
 
@@ -246,6 +279,75 @@ TEST(IrradianceTest, OfPhotonsIsTheClosedForm) {
     ExpectMean(Measure(lamp.scene, settings, 3, kParts, "photons.G"), expected);
     EXPECT_EQ(Measure(lamp.scene, settings, 1, 2, "direct.G").mean, 0);
   }
+}
+
+// An even sky behind a portal that looks up, at z = 1 from (-0.3, -0.5) to (0.5, 0.4), without any
+// wall around it.
+Lamp PortalLamp() {
+  Lamp lamp{"portal", Floor(), {}, {0, 0, 1}, 0};
+  InfiniteLight light;
+  light.radiance = Gray(1.5F);
+  light.kind = InfiniteLight::Kind::kPortal;
+  light.portal = Portal{{-0.3F, -0.5F, 1}, {0.8F, 0, 0}, {0, 0.9F, 0}};
+  lamp.scene.infinite_lights.push_back(light);
+  // The form factor of a rectangle, by its corners.
+  lamp.irradiance = [](double x, double y) {
+    const auto corner = [](double a, double b) {
+      const double p = std::sqrt(1 + a * a);
+      const double q = std::sqrt(1 + b * b);
+      return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * kPiD);
+    };
+    return 1.5 * kPiD *
+           (corner(0.5 - x, 0.4 - y) - corner(-0.3 - x, 0.4 - y) - corner(0.5 - x, -0.5 - y) +
+            corner(-0.3 - x, -0.5 - y));
+  };
+  return lamp;
+}
+
+TEST(IrradianceTest, ThroughAPortalIsTheClosedForm) {
+  const double albedo_over_pi = static_cast<double>(kFloorReflectance) / kPiD;
+  const Lamp lamp = PortalLamp();
+  const double expected = lamp.irradiance(0, 0) * albedo_over_pi;
+  ExpectMean(Measure(lamp.scene, TestSettings(lamp.scene, 1, 0.01, 1), 4096, kParts, "direct.G"),
+             expected, 1e-3 * expected);
+
+  // By photons: a pane that bends nothing, between floor and portal.
+  Scene by_photons = lamp.scene;
+  AddBox(by_photons, {-4, -4, 0.7F}, {4, 4, 0.8F}, AddMaterial(by_photons, DielectricMaterial(1)));
+  const RenderSettings settings = HeldRadius(by_photons, 150000, 0.3, 4);
+  ExpectMean(Measure(by_photons, settings, 3, kParts, "photons.G"),
+             Smoothed(lamp.irradiance, 0.3) * albedo_over_pi);
+  EXPECT_EQ(Measure(by_photons, settings, 1, 2, "direct.G").mean, 0);
+
+  // A pane above the portal: a ray that leaves the pane begins on the far side and sees no light,
+  // and photons that land on the pane first bring none.
+  Scene beyond = lamp.scene;
+  AddBox(beyond, {-4, -4, 1.2F}, {4, 4, 1.3F}, AddMaterial(beyond, DielectricMaterial(1)));
+  EXPECT_EQ(Measure(beyond, settings, 1, 2, "photons.G").mean, 0);
+  EXPECT_EQ(Measure(beyond, settings, 16, 2, "direct.G").mean, 0);
+
+  // A roof beyond the portal, half as high again over the floor, that is black: from (x, y) the
+  // part of the portal before it is that for which 1.5 times the way to it along y ends at y > 0.
+  Lamp shaded = lamp;
+  shaded.irradiance = [](double x, double y) {
+    const double rim = std::clamp(y - y / 1.5, -0.5, 0.4);
+    const auto corner = [](double a, double b) {
+      const double p = std::sqrt(1 + a * a);
+      const double q = std::sqrt(1 + b * b);
+      return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * kPiD);
+    };
+    return 1.5 * kPiD *
+           (corner(0.5 - x, rim - y) - corner(-0.3 - x, rim - y) - corner(0.5 - x, -0.5 - y) +
+            corner(-0.3 - x, -0.5 - y));
+  };
+  for (Scene* const scene : {&shaded.scene, &by_photons})
+    AddQuad(*scene, {-40, 0, 1.5F}, {80, 0, 0}, {0, 40, 0}, kBlack);
+  const double half = shaded.irradiance(0, 0) * albedo_over_pi;
+  ExpectMean(
+      Measure(shaded.scene, TestSettings(shaded.scene, 1, 0.01, 1), 4096, kParts, "direct.G"), half,
+      1e-3 * half);
+  ExpectMean(Measure(by_photons, HeldRadius(by_photons, 150000, 0.3, 4), 3, kParts, "photons.G"),
+             Smoothed(shaded.irradiance, 0.3) * albedo_over_pi);
 }
 
 // --- glass -------------------------------------------------------------------------------------

@@ -28,7 +28,18 @@
 namespace lucerna {
 namespace {
 
-enum class LightKind { kTriangles, kSphere, kDisk, kPoint, kSpot, kDistant, kConstant, kMap };
+enum class LightKind {
+  kTriangles,
+  kSphere,
+  kDisk,
+  kPoint,
+  kSpot,
+  kDistant,
+  kConstant,
+  kMap,
+  kPicture,
+  kPortal
+};
 enum class Chain {
   kNone,
   kPane,
@@ -70,8 +81,9 @@ struct PathClass {
 };
 
 std::string NameOf(const PathClass& cell) {
-  constexpr std::array<std::string_view, 8> kLights = {"Triangles", "Sphere",  "Disk",     "Point",
-                                                       "Spot",      "Distant", "Constant", "Map"};
+  constexpr std::array<std::string_view, 10> kLights = {"Triangles", "Sphere",  "Disk",     "Point",
+                                                        "Spot",      "Distant", "Constant", "Map",
+                                                        "Picture",   "Portal"};
   constexpr std::array<std::string_view, 13> kChains = {"Directly",        "ByPane",
                                                         "ByThinPane",      "ByRoughPane",
                                                         "ByMirror",        "ByNarrowMetal",
@@ -330,6 +342,14 @@ Scene SceneOf(const PathClass& cell) {
   const Vec3 lit = by_wall ? Vec3{0, 0.85F, 0.8F} : Vec3{0, 0, 0};
   const Vec3 along = Normalize(lit - place);
   const auto area_light = [&] { return AddAreaLight(scene, 15, cell.light == LightKind::kDisk); };
+  const auto picture = [] {
+    Picture made;
+    made.width = made.height = 6;
+    made.channels = 1;
+    for (int i = 0; i < 36; ++i)
+      made.linear.push_back(0.1F + 0.4F * static_cast<float>(i * 7 % 5));
+    return std::make_shared<const Picture>(std::move(made));
+  };
   switch (cell.light) {
     case LightKind::kTriangles: {
       const Frame frame(along);
@@ -356,15 +376,29 @@ Scene SceneOf(const PathClass& cell) {
       scene.infinite_lights.push_back({Gray(0.7F)});
       break;
     case LightKind::kMap: {
-      Picture picture;
-      picture.width = picture.height = 6;
-      picture.channels = 1;
-      for (int i = 0; i < 36; ++i)
-        picture.linear.push_back(0.1F + 0.4F * static_cast<float>(i * 7 % 5));
       InfiniteLight light;
       light.radiance = Gray(1);
       light.kind = InfiniteLight::Kind::kEnvironment;
-      light.map = std::make_shared<const Picture>(std::move(picture));
+      light.map = picture();
+      scene.infinite_lights.push_back(light);
+      break;
+    }
+    case LightKind::kPicture: {
+      AreaLight light = {Gray(18), false, picture()};
+      light.largest_pixel = light.picture->Largest();
+      scene.area_lights.push_back(light);
+      const Frame frame(along);
+      AddQuad(scene, place - (frame.s + frame.t) * 0.2F, frame.s * 0.4F, frame.t * 0.4F, black, 0);
+      scene.meshes.back().uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+      break;
+    }
+    case LightKind::kPortal: {
+      InfiniteLight light;
+      light.radiance = Gray(15);
+      light.kind = InfiniteLight::Kind::kPortal;
+      light.map = picture();
+      const Frame frame(along);
+      light.portal = Portal{place - (frame.s + frame.t) * 0.2F, frame.t * 0.4F, frame.s * 0.4F};
       scene.infinite_lights.push_back(light);
       break;
     }
@@ -520,6 +554,8 @@ std::vector<PathClass> Cells() {
   add({kMap}, {kNone, kPane, kRoughPane, kMirror, kNarrowWall, kDiffuseWall},
       {Floor::kDiffuse, Floor::kRoughMetal, Floor::kNarrowMetal});
   add({kSphere, kDisk, kConstant}, {kNone, kPane}, two);
+  add({kPicture, kPortal}, {kNone, kPane, kMirror, kDiffuseWall}, two);
+  add({kPicture, kPortal}, {kPane}, {Floor::kDiffuse}, View::kThroughGlass);
   add({kSpot}, {kNone, kPane, kMirror}, two);
   add({kSpot}, {kPane}, {Floor::kTexturedMetal, Floor::kNarrowGlass});
   // As bright as without the pane.

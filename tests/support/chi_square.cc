@@ -91,10 +91,9 @@ double ChiSquarePValue(std::span<const double> observed, std::span<const double>
 
 double DirectionsPValue(
     const std::function<bool(float u_lobe, float u1, float u2, Vec3& direction)>& draw,
-    const std::function<double(Vec3)>& pdf_solid_angle, int samples, std::uint64_t key) {
+    const std::function<double(Vec3)>& pdf_solid_angle, int samples, std::uint64_t key, int fine) {
   constexpr int kRows = 24;
   constexpr int kColumns = 32;
-  constexpr int kFine = 24;
   constexpr double kTwoPi = 2 * std::numbers::pi;
   constexpr std::size_t kCells = kRows * kColumns;
   // The last cell takes the samples that give no direction.
@@ -103,17 +102,17 @@ double DirectionsPValue(
   double total = 0;
   for (int row = 0; row < kRows; ++row) {
     // A narrow lobe around a pole lies in one row alone, which is cut finer.
-    const int slices = row == 0 || row == kRows - 1 ? 16 * kFine : kFine;
+    const int slices = row == 0 || row == kRows - 1 ? 16 * fine : fine;
     for (int slice = 0; slice < slices; ++slice) {
       const double z = 2 * (row + (slice + 0.5) / slices) / kRows - 1;
       const double radius = std::sqrt(1 - z * z);
-      for (int column = 0; column < kColumns * kFine; ++column) {
-        const double phi = kTwoPi * (column + 0.5) / (kColumns * kFine);
+      for (int column = 0; column < kColumns * fine; ++column) {
+        const double phi = kTwoPi * (column + 0.5) / (kColumns * fine);
         const double mass =
             pdf_solid_angle({static_cast<float>(radius * std::cos(phi)),
                              static_cast<float>(radius * std::sin(phi)), static_cast<float>(z)}) *
-            2 * kTwoPi / (kRows * slices * kColumns * kFine);
-        expected[static_cast<std::size_t>(row * kColumns + column / kFine)] += mass * samples;
+            2 * kTwoPi / (kRows * slices * kColumns * fine);
+        expected[static_cast<std::size_t>(row * kColumns + column / fine)] += mass * samples;
         total += mass;
       }
     }

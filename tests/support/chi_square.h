@@ -23,10 +23,12 @@ namespace lucerna {
 
 // Draws `samples` directions and compares their numbers per cell of (cosθ, φ) with the integral of
 // `pdf_solid_angle` over the cells. `draw` returns false for a sample that gives no direction; so
-// a density may integrate to less than one. Returns the p-value.
+// a density may integrate to less than one. The integral is by `fine`² midpoints a cell: a density
+// that jumps within cells needs more of them. Returns the p-value.
 [[nodiscard]] double DirectionsPValue(
     const std::function<bool(float u_lobe, float u1, float u2, Vec3& direction)>& draw,
-    const std::function<double(Vec3)>& pdf_solid_angle, int samples, std::uint64_t key);
+    const std::function<double(Vec3)>& pdf_solid_angle, int samples, std::uint64_t key,
+    int fine = 24);
 
 // The mean of a few independent numbers, with its standard error taken from their spread.
 struct MeasuredMean {

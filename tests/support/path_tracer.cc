@@ -469,9 +469,24 @@ class PathTracer {
     return 3 * t * t - 2 * t * t * t;
   }
 
-  Color FromInfinity(Vec3 direction, bool sees_stand_ins) const {
+  // Whether the ray goes through the rectangle, from the side that sees light.
+  static bool Passes(const Portal& portal, Vec3 from, Vec3 direction) {
+    const Double3 x(portal.along_x);
+    const Double3 y(portal.along_y);
+    const Double3 normal = Cross(x, y);
+    const Double3 to = Double3(from) - Double3(portal.corner);
+    const double approach = Dot(Double3(direction), normal);
+    if (approach <= 0 || Dot(to, normal) >= 0) return false;
+    const Double3 at = to + Double3(direction) * (-Dot(to, normal) / approach);
+    const double s = Dot(at, x) / Dot(x, x);
+    const double t = Dot(at, y) / Dot(y, y);
+    return s >= 0 && s <= 1 && t >= 0 && t <= 1;
+  }
+
+  Color FromInfinity(Vec3 from, Vec3 direction, bool sees_stand_ins) const {
     Color seen{};
     for (const InfiniteLight& light : scene_.infinite_lights) {
+      if (light.portal && !Passes(*light.portal, from, direction)) continue;
       const Color scale = Working(FromFloat(light.radiance));
       if (light.map == nullptr) {
         AddTo(seen, scale);
@@ -494,6 +509,28 @@ class PathTracer {
       }
     }
     return seen;
+  }
+
+  // With a picture: between the centres of its pixels, the first row at v = 1.
+  Color Emitted(const AreaLight& light, const SurfacePoint& point) const {
+    const Color scale = Working(FromFloat(light.radiance));
+    if (light.picture == nullptr) return scale;
+    const Picture& picture = *light.picture;
+    const Vec2 uv = UvAt(scene_, point);
+    const double x = static_cast<double>(uv.x) * picture.width - 0.5;
+    const double y = (1 - static_cast<double>(uv.y)) * picture.height - 0.5;
+    Color sum{};
+    for (int i = 0; i < 4; ++i) {
+      const double column = std::floor(x) + i % 2;
+      const double row = std::floor(y) + i / 2;
+      const double share = (1 - std::abs(x - column)) * (1 - std::abs(y - row));
+      const auto held = [](double place, int count) {
+        return std::clamp(static_cast<int>(place), 0, count - 1);
+      };
+      const Rgb pixel = picture.At(held(column, picture.width), held(row, picture.height));
+      AddTo(sum, Times(FromFloat(pixel), share));
+    }
+    return Times(scale, Working(sum));
   }
 
   // Draws the material of a mix, and turns the normal where that has bumps.
@@ -530,14 +567,14 @@ class PathTracer {
       const bool met = Meet(ray, !only_smooth, passed, point);
       AddTo(seen, Times(weight, passed));
       if (!met) {
-        AddTo(seen, Times(weight, FromInfinity(ray.direction, !only_smooth)));
+        AddTo(seen, Times(weight, FromInfinity(ray.origin, ray.direction, !only_smooth)));
         return seen;
       }
       const Vec3 wo = -ray.direction;
       if (point.area_light != kNoAreaLight) {
         const AreaLight& light = scene_.area_lights[static_cast<std::size_t>(point.area_light)];
         if (light.two_sided || Dot(point.geometric_normal, wo) > 0) {
-          AddTo(seen, Times(weight, Working(FromFloat(light.radiance))));
+          AddTo(seen, Times(weight, Emitted(light, point)));
         }
       }
       if (events_left == 0) return seen;

@@ -214,14 +214,14 @@ TEST(EnvironmentLightTest, AnEvenMapIsTheConstantLight) {
   const Lit plain({constant});
   for (int c = 0; c < 3; ++c) {
     EXPECT_NEAR(even.lights->TotalPower()[c] / plain.lights->TotalPower()[c], 1, 1e-5) << c;
-    EXPECT_NEAR(even.lights->InfiniteRadiance({0, 0.6F, 0.8F})[c] /
-                    plain.lights->InfiniteRadiance({0, 0.6F, 0.8F})[c],
+    EXPECT_NEAR(even.lights->InfiniteRadiance({}, {0, 0.6F, 0.8F})[c] /
+                    plain.lights->InfiniteRadiance({}, {0, 0.6F, 0.8F})[c],
                 1, 1e-5);
   }
-  EXPECT_NEAR(
-      even.lights->PdfDirectInfinite({0, 0, 1}) / plain.lights->PdfDirectInfinite({0, 0, 1}), 1,
-      1e-5);
-  const double radiance = static_cast<double>(plain.lights->InfiniteRadiance({0, 0, 1}).g);
+  EXPECT_NEAR(even.lights->PdfDirectInfinite({}, {0, 0, 1}) /
+                  plain.lights->PdfDirectInfinite({}, {0, 0, 1}),
+              1, 1e-5);
+  const double radiance = static_cast<double>(plain.lights->InfiniteRadiance({}, {0, 0, 1}).g);
   // The second disk hides a little.
   ExpectEqual(IrradianceByPhotons(even, 10), radiance * kPiD, 2e-3 * radiance);
   ExpectEqual(IrradianceByLights(even, 11), radiance * kPiD, 2e-3 * radiance);
@@ -264,8 +264,8 @@ TEST(EnvironmentLightTest, PhotonsAndSampledLightsAgreeForSeveralSkies) {
   for (int i = 0; i < kLattice; ++i) {
     for (int j = 0; j < kLattice; ++j) {
       total += static_cast<double>(lit.lights->PdfDirectInfinite(
-                   EqualAreaDirection({(static_cast<float>(i) + 0.5F) / kLattice,
-                                       (static_cast<float>(j) + 0.5F) / kLattice}))) *
+                   {}, EqualAreaDirection({(static_cast<float>(i) + 0.5F) / kLattice,
+                                           (static_cast<float>(j) + 0.5F) / kLattice}))) *
                4 * kPiD / (kLattice * kLattice);
     }
   }

@@ -10,7 +10,7 @@ void ReadGoniometricLight(const LightInput& input) {
   const Rgb color = parameters.FindEmission("I").value_or(Gray(1));
   double scale = parameters.Float("scale", 1, kZeroOrMore);
   const double power_w = parameters.Float("power", -1);
-  const std::shared_ptr<const Picture> map = ReadLightPicture(input);
+  const std::shared_ptr<const Picture> map = ReadLightPicture(parameters, input.assets);
   const StatusOr<ShapeAxes> axes = AxesOf(input.to_world);
   if (!axes.ok()) {
     parameters.Error("is stretched by its transform, which is not supported; scale all axes alike");

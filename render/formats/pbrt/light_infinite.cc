@@ -1,9 +1,14 @@
-// LightSource "infinite": constant light, or an environment map.
+// LightSource "infinite": constant light, or an environment map; either may come through a portal.
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <string_view>
 
 #include "render/base/text.h"
 #include "render/formats/pbrt/light_readers.h"
 #include "render/formats/pbrt/shapes.h"
+#include "render/math/double3.h"
 #include "render/math/equal_area_square.h"
 
 namespace lucerna {
@@ -30,7 +35,43 @@ double IlluminanceOf(const Picture& map) {
   return sum * 4 * kPiD / (static_cast<double>(side) * side);
 }
 
-void ReadEnvironment(const LightInput& input, double scale, double illuminance) {
+// The rectangle that four points in a row are, in the world and not in the light's own space.
+std::optional<Portal> ReadPortal(ParameterList& parameters) {
+  static constexpr std::string_view kTypes[] = {"point3", "point"};
+  const std::span<const double> numbers = parameters.Numbers("portal", kTypes, 3);
+  if (numbers.empty()) return std::nullopt;
+  if (numbers.size() != 12) {
+    parameters.Error("portal", "needs four points: the corners of a rectangle, one after another");
+    return std::nullopt;
+  }
+  std::array<Double3, 4> corners;
+  for (std::size_t i = 0; i < 4; ++i)
+    corners[i] = {numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]};
+  // As far as pbrt-v4 has it.
+  constexpr double kTolerance = 0.001;
+  const auto unit = [](Double3 v) { return v * (1 / Length(v)); };
+  const Double3 x = corners[3] - corners[0];
+  const Double3 y = corners[1] - corners[0];
+  const Double3 x_beyond = unit(corners[2] - corners[1]);
+  const Double3 y_beyond = unit(corners[2] - corners[3]);
+  // Not so for sides without length.
+  const bool is_rectangle = Dot(unit(x), x_beyond) > 1 - kTolerance &&
+                            Dot(unit(y), y_beyond) > 1 - kTolerance &&
+                            std::abs(Dot(unit(x), unit(y))) < kTolerance;
+  const Double3 across = y - x * (Dot(x, y) / Dot(x, x));
+  const Portal portal = {ToFloat(corners[0]), ToFloat(x), ToFloat(across)};
+  const bool has_size = LengthSquared(portal.along_x) > 0 && LengthSquared(portal.along_y) > 0 &&
+                        std::isfinite(LengthSquared(portal.along_x)) &&
+                        std::isfinite(LengthSquared(portal.along_y));
+  if (!is_rectangle || !has_size || !IsFinite(portal.corner)) {
+    parameters.Error("portal", "is no rectangle; give its four corners one after another");
+    return std::nullopt;
+  }
+  return portal;
+}
+
+void ReadEnvironment(const LightInput& input, double scale, double illuminance,
+                     const std::optional<Portal>& portal) {
   ParameterList& parameters = input.parameters;
   if (parameters.Has("L")) {
     parameters.Error("L", "and filename exclude each other; give one or the other");
@@ -72,6 +113,8 @@ void ReadEnvironment(const LightInput& input, double scale, double illuminance) 
     return;
   }
   light.map = *std::move(map);
+  light.portal = portal;
+  if (portal) light.kind = InfiniteLight::Kind::kPortal;
   input.scene.infinite_lights.push_back(std::move(light));
 }
 
@@ -79,16 +122,11 @@ void ReadEnvironment(const LightInput& input, double scale, double illuminance) 
 
 void ReadInfiniteLight(const LightInput& input) {
   ParameterList& parameters = input.parameters;
-  if (parameters.Has("portal")) {
-    parameters.Warning("portal",
-                       "is ignored: light comes in wherever nothing is in its way, and photons "
-                       "are sent where they come into view anyway");
-    parameters.Ignore("portal");
-  }
+  const std::optional<Portal> portal = ReadPortal(parameters);
   double scale = parameters.Float("scale", 1, kZeroOrMore);
   const double illuminance = parameters.Float("illuminance", -1);
   if (parameters.Has("filename")) {
-    ReadEnvironment(input, scale, illuminance);
+    ReadEnvironment(input, scale, illuminance, portal);
     return;
   }
   const Rgb color = parameters.FindEmission("L").value_or(Gray(1));
@@ -96,6 +134,8 @@ void ReadInfiniteLight(const LightInput& input) {
   if (illuminance > 0) scale *= illuminance / kPiD;
   InfiniteLight light;
   light.radiance = ScaledEmission(parameters, color, scale);
+  light.portal = portal;
+  if (portal) light.kind = InfiniteLight::Kind::kPortal;
   input.scene.infinite_lights.push_back(light);
   WarnIfBlack(parameters, light.radiance);
 }

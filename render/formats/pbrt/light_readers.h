@@ -38,7 +38,8 @@ void ReadInfiniteLight(const LightInput& input);
                              Vec3 to);
 
 // The picture that "filename" names. nullptr, and an error, when there is none that can be used.
-[[nodiscard]] std::shared_ptr<const Picture> ReadLightPicture(const LightInput& input);
+[[nodiscard]] std::shared_ptr<const Picture> ReadLightPicture(ParameterList& parameters,
+                                                              AssetReader& assets);
 
 void WarnIfBlack(ParameterList& parameters, Rgb emitted);
 

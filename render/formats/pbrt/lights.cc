@@ -17,21 +17,47 @@ constexpr Kind<LightReader> kKinds[] = {
 };
 #undef LUCERNA_ROW
 
-AreaEmission ReadDiffuseEmission(ParameterList& parameters) {
-  AreaEmission emission;
-  if (parameters.Has("filename")) {
-    parameters.Error("filename", "is not supported: give L, the colour of the light");
-    parameters.Ignore("filename");
+// Of all pixels.
+double MeanLuminance(const Picture& picture) {
+  double sum = 0;
+  for (int y = 0; y < picture.height; ++y) {
+    for (int x = 0; x < picture.width; ++x)
+      sum += static_cast<double>(Luminance(picture.At(x, y)));
   }
-  const Rgb color = parameters.FindEmission("L").value_or(Gray(1));
-  emission.radiance = ScaledEmission(parameters, color, parameters.Float("scale", 1, kZeroOrMore));
+  return sum / (static_cast<double>(picture.width) * static_cast<double>(picture.height));
+}
+
+AreaEmission ReadDiffuseEmission(ParameterList& parameters, AssetReader& assets) {
+  AreaEmission emission;
+  Rgb color = Gray(1);
+  double largest = 1;
+  if (parameters.Has("filename")) {
+    if (parameters.Has("L")) {
+      parameters.Error("L", "and filename exclude each other; give one or the other");
+      parameters.Ignore("L");
+    }
+    emission.picture = ReadLightPicture(parameters, assets);
+    if (emission.picture != nullptr) {
+      largest = static_cast<double>(emission.picture->Largest());
+      emission.mean_luminance = MeanLuminance(*emission.picture);
+      // A black picture is no light, as one of scale 0.
+      if (!(largest > 0)) color = Rgb{};
+    }
+  } else {
+    color = parameters.FindEmission("L").value_or(color);
+  }
+  const double scale = parameters.Float("scale", 1, kZeroOrMore);
+  emission.radiance = ScaledEmission(parameters, color, scale);
+  // Summed over all pixels in single precision.
+  if (emission.picture != nullptr && !(scale * largest < 1e30))
+    parameters.Error("is too bright for single precision");
   emission.two_sided = parameters.Bool("twosided", false);
   const double power_w = parameters.Float("power", -1);
   if (power_w > 0) emission.power_w = power_w;
   return emission;
 }
 
-using AreaLightReader = AreaEmission (*)(ParameterList&);
+using AreaLightReader = AreaEmission (*)(ParameterList&, AssetReader&);
 constexpr Kind<AreaLightReader> kAreaKinds[] = {{"diffuse", &ReadDiffuseEmission}};
 
 }  // namespace
@@ -63,14 +89,13 @@ Vec3 Direction(ParameterList& parameters, const Transform& to_world, Vec3 from, 
   return {0, 0, 1};
 }
 
-std::shared_ptr<const Picture> ReadLightPicture(const LightInput& input) {
-  ParameterList& parameters = input.parameters;
+std::shared_ptr<const Picture> ReadLightPicture(ParameterList& parameters, AssetReader& assets) {
   const std::optional<std::string> file = parameters.FindString("filename");
   if (!file.has_value()) {
     parameters.Error("needs \"string filename\": the picture that says how strong it is");
     return nullptr;
   }
-  StatusOr<std::shared_ptr<const Picture>> map = input.assets.ReadPicture(*file, {});
+  StatusOr<std::shared_ptr<const Picture>> map = assets.ReadPicture(*file, {});
   if (!map.ok()) {
     parameters.Error("filename", Concat("cannot be read: ", map.status().message()));
     return nullptr;
@@ -87,22 +112,25 @@ void WarnIfBlack(ParameterList& parameters, Rgb emitted) {
   if (IsBlack(emitted)) parameters.Warning("", "emits nothing: its colour or scale is 0");
 }
 
-std::optional<AreaEmission> ReadAreaEmission(std::string_view type, ParameterList& parameters) {
+std::optional<AreaEmission> ReadAreaEmission(std::string_view type, ParameterList& parameters,
+                                             AssetReader& assets) {
   const AreaLightReader read = FindReader<AreaLightReader>(kAreaKinds, type);
   if (read == nullptr) {
     parameters.Error(Concat("is not supported; ", SupportedKinds<AreaLightReader>(kAreaKinds)));
     return std::nullopt;
   }
-  const AreaEmission emission = read(parameters);
+  AreaEmission emission = read(parameters, assets);
   parameters.WarnOfUnread();
   return emission;
 }
 
 AreaLight MakeAreaLight(const AreaEmission& emission, double area_m2) {
-  AreaLight light = {emission.radiance, emission.two_sided};
+  AreaLight light = {emission.radiance, emission.two_sided, emission.picture};
+  if (light.picture != nullptr) light.largest_pixel = light.picture->Largest();
   if (emission.power_w.has_value()) {
     const double sides = emission.two_sided ? 2 : 1;
-    light.radiance *= static_cast<float>(*emission.power_w / (sides * kPiD * area_m2));
+    light.radiance *=
+        static_cast<float>(*emission.power_w / (sides * kPiD * area_m2 * emission.mean_luminance));
   }
   return light;
 }

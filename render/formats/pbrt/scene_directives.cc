@@ -221,13 +221,13 @@ bool DirectiveReader::OnAreaLightSource(Arguments& arguments) {
   if (!arguments.ReadTyped(type, parameters)) return false;
   ParameterList list = ListFor(arguments, type, std::move(parameters),
                                graphics_.state().DefaultsOf(AttributeTarget::kLight));
-  const std::optional<AreaEmission> emission = ReadAreaEmission(type, list);
+  const std::optional<AreaEmission> emission = ReadAreaEmission(type, list, assets_);
   GraphicsState& state = graphics_.state();
   state.area_light = kNoAreaLight;
   state.area_emission.reset();
   if (!emission.has_value()) return true;
   if (IsBlack(emission->radiance)) {
-    list.Warning("", "emits nothing, its L or scale is 0: its shapes are no lights");
+    list.Warning("", "emits nothing, its L, picture or scale is 0: its shapes are no lights");
     return true;
   }
   if (!emission->power_w.has_value()) {
@@ -299,7 +299,7 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
       list.Warning("", "gets its power as a whole; pbrt-v4 gives it to each triangle");
     }
     const AreaLight light = MakeAreaLight(*state.area_emission, shapes.Area());
-    if (!IsFinite(light.radiance)) list.Error("is too small for its power");
+    if (!IsFinite(light.Largest())) list.Error("is too small for its power");
     const auto index = static_cast<std::int32_t>(scene_.area_lights.size());
     scene_.area_lights.push_back(light);
     ForEachShapeTraits(shapes, [&](ShapeTraits& traits) { traits.area_light = index; });

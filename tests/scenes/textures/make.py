@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes the pictures that tests/scenes/textured.pbrt shows: python3 make.py, in this folder."""
+"""Makes the pictures that scenes of tests/scenes show: python3 make.py, in this folder."""
 
 import math
 import struct
@@ -29,6 +29,17 @@ def brick(x, y):
     if y % 16 == 0 or (x + shift) % 32 == 0:
         return (200, 195, 185)
     return (150 + (7 * x + 3 * y) % 16, 80, 60)
+
+
+def screen(x, y):
+    """A test card: six columns of colours, a white frame at the left and top, a grey foot."""
+    if x < 2 or y < 2:
+        return (255, 255, 255)
+    if y >= 28:
+        return (4 * (x + 1) - 1,) * 3
+    return [(220, 30, 20), (20, 200, 40), (30, 60, 230), (230, 200, 20), (0, 0, 0), (250, 90, 200)][
+        min(5, x * 6 // 64)
+    ]
 
 
 def direction(u, v):
@@ -65,4 +76,5 @@ def write_pfm(path, size, pixel):
 
 
 write_png("bricks.png", 32, 32, brick)
+write_png("screen.png", 64, 36, screen)
 write_pfm("sky.pfm", 16, sky)
