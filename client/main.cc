@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <functional>
 #include <map>
+#include <new>
 #include <optional>
 #include <string>
 #include <vector>
@@ -600,7 +601,15 @@ int Run(int argc, char** argv) {
   const bool has_no_job = *validate || *plan || *diff || *digest || *png || *completion;
   if (!has_no_job) CatchInterruptions();
   IgnoreGrpcLog();
-  Status status = chosen();
+  Status status;
+  try {
+    status = chosen();
+  } catch (const std::bad_alloc&) {
+    status = absl::ResourceExhaustedError(
+        "there is not enough memory for this; give the process more, or make the image or the "
+        "scene "
+        "smaller");
+  }
   if (std::fflush(stdout) != 0 && status.ok()) {
     status = absl::ResourceExhaustedError("cannot write to the standard output");
   }

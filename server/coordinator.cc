@@ -26,6 +26,9 @@ namespace {
 
 constexpr Duration kLongestSync = std::chrono::seconds(5);
 constexpr Duration kSaveUnsavedEvery = std::chrono::seconds(1);
+// Freed memory is given back after so many jobs, or when so long none has ended.
+constexpr int kReleaseAfterJobs = 64;
+constexpr Duration kReleaseAfter = std::chrono::seconds(10);
 constexpr std::chrono::milliseconds kRetryPause{100};
 constexpr int kPausesBeforeRetry = 10;
 constexpr std::size_t kSecretBytes = 32;
@@ -160,6 +163,11 @@ void Coordinator::Tick() {
     SaveStandings();
     if (state_) jobs_.SaveUnsaved(Now());
   }
+  if (const int ended = ended_since_release_;
+      ended >= kReleaseAfterJobs || (ended > 0 && clock_.Steady() >= release_at_.load())) {
+    ended_since_release_ = 0;
+    ReleaseFreedMemory();
+  }
 }
 
 // Jobs
@@ -177,11 +185,12 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
   }
   LUCERNA_ASSIGN_OR_RETURN(
       const MemoryClaim for_reading,
-      budget_.Claim(MemoryUse::kScenes, SceneMemory(SceneBytes(submission.manifest))));
+      budget_.Claim(MemoryUse::kScenes, GuessSceneMemory(SceneBytes(submission.manifest))));
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
   // Its files stay beside it.
   const std::uint64_t files = SceneBytes(submission.manifest);
-  if (MemoryNeedOf(job.needs, job.settings, files, state_ != nullptr) + files >
+  if (MemoryNeedOf(job.needs, job.settings, HeldOfScene(job.scene_memory), state_ != nullptr) +
+          files >
       budget_.max_bytes()) {
     return absl::ResourceExhaustedError(
         "the job needs more memory than the coordinator has for all jobs; make the image or the "
@@ -429,6 +438,8 @@ void Coordinator::RunTurn(JobTable::Turn turn) {
         return;
       }
       Conclude(job_id, std::move(result));
+      release_at_ = clock_.Steady() + kReleaseAfter;
+      ++ended_since_release_;
       // Without the work of a worker whose results were wrong.
       if (!jobs_.TakeBeginsAgain(job_id)) return;
       // What was taken of the run before finds its rounds closed before new ones open.
@@ -479,7 +490,9 @@ StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
 }
 
 StatusOr<std::optional<MemoryClaim>> Coordinator::WaitForMemory(const JobTable::Turn& turn) {
-  const std::uint64_t bytes = MemoryNeedOf(turn.needs, turn.settings, SceneBytes(turn.manifest),
+  const std::uint64_t scene_memory =
+      turn.scene_memory > 0 ? turn.scene_memory : GuessSceneMemory(SceneBytes(turn.manifest));
+  const std::uint64_t bytes = MemoryNeedOf(turn.needs, turn.settings, scene_memory,
                                            /*keeps_checkpoints=*/state_ != nullptr);
   bool has_waited = false;
   while (true) {

@@ -294,6 +294,9 @@ class Coordinator {
   std::atomic<bool> is_lending_ = true;
   std::atomic<bool> is_closing_ = false;
   SteadyTime save_unsaved_at_;  // of the thread of Tick
+  // Jobs that have ended since freed memory was given back, and when it is given back next.
+  std::atomic<int> ended_since_release_ = 0;
+  std::atomic<SteadyTime> release_at_ = SteadyTime();
   // Held from taking changed standings until they are on the disk: the newest is written last.
   Mutex standings_mutex_;
 

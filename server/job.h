@@ -229,6 +229,8 @@ struct Job {
   RenderSettings settings;
   std::vector<std::string> warnings;
   SceneNeeds needs;
+  // Of the coordinator's memory, as counted when it was submitted [bytes]; 0: not known.
+  std::uint64_t scene_memory = 0;
   WallTime submitted_at;
   JobLife life;
   JobCounters counters;

@@ -359,9 +359,10 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));
 }
 
-EyePass JobEstimator::TraceEyePaths(std::uint64_t pass) const {
+EyePass JobEstimator::TraceEyePaths(std::uint64_t pass,
+                                    const std::function<bool()>& shall_stop) const {
   return TraceHitpointPass(*state_->tracer, pass, state_->first_hits.Of(pass), *state_->film_spread,
-                           state_->team);
+                           state_->team, shall_stop);
 }
 
 std::optional<RoundPlan> JobEstimator::PlanFor(const PassRange& round) const {

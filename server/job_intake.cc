@@ -66,8 +66,13 @@ StatusOr<CheckedJob> JobIntake::Check(const Submission& submission,
   job.scene = std::move(read.scene);
   job.warnings = std::move(read.warnings);
   LUCERNA_ASSIGN_OR_RETURN(job.settings, ResolveSettings(submission.overrides, job.scene));
+  // Before it is analysed, which takes memory too.
+  constexpr RayNeeds kMost = {
+      .robust_rays = true, .split_triangles = true, .shading_normals = true};
+  LUCERNA_RETURN_IF_ERROR(CheckSceneMemory(SceneMemoryOf(job.scene, kMost), max_job_bytes_));
   job.needs = NeedsOf(job.scene, job.settings);
-  LUCERNA_RETURN_IF_ERROR(CheckMemory(job.needs, job.settings, max_job_bytes_));
+  job.scene_memory = SceneMemoryOf(job.scene, job.needs.rays());
+  LUCERNA_RETURN_IF_ERROR(CheckMemory(job.needs, job.settings, job.scene_memory, max_job_bytes_));
   if (submission.reference) {
     auto pin = blobs_.Pin(*submission.reference);
     if (!pin.ok()) {

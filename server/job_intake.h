@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "render/analysis/needs.h"
+#include "render/analysis/scene_memory.h"
 #include "render/base/digest.h"
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
@@ -41,19 +42,21 @@ struct CheckedJob {
   std::vector<std::string> warnings;
   RenderSettings settings;
   SceneNeeds needs;
+  SceneMemory scene_memory;
   PinnedBlobs pinned;  // all files of the scene, and the reference
 };
 
 class JobIntake {
  public:
-  // The store outlives the intake. `max_job_bytes` is for the image of one job; the
-  // shapes of its scene, with the tree over them, may have half of that and its pictures a quarter.
+  // The store outlives the intake. `max_job_bytes` is for the image of one job and its scene. While
+  // that is read its shapes may have an eighth of it and its pictures a quarter: the analysis of
+  // a scene, and the tree over it, take several times the memory of the shapes.
   JobIntake(BlobStore& blobs, std::uint64_t max_job_bytes)
       : blobs_(blobs), max_job_bytes_(max_job_bytes) {}
 
   // Errors: INVALID_ARGUMENT with all errors of scene and settings, FAILED_PRECONDITION when blobs
-  // are missing, RESOURCE_EXHAUSTED when the image does not fit into memory, or what `still_needed`
-  // says, which is asked between two files.
+  // are missing, RESOURCE_EXHAUSTED when image or scene do not fit into memory, or what
+  // `still_needed` says, which is asked between two files.
   [[nodiscard]] StatusOr<CheckedJob> Check(const Submission& submission,
                                            const StillNeeded& still_needed) const;
 

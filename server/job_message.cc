@@ -343,6 +343,7 @@ std::string EncodeRecord(const Job& job, const std::optional<Digest>& image, Dur
   *record.mutable_job() = ToProto(report);
   *record.mutable_scene() = ToProto(job.manifest);
   *record.mutable_needs() = ToProto(job.needs);
+  record.set_scene_memory_bytes(job.scene_memory);
   if (job.reference) record.set_reference_digest(std::string(job.reference->Bytes()));
   if (image) record.set_image_digest(std::string(image->Bytes()));
   for (const std::string& worker : job.distrusted)
@@ -379,6 +380,7 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
   }
   job.warnings.assign(message.warnings().begin(), message.warnings().end());
   LUCERNA_ASSIGN_OR_RETURN(job.needs, FromProto(record.needs()));
+  job.scene_memory = record.scene_memory_bytes();
   for (const v1::PartUse& use : message.parts()) {
     for (const Part part : AllParts()) {
       if (NameOf(part) == std::string_view(use.part())) job.needs.GiveReason(part, use.reason());

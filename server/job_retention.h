@@ -17,6 +17,8 @@ struct RetentionLimits {
   // Of jobs whose photons are kept, so that they can go on; the newest counts as none. At some 700
   // bytes a pixel.
   std::int64_t pixels = std::int64_t{1} << 21;
+  // Of those, jobs whose photons, scene and tree are in memory; others go on from a checkpoint.
+  std::size_t in_memory = 64;
   std::size_t images = 64;  // in memory; those on a disk are kept with the record
   std::size_t image_bytes = std::size_t{2} << 30;  // the newest counts as none
   Duration age{};                                  // since a job ended; 0: no limit
@@ -24,7 +26,8 @@ struct RetentionLimits {
 
 // What there is of an ended job.
 struct EndedJob {
-  bool has_photons = false;
+  bool has_photons = false;  // in memory or in a checkpoint
+  bool is_in_memory = false;
   std::int64_t pixels = 0;
   bool has_image = false;
   std::size_t image_bytes = 0;
@@ -35,6 +38,7 @@ struct KeptOfJob {
   bool record = true;  // false: nothing at all
   bool photons = true;
   bool image = true;
+  bool in_memory = true;  // its photons
   bool operator==(const KeptOfJob&) const = default;
 };
 

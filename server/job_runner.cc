@@ -31,6 +31,12 @@ constexpr Duration kPauseBeforeRetry = std::chrono::seconds(1);
 // How long the first checkpoint is expected to take: a job of a few seconds needs none.
 constexpr Duration kFirstSave = std::chrono::milliseconds(100);
 
+// A limit beyond a century is no limit, and would not fit.
+Duration LimitOf(double time_s) {
+  return std::chrono::duration_cast<Duration>(
+      std::chrono::duration<double>(std::min(time_s, 3.2e9)));
+}
+
 // How long to wait after a checkpoint that took `time`, for `share` of the time. Decades at most,
 // so that sums fit.
 Duration PauseAfterSave(Duration time, double share) {
@@ -142,6 +148,7 @@ StatusOr<RenderResult> JobRunner::RunToEnd() {
   // Whatever ended it: workers must not go on with passes that will not be merged.
   CloseAll();
   hooks_.scheduler.ForgetJob(job_id_);
+  hooks_.on_work_opened();
   TakeInEstimate(true);
   return result;
 }
@@ -194,8 +201,42 @@ StopReason JobRunner::ReasonToStop(const End& end, bool is_time_up) const {
     return end.passes > 0 && done >= end.passes ? StopReason::kPasses : StopReason::kPhotons;
   }
   if (is_time_up) return StopReason::kTime;
-  const MutexLock lock(mutex_);
-  return shall_finish_ ? StopReason::kUser : StopReason::kNone;
+  return shall_finish() ? StopReason::kUser : StopReason::kNone;
+}
+
+std::optional<SteadyTime> JobRunner::WhenTimeIsUp(const End& end) const {
+  if (!(end.time_s > 0)) return std::nullopt;
+  return hooks_.when_it_has_run(LimitOf(end.time_s));
+}
+
+bool JobRunner::IsTimeUp(const End& end) const {
+  return end.time_s > 0 && hooks_.running() >= LimitOf(end.time_s);
+}
+
+bool JobRunner::IsFirstPassComplete() const {
+  if (split_passes_.empty()) return false;
+  const SplitPass& oldest = split_passes_.front();
+  return oldest.traced.eye.pass == 0 && (!HasPhotons(oldest) || hooks_.passes.IsComplete(KeyOf(0)));
+}
+
+bool JobRunner::ShallInterrupt() const {
+  End end;
+  bool shall_end = false;
+  {
+    const MutexLock lock(mutex_);
+    if (why_stopped_) return true;
+    end = end_;
+    shall_end = shall_finish_;
+  }
+  return (shall_end || IsTimeUp(end)) && (PassesDone() > 0 || IsFirstPassComplete());
+}
+
+void JobRunner::WarnOfFirstPass(const End& end) {
+  if (std::exchange(has_warned_of_time_, true)) return;
+  hooks_.on_warning(absl::StrCat(
+      "warning: the ", end.time_s,
+      " s were over before the first pass was whole; an image has at"
+      " least one, so the job ends with it: give it more time, or make the image smaller"));
 }
 
 bool JobRunner::MayMeetTarget(const End& end) const {
@@ -215,30 +256,30 @@ StatusOr<RenderResult> JobRunner::RunRounds() {
       const MutexLock lock(mutex_);
       end = end_;
     }
-    due_.reset();
-    bool is_time_up = false;
-    if (end.time_s > 0) {
-      // A limit beyond a century is no limit, and would not fit.
-      const auto limit = std::chrono::duration_cast<Duration>(
-          std::chrono::duration<double>(std::min(end.time_s, 3.2e9)));
-      due_ = hooks_.when_it_has_run(limit);
-      is_time_up = hooks_.running() >= limit;
-    }
+    due_ = WhenTimeIsUp(end);
+    const bool is_time_up = IsTimeUp(end);
     TakeInEstimate(false);
     if (const StopReason reason = ReasonToStop(end, is_time_up); reason != StopReason::kNone) {
       // A stop by error leaves later passes out: no estimate covers them.
       if (reason != StopReason::kError) TakeInTail();
       ReportProgress();
+      // What is out counts no more: workers hear of it before the last estimate, which may take
+      // long.
+      CloseAll();
+      hooks_.on_work_opened();
       BeginEstimateIfDue(true);
       TakeInEstimate(true);
       CheckImage();
       const MutexLock lock(estimator_mutex_);
       return MakeResult(reason);
     }
-    if (WantedPasses(end) != opened_until_.first || due_ != opened_until_.second) {
-      SetRoundEnds(end);
-    }
-    LUCERNA_ASSIGN_OR_RETURN(const bool has_done_something, Step(end, !is_time_up));
+    // An image has at least one pass.
+    const bool ends_with_first = PassesDone() == 0 && (is_time_up || shall_finish());
+    if (ends_with_first && is_time_up) WarnOfFirstPass(end);
+    const std::uint64_t lent_until = ends_with_first ? 1 : WantedPasses(end);
+    if (lent_until != opened_until_.first || due_ != opened_until_.second) SetRoundEnds(lent_until);
+    LUCERNA_ASSIGN_OR_RETURN(const bool has_done_something,
+                             Step(end, !is_time_up && !ends_with_first));
     ReportProgress();
     if (has_done_something) continue;
     // When time is up and nothing has been taken in, the first pass is waited for all the same.
@@ -301,16 +342,15 @@ StatusOr<bool> JobRunner::Step(const End& end, bool wants_more) {
       return true;
     }
   }
-  const std::optional<std::uint64_t> to_split = NextToSplit(end);
+  std::optional<std::uint64_t> to_split = NextToSplit(end);
+  if (!wants_more && to_split > std::uint64_t{0}) to_split.reset();
   if (to_split && split_passes_.size() < kMostSplitPasses) {
-    TracedPass traced;
-    if (ahead_) {
-      traced = std::move(*ahead_);
-      ahead_.reset();
-    } else {
+    std::optional<TracedPass> traced = std::exchange(ahead_, std::nullopt);
+    if (!traced) {
       LUCERNA_ASSIGN_OR_RETURN(traced, Trace(*to_split));
+      if (!traced) return true;
     }
-    LUCERNA_RETURN_IF_ERROR(OpenSplitPass(std::move(traced)));
+    LUCERNA_RETURN_IF_ERROR(OpenSplitPass(*std::move(traced)));
     next_split_ = *to_split + 1;
     return true;
   }
@@ -335,8 +375,8 @@ StatusOr<bool> JobRunner::Step(const End& end, bool wants_more) {
   return false;
 }
 
-void JobRunner::SetRoundEnds(const End& end) {
-  opened_until_ = {WantedPasses(end), due_};
+void JobRunner::SetRoundEnds(std::uint64_t last) {
+  opened_until_ = {last, due_};
   for (const OpenRound& open : open_rounds_) {
     if (open.is_split) continue;
     hooks_.scheduler.SetRoundEnd(KeyOf(open.round.first),
@@ -425,14 +465,15 @@ std::optional<std::uint64_t> JobRunner::NextToSplit(const End& end) const {
   return std::nullopt;
 }
 
-StatusOr<JobRunner::TracedPass> JobRunner::Trace(std::uint64_t pass) {
+StatusOr<std::optional<JobRunner::TracedPass>> JobRunner::Trace(std::uint64_t pass) {
   TracedPass traced;
-  traced.eye = estimator_->TraceEyePaths(pass);
+  traced.eye = estimator_->TraceEyePaths(pass, [this] { return ShallInterrupt(); });
+  if (!traced.eye.is_whole) return std::optional<TracedPass>();
   std::string bytes = EncodeHitpointBlock(traced.eye.block);
   const Digest digest = Sha256(bytes);
   LUCERNA_ASSIGN_OR_RETURN(traced.block,
                            hooks_.blobs.PutPinned(digest, std::move(bytes), AfterLastPin::kDrop));
-  return traced;
+  return std::optional<TracedPass>(std::move(traced));
 }
 
 const JobRunner::OpenRound& JobRunner::OpenRoundOf(std::uint64_t pass) const {
@@ -682,6 +723,11 @@ bool JobRunner::WaitForChange(std::optional<SteadyTime> until) {
   }
   was_woken_ = false;
   return !why_stopped_;
+}
+
+bool JobRunner::shall_finish() const {
+  const MutexLock lock(mutex_);
+  return shall_finish_;
 }
 
 Status JobRunner::why_stopped() const {

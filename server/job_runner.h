@@ -163,6 +163,7 @@ class JobRunner final : public RunningJob {
   // Before the process ends: rounds that have come, and a checkpoint.
   void KeepWholeRounds();
   // One thing that can be done now: opens, traces or takes in. False when there is nothing.
+  // `wants_more`: passes beside the first, which an image needs.
   StatusOr<bool> Step(const End& end, bool wants_more);
   // Begins to estimate the error of the passes so far, on another thread and from a copy of the
   // sums, at the next checkpoint or if `is_last`.
@@ -179,6 +180,16 @@ class JobRunner final : public RunningJob {
   StopReason ReasonToStop(const End& end, bool is_time_up) const;
   // Passes from the first on without a gap.
   std::uint64_t PassesDone() const;
+  // Whether the photons of the first pass, if it is split, are there and wait to be taken in.
+  bool IsFirstPassComplete() const;
+  // When the job will have run as long as it may; absent without a limit, and while its time stands
+  // still.
+  std::optional<SteadyTime> WhenTimeIsUp(const End& end) const;
+  bool IsTimeUp(const End& end) const;
+  // Whether eye paths that are being traced here would be of no use.
+  bool ShallInterrupt() const;
+  // Says, once, that the first pass is finished although the job should have ended.
+  void WarnOfFirstPass(const End& end);
 
   void ReportProgress();
   // Takes in the oldest round if all of it has come.
@@ -195,13 +206,14 @@ class JobRunner final : public RunningJob {
   bool ClaimNextRound();
   // How many passes are wanted, as far as is known now.
   std::uint64_t WantedPasses(const End& end) const;
-  // Lends more, or fewer, passes of the open rounds.
-  void SetRoundEnds(const End& end);
+  // Lends more, or fewer, passes of the open rounds: those before `last`.
+  void SetRoundEnds(std::uint64_t last);
   // The next pass of the open rounds that is to be split; absent when there is none.
   std::optional<std::uint64_t> NextToSplit(const End& end) const;
   // Requires that the round of the pass is open.
   const OpenRound& OpenRoundOf(std::uint64_t pass) const;
-  StatusOr<TracedPass> Trace(std::uint64_t pass);
+  // Nothing when it was interrupted.
+  StatusOr<std::optional<TracedPass>> Trace(std::uint64_t pass);
   Status OpenSplitPass(TracedPass traced);
   bool HasPhotons(const SplitPass& open) const;
   Status TakeInSplitPass(const SplitPass& open);
@@ -213,6 +225,7 @@ class JobRunner final : public RunningJob {
   // Waits for a wake, until `until` if there is one. False when Run must end now.
   bool WaitForChange(std::optional<SteadyTime> until);
   Status why_stopped() const;
+  bool shall_finish() const;
   bool gives_up_turn() const;
   PassKey KeyOf(std::uint64_t pass) const { return {job_id_, pass}; }
   RenderResult MakeResult(StopReason reason) const LUCERNA_REQUIRES(estimator_mutex_);
@@ -239,6 +252,7 @@ class JobRunner final : public RunningJob {
   std::int64_t next_checkpoint_ = kFirstCheckpoint;
   int checkpoints_ = 0;
   bool has_warned_ = false;                // of a black image
+  bool has_warned_of_time_ = false;        // that has passed before the first pass is whole
   std::int64_t passes_at_checkpoint_ = 0;  // passes
   double error_at_most_ = HUGE_VAL;        // the upper end of the last interval
   std::optional<SteadyTime> due_;          // when time is up

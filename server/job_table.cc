@@ -4,6 +4,8 @@
 #include <charconv>
 #include <utility>
 
+#include "server/memory_need.h"
+
 namespace lucerna {
 namespace {
 
@@ -138,6 +140,7 @@ JobTable::Entry JobTable::MakeEntry(CheckedJob checked, WallTime submitted_at,
   job.settings = std::move(checked.settings);
   job.warnings = std::move(checked.warnings);
   job.needs = std::move(checked.needs);
+  job.scene_memory = HeldOfScene(checked.scene_memory);
   job.submitted_at = submitted_at;
   job.life = JobLife(moment.now);
   job.life.SetHasWorkers(has_workers_, moment.now);
@@ -769,9 +772,15 @@ std::optional<JobTable::Turn> JobTable::WaitForTurn() {
   // A job that ends while it waits leaves the queue in the same step.
   LUCERNA_CHECK(entry.job.life.Prepare());
   ++entry.version;
-  return Turn{entry.job.id,    entry.job.manifest,   entry.job.settings,
-              entry.job.needs, entry.job.reference,  std::exchange(entry.scene, std::nullopt),
-              entry.runner,    TurnEnd(*this, *next)};
+  return Turn{entry.job.id,
+              entry.job.manifest,
+              entry.job.settings,
+              entry.job.needs,
+              entry.job.scene_memory,
+              entry.job.reference,
+              std::exchange(entry.scene, std::nullopt),
+              entry.runner,
+              TurnEnd(*this, *next)};
 }
 
 void JobTable::EndTurn(std::uint64_t serial) {
@@ -1103,6 +1112,7 @@ void JobTable::Retain(Dropped& dropped, const Moment& moment) {
     serials.push_back(item->first);
     ended.push_back(
         {.has_photons = entry.runner != nullptr || entry.has_checkpoint,
+         .is_in_memory = entry.runner != nullptr,
          .pixels = std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()},
          .has_image = entry.image != nullptr,
          .image_bytes = entry.image ? entry.image->size() : 0,
@@ -1112,9 +1122,9 @@ void JobTable::Retain(Dropped& dropped, const Moment& moment) {
   for (std::size_t i = 0; i < kept.size(); ++i) {
     const auto found = entries_.find(serials[i]);
     Entry& entry = found->second;
-    if (!kept[i].photons) {
+    if (!kept[i].photons) entry.has_checkpoint = false;
+    if (!kept[i].photons || !kept[i].in_memory) {
       dropped.runners.push_back(std::exchange(entry.runner, nullptr));
-      entry.has_checkpoint = false;
       // The one that has just ended is still in use by its thread; its files go with its turn.
       if (!queue_.HasTurn(found->first)) {
         dropped.pinned.push_back(std::exchange(entry.pinned, {}));

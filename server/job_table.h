@@ -226,6 +226,7 @@ class JobTable {
     SceneManifest manifest;
     RenderSettings settings;
     SceneNeeds needs;
+    std::uint64_t scene_memory = 0;  // see Job
     std::optional<Digest> reference;
     std::optional<Scene> scene;          // absent: to be read again
     std::shared_ptr<RunningJob> runner;  // of a job that goes on

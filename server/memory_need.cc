@@ -16,10 +16,11 @@ constexpr std::uint64_t kPassVariance = 28;
 // Memory for a byte of a file: binary meshes become as much again with the tree over their
 // triangles three times; text becomes less.
 constexpr std::uint64_t kPerSceneByte = 4;
+constexpr double kGigabyte = 1e9;
 
 }  // namespace
 
-std::uint64_t SceneMemory(std::uint64_t scene_bytes) {
+std::uint64_t GuessSceneMemory(std::uint64_t scene_bytes) {
   return kPerSceneByte * scene_bytes;
 }
 
@@ -28,24 +29,42 @@ std::uint64_t CheckpointBytes(std::uint64_t pixels) {
 }
 
 std::uint64_t MemoryNeedOf(const SceneNeeds& needs, const RenderSettings& settings,
-                           std::uint64_t scene_bytes, bool keeps_checkpoints) {
+                           std::uint64_t scene_memory, bool keeps_checkpoints) {
   const auto pixels = static_cast<std::uint64_t>(settings.crop_width()) *
                       static_cast<std::uint64_t>(settings.crop_height());
   const std::uint64_t each = kEstimate + kPassVariance + (keeps_checkpoints ? kCheckpoint : 0);
   return static_cast<std::uint64_t>(ExpectedCostOf(needs, settings).coordinator) + pixels * each +
-         SceneMemory(scene_bytes);
+         scene_memory;
+}
+
+Status CheckSceneMemory(const SceneMemory& scene, std::uint64_t available_bytes) {
+  const double needed = scene.PeakOfCoordinator();
+  const auto available = static_cast<double>(available_bytes);
+  if (needed <= available) return absl::OkStatus();
+  return absl::ResourceExhaustedError(
+      absl::StrFormat("the scene takes %.2f GB of the coordinator's memory (meshes %.2f, images "
+                      "%.2f), of which %.2f "
+                      "GB are free for one job; use fewer triangles or smaller images, or start "
+                      "the coordinator with "
+                      "a larger --max-job-bytes",
+                      needed / kGigabyte, (needed - scene.textures) / kGigabyte,
+                      scene.textures / kGigabyte, available / kGigabyte));
 }
 
 Status CheckMemory(const SceneNeeds& needs, const RenderSettings& settings,
-                   std::uint64_t available_bytes) {
-  const double needed = ExpectedCostOf(needs, settings).coordinator;
+                   const SceneMemory& scene, std::uint64_t available_bytes) {
+  LUCERNA_RETURN_IF_ERROR(CheckSceneMemory(scene, available_bytes));
+  const double image = ExpectedCostOf(needs, settings).coordinator;
+  const double of_scene = scene.KeptByCoordinator() + scene.building_trees;
   const auto available = static_cast<double>(available_bytes);
-  if (needed <= available) return absl::OkStatus();
-  constexpr double kGigabyte = 1e9;
+  if (image + of_scene <= available) return absl::OkStatus();
   return absl::ResourceExhaustedError(absl::StrFormat(
-      "an image of %dx%d pixels takes %.1f GB of the coordinator's memory, of which %.1f GB are "
-      "free for one job; make it smaller, or render it in parts with the film's cropwindow",
-      settings.crop_width(), settings.crop_height(), needed / kGigabyte, available / kGigabyte));
+      "an image of %dx%d pixels takes %.1f GB of the coordinator's memory and its scene %.1f GB, "
+      "and "
+      "%.1f GB are free for one job; make it smaller, or render it in parts with the film's "
+      "cropwindow",
+      settings.crop_width(), settings.crop_height(), image / kGigabyte, of_scene / kGigabyte,
+      available / kGigabyte));
 }
 
 }  // namespace lucerna

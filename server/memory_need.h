@@ -1,4 +1,4 @@
-// Does a job's image fit into the coordinator's memory?
+// Do a job's image and scene fit into the coordinator's memory?
 //
 // Asked before anything is allocated: a coordinator that the system ends for want of memory takes
 // the other jobs with it.
@@ -7,23 +7,31 @@
 #include <cstdint>
 
 #include "render/analysis/needs.h"
+#include "render/analysis/scene_memory.h"
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
 
 namespace lucerna {
 
 // What a job holds of the coordinator's memory while it can go on [bytes]: its image's sums, the
-// copies that error estimates and checkpoints are made from, and the scene of `scene_bytes` as
-// files.
+// copies that error estimates and checkpoints are made from, and `scene_memory` of the scene.
 [[nodiscard]] std::uint64_t MemoryNeedOf(const SceneNeeds& needs, const RenderSettings& settings,
-                                         std::uint64_t scene_bytes, bool keeps_checkpoints);
+                                         std::uint64_t scene_memory, bool keeps_checkpoints);
+// What a job holds of its scene, with what building it takes for a while [bytes].
+[[nodiscard]] inline std::uint64_t HeldOfScene(const SceneMemory& memory) {
+  return static_cast<std::uint64_t>(memory.KeptByCoordinator() + memory.building_trees);
+}
 // About how large the checkpoint of a job of so many pixels is [bytes].
 [[nodiscard]] std::uint64_t CheckpointBytes(std::uint64_t pixels);
-// Of a scene of so many bytes as files, with the tree over its shapes [bytes].
-[[nodiscard]] std::uint64_t SceneMemory(std::uint64_t scene_bytes);
+// A guess of what a scene of so many bytes as files takes, before it has been read [bytes].
+[[nodiscard]] std::uint64_t GuessSceneMemory(std::uint64_t scene_bytes);
 
-// Errors: RESOURCE_EXHAUSTED that names the image, what it takes, and what to do about it.
+// For a scene that has been read, before what a job needs is found. Errors: RESOURCE_EXHAUSTED that
+// says what the scene takes, and what to do about it.
+[[nodiscard]] Status CheckSceneMemory(const SceneMemory& scene, std::uint64_t available_bytes);
+// Errors: RESOURCE_EXHAUSTED that names the image, what it and its scene take, and what to do about
+// it.
 [[nodiscard]] Status CheckMemory(const SceneNeeds& needs, const RenderSettings& settings,
-                                 std::uint64_t available_bytes);
+                                 const SceneMemory& scene, std::uint64_t available_bytes);
 
 }  // namespace lucerna

@@ -261,6 +261,7 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
                  std::uint64_t{1}, kPhotonsPerChunk);
   const std::uint64_t per_round = per_chunk * kChunksPerThread *
                                   static_cast<std::uint64_t>(std::max(1, state_->team.threads()));
+  const Status given_up = absl::CancelledError("the batch was given up");
   for (std::uint64_t next = range.first; next < last;) {
     const std::uint64_t part = next;
     const std::uint64_t part_end = std::min(last, part + kPhotonsPerPart);
@@ -310,11 +311,12 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
         found += tallies[chunk].deposits;
       next = round_end;
     }
-    if (stop) return absl::CancelledError("the batch was given up");
+    if (stop) return given_up;
     LUCERNA_RETURN_IF_ERROR(CheckDeposits(tallies));
     // Sorted deposits are copies: those they were made of go.
     const PhotonGrid grid(deposits, region, cell, state_->team);
     deposits = {};
+    if (stop) return given_up;
     std::vector<std::uint32_t> found_by(grid.size(), kNotFound);
     std::optional<PhotonGrid> caustic_grid;
     std::vector<std::uint32_t> caustic_found_by;
@@ -322,6 +324,7 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
     if (block.caustic_rows > 0) {
       caustic_grid.emplace(caustics, region, caustic_cell, state_->team);
       caustics = {};
+      if (stop) return given_up;
       caustic_found_by.assign(caustic_grid->size(), kNotFound);
       photons.caustics = &*caustic_grid;
       photons.caustic_found_by = caustic_found_by;
@@ -332,6 +335,7 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
     if (!block.segments.empty()) {
       tree.emplace(scattered, state_->team);
       scattered = {};
+      if (stop) return given_up;
       scattered_found_by.assign(tree->size(), kNotFound);
       photons.scattered = &*tree;
       photons.scattered_found_by = scattered_found_by;
@@ -343,7 +347,7 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
         counted.tally,
         Gather(block, radii, photons, prepared.scene().materials, Kernel{settings.kernel},
                prepared.flux_scale(), state_->team, stop, evidence, sums));
-    if (stop) return absl::CancelledError("the batch was given up");
+    if (stop) return given_up;
     for (const BatchTally& tally : tallies)
       counted.tally += tally;
     counted.tally.lights = TallyLights(sent, photons);
@@ -364,9 +368,10 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
                                          std::uint64_t pass, const RoundPlan& plan,
                                          const std::atomic<bool>& stop) {
   State& state = *state_;
-  const EyePass eye = TraceHitpointPass(*state.eye_paths, pass, state.first_hits->Of(pass),
-                                        *state.film_spread, state.team);
-  if (stop) return absl::CancelledError("the slice was given up");
+  const EyePass eye =
+      TraceHitpointPass(*state.eye_paths, pass, state.first_hits->Of(pass), *state.film_spread,
+                        state.team, [&stop] { return stop.load(std::memory_order_relaxed); });
+  if (stop || !eye.is_whole) return absl::CancelledError("the slice was given up");
   const std::size_t columns = EvidenceColumns(EvidenceOf(settings.radius_controller, pass));
   PassSums sums(eye.block.size(), columns);
   std::vector<PhotonKey> dropped;

@@ -1,6 +1,7 @@
 #include "worker/lease_runner.h"
 
 #include <algorithm>
+#include <new>
 #include <thread>
 
 #include <spdlog/spdlog.h>
@@ -22,6 +23,18 @@ constexpr std::chrono::milliseconds kBusyPause{200};
 bool IsGone(const Status& status) {
   return absl::IsUnavailable(status) || absl::IsDeadlineExceeded(status) ||
          absl::IsCancelled(status) || absl::IsUnimplemented(status);
+}
+
+// What `work` returns, or that memory ran out in it.
+template <typename Work>
+auto UnlessOutOfMemory(const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return absl::ResourceExhaustedError(
+        "the worker ran out of memory; use a machine with more, or make the image or the scene "
+        "smaller");
+  }
 }
 
 Status NoSuchGuide() {
@@ -124,7 +137,7 @@ void LeaseRunner::FetchStage() {
       Release(*held, work.status());
       continue;
     }
-    StatusOr<Fetched> fetched = Fetch(held);
+    StatusOr<Fetched> fetched = UnlessOutOfMemory([&] { return Fetch(held); });
     if (!fetched.ok()) {
       if (StopIfGone(fetched.status())) return;
       // The pass ended while its lease was on the way.
@@ -181,7 +194,7 @@ void LeaseRunner::ComputeStage() {
   while (auto fetched = fetched_.Take()) {
     const Duration cpu_before = ProcessCpuTime();
     const SteadyTime began_at = SystemClock().Steady();
-    StatusOr<std::string> bytes = Compute(*fetched);
+    StatusOr<std::string> bytes = UnlessOutOfMemory([&] { return Compute(*fetched); });
     counts_.computing.Count(SystemClock().Steady() - began_at);
     if (!bytes.ok()) {
       Release(*fetched->held, bytes.status());
@@ -211,6 +224,7 @@ StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
       zeros.tally.photons = accumulation.tally.photons;
       accumulation = std::move(zeros);
     }
+    if (stop) return absl::CancelledError("the batch was given up");
     return EncodeAccumulation(accumulation, fetched.block->size());
   }
   const RoundPlan plan = {.photons_per_pass = work.photons_per_pass,
@@ -230,6 +244,7 @@ StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
     slice = EmptySlice(slice.passes, slice.pixels(), slice.evidence);
     slice.tally.photons = photons;
   }
+  if (stop) return absl::CancelledError("the slice was given up");
   return EncodeSlice(slice);
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 
+#include "render/analysis/scene_memory.h"
 #include "render/formats/read_scene.h"
 #include "render/wire/block_codec.h"
 
@@ -31,7 +32,8 @@ auto Find(Kept& kept, const Digest& digest) {
 
 }  // namespace
 
-StatusOr<Scene> FetchScene(const SceneManifest& manifest, const FetchBytes& fetch) {
+StatusOr<Scene> FetchScene(const SceneManifest& manifest, const FetchBytes& fetch,
+                           const SceneLimits& limits) {
   // The parser would report a broken connection as an error of the scene.
   Status fetched;
   std::map<Digest, std::uint64_t> size_of;
@@ -42,7 +44,7 @@ StatusOr<Scene> FetchScene(const SceneManifest& manifest, const FetchBytes& fetc
     fetched.Update(bytes.status());
     return bytes;
   });
-  ParsedScene parsed = ReadScene(files, manifest.main_path);
+  ParsedScene parsed = ReadScene(files, manifest.main_path, limits);
   LUCERNA_RETURN_IF_ERROR(fetched);
   LUCERNA_RETURN_IF_ERROR(parsed.ToStatus());
   return std::move(parsed.scene);
@@ -54,7 +56,20 @@ StatusOr<std::shared_ptr<BatchTracer>> SceneCache::TracerFor(const SceneManifest
   // The oldest goes first: three scenes at once may be more than memory holds.
   while (tracers_.size() >= kTracersKept)
     tracers_.pop_back();
-  LUCERNA_ASSIGN_OR_RETURN(Scene fetched, FetchScene(scene, fetch_));
+  SceneLimits limits;
+  const std::uint64_t free_bytes = available_();
+  limits.max_shape_bytes = std::min(limits.max_shape_bytes, free_bytes);
+  limits.max_picture_bytes = std::min(limits.max_picture_bytes, free_bytes);
+  LUCERNA_ASSIGN_OR_RETURN(Scene fetched, FetchScene(scene, fetch_, limits));
+  // Before anything is built: a worker that the system ends takes the reason with it.
+  const SceneMemory memory = SceneMemoryOf(
+      fetched, {.robust_rays = true, .split_triangles = true, .shading_normals = true});
+  Status fits = CheckSceneFits(memory, memory.PeakOfWorker(), available_());
+  while (!fits.ok() && !tracers_.empty()) {
+    tracers_.pop_back();
+    fits = CheckSceneFits(memory, memory.PeakOfWorker(), available_());
+  }
+  LUCERNA_RETURN_IF_ERROR(fits);
   auto tracer = std::make_shared<BatchTracer>(std::move(fetched), threads_);
   tracers_.emplace_front(digest, tracer);
   return tracer;

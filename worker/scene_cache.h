@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -15,6 +16,7 @@
 #include <utility>
 
 #include "render/base/digest.h"
+#include "render/base/memory.h"
 #include "render/base/status.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/scene/scene_files.h"
@@ -27,15 +29,19 @@ using FetchBytes =
     std::function<StatusOr<std::string>(const Digest& digest, std::uint64_t max_bytes)>;
 
 // Errors: what fetching or reading the scene said.
-[[nodiscard]] StatusOr<Scene> FetchScene(const SceneManifest& manifest, const FetchBytes& fetch);
+[[nodiscard]] StatusOr<Scene> FetchScene(const SceneManifest& manifest, const FetchBytes& fetch,
+                                         const SceneLimits& limits = {});
 
 class SceneCache {
  public:
   using Fetch = FetchBytes;
 
-  SceneCache(int threads, Fetch fetch) : threads_(threads), fetch_(std::move(fetch)) {}
+  // `available` is how much memory is free [bytes].
+  SceneCache(int threads, Fetch fetch, std::function<std::uint64_t()> available = AvailableMemory)
+      : threads_(threads), fetch_(std::move(fetch)), available_(std::move(available)) {}
 
-  // Errors: what fetching or reading the scene said.
+  // Errors: what fetching or reading the scene said, RESOURCE_EXHAUSTED for a scene that does not
+  // fit into what is free once the other scenes are dropped.
   [[nodiscard]] StatusOr<std::shared_ptr<BatchTracer>> TracerFor(const SceneManifest& scene);
   // Errors: what fetching said, INVALID_ARGUMENT for bytes that are no block.
   [[nodiscard]] StatusOr<std::shared_ptr<const HitpointBlock>> BlockFor(const Digest& digest,
@@ -50,6 +56,7 @@ class SceneCache {
 
   const int threads_;
   const Fetch fetch_;
+  const std::function<std::uint64_t()> available_;
   Kept<BatchTracer> tracers_;
   Kept<const HitpointBlock> blocks_;
   Kept<const RadiusColumn> radii_;

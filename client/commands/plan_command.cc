@@ -1,6 +1,8 @@
 #include "client/commands/plan_command.h"
 
+#include <array>
 #include <cstdio>
+#include <utility>
 
 #include "absl/strings/str_format.h"
 
@@ -8,6 +10,7 @@
 #include "client/view/report.h"
 #include "render/analysis/expected_cost.h"
 #include "render/analysis/needs.h"
+#include "render/analysis/scene_memory.h"
 #include "render/base/text.h"
 
 namespace lucerna {
@@ -30,8 +33,11 @@ Status PrintPlan(const SceneSource& source, const RenderOverrides& overrides,
   const RenderSettings& settings = read.settings.front();
   const SceneNeeds needs = NeedsOf(scene, settings);
   const ExpectedCost cost = ExpectedCostOf(needs, settings);
+  SceneMemory memory = SceneMemoryOf(scene, needs.rays());
+  for (const auto& [path, file] : read.manifest.entries)
+    memory.files += static_cast<double>(file.size_bytes);
   if (output_options.json) {
-    std::fputs(PlanReport(needs, cost).c_str(), stdout);
+    std::fputs(PlanReport(needs, cost, memory).c_str(), stdout);
     return absl::OkStatus();
   }
   std::printf("%s, %d x %d pixels, %s\n", source.path.c_str(), settings.crop_width(),
@@ -42,6 +48,20 @@ Status PrintPlan(const SceneSource& source, const RenderOverrides& overrides,
       if (needs.Uses(part) != is_used) continue;
       std::printf("  %-18s %s\n", std::string(NameOf(part)).c_str(), needs.ReasonOf(part).c_str());
     }
+  }
+  std::printf("\nmemory of the scene, predicted from its counts\n");
+  const std::array<std::pair<const char*, double>, 9> rows = {
+      {{"files", memory.files},
+       {"shapes", memory.shapes},
+       {"textures", memory.textures},
+       {"ray acceleration", memory.acceleration},
+       {"  of instances", memory.instances},
+       {"lights", memory.lights},
+       {"feature edges", memory.edges},
+       {"coordinator", memory.PeakOfCoordinator()},
+       {"each worker", memory.PeakOfWorker()}}};
+  for (const auto& [name, bytes] : rows) {
+    if (bytes > 0) std::printf("  %-18s %s\n", name, Bytes(bytes).c_str());
   }
   std::printf("\nexpected, beside the scene itself\n");
   std::printf("  %-18s %s\n", "coordinator", Bytes(cost.coordinator).c_str());

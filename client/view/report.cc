@@ -539,7 +539,8 @@ std::string DigestReport(const Image& image) {
                  {"metadata", image.metadata}});
 }
 
-std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost) {
+std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost,
+                       const SceneMemory& memory) {
   Json parts = Json::array();
   for (const Part part : AllParts()) {
     parts.push_back(
@@ -551,7 +552,17 @@ std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost) {
                   {{"coordinator_bytes", cost.coordinator},
                    {"worker_bytes", cost.worker},
                    {"first_pass_bytes_sent", cost.first_pass_sent},
-                   {"pass_bytes_sent", cost.pass_sent}}}});
+                   {"pass_bytes_sent", cost.pass_sent}}},
+                 {"scene_memory",
+                  {{"files_bytes", memory.files},
+                   {"shapes_bytes", memory.shapes},
+                   {"textures_bytes", memory.textures},
+                   {"acceleration_bytes", memory.acceleration},
+                   {"instances_bytes", memory.instances},
+                   {"lights_bytes", memory.lights},
+                   {"edges_bytes", memory.edges},
+                   {"coordinator_bytes", memory.PeakOfCoordinator()},
+                   {"worker_bytes", memory.PeakOfWorker()}}}});
 }
 
 std::string SelfcheckReport(const std::vector<SelfcheckResult>& results) {

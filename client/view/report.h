@@ -14,6 +14,7 @@
 #include "proto/lucerna/v1/photons.pb.h"
 #include "render/analysis/expected_cost.h"
 #include "render/analysis/needs.h"
+#include "render/analysis/scene_memory.h"
 #include "render/base/digest.h"
 #include "render/film/image_metrics.h"
 #include "render/formats/diagnostic.h"
@@ -57,7 +58,8 @@ struct BakeRound {
                                      double interpolation_error, const std::string& path);
 [[nodiscard]] std::string PhotonReport(const v1::PhotonPath& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
-[[nodiscard]] std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost);
+[[nodiscard]] std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost,
+                                     const SceneMemory& memory);
 [[nodiscard]] std::string SelfcheckReport(const std::vector<SelfcheckResult>& results);
 
 }  // namespace lucerna

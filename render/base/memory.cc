@@ -45,6 +45,10 @@ std::uint64_t AvailableMemory() {
   return available;
 }
 
+void ReleaseFreedMemory() {
+  malloc_trim(0);
+}
+
 void KeepFreedMemory() {
   constexpr int kLargestBlock = 32 << 20;  // the largest that the C library allows
   constexpr int kLargestRest = 256 << 20;

@@ -9,6 +9,10 @@ namespace lucerna {
 // is less [bytes]; UINT64_MAX when the system does not say.
 [[nodiscard]] std::uint64_t AvailableMemory();
 
+// Gives back to the system what was freed and lies between what is held. Takes some milliseconds
+// for each 100 MB, in which other threads may wait for memory.
+void ReleaseFreedMemory();
+
 // Keeps freed blocks of up to 32 MiB for the next ones instead of giving each back to the system:
 // columns of an image come and go with every pass, and a page that the system gives is cleared and
 // mapped anew. All threads share two heaps: with one for each, what one thread freed would lie idle

@@ -70,6 +70,13 @@ class Diagnostics {
     return of_severity_[static_cast<std::size_t>(severity)].kept.size() == max_of_each_;
   }
 
+  // How many have come of a kind, with those that were not kept; equal warnings and notes count
+  // once.
+  [[nodiscard]] std::size_t CountOf(Diagnostic::Severity severity) const {
+    const OfSeverity& of = of_severity_[static_cast<std::size_t>(severity)];
+    return of.kept.size() + of.dropped;
+  }
+
   // Errors first, then warnings, then notes, each in the order of the text. Where more than
   // max_of_each came, the last one kept says how many more there were.
   [[nodiscard]] std::vector<Diagnostic> Take();

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <new>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -76,11 +78,22 @@ UnfinishedScene ReadUnfinishedScene(const std::string& main_path, AssetReader& a
 
 ParsedScene ReadScene(SceneFiles& files, const std::string& main_path, const SceneLimits& limits,
                       std::size_t max_of_each) {
-  Diagnostics diagnostics(max_of_each);
-  AssetReader assets(files, limits);
-  Scene scene =
-      FinishScene(ReadUnfinishedScene(main_path, assets, diagnostics), main_path, diagnostics);
-  return {std::move(scene), diagnostics.Take()};
+  try {
+    Diagnostics diagnostics(max_of_each);
+    AssetReader assets(files, limits);
+    Scene scene =
+        FinishScene(ReadUnfinishedScene(main_path, assets, diagnostics), main_path, diagnostics);
+    return {std::move(scene), diagnostics.Take()};
+  } catch (const std::bad_alloc&) {
+    // What had been read is freed by now.
+  } catch (const std::length_error&) {
+    // The same: more elements than a vector can have.
+  }
+  Diagnostics out_of_memory;
+  out_of_memory.Error({&main_path, 0, 0},
+                      "the scene takes more memory than there is; repeat meshes and files less "
+                      "often, or give fewer triangles and smaller images");
+  return {Scene(), out_of_memory.Take()};
 }
 
 }  // namespace lucerna

@@ -145,8 +145,8 @@ int FilmSpread::BrightPathsOf(int x, int y) const {
 }
 
 void FilmSpread::Add(std::uint64_t pass, const std::vector<Rgb>& bright, std::vector<Rgb>& direct,
-                     ThreadTeam& team) {
-  if (!is_needed()) return;
+                     ThreadTeam& team, const std::function<bool()>& shall_stop) {
+  if (!is_needed() || (shall_stop && shall_stop())) return;
   Prepare(team);
   const std::vector<GlintPath> glint_paths = TraceGlints(pass, team);
   const int tiles_x = (width_ + kTile - 1) / kTile;
@@ -154,6 +154,7 @@ void FilmSpread::Add(std::uint64_t pass, const std::vector<Rgb>& bright, std::ve
   team.For(static_cast<std::size_t>(tiles_x) * static_cast<std::size_t>(tiles_y), 4,
            [&](std::size_t begin, std::size_t end) {
              for (std::size_t tile = begin; tile < end; ++tile) {
+               if (shall_stop && shall_stop()) return;
                const int x0 = static_cast<int>(tile % static_cast<std::size_t>(tiles_x)) * kTile;
                const int y0 = static_cast<int>(tile / static_cast<std::size_t>(tiles_x)) * kTile;
                AddTile(pass, {x0, y0, std::min(x0 + kTile, width_), std::min(y0 + kTile, height_)},

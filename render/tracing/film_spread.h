@@ -27,6 +27,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -54,8 +55,9 @@ class FilmSpread {
 
   // Adds to `direct` what bright lights bring to the pixels of the crop window in a pass. `bright`:
   // EyePath::bright of the same pixels. What lies straight ahead of pixels is found once.
+  // `shall_stop` may be empty and is asked between tiles: once it is true, the rest is left out.
   void Add(std::uint64_t pass, const std::vector<Rgb>& bright, std::vector<Rgb>& direct,
-           ThreadTeam& team);
+           ThreadTeam& team, const std::function<bool()>& shall_stop = nullptr);
 
  private:
   // Pixels [x0, x1) × [y0, y1) in the crop window's coordinates.

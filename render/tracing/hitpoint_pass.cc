@@ -1,6 +1,7 @@
 #include "render/tracing/hitpoint_pass.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "render/estimate/slice_sums.h"
@@ -40,7 +41,8 @@ float UnitRadiusOf(const EyePathTracer& tracer, const EyeSegment& segment) {
 }  // namespace
 
 EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, FirstHitsOfSet* known,
-                          FilmSpread& spread, ThreadTeam& team) {
+                          FilmSpread& spread, ThreadTeam& team,
+                          const std::function<bool()>& shall_stop) {
   const int width = tracer.settings().crop_width();
   const int height = tracer.settings().crop_height();
   const int tiles_x = (width + kTile - 1) / kTile;
@@ -77,8 +79,16 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   const bool automatic = tracer.settings().initial_radius == 0;
   std::vector<Tile> per_tile(tiles);
   std::vector<std::uint64_t> rays(tiles);
+  // Once true, it stays so, whatever the caller would say later.
+  std::atomic<bool> is_stopped = false;
+  const auto stops = [&] {
+    if (shall_stop && !is_stopped.load(std::memory_order_relaxed) && shall_stop())
+      is_stopped = true;
+    return is_stopped.load(std::memory_order_relaxed);
+  };
   team.For(tiles, 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t tile = begin; tile < end; ++tile) {
+      if (stops()) return;
       const int x0 = static_cast<int>(tile % static_cast<std::size_t>(tiles_x)) * kTile;
       const int y0 = static_cast<int>(tile / static_cast<std::size_t>(tiles_x)) * kTile;
       for (int y = y0; y < std::min(y0 + kTile, height); ++y) {
@@ -122,8 +132,10 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     }
   });
 
-  if (known != nullptr) known->is_known = true;
-  spread.Add(pass, bright, out.direct, team);
+  if (known != nullptr && !is_stopped) known->is_known = true;
+  spread.Add(pass, bright, out.direct, team, stops);
+  out.is_whole = !is_stopped;
+  if (!out.is_whole) return out;
 
   // Where the rows of each tile begin: first all ordinary ones, then the caustic ones, then the
   // segments.

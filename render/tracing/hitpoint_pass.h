@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "render/base/parallel.h"
@@ -20,6 +21,7 @@ namespace lucerna {
 
 struct EyePass {
   std::uint64_t pass = 0;
+  bool is_whole = true;  // else it was given up, and what is below is of no use
   HitpointBlock block;
   // Per hitpoint, in the block's order. A pixel has at most one among the caustic rows and one
   // among the others.
@@ -34,10 +36,11 @@ struct EyePass {
 
 // Traces one eye path for every pixel. Depends on the tracer's job and `pass` alone; `known` (or
 // nullptr), what the camera's rays meet, is used or filled and saves time alone. `spread` is of the
-// same tracer.
+// same tracer. `shall_stop` may be empty; it is asked before every 256 pixels, by several threads,
+// and once it is true the pass is given up.
 [[nodiscard]] EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass,
-                                        FirstHitsOfSet* known, FilmSpread& spread,
-                                        ThreadTeam& team);
+                                        FirstHitsOfSet* known, FilmSpread& spread, ThreadTeam& team,
+                                        const std::function<bool()>& shall_stop = nullptr);
 
 // Where the hitpoints of the first pass are, and how many pixels have one.
 struct HitpointExtent {

@@ -1,10 +1,7 @@
 // When memory runs out while a slice is merged, the round is as it was, and the slice can come
 // again.
 //
-// This program's operator new fails at a chosen allocation of the thread. Every allocation of a
-// merge is made to fail, one after the other.
-#include <cstdlib>
-#include <limits>
+// Every allocation of a merge is made to fail, one after the other.
 #include <memory>
 #include <new>
 #include <vector>
@@ -12,42 +9,7 @@
 #include "gtest/gtest.h"
 
 #include "server/round_merger.h"
-
-namespace {
-
-constexpr int kNever = std::numeric_limits<int>::max();
-// So many allocations of this thread succeed, and the next one does not.
-thread_local int allocations_left = kNever;
-
-void* Allocate(std::size_t size) {
-  if (allocations_left != kNever && allocations_left-- == 0) {
-    allocations_left = kNever;
-    throw std::bad_alloc();
-  }
-  if (void* const bytes = std::malloc(size == 0 ? 1 : size)) return bytes;
-  throw std::bad_alloc();
-}
-
-}  // namespace
-
-void* operator new(std::size_t size) {
-  return Allocate(size);
-}
-void* operator new[](std::size_t size) {
-  return Allocate(size);
-}
-void operator delete(void* bytes) noexcept {
-  std::free(bytes);
-}
-void operator delete[](void* bytes) noexcept {
-  std::free(bytes);
-}
-void operator delete(void* bytes, std::size_t /*size*/) noexcept {
-  std::free(bytes);
-}
-void operator delete[](void* bytes, std::size_t /*size*/) noexcept {
-  std::free(bytes);
-}
+#include "tests/memory/failing_allocations.h"
 
 namespace lucerna {
 namespace {

@@ -70,5 +70,69 @@ TEST(StopAndExtendTest, AJobThatHasNotBegunIsCancelledInstead) {
   EXPECT_EQ(client.Image("unknown").code(), grpc::StatusCode::NOT_FOUND);
 }
 
+v1::SubmitRequest ForSeconds(const v1::SceneManifest& scene, double time_s) {
+  v1::SubmitRequest request = RequestFor(scene, "timed", 1);
+  RenderOverrides overrides;
+  overrides.time_s = time_s;
+  overrides.photons_per_pass = 1000;
+  overrides.radius_controller = RadiusControllerKind::kPppm;
+  *request.mutable_overrides() = ToProto(overrides);
+  return request;
+}
+
+// What is out when time is up is taken back; the image is that of the passes that are whole.
+TEST(StopAndExtendTest, TimeThatIsUpTakesLeasesBackAndKeepsWholePasses) {
+  ServiceUnderTest service;
+  TestClient client(service);
+  const v1::SceneManifest scene = client.Upload(SmallScene());
+  IdleHandsWorker worker(service);
+  const std::string job = client.Submit(ForSeconds(scene, 5)).message.job_id();
+  const auto first = worker.TakeLease();
+  ASSERT_TRUE(first);
+  ASSERT_TRUE(worker.Commit(*first).ok());
+  const auto second = worker.TakeLease();
+  ASSERT_TRUE(second);
+  service.clock().Move(std::chrono::seconds(5));
+  const v1::Job ended = client.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message;
+  EXPECT_EQ(ended.stop_reason(), v1::STOP_REASON_TIME);
+  EXPECT_EQ(ended.progress().passes(), 1);
+  EXPECT_EQ(ended.progress().photons(), 1000U);
+  EXPECT_EQ(ended.warnings_size(), 0);
+  const auto told = worker.Sync(false, Duration::zero(), {second->lease_id()});
+  ASSERT_EQ(told.message.revoked_lease_ids_size(), 1);
+  EXPECT_EQ(told.message.revoked_lease_ids(0), second->lease_id());
+  EXPECT_EQ(worker.Commit(*second).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
+}
+
+// An image has at least one pass: it is finished, nothing else is lent, and the job says so.
+TEST(StopAndExtendTest, TimeThatIsUpBeforeTheFirstPassWaitsForThatAlone) {
+  ServiceUnderTest service;
+  TestClient client(service);
+  const v1::SceneManifest scene = client.Upload(SmallScene());
+  IdleHandsWorker worker(service);
+  const std::string job = client.Submit(ForSeconds(scene, 5)).message.job_id();
+  const auto first = worker.TakeLease();
+  ASSERT_TRUE(first);
+  EXPECT_EQ(client.Get(job).message.warnings_size(), 0);
+  service.clock().Move(std::chrono::seconds(5));
+  const auto has_warned = [](const v1::Job& now) { return now.warnings_size() == 0; };
+  const v1::Job warned = client.Watch(job, has_warned).message;
+  ASSERT_EQ(warned.warnings_size(), 1);
+  EXPECT_NE(warned.warnings(0).find("the 5 s were over before the first pass was whole"),
+            std::string::npos)
+      << warned.warnings(0);
+  EXPECT_EQ(warned.state(), v1::JOB_STATE_RUNNING);
+  IdleHandsWorker other(service, "other");
+  EXPECT_FALSE(other.Sync(true, Duration::zero()).message.has_lease()) << "of a later pass";
+  EXPECT_EQ(
+      worker.Sync(false, Duration::zero(), {first->lease_id()}).message.revoked_lease_ids_size(),
+      0);
+  ASSERT_TRUE(worker.Commit(*first).ok());
+  const v1::Job ended = client.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message;
+  EXPECT_EQ(ended.stop_reason(), v1::STOP_REASON_TIME);
+  EXPECT_EQ(ended.progress().passes(), 1);
+  EXPECT_EQ(ended.warnings_size(), 1);
+}
+
 }  // namespace
 }  // namespace lucerna

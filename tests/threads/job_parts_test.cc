@@ -37,6 +37,20 @@ TEST(JobRetentionTest, NothingIsKeptOfJobsThatEndedTooLongAgo) {
   EXPECT_TRUE(DecideRetention({old}, {})[0].record) << "no limit";
 }
 
+TEST(JobRetentionTest, OfManySmallJobsOnlyTheNewestAreInMemory) {
+  const RetentionLimits limits = {.pixels = 250, .in_memory = 2};
+  const EndedJob small = {.has_photons = true, .is_in_memory = true, .pixels = 100};
+  const EndedJob on_disk = {.has_photons = true, .pixels = 100};
+  EXPECT_EQ(DecideRetention({small, on_disk, small, small, small}, limits),
+            (std::vector<KeptOfJob>{{.in_memory = true},
+                                    {.in_memory = true},
+                                    {.in_memory = true},
+                                    {.photons = false, .in_memory = false},
+                                    {.photons = false, .in_memory = false}}));
+  EXPECT_EQ(DecideRetention({small, small, small}, limits).back(), (KeptOfJob{.in_memory = false}))
+      << "its checkpoint stays";
+}
+
 TEST(JobRetentionTest, JobsWithoutPhotonsOrImageTakeNoRoom) {
   const RetentionLimits limits = {.jobs = 10, .pixels = 0, .images = 1, .image_bytes = 0};
   const EndedJob cancelled = {.pixels = 1000};

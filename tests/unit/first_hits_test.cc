@@ -1,6 +1,7 @@
 // What the camera's rays meet is found once for each set of eye paths, and changes nothing.
 #include "render/tracing/first_hits.h"
 
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 
@@ -81,6 +82,42 @@ TEST(FirstHitsTest, AreWhatEyePathsGoBy) {
     shape = kNoShape;
   EXPECT_FALSE(traced.pixels.empty());
   EXPECT_TRUE(TraceHitpointPass(tracer, 0, &known, spread, team).pixels.empty());
+}
+
+// Between two questions at most 256 pixels are traced, and a pass that is given up leaves nothing
+// behind.
+TEST(FirstHitsTest, APassIsGivenUpWithinATileAndTellsNothing) {
+  const Scene scene = InWorkingSpace(Floor());
+  RenderSettings settings = TestSettings(scene, 1000, 0.1, 8);
+  settings.width = settings.height = settings.crop_x1 = settings.crop_y1 = 160;
+  const SceneNeeds needs = NeedsOf(scene, settings);
+  const auto intersector = Intersector::Create(scene).value();
+  const LightSet lights(scene, *intersector);
+  const EyePathTracer tracer(scene, settings, needs, *intersector, lights);
+  ThreadTeam team(1);
+  FilmSpread spread(tracer);
+  const EyePass whole = TraceHitpointPass(tracer, 0, nullptr, spread, team);
+  ASSERT_TRUE(whole.is_whole);
+  const double rays_of_tile = static_cast<double>(whole.rays) / 100;
+  FirstHitsOfSet known;
+  known.shapes.resize(160 * 160);
+  for (const int tiles : {0, 1, 7}) {
+    SCOPED_TRACE(tiles);
+    std::atomic<int> questions = 0;
+    const EyePass given_up =
+        TraceHitpointPass(tracer, 0, &known, spread, team, [&] { return ++questions > tiles; });
+    EXPECT_FALSE(given_up.is_whole);
+    EXPECT_EQ(questions, tiles + 1) << "once it is true nobody asks again";
+    EXPECT_FALSE(known.is_known);
+  }
+  // Rays are those of the tiles between the questions; none of them needs more than twice the mean.
+  int questions = 0;
+  EXPECT_LE(
+      TraceHitpointPass(tracer, 0, nullptr, spread, team, [&] { return ++questions > 7; }).rays,
+      static_cast<std::uint64_t>(2 * 7 * rays_of_tile));
+  const EyePass again = TraceHitpointPass(tracer, 0, &known, spread, team);
+  EXPECT_TRUE(again.is_whole);
+  EXPECT_EQ(again.block, whole.block);
 }
 
 }  // namespace

@@ -105,6 +105,23 @@ TEST_F(JobIntakeTest, RefusesASmallUploadThatUnpacksToMoreThanTheMemory) {
   EXPECT_TRUE(NothingIsPinned());
 }
 
+// A closed surface takes several times its memory while it is analysed.
+TEST_F(JobIntakeTest, RefusesASceneThatDoesNotFitOnceItsTreeIsBuilt) {
+  std::string scene = kScene;
+  scene +=
+      "Shape \"loopsubdiv\" \"integer levels\" 6 \"point3 P\" "
+      "[1 0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1] "
+      "\"integer indices\" [0 2 4 2 1 4 1 3 4 3 0 4 2 0 5 1 2 5 3 1 5 0 3 5]\n";
+  Add("scene.pbrt", scene);
+  Add("floor.pbrt", kFloor);
+  const StatusOr<CheckedJob> job = Check();
+  ASSERT_TRUE(job.ok()) << job.status();
+  const double peak = job->scene_memory.PeakOfCoordinator();
+  max_job_bytes_ = static_cast<std::uint64_t>(0.9 * peak);
+  EXPECT_THAT(std::string(Check().status().message()),
+              testing::StartsWith("the scene takes 0.01 GB of the coordinator's memory"));
+}
+
 // A picture of one colour packs well: its pixels count, and their number is in its first bytes.
 TEST_F(JobIntakeTest, RefusesASmallPictureOfMorePixelsThanTheMemoryHolds) {
   using namespace std::string_literals;

@@ -28,6 +28,7 @@ Job FullJob() {
   job.settings = ResolveSettings(overrides, Scene()).value();
   job.warnings = {"scene.pbrt:1:2: a warning"};
   job.needs = SceneNeeds(5, 3, {});
+  job.scene_memory = 123'456'789'000;
   for (const Part part : AllParts())
     job.needs.GiveReason(part, absl::StrCat("reason ", std::string(NameOf(part))));
   job.submitted_at = kNow.wall - std::chrono::minutes(10);
@@ -139,6 +140,7 @@ TEST(JobMessageTest, ARecordHoldsAllThatClientsSee) {
   EXPECT_EQ(read->job.manifest, job.manifest);
   EXPECT_EQ(read->job.settings, job.settings) << "to the bit";
   EXPECT_EQ(read->job.needs, job.needs);
+  EXPECT_EQ(read->job.scene_memory, job.scene_memory);
   EXPECT_EQ(read->job.reference, job.reference);
   EXPECT_EQ(read->job.life.submitted_at(), job.life.submitted_at());
   EXPECT_EQ(read->job.life.state(), JobState::kSucceeded);

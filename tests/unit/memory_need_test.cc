@@ -31,12 +31,32 @@ TEST(MemoryNeedTest, GrowsWithPixelsAndEvidence) {
 TEST(MemoryNeedTest, OfTheLargestFilmIsNotFoundOnASmallMachine) {
   const RenderSettings largest = Sized(16384, 16384);
   EXPECT_GT(MemoryNeeded(largest), 100e9);
-  const Status refused = CheckMemory(SceneNeeds(), largest, std::uint64_t{16} << 30);
+  const Status refused = CheckMemory(SceneNeeds(), largest, SceneMemory(), std::uint64_t{16} << 30);
   EXPECT_TRUE(absl::IsResourceExhausted(refused));
   EXPECT_THAT(std::string(refused.message()),
               testing::AllOf(testing::HasSubstr("16384x16384"), testing::HasSubstr("17.2 GB"),
                              testing::HasSubstr("cropwindow")));
-  EXPECT_TRUE(CheckMemory(SceneNeeds(), largest, std::uint64_t{1} << 40).ok());
+  EXPECT_TRUE(CheckMemory(SceneNeeds(), largest, SceneMemory(), std::uint64_t{1} << 40).ok());
+}
+
+TEST(MemoryNeedTest, OfASceneCountsBesideTheImageAndByItself) {
+  SceneMemory scene;
+  scene.shapes = 1e9;
+  scene.acceleration = 3e9;
+  scene.textures = 2e9;
+  const RenderSettings small = Sized(100, 100);
+  EXPECT_TRUE(CheckMemory(SceneNeeds(), small, scene, 6'700'000'000).ok());
+  const Status refused = CheckMemory(SceneNeeds(), small, scene, 6'500'000'000);
+  EXPECT_TRUE(absl::IsResourceExhausted(refused));
+  EXPECT_THAT(std::string(refused.message()),
+              testing::AllOf(testing::HasSubstr("the scene takes 6.60 GB"),
+                             testing::HasSubstr("6.50 GB are free"),
+                             testing::HasSubstr("--max-job-bytes")));
+  // Each alone would fit.
+  const RenderSettings large = Sized(2000, 1000);
+  EXPECT_TRUE(CheckMemory(SceneNeeds(), large, SceneMemory(), 6'700'000'000).ok());
+  EXPECT_THAT(std::string(CheckMemory(SceneNeeds(), large, scene, 6'700'000'000).message()),
+              testing::HasSubstr("its scene 6.0 GB"));
 }
 
 TEST(MemoryNeedTest, OfACropWindowIsThatOfItsPixels) {

@@ -48,6 +48,62 @@ TEST(ReadSceneTest, AFileOfNoKnownFormatIsRefused) {
   }
 }
 
+constexpr const char* kHead =
+    "LookAt 0 0 5  0 0 0  0 1 0\nCamera \"perspective\"\nWorldBegin\nLightSource \"point\"\n";
+
+// A program gets as many as it asks for.
+TEST(ReadSceneTest, DiagnosticsAreKeptAsManyAsAreAskedFor) {
+  std::string text = kHead;
+  for (int i = 0; i < 250; ++i)
+    text += "Directive" + std::to_string(i) + " 1 \"a\"\n";
+  MemoryFiles files({{"s.pbrt", text}});
+  EXPECT_EQ(ReadScene(files, "s.pbrt").diagnostics.size(), Diagnostics::kMaxOfEach);
+  const ParsedScene all = ReadScene(files, "s.pbrt", {}, 1'000'000);
+  ASSERT_EQ(all.diagnostics.size(), 250U);
+  for (int i = 0; i < 250; ++i) {
+    const Diagnostic& diagnostic = all.diagnostics[static_cast<std::size_t>(i)];
+    EXPECT_EQ(diagnostic.line, 5 + i);
+    EXPECT_EQ(diagnostic.message, "unknown directive \"Directive" + std::to_string(i) + "\"");
+  }
+}
+
+TEST(ReadSceneTest, AMillionErrorsAreEnough) {
+  std::string text = kHead;
+  for (int i = 0; i < 1000; ++i)
+    text += "Nothing\n";
+  std::string main = kHead;
+  for (int i = 0; i < 1100; ++i)
+    main += "Include \"more.pbrt\"\n";
+  MemoryFiles files({{"s.pbrt", main}, {"more.pbrt", text.substr(std::string(kHead).size())}});
+  const ParsedScene parsed = ReadScene(files, "s.pbrt");
+  ASSERT_EQ(parsed.diagnostics.size(), Diagnostics::kMaxOfEach);
+  EXPECT_EQ(parsed.diagnostics.back().message, "and 999903 more errors")
+      << "the one that is one too many, and the one that says so";
+}
+
+// A short text that is included often can name a billion of them.
+TEST(ReadSceneTest, MaterialsTexturesAndLightsAreBounded) {
+  SceneLimits limits;
+  limits.max_shape_bytes = 1 << 20;
+  for (const char* const directive :
+       {"Material \"diffuse\"\n", "LightSource \"point\"\n",
+        "LightSource \"infinite\" \"rgb L\" [0 0 0]\n",
+        "AttributeBegin AreaLightSource \"diffuse\" Shape \"sphere\" AttributeEnd\n"}) {
+    SCOPED_TRACE(directive);
+    std::string more;
+    for (int i = 0; i < 100; ++i)
+      more += directive;
+    std::string main = kHead;
+    for (int i = 0; i < 1000; ++i)
+      main += "Include \"more.pbrt\"\n";
+    MemoryFiles files({{"s.pbrt", main}, {"more.pbrt", more}});
+    const ParsedScene parsed = ReadScene(files, "s.pbrt", limits);
+    ASSERT_FALSE(parsed.ok());
+    EXPECT_THAT(parsed.diagnostics.front().message,
+                ::testing::HasSubstr("bytes of memory that there are for them"));
+  }
+}
+
 TEST(ReadSceneTest, AFileThatIsNotThereIsMissing) {
   MemoryFiles none({});
   const ParsedScene parsed = ReadScene(none, "scene.xml");

@@ -174,7 +174,34 @@ void DirectiveReader::ReadDirectives(Tokenizer& tokens) {
       arguments.Error(Concat(directive->name, " must come after WorldBegin"));
     }
     if (!(this->*directive->handler)(arguments)) SkipToDirective(tokens);
+    CheckRoom(token.location);
   }
+}
+
+void DirectiveReader::CheckRoom(const SourceLocation& location) {
+  constexpr std::size_t kMostErrors = 1'000'000;
+  if (IsStopped()) return;
+  if (diagnostics_.CountOf(Diagnostic::Severity::kError) > kMostErrors) {
+    diagnostics_.Error(location,
+                       Concat("more than ", kMostErrors, " errors: the rest is not read"));
+    is_stopped_ = true;
+    return;
+  }
+  std::size_t bytes =
+      scene_.materials.size() * sizeof(Material) + scene_.textures.size() * sizeof(Texture) +
+      scene_.media.size() * sizeof(Medium) + scene_.area_lights.size() * sizeof(AreaLight) +
+      scene_.infinite_lights.size() * sizeof(InfiniteLight);
+  ForEachDeltaList(scene_, [&](const auto& lights) {
+    if (!lights.empty()) bytes += lights.size() * sizeof(lights.front());
+  });
+  const std::uint64_t most = assets_.limits().max_shape_bytes;
+  if (bytes <= most) return;
+  diagnostics_.Error(location, Concat("with this, the materials, textures and lights of the scene "
+                                      "take more than the ",
+                                      most,
+                                      " bytes of memory that there are for them; give each "
+                                      "once, and refer to it by its name"));
+  is_stopped_ = true;
 }
 
 void DirectiveReader::ReportUnknown(const Token& token) {

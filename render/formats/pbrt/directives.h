@@ -68,6 +68,8 @@ class DirectiveReader {
   void IncludeFile(const std::string& path, const SourceLocation& location);
   void ReadText(const std::string& path, std::string_view text);
   void ReadDirectives(Tokenizer& tokens);
+  // Stops where the text brings more than may be in memory, or more errors than anybody reads.
+  void CheckRoom(const SourceLocation& location);
   void ReportUnknown(const Token& token);
   static void SkipToDirective(Tokenizer& tokens);
   [[nodiscard]] bool IsStopped() const { return is_stopped_ || assets_.is_over_limit(); }

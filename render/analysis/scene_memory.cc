@@ -1,0 +1,145 @@
+#include "render/analysis/scene_memory.h"
+
+#include <algorithm>
+#include <set>
+
+#include "absl/strings/str_format.h"
+
+#include "render/scene/shape_lists.h"
+
+namespace lucerna {
+namespace {
+
+// Bytes, measured (docs/measurements/scene-memory.md).
+
+// Of a process over that of its blocks.
+constexpr double kOfHeaps = 1.1;
+// Of the C library for a block, of which a mesh has three or four.
+constexpr double kBlock = 16;
+// Of Embree's tree, for a triangle or analytic shape, with copies of large ones that are split.
+constexpr double kTreePrimitive = 62;
+constexpr double kSplitTreePrimitive = 74;
+constexpr double kTreeShape = 85;  // analytic
+constexpr double kTreeMesh = 520;
+constexpr double kTreeInstance = 430;
+constexpr double kBuildingPrimitive = 36;  // beside the tree
+// Of the set of lights.
+constexpr double kEmitter = 48;
+// Of feature edges: a segment, with the grids; the least when there are any; and while they are
+// found.
+constexpr double kSegment = 70;
+constexpr double kFewestSegments = 1.2e6;
+constexpr double kEdgesPerTriangle = 77, kEdgesPerVertex = 28, kEdgesPerMesh = 24;
+// Of the analysis of what a job needs: a triangle, a vertex, a mesh, and a triangle of a closed
+// surface.
+constexpr double kAnalysisPerTriangle = 108, kAnalysisPerVertex = 29, kAnalysisPerMesh = 650;
+constexpr double kAnalysisOfClosed = 90;
+// A surface counts as open when a larger share of its triangles has an edge of its own.
+constexpr double kOpenShare = 1e-3;
+
+double SizeOf(const Picture& picture) {
+  return static_cast<double>(picture.coded.size()) +
+         static_cast<double>(picture.linear.size() * sizeof(float)) + sizeof(Picture);
+}
+
+double SizeOf(const TriangleMesh& mesh) {
+  return sizeof(TriangleMesh) + 4 * kBlock +
+         static_cast<double>(mesh.positions.size() * sizeof(Vec3) +
+                             mesh.indices.size() * sizeof(std::uint32_t) +
+                             mesh.normals.size() * sizeof(Vec3) + mesh.uvs.size() * sizeof(Vec2));
+}
+
+// How many edges belong to one triangle alone, by Euler's formula for surfaces of one piece: exact
+// for a grid and for loose triangles. Vertices that are doubled along seams look like open edges;
+// where a mesh has normals or texture coordinates, half of what looks open is taken for seams.
+double OpenEdges(const TriangleMesh& mesh) {
+  const auto triangles = static_cast<double>(mesh.indices.size()) / 3;
+  const auto vertices = static_cast<double>(mesh.positions.size());
+  const double open = std::clamp(2 * vertices - triangles, 0.0, 3 * triangles);
+  return mesh.normals.empty() && mesh.uvs.empty() ? open : open / 2;
+}
+
+}  // namespace
+
+double SceneMemory::PeakOfCoordinator() const {
+  return files + kOfHeaps * (shapes + textures +
+                             std::max(analysing, acceleration + building_trees + lights));
+}
+
+double SceneMemory::PeakOfWorker() const {
+  return kOfHeaps * (shapes + textures +
+                     std::max(std::max(edges, building_edges),
+                              edges + acceleration + building_trees + lights));
+}
+
+SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
+  SceneMemory memory;
+  const double tree = rays.split_triangles ? kSplitTreePrimitive : kTreePrimitive;
+  double open_edges = 0;
+  double primitives = 0;
+  for (const auto* list : {&scene.meshes, &scene.object_meshes}) {
+    for (const TriangleMesh& mesh : *list) {
+      const auto triangles = static_cast<double>(mesh.indices.size()) / 3;
+      const auto vertices = static_cast<double>(mesh.positions.size());
+      primitives += triangles;
+      memory.shapes += SizeOf(mesh);
+      memory.acceleration += kTreeMesh + tree * triangles + sizeof(Vec3) * (vertices + 1) + kBlock;
+      // The rest concerns what is written out.
+      if (list != &scene.meshes) continue;
+      open_edges += OpenEdges(mesh);
+      memory.building_edges +=
+          kEdgesPerTriangle * triangles + kEdgesPerVertex * vertices + kEdgesPerMesh;
+      const bool is_open = mesh.normals.empty() && mesh.uvs.empty() &&
+                           2 * vertices - triangles > 8 + kOpenShare * triangles;
+      memory.analysing += (kAnalysisPerTriangle + (is_open ? 0 : kAnalysisOfClosed)) * triangles +
+                          kAnalysisPerVertex * vertices + kAnalysisPerMesh;
+      if (mesh.traits.area_light >= 0) memory.lights += kEmitter * triangles;
+    }
+  }
+  ForEachAnalyticList(scene, [&](const auto& list) {
+    const auto count = static_cast<double>(list.size());
+    if (list.empty()) return;
+    primitives += count;
+    memory.shapes += count * sizeof(list.front());
+    memory.acceleration += count * kTreeShape;
+  });
+  const auto instances = static_cast<double>(scene.instances.size());
+  memory.instances = kTreeInstance * instances;
+  memory.acceleration += memory.instances;
+  memory.shapes += sizeof(Instance) * instances;
+  memory.building_trees = kBuildingPrimitive * (primitives + instances);
+  memory.shapes += static_cast<double>(
+      scene.materials.size() * sizeof(Material) + scene.textures.size() * sizeof(Texture) +
+      scene.area_lights.size() * sizeof(AreaLight) + scene.sensors.size() * sizeof(Sensor) +
+      scene.infinite_lights.size() * sizeof(InfiniteLight));
+  ForEachDeltaList(scene, [&](const auto& lights) {
+    if (!lights.empty()) memory.lights += static_cast<double>(lights.size()) * kEmitter;
+  });
+  if (open_edges > 0) memory.edges = std::max(kFewestSegments, kSegment * open_edges);
+
+  // A picture is in memory once, however many refer to it.
+  std::set<const Picture*> pictures;
+  const auto add = [&](const std::shared_ptr<const Picture>& picture) {
+    if (picture != nullptr && pictures.insert(picture.get()).second)
+      memory.textures += SizeOf(*picture);
+  };
+  for (const Texture& texture : scene.textures)
+    add(texture.picture);
+  for (const InfiniteLight& light : scene.infinite_lights)
+    add(light.map);
+  return memory;
+}
+
+Status CheckSceneFits(const SceneMemory& memory, double peak_bytes, std::uint64_t available_bytes) {
+  const double beside = peak_bytes - memory.shapes - memory.textures;
+  const auto available = static_cast<double>(available_bytes);
+  if (beside <= available) return absl::OkStatus();
+  constexpr double kGigabyte = 1e9;
+  return absl::ResourceExhaustedError(absl::StrFormat(
+      "the scene takes about %.1f GB of memory, %.1f GB of which are still to be built, and %.1f "
+      "GB "
+      "are free here; use a machine with more memory, or a scene with fewer triangles",
+      peak_bytes / kGigabyte, beside / kGigabyte, available / kGigabyte));
+}
+
+}  // namespace lucerna

@@ -1,0 +1,125 @@
+// What a scene takes is counted, each thing once, and edges are those that are found.
+#include "render/analysis/scene_memory.h"
+
+#include <cstdint>
+#include <memory>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+#include "render/geometry/feature_edges.h"
+#include "tests/support/test_scenes.h"
+
+namespace lucerna {
+namespace {
+
+constexpr RayNeeds kRays;
+
+// A flat grid of side x side squares.
+TriangleMesh Grid(std::uint32_t side) {
+  TriangleMesh mesh;
+  mesh.traits.material = 0;
+  for (std::uint32_t y = 0; y <= side; ++y) {
+    for (std::uint32_t x = 0; x <= side; ++x)
+      mesh.positions.push_back({static_cast<float>(x), static_cast<float>(y), 0});
+  }
+  for (std::uint32_t y = 0; y < side; ++y) {
+    for (std::uint32_t x = 0; x < side; ++x) {
+      const std::uint32_t a = y * (side + 1) + x;
+      mesh.indices.insert(mesh.indices.end(),
+                          {a, a + 1, a + side + 2, a, a + side + 2, a + side + 1});
+    }
+  }
+  return mesh;
+}
+
+// The same triangles, each with corners of its own, apart from each other.
+TriangleMesh Loose(const TriangleMesh& mesh) {
+  TriangleMesh loose;
+  loose.traits = mesh.traits;
+  for (const std::uint32_t index : mesh.indices) {
+    const auto corner = static_cast<std::uint32_t>(loose.positions.size());
+    loose.positions.push_back(mesh.positions[index] + Vec3{0, 0, static_cast<float>(corner / 3)});
+    loose.indices.push_back(corner);
+  }
+  return loose;
+}
+
+Scene With(TriangleMesh mesh) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  scene.meshes.push_back(std::move(mesh));
+  return scene;
+}
+
+TEST(SceneMemoryTest, CountsTheEdgesThatAreFound) {
+  constexpr double kSegment = 70;
+  for (const std::uint32_t side : {100U, 200U}) {
+    for (const bool is_loose : {false, true}) {
+      SCOPED_TRACE(testing::Message() << side << " " << is_loose);
+      const TriangleMesh grid = Grid(side);
+      const Scene scene = With(is_loose ? Loose(grid) : grid);
+      const auto found = static_cast<double>(FeatureEdges(scene).segments().size());
+      EXPECT_EQ(found, is_loose ? 6.0 * side * side : 4.0 * side);
+      // Euler's characteristic of a grid is 1, for which two edges more are counted.
+      const double predicted = SceneMemoryOf(scene, kRays).edges;
+      EXPECT_EQ(predicted, std::max(1.2e6, kSegment * (is_loose ? found : found + 2)));
+    }
+  }
+}
+
+TEST(SceneMemoryTest, GrowsWithTheTriangles) {
+  const SceneMemory small = SceneMemoryOf(With(Grid(100)), kRays);
+  const SceneMemory large = SceneMemoryOf(With(Grid(200)), kRays);
+  // Fourfold, but for what each mesh takes and for the vertices of the rim.
+  EXPECT_NEAR(large.PeakOfCoordinator() / small.PeakOfCoordinator(), 4, 0.05);
+  EXPECT_NEAR(large.acceleration / small.acceleration, 4, 0.05);
+  EXPECT_GT(SceneMemoryOf(With(Grid(100)), {.split_triangles = true}).acceleration,
+            small.acceleration);
+  EXPECT_GE(small.PeakOfCoordinator(), small.KeptByCoordinator());
+}
+
+TEST(SceneMemoryTest, AnInstanceTakesNoMemoryOfItsMesh) {
+  Scene scene = With(Grid(1));
+  scene.object_meshes.push_back(Grid(200));
+  InstancedObject object;
+  object.mesh_count = 1;
+  scene.objects.push_back(object);
+  const SceneMemory none = SceneMemoryOf(scene, kRays);
+  scene.instances.resize(1000);
+  const SceneMemory many = SceneMemoryOf(scene, kRays);
+  EXPECT_EQ(many.instances, 430'000);
+  EXPECT_EQ(many.acceleration, none.acceleration + many.instances);
+  EXPECT_EQ(many.edges, none.edges) << "discs are not cut at edges of instances";
+  EXPECT_LT(many.shapes - none.shapes, 1000.0 * 256);
+}
+
+TEST(SceneMemoryTest, APictureCountsOnceHoweverManyTexturesShowIt) {
+  Scene scene = With(Grid(1));
+  const auto picture = std::make_shared<Picture>();
+  picture->width = picture->height = 1024;
+  picture->coded.resize(3 << 20);
+  Texture texture;
+  texture.kind = Texture::Kind::kPicture;
+  texture.picture = picture;
+  scene.textures.assign(5, texture);
+  InfiniteLight sky;
+  sky.map = picture;
+  scene.infinite_lights.push_back(sky);
+  EXPECT_EQ(SceneMemoryOf(scene, kRays).textures, (3 << 20) + sizeof(Picture));
+}
+
+TEST(SceneMemoryTest, SaysWhatIsStillToBeBuiltAndWhatToDo) {
+  const SceneMemory memory = SceneMemoryOf(With(Grid(200)), kRays);
+  const double peak = memory.PeakOfWorker();
+  const auto beside = static_cast<std::uint64_t>(peak - memory.shapes) + 1;
+  EXPECT_TRUE(CheckSceneFits(memory, peak, beside).ok());
+  const Status refused = CheckSceneFits(memory, peak, beside - 2);
+  EXPECT_TRUE(absl::IsResourceExhausted(refused));
+  EXPECT_THAT(std::string(refused.message()),
+              testing::AllOf(testing::HasSubstr("the scene takes about 0.0 GB"),
+                             testing::HasSubstr("use a machine with more memory")));
+}
+
+}  // namespace
+}  // namespace lucerna
