@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "client/image_output.h"
 #include "client/local_cluster.h"
 #include "client/output_options.h"
 #include "client/scene_reading.h"
@@ -16,27 +17,19 @@
 
 namespace lucerna {
 
-// Where an image goes; empty: not there.
-struct OutputPaths {
-  std::string image;      // .exr, .png, .pfm or .hdr
-  std::string png;        // a PNG file beside it
-  bool replaces = false;  // files that this program has not written too
-
-  [[nodiscard]] bool empty() const { return image.empty() && png.empty(); }
-};
-
 struct RenderRequest {
   SceneSource scene;
   RenderOverrides overrides;
   std::string reference;  // EXR file to measure the true error by; empty: none
+  std::string mesh;       // of `render`: .glb file whose light is drawn; empty: photons bring it
   OutputPaths outputs;
   int priority = 0;               // of `submit`
   bool keeps_checkpoints = true;  // of `render`: in a folder beside the image
   bool resumes = false;           // goes on from there
 };
 
-// Renders on a coordinator and workers of its own. An interruption writes the image so far and
-// leaves the checkpoints.
+// Renders on a coordinator and workers of its own, or draws the light of a mesh in this process. An
+// interruption writes the image so far and leaves the checkpoints.
 [[nodiscard]] Status Render(const RenderRequest& request, const ClusterOptions& cluster,
                             const OutputOptions& output_options);
 

@@ -96,6 +96,12 @@ Status ChooseUnit(Scene& scene) {
     // Above 0 however small it is beside the scene.
     sensor.spacing = std::max(ScaledBy(sensor.spacing, factor), FLT_MIN);
   }
+  for (SensorBucket& bucket : scene.sensor_buckets) {
+    for (Vec3& corner : bucket.corners)
+      corner = ScaledBy(corner, factor);
+    bucket.ball_center = ScaledBy(bucket.ball_center, factor);
+    bucket.ball_radius = ScaledBy(bucket.ball_radius, factor);
+  }
   for (auto& border : scene.sensor_borders) {
     for (Vec3& end : border)
       end = ScaledBy(end, factor);

@@ -91,13 +91,29 @@ Vec3 SphericalDirection(Camera::Kind kind, double x, double y) {
   return {z_up.x, z_up.z, z_up.y};
 }
 
+// A point of a bucket, from two numbers in [0, 1): uniform in its triangle, on a ball uniform in
+// the triangle under it.
+Sensor PointOf(const SensorBucket& bucket, const Sensor& sensor, float u, float v) {
+  const float root = std::sqrt(u);
+  const auto& [a, b, c] = bucket.corners;
+  Sensor at = sensor;
+  at.position = a * (1 - root) + b * (root * (1 - v)) + c * (root * v);
+  if (bucket.ball_radius > 0) {
+    const Vec3 out = Normalize(at.position - bucket.ball_center);
+    at.position = bucket.ball_center + out * bucket.ball_radius;
+    at.normal = Dot(out, sensor.normal) < 0 ? -out : out;
+  }
+  return at;
+}
+
 }  // namespace
 
 EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
                              const SceneNeeds& needs, const Intersector& intersector,
-                             const LightSet& lights)
+                             const LightSet& lights, DirectLight direct_light)
     : scene_(scene),
       settings_(settings),
+      direct_light_(direct_light),
       eye_sets_(needs.eye_sample_sets()),
       parts_(WalkPartsFor(needs)),
       properties_(PropertiesOf(scene.materials)),
@@ -433,12 +449,18 @@ EyePath EyePathTracer::AtSensor(std::size_t number, const PixelSampler& sampler)
   // The last row may be longer than there are sensors.
   if (number >= scene_.sensors.size()) return path;
   const Sensor& sensor = scene_.sensors[number];
+  Sensor at = sensor;  // where direct light is sampled
+  if (!scene_.sensor_buckets.empty()) {
+    // A path ends at its vertex 0.
+    const SobolPoint u = sampler.ForVertex(1);
+    at = PointOf(scene_.sensor_buckets[number], sensor, u[1], u[2]);
+  }
   SurfacePoint surface;
-  surface.position = sensor.position;
-  surface.geometric_normal = sensor.normal;
-  surface.shading_normal = sensor.normal;
+  surface.position = at.position;
+  surface.geometric_normal = at.normal;
+  surface.shading_normal = at.normal;
   // The surface under it is not known: as far off as for one that is as large as the scene.
-  surface.clearance = kClearance * (MaxAbs(sensor.position) + intersector_.bounds().Diagonal());
+  surface.clearance = kClearance * (MaxAbs(at.position) + intersector_.bounds().Diagonal());
   static const Material white = [] {
     Material material;
     material.reflectance = Gray(1);
@@ -447,13 +469,13 @@ EyePath EyePathTracer::AtSensor(std::size_t number, const PixelSampler& sampler)
   const Frame frame = ShadingFrame(surface);
   constexpr Vec3 kUp = {0, 0, 1};
   const std::int32_t medium =
-      parts_.media ? media_.AtLight(LeavingPoint(surface, sensor.normal), scene_.camera.medium)
+      parts_.media ? media_.AtLight(LeavingPoint(surface, at.normal), scene_.camera.medium)
                    : kNoMedium;
   path.features = {white.reflectance, sensor.normal, 0};
   if (parts_.lights) {
     const SobolPoint u = sampler.ForVertex(0);
     const ShadingPoint point = {
-        surface, white, frame, sensor.normal, parts_.media ? &media_ : nullptr, medium};
+        surface, white, frame, at.normal, parts_.media ? &media_ : nullptr, medium};
     path.direct += LightSampledRadiance(intersector_, lights_, point, u, path.rays);
     BsdfSample sample;
     if (rays_find_lights_ && SampleDiffuse(white, kUp, u[1], u[2], sample)) {
@@ -597,7 +619,9 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       }
       emission_was_collected = true;
     }
-    if (parts_.lights && !(parts_.lobes && whole_properties.is_smooth)) {
+    const bool is_lit_otherwise =
+        direct_light_ == DirectLight::kWherePathsGoOn && whole_properties.gathers;
+    if (parts_.lights && !is_lit_otherwise && !(parts_.lobes && whole_properties.is_smooth)) {
       const ShadingPoint point = {
           surface, whole, frame, wo, parts_.media ? &media_ : nullptr, medium, share_of_first};
       path.direct += weight * LightSampledRadiance(intersector_, lights_, point, u, path.rays);
@@ -653,7 +677,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       return hitpoint;
     };
     if (properties.gathers) {
-      if (parts_.lights && scattered && rays_find_lights_) {
+      if (parts_.lights && !is_lit_otherwise && scattered && rays_find_lights_) {
         path.direct += ScatteredDirect(surface, wi, share * sample.pdf, medium_after,
                                        weight * sample.weight, path.rays);
       }
@@ -683,7 +707,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
 
     if (!scattered) return finish();
     weight *= sample.weight;
-    scatter_pdf = sample.is_delta ? 0 : share * sample.pdf;
+    scatter_pdf = sample.is_delta || is_lit_otherwise ? 0 : share * sample.pdf;
     scatter_position = surface.position;
     const float strength = MaxChannel(weight);
     if (!(strength > 0)) return finish();
