@@ -29,7 +29,6 @@ struct OutputPaths {
 // Writes the image, whose EXR file is `exr`. What cannot be written leaves no other file out, and
 // goes to the folder for temporary files.
 [[nodiscard]] StatusOr<SavedImage> WriteOutputs(const Image& image, const std::string& exr,
-                                                const OutputPaths& outputs,
-                                                const Display& display);
+                                                const OutputPaths& outputs, const Display& display);
 
 }  // namespace lucerna

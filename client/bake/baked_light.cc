@@ -117,7 +117,8 @@ std::optional<BakedLight::Nearest> BakedLight::Find(const Tree& tree, Vec3 posit
     const Double3 cross = Cross(corners[1] - corners[0], corners[2] - corners[0]);
     if (!(Dot(cross, Double3(normal)) > kSameWay * Length(cross))) return;
     const std::array<double, 3> shares = NearestShares(p, corners[0], corners[1], corners[2]);
-    const Double3 off = corners[0] * shares[0] + corners[1] * shares[1] + corners[2] * shares[2] - p;
+    const Double3 off =
+        corners[0] * shares[0] + corners[1] * shares[1] + corners[2] * shares[2] - p;
     const double squared = Dot(off, off);
     if (nearest && !(squared < nearest->squared_distance)) return;
     double longest = 0;

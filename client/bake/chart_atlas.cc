@@ -28,9 +28,7 @@ struct Point2 {
 // A plane in which a chart lies.
 struct ChartFrame {
   Double3 origin, right, up;
-  [[nodiscard]] Point2 Of(Double3 p) const {
-    return {Dot(p - origin, right), Dot(p - origin, up)};
-  }
+  [[nodiscard]] Point2 Of(Double3 p) const { return {Dot(p - origin, right), Dot(p - origin, up)}; }
 };
 
 double CrossOf(Point2 a, Point2 b) {
@@ -206,8 +204,7 @@ class Charting {
       if (turns == kMostTurns) break;
       const auto& v = mesh_.faces()[face].vertices;
       for (std::size_t i = 0; i < 3 && turns < kMostTurns; ++i, ++turns) {
-        ChartFrame frame =
-            FrameOf(chart.normal, At(v[(i + 1) % 3]) - At(v[i]), At(v[i]));
+        ChartFrame frame = FrameOf(chart.normal, At(v[(i + 1) % 3]) - At(v[i]), At(v[i]));
         Point2 low = {HUGE_VAL, HUGE_VAL};
         Point2 high = {-HUGE_VAL, -HUGE_VAL};
         for (const std::uint32_t of : chart.faces) {
@@ -220,8 +217,7 @@ class Charting {
         if (!(area < smallest)) continue;
         smallest = area;
         const double margin = kMargin * texel_;
-        frame.origin =
-            frame.origin + frame.right * (low.x - margin) + frame.up * (low.y - margin);
+        frame.origin = frame.origin + frame.right * (low.x - margin) + frame.up * (low.y - margin);
         chart.frame = frame;
         const auto cells = [&](double length) {
           return static_cast<int>(std::min(std::ceil(length / texel_), 1e8)) + 2 * kMargin;
@@ -298,8 +294,7 @@ class Charting {
       Double3 normal;
       for (std::size_t i = 0; i < 3; ++i) {
         position = position + At(face.vertices[i]) * owner.near.shares[i];
-        normal =
-            normal + Double3(mesh_.vertices()[face.vertices[i]].normal) * owner.near.shares[i];
+        normal = normal + Double3(mesh_.vertices()[face.vertices[i]].normal) * owner.near.shares[i];
       }
       ChartAtlas::Texel texel;
       texel.x = chart.x + static_cast<int>(cell.first);
@@ -341,7 +336,8 @@ Image AtlasImage(const ChartAtlas& atlas, const std::vector<Irradiance>& measure
   Image image;
   image.width = atlas.width;
   image.height = atlas.height;
-  const auto pixels = static_cast<std::size_t>(atlas.width) * static_cast<std::size_t>(atlas.height);
+  const auto pixels =
+      static_cast<std::size_t>(atlas.width) * static_cast<std::size_t>(atlas.height);
   for (const char* name :
        {"R", "G", "B", "noise", "P.X", "P.Y", "P.Z", "N.X", "N.Y", "N.Z", "chart", "inside"}) {
     image.channels.push_back({name, std::vector<float>(pixels)});
@@ -353,9 +349,18 @@ Image AtlasImage(const ChartAtlas& atlas, const std::vector<Irradiance>& measure
     const Rgb e = measured[i].value;
     const Vec3 p = texel.sensor.position;
     const Vec3 n = texel.sensor.normal;
-    const std::array<float, 12> values = {
-        e.r, e.g, e.b, measured[i].noise, p.x, p.y,
-        p.z, n.x, n.y, n.z, static_cast<float>(texel.chart + 1), texel.area > 0 ? 1.0F : 0.0F};
+    const std::array<float, 12> values = {e.r,
+                                          e.g,
+                                          e.b,
+                                          measured[i].noise,
+                                          p.x,
+                                          p.y,
+                                          p.z,
+                                          n.x,
+                                          n.y,
+                                          n.z,
+                                          static_cast<float>(texel.chart + 1),
+                                          texel.area > 0 ? 1.0F : 0.0F};
     for (std::size_t channel = 0; channel < values.size(); ++channel)
       image.channels[channel].pixels[at] = values[channel];
   }
@@ -406,8 +411,8 @@ BakedMesh AtlasMesh(const SurfaceMesh& mesh, const ChartAtlas& atlas, const Imag
       to.irradiance.push_back(
           {bilinear_at("R", place), bilinear_at("G", place), bilinear_at("B", place)});
       to.noise.push_back(bilinear_at("noise", place));
-      to.uvs.push_back({place.x / static_cast<float>(atlas.width),
-                        place.y / static_cast<float>(atlas.height)});
+      to.uvs.push_back(
+          {place.x / static_cast<float>(atlas.width), place.y / static_cast<float>(atlas.height)});
     }
     to.faces.push_back(corners);
   }

@@ -1,9 +1,9 @@
 // Where on surfaces are the texels of a light map?
 //
-// Faces that meet without a crease and are turned less than 45 degrees from the first of them form a
-// chart: their projection onto its plane, in which no two of them lie over each other. Charts stand
-// beside each other in one image, at least two texels apart. Texels around a chart measure the
-// nearest point of it, so that bilinear look-ups need no others.
+// Faces that meet without a crease and are turned less than 45 degrees from the first of them form
+// a chart: their projection onto its plane, in which no two of them lie over each other. Charts
+// stand beside each other in one image, at least two texels apart. Texels around a chart measure
+// the nearest point of it, so that bilinear look-ups need no others.
 #pragma once
 
 #include <array>
@@ -30,9 +30,9 @@ struct ChartAtlas {
   };
   int width = 0, height = 0;
   std::size_t charts = 0;
-  std::vector<Texel> texels;                  // row by row
-  std::vector<std::uint32_t> chart_of;        // [faces]
-  std::vector<std::array<Vec2, 3>> places;    // [faces] of corners [texels], y down
+  std::vector<Texel> texels;                // row by row
+  std::vector<std::uint32_t> chart_of;      // [faces]
+  std::vector<std::array<Vec2, 3>> places;  // [faces] of corners [texels], y down
 };
 
 // Of the faces of a mesh; texels have edges of `texel`.

@@ -53,8 +53,8 @@ class Decimator {
     for (const MeasuredPoint& point : points) {
       const auto found = face_of.find(point.edge);
       if (found == face_of.end()) continue;
-      samples_[found->second].push_back({(At(point.edge.first) + At(point.edge.second)) * 0.5,
-                                         point.luminance, point.weight});
+      samples_[found->second].push_back(
+          {(At(point.edge.first) + At(point.edge.second)) * 0.5, point.luminance, point.weight});
     }
   }
 

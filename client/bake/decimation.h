@@ -26,8 +26,8 @@ struct MeasuredPoint {
 struct DecimationRules {
   double tolerance = 0;  // of differences, over the luminance or `floor` where that is more
   double floor = 0;
-  double longest = 0;                // of edges
-  double flatness = 0;               // how far a removed vertex may lie off the surface
+  double longest = 0;               // of edges
+  double flatness = 0;              // how far a removed vertex may lie off the surface
   std::vector<bool> is_kept_whole;  // [surfaces] nothing of it is removed
 };
 

@@ -44,7 +44,8 @@ struct BakedMesh {
 [[nodiscard]] std::string MeshPly(const BakedMesh& mesh, bool is_ascii);
 
 // A binary glTF 2.0 file: a node and a mesh for each surface, with the attributes _IRRADIANCE and
-// _NOISE, texture coordinates where there are some, and as COLOR_0, for viewers, the irradiance over four times its mean luminance.
+// _NOISE, texture coordinates where there are some, and as COLOR_0, for viewers, the irradiance
+// over four times its mean luminance.
 [[nodiscard]] std::string MeshGlb(const BakedMesh& mesh);
 
 // Reads such a file back, but for the noise. `path` is for messages.

@@ -27,6 +27,8 @@ constexpr double kDarkShare = 0.1;
 constexpr double kNoiseDeviations = 2;
 // The same for means over faces of the first mesh, whose noise is estimated from few passes.
 constexpr double kSurveyDeviations = 4;
+// Direct light that the mesh misses on a face of the first mesh, over what it has there.
+constexpr double kMissedShare = 0.5;
 // Into so many parts a disk's rim and a sphere's equator are divided.
 constexpr int kRoundParts = 32;
 
@@ -388,7 +390,8 @@ MeshVertex SurfaceMesh::NodeOf(const MeshFace& face, std::uint32_t from, std::ui
   const MeshVertex& b = vertices_[std::max(from, to)];
   MeshVertex node = MiddleOf(face, a, b);
   node.irradiance = {(a.irradiance->value + b.irradiance->value) * 0.5F,
-                     std::hypot(a.irradiance->noise, b.irradiance->noise) / 2};
+                     std::hypot(a.irradiance->noise, b.irradiance->noise) / 2,
+                     (a.irradiance->direct + b.irradiance->direct) / 2};
   return node;
 }
 
@@ -423,10 +426,9 @@ Status SurfaceMesh::Split(std::set<Pair> places) {
           middles.try_emplace(vertices, static_cast<std::uint32_t>(vertices_.size()));
       if (is_new) {
         const auto probe = probes_.find(vertices);
-        MeshVertex middle =
-            probe == probes_.end()
-                ? MiddleOf(face, vertices_[vertices.first], vertices_[vertices.second])
-                : probe->second.middle;
+        MeshVertex middle = probe == probes_.end() ? MiddleOf(face, vertices_[vertices.first],
+                                                              vertices_[vertices.second])
+                                                   : probe->second.middle;
         middle.place = PlaceOf(middle.position);
         vertices_.push_back(std::move(middle));
         if (probe != probes_.end()) {
@@ -611,42 +613,53 @@ double SurfaceMesh::MeanIrradiance() const {
   return area > 0 ? sum / area : 0;
 }
 
-double SurfaceMesh::MeanOn(const MeshFace& face) const {
-  double corners = 0;
-  double middles = 0;
+SurfaceMesh::FaceMean SurfaceMesh::MeanOn(const MeshFace& face) const {
+  FaceMean corners;
+  FaceMean middles;
+  const auto add = [](const Irradiance& irradiance, FaceMean& sums) {
+    sums.all += LuminanceOf(irradiance);
+    sums.direct += static_cast<double>(irradiance.direct);
+  };
   for (std::size_t i = 0; i < 3; ++i) {
     const std::uint32_t from = face.vertices[i];
-    corners += LuminanceOf(*vertices_[from].irradiance);
-    middles += LuminanceOf(*NodeOf(face, from, face.vertices[(i + 1) % 3]).irradiance);
+    add(*vertices_[from].irradiance, corners);
+    add(*NodeOf(face, from, face.vertices[(i + 1) % 3]).irradiance, middles);
   }
   // Of a quadratic function; of four linear ones, between corners and middles.
-  if (elements_ == MeshElements::kQuadratic) return middles / 3;
-  return (corners + 3 * middles) / 12;
+  if (elements_ == MeshElements::kQuadratic) return {middles.all / 3, middles.direct / 3};
+  return {(corners.all + 3 * middles.all) / 12, (corners.direct + 3 * middles.direct) / 12};
 }
 
 void SurfaceMesh::AddUnlikeSurvey(double tolerance, double floor, std::set<Pair>& places) const {
-  struct Sum {
-    double flux = 0, area = 0;
+  struct Sums {
+    double flux = 0, direct = 0, area = 0;
   };
-  std::vector<Sum> sums(surveys_.size());
+  std::vector<Sums> sums(surveys_.size());
   for (const MeshFace& face : faces_) {
     const double area = AreaOf(face);
-    sums[face.survey].flux += area * MeanOn(face);
-    sums[face.survey].area += area;
+    const FaceMean mean = MeanOn(face);
+    Sums& of = sums[face.survey];
+    of.flux += area * mean.all;
+    of.direct += area * mean.direct;
+    of.area += area;
   }
   const double shortest = elements_ == MeshElements::kQuadratic ? 2 * spacing_ : spacing_;
   for (const MeshFace& face : faces_) {
     const Survey& survey = surveys_[face.survey];
-    const auto noise = static_cast<double>(survey.mean.noise);
-    // Where nothing arrived, nothing is known of the noise either.
-    if (!survey.is_flat || !(noise > 0)) continue;
-    const double mean = sums[face.survey].flux / sums[face.survey].area;
+    if (!survey.is_flat) continue;
+    const Sums& of = sums[face.survey];
+    const double mean = of.flux / of.area;
     const double surveyed = LuminanceOf(survey.mean);
     const double difference = std::abs(mean - surveyed);
-    if (difference < tolerance * std::max({mean, surveyed, floor}) ||
-        difference <= kSurveyDeviations * noise) {
-      continue;
-    }
+    const auto noise = static_cast<double>(survey.mean.noise);
+    // Where nothing arrived, nothing is known of the noise either.
+    const bool differs = noise > 0 && difference > kSurveyDeviations * noise &&
+                         difference >= tolerance * std::max({mean, surveyed, floor});
+    // Of direct light a few samples that are far brighter tell more than their mean's noise.
+    const double direct = of.direct / of.area;
+    const bool lacks_direct =
+        static_cast<double>(survey.mean.direct) - direct > kMissedShare * std::max(direct, floor);
+    if (!differs && !lacks_direct) continue;
     for (int edge = 0; edge < 3; ++edge) {
       const Pair vertices = EdgeOf(face, edge);
       if (LengthOf(vertices) > shortest) places.insert(PlacesOf(vertices));
@@ -665,8 +678,7 @@ StatusOr<std::size_t> SurfaceMesh::Refine(double tolerance) {
     const Irradiance& at_point = *PointOf(asked).irradiance;
     // Of the nearer end, the middle and the other end.
     const bool is_nearer_second = asked.point == 2;
-    const Irradiance& at_near =
-        *vertices_[is_nearer_second ? edge.second : edge.first].irradiance;
+    const Irradiance& at_near = *vertices_[is_nearer_second ? edge.second : edge.first].irradiance;
     const Irradiance& at_middle = *probes_.at(edge).middle.irradiance;
     const Irradiance& at_far = *vertices_[is_nearer_second ? edge.first : edge.second].irradiance;
     const std::array<double, 3> weights =
@@ -675,11 +687,10 @@ StatusOr<std::size_t> SurfaceMesh::Refine(double tolerance) {
     const double expected = weights[0] * LuminanceOf(at_near) +
                             weights[1] * LuminanceOf(at_middle) + weights[2] * LuminanceOf(at_far);
     const double difference = std::abs(value - expected);
-    const double noise = std::sqrt(
-        std::pow(static_cast<double>(at_point.noise), 2) +
-        std::pow(weights[0] * static_cast<double>(at_near.noise), 2) +
-        std::pow(weights[1] * static_cast<double>(at_middle.noise), 2) +
-        std::pow(weights[2] * static_cast<double>(at_far.noise), 2));
+    const double noise = std::sqrt(std::pow(static_cast<double>(at_point.noise), 2) +
+                                   std::pow(weights[0] * static_cast<double>(at_near.noise), 2) +
+                                   std::pow(weights[1] * static_cast<double>(at_middle.noise), 2) +
+                                   std::pow(weights[2] * static_cast<double>(at_far.noise), 2));
     const bool is_noise = tolerance > 0 && difference <= kNoiseDeviations * noise;
     if (!is_noise && difference >= tolerance * std::max({value, expected, floor})) {
       places.insert(PlacesOf(edge));

@@ -10,10 +10,11 @@
 // (with quadratic elements, at its quarters), and where it differs from what the mesh has there by
 // more than is allowed, the faces beside the edge are split. What lies between those points is not
 // overlooked either when the mesh was surveyed: the mean of the mesh over each face of the first
-// mesh must agree with the mean that was measured there. Faces are split at their longest edge first, whatever edge asks for it (Rivara 1984,
-// "Algorithms for refining triangular grids suitable for adaptive and multigrid techniques"), so
-// that they do not become thinner; and the two faces of an edge are split together, also where they
-// are of different surfaces with corners at the same places: there are no cracks.
+// mesh must agree with the mean that was measured there. Faces are split at their longest edge
+// first, whatever edge asks for it (Rivara 1984, "Algorithms for refining triangular grids suitable
+// for adaptive and multigrid techniques"), so that they do not become thinner; and the two faces of
+// an edge are split together, also where they are of different surfaces with corners at the same
+// places: there are no cracks.
 //
 // Lengths and positions are those of the scene's file.
 #pragma once
@@ -39,7 +40,8 @@ namespace lucerna {
 // Of a sensor [W·m⁻²].
 struct Irradiance {
   Rgb value;
-  float noise = 0;  // standard deviation of the luminance
+  float noise = 0;   // standard deviation of the luminance
+  float direct = 0;  // of the luminance, what comes straight from lights
 };
 
 struct MeshVertex {
@@ -86,7 +88,7 @@ class SurfaceMesh {
   struct Options {
     MeasuredSides sides = MeasuredSides::kBrighter;
     std::vector<std::string> names;  // of materials; empty: all
-    double spacing = 0;  // of neighbouring points where the mesh is finest, > 0
+    double spacing = 0;              // of neighbouring points where the mesh is finest, > 0
     MeshElements elements = MeshElements::kLinear;
   };
   // Shapes of other materials than those that keep photons, and curves, have no part in it.
@@ -122,8 +124,8 @@ class SurfaceMesh {
   // more than `tolerance` times the luminance there, or a tenth of the mean where that is more, and
   // by more than twice the standard deviation of the difference; and the edges within a face of the
   // first mesh over which the mesh's mean differs from the surveyed one by more than that and its
-  // noise. With a tolerance of 0: all of them. Returns how many. Errors: RESOURCE_EXHAUSTED as
-  // before.
+  // noise, or lacks direct light by half. With a tolerance of 0: all of them. Returns how many.
+  // Errors: RESOURCE_EXHAUSTED as before.
   [[nodiscard]] StatusOr<std::size_t> Refine(double tolerance);
 
   // Removes vertices where the mesh is flat and linear without them: nowhere does the mesh differ
@@ -185,8 +187,11 @@ class SurfaceMesh {
   [[nodiscard]] MeshVertex MiddleOf(const MeshFace& face, const MeshVertex& a,
                                     const MeshVertex& b) const;
   [[nodiscard]] MeshVertex& PointOf(const AskedProbe& asked);
-  // Of the luminance of what the mesh has on a face.
-  [[nodiscard]] double MeanOn(const MeshFace& face) const;
+  // Of what the mesh has on a face, of the luminance, and of its direct part.
+  struct FaceMean {
+    double all = 0, direct = 0;
+  };
+  [[nodiscard]] FaceMean MeanOn(const MeshFace& face) const;
   // Of faces of the first mesh whose mean is not that of the survey.
   void AddUnlikeSurvey(double tolerance, double floor, std::set<Pair>& places) const;
   [[nodiscard]] Irradiance AtCorner(const MeshFace& face, std::uint32_t vertex) const {
@@ -205,7 +210,7 @@ class SurfaceMesh {
   // What NextSensors asked for: vertices, then points of edges.
   std::vector<std::uint32_t> asked_vertices_;
   std::vector<AskedProbe> asked_probes_;
-  std::vector<Survey> surveys_;  // empty: none
+  std::vector<Survey> surveys_;                       // empty: none
   std::optional<std::vector<Remainder>> remainders_;  // once it is decimated
 };
 

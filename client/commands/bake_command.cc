@@ -115,6 +115,9 @@ StatusOr<std::vector<Irradiance>> MeasuredIn(const Image& image, std::size_t cou
   const ImageChannel* const r = image.Find(layer + "R");
   const ImageChannel* const g = image.Find(layer + "G");
   const ImageChannel* const b = image.Find(layer + "B");
+  const std::array<const ImageChannel*, 3> direct = {image.Find("direct.R"), image.Find("direct.G"),
+                                                     image.Find("direct.B")};
+  const bool has_direct = !indirect_only && !std::ranges::count(direct, nullptr);
   // Absent after a single pass.
   const ImageChannel* const noise = image.Find("noise");
   if (r == nullptr || g == nullptr || b == nullptr || r->pixels.size() < count) {
@@ -127,6 +130,11 @@ StatusOr<std::vector<Irradiance>> MeasuredIn(const Image& image, std::size_t cou
     measured[i].value = {irradiance_of(r->pixels[i]), irradiance_of(g->pixels[i]),
                          irradiance_of(b->pixels[i])};
     if (noise != nullptr) measured[i].noise = irradiance_of(noise->pixels[i]);
+    if (has_direct) {
+      measured[i].direct =
+          Luminance({irradiance_of(direct[0]->pixels[i]), irradiance_of(direct[1]->pixels[i]),
+                     irradiance_of(direct[2]->pixels[i])});
+    }
   }
   return measured;
 }
@@ -379,7 +387,7 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
   LUCERNA_ASSIGN_OR_RETURN(SurfaceMesh mesh, SurfaceMesh::FromScene(scene, options));
   // A light map's charts are of the scene's own triangles.
   if (!is_light_map) {
-    LUCERNA_RETURN_IF_ERROR(mesh.SplitLongEdges((is_histogram ? 1 : kCoarsest) * options.spacing));
+    LUCERNA_RETURN_IF_ERROR(mesh.SplitLongEdges(kCoarsest * options.spacing));
   }
 
   const std::string folder = FolderOf(request);
@@ -387,17 +395,15 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
   if (!request.resumes) std::filesystem::remove_all(folder, error_of_folder);
   std::filesystem::create_directories(folder, error_of_folder);
   if (error_of_folder) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(folder, ", for rounds that are finished, cannot be made: ",
-                     error_of_folder.message()));
+    return absl::InvalidArgumentError(absl::StrCat(
+        folder, ", for rounds that are finished, cannot be made: ", error_of_folder.message()));
   }
   LUCERNA_ASSIGN_OR_RETURN(Jobs jobs, Jobs::Open(cluster, server));
   Bakery bakery(request, output_options, scene, read.manifest, std::move(jobs));
   bakery.SetOverrides(overrides);
   const bool is_refined = !is_histogram && !is_light_map && request.tolerance > 0;
   if (is_refined || request.sides == MeasuredSides::kBrighter) {
-    LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured,
-                             bakery.Survey(mesh.Buckets()));
+    LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured, bakery.Survey(mesh.Buckets()));
     mesh.SetBuckets(measured);
     if (request.sides == MeasuredSides::kBrighter) mesh.DropDarkerSides();
     mesh.KeepAsSurvey();
@@ -428,6 +434,7 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
     figures = FiguresOf(mesh, atlas, measured);
   } else {
     if (is_histogram) {
+      LUCERNA_RETURN_IF_ERROR(mesh.SplitLongEdges(options.spacing));
       LUCERNA_ASSIGN_OR_RETURN(const std::vector<Irradiance> measured,
                                bakery.MeasureRound(mesh.Buckets()));
       mesh.SetBuckets(measured);

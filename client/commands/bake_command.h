@@ -50,8 +50,8 @@ struct BakeRequest {
   bool resumes = false;        // takes rounds that were finished before an interruption
 };
 
-// Writes the mesh whole or not at all, and prints figures of its surfaces. Until then rounds that are
-// finished are kept in a folder beside it, for a bake that resumes. The jobs run on `server`
+// Writes the mesh whole or not at all, and prints figures of its surfaces. Until then rounds that
+// are finished are kept in a folder beside it, for a bake that resumes. The jobs run on `server`
 // when it is there, else on a coordinator and workers of their own.
 [[nodiscard]] Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
                           const std::optional<Endpoint>& server,

@@ -130,9 +130,8 @@ Status DrawMesh(const RenderRequest& request, int threads, const OutputOptions& 
   render.image.metadata["lucerna.scene_digest"] = read.manifest.SceneDigest().Hex();
   render.image.metadata["lucerna.mesh_digest"] = Sha256(bytes).Hex();
   LUCERNA_ASSIGN_OR_RETURN(const std::string exr, EncodeExr(render.image));
-  LUCERNA_ASSIGN_OR_RETURN(
-      const SavedImage saved,
-      WriteOutputs(render.image, exr, request.outputs, output_options.display));
+  LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved, WriteOutputs(render.image, exr, request.outputs,
+                                                                output_options.display));
   if (render.share_unknown > 0 && !output_options.quiet) {
     std::fprintf(stderr,
                  "lucerna: warning: for %.2g %% of what is seen the mesh has no light, which is "
@@ -142,8 +141,8 @@ Status DrawMesh(const RenderRequest& request, int threads, const OutputOptions& 
   if (output_options.json) {
     Print(MeshRenderReport(read.settings.front().passes, render.share_unknown, saved));
   } else if (!output_options.quiet) {
-    Print(absl::StrCat(read.settings.front().passes, " passes without photons: ",
-                       absl::StrJoin(saved.paths, ", "), "\n"));
+    Print(absl::StrCat(read.settings.front().passes,
+                       " passes without photons: ", absl::StrJoin(saved.paths, ", "), "\n"));
   }
   return absl::OkStatus();
 }

@@ -55,8 +55,8 @@ struct BakeRound {
   v1::Job job;
 };
 // What was measured, and of the mesh: figures of its surfaces, SurfaceMesh::InterpolationError
-// where there is one, and the error that the first round estimated at its points, which are spread evenly. Requires a
-// round.
+// where there is one, and the error that the first round estimated at its points, which are spread
+// evenly. Requires a round.
 [[nodiscard]] std::string BakeReport(const std::vector<BakeRound>& rounds,
                                      const std::vector<SurfaceFigures>& figures,
                                      const std::optional<double>& interpolation_error,

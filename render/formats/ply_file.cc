@@ -432,8 +432,9 @@ Status ReadBuckets(Body& body, Format format, const Element& element,
     LUCERNA_RETURN_IF_ERROR(rows.Next(i));
     SensorBucket& bucket = buckets[i];
     bucket = {{rows.VectorAt(0), rows.VectorAt(3), rows.VectorAt(6)}, rows.VectorAt(9), rows[12]};
-    const bool is_finite = std::ranges::all_of(bucket.corners, [](Vec3 corner) { return IsFinite(corner); }) &&
-                           IsFinite(bucket.ball_center) && std::isfinite(bucket.ball_radius);
+    const bool is_finite =
+        std::ranges::all_of(bucket.corners, [](Vec3 corner) { return IsFinite(corner); }) &&
+        IsFinite(bucket.ball_center) && std::isfinite(bucket.ball_radius);
     if (!is_finite) return Bad(Concat("bucket ", i, " is not finite"));
   }
   return absl::OkStatus();

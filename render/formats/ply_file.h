@@ -31,8 +31,8 @@ struct PlyPoints {
   std::vector<Vec3> normals;    // [positions], as the file has them
   std::vector<float> spacings;  // [positions] or empty: the property `spacing`, as the file has it
   std::vector<std::array<Vec3, 2>> segments;  // the element `segment`: ax ay az bx by bz, finite
-  // The element `bucket`, finite: corners ax ay az bx by bz cx cy cz, and the ball that they lie on,
-  // ox oy oz r.
+  // The element `bucket`, finite: corners ax ay az bx by bz cx cy cz, and the ball that they lie
+  // on, ox oy oz r.
   std::vector<SensorBucket> buckets;
   std::vector<std::string> comments;  // without the word "comment"
 };

@@ -30,6 +30,12 @@ double FarthestOf(const Scene& scene) {
   }
   for (const Sensor& sensor : scene.sensors)
     farthest = std::max(farthest, static_cast<double>(MaxAbs(sensor.position)));
+  for (const SensorBucket& bucket : scene.sensor_buckets) {
+    for (const Vec3 corner : bucket.corners)
+      farthest = std::max(farthest, static_cast<double>(MaxAbs(corner)));
+    farthest = std::max({farthest, static_cast<double>(MaxAbs(bucket.ball_center)),
+                         std::abs(static_cast<double>(bucket.ball_radius))});
+  }
   ForEachDeltaList(scene, [&](const auto& lights) {
     for (const auto& light : lights) {
       if (!light.kIsAtInfinity)

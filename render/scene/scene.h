@@ -188,7 +188,7 @@ struct Scene {
 #undef LUCERNA_MEMBER
   std::vector<InfiniteLight> infinite_lights;
   Camera camera;
-  std::vector<Sensor> sensors;  // not empty when the camera is none but these
+  std::vector<Sensor> sensors;               // not empty when the camera is none but these
   std::vector<SensorBucket> sensor_buckets;  // [sensors], or empty: direct light is that at points
   // Borders at which discs are cut besides the edges of surfaces: those of a histogram's buckets.
   std::vector<std::array<Vec3, 2>> sensor_borders;

@@ -91,6 +91,14 @@ Vec3 SphericalDirection(Camera::Kind kind, double x, double y) {
   return {z_up.x, z_up.z, z_up.y};
 }
 
+// Samples of direct light in a bucket, in each pass: a bright spot may fill a small part of a large
+// bucket, and where there are many buckets each is small.
+int BucketSamples(std::size_t buckets) {
+  constexpr std::size_t kMostInAll = std::size_t{1} << 19;
+  constexpr std::size_t kMost = 16;
+  return static_cast<int>(std::clamp(kMostInAll / buckets, std::size_t{1}, kMost));
+}
+
 // A point of a bucket, from two numbers in [0, 1): uniform in its triangle, on a ball uniform in
 // the triangle under it.
 Sensor PointOf(const SensorBucket& bucket, const Sensor& sensor, float u, float v) {
@@ -449,38 +457,43 @@ EyePath EyePathTracer::AtSensor(std::size_t number, const PixelSampler& sampler)
   // The last row may be longer than there are sensors.
   if (number >= scene_.sensors.size()) return path;
   const Sensor& sensor = scene_.sensors[number];
-  Sensor at = sensor;  // where direct light is sampled
-  if (!scene_.sensor_buckets.empty()) {
-    // A path ends at its vertex 0.
-    const SobolPoint u = sampler.ForVertex(1);
-    at = PointOf(scene_.sensor_buckets[number], sensor, u[1], u[2]);
-  }
-  SurfacePoint surface;
-  surface.position = at.position;
-  surface.geometric_normal = at.normal;
-  surface.shading_normal = at.normal;
-  // The surface under it is not known: as far off as for one that is as large as the scene.
-  surface.clearance = kClearance * (MaxAbs(at.position) + intersector_.bounds().Diagonal());
   static const Material white = [] {
     Material material;
     material.reflectance = Gray(1);
     return material;
   }();
-  const Frame frame = ShadingFrame(surface);
   constexpr Vec3 kUp = {0, 0, 1};
-  const std::int32_t medium =
-      parts_.media ? media_.AtLight(LeavingPoint(surface, at.normal), scene_.camera.medium)
-                   : kNoMedium;
-  path.features = {white.reflectance, sensor.normal, 0};
-  if (parts_.lights) {
-    const SobolPoint u = sampler.ForVertex(0);
-    const ShadingPoint point = {
-        surface, white, frame, at.normal, parts_.media ? &media_ : nullptr, medium};
-    path.direct += LightSampledRadiance(intersector_, lights_, point, u, path.rays);
+  const auto direct_at = [&](const Sensor& at, const SobolPoint& u) {
+    SurfacePoint surface;
+    surface.position = at.position;
+    surface.geometric_normal = at.normal;
+    surface.shading_normal = at.normal;
+    // The surface under it is not known: as far off as for one that is as large as the scene.
+    surface.clearance = kClearance * (MaxAbs(at.position) + intersector_.bounds().Diagonal());
+    const Frame frame = ShadingFrame(surface);
+    const std::int32_t medium =
+        parts_.media ? media_.AtLight(LeavingPoint(surface, at.normal), scene_.camera.medium)
+                     : kNoMedium;
+    const ShadingPoint point = {surface, white, frame, at.normal, parts_.media ? &media_ : nullptr,
+                                medium};
+    Rgb direct = LightSampledRadiance(intersector_, lights_, point, u, path.rays);
     BsdfSample sample;
     if (rays_find_lights_ && SampleDiffuse(white, kUp, u[1], u[2], sample)) {
-      path.direct += ScatteredDirect(surface, frame.ToWorld(sample.wi), sample.pdf, medium,
-                                     sample.weight, path.rays);
+      direct += ScatteredDirect(surface, frame.ToWorld(sample.wi), sample.pdf, medium,
+                                sample.weight, path.rays);
+    }
+    return direct;
+  };
+  path.features = {white.reflectance, sensor.normal, 0};
+  if (parts_.lights && scene_.sensor_buckets.empty()) {
+    path.direct += direct_at(sensor, sampler.ForVertex(0));
+  } else if (parts_.lights) {
+    const int count = BucketSamples(scene_.sensor_buckets.size());
+    for (int i = 0; i < count; ++i) {
+      // A sensor sees no bright lights, for which these numbers are elsewhere.
+      const SobolPoint u = sampler.ForBright(i, count).camera;
+      path.direct += direct_at(PointOf(scene_.sensor_buckets[number], sensor, u[0], u[6]), u) *
+                     (1.0F / static_cast<float>(count));
     }
   }
   path.hitpoint.position = sensor.position;

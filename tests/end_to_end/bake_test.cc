@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -25,6 +26,7 @@ namespace {
 using nlohmann::json;
 using std::chrono::seconds;
 using testing::HasSubstr;
+using testing::Not;
 
 const std::string kBin = LUCERNA_BIN_DIR;
 
@@ -52,8 +54,13 @@ class BakeTest : public testing::Test {
   [[nodiscard]] std::vector<std::string> Command(const std::string& out,
                                                  const std::vector<std::string>& more) const {
     std::vector<std::string> words = {
-        kBin + "/lucerna", "bake", Path("scene.pbrt"), "-o", Path(out), "--passes", "4",
-        "--spacing",       "0.02", "--seed",           "7"};
+        kBin + "/lucerna", "bake", Path("scene.pbrt"), "-o", Path(out), "--seed", "7"};
+    // Flags are given once.
+    const auto add_unless_given = [&](const std::string& flag, const std::string& value) {
+      if (std::ranges::count(more, flag) == 0) words.insert(words.end(), {flag, value});
+    };
+    add_unless_given("--passes", "4");
+    add_unless_given("--spacing", "0.02");
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
@@ -88,6 +95,27 @@ TEST_F(BakeTest, HasTheSameBytesWhoeverTraces) {
   ChildProcess other(worker);
   ASSERT_EQ(bake.WaitForExit(seconds(300)), 0) << bake.Errors();
   EXPECT_TRUE(ReadFile(Path("4.ply")).value_or("") == alone);
+}
+
+TEST_F(BakeTest, GoesOnAfterItWasKilled) {
+  const std::string alone = Bake("alone.ply");
+  ChildProcess killed(Command("out.ply", {}));
+  ASSERT_TRUE(killed.WaitForText("round 2", seconds(120))) << killed.Errors();
+  killed.Signal(SIGKILL);
+  killed.WaitForExit(seconds(60));
+  EXPECT_FALSE(ReadFile(Path("out.ply")).ok());
+  std::string jobs;
+  for (const auto& entry : std::filesystem::directory_iterator(Path("out.ply.rounds"))) {
+    if (entry.path().extension() == ".job") jobs += ReadFile(entry.path().string()).value_or("");
+  }
+  const Finished run = RunProgram(Command("out.ply", {"--resume", "--json"}), seconds(300));
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  EXPECT_TRUE(ReadFile(Path("out.ply")).value_or("") == alone);
+  // The first round was not measured again, the last one was.
+  const json rounds = json::parse(run.output)["rounds"];
+  EXPECT_THAT(jobs, HasSubstr(rounds.front()["job_id"].get<std::string>()));
+  EXPECT_THAT(jobs, Not(HasSubstr(rounds.back()["job_id"].get<std::string>())));
+  EXPECT_FALSE(std::filesystem::exists(Path("out.ply.rounds")));
 }
 
 TEST_F(BakeTest, PrintsTheFiguresOfSurfaces) {
@@ -128,18 +156,17 @@ class FromMeshTest : public BakeTest {
  protected:
   FromMeshTest() {
     // The camera sees the floor, some of it through the glass ball, and no other side.
-    const Finished run = RunProgram({kBin + "/lucerna", "render", Path("scene.pbrt"), "-o",
-                                     Path("photons.exr"), "--size", "64x64", "--passes", "64",
-                                     "--photons-per-pass", "65536", "--quiet"},
-                                    seconds(300));
+    const Finished run =
+        RunProgram({kBin + "/lucerna", "render", Path("scene.pbrt"), "-o", Path("photons.exr"),
+                    "--size", "64x64", "--passes", "64", "--photons-per-pass", "65536", "--quiet"},
+                   seconds(300));
     EXPECT_EQ(run.exit_code, 0) << run.errors;
   }
   [[nodiscard]] Finished Draw(const std::string& mesh, const std::string& out,
                               const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> words = {kBin + "/lucerna", "render",     Path("scene.pbrt"),
-                                      "--from-mesh",     Path(mesh),   "-o",
-                                      Path(out),         "--size",     "64x64",
-                                      "--passes",        "16",         "--json"};
+    std::vector<std::string> words = {
+        kBin + "/lucerna", "render", Path("scene.pbrt"), "--from-mesh", Path(mesh), "-o", Path(out),
+        "--size",          "64x64",  "--passes",         "16",          "--json"};
     words.insert(words.end(), more.begin(), more.end());
     return RunProgram(words, seconds(300));
   }
@@ -163,9 +190,12 @@ TEST_F(FromMeshTest, DrawsWhatPhotonsWouldShow) {
   const std::vector<double> truth = BlocksOf("photons.exr");
   const double mean = MeanOf(truth);
   ASSERT_GT(mean, 0);
-  for (const std::vector<std::string>& flags : std::vector<std::vector<std::string>>{
-           {}, {"--indirect-only"}, {"--elements", "quadratic"}, {"--estimator", "histogram"}}) {
-    std::vector<std::string> more = {"--passes", "64", "--photons-per-pass", "65536"};
+  for (const std::vector<std::string>& flags :
+       std::vector<std::vector<std::string>>{{},
+                                             {"--indirect-only"},
+                                             {"--elements", "quadratic"},
+                                             {"--spacing", "0.05", "--estimator", "histogram"}}) {
+    std::vector<std::string> more = {"--passes", "16", "--photons-per-pass", "65536"};
     more.insert(more.end(), flags.begin(), flags.end());
     (void)Bake("mesh.glb", more);
     const Finished run = Draw("mesh.glb", "drawn.exr");
@@ -255,10 +285,10 @@ LightSource "point" "rgb I" [.01 .01 .01] "point3 from" [0 0 3]
 Material "diffuse" "rgb reflectance" [.5 .5 .5]
 Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point3 P" [-2 -2 0 2 -2 0 2 2 0 -2 2 0]
 )";
-  const Finished run = RunProgram({kBin + "/lucerna", "bake", Path("cone.pbrt"), "-o",
-                                   Path("cone.ply"), "--passes", "4", "--spacing", ".25", "--sides",
-                                   "front", "--max-depth", "1", "--json"},
-                                  seconds(300));
+  const Finished run =
+      RunProgram({kBin + "/lucerna", "bake", Path("cone.pbrt"), "-o", Path("cone.ply"), "--passes",
+                  "4", "--spacing", ".25", "--sides", "front", "--max-depth", "1", "--json"},
+                 seconds(300));
   ASSERT_EQ(run.exit_code, 0) << run.errors;
   // 10 / 3^2 in the middle of the spot, and 0.0011 of the other light.
   const json floor = json::parse(run.output)["surfaces"][0];

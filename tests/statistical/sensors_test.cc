@@ -288,7 +288,7 @@ TEST(SensorsTest, DirectLightOfABucketIsTheMeanOverIt) {
   });
   ExpectIrradiance(scene, SettingsOfSensors(scene), 256, {expected}, 1e-3);
   // That of the middle alone is another.
-  EXPECT_GT(std::abs(1 / std::pow(2 * 25.0 / 36 + 1, 1.5) - expected), 0.2 * expected);
+  EXPECT_GT(std::abs(1 / std::pow(2 * 25.0 / 36 + 1, 1.5) - expected), 0.1 * expected);
 }
 
 TEST(SensorsTest, DirectLightOfABucketOnABallIsThatOfTheBall) {

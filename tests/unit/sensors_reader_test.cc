@@ -121,9 +121,8 @@ TEST(SensorsReaderTest, SaysWhatIsMissing) {
   EXPECT_THAT(ErrorOf(File(kComments, "", 0)), HasSubstr("no points"));
   EXPECT_THAT(ErrorOf(File(kComments, "0 0 1 0 0 0\n", 1)), HasSubstr("normal of point 0"));
   EXPECT_THAT(ErrorOf(File(kComments, "0 0 1 0 0 3\n", 1)), HasSubstr("normal of point 0"));
-  EXPECT_THAT(ErrorOf(SensorsFile("scene.pbrt", {{{{}, {0, 0, 1}, 1}, {{}, {0, 0, 1}, 1}},
-                                                 {SensorBucket()},
-                                                 {}})),
+  EXPECT_THAT(ErrorOf(SensorsFile(
+                  "scene.pbrt", {{{{}, {0, 0, 1}, 1}, {{}, {0, 0, 1}, 1}}, {SensorBucket()}, {}})),
               HasSubstr("1 buckets for 2 points"));
   SensorBucket infinite;
   infinite.corners[1].y = HUGE_VALF;

@@ -51,7 +51,7 @@ using Field = std::function<double(const Sensor&)>;
 std::vector<Irradiance> Measure(const std::vector<Sensor>& sensors, const Field& field) {
   std::vector<Irradiance> measured;
   for (const Sensor& sensor : sensors)
-    measured.push_back({Gray(static_cast<float>(field(sensor))), 0});
+    measured.push_back({Gray(static_cast<float>(field(sensor))), 0, 0});
   return measured;
 }
 
@@ -321,8 +321,8 @@ TEST(SurfaceMeshTest, ASpotWithinAFaceIsFoundByTheSurvey) {
       std::vector<Irradiance> means;
       for (const Sensor& sensor : set.sensors) {
         const bool has_spot = sensor.position.x > sensor.position.y;
-        means.push_back({Gray(has_spot ? static_cast<float>(1 + 99 * AreaOfSmallSpot() / 128) : 1),
-                         0.01F});
+        means.push_back(
+            {Gray(has_spot ? static_cast<float>(1 + 99 * AreaOfSmallSpot() / 128) : 1), 0.01F});
       }
       mesh.SetBuckets(means);
       mesh.KeepAsSurvey();
@@ -345,10 +345,26 @@ TEST(SurfaceMeshTest, ASpotWithinAFaceIsFoundByTheSurvey) {
   EXPECT_LT(found.faces().size(), 2048 + 512U);
 }
 
+TEST(SurfaceMeshTest, DirectLightThatIsMissedIsFoundHoweverNoisyItsMean) {
+  SurfaceMesh mesh = SquareOf(0.5);
+  // As many samples of the spot as make a mean as large as its noise.
+  mesh.SetBuckets({{Gray(3), 2, 3}, {Gray(1), 0.1F, 1}});
+  mesh.KeepAsSurvey();
+  mesh.SetMeasured([&] {
+    std::vector<Irradiance> measured = Measure(mesh.NextSensors(true), SmallSpot);
+    for (Irradiance& of : measured)
+      of.direct = of.value.g;
+    return measured;
+  }());
+  // Of the first face all edges.
+  EXPECT_EQ(mesh.Refine(0.05).value(), 3U);
+  EXPECT_GT(mesh.faces().size(), 4U);
+}
+
 TEST(SurfaceMeshTest, TheSurveysNoiseIsNoSpot) {
   SurfaceMesh mesh = SquareOf(0.5);
   // 30 % off, and four standard deviations are 40 %; where no noise is known nothing is.
-  mesh.SetBuckets({{Gray(1.3F), 0.1F}, {Gray(0), 0}});
+  mesh.SetBuckets({{Gray(1.3F), 0.1F, 0}, {Gray(0), 0, 0}});
   mesh.KeepAsSurvey();
   Bake(
       mesh, [](const Sensor&) { return 1.0; }, 0.05);
@@ -550,8 +566,7 @@ TEST(MeshFileTest, GlbIsReadBack) {
   for (std::size_t size = 0; size < bytes.size(); size += 97) {
     EXPECT_FALSE(ReadMeshGlb("box.glb", bytes.substr(0, size)).ok()) << size;
   }
-  const StatusOr<BakedMesh> other =
-      ReadMeshGlb("other.gltf", R"({"asset": {"version": "2.0"}})");
+  const StatusOr<BakedMesh> other = ReadMeshGlb("other.gltf", R"({"asset": {"version": "2.0"}})");
   ASSERT_FALSE(other.ok());
   EXPECT_THAT(std::string(other.status().message()), HasSubstr("no meshes"));
 }
@@ -620,7 +635,7 @@ TEST(ChartAtlasTest, BilinearLookUpsFindWhatIsLinear) {
   const auto linear = [](Vec3 p) { return 1 + p.x + 2 * p.y + 3 * p.z; };
   std::vector<Irradiance> measured;
   for (const ChartAtlas::Texel& texel : atlas->texels)
-    measured.push_back({Gray(linear(texel.sensor.position)), 0});
+    measured.push_back({Gray(linear(texel.sensor.position)), 0, 0});
   const Image image = AtlasImage(*atlas, measured);
   const BakedMesh baked = AtlasMesh(mesh, *atlas, image);
   ASSERT_EQ(baked.surfaces.size(), 1U);

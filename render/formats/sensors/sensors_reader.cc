@@ -79,8 +79,8 @@ UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
   constexpr std::size_t kMostPoints = std::size_t{65536} * 65536;
   if (points->positions.size() > kMostPoints) return fail("it has too many points");
   if (!points->buckets.empty() && points->buckets.size() != points->positions.size()) {
-    return fail(Concat("it has ", points->buckets.size(), " buckets for ",
-                       points->positions.size(), " points; give each point one, or none"));
+    return fail(Concat("it has ", points->buckets.size(), " buckets for ", points->positions.size(),
+                       " points; give each point one, or none"));
   }
 
   UnfinishedScene unfinished =
@@ -123,8 +123,7 @@ std::string SensorsFile(const std::string& scene_path, const SensorSet& set) {
   add_properties({"x", "y", "z", "nx", "ny", "nz", "spacing"});
   if (!set.buckets.empty()) {
     bytes += Concat("element bucket ", set.buckets.size(), "\n");
-    add_properties(
-        {"ax", "ay", "az", "bx", "by", "bz", "cx", "cy", "cz", "ox", "oy", "oz", "r"});
+    add_properties({"ax", "ay", "az", "bx", "by", "bz", "cx", "cy", "cz", "ox", "oy", "oz", "r"});
   }
   bytes += Concat("element segment ", set.borders.size(), "\n");
   add_properties({"ax", "ay", "az", "bx", "by", "bz"});
