@@ -475,6 +475,19 @@ TEST(SurfaceMeshTest, DecimationLeavesNoCracks) {
   EXPECT_NEAR(AreaOf(mesh), 22, 1e-4);
 }
 
+TEST(SurfaceMeshTest, DecimationKeepsBordersThatBend) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddDisk(scene, {0, 0, 0}, {0, 0, 1}, 1, 0, kNoAreaLight);
+  SurfaceMesh mesh = MeshOf(scene, MeasuredSides::kFront, 0.05);
+  ASSERT_TRUE(mesh.SplitLongEdges(0.15).ok());
+  Bake(
+      mesh, [](const Sensor&) { return 1.0; }, 0.05);
+  const double area = AreaOf(mesh);
+  EXPECT_GT(mesh.Decimate(0.05, 10), 10U);
+  EXPECT_NEAR(AreaOf(mesh), area, 1e-5);
+}
+
 TEST(SurfaceMeshTest, ASphereIsNotDecimated) {
   Scene scene;
   AddMaterial(scene, DiffuseMaterial(0.5F));
