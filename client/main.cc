@@ -224,6 +224,8 @@ int Run(int argc, char** argv) {
   CLI::Option* no_checkpoints =
       render->add_flag("--no-checkpoints", keeps_no_checkpoints,
                        "keep nothing beside the image to go on from after an interruption");
+  render->add_option("--from-mesh", request.mesh,
+                     ".glb file of lucerna bake whose light is drawn, without photons");
   render->add_flag("--resume", request.resumes, "go on with a render that was interrupted")
       ->excludes(no_checkpoints);
   add_workers(render);
@@ -449,7 +451,11 @@ int Run(int argc, char** argv) {
                     output_options);
       });
   add_scene(bake, baked.scene);
-  bake->add_option("-o,--output", baked.output_path, ".ply or .glb file to write")->required();
+  bake->add_option("-o,--output", baked.output_path,
+                   "file to write: .ply or .glb for a mesh, .exr for a light map")
+      ->required();
+  bake->add_option("--uv-mesh", baked.uv_mesh_path,
+                   ".glb file to write beside a light map: the surfaces with their places in it");
   bake->add_flag("--ascii", baked.is_ascii, "write a PLY file as text");
   bake->add_option("--spacing", baked.spacing,
                    "distance of neighbouring points where the mesh is finest, in scene units "
@@ -460,6 +466,14 @@ int Run(int argc, char** argv) {
                    "everywhere")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
+  const std::map<std::string, MeshElements> elements = {{"linear", MeshElements::kLinear},
+                                                        {"quadratic", MeshElements::kQuadratic}};
+  bake->add_option("--elements", baked.elements,
+                   "linear or quadratic: how irradiance is interpolated on a triangle")
+      ->transform(CLI::Transformer(elements))
+      ->default_str("linear");
+  bake->add_flag("!--no-decimation", baked.decimates,
+                 "keep vertices where the mesh is right without them");
   bake->add_option("--material", baked.materials,
                    "measure surfaces of this material alone; may be repeated")
       ->allow_extra_args(false);
@@ -488,6 +502,9 @@ int Run(int argc, char** argv) {
   add_image_flags(bake, baked.overrides);
   AddSettingFlags(*bake, SettingRole::kStopsJob, baked.overrides);
   add_workers(bake);
+  bake->add_flag("--resume", baked.resumes,
+                 "take the rounds that were finished before an interruption from the folder beside "
+                 "the output");
   bake->add_flag("--on-server", bakes_on_server, "run the jobs on the coordinator of --server");
   add_server(bake);
   add_no_preview(bake);

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -14,6 +15,12 @@
 
 #include "render/base/text.h"
 #include "render/base/version.h"
+#include "render/formats/asset_reader.h"
+#include "render/formats/diagnostic.h"
+#include "render/formats/gltf/accessors.h"
+#include "render/formats/gltf/document.h"
+#include "render/math/double3.h"
+#include "render/scene/scene_files.h"
 
 namespace lucerna {
 namespace {
@@ -27,6 +34,9 @@ constexpr int kArrayBuffer = 34962;
 constexpr int kElementArrayBuffer = 34963;
 // What is this many times as bright as the mean is white for viewers.
 constexpr double kWhite = 4;
+// How its `extras` name elements.
+constexpr const char* kQuadraticElements = "quadratic";
+constexpr const char* kLinearElements = "linear";
 
 template <typename Values>
 void Append(std::string& bytes, const Values& values) {
@@ -97,43 +107,122 @@ class Buffer {
   nlohmann::ordered_json accessors_ = nlohmann::ordered_json::array();
 };
 
+// A .glb file names no other files.
+class NoFiles final : public SceneFiles {
+ public:
+  [[nodiscard]] StatusOr<std::string> Read(const std::string& logical_path) override {
+    return absl::NotFoundError(Concat(logical_path, " is not read"));
+  }
+};
+
+// One primitive. False: an error, which is in the diagnostics.
+bool ReadSurface(const GltfObject& primitive, GltfBuffers& buffers, BakedMesh::Surface& surface) {
+  const GltfObject attributes = primitive.Child("attributes");
+  if (!attributes.Has("_IRRADIANCE")) {
+    primitive.Error("has no attribute _IRRADIANCE; give a file that lucerna bake has written");
+    return false;
+  }
+  const auto open = [&](const GltfObject& object, const char* name,
+                        GltfUse use) -> const GltfAccessor* {
+    const std::optional<std::size_t> index = object.Index(name, "accessors");
+    if (!index) {
+      if (!object.Has(name)) object.Error(Concat("needs ", name));
+      return nullptr;
+    }
+    return buffers.Open(*index, use);
+  };
+  const GltfAccessor* const positions = open(attributes, "POSITION", GltfUse::kVec3);
+  const GltfAccessor* const normals = open(attributes, "NORMAL", GltfUse::kVec3);
+  const GltfAccessor* const irradiance = open(attributes, "_IRRADIANCE", GltfUse::kVec3);
+  const GltfAccessor* const indices = open(primitive, "indices", GltfUse::kIndices);
+  if (!positions || !normals || !irradiance || !indices) return false;
+  const std::size_t count = positions->count();
+  if (normals->count() != count || irradiance->count() != count || indices->count() % 3 != 0) {
+    primitive.Error("has columns of different lengths");
+    return false;
+  }
+  const auto vector_of = [](const std::array<double, 4>& v) {
+    return ToFloat(Double3(v[0], v[1], v[2]));
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    surface.positions.push_back(vector_of(positions->At(i)));
+    surface.normals.push_back(vector_of(normals->At(i)));
+    const Vec3 e = vector_of(irradiance->At(i));
+    surface.irradiance.push_back({e.x, e.y, e.z});
+    surface.noise.push_back(0);
+    if (!IsFinite(surface.positions.back()) || !IsFinite(surface.normals.back()) || !IsFinite(e)) {
+      primitive.Error(Concat("vertex ", i, " is not finite"));
+      return false;
+    }
+  }
+  for (std::size_t i = 0; i < indices->count(); i += 3) {
+    auto& face = surface.faces.emplace_back();
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      face[corner] = indices->WholeAt(i + corner);
+      if (face[corner] < count) continue;
+      primitive.Error(Concat("refers to vertex ", face[corner], " of ", count));
+      return false;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 BakedMesh BakedMeshOf(const SurfaceMesh& mesh) {
+  using Corners = std::array<std::uint32_t, 3>;
   BakedMesh baked;
+  baked.is_quadratic = mesh.elements() == MeshElements::kQuadratic;
   // Of the surfaces of `mesh`, where they are in `baked`.
   std::map<std::uint32_t, std::size_t> at;
   std::map<std::uint32_t, std::uint32_t> vertex_at;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> node_at;  // by ends of edges
   for (const MeshFace& face : mesh.faces()) {
     const auto [found, is_new] = at.try_emplace(face.surface, baked.surfaces.size());
     if (is_new) {
       const MeshSurface& surface = mesh.surfaces()[face.surface];
-      baked.surfaces.emplace_back().name = Concat(surface.shape, surface.name.empty() ? "" : " ",
-                                                  surface.name, surface.is_back ? ", back" : "");
+      BakedMesh::Surface& added = baked.surfaces.emplace_back();
+      added.name = NameOf(surface);
+      added.material = surface.name;
     }
     BakedMesh::Surface& to = baked.surfaces[found->second];
-    std::array<std::uint32_t, 3> corners{};
+    const auto add = [&](const MeshVertex& vertex, const Irradiance& irradiance) {
+      to.positions.push_back(vertex.position);
+      to.normals.push_back(vertex.normal);
+      to.irradiance.push_back(irradiance.value);
+      to.noise.push_back(irradiance.noise);
+      return static_cast<std::uint32_t>(to.positions.size() - 1);
+    };
+    Corners corners{};
     for (std::size_t i = 0; i < corners.size(); ++i) {
-      const MeshVertex& vertex = mesh.vertices()[face.vertices[i]];
+      const std::uint32_t number = face.vertices[i];
+      const MeshVertex& vertex = mesh.vertices()[number];
       if (face.bucket) {
-        corners[i] = static_cast<std::uint32_t>(to.positions.size());
-        to.positions.push_back(vertex.position);
-        to.normals.push_back(vertex.normal);
-        to.irradiance.push_back(face.bucket->value);
-        to.noise.push_back(face.bucket->noise);
+        corners[i] = add(vertex, *face.bucket);
         continue;
       }
-      const auto [known, is_first] =
-          vertex_at.try_emplace(face.vertices[i], static_cast<std::uint32_t>(to.positions.size()));
-      if (is_first) {
-        to.positions.push_back(vertex.position);
-        to.normals.push_back(vertex.normal);
-        to.irradiance.push_back(vertex.irradiance->value);
-        to.noise.push_back(vertex.irradiance->noise);
-      }
+      const auto [known, is_first] = vertex_at.try_emplace(number, 0);
+      if (is_first) known->second = add(vertex, *vertex.irradiance);
       corners[i] = known->second;
     }
-    to.faces.push_back(corners);
+    if (!baked.is_quadratic || face.bucket) {
+      to.faces.push_back(corners);
+      continue;
+    }
+    Corners nodes{};  // of the edges from each corner to the next
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const std::uint32_t from = face.vertices[i];
+      const std::uint32_t end = face.vertices[(i + 1) % 3];
+      const auto [known, is_first] = node_at.try_emplace(std::minmax(from, end), 0);
+      if (is_first) {
+        const MeshVertex node = mesh.NodeOf(face, from, end);
+        known->second = add(node, *node.irradiance);
+      }
+      nodes[i] = known->second;
+    }
+    const auto [a, b, c] = corners;
+    const auto [ab, bc, ca] = nodes;
+    to.faces.insert(to.faces.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
   }
   return baked;
 }
@@ -207,6 +296,9 @@ std::string MeshGlb(const BakedMesh& mesh) {
     attributes["POSITION"] = buffer.AddPositions(surface.positions);
     attributes["NORMAL"] = buffer.Add(surface.normals, "VEC3", kFloat, kArrayBuffer);
     attributes["COLOR_0"] = buffer.Add(colors, "VEC4", kFloat, kArrayBuffer);
+    if (!surface.uvs.empty()) {
+      attributes["TEXCOORD_0"] = buffer.Add(surface.uvs, "VEC2", kFloat, kArrayBuffer);
+    }
     attributes["_IRRADIANCE"] = buffer.Add(surface.irradiance, "VEC3", kFloat, kArrayBuffer);
     attributes["_NOISE"] = buffer.Add(surface.noise, "SCALAR", kFloat, kArrayBuffer);
     std::vector<std::uint32_t> indices;
@@ -216,6 +308,7 @@ std::string MeshGlb(const BakedMesh& mesh) {
     const std::size_t index_accessor =
         buffer.Add(indices, "SCALAR", kUnsignedInt, kElementArrayBuffer);
     meshes.push_back({{"name", surface.name},
+                      {"extras", {{"material", surface.material}}},
                       {"primitives",
                        {{{"attributes", attributes},
                          {"indices", index_accessor},
@@ -241,6 +334,8 @@ std::string MeshGlb(const BakedMesh& mesh) {
   file["extras"] = {{"irradiance_unit", "W/m^2"},
                     {"scene", mesh.scene},
                     {"spacing", mesh.spacing},
+                    {"elements", mesh.is_quadratic ? kQuadraticElements : kLinearElements},
+                    {"indirect_only", mesh.is_indirect},
                     {"relative_error", mesh.estimate}};
 
   std::string json = file.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -256,6 +351,39 @@ std::string MeshGlb(const BakedMesh& mesh) {
   bytes.append("BIN\0", 4);
   bytes += buffer.bytes();
   return bytes;
+}
+
+StatusOr<BakedMesh> ReadMeshGlb(const std::string& path, std::string_view bytes) {
+  Diagnostics diagnostics;
+  NoFiles no_files;
+  AssetReader assets(no_files, {});
+  const GltfDocument document(path, bytes, diagnostics);
+  BakedMesh mesh;
+  if (document.is_readable()) {
+    GltfBuffers buffers(document, assets);
+    const GltfObject extras = document.Root().Child("extras");
+    mesh.scene = extras.String("scene", "");
+    mesh.is_indirect = extras.Bool("indirect_only", false);
+    mesh.is_quadratic = extras.String("elements", kLinearElements) == kQuadraticElements;
+    for (std::size_t i = 0; i < document.Count("meshes"); ++i) {
+      const GltfObject of_mesh = document.At("meshes", i);
+      for (const GltfObject& primitive : of_mesh.Children("primitives")) {
+        BakedMesh::Surface& surface = mesh.surfaces.emplace_back();
+        surface.name = of_mesh.String("name", "");
+        surface.material = of_mesh.Child("extras").String("material", "");
+        if (!ReadSurface(primitive, buffers, surface)) break;
+        if (mesh.is_quadratic && surface.faces.size() % 4 != 0) {
+          primitive.Error("has quadratic elements that are not four faces each");
+        }
+      }
+      if (diagnostics.has_error()) break;
+    }
+    if (mesh.surfaces.empty() && !diagnostics.has_error()) {
+      document.Root().Error("it has no meshes; give a file that lucerna bake has written");
+    }
+  }
+  if (!diagnostics.has_error()) return mesh;
+  return absl::InvalidArgumentError(diagnostics.Take().front().ToString());
 }
 
 }  // namespace lucerna

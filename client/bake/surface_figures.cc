@@ -42,14 +42,14 @@ std::string FiguresTable(const std::vector<SurfaceFigures>& figures, bool in_lux
   std::size_t width = 7;
   for (const SurfaceFigures& of : figures)
     width = std::max(width, Escaped(of.name).size());
-  std::string table =
-      absl::StrFormat("%-*s %9s %10s %10s %10s %10s %6s\n", static_cast<int>(width), "surface",
-                      "triangles", "area m2", in_lux ? "min lx" : "min W/m2", "mean", "max", "U0");
+  std::string table = absl::StrFormat("%-*s %9s %10s %10s %10s %10s %6s %6s\n",
+                                      static_cast<int>(width), "surface", "triangles", "area m2",
+                                      in_lux ? "min lx" : "min W/m2", "mean", "max", "U0", "Ud");
   for (const SurfaceFigures& of : figures) {
-    table +=
-        absl::StrFormat("%-*s %9d %10.4g %10.4g %10.4g %10.4g %6.3f\n", static_cast<int>(width),
-                        Escaped(of.name), of.triangles, of.area, of.lowest * factor,
-                        of.mean * factor, of.highest * factor, of.uniformity());
+    table += absl::StrFormat("%-*s %9d %10.4g %10.4g %10.4g %10.4g %6.3f %6.3f\n",
+                             static_cast<int>(width), Escaped(of.name), of.triangles, of.area,
+                             of.lowest * factor, of.mean * factor, of.highest * factor,
+                             of.uniformity(), of.diversity());
   }
   return table;
 }

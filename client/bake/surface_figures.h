@@ -17,6 +17,8 @@ struct SurfaceFigures {
   double mean = 0;                 // over the area, linear on each triangle
   // Lowest over mean, as EN 12464-1 defines the uniformity U0; 0 where there is no light.
   [[nodiscard]] double uniformity() const { return mean > 0 ? lowest / mean : 0; }
+  // Lowest over highest, Ud.
+  [[nodiscard]] double diversity() const { return highest > 0 ? lowest / highest : 0; }
 };
 
 // In the order of the mesh.

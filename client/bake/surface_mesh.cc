@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "client/bake/decimation.h"
 #include "render/base/text.h"
 #include "render/math/double3.h"
 #include "render/math/union_find.h"
@@ -24,6 +25,10 @@ constexpr double kLargestInset = 0.1;
 constexpr double kDarkShare = 0.1;
 // Differences below so many standard deviations are noise.
 constexpr double kNoiseDeviations = 2;
+// The same for means over faces of the first mesh, whose noise is estimated from few passes.
+constexpr double kSurveyDeviations = 4;
+// Direct light that the mesh misses on a face of the first mesh, over what it has there.
+constexpr double kMissedShare = 0.5;
 // Into so many parts a disk's rim and a sphere's equator are divided.
 constexpr int kRoundParts = 32;
 
@@ -151,9 +156,15 @@ double LuminanceOf(const Irradiance& irradiance) {
 
 }  // namespace
 
+std::string NameOf(const MeshSurface& surface) {
+  return Concat(surface.shape, surface.name.empty() ? "" : " ", surface.name,
+                surface.is_back ? ", back" : "");
+}
+
 StatusOr<SurfaceMesh> SurfaceMesh::FromScene(const Scene& scene, const Options& options) {
   SurfaceMesh mesh;
   mesh.spacing_ = options.spacing;
+  mesh.elements_ = options.elements;
   std::set<std::string> names;
   std::uint32_t shape = 0;
   const auto is_wanted = [&](const ShapeTraits& traits) {
@@ -300,7 +311,9 @@ Sensor SurfaceMesh::SensorOn(const MeshFace& face, Vec3 position, Vec3 normal) c
     if (length > 0) {
       const Double3 radial = out * (1 / length);
       const bool is_same = Dot(radial, Double3(normal)) > 0;
-      return {position, ToFloat(radial * (is_same ? 1 : -1)), static_cast<float>(spacing_)};
+      const auto radius = static_cast<double>(ball->radius);
+      return {ToFloat(Double3(ball->center) + radial * radius),
+              ToFloat(radial * (is_same ? 1 : -1)), static_cast<float>(spacing_)};
     }
   }
   Double3 middle;
@@ -346,9 +359,8 @@ int SurfaceMesh::LongestEdgeOf(const MeshFace& face) const {
   return longest;
 }
 
-MeshVertex SurfaceMesh::MiddleOf(const MeshFace& face, Pair edge) {
-  const MeshVertex& a = vertices_[edge.first];
-  const MeshVertex& b = vertices_[edge.second];
+MeshVertex SurfaceMesh::MiddleOf(const MeshFace& face, const MeshVertex& a,
+                                 const MeshVertex& b) const {
   MeshVertex middle;
   middle.surface = face.surface;
   Double3 position = (Double3(a.position) + Double3(b.position)) * 0.5;
@@ -363,6 +375,24 @@ MeshVertex SurfaceMesh::MiddleOf(const MeshFace& face, Pair edge) {
   middle.position = ToFloat(position);
   middle.sensor = SensorOn(face, middle.position, middle.normal);
   return middle;
+}
+
+MeshVertex& SurfaceMesh::PointOf(const AskedProbe& asked) {
+  Probe& probe = probes_.at(asked.edge);
+  return asked.point == 0 ? probe.middle
+                          : (*probe.quarters)[static_cast<std::size_t>(asked.point - 1)];
+}
+
+MeshVertex SurfaceMesh::NodeOf(const MeshFace& face, std::uint32_t from, std::uint32_t to) const {
+  const auto probe = probes_.find(std::minmax(from, to));
+  if (probe != probes_.end() && probe->second.middle.irradiance) return probe->second.middle;
+  const MeshVertex& a = vertices_[std::min(from, to)];
+  const MeshVertex& b = vertices_[std::max(from, to)];
+  MeshVertex node = MiddleOf(face, a, b);
+  node.irradiance = {(a.irradiance->value + b.irradiance->value) * 0.5F,
+                     std::hypot(a.irradiance->noise, b.irradiance->noise) / 2,
+                     (a.irradiance->direct + b.irradiance->direct) / 2};
+  return node;
 }
 
 Status SurfaceMesh::Split(std::set<Pair> places) {
@@ -396,16 +426,24 @@ Status SurfaceMesh::Split(std::set<Pair> places) {
           middles.try_emplace(vertices, static_cast<std::uint32_t>(vertices_.size()));
       if (is_new) {
         const auto probe = probes_.find(vertices);
-        MeshVertex middle =
-            probe == probes_.end() ? MiddleOf(face, vertices) : probe->second.middle;
-        if (probe != probes_.end()) probe->second.is_used = true;
+        MeshVertex middle = probe == probes_.end() ? MiddleOf(face, vertices_[vertices.first],
+                                                              vertices_[vertices.second])
+                                                   : probe->second.middle;
         middle.place = PlaceOf(middle.position);
         vertices_.push_back(std::move(middle));
+        if (probe != probes_.end()) {
+          probe->second.is_used = true;
+          if (const auto quarters = probe->second.quarters; quarters) {
+            // New vertices have larger numbers.
+            probes_[{vertices.first, found->second}].middle = (*quarters)[0];
+            probes_[{vertices.second, found->second}].middle = (*quarters)[1];
+          }
+        }
       }
       m[index] = found->second;
     }
     const auto add = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
-      finer.push_back({{a, b, c}, face.surface, std::nullopt});
+      finer.push_back({{a, b, c}, face.surface, std::nullopt, face.survey});
     };
     if (m[0] == kNoVertex) {
       finer.push_back(face);
@@ -452,7 +490,7 @@ Status SurfaceMesh::SplitLongEdges(double longest) {
 
 std::vector<Sensor> SurfaceMesh::NextSensors(bool with_edges) {
   asked_vertices_.clear();
-  asked_edges_.clear();
+  asked_probes_.clear();
   std::vector<Sensor> sensors;
   std::vector<std::uint8_t> is_used(vertices_.size());
   for (const MeshFace& face : faces_) {
@@ -466,12 +504,25 @@ std::vector<Sensor> SurfaceMesh::NextSensors(bool with_edges) {
   for (const MeshFace& face : faces_) {
     for (int edge = 0; edge < 3; ++edge) {
       const Pair vertices = EdgeOf(face, edge);
-      if (!(LengthOf(vertices) > spacing_)) continue;
-      const auto [probe, is_new] = probes_.try_emplace(vertices);
-      if (!is_new) continue;
-      probe->second.middle = MiddleOf(face, vertices);
-      asked_edges_.push_back(vertices);
-      sensors.push_back(probe->second.middle.sensor);
+      const double length = LengthOf(vertices);
+      if (!(length > spacing_)) continue;
+      const MeshVertex& a = vertices_[vertices.first];
+      const MeshVertex& b = vertices_[vertices.second];
+      const auto [found, is_new] = probes_.try_emplace(vertices);
+      Probe& probe = found->second;
+      if (is_new) {
+        probe.middle = MiddleOf(face, a, b);
+        asked_probes_.push_back({vertices, 0});
+        sensors.push_back(probe.middle.sensor);
+      }
+      if (elements_ == MeshElements::kLinear || probe.quarters || !(length > 2 * spacing_)) {
+        continue;
+      }
+      probe.quarters = {MiddleOf(face, a, probe.middle), MiddleOf(face, b, probe.middle)};
+      for (const int point : {1, 2}) {
+        asked_probes_.push_back({vertices, point});
+        sensors.push_back(PointOf(asked_probes_.back()).sensor);
+      }
     }
   }
   return sensors;
@@ -480,49 +531,47 @@ std::vector<Sensor> SurfaceMesh::NextSensors(bool with_edges) {
 void SurfaceMesh::SetMeasured(const std::vector<Irradiance>& measured) {
   for (std::size_t i = 0; i < asked_vertices_.size(); ++i)
     vertices_[asked_vertices_[i]].irradiance = measured[i];
-  for (std::size_t i = 0; i < asked_edges_.size(); ++i)
-    probes_.at(asked_edges_[i]).middle.irradiance = measured[asked_vertices_.size() + i];
+  for (std::size_t i = 0; i < asked_probes_.size(); ++i)
+    PointOf(asked_probes_[i]).irradiance = measured[asked_vertices_.size() + i];
 }
 
-std::vector<Sensor> SurfaceMesh::BucketSensors() const {
-  std::vector<Sensor> sensors;
-  sensors.reserve(faces_.size());
+SensorSet SurfaceMesh::Buckets() const {
+  SensorSet set;
+  set.sensors.reserve(faces_.size());
+  set.buckets.reserve(faces_.size());
+  std::map<Pair, std::array<Vec3, 2>> borders;  // by places
   for (const MeshFace& face : faces_) {
+    SensorBucket bucket;
     Double3 middle;
-    for (const std::uint32_t vertex : face.vertices)
-      middle = middle + Double3(vertices_[vertex].position) * (1.0 / 3);
-    const Vec3 normal =
-        TriangleNormal(vertices_[face.vertices[0]].position, vertices_[face.vertices[1]].position,
-                       vertices_[face.vertices[2]].position);
+    for (std::size_t i = 0; i < 3; ++i) {
+      bucket.corners[i] = vertices_[face.vertices[i]].position;
+      middle = middle + Double3(bucket.corners[i]) * (1.0 / 3);
+    }
+    const Vec3 normal = TriangleNormal(bucket.corners[0], bucket.corners[1], bucket.corners[2]);
     Sensor sensor = {ToFloat(middle), normal, 0};
     if (const auto& ball = surfaces_[face.surface].ball; ball) {
       const Double3 out = middle - Double3(ball->center);
       middle = Double3(ball->center) + out * (static_cast<double>(ball->radius) / Length(out));
       sensor = SensorOn(face, ToFloat(middle), normal);
+      bucket.ball_center = ball->center;
+      bucket.ball_radius = ball->radius;
     }
     double reach = 0;
-    for (const std::uint32_t vertex : face.vertices)
-      reach = std::max(reach, Length(Double3(vertices_[vertex].position) - middle));
+    for (const Vec3 corner : bucket.corners)
+      reach = std::max(reach, Length(Double3(corner) - middle));
     sensor.spacing = static_cast<float>(kBeyondCorners * reach);
-    sensors.push_back(sensor);
-  }
-  return sensors;
-}
-
-std::vector<std::array<Vec3, 2>> SurfaceMesh::BucketBorders() const {
-  std::map<Pair, std::array<Vec3, 2>> borders;  // by places
-  for (const MeshFace& face : faces_) {
+    set.sensors.push_back(sensor);
+    set.buckets.push_back(bucket);
     for (int edge = 0; edge < 3; ++edge) {
       const Pair vertices = EdgeOf(face, edge);
       borders.try_emplace(PlacesOf(vertices), std::array{vertices_[vertices.first].position,
                                                          vertices_[vertices.second].position});
     }
   }
-  std::vector<std::array<Vec3, 2>> list;
-  list.reserve(borders.size());
+  set.borders.reserve(borders.size());
   for (const auto& [places, border] : borders)
-    list.push_back(border);
-  return list;
+    set.borders.push_back(border);
+  return set;
 }
 
 void SurfaceMesh::SetBuckets(const std::vector<Irradiance>& measured) {
@@ -530,22 +579,25 @@ void SurfaceMesh::SetBuckets(const std::vector<Irradiance>& measured) {
     faces_[i].bucket = measured[i];
 }
 
+void SurfaceMesh::KeepAsSurvey() {
+  surveys_.clear();
+  for (MeshFace& face : faces_) {
+    face.survey = static_cast<std::uint32_t>(surveys_.size());
+    surveys_.push_back({*face.bucket, !surfaces_[face.surface].ball});
+    face.bucket.reset();
+  }
+}
+
 void SurfaceMesh::DropDarkerSides() {
   std::vector<double> flux(surfaces_.size());
-  for (const MeshFace& face : faces_) {
-    for (const std::uint32_t vertex : face.vertices)
-      flux[face.surface] += AreaOf(face) / 3 * LuminanceOf(AtCorner(face, vertex));
-  }
+  for (const MeshFace& face : faces_)
+    flux[face.surface] += AreaOf(face) * LuminanceOf(*face.bucket);
   // The two sides of a shape follow each other.
   for (std::size_t i = 0; i + 1 < surfaces_.size(); i += 2) {
     const bool is_back_brighter = flux[i + 1] > flux[i];
     surfaces_[is_back_brighter ? i : i + 1].is_kept = false;
   }
   std::erase_if(faces_, [&](const MeshFace& face) { return !surfaces_[face.surface].is_kept; });
-  for (MeshVertex& vertex : vertices_)
-    vertex.irradiance.reset();
-  for (MeshFace& face : faces_)
-    face.bucket.reset();
 }
 
 double SurfaceMesh::MeanIrradiance() const {
@@ -561,42 +613,148 @@ double SurfaceMesh::MeanIrradiance() const {
   return area > 0 ? sum / area : 0;
 }
 
+SurfaceMesh::FaceMean SurfaceMesh::MeanOn(const MeshFace& face) const {
+  FaceMean corners;
+  FaceMean middles;
+  const auto add = [](const Irradiance& irradiance, FaceMean& sums) {
+    sums.all += LuminanceOf(irradiance);
+    sums.direct += static_cast<double>(irradiance.direct);
+  };
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::uint32_t from = face.vertices[i];
+    add(*vertices_[from].irradiance, corners);
+    add(*NodeOf(face, from, face.vertices[(i + 1) % 3]).irradiance, middles);
+  }
+  // Of a quadratic function; of four linear ones, between corners and middles.
+  if (elements_ == MeshElements::kQuadratic) return {middles.all / 3, middles.direct / 3};
+  return {(corners.all + 3 * middles.all) / 12, (corners.direct + 3 * middles.direct) / 12};
+}
+
+void SurfaceMesh::AddUnlikeSurvey(double tolerance, double floor, std::set<Pair>& places) const {
+  struct Sums {
+    double flux = 0, direct = 0, area = 0;
+  };
+  std::vector<Sums> sums(surveys_.size());
+  for (const MeshFace& face : faces_) {
+    const double area = AreaOf(face);
+    const FaceMean mean = MeanOn(face);
+    Sums& of = sums[face.survey];
+    of.flux += area * mean.all;
+    of.direct += area * mean.direct;
+    of.area += area;
+  }
+  const double shortest = elements_ == MeshElements::kQuadratic ? 2 * spacing_ : spacing_;
+  for (const MeshFace& face : faces_) {
+    const Survey& survey = surveys_[face.survey];
+    if (!survey.is_flat) continue;
+    const Sums& of = sums[face.survey];
+    const double mean = of.flux / of.area;
+    const double surveyed = LuminanceOf(survey.mean);
+    const double difference = std::abs(mean - surveyed);
+    const auto noise = static_cast<double>(survey.mean.noise);
+    // Where nothing arrived, nothing is known of the noise either.
+    const bool differs = noise > 0 && difference > kSurveyDeviations * noise &&
+                         difference >= tolerance * std::max({mean, surveyed, floor});
+    // Of direct light a few samples that are far brighter tell more than their mean's noise.
+    const double direct = of.direct / of.area;
+    const bool lacks_direct =
+        static_cast<double>(survey.mean.direct) - direct > kMissedShare * std::max(direct, floor);
+    if (!differs && !lacks_direct) continue;
+    for (int edge = 0; edge < 3; ++edge) {
+      const Pair vertices = EdgeOf(face, edge);
+      if (LengthOf(vertices) > shortest) places.insert(PlacesOf(vertices));
+    }
+  }
+}
+
 StatusOr<std::size_t> SurfaceMesh::Refine(double tolerance) {
   const double floor = kDarkShare * MeanIrradiance();
   std::set<Pair> places;
-  for (const Pair& edge : asked_edges_) {
+  const bool is_quadratic = elements_ == MeshElements::kQuadratic;
+  for (const AskedProbe& asked : asked_probes_) {
+    const Pair& edge = asked.edge;
+    // Quadratic elements have the middle as a node.
+    if (is_quadratic == (asked.point == 0)) continue;
+    const Irradiance& at_point = *PointOf(asked).irradiance;
+    // Of the nearer end, the middle and the other end.
+    const bool is_nearer_second = asked.point == 2;
+    const Irradiance& at_near = *vertices_[is_nearer_second ? edge.second : edge.first].irradiance;
     const Irradiance& at_middle = *probes_.at(edge).middle.irradiance;
-    const Irradiance& at_a = *vertices_[edge.first].irradiance;
-    const Irradiance& at_b = *vertices_[edge.second].irradiance;
-    const double middle = LuminanceOf(at_middle);
-    const double ends = (LuminanceOf(at_a) + LuminanceOf(at_b)) / 2;
-    const double difference = std::abs(middle - ends);
-    const double noise =
-        std::hypot(static_cast<double>(at_middle.noise), static_cast<double>(at_a.noise) / 2,
-                   static_cast<double>(at_b.noise) / 2);
+    const Irradiance& at_far = *vertices_[is_nearer_second ? edge.first : edge.second].irradiance;
+    const std::array<double, 3> weights =
+        is_quadratic ? std::array{0.375, 0.75, -0.125} : std::array{0.5, 0.0, 0.5};
+    const double value = LuminanceOf(at_point);
+    const double expected = weights[0] * LuminanceOf(at_near) +
+                            weights[1] * LuminanceOf(at_middle) + weights[2] * LuminanceOf(at_far);
+    const double difference = std::abs(value - expected);
+    const double noise = std::sqrt(std::pow(static_cast<double>(at_point.noise), 2) +
+                                   std::pow(weights[0] * static_cast<double>(at_near.noise), 2) +
+                                   std::pow(weights[1] * static_cast<double>(at_middle.noise), 2) +
+                                   std::pow(weights[2] * static_cast<double>(at_far.noise), 2));
     const bool is_noise = tolerance > 0 && difference <= kNoiseDeviations * noise;
-    if (!is_noise && difference >= tolerance * std::max({middle, ends, floor})) {
+    if (!is_noise && difference >= tolerance * std::max({value, expected, floor})) {
       places.insert(PlacesOf(edge));
     }
   }
+  if (!surveys_.empty() && tolerance > 0) AddUnlikeSurvey(tolerance, floor, places);
   const std::size_t count = places.size();
   if (count > 0) LUCERNA_RETURN_IF_ERROR(Split(std::move(places)));
   return count;
 }
 
+std::size_t SurfaceMesh::Decimate(double tolerance, double longest) {
+  std::vector<MeasuredPoint> points;
+  for (const auto& [edge, probe] : probes_) {
+    if (probe.is_used || !probe.middle.irradiance) continue;
+    const double length = LengthOf(edge);
+    points.push_back({edge, LuminanceOf(*probe.middle.irradiance), length * length});
+  }
+  DecimationRules rules;
+  rules.tolerance = tolerance;
+  rules.floor = kDarkShare * MeanIrradiance();
+  rules.longest = longest;
+  rules.flatness = kInset * spacing_;
+  for (const MeshSurface& surface : surfaces_)
+    rules.is_kept_whole.push_back(surface.ball.has_value());
+  Decimation done = DecimateMesh(vertices_, faces_, points, rules);
+  faces_ = std::move(done.faces);
+  remainders_.emplace();
+  for (const Decimation::Difference& of : done.differences)
+    remainders_->push_back({of.value, of.weight});
+  return done.removed;
+}
+
 double SurfaceMesh::InterpolationError() const {
   double sum = 0;
   double weight = 0;
-  for (const auto& [edge, probe] : probes_) {
-    if (probe.is_used || !probe.middle.irradiance) continue;
-    const auto& a = vertices_[edge.first].irradiance;
-    const auto& b = vertices_[edge.second].irradiance;
-    if (!a || !b) continue;
-    const double difference =
-        LuminanceOf(*probe.middle.irradiance) - (LuminanceOf(*a) + LuminanceOf(*b)) / 2;
-    const double length = LengthOf(edge);
-    sum += length * length * difference * difference;
-    weight += length * length;
+  const auto add = [&](double difference, double of_point) {
+    sum += of_point * difference * difference;
+    weight += of_point;
+  };
+  if (remainders_) {
+    for (const Remainder& of : *remainders_)
+      add(of.difference, of.weight);
+  } else {
+    for (const auto& [edge, probe] : probes_) {
+      if (probe.is_used || !probe.middle.irradiance) continue;
+      const auto& a = vertices_[edge.first].irradiance;
+      const auto& b = vertices_[edge.second].irradiance;
+      if (!a || !b) continue;
+      const double length = LengthOf(edge);
+      const double middle = LuminanceOf(*probe.middle.irradiance);
+      if (elements_ == MeshElements::kLinear) {
+        add(middle - (LuminanceOf(*a) + LuminanceOf(*b)) / 2, length * length);
+        continue;
+      }
+      if (!probe.quarters) continue;
+      for (const std::size_t quarter : {0U, 1U}) {
+        const auto& at = (*probe.quarters)[quarter].irradiance;
+        if (!at) continue;
+        const double near = LuminanceOf(quarter == 0 ? *a : *b);
+        const double far = LuminanceOf(quarter == 0 ? *b : *a);
+        add(LuminanceOf(*at) - (0.375 * near + 0.75 * middle - 0.125 * far), length * length / 2);
+      }
+    }
   }
   const double mean = MeanIrradiance();
   return weight > 0 && mean > 0 ? std::sqrt(sum / weight) / mean : 0;

@@ -1,10 +1,10 @@
 #include "client/commands/job_commands.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <set>
 #include <system_error>
@@ -14,18 +14,21 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_join.h"
 
+#include "client/bake/mesh_file.h"
+#include "client/bake/mesh_render.h"
 #include "client/connection.h"
 #include "client/exit_code.h"
 #include "client/frames.h"
+#include "client/image_output.h"
 #include "client/interruption.h"
 #include "client/job_run.h"
+#include "client/render_flags.h"
 #include "client/scene_reading.h"
 #include "client/usage.h"
 #include "client/view/report.h"
 #include "render/base/clock.h"
 #include "render/base/escape.h"
 #include "render/base/files.h"
-#include "render/film/picture_file.h"
 #include "render/film/png_file.h"
 #include "render/image/exr_file.h"
 #include "render/report/progress_view.h"
@@ -38,87 +41,12 @@ void Print(const std::string& text) {
   std::fputs(text.c_str(), stdout);
 }
 
-// Devices and pipes have no ending, and take an EXR file.
-bool IsDevice(const std::string& path) {
-  std::error_code error;
-  return std::filesystem::is_other(path, error);
-}
-
-StatusOr<PictureFormat> FormatOf(const std::string& path) {
-  if (IsDevice(path)) return PictureFormat::kExr;
-  StatusOr<PictureFormat> format = PictureFormatOf(path);
-  if (format.ok()) return format;
-  return Failure(ExitCode::kUsage, absl::StrCat(path, ": ", format.status().message()));
-}
-
-// A file that something else has written is not replaced unasked.
-Status CheckMayReplace(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return absl::OkStatus();
-  std::ifstream file(path, std::ios::binary);
-  std::string first(kBytesThatTell, '\0');
-  file.read(first.data(), static_cast<std::streamsize>(first.size()));
-  first.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, file.gcount())));
-  if (first.empty() || IsOwnPicture(first)) return absl::OkStatus();
-  return Failure(
-      ExitCode::kUsage,
-      absl::StrCat(path, " exists, and was not written by lucerna; --force replaces it"));
-}
-
-Status CheckOutputs(const OutputPaths& outputs) {
-  if (!outputs.image.empty() && !outputs.png.empty() && IsSameFile(outputs.image, outputs.png)) {
-    return Failure(ExitCode::kUsage, absl::StrCat("-o and --png both name ", outputs.image,
-                                                  "; give each image a file of its own"));
-  }
-  if (!outputs.image.empty()) LUCERNA_RETURN_IF_ERROR(FormatOf(outputs.image).status());
-  for (const std::string& path : {outputs.image, outputs.png}) {
-    if (path.empty()) continue;
-    LUCERNA_RETURN_IF_ERROR(CheckWritable(path));
-    if (!outputs.replaces) LUCERNA_RETURN_IF_ERROR(CheckMayReplace(path));
-  }
-  return absl::OkStatus();
-}
-
-// The image of hours is not thrown away because its place is full. Returns `why`, with the name of
-// the file in the folder for temporary files that has it instead.
-Status SaveElsewhere(const std::string& path, const std::string& bytes, const Status& why) {
-  std::error_code error;
-  const std::filesystem::path folder = std::filesystem::temp_directory_path(error);
-  if (error) return why;
-  const std::string other = (folder / std::filesystem::path(path).filename()).string();
-  if (IsSameFile(other, path) || std::filesystem::exists(other, error) ||
-      !WriteFile(other, bytes).ok()) {
-    return why;
-  }
-  return Status(why.code(), absl::StrCat(why.message(), "; it is in ", other, " instead"));
-}
-
-// Fetches the image, makes sure that it is one, and writes it. What cannot be written leaves no
-// other file out.
+// Fetches the image, makes sure that it is one, and writes it.
 StatusOr<SavedImage> Save(ClientConnection& connection, const std::string& job_id,
                           const OutputPaths& outputs, const Display& display) {
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, connection.GetImage(job_id));
   LUCERNA_ASSIGN_OR_RETURN(const Image image, DecodeImageOf(job_id, bytes));
-  SavedImage saved;
-  saved.digest = image.PixelDigest();
-  Status status;
-  const auto save = [&](const std::string& path, PictureFormat format) -> Status {
-    std::string encoded;
-    if (format != PictureFormat::kExr) {
-      LUCERNA_ASSIGN_OR_RETURN(encoded, EncodePicture(image, format, display));
-    }
-    const std::string& picture = format == PictureFormat::kExr ? bytes : encoded;
-    const Status written = WriteFile(path, picture);
-    if (written.ok()) saved.paths.push_back(path);
-    return written.ok() || IsDevice(path) ? written : SaveElsewhere(path, picture, written);
-  };
-  if (!outputs.image.empty()) {
-    LUCERNA_ASSIGN_OR_RETURN(const PictureFormat format, FormatOf(outputs.image));
-    status = save(outputs.image, format);
-  }
-  if (!outputs.png.empty()) status.Update(save(outputs.png, PictureFormat::kPng));
-  if (!status.ok()) return status;
-  return saved;
+  return WriteOutputs(image, bytes, outputs, display);
 }
 
 // Writes the image so far from time to time. What fails is said once, and tried again.
@@ -209,6 +137,7 @@ StatusOr<std::vector<RenderRequest>> RequestsOf(const RenderRequest& request,
     one.scene.path = frame.scene;
     one.outputs.image = WithFrameNumber(request.outputs.image, frame.number);
     one.outputs.png = WithFrameNumber(request.outputs.png, frame.number);
+    one.mesh = WithFrameNumber(request.mesh, frame.number);
     if (names_images && one.outputs.empty()) one.outputs.image = ImageNameOf(frame.scene);
     for (const std::string& image : {one.outputs.image, one.outputs.png}) {
       if (image.empty() || images.insert(image).second) continue;
@@ -223,9 +152,58 @@ StatusOr<std::vector<RenderRequest>> RequestsOf(const RenderRequest& request,
 
 namespace {
 
+// Of a render without photons, most settings mean nothing.
+Status CheckRequestOfMesh(const RenderRequest& request) {
+  constexpr std::array<std::string_view, 4> kMeaningful = {"size", "passes", "seed", "max_depth"};
+  for (const Setting& setting : AllSettings()) {
+    if (!IsGiven(setting, request.overrides)) continue;
+    if (std::ranges::count(kMeaningful, setting.name) > 0) continue;
+    return Failure(ExitCode::kUsage, absl::StrCat(FlagOf(setting),
+                                                  " has no meaning with --from-mesh, which traces "
+                                                  "no photons; leave it away"));
+  }
+  if (!request.reference.empty() || request.resumes) {
+    return Failure(ExitCode::kUsage, absl::StrCat(request.resumes ? "--resume" : "--reference",
+                                                  " has no meaning with --from-mesh; leave it "
+                                                  "away, and compare with lucerna diff"));
+  }
+  return absl::OkStatus();
+}
+
+Status DrawMesh(const RenderRequest& request, int threads, const OutputOptions& output_options) {
+  LUCERNA_RETURN_IF_ERROR(CheckRequestOfMesh(request));
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadFile(request.mesh));
+  LUCERNA_ASSIGN_OR_RETURN(const BakedMesh mesh, ReadMeshGlb(request.mesh, bytes));
+  Scene scene;
+  LUCERNA_ASSIGN_OR_RETURN(
+      const SceneOfJobs read,
+      ReadSceneOfJobs(request.scene, {&request.overrides, 1}, output_options.quiet, &scene));
+  LUCERNA_ASSIGN_OR_RETURN(MeshRender render,
+                           RenderFromMesh(scene, read.settings.front(), mesh, threads));
+  render.image.metadata["lucerna.scene_digest"] = read.manifest.SceneDigest().Hex();
+  render.image.metadata["lucerna.mesh_digest"] = Sha256(bytes).Hex();
+  LUCERNA_ASSIGN_OR_RETURN(const std::string exr, EncodeExr(render.image));
+  LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved, WriteOutputs(render.image, exr, request.outputs,
+                                                                output_options.display));
+  if (render.share_unknown > 0 && !output_options.quiet) {
+    std::fprintf(stderr,
+                 "lucerna: warning: for %.2g %% of what is seen the mesh has no light, which is "
+                 "black; bake all surfaces, with --sides both where both are seen\n",
+                 100 * render.share_unknown);
+  }
+  if (output_options.json) {
+    Print(MeshRenderReport(read.settings.front().passes, render.share_unknown, saved));
+  } else if (!output_options.quiet) {
+    Print(absl::StrCat(read.settings.front().passes,
+                       " passes without photons: ", absl::StrJoin(saved.paths, ", "), "\n"));
+  }
+  return absl::OkStatus();
+}
+
 Status RenderOne(const RenderRequest& request, const ClusterOptions& cluster_options,
                  const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
+  if (!request.mesh.empty()) return DrawMesh(request, cluster_options.threads, output_options);
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene, request.overrides, output_options.quiet));
   ClusterOptions options = cluster_options;

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "client/image_output.h"
 #include "client/local_cluster.h"
 #include "client/output_options.h"
 #include "client/scene_reading.h"
@@ -17,19 +18,11 @@
 
 namespace lucerna {
 
-// Where an image goes; empty: not there.
-struct OutputPaths {
-  std::string image;      // .exr, .png, .pfm or .hdr
-  std::string png;        // a PNG file beside it
-  bool replaces = false;  // files that this program has not written too
-
-  [[nodiscard]] bool empty() const { return image.empty() && png.empty(); }
-};
-
 struct RenderRequest {
   SceneSource scene;
   RenderOverrides overrides;
   std::string reference;  // EXR file to measure the true error by; empty: none
+  std::string mesh;       // of `render`: .glb file whose light is drawn; empty: photons bring it
   OutputPaths outputs;
   // The image so far is written so often [s]; 0: at the end alone.
   double save_every_s = 0;
@@ -46,9 +39,9 @@ struct RenderRequest {
     const RenderRequest& request, const std::vector<std::string>& scenes, std::string_view frames,
     bool names_images);
 
-// Renders on a coordinator and workers of its own, one after the other. An interruption writes the
-// image so far and leaves the checkpoints. Of several that go on after one, those whose image is
-// there without checkpoints are done.
+// Renders on a coordinator and workers of its own, or draws the light of a mesh in this process,
+// one after the other. An interruption writes the image so far and leaves the checkpoints. Of
+// several that go on after one, those whose image is there without checkpoints are done.
 [[nodiscard]] Status Render(const std::vector<RenderRequest>& requests,
                             const ClusterOptions& cluster, const OutputOptions& output_options);
 

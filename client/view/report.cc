@@ -373,6 +373,12 @@ std::string SavedReport(const std::string& job_id, const SavedImage& saved) {
   return ToText(json);
 }
 
+std::string MeshRenderReport(std::int64_t passes, double share_unknown, const SavedImage& saved) {
+  Json json = {{"passes", passes}, {"share_unknown", share_unknown}};
+  AddSaved(json, saved);
+  return ToText(json);
+}
+
 std::string SubmittedReport(const v1::SubmitResponse& submitted) {
   Json json = {{"job_id", submitted.job_id()}, {"warnings", Json::array()}};
   for (const std::string& warning : submitted.warnings())
@@ -478,15 +484,17 @@ std::string ReferenceReport(const Image& reference, const std::string& path) {
 }
 
 std::string BakeReport(const std::vector<BakeRound>& rounds,
-                       const std::vector<SurfaceFigures>& figures, double interpolation_error,
-                       const std::string& path) {
+                       const std::vector<SurfaceFigures>& figures,
+                       const std::optional<double>& interpolation_error, const std::string& path) {
   Json json;
   json["rounds"] = Json::array();
   for (const BakeRound& round : rounds) {
     Json item = {{"points", round.points},
                  {"job_id", round.job.job_id()},
                  {"passes", round.job.progress().passes()},
-                 {"photons", round.job.progress().photons()}};
+                 {"photons", round.job.progress().photons()},
+                 {"cpu_s", Seconds(FromProto(round.job.progress().coordinator_cpu())) +
+                               Seconds(FromProto(round.job.progress().worker_cpu()))}};
     if (const auto error = NewestError(round.job)) {
       item["relative_error"] = {
           {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
@@ -504,11 +512,12 @@ std::string BakeReport(const std::vector<BakeRound>& rounds,
                                 {"min_lx", of.lowest * kLumensPerWatt},
                                 {"mean_lx", of.mean * kLumensPerWatt},
                                 {"max_lx", of.highest * kLumensPerWatt},
-                                {"uniformity", of.uniformity()}});
+                                {"uniformity", of.uniformity()},
+                                {"min_over_max", of.diversity()}});
   }
   if (json["rounds"].front().contains("relative_error"))
     json["relative_error"] = json["rounds"].front()["relative_error"];
-  json["interpolation_error"] = interpolation_error;
+  if (interpolation_error) json["interpolation_error"] = *interpolation_error;
   json["path"] = path;
   return ToText(json);
 }

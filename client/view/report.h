@@ -4,6 +4,8 @@
 // their units; absent values are left out.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,9 @@ struct SavedImage {
 [[nodiscard]] std::string ConvergenceCsv(const v1::Job& job);
 [[nodiscard]] std::string JobsReport(const std::vector<v1::Job>& jobs);
 [[nodiscard]] std::string SavedReport(const std::string& job_id, const SavedImage& saved);
+// Of an image without photons: MeshRender::share_unknown.
+[[nodiscard]] std::string MeshRenderReport(std::int64_t passes, double share_unknown,
+                                           const SavedImage& saved);
 [[nodiscard]] std::string SubmittedReport(const v1::SubmitResponse& submitted);
 [[nodiscard]] std::string SceneReport(const std::vector<Diagnostic>& diagnostics, bool is_ok);
 [[nodiscard]] std::string MetricsReport(const ImageMetrics& metrics);
@@ -50,12 +55,13 @@ struct BakeRound {
   std::size_t points = 0;
   v1::Job job;
 };
-// What was measured, and of the mesh: figures of its surfaces, SurfaceMesh::InterpolationError, and
-// the error that the first round estimated at its points, which are spread evenly. Requires a
-// round.
+// What was measured, and of the mesh: figures of its surfaces, SurfaceMesh::InterpolationError
+// where there is one, and the error that the first round estimated at its points, which are spread
+// evenly. Requires a round.
 [[nodiscard]] std::string BakeReport(const std::vector<BakeRound>& rounds,
                                      const std::vector<SurfaceFigures>& figures,
-                                     double interpolation_error, const std::string& path);
+                                     const std::optional<double>& interpolation_error,
+                                     const std::string& path);
 [[nodiscard]] std::string PhotonReport(const v1::PhotonPath& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
 [[nodiscard]] std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost,

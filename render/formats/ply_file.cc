@@ -419,6 +419,27 @@ Status ReadFaces(Body& body, Format format, const Element& element, TriangleMesh
   return absl::OkStatus();
 }
 
+Status ReadBuckets(Body& body, Format format, const Element& element,
+                   std::vector<SensorBucket>& buckets) {
+  constexpr std::array<std::string_view, 13> kColumns = {"ax", "ay", "az", "bx", "by", "bz", "cx",
+                                                         "cy", "cz", "ox", "oy", "oz", "r"};
+  Rows rows(body, format, element, kColumns);
+  if (!rows.Has({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12})) {
+    return Bad("its buckets have no ax, ay, az, bx, by, bz, cx, cy, cz, ox, oy, oz and r");
+  }
+  buckets.resize(element.count);
+  for (std::uint64_t i = 0; i < element.count; ++i) {
+    LUCERNA_RETURN_IF_ERROR(rows.Next(i));
+    SensorBucket& bucket = buckets[i];
+    bucket = {{rows.VectorAt(0), rows.VectorAt(3), rows.VectorAt(6)}, rows.VectorAt(9), rows[12]};
+    const bool is_finite =
+        std::ranges::all_of(bucket.corners, [](Vec3 corner) { return IsFinite(corner); }) &&
+        IsFinite(bucket.ball_center) && std::isfinite(bucket.ball_radius);
+    if (!is_finite) return Bad(Concat("bucket ", i, " is not finite"));
+  }
+  return absl::OkStatus();
+}
+
 Status SkipElement(Body& body, Format format, const Element& element) {
   if (element.properties.empty()) return absl::OkStatus();
   if (format != Format::kAscii && !element.has_list()) {
@@ -497,6 +518,7 @@ StatusOr<PlyPoints> ParsePlyPoints(std::string_view bytes) {
   PlyPoints points;
   bool has_vertices = false;
   bool has_segments = false;
+  bool has_buckets = false;
   for (const Element& element : header.elements) {
     if (element.count > 0xFFFFFFFFU) {
       return Bad(Concat("it has more than 2^32 times ", element.name));
@@ -513,6 +535,9 @@ StatusOr<PlyPoints> ParsePlyPoints(std::string_view bytes) {
     } else if (element.name == "segment") {
       if (std::exchange(has_segments, true)) return Bad("it has two elements segment");
       LUCERNA_RETURN_IF_ERROR(ReadSegments(body, header.format, element, points.segments));
+    } else if (element.name == "bucket") {
+      if (std::exchange(has_buckets, true)) return Bad("it has two elements bucket");
+      LUCERNA_RETURN_IF_ERROR(ReadBuckets(body, header.format, element, points.buckets));
     } else {
       LUCERNA_RETURN_IF_ERROR(SkipElement(body, header.format, element));
     }

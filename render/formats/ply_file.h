@@ -31,7 +31,10 @@ struct PlyPoints {
   std::vector<Vec3> normals;    // [positions], as the file has them
   std::vector<float> spacings;  // [positions] or empty: the property `spacing`, as the file has it
   std::vector<std::array<Vec3, 2>> segments;  // the element `segment`: ax ay az bx by bz, finite
-  std::vector<std::string> comments;          // without the word "comment"
+  // The element `bucket`, finite: corners ax ay az bx by bz cx cy cz, and the ball that they lie
+  // on, ox oy oz r.
+  std::vector<SensorBucket> buckets;
+  std::vector<std::string> comments;  // without the word "comment"
 };
 
 // Errors: those of ParsePly but for faces, which are skipped, and INVALID_ARGUMENT without normals.

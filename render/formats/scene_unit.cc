@@ -38,6 +38,12 @@ double FarthestOf(const Scene& scene) {
                            static_cast<double>(MaxAbs(portal.along_y))});
     }
   }
+  for (const SensorBucket& bucket : scene.sensor_buckets) {
+    for (const Vec3 corner : bucket.corners)
+      farthest = std::max(farthest, static_cast<double>(MaxAbs(corner)));
+    farthest = std::max({farthest, static_cast<double>(MaxAbs(bucket.ball_center)),
+                         std::abs(static_cast<double>(bucket.ball_radius))});
+  }
   ForEachDeltaList(scene, [&](const auto& lights) {
     for (const auto& light : lights) {
       if (!light.kIsAtInfinity)
@@ -109,6 +115,12 @@ Status ChooseUnit(Scene& scene) {
     sensor.position = ScaledBy(sensor.position, factor);
     // Above 0 however small it is beside the scene.
     sensor.spacing = std::max(ScaledBy(sensor.spacing, factor), FLT_MIN);
+  }
+  for (SensorBucket& bucket : scene.sensor_buckets) {
+    for (Vec3& corner : bucket.corners)
+      corner = ScaledBy(corner, factor);
+    bucket.ball_center = ScaledBy(bucket.ball_center, factor);
+    bucket.ball_radius = ScaledBy(bucket.ball_radius, factor);
   }
   for (auto& border : scene.sensor_borders) {
     for (Vec3& end : border)

@@ -112,6 +112,16 @@ struct Sensor {
   bool operator==(const Sensor&) const = default;
 };
 
+// The part of a surface over which a sensor's direct light is averaged: a triangle, or what lies
+// over it on a ball.
+struct SensorBucket {
+  std::array<Vec3, 3> corners;
+  Vec3 ball_center;       // of a ball
+  float ball_radius = 0;  // 0: flat
+
+  bool operator==(const SensorBucket&) const = default;
+};
+
 // The window on the plane z = 1 in camera space that an image of `width` x `height` pixels shows
 // as a whole (a crop window shows a part of it); of an orthographic camera on any plane.
 // Meaningless for cameras that look everywhere.
@@ -187,7 +197,8 @@ struct Scene {
 #undef LUCERNA_MEMBER
   std::vector<InfiniteLight> infinite_lights;
   Camera camera;
-  std::vector<Sensor> sensors;  // not empty when the camera is none but these
+  std::vector<Sensor> sensors;               // not empty when the camera is none but these
+  std::vector<SensorBucket> sensor_buckets;  // [sensors], or empty: direct light is that at points
   // Borders at which discs are cut besides the edges of surfaces: those of a histogram's buckets.
   std::vector<std::array<Vec3, 2>> sensor_borders;
   FilmSettings film;

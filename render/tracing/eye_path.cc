@@ -91,13 +91,37 @@ Vec3 SphericalDirection(Camera::Kind kind, double x, double y) {
   return {z_up.x, z_up.z, z_up.y};
 }
 
+// Samples of direct light in a bucket, in each pass: a bright spot may fill a small part of a large
+// bucket, and where there are many buckets each is small.
+int BucketSamples(std::size_t buckets) {
+  constexpr std::size_t kMostInAll = std::size_t{1} << 19;
+  constexpr std::size_t kMost = 16;
+  return static_cast<int>(std::clamp(kMostInAll / buckets, std::size_t{1}, kMost));
+}
+
+// A point of a bucket, from two numbers in [0, 1): uniform in its triangle, on a ball uniform in
+// the triangle under it.
+Sensor PointOf(const SensorBucket& bucket, const Sensor& sensor, float u, float v) {
+  const float root = std::sqrt(u);
+  const auto& [a, b, c] = bucket.corners;
+  Sensor at = sensor;
+  at.position = a * (1 - root) + b * (root * (1 - v)) + c * (root * v);
+  if (bucket.ball_radius > 0) {
+    const Vec3 out = Normalize(at.position - bucket.ball_center);
+    at.position = bucket.ball_center + out * bucket.ball_radius;
+    at.normal = Dot(out, sensor.normal) < 0 ? -out : out;
+  }
+  return at;
+}
+
 }  // namespace
 
 EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
                              const SceneNeeds& needs, const Intersector& intersector,
-                             const LightSet& lights)
+                             const LightSet& lights, DirectLight direct_light)
     : scene_(scene),
       settings_(settings),
+      direct_light_(direct_light),
       eye_sets_(needs.eye_sample_sets()),
       parts_(WalkPartsFor(needs)),
       properties_(PropertiesOf(scene.materials)),
@@ -435,32 +459,43 @@ EyePath EyePathTracer::AtSensor(std::size_t number, const PixelSampler& sampler)
   // The last row may be longer than there are sensors.
   if (number >= scene_.sensors.size()) return path;
   const Sensor& sensor = scene_.sensors[number];
-  SurfacePoint surface;
-  surface.position = sensor.position;
-  surface.geometric_normal = sensor.normal;
-  surface.shading_normal = sensor.normal;
-  // The surface under it is not known: as far off as for one that is as large as the scene.
-  surface.clearance = kClearance * (MaxAbs(sensor.position) + intersector_.bounds().Diagonal());
   static const Material white = [] {
     Material material;
     material.reflectance = Gray(1);
     return material;
   }();
-  const Frame frame = ShadingFrame(surface);
   constexpr Vec3 kUp = {0, 0, 1};
-  const std::int32_t medium =
-      parts_.media ? media_.AtLight(LeavingPoint(surface, sensor.normal), scene_.camera.medium)
-                   : kNoMedium;
-  path.features = {white.reflectance, sensor.normal, 0};
-  if (parts_.lights) {
-    const SobolPoint u = sampler.ForVertex(0);
-    const ShadingPoint point = {
-        surface, white, frame, sensor.normal, parts_.media ? &media_ : nullptr, medium};
-    path.direct += LightSampledRadiance(intersector_, lights_, point, u, path.rays);
+  const auto direct_at = [&](const Sensor& at, const SobolPoint& u) {
+    SurfacePoint surface;
+    surface.position = at.position;
+    surface.geometric_normal = at.normal;
+    surface.shading_normal = at.normal;
+    // The surface under it is not known: as far off as for one that is as large as the scene.
+    surface.clearance = kClearance * (MaxAbs(at.position) + intersector_.bounds().Diagonal());
+    const Frame frame = ShadingFrame(surface);
+    const std::int32_t medium =
+        parts_.media ? media_.AtLight(LeavingPoint(surface, at.normal), scene_.camera.medium)
+                     : kNoMedium;
+    const ShadingPoint point = {surface, white, frame, at.normal, parts_.media ? &media_ : nullptr,
+                                medium};
+    Rgb direct = LightSampledRadiance(intersector_, lights_, point, u, path.rays);
     BsdfSample sample;
     if (rays_find_lights_ && SampleDiffuse(white, kUp, u[1], u[2], sample)) {
-      path.direct += ScatteredDirect(surface, frame.ToWorld(sample.wi), sample.pdf, medium,
-                                     sample.weight, path.rays);
+      direct += ScatteredDirect(surface, frame.ToWorld(sample.wi), sample.pdf, medium,
+                                sample.weight, path.rays);
+    }
+    return direct;
+  };
+  path.features = {white.reflectance, sensor.normal, 0};
+  if (parts_.lights && scene_.sensor_buckets.empty()) {
+    path.direct += direct_at(sensor, sampler.ForVertex(0));
+  } else if (parts_.lights) {
+    const int count = BucketSamples(scene_.sensor_buckets.size());
+    for (int i = 0; i < count; ++i) {
+      // A sensor sees no bright lights, for which these numbers are elsewhere.
+      const SobolPoint u = sampler.ForBright(i, count).camera;
+      path.direct += direct_at(PointOf(scene_.sensor_buckets[number], sensor, u[0], u[6]), u) *
+                     (1.0F / static_cast<float>(count));
     }
   }
   path.hitpoint.position = sensor.position;
@@ -601,7 +636,9 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       }
       emission_was_collected = true;
     }
-    if (parts_.lights && !(parts_.lobes && whole_properties.is_smooth)) {
+    const bool is_lit_otherwise =
+        direct_light_ == DirectLight::kWherePathsGoOn && whole_properties.gathers;
+    if (parts_.lights && !is_lit_otherwise && !(parts_.lobes && whole_properties.is_smooth)) {
       const ShadingPoint point = {
           surface, whole, frame, wo, parts_.media ? &media_ : nullptr, medium, share_of_first};
       path.direct += weight * LightSampledRadiance(intersector_, lights_, point, u, path.rays);
@@ -657,7 +694,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       return hitpoint;
     };
     if (properties.gathers) {
-      if (parts_.lights && scattered && rays_find_lights_) {
+      if (parts_.lights && !is_lit_otherwise && scattered && rays_find_lights_) {
         path.direct += ScatteredDirect(surface, wi, share * sample.pdf, medium_after,
                                        weight * sample.weight, path.rays);
       }
@@ -687,7 +724,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
 
     if (!scattered) return finish();
     weight *= sample.weight;
-    scatter_pdf = sample.is_delta ? 0 : share * sample.pdf;
+    scatter_pdf = sample.is_delta || is_lit_otherwise ? 0 : share * sample.pdf;
     scatter_position = surface.position;
     const float strength = MaxChannel(weight);
     if (!(strength > 0)) return finish();

@@ -67,9 +67,15 @@ struct EyePath {
 
 class EyePathTracer {
  public:
+  // Where lights are sampled.
+  enum class DirectLight : std::uint8_t {
+    kEverywhere,
+    kWherePathsGoOn,  // not where photons are gathered: something else knows all light there
+  };
   // Keeps references to all.
   EyePathTracer(const Scene& scene, const RenderSettings& settings, const SceneNeeds& needs,
-                const Intersector& intersector, const LightSet& lights);
+                const Intersector& intersector, const LightSet& lights,
+                DirectLight direct_light = DirectLight::kEverywhere);
 
   // What is known of the first thing that an eye path meets.
   struct First {
@@ -204,6 +210,7 @@ class EyePathTracer {
 
   const Scene& scene_;
   const RenderSettings& settings_;
+  const DirectLight direct_light_;
   const int eye_sets_;  // see EyeSetOf
   const WalkParts parts_;
   const std::vector<MaterialProperties> properties_;  // [materials]

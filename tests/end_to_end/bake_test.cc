@@ -1,7 +1,9 @@
 // `lucerna bake` leaves the mesh that it promises, with the same bytes whoever traces the photons.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -13,6 +15,8 @@
 
 #include "render/base/files.h"
 #include "render/formats/ply_file.h"
+#include "render/image/exr_file.h"
+#include "render/image/image.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 
@@ -22,6 +26,7 @@ namespace {
 using nlohmann::json;
 using std::chrono::seconds;
 using testing::HasSubstr;
+using testing::Not;
 
 const std::string kBin = LUCERNA_BIN_DIR;
 
@@ -49,8 +54,13 @@ class BakeTest : public testing::Test {
   [[nodiscard]] std::vector<std::string> Command(const std::string& out,
                                                  const std::vector<std::string>& more) const {
     std::vector<std::string> words = {
-        kBin + "/lucerna", "bake", Path("scene.pbrt"), "-o", Path(out), "--passes", "4",
-        "--spacing",       "0.02", "--seed",           "7"};
+        kBin + "/lucerna", "bake", Path("scene.pbrt"), "-o", Path(out), "--seed", "7"};
+    // Flags are given once.
+    const auto add_unless_given = [&](const std::string& flag, const std::string& value) {
+      if (std::ranges::count(more, flag) == 0) words.insert(words.end(), {flag, value});
+    };
+    add_unless_given("--passes", "4");
+    add_unless_given("--spacing", "0.02");
     words.insert(words.end(), more.begin(), more.end());
     return words;
   }
@@ -87,6 +97,27 @@ TEST_F(BakeTest, HasTheSameBytesWhoeverTraces) {
   EXPECT_TRUE(ReadFile(Path("4.ply")).value_or("") == alone);
 }
 
+TEST_F(BakeTest, GoesOnAfterItWasKilled) {
+  const std::string alone = Bake("alone.ply");
+  ChildProcess killed(Command("out.ply", {}));
+  ASSERT_TRUE(killed.WaitForText("round 2", seconds(120))) << killed.Errors();
+  killed.Signal(SIGKILL);
+  killed.WaitForExit(seconds(60));
+  EXPECT_FALSE(ReadFile(Path("out.ply")).ok());
+  std::string jobs;
+  for (const auto& entry : std::filesystem::directory_iterator(Path("out.ply.rounds"))) {
+    if (entry.path().extension() == ".job") jobs += ReadFile(entry.path().string()).value_or("");
+  }
+  const Finished run = RunProgram(Command("out.ply", {"--resume", "--json"}), seconds(300));
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  EXPECT_TRUE(ReadFile(Path("out.ply")).value_or("") == alone);
+  // The first round was not measured again, the last one was.
+  const json rounds = json::parse(run.output)["rounds"];
+  EXPECT_THAT(jobs, HasSubstr(rounds.front()["job_id"].get<std::string>()));
+  EXPECT_THAT(jobs, Not(HasSubstr(rounds.back()["job_id"].get<std::string>())));
+  EXPECT_FALSE(std::filesystem::exists(Path("out.ply.rounds")));
+}
+
 TEST_F(BakeTest, PrintsTheFiguresOfSurfaces) {
   const Finished run = RunProgram(Command("out.glb", {"--json", "--max-depth", "1"}), seconds(300));
   ASSERT_EQ(run.exit_code, 0) << run.errors;
@@ -120,12 +151,158 @@ TEST_F(BakeTest, LeavesOutDirectLightWhenTold) {
   EXPECT_LT(indirect, 0.1 * all);
 }
 
+// What a render of the scene sees, with or without photons.
+class FromMeshTest : public BakeTest {
+ protected:
+  FromMeshTest() {
+    // The camera sees the floor, some of it through the glass ball, and no other side.
+    const Finished run =
+        RunProgram({kBin + "/lucerna", "render", Path("scene.pbrt"), "-o", Path("photons.exr"),
+                    "--size", "64x64", "--passes", "64", "--photons-per-pass", "65536", "--quiet"},
+                   seconds(300));
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+  }
+  [[nodiscard]] Finished Draw(const std::string& mesh, const std::string& out,
+                              const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> words = {
+        kBin + "/lucerna", "render", Path("scene.pbrt"), "--from-mesh", Path(mesh), "-o", Path(out),
+        "--size",          "64x64",  "--passes",         "16",          "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    return RunProgram(words, seconds(300));
+  }
+  // Means of the luminance over blocks of 8 x 8 pixels.
+  [[nodiscard]] std::vector<double> BlocksOf(const std::string& name) const {
+    const Image image = DecodeExr(ReadFile(Path(name)).value_or("")).value();
+    std::vector<double> blocks(64);
+    for (std::size_t i = 0; i < 64 * 64; ++i)
+      blocks[i / 512 * 8 + i % 64 / 8] += static_cast<double>(image.Find("G")->pixels[i]) / 64;
+    return blocks;
+  }
+  [[nodiscard]] static double MeanOf(const std::vector<double>& values) {
+    double sum = 0;
+    for (const double value : values)
+      sum += value / static_cast<double>(values.size());
+    return sum;
+  }
+};
+
+TEST_F(FromMeshTest, DrawsWhatPhotonsWouldShow) {
+  const std::vector<double> truth = BlocksOf("photons.exr");
+  const double mean = MeanOf(truth);
+  ASSERT_GT(mean, 0);
+  for (const std::vector<std::string>& flags :
+       std::vector<std::vector<std::string>>{{},
+                                             {"--indirect-only"},
+                                             {"--elements", "quadratic"},
+                                             {"--spacing", "0.05", "--estimator", "histogram"}}) {
+    std::vector<std::string> more = {"--passes", "16", "--photons-per-pass", "65536"};
+    more.insert(more.end(), flags.begin(), flags.end());
+    (void)Bake("mesh.glb", more);
+    const Finished run = Draw("mesh.glb", "drawn.exr");
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    EXPECT_EQ(json::parse(run.output)["share_unknown"], 0);
+    const std::vector<double> drawn = BlocksOf("drawn.exr");
+    const std::string what = flags.empty() ? "linear" : flags.back();
+    EXPECT_NEAR(MeanOf(drawn), mean, 0.02 * mean) << what;
+    // The tolerance of the mesh, and a block at the caustic's rim may differ by its width.
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      EXPECT_NEAR(drawn[i], truth[i], 0.1 * std::max(truth[i], mean)) << what << ", block " << i;
+    }
+  }
+}
+
+TEST_F(FromMeshTest, TakesReflectanceFromTheScene) {
+  (void)Bake("mesh.glb");
+  ASSERT_EQ(Draw("mesh.glb", "grey.exr").exit_code, 0);
+  std::string scene = kScene;
+  scene.replace(scene.find("[.5 .5 .5]"), 10, "[.1 .2 .1]");
+  std::ofstream(Path("scene.pbrt")) << scene;
+  ASSERT_EQ(Draw("mesh.glb", "painted.exr").exit_code, 0);
+  const std::vector<double> grey = BlocksOf("grey.exr");
+  const std::vector<double> painted = BlocksOf("painted.exr");
+  for (std::size_t i = 0; i < grey.size(); ++i)
+    EXPECT_NEAR(painted[i], 0.4 * grey[i], 1e-4 * grey[i]);
+  // The same image on any number of threads.
+  ASSERT_EQ(Draw("mesh.glb", "again.exr", {"--threads", "3"}).exit_code, 0);
+  EXPECT_TRUE(ReadFile(Path("again.exr")).value_or("1") ==
+              ReadFile(Path("painted.exr")).value_or("2"));
+}
+
+TEST_F(FromMeshTest, SaysWhatToMend) {
+  (void)Bake("mesh.glb");
+  const Finished photons = Draw("mesh.glb", "out.exr", {"--photons", "1k"});
+  EXPECT_EQ(photons.exit_code, 2);
+  EXPECT_THAT(photons.errors, HasSubstr("--photons has no meaning with --from-mesh"));
+  EXPECT_EQ(Draw("mesh.glb", "out.exr", {"--reference", "x.exr"}).exit_code, 2);
+  EXPECT_THAT(Draw("none.glb", "out.exr").errors, HasSubstr("none.glb"));
+  const Finished other = Draw("photons.exr", "out.exr");
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_FALSE(ReadFile(Path("out.exr")).ok());
+}
+
+TEST_F(BakeTest, LightMapsHoldTheSameLight) {
+  const Finished run =
+      RunProgram(Command("out.exr", {"--json", "--max-depth", "1", "--uv-mesh", Path("uv.glb")}),
+                 seconds(300));
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const json report = json::parse(run.output);
+  const json& floor = report["surfaces"][0];
+  EXPECT_NEAR(floor["area_m2"].get<double>(), 16, 1e-4);
+  EXPECT_NEAR(floor["max_w_m2"].get<double>(), 10.0 / 4, 1e-3);
+  const Image image = DecodeExr(ReadFile(Path("out.exr")).value_or("")).value();
+  // The floor is 200 texels wide.
+  double area = 0;
+  for (std::size_t i = 0; i < image.Find("R")->pixels.size(); ++i) {
+    if (image.Find("inside")->pixels[i] == 0) continue;
+    area += 0.02 * 0.02;
+    const auto at = [&](const char* name) {
+      return static_cast<double>(image.Find(name)->pixels[i]);
+    };
+    const double x = at("P.X");
+    const double y = at("P.Y");
+    EXPECT_EQ(at("N.Z"), 1);
+    // But for the shadow of the ball.
+    if (x > 0 && y > 0) continue;
+    const double expected = 10 * 2 / std::pow(x * x + y * y + 4, 1.5);
+    ASSERT_NEAR(at("R"), expected, 1e-3 * expected) << x << " " << y;
+  }
+  EXPECT_NEAR(area, 16, 0.05);
+  const Finished valid = RunProgram({kBin + "/lucerna", "validate", Path("uv.glb")}, seconds(60));
+  EXPECT_EQ(valid.exit_code, 0) << valid.errors;
+  EXPECT_EQ(RunProgram(Command("out.exr", {"--estimator", "histogram"}), seconds(60)).exit_code, 2);
+  EXPECT_EQ(RunProgram(Command("out.glb", {"--uv-mesh", "x.glb"}), seconds(60)).exit_code, 2);
+}
+
+TEST_F(BakeTest, FindsASpotWithinAFaceOfTheFirstMesh) {
+  // A narrow cone of light: 0.3 wide on the floor, within a face with edges of 4.
+  std::ofstream(Path("cone.pbrt")) << R"(
+LookAt 2 2 2  0 0 0  0 0 1
+Camera "perspective"
+WorldBegin
+LightSource "spot" "rgb I" [10 10 10] "point3 from" [1.1 -.47 3] "point3 to" [1.1 -.47 0]
+  "float coneangle" 3 "float conedeltaangle" 0.1
+LightSource "point" "rgb I" [.01 .01 .01] "point3 from" [0 0 3]
+Material "diffuse" "rgb reflectance" [.5 .5 .5]
+Shape "trianglemesh" "integer indices" [0 1 2 0 2 3] "point3 P" [-2 -2 0 2 -2 0 2 2 0 -2 2 0]
+)";
+  const Finished run =
+      RunProgram({kBin + "/lucerna", "bake", Path("cone.pbrt"), "-o", Path("cone.ply"), "--passes",
+                  "4", "--spacing", ".25", "--sides", "front", "--max-depth", "1", "--json"},
+                 seconds(300));
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  // 10 / 3^2 in the middle of the spot, and 0.0011 of the other light.
+  const json floor = json::parse(run.output)["surfaces"][0];
+  EXPECT_GT(floor["max_w_m2"].get<double>(), 1.0);
+}
+
 TEST_F(BakeTest, SaysWhatToMend) {
   const auto run = [&](const std::string& out, const std::vector<std::string>& more) {
     return RunProgram(Command(out, more), seconds(60));
   };
   EXPECT_EQ(run("out.obj", {}).exit_code, 2);
   EXPECT_THAT(run("out.obj", {}).errors, HasSubstr(".ply or .glb"));
+  EXPECT_EQ(run("out.glb", {"--elements", "cubic"}).exit_code, 2);
+  EXPECT_EQ(run("out.glb", {"--elements", "quadratic", "--estimator", "histogram"}).exit_code, 2);
   EXPECT_EQ(run("out.glb", {"--ascii"}).exit_code, 2);
   EXPECT_EQ(run("out.ply", {"--size", "8x8"}).exit_code, 2);
   EXPECT_EQ(run("out.ply", {"--spacing", "-1"}).exit_code, 2);

@@ -177,6 +177,15 @@ namespace lucerna {
     if (!IsFinite(sensor.position) || !is_unit(sensor.normal) || !(sensor.spacing > 0))
       return "a sensor";
   }
+  const std::size_t buckets = scene.sensor_buckets.size();
+  if (buckets != 0 && buckets != scene.sensors.size()) return "how many buckets there are";
+  for (const SensorBucket& bucket : scene.sensor_buckets) {
+    const auto& [a, b, c] = bucket.corners;
+    if (!IsFinite(a) || !IsFinite(b) || !IsFinite(c) || !IsFinite(bucket.ball_center) ||
+        !std::isfinite(bucket.ball_radius)) {
+      return "a bucket of sensors";
+    }
+  }
   for (const auto& [a, b] : scene.sensor_borders) {
     if (!IsFinite(a) || !IsFinite(b)) return "a border of sensors";
   }

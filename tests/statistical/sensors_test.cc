@@ -23,7 +23,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr int kParts = 16;
-constexpr int kComparisons = 80;
+constexpr int kComparisons = 82;
 
 void SetSensors(Scene& scene, std::vector<Sensor> sensors, double spacing) {
   scene.camera = Camera();
@@ -251,6 +251,65 @@ TEST(SensorsTest, DoesNotPassAThinWall) {
 
 // A point light within glass of an index of nearly 1: photons carry all its light. Each triangle of
 // the floor is a bucket.
+// The mean over a triangle, by the middles of small ones. `value_at`: of the shares of its corners.
+template <typename Value>
+double MeanOverTriangle(const Value& value_at) {
+  constexpr int kFine = 400;
+  double sum = 0;
+  double count = 0;
+  for (int i = 0; i < kFine; ++i) {
+    for (int j = 0; j < kFine - i; ++j) {
+      for (const double inside : {1.0 / 3, 2.0 / 3}) {
+        // The second of two small triangles is not there at the slanted side.
+        if (inside > 0.5 && i + j == kFine - 1) continue;
+        const double u = (i + inside) / kFine;
+        const double v = (j + inside) / kFine;
+        sum += value_at(1 - u - v, u, v);
+        ++count;
+      }
+    }
+  }
+  return sum / count;
+}
+
+TEST(SensorsTest, DirectLightOfABucketIsTheMeanOverIt) {
+  // A light close above one corner; a screen hides a part of the triangle from it.
+  Scene scene = Floor({{4.0F / 3, 4.0F / 3, 0}});
+  scene.sensor_buckets = {{{Vec3{0, 0, 0}, Vec3{4, 0, 0}, Vec3{0, 4, 0}}, {}, 0}};
+  AddQuad(scene, {2, -4, 0}, {0, 8, 0}, {0, 0, 8}, 0);
+  PointLight light;
+  light.position = {0.5F, 0.5F, 1};
+  light.intensity = Gray(1);
+  scene.point_lights.push_back(light);
+  const double expected = MeanOverTriangle([](double /*at_a*/, double at_b, double at_c) {
+    const double dx = 4 * at_b - 0.5;
+    const double dy = 4 * at_c - 0.5;
+    return 4 * at_b < 2 ? 1 / std::pow(dx * dx + dy * dy + 1, 1.5) : 0;
+  });
+  ExpectIrradiance(scene, SettingsOfSensors(scene), 256, {expected}, 1e-3);
+  // That of the middle alone is another.
+  EXPECT_GT(std::abs(1 / std::pow(2 * 25.0 / 36 + 1, 1.5) - expected), 0.1 * expected);
+}
+
+TEST(SensorsTest, DirectLightOfABucketOnABallIsThatOfTheBall) {
+  Scene scene;
+  AddMaterial(scene, DiffuseMaterial(0.5F));
+  AddSphere(scene, {1, 2, 3}, 0.5F, 0);
+  DistantLight sun;
+  sun.direction = {0, 0, -1};
+  sun.irradiance = Gray(4);
+  scene.distant_lights.push_back(sun);
+  const Vec3 middle = Normalize(Vec3{1, 1, 1});
+  SetSensors(scene, {{Vec3{1, 2, 3} + middle * 0.5F, middle, 0}}, 0.05);
+  scene.sensor_buckets = {
+      {{Vec3{1.5F, 2, 3}, Vec3{1, 2.5F, 3}, Vec3{1, 2, 3.5F}}, {1, 2, 3}, 0.5F}};
+  // Of the points over a triangle, the cosine towards the sun; inside of the ball it would be dark.
+  const double expected = MeanOverTriangle([](double at_a, double at_b, double at_c) {
+    return 4 * at_c / std::sqrt(at_a * at_a + at_b * at_b + at_c * at_c);
+  });
+  ExpectIrradiance(scene, SettingsOfSensors(scene), 256, {expected}, 1e-3);
+}
+
 TEST(SensorsTest, BucketsHoldThePhotonsOfTheirTriangles) {
   constexpr int kSide = 4;       // squares along a side of the floor
   constexpr double kHeight = 3;  // of the light

@@ -65,17 +65,25 @@ TEST(SensorsReaderTest, WhatIsWrittenIsRead) {
   const std::vector<Sensor> sensors = {
       {{1, 2, 3}, {0, 0, 1}, 0.5F}, {{4, 5, 6}, {0.6F, 0.8F, 0}, 2}, {{7, 8, 9}, {-1, 0, 0}, 1}};
   const std::vector<std::array<Vec3, 2>> borders = {{Vec3{0, 1, 2}, Vec3{3, 4, 5}}};
-  const ParsedScene parsed = Read(SensorsFile("scene.pbrt", sensors, borders));
+  const std::vector<SensorBucket> buckets = {
+      {{Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{0, 1, 0}}, {}, 0},
+      {{Vec3{0, 0, 1}, Vec3{1, 0, 1}, Vec3{0, 1, 1}}, {1, 2, 3}, 4},
+      {{Vec3{5, 6, 7}, Vec3{8, 9, 10}, Vec3{11, 12, 13}}, {}, 0}};
+  const ParsedScene parsed = Read(SensorsFile("scene.pbrt", {sensors, buckets, borders}));
   ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
   EXPECT_EQ(parsed.scene.sensors, sensors);
+  EXPECT_EQ(parsed.scene.sensor_buckets, buckets);
   EXPECT_EQ(parsed.scene.sensor_borders, borders);
   EXPECT_EQ(parsed.scene.film.width, 2);
   EXPECT_EQ(parsed.scene.film.height, 2);
 }
 
 TEST(SensorsReaderTest, FollowTheUnitOfTheScene) {
-  const ParsedScene parsed = Read(SensorsFile("scene.pbrt", {{{0, 0, 3e10F}, {0, 0, 1}, 1e9F}},
-                                              {{Vec3{0, 0, 0}, Vec3{0, 0, 3e10F}}}),
+  const SensorBucket bucket = {
+      {Vec3{0, 0, 3e10F}, Vec3{0, 0, 0}, Vec3{0, 0, 0}}, {0, 0, 3e10F}, 3e10F};
+  const ParsedScene parsed = Read(SensorsFile("scene.pbrt", {{{{0, 0, 3e10F}, {0, 0, 1}, 1e9F}},
+                                                             {bucket},
+                                                             {{Vec3{0, 0, 0}, Vec3{0, 0, 3e10F}}}}),
                                   "Camera \"perspective\" WorldBegin LightSource \"distant\"\n"
                                   "Shape \"sphere\" \"float radius\" 3e10\n");
   ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
@@ -84,6 +92,9 @@ TEST(SensorsReaderTest, FollowTheUnitOfTheScene) {
   EXPECT_EQ(static_cast<double>(scene.sensors[0].position.z) * scene.unit, 3e10F);
   EXPECT_EQ(static_cast<double>(scene.sensors[0].spacing) * scene.unit, 1e9F);
   EXPECT_EQ(scene.sensor_borders[0][1].z, scene.sensors[0].position.z);
+  EXPECT_EQ(scene.sensor_buckets[0].corners[0], scene.sensors[0].position);
+  EXPECT_EQ(scene.sensor_buckets[0].ball_center, scene.sensors[0].position);
+  EXPECT_EQ(scene.sensor_buckets[0].ball_radius, scene.sensors[0].position.z);
   EXPECT_EQ(scene.spheres[0].radius, scene.sensors[0].position.z);
 }
 
@@ -110,6 +121,13 @@ TEST(SensorsReaderTest, SaysWhatIsMissing) {
   EXPECT_THAT(ErrorOf(File(kComments, "", 0)), HasSubstr("no points"));
   EXPECT_THAT(ErrorOf(File(kComments, "0 0 1 0 0 0\n", 1)), HasSubstr("normal of point 0"));
   EXPECT_THAT(ErrorOf(File(kComments, "0 0 1 0 0 3\n", 1)), HasSubstr("normal of point 0"));
+  EXPECT_THAT(ErrorOf(SensorsFile(
+                  "scene.pbrt", {{{{}, {0, 0, 1}, 1}, {{}, {0, 0, 1}, 1}}, {SensorBucket()}, {}})),
+              HasSubstr("1 buckets for 2 points"));
+  SensorBucket infinite;
+  infinite.corners[1].y = HUGE_VALF;
+  EXPECT_THAT(ErrorOf(SensorsFile("scene.pbrt", {{{{}, {0, 0, 1}, 1}}, {infinite}, {}})),
+              HasSubstr("bucket 0 is not finite"));
   const std::string segments =
       "ply\nformat ascii 1.0\ncomment lucerna scene scene.pbrt\ncomment lucerna spacing 1\n"
       "element segment 1\nproperty float ax\nproperty float ay\nproperty float az\n"

@@ -78,6 +78,10 @@ UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
   // As many as an image may have pixels.
   constexpr std::size_t kMostPoints = std::size_t{65536} * 65536;
   if (points->positions.size() > kMostPoints) return fail("it has too many points");
+  if (!points->buckets.empty() && points->buckets.size() != points->positions.size()) {
+    return fail(Concat("it has ", points->buckets.size(), " buckets for ", points->positions.size(),
+                       " points; give each point one, or none"));
+  }
 
   UnfinishedScene unfinished =
       ReadUnfinishedScene(*diagnostics.NameOfFile(scene_path), assets, diagnostics);
@@ -98,6 +102,7 @@ UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
     sum += static_cast<double>(own);
   }
   scene.sensor_borders = std::move(points->segments);
+  scene.sensor_buckets = std::move(points->buckets);
   scene.camera.kind = Camera::Kind::kSensors;
   scene.camera.camera_to_world = Transform();
   scene.camera.lens_radius = 0;
@@ -108,16 +113,19 @@ UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
   return unfinished;
 }
 
-std::string SensorsFile(const std::string& scene_path, const std::vector<Sensor>& sensors,
-                        const std::vector<std::array<Vec3, 2>>& borders) {
+std::string SensorsFile(const std::string& scene_path, const SensorSet& set) {
   std::string bytes = Concat("ply\nformat binary_little_endian 1.0\ncomment ", kScene, scene_path,
-                             "\nelement vertex ", sensors.size(), "\n");
+                             "\nelement vertex ", set.sensors.size(), "\n");
   const auto add_properties = [&](std::initializer_list<std::string_view> names) {
     for (const std::string_view name : names)
       bytes += Concat("property float ", name, "\n");
   };
   add_properties({"x", "y", "z", "nx", "ny", "nz", "spacing"});
-  bytes += Concat("element segment ", borders.size(), "\n");
+  if (!set.buckets.empty()) {
+    bytes += Concat("element bucket ", set.buckets.size(), "\n");
+    add_properties({"ax", "ay", "az", "bx", "by", "bz", "cx", "cy", "cz", "ox", "oy", "oz", "r"});
+  }
+  bytes += Concat("element segment ", set.borders.size(), "\n");
   add_properties({"ax", "ay", "az", "bx", "by", "bz"});
   bytes += "end_header\n";
   const auto add = [&](std::initializer_list<float> row) {
@@ -126,13 +134,22 @@ std::string SensorsFile(const std::string& scene_path, const std::vector<Sensor>
       bytes.append(raw.data(), raw.size());
     }
   };
-  for (const Sensor& sensor : sensors) {
-    const Vec3 p = sensor.position;
-    const Vec3 n = sensor.normal;
-    add({p.x, p.y, p.z, n.x, n.y, n.z, sensor.spacing});
+  const auto add_point = [&](Vec3 p) { add({p.x, p.y, p.z}); };
+  for (const Sensor& sensor : set.sensors) {
+    add_point(sensor.position);
+    add_point(sensor.normal);
+    add({sensor.spacing});
   }
-  for (const auto& [a, b] : borders)
-    add({a.x, a.y, a.z, b.x, b.y, b.z});
+  for (const SensorBucket& bucket : set.buckets) {
+    for (const Vec3 corner : bucket.corners)
+      add_point(corner);
+    add_point(bucket.ball_center);
+    add({bucket.ball_radius});
+  }
+  for (const auto& [a, b] : set.borders) {
+    add_point(a);
+    add_point(b);
+  }
   return bytes;
 }
 

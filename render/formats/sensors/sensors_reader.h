@@ -8,7 +8,9 @@
 //                                   property `spacing` of its own instead
 //
 // Segments, an element `segment` with the properties ax ay az bx by bz, are borders at which discs
-// of photons are cut.
+// of photons are cut. Triangles, an element `bucket` with the properties ax ay az bx by bz cx cy cz
+// ox oy oz r, as many as there are points: the direct light of a point is the mean over its
+// triangle, or over the part of a ball with this centre and radius that lies over it (r 0: flat).
 //
 // The image of such a scene has a pixel for each point, row by row, in about as many rows as
 // columns.
@@ -34,9 +36,14 @@ namespace lucerna {
 [[nodiscard]] UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
                                           AssetReader& assets, Diagnostics& diagnostics);
 
+// Sensors, and what may come with them.
+struct SensorSet {
+  std::vector<Sensor> sensors;
+  std::vector<SensorBucket> buckets;  // [sensors] or empty
+  std::vector<std::array<Vec3, 2>> borders;
+};
+
 // The bytes of such a file. Requires spacings above 0.
-[[nodiscard]] std::string SensorsFile(const std::string& scene_path,
-                                      const std::vector<Sensor>& sensors,
-                                      const std::vector<std::array<Vec3, 2>>& borders);
+[[nodiscard]] std::string SensorsFile(const std::string& scene_path, const SensorSet& set);
 
 }  // namespace lucerna
