@@ -134,8 +134,15 @@ int Run(int argc, char** argv) {
     return added;
   };
   const auto add_json = [&](CLI::App* to) {
-    to->add_flag("--json", output_options.json, "print the result as one JSON value");
+    return to->add_flag("--json", output_options.json, "print the result as one JSON value");
   };
+  const auto add_full = [&](CLI::App* to, CLI::Option* json) {
+    to->add_flag_callback(
+          "--full", [&] { output_options.detail = JsonDetail::kFull; },
+          "with --json: all that is known, not only what scripts need most")
+        ->needs(json);
+  };
+  const auto add_json_and_full = [&](CLI::App* to) { add_full(to, add_json(to)); };
   const auto add_quiet = [&](CLI::App* to) {
     to->add_flag("--quiet", output_options.quiet, "print nothing but errors and the result");
   };
@@ -229,7 +236,7 @@ int Run(int argc, char** argv) {
   render->add_flag("--resume", request.resumes, "go on with a render that was interrupted")
       ->excludes(no_checkpoints);
   add_workers(render);
-  add_json(render);
+  add_json_and_full(render);
   add_quiet(render);
   add_no_preview(render);
 
@@ -247,7 +254,7 @@ int Run(int argc, char** argv) {
       ->check(CLI::Range(-100, 100))
       ->capture_default_str();
   add_server(submit);
-  add_json(submit);
+  add_json_and_full(submit);
   add_quiet(submit);
   add_no_preview(submit);
 
@@ -259,7 +266,7 @@ int Run(int argc, char** argv) {
   jobs->add_option("--user", listed.user, "only jobs of this user");
   jobs->add_option("--name", listed.name_contains, "only jobs whose names contain this");
   add_server(jobs);
-  add_json(jobs);
+  add_json_and_full(jobs);
 
   CLI::App* workers = command("workers", "list the workers of a coordinator", [&] {
     if (!worker_order) return ListWorkers(server, output_options);
@@ -308,9 +315,12 @@ int Run(int argc, char** argv) {
   for (CLI::App* about_job : {watch, wait, fetch, report}) {
     about_job->add_option("JOB", job_id, "the job's id")->required();
     add_server(about_job);
-    add_json(about_job);
     add_quiet(about_job);
   }
+  for (CLI::App* of_job : {watch, wait})
+    add_json_and_full(of_job);
+  add_json(fetch);
+  add_json(report);
 
   CLI::App* trace_photon =
       command("trace-photon", "trace one photon of a job again and show its way", [&]() -> Status {
@@ -356,13 +366,14 @@ int Run(int argc, char** argv) {
   for (CLI::App* about_jobs : {cancel, stop, pause, resume}) {
     about_jobs->add_option("JOB", job_ids, "ids of jobs")->required();
     add_server(about_jobs);
-    about_jobs->add_flag("--json", output_options.json, "print one JSON value for each job");
+    add_full(about_jobs, about_jobs->add_flag("--json", output_options.json,
+                                              "print one JSON value for each job"));
     add_quiet(about_jobs);
   }
   for (CLI::App* about_job : {extend, prioritize}) {
     about_job->add_option("JOB", job_id, "the job's id")->required();
     add_server(about_job);
-    add_json(about_job);
+    add_json_and_full(about_job);
     add_quiet(about_job);
   }
   prioritize->add_option("PRIORITY", priority, "jobs of higher priority come first; -100 to 100")
@@ -426,7 +437,7 @@ int Run(int argc, char** argv) {
   compare->add_option("-o,--output", comparison.table_path, "table to write, as Markdown");
   compare->add_option("--plot", comparison.plot_path, "plot to write, as SVG");
   add_image_flags(compare, comparison.common);
-  add_json(compare);
+  add_json_and_full(compare);
   add_quiet(compare);
 
   CLI::App* reference =

@@ -1,11 +1,16 @@
 // Output options of a command.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "render/film/display.h"
 
 namespace lucerna {
+
+// How much of a job or a comparison a JSON value holds. Short: the properties that a script needs
+// to go on. Full: all that is known; those of the short value are the same.
+enum class JsonDetail : std::uint8_t { kShort, kFull };
 
 struct OutputOptions {
   bool json = false;   // results as one JSON value
@@ -13,6 +18,7 @@ struct OutputOptions {
   // Progress on a terminal may be redrawn in place, and may show the image.
   bool redraws = false;
   bool previews = false;
+  JsonDetail detail = JsonDetail::kShort;              // of JSON
   Display display = {.exposure_stops = std::nullopt};  // of PNG files and previews
 };
 

@@ -12,7 +12,7 @@ packages=(
   libpugixml-dev libtinyobjloader-dev prometheus-cpp-dev libcpp-httplib-dev
 )
 if [ "${1:-}" = tests ]; then
-  packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3 chromium clang-format clang-tidy prometheus python3-yaml)
+  packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3 python3-jsonschema python3-yaml chromium clang-format clang-tidy prometheus)
 fi
 
 missing=()

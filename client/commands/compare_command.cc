@@ -383,7 +383,8 @@ Status CompareSettings(const CompareRequest& request, const ClusterOptions& clus
     LUCERNA_RETURN_IF_ERROR(WriteFile(request.table_path, table));
   }
   if (output_options.json) {
-    std::fputs(ComparisonReport(comparison, subject, measured).c_str(), stdout);
+    std::fputs(ComparisonReport(comparison, subject, measured, output_options.detail).c_str(),
+               stdout);
   } else if (request.table_path.empty()) {
     std::fputs(table.c_str(), stdout);
   } else if (!output_options.quiet) {

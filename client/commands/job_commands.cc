@@ -82,7 +82,7 @@ Status SaveAndReport(ClientConnection& connection, const v1::Job& job, const Out
   LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved,
                            Save(connection, job.job_id(), outputs, output_options.display));
   if (output_options.json) {
-    Print(JobReport(job, saved));
+    Print(JobReport(job, saved, output_options.detail));
   } else if (!output_options.quiet) {
     Print(absl::StrCat(SummaryLine(job), ": ", absl::StrJoin(saved.paths, ", "), "\n"));
   }
@@ -329,7 +329,7 @@ Status ListJobs(const JobsRequest& request, const Endpoint& server,
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, connection->List(filter));
   if (output_options.json) {
-    Print(JobsReport(jobs));
+    Print(JobsReport(jobs, output_options.detail));
     return absl::OkStatus();
   }
   Print(TableHead() + "\n");
@@ -344,7 +344,7 @@ Status Follow(const std::string& job_id, bool shows_progress, const Endpoint& se
   LUCERNA_ASSIGN_OR_RETURN(
       const v1::Job job, FollowToEnd(*connection, job_id, shows_progress, output_options, Nothing));
   if (output_options.json) {
-    Print(JobReport(job));
+    Print(JobReport(job, output_options.detail));
   } else if (!output_options.quiet) {
     Print(SummaryLine(job) + "\n");
   }
@@ -418,7 +418,7 @@ namespace {
 Status Acknowledge(const StatusOr<v1::Job>& job, const OutputOptions& output_options) {
   if (!job.ok()) return job.status();
   if (output_options.json) {
-    Print(JobReport(*job));
+    Print(JobReport(*job, output_options.detail));
   } else if (!output_options.quiet) {
     Print(absl::StrCat("job ", job->job_id(), " ", NameOf(job->state()), "\n"));
   }

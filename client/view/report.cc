@@ -1,5 +1,6 @@
 #include "client/view/report.h"
 
+#include <array>
 #include <cmath>
 #include <optional>
 #include <string>
@@ -80,7 +81,14 @@ Json TallyOf(const v1::Tally& message) {
   return json;
 }
 
-Json JobOf(const v1::Job& job) {
+// What a script needs to go on: whose job it is, whether it goes on and if not why, how far it is,
+// how good the image is, and what is wrong. In this order.
+constexpr std::array kShortJob = {
+    "job_id",     "name",           "state",         "stop_reason",   "failure",        "owner",
+    "no_workers", "condition",      "pause_cause",   "passes",        "photons",        "running_s",
+    "warnings",   "relative_error", "nothing_found", "missing_light", "dropped_photons"};
+
+Json FullJobOf(const v1::Job& job) {
   const v1::Progress& progress = job.progress();
   Json json = {{"job_id", job.job_id()}, {"name", job.name()}, {"state", NameOf(job.state())}};
   if (job.state() == v1::JOB_STATE_SUCCEEDED) json["stop_reason"] = NameOf(job.stop_reason());
@@ -167,6 +175,16 @@ Json JobOf(const v1::Job& job) {
   if (job.dropped_photons_size() > 0) json["dropped_photons"] = Json::array();
   for (const v1::PhotonKey& key : job.dropped_photons())
     json["dropped_photons"].push_back({{"pass", key.pass()}, {"index", key.index()}});
+  return json;
+}
+
+Json JobOf(const v1::Job& job, JsonDetail detail) {
+  Json all = FullJobOf(job);
+  if (detail == JsonDetail::kFull) return all;
+  Json json;
+  for (const char* name : kShortJob) {
+    if (all.contains(name)) json[name] = std::move(all[name]);
+  }
   return json;
 }
 
@@ -275,18 +293,18 @@ void AddSaved(Json& json, const SavedImage& saved) {
 
 }  // namespace
 
-std::string JobReport(const v1::Job& job) {
-  return ToText(JobOf(job));
+std::string JobReport(const v1::Job& job, JsonDetail detail) {
+  return ToText(JobOf(job, detail));
 }
 
-std::string JobReport(const v1::Job& job, const SavedImage& saved) {
-  Json json = JobOf(job);
+std::string JobReport(const v1::Job& job, const SavedImage& saved, JsonDetail detail) {
+  Json json = JobOf(job, detail);
   AddSaved(json, saved);
   return ToText(json);
 }
 
 std::string ConvergenceReport(const v1::Job& job) {
-  Json json = JobOf(job);
+  Json json = FullJobOf(job);
   json["has_reference"] = job.has_reference();
   for (const auto& [name, against] : {std::pair{"mse_exponent_time", ErrorAgainst::kTime},
                                       std::pair{"mse_exponent_photons", ErrorAgainst::kPhotons}}) {
@@ -360,10 +378,10 @@ std::string ConvergenceCsv(const v1::Job& job) {
   return csv;
 }
 
-std::string JobsReport(const std::vector<v1::Job>& jobs) {
+std::string JobsReport(const std::vector<v1::Job>& jobs, JsonDetail detail) {
   Json json = Json::array();
   for (const v1::Job& job : jobs)
-    json.push_back(JobOf(job));
+    json.push_back(JobOf(job, detail));
   return ToText(json);
 }
 
@@ -424,7 +442,7 @@ std::string MetricsReport(const ImageMetrics& metrics) {
 }
 
 std::string ComparisonReport(const Comparison& comparison, const ComparisonSubject& subject,
-                             const std::vector<ComparedRun>& runs) {
+                             const std::vector<ComparedRun>& runs, JsonDetail detail) {
   Json json = {{"scene", subject.scene},
                {"reference", subject.reference},
                {"cores", subject.cores},
@@ -455,9 +473,9 @@ std::string ComparisonReport(const Comparison& comparison, const ComparisonSubje
       if (std::isfinite(cell->ratio.value)) at["ratio"] = MeanJson(cell->ratio);
       one["at"].push_back(std::move(at));
     }
-    one["runs"] = Json::array();
+    if (detail == JsonDetail::kFull) one["runs"] = Json::array();
     for (const ComparedRun& run : runs) {
-      if (run.setting != i) continue;
+      if (detail == JsonDetail::kShort || run.setting != i) continue;
       Json points = Json::array();
       for (const ErrorPoint& point : run.points) {
         points.push_back({{"time_s", point.seconds},
@@ -524,6 +542,7 @@ std::string BakeReport(const std::vector<BakeRound>& rounds,
 
 std::string PhotonReport(const v1::PhotonPath& path) {
   Json json = {{"pass", path.key().pass()}, {"index", path.key().index()}};
+  if (path.wavelength_nm() > 0) json["wavelength_nm"] = path.wavelength_nm();
   if (path.has_emission()) {
     json["emission"] = {{"light", path.emission().light()},
                         {"position", TripleOf(path.emission().position())},

@@ -1,7 +1,8 @@
 // How do results read to a program?
 //
 // One JSON value each, indented, with a line end; or a table of comma-separated values. Names carry
-// their units; absent values are left out.
+// their units; absent values are left out. docs/schemas describes each value: a change here is a
+// change there, which tests/tools/check_schemas.py holds us to.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 #include "client/bake/surface_figures.h"
 #include "client/compare/comparison.h"
+#include "client/output_options.h"
 #include "client/selfcheck/selfcheck.h"
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "proto/lucerna/v1/photons.pb.h"
@@ -29,14 +31,14 @@ struct SavedImage {
   Digest digest;
 };
 
-[[nodiscard]] std::string JobReport(const v1::Job& job);
-[[nodiscard]] std::string JobReport(const v1::Job& job, const SavedImage& saved);
-// The job with its convergence record and the shares of its workers.
+[[nodiscard]] std::string JobReport(const v1::Job& job, JsonDetail detail);
+[[nodiscard]] std::string JobReport(const v1::Job& job, const SavedImage& saved, JsonDetail detail);
+// The full job with its convergence record and the shares of its workers.
 [[nodiscard]] std::string ConvergenceReport(const v1::Job& job);
 // The same record and shares as one table after RFC 4180: `row` is "sample" or "worker", and what a
 // row does not have is empty.
 [[nodiscard]] std::string ConvergenceCsv(const v1::Job& job);
-[[nodiscard]] std::string JobsReport(const std::vector<v1::Job>& jobs);
+[[nodiscard]] std::string JobsReport(const std::vector<v1::Job>& jobs, JsonDetail detail);
 [[nodiscard]] std::string SavedReport(const std::string& job_id, const SavedImage& saved);
 // Of an image without photons: MeshRender::share_unknown.
 [[nodiscard]] std::string MeshRenderReport(std::int64_t passes, double share_unknown,
@@ -44,10 +46,10 @@ struct SavedImage {
 [[nodiscard]] std::string SubmittedReport(const v1::SubmitResponse& submitted);
 [[nodiscard]] std::string SceneReport(const std::vector<Diagnostic>& diagnostics, bool is_ok);
 [[nodiscard]] std::string MetricsReport(const ImageMetrics& metrics);
-// What was compared, its table, and all that was measured.
+// What was compared and its table; full, all that was measured too.
 [[nodiscard]] std::string ComparisonReport(const Comparison& comparison,
                                            const ComparisonSubject& subject,
-                                           const std::vector<ComparedRun>& runs);
+                                           const std::vector<ComparedRun>& runs, JsonDetail detail);
 // Of an image that MakeReference made.
 [[nodiscard]] std::string ReferenceReport(const Image& reference, const std::string& path);
 // One job of a bake.

@@ -18,7 +18,7 @@ import tempfile
 
 def render(lucerna, scene, arguments, image, everything):
     command = ["/usr/bin/env", "time", "-f", "%M", lucerna, "render", scene, "-o", image, "--json",
-               "--quiet", "--size", arguments.size, "--passes", arguments.passes, *arguments.flags]
+               "--full", "--quiet", "--size", arguments.size, "--passes", arguments.passes, *arguments.flags]
     if everything:
         command.append("--use-everything")
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True)

@@ -131,7 +131,7 @@ void KillProgram(const std::string& program, pid_t parent) {
 }
 
 TEST_F(ClientCommandsTest, RenderLeavesAnImageAPreviewAndTheFigures) {
-  const Ran ran = Run(SmallRender({"-o", In("a.exr"), "--png", In("a.png"), "--json"}));
+  const Ran ran = Run(SmallRender({"-o", In("a.exr"), "--png", In("a.png"), "--json", "--full"}));
   ASSERT_EQ(ran.code, 0) << ran.err;
   const json report = json::parse(ran.out);
   EXPECT_EQ(report["state"], "SUCCEEDED");
@@ -174,8 +174,8 @@ TEST_F(ClientCommandsTest, WholePassesAreLentWithOneColumnOfRadiiARound) {
     std::vector<std::string> words = {"render",   SceneOfTests("corner.pbrt"),
                                       "--size",   "48x48",
                                       "--passes", passes,
-                                      "--json",   "-o",
-                                      In("a.exr")};
+                                      "--json",   "--full",
+                                      "-o",       In("a.exr")};
     words.insert(words.end(), more.begin(), more.end());
     const Ran ran = Run(words);
     EXPECT_EQ(ran.code, 0) << ran.err;
@@ -782,7 +782,7 @@ TEST_F(ClientCommandsTest, TracePhotonShowsTheWayOfAPhotonOfAJobThatIsOver) {
                              std::to_string(kPhotons), "--max-depth", std::to_string(kDepth)});
   ASSERT_EQ(submitted.code, 0) << submitted.err;
   const std::string job = submitted.out.substr(0, submitted.out.find('\n'));
-  const Ran waited = Run({"wait", job, "--server", server, "--json"});
+  const Ran waited = Run({"wait", job, "--server", server, "--json", "--full"});
   ASSERT_EQ(waited.code, 0) << waited.err;
   const json books = json::parse(waited.out);
   EXPECT_EQ(books["tally"]["dropped"], 0);
@@ -888,13 +888,13 @@ class CompareTest : public ClientCommandsTest {
 TEST_F(CompareTest, SettingsAreComparedByTheirRecords) {
   ASSERT_EQ(Run(SmallReference(SceneOfTests("caustic.pbrt"), In("ref.exr"))).code, 0);
   ExpectComparison(
-      Run(SmallComparison({"-o", In("table.md"), "--plot", In("plot.svg"), "--json"})));
+      Run(SmallComparison({"-o", In("table.md"), "--plot", In("plot.svg"), "--json", "--full"})));
 }
 
 TEST_F(CompareTest, SettingsAreComparedByTheirImagesWhenPixelsAreLeftOut) {
   ASSERT_EQ(Run(SmallReference(SceneOfTests("caustic.pbrt"), In("ref.exr"))).code, 0);
   ExpectComparison(Run(SmallComparison(
-      {"-o", In("table.md"), "--plot", In("plot.svg"), "--json", "--trim", "0.01"})));
+      {"-o", In("table.md"), "--plot", In("plot.svg"), "--json", "--full", "--trim", "0.01"})));
   EXPECT_NE(Contents(In("table.md")).find("without the worst 1 % of pixels"), std::string::npos);
 }
 

@@ -81,8 +81,8 @@ def main():
                         args.size, "--time", "86400"], check=True, **quiet)
 
         def look():
-            text = subprocess.run([args.bin + "/lucerna", "jobs", "--server", ADDRESS, "--json"],
-                                  capture_output=True, check=True, text=True).stdout
+            text = subprocess.run([args.bin + "/lucerna", "jobs", "--server", ADDRESS, "--json",
+                                   "--full"], capture_output=True, check=True, text=True).stdout
             jobs = json.loads(text)
             count = [float(find(jobs, key) or 0)
                      for key in ("photons", "sent_bytes", "received_bytes")]

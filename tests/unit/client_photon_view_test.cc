@@ -97,7 +97,8 @@ TEST(DroppedLineTest, NamesTheFirstPhotonAndIsOtherwiseEmpty) {
             "3 photons were not finite and left out; the first: lucerna trace-photon abc-1 "
             "12:3456");
   EXPECT_THAT(ReportPage(job, {}), HasSubstr("lucerna trace-photon abc-1 12:3456"));
-  EXPECT_EQ(nlohmann::json::parse(JobReport(job))["dropped_photons"][0]["index"], 3456);
+  EXPECT_EQ(nlohmann::json::parse(JobReport(job, JsonDetail::kFull))["dropped_photons"][0]["index"],
+            3456);
 }
 
 TEST(EnergyInWordsTest, GivesSharesAndSaysWhenTheBooksAreOff) {
@@ -113,7 +114,7 @@ TEST(EnergyInWordsTest, GivesSharesAndSaysWhenTheBooksAreOff) {
   EXPECT_EQ(EnergyInWords(energy),
             "of what was emitted 75.00 % was absorbed, 22.50 % escaped, roulette took 5.00 % and "
             "gave 2.50 %");
-  const auto json = nlohmann::json::parse(JobReport(job))["energy"];
+  const auto json = nlohmann::json::parse(JobReport(job, JsonDetail::kFull))["energy"];
   EXPECT_EQ(json["absorbed"], 0.75);
   EXPECT_EQ(json["balance"], 0);
   energy.set_cut_off(-4);

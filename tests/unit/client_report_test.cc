@@ -30,7 +30,7 @@ TEST(ReportTest, AJobTellsItsFigures) {
   SavedImage saved;
   saved.paths = {"out.exr", "out.png"};
 
-  const json report = json::parse(JobReport(job, saved));
+  const json report = json::parse(JobReport(job, saved, JsonDetail::kFull));
   EXPECT_EQ(report["job_id"], "j1");
   EXPECT_EQ(report["state"], "SUCCEEDED");
   EXPECT_EQ(report["stop_reason"], "TIME");
@@ -49,7 +49,7 @@ TEST(ReportTest, AJobTellsItsFigures) {
 // What `render --json` prints carries the estimate, and with a reference the truth.
 TEST(ReportTest, AJobsReportCarriesItsError) {
   v1::Job job = ConvergingJob(12);
-  json report = json::parse(JobReport(job));
+  json report = json::parse(JobReport(job, JsonDetail::kFull));
   EXPECT_DOUBLE_EQ(
       report["relative_error"]["estimate"].get<double>(),
       std::sqrt(job.convergence(11).relative().noise() + job.convergence(11).relative().bias()));
@@ -64,11 +64,42 @@ TEST(ReportTest, AJobsReportCarriesItsError) {
   light.set_name("light 1");
   light.set_photons_sent(5);
   light.set_missing_share(HUGE_VAL);
-  report = json::parse(JobReport(job));
+  report = json::parse(JobReport(job, JsonDetail::kFull));
   EXPECT_FALSE(report.contains("relative_error")) << "nothing is known, above all not 0";
   EXPECT_EQ(report["nothing_found"], true);
   EXPECT_EQ(report["lights"][0]["photons_sent"], 5);
   EXPECT_TRUE(report["lights"][0]["missing_share"].is_null());
+}
+
+// The properties that the manual promises, each as in the full value.
+TEST(ReportTest, TheShortValueIsAPartOfTheFullOne) {
+  v1::Job job = ConvergingJob(12);
+  job.set_state(v1::JOB_STATE_SUCCEEDED);
+  job.mutable_progress()->mutable_tally()->mutable_energy()->set_emitted(400);
+  const SavedImage saved = {{"out.exr"}, Digest()};
+  const json full = json::parse(JobReport(job, saved, JsonDetail::kFull));
+  const json brief = json::parse(JobReport(job, saved, JsonDetail::kShort));
+  for (const auto& [name, value] : brief.items())
+    EXPECT_EQ(value, full[name]) << name;
+  for (const char* name : {"job_id", "state", "stop_reason", "passes", "photons", "running_s",
+                           "relative_error", "warnings", "paths", "image_digest"}) {
+    EXPECT_TRUE(brief.contains(name)) << name;
+  }
+  for (const char* name : {"energy", "tally", "parts", "settings", "lights", "worker_cpu_s"}) {
+    EXPECT_TRUE(full.contains(name)) << name;
+    EXPECT_FALSE(brief.contains(name)) << name;
+  }
+
+  job.set_state(v1::JOB_STATE_PAUSED);
+  job.set_pause_cause(v1::PAUSE_CAUSE_DISK);
+  job.set_condition("paused: no room");
+  job.mutable_convergence(11)->set_nothing_found(true);
+  const json listed = json::parse(JobsReport({job}, JsonDetail::kShort))[0];
+  EXPECT_EQ(listed["pause_cause"], "DISK");
+  EXPECT_EQ(listed["condition"], "paused: no room");
+  EXPECT_EQ(listed["nothing_found"], true) << "what is wrong is never left out";
+  EXPECT_EQ(listed["warnings"].size(), static_cast<std::size_t>(job.warnings_size()));
+  EXPECT_FALSE(listed.contains("energy"));
 }
 
 TEST(ReportTest, TheConvergenceRecordKeepsItsDigits) {
@@ -86,7 +117,8 @@ TEST(ReportTest, TheConvergenceRecordKeepsItsDigits) {
   EXPECT_EQ(sample["left_out_pixels"], 65);
   EXPECT_DOUBLE_EQ(report["relative_error"]["untrimmed"].get<double>(),
                    std::sqrt(job.convergence(11).relative_untrimmed()));
-  EXPECT_EQ(json::parse(JobReport(job))["relative_error"], report["relative_error"]);
+  EXPECT_EQ(json::parse(JobReport(job, JsonDetail::kFull))["relative_error"],
+            report["relative_error"]);
   EXPECT_NEAR(report["mse_exponent_photons"].get<double>(), -2.0 / 3, 1e-4);
   EXPECT_DOUBLE_EQ(report["relative_error"]["high"].get<double>(),
                    std::sqrt(job.convergence(11).relative().high()));
@@ -126,7 +158,7 @@ TEST(ReportTest, TheTableHasARowForEverySampleAndWorkerAndACellForEveryColumn) {
 }
 
 TEST(ReportTest, NoJobsIsAnEmptyList) {
-  EXPECT_EQ(json::parse(JobsReport({})), json::array());
+  EXPECT_EQ(json::parse(JobsReport({}, JsonDetail::kShort)), json::array());
 }
 
 TEST(ReportTest, DiagnosticsKeepTheirPlace) {
