@@ -12,7 +12,8 @@ packages=(
   libpugixml-dev libtinyobjloader-dev prometheus-cpp-dev libcpp-httplib-dev
 )
 if [ "${1:-}" = tests ]; then
-  packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3 chromium clang-format clang-tidy prometheus)
+  packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3 chromium clang-format clang-tidy prometheus
+    python3-grpcio python3-protobuf python3-numpy python3-venv)
 fi
 
 missing=()
