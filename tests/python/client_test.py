@@ -17,7 +17,9 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import unittest
+import unittest.mock
 import xml.etree.ElementTree
 import zlib
 
@@ -95,6 +97,15 @@ class TemporaryTest(unittest.TestCase):
         folder = tempfile.TemporaryDirectory(dir=FOLDER.name)
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
+
+
+class TextTest(unittest.TestCase):
+    def test_what_a_terminal_would_obey_is_written_out(self):
+        printable = lucerna.errors.printable
+        self.assertEqual("a\\x1b[2J\\x0ab\\u{202e}", printable("a\x1b[2J\nb\u202e"))
+        self.assertEqual("zwei\nZeilen: Größe 5\u00a0µm 影 \U0001f469\u200d\U0001f52c",
+                         printable("zwei\nZeilen: Größe 5\u00a0µm 影 \U0001f469\u200d\U0001f52c",
+                                   keeps="\n"))
 
 
 # --- Files ---
@@ -203,6 +214,14 @@ class ExrTest(TemporaryTest):
             except lucerna.Error:
                 errors += 1
         self.assertGreater(errors, 1000)
+
+    def test_blocks_that_are_not_where_the_table_says_are_an_error(self):
+        content = exr({"R": self.CHANNELS["G"]}, *ZIPS)
+        table = len(content) - 37 * (8 + 8 + 5 * 4)
+        swapped = (content[:table] + content[table + 8:table + 16] + content[table:table + 8] +
+                   content[table + 16:])
+        with self.assertRaisesRegex(lucerna.Error, "block of its scanlines is damaged"):
+            lucerna.decode_exr(swapped)
 
     def test_a_small_file_takes_little_memory(self):
         content = bytearray(exr({"R": np.zeros((1, 1), dtype=np.float32)}, *NONE))
@@ -384,6 +403,9 @@ class JobsTest(TemporaryTest):
         with self.assertRaisesRegex(lucerna.UsageError, "asleep is no state"):
             self.client.jobs(states=["asleep"])
         self.assertEqual(5, job.set_priority(5).priority)
+        job.extend(passes=1_000_000, time="2h")
+        settings = job.state().settings
+        self.assertEqual(("1000000", "7200"), (settings["passes"], settings["time"]))
         job.resume()
         # Of a job that runs: the image so far.
         self.assertIn("beauty", job.fetch())
@@ -395,6 +417,13 @@ class JobsTest(TemporaryTest):
         self.assertNotIn(job.job_id, [one.job_id for one in self.client.jobs()])
         with self.assertRaises(lucerna.NotFoundError):
             job.state()
+
+    def test_a_long_list_of_jobs_comes_in_pages(self):
+        submitted = [self.submit(passes=1).job_id for _ in range(3)]
+        whole = [one.job_id for one in self.client.jobs()]
+        self.assertEqual(submitted[::-1], whole[:3])
+        with unittest.mock.patch.object(lucerna.client, "_PAGE", 2):
+            self.assertEqual(whole, [one.job_id for one in self.client.jobs()])
 
     def test_a_cancelled_job_says_so(self):
         job = self.submit(time="1h")
@@ -430,6 +459,12 @@ class JobsTest(TemporaryTest):
             client = lucerna.Client(self.programs.address, program=self.folder / "lucerna")
             self.addCleanup(client.close)
             client.submit(SCENE, passes=1)
+
+    def test_the_users_file_of_flags_does_not_count(self):
+        (self.folder / "lucerna.toml").write_text('[submit]\nkernel = "constant"\n',
+                                                  encoding="utf-8")
+        with unittest.mock.patch.dict(os.environ, {"XDG_CONFIG_HOME": str(self.folder)}):
+            self.assertEqual("epanechnikov", self.submit(passes=1).wait().settings["kernel"])
 
     def test_the_example_draws_every_sample(self):
         plot = self.folder / "plot.svg"
@@ -474,9 +509,16 @@ class ConnectionTest(TemporaryTest):
                     break
             first.server.kill()
             first.server.wait()
-            second = Programs("--state", str(self.folder / "state"), listen=first.address,
-                              worker=False)
-            self.addCleanup(second.close)
+            listed = []
+            call = threading.Thread(target=lambda: listed.extend(client.jobs()))
+            with unittest.mock.patch.object(lucerna.client, "_ATTEMPTS", 60):
+                # Before there is a coordinator again.
+                call.start()
+                second = Programs("--state", str(self.folder / "state"), listen=first.address,
+                                  worker=False)
+                self.addCleanup(second.close)
+                call.join()
+            self.assertEqual([job.job_id], [one.job_id for one in listed])
             # Of the second one: the first has no news any more, the worker comes back.
             before = state.passes
             for state in states:
@@ -484,12 +526,12 @@ class ConnectionTest(TemporaryTest):
                     break
             job.stop()
             self.assertEqual("succeeded", list(states)[-1].state)
-            impatient = lucerna.Client(first.address, max_silence_s=1)
+            impatient = lucerna.Client(first.address, max_silence_s=0)
             self.addCleanup(impatient.close)
             other = impatient.submit(SCENE, size=SIZE, time="1h")
             states = other.watch()
             next(states)
-            second.close()
+            second.server.kill()
             with self.assertRaisesRegex(lucerna.UnreachableError, "cannot reach the coordinator"):
                 list(states)
             with self.assertRaises(lucerna.UnreachableError):
@@ -525,12 +567,12 @@ class ConnectionTest(TemporaryTest):
             with self.assertRaises(lucerna.AccessError):
                 client.jobs()
         with self.assertRaisesRegex(lucerna.UnreachableError, "if it uses TLS, give tls="):
-            lucerna.Client(programs.address, connect_timeout_s=0.5)
+            lucerna.Client(programs.address, connect_timeout_s=2)
         stranger = self.folder / "stranger"
         subprocess.run(["bash", ROOT / "deploy/dev-ca.sh", stranger], check=True,
                        capture_output=True)
         with self.assertRaisesRegex(lucerna.UnreachableError, "certificate verify failed"):
-            lucerna.Client(programs.address, connect_timeout_s=0.5, tls=lucerna.Tls(
+            lucerna.Client(programs.address, connect_timeout_s=2, tls=lucerna.Tls(
                 stranger / "ca.pem", ca / "client.pem", ca / "client.key"))
 
     def test_a_token_does_not_travel_in_the_clear(self):
@@ -542,7 +584,8 @@ class ConnectionTest(TemporaryTest):
 
 class InstallationTest(TemporaryTest):
     def test_pip_installs_it_without_a_network(self):
-        environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        environment = {name: value for name, value in os.environ.items()
+                       if name != "PYTHONPATH" and not name.startswith("PIP_")}
         made = subprocess.run([sys.executable, "-m", "venv", "--system-site-packages",
                                self.folder / "env"], capture_output=True, check=False)
         if made.returncode != 0:

@@ -29,6 +29,7 @@ from lucerna.v1 import images_pb2, images_pb2_grpc, jobs_pb2, jobs_pb2_grpc
 _CALL_S = 30.0
 _ATTEMPTS = 7  # about six seconds of pauses in all
 _FIRST_PAUSE_S = 0.1
+_PAGE = 200  # jobs of a list that come at once
 _LONGEST_PAUSE_S = 2.0
 _MAX_IMAGE_BYTES = 8 << 30
 # As render/wire/channel.cc: a machine that vanished is noticed, and no proxy for the web is asked.
@@ -210,14 +211,14 @@ class Client:
         return Job(self, submitted["job_id"], submitted["warnings"])
 
     def job(self, job_id: str) -> Job:
-        """A job that was submitted earlier. Does not ask whether there is one."""
+        """A job that was submitted earlier. Makes no call: its methods tell whether there is one."""
         return Job(self, job_id)
 
     def jobs(self, *, states: Iterable[str] = (), owner: str = "",
              name_contains: str = "") -> list[JobState]:
         """All jobs, newest first, without their samples; only those that are in one of `states`, are
         `owner`'s, and whose names contain this."""
-        request = jobs_pb2.ListJobsRequest(page_size=200, owner=owner, name_contains=name_contains)
+        request = jobs_pb2.ListJobsRequest(page_size=_PAGE, owner=owner, name_contains=name_contains)
         for name in states:
             try:
                 request.states.append(jobs_pb2.JobState.Value(f"JOB_STATE_{name.upper()}"))
@@ -284,7 +285,7 @@ class Client:
                     yield state
                     if state.has_ended:
                         return
-                    # From here: what the caller did with the state takes no patience.
+                    # From here: the time that the caller took does not count.
                     last_news = time.monotonic()
                     pause_s = _FIRST_PAUSE_S
             except grpc.RpcError as error:
@@ -321,7 +322,9 @@ class Client:
 
     def _unreachable(self, why: str | None) -> UnreachableError:
         why = printable(why or "")
-        if self.tls is None and ("Socket closed" in why or "Connection reset" in why):
+        is_refused = "failed to connect" in why and (
+            "Socket closed" in why or "Connection reset" in why)
+        if self.tls is None and is_refused:
             return UnreachableError(f"the coordinator at {self.server} ended the connection at "
                                     "once; if it uses TLS, give tls=")
         # What is wrong with certificates is only in gRPC's words.

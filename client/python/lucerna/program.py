@@ -1,6 +1,7 @@
 """What the program `lucerna` does for this package: it reads scenes.
 
-Which files a scene names is known by its reader alone, for three formats, and there is one reader.
+Only a reader of scenes can tell which files one names. There is one for each of three formats, in the
+program, and none here.
 """
 
 import difflib

@@ -70,7 +70,7 @@ class JobState:
     stop_reason: str        # of succeeded: passes, time, error, photons or user
     failure: str            # of failed: what went wrong and what to do
     condition: str          # of paused: why, and when it goes on
-    has_workers: bool
+    has_workers: bool       # False: it runs, and no worker is connected
     passes: int             # merged into the image
     photons: int
     seconds: float          # wall time in which the job ran and a worker was connected
