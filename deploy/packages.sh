@@ -12,7 +12,8 @@ packages=(
   libpugixml-dev libtinyobjloader-dev prometheus-cpp-dev libcpp-httplib-dev
 )
 if [ "${1:-}" = tests ]; then
-  packages+=(libgtest-dev libgmock-dev libbenchmark-dev python3 python3-jsonschema python3-yaml chromium clang-format clang-tidy prometheus)
+  packages+=(libgtest-dev libgmock-dev libbenchmark-dev chromium clang-format clang-tidy prometheus
+    python3 python3-grpcio python3-jsonschema python3-numpy python3-protobuf python3-venv python3-yaml)
 fi
 
 missing=()
