@@ -10,10 +10,10 @@ namespace lucerna {
 namespace {
 
 // A small upload may hold a large scene: compressed meshes and pictures, a mesh that is read a
-// thousand times. The tree over the shapes takes about three times their own memory.
+// thousand times. What is built of the shapes is counted when they have been read (CheckMemory).
 SceneLimits LimitsFor(std::uint64_t max_job_bytes) {
   SceneLimits limits;
-  limits.max_shape_bytes = std::min(limits.max_shape_bytes, max_job_bytes / 8);
+  limits.max_shape_bytes = std::min(limits.max_shape_bytes, max_job_bytes / 4);
   limits.max_picture_bytes = std::min(limits.max_picture_bytes, max_job_bytes / 4);
   return limits;
 }

@@ -49,8 +49,8 @@ struct CheckedJob {
 class JobIntake {
  public:
   // The store outlives the intake. `max_job_bytes` is for the image of one job and its scene. While
-  // that is read its shapes may have an eighth of it and its pictures a quarter: the analysis of
-  // a scene, and the tree over it, take several times the memory of the shapes.
+  // that is read its shapes may have a quarter of it and its pictures another: the analysis of a
+  // scene, and the tree over it, take several times the memory of the shapes.
   JobIntake(BlobStore& blobs, std::uint64_t max_job_bytes)
       : blobs_(blobs), max_job_bytes_(max_job_bytes) {}
 

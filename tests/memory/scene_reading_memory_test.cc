@@ -1,6 +1,7 @@
 // When memory runs out while a scene is read, that is an error of the scene with a sentence.
 //
 // Every allocation of the reading of a small scene is made to fail, one after the other.
+#include <map>
 #include <string>
 
 #include "gmock/gmock.h"
@@ -32,7 +33,7 @@ TEST(SceneReadingMemoryTest, EachAllocationMayFail) {
   int failures = 0;
   for (bool has_failed = true; has_failed; ++failures) {
     SCOPED_TRACE(failures);
-    MemoryFiles files({{"scene.pbrt", kScene}});
+    MemoryFiles files(std::map<std::string, std::string>{{"scene.pbrt", kScene}});
     const std::string name = "scene.pbrt";
     allocations_left = failures;
     const ParsedScene parsed = ReadScene(files, name);

@@ -49,17 +49,15 @@ TEST_F(SceneCacheTest, KeepsTwoScenes) {
   EXPECT_EQ(fetched_, 4);
 }
 
-TEST_F(SceneCacheTest, RefusesAScenesThatDoesNotFitAndDropsOthersForIt) {
+TEST_F(SceneCacheTest, RefusesASceneThatDoesNotFitAndDropsOthersForIt) {
   const SceneManifest small = SceneOf("1");
-  // 131,072 triangles.
-  const SceneManifest large =
-      SceneOf("2",
-              "Shape \"loopsubdiv\" \"integer levels\" 7 \"point3 P\" [1 0 0 -1 0 0 0 1 0 0 -1 0 0 "
-              "0 1 0 0 -1] "
-              "\"integer indices\" [0 2 4 2 1 4 1 3 4 3 0 4 2 0 5 1 2 5 3 1 5 0 3 5]\n");
+  std::string meshes;
+  for (int i = 0; i < 10'000; ++i)
+    meshes += "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]\n";
+  const SceneManifest large = SceneOf("2", meshes);
   ASSERT_TRUE(cache_.TracerFor(small).ok());
   // Its meshes fit, what is built of them does not.
-  available_ = 8 << 20;
+  available_ = 6 << 20;
   const Status refused = cache_.TracerFor(large).status();
   EXPECT_TRUE(absl::IsResourceExhausted(refused)) << refused;
   EXPECT_THAT(std::string(refused.message()),

@@ -165,6 +165,7 @@ void DirectiveReader::ReadDirectives(Tokenizer& tokens) {
     if (directive == nullptr) {
       ReportUnknown(token);
       SkipToDirective(tokens);
+      CheckRoom(token.location);
       continue;
     }
     Arguments arguments(directive->name, token.location, tokens, diagnostics_);
