@@ -120,7 +120,7 @@ def plot(path, rows):
                 return f"{x + index * width:.1f},{y + row_number * height:.1f}"
 
             out.append(f'<text x="{index * width + 40}" y="{row_number * height + 20}">'
-                       f'{scene}: relative MSE against {what}</text>')
+                       f'{scene}: MSE against {what}</text>')
             for error in (low * 1.4, high / 1.4):
                 y = place(first, error).split(",")[1]
                 out.append(f'<text x="{index * width + 2}" y="{y}">{error:.2g}</text>')
