@@ -31,6 +31,7 @@ Shape "sphere" "float nosuch" 1
 
 TEST(SceneReadingMemoryTest, EachAllocationMayFail) {
   int failures = 0;
+  int refused = 0;
   for (bool has_failed = true; has_failed; ++failures) {
     SCOPED_TRACE(failures);
     MemoryFiles files(std::map<std::string, std::string>{{"scene.pbrt", kScene}});
@@ -39,13 +40,19 @@ TEST(SceneReadingMemoryTest, EachAllocationMayFail) {
     const ParsedScene parsed = ReadScene(files, name);
     has_failed = allocations_left == kNever;
     allocations_left = kNever;
-    EXPECT_EQ(parsed.ok(), !has_failed);
-    if (!has_failed) continue;
     ASSERT_EQ(parsed.diagnostics.size(), 1U);
+    // The standard library's sort does without its buffer: then the scene is as ever.
+    if (parsed.ok()) {
+      EXPECT_THAT(parsed.diagnostics[0].message, testing::HasSubstr("nosuch"));
+      EXPECT_EQ(parsed.scene.meshes.size(), 1U);
+      continue;
+    }
+    ++refused;
+    EXPECT_TRUE(has_failed);
     EXPECT_THAT(parsed.diagnostics[0].message, testing::HasSubstr("more memory than there is"));
     EXPECT_TRUE(parsed.scene.meshes.empty());
   }
-  EXPECT_GT(failures, 100) << "reading allocates";
+  EXPECT_GT(refused, 100) << "reading allocates";
 }
 
 }  // namespace

@@ -1,6 +1,9 @@
 // A job is stopped with its image, goes on to a new end, and is stopped again, in any of its
 // states.
+#include <algorithm>
+#include <chrono>
 #include <string>
+#include <thread>
 
 #include "gtest/gtest.h"
 
@@ -80,6 +83,12 @@ v1::SubmitRequest ForSeconds(const v1::SceneManifest& scene, double time_s) {
   return request;
 }
 
+bool SaysThatFirstPassIsLate(const v1::Job& job) {
+  return std::ranges::any_of(job.warnings(), [](const std::string& warning) {
+    return warning.find("the 5 s were over before the first pass was whole") != std::string::npos;
+  });
+}
+
 // What is out when time is up is taken back; the image is that of the passes that are whole.
 TEST(StopAndExtendTest, TimeThatIsUpTakesLeasesBackAndKeepsWholePasses) {
   ServiceUnderTest service;
@@ -97,7 +106,7 @@ TEST(StopAndExtendTest, TimeThatIsUpTakesLeasesBackAndKeepsWholePasses) {
   EXPECT_EQ(ended.stop_reason(), v1::STOP_REASON_TIME);
   EXPECT_EQ(ended.progress().passes(), 1);
   EXPECT_EQ(ended.progress().photons(), 1000U);
-  EXPECT_EQ(ended.warnings_size(), 0);
+  EXPECT_FALSE(SaysThatFirstPassIsLate(ended));
   const auto told = worker.Sync(false, Duration::zero(), {second->lease_id()});
   ASSERT_EQ(told.message.revoked_lease_ids_size(), 1);
   EXPECT_EQ(told.message.revoked_lease_ids(0), second->lease_id());
@@ -115,12 +124,12 @@ TEST(StopAndExtendTest, TimeThatIsUpBeforeTheFirstPassWaitsForThatAlone) {
   ASSERT_TRUE(first);
   EXPECT_EQ(client.Get(job).message.warnings_size(), 0);
   service.clock().Move(std::chrono::seconds(5));
-  const auto has_warned = [](const v1::Job& now) { return now.warnings_size() == 0; };
-  const v1::Job warned = client.Watch(job, has_warned).message;
-  ASSERT_EQ(warned.warnings_size(), 1);
-  EXPECT_NE(warned.warnings(0).find("the 5 s were over before the first pass was whole"),
-            std::string::npos)
-      << warned.warnings(0);
+  v1::Job warned = client.Get(job).message;
+  for (int i = 0; i < 20'000 && !SaysThatFirstPassIsLate(warned); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    warned = client.Get(job).message;
+  }
+  ASSERT_TRUE(SaysThatFirstPassIsLate(warned));
   EXPECT_EQ(warned.state(), v1::JOB_STATE_RUNNING);
   IdleHandsWorker other(service, "other");
   EXPECT_FALSE(other.Sync(true, Duration::zero()).message.has_lease()) << "of a later pass";
@@ -131,7 +140,7 @@ TEST(StopAndExtendTest, TimeThatIsUpBeforeTheFirstPassWaitsForThatAlone) {
   const v1::Job ended = client.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).message;
   EXPECT_EQ(ended.stop_reason(), v1::STOP_REASON_TIME);
   EXPECT_EQ(ended.progress().passes(), 1);
-  EXPECT_EQ(ended.warnings_size(), 1);
+  EXPECT_TRUE(SaysThatFirstPassIsLate(ended));
 }
 
 }  // namespace
