@@ -94,29 +94,28 @@ double FormFactor(double x, double y) {
 }
 
 // The irradiance at `from` on a plane that looks up, and its standard error.
-std::array<double, 2> Irradiance(const LightSet& lights, Vec3 from) {
-  constexpr int kSamples = 20'000;
+std::array<double, 2> Irradiance(const LightSet& lights, Vec3 from, int samples) {
   KeyedRng rng(7);
   double sum = 0;
   double squares = 0;
-  for (int i = 0; i < kSamples; ++i) {
+  for (int i = 0; i < samples; ++i) {
     LightSample sample;
     const auto choice = static_cast<double>(rng.Uniform());
     const float u1 = rng.Uniform();
     if (!lights.SampleDirect(from, choice, u1, rng.Uniform(), sample)) continue;
     const auto value =
         static_cast<double>(Luminance(sample.radiance_over_pdf) * std::max(sample.wi.z, 0.0F));
-    sum += value / kSamples;
-    squares += value * value / kSamples;
+    sum += value / samples;
+    squares += value * value / samples;
   }
-  return {sum, std::sqrt(std::max(0.0, squares - sum * sum) / kSamples)};
+  return {sum, std::sqrt(std::max(0.0, squares - sum * sum) / samples)};
 }
 
 TEST(PortalLightTest, LightsByTheFormFactorOfTheRectangle) {
   const Lit lit(kEven);
   for (const auto& [x, y] : {std::pair{0.0, 0.0}, {0.3, 0.1}, {-2.0, 0.5}, {1.0, -3.0}}) {
     const auto [irradiance, error] =
-        Irradiance(*lit.lights, {static_cast<float>(x), static_cast<float>(y), 0});
+        Irradiance(*lit.lights, {static_cast<float>(x), static_cast<float>(y), 0}, 20'000);
     const double expected = 2 * kPiD * FormFactor(x, y);
     EXPECT_NEAR(irradiance, expected, 4.5 * error + 1e-5 * expected) << x << " " << y;
     // Drawn from the rectangle alone, by light: only the cosine is left.
@@ -195,8 +194,10 @@ TEST(PortalLightTest, SendsPhotonsAsItLights) {
         const double r = static_cast<double>(kRadius) * std::sqrt((i % 3 + 0.5) / 3);
         const double angle = 2 * kPiD * (i / 3 + 0.3) / 4;
         const auto [irradiance, error] =
-            Irradiance(*lit.lights, places[p] + Vec3{static_cast<float>(r * std::cos(angle)),
-                                                     static_cast<float>(r * std::sin(angle)), 0});
+            Irradiance(*lit.lights,
+                       places[p] + Vec3{static_cast<float>(r * std::cos(angle)),
+                                        static_cast<float>(r * std::sin(angle)), 0},
+                       2000);
         expected += irradiance / kPoints;
         variance += error * error / (kPoints * kPoints);
       }

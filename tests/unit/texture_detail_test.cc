@@ -10,8 +10,12 @@
 
 #include "gtest/gtest.h"
 
+#include "render/analysis/needs.h"
 #include "render/math/equal_area_square.h"
+#include "render/transport/light.h"
 #include "render/transport/sky_detail.h"
+#include "tests/support/test_scenes.h"
+#include "worker/photon_spectrum.h"
 
 namespace lucerna {
 namespace {
@@ -110,6 +114,47 @@ TEST(TextureDetailTest, OfACheckerboardIsThatOfItsPicture) {
   EXPECT_GT(details[2].u, 0);
   EXPECT_NEAR(details[2].u / details[3].u, 1, 1e-5);
   EXPECT_NEAR(details[2].v / details[3].v, 1, 1e-5);
+}
+
+// Light that leaves a picture has its detail beside that of the light's outline: waves over the
+// two metres of a square light, and as strong for one that is brighter.
+TEST(TextureDetailTest, OfAPictureOnALightIsThatOfItsLight) {
+  constexpr int kWidth = 512;
+  constexpr double kDepth = 0.5;
+  const double k = 2 * kPiD * 16;
+  const auto curvature_of = [&](float scale, bool has_picture) {
+    Scene scene;
+    AddMaterial(scene, DiffuseMaterial(0.5F));
+    AddQuad(scene, {-1, -1, -3}, {2, 0, 0}, {0, 2, 0}, 0);
+    AreaLight light;
+    light.radiance = Gray(1);
+    if (has_picture) {
+      light.picture = GreyPicture(kWidth, 3, [&](int x, int) {
+        return static_cast<double>(scale) * (1 + kDepth * std::cos(k * (x + 0.5) / kWidth));
+      });
+      light.largest_pixel = light.picture->Largest();
+    }
+    scene.area_lights.push_back(light);
+    AddQuad(scene, {-1, -1, 0}, {0, 2, 0}, {2, 0, 0}, 0, 0);
+    scene.meshes.back().uvs = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+    const auto intersector = Intersector::Create(scene).value();
+    const LightSet lights(scene, *intersector);
+    RenderSettings settings;
+    settings.width = settings.height = 64;
+    settings.initial_radius = 0.01;
+    settings.radius_controller = RadiusControllerKind::kFrequency;
+    const auto tracer =
+        SpectrumTracer::Create(scene, settings, NeedsOf(scene, settings), *intersector, lights)
+            .value();
+    Emission emission;
+    EXPECT_TRUE(lights.SampleEmission(0.5, 0.3F, 0.4F, 0.1F, 0.2F, emission));
+    return tracer->Leave(emission).spectrum.s;
+  };
+  const double plain = curvature_of(1, false);
+  for (const float scale : {1.0F, 40.0F}) {
+    EXPECT_NEAR((curvature_of(scale, true) - plain) / (WaveDetail(kDepth, k) / 4), 1, 1e-2)
+        << scale;
+  }
 }
 
 // A sky of luminance 1 + a z: the Laplacian over the sphere is -2 a z.
