@@ -1,6 +1,7 @@
 #include "client/render_flags.h"
 
 #include <algorithm>
+#include <cstdint>
 #include <string_view>
 
 #include "absl/strings/str_replace.h"
@@ -37,8 +38,11 @@ void ParseFlag(const Setting& setting, const std::string& text, RenderOverrides&
 void AddFlag(CLI::App& command, const Setting& setting, RenderOverrides& overrides,
              const std::string& help) {
   if (IsBool(setting)) {
-    command.add_flag_callback(
-        FlagOf(setting), [&] { ParseFlag(setting, "true", overrides); }, help);
+    // --flag=false counts as one less than none.
+    command.add_flag_function(
+        FlagOf(setting),
+        [&](std::int64_t count) { ParseFlag(setting, count > 0 ? "true" : "false", overrides); },
+        help);
     return;
   }
   command

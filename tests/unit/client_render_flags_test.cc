@@ -57,6 +57,14 @@ TEST(RenderFlagsTest, EveryFlagArrives) {
   EXPECT_EQ(ParseStop("--passes 3 --time 5.5 --error 2% --photons 6"), until);
 }
 
+// A switch that is said to be off was taken for one that is on.
+TEST(RenderFlagsTest, SwitchesMayBeTurnedOff) {
+  RenderOverrides expected;
+  expected.adaptive_photons = false;
+  expected.use_everything = true;
+  EXPECT_EQ(Parse("--adaptive-photons=false --use-everything=true").value(), expected);
+}
+
 // "3" is hardly ever meant as 300 %.
 TEST(RenderFlagsTest, AShareAboveOneNeedsItsPercentSign) {
   try {
