@@ -233,6 +233,11 @@ def alone(checks, folder):
     checks.run("selfcheck", "selfcheck", "--only", "number-")
     checks.run("bake", "bake", ROOT / "tests/scenes/corner.pbrt", "-o", folder / "a.ply",
                "--spacing", 1, "--passes", 12, "--photons-per-pass", 2000, "--quiet")
+    checks.run("bake", "bake", ROOT / "tests/scenes/corner.pbrt", "-o", folder / "a.glb",
+               "--spacing", 1, "--passes", 12, "--photons-per-pass", 2000, "--quiet")
+    checks.run("mesh-render", "render", ROOT / "tests/scenes/corner.pbrt", "--from-mesh",
+               folder / "a.glb", "--size", "8x8", "--passes", 2, "-o", folder / "drawn.exr",
+               "--quiet")
     compare = ["compare", SCENE, "--reference", reference, *SMALL, "--times", "0.1,0.2",
                "--repetitions", 2, "--settings", "first: --kernel constant", "--settings",
                "second: --radius-controller pppm", "--quiet"]
