@@ -5,8 +5,8 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <optional>
-#include <set>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -131,7 +131,7 @@ StatusOr<std::vector<RenderRequest>> RequestsOf(const RenderRequest& request,
                                                 std::string_view frames, bool names_images) {
   LUCERNA_ASSIGN_OR_RETURN(const std::vector<SceneFrame> found, FramesOf(scenes, frames));
   std::vector<RenderRequest> requests;
-  std::set<std::string> images;
+  std::map<std::string, std::size_t> images;  // and which request writes them
   for (const SceneFrame& frame : found) {
     RenderRequest& one = requests.emplace_back(request);
     one.scene.path = frame.scene;
@@ -140,7 +140,9 @@ StatusOr<std::vector<RenderRequest>> RequestsOf(const RenderRequest& request,
     one.mesh = WithFrameNumber(request.mesh, frame.number);
     if (names_images && one.outputs.empty()) one.outputs.image = ImageNameOf(frame.scene);
     for (const std::string& image : {one.outputs.image, one.outputs.png}) {
-      if (image.empty() || images.insert(image).second) continue;
+      // Both images of one request: CheckOutputs.
+      const auto known = images.emplace(image, requests.size()).first;
+      if (image.empty() || known->second == requests.size()) continue;
       return Failure(
           ExitCode::kUsage,
           absl::StrCat("two scenes would be written to ", image,

@@ -108,8 +108,10 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
       if (traits.area_light == kNoAreaLight) return;
       if (LightOf(traits).picture != nullptr) emitters += of_shape;
     };
-    for (const TriangleMesh& mesh : scene.meshes)
-      count(mesh.traits, static_cast<double>(mesh.indices.size() / 3));
+    for (const TriangleMesh& mesh : scene.meshes) {
+      const std::size_t triangles = mesh.indices.size() / 3;
+      count(mesh.traits, static_cast<double>(triangles));
+    }
     ForEachAnalyticShape(scene, [&](const auto& shape) { count(shape.traits, 1); });
     int side = kMostSpreadSide;
     while (side > 1 && emitters * side * side > kMostSpreadCells)

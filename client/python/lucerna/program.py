@@ -86,13 +86,14 @@ def compare(scene: StrPath, reference: StrPath, settings: Mapping[str, Mapping[s
             None, *, times: Sequence[float] | None = None, repetitions: int | None = None,
             program: StrPath = "lucerna", **common: Value) -> dict[str, Any]:
     """Which settings are ahead after equal time? Renders the scene on this machine with each of
-    `settings`, given by a name of your choice, and returns what `lucerna compare --json` prints.
+    `settings`, given by a name of your choice, and returns what `lucerna compare --json --full`
+    prints.
 
     reference: an EXR file, best of `lucerna reference`. times: processor seconds over cores, growing.
     common: settings of all. Without `settings` every radius controller is tried.
     """
     words = ["compare", os.path.abspath(scene), "--reference", os.path.abspath(reference), "--json",
-             "--quiet", *flags(program, common)]
+             "--full", "--quiet", *flags(program, common)]
     for name, one in (settings or {}).items():
         if any(set(text_of(value)) & set(" \t\r\n\"'") for value in one.values()):
             raise UsageError(f"setting \"{name}\": a value holds a space or a quotation mark")
