@@ -212,7 +212,7 @@ Status CheckRequest(const BakeRequest& request) {
   return CheckWritable(request.output_path);
 }
 
-// Measures, and keeps what is to be told of it.
+// Measures, and keeps what is reported of it.
 class Bakery {
  public:
   Bakery(const BakeRequest& request, const OutputOptions& output_options, const Scene& scene,

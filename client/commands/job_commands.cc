@@ -164,6 +164,11 @@ Status CheckRequestOfMesh(const RenderRequest& request) {
                                                   " has no meaning with --from-mesh, which traces "
                                                   "no photons; leave it away"));
   }
+  if (request.save_every_s > 0) {
+    return Failure(ExitCode::kUsage,
+                   "--save-every has no meaning with --from-mesh, which writes its image at once; "
+                   "leave it away");
+  }
   if (!request.reference.empty() || request.resumes) {
     return Failure(ExitCode::kUsage, absl::StrCat(request.resumes ? "--resume" : "--reference",
                                                   " has no meaning with --from-mesh; leave it "
@@ -276,6 +281,9 @@ Status Render(const std::vector<RenderRequest>& requests, const ClusterOptions& 
 Status Submit(const RenderRequest& request, const Endpoint& server,
               const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
+  if (request.save_every_s > 0 && request.outputs.empty()) {
+    return Failure(ExitCode::kUsage, "--save-every needs a file to write to; give one with -o");
+  }
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene, request.overrides, output_options.quiet));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));

@@ -322,6 +322,9 @@ TEST_F(ClientCommandsTest, FramesAreRenderedToImagesOfTheirNumbers) {
 }
 
 TEST_F(ClientCommandsTest, TheImageSoFarIsSavedFromTimeToTime) {
+  const Ran nowhere = Run({"submit", SceneOfTests("corner.pbrt"), "--save-every", "5m"});
+  EXPECT_EQ(nowhere.code, 2);
+  EXPECT_NE(nowhere.err.find("--save-every needs a file"), std::string::npos) << nowhere.err;
   const pid_t pid = Start({"render", SceneOfTests("corner.pbrt"), "--size", "16x16", "--passes",
                            "1000000", "--save-every", "50ms", "-o", "out.exr", "--quiet"});
   // An image is there while the render goes on.

@@ -107,9 +107,9 @@ TEST(StopAndExtendTest, TimeThatIsUpTakesLeasesBackAndKeepsWholePasses) {
   EXPECT_EQ(ended.progress().passes(), 1);
   EXPECT_EQ(ended.progress().photons(), 1000U);
   EXPECT_FALSE(SaysThatFirstPassIsLate(ended));
-  const auto told = worker.Sync(false, Duration::zero(), {second->lease_id()});
-  ASSERT_EQ(told.message.revoked_lease_ids_size(), 1);
-  EXPECT_EQ(told.message.revoked_lease_ids(0), second->lease_id());
+  const auto answer = worker.Sync(false, Duration::zero(), {second->lease_id()});
+  ASSERT_EQ(answer.message.revoked_lease_ids_size(), 1);
+  EXPECT_EQ(answer.message.revoked_lease_ids(0), second->lease_id());
   EXPECT_EQ(worker.Commit(*second).message.outcome(), v1::COMMIT_OUTCOME_SUPERSEDED);
 }
 
