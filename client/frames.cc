@@ -15,7 +15,8 @@
 namespace lucerna {
 namespace {
 
-constexpr std::size_t kMostFrames = 1'000'000;
+// All requests are made before the first is rendered, of some hundred bytes each.
+constexpr std::size_t kMostFrames = 100'000;
 
 Status NoFrames(std::string_view frames) {
   return Failure(ExitCode::kUsage,

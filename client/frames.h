@@ -24,7 +24,7 @@ struct SceneFrame {
 // The scenes in order. With `frames`, such as "1-24" or "1,5,8-10", each scene once for every
 // number. Else a scene's number is what its file's name ends with, before the ending, or its place
 // in the list, from 1.
-// Errors: Failure(kUsage) for frames that are none or more than a million, frames without a #, and
+// Errors: Failure(kUsage) for frames that are none or more than 100,000, frames without a #, and
 // a # without frames.
 [[nodiscard]] StatusOr<std::vector<SceneFrame>> FramesOf(const std::vector<std::string>& scenes,
                                                          std::string_view frames);
