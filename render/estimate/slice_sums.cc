@@ -43,6 +43,9 @@ void SetWhatFollowsFromRadiance(SliceSums& slice) {
   LUCERNA_CHECK(slice.passes.size() == 1);
   const std::size_t pixels = slice.pixels();
   const double half = slice.passes.first % 2 == 0 ? 1 : -1;
+  const auto bits = [&](std::size_t column) {
+    return SignificantBits(slice.passes, column, slice.evidence);
+  };
   for (std::size_t c = 0; c < 3; ++c) {
     const float* const photons = slice.columns[kPhotonRadiance + c].data();
     const float* const direct = slice.columns[kDirectRadiance + c].data();
@@ -50,14 +53,14 @@ void SetWhatFollowsFromRadiance(SliceSums& slice) {
     for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
       half_difference[pixel] =
           Rounded(half * (static_cast<double>(photons[pixel]) + static_cast<double>(direct[pixel])),
-                  Precision::kRadiance);
+                  bits(kHalfDifference));
     }
   }
   std::ranges::fill(slice.columns[kSquaredDeviations], 0.0F);
   const Luminances luminances(slice);
   float* const largest = slice.columns[kLargestLuminance].data();
   for (std::size_t pixel = 0; pixel < pixels; ++pixel)
-    largest[pixel] = Rounded(std::max(0.0, luminances[pixel]), Precision::kStatistic);
+    largest[pixel] = Rounded(std::max(0.0, luminances[pixel]), bits(kLargestLuminance));
 }
 
 Status MergeSibling(SliceSums& sum, const SliceSums& sibling) {
@@ -69,6 +72,11 @@ Status MergeSibling(SliceSums& sum, const SliceSums& sibling) {
     return absl::OutOfRangeError("the tally of a slice would not fit in 64 bits");
   }
   const std::size_t pixels = sum.pixels();
+  const PassRange together = {std::min(sum.passes.first, sibling.passes.first),
+                              std::max(sum.passes.last, sibling.passes.last)};
+  const auto bits = [&](std::size_t column) {
+    return SignificantBits(together, column, sum.evidence);
+  };
   const auto half = static_cast<double>(sum.passes.size());
   // Before the radiance is added up.
   float* const deviations = sum.columns[kSquaredDeviations].data();
@@ -79,7 +87,7 @@ Status MergeSibling(SliceSums& sum, const SliceSums& sibling) {
     deviations[pixel] = Rounded(
         static_cast<double>(deviations[pixel]) + static_cast<double>(their_deviations[pixel]) +
             DeviationBetween(half, luminances[pixel], half, their_luminances[pixel]),
-        Precision::kStatistic);
+        bits(kSquaredDeviations));
   }
   for (std::size_t column = 0; column < sum.columns.size(); ++column) {
     if (column == kSquaredDeviations) continue;
@@ -90,8 +98,8 @@ Status MergeSibling(SliceSums& sum, const SliceSums& sibling) {
         ours[pixel] = std::max(ours[pixel], theirs[pixel]);
       continue;
     }
-    constexpr float kLargest = 0x1.fep127F;
-    const unsigned int dropped = DroppedBits(PrecisionOf(column, sum.evidence));
+    constexpr auto kLargest = static_cast<float>(kLargestSum);
+    const unsigned int dropped = DroppedBits(bits(column));
     for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
       ours[pixel] =
           RoundedFloat(std::clamp(ours[pixel] + theirs[pixel], -kLargest, kLargest), dropped);
@@ -103,8 +111,7 @@ Status MergeSibling(SliceSums& sum, const SliceSums& sibling) {
   if (sum.reports.size() > kMostReports) sum.reports.resize(kMostReports);
   sum.tally += sibling.tally;
   sum.eye_rays += sibling.eye_rays;
-  sum.passes = {std::min(sum.passes.first, sibling.passes.first),
-                std::max(sum.passes.last, sibling.passes.last)};
+  sum.passes = together;
   std::vector<PhotonKey>& dropped = sum.dropped_photons;
   dropped.insert(dropped.end(), sibling.dropped_photons.begin(), sibling.dropped_photons.end());
   std::ranges::sort(dropped);

@@ -5,12 +5,12 @@
 // coordinator adds slices to slices. Sums are taken in a fixed tree, each node the rounded sum of
 // its two halves, so that the bits do not depend on who adds up what.
 //
-// Sums of radiance are rounded to 16 significant bits and all others to 8, to nearest, when a pass
-// becomes a slice and at every node: far below the noise of the passes that
-// they sum, and half the bytes on the wire.
+// Sums are rounded, to nearest, when a pass becomes a slice and at every node, to as many
+// significant bits as their noise leaves them (SignificantBits): a third of a float's bytes on the
+// wire.
 //
 // Invariants
-//   S1  Every column that is present has pixels() rows, all finite, in its column's precision.
+//   S1  Every column that is present has pixels() rows, all finite, of its SignificantBits.
 //   S2  `passes` is a slice (IsSlice).
 //   S3  Of a single pass, columns that FollowsFromRadiance names are as SetWhatFollowsFromRadiance
 //       sets them.
@@ -33,9 +33,6 @@
 #include "render/math/rgb.h"
 
 namespace lucerna {
-
-// Significant bits of a column's floats.
-enum class Precision : std::uint8_t { kRadiance = 16, kStatistic = 8 };
 
 // The columns that every slice has. Radiance in the working space.
 enum SliceColumn : std::size_t {
@@ -107,17 +104,28 @@ struct SliceShape {
 [[nodiscard]] constexpr std::size_t ColumnsOf(const PassRange& passes, std::size_t evidence) {
   return kSliceColumns + evidence + (HasFeatures(passes) ? std::size_t{kFeatureColumns} : 0);
 }
-[[nodiscard]] constexpr Precision PrecisionOf(std::size_t column, std::size_t evidence) {
-  const bool is_statistic =
-      column >= kSquaredDeviations && column < kSliceColumns + evidence && column != kPhotonCount;
-  return is_statistic ? Precision::kStatistic : Precision::kRadiance;
+// Significant bits of a column's floats, that is of sums over `passes`. What photons bring to one
+// pass differs by tenths from pass to pass: 9 bits, an error of a thousandth, are far below that,
+// and as noise falls with the root of the passes a bit more for each factor of four stays so. Direct
+// light may be without noise: 12 bits. What decides about radii and errors needs no more than a
+// hundredth.
+[[nodiscard]] constexpr unsigned int SignificantBits(const PassRange& passes, std::size_t column,
+                                                     std::size_t evidence) {
+  constexpr unsigned int kAll = 16;
+  const auto doublings = static_cast<unsigned int>(std::bit_width(passes.size()) - 1);
+  if (column < kDirectRadiance) return 9 + (doublings + 1) / 2;
+  if (column < kHalfDifference) return 12;
+  // Of a single pass it is the radiance itself, from which the first difference is taken.
+  if (column < kSquaredDeviations) return passes.size() == 1 ? kAll : 8;
+  if (column == kPhotonCount || column >= kSliceColumns + evidence) return kAll;
+  return 6;
 }
 
 // These are made for every pixel of every pass, in loops over vectors.
 
-// The bits of a float that its precision leaves zero.
-[[nodiscard]] constexpr unsigned int DroppedBits(Precision precision) {
-  return 24U - static_cast<unsigned int>(precision);
+// The low bits of a float that are zero where it has so many significant ones.
+[[nodiscard]] constexpr unsigned int DroppedBits(unsigned int significant_bits) {
+  return 24 - significant_bits;
 }
 // `value` without its lowest bits, to nearest, ties to even. Requires one whose rounding is finite.
 [[nodiscard]] constexpr float RoundedFloat(float value, unsigned int dropped_bits) {
@@ -127,12 +135,13 @@ struct SliceShape {
   const std::uint32_t half = (mask >> 1) + ((bits >> dropped_bits) & 1);
   return std::bit_cast<float>((bits + half) & ~mask);
 }
-// `value` in this precision, to nearest, ties to even; what no float holds becomes the largest.
-[[nodiscard]] constexpr float Rounded(double value, Precision precision) {
-  // The largest float of any precision here, so that rounding up stays finite.
-  constexpr double kLargest = 0x1.fep127;
-  return RoundedFloat(static_cast<float>(std::clamp(value, -kLargest, kLargest)),
-                      DroppedBits(precision));
+// Rounding this up stays finite with any number of bits here.
+inline constexpr double kLargestSum = 0x1.f8p127;
+// `value` with so many significant bits, to nearest, ties to even; what no float holds becomes the
+// largest.
+[[nodiscard]] constexpr float Rounded(double value, unsigned int significant_bits) {
+  return RoundedFloat(static_cast<float>(std::clamp(value, -kLargestSum, kLargestSum)),
+                      DroppedBits(significant_bits));
 }
 
 // All columns zero.

@@ -58,7 +58,7 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   for (std::vector<float>& column : slice.columns)
     columns.push_back(column.data());
   const auto set = [&](std::size_t column, std::size_t pixel, double value) {
-    columns[column][pixel] = Rounded(value, PrecisionOf(column, evidence));
+    columns[column][pixel] = Rounded(value, SignificantBits(slice.passes, column, evidence));
   };
 
   std::vector<PixelOfPass> brought(pixels);

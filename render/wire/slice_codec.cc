@@ -12,11 +12,11 @@
 namespace lucerna {
 namespace {
 
-constexpr std::string_view kMagic = "LSL3";
+constexpr std::string_view kMagic = "LSL4";
 
-// The low bits of a float that its precision leaves zero.
-unsigned int EmptyBits(std::size_t column, std::size_t evidence) {
-  return 24U - static_cast<unsigned int>(PrecisionOf(column, evidence));
+// The low bits of a float of that column that are zero.
+unsigned int EmptyBits(const PassRange& passes, std::size_t column, std::size_t evidence) {
+  return DroppedBits(SignificantBits(passes, column, evidence));
 }
 
 Status Malformed(std::string_view what) {
@@ -62,7 +62,7 @@ std::string EncodeSlice(const SliceSums& slice) {
   std::vector<std::uint32_t> codes(slice.pixels());
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
     if (FollowsFromRadiance(slice.passes, column)) continue;
-    const unsigned int empty = EmptyBits(column, slice.evidence);
+    const unsigned int empty = EmptyBits(slice.passes, column, slice.evidence);
     std::ranges::transform(slice.columns[column], codes.begin(), [&](float value) {
       return std::bit_cast<std::uint32_t>(value) >> empty;
     });
@@ -119,7 +119,7 @@ StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape)
   for (std::size_t column = 0; column < columns; ++column) {
     std::vector<float>& values = slice.columns.emplace_back(shape.pixels);
     if (FollowsFromRadiance(shape.passes, column)) continue;
-    reader.Floats(EmptyBits(column, shape.evidence), values);
+    reader.Floats(EmptyBits(shape.passes, column, shape.evidence), values);
     if (!reader.ok()) {
       return Malformed(
           "its columns are truncated or damaged, or a value is not finite or too long");

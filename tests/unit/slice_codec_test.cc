@@ -33,7 +33,7 @@ SliceSums RandomSlice(const SliceShape& shape) {
       if (rng.Bits() % 4 == 0) continue;
       const double sign = rng.Bits() % 2 == 0 ? 1 : -1;
       value = Rounded(sign * std::exp(60 * static_cast<double>(rng.Uniform()) - 30),
-                      PrecisionOf(column, shape.evidence));
+                      SignificantBits(shape.passes, column, shape.evidence));
     }
   }
   if (shape.passes.size() == 1) SetWhatFollowsFromRadiance(slice);
@@ -80,13 +80,13 @@ TEST(SliceCodecTest, BringsTheEndsOfEveryColumnBack) {
   const SliceShape shape = Shape({3, 4}, 6, kSectors);
   SliceSums slice = RandomSlice(shape);
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
-    const Precision precision = PrecisionOf(column, shape.evidence);
+    const unsigned int bits = SignificantBits(shape.passes, column, shape.evidence);
     slice.columns[column] = {
-        Rounded(1e300, precision),
-        Rounded(-1e300, precision),
-        Rounded(std::numeric_limits<double>::denorm_min(), precision),
+        Rounded(1e300, bits),
+        Rounded(-1e300, bits),
+        Rounded(std::numeric_limits<double>::denorm_min(), bits),
         -0.0F,
-        std::bit_cast<float>(std::uint32_t{1} << (24 - static_cast<int>(precision))),
+        std::bit_cast<float>(std::uint32_t{1} << DroppedBits(bits)),
         1};
   }
   SetWhatFollowsFromRadiance(slice);
@@ -171,17 +171,18 @@ TEST(SliceCodecTest, RefusesNumbersThatAreNotFinite) {
   }
 }
 
-// The planes of a column may hold more bits than its precision has; what remained after the shift
+// The planes of a column may hold more bits than its values have; what remained after the shift
 // would be another number.
 TEST(SliceCodecTest, RefusesAValueWithTooManyBits) {
   const SliceShape shape = Shape({16, 18}, 2, 0);
-  const auto bytes_with = [&](std::uint32_t radiance, std::uint32_t statistic) {
+  // With a bit above all others in one column, or nowhere.
+  const auto bytes_with_bit_in = [&](std::size_t damaged) {
     ByteWriter writer;
     SliceSums head = EmptySlice(shape.passes, 0, 0);
     head.columns.clear();
     head.tally.photons = kPhotons;
     // The head of a slice of 2 pixels: that of none, with two numbers changed.
-    writer.Bytes("LSL3");
+    writer.Bytes("LSL4");
     writer.Varint(shape.passes.first);
     writer.Varint(shape.passes.size());
     writer.Varint(shape.pixels);
@@ -189,15 +190,17 @@ TEST(SliceCodecTest, RefusesAValueWithTooManyBits) {
     const std::string of_none = EncodeSlice(head);
     writer.Bytes(std::string_view(of_none).substr(4 + 4));
     for (std::size_t column = 0; column < kSliceColumns; ++column) {
-      const bool is_radiance = PrecisionOf(column, 0) == Precision::kRadiance;
-      const std::vector<std::uint32_t> codes = {0, is_radiance ? radiance : statistic};
+      const unsigned int empty = DroppedBits(SignificantBits(shape.passes, column, 0));
+      const std::uint32_t one = std::bit_cast<std::uint32_t>(1.0F) >> empty;
+      const std::uint32_t above = std::uint32_t{1} << (32 - empty);
+      const std::vector<std::uint32_t> codes = {0, column == damaged ? above : one};
       writer.Planes(codes);
     }
     return writer.Take();
   };
-  EXPECT_TRUE(DecodeSlice(bytes_with(0xBF8000, 0xBF80), shape).ok());
-  EXPECT_FALSE(DecodeSlice(bytes_with(0x1000000, 0), shape).ok());
-  EXPECT_FALSE(DecodeSlice(bytes_with(0, 0x10000), shape).ok());
+  EXPECT_TRUE(DecodeSlice(bytes_with_bit_in(kSliceColumns), shape).ok());
+  for (std::size_t column = 0; column < kSliceColumns; ++column)
+    EXPECT_FALSE(DecodeSlice(bytes_with_bit_in(column), shape).ok()) << column;
 }
 
 // Whoever is told to replay a photon must find it.

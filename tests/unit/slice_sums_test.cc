@@ -24,7 +24,7 @@ SliceSums RandomPass(std::uint64_t pass) {
     if (column == kSquaredDeviations) continue;
     for (float& value : slice.columns[column]) {
       const double number = std::exp(8.0 * static_cast<double>(rng.Uniform()) - 4.0);
-      value = Rounded(number, PrecisionOf(column, kEvidence));
+      value = Rounded(number, SignificantBits(slice.passes, column, kEvidence));
     }
   }
   slice.tally.photons = 10 + pass;
@@ -40,17 +40,38 @@ double LuminanceAt(const SliceSums& slice, std::size_t pixel) {
 }
 
 TEST(SliceSumsTest, RoundsToNearestWithTiesToEven) {
-  EXPECT_EQ(Rounded(1, Precision::kStatistic), 1.0F);
+  EXPECT_EQ(Rounded(1, 8), 1.0F);
   // 8 significant bits: steps of 2^-7 from 1 on.
-  EXPECT_EQ(Rounded(1 + 0x1.8p-8, Precision::kStatistic), 1.0F + 0x1p-7F);
-  EXPECT_EQ(Rounded(1 + 0x0.8p-8, Precision::kStatistic), 1.0F);
-  EXPECT_EQ(Rounded(1 + 0x1p-8, Precision::kStatistic), 1.0F);            // tie, 1 is even
-  EXPECT_EQ(Rounded(1 + 0x3p-8, Precision::kStatistic), 1.0F + 0x4p-8F);  // tie, upwards
-  EXPECT_EQ(Rounded(-1 - 0x1.8p-8, Precision::kStatistic), -1.0F - 0x1p-7F);
-  EXPECT_EQ(Rounded(1 + 0x1p-16, Precision::kRadiance), 1.0F);
-  EXPECT_EQ(Rounded(1 + 0x1.8p-16, Precision::kRadiance), 1.0F + 0x1p-15F);
-  EXPECT_TRUE(std::isfinite(Rounded(1e300, Precision::kStatistic)));
-  EXPECT_TRUE(std::isfinite(Rounded(-1e300, Precision::kRadiance)));
+  EXPECT_EQ(Rounded(1 + 0x1.8p-8, 8), 1.0F + 0x1p-7F);
+  EXPECT_EQ(Rounded(1 + 0x0.8p-8, 8), 1.0F);
+  EXPECT_EQ(Rounded(1 + 0x1p-8, 8), 1.0F);            // tie, 1 is even
+  EXPECT_EQ(Rounded(1 + 0x3p-8, 8), 1.0F + 0x4p-8F);  // tie, upwards
+  EXPECT_EQ(Rounded(-1 - 0x1.8p-8, 8), -1.0F - 0x1p-7F);
+  EXPECT_EQ(Rounded(1 + 0x1p-16, 16), 1.0F);
+  EXPECT_EQ(Rounded(1 + 0x1.8p-16, 16), 1.0F + 0x1p-15F);
+}
+
+// What is too large becomes the largest sum, which needs no rounding with any number of bits.
+TEST(SliceSumsTest, RoundingStaysFinite) {
+  for (const PassRange& passes : {PassRange{0, 1}, PassRange{16, 18}, PassRange{512, 576}}) {
+    for (std::size_t column = 0; column < ColumnsOf(passes, kEvidence); ++column) {
+      const unsigned int bits = SignificantBits(passes, column, kEvidence);
+      EXPECT_EQ(Rounded(1e300, bits), static_cast<float>(kLargestSum)) << column;
+      EXPECT_EQ(Rounded(-1e300, bits), -static_cast<float>(kLargestSum)) << column;
+    }
+  }
+}
+
+// What photons bring differs from pass to pass by a share of itself, for a sum of n passes by 1 over
+// the root of n of that: an error of rounding may be no more of it.
+TEST(SliceSumsTest, RoundingStaysTheSameShareOfThePhotonsNoise) {
+  const auto largest_error = [](const PassRange& passes) {
+    return std::exp2(-static_cast<double>(SignificantBits(passes, kPhotonRadiance, kEvidence)));
+  };
+  const double of_one = largest_error({16, 17});
+  EXPECT_LE(of_one, 0.002);
+  for (std::uint64_t size = 1; size <= kLongestRound; size *= 2)
+    EXPECT_LE(largest_error({512, 512 + size}), of_one / std::sqrt(static_cast<double>(size)));
 }
 
 TEST(SliceSumsTest, SiblingsMakeTheSameSumInEitherOrder) {
