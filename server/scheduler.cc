@@ -14,10 +14,10 @@ namespace {
 constexpr std::size_t kTimesKept = 31;
 // With fewer commits than this the usual time of one is unknown.
 constexpr std::size_t kTimesNeeded = 3;
-// A slice shall be there when so much of the time that a job has left is over, by the usual time
-// from lending to merging. With a quarter, slices of the last minute of a large farm were so short
-// that they filled its link.
-constexpr double kShareOfTimeLeft = 0.5;
+// A slice shall be there when so much of the time that a job has left is over, by the time from
+// lending to merging of the worker's last slice, or of most workers. With a quarter, slices of the
+// last minute of a large farm were so short that they filled its link.
+constexpr double kShareOfTimeLeft = 0.8;
 // Of a registration, so many of its last leases are known.
 constexpr std::size_t kMostPast = 64;
 // So many audits are looked at for one worker. A worker is passed over only by audits that it has a
@@ -632,7 +632,7 @@ StatusOr<Scheduler::Taken> Scheduler::TakeResult(const BatchClaim& claim, const 
   work.returned.erase(range);
   work.poisoned.erase(range);
   if (const auto lease = leases_.find(lease_id); lease != leases_.end()) {
-    NoteTime(kind, range, now - lease->second.lent_at);
+    NoteTime(lease->second, now);
     EraseLease(lease_id, Ending::kDelivered);
     const auto lent = work.lent.find(range);
     lent->second.erase(lease_id);
@@ -663,9 +663,11 @@ void Scheduler::RefuseResult(const BatchClaim& claim, std::string_view reason) {
   QuarantineIfUnreliable(record, failure);
 }
 
-void Scheduler::NoteTime(WorkKind kind, WorkRange range, Duration lease_time) {
-  const auto of_kind = static_cast<std::size_t>(kind);
-  times_[of_kind].push_back(Seconds(lease_time) / static_cast<double>(range.size()));
+void Scheduler::NoteTime(const Lease& lease, SteadyTime now) {
+  const auto of_kind = static_cast<std::size_t>(lease.kind);
+  const double time = Seconds(now - lease.lent_at) / static_cast<double>(lease.range.size());
+  if (lease.kind == WorkKind::kPasses) workers_.at(lease.worker).pass_time = time;
+  times_[of_kind].push_back(time);
   if (times_[of_kind].size() > kTimesKept) times_[of_kind].pop_front();
   usual_times_[of_kind] = MedianOf(times_[of_kind]);
 }
@@ -675,13 +677,12 @@ void Scheduler::Commit(const PassKey& key, WorkRange range, SteadyTime now) {
   const auto found = open_.find(key);
   if (found == open_.end()) return;
   Work& work = found->second;
-  Duration lease_time = Duration::max();
   const auto lent = work.lent.find(range);
   if (lent != work.lent.end()) {
-    // The shortest: a lease that had to be doubled says nothing of how long a batch takes.
-    for (const std::string& id : lent->second)
-      lease_time = std::min(lease_time, now - leases_.at(id).lent_at);
-    NoteTime(work.kind, range, lease_time);
+    // The newest: a lease that had to be doubled says nothing of how long a batch takes.
+    const auto newest = std::ranges::max_element(
+        lent->second, {}, [&](const std::string& id) { return leases_.at(id).lent_at; });
+    NoteTime(leases_.at(*newest), now);
   }
   Settle(key, work, range);
   UpdateLendable(key, work);
@@ -769,8 +770,9 @@ int Scheduler::LiveWorkers() const {
 // Leases
 // ---------------------------------------------------------------------------------------------
 
-std::uint64_t Scheduler::BatchSize(const Work& work, SteadyTime now) const {
-  if (work.kind == WorkKind::kPasses) return SliceSize(work, now);
+std::uint64_t Scheduler::BatchSize(const Work& work, std::optional<double> pass_time,
+                                   SteadyTime now) const {
+  if (work.kind == WorkKind::kPasses) return SliceSize(work, pass_time, now);
   if (options_.fixed_batch > 0) return std::min(options_.fixed_batch, work.rest.size());
   const std::uint64_t ways = std::clamp<std::uint64_t>(live_workers_, 1, options_.max_split_ways);
   const std::uint64_t share = CeilDivide(work.total, ways);
@@ -779,12 +781,13 @@ std::uint64_t Scheduler::BatchSize(const Work& work, SteadyTime now) const {
 
 // Long slices cost the coordinator and the network least; but every worker shall have one and find
 // a second one waiting, and what is not done when time is up is lost.
-std::uint64_t Scheduler::SliceSize(const Work& work, SteadyTime now) const {
+std::uint64_t Scheduler::SliceSize(const Work& work, std::optional<double> pass_time,
+                                   SteadyTime now) const {
   std::uint64_t size = std::min(
       {round_passes_ / (options_.slices_per_worker * std::max<std::uint64_t>(live_workers_, 1)),
        options_.max_slice, work.rest.size()});
   if (work.due) {
-    const std::optional<double> time = UsualTime(WorkKind::kPasses);
+    const std::optional<double> time = pass_time ? pass_time : UsualTime(WorkKind::kPasses);
     const double left = Seconds(*work.due - now);
     if (!time || left <= 0) {
       size = 1;
@@ -806,7 +809,7 @@ bool Scheduler::HasBatchesToSpare(SteadyTime now) const {
     if (shares_.IsHeld(key.job_id)) continue;
     const Work& work = open_.at(key);
     batches += work.returned.size();
-    if (work.rest.size() > 0) batches += CeilDivide(work.rest.size(), BatchSize(work, now));
+    if (work.rest.size() > 0) batches += CeilDivide(work.rest.size(), BatchSize(work, std::nullopt, now));
     if (batches > idle_workers_) return true;
   }
   return false;
@@ -826,14 +829,15 @@ std::optional<BatchLease> Scheduler::Lend(const std::string& worker_id, SteadyTi
   if (!job_id) return std::nullopt;
   // A worker that is busy fetches ahead only what the idle ones leave over; else one worker would
   // take a whole last pass and the others would stand by.
-  if (!workers_.at(worker_id).leases.empty() && !HasBatchesToSpare(now)) return std::nullopt;
+  const Worker& worker = workers_.at(worker_id);
+  if (!worker.leases.empty() && !HasBatchesToSpare(now)) return std::nullopt;
   const PassKey key = *lendable_.lower_bound({*job_id, 0});
   Work& work = open_.at(key);
   WorkRange range;
   if (!work.returned.empty()) {
     // One that this worker has not failed at, if there is one.
     const std::map<WorkRange, Losses>& losses = work.losses;
-    const std::string& record = workers_.at(worker_id).record;
+    const std::string& record = worker.record;
     const auto is_new_to_worker = [&](const WorkRange& returned) {
       const auto found = losses.find(returned);
       return found == losses.end() || !found->second.workers.contains(record);
@@ -843,7 +847,7 @@ std::optional<BatchLease> Scheduler::Lend(const std::string& worker_id, SteadyTi
     range = *choice;
     work.returned.erase(choice);
   } else {
-    range = {work.rest.first, work.rest.first + BatchSize(work, now)};
+    range = {work.rest.first, work.rest.first + BatchSize(work, worker.pass_time, now)};
     work.rest.first = range.last;
     ++lent_anew_;
   }

@@ -270,6 +270,8 @@ class Scheduler {
     bool may_be_lent = true;
     std::set<std::string> leases;
     std::uint64_t place = 0;  // in the queue for leases; 0: does not wait
+    // How long a pass of its last slice took, from lending to merging [s].
+    std::optional<double> pass_time;
     // What it held when it was last heard of.
     std::vector<std::pair<PassKey, WorkRange>> interrupted;
     std::deque<PastLease> past;  // the newest
@@ -334,8 +336,11 @@ class Scheduler {
   void AddWork(const PassKey& key, Work work) LUCERNA_REQUIRES(mutex_);
 
   // Of the next batch. Requires work.rest.size() > 0.
-  std::uint64_t BatchSize(const Work& work, SteadyTime now) const LUCERNA_REQUIRES(mutex_);
-  std::uint64_t SliceSize(const Work& work, SteadyTime now) const LUCERNA_REQUIRES(mutex_);
+  // `pass_time`: of the worker that it is for, or of none.
+  std::uint64_t BatchSize(const Work& work, std::optional<double> pass_time, SteadyTime now) const
+      LUCERNA_REQUIRES(mutex_);
+  std::uint64_t SliceSize(const Work& work, std::optional<double> pass_time, SteadyTime now) const
+      LUCERNA_REQUIRES(mutex_);
   // Whether there are more batches to hand out than idle workers.
   bool HasBatchesToSpare(SteadyTime now) const LUCERNA_REQUIRES(mutex_);
   std::optional<BatchLease> Lend(const std::string& worker_id, SteadyTime now)
@@ -384,7 +389,7 @@ class Scheduler {
   void Forget(std::map<std::string, Worker>::iterator worker, SteadyTime now)
       LUCERNA_REQUIRES(mutex_);
   StatusOr<Standing> StandingLocked(const BatchClaim& claim) const LUCERNA_REQUIRES(mutex_);
-  void NoteTime(WorkKind kind, WorkRange range, Duration lease_time) LUCERNA_REQUIRES(mutex_);
+  void NoteTime(const Lease& lease, SteadyTime now) LUCERNA_REQUIRES(mutex_);
   // How old a lease may become by being renewed.
   Duration LongestAge(const Lease& lease) const LUCERNA_REQUIRES(mutex_);
   // Enters the newest lease of a range among those that another may join, or takes it out.
