@@ -386,6 +386,10 @@ SliceShape JobEstimator::ShapeOf(const PassRange& round, const RoundPlan& plan) 
           .photons_per_pass = plan.photons_per_pass};
 }
 
+ThreadTeam& JobEstimator::team() {
+  return state_->team;
+}
+
 SliceSums JobEstimator::SliceOf(const EyePass& pass, const RoundPlan& plan,
                                 const PassSums& sums) const {
   return SliceOfPass(pass, plan, sums, state_->settings, state_->prepared.flux_scale(),

@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "render/analysis/needs.h"
+#include "render/base/parallel.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/error_estimate.h"
@@ -82,6 +83,9 @@ class JobEstimator {
                                                                       SceneNeeds needs,
                                                                       int threads);
   ~JobEstimator();
+
+  // That does what is spread over threads.
+  [[nodiscard]] ThreadTeam& team();
 
   // `shall_stop` as TraceHitpointPass has it.
   [[nodiscard]] EyePass TraceEyePaths(std::uint64_t pass,

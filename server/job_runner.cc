@@ -424,7 +424,7 @@ Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
   if (first > round.first) next_split_ = first;
   if (round.first == 0 && !open.is_split) next_split_ = round.last;
   if (!open.is_split) {
-    std::string bytes = EncodeRadii(*open.plan.radii);
+    std::string bytes = EncodeRadii(*open.plan.radii, &estimator_->team());
     const Digest digest = Sha256(bytes);
     LUCERNA_ASSIGN_OR_RETURN(open.radii,
                              hooks_.blobs.PutPinned(digest, std::move(bytes), AfterLastPin::kDrop));
@@ -469,7 +469,7 @@ StatusOr<std::optional<JobRunner::TracedPass>> JobRunner::Trace(std::uint64_t pa
   TracedPass traced;
   traced.eye = estimator_->TraceEyePaths(pass, [this] { return ShallInterrupt(); });
   if (!traced.eye.is_whole) return std::optional<TracedPass>();
-  std::string bytes = EncodeHitpointBlock(traced.eye.block);
+  std::string bytes = EncodeHitpointBlock(traced.eye.block, &estimator_->team());
   const Digest digest = Sha256(bytes);
   LUCERNA_ASSIGN_OR_RETURN(traced.block,
                            hooks_.blobs.PutPinned(digest, std::move(bytes), AfterLastPin::kDrop));
@@ -488,7 +488,7 @@ Status JobRunner::OpenSplitPass(TracedPass traced) {
   const OpenRound& round = OpenRoundOf(traced.eye.pass);
   const RoundPlan& plan = round.plan;
   SplitPass open;
-  std::string bytes = EncodeRadii(HitpointRadii(traced.eye, plan));
+  std::string bytes = EncodeRadii(HitpointRadii(traced.eye, plan), &estimator_->team());
   open.blobs = {.block = traced.block.digest(),
                 .radii = Sha256(bytes),
                 .rows = traced.eye.block.size(),

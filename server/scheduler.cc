@@ -809,7 +809,8 @@ bool Scheduler::HasBatchesToSpare(SteadyTime now) const {
     if (shares_.IsHeld(key.job_id)) continue;
     const Work& work = open_.at(key);
     batches += work.returned.size();
-    if (work.rest.size() > 0) batches += CeilDivide(work.rest.size(), BatchSize(work, std::nullopt, now));
+    if (work.rest.size() > 0)
+      batches += CeilDivide(work.rest.size(), BatchSize(work, std::nullopt, now));
     if (batches > idle_workers_) return true;
   }
   return false;
@@ -1058,6 +1059,23 @@ void Scheduler::PoisonIfDue(const PassKey& key, Work& work, WorkRange range) {
     return;
   }
   work.returned.erase(range);
+  if (work.kind == WorkKind::kPasses && range.size() > 1 && !work.audits.contains(range)) {
+    // Long slices are lost where workers come and go, whatever is in them. Each half is poisoned by
+    // one more failure, so that a bad pass is found and the others are not lost with it.
+    Losses of_half = losses->second;
+    of_half.is_poisoned = false;
+    of_half.failures = std::min(of_half.failures, options_.poison_failures - 1);
+    while (!of_half.workers.empty() && of_half.workers.size() >= options_.poison_workers)
+      of_half.workers.erase(of_half.workers.begin());
+    const std::uint64_t middle = range.first + range.size() / 2;
+    work.losses.erase(range);
+    for (const WorkRange& half : {WorkRange{range.first, middle}, WorkRange{middle, range.last}}) {
+      work.losses[half] = of_half;
+      work.returned.insert(half);
+    }
+    UpdateLendable(key, work);
+    return;
+  }
   work.poisoned.insert(range);
   UpdateLendable(key, work);
   poisoned_.push_back(

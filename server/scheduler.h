@@ -11,7 +11,8 @@
 // batch is lent a second time, and a third when that one is late too; whoever commits first wins.
 //
 // Batch: pending -> leased -> committed; back to pending; poisoned when poison_workers different
-// workers failed or crashed at it, or all that there are, poison_failures times. A poisoned batch
+// workers failed or crashed at it, or all that there are, poison_failures times. A slice of several
+// passes is cut into halves first, each of which one more failure poisons. A poisoned batch
 // is lent no more until ReleasePoisoned.
 //
 // A result counts only with the lease of the very worker and range (StandingOf). A lease that ended

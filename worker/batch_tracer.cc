@@ -406,8 +406,12 @@ StatusOr<SliceSums> BatchTracer::RunSlice(const RenderSettings& settings, const 
                            RunSlice(settings, needs, {passes.first, middle}, plan, stop));
   LUCERNA_ASSIGN_OR_RETURN(const SliceSums second,
                            RunSlice(settings, needs, {middle, passes.last}, plan, stop));
-  LUCERNA_RETURN_IF_ERROR(MergeSibling(sums, second));
+  LUCERNA_RETURN_IF_ERROR(MergeSibling(sums, second, &state_->team));
   return sums;
+}
+
+ThreadTeam& BatchTracer::team() {
+  return state_->team;
 }
 
 }  // namespace lucerna

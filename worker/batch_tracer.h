@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "render/analysis/needs.h"
+#include "render/base/parallel.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/hitpoint_block.h"
@@ -47,6 +48,9 @@ class BatchTracer {
   [[nodiscard]] StatusOr<SliceSums> RunSlice(const RenderSettings& settings,
                                              const SceneNeeds& needs, const PassRange& passes,
                                              const RoundPlan& plan, const std::atomic<bool>& stop);
+
+  // That does all of it.
+  [[nodiscard]] ThreadTeam& team();
 
  private:
   // Photons of a pass, drawn by `guide` (nullptr: evenly).

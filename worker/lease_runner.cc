@@ -246,7 +246,7 @@ StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
     slice.tally.photons = photons;
   }
   if (stop) return absl::CancelledError("the slice was given up");
-  return EncodeSlice(slice);
+  return EncodeSlice(slice, &fetched.tracer->team());
 }
 
 void LeaseRunner::CommitStage() {

@@ -29,6 +29,48 @@ class Luminances {
   std::array<const float*, 6> columns_{};
 };
 
+// Adds the rows [begin, end) of a sibling, with which `sum` makes that of the passes `together`.
+void AddSibling(SliceSums& sum, const SliceSums& sibling, const PassRange& together,
+                std::size_t begin, std::size_t end) {
+  const auto bits = [&](std::size_t column) {
+    return SignificantBits(together, column, sum.evidence);
+  };
+  const auto half = static_cast<double>(sum.passes.size());
+  // Before the radiance is added up.
+  float* const deviations = sum.columns[kSquaredDeviations].data();
+  const float* const their_deviations = sibling.columns[kSquaredDeviations].data();
+  const Luminances luminances(sum);
+  const Luminances their_luminances(sibling);
+  for (std::size_t pixel = begin; pixel < end; ++pixel) {
+    deviations[pixel] = Rounded(
+        static_cast<double>(deviations[pixel]) + static_cast<double>(their_deviations[pixel]) +
+            DeviationBetween(half, luminances[pixel], half, their_luminances[pixel]),
+        bits(kSquaredDeviations));
+  }
+  const auto add = [](float ours, float theirs, unsigned int dropped) {
+    constexpr auto kLargest = static_cast<float>(kLargestSum);
+    return RoundedFloat(std::clamp(ours + theirs, -kLargest, kLargest), dropped);
+  };
+  const auto add_column = [&](std::size_t column, const auto& dropped_of) {
+    float* const ours = sum.columns[column].data();
+    const float* const theirs = sibling.columns[column].data();
+    for (std::size_t pixel = begin; pixel < end; ++pixel)
+      ours[pixel] = add(ours[pixel], theirs[pixel], dropped_of(pixel));
+  };
+  for (std::size_t column = kDirectRadiance; column < sum.columns.size(); ++column) {
+    if (column == kSquaredDeviations || column == kLargestLuminance) continue;
+    add_column(column, [dropped = DroppedBits(bits(column))](std::size_t) { return dropped; });
+  }
+  // By the number of photons that is known by now.
+  const float* const counts = sum.columns[kPhotonCount].data();
+  for (std::size_t column = kPhotonRadiance; column < kDirectRadiance; ++column)
+    add_column(column, [&](std::size_t pixel) { return DroppedBits(PhotonBits(counts[pixel])); });
+  float* const largest = sum.columns[kLargestLuminance].data();
+  const float* const their_largest = sibling.columns[kLargestLuminance].data();
+  for (std::size_t pixel = begin; pixel < end; ++pixel)
+    largest[pixel] = std::max(largest[pixel], their_largest[pixel]);
+}
+
 }  // namespace
 
 SliceSums EmptySlice(const PassRange& passes, std::size_t pixels, std::size_t evidence) {
@@ -40,8 +82,11 @@ SliceSums EmptySlice(const PassRange& passes, std::size_t pixels, std::size_t ev
 }
 
 void SetWhatFollowsFromRadiance(SliceSums& slice) {
-  LUCERNA_CHECK(slice.passes.size() == 1);
-  const std::size_t pixels = slice.pixels();
+  SetWhatFollowsFromRadiance(slice, 0, slice.pixels());
+}
+
+void SetWhatFollowsFromRadiance(SliceSums& slice, std::size_t begin, std::size_t end) {
+  LUCERNA_CHECK(slice.passes.size() == 1 && end <= slice.pixels());
   const double half = slice.passes.first % 2 == 0 ? 1 : -1;
   const auto bits = [&](std::size_t column) {
     return SignificantBits(slice.passes, column, slice.evidence);
@@ -50,20 +95,21 @@ void SetWhatFollowsFromRadiance(SliceSums& slice) {
     const float* const photons = slice.columns[kPhotonRadiance + c].data();
     const float* const direct = slice.columns[kDirectRadiance + c].data();
     float* const half_difference = slice.columns[kHalfDifference + c].data();
-    for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    for (std::size_t pixel = begin; pixel < end; ++pixel) {
       half_difference[pixel] =
           Rounded(half * (static_cast<double>(photons[pixel]) + static_cast<double>(direct[pixel])),
                   bits(kHalfDifference));
     }
   }
-  std::ranges::fill(slice.columns[kSquaredDeviations], 0.0F);
+  float* const deviations = slice.columns[kSquaredDeviations].data();
+  std::fill(deviations + begin, deviations + end, 0.0F);
   const Luminances luminances(slice);
   float* const largest = slice.columns[kLargestLuminance].data();
-  for (std::size_t pixel = 0; pixel < pixels; ++pixel)
+  for (std::size_t pixel = begin; pixel < end; ++pixel)
     largest[pixel] = Rounded(std::max(0.0, luminances[pixel]), bits(kLargestLuminance));
 }
 
-Status MergeSibling(SliceSums& sum, const SliceSums& sibling) {
+Status MergeSibling(SliceSums& sum, const SliceSums& sibling, ThreadTeam* team) {
   if (sibling.passes != SiblingOf(sum.passes) || sibling.columns.size() != sum.columns.size() ||
       sibling.pixels() != sum.pixels() || sibling.evidence != sum.evidence) {
     return absl::InvalidArgumentError("two slices do not make a larger one");
@@ -71,39 +117,16 @@ Status MergeSibling(SliceSums& sum, const SliceSums& sibling) {
   if (!sum.tally.Fits(sibling.tally)) {
     return absl::OutOfRangeError("the tally of a slice would not fit in 64 bits");
   }
-  const std::size_t pixels = sum.pixels();
   const PassRange together = {std::min(sum.passes.first, sibling.passes.first),
                               std::max(sum.passes.last, sibling.passes.last)};
-  const auto bits = [&](std::size_t column) {
-    return SignificantBits(together, column, sum.evidence);
+  const auto add = [&](std::size_t begin, std::size_t end) {
+    AddSibling(sum, sibling, together, begin, end);
   };
-  const auto half = static_cast<double>(sum.passes.size());
-  // Before the radiance is added up.
-  float* const deviations = sum.columns[kSquaredDeviations].data();
-  const float* const their_deviations = sibling.columns[kSquaredDeviations].data();
-  const Luminances luminances(sum);
-  const Luminances their_luminances(sibling);
-  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-    deviations[pixel] = Rounded(
-        static_cast<double>(deviations[pixel]) + static_cast<double>(their_deviations[pixel]) +
-            DeviationBetween(half, luminances[pixel], half, their_luminances[pixel]),
-        bits(kSquaredDeviations));
-  }
-  for (std::size_t column = 0; column < sum.columns.size(); ++column) {
-    if (column == kSquaredDeviations) continue;
-    float* const ours = sum.columns[column].data();
-    const float* const theirs = sibling.columns[column].data();
-    if (column == kLargestLuminance) {
-      for (std::size_t pixel = 0; pixel < pixels; ++pixel)
-        ours[pixel] = std::max(ours[pixel], theirs[pixel]);
-      continue;
-    }
-    constexpr auto kLargest = static_cast<float>(kLargestSum);
-    const unsigned int dropped = DroppedBits(bits(column));
-    for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-      ours[pixel] =
-          RoundedFloat(std::clamp(ours[pixel] + theirs[pixel], -kLargest, kLargest), dropped);
-    }
+  constexpr std::size_t kPixelsAtOnce = 4096;
+  if (team != nullptr) {
+    team->For(sum.pixels(), kPixelsAtOnce, add);
+  } else {
+    add(0, sum.pixels());
   }
   const bool is_first = sum.passes.first < sibling.passes.first;
   sum.reports.insert(is_first ? sum.reports.end() : sum.reports.begin(), sibling.reports.begin(),

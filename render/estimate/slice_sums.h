@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/base/parallel.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/emission_report.h"
@@ -104,21 +105,27 @@ struct SliceShape {
 [[nodiscard]] constexpr std::size_t ColumnsOf(const PassRange& passes, std::size_t evidence) {
   return kSliceColumns + evidence + (HasFeatures(passes) ? std::size_t{kFeatureColumns} : 0);
 }
-// Significant bits of a column's floats, that is of sums over `passes`. What photons bring to one
-// pass differs by tenths from pass to pass: 9 bits, an error of a thousandth, are far below that,
-// and as noise falls with the root of the passes a bit more for each factor of four stays so. Direct
-// light may be without noise: 12 bits. What decides about radii and errors needs no more than a
-// hundredth.
+// Significant bits of a column's floats, at most; those of photons have PhotonBits. Direct light
+// may be without noise: 12 bits, an error of one in 8000. What decides about radii and errors need
+// not be better known than to a hundredth.
 [[nodiscard]] constexpr unsigned int SignificantBits(const PassRange& passes, std::size_t column,
                                                      std::size_t evidence) {
   constexpr unsigned int kAll = 16;
-  const auto doublings = static_cast<unsigned int>(std::bit_width(passes.size()) - 1);
-  if (column < kDirectRadiance) return 9 + (doublings + 1) / 2;
+  if (column < kDirectRadiance) return kAll;
   if (column < kHalfDifference) return 12;
   // Of a single pass it is the radiance itself, from which the first difference is taken.
-  if (column < kSquaredDeviations) return passes.size() == 1 ? kAll : 8;
+  if (column < kSquaredDeviations && passes.size() == 1) return kAll;
   if (column == kPhotonCount || column >= kSliceColumns + evidence) return kAll;
   return 6;
+}
+// Significant bits of what `count` photons bring to a pixel. Their noise is one over the root of
+// their number at least, and rounding errors are at most a 32nd of that. Hitpoints that share a
+// radius and segments in media are not counted: they have the least bits here, an error of one in
+// 2000.
+[[nodiscard]] constexpr unsigned int PhotonBits(float count) {
+  // Count < 2^(exponent + 1).
+  const int exponent = static_cast<int>(std::bit_cast<std::uint32_t>(count) >> 23U) - 127;
+  return static_cast<unsigned int>(std::clamp(6 + (exponent + 2) / 2, 10, 16));
 }
 
 // These are made for every pixel of every pass, in loops over vectors.
@@ -152,13 +159,16 @@ inline constexpr double kLargestSum = 0x1.f8p127;
 [[nodiscard]] constexpr bool FollowsFromRadiance(const PassRange& passes, std::size_t column) {
   return passes.size() == 1 && column >= kHalfDifference && column <= kLargestLuminance;
 }
-// Sets these columns. Requires slice.passes.size() == 1.
+// Sets these columns, of pixels [begin, end) or of all. Requires slice.passes.size() == 1.
+void SetWhatFollowsFromRadiance(SliceSums& slice, std::size_t begin, std::size_t end);
 void SetWhatFollowsFromRadiance(SliceSums& slice);
 
-// Makes `sum` the sum of itself and its sibling; in either order the same bits.
+// Makes `sum` the sum of itself and its sibling; in either order the same bits. By the threads of
+// `team`, or by the caller's alone.
 // Errors: INVALID_ARGUMENT when they are no siblings or differ in shape, OUT_OF_RANGE when a tally
 // would not fit in 64 bits. Then nothing has changed.
-[[nodiscard]] Status MergeSibling(SliceSums& sum, const SliceSums& sibling);
+[[nodiscard]] Status MergeSibling(SliceSums& sum, const SliceSums& sibling,
+                                  ThreadTeam* team = nullptr);
 
 // Chan, Golub & LeVeque 1983, "Algorithms for Computing the Sample Variance": what the squared
 // deviations of two groups together are more than their sum, of `n` and `m` values with these sums.

@@ -47,7 +47,15 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   LUCERNA_CHECK(sums.size() == rows && plan.radii->size() == pixels &&
                 sums.evidence().size() >= kCommonColumns);
   const std::size_t evidence = ControllerColumns(settings.radius_controller);
-  SliceSums slice = EmptySlice({pass.pass, pass.pass + 1}, pixels, evidence);
+  SliceSums slice;
+  slice.passes = {pass.pass, pass.pass + 1};
+  slice.evidence = evidence;
+  slice.columns.resize(ColumnsOf(slice.passes, evidence));
+  // The system clears memory where it is first touched, which takes as long as filling it in.
+  team.For(slice.columns.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t column = begin; column < end; ++column)
+      slice.columns[column].resize(pixels);
+  });
   slice.tally = sums.tally();
   slice.eye_rays = pass.rays;
   for (const FoundPhoton& found : sums.FoundInOrder()) {
@@ -109,8 +117,9 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   const SliceColumn bias = pass.pass % 2 == 0 ? kEvenBias : kOddBias;
   const std::size_t first_feature = slice.first_feature();
   const auto set_pixel = [&](std::size_t pixel) {
+    const unsigned int photon_bits = PhotonBits(columns[kPhotonCount][pixel]);
     for (std::size_t c = 0; c < 3; ++c) {
-      set(kPhotonRadiance + c, pixel, brought[pixel].photons[c]);
+      columns[kPhotonRadiance + c][pixel] = Rounded(brought[pixel].photons[c], photon_bits);
       set(kDirectRadiance + c, pixel, static_cast<double>(pass.direct[pixel][static_cast<int>(c)]));
     }
     set(bias, pixel, brought[pixel].bias);
@@ -128,8 +137,8 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   team.For(pixels, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
     for (std::size_t pixel = begin; pixel < end; ++pixel)
       set_pixel(pixel);
+    SetWhatFollowsFromRadiance(slice, begin, end);
   });
-  SetWhatFollowsFromRadiance(slice);
   return slice;
 }
 

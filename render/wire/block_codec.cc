@@ -50,8 +50,8 @@ Status Malformed(std::string_view what) {
 
 }  // namespace
 
-std::string EncodeHitpointBlock(const HitpointBlock& block) {
-  ByteWriter writer;
+std::string EncodeHitpointBlock(const HitpointBlock& block, ThreadTeam* team) {
+  ByteWriter writer(team);
   writer.Bytes(kBlockMagic);
   writer.Varint(block.size());
   writer.Varint(block.glossy.size());
@@ -205,8 +205,8 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
   return block;
 }
 
-std::string EncodeRadii(const RadiusColumn& radii) {
-  ByteWriter writer;
+std::string EncodeRadii(const RadiusColumn& radii, ThreadTeam* team) {
+  ByteWriter writer(team);
   writer.Bytes(kRadiiMagic);
   writer.Varint(radii.size());
   WriteDeltas(writer, radii.size(),

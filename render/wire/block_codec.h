@@ -12,19 +12,21 @@
 #include <string>
 #include <string_view>
 
+#include "render/base/parallel.h"
 #include "render/base/status.h"
 #include "render/estimate/hitpoint_block.h"
 
 namespace lucerna {
 
-[[nodiscard]] std::string EncodeHitpointBlock(const HitpointBlock& block);
+[[nodiscard]] std::string EncodeHitpointBlock(const HitpointBlock& block,
+                                              ThreadTeam* team = nullptr);
 
 // Errors: INVALID_ARGUMENT when `bytes` is not a block of at most `max_hitpoints` rows that keeps
 // the block's invariants. (Whether materials exist is for those to check who have the scene.)
 [[nodiscard]] StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes,
                                                           std::size_t max_hitpoints);
 
-[[nodiscard]] std::string EncodeRadii(const RadiusColumn& radii);
+[[nodiscard]] std::string EncodeRadii(const RadiusColumn& radii, ThreadTeam* team = nullptr);
 
 // Errors: INVALID_ARGUMENT when `bytes` are not `hitpoints` radii, each finite and > 0.
 [[nodiscard]] StatusOr<RadiusColumn> DecodeRadii(std::string_view bytes, std::size_t hitpoints);

@@ -14,22 +14,13 @@ namespace {
 
 constexpr int kCompressionLevel = 1;
 
-template <typename Value>
-void WritePlanes(ByteWriter& writer, std::span<const Value> column) {
-  Value all = 0;
-  for (const Value value : column)
-    all |= value;
-  std::uint8_t planes = 0;
-  for (; all != 0; all = static_cast<Value>(all >> 8U))
-    ++planes;
-  writer.Byte(planes);
-  std::string plane(column.size(), '\0');
-  for (unsigned int p = 0; p < planes; ++p) {
-    std::ranges::transform(column, plane.begin(), [p](Value value) {
-      return static_cast<char>(static_cast<std::uint8_t>(value >> (8 * p)));
-    });
-    writer.Compressed(plane);
-  }
+std::string Packed(std::string_view bytes) {
+  std::string packed(ZSTD_compressBound(bytes.size()), '\0');
+  const std::size_t size =
+      ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), kCompressionLevel);
+  LUCERNA_CHECK(ZSTD_isError(size) == 0);
+  packed.resize(size);
+  return packed;
 }
 
 // Calls put(row, number) for the numbers whose byte planes follow one another in `bytes`. A fixed
@@ -75,19 +66,45 @@ void ByteWriter::Varint(std::uint64_t value) {
 }
 
 void ByteWriter::Compressed(std::string_view bytes) {
-  std::string packed(ZSTD_compressBound(bytes.size()), '\0');
-  const std::size_t size =
-      ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), kCompressionLevel);
-  LUCERNA_CHECK(ZSTD_isError(size) == 0);
-  Varint(size);
-  Bytes(std::string_view(packed).substr(0, size));
+  const std::string packed = Packed(bytes);
+  Varint(packed.size());
+  Bytes(packed);
+}
+
+template <typename Value>
+void ByteWriter::WritePlanes(std::span<const Value> column) {
+  Value all = 0;
+  for (const Value value : column)
+    all |= value;
+  std::vector<std::string> planes;
+  for (; all != 0; all = static_cast<Value>(all >> 8U))
+    planes.emplace_back();
+  const auto pack = [&](std::size_t begin, std::size_t end) {
+    std::string plane(column.size(), '\0');
+    for (std::size_t p = begin; p < end; ++p) {
+      std::ranges::transform(column, plane.begin(), [p](Value value) {
+        return static_cast<char>(static_cast<std::uint8_t>(value >> (8 * p)));
+      });
+      planes[p] = Packed(plane);
+    }
+  };
+  if (team_ != nullptr) {
+    team_->For(planes.size(), 1, pack);
+  } else {
+    pack(0, planes.size());
+  }
+  Byte(static_cast<std::uint8_t>(planes.size()));
+  for (const std::string& plane : planes) {
+    Varint(plane.size());
+    Bytes(plane);
+  }
 }
 
 void ByteWriter::Planes(std::span<const std::uint32_t> column) {
-  WritePlanes(*this, column);
+  WritePlanes(column);
 }
 void ByteWriter::Planes(std::span<const std::uint64_t> column) {
-  WritePlanes(*this, column);
+  WritePlanes(column);
 }
 
 void ByteReader::Fail() {

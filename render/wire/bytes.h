@@ -15,6 +15,8 @@
 #include <string_view>
 #include <vector>
 
+#include "render/base/parallel.h"
+
 namespace lucerna {
 
 // Small magnitudes of either sign become small numbers.
@@ -33,6 +35,9 @@ constexpr std::int64_t UnZigZag(std::uint64_t code) {
 
 class ByteWriter {
  public:
+  // The threads of `team` compress the planes of a column, or the caller's does.
+  explicit ByteWriter(ThreadTeam* team = nullptr) : team_(team) {}
+
   void Byte(std::uint8_t value) { bytes_.push_back(static_cast<char>(value)); }
   void Varint(std::uint64_t value);
   void Bytes(std::string_view bytes) { bytes_.append(bytes); }
@@ -45,6 +50,10 @@ class ByteWriter {
   [[nodiscard]] std::string Take() { return std::move(bytes_); }
 
  private:
+  template <typename Value>
+  void WritePlanes(std::span<const Value> column);
+
+  ThreadTeam* team_;
   std::string bytes_;
 };
 

@@ -40,7 +40,7 @@ Status CheckDropped(const SliceSums& slice, std::uint64_t photons_per_pass) {
 
 }  // namespace
 
-std::string EncodeSlice(const SliceSums& slice) {
+std::string EncodeSlice(const SliceSums& slice, ThreadTeam* team) {
   ByteWriter writer;
   writer.Bytes(kMagic);
   writer.Varint(slice.passes.first);
@@ -59,15 +59,27 @@ std::string EncodeSlice(const SliceSums& slice) {
     WriteEmission(writer, report.numbers);
     writer.Varint(report.pixel);
   }
-  std::vector<std::uint32_t> codes(slice.pixels());
-  for (std::size_t column = 0; column < slice.columns.size(); ++column) {
-    if (FollowsFromRadiance(slice.passes, column)) continue;
-    const unsigned int empty = EmptyBits(slice.passes, column, slice.evidence);
-    std::ranges::transform(slice.columns[column], codes.begin(), [&](float value) {
-      return std::bit_cast<std::uint32_t>(value) >> empty;
-    });
-    writer.Planes(codes);
+  std::vector<std::string> columns(slice.columns.size());
+  const auto encode = [&](std::size_t begin, std::size_t end) {
+    std::vector<std::uint32_t> codes(slice.pixels());
+    for (std::size_t column = begin; column < end; ++column) {
+      if (FollowsFromRadiance(slice.passes, column)) continue;
+      const unsigned int empty = EmptyBits(slice.passes, column, slice.evidence);
+      std::ranges::transform(slice.columns[column], codes.begin(), [&](float value) {
+        return std::bit_cast<std::uint32_t>(value) >> empty;
+      });
+      ByteWriter of_column;
+      of_column.Planes(codes);
+      columns[column] = of_column.Take();
+    }
+  };
+  if (team != nullptr) {
+    team->For(columns.size(), 1, encode);
+  } else {
+    encode(0, columns.size());
   }
+  for (const std::string& column : columns)
+    writer.Bytes(column);
   return writer.Take();
 }
 

@@ -11,12 +11,14 @@
 #include <string>
 #include <string_view>
 
+#include "render/base/parallel.h"
 #include "render/base/status.h"
 #include "render/estimate/slice_sums.h"
 
 namespace lucerna {
 
-[[nodiscard]] std::string EncodeSlice(const SliceSums& slice);
+// By the threads of `team`, or by the caller's alone.
+[[nodiscard]] std::string EncodeSlice(const SliceSums& slice, ThreadTeam* team = nullptr);
 
 // Errors: INVALID_ARGUMENT when `bytes` is not a slice of this shape.
 [[nodiscard]] StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape);

@@ -53,16 +53,18 @@ struct Costs {
   double photons_per_pixel = 4;   // and pass
   double eye_ns = 900;            // of a core: an eye path with direct light
   double photon_ns = 1250;        // of a core: a photon path with gathering
-  double merge_ns = 60;           // a pixel and slice: decode and merge
+  double encode_slice_ns = 130;   // of a core of a worker, a pixel and slice
+  double add_pass_ns = 13;        // the same, a pixel and pass but the first of a slice
+  double merge_ns = 80;           // a pixel and slice: decode and merge
   double statistics_ns = 50;      // a pixel and round, in parallel: statistics and radii
   double estimate_ns = 5;         // a pixel and estimate, on the job's thread
-  double encode_block_ns = 30;    // a pixel and split pass, on the job's thread
-  double encode_radii_ns = 9;     // a pixel and round, or split pass, on the job's thread
+  double encode_block_ns = 10;    // a pixel and split pass, on the job's thread
+  double encode_radii_ns = 4;     // a pixel and round, or split pass, on the job's thread
   double accumulation_ns = 75;    // a hitpoint that a batch of photons touched: decode and add
-  double split_slice_ns = 60;     // a pixel and split pass, on the job's thread: its slice
+  double split_slice_ns = 60;     // a pixel and split pass, in parallel: its slice
   double rpc_us = 50;             // of a core of the coordinator, any call
-  double slice_bytes = 30;        // a pixel
-  double first_slice_bytes = 26;  // a pixel, in the first 16 passes
+  double slice_bytes = 20.5;      // a pixel
+  double first_slice_bytes = 22;  // a pixel, in the first 16 passes
   double radii_bytes = 2;         // a pixel, round and worker
   double block_bytes = 8;         // a pixel and worker, of a split pass
   double accumulation_bytes = 8;  // a hitpoint that a batch of photons touched
@@ -78,7 +80,7 @@ struct Costs {
   double max_slice = 16;          // [passes] SchedulerOptions::max_slice
   double slices_per_worker = 2;   // SchedulerOptions::slices_per_worker
   // Of a slice of one pass, a pixel; 0: as of other slices.
-  double single_slice_bytes = 19;
+  double single_slice_bytes = 13.5;
   // Rounds from this pass on are never split, whatever the policy says.
   double split_below = 16;
   double split_ways = 8;      // SchedulerOptions::max_split_ways
@@ -101,13 +103,15 @@ constexpr std::array kOptions = {
     Option{"photons-per-pixel", &Costs::photons_per_pixel, "and pass"},
     Option{"eye", &Costs::eye_ns, "ns of a core, an eye path"},
     Option{"photon", &Costs::photon_ns, "ns of a core, a photon path with gathering"},
+    Option{"encode-slice", &Costs::encode_slice_ns, "ns of a worker's core, a pixel and slice"},
+    Option{"add-pass", &Costs::add_pass_ns, "ns of a worker's core, a pixel and pass but one"},
     Option{"merge", &Costs::merge_ns, "ns a pixel and slice"},
     Option{"statistics", &Costs::statistics_ns, "ns a pixel and round, parallel"},
     Option{"estimate", &Costs::estimate_ns, "ns a pixel and estimate, serial"},
     Option{"encode-block", &Costs::encode_block_ns, "ns a pixel and split pass, serial"},
     Option{"encode-radii", &Costs::encode_radii_ns, "ns a pixel and round or split pass, serial"},
     Option{"accumulation", &Costs::accumulation_ns, "ns a hitpoint touched by a batch"},
-    Option{"split-slice", &Costs::split_slice_ns, "ns a pixel and split pass, serial"},
+    Option{"split-slice", &Costs::split_slice_ns, "ns a pixel and split pass, parallel"},
     Option{"rpc", &Costs::rpc_us, "us of a core of the coordinator, a call"},
     Option{"slice-bytes", &Costs::slice_bytes, "bytes a pixel and slice"},
     Option{"first-slice-bytes", &Costs::first_slice_bytes, "the same, first 16 passes"},
@@ -453,6 +457,12 @@ class Farm {
 
   // Core seconds that the work of a lease takes.
   [[nodiscard]] double WorkOf(const BatchLease& lease) const {
+    if (lease.kind == WorkKind::kPhotons) return PathWorkOf(lease);
+    const auto size = static_cast<double>(lease.range.size());
+    return PathWorkOf(lease) + 1e-9 * Pixels() * ((size - 1) * c_.add_pass_ns + c_.encode_slice_ns);
+  }
+  // Of those what paths take.
+  [[nodiscard]] double PathWorkOf(const BatchLease& lease) const {
     const auto size = static_cast<double>(lease.range.size());
     if (lease.kind == WorkKind::kPhotons) return 1e-9 * c_.photon_ns * size;
     return 1e-9 * size * Pixels() * (c_.eye_ns + c_.photon_ns * c_.photons_per_pixel);
@@ -665,7 +675,7 @@ class Farm {
         scheduler_->Commit(lease.pass, lease.range, At(now_));
         return 0;
       });
-      const double work = WorkOf(lease);
+      const double work = PathWorkOf(lease);
       useful_ += work;
       if (now_ > c_.seconds / 2) useful_late_ += work;
       photons_ += lease.kind == WorkKind::kPhotons ? static_cast<double>(lease.range.size())
@@ -757,7 +767,7 @@ class Farm {
       std::erase(split_passes_, pass);
       scheduler_->Close(KeyOf(pass));
       static_cast<void>(passes_.Take(KeyOf(pass)));
-      Work(1e-9 * c_.split_slice_ns * Pixels(), 0, [this, pass] {
+      Work(0, 1e-9 * c_.split_slice_ns * Pixels(), [this, pass] {
         SliceSums slice = EmptySlice({pass, pass + 1}, 1, 0);
         LUCERNA_CHECK(rounds_.Merge(KeyOf(RoundOf(pass).first), std::move(slice)).ok());
       });

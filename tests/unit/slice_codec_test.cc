@@ -81,13 +81,12 @@ TEST(SliceCodecTest, BringsTheEndsOfEveryColumnBack) {
   SliceSums slice = RandomSlice(shape);
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
     const unsigned int bits = SignificantBits(shape.passes, column, shape.evidence);
-    slice.columns[column] = {
-        Rounded(1e300, bits),
-        Rounded(-1e300, bits),
-        Rounded(std::numeric_limits<double>::denorm_min(), bits),
-        -0.0F,
-        std::bit_cast<float>(std::uint32_t{1} << DroppedBits(bits)),
-        1};
+    slice.columns[column] = {Rounded(1e300, bits),
+                             Rounded(-1e300, bits),
+                             Rounded(std::numeric_limits<double>::denorm_min(), bits),
+                             -0.0F,
+                             std::bit_cast<float>(std::uint32_t{1} << DroppedBits(bits)),
+                             1};
   }
   SetWhatFollowsFromRadiance(slice);
   const auto decoded = DecodeSlice(EncodeSlice(slice), shape);
