@@ -18,7 +18,7 @@ void ReadDisk(const ShapeInput& input, ShapeSet& shapes) {
     return;
   }
   const StatusOr<double> scale = placement.to_world.UniformScale();
-  if (phi_max_rad < 2 * std::numbers::pi || !scale.ok()) {
+  if (phi_max_rad < 2 * std::numbers::pi || !scale.ok() || !placement.stays_similar) {
     PlaceMesh(DiskMesh(radius, inner_radius, height, phi_max_rad), parameters, placement, shapes);
     return;
   }

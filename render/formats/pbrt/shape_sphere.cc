@@ -24,7 +24,7 @@ void ReadSphere(const ShapeInput& input, ShapeSet& shapes) {
   }
   const bool is_whole = z_min == -radius && z_max == radius && phi_max_rad >= 2 * std::numbers::pi;
   const StatusOr<double> scale = placement.to_world.UniformScale();
-  if (!is_whole || !scale.ok()) {
+  if (!is_whole || !scale.ok() || !placement.stays_similar) {
     PlaceMesh(SphereMesh(radius, z_min, z_max, phi_max_rad), parameters, placement, shapes);
     return;
   }

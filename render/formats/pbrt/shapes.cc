@@ -284,7 +284,8 @@ ShapeSet PlaceMadeMesh(TriangleMesh mesh, ParameterList& parameters,
   return shapes;
 }
 
-StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world) {
+StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world,
+                               bool stays_similar) {
   ShapeSet shapes;
   for (const TriangleMesh& original : object.meshes) {
     TriangleMesh mesh = original;
@@ -307,7 +308,7 @@ StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world
 #define LUCERNA_MOVE(Name, list, name)                                      \
   for (Name shape : object.list) {                                          \
     if constexpr (!Name::kIsThin) {                                         \
-      if (!to_world.UniformScale().ok()) {                                  \
+      if (!stays_similar || !to_world.UniformScale().ok()) {                \
         LUCERNA_RETURN_IF_ERROR(add_mesh(Mesh##Name(shape), shape.traits)); \
         continue;                                                           \
       }                                                                     \
