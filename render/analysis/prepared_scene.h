@@ -11,10 +11,10 @@
 
 #include "render/analysis/needs.h"
 #include "render/base/status.h"
-#include "render/formats/scene_at_time.h"
 #include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
 #include "render/scene/scene.h"
+#include "render/scene/scene_at_time.h"
 #include "render/transport/light.h"
 
 namespace lucerna {

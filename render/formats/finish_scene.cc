@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "render/base/text.h"
-#include "render/formats/degenerate_triangles.h"
-#include "render/formats/scene_at_time.h"
 #include "render/formats/scene_unit.h"
+#include "render/scene/degenerate_triangles.h"
+#include "render/scene/scene_at_time.h"
 #include "render/scene/scene_extent.h"
 #include "render/scene/shape_lists.h"
 

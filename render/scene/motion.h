@@ -1,7 +1,7 @@
 // What moves while the shutter is open.
 //
 // A Scene holds everything where it is when the shutter opens. Each pass sees the scene at one time
-// (analysis/pass_time.h), at which formats/scene_at_time.h puts what moves. Lights stand still.
+// (analysis/pass_time.h), at which scene/scene_at_time.h puts what moves. Lights stand still.
 #pragma once
 
 #include <cstdint>

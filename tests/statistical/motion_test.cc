@@ -17,7 +17,7 @@
 
 #include "render/analysis/pass_time.h"
 #include "render/formats/read_scene.h"
-#include "render/formats/scene_at_time.h"
+#include "render/scene/scene_at_time.h"
 #include "tests/support/chi_square.h"
 #include "tests/support/local_render.h"
 #include "tests/support/measure.h"

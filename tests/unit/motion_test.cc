@@ -14,7 +14,7 @@
 #include "render/analysis/prepared_scene.h"
 #include "render/analysis/reachability.h"
 #include "render/formats/read_scene.h"
-#include "render/formats/scene_at_time.h"
+#include "render/scene/scene_at_time.h"
 #include "render/scene/scene_extent.h"
 #include "tests/support/memory_files.h"
 

@@ -110,6 +110,12 @@ constexpr Kind<FilterReader> kFilters[] = {
 
 void ReadCamera(std::string_view type, ParameterList& parameters, Camera& camera,
                 SceneMotion& motion) {
+  if (type == "realistic") {
+    parameters.Error(
+        "is not supported: no rays are traced through lenses of a camera; use a "
+        "perspective camera with lensradius and focaldistance");
+    return;
+  }
   const CameraReader read = FindReader<CameraReader>(kCameras, type);
   if (read == nullptr) {
     parameters.Error(Concat("is not supported; ", SupportedKinds<CameraReader>(kCameras)));

@@ -37,16 +37,6 @@ void ReadDisk(const ShapeInput& input, ShapeSet& shapes) {
   shapes.disks.push_back(disk);
 }
 
-Status MoveDisk(Disk& shape, const Transform& to_world) {
-  LUCERNA_ASSIGN_OR_RETURN(const Similarity similarity, SimilarityOf(to_world, "disk"));
-  shape.center = to_world.Point(shape.center);
-  shape.normal = Normalize(to_world.Normal(shape.normal));
-  shape.radius *= similarity.factor;
-  shape.axes = similarity.Axes(shape.axes);
-  shape.inner_radius *= similarity.factor;
-  return IsInRange(shape.center, shape.radius) ? absl::OkStatus() : MovedAway();
-}
-
 TriangleMesh MeshDisk(const Disk& shape) {
   TriangleMesh mesh = DiskMesh(static_cast<double>(shape.radius),
                                static_cast<double>(shape.inner_radius), 0, 2 * std::numbers::pi);

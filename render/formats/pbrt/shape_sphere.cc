@@ -41,14 +41,6 @@ void ReadSphere(const ShapeInput& input, ShapeSet& shapes) {
   shapes.spheres.push_back(sphere);
 }
 
-Status MoveSphere(Sphere& shape, const Transform& to_world) {
-  LUCERNA_ASSIGN_OR_RETURN(const Similarity similarity, SimilarityOf(to_world, "sphere"));
-  shape.center = to_world.Point(shape.center);
-  shape.radius *= similarity.factor;
-  shape.axes = similarity.Axes(shape.axes);
-  return IsInRange(shape.center, shape.radius) ? absl::OkStatus() : MovedAway();
-}
-
 TriangleMesh MeshSphere(const Sphere& shape) {
   const auto radius = static_cast<double>(shape.radius);
   TriangleMesh mesh = SphereMesh(radius, -radius, radius, 2 * std::numbers::pi);

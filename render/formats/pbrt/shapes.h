@@ -14,11 +14,9 @@
 #include "render/formats/pbrt/textures.h"
 #include "render/math/transform.h"
 #include "render/scene/scene.h"
+#include "render/scene/shape_moves.h"
 
 namespace lucerna {
-
-// Where the axes of a space point. Errors: INVALID_ARGUMENT when it is stretched.
-[[nodiscard]] StatusOr<ShapeAxes> AxesOf(const Transform& to_world);
 
 // Shapes in world space, or in the space of an object that is instanced later. Their traits are
 // those of the Shape directive that made them.

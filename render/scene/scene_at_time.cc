@@ -1,15 +1,14 @@
-#include "render/formats/scene_at_time.h"
+#include "render/scene/scene_at_time.h"
 
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
 #include <cstddef>
 
-#include "render/formats/degenerate_triangles.h"
-#include "render/formats/mesh_placement.h"
-#include "render/formats/pbrt/shape_readers.h"
+#include "render/scene/degenerate_triangles.h"
 #include "render/scene/scene_extent.h"
 #include "render/scene/shape_lists.h"
+#include "render/scene/shape_moves.h"
 
 namespace lucerna {
 namespace {
@@ -30,9 +29,12 @@ bool MoveTo(const Transform& motion, Instance& instance) {
   instance.to_world = motion * instance.to_world;
   return instance.to_world.IsFinite();
 }
+// A radius that is too small for single precision is so when the shutter opens or closes, and is
+// left to be so: such a shape is not seen.
 #define LUCERNA_MOVE(Name, list, name)                \
   bool MoveTo(const Transform& motion, Name& shape) { \
-    return Move##Name(shape, motion).ok();            \
+    Move##Name(shape, motion).IgnoreError();          \
+    return IsFinite(shape.center);                    \
   }
 LUCERNA_ANALYTIC_SHAPES(LUCERNA_MOVE)
 #undef LUCERNA_MOVE
