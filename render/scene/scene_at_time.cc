@@ -108,13 +108,13 @@ Bounds SweptBy(const ShapeMotion& motion, const Moved& moved, double open, doubl
                                 (corner & 4) != 0 ? moved.box.high.z : moved.box.low.z});
       swept.Add(at - Vec3{thick, thick, thick});
       swept.Add(at + Vec3{thick, thick, thick});
-      if (step > 0) largest_step = std::max(largest_step, Length(at - before[corner]));
+      if (step > 0) largest_step = std::max(largest_step, MaxAbs(at - before[corner]));
       before[corner] = at;
     }
   }
   // A path lies no farther from the nearer of two steps than half of their distance, but for its
   // bend.
-  const float margin = 0.5F * largest_step + kMargin * swept.Diagonal();
+  const float margin = 0.5F * largest_step + kMargin * MaxAbs(swept.high - swept.low);
   swept.low = swept.low - Vec3{margin, margin, margin};
   swept.high = swept.high + Vec3{margin, margin, margin};
   return swept;

@@ -171,14 +171,12 @@ TEST(SameBitsAfterExtendTest, AJobThatGoesOnIsOneThatNeverStopped) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, SameBitsTest,
-                         testing::Values(Case{"glass-box.pbrt", "appm"},
-                                         Case{"glass-box.pbrt", "ppm"},
-                                         Case{"rough-metal.pbrt", "ppm"},
-                                         Case{"rough-metal.pbrt", "cppm"},
-                                         Case{"textured.pbrt", "frequency-mse"},
-                                         Case{"glass-box.pbrt", "frequency-mse"},
-                                         Case{"motion.pbrt", "appm"}));
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, SameBitsTest,
+    testing::Values(Case{"glass-box.pbrt", "appm"}, Case{"glass-box.pbrt", "ppm"},
+                    Case{"rough-metal.pbrt", "ppm"}, Case{"rough-metal.pbrt", "cppm"},
+                    Case{"textured.pbrt", "frequency-mse"}, Case{"glass-box.pbrt", "frequency-mse"},
+                    Case{"motion.pbrt", "appm"}));
 
 }  // namespace
 }  // namespace lucerna
