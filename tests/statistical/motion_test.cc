@@ -214,6 +214,31 @@ TEST(MotionBlurTest, PhotonsPassForTheSameShare) {
   ExpectEqual(blurred, all, 2.0 / 32 * kLit / std::sqrt(kParts));
 }
 
+// A floor that rises by four times the width of a hitpoint's disc, in parallel light: photons of
+// another time than the hitpoint's would land below or above it, and count for nothing.
+TEST(MotionBlurTest, PhotonsLandOnWhatMoves) {
+  const std::string floor =
+      "Material \"diffuse\" \"rgb reflectance\" [.5 .5 .5] Shape \"trianglemesh\" \"point3 P\" [-3 "
+      "-3 0 3 -3 0 3 3 0 -3 3 0] \"integer indices\" [0 1 2 0 2 3] AttributeEnd ";
+  const std::string around =
+      "LookAt 0 -2 .45 0 0 .2 0 0 1 Camera \"perspective\" \"float fov\" .3 Film \"rgb\" \"integer "
+      "xresolution\" 4 \"integer yresolution\" 4 WorldBegin LightSource \"distant\" \"rgb L\" [1 1 "
+      "1] "
+      "\"point3 from\" [0 0 1] \"point3 to\" [0 0 0] " +
+      kSheet + "AttributeBegin ";
+  const Scene rising =
+      SceneOf(around + "ActiveTransform EndTime Translate 0 0 .4 ActiveTransform All " + floor);
+  const Scene still = SceneOf(around + floor);
+  const MeasuredMean a = Measure(rising, TestSettings(rising, 60000, .05, 4), 32, kParts, "R");
+  const MeasuredMean b = Measure(still, TestSettings(still, 60000, .05, 4), 32, kParts, "R");
+  const double lit = 0.5 / std::numbers::pi;
+  EXPECT_NEAR(b.mean / lit, 1, 0.1) << "the light is not that of photons through the sheet";
+  const double quantile = StudentQuantile(SidakLevel(1e-3, kComparisons), kParts);
+  const double bound = quantile * std::hypot(a.standard_error, b.standard_error);
+  EXPECT_NEAR(a.mean, b.mean, bound);
+  EXPECT_LT(bound, 0.15 * lit) << "the bound would let a wrong result pass";
+}
+
 // All at once: a glass ball, its caustic, a metal ball that grows, a bar that turns and a camera
 // that drifts, against the mean of renders of scenes that stand still.
 TEST(MotionBlurTest, AWholeSceneIsTheMeanOfItsMoments) {

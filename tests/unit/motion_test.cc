@@ -274,6 +274,22 @@ TEST(MotionTest, TheExtentIsTheSameAtAllTimes) {
   }
 }
 
+// The top of the arc lies between two of the times at which the box is known.
+TEST(MotionTest, TheExtentHoldsArcs) {
+  const Scene scene = World(
+      "ActiveTransform EndTime Rotate 150 0 0 1 ActiveTransform All Shape \"trianglemesh\" "
+      "\"point3 P\" [2 0 0 1.99 0 0 2 0 .01]");
+  float highest = 0;
+  for (int step = 0; step <= 1000; ++step) {
+    const Scene then = At(scene, step / 1000.0);
+    for (const Vec3 position : then.meshes.at(0).positions)
+      highest = std::max(highest, position.y);
+  }
+  EXPECT_NEAR(highest, 2, 1e-4);
+  EXPECT_LT(highest, scene.motion.swept.high.y);
+  EXPECT_LT(scene.motion.swept.high.y, 2.1) << "no larger than it must be";
+}
+
 // A worker sees passes in any order.
 TEST(MotionTest, AMomentDoesNotDependOnTheOneBefore) {
   const Scene scene = World(kManyMotions);
