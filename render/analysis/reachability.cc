@@ -124,8 +124,7 @@ class Walls {
                                                  const MaterialPredicate& is_wall) {
     std::unique_ptr<Walls> walls(new Walls);
     const auto accepts = [&](const ShapeTraits& traits) {
-      return IsWhole(traits) && traits.motion == kNoMotion &&
-             is_wall(scene.materials[static_cast<std::size_t>(traits.material)]);
+      return IsWhole(traits) && is_wall(scene.materials[static_cast<std::size_t>(traits.material)]);
     };
     for (const TriangleMesh& mesh : scene.meshes) {
       if (!accepts(mesh.traits)) continue;

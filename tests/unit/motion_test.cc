@@ -336,17 +336,26 @@ TEST(MotionTest, NeedsNewEyePathsInEachPass) {
 
 // A shell around the camera proves that the light outside is not seen, unless one of them moves.
 TEST(MotionTest, WhatMovesProvesNothing) {
-  const std::string shell = "Material \"diffuse\" Shape \"sphere\" \"float radius\" 3 ";
+  const std::string ball = "Material \"diffuse\" Shape \"sphere\" \"float radius\" 3 ";
+  const std::string box =
+      "Material \"diffuse\" Shape \"trianglemesh\" \"point3 P\" [-3 -3 -3 3 -3 -3 3 3 -3 -3 3 -3 "
+      "-3 "
+      "-3 3 3 -3 3 3 3 3 -3 3 3] \"integer indices\" [0 2 1 0 3 2 4 5 6 4 6 7 0 1 5 0 5 4 1 2 6 1 "
+      "6 "
+      "5 2 3 7 2 7 6 3 0 4 3 4 7] ";
   const std::string light = "AttributeBegin Translate 9 0 0 LightSource \"point\" AttributeEnd ";
   const auto unreachable = [](const Scene& scene) {
     return FindUnreachableLights(scene).of_photons.size();
   };
-  EXPECT_EQ(unreachable(World(light + shell)), 2U);  // with the sky
-  EXPECT_EQ(unreachable(World(light + kToRight + shell)), 0U);
-  EXPECT_EQ(unreachable(Read("ActiveTransform EndTime Translate 0 0 -9 " + kCamera, light + shell)),
-            0U);
-  // Something else that moves takes nothing from the proof.
-  EXPECT_EQ(unreachable(World(light + shell + kToRight + kSphere)), 2U);
+  for (const std::string& shell : {ball, box}) {
+    EXPECT_EQ(unreachable(World(light + shell)), 2U);  // with the sky
+    EXPECT_EQ(unreachable(World(light + kToRight + shell)), 0U);
+    EXPECT_EQ(
+        unreachable(Read("ActiveTransform EndTime Translate 0 0 -9 " + kCamera, light + shell)),
+        0U);
+    // Something else that moves takes nothing from the proof.
+    EXPECT_EQ(unreachable(World(light + shell + kToRight + kSphere)), 2U);
+  }
 }
 
 TEST(MotionTest, SmoothShellsEncloseNothingThatMovesOutOfThem) {
