@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_format.h"
 
+#include "render/analysis/pass_time.h"
 #include "render/analysis/prepared_scene.h"
 #include "render/base/mutex.h"
 #include "render/base/parallel.h"
@@ -359,8 +360,18 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));
 }
 
-EyePass JobEstimator::TraceEyePaths(std::uint64_t pass,
-                                    const std::function<bool()>& shall_stop) const {
+StatusOr<EyePass> JobEstimator::TraceEyePaths(std::uint64_t pass,
+                                              const std::function<bool()>& shall_stop) const {
+  const SceneMotion& motion = state_->prepared.scene().motion;
+  if (motion.Moves()) {
+    // The scene of this job stays as it is when the shutter opens: others read it meanwhile.
+    LUCERNA_ASSIGN_OR_RETURN(const std::unique_ptr<PreparedScene> then,
+                             state_->prepared.At(TimeOfPass(motion, state_->settings.seed, pass)));
+    const EyePathTracer tracer(then->scene(), state_->settings, then->needs(), then->intersector(),
+                               then->lights());
+    FilmSpread spread(tracer);
+    return TraceHitpointPass(tracer, pass, nullptr, spread, state_->team, shall_stop);
+  }
   return TraceHitpointPass(*state_->tracer, pass, state_->first_hits.Of(pass), *state_->film_spread,
                            state_->team, shall_stop);
 }

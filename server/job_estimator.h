@@ -88,8 +88,8 @@ class JobEstimator {
   [[nodiscard]] ThreadTeam& team();
 
   // `shall_stop` as TraceHitpointPass has it.
-  [[nodiscard]] EyePass TraceEyePaths(std::uint64_t pass,
-                                      const std::function<bool()>& shall_stop = nullptr) const;
+  [[nodiscard]] StatusOr<EyePass> TraceEyePaths(
+      std::uint64_t pass, const std::function<bool()>& shall_stop = nullptr) const;
   // Absent while passes before RadiiFrom(round) have not been added, and for a round that has been.
   [[nodiscard]] std::optional<RoundPlan> PlanFor(const PassRange& round) const;
   [[nodiscard]] SliceShape ShapeOf(const PassRange& round, const RoundPlan& plan) const;

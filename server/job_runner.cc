@@ -467,7 +467,8 @@ std::optional<std::uint64_t> JobRunner::NextToSplit(const End& end) const {
 
 StatusOr<std::optional<JobRunner::TracedPass>> JobRunner::Trace(std::uint64_t pass) {
   TracedPass traced;
-  traced.eye = estimator_->TraceEyePaths(pass, [this] { return ShallInterrupt(); });
+  LUCERNA_ASSIGN_OR_RETURN(traced.eye,
+                           estimator_->TraceEyePaths(pass, [this] { return ShallInterrupt(); }));
   if (!traced.eye.is_whole) return std::optional<TracedPass>();
   std::string bytes = EncodeHitpointBlock(traced.eye.block, &estimator_->team());
   const Digest digest = Sha256(bytes);

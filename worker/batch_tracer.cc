@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/analysis/pass_time.h"
 #include "render/analysis/prepared_scene.h"
 #include "render/base/parallel.h"
 #include "render/estimate/evidence.h"
@@ -169,14 +170,22 @@ Status CheckDeposits(const std::vector<BatchTally>& tallies) {
 }  // namespace
 
 struct BatchTracer::State {
-  State(Scene s, int threads) : prepared(std::move(s)), features(prepared.scene()), team(threads) {}
+  State(Scene s, int threads)
+      : prepared(std::move(s)),
+        features(std::in_place, prepared.scene()),
+        time_of_features(prepared.time()),
+        team(threads) {}
 
-  // Builds what a job with these needs uses; what the job before it used too is kept.
-  Status PrepareFor(const SceneNeeds& needs) {
-    if (prepared.IsPreparedFor(needs)) return absl::OkStatus();
+  // Builds what a pass of a job with these needs uses; what the one before it used too is kept.
+  Status PrepareFor(const RenderSettings& settings, const SceneNeeds& needs, std::uint64_t pass) {
+    const double time = TimeOfPass(prepared.scene().motion, settings.seed, pass);
+    if (prepared.IsPreparedFor(needs, time)) return absl::OkStatus();
     spectra.reset();
     eye_paths.reset();
-    return prepared.PrepareFor(needs);
+    LUCERNA_RETURN_IF_ERROR(prepared.PrepareFor(needs, time));
+    if (time_of_features != time) features.emplace(prepared.scene());
+    time_of_features = time;
+    return absl::OkStatus();
   }
 
   // Requires PrepareFor. Keeps the first hits that it found while the settings stay.
@@ -192,7 +201,8 @@ struct BatchTracer::State {
   }
 
   PreparedScene prepared;
-  FeatureEdges features;
+  std::optional<FeatureEdges> features;
+  double time_of_features;
   ThreadTeam team;
   // Made when a job uses it.
   std::unique_ptr<SpectrumTracer> spectra;
@@ -237,7 +247,7 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
   const std::uint64_t last = range.last;
   const PhotonGuide* const guide = range.guide;
   const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
-  LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(needs));
+  LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(settings, needs, pass));
   const PreparedScene& prepared = state_->prepared;
   const Bounds region = RegionOf(block, radii, ReachOf(evidence));
   const Bounds media_region = MediaRegionOf(block, radii);
@@ -320,7 +330,7 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
     std::vector<std::uint32_t> found_by(grid.size(), kNotFound);
     std::optional<PhotonGrid> caustic_grid;
     std::vector<std::uint32_t> caustic_found_by;
-    GatheredPhotons photons{.grid = grid, .features = &state_->features, .found_by = found_by};
+    GatheredPhotons photons{.grid = grid, .features = &*state_->features, .found_by = found_by};
     if (block.caustic_rows > 0) {
       caustic_grid.emplace(caustics, region, caustic_cell, state_->team);
       caustics = {};
@@ -398,9 +408,11 @@ StatusOr<SliceSums> BatchTracer::RunSlice(const RenderSettings& settings, const 
   if (!IsSlice(passes) || plan.radii == nullptr || plan.radii->size() != pixels) {
     return absl::InvalidArgumentError("a slice's passes or radii do not fit its job");
   }
-  LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(needs));
-  state_->PrepareEyePaths(settings);
-  if (passes.size() == 1) return RunPass(settings, needs, passes.first, plan, stop);
+  if (passes.size() == 1) {
+    LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(settings, needs, passes.first));
+    state_->PrepareEyePaths(settings);
+    return RunPass(settings, needs, passes.first, plan, stop);
+  }
   const std::uint64_t middle = passes.first + passes.size() / 2;
   LUCERNA_ASSIGN_OR_RETURN(SliceSums sums,
                            RunSlice(settings, needs, {passes.first, middle}, plan, stop));

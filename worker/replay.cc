@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "render/analysis/pass_time.h"
 #include "render/analysis/prepared_scene.h"
 #include "render/wire/messages.h"
 #include "worker/connection.h"
@@ -126,7 +127,8 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
         ": passes count from 0, and the photons of each from 0 to ", photons_per_pass - 1));
   }
   PreparedScene prepared(std::move(rec709));
-  LUCERNA_RETURN_IF_ERROR(prepared.PrepareFor(needs));
+  LUCERNA_RETURN_IF_ERROR(
+      prepared.PrepareFor(needs, TimeOfPass(prepared.scene().motion, settings.seed, pass)));
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
                                 settings, needs, nullptr, Bounds(), photons_per_pass, Bounds(),
                                 guide);

@@ -44,7 +44,7 @@ Walls WallsOf(const Scene& scene, const MaterialPredicate& is_wall) {
   Walls walls;
   std::vector<std::uint32_t> corners;
   for (const TriangleMesh& mesh : scene.meshes) {
-    if (!IsWhole(mesh.traits)) continue;
+    if (!IsWhole(mesh.traits) || mesh.traits.motion != kNoMotion) continue;
     if (!is_wall(scene.materials[static_cast<std::size_t>(mesh.traits.material)])) continue;
     const auto first = static_cast<std::uint32_t>(walls.positions.size());
     walls.positions.insert(walls.positions.end(), mesh.positions.begin(), mesh.positions.end());
@@ -212,7 +212,7 @@ std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene, const MaterialPr
   ForEachAnalyticShape(scene, [&](const auto& shape) {
     using Shape = std::decay_t<decltype(shape)>;
     if constexpr (Shape::kIsClosed && !Shape::kIsThin) {
-      if (IsWhole(shape.traits) &&
+      if (IsWhole(shape.traits) && shape.traits.motion == kNoMotion &&
           is_wall(scene.materials[static_cast<std::size_t>(shape.traits.material)])) {
         surfaces.emplace_back(shape.center, shape.Reach(),
                               [shape](Double3 point) { return shape.SignedDistance(point); });

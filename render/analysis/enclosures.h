@@ -49,7 +49,8 @@ class ClosedSurface {
   double near_ = 0;  // closer than this is too near
 };
 
-// The closed surfaces among the triangles and shapes of the materials that `is_wall` accepts.
+// The closed surfaces among the triangles and shapes of the materials that `is_wall` accepts and
+// that do not move.
 using MaterialPredicate = std::function<bool(const Material&)>;
 [[nodiscard]] std::vector<ClosedSurface> ClosedSurfacesOf(const Scene& scene,
                                                           const MaterialPredicate& is_wall);

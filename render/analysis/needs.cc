@@ -181,8 +181,8 @@ bool GathersOnOneFloor(const Scene& scene) {
   ForEachAnalyticShape(scene, [&](const auto& shape) {
     curves_gather = curves_gather || (!shape.kIsFlat && gathers(shape.traits));
   });
-  // The camera is one point here, and instances may gather anywhere.
-  if (curves_gather || !scene.instances.empty() ||
+  // The camera is one point here, and instances and what moves may gather anywhere.
+  if (curves_gather || !scene.instances.empty() || scene.motion.Moves() ||
       scene.camera.kind == Camera::Kind::kOrthographic ||
       scene.camera.kind == Camera::Kind::kSensors) {
     return false;
@@ -439,6 +439,8 @@ class NeedsFinder {
         std::int64_t{settings_.crop_width()} * std::int64_t{settings_.crop_height()};
     if (has_lens) {
       Set(Part::kFreshEyePaths, true, "the camera has a lens");
+    } else if (scene_.motion.Moves()) {
+      Set(Part::kFreshEyePaths, true, "each pass sees the scene at another time");
     } else if (std::ranges::any_of(scene_.media, &Medium::Scatters)) {
       Set(Part::kFreshEyePaths, true, "eye paths choose at random where they look into media");
     } else if (specular_ != nullptr) {
@@ -483,7 +485,7 @@ class NeedsFinder {
   }
 
   void AddRareParts() {
-    Set(Part::kMotion, false, "scenes that move are not read");
+    Set(Part::kMotion, scene_.motion.Moves(), MotionReason());
     const std::size_t media = scene_.media.size();
     Set(Part::kMedia, media > 0,
         media > 0 ? Concat("media that absorb or scatter light: ", media)
@@ -498,6 +500,19 @@ class NeedsFinder {
             ? std::string("everything is written out as shapes of its own: one tree")
             : Concat("instances: ", scene_.instances.size(),
                      ", of objects: ", scene_.objects.size(), ", which are in memory once"));
+  }
+
+  [[nodiscard]] std::string MotionReason() const {
+    const SceneMotion& motion = scene_.motion;
+    if (!motion.Moves()) return "nothing moves while the shutter is open";
+    std::size_t shapes = 0;
+    ForEachShapeTraits(
+        scene_, [&](const ShapeTraits& traits) { shapes += traits.motion != kNoMotion ? 1 : 0; });
+    for (const Instance& instance : scene_.instances)
+      shapes += instance.motion != kNoMotion ? 1 : 0;
+    std::string moving = shapes > 0 ? Concat("shapes that move: ", shapes) : std::string();
+    if (motion.of_camera) moving += shapes > 0 ? "; the camera moves" : "the camera moves";
+    return moving;
   }
 
   void ForceEverything() {

@@ -6,11 +6,19 @@
 
 namespace lucerna {
 
-PreparedScene::PreparedScene(Scene rec709) : scene_(InWorkingSpace(std::move(rec709))) {}
+PreparedScene::PreparedScene(Scene rec709)
+    : scene_(InWorkingSpace(std::move(rec709))),
+      time_(scene_.motion.shutter_open),
+      mover_(scene_.motion.Moves() ? std::make_shared<const SceneMover>(scene_) : nullptr) {}
 
-Status PreparedScene::PrepareFor(const SceneNeeds& needs) {
-  if (IsPreparedFor(needs)) return absl::OkStatus();
+Status PreparedScene::PrepareFor(const SceneNeeds& needs, std::optional<double> time) {
+  if (IsPreparedFor(needs, time)) return absl::OkStatus();
   lights_.reset();
+  if (const double to = TimeOf(time); to != time_) {
+    intersector_.reset();
+    mover_->MoveTo(to, scene_);
+    time_ = to;
+  }
   if (intersector_ == nullptr || needs_.rays() != needs.rays()) {
     intersector_.reset();
     LUCERNA_ASSIGN_OR_RETURN(intersector_, Intersector::Create(scene_, needs.rays()));
@@ -19,6 +27,12 @@ Status PreparedScene::PrepareFor(const SceneNeeds& needs) {
   lights_ = std::make_unique<LightSet>(scene_, *intersector_, needs_.lights());
   flux_scale_ = FluxScale::ForPower(lights_->TotalPower());
   return absl::OkStatus();
+}
+
+StatusOr<std::unique_ptr<PreparedScene>> PreparedScene::At(double time) const {
+  std::unique_ptr<PreparedScene> other(new PreparedScene(scene_, time_, mover_));
+  LUCERNA_RETURN_IF_ERROR(other->PrepareFor(needs_, time));
+  return other;
 }
 
 }  // namespace lucerna

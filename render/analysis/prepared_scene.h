@@ -1,16 +1,20 @@
 // A scene with what paths through it need: colours in the working space, the intersector, the
 // lights and the scale of the fixed-point flux.
 //
-// Eye paths, photon batches and replays of photons use one of these, built here alone.
+// Eye paths, photon batches and replays of photons use one of these, built here alone. A scene that
+// moves is prepared for one time, and anew for another: all that is found on its surfaces is then
+// right without knowing of motion.
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "render/analysis/needs.h"
 #include "render/base/status.h"
 #include "render/geometry/intersector.h"
 #include "render/math/fixed_point.h"
 #include "render/scene/scene.h"
+#include "render/scene/scene_at_time.h"
 #include "render/transport/light.h"
 
 namespace lucerna {
@@ -22,16 +26,22 @@ class PreparedScene {
   PreparedScene(const PreparedScene&) = delete;
   PreparedScene& operator=(const PreparedScene&) = delete;
 
-  // Builds what a job with these needs uses, and keeps what the job before it used too. Whatever
-  // refers to intersector or lights must be gone unless IsPreparedFor(needs).
+  // Builds what a job with these needs uses, as of the time when the shutter opens or of another,
+  // and keeps what the job before it used too. Whatever refers to scene, intersector or lights must
+  // be gone unless IsPreparedFor(needs) and that time.
   // Errors: RESOURCE_EXHAUSTED when memory runs out, INTERNAL when Embree refuses the scene.
-  [[nodiscard]] Status PrepareFor(const SceneNeeds& needs);
-  [[nodiscard]] bool IsPreparedFor(const SceneNeeds& needs) const {
-    return lights_ != nullptr && needs_ == needs;
+  [[nodiscard]] Status PrepareFor(const SceneNeeds& needs, std::optional<double> time = {});
+  [[nodiscard]] bool IsPreparedFor(const SceneNeeds& needs, std::optional<double> time = {}) const {
+    return lights_ != nullptr && needs_ == needs && time_ == TimeOf(time);
   }
+  // The same scene, prepared for the same needs as of another time. Requires PrepareFor.
+  // Errors: those of PrepareFor.
+  [[nodiscard]] StatusOr<std::unique_ptr<PreparedScene>> At(double time) const;
 
   // In the working space.
   [[nodiscard]] const Scene& scene() const { return scene_; }
+  // That of which the scene is.
+  [[nodiscard]] double time() const { return time_; }
 
   // The rest requires that PrepareFor has returned OK.
   [[nodiscard]] const SceneNeeds& needs() const { return needs_; }
@@ -40,7 +50,16 @@ class PreparedScene {
   [[nodiscard]] const FluxScale& flux_scale() const { return flux_scale_; }
 
  private:
-  Scene scene_;
+  PreparedScene(const Scene& scene, double time, std::shared_ptr<const SceneMover> mover)
+      : scene_(scene), time_(time), mover_(std::move(mover)) {}
+  // All times are one where nothing moves.
+  [[nodiscard]] double TimeOf(std::optional<double> time) const {
+    return mover_ == nullptr ? time_ : time.value_or(scene_.motion.shutter_open);
+  }
+
+  Scene scene_;  // at `time_`
+  double time_;
+  std::shared_ptr<const SceneMover> mover_;  // nullptr: nothing moves
   SceneNeeds needs_;
   std::unique_ptr<Intersector> intersector_;
   std::unique_ptr<LightSet> lights_;

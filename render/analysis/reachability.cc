@@ -179,10 +179,10 @@ class Walls {
 // The lights whose light cannot reach the camera, however it is scattered.
 std::vector<std::uint32_t> FindSeparated(const Scene& scene,
                                          const std::vector<NumberedLight>& lights) {
-  // Rays of an orthographic camera begin on a plane, and sensors are anywhere: neither is looked at
-  // here.
+  // Rays of an orthographic camera begin on a plane, sensors are anywhere, and a camera that moves
+  // may pass a wall: none is looked at here.
   if (scene.camera.kind == Camera::Kind::kOrthographic ||
-      scene.camera.kind == Camera::Kind::kSensors) {
+      scene.camera.kind == Camera::Kind::kSensors || scene.motion.of_camera) {
     return {};
   }
   const auto walls = Walls::Create(scene, IsOpaque);
@@ -216,6 +216,14 @@ bool AllSampledLie(const Scene& scene, const ClosedSurface& surface, bool inside
   const auto is_lit = [&](const ShapeTraits& traits) {
     return ScattersBroadly(scene.materials[static_cast<std::size_t>(traits.material)]);
   };
+  // Shapes that move may do so into it or out of it.
+  bool all_stand_still = true;
+  ForEachShapeTraits(scene, [&](const ShapeTraits& traits) {
+    all_stand_still = all_stand_still && (traits.motion == kNoMotion || !is_lit(traits));
+  });
+  for (const Instance& instance : scene.instances)
+    all_stand_still = all_stand_still && instance.motion == kNoMotion;
+  if (!all_stand_still) return false;
   const double far = kNear * LargestCoordinate(surface.bounds());
   const auto lies = [&](std::span<const Vec3> points) {
     if (!inside && AreDisjoint(BoxAround(points), surface.bounds(), far)) return true;

@@ -62,12 +62,13 @@ double OpenEdges(const TriangleMesh& mesh) {
 }  // namespace
 
 double SceneMemory::PeakOfCoordinator() const {
-  return files + kOfHeaps * (shapes + textures +
-                             std::max(analysing, acceleration + building_trees + lights));
+  return files +
+         kOfHeaps * (shapes + textures + moving +
+                     std::max(analysing, acceleration + building_trees + lights + at_another_time));
 }
 
 double SceneMemory::PeakOfWorker() const {
-  return kOfHeaps * (shapes + textures +
+  return kOfHeaps * (shapes + textures + moving +
                      std::max(std::max(edges, building_edges),
                               edges + acceleration + building_trees + lights));
 }
@@ -115,6 +116,20 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
   ForEachDeltaList(scene, [&](const auto& lights) {
     if (!lights.empty()) memory.lights += static_cast<double>(lights.size()) * kEmitter;
   });
+  if (scene.motion.Moves()) {
+    for (const TriangleMesh& mesh : scene.meshes) {
+      if (mesh.traits.motion != kNoMotion) memory.moving += SizeOf(mesh);
+    }
+    ForEachAnalyticShape(scene, [&](const auto& shape) {
+      if (shape.traits.motion != kNoMotion) memory.moving += sizeof(shape);
+    });
+    for (const Instance& instance : scene.instances)
+      memory.moving += instance.motion != kNoMotion ? sizeof(instance) : 0;
+    memory.moving += static_cast<double>(scene.motion.of_shapes.size()) *
+                     (sizeof(ShapeMotion) + sizeof(AnimatedTransform) + kBlock);
+    memory.at_another_time =
+        memory.shapes + memory.acceleration + memory.building_trees + memory.lights;
+  }
   if (open_edges > 0) memory.edges = std::max(kFewestSegments, kSegment * open_edges);
 
   // A picture is in memory once, however many refer to it.

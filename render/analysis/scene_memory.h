@@ -22,14 +22,17 @@ struct SceneMemory {
   double acceleration = 0;  // Embree's trees, with the copies of positions that they refer to
   double instances = 0;     // of that, what stands for instances in the tree above
   double lights = 0;        // of emitting triangles
+  double moving = 0;        // copies of the shapes that move
   double edges = 0;         // at which discs are cut: of a worker; at most, where edges are unknown
 
   // What building takes for a while beside what is kept.
   double building_trees = 0, building_edges = 0, analysing = 0;
+  // Of a coordinator that traces eye paths of a scene that moves: a second one.
+  double at_another_time = 0;
 
   // What a coordinator keeps of a job beside the image.
   [[nodiscard]] double KeptByCoordinator() const {
-    return shapes + textures + acceleration + lights;
+    return shapes + textures + acceleration + lights + moving;
   }
   // The greatest at one time, beside the image, of a coordinator that reads, analyses and renders
   // it, and of a worker. With what the heaps keep of memory that was freed.

@@ -10,8 +10,9 @@
 #include <vector>
 
 #include "render/base/text.h"
-#include "render/formats/degenerate_triangles.h"
 #include "render/formats/scene_unit.h"
+#include "render/scene/degenerate_triangles.h"
+#include "render/scene/scene_at_time.h"
 #include "render/scene/scene_extent.h"
 #include "render/scene/shape_lists.h"
 
@@ -41,6 +42,15 @@ bool HasUvTexture(const Scene& scene, const Material& material) {
   return std::ranges::any_of(material.roughness_textures, by_uv) || by_uv(material.texture) ||
          by_uv(material.second_texture) || by_uv(material.displacement) ||
          by_uv(material.normal_map) || by_uv(material.amount_texture);
+}
+
+void BeginMotion(Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
+  if (const Status begun = BeginMotion(scene); !begun.ok())
+    diagnostics.Error(whole, std::string(begun.message()));
+  // Sensors are on surfaces as they are then.
+  if (scene.camera.kind != Camera::Kind::kSensors || !scene.motion.Moves()) return;
+  diagnostics.Warning(whole, "irradiance is measured as the shutter opens: nothing moves");
+  ForgetMotion(scene);
 }
 
 void WarnOfMissingUvs(const Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {
@@ -181,6 +191,7 @@ Scene FinishScene(UnfinishedScene unfinished, const std::string& main_file,
   Scene& scene = unfinished.scene;
   if (diagnostics.has_error()) return std::move(scene);
   const SourceLocation whole = {&main_file, 0, 0};
+  BeginMotion(scene, whole, diagnostics);
   JoinMixes(scene.materials);
   WarnOfMissingUvs(scene, whole, diagnostics);
   WarnOfDistance(scene, whole, diagnostics);

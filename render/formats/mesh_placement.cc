@@ -11,20 +11,6 @@ void SwapTriangle(TriangleMesh& mesh, std::size_t triangle) {
 
 }  // namespace
 
-bool MoveMesh(const Transform& to_world, TriangleMesh& mesh) {
-  for (Vec3& position : mesh.positions) {
-    position = to_world.Point(position);
-    if (!IsFinite(position)) return false;
-  }
-  for (Vec3& normal : mesh.normals) {
-    const float size = MaxAbs(normal);
-    normal = size > 0 ? to_world.Normal(normal / size) : Vec3();
-    // Normal() leaves zero when there is no direction left: S3 lets that stand.
-    if (normal != Vec3()) normal = Normalize(normal);
-  }
-  return true;
-}
-
 void SwapWinding(TriangleMesh& mesh) {
   for (std::size_t i = 0; i < mesh.indices.size() / 3; ++i)
     SwapTriangle(mesh, i);

@@ -21,10 +21,6 @@ inline constexpr std::uint64_t kInstanceBytes = 1024;
 // Shapes have numbers of 32 bits.
 inline constexpr std::uint64_t kMaxInstanced = std::uint64_t{4'000'000'000};
 
-// Moves positions and normals; the winding is not touched. Returns false when a position leaves the
-// finite numbers.
-[[nodiscard]] bool MoveMesh(const Transform& to_world, TriangleMesh& mesh);
-
 // Turns all triangles over.
 void SwapWinding(TriangleMesh& mesh);
 

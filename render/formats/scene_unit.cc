@@ -27,6 +27,10 @@ double FarthestOf(const Scene& scene) {
     const auto& row = scene.camera.camera_to_world.rows()[axis];
     const double on_lens = std::abs(row[0]) + std::abs(row[1]) + std::abs(row[2]);
     farthest = std::max(farthest, std::abs(row[3]) + scene.camera.lens_radius * on_lens);
+    if (const auto& moves = scene.motion.of_camera) {
+      const double at_close = moves->At(scene.motion.shutter_close).rows()[axis][3];
+      farthest = std::max(farthest, std::abs(at_close) + scene.camera.lens_radius * on_lens);
+    }
   }
   for (const Sensor& sensor : scene.sensors)
     farthest = std::max(farthest, static_cast<double>(MaxAbs(sensor.position)));
@@ -108,6 +112,15 @@ Status ChooseUnit(Scene& scene) {
   Camera& camera = scene.camera;
   camera.camera_to_world = Transform::Scale(factor, factor, factor) * camera.camera_to_world *
                            Transform::Scale(scene.unit, scene.unit, scene.unit);
+  SceneMotion& motion = scene.motion;
+  if (motion.of_camera) motion.of_camera = motion.of_camera->ScaledBy(factor);
+  for (ShapeMotion& of_shapes : motion.of_shapes) {
+    for (AnimatedTransform& transform : of_shapes.to_world)
+      transform = transform.ScaledBy(factor);
+    of_shapes.from_world = AnimatedTransform(of_shapes.from_world).ScaledBy(factor).start();
+  }
+  motion.swept.low = ScaledBy(motion.swept.low, factor);
+  motion.swept.high = ScaledBy(motion.swept.high, factor);
   camera.window_scale *= factor;
   camera.lens_radius *= factor;
   camera.focal_distance *= factor;

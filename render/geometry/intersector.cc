@@ -330,6 +330,11 @@ StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, R
       embree.AttachMesh(made, i, scene, scene.object_meshes[object.first_mesh + i]);
     rtcCommitScene(made);
   }
+  // The same at all times: what follows from the size of the scene does not change between passes.
+  if (const Bounds& swept = scene.motion.swept; !swept.empty()) {
+    bounds.Add(swept.low);
+    bounds.Add(swept.high);
+  }
   LUCERNA_RETURN_IF_ERROR(intersector->AddInstances());
   rtcCommitScene(embree.scene);
   LUCERNA_RETURN_IF_ERROR(EmbreeStatus(embree.device));

@@ -1,10 +1,10 @@
 // The kinds of shape that are given by a formula. All others are triangle meshes.
 //
-// A kind is an include and a row here and three files: its value in render/scene/shape_NAME.h, how
-// pbrt files give it in render/formats/pbrt/shape_NAME.cc, and intersection, sampling, texture
-// coordinates, curvature and edges in render/geometry/shape_NAME.cc (docs/adding.md). Functions
-// that differ between kinds are declared from these rows, in formats/pbrt/shape_readers.h and
-// geometry/shape_geometry.h.
+// A kind is an include and a row here and four files: its value in render/scene/shape_NAME.h, how
+// it is moved in shape_NAME.cc there, how pbrt files give it in render/formats/pbrt/shape_NAME.cc,
+// and intersection, sampling, texture coordinates, curvature and edges in
+// render/geometry/shape_NAME.cc (docs/adding.md). Functions that differ between kinds are declared
+// from these rows: scene/shape_moves.h, formats/pbrt/shape_readers.h, geometry/shape_geometry.h.
 //
 // The value, a struct Name, has the members
 //   center, traits         `center` is the middle of a ball that holds the shape

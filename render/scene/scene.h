@@ -11,11 +11,12 @@
 // Invariants, which the readers guarantee and everything above relies on
 //   S1  Every position, normal, texture coordinate, transform, colour and pixel is finite.
 //   S2  Every index is in range: triangle -> vertex, shape -> material, shape -> area light,
-//       material -> texture, shape, light and camera -> medium; a texture is made of textures
-//       before it. A texture that needs a picture has one, and the picture of an infinite light is
-//       square. A light behind a portal has one, and no other has.
+//       material -> texture, shape, light and camera -> medium, shape -> motion; a texture is made
+//       of textures before it. A texture that needs a picture has one, and the picture of an
+//       infinite light is square. A light behind a portal has one, and no other has.
 //   S3  Normals are unit length or zero (zero: use the geometric normal).
-//       An object's meshes are not empty, and an instance's object exists.
+//       An object's meshes are not empty and do not move, and an instance's object exists.
+//       What emits does not move.
 //   S4  Reflectances are in [0, 1], those of textures once they are looked up; emitted quantities,
 //       pixels and scales of textures are >= 0.
 #pragma once
@@ -37,6 +38,7 @@
 #include "render/scene/light_list.h"
 #include "render/scene/material.h"
 #include "render/scene/medium.h"
+#include "render/scene/motion.h"
 #include "render/scene/shape_traits.h"
 #include "render/scene/texture.h"
 
@@ -144,6 +146,7 @@ struct InstancedObject {
 struct Instance {
   std::uint32_t object = 0;  // index in Scene::objects
   Transform to_world;        // affine, and it can be inverted
+  std::int32_t motion = kNoMotion;
 };
 
 // The reconstruction filter of the film, separable, in pixels.
@@ -204,6 +207,7 @@ struct Scene {
   FilmSettings film;
   PixelFilter filter;
   IntegratorSettings integrator;
+  SceneMotion motion;
 
   // Of the triangles in memory: those of an object once.
   [[nodiscard]] std::size_t TriangleCount() const {

@@ -41,6 +41,10 @@ Bounds BoundsOf(const Scene& scene) {
     box.Add(shape.center - Everywhere(shape.Reach()));
     box.Add(shape.center + Everywhere(shape.Reach()));
   });
+  if (const Bounds& swept = scene.motion.swept; !swept.empty()) {
+    box.Add(swept.low);
+    box.Add(swept.high);
+  }
   return box;
 }
 

@@ -16,7 +16,8 @@ struct SceneExtent {
 // The box around an instance.
 [[nodiscard]] Bounds BoundsOf(const Scene& scene, const Instance& instance);
 
-// The box around all shapes; that of an analytic shape is that of the ball that holds it.
+// The box around all shapes, at all times while the shutter is open; that of an analytic shape is
+// that of the ball that holds it.
 [[nodiscard]] Bounds BoundsOf(const Scene& scene);
 
 // Whether all of `box` lies behind, or on, the plane through `point` with `normal`: light that

@@ -5,6 +5,7 @@
 
 #include "render/math/vector.h"
 #include "render/scene/medium.h"
+#include "render/scene/motion.h"
 #include "render/scene/texture.h"
 
 namespace lucerna {
@@ -22,6 +23,7 @@ struct ShapeTraits {
   // (geometry/intersector.h).
   float alpha = 1;
   std::int32_t alpha_texture = kNoTexture;  // in place of `alpha`, which is its largest number
+  std::int32_t motion = kNoMotion;
 
   [[nodiscard]] bool SeparatesMedia() const { return medium_inside != medium_outside; }
   bool operator==(const ShapeTraits&) const = default;

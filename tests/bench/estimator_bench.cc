@@ -54,7 +54,7 @@ struct Bench {
     intersector = Intersector::Create(scene, needs.rays()).value();
     lights = std::make_unique<LightSet>(scene, *intersector, needs.lights());
     estimator = JobEstimator::Create(scene, settings, needs, 1).value();
-    eye = estimator->TraceEyePaths(0);
+    eye = estimator->TraceEyePaths(0).value();
     radii = HitpointRadii(eye, estimator->PlanFor({0, 1}).value());
     for (std::size_t row = 0; row < radii.size(); ++row) {
       const Vec3 reach = {radii[row], radii[row], radii[row]};
@@ -149,7 +149,7 @@ void EyePaths(benchmark::State& state, const Bench& bench) {
   std::uint64_t pass = 1;
   std::uint64_t rays = 0;
   for (auto _ : state)
-    rays += bench.estimator->TraceEyePaths(pass++).rays;
+    rays += bench.estimator->TraceEyePaths(pass++).value().rays;
   const double paths = static_cast<double>(pass - 1) * 65536;
   state.counters["eye_paths/s"] = Counter(paths, Counter::kIsRate);
   state.counters["rays/path"] = static_cast<double>(rays) / paths;

@@ -355,7 +355,8 @@ class Check {
     const Scene file = LoadScene(options_.scene);
     EyePass eye = JobEstimator::Create(file, settings_, NeedsOf(file, settings_), 0)
                       .value()
-                      ->TraceEyePaths(0);
+                      ->TraceEyePaths(0)
+                      .value();
     const std::size_t rows = eye.block.size();
     const auto reach = static_cast<float>(options_.initial_radius);
     Bounds region;

@@ -4,8 +4,8 @@
 // with one, and for batches of several sizes, down to some that cut a pass into dozens of ranges;
 // over few passes, and over so many that rounds of two and four passes are lent as slices; with
 // workers that are killed; and for a job that goes on after an end in the middle of a round.
-// The scene has smooth glass and a mirror, the other has rough metal, whose hitpoints travel with
-// their BSDF.
+// One scene has smooth glass and a mirror, another rough metal, whose hitpoints travel with their
+// BSDF, and one moves: each pass is at its own time, whoever traces it.
 #include <chrono>
 #include <memory>
 #include <ostream>
@@ -152,7 +152,8 @@ TEST_P(SameBitsOfRoundsTest, ForAnyWorkersThreadsBatchesAndKills) {
 INSTANTIATE_TEST_SUITE_P(Scenes, SameBitsOfRoundsTest,
                          testing::Values(Case{"glass-box.pbrt", "appm"},
                                          Case{"rough-metal.pbrt", "cppm"},
-                                         Case{"textured.pbrt", "frequency-mse"}));
+                                         Case{"textured.pbrt", "frequency-mse"},
+                                         Case{"motion.pbrt", "frequency-mse"}));
 
 // Pass 21 ends in the middle of a round, and so does pass 45.
 TEST(SameBitsAfterExtendTest, AJobThatGoesOnIsOneThatNeverStopped) {
@@ -170,13 +171,12 @@ TEST(SameBitsAfterExtendTest, AJobThatGoesOnIsOneThatNeverStopped) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, SameBitsTest,
-                         testing::Values(Case{"glass-box.pbrt", "appm"},
-                                         Case{"glass-box.pbrt", "ppm"},
-                                         Case{"rough-metal.pbrt", "ppm"},
-                                         Case{"rough-metal.pbrt", "cppm"},
-                                         Case{"textured.pbrt", "frequency-mse"},
-                                         Case{"glass-box.pbrt", "frequency-mse"}));
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, SameBitsTest,
+    testing::Values(Case{"glass-box.pbrt", "appm"}, Case{"glass-box.pbrt", "ppm"},
+                    Case{"rough-metal.pbrt", "ppm"}, Case{"rough-metal.pbrt", "cppm"},
+                    Case{"textured.pbrt", "frequency-mse"}, Case{"glass-box.pbrt", "frequency-mse"},
+                    Case{"motion.pbrt", "appm"}));
 
 }  // namespace
 }  // namespace lucerna

@@ -5,6 +5,8 @@
 #include <string>
 
 #include "render/scene/scene.h"
+#include "render/scene/scene_at_time.h"
+#include "render/scene/scene_extent.h"
 
 namespace lucerna {
 
@@ -26,7 +28,10 @@ namespace lucerna {
     return traits.material >= 0 &&
            static_cast<std::size_t>(traits.material) < scene.materials.size() &&
            traits.alpha >= 0 && traits.alpha <= 1 && traits.area_light >= kNoAreaLight &&
-           traits.area_light < static_cast<std::int32_t>(scene.area_lights.size());
+           traits.area_light < static_cast<std::int32_t>(scene.area_lights.size()) &&
+           traits.motion >= kNoMotion &&
+           traits.motion < static_cast<std::int32_t>(scene.motion.of_shapes.size()) &&
+           (traits.motion == kNoMotion || traits.area_light == kNoAreaLight);
   };
   const auto is_unit = [](Vec3 v) { return std::abs(Length(v) - 1) < 1e-4F; };
   const auto is_light = [](Rgb c) { return IsFinite(c) && c.r >= 0 && c.g >= 0 && c.b >= 0; };
@@ -63,7 +68,9 @@ namespace lucerna {
     }
   }
   for (const Instance& instance : scene.instances) {
-    if (instance.object >= scene.objects.size() || !instance.to_world.Inverse().ok()) {
+    if (instance.object >= scene.objects.size() || !instance.to_world.Inverse().ok() ||
+        instance.motion < kNoMotion ||
+        instance.motion >= static_cast<std::int32_t>(scene.motion.of_shapes.size())) {
       return "an instance";
     }
   }
@@ -164,6 +171,19 @@ namespace lucerna {
           std::isfinite(LengthSquared(light.portal->along_x)) &&
           std::isfinite(LengthSquared(light.portal->along_y)))) {
       return "a portal's sides";
+    }
+  }
+  if (scene.motion.Moves()) {
+    const double open = scene.motion.shutter_open;
+    const double close = scene.motion.shutter_close;
+    if (!(open < close)) return "the shutter";
+    Scene moved = scene;
+    const SceneMover mover(scene);
+    for (const double share : {0.3, 1.0}) {
+      mover.MoveTo(open + share * (close - open), moved);
+      if (!moved.camera.camera_to_world.IsFinite()) return "a camera that moves";
+      const Bounds box = BoundsOf(moved);
+      if (!box.empty() && (!IsFinite(box.low) || !IsFinite(box.high))) return "what moves";
     }
   }
   const FilmSettings& film = scene.film;

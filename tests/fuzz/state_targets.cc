@@ -139,7 +139,7 @@ std::vector<std::string> SumsSeeds() {
   const std::unique_ptr<JobEstimator> estimator = SmallEstimator();
   std::vector<std::string> seeds = {Saved(*estimator)};
   for (std::uint64_t pass = 0; pass < 3; ++pass) {
-    const EyePass now = estimator->TraceEyePaths(pass);
+    const EyePass now = estimator->TraceEyePaths(pass).value();
     const RoundPlan plan = estimator->PlanFor(RoundOf(pass)).value();
     const std::size_t columns =
         EvidenceColumns(EvidenceOf(RenderSettings().radius_controller, pass));

@@ -50,9 +50,9 @@ TEST(FirstHitsTest, GiveThePassThatTracingGives) {
   const auto warm = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 2).value();
   const int sets = warm->needs().eye_sample_sets();
   ASSERT_GT(sets, 0);
-  const EyePass before = warm->TraceEyePaths(0);
-  const EyePass again = warm->TraceEyePaths(static_cast<std::uint64_t>(sets));
-  const EyePass traced = fresh->TraceEyePaths(static_cast<std::uint64_t>(sets));
+  const EyePass before = warm->TraceEyePaths(0).value();
+  const EyePass again = warm->TraceEyePaths(static_cast<std::uint64_t>(sets)).value();
+  const EyePass traced = fresh->TraceEyePaths(static_cast<std::uint64_t>(sets)).value();
   EXPECT_EQ(again.block, before.block);
   EXPECT_EQ(again.block, traced.block);
   EXPECT_EQ(again.pixels, traced.pixels);

@@ -114,13 +114,13 @@ TEST(JobEstimatorTest, TracesTheEyePathsOfAPassAtAnyTime) {
   const auto early = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 1).value();
   const auto late = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 3).value();
   for (std::uint64_t pass = 0; pass < 3; ++pass) {
-    const EyePass now = late->TraceEyePaths(pass);
+    const EyePass now = late->TraceEyePaths(pass).value();
     const std::size_t columns = EvidenceColumns(EvidenceOf(settings.radius_controller, pass));
     const RoundPlan plan = late->PlanFor(RoundOf(pass)).value();
     late->AddRound(late->SliceOf(now, plan, PassSums(now.block.size(), columns)), plan);
   }
-  const EyePass a = early->TraceEyePaths(3);
-  const EyePass b = late->TraceEyePaths(3);
+  const EyePass a = early->TraceEyePaths(3).value();
+  const EyePass b = late->TraceEyePaths(3).value();
   EXPECT_EQ(a.block, b.block);
   EXPECT_EQ(a.pixels, b.pixels);
   EXPECT_EQ(a.rays, b.rays);
@@ -132,7 +132,7 @@ TEST(JobEstimatorTest, PutsHitpointsOnSurfacesWithEveryPixelAtMostOnce) {
   const Scene scene = Room();
   const RenderSettings settings = TestSettings(scene, 1000, 0, 8);
   const auto estimator = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 2).value();
-  const EyePass pass = estimator->TraceEyePaths(0);
+  const EyePass pass = estimator->TraceEyePaths(0).value();
   const RadiusColumn radii = HitpointRadii(pass, estimator->PlanFor({0, 1}).value());
   std::vector<int> hitpoints(32 * 32);
   for (const std::uint32_t pixel : pass.pixels)
@@ -229,7 +229,7 @@ SliceSums SplitSlice(const JobEstimator& estimator, BatchTracer& tracer,
                      const RenderSettings& settings, std::uint64_t pass, const RoundPlan& plan,
                      std::uint64_t batches) {
   const std::atomic<bool> stop = false;
-  const EyePass eye = estimator.TraceEyePaths(pass);
+  const EyePass eye = estimator.TraceEyePaths(pass).value();
   PassSums sums(eye.block.size(), EvidenceColumns(EvidenceOf(settings.radius_controller, pass)));
   if (eye.block.size() > 0 && estimator.needs().Uses(Part::kPhotons)) {
     for (std::uint64_t b = batches; b-- > 0;) {

@@ -12,6 +12,7 @@
 namespace lucerna {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 constexpr const char* kTriangle =
@@ -90,8 +91,14 @@ TEST(PbrtMediaTest, KeepTheirOpticalThicknessInAnotherUnit) {
 
 TEST(PbrtMediaTest, WhatIsWrongIsSaid) {
   EXPECT_THAT(Said("MakeNamedMedium \"m\""), HasSubstr("needs \"string type\""));
-  EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"nanovdb\""),
-              HasSubstr("\"nanovdb\", which is not supported; there is homogeneous"));
+  for (const char* const grid : {"uniformgrid", "rgbgrid", "nanovdb", "cloud"}) {
+    const std::string type = std::string("\"") + grid + "\"";
+    EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" " + type),
+                AllOf(HasSubstr(type + ", which is not supported"),
+                      HasSubstr("use homogeneous with the mean density")));
+  }
+  EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"smoke\""),
+              HasSubstr("\"smoke\", which is not supported; there is homogeneous"));
   EXPECT_THAT(Said("MediumInterface \"m\" \"\""), HasSubstr("there is no medium \"m\""));
   EXPECT_THAT(Said(std::string(kFog) + kFog), HasSubstr("is defined twice"));
   EXPECT_THAT(

@@ -734,6 +734,10 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
          "there are point, spot, goniometric, projection, distant and infinite");
   expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "no such file");
   expect("Camera \"perspective\"", "before WorldBegin");
+  EXPECT_THAT(
+      Said("Camera \"realistic\" \"string lensfile\" \"l.dat\" WorldBegin"),
+      HasSubstr("Camera \"realistic\" is not supported: no rays are traced through lenses of "
+                "a camera; use a perspective camera"));
 }
 
 TEST(PbrtParserTest, ReadsCoatedDiffuse) {

@@ -299,15 +299,6 @@ TEST(PbrtShapesTest, AlphaIsAShareOfRaysAndZeroIsNothing) {
   EXPECT_EQ(light.disks.size(), 1U);
 }
 
-TEST(PbrtShapesTest, MotionIsShownAsTheShutterOpens) {
-  const std::string world =
-      "AttributeBegin ActiveTransform EndTime Translate 5 0 0 ActiveTransform All Translate 1 0 0 "
-      "Shape \"sphere\" AttributeEnd";
-  EXPECT_EQ(World(world).spheres.at(0).center, Vec3(1, 0, 0));
-  EXPECT_THAT(Said(world), HasSubstr("warning: motion is not rendered"));
-  EXPECT_THAT(Said(world), Not(HasSubstr("error")));
-}
-
 TEST(PbrtShapesTest, ObjectsThatWouldTakeMuchMemoryAreShared) {
   // 8192 triangles: 128 copies are as many as are written out.
   const std::string object =

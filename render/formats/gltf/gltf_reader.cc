@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "render/base/text.h"
-#include "render/formats/degenerate_triangles.h"
 #include "render/formats/gltf/accessors.h"
 #include "render/formats/gltf/cameras.h"
 #include "render/formats/gltf/document.h"
@@ -16,7 +15,9 @@
 #include "render/formats/gltf/nodes.h"
 #include "render/formats/gltf/textures.h"
 #include "render/formats/mesh_placement.h"
+#include "render/scene/degenerate_triangles.h"
 #include "render/scene/scene_extent.h"
+#include "render/scene/shape_moves.h"
 
 namespace lucerna {
 namespace {

@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "render/base/text.h"
-#include "render/formats/degenerate_triangles.h"
 #include "render/formats/mesh_placement.h"
+#include "render/scene/degenerate_triangles.h"
 
 namespace lucerna {
 namespace {

@@ -61,7 +61,7 @@ std::span<const DirectiveReader::Directive> DirectiveReader::Directives() {
       {"Transform", &P::OnTransform, Phase::kAnywhere},
       {"TransformBegin", &P::OnTransformBegin, Phase::kInWorld},
       {"TransformEnd", &P::OnTransformEnd, Phase::kInWorld},
-      {"TransformTimes", &P::OnTransformTimes, Phase::kAnywhere},
+      {"TransformTimes", &P::OnTransformTimes, Phase::kBeforeWorld},
       {"Translate", &P::OnTranslate, Phase::kAnywhere},
       {"WorldBegin", &P::OnWorldBegin, Phase::kBeforeWorld},
       // pbrt-v3 and older.
@@ -107,7 +107,7 @@ UnfinishedScene DirectiveReader::Finish() {
   ReportNamedMaterials();
   ReportNamedMedia();
   ReplaceWrittenOut();
-  scene_.film.exposure *= exposure_time_s_;
+  scene_.film.exposure *= scene_.motion.shutter_close - scene_.motion.shutter_open;
   if (!in_world_) unfinished_.missing.emplace_back("the scene has no WorldBegin");
   return std::move(unfinished_);
 }
@@ -191,7 +191,8 @@ void DirectiveReader::CheckRoom(const SourceLocation& location) {
   std::size_t bytes =
       scene_.materials.size() * sizeof(Material) + scene_.textures.size() * sizeof(Texture) +
       scene_.media.size() * sizeof(Medium) + scene_.area_lights.size() * sizeof(AreaLight) +
-      scene_.infinite_lights.size() * sizeof(InfiniteLight);
+      scene_.infinite_lights.size() * sizeof(InfiniteLight) +
+      scene_.motion.of_shapes.size() * (sizeof(ShapeMotion) + sizeof(AnimatedTransform));
   ForEachDeltaList(scene_, [&](const auto& lights) {
     if (!lights.empty()) bytes += lights.size() * sizeof(lights.front());
   });
@@ -396,8 +397,10 @@ bool DirectiveReader::OnObjectInstance(Arguments& arguments) {
 
 bool DirectiveReader::OnWorldBegin(Arguments& /*arguments*/) {
   in_world_ = true;
-  graphics_.state().to_world = Transform();
-  coordinate_systems_["world"] = Transform();
+  GraphicsState& state = graphics_.state();
+  state.to_world = {};
+  state.changes_start = state.changes_end = true;
+  coordinate_systems_["world"] = {};
   return true;
 }
 

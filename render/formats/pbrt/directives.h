@@ -86,7 +86,7 @@ class DirectiveReader {
   // Transforms (transform_directives.cc).
   bool Concatenate(Arguments& arguments, const StatusOr<Transform>& transform);
   bool Replace(Arguments& arguments, const Transform& transform);
-  void WarnOfMotion(const Arguments& arguments);
+  bool Replace(Arguments& arguments, const TransformPair& transforms);
   bool ReadMatrix(Arguments& arguments, Transform& transform);
   bool OnIdentity(Arguments& arguments);
   bool OnTranslate(Arguments& arguments);
@@ -99,6 +99,17 @@ class DirectiveReader {
   bool OnCoordSysTransform(Arguments& arguments);
   bool OnActiveTransform(Arguments& arguments);
   bool OnTransformTimes(Arguments& arguments);
+
+  // Motion (motion_directives.cc).
+  // Reports what is wrong.
+  std::optional<AnimatedTransform> Animated(const TransformPair& transforms, Arguments& arguments);
+  // Of shapes at the current transforms; kNoMotion where these do not move.
+  std::int32_t MotionHere(Arguments& arguments);
+  // Of a shape of an object that moves as `within` in the object's space, where the current
+  // transforms put an instance.
+  std::int32_t MotionOfInstance(std::int32_t within, Arguments& arguments);
+  // Of what pbrt-v4 does not move.
+  void WarnIfMoved(const Arguments& arguments, std::string_view what);
 
   // Scopes (directives.cc).
   void Begin(Arguments& arguments);
@@ -143,6 +154,7 @@ class DirectiveReader {
     ShapeSet shapes;
     std::uint64_t triangles = 0;
     bool has_instance = false;
+    bool has_moving_parts = false;        // then it is always written out
     std::optional<std::uint32_t> shared;  // index in Scene::objects
   };
   // Copies of an object's meshes, which are replaced by an instance when the object is shared after
@@ -150,6 +162,7 @@ class DirectiveReader {
   struct WrittenOutMeshes {
     Object* object = nullptr;
     Transform to_world;
+    std::int32_t motion = kNoMotion;
     std::size_t first = 0, count = 0;  // in Scene::meshes
   };
   void PlaceInstance(Object& object, Arguments& arguments);
@@ -188,8 +201,13 @@ class DirectiveReader {
 
   GraphicsStack graphics_;
   bool in_world_ = false;
-  double exposure_time_s_ = 1;
-  std::map<std::string, Transform> coordinate_systems_;
+  // As pbrt-v4 has it where a text says nothing.
+  double transform_start_ = 0, transform_end_ = 1;
+  // Of the last motion, which the shapes that come next share: its number, and that of the object's
+  // motion that it is made of.
+  std::int32_t last_motion_ = kNoMotion, last_within_ = kNoMotion;
+  TransformPair last_transforms_;
+  std::map<std::string, TransformPair> coordinate_systems_;
   std::map<std::string, NamedMaterial> named_materials_;
   std::map<std::string, NamedMedium> named_media_;
   MaterialNames defined_materials_;

@@ -22,15 +22,24 @@ struct RgbSpace;
 enum class AttributeTarget : std::uint8_t { kShape, kLight, kMaterial, kTexture, kMedium };
 inline constexpr std::size_t kAttributeTargets = 5;
 
+// Where something is at the beginning of a motion and at its end.
+struct TransformPair {
+  Transform start, end;
+
+  [[nodiscard]] bool Moves() const { return start != end; }
+  bool operator==(const TransformPair&) const = default;
+};
+
 // What AttributeBegin saves and AttributeEnd restores. Large parts are shared, so that a copy is
 // small however much the text put into them.
 struct GraphicsState {
   using Defaults = std::shared_ptr<const std::vector<Parameter>>;
 
-  Transform to_world;  // before WorldBegin: world to camera, as pbrt writes it
-  // After ActiveTransform EndTime, transforms change nothing: everything stands where it is when
-  // the shutter opens.
-  bool is_at_end_time = false;
+  // At the first and the second of the TransformTimes; before WorldBegin: world to camera, as pbrt
+  // writes it.
+  TransformPair to_world;
+  // Which of the two directives change (ActiveTransform).
+  bool changes_start = true, changes_end = true;
   bool reverse_orientation = false;
   std::int32_t material = 0;
   std::shared_ptr<const AreaEmission> area_emission;

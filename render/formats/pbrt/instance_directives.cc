@@ -9,11 +9,14 @@
 #include "render/formats/mesh_placement.h"
 #include "render/formats/pbrt/directives.h"
 #include "render/scene/scene_extent.h"
+#include "render/scene/shape_lists.h"
 
 namespace lucerna {
 
 void DirectiveReader::PlaceInstance(Object& object, Arguments& arguments) {
-  const Transform& to_world = graphics_.state().to_world;
+  const TransformPair& places = graphics_.state().to_world;
+  const Transform& to_world = places.start;
+  const bool stays_similar = !places.Moves() || places.end.UniformScale().ok();
   if (!to_world.Inverse().ok()) {
     diagnostics_.Note(arguments.location(),
                       "an instance is flattened by its transform and left out");
@@ -21,7 +24,7 @@ void DirectiveReader::PlaceInstance(Object& object, Arguments& arguments) {
   }
   // One instance alone takes no more than the object.
   const bool is_used = object.shared.has_value() || object.has_instance;
-  if (!object.shared.has_value() && is_used && object.triangles > 0 &&
+  if (!object.shared.has_value() && is_used && object.triangles > 0 && !object.has_moving_parts &&
       written_out_triangles_ + object.triangles > kMaxWrittenOut) {
     Share(object);
   }
@@ -30,13 +33,18 @@ void DirectiveReader::PlaceInstance(Object& object, Arguments& arguments) {
   if (IsStopped()) return;
   // Before it is laid out, because that is what takes the memory.
   if (!HasRoomFor(object.shapes, arguments)) return;
-  StatusOr<ShapeSet> shapes = Instantiate(object.shapes, to_world);
+  StatusOr<ShapeSet> shapes = Instantiate(object.shapes, to_world, stays_similar);
   if (!shapes.ok()) {
     arguments.Error(std::string(shapes.status().message()));
     return;
   }
+  ForEachShapeTraits(*shapes, [&](ShapeTraits& traits) {
+    traits.motion = MotionOfInstance(traits.motion, arguments);
+  });
+  if (IsStopped()) return;
   if (!object.shared.has_value() && !shapes->meshes.empty()) {
-    written_out_.push_back({&object, to_world, scene_.meshes.size(), shapes->meshes.size()});
+    written_out_.push_back({&object, to_world, shapes->meshes.front().traits.motion,
+                            scene_.meshes.size(), shapes->meshes.size()});
     written_out_triangles_ += object.triangles;
   }
   AddShapes(*std::move(shapes));
@@ -58,7 +66,8 @@ void DirectiveReader::Share(Object& object) {
 void DirectiveReader::AddInstance(Object& object, const Transform& to_world, Arguments& arguments) {
   instanced_triangles_ += object.triangles;
   shapes_bytes_ += kInstanceBytes;
-  const Instance& instance = scene_.instances.emplace_back(Instance{*object.shared, to_world});
+  const Instance& instance =
+      scene_.instances.emplace_back(Instance{*object.shared, to_world, MotionHere(arguments)});
   const Bounds box = BoundsOf(scene_, instance);
   if (!IsFinite(box.low) || !IsFinite(box.high)) {
     arguments.Error("the instance is moved or scaled out of single precision by its transform");
@@ -82,7 +91,7 @@ void DirectiveReader::ReplaceWrittenOut() {
   for (const WrittenOutMeshes& copy : written_out_) {
     if (!copy.object->shared.has_value()) continue;
     any = true;
-    scene_.instances.push_back({*copy.object->shared, copy.to_world});
+    scene_.instances.push_back({*copy.object->shared, copy.to_world, copy.motion});
     for (std::size_t i = 0; i < copy.count; ++i)
       is_replaced[copy.first + i] = true;
   }

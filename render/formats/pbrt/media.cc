@@ -20,6 +20,13 @@ Medium ReadMedium(ParameterList& parameters) {
     if (!parameters.Has("type")) parameters.Error("needs \"string type\"");
     return medium;
   }
+  if (*type == "uniformgrid" || *type == "rgbgrid" || *type == "nanovdb" || *type == "cloud") {
+    parameters.Error(
+        "type", Concat("is ", Quoted(*type),
+                       ", which is not supported: media have the same density everywhere here; "
+                       "use homogeneous with the mean density"));
+    return medium;
+  }
   if (*type != "homogeneous") {
     parameters.Error(
         "type", Concat("is ", Quoted(*type), ", which is not supported; there is homogeneous"));

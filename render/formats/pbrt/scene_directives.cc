@@ -56,14 +56,18 @@ bool DirectiveReader::OnCamera(Arguments& arguments) {
   if (unfinished_.has_camera) arguments.Error("the scene has a second camera");
   unfinished_.has_camera = true;
   ParameterList list = ListFor(arguments, type, std::move(parameters));
-  ReadCamera(type, list, scene_.camera, exposure_time_s_);
-  const StatusOr<Transform> camera_to_world = graphics_.state().to_world.Inverse();
-  if (!camera_to_world.ok()) {
+  ReadCamera(type, list, scene_.camera, scene_.motion);
+  const TransformPair& from_world = graphics_.state().to_world;
+  const StatusOr<Transform> at_start = from_world.start.Inverse();
+  const StatusOr<Transform> at_end = from_world.end.Inverse();
+  if (!at_start.ok() || !at_end.ok()) {
     arguments.Error("the camera's transform cannot be inverted");
     return true;
   }
-  scene_.camera.camera_to_world = *camera_to_world;
-  coordinate_systems_["camera"] = scene_.camera.camera_to_world;
+  const TransformPair camera_to_world = {*at_start, *at_end};
+  scene_.camera.camera_to_world = camera_to_world.start;
+  if (from_world.Moves()) scene_.motion.of_camera = Animated(camera_to_world, arguments);
+  coordinate_systems_["camera"] = camera_to_world;
   scene_.camera.medium = graphics_.state().medium_outside;
   return true;
 }
@@ -246,7 +250,8 @@ bool DirectiveReader::OnLightSource(Arguments& arguments) {
                                graphics_.state().DefaultsOf(AttributeTarget::kLight));
   std::vector<std::size_t> before;
   ForEachDeltaList(scene_, [&](const auto& lights) { before.push_back(lights.size()); });
-  ReadLight(type, list, graphics_.state().to_world, assets_, scene_);
+  WarnIfMoved(arguments, "lights do not move, in pbrt-v4 neither");
+  ReadLight(type, list, graphics_.state().to_world.start, assets_, scene_);
   auto first = before.begin();
   ForEachDeltaList(scene_, [&](auto& lights) {
     for (std::size_t i = *first++; i < lights.size(); ++i)
@@ -267,7 +272,7 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
   ParameterList list =
       ListFor(arguments, type, std::move(parameters), state.DefaultsOf(AttributeTarget::kShape));
   ShapePlacement placement = {
-      state.to_world,
+      state.to_world.start,
       state.reverse_orientation,
       {state.material, state.area_light, state.medium_inside, state.medium_outside}};
   const bool emits = state.area_emission != nullptr;
@@ -277,6 +282,12 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
   }
   const bool is_light = emits && open_object_ == nullptr;
   placement.emits = is_light;
+  if (is_light) {
+    WarnIfMoved(arguments, "shapes that emit do not move, and pbrt-v4 refuses them");
+  } else {
+    placement.traits.motion = MotionHere(arguments);
+    placement.stays_similar = !state.to_world.Moves() || state.to_world.end.UniformScale().ok();
+  }
   ShapeSet shapes = mesh.has_value()
                         ? PlaceMadeMesh(*std::move(mesh), list, placement, textures_.numbers)
                         : ReadShapes(type, list, placement, textures_.numbers, assets_);
@@ -333,6 +344,9 @@ void DirectiveReader::AddShapes(ShapeSet shapes) {
   if (open_object_ != nullptr) {
     for (const TriangleMesh& mesh : shapes.meshes)
       open_object_->triangles += mesh.indices.size() / 3;
+    ForEachShapeTraits(shapes, [&](const ShapeTraits& traits) {
+      if (traits.motion != kNoMotion) open_object_->has_moving_parts = true;
+    });
   }
   append(open_object_ != nullptr ? open_object_->shapes.meshes : scene_.meshes, shapes.meshes);
 #define LUCERNA_APPEND(Name, list, name) \
@@ -366,9 +380,10 @@ bool DirectiveReader::OnTexture(Arguments& arguments) {
   ReadSpectrumFiles(assets_, parameters, diagnostics_);
   ParameterList list(arguments.SubjectOf(name), arguments.location(), std::move(parameters),
                      graphics_.state().DefaultsOf(AttributeTarget::kTexture).get(), diagnostics_);
+  WarnIfMoved(arguments, "textures do not move, in pbrt-v4 neither");
   // Made first: a texture may not be a part of itself.
-  NamedTexture made = ReadTexture(type, is_number, list, textures_, graphics_.state().to_world,
-                                  assets_, scene_.textures);
+  NamedTexture made = ReadTexture(type, is_number, list, textures_,
+                                  graphics_.state().to_world.start, assets_, scene_.textures);
   names.emplace(name, std::move(made));
   return true;
 }

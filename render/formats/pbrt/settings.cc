@@ -59,11 +59,11 @@ void ReadSpherical(ParameterList& parameters, Camera& camera) {
     parameters.Ignore(name);
 }
 
-void ReadShutter(ParameterList& parameters, double& exposure_time_s) {
-  const double open = parameters.Float("shutteropen", 0);
-  const double close = parameters.Float("shutterclose", 1);
-  if (!(close > open)) parameters.Error("shutterclose", "must be after shutteropen");
-  exposure_time_s = close - open;
+void ReadShutter(ParameterList& parameters, SceneMotion& motion) {
+  motion.shutter_open = parameters.Float("shutteropen", 0);
+  motion.shutter_close = parameters.Float("shutterclose", 1);
+  if (motion.shutter_close > motion.shutter_open) return;
+  parameters.Error("shutterclose", "must be after shutteropen");
 }
 
 using CameraReader = void (*)(ParameterList&, Camera&);
@@ -109,14 +109,20 @@ constexpr Kind<FilterReader> kFilters[] = {
 }  // namespace
 
 void ReadCamera(std::string_view type, ParameterList& parameters, Camera& camera,
-                double& exposure_time_s) {
+                SceneMotion& motion) {
+  if (type == "realistic") {
+    parameters.Error(
+        "is not supported: no rays are traced through lenses of a camera; use a "
+        "perspective camera with lensradius and focaldistance");
+    return;
+  }
   const CameraReader read = FindReader<CameraReader>(kCameras, type);
   if (read == nullptr) {
     parameters.Error(Concat("is not supported; ", SupportedKinds<CameraReader>(kCameras)));
     return;
   }
   read(parameters, camera);
-  ReadShutter(parameters, exposure_time_s);
+  ReadShutter(parameters, motion);
   parameters.WarnOfUnread();
 }
 

@@ -8,10 +8,10 @@
 
 namespace lucerna {
 
-// `exposure_time_s` is shutterclose - shutteropen; the film's own share of the exposure is
-// iso / 100, and the reader multiplies the two.
+// The camera's share of the exposure is shutterclose - shutteropen, the film's own iso / 100; the
+// reader multiplies the two.
 void ReadCamera(std::string_view type, ParameterList& parameters, Camera& camera,
-                double& exposure_time_s);
+                SceneMotion& motion);
 void ReadFilm(std::string_view type, ParameterList& parameters, FilmSettings& film);
 void ReadPixelFilter(std::string_view type, ParameterList& parameters, PixelFilter& filter);
 void ReadIntegrator(std::string_view type, ParameterList& parameters,

@@ -105,16 +105,6 @@ int PiecesOf(const Bezier& curve, double radius) {
                                      static_cast<double>(kMaxPieces)));
 }
 
-// The factor of lengths, on average over all directions.
-double MeanScale(const Transform& transform) {
-  double squared = 0;
-  for (std::size_t row = 0; row < 3; ++row) {
-    for (std::size_t column = 0; column < 3; ++column)
-      squared += transform.rows()[row][column] * transform.rows()[row][column] / 3;
-  }
-  return std::sqrt(squared);
-}
-
 // A band across the curve, at right angles to normals that turn evenly from the first to the last
 // of a segment.
 TriangleMesh RibbonOf(const std::vector<Bezier>& segments, const std::vector<Double3>& normals,
@@ -240,19 +230,6 @@ void ReadCurvePiece(const ShapeInput& input, ShapeSet& shapes) {
       shapes.curve_pieces.push_back(piece);
     }
   }
-}
-
-// Under a transform that stretches, the tube stays round and gets the mean width.
-Status MoveCurvePiece(CurvePiece& shape, const Transform& to_world) {
-  const auto scale = static_cast<float>(MeanScale(to_world));
-  shape.from = to_world.Point(shape.from);
-  shape.to = to_world.Point(shape.to);
-  shape.from_radius *= scale;
-  shape.to_radius *= scale;
-  shape.center = shape.from * 0.5F + shape.to * 0.5F;
-  return IsFinite(shape.from) && IsFinite(shape.to) && IsInRange(shape.center, shape.Reach())
-             ? absl::OkStatus()
-             : MovedAway();
 }
 
 }  // namespace lucerna

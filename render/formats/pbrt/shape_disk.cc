@@ -18,7 +18,7 @@ void ReadDisk(const ShapeInput& input, ShapeSet& shapes) {
     return;
   }
   const StatusOr<double> scale = placement.to_world.UniformScale();
-  if (phi_max_rad < 2 * std::numbers::pi || !scale.ok()) {
+  if (phi_max_rad < 2 * std::numbers::pi || !scale.ok() || !placement.stays_similar) {
     PlaceMesh(DiskMesh(radius, inner_radius, height, phi_max_rad), parameters, placement, shapes);
     return;
   }
@@ -35,16 +35,6 @@ void ReadDisk(const ShapeInput& input, ShapeSet& shapes) {
     return;
   }
   shapes.disks.push_back(disk);
-}
-
-Status MoveDisk(Disk& shape, const Transform& to_world) {
-  LUCERNA_ASSIGN_OR_RETURN(const Similarity similarity, SimilarityOf(to_world, "disk"));
-  shape.center = to_world.Point(shape.center);
-  shape.normal = Normalize(to_world.Normal(shape.normal));
-  shape.radius *= similarity.factor;
-  shape.axes = similarity.Axes(shape.axes);
-  shape.inner_radius *= similarity.factor;
-  return IsInRange(shape.center, shape.radius) ? absl::OkStatus() : MovedAway();
 }
 
 TriangleMesh MeshDisk(const Disk& shape) {

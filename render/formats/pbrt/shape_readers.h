@@ -2,8 +2,6 @@
 //
 // Read  Adds a shape to `shapes`, or reports what is wrong. A part of the shape, or one that its
 //       transform stretches, becomes a mesh.
-// Move  Puts a shape of an object where an instance of the object stands. Errors: INVALID_ARGUMENT
-//       when the shape would then be of another kind or is moved out of single precision.
 // Mesh  The same shape as triangles, in the same space; of shapes that are not thin.
 #pragma once
 
@@ -16,6 +14,7 @@
 #include "render/formats/pbrt/shapes.h"
 #include "render/math/transform.h"
 #include "render/scene/scene.h"
+#include "render/scene/shape_moves.h"
 
 namespace lucerna {
 
@@ -26,9 +25,8 @@ struct ShapeInput {
   AssetReader& assets;
 };
 
-#define LUCERNA_DECLARE(Name, list, name)                                  \
-  void Read##Name(const ShapeInput& input, ShapeSet& shapes);              \
-  [[nodiscard]] Status Move##Name(Name& shape, const Transform& to_world); \
+#define LUCERNA_DECLARE(Name, list, name)                     \
+  void Read##Name(const ShapeInput& input, ShapeSet& shapes); \
   [[nodiscard]] TriangleMesh Mesh##Name(const Name& shape);
 LUCERNA_ANALYTIC_SHAPES(LUCERNA_DECLARE)
 #undef LUCERNA_DECLARE
@@ -57,24 +55,8 @@ void PlaceMesh(TriangleMesh mesh, ParameterList& parameters, const ShapePlacemen
 // "phimax" in radians, in (0, 2 pi].
 [[nodiscard]] double ReadPhiMax(ParameterList& parameters);
 
-// A transform that keeps angles.
-struct Similarity {
-  float factor = 1;  // by which lengths grow
-  ShapeAxes turned;  // the world's axes, moved
-
-  [[nodiscard]] ShapeAxes Axes(const ShapeAxes& axes) const;
-};
-// Of the transform of an instance that holds a `name`, such as "sphere". Errors: INVALID_ARGUMENT
-// when it does not scale all axes alike.
-[[nodiscard]] StatusOr<Similarity> SimilarityOf(const Transform& to_world, std::string_view name);
-
 // Moves a mesh around the origin to `center`, its axes to `axes`, and winds it by its normals,
 // which are turned over for `is_reversed`.
 void PutOnAxes(Vec3 center, const ShapeAxes& axes, bool is_reversed, TriangleMesh& mesh);
-
-// INVALID_ARGUMENT: an instance is moved out of single precision.
-[[nodiscard]] Status MovedAway();
-// Whether single precision holds a shape around `center` with this radius.
-[[nodiscard]] bool IsInRange(Vec3 center, float radius);
 
 }  // namespace lucerna

@@ -24,7 +24,7 @@ void ReadSphere(const ShapeInput& input, ShapeSet& shapes) {
   }
   const bool is_whole = z_min == -radius && z_max == radius && phi_max_rad >= 2 * std::numbers::pi;
   const StatusOr<double> scale = placement.to_world.UniformScale();
-  if (!is_whole || !scale.ok()) {
+  if (!is_whole || !scale.ok() || !placement.stays_similar) {
     PlaceMesh(SphereMesh(radius, z_min, z_max, phi_max_rad), parameters, placement, shapes);
     return;
   }
@@ -39,14 +39,6 @@ void ReadSphere(const ShapeInput& input, ShapeSet& shapes) {
     return;
   }
   shapes.spheres.push_back(sphere);
-}
-
-Status MoveSphere(Sphere& shape, const Transform& to_world) {
-  LUCERNA_ASSIGN_OR_RETURN(const Similarity similarity, SimilarityOf(to_world, "sphere"));
-  shape.center = to_world.Point(shape.center);
-  shape.radius *= similarity.factor;
-  shape.axes = similarity.Axes(shape.axes);
-  return IsInRange(shape.center, shape.radius) ? absl::OkStatus() : MovedAway();
 }
 
 TriangleMesh MeshSphere(const Sphere& shape) {

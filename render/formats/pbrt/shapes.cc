@@ -7,17 +7,16 @@
 // space; only ReverseOrientation turns them over.
 #include <algorithm>
 #include <array>
-#include <cfloat>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
 #include "render/base/text.h"
-#include "render/formats/degenerate_triangles.h"
 #include "render/formats/mesh_placement.h"
 #include "render/formats/pbrt/kinds.h"
 #include "render/formats/pbrt/shape_readers.h"
 #include "render/math/double3.h"
+#include "render/scene/degenerate_triangles.h"
 #include "render/scene/shape_lists.h"
 
 namespace lucerna {
@@ -186,31 +185,6 @@ double ReadPhiMax(ParameterList& parameters) {
   return parameters.Float("phimax", 360, {0, 360, false}) * std::numbers::pi / 180;
 }
 
-StatusOr<ShapeAxes> AxesOf(const Transform& to_world) {
-  LUCERNA_ASSIGN_OR_RETURN(const double scale, to_world.UniformScale());
-  const auto axis = [&](Vec3 local) {
-    const Vec3 world = to_world.Vector(local * static_cast<float>(1 / scale));
-    const float size = MaxAbs(world);
-    return size > 0 && std::isfinite(size) ? Normalize(world / size) : local;
-  };
-  return ShapeAxes{axis({1, 0, 0}), axis({0, 1, 0}), axis({0, 0, 1})};
-}
-
-ShapeAxes Similarity::Axes(const ShapeAxes& axes) const {
-  const auto in_world = [&](Vec3 v) { return turned.x * v.x + turned.y * v.y + turned.z * v.z; };
-  return {in_world(axes.x), in_world(axes.y), in_world(axes.z)};
-}
-
-StatusOr<Similarity> SimilarityOf(const Transform& to_world, std::string_view name) {
-  const StatusOr<double> scale = to_world.UniformScale();
-  if (!scale.ok()) {
-    return absl::InvalidArgumentError(
-        Concat("the instance holds a ", name,
-               ", and its transform does not scale all axes alike, which is not supported"));
-  }
-  return Similarity{static_cast<float>(*scale), AxesOf(to_world).value_or(ShapeAxes())};
-}
-
 void PutOnAxes(Vec3 center, const ShapeAxes& axes, bool is_reversed, TriangleMesh& mesh) {
   const auto turned = [&](Vec3 v) { return axes.x * v.x + axes.y * v.y + axes.z * v.z; };
   for (Vec3& position : mesh.positions)
@@ -218,15 +192,6 @@ void PutOnAxes(Vec3 center, const ShapeAxes& axes, bool is_reversed, TriangleMes
   for (Vec3& normal : mesh.normals)
     normal = turned(normal) * (is_reversed ? -1.0F : 1.0F);
   WindByNormals(mesh, false);
-}
-
-Status MovedAway() {
-  return absl::InvalidArgumentError(
-      "the instance is moved or scaled out of single precision by its transform");
-}
-
-bool IsInRange(Vec3 center, float radius) {
-  return IsFinite(center) && radius >= FLT_MIN && std::isfinite(radius);
 }
 
 std::uint64_t ShapeSet::Cost() const {
@@ -284,7 +249,8 @@ ShapeSet PlaceMadeMesh(TriangleMesh mesh, ParameterList& parameters,
   return shapes;
 }
 
-StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world) {
+StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world,
+                               bool stays_similar) {
   ShapeSet shapes;
   for (const TriangleMesh& original : object.meshes) {
     TriangleMesh mesh = original;
@@ -307,7 +273,7 @@ StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world
 #define LUCERNA_MOVE(Name, list, name)                                      \
   for (Name shape : object.list) {                                          \
     if constexpr (!Name::kIsThin) {                                         \
-      if (!to_world.UniformScale().ok()) {                                  \
+      if (!stays_similar || !to_world.UniformScale().ok()) {                \
         LUCERNA_RETURN_IF_ERROR(add_mesh(Mesh##Name(shape), shape.traits)); \
         continue;                                                           \
       }                                                                     \

@@ -14,11 +14,9 @@
 #include "render/formats/pbrt/textures.h"
 #include "render/math/transform.h"
 #include "render/scene/scene.h"
+#include "render/scene/shape_moves.h"
 
 namespace lucerna {
-
-// Where the axes of a space point. Errors: INVALID_ARGUMENT when it is stretched.
-[[nodiscard]] StatusOr<ShapeAxes> AxesOf(const Transform& to_world);
 
 // Shapes in world space, or in the space of an object that is instanced later. Their traits are
 // those of the Shape directive that made them.
@@ -42,6 +40,8 @@ struct ShapePlacement {
   bool reverse_orientation = false;
   ShapeTraits traits;
   bool emits = false;  // also where the light is made after the shape
+  // Of shapes that move: at the end the transform scales all axes alike.
+  bool stays_similar = true;
 };
 
 [[nodiscard]] ShapeSet ReadShapes(std::string_view type, ParameterList& parameters,
@@ -53,8 +53,9 @@ struct ShapePlacement {
                                      const ShapePlacement& placement, const TextureNames& numbers);
 
 // The shapes of an object where an instance of it stands; an ellipsoid, which has no kind of its
-// own, as a mesh. Errors: INVALID_ARGUMENT when the transform moves a position out of the finite
-// numbers.
-[[nodiscard]] StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world);
+// own, as a mesh, and where `stays_similar` is false what may become one. Errors: INVALID_ARGUMENT
+// when the transform moves a position out of the finite numbers.
+[[nodiscard]] StatusOr<ShapeSet> Instantiate(const ShapeSet& object, const Transform& to_world,
+                                             bool stays_similar);
 
 }  // namespace lucerna

@@ -5,20 +5,33 @@
 
 namespace lucerna {
 
-bool DirectiveReader::Replace(Arguments& arguments, const Transform& transform) {
-  if (graphics_.state().is_at_end_time) return true;
-  if (transform.IsFinite()) {
-    graphics_.state().to_world = transform;
+bool DirectiveReader::Replace(Arguments& arguments, const TransformPair& transforms) {
+  if (transforms.start.IsFinite() && transforms.end.IsFinite()) {
+    graphics_.state().to_world = transforms;
   } else {
     arguments.Error(Concat(arguments.directive(), " makes a transform that is not finite"));
   }
   return true;
 }
 
+bool DirectiveReader::Replace(Arguments& arguments, const Transform& transform) {
+  const GraphicsState& state = graphics_.state();
+  TransformPair replaced = state.to_world;
+  if (state.changes_start) replaced.start = transform;
+  if (state.changes_end) replaced.end = transform;
+  return Replace(arguments, replaced);
+}
+
 bool DirectiveReader::Concatenate(Arguments& arguments, const StatusOr<Transform>& transform) {
-  if (transform.ok()) return Replace(arguments, graphics_.state().to_world * *transform);
-  arguments.Error(std::string(transform.status().message()));
-  return true;
+  if (!transform.ok()) {
+    arguments.Error(std::string(transform.status().message()));
+    return true;
+  }
+  const GraphicsState& state = graphics_.state();
+  TransformPair joined = state.to_world;
+  if (state.changes_start) joined.start = joined.start * *transform;
+  if (state.changes_end) joined.end = joined.end * *transform;
+  return Replace(arguments, joined);
 }
 
 bool DirectiveReader::OnIdentity(Arguments& arguments) {
@@ -65,7 +78,7 @@ bool DirectiveReader::ReadMatrix(Arguments& arguments, Transform& transform) {
 }
 
 bool DirectiveReader::OnTransform(Arguments& arguments) {
-  Transform transform = graphics_.state().to_world;
+  Transform transform = graphics_.state().to_world.start;
   return ReadMatrix(arguments, transform) && Replace(arguments, transform);
 }
 
@@ -99,22 +112,24 @@ bool DirectiveReader::OnActiveTransform(Arguments& arguments) {
     arguments.Error("ActiveTransform takes StartTime, EndTime or All");
     return false;
   }
-  graphics_.state().is_at_end_time = token.text == "EndTime";
-  if (token.text != "All") WarnOfMotion(arguments);
+  graphics_.state().changes_start = token.text != "EndTime";
+  graphics_.state().changes_end = token.text != "StartTime";
   arguments.tokens().Next();
   return true;
 }
 
 bool DirectiveReader::OnTransformTimes(Arguments& arguments) {
   std::array<double, 2> v{};
-  WarnOfMotion(arguments);
-  return arguments.ReadNumbers(v);
-}
-
-void DirectiveReader::WarnOfMotion(const Arguments& arguments) {
-  diagnostics_.Warning(arguments.location(),
-                       "motion is not rendered: everything stands where it is when the shutter "
-                       "opens");
+  if (!arguments.ReadNumbers(v)) return false;
+  if (v[0] < v[1]) {
+    transform_start_ = v[0];
+    transform_end_ = v[1];
+  } else {
+    arguments.Error(
+        "TransformTimes takes the times of the transforms at the start and at the end "
+        "of motions: the second must be later");
+  }
+  return true;
 }
 
 }  // namespace lucerna

@@ -105,6 +105,7 @@ UnfinishedScene ReadSensors(const std::string& main_path, std::string_view text,
   scene.sensor_buckets = std::move(points->buckets);
   scene.camera.kind = Camera::Kind::kSensors;
   scene.camera.camera_to_world = Transform();
+  scene.motion.of_camera.reset();
   scene.camera.lens_radius = 0;
   scene.camera.window_scale = sum / static_cast<double>(scene.sensors.size());
   SetFilm(scene);

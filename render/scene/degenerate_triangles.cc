@@ -1,4 +1,4 @@
-#include "render/formats/degenerate_triangles.h"
+#include "render/scene/degenerate_triangles.h"
 
 #include <cmath>
 
