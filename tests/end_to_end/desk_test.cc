@@ -180,7 +180,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, TilesTest, testing::Values("caustic.pbrt", "tex
 TEST(CropTest, WhatLiesOutsideIsASentence) {
   const Finished ran = Lucerna({"render", SceneOfTests("caustic.pbrt"), "--size", "48x32", "--crop",
                                 "0,49,0,32", "-o", "/dev/null"});
-  EXPECT_EQ(ran.exit_code, 1);
+  EXPECT_EQ(ran.exit_code, 2);
   EXPECT_THAT(ran.errors, HasSubstr("--crop must lie within the image of 48x32 pixels"));
 }
 
@@ -376,7 +376,7 @@ TEST(TracePhotonsTest, SeveralPhotonsAreAFileOfPointsOrLinesAndShapesHaveTheirLi
                                       "--passes", "2", "--photons-per-pass", "5000", "-o",
                                       folder.At("a.exr"), "--json", "--server", address});
   ASSERT_EQ(submitted.exit_code, 0) << submitted.errors;
-  const std::string job = json::parse(submitted.output).at("id");
+  const std::string job = json::parse(submitted.output).at("job_id");
   const auto trace = [&](const std::string& photons, const std::vector<std::string>& more) {
     std::vector<std::string> words = {"trace-photon", job, photons, "--server", address};
     words.insert(words.end(), more.begin(), more.end());

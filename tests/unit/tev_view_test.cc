@@ -93,7 +93,7 @@ TEST(TevPacketTest, UpdatesATileChannelAfterChannel) {
   EXPECT_EQ(reader.Int(), 5);
   EXPECT_EQ(reader.Int(), 2);
   EXPECT_EQ(reader.Int(), 1);
-  for (const float value : {1, 2, 3, 4})
+  for (const float value : {1.0F, 2.0F, 3.0F, 4.0F})
     EXPECT_EQ(reader.Float(), value);
   EXPECT_EQ(reader.rest(), 0U);
 }
