@@ -118,7 +118,12 @@ class SmallTev {
       ::close(connection);
     });
   }
-  ~SmallTev() { ::close(socket_); }
+  ~SmallTev() {
+    // Ends a wait for a connection.
+    ::shutdown(socket_, SHUT_RDWR);
+    if (thread_.joinable()) thread_.join();
+    ::close(socket_);
+  }
   [[nodiscard]] const std::string& address() const { return address_; }
   const std::string& Received() {
     thread_.join();
