@@ -428,15 +428,32 @@ StatusOr<std::string> ClientConnection::GetImage(const std::string& job_id,
                                                  const std::function<bool()>& gives_up) {
   v1::GetImageRequest request;
   request.set_job_id(job_id);
+  return ReadChunks(
+      "the image",
+      [&](grpc::ClientContext* context) { return images_->GetImage(context, request); }, gives_up);
+}
+
+StatusOr<std::string> ClientConnection::GetTrace(const std::string& job_id) {
+  v1::GetTraceRequest request;
+  request.set_job_id(job_id);
+  return ReadChunks(
+      "the timeline",
+      [&](grpc::ClientContext* context) { return images_->GetTrace(context, request); },
+      [] { return false; });
+}
+
+StatusOr<std::string> ClientConnection::ReadChunks(const char* what, const OpenReader& open,
+                                                   const std::function<bool()>& gives_up) {
   std::string bytes;
   bool is_too_long = false;
   const Status status = Retry(kNoDeadline, [&](grpc::ClientContext& context) {
     // Not a code that is worth another attempt.
-    const grpc::Status given_up(grpc::StatusCode::ABORTED, "nobody waits for the image any more");
+    const grpc::Status given_up(grpc::StatusCode::ABORTED,
+                                absl::StrCat("nobody waits for ", what, " any more"));
     if (gives_up()) return given_up;
     bytes.clear();
     StallGuard guard(context, kLongestSilence, [&] { return IsInterrupted() || gives_up(); });
-    const auto reader = images_->GetImage(&context, request);
+    const auto reader = open(&context);
     v1::Chunk chunk;
     while (!is_too_long && reader->Read(&chunk)) {
       guard.Progress();
@@ -448,7 +465,7 @@ StatusOr<std::string> ClientConnection::GetImage(const std::string& job_id,
     if (gives_up()) return given_up;
     return is_too_long ? grpc::Status::OK : ended;
   });
-  if (is_too_long) return absl::ResourceExhaustedError("the image is longer than 8 GiB");
+  if (is_too_long) return absl::ResourceExhaustedError(absl::StrCat(what, " is longer than 8 GiB"));
   LUCERNA_RETURN_IF_ERROR(status);
   return bytes;
 }

@@ -72,6 +72,8 @@ class ClientConnection {
   // other calls.
   [[nodiscard]] StatusOr<std::string> GetImage(
       const std::string& job_id, const std::function<bool()>& gives_up = [] { return false; });
+  // The timeline of a job that was submitted to be traced, in Chrome's trace format.
+  [[nodiscard]] StatusOr<std::string> GetTrace(const std::string& job_id);
 
  private:
   ClientConnection(Endpoint endpoint, const std::shared_ptr<grpc::Channel>& channel);
@@ -80,6 +82,11 @@ class ClientConnection {
   [[nodiscard]] Status Retry(Duration time_for_one,
                              const std::function<grpc::Status(grpc::ClientContext&)>& call);
   [[nodiscard]] Status UploadBlob(const Digest& digest, std::string_view bytes);
+  // All bytes of a stream of chunks; `what` is for messages.
+  using OpenReader =
+      std::function<std::unique_ptr<grpc::ClientReader<v1::Chunk>>(grpc::ClientContext*)>;
+  [[nodiscard]] StatusOr<std::string> ReadChunks(const char* what, const OpenReader& open,
+                                                 const std::function<bool()>& gives_up);
   // What gRPC says of a connection that could not be made.
   [[nodiscard]] std::string WhyNotConnected();
   // What the coordinator said.

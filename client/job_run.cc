@@ -11,6 +11,7 @@
 #include "client/view/live_view.h"
 #include "client/view/preview_source.h"
 #include "client/view/terminal.h"
+#include "client/view/tev_view.h"
 #include "render/base/clock.h"
 #include "render/base/files.h"
 #include "render/base/random_id.h"
@@ -79,12 +80,50 @@ class Progress {
   std::optional<PreviewSource> previews_;
 };
 
+// Shows a job's image in a viewer each time that there is a newer one.
+class ViewerFeed {
+ public:
+  ViewerFeed(ClientConnection& connection, const std::string& job_id, TevView& viewer)
+      : connection_(connection),
+        job_id_(job_id),
+        viewer_(viewer),
+        source_([&connection, job_id](const std::function<bool()>& gives_up) {
+          return connection.GetImage(job_id, gives_up);
+        }) {}
+
+  void Show(const v1::Job& job) {
+    if (job.progress().passes() == 0) return;
+    const std::shared_ptr<const Image> newest = source_.Newest();
+    if (newest == nullptr || newest == shown_) return;
+    shown_ = newest;
+    viewer_.Show(NameOf(job), *newest);
+  }
+  void Finish(const v1::Job& job) {
+    const StatusOr<std::string> bytes = connection_.GetImage(job_id_);
+    if (!bytes.ok()) return;
+    if (const StatusOr<Image> image = DecodeExr(*bytes); image.ok())
+      viewer_.Show(NameOf(job), *image);
+  }
+
+ private:
+  static std::string NameOf(const v1::Job& job) {
+    return absl::StrCat(job.name(), " (", job.job_id(), ")");
+  }
+
+  ClientConnection& connection_;
+  const std::string job_id_;
+  TevView& viewer_;
+  PreviewSource source_;
+  std::shared_ptr<const Image> shown_;
+};
+
 }  // namespace
 
 StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& files,
                                      const SceneManifest& manifest,
                                      const RenderOverrides& overrides,
-                                     const std::string& reference_path, int priority) {
+                                     const std::string& reference_path, int priority,
+                                     bool is_traced) {
   LUCERNA_RETURN_IF_ERROR(connection.Upload(manifest, files));
   v1::SubmitRequest request;
   if (!reference_path.empty()) {
@@ -97,6 +136,7 @@ StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& f
   *request.mutable_scene() = ToProto(manifest);
   *request.mutable_overrides() = ToProto(overrides);
   request.set_priority(priority);
+  request.set_is_traced(is_traced);
   return connection.Submit(request);
 }
 
@@ -105,7 +145,10 @@ StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& j
                               const std::function<Status(const v1::Job&)>& check) {
   std::optional<Progress> progress;
   if (shows_progress && !output_options.quiet) progress.emplace(connection, job_id, output_options);
+  std::optional<ViewerFeed> viewer;
+  if (output_options.tev) viewer.emplace(connection, job_id, *output_options.tev);
   auto job = connection.Watch(job_id, [&](const v1::Job& newest) {
+    if (viewer) viewer->Show(newest);
     // The summary reports the end.
     if (progress && newest.state() != v1::JOB_STATE_UNSPECIFIED && !HasEnded(newest.state())) {
       progress->Show(newest);
@@ -113,6 +156,7 @@ StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& j
     return check(newest);
   });
   if (progress) progress->Finish();
+  if (viewer && job.ok()) viewer->Finish(*job);
   if (job.ok() && !output_options.quiet) {
     const std::string dropped = DroppedLine(*job);
     if (!dropped.empty()) std::fprintf(stderr, "lucerna: warning: %s\n", dropped.c_str());
@@ -156,7 +200,8 @@ StatusOr<v1::Job> LocalRuns::Run(SceneFiles& files, const SceneManifest& manifes
                                  const std::string& reference_path,
                                  const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
-                           SendJob(*connection_, files, manifest, overrides, reference_path));
+                           SendJob(*connection_, files, manifest, overrides, reference_path,
+                                   /*priority=*/0, is_tracing_));
   job_id_ = submitted.job_id();
   return FollowOwn(output_options);
 }

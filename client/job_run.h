@@ -20,12 +20,13 @@
 namespace lucerna {
 
 // Uploads what the coordinator does not have and submits. `files` reads those of the manifest.
-// `reference_path` may be empty. `priority` is that of Job.
+// `reference_path` may be empty. `priority` is that of Job. Of a job that is traced the coordinator
+// keeps a timeline.
 [[nodiscard]] StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& files,
                                                    const SceneManifest& manifest,
                                                    const RenderOverrides& overrides,
                                                    const std::string& reference_path,
-                                                   int priority = 0);
+                                                   int priority = 0, bool is_traced = false);
 
 // Follows the job to its end, and shows its progress unless that is off. `check` is asked several
 // times a second; before the first news, of an empty job.
@@ -66,6 +67,8 @@ class LocalRuns {
                                          const OutputOptions& output_options);
   // The image of a job that succeeded.
   [[nodiscard]] StatusOr<Image> ImageOf(const v1::Job& job);
+  // Of the jobs that are run from now on timelines are kept.
+  void TraceJobs() { is_tracing_ = true; }
   // Called several times a second while a job runs, with the newest news of it; the job goes on.
   void WhileItRuns(std::function<void(const v1::Job&)> on_news) { on_news_ = std::move(on_news); }
   // Of the job that was run last; empty before.
@@ -78,6 +81,7 @@ class LocalRuns {
   StatusOr<v1::Job> FollowOwn(const OutputOptions& output_options);
 
   bool has_state_ = false;
+  bool is_tracing_ = false;
   std::function<void(const v1::Job&)> on_news_;
   std::string job_id_;
   std::unique_ptr<LocalCluster> cluster_;

@@ -26,10 +26,12 @@
 #include "client/exit_code.h"
 #include "client/interruption.h"
 #include "client/local_cluster.h"
+#include "client/manual.h"
 #include "client/render_flags.h"
 #include "client/selfcheck/selfcheck.h"
 #include "client/usage.h"
 #include "client/view/preview.h"
+#include "client/view/tev_view.h"
 #include "render/base/escape.h"
 #include "render/base/version.h"
 #include "render/wire/channel.h"
@@ -66,6 +68,18 @@ double SecondsOf(const char* flag, const std::string& text) {
   return *parsed.time_s;
 }
 
+// Errors: CLI::ValidationError.
+std::pair<double, double> RangeOf(const std::string& text) {
+  const std::size_t comma = text.find(',');
+  std::pair<double, double> range;
+  if (comma == std::string::npos || !absl::SimpleAtod(text.substr(0, comma), &range.first) ||
+      !absl::SimpleAtod(text.substr(comma + 1), &range.second)) {
+    throw CLI::ValidationError(
+        absl::StrCat("--range must be two numbers, like 0.01,0.5, not \"", text, "\""));
+  }
+  return range;
+}
+
 ToneCurve CurveOf(const std::string& name) {
   const StatusOr<ToneCurve> curve = ParseToneCurve(name);
   if (!curve.ok()) {
@@ -100,6 +114,7 @@ int Run(int argc, char** argv) {
   RenderOverrides planned;
   Endpoint server{"127.0.0.1:7400"};
   std::string token_file;
+  std::string tev;
   std::string token_name;
   std::string token_roles = "submit";
   std::string job_id;
@@ -186,6 +201,9 @@ int Run(int argc, char** argv) {
     to->add_flag("--force", outputs.replaces, "replace files that lucerna has not written");
     add_display(to);
   };
+  const auto add_tev = [&](CLI::App* to) {
+    to->add_option("--tev", tev, "show the image so far in the viewer tev, at host:port");
+  };
   const auto add_image_flags = [](CLI::App* to, RenderOverrides& overrides) {
     AddSettingFlags(*to, SettingRole::kDecidesPixels, overrides);
   };
@@ -205,6 +223,9 @@ int Run(int argc, char** argv) {
     add_image_flags(to, request.overrides);
     AddSettingFlags(*to, SettingRole::kStopsJob, request.overrides);
     to->add_option("--reference", request.reference, "EXR file to measure the true error by");
+    to->add_option("--trace", request.trace,
+                   "file for the job's timeline, in Chrome's trace format (.json)");
+    add_tev(to);
   };
 
   const auto add_workers = [&](CLI::App* to) {
@@ -305,6 +326,7 @@ int Run(int argc, char** argv) {
       "cancel", "end jobs and drop their images",
       for_each_job([&](const std::string& job) { return Cancel(job, server, output_options); }));
   add_no_preview(watch);
+  add_tev(watch);
   add_display(watch);
   CLI::App* report =
       command("report", "write a page about a job: image, error against time, workers",
@@ -323,7 +345,7 @@ int Run(int argc, char** argv) {
   add_json(report);
 
   CLI::App* trace_photon =
-      command("trace-photon", "trace one photon of a job again and show its way", [&]() -> Status {
+      command("trace-photon", "trace photons of a job again and show their ways", [&]() -> Status {
         LUCERNA_RETURN_IF_ERROR(find_programs());
         photon.job_id = job_id;
         photon.program_folder = cluster.program_folder;
@@ -331,8 +353,13 @@ int Run(int argc, char** argv) {
         return TracePhoton(photon, server, output_options);
       });
   trace_photon->add_option("JOB", job_id, "the job's id; it may have ended")->required();
-  trace_photon->add_option("PHOTON", photon.photon, "PASS:INDEX, both from 0, or INDEX")
+  trace_photon
+      ->add_option("PHOTON", photon.photon,
+                   "PASS:INDEX, both from 0, or INDEX; several are PASS:FIRST-LAST")
       ->required();
+  trace_photon->add_option("-o,--output", photon.output,
+                           "file to write: .ply for the places where photons left light, .obj for "
+                           "their ways");
   trace_photon->add_option("--pass", photon.pass,
                            "the pass, where PHOTON is an INDEX (default: 0)");
   add_server(trace_photon);
@@ -418,10 +445,13 @@ int Run(int argc, char** argv) {
         LUCERNA_RETURN_IF_ERROR(find_programs());
         return CompareSettings(comparison, cluster, output_options);
       });
-  compare->add_option("SCENE", comparison.scene_path, "scene file: pbrt-v4 or glTF 2.0")
+  compare->add_option("SCENE", comparison.scene_paths, "scene files: pbrt-v4, glTF 2.0 or Mitsuba")
       ->required();
-  compare->add_option("--reference", comparison.reference_path, "EXR file to measure errors by")
-      ->required();
+  compare
+      ->add_option("--reference", comparison.reference_paths,
+                   "EXR file to measure errors by, once for each scene, in their order")
+      ->required()
+      ->allow_extra_args(false);
   compare->add_option("--mask", comparison.mask_path,
                       "EXR file; pixels that are 0 in it are left out");
   compare->add_option("--trim", comparison.trim_share, "leave out this share of the worst pixels")
@@ -435,7 +465,10 @@ int Run(int argc, char** argv) {
                    "\"NAME: flags\", once for each (default: one for each radius controller)")
       ->allow_extra_args(false);
   compare->add_option("-o,--output", comparison.table_path, "table to write, as Markdown");
-  compare->add_option("--plot", comparison.plot_path, "plot to write, as SVG");
+  compare->add_option("--plot", comparison.plot_path,
+                      "plot to write, as SVG; #### stands for the number of the scene");
+  compare->add_option("--csv", comparison.csv_path,
+                      "file for all points that were measured, as a table");
   add_image_flags(compare, comparison.common);
   add_json_and_full(compare);
   add_quiet(compare);
@@ -546,6 +579,10 @@ int Run(int argc, char** argv) {
       std::fputs(SettingsTable().c_str(), stdout);
       return absl::OkStatus();
     }
+    if (topic == "man") {
+      std::fputs(ManualOf(app).c_str(), stdout);
+      return absl::OkStatus();
+    }
     if (topic.empty()) {
       // Not app.help(), which explains the command that was given: this one.
       std::fputs(
@@ -561,7 +598,7 @@ int Run(int argc, char** argv) {
     std::fputs(about->help(app.get_name()).c_str(), stdout);
     return absl::OkStatus();
   });
-  help->add_option("TOPIC", topic, "a command, or settings");
+  help->add_option("TOPIC", topic, "a command, settings, or man for the manual page");
 
   Shell shell = Shell::kBash;
   CLI::App* completion =
@@ -586,6 +623,15 @@ int Run(int argc, char** argv) {
   png->add_option("FILE", to_convert.exr_path, "EXR file")->required();
   png->add_option("OUT", to_convert.path, "file to write: .png, .pfm or .hdr")->required();
   png->add_option("--layer", to_convert.layer, "a layer, such as direct, albedo, N or noise");
+  CLI::Option* false_color =
+      png->add_flag("--false-color", to_convert.is_false_color,
+                    "the layer's numbers as colours, such as those of radius, bandwidth or density "
+                    "(of photons; the default)");
+  png->add_option_function<std::string>(
+         "--range", [&](const std::string& text) { to_convert.range = RangeOf(text); },
+         "numbers that are dark blue and white (default: by the layer)")
+      ->type_name("LOW,HIGH")
+      ->needs(false_color);
   add_display(png);
 
   std::vector<std::string> words(argv + 1, argv + argc);
@@ -624,6 +670,15 @@ int Run(int argc, char** argv) {
     return End(ExitCode::kUsage);
   }
   server.token = *std::move(token);
+
+  if (!tev.empty()) {
+    StatusOr<std::shared_ptr<TevView>> viewer = TevView::Open(tev);
+    if (!viewer.ok()) {
+      std::fprintf(stderr, "lucerna: %s\n", std::string(viewer.status().message()).c_str());
+      return End(ExitCode::kFailed);
+    }
+    output_options.tev = *std::move(viewer);
+  }
 
   // These commands start no job and no process, so a signal may end them at once.
   const bool has_no_job = *validate || *plan || *diff || *digest || *png || *completion;

@@ -12,8 +12,9 @@ packages=(
   libpugixml-dev libtinyobjloader-dev prometheus-cpp-dev libcpp-httplib-dev
 )
 if [ "${1:-}" = tests ]; then
-  packages+=(libgtest-dev libgmock-dev libbenchmark-dev chromium clang-format clang-tidy prometheus
-    python3 python3-grpcio python3-jsonschema python3-numpy python3-protobuf python3-venv python3-yaml)
+  packages+=(libgtest-dev libgmock-dev libbenchmark-dev chromium clang-format clang-tidy groff-base mandoc prometheus
+    python3 python3-grpcio python3-ipykernel python3-jsonschema python3-nbclient python3-nbformat python3-numpy
+    python3-protobuf python3-venv python3-yaml)
 fi
 
 missing=()

@@ -26,6 +26,7 @@ const std::map<std::string_view, MethodRule>& Rules() {
       {"/lucerna.v1.AssetService/FindMissing", {kSubmit}},
       {"/lucerna.v1.AssetService/Upload", {kSubmit}},
       {"/lucerna.v1.ImageService/GetImage", {kSubmit}},
+      {"/lucerna.v1.ImageService/GetTrace", {kSubmit}},
       {"/lucerna.v1.JobService/Cancel", {kSubmit}},
       {"/lucerna.v1.JobService/Delete", {kSubmit}},
       {"/lucerna.v1.JobService/Extend", {kSubmit}},

@@ -33,6 +33,7 @@ constexpr std::chrono::milliseconds kRetryPause{100};
 constexpr int kPausesBeforeRetry = 10;
 constexpr std::size_t kSecretBytes = 32;
 constexpr std::size_t kMostIdentity = 128;
+constexpr std::size_t kMostTraces = 4;     // each takes some ten MB at most
 constexpr std::size_t kRandomDigits = 16;  // of a job's id: 64 bits, short enough to be typed
 
 // Different for every start of a coordinator on one machine.
@@ -154,7 +155,7 @@ void Coordinator::Close() {
 void Coordinator::Tick() {
   scheduler_.Expire(clock_.Steady());
   transfers_.Tick();
-  PausePoisonedJobs();
+  HandleLosses();
   ShowDisputes();
   AnswerParked();
   CountWorkers();
@@ -199,6 +200,7 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
   LUCERNA_RETURN_IF_ERROR(CheckDiskNeed(job));
   if (submission.validate_only) return JobTable::Submitted{"", std::move(job.warnings)};
   StatusOr<JobTable::Submitted> submitted;
+  const SteadyTime submitted_at = clock_.Steady();
   {
     const MutexLock lock(files_mutex_);
     const Status kept = KeepFiles(job);
@@ -209,6 +211,7 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
     RemoveUnneeded();
     return submitted.status();
   }
+  if (submission.is_traced) BeginTrace(submitted->job_id, submitted_at);
   spdlog::info("job {} submitted: {}", submitted->job_id, Escaped(submission.manifest.main_path));
   return submitted;
 }
@@ -304,6 +307,10 @@ Status Coordinator::CheckDiskNeed(const CheckedJob& job) const {
 Status Coordinator::Delete(const std::string& job_id) {
   LUCERNA_RETURN_IF_ERROR(jobs_.Delete(job_id, Now()));
   spdlog::info("job {} is deleted", job_id);
+  {
+    const MutexLock lock(traces_mutex_);
+    EndTrace(job_id);
+  }
   RemoveUnneeded();
   return absl::OkStatus();
 }
@@ -381,15 +388,76 @@ void Coordinator::UpdateClaim(const std::string& job_id) {
   scheduler_.SetHeld(job_id, share->is_held);
 }
 
-StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) const {
+StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) {
   LUCERNA_ASSIGN_OR_RETURN(const JobTable::ImageSource source, jobs_.FindImage(job_id, Now()));
   if (source.image) return source.image;
   if (source.image_digest) {
     LUCERNA_ASSIGN_OR_RETURN(std::string bytes, state_->blobs().Get(*source.image_digest));
     return std::make_shared<const std::string>(std::move(bytes));
   }
+  const SteadyTime began_at = clock_.Steady();
   LUCERNA_ASSIGN_OR_RETURN(RenderResult result, source.runner->ImageSoFar());
-  return Encode(source, std::move(result));
+  StatusOr<Blob> image = Encode(source, std::move(result));
+  TraceOwn(job_id, "image", began_at, [] { return "image so far"; });
+  return image;
+}
+
+void Coordinator::TraceOwn(const std::string& job_id, std::string_view row, SteadyTime from,
+                           const std::function<std::string()>& what) {
+  if (const auto trace = FindTrace(job_id)) {
+    trace->AddOwn({.row = std::string(row), .what = what(), .from = from, .to = clock_.Steady()});
+  }
+}
+
+StatusOr<Blob> Coordinator::TraceOf(const std::string& job_id) {
+  LUCERNA_RETURN_IF_ERROR(OwnerOf(job_id).status());
+  TraceEndedLeases();
+  const std::shared_ptr<JobTrace> trace = FindTrace(job_id);
+  if (trace == nullptr) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "no timeline of job ", job_id,
+        " is kept; submit it with --trace, and fetch it before the coordinator is restarted"));
+  }
+  return std::make_shared<const std::string>(trace->Json());
+}
+
+void Coordinator::BeginTrace(const std::string& job_id, SteadyTime submitted_at) {
+  const MutexLock lock(traces_mutex_);
+  if (traces_.contains(job_id)) return;
+  while (traced_.size() >= kMostTraces)
+    EndTrace(std::string(traced_.front()));
+  traces_[job_id] = std::make_shared<JobTrace>(job_id, submitted_at);
+  traced_.push_back(job_id);
+  scheduler_.SetTraced(job_id, true);
+  is_tracing_ = true;
+}
+
+void Coordinator::EndTrace(const std::string& job_id) {
+  if (traces_.erase(job_id) == 0) return;
+  std::erase(traced_, job_id);
+  scheduler_.SetTraced(job_id, false);
+  is_tracing_ = !traces_.empty();
+}
+
+std::shared_ptr<JobTrace> Coordinator::FindTrace(const std::string& job_id) {
+  if (!is_tracing_) return nullptr;
+  const MutexLock lock(traces_mutex_);
+  const auto found = traces_.find(job_id);
+  return found == traces_.end() ? nullptr : found->second;
+}
+
+void Coordinator::TraceEndedLeases() {
+  if (!is_tracing_) return;
+  const SteadyTime now = clock_.Steady();
+  for (const Scheduler::EndedLease& lease : scheduler_.TakeEnded()) {
+    if (const auto trace = FindTrace(lease.job_id)) {
+      trace->AddWorkers({.row = absl::StrCat(lease.record, " (", Escaped(lease.name), ")"),
+                         .what = lease.work,
+                         .from = lease.lent_at,
+                         .to = now,
+                         .details = {{"ending", lease.ending}}});
+    }
+  }
 }
 
 StatusOr<Coordinator::Description> Coordinator::Describe(const std::string& job_id) const {
@@ -471,6 +539,7 @@ StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
     later.gave_up_turn = true;
     return later;
   }
+  const SteadyTime began_at = clock_.Steady();
   ReferenceImage reference;
   if (turn.reference) {
     LUCERNA_ASSIGN_OR_RETURN(reference, intake_.ReadReference(*turn.reference, turn.settings));
@@ -486,6 +555,7 @@ StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
   LUCERNA_RETURN_IF_ERROR(
       runner->Prepare(*std::move(turn.scene), turn.needs, std::move(reference)));
   RestoreCheckpoint(turn.job_id, *runner);
+  TraceOwn(turn.job_id, "job", began_at, [] { return "scene is read and prepared"; });
   return runner->Resume();
 }
 
@@ -673,6 +743,11 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, M
                                tally) { return KeepCheckpoint(id, std::move(sums), passes, tally); }
                      : std::function<Status(std::string, std::int64_t, const BatchTally&)>(),
           .checkpoint_share = options_.checkpoint_share,
+          .on_timed =
+              [this, id](std::string_view row, SteadyTime from,
+                         const std::function<std::string()>& what) {
+                TraceOwn(id, row, from, what);
+              },
           .on_pause =
               [this, id](const Status& why) {
                 const std::string condition = why.ok() ? "" : state_->PauseCondition(why);
@@ -691,7 +766,10 @@ void Coordinator::Conclude(const std::string& job_id, StatusOr<RenderResult> res
     const std::int64_t passes = result->passes;
     const std::optional<JobTable::ImageSource> source = jobs_.DescribeRun(job_id, Now());
     if (!source) return;
+    const SteadyTime began_at = clock_.Steady();
     StatusOr<Blob> image = Encode(*source, *std::move(result));
+    TraceOwn(job_id, "image", began_at,
+             [&] { return absl::StrCat("image of ", passes, " passes"); });
     failure = image.ok() ? EndWell(job_id, reason, Claimed(*image)) : image.status();
     if (failure.ok()) {
       spdlog::info("job {} succeeded after {} passes and {:.1f} s", job_id, passes,
@@ -756,7 +834,7 @@ std::uint64_t Coordinator::Sync(const std::string& worker, Scheduler::Report rep
     answer(heard);
     return 0;
   }
-  PausePoisonedJobs();
+  HandleLosses();
   // What came back with this report may be what others wait for.
   if (report.wants_lease || !report.failures.empty()) AnswerParked();
   report.failures.clear();
@@ -790,10 +868,9 @@ void Coordinator::SyncBroke(std::uint64_t ticket) {
 }
 
 void Coordinator::EndBroken(const ParkedSyncs::Call& broken) {
-  spdlog::info("worker {} vanished", ShownWorker(broken.worker));
   scheduler_.LoseWorker(broken.worker);
   broken.answer(absl::CancelledError("the connection broke"));
-  PausePoisonedJobs();
+  HandleLosses();
 }
 
 // Calls of workers whose leases have ended, then of those that can be lent something, as long as
@@ -917,7 +994,17 @@ StatusOr<MergeOutcome> Coordinator::Commit(const Delivery& delivery, std::string
   if (known) return *known;
   const SteadyTime began_at = clock_.Steady();
   StatusOr<MergeOutcome> outcome = TakeIn(delivery, bytes);
-  results_.taking_in.Count(clock_.Steady() - began_at);
+  const SteadyTime ended_at = clock_.Steady();
+  TraceEndedLeases();
+  results_.taking_in.Count(ended_at - began_at);
+  if (const auto trace = FindTrace(delivery.pass.job_id)) {
+    trace->AddOwn({.row = "merge",
+                   .what = absl::StrCat("result of ", ShownWorker(delivery.worker)),
+                   .from = began_at,
+                   .to = ended_at,
+                   .details = {{"bytes", absl::StrCat(bytes.size())},
+                               {"taken in", outcome.ok() ? "yes" : "refused"}}});
+  }
   if (outcome.ok()) {
     ++results_.of_outcome[static_cast<std::size_t>(*outcome)];
   } else {
@@ -931,7 +1018,7 @@ void Coordinator::Refuse(const Delivery& delivery, const Status& why) {
                delivery.pass.job_id, std::string(why.message()));
   ++results_.refused;
   scheduler_.RefuseResult(ClaimOf(delivery), std::string(why.message()));
-  PausePoisonedJobs();
+  HandleLosses();
   AnswerParked();
 }
 
@@ -1017,7 +1104,10 @@ std::string Coordinator::ShownWorker(const std::string& worker) const {
   return absl::StrCat(record->id, " (", Escaped(record->name), ")");
 }
 
-void Coordinator::PausePoisonedJobs() {
+void Coordinator::HandleLosses() {
+  TraceEndedLeases();
+  for (const Scheduler::Loss& loss : scheduler_.TakeLosses())
+    spdlog::warn("worker {} ({}) {}", loss.record, Escaped(loss.name), loss.reason);
   for (const Scheduler::Poisoned& poisoned : scheduler_.TakePoisoned()) {
     const std::string reason =
         absl::StrCat("paused: ", poisoned.message, "; lucerna resume lends it again");

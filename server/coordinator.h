@@ -13,6 +13,8 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -36,6 +38,7 @@
 #include "server/job_intake.h"
 #include "server/job_runner.h"
 #include "server/job_table.h"
+#include "server/job_trace.h"
 #include "server/memory_budget.h"
 #include "server/open_transfers.h"
 #include "server/parked_syncs.h"
@@ -102,7 +105,11 @@ class Coordinator {
   // Also removes what no other job needs from the disk: may take long.
   [[nodiscard]] Status Delete(const std::string& job_id);
   // EXR bytes. Errors: NOT_FOUND, FAILED_PRECONDITION when there is no image (yet).
-  [[nodiscard]] StatusOr<Blob> ImageOf(const std::string& job_id) const;
+  [[nodiscard]] StatusOr<Blob> ImageOf(const std::string& job_id);
+
+  // What was done for it so far, as a file of Chrome's trace format. Errors: NOT_FOUND,
+  // FAILED_PRECONDITION for a job that is not traced (Submission::is_traced).
+  [[nodiscard]] StatusOr<Blob> TraceOf(const std::string& job_id);
 
   // What a program must know to trace a job's photons again.
   struct Description {
@@ -258,7 +265,18 @@ class Coordinator {
 
   // Waits until all that is being merged has been counted.
   void WaitForMerges();
-  void PausePoisonedJobs();
+  // Logs what went wrong with workers, and pauses jobs whose batches they cannot do.
+  void HandleLosses();
+  // nullptr for a job that is not traced.
+  std::shared_ptr<JobTrace> FindTrace(const std::string& job_id);
+  void BeginTrace(const std::string& job_id, SteadyTime submitted_at);
+  void EndTrace(const std::string& job_id) LUCERNA_REQUIRES(traces_mutex_);
+  // What began at `from` and ends now, if the job is traced; `what` makes its text.
+  void TraceOwn(const std::string& job_id, std::string_view row, SteadyTime from,
+                const std::function<std::string()>& what);
+  // Adds the leases that have ended to the traces of their jobs. Soon after they have: they end
+  // now.
+  void TraceEndedLeases();
   // What a registration's worker is called in the log.
   std::string ShownWorker(const std::string& worker) const;
   // What there is for a worker now; absent when it should wait on.
@@ -289,6 +307,10 @@ class Coordinator {
   // and what comes later is refused.
   std::shared_mutex merging_;
   Mutex merge_gate_;
+  Mutex traces_mutex_;
+  std::map<std::string, std::shared_ptr<JobTrace>> traces_ LUCERNA_GUARDED_BY(traces_mutex_);
+  std::deque<std::string> traced_ LUCERNA_GUARDED_BY(traces_mutex_);  // jobs, the oldest first
+  std::atomic<bool> is_tracing_ = false;                              // whether there is a trace
   std::set<std::string> disputed_;  // jobs that wait; of the thread of Tick
   Mutex claims_mutex_;              // held from reading a job's share to giving it to the scheduler
   std::atomic<bool> is_lending_ = true;

@@ -1,4 +1,4 @@
-// The gRPC service that streams images, to the owners of their jobs.
+// The gRPC service that streams images and timelines, to the owners of their jobs.
 //
 // Threads: gRPC calls in from its own pool. The image of a running job waits for one step of its
 // estimator and for the encoding, in the pool for images.
@@ -24,23 +24,35 @@ class ImageService final : public v1::ImageService::CallbackService {
 
   grpc::ServerWriteReactor<v1::Chunk>* GetImage(grpc::CallbackServerContext* context,
                                                 const v1::GetImageRequest* request) override {
+    return SendOf(context, request->job_id(),
+                  [this, job_id = request->job_id()] { return coordinator_.ImageOf(job_id); });
+  }
+
+  grpc::ServerWriteReactor<v1::Chunk>* GetTrace(grpc::CallbackServerContext* context,
+                                                const v1::GetTraceRequest* request) override {
+    return SendOf(context, request->job_id(),
+                  [this, job_id = request->job_id()] { return coordinator_.TraceOf(job_id); });
+  }
+
+ private:
+  // Bytes of a job, to who may have them.
+  template <typename MakeBytes>
+  grpc::ServerWriteReactor<v1::Chunk>* SendOf(grpc::CallbackServerContext* context,
+                                              const std::string& job_id, MakeBytes make) {
     auto* const reactor = new BytesReactor;
-    const StatusOr<std::string> owner = coordinator_.OwnerOf(request->job_id());
+    const StatusOr<std::string> owner = coordinator_.OwnerOf(job_id);
     const Status allowed =
-        owner.ok() ? access_.CheckOwns(*context, request->job_id(), *owner) : owner.status();
+        owner.ok() ? access_.CheckOwns(*context, job_id, *owner) : owner.status();
     if (!allowed.ok()) {
       reactor->Send(allowed);
       return reactor;
     }
-    pools_.images.Run(NeededByCaller(context), [this, reactor, job_id = request->job_id()](
-                                                   const Status& may_begin) {
-      reactor->Send(may_begin.ok() ? WithinMemory([&] { return coordinator_.ImageOf(job_id); })
-                                   : StatusOr<Blob>(may_begin));
+    pools_.images.Run(NeededByCaller(context), [reactor, make](const Status& may_begin) {
+      reactor->Send(may_begin.ok() ? WithinMemory(make) : StatusOr<Blob>(may_begin));
     });
     return reactor;
   }
 
- private:
   Coordinator& coordinator_;
   WorkPools& pools_;
   const Access& access_;

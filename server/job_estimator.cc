@@ -471,7 +471,8 @@ Image JobEstimator::MakeImage() const {
   Image image = MakeFilmImage({.width = state.settings.crop_width(),
                                .height = state.settings.crop_height(),
                                .exposure = scene.film.exposure,
-                               .max_component = scene.film.max_component},
+                               .max_component = scene.film.max_component,
+                               .has_coverage = state.settings.coverage},
                               sums, *state.last_radii, *state.radii, *state.controller,
                               Kernel{state.settings.kernel});
   ToFileUnit(image, scene.unit);

@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_format.h"
 
+#include "render/film/film.h"
 #include "render/image/exr_file.h"
 #include "render/scene/setting_table.h"
 
@@ -37,6 +38,7 @@ StatusOr<Blob> EncodeJobImage(const Job& job, RenderResult result, const RunReco
       absl::StrFormat("%.3f", Seconds(run.coordinator_cpu + job.counters.worker_cpu));
   metadata["lucerna.run.workers"] = absl::StrCat(job.most_workers);
   metadata["lucerna.run.finished_at"] = UtcText(run.finished_at);
+  SetImageWindow(job.settings, result.image);
   LUCERNA_ASSIGN_OR_RETURN(std::string bytes, EncodeExr(result.image));
   return std::make_shared<const std::string>(std::move(bytes));
 }

@@ -33,6 +33,7 @@ struct Submission {
   int priority = 0;
   std::optional<Digest> reference;  // of an EXR image among the blobs
   std::string owner = {};           // who submits it; empty: unknown
+  bool is_traced = false;           // its timeline is kept (server/job_trace.h)
 };
 
 // A submission that was found good.

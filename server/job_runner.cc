@@ -444,6 +444,7 @@ Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
 }
 
 void JobRunner::TakeIn(const OpenRound& open) {
+  const SteadyTime began_at = hooks_.clock.Steady();
   const PassKey key = KeyOf(open.round.first);
   if (!open.is_split) hooks_.scheduler.Close(key);
   const std::shared_ptr<const SliceSums> sums = hooks_.rounds.Take(key);
@@ -453,6 +454,9 @@ void JobRunner::TakeIn(const OpenRound& open) {
   }
   if (!open.is_split) Withdraw(key.pass);
   hooks_.on_round_merged(sums->tally, static_cast<std::int64_t>(open.round.size()));
+  Timed("rounds", began_at, [&] {
+    return absl::StrCat("passes ", open.round.first, " to ", open.round.last, " are added up");
+  });
 }
 
 std::optional<std::uint64_t> JobRunner::NextToSplit(const End& end) const {
@@ -467,8 +471,10 @@ std::optional<std::uint64_t> JobRunner::NextToSplit(const End& end) const {
 
 StatusOr<std::optional<JobRunner::TracedPass>> JobRunner::Trace(std::uint64_t pass) {
   TracedPass traced;
+  const SteadyTime began_at = hooks_.clock.Steady();
   LUCERNA_ASSIGN_OR_RETURN(traced.eye,
                            estimator_->TraceEyePaths(pass, [this] { return ShallInterrupt(); }));
+  Timed("eye paths", began_at, [&] { return absl::StrCat("eye paths of pass ", pass); });
   if (!traced.eye.is_whole) return std::optional<TracedPass>();
   std::string bytes = EncodeHitpointBlock(traced.eye.block, &estimator_->team());
   const Digest digest = Sha256(bytes);
@@ -560,6 +566,7 @@ void JobRunner::BeginEstimateIfDue(bool is_last) {
   next_checkpoint_ = NextCheckpoint(snapshot.image.passes, /*near_target=*/false);
   std::packaged_task<ErrorCheckpoint()> task(
       [this, look = ++checkpoints_, snapshot = std::move(snapshot)] {
+        const SteadyTime began_at = hooks_.clock.Steady();
         ErrorCheckpoint checkpoint;
         checkpoint.passes = snapshot.image.passes;
         checkpoint.photons = snapshot.photons;
@@ -567,6 +574,8 @@ void JobRunner::BeginEstimateIfDue(bool is_last) {
         checkpoint.estimate = estimator_->EstimateError(snapshot, checkpoint.missing, look);
         if (!reference_.empty())
           checkpoint.truth = JobEstimator::ErrorAgainst(reference_, snapshot);
+        Timed("estimate", began_at,
+              [&] { return absl::StrCat("error after ", checkpoint.passes, " passes"); });
         return checkpoint;
       });
   estimate_ = task.get_future();
@@ -672,6 +681,8 @@ Status JobRunner::KeepCheckpoint() {
   const SteadyTime began_at = hooks_.clock.Steady();
   LUCERNA_RETURN_IF_ERROR(hooks_.on_checkpoint(
       Save(), static_cast<std::int64_t>(estimator_->whole_passes()), estimator_->whole_tally()));
+  Timed("checkpoint", began_at,
+        [&] { return absl::StrCat("checkpoint of ", estimator_->whole_passes(), " passes"); });
   const SteadyTime now = hooks_.clock.Steady();
   save_at_ = now + PauseAfterSave(now - began_at, hooks_.checkpoint_share);
   saved_passes_ = estimator_->whole_passes();

@@ -84,6 +84,11 @@ struct RunnerHooks {
       on_checkpoint;
   // How much of the time checkpoints may take, in (0, 1]; 1: one after every round.
   double checkpoint_share = 0.01;
+  // Something began at `from` and ends now, on a row of the job's timeline; `what` makes its text
+  // and is called where the job is traced. Called from the runner's thread and that of estimates.
+  std::function<void(std::string_view row, SteadyTime from,
+                     const std::function<std::string()>& what)>
+      on_timed;
   // The job pauses and why, or goes on (OK).
   std::function<void(const Status& why)> on_pause;
   // How long the job has run, and when it will have run so long (absent while its time stands
@@ -192,6 +197,10 @@ class JobRunner final : public RunningJob {
   void WarnOfFirstPass(const End& end);
 
   void ReportProgress();
+  void Timed(std::string_view row, SteadyTime from,
+             const std::function<std::string()>& what) const {
+    if (hooks_.on_timed) hooks_.on_timed(row, from, what);
+  }
   // Takes in the oldest round if all of it has come.
   bool TakeInIfWhole();
   bool IsOldestRoundWhole() const;

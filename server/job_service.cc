@@ -28,6 +28,7 @@ StatusOr<Submission> ReadSubmission(const v1::SubmitRequest& request) {
   LUCERNA_ASSIGN_OR_RETURN(submission.manifest, FromProto(request.scene()));
   LUCERNA_ASSIGN_OR_RETURN(submission.overrides, FromProto(request.overrides()));
   submission.validate_only = request.validate_only();
+  submission.is_traced = request.is_traced();
   submission.priority = request.priority();
   if (submission.priority < kLowestPriority || submission.priority > kHighestPriority) {
     return absl::InvalidArgumentError(

@@ -19,18 +19,19 @@
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <spdlog/sinks/ringbuffer_sink.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include "render/base/certificate.h"
 #include "render/base/clock.h"
 #include "render/base/escape.h"
 #include "render/base/fail_point.h"
+#include "render/base/manual_page.h"
 #include "render/base/memory.h"
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"
 #include "render/wire/grpc_process.h"
+#include "render/wire/program_log.h"
 #include "render/wire/security_flags.h"
 #include "server/acceptor.h"
 #include "server/access.h"
@@ -51,6 +52,7 @@
 namespace lucerna {
 namespace {
 
+constexpr char kProgram[] = "lucerna-server";
 constexpr int kExitUsage = 2;
 constexpr int kExitNoState = 1;
 constexpr int kExitCannotListen = 3;
@@ -70,7 +72,7 @@ struct Flags {
   bool offers_reflection = false;
   std::size_t max_connections_per_address = 16384;
   bool allow_insecure_network = false;
-  std::string log_level = "info";
+  LogFlags log;
   std::string state;
   std::uint64_t max_disk_bytes = 0;
   double keep_days = 0;
@@ -90,6 +92,9 @@ sigset_t BlockEndSignals() {
 }
 
 int Serve(const Flags& flags, const std::shared_ptr<LogLines>& log) {
+  const auto say_why = [&](const std::string& message) {
+    SayWhyItEnds(kProgram, message, flags.log.of_lines());
+  };
   const sigset_t end_signals = BlockEndSignals();
   KeepGrpc();
   RaiseDescriptorLimit();
@@ -100,16 +105,14 @@ int Serve(const Flags& flags, const std::shared_ptr<LogLines>& log) {
         flags.state, absl::StrCat(absl::Hex(clock.Wall().time_since_epoch().count() / 1000)),
         {clock.Steady(), ProcessCpuTime(), clock.Wall()}, flags.max_disk_bytes);
     if (!opened.ok()) {
-      std::fprintf(stderr, "lucerna-server: --state %s: %s\n", flags.state.c_str(),
-                   std::string(opened.status().message()).c_str());
+      say_why(absl::StrCat("--state ", flags.state, ": ", opened.status().message()));
       return kExitNoState;
     }
     state = *std::move(opened);
   }
   StatusOr<std::unique_ptr<Access>> access = Access::Open(flags.tokens);
   if (!access.ok()) {
-    std::fprintf(stderr, "lucerna-server: --tokens %s\n",
-                 EscapedLines(std::string(access.status().message())).c_str());
+    say_why(absl::StrCat("--tokens ", EscapedLines(std::string(access.status().message()))));
     return kExitUsage;
   }
   Coordinator coordinator(flags.coordinator, clock, std::move(state));
@@ -145,10 +148,8 @@ int Serve(const Flags& flags, const std::shared_ptr<LogLines>& log) {
   for (const Listener::Options& options : wanted) {
     StatusOr<std::unique_ptr<Listener>> listener = Listener::Start(options);
     if (!listener.ok()) {
-      std::fprintf(stderr,
-                   "lucerna-server: cannot listen on %s (%s); is the port in use, or the address "
-                   "not of this machine?\n",
-                   options.address.c_str(), std::string(listener.status().message()).c_str());
+      say_why(absl::StrCat("cannot listen on ", options.address, " (", listener.status().message(),
+                           "); is the port in use, or the address not of this machine?"));
       return kExitCannotListen;
     }
     listeners.push_back(*std::move(listener));
@@ -162,8 +163,7 @@ int Serve(const Flags& flags, const std::shared_ptr<LogLines>& log) {
     StatusOr<std::unique_ptr<MetricsListener>> started = MetricsListener::Start(
         flags.metrics, [&](MetricsPage& page) { FillMetrics(coordinator, latencies, page); });
     if (!started.ok()) {
-      std::fprintf(stderr, "lucerna-server: --metrics: %s\n",
-                   std::string(started.status().message()).c_str());
+      say_why(absl::StrCat("--metrics: ", started.status().message()));
       return kExitCannotListen;
     }
     metrics = *std::move(started);
@@ -174,8 +174,7 @@ int Serve(const Flags& flags, const std::shared_ptr<LogLines>& log) {
     StatusOr<std::unique_ptr<WebListener>> started = WebListener::Start(
         coordinator, {flags.web, access->get(), [log] { return log->last_formatted(); }});
     if (!started.ok()) {
-      std::fprintf(stderr, "lucerna-server: --web: %s\n",
-                   std::string(started.status().message()).c_str());
+      say_why(absl::StrCat("--web: ", started.status().message()));
       return kExitCannotListen;
     }
     web = *std::move(started);
@@ -254,6 +253,35 @@ Status CheckListening(const Flags& flags) {
   return CheckTlsFiles(flags.tls, SystemClock().Wall()).status();
 }
 
+std::string ManualOf(const CLI::App& app) {
+  ManualPage page(kProgram, "coordinator of Lucerna, a distributed renderer");
+  page.Section("SYNOPSIS");
+  page.Paragraph("lucerna-server [FLAGS]");
+  page.Section("DESCRIPTION");
+  page.Paragraph(
+      "Takes jobs from users, lends batches of photons and passes to workers, which may come and "
+      "go "
+      "at any time, and keeps the images. It writes \"listening on ADDRESS:PORT\" to the standard "
+      "output once it accepts calls, and its log to the standard error. Without certificates it "
+      "listens on its own machine only.");
+  page.Section("OPTIONS");
+  AddFlagItems(page, app, [](const CLI::Option&) { return true; });
+  page.Section("SIGNALS");
+  page.Paragraph(
+      "SIGTERM and SIGINT end it in order: it lends nothing more, takes in the results that are on "
+      "their way, and writes a checkpoint where it has a --state.");
+  page.Section("EXIT STATUS");
+  page.Item("0", "It was ended in order.");
+  page.Item("1", "The folder of --state cannot be used.");
+  page.Item("2", "The command line is wrong.");
+  page.Item("3", "It cannot listen on an address.");
+  page.Section("EXAMPLES");
+  page.Example("lucerna-server --listen 127.0.0.1:7400 --state /var/lib/lucerna");
+  page.Section("SEE ALSO");
+  page.Paragraph("lucerna(1), lucerna-worker(1); /usr/share/doc/lucerna/manual.md");
+  return page.text();
+}
+
 int Main(int argc, char** argv) {
   Flags flags;
   flags.coordinator.numeric_profile = NumericProfile();
@@ -327,9 +355,11 @@ int Main(int argc, char** argv) {
   app.add_option("--batch-photons", flags.coordinator.batch_photons,
                  "photons in every batch; 0: by the number of workers")
       ->capture_default_str();
-  app.add_option("--log-level", flags.log_level, "debug, info, warn, error or off")
-      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
-      ->capture_default_str();
+  AddLogFlags<CLI::IsMember>(app, flags.log);
+  if (argc == 3 && std::string_view(argv[1]) == "help" && std::string_view(argv[2]) == "man") {
+    std::fputs(ManualOf(app).c_str(), stdout);
+    return 0;
+  }
   std::string help = "--help";
   if (argc == 2 && std::string_view(argv[1]) == "help") argv[1] = help.data();
   try {
@@ -346,9 +376,8 @@ int Main(int argc, char** argv) {
       std::chrono::duration<double, std::ratio<86400>>(flags.keep_days));
   if (const char* const fail_point = std::getenv("LUCERNA_FAIL_POINT")) ArmFailPoint(fail_point);
   const auto log = std::make_shared<LogLines>(kLogLines);
-  spdlog::set_default_logger(spdlog::stderr_color_mt("lucerna-server"));
+  StartLog(kProgram, flags.log.level, flags.log.of_lines());
   spdlog::default_logger()->sinks().push_back(log);
-  spdlog::set_level(spdlog::level::from_str(flags.log_level));
   TakeGrpcErrors(LogGrpcError);
   return Serve(flags, log);
 }

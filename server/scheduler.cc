@@ -26,6 +26,8 @@ constexpr int kMostLookedAt = 8;
 // A lease may become at most 2^10 times as old as at first.
 constexpr int kMostDoublings = 10;
 constexpr std::size_t kMostReason = 200;  // of what workers say, for messages
+constexpr std::size_t kMostLosses =
+    1000;  // and leases that ended, between two calls that take them
 
 Status UnknownWorker(const std::string& worker) {
   return absl::NotFoundError(absl::StrCat("the coordinator does not know worker ",
@@ -167,6 +169,11 @@ Status Scheduler::TakeReport(const std::string& worker_id, const Report& report,
   ResolveInterrupted(worker, /*has_crashed=*/false);
   for (const auto& [lease_id, reason] : report.failures) {
     if (!worker.leases.contains(lease_id)) continue;
+    NoteLoss(
+        worker.record,
+        absl::StrCat("failed at ", NameOfLease(lease_id), ": ",
+                     reason.empty() ? "no reason given"
+                                    : Escaped(std::string_view(reason).substr(0, kMostReason))));
     TakeBack(lease_id, Ending::kFailed, reason.empty() ? "failed" : reason);
   }
   const std::set<std::string> held(report.held.begin(), report.held.end());
@@ -263,8 +270,27 @@ void Scheduler::LoseWorker(const std::string& worker_id) {
   const MutexLock lock(mutex_);
   const auto found = workers_.find(worker_id);
   if (found == workers_.end()) return;
+  NoteLoss(found->second.record,
+           absl::StrCat("vanished: its connection broke; leases that it held and that go back: ",
+                        found->second.leases.size()));
   SetConnected(worker_id, found->second, false);
   TakeBackAll(found->second, Ending::kInterrupted);
+}
+
+std::string Scheduler::NameOfLease(const std::string& lease_id) const {
+  const Lease& lease = leases_.at(lease_id);
+  return absl::StrCat(NameOf(lease.pass, lease.kind, lease.range), " of job ", lease.pass.job_id);
+}
+
+void Scheduler::NoteLoss(const std::string& record, std::string reason) {
+  if (losses_.size() >= kMostLosses) return;
+  const WorkerRecord* const worker = records_.Find(record);
+  losses_.push_back({record, worker == nullptr ? "" : worker->name, std::move(reason)});
+}
+
+std::vector<Scheduler::Loss> Scheduler::TakeLosses() {
+  const MutexLock lock(mutex_);
+  return std::exchange(losses_, {});
 }
 
 void Scheduler::RemoveWorker(const std::string& worker_id) {
@@ -425,9 +451,11 @@ void Scheduler::QuarantineIfUnreliable(const std::string& record, std::string_vi
       !records_.IsUnreliable(record) || !HasOthersThan(std::array{record})) {
     return;
   }
-  records_.Quarantine(record, absl::StrCat(kBadOfRecent, " of its last ", kRecentLeases,
-                                           " leases failed or stalled, the last one: ",
-                                           std::string(failure.substr(0, kMostReason))));
+  const std::string reason = absl::StrCat(
+      kBadOfRecent, " of its last ", kRecentLeases,
+      " leases failed or stalled, the last one: ", std::string(failure.substr(0, kMostReason)));
+  records_.Quarantine(record, reason);
+  NoteLoss(record, absl::StrCat("is put in quarantine: ", Escaped(reason)));
   UpdateStanding(record);
 }
 
@@ -607,6 +635,8 @@ StatusOr<Scheduler::Taken> Scheduler::TakeResult(const BatchClaim& claim, const 
   const std::string record = workers_.at(claim.worker).record;
   Work& work = open_.at(key);
   records_.Count(record, WorkerRecords::End::kCommitted);
+  if (const auto lease = leases_.find(lease_id); lease != leases_.end())
+    lease->second.has_result = true;
   auto audit = work.audits.find(range);
   if (audit == work.audits.end()) {
     if (!IsAudited(options_.audit_secret, options_.audit_share, key, kind, range)) return taken;
@@ -698,8 +728,14 @@ void Scheduler::Expire(SteadyTime now) {
     if (lease->second.expires_at > now) {
       lease_deadlines_.emplace(lease->second.expires_at, id);
     } else if (lease->second.is_too_old) {
+      NoteLoss(workers_.at(lease->second.worker).record,
+               absl::StrCat("stalled at ", NameOfLease(id), ": it did not end within ",
+                            Seconds(LongestAge(lease->second)), " s"));
       TakeBack(id, Ending::kStalled, "it was renewed and did not end");
     } else {
+      NoteLoss(workers_.at(lease->second.worker).record,
+               absl::StrCat("was not heard of for ", Seconds(options_.lease_time),
+                            " s: ", NameOfLease(id), " goes back"));
       TakeBack(id, Ending::kInterrupted);
     }
   }
@@ -713,6 +749,10 @@ void Scheduler::Expire(SteadyTime now) {
       continue;
     }
     TakeBackAll(worker->second, Ending::kInterrupted);
+    NoteLoss(worker->second.record,
+             absl::StrCat("is given up: it crashed or was cut off, and did not come back within ",
+                          Seconds(options_.worker_silence),
+                          " s; leases that count as crashed: ", worker->second.interrupted.size()));
     ResolveInterrupted(worker->second, /*has_crashed=*/true);
     Forget(worker, worker->second.heard_at);
   }
@@ -972,7 +1012,48 @@ void Scheduler::EraseLease(const std::string& lease_id, Ending ending) {
       {{lease_id, ended.pass, ended.range, ended.kind}, ending, open_.at(ended.pass).opening});
   if (worker.past.size() > kMostPast) worker.past.pop_front();
   affected_.insert(found->first);
+  if (traced_.contains(ended.pass.job_id) && ended_.size() < kMostLosses) {
+    const WorkerRecord* const record = records_.Find(worker.record);
+    ended_.push_back({.job_id = ended.pass.job_id,
+                      .record = worker.record,
+                      .name = record == nullptr ? "" : record->name,
+                      .work = NameOf(ended.pass, ended.kind, ended.range),
+                      .ending = EndingText(ended.has_result ? Ending::kDelivered : ending),
+                      .lent_at = ended.lent_at});
+  }
   leases_.erase(lease);
+}
+
+const char* Scheduler::EndingText(Ending ending) {
+  switch (ending) {
+    case Ending::kDelivered:
+      return "delivered";
+    case Ending::kOvertaken:
+      return "overtaken";
+    case Ending::kGivenBack:
+      return "given back";
+    case Ending::kFailed:
+      return "failed";
+    case Ending::kInterrupted:
+      return "interrupted";
+    case Ending::kStalled:
+      return "stalled";
+  }
+  return "";
+}
+
+void Scheduler::SetTraced(const std::string& job_id, bool is_traced) {
+  const MutexLock lock(mutex_);
+  if (is_traced) {
+    traced_.insert(job_id);
+  } else {
+    traced_.erase(job_id);
+  }
+}
+
+std::vector<Scheduler::EndedLease> Scheduler::TakeEnded() {
+  const MutexLock lock(mutex_);
+  return std::exchange(ended_, {});
 }
 
 void Scheduler::TakeBack(const std::string& lease_id, Ending ending, std::string_view failure) {

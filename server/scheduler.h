@@ -206,6 +206,28 @@ class Scheduler {
   // Takes back what has run out and forgets workers that are silent.
   void Expire(SteadyTime now);
 
+  // What went wrong with a worker, for the log.
+  struct Loss {
+    std::string record;  // its id
+    std::string name;
+    std::string reason;  // a sentence whose subject is the worker
+  };
+  // Since the last call, in their order; of more than a thousand the first.
+  [[nodiscard]] std::vector<Loss> TakeLosses();
+
+  // Leases of such a job are kept for TakeEnded when they end.
+  void SetTraced(const std::string& job_id, bool is_traced);
+  struct EndedLease {
+    std::string job_id;
+    std::string record;  // the worker's id
+    std::string name;
+    std::string work;    // "passes 0 to 4"
+    std::string ending;  // "delivered"
+    SteadyTime lent_at;
+  };
+  // Since the last call, of jobs that are traced.
+  [[nodiscard]] std::vector<EndedLease> TakeEnded();
+
   struct Poisoned {
     PassKey pass;
     std::string message;  // for the user
@@ -287,6 +309,7 @@ class Scheduler {
     SteadyTime expires_at;
     std::uint64_t number = 0;  // leases are numbered as they are lent
     bool is_too_old = false;   // to be renewed
+    bool has_result = false;   // that was taken
   };
   struct Losses {
     std::set<std::string> workers;  // records of those that failed or crashed
@@ -370,6 +393,7 @@ class Scheduler {
       LUCERNA_REQUIRES(mutex_);
   void TakeBackAll(Worker& worker, Ending ending) LUCERNA_REQUIRES(mutex_);
   void EraseLease(const std::string& lease_id, Ending ending) LUCERNA_REQUIRES(mutex_);
+  static const char* EndingText(Ending ending);
   // A range that nobody holds any more waits to be lent again.
   void Return(const PassKey& key, Work& work, WorkRange range) LUCERNA_REQUIRES(mutex_);
   // The range has a result, or its pass or round has ended: it waits for nothing.
@@ -383,6 +407,9 @@ class Scheduler {
   void ResolveInterrupted(Worker& worker, bool has_crashed) LUCERNA_REQUIRES(mutex_);
   void QuarantineIfUnreliable(const std::string& record, std::string_view failure)
       LUCERNA_REQUIRES(mutex_);
+  void NoteLoss(const std::string& record, std::string reason) LUCERNA_REQUIRES(mutex_);
+  // "pass 3 of job x" of a lease that there is.
+  std::string NameOfLease(const std::string& lease_id) const LUCERNA_REQUIRES(mutex_);
   bool QuarantineLocked(const std::string& id, std::string_view reason, bool has_lied)
       LUCERNA_REQUIRES(mutex_);
   // What follows for its registration from the state of a worker's record.
@@ -411,6 +438,9 @@ class Scheduler {
   std::array<std::deque<double>, 2> times_ LUCERNA_GUARDED_BY(mutex_);
   std::array<std::optional<double>, 2> usual_times_ LUCERNA_GUARDED_BY(mutex_);
   std::vector<Poisoned> poisoned_ LUCERNA_GUARDED_BY(mutex_);
+  std::vector<Loss> losses_ LUCERNA_GUARDED_BY(mutex_);
+  std::set<std::string> traced_ LUCERNA_GUARDED_BY(mutex_);  // jobs
+  std::vector<EndedLease> ended_ LUCERNA_GUARDED_BY(mutex_);
   WorkerRecords records_ LUCERNA_GUARDED_BY(mutex_);
   std::uint64_t next_lease_ LUCERNA_GUARDED_BY(mutex_) = 1;
   std::uint64_t next_opening_ LUCERNA_GUARDED_BY(mutex_) = 1;

@@ -15,13 +15,13 @@
 #include <utility>
 
 #include <CLI/CLI.hpp>
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include "render/base/clock.h"
 #include "render/base/escape.h"
 #include "render/base/fail_point.h"
+#include "render/base/manual_page.h"
 #include "render/base/memory.h"
 #include "render/base/random_id.h"
 #include "render/base/version.h"
@@ -29,6 +29,7 @@
 #include "render/wire/channel.h"
 #include "render/wire/grpc_process.h"
 #include "render/wire/metrics.h"
+#include "render/wire/program_log.h"
 #include "render/wire/security_flags.h"
 #include "worker/replay.h"
 #include "worker/session.h"
@@ -36,6 +37,7 @@
 namespace lucerna {
 namespace {
 
+constexpr char kProgram[] = "lucerna-worker";
 constexpr int kExitFailed = 1;
 constexpr int kExitUsage = 2;
 constexpr int kExitUnreachable = 3;
@@ -58,7 +60,7 @@ std::string WorkerName() {
   return absl::StrCat(host, ":", getpid());
 }
 
-int Work(Session::Options options, const std::string& metrics_address) {
+int Work(Session::Options options, const std::string& metrics_address, LogFormat format) {
   // Both signals wait to be asked for, in this thread and in every thread it starts.
   sigset_t signals;
   sigemptyset(&signals);
@@ -72,8 +74,7 @@ int Work(Session::Options options, const std::string& metrics_address) {
     StatusOr<std::unique_ptr<MetricsListener>> started = MetricsListener::Start(
         metrics_address, [&](MetricsPage& page) { session.counts().Fill(page); });
     if (!started.ok()) {
-      std::fprintf(stderr, "lucerna-worker: --metrics: %s\n",
-                   std::string(started.status().message()).c_str());
+      SayWhyItEnds(kProgram, absl::StrCat("--metrics: ", started.status().message()), format);
       return kExitUnreachable;
     }
     metrics = *std::move(started);
@@ -93,25 +94,49 @@ int Work(Session::Options options, const std::string& metrics_address) {
   const Status status = session.Run();
   has_ended = true;
   listener.join();
-  if (!status.ok()) {
-    std::fprintf(stderr, "lucerna-worker: %s\n",
-                 EscapedLines(std::string(status.message())).c_str());
-  }
+  if (!status.ok()) SayWhyItEnds(kProgram, EscapedLines(std::string(status.message())), format);
   return ExitCodeFor(status);
 }
 
-// Writes what a photon did to the standard output, as a message for `lucerna trace-photon`.
+// Writes what photons did to the standard output, as a message for `lucerna trace-photon`.
 int ReplayPhoton(const ReplayOptions& options) {
-  const StatusOr<v1::PhotonPath> path = Replay(options);
-  if (!path.ok()) {
+  const StatusOr<v1::PhotonPaths> paths = Replay(options);
+  if (!paths.ok()) {
     std::fprintf(stderr, "lucerna-worker: %s\n",
-                 EscapedLines(std::string(path.status().message())).c_str());
-    return ExitCodeFor(path.status());
+                 EscapedLines(std::string(paths.status().message())).c_str());
+    return ExitCodeFor(paths.status());
   }
-  const std::string bytes = path->SerializeAsString();
+  const std::string bytes = paths->SerializeAsString();
   const bool is_written = std::fwrite(bytes.data(), 1, bytes.size(), stdout) == bytes.size() &&
                           std::fflush(stdout) == 0;
   return is_written ? 0 : kExitFailed;
+}
+
+std::string ManualOf(const CLI::App& app) {
+  ManualPage page(kProgram, "worker of Lucerna, a distributed renderer");
+  page.Section("SYNOPSIS");
+  page.Paragraph("lucerna-worker [FLAGS]");
+  page.Section("DESCRIPTION");
+  page.Paragraph(
+      "Takes batches of photons and passes from the coordinator, traces them and returns what they "
+      "brought. It keeps nothing that cannot be fetched again, and may be started and killed at "
+      "any "
+      "time. Its log goes to the standard error.");
+  page.Section("OPTIONS");
+  AddFlagItems(page, app, [](const CLI::Option&) { return true; });
+  page.Section("SIGNALS");
+  page.Paragraph("SIGTERM and SIGINT make it give back what it holds and end.");
+  page.Section("EXIT STATUS");
+  page.Item("0", "It was ended by SIGTERM or SIGINT.");
+  page.Item("1", "Anything else.");
+  page.Item("2", "The command line is wrong.");
+  page.Item("3", "No coordinator answers.");
+  page.Item("4", "The coordinator refuses this worker: another build, or no right to work.");
+  page.Section("EXAMPLES");
+  page.Example("lucerna-worker --server farm.example:7400 --threads 8");
+  page.Section("SEE ALSO");
+  page.Paragraph("lucerna(1), lucerna-server(1); /usr/share/doc/lucerna/manual.md");
+  return page.text();
 }
 
 int Main(int argc, char** argv) {
@@ -120,7 +145,7 @@ int Main(int argc, char** argv) {
   options.name = WorkerName();
   options.numeric_profile = NumericProfile();
   options.identity = RandomId();
-  std::string log_level = "info";
+  LogFlags log;
   double connect_timeout_s = 60;
   options.server.address = "127.0.0.1:7400";
   std::string token_file;
@@ -145,15 +170,18 @@ int Main(int argc, char** argv) {
       ->check([](const std::string& address) {
         return IsAddress(address) ? "" : "give HOST:PORT, such as 127.0.0.1:7481";
       });
-  app.add_option("--log-level", log_level, "debug, info, warn, error or off")
-      ->check(CLI::IsMember({"debug", "info", "warn", "error", "off"}))
-      ->capture_default_str();
+  AddLogFlags<CLI::IsMember>(app, log);
   CLI::Option* job =
       app.add_option("--replay", replay.job_id,
-                     "trace one photon of this job again, write its way to stdout, end");
-  app.add_option("--pass", replay.pass, "of the photon to replay, from 0")->needs(job);
-  app.add_option("--index", replay.index, "of the photon to replay in its pass, from 0")
+                     "trace photons of this job again, write their ways to stdout, end");
+  app.add_option("--pass", replay.pass, "of the photons to replay, from 0")->needs(job);
+  app.add_option("--index", replay.index, "of the first photon to replay in its pass, from 0")
       ->needs(job);
+  app.add_option("--count", replay.count, "how many photons to replay")->needs(job);
+  if (argc == 3 && std::string_view(argv[1]) == "help" && std::string_view(argv[2]) == "man") {
+    std::fputs(ManualOf(app).c_str(), stdout);
+    return 0;
+  }
   std::string help = "--help";
   if (argc == 2 && std::string_view(argv[1]) == "help") argv[1] = help.data();
   try {
@@ -177,8 +205,7 @@ int Main(int argc, char** argv) {
   options.connect_timeout =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(connect_timeout_s));
   if (const char* const fail_point = std::getenv("LUCERNA_FAIL_POINT")) ArmFailPoint(fail_point);
-  spdlog::set_default_logger(spdlog::stderr_color_mt("lucerna-worker"));
-  spdlog::set_level(spdlog::level::from_str(log_level));
+  StartLog(kProgram, log.level, log.of_lines());
   TakeGrpcErrors([](const std::string& message) { spdlog::debug("gRPC: {}", Escaped(message)); });
   if (*job) {
     replay.server = options.server;
@@ -186,7 +213,7 @@ int Main(int argc, char** argv) {
     replay.numeric_profile = options.numeric_profile;
     return ReplayPhoton(replay);
   }
-  return Work(std::move(options), metrics);
+  return Work(std::move(options), metrics, log.of_lines());
 }
 
 }  // namespace

@@ -1,9 +1,12 @@
 #include "worker/replay.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "render/analysis/pass_time.h"
 #include "render/analysis/prepared_scene.h"
+#include "render/geometry/intersector.h"
+#include "render/scene/shape_lists.h"
 #include "render/wire/messages.h"
 #include "worker/connection.h"
 #include "worker/photon_path.h"
@@ -29,23 +32,49 @@ v1::Triple TripleOf(Rgb c) {
   return TripleOf(c.r, c.g, c.b);
 }
 
-std::string NameOf(const Emitter& light) {
+// A place as the scene's file has it.
+v1::Triple PlaceOf(Vec3 position, const Scene& scene) {
+  return TripleOf(position * static_cast<float>(scene.unit));
+}
+
+// " (room.pbrt:12)".
+std::string InParentheses(const std::string& source) {
+  return source.empty() ? "" : absl::StrCat(" (", source, ")");
+}
+
+std::string NameOf(const Emitter& light, const Scene& scene) {
   if (light.kind == EmitterKind::kTriangle) {
-    return absl::StrCat("triangle ", light.primitive, " of mesh ", light.geometry);
+    return absl::StrCat("triangle ", light.primitive, " of mesh ", light.geometry,
+                        InParentheses(scene.SourceOf(scene.meshes[light.geometry].traits)));
   }
   if (light.kind == EmitterKind::kInfinite) return "the even sky";
-  return absl::StrCat(std::string(NameOf(light.kind)), " ", light.primitive);
+  const std::string name = absl::StrCat(std::string(NameOf(light.kind)), " ", light.primitive);
+  switch (light.kind) {
+#define LUCERNA_CASE(Name, list, name_of_kind) \
+  case EmitterKind::k##Name:                   \
+    return absl::StrCat(name, InParentheses(scene.SourceOf(scene.list[light.primitive].traits)));
+    LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+    default:
+      return name;
+  }
 }
 
 std::string NameOfShape(const SurfacePoint& surface, const Scene& scene) {
+  const TriangleMesh* const mesh = MeshOf(scene, surface.geometry);
+  const std::string source = InParentheses(scene.SourceOf(
+      mesh != nullptr ? mesh->traits
+                      : VisitShape(scene, KindOf(scene, surface.geometry), surface.primitive,
+                                   [](const auto& shape) { return shape.traits; })));
   if (surface.instance != kNoInstance) {
-    return absl::StrCat("triangle ", surface.primitive, " of a mesh of instance ",
-                        surface.instance);
+    return absl::StrCat("triangle ", surface.primitive, " of a mesh of instance ", surface.instance,
+                        source);
   }
-  if (surface.geometry < scene.meshes.size()) {
-    return absl::StrCat("triangle ", surface.primitive, " of mesh ", surface.geometry);
+  if (mesh != nullptr) {
+    return absl::StrCat("triangle ", surface.primitive, " of mesh ", surface.geometry, source);
   }
-  return absl::StrCat(std::string(NameOf(KindOf(scene, surface.geometry))), " ", surface.primitive);
+  return absl::StrCat(std::string(NameOf(KindOf(scene, surface.geometry))), " ", surface.primitive,
+                      source);
 }
 
 v1::PhotonEnd EndToProto(PhotonEnd end) {
@@ -93,8 +122,8 @@ v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing, const Scene
     message.set_material(absl::StrCat(landing.surface.material, " (",
                                       std::string(NameOf(landing.material_kind)), ")"));
   }
-  message.set_distance(static_cast<double>(landing.distance));
-  *message.mutable_position() = TripleOf(landing.surface.position);
+  message.set_distance(static_cast<double>(landing.distance) * scene.unit);
+  *message.mutable_position() = PlaceOf(landing.surface.position, scene);
   *message.mutable_geometric_normal() = TripleOf(landing.surface.geometric_normal);
   *message.mutable_shading_normal() = TripleOf(landing.surface.shading_normal);
   *message.mutable_flux_arriving() = TripleOf(landing.arriving);
@@ -115,15 +144,32 @@ v1::PhotonPath::Landing LandingToProto(const PhotonLanding& landing, const Scene
   return message;
 }
 
+v1::PhotonPath PathToProto(const PhotonHistory& history, const PreparedScene& prepared) {
+  const Scene& scene = prepared.scene();
+  v1::PhotonPath path;
+  path.set_end(EndToProto(history.end));
+  if (history.end == PhotonEnd::kNotEmitted) return path;
+  v1::PhotonPath::Emission& emission = *path.mutable_emission();
+  emission.set_light(NameOf(prepared.lights().emitter(history.emission.emitter), scene));
+  *emission.mutable_position() = PlaceOf(history.emission.ray.origin, scene);
+  *emission.mutable_direction() = TripleOf(history.emission.ray.direction);
+  *emission.mutable_flux() = TripleOf(history.emission.flux);
+  path.set_wavelength_nm(static_cast<double>(history.wavelength_nm));
+  for (const PhotonLanding& landing : history.landings)
+    *path.add_landings() = LandingToProto(landing, scene);
+  return path;
+}
+
 }  // namespace
 
-StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& settings,
-                                       const SceneNeeds& needs, std::uint64_t pass,
-                                       std::uint64_t index, std::uint64_t photons_per_pass,
-                                       const PhotonGuide* guide) {
-  if (pass >= kMostPasses || index >= photons_per_pass) {
+StatusOr<v1::PhotonPaths> ReplayInScene(Scene rec709, const RenderSettings& settings,
+                                        const SceneNeeds& needs, PhotonRange photons,
+                                        std::uint64_t photons_per_pass, const PhotonGuide* guide) {
+  if (photons.pass >= kMostPasses || photons.first >= photons_per_pass ||
+      photons.count > photons_per_pass - photons.first) {
     return absl::OutOfRangeError(absl::StrCat(
-        "there is no photon ", pass, ":", index,
+        "there is no photon ", photons.pass, ":",
+        photons.first + std::max<std::uint64_t>(photons.count, 1) - 1,
         ": passes count from 0, and the photons of each from 0 to ", photons_per_pass - 1));
   }
   PreparedScene prepared(std::move(rec709));
@@ -132,26 +178,17 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
                                 settings, needs, nullptr, Bounds(), photons_per_pass, Bounds(),
                                 guide);
-  const PhotonHistory history = tracer.Replay(pass, index);
-
-  v1::PhotonPath path;
-  path.mutable_key()->set_pass(pass);
-  path.mutable_key()->set_index(index);
-  path.set_end(EndToProto(history.end));
-  if (history.end == PhotonEnd::kNotEmitted) return path;
-  v1::PhotonPath::Emission& emission = *path.mutable_emission();
-  emission.set_light(NameOf(prepared.lights().emitter(history.emission.emitter)));
-  *emission.mutable_position() = TripleOf(history.emission.ray.origin);
-  *emission.mutable_direction() = TripleOf(history.emission.ray.direction);
-  *emission.mutable_flux() = TripleOf(history.emission.flux);
-  path.set_wavelength_nm(static_cast<double>(history.wavelength_nm));
-  for (const PhotonLanding& landing : history.landings) {
-    *path.add_landings() = LandingToProto(landing, prepared.scene());
+  v1::PhotonPaths paths;
+  for (std::uint64_t index = photons.first; index < photons.first + photons.count; ++index) {
+    v1::PhotonPath& path = *paths.add_paths();
+    path = PathToProto(tracer.Replay(photons.pass, index), prepared);
+    path.mutable_key()->set_pass(photons.pass);
+    path.mutable_key()->set_index(index);
   }
-  return path;
+  return paths;
 }
 
-StatusOr<v1::PhotonPath> Replay(const ReplayOptions& options) {
+StatusOr<v1::PhotonPaths> Replay(const ReplayOptions& options) {
   Connection connection(Connection::Channels(options.server));
   if (!connection.WaitUntilConnected(options.connect_timeout)) {
     return absl::UnavailableError(absl::StrCat("no coordinator answers at ", options.server.address,
@@ -180,8 +217,8 @@ StatusOr<v1::PhotonPath> Replay(const ReplayOptions& options) {
   for (const GuideStep& step : guides) {
     if (step.first_pass <= options.pass) guide = step.guide;
   }
-  return ReplayInScene(std::move(scene), settings, needs, options.pass, options.index,
-                       photons_per_pass, guide.get());
+  return ReplayInScene(std::move(scene), settings, needs,
+                       {options.pass, options.index, options.count}, photons_per_pass, guide.get());
 }
 
 }  // namespace lucerna

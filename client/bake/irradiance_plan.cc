@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 
 #include "client/bake/surface_figures.h"
+#include "render/film/false_color.h"
 #include "render/math/double3.h"
 
 namespace lucerna {
@@ -55,21 +56,11 @@ Polygon Clip(const Polygon& polygon, double level, double sign) {
   return left;
 }
 
-// From dark blue over green to white, of a share in [0, 1]: lighter means more.
 std::string ColorOf(double share) {
-  constexpr std::array<std::array<double, 3>, 6> kStops = {{{20, 20, 70},
-                                                            {30, 70, 160},
-                                                            {30, 150, 150},
-                                                            {90, 190, 80},
-                                                            {240, 200, 50},
-                                                            {255, 250, 220}}};
-  const double place = std::clamp(share, 0.0, 1.0) * (kStops.size() - 1);
-  const auto first = std::min(static_cast<std::size_t>(place), kStops.size() - 2);
-  const double t = place - static_cast<double>(first);
-  const auto channel = [&](std::size_t c) {
-    return static_cast<int>(std::lround(kStops[first][c] * (1 - t) + kStops[first + 1][c] * t));
-  };
-  return absl::StrFormat("#%02x%02x%02x", channel(0), channel(1), channel(2));
+  const std::array<double, 3> color = FalseColor(share);
+  return absl::StrFormat("#%02x%02x%02x", static_cast<int>(std::lround(color[0])),
+                         static_cast<int>(std::lround(color[1])),
+                         static_cast<int>(std::lround(color[2])));
 }
 
 // 1, 2 or 5 times a power of ten: at most so large that `range` has ten parts.

@@ -12,6 +12,7 @@
 #include "render/analysis/needs.h"
 #include "render/analysis/prepared_scene.h"
 #include "render/base/parallel.h"
+#include "render/film/film.h"
 #include "render/film/layers.h"
 #include "render/math/color_space.h"
 #include "render/math/double3.h"
@@ -121,6 +122,7 @@ StatusOr<MeshRender> RenderFromMesh(const Scene& scene, const RenderSettings& se
   Image& image = render.image;
   image.width = width;
   image.height = height;
+  SetImageWindow(settings, image);
   const double to_pixel = scene.film.exposure / static_cast<double>(settings.passes);
   const auto values_of = [&](std::size_t pixel) {
     const PixelSums& of = sums[pixel];

@@ -198,6 +198,12 @@ Status CheckRequest(const BakeRequest& request) {
   if (request.overrides.width) {
     return Failure(ExitCode::kUsage, "--size has no meaning here: --spacing says how fine to be");
   }
+  if (request.overrides.crop || request.overrides.coverage) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat(request.overrides.crop ? "--crop" : "--coverage",
+                                " has no meaning here: what is measured is no image; leave it "
+                                "away"));
+  }
   if (IsSameFile(request.output_path, request.scene.path)) {
     return Failure(ExitCode::kUsage,
                    absl::StrCat(request.output_path, " is the scene; name another file with -o"));

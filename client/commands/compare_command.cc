@@ -14,6 +14,7 @@
 
 #include "client/commands/file_commands.h"
 #include "client/exit_code.h"
+#include "client/frames.h"
 #include "client/job_run.h"
 #include "client/render_flags.h"
 #include "client/scene_reading.h"
@@ -47,10 +48,30 @@ int Cores() {
   return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }
 
+std::string PlotPathOf(const CompareRequest& request, std::size_t scene) {
+  return WithFrameNumber(request.plot_path, static_cast<int>(scene) + 1);
+}
+
 Status CheckFiles(const CompareRequest& request) {
-  std::vector<std::string> taken = {request.scene_path, request.reference_path};
+  const std::size_t scenes = request.scene_paths.size();
+  if (request.reference_paths.size() != scenes) {
+    return Misuse(
+        absl::StrCat("there are ", scenes, " scenes and ", request.reference_paths.size(),
+                     " references; give --reference once for each scene, in their order"));
+  }
+  if (scenes > 1 && !request.plot_path.empty() && !HasFrameNumber(request.plot_path)) {
+    return Misuse(
+        absl::StrCat("--plot ", request.plot_path,
+                     ": each scene has a plot of its own; put #### in its name, which the "
+                     "number of the scene replaces"));
+  }
+  std::vector<std::string> taken = request.scene_paths;
+  taken.insert(taken.end(), request.reference_paths.begin(), request.reference_paths.end());
   if (!request.mask_path.empty()) taken.push_back(request.mask_path);
-  for (const std::string& path : {request.table_path, request.plot_path}) {
+  std::vector<std::string> results = {request.table_path, request.csv_path};
+  for (std::size_t i = 0; i < scenes; ++i)
+    results.push_back(PlotPathOf(request, i));
+  for (const std::string& path : results) {
     if (path.empty()) continue;
     for (const std::string& other : taken) {
       if (IsSameFile(path, other)) {
@@ -72,9 +93,10 @@ struct Yardstick {
   double untrimmed_noise = 0;   // of all pixels; 0: not known
 };
 
-StatusOr<std::unique_ptr<Yardstick>> ReadYardstick(const CompareRequest& request) {
+StatusOr<std::unique_ptr<Yardstick>> ReadYardstick(const CompareRequest& request,
+                                                   const std::string& reference_path) {
   auto yardstick = std::make_unique<Yardstick>();
-  LUCERNA_ASSIGN_OR_RETURN(yardstick->reference, ReadImage(request.reference_path));
+  LUCERNA_ASSIGN_OR_RETURN(yardstick->reference, ReadImage(reference_path));
   yardstick->options.trim_share = request.trim_share;
   if (!request.mask_path.empty()) {
     LUCERNA_ASSIGN_OR_RETURN(yardstick->mask, ReadImage(request.mask_path));
@@ -84,7 +106,7 @@ StatusOr<std::unique_ptr<Yardstick>> ReadYardstick(const CompareRequest& request
   const auto metrics = Compare(yardstick->reference, yardstick->reference, yardstick->options);
   if (!metrics.ok()) {
     return absl::InvalidArgumentError(
-        absl::StrCat(request.reference_path, ": ", metrics.status().message()));
+        absl::StrCat(reference_path, ": ", metrics.status().message()));
   }
   yardstick->noise = metrics->reference_rel_mse;
   yardstick->untrimmed_noise = metrics->reference_rel_mse_untrimmed;
@@ -111,11 +133,14 @@ double CpuSeconds(const v1::Progress& progress) {
 // Makes the runs, one after the other.
 class Comparer {
  public:
+  // `scene` is one of those of the request.
   Comparer(LocalRuns& runs, const SceneManifest& manifest, const Yardstick& yardstick,
-           const CompareRequest& request, const OutputOptions& output_options)
+           const CompareRequest& request, std::size_t scene, const OutputOptions& output_options)
       : runs_(runs),
         manifest_(manifest),
         yardstick_(yardstick),
+        scene_path_(request.scene_paths[scene]),
+        reference_path_(request.reference_paths[scene]),
         request_(request),
         voice_(output_options) {
     // Fetching images would take the time that is measured.
@@ -125,7 +150,7 @@ class Comparer {
   // One job to the last time, whose record is the curve.
   StatusOr<std::vector<ErrorPoint>> Record(const RenderOverrides& overrides, double seconds) {
     LUCERNA_ASSIGN_OR_RETURN(const v1::Job job,
-                             RunUntil(overrides, seconds, HUGE_VAL, request_.reference_path));
+                             RunUntil(overrides, seconds, HUGE_VAL, reference_path_));
     std::vector<ErrorPoint> curve =
         CurveOf(job, Cores(), yardstick_.noise.value_or(0), yardstick_.untrimmed_noise);
     if (curve.empty()) {
@@ -167,8 +192,8 @@ class Comparer {
                              const std::string& reference_path) {
     for (int attempt = 1;; ++attempt) {
       overrides.time_s = seconds / busy_share_;
-      LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, runs_.Run(request_.scene_path, manifest_,
-                                                            overrides, reference_path, voice_));
+      LUCERNA_ASSIGN_OR_RETURN(
+          const v1::Job job, runs_.Run(scene_path_, manifest_, overrides, reference_path, voice_));
       const double had_s = CpuSeconds(job.progress()) / Cores();
       const double wall_s = Seconds(FromProto(job.progress().running()));
       busy_share_ = wall_s > 0 ? std::clamp(had_s / wall_s, kLeastBusyShare, 1.0) : kFirstBusyShare;
@@ -186,6 +211,8 @@ class Comparer {
   LocalRuns& runs_;
   const SceneManifest& manifest_;
   const Yardstick& yardstick_;
+  const std::string& scene_path_;
+  const std::string& reference_path_;
   const CompareRequest& request_;
   OutputOptions voice_;
 };
@@ -310,6 +337,69 @@ std::vector<ErrorPoint> CurveOf(const v1::Job& job, int cores, double reference_
   return curve;
 }
 
+namespace {
+
+// All that follows from one scene of the request.
+struct ComparedScene {
+  Comparison comparison;
+  ComparisonSubject subject;
+  std::vector<ComparedRun> runs;
+  std::optional<Comparison> drawn;  // with more times, where curves have them
+};
+
+StatusOr<ComparedScene> CompareOne(LocalRuns& runs, const CompareRequest& request,
+                                   std::size_t scene_number, std::vector<NamedFlags> settings,
+                                   const std::vector<double>& times, const Yardstick& yardstick,
+                                   const SceneOfJobs& scene, const OutputOptions& output_options) {
+  // The coordinator's own record measures so.
+  const bool has_record = request.mask_path.empty() && request.trim_share == kTrimmedShare;
+  // One point makes no curve.
+  std::vector<double> stops = times;
+  if (stops.size() == 1) stops.insert(stops.begin(), stops[0] / 2);
+  ComparedScene result;
+  std::vector<ComparedRun>& measured = result.runs;
+  Comparer comparer(runs, scene.manifest, yardstick, request, scene_number, output_options);
+  for (int repetition = 0; repetition < request.repetitions; ++repetition) {
+    const std::size_t first = measured.size();
+    for (std::size_t i = 0; i < settings.size(); ++i) {
+      const std::uint64_t seed = scene.settings[i].seed + static_cast<std::uint64_t>(repetition);
+      measured.push_back({.setting = i, .seed = seed, .points = {}});
+      settings[i].overrides.seed = seed;
+      if (!has_record) continue;
+      comparer.Announce(repetition, settings[i].name, times.back());
+      LUCERNA_ASSIGN_OR_RETURN(measured.back().points,
+                               comparer.Record(settings[i].overrides, times.back()));
+    }
+    if (has_record) continue;
+    for (const double seconds : stops) {
+      for (std::size_t i = 0; i < settings.size(); ++i) {
+        comparer.Announce(repetition, settings[i].name, seconds);
+        LUCERNA_ASSIGN_OR_RETURN(const ErrorPoint point,
+                                 comparer.Measure(settings[i].overrides, seconds));
+        measured[first + i].points.push_back(point);
+      }
+    }
+  }
+  std::vector<SettingToCompare> compared;
+  result.subject = {.scene = request.scene_paths[scene_number],
+                    .reference = request.reference_paths[scene_number],
+                    .reference_noise = yardstick.noise,
+                    .cores = Cores(),
+                    .repetitions = request.repetitions,
+                    .first_seed = scene.settings.front().seed,
+                    .left_out = LeftOut(request),
+                    .flags = {}};
+  for (std::size_t i = 0; i < settings.size(); ++i) {
+    compared.push_back({settings[i].name, TheoryOf(scene.settings[i])});
+    result.subject.flags.push_back(settings[i].words);
+  }
+  result.comparison = CompareRuns(compared, measured, times);
+  if (has_record) result.drawn = CompareRuns(compared, measured, Finer(times));
+  return result;
+}
+
+}  // namespace
+
 Status CompareSettings(const CompareRequest& request, const ClusterOptions& cluster,
                        const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const std::vector<double> times, ParseTimes(request.times));
@@ -326,67 +416,48 @@ Status CompareSettings(const CompareRequest& request, const ClusterOptions& clus
     overrides.back().time_s = times.back();
   }
   LUCERNA_RETURN_IF_ERROR(CheckFiles(request));
-  LUCERNA_ASSIGN_OR_RETURN(const auto yardstick, ReadYardstick(request));
-  LUCERNA_ASSIGN_OR_RETURN(const SceneOfJobs scene,
-                           ReadSceneOfJobs({request.scene_path}, overrides, output_options.quiet));
-  LUCERNA_RETURN_IF_ERROR(CheckSizes(settings, scene, yardstick->reference));
+  // What is wrong with the last scene is found before the first is rendered.
+  std::vector<std::unique_ptr<Yardstick>> yardsticks;
+  std::vector<SceneOfJobs> scenes;
+  for (std::size_t i = 0; i < request.scene_paths.size(); ++i) {
+    LUCERNA_ASSIGN_OR_RETURN(auto yardstick, ReadYardstick(request, request.reference_paths[i]));
+    LUCERNA_ASSIGN_OR_RETURN(SceneOfJobs scene, ReadSceneOfJobs({request.scene_paths[i]}, overrides,
+                                                                output_options.quiet));
+    LUCERNA_RETURN_IF_ERROR(CheckSizes(settings, scene, yardstick->reference));
+    yardsticks.push_back(std::move(yardstick));
+    scenes.push_back(std::move(scene));
+  }
   LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster));
 
-  // The coordinator's own record measures so.
-  const bool has_record = request.mask_path.empty() && request.trim_share == kTrimmedShare;
-  // One point makes no curve.
-  std::vector<double> stops = times;
-  if (stops.size() == 1) stops.insert(stops.begin(), stops[0] / 2);
-  std::vector<ComparedRun> measured;
-  Comparer comparer(*runs, scene.manifest, *yardstick, request, output_options);
-  for (int repetition = 0; repetition < request.repetitions; ++repetition) {
-    const std::size_t first = measured.size();
-    for (std::size_t i = 0; i < settings.size(); ++i) {
-      const std::uint64_t seed = scene.settings[i].seed + static_cast<std::uint64_t>(repetition);
-      measured.push_back({.setting = i, .seed = seed, .points = {}});
-      overrides[i].seed = seed;
-      if (!has_record) continue;
-      comparer.Announce(repetition, settings[i].name, times.back());
-      LUCERNA_ASSIGN_OR_RETURN(measured.back().points, comparer.Record(overrides[i], times.back()));
+  std::string tables;
+  std::string csv = ComparisonCsvHead();
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    LUCERNA_ASSIGN_OR_RETURN(
+        const ComparedScene result,
+        CompareOne(*runs, request, i, settings, times, *yardsticks[i], scenes[i], output_options));
+    absl::StrAppend(&tables, i == 0 ? "" : "\n",
+                    ComparisonTable(result.comparison, result.subject));
+    absl::StrAppend(&csv, ComparisonCsvRows(result.comparison, result.subject, result.runs));
+    if (!request.plot_path.empty()) {
+      LUCERNA_RETURN_IF_ERROR(WriteFile(
+          PlotPathOf(request, i),
+          DrawChartFile(ChartOf(result.drawn.value_or(result.comparison), result.subject))));
     }
-    if (has_record) continue;
-    for (const double seconds : stops) {
-      for (std::size_t i = 0; i < settings.size(); ++i) {
-        comparer.Announce(repetition, settings[i].name, seconds);
-        LUCERNA_ASSIGN_OR_RETURN(const ErrorPoint point, comparer.Measure(overrides[i], seconds));
-        measured[first + i].points.push_back(point);
-      }
+    // After each scene: hours of it are not lost with the next.
+    if (!request.table_path.empty()) {
+      LUCERNA_RETURN_IF_ERROR(WriteFile(request.table_path, tables));
+    }
+    if (!request.csv_path.empty()) LUCERNA_RETURN_IF_ERROR(WriteFile(request.csv_path, csv));
+    if (output_options.json) {
+      std::fputs(
+          ComparisonReport(result.comparison, result.subject, result.runs, output_options.detail)
+              .c_str(),
+          stdout);
     }
   }
-
-  std::vector<SettingToCompare> compared;
-  ComparisonSubject subject = {.scene = request.scene_path,
-                               .reference = request.reference_path,
-                               .reference_noise = yardstick->noise,
-                               .cores = Cores(),
-                               .repetitions = request.repetitions,
-                               .first_seed = scene.settings.front().seed,
-                               .left_out = LeftOut(request),
-                               .flags = {}};
-  for (std::size_t i = 0; i < settings.size(); ++i) {
-    compared.push_back({settings[i].name, TheoryOf(scene.settings[i])});
-    subject.flags.push_back(settings[i].words);
-  }
-  const Comparison comparison = CompareRuns(compared, measured, times);
-  const std::string table = ComparisonTable(comparison, subject);
-  if (!request.plot_path.empty()) {
-    const Comparison drawn =
-        has_record ? CompareRuns(compared, measured, Finer(times)) : comparison;
-    LUCERNA_RETURN_IF_ERROR(WriteFile(request.plot_path, DrawChartFile(ChartOf(drawn, subject))));
-  }
-  if (!request.table_path.empty()) {
-    LUCERNA_RETURN_IF_ERROR(WriteFile(request.table_path, table));
-  }
-  if (output_options.json) {
-    std::fputs(ComparisonReport(comparison, subject, measured, output_options.detail).c_str(),
-               stdout);
-  } else if (request.table_path.empty()) {
-    std::fputs(table.c_str(), stdout);
+  if (output_options.json) return absl::OkStatus();
+  if (request.table_path.empty()) {
+    std::fputs(tables.c_str(), stdout);
   } else if (!output_options.quiet) {
     std::printf("%s\n", request.table_path.c_str());
   }

@@ -1,9 +1,10 @@
-// Which settings are ahead on a scene after equal time?
+// Which settings are ahead on scenes after equal time?
 //
-// Renders one scene with several settings in turn on a cluster of its own, repetition by repetition
-// and setting by setting, so that slow moments of the machine hit all of them, and compares with a
-// reference. Errors against time come from the convergence record of one long job a run; with a
-// mask or another trimming, which the coordinator does not have, from one job for each time.
+// Renders each scene with several settings in turn on a cluster of its own, repetition by
+// repetition and setting by setting, so that slow moments of the machine hit all of them, and
+// compares with a reference. Errors against time come from the convergence record of one long job a
+// run; with a mask or another trimming, which the coordinator does not have, from one job for each
+// time.
 #pragma once
 
 #include <optional>
@@ -21,16 +22,17 @@
 namespace lucerna {
 
 struct CompareRequest {
-  std::string scene_path;
-  RenderOverrides common;             // of all settings; without stop criteria
-  std::vector<std::string> settings;  // "NAME: flags"; empty: one for each radius controller
-  std::string reference_path;
-  std::string mask_path;  // empty: all pixels
+  std::vector<std::string> scene_paths;
+  RenderOverrides common;                    // of all settings; without stop criteria
+  std::vector<std::string> settings;         // "NAME: flags"; empty: one for each radius controller
+  std::vector<std::string> reference_paths;  // one for each scene
+  std::string mask_path;                     // empty: all pixels
   double trim_share = kTrimmedShare;
   std::string times = "1,2,5,10";  // [s] of processor time over cores
   int repetitions = 3;
   std::string table_path;  // empty: to stdout, unless the result goes there as JSON
-  std::string plot_path;   // empty: none
+  std::string plot_path;   // empty: none; #### is the number of the scene, from 1
+  std::string csv_path;    // all points that were measured; empty: none
 };
 
 [[nodiscard]] Status CompareSettings(const CompareRequest& request, const ClusterOptions& cluster,

@@ -13,6 +13,7 @@
 #include "render/base/escape.h"
 #include "render/base/files.h"
 #include "render/estimate/error_estimate.h"
+#include "render/film/false_color.h"
 #include "render/film/picture_file.h"
 #include "render/image/exr_file.h"
 
@@ -120,6 +121,16 @@ Status ConvertToPicture(const PictureRequest& request, const Display& display) {
     return Failure(ExitCode::kUsage, absl::StrCat(request.path, ": ", format.status().message()));
   }
   LUCERNA_ASSIGN_OR_RETURN(Image image, ReadImage(request.exr_path));
+  if (request.is_false_color) {
+    const std::string layer = request.layer.empty() ? "density" : request.layer;
+    LUCERNA_ASSIGN_OR_RETURN(const FalseColors colors, FalseColorsOf(image, layer, request.range));
+    LUCERNA_ASSIGN_OR_RETURN(const std::string bytes,
+                             EncodePicture(colors.picture, *format, Display()));
+    LUCERNA_RETURN_IF_ERROR(WriteFile(request.path, bytes));
+    std::printf("%s: dark blue is %.4g, white %.4g%s\n", Escaped(layer).c_str(), colors.scale.low,
+                colors.scale.high, colors.scale.is_logarithmic ? ", logarithmic between" : "");
+    return absl::OkStatus();
+  }
   if (!request.layer.empty()) {
     LUCERNA_ASSIGN_OR_RETURN(image, PictureOfLayer(image, request.layer));
   }

@@ -1,7 +1,9 @@
 // Commands that read local files and need no coordinator.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "client/commands/job_commands.h"
 #include "render/base/status.h"
@@ -29,8 +31,10 @@ namespace lucerna {
 // Turns an EXR file, or one of its layers, into a file of another format.
 struct PictureRequest {
   std::string exr_path;
-  std::string path;   // .png, .pfm or .hdr
-  std::string layer;  // empty: the image
+  std::string path;             // .png, .pfm or .hdr
+  std::string layer;            // empty: the image
+  bool is_false_color = false;  // its numbers as colours (render/film/false_color.h)
+  std::optional<std::pair<double, double>> range = std::nullopt;  // of them; absent: by the layer
 };
 [[nodiscard]] Status ConvertToPicture(const PictureRequest& request, const Display& display);
 

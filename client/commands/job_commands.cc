@@ -93,6 +93,22 @@ Status Nothing(const v1::Job& /*job*/) {
   return absl::OkStatus();
 }
 
+// Writes the timeline of a job that has ended, however that was.
+Status SaveTrace(ClientConnection& connection, const std::string& job_id, const std::string& path) {
+  if (path.empty()) return absl::OkStatus();
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, connection.GetTrace(job_id));
+  return WriteFile(path, bytes);
+}
+
+Status CheckTrace(const RenderRequest& request) {
+  if (request.trace.empty()) return absl::OkStatus();
+  if (!request.trace.ends_with(".json")) {
+    return Failure(ExitCode::kUsage, absl::StrCat("--trace ", request.trace,
+                                                  ": a timeline is a .json file; name one"));
+  }
+  return CheckWritable(request.trace);
+}
+
 // Beside the image; empty when that is no file (a device, a pipe), or none are wanted.
 std::string CheckpointFolder(const RenderRequest& request) {
   const std::string& image =
@@ -138,8 +154,9 @@ StatusOr<std::vector<RenderRequest>> RequestsOf(const RenderRequest& request,
     one.outputs.image = WithFrameNumber(request.outputs.image, frame.number);
     one.outputs.png = WithFrameNumber(request.outputs.png, frame.number);
     one.mesh = WithFrameNumber(request.mesh, frame.number);
+    one.trace = WithFrameNumber(request.trace, frame.number);
     if (names_images && one.outputs.empty()) one.outputs.image = ImageNameOf(frame.scene);
-    for (const std::string& image : {one.outputs.image, one.outputs.png}) {
+    for (const std::string& image : {one.outputs.image, one.outputs.png, one.trace}) {
       // Both images of one request: CheckOutputs.
       const auto known = images.emplace(image, requests.size()).first;
       if (image.empty() || known->second == requests.size()) continue;
@@ -156,7 +173,8 @@ namespace {
 
 // Of a render without photons, most settings mean nothing.
 Status CheckRequestOfMesh(const RenderRequest& request) {
-  constexpr std::array<std::string_view, 4> kMeaningful = {"size", "passes", "seed", "max_depth"};
+  constexpr std::array<std::string_view, 5> kMeaningful = {"size", "crop", "passes", "seed",
+                                                           "max_depth"};
   for (const Setting& setting : AllSettings()) {
     if (!IsGiven(setting, request.overrides)) continue;
     if (std::ranges::count(kMeaningful, setting.name) > 0) continue;
@@ -168,6 +186,10 @@ Status CheckRequestOfMesh(const RenderRequest& request) {
     return Failure(ExitCode::kUsage,
                    "--save-every has no meaning with --from-mesh, which writes its image at once; "
                    "leave it away");
+  }
+  if (!request.trace.empty()) {
+    return Failure(ExitCode::kUsage,
+                   "--trace has no meaning with --from-mesh, which starts no job; leave it away");
   }
   if (!request.reference.empty() || request.resumes) {
     return Failure(ExitCode::kUsage, absl::StrCat(request.resumes ? "--resume" : "--reference",
@@ -210,6 +232,12 @@ Status DrawMesh(const RenderRequest& request, int threads, const OutputOptions& 
 Status RenderOne(const RenderRequest& request, const ClusterOptions& cluster_options,
                  const OutputOptions& output_options) {
   LUCERNA_RETURN_IF_ERROR(CheckOutputs(request.outputs));
+  LUCERNA_RETURN_IF_ERROR(CheckTrace(request));
+  if (!request.trace.empty() && request.resumes) {
+    return Failure(ExitCode::kUsage,
+                   "--trace has no meaning with --resume: what was done before the interruption is "
+                   "not known any more; leave it away");
+  }
   if (!request.mesh.empty()) return DrawMesh(request, cluster_options.threads, output_options);
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene, request.overrides, output_options.quiet));
@@ -227,10 +255,12 @@ Status RenderOne(const RenderRequest& request, const ClusterOptions& cluster_opt
     std::filesystem::remove_all(folder, ignored);
   }
   StatusOr<v1::Job> job;
+  Status traced;
   {
     LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(options));
     DirectoryFiles files = FilesOf(request.scene);
     PeriodicSave periodic(request, output_options.display);
+    if (!request.trace.empty()) runs->TraceJobs();
     runs->WhileItRuns(
         [&](const v1::Job& newest) { periodic.Consider(runs->connection(), newest); });
     job = request.resumes
@@ -239,13 +269,16 @@ Status RenderOne(const RenderRequest& request, const ClusterOptions& cluster_opt
     if (ExitCodeOf(job.status()) == ExitCode::kInterrupted) {
       return EndInterrupted(*runs, request, !folder.empty(), output_options.display);
     }
+    // Of a job that failed too.
+    if (!runs->job_id().empty())
+      traced = SaveTrace(runs->connection(), runs->job_id(), request.trace);
     if (job.ok()) {
       // What cannot be written now is still in the folder.
       LUCERNA_RETURN_IF_ERROR(
           SaveAndReport(runs->connection(), *job, request.outputs, output_options));
     }
   }
-  if (folder.empty()) return job.status();
+  if (folder.empty()) return job.ok() ? traced : job.status();
   // A process that died says nothing about the job.
   const bool can_go_on = absl::IsInternal(job.status()) ||
                          ExitCodeOf(job.status()) == ExitCode::kUnreachable ||
@@ -257,7 +290,7 @@ Status RenderOne(const RenderRequest& request, const ClusterOptions& cluster_opt
         absl::StrCat(std::string(status.message()), "\nthe same command with --resume goes on"));
   }
   std::filesystem::remove_all(folder, ignored);
-  return job.status();
+  return job.ok() ? traced : job.status();
 }
 
 }  // namespace
@@ -284,13 +317,20 @@ Status Submit(const RenderRequest& request, const Endpoint& server,
   if (request.save_every_s > 0 && request.outputs.empty()) {
     return Failure(ExitCode::kUsage, "--save-every needs a file to write to; give one with -o");
   }
+  LUCERNA_RETURN_IF_ERROR(CheckTrace(request));
+  if (!request.trace.empty() && request.outputs.empty()) {
+    return Failure(
+        ExitCode::kUsage,
+        "--trace is written when the job has ended, so submit must wait for it; name its "
+        "image with -o");
+  }
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene, request.overrides, output_options.quiet));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   DirectoryFiles files = FilesOf(request.scene);
   LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
                            SendJob(*connection, files, manifest, request.overrides,
-                                   request.reference, request.priority));
+                                   request.reference, request.priority, !request.trace.empty()));
   if (request.outputs.empty()) {
     Print(output_options.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
     return absl::OkStatus();
@@ -307,7 +347,9 @@ Status Submit(const RenderRequest& request, const Endpoint& server,
                    absl::StrCat("interrupted; job ", submitted.job_id(),
                                 " goes on, see lucerna watch and lucerna cancel"));
   }
-  return SaveAndReport(*connection, *job, request.outputs, output_options);
+  const Status traced = SaveTrace(*connection, submitted.job_id(), request.trace);
+  LUCERNA_RETURN_IF_ERROR(SaveAndReport(*connection, *job, request.outputs, output_options));
+  return traced;
 }
 
 namespace {

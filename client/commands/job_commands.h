@@ -26,6 +26,7 @@ struct RenderRequest {
   OutputPaths outputs;
   // The image so far is written so often [s]; 0: at the end alone.
   double save_every_s = 0;
+  std::string trace;              // file for the job's timeline; empty: none
   int priority = 0;               // of `submit`
   bool keeps_checkpoints = true;  // of `render`: in a folder beside the image
   bool resumes = false;           // goes on from there

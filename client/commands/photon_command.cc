@@ -10,12 +10,17 @@
 #include "client/exit_code.h"
 #include "client/foreign_text.h"
 #include "client/program_output.h"
+#include "client/view/photon_file.h"
 #include "client/view/report.h"
+#include "render/base/files.h"
 #include "render/report/photon_view.h"
 #include "render/wire/messages.h"
 
 namespace lucerna {
 namespace {
+
+// What the worker program may answer holds so many, with some ten landings each.
+constexpr std::uint64_t kMostPhotons = 50'000;
 
 std::optional<std::uint64_t> NumberIn(std::string_view text) {
   std::uint64_t number = 0;
@@ -24,44 +29,59 @@ std::optional<std::uint64_t> NumberIn(std::string_view text) {
   return number;
 }
 
-StatusOr<v1::PhotonKey> ReadKey(const PhotonRequest& request) {
+// Photons of one pass, from `first` to `last`.
+struct PhotonKeys {
+  std::uint64_t pass = 0, first = 0, last = 0;
+};
+
+StatusOr<PhotonKeys> ReadKeys(const PhotonRequest& request) {
   const std::string_view text = request.photon;
   const std::size_t colon = text.find(':');
   const bool has_pass = colon != std::string_view::npos;
+  const std::string_view range = has_pass ? text.substr(colon + 1) : text;
+  const std::size_t dash = range.find('-');
   const auto pass = has_pass ? NumberIn(text.substr(0, colon)) : request.pass.value_or(0);
-  const auto index = NumberIn(has_pass ? text.substr(colon + 1) : text);
-  if (!pass || !index || (has_pass && request.pass)) {
+  const auto first = NumberIn(range.substr(0, dash));
+  const auto last = dash == std::string_view::npos ? first : NumberIn(range.substr(dash + 1));
+  if (!pass || !first || !last || *last < *first || (has_pass && request.pass)) {
     return Failure(ExitCode::kUsage,
                    absl::StrCat("\"", request.photon,
-                                "\" names no photon; give PASS:INDEX, such as 12:3456, or INDEX "
-                                "with --pass"));
+                                "\" names no photon; give PASS:INDEX, such as 12:3456, INDEX with "
+                                "--pass, or several as PASS:FIRST-LAST"));
   }
-  v1::PhotonKey key;
-  key.set_pass(*pass);
-  key.set_index(*index);
-  return key;
+  if (*last - *first >= kMostPhotons) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat("at most ", kMostPhotons, " photons at once, not ",
+                                *last - *first + 1, "; give a shorter range"));
+  }
+  return PhotonKeys{*pass, *first, *last};
 }
 
 }  // namespace
 
 Status TracePhoton(const PhotonRequest& request, const Endpoint& server,
                    const OutputOptions& output_options) {
-  LUCERNA_ASSIGN_OR_RETURN(const v1::PhotonKey key, ReadKey(request));
+  LUCERNA_ASSIGN_OR_RETURN(const PhotonKeys keys, ReadKeys(request));
+  if (!request.output.empty()) {
+    LUCERNA_RETURN_IF_ERROR(PhotonFileFormatOf(request.output).status());
+    LUCERNA_RETURN_IF_ERROR(CheckWritable(request.output));
+  }
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, connection->Get(request.job_id));
   auto photons = static_cast<std::uint64_t>(SettingsOf(job).photons_per_pass);
   for (const v1::PhotonStep& step : job.photon_steps()) {
-    if (step.first_pass() <= key.pass()) photons = step.photons_per_pass();
+    if (step.first_pass() <= keys.pass) photons = step.photons_per_pass();
   }
-  if (key.index() >= photons) {
-    return Failure(ExitCode::kUsage, absl::StrCat("pass ", key.pass(), " of job ", request.job_id,
+  if (keys.last >= photons) {
+    return Failure(ExitCode::kUsage, absl::StrCat("pass ", keys.pass, " of job ", request.job_id,
                                                   " has the photons 0 to ", photons - 1,
-                                                  "; there is no ", key.index()));
+                                                  "; there is no ", keys.last));
   }
   std::vector<std::string> flags = {"--server", server.address,
                                     "--replay", request.job_id,
-                                    "--pass",   std::to_string(key.pass()),
-                                    "--index",  std::to_string(key.index())};
+                                    "--pass",   std::to_string(keys.pass),
+                                    "--index",  std::to_string(keys.first),
+                                    "--count",  std::to_string(keys.last - keys.first + 1)};
   if (!server.tls.empty()) {
     flags.insert(flags.end(), {"--tls-ca", server.tls.authority, "--tls-cert",
                                server.tls.certificate, "--tls-key", server.tls.key});
@@ -71,13 +91,19 @@ Status TracePhoton(const PhotonRequest& request, const Endpoint& server,
   }
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes,
                            OutputOf(request.program_folder + "/lucerna-worker", std::move(flags)));
-  v1::PhotonPath path;
-  if (!path.ParseFromString(bytes)) {
+  v1::PhotonPaths paths;
+  if (!paths.ParseFromString(bytes)) {
     return absl::DataLossError(
-        "the worker program answered with something that is no photon's way");
+        "the worker program answered with something that is no way of photons");
   }
-  EscapeTexts(path);
-  std::fputs((output_options.json ? PhotonReport(path) : PhotonPathText(path)).c_str(), stdout);
+  if (!request.output.empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(const PhotonFileFormat format, PhotonFileFormatOf(request.output));
+    return WriteFile(request.output, PhotonFile(paths, format));
+  }
+  for (v1::PhotonPath& path : *paths.mutable_paths()) {
+    EscapeTexts(path);
+    std::fputs((output_options.json ? PhotonReport(path) : PhotonPathText(path)).c_str(), stdout);
+  }
   return absl::OkStatus();
 }
 

@@ -1,7 +1,7 @@
-// What did that photon of that job do?
+// What did those photons of that job do?
 //
-// The worker program replays it, as the worker did that traced it for the job; the client only
-// finds the program and shows the way.
+// The worker program replays them, as the workers did that traced them for the job; the client only
+// finds the program and shows the ways.
 #pragma once
 
 #include <cstdint>
@@ -16,13 +16,15 @@ namespace lucerna {
 
 struct PhotonRequest {
   std::string job_id;
-  std::string photon;                 // "PASS:INDEX", or "INDEX"
+  std::string photon;                 // "PASS:INDEX", "PASS:FIRST-LAST", or without a pass
   std::optional<std::uint64_t> pass;  // when `photon` names none; else 0
   std::string program_folder;         // holds lucerna-worker
   std::string token_file = {};        // for lucerna-worker; empty: none
+  std::string output = {};            // .ply or .obj file to write; empty: to stdout, as text
 };
 
-// Prints what the photon did, step by step.
+// Prints what each photon did, step by step, or writes a file that shows it
+// (client/view/photon_file.h).
 // Errors: Failure(kUsage) for a text that names no photon, or one that the job does not have.
 [[nodiscard]] Status TracePhoton(const PhotonRequest& request, const Endpoint& server,
                                  const OutputOptions& output_options);

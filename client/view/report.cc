@@ -493,6 +493,35 @@ std::string ComparisonReport(const Comparison& comparison, const ComparisonSubje
   return ToText(json);
 }
 
+std::string ComparisonCsvHead() {
+  return "scene,reference,setting,flags,seed,cores,cpu_s_over_cores,wall_s,photons,relative_mse,"
+         "reference_noise,relative_mse_untrimmed,reference_noise_untrimmed\r\n";
+}
+
+std::string ComparisonCsvRows(const Comparison& comparison, const ComparisonSubject& subject,
+                              const std::vector<ComparedRun>& runs) {
+  std::string csv;
+  for (const ComparedRun& run : runs) {
+    for (const ErrorPoint& point : run.points) {
+      const std::vector<std::string> cells = {Cell(subject.scene),
+                                              Cell(subject.reference),
+                                              Cell(comparison.settings[run.setting].name),
+                                              Cell(subject.flags[run.setting]),
+                                              std::to_string(run.seed),
+                                              std::to_string(subject.cores),
+                                              Cell(point.seconds),
+                                              Cell(point.wall_s),
+                                              Cell(point.photons),
+                                              Cell(point.rel_mse),
+                                              Cell(point.reference_noise),
+                                              Cell(point.untrimmed),
+                                              Cell(point.untrimmed_reference_noise)};
+      absl::StrAppend(&csv, absl::StrJoin(cells, ","), "\r\n");
+    }
+  }
+  return csv;
+}
+
 std::string ReferenceReport(const Image& reference, const std::string& path) {
   return ToText({{"path", path},
                  {"image_digest", reference.PixelDigest().Hex()},

@@ -50,6 +50,12 @@ struct SavedImage {
 [[nodiscard]] std::string ComparisonReport(const Comparison& comparison,
                                            const ComparisonSubject& subject,
                                            const std::vector<ComparedRun>& runs, JsonDetail detail);
+// The points of all runs after RFC 4180, a row each: scene, reference, setting, its flags, seed,
+// times, photons and errors. The head is a line of its own, for the rows of several scenes.
+[[nodiscard]] std::string ComparisonCsvHead();
+[[nodiscard]] std::string ComparisonCsvRows(const Comparison& comparison,
+                                            const ComparisonSubject& subject,
+                                            const std::vector<ComparedRun>& runs);
 // Of an image that MakeReference made.
 [[nodiscard]] std::string ReferenceReport(const Image& reference, const std::string& path);
 // One job of a bake.

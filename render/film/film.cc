@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "render/base/status.h"
+#include "render/estimate/slice_sums.h"
 #include "render/film/layers.h"
 #include "render/frequency/bandwidth.h"
 #include "render/math/color_space.h"
@@ -25,6 +26,8 @@ Image MakeFilmImage(const FilmFormat& format, const ImageSums& sums, const Radiu
                ? static_cast<double>(features.unit_radius) / static_cast<double>(features.hitpoints)
                : 0;
   };
+  // Only these tell what surfaces look like.
+  const auto feature_passes = static_cast<double>(std::min(sums.passes(), kFeaturePasses));
   const auto values_of = [&](std::size_t pixel) {
     const ImageSums::Pixel of_pixel = sums.At(pixel);
     PixelValues values;
@@ -49,11 +52,13 @@ Image MakeFilmImage(const FilmFormat& format, const ImageSums& sums, const Radiu
     }
     values.distance =
         features.hits > 0 ? static_cast<double>(features.distance) * per_hit : HUGE_VAL;
+    values.coverage = static_cast<double>(features.hits) / feature_passes;
     values.radius = static_cast<double>(last_radii[pixel]) * unit_radius(pixel);
     values.photon_count = of_pixel.photon_count;
     return values;
   };
   AddLayers(LayerSource::kEveryImage, values_of, image);
+  if (format.has_coverage) AddLayers(LayerSource::kCoverage, values_of, image);
   if (!controller.Predicts()) return image;
   const auto predictions_of = [&](std::size_t pixel) {
     PixelValues values;
@@ -68,6 +73,16 @@ Image MakeFilmImage(const FilmFormat& format, const ImageSums& sums, const Radiu
   };
   AddLayers(LayerSource::kPredictions, predictions_of, image);
   return image;
+}
+
+void SetImageWindow(const RenderSettings& settings, Image& image) {
+  const bool is_whole =
+      settings.crop_width() == settings.width && settings.crop_height() == settings.height;
+  if (is_whole) return;
+  image.x0 = settings.crop_x0;
+  image.y0 = settings.crop_y0;
+  image.whole_width = settings.width;
+  image.whole_height = settings.height;
 }
 
 }  // namespace lucerna

@@ -6,6 +6,7 @@
 #include "render/estimate/radius_controller.h"
 #include "render/image/image.h"
 #include "render/math/kernel.h"
+#include "render/scene/render_settings.h"
 
 namespace lucerna {
 
@@ -14,13 +15,17 @@ struct FilmFormat {
   double exposure = 1;  // factor from radiance to pixel values
   // Pixel values are scaled down until no channel is larger.
   double max_component = HUGE_VAL;
+  bool has_coverage = false;  // the layer of kCoverage
 };
 
 // The image of all passes of `sums`, Rec. 709. `last_radii` are those of the last round [unit
-// radii]. The layers of kEveryImage, and of kPredictions if the controller makes any
-// (film/layers.h). Requires sums.passes() > 0.
+// radii]. The layers of kEveryImage, of kCoverage on request, and of kPredictions if the controller
+// makes any (film/layers.h). Requires sums.passes() > 0.
 [[nodiscard]] Image MakeFilmImage(const FilmFormat& format, const ImageSums& sums,
                                   const RadiusColumn& last_radii, const PixelRadii& radii,
                                   const RadiusController& controller, const Kernel& kernel);
+
+// Says of an image that it is a part of a whole, where the settings crop it.
+void SetImageWindow(const RenderSettings& settings, Image& image);
 
 }  // namespace lucerna

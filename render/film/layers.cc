@@ -27,6 +27,7 @@ constexpr std::array kLayers = {
           [](Pixel p, std::size_t) { return p.radius; }},
     Layer{"photon_count", "", Unit::kNone, Source::kEveryImage,
           [](Pixel p, std::size_t) { return p.photon_count; }},
+    Layer{"A", "", Unit::kNone, Source::kCoverage, [](Pixel p, std::size_t) { return p.coverage; }},
     // The square root of the spectral trace.
     Layer{"bandwidth", "", Unit::kPerLength, Source::kPredictions,
           [](Pixel p, std::size_t) { return p.bandwidth; }},

@@ -18,6 +18,7 @@ struct PixelValues {
   double limit = 1;  // factor that keeps the beauty image below the film's maximum
   std::array<double, 3> albedo{}, normal{};
   double distance = 0;  // from the camera; infinite where nothing was hit
+  double coverage = 0;  // of the pixel's paths, which share hit a surface
   double radius = 0, photon_count = 0;
   // What the radius controller predicts; 0 where it predicts nothing.
   double bandwidth = 0, min_radius = 0, relative_bias = 0;
@@ -27,9 +28,9 @@ struct PixelValues {
 
 // How values change with the unit of length and with the power of the lights.
 enum class LayerUnit : std::uint8_t { kNone, kRadiance, kLength, kPerLength };
-// Which images have the layer: all; those of controllers that predict bandwidths; those of two
-// passes or more.
-enum class LayerSource : std::uint8_t { kEveryImage, kPredictions, kPasses };
+// Which images have the layer: all; those that were asked for it; those of controllers that predict
+// bandwidths; those of two passes or more.
+enum class LayerSource : std::uint8_t { kEveryImage, kCoverage, kPredictions, kPasses };
 
 struct Layer {
   std::string_view name;      // of the EXR layer; the beauty image has none

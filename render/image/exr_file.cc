@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <climits>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -280,6 +281,14 @@ StatusOr<std::string> EncodeExr(const Image& image) {
   }
   try {
     Imf::Header header(image.width, image.height);
+    if (image.whole_width > 0 && image.whole_height > 0) {
+      using Box = Imath::Box2i;
+      using Corner = Imath::V2i;
+      header.displayWindow() =
+          Box(Corner(0, 0), Corner(image.whole_width - 1, image.whole_height - 1));
+      header.dataWindow() = Box(Corner(image.x0, image.y0),
+                                Corner(image.x0 + image.width - 1, image.y0 + image.height - 1));
+    }
     // Line by line at this level takes 0.6 of the time of the library's own choice, for 2 % more
     // bytes; the coordinator does it while workers wait for their next job.
     header.compression() = Imf::ZIPS_COMPRESSION;
@@ -298,10 +307,10 @@ StatusOr<std::string> EncodeExr(const Image& image) {
       LUCERNA_CHECK(planes.findSlice(channel.name) == nullptr);
       header.channels().insert(channel.name, Imf::Channel(Imf::FLOAT));
       // The library reads through this pointer and never writes; its type is shared with reading.
-      auto* base = reinterpret_cast<char*>(const_cast<float*>(channel.pixels.data()));
       planes.insert(channel.name,
-                    Imf::Slice(Imf::FLOAT, base, sizeof(float),
-                               sizeof(float) * static_cast<std::size_t>(image.width)));
+                    Imf::Slice::Make(Imf::FLOAT, const_cast<float*>(channel.pixels.data()),
+                                     header.dataWindow(), sizeof(float),
+                                     sizeof(float) * static_cast<std::size_t>(image.width)));
     }
 
     MemoryOutput output;
@@ -331,6 +340,17 @@ StatusOr<Image> DecodeExr(std::string_view bytes) {
     // A header can name its window twice; the library then uses one of them.
     if (image.width != extent.width || image.height != extent.height) {
       return Garbage("its data window is ambiguous");
+    }
+
+    const auto& whole = header.displayWindow();
+    const bool is_part = window != whole && whole.min == Imath::V2i(0, 0) &&
+                         whole.max.x < INT_MAX && whole.max.y < INT_MAX && whole.max.x >= 0 &&
+                         whole.max.y >= 0;
+    if (is_part) {
+      image.x0 = window.min.x;
+      image.y0 = window.min.y;
+      image.whole_width = whole.max.x + 1;
+      image.whole_height = whole.max.y + 1;
     }
 
     for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel) {

@@ -20,7 +20,10 @@ struct ImageChannel {
 // The channels of one picture plus text metadata.
 // The layers of a render: film/layers.h.
 struct Image {
-  int width = 0, height = 0;           // [pixels]
+  int width = 0, height = 0;  // [pixels]
+  // Of a part of a picture: where its upper left pixel lies in the whole, and the size of that. 0:
+  // it is the whole. In a file the data window and the display window.
+  int x0 = 0, y0 = 0, whole_width = 0, whole_height = 0;
   std::vector<ImageChannel> channels;  // sorted by name once written
   // Keys beginning with "lucerna." are ours. Those beginning with "lucerna.run." tell of one run
   // (seconds, machine names) and are left out of the digest; all others are in it.

@@ -64,6 +64,19 @@ int ScalePixel(int x, int old_size, int new_size) {
   return static_cast<int>((scaled + old_size - 1) / old_size);
 }
 
+// The scene's crop window, at the size of the image.
+void ScaleCrop(const FilmSettings& film, RenderSettings& settings) {
+  settings.crop_x0 = ScalePixel(film.crop_x0, film.width, settings.width);
+  settings.crop_y0 = ScalePixel(film.crop_y0, film.height, settings.height);
+  // A crop window of a small image can vanish between two pixels; it keeps one then.
+  settings.crop_x0 = std::min(settings.crop_x0, settings.width - 1);
+  settings.crop_y0 = std::min(settings.crop_y0, settings.height - 1);
+  settings.crop_x1 =
+      std::max(ScalePixel(film.crop_x1, film.width, settings.width), settings.crop_x0 + 1);
+  settings.crop_y1 =
+      std::max(ScalePixel(film.crop_y1, film.height, settings.height), settings.crop_y0 + 1);
+}
+
 }  // namespace
 
 std::string_view NameOf(RadiusControllerKind kind) {
@@ -132,15 +145,11 @@ StatusOr<RenderSettings> ResolveSettings(const RenderOverrides& overrides, const
         Concat(NameInMessage(size), " needs both a width and a height, as in 640x480"));
   }
   LUCERNA_RETURN_IF_ERROR(CheckSetting(size, settings));
-  settings.crop_x0 = ScalePixel(film.crop_x0, film.width, settings.width);
-  settings.crop_y0 = ScalePixel(film.crop_y0, film.height, settings.height);
-  // A crop window of a small image can vanish between two pixels; it keeps one then.
-  settings.crop_x0 = std::min(settings.crop_x0, settings.width - 1);
-  settings.crop_y0 = std::min(settings.crop_y0, settings.height - 1);
-  settings.crop_x1 =
-      std::max(ScalePixel(film.crop_x1, film.width, settings.width), settings.crop_x0 + 1);
-  settings.crop_y1 =
-      std::max(ScalePixel(film.crop_y1, film.height, settings.height), settings.crop_y0 + 1);
+  if (overrides.crop) {
+    LUCERNA_RETURN_IF_ERROR(CheckSetting(*FindSetting("crop"), settings));
+  } else {
+    ScaleCrop(film, settings);
+  }
 
   RenderOverrides until = overrides;
   if (!has_end) until.passes = settings.passes;

@@ -63,6 +63,8 @@ struct SettingFields {
   Field<double> bias{};
   Field<double> frequency_share{};
   Field<bool> use_everything{};
+  // The image has the channel A.
+  Field<bool> coverage{};
 
   bool operator==(const SettingFields&) const = default;
 };
@@ -70,9 +72,16 @@ struct SettingFields {
 template <typename T>
 using SettingValue = T;
 
+// A part of an image, [x0, x1) × [y0, y1) [pixels].
+struct CropWindow {
+  int x0 = 0, x1 = 0, y0 = 0, y1 = 0;
+  bool operator==(const CropWindow&) const = default;
+};
+
 // What a user gives for one job; absent: the scene file's value, else the default. Width and
-// height are given both or not at all; the crop window is scaled along.
+// height are given both or not at all; the scene's crop window is scaled along.
 struct RenderOverrides : SettingFields<std::optional> {
+  std::optional<CropWindow> crop;
   bool operator==(const RenderOverrides&) const = default;
 };
 

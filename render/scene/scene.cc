@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "render/base/text.h"
+
 namespace lucerna {
 
 Window ScreenWindow(const Camera& camera, int width, int height) {
@@ -49,6 +51,13 @@ double LensReach(const Camera& camera) {
   const double x = static_cast<double>(Length(camera.camera_to_world.Vector({radius, 0, 0})));
   const double y = static_cast<double>(Length(camera.camera_to_world.Vector({0, radius, 0})));
   return std::hypot(x, y);
+}
+
+std::string Scene::SourceOf(const ShapeTraits& traits) const {
+  if (traits.source < 0 || static_cast<std::size_t>(traits.source) >= sources.size()) return "";
+  const ShapeSource& source = sources[static_cast<std::size_t>(traits.source)];
+  if (source.file >= source_files.size()) return "";
+  return Concat(source_files[source.file], ":", source.line);
 }
 
 }  // namespace lucerna

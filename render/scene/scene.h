@@ -178,6 +178,12 @@ struct IntegratorSettings {
   std::optional<int> pixel_samples;
 };
 
+// Where a shape is written.
+struct ShapeSource {
+  std::uint32_t file = 0;  // in Scene::source_files
+  std::uint32_t line = 0;  // from 1
+};
+
 struct Scene {
   // A length here times this is one of the file: a power of two, 1 for scenes of common sizes
   // (formats/scene_unit.h). Of what is below, the integrator's settings are the file's.
@@ -208,6 +214,11 @@ struct Scene {
   PixelFilter filter;
   IntegratorSettings integrator;
   SceneMotion motion;
+  // Of the shapes of text formats: one for each that the text has, which may be many here.
+  std::vector<ShapeSource> sources;
+  std::vector<std::string> source_files;
+  // "room.pbrt:12"; empty when it is not known.
+  [[nodiscard]] std::string SourceOf(const ShapeTraits& traits) const;
 
   // Of the triangles in memory: those of an object once.
   [[nodiscard]] std::size_t TriangleCount() const {

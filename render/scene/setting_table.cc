@@ -45,6 +45,12 @@ constexpr auto kSettings = std::to_array<Setting>({
                                    .of_scene = [](const Scene& scene) -> std::optional<int> {
                                      return scene.film.height;
                                    }}}},
+    {.name = "crop",
+     .unit = "pixels",
+     .meaning = "render a part of the image alone: columns from and to, rows from and to, without "
+                "the last",
+     .scene_default = "the scene's film",
+     .type = CropFields{}},
     {.name = "passes",
      .role = SettingRole::kStopsJob,
      .meaning = "stop after so many passes in all",
@@ -192,6 +198,9 @@ constexpr auto kSettings = std::to_array<Setting>({
      .meaning = "leave nothing out that the scene does not need, for comparison",
      .type = SettingField<bool>{.given = &Overrides::use_everything,
                                 .value = &Settings::use_everything}},
+    {.name = "coverage",
+     .meaning = "write the channel A: which share of a pixel meets a surface",
+     .type = SettingField<bool>{.given = &Overrides::coverage, .value = &Settings::coverage}},
 });
 
 template <typename... Functions>
@@ -344,6 +353,26 @@ Status Parse(const Setting& setting, const RadiusFields& fields, std::string_vie
   return absl::OkStatus();
 }
 
+Status Parse(const Setting& setting, const CropFields& /*fields*/, std::string_view text,
+             RenderOverrides& overrides) {
+  std::array<int, 4> bounds{};
+  std::string_view rest = text;
+  bool is_good = true;
+  for (std::size_t i = 0; i < bounds.size(); ++i) {
+    const std::size_t comma = i + 1 < bounds.size() ? rest.find(',') : rest.size();
+    const auto bound = ToNumber<int>(rest.substr(0, comma));
+    is_good = is_good && comma != std::string_view::npos && bound.has_value();
+    if (!is_good) break;
+    bounds[i] = *bound;
+    rest.remove_prefix(std::min(comma + 1, rest.size()));
+  }
+  if (!is_good) {
+    return NotOfTheType(setting, "columns and rows in pixels, X0,X1,Y0,Y1, like 0,320,0,240", text);
+  }
+  overrides.crop = CropWindow{bounds[0], bounds[1], bounds[2], bounds[3]};
+  return absl::OkStatus();
+}
+
 // Text of values, by type.
 
 template <typename T>
@@ -359,6 +388,14 @@ std::string TextOf(T value) {
 
 std::string SizeText(int width, int height) {
   return Concat(width, "x", height);
+}
+
+std::string CropText(const CropWindow& crop) {
+  return Concat(crop.x0, ",", crop.x1, ",", crop.y0, ",", crop.y1);
+}
+
+CropWindow CropOf(const RenderSettings& settings) {
+  return {settings.crop_x0, settings.crop_x1, settings.crop_y0, settings.crop_y1};
 }
 
 // "auto" alone is the default.
@@ -450,6 +487,7 @@ std::optional<std::string> SettingText(const Setting& setting, const RenderOverr
                        (overrides.*fields.scene_units.given).value_or(0),
                        (overrides.*fields.footprints.given).value_or(fields.footprints.fallback));
                  },
+                 [&](const CropFields&) { return CropText(*overrides.crop); },
                  [&](const auto& field) { return TextOf(*(overrides.*field.given)); }},
       setting.type);
 }
@@ -463,6 +501,7 @@ std::string SettingText(const Setting& setting, const RenderSettings& settings) 
                                  return RadiusText(settings.*fields.scene_units.value,
                                                    settings.*fields.footprints.value);
                                },
+                               [&](const CropFields&) { return CropText(CropOf(settings)); },
                                [&](const auto& field) { return TextOf(settings.*field.value); }},
                     setting.type);
 }
@@ -477,6 +516,7 @@ bool IsGiven(const Setting& setting, const RenderOverrides& overrides) {
                    return (overrides.*fields.scene_units.given).has_value() ||
                           (overrides.*fields.footprints.given).has_value();
                  },
+                 [&](const CropFields&) { return overrides.crop.has_value(); },
                  [&](const auto& field) { return (overrides.*field.given).has_value(); }},
       setting.type);
 }
@@ -490,6 +530,14 @@ void ResolveSetting(const Setting& setting, const RenderOverrides& overrides, co
                         [&](const RadiusFields& fields) {
                           Resolve(fields.scene_units, overrides, scene, settings);
                           Resolve(fields.footprints, overrides, scene, settings);
+                        },
+                        [&](const CropFields&) {
+                          // The scene's is scaled to the size (ResolveSettings).
+                          if (!overrides.crop) return;
+                          settings.crop_x0 = overrides.crop->x0;
+                          settings.crop_x1 = overrides.crop->x1;
+                          settings.crop_y0 = overrides.crop->y0;
+                          settings.crop_y1 = overrides.crop->y1;
                         },
                         [&](const auto& field) { Resolve(field, overrides, scene, settings); }},
              setting.type);
@@ -523,6 +571,17 @@ Status CheckSetting(const Setting& setting, const RenderSettings& settings) {
                               ? absl::OkStatus()
                               : out_of_range(Concat(scene_units));
                  },
+                 [&](const CropFields&) {
+                   const CropWindow crop = CropOf(settings);
+                   const bool is_within = crop.x0 >= 0 && crop.x0 < crop.x1 &&
+                                          crop.x1 <= settings.width && crop.y0 >= 0 &&
+                                          crop.y0 < crop.y1 && crop.y1 <= settings.height;
+                   return is_within
+                              ? absl::OkStatus()
+                              : Invalid(setting, Concat("must lie within the image of ",
+                                                        SizeText(settings.width, settings.height),
+                                                        " pixels, not be ", CropText(crop)));
+                 },
                  [&]<typename T>(const SettingField<T>& field) {
                    if constexpr (kHasRange<T>) {
                      const T value = settings.*field.value;
@@ -544,6 +603,7 @@ std::string RangeText(const Setting& setting) {
                                      BoundsText(fields.scene_units, false), " in scene units, ",
                                      BoundsText(fields.footprints, false, "px"), ", or auto");
                                },
+                               [](const CropFields&) { return std::string("within the image"); },
                                [&]<typename T>(const SettingField<T>& field) -> std::string {
                                  if constexpr (std::is_same_v<T, RadiusControllerKind>) {
                                    return Listed(RadiusControllerNames(), " or ");
@@ -563,6 +623,7 @@ std::string DefaultText(const Setting& setting) {
   if (text.empty()) {
     text = std::visit(Overloaded{[&](const SizeFields&) { return std::string(); },
                                  [&](const RadiusFields&) { return std::string("auto"); },
+                                 [](const CropFields&) { return std::string(); },
                                  [&]<typename T>(const SettingField<T>& field) {
                                    if constexpr (kHasRange<T>) {
                                      return ShownNumber(field.fallback, setting.is_share);
@@ -580,6 +641,7 @@ std::string DefaultText(const Setting& setting) {
 std::string ValuePlaceholder(const Setting& setting) {
   return std::visit(Overloaded{[](const SizeFields&) { return std::string("WxH"); },
                                [](const RadiusFields&) { return std::string("R|Npx|auto"); },
+                               [](const CropFields&) { return std::string("X0,X1,Y0,Y1"); },
                                [](const SettingField<bool>&) { return std::string(); },
                                [&](const SettingField<double>&) {
                                  return std::string(setting.is_share ? "P%" : "X");
@@ -595,6 +657,8 @@ std::string SettingsText(const RenderSettings& settings) {
   for (const Setting& setting : kSettings) {
     if (setting.role != SettingRole::kDecidesPixels) continue;
     if (setting.is_used != nullptr && !setting.is_used(settings)) continue;
+    // Stands behind the size.
+    if (std::holds_alternative<CropFields>(setting.type)) continue;
     std::string name(setting.name);
     std::ranges::replace(name, '_', '-');
     const std::string value = SettingText(setting, settings);

@@ -41,10 +41,13 @@ struct RadiusFields {
   SettingField<double> scene_units = {}, footprints = {};
 };
 
+// "0,320,0,240" in pixels of the whole image: x from and to, y from and to.
+struct CropFields {};
+
 using SettingType =
     std::variant<SettingField<int>, SettingField<std::int64_t>, SettingField<std::uint64_t>,
                  SettingField<double>, SettingField<bool>, SettingField<RadiusControllerKind>,
-                 SettingField<KernelKind>, SizeFields, RadiusFields>;
+                 SettingField<KernelKind>, SizeFields, RadiusFields, CropFields>;
 
 enum class SettingRole : std::uint8_t {
   kDecidesPixels,

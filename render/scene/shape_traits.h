@@ -12,6 +12,8 @@ namespace lucerna {
 
 inline constexpr std::int32_t kNoAreaLight = -1;
 
+inline constexpr std::int32_t kNoSource = -1;
+
 // What every shape carries.
 struct ShapeTraits {
   std::int32_t material = 0;
@@ -24,9 +26,16 @@ struct ShapeTraits {
   float alpha = 1;
   std::int32_t alpha_texture = kNoTexture;  // in place of `alpha`, which is its largest number
   std::int32_t motion = kNoMotion;
+  std::int32_t source = kNoSource;          // in Scene::sources; only for messages
 
   [[nodiscard]] bool SeparatesMedia() const { return medium_inside != medium_outside; }
-  bool operator==(const ShapeTraits&) const = default;
+  // Whether the shapes look the same, wherever they are written.
+  bool operator==(const ShapeTraits& other) const {
+    return material == other.material && area_light == other.area_light &&
+           medium_inside == other.medium_inside && medium_outside == other.medium_outside &&
+           alpha == other.alpha && alpha_texture == other.alpha_texture &&
+           motion == other.motion;
+  }
 };
 
 // Whether all rays meet the shape.

@@ -92,6 +92,31 @@ class Programs:
         self.log.close()
 
 
+def run_without_jupyter(path, environment):
+    """The code cells of a notebook, in order: what they displayed as SVG, and what they printed."""
+    cells = ["".join(cell["source"]) for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
+             if cell["cell_type"] == "code"]
+    script = "\n".join([
+        "import sys, types",
+        "module = types.ModuleType('IPython.display')",
+        "plots = []",
+        "module.SVG = lambda data: data",
+        "class Shown:",
+        "    update = staticmethod(plots.append)",
+        "module.display = lambda plot, display_id: plots.append(plot) or Shown()",
+        "sys.modules['IPython'] = types.ModuleType('IPython')",
+        "sys.modules['IPython.display'] = module",
+        *cells,
+        "print('PLOT', plots[-1])",
+    ])
+    done = subprocess.run([sys.executable, "-c", script], cwd=path.parent, text=True,
+                          env={**os.environ, **environment}, capture_output=True, check=False)
+    if done.returncode != 0:
+        raise AssertionError(done.stderr)
+    said, plot = done.stdout.split("PLOT ", 1)
+    return [plot], said
+
+
 class TemporaryTest(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory(dir=FOLDER.name)
@@ -483,6 +508,38 @@ class JobsTest(TemporaryTest):
         jobs = [one for one in self.client.jobs() if one.settings.get("passes") == "8"]
         counts = [len(self.client.job(one.job_id).state().samples) for one in jobs[:2]]
         self.assertEqual(sorted(counts), sorted(len(one.get("points").split()) for one in lines))
+
+    def test_the_notebook_runs_and_draws_a_curve_for_each_controller(self):
+        path = PACKAGE / "examples/error_against_time.ipynb"
+        environment = {"LUCERNA_SCENE": str(SCENE), "LUCERNA_SERVER": self.programs.address,
+                       "LUCERNA_SIZE": SIZE, "LUCERNA_PASSES": "8", "PYTHONPATH": str(SOURCE)}
+        try:
+            import ipykernel  # noqa: F401
+            import nbclient
+            import nbformat
+        except ImportError:
+            plots, said = run_without_jupyter(path, environment)
+        else:
+            notebook = nbformat.read(path, as_version=4)
+            nbformat.validate(notebook)
+            self.assertFalse(any(cell.get("outputs") for cell in notebook.cells),
+                             "what a run has drawn is not part of the notebook")
+            with unittest.mock.patch.dict(os.environ, environment):
+                nbclient.NotebookClient(notebook, timeout=300, resources={
+                    "metadata": {"path": str(path.parent)}}).execute()
+            outputs = [output for cell in notebook.cells if cell.cell_type == "code"
+                       for output in cell.outputs]
+            plots = ["".join(output["data"]["image/svg+xml"]) for output in outputs
+                     if "image/svg+xml" in output.get("data", {})]
+            said = "".join(output["text"] for output in outputs
+                           if output.output_type == "stream" and output.name == "stdout")
+        lines = xml.etree.ElementTree.fromstring(plots[-1]).findall(
+            ".//{http://www.w3.org/2000/svg}polyline")
+        self.assertEqual(3, len(lines))
+        for name in ("appm", "ppm", "frequency-mse"):
+            self.assertRegex(said, rf"(?m)^{name} +[0-9.]+ % after +[0-9.]+ s, slope ")
+            self.assertIn(f">{name}</text>", plots[-1])
+        self.assertEqual(2, said.count("relMSE against appm"))
 
     def test_the_page_of_the_manual_runs_as_it_is(self):
         page = (ROOT / "docs/python.md").read_text(encoding="utf-8")

@@ -68,6 +68,23 @@ TEST(ExrFileTest, EveryBitComesBack) {
   EXPECT_EQ(back->PixelDigest(), image.PixelDigest());
 }
 
+TEST(ExrFileTest, APartKeepsItsPlaceInTheWhole) {
+  Image part = Example();
+  const Digest digest = part.PixelDigest();
+  part.x0 = 7;
+  part.y0 = 20;
+  part.whole_width = 64;
+  part.whole_height = 400;
+  const StatusOr<Image> back = DecodeExr(*EncodeExr(part));
+  ASSERT_TRUE(back.ok()) << back.status();
+  EXPECT_EQ(back->x0, 7);
+  EXPECT_EQ(back->y0, 20);
+  EXPECT_EQ(back->whole_width, 64);
+  EXPECT_EQ(back->whole_height, 400);
+  EXPECT_EQ(back->PixelDigest(), digest) << "of pixels, wherever they lie";
+  EXPECT_EQ(DecodeExr(*EncodeExr(Example()))->whole_width, 0);
+}
+
 TEST(ExrFileTest, TheSameImageGivesTheSameBytesWhateverTheOrderOfItsChannels) {
   Image image = Example();
   const std::string bytes = Encoded(image);

@@ -6,8 +6,11 @@
 #include <memory>
 #include <utility>
 
+#include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "render/formats/read_scene.h"
+#include "tests/support/memory_files.h"
 #include "tests/support/test_scenes.h"
 #include "worker/replay.h"
 
@@ -234,9 +237,11 @@ TEST(PhotonReplayTest, TellsEveryStepOfAMirroredPhoton) {
   scene.spot_lights.push_back({{0, 0, 2}, {0, 0, -1}, Gray(1), 0.9999F, 0.9998F});
   scene.materials.push_back({});
   const RenderSettings settings = TestSettings(scene, 100, 0.1, 4);
-  const auto path =
-      ReplayInScene(scene, settings, NeedsOf(scene, settings), 0, 5, settings.photons_per_pass);
-  ASSERT_TRUE(path.ok()) << path.status();
+  const auto photons = static_cast<std::uint64_t>(settings.photons_per_pass);
+  const auto paths = ReplayInScene(scene, settings, NeedsOf(scene, settings), {0, 5, 1}, photons);
+  ASSERT_TRUE(paths.ok()) << paths.status();
+  ASSERT_EQ(paths->paths_size(), 1);
+  const v1::PhotonPath* const path = &paths->paths(0);
   EXPECT_EQ(path->emission().light(), "spot light 0");
   EXPECT_EQ(path->emission().position().z(), 2);
   ASSERT_EQ(path->landings_size(), 1);
@@ -252,12 +257,61 @@ TEST(PhotonReplayTest, TellsEveryStepOfAMirroredPhoton) {
             landing.scattering().survived() ? v1::PHOTON_END_ESCAPED : v1::PHOTON_END_ROULETTE);
 
   const auto is_out_of_range = [&](std::uint64_t pass, std::uint64_t index) {
-    return absl::IsOutOfRange(ReplayInScene(scene, settings, NeedsOf(scene, settings), pass, index,
-                                            settings.photons_per_pass)
-                                  .status());
+    return absl::IsOutOfRange(
+        ReplayInScene(scene, settings, NeedsOf(scene, settings), {pass, index, 1}, photons)
+            .status());
   };
   EXPECT_TRUE(is_out_of_range(0, 100));
   EXPECT_TRUE(is_out_of_range(std::uint64_t{1} << 60, 0));
+  EXPECT_TRUE(absl::IsOutOfRange(
+      ReplayInScene(scene, settings, NeedsOf(scene, settings), {0, 98, 3}, photons).status()));
+
+  // Each of several is the one that is traced alone.
+  const auto several = ReplayInScene(scene, settings, NeedsOf(scene, settings), {0, 3, 4}, photons);
+  ASSERT_TRUE(several.ok()) << several.status();
+  ASSERT_EQ(several->paths_size(), 4);
+  EXPECT_EQ(several->paths(2).key().index(), 5U);
+  EXPECT_EQ(several->paths(2).SerializeAsString(), path->SerializeAsString());
+  EXPECT_NE(several->paths(1).emission().SerializeAsString(), path->emission().SerializeAsString());
+}
+
+TEST(PhotonReplayTest, NamesShapesByTheirLinesAndPlacesAsTheFileHasThem) {
+  // So small that it is rendered in a unit of its own.
+  MemoryFiles files({{"s.pbrt",
+                      "Film \"rgb\" \"integer xresolution\" 8 \"integer yresolution\" 8\n"
+                      "LookAt 0 0 3e-9 0 0 0 0 1 0\n"
+                      "Camera \"perspective\"\n"
+                      "WorldBegin\n"
+                      "Include \"floor.pbrt\"\n"
+                      "AttributeBegin\n"
+                      "  AreaLightSource \"diffuse\" \"rgb L\" [1 1 1]\n"
+                      "  Translate 0 0 2e-9\n"
+                      "  ReverseOrientation\n"
+                      "  Shape \"disk\" \"float radius\" 1e-9\n"
+                      "AttributeEnd\n"},
+                     {"floor.pbrt",
+                      "Material \"diffuse\"\n"
+                      "Shape \"bilinearmesh\" \"point3 P\" [-9e-8 -9e-8 0 9e-8 -9e-8 0 -9e-8 9e-8 "
+                      "0 9e-8 9e-8 0]\n"}});
+  ParsedScene parsed = ReadScene(files, "s.pbrt");
+  ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
+  ASSERT_NE(parsed.scene.unit, 1) << "the scene does not test what it is for";
+  const RenderSettings settings = TestSettings(parsed.scene, 100, 0.1, 4);
+  const SceneNeeds needs = NeedsOf(parsed.scene, settings);
+  const auto paths = ReplayInScene(std::move(parsed.scene), settings, needs, {0, 0, 20}, 100);
+  ASSERT_TRUE(paths.ok()) << paths.status();
+  int landings = 0;
+  for (const v1::PhotonPath& path : paths->paths()) {
+    EXPECT_EQ(path.emission().light(), "disk 0 (s.pbrt:10)");
+    EXPECT_NEAR(path.emission().position().z(), 2e-9, 1e-15);
+    if (path.landings_size() == 0) continue;
+    EXPECT_THAT(path.landings(0).shape(),
+                testing::MatchesRegex("triangle [0-9]+ of mesh 0 \\(floor.pbrt:2\\)"));
+    EXPECT_GE(path.landings(0).distance(), 2e-9 * (1 - 1e-6));
+    EXPECT_LT(path.landings(0).distance(), 1e-6);
+    ++landings;
+  }
+  EXPECT_GT(landings, 10);
 }
 
 }  // namespace

@@ -284,6 +284,80 @@ TEST(SchedulerTest, PoisonsABatchThatALoneWorkerCannotDo) {
   EXPECT_EQ(tries, 3);
 }
 
+TEST(SchedulerTest, SaysWhyAWorkerLostWhatItHeld) {
+  Scheduler scheduler(Batches(100));
+  scheduler.OpenPass(kFirst, 400);
+  const auto failing = scheduler.AddWorker("failing", At(0)).value();
+  Fail(scheduler, failing, Ask(scheduler, failing, 0).value(), 0);
+  const auto broken = scheduler.AddWorker("broken", At(0)).value();
+  ASSERT_TRUE(Ask(scheduler, broken, 0));
+  scheduler.LoseWorker(broken);
+  const auto silent = scheduler.AddWorker("silent", At(1)).value();
+  ASSERT_TRUE(Ask(scheduler, silent, 1));
+  scheduler.Expire(At(12));
+  scheduler.RemoveWorker(failing);
+  scheduler.Expire(At(40));
+  const auto losses = scheduler.TakeLosses();
+  const auto reasons_of = [&](const std::string& name) {
+    std::vector<std::string> reasons;
+    for (const Scheduler::Loss& loss : losses) {
+      if (loss.name == name) reasons.push_back(loss.reason);
+    }
+    return reasons;
+  };
+  EXPECT_EQ(
+      reasons_of("failing"),
+      (std::vector<std::string>{"failed at photons 0 to 100 of pass 0 of job job: out of memory"}))
+      << "leaving in order is no loss";
+  EXPECT_EQ(reasons_of("broken"),
+            (std::vector<std::string>{
+                "vanished: its connection broke; leases that it held and that go back: 1",
+                "is given up: it crashed or was cut off, and did not come back within 30 s; leases "
+                "that count as crashed: 1"}));
+  EXPECT_EQ(reasons_of("silent"),
+            (std::vector<std::string>{
+                "was not heard of for 10 s: photons 0 to 100 of pass 0 of job job goes back",
+                "is given up: it crashed or was cut off, and did not come back within 30 s; leases "
+                "that count as crashed: 1"}));
+  EXPECT_TRUE(scheduler.TakeLosses().empty());
+}
+
+TEST(SchedulerTest, SaysHowLeasesOfTracedJobsEnded) {
+  Scheduler scheduler(Batches(100));
+  const auto lose_one = [&](const PassKey& pass) {
+    scheduler.OpenPass(pass, 100);
+    const auto worker = scheduler.AddWorker("host", At(1)).value();
+    ASSERT_TRUE(Ask(scheduler, worker, 1));
+    scheduler.LoseWorker(worker);
+    scheduler.Close(pass);
+  };
+  lose_one(kFirst);
+  EXPECT_TRUE(scheduler.TakeEnded().empty()) << "of a job that is not traced";
+  scheduler.SetTraced("job", true);
+  lose_one(kFirst);
+  auto ended = scheduler.TakeEnded();
+  ASSERT_EQ(ended.size(), 1U);
+  EXPECT_EQ(ended[0].job_id, "job");
+  EXPECT_EQ(ended[0].name, "host");
+  EXPECT_EQ(ended[0].work, "photons 0 to 100 of pass 0");
+  EXPECT_EQ(ended[0].ending, "interrupted");
+  EXPECT_EQ(ended[0].lent_at, At(1));
+
+  scheduler.OpenPass(kSecond, 100);
+  const auto worker = scheduler.AddWorker("other", At(2)).value();
+  const auto lease = Ask(scheduler, worker, 2);
+  ASSERT_TRUE(lease);
+  ASSERT_TRUE(scheduler.TakeResult({worker, *lease}, Digest(), At(3)).ok());
+  EXPECT_TRUE(scheduler.TakeEnded().empty()) << "it ends when its result is merged";
+  scheduler.Commit(kSecond, lease->range, At(3));
+  ended = scheduler.TakeEnded();
+  ASSERT_EQ(ended.size(), 1U);
+  EXPECT_EQ(ended[0].ending, "delivered");
+  scheduler.SetTraced("job", false);
+  lose_one(kFirst);
+  EXPECT_TRUE(scheduler.TakeEnded().empty());
+}
+
 TEST(SchedulerTest, AGoodbyeIsNoFailure) {
   Scheduler scheduler(Batches(100));
   scheduler.OpenPass(kFirst, 100);

@@ -33,6 +33,7 @@ RenderSettings WithBack(const RenderSettings& settings) {
 TEST(SettingTableTest, EveryRowIsCompleteAndItsDefaultInItsRange) {
   RenderSettings settings;
   settings.width = settings.height = 1;
+  settings.crop_x1 = settings.crop_y1 = 1;
   settings.photons_per_pass = 1;
   settings.time_s = settings.error = 1;
   settings.photons = 1;
@@ -49,10 +50,24 @@ TEST(SettingTableTest, EveryRowIsCompleteAndItsDefaultInItsRange) {
   EXPECT_EQ(FindSetting("no_such_setting"), nullptr);
 }
 
+TEST(SettingTableTest, ACropIsFourNumbersOfPixels) {
+  RenderOverrides overrides;
+  const Setting& crop = *FindSetting("crop");
+  ASSERT_TRUE(ParseSetting(crop, "0,320,10,240", overrides).ok());
+  EXPECT_EQ(overrides.crop, (CropWindow{0, 320, 10, 240}));
+  EXPECT_EQ(SettingText(crop, overrides), "0,320,10,240");
+  for (const char* text : {"", "0,1,0", "0,1,0,1,2", "0,1,0,", "a,1,0,1", "0 1 0 1", "0,1,0,0.5"})
+    EXPECT_THAT(WhyRefused("crop", text), HasSubstr("X0,X1,Y0,Y1")) << text;
+}
+
 TEST(SettingTableTest, TextReadsBackToTheSameBits) {
   RenderSettings settings;
   settings.width = 640;
   settings.height = 480;
+  settings.crop_x0 = 1;
+  settings.crop_x1 = 640;
+  settings.crop_y0 = 2;
+  settings.crop_y1 = 3;
   settings.passes = std::numeric_limits<std::int64_t>::max();
   settings.time_s = 0.1;
   settings.error = std::nextafter(3.0, 4.0);

@@ -147,6 +147,8 @@ class DirectiveReader {
   // Reports an error and stops the reading when the scene has no room for these shapes.
   bool HasRoomFor(const ShapeSet& shapes, Arguments& arguments);
   void AddShapes(ShapeSet shapes);
+  // For ShapeTraits::source.
+  std::int32_t SourceAt(const SourceLocation& location);
 
   // Instances (instance_directives.cc).
   struct Object {
@@ -194,6 +196,8 @@ class DirectiveReader {
 
   int depth_ = 0;                        // of files that include files
   std::vector<std::string> open_texts_;  // paths, the main file's first
+  // In scene_.source_files, by SourceLocation::file.
+  std::map<const std::string*, std::uint32_t> source_files_;
   std::uint64_t texts_read_ = 0;
   std::uint64_t shapes_cost_ = 0;
   std::uint64_t shapes_bytes_ = 0;

@@ -315,8 +315,19 @@ bool DirectiveReader::AddShape(Arguments& arguments, std::optional<TriangleMesh>
     scene_.area_lights.push_back(light);
     ForEachShapeTraits(shapes, [&](ShapeTraits& traits) { traits.area_light = index; });
   }
+  const std::int32_t source = SourceAt(arguments.location());
+  ForEachShapeTraits(shapes, [&](ShapeTraits& traits) { traits.source = source; });
   AddShapes(std::move(shapes));
   return true;
+}
+
+std::int32_t DirectiveReader::SourceAt(const SourceLocation& location) {
+  if (location.file == nullptr || location.line <= 0) return kNoSource;
+  const auto [file, is_new] = source_files_.try_emplace(
+      location.file, static_cast<std::uint32_t>(scene_.source_files.size()));
+  if (is_new) scene_.source_files.push_back(*location.file);
+  scene_.sources.push_back({file->second, static_cast<std::uint32_t>(location.line)});
+  return static_cast<std::int32_t>(scene_.sources.size() - 1);
 }
 
 bool DirectiveReader::HasRoomFor(const ShapeSet& shapes, Arguments& arguments) {
