@@ -187,6 +187,9 @@ struct JobEstimator::State {
                                                 static_cast<std::size_t>(r.crop_height())) {}
 
   PreparedScene prepared;
+  // Of jobs that carry wavelengths: held where the scene has the colours of a pass, and where its
+  // three colours are used meanwhile.
+  Mutex colors_mutex;
   RenderSettings settings;
   ThreadTeam team;
   FirstHits first_hits;
@@ -218,6 +221,11 @@ struct JobEstimator::State {
   float widest_radius = 0;  // of these hitpoints
   double hit_share = 0;     // of the pixels that have one
 
+  [[nodiscard]] std::unique_ptr<const MutexLock> HoldColors() {
+    return prepared.needs().Uses(Part::kSpectra) ? std::make_unique<const MutexLock>(colors_mutex)
+                                                 : nullptr;
+  }
+
   // How many photons later passes have once `round` is added, given how many they would have by
   // what was known before.
   [[nodiscard]] std::uint64_t ChoosePhotons(const SliceSums& round, std::uint64_t before) {
@@ -245,6 +253,7 @@ struct JobEstimator::State {
     // A guide that asks for no reports was learned from enough of them.
     if (!IsGuidePass(round.passes.last) || before->reported() == 0) return before;
     const PixelMeans means = MeansOf(*sums, *plan.radii, team);
+    const auto lock = HoldColors();
     return std::make_shared<const PhotonGuide>(learner->Next(
         round.passes.last, photons_per_pass,
         [&](std::uint32_t pixel) {
@@ -332,6 +341,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
       std::make_unique<EyePathTracer>(prepared.scene(), state->settings, prepared.needs(),
                                       prepared.intersector(), prepared.lights());
   state->film_spread = std::make_unique<FilmSpread>(*state->tracer);
+  if (prepared.needs().Uses(Part::kSpectra)) state->film_spread->Prepare(state->team);
   const int width = settings.crop_width();
   const int height = settings.crop_height();
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -361,6 +371,8 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
 
 EyePass JobEstimator::TraceEyePaths(std::uint64_t pass,
                                     const std::function<bool()>& shall_stop) const {
+  const auto lock = state_->HoldColors();
+  const PreparedScene::AtPass at_pass(state_->prepared, state_->settings.seed, pass);
   return TraceHitpointPass(*state_->tracer, pass, state_->first_hits.Of(pass), *state_->film_spread,
                            state_->team, shall_stop);
 }
@@ -388,7 +400,7 @@ SliceShape JobEstimator::ShapeOf(const PassRange& round, const RoundPlan& plan) 
 
 SliceSums JobEstimator::SliceOf(const EyePass& pass, const RoundPlan& plan,
                                 const PassSums& sums) const {
-  return SliceOfPass(pass, plan, sums, state_->settings, state_->prepared.flux_scale(),
+  return SliceOfPass(pass, plan, sums, state_->settings, needs(), state_->prepared.flux_scale(),
                      state_->team);
 }
 
@@ -422,7 +434,7 @@ const SceneNeeds& JobEstimator::needs() const {
 }
 
 EmissionCheck JobEstimator::emission_check() const {
-  return EmissionCheck(state_->prepared.lights());
+  return EmissionCheck(state_->prepared.lights(), state_->prepared.largest_power());
 }
 
 std::size_t JobEstimator::faint_lights() const {

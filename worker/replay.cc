@@ -127,6 +127,7 @@ StatusOr<v1::PhotonPath> ReplayInScene(Scene rec709, const RenderSettings& setti
   }
   PreparedScene prepared(std::move(rec709));
   LUCERNA_RETURN_IF_ERROR(prepared.PrepareFor(needs));
+  const PreparedScene::AtPass at_pass(prepared, settings.seed, pass);
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
                                 settings, needs, nullptr, Bounds(), photons_per_pass, Bounds(),
                                 guide);

@@ -48,6 +48,7 @@ constexpr std::array<std::string_view, kParts> kNames = {
     "alpha-masks",
     "instances",
     "dispersion",
+    "spectra",
 };
 
 // Sets of eye paths: with fewer the edges of shapes would be seen not to be smooth.
@@ -483,6 +484,9 @@ class NeedsFinder {
   }
 
   void AddRareParts() {
+    Set(Part::kSpectra, settings_.spectral,
+        settings_.spectral ? "the job asks for spectra: three wavelengths for each pass"
+                           : "the job asks for three colours");
     Set(Part::kMotion, false, "scenes that move are not read");
     const std::size_t media = scene_.media.size();
     Set(Part::kMedia, media > 0,

@@ -18,7 +18,21 @@ Status PreparedScene::PrepareFor(const SceneNeeds& needs) {
   needs_ = needs;
   lights_ = std::make_unique<LightSet>(scene_, *intersector_, needs_.lights());
   flux_scale_ = FluxScale::ForPower(lights_->TotalPower());
+  colors_ = needs_.Uses(Part::kSpectra) ? std::make_unique<PassColors>(scene_) : nullptr;
   return absl::OkStatus();
+}
+
+PreparedScene::AtPass::AtPass(PreparedScene& prepared, std::uint64_t seed, std::uint64_t pass)
+    : prepared_(prepared) {
+  if (prepared_.colors_ == nullptr) return;
+  prepared_.colors_->SetAt(WavelengthsOfPass(seed, pass), prepared_.scene_);
+  prepared_.lights_->TakeColors();
+}
+
+PreparedScene::AtPass::~AtPass() {
+  if (prepared_.colors_ == nullptr) return;
+  prepared_.colors_->SetThree(prepared_.scene_);
+  prepared_.lights_->TakeColors();
 }
 
 }  // namespace lucerna

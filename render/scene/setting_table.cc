@@ -107,6 +107,10 @@ constexpr auto kSettings = std::to_array<Setting>({
      .meaning = "send photons in proportion to power alone, not more where earlier ones have come "
                 "into view",
      .type = SettingField<bool>{.given = &Overrides::unguided, .value = &Settings::unguided}},
+    {.name = "spectral",
+     .meaning = "carry spectra in place of three colours: for saturated colours and metals in "
+                "coloured light, and prisms",
+     .type = SettingField<bool>{.given = &Overrides::spectral, .value = &Settings::spectral}},
     {.name = "seed",
      .meaning = "another seed gives other noise",
      .scene_default = "the scene's `seed`",
