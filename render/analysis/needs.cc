@@ -485,8 +485,8 @@ class NeedsFinder {
 
   void AddRareParts() {
     Set(Part::kSpectra, settings_.spectral,
-        settings_.spectral ? "the job asks for spectra: three wavelengths for each pass"
-                           : "the job asks for three colours");
+        settings_.spectral ? "setting \"spectral\": each pass carries three wavelengths"
+                           : "paths carry three colours");
     Set(Part::kMotion, false, "scenes that move are not read");
     const std::size_t media = scene_.media.size();
     Set(Part::kMedia, media > 0,
