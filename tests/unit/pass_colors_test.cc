@@ -227,8 +227,10 @@ TEST(PassColorsTest, ScenesOfOtherJobsStayAsTheyAre) {
   red.reflectance = {0.6F, 0.1F, 0.2F};
   AddMaterial(scene, red);
   AddQuad(scene, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, 0, AddAreaLight(scene, 1));
+  RenderSettings settings = TestSettings(scene, 100, 0.1, 4);
+  settings.spectral = false;
   PreparedScene prepared(scene);
-  ASSERT_TRUE(prepared.PrepareFor(NeedsOf(scene, TestSettings(scene, 100, 0.1, 4))).ok());
+  ASSERT_TRUE(prepared.PrepareFor(NeedsOf(scene, settings)).ok());
   const std::vector<Material> materials = prepared.scene().materials;
   const PreparedScene::AtPass at_pass(prepared, 1, 3);
   EXPECT_EQ(prepared.scene().materials, materials);
