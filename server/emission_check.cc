@@ -26,7 +26,8 @@ constexpr std::uint64_t kMayBeMissing = 16;
 
 }  // namespace
 
-EmissionCheck::EmissionCheck(const LightSet& lights) {
+EmissionCheck::EmissionCheck(const LightSet& lights, double largest_power)
+    : largest_power_(largest_power) {
   const auto total = static_cast<double>(Luminance(lights.TotalPower()));
   const bool is_ordinary = total > kLeastPower && total < kMostPower;
   double sending = 0;
@@ -41,7 +42,7 @@ EmissionCheck::EmissionCheck(const LightSet& lights) {
     // Within a cone, a pixel or a cell of a picture photons differ.
     const bool is_mixed = light.kind == EmitterKind::kSpot ||
                           light.kind == EmitterKind::kProjection || light.lights > 1;
-    const bool differ = is_mixed || light.largest_share > 1;
+    const bool differ = is_mixed || light.largest_share > 1 || largest_power > 1;
     may_emit_less_ |= !is_ordinary || differ;
     if (!is_ordinary) {
       lights_.push_back({0, kLargestEnergy});
@@ -54,8 +55,11 @@ EmissionCheck::EmissionCheck(const LightSet& lights) {
     const double units = std::ldexp(flux / total, kEnergyBits);
     Range range = {units * (1 - rounding) - 1, units * (1 + rounding) + 1};
     // Of several lights together, of any kind, fainter ones have less.
-    const auto largest = static_cast<double>(light.largest_share);
-    if (differ) range = {0, std::max(is_mixed ? kMostOfSpot : 1, largest) * range.most};
+    const double largest = static_cast<double>(light.largest_share) * largest_power;
+    if (differ) {
+      range = {0, std::max(is_mixed ? kMostOfSpot * largest_power : largest_power, largest) *
+                      range.most};
+    }
     lights_.push_back({std::clamp(range.least, 0.0, kLargestEnergy),
                        std::clamp(range.most, 0.0, kLargestEnergy)});
   }
@@ -89,7 +93,7 @@ Status EmissionCheck::CheckGuided(const BatchTally& tally) const {
   const double x = 0.5 * (b + std::sqrt(b * b + 8 * kLogOfChance * r / photons));
   const double missing =
       static_cast<double>(kMayBeMissing + tally.photons / kOneMissingOf + tally.dropped);
-  const double most = photons * (mean * (1 + x + kRounding) + 1);
+  const double most = photons * (mean * largest_power_ * (1 + x + kRounding) + 1);
   const double least =
       may_emit_less_ ? 0 : photons * (mean * (1 - x - kRounding) - 1) - missing * most_of_photon;
   const auto emitted = static_cast<double>(tally.energy.emitted);

@@ -17,7 +17,9 @@ class EmissionCheck {
  public:
   // Of nothing: every tally passes.
   EmissionCheck() = default;
-  explicit EmissionCheck(const LightSet& lights);
+  // `largest_power`: how many times its power a light has in any pass, at least; 1: the same in
+  // all.
+  explicit EmissionCheck(const LightSet& lights, double largest_power = 1);
 
   // Errors: INVALID_ARGUMENT when photons were sent by other lights than there are, not all were
   // sent by some light, or the energy emitted is not that of so many photons; of photons that are
@@ -34,7 +36,8 @@ class EmissionCheck {
   [[nodiscard]] Status CheckGuided(const BatchTally& tally) const;
 
   std::vector<Range> lights_;
-  bool may_emit_less_ = false;  // spots, and lights that are counted together
+  bool may_emit_less_ = false;  // spots, lights that are counted together, other colours
+  double largest_power_ = 1;
 };
 
 }  // namespace lucerna

@@ -188,6 +188,9 @@ struct JobEstimator::State {
                                                 static_cast<std::size_t>(r.crop_height())) {}
 
   PreparedScene prepared;
+  // Of jobs that carry wavelengths: held where the scene has the colours of a pass, and where its
+  // three colours are used meanwhile.
+  Mutex colors_mutex;
   RenderSettings settings;
   ThreadTeam team;
   FirstHits first_hits;
@@ -219,6 +222,11 @@ struct JobEstimator::State {
   float widest_radius = 0;  // of these hitpoints
   double hit_share = 0;     // of the pixels that have one
 
+  [[nodiscard]] std::unique_ptr<const MutexLock> HoldColors() {
+    return prepared.needs().Uses(Part::kSpectra) ? std::make_unique<const MutexLock>(colors_mutex)
+                                                 : nullptr;
+  }
+
   // How many photons later passes have once `round` is added, given how many they would have by
   // what was known before.
   [[nodiscard]] std::uint64_t ChoosePhotons(const SliceSums& round, std::uint64_t before) {
@@ -246,6 +254,7 @@ struct JobEstimator::State {
     // A guide that asks for no reports was learned from enough of them.
     if (!IsGuidePass(round.passes.last) || before->reported() == 0) return before;
     const PixelMeans means = MeansOf(*sums, *plan.radii, team);
+    const auto lock = HoldColors();
     return std::make_shared<const PhotonGuide>(learner->Next(
         round.passes.last, photons_per_pass,
         [&](std::uint32_t pixel) {
@@ -333,6 +342,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
       std::make_unique<EyePathTracer>(prepared.scene(), state->settings, prepared.needs(),
                                       prepared.intersector(), prepared.lights());
   state->film_spread = std::make_unique<FilmSpread>(*state->tracer);
+  if (prepared.needs().Uses(Part::kSpectra)) state->film_spread->Prepare(state->team);
   const int width = settings.crop_width();
   const int height = settings.crop_height();
   const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -362,6 +372,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
 
 StatusOr<EyePass> JobEstimator::TraceEyePaths(std::uint64_t pass,
                                               const std::function<bool()>& shall_stop) const {
+  const auto lock = state_->HoldColors();
   const SceneMotion& motion = state_->prepared.scene().motion;
   if (motion.Moves()) {
     // The scene of this job stays as it is when the shutter opens: others read it meanwhile.
@@ -370,8 +381,11 @@ StatusOr<EyePass> JobEstimator::TraceEyePaths(std::uint64_t pass,
     const EyePathTracer tracer(then->scene(), state_->settings, then->needs(), then->intersector(),
                                then->lights());
     FilmSpread spread(tracer);
+    if (needs().Uses(Part::kSpectra)) spread.Prepare(state_->team);
+    const PreparedScene::AtPass at_pass(*then, state_->settings.seed, pass);
     return TraceHitpointPass(tracer, pass, nullptr, spread, state_->team, shall_stop);
   }
+  const PreparedScene::AtPass at_pass(state_->prepared, state_->settings.seed, pass);
   return TraceHitpointPass(*state_->tracer, pass, state_->first_hits.Of(pass), *state_->film_spread,
                            state_->team, shall_stop);
 }
@@ -403,7 +417,7 @@ ThreadTeam& JobEstimator::team() {
 
 SliceSums JobEstimator::SliceOf(const EyePass& pass, const RoundPlan& plan,
                                 const PassSums& sums) const {
-  return SliceOfPass(pass, plan, sums, state_->settings, state_->prepared.flux_scale(),
+  return SliceOfPass(pass, plan, sums, state_->settings, needs(), state_->prepared.flux_scale(),
                      state_->team);
 }
 
@@ -437,7 +451,7 @@ const SceneNeeds& JobEstimator::needs() const {
 }
 
 EmissionCheck JobEstimator::emission_check() const {
-  return EmissionCheck(state_->prepared.lights());
+  return EmissionCheck(state_->prepared.lights(), state_->prepared.largest_power());
 }
 
 std::size_t JobEstimator::faint_lights() const {

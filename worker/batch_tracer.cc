@@ -195,9 +195,22 @@ struct BatchTracer::State {
     eye_paths = std::make_unique<EyePathTracer>(prepared.scene(), eye_settings, prepared.needs(),
                                                 prepared.intersector(), prepared.lights());
     film_spread.emplace(*eye_paths);
+    if (prepared.needs().Uses(Part::kSpectra)) film_spread->Prepare(team);
     first_hits.emplace(prepared.needs().eye_sample_sets(),
                        static_cast<std::size_t>(settings.crop_width()) *
                            static_cast<std::size_t>(settings.crop_height()));
+  }
+
+  // Requires PrepareFor.
+  Status PrepareSpectra(const RenderSettings& settings, std::uint64_t pass) {
+    if (EvidenceOf(settings.radius_controller, pass) != Evidence::kFrequency) {
+      return absl::OkStatus();
+    }
+    if (spectra != nullptr && spectra->Suits(settings)) return absl::OkStatus();
+    LUCERNA_ASSIGN_OR_RETURN(spectra,
+                             SpectrumTracer::Create(prepared.scene(), settings, prepared.needs(),
+                                                    prepared.intersector(), prepared.lights()));
+    return absl::OkStatus();
   }
 
   PreparedScene prepared;
@@ -232,6 +245,9 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
   PassSums sums(block.size(), columns);
   std::vector<std::uint64_t> dropped;
   const PhotonRange photons = {pass, first, last, photons_per_pass, guide};
+  LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(settings, needs, pass));
+  LUCERNA_RETURN_IF_ERROR(state_->PrepareSpectra(settings, pass));
+  const PreparedScene::AtPass at_pass(state_->prepared, settings.seed, pass);
   LUCERNA_RETURN_IF_ERROR(
       GatherPhotons(settings, needs, photons, block, radii, stop, sums, dropped));
   LUCERNA_ASSIGN_OR_RETURN(Accumulation accumulation, sums.ToAccumulation());
@@ -247,7 +263,6 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
   const std::uint64_t last = range.last;
   const PhotonGuide* const guide = range.guide;
   const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
-  LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(settings, needs, pass));
   const PreparedScene& prepared = state_->prepared;
   const Bounds region = RegionOf(block, radii, ReachOf(evidence));
   const Bounds media_region = MediaRegionOf(block, radii);
@@ -255,12 +270,6 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
   const float cell = CellWidth(std::span(radii).first(first_caustic));
   const float caustic_cell = CellWidth(std::span(radii).subspan(first_caustic, block.caustic_rows));
   const CausticWeight caustic_weight(prepared.scene(), settings, prepared.intersector().bounds());
-  if (evidence == Evidence::kFrequency &&
-      (state_->spectra == nullptr || !state_->spectra->Suits(settings))) {
-    LUCERNA_ASSIGN_OR_RETURN(state_->spectra,
-                             SpectrumTracer::Create(prepared.scene(), settings, needs,
-                                                    prepared.intersector(), prepared.lights()));
-  }
   const SpectrumTracer* spectra =
       evidence == Evidence::kFrequency ? state_->spectra.get() : nullptr;
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
@@ -378,6 +387,8 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
                                          std::uint64_t pass, const RoundPlan& plan,
                                          const std::atomic<bool>& stop) {
   State& state = *state_;
+  LUCERNA_RETURN_IF_ERROR(state.PrepareSpectra(settings, pass));
+  const PreparedScene::AtPass at_pass(state.prepared, settings.seed, pass);
   const EyePass eye =
       TraceHitpointPass(*state.eye_paths, pass, state.first_hits->Of(pass), *state.film_spread,
                         state.team, [&stop] { return stop.load(std::memory_order_relaxed); });
@@ -395,7 +406,8 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
     for (const std::uint64_t index : named)
       dropped.push_back({pass, index});
   }
-  SliceSums slice = SliceOfPass(eye, plan, sums, settings, state.prepared.flux_scale(), state.team);
+  SliceSums slice =
+      SliceOfPass(eye, plan, sums, settings, needs, state.prepared.flux_scale(), state.team);
   slice.dropped_photons = std::move(dropped);
   return slice;
 }

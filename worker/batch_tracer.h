@@ -60,7 +60,7 @@ class BatchTracer {
     const PhotonGuide* guide;
   };
   // Adds what the hitpoints gather of these photons, and the names of the first that were dropped.
-  // Requires hitpoints, photons and radii that fit.
+  // Requires hitpoints, photons and radii that fit, and a scene prepared for the pass.
   Status GatherPhotons(const RenderSettings& settings, const SceneNeeds& needs,
                        const PhotonRange& range, const HitpointBlock& block,
                        const RadiusColumn& radii, const std::atomic<bool>& stop, PassSums& sums,

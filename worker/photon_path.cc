@@ -423,8 +423,8 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
   PathWavelength wavelength;
   if (parts.dispersion) {
     constexpr std::uint64_t kWavelengthKey = 0x574156454C454E47ULL;
-    wavelength =
-        PathWavelength(KeyedRng(CombineKeys(key.job_key ^ kWavelengthKey, key.number)).Uniform());
+    wavelength = PathWavelength(
+        KeyedRng(CombineKeys(key.job_key ^ kWavelengthKey, key.number)).Uniform(), scene_.uplift);
   }
   std::int32_t medium = parts.media ? light_media_[emission.emitter] : kNoMedium;
   for (int landing = 0; landing < settings_.max_depth; ++landing) {

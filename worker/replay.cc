@@ -174,7 +174,8 @@ StatusOr<v1::PhotonPaths> ReplayInScene(Scene rec709, const RenderSettings& sett
   }
   PreparedScene prepared(std::move(rec709));
   LUCERNA_RETURN_IF_ERROR(
-      prepared.PrepareFor(needs, TimeOfPass(prepared.scene().motion, settings.seed, pass)));
+      prepared.PrepareFor(needs, TimeOfPass(prepared.scene().motion, settings.seed, photons.pass)));
+  const PreparedScene::AtPass at_pass(prepared, settings.seed, photons.pass);
   const PhotonPathTracer tracer(prepared.scene(), prepared.intersector(), prepared.lights(),
                                 settings, needs, nullptr, Bounds(), photons_per_pass, Bounds(),
                                 guide);

@@ -48,6 +48,7 @@ constexpr std::array<std::string_view, kParts> kNames = {
     "alpha-masks",
     "instances",
     "dispersion",
+    "spectra",
 };
 
 // Sets of eye paths: with fewer the edges of shapes would be seen not to be smooth.
@@ -485,6 +486,9 @@ class NeedsFinder {
   }
 
   void AddRareParts() {
+    Set(Part::kSpectra, settings_.spectral,
+        settings_.spectral ? "setting \"spectral\": each pass carries three wavelengths"
+                           : "paths carry three colours");
     Set(Part::kMotion, scene_.motion.Moves(), MotionReason());
     const std::size_t media = scene_.media.size();
     Set(Part::kMedia, media > 0,

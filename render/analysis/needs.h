@@ -52,8 +52,9 @@ enum class Part : std::uint8_t {
   kAlphaMasks,
   kInstances,   // a second level of the acceleration structure
   kDispersion,  // a wavelength for each path
+  kSpectra,     // three wavelengths for each pass
 };
-inline constexpr std::size_t kParts = static_cast<std::size_t>(Part::kDispersion) + 1;
+inline constexpr std::size_t kParts = static_cast<std::size_t>(Part::kSpectra) + 1;
 
 [[nodiscard]] constexpr std::array<Part, kParts> AllParts() {
   std::array<Part, kParts> parts{};

@@ -26,6 +26,7 @@ Status PreparedScene::PrepareFor(const SceneNeeds& needs, std::optional<double> 
   needs_ = needs;
   lights_ = std::make_unique<LightSet>(scene_, *intersector_, needs_.lights());
   flux_scale_ = FluxScale::ForPower(lights_->TotalPower());
+  colors_ = needs_.Uses(Part::kSpectra) ? std::make_unique<PassColors>(scene_) : nullptr;
   return absl::OkStatus();
 }
 
@@ -33,6 +34,19 @@ StatusOr<std::unique_ptr<PreparedScene>> PreparedScene::At(double time) const {
   std::unique_ptr<PreparedScene> other(new PreparedScene(scene_, time_, mover_));
   LUCERNA_RETURN_IF_ERROR(other->PrepareFor(needs_, time));
   return other;
+}
+
+PreparedScene::AtPass::AtPass(PreparedScene& prepared, std::uint64_t seed, std::uint64_t pass)
+    : prepared_(prepared) {
+  if (prepared_.colors_ == nullptr) return;
+  prepared_.colors_->SetAt(WavelengthsOfPass(seed, pass), prepared_.scene_);
+  prepared_.lights_->TakeColors();
+}
+
+PreparedScene::AtPass::~AtPass() {
+  if (prepared_.colors_ == nullptr) return;
+  prepared_.colors_->SetThree(prepared_.scene_);
+  prepared_.lights_->TakeColors();
 }
 
 }  // namespace lucerna

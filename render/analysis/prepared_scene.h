@@ -6,6 +6,7 @@
 // right without knowing of motion.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 
@@ -16,6 +17,7 @@
 #include "render/scene/scene.h"
 #include "render/scene/scene_at_time.h"
 #include "render/transport/light.h"
+#include "render/transport/pass_colors.h"
 
 namespace lucerna {
 
@@ -38,16 +40,35 @@ class PreparedScene {
   // Errors: those of PrepareFor.
   [[nodiscard]] StatusOr<std::unique_ptr<PreparedScene>> At(double time) const;
 
-  // In the working space.
+  // In the working space, or at the wavelengths of a pass.
   [[nodiscard]] const Scene& scene() const { return scene_; }
   // That of which the scene is.
   [[nodiscard]] double time() const { return time_; }
+
+  // Gives scene() and lights() of a job that carries wavelengths those of a pass, until the object
+  // is gone; of other jobs nothing changes. Requires that PrepareFor has returned OK, and that
+  // nobody uses them meanwhile but for that pass.
+  class AtPass {
+   public:
+    AtPass(PreparedScene& prepared, std::uint64_t seed, std::uint64_t pass);
+    ~AtPass();
+    AtPass(const AtPass&) = delete;
+    AtPass& operator=(const AtPass&) = delete;
+
+   private:
+    PreparedScene& prepared_;
+  };
 
   // The rest requires that PrepareFor has returned OK.
   [[nodiscard]] const SceneNeeds& needs() const { return needs_; }
   [[nodiscard]] const Intersector& intersector() const { return *intersector_; }
   [[nodiscard]] const LightSet& lights() const { return *lights_; }
   [[nodiscard]] const FluxScale& flux_scale() const { return flux_scale_; }
+  // At least how many times its power [luminance] a light has in any pass: 1 where its colour is
+  // the same in all.
+  [[nodiscard]] double largest_power() const {
+    return colors_ == nullptr ? 1 : colors_->largest_power();
+  }
 
  private:
   PreparedScene(const Scene& scene, double time, std::shared_ptr<const SceneMover> mover)
@@ -64,6 +85,7 @@ class PreparedScene {
   std::unique_ptr<Intersector> intersector_;
   std::unique_ptr<LightSet> lights_;
   FluxScale flux_scale_;
+  std::unique_ptr<PassColors> colors_;  // of a job that carries wavelengths
 };
 
 }  // namespace lucerna

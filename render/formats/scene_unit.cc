@@ -92,6 +92,8 @@ Status ChooseUnit(Scene& scene) {
   for (Medium& medium : scene.media) {
     medium.absorption *= static_cast<float>(scene.unit);
     medium.scattering *= static_cast<float>(scene.unit);
+    medium.absorption_spectrum.factor *= static_cast<float>(scene.unit);
+    medium.scattering_spectrum.factor *= static_cast<float>(scene.unit);
   }
   for (InfiniteLight& light : scene.infinite_lights) {
     if (!light.portal) continue;

@@ -23,6 +23,11 @@ Xyz Observe(const Curve& curve) {
   return sum;
 }
 
+// Planck's law up to a factor; the second radiation constant is 1.438777e7 nm·K.
+double Planck(double nm, double temperature_k) {
+  return 1 / (std::pow(nm / 560, 5) * std::expm1(1.438777e7 / (nm * temperature_k)));
+}
+
 // Cut off at zero first and scaled after, so that the luminance is 1 for saturated colours too.
 Rgb WithUnitLuminance(const Xyz& xyz) {
   std::array<double, 3> rgb = Rec709(xyz);
@@ -36,29 +41,24 @@ Rgb WithUnitLuminance(const Xyz& xyz) {
 
 }  // namespace
 
-double WavelengthCurve::At(double nm) const {
-  if (wavelength_nm.empty() || nm < wavelength_nm.front() || nm > wavelength_nm.back()) return 0;
-  return AtClamped(nm);
-}
-
-double WavelengthCurve::AtClamped(double nm) const {
-  const auto above = std::upper_bound(wavelength_nm.begin(), wavelength_nm.end(), nm);
-  if (above == wavelength_nm.begin()) return value.front();
-  if (above == wavelength_nm.end()) return value.back();
-  const auto i = static_cast<std::size_t>(above - wavelength_nm.begin());
-  const double t = (nm - wavelength_nm[i - 1]) / (wavelength_nm[i] - wavelength_nm[i - 1]);
-  return value[i - 1] * (1 - t) + value[i] * t;
-}
-
 Rgb EmissionColor(const WavelengthCurve& curve) {
   return WithUnitLuminance(Observe([&curve](double nm) { return curve.At(nm); }));
 }
 
 Rgb BlackbodyColor(double temperature_k) {
-  // Planck's law up to a factor; the second radiation constant is 1.438777e7 nm·K.
-  return WithUnitLuminance(Observe([temperature_k](double nm) {
-    return 1 / (std::pow(nm / 560, 5) * std::expm1(1.438777e7 / (nm * temperature_k)));
-  }));
+  return WithUnitLuminance(
+      Observe([temperature_k](double nm) { return Planck(nm, temperature_k); }));
+}
+
+WavelengthCurve BlackbodyCurve(double temperature_k) {
+  // Fine enough for a line between two values to be Planck's law within 1e-3 at 1000 K.
+  constexpr double kFirstNm = 360, kLastNm = 830, kStepNm = 5;
+  WavelengthCurve curve;
+  for (double nm = kFirstNm; nm <= kLastNm; nm += kStepNm) {
+    curve.wavelength_nm.push_back(nm);
+    curve.value.push_back(Planck(nm, temperature_k));
+  }
+  return curve;
 }
 
 Rgb ReflectanceColor(const WavelengthCurve& curve) {

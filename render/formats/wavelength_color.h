@@ -4,22 +4,10 @@
 // 709 are cut off at zero.
 #pragma once
 
-#include <vector>
-
 #include "render/math/rgb.h"
+#include "render/math/wavelength_curve.h"
 
 namespace lucerna {
-
-// Values at wavelengths, linear between them and zero outside.
-struct WavelengthCurve {
-  std::vector<double> wavelength_nm;  // strictly increasing
-  std::vector<double> value;          // one for each wavelength
-
-  // The value at `nm`, zero outside the curve.
-  [[nodiscard]] double At(double nm) const;
-  // The value at `nm`, outside the curve that of its nearer end. Requires a curve of one or more.
-  [[nodiscard]] double AtClamped(double nm) const;
-};
 
 // The wavelengths that stand for red, green and blue where a quantity is sampled, not seen: the
 // optical constants of metals.
@@ -33,6 +21,8 @@ inline constexpr double kRedNm = 630, kGreenNm = 532, kBlueNm = 465;
 // kMaxBlackbodyK: outside, single precision has no room for the curve.
 inline constexpr double kMinBlackbodyK = 500, kMaxBlackbodyK = 1e6;
 [[nodiscard]] Rgb BlackbodyColor(double temperature_k);
+// The same up to a factor, where the eye sees.
+[[nodiscard]] WavelengthCurve BlackbodyCurve(double temperature_k);
 
 // A surface that reflects by this curve, in daylight D65; a curve that is 1 everywhere is white.
 // Every channel is in [0, 1].

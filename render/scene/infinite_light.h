@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "render/math/rgb.h"
+#include "render/scene/given_spectrum.h"
 #include "render/scene/shape_traits.h"
 #include "render/scene/texture.h"
 
@@ -42,6 +43,7 @@ struct InfiniteLight {
   ShapeAxes axes = {};          // of the map, in the world
   Kind kind = Kind::kInfinite;  // the same everywhere; kEnvironment: a map; kPortal: either
   std::optional<Portal> portal = std::nullopt;  // of kPortal
+  GivenSpectrum spectrum = {};                  // of the radiance, up to a factor
 
   // Whether it is brighter from some directions than from others.
   [[nodiscard]] bool HasDetail() const {

@@ -5,6 +5,7 @@
 
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
+#include "render/scene/given_spectrum.h"
 #include "render/scene/medium.h"
 
 namespace lucerna {
@@ -15,6 +16,7 @@ struct DistantLight {
   Vec3 direction;  // unit, the way the light travels
   Rgb irradiance;  // [W·m⁻²] on a plane facing it
   std::int32_t medium = kNoMedium;
+  GivenSpectrum spectrum = {};
 
   [[nodiscard]] Vec3 Place() const { return direction; }
   [[nodiscard]] const Rgb& Strength() const { return irradiance; }

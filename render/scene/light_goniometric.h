@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "render/math/piecewise_constant.h"
+#include "render/scene/given_spectrum.h"
 #include "render/scene/medium.h"
 #include "render/scene/scaling.h"
 #include "render/scene/shape_traits.h"
@@ -24,6 +25,7 @@ struct GoniometricLight {
   std::shared_ptr<const PiecewiseConstant2D> directions;  // in proportion to the picture
   ShapeAxes axes;                                         // of the map, in the world
   std::int32_t medium = kNoMedium;
+  GivenSpectrum spectrum = {};
 
   // Of a pixel of the map.
   [[nodiscard]] static float GrayOf(const Picture& map, int x, int y) {

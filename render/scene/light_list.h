@@ -10,6 +10,7 @@
 //   Place()        its position; at infinity, the direction in which its light travels, unit
 //   Strength()     its colour: an intensity [W·sr⁻¹] or irradiance [W·m⁻²], as rgb in linear
 //                  Rec. 709, or once the scene is in the working space, in that
+//   spectrum       of the strength, where the file gives it by wavelength, up to a factor
 //   medium         in which it is, as the file names it (scene/medium.h)
 //   Scale(factor)  to another unit of length (scene/scaling.h); false when the strength has no
 //                  number then

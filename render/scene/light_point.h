@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "render/scene/given_spectrum.h"
 #include "render/scene/medium.h"
 #include "render/scene/scaling.h"
 
@@ -14,6 +15,7 @@ struct PointLight {
   Vec3 position;
   Rgb intensity;  // [W·sr⁻¹]
   std::int32_t medium = kNoMedium;
+  GivenSpectrum spectrum = {};
 
   [[nodiscard]] Vec3 Place() const { return position; }
   [[nodiscard]] const Rgb& Strength() const { return intensity; }

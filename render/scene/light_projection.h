@@ -8,6 +8,8 @@
 
 #include "render/math/color_space.h"
 #include "render/math/piecewise_constant.h"
+#include "render/math/uplift.h"
+#include "render/scene/given_spectrum.h"
 #include "render/scene/medium.h"
 #include "render/scene/scaling.h"
 #include "render/scene/shape_traits.h"
@@ -28,11 +30,16 @@ struct ProjectionLight {
   // Half of the picture's width and height at distance 1.
   float half_width = 1, half_height = 1;
   std::int32_t medium = kNoMedium;
+  GivenSpectrum spectrum = {};
 
   [[nodiscard]] int columns() const { return map->width * parts; }
   [[nodiscard]] int rows() const { return map->height * parts; }
   // Of a cell, in the working space.
   [[nodiscard]] Rgb ColorOf(int x, int y) const { return ToWorking(map->At(x / parts, y / parts)); }
+  // The same at a pass's wavelengths; `uplift` nullptr: in the working space.
+  [[nodiscard]] Rgb ColorOf(int x, int y, const Uplift* uplift) const {
+    return uplift == nullptr ? ColorOf(x, y) : uplift->Unbounded(map->At(x / parts, y / parts));
+  }
   // The place [cells] that shines in a direction away from the light with these slopes x/z and y/z.
   [[nodiscard]] Vec2 PlaceOf(float x_slope, float y_slope) const {
     return {(x_slope / half_width + 1) * 0.5F * static_cast<float>(columns()),
@@ -55,14 +62,15 @@ struct ProjectionLight {
   }
   [[nodiscard]] float WeightOf(int x, int y) const { return Luminance(LightOf(x, y)); }
   // What `intensity` is multiplied by in a direction away from the light, in the working space.
-  [[nodiscard]] Rgb FactorAt(Vec3 direction) const {
+  [[nodiscard]] Rgb FactorAt(Vec3 direction, const Uplift* uplift = nullptr) const {
     const float z = Dot(direction, axes.z);
     if (!(z > 0)) return {};
     const Vec2 place = PlaceOf(Dot(direction, axes.x) / z, Dot(direction, axes.y) / z);
     const bool is_inside = place.x >= 0 && place.y >= 0 &&
                            place.x < static_cast<float>(columns()) &&
                            place.y < static_cast<float>(rows());
-    return is_inside ? ColorOf(static_cast<int>(place.x), static_cast<int>(place.y)) : Rgb{};
+    return is_inside ? ColorOf(static_cast<int>(place.x), static_cast<int>(place.y), uplift)
+                     : Rgb{};
   }
   [[nodiscard]] Vec3 Place() const { return position; }
   [[nodiscard]] const Rgb& Strength() const { return intensity; }

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "render/scene/given_spectrum.h"
 #include "render/scene/medium.h"
 #include "render/scene/scaling.h"
 
@@ -19,6 +20,7 @@ struct SpotLight {
   float cos_falloff_start = 1;
   float cos_total_width = 1;
   std::int32_t medium = kNoMedium;
+  GivenSpectrum spectrum = {};
 
   [[nodiscard]] Vec3 Place() const { return position; }
   [[nodiscard]] const Rgb& Strength() const { return intensity; }

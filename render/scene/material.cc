@@ -78,4 +78,10 @@ Rgb TexturedValue(MaterialNumbers::Kind kind, Rgb color) {
   return WithKind(kind, [&](auto of_kind) { return of_kind.TexturedValue(color); });
 }
 
+Rgb TexturedValueAtWavelengths(MaterialNumbers::Kind kind, Rgb values) {
+  // Of grey, each channel follows from that channel alone.
+  return {TexturedValue(kind, Gray(values.r)).r, TexturedValue(kind, Gray(values.g)).g,
+          TexturedValue(kind, Gray(values.b)).b};
+}
+
 }  // namespace lucerna

@@ -20,6 +20,7 @@
 
 #include "render/math/dispersion.h"
 #include "render/math/rgb.h"
+#include "render/scene/given_spectrum.h"
 #include "render/scene/texture.h"
 
 // The kinds of material, in the order of Material::Kind.
@@ -62,6 +63,7 @@ struct MaterialNumbers {
   Rgb transmittance;                     // diffuse transmission
   Rgb eta = {1, 1, 1};                   // conductor, under a coat too: index of refraction
   Rgb k = {0, 0, 0};                     // the same: absorption
+  bool is_at_wavelengths = false;        // eta and k are those of a pass's wavelengths
   float ior = 1.5F;                      // dielectric, coat, hair: inside over outside
   Dispersion dispersion;                 // dielectric; `ior` is that at the d line
   float alpha_u = 0;                     // of metals, dielectrics and coats: GGX widths; 0 and 0:
@@ -151,6 +153,7 @@ struct Material : MaterialNumbers {
   std::shared_ptr<const CoatTable> owned_coat;
   std::shared_ptr<const CoatFamily> owned_coats;
   std::shared_ptr<const MaterialProperties> owned_mixed_properties;
+  OwnedSpectra given;  // colours that the file gives by wavelength
 
   bool operator==(const Material&) const = default;
 };
@@ -263,6 +266,8 @@ LUCERNA_MATERIALS(LUCERNA_DECLARE)
 [[nodiscard]] Rgb TexturedParameter(const MaterialNumbers& material);
 void SetTexturedParameter(MaterialNumbers& material, Rgb value);
 [[nodiscard]] Rgb TexturedValue(MaterialNumbers::Kind kind, Rgb color);
+// The same of reflectances at three wavelengths.
+[[nodiscard]] Rgb TexturedValueAtWavelengths(MaterialNumbers::Kind kind, Rgb values);
 
 // Gives mixes the properties of what they are made of: each material of a mix becomes a copy that
 // says that it is one. Mixes that have their properties get them anew.

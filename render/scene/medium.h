@@ -7,6 +7,7 @@
 #include <string>
 
 #include "render/math/rgb.h"
+#include "render/scene/given_spectrum.h"
 
 namespace lucerna {
 
@@ -20,6 +21,8 @@ struct Medium {
   // Mean cosine between the directions before and after a scattering, in (-1, 1) (Henyey &
   // Greenstein 1941).
   float g = 0;
+  // What of the two the file gives by wavelength.
+  GivenSpectrum absorption_spectrum = {}, scattering_spectrum = {};
 
   bool operator==(const Medium&) const = default;
 

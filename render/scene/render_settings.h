@@ -51,6 +51,8 @@ struct SettingFields {
   // Photons are drawn in proportion to power alone, not by what earlier ones found
   // (transport/photon_guide.h).
   Field<bool> unguided{};
+  // Paths carry three wavelengths of each pass in place of three colours.
+  Field<bool> spectral{};
   Field<std::uint64_t> seed{};
   Field<RadiusControllerKind> radius_controller{};
   Field<double> alpha{};

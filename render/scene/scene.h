@@ -52,7 +52,8 @@ struct AreaLight {
   bool two_sided = false;  // else the side that the shape's outward normal points to
   // Over the shape's u and v, as PictureColor has it with its edges clamped.
   std::shared_ptr<const Picture> picture = nullptr;
-  float largest_pixel = 1;  // of `picture`, any channel
+  float largest_pixel = 1;      // of `picture`, any channel
+  GivenSpectrum spectrum = {};  // of the radiance, up to a factor
 
   // No channel of the radiance is anywhere larger.
   [[nodiscard]] Rgb Largest() const {
@@ -184,6 +185,8 @@ struct ShapeSource {
   std::uint32_t line = 0;  // from 1
 };
 
+class Uplift;  // math/uplift.h
+
 struct Scene {
   // A length here times this is one of the file: a power of two, 1 for scenes of common sizes
   // (formats/scene_unit.h). Of what is below, the integrator's settings are the file's.
@@ -219,6 +222,9 @@ struct Scene {
   std::vector<std::string> source_files;
   // "room.pbrt:12"; empty when it is not known.
   [[nodiscard]] std::string SourceOf(const ShapeTraits& traits) const;
+  // Of a scene whose colours are values at the wavelengths of a pass (transport/pass_colors.h):
+  // from the pixels of pictures to such values. Else nullptr.
+  const Uplift* uplift = nullptr;
 
   // Of the triangles in memory: those of an object once.
   [[nodiscard]] std::size_t TriangleCount() const {

@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "render/base/text.h"
+#include "render/scene/saturated_colors.h"
 
 namespace lucerna {
 namespace {
@@ -113,6 +114,14 @@ constexpr auto kSettings = std::to_array<Setting>({
      .meaning = "send photons in proportion to power alone, not more where earlier ones have come "
                 "into view",
      .type = SettingField<bool>{.given = &Overrides::unguided, .value = &Settings::unguided}},
+    {.name = "spectral",
+     .meaning = "carry wavelengths in place of three colours; `--spectral=false` for three colours",
+     .default_text = "set where a colour is saturated or smooth glass disperses",
+     .type = SettingField<bool>{.given = &Overrides::spectral,
+                                .value = &Settings::spectral,
+                                .of_scene = [](const Scene& scene) -> std::optional<bool> {
+                                  return HasSaturatedColors(scene);
+                                }}},
     {.name = "seed",
      .meaning = "another seed gives other noise",
      .scene_default = "the scene's `seed`",

@@ -124,7 +124,7 @@ class EyePathTracer {
   [[nodiscard]] Rgb BrightOf(const Ray& ray, KeyedRng rng, PathWavelength wavelength) const;
   // Of a number in [0, 1); none where no glass disperses.
   [[nodiscard]] PathWavelength WavelengthOf(float u) const {
-    return parts_.dispersion ? PathWavelength(u) : PathWavelength();
+    return parts_.dispersion ? PathWavelength(u, scene_.uplift) : PathWavelength();
   }
   // A reflection (`lobe` 0) or refraction (1) at a smooth surface.
   struct SmoothBranch {
@@ -199,7 +199,7 @@ class EyePathTracer {
   // refractions are all followed, not drawn.
   [[nodiscard]] Rgb EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int& rays) const;
   [[nodiscard]] PathWavelength WavelengthOf(const PixelSampler& sampler) const {
-    return parts_.dispersion ? PathWavelength(sampler.ForWavelength()) : PathWavelength();
+    return WavelengthOf(sampler.ForWavelength());
   }
   // What a ray in `medium` meets, behind interfaces; with media, what is left of light on the way.
   [[nodiscard]] bool FindThroughMedia(Ray& ray, Hit& hit, std::int32_t& medium, Rgb& transmittance,

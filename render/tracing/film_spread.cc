@@ -54,7 +54,7 @@ FilmRegion FilmSpread::OnFilm(const Window& pixels) const {
 }
 
 void FilmSpread::Prepare(ThreadTeam& team) {
-  if (is_prepared_) return;
+  if (is_prepared_ || !is_needed()) return;
   is_prepared_ = true;
   // One more on each side: an outline lies between two centres that differ.
   around_ = {std::max(-reach_x_ - 1, image_.x0), std::max(-reach_y_ - 1, image_.y0),

@@ -53,6 +53,10 @@ class FilmSpread {
   // Whether Add does anything.
   [[nodiscard]] bool is_needed() const { return tracer_.MeetsBright(); }
 
+  // Finds what does not change between passes, unless it is known; Add does so too. Where colours
+  // of the scene change between passes it is to be called before.
+  void Prepare(ThreadTeam& team);
+
   // Adds to `direct` what bright lights bring to the pixels of the crop window in a pass. `bright`:
   // EyePath::bright of the same pixels. What lies straight ahead of pixels is found once.
   // `shall_stop` may be empty and is asked between tiles: once it is true, the rest is left out.
@@ -88,8 +92,6 @@ class FilmSpread {
                static_cast<std::size_t>(around_.x1 - around_.x0) +
            static_cast<std::size_t>(x - around_.x0);
   }
-  // Finds what does not change between passes.
-  void Prepare(ThreadTeam& team);
   // Paths a pass that are traced for the bright part alone; 0: the pixel's own path counts.
   [[nodiscard]] int BrightPathsOf(int x, int y) const;
 

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "render/estimate/evidence.h"
 #include "render/math/color_space.h"
 #include "render/math/kernel.h"
+#include "render/math/pass_wavelengths.h"
 
 namespace lucerna {
 namespace {
@@ -20,6 +22,10 @@ struct PixelOfPass {
   std::array<double, 3> photons{};
   double bias = 0;
 };
+
+std::array<double, 3> ToDoubles(Rgb c) {
+  return {static_cast<double>(c.r), static_cast<double>(c.g), static_cast<double>(c.b)};
+}
 
 }  // namespace
 
@@ -41,7 +47,8 @@ RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan) {
 }
 
 SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums& sums,
-                      const RenderSettings& settings, const FluxScale& scale, ThreadTeam& team) {
+                      const RenderSettings& settings, const SceneNeeds& needs,
+                      const FluxScale& scale, ThreadTeam& team) {
   const std::size_t rows = pass.pixels.size();
   const std::size_t pixels = pass.direct.size();
   LUCERNA_CHECK(sums.size() == rows && plan.radii->size() == pixels &&
@@ -67,6 +74,14 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
     columns.push_back(column.data());
   const auto set = [&](std::size_t column, std::size_t pixel, double value) {
     columns[column][pixel] = Rounded(value, SignificantBits(slice.passes, column, evidence));
+  };
+
+  // Some of the colours that make a mean over passes are below zero: single wavelengths are outside
+  // of all three.
+  std::optional<PassWavelengths> wavelengths;
+  if (needs.Uses(Part::kSpectra)) wavelengths = WavelengthsOfPass(settings.seed, pass.pass);
+  const auto in_color = [&](const std::array<double, 3>& values) {
+    return wavelengths.has_value() ? wavelengths->ToWorking(values) : values;
   };
 
   std::vector<PixelOfPass> brought(pixels);
@@ -117,18 +132,21 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   const SliceColumn bias = pass.pass % 2 == 0 ? kEvenBias : kOddBias;
   const std::size_t first_feature = slice.first_feature();
   const auto set_pixel = [&](std::size_t pixel) {
+    const std::array<double, 3> photons = in_color(brought[pixel].photons);
+    const std::array<double, 3> direct = in_color(ToDoubles(pass.direct[pixel]));
     const unsigned int photon_bits = PhotonBits(columns[kPhotonCount][pixel]);
     for (std::size_t c = 0; c < 3; ++c) {
-      columns[kPhotonRadiance + c][pixel] = Rounded(brought[pixel].photons[c], photon_bits);
-      set(kDirectRadiance + c, pixel, static_cast<double>(pass.direct[pixel][static_cast<int>(c)]));
+      columns[kPhotonRadiance + c][pixel] = Rounded(photons[c], photon_bits);
+      set(kDirectRadiance + c, pixel, direct[c]);
     }
     set(bias, pixel, brought[pixel].bias);
     if (!HasFeatures(slice.passes)) return;
     const EyeFeatures& features = pass.features[pixel];
     if (!std::isfinite(features.distance)) return;
+    const std::array<double, 3> albedo = in_color(ToDoubles(features.albedo));
     for (int c = 0; c < 3; ++c) {
       const auto offset = static_cast<std::size_t>(c);
-      set(first_feature + kAlbedo + offset, pixel, static_cast<double>(features.albedo[c]));
+      set(first_feature + kAlbedo + offset, pixel, albedo[offset]);
       set(first_feature + kNormal + offset, pixel, static_cast<double>(features.normal[c]));
     }
     set(first_feature + kDistance, pixel, static_cast<double>(features.distance));

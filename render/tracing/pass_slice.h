@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "render/analysis/needs.h"
 #include "render/base/parallel.h"
 #include "render/estimate/accumulation.h"
 #include "render/estimate/hitpoint_block.h"
@@ -34,9 +35,11 @@ struct RoundPlan {
 // The radius of every hitpoint of a pass [scene units].
 [[nodiscard]] RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan);
 
-// The slice of one pass. `sums` are those of all its photons, gathered with HitpointRadii.
+// The slice of one pass. `sums` are those of all its photons, gathered with HitpointRadii. Of a job
+// that carries wavelengths (`needs`) it has their colour, in the working space as any other.
 [[nodiscard]] SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan,
                                     const PassSums& sums, const RenderSettings& settings,
-                                    const FluxScale& scale, ThreadTeam& team);
+                                    const SceneNeeds& needs, const FluxScale& scale,
+                                    ThreadTeam& team);
 
 }  // namespace lucerna

@@ -11,6 +11,12 @@
 namespace lucerna {
 namespace {
 
+// Of what follows from the indices of a metal, which are those of Rec. 709's channels unless they
+// are those of a pass's wavelengths: in the scene's colours.
+Rgb InScene(const Material& material, Rgb of_indices) {
+  return material.is_at_wavelengths ? of_indices : ToWorking(of_indices);
+}
+
 Ggx BaseFacets(const Material& material) {
   return {BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior),
           BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior)};
@@ -58,7 +64,7 @@ Rgb MirrorReflectance(const Material& material, float cosine) {
     sum = metal * (Gray(1) + sum * reflected);
     if (sum == before) break;
   }
-  return Gray(reflected) + ToWorking(sum * Square(1 - reflected));
+  return Gray(reflected) + InScene(material, sum * Square(1 - reflected));
 }
 
 // --- the lobes of what is scattered broadly
@@ -137,7 +143,7 @@ Rgb EvaluateUp(const Material& material, Vec3 up, Vec3 wi) {
     below += ResidualColor(material) *
              (CoatResidual(material, up.z) * CoatResidual(material, wi.z) * kInversePi / mean);
   }
-  return Gray(coat) + ToWorking(below);
+  return Gray(coat) + InScene(material, below);
 }
 
 bool SampleUp(const Material& material, Vec3 up, float u1, float u2, Vec3& wi) {
@@ -210,7 +216,7 @@ float CoatedConductorBsdf::Pdf(const Material& material, Vec3 wo, Vec3 wi) {
 
 Rgb CoatedConductorBsdf::Albedo(const Material& material) {
   if (material.parts == Parts::kFirst) return Gray(1);
-  return ToWorking(MetalInCoat(material, 1));
+  return InScene(material, MetalInCoat(material, 1));
 }
 
 float CoatedConductorBsdf::ReflectedShare(const Material& /*material*/, float /*cos_o*/) {

@@ -9,9 +9,11 @@
 namespace lucerna {
 namespace {
 
-// What a metal reflects, in the working space: its indices are those of Rec. 709's channels.
+// What a metal reflects, in the working space, or at the pass's wavelengths: elsewhere its indices
+// are those of Rec. 709's channels.
 Rgb MetalReflectance(const Material& material, float cos_i) {
-  return ToWorking(FresnelConductor(cos_i, material.eta, material.k));
+  const Rgb reflected = FresnelConductor(cos_i, material.eta, material.k);
+  return material.is_at_wavelengths ? reflected : ToWorking(reflected);
 }
 
 // The half vector of reflection, turned to z > 0; false when wo and wi have none.

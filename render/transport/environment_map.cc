@@ -7,6 +7,7 @@
 #include "render/base/status.h"
 #include "render/math/color_space.h"
 #include "render/math/equal_area_square.h"
+#include "render/math/uplift.h"
 #include "render/math/warp.h"
 #include "render/transport/sky_detail.h"
 
@@ -21,9 +22,11 @@ float DensityOf(Rgb radiance, double mean_luminance) {
 
 }  // namespace
 
-EnvironmentMap::EnvironmentMap(const InfiniteLight& light)
+EnvironmentMap::EnvironmentMap(const InfiniteLight& light, std::size_t number)
     : map_(light.map),
+      number_(number),
       scale_(light.radiance),
+      scale_now_(light.radiance),
       axes_(light.axes),
       size_(light.map->width),
       texels_(size_, map_->height, [this](int x, int y) {
@@ -49,6 +52,11 @@ Rgb EnvironmentMap::RadianceOf(Texel texel) const {
   return ToWorking(map_->At(texel.x, texel.y)) * scale_;
 }
 
+Rgb EnvironmentMap::RadianceNow(Texel texel) const {
+  if (uplift_ == nullptr) return RadianceOf(texel);
+  return uplift_->Unbounded(map_->At(texel.x, texel.y)) * scale_now_;
+}
+
 Vec2 EnvironmentMap::PlaceOf(Vec3 direction) const {
   return EqualAreaPlace(
       {Dot(direction, axes_.x), Dot(direction, axes_.y), Dot(direction, axes_.z)});
@@ -63,11 +71,11 @@ EnvironmentMap::Texel EnvironmentMap::TexelOf(Vec3 direction) const {
 }
 
 Rgb EnvironmentMap::Radiance(Vec3 direction) const {
-  return RadianceOf(TexelOf(direction));
+  return RadianceNow(TexelOf(direction));
 }
 
 float EnvironmentMap::PdfSolidAngle(Vec3 direction) const {
-  return DensityOf(Radiance(direction), mean_luminance_);
+  return DensityOf(RadianceOf(TexelOf(direction)), mean_luminance_);
 }
 
 Vec3 EnvironmentMap::Sample(float u1, float u2) const {
@@ -80,11 +88,11 @@ Vec3 EnvironmentMap::Sample(float u1, float u2) const {
 bool EnvironmentMap::SampleEmission(const Emitter& emitter, const BoundingSphere& scene,
                                     const EmissionNumbers& u, Emission& emission) const {
   const Vec3 towards = Sample(u.direction1, u.direction2);
-  const Rgb radiance = Radiance(towards);
-  const float pdf = DensityOf(radiance, mean_luminance_);
+  const Texel texel = TexelOf(towards);
+  const float pdf = DensityOf(RadianceOf(texel), mean_luminance_);
   if (!(pdf > 0)) return false;
   SetEnteringRay(towards, scene, u, emission.ray);
-  emission.flux = radiance * (kPi * scene.radius * scene.radius / (pdf * emitter.choice));
+  emission.flux = RadianceNow(texel) * (kPi * scene.radius * scene.radius / (pdf * emitter.choice));
   return true;
 }
 
@@ -103,9 +111,9 @@ std::unique_ptr<const InfiniteSpectrum> EnvironmentMap::MeasureSpectrum() const 
 
 InfiniteEmissions MakeEnvironmentEmissions(const std::vector<InfiniteLight>& lights) {
   InfiniteEmissions emissions;
-  for (const InfiniteLight& light : lights) {
-    if (light.kind != InfiniteLight::Kind::kEnvironment) continue;
-    auto environment = std::make_shared<EnvironmentMap>(light);
+  for (std::size_t number = 0; number < lights.size(); ++number) {
+    if (lights[number].kind != InfiniteLight::Kind::kEnvironment) continue;
+    auto environment = std::make_shared<EnvironmentMap>(lights[number], number);
     if (!IsBlack(environment->MeanRadiance())) emissions.push_back(std::move(environment));
   }
   return emissions;

@@ -19,10 +19,14 @@ namespace lucerna {
 
 class EnvironmentMap final : public InfiniteEmission {
  public:
-  // Requires a light with a map.
-  explicit EnvironmentMap(const InfiniteLight& light);
+  // Requires a light with a map, of that number among the scene's infinite lights.
+  explicit EnvironmentMap(const InfiniteLight& light, std::size_t number = 0);
 
   [[nodiscard]] EmitterKind kind() const override { return EmitterKind::kEnvironment; }
+  void TakeColors(const std::vector<InfiniteLight>& lights, const Uplift* uplift) override {
+    scale_now_ = lights[number_].radiance;
+    uplift_ = uplift;
+  }
   [[nodiscard]] Rgb Radiance(Vec3 direction) const;
   [[nodiscard]] Rgb Radiance(Vec3 /*from*/, Vec3 direction) const override {
     return Radiance(direction);
@@ -58,10 +62,14 @@ class EnvironmentMap final : public InfiniteEmission {
     int x, y;
   };
   [[nodiscard]] Texel TexelOf(Vec3 direction) const;
+  // Its three colours, by which directions are drawn, and those that it has now.
   [[nodiscard]] Rgb RadianceOf(Texel texel) const;
+  [[nodiscard]] Rgb RadianceNow(Texel texel) const;
 
   std::shared_ptr<const Picture> map_;
-  Rgb scale_;
+  std::size_t number_;
+  Rgb scale_, scale_now_;
+  const Uplift* uplift_ = nullptr;
   ShapeAxes axes_;
   int size_;
   Rgb mean_;

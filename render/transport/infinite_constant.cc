@@ -13,11 +13,22 @@ class ConstantSpectrum final : public InfiniteSpectrum {
   }
 };
 
+Rgb SumOf(const std::vector<InfiniteLight>& lights) {
+  Rgb radiance;
+  for (const InfiniteLight& light : lights) {
+    if (light.kind == InfiniteLight::Kind::kInfinite) radiance += light.radiance;
+  }
+  return radiance;
+}
+
 class ConstantEmission final : public InfiniteEmission {
  public:
   explicit ConstantEmission(Rgb radiance) : radiance_(radiance) {}
 
   [[nodiscard]] EmitterKind kind() const override { return EmitterKind::kInfinite; }
+  void TakeColors(const std::vector<InfiniteLight>& lights, const Uplift* /*uplift*/) override {
+    radiance_ = SumOf(lights);
+  }
   [[nodiscard]] Rgb Radiance(Vec3 /*from*/, Vec3 /*direction*/) const override { return radiance_; }
   [[nodiscard]] Rgb MeanRadiance() const override { return radiance_; }
   [[nodiscard]] float LargestRadiance() const override { return MaxChannel(radiance_); }
@@ -50,10 +61,7 @@ class ConstantEmission final : public InfiniteEmission {
 }  // namespace
 
 InfiniteEmissions MakeInfiniteEmissions(const std::vector<InfiniteLight>& lights) {
-  Rgb radiance;
-  for (const InfiniteLight& light : lights) {
-    if (light.kind == InfiniteLight::Kind::kInfinite) radiance += light.radiance;
-  }
+  const Rgb radiance = SumOf(lights);
   if (IsBlack(radiance)) return {};
   return {std::make_shared<ConstantEmission>(radiance)};
 }

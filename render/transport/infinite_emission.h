@@ -25,13 +25,16 @@ class InfiniteSpectrum {
   [[nodiscard]] virtual Spectrum Source(Vec3 direction, const SpectrumLimits& limits) const = 0;
 };
 
-// A light that is not black. Threads: any.
+// A light that is not black. Threads: any, while no other takes colours.
 class InfiniteEmission {
  public:
   virtual ~InfiniteEmission() = default;
 
   [[nodiscard]] virtual EmitterKind kind() const = 0;
-  // In the working space.
+  // Takes over colours of the scene's infinite lights, and its uplift, that have changed.
+  // MeanRadiance and Power of a map stay as they were, and all by which directions are drawn.
+  virtual void TakeColors(const std::vector<InfiniteLight>& lights, const Uplift* uplift) = 0;
+  // In the scene's colours.
   [[nodiscard]] virtual Rgb Radiance(Vec3 from, Vec3 direction) const = 0;
   // The mean over all directions.
   [[nodiscard]] virtual Rgb MeanRadiance() const = 0;
@@ -72,7 +75,7 @@ class InfiniteEmission {
 
 // The lights of one kind, those that are black left out; a kind whose lights look alike may make
 // one of them all.
-using InfiniteEmissions = std::vector<std::shared_ptr<const InfiniteEmission>>;
+using InfiniteEmissions = std::vector<std::shared_ptr<InfiniteEmission>>;
 #define LUCERNA_DECLARE(Name, name) \
   [[nodiscard]] InfiniteEmissions Make##Name##Emissions(const std::vector<InfiniteLight>& lights);
 LUCERNA_INFINITE_LIGHTS(LUCERNA_DECLARE)

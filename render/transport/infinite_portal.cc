@@ -40,7 +40,7 @@ InfiniteLight SkyOf(InfiniteLight light) {
   return light;
 }
 
-std::shared_ptr<const InfiniteEmission> EmissionOf(const InfiniteLight& light) {
+std::shared_ptr<InfiniteEmission> EmissionOf(const InfiniteLight& light) {
   const InfiniteEmissions emissions = light.map == nullptr
                                           ? MakeInfiniteEmissions({SkyOf(light)})
                                           : MakeEnvironmentEmissions({SkyOf(light)});
@@ -49,8 +49,10 @@ std::shared_ptr<const InfiniteEmission> EmissionOf(const InfiniteLight& light) {
 
 class PortalEmission final : public InfiniteEmission {
  public:
-  PortalEmission(const InfiniteLight& light, std::shared_ptr<const InfiniteEmission> sky)
-      : sky_(std::move(sky)), axes_(light.axes), corner_(light.portal->corner) {
+  // Of that number among the scene's infinite lights.
+  PortalEmission(const InfiniteLight& light, std::size_t number,
+                 std::shared_ptr<InfiniteEmission> sky)
+      : number_(number), sky_(std::move(sky)), axes_(light.axes), corner_(light.portal->corner) {
     const Portal& portal = *light.portal;
     width_ = Length(portal.along_x);
     height_ = Length(portal.along_y);
@@ -61,6 +63,9 @@ class PortalEmission final : public InfiniteEmission {
   }
 
   [[nodiscard]] EmitterKind kind() const override { return EmitterKind::kPortal; }
+  void TakeColors(const std::vector<InfiniteLight>& lights, const Uplift* uplift) override {
+    sky_->TakeColors({SkyOf(lights[number_])}, uplift);
+  }
   [[nodiscard]] Rgb Radiance(Vec3 from, Vec3 direction) const override {
     return Lights(from) && Passes(from, direction) ? sky_->Radiance(from, direction) : Rgb{};
   }
@@ -260,7 +265,8 @@ class PortalEmission final : public InfiniteEmission {
     return {place.x * side, place.y * side};
   }
 
-  std::shared_ptr<const InfiniteEmission> sky_;
+  std::size_t number_;
+  std::shared_ptr<InfiniteEmission> sky_;
   ShapeAxes axes_;  // of the sky
   Vec3 corner_;
   Vec3 x_, y_, z_;  // unit; z: towards the sky
@@ -277,11 +283,11 @@ class PortalEmission final : public InfiniteEmission {
 
 InfiniteEmissions MakePortalEmissions(const std::vector<InfiniteLight>& lights) {
   InfiniteEmissions emissions;
-  for (const InfiniteLight& light : lights) {
-    if (light.kind != InfiniteLight::Kind::kPortal) continue;
-    std::shared_ptr<const InfiniteEmission> sky = EmissionOf(light);
+  for (std::size_t number = 0; number < lights.size(); ++number) {
+    if (lights[number].kind != InfiniteLight::Kind::kPortal) continue;
+    std::shared_ptr<InfiniteEmission> sky = EmissionOf(lights[number]);
     if (sky != nullptr)
-      emissions.push_back(std::make_shared<PortalEmission>(light, std::move(sky)));
+      emissions.push_back(std::make_shared<PortalEmission>(lights[number], number, std::move(sky)));
   }
   return emissions;
 }

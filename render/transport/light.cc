@@ -9,6 +9,7 @@
 #include "render/geometry/surface_uv.h"
 #include "render/math/color_space.h"
 #include "render/math/double3.h"
+#include "render/math/uplift.h"
 #include "render/math/warp.h"
 #include "render/scene/scene_extent.h"
 #include "render/transport/infinite_emission.h"
@@ -38,9 +39,10 @@ constexpr double kEvenShare = 0.1;
 constexpr int kMostSpreadSide = 256;
 constexpr double kMostSpreadCells = 1 << 22;
 
-// Of the picture of a light, in the working space.
-Rgb PixelsAt(const AreaLight& light, Vec2 uv) {
-  return ToWorking(PictureColor(*light.picture, uv, Texture::Wrap::kClamp, Texture::Wrap::kClamp));
+// Of the picture of a light, in the scene's colours.
+Rgb PixelsAt(const Scene& scene, const AreaLight& light, Vec2 uv) {
+  const Rgb color = PictureColor(*light.picture, uv, Texture::Wrap::kClamp, Texture::Wrap::kClamp);
+  return scene.uplift == nullptr ? ToWorking(color) : scene.uplift->Unbounded(color);
 }
 
 }  // namespace
@@ -210,6 +212,43 @@ LightSet::LightSet(const Scene& scene, const Intersector& intersector,
   }
 
   ShareOut();
+}
+
+void LightSet::TakeColors() {
+  for (const auto& light : infinite_lights_)
+    light->TakeColors(scene_.infinite_lights, scene_.uplift);
+  for (Emitter& emitter : emitters_) {
+    emitter.uplift = scene_.uplift;
+    const bool sends = emitter.choice > 0;
+    switch (emitter.kind) {
+#define LUCERNA_CASE(Name, list, name) case Kind::k##Name:
+      case Kind::kTriangle:
+        LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE) {
+#undef LUCERNA_CASE
+          const ShapeTraits& traits = TraitsOf(emitter);
+          emitter.radiance = LightOf(traits).radiance * (emitter.is_invisible ? 1 : traits.alpha);
+          // What a picture sends is computed for each photon.
+          if (sends && emitter.spread < 0) {
+            emitter.power =
+                emitter.radiance * (kPi * emitter.area * (emitter.two_sided ? 2.0F : 1.0F));
+          }
+          break;
+        }
+#define LUCERNA_CASE(Name, list, name)                                                         \
+  case Kind::k##Name:                                                                          \
+    emitter.radiance = scene_.list[emitter.primitive].Strength();                              \
+    if (sends) emitter.power = Name##Emission::Power(scene_.list[emitter.primitive], sphere_); \
+    break;
+        LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+#define LUCERNA_CASE(Name, name) case Kind::k##Name:
+        LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+        emitter.radiance = infinite_lights_[emitter.primitive]->MeanRadiance();
+        if (sends) emitter.power = infinite_lights_[emitter.primitive]->Power(sphere_);
+        break;
+    }
+  }
 }
 
 void LightSet::ShareOut() {
@@ -646,7 +685,7 @@ Rgb LightSet::EmittedRadiance(const SurfacePoint& point, Vec3 wo) const {
   const AreaLight& light = scene_.area_lights[static_cast<std::size_t>(point.area_light)];
   if (!light.two_sided && !(Dot(point.geometric_normal, wo) > 0)) return {};
   if (light.picture == nullptr) return light.radiance;
-  return light.radiance * PixelsAt(light, UvAt(scene_, point));
+  return light.radiance * PixelsAt(scene_, light, UvAt(scene_, point));
 }
 
 const AreaLight& LightSet::LightOf(const ShapeTraits& traits) const {
@@ -666,7 +705,7 @@ const ShapeTraits& LightSet::TraitsOf(const Emitter& emitter) const {
 }
 
 Rgb LightSet::PictureRadiance(const Emitter& emitter, Vec2 uv) const {
-  return emitter.radiance * PixelsAt(LightOf(TraitsOf(emitter)), uv);
+  return emitter.radiance * PixelsAt(scene_, LightOf(TraitsOf(emitter)), uv);
 }
 
 Vec2 LightSet::UvOn(const Emitter& emitter, float u1, float u2, Vec3 position) const {

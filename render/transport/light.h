@@ -67,7 +67,8 @@ struct Emitter {
   float direct_choice = 0;  // probability for direct light
   Rgb radiance;             // or intensity, or irradiance, or what a picture is multiplied by
   Rgb power;
-  std::uint8_t light = 0;  // index into LightSet::lights()
+  const Uplift* uplift = nullptr;  // of the scene
+  std::uint8_t light = 0;          // index into LightSet::lights()
 };
 
 // At most so many lights are counted one by one.
@@ -114,6 +115,10 @@ class LightSet {
   // drawn from all, except those that `selection` leaves out.
   LightSet(const Scene& scene, const Intersector& intersector,
            const LightSelection& selection = {});
+
+  // Takes over the colours of lights, and the scene's uplift, that have changed in the scene. How
+  // lights are drawn, lights() and TotalPower() stay as they were.
+  void TakeColors();
 
   [[nodiscard]] bool empty() const { return emitters_.empty(); }
   // How many emitters there are.
@@ -182,8 +187,7 @@ class LightSet {
   [[nodiscard]] float PdfDirectInfinite(Vec3 from, Vec3 direction) const;
   // [those that are not black], in the order of Emitter::primitive; see
   // transport/infinite_emission.h.
-  [[nodiscard]] const std::vector<std::shared_ptr<const InfiniteEmission>>& infinite_lights()
-      const {
+  [[nodiscard]] const std::vector<std::shared_ptr<InfiniteEmission>>& infinite_lights() const {
     return infinite_lights_;
   }
 
@@ -227,7 +231,7 @@ class LightSet {
   // [shapes of a kind]: number of its emitter, or -1.
   std::array<std::vector<std::int32_t>, kShapeKinds> shape_emitter_;
   Rgb total_power_;
-  std::vector<std::shared_ptr<const InfiniteEmission>> infinite_lights_;
+  std::vector<std::shared_ptr<InfiniteEmission>> infinite_lights_;
   std::size_t first_infinite_ = 0;  // emitter of the first
   std::vector<LightGroup> lights_;
   std::size_t faint_lights_ = 0;

@@ -44,7 +44,7 @@ bool ProjectionEmission::SampleEmission(const ProjectionLight& light, const Emit
   const double share = static_cast<double>(light.WeightOf(x, y)) / light.cells->sum();
   if (!(share > 0)) return false;
   // The density over the plane is the cell's share over its area.
-  emission.flux = emitter.radiance * light.ColorOf(x, y) *
+  emission.flux = emitter.radiance * light.ColorOf(x, y, emitter.uplift) *
                   (ProjectionLight::SolidAngleOverArea(local) *
                    static_cast<float>(AreaOfCell(light) / share) / emitter.choice);
   return true;
@@ -68,7 +68,7 @@ bool ProjectionEmission::SampleDirect(const ProjectionLight& light, const Emitte
   sample.is_distant = false;
   sample.target = light.position;
   sample.wi = to / std::sqrt(distance2);
-  const Rgb factor = light.FactorAt(-sample.wi);
+  const Rgb factor = light.FactorAt(-sample.wi, emitter.uplift);
   sample.radiance_over_pdf = emitter.radiance * factor * (1 / (distance2 * emitter.direct_choice));
   sample.pdf = 0;
   return !IsBlack(factor);

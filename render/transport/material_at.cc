@@ -4,11 +4,18 @@
 
 #include "render/geometry/surface_uv.h"
 #include "render/math/rng.h"
+#include "render/math/uplift.h"
 #include "render/transport/bump.h"
 #include "render/transport/coat.h"
 
 namespace lucerna {
 namespace {
+
+// What a texture's colour makes of a parameter, in the scene's colours.
+Rgb ValueOf(const Scene& scene, const Material& material, Rgb color) {
+  if (scene.uplift == nullptr) return TexturedValue(material.kind, color);
+  return TexturedValueAtWavelengths(material.kind, scene.uplift->Reflectance(color));
+}
 
 // A number in [0, 1) that belongs to a place and a direction: their bits, mixed.
 float NumberOf(Vec3 position, Vec3 direction) {
@@ -85,11 +92,11 @@ const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
   static_cast<MaterialNumbers&>(here) = static_cast<const MaterialNumbers&>(material);
   if (material.texture != kNoTexture) {
     const Rgb color = TextureColor(scene.textures, material.texture, place);
-    SetTexturedParameter(here, TexturedValue(material.kind, color * material.texture_scale));
+    SetTexturedParameter(here, ValueOf(scene, material, color * material.texture_scale));
   }
   if (material.second_texture != kNoTexture) {
     const Rgb color = TextureColor(scene.textures, material.second_texture, place);
-    here.transmittance = TexturedValue(material.kind, color * material.texture_scale);
+    here.transmittance = ValueOf(scene, material, color * material.texture_scale);
   }
   if (material.Disperses() && wavelength.is_drawn())
     here.ior = IndexAt(wavelength.nm(), material.ior, material.dispersion);

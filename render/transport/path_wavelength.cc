@@ -62,4 +62,14 @@ PathWavelength::PathWavelength(float u) {
   color_ = table.color[cell];
 }
 
+PathWavelength::PathWavelength(float u, const Uplift* uplift) {
+  if (uplift == nullptr) {
+    *this = PathWavelength(u);
+    return;
+  }
+  const auto chosen = std::min(static_cast<std::size_t>(3 * u), std::size_t{2});
+  nm_ = static_cast<float>(uplift->wavelengths().nm[chosen]);
+  color_ = {chosen == 0 ? 3.0F : 0.0F, chosen == 1 ? 3.0F : 0.0F, chosen == 2 ? 3.0F : 0.0F};
+}
+
 }  // namespace lucerna

@@ -8,9 +8,16 @@
 //
 // Colours are those of the CIE 1931 observer in daylight, in the working space. Single wavelengths
 // lie outside of it: what is below zero is cut off, and each channel scaled so that the mean is 1.
+//
+// In jobs that carry wavelengths a path has the values at three of them. At such a surface it keeps
+// one, chosen for the path with a probability of a third, and so three times its value: on average
+// that is what each of the three brings along its own way. A photon and an eye path that both meet
+// such a surface choose independently; the two agree in one case of three and have nine times the
+// value then, on average what it is.
 #pragma once
 
 #include "render/math/rgb.h"
+#include "render/math/uplift.h"
 #include "render/scene/material.h"
 
 namespace lucerna {
@@ -21,6 +28,8 @@ class PathWavelength {
   PathWavelength() = default;
   // Drawn by `u` in [0, 1).
   explicit PathWavelength(float u);
+  // The same in a job that carries wavelengths; `uplift` nullptr: in one of three colours.
+  PathWavelength(float u, const Uplift* uplift);
 
   [[nodiscard]] bool is_drawn() const { return nm_ > 0; }
   // Requires is_drawn().

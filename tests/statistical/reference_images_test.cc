@@ -27,6 +27,7 @@ struct Case {
   bool has_mask;
   double clip = 5;
   double left_out = 1e-4;  // share of the pixels
+  double channel_error = 0.02;
 };
 
 // What gtest shows of a case.
@@ -78,7 +79,7 @@ TEST_P(ReferenceImageTest, AgreesInTheMeanAndComesCloserWithPhotons) {
 
   EXPECT_NEAR(late.mean_ratio, 1, 0.01);
   for (const double ratio : late.channel_mean_ratio)
-    EXPECT_NEAR(ratio, 1, 0.02);
+    EXPECT_NEAR(ratio, 1, c.channel_error);
   const double error = Compare(render.MakeImage(), reference, trimmed).value().rel_mse;
   EXPECT_LT(error, 0.75 * early);
   EXPECT_EQ(render.tally().dropped, 0U);
@@ -89,14 +90,16 @@ TEST_P(ReferenceImageTest, AgreesInTheMeanAndComesCloserWithPhotons) {
 
 INSTANTIATE_TEST_SUITE_P(
     OtherRenderers, ReferenceImageTest,
-    testing::Values(Case{"cornell-box", "scene-v4.pbrt", 256, 256, 100, 64, false},
-                    Case{"veach-bidir", "scene-v4.pbrt", 256, 256, 20, 64, false},
-                    Case{"veach-mis", "scene-v4.pbrt", 256, 144, 100, 64, false},
-                    // Its reference, of 300 eye paths a pixel, lacks most of the 14 pixels where
-                    // the light is seen by reflection in the water, once in some thousand paths.
-                    Case{"water-caustic", "scene-v4.pbrt", 256, 256, 100, 64, false, 1, 3e-4},
-                    Case{"sphere-box", "scene.pbrt", 256, 256, 100, 48, true},
-                    Case{"sphere-caustic", "scene.pbrt", 256, 256, 100, 48, true}),
+    testing::Values(  // Saturated walls, and wavelengths as the reference has them: 0.3 %, and
+                      // three standard errors of the mean of 64 passes.
+        Case{"cornell-box", "scene-v4.pbrt", 256, 256, 100, 64, false, 5, 1e-4, 0.005},
+        Case{"veach-bidir", "scene-v4.pbrt", 256, 256, 20, 64, false},
+        Case{"veach-mis", "scene-v4.pbrt", 256, 144, 100, 64, false},
+        // Its reference, of 300 eye paths a pixel, lacks most of the 14 pixels where
+        // the light is seen by reflection in the water, once in some thousand paths.
+        Case{"water-caustic", "scene-v4.pbrt", 256, 256, 100, 64, false, 1, 3e-4},
+        Case{"sphere-box", "scene.pbrt", 256, 256, 100, 48, true},
+        Case{"sphere-caustic", "scene.pbrt", 256, 256, 100, 48, true}),
     [](const testing::TestParamInfo<Case>& scene) {
       std::string name = scene.param.folder;
       for (char& letter : name) {

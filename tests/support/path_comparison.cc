@@ -36,6 +36,8 @@ std::vector<PathComparison> CompareWithPaths(const Scene& scene, RenderSettings 
   const int height = settings.height;
   LUCERNA_CHECK(width % side == 0 && height % side == 0 && settings.crop_width() == width &&
                 settings.crop_height() == height);
+  // As the path tracer has them.
+  settings.spectral = false;
   std::vector<PathComparison> comparisons;
   comparisons.push_back({{0, 0, width, height}, {}, {}});
   for (int i = 0; side > 1 && i < side * side; ++i) {

@@ -43,10 +43,12 @@ TEST(RenderFlagsTest, EveryFlagArrives) {
   expected.bias = 0.01;
   expected.frequency_share = 0.5;
   expected.use_everything = true;
+  expected.spectral = true;
   const auto overrides = Parse(
       "--size 640x360 --photons-per-pass 4 --seed 18446744073709551615 "
       "--radius-controller pppm --alpha 0.7 --kernel constant --initial-radius 0.25 "
-      "--max-depth 8 --bias 1% --frequency-share 0.5 --use-everything");
+      "--max-depth 8 --bias 1% --frequency-share 0.5 --use-everything "
+      "--spectral");
   ASSERT_TRUE(overrides.ok()) << overrides.status();
   EXPECT_EQ(*overrides, expected);
   RenderOverrides until;
@@ -61,8 +63,10 @@ TEST(RenderFlagsTest, EveryFlagArrives) {
 TEST(RenderFlagsTest, SwitchesMayBeTurnedOff) {
   RenderOverrides expected;
   expected.adaptive_photons = false;
+  expected.spectral = false;
   expected.use_everything = true;
-  EXPECT_EQ(Parse("--adaptive-photons=false --use-everything=true").value(), expected);
+  EXPECT_EQ(Parse("--adaptive-photons=false --use-everything=true --spectral=false").value(),
+            expected);
 }
 
 // "3" is hardly ever meant as 300 %.

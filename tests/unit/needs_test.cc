@@ -266,7 +266,7 @@ TEST(SceneNeedsTest, EverythingIsAllThatCanBeForced) {
   }
   EXPECT_EQ(left_out,
             (Names{"round-shapes", "environment", "area-lights", "lens", "motion", "media",
-                   "alpha-masks", "instances", "caustic-hitpoints", "dispersion"}));
+                   "alpha-masks", "instances", "caustic-hitpoints", "dispersion", "spectra"}));
 }
 
 TEST(SceneNeedsTest, CausticPhotonsAreForNarrowSurfacesBehindSmoothOnes) {

@@ -59,7 +59,7 @@ RenderSettings Settings(RadiusControllerKind controller, KernelKind kernel) {
 SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums& sums,
                       const RenderSettings& settings, const FluxScale& scale) {
   ThreadTeam team(2);
-  return lucerna::SliceOfPass(pass, plan, sums, settings, scale, team);
+  return lucerna::SliceOfPass(pass, plan, sums, settings, SceneNeeds(), scale, team);
 }
 
 // One pixel, one hitpoint a pass, PPM with immediate radii: tau' = (tau + Phi) r'^2 / r^2 and

@@ -81,6 +81,7 @@ TEST(SettingTableTest, TextReadsBackToTheSameBits) {
   settings.bias = 1.0 / 3;
   settings.frequency_share = 5e-324;
   settings.use_everything = true;
+  settings.spectral = true;
   EXPECT_EQ(WithBack(settings), settings);
   settings.initial_radius = 0;
   settings.initial_footprints = 1.0 / 3;

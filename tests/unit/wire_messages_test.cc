@@ -33,6 +33,7 @@ RenderSettings SomeSettings() {
   settings.bias = 0.1;
   settings.frequency_share = 1;
   settings.use_everything = true;
+  settings.spectral = true;
   settings.max_depth = 12;
   return settings;
 }

@@ -1,4 +1,6 @@
 // LightSource "goniometric".
+#include <utility>
+
 #include "render/base/text.h"
 #include "render/formats/pbrt/light_readers.h"
 #include "render/formats/pbrt/shapes.h"
@@ -7,7 +9,8 @@ namespace lucerna {
 
 void ReadGoniometricLight(const LightInput& input) {
   ParameterList& parameters = input.parameters;
-  const Rgb color = parameters.FindEmission("I").value_or(Gray(1));
+  GivenSpectrum spectrum;
+  const Rgb color = parameters.FindEmission("I", &spectrum).value_or(Gray(1));
   double scale = parameters.Float("scale", 1, kZeroOrMore);
   const double power_w = parameters.Float("power", -1);
   const std::shared_ptr<const Picture> map = ReadLightPicture(parameters, input.assets);
@@ -34,6 +37,7 @@ void ReadGoniometricLight(const LightInput& input) {
   // The map's pole is along y of the light, as in pbrt-v4.
   light.axes = {axes->x, axes->z, axes->y};
   light.intensity = mean > 0 ? ScaledEmission(parameters, color, scale) : Rgb{};
+  light.spectrum = std::move(spectrum);
   input.scene.goniometric_lights.push_back(light);
   WarnIfBlack(parameters, light.intensity);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 #include <string_view>
+#include <utility>
 
 #include "render/base/text.h"
 #include "render/formats/pbrt/light_readers.h"
@@ -129,13 +130,15 @@ void ReadInfiniteLight(const LightInput& input) {
     ReadEnvironment(input, scale, illuminance, portal);
     return;
   }
-  const Rgb color = parameters.FindEmission("L").value_or(Gray(1));
+  GivenSpectrum spectrum;
+  const Rgb color = parameters.FindEmission("L", &spectrum).value_or(Gray(1));
   // A surface that sees constant radiance L over its hemisphere receives pi L.
   if (illuminance > 0) scale *= illuminance / kPiD;
   InfiniteLight light;
   light.radiance = ScaledEmission(parameters, color, scale);
   light.portal = portal;
   if (portal) light.kind = InfiniteLight::Kind::kPortal;
+  light.spectrum = std::move(spectrum);
   input.scene.infinite_lights.push_back(light);
   WarnIfBlack(parameters, light.radiance);
 }

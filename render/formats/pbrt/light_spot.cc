@@ -1,5 +1,6 @@
 // LightSource "spot".
 #include <cmath>
+#include <utility>
 
 #include "render/formats/pbrt/light_readers.h"
 
@@ -7,7 +8,8 @@ namespace lucerna {
 
 void ReadSpotLight(const LightInput& input) {
   ParameterList& parameters = input.parameters;
-  const Rgb color = parameters.FindEmission("I").value_or(Gray(1));
+  GivenSpectrum spectrum;
+  const Rgb color = parameters.FindEmission("I", &spectrum).value_or(Gray(1));
   double scale = parameters.Float("scale", 1, kZeroOrMore);
   const double power_w = parameters.Float("power", -1);
   const Vec3 from = parameters.Point("from", {0, 0, 0});
@@ -27,6 +29,7 @@ void ReadSpotLight(const LightInput& input) {
   light.position = FinitePoint(parameters, input.to_world, from);
   light.direction = Direction(parameters, input.to_world, from, to);
   light.intensity = ScaledEmission(parameters, color, scale);
+  light.spectrum = std::move(spectrum);
   input.scene.spot_lights.push_back(light);
   WarnIfBlack(parameters, light.intensity);
 }

@@ -44,7 +44,7 @@ AreaEmission ReadDiffuseEmission(ParameterList& parameters, AssetReader& assets)
       if (!(largest > 0)) color = Rgb{};
     }
   } else {
-    color = parameters.FindEmission("L").value_or(color);
+    color = parameters.FindEmission("L", &emission.spectrum).value_or(color);
   }
   const double scale = parameters.Float("scale", 1, kZeroOrMore);
   emission.radiance = ScaledEmission(parameters, color, scale);
@@ -127,6 +127,7 @@ std::optional<AreaEmission> ReadAreaEmission(std::string_view type, ParameterLis
 AreaLight MakeAreaLight(const AreaEmission& emission, double area_m2) {
   AreaLight light = {emission.radiance, emission.two_sided, emission.picture};
   if (light.picture != nullptr) light.largest_pixel = light.picture->Largest();
+  light.spectrum = emission.spectrum;
   if (emission.power_w.has_value()) {
     const double sides = emission.two_sided ? 2 : 1;
     light.radiance *=

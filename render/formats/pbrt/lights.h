@@ -22,6 +22,7 @@ struct AreaEmission {
   std::optional<double> power_w;  // luminous, of the whole shape
   std::shared_ptr<const Picture> picture;
   double mean_luminance = 1;  // of the picture's pixels
+  GivenSpectrum spectrum;     // of the radiance, where it is given
 };
 // Absent for a type that is not supported, which is an error.
 [[nodiscard]] std::optional<AreaEmission> ReadAreaEmission(std::string_view type,

@@ -1,4 +1,6 @@
 // Material "conductor", and the metal of "coatedconductor".
+#include <utility>
+
 #include "render/base/text.h"
 #include "render/formats/pbrt/material_readers.h"
 #include "render/formats/pbrt/optical_constants.h"
@@ -9,8 +11,9 @@ void ReadMetal(const MetalParameters& called, const MaterialInput& input, Materi
   ParameterList& parameters = input.parameters;
   const bool is_textured = parameters.IsTexture("reflectance");
   if (is_textured) material.texture = FindTexture("reflectance", input);
+  MaterialSpectra given;
   const std::optional<Rgb> reflectance =
-      is_textured ? Gray(0.5F) : parameters.FindReflectance("reflectance");
+      is_textured ? Gray(0.5F) : parameters.FindReflectance("reflectance", &given.reflectance);
   if (reflectance.has_value()) {
     if (parameters.Has(called.eta) || parameters.Has(called.k)) {
       parameters.Error("reflectance", Concat("and ", called.eta, " or ", called.k,
@@ -23,9 +26,13 @@ void ReadMetal(const MetalParameters& called, const MaterialInput& input, Materi
                   AbsorptionFor(reflectance->b)};
   } else {
     const MetalConstants copper = MetalNamed("Cu").value();
-    material.eta = parameters.FindOpticalConstant(called.eta, {0, 100}).value_or(copper.eta);
-    material.k = parameters.FindOpticalConstant(called.k, {0, 1000}).value_or(copper.k);
+    given.eta = MetalSpectrumNamed("metal-Cu-eta");
+    given.k = MetalSpectrumNamed("metal-Cu-k");
+    material.eta =
+        parameters.FindOpticalConstant(called.eta, {0, 100}, &given.eta).value_or(copper.eta);
+    material.k = parameters.FindOpticalConstant(called.k, {0, 1000}, &given.k).value_or(copper.k);
   }
+  material.given = OwnedSpectra(std::move(given));
 }
 
 void ReadConductor(const MaterialInput& input, Material& material) {

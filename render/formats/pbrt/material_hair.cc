@@ -52,7 +52,10 @@ void ReadColor(const MaterialInput& input, Material& material) {
     if (parameters.IsTexture("sigma_a")) {
       material.texture = FindTexture("sigma_a", input);
     } else {
-      material.absorption = parameters.FindOpticalConstant("sigma_a", kZeroOrMore).value_or(Rgb());
+      MaterialSpectra given;
+      material.absorption =
+          parameters.FindOpticalConstant("sigma_a", kZeroOrMore, &given.absorption).value_or(Rgb());
+      material.given = OwnedSpectra(std::move(given));
     }
     return;
   }
@@ -64,7 +67,10 @@ void ReadColor(const MaterialInput& input, Material& material) {
     if (parameters.IsTexture(reflectance)) {
       material.texture = FindTexture(reflectance, input);
     } else {
-      material.reflectance = parameters.FindReflectance(reflectance).value_or(material.reflectance);
+      MaterialSpectra given;
+      material.reflectance = parameters.FindReflectance(reflectance, &given.reflectance)
+                                 .value_or(material.reflectance);
+      material.given = OwnedSpectra(std::move(given));
     }
     return;
   }

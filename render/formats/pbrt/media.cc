@@ -38,11 +38,17 @@ Medium ReadMedium(ParameterList& parameters) {
     parameters.Ignore("preset");
   }
   // As pbrt-v4: each 1 where it is not given.
-  medium.absorption = parameters.FindOpticalConstant("sigma_a", kZeroOrMore).value_or(Gray(1));
-  medium.scattering = parameters.FindOpticalConstant("sigma_s", kZeroOrMore).value_or(Gray(1));
+  medium.absorption =
+      parameters.FindOpticalConstant("sigma_a", kZeroOrMore, &medium.absorption_spectrum)
+          .value_or(Gray(1));
+  medium.scattering =
+      parameters.FindOpticalConstant("sigma_s", kZeroOrMore, &medium.scattering_spectrum)
+          .value_or(Gray(1));
   const auto scale = static_cast<float>(parameters.Float("scale", 1, kZeroOrMore));
   medium.absorption *= scale;
   medium.scattering *= scale;
+  medium.absorption_spectrum.factor = scale;
+  medium.scattering_spectrum.factor = scale;
   if (!IsFinite(medium.Extinction())) parameters.Error("scale", "makes a coefficient too large");
   medium.g = static_cast<float>(parameters.Float("g", 0, kMeanCosine));
   if (const std::optional<Rgb> emitted = parameters.FindEmission("Le");

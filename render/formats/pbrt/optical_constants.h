@@ -1,6 +1,7 @@
 // What are the optical constants of the materials that pbrt knows by name?
 //
-// Metals as index of refraction and absorption at 630, 532 and 465 nm, glasses as the index at
+// Metals as index of refraction and absorption at 630, 532 and 465 nm, some also at all visible
+// wavelengths; glasses as the index at
 // the helium d line (587.6 nm) and its dispersion.
 //
 // Source: Palik, "Handbook of Optical Constants of Solids" (Ag, Al, Au, Cu); Querry 1985,
@@ -14,6 +15,7 @@
 
 #include "render/math/dispersion.h"
 #include "render/math/rgb.h"
+#include "render/scene/given_spectrum.h"
 
 namespace lucerna {
 
@@ -27,6 +29,10 @@ struct MetalConstants {
 
 // By pbrt's name of a curve: "metal-Ag-eta", "metal-Ag-k" and so on.
 [[nodiscard]] std::optional<Rgb> MetalCurveNamed(std::string_view name);
+
+// The same at all visible wavelengths, where it is known (Ag, Al, Au and Cu); else as lines between
+// the three.
+[[nodiscard]] GivenSpectrum MetalSpectrumNamed(std::string_view name);
 
 // By pbrt's name: "glass-BK7", "glass-F11" (which is Schott's SF11) and so on, "diamond".
 [[nodiscard]] std::optional<RefractiveIndex> GlassNamed(std::string_view name);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <utility>
 
 #include "render/base/text.h"
 #include "render/formats/pbrt/optical_constants.h"
@@ -23,6 +25,10 @@ constexpr std::array<std::string_view, 2> kReflectanceTypes = {"rgb", "spectrum"
 constexpr std::array<std::string_view, 3> kEmissionTypes = {"rgb", "spectrum", "blackbody"};
 constexpr std::array<std::string_view, 3> kOpticalTypes = {"spectrum", "rgb", "float"};
 constexpr std::array<std::string_view, 2> kIndexTypes = {"float", "spectrum"};
+
+void Give(WavelengthCurve curve, GivenSpectrum* given) {
+  if (given != nullptr) *given = {std::make_shared<const WavelengthCurve>(std::move(curve))};
+}
 
 Rgb ToRgb(const std::vector<double>& numbers) {
   return {static_cast<float>(numbers[0]), static_cast<float>(numbers[1]),
@@ -248,7 +254,7 @@ std::optional<WavelengthCurve> ParameterList::CurveOf(const Parameter& parameter
   return curve;
 }
 
-std::optional<Rgb> ParameterList::FindReflectance(std::string_view name) {
+std::optional<Rgb> ParameterList::FindReflectance(std::string_view name, GivenSpectrum* given) {
   const Parameter* parameter = Take(name, kReflectanceTypes, 0);
   if (parameter == nullptr) return std::nullopt;
   if (parameter->type == "rgb") {
@@ -269,15 +275,17 @@ std::optional<Rgb> ParameterList::FindReflectance(std::string_view name) {
                " is not a reflectance that is supported; give an rgb"));
     return std::nullopt;
   }
-  const std::optional<WavelengthCurve> curve = CurveOf(*parameter);
+  std::optional<WavelengthCurve> curve = CurveOf(*parameter);
   if (!curve.has_value()) return std::nullopt;
   for (const double value : curve->value) {
     if (!CheckRange(*parameter, value, {0, 1})) return std::nullopt;
   }
-  return ReflectanceColor(*curve);
+  const Rgb color = ReflectanceColor(*curve);
+  Give(*std::move(curve), given);
+  return color;
 }
 
-std::optional<Rgb> ParameterList::FindEmission(std::string_view name) {
+std::optional<Rgb> ParameterList::FindEmission(std::string_view name, GivenSpectrum* given) {
   const Parameter* parameter = Take(name, kEmissionTypes, 0);
   if (parameter == nullptr) return std::nullopt;
   if (parameter->type == "rgb") {
@@ -292,6 +300,7 @@ std::optional<Rgb> ParameterList::FindEmission(std::string_view name) {
     if (!CheckRange(*parameter, parameter->numbers[0], {kMinBlackbodyK, kMaxBlackbodyK})) {
       return std::nullopt;
     }
+    if (given != nullptr) Give(BlackbodyCurve(parameter->numbers[0]), given);
     return BlackbodyColor(parameter->numbers[0]);
   }
   if (!parameter->strings.empty()) {
@@ -303,15 +312,19 @@ std::optional<Rgb> ParameterList::FindEmission(std::string_view name) {
                "an rgb, a blackbody or pairs of wavelength and value"));
     return std::nullopt;
   }
-  const std::optional<WavelengthCurve> curve = CurveOf(*parameter);
+  std::optional<WavelengthCurve> curve = CurveOf(*parameter);
   if (!curve.has_value()) return std::nullopt;
-  return EmissionColor(*curve);
+  const Rgb color = EmissionColor(*curve);
+  Give(*std::move(curve), given);
+  return color;
 }
 
-std::optional<Rgb> ParameterList::FindOpticalConstant(std::string_view name, Range range) {
+std::optional<Rgb> ParameterList::FindOpticalConstant(std::string_view name, Range range,
+                                                      GivenSpectrum* given) {
   const Parameter* parameter = Take(name, kOpticalTypes, 0);
   if (parameter == nullptr) return std::nullopt;
   Rgb constant;
+  GivenSpectrum found;
   if (!parameter->strings.empty()) {
     const std::optional<Rgb> metal = MetalCurveNamed(parameter->strings[0]);
     const std::optional<RefractiveIndex> glass = GlassNamed(parameter->strings[0]);
@@ -324,6 +337,7 @@ std::optional<Rgb> ParameterList::FindOpticalConstant(std::string_view name, Ran
       return std::nullopt;
     }
     constant = metal.has_value() ? *metal : Gray(glass->at_d);
+    if (metal.has_value()) found = MetalSpectrumNamed(parameter->strings[0]);
   } else if (parameter->type == "rgb") {
     if (!CheckCount(*parameter, 3)) return std::nullopt;
     constant = ToRgb(parameter->numbers);
@@ -331,15 +345,17 @@ std::optional<Rgb> ParameterList::FindOpticalConstant(std::string_view name, Ran
     if (!CheckCount(*parameter, 1)) return std::nullopt;
     constant = Gray(static_cast<float>(parameter->numbers[0]));
   } else {
-    const std::optional<WavelengthCurve> curve = CurveOf(*parameter);
+    std::optional<WavelengthCurve> curve = CurveOf(*parameter);
     if (!curve.has_value()) return std::nullopt;
     constant = {static_cast<float>(curve->AtClamped(kRedNm)),
                 static_cast<float>(curve->AtClamped(kGreenNm)),
                 static_cast<float>(curve->AtClamped(kBlueNm))};
+    Give(*std::move(curve), &found);
   }
   for (int channel = 0; channel < 3; ++channel) {
     if (!CheckRange(*parameter, static_cast<double>(constant[channel]), range)) return std::nullopt;
   }
+  if (given != nullptr) *given = std::move(found);
   return constant;
 }
 

@@ -18,6 +18,7 @@
 #include "render/math/dispersion.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
+#include "render/scene/given_spectrum.h"
 
 namespace lucerna {
 
@@ -78,12 +79,14 @@ class ParameterList {
   // Whether a parameter of this name is of type texture, and the name of that texture.
   [[nodiscard]] bool IsTexture(std::string_view name) const;
   std::optional<std::string> FindTexture(std::string_view name);
+  // Of colours, `given` (or nullptr) becomes the curve where one is given.
   // A colour in [0, 1].
-  std::optional<Rgb> FindReflectance(std::string_view name);
+  std::optional<Rgb> FindReflectance(std::string_view name, GivenSpectrum* given = nullptr);
   // The colour of a light; rgb as it stands, everything else with luminance 1, as in pbrt-v4.
-  std::optional<Rgb> FindEmission(std::string_view name);
+  std::optional<Rgb> FindEmission(std::string_view name, GivenSpectrum* given = nullptr);
   // An optical constant per channel: a colour, a number, a named metal or a curve.
-  std::optional<Rgb> FindOpticalConstant(std::string_view name, Range range);
+  std::optional<Rgb> FindOpticalConstant(std::string_view name, Range range,
+                                         GivenSpectrum* given = nullptr);
   // An index of refraction: a number, a named glass or a curve.
   std::optional<RefractiveIndex> FindRefractiveIndex(std::string_view name, Range range);
   // The same at the d line, 1.5 when it is absent, with a warning where it is not the same at all
