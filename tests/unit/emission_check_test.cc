@@ -2,6 +2,8 @@
 // passes, for every kind of light, and what is zero, doubled or absurd does not.
 #include "server/emission_check.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -54,6 +56,33 @@ TEST(SceneEmissionTest, WhatWorkersCountPassesForEverySceneOfTheTests) {
     ++scenes;
   }
   EXPECT_GE(scenes, 10);
+}
+
+// A red and a blue light have more power in some passes and less in others: what workers count
+// passes in all, and what no pass can have does not.
+TEST(SceneEmissionTest, LightsOfSaturatedColorsPassAtAllWavelengths) {
+  Scene scene = ManyLights();
+  scene.area_lights[0].radiance = {5, 0.3F, 0.2F};
+  scene.spot_lights[0].intensity = {0.1F, 0.3F, 3};
+  RenderSettings settings = TestSettings(scene, 20'000, 0.1, 6);
+  ASSERT_TRUE(settings.spectral);
+  double least = HUGE_VAL;
+  double most = 0;
+  LocalRender render(scene, settings);
+  std::int64_t before = 0;
+  for (int pass = 0; pass < 16; ++pass) {
+    render.AddPass(1);
+    const auto emitted = static_cast<double>(render.tally().energy.emitted - before);
+    before = render.tally().energy.emitted;
+    least = std::min(least, emitted);
+    most = std::max(most, emitted);
+    const Status checked = render.emission_check().Check(render.tally());
+    EXPECT_TRUE(checked.ok()) << pass << ": " << checked.message();
+  }
+  EXPECT_GT(most, 1.1 * least);
+  BatchTally absurd = render.tally();
+  absurd.energy.emitted *= 20;
+  EXPECT_FALSE(render.emission_check().Check(absurd).ok());
 }
 
 class EmissionCheckTest : public testing::Test {
