@@ -13,10 +13,12 @@
 #include "render/analysis/pass_time.h"
 #include "render/analysis/prepared_scene.h"
 #include "render/analysis/reachability.h"
+#include "render/analysis/scene_memory.h"
 #include "render/formats/read_scene.h"
 #include "render/scene/scene_at_time.h"
 #include "render/scene/scene_extent.h"
 #include "tests/support/memory_files.h"
+#include "worker/replay.h"
 
 namespace lucerna {
 namespace {
@@ -407,6 +409,38 @@ TEST(MotionTest, EvenAndOddPassesAreIndependent) {
     product += (TimeOfPass(motion, seed, 0) - 0.5) * (TimeOfPass(motion, seed, 1) - 0.5);
   // Of variance 1/144 each: five standard deviations.
   EXPECT_LT(std::abs(product / kRuns), 5.0 / 12 / std::sqrt(kRuns));
+}
+
+// A photon of a job that is over is traced again as of the time of its pass.
+TEST(MotionTest, PhotonsAreReplayedAtTheTimeOfTheirPass) {
+  const Scene scene = World(
+      "LightSource \"distant\" \"point3 from\" [0 0 1] \"point3 to\" [0 0 0] ActiveTransform "
+      "EndTime "
+      "Translate 0 0 4 ActiveTransform All Material \"diffuse\" \"rgb reflectance\" [0 0 0] Shape "
+      "\"trianglemesh\" \"point3 P\" [-99 -99 0 99 -99 0 0 99 0]");
+  const RenderSettings settings = ResolveSettings(RenderOverrides(), scene).value();
+  const SceneNeeds needs = NeedsOf(scene, settings);
+  int landed = 0;
+  for (std::uint64_t pass = 0; pass < 20; ++pass) {
+    const v1::PhotonPath path =
+        ReplayInScene(scene, settings, needs, pass, 0, 1000, nullptr).value();
+    if (path.landings().empty()) continue;
+    ++landed;
+    EXPECT_NEAR(static_cast<double>(path.landings(0).position().z()),
+                4 * TimeOfPass(scene.motion, settings.seed, pass), 1e-5);
+  }
+  EXPECT_GT(landed, 3);
+}
+
+TEST(MotionTest, TheMemoryOfMotionIsPredicted) {
+  const std::string mesh = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] ";
+  const SceneMemory still = SceneMemoryOf(World(mesh), RayNeeds());
+  EXPECT_EQ(still.moving, 0);
+  EXPECT_EQ(still.at_another_time, 0);
+  const SceneMemory moving = SceneMemoryOf(World(kToRight + mesh), RayNeeds());
+  EXPECT_GT(moving.moving, sizeof(TriangleMesh));
+  EXPECT_GE(moving.at_another_time, moving.shapes + moving.acceleration);
+  EXPECT_GT(moving.PeakOfCoordinator(), still.PeakOfCoordinator() + moving.at_another_time);
 }
 
 TEST(MotionTest, SensorsMeasureAsTheShutterOpens) {
