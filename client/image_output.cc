@@ -26,14 +26,20 @@ StatusOr<PictureFormat> FormatOf(const std::string& path) {
   return Failure(ExitCode::kUsage, absl::StrCat(path, ": ", format.status().message()));
 }
 
-// A file that something else has written is not replaced unasked.
-Status CheckMayReplace(const std::string& path) {
+// Empty where there is no file.
+std::string FirstBytesOf(const std::string& path) {
   std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) return absl::OkStatus();
+  if (!std::filesystem::is_regular_file(path, error)) return "";
   std::ifstream file(path, std::ios::binary);
   std::string first(kBytesThatTell, '\0');
   file.read(first.data(), static_cast<std::streamsize>(first.size()));
   first.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, file.gcount())));
+  return first;
+}
+
+// A file that something else has written is not replaced unasked.
+Status CheckMayReplace(const std::string& path) {
+  const std::string first = FirstBytesOf(path);
   if (first.empty() || IsOwnPicture(first)) return absl::OkStatus();
   return Failure(
       ExitCode::kUsage,
@@ -68,6 +74,14 @@ Status CheckOutputs(const OutputPaths& outputs) {
     if (!outputs.replaces) LUCERNA_RETURN_IF_ERROR(CheckMayReplace(path));
   }
   return absl::OkStatus();
+}
+
+Status CheckMayWrite(const std::string& path, std::string_view mark) {
+  LUCERNA_RETURN_IF_ERROR(CheckWritable(path));
+  const std::string first = FirstBytesOf(path);
+  if (first.empty() || first.find(mark) != std::string::npos) return absl::OkStatus();
+  return Failure(ExitCode::kUsage,
+                 absl::StrCat(path, " exists, and was not written by lucerna; name another file"));
 }
 
 StatusOr<SavedImage> WriteOutputs(const Image& image, const std::string& exr,

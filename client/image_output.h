@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "client/view/report.h"
 #include "render/base/status.h"
@@ -25,6 +26,10 @@ struct OutputPaths {
 // Errors: Failure(kUsage) for names that cannot be, and for a file that is there and was not
 // written by this program; what the system says of folders.
 [[nodiscard]] Status CheckOutputs(const OutputPaths& outputs);
+
+// Of a file that is no image. Errors: what the system says of folders; Failure(kUsage) for a file
+// that is there without `mark` in its first bytes: something else wrote it.
+[[nodiscard]] Status CheckMayWrite(const std::string& path, std::string_view mark);
 
 // Writes the image, whose EXR file is `exr`. What cannot be written leaves no other file out, and
 // goes to the folder for temporary files.

@@ -106,7 +106,7 @@ Status CheckTrace(const RenderRequest& request) {
     return Failure(ExitCode::kUsage, absl::StrCat("--trace ", request.trace,
                                                   ": a timeline is a .json file; name one"));
   }
-  return CheckWritable(request.trace);
+  return CheckMayWrite(request.trace, "traceEvents");
 }
 
 // Beside the image; empty when that is no file (a device, a pipe), or none are wanted.

@@ -9,6 +9,7 @@
 #include "client/connection.h"
 #include "client/exit_code.h"
 #include "client/foreign_text.h"
+#include "client/image_output.h"
 #include "client/program_output.h"
 #include "client/view/photon_file.h"
 #include "client/view/report.h"
@@ -64,7 +65,7 @@ Status TracePhoton(const PhotonRequest& request, const Endpoint& server,
   LUCERNA_ASSIGN_OR_RETURN(const PhotonKeys keys, ReadKeys(request));
   if (!request.output.empty()) {
     LUCERNA_RETURN_IF_ERROR(PhotonFileFormatOf(request.output).status());
-    LUCERNA_RETURN_IF_ERROR(CheckWritable(request.output));
+    LUCERNA_RETURN_IF_ERROR(CheckMayWrite(request.output, "lucerna trace-photon"));
   }
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, connection->Get(request.job_id));

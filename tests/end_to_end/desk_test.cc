@@ -265,7 +265,16 @@ TEST(TraceFlagTest, TheTimelineHasLeasesOfEachWorkerMergesEstimatesAndImages) {
     EXPECT_GE(spans[row], 1) << row;
 }
 
-TEST(TraceFlagTest, AJobThatIsNotTracedHasNone) {
+TEST(TraceFlagTest, AFileOfSomethingElseIsNotReplaced) {
+  const TemporaryFolder folder;
+  ASSERT_TRUE(WriteFile(folder.At("mine.json"), "{\"mine\": 1}").ok());
+  const Finished ran = Lucerna({"render", SceneOfTests("caustic.pbrt"), "-o", folder.At("a.exr"),
+                                "--trace", folder.At("mine.json")});
+  EXPECT_EQ(ran.exit_code, 2);
+  EXPECT_THAT(ran.errors, HasSubstr("was not written by lucerna"));
+}
+
+TEST(TraceFlagTest, SubmitMustWaitForTheEnd) {
   const TemporaryFolder folder;
   const Finished ran =
       Lucerna({"submit", SceneOfTests("caustic.pbrt"), "--trace", folder.At("t.json")});
@@ -399,6 +408,11 @@ TEST(TracePhotonsTest, SeveralPhotonsAreAFileOfPointsOrLinesAndShapesHaveTheirLi
   ASSERT_EQ(trace("0:0-199", {"-o", folder.At("ways.obj")}).exit_code, 0);
   const std::string lines = *ReadFile(folder.At("ways.obj"));
   EXPECT_GT(std::count(lines.begin(), lines.end(), 'l'), 100);
+
+  ASSERT_EQ(trace("0:0-9", {"-o", folder.At("ways.obj")}).exit_code, 0) << "over its own file";
+  ASSERT_TRUE(WriteFile(folder.At("mine.obj"), "v 0 0 0\n").ok());
+  EXPECT_EQ(trace("0:0-9", {"-o", folder.At("mine.obj")}).exit_code, 2) << "not over a user's";
+  EXPECT_EQ(*ReadFile(folder.At("mine.obj")), "v 0 0 0\n");
 
   EXPECT_EQ(trace("0:0-5000", {}).exit_code, 2) << "beyond the last photon";
   EXPECT_EQ(trace("0:5-4", {}).exit_code, 2);
