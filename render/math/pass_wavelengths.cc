@@ -10,6 +10,7 @@
 #include "render/math/cie_observer.h"
 #include "render/math/color_space.h"
 #include "render/math/rng.h"
+#include "render/math/sobol.h"
 
 namespace lucerna {
 namespace {
@@ -176,19 +177,16 @@ PassWavelengths WavelengthsAt(double t) {
 
 PassWavelengths WavelengthsOfPass(std::uint64_t seed, std::uint64_t pass) {
   constexpr std::uint64_t kKey = 0x50415353574C454EULL;
-  // The second dimension of Sobol's sequence, of which the columns are those of Pascal's triangle:
-  // as even as the first, in which passes take their sets of eye paths in turn, and even together
-  // with it.
-  std::uint32_t bits = 0;
-  std::uint32_t column = 0x80000000U;
-  for (std::uint64_t rest = pass / 2; rest != 0; rest >>= 1) {
-    if ((rest & 1) != 0) bits ^= column;
-    column ^= column >> 1;
-  }
+  // A dimension of Sobol's sequence that eye paths leave free. Their places on film and lens are
+  // the first four, scrambled, and a fifth chooses among these wavelengths: with one of those each
+  // part of a pixel would see a part of the wavelengths, for ever. Where sets of eye paths take
+  // turns, each set meets all of them in time.
+  constexpr int kFreeDimension = 5;
+  const std::uint32_t digits = SobolDigits(static_cast<std::uint32_t>(pass / 2), kFreeDimension);
   // Shifted by the seed, and odd passes once more: they lie between the even ones.
   const double shift = static_cast<double>(KeyedRng(CombineKeys(seed, kKey)).Uniform()) +
                        (pass % 2 == 0 ? 0.0 : 1.0 / 3);
-  const double place = static_cast<double>(bits) * 0x1p-32 + shift;
+  const double place = static_cast<double>(digits) * 0x1p-32 + shift;
   // There and back, so that what goes over the end of the range comes in where it left: a sum over
   // even places of a function that is continuous around the circle converges faster.
   return WavelengthsAt(1 - std::abs(2 * (place - std::floor(place)) - 1));

@@ -152,4 +152,11 @@ SobolPoint ShuffledOwenSobol(std::uint64_t index, std::uint64_t key) {
   return Point(shuffled, period_key);
 }
 
+std::uint32_t SobolDigits(std::uint32_t index, int dimension) {
+  Lanes sum = {};
+  for (std::size_t nibble = 0; nibble < 8; ++nibble)
+    sum ^= Load(kTable.rows[nibble][(index >> (4 * nibble)) & 15U]);
+  return ReverseBits(sum[dimension]);
+}
+
 }  // namespace lucerna

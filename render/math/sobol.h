@@ -26,4 +26,8 @@ using SobolPoint = std::array<float, kSobolDimensions>;
 // fixed function of each other however many points are drawn.
 [[nodiscard]] SobolPoint ShuffledOwenSobol(std::uint64_t index, std::uint64_t key);
 
+// The same point before it is scrambled, of one dimension: 32 binary digits behind the point. For
+// numbers that all pixels share and that go with no dimension that they use.
+[[nodiscard]] std::uint32_t SobolDigits(std::uint32_t index, int dimension);
+
 }  // namespace lucerna

@@ -60,7 +60,7 @@ class PixelSampler {
 
   // For the path's wavelength, in [0, 1).
   [[nodiscard]] float ForWavelength() const {
-    return OwenSobol(pass_, CombineKeys(key_, 0x574156454C454E47ULL))[0];
+    return ShuffledOwenSobol(pass_, CombineKeys(key_, 0x574156454C454E47ULL))[0];
   }
 
   // Independent numbers for the tree of specular branches.

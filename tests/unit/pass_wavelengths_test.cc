@@ -12,6 +12,7 @@
 
 #include "render/math/cie_observer.h"
 #include "render/math/color_space.h"
+#include "render/math/sobol.h"
 
 namespace lucerna {
 namespace {
@@ -129,6 +130,33 @@ TEST(PassWavelengthsTest, PassesOfOneSetOfEyePathsAreSpreadToo) {
   }
   EXPECT_LT(lowest, kSecondPartNm + 0.25 * (kThirdPartNm - kSecondPartNm));
   EXPECT_GT(highest, kSecondPartNm + 0.75 * (kThirdPartNm - kSecondPartNm));
+}
+
+// Places on film and lens are the first dimensions of a pixel's sequence. In each eighth of them
+// all eighths of t must come about equally often: were t one of these dimensions, each part of a
+// pixel would see a part of the wavelengths.
+TEST(PassWavelengthsTest, AllPartsOfAPixelSeeAllWavelengths) {
+  constexpr std::size_t kBins = 8;
+  constexpr std::uint64_t kPasses = 4096;
+  std::array<double, kBins + 1> ends{};
+  for (std::size_t i = 0; i <= kBins; ++i)
+    ends[i] = WavelengthsAt(static_cast<double>(i) / kBins).nm[1];
+  for (const std::uint64_t key : {3ULL, 4ULL}) {
+    for (std::size_t dimension = 0; dimension < 4; ++dimension) {
+      std::array<std::array<int, kBins>, kBins> count{};
+      for (std::uint64_t i = 0; i < kPasses; ++i) {
+        const double nm = WavelengthsOfPass(1, 2 * i).nm[1];
+        const auto above = std::upper_bound(ends.begin() + 1, ends.end() - 1, nm);
+        const float place = OwenSobol(i, key)[dimension];
+        ++count[static_cast<std::size_t>(place * kBins)]
+               [static_cast<std::size_t>(above - ends.begin()) - 1];
+      }
+      for (const auto& row : count) {
+        for (const int passes : row)
+          EXPECT_NEAR(passes, kPasses / (kBins * kBins), 8) << "dimension " << dimension;
+      }
+    }
+  }
 }
 
 TEST(PassWavelengthsTest, ASeedHasItsOwn) {
