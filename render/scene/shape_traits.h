@@ -26,15 +26,14 @@ struct ShapeTraits {
   float alpha = 1;
   std::int32_t alpha_texture = kNoTexture;  // in place of `alpha`, which is its largest number
   std::int32_t motion = kNoMotion;
-  std::int32_t source = kNoSource;          // in Scene::sources; only for messages
+  std::int32_t source = kNoSource;  // in Scene::sources; only for messages
 
   [[nodiscard]] bool SeparatesMedia() const { return medium_inside != medium_outside; }
   // Whether the shapes look the same, wherever they are written.
   bool operator==(const ShapeTraits& other) const {
     return material == other.material && area_light == other.area_light &&
            medium_inside == other.medium_inside && medium_outside == other.medium_outside &&
-           alpha == other.alpha && alpha_texture == other.alpha_texture &&
-           motion == other.motion;
+           alpha == other.alpha && alpha_texture == other.alpha_texture && motion == other.motion;
   }
 };
 

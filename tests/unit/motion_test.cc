@@ -422,8 +422,9 @@ TEST(MotionTest, PhotonsAreReplayedAtTheTimeOfTheirPass) {
   const SceneNeeds needs = NeedsOf(scene, settings);
   int landed = 0;
   for (std::uint64_t pass = 0; pass < 20; ++pass) {
-    const v1::PhotonPath path =
-        ReplayInScene(scene, settings, needs, pass, 0, 1000, nullptr).value();
+    const v1::PhotonPaths paths =
+        ReplayInScene(scene, settings, needs, PhotonRange{.pass = pass}, 1000).value();
+    const v1::PhotonPath& path = paths.paths(0);
     if (path.landings().empty()) continue;
     ++landed;
     EXPECT_NEAR(static_cast<double>(path.landings(0).position().z()),
