@@ -29,12 +29,9 @@ class Luminances {
   std::array<const float*, 6> columns_{};
 };
 
-// Adds the rows [begin, end) of a sibling, with which `sum` makes that of the passes `together`.
-void AddSibling(SliceSums& sum, const SliceSums& sibling, const PassRange& together,
-                std::size_t begin, std::size_t end) {
-  const auto bits = [&](std::size_t column) {
-    return SignificantBits(together, column, sum.evidence);
-  };
+// Adds the rows [begin, end) of a sibling.
+void AddSibling(SliceSums& sum, const SliceSums& sibling, std::size_t begin, std::size_t end) {
+  const auto bits = [&](std::size_t column) { return SignificantBits(column, sum.evidence); };
   const auto half = static_cast<double>(sum.passes.size());
   // Before the radiance is added up.
   float* const deviations = sum.columns[kSquaredDeviations].data();
@@ -51,20 +48,14 @@ void AddSibling(SliceSums& sum, const SliceSums& sibling, const PassRange& toget
     constexpr auto kLargest = static_cast<float>(kLargestSum);
     return RoundedFloat(std::clamp(ours + theirs, -kLargest, kLargest), dropped);
   };
-  const auto add_column = [&](std::size_t column, const auto& dropped_of) {
+  for (std::size_t column = 0; column < sum.columns.size(); ++column) {
+    if (column == kSquaredDeviations || column == kLargestLuminance) continue;
     float* const ours = sum.columns[column].data();
     const float* const theirs = sibling.columns[column].data();
+    const unsigned int dropped = DroppedBits(bits(column));
     for (std::size_t pixel = begin; pixel < end; ++pixel)
-      ours[pixel] = add(ours[pixel], theirs[pixel], dropped_of(pixel));
-  };
-  for (std::size_t column = kDirectRadiance; column < sum.columns.size(); ++column) {
-    if (column == kSquaredDeviations || column == kLargestLuminance) continue;
-    add_column(column, [dropped = DroppedBits(bits(column))](std::size_t) { return dropped; });
+      ours[pixel] = add(ours[pixel], theirs[pixel], dropped);
   }
-  // By the number of photons that is known by now.
-  const float* const counts = sum.columns[kPhotonCount].data();
-  for (std::size_t column = kPhotonRadiance; column < kDirectRadiance; ++column)
-    add_column(column, [&](std::size_t pixel) { return DroppedBits(PhotonBits(counts[pixel])); });
   float* const largest = sum.columns[kLargestLuminance].data();
   const float* const their_largest = sibling.columns[kLargestLuminance].data();
   for (std::size_t pixel = begin; pixel < end; ++pixel)
@@ -88,9 +79,7 @@ void SetWhatFollowsFromRadiance(SliceSums& slice) {
 void SetWhatFollowsFromRadiance(SliceSums& slice, std::size_t begin, std::size_t end) {
   LUCERNA_CHECK(slice.passes.size() == 1 && end <= slice.pixels());
   const double half = slice.passes.first % 2 == 0 ? 1 : -1;
-  const auto bits = [&](std::size_t column) {
-    return SignificantBits(slice.passes, column, slice.evidence);
-  };
+  const auto bits = [&](std::size_t column) { return SignificantBits(column, slice.evidence); };
   for (std::size_t c = 0; c < 3; ++c) {
     const float* const photons = slice.columns[kPhotonRadiance + c].data();
     const float* const direct = slice.columns[kDirectRadiance + c].data();
@@ -120,7 +109,7 @@ Status MergeSibling(SliceSums& sum, const SliceSums& sibling, ThreadTeam* team) 
   const PassRange together = {std::min(sum.passes.first, sibling.passes.first),
                               std::max(sum.passes.last, sibling.passes.last)};
   const auto add = [&](std::size_t begin, std::size_t end) {
-    AddSibling(sum, sibling, together, begin, end);
+    AddSibling(sum, sibling, begin, end);
   };
   constexpr std::size_t kPixelsAtOnce = 4096;
   if (team != nullptr) {

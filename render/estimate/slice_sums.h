@@ -5,9 +5,9 @@
 // coordinator adds slices to slices. Sums are taken in a fixed tree, each node the rounded sum of
 // its two halves, so that the bits do not depend on who adds up what.
 //
-// Sums are rounded, to nearest, when a pass becomes a slice and at every node, to as many
-// significant bits as their noise leaves them (SignificantBits): a third of a float's bytes on the
-// wire.
+// Sums of radiance are rounded to 16 significant bits and all others to 8, to nearest, when a pass
+// becomes a slice and at every node: far below the noise of the passes that
+// they sum, and half the bytes on the wire.
 //
 // Invariants
 //   S1  Every column that is present has pixels() rows, all finite, of its SignificantBits.
@@ -105,27 +105,11 @@ struct SliceShape {
 [[nodiscard]] constexpr std::size_t ColumnsOf(const PassRange& passes, std::size_t evidence) {
   return kSliceColumns + evidence + (HasFeatures(passes) ? std::size_t{kFeatureColumns} : 0);
 }
-// Significant bits of a column's floats, at most; those of photons have PhotonBits. Direct light
-// may be without noise: 12 bits, an error of one in 8000. What decides about radii and errors need
-// not be better known than to a hundredth.
-[[nodiscard]] constexpr unsigned int SignificantBits(const PassRange& passes, std::size_t column,
-                                                     std::size_t evidence) {
-  constexpr unsigned int kAll = 16;
-  if (column < kDirectRadiance) return kAll;
-  if (column < kHalfDifference) return 12;
-  // Of a single pass it is the radiance itself, from which the first difference is taken.
-  if (column < kSquaredDeviations && passes.size() == 1) return kAll;
-  if (column == kPhotonCount || column >= kSliceColumns + evidence) return kAll;
-  return 6;
-}
-// Significant bits of what `count` photons bring to a pixel. Their noise is one over the root of
-// their number at least, and rounding errors are at most a 32nd of that. Hitpoints that share a
-// radius and segments in media are not counted: they have the least bits here, an error of one in
-// 2000.
-[[nodiscard]] constexpr unsigned int PhotonBits(float count) {
-  // Count < 2^(exponent + 1).
-  const int exponent = static_cast<int>(std::bit_cast<std::uint32_t>(count) >> 23U) - 127;
-  return static_cast<unsigned int>(std::clamp(6 + (exponent + 2) / 2, 10, 16));
+// Significant bits of a column's floats.
+[[nodiscard]] constexpr unsigned int SignificantBits(std::size_t column, std::size_t evidence) {
+  const bool is_statistic =
+      column >= kSquaredDeviations && column < kSliceColumns + evidence && column != kPhotonCount;
+  return is_statistic ? 8 : 16;
 }
 
 // These are made for every pixel of every pass, in loops over vectors.

@@ -73,7 +73,7 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   for (std::vector<float>& column : slice.columns)
     columns.push_back(column.data());
   const auto set = [&](std::size_t column, std::size_t pixel, double value) {
-    columns[column][pixel] = Rounded(value, SignificantBits(slice.passes, column, evidence));
+    columns[column][pixel] = Rounded(value, SignificantBits(column, evidence));
   };
 
   // Some of the colours that make a mean over passes are below zero: single wavelengths are outside
@@ -134,9 +134,8 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   const auto set_pixel = [&](std::size_t pixel) {
     const std::array<double, 3> photons = in_color(brought[pixel].photons);
     const std::array<double, 3> direct = in_color(ToDoubles(pass.direct[pixel]));
-    const unsigned int photon_bits = PhotonBits(columns[kPhotonCount][pixel]);
     for (std::size_t c = 0; c < 3; ++c) {
-      columns[kPhotonRadiance + c][pixel] = Rounded(photons[c], photon_bits);
+      set(kPhotonRadiance + c, pixel, photons[c]);
       set(kDirectRadiance + c, pixel, direct[c]);
     }
     set(bias, pixel, brought[pixel].bias);

@@ -12,11 +12,11 @@
 namespace lucerna {
 namespace {
 
-constexpr std::string_view kMagic = "LSL4";
+constexpr std::string_view kMagic = "LSL3";
 
 // The low bits of a float of that column that are zero.
-unsigned int EmptyBits(const PassRange& passes, std::size_t column, std::size_t evidence) {
-  return DroppedBits(SignificantBits(passes, column, evidence));
+unsigned int EmptyBits(std::size_t column, std::size_t evidence) {
+  return DroppedBits(SignificantBits(column, evidence));
 }
 
 Status Malformed(std::string_view what) {
@@ -64,7 +64,7 @@ std::string EncodeSlice(const SliceSums& slice, ThreadTeam* team) {
     std::vector<std::uint32_t> codes(slice.pixels());
     for (std::size_t column = begin; column < end; ++column) {
       if (FollowsFromRadiance(slice.passes, column)) continue;
-      const unsigned int empty = EmptyBits(slice.passes, column, slice.evidence);
+      const unsigned int empty = EmptyBits(column, slice.evidence);
       std::ranges::transform(slice.columns[column], codes.begin(), [&](float value) {
         return std::bit_cast<std::uint32_t>(value) >> empty;
       });
@@ -131,7 +131,7 @@ StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape)
   for (std::size_t column = 0; column < columns; ++column) {
     std::vector<float>& values = slice.columns.emplace_back(shape.pixels);
     if (FollowsFromRadiance(shape.passes, column)) continue;
-    reader.Floats(EmptyBits(shape.passes, column, shape.evidence), values);
+    reader.Floats(EmptyBits(column, shape.evidence), values);
     if (!reader.ok()) {
       return Malformed(
           "its columns are truncated or damaged, or a value is not finite or too long");

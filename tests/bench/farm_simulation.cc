@@ -63,8 +63,8 @@ struct Costs {
   double accumulation_ns = 75;    // a hitpoint that a batch of photons touched: decode and add
   double split_slice_ns = 60;     // a pixel and split pass, in parallel: its slice
   double rpc_us = 50;             // of a core of the coordinator, any call
-  double slice_bytes = 20.5;      // a pixel
-  double first_slice_bytes = 22;  // a pixel, in the first 16 passes
+  double slice_bytes = 30;        // a pixel
+  double first_slice_bytes = 26;  // a pixel, in the first 16 passes
   double radii_bytes = 2;         // a pixel, round and worker
   double block_bytes = 8;         // a pixel and worker, of a split pass
   double accumulation_bytes = 8;  // a hitpoint that a batch of photons touched
@@ -80,7 +80,7 @@ struct Costs {
   double max_slice = 16;          // [passes] SchedulerOptions::max_slice
   double slices_per_worker = 2;   // SchedulerOptions::slices_per_worker
   // Of a slice of one pass, a pixel; 0: as of other slices.
-  double single_slice_bytes = 13.5;
+  double single_slice_bytes = 19;
   // Rounds from this pass on are never split, whatever the policy says.
   double split_below = 16;
   double split_ways = 8;      // SchedulerOptions::max_split_ways

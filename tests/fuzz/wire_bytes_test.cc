@@ -71,7 +71,7 @@ SliceSums SomeSlice(const SliceShape& shape) {
     for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel) {
       slice.columns[column][pixel] =
           Rounded(std::exp(8 * static_cast<double>(pixel)) * (pixel % 3 == 0 ? -1 : 1) / 1000,
-                  SignificantBits(shape.passes, column, shape.evidence));
+                  SignificantBits(column, shape.evidence));
     }
   }
   slice.tally.photons = shape.photons_per_pass * shape.passes.size();
@@ -89,7 +89,7 @@ void CheckSliceOf(const std::string& bytes, const SliceShape& shape) {
   bool is_kept = true;
   for (std::size_t column = 0; column < decoded->columns.size(); ++column) {
     ASSERT_EQ(decoded->columns[column].size(), shape.pixels);
-    const unsigned int bits = SignificantBits(shape.passes, column, shape.evidence);
+    const unsigned int bits = SignificantBits(column, shape.evidence);
     for (const float value : decoded->columns[column])
       is_kept &= std::isfinite(value) && Rounded(static_cast<double>(value), bits) == value;
   }

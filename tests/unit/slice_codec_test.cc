@@ -33,7 +33,7 @@ SliceSums RandomSlice(const SliceShape& shape) {
       if (rng.Bits() % 4 == 0) continue;
       const double sign = rng.Bits() % 2 == 0 ? 1 : -1;
       value = Rounded(sign * std::exp(60 * static_cast<double>(rng.Uniform()) - 30),
-                      SignificantBits(shape.passes, column, shape.evidence));
+                      SignificantBits(column, shape.evidence));
     }
   }
   if (shape.passes.size() == 1) SetWhatFollowsFromRadiance(slice);
@@ -80,7 +80,7 @@ TEST(SliceCodecTest, BringsTheEndsOfEveryColumnBack) {
   const SliceShape shape = Shape({3, 4}, 6, kSectors);
   SliceSums slice = RandomSlice(shape);
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
-    const unsigned int bits = SignificantBits(shape.passes, column, shape.evidence);
+    const unsigned int bits = SignificantBits(column, shape.evidence);
     slice.columns[column] = {Rounded(1e300, bits),
                              Rounded(-1e300, bits),
                              Rounded(std::numeric_limits<double>::denorm_min(), bits),
@@ -181,7 +181,7 @@ TEST(SliceCodecTest, RefusesAValueWithTooManyBits) {
     head.columns.clear();
     head.tally.photons = kPhotons;
     // The head of a slice of 2 pixels: that of none, with two numbers changed.
-    writer.Bytes("LSL4");
+    writer.Bytes("LSL3");
     writer.Varint(shape.passes.first);
     writer.Varint(shape.passes.size());
     writer.Varint(shape.pixels);
@@ -189,7 +189,7 @@ TEST(SliceCodecTest, RefusesAValueWithTooManyBits) {
     const std::string of_none = EncodeSlice(head);
     writer.Bytes(std::string_view(of_none).substr(4 + 4));
     for (std::size_t column = 0; column < kSliceColumns; ++column) {
-      const unsigned int empty = DroppedBits(SignificantBits(shape.passes, column, 0));
+      const unsigned int empty = DroppedBits(SignificantBits(column, 0));
       const std::uint32_t one = std::bit_cast<std::uint32_t>(1.0F) >> empty;
       const std::uint32_t above = std::uint32_t{1} << (32 - empty);
       const std::vector<std::uint32_t> codes = {0, column == damaged ? above : one};

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -25,7 +24,7 @@ SliceSums RandomPass(std::uint64_t pass) {
     if (column == kSquaredDeviations) continue;
     for (float& value : slice.columns[column]) {
       const double number = std::exp(8.0 * static_cast<double>(rng.Uniform()) - 4.0);
-      value = Rounded(number, SignificantBits(slice.passes, column, kEvidence));
+      value = Rounded(number, SignificantBits(column, kEvidence));
     }
   }
   slice.tally.photons = 10 + pass;
@@ -56,25 +55,11 @@ TEST(SliceSumsTest, RoundsToNearestWithTiesToEven) {
 TEST(SliceSumsTest, RoundingStaysFinite) {
   for (const PassRange& passes : {PassRange{0, 1}, PassRange{16, 18}, PassRange{512, 576}}) {
     for (std::size_t column = 0; column < ColumnsOf(passes, kEvidence); ++column) {
-      const unsigned int bits = SignificantBits(passes, column, kEvidence);
+      const unsigned int bits = SignificantBits(column, kEvidence);
       EXPECT_EQ(Rounded(1e300, bits), static_cast<float>(kLargestSum)) << column;
       EXPECT_EQ(Rounded(-1e300, bits), -static_cast<float>(kLargestSum)) << column;
     }
   }
-}
-
-// The noise of n photons is 1 over the root of n at least. Below 16 bits an error of rounding is at
-// most a 32nd of it.
-TEST(SliceSumsTest, RoundingIsASmallShareOfThePhotonsNoise) {
-  for (float count = 1; count < 1e18F; count *= 1.01F) {
-    const unsigned int bits = PhotonBits(count);
-    if (bits == 16) continue;
-    const double largest_error = std::exp2(-static_cast<double>(bits));
-    EXPECT_LE(largest_error, 1 / (32 * std::sqrt(static_cast<double>(count)))) << count;
-  }
-  EXPECT_EQ(PhotonBits(0), 10U);
-  EXPECT_EQ(PhotonBits(1e6F), 16U);
-  EXPECT_EQ(PhotonBits(std::numeric_limits<float>::max()), 16U);
 }
 
 TEST(SliceSumsTest, SiblingsMakeTheSameSumInEitherOrder) {
@@ -110,7 +95,7 @@ TEST(SliceSumsTest, DeviationsAreThoseOfAllPasses) {
     squares += (luminance - mean) * (luminance - mean);
   // Pairs, fours and the eight were each rounded once.
   const double rounding =
-      std::exp2(-static_cast<double>(SignificantBits({64, 72}, kSquaredDeviations, kEvidence)));
+      std::exp2(-static_cast<double>(SignificantBits(kSquaredDeviations, kEvidence)));
   EXPECT_NEAR(static_cast<double>(tree.Whole()->At(kSquaredDeviations, 5)), squares,
               3 * rounding * squares);
 }
