@@ -24,7 +24,7 @@ podman build --network host --tag "$tag" --file deploy/container/Containerfile \
   --build-arg BASE="$base" --build-arg PACKAGE="$(realpath --relative-to=. "$package")" . > "$folder/build.log" 2>&1 ||
   { tail -n 20 "$folder/build.log"; exit 1; }
 
-in_background() { started+=("$(podman run --detach --network host --volume "$folder:/work" "$tag" "$@")"); }
+in_background() { started+=("$(podman run --detach --network host --volume "$folder:/scenes" "$tag" "$@")"); }
 [ "$(podman run --rm --network host "$tag" id --user)" = 10001 ] || { echo "the programs run as another user"; exit 1; }
 in_background lucerna-server --listen 127.0.0.1:0 --state /var/lib/lucerna
 address=
@@ -38,8 +38,8 @@ in_background lucerna-worker --server "$address" --threads 1
 in_background lucerna-worker --server "$address" --threads 1
 cp -r tests/scenes/caustic.pbrt tests/scenes/meshes "$folder"
 flags=(--size 96x96 --passes 256 --quiet)
-podman run --rm --network host --volume "$folder:/work" "$tag" \
-  lucerna submit /work/caustic.pbrt "${flags[@]}" --server "$address" -o /work/inside.exr &
+podman run --rm --network host --volume "$folder:/scenes" "$tag" \
+  lucerna submit /scenes/caustic.pbrt "${flags[@]}" --server "$address" -o /scenes/inside.exr &
 client=$!
 for _ in $(seq 300); do
   passes=$("$bin/lucerna" jobs --server "$address" --json | grep -o '"passes": [0-9]*' | grep -o '[0-9]*' | tail -n 1 || true)
