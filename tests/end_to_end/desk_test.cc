@@ -3,26 +3,21 @@
 // lines, comparisons of several scenes.
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <cstring>
 #include <map>
 #include <numbers>
 #include <set>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include <arpa/inet.h>
-#include <netinet/in.h>
 #include <nlohmann/json.hpp>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include "render/base/files.h"
 #include "render/image/exr_file.h"
 #include "tests/support/process.h"
+#include "tests/support/small_tev.h"
 #include "tests/support/temporary_folder.h"
 
 namespace lucerna {
@@ -281,55 +276,6 @@ TEST(TraceFlagTest, SubmitMustWaitForTheEnd) {
   EXPECT_EQ(ran.exit_code, 2);
   EXPECT_THAT(ran.errors, HasSubstr("-o"));
 }
-
-// As much of tev as receives: the number of images created, and of pixels updated.
-class SmallTev {
- public:
-  SmallTev() : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    EXPECT_EQ(::bind(socket_, reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
-    EXPECT_EQ(::listen(socket_, 1), 0);
-    socklen_t size = sizeof(address);
-    ::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size);
-    address_ = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
-    thread_ = std::thread([this] {
-      const int connection = ::accept(socket_, nullptr, nullptr);
-      char bytes[65536];
-      for (ssize_t got = 0; (got = ::read(connection, bytes, sizeof(bytes))) > 0;)
-        received_.append(bytes, static_cast<std::size_t>(got));
-      ::close(connection);
-    });
-  }
-  ~SmallTev() {
-    // Ends a wait for a connection.
-    ::shutdown(socket_, SHUT_RDWR);
-    if (thread_.joinable()) thread_.join();
-    ::close(socket_);
-  }
-  [[nodiscard]] const std::string& address() const { return address_; }
-  // Packets by operation.
-  std::map<int, std::vector<std::string>> Packets() {
-    thread_.join();
-    std::map<int, std::vector<std::string>> packets;
-    for (std::size_t at = 0; at + 5 <= received_.size();) {
-      std::uint32_t length = 0;
-      std::memcpy(&length, &received_[at], 4);
-      EXPECT_GE(length, 5U);
-      EXPECT_LE(at + length, received_.size()) << "a packet is cut off";
-      packets[received_[at + 4]].push_back(received_.substr(at, length));
-      at += length;
-    }
-    return packets;
-  }
-
- private:
-  int socket_;
-  std::string address_;
-  std::string received_;
-  std::thread thread_;
-};
 
 TEST(TevFlagTest, TheLastImageIsTheOneInTheFile) {
   const TemporaryFolder folder;

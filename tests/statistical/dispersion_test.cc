@@ -10,6 +10,7 @@
 
 #include "render/math/color_space.h"
 #include "render/transport/path_wavelength.h"
+#include "tests/support/glass_balls.h"
 #include "tests/support/local_render.h"
 #include "tests/support/measure.h"
 #include "tests/support/test_scenes.h"
@@ -23,51 +24,10 @@ constexpr int kSeeds = 12;
 constexpr int kWavelengths = 16;
 constexpr std::array<std::string_view, 3> kChannels = {"R", "G", "B"};
 
-// More dispersive than any: 1.43 to 1.77.
-constexpr float kAtD = 1.5F;
-constexpr Dispersion kStrong = {0.08F, 0};
-
-// What is looked at: a floor where a ball of glass gathers the light of a spot, or a wall, the
-// right part of it black, through the ball.
 enum class View : std::uint8_t { kFocus, kThroughBall };
 
 Scene BallScene(const Material& glass, View view) {
-  Scene scene;
-  const std::int32_t ball = AddMaterial(scene, glass);
-  const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.7F));
-  AddSphere(scene, {0, 0, 1.3F}, 1, ball);
-  if (view == View::kFocus) {
-    AddQuad(scene, {-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, white);
-    scene.spot_lights.push_back({.position = {0, 0, 9},
-                                 .direction = {0, 0, -1},
-                                 .intensity = Gray(50),
-                                 .cos_falloff_start = 0.991F,
-                                 .cos_total_width = 0.99F});
-    SetCamera(scene, {0, -6, 6}, {0, 0, 0}, {0, 0, 1}, 3, 12);
-  } else {
-    AddQuad(scene, {-8, 4, -8}, {9, 0, 0}, {0, 0, 16}, white);
-    AddQuad(scene, {1, 4, -8}, {7, 0, 0}, {0, 0, 16}, AddMaterial(scene, DiffuseMaterial(0)));
-    scene.point_lights.push_back({.position = {0, 3, 6}, .intensity = Gray(50)});
-    SetCamera(scene, {0, -6, 1.3}, {0, 0, 1.3}, {0, 0, 1}, 16, 32);
-  }
-  return scene;
-}
-
-// Of the left and the right half of the image: [channel + 3 * half].
-using Halves = std::array<double, 6>;
-
-Halves HalvesOf(const Image& image) {
-  Halves halves{};
-  for (std::size_t c = 0; c < 3; ++c) {
-    const std::vector<float>& pixels = image.Find(kChannels[c])->pixels;
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      const bool is_right =
-          i % static_cast<std::size_t>(image.width) * 2 >= static_cast<std::size_t>(image.width);
-      halves[c + (is_right ? 3 : 0)] +=
-          static_cast<double>(pixels[i]) * 2 / static_cast<double>(pixels.size());
-    }
-  }
-  return halves;
+  return view == View::kFocus ? FocusOfBall(glass) : WallThroughBall(glass);
 }
 
 class DispersionTest : public testing::TestWithParam<View> {
@@ -83,8 +43,8 @@ class DispersionTest : public testing::TestWithParam<View> {
 };
 
 TEST_P(DispersionTest, TheImageIsThatOfPlainGlassesInTheColorsOfTheirWavelengths) {
-  Material strong = DielectricMaterial(kAtD);
-  strong.dispersion = kStrong;
+  Material strong = DielectricMaterial(kStrongIndexAtD);
+  strong.dispersion = kStrongDispersion;
   std::array<std::vector<double>, 6> dispersed;
   std::array<std::vector<double>, 6> together;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
@@ -92,8 +52,9 @@ TEST_P(DispersionTest, TheImageIsThatOfPlainGlassesInTheColorsOfTheirWavelengths
     Halves sum{};
     for (int i = 0; i < kWavelengths; ++i) {
       const PathWavelength wavelength((static_cast<float>(i) + 0.5F) / kWavelengths);
-      const Halves plain = Render(DielectricMaterial(IndexAt(wavelength.nm(), kAtD, kStrong)),
-                                  1000 * seed + static_cast<std::uint64_t>(i));
+      const Halves plain =
+          Render(DielectricMaterial(IndexAt(wavelength.nm(), kStrongIndexAtD, kStrongDispersion)),
+                 1000 * seed + static_cast<std::uint64_t>(i));
       const Rgb color = wavelength.color();
       const std::array<double, 3> rec709 =
           ToRec709({static_cast<double>(color.r), static_cast<double>(color.g),

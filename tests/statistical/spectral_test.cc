@@ -18,6 +18,7 @@
 #include "render/math/color_space.h"
 #include "render/math/dispersion.h"
 #include "render/transport/bsdf.h"
+#include "tests/support/glass_balls.h"
 #include "tests/support/local_render.h"
 #include "tests/support/measure.h"
 #include "tests/support/test_scenes.h"
@@ -165,58 +166,21 @@ constexpr int kSeeds = 12;
 constexpr int kCells = 20;
 constexpr double kLowNm = 400, kHighNm = 700;
 
-// More dispersive than any: 1.43 to 1.77.
-constexpr float kAtD = 1.5F;
-constexpr Dispersion kStrong = {0.08F, 0};
-
 // Which paths meet glass: photons on their way to a floor, eye paths to a wall, or both.
 enum class View : std::uint8_t { kPhotons, kEyePaths, kBoth };
 
 Scene BallScene(const Material& glass, View view) {
+  if (view == View::kPhotons) return FocusOfBall(glass);
+  if (view == View::kEyePaths) return WallThroughBall(glass);
+  // A light in a ball, whose light is seen through another one.
   Scene scene;
   const std::int32_t ball = AddMaterial(scene, glass);
-  const std::int32_t white = AddMaterial(scene, DiffuseMaterial(0.7F));
-  if (view == View::kEyePaths) {
-    AddSphere(scene, {0, 0, 1.3F}, 1, ball);
-    AddQuad(scene, {-8, 4, -8}, {9, 0, 0}, {0, 0, 16}, white);
-    AddQuad(scene, {1, 4, -8}, {7, 0, 0}, {0, 0, 16}, AddMaterial(scene, DiffuseMaterial(0)));
-    scene.point_lights.push_back({.position = {0, 3, 6}, .intensity = Gray(50)});
-    SetCamera(scene, {0, -6, 1.3}, {0, 0, 1.3}, {0, 0, 1}, 16, 32);
-    return scene;
-  }
-  AddQuad(scene, {-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, white);
-  if (view == View::kPhotons) {
-    AddSphere(scene, {0, 0, 1.3F}, 1, ball);
-    scene.spot_lights.push_back({.position = {0, 0, 9},
-                                 .direction = {0, 0, -1},
-                                 .intensity = Gray(50),
-                                 .cos_falloff_start = 0.991F,
-                                 .cos_total_width = 0.99F});
-    SetCamera(scene, {0, -6, 6}, {0, 0, 0}, {0, 0, 1}, 3, 12);
-    return scene;
-  }
-  // A light in a ball, whose light is seen through another one.
+  AddQuad(scene, {-4, -4, 0}, {8, 0, 0}, {0, 8, 0}, AddMaterial(scene, DiffuseMaterial(0.7F)));
   AddSphere(scene, {0, 0, 2}, 0.5F, ball);
   scene.point_lights.push_back({.position = {0.2F, 0, 2}, .intensity = Gray(50)});
   AddSphere(scene, {0, -3, 3}, 0.5F, ball);
   SetCamera(scene, {0, -6, 6}, {0, 0, 0}, {0, 0, 1}, 6, 12);
   return scene;
-}
-
-// Of the left and the right half of the image: [channel + 3 * half].
-using Halves = std::array<double, 6>;
-
-Halves HalvesOf(const Image& image) {
-  Halves halves{};
-  for (std::size_t c = 0; c < 3; ++c) {
-    const std::vector<float>& pixels = image.Find(kChannels[c])->pixels;
-    for (std::size_t i = 0; i < pixels.size(); ++i) {
-      const auto width = static_cast<std::size_t>(image.width);
-      halves[c + (i % width * 2 >= width ? 3 : 0)] +=
-          static_cast<double>(pixels[i]) * 2 / static_cast<double>(pixels.size());
-    }
-  }
-  return halves;
 }
 
 class SpectralDispersionTest : public testing::TestWithParam<View> {
@@ -233,8 +197,8 @@ class SpectralDispersionTest : public testing::TestWithParam<View> {
 };
 
 TEST_P(SpectralDispersionTest, TheImageIsThatOfPlainGlassesOfAllWavelengths) {
-  Material strong = DielectricMaterial(kAtD);
-  strong.dispersion = kStrong;
+  Material strong = DielectricMaterial(kStrongIndexAtD);
+  strong.dispersion = kStrongDispersion;
   std::array<std::vector<double>, 6> dispersed;
   std::array<std::vector<double>, 6> together;
   for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
@@ -246,8 +210,9 @@ TEST_P(SpectralDispersionTest, TheImageIsThatOfPlainGlassesOfAllWavelengths) {
       const double high = i == kCells - 1 ? kLastObservedNm : kLowNm + (i + 1) * step;
       const auto middle = static_cast<float>(kLowNm + (i + 0.5) * step);
       const Triple color = DaylightBetween(low, high);
-      const Halves plain = Render(DielectricMaterial(IndexAt(middle, kAtD, kStrong)),
-                                  1000 * seed + static_cast<std::uint64_t>(i), false);
+      const Halves plain =
+          Render(DielectricMaterial(IndexAt(middle, kStrongIndexAtD, kStrongDispersion)),
+                 1000 * seed + static_cast<std::uint64_t>(i), false);
       for (std::size_t k = 0; k < 6; ++k)
         sum[k] += color[k % 3] * plain[k];
     }

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <cstring>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -13,6 +12,8 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
+
+#include "tests/support/small_tev.h"
 
 namespace lucerna {
 namespace {
@@ -97,45 +98,6 @@ TEST(TevPacketTest, UpdatesATileChannelAfterChannel) {
     EXPECT_EQ(reader.Float(), value);
   EXPECT_EQ(reader.rest(), 0U);
 }
-
-// Takes one connection and reads it to its end.
-class SmallTev {
- public:
-  SmallTev() : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    EXPECT_EQ(::bind(socket_, reinterpret_cast<sockaddr*>(&address), sizeof(address)), 0);
-    EXPECT_EQ(::listen(socket_, 1), 0);
-    socklen_t size = sizeof(address);
-    ::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size);
-    address_ = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
-    thread_ = std::thread([this] {
-      const int connection = ::accept(socket_, nullptr, nullptr);
-      char bytes[65536];
-      for (ssize_t got = 0; (got = ::read(connection, bytes, sizeof(bytes))) > 0;)
-        received_.append(bytes, static_cast<std::size_t>(got));
-      ::close(connection);
-    });
-  }
-  ~SmallTev() {
-    // Ends a wait for a connection.
-    ::shutdown(socket_, SHUT_RDWR);
-    if (thread_.joinable()) thread_.join();
-    ::close(socket_);
-  }
-  [[nodiscard]] const std::string& address() const { return address_; }
-  const std::string& Received() {
-    thread_.join();
-    return received_;
-  }
-
- private:
-  int socket_;
-  std::string address_;
-  std::string received_;
-  std::thread thread_;
-};
 
 TEST(TevViewTest, AnImageArrivesWholeInTilesAtItsPlace) {
   SmallTev tev;
