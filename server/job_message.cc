@@ -367,6 +367,7 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
   LUCERNA_ASSIGN_OR_RETURN(job.scene_digest, Digest::FromBytes(message.scene_digest()));
   JobState state = StateOf(message);
   std::string failure = message.failure();
+  AddLaterSettings(*record.mutable_job()->mutable_settings());
   if (StatusOr<RenderSettings> settings = FromProto(message.settings()); settings.ok()) {
     job.settings = *std::move(settings);
   } else {

@@ -113,10 +113,12 @@ constexpr auto kSettings = std::to_array<Setting>({
     {.name = "unguided",
      .meaning = "send photons in proportion to power alone, not more where earlier ones have come "
                 "into view",
+     .in_older_jobs = "true",
      .type = SettingField<bool>{.given = &Overrides::unguided, .value = &Settings::unguided}},
     {.name = "spectral",
      .meaning = "carry wavelengths in place of three colours; `--spectral=false` for three colours",
      .default_text = "set where a colour is saturated or smooth glass disperses",
+     .in_older_jobs = "false",
      .type = SettingField<bool>{.given = &Overrides::spectral,
                                 .value = &Settings::spectral,
                                 .of_scene = [](const Scene& scene) -> std::optional<bool> {
@@ -209,6 +211,7 @@ constexpr auto kSettings = std::to_array<Setting>({
                                 .value = &Settings::use_everything}},
     {.name = "coverage",
      .meaning = "write the channel A: which share of a pixel meets a surface",
+     .in_older_jobs = "false",
      .type = SettingField<bool>{.given = &Overrides::coverage, .value = &Settings::coverage}},
 });
 

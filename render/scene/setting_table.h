@@ -64,6 +64,9 @@ struct Setting {
       {};  // what of the scene file comes before the default; empty: none
   std::string_view default_text = {};                         // empty: the field's fallback
   bool (*is_used)(const RenderSettings& settings) = nullptr;  // nullptr: always
+  // For settings that came after jobs were first kept on the disk: the value, as text, with which
+  // a job renders as it did before. Empty: every job on a disk has the setting.
+  std::string_view in_older_jobs = {};
   SettingType type = {};
 };
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <variant>
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/unknown_field_set.h>
@@ -184,6 +185,23 @@ StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message) {
     return absl::InvalidArgumentError("the crop window is not within the image");
   }
   return settings;
+}
+
+void AddLaterSettings(v1::RenderSettings& message) {
+  for (const Setting& setting : AllSettings()) {
+    const bool is_there = std::ranges::any_of(
+        message.settings(), [&](const v1::Setting& item) { return item.name() == setting.name; });
+    if (is_there) continue;
+    if (std::holds_alternative<CropFields>(setting.type)) {
+      // Parts of an image are older than their setting, in fields of their own.
+      AddSetting(setting,
+                 Concat(message.crop_x0(), ",", message.crop_x1(), ",", message.crop_y0(), ",",
+                        message.crop_y1()),
+                 *message.mutable_settings());
+    } else if (!setting.in_older_jobs.empty()) {
+      AddSetting(setting, std::string(setting.in_older_jobs), *message.mutable_settings());
+    }
+  }
 }
 
 RenderSettings SettingsOf(const v1::Job& job) {

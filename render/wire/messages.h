@@ -35,6 +35,9 @@ namespace lucerna {
 [[nodiscard]] v1::RenderSettings ToProto(const RenderSettings& settings);
 // Checks ranges too. Errors: INVALID_ARGUMENT, also for a setting that is unknown or missing.
 [[nodiscard]] StatusOr<RenderSettings> FromProto(const v1::RenderSettings& message);
+// For a job that was kept by an earlier build: adds the settings that came since, with the values
+// that render as that build did. Others that are missing stay so.
+void AddLaterSettings(v1::RenderSettings& message);
 // The job's settings to show to a user: what cannot be read has its default, and a stop criterion
 // that cannot be read is none.
 [[nodiscard]] RenderSettings SettingsOf(const v1::Job& job);

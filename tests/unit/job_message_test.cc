@@ -1,10 +1,14 @@
 // A record read by a later process says all that clients see of the job.
 #include "server/job_message.h"
 
+#include <algorithm>
 #include <limits>
+#include <set>
+#include <string>
 
 #include "gtest/gtest.h"
 
+#include "render/scene/setting_table.h"
 #include "server/state/durable_state.h"
 #include "tests/support/temporary_folder.h"
 
@@ -161,19 +165,64 @@ TEST(JobMessageTest, AJobThatHasNotEndedWaitsAgain) {
   EXPECT_FALSE(read->image);
 }
 
+// `record` without the settings of these names.
+std::string WithoutSettings(v1::JobRecord record, const std::set<std::string>& names) {
+  auto& settings = *record.mutable_job()->mutable_settings()->mutable_settings();
+  const auto is_named = [&](const v1::Setting& item) { return names.contains(item.name()); };
+  settings.erase(std::remove_if(settings.begin(), settings.end(), is_named), settings.end());
+  return record.SerializeAsString();
+}
+
 TEST(JobMessageTest, SettingsOfAnotherVersionFailAJobThatWaitsAndShowOneThatEnded) {
   v1::JobRecord record;
-  Job job = FullJob();
-  ASSERT_TRUE(record.ParseFromString(EncodeRecord(job, std::nullopt, Duration::zero())));
-  record.mutable_job()->mutable_settings()->mutable_settings()->RemoveLast();
-  const auto ended = DecodeRecord(record.SerializeAsString(), kNow);
+  ASSERT_TRUE(record.ParseFromString(EncodeRecord(FullJob(), std::nullopt, Duration::zero())));
+  const auto ended = DecodeRecord(WithoutSettings(record, {"alpha"}), kNow);
   ASSERT_TRUE(ended.ok()) << ended.status();
   EXPECT_EQ(ended->job.life.state(), JobState::kSucceeded);
   record.mutable_job()->set_state(v1::JOB_STATE_RUNNING);
-  const auto waits = DecodeRecord(record.SerializeAsString(), kNow);
+  const auto waits = DecodeRecord(WithoutSettings(record, {"alpha"}), kNow);
   ASSERT_TRUE(waits.ok()) << waits.status();
   EXPECT_EQ(waits->job.life.state(), JobState::kFailed);
   EXPECT_NE(waits->job.life.failure().find("another version"), std::string::npos);
+}
+
+// The first build that kept jobs had these settings. A coordinator that takes its place goes on
+// with the jobs, which render as they did then: whatever was added since must say how.
+TEST(JobMessageTest, AJobOfTheOldestRecordsGoesOnAsItWas) {
+  const std::set<std::string> of_oldest = {"size",
+                                           "passes",
+                                           "time_s",
+                                           "error",
+                                           "photons",
+                                           "photons_per_pass",
+                                           "seed",
+                                           "kernel",
+                                           "initial_radius",
+                                           "max_depth",
+                                           "adaptive_photons",
+                                           "radius_controller",
+                                           "alpha",
+                                           "bias",
+                                           "use_everything",
+                                           "frequency_share"};
+  std::set<std::string> later;
+  for (const Setting& setting : AllSettings()) {
+    if (!of_oldest.contains(std::string(setting.name))) later.insert(std::string(setting.name));
+  }
+  ASSERT_GE(later.size(), 4U);
+  Job job = FullJob();
+  job.life = JobLife(kNow.now);
+  job.settings.crop_x0 = 1;
+  // What they had before there was a choice.
+  job.settings.unguided = true;
+  job.settings.spectral = false;
+  job.settings.coverage = false;
+  v1::JobRecord record;
+  ASSERT_TRUE(record.ParseFromString(EncodeRecord(job, std::nullopt, Duration::zero())));
+  const auto read = DecodeRecord(WithoutSettings(record, later), kNow);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(read->job.life.state(), JobState::kQueued) << read->job.life.failure();
+  EXPECT_EQ(read->job.settings, job.settings);
 }
 
 TEST(JobMessageTest, RefusesOtherBytes) {
