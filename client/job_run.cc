@@ -13,6 +13,7 @@
 #include "client/view/terminal.h"
 #include "client/view/tev_view.h"
 #include "render/base/clock.h"
+#include "render/base/console.h"
 #include "render/base/files.h"
 #include "render/base/random_id.h"
 #include "render/image/exr_file.h"
@@ -63,13 +64,13 @@ class Progress {
     std::shared_ptr<const Image> image;
     // There is none before the first pass.
     if (previews_ && job.progress().passes() > 0) image = previews_->Newest();
-    Write(frames_.Paint(LiveLines(job, image.get(), size, display_), size));
+    Write(frames_.Paint(LiveLines(job, image.get(), size, LocaleCharset(), display_), size));
   }
   void Finish() { Write(frames_.Finish()); }
 
  private:
   static void Write(const std::string& text) {
-    std::fputs(text.c_str(), stderr);
+    PrintError(text);
     std::fflush(stderr);
   }
 
@@ -159,13 +160,13 @@ StatusOr<v1::Job> FollowToEnd(ClientConnection& connection, const std::string& j
   if (viewer && job.ok()) viewer->Finish(*job);
   if (job.ok() && !output_options.quiet) {
     const std::string dropped = DroppedLine(*job);
-    if (!dropped.empty()) std::fprintf(stderr, "lucerna: warning: %s\n", dropped.c_str());
+    if (!dropped.empty()) PrintError(absl::StrCat("lucerna: warning: ", dropped, "\n"));
     // Warnings of the scene's files have a place and came when the scene was read.
     for (const std::string& warning : job->warnings()) {
-      if (warning.starts_with("warning: ")) std::fprintf(stderr, "lucerna: %s\n", warning.c_str());
+      if (warning.starts_with("warning: ")) PrintError(absl::StrCat("lucerna: ", warning, "\n"));
     }
     for (const std::string& note : ErrorNotes(*job))
-      std::fprintf(stderr, "lucerna: %s\n", note.c_str());
+      PrintError(absl::StrCat("lucerna: ", note, "\n"));
   }
   return job;
 }

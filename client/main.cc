@@ -8,6 +8,7 @@
 #include <map>
 #include <new>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,7 @@
 #include "client/usage.h"
 #include "client/view/preview.h"
 #include "client/view/tev_view.h"
+#include "render/base/console.h"
 #include "render/base/escape.h"
 #include "render/base/version.h"
 #include "render/wire/channel.h"
@@ -576,18 +578,16 @@ int Run(int argc, char** argv) {
 
   CLI::App* help = command("help", "explain a command, or all settings of a job", [&]() -> Status {
     if (topic == "settings") {
-      std::fputs(SettingsTable().c_str(), stdout);
+      PrintText(SettingsTable());
       return absl::OkStatus();
     }
     if (topic == "man") {
-      std::fputs(ManualOf(app).c_str(), stdout);
+      PrintData(ManualOf(app));
       return absl::OkStatus();
     }
     if (topic.empty()) {
       // Not app.help(), which explains the command that was given: this one.
-      std::fputs(
-          app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal).c_str(),
-          stdout);
+      PrintText(app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal));
       return absl::OkStatus();
     }
     const CLI::App* about = FindCommand(app, topic);
@@ -595,7 +595,7 @@ int Run(int argc, char** argv) {
       return Failure(ExitCode::kUsage,
                      absl::StrCat("there is no command ", topic, "; lucerna help lists them"));
     }
-    std::fputs(about->help(app.get_name()).c_str(), stdout);
+    PrintText(about->help(app.get_name()));
     return absl::OkStatus();
   });
   help->add_option("TOPIC", topic, "a command, settings, or man for the manual page");
@@ -603,7 +603,7 @@ int Run(int argc, char** argv) {
   Shell shell = Shell::kBash;
   CLI::App* completion =
       command("completion", "print a script that completes commands in a shell", [&]() -> Status {
-        std::fputs(CompletionScript(app, shell).c_str(), stdout);
+        PrintData(CompletionScript(app, shell));
         return absl::OkStatus();
       });
   const std::map<std::string, Shell> shells = {
@@ -644,18 +644,21 @@ int Run(int argc, char** argv) {
     app.parse(std::move(last_first));
   } catch (const CLI::ParseError& error) {
     // Help is asked for by an exception too, with code 0.
-    const bool is_done = app.exit(error) == 0;
-    if (!is_done) std::fputs(Suggestion(app, words).c_str(), stderr);
+    std::ostringstream out;
+    std::ostringstream wrong;
+    const bool is_done = app.exit(error, out, wrong) == 0;
+    PrintText(out.str());
+    PrintError(wrong.str());
+    if (!is_done) PrintError(Suggestion(app, words));
     return End(is_done ? ExitCode::kDone : ExitCode::kUsage);
   }
   if (*fetch && fetched.empty()) {
-    std::fputs("lucerna: say where the image goes, with -o FILE.exr or --png FILE.png\n", stderr);
+    PrintError("lucerna: say where the image goes, with -o FILE.exr or --png FILE.png\n");
     return End(ExitCode::kUsage);
   }
 
   if (*report && report_paths.html.empty() && report_paths.csv.empty() && !output_options.json) {
-    std::fputs("lucerna: say where the report goes, with -o PAGE.html, --csv FILE or --json\n",
-               stderr);
+    PrintError("lucerna: say where the report goes, with -o PAGE.html, --csv FILE or --json\n");
     return End(ExitCode::kUsage);
   }
   const char* term = std::getenv("TERM");
@@ -665,8 +668,7 @@ int Run(int argc, char** argv) {
 
   StatusOr<std::string> token = ReadToken(token_file, std::getenv("LUCERNA_TOKEN"));
   if (!token.ok()) {
-    std::fprintf(stderr, "lucerna: --token-file %s\n",
-                 std::string(token.status().message()).c_str());
+    PrintError(absl::StrCat("lucerna: --token-file ", token.status().message(), "\n"));
     return End(ExitCode::kUsage);
   }
   server.token = *std::move(token);
@@ -674,7 +676,7 @@ int Run(int argc, char** argv) {
   if (!tev.empty()) {
     StatusOr<std::shared_ptr<TevView>> viewer = TevView::Open(tev);
     if (!viewer.ok()) {
-      std::fprintf(stderr, "lucerna: %s\n", std::string(viewer.status().message()).c_str());
+      PrintError(absl::StrCat("lucerna: ", viewer.status().message(), "\n"));
       return End(ExitCode::kFailed);
     }
     output_options.tev = *std::move(viewer);
@@ -697,8 +699,8 @@ int Run(int argc, char** argv) {
     status = absl::ResourceExhaustedError("cannot write to the standard output");
   }
   if (!status.ok()) {
-    std::fprintf(stderr, "lucerna: %s\n",
-                 EscapedLines(WithFlagNames(std::string(status.message()))).c_str());
+    PrintError(absl::StrCat("lucerna: ", EscapedLines(WithFlagNames(std::string(status.message()))),
+                            "\n"));
   }
   return End(ExitCodeOf(status));
 }
@@ -707,5 +709,6 @@ int Run(int argc, char** argv) {
 }  // namespace lucerna
 
 int main(int argc, char** argv) {
+  lucerna::ReadLocale();
   return lucerna::Run(argc, argv);
 }

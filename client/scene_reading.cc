@@ -1,12 +1,13 @@
 #include "client/scene_reading.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <utility>
 
 #include "client/exit_code.h"
 #include "client/render_flags.h"
+#include "render/base/console.h"
 #include "render/base/escape.h"
+#include "render/base/text.h"
 
 namespace lucerna {
 namespace {
@@ -19,9 +20,9 @@ void WarnOfUnused(std::span<const RenderOverrides> overrides,
     const bool is_given = std::ranges::any_of(
         overrides, [&](const RenderOverrides& of_job) { return IsGiven(setting, of_job); });
     if (!is_given || std::ranges::any_of(settings, setting.is_used)) continue;
-    std::fprintf(stderr,
-                 "lucerna: warning: %s has no effect with the other settings of this job (%s)\n",
-                 FlagOf(setting).c_str(), std::string(setting.meaning).c_str());
+    PrintError(Concat("lucerna: warning: ", FlagOf(setting),
+                      " has no effect with the other settings of this job (", setting.meaning,
+                      ")\n"));
   }
 }
 
@@ -63,7 +64,7 @@ StatusOr<SceneOfJobs> ReadSceneOfJobs(const SceneSource& source,
     const bool is_error = diagnostic.severity == Diagnostic::Severity::kError;
     errors += is_error ? 1 : 0;
     if (!is_error && (quiet || diagnostic.severity == Diagnostic::Severity::kNote)) continue;
-    std::fprintf(stderr, "%s\n", Escaped(diagnostic.ToString()).c_str());
+    PrintError(Escaped(diagnostic.ToString()) + "\n");
   }
   if (!parsed.ok()) {
     return absl::InvalidArgumentError(absl::StrCat(path, " has ", errors,

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <ratio>
 #include <string>
 #include <string_view>
@@ -21,11 +22,12 @@
 #include <spdlog/sinks/ringbuffer_sink.h>
 #include <spdlog/spdlog.h>
 
+#include "render/base/byte_size.h"
 #include "render/base/certificate.h"
 #include "render/base/clock.h"
+#include "render/base/console.h"
 #include "render/base/escape.h"
 #include "render/base/fail_point.h"
-#include "render/base/manual_page.h"
 #include "render/base/memory.h"
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
@@ -33,6 +35,7 @@
 #include "render/wire/grpc_process.h"
 #include "render/wire/program_log.h"
 #include "render/wire/security_flags.h"
+#include "render/wire/service_flags.h"
 #include "server/acceptor.h"
 #include "server/access.h"
 #include "server/admin_service.h"
@@ -253,34 +256,28 @@ Status CheckListening(const Flags& flags) {
   return CheckTlsFiles(flags.tls, SystemClock().Wall()).status();
 }
 
-std::string ManualOf(const CLI::App& app) {
-  ManualPage page(kProgram, "coordinator of Lucerna, a distributed renderer");
-  page.Section("SYNOPSIS");
-  page.Paragraph("lucerna-server [FLAGS]");
-  page.Section("DESCRIPTION");
-  page.Paragraph(
-      "Takes jobs from users, lends batches of photons and passes to workers, which may come and "
-      "go "
-      "at any time, and keeps the images. It writes \"listening on ADDRESS:PORT\" to the standard "
-      "output once it accepts calls, and its log to the standard error. Without certificates it "
-      "listens on its own machine only.");
-  page.Section("OPTIONS");
-  AddFlagItems(page, app, [](const CLI::Option&) { return true; });
-  page.Section("SIGNALS");
-  page.Paragraph(
-      "SIGTERM and SIGINT end it in order: it lends nothing more, takes in the results that are on "
-      "their way, and writes a checkpoint where it has a --state.");
-  page.Section("EXIT STATUS");
-  page.Item("0", "It was ended in order.");
-  page.Item("1", "The folder of --state cannot be used.");
-  page.Item("2", "The command line is wrong.");
-  page.Item("3", "It cannot listen on an address.");
-  page.Section("EXAMPLES");
-  page.Example("lucerna-server --listen 127.0.0.1:7400 --state /var/lib/lucerna");
-  page.Section("SEE ALSO");
-  page.Paragraph("lucerna(1), lucerna-worker(1); /usr/share/doc/lucerna/manual.md");
-  return page.text();
-}
+constexpr std::pair<std::string_view, std::string_view> kExits[] = {
+    {"0", "It was ended in order."},
+    {"1", "The folder of --state cannot be used."},
+    {"2", "The command line is wrong."},
+    {"3", "It cannot listen on an address."},
+};
+
+constexpr ServiceManual kManual = {
+    .program = kProgram,
+    .summary = "coordinator of Lucerna, a distributed renderer",
+    .description =
+        "Takes jobs from users, lends batches of photons and passes to workers, which may come and "
+        "go at any time, and keeps the images. It writes \"listening on ADDRESS:PORT\" to the "
+        "standard output once it accepts calls, and its log to the standard error. Without "
+        "certificates it listens on its own machine only.",
+    .signals =
+        "SIGTERM and SIGINT end it in order: it lends nothing more, takes in the results that are "
+        "on their way, and writes a checkpoint where it has a --state.",
+    .exit_codes = kExits,
+    .example = "lucerna-server --listen 127.0.0.1:7400 --state /var/lib/lucerna",
+    .see_also = "lucerna(1), lucerna-worker(1)",
+};
 
 int Main(int argc, char** argv) {
   Flags flags;
@@ -315,25 +312,42 @@ int Main(int argc, char** argv) {
                  "jobs in progress, which share the workers")
       ->check(CLI::Range(1, 64))
       ->capture_default_str();
-  app.add_option("--max-memory", flags.coordinator.max_memory_bytes,
-                 "memory for all that the coordinator holds together [bytes]; 0: what is free at "
-                 "the start")
+  const CLI::Validator sizes(
+      [](std::string& text) -> std::string {
+        const std::optional<std::uint64_t> bytes = ParseByteSize(text);
+        if (!bytes) return absl::StrCat("give a size, such as 500M, 8G or 8GiB, not ", text);
+        text = absl::StrCat(*bytes);
+        return "";
+      },
+      "");
+  app.add_option(
+         "--max-memory", flags.coordinator.max_memory_bytes,
+         "memory for all that the coordinator holds together, such as 8G or 8GiB; 0: what is "
+         "free at the start")
+      ->transform(sizes)
+      ->type_name("SIZE")
       ->capture_default_str();
   app.add_option("--max-store-bytes", flags.coordinator.max_store_bytes,
-                 "memory for scene files and hitpoints [bytes]")
+                 "memory for scene files and hitpoints")
+      ->transform(sizes)
+      ->type_name("SIZE")
       ->capture_default_str();
-  app.add_option(
-         "--max-job-bytes", flags.coordinator.max_job_bytes,
-         "memory for the image and the scene of one job [bytes]; 0: what is free at the start")
+  app.add_option("--max-job-bytes", flags.coordinator.max_job_bytes,
+                 "memory for the image and the scene of one job; 0: what is free at the start")
+      ->transform(sizes)
+      ->type_name("SIZE")
       ->capture_default_str();
   CLI::Option* const state = app.add_option(
       "--state", flags.state,
       "folder that keeps jobs, images and checkpoints, so that a later start goes on with "
       "them; without it they end with the process");
-  app.add_option("--max-disk", flags.max_disk_bytes,
-                 "size of the files in that folder together [bytes]; jobs that ended first are "
-                 "removed for new ones; 0: no limit")
+  app.add_option(
+         "--max-disk", flags.max_disk_bytes,
+         "size of the files in that folder together; jobs that ended first are removed for new "
+         "ones; 0: no limit")
       ->needs(state)
+      ->transform(sizes)
+      ->type_name("SIZE")
       ->capture_default_str();
   app.add_option("--checkpoint-share", flags.coordinator.checkpoint_share,
                  "share of a job's time that its checkpoints may take, above 0; 1: one after every "
@@ -356,20 +370,11 @@ int Main(int argc, char** argv) {
                  "photons in every batch; 0: by the number of workers")
       ->capture_default_str();
   AddLogFlags<CLI::IsMember>(app, flags.log);
-  if (argc == 3 && std::string_view(argv[1]) == "help" && std::string_view(argv[2]) == "man") {
-    std::fputs(ManualOf(app).c_str(), stdout);
-    return 0;
-  }
-  std::string help = "--help";
-  if (argc == 2 && std::string_view(argv[1]) == "help") argv[1] = help.data();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitUsage;
+  if (const auto code = ParseServiceFlags<CLI::ParseError>(app, argc, argv, kManual, kExitUsage)) {
+    return *code;
   }
   if (const Status checked = CheckListening(flags); !checked.ok()) {
-    std::fprintf(stderr, "lucerna-server: %s\n",
-                 EscapedLines(std::string(checked.message())).c_str());
+    PrintError(absl::StrCat(kProgram, ": ", EscapedLines(std::string(checked.message())), "\n"));
     return kExitUsage;
   }
   flags.coordinator.retention.age = std::chrono::duration_cast<Duration>(
@@ -386,6 +391,7 @@ int Main(int argc, char** argv) {
 }  // namespace lucerna
 
 int main(int argc, char** argv) {
+  lucerna::ReadLocale();
   lucerna::KeepFreedMemory();
   return lucerna::Main(argc, argv);
 }

@@ -19,9 +19,9 @@
 #include <unistd.h>
 
 #include "render/base/clock.h"
+#include "render/base/console.h"
 #include "render/base/escape.h"
 #include "render/base/fail_point.h"
-#include "render/base/manual_page.h"
 #include "render/base/memory.h"
 #include "render/base/random_id.h"
 #include "render/base/version.h"
@@ -31,6 +31,7 @@
 #include "render/wire/metrics.h"
 #include "render/wire/program_log.h"
 #include "render/wire/security_flags.h"
+#include "render/wire/service_flags.h"
 #include "worker/replay.h"
 #include "worker/session.h"
 
@@ -102,8 +103,8 @@ int Work(Session::Options options, const std::string& metrics_address, LogFormat
 int ReplayPhoton(const ReplayOptions& options) {
   const StatusOr<v1::PhotonPaths> paths = Replay(options);
   if (!paths.ok()) {
-    std::fprintf(stderr, "lucerna-worker: %s\n",
-                 EscapedLines(std::string(paths.status().message())).c_str());
+    PrintError(
+        absl::StrCat(kProgram, ": ", EscapedLines(std::string(paths.status().message())), "\n"));
     return ExitCodeFor(paths.status());
   }
   const std::string bytes = paths->SerializeAsString();
@@ -112,32 +113,26 @@ int ReplayPhoton(const ReplayOptions& options) {
   return is_written ? 0 : kExitFailed;
 }
 
-std::string ManualOf(const CLI::App& app) {
-  ManualPage page(kProgram, "worker of Lucerna, a distributed renderer");
-  page.Section("SYNOPSIS");
-  page.Paragraph("lucerna-worker [FLAGS]");
-  page.Section("DESCRIPTION");
-  page.Paragraph(
-      "Takes batches of photons and passes from the coordinator, traces them and returns what they "
-      "brought. It keeps nothing that cannot be fetched again, and may be started and killed at "
-      "any "
-      "time. Its log goes to the standard error.");
-  page.Section("OPTIONS");
-  AddFlagItems(page, app, [](const CLI::Option&) { return true; });
-  page.Section("SIGNALS");
-  page.Paragraph("SIGTERM and SIGINT make it give back what it holds and end.");
-  page.Section("EXIT STATUS");
-  page.Item("0", "It was ended by SIGTERM or SIGINT.");
-  page.Item("1", "Anything else.");
-  page.Item("2", "The command line is wrong.");
-  page.Item("3", "No coordinator answers.");
-  page.Item("4", "The coordinator refuses this worker: another build, or no right to work.");
-  page.Section("EXAMPLES");
-  page.Example("lucerna-worker --server farm.example:7400 --threads 8");
-  page.Section("SEE ALSO");
-  page.Paragraph("lucerna(1), lucerna-server(1); /usr/share/doc/lucerna/manual.md");
-  return page.text();
-}
+constexpr std::pair<std::string_view, std::string_view> kExits[] = {
+    {"0", "It was ended by SIGTERM or SIGINT."},
+    {"1", "Anything else."},
+    {"2", "The command line is wrong."},
+    {"3", "No coordinator answers."},
+    {"4", "The coordinator refuses this worker: another build, or no right to work."},
+};
+
+constexpr ServiceManual kManual = {
+    .program = kProgram,
+    .summary = "worker of Lucerna, a distributed renderer",
+    .description =
+        "Takes batches of photons and passes from the coordinator, traces them and returns what "
+        "they brought. It keeps nothing that cannot be fetched again, and may be started and "
+        "killed at any time. Its log goes to the standard error.",
+    .signals = "SIGTERM and SIGINT make it give back what it holds and end.",
+    .exit_codes = kExits,
+    .example = "lucerna-worker --server farm.example:7400 --threads 8",
+    .see_also = "lucerna(1), lucerna-server(1)",
+};
 
 int Main(int argc, char** argv) {
   Session::Options options;
@@ -178,28 +173,19 @@ int Main(int argc, char** argv) {
   app.add_option("--index", replay.index, "of the first photon to replay in its pass, from 0")
       ->needs(job);
   app.add_option("--count", replay.count, "how many photons to replay")->needs(job);
-  if (argc == 3 && std::string_view(argv[1]) == "help" && std::string_view(argv[2]) == "man") {
-    std::fputs(ManualOf(app).c_str(), stdout);
-    return 0;
-  }
-  std::string help = "--help";
-  if (argc == 2 && std::string_view(argv[1]) == "help") argv[1] = help.data();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitUsage;
+  if (const auto code = ParseServiceFlags<CLI::ParseError>(app, argc, argv, kManual, kExitUsage)) {
+    return *code;
   }
   if (!IsAddress(options.server.address)) {
-    std::fprintf(stderr,
-                 "lucerna-worker: --server \"%s\": give HOST:PORT, such as 127.0.0.1:7400\n",
-                 options.server.address.c_str());
+    PrintError(absl::StrCat(kProgram, ": --server \"", options.server.address,
+                            "\": give HOST:PORT, such as 127.0.0.1:7400\n"));
     return kExitUsage;
   }
   StatusOr<std::string> token = ReadToken(token_file, std::getenv("LUCERNA_TOKEN"));
   if (token.ok()) options.server.token = *std::move(token);
   const Status security = token.ok() ? CheckSecurity(options.server) : token.status();
   if (!security.ok()) {
-    std::fprintf(stderr, "lucerna-worker: %s\n", std::string(security.message()).c_str());
+    PrintError(absl::StrCat(kProgram, ": ", security.message(), "\n"));
     return kExitUsage;
   }
   options.connect_timeout =
@@ -220,6 +206,7 @@ int Main(int argc, char** argv) {
 }  // namespace lucerna
 
 int main(int argc, char** argv) {
+  lucerna::ReadLocale();
   lucerna::KeepFreedMemory();
   return lucerna::Main(argc, argv);
 }

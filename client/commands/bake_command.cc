@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <numbers>
 #include <system_error>
 #include <utility>
+
+#include "absl/strings/str_format.h"
 
 #include "client/bake/chart_atlas.h"
 #include "client/bake/irradiance_plan.h"
@@ -19,6 +20,7 @@
 #include "client/job_run.h"
 #include "client/scene_reading.h"
 #include "client/view/report.h"
+#include "render/base/console.h"
 #include "render/base/files.h"
 #include "render/formats/sensors/sensors_reader.h"
 #include "render/image/exr_file.h"
@@ -265,7 +267,7 @@ class Bakery {
  private:
   void Say(const std::string& what, const SensorSet& set) const {
     if (output_options_.quiet) return;
-    std::fprintf(stderr, "%s: %zu points\n", what.c_str(), set.sensors.size());
+    PrintError(absl::StrCat(what, ": ", set.sensors.size(), " points\n"));
   }
 
   // A job's name among those that are kept: of its scene, sensors included, and its settings.
@@ -351,18 +353,18 @@ Status MeasureMesh(const BakeRequest& request, Bakery& bakery, SurfaceMesh& mesh
 void PrintFigures(const std::vector<SurfaceFigures>& figures, bool in_lux,
                   const std::optional<RelativeError>& error,
                   const std::optional<double>& interpolation_error, const std::string& path) {
-  std::fputs(FiguresTable(figures, in_lux).c_str(), stdout);
+  std::string text = FiguresTable(figures, in_lux);
   if (error) {
-    std::printf("estimated error %.2g %% (95 %%: %.2g %% to %.2g %%)", 100 * error->value,
-                100 * error->low, 100 * error->high);
+    absl::StrAppendFormat(&text, "estimated error %.2g %% (95 %%: %.2g %% to %.2g %%)",
+                          100 * error->value, 100 * error->low, 100 * error->high);
   } else {
-    std::printf("no estimate of the error");
+    text += "no estimate of the error";
   }
   if (interpolation_error) {
-    std::printf("; between vertices the mesh differs by %.2g %% of the mean",
-                100 * *interpolation_error);
+    absl::StrAppendFormat(&text, "; between vertices the mesh differs by %.2g %% of the mean",
+                          100 * *interpolation_error);
   }
-  std::printf(": %s\n", path.c_str());
+  PrintText(absl::StrCat(text, ": ", path, "\n"));
 }
 
 }  // namespace
@@ -466,9 +468,7 @@ Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
   }
   std::filesystem::remove_all(folder, error_of_folder);
   if (output_options.json) {
-    std::fputs(
-        BakeReport(bakery.rounds(), figures, interpolation_error, request.output_path).c_str(),
-        stdout);
+    PrintData(BakeReport(bakery.rounds(), figures, interpolation_error, request.output_path));
   } else if (!output_options.quiet) {
     PrintFigures(figures, request.in_lux, NewestError(bakery.rounds().front().job),
                  interpolation_error, request.output_path);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <thread>
 #include <utility>
@@ -19,6 +18,7 @@
 #include "client/render_flags.h"
 #include "client/scene_reading.h"
 #include "client/view/report.h"
+#include "render/base/console.h"
 #include "render/base/files.h"
 #include "render/film/image_metrics.h"
 #include "render/film/reference.h"
@@ -179,10 +179,8 @@ class Comparer {
 
   void Announce(int repetition, const std::string& setting, double seconds) const {
     if (voice_.quiet) return;
-    std::fprintf(stderr, "%s\n",
-                 absl::StrFormat("repetition %d of %d, %s, %g s", repetition + 1,
-                                 request_.repetitions, setting, seconds)
-                     .c_str());
+    PrintError(absl::StrFormat("repetition %d of %d, %s, %g s\n", repetition + 1,
+                               request_.repetitions, setting, seconds));
   }
 
  private:
@@ -200,10 +198,8 @@ class Comparer {
       const bool is_near = had_s * kNear >= seconds && had_s <= most_over * seconds;
       if (is_near || attempt == kAttempts) return job;
       if (voice_.quiet) continue;
-      std::fprintf(
-          stderr, "%s\n",
-          absl::StrFormat("  once more: it had %.2f s of processor time, not %g", had_s, seconds)
-              .c_str());
+      PrintError(absl::StrFormat("  once more: it had %.2f s of processor time, not %g\n", had_s,
+                                 seconds));
     }
   }
 
@@ -449,17 +445,15 @@ Status CompareSettings(const CompareRequest& request, const ClusterOptions& clus
     }
     if (!request.csv_path.empty()) LUCERNA_RETURN_IF_ERROR(WriteFile(request.csv_path, csv));
     if (output_options.json) {
-      std::fputs(
-          ComparisonReport(result.comparison, result.subject, result.runs, output_options.detail)
-              .c_str(),
-          stdout);
+      PrintData(
+          ComparisonReport(result.comparison, result.subject, result.runs, output_options.detail));
     }
   }
   if (output_options.json) return absl::OkStatus();
   if (request.table_path.empty()) {
-    std::fputs(tables.c_str(), stdout);
+    PrintText(tables);
   } else if (!output_options.quiet) {
-    std::printf("%s\n", request.table_path.c_str());
+    PrintData(request.table_path + "\n");
   }
   return absl::OkStatus();
 }

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
 #include "absl/strings/str_format.h"
@@ -10,6 +9,7 @@
 #include "client/exit_code.h"
 #include "client/scene_reading.h"
 #include "client/view/report.h"
+#include "render/base/console.h"
 #include "render/base/escape.h"
 #include "render/base/files.h"
 #include "render/estimate/error_estimate.h"
@@ -48,15 +48,15 @@ Status Validate(const SceneSource& source, bool strict, const OutputOptions& out
     const bool is_error = diagnostic.severity == Diagnostic::Severity::kError;
     // As JSON they are the result itself.
     if (output_options.json || (output_options.quiet && !is_error)) continue;
-    std::fprintf(stderr, "%s\n", Escaped(diagnostic.ToString()).c_str());
+    PrintError(Escaped(diagnostic.ToString()) + "\n");
   }
   const bool is_ok = parsed.ok() && !(strict && counts[1] > 0);
-  if (output_options.json) std::fputs(SceneReport(parsed.diagnostics, is_ok).c_str(), stdout);
+  if (output_options.json) PrintData(SceneReport(parsed.diagnostics, is_ok));
   const std::string summary =
       absl::StrCat(scene_path, ": ", Counted(counts[0], "error"), ", ",
                    Counted(counts[1], "warning"), ", ", Counted(counts[2], "note"));
   if (!is_ok) return absl::InvalidArgumentError(summary);
-  if (!output_options.json && !output_options.quiet) std::printf("%s\n", summary.c_str());
+  if (!output_options.json && !output_options.quiet) PrintText(summary + "\n");
   return absl::OkStatus();
 }
 
@@ -72,7 +72,7 @@ Status Diff(const std::string& image_path, const std::string& reference_path,
   }
   LUCERNA_ASSIGN_OR_RETURN(const ImageMetrics metrics, Compare(image, reference, options));
   if (output_options.json) {
-    std::fputs(MetricsReport(metrics).c_str(), stdout);
+    PrintData(MetricsReport(metrics));
     return absl::OkStatus();
   }
   const double trimmed_share = options.trim_share > 0 ? options.trim_share : kTrimmedShare;
@@ -86,7 +86,7 @@ Status Diff(const std::string& image_path, const std::string& reference_path,
       metrics.pixels, metrics.rmse, metrics.rel_mse_trimmed, 100 * trimmed_share,
       metrics.rel_mse_untrimmed, metrics.mean_a, metrics.mean_b, metrics.mean_ratio,
       metrics.channel_mean_ratio[0], metrics.channel_mean_ratio[1], metrics.channel_mean_ratio[2]);
-  std::fputs(EscapedLines(text).c_str(), stdout);
+  PrintText(text);
   if (metrics.reference_rel_mse && metrics.reference_mse) {
     const std::string of_reference = absl::StrFormat(
         "the reference's noise: relMSE trimmed %.6g, untrimmed %.6g; RMSE %.6g\n"
@@ -95,7 +95,7 @@ Status Diff(const std::string& image_path, const std::string& reference_path,
         std::sqrt(*metrics.reference_mse),
         metrics.rel_mse_trimmed - metrics.reference_rel_mse_trimmed,
         metrics.rel_mse_untrimmed - metrics.reference_rel_mse_untrimmed);
-    std::fputs(of_reference.c_str(), stdout);
+    PrintText(of_reference);
   }
   return absl::OkStatus();
 }
@@ -104,7 +104,7 @@ Status PrintDigest(const std::string& exr_path, const OutputOptions& output_opti
   LUCERNA_ASSIGN_OR_RETURN(const Image image, ReadImage(exr_path));
   const std::string text =
       output_options.json ? DigestReport(image) : absl::StrCat(image.PixelDigest().Hex(), "\n");
-  std::fputs(EscapedLines(text).c_str(), stdout);
+  PrintData(EscapedLines(text));
   return absl::OkStatus();
 }
 
@@ -127,8 +127,9 @@ Status ConvertToPicture(const PictureRequest& request, const Display& display) {
     LUCERNA_ASSIGN_OR_RETURN(const std::string bytes,
                              EncodePicture(colors.picture, *format, Display()));
     LUCERNA_RETURN_IF_ERROR(WriteFile(request.path, bytes));
-    std::printf("%s: dark blue is %.4g, white %.4g%s\n", Escaped(layer).c_str(), colors.scale.low,
-                colors.scale.high, colors.scale.is_logarithmic ? ", logarithmic between" : "");
+    PrintText(absl::StrFormat("%s: dark blue is %.4g, white %.4g%s\n", Escaped(layer),
+                              colors.scale.low, colors.scale.high,
+                              colors.scale.is_logarithmic ? ", logarithmic between" : ""));
     return absl::OkStatus();
   }
   if (!request.layer.empty()) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 
 #include "client/bake/mesh_file.h"
@@ -27,6 +27,7 @@
 #include "client/usage.h"
 #include "client/view/report.h"
 #include "render/base/clock.h"
+#include "render/base/console.h"
 #include "render/base/escape.h"
 #include "render/base/files.h"
 #include "render/film/png_file.h"
@@ -36,10 +37,6 @@
 
 namespace lucerna {
 namespace {
-
-void Print(const std::string& text) {
-  std::fputs(text.c_str(), stdout);
-}
 
 // Fetches the image, makes sure that it is one, and writes it.
 StatusOr<SavedImage> Save(ClientConnection& connection, const std::string& job_id,
@@ -63,8 +60,8 @@ class PeriodicSave {
     // From here, so that a slow disk does not take all of the time.
     last_ = SystemClock().Steady();
     if (!status.ok() && !has_warned_) {
-      std::fprintf(stderr, "lucerna: warning: the image so far was not saved: %s\n",
-                   EscapedLines(std::string(status.message())).c_str());
+      PrintError(absl::StrCat("lucerna: warning: the image so far was not saved: ",
+                              EscapedLines(std::string(status.message())), "\n"));
     }
     has_warned_ = !status.ok();
   }
@@ -82,9 +79,9 @@ Status SaveAndReport(ClientConnection& connection, const v1::Job& job, const Out
   LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved,
                            Save(connection, job.job_id(), outputs, output_options.display));
   if (output_options.json) {
-    Print(JobReport(job, saved, output_options.detail));
+    PrintData(JobReport(job, saved, output_options.detail));
   } else if (!output_options.quiet) {
-    Print(absl::StrCat(SummaryLine(job), ": ", absl::StrJoin(saved.paths, ", "), "\n"));
+    PrintText(absl::StrCat(SummaryLine(job), ": ", absl::StrJoin(saved.paths, ", "), "\n"));
   }
   return absl::OkStatus();
 }
@@ -215,16 +212,16 @@ Status DrawMesh(const RenderRequest& request, int threads, const OutputOptions& 
   LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved, WriteOutputs(render.image, exr, request.outputs,
                                                                 output_options.display));
   if (render.share_unknown > 0 && !output_options.quiet) {
-    std::fprintf(stderr,
-                 "lucerna: warning: for %.2g %% of what is seen the mesh has no light, which is "
-                 "black; bake all surfaces, with --sides both where both are seen\n",
-                 100 * render.share_unknown);
+    PrintError(absl::StrFormat(
+        "lucerna: warning: for %.2g %% of what is seen the mesh has no light, which is black; bake "
+        "all surfaces, with --sides both where both are seen\n",
+        100 * render.share_unknown));
   }
   if (output_options.json) {
-    Print(MeshRenderReport(read.settings.front().passes, render.share_unknown, saved));
+    PrintData(MeshRenderReport(read.settings.front().passes, render.share_unknown, saved));
   } else if (!output_options.quiet) {
-    Print(absl::StrCat(read.settings.front().passes,
-                       " passes without photons: ", absl::StrJoin(saved.paths, ", "), "\n"));
+    PrintText(absl::StrCat(read.settings.front().passes,
+                           " passes without photons: ", absl::StrJoin(saved.paths, ", "), "\n"));
   }
   return absl::OkStatus();
 }
@@ -332,7 +329,7 @@ Status Submit(const RenderRequest& request, const Endpoint& server,
                            SendJob(*connection, files, manifest, request.overrides,
                                    request.reference, request.priority, !request.trace.empty()));
   if (request.outputs.empty()) {
-    Print(output_options.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
+    PrintData(output_options.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
     return absl::OkStatus();
   }
   PeriodicSave periodic(request, output_options.display);
@@ -381,12 +378,12 @@ Status ListJobs(const JobsRequest& request, const Endpoint& server,
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, connection->List(filter));
   if (output_options.json) {
-    Print(JobsReport(jobs, output_options.detail));
+    PrintData(JobsReport(jobs, output_options.detail));
     return absl::OkStatus();
   }
-  Print(TableHead() + "\n");
+  PrintText(TableHead() + "\n");
   for (const v1::Job& job : jobs)
-    Print(TableLine(job) + "\n");
+    PrintText(TableLine(job) + "\n");
   return absl::OkStatus();
 }
 
@@ -396,9 +393,9 @@ Status Follow(const std::string& job_id, bool shows_progress, const Endpoint& se
   LUCERNA_ASSIGN_OR_RETURN(
       const v1::Job job, FollowToEnd(*connection, job_id, shows_progress, output_options, Nothing));
   if (output_options.json) {
-    Print(JobReport(job, output_options.detail));
+    PrintData(JobReport(job, output_options.detail));
   } else if (!output_options.quiet) {
-    Print(SummaryLine(job) + "\n");
+    PrintText(SummaryLine(job) + "\n");
   }
   return CheckSucceeded(job);
 }
@@ -410,9 +407,9 @@ Status Fetch(const std::string& job_id, const OutputPaths& outputs, const Endpoi
   LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved,
                            Save(*connection, job_id, outputs, output_options.display));
   if (output_options.json) {
-    Print(SavedReport(job_id, saved));
+    PrintData(SavedReport(job_id, saved));
   } else if (!output_options.quiet) {
-    Print(absl::StrJoin(saved.paths, "\n") + "\n");
+    PrintData(absl::StrJoin(saved.paths, "\n") + "\n");
   }
   return absl::OkStatus();
 }
@@ -457,9 +454,9 @@ Status Report(const std::string& job_id, const ReportPaths& paths, const Endpoin
     written.push_back(paths.csv);
   }
   if (output_options.json) {
-    Print(ConvergenceReport(job));
+    PrintData(ConvergenceReport(job));
   } else if (!output_options.quiet) {
-    Print(absl::StrJoin(written, "\n") + "\n");
+    PrintData(absl::StrJoin(written, "\n") + "\n");
   }
   return absl::OkStatus();
 }
@@ -470,9 +467,9 @@ namespace {
 Status Acknowledge(const StatusOr<v1::Job>& job, const OutputOptions& output_options) {
   if (!job.ok()) return job.status();
   if (output_options.json) {
-    Print(JobReport(*job, output_options.detail));
+    PrintData(JobReport(*job, output_options.detail));
   } else if (!output_options.quiet) {
-    Print(absl::StrCat("job ", job->job_id(), " ", NameOf(job->state()), "\n"));
+    PrintText(absl::StrCat("job ", job->job_id(), " ", NameOf(job->state()), "\n"));
   }
   return absl::OkStatus();
 }
@@ -507,7 +504,7 @@ Status DeleteJob(const std::string& job_id, const Endpoint& server,
                  const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_RETURN_IF_ERROR(connection->Delete(job_id));
-  if (!output_options.quiet) Print(absl::StrCat("job ", job_id, " is deleted\n"));
+  if (!output_options.quiet) PrintText(absl::StrCat("job ", job_id, " is deleted\n"));
   return absl::OkStatus();
 }
 

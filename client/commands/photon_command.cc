@@ -1,7 +1,6 @@
 #include "client/commands/photon_command.h"
 
 #include <charconv>
-#include <cstdio>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -13,6 +12,7 @@
 #include "client/program_output.h"
 #include "client/view/photon_file.h"
 #include "client/view/report.h"
+#include "render/base/console.h"
 #include "render/base/files.h"
 #include "render/report/photon_view.h"
 #include "render/wire/messages.h"
@@ -103,7 +103,11 @@ Status TracePhoton(const PhotonRequest& request, const Endpoint& server,
   }
   for (v1::PhotonPath& path : *paths.mutable_paths()) {
     EscapeTexts(path);
-    std::fputs((output_options.json ? PhotonReport(path) : PhotonPathText(path)).c_str(), stdout);
+    if (output_options.json) {
+      PrintData(PhotonReport(path));
+    } else {
+      PrintText(PhotonPathText(path));
+    }
   }
   return absl::OkStatus();
 }

@@ -1,7 +1,6 @@
 #include "client/commands/plan_command.h"
 
 #include <array>
-#include <cstdio>
 #include <utility>
 
 #include "absl/strings/str_format.h"
@@ -11,6 +10,7 @@
 #include "render/analysis/expected_cost.h"
 #include "render/analysis/needs.h"
 #include "render/analysis/scene_memory.h"
+#include "render/base/console.h"
 #include "render/base/text.h"
 
 namespace lucerna {
@@ -37,19 +37,20 @@ Status PrintPlan(const SceneSource& source, const RenderOverrides& overrides,
   for (const auto& [path, file] : read.manifest.entries)
     memory.files += static_cast<double>(file.size_bytes);
   if (output_options.json) {
-    std::fputs(PlanReport(needs, cost, memory).c_str(), stdout);
+    PrintData(PlanReport(needs, cost, memory));
     return absl::OkStatus();
   }
-  std::printf("%s, %d x %d pixels, %s\n", source.path.c_str(), settings.crop_width(),
-              settings.crop_height(), std::string(NameOf(settings.radius_controller)).c_str());
+  std::string text =
+      absl::StrFormat("%s, %d x %d pixels, %s\n", source.path, settings.crop_width(),
+                      settings.crop_height(), std::string(NameOf(settings.radius_controller)));
   for (const bool is_used : {true, false}) {
-    std::printf("\n%s\n", is_used ? "used" : "left out");
+    absl::StrAppendFormat(&text, "\n%s\n", is_used ? "used" : "left out");
     for (const Part part : AllParts()) {
       if (needs.Uses(part) != is_used) continue;
-      std::printf("  %-18s %s\n", std::string(NameOf(part)).c_str(), needs.ReasonOf(part).c_str());
+      absl::StrAppendFormat(&text, "  %-18s %s\n", std::string(NameOf(part)), needs.ReasonOf(part));
     }
   }
-  std::printf("\nmemory of the scene, predicted from its counts\n");
+  text += "\nmemory of the scene, predicted from its counts\n";
   const std::array<std::pair<const char*, double>, 9> rows = {
       {{"files", memory.files},
        {"shapes", memory.shapes},
@@ -61,18 +62,20 @@ Status PrintPlan(const SceneSource& source, const RenderOverrides& overrides,
        {"coordinator", memory.PeakOfCoordinator()},
        {"each worker", memory.PeakOfWorker()}}};
   for (const auto& [name, bytes] : rows) {
-    if (bytes > 0) std::printf("  %-18s %s\n", name, Bytes(bytes).c_str());
+    if (bytes > 0) absl::StrAppendFormat(&text, "  %-18s %s\n", name, Bytes(bytes));
   }
-  std::printf("\nexpected, beside the scene itself\n");
-  std::printf("  %-18s %s\n", "coordinator", Bytes(cost.coordinator).c_str());
-  std::printf("  %-18s %s\n", "each worker", Bytes(cost.worker).c_str());
+  text += "\nexpected, beside the scene itself\n";
+  absl::StrAppendFormat(&text, "  %-18s %s\n", "coordinator", Bytes(cost.coordinator));
+  absl::StrAppendFormat(&text, "  %-18s %s\n", "each worker", Bytes(cost.worker));
   if (cost.pass_sent < cost.first_pass_sent) {
-    std::printf("  %-18s %s to each worker, %s after %d passes\n", "sent a pass",
-                Bytes(cost.first_pass_sent).c_str(), Bytes(cost.pass_sent).c_str(),
-                needs.eye_sample_sets());
+    absl::StrAppendFormat(&text, "  %-18s %s to each worker, %s after %d passes\n", "sent a pass",
+                          Bytes(cost.first_pass_sent), Bytes(cost.pass_sent),
+                          needs.eye_sample_sets());
   } else {
-    std::printf("  %-18s %s to each worker\n", "sent a pass", Bytes(cost.pass_sent).c_str());
+    absl::StrAppendFormat(&text, "  %-18s %s to each worker\n", "sent a pass",
+                          Bytes(cost.pass_sent));
   }
+  PrintText(text);
   return absl::OkStatus();
 }
 

@@ -1,7 +1,6 @@
 #include "client/commands/reference_command.h"
 
 #include <array>
-#include <cstdio>
 
 #include "absl/strings/str_format.h"
 
@@ -9,6 +8,7 @@
 #include "client/job_run.h"
 #include "client/scene_reading.h"
 #include "client/view/report.h"
+#include "render/base/console.h"
 #include "render/base/files.h"
 #include "render/film/reference.h"
 #include "render/image/exr_file.h"
@@ -64,8 +64,7 @@ Status RenderReference(const ReferenceRequest& request, const ClusterOptions& cl
     // Unsigned: after the largest seed comes 0.
     overrides.seed = settings.seed + half;
     if (!output_options.quiet) {
-      std::fprintf(stderr, "half %zu of 2, seed %llu\n", half + 1,
-                   static_cast<unsigned long long>(*overrides.seed));
+      PrintError(absl::StrCat("half ", half + 1, " of 2, seed ", *overrides.seed, "\n"));
     }
     LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, runs->Run(request.scene_path, scene.manifest,
                                                           overrides, "", output_options));
@@ -75,15 +74,15 @@ Status RenderReference(const ReferenceRequest& request, const ClusterOptions& cl
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, EncodeExr(reference));
   LUCERNA_RETURN_IF_ERROR(WriteFile(request.output_path, bytes));
   if (output_options.json) {
-    std::fputs(ReferenceReport(reference, request.output_path).c_str(), stdout);
+    PrintData(ReferenceReport(reference, request.output_path));
   } else if (!output_options.quiet) {
-    std::printf("%s passes, %s photons, noise: relMSE trimmed %s, untrimmed %s; RMSE %s: %s\n",
-                MetadataOf(reference, "lucerna.reference.passes").c_str(),
-                MetadataOf(reference, "lucerna.reference.photons").c_str(),
-                MetadataOf(reference, "lucerna.reference.rel_mse_trimmed").c_str(),
-                MetadataOf(reference, "lucerna.reference.rel_mse").c_str(),
-                MetadataOf(reference, "lucerna.reference.rmse").c_str(),
-                request.output_path.c_str());
+    const auto value = [&](const char* name) {
+      return MetadataOf(reference, absl::StrCat("lucerna.reference.", name));
+    };
+    PrintText(absl::StrCat(value("passes"), " passes, ", value("photons"),
+                           " photons, noise: relMSE trimmed ", value("rel_mse_trimmed"),
+                           ", untrimmed ", value("rel_mse"), "; RMSE ", value("rmse"), ": ",
+                           request.output_path, "\n"));
   }
   return absl::OkStatus();
 }

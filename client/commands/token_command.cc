@@ -1,11 +1,10 @@
 #include "client/commands/token_command.h"
 
-#include <cstdio>
-
 #include "absl/strings/escaping.h"
 #include <nlohmann/json.hpp>
 
 #include "client/exit_code.h"
+#include "render/base/console.h"
 #include "render/base/digest.h"
 #include "render/base/random_id.h"
 #include "render/base/token_file.h"
@@ -31,11 +30,11 @@ Status NewToken(const std::string& name, const std::string& roles,
   const std::string line = absl::StrCat(name, " ", roles, " ", Sha256(token).Hex());
   if (output_options.json) {
     const nlohmann::ordered_json result = {{"token", token}, {"line", line}};
-    std::printf("%s\n", result.dump(2).c_str());
+    PrintData(result.dump(2) + "\n");
     return absl::OkStatus();
   }
-  std::printf("token, for %s alone:\n%s\nline for the coordinator's --tokens file:\n%s\n",
-              name.c_str(), token.c_str(), line.c_str());
+  PrintText(absl::StrCat("token, for ", name, " alone:\n", token,
+                         "\nline for the coordinator's --tokens file:\n", line, "\n"));
   return absl::OkStatus();
 }
 

@@ -1,18 +1,28 @@
 #include "client/commands/worker_commands.h"
 
-#include <cstdio>
 #include <vector>
 
 #include "client/connection.h"
 #include "client/view/worker_view.h"
+#include "render/base/console.h"
 
 namespace lucerna {
+namespace {
+
+void Print(const std::vector<v1::Worker>& workers, const OutputOptions& output_options) {
+  if (output_options.json) {
+    PrintData(WorkersReport(workers));
+  } else {
+    PrintText(WorkersTable(workers));
+  }
+}
+
+}  // namespace
 
 Status ListWorkers(const Endpoint& server, const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Worker> workers, connection->ListWorkers());
-  const std::string text = output_options.json ? WorkersReport(workers) : WorkersTable(workers);
-  std::fputs(text.c_str(), stdout);
+  Print(workers, output_options);
   return absl::OkStatus();
 }
 
@@ -30,10 +40,7 @@ Status OrderWorker(WorkerOrder order, const std::string& worker_id, const Endpoi
     }
     return absl::InternalError("no such order");
   }());
-  if (!output_options.quiet) {
-    const std::string text = output_options.json ? WorkersReport({worker}) : WorkersTable({worker});
-    std::fputs(text.c_str(), stdout);
-  }
+  if (!output_options.quiet) Print({worker}, output_options);
   return absl::OkStatus();
 }
 

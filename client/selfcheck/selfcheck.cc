@@ -11,6 +11,7 @@
 #include "client/exit_code.h"
 #include "client/view/report.h"
 #include "render/base/clock.h"
+#include "render/base/console.h"
 
 namespace lucerna {
 namespace {
@@ -62,12 +63,12 @@ Status Selfcheck(const std::string& only, const std::string& program_folder,
     LUCERNA_ASSIGN_OR_RETURN(const SelfcheckResult result, RunCase(one, *bench));
     if (!result.outcome.holds) failed.push_back(result.name);
     if (!output_options.json && !(output_options.quiet && result.outcome.holds)) {
-      std::fputs(LineOf(result).c_str(), stdout);
+      PrintText(LineOf(result));
       std::fflush(stdout);
     }
     results.push_back(result);
   }
-  if (output_options.json) std::fputs(SelfcheckReport(results).c_str(), stdout);
+  if (output_options.json) PrintData(SelfcheckReport(results));
   if (failed.empty()) return absl::OkStatus();
   return absl::FailedPreconditionError(absl::StrCat(
       failed.size(), " of ", cases.size(), " cases failed: ", absl::StrJoin(failed, ", ")));

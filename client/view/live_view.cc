@@ -27,9 +27,10 @@ constexpr int kGap = 2;
 // Dots of a Braille letter, by column and row; Unicode numbers them so.
 constexpr std::uint8_t kDots[2][4] = {{0x01, 0x02, 0x04, 0x40}, {0x08, 0x10, 0x20, 0x80}};
 
-class BrailleGrid {
+// Of 2 × 4 dots a letter.
+class DotGrid {
  public:
-  BrailleGrid(int columns, int rows)
+  DotGrid(int columns, int rows)
       : columns_(columns),
         rows_(rows),
         cells_(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)) {}
@@ -39,22 +40,34 @@ class BrailleGrid {
     const std::size_t row = static_cast<std::size_t>(y / 4) * static_cast<std::size_t>(columns_);
     cells_[row + static_cast<std::size_t>(x / 2)] |= kDots[x % 2][y % 4];
   }
-  [[nodiscard]] std::vector<std::string> Lines() const {
+  void SetLevel(int y) { level_ = y; }
+
+  [[nodiscard]] std::vector<std::string> Lines(Charset charset) const {
     std::vector<std::string> lines(static_cast<std::size_t>(rows_));
     for (std::size_t i = 0; i < cells_.size(); ++i) {
-      // U+2800 + dots, in UTF-8.
-      const std::uint8_t dots = cells_[i];
-      std::string& line = lines[i / static_cast<std::size_t>(columns_)];
-      line += '\xe2';
-      line += static_cast<char>(0xA0 | (dots >> 6));
-      line += static_cast<char>(0x80 | (dots & 0x3F));
+      const std::size_t row = i / static_cast<std::size_t>(columns_);
+      const bool has_level = level_ >= 0 && level_ / 4 == static_cast<int>(row);
+      lines[row] += charset == Charset::kUtf8
+                        ? Braille(has_level ? cells_[i] | kDots[0][level_ % 4] : cells_[i])
+                        : std::string(1, Ascii(cells_[i], has_level));
     }
     return lines;
   }
 
  private:
+  // U+2800 + dots, in UTF-8.
+  static std::string Braille(int dots) {
+    return {'\xe2', static_cast<char>(0xA0 | (dots >> 6)), static_cast<char>(0x80 | (dots & 0x3F))};
+  }
+  static char Ascii(int dots, bool has_level) {
+    constexpr int kUpper = kDots[0][0] | kDots[0][1] | kDots[1][0] | kDots[1][1];
+    if (dots == 0) return has_level ? '-' : ' ';
+    return (dots & kUpper) == 0 ? '.' : (dots & ~kUpper) == 0 ? '\'' : ':';
+  }
+
   int columns_, rows_;
   std::vector<std::uint8_t> cells_;
+  int level_ = -1;  // row of dots; -1: none
 };
 
 bool HasLogarithm(double value) {
@@ -126,7 +139,7 @@ std::vector<std::string> Wrapped(const std::string& text, int columns) {
 }
 
 // The curve with the error at its upper and lower end in front, and the time below; `rows` lines.
-std::vector<std::string> LabelledCurve(const v1::Job& job, int columns, int rows) {
+std::vector<std::string> LabelledCurve(const v1::Job& job, int columns, int rows, Charset charset) {
   std::vector<ChartPoint> points;
   for (const v1::ErrorSample& sample : job.convergence()) {
     const ChartPoint point{Abscissa(sample, ErrorAgainst::kTime), ErrorOf(sample).value};
@@ -135,8 +148,8 @@ std::vector<std::string> LabelledCurve(const v1::Job& job, int columns, int rows
   if (points.size() < 2 || columns < kFewestColumns || rows < kFewestRows) return {};
   const double target = SettingsOf(job).error;
   const int curve_columns = columns - kLabelColumns - 1;
-  std::vector<std::string> lines =
-      DrawCurve(points, target > 0 ? std::optional(target) : std::nullopt, curve_columns, rows - 1);
+  std::vector<std::string> lines = DrawCurve(
+      points, target > 0 ? std::optional(target) : std::nullopt, curve_columns, rows - 1, charset);
   double low = target > 0 ? target : points.front().y;
   double high = low;
   for (const ChartPoint& point : points) {
@@ -170,7 +183,8 @@ void AppendBeside(std::vector<std::string>& lines, const std::vector<std::string
 }  // namespace
 
 std::vector<std::string> DrawCurve(const std::vector<ChartPoint>& points,
-                                   std::optional<double> level, int columns, int rows) {
+                                   std::optional<double> level, int columns, int rows,
+                                   Charset charset) {
   LUCERNA_CHECK(columns >= 1 && rows >= 1);
   std::vector<ChartPoint> drawn;
   for (const ChartPoint& point : points) {
@@ -192,7 +206,7 @@ std::vector<std::string> DrawCurve(const std::vector<ChartPoint>& points,
   if (!(y_low < y_high)) y_low = y_high / 2;
   const LogScale x(x_low, x_high, 0, 2 * columns - 1);
   const LogScale y(y_low, y_high, 4 * rows - 1, 0);
-  BrailleGrid grid(columns, rows);
+  DotGrid grid(columns, rows);
   for (std::size_t i = 0; i + 1 < drawn.size(); ++i) {
     const double x0 = x.At(drawn[i].x);
     const double y0 = y.At(drawn[i].y);
@@ -207,12 +221,8 @@ std::vector<std::string> DrawCurve(const std::vector<ChartPoint>& points,
                static_cast<int>(std::lround(y0 + share * dy)));
     }
   }
-  if (level) {
-    const int row = static_cast<int>(std::lround(y.At(*level)));
-    for (int column = 0; column < 2 * columns; column += 2)
-      grid.Set(column, row);
-  }
-  return grid.Lines();
+  if (level) grid.SetLevel(static_cast<int>(std::lround(y.At(*level))));
+  return grid.Lines(charset);
 }
 
 int ColumnsOf(std::string_view text) {
@@ -239,12 +249,13 @@ std::string CutTo(const std::string& text, int columns) {
 }
 
 std::vector<std::string> LiveLines(const v1::Job& job, const Image* image, TerminalSize size,
-                                   const Display& display) {
-  std::vector<std::string> lines = Broken(ProgressLine(job), size.columns);
-  for (std::string& line : Broken(ErrorLine(job), size.columns))
+                                   Charset charset, const Display& display) {
+  // Before they are cut to the width: what ASCII has for a letter may be longer.
+  std::vector<std::string> lines = Broken(InCharset(ProgressLine(job), charset), size.columns);
+  for (std::string& line : Broken(InCharset(ErrorLine(job), charset), size.columns))
     lines.push_back(std::move(line));
   for (const std::string& note : ErrorNotes(job)) {
-    for (std::string& line : Wrapped(note, size.columns))
+    for (std::string& line : Wrapped(InCharset(note, charset), size.columns))
       lines.push_back(std::move(line));
   }
   // The line that the cursor may need stays free.
@@ -252,7 +263,7 @@ std::vector<std::string> LiveLines(const v1::Job& job, const Image* image, Termi
   const bool is_wide = size.columns >= 2 * (kFewestColumns + kLabelColumns);
   const int curve_columns = std::min(
       kMostCurveColumns, image != nullptr && is_wide ? (size.columns - kGap) / 2 : size.columns);
-  const std::vector<std::string> curve = LabelledCurve(job, curve_columns, rows);
+  const std::vector<std::string> curve = LabelledCurve(job, curve_columns, rows, charset);
 
   std::vector<std::string> picture;
   const bool is_beside = !curve.empty() && is_wide;
@@ -262,7 +273,7 @@ std::vector<std::string> LiveLines(const v1::Job& job, const Image* image, Termi
   if (image != nullptr && rows >= kFewestRows && size.columns - used >= kFewestColumns) {
     const auto preview =
         MakePreview(*image, size.columns - used, std::min(rows, kMostRows), display);
-    if (preview.ok()) picture = preview->Lines();
+    if (preview.ok()) picture = preview->Lines(charset);
   }
   if (is_beside) {
     AppendBeside(lines, curve, used, picture);

@@ -12,6 +12,7 @@
 
 #include "client/view/terminal.h"
 #include "proto/lucerna/v1/jobs.pb.h"
+#include "render/base/console.h"
 #include "render/film/display.h"
 #include "render/image/image.h"
 #include "render/report/chart.h"
@@ -19,11 +20,12 @@
 namespace lucerna {
 
 // The curve through `points`, both axes logarithmic, in Braille letters of 2 × 4 dots; `level` is a
-// line of every other dot. `rows` texts of exactly `columns` letters; none when nothing can be
-// drawn. Requires columns >= 1, rows >= 1.
+// line of every other dot. In ASCII ' and . are the curve in the upper and lower half of a letter,
+// : in both, and - is the level. `rows` texts of exactly `columns` letters; none when nothing can
+// be drawn. Requires columns >= 1, rows >= 1.
 [[nodiscard]] std::vector<std::string> DrawCurve(const std::vector<ChartPoint>& points,
-                                                 std::optional<double> level, int columns,
-                                                 int rows);
+                                                 std::optional<double> level, int columns, int rows,
+                                                 Charset charset);
 
 // How many columns `text` takes; escape sequences take none. The program's own letters are one
 // column wide each.
@@ -35,7 +37,8 @@ namespace lucerna {
 // The lines of a frame. None is wider than the terminal, and there are fewer than it has rows.
 // `image` may be null.
 [[nodiscard]] std::vector<std::string> LiveLines(const v1::Job& job, const Image* image,
-                                                 TerminalSize size, const Display& display = {});
+                                                 TerminalSize size, Charset charset,
+                                                 const Display& display = {});
 
 // Writes frames over one another.
 class FramePainter {

@@ -39,21 +39,31 @@ bool HasColors(const char* colorterm, const char* term, const char* no_color) {
   return colors == "truecolor" || colors == "24bit" || name.ends_with("256color");
 }
 
-std::vector<std::string> Preview::Lines() const {
+std::vector<std::string> Preview::Lines(Charset charset) const {
   std::vector<std::string> lines;
-  const auto color = [&](int x, int y) {
-    const std::size_t at = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-                                static_cast<std::size_t>(x));
-    return absl::StrFormat("%d;%d;%d", pixels[at], pixels[at + 1], pixels[at + 2]);
+  const auto at = [&](int x, int y) {
+    return 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                static_cast<std::size_t>(x));
   };
+  const auto colors_of = [&](int x, int y) {
+    const std::uint8_t* const upper = &pixels[at(x, y)];
+    const std::uint8_t* const lower = &pixels[at(x, y + 1)];
+    if (charset == Charset::kAscii) {
+      const auto mean = [&](int c) { return (upper[c] + lower[c] + 1) / 2; };
+      return absl::StrFormat("\x1b[48;2;%d;%d;%dm", mean(0), mean(1), mean(2));
+    }
+    return absl::StrFormat("\x1b[38;2;%d;%d;%d;48;2;%d;%d;%dm", upper[0], upper[1], upper[2],
+                           lower[0], lower[1], lower[2]);
+  };
+  const char* const cell = charset == Charset::kAscii ? " " : "▀";
   for (int y = 0; y + 1 < height; y += 2) {
     std::string line;
     std::string last;
     for (int x = 0; x < width; ++x) {
-      std::string colors = absl::StrCat("\x1b[38;2;", color(x, y), ";48;2;", color(x, y + 1), "m");
+      std::string colors = colors_of(x, y);
       // Neighbours are often alike.
       if (colors != last) line += colors;
-      line += "▀";
+      line += cell;
       last = std::move(colors);
     }
     lines.push_back(line + "\x1b[0m");

@@ -1,7 +1,7 @@
 // An image as coloured characters of a terminal.
 //
 // Pure. Every cell is an upper half block, its ink the upper pixel and its ground the lower one, in
-// 24-bit colours; brightness is that of the PNG.
+// 24-bit colours; brightness is that of the PNG. In ASCII a cell is a space on the mean of both.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "render/base/console.h"
 #include "render/base/status.h"
 #include "render/film/display.h"
 #include "render/image/image.h"
@@ -25,7 +26,7 @@ struct Preview {
   std::vector<std::uint8_t> pixels;  // [height × width × 3], sRGB
 
   // One text a row, each with its colours and an end to them.
-  [[nodiscard]] std::vector<std::string> Lines() const;
+  [[nodiscard]] std::vector<std::string> Lines(Charset charset) const;
 };
 
 // The image averaged down to at most `columns` letters and `rows` rows of text, its proportions

@@ -4,7 +4,6 @@
 #include <bit>
 #include <cerrno>
 #include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <utility>
 
@@ -13,6 +12,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include "render/base/console.h"
 #include "render/base/escape.h"
 
 namespace lucerna {
@@ -178,8 +178,8 @@ void TevView::Show(const std::string& name, const Image& image) {
   for (const TevTile& tile : TevTilesOf(image))
     is_shown = is_shown && Send(TevUpdatePacket(name, kChannels, tile));
   if (is_shown) return;
-  std::fprintf(stderr, "lucerna: warning: tev at %s takes no images any more (%s)\n",
-               Escaped(address_).c_str(), std::strerror(errno));
+  PrintError(absl::StrCat("lucerna: warning: tev at ", Escaped(address_),
+                          " takes no images any more (", std::strerror(errno), ")\n"));
   ::close(socket_);
   socket_ = -1;
 }

@@ -3,13 +3,16 @@
 #include <cstdio>
 #include <memory>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include <nlohmann/json.hpp>
 #include <spdlog/formatter.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include "render/base/clock.h"
+#include "render/base/console.h"
 
 namespace lucerna {
 namespace {
@@ -30,6 +33,24 @@ class JsonLines final : public spdlog::formatter {
   [[nodiscard]] std::unique_ptr<spdlog::formatter> clone() const override {
     return std::make_unique<JsonLines>();
   }
+};
+
+// spdlog's own lines, for a locale without UTF-8. What stands before the message is ASCII, so the
+// colours stay where they are.
+class AsciiLines final : public spdlog::formatter {
+ public:
+  void format(const spdlog::details::log_msg& line, spdlog::memory_buf_t& to) override {
+    spdlog::memory_buf_t utf8;
+    lines_.format(line, utf8);
+    const std::string ascii = InCharset({utf8.data(), utf8.size()}, Charset::kAscii);
+    to.append(ascii.data(), ascii.data() + ascii.size());
+  }
+  [[nodiscard]] std::unique_ptr<spdlog::formatter> clone() const override {
+    return std::make_unique<AsciiLines>();
+  }
+
+ private:
+  spdlog::pattern_formatter lines_;
 };
 
 }  // namespace
@@ -55,7 +76,11 @@ std::string JsonLogLine(std::chrono::system_clock::time_point time, std::string_
 
 void StartLog(const std::string& program, const std::string& level, LogFormat format) {
   spdlog::set_default_logger(spdlog::stderr_color_mt(program));
-  if (format == LogFormat::kJson) spdlog::set_formatter(std::make_unique<JsonLines>());
+  if (format == LogFormat::kJson) {
+    spdlog::set_formatter(std::make_unique<JsonLines>());
+  } else if (LocaleCharset() == Charset::kAscii) {
+    spdlog::set_formatter(std::make_unique<AsciiLines>());
+  }
   spdlog::set_level(spdlog::level::from_str(level));
 }
 
@@ -65,7 +90,7 @@ void SayWhyItEnds(const std::string& program, const std::string& message, LogFor
     std::fprintf(stderr, "%s\n",
                  JsonLogLine(SystemClock().Wall(), "critical", program, message).c_str());
   } else {
-    std::fprintf(stderr, "%s: %s\n", program.c_str(), message.c_str());
+    PrintError(absl::StrCat(program, ": ", message, "\n"));
   }
 }
 

@@ -1,5 +1,6 @@
 // Frames must stand over one another on terminals of any size: no line may wrap, no frame may
 // scroll, and nothing of an old one may be left.
+#include <algorithm>
 #include <cmath>
 
 #include "gtest/gtest.h"
@@ -30,19 +31,33 @@ Image GrayImage(int width, int height) {
 TEST(CurveTest, AFallingPowerLawIsADiagonal) {
   // Two letters of 2 × 4 dots beside and under one another: (0, 0) to (3, 7).
   const std::vector<std::string> lines =
-      DrawCurve({{1, 100}, {10, 10}, {100, 1}}, std::nullopt, 2, 2);
+      DrawCurve({{1, 100}, {10, 10}, {100, 1}}, std::nullopt, 2, 2, Charset::kUtf8);
   EXPECT_EQ(lines, (std::vector<std::string>{"⢣⠀", "⠀⢣"}));
 }
 
 TEST(CurveTest, ALevelIsEveryOtherDotAndWidensTheRange) {
-  const std::vector<std::string> lines = DrawCurve({{1, 100}, {100, 100}}, 1, 3, 1);
+  const std::vector<std::string> lines = DrawCurve({{1, 100}, {100, 100}}, 1, 3, 1, Charset::kUtf8);
   EXPECT_EQ(lines, (std::vector<std::string>{"⡉⡉⡉"}));
 }
 
 TEST(CurveTest, FewerThanTwoPointsAreNoCurve) {
-  EXPECT_TRUE(DrawCurve({}, 1, 5, 5).empty());
-  EXPECT_TRUE(DrawCurve({{1, 1}, {0, 1}, {2, std::nan("")}}, 1, 5, 5).empty());
-  EXPECT_EQ(DrawCurve({{1, 1}, {1, 1}}, std::nullopt, 5, 5).size(), 5U) << "no extent";
+  EXPECT_TRUE(DrawCurve({}, 1, 5, 5, Charset::kUtf8).empty());
+  EXPECT_TRUE(DrawCurve({{1, 1}, {0, 1}, {2, std::nan("")}}, 1, 5, 5, Charset::kUtf8).empty());
+  EXPECT_EQ(DrawCurve({{1, 1}, {1, 1}}, std::nullopt, 5, 5, Charset::kUtf8).size(), 5U)
+      << "no extent";
+}
+
+TEST(CurveTest, InAsciiHalvesOfLettersAreTheCurveAndTheLevelIsALine) {
+  // Two letters under one another: 8 rows of dots. The curve falls from row 0 to row 7.
+  EXPECT_EQ(DrawCurve({{1, 100}, {10, 10}, {100, 1}}, std::nullopt, 2, 2, Charset::kAscii),
+            (std::vector<std::string>{": ", " :"}));
+  EXPECT_EQ(DrawCurve({{1, 100}, {100, 100}}, 1, 3, 2, Charset::kAscii),
+            (std::vector<std::string>{"'''", "---"}));
+  EXPECT_EQ(DrawCurve({{1, 1}, {100, 1}}, 100, 3, 2, Charset::kAscii),
+            (std::vector<std::string>{"---", "..."}));
+  EXPECT_EQ(DrawCurve({{1, 1}, {100, 1}}, 1, 3, 1, Charset::kAscii),
+            (std::vector<std::string>{"'''"}))
+      << "where both are, the curve";
 }
 
 TEST(LiveViewTest, ColumnsAreLettersWithoutEscapes) {
@@ -60,7 +75,7 @@ TEST(LiveViewTest, AFrameFitsItsTerminal) {
     for (int columns = 1; columns < 200; columns += 7) {
       for (int rows = 1; rows < 60; rows += 3) {
         for (const Image* shown : {static_cast<const Image*>(nullptr), &image}) {
-          const auto lines = LiveLines(RunningJob(samples), shown, {columns, rows});
+          const auto lines = LiveLines(RunningJob(samples), shown, {columns, rows}, Charset::kUtf8);
           ASSERT_LE(lines.size(), static_cast<std::size_t>(std::max(1, rows - 1)));
           for (const std::string& line : lines)
             ASSERT_LE(ColumnsOf(line), columns) << columns << " × " << rows;
@@ -73,19 +88,45 @@ TEST(LiveViewTest, AFrameFitsItsTerminal) {
 TEST(LiveViewTest, ShowsProgressErrorCurveAndImage) {
   const v1::Job job = RunningJob(24);
   const Image image = GrayImage(640, 480);
-  const std::vector<std::string> lines = LiveLines(job, &image, {120, 40});
+  const std::vector<std::string> lines = LiveLines(job, &image, {120, 40}, Charset::kUtf8);
   EXPECT_EQ(lines[0], ProgressLine(job));
   EXPECT_EQ(lines[1], ErrorLine(job));
   ASSERT_EQ(lines.size(), 16U);
   EXPECT_EQ(lines[2].find("  22.1 % "), 0U) << lines[2];
   EXPECT_NE(lines[2].find("▀"), std::string::npos);
   EXPECT_NE(lines[15].find("3:29"), std::string::npos) << lines[15];
-  for (const std::string& line : LiveLines(job, nullptr, {120, 40}))
+  for (const std::string& line : LiveLines(job, nullptr, {120, 40}, Charset::kUtf8))
     EXPECT_EQ(line.find('\x1b'), std::string::npos) << "no colours without an image";
 }
 
+TEST(LiveViewTest, InAsciiNoByteIsBeyondIt) {
+  const Image image = GrayImage(640, 480);
+  v1::Job job = RunningJob(24);
+  v1::LightFinding& light = *job.add_lights();
+  light.set_name("grüne Kugel");
+  light.set_photons_sent(1000);
+  light.set_missing_share(0.003);
+  job.mutable_convergence(job.convergence_size() - 1)->set_missing_relative(1);
+  for (int columns = 20; columns < 200; columns += 7) {
+    const auto lines = LiveLines(job, &image, {columns, 40}, Charset::kAscii);
+    for (const std::string& line : lines) {
+      ASSERT_TRUE(std::ranges::all_of(line, [](char c) { return c >= 0; })) << line;
+      ASSERT_LE(ColumnsOf(line), columns);
+    }
+  }
+  const auto lines = LiveLines(job, &image, {200, 40}, Charset::kAscii);
+  const auto has = [&](const std::string& text) {
+    return std::ranges::any_of(
+        lines, [&](const std::string& line) { return line.find(text) != std::string::npos; });
+  };
+  EXPECT_TRUE(has("gr\\u{fc}ne Kugel"));
+  EXPECT_TRUE(has("\x1b[48;2;188;188;188m  ")) << "the image";
+  EXPECT_TRUE(has("---")) << "the target";
+}
+
 TEST(LiveViewTest, LongLinesBreakBetweenTheirParts) {
-  const std::vector<std::string> lines = LiveLines(RunningJob(24), nullptr, {46, 40});
+  const std::vector<std::string> lines =
+      LiveLines(RunningJob(24), nullptr, {46, 40}, Charset::kUtf8);
   EXPECT_EQ(lines[0], "[####################] 100 %  pass 418");
   EXPECT_EQ(lines[2], "error about 2.96 % (95 %: 2.65 % to 3.38 %)");
   EXPECT_EQ(lines[3], "untrimmed 3.28 %  target 3.50 %");

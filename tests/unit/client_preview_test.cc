@@ -35,13 +35,22 @@ TEST(PreviewTest, ACellIsItsUpperPixelOverItsLower) {
   const auto preview = MakePreview(ImageOf(2, 2, {1, 0, 0.5F, 0.5F}), 10, 10);
   ASSERT_TRUE(preview.ok());
   // 0.5 is 188 as sRGB.
-  EXPECT_EQ(preview->Lines(), (std::vector<std::string>{"\x1b[38;2;255;0;0;48;2;188;0;0m▀"
-                                                        "\x1b[38;2;0;0;0;48;2;188;0;0m▀\x1b[0m"}));
+  EXPECT_EQ(preview->Lines(Charset::kUtf8),
+            (std::vector<std::string>{"\x1b[38;2;255;0;0;48;2;188;0;0m▀"
+                                      "\x1b[38;2;0;0;0;48;2;188;0;0m▀\x1b[0m"}));
+}
+
+TEST(PreviewTest, InAsciiACellIsASpaceOnTheMeanOfItsPixels) {
+  const auto preview = MakePreview(ImageOf(2, 2, {1, 0, 0.5F, 0.5F}), 10, 10);
+  ASSERT_TRUE(preview.ok());
+  // 255 and 188, 0 and 188.
+  EXPECT_EQ(preview->Lines(Charset::kAscii),
+            (std::vector<std::string>{"\x1b[48;2;222;0;0m \x1b[48;2;94;0;0m \x1b[0m"}));
 }
 
 TEST(PreviewTest, CellsThatAreAlikeShareTheirColors) {
   const auto preview = MakePreview(ImageOf(3, 2, std::vector<float>(6, 1)), 10, 10);
-  EXPECT_EQ(preview->Lines()[0], "\x1b[38;2;255;0;0;48;2;255;0;0m▀▀▀\x1b[0m");
+  EXPECT_EQ(preview->Lines(Charset::kUtf8)[0], "\x1b[38;2;255;0;0;48;2;255;0;0m▀▀▀\x1b[0m");
 }
 
 TEST(PreviewTest, PixelsAreAveragedAsLight) {
