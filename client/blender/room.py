@@ -2,8 +2,9 @@
 
   blender --background --factory-startup --python room.py -- room.glb
 
-A glass sphere and a metal one in a box that is open to the front, under a lamp: the glass gathers the
-lamp's light into a caustic on the floor. In a scene of your own the last function is all that you need.
+A glass sphere and a metal one in a box that is open to the front, under an area light: the glass
+gathers its light into a caustic on the floor. In a scene of your own the last function is all that
+you need.
 """
 import sys
 
@@ -33,7 +34,7 @@ def solid_glass(name, ior, thickness_m):
     return made
 
 
-def lamp(name, strength):
+def emitter(name, strength):
     """A surface that emits [W/(m² sr)]: area lights are not exported, emitting surfaces are."""
     made = material(name, Base_Color=(0, 0, 0, 1))
     shader = made.node_tree.nodes["Principled BSDF"]
@@ -69,7 +70,7 @@ def build():
     plane("back", 2, (0, 1, 1), (half, 0, 0), white)
     plane("left", 2, (-1, 0, 1), (0, half, 0), red)
     plane("right", 2, (1, 0, 1), (0, -half, 0), green)
-    plane("lamp", 0.3, (0, 0, 1.99), (2 * half, 0, 0), lamp("lamp", 120))
+    plane("lamp", 0.3, (0, 0, 1.99), (2 * half, 0, 0), emitter("lamp", 120))
     sphere("glass", 0.35, (0.4, -0.25, 0.5), solid_glass("glass", 1.5, 0.7))
     sphere("metal", 0.35, (-0.42, 0.3, 0.36),
            material("metal", Base_Color=(0.9, 0.7, 0.4, 1), Metallic=1.0, Roughness=0.15))
