@@ -15,13 +15,14 @@
 namespace lucerna {
 namespace {
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 7> kEnvironment = {{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 8> kEnvironment = {{
     {"LUCERNA_SERVER", "the coordinator, where --server is not given"},
     {"LUCERNA_TOKEN", "your token, where --token-file is not given"},
     {"LUCERNA_TLS_CA, LUCERNA_TLS_CERT, LUCERNA_TLS_KEY",
      "PEM files, where --tls-ca, --tls-cert and --tls-key are not given"},
     {"COLORTERM, TERM", "whether the terminal can show the image so far"},
     {"NO_COLOR", "if it is set, no image is shown on the terminal"},
+    {"LC_ALL, LC_CTYPE, LANG", "whether text may have other characters than ASCII"},
     {"XDG_CONFIG_HOME, HOME", "where lucerna.toml is"},
     {"TMPDIR", "where an image goes whose own file cannot be written"},
 }};
