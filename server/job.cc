@@ -127,6 +127,8 @@ Job SummaryOf(const Job& job) {
   summary.submitted_at = job.submitted_at;
   summary.life = job.life;
   summary.counters = job.counters;
+  // The share that is done follows from them.
+  summary.photon_steps = job.photon_steps;
   summary.reference = job.reference;
   summary.ended_at = job.ended_at;
   summary.owner = job.owner;

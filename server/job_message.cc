@@ -167,6 +167,8 @@ v1::Job SummaryToProto(const JobReport& report) {
   message.set_owner(job.owner);
   message.set_priority(job.priority);
   message.set_pause_cause(CauseToProto(job.pause_cause));
+  for (const PhotonStep& step : job.photon_steps)
+    *message.add_photon_steps() = ToProto(step);
   return message;
 }
 
@@ -194,8 +196,6 @@ v1::Job ToProto(const JobReport& report) {
     item.set_missing_share(light.missing_share);
   }
   AddShares(job.workers, message);
-  for (const PhotonStep& step : job.photon_steps)
-    *message.add_photon_steps() = ToProto(step);
   std::vector<PassTally> parts = job.pass_record.tallies();
   if (job.tail.passes > 0) parts.push_back(job.tail);
   for (const PassTally& part : parts) {

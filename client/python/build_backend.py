@@ -5,8 +5,8 @@ pip calls build_wheel (PEP 517). By hand, for use without an installation:
 
   build_backend.py FOLDER      # writes FOLDER/lucerna, for PYTHONPATH=FOLDER
 
-Needs protoc and grpc_python_plugin (Debian: protobuf-compiler, protobuf-compiler-grpc), and the
-whole source tree, because the protocol is in its folder `proto`.
+Needs protoc, its own messages and grpc_python_plugin (Debian: protobuf-compiler, libprotobuf-dev,
+protobuf-compiler-grpc), and the whole source tree, because the protocol is in its folder `proto`.
 """
 
 import base64
@@ -51,10 +51,15 @@ def write_stubs(package: pathlib.Path) -> None:
     stubs.mkdir()
     (stubs / "__init__.py").write_text('"""Generated from proto/lucerna/v1."""\n', encoding="utf-8")
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([programs["protoc"], f"--proto_path={ROOT}", f"--python_out={folder}",
-                        f"--pyi_out={folder}", f"--grpc_out={folder}",
-                        f"--plugin=protoc-gen-grpc={programs['grpc_python_plugin']}",
-                        *(f"proto/lucerna/v1/{name}.proto" for name in PROTOS)], check=True)
+        made = subprocess.run([programs["protoc"], f"--proto_path={ROOT}", f"--python_out={folder}",
+                               f"--pyi_out={folder}", f"--grpc_out={folder}",
+                               f"--plugin=protoc-gen-grpc={programs['grpc_python_plugin']}",
+                               *(f"proto/lucerna/v1/{name}.proto" for name in PROTOS)],
+                              stderr=subprocess.PIPE, text=True, check=False)
+        if made.returncode != 0:
+            advice = ("; install libprotobuf-dev, which has them"
+                      if "google/protobuf" in made.stderr else "")
+            sys.exit(f"protoc failed{advice}:\n{made.stderr}")
         for path in sorted((pathlib.Path(folder) / "proto/lucerna/v1").glob("*.py*")):
             text = path.read_text(encoding="utf-8")
             # A top-level module `proto` would be in the way of other packages.

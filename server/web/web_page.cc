@@ -201,7 +201,8 @@ main{display:grid;grid-template-columns:minmax(0,2fr) minmax(0,3fr);gap:24px;max
 section{background:var(--card);border:1px solid var(--rule);border-radius:8px;padding:16px 18px;overflow-x:auto}
 .side{display:grid;gap:24px}
 table{border-collapse:collapse;width:100%;font-size:13.5px;font-variant-numeric:tabular-nums}
-th,td{text-align:left;padding:4px 10px 4px 0;border-top:1px solid var(--rule);overflow-wrap:anywhere}
+th,td{text-align:left;padding:4px 8px 4px 0;border-top:1px solid var(--rule)}
+td:first-child{overflow-wrap:anywhere}
 thead th{border-top:0;color:var(--muted);font-weight:600}
 .number{text-align:right;white-space:nowrap}
 tr.chosen{background:var(--here)}

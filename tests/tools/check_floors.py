@@ -68,6 +68,11 @@ CALLS = {
     r"\bgetenv\b": ["server/main.cc", "worker/main.cc", "client/main.cc"],
     r"\bofstream\b|\bfopen\b|\bO_CREAT\b|\bO_WRONLY\b|\bO_RDWR\b": ["render/base/files"],
     r"\bgetrandom\(": ["render/base/random_id"],
+    # Text for people is in the characters of the locale. The mains print addresses, which are ASCII.
+    r"\bstd::(printf|fprintf|f?puts|cout|cerr|clog)\b": [
+        "render/base/console", "render/base/status.h", "render/wire/program_log", "server/main.cc", "worker/main.cc"
+    ],
+    r"\bsetlocale\b": ["render/base/console"],
     r"\bstd::mt19937|\brandom_device\b|\b(s?rand|drand48)\(": [],
 }
 
@@ -139,6 +144,8 @@ PLANTED = [
     ("worker/a.cc", "const auto now = std::chrono::steady_clock::now();"),
     ("server/a.cc", 'const char* home = std::getenv("HOME");'),
     ("client/a.cc", "std::ofstream out(path);"),
+    ("client/commands/a.cc", 'std::printf("%s", text);'),
+    ("client/main.cc", "std::setlocale(LC_ALL, text);"),
     ("render/other/a.cc", "int x = 0;"),
 ]
 # Lines that must be let through.
