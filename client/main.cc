@@ -82,6 +82,17 @@ std::pair<double, double> RangeOf(const std::string& text) {
   return range;
 }
 
+// The library's own text about the values shows their numbers, as bytes.
+template <typename Value>
+CLI::Validator OneOf(const std::map<std::string, Value>& values) {
+  CLI::Transformer names(values);
+  std::string text;
+  for (const auto& [name, value] : values)
+    absl::StrAppend(&text, text.empty() ? "{" : ",", name);
+  names.description(text + "}");
+  return names;
+}
+
 ToneCurve CurveOf(const std::string& name) {
   const StatusOr<ToneCurve> curve = ParseToneCurve(name);
   if (!curve.ok()) {
@@ -516,7 +527,7 @@ int Run(int argc, char** argv) {
                                                         {"quadratic", MeshElements::kQuadratic}};
   bake->add_option("--elements", baked.elements,
                    "linear or quadratic: how irradiance is interpolated on a triangle")
-      ->transform(CLI::Transformer(elements))
+      ->transform(OneOf(elements))
       ->default_str("linear");
   bake->add_flag("!--no-decimation", baked.decimates,
                  "keep vertices where the mesh is right without them");
@@ -530,14 +541,14 @@ int Run(int argc, char** argv) {
   bake->add_option("--estimator", baked.estimator,
                    "kernel, nearest (about the k nearest photons of each vertex) or histogram (the "
                    "photons on each triangle of an even mesh)")
-      ->transform(CLI::Transformer(estimators))
+      ->transform(OneOf(estimators))
       ->default_str("kernel");
   const std::map<std::string, MeasuredSides> sides = {{"brighter", MeasuredSides::kBrighter},
                                                       {"front", MeasuredSides::kFront},
                                                       {"back", MeasuredSides::kBack},
                                                       {"both", MeasuredSides::kBoth}};
   bake->add_option("--sides", baked.sides, "brighter, front, back or both sides of each shape")
-      ->transform(CLI::Transformer(sides))
+      ->transform(OneOf(sides))
       ->default_str("brighter");
   bake->add_flag("--indirect-only", baked.indirect_only,
                  "leave out light that comes straight from lights");
@@ -608,9 +619,7 @@ int Run(int argc, char** argv) {
       });
   const std::map<std::string, Shell> shells = {
       {"bash", Shell::kBash}, {"zsh", Shell::kZsh}, {"fish", Shell::kFish}};
-  completion->add_option("SHELL", shell, "bash, zsh or fish")
-      ->required()
-      ->transform(CLI::Transformer(shells));
+  completion->add_option("SHELL", shell, "bash, zsh or fish")->required()->transform(OneOf(shells));
 
   CLI::App* digest = command("digest", "print the digest of an image's pixels and settings",
                              [&] { return PrintDigest(image_path, output_options); });

@@ -1,4 +1,5 @@
 // All three programs say which release they are and how they are called.
+#include <algorithm>
 #include <string>
 
 #include "gmock/gmock.h"
@@ -31,6 +32,15 @@ TEST(HelpOfCommandsTest, ExplainsOneCommandOrSaysThatThereIsNone) {
   const auto unknown = RunProgram({program, "help", "paint"});
   EXPECT_EQ(unknown.exit_code, 2);
   EXPECT_THAT(unknown.errors, testing::HasSubstr("there is no command paint"));
+}
+
+// Values of a flag are shown by their names, not by what they are inside.
+TEST(HelpOfCommandsTest, IsTextAlone) {
+  for (const char* command : {"render", "bake", "completion", "settings", "man"}) {
+    const std::string help = RunProgram({kBin + "/lucerna", "help", command}).output;
+    EXPECT_GT(help.size(), 100U) << command;
+    EXPECT_TRUE(std::ranges::all_of(help, [](char c) { return c >= ' ' || c == '\n'; })) << command;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Programs, HelpTest,

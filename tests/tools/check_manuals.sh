@@ -10,6 +10,7 @@ checked=0
 for program in lucerna lucerna-server lucerna-worker; do
   page="$folder/$program.1"
   "$1/$program" help man >"$page"
+  grep -q '^\.SH "\?SEE ALSO' "$page" || { echo "$program: the page is cut off"; bad=1; }
   if command -v groff >/dev/null; then
     checked=1
     said=$(groff -man -Tutf8 -Kutf8 -ww -z "$page" 2>&1)

@@ -184,7 +184,7 @@ needs() { # packages
 }
 export -f needs
 as_root() {
-  try 'installed: man lucerna' 'needs man-db groff-base; man -P cat lucerna | has -- --exposure; man -P cat lucerna-worker | has -- --threads'
+  try 'installed: man lucerna' 'needs man-db groff-base; man -P cat lucerna > page; grep -q -- --exposure page; grep -q LC_ALL page; man -P cat lucerna-worker | has -- --threads'
   try 'systemd: systemd-analyze verify' 'needs systemd; for unit in lucerna-server lucerna-worker; do
     said=$(systemd-analyze verify --man=no "/lib/systemd/system/$unit.service" 2>&1); [ -z "$said" ] || { echo "$said"; exit 1; }; done'
   try 'farm: certificates of dev-ca.sh, and tokens' '
