@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "absl/strings/numbers.h"
+#include "absl/strings/str_join.h"
 #include <CLI/CLI.hpp>
 
 #include "client/commands/bake_command.h"
@@ -35,6 +36,7 @@
 #include "client/view/tev_view.h"
 #include "render/base/console.h"
 #include "render/base/escape.h"
+#include "render/base/text.h"
 #include "render/base/version.h"
 #include "render/wire/channel.h"
 #include "render/wire/grpc_process.h"
@@ -82,15 +84,18 @@ std::pair<double, double> RangeOf(const std::string& text) {
   return range;
 }
 
-// The library's own text about the values shows their numbers, as bytes.
+// The library's own texts about the values show their numbers, as bytes.
 template <typename Value>
 CLI::Validator OneOf(const std::map<std::string, Value>& values) {
-  CLI::Transformer names(values);
-  std::string text;
+  std::vector<std::string> names;
   for (const auto& [name, value] : values)
-    absl::StrAppend(&text, text.empty() ? "{" : ",", name);
-  names.description(text + "}");
-  return names;
+    names.push_back(name);
+  return CLI::Validator(
+      [values, names, numbers = CLI::Transformer(values)](std::string& text) -> std::string {
+        if (values.contains(text)) return numbers(text);
+        return absl::StrCat("must be ", Listed(names, " or "), ", not ", text);
+      },
+      absl::StrCat("{", absl::StrJoin(names, ","), "}"));
 }
 
 ToneCurve CurveOf(const std::string& name) {

@@ -34,6 +34,12 @@ TEST(HelpOfCommandsTest, ExplainsOneCommandOrSaysThatThereIsNone) {
   EXPECT_THAT(unknown.errors, testing::HasSubstr("there is no command paint"));
 }
 
+TEST(HelpOfCommandsTest, AValueThatAFlagDoesNotHaveIsMetWithThoseThatItHas) {
+  const auto wrong = RunProgram({kBin + "/lucerna", "completion", "csh"});
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.errors, testing::HasSubstr("must be bash, fish or zsh, not csh"));
+}
+
 // Values of a flag are shown by their names, not by what they are inside.
 TEST(HelpOfCommandsTest, IsTextAlone) {
   for (const char* command : {"render", "bake", "completion", "settings", "man"}) {
