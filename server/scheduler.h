@@ -71,7 +71,7 @@ struct SchedulerOptions {
   std::uint64_t max_batch = std::uint64_t{1} << 22;
   // A pass is split among so many workers at most: what every one of them is sent and sends takes
   // longer than the photons that one more would take over.
-  std::uint64_t max_split_ways = 8;
+  std::uint64_t max_split_ways = 6;
   std::uint64_t fixed_batch = 0;  // all batches of this size; 0: as above
   std::uint64_t max_slice = 16;   // [passes]
   // Slices are cut so that open rounds have so many for every worker.

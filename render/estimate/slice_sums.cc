@@ -31,7 +31,9 @@ class Luminances {
 
 // Adds the rows [begin, end) of a sibling.
 void AddSibling(SliceSums& sum, const SliceSums& sibling, std::size_t begin, std::size_t end) {
-  const auto bits = [&](std::size_t column) { return SignificantBits(column, sum.evidence); };
+  const auto bits = [&](std::size_t column) {
+    return SignificantBits(2 * sum.passes.size(), column, sum.evidence);
+  };
   const auto half = static_cast<double>(sum.passes.size());
   // Before the radiance is added up.
   float* const deviations = sum.columns[kSquaredDeviations].data();
@@ -44,17 +46,36 @@ void AddSibling(SliceSums& sum, const SliceSums& sibling, std::size_t begin, std
             DeviationBetween(half, luminances[pixel], half, their_luminances[pixel]),
         bits(kSquaredDeviations));
   }
-  const auto add = [](float ours, float theirs, unsigned int dropped) {
+  const auto add = [](float ours, float theirs) {
     constexpr auto kLargest = static_cast<float>(kLargestSum);
-    return RoundedFloat(std::clamp(ours + theirs, -kLargest, kLargest), dropped);
+    return std::clamp(ours + theirs, -kLargest, kLargest);
   };
-  for (std::size_t column = 0; column < sum.columns.size(); ++column) {
+  for (std::size_t column = kDirectRadiance; column < sum.columns.size(); ++column) {
     if (column == kSquaredDeviations || column == kLargestLuminance) continue;
     float* const ours = sum.columns[column].data();
     const float* const theirs = sibling.columns[column].data();
     const unsigned int dropped = DroppedBits(bits(column));
     for (std::size_t pixel = begin; pixel < end; ++pixel)
-      ours[pixel] = add(ours[pixel], theirs[pixel], dropped);
+      ours[pixel] = RoundedFloat(add(ours[pixel], theirs[pixel]), dropped);
+  }
+  // After their number.
+  static_assert(kPhotonRadiance == 0 && kDirectRadiance == 3);
+  const PhotonRounding rounded({std::min(sum.passes.first, sibling.passes.first),
+                                std::max(sum.passes.last, sibling.passes.last)});
+  const float* const counts = sum.columns[kPhotonCount].data();
+  std::array<float*, 3> ours{};
+  std::array<const float*, 3> theirs{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    ours[c] = sum.columns[c].data();
+    theirs[c] = sibling.columns[c].data();
+  }
+  for (std::size_t pixel = begin; pixel < end; ++pixel) {
+    std::array<float, 3> rgb{};
+    for (std::size_t c = 0; c < 3; ++c)
+      rgb[c] = add(ours[c][pixel], theirs[c][pixel]);
+    rgb = rounded(pixel, counts[pixel], rgb);
+    for (std::size_t c = 0; c < 3; ++c)
+      ours[c][pixel] = rgb[c];
   }
   float* const largest = sum.columns[kLargestLuminance].data();
   const float* const their_largest = sibling.columns[kLargestLuminance].data();
@@ -79,7 +100,7 @@ void SetWhatFollowsFromRadiance(SliceSums& slice) {
 void SetWhatFollowsFromRadiance(SliceSums& slice, std::size_t begin, std::size_t end) {
   LUCERNA_CHECK(slice.passes.size() == 1 && end <= slice.pixels());
   const double half = slice.passes.first % 2 == 0 ? 1 : -1;
-  const auto bits = [&](std::size_t column) { return SignificantBits(column, slice.evidence); };
+  const auto bits = [&](std::size_t column) { return SignificantBits(1, column, slice.evidence); };
   for (std::size_t c = 0; c < 3; ++c) {
     const float* const photons = slice.columns[kPhotonRadiance + c].data();
     const float* const direct = slice.columns[kDirectRadiance + c].data();

@@ -5,14 +5,15 @@
 // coordinator adds slices to slices. Sums are taken in a fixed tree, each node the rounded sum of
 // its two halves, so that the bits do not depend on who adds up what.
 //
-// Sums of radiance are rounded to 16 significant bits and all others to 8, to nearest, when a pass
-// becomes a slice and at every node: far below the noise of the passes that
-// they sum, and half the bytes on the wire.
+// When a pass becomes a slice, and at every node, sums are rounded to so many significant bits that
+// the error is far below the noise of the passes that they sum, a third of the bytes on the wire:
+// direct light, which may have no noise, to 16; light by photons to as many as the number of its
+// photons deserves, with dither, so that it is right in the mean (PhotonRounding); statistics to 8.
 //
 // Invariants
-//   S1  Every column that is present has pixels() rows, all finite, of its SignificantBits.
-//   S2  `passes` is a slice (IsSlice).
-//   S3  Of a single pass, columns that FollowsFromRadiance names are as SetWhatFollowsFromRadiance
+//   S1  Every column that is present has pixels() rows, all finite, of its SignificantBits or
+//   fewer. S2  `passes` is a slice (IsSlice). S3  Of a single pass, columns that
+//   FollowsFromRadiance names are as SetWhatFollowsFromRadiance
 //       sets them.
 #pragma once
 
@@ -32,6 +33,7 @@
 #include "render/estimate/rounds.h"
 #include "render/math/color_space.h"
 #include "render/math/rgb.h"
+#include "render/math/rng.h"
 
 namespace lucerna {
 
@@ -105,10 +107,14 @@ struct SliceShape {
 [[nodiscard]] constexpr std::size_t ColumnsOf(const PassRange& passes, std::size_t evidence) {
   return kSliceColumns + evidence + (HasFeatures(passes) ? std::size_t{kFeatureColumns} : 0);
 }
-// Significant bits of a column's floats.
-[[nodiscard]] constexpr unsigned int SignificantBits(std::size_t column, std::size_t evidence) {
+// Significant bits of a column's floats, at most. The difference of halves is a statistic as soon
+// as there is one: of a single pass it is the radiance itself.
+[[nodiscard]] constexpr unsigned int SignificantBits(std::uint64_t passes, std::size_t column,
+                                                     std::size_t evidence) {
+  const std::size_t first_statistic =
+      passes == 1 ? std::size_t{kSquaredDeviations} : std::size_t{kHalfDifference};
   const bool is_statistic =
-      column >= kSquaredDeviations && column < kSliceColumns + evidence && column != kPhotonCount;
+      column >= first_statistic && column < kSliceColumns + evidence && column != kPhotonCount;
   return is_statistic ? 8 : 16;
 }
 
@@ -134,6 +140,47 @@ inline constexpr double kLargestSum = 0x1.f8p127;
   return RoundedFloat(static_cast<float>(std::clamp(value, -kLargestSum, kLargestSum)),
                       DroppedBits(significant_bits));
 }
+
+// Significant bits of light by `count` photons: 8 for fewer than 32, half a bit more each time that
+// they double, 16 at most. Then one rounding has less than a thousandth of the variance of light by
+// as many photons that are independent of each other. Without photons there is no noise to hide in:
+// 16. (The number comes from the exponent, of whatever float.)
+[[nodiscard]] constexpr unsigned int PhotonBits(float count) {
+  const std::uint32_t exponent = (std::bit_cast<std::uint32_t>(count) >> 23) & 0xFFU;
+  if (exponent == 0) return 16;
+  constexpr std::uint32_t kOfEight = 127 + 3;
+  return 8 + std::min(8U, (std::max(exponent, kOfEight) - kOfEight) / 2);
+}
+
+// Rounds light by photons in a slice of these passes: down or up by chance, with the chance that
+// keeps the mean. The numbers of chance belong to the slice and the pixel.
+class PhotonRounding {
+ public:
+  explicit constexpr PhotonRounding(const PassRange& passes)
+      : key_(CombineKeys(passes.first, passes.size())) {}
+
+  // Requires values within kLargestSum, all columns of a pixel at once.
+  [[nodiscard]] constexpr std::array<float, 3> operator()(std::size_t pixel, float count,
+                                                          const std::array<float, 3>& rgb) const {
+    const unsigned int bits = PhotonBits(count);
+    const unsigned int dropped = DroppedBits(bits);
+    if (bits == 16) {
+      return {RoundedFloat(rgb[0], dropped), RoundedFloat(rgb[1], dropped),
+              RoundedFloat(rgb[2], dropped)};
+    }
+    const std::uint32_t mask = (std::uint32_t{1} << dropped) - 1;
+    // The same chance for all channels: grey stays grey, and what they have in common stays so.
+    const std::uint32_t up =
+        static_cast<std::uint32_t>(Mix64(key_ + pixel * 0x9E3779B97F4A7C15ULL)) & mask;
+    std::array<float, 3> rounded{};
+    for (std::size_t c = 0; c < 3; ++c)
+      rounded[c] = std::bit_cast<float>((std::bit_cast<std::uint32_t>(rgb[c]) + up) & ~mask);
+    return rounded;
+  }
+
+ private:
+  std::uint64_t key_;
+};
 
 // All columns zero.
 [[nodiscard]] SliceSums EmptySlice(const PassRange& passes, std::size_t pixels,

@@ -17,12 +17,6 @@ namespace {
 constexpr double kSmallestRadius = 1e-18;
 constexpr double kLargestRadius = 1e18;
 
-// What a pass brings to one pixel.
-struct PixelOfPass {
-  std::array<double, 3> photons{};
-  double bias = 0;
-};
-
 std::array<double, 3> ToDoubles(Rgb c) {
   return {static_cast<double>(c.r), static_cast<double>(c.g), static_cast<double>(c.b)};
 }
@@ -73,7 +67,15 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   for (std::vector<float>& column : slice.columns)
     columns.push_back(column.data());
   const auto set = [&](std::size_t column, std::size_t pixel, double value) {
-    columns[column][pixel] = Rounded(value, SignificantBits(column, evidence));
+    columns[column][pixel] = Rounded(value, SignificantBits(1, column, evidence));
+  };
+
+  const SliceColumn bias = pass.pass % 2 == 0 ? kEvenBias : kOddBias;
+  // What the rows of a pixel bring together is summed in its columns, and rounded at the end.
+  const auto add = [&](std::size_t column, std::size_t pixel, double value) {
+    float& sum = columns[column][pixel];
+    sum =
+        static_cast<float>(std::clamp(static_cast<double>(sum) + value, -kLargestSum, kLargestSum));
   };
 
   // Some of the colours that make a mean over passes are below zero: single wavelengths are outside
@@ -84,7 +86,6 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
     return wavelengths.has_value() ? wavelengths->ToWorking(values) : values;
   };
 
-  std::vector<PixelOfPass> brought(pixels);
   const double luminance_per_quantum = static_cast<double>(Luminance(scale.watts_per_quantum));
   constexpr double kToBias = 1 / (1 - static_cast<double>(kInnerShare * kInnerShare));
   const double norm = Kernel{settings.kernel}.Norm();
@@ -97,16 +98,16 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
     const float in_units = has_common_radius ? plan.caustic_radius : (*plan.radii)[pixel];
     const auto radius = static_cast<double>(HitpointRadius(in_units, pass.unit_radii[row]));
     const double to_density = per_photon / (radius * radius);
-    PixelOfPass& of_pixel = brought[pixel];
     for (int channel = 0; channel < 3; ++channel) {
       const double flux = static_cast<double>(sums.flux(channel)[row]) *
                           static_cast<double>(scale.watts_per_quantum[channel]);
-      of_pixel.photons[static_cast<std::size_t>(channel)] +=
-          static_cast<double>(pass.weights[row][channel]) * flux * to_density;
+      add(kPhotonRadiance + static_cast<std::size_t>(channel), pixel,
+          static_cast<double>(pass.weights[row][channel]) * flux * to_density);
     }
     const double blur = static_cast<double>(sums.evidence()[kBlurColumn][row]) * kToBias;
-    of_pixel.bias += blur * luminance_per_quantum * to_density *
-                     static_cast<double>(Luminance(pass.weights[row]));
+    add(bias, pixel,
+        blur * luminance_per_quantum * to_density *
+            static_cast<double>(Luminance(pass.weights[row])));
     if (has_common_radius) return;
     set(kPhotonCount, pixel, static_cast<double>(sums.counts()[row]));
     const auto unit_radius = static_cast<double>(in_units);
@@ -129,16 +130,23 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
     });
   }
 
-  const SliceColumn bias = pass.pass % 2 == 0 ? kEvenBias : kOddBias;
   const std::size_t first_feature = slice.first_feature();
+  const PhotonRounding rounded_photons(slice.passes);
   const auto set_pixel = [&](std::size_t pixel) {
-    const std::array<double, 3> photons = in_color(brought[pixel].photons);
+    std::array<double, 3> photons{};
+    for (std::size_t c = 0; c < 3; ++c)
+      photons[c] = static_cast<double>(columns[kPhotonRadiance + c][pixel]);
+    photons = in_color(photons);
     const std::array<double, 3> direct = in_color(ToDoubles(pass.direct[pixel]));
+    std::array<float, 3> by_photons{};
     for (std::size_t c = 0; c < 3; ++c) {
-      set(kPhotonRadiance + c, pixel, photons[c]);
+      by_photons[c] = static_cast<float>(std::clamp(photons[c], -kLargestSum, kLargestSum));
       set(kDirectRadiance + c, pixel, direct[c]);
     }
-    set(bias, pixel, brought[pixel].bias);
+    by_photons = rounded_photons(pixel, columns[kPhotonCount][pixel], by_photons);
+    for (std::size_t c = 0; c < 3; ++c)
+      columns[kPhotonRadiance + c][pixel] = by_photons[c];
+    set(bias, pixel, static_cast<double>(columns[bias][pixel]));
     if (!HasFeatures(slice.passes)) return;
     const EyeFeatures& features = pass.features[pixel];
     if (!std::isfinite(features.distance)) return;

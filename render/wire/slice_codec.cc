@@ -6,17 +6,49 @@
 #include <vector>
 
 #include "render/wire/bytes.h"
+#include "render/wire/color_columns.h"
 #include "render/wire/photon_guide_codec.h"
 #include "render/wire/tally_codec.h"
 
 namespace lucerna {
 namespace {
 
-constexpr std::string_view kMagic = "LSL3";
+constexpr std::string_view kMagic = "LSL4";
 
 // The low bits of a float of that column that are zero.
-unsigned int EmptyBits(std::size_t column, std::size_t evidence) {
-  return DroppedBits(SignificantBits(column, evidence));
+unsigned int EmptyBits(const SliceSums& slice, std::size_t column) {
+  return DroppedBits(SignificantBits(slice.passes.size(), column, slice.evidence));
+}
+
+// The column that a column is foretold from: green, of radiance. Itself: from none.
+std::size_t BaseOf(std::size_t column) {
+  constexpr std::size_t kColors = kSquaredDeviations;
+  static_assert(kPhotonRadiance == 0 && kDirectRadiance == 3 && kHalfDifference == 6 &&
+                kColors == 9);
+  return column < kColors ? column / 3 * 3 + 1 : column;
+}
+
+ColorColumn Beside(const SliceSums& slice, std::size_t column) {
+  ColorColumn with;
+  with.base = slice.columns[BaseOf(column)];
+  with.dropped = EmptyBits(slice, column);
+  if (column < kDirectRadiance) with.counts = slice.columns[kPhotonCount];
+  return with;
+}
+
+// All columns that are sent, each behind those that it is foretold from.
+std::vector<std::size_t> SentColumns(const PassRange& passes, std::size_t columns) {
+  std::vector<std::size_t> sent = {kPhotonCount};
+  const auto send = [&](std::size_t column) {
+    if (column != kPhotonCount && !FollowsFromRadiance(passes, column)) sent.push_back(column);
+  };
+  for (std::size_t column = 0; column < columns; ++column) {
+    if (BaseOf(column) == column) send(column);
+  }
+  for (std::size_t column = 0; column < columns; ++column) {
+    if (BaseOf(column) != column) send(column);
+  }
+  return sent;
 }
 
 Status Malformed(std::string_view what) {
@@ -59,18 +91,23 @@ std::string EncodeSlice(const SliceSums& slice, ThreadTeam* team) {
     WriteEmission(writer, report.numbers);
     writer.Varint(report.pixel);
   }
-  std::vector<std::string> columns(slice.columns.size());
+  const std::vector<std::size_t> sent = SentColumns(slice.passes, slice.columns.size());
+  std::vector<std::string> columns(sent.size());
   const auto encode = [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> codes(slice.pixels());
-    for (std::size_t column = begin; column < end; ++column) {
-      if (FollowsFromRadiance(slice.passes, column)) continue;
-      const unsigned int empty = EmptyBits(column, slice.evidence);
-      std::ranges::transform(slice.columns[column], codes.begin(), [&](float value) {
-        return std::bit_cast<std::uint32_t>(value) >> empty;
-      });
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::vector<float>& values = slice.columns[sent[i]];
+      if (BaseOf(sent[i]) == sent[i]) {
+        const unsigned int empty = EmptyBits(slice, sent[i]);
+        std::ranges::transform(values, codes.begin(), [&](float value) {
+          return std::bit_cast<std::uint32_t>(value) >> empty;
+        });
+      } else {
+        CodesOfChannel(Beside(slice, sent[i]), values, codes);
+      }
       ByteWriter of_column;
       of_column.Planes(codes);
-      columns[column] = of_column.Take();
+      columns[i] = of_column.Take();
     }
   };
   if (team != nullptr) {
@@ -127,17 +164,26 @@ StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape)
     slice.reports.push_back(report);
   }
   if (!reader.ok()) return Malformed("truncated");
-  slice.columns.reserve(columns);
-  for (std::size_t column = 0; column < columns; ++column) {
-    std::vector<float>& values = slice.columns.emplace_back(shape.pixels);
-    if (FollowsFromRadiance(shape.passes, column)) continue;
-    reader.Floats(EmptyBits(column, shape.evidence), values);
-    if (!reader.ok()) {
+  slice.columns.resize(columns);
+  std::vector<std::uint32_t> codes;
+  for (const std::size_t column : SentColumns(shape.passes, columns)) {
+    std::vector<float>& values = slice.columns[column];
+    values.resize(shape.pixels);
+    bool is_of_column = true;
+    if (BaseOf(column) == column) {
+      reader.Floats(EmptyBits(slice, column), values);
+    } else {
+      codes = reader.Planes32(shape.pixels);
+      is_of_column = reader.ok() && ChannelFromCodes(Beside(slice, column), codes, values);
+    }
+    if (!is_of_column || !reader.ok()) {
       return Malformed(
           "its columns are truncated or damaged, or a value is not finite or too long");
     }
   }
   if (!reader.finished()) return Malformed("bytes are left over");
+  for (std::vector<float>& column : slice.columns)
+    column.resize(shape.pixels);
   if (shape.passes.size() == 1) SetWhatFollowsFromRadiance(slice);
   return slice;
 }

@@ -2,7 +2,8 @@
 //
 // A short head (magic with the version, passes, pixels, counters) and the columns as byte planes of
 // the bits that they have (estimate/slice_sums.h): the lowest of 8 bits of noise, the others of
-// exponents, which compress. The same slice gives the same bytes.
+// exponents, which compress. Red and blue travel beside green (wire/color_columns.h). The same
+// slice gives the same bytes.
 //
 // Decoding checks everything: shape against what the caller expects before anything is allocated,
 // that numbers are finite, that dropped photons belong to the slice, and that no byte is left over.

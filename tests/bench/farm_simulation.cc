@@ -53,9 +53,9 @@ struct Costs {
   double photons_per_pixel = 4;   // and pass
   double eye_ns = 900;            // of a core: an eye path with direct light
   double photon_ns = 1250;        // of a core: a photon path with gathering
-  double encode_slice_ns = 130;   // of a core of a worker, a pixel and slice
+  double encode_slice_ns = 150;   // of a core of a worker, a pixel and slice
   double add_pass_ns = 13;        // the same, a pixel and pass but the first of a slice
-  double merge_ns = 80;           // a pixel and slice: decode and merge
+  double merge_ns = 105;          // a pixel and slice: decode and merge
   double statistics_ns = 50;      // a pixel and round, in parallel: statistics and radii
   double estimate_ns = 5;         // a pixel and estimate, on the job's thread
   double encode_block_ns = 10;    // a pixel and split pass, on the job's thread
@@ -63,8 +63,8 @@ struct Costs {
   double accumulation_ns = 75;    // a hitpoint that a batch of photons touched: decode and add
   double split_slice_ns = 60;     // a pixel and split pass, in parallel: its slice
   double rpc_us = 50;             // of a core of the coordinator, any call
-  double slice_bytes = 30;        // a pixel
-  double first_slice_bytes = 26;  // a pixel, in the first 16 passes
+  double slice_bytes = 21;        // a pixel
+  double first_slice_bytes = 24;  // a pixel, in the first 16 passes
   double radii_bytes = 2;         // a pixel, round and worker
   double block_bytes = 8;         // a pixel and worker, of a split pass
   double accumulation_bytes = 8;  // a hitpoint that a batch of photons touched
@@ -80,10 +80,10 @@ struct Costs {
   double max_slice = 16;          // [passes] SchedulerOptions::max_slice
   double slices_per_worker = 2;   // SchedulerOptions::slices_per_worker
   // Of a slice of one pass, a pixel; 0: as of other slices.
-  double single_slice_bytes = 19;
+  double single_slice_bytes = 12.5;
   // Rounds from this pass on are never split, whatever the policy says.
   double split_below = 16;
-  double split_ways = 8;      // SchedulerOptions::max_split_ways
+  double split_ways = 6;      // SchedulerOptions::max_split_ways
   double split_passes = 2;    // are out at once at most
   double progress_every = 0;  // [s] lines to stderr; 0: none
   double seed = 1;

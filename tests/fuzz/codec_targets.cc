@@ -149,7 +149,7 @@ std::vector<std::string> SliceSeeds() {
       for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel) {
         slice.columns[column][pixel] =
             Rounded(std::exp(8 * static_cast<double>(pixel)) * (pixel % 3 == 0 ? -1 : 1) / 1000,
-                    SignificantBits(column, shape.evidence));
+                    SignificantBits(shape.passes.size(), column, shape.evidence));
       }
     }
     slice.tally.photons = shape.photons_per_pass * shape.passes.size();

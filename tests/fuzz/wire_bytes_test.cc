@@ -71,7 +71,7 @@ SliceSums SomeSlice(const SliceShape& shape) {
     for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel) {
       slice.columns[column][pixel] =
           Rounded(std::exp(8 * static_cast<double>(pixel)) * (pixel % 3 == 0 ? -1 : 1) / 1000,
-                  SignificantBits(column, shape.evidence));
+                  SignificantBits(shape.passes.size(), column, shape.evidence));
     }
   }
   slice.tally.photons = shape.photons_per_pass * shape.passes.size();
@@ -89,7 +89,7 @@ void CheckSliceOf(const std::string& bytes, const SliceShape& shape) {
   bool is_kept = true;
   for (std::size_t column = 0; column < decoded->columns.size(); ++column) {
     ASSERT_EQ(decoded->columns[column].size(), shape.pixels);
-    const unsigned int bits = SignificantBits(column, shape.evidence);
+    const unsigned int bits = SignificantBits(shape.passes.size(), column, shape.evidence);
     for (const float value : decoded->columns[column])
       is_kept &= std::isfinite(value) && Rounded(static_cast<double>(value), bits) == value;
   }
@@ -188,7 +188,7 @@ TEST(WireBytesTest, HugeCountsAreRefusedBeforeAnythingIsAllocated) {
     EXPECT_FALSE(DecodeAccumulation(accumulation.Take(), kHitpoints).ok());
     for (const bool is_pixels : {true, false}) {
       ByteWriter slice;
-      slice.Bytes("LSL3");
+      slice.Bytes("LSL4");
       slice.Varint(kSlice.passes.first);
       slice.Varint(kSlice.passes.size());
       slice.Varint(is_pixels ? count : kSlice.pixels);

@@ -24,7 +24,7 @@ SliceSums RandomPass(std::uint64_t pass) {
     if (column == kSquaredDeviations) continue;
     for (float& value : slice.columns[column]) {
       const double number = std::exp(8.0 * static_cast<double>(rng.Uniform()) - 4.0);
-      value = Rounded(number, SignificantBits(column, kEvidence));
+      value = Rounded(number, SignificantBits(1, column, kEvidence));
     }
   }
   slice.tally.photons = 10 + pass;
@@ -55,9 +55,90 @@ TEST(SliceSumsTest, RoundsToNearestWithTiesToEven) {
 TEST(SliceSumsTest, RoundingStaysFinite) {
   for (const PassRange& passes : {PassRange{0, 1}, PassRange{16, 18}, PassRange{512, 576}}) {
     for (std::size_t column = 0; column < ColumnsOf(passes, kEvidence); ++column) {
-      const unsigned int bits = SignificantBits(column, kEvidence);
+      const unsigned int bits = SignificantBits(passes.size(), column, kEvidence);
       EXPECT_EQ(Rounded(1e300, bits), static_cast<float>(kLargestSum)) << column;
       EXPECT_EQ(Rounded(-1e300, bits), -static_cast<float>(kLargestSum)) << column;
+    }
+  }
+}
+
+// Half a bit more each time that the number of photons doubles, from 8 bits on and up to 16.
+TEST(SliceSumsTest, LightByPhotonsHasBitsByTheirNumber) {
+  EXPECT_EQ(PhotonBits(0), 16U) << "no noise to hide in";
+  EXPECT_EQ(PhotonBits(1), 8U);
+  EXPECT_EQ(PhotonBits(31), 8U);
+  EXPECT_EQ(PhotonBits(32), 9U);
+  EXPECT_EQ(PhotonBits(1024), 11U);
+  EXPECT_EQ(PhotonBits(1 << 19), 16U);
+  EXPECT_EQ(PhotonBits(static_cast<float>(kLargestSum)), 16U);
+  // One rounding with dither has at most a quarter of the square of a step, which is at most 2^-7
+  // of the number at 8 bits: below a thousandth of the variance of n independent photons of equal
+  // weight, 1 / n of the square, with as many photons as have these bits.
+  for (float count = 1; count < 1e9F; count *= 1.5F) {
+    const double step = std::exp2(1.0 - PhotonBits(count));
+    if (PhotonBits(count) == 16) break;
+    EXPECT_LT(step * step / 4, 1e-3 / static_cast<double>(count)) << count;
+  }
+}
+
+// Down or up by less than a step, by chance, and right in the mean; to nearest with 16 bits.
+TEST(SliceSumsTest, DitherKeepsTheMeanOfLightByPhotons) {
+  const PhotonRounding rounded({6, 8});
+  constexpr std::array<float, 3> kLight = {1.0037F, -0x1.fe8p20F, 3e-39F};
+  constexpr int kSamples = 1 << 16;
+  std::array<double, 3> sum{};
+  for (std::size_t pixel = 0; pixel < kSamples; ++pixel) {
+    const std::array<float, 3> light = rounded(pixel, 5, kLight);
+    for (std::size_t c = 0; c < 3; ++c) {
+      ASSERT_EQ(light[c], Rounded(static_cast<double>(light[c]), 8));
+      ASSERT_LT(std::abs(light[c] - kLight[c]), std::abs(kLight[c]) * 0x1p-7F + 0x1p-133F);
+      sum[c] += static_cast<double>(light[c]);
+    }
+  }
+  for (std::size_t c = 0; c < 3; ++c) {
+    // Of a step of the number's own, five standard deviations of the mean of numbers that are
+    // within it: a step over twice the root of the samples.
+    const double step =
+        c == 2 ? 0x1p-133 : std::exp2(std::floor(std::log2(std::abs(kLight[c]))) - 7);
+    EXPECT_NEAR(sum[c] / kSamples, static_cast<double>(kLight[c]),
+                5 * step / 2 / std::sqrt(kSamples));
+  }
+  EXPECT_EQ(rounded(3, 5, {0, 0, 0}), (std::array<float, 3>{}));
+  const float light = 1 + 0x1.8p-16F;
+  EXPECT_EQ(rounded(3, 0, {light, light, light})[2], Rounded(static_cast<double>(light), 16));
+  // Other slices and pixels take other chances.
+  int same_slice = 0;
+  int same_pixel = 0;
+  for (std::size_t pixel = 0; pixel < 1000; ++pixel) {
+    const float here = rounded(pixel, 5, {1.0039F, 0, 0})[0];
+    same_slice += PhotonRounding({4, 8})(pixel, 5, {1.0039F, 0, 0})[0] == here ? 1 : 0;
+    same_pixel += rounded(pixel + 1000, 5, {1.0039F, 0, 0})[0] == here ? 1 : 0;
+  }
+  // Half of them, up to five deviations.
+  EXPECT_NEAR(same_slice, 500, 5 * 16);
+  EXPECT_NEAR(same_pixel, 500, 5 * 16);
+}
+
+// Passes without noise have none in their sum: no difference of halves, no deviations, and to 16
+// bits the same mean, however many there are.
+TEST(SliceSumsTest, LightWithoutNoiseStaysWithout) {
+  SliceTree tree({64, 72});
+  for (std::uint64_t pass = 64; pass < 72; ++pass) {
+    SliceSums slice = EmptySlice({pass, pass + 1}, kPixels, kEvidence);
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t pixel = 0; pixel < kPixels; ++pixel)
+        slice.columns[kDirectRadiance + c][pixel] =
+            Rounded(1.0 / (3.0 + static_cast<double>(pixel + c)), 16);
+    }
+    SetWhatFollowsFromRadiance(slice);
+    ASSERT_TRUE(tree.Add(std::move(slice)).ok());
+  }
+  for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
+    EXPECT_EQ(tree.Whole()->At(kSquaredDeviations, pixel), 0);
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_EQ(tree.Whole()->At(kHalfDifference + c, pixel), 0);
+      const double mean = static_cast<double>(tree.Whole()->At(kDirectRadiance + c, pixel)) / 8;
+      EXPECT_NEAR(mean * (3.0 + static_cast<double>(pixel + c)), 1, 0x1p-16);
     }
   }
 }
@@ -95,7 +176,7 @@ TEST(SliceSumsTest, DeviationsAreThoseOfAllPasses) {
     squares += (luminance - mean) * (luminance - mean);
   // Pairs, fours and the eight were each rounded once.
   const double rounding =
-      std::exp2(-static_cast<double>(SignificantBits(kSquaredDeviations, kEvidence)));
+      std::exp2(-static_cast<double>(SignificantBits(8, kSquaredDeviations, kEvidence)));
   EXPECT_NEAR(static_cast<double>(tree.Whole()->At(kSquaredDeviations, 5)), squares,
               3 * rounding * squares);
 }
