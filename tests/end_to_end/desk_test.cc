@@ -112,7 +112,8 @@ TEST_P(TilesTest, StitchToTheWholeImage) {
 
 // Contributions of photons are rounded to quanta with random bits that belong to the photon and the
 // hitpoint's number, which is another in a tile. So what they bring differs by a quantum for each
-// photon at most, and by how often its sums are rounded.
+// photon at most. The sums are then rounded by chances that belong to the number of the pixel,
+// which is another in a tile too.
 TEST(TilesOfPhotonsTest, DifferByTheirRounding) {
   const TemporaryFolder folder;
   constexpr double kAlbedo = 0.5;
@@ -144,9 +145,11 @@ TEST(TilesOfPhotonsTest, DifferByTheirRounding) {
   // photons.
   constexpr double kPi = std::numbers::pi;
   const double to_pixel = kAlbedo / kPi / (kPi * kRadius * kRadius) / kPhotons / kPasses;
-  // Each sum of passes has 16 bits, of a pass and of four steps of the tree; the last one is the
-  // image's own.
-  constexpr double kSumsRounding = 6.0 / (1 << 15);
+  // One rounding of a sum of n photons has less than a thousandth of the variance of n independent
+  // ones (PhotonBits), and so has each level of the tree together: a pass and four steps, and the
+  // image's own, in either image. Five standard deviations.
+  constexpr double kRoundings = 6;
+  const double sums_rounding = 5 * std::sqrt(2 * kRoundings * 1e-3);
   // Of a row of the matrix from the working space, P3, to Rec. 709 the coefficients' sizes
   // together.
   constexpr double kToRec709 = 1.5;
@@ -155,9 +158,10 @@ TEST(TilesOfPhotonsTest, DifferByTheirRounding) {
     const ImageChannel& counts = *whole.Find("photon_count");
     for (std::size_t i = 0; i < counts.pixels.size(); ++i) {
       const auto value = static_cast<double>(whole.Find(name)->pixels[i]);
-      const double quanta = static_cast<double>(counts.pixels[i]) * kQuantum * to_pixel;
+      const auto count = static_cast<double>(counts.pixels[i]);
+      const double quanta = count * kQuantum * to_pixel;
       ASSERT_NEAR(static_cast<double>(stitched.Find(name)->pixels[i]), value,
-                  kToRec709 * (quanta + kSumsRounding * value))
+                  kToRec709 * (quanta + sums_rounding / std::sqrt(std::max(count, 1.0)) * value))
           << name << " " << i;
       lit += value > 0 ? 1 : 0;
     }
