@@ -9,7 +9,7 @@ packages=(
   libembree-dev libtbb-dev
   libopenexr-dev libstb-dev zlib1g-dev
   openssl libspdlog-dev libzstd-dev libcli11-dev nlohmann-json3-dev libsqlite3-dev
-  libpugixml-dev libtinyobjloader-dev prometheus-cpp-dev libcpp-httplib-dev
+  libpugixml-dev libtinyobjloader-dev prometheus-cpp-dev libcpp-httplib-dev libsystemd-dev
 )
 if [ "${1:-}" = tests ]; then
   packages+=(libgtest-dev libgmock-dev libbenchmark-dev chromium clang-format clang-tidy groff-base mandoc prometheus

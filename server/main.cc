@@ -36,6 +36,7 @@
 #include "render/wire/program_log.h"
 #include "render/wire/security_flags.h"
 #include "render/wire/service_flags.h"
+#include "render/wire/service_manager.h"
 #include "server/acceptor.h"
 #include "server/access.h"
 #include "server/admin_service.h"
@@ -187,12 +188,17 @@ int Serve(const Flags& flags, const std::shared_ptr<LogLines>& log) {
   spdlog::info("numeric profile: {}", flags.coordinator.numeric_profile);
 
   SecurityFiles security(flags.tls, **access, clock);
+  ServiceManager manager(clock);
+  manager.SayReady();
   const timespec tick = {0, kTickNanos};
   while (sigtimedwait(&end_signals, nullptr, &tick) < 0) {
     coordinator.Tick();
     jobs.Tick();
     security.Tick();
+    // A tick takes the locks that all calls take: it stands still when they do.
+    manager.SayAlive();
   }
+  manager.SayEnding();
   spdlog::info("ending");
   for (const auto& listener : listeners)
     listener->StopServing();

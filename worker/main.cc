@@ -32,6 +32,7 @@
 #include "render/wire/program_log.h"
 #include "render/wire/security_flags.h"
 #include "render/wire/service_flags.h"
+#include "render/wire/service_manager.h"
 #include "worker/replay.h"
 #include "worker/session.h"
 
@@ -84,9 +85,13 @@ int Work(Session::Options options, const std::string& metrics_address, LogFormat
   }
   std::atomic<bool> has_ended = false;
   std::thread listener([&] {
+    // That it runs at all. Whether it works off what it was lent, the coordinator watches.
+    ServiceManager manager(SystemClock());
     const timespec look = {0, kSignalLookNanos};
     while (!has_ended) {
+      manager.SayAlive();
       if (sigtimedwait(&signals, nullptr, &look) < 0) continue;
+      manager.SayEnding();
       spdlog::info("ending");
       session.Stop();
       return;

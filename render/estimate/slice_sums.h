@@ -11,9 +11,9 @@
 // photons deserves, with dither, so that it is right in the mean (PhotonRounding); statistics to 8.
 //
 // Invariants
-//   S1  Every column that is present has pixels() rows, all finite, of its SignificantBits or
-//   fewer. S2  `passes` is a slice (IsSlice). S3  Of a single pass, columns that
-//   FollowsFromRadiance names are as SetWhatFollowsFromRadiance
+//   S1  Every column that is present has pixels() rows, all finite, of SignificantBits at most.
+//   S2  `passes` is a slice (IsSlice).
+//   S3  Of a single pass, columns that FollowsFromRadiance names are as SetWhatFollowsFromRadiance
 //       sets them.
 #pragma once
 

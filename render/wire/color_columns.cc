@@ -22,25 +22,25 @@ bool IsNormal(float value) {
 
 // The bits of the number that is to `base` as `before` is to `base_before`; of `base` where no such
 // ratio can be had.
-std::uint32_t Foretold(float base, float base_before, float before) {
+std::uint32_t Predicted(float base, float base_before, float before) {
   const float ratio = before / base_before;
-  const float foretold = base * ratio;
+  const float predicted = base * ratio;
   const bool has_ratio = IsNormal(base) && IsNormal(base_before);
   if (has_ratio && !IsNormal(before)) return 0;
-  const bool is_usable = has_ratio && IsNormal(ratio) && IsNormal(foretold);
-  return std::bit_cast<std::uint32_t>(is_usable ? foretold : base);
+  const bool is_usable = has_ratio && IsNormal(ratio) && IsNormal(predicted);
+  return std::bit_cast<std::uint32_t>(is_usable ? predicted : base);
 }
 
-// Calls body(pixel, code that is foretold from what lies before).
+// Calls body(pixel, code that is predicted from what lies before).
 template <typename Body>
 void ForEachPixel(const ColorColumn& with, const float* channel, const Body& body) {
   const std::span<const float> base = with.base;
   for (std::size_t pixel = 0; pixel < base.size(); ++pixel) {
     const bool has_before = pixel >= kBefore;
     const std::size_t before = has_before ? pixel - kBefore : 0;
-    const std::uint32_t bits = has_before ? Foretold(base[pixel], base[before], channel[before])
+    const std::uint32_t bits = has_before ? Predicted(base[pixel], base[before], channel[before])
                                           : std::bit_cast<std::uint32_t>(base[pixel]);
-    // With as few bits as what is foretold, so that the difference has no others.
+    // With as few bits as what is predicted, so that the difference has no others.
     const unsigned int rounded =
         with.counts.empty() ? with.dropped
                             : std::max(with.dropped, DroppedBits(PhotonBits(with.counts[pixel])));
@@ -54,9 +54,9 @@ void ForEachPixel(const ColorColumn& with, const float* channel, const Body& bod
 void CodesOfChannel(const ColorColumn& with, std::span<const float> channel,
                     std::span<std::uint32_t> codes) {
   LUCERNA_CHECK(with.base.size() == channel.size() && codes.size() == channel.size());
-  ForEachPixel(with, channel.data(), [&](std::size_t pixel, std::uint32_t foretold) {
+  ForEachPixel(with, channel.data(), [&](std::size_t pixel, std::uint32_t predicted) {
     const std::uint32_t code = std::bit_cast<std::uint32_t>(channel[pixel]) >> with.dropped;
-    codes[pixel] = ZigZag(static_cast<std::int32_t>(code - foretold));
+    codes[pixel] = ZigZag(static_cast<std::int32_t>(code - predicted));
   });
 }
 
@@ -66,8 +66,8 @@ bool ChannelFromCodes(const ColorColumn& with, std::span<const std::uint32_t> co
   constexpr std::uint32_t kExponent = 0x7F800000;  // all ones: infinite or not a number
   std::uint32_t all = 0;
   std::uint32_t largest_exponent = 0;
-  ForEachPixel(with, channel.data(), [&](std::size_t pixel, std::uint32_t foretold) {
-    const std::uint32_t code = foretold + static_cast<std::uint32_t>(UnZigZag(codes[pixel]));
+  ForEachPixel(with, channel.data(), [&](std::size_t pixel, std::uint32_t predicted) {
+    const std::uint32_t code = predicted + static_cast<std::uint32_t>(UnZigZag(codes[pixel]));
     const std::uint32_t bits = code << with.dropped;
     all |= code;
     largest_exponent = std::max(largest_exponent, bits & kExponent);

@@ -4,8 +4,8 @@
 // pixels, however noisy it is. So red and blue are sent as what they are more or less than green
 // times the ratio of a pixel before. Nothing is lost, and there is little to send.
 //
-// The foretelling is float arithmetic, which must give the same bits for whoever encodes and
-// decodes: it knows no denormal numbers, which some threads round to zero and others do not.
+// The prediction is made in floats and must have the same bits for encoder and decoder. Denormal
+// numbers are left out of it: some threads round them to zero, and some do not.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 namespace lucerna {
 
-// `channel` is foretold from `base`; floats with `dropped` low bits that are zero, or, where
+// `channel` is predicted from `base`; floats with `dropped` low bits that are zero, or, where
 // `counts` are given, what PhotonBits has of them at least. All of one size.
 struct ColorColumn {
   std::span<const float> base;

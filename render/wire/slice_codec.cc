@@ -20,7 +20,7 @@ unsigned int EmptyBits(const SliceSums& slice, std::size_t column) {
   return DroppedBits(SignificantBits(slice.passes.size(), column, slice.evidence));
 }
 
-// The column that a column is foretold from: green, of radiance. Itself: from none.
+// The column that a column is predicted from: green, of radiance. Itself: from none.
 std::size_t BaseOf(std::size_t column) {
   constexpr std::size_t kColors = kSquaredDeviations;
   static_assert(kPhotonRadiance == 0 && kDirectRadiance == 3 && kHalfDifference == 6 &&
@@ -36,7 +36,7 @@ ColorColumn Beside(const SliceSums& slice, std::size_t column) {
   return with;
 }
 
-// All columns that are sent, each behind those that it is foretold from.
+// All columns that are sent, each behind those that it is predicted from.
 std::vector<std::size_t> SentColumns(const PassRange& passes, std::size_t columns) {
   std::vector<std::size_t> sent = {kPhotonCount};
   const auto send = [&](std::size_t column) {

@@ -154,7 +154,7 @@ TEST(SliceCodecTest, ChannelsInOneRatioCostLittleMoreThanOne) {
   EXPECT_EQ(*decoded, slice);
 }
 
-// Whoever decodes may round denormal numbers to zero, or not: what is foretold does not depend on
+// Whoever decodes may round denormal numbers to zero, or not: what is predicted does not depend on
 // it.
 TEST(SliceCodecTest, FromAndToThreadsThatFlushDenormals) {
   const SliceShape shape = Shape({16, 18}, 4096, 0);

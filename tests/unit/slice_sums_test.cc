@@ -143,6 +143,18 @@ TEST(SliceSumsTest, LightWithoutNoiseStaysWithout) {
   }
 }
 
+// A difference of halves that is far smaller than the radiance has its own bits.
+TEST(SliceSumsTest, SmallDifferencesOfHalvesAreKept) {
+  SliceSums even = EmptySlice({64, 65}, 1, kEvidence);
+  SliceSums odd = EmptySlice({65, 66}, 1, kEvidence);
+  even.columns[kDirectRadiance][0] = 1;
+  odd.columns[kDirectRadiance][0] = 1 + 0x1p-15F;
+  SetWhatFollowsFromRadiance(even);
+  SetWhatFollowsFromRadiance(odd);
+  ASSERT_TRUE(MergeSibling(even, odd).ok());
+  EXPECT_EQ(even.At(kHalfDifference, 0), -0x1p-15F);
+}
+
 TEST(SliceSumsTest, SiblingsMakeTheSameSumInEitherOrder) {
   SliceSums forward = RandomPass(32);
   SliceSums backward = RandomPass(33);
