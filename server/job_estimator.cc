@@ -415,10 +415,9 @@ ThreadTeam& JobEstimator::team() {
   return state_->team;
 }
 
-SliceSums JobEstimator::SliceOf(const EyePass& pass, const RoundPlan& plan,
-                                const PassSums& sums) const {
-  return SliceOfPass(pass, plan, sums, state_->settings, needs(), state_->prepared.flux_scale(),
-                     state_->team);
+SliceSums JobEstimator::SliceOf(EyePass pass, const RoundPlan& plan, PassSums sums) const {
+  return SliceOfPass(std::move(pass), plan, std::move(sums), state_->settings, needs(),
+                     state_->prepared.flux_scale(), state_->team);
 }
 
 void JobEstimator::AddRound(const SliceSums& round, const RoundPlan& plan) {
@@ -516,6 +515,7 @@ Image JobEstimator::MakeImage() const {
   }
   const std::vector<float> noise_layer =
       NoiseOfPixels(image.width, image.height, noise_area, noise);
+  noise = {};
   const auto errors_of = [&](std::size_t pixel) {
     PixelValues values;
     values.noise = static_cast<double>(noise_layer[pixel]);

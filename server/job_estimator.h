@@ -93,9 +93,8 @@ class JobEstimator {
   // Absent while passes before RadiiFrom(round) have not been added, and for a round that has been.
   [[nodiscard]] std::optional<RoundPlan> PlanFor(const PassRange& round) const;
   [[nodiscard]] SliceShape ShapeOf(const PassRange& round, const RoundPlan& plan) const;
-  // The slice of a pass whose photons brought `sums`, of pass.block.size() rows.
-  [[nodiscard]] SliceSums SliceOf(const EyePass& pass, const RoundPlan& plan,
-                                  const PassSums& sums) const;
+  // The slice of a pass whose photons brought `sums`, of pass.block.size() rows; both are used up.
+  [[nodiscard]] SliceSums SliceOf(EyePass pass, const RoundPlan& plan, PassSums sums) const;
   // Requires the next round, whole, and its plan.
   void AddRound(const SliceSums& round, const RoundPlan& plan);
   // Slices of the round after those added, from its first pass on without a gap, and its plan: they

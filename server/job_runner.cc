@@ -356,9 +356,9 @@ StatusOr<bool> JobRunner::Step(const End& end, bool wants_more) {
   }
   for (auto open = split_passes_.begin(); open != split_passes_.end(); ++open) {
     if (HasPhotons(*open) && !hooks_.passes.IsComplete(KeyOf(open->traced.eye.pass))) continue;
-    const SplitPass complete = std::move(*open);
+    SplitPass complete = std::move(*open);
     split_passes_.erase(open);
-    LUCERNA_RETURN_IF_ERROR(TakeInSplitPass(complete));
+    LUCERNA_RETURN_IF_ERROR(TakeInSplitPass(std::move(complete)));
     return true;
   }
   // With a target, the image must not grow beyond a checkpoint before it is known to miss it.
@@ -523,7 +523,7 @@ bool JobRunner::HasPhotons(const SplitPass& open) const {
   return open.blobs.rows > 0 && estimator_->needs().Uses(Part::kPhotons);
 }
 
-Status JobRunner::TakeInSplitPass(const SplitPass& open) {
+Status JobRunner::TakeInSplitPass(SplitPass open) {
   const PassKey key = KeyOf(open.traced.eye.pass);
   PassSums sums(open.blobs.rows,
                 EvidenceColumns(EvidenceOf(settings_.radius_controller, key.pass)));
@@ -536,7 +536,7 @@ Status JobRunner::TakeInSplitPass(const SplitPass& open) {
   {
     const MutexLock lock(estimator_mutex_);
     const RoundPlan& plan = OpenRoundOf(key.pass).plan;
-    slice = estimator_->SliceOf(open.traced.eye, plan, sums);
+    slice = estimator_->SliceOf(std::move(open.traced.eye), plan, std::move(sums));
   }
   return hooks_.rounds.Merge(KeyOf(RoundOf(key.pass).first), std::move(slice)).status();
 }

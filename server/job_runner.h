@@ -225,7 +225,7 @@ class JobRunner final : public RunningJob {
   StatusOr<std::optional<TracedPass>> Trace(std::uint64_t pass);
   Status OpenSplitPass(TracedPass traced);
   bool HasPhotons(const SplitPass& open) const;
-  Status TakeInSplitPass(const SplitPass& open);
+  Status TakeInSplitPass(SplitPass open);
   void CloseAll();
   // Publishes what workers need of a pass or round, or withdraws it.
   void Publish(std::uint64_t pass, const WorkBlobs& blobs);

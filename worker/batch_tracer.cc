@@ -389,7 +389,7 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
   State& state = *state_;
   LUCERNA_RETURN_IF_ERROR(state.PrepareSpectra(settings, pass));
   const PreparedScene::AtPass at_pass(state.prepared, settings.seed, pass);
-  const EyePass eye =
+  EyePass eye =
       TraceHitpointPass(*state.eye_paths, pass, state.first_hits->Of(pass), *state.film_spread,
                         state.team, [&stop] { return stop.load(std::memory_order_relaxed); });
   if (stop || !eye.is_whole) return absl::CancelledError("the slice was given up");
@@ -406,8 +406,8 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
     for (const std::uint64_t index : named)
       dropped.push_back({pass, index});
   }
-  SliceSums slice =
-      SliceOfPass(eye, plan, sums, settings, needs, state.prepared.flux_scale(), state.team);
+  SliceSums slice = SliceOfPass(std::move(eye), plan, std::move(sums), settings, needs,
+                                state.prepared.flux_scale(), state.team);
   slice.dropped_photons = std::move(dropped);
   return slice;
 }

@@ -17,7 +17,6 @@ constexpr double kEvidenceColumn = 16;
 // Bytes a hitpoint: compressed, with and without what glossy ones need.
 constexpr double kBlock = 6.5;
 constexpr double kGlossyBlock = 14;
-constexpr double kFirstHit = 4;
 constexpr double kRadius = 2.5;
 // Of hitpoints for caustic photons and of segments in media, wherever a pass is traced.
 constexpr double kCausticHitpoint = 150;
@@ -30,14 +29,15 @@ ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& setti
       static_cast<double>(EvidenceColumns(EvidenceOf(settings.radius_controller, 0)));
   const auto numbers = static_cast<double>(MakeRadiusController(settings, 1)->MemoryPerPixel());
   const double block = needs.Uses(Part::kGlossy) ? kGlossyBlock : kBlock;
-  const double sets = needs.eye_sample_sets();
+  const auto first_hits = static_cast<double>(
+      kFirstHitBytes * KeptSets(needs.eye_sample_sets(), static_cast<std::size_t>(pixels)));
   const double rows_beside =
       (needs.Uses(Part::kCausticHitpoints) ? 1 : 0) + (needs.Uses(Part::kMedia) ? 1 : 0);
   ExpectedCost cost;
   cost.coordinator = pixels * (kCoordinator + rows_beside * kCausticHitpoint +
                                kEvidenceColumn * columns + sizeof(double) * numbers);
-  cost.worker = pixels * (kWorker + rows_beside * kCausticHitpoint + kEvidenceColumn * columns +
-                          sets * kFirstHit);
+  cost.worker =
+      pixels * (kWorker + rows_beside * kCausticHitpoint + kEvidenceColumn * columns + first_hits);
   cost.first_pass_sent = pixels * (block + kRadius + rows_beside * (kGlossyBlock + kRadius));
   cost.pass_sent = pixels * kRadius;
   return cost;

@@ -7,6 +7,7 @@
 // arithmetic is the same.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -132,6 +133,15 @@ inline constexpr std::uint64_t kRoundsOfSets = 16;
   if (sets == 0) return pass;
   const auto n = static_cast<std::uint64_t>(sets);
   return pass / (n * kRoundsOfSets) * n + pass % n;
+}
+
+// Of how many of the sets what the camera's rays meet first is kept, kFirstHitBytes for each ray
+// and kMostFirstHitBytes at most (tracing/first_hits.h).
+inline constexpr std::size_t kFirstHitBytes = 4;
+inline constexpr std::size_t kMostFirstHitBytes = std::size_t{64} << 20U;
+[[nodiscard]] constexpr std::size_t KeptSets(int sets, std::size_t pixels) {
+  return std::min(static_cast<std::size_t>(sets),
+                  kMostFirstHitBytes / (kFirstHitBytes * std::max<std::size_t>(pixels, 1)));
 }
 
 }  // namespace lucerna

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "render/base/status.h"
@@ -240,10 +241,10 @@ std::vector<float> LeastAround(int width, int height, int reach, const std::vect
 constexpr int kKernelReach = 3;
 
 // The least luminance that a pixel can plausibly have without the blur.
-std::vector<float> LeastLuminance(int width, int height, const std::vector<float>& luminance,
+std::vector<float> LeastLuminance(int width, int height, std::vector<float> luminance,
                                   ThreadTeam& team) {
-  return LeastAround(width, height, kKernelReach, Smoothed(width, height, 2, luminance, team),
-                     team);
+  luminance = Smoothed(width, height, 2, luminance, team);
+  return LeastAround(width, height, kKernelReach, luminance, team);
 }
 
 // What the kernel changed in each pixel, as the two halves have it.
@@ -501,12 +502,14 @@ ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& 
     const SquaredError unknown = {.noise = HUGE_VAL, .bias = 0, .low = 0, .high = HUGE_VAL};
     return {.relative = unknown, .absolute = {}, .untrimmed = HUGE_VAL};
   }
-  const std::array<MeanAround, 3> around = {MeanAround(width, height, std::move(means[0]), team),
-                                            MeanAround(width, height, std::move(means[1]), team),
-                                            MeanAround(width, height, std::move(means[2]), team)};
-  const std::vector<float> least_luminance =
-      LeastLuminance(width, height, rounded_luminances, team);
+  std::optional<std::array<MeanAround, 3>> around =
+      std::array{MeanAround(width, height, std::move(means[0]), team),
+                 MeanAround(width, height, std::move(means[1]), team),
+                 MeanAround(width, height, std::move(means[2]), team)};
+  std::vector<float> least_luminance =
+      LeastLuminance(width, height, std::move(rounded_luminances), team);
   const double believed = BelievedShare(width, height, half_biases, luminances, floor, team);
+  half_biases = {};
   std::vector<PixelError> pixels(count);
   std::vector<float> differences(count);
   PixelBiases biases(count);
@@ -533,7 +536,7 @@ ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& 
         const double odd = odd_sum[c] / odd_passes;
         difference[c] = even - odd;
         const double own = all[c] / passes;
-        const double agreed = Middle(even, odd, around[c](x, y));
+        const double agreed = Middle(even, odd, (*around)[c](x, y));
         const double least = std::min(own, agreed);
         // One over value² + floor. The agreed value is too large where rare light fell on the
         // dark, the least one too small where lights are seen in few samples.
@@ -593,6 +596,10 @@ ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& 
     return std::array<double, 2>{halves, independent};
   };
   const auto [halves, independent] = SumOfRows<2>(team, height, do_row);
+  // Before what smoothing takes.
+  around.reset();
+  least_luminance = {};
+  luminances = {};
   Spread spread{.noise_area = CorrelatedArea(width, height, differences, differences), .z = z};
   const ChosenBias chosen = Choose(width, height, biases, spread.noise_area, team);
   spread.bias_area = chosen.bias.area;

@@ -2,9 +2,11 @@
 //
 // Where sets of eye paths take turns (analysis/needs.h, EyeSetOf), the camera's rays of a set are
 // the same in every pass that uses it, so what they meet is found once. Only which shape it is is
-// kept, 4 bytes for a ray: where the ray meets it is soon computed again.
+// kept, 4 bytes for a ray: where the ray meets it is soon computed again. Of large images only the
+// first sets are kept (KeptSets), so that memory does not grow with pixels times sets.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -19,18 +21,21 @@ struct FirstHitsOfSet {
   std::vector<std::uint32_t> shapes;  // [pixels of the crop window] see Intersector::ShapeOf
 };
 
+static_assert(sizeof(FirstHitsOfSet::shapes[0]) == kFirstHitBytes);
+
 class FirstHits {
  public:
   // `sets` take turns; 0 when every pass has eye paths of its own.
   FirstHits(int sets, std::size_t pixels)
-      : pixels_(pixels), kept_(static_cast<std::size_t>(sets)) {}
+      : pixels_(pixels), sets_(sets), kept_(KeptSets(sets, pixels)) {}
 
-  // Of the set that `pass` uses: known, or to be filled and called known. nullptr when eye paths
-  // are never used again.
+  // Of the set that `pass` uses: known, or to be filled and called known. nullptr when its eye
+  // paths are never used again or not kept.
   [[nodiscard]] FirstHitsOfSet* Of(std::uint64_t pass) {
-    if (kept_.empty()) return nullptr;
-    Kept& kept = kept_[pass % kept_.size()];
-    const std::uint64_t set = EyeSetOf(pass, static_cast<int>(kept_.size()));
+    const std::uint64_t turn = sets_ > 0 ? pass % static_cast<std::uint64_t>(sets_) : 0;
+    if (turn >= kept_.size()) return nullptr;
+    Kept& kept = kept_[turn];
+    const std::uint64_t set = EyeSetOf(pass, sets_);
     if (kept.set != set || kept.hits.shapes.empty()) {
       kept.set = set;
       kept.hits.is_known = false;
@@ -45,6 +50,7 @@ class FirstHits {
     FirstHitsOfSet hits;
   };
   std::size_t pixels_;
+  int sets_;
   std::vector<Kept> kept_;  // by turn
 };
 

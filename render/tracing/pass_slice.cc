@@ -40,7 +40,9 @@ RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan) {
   return of_hitpoints;
 }
 
-SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums& sums,
+// Columns are made when their turn comes, and what they follow from is freed after it: at no time
+// are there both the whole pass and the whole slice.
+SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
                       const RenderSettings& settings, const SceneNeeds& needs,
                       const FluxScale& scale, ThreadTeam& team) {
   const std::size_t rows = pass.pixels.size();
@@ -52,20 +54,24 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   slice.passes = {pass.pass, pass.pass + 1};
   slice.evidence = evidence;
   slice.columns.resize(ColumnsOf(slice.passes, evidence));
+  const bool has_features = HasFeatures(slice.passes);
+  const std::size_t first_feature = slice.first_feature();
+  std::vector<float*> columns(slice.columns.size());
   // The system clears memory where it is first touched, which takes as long as filling it in.
-  team.For(slice.columns.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t column = begin; column < end; ++column)
-      slice.columns[column].resize(pixels);
-  });
+  const auto make = [&](std::size_t first, std::size_t count) {
+    team.For(count, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t column = first + begin; column < first + end; ++column) {
+        slice.columns[column].resize(pixels);
+        columns[column] = slice.columns[column].data();
+      }
+    });
+  };
   slice.tally = sums.tally();
   slice.eye_rays = pass.rays;
   for (const FoundPhoton& found : sums.FoundInOrder()) {
     if (slice.reports.size() == kMostReports) break;
     slice.reports.push_back({found.numbers, pass.pixels[found.row]});
   }
-  std::vector<float*> columns;
-  for (std::vector<float>& column : slice.columns)
-    columns.push_back(column.data());
   const auto set = [&](std::size_t column, std::size_t pixel, double value) {
     columns[column][pixel] = Rounded(value, SignificantBits(1, column, evidence));
   };
@@ -91,6 +97,13 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
   const double norm = Kernel{settings.kernel}.Norm();
   const double per_photon = norm / static_cast<double>(plan.photons_per_pass);
   const std::size_t first_caustic = pass.block.first_caustic();
+  const std::size_t first_segment = pass.block.first_segment();
+  pass.block = {};
+  make(kPhotonRadiance, 3);
+  make(kEvenBias, kSliceColumns - kEvenBias + evidence);
+  static_assert(kEvenBias < kOddBias && kOddBias < kPhotonCount && kPhotonCount < kBlur);
+  if (has_features) make(first_feature + kUnitRadius, 3);
+  static_assert(kHits == kUnitRadius + 1 && kHitpoints == kHits + 1);
   const std::size_t evidence_here = sums.evidence().size() - kCommonColumns;
   const auto add_row = [&](std::size_t row) {
     const std::uint32_t pixel = pass.pixels[row];
@@ -116,13 +129,13 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
       set(kSliceColumns + column, pixel,
           static_cast<double>(sums.evidence()[kCommonColumns + column][row]));
     }
-    if (!HasFeatures(slice.passes)) return;
-    set(slice.first_feature() + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
-    set(slice.first_feature() + kHitpoints, pixel, 1);
+    if (!has_features) return;
+    set(first_feature + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
+    set(first_feature + kHitpoints, pixel, 1);
   };
   // A pixel has at most one row of each kind, so that rows of a kind are independent of each other.
   constexpr std::size_t kRowsAtOnce = 4096;
-  const std::array bounds = {std::size_t{0}, first_caustic, pass.block.first_segment(), rows};
+  const std::array bounds = {std::size_t{0}, first_caustic, first_segment, rows};
   for (std::size_t kind = 0; kind + 1 < bounds.size(); ++kind) {
     team.For(bounds[kind + 1] - bounds[kind], kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
       for (std::size_t row = bounds[kind] + begin; row < bounds[kind] + end; ++row)
@@ -130,9 +143,14 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
     });
   }
 
-  const std::size_t first_feature = slice.first_feature();
+  sums = PassSums(0);
+  pass.pixels = {};
+  pass.weights = {};
+  pass.unit_radii = {};
+
+  make(kDirectRadiance, 3);
   const PhotonRounding rounded_photons(slice.passes);
-  const auto set_pixel = [&](std::size_t pixel) {
+  const auto set_radiance = [&](std::size_t pixel) {
     std::array<double, 3> photons{};
     for (std::size_t c = 0; c < 3; ++c)
       photons[c] = static_cast<double>(columns[kPhotonRadiance + c][pixel]);
@@ -147,21 +165,38 @@ SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums
     for (std::size_t c = 0; c < 3; ++c)
       columns[kPhotonRadiance + c][pixel] = by_photons[c];
     set(bias, pixel, static_cast<double>(columns[bias][pixel]));
-    if (!HasFeatures(slice.passes)) return;
-    const EyeFeatures& features = pass.features[pixel];
-    if (!std::isfinite(features.distance)) return;
-    const std::array<double, 3> albedo = in_color(ToDoubles(features.albedo));
-    for (int c = 0; c < 3; ++c) {
-      const auto offset = static_cast<std::size_t>(c);
-      set(first_feature + kAlbedo + offset, pixel, albedo[offset]);
-      set(first_feature + kNormal + offset, pixel, static_cast<double>(features.normal[c]));
-    }
-    set(first_feature + kDistance, pixel, static_cast<double>(features.distance));
-    set(first_feature + kHits, pixel, 1);
   };
+  const auto for_pixels = [&](const auto& work) {
+    team.For(pixels, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t pixel = begin; pixel < end; ++pixel)
+        work(pixel);
+    });
+  };
+  for_pixels(set_radiance);
+  pass.direct = {};
+
+  if (has_features) {
+    make(first_feature + kAlbedo, kUnitRadius - kAlbedo);
+    static_assert(kAlbedo < kNormal && kNormal < kDistance && kDistance < kUnitRadius);
+    for_pixels([&](std::size_t pixel) {
+      const EyeFeatures& features = pass.features[pixel];
+      if (!std::isfinite(features.distance)) return;
+      const std::array<double, 3> albedo = in_color(ToDoubles(features.albedo));
+      for (int c = 0; c < 3; ++c) {
+        const auto offset = static_cast<std::size_t>(c);
+        set(first_feature + kAlbedo + offset, pixel, albedo[offset]);
+        set(first_feature + kNormal + offset, pixel, static_cast<double>(features.normal[c]));
+      }
+      set(first_feature + kDistance, pixel, static_cast<double>(features.distance));
+      set(first_feature + kHits, pixel, 1);
+    });
+    pass.features = {};
+  }
+
+  make(kHalfDifference, kEvenBias - kHalfDifference);
+  static_assert(kHalfDifference < kSquaredDeviations && kSquaredDeviations < kLargestLuminance &&
+                kLargestLuminance < kEvenBias);
   team.For(pixels, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t pixel = begin; pixel < end; ++pixel)
-      set_pixel(pixel);
     SetWhatFollowsFromRadiance(slice, begin, end);
   });
   return slice;

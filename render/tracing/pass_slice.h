@@ -35,11 +35,11 @@ struct RoundPlan {
 // The radius of every hitpoint of a pass [scene units].
 [[nodiscard]] RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan);
 
-// The slice of one pass. `sums` are those of all its photons, gathered with HitpointRadii. Of a job
-// that carries wavelengths (`needs`) it has their colour, in the working space as any other.
-[[nodiscard]] SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan,
-                                    const PassSums& sums, const RenderSettings& settings,
-                                    const SceneNeeds& needs, const FluxScale& scale,
-                                    ThreadTeam& team);
+// The slice of one pass, which is used up. `sums` are those of all its photons, gathered with
+// HitpointRadii. Of a job that carries wavelengths (`needs`) it has their colour, in the working
+// space as any other.
+[[nodiscard]] SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
+                                    const RenderSettings& settings, const SceneNeeds& needs,
+                                    const FluxScale& scale, ThreadTeam& team);
 
 }  // namespace lucerna

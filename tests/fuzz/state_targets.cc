@@ -139,11 +139,12 @@ std::vector<std::string> SumsSeeds() {
   const std::unique_ptr<JobEstimator> estimator = SmallEstimator();
   std::vector<std::string> seeds = {Saved(*estimator)};
   for (std::uint64_t pass = 0; pass < 3; ++pass) {
-    const EyePass now = estimator->TraceEyePaths(pass).value();
+    EyePass now = estimator->TraceEyePaths(pass).value();
+    const std::size_t rows = now.block.size();
     const RoundPlan plan = estimator->PlanFor(RoundOf(pass)).value();
     const std::size_t columns =
         EvidenceColumns(EvidenceOf(RenderSettings().radius_controller, pass));
-    estimator->AddRound(estimator->SliceOf(now, plan, PassSums(now.block.size(), columns)), plan);
+    estimator->AddRound(estimator->SliceOf(std::move(now), plan, PassSums(rows, columns)), plan);
   }
   seeds.push_back(Saved(*estimator));
   return seeds;

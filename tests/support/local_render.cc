@@ -45,7 +45,7 @@ void LocalRender::AddPass(int batches) {
   if (batches == 0 && pass_ > 0) {
     slice = OrDie(tracer_->RunSlice(settings_, needs_, {pass_, pass_ + 1}, *plan_, stop));
   } else {
-    const EyePass eye = estimator_->TraceEyePaths(pass_).value();
+    EyePass eye = estimator_->TraceEyePaths(pass_).value();
     const RadiusColumn radii = HitpointRadii(eye, *plan_);
     PassSums sums(eye.block.size(),
                   EvidenceColumns(EvidenceOf(settings_.radius_controller, pass_)));
@@ -57,7 +57,7 @@ void LocalRender::AddPass(int batches) {
                              eye.block, radii, stop, photons, plan_->guide.get()));
       if (const Status added = sums.Add(accumulation); !added.ok()) Die(added);
     }
-    slice = estimator_->SliceOf(eye, *plan_, sums);
+    slice = estimator_->SliceOf(std::move(eye), *plan_, std::move(sums));
   }
   tally_ += slice.tally;
   if (const Status added = round_->Add(std::move(slice)); !added.ok()) Die(added);

@@ -34,6 +34,19 @@ TEST(FirstHitsTest, AreNotKeptWhereEyePathsAreNew) {
   EXPECT_EQ(FirstHits(0, 10).Of(0), nullptr);
 }
 
+TEST(FirstHitsTest, TakeNoMoreThanTheirBytes) {
+  constexpr int kSets = 64;
+  constexpr std::size_t kPixels = std::size_t{1} << 20U;
+  const std::size_t kept = KeptSets(kSets, kPixels);
+  EXPECT_EQ(kept, 16U);
+  FirstHits hits(kSets, kPixels);
+  EXPECT_NE(hits.Of(kept - 1), nullptr);
+  EXPECT_EQ(hits.Of(kept), nullptr);
+  EXPECT_EQ(hits.Of(kSets + kept), nullptr) << "of the same set in its next turn";
+  EXPECT_EQ(KeptSets(kSets, 1), 64U);
+  EXPECT_EQ(KeptSets(kSets, std::size_t{1} << 28U), 0U);
+}
+
 // A floor, seen in part, and a light.
 Scene Floor() {
   Scene scene;

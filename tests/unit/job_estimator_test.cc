@@ -114,10 +114,11 @@ TEST(JobEstimatorTest, TracesTheEyePathsOfAPassAtAnyTime) {
   const auto early = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 1).value();
   const auto late = JobEstimator::Create(scene, settings, NeedsOf(scene, settings), 3).value();
   for (std::uint64_t pass = 0; pass < 3; ++pass) {
-    const EyePass now = late->TraceEyePaths(pass).value();
+    EyePass now = late->TraceEyePaths(pass).value();
+    const std::size_t rows = now.block.size();
     const std::size_t columns = EvidenceColumns(EvidenceOf(settings.radius_controller, pass));
     const RoundPlan plan = late->PlanFor(RoundOf(pass)).value();
-    late->AddRound(late->SliceOf(now, plan, PassSums(now.block.size(), columns)), plan);
+    late->AddRound(late->SliceOf(std::move(now), plan, PassSums(rows, columns)), plan);
   }
   const EyePass a = early->TraceEyePaths(3).value();
   const EyePass b = late->TraceEyePaths(3).value();
@@ -229,7 +230,7 @@ SliceSums SplitSlice(const JobEstimator& estimator, BatchTracer& tracer,
                      const RenderSettings& settings, std::uint64_t pass, const RoundPlan& plan,
                      std::uint64_t batches) {
   const std::atomic<bool> stop = false;
-  const EyePass eye = estimator.TraceEyePaths(pass).value();
+  EyePass eye = estimator.TraceEyePaths(pass).value();
   PassSums sums(eye.block.size(), EvidenceColumns(EvidenceOf(settings.radius_controller, pass)));
   if (eye.block.size() > 0 && estimator.needs().Uses(Part::kPhotons)) {
     for (std::uint64_t b = batches; b-- > 0;) {
@@ -242,7 +243,7 @@ SliceSums SplitSlice(const JobEstimator& estimator, BatchTracer& tracer,
       EXPECT_TRUE(sums.Add(batch).ok());
     }
   }
-  return estimator.SliceOf(eye, plan, sums);
+  return estimator.SliceOf(std::move(eye), plan, std::move(sums));
 }
 
 struct SliceCase {

@@ -57,10 +57,11 @@ RenderSettings Settings(RadiusControllerKind controller, KernelKind kernel) {
   return settings;
 }
 
-SliceSums SliceOfPass(const EyePass& pass, const RoundPlan& plan, const PassSums& sums,
+SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
                       const RenderSettings& settings, const FluxScale& scale) {
   ThreadTeam team(2);
-  return lucerna::SliceOfPass(pass, plan, sums, settings, SceneNeeds(), scale, team);
+  return lucerna::SliceOfPass(std::move(pass), plan, std::move(sums), settings, SceneNeeds(), scale,
+                              team);
 }
 
 // One pixel, one hitpoint a pass, PPM with immediate radii: tau' = (tau + Phi) r'^2 / r^2 and

@@ -1,0 +1,67 @@
+// How much memory does a pass take while it becomes a slice?
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "gtest/gtest.h"
+
+#include "render/estimate/evidence.h"
+#include "render/tracing/pass_slice.h"
+#include "tests/memory/failing_allocations.h"
+
+namespace lucerna {
+namespace {
+
+// Bytes of a pixel.
+constexpr std::size_t kWhere = sizeof(Vec3) + sizeof(std::uint32_t);  // position and normal
+constexpr std::size_t kRow = sizeof(std::uint32_t) + sizeof(Rgb) + sizeof(float);
+constexpr std::size_t kSeen = sizeof(Rgb) + sizeof(EyeFeatures);
+constexpr std::size_t kPixels = 1U << 14U;
+
+EyePass WholePass(std::uint64_t pass) {
+  EyePass eye;
+  eye.pass = pass;
+  eye.block.positions.resize(kPixels);
+  eye.block.normals_oct.resize(kPixels);
+  eye.pixels.resize(kPixels);
+  for (std::size_t i = 0; i < kPixels; ++i)
+    eye.pixels[i] = static_cast<std::uint32_t>(i);
+  eye.weights.resize(kPixels);
+  eye.unit_radii.assign(kPixels, 1);
+  eye.direct.resize(kPixels);
+  eye.features.resize(kPixels);
+  return eye;
+}
+
+// Where hitpoints are is of no use any more, and direct light becomes columns when what photons
+// brought has become theirs: the most is what the rows have and the columns that follow from them.
+TEST(SliceOfPassMemoryTest, NeverHoldsTheWholePassBesideTheWholeSlice) {
+  RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kAppm;
+  const std::size_t evidence = ControllerColumns(settings.radius_controller);
+  ThreadTeam team(1);
+  const RoundPlan plan = {.photons_per_pass = 1,
+                          .radii = std::make_shared<const RadiusColumn>(kPixels, 1.0F)};
+  const std::size_t before = LiveBytes();
+  EyePass eye = WholePass(0);
+  PassSums sums(kPixels, kCommonColumns + evidence);
+  const std::size_t of_sums = sizeof(std::int64_t) * (4 + kCommonColumns + evidence);
+  // For vectors' heads, and what the allocator adds to each of them.
+  constexpr std::size_t kSlack = 8192;
+  ASSERT_NEAR(static_cast<double>(LiveBytes() - before),
+              static_cast<double>(kPixels * (kWhere + kRow + kSeen + of_sums)), kSlack);
+  ForgetMostLiveBytes();
+  const SliceSums slice = SliceOfPass(std::move(eye), plan, std::move(sums), settings, SceneNeeds(),
+                                      {Gray(1), Gray(1)}, team);
+  const std::size_t of_slice = sizeof(float) * slice.columns.size();
+  EXPECT_NEAR(static_cast<double>(LiveBytes() - before), static_cast<double>(kPixels * of_slice),
+              kSlack);
+  // By photons: three of radiance, two of bias, the count, the blur, the evidence, and three of the
+  // features.
+  const std::size_t from_rows = sizeof(float) * (3 + 4 + evidence + 3);
+  EXPECT_LE(MostLiveBytes() - before, kPixels * (kRow + kSeen + of_sums + from_rows) + kSlack);
+}
+
+}  // namespace
+}  // namespace lucerna
