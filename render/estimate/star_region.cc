@@ -53,12 +53,34 @@ bool StarRegion::Add(Point2 a, Point2 b) {
   }
   const Point2 along = {b.x - a.x, b.y - a.y};
   if (!(cross > 1e-12 * Dot(along, along)) || !(cross > 1e-30)) return true;
+  const Segment segment = {a, b, {along.y / cross, -along.x / cross}};
+  for (std::size_t i = 0; i < segments_; ++i) {
+    if (exact_[i].Hides(segment)) return true;
+  }
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < segments_; ++i) {
+    if (segment.Hides(exact_[i])) continue;
+    if (kept != i) {
+      exact_[kept] = exact_[i];
+      wedges_[kept] = wedges_[i];
+    }
+    ++kept;
+  }
+  segments_ = kept;
   if (segments_ == kMostSegments) return false;
-  const Point2 g = {along.y / cross, -along.x / cross};
-  exact_[segments_] = {a, b, g};
   const auto f = [](double x) { return static_cast<float>(x); };
-  wedges_[segments_++] = {f(a.x), f(a.y), f(b.x), f(b.y), f(g.x), f(g.y)};
+  exact_[segments_] = segment;
+  wedges_[segments_++] = {f(a.x), f(a.y), f(b.x), f(b.y), f(segment.g.x), f(segment.g.y)};
   return true;
+}
+
+bool StarRegion::Segment::Hides(const Segment& other) const {
+  // Of a segment that was added twice, neither is before the other but for rounding.
+  constexpr double kBehind = 1 - 1e-12;
+  const auto is_behind = [&](Point2 p) {
+    return Cross(a, p) >= 0 && Cross(p, b) >= 0 && Dot(g, p) >= kBehind;
+  };
+  return is_behind(other.a) && is_behind(other.b);
 }
 
 void StarRegion::AddPiece(Point2 from, Point2 to, Point2 g) {

@@ -30,11 +30,12 @@ struct RegionMoments {
 
 class StarRegion {
  public:
-  // A hitpoint with more segments than this in its disc is not worth the search.
-  static constexpr std::size_t kMostSegments = 32;
+  // Of segments that do not hide each other.
+  static constexpr std::size_t kMostSegments = 64;
 
-  // Nothing of what lies behind the segment is in the region. False, and no change, when there is
-  // no room for another. A segment that points at the origin hides nothing.
+  // Nothing of what lies behind the segment is in the region. False when there is no room for
+  // another: then the region is of no use. A segment that points at the origin hides nothing, and
+  // one that lies behind another takes no room.
   // Requires finite ends; far ends lose precision (cut segments to the disc first).
   bool Add(Point2 a, Point2 b);
   // After the last Add, before anything below.
@@ -90,6 +91,9 @@ class StarRegion {
   std::size_t pieces_ = 0;
   struct Segment {
     Point2 a, b, g;
+
+    // Whether all of the other lies behind this one. What lies behind it is convex.
+    [[nodiscard]] bool Hides(const Segment& other) const;
   };
   std::array<Segment, kMostSegments> exact_;
   // The same for Sees.
