@@ -18,6 +18,12 @@ constexpr double kLeastShare = 0.02;
 
 // In double: segments may be a million radii long.
 bool CutDisc::AddSegment(const FeatureSegment& segment, const Frame& frame, double reach) {
+  const auto on_plane = [&](Vec3 end) {
+    const DiscPlace place = PlaceOf(end - position_);
+    return Point2{place.x, place.y};
+  };
+  // Of most segments that crowd a disc this is all that must be known.
+  if (region_.Hides(on_plane(segment.ends[0]), on_plane(segment.ends[1]))) return true;
   const auto scale = static_cast<double>(inverse_radius_);
   const Double3 a = (Double3(segment.ends[0]) - Double3(position_)) * scale;
   const Double3 along = (Double3(segment.ends[1]) - Double3(position_)) * scale + a * -1;
@@ -61,6 +67,8 @@ bool CutDisc::Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, floa
   normal_ = normal;
   inverse_radius_ = 1 / radius;
   const Frame frame(normal);
+  s_ = frame.s * inverse_radius_;
+  t_ = frame.t * inverse_radius_;
   region_.Clear();
   bool has_room = true;
   features.ForEachNear({position, normal, radius * reach, radius * kPlaneTolerance},
@@ -81,8 +89,6 @@ bool CutDisc::Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, floa
   inner_.slope_x /= kInnerShare;
   inner_.slope_y /= kInnerShare;
   if (reach > 1) FitLaplacian(static_cast<double>(reach));
-  s_ = frame.s * inverse_radius_;
-  t_ = frame.t * inverse_radius_;
   return true;
 }
 
