@@ -138,6 +138,7 @@ void Arrange(std::span<FeatureSegment> segments, std::size_t lanes) {
 
 void FeatureEdges::BuildTree() {
   if (segments_.empty()) return;
+  segments_.shrink_to_fit();
   Arrange(segments_, kLanes);
   const auto set = [](Lanes& lanes, std::size_t lane, Vec3 low, Vec3 high) {
     for (int axis = 0; axis < 3; ++axis) {
