@@ -235,7 +235,9 @@ TEST(FeatureEdgesTest, AreFoundWhereTheyAre) {
         EXPECT_EQ(found.count(&segment), 0U);
       }
     }
-    if (any_in_reach) EXPECT_TRUE(edges.HasNear(center, reach));
+    if (any_in_reach) {
+      EXPECT_TRUE(edges.HasNear(center, reach));
+    }
   }
   EXPECT_GT(found_any, 1000);
   // It ends when it is told to.
