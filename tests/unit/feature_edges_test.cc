@@ -235,9 +235,7 @@ TEST(FeatureEdgesTest, AreFoundWhereTheyAre) {
         EXPECT_EQ(found.count(&segment), 0U);
       }
     }
-    if (any_in_reach) {
-      EXPECT_TRUE(edges.HasNear(center, reach));
-    }
+    EXPECT_TRUE(!any_in_reach || edges.HasNear(center, reach));
   }
   EXPECT_GT(found_any, 1000);
   // It ends when it is told to.
