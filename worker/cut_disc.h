@@ -56,8 +56,7 @@ class CutDisc {
   [[nodiscard]] float inverse_share() const { return inverse_share_; }
 
  private:
-  // False when there is no room for it.
-  bool AddSegment(const FeatureSegment& segment, const Frame& frame, double reach);
+  void AddSegment(const FeatureSegment& segment, const Frame& frame, double reach);
   void FitLaplacian(double reach);
 
   Vec3 position_, normal_;
