@@ -1,10 +1,8 @@
 #include "worker/cut_disc.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
-#include <span>
 
 #include "render/estimate/evidence.h"
 #include "render/math/double3.h"
@@ -19,7 +17,13 @@ constexpr double kLeastShare = 0.02;
 }  // namespace
 
 // In double: segments may be a million radii long.
-void CutDisc::AddSegment(const FeatureSegment& segment, const Frame& frame, double reach) {
+bool CutDisc::AddSegment(const FeatureSegment& segment, const Frame& frame, double reach) {
+  const auto on_plane = [&](Vec3 end) {
+    const DiscPlace place = PlaceOf(end - position_);
+    return Point2{place.x, place.y};
+  };
+  // Of most segments that crowd a disc this is all that must be known.
+  if (region_.Hides(on_plane(segment.ends[0]), on_plane(segment.ends[1]))) return true;
   const auto scale = static_cast<double>(inverse_radius_);
   const Double3 a = (Double3(segment.ends[0]) - Double3(position_)) * scale;
   const Double3 along = (Double3(segment.ends[1]) - Double3(position_)) * scale + a * -1;
@@ -31,7 +35,7 @@ void CutDisc::AddSegment(const FeatureSegment& segment, const Frame& frame, doub
   const double rise = Dot(along, n);
   const auto tolerance = static_cast<double>(kPlaneTolerance);
   if (rise == 0) {
-    if (!(std::abs(height) < tolerance)) return;
+    if (!(std::abs(height) < tolerance)) return true;
   } else {
     const double enters = (-tolerance - height) / rise;
     const double leaves = (tolerance - height) / rise;
@@ -45,30 +49,33 @@ void CutDisc::AddSegment(const FeatureSegment& segment, const Frame& frame, doub
   const Point2 p = flat(a);
   const Point2 d = flat(along);
   const double dd = d.x * d.x + d.y * d.y;
-  if (!(dd > 0)) return;
+  if (!(dd > 0)) return true;
   const double middle = -(p.x * d.x + p.y * d.y) / dd;
   const Point2 nearest = {p.x + d.x * middle, p.y + d.y * middle};
   const double left = reach * reach - (nearest.x * nearest.x + nearest.y * nearest.y);
-  if (!(left > 0)) return;
+  if (!(left > 0)) return true;
   const double half = std::sqrt(left / dd);
   t0 = std::max(t0, middle - half);
   t1 = std::min(t1, middle + half);
-  if (!(t0 < t1)) return;
-  region_.Add({p.x + d.x * t0, p.y + d.y * t0}, {p.x + d.x * t1, p.y + d.y * t1});
+  if (!(t0 < t1)) return true;
+  return region_.Add({p.x + d.x * t0, p.y + d.y * t0}, {p.x + d.x * t1, p.y + d.y * t1});
 }
 
 bool CutDisc::Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, float radius,
                   float reach, KernelKind kernel) {
-  std::array<std::uint32_t, StarRegion::kMostSegments> found;
-  const std::size_t count = features.Find(position, radius * reach, found);
-  if (count == 0 || count > found.size()) return false;
   position_ = position;
   normal_ = normal;
   inverse_radius_ = 1 / radius;
   const Frame frame(normal);
+  s_ = frame.s * inverse_radius_;
+  t_ = frame.t * inverse_radius_;
   region_.Clear();
-  for (const std::uint32_t number : std::span(found).first(count))
-    AddSegment(features.segments()[number], frame, static_cast<double>(reach));
+  bool has_room = true;
+  features.ForEachNear({position, normal, radius * reach, radius * kPlaneTolerance},
+                       [&](const FeatureSegment& segment) {
+                         return has_room = AddSegment(segment, frame, static_cast<double>(reach));
+                       });
+  if (!has_room) return false;
   if (region_.segments() == 0) return false;
   region_.Finish();
 
@@ -82,8 +89,6 @@ bool CutDisc::Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, floa
   inner_.slope_x /= kInnerShare;
   inner_.slope_y /= kInnerShare;
   if (reach > 1) FitLaplacian(static_cast<double>(reach));
-  s_ = frame.s * inverse_radius_;
-  t_ = frame.t * inverse_radius_;
   return true;
 }
 

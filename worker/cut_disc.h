@@ -56,7 +56,8 @@ class CutDisc {
   [[nodiscard]] float inverse_share() const { return inverse_share_; }
 
  private:
-  void AddSegment(const FeatureSegment& segment, const Frame& frame, double reach);
+  // False when there is no room for it.
+  bool AddSegment(const FeatureSegment& segment, const Frame& frame, double reach);
   void FitLaplacian(double reach);
 
   Vec3 position_, normal_;

@@ -358,21 +358,27 @@ std::vector<GatherPiece> GatherAll(const HitpointBlock& block, const RadiusColum
         const GlossyHitpoint* lobe = is_glossy ? &*glossy++ : nullptr;
         const bool is_caustic = row >= first_caustic;
         if (is_caustic && photons.caustics == nullptr) continue;
+        // Most discs of dark places are empty, and the cut is the dearest part of a full one.
+        const RowSource& source = is_caustic ? caustic : ordinary;
+        if (photons.features != nullptr &&
+            !source.grid.HasAnyWithin(block.positions[row], radii[row] * ReachOf(kEvidence))) {
+          continue;
+        }
         const bool is_cut = photons.features != nullptr &&
                             cut.Cut(*photons.features, block.positions[row],
                                     DecodeOctahedral(block.normals_oct[row]), radii[row],
                                     ReachOf(kEvidence), GatherKernel::kKind);
-        const auto gather_row = [&](auto with_normals, auto with_cut, const RowSource& source) {
+        const auto gather_row = [&](auto with_normals, auto with_cut) {
           GatherRow<GatherKernel, kEvidence, with_normals(), with_cut()>(
               block, row, radii[row], lobe, materials, scale, source, is_cut ? &cut : nullptr,
               piece, sums);
         };
         if (is_caustic) {
-          is_cut ? gather_row(std::true_type(), std::true_type(), caustic)
-                 : gather_row(std::true_type(), std::false_type(), caustic);
+          is_cut ? gather_row(std::true_type(), std::true_type())
+                 : gather_row(std::true_type(), std::false_type());
         } else {
-          is_cut ? gather_row(std::bool_constant<kNormals>(), std::true_type(), ordinary)
-                 : gather_row(std::bool_constant<kNormals>(), std::false_type(), ordinary);
+          is_cut ? gather_row(std::bool_constant<kNormals>(), std::true_type())
+                 : gather_row(std::bool_constant<kNormals>(), std::false_type());
         }
       }
     }

@@ -65,8 +65,15 @@ class PhotonGrid {
   // Calls visit(photon, squared distance) for every photon closer to `center` than `radius`.
   template <typename Visit>
   void ForEachWithin(Vec3 center, float radius, const Visit& visit) const;
+  // Whether there is any such photon.
+  [[nodiscard]] bool HasAnyWithin(Vec3 center, float radius) const;
 
  private:
+  // Calls visit(first photon, their distances, mask) for up to eight photons at a time, where the
+  // mask has a bit for each of them that is closer than `radius`, at least one, until it returns
+  // true.
+  template <typename Visit>
+  void ForEachEight(Vec3 center, float radius, const Visit& visit) const;
   [[nodiscard]] int CellOf(float offset, int cells) const {
     const float cell = offset * inverse_cell_;
     return cell > 0 ? std::min(static_cast<int>(std::min(cell, 1e9F)), cells - 1) : 0;

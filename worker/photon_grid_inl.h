@@ -10,7 +10,7 @@
 namespace lucerna {
 
 template <typename Visit>
-void PhotonGrid::ForEachWithin(Vec3 center, float radius, const Visit& visit) const {
+void PhotonGrid::ForEachEight(Vec3 center, float radius, const Visit& visit) const {
   if (size_ == 0) return;
   const float squared_radius = radius * radius;
   const int x0 = CellOf(center.x - radius - low_.x, nx_);
@@ -41,16 +41,31 @@ void PhotonGrid::ForEachWithin(Vec3 center, float radius, const Visit& visit) co
         // Lanes beyond the run belong to the next cells.
         if (end - i < 8) mask &= (1U << (end - i)) - 1U;
         if (mask == 0) continue;
-        alignas(32) float distances[8];
-        _mm256_store_ps(distances, squared);
-        while (mask != 0) {
-          const auto lane = static_cast<std::size_t>(std::countr_zero(mask));
-          mask &= mask - 1;
-          visit(i + lane, distances[lane]);
-        }
+        if (visit(i, squared, mask)) return;
       }
     }
   }
+}
+
+template <typename Visit>
+void PhotonGrid::ForEachWithin(Vec3 center, float radius, const Visit& visit) const {
+  ForEachEight(center, radius, [&](std::size_t first, __m256 squared, unsigned int mask) {
+    alignas(32) float distances[8];
+    _mm256_store_ps(distances, squared);
+    while (mask != 0) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(mask));
+      mask &= mask - 1;
+      visit(first + lane, distances[lane]);
+    }
+    return false;
+  });
+}
+
+inline bool PhotonGrid::HasAnyWithin(Vec3 center, float radius) const {
+  bool has_any = false;
+  ForEachEight(center, radius, [&](std::size_t /*first*/, __m256 /*squared*/,
+                                   unsigned int /*mask*/) { return has_any = true; });
+  return has_any;
 }
 
 }  // namespace lucerna

@@ -25,10 +25,8 @@ constexpr double kTreeInstance = 430;
 constexpr double kBuildingPrimitive = 36;  // beside the tree
 // Of the set of lights.
 constexpr double kEmitter = 48;
-// Of feature edges: a segment, with the grids; the least when there are any; and while they are
-// found.
-constexpr double kSegment = 70;
-constexpr double kFewestSegments = 1.2e6;
+// Of feature edges: a segment, with the tree; and while they are found.
+constexpr double kSegment = 52;
 constexpr double kEdgesPerTriangle = 77, kEdgesPerVertex = 28, kEdgesPerMesh = 24;
 // Of the analysis of what a job needs: a triangle, a vertex, a mesh, and a triangle of a closed
 // surface.
@@ -130,7 +128,7 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
     memory.at_another_time =
         memory.shapes + memory.acceleration + memory.building_trees + memory.lights;
   }
-  if (open_edges > 0) memory.edges = std::max(kFewestSegments, kSegment * open_edges);
+  memory.edges = kSegment * open_edges;
 
   // A picture is in memory once, however many refer to it.
   std::set<const Picture*> pictures;

@@ -32,6 +32,9 @@ double AngleBetween(Point2 from, Point2 to) {
   return angle < -1e-14 ? angle + 2 * std::numbers::pi : std::max(angle, 0.0);
 }
 
+// g·x of what lies behind a segment, but for rounding.
+constexpr float kBehind = 1 - 1e-6F;
+
 // Calls visit(y, weight) for the nodes of [y0, y1].
 template <typename Visit>
 void Quadrature(std::span<const QuadratureNode> nodes, double y0, double y1, const Visit& visit) {
@@ -45,6 +48,64 @@ void Quadrature(std::span<const QuadratureNode> nodes, double y0, double y1, con
 
 }  // namespace
 
+// What lies behind a segment is convex: all of another one is there when both of its ends are. In
+// float: a segment that is before another by no more than rounding may go, and the same one twice
+// must.
+bool StarRegion::Hides(Point2 a, Point2 b) const {
+  const auto px = static_cast<float>(a.x), py = static_cast<float>(a.y);
+  const auto qx = static_cast<float>(b.x), qy = static_cast<float>(b.y);
+  for (std::size_t block = 0; block < blocks(); ++block) {
+    const Wedges& w = wedges_[block];
+    const __m256 ax = LoadLanes(w.ax), ay = LoadLanes(w.ay);
+    const __m256 bx = LoadLanes(w.bx), by = LoadLanes(w.by);
+    const __m256 gx = LoadLanes(w.gx), gy = LoadLanes(w.gy);
+    const auto hides = (ax * py - ay * px >= 0) & (px * by - py * bx >= 0) &
+                       (gx * px + gy * py >= kBehind) & (ax * qy - ay * qx >= 0) &
+                       (qx * by - qy * bx >= 0) & (gx * qx + gy * qy >= kBehind);
+    if (LaneBits(hides) != 0) return true;
+  }
+  return false;
+}
+
+void StarRegion::RemoveHiddenBy(const Segment& segment) {
+  const auto f = [](double x) { return static_cast<float>(x); };
+  const float ax = f(segment.a.x), ay = f(segment.a.y);
+  const float bx = f(segment.b.x), by = f(segment.b.y);
+  const float gx = f(segment.g.x), gy = f(segment.g.y);
+  std::array<unsigned int, kMostSegments / kLanes> hidden;
+  unsigned int any = 0;
+  for (std::size_t block = 0; block < blocks(); ++block) {
+    const Wedges& w = wedges_[block];
+    const auto is_behind = [&](__m256 x, __m256 y) {
+      return (ax * y - ay * x >= 0) & (x * by - y * bx >= 0) & (gx * x + gy * y >= kBehind);
+    };
+    hidden[block] = LaneBits(is_behind(LoadLanes(w.ax), LoadLanes(w.ay)) &
+                             is_behind(LoadLanes(w.bx), LoadLanes(w.by)));
+    any |= hidden[block];
+  }
+  if (any == 0) return;
+  const std::size_t before = segments_;
+  segments_ = 0;
+  for (std::size_t i = 0; i < before; ++i) {
+    if ((hidden[i / kLanes] >> (i % kLanes) & 1U) == 0) Set(segments_++, exact_[i]);
+  }
+  for (std::size_t i = segments_; i < before; ++i)
+    Set(i, {});
+}
+
+void StarRegion::Set(std::size_t number, const Segment& segment) {
+  const auto f = [](double x) { return static_cast<float>(x); };
+  exact_[number] = segment;
+  Wedges& w = wedges_[number / kLanes];
+  const std::size_t lane = number % kLanes;
+  w.ax[lane] = f(segment.a.x);
+  w.ay[lane] = f(segment.a.y);
+  w.bx[lane] = f(segment.b.x);
+  w.by[lane] = f(segment.b.y);
+  w.gx[lane] = f(segment.g.x);
+  w.gy[lane] = f(segment.g.y);
+}
+
 bool StarRegion::Add(Point2 a, Point2 b) {
   double cross = Cross(a, b);
   if (cross < 0) {
@@ -53,11 +114,12 @@ bool StarRegion::Add(Point2 a, Point2 b) {
   }
   const Point2 along = {b.x - a.x, b.y - a.y};
   if (!(cross > 1e-12 * Dot(along, along)) || !(cross > 1e-30)) return true;
+  if (Hides(a, b)) return true;
+  const Segment segment = {a, b, {along.y / cross, -along.x / cross}};
+  RemoveHiddenBy(segment);
   if (segments_ == kMostSegments) return false;
-  const Point2 g = {along.y / cross, -along.x / cross};
-  exact_[segments_] = {a, b, g};
-  const auto f = [](double x) { return static_cast<float>(x); };
-  wedges_[segments_++] = {f(a.x), f(a.y), f(b.x), f(b.y), f(g.x), f(g.y)};
+  if (segments_ % kLanes == 0) wedges_[segments_ / kLanes] = {};
+  Set(segments_++, segment);
   return true;
 }
 

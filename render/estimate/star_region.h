@@ -12,6 +12,7 @@
 #include <array>
 #include <cstddef>
 
+#include "render/math/float_lanes.h"
 #include "render/math/kernel.h"
 
 namespace lucerna {
@@ -30,13 +31,16 @@ struct RegionMoments {
 
 class StarRegion {
  public:
-  // A hitpoint with more segments than this in its disc is not worth the search.
-  static constexpr std::size_t kMostSegments = 32;
+  // Of segments that do not hide each other.
+  static constexpr std::size_t kMostSegments = 64;
 
-  // Nothing of what lies behind the segment is in the region. False, and no change, when there is
-  // no room for another. A segment that points at the origin hides nothing.
+  // Nothing of what lies behind the segment is in the region. False when there is no room for
+  // another: then the region is of no use. A segment that points at the origin hides nothing, and
+  // one that lies behind another takes no room.
   // Requires finite ends; far ends lose precision (cut segments to the disc first).
   bool Add(Point2 a, Point2 b);
+  // Whether all of a segment lies behind one that was added: then Add would change nothing.
+  [[nodiscard]] bool Hides(Point2 a, Point2 b) const;
   // After the last Add, before anything below.
   void Finish();
   void Clear() { segments_ = pieces_ = 0; }
@@ -45,12 +49,14 @@ class StarRegion {
 
   // Whether no segment lies between the origin and the point.
   [[nodiscard]] bool Sees(float x, float y) const {
-    bool is_hidden = false;
-    for (std::size_t i = 0; i < segments_; ++i) {
-      const Wedge& w = wedges_[i];
-      is_hidden |= w.ax * y - w.ay * x > 0 && x * w.by - y * w.bx > 0 && w.gx * x + w.gy * y > 1;
+    for (std::size_t block = 0; block < blocks(); ++block) {
+      const Wedges& w = wedges_[block];
+      const auto hidden = (LoadLanes(w.ax) * y - LoadLanes(w.ay) * x > 0) &
+                          (x * LoadLanes(w.by) - y * LoadLanes(w.bx) > 0) &
+                          (LoadLanes(w.gx) * x + LoadLanes(w.gy) * y > 1);
+      if (LaneBits(hidden) != 0) return false;
     }
-    return !is_hidden;
+    return true;
   }
 
   // Moments of K(|x|²) over the part of the region within `scale`, where K is the kernel's shape
@@ -66,9 +72,11 @@ class StarRegion {
   [[nodiscard]] PowerMoments PowerMomentsOf(double scale) const;
 
  private:
-  // The cone between directions a and b (counter-clockwise), and the line g·x = 1 across it.
-  struct Wedge {
-    float ax, ay, bx, by, gx, gy;
+  static constexpr std::size_t kLanes = 8;
+  // Of each of eight segments the cone between its ends a and b (counter-clockwise) and the line
+  // g·x = 1 across it. Those that there are not are 0 and hide nothing.
+  struct Wedges {
+    alignas(32) std::array<float, kLanes> ax{}, ay{}, bx{}, by{}, gx{}, gy{};
   };
   // Between two directions (unit, counter-clockwise) the region ends at the line g·x = 1; with
   // g = 0 it does not end.
@@ -91,9 +99,13 @@ class StarRegion {
   struct Segment {
     Point2 a, b, g;
   };
+  [[nodiscard]] std::size_t blocks() const { return (segments_ + kLanes - 1) / kLanes; }
+  void Set(std::size_t number, const Segment& segment);
+  void RemoveHiddenBy(const Segment& segment);
+
   std::array<Segment, kMostSegments> exact_;
-  // The same for Sees.
-  std::array<Wedge, kMostSegments> wedges_;
+  // The same, eight at a time.
+  std::array<Wedges, kMostSegments / kLanes> wedges_;
   std::array<Piece, kMostPieces> all_pieces_;
 };
 

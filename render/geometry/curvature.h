@@ -14,6 +14,7 @@
 // exactly (within the range of float).
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -67,5 +68,10 @@ class SurfaceCurvature {
   std::vector<std::int64_t> first_;  // [meshes] into bendings_; negative: flat
   std::vector<Bending> bendings_;
 };
+
+// The least radius of curvature of the surface at the point, of any direction and either side: of a
+// mesh with vertex normals as far as they turn along the sides of its triangle. HUGE_VALF where the
+// surface is flat. Nothing needs to be prepared for it. Threads: any.
+[[nodiscard]] float LeastBendRadius(const Scene& scene, const SurfacePoint& point);
 
 }  // namespace lucerna

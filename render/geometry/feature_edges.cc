@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <type_traits>
 #include <utility>
+
+#include <immintrin.h>
 
 #include "render/math/double3.h"
 #include "render/scene/mesh_edges.h"
@@ -12,22 +15,6 @@
 
 namespace lucerna {
 namespace {
-
-// Of the finest grid, about. A room of few edges has cells of a 64th of its size.
-constexpr double kFewestCells = 0x1p18;
-constexpr double kMostCells = 0x1p23;
-constexpr double kCellsPerSegment = 8;
-// A query that meets more is as good as lost in foliage.
-constexpr std::size_t kMostCandidates = 512;
-
-// Squared, relative to `reach` squared, so that nothing leaves the range of a float.
-float SquaredDistance(Vec3 center, const FeatureSegment& segment, float inverse_reach) {
-  const Vec3 a = (segment.ends[0] - center) * inverse_reach;
-  const Vec3 along = (segment.ends[1] - segment.ends[0]) * inverse_reach;
-  const float squared = LengthSquared(along);
-  const float t = squared > 0 ? std::clamp(-Dot(a, along) / squared, 0.0F, 1.0F) : 0.0F;
-  return LengthSquared(a + along * t);
-}
 
 // Whether a surface goes on across an edge: two faces, or several that lie on each other, that
 // leave it in nearly opposite directions.
@@ -58,11 +45,11 @@ FeatureEdges::FeatureEdges(const Scene& scene) {
   segments_.insert(segments_.end(), crossings.begin(), crossings.end());
   for (const auto& border : scene.sensor_borders)
     segments_.push_back({border});
-  BuildLevels();
+  BuildTree();
 }
 
 FeatureEdges::FeatureEdges(std::vector<FeatureSegment> segments) : segments_(std::move(segments)) {
-  BuildLevels();
+  BuildTree();
 }
 
 void FeatureEdges::AddMeshEdges(const Scene& scene) {
@@ -121,122 +108,169 @@ void FeatureEdges::AddMeshEdges(const Scene& scene) {
   });
 }
 
-// Steps along the longest axis, a cell at a time: what lies between two steps is in few cells
-// across. A little wider than the segment, for rounding.
-template <typename Visit>
-void FeatureEdges::ForEachCell(const Level& level, const FeatureSegment& segment,
-                               const Visit& visit) const {
-  const Vec3 a = segment.ends[0] - low_;
-  const Vec3 along = segment.ends[1] - segment.ends[0];
-  const float slack = 1e-3F * level.width;
-  const Vec3 size = {std::abs(along.x), std::abs(along.y), std::abs(along.z)};
-  const int major = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
-  const auto at = [&](float t) { return a + along * t; };
-  const float start = std::min(a[major], a[major] + along[major]);
-  const float end = std::max(a[major], a[major] + along[major]);
-  const int first = level.CellOf(major, start - slack);
-  const int last = level.CellOf(major, end + slack);
-  for (int step = first; step <= last; ++step) {
-    float t0 = 0;
-    float t1 = 1;
-    if (along[major] != 0 && first != last) {
-      const auto t_at = [&](float offset) {
-        return std::clamp((offset - a[major]) / along[major], 0.0F, 1.0F);
-      };
-      t0 = t_at(static_cast<float>(step) * level.width - slack);
-      t1 = t_at(static_cast<float>(step + 1) * level.width + slack);
-    }
-    const Vec3 p = at(t0);
-    const Vec3 q = at(t1);
-    std::array<std::array<int, 2>, 3> range;
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto i = static_cast<std::size_t>(axis);
-      range[i] = {level.CellOf(axis, std::min(p[axis], q[axis]) - slack),
-                  level.CellOf(axis, std::max(p[axis], q[axis]) + slack)};
-    }
-    range[static_cast<std::size_t>(major)] = {step, step};
-    for (int z = range[2][0]; z <= range[2][1]; ++z) {
-      for (int y = range[1][0]; y <= range[1][1]; ++y) {
-        for (int x = range[0][0]; x <= range[0][1]; ++x)
-          visit(level.Row(y, z) + static_cast<std::size_t>(x));
-      }
-    }
-  }
-}
+namespace {
 
-void FeatureEdges::BuildLevels() {
-  if (segments_.empty()) return;
+// Sorts segments so that each eight that follow each other are near each other, each eight of such
+// groups too, and so on.
+void Arrange(std::span<FeatureSegment> segments, std::size_t lanes) {
+  if (segments.size() <= lanes) return;
+  std::size_t of_child = lanes;
+  while (of_child * lanes < segments.size())
+    of_child *= lanes;
+  const std::size_t children = (segments.size() + of_child - 1) / of_child;
+  const auto half = static_cast<std::ptrdiff_t>(children / 2 * of_child);
+  const auto middle = [](const FeatureSegment& s) { return s.ends[0] * 0.5F + s.ends[1] * 0.5F; };
   Bounds bounds;
-  for (const FeatureSegment& segment : segments_) {
-    bounds.Add(segment.ends[0]);
-    bounds.Add(segment.ends[1]);
-  }
-  low_ = bounds.low;
-  const Vec3 extent = bounds.high - bounds.low;
-  const double wanted = std::clamp(kCellsPerSegment * static_cast<double>(segments_.size()),
-                                   kFewestCells, kMostCells);
-  double width = static_cast<double>(MaxAbs(extent)) / 4096;
-  if (!(width > 0)) width = 1;
-  const auto cells_along = [](float size, double w) {
-    return std::floor(static_cast<double>(size) / w) + 1;
+  for (const FeatureSegment& segment : segments)
+    bounds.Add(middle(segment));
+  const Vec3 size = bounds.high - bounds.low;
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  std::nth_element(segments.begin(), segments.begin() + half, segments.end(),
+                   [&](const FeatureSegment& a, const FeatureSegment& b) {
+                     return middle(a)[axis] < middle(b)[axis];
+                   });
+  const auto first = static_cast<std::size_t>(half);
+  Arrange(segments.first(first), lanes);
+  Arrange(segments.subspan(first), lanes);
+}
+
+}  // namespace
+
+void FeatureEdges::BuildTree() {
+  if (segments_.empty()) return;
+  segments_.shrink_to_fit();
+  Arrange(segments_, kLanes);
+  const auto set = [](Lanes& lanes, std::size_t lane, Vec3 low, Vec3 high) {
+    for (int axis = 0; axis < 3; ++axis) {
+      lanes.low[static_cast<std::size_t>(axis)][lane] = low[axis];
+      lanes.high[static_cast<std::size_t>(axis)][lane] = high[axis];
+    }
   };
-  while (cells_along(extent.x, width) * cells_along(extent.y, width) *
-             cells_along(extent.z, width) >
-         wanted) {
-    width *= 1.1;
-  }
-  for (;; width *= 2) {
-    Level& level = levels_.emplace_back();
-    level.width = static_cast<float>(width);
-    level.inverse_width = static_cast<float>(1 / width);
-    level.cells = {static_cast<int>(cells_along(extent.x, width)),
-                   static_cast<int>(cells_along(extent.y, width)),
-                   static_cast<int>(cells_along(extent.z, width))};
-    const std::size_t cells = static_cast<std::size_t>(level.cells[0]) *
-                              static_cast<std::size_t>(level.cells[1]) *
-                              static_cast<std::size_t>(level.cells[2]);
-    level.first.assign(cells + 1, 0);
-    for (const FeatureSegment& segment : segments_)
-      ForEachCell(level, segment, [&](std::size_t cell) { ++level.first[cell]; });
-    // Counts become ends, and ends, counted down while cells are filled, beginnings.
-    std::uint64_t sum = 0;
-    for (std::uint32_t& count : level.first) {
-      sum += count;
-      count = static_cast<std::uint32_t>(sum);
+  const auto groups = [](std::size_t count) { return (count + kLanes - 1) / kLanes; };
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  Lanes none;
+  for (std::size_t lane = 0; lane < kLanes; ++lane)
+    set(none, lane, {kFar, kFar, kFar}, {kFar, kFar, kFar});
+  levels_.emplace_back(groups(segments_.size()), none);
+  for (std::size_t i = 0; i < segments_.size(); ++i)
+    set(levels_[0][i / kLanes], i % kLanes, segments_[i].ends[0], segments_[i].ends[1]);
+  while (levels_.back().size() > 1) {
+    const std::vector<Lanes>& below = levels_.back();
+    std::vector<Lanes> level(groups(below.size()), none);
+    for (std::size_t i = 0; i < below.size(); ++i) {
+      Bounds bounds;
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        const auto corner = [&](const std::array<std::array<float, kLanes>, 3>& of) {
+          return Vec3{of[0][lane], of[1][lane], of[2][lane]};
+        };
+        if (corner(below[i].low).x == kFar) continue;
+        bounds.Add(corner(below[i].low));
+        bounds.Add(corner(below[i].high));
+      }
+      set(level[i / kLanes], i % kLanes, bounds.low, bounds.high);
     }
-    level.segments.resize(sum);
-    for (std::size_t i = segments_.size(); i-- > 0;) {
-      ForEachCell(level, segments_[i], [&](std::size_t cell) {
-        level.segments[--level.first[cell]] = static_cast<std::uint32_t>(i);
-      });
-    }
-    if (cells == 1) break;
+    levels_.push_back(std::move(level));
   }
 }
 
-std::size_t FeatureEdges::Search(const Level& grid, Vec3 center, float reach, std::array<int, 2> x,
-                                 std::array<int, 2> y, std::array<int, 2> z,
-                                 std::span<std::uint32_t> found) const {
-  const float inverse_reach = 1 / reach;
-  std::size_t count = 0;
-  std::size_t candidates = 0;
-  for (int k = z[0]; k <= z[1]; ++k) {
-    for (int j = y[0]; j <= y[1]; ++j) {
-      const std::size_t row = grid.Row(j, k);
-      const std::uint32_t begin = grid.first[row + static_cast<std::size_t>(x[0])];
-      const std::uint32_t end = grid.first[row + static_cast<std::size_t>(x[1]) + 1];
-      for (std::uint32_t i = begin; i < end; ++i) {
-        if (++candidates > kMostCandidates) return found.size() + 1;
-        const std::uint32_t number = grid.segments[i];
-        if (!(SquaredDistance(center, segments_[number], inverse_reach) < 1)) continue;
-        const auto seen = found.first(count);
-        if (std::ranges::find(seen, number) != seen.end()) continue;
-        if (count == found.size()) return found.size() + 1;
-        found[count++] = number;
-      }
-    }
-  }
-  return count;
+namespace {
+
+struct Vec3Lanes {
+  __m256 x, y, z;
+};
+
+Vec3Lanes All(Vec3 a) {
+  return {_mm256_set1_ps(a.x), _mm256_set1_ps(a.y), _mm256_set1_ps(a.z)};
+}
+Vec3Lanes Load(const std::array<std::array<float, 8>, 3>& of) {
+  return {_mm256_load_ps(of[0].data()), _mm256_load_ps(of[1].data()), _mm256_load_ps(of[2].data())};
+}
+Vec3Lanes operator-(const Vec3Lanes& a, const Vec3Lanes& b) {
+  return {_mm256_sub_ps(a.x, b.x), _mm256_sub_ps(a.y, b.y), _mm256_sub_ps(a.z, b.z)};
+}
+Vec3Lanes operator+(const Vec3Lanes& a, const Vec3Lanes& b) {
+  return {_mm256_add_ps(a.x, b.x), _mm256_add_ps(a.y, b.y), _mm256_add_ps(a.z, b.z)};
+}
+Vec3Lanes operator*(const Vec3Lanes& a, __m256 s) {
+  return {_mm256_mul_ps(a.x, s), _mm256_mul_ps(a.y, s), _mm256_mul_ps(a.z, s)};
+}
+__m256 Dot(const Vec3Lanes& a, const Vec3Lanes& b) {
+  return _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(a.x, b.x), _mm256_mul_ps(a.y, b.y)),
+                       _mm256_mul_ps(a.z, b.z));
+}
+__m256 Abs(__m256 a) {
+  return _mm256_andnot_ps(_mm256_set1_ps(-0.0F), a);
+}
+__m256 MaxAbs(const Vec3Lanes& a) {
+  return _mm256_max_ps(_mm256_max_ps(Abs(a.x), Abs(a.y)), Abs(a.z));
+}
+unsigned int Bits(__m256 mask) {
+  return static_cast<unsigned int>(_mm256_movemask_ps(mask));
+}
+
+// Of what is added to a height, relative to the lengths that it is computed from, for rounding.
+constexpr float kHeightRounding = 1e-6F;
+
+}  // namespace
+
+// Relative to `reach`, so that squares do not leave the range of a float.
+unsigned int FeatureEdges::SegmentsNear(const Lanes& segments, const DiscSlab& slab) {
+  const __m256 zero = _mm256_setzero_ps();
+  const __m256 one = _mm256_set1_ps(1);
+  const __m256 scale = _mm256_set1_ps(1 / slab.reach);
+  const Vec3Lanes center = All(slab.center);
+  const Vec3Lanes a = (Load(segments.low) - center) * scale;
+  const Vec3Lanes b = (Load(segments.high) - center) * scale;
+  const Vec3Lanes normal = All(slab.normal);
+  const __m256 height_a = Dot(a, normal);
+  const __m256 height_b = Dot(b, normal);
+  const __m256 height = _mm256_add_ps(
+      _mm256_set1_ps(slab.height / slab.reach),
+      _mm256_mul_ps(_mm256_set1_ps(kHeightRounding), _mm256_add_ps(MaxAbs(a), MaxAbs(b))));
+  const __m256 lower = _mm256_min_ps(height_a, height_b);
+  const __m256 higher = _mm256_max_ps(height_a, height_b);
+  const __m256 in_slab =
+      _mm256_and_ps(_mm256_cmp_ps(lower, height, _CMP_LE_OQ),
+                    _mm256_cmp_ps(higher, _mm256_sub_ps(zero, height), _CMP_GE_OQ));
+  if (Bits(in_slab) == 0) return 0;
+  const Vec3Lanes along = b - a;
+  const __m256 squared = Dot(along, along);
+  const __m256 share = _mm256_div_ps(_mm256_sub_ps(zero, Dot(a, along)), squared);
+  // A segment without length is where it begins: the maximum of no number and 0 is 0.
+  const __m256 t = _mm256_min_ps(_mm256_max_ps(share, zero), one);
+  const Vec3Lanes nearest = a + along * t;
+  return Bits(_mm256_and_ps(in_slab, _mm256_cmp_ps(Dot(nearest, nearest), one, _CMP_LT_OQ)));
+}
+
+unsigned int FeatureEdges::BoxesNear(const Lanes& boxes, const DiscSlab& slab) {
+  const __m256 zero = _mm256_setzero_ps();
+  const __m256 one = _mm256_set1_ps(1 + 1e-5F);
+  const __m256 scale = _mm256_set1_ps(1 / slab.reach);
+  const Vec3Lanes center = All(slab.center);
+  const Vec3Lanes low = (Load(boxes.low) - center) * scale;
+  const Vec3Lanes high = (Load(boxes.high) - center) * scale;
+  const auto beyond = [&](__m256 from, __m256 to) {
+    return _mm256_max_ps(_mm256_max_ps(from, _mm256_sub_ps(zero, to)), zero);
+  };
+  const Vec3Lanes outside = {beyond(low.x, high.x), beyond(low.y, high.y), beyond(low.z, high.z)};
+  const __m256 in_reach = _mm256_cmp_ps(Dot(outside, outside), one, _CMP_LT_OQ);
+  // The lowest and the highest corner.
+  const auto lower = [](__m256 from, __m256 to, float n) {
+    const __m256 by = _mm256_set1_ps(n);
+    return _mm256_mul_ps(n >= 0 ? from : to, by);
+  };
+  const Vec3 n = slab.normal;
+  const __m256 lowest = _mm256_add_ps(
+      _mm256_add_ps(lower(low.x, high.x, n.x), lower(low.y, high.y, n.y)), lower(low.z, high.z, n.z));
+  const __m256 highest = _mm256_add_ps(
+      _mm256_add_ps(lower(high.x, low.x, n.x), lower(high.y, low.y, n.y)), lower(high.z, low.z, n.z));
+  const __m256 height = _mm256_add_ps(
+      _mm256_set1_ps(slab.height / slab.reach),
+      _mm256_mul_ps(_mm256_set1_ps(kHeightRounding), _mm256_add_ps(MaxAbs(low), MaxAbs(high))));
+  const __m256 in_slab =
+      _mm256_and_ps(_mm256_cmp_ps(lowest, height, _CMP_LE_OQ),
+                    _mm256_cmp_ps(highest, _mm256_sub_ps(zero, height), _CMP_GE_OQ));
+  return Bits(_mm256_and_ps(in_reach, in_slab));
 }
 
 }  // namespace lucerna

@@ -14,11 +14,13 @@
 // them, so cutting too much costs noise and no bias. So near misses (corners that are equal but for
 // rounding, neighbours that do not share their corners) need no care.
 //
-// Segments are found by uniform grids of several widths, one inside the other: a query looks at the
-// one whose cells are about as wide as its ball.
+// Segments are found by a tree of boxes with eight children each, of which a query tests all at
+// once. (Grids of cells had, in a scene much wider than a disc, hundreds of segments in a cell.)
 #pragma once
 
 #include <array>
+#include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -33,75 +35,82 @@ namespace lucerna {
 // Surfaces turned less than this from each other count as one.
 inline constexpr float kSameSurfaceCosine = 0.7F;
 
-// Memory: 24 bytes a segment and about 40 in the grids, at least 1.2 MB when there are any; while
-// it is built 24 per vertex and 40 per triangle of the scene.
+// A disc with what bends it out of its plane: what lies closer to its center than `reach` and
+// closer to the plane through it than `height`.
+struct DiscSlab {
+  Vec3 center;
+  Vec3 normal;  // unit
+  float reach = 0;
+  float height = 0;
+};
+
+// Memory: 24 bytes a segment and about 28 in the tree; while it is built 24 per vertex and 40 per
+// triangle of the scene.
 class FeatureEdges {
  public:
   explicit FeatureEdges(const Scene& scene);
   // For tests.
   explicit FeatureEdges(std::vector<FeatureSegment> segments);
 
+  // In an order of their own.
   [[nodiscard]] std::span<const FeatureSegment> segments() const { return segments_; }
   [[nodiscard]] bool empty() const { return segments_.empty(); }
 
-  // Writes the numbers of the segments closer to `center` than `reach` to `found`, each once, in an
-  // order that depends on the arguments alone. Returns how many there are; more than found.size()
-  // when not all had room, or when there were too many to go through. Threads: any.
-  [[nodiscard]] std::size_t Find(Vec3 center, float reach, std::span<std::uint32_t> found) const {
-    if (levels_.empty()) return 0;
-    std::size_t level = 0;
-    while (level + 1 < levels_.size() && levels_[level].width < 2 * reach)
-      ++level;
-    const Level& grid = levels_[level];
-    const std::array<int, 2> x = grid.Range(0, center.x - low_.x, reach);
-    const std::array<int, 2> y = grid.Range(1, center.y - low_.y, reach);
-    const std::array<int, 2> z = grid.Range(2, center.z - low_.z, reach);
-    std::uint32_t any = 0;
-    for (int k = z[0]; k <= z[1]; ++k) {
-      for (int j = y[0]; j <= y[1]; ++j) {
-        const std::size_t row = grid.Row(j, k);
-        any |= grid.first[row + static_cast<std::size_t>(x[1]) + 1] -
-               grid.first[row + static_cast<std::size_t>(x[0])];
+  // Calls visit(segment) for each segment of which a part lies within `reach` and of which a part,
+  // not always the same, lies within `height`, and for a few that come so near but for rounding, in
+  // an order that depends on the arguments alone, until it returns false. Threads: any.
+  template <typename Visit>
+  void ForEachNear(const DiscSlab& slab, const Visit& visit) const {
+    if (levels_.empty()) return;
+    struct Group {
+      std::uint32_t level, number;
+    };
+    std::array<Group, kLanes * kMostLevels> open;
+    std::size_t count = 0;
+    open[count++] = {static_cast<std::uint32_t>(levels_.size() - 1), 0};
+    while (count > 0) {
+      const Group group = open[--count];
+      const Lanes& lanes = levels_[group.level][group.number];
+      for (unsigned int near = group.level == 0 ? SegmentsNear(lanes, slab) : BoxesNear(lanes, slab);
+           near != 0; near &= near - 1) {
+        const auto child = static_cast<std::uint32_t>(kLanes * group.number) +
+                           static_cast<std::uint32_t>(std::countr_zero(near));
+        if (group.level > 0) {
+          open[count++] = {group.level - 1, child};
+        } else if (!visit(segments_[child])) {
+          return;
+        }
       }
     }
-    if (any == 0) return 0;
-    return Search(grid, center, reach, x, y, z, found);
+  }
+  // Whether any segment comes closer to `center` than `reach`.
+  [[nodiscard]] bool HasNear(Vec3 center, float reach) const {
+    bool has_any = false;
+    ForEachNear({center, {0, 0, 1}, reach, HUGE_VALF},
+                [&](const FeatureSegment&) { return !(has_any = true); });
+    return has_any;
   }
 
  private:
-  struct Level {
-    float width = 0;
-    float inverse_width = 0;
-    std::array<int, 3> cells = {1, 1, 1};
-    std::vector<std::uint32_t> first;     // [cells + 1] into `segments`
-    std::vector<std::uint32_t> segments;  // of each cell, ascending
-
-    [[nodiscard]] std::array<int, 2> Range(int axis, float offset, float reach) const {
-      return {CellOf(axis, offset - reach), CellOf(axis, offset + reach)};
-    }
-    [[nodiscard]] int CellOf(int axis, float offset) const {
-      const float cell = offset * inverse_width;
-      const int last = cells[static_cast<std::size_t>(axis)] - 1;
-      return cell > 0 ? (cell < static_cast<float>(last) ? static_cast<int>(cell) : last) : 0;
-    }
-    [[nodiscard]] std::size_t Row(int y, int z) const {
-      return (static_cast<std::size_t>(z) * static_cast<std::size_t>(cells[1]) +
-              static_cast<std::size_t>(y)) *
-             static_cast<std::size_t>(cells[0]);
-    }
+  static constexpr std::size_t kLanes = 8;
+  // Enough for 2^33 segments.
+  static constexpr std::size_t kMostLevels = 11;
+  // Of eight segments the ends, or of eight boxes the corners; those that there are not are far
+  // away. By axis.
+  struct alignas(32) Lanes {
+    std::array<std::array<float, kLanes>, 3> low, high;
   };
 
   void AddMeshEdges(const Scene& scene);
-  void BuildLevels();
-  template <typename Visit>
-  void ForEachCell(const Level& level, const FeatureSegment& segment, const Visit& visit) const;
-  [[nodiscard]] std::size_t Search(const Level& grid, Vec3 center, float reach,
-                                   std::array<int, 2> x, std::array<int, 2> y, std::array<int, 2> z,
-                                   std::span<std::uint32_t> found) const;
+  void BuildTree();
+  // A bit for each that is near.
+  [[nodiscard]] static unsigned int SegmentsNear(const Lanes& segments, const DiscSlab& slab);
+  [[nodiscard]] static unsigned int BoxesNear(const Lanes& boxes, const DiscSlab& slab);
 
   std::vector<FeatureSegment> segments_;
-  Vec3 low_;
-  std::vector<Level> levels_;
+  // The first is that of the segments, the last has one group. The boxes of a level hold the groups
+  // of the one before.
+  std::vector<std::vector<Lanes>> levels_;
 };
 
 }  // namespace lucerna

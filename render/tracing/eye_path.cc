@@ -5,6 +5,7 @@
 #include <numbers>
 #include <optional>
 
+#include "render/geometry/curvature.h"
 #include "render/math/equal_area_square.h"
 #include "render/math/octahedral.h"
 #include "render/math/warp.h"
@@ -17,6 +18,11 @@ namespace {
 
 // Eye paths weaker than this end by roulette more often than they go on.
 constexpr float kRouletteWeight = 0.5F;
+// What lies within a disc of this many radii of curvature on a round surface is turned by less than
+// 45 degrees from its middle: 2 sin(45°/2).
+constexpr float kMostBend = 0.765F;
+// But a first disc is no narrower than so many pixels: what is thinner than a pixel would be noise.
+constexpr float kLeastFootprints = 1;
 // Branches of the specular tree weaker than `BranchWeight` end by roulette. What survives and finds
 // the brightest light adds no more than kWhite times the mean radiance of the scene, so that a
 // small light seen by way of several inner reflections of glass (about 0.04 each) is no bright
@@ -505,6 +511,13 @@ EyePath EyePathTracer::AtSensor(std::size_t number, const PixelSampler& sampler)
   return path;
 }
 
+float EyePathTracer::RadiusUnit(const SurfacePoint& surface, float footprint) const {
+  if (settings_.initial_radius != 0) return footprint;
+  const float widest =
+      std::max(kMostBend * LeastBendRadius(scene_, surface), kLeastFootprints * footprint);
+  return std::min(footprint, widest / static_cast<float>(settings_.initial_footprints));
+}
+
 EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) const {
   EyePath path;
   Rgb weight = Gray(1);
@@ -690,7 +703,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
             surface.tangent == Vec3() ? kNoTangent : EncodeOctahedral(surface.tangent)};
       }
       hitpoint.weight = weight;
-      hitpoint.footprint = footprint_ + footprint_slope_ * length;
+      hitpoint.footprint = RadiusUnit(surface, footprint_ + footprint_slope_ * length);
       return hitpoint;
     };
     if (properties.gathers) {

@@ -36,7 +36,9 @@ struct EyeHitpoint {
   Vec3 to_eye, shading_normal;  // glossy only
   GlossyPlace place;            // glossy only: what depends on the place
   Rgb weight;                   // from gathered flux density to radiance; black: no hitpoint
-  float footprint = 0;          // width of the pixel at the hitpoint [scene units]
+  // Width of the pixel at the hitpoint [scene units]; less on a surface that is bent as strongly as
+  // the first disc is wide.
+  float footprint = 0;
 };
 
 // A straight part of an eye path through a medium that scatters: photons count that were scattered
@@ -175,6 +177,8 @@ class EyePathTracer {
   // is not drawn from the lights. `weight` includes the sample's, `pdf` is its density [sr⁻¹].
   [[nodiscard]] Rgb ScatteredDirect(const SurfacePoint& surface, Vec3 wi, float pdf,
                                     std::int32_t medium, Rgb weight, int& rays) const;
+  // The unit of radii at a hitpoint, from the width of the pixel there.
+  [[nodiscard]] float RadiusUnit(const SurfacePoint& surface, float footprint) const;
   // What the camera's ray meets. False when that is nothing.
   [[nodiscard]] bool FindFirst(const Ray& ray, First first, Hit& hit) const;
   // Of a surface with its material where it was met (MaterialAt).

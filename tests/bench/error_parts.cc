@@ -70,9 +70,8 @@ std::vector<Class> ClassesOf(const Scene& scene, int width, int height) {
     const Material& material = scene.materials[point.material];
     if (point.area_light != kNoAreaLight) return kRest;
     if (!Gathers(material)) return ScattersNothing(material) ? kRest : kGlass;
-    std::array<std::uint32_t, 1> found;
     const float reach = kFootprints * static_cast<float>(step) * hit.t / Length(ahead);
-    return features.Find(point.position, reach, found) > 0 ? kCorner : kRest;
+    return features.HasNear(point.position, reach) ? kCorner : kRest;
   };
   std::vector<Class> classes;
   for (int y = 0; y < height; ++y) {

@@ -24,6 +24,7 @@ namespace {
 
 constexpr int kParts = 24;
 constexpr int kComparisons = 8;
+constexpr double kPi = 3.14159265358979;
 
 // A room whose walls, numbered 0, shine inwards; light 0 shines from one side, light 1 from both.
 Scene Room() {
@@ -44,6 +45,28 @@ Scene Room() {
 void AddShiningBox(Scene& scene, Vec3 low, Vec3 high) {
   AddBox(scene, low, high, 0);
   scene.meshes.back().traits.area_light = 0;
+}
+
+// A column from below the floor to above the ceiling, of flat sides with round normals.
+void AddColumn(Scene& scene, float x, float y, float radius) {
+  constexpr int kSides = 32;
+  TriangleMesh mesh;
+  mesh.traits.material = 0;
+  mesh.traits.area_light = 0;
+  for (std::uint32_t i = 0; i < kSides; ++i) {
+    const double angle = 2 * kPi * i / kSides;
+    const Vec3 normal = {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)),
+                         0};
+    for (const float z : {-1.1F, 1.1F}) {
+      mesh.positions.push_back({x + radius * normal.x, y + radius * normal.y, z});
+      mesh.normals.push_back(normal);
+    }
+    const std::uint32_t next = (i + 1) % kSides;
+    for (const std::uint32_t corner :
+         {2 * i, 2 * next, 2 * next + 1, 2 * i, 2 * next + 1, 2 * i + 1})
+      mesh.indices.push_back(corner);
+  }
+  scene.meshes.push_back(std::move(mesh));
 }
 
 struct Furniture {
@@ -77,6 +100,13 @@ std::vector<Furniture> AllFurniture() {
       {"a ball sunk into the floor",
        [](Scene& scene) {
          AddSphere(scene, {0.1F, 0, -1.3F}, 0.6F, 0, 0);
+       }},
+      // A pixel and a half in radius, half of a first disc's.
+      {"round columns",
+       [](Scene& scene) {
+         for (const auto& [x, y] : {std::pair(-0.1F, -0.4F), {0.2F, 0.1F}, {-0.2F, 0.2F},
+                                    {-0.5F, 0.1F}, {0.3F, -0.5F}, {0.0F, -0.1F}})
+           AddColumn(scene, x, y, 0.06F);
        }},
   };
 }

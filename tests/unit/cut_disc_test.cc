@@ -221,6 +221,38 @@ TEST(CutDiscTest, FillsTheSectorsBeyondAnEdge) {
   }
 }
 
+// A hundred plates that stand on a floor like books, with light before the first of them alone; and
+// a round hole whose rim has a hundred sides, of which none hides another where they are few enough
+// to be seen at once.
+TEST(CutDiscTest, KeepsEvenLightWhereEdgesCrowd) {
+  Scene books;
+  AddMaterial(books, DiffuseMaterial(0.5F));
+  AddQuad(books, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0);
+  for (int i = 0; i < 100; ++i)
+    AddQuad(books, {0.002F * static_cast<float>(i), -1, 0}, {0, 2, 0}, {0, 0, 1}, 0);
+  Deposits light;
+  AddPlane(light, kFloor, {},
+           [&](float x, float y) { return (kFloor.s * x + kFloor.t * y).x < 0 ? 1.0F : 0.0F; });
+  for (const float distance : {0.01F, 0.1F, 0.2F, 0.4F})
+    EXPECT_NEAR(At(books, light, {-distance, 0.1F, 0}, {0, 0, 1}).density, 1, 0.02) << distance;
+
+  Scene well;
+  AddMaterial(well, DiffuseMaterial(0.5F));
+  AddQuad(well, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, 0);
+  constexpr int kSides = 100;
+  const auto at = [](int i) {
+    const float angle = 6.2831853F * static_cast<float>(i) / kSides;
+    return Vec3{0.2F * std::cos(angle), 0.2F * std::sin(angle), 0};
+  };
+  for (int i = 0; i < kSides; ++i)
+    AddQuad(well, at(i), at(i + 1) - at(i), {0, 0, 1}, 0);
+  Deposits beside;
+  AddPlane(beside, kFloor, {}, [&](float x, float y) { return x * x + y * y > 0.04F ? 1.0F : 0.0F; });
+  // From outside about a third of the sides is seen.
+  for (const float distance : {0.21F, 0.3F, 0.5F})
+    EXPECT_NEAR(At(well, beside, {distance, 0, 0}, {0, 0, 1}).density, 1, 0.02) << distance;
+}
+
 // Nothing leaves its range where little is left of a disc, or where a photon is as strong as there
 // is room for.
 TEST(CutDiscTest, HoldsContributionsInTheirRange) {

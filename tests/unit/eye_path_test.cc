@@ -48,5 +48,43 @@ TEST(EyePathTest, FollowsAllBranchesOfGlassSeenInRoughMetal) {
   EXPECT_NEAR(mean, static_cast<double>(kRadiance) * metal * 2 * r / (1 + r), 0.1 * mean);
 }
 
+// The first disc, of three widths of a pixel, is no wider than what turns by 45 degrees, and no
+// narrower than a pixel; on what is flat or bent less it is as wide as it was.
+TEST(EyePathTest, DiscsOnBentSurfacesAreNarrower) {
+  constexpr double kDistance = 2;
+  constexpr double kPi = 3.14159265358979;
+  const double pixel = 2 * kDistance * std::tan(0.25 * kPi / 180);
+  const auto unit_on_a_ball = [&](double radius_px) {
+    Scene scene;
+    const auto radius = static_cast<float>(radius_px * pixel);
+    AddMaterial(scene, DiffuseMaterial(0.5F));
+    if (radius > 0) {
+      AddSphere(scene, {0, 0, -radius}, radius, 0);
+    } else {
+      AddQuad(scene, {-5, -5, 0}, {10, 0, 0}, {0, 10, 0}, 0);
+    }
+    SetCamera(scene, {0, 0, kDistance}, {0, 0, 0}, {0, 1, 0}, 0.5, 1);
+    RenderSettings settings = TestSettings(scene, 1000, 0.01, 40);
+    settings.initial_radius = 0;
+    settings.initial_footprints = 3;
+    const SceneNeeds needs = NeedsOf(scene, settings);
+    const auto intersector = Intersector::Create(scene).value();
+    const LightSet lights(scene, *intersector);
+    const EyePathTracer tracer(scene, settings, needs, *intersector, lights);
+    EyeHitpoint hitpoint;
+    for (std::uint64_t pass = 0; IsBlack(hitpoint.weight) && pass < 100; ++pass)
+      hitpoint = tracer.Trace(0, 0, pass, {}).hitpoint;
+    return static_cast<double>(hitpoint.footprint) / pixel;
+  };
+  // Rays of a pixel meet the ball up to a pixel's width further away.
+  constexpr double kSlack = 0.01;
+  const double turn = 2 * std::sin(kPi / 8);
+  EXPECT_NEAR(unit_on_a_ball(0), 1, kSlack) << "flat";
+  EXPECT_NEAR(unit_on_a_ball(4.5), 1, kSlack);
+  EXPECT_NEAR(unit_on_a_ball(3), turn * 3 / 3, kSlack);
+  EXPECT_NEAR(unit_on_a_ball(1.5), turn * 1.5 / 3, kSlack);
+  EXPECT_NEAR(unit_on_a_ball(0.75), 1.0 / 3, kSlack);
+}
+
 }  // namespace
 }  // namespace lucerna

@@ -33,8 +33,7 @@ TEST(FeatureEdgesTest, OfAnEmptySceneAreNone) {
   AddSphere(ball, {0, 0, 0}, 1, 0);
   const FeatureEdges edges(ball);
   EXPECT_TRUE(edges.empty());
-  std::array<std::uint32_t, 4> found;
-  EXPECT_EQ(edges.Find({0, 0, 0}, 10, found), 0U);
+  EXPECT_FALSE(edges.HasNear({0, 0, 0}, 10));
 }
 
 TEST(FeatureEdgesTest, OfAQuadAreItsFourSidesAndOfABoxItsTwelve) {
@@ -201,35 +200,75 @@ TEST(FeatureEdgesTest, AreFoundWhereTheyAre) {
     segments.push_back({{a, i % 5 == 0 ? at(10) : a + at(0.1F)}});
   }
   const FeatureEdges edges(segments);
+  ASSERT_EQ(edges.segments().size(), segments.size());
+  int found_any = 0;
   for (int i = 0; i < 3000; ++i) {
     const float x = rng.Uniform();
     const float y = rng.Uniform();
     const Vec3 center = {12 * x - 1, 34 * y - 2, 0.5F};
     const float reach = std::pow(10.0F, -3 + 4 * rng.Uniform());
-    std::set<std::uint32_t> expected;
-    for (std::uint32_t s = 0; s < segments.size(); ++s) {
-      const Vec3 a = segments[s].ends[0];
-      const Vec3 along = segments[s].ends[1] - a;
+    const float turn = 6.3F * rng.Uniform();
+    const Vec3 normal = Normalize({std::cos(turn), std::sin(turn), rng.Uniform()});
+    const float height = i % 3 == 0 ? HUGE_VALF : reach * rng.Uniform();
+    std::multiset<const FeatureSegment*> found;
+    edges.ForEachNear({center, normal, reach, height}, [&](const FeatureSegment& segment) {
+      found.insert(&segment);
+      return true;
+    });
+    bool any_in_reach = false;
+    for (const FeatureSegment& segment : edges.segments()) {
+      const Vec3 a = segment.ends[0];
+      const Vec3 along = segment.ends[1] - a;
       const float t = std::clamp(Dot(center - a, along) / LengthSquared(along), 0.0F, 1.0F);
       const float distance = Length(a + along * t - center);
+      const float low = Dot(a - center, normal);
+      const float high = low + Dot(along, normal);
+      // Of both sides of the plane, or how far off it the nearer end is.
+      const float off = low * high <= 0 ? 0 : std::min(std::abs(low), std::abs(high));
+      const float slack = 1e-4F * (reach + 1e-2F);
+      any_in_reach |= distance < reach - slack;
       // Those at the very end are found or not.
-      if (std::abs(distance - reach) < 1e-4F * (reach + 1e-2F)) expected.insert(UINT32_MAX);
-      if (distance < reach) expected.insert(s);
+      if (distance < reach - slack && off < height - slack) {
+        EXPECT_EQ(found.count(&segment), 1U);
+        ++found_any;
+      } else if (distance > reach + slack || off > height + slack) {
+        EXPECT_EQ(found.count(&segment), 0U);
+      }
     }
-    if (expected.contains(UINT32_MAX)) continue;
-    std::array<std::uint32_t, 400> found;
-    const std::size_t count = edges.Find(center, reach, found);
-    // Too many to go through.
-    if (count > found.size()) {
-      EXPECT_GT(expected.size(), 50U);
-      continue;
-    }
-    EXPECT_EQ(std::set(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count)),
-              expected);
-    EXPECT_EQ(count, expected.size());
+    EXPECT_TRUE(!any_in_reach || edges.HasNear(center, reach));
   }
-  std::array<std::uint32_t, 2> few;
-  EXPECT_GT(edges.Find(segments[0].ends[0], 3, few), few.size());
+  EXPECT_GT(found_any, 1000);
+  // It ends when it is told to.
+  int visited = 0;
+  edges.ForEachNear({{5, 15, 0.5F}, {0, 0, 1}, 40, HUGE_VALF},
+                    [&](const FeatureSegment&) { return ++visited < 7; });
+  EXPECT_EQ(visited, 7);
+}
+
+// A scene of another size has the same edges near its discs.
+TEST(FeatureEdgesTest, AreFoundAtAnySize) {
+  std::vector<std::size_t> counts;
+  for (const float size : {1.0F, 0x1p-40F, 0x1p40F}) {
+    KeyedRng rng(21);
+    std::vector<FeatureSegment> segments;
+    for (int i = 0; i < 100; ++i) {
+      const auto at = [&] {
+        const float x = rng.Uniform();
+        const float y = rng.Uniform();
+        return Vec3{size * x, size * y, size * rng.Uniform()};
+      };
+      const Vec3 a = at();
+      segments.push_back({{a, at()}});
+    }
+    std::size_t count = 0;
+    const float half = 0.5F * size;
+    FeatureEdges(segments).ForEachNear({{half, half, half}, {0, 0, 1}, half, 0.1F * size},
+                                       [&](const FeatureSegment&) { return ++count > 0; });
+    counts.push_back(count);
+  }
+  EXPECT_GT(counts[0], 20U);
+  EXPECT_EQ(counts[1], counts[0]);
+  EXPECT_EQ(counts[2], counts[0]);
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ Scene With(TriangleMesh mesh) {
 }
 
 TEST(SceneMemoryTest, CountsTheEdgesThatAreFound) {
-  constexpr double kSegment = 70;
+  constexpr double kSegment = 52;
   for (const std::uint32_t side : {100U, 200U}) {
     for (const bool is_loose : {false, true}) {
       SCOPED_TRACE(testing::Message() << side << " " << is_loose);
@@ -63,7 +63,7 @@ TEST(SceneMemoryTest, CountsTheEdgesThatAreFound) {
       EXPECT_EQ(found, is_loose ? 6.0 * side * side : 4.0 * side);
       // Euler's characteristic of a grid is 1, for which two edges more are counted.
       const double predicted = SceneMemoryOf(scene, kRays).edges;
-      EXPECT_EQ(predicted, std::max(1.2e6, kSegment * (is_loose ? found : found + 2)));
+      EXPECT_EQ(predicted, kSegment * (is_loose ? found : found + 2));
     }
   }
 }

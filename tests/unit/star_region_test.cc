@@ -2,6 +2,8 @@
 // points say where there are none.
 #include "render/estimate/star_region.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -208,8 +210,64 @@ TEST(StarRegionTest, HasRoomForSoManySegmentsAndNoMore) {
   EXPECT_TRUE(region.Add({1, 1}, {2, 2})) << "points at the origin and hides nothing";
   region.Finish();
   // A polygon of n corners on a circle of radius 1/2.
+  constexpr double kCorners = StarRegion::kMostSegments;
   EXPECT_NEAR(region.MomentsOf(KernelKind::kConstant, 1).zeroth,
-              16 * 0.25 * std::sin(2 * kPiD / 32), 1e-9);
+              kCorners / 2 * 0.25 * std::sin(2 * kPiD / kCorners), 1e-9);
+}
+
+// Plates behind each other: the first hides all others, in whatever order they come, and twice over.
+TEST(StarRegionTest, SegmentsThatAreHiddenTakeNoRoom) {
+  const auto plate = [](int i) {
+    const double x = 0.1 + 0.001 * i;
+    return std::array{Point2{x, -2 * x}, Point2{x, 3 * x}};
+  };
+  for (const int step : {1, -1, 37}) {
+    SCOPED_TRACE(step);
+    StarRegion region;
+    region.Clear();
+    for (int k = 0; k < 200; ++k) {
+      const auto [a, b] = plate((step > 0 ? k * step : 199 - k) % 200);
+      ASSERT_TRUE(region.Add(a, b));
+      ASSERT_TRUE(region.Add(b, a));
+    }
+    EXPECT_EQ(region.segments(), 1U);
+    region.Finish();
+    StarRegion first = Region({plate(0)});
+    EXPECT_EQ(region.MomentsOf(KernelKind::kBiweight, 1).zeroth,
+              first.MomentsOf(KernelKind::kBiweight, 1).zeroth);
+  }
+  // One that is seen beside the first stays.
+  StarRegion region = Region({plate(0), {Point2{0.3, 0.5}, Point2{0.3, 1.0}}});
+  EXPECT_EQ(region.segments(), 2U);
+  EXPECT_TRUE(region.Hides({0.3, 0.1}, {0.5, 0.1}));
+  EXPECT_FALSE(region.Hides({0.3, 0.1}, {0.3, 1.0}));
+  EXPECT_FALSE(region.Hides({0.05, 0.01}, {0.3, 0.1})) << "it begins before it";
+}
+
+// What is removed and put in another's place leaves no trace: random segments, nearest last, see
+// the same points as nearest first.
+TEST(StarRegionTest, TheOrderOfSegmentsDoesNotMatter) {
+  KeyedRng rng(17);
+  const auto uniform = [&] { return 2 * static_cast<double>(rng.Uniform()) - 1; };
+  for (int trial = 0; trial < 200; ++trial) {
+    SCOPED_TRACE(trial);
+    std::vector<std::array<Point2, 2>> segments;
+    for (int i = 0; i < 50; ++i) {
+      const Point2 a = {uniform(), uniform()};
+      segments.push_back({a, Point2{a.x + 0.3 * uniform(), a.y + 0.3 * uniform()}});
+    }
+    const StarRegion one = Region(segments);
+    std::reverse(segments.begin(), segments.end());
+    const StarRegion other = Region(segments);
+    EXPECT_EQ(one.segments(), other.segments());
+    EXPECT_LT(one.segments(), segments.size());
+    EXPECT_NEAR(one.MomentsOf(KernelKind::kEpanechnikov, 1).zeroth,
+                other.MomentsOf(KernelKind::kEpanechnikov, 1).zeroth, 1e-9);
+    for (int i = 0; i < 100; ++i) {
+      const auto x = static_cast<float>(uniform()), y = static_cast<float>(uniform());
+      EXPECT_EQ(one.Sees(x, y), other.Sees(x, y));
+    }
+  }
 }
 
 }  // namespace
