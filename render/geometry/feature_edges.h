@@ -2,7 +2,7 @@
 //
 // Segments at which the disc of a hitpoint must be cut, because what lies beyond is another
 // surface, or none:
-//   * open edges of meshes, and edges at which the faces turn by more than about 45 degrees
+//   * open edges of meshes, and edges at which the faces turn by about 45 degrees or more
 //     (kSameSurfaceCosine) or at which more than two faces meet. Corners in the same place to the
 //     bit are the same corner, whatever mesh they belong to;
 //   * edges between a surface on which photons are kept and one on which none are;
@@ -32,8 +32,9 @@
 
 namespace lucerna {
 
-// Surfaces turned less than this from each other count as one.
-inline constexpr float kSameSurfaceCosine = 0.7F;
+// Surfaces turned less than this from each other count as one: a little less than 45 degrees, so that
+// the sides of an octagonal bar do not.
+inline constexpr float kSameSurfaceCosine = 0.71F;
 
 // A disc with what bends it out of its plane: what lies closer to its center than `reach` and
 // closer to the plane through it than `height`.

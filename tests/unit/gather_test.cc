@@ -183,7 +183,7 @@ std::vector<std::array<std::int64_t, 4>> Oracle(const Case& input, const Kernel&
         }
         const float cosine = Dot(photon.normal, side);
         const float twice_height = Dot(to_photon, side) + Dot(to_photon, photon.normal);
-        const float most = (cosine >= 0.7F ? 2 * std::max(0.0F, 1 - cosine) : 0) + 0.1F * 0.1F;
+        const float most = (cosine >= 0.71F ? 2 * std::max(0.0F, 1 - cosine) : 0) + 0.1F * 0.1F;
         if (cosine < 0 || twice_height * twice_height > most * (radius * radius)) continue;
         const float shape = kernel.Shape(squared * (1 / (radius * radius)));
         const std::uint64_t bits = PairBits(photon.key, static_cast<std::uint32_t>(row));
