@@ -724,5 +724,6 @@ int Run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   lucerna::ReadLocale();
+  lucerna::KeepOpenSsl();
   return lucerna::Run(argc, argv);
 }

@@ -213,5 +213,6 @@ int Main(int argc, char** argv) {
 int main(int argc, char** argv) {
   lucerna::ReadLocale();
   lucerna::KeepFreedMemory();
+  lucerna::KeepOpenSsl();
   return lucerna::Main(argc, argv);
 }

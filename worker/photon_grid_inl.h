@@ -63,8 +63,10 @@ void PhotonGrid::ForEachWithin(Vec3 center, float radius, const Visit& visit) co
 
 inline bool PhotonGrid::HasAnyWithin(Vec3 center, float radius) const {
   bool has_any = false;
-  ForEachEight(center, radius, [&](std::size_t /*first*/, __m256 /*squared*/,
-                                   unsigned int /*mask*/) { return has_any = true; });
+  ForEachEight(center, radius,
+               [&](std::size_t /*first*/, __m256 /*squared*/, unsigned int /*mask*/) {
+                 return has_any = true;
+               });
   return has_any;
 }
 

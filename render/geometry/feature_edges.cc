@@ -260,10 +260,12 @@ unsigned int FeatureEdges::BoxesNear(const Lanes& boxes, const DiscSlab& slab) {
     return _mm256_mul_ps(n >= 0 ? from : to, by);
   };
   const Vec3 n = slab.normal;
-  const __m256 lowest = _mm256_add_ps(
-      _mm256_add_ps(lower(low.x, high.x, n.x), lower(low.y, high.y, n.y)), lower(low.z, high.z, n.z));
-  const __m256 highest = _mm256_add_ps(
-      _mm256_add_ps(lower(high.x, low.x, n.x), lower(high.y, low.y, n.y)), lower(high.z, low.z, n.z));
+  const __m256 lowest =
+      _mm256_add_ps(_mm256_add_ps(lower(low.x, high.x, n.x), lower(low.y, high.y, n.y)),
+                    lower(low.z, high.z, n.z));
+  const __m256 highest =
+      _mm256_add_ps(_mm256_add_ps(lower(high.x, low.x, n.x), lower(high.y, low.y, n.y)),
+                    lower(high.z, low.z, n.z));
   const __m256 height = _mm256_add_ps(
       _mm256_set1_ps(slab.height / slab.reach),
       _mm256_mul_ps(_mm256_set1_ps(kHeightRounding), _mm256_add_ps(MaxAbs(low), MaxAbs(high))));

@@ -32,8 +32,8 @@
 
 namespace lucerna {
 
-// Surfaces turned less than this from each other count as one: a little less than 45 degrees, so that
-// the sides of an octagonal bar do not.
+// Surfaces turned less than this from each other count as one: a little less than 45 degrees, so
+// that the sides of an octagonal bar do not.
 inline constexpr float kSameSurfaceCosine = 0.71F;
 
 // A disc with what bends it out of its plane: what lies closer to its center than `reach` and
@@ -72,7 +72,8 @@ class FeatureEdges {
     while (count > 0) {
       const Group group = open[--count];
       const Lanes& lanes = levels_[group.level][group.number];
-      for (unsigned int near = group.level == 0 ? SegmentsNear(lanes, slab) : BoxesNear(lanes, slab);
+      for (unsigned int near = group.level == 0 ? SegmentsNear(lanes, slab)
+                                                : BoxesNear(lanes, slab);
            near != 0; near &= near - 1) {
         const auto child = static_cast<std::uint32_t>(kLanes * group.number) +
                            static_cast<std::uint32_t>(std::countr_zero(near));

@@ -23,7 +23,7 @@ namespace lucerna {
 namespace {
 
 constexpr int kParts = 24;
-constexpr int kComparisons = 8;
+constexpr int kComparisons = 9;
 constexpr double kPi = 3.14159265358979;
 
 // A room whose walls, numbered 0, shine inwards; light 0 shines from one side, light 1 from both.
@@ -47,26 +47,36 @@ void AddShiningBox(Scene& scene, Vec3 low, Vec3 high) {
   scene.meshes.back().traits.area_light = 0;
 }
 
-// A column from below the floor to above the ceiling, of flat sides with round normals.
-void AddColumn(Scene& scene, float x, float y, float radius) {
-  constexpr int kSides = 32;
+// A column from below the floor to above the ceiling, of flat sides, with round normals or none.
+void AddColumn(Scene& scene, float x, float y, float radius, std::uint32_t sides, bool is_round) {
   TriangleMesh mesh;
   mesh.traits.material = 0;
   mesh.traits.area_light = 0;
-  for (std::uint32_t i = 0; i < kSides; ++i) {
-    const double angle = 2 * kPi * i / kSides;
+  for (std::uint32_t i = 0; i < sides; ++i) {
+    const double angle = 2 * kPi * i / sides;
     const Vec3 normal = {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)),
                          0};
     for (const float z : {-1.1F, 1.1F}) {
       mesh.positions.push_back({x + radius * normal.x, y + radius * normal.y, z});
-      mesh.normals.push_back(normal);
+      if (is_round) mesh.normals.push_back(normal);
     }
-    const std::uint32_t next = (i + 1) % kSides;
+    const std::uint32_t next = (i + 1) % sides;
     for (const std::uint32_t corner :
          {2 * i, 2 * next, 2 * next + 1, 2 * i, 2 * next + 1, 2 * i + 1})
       mesh.indices.push_back(corner);
   }
   scene.meshes.push_back(std::move(mesh));
+}
+
+// A pixel and a half in radius, half of a first disc's.
+void AddColumns(Scene& scene, std::uint32_t sides, bool is_round) {
+  for (const auto& [x, y] : {std::pair(-0.1F, -0.4F),
+                             {0.2F, 0.1F},
+                             {-0.2F, 0.2F},
+                             {-0.5F, 0.1F},
+                             {0.3F, -0.5F},
+                             {0.0F, -0.1F}})
+    AddColumn(scene, x, y, 0.06F, sides, is_round);
 }
 
 struct Furniture {
@@ -101,13 +111,8 @@ std::vector<Furniture> AllFurniture() {
        [](Scene& scene) {
          AddSphere(scene, {0.1F, 0, -1.3F}, 0.6F, 0, 0);
        }},
-      // A pixel and a half in radius, half of a first disc's.
-      {"round columns",
-       [](Scene& scene) {
-         for (const auto& [x, y] : {std::pair(-0.1F, -0.4F), {0.2F, 0.1F}, {-0.2F, 0.2F},
-                                    {-0.5F, 0.1F}, {0.3F, -0.5F}, {0.0F, -0.1F}})
-           AddColumn(scene, x, y, 0.06F);
-       }},
+      {"round columns", [](Scene& scene) { AddColumns(scene, 32, true); }},
+      {"octagonal columns", [](Scene& scene) { AddColumns(scene, 8, false); }},
   };
 }
 

@@ -713,8 +713,7 @@ TEST(LeastBendRadiusTest, IsThatOfTheRoundSurface) {
                     {std::cos(angle), std::sin(angle), 0}};
     };
     const Scene tube = SceneOf(Tessellate(cylinder, {0, 2 * pi}, {0, 40}, 16, 4));
-    const Scene ball =
-        SceneOf(Tessellate(SphereSurface(radius), {0, 2 * pi}, {-1.2, 1.2}, 24, 12));
+    const Scene ball = SceneOf(Tessellate(SphereSurface(radius), {0, 2 * pi}, {-1.2, 1.2}, 24, 12));
     for (const Scene* scene : {&tube, &ball}) {
       for (std::uint32_t i = 0; i < TriangleCount(*scene); ++i)
         ASSERT_NEAR(LeastBendRadius(*scene, MiddleOf(*scene, i)) / radius, 1, 1e-5);

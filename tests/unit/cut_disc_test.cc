@@ -247,7 +247,8 @@ TEST(CutDiscTest, KeepsEvenLightWhereEdgesCrowd) {
   for (int i = 0; i < kSides; ++i)
     AddQuad(well, at(i), at(i + 1) - at(i), {0, 0, 1}, 0);
   Deposits beside;
-  AddPlane(beside, kFloor, {}, [&](float x, float y) { return x * x + y * y > 0.04F ? 1.0F : 0.0F; });
+  AddPlane(beside, kFloor, {},
+           [&](float x, float y) { return x * x + y * y > 0.04F ? 1.0F : 0.0F; });
   // From outside about a third of the sides is seen.
   for (const float distance : {0.21F, 0.3F, 0.5F})
     EXPECT_NEAR(At(well, beside, {distance, 0, 0}, {0, 0, 1}).density, 1, 0.02) << distance;

@@ -215,7 +215,8 @@ TEST(StarRegionTest, HasRoomForSoManySegmentsAndNoMore) {
               kCorners / 2 * 0.25 * std::sin(2 * kPiD / kCorners), 1e-9);
 }
 
-// Plates behind each other: the first hides all others, in whatever order they come, and twice over.
+// Plates behind each other: the first hides all others, in whatever order they come, and twice
+// over.
 TEST(StarRegionTest, SegmentsThatAreHiddenTakeNoRoom) {
   const auto plate = [](int i) {
     const double x = 0.1 + 0.001 * i;
