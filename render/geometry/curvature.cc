@@ -333,42 +333,4 @@ float SurfaceCurvature::SquaredPrincipals(const SurfacePoint& point) const {
   return std::min(sum, static_cast<float>(kLargest));
 }
 
-float LeastBendRadius(const Scene& scene, const SurfacePoint& point) {
-  const TriangleMesh* mesh = MeshOf(scene, point.geometry);
-  if (mesh == nullptr) {
-    return VisitShape(scene, KindOf(scene, point.geometry), point.primitive,
-                      [&](const auto& shape) {
-                        if constexpr (std::decay_t<decltype(shape)>::kIsFlat) {
-                          return HUGE_VALF;
-                        } else {
-                          const PrincipalCurvatures k = CurvatureOf(shape, point.position);
-                          const float most = std::max(std::abs(k.first), std::abs(k.second));
-                          return most > 0 ? 1 / most : HUGE_VALF;
-                        }
-                      });
-  }
-  if (mesh->normals.empty()) return HUGE_VALF;
-  const std::uint32_t* corner = &mesh->indices[std::size_t{3} * point.primitive];
-  std::array<Vec3, 3> normals = {mesh->normals[corner[0]], mesh->normals[corner[1]],
-                                 mesh->normals[corner[2]]};
-  if (normals[0] == normals[1] && normals[0] == normals[2]) return HUGE_VALF;
-  for (Vec3& normal : normals) {
-    if (point.instance != kNoInstance && normal != Vec3())
-      normal = scene.instances[point.instance].to_world.Normal(normal);
-    if (normal == Vec3()) return HUGE_VALF;
-    normal = Normalize(normal);
-  }
-  const std::array<Vec3, 3> corners = CornersOf(scene, *mesh, point.primitive, point.instance);
-  // In double, so that squares do not leave its range.
-  double most = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    const std::size_t next = (i + 1) % 3;
-    const Double3 side = Double3(corners[next]) - Double3(corners[i]);
-    const Double3 turn = Double3(normals[next]) - Double3(normals[i]);
-    const double squared = Dot(side, side);
-    if (squared > 0) most = std::max(most, Dot(turn, turn) / squared);
-  }
-  return most > 0 ? static_cast<float>(1 / std::sqrt(most)) : HUGE_VALF;
-}
-
 }  // namespace lucerna

@@ -69,9 +69,4 @@ class SurfaceCurvature {
   std::vector<Bending> bendings_;
 };
 
-// The least radius of curvature of the surface at the point, of any direction and either side: of a
-// mesh with vertex normals as far as they turn along the sides of its triangle. HUGE_VALF where the
-// surface is flat. Nothing needs to be prepared for it. Threads: any.
-[[nodiscard]] float LeastBendRadius(const Scene& scene, const SurfacePoint& point);
-
 }  // namespace lucerna

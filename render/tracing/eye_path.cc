@@ -5,7 +5,6 @@
 #include <numbers>
 #include <optional>
 
-#include "render/geometry/curvature.h"
 #include "render/math/equal_area_square.h"
 #include "render/math/octahedral.h"
 #include "render/math/warp.h"
@@ -141,6 +140,8 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       media_(scene, intersector),
       filter_x_(scene.filter, scene.filter.radius_x),
       filter_y_(scene.filter, scene.filter.radius_y) {
+  // Other radii do not ask.
+  if (settings.initial_radius == 0 && needs.Uses(Part::kPhotons)) bends_.emplace(scene);
   // Readers let only invertible transforms pass.
   world_to_camera_ = scene.camera.camera_to_world.Inverse().value_or(Transform());
   const Window window = ScreenWindow(scene.camera, settings.width, settings.height);
@@ -512,9 +513,8 @@ EyePath EyePathTracer::AtSensor(std::size_t number, const PixelSampler& sampler)
 }
 
 float EyePathTracer::RadiusUnit(const SurfacePoint& surface, float footprint) const {
-  if (settings_.initial_radius != 0) return footprint;
-  const float widest =
-      std::max(kMostBend * LeastBendRadius(scene_, surface), kLeastFootprints * footprint);
+  if (!bends_) return footprint;
+  const float widest = std::max(kMostBend * bends_->At(surface), kLeastFootprints * footprint);
   return std::min(footprint, widest / static_cast<float>(settings_.initial_footprints));
 }
 

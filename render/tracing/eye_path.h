@@ -7,6 +7,7 @@
 
 #include "render/analysis/needs.h"
 #include "render/estimate/hitpoint_block.h"
+#include "render/geometry/bend_radii.h"
 #include "render/geometry/intersector.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
@@ -227,6 +228,7 @@ class EyePathTracer {
   const Intersector& intersector_;
   const LightSet& lights_;
   const Media media_;
+  std::optional<BendRadii> bends_;  // of automatic radii
   FilterSampler filter_x_, filter_y_;
   Transform world_to_camera_;
   double window_low_x_, window_high_y_;  // of the whole image on the plane z = 1

@@ -704,51 +704,5 @@ TEST(SurfaceCurvatureTest, StaysFiniteAndClampedOnBrokenMeshes) {
   }
 }
 
-// Of a sphere and of a cylinder it is the radius, at any size and however long the triangles are.
-TEST(LeastBendRadiusTest, IsThatOfTheRoundSurface) {
-  for (const double radius : {0.25, 0x1p-40, 0x1p40}) {
-    SCOPED_TRACE(radius);
-    const Surface cylinder = [&](double angle, double z) {
-      return Vertex{{radius * std::cos(angle), radius * std::sin(angle), radius * z},
-                    {std::cos(angle), std::sin(angle), 0}};
-    };
-    const Scene tube = SceneOf(Tessellate(cylinder, {0, 2 * pi}, {0, 40}, 16, 4));
-    const Scene ball = SceneOf(Tessellate(SphereSurface(radius), {0, 2 * pi}, {-1.2, 1.2}, 24, 12));
-    for (const Scene* scene : {&tube, &ball}) {
-      for (std::uint32_t i = 0; i < TriangleCount(*scene); ++i)
-        ASSERT_NEAR(LeastBendRadius(*scene, MiddleOf(*scene, i)) / radius, 1, 1e-5);
-    }
-    // The same triangles without vertex normals, or with those of a plane, are flat.
-    Scene flat = tube;
-    flat.meshes[0].normals.assign(flat.meshes[0].positions.size(), Vec3{0, 0, 1});
-    EXPECT_EQ(LeastBendRadius(flat, MiddleOf(flat, 3)), HUGE_VALF);
-    flat.meshes[0].normals.clear();
-    EXPECT_EQ(LeastBendRadius(flat, MiddleOf(flat, 3)), HUGE_VALF);
-  }
-}
-
-TEST(LeastBendRadiusTest, OfAnalyticShapesAndInstancesIsThatInTheWorld) {
-  Scene scene;
-  AddMaterial(scene, DiffuseMaterial(0.5F));
-  AddSphere(scene, {1, 2, 3}, 0.3F, 0, kNoAreaLight, /*inward=*/true);
-  AddDisk(scene, {0, 0, 0}, {0, 0, 1}, 2, 0);
-  SurfacePoint point;
-  point.geometry = GeometryOf(scene, ShapeKind::kSphere);
-  EXPECT_NEAR(LeastBendRadius(scene, point), 0.3, 1e-6);
-  point.geometry = GeometryOf(scene, ShapeKind::kDisk);
-  EXPECT_EQ(LeastBendRadius(scene, point), HUGE_VALF);
-
-  scene.object_meshes.push_back(
-      SceneOf(Tessellate(SphereSurface(1), {0, 2 * pi}, {-1.2, 1.2}, 24, 12)).meshes[0]);
-  InstancedObject object;
-  object.mesh_count = 1;
-  scene.objects.push_back(object);
-  scene.instances.emplace_back().to_world = Transform::Scale(5, 5, 5);
-  point.geometry = static_cast<std::uint32_t>(scene.meshes.size()) + kShapeKinds;
-  point.primitive = 7;
-  point.instance = 0;
-  EXPECT_NEAR(LeastBendRadius(scene, point), 5, 1e-4);
-}
-
 }  // namespace
 }  // namespace lucerna

@@ -63,6 +63,7 @@ TEST(EyePathTest, DiscsOnBentSurfacesAreNarrower) {
     } else {
       AddQuad(scene, {-5, -5, 0}, {10, 0, 0}, {0, 10, 0}, 0);
     }
+    AddQuad(scene, {-1, -1, 3}, {0, 2, 0}, {2, 0, 0}, 0, AddAreaLight(scene, 1));
     SetCamera(scene, {0, 0, kDistance}, {0, 0, 0}, {0, 1, 0}, 0.5, 1);
     RenderSettings settings = TestSettings(scene, 1000, 0.01, 40);
     settings.initial_radius = 0;
