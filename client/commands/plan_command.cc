@@ -51,7 +51,7 @@ Status PrintPlan(const SceneSource& source, const RenderOverrides& overrides,
     }
   }
   text += "\nmemory of the scene, predicted from its counts\n";
-  const std::array<std::pair<const char*, double>, 9> rows = {
+  const std::array<std::pair<const char*, double>, 10> rows = {
       {{"files", memory.files},
        {"shapes", memory.shapes},
        {"textures", memory.textures},
@@ -59,6 +59,7 @@ Status PrintPlan(const SceneSource& source, const RenderOverrides& overrides,
        {"  of instances", memory.instances},
        {"lights", memory.lights},
        {"feature edges", memory.edges},
+       {"bends of facets", memory.bends},
        {"coordinator", memory.PeakOfCoordinator()},
        {"each worker", memory.PeakOfWorker()}}};
   for (const auto& [name, bytes] : rows) {

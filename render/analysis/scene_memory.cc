@@ -28,6 +28,9 @@ constexpr double kEmitter = 48;
 // Of feature edges: a segment, with the tree; and while they are found.
 constexpr double kSegment = 52;
 constexpr double kEdgesPerTriangle = 77, kEdgesPerVertex = 28, kEdgesPerMesh = 24;
+// Of bends: a triangle without vertex normals; and while they are found.
+constexpr double kBend = 4;
+constexpr double kBendsPerTriangle = 48, kBendsPerVertex = 4;
 // Of the analysis of what a job needs: a triangle, a vertex, a mesh, and a triangle of a closed
 // surface.
 constexpr double kAnalysisPerTriangle = 108, kAnalysisPerVertex = 29, kAnalysisPerMesh = 650;
@@ -60,15 +63,16 @@ double OpenEdges(const TriangleMesh& mesh) {
 }  // namespace
 
 double SceneMemory::PeakOfCoordinator() const {
-  return files +
-         kOfHeaps * (shapes + textures + moving +
-                     std::max(analysing, acceleration + building_trees + lights + at_another_time));
+  return files + kOfHeaps * (shapes + textures + moving +
+                             std::max(analysing, acceleration + lights + at_another_time + bends +
+                                                     std::max(building_trees, building_bends)));
 }
 
 double SceneMemory::PeakOfWorker() const {
-  return kOfHeaps * (shapes + textures + moving +
-                     std::max(std::max(edges, building_edges),
-                              edges + acceleration + building_trees + lights));
+  return kOfHeaps *
+         (shapes + textures + moving +
+          std::max(std::max(edges, building_edges), edges + acceleration + lights + bends +
+                                                        std::max(building_trees, building_bends)));
 }
 
 SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
@@ -83,6 +87,12 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
       primitives += triangles;
       memory.shapes += SizeOf(mesh);
       memory.acceleration += kTreeMesh + tree * triangles + sizeof(Vec3) * (vertices + 1) + kBlock;
+      if (mesh.normals.empty()) {
+        memory.bends += kBend * triangles;
+        // One mesh after the other.
+        memory.building_bends = std::max(
+            memory.building_bends, kBendsPerTriangle * triangles + kBendsPerVertex * vertices);
+      }
       // The rest concerns what is written out.
       if (list != &scene.meshes) continue;
       open_edges += OpenEdges(mesh);

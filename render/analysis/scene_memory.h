@@ -24,15 +24,16 @@ struct SceneMemory {
   double lights = 0;        // of emitting triangles
   double moving = 0;        // copies of the shapes that move
   double edges = 0;         // at which discs are cut: of a worker; at most, where edges are unknown
+  double bends = 0;         // of facets without vertex normals, as if none were flat
 
   // What building takes for a while beside what is kept.
-  double building_trees = 0, building_edges = 0, analysing = 0;
+  double building_trees = 0, building_edges = 0, building_bends = 0, analysing = 0;
   // Of a coordinator that traces eye paths of a scene that moves: a second one.
   double at_another_time = 0;
 
   // What a coordinator keeps of a job beside the image.
   [[nodiscard]] double KeptByCoordinator() const {
-    return shapes + textures + acceleration + lights + moving;
+    return shapes + textures + acceleration + lights + moving + bends;
   }
   // The greatest at one time, beside the image, of a coordinator that reads, analyses and renders
   // it, and of a worker. With what the heaps keep of memory that was freed.

@@ -68,6 +68,15 @@ TEST(SceneMemoryTest, CountsTheEdgesThatAreFound) {
   }
 }
 
+TEST(SceneMemoryTest, FacetsHaveBendsWhereThereAreNoVertexNormals) {
+  TriangleMesh grid = Grid(100);
+  EXPECT_EQ(SceneMemoryOf(With(grid), kRays).bends, 4 * 2 * 100 * 100);
+  grid.normals.assign(grid.positions.size(), Vec3{0, 0, 1});
+  const SceneMemory with_normals = SceneMemoryOf(With(grid), kRays);
+  EXPECT_EQ(with_normals.bends, 0);
+  EXPECT_EQ(with_normals.building_bends, 0);
+}
+
 TEST(SceneMemoryTest, GrowsWithTheTriangles) {
   const SceneMemory small = SceneMemoryOf(With(Grid(100)), kRays);
   const SceneMemory large = SceneMemoryOf(With(Grid(200)), kRays);
