@@ -36,6 +36,7 @@
 #include "client/view/tev_view.h"
 #include "render/base/console.h"
 #include "render/base/escape.h"
+#include "render/base/open_ssl.h"
 #include "render/base/text.h"
 #include "render/base/version.h"
 #include "render/wire/channel.h"

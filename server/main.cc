@@ -29,6 +29,7 @@
 #include "render/base/escape.h"
 #include "render/base/fail_point.h"
 #include "render/base/memory.h"
+#include "render/base/open_ssl.h"
 #include "render/base/version.h"
 #include "render/geometry/numeric_profile.h"
 #include "render/wire/channel.h"

@@ -2,9 +2,6 @@
 
 #include <grpc/grpc.h>
 #include <grpc/support/log.h>
-#include <openssl/crypto.h>
-
-#include "render/base/status.h"
 
 namespace lucerna {
 namespace {
@@ -23,10 +20,6 @@ void TakeGrpcErrors(void (*on_error)(const std::string& message)) {
   gpr_set_log_function([](gpr_log_func_args* line) {
     if (line->severity == GPR_LOG_SEVERITY_ERROR) error_sink(line->message);
   });
-}
-
-void KeepOpenSsl() {
-  LUCERNA_CHECK(OPENSSL_init_crypto(OPENSSL_INIT_NO_ATEXIT, nullptr) == 1);
 }
 
 void KeepGrpc() {

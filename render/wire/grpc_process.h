@@ -16,10 +16,6 @@ void IgnoreGrpcLog();
 // at once.
 void TakeGrpcErrors(void (*on_error)(const std::string& message));
 
-// When the process ends, OpenSSL is not taken down: a thread of gRPC may be within a handshake then.
-// Before OpenSSL is used.
-void KeepOpenSsl();
-
 // From now on gRPC's threads stay until the process ends. They begin here, so signals that others
 // wait for are blocked before.
 void KeepGrpc();
