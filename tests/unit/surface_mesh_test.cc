@@ -488,6 +488,31 @@ TEST(SurfaceMeshTest, DecimationKeepsBordersThatBend) {
   EXPECT_NEAR(AreaOf(mesh), area, 1e-5);
 }
 
+// A half tube of many strips: vertices within a strip and along its edges go, none across the bend.
+TEST(SurfaceMeshTest, ABentMeshKeepsItsShape) {
+  Scene scene;
+  TriangleMesh arch;
+  arch.traits.material = AddMaterial(scene, DiffuseMaterial(0.5F));
+  constexpr std::uint32_t kStrips = 12;
+  for (std::uint32_t i = 0; i <= kStrips; ++i) {
+    const double angle = std::numbers::pi * i / kStrips;
+    for (const float y : {0.0F, 4.0F})
+      arch.positions.push_back(
+          {static_cast<float>(std::cos(angle)), y, static_cast<float>(std::sin(angle))});
+    if (i < kStrips)
+      arch.indices.insert(arch.indices.end(),
+                          {2 * i, 2 * i + 1, 2 * i + 3, 2 * i, 2 * i + 3, 2 * i + 2});
+  }
+  scene.meshes.push_back(std::move(arch));
+  SurfaceMesh mesh = MeshOf(scene, MeasuredSides::kFront, 0.05);
+  ASSERT_TRUE(mesh.SplitLongEdges(0.15).ok());
+  Bake(
+      mesh, [](const Sensor&) { return 1.0; }, 0.05);
+  const double area = AreaOf(mesh);
+  EXPECT_GT(mesh.Decimate(0.05, 10), 10U);
+  EXPECT_NEAR(AreaOf(mesh), area, 1e-4);
+}
+
 TEST(SurfaceMeshTest, ASphereIsNotDecimated) {
   Scene scene;
   AddMaterial(scene, DiffuseMaterial(0.5F));
