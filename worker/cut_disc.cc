@@ -61,8 +61,9 @@ bool CutDisc::AddSegment(const FeatureSegment& segment, const Frame& frame, doub
   return region_.Add({p.x + d.x * t0, p.y + d.y * t0}, {p.x + d.x * t1, p.y + d.y * t1});
 }
 
-bool CutDisc::Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, float radius,
-                  float reach, KernelKind kernel) {
+CutDisc::Outcome CutDisc::Cut(const FeatureEdges& features, Vec3 position, Vec3 normal,
+                              float radius, float reach, KernelKind kernel,
+                              absl::FunctionRef<bool()> has_photons) {
   position_ = position;
   normal_ = normal;
   inverse_radius_ = 1 / radius;
@@ -71,17 +72,22 @@ bool CutDisc::Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, floa
   t_ = frame.t * inverse_radius_;
   region_.Clear();
   bool has_room = true;
+  bool is_known = false;
+  bool is_empty = false;
   features.ForEachNear({position, normal, radius * reach, radius * kPlaneTolerance},
                        [&](const FeatureSegment& segment) {
+                         if (!is_known) is_empty = !has_photons();
+                         is_known = true;
+                         if (is_empty) return false;
                          return has_room = AddSegment(segment, frame, static_cast<double>(reach));
                        });
-  if (!has_room) return false;
-  if (region_.segments() == 0) return false;
+  if (is_empty) return Outcome::kEmpty;
+  if (!has_room || region_.segments() == 0) return Outcome::kWhole;
   region_.Finish();
 
   const double whole = 1 / Kernel{kernel}.Norm();
   const RegionMoments moments = region_.MomentsOf(kernel, 1);
-  if (!(moments.zeroth > kLeastShare * whole)) return false;
+  if (!(moments.zeroth > kLeastShare * whole)) return Outcome::kWhole;
   // As much of a kernel is left in a smaller disc, or more.
   whole_ = WeightFor(moments, whole);
   constexpr auto kInner = static_cast<double>(kInnerShare);
@@ -89,7 +95,7 @@ bool CutDisc::Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, floa
   inner_.slope_x /= kInnerShare;
   inner_.slope_y /= kInnerShare;
   if (reach > 1) FitLaplacian(static_cast<double>(reach));
-  return true;
+  return Outcome::kCut;
 }
 
 // The part of 2u - 1 over the region that is at right angles to 1, x and y, by Gram and Schmidt.

@@ -13,6 +13,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "absl/functional/function_ref.h"
+
 #include "render/estimate/star_region.h"
 #include "render/geometry/feature_edges.h"
 #include "render/math/vector.h"
@@ -31,12 +33,18 @@ struct DiscPlace {
 
 class CutDisc {
  public:
-  // False when the disc of `reach` radii is whole, or too little or nothing certain is left of it:
-  // then nothing below may be used, and every photon on the hitpoint's side of the surface counts
-  // as in a whole disc.
+  enum class Outcome : std::uint8_t {
+    // Nothing cuts the disc of `reach` radii, or too little or nothing certain is left of it: every
+    // photon on the hitpoint's side of the surface counts as in a whole disc.
+    kWhole,
+    kCut,
+    kEmpty,  // there are edges, and no photon
+  };
+  // Nothing below may be used but after kCut. Asks whether there is any photon at most once, and
+  // only where there are edges: the cut is dear, and many discs of dark places are empty.
   // Requires a unit normal and a radius whose square is a positive float.
-  bool Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, float radius, float reach,
-           KernelKind kernel);
+  Outcome Cut(const FeatureEdges& features, Vec3 position, Vec3 normal, float radius, float reach,
+              KernelKind kernel, absl::FunctionRef<bool()> has_photons);
 
   [[nodiscard]] DiscPlace PlaceOf(Vec3 to_photon) const {
     return {Dot(to_photon, s_), Dot(to_photon, t_)};

@@ -358,16 +358,18 @@ std::vector<GatherPiece> GatherAll(const HitpointBlock& block, const RadiusColum
         const GlossyHitpoint* lobe = is_glossy ? &*glossy++ : nullptr;
         const bool is_caustic = row >= first_caustic;
         if (is_caustic && photons.caustics == nullptr) continue;
-        // Most discs of dark places are empty, and the cut is the dearest part of a full one.
         const RowSource& source = is_caustic ? caustic : ordinary;
-        if (photons.features != nullptr &&
-            !source.grid.HasAnyWithin(block.positions[row], radii[row] * ReachOf(kEvidence))) {
-          continue;
+        bool is_cut = false;
+        if (photons.features != nullptr) {
+          const CutDisc::Outcome outcome = cut.Cut(
+              *photons.features, block.positions[row], DecodeOctahedral(block.normals_oct[row]),
+              radii[row], ReachOf(kEvidence), GatherKernel::kKind, [&] {
+                return source.grid.HasAnyWithin(block.positions[row],
+                                                radii[row] * ReachOf(kEvidence));
+              });
+          if (outcome == CutDisc::Outcome::kEmpty) continue;
+          is_cut = outcome == CutDisc::Outcome::kCut;
         }
-        const bool is_cut = photons.features != nullptr &&
-                            cut.Cut(*photons.features, block.positions[row],
-                                    DecodeOctahedral(block.normals_oct[row]), radii[row],
-                                    ReachOf(kEvidence), GatherKernel::kKind);
         const auto gather_row = [&](auto with_normals, auto with_cut) {
           GatherRow<GatherKernel, kEvidence, with_normals(), with_cut()>(
               block, row, radii[row], lobe, materials, scale, source, is_cut ? &cut : nullptr,
