@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_format.h"
 
+#include "render/geometry/bend_radii.h"
 #include "render/scene/shape_lists.h"
 
 namespace lucerna {
@@ -28,9 +29,9 @@ constexpr double kEmitter = 48;
 // Of feature edges: a segment, with the tree; and while they are found.
 constexpr double kSegment = 52;
 constexpr double kEdgesPerTriangle = 77, kEdgesPerVertex = 28, kEdgesPerMesh = 24;
-// Of bends: a triangle without vertex normals; and while they are found.
+// Of bends: a triangle of a mesh with facets; and while they are found.
 constexpr double kBend = 4;
-constexpr double kBendsPerTriangle = 48, kBendsPerVertex = 4;
+constexpr double kBendsPerTriangle = 52, kBendsPerVertex = 4;
 // Of the analysis of what a job needs: a triangle, a vertex, a mesh, and a triangle of a closed
 // surface.
 constexpr double kAnalysisPerTriangle = 108, kAnalysisPerVertex = 29, kAnalysisPerMesh = 650;
@@ -87,7 +88,7 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
       primitives += triangles;
       memory.shapes += SizeOf(mesh);
       memory.acceleration += kTreeMesh + tree * triangles + sizeof(Vec3) * (vertices + 1) + kBlock;
-      if (mesh.normals.empty()) {
+      if (HasFacets(mesh)) {
         memory.bends += kBend * triangles;
         // One mesh after the other.
         memory.building_bends = std::max(

@@ -24,7 +24,7 @@ struct SceneMemory {
   double lights = 0;        // of emitting triangles
   double moving = 0;        // copies of the shapes that move
   double edges = 0;         // at which discs are cut: of a worker; at most, where edges are unknown
-  double bends = 0;         // of facets without vertex normals, as if none were flat
+  double bends = 0;         // of meshes with facets, as if none were flat
 
   // What building takes for a while beside what is kept.
   double building_trees = 0, building_edges = 0, building_bends = 0, analysing = 0;

@@ -1,7 +1,7 @@
 // What does OpenSSL do when the process ends?
 //
-// By itself it frees all that it has. A thread of gRPC that is within a handshake then, of a
-// connection that nobody waits for any more, would use what is gone.
+// By default it frees its memory at exit. A thread of gRPC may be within a handshake then, of a
+// connection that has been given up, and would use memory that was freed.
 #pragma once
 
 namespace lucerna {

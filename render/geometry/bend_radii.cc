@@ -17,22 +17,25 @@
 namespace lucerna {
 namespace {
 
-// A mesh whose facets turn by less than this from the mean around them is flat.
-constexpr double kFlat = 0.01;
+// By how much of its distance from the origin a vertex may be off: files write six digits.
+constexpr double kPlaceRounding = 1e-6;
 // No more facets around a corner are looked at than this, or up to twice as many: the tip of a cone
 // may have any number.
 constexpr std::size_t kFacetsAround = 32;
 
-// In double, so that squares do not leave its range.
+// Of turns by more than `rounding`. In double, so that squares do not leave its range.
 template <typename Point, typename Normal>
-float RadiusOf(const std::array<Point, 3>& corners, const std::array<Normal, 3>& normals) {
+float RadiusOf(const std::array<Point, 3>& corners, const std::array<Normal, 3>& normals,
+               double rounding = 0) {
   double most = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t next = (i + 1) % 3;
     const Double3 side = Double3(corners[next]) - Double3(corners[i]);
     const Double3 turn = Double3(normals[next]) - Double3(normals[i]);
     const double squared = Dot(side, side);
-    if (squared > 0) most = std::max(most, Dot(turn, turn) / squared);
+    const double squared_turn = Dot(turn, turn);
+    if (squared > 0 && squared_turn > rounding * rounding)
+      most = std::max(most, squared_turn / squared);
   }
   return most > 0 ? static_cast<float>(1 / std::sqrt(most)) : HUGE_VALF;
 }
@@ -40,6 +43,7 @@ float RadiusOf(const std::array<Point, 3>& corners, const std::array<Normal, 3>&
 struct Facet {
   Vec3 normal;  // unit, or 0 of a triangle without area
   std::array<float, 3> angles{};
+  float rounding = 0;  // by which the normal may be off
 };
 
 Facet FacetOf(const std::array<Double3, 3>& corners) {
@@ -48,11 +52,16 @@ Facet FacetOf(const std::array<Double3, 3>& corners) {
   const double twice_area = Length(cross);
   if (!(twice_area > 0)) return facet;
   facet.normal = ToFloat(cross * (1 / twice_area));
+  double longest = 0;
+  double farthest = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     const Double3 to_next = corners[(i + 1) % 3] - corners[i];
+    longest = std::max(longest, Length(to_next));
+    farthest = std::max(farthest, Length(corners[i]));
     const Double3 to_last = corners[(i + 2) % 3] - corners[i];
     facet.angles[i] = static_cast<float>(std::atan2(twice_area, Dot(to_next, to_last)));
   }
+  facet.rounding = static_cast<float>(kPlaceRounding * farthest * longest / twice_area);
   return facet;
 }
 
@@ -92,11 +101,11 @@ std::vector<float> RadiiOfFacets(const TriangleMesh& mesh) {
   };
 
   std::vector<float> radii(triangles, HUGE_VALF);
-  bool is_flat = true;
   for (std::size_t i = 0; i < triangles; ++i) {
     const Double3 own(facets[i].normal);
     if (!(Dot(own, own) > 0)) continue;
     std::array<Double3, 3> normals;
+    float rounding = facets[i].rounding;
     for (std::size_t c = 0; c < 3; ++c) {
       const auto here = around_of(corners[3 * i + c]);
       // Of itself at least.
@@ -108,24 +117,40 @@ std::vector<float> RadiiOfFacets(const TriangleMesh& mesh) {
         if (here[k] / 3 == i || Dot(normal, own) < static_cast<double>(kSameSurfaceCosine))
           continue;
         normals[c] = normals[c] + normal * static_cast<double>(other.angles[here[k] % 3]);
+        rounding = std::max(rounding, other.rounding);
       }
       normals[c] = normals[c] * (1 / Length(normals[c]));
-      is_flat &= Length(normals[c] - own) < kFlat;
     }
-    radii[i] = RadiusOf(corners_of(i), normals);
+    radii[i] = RadiusOf(corners_of(i), normals, 2 * static_cast<double>(rounding));
   }
+  const bool is_flat = std::ranges::all_of(radii, [](float r) { return r == HUGE_VALF; });
   return is_flat ? std::vector<float>() : radii;
 }
 
 std::vector<std::vector<float>> RadiiOfAll(const std::vector<TriangleMesh>& meshes) {
   std::vector<std::vector<float>> radii(meshes.size());
   for (std::size_t i = 0; i < meshes.size(); ++i) {
-    if (meshes[i].normals.empty()) radii[i] = RadiiOfFacets(meshes[i]);
+    if (HasFacets(meshes[i])) radii[i] = RadiiOfFacets(meshes[i]);
   }
   return radii;
 }
 
+bool IsFacet(const TriangleMesh& mesh, std::size_t triangle) {
+  if (mesh.normals.empty()) return true;
+  const std::uint32_t* const corner = &mesh.indices[3 * triangle];
+  const Vec3 normal = mesh.normals[corner[0]];
+  return normal == mesh.normals[corner[1]] && normal == mesh.normals[corner[2]];
+}
+
 }  // namespace
+
+bool HasFacets(const TriangleMesh& mesh) {
+  const std::size_t triangles = mesh.indices.size() / 3;
+  for (std::size_t i = 0; i < triangles; ++i) {
+    if (IsFacet(mesh, i)) return true;
+  }
+  return false;
+}
 
 BendRadii::BendRadii(const Scene& scene)
     : scene_(scene),
@@ -164,7 +189,7 @@ float BendRadii::At(const SurfacePoint& point) const {
                         }
                       });
   }
-  if (mesh->normals.empty()) {
+  if (IsFacet(*mesh, point.primitive)) {
     const std::size_t number = point.geometry;
     return number < of_meshes_.size() ? AtFacet(of_meshes_[number], *mesh, point)
                                       : AtFacet(of_object_meshes_[static_cast<std::size_t>(
@@ -174,7 +199,6 @@ float BendRadii::At(const SurfacePoint& point) const {
   const std::uint32_t* corner = &mesh->indices[std::size_t{3} * point.primitive];
   std::array<Vec3, 3> normals = {mesh->normals[corner[0]], mesh->normals[corner[1]],
                                  mesh->normals[corner[2]]};
-  if (normals[0] == normals[1] && normals[0] == normals[2]) return HUGE_VALF;
   for (Vec3& normal : normals) {
     if (point.instance != kNoInstance && normal != Vec3())
       normal = scene_.instances[point.instance].to_world.Normal(normal);

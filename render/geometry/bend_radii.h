@@ -1,10 +1,11 @@
 // How narrow is the bend of a surface at a point?
 //
 // Analytic shapes are exact. A mesh is bent as far as its vertex normals turn along the sides of a
-// triangle. One without vertex normals has facets: it is bent as if it had, at the corners of each
-// facet, the mean of the normals of the facets around that are one surface with it
-// (kSameSurfaceCosine), weighted by their angles at the corner. So a bar of twelve flat sides is as
-// round as one of twelve sides with round normals, and a box is flat.
+// triangle. Triangles without vertex normals, or with the same at all three corners, are facets:
+// they are bent as if they had, at the corners of each, the mean of the normals of the facets
+// around that are one surface with it (kSameSurfaceCosine), weighted by their angles at the corner.
+// So a bar of twelve flat sides is as round as one of twelve sides with round normals, and a box is
+// flat. What the rounding of vertices may have turned does not count.
 #pragma once
 
 #include <vector>
@@ -14,10 +15,13 @@
 
 namespace lucerna {
 
+// Whether any triangle of the mesh is a facet.
+[[nodiscard]] bool HasFacets(const TriangleMesh& mesh);
+
 class BendRadii {
  public:
-  // Prepares the meshes without vertex normals: 4 bytes a triangle are kept of those that are not
-  // flat, and some 50 taken meanwhile. Keeps a reference to `scene`, which must not change.
+  // Prepares the meshes that have facets: 4 bytes a triangle are kept of those that are not flat,
+  // and some 50 taken meanwhile. Keeps a reference to `scene`, which must not change.
   explicit BendRadii(const Scene& scene);
 
   // The least radius of curvature of the surface at the point, of any direction and either side.
@@ -25,7 +29,7 @@ class BendRadii {
   [[nodiscard]] float At(const SurfacePoint& point) const;
 
  private:
-  // Of a mesh in the world, or in its object, by triangles; empty: flat, or it has vertex normals.
+  // Of a mesh in the world, or in its object, by triangles; empty: flat, or without facets.
   using OfFacets = std::vector<float>;
   [[nodiscard]] float AtFacet(const OfFacets& facets, const TriangleMesh& mesh,
                               const SurfacePoint& point) const;

@@ -10,6 +10,7 @@
 #include <immintrin.h>
 
 #include "render/math/double3.h"
+#include "render/math/float_lanes.h"
 #include "render/scene/mesh_edges.h"
 #include "render/scene/shape_lists.h"
 
@@ -179,33 +180,33 @@ struct Vec3Lanes {
   __m256 x, y, z;
 };
 
-Vec3Lanes All(Vec3 a) {
-  return {_mm256_set1_ps(a.x), _mm256_set1_ps(a.y), _mm256_set1_ps(a.z)};
-}
 Vec3Lanes Load(const std::array<std::array<float, 8>, 3>& of) {
-  return {_mm256_load_ps(of[0].data()), _mm256_load_ps(of[1].data()), _mm256_load_ps(of[2].data())};
+  return {LoadLanes(of[0]), LoadLanes(of[1]), LoadLanes(of[2])};
+}
+Vec3Lanes operator-(const Vec3Lanes& a, Vec3 b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
 Vec3Lanes operator-(const Vec3Lanes& a, const Vec3Lanes& b) {
-  return {_mm256_sub_ps(a.x, b.x), _mm256_sub_ps(a.y, b.y), _mm256_sub_ps(a.z, b.z)};
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
 }
 Vec3Lanes operator+(const Vec3Lanes& a, const Vec3Lanes& b) {
-  return {_mm256_add_ps(a.x, b.x), _mm256_add_ps(a.y, b.y), _mm256_add_ps(a.z, b.z)};
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+Vec3Lanes operator*(const Vec3Lanes& a, float s) {
+  return {a.x * s, a.y * s, a.z * s};
 }
 Vec3Lanes operator*(const Vec3Lanes& a, __m256 s) {
-  return {_mm256_mul_ps(a.x, s), _mm256_mul_ps(a.y, s), _mm256_mul_ps(a.z, s)};
+  return {a.x * s, a.y * s, a.z * s};
 }
 __m256 Dot(const Vec3Lanes& a, const Vec3Lanes& b) {
-  return _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(a.x, b.x), _mm256_mul_ps(a.y, b.y)),
-                       _mm256_mul_ps(a.z, b.z));
+  return a.x * b.x + a.y * b.y + a.z * b.z;
 }
-__m256 Abs(__m256 a) {
-  return _mm256_andnot_ps(_mm256_set1_ps(-0.0F), a);
+__m256 Dot(const Vec3Lanes& a, Vec3 b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
 }
 __m256 MaxAbs(const Vec3Lanes& a) {
-  return _mm256_max_ps(_mm256_max_ps(Abs(a.x), Abs(a.y)), Abs(a.z));
-}
-unsigned int Bits(__m256 mask) {
-  return static_cast<unsigned int>(_mm256_movemask_ps(mask));
+  const auto max_abs = [](__m256 b, __m256 c) { return _mm256_max_ps(_mm256_max_ps(b, -b), c); };
+  return max_abs(a.x, max_abs(a.y, max_abs(a.z, _mm256_setzero_ps())));
 }
 
 // Of what is added to a height, relative to the lengths that it is computed from, for rounding.
@@ -215,64 +216,40 @@ constexpr float kHeightRounding = 1e-6F;
 
 // Relative to `reach`, so that squares do not leave the range of a float.
 unsigned int FeatureEdges::SegmentsNear(const Lanes& segments, const DiscSlab& slab) {
-  const __m256 zero = _mm256_setzero_ps();
-  const __m256 one = _mm256_set1_ps(1);
-  const __m256 scale = _mm256_set1_ps(1 / slab.reach);
-  const Vec3Lanes center = All(slab.center);
-  const Vec3Lanes a = (Load(segments.low) - center) * scale;
-  const Vec3Lanes b = (Load(segments.high) - center) * scale;
-  const Vec3Lanes normal = All(slab.normal);
-  const __m256 height_a = Dot(a, normal);
-  const __m256 height_b = Dot(b, normal);
-  const __m256 height = _mm256_add_ps(
-      _mm256_set1_ps(slab.height / slab.reach),
-      _mm256_mul_ps(_mm256_set1_ps(kHeightRounding), _mm256_add_ps(MaxAbs(a), MaxAbs(b))));
-  const __m256 lower = _mm256_min_ps(height_a, height_b);
-  const __m256 higher = _mm256_max_ps(height_a, height_b);
-  const __m256 in_slab =
-      _mm256_and_ps(_mm256_cmp_ps(lower, height, _CMP_LE_OQ),
-                    _mm256_cmp_ps(higher, _mm256_sub_ps(zero, height), _CMP_GE_OQ));
-  if (Bits(in_slab) == 0) return 0;
+  const float scale = 1 / slab.reach;
+  const Vec3Lanes a = (Load(segments.low) - slab.center) * scale;
+  const Vec3Lanes b = (Load(segments.high) - slab.center) * scale;
+  const __m256 height_a = Dot(a, slab.normal);
+  const __m256 height_b = Dot(b, slab.normal);
+  const __m256 height = slab.height * scale + kHeightRounding * (MaxAbs(a) + MaxAbs(b));
+  const auto in_slab = (_mm256_min_ps(height_a, height_b) <= height) &
+                       (_mm256_max_ps(height_a, height_b) >= -height);
+  if (LaneBits(in_slab) == 0) return 0;
   const Vec3Lanes along = b - a;
-  const __m256 squared = Dot(along, along);
-  const __m256 share = _mm256_div_ps(_mm256_sub_ps(zero, Dot(a, along)), squared);
   // A segment without length is where it begins: the maximum of no number and 0 is 0.
-  const __m256 t = _mm256_min_ps(_mm256_max_ps(share, zero), one);
+  const __m256 share = -Dot(a, along) / Dot(along, along);
+  const __m256 t = _mm256_min_ps(_mm256_max_ps(share, _mm256_setzero_ps()), _mm256_set1_ps(1));
   const Vec3Lanes nearest = a + along * t;
-  return Bits(_mm256_and_ps(in_slab, _mm256_cmp_ps(Dot(nearest, nearest), one, _CMP_LT_OQ)));
+  return LaneBits(in_slab & (Dot(nearest, nearest) < 1));
 }
 
 unsigned int FeatureEdges::BoxesNear(const Lanes& boxes, const DiscSlab& slab) {
-  const __m256 zero = _mm256_setzero_ps();
-  const __m256 one = _mm256_set1_ps(1 + 1e-5F);
-  const __m256 scale = _mm256_set1_ps(1 / slab.reach);
-  const Vec3Lanes center = All(slab.center);
-  const Vec3Lanes low = (Load(boxes.low) - center) * scale;
-  const Vec3Lanes high = (Load(boxes.high) - center) * scale;
-  const auto beyond = [&](__m256 from, __m256 to) {
-    return _mm256_max_ps(_mm256_max_ps(from, _mm256_sub_ps(zero, to)), zero);
+  const float scale = 1 / slab.reach;
+  const Vec3Lanes low = (Load(boxes.low) - slab.center) * scale;
+  const Vec3Lanes high = (Load(boxes.high) - slab.center) * scale;
+  const auto beyond = [](__m256 from, __m256 to) {
+    return _mm256_max_ps(_mm256_max_ps(from, -to), _mm256_setzero_ps());
   };
   const Vec3Lanes outside = {beyond(low.x, high.x), beyond(low.y, high.y), beyond(low.z, high.z)};
-  const __m256 in_reach = _mm256_cmp_ps(Dot(outside, outside), one, _CMP_LT_OQ);
   // The lowest and the highest corner.
-  const auto lower = [](__m256 from, __m256 to, float n) {
-    const __m256 by = _mm256_set1_ps(n);
-    return _mm256_mul_ps(n >= 0 ? from : to, by);
-  };
+  const auto corner = [](float n, __m256 from, __m256 to) { return (n >= 0 ? from : to) * n; };
   const Vec3 n = slab.normal;
   const __m256 lowest =
-      _mm256_add_ps(_mm256_add_ps(lower(low.x, high.x, n.x), lower(low.y, high.y, n.y)),
-                    lower(low.z, high.z, n.z));
+      corner(n.x, low.x, high.x) + corner(n.y, low.y, high.y) + corner(n.z, low.z, high.z);
   const __m256 highest =
-      _mm256_add_ps(_mm256_add_ps(lower(high.x, low.x, n.x), lower(high.y, low.y, n.y)),
-                    lower(high.z, low.z, n.z));
-  const __m256 height = _mm256_add_ps(
-      _mm256_set1_ps(slab.height / slab.reach),
-      _mm256_mul_ps(_mm256_set1_ps(kHeightRounding), _mm256_add_ps(MaxAbs(low), MaxAbs(high))));
-  const __m256 in_slab =
-      _mm256_and_ps(_mm256_cmp_ps(lowest, height, _CMP_LE_OQ),
-                    _mm256_cmp_ps(highest, _mm256_sub_ps(zero, height), _CMP_GE_OQ));
-  return Bits(_mm256_and_ps(in_reach, in_slab));
+      corner(n.x, high.x, low.x) + corner(n.y, high.y, low.y) + corner(n.z, high.z, low.z);
+  const __m256 height = slab.height * scale + kHeightRounding * (MaxAbs(low) + MaxAbs(high));
+  return LaneBits((Dot(outside, outside) < 1 + 1e-5F) & (lowest <= height) & (highest >= -height));
 }
 
 }  // namespace lucerna

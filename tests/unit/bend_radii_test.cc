@@ -1,6 +1,7 @@
 // A surface is bent as the round one is that it was made of, with vertex normals or without.
 #include "render/geometry/bend_radii.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -102,10 +103,6 @@ TEST(BendRadiiTest, OfAMeshAreThoseOfTheRoundSurface) {
       for (std::uint32_t i = 0; i < Triangles(scene); ++i)
         ASSERT_NEAR(bends.At(OnTriangle(i)) / radius, 1, 1e-5);
     }
-    // Those of a plane.
-    Scene flat = SceneOf(Tube(radius, 16, true));
-    flat.meshes[0].normals.assign(flat.meshes[0].positions.size(), Vec3{0, 0, 1});
-    EXPECT_EQ(BendRadii(flat).At(OnTriangle(3)), HUGE_VALF);
   }
 }
 
@@ -127,6 +124,52 @@ TEST(BendRadiiTest, OfFacetsAreThoseOfTheRoundSurface) {
     const BendRadii bends(ball);
     for (std::uint32_t i = 4 * 24; i < Triangles(ball) - 4 * 24; ++i)
       ASSERT_NEAR(bends.At(OnTriangle(i)) / radius, 1, 0.1);
+  }
+}
+
+// Files have the normals of facets at their corners, too.
+TEST(BendRadiiTest, FacetsMayHaveNormals) {
+  TriangleMesh mesh = Tube(0.25, 12, true, /*shares_corners=*/false);
+  for (std::size_t i = 0; i < mesh.normals.size(); i += 4) {
+    const Vec3 normal = Normalize(mesh.normals[i] + mesh.normals[i + 1]);
+    std::fill_n(mesh.normals.begin() + static_cast<std::ptrdiff_t>(i), 4, normal);
+  }
+  EXPECT_TRUE(HasFacets(mesh));
+  const Scene tube = SceneOf(std::move(mesh));
+  const BendRadii bends(tube);
+  for (std::uint32_t i = 0; i < Triangles(tube); ++i)
+    ASSERT_NEAR(bends.At(OnTriangle(i)) / 0.25, 1, 1e-4);
+  EXPECT_FALSE(HasFacets(Tube(0.25, 12, true)));
+}
+
+// A tube of a thousand sides is as round as one of twelve; a fine grid is flat wherever it lies and
+// however it is turned, though its vertices are rounded.
+TEST(BendRadiiTest, FineFacetsAreKnownFromRounding) {
+  const Scene tube = SceneOf(Tube(0.25, 1000, false));
+  const BendRadii bends(tube);
+  for (std::uint32_t i = 0; i < Triangles(tube); ++i)
+    ASSERT_NEAR(bends.At(OnTriangle(i)) / 0.25, 1, 0.05);
+
+  const Frame frame(Normalize({0.3F, 0.5F, 0.8F}));
+  for (const float away : {0.0F, 10.0F, 1000.0F}) {
+    SCOPED_TRACE(away);
+    TriangleMesh grid;
+    grid.traits.material = 0;
+    constexpr std::uint32_t kSide = 200;
+    for (std::uint32_t y = 0; y <= kSide; ++y) {
+      for (std::uint32_t x = 0; x <= kSide; ++x) {
+        grid.positions.push_back(Vec3{away, away, 0} + frame.s * (static_cast<float>(x) / kSide) +
+                                 frame.t * (static_cast<float>(y) / kSide));
+        if (x == kSide || y == kSide) continue;
+        const std::uint32_t a = y * (kSide + 1) + x;
+        const std::uint32_t b = a + kSide + 1;
+        grid.indices.insert(grid.indices.end(), {a, a + 1, b + 1, a, b + 1, b});
+      }
+    }
+    const Scene scene = SceneOf(std::move(grid));
+    const BendRadii flat(scene);
+    for (std::uint32_t i = 0; i < Triangles(scene); ++i)
+      ASSERT_EQ(flat.At(OnTriangle(i)), HUGE_VALF);
   }
 }
 

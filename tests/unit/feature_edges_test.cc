@@ -238,7 +238,7 @@ TEST(FeatureEdgesTest, AreFoundWhereTheyAre) {
     EXPECT_TRUE(!any_in_reach || edges.HasNear(center, reach));
   }
   EXPECT_GT(found_any, 1000);
-  // It ends when it is told to.
+  // A visit that returns false is the last.
   int visited = 0;
   edges.ForEachNear({{5, 15, 0.5F}, {0, 0, 1}, 40, HUGE_VALF},
                     [&](const FeatureSegment&) { return ++visited < 7; });

@@ -68,10 +68,13 @@ TEST(SceneMemoryTest, CountsTheEdgesThatAreFound) {
   }
 }
 
-TEST(SceneMemoryTest, FacetsHaveBendsWhereThereAreNoVertexNormals) {
+TEST(SceneMemoryTest, OnlyMeshesWithFacetsHaveBends) {
   TriangleMesh grid = Grid(100);
   EXPECT_EQ(SceneMemoryOf(With(grid), kRays).bends, 4 * 2 * 100 * 100);
   grid.normals.assign(grid.positions.size(), Vec3{0, 0, 1});
+  EXPECT_EQ(SceneMemoryOf(With(grid), kRays).bends, 4 * 2 * 100 * 100) << "flat normals are facets";
+  for (std::size_t i = 0; i < grid.normals.size(); ++i)
+    grid.normals[i] = Normalize({grid.positions[i].x, grid.positions[i].y, 100});
   const SceneMemory with_normals = SceneMemoryOf(With(grid), kRays);
   EXPECT_EQ(with_normals.bends, 0);
   EXPECT_EQ(with_normals.building_bends, 0);
