@@ -205,14 +205,6 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
   std::int64_t sum_g = 0;
   std::int64_t sum_b = 0;
   EvidenceSums<kEvidence> evidence(normal, scale);
-  // Photons beyond the radius, for evidence that reaches further, have no part in the estimate.
-  const auto shape = [&](float squared) {
-    const float t2 = squared * inverse_squared;
-    if constexpr (ReachOf(kEvidence) > 1) {
-      if (!(t2 < 1)) return 0.0F;
-    }
-    return GatherKernel::Shape(t2);
-  };
   const float reach = radius * ReachOf(kEvidence);
   // The whole kernel less the inner one: see kBlurColumn.
   constexpr float kInnerArea = kInnerShare * kInnerShare;
@@ -221,10 +213,12 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
     return t2 < 1 ? whole - GatherKernel::Shape(t2) * (1 / kInnerArea) : whole;
   };
   std::int64_t blur = 0;
-  const auto add = [&](std::size_t number, const PhotonRecord& photon, Rgb flux, float squared,
-                       DiscPlace place) {
+  const auto count_photon = [&](std::size_t number) {
     if (!source.found_by.empty()) MarkFound(source.found_by[number], hitpoint);
-    const float whole = shape(squared);
+    ++count;
+  };
+  const auto add = [&](const PhotonRecord& photon, Rgb flux, float squared, DiscPlace place) {
+    const float whole = GatherKernel::Shape(squared * inverse_squared);
     const std::uint64_t bits = PairBits(photon.key, hitpoint);
     const auto dither = [&](int channel) { return DitherOf(bits, channel); };
     if constexpr (kCut) {
@@ -247,7 +241,17 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
       sum_g += RoundDithered(quanta.g, dither(1));
       sum_b += RoundDithered(quanta.b, dither(2));
     }
-    ++count;
+  };
+  // Photons beyond the radius, for evidence that reaches further, have no part in the estimate.
+  const auto for_each_photon = [&](const auto& visit) {
+    const auto near = [&](std::size_t i, float squared) { visit(i, squared, std::true_type()); };
+    if constexpr (ReachOf(kEvidence) > 1) {
+      grid.ForEachWithin(position, radius, reach, near, [&](std::size_t i, float squared) {
+        visit(i, squared, std::false_type());
+      });
+    } else {
+      grid.ForEachWithin(position, reach, near);
+    }
   };
   // Whether a place belongs to the disc.
   const auto find_place = [&](Vec3 to_photon, DiscPlace& place) {
@@ -259,7 +263,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
     }
   };
   if (!kNormals || glossy == nullptr) {
-    grid.ForEachWithin(position, reach, [&](std::size_t i, float squared) {
+    for_each_photon([&](std::size_t i, float squared, auto is_near) {
       const auto& photon = grid.template record<kNormals>(i);
       const Vec3 to_photon = grid.position(i) - position;
       if constexpr (kNormals) {
@@ -270,7 +274,8 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
       }
       DiscPlace place;
       if (!find_place(to_photon, place)) return;
-      add(i, photon, photon.flux, squared, place);
+      count_photon(i);
+      if constexpr (is_near()) add(photon, photon.flux, squared, place);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(photon.flux), cut);
     });
   } else {
@@ -298,7 +303,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
     const Frame frame = FrameOf(*glossy, place_of);
     const Vec3 wo = frame.ToLocal(DecodeOctahedral(glossy->to_eye_oct));
     const bool transmits = Transmits(material);
-    grid.ForEachWithin(position, reach, [&](std::size_t i, float squared) {
+    for_each_photon([&](std::size_t i, float squared, auto is_near) {
       const FacingRecord& photon = grid.template record<true>(i);
       const Vec3 to_photon = grid.position(i) - position;
       // Photons on the far side of a rough dielectric count too.
@@ -319,7 +324,8 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
         ++piece.excess;
         return;
       }
-      add(i, photon, scattered, squared, place);
+      count_photon(i);
+      if constexpr (is_near()) add(photon, scattered, squared, place);
       evidence.Add(grid, i, to_photon, squared, squared_radius, Luminance(scattered), cut);
     });
   }

@@ -8,6 +8,8 @@
 #include <cstdint>
 #include <vector>
 
+#include <immintrin.h>
+
 #include "render/base/parallel.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
@@ -65,6 +67,11 @@ class PhotonGrid {
   // Calls visit(photon, squared distance) for every photon closer to `center` than `radius`.
   template <typename Visit>
   void ForEachWithin(Vec3 center, float radius, const Visit& visit) const;
+  // The same within `reach`, by visit_near where squared distance · (1 / radius²) < 1 and by
+  // visit_far elsewhere, in an order of its own.
+  template <typename Near, typename Far>
+  void ForEachWithin(Vec3 center, float radius, float reach, const Near& visit_near,
+                     const Far& visit_far) const;
   // Whether there is any such photon.
   [[nodiscard]] bool HasAnyWithin(Vec3 center, float radius) const;
 
@@ -74,6 +81,9 @@ class PhotonGrid {
   // true.
   template <typename Visit>
   void ForEachEight(Vec3 center, float radius, const Visit& visit) const;
+  // Calls visit(photon, squared distance) for each photon of such a mask.
+  template <typename Visit>
+  static void VisitLanes(std::size_t first, __m256 squared, unsigned int mask, const Visit& visit);
   [[nodiscard]] int CellOf(float offset, int cells) const {
     const float cell = offset * inverse_cell_;
     return cell > 0 ? std::min(static_cast<int>(std::min(cell, 1e9F)), cells - 1) : 0;

@@ -50,15 +50,35 @@ void PhotonGrid::ForEachEight(Vec3 center, float radius, const Visit& visit) con
 template <typename Visit>
 void PhotonGrid::ForEachWithin(Vec3 center, float radius, const Visit& visit) const {
   ForEachEight(center, radius, [&](std::size_t first, __m256 squared, unsigned int mask) {
-    alignas(32) float distances[8];
-    _mm256_store_ps(distances, squared);
-    while (mask != 0) {
-      const auto lane = static_cast<std::size_t>(std::countr_zero(mask));
-      mask &= mask - 1;
-      visit(first + lane, distances[lane]);
-    }
+    VisitLanes(first, squared, mask, visit);
     return false;
   });
+}
+
+template <typename Near, typename Far>
+void PhotonGrid::ForEachWithin(Vec3 center, float radius, float reach, const Near& visit_near,
+                               const Far& visit_far) const {
+  const __m256 inverse_squared = _mm256_set1_ps(1 / (radius * radius));
+  const __m256 one = _mm256_set1_ps(1);
+  ForEachEight(center, reach, [&](std::size_t first, __m256 squared, unsigned int mask) {
+    const auto is_near = static_cast<unsigned int>(_mm256_movemask_ps(
+        _mm256_cmp_ps(_mm256_mul_ps(squared, inverse_squared), one, _CMP_LT_OQ)));
+    VisitLanes(first, squared, mask & is_near, visit_near);
+    VisitLanes(first, squared, mask & ~is_near, visit_far);
+    return false;
+  });
+}
+
+template <typename Visit>
+void PhotonGrid::VisitLanes(std::size_t first, __m256 squared, unsigned int mask,
+                            const Visit& visit) {
+  alignas(32) float distances[8];
+  _mm256_store_ps(distances, squared);
+  while (mask != 0) {
+    const auto lane = static_cast<std::size_t>(std::countr_zero(mask));
+    mask &= mask - 1;
+    visit(first + lane, distances[lane]);
+  }
 }
 
 inline bool PhotonGrid::HasAnyWithin(Vec3 center, float radius) const {

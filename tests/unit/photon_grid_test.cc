@@ -56,6 +56,31 @@ std::vector<std::uint32_t> NearByGrid(const PhotonGrid& grid, Vec3 center, float
   return near;
 }
 
+// Photons within a radius and those beyond it, within one and a half of it.
+void ExpectNearAndFar(const PhotonGrid& grid, const Cloud& cloud, Vec3 center, float radius) {
+  const float reach = 1.5F * radius;
+  const float inverse_squared = 1 / (radius * radius);
+  std::vector<std::uint32_t> near;
+  std::vector<std::uint32_t> far;
+  const auto list_in = [&](std::vector<std::uint32_t>& list) {
+    return [&](std::size_t i, float squared) {
+      EXPECT_EQ(squared, LengthSquared(grid.position(i) - center));
+      list.push_back(grid.record<false>(i).key);
+    };
+  };
+  grid.ForEachWithin(center, radius, reach, list_in(near), list_in(far));
+  std::ranges::sort(near);
+  std::ranges::sort(far);
+  std::vector<std::uint32_t> expected_near;
+  std::vector<std::uint32_t> expected_far;
+  for (const std::uint32_t i : NearByBruteForce(cloud, center, reach)) {
+    const bool is_near = LengthSquared(cloud.all[i] - center) * inverse_squared < 1;
+    (is_near ? expected_near : expected_far).push_back(i);
+  }
+  ASSERT_EQ(near, expected_near);
+  ASSERT_EQ(far, expected_far);
+}
+
 void ExpectAgreement(const Cloud& cloud, float cell, float extent, std::uint64_t key) {
   for (const int threads : {1, 3}) {
     ThreadTeam team(threads);
@@ -67,6 +92,7 @@ void ExpectAgreement(const Cloud& cloud, float cell, float extent, std::uint64_t
       const Vec3 center = RandomPoint(rng, 1.4F * extent) - Vec3{0.2F, 0.2F, 0.2F} * extent;
       const float radius = extent * std::pow(10.0F, -4 + 4 * rng.Uniform());
       ASSERT_EQ(NearByGrid(grid, center, radius), NearByBruteForce(cloud, center, radius));
+      ASSERT_NO_FATAL_FAILURE(ExpectNearAndFar(grid, cloud, center, radius));
     }
     // Around photons themselves, and with radii that end exactly on another photon.
     for (std::size_t i = 0; i + 1 < std::min<std::size_t>(cloud.all.size(), 100); ++i) {
@@ -75,6 +101,7 @@ void ExpectAgreement(const Cloud& cloud, float cell, float extent, std::uint64_t
       ASSERT_EQ(NearByGrid(grid, center, radius), NearByBruteForce(cloud, center, radius));
       const float wider = std::nextafter(radius, HUGE_VALF);
       ASSERT_EQ(NearByGrid(grid, center, wider), NearByBruteForce(cloud, center, wider));
+      ASSERT_NO_FATAL_FAILURE(ExpectNearAndFar(grid, cloud, center, radius));
     }
   }
 }
