@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace lucerna {
 namespace {
@@ -64,11 +65,21 @@ FilterSampler::FilterSampler(const PixelFilter& filter, float radius) : radius_(
     weight_[i] = static_cast<float>(std::copysign(absolute / total, mass[i]));
   }
   cumulative_[kCells] = 1;
+  std::uint8_t cell = 0;
+  static_assert(kCells - 1 <= UINT8_MAX);
+  for (std::size_t i = 0; i < kCells; ++i) {
+    const float u = static_cast<float>(i) / static_cast<float>(kCells);
+    while (cell + 1U < kCells && cumulative_[cell + 1U] <= u)
+      ++cell;
+    first_cell_[i] = cell;
+  }
 }
 
 float FilterSampler::Sample(float u, float& weight) const {
-  const auto above = std::upper_bound(cumulative_.begin() + 1, cumulative_.end() - 1, u);
-  const auto cell = static_cast<std::size_t>(above - cumulative_.begin()) - 1;
+  std::size_t cell =
+      first_cell_[std::min(static_cast<std::size_t>(u * static_cast<float>(kCells)), kCells - 1)];
+  while (cell + 1 < kCells && cumulative_[cell + 1] <= u)
+    ++cell;
   const float width = cumulative_[cell + 1] - cumulative_[cell];
   const float inside = width > 0 ? (u - cumulative_[cell]) / width : 0.5F;
   weight *= weight_[cell];

@@ -105,6 +105,9 @@ class FilterSampler {
   static constexpr std::size_t kCells = 128;
   float radius_;
   std::array<float, kCells + 1> cumulative_{};
+  // [i] of the numbers from i / kCells on: the cell of the smallest. (Chen & Asau 1974, "On
+  // Generating Random Variates from an Empirical Distribution".)
+  std::array<std::uint8_t, kCells> first_cell_{};
   std::array<float, kCells> weight_{};
 };
 

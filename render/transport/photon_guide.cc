@@ -73,18 +73,14 @@ double PhotonGuide::Draw(PrimaryNumbers& numbers) const {
     const std::size_t d = nodes_[at].dimension;
     const double share = ShareOf(nodes_[at].low_share);
     size[d] *= 0.5;
-    if (numbers[d] < share) {
-      numbers[d] /= share;
-      weight *= 0.5 / share;
-      ++at;
-    } else {
-      numbers[d] = (numbers[d] - share) / (1 - share);
-      low[d] += size[d];
-      weight *= 0.5 / (1 - share);
-      at = high_[at];
-    }
+    // Without a branch: its way is as random as the number.
+    const bool is_low = numbers[d] < share;
+    const double part = is_low ? share : 1 - share;
     // A quotient may be rounded to 1.
-    numbers[d] = std::min(numbers[d], kBelowOne);
+    numbers[d] = std::min((numbers[d] - (is_low ? 0 : share)) / part, kBelowOne);
+    low[d] += is_low ? 0 : size[d];
+    weight *= 0.5 / part;
+    at = is_low ? at + 1 : high_[at];
   }
   for (std::size_t d = 0; d < kEmissionDimensions; ++d)
     numbers[d] = low[d] + size[d] * numbers[d];
