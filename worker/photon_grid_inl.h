@@ -5,6 +5,7 @@
 
 #include <immintrin.h>
 
+#include "render/math/float_lanes.h"
 #include "worker/photon_grid.h"
 
 namespace lucerna {
@@ -58,11 +59,9 @@ void PhotonGrid::ForEachWithin(Vec3 center, float radius, const Visit& visit) co
 template <typename Near, typename Far>
 void PhotonGrid::ForEachWithin(Vec3 center, float radius, float reach, const Near& visit_near,
                                const Far& visit_far) const {
-  const __m256 inverse_squared = _mm256_set1_ps(1 / (radius * radius));
-  const __m256 one = _mm256_set1_ps(1);
+  const float inverse_squared = 1 / (radius * radius);
   ForEachEight(center, reach, [&](std::size_t first, __m256 squared, unsigned int mask) {
-    const auto is_near = static_cast<unsigned int>(_mm256_movemask_ps(
-        _mm256_cmp_ps(_mm256_mul_ps(squared, inverse_squared), one, _CMP_LT_OQ)));
+    const unsigned int is_near = LaneBits(squared * inverse_squared < 1);
     VisitLanes(first, squared, mask & is_near, visit_near);
     VisitLanes(first, squared, mask & ~is_near, visit_far);
     return false;

@@ -73,7 +73,7 @@ double PhotonGuide::Draw(PrimaryNumbers& numbers) const {
     const std::size_t d = nodes_[at].dimension;
     const double share = ShareOf(nodes_[at].low_share);
     size[d] *= 0.5;
-    // Without a branch: its way is as random as the number.
+    // Selections, not a branch: no processor could predict which half it is.
     const bool is_low = numbers[d] < share;
     const double part = is_low ? share : 1 - share;
     // A quotient may be rounded to 1.
