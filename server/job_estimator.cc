@@ -13,6 +13,7 @@
 
 #include "render/analysis/pass_time.h"
 #include "render/analysis/prepared_scene.h"
+#include "render/base/memory.h"
 #include "render/base/mutex.h"
 #include "render/base/parallel.h"
 #include "render/base/text.h"
@@ -244,19 +245,20 @@ struct JobEstimator::State {
     return NextPhotons(before, choice->most * first, best_photons);
   }
 
-  // By what later passes draw their photons once `round` is added, given by what they would by what
-  // was known before.
+  // By what later passes draw their photons once `round` is added, which brought `reports` of so
+  // many photons, given by what they would by what was known before.
   [[nodiscard]] std::shared_ptr<const PhotonGuide> ChooseGuide(
-      const SliceSums& round, const RoundPlan& plan, std::uint64_t photons_per_pass,
+      const PassRange& round, std::span<const EmissionReport> reports, std::uint64_t photons,
+      const RoundPlan& plan, std::uint64_t photons_per_pass,
       const std::shared_ptr<const PhotonGuide>& before) {
     if (learner == nullptr) return nullptr;
-    learner->Add(round.reports, plan.guide, round.tally.photons);
+    learner->Add(reports, plan.guide, photons);
     // A guide that asks for no reports was learned from enough of them.
-    if (!IsGuidePass(round.passes.last) || before->reported() == 0) return before;
+    if (!IsGuidePass(round.last) || before->reported() == 0) return before;
     const PixelMeans means = MeansOf(*sums, *plan.radii, team);
     const auto lock = HoldColors();
     return std::make_shared<const PhotonGuide>(learner->Next(
-        round.passes.last, photons_per_pass,
+        round.last, photons_per_pass,
         [&](std::uint32_t pixel) {
           return PhotonScore(*sums, *plan.radii, settings.crop_width(), means, pixel);
         },
@@ -420,18 +422,23 @@ SliceSums JobEstimator::SliceOf(EyePass pass, const RoundPlan& plan, PassSums su
                      state_->prepared.flux_scale(), state_->team);
 }
 
-void JobEstimator::AddRound(const SliceSums& round, const RoundPlan& plan) {
-  LUCERNA_CHECK(round.passes == RoundOf(whole_passes()));
+void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundPlan& plan) {
+  LUCERNA_CHECK(round->passes == RoundOf(whole_passes()));
   State& state = *state_;
-  state.sums->Add(round, state.team);
-  state.radii->Step(round, *plan.radii, state.team);
+  state.sums->Add(*round, state.team);
+  state.radii->Step(*round, *plan.radii, state.team);
   state.last_radii = plan.radii;
   const std::uint64_t passes = whole_passes();
   const State::After before = state.after.rbegin()->second;
   State::After& after = state.after[passes];
   after.radii = std::make_shared<const RadiusColumn>(state.radii->Current());
-  after.photons_per_pass = state.ChoosePhotons(round, before.photons_per_pass);
-  after.guide = state.ChooseGuide(round, plan, after.photons_per_pass, before.guide);
+  after.photons_per_pass = state.ChoosePhotons(*round, before.photons_per_pass);
+  const PassRange of_round = round->passes;
+  const std::vector<EmissionReport> reports = round->reports;
+  const std::uint64_t photons = round->tally.photons;
+  round.reset();
+  after.guide =
+      state.ChooseGuide(of_round, reports, photons, plan, after.photons_per_pass, before.guide);
   // Rounds that are still to be planned, or to be planned again by a job that goes on, need these;
   // the newest is what the next choice of photons follows from.
   std::set<std::uint64_t> needed = {passes};
@@ -515,7 +522,7 @@ Image JobEstimator::MakeImage() const {
   }
   const std::vector<float> noise_layer =
       NoiseOfPixels(image.width, image.height, noise_area, noise);
-  noise = {};
+  FreeMemoryOf(noise);
   const auto errors_of = [&](std::size_t pixel) {
     PixelValues values;
     values.noise = static_cast<double>(noise_layer[pixel]);
@@ -585,13 +592,15 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
   return snapshot;
 }
 
-ErrorEstimate JobEstimator::EstimateError(const EstimatorSnapshot& snapshot,
-                                          const MissingLight& missing, int look) const {
-  ErrorEstimate estimate = lucerna::EstimateError(snapshot.image, look, state_->team);
+ErrorEstimate JobEstimator::EstimateError(EstimatorSnapshot snapshot, const MissingLight& missing,
+                                          int look) const {
+  const std::int64_t passes = snapshot.image.passes;
+  ErrorEstimate estimate =
+      lucerna::EstimateError(std::move(snapshot.image), look, state_->team);
   {
     const MutexLock lock(state_->noise_area_mutex);
     state_->noise_area = estimate.noise_area;
-    state_->noise_area_after = snapshot.image.passes;
+    state_->noise_area_after = passes;
   }
   // Without any light a black image is exact.
   if (lucerna::IsBlack(state_->prepared.lights().TotalPower())) {

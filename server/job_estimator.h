@@ -95,8 +95,9 @@ class JobEstimator {
   [[nodiscard]] SliceShape ShapeOf(const PassRange& round, const RoundPlan& plan) const;
   // The slice of a pass whose photons brought `sums`, of pass.block.size() rows; both are used up.
   [[nodiscard]] SliceSums SliceOf(EyePass pass, const RoundPlan& plan, PassSums sums) const;
-  // Requires the next round, whole, and its plan.
-  void AddRound(const SliceSums& round, const RoundPlan& plan);
+  // Requires the next round, whole, and its plan. Lets go of the round's columns as soon as they
+  // have been added: what is learned from it afterwards takes longer.
+  void AddRound(std::shared_ptr<const SliceSums> round, const RoundPlan& plan);
   // Slices of the round after those added, from its first pass on without a gap, and its plan: they
   // count in all that follows here until the next AddRound or SetTail, but radii do not follow from
   // them.
@@ -120,8 +121,8 @@ class JobEstimator {
   // `look` counts the estimates of this job, from 1. The upper ends of its intervals hold what is
   // `missing`; they are infinite while nothing is found. May run beside all others, but not beside
   // itself. Requires a snapshot of this estimator, of two passes or more.
-  [[nodiscard]] ErrorEstimate EstimateError(const EstimatorSnapshot& snapshot,
-                                            const MissingLight& missing, int look) const;
+  [[nodiscard]] ErrorEstimate EstimateError(EstimatorSnapshot snapshot, const MissingLight& missing,
+                                            int look) const;
   // Whether all pixels are black. Requires passes() > 0.
   [[nodiscard]] bool IsBlack() const;
   [[nodiscard]] const SceneNeeds& needs() const;

@@ -447,13 +447,14 @@ void JobRunner::TakeIn(const OpenRound& open) {
   const SteadyTime began_at = hooks_.clock.Steady();
   const PassKey key = KeyOf(open.round.first);
   if (!open.is_split) hooks_.scheduler.Close(key);
-  const std::shared_ptr<const SliceSums> sums = hooks_.rounds.Take(key);
+  std::shared_ptr<const SliceSums> sums = hooks_.rounds.Take(key);
+  const BatchTally tally = sums->tally;
   {
     const MutexLock lock(estimator_mutex_);
-    estimator_->AddRound(*sums, open.plan);
+    estimator_->AddRound(std::move(sums), open.plan);
   }
   if (!open.is_split) Withdraw(key.pass);
-  hooks_.on_round_merged(sums->tally, static_cast<std::int64_t>(open.round.size()));
+  hooks_.on_round_merged(tally, static_cast<std::int64_t>(open.round.size()));
   Timed("rounds", began_at, [&] {
     return absl::StrCat("passes ", open.round.first, " to ", open.round.last, " are added up");
   });
@@ -552,28 +553,32 @@ void JobRunner::Withdraw(std::uint64_t pass) {
 }
 
 void JobRunner::BeginEstimateIfDue(bool is_last) {
-  EstimatorSnapshot snapshot;
   {
     const MutexLock lock(estimator_mutex_);
     const std::int64_t passes = estimator_->passes();
     if (passes < 2 || passes == passes_at_checkpoint_) return;
     if (!is_last && passes < next_checkpoint_) return;
-    snapshot = estimator_->Snapshot();
   }
   // One at a time, so that which passes are estimated does not depend on how long that takes.
   TakeInEstimate(true);
+  EstimatorSnapshot snapshot;
+  {
+    const MutexLock lock(estimator_mutex_);
+    snapshot = estimator_->Snapshot();
+  }
   passes_at_checkpoint_ = snapshot.image.passes;
   next_checkpoint_ = NextCheckpoint(snapshot.image.passes, /*near_target=*/false);
   std::packaged_task<ErrorCheckpoint()> task(
-      [this, look = ++checkpoints_, snapshot = std::move(snapshot)] {
+      [this, look = ++checkpoints_, snapshot = std::move(snapshot)]() mutable {
         const SteadyTime began_at = hooks_.clock.Steady();
         ErrorCheckpoint checkpoint;
         checkpoint.passes = snapshot.image.passes;
         checkpoint.photons = snapshot.photons;
         checkpoint.missing = estimator_->FindMissingLight(snapshot);
-        checkpoint.estimate = estimator_->EstimateError(snapshot, checkpoint.missing, look);
         if (!reference_.empty())
           checkpoint.truth = JobEstimator::ErrorAgainst(reference_, snapshot);
+        checkpoint.estimate =
+            estimator_->EstimateError(std::move(snapshot), checkpoint.missing, look);
         Timed("estimate", began_at,
               [&] { return absl::StrCat("error after ", checkpoint.passes, " passes"); });
         return checkpoint;

@@ -10,6 +10,7 @@
 
 #include "render/analysis/pass_time.h"
 #include "render/analysis/prepared_scene.h"
+#include "render/base/memory.h"
 #include "render/base/parallel.h"
 #include "render/estimate/evidence.h"
 #include "render/geometry/feature_edges.h"
@@ -242,23 +243,23 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
     none.evidence.resize(columns);
     return none;
   }
-  PassSums sums(block.size(), columns);
   std::vector<std::uint64_t> dropped;
   const PhotonRange photons = {pass, first, last, photons_per_pass, guide};
   LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(settings, needs, pass));
   LUCERNA_RETURN_IF_ERROR(state_->PrepareSpectra(settings, pass));
   const PreparedScene::AtPass at_pass(state_->prepared, settings.seed, pass);
-  LUCERNA_RETURN_IF_ERROR(
-      GatherPhotons(settings, needs, photons, block, radii, stop, sums, dropped));
+  LUCERNA_ASSIGN_OR_RETURN(
+      const PassSums sums, GatherPhotons(settings, needs, photons, block, radii, stop, dropped));
   LUCERNA_ASSIGN_OR_RETURN(Accumulation accumulation, sums.ToAccumulation());
   accumulation.dropped_photons = std::move(dropped);
   return accumulation;
 }
 
-Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNeeds& needs,
-                                  const PhotonRange& range, const HitpointBlock& block,
-                                  const RadiusColumn& radii, const std::atomic<bool>& stop,
-                                  PassSums& sums, std::vector<std::uint64_t>& dropped_photons) {
+StatusOr<PassSums> BatchTracer::GatherPhotons(const RenderSettings& settings,
+                                              const SceneNeeds& needs, const PhotonRange& range,
+                                              const HitpointBlock& block, const RadiusColumn& radii,
+                                              const std::atomic<bool>& stop,
+                                              std::vector<std::uint64_t>& dropped_photons) {
   const std::uint64_t pass = range.pass;
   const std::uint64_t last = range.last;
   const PhotonGuide* const guide = range.guide;
@@ -281,6 +282,9 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
   const std::uint64_t per_round = per_chunk * kChunksPerThread *
                                   static_cast<std::uint64_t>(std::max(1, state_->team.threads()));
   const Status given_up = absl::CancelledError("the batch was given up");
+  const std::size_t columns = EvidenceColumns(evidence);
+  // Made when deposits have been sorted: the memory that sorting takes is free by then.
+  std::optional<PassSums> sums;
   for (std::uint64_t next = range.first; next < last;) {
     const std::uint64_t part = next;
     const std::uint64_t part_end = std::min(last, part + kPhotonsPerPart);
@@ -334,7 +338,7 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
     LUCERNA_RETURN_IF_ERROR(CheckDeposits(tallies));
     // Sorted deposits are copies: those they were made of go.
     const PhotonGrid grid(deposits, region, cell, state_->team);
-    deposits = {};
+    FreeMemoryOf(deposits);
     if (stop) return given_up;
     std::vector<std::uint32_t> found_by(grid.size(), kNotFound);
     std::optional<PhotonGrid> caustic_grid;
@@ -342,7 +346,7 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
     GatheredPhotons photons{.grid = grid, .features = &*state_->features, .found_by = found_by};
     if (block.caustic_rows > 0) {
       caustic_grid.emplace(caustics, region, caustic_cell, state_->team);
-      caustics = {};
+      FreeMemoryOf(caustics);
       if (stop) return given_up;
       caustic_found_by.assign(caustic_grid->size(), kNotFound);
       photons.caustics = &*caustic_grid;
@@ -353,7 +357,7 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
     std::vector<std::uint32_t> scattered_found_by;
     if (!block.segments.empty()) {
       tree.emplace(scattered, state_->team);
-      scattered = {};
+      FreeMemoryOf(scattered);
       if (stop) return given_up;
       scattered_found_by.assign(tree->size(), kNotFound);
       photons.scattered = &*tree;
@@ -361,18 +365,19 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
       photons.media = &prepared.scene().media;
     }
     Accumulation counted;
-    counted.evidence.resize(sums.evidence().size());
+    counted.evidence.resize(columns);
+    if (!sums) sums.emplace(block.size(), columns);
     LUCERNA_ASSIGN_OR_RETURN(
         counted.tally,
         Gather(block, radii, photons, prepared.scene().materials, Kernel{settings.kernel},
-               prepared.flux_scale(), state_->team, stop, evidence, sums));
+               prepared.flux_scale(), state_->team, stop, evidence, *sums));
     if (stop) return given_up;
     for (const BatchTally& tally : tallies)
       counted.tally += tally;
     counted.tally.lights = TallyLights(sent, photons);
     if (guide != nullptr && guide->reported() > 0)
       counted.found = ReportFound(tracer, pass, part, photons);
-    LUCERNA_RETURN_IF_ERROR(sums.Add(counted));
+    LUCERNA_RETURN_IF_ERROR(sums->Add(counted));
     for (const std::vector<std::uint64_t>& named : dropped) {
       for (const std::uint64_t index : named) {
         if (dropped_photons.size() == kDroppedNamed) break;
@@ -380,7 +385,7 @@ Status BatchTracer::GatherPhotons(const RenderSettings& settings, const SceneNee
       }
     }
   }
-  return absl::OkStatus();
+  return sums ? *std::move(sums) : PassSums(block.size(), columns);
 }
 
 StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const SceneNeeds& needs,
@@ -393,20 +398,23 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
       TraceHitpointPass(*state.eye_paths, pass, state.first_hits->Of(pass), *state.film_spread,
                         state.team, [&stop] { return stop.load(std::memory_order_relaxed); });
   if (stop || !eye.is_whole) return absl::CancelledError("the slice was given up");
-  const std::size_t columns = EvidenceColumns(EvidenceOf(settings.radius_controller, pass));
-  PassSums sums(eye.block.size(), columns);
+  std::optional<PassSums> sums;
   std::vector<PhotonKey> dropped;
   // A camera that sees nothing needs no photons, and without light there are none.
   if (eye.block.size() > 0 && needs.Uses(Part::kPhotons)) {
     std::vector<std::uint64_t> named;
     const PhotonRange photons = {pass, 0, plan.photons_per_pass, plan.photons_per_pass,
                                  plan.guide.get()};
-    LUCERNA_RETURN_IF_ERROR(GatherPhotons(settings, needs, photons, eye.block,
-                                          HitpointRadii(eye, plan), stop, sums, named));
+    LUCERNA_ASSIGN_OR_RETURN(sums, GatherPhotons(settings, needs, photons, eye.block,
+                                                 HitpointRadii(eye, plan), stop, named));
     for (const std::uint64_t index : named)
       dropped.push_back({pass, index});
   }
-  SliceSums slice = SliceOfPass(std::move(eye), plan, std::move(sums), settings, needs,
+  if (!sums) {
+    sums.emplace(eye.block.size(),
+                 EvidenceColumns(EvidenceOf(settings.radius_controller, pass)));
+  }
+  SliceSums slice = SliceOfPass(std::move(eye), plan, *std::move(sums), settings, needs,
                                 state.prepared.flux_scale(), state.team);
   slice.dropped_photons = std::move(dropped);
   return slice;

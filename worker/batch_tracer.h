@@ -59,12 +59,12 @@ class BatchTracer {
     std::uint64_t photons_per_pass;  // 0: as in the settings
     const PhotonGuide* guide;
   };
-  // Adds what the hitpoints gather of these photons, and the names of the first that were dropped.
+  // What the hitpoints gather of these photons. Adds the names of the first that were dropped.
   // Requires hitpoints, photons and radii that fit, and a scene prepared for the pass.
-  Status GatherPhotons(const RenderSettings& settings, const SceneNeeds& needs,
-                       const PhotonRange& range, const HitpointBlock& block,
-                       const RadiusColumn& radii, const std::atomic<bool>& stop, PassSums& sums,
-                       std::vector<std::uint64_t>& dropped_photons);
+  StatusOr<PassSums> GatherPhotons(const RenderSettings& settings, const SceneNeeds& needs,
+                                   const PhotonRange& range, const HitpointBlock& block,
+                                   const RadiusColumn& radii, const std::atomic<bool>& stop,
+                                   std::vector<std::uint64_t>& dropped_photons);
   StatusOr<SliceSums> RunPass(const RenderSettings& settings, const SceneNeeds& needs,
                               std::uint64_t pass, const RoundPlan& plan,
                               const std::atomic<bool>& stop);

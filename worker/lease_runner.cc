@@ -236,8 +236,8 @@ StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
       fetched.tracer->RunSlice(job.settings, job.needs, {work.first, work.last}, plan, stop));
   counts_.photons += slice.tally.photons;
   if (FaultIsDue("result.flipped")) {
-    float& sum = slice.columns[kPhotonRadiance][0];
-    sum = Rounded(static_cast<double>(sum) + 1, 16);
+    PackedFloats& red = slice.columns[kPhotonRadiance];
+    red.Set(0, Rounded(static_cast<double>(red[0]) + 1, 16));
   }
   if (FaultIsDue("result.zeros")) {
     const std::uint64_t photons = slice.tally.photons;

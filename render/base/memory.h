@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 namespace lucerna {
 
@@ -12,6 +13,12 @@ namespace lucerna {
 // Gives back to the system what was freed and lies between what is held. Takes some milliseconds
 // for each 100 MB, in which other threads may wait for memory.
 void ReleaseFreedMemory();
+
+// Empties a vector and frees what it held. An empty list that is assigned leaves it its memory.
+template <typename Value>
+void FreeMemoryOf(std::vector<Value>& values) {
+  std::vector<Value>().swap(values);
+}
 
 // Keeps freed blocks of up to 32 MiB for the next ones instead of giving each back to the system:
 // columns of an image come and go with every pass, and a page that the system gives is cleared and

@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "render/base/memory.h"
 #include "render/base/status.h"
 #include "render/estimate/relative_error.h"
 
@@ -68,17 +69,22 @@ double Middle(double a, double b, double c) {
   return std::max(std::min(a, b), std::min(std::max(a, b), c));
 }
 
-// The mean of the pixels within kReach, without the pixel itself; its own value where it is alone.
+// The mean of a channel over the pixels within kReach, without the pixel itself; its own value where
+// it is alone. Keeps a reference to the image.
 class MeanAround {
  public:
-  MeanAround(int width, int height, std::vector<float> values, ThreadTeam& team)
-      : width_(width), height_(height), values_(std::move(values)), rows_(values_.size()) {
-    ForRows(team, height, [&](std::size_t row) {
+  MeanAround(const ImageStatistics& image, std::size_t channel, ThreadTeam& team)
+      : image_(image),
+        channel_(channel),
+        width_(image.width),
+        height_(image.height),
+        rows_(image.pixels.size()) {
+    ForRows(team, height_, [&](std::size_t row) {
       const int y = static_cast<int>(row);
-      for (int x = 0; x < width; ++x) {
+      for (int x = 0; x < width_; ++x) {
         float sum = 0;
-        for (int i = std::max(0, x - kReach); i <= std::min(width - 1, x + kReach); ++i)
-          sum += values_[At(i, y)];
+        for (int i = std::max(0, x - kReach); i <= std::min(width_ - 1, x + kReach); ++i)
+          sum += ValueAt(i, y);
         rows_[At(x, y)] = sum;
       }
     });
@@ -89,7 +95,7 @@ class MeanAround {
     const int bottom = std::min(height_ - 1, y + kReach);
     const int across = std::min(width_ - 1, x + kReach) - std::max(0, x - kReach) + 1;
     const int count = across * (bottom - top + 1) - 1;
-    const auto own = static_cast<double>(values_[At(x, y)]);
+    const auto own = static_cast<double>(ValueAt(x, y));
     if (count == 0) return own;
     double sum = -own;
     for (int j = top; j <= bottom; ++j)
@@ -105,8 +111,14 @@ class MeanAround {
            static_cast<std::size_t>(x);
   }
 
+  [[nodiscard]] float ValueAt(int x, int y) const {
+    return static_cast<float>(static_cast<double>(image_.pixels[At(x, y)].all[channel_]) /
+                              static_cast<double>(image_.passes));
+  }
+
+  const ImageStatistics& image_;
+  std::size_t channel_;
   int width_, height_;
-  std::vector<float> values_;
   std::vector<float> rows_;  // sums over x
 };
 
@@ -461,7 +473,7 @@ double TwoSidedNormalQuantile(double probability) {
   return 0.5 * (low + high);
 }
 
-ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& team) {
+ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
   LUCERNA_CHECK(image.passes >= 2 && look >= 1);
   const int width = image.width;
   const int height = image.height;
@@ -479,9 +491,6 @@ ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& 
     return RgbSum{static_cast<double>(sums[0]), static_cast<double>(sums[1]),
                   static_cast<double>(sums[2])};
   };
-  std::array<std::vector<float>, 3> means;
-  for (std::vector<float>& channel : means)
-    channel.resize(count);
   std::vector<double> luminances(count);
   std::vector<float> rounded_luminances(count);
   std::vector<HalfBiases> half_biases(count);
@@ -489,8 +498,6 @@ ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& 
     for (std::size_t i = row * w; i < (row + 1) * w; ++i) {
       const PixelStatistics& sums = image.pixels[i];
       const RgbSum all = color_of(sums.all);
-      for (std::size_t c = 0; c < 3; ++c)
-        means[c][i] = static_cast<float>(all[c] / passes);
       luminances[i] = LuminanceOf(all) / passes;
       rounded_luminances[i] = static_cast<float>(luminances[i]);
       half_biases[i] = {static_cast<float>(static_cast<double>(sums.even_bias) / even_passes),
@@ -503,13 +510,13 @@ ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& 
     return {.relative = unknown, .absolute = {}, .untrimmed = HUGE_VAL};
   }
   std::optional<std::array<MeanAround, 3>> around =
-      std::array{MeanAround(width, height, std::move(means[0]), team),
-                 MeanAround(width, height, std::move(means[1]), team),
-                 MeanAround(width, height, std::move(means[2]), team)};
+      std::array{MeanAround(image, 0, team), MeanAround(image, 1, team),
+                 MeanAround(image, 2, team)};
   std::vector<float> least_luminance =
       LeastLuminance(width, height, std::move(rounded_luminances), team);
   const double believed = BelievedShare(width, height, half_biases, luminances, floor, team);
-  half_biases = {};
+  FreeMemoryOf(half_biases);
+  FreeMemoryOf(luminances);
   std::vector<PixelError> pixels(count);
   std::vector<float> differences(count);
   PixelBiases biases(count);
@@ -554,7 +561,7 @@ ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& 
       const double odd_bias = static_cast<double>(sums.odd_bias) / odd_passes;
       // One over value² + floor as a half has it without `share` of the bias, times the squared
       // colour of the bias.
-      const double mean = luminances[pixel];
+      const double mean = LuminanceOf(all) / passes;
       const auto color_over_value = [&](double half, double bias, double share) {
         const double unblurred =
             std::max({static_cast<double>(least_luminance[pixel]), half - share * bias, 0.0});
@@ -598,8 +605,8 @@ ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& 
   const auto [halves, independent] = SumOfRows<2>(team, height, do_row);
   // Before what smoothing takes.
   around.reset();
-  least_luminance = {};
-  luminances = {};
+  FreeMemoryOf(least_luminance);
+  FreeMemoryOf(image.pixels);
   Spread spread{.noise_area = CorrelatedArea(width, height, differences, differences), .z = z};
   const ChosenBias chosen = Choose(width, height, biases, spread.noise_area, team);
   spread.bias_area = chosen.bias.area;

@@ -120,7 +120,7 @@ inline constexpr double kConfidence = 0.95;
 
 // `look` counts the looks at this render, from 1. The result does not depend on the number of
 // threads. Requires image.passes >= 2.
-[[nodiscard]] ErrorEstimate EstimateError(const ImageStatistics& image, int look, ThreadTeam& team);
+[[nodiscard]] ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team);
 
 // Returns z with P(|Z| > z) = probability for a standard normal Z. Requires 0 < probability < 1.
 [[nodiscard]] double TwoSidedNormalQuantile(double probability);

@@ -62,50 +62,58 @@ void ImageSums::AddDeviations(const SliceSums& slice) {
   const auto passes = static_cast<double>(whole_.passes);
   const auto slice_passes = static_cast<double>(slice.passes.size());
   std::array<const double*, 6> radiance{};
-  std::array<const float*, 6> added{};
+  std::array<std::array<float, kPixelsUnpacked>, 6> added;
   static_assert(kDirectRadiance == kPhotonRadiance + 3);
-  for (std::size_t c = 0; c < 6; ++c) {
+  for (std::size_t c = 0; c < 6; ++c)
     radiance[c] = whole_.columns.radiance[c].data();
-    added[c] = slice.columns[kPhotonRadiance + c].data();
-  }
   double* const deviations = whole_.columns.squared_deviations.data();
-  const float* const slice_deviations = slice.columns[kSquaredDeviations].data();
-  for (std::size_t i = 0; i < pixels(); ++i) {
-    const auto before = [&](std::size_t c) { return radiance[c][i] + radiance[c + 3][i]; };
-    const auto of_slice = [&](std::size_t c) {
-      return static_cast<double>(added[c][i]) + static_cast<double>(added[c + 3][i]);
-    };
-    deviations[i] =
-        TogetherDeviating(deviations[i], static_cast<double>(slice_deviations[i]), passes,
-                          WorkingLuminance(before(0), before(1), before(2)), slice_passes,
-                          WorkingLuminance(of_slice(0), of_slice(1), of_slice(2)));
+  std::array<float, kPixelsUnpacked> slice_deviations;
+  for (std::size_t first = 0; first < pixels(); first += kPixelsUnpacked) {
+    const std::size_t count = std::min(kPixelsUnpacked, pixels() - first);
+    for (std::size_t c = 0; c < 6; ++c)
+      slice.Read(kPhotonRadiance + c, first, std::span(added[c]).first(count));
+    slice.Read(kSquaredDeviations, first, std::span(slice_deviations).first(count));
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t pixel = first + i;
+      const auto before = [&](std::size_t c) {
+        return radiance[c][pixel] + radiance[c + 3][pixel];
+      };
+      const auto of_slice = [&](std::size_t c) {
+        return static_cast<double>(added[c][i]) + static_cast<double>(added[c + 3][i]);
+      };
+      deviations[pixel] =
+          TogetherDeviating(deviations[pixel], static_cast<double>(slice_deviations[i]), passes,
+                            WorkingLuminance(before(0), before(1), before(2)), slice_passes,
+                            WorkingLuminance(of_slice(0), of_slice(1), of_slice(2)));
+    }
   }
 }
 
 // Column by column, as vectors. AddTo does the same to one pixel, with the same bits.
 void ImageSums::AddPixels(const SliceSums& slice, std::size_t begin, std::size_t end) {
-  const auto column = [&](std::size_t c) { return slice.columns[c].data(); };
-  for (std::size_t c = 0; c < 6; ++c) {
-    double* const radiance = whole_.columns.radiance[c].data();
-    const float* const added = column(kPhotonRadiance + c);
-    for (std::size_t i = begin; i < end; ++i)
-      radiance[i] += static_cast<double>(added[i]);
-  }
-  const auto add = [&](std::vector<float>& sums, std::size_t c) {
-    float* const sum = sums.data();
-    const float* const of_slice = column(c);
-    for (std::size_t i = begin; i < end; ++i)
-      sum[i] += of_slice[i];
+  std::array<float, kPixelsUnpacked> unpacked;
+  // Calls add(sum, number of the slice) for each pixel.
+  const auto to_each = [&](auto& sums, std::size_t column, const auto& add) {
+    for (std::size_t first = begin; first < end; first += kPixelsUnpacked) {
+      const std::size_t count = std::min(kPixelsUnpacked, end - first);
+      slice.Read(column, first, std::span(unpacked).first(count));
+      auto* const sum = sums.data() + first;
+      for (std::size_t i = 0; i < count; ++i)
+        add(sum[i], unpacked[i]);
+    }
   };
+  const auto add = [](auto& sum, float number) { sum += number; };
+  for (std::size_t c = 0; c < 6; ++c) {
+    to_each(whole_.columns.radiance[c], kPhotonRadiance + c,
+            [](double& sum, float number) { sum += static_cast<double>(number); });
+  }
   for (std::size_t c = 0; c < 3; ++c)
-    add(whole_.columns.half_difference[c], kHalfDifference + c);
-  add(whole_.columns.even_bias, kEvenBias);
-  add(whole_.columns.odd_bias, kOddBias);
-  add(whole_.columns.photon_count, kPhotonCount);
-  float* const largest = whole_.columns.largest.data();
-  const float* const slice_largest = column(kLargestLuminance);
-  for (std::size_t i = begin; i < end; ++i)
-    largest[i] = std::max(largest[i], slice_largest[i]);
+    to_each(whole_.columns.half_difference[c], kHalfDifference + c, add);
+  to_each(whole_.columns.even_bias, kEvenBias, add);
+  to_each(whole_.columns.odd_bias, kOddBias, add);
+  to_each(whole_.columns.photon_count, kPhotonCount, add);
+  to_each(whole_.columns.largest, kLargestLuminance,
+          [](float& most, float number) { most = std::max(most, number); });
 }
 
 void ImageSums::Restore(Whole whole) {
@@ -163,8 +171,8 @@ RgbSum ImageSums::RadianceAt(std::size_t pixel) const {
     double photons = whole_.columns.radiance[c][pixel];
     double direct = whole_.columns.radiance[3 + c][pixel];
     for (const auto& slice : tail_) {
-      photons += static_cast<double>(slice->columns[kPhotonRadiance + c][pixel]);
-      direct += static_cast<double>(slice->columns[kDirectRadiance + c][pixel]);
+      photons += static_cast<double>(slice->At(kPhotonRadiance + c, pixel));
+      direct += static_cast<double>(slice->At(kDirectRadiance + c, pixel));
     }
     radiance[c] = photons + direct;
   }
@@ -179,7 +187,7 @@ ImageSums::Features ImageSums::FeaturesAt(std::size_t pixel) const {
 }
 
 void ImageSums::AddTo(Pixel& sum, std::uint64_t passes, const SliceSums& slice, std::size_t pixel) {
-  const auto at = [&](std::size_t column) { return slice.columns[column][pixel]; };
+  const auto at = [&](std::size_t column) { return slice.At(column, pixel); };
   const double before = LuminanceOfSum(sum);
   Pixel alone;
   for (std::size_t c = 0; c < 3; ++c) {
@@ -202,7 +210,7 @@ void ImageSums::AddTo(Pixel& sum, std::uint64_t passes, const SliceSums& slice, 
 void ImageSums::AddTo(Features& sum, const SliceSums& slice, std::size_t pixel) {
   if (!HasFeatures(slice.passes)) return;
   const std::size_t first = slice.first_feature();
-  const auto at = [&](std::size_t column) { return slice.columns[first + column][pixel]; };
+  const auto at = [&](std::size_t column) { return slice.At(first + column, pixel); };
   sum.albedo += Rgb{at(kAlbedo), at(kAlbedo + 1), at(kAlbedo + 2)};
   sum.normal = sum.normal + Vec3{at(kNormal), at(kNormal + 1), at(kNormal + 2)};
   sum.distance += at(kDistance);

@@ -10,77 +10,93 @@
 namespace lucerna {
 namespace {
 
-// The luminances of the radiance of pixels.
-class Luminances {
+using Floats = std::array<float, kPixelsUnpacked>;
+
+// The radiance of some pixels, by photons and without.
+class Radiance {
  public:
-  explicit Luminances(const SliceSums& sums) {
-    for (std::size_t c = 0; c < 6; ++c)
-      columns_[c] = sums.columns[kPhotonRadiance + c].data();
+  Radiance(const SliceSums& sums, std::size_t begin, std::size_t count) {
+    for (std::size_t c = 0; c < columns_.size(); ++c)
+      sums.columns[kPhotonRadiance + c].Read(begin, std::span(columns_[c]).first(count));
   }
-  double operator[](std::size_t pixel) const {
-    const auto channel = [&](std::size_t c) {
-      return static_cast<double>(columns_[c][pixel]) + static_cast<double>(columns_[c + 3][pixel]);
-    };
-    return WorkingLuminance(channel(0), channel(1), channel(2));
+  [[nodiscard]] double channel(std::size_t c, std::size_t i) const {
+    return static_cast<double>(columns_[c][i]) + static_cast<double>(columns_[c + 3][i]);
   }
+  [[nodiscard]] double luminance(std::size_t i) const {
+    return WorkingLuminance(channel(0, i), channel(1, i), channel(2, i));
+  }
+  [[nodiscard]] float by_photons(std::size_t c, std::size_t i) const { return columns_[c][i]; }
 
  private:
   static_assert(kDirectRadiance == kPhotonRadiance + 3);
-  std::array<const float*, 6> columns_{};
+  std::array<Floats, 6> columns_;
 };
 
-// Adds the rows [begin, end) of a sibling.
-void AddSibling(SliceSums& sum, const SliceSums& sibling, std::size_t begin, std::size_t end) {
+// Calls work(begin, count) for all pixels of [begin, end), a few at a time.
+template <typename Work>
+void ForEachFew(std::size_t begin, std::size_t end, const Work& work) {
+  for (std::size_t first = begin; first < end; first += kPixelsUnpacked)
+    work(first, std::min(kPixelsUnpacked, end - first));
+}
+
+// Adds a few rows of a sibling. `sum` has room for all columns of both together.
+void AddFew(SliceSums& sum, const SliceSums& sibling, const PassRange& together, std::size_t begin,
+            std::size_t count) {
   const auto bits = [&](std::size_t column) {
-    return SignificantBits(2 * sum.passes.size(), column, sum.evidence);
+    return SignificantBits(together.size(), column, sum.evidence);
   };
   const auto half = static_cast<double>(sum.passes.size());
-  // Before the radiance is added up.
-  float* const deviations = sum.columns[kSquaredDeviations].data();
-  const float* const their_deviations = sibling.columns[kSquaredDeviations].data();
-  const Luminances luminances(sum);
-  const Luminances their_luminances(sibling);
-  for (std::size_t pixel = begin; pixel < end; ++pixel) {
-    deviations[pixel] = Rounded(
-        static_cast<double>(deviations[pixel]) + static_cast<double>(their_deviations[pixel]) +
-            DeviationBetween(half, luminances[pixel], half, their_luminances[pixel]),
-        bits(kSquaredDeviations));
-  }
-  const auto add = [](float ours, float theirs) {
+  // All that follows from the radiance before that is added up.
+  const Radiance radiance(sum, begin, count);
+  const Radiance their_radiance(sibling, begin, count);
+  std::array<Floats, kEvenBias - kHalfDifference> ours;
+  static_assert(kHalfDifference < kSquaredDeviations && kSquaredDeviations < kLargestLuminance &&
+                kLargestLuminance < kEvenBias);
+  for (std::size_t column = kHalfDifference; column < kEvenBias; ++column)
+    sum.Read(column, begin, std::span(ours[column - kHalfDifference]).first(count));
+  Floats mine;
+  Floats theirs;
+  const auto add = [](float one, float other) {
     constexpr auto kLargest = static_cast<float>(kLargestSum);
-    return std::clamp(ours + theirs, -kLargest, kLargest);
+    return std::clamp(one + other, -kLargest, kLargest);
   };
   for (std::size_t column = kDirectRadiance; column < sum.columns.size(); ++column) {
-    if (column == kSquaredDeviations || column == kLargestLuminance) continue;
-    float* const ours = sum.columns[column].data();
-    const float* const theirs = sibling.columns[column].data();
-    const unsigned int dropped = DroppedBits(bits(column));
-    for (std::size_t pixel = begin; pixel < end; ++pixel)
-      ours[pixel] = RoundedFloat(add(ours[pixel], theirs[pixel]), dropped);
+    const std::span their_values = std::span(theirs).first(count);
+    sibling.Read(column, begin, their_values);
+    const bool is_read = column >= kHalfDifference && column < kEvenBias;
+    const std::span values =
+        std::span(is_read ? ours[column - kHalfDifference] : mine).first(count);
+    if (!is_read) sum.columns[column].Read(begin, values);
+    if (column == kSquaredDeviations) {
+      for (std::size_t i = 0; i < count; ++i) {
+        values[i] = Rounded(
+            static_cast<double>(values[i]) + static_cast<double>(their_values[i]) +
+                DeviationBetween(half, radiance.luminance(i), half, their_radiance.luminance(i)),
+            bits(column));
+      }
+    } else if (column == kLargestLuminance) {
+      for (std::size_t i = 0; i < count; ++i)
+        values[i] = std::max(values[i], their_values[i]);
+    } else {
+      const unsigned int dropped = DroppedBits(bits(column));
+      for (std::size_t i = 0; i < count; ++i)
+        values[i] = RoundedFloat(add(values[i], their_values[i]), dropped);
+    }
+    sum.columns[column].Write(begin, values);
   }
   // After their number.
   static_assert(kPhotonRadiance == 0 && kDirectRadiance == 3);
-  const PhotonRounding rounded({std::min(sum.passes.first, sibling.passes.first),
-                                std::max(sum.passes.last, sibling.passes.last)});
-  const float* const counts = sum.columns[kPhotonCount].data();
-  std::array<float*, 3> ours{};
-  std::array<const float*, 3> theirs{};
-  for (std::size_t c = 0; c < 3; ++c) {
-    ours[c] = sum.columns[c].data();
-    theirs[c] = sibling.columns[c].data();
-  }
-  for (std::size_t pixel = begin; pixel < end; ++pixel) {
+  const PhotonRounding rounded(together);
+  const std::span counts = std::span(mine).first(count);
+  sum.columns[kPhotonCount].Read(begin, counts);
+  for (std::size_t i = 0; i < count; ++i) {
     std::array<float, 3> rgb{};
     for (std::size_t c = 0; c < 3; ++c)
-      rgb[c] = add(ours[c][pixel], theirs[c][pixel]);
-    rgb = rounded(pixel, counts[pixel], rgb);
+      rgb[c] = add(radiance.by_photons(c, i), their_radiance.by_photons(c, i));
+    rgb = rounded(begin + i, counts[i], rgb);
     for (std::size_t c = 0; c < 3; ++c)
-      ours[c][pixel] = rgb[c];
+      sum.columns[c].Set(begin + i, rgb[c]);
   }
-  float* const largest = sum.columns[kLargestLuminance].data();
-  const float* const their_largest = sibling.columns[kLargestLuminance].data();
-  for (std::size_t pixel = begin; pixel < end; ++pixel)
-    largest[pixel] = std::max(largest[pixel], their_largest[pixel]);
 }
 
 }  // namespace
@@ -89,34 +105,37 @@ SliceSums EmptySlice(const PassRange& passes, std::size_t pixels, std::size_t ev
   SliceSums sums;
   sums.passes = passes;
   sums.evidence = evidence;
-  sums.columns.assign(ColumnsOf(passes, evidence), std::vector<float>(pixels));
+  sums.columns.resize(ColumnsOf(passes, evidence));
+  for (std::size_t column = 0; column < sums.columns.size(); ++column) {
+    if (FollowsFromRadiance(passes, column)) continue;
+    sums.columns[column] =
+        PackedFloats(pixels, SignificantBits(passes.size(), column, evidence));
+  }
   return sums;
 }
 
-void SetWhatFollowsFromRadiance(SliceSums& slice) {
-  SetWhatFollowsFromRadiance(slice, 0, slice.pixels());
-}
-
-void SetWhatFollowsFromRadiance(SliceSums& slice, std::size_t begin, std::size_t end) {
-  LUCERNA_CHECK(slice.passes.size() == 1 && end <= slice.pixels());
-  const double half = slice.passes.first % 2 == 0 ? 1 : -1;
-  const auto bits = [&](std::size_t column) { return SignificantBits(1, column, slice.evidence); };
-  for (std::size_t c = 0; c < 3; ++c) {
-    const float* const photons = slice.columns[kPhotonRadiance + c].data();
-    const float* const direct = slice.columns[kDirectRadiance + c].data();
-    float* const half_difference = slice.columns[kHalfDifference + c].data();
-    for (std::size_t pixel = begin; pixel < end; ++pixel) {
-      half_difference[pixel] =
-          Rounded(half * (static_cast<double>(photons[pixel]) + static_cast<double>(direct[pixel])),
-                  bits(kHalfDifference));
-    }
+void SliceSums::Read(std::size_t column, std::size_t begin, std::span<float> values) const {
+  if (!FollowsFromRadiance(passes, column)) {
+    columns[column].Read(begin, values);
+    return;
   }
-  float* const deviations = slice.columns[kSquaredDeviations].data();
-  std::fill(deviations + begin, deviations + end, 0.0F);
-  const Luminances luminances(slice);
-  float* const largest = slice.columns[kLargestLuminance].data();
-  for (std::size_t pixel = begin; pixel < end; ++pixel)
-    largest[pixel] = Rounded(std::max(0.0, luminances[pixel]), bits(kLargestLuminance));
+  if (column == kSquaredDeviations) {
+    std::ranges::fill(values, 0.0F);
+    return;
+  }
+  const unsigned int bits = SignificantBits(1, column, evidence);
+  const double half = passes.first % 2 == 0 ? 1 : -1;
+  ForEachFew(begin, begin + values.size(), [&](std::size_t first, std::size_t count) {
+    const Radiance radiance(*this, first, count);
+    float* const here = values.data() + (first - begin);
+    if (column == kLargestLuminance) {
+      for (std::size_t i = 0; i < count; ++i)
+        here[i] = Rounded(std::max(0.0, radiance.luminance(i)), bits);
+    } else {
+      for (std::size_t i = 0; i < count; ++i)
+        here[i] = Rounded(half * radiance.channel(column - kHalfDifference, i), bits);
+    }
+  });
 }
 
 Status MergeSibling(SliceSums& sum, const SliceSums& sibling, ThreadTeam* team) {
@@ -129,8 +148,15 @@ Status MergeSibling(SliceSums& sum, const SliceSums& sibling, ThreadTeam* team) 
   }
   const PassRange together = {std::min(sum.passes.first, sibling.passes.first),
                               std::max(sum.passes.last, sibling.passes.last)};
+  for (std::size_t column = 0; column < sum.columns.size(); ++column) {
+    if (!FollowsFromRadiance(sum.passes, column)) continue;
+    sum.columns[column] =
+        PackedFloats(sum.pixels(), SignificantBits(together.size(), column, sum.evidence));
+  }
   const auto add = [&](std::size_t begin, std::size_t end) {
-    AddSibling(sum, sibling, begin, end);
+    ForEachFew(begin, end, [&](std::size_t first, std::size_t count) {
+      AddFew(sum, sibling, together, first, count);
+    });
   };
   constexpr std::size_t kPixelsAtOnce = 4096;
   if (team != nullptr) {

@@ -11,10 +11,10 @@
 // photons deserves, with dither, so that it is right in the mean (PhotonRounding); statistics to 8.
 //
 // Invariants
-//   S1  Every column that is present has pixels() rows, all finite, of SignificantBits at most.
+//   S1  Every column that is kept has pixels() rows, all finite, of SignificantBits at most.
 //   S2  `passes` is a slice (IsSlice).
-//   S3  Of a single pass, columns that FollowsFromRadiance names are as SetWhatFollowsFromRadiance
-//       sets them.
+//   S3  Of a single pass, columns that FollowsFromRadiance names are not kept: they are computed
+//       when they are read.
 #pragma once
 
 #include <algorithm>
@@ -32,6 +32,7 @@
 #include "render/estimate/emission_report.h"
 #include "render/estimate/rounds.h"
 #include "render/math/color_space.h"
+#include "render/math/packed_floats.h"
 #include "render/math/rgb.h"
 #include "render/math/rng.h"
 
@@ -68,6 +69,11 @@ inline constexpr std::uint64_t kFeaturePasses = 16;
   return slice.first < kFeaturePasses;
 }
 
+// Of a single pass some columns follow from its radiance.
+[[nodiscard]] constexpr bool FollowsFromRadiance(const PassRange& passes, std::size_t column) {
+  return passes.size() == 1 && column >= kHalfDifference && column <= kLargestLuminance;
+}
+
 // What names one photon of a job.
 struct PhotonKey {
   std::uint64_t pass = 0, index = 0;
@@ -77,8 +83,8 @@ struct PhotonKey {
 struct SliceSums {
   PassRange passes;
   // kSliceColumns, then `evidence` columns of the radius controller, then kFeatureColumns where
-  // HasFeatures(passes). Each [pixels].
-  std::vector<std::vector<float>> columns;
+  // HasFeatures(passes). Each [pixels], or empty where FollowsFromRadiance.
+  std::vector<PackedFloats> columns;
   std::size_t evidence = 0;
   BatchTally tally;
   std::uint64_t eye_rays = 0;
@@ -91,8 +97,13 @@ struct SliceSums {
   [[nodiscard]] std::size_t pixels() const { return columns.empty() ? 0 : columns[0].size(); }
   [[nodiscard]] std::size_t first_feature() const { return kSliceColumns + evidence; }
   [[nodiscard]] float At(std::size_t column, std::size_t pixel) const {
-    return columns[column][pixel];
+    if (!FollowsFromRadiance(passes, column)) return columns[column][pixel];
+    float value = 0;
+    Read(column, pixel, std::span(&value, 1));
+    return value;
   }
+  // What the pixels from `begin` on have, as many as there are in `values`.
+  void Read(std::size_t column, std::size_t begin, std::span<float> values) const;
   bool operator==(const SliceSums&) const = default;
 };
 
@@ -117,6 +128,9 @@ struct SliceShape {
       column >= first_statistic && column < kSliceColumns + evidence && column != kPhotonCount;
   return is_statistic ? 8 : 16;
 }
+
+// Pixels that are unpacked at a time, so that a few columns of theirs stay in the nearest cache.
+inline constexpr std::size_t kPixelsUnpacked = 256;
 
 // These are made for every pixel of every pass, in loops over vectors.
 
@@ -185,14 +199,6 @@ class PhotonRounding {
 // All columns zero.
 [[nodiscard]] SliceSums EmptySlice(const PassRange& passes, std::size_t pixels,
                                    std::size_t evidence);
-
-// Of a single pass some columns follow from its radiance: they are computed and never sent.
-[[nodiscard]] constexpr bool FollowsFromRadiance(const PassRange& passes, std::size_t column) {
-  return passes.size() == 1 && column >= kHalfDifference && column <= kLargestLuminance;
-}
-// Sets these columns, of pixels [begin, end) or of all. Requires slice.passes.size() == 1.
-void SetWhatFollowsFromRadiance(SliceSums& slice, std::size_t begin, std::size_t end);
-void SetWhatFollowsFromRadiance(SliceSums& slice);
 
 // Makes `sum` the sum of itself and its sibling; in either order the same bits. By the threads of
 // `team`, or by the caller's alone.

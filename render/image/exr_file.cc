@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -32,24 +33,46 @@ constexpr std::uint64_t kSamplesPerByte = 64;
 constexpr std::uint64_t kMaxLinesPerBlock = 256;
 constexpr std::size_t kMaxAttributeName = 255;
 
+// In pieces: one block that grows would take up to three times what it holds.
 class MemoryOutput final : public Imf::OStream {
  public:
   MemoryOutput() : Imf::OStream("image") {}
 
   void write(const char bytes[], int count) override {
-    const auto size = static_cast<std::size_t>(count);
-    if (position_ + size > bytes_.size()) bytes_.resize(position_ + size);
-    std::memcpy(bytes_.data() + position_, bytes, size);
-    position_ += size;
+    const char* from = bytes;
+    for (auto left = static_cast<std::size_t>(count); left > 0;) {
+      const std::size_t within = position_ % kPieceBytes;
+      const std::size_t here = std::min(left, kPieceBytes - within);
+      while (pieces_.size() <= position_ / kPieceBytes)
+        pieces_.push_back(std::make_unique<char[]>(kPieceBytes));
+      std::memcpy(pieces_[position_ / kPieceBytes].get() + within, from, here);
+      from += here;
+      left -= here;
+      position_ += here;
+    }
+    size_ = std::max(size_, position_);
   }
   std::uint64_t tellp() override { return position_; }
   // The library goes back once, to fill in the table of block offsets.
   void seekp(std::uint64_t position) override { position_ = position; }
 
-  [[nodiscard]] std::string Take() { return std::move(bytes_); }
+  // All that was written; nothing is left here.
+  [[nodiscard]] std::string Take() {
+    std::string bytes;
+    bytes.reserve(size_);
+    for (std::unique_ptr<char[]>& piece : pieces_) {
+      bytes.append(piece.get(), std::min(kPieceBytes, size_ - bytes.size()));
+      piece.reset();
+    }
+    pieces_.clear();
+    return bytes;
+  }
 
  private:
-  std::string bytes_;
+  static constexpr std::size_t kPieceBytes = std::size_t{1} << 18;
+
+  std::vector<std::unique_ptr<char[]>> pieces_;
+  std::size_t size_ = 0;
   std::size_t position_ = 0;
 };
 

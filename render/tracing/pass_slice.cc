@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "render/base/memory.h"
 #include "render/estimate/evidence.h"
 #include "render/math/color_space.h"
 #include "render/math/kernel.h"
@@ -56,14 +57,11 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
   slice.columns.resize(ColumnsOf(slice.passes, evidence));
   const bool has_features = HasFeatures(slice.passes);
   const std::size_t first_feature = slice.first_feature();
-  std::vector<float*> columns(slice.columns.size());
   // The system clears memory where it is first touched, which takes as long as filling it in.
   const auto make = [&](std::size_t first, std::size_t count) {
     team.For(count, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t column = first + begin; column < first + end; ++column) {
-        slice.columns[column].resize(pixels);
-        columns[column] = slice.columns[column].data();
-      }
+      for (std::size_t column = first + begin; column < first + end; ++column)
+        slice.columns[column] = PackedFloats(pixels, SignificantBits(1, column, evidence));
     });
   };
   slice.tally = sums.tally();
@@ -73,13 +71,12 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
     slice.reports.push_back({found.numbers, pass.pixels[found.row]});
   }
   const auto set = [&](std::size_t column, std::size_t pixel, double value) {
-    columns[column][pixel] = Rounded(value, SignificantBits(1, column, evidence));
+    slice.columns[column].Set(pixel, Rounded(value, SignificantBits(1, column, evidence)));
   };
 
   const SliceColumn bias = pass.pass % 2 == 0 ? kEvenBias : kOddBias;
-  // What the rows of a pixel bring together is summed in its columns, and rounded at the end.
-  const auto add = [&](std::size_t column, std::size_t pixel, double value) {
-    float& sum = columns[column][pixel];
+  // What the rows of a pixel bring together is summed first, and rounded at the end.
+  const auto add = [](float& sum, double value) {
     sum =
         static_cast<float>(std::clamp(static_cast<double>(sum) + value, -kLargestSum, kLargestSum));
   };
@@ -99,7 +96,11 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
   const std::size_t first_caustic = pass.block.first_caustic();
   const std::size_t first_segment = pass.block.first_segment();
   pass.block = {};
-  make(kPhotonRadiance, 3);
+  struct OfPhotons {
+    std::array<float, 3> radiance{};
+    float bias = 0;
+  };
+  std::vector<OfPhotons> of_photons(pixels);
   make(kEvenBias, kSliceColumns - kEvenBias + evidence);
   static_assert(kEvenBias < kOddBias && kOddBias < kPhotonCount && kPhotonCount < kBlur);
   if (has_features) make(first_feature + kUnitRadius, 3);
@@ -111,14 +112,15 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
     const float in_units = has_common_radius ? plan.caustic_radius : (*plan.radii)[pixel];
     const auto radius = static_cast<double>(HitpointRadius(in_units, pass.unit_radii[row]));
     const double to_density = per_photon / (radius * radius);
+    OfPhotons& sum = of_photons[pixel];
     for (int channel = 0; channel < 3; ++channel) {
       const double flux = static_cast<double>(sums.flux(channel)[row]) *
                           static_cast<double>(scale.watts_per_quantum[channel]);
-      add(kPhotonRadiance + static_cast<std::size_t>(channel), pixel,
+      add(sum.radiance[static_cast<std::size_t>(channel)],
           static_cast<double>(pass.weights[row][channel]) * flux * to_density);
     }
     const double blur = static_cast<double>(sums.evidence()[kBlurColumn][row]) * kToBias;
-    add(bias, pixel,
+    add(sum.bias,
         blur * luminance_per_quantum * to_density *
             static_cast<double>(Luminance(pass.weights[row])));
     if (has_common_radius) return;
@@ -144,16 +146,18 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
   }
 
   sums = PassSums(0);
-  pass.pixels = {};
-  pass.weights = {};
-  pass.unit_radii = {};
+  FreeMemoryOf(pass.pixels);
+  FreeMemoryOf(pass.weights);
+  FreeMemoryOf(pass.unit_radii);
 
+  make(kPhotonRadiance, 3);
   make(kDirectRadiance, 3);
   const PhotonRounding rounded_photons(slice.passes);
   const auto set_radiance = [&](std::size_t pixel) {
+    const OfPhotons& sum = of_photons[pixel];
     std::array<double, 3> photons{};
     for (std::size_t c = 0; c < 3; ++c)
-      photons[c] = static_cast<double>(columns[kPhotonRadiance + c][pixel]);
+      photons[c] = static_cast<double>(sum.radiance[c]);
     photons = in_color(photons);
     const std::array<double, 3> direct = in_color(ToDoubles(pass.direct[pixel]));
     std::array<float, 3> by_photons{};
@@ -161,10 +165,10 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
       by_photons[c] = static_cast<float>(std::clamp(photons[c], -kLargestSum, kLargestSum));
       set(kDirectRadiance + c, pixel, direct[c]);
     }
-    by_photons = rounded_photons(pixel, columns[kPhotonCount][pixel], by_photons);
+    by_photons = rounded_photons(pixel, slice.columns[kPhotonCount][pixel], by_photons);
     for (std::size_t c = 0; c < 3; ++c)
-      columns[kPhotonRadiance + c][pixel] = by_photons[c];
-    set(bias, pixel, static_cast<double>(columns[bias][pixel]));
+      slice.columns[kPhotonRadiance + c].Set(pixel, by_photons[c]);
+    set(bias, pixel, static_cast<double>(sum.bias));
   };
   const auto for_pixels = [&](const auto& work) {
     team.For(pixels, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
@@ -173,7 +177,8 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
     });
   };
   for_pixels(set_radiance);
-  pass.direct = {};
+  FreeMemoryOf(pass.direct);
+  FreeMemoryOf(of_photons);
 
   if (has_features) {
     make(first_feature + kAlbedo, kUnitRadius - kAlbedo);
@@ -190,15 +195,8 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
       set(first_feature + kDistance, pixel, static_cast<double>(features.distance));
       set(first_feature + kHits, pixel, 1);
     });
-    pass.features = {};
+    FreeMemoryOf(pass.features);
   }
-
-  make(kHalfDifference, kEvenBias - kHalfDifference);
-  static_assert(kHalfDifference < kSquaredDeviations && kSquaredDeviations < kLargestLuminance &&
-                kLargestLuminance < kEvenBias);
-  team.For(pixels, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
-    SetWhatFollowsFromRadiance(slice, begin, end);
-  });
   return slice;
 }
 

@@ -194,21 +194,31 @@ std::vector<std::uint64_t> ByteReader::Planes64(std::size_t rows) {
   return Joined<std::uint64_t>(column.planes, column.bytes.get(), rows);
 }
 
-void ByteReader::Floats(unsigned int dropped, std::span<float> column) {
-  const ColumnBytes bytes = ReadPlanes(sizeof(std::uint32_t), column.size());
+void ByteReader::Floats(PackedFloats& column) {
+  const std::size_t rows = column.size();
+  const ColumnBytes bytes = ReadPlanes(column.bytes(), rows);
   if (!ok_) return;
-  constexpr std::uint32_t kExponent = 0x7F800000;  // all ones: infinite or not a number
-  std::uint32_t all = 0;
-  std::uint32_t largest_exponent = 0;
-  JoinPlanes<std::uint32_t>(bytes.planes, bytes.bytes.get(), column.size(),
-                            [&, to = column.data()](std::size_t i, std::uint32_t code) {
-                              const std::uint32_t bits = code << dropped;
-                              all |= code;
-                              largest_exponent = std::max(largest_exponent, bits & kExponent);
-                              to[i] = std::bit_cast<float>(bits);
-                            });
-  const bool is_too_wide = dropped > 0 && (all >> (32 - dropped)) != 0;
-  if (is_too_wide || largest_exponent == kExponent) Fail();
+  unsigned int planes = bytes.planes;
+  const std::uint8_t* plane = bytes.bytes.get();
+  if (column.bytes() == 3) {
+    const std::span low = column.low();
+    if (planes == 0) {
+      std::ranges::fill(low, std::uint8_t{0});
+    } else {
+      std::copy_n(plane, rows, low.data());
+      plane += rows;
+      --planes;
+    }
+  }
+  constexpr std::uint16_t kExponent = 0x7F80;  // all ones: infinite or not a number
+  std::uint16_t largest_exponent = 0;
+  JoinPlanes<std::uint16_t>(
+      planes, plane, rows, [&, to = column.high().data()](std::size_t i, std::uint16_t high) {
+        largest_exponent =
+            std::max(largest_exponent, static_cast<std::uint16_t>(high & kExponent));
+        to[i] = high;
+      });
+  if (largest_exponent == kExponent) Fail();
 }
 
 }  // namespace lucerna

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "render/base/parallel.h"
+#include "render/math/packed_floats.h"
 
 namespace lucerna {
 
@@ -67,9 +68,9 @@ class ByteReader {
   // What Compressed wrote. Fails unless it unpacks to exactly `size` bytes; nothing is allocated
   // before the compressed bytes themselves have promised that size.
   std::string Compressed(std::size_t size);
-  // What Planes wrote of floats without their lowest `dropped` bits, which become 0, into `column`.
-  // Fails for numbers that have more bits or are not finite.
-  void Floats(unsigned int dropped, std::span<float> column);
+  // What Planes wrote of the bytes that `column` keeps, into it. Fails for numbers that have more or
+  // are not finite.
+  void Floats(PackedFloats& column);
   // What Planes wrote, `rows` of them.
   std::vector<std::uint32_t> Planes32(std::size_t rows);
   std::vector<std::uint64_t> Planes64(std::size_t rows);

@@ -11,22 +11,23 @@
 #include <cstdint>
 #include <span>
 
+#include "render/math/packed_floats.h"
+
 namespace lucerna {
 
-// `channel` is predicted from `base`; floats with `dropped` low bits that are zero, or, where
-// `counts` are given, what PhotonBits has of them at least. All of one size.
+// A channel is predicted from `base`; floats of as many bytes, or, where `counts` are given, of what
+// bits PhotonBits has at most. All of one size.
 struct ColorColumn {
-  std::span<const float> base;
-  std::span<const float> counts;
-  unsigned int dropped = 0;
+  const PackedFloats& base;
+  const PackedFloats* counts = nullptr;
 };
 
 // The numbers to be sent in place of `channel`, as many.
-void CodesOfChannel(const ColorColumn& with, std::span<const float> channel,
+void CodesOfChannel(const ColorColumn& with, const PackedFloats& channel,
                     std::span<std::uint32_t> codes);
 // `channel` from what CodesOfChannel made of it. False when the codes are of something else: a
 // number of more bits, or one that is not finite.
 [[nodiscard]] bool ChannelFromCodes(const ColorColumn& with, std::span<const std::uint32_t> codes,
-                                    std::span<float> channel);
+                                    PackedFloats& channel);
 
 }  // namespace lucerna

@@ -15,11 +15,6 @@ namespace {
 
 constexpr std::string_view kMagic = "LSL4";
 
-// The low bits of a float of that column that are zero.
-unsigned int EmptyBits(const SliceSums& slice, std::size_t column) {
-  return DroppedBits(SignificantBits(slice.passes.size(), column, slice.evidence));
-}
-
 // The column that a column is predicted from: green, of radiance. Itself: from none.
 std::size_t BaseOf(std::size_t column) {
   constexpr std::size_t kColors = kSquaredDeviations;
@@ -29,11 +24,20 @@ std::size_t BaseOf(std::size_t column) {
 }
 
 ColorColumn Beside(const SliceSums& slice, std::size_t column) {
-  ColorColumn with;
-  with.base = slice.columns[BaseOf(column)];
-  with.dropped = EmptyBits(slice, column);
-  if (column < kDirectRadiance) with.counts = slice.columns[kPhotonCount];
-  return with;
+  return {.base = slice.columns[BaseOf(column)],
+          .counts = column < kDirectRadiance ? &slice.columns[kPhotonCount] : nullptr};
+}
+
+// The bytes that are kept of each float, as one number.
+void CodesOf(const PackedFloats& values, std::span<std::uint32_t> codes) {
+  const std::span high = values.high();
+  const std::span low = values.low();
+  if (low.empty()) {
+    std::ranges::copy(high, codes.begin());
+    return;
+  }
+  for (std::size_t i = 0; i < codes.size(); ++i)
+    codes[i] = static_cast<std::uint32_t>(high[i]) << 8U | low[i];
 }
 
 // All columns that are sent, each behind those that it is predicted from.
@@ -96,12 +100,9 @@ std::string EncodeSlice(const SliceSums& slice, ThreadTeam* team) {
   const auto encode = [&](std::size_t begin, std::size_t end) {
     std::vector<std::uint32_t> codes(slice.pixels());
     for (std::size_t i = begin; i < end; ++i) {
-      const std::vector<float>& values = slice.columns[sent[i]];
+      const PackedFloats& values = slice.columns[sent[i]];
       if (BaseOf(sent[i]) == sent[i]) {
-        const unsigned int empty = EmptyBits(slice, sent[i]);
-        std::ranges::transform(values, codes.begin(), [&](float value) {
-          return std::bit_cast<std::uint32_t>(value) >> empty;
-        });
+        CodesOf(values, codes);
       } else {
         CodesOfChannel(Beside(slice, sent[i]), values, codes);
       }
@@ -165,15 +166,15 @@ StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape)
   }
   if (!reader.ok()) return Malformed("truncated");
   slice.columns.resize(columns);
-  std::vector<std::uint32_t> codes;
   for (const std::size_t column : SentColumns(shape.passes, columns)) {
-    std::vector<float>& values = slice.columns[column];
-    values.resize(shape.pixels);
+    PackedFloats& values = slice.columns[column];
+    values = PackedFloats(shape.pixels,
+                          SignificantBits(shape.passes.size(), column, shape.evidence));
     bool is_of_column = true;
     if (BaseOf(column) == column) {
-      reader.Floats(EmptyBits(slice, column), values);
+      reader.Floats(values);
     } else {
-      codes = reader.Planes32(shape.pixels);
+      const std::vector<std::uint32_t> codes = reader.Planes32(shape.pixels);
       is_of_column = reader.ok() && ChannelFromCodes(Beside(slice, column), codes, values);
     }
     if (!is_of_column || !reader.ok()) {
@@ -182,9 +183,6 @@ StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape)
     }
   }
   if (!reader.finished()) return Malformed("bytes are left over");
-  for (std::vector<float>& column : slice.columns)
-    column.resize(shape.pixels);
-  if (shape.passes.size() == 1) SetWhatFollowsFromRadiance(slice);
   return slice;
 }
 

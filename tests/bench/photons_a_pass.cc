@@ -70,7 +70,7 @@ class TimedRender {
     LUCERNA_CHECK(round_->Add(std::move(slice)).ok());
     ++pass_;
     if (round_->IsWhole()) {
-      estimator_->AddRound(*round_->Whole(), *plan_);
+      estimator_->AddRound(round_->Whole(), *plan_);
     } else {
       estimator_->SetTail(round_->Prefix(), *plan_);
     }

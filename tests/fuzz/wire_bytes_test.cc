@@ -68,10 +68,9 @@ constexpr SliceShape kSlice = {
 SliceSums SomeSlice(const SliceShape& shape) {
   SliceSums slice = EmptySlice(shape.passes, shape.pixels, shape.evidence);
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
-    for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel) {
-      slice.columns[column][pixel] =
-          Rounded(std::exp(8 * static_cast<double>(pixel)) * (pixel % 3 == 0 ? -1 : 1) / 1000,
-                  SignificantBits(shape.passes.size(), column, shape.evidence));
+    for (std::size_t pixel = 0; pixel < slice.columns[column].size(); ++pixel) {
+      slice.columns[column].Set(pixel, Rounded(std::exp(8 * static_cast<double>(pixel)) * (pixel % 3 == 0 ? -1 : 1) / 1000,
+                  SignificantBits(shape.passes.size(), column, shape.evidence)));
     }
   }
   slice.tally.photons = shape.photons_per_pass * shape.passes.size();
@@ -88,10 +87,11 @@ void CheckSliceOf(const std::string& bytes, const SliceShape& shape) {
   ASSERT_EQ(decoded->columns.size(), ColumnsOf(shape.passes, shape.evidence));
   bool is_kept = true;
   for (std::size_t column = 0; column < decoded->columns.size(); ++column) {
-    ASSERT_EQ(decoded->columns[column].size(), shape.pixels);
     const unsigned int bits = SignificantBits(shape.passes.size(), column, shape.evidence);
-    for (const float value : decoded->columns[column])
+    for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel) {
+      const float value = decoded->At(column, pixel);
       is_kept &= std::isfinite(value) && Rounded(static_cast<double>(value), bits) == value;
+    }
   }
   ASSERT_TRUE(is_kept);
   ASSERT_EQ(decoded->tally.photons, shape.photons_per_pass * shape.passes.size());
@@ -106,9 +106,9 @@ void CheckSliceOf(const std::string& bytes, const SliceShape& shape) {
   of_sibling.passes = SiblingOf(shape.passes);
   const Status merged = MergeSibling(*decoded, SomeSlice(of_sibling));
   EXPECT_TRUE(merged.ok() || absl::IsOutOfRange(merged)) << merged;
-  for (const std::vector<float>& column : decoded->columns) {
-    for (const float value : column)
-      is_kept &= std::isfinite(value);
+  for (std::size_t column = 0; column < decoded->columns.size(); ++column) {
+    for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel)
+      is_kept &= std::isfinite(decoded->At(column, pixel));
   }
   EXPECT_TRUE(is_kept);
 }

@@ -54,12 +54,15 @@ TEST(SliceOfPassMemoryTest, NeverHoldsTheWholePassBesideTheWholeSlice) {
   ForgetMostLiveBytes();
   const SliceSums slice = SliceOfPass(std::move(eye), plan, std::move(sums), settings, SceneNeeds(),
                                       {Gray(1), Gray(1)}, team);
-  const std::size_t of_slice = sizeof(float) * slice.columns.size();
+  std::size_t of_slice = 0;
+  for (const PackedFloats& column : slice.columns) {
+    if (!column.empty()) of_slice += column.bytes();
+  }
   EXPECT_NEAR(static_cast<double>(LiveBytes() - before), static_cast<double>(kPixels * of_slice),
               kSlack);
-  // By photons: three of radiance, two of bias, the count, the blur, the evidence, and three of the
-  // features.
-  const std::size_t from_rows = sizeof(float) * (3 + 4 + evidence + 3);
+  // By photons: radiance and bias as floats, and packed two columns of bias, the count, the blur,
+  // the evidence and three of the features.
+  const std::size_t from_rows = sizeof(float) * 4 + 2 * 2 + 3 + 2 + 2 * evidence + 3 * 3;
   EXPECT_LE(MostLiveBytes() - before, kPixels * (kRow + kSeen + of_sums + from_rows) + kSlack);
 }
 

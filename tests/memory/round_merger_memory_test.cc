@@ -19,8 +19,10 @@ const PassKey kRound = {"job", 16};  // of 4 passes
 
 SliceSums Slice(std::uint64_t pass) {
   SliceSums sum = EmptySlice({pass, pass + 1}, kPixels, 1);
-  for (std::vector<float>& column : sum.columns)
-    column.assign(kPixels, static_cast<float>(pass % 7));
+  const std::vector<float> numbers(kPixels, static_cast<float>(pass % 7));
+  for (PackedFloats& column : sum.columns) {
+    if (!column.empty()) column.Write(0, numbers);
+  }
   sum.tally.photons = 100;
   sum.dropped_photons = {{pass, 1}};
   return sum;

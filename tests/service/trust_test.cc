@@ -65,8 +65,7 @@ class TrustTest : public testing::Test {
     if (lease.kind() != v1::WORK_KIND_PASSES) return worker.ResultOf(lease);
     SliceSums slice = EmptySlice({lease.first(), lease.last()}, kSmallScenePixels, 0);
     SetEscaped(slice.tally, lease.photons_per_pass() * slice.passes.size());
-    slice.columns[kPhotonRadiance][0] = 1;
-    if (slice.passes.size() == 1) SetWhatFollowsFromRadiance(slice);
+    slice.columns[kPhotonRadiance].Set(0, 1);
     return EncodeSlice(slice);
   }
 

@@ -63,7 +63,7 @@ void LocalRender::AddPass(int batches) {
   if (const Status added = round_->Add(std::move(slice)); !added.ok()) Die(added);
   ++pass_;
   if (round_->IsWhole()) {
-    estimator_->AddRound(*round_->Whole(), *plan_);
+    estimator_->AddRound(round_->Whole(), *plan_);
   } else {
     estimator_->SetTail(round_->Prefix(), *plan_);
   }

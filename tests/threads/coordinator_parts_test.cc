@@ -116,9 +116,9 @@ TEST(CoordinatorPartsTest, ABatchThatManyDeliverAtOnceIsAcceptedOnce) {
 // What a slice brings depends on its passes alone.
 SliceSums SliceOf(const PassRange& passes) {
   SliceSums sum = EmptySlice({passes.first, passes.first + 1}, kHitpoints, 0);
-  for (std::vector<float>& column : sum.columns) {
-    for (std::size_t pixel = 0; pixel < kHitpoints; ++pixel)
-      column[pixel] = static_cast<float>((passes.first * (pixel + 1)) % 251);
+  for (PackedFloats& column : sum.columns) {
+    for (std::size_t pixel = 0; pixel < column.size(); ++pixel)
+      column.Set(pixel, static_cast<float>((passes.first * (pixel + 1)) % 251));
   }
   sum.tally.photons = 10;
   sum.tally.rays = passes.first;

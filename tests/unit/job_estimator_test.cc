@@ -118,7 +118,9 @@ TEST(JobEstimatorTest, TracesTheEyePathsOfAPassAtAnyTime) {
     const std::size_t rows = now.block.size();
     const std::size_t columns = EvidenceColumns(EvidenceOf(settings.radius_controller, pass));
     const RoundPlan plan = late->PlanFor(RoundOf(pass)).value();
-    late->AddRound(late->SliceOf(std::move(now), plan, PassSums(rows, columns)), plan);
+    late->AddRound(std::make_shared<const SliceSums>(
+                       late->SliceOf(std::move(now), plan, PassSums(rows, columns))),
+                   plan);
   }
   const EyePass a = early->TraceEyePaths(3).value();
   const EyePass b = late->TraceEyePaths(3).value();
@@ -378,7 +380,7 @@ class RoundJob {
       for (std::uint64_t pass = end; pass-- > round.first;)
         EXPECT_TRUE(tree.Add(Traced({pass, pass + 1}, plan)).ok());
       if (!tree.IsWhole()) return estimator_->SetTail(tree.Prefix(), plan);
-      estimator_->AddRound(*tree.Whole(), plan);
+      estimator_->AddRound(tree.Whole(), plan);
     }
   }
   RoundPlan PlanOf(const PassRange& round) const { return estimator_->PlanFor(round).value(); }

@@ -33,10 +33,10 @@ PassVariance VarianceOf(std::uint64_t passes, const GatherRule& gather,
       KeyedRng rng(CombineKeys(CombineKeys(3, pass), i));
       const Gathered gathered = gather(rng, pass, i);
       for (std::size_t c = 0; c < 3; ++c) {
-        slice.columns[kPhotonRadiance + c][i] = static_cast<float>(gathered.photons);
-        slice.columns[kDirectRadiance + c][i] = static_cast<float>(gathered.direct);
+        slice.columns[kPhotonRadiance + c].Set(i, static_cast<float>(gathered.photons));
+        slice.columns[kDirectRadiance + c].Set(i, static_cast<float>(gathered.direct));
       }
-      slice.columns[kPhotonCount][i] = static_cast<float>(gathered.count);
+      slice.columns[kPhotonCount].Set(i, static_cast<float>(gathered.count));
     }
     // An eye path costs 3 + 4 * 0.75 = 6 photon rays, and a photon 1.5 + 5 * 0.1 = 2.
     slice.eye_rays = 4 * pixels;
@@ -155,9 +155,10 @@ TEST(PassVarianceTest, CountsLowDiscrepancyOfDirectLight) {
         .Split(1)
         .eye_paths;
   };
-  EXPECT_NEAR(with({0.2, 0.2, 0.8, 0.8}), 0, 1e-6);
-  // Means of halves differ by 0.6; 8 / 4 of its square is what one pass varies by.
-  EXPECT_NEAR(with({0.2, 0.8, 0.2, 0.8}), 2 * 0.36 * kRelative, 1e-5);
+  // Numbers that a slice holds as they are.
+  EXPECT_NEAR(with({0.25, 0.25, 0.75, 0.75}), 0, 1e-6);
+  // Means of halves differ by 0.5; 8 / 4 of its square is what one pass varies by.
+  EXPECT_NEAR(with({0.25, 0.75, 0.25, 0.75}), 2 * 0.25 * kRelative, 1e-5);
 }
 
 TEST(PassVarianceTest, LeavesOutThePixelsThatVaryMost) {

@@ -22,8 +22,10 @@ SliceShape Shape() {
 // What a pass brings depends on its number.
 SliceSums Slice(const PassRange& passes) {
   SliceSums sum = EmptySlice({passes.first, passes.first + 1}, kPixels, 1);
-  for (std::vector<float>& column : sum.columns)
-    column.assign(kPixels, static_cast<float>(passes.first % 7));
+  const std::vector<float> numbers(kPixels, static_cast<float>(passes.first % 7));
+  for (PackedFloats& column : sum.columns) {
+    if (!column.empty()) column.Write(0, numbers);
+  }
   sum.tally.photons = 100;
   sum.tally.rays = passes.first;
   if (passes.size() == 1) return sum;

@@ -2,6 +2,7 @@
 // what an encoder of ours wrote for the slice that was asked for.
 #include "render/wire/slice_codec.h"
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -29,14 +30,14 @@ SliceSums RandomSlice(const SliceShape& shape) {
   SliceSums slice = EmptySlice(shape.passes, shape.pixels, shape.evidence);
   KeyedRng rng(CombineKeys(11, shape.passes.first));
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
-    for (float& value : slice.columns[column]) {
+    for (std::size_t pixel = 0; pixel < slice.columns[column].size(); ++pixel) {
       if (rng.Bits() % 4 == 0) continue;
       const double sign = rng.Bits() % 2 == 0 ? 1 : -1;
-      value = Rounded(sign * std::exp(60 * static_cast<double>(rng.Uniform()) - 30),
-                      SignificantBits(shape.passes.size(), column, shape.evidence));
+      slice.columns[column].Set(
+          pixel, Rounded(sign * std::exp(60 * static_cast<double>(rng.Uniform()) - 30),
+                         SignificantBits(shape.passes.size(), column, shape.evidence)));
     }
   }
-  if (shape.passes.size() == 1) SetWhatFollowsFromRadiance(slice);
   slice.eye_rays = 12'345;
   slice.tally = {.photons = kPhotons * shape.passes.size(),
                  .rays = std::uint64_t{1} << 60,
@@ -80,15 +81,13 @@ TEST(SliceCodecTest, BringsTheEndsOfEveryColumnBack) {
   const SliceShape shape = Shape({3, 4}, 6, kSectors);
   SliceSums slice = RandomSlice(shape);
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
+    if (FollowsFromRadiance(shape.passes, column)) continue;
     const unsigned int bits = SignificantBits(shape.passes.size(), column, shape.evidence);
-    slice.columns[column] = {Rounded(1e300, bits),
-                             Rounded(-1e300, bits),
-                             Rounded(std::numeric_limits<double>::denorm_min(), bits),
-                             -0.0F,
-                             std::bit_cast<float>(std::uint32_t{1} << DroppedBits(bits)),
-                             1};
+    slice.columns[column].Write(
+        0, std::array{Rounded(1e300, bits), Rounded(-1e300, bits),
+                      Rounded(std::numeric_limits<double>::denorm_min(), bits), -0.0F,
+                      std::bit_cast<float>(std::uint32_t{1} << DroppedBits(bits)), 1.0F});
   }
-  SetWhatFollowsFromRadiance(slice);
   const auto decoded = DecodeSlice(EncodeSlice(slice), shape);
   ASSERT_TRUE(decoded.ok()) << decoded.status();
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
@@ -121,7 +120,7 @@ TEST(SliceCodecTest, SendsNothingThatFollowsFromTheRadianceOfOnePass) {
     SliceSums slice = RandomSlice(shape);
     for (const std::size_t column : {std::size_t{kEvenBias}, std::size_t{kOddBias},
                                      std::size_t{kPhotonCount}, std::size_t{kBlur}})
-      slice.columns[column].assign(pixels, 0);
+      slice.columns[column].Write(0, std::vector<float>(pixels));
     return static_cast<double>(EncodeSlice(slice).size());
   };
   const double radiance = 6 * 3 * static_cast<double>(pixels);
@@ -140,11 +139,13 @@ TEST(SliceCodecTest, ChannelsInOneRatioCostLittleMoreThanOne) {
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     const double light = std::exp(static_cast<double>(rng.Uniform()) * 4);
     const bool is_left = pixel % 200 < 100;
-    slice.columns[kDirectRadiance][pixel] = Rounded((is_left ? 0.7 : 0.2) * light, 16);
-    slice.columns[kDirectRadiance + 1][pixel] = Rounded((is_left ? 0.3 : 0.6) * light, 16);
-    slice.columns[kDirectRadiance + 2][pixel] = is_left ? 0 : Rounded(3 * light, 16);
+    const auto set = [&](std::size_t c, double value) {
+      slice.columns[kDirectRadiance + c].Set(pixel, Rounded(value, 16));
+    };
+    set(0, (is_left ? 0.7 : 0.2) * light);
+    set(1, (is_left ? 0.3 : 0.6) * light);
+    set(2, is_left ? 0 : 3 * light);
   }
-  SetWhatFollowsFromRadiance(slice);
   const std::string bytes = EncodeSlice(slice);
   // Random bits are 16 of green; red and blue differ by a rounding or two, and wholly where the
   // surface changes, for 8 of 100 pixels.
@@ -163,7 +164,7 @@ TEST(SliceCodecTest, FromAndToThreadsThatFlushDenormals) {
     for (std::size_t pixel = 0; pixel < shape.pixels; ++pixel) {
       // From ordinary numbers to denormal ones, so that ratios and products end up there too.
       const auto power = static_cast<int>((pixel * 7 + column * 41) % 160);
-      slice.columns[column][pixel] = Rounded(std::ldexp(1.25, 10 - power), 8);
+      slice.columns[column].Set(pixel, Rounded(std::ldexp(1.25, 10 - power), 8));
     }
   }
   ThreadTeam flushing(1);
@@ -218,7 +219,7 @@ TEST(SliceCodecTest, RefusesNumbersThatAreNotFinite) {
         std::numeric_limits<float>::quiet_NaN()}) {
     for (std::size_t column = 0; column < ColumnsOf(shape.passes, shape.evidence); ++column) {
       SliceSums slice = RandomSlice(shape);
-      slice.columns[column][7] = value;
+      slice.columns[column].Set(7, value);
       EXPECT_TRUE(absl::IsInvalidArgument(DecodeSlice(EncodeSlice(slice), shape).status()))
           << value << " in column " << column;
     }

@@ -21,10 +21,10 @@ SliceSums RandomPass(std::uint64_t pass) {
   SliceSums slice = EmptySlice({pass, pass + 1}, kPixels, kEvidence);
   KeyedRng rng(CombineKeys(7, pass));
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
-    if (column == kSquaredDeviations) continue;
-    for (float& value : slice.columns[column]) {
+    if (FollowsFromRadiance(slice.passes, column)) continue;
+    for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
       const double number = std::exp(8.0 * static_cast<double>(rng.Uniform()) - 4.0);
-      value = Rounded(number, SignificantBits(1, column, kEvidence));
+      slice.columns[column].Set(pixel, Rounded(number, SignificantBits(1, column, kEvidence)));
     }
   }
   slice.tally.photons = 10 + pass;
@@ -127,10 +127,9 @@ TEST(SliceSumsTest, LightWithoutNoiseStaysWithout) {
     SliceSums slice = EmptySlice({pass, pass + 1}, kPixels, kEvidence);
     for (std::size_t c = 0; c < 3; ++c) {
       for (std::size_t pixel = 0; pixel < kPixels; ++pixel)
-        slice.columns[kDirectRadiance + c][pixel] =
-            Rounded(1.0 / (3.0 + static_cast<double>(pixel + c)), 16);
+        slice.columns[kDirectRadiance + c].Set(
+            pixel, Rounded(1.0 / (3.0 + static_cast<double>(pixel + c)), 16));
     }
-    SetWhatFollowsFromRadiance(slice);
     ASSERT_TRUE(tree.Add(std::move(slice)).ok());
   }
   for (std::size_t pixel = 0; pixel < kPixels; ++pixel) {
@@ -147,10 +146,8 @@ TEST(SliceSumsTest, LightWithoutNoiseStaysWithout) {
 TEST(SliceSumsTest, SmallDifferencesOfHalvesAreKept) {
   SliceSums even = EmptySlice({64, 65}, 1, kEvidence);
   SliceSums odd = EmptySlice({65, 66}, 1, kEvidence);
-  even.columns[kDirectRadiance][0] = 1;
-  odd.columns[kDirectRadiance][0] = 1 + 0x1p-15F;
-  SetWhatFollowsFromRadiance(even);
-  SetWhatFollowsFromRadiance(odd);
+  even.columns[kDirectRadiance].Set(0, 1);
+  odd.columns[kDirectRadiance].Set(0, 1 + 0x1p-15F);
   ASSERT_TRUE(MergeSibling(even, odd).ok());
   EXPECT_EQ(even.At(kHalfDifference, 0), -0x1p-15F);
 }
