@@ -595,8 +595,7 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
 ErrorEstimate JobEstimator::EstimateError(EstimatorSnapshot snapshot, const MissingLight& missing,
                                           int look) const {
   const std::int64_t passes = snapshot.image.passes;
-  ErrorEstimate estimate =
-      lucerna::EstimateError(std::move(snapshot.image), look, state_->team);
+  ErrorEstimate estimate = lucerna::EstimateError(std::move(snapshot.image), look, state_->team);
   {
     const MutexLock lock(state_->noise_area_mutex);
     state_->noise_area = estimate.noise_area;

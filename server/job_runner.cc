@@ -568,21 +568,19 @@ void JobRunner::BeginEstimateIfDue(bool is_last) {
   }
   passes_at_checkpoint_ = snapshot.image.passes;
   next_checkpoint_ = NextCheckpoint(snapshot.image.passes, /*near_target=*/false);
-  std::packaged_task<ErrorCheckpoint()> task(
-      [this, look = ++checkpoints_, snapshot = std::move(snapshot)]() mutable {
-        const SteadyTime began_at = hooks_.clock.Steady();
-        ErrorCheckpoint checkpoint;
-        checkpoint.passes = snapshot.image.passes;
-        checkpoint.photons = snapshot.photons;
-        checkpoint.missing = estimator_->FindMissingLight(snapshot);
-        if (!reference_.empty())
-          checkpoint.truth = JobEstimator::ErrorAgainst(reference_, snapshot);
-        checkpoint.estimate =
-            estimator_->EstimateError(std::move(snapshot), checkpoint.missing, look);
-        Timed("estimate", began_at,
-              [&] { return absl::StrCat("error after ", checkpoint.passes, " passes"); });
-        return checkpoint;
-      });
+  std::packaged_task<ErrorCheckpoint()> task([this, look = ++checkpoints_,
+                                              snapshot = std::move(snapshot)]() mutable {
+    const SteadyTime began_at = hooks_.clock.Steady();
+    ErrorCheckpoint checkpoint;
+    checkpoint.passes = snapshot.image.passes;
+    checkpoint.photons = snapshot.photons;
+    checkpoint.missing = estimator_->FindMissingLight(snapshot);
+    if (!reference_.empty()) checkpoint.truth = JobEstimator::ErrorAgainst(reference_, snapshot);
+    checkpoint.estimate = estimator_->EstimateError(std::move(snapshot), checkpoint.missing, look);
+    Timed("estimate", began_at,
+          [&] { return absl::StrCat("error after ", checkpoint.passes, " passes"); });
+    return checkpoint;
+  });
   estimate_ = task.get_future();
   estimate_thread_ = std::thread([this, task = std::move(task)]() mutable {
     task();

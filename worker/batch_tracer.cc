@@ -248,8 +248,8 @@ StatusOr<Accumulation> BatchTracer::Run(const RenderSettings& settings, const Sc
   LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(settings, needs, pass));
   LUCERNA_RETURN_IF_ERROR(state_->PrepareSpectra(settings, pass));
   const PreparedScene::AtPass at_pass(state_->prepared, settings.seed, pass);
-  LUCERNA_ASSIGN_OR_RETURN(
-      const PassSums sums, GatherPhotons(settings, needs, photons, block, radii, stop, dropped));
+  LUCERNA_ASSIGN_OR_RETURN(const PassSums sums,
+                           GatherPhotons(settings, needs, photons, block, radii, stop, dropped));
   LUCERNA_ASSIGN_OR_RETURN(Accumulation accumulation, sums.ToAccumulation());
   accumulation.dropped_photons = std::move(dropped);
   return accumulation;
@@ -411,8 +411,7 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
       dropped.push_back({pass, index});
   }
   if (!sums) {
-    sums.emplace(eye.block.size(),
-                 EvidenceColumns(EvidenceOf(settings.radius_controller, pass)));
+    sums.emplace(eye.block.size(), EvidenceColumns(EvidenceOf(settings.radius_controller, pass)));
   }
   SliceSums slice = SliceOfPass(std::move(eye), plan, *std::move(sums), settings, needs,
                                 state.prepared.flux_scale(), state.team);

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <type_traits>
+#include <utility>
+
+#include "render/base/memory.h"
 
 namespace lucerna {
 namespace {
@@ -10,24 +14,25 @@ namespace {
 // More cells than this per deposit are mostly empty and only cost memory.
 constexpr double kCellsPerDeposit = 4;
 constexpr double kFewestCells = 4096;
+// Buckets so many that the cells of one fit in the nearest cache, and that what a thread counts
+// does too.
+constexpr std::size_t kMostBuckets = 1024;
+constexpr std::size_t kFewestCellsOfBucket = 64;
 
 }  // namespace
 
-PhotonGrid::PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& region, float cell,
-                       ThreadTeam& team)
+PhotonGrid::PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& region,
+                       float cell_width, ThreadTeam& team)
     : low_(region.low) {
   std::size_t count = 0;
-  std::vector<std::size_t> start;  // of each chunk in the input order
-  for (const auto& chunk : deposits) {
-    start.push_back(count);
+  for (const Deposits& chunk : deposits)
     count += chunk.size();
-  }
-  start.push_back(count);
   if (count == 0) return;
 
   const Vec3 extent = region.high - region.low;
   const double most_cells = std::max(kFewestCells, kCellsPerDeposit * static_cast<double>(count));
-  double width = std::max(static_cast<double>(cell), static_cast<double>(MaxAbs(extent)) * 1e-6);
+  double width =
+      std::max(static_cast<double>(cell_width), static_cast<double>(MaxAbs(extent)) * 1e-6);
   if (!(width > 0)) width = 1;
   const auto cells_at = [&](double w) {
     return (std::floor(static_cast<double>(extent.x) / w) + 1) *
@@ -43,40 +48,59 @@ PhotonGrid::PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& regi
   const std::size_t cells =
       static_cast<std::size_t>(nx_) * static_cast<std::size_t>(ny_) * static_cast<std::size_t>(nz_);
 
-  // Groups of chunks count their cells apart, so that the sort runs in parallel and is stable.
+  // First by buckets of neighbouring cells, of which groups of chunks count and place their
+  // deposits apart, then each bucket by its cells: in parallel, in the order of the input, and
+  // without an array of all cells for each thread.
+  const std::size_t cells_of_bucket =
+      std::max(kFewestCellsOfBucket, (cells + kMostBuckets - 1) / kMostBuckets);
+  const std::size_t buckets = (cells + cells_of_bucket - 1) / cells_of_bucket;
   const std::size_t groups =
       std::min(deposits.size(), static_cast<std::size_t>(std::max(1, team.threads())));
-  const auto chunk_of_group = [&](std::size_t group) { return group * deposits.size() / groups; };
-  std::vector<std::uint32_t> cell_of(count);
-  std::vector<std::vector<std::uint32_t>> counts(groups);
-  team.For(groups, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t group = begin; group < end; ++group) {
-      counts[group].assign(cells, 0);
-      for (std::size_t c = chunk_of_group(group); c < chunk_of_group(group + 1); ++c) {
-        std::size_t out = start[c];
-        for (const Deposit& deposit : deposits[c].rows) {
-          const Vec3 offset = deposit.position - low_;
-          const std::size_t number =
-              (static_cast<std::size_t>(CellOf(offset.z, nz_)) * static_cast<std::size_t>(ny_) +
-               static_cast<std::size_t>(CellOf(offset.y, ny_))) *
-                  static_cast<std::size_t>(nx_) +
-              static_cast<std::size_t>(CellOf(offset.x, nx_));
-          cell_of[out++] = static_cast<std::uint32_t>(number);
-          ++counts[group][number];
+  // Calls visit(cell, chunk, row, group) for all deposits, those of a group in
+  // their order.
+  const auto for_each_of_groups = [&](const auto& visit) {
+    team.For(groups, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t group = begin; group < end; ++group) {
+        for (std::size_t c = group * deposits.size() / groups;
+             c < (group + 1) * deposits.size() / groups; ++c) {
+          const std::vector<Deposit>& rows = deposits[c].rows;
+          for (std::size_t i = 0; i < rows.size(); ++i) {
+            const Vec3 offset = rows[i].position - low_;
+            const std::size_t cell =
+                (static_cast<std::size_t>(CellOf(offset.z, nz_)) * static_cast<std::size_t>(ny_) +
+                 static_cast<std::size_t>(CellOf(offset.y, ny_))) *
+                    static_cast<std::size_t>(nx_) +
+                static_cast<std::size_t>(CellOf(offset.x, nx_));
+            visit(cell, c, i, group);
+          }
         }
       }
-    }
+    });
+  };
+  std::vector<std::vector<std::uint32_t>> next(groups, std::vector<std::uint32_t>(buckets, 0));
+  for_each_of_groups([&](std::size_t cell, std::size_t, std::size_t, std::size_t group) {
+    ++next[group][cell / cells_of_bucket];
   });
-  first_.resize(cells + 1);
+  std::vector<std::uint32_t> first_of_bucket(buckets + 1);
   std::uint32_t sum = 0;
-  for (std::size_t number = 0; number < cells; ++number) {
-    first_[number] = sum;
-    for (std::size_t group = 0; group < groups; ++group) {
-      const std::uint32_t here = counts[group][number];
-      counts[group][number] = sum;
-      sum += here;
-    }
+  for (std::size_t bucket = 0; bucket < buckets; ++bucket) {
+    first_of_bucket[bucket] = sum;
+    for (std::vector<std::uint32_t>& of_group : next)
+      sum += std::exchange(of_group[bucket], sum);
   }
+  first_of_bucket[buckets] = sum;
+  // A deposit's cell within its bucket, and where it comes from.
+  struct Entry {
+    std::uint32_t cell, chunk, row;
+  };
+  std::vector<Entry> entries(count);
+  for_each_of_groups([&](std::size_t cell, std::size_t chunk, std::size_t row, std::size_t group) {
+    entries[next[group][cell / cells_of_bucket]++] = {
+        static_cast<std::uint32_t>(cell % cells_of_bucket), static_cast<std::uint32_t>(chunk),
+        static_cast<std::uint32_t>(row)};
+  });
+  FreeMemoryOf(next);
+  first_.resize(cells + 1);
   first_[cells] = sum;
 
   x_.assign(count + 8, HUGE_VALF);
@@ -90,27 +114,38 @@ PhotonGrid::PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& regi
   const bool has_densities = has(&Deposits::emission_densities);
   if (has_densities) emission_densities_.resize(count);
   const auto place_all = [&](auto with_normals, auto with_traces) {
-    team.For(groups, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t group = begin; group < end; ++group) {
-        for (std::size_t c = chunk_of_group(group); c < chunk_of_group(group + 1); ++c) {
-          const Deposits& chunk = deposits[c];
-          for (std::size_t i = 0; i < chunk.size(); ++i) {
-            const Deposit& deposit = chunk.rows[i];
-            const std::size_t out = counts[group][cell_of[start[c] + i]]++;
-            x_[out] = deposit.position.x;
-            y_[out] = deposit.position.y;
-            z_[out] = deposit.position.z;
-            sources_[out] = deposit.source;
-            if constexpr (with_normals) {
-              facing_[out] = {{deposit.flux, deposit.key},
-                              chunk.normals[i],
-                              chunk.arrivals_oct.empty() ? 0 : chunk.arrivals_oct[i]};
-            } else {
-              records_[out] = {deposit.flux, deposit.key};
-            }
-            if constexpr (with_traces) traces_[out] = chunk.traces[i];
-            if (has_densities) emission_densities_[out] = chunk.emission_densities[i];
+    team.For(buckets, 1, [&](std::size_t begin, std::size_t end) {
+      std::vector<std::uint32_t> next_of_cell;
+      for (std::size_t bucket = begin; bucket < end; ++bucket) {
+        const std::span here = std::span(entries).subspan(
+            first_of_bucket[bucket], first_of_bucket[bucket + 1] - first_of_bucket[bucket]);
+        const std::size_t first_cell = bucket * cells_of_bucket;
+        next_of_cell.assign(std::min(cells_of_bucket, cells - first_cell), 0);
+        for (const Entry& entry : here)
+          ++next_of_cell[entry.cell];
+        std::uint32_t before = first_of_bucket[bucket];
+        for (std::size_t cell = 0; cell < next_of_cell.size(); ++cell) {
+          first_[first_cell + cell] = before;
+          before += std::exchange(next_of_cell[cell], before);
+        }
+        for (const Entry& entry : here) {
+          const Deposits& chunk = deposits[entry.chunk];
+          const std::size_t i = entry.row;
+          const Deposit& deposit = chunk.rows[i];
+          const std::size_t out = next_of_cell[entry.cell]++;
+          x_[out] = deposit.position.x;
+          y_[out] = deposit.position.y;
+          z_[out] = deposit.position.z;
+          sources_[out] = deposit.source;
+          if constexpr (with_normals) {
+            facing_[out] = {{deposit.flux, deposit.key},
+                            chunk.normals[i],
+                            chunk.arrivals_oct.empty() ? 0 : chunk.arrivals_oct[i]};
+          } else {
+            records_[out] = {deposit.flux, deposit.key};
           }
+          if constexpr (with_traces) traces_[out] = chunk.traces[i];
+          if (has_densities) emission_densities_[out] = chunk.emission_densities[i];
         }
       }
     });

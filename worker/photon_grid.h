@@ -1,8 +1,8 @@
 // Which photons are near a point?
 //
-// Deposits are sorted into the cells of a uniform grid (a counting sort), so that a hitpoint finds
-// its neighbours as a few runs of consecutive photons: cells along x are neighbours in memory.
-// The order inside a cell is that of the input.
+// Deposits are sorted into the cells of a uniform grid (a counting sort in two steps), so that a
+// hitpoint finds its neighbours as a few runs of consecutive photons: cells along x are neighbours
+// in memory. The order inside a cell is that of the input.
 #pragma once
 
 #include <cstdint>
@@ -35,8 +35,8 @@ static_assert(sizeof(PhotonRecord) == 16 && sizeof(FacingRecord) == 32);
 class PhotonGrid {
  public:
   // `region` holds all deposits, which come in chunks that have the same columns. Cells are about
-  // `cell` wide [scene units], wider when there would be far more of them than deposits.
-  PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& region, float cell,
+  // `cell_width` wide [scene units], wider when there would be far more of them than deposits.
+  PhotonGrid(const std::vector<Deposits>& deposits, const Bounds& region, float cell_width,
              ThreadTeam& team);
 
   [[nodiscard]] std::size_t size() const { return size_; }

@@ -69,8 +69,8 @@ double Middle(double a, double b, double c) {
   return std::max(std::min(a, b), std::min(std::max(a, b), c));
 }
 
-// The mean of a channel over the pixels within kReach, without the pixel itself; its own value where
-// it is alone. Keeps a reference to the image.
+// The mean of a channel over the pixels within kReach, without the pixel itself; its own value
+// where it is alone. Keeps a reference to the image.
 class MeanAround {
  public:
   MeanAround(const ImageStatistics& image, std::size_t channel, ThreadTeam& team)
@@ -509,9 +509,8 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
     const SquaredError unknown = {.noise = HUGE_VAL, .bias = 0, .low = 0, .high = HUGE_VAL};
     return {.relative = unknown, .absolute = {}, .untrimmed = HUGE_VAL};
   }
-  std::optional<std::array<MeanAround, 3>> around =
-      std::array{MeanAround(image, 0, team), MeanAround(image, 1, team),
-                 MeanAround(image, 2, team)};
+  std::optional<std::array<MeanAround, 3>> around = std::array{
+      MeanAround(image, 0, team), MeanAround(image, 1, team), MeanAround(image, 2, team)};
   std::vector<float> least_luminance =
       LeastLuminance(width, height, std::move(rounded_luminances), team);
   const double believed = BelievedShare(width, height, half_biases, luminances, floor, team);

@@ -108,8 +108,7 @@ SliceSums EmptySlice(const PassRange& passes, std::size_t pixels, std::size_t ev
   sums.columns.resize(ColumnsOf(passes, evidence));
   for (std::size_t column = 0; column < sums.columns.size(); ++column) {
     if (FollowsFromRadiance(passes, column)) continue;
-    sums.columns[column] =
-        PackedFloats(pixels, SignificantBits(passes.size(), column, evidence));
+    sums.columns[column] = PackedFloats(pixels, SignificantBits(passes.size(), column, evidence));
   }
   return sums;
 }

@@ -47,8 +47,7 @@ class PackedFloats {
   }
   void Write(std::size_t begin, std::span<const float> floats) {
     for (std::size_t i = 0; i < floats.size(); ++i)
-      high_[begin + i] =
-          static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(floats[i]) >> 16U);
+      high_[begin + i] = static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(floats[i]) >> 16U);
     if (low_.empty()) return;
     for (std::size_t i = 0; i < floats.size(); ++i)
       low_[begin + i] = static_cast<std::uint8_t>(std::bit_cast<std::uint32_t>(floats[i]) >> 8U);

@@ -96,11 +96,12 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
   const std::size_t first_caustic = pass.block.first_caustic();
   const std::size_t first_segment = pass.block.first_segment();
   pass.block = {};
-  struct OfPhotons {
-    std::array<float, 3> radiance{};
-    float bias = 0;
-  };
-  std::vector<OfPhotons> of_photons(pixels);
+  // Radiance, and the bias behind it.
+  std::array<std::vector<float>, 4> of_photons;
+  team.For(of_photons.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t column = begin; column < end; ++column)
+      of_photons[column].resize(pixels);
+  });
   make(kEvenBias, kSliceColumns - kEvenBias + evidence);
   static_assert(kEvenBias < kOddBias && kOddBias < kPhotonCount && kPhotonCount < kBlur);
   if (has_features) make(first_feature + kUnitRadius, 3);
@@ -112,17 +113,15 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
     const float in_units = has_common_radius ? plan.caustic_radius : (*plan.radii)[pixel];
     const auto radius = static_cast<double>(HitpointRadius(in_units, pass.unit_radii[row]));
     const double to_density = per_photon / (radius * radius);
-    OfPhotons& sum = of_photons[pixel];
     for (int channel = 0; channel < 3; ++channel) {
       const double flux = static_cast<double>(sums.flux(channel)[row]) *
                           static_cast<double>(scale.watts_per_quantum[channel]);
-      add(sum.radiance[static_cast<std::size_t>(channel)],
+      add(of_photons[static_cast<std::size_t>(channel)][pixel],
           static_cast<double>(pass.weights[row][channel]) * flux * to_density);
     }
     const double blur = static_cast<double>(sums.evidence()[kBlurColumn][row]) * kToBias;
-    add(sum.bias,
-        blur * luminance_per_quantum * to_density *
-            static_cast<double>(Luminance(pass.weights[row])));
+    add(of_photons[3][pixel], blur * luminance_per_quantum * to_density *
+                                  static_cast<double>(Luminance(pass.weights[row])));
     if (has_common_radius) return;
     set(kPhotonCount, pixel, static_cast<double>(sums.counts()[row]));
     const auto unit_radius = static_cast<double>(in_units);
@@ -154,10 +153,9 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
   make(kDirectRadiance, 3);
   const PhotonRounding rounded_photons(slice.passes);
   const auto set_radiance = [&](std::size_t pixel) {
-    const OfPhotons& sum = of_photons[pixel];
     std::array<double, 3> photons{};
     for (std::size_t c = 0; c < 3; ++c)
-      photons[c] = static_cast<double>(sum.radiance[c]);
+      photons[c] = static_cast<double>(of_photons[c][pixel]);
     photons = in_color(photons);
     const std::array<double, 3> direct = in_color(ToDoubles(pass.direct[pixel]));
     std::array<float, 3> by_photons{};
@@ -168,7 +166,7 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
     by_photons = rounded_photons(pixel, slice.columns[kPhotonCount][pixel], by_photons);
     for (std::size_t c = 0; c < 3; ++c)
       slice.columns[kPhotonRadiance + c].Set(pixel, by_photons[c]);
-    set(bias, pixel, static_cast<double>(sum.bias));
+    set(bias, pixel, static_cast<double>(of_photons[3][pixel]));
   };
   const auto for_pixels = [&](const auto& work) {
     team.For(pixels, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
@@ -178,7 +176,8 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
   };
   for_pixels(set_radiance);
   FreeMemoryOf(pass.direct);
-  FreeMemoryOf(of_photons);
+  for (std::vector<float>& column : of_photons)
+    FreeMemoryOf(column);
 
   if (has_features) {
     make(first_feature + kAlbedo, kUnitRadius - kAlbedo);

@@ -214,8 +214,7 @@ void ByteReader::Floats(PackedFloats& column) {
   std::uint16_t largest_exponent = 0;
   JoinPlanes<std::uint16_t>(
       planes, plane, rows, [&, to = column.high().data()](std::size_t i, std::uint16_t high) {
-        largest_exponent =
-            std::max(largest_exponent, static_cast<std::uint16_t>(high & kExponent));
+        largest_exponent = std::max(largest_exponent, static_cast<std::uint16_t>(high & kExponent));
         to[i] = high;
       });
   if (largest_exponent == kExponent) Fail();

@@ -68,8 +68,8 @@ class ByteReader {
   // What Compressed wrote. Fails unless it unpacks to exactly `size` bytes; nothing is allocated
   // before the compressed bytes themselves have promised that size.
   std::string Compressed(std::size_t size);
-  // What Planes wrote of the bytes that `column` keeps, into it. Fails for numbers that have more or
-  // are not finite.
+  // What Planes wrote of the bytes that `column` keeps, into it. Fails for numbers that have more
+  // or are not finite.
   void Floats(PackedFloats& column);
   // What Planes wrote, `rows` of them.
   std::vector<std::uint32_t> Planes32(std::size_t rows);

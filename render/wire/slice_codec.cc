@@ -168,8 +168,8 @@ StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape)
   slice.columns.resize(columns);
   for (const std::size_t column : SentColumns(shape.passes, columns)) {
     PackedFloats& values = slice.columns[column];
-    values = PackedFloats(shape.pixels,
-                          SignificantBits(shape.passes.size(), column, shape.evidence));
+    values =
+        PackedFloats(shape.pixels, SignificantBits(shape.passes.size(), column, shape.evidence));
     bool is_of_column = true;
     if (BaseOf(column) == column) {
       reader.Floats(values);

@@ -144,8 +144,8 @@ std::vector<std::string> SumsSeeds() {
     const RoundPlan plan = estimator->PlanFor(RoundOf(pass)).value();
     const std::size_t columns =
         EvidenceColumns(EvidenceOf(RenderSettings().radius_controller, pass));
-    estimator->AddRound(std::make_shared<const SliceSums>(estimator->SliceOf(
-                            std::move(now), plan, PassSums(rows, columns))),
+    estimator->AddRound(std::make_shared<const SliceSums>(
+                            estimator->SliceOf(std::move(now), plan, PassSums(rows, columns))),
                         plan);
   }
   seeds.push_back(Saved(*estimator));

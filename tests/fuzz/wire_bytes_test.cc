@@ -69,7 +69,9 @@ SliceSums SomeSlice(const SliceShape& shape) {
   SliceSums slice = EmptySlice(shape.passes, shape.pixels, shape.evidence);
   for (std::size_t column = 0; column < slice.columns.size(); ++column) {
     for (std::size_t pixel = 0; pixel < slice.columns[column].size(); ++pixel) {
-      slice.columns[column].Set(pixel, Rounded(std::exp(8 * static_cast<double>(pixel)) * (pixel % 3 == 0 ? -1 : 1) / 1000,
+      slice.columns[column].Set(
+          pixel,
+          Rounded(std::exp(8 * static_cast<double>(pixel)) * (pixel % 3 == 0 ? -1 : 1) / 1000,
                   SignificantBits(shape.passes.size(), column, shape.evidence)));
     }
   }

@@ -18,7 +18,9 @@ constexpr int kSide = 256;
 constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
 
 ImageStatistics NoisyImage() {
-  ImageStatistics image = {.width = kSide, .height = kSide, .passes = 4,
+  ImageStatistics image = {.width = kSide,
+                           .height = kSide,
+                           .passes = 4,
                            .pixels = std::vector<PixelStatistics>(kPixels)};
   KeyedRng rng(2);
   for (PixelStatistics& pixel : image.pixels) {

@@ -22,7 +22,10 @@ std::uint32_t BitsOf(float value) {
 TEST(PackedFloatsTest, KeepEveryNumberOfTheirBits) {
   for (const unsigned int significant_bits : {8U, 16U}) {
     const std::uint32_t below = (std::uint32_t{1} << (24 - significant_bits)) - 1;
-    std::vector<float> numbers = {0.0F, -0.0F, 1.0F, -1.5F,
+    std::vector<float> numbers = {0.0F,
+                                  -0.0F,
+                                  1.0F,
+                                  -1.5F,
                                   std::numeric_limits<float>::infinity(),
                                   std::bit_cast<float>(below + 1)};  // the smallest there is
     KeyedRng rng(5);
