@@ -11,7 +11,7 @@ namespace {
 // sums, and of the photons that were reported), of the
 // copy that an error is estimated from and its work, and of the sums of squared deviations.
 constexpr std::uint64_t kCheckpoint = 220 + 2 * 14;
-constexpr std::uint64_t kEstimate = 48 + 200;
+constexpr std::uint64_t kEstimate = 48 + 72;
 constexpr std::uint64_t kPassVariance = 28;
 // Memory for a byte of a file: binary meshes become as much again with the tree over their
 // triangles three times; text becomes less.
