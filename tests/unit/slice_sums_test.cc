@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -117,6 +118,38 @@ TEST(SliceSumsTest, DitherKeepsTheMeanOfLightByPhotons) {
   // Half of them, up to five deviations.
   EXPECT_NEAR(same_slice, 500, 5 * 16);
   EXPECT_NEAR(same_pixel, 500, 5 * 16);
+}
+
+// What follows from the radiance of a single pass: the difference of halves with the sign of its
+// half, no deviations, and its luminance, at least 0. In runs as pixel by pixel.
+TEST(SliceSumsTest, WhatFollowsFromTheRadianceOfOnePassIsRead) {
+  for (const std::uint64_t pass : {6, 7}) {
+    constexpr std::size_t kMany = 2 * kPixelsUnpacked + 5;
+    SliceSums slice = EmptySlice({pass, pass + 1}, kMany, kEvidence);
+    KeyedRng rng(3);
+    for (std::size_t column = 0; column < kHalfDifference; ++column) {
+      for (std::size_t pixel = 0; pixel < kMany; ++pixel)
+        slice.columns[column].Set(pixel, Rounded(static_cast<double>(rng.Uniform()) - 0.25, 16));
+    }
+    for (std::size_t column = kHalfDifference; column <= kLargestLuminance; ++column) {
+      std::vector<float> run(kMany - 3);
+      slice.Read(column, 3, run);
+      for (std::size_t pixel = 3; pixel < kMany; ++pixel) {
+        double expected = 0;
+        if (column < kSquaredDeviations) {
+          const std::size_t c = column - kHalfDifference;
+          expected = (pass % 2 == 0 ? 1 : -1) *
+                     (static_cast<double>(slice.At(kPhotonRadiance + c, pixel)) +
+                      static_cast<double>(slice.At(kDirectRadiance + c, pixel)));
+        } else if (column == kLargestLuminance) {
+          expected = std::max(0.0, LuminanceAt(slice, pixel));
+        }
+        const unsigned int bits = SignificantBits(1, column, kEvidence);
+        ASSERT_EQ(run[pixel - 3], Rounded(expected, bits)) << column << " " << pixel;
+        ASSERT_EQ(slice.At(column, pixel), run[pixel - 3]) << column << " " << pixel;
+      }
+    }
+  }
 }
 
 // Passes without noise have none in their sum: no difference of halves, no deviations, and to 16
