@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <optional>
 #include <span>
@@ -66,16 +67,43 @@ Status CheckBlock(const HitpointBlock& block, const RadiusColumn& radii, const S
   return absl::OkStatus();
 }
 
+// Rows that a thread takes at once where little is done with each.
+constexpr std::size_t kRowsAtOnce = std::size_t{1} << 14;
+
+// The sum of what body(begin, end) gives for the pieces of [0, count), by `add`, in their order.
+template <typename Sum, typename Body, typename Add>
+Sum SumOfPieces(ThreadTeam& team, std::size_t count, const Body& body, const Add& add) {
+  std::vector<Sum> pieces((count + kRowsAtOnce - 1) / kRowsAtOnce);
+  team.For(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t piece = begin; piece < end; ++piece) {
+      pieces[piece] = body(piece * kRowsAtOnce, std::min(count, (piece + 1) * kRowsAtOnce));
+    }
+  });
+  Sum sum = {};
+  for (Sum& piece : pieces)
+    add(sum, piece);
+  return sum;
+}
+
 // The box in which a photon can be found by some hitpoint.
-Bounds RegionOf(const HitpointBlock& block, const RadiusColumn& radii, float radii_reach) {
-  Bounds region;
-  for (std::size_t row = 0; row < block.first_segment(); ++row) {
-    const float r = radii_reach * radii[row];
-    const Vec3 reach = {r, r, r};
-    region.Add(block.positions[row] - reach);
-    region.Add(block.positions[row] + reach);
-  }
-  return region;
+Bounds RegionOf(const HitpointBlock& block, const RadiusColumn& radii, float radii_reach,
+                ThreadTeam& team) {
+  const auto of_rows = [&](std::size_t begin, std::size_t end) {
+    Bounds region;
+    for (std::size_t row = begin; row < end; ++row) {
+      const float r = radii_reach * radii[row];
+      const Vec3 reach = {r, r, r};
+      region.Add(block.positions[row] - reach);
+      region.Add(block.positions[row] + reach);
+    }
+    return region;
+  };
+  return SumOfPieces<Bounds>(team, block.first_segment(), of_rows,
+                             [](Bounds& region, const Bounds& piece) {
+                               if (piece.empty()) return;
+                               region.Add(piece.low);
+                               region.Add(piece.high);
+                             });
 }
 
 // The box in which a photon that a medium scattered can be found by some segment.
@@ -93,10 +121,15 @@ Bounds MediaRegionOf(const HitpointBlock& block, const RadiusColumn& radii) {
 }
 
 // Cells twice as wide as the middle radius: a hitpoint meets two to three of them along an axis,
-// and a few very large or small radii do not spoil the grid for the others.
+// and a few very large or small radii do not spoil the grid for the others. Some thousands of the
+// hitpoints tell: what is found does not depend on the width.
 float CellWidth(std::span<const float> of_hitpoints) {
   if (of_hitpoints.empty()) return 0;
-  RadiusColumn radii(of_hitpoints.begin(), of_hitpoints.end());
+  constexpr std::size_t kSample = std::size_t{1} << 13;
+  const std::size_t step = 1 + of_hitpoints.size() / kSample;
+  RadiusColumn radii;
+  for (std::size_t row = step / 2; row < of_hitpoints.size(); row += step)
+    radii.push_back(of_hitpoints[row]);
   const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
   std::nth_element(radii.begin(), middle, radii.end());
   return 2 * *middle;
@@ -106,24 +139,44 @@ float CellWidth(std::span<const float> of_hitpoints) {
 // each has sent, and those that hitpoints found.
 std::vector<LightTally> TallyLights(
     const std::vector<std::array<std::uint64_t, kMaxLightGroups>>& sent,
-    const GatheredPhotons& photons) {
+    const GatheredPhotons& photons, ThreadTeam& team) {
   std::vector<LightTally> lights(kMaxLightTallies);
   for (const auto& of_chunk : sent) {
     for (std::size_t light = 0; light < kMaxLightGroups; ++light)
       lights[light].sent += of_chunk[light];
   }
-  // [photons of the part × classes] whether the photon has been counted.
-  std::vector<bool> is_counted(kPathClasses << DepositSource::kNumberBits);
+  // [photons of the part × classes] whether the photon has been counted, as bits. Its light is one,
+  // so that it is the same whichever of its deposits is met first.
+  constexpr std::size_t kBits = 64;
+  std::vector<std::atomic<std::uint64_t>> is_counted((kPathClasses << DepositSource::kNumberBits) /
+                                                     kBits);
+  using InView = std::array<std::array<std::uint64_t, kPathClasses>, kMaxLightTallies>;
   const auto count = [&](const auto& grid, std::span<const std::uint32_t> found_by) {
-    for (std::size_t i = 0; i < found_by.size(); ++i) {
-      if (found_by[i] == kNotFound) continue;
-      const DepositSource source = grid.source(i);
-      if (!source.is_unguided) continue;
-      const auto path = static_cast<std::size_t>(source.path);
-      const std::size_t entry = kPathClasses * source.number + path;
-      if (is_counted[entry]) continue;
-      is_counted[entry] = true;
-      ++lights[source.light].in_view[path];
+    const auto of_deposits = [&](std::size_t begin, std::size_t end) {
+      InView in_view = {};
+      for (std::size_t i = begin; i < end; ++i) {
+        if (found_by[i] == kNotFound) continue;
+        const DepositSource source = grid.source(i);
+        if (!source.is_unguided) continue;
+        const auto path = static_cast<std::size_t>(source.path);
+        const std::size_t entry = kPathClasses * source.number + path;
+        const std::uint64_t bit = std::uint64_t{1} << (entry % kBits);
+        const std::uint64_t before =
+            is_counted[entry / kBits].fetch_or(bit, std::memory_order_relaxed);
+        if ((before & bit) == 0) ++in_view[source.light][path];
+      }
+      return in_view;
+    };
+    const InView in_view =
+        SumOfPieces<InView>(team, found_by.size(), of_deposits, [](InView& sum, const InView& of) {
+          for (std::size_t light = 0; light < sum.size(); ++light) {
+            for (std::size_t path = 0; path < kPathClasses; ++path)
+              sum[light][path] += of[light][path];
+          }
+        });
+    for (std::size_t light = 0; light < lights.size(); ++light) {
+      for (std::size_t path = 0; path < kPathClasses; ++path)
+        lights[light].in_view[path] += in_view[light][path];
     }
   };
   count(photons.grid, photons.found_by);
@@ -136,15 +189,25 @@ std::vector<LightTally> TallyLights(
 
 // Those found of the photons of a part from `first` on that the guide asks to be reported.
 std::vector<FoundPhoton> ReportFound(const PhotonPathTracer& tracer, std::uint64_t pass,
-                                     std::uint64_t first, const GatheredPhotons& photons) {
-  std::vector<FoundPhoton> found;
+                                     std::uint64_t first, const GatheredPhotons& photons,
+                                     ThreadTeam& team) {
+  using Found = std::vector<FoundPhoton>;
+  Found found;
+  const auto append = [](Found& all, const Found& of_piece) {
+    all.insert(all.end(), of_piece.begin(), of_piece.end());
+  };
   const auto add = [&](const auto& grid, std::span<const std::uint32_t> found_by) {
-    for (std::size_t i = 0; i < found_by.size(); ++i) {
-      if (found_by[i] == kNotFound) continue;
-      const std::uint64_t index = tracer.IndexOf(pass, first, grid.source(i).number);
-      if (const auto numbers = tracer.ReportOf(pass, index))
-        found.push_back({index, *numbers, found_by[i]});
-    }
+    const auto of_deposits = [&](std::size_t begin, std::size_t end) {
+      Found of_piece;
+      for (std::size_t i = begin; i < end; ++i) {
+        if (found_by[i] == kNotFound) continue;
+        const std::uint64_t index = tracer.IndexOf(pass, first, grid.source(i).number);
+        if (const auto numbers = tracer.ReportOf(pass, index))
+          of_piece.push_back({index, *numbers, found_by[i]});
+      }
+      return of_piece;
+    };
+    append(found, SumOfPieces<Found>(team, found_by.size(), of_deposits, append));
   };
   add(photons.grid, photons.found_by);
   if (photons.caustics != nullptr) add(*photons.caustics, photons.caustic_found_by);
@@ -265,7 +328,7 @@ StatusOr<PassSums> BatchTracer::GatherPhotons(const RenderSettings& settings,
   const PhotonGuide* const guide = range.guide;
   const Evidence evidence = EvidenceOf(settings.radius_controller, pass);
   const PreparedScene& prepared = state_->prepared;
-  const Bounds region = RegionOf(block, radii, ReachOf(evidence));
+  const Bounds region = RegionOf(block, radii, ReachOf(evidence), state_->team);
   const Bounds media_region = MediaRegionOf(block, radii);
   const std::size_t first_caustic = block.first_caustic();
   const float cell = CellWidth(std::span(radii).first(first_caustic));
@@ -298,6 +361,8 @@ StatusOr<PassSums> BatchTracer::GatherPhotons(const RenderSettings& settings,
     while (next < part_end && found < kDepositsPerPart && !stop) {
       const std::uint64_t round_end = std::min(part_end, next + per_round);
       const std::size_t before = tallies.size();
+      // As many deposits as the chunks so far had, and some more.
+      const std::uint64_t expected = next > part ? per_chunk * found * 9 / (8 * (next - part)) : 0;
       const auto chunks = static_cast<std::size_t>((round_end - next + per_chunk - 1) / per_chunk);
       deposits.resize(before + chunks);
       caustics.resize(before + chunks);
@@ -311,7 +376,7 @@ StatusOr<PassSums> BatchTracer::GatherPhotons(const RenderSettings& settings,
           const std::uint64_t chunk_first = next + chunk * per_chunk;
           const std::uint64_t chunk_last = std::min(round_end, chunk_first + per_chunk);
           PhotonPathTracer::Landed landed;
-          landed.deposits.rows.reserve(2 * per_chunk);
+          landed.deposits.rows.reserve(expected);
           for (std::uint64_t index = chunk_first; index < chunk_last; ++index) {
             tracer.Trace(pass, index, landed);
           }
@@ -366,7 +431,7 @@ StatusOr<PassSums> BatchTracer::GatherPhotons(const RenderSettings& settings,
     }
     Accumulation counted;
     counted.evidence.resize(columns);
-    if (!sums) sums.emplace(block.size(), columns);
+    if (!sums) sums.emplace(block.size(), columns, &state_->team);
     LUCERNA_ASSIGN_OR_RETURN(
         counted.tally,
         Gather(block, radii, photons, prepared.scene().materials, Kernel{settings.kernel},
@@ -374,9 +439,9 @@ StatusOr<PassSums> BatchTracer::GatherPhotons(const RenderSettings& settings,
     if (stop) return given_up;
     for (const BatchTally& tally : tallies)
       counted.tally += tally;
-    counted.tally.lights = TallyLights(sent, photons);
+    counted.tally.lights = TallyLights(sent, photons, state_->team);
     if (guide != nullptr && guide->reported() > 0)
-      counted.found = ReportFound(tracer, pass, part, photons);
+      counted.found = ReportFound(tracer, pass, part, photons, state_->team);
     LUCERNA_RETURN_IF_ERROR(sums->Add(counted));
     for (const std::vector<std::uint64_t>& named : dropped) {
       for (const std::uint64_t index : named) {
@@ -405,8 +470,9 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
     std::vector<std::uint64_t> named;
     const PhotonRange photons = {pass, 0, plan.photons_per_pass, plan.photons_per_pass,
                                  plan.guide.get()};
-    LUCERNA_ASSIGN_OR_RETURN(sums, GatherPhotons(settings, needs, photons, eye.block,
-                                                 HitpointRadii(eye, plan), stop, named));
+    LUCERNA_ASSIGN_OR_RETURN(sums,
+                             GatherPhotons(settings, needs, photons, eye.block,
+                                           HitpointRadii(eye, plan, &state.team), stop, named));
     for (const std::uint64_t index : named)
       dropped.push_back({pass, index});
   }

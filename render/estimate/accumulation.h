@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "render/base/parallel.h"
 #include "render/base/status.h"
 #include "render/estimate/emission_report.h"
 
@@ -144,7 +145,9 @@ struct Accumulation {
 // The sum of all batches of one pass, one row per hitpoint of the block.
 class PassSums {
  public:
-  explicit PassSums(std::size_t hitpoints, std::size_t evidence_columns = 0);
+  // All zero, made by the threads of `team` or by the caller's alone.
+  explicit PassSums(std::size_t hitpoints, std::size_t evidence_columns = 0,
+                    ThreadTeam* team = nullptr);
 
   // Adds every row. All or nothing.
   // Errors: INVALID_ARGUMENT when the accumulation breaks its own promises or names a hitpoint

@@ -1,8 +1,10 @@
 #include "render/tracing/hitpoint_pass.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
+#include <functional>
 
 #include "render/estimate/slice_sums.h"
 #include "render/math/octahedral.h"
@@ -162,14 +164,19 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   out.block.caustic_rows = next.row - ordinary;
   const std::size_t segments_begin = next.row;
   count(&Tile::segment_rows, first_segment);
-  out.block.positions.resize(next.row);
-  out.block.normals_oct.resize(next.row);
   out.block.glossy.resize(next.glossy);
   if (has_places) out.block.places.resize(next.glossy);
   out.block.segments.resize(next.row - segments_begin);
-  out.pixels.resize(next.row);
-  out.weights.resize(next.row);
-  out.unit_radii.resize(next.row);
+  // Clearing memory takes as long as filling it in.
+  const auto resize = [&](auto&... columns) {
+    const std::array<std::function<void()>, sizeof...(columns)> resizes = {
+        [&] { columns.resize(next.row); }...};
+    team.For(resizes.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t column = begin; column < end; ++column)
+        resizes[column]();
+    });
+  };
+  resize(out.block.positions, out.weights, out.block.normals_oct, out.pixels, out.unit_radii);
   const auto place_rows = [&](Rows& rows, const FirstRows& first) {
     for (std::size_t i = 0; i < rows.rows.size(); ++i) {
       const Row& row = rows.rows[i];

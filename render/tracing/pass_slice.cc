@@ -30,13 +30,21 @@ float HitpointRadius(float radius, float unit_radius) {
                  kLargestRadius));
 }
 
-RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan) {
+RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan, ThreadTeam* team) {
   RadiusColumn of_hitpoints(pass.pixels.size());
   const std::size_t first_caustic = pass.block.first_caustic();
-  for (std::size_t row = 0; row < of_hitpoints.size(); ++row) {
-    const float radius =
-        row < first_caustic ? (*plan.radii)[pass.pixels[row]] : plan.caustic_radius;
-    of_hitpoints[row] = HitpointRadius(radius, pass.unit_radii[row]);
+  const auto set = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t row = begin; row < end; ++row) {
+      const float radius =
+          row < first_caustic ? (*plan.radii)[pass.pixels[row]] : plan.caustic_radius;
+      of_hitpoints[row] = HitpointRadius(radius, pass.unit_radii[row]);
+    }
+  };
+  constexpr std::size_t kRowsAtOnce = std::size_t{1} << 14;
+  if (team != nullptr) {
+    team->For(of_hitpoints.size(), kRowsAtOnce, set);
+  } else {
+    set(0, of_hitpoints.size());
   }
   return of_hitpoints;
 }

@@ -32,8 +32,10 @@ struct RoundPlan {
 // Of a radius [units of the settings] whose unit has this length there [scene units].
 [[nodiscard]] float HitpointRadius(float radius, float unit_radius);
 
-// The radius of every hitpoint of a pass [scene units].
-[[nodiscard]] RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan);
+// The radius of every hitpoint of a pass [scene units]. By the threads of `team`, or by the
+// caller's alone.
+[[nodiscard]] RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan,
+                                         ThreadTeam* team = nullptr);
 
 // The slice of one pass, which is used up. `sums` are those of all its photons, gathered with
 // HitpointRadii. Of a job that carries wavelengths (`needs`) it has their colour, in the working
