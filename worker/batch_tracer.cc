@@ -161,9 +161,11 @@ std::vector<LightTally> TallyLights(
         const auto path = static_cast<std::size_t>(source.path);
         const std::size_t entry = kPathClasses * source.number + path;
         const std::uint64_t bit = std::uint64_t{1} << (entry % kBits);
-        const std::uint64_t before =
-            is_counted[entry / kBits].fetch_or(bit, std::memory_order_relaxed);
-        if ((before & bit) == 0) ++in_view[source.light][path];
+        std::atomic<std::uint64_t>& bits = is_counted[entry / kBits];
+        // A photon leaves several deposits: mostly it is counted already, and reading is cheaper.
+        if ((bits.load(std::memory_order_relaxed) & bit) != 0) continue;
+        if ((bits.fetch_or(bit, std::memory_order_relaxed) & bit) == 0)
+          ++in_view[source.light][path];
       }
       return in_view;
     };
