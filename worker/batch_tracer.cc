@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <optional>
 #include <span>
@@ -139,46 +138,25 @@ float CellWidth(std::span<const float> of_hitpoints) {
 // each has sent, and those that hitpoints found.
 std::vector<LightTally> TallyLights(
     const std::vector<std::array<std::uint64_t, kMaxLightGroups>>& sent,
-    const GatheredPhotons& photons, ThreadTeam& team) {
+    const GatheredPhotons& photons) {
   std::vector<LightTally> lights(kMaxLightTallies);
   for (const auto& of_chunk : sent) {
     for (std::size_t light = 0; light < kMaxLightGroups; ++light)
       lights[light].sent += of_chunk[light];
   }
-  // [photons of the part × classes] whether the photon has been counted, as bits. Its light is one,
-  // so that it is the same whichever of its deposits is met first.
-  constexpr std::size_t kBits = 64;
-  std::vector<std::atomic<std::uint64_t>> is_counted((kPathClasses << DepositSource::kNumberBits) /
-                                                     kBits);
-  using InView = std::array<std::array<std::uint64_t, kPathClasses>, kMaxLightTallies>;
+  // [photons of the part × classes] whether the photon has been counted. By one thread: bits that
+  // several set would go from core to core, which takes twice as long already with two.
+  std::vector<bool> is_counted(kPathClasses << DepositSource::kNumberBits);
   const auto count = [&](const auto& grid, std::span<const std::uint32_t> found_by) {
-    const auto of_deposits = [&](std::size_t begin, std::size_t end) {
-      InView in_view = {};
-      for (std::size_t i = begin; i < end; ++i) {
-        if (found_by[i] == kNotFound) continue;
-        const DepositSource source = grid.source(i);
-        if (!source.is_unguided) continue;
-        const auto path = static_cast<std::size_t>(source.path);
-        const std::size_t entry = kPathClasses * source.number + path;
-        const std::uint64_t bit = std::uint64_t{1} << (entry % kBits);
-        std::atomic<std::uint64_t>& bits = is_counted[entry / kBits];
-        // A photon leaves several deposits: mostly it is counted already, and reading is cheaper.
-        if ((bits.load(std::memory_order_relaxed) & bit) != 0) continue;
-        if ((bits.fetch_or(bit, std::memory_order_relaxed) & bit) == 0)
-          ++in_view[source.light][path];
-      }
-      return in_view;
-    };
-    const InView in_view =
-        SumOfPieces<InView>(team, found_by.size(), of_deposits, [](InView& sum, const InView& of) {
-          for (std::size_t light = 0; light < sum.size(); ++light) {
-            for (std::size_t path = 0; path < kPathClasses; ++path)
-              sum[light][path] += of[light][path];
-          }
-        });
-    for (std::size_t light = 0; light < lights.size(); ++light) {
-      for (std::size_t path = 0; path < kPathClasses; ++path)
-        lights[light].in_view[path] += in_view[light][path];
+    for (std::size_t i = 0; i < found_by.size(); ++i) {
+      if (found_by[i] == kNotFound) continue;
+      const DepositSource source = grid.source(i);
+      if (!source.is_unguided) continue;
+      const auto path = static_cast<std::size_t>(source.path);
+      const std::size_t entry = kPathClasses * source.number + path;
+      if (is_counted[entry]) continue;
+      is_counted[entry] = true;
+      ++lights[source.light].in_view[path];
     }
   };
   count(photons.grid, photons.found_by);
@@ -441,7 +419,7 @@ StatusOr<PassSums> BatchTracer::GatherPhotons(const RenderSettings& settings,
     if (stop) return given_up;
     for (const BatchTally& tally : tallies)
       counted.tally += tally;
-    counted.tally.lights = TallyLights(sent, photons, state_->team);
+    counted.tally.lights = TallyLights(sent, photons);
     if (guide != nullptr && guide->reported() > 0)
       counted.found = ReportFound(tracer, pass, part, photons, state_->team);
     LUCERNA_RETURN_IF_ERROR(sums->Add(counted));
