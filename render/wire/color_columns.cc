@@ -39,8 +39,9 @@ struct Window {
   std::array<float, kPixels> counts;
 };
 
-// Calls body(pixel, its code that is predicted from what lies before, window), where the channel of
-// that pixel is window.channel[kBefore + pixel % kPixels], to be read or set.
+// Calls body(pixel, its code that is predicted from what lies before, its number in the channel),
+// which reads the number or sets it. Before and after that of a run of pixels, begin and end are
+// called with the first of them and their numbers.
 template <typename Begin, typename Body, typename End>
 void ForEachPixel(const ColorColumn& with, const Begin& begin, const Body& body, const End& end) {
   const std::size_t size = with.base.size();

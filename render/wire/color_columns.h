@@ -15,8 +15,8 @@
 
 namespace lucerna {
 
-// A channel is predicted from `base`; floats of as many bytes, or, where `counts` are given, of
-// what bits PhotonBits has at most. All of one size.
+// What a channel is predicted from: `base`, whose floats have as many bytes. Where `counts` are
+// given, the channel has no more significant bits than PhotonBits says. All of one size.
 struct ColorColumn {
   const PackedFloats& base;
   const PackedFloats* counts = nullptr;
