@@ -202,9 +202,20 @@ TEST_F(ManyJobsTest, OneRequestThirtyTimesAtOnceIsOneJob) {
   EXPECT_EQ(client_.List().message.jobs_size(), 1);
 }
 
-// The jobs of SmallScene need some 60 kB each.
+// What an ended job that keeps its photons holds, where there is room for many.
+std::uint64_t HeldByAJob() {
+  ServiceUnderTest service;
+  TestClient client(service);
+  const v1::SceneManifest scene = client.Upload(SmallScene());
+  const WorkerThread worker(service);
+  const std::string job = client.Submit(RequestFor(scene, "only", 2)).message.job_id();
+  EXPECT_TRUE(client.WaitFor(job, {v1::JOB_STATE_SUCCEEDED}).ok());
+  return service.coordinator().budget().HeldFor(MemoryUse::kJobs);
+}
+
 TEST(MemoryOfJobsTest, AJobThatDoesNotFitBesideOthersWaitsAndBlocksNobody) {
-  ServiceUnderTest service({.jobs_at_once = 2, .max_memory_bytes = 100'000});
+  // Room for one job of this size and a smaller one, and not for two.
+  ServiceUnderTest service({.jobs_at_once = 2, .max_memory_bytes = HeldByAJob() * 7 / 4});
   TestClient client(service);
   const v1::SceneManifest scene = client.Upload(SmallScene());
   const std::string first = client.Submit(RequestFor(scene, "first", kEndless)).message.job_id();
@@ -237,9 +248,11 @@ TEST(MemoryOfJobsTest, AJobThatDoesNotFitBesideOthersWaitsAndBlocksNobody) {
 }
 
 TEST(MemoryOfJobsTest, WhatWillNeverFitIsRefusedAndEndedJobsLetGoOfTheirPhotons) {
-  ServiceUnderTest service({.max_memory_bytes = 100'000});
+  // Room for one job and its scene, and not for two.
+  const std::uint64_t room = HeldByAJob() * 7 / 4;
+  ServiceUnderTest service({.max_memory_bytes = room});
   TestClient client(service);
-  EXPECT_EQ(client.UploadBytes(std::string(200'000, 'x')).error_code(),
+  EXPECT_EQ(client.UploadBytes(std::string(2 * room, 'x')).error_code(),
             grpc::StatusCode::RESOURCE_EXHAUSTED);
   const v1::SceneManifest scene = client.Upload(SmallScene());
   const WorkerThread worker(service);
@@ -252,7 +265,7 @@ TEST(MemoryOfJobsTest, WhatWillNeverFitIsRefusedAndEndedJobsLetGoOfTheirPhotons)
   EXPECT_EQ(client.Extend(first, 4).code(), grpc::StatusCode::FAILED_PRECONDITION)
       << "the second needed its memory";
   EXPECT_TRUE(client.Image(first).ok());
-  EXPECT_LE(service.coordinator().budget().held(), 100'000U);
+  EXPECT_LE(service.coordinator().budget().held(), room);
 }
 
 TEST_F(ManyJobsTest, RoundsThatAreOpenCountAsMemoryAndAJobGoesOnWithoutRoomForMany) {
