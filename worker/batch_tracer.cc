@@ -24,9 +24,9 @@ namespace {
 
 // A range is worked off in parts: large enough for the sort to pay, and no larger, because a
 // deposit takes about 100 bytes. In a closed white room every photon lands max_depth times, so
-// what is counted is the deposits as well.
+// what is counted is the deposits as well: as many as two for each photon of a whole part.
 constexpr std::uint64_t kPhotonsPerPart = std::uint64_t{1} << DepositSource::kNumberBits;
-constexpr std::uint64_t kDepositsPerPart = std::uint64_t{1} << 24;
+constexpr std::uint64_t kDepositsPerPart = std::uint64_t{1} << 21;
 constexpr std::uint64_t kPhotonsPerChunk = 2048;
 constexpr std::uint64_t kMostDepositsPerChunk = std::uint64_t{1} << 20;
 constexpr std::uint64_t kChunksPerThread = 8;  // traced before deposits are counted again
