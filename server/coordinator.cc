@@ -472,7 +472,8 @@ StatusOr<Blob> Coordinator::Encode(const JobTable::ImageSource& source, RenderRe
                         {.running = source.running,
                          .coordinator_cpu = source.cpu,
                          .finished_at = clock_.Wall(),
-                         .numeric_profile = options_.numeric_profile});
+                         .numeric_profile = options_.numeric_profile},
+                        options_.threads);
 }
 
 void Coordinator::RunJobs() {

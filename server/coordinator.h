@@ -54,7 +54,7 @@ namespace lucerna {
 class Coordinator {
  public:
   struct Options {
-    int threads = 0;                     // for eye paths; 0: all
+    int threads = 0;                     // of jobs and images; 0: all
     std::uint64_t max_memory_bytes = 0;  // of all parts together; 0: what is free at the start
     std::uint64_t max_store_bytes = std::uint64_t{8} << 30;
     std::uint64_t max_job_bytes =

@@ -100,9 +100,9 @@ double ValueAt(const ImageSums& sums, std::size_t pixel) {
 double FactorAt(const ImageSums& sums, const RadiusColumn& radii, std::size_t pixel) {
   const ImageSums::Features features = sums.FeaturesAt(pixel);
   if (!(features.hitpoints > 0 && features.hits > 0)) return 0;
-  const Rgb albedo = features.albedo / features.hits;
+  const Rgb albedo = features.albedo / static_cast<float>(features.hits);
   const double radius = static_cast<double>(radii[pixel]) *
-                        static_cast<double>(features.unit_radius / features.hitpoints);
+                        static_cast<double>(features.unit_radius / static_cast<float>(features.hitpoints));
   return WorkingLuminance(static_cast<double>(albedo.r), static_cast<double>(albedo.g),
                           static_cast<double>(albedo.b)) /
          std::max(radius * radius, 1e-36);
@@ -228,18 +228,17 @@ struct JobEstimator::State {
                                                  : nullptr;
   }
 
-  // How many photons later passes have once `round` is added, given how many they would have by
+  // How many photons later passes have once `round` has been added, given how many they would have by
   // what was known before.
-  [[nodiscard]] std::uint64_t ChoosePhotons(const SliceSums& round, std::uint64_t before) {
+  [[nodiscard]] std::uint64_t ChoosePhotons(const PassRange& round, std::uint64_t before) {
     if (!settings.adaptive_photons) return before;
-    if (variance != nullptr) variance->Add(round);
-    const auto choice = std::ranges::find(kPhotonChoices, round.passes.last, &PhotonChoice::passes);
+    const auto choice = std::ranges::find(kPhotonChoices, round.last, &PhotonChoice::passes);
     if (choice == kPhotonChoices.end()) return before;
     if (variance != nullptr) {
       const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
-      best_photons = variance->BestPhotons(kPi64 * Kernel{settings.kernel}.Moments().roughness *
+      best_photons = variance->BestPhotons(*sums, kPi64 * Kernel{settings.kernel}.Moments().roughness *
                                            reach * reach);
-      if (variance->passes() == kFirstLongRound) variance.reset();
+      if (round.last == kFirstLongRound) variance.reset();
     }
     const auto first = static_cast<std::uint64_t>(settings.photons_per_pass);
     return NextPhotons(before, choice->most * first, best_photons);
@@ -425,6 +424,8 @@ SliceSums JobEstimator::SliceOf(EyePass pass, const RoundPlan& plan, PassSums su
 void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundPlan& plan) {
   LUCERNA_CHECK(round->passes == RoundOf(whole_passes()));
   State& state = *state_;
+  state.sums->SetTail({});
+  if (state.variance != nullptr) state.variance->Add(*round, *state.sums);
   state.sums->Add(*round, state.team);
   state.radii->Step(*round, *plan.radii, state.team);
   state.last_radii = plan.radii;
@@ -432,11 +433,11 @@ void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundP
   const State::After before = state.after.rbegin()->second;
   State::After& after = state.after[passes];
   after.radii = std::make_shared<const RadiusColumn>(state.radii->Current());
-  after.photons_per_pass = state.ChoosePhotons(*round, before.photons_per_pass);
   const PassRange of_round = round->passes;
   const std::vector<EmissionReport> reports = round->reports;
   const std::uint64_t photons = round->tally.photons;
   round.reset();
+  after.photons_per_pass = state.ChoosePhotons(of_round, before.photons_per_pass);
   after.guide =
       state.ChooseGuide(of_round, reports, photons, plan, after.photons_per_pass, before.guide);
   // Rounds that are still to be planned, or to be planned again by a job that goes on, need these;
@@ -484,53 +485,71 @@ std::uint64_t JobEstimator::eye_rays() const {
   return state_->sums->eye_rays();
 }
 
-Image JobEstimator::MakeImage() const {
-  const State& state = *state_;
-  const Scene& scene = state.prepared.scene();
-  const ImageSums& sums = *state.sums;
-  Image image = MakeFilmImage({.width = state.settings.crop_width(),
-                               .height = state.settings.crop_height(),
-                               .exposure = scene.film.exposure,
-                               .max_component = scene.film.max_component,
-                               .has_coverage = state.settings.coverage},
-                              sums, *state.last_radii, *state.radii, *state.controller,
-                              Kernel{state.settings.kernel});
-  ToFileUnit(image, scene.unit);
-  if (passes() < 2) return image;
+BandedImage JobEstimator::MakeBands() const {
+  BandedImage image;
+  image.head.width = state_->settings.crop_width();
+  image.head.height = state_->settings.crop_height();
+  const bool has_noise = passes() >= 2;
+  // Of all pixels, since those around count.
+  const auto noise =
+      std::make_shared<const std::vector<float>>(has_noise ? NoiseLayer() : std::vector<float>());
+  image.rows = [this, noise, has_noise](int first_row, int last_row) {
+    const State& state = *state_;
+    const Scene& scene = state.prepared.scene();
+    const ImageSums& sums = *state.sums;
+    const auto width = static_cast<std::size_t>(state.settings.crop_width());
+    const std::size_t first = static_cast<std::size_t>(first_row) * width;
+    const std::size_t last = static_cast<std::size_t>(last_row) * width;
+    std::vector<ImageChannel> band = MakeFilmPixels(
+        {.exposure = scene.film.exposure,
+         .max_component = scene.film.max_component,
+         .has_coverage = state.settings.coverage},
+        first, last, sums, *state.last_radii, *state.radii, *state.controller,
+        Kernel{state.settings.kernel}, state_->team);
+    ToFileUnit(band, scene.unit);
+    if (!has_noise) return band;
+    const auto errors_of = [&](std::size_t offset) {
+      const ImageSums::Pixel of_pixel = sums.At(first + offset);
+      PixelValues values;
+      values.noise = static_cast<double>((*noise)[first + offset]);
+      values.bias = scene.film.exposure * (of_pixel.even_bias + of_pixel.odd_bias) /
+                    static_cast<double>(passes());
+      return values;
+    };
+    AddLayers(LayerSource::kPasses, errors_of, last - first, state_->team, band);
+    return band;
+  };
+  return image;
+}
+
+std::vector<float> JobEstimator::NoiseLayer() const {
+  const ImageSums& sums = *state_->sums;
   const auto passes_so_far = static_cast<double>(passes());
-  const double exposure = scene.film.exposure;
+  const double exposure = state_->prepared.scene().film.exposure;
   const double even_passes = std::ceil(passes_so_far / 2);
   const double odd_passes = passes_so_far - even_passes;
   const double noise_area = NoiseArea();
   std::vector<PixelNoise> noise(sums.pixels());
-  std::vector<float> bias(sums.pixels());
-  for (std::size_t pixel = 0; pixel < sums.pixels(); ++pixel) {
-    const ImageSums::Pixel of_pixel = sums.At(pixel);
-    const double sum = exposure * LuminanceOf(ToRec709(of_pixel.radiance()));
-    const double even_sum =
-        0.5 * (sum + exposure * LuminanceOf(ToRec709(of_pixel.half_difference)));
-    bias[pixel] =
-        static_cast<float>(exposure * (of_pixel.even_bias + of_pixel.odd_bias) / passes_so_far);
-    const double variance = exposure * exposure * of_pixel.squared_deviations / passes_so_far;
-    if (!(variance > 0)) continue;
-    const double difference = even_sum / even_passes - (sum - even_sum) / odd_passes;
-    const double largest = exposure * static_cast<double>(of_pixel.largest) - sum / passes_so_far;
-    noise[pixel] = {.of_halves = difference * difference * even_passes * odd_passes /
-                                 (passes_so_far * passes_so_far),
-                    .of_passes = variance / (passes_so_far - 1),
-                    .largest_share = std::min(1.0, largest * largest / (passes_so_far * variance))};
-  }
-  const std::vector<float> noise_layer =
-      NoiseOfPixels(image.width, image.height, noise_area, noise);
-  FreeMemoryOf(noise);
-  const auto errors_of = [&](std::size_t pixel) {
-    PixelValues values;
-    values.noise = static_cast<double>(noise_layer[pixel]);
-    values.bias = static_cast<double>(bias[pixel]);
-    return values;
-  };
-  AddLayers(LayerSource::kPasses, errors_of, image);
-  return image;
+  constexpr std::size_t kPixelsAtOnce = 4096;
+  state_->team.For(noise.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t pixel = begin; pixel < end; ++pixel) {
+      const ImageSums::Pixel of_pixel = sums.At(pixel);
+      const double sum = exposure * LuminanceOf(ToRec709(of_pixel.radiance()));
+      const double even_sum =
+          0.5 * (sum + exposure * LuminanceOf(ToRec709(of_pixel.half_difference)));
+      const double variance = exposure * exposure * of_pixel.squared_deviations / passes_so_far;
+      if (!(variance > 0)) continue;
+      const double difference = even_sum / even_passes - (sum - even_sum) / odd_passes;
+      const double largest = exposure * static_cast<double>(of_pixel.largest) - sum / passes_so_far;
+      noise[pixel] = {
+          .of_halves = difference * difference * even_passes * odd_passes /
+                       (passes_so_far * passes_so_far),
+          .of_passes = variance / (passes_so_far - 1),
+          .largest_share = std::min(1.0, largest * largest / (passes_so_far * variance))};
+    }
+  });
+  return NoiseOfPixels(state_->settings.crop_width(), state_->settings.crop_height(), noise_area,
+                       noise);
 }
 
 double JobEstimator::NoiseArea() const {
@@ -548,10 +567,8 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
   EstimatorSnapshot snapshot;
   snapshot.photons = photons();
   snapshot.lights = state.sums->tally().lights;
-  snapshot.image = {.width = state.settings.crop_width(),
-                    .height = state.settings.crop_height(),
-                    .passes = passes(),
-                    .pixels = std::vector<PixelStatistics>(pixels)};
+  snapshot.image =
+      ImageStatistics(state.settings.crop_width(), state.settings.crop_height(), passes());
   const auto scaled = [](const RgbSum& color, double factor) {
     return std::array<float, 3>{static_cast<float>(factor * color[0]),
                                 static_cast<float>(factor * color[1]),
@@ -568,7 +585,7 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
         const RgbSum all = ToRec709(of_pixel.radiance());
         const RgbSum photons = ToRec709(of_pixel.photons);
         const double photon_luminance = LuminanceOf(photons);
-        PixelStatistics& statistics = snapshot.image.pixels[pixel];
+        PixelStatistics statistics;
         statistics.all = scaled(all, exposure);
         statistics.half_difference = scaled(ToRec709(of_pixel.half_difference), exposure);
         statistics.squared_deviations =
@@ -577,6 +594,7 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
         statistics.odd_bias = static_cast<float>(exposure * of_pixel.odd_bias);
         // Bias is known as a luminance: it has the colour that the photons have.
         if (photon_luminance > 0) statistics.bias_color = scaled(photons, 1 / photon_luminance);
+        snapshot.image.Set(pixel, statistics);
         luminances[piece][0] += std::max(0.0, LuminanceOf(all));
         luminances[piece][1] += photon_luminance;
       }
@@ -622,7 +640,7 @@ bool JobEstimator::IsBlack() const {
 MissingLight JobEstimator::FindMissingLight(const EstimatorSnapshot& snapshot) const {
   const State& state = *state_;
   const double exposure = state.prepared.scene().film.exposure;
-  const auto pixel_count = static_cast<double>(snapshot.image.pixels.size());
+  const auto pixel_count = static_cast<double>(snapshot.image.pixels());
   PhotonView view;
   view.takes_photons = state.prepared.needs().Uses(Part::kPhotons) &&
                        state.settings.max_depth > 1 && state.hit_share > 0;
@@ -634,11 +652,12 @@ MissingLight JobEstimator::FindMissingLight(const EstimatorSnapshot& snapshot) c
   if (mean > 0) {
     const double to_mean = 1 / (mean * exposure * static_cast<double>(snapshot.image.passes));
     double inverse = 0;
-    for (const PixelStatistics& pixel : snapshot.image.pixels) {
+    const std::array<std::vector<float>, 3>& all = snapshot.image.all;
+    for (std::size_t pixel = 0; pixel < snapshot.image.pixels(); ++pixel) {
       const double of_mean =
-          to_mean * std::max(0.0, LuminanceOf({static_cast<double>(pixel.all[0]),
-                                               static_cast<double>(pixel.all[1]),
-                                               static_cast<double>(pixel.all[2])}));
+          to_mean * std::max(0.0, LuminanceOf({static_cast<double>(all[0][pixel]),
+                                               static_cast<double>(all[1][pixel]),
+                                               static_cast<double>(all[2][pixel])}));
       inverse += 1 / (of_mean * of_mean + 0.01);
     }
     view.brightness = mean / std::sqrt(inverse / pixel_count);
@@ -695,10 +714,10 @@ TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference,
   const double floor = RelativeErrorFloor(luminances);
   std::vector<TrueError> pixels(reference.size());
   for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
-    const std::array<float, 3>& sum = snapshot.image.pixels[pixel].all;
     for (std::size_t c = 0; c < 3; ++c) {
       const auto right = static_cast<double>(reference[pixel][static_cast<int>(c)]);
-      const double off = static_cast<double>(sum[c]) * to_pixel - right;
+      const double off =
+          static_cast<double>(snapshot.image.all[c][pixel]) * to_pixel - right;
       pixels[pixel].absolute += off * off;
       pixels[pixel].relative += RelativeSquare(off * off, right, floor);
     }
@@ -741,7 +760,7 @@ void JobEstimator::Save(ByteWriter& writer) const {
   }
   WriteDouble(writer, state.best_photons);
   writer.Byte(state.variance != nullptr ? 1 : 0);
-  if (state.variance != nullptr) WriteVariance(writer, state.variance->numbers());
+  if (state.variance != nullptr) WriteVariance(writer, *state.variance);
 }
 
 Status JobEstimator::Restore(ByteReader& reader) {
@@ -774,9 +793,8 @@ Status JobEstimator::Restore(ByteReader& reader) {
   const double best_photons = ReadDouble(reader);
   std::unique_ptr<PassVariance> variance;
   if (reader.Byte() != 0) {
-    LUCERNA_ASSIGN_OR_RETURN(PassVariance::Numbers numbers_of_variance,
-                             ReadVariance(reader, pixels));
-    variance = std::make_unique<PassVariance>(std::move(numbers_of_variance));
+    LUCERNA_ASSIGN_OR_RETURN(PassVariance read, ReadVariance(reader, pixels));
+    variance = std::make_unique<PassVariance>(std::move(read));
   }
   if (!reader.finished() || !after.contains(sums.passes)) {
     return absl::InvalidArgumentError("malformed checkpoint: it ends too soon or too late");

@@ -113,7 +113,9 @@ class JobEstimator {
   [[nodiscard]] const BatchTally& whole_tally() const;
   // The image of the passes so far, without metadata. Requires passes() > 0. Layers
   // `noise` (standard deviation of each pixel's luminance) and `bias` from the second pass on.
-  [[nodiscard]] Image MakeImage() const;
+  [[nodiscard]] Image MakeImage() const { return MakeBands().Whole(); }
+  // The same, to be made while nothing is added here; this estimator must live as long.
+  [[nodiscard]] BandedImage MakeBands() const;
   // Requires passes() > 0.
   [[nodiscard]] EstimatorSnapshot Snapshot() const;
   // May run beside all others. Requires a snapshot of this estimator.
@@ -143,6 +145,8 @@ class JobEstimator {
 
  private:
   struct State;
+  // Standard deviations of the image so far [pixels]. Requires two passes or more.
+  [[nodiscard]] std::vector<float> NoiseLayer() const;
   // Of the image so far (ErrorEstimate::noise_area).
   [[nodiscard]] double NoiseArea() const;
   explicit JobEstimator(std::unique_ptr<State> state);

@@ -25,8 +25,9 @@ std::string UtcText(WallTime time) {
 
 }  // namespace
 
-StatusOr<Blob> EncodeJobImage(const Job& job, RenderResult result, const RunRecord& run) {
-  std::map<std::string, std::string>& metadata = result.image.metadata;
+StatusOr<Blob> EncodeJobImage(const Job& job, RenderResult result, const RunRecord& run,
+                              int threads) {
+  std::map<std::string, std::string>& metadata = result.image.head.metadata;
   metadata["lucerna.scene_digest"] = job.scene_digest.Hex();
   metadata["lucerna.settings"] = SettingsText(job.settings);
   metadata["lucerna.seed"] = absl::StrCat(job.settings.seed);
@@ -38,8 +39,8 @@ StatusOr<Blob> EncodeJobImage(const Job& job, RenderResult result, const RunReco
       absl::StrFormat("%.3f", Seconds(run.coordinator_cpu + job.counters.worker_cpu));
   metadata["lucerna.run.workers"] = absl::StrCat(job.most_workers);
   metadata["lucerna.run.finished_at"] = UtcText(run.finished_at);
-  SetImageWindow(job.settings, result.image);
-  LUCERNA_ASSIGN_OR_RETURN(std::string bytes, EncodeExr(result.image));
+  SetImageWindow(job.settings, result.image.head);
+  LUCERNA_ASSIGN_OR_RETURN(std::string bytes, EncodeExr(result.image, threads));
   return std::make_shared<const std::string>(std::move(bytes));
 }
 

@@ -19,8 +19,8 @@ struct RunRecord {
   std::string numeric_profile;
 };
 
-// Errors: those of EncodeExr.
+// Packed by so many threads; 0: all. Errors: those of EncodeExr.
 [[nodiscard]] StatusOr<Blob> EncodeJobImage(const Job& job, RenderResult result,
-                                            const RunRecord& run);
+                                            const RunRecord& run, int threads);
 
 }  // namespace lucerna

@@ -271,7 +271,12 @@ StatusOr<RenderResult> JobRunner::RunRounds() {
       TakeInEstimate(true);
       CheckImage();
       const MutexLock lock(estimator_mutex_);
-      return MakeResult(reason);
+      RenderResult result = MakeResult(reason);
+      result.image = estimator_->MakeBands();
+      // What has ended may be let go of before its image has been made.
+      result.image.rows = [estimator = estimator_, rows = std::move(result.image.rows)](
+                              int first, int last) { return rows(first, last); };
+      return result;
     }
     // An image has at least one pass.
     const bool ends_with_first = PassesDone() == 0 && (is_time_up || shall_finish());
@@ -817,7 +822,6 @@ std::optional<std::size_t> JobRunner::HitpointsIn(const Digest& digest) const {
 RenderResult JobRunner::MakeResult(StopReason reason) const {
   RenderResult result;
   result.reason = reason;
-  result.image = estimator_->MakeImage();
   result.passes = estimator_->passes();
   result.photons = estimator_->photons();
   return result;
@@ -826,7 +830,12 @@ RenderResult JobRunner::MakeResult(StopReason reason) const {
 StatusOr<RenderResult> JobRunner::ImageSoFar() const {
   if (is_running_) {
     const MutexLock lock(estimator_mutex_);
-    if (estimator_->passes() > 0) return MakeResult(StopReason::kNone);
+    if (estimator_->passes() > 0) {
+      RenderResult result = MakeResult(StopReason::kNone);
+      // Of the passes so far: more are added while it is written.
+      result.image = InBands(estimator_->MakeImage());
+      return result;
+    }
   }
   return absl::FailedPreconditionError("no pass has been merged yet; try again in a moment");
 }

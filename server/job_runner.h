@@ -237,6 +237,7 @@ class JobRunner final : public RunningJob {
   bool shall_finish() const;
   bool gives_up_turn() const;
   PassKey KeyOf(std::uint64_t pass) const { return {job_id_, pass}; }
+  // Of all but the image.
   RenderResult MakeResult(StopReason reason) const LUCERNA_REQUIRES(estimator_mutex_);
 
   const std::string job_id_;
@@ -246,7 +247,7 @@ class JobRunner final : public RunningJob {
 
   // Held for one step of the estimator at a time, except its eye paths.
   mutable Mutex estimator_mutex_;
-  std::unique_ptr<JobEstimator> estimator_;  // set once, before any other thread may ask
+  std::shared_ptr<JobEstimator> estimator_;  // set once, before any other thread may ask
   std::atomic<bool> is_running_ = false;
   EmissionCheck emission_check_;         // set with the estimator
   std::atomic<bool> is_guided_ = false;  // by a guide that is not even

@@ -312,7 +312,7 @@ int Main(int argc, char** argv) {
   app.add_flag("--reflection", flags.offers_reflection, "describe the protocol to tools");
   app.add_flag("--allow-insecure-network", flags.allow_insecure_network,
                "listen beyond this machine although traffic is not encrypted");
-  app.add_option("--threads", flags.coordinator.threads, "threads for eye paths; 0: all")
+  app.add_option("--threads", flags.coordinator.threads, "threads of jobs and images; 0: all")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   app.add_option("--jobs-at-once", flags.coordinator.jobs_at_once,

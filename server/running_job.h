@@ -22,7 +22,7 @@ namespace lucerna {
 
 struct RenderResult {
   StopReason reason = StopReason::kNone;
-  Image image;  // without metadata
+  BandedImage image;  // without metadata; nothing is added to the job before it is made
   std::int64_t passes = 0;
   std::uint64_t photons = 0;  // in the image
   // The job is not over: it was asked to give up its turn, and Resume goes on. No image then.

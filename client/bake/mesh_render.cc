@@ -143,8 +143,8 @@ StatusOr<MeshRender> RenderFromMesh(const Scene& scene, const RenderSettings& se
     values.distance = of.hits > 0 ? of.distance * per_hit : HUGE_VAL;
     return values;
   };
-  AddLayers(LayerSource::kEveryImage, values_of, image);
-  ToFileUnit(image, scene.unit);
+  AddLayers(LayerSource::kEveryImage, values_of, pixels, team, image.channels);
+  ToFileUnit(image.channels, scene.unit);
   image.metadata["lucerna.settings"] = SettingsText(settings);
   image.metadata["lucerna.seed"] = std::to_string(settings.seed);
   image.metadata["lucerna.passes"] = std::to_string(settings.passes);

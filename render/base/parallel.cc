@@ -43,12 +43,12 @@ class Order {
 #endif
 };
 
+}  // namespace
+
 int ThreadsOrAll(int threads) {
   if (threads > 0) return threads;
   return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }
-
-}  // namespace
 
 struct ThreadTeam::State {
   explicit State(int threads) : arena(threads) {}

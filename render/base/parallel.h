@@ -10,9 +10,12 @@
 
 namespace lucerna {
 
+// As many as asked for; 0: as many as the machine has.
+[[nodiscard]] int ThreadsOrAll(int threads);
+
 class ThreadTeam {
  public:
-  // threads = 0: as many as the machine has.
+  // threads: as ThreadsOrAll has it.
   explicit ThreadTeam(int threads);
   ~ThreadTeam();
   ThreadTeam(const ThreadTeam&) = delete;

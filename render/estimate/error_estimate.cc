@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 #include "render/base/memory.h"
@@ -51,12 +51,16 @@ void ForRows(ThreadTeam& team, int height, const Body& body) {
   });
 }
 
-// The sum of what body(row) gives for all rows, in their order: the same bits whatever the number
-// of threads.
-template <std::size_t kSums, typename Body>
-std::array<double, kSums> SumOfRows(ThreadTeam& team, int height, const Body& body) {
+// The sum of what body_of(first, last)(row) gives for all rows, in their order: the same bits
+// whatever the number of threads, and of rows of one block.
+template <std::size_t kSums, typename BodyOf>
+std::array<double, kSums> SumOfBlocks(ThreadTeam& team, int height, const BodyOf& body_of) {
   std::vector<std::array<double, kSums>> rows(static_cast<std::size_t>(height));
-  ForRows(team, height, [&](std::size_t row) { rows[row] = body(row); });
+  team.For(rows.size(), kLinesAtOnce, [&](std::size_t begin, std::size_t end) {
+    const auto body = body_of(begin, end);
+    for (std::size_t row = begin; row < end; ++row)
+      rows[row] = body(row);
+  });
   std::array<double, kSums> sums{};
   for (const std::array<double, kSums>& row : rows) {
     for (std::size_t i = 0; i < kSums; ++i)
@@ -65,41 +69,52 @@ std::array<double, kSums> SumOfRows(ThreadTeam& team, int height, const Body& bo
   return sums;
 }
 
+// The same of body(row).
+template <std::size_t kSums, typename Body>
+std::array<double, kSums> SumOfRows(ThreadTeam& team, int height, const Body& body) {
+  return SumOfBlocks<kSums>(team, height,
+                            [&](std::size_t, std::size_t) { return std::cref(body); });
+}
+
 double Middle(double a, double b, double c) {
   return std::max(std::min(a, b), std::min(std::max(a, b), c));
 }
 
-// The mean of a channel over the pixels within kReach, without the pixel itself; its own value
-// where it is alone. Keeps a reference to the image.
+// The means of the channels over the pixels within kReach, without the pixel itself; its own value
+// where it is alone. For the rows of one block; keeps a reference to the image.
 class MeanAround {
  public:
-  MeanAround(const ImageStatistics& image, std::size_t channel, ThreadTeam& team)
+  MeanAround(const ImageStatistics& image, int first_row, int last_row)
       : image_(image),
-        channel_(channel),
         width_(image.width),
         height_(image.height),
-        rows_(image.pixels.size()) {
-    ForRows(team, height_, [&](std::size_t row) {
-      const int y = static_cast<int>(row);
-      for (int x = 0; x < width_; ++x) {
-        float sum = 0;
-        for (int i = std::max(0, x - kReach); i <= std::min(width_ - 1, x + kReach); ++i)
-          sum += ValueAt(i, y);
-        rows_[At(x, y)] = sum;
+        first_(std::max(0, first_row - kReach)) {
+    const int last = std::min(height_, last_row + kReach);
+    for (std::size_t channel = 0; channel < 3; ++channel) {
+      std::vector<float>& sums = sums_[channel];
+      sums.reserve(static_cast<std::size_t>(last - first_) * static_cast<std::size_t>(width_));
+      for (int y = first_; y < last; ++y) {
+        for (int x = 0; x < width_; ++x) {
+          float sum = 0;
+          for (int i = std::max(0, x - kReach); i <= std::min(width_ - 1, x + kReach); ++i)
+            sum += ValueAt(channel, i, y);
+          sums.push_back(sum);
+        }
       }
-    });
+    }
   }
 
-  [[nodiscard]] double operator()(int x, int y) const {
+  // Requires a pixel of the block.
+  [[nodiscard]] double operator()(std::size_t channel, int x, int y) const {
     const int top = std::max(0, y - kReach);
     const int bottom = std::min(height_ - 1, y + kReach);
     const int across = std::min(width_ - 1, x + kReach) - std::max(0, x - kReach) + 1;
     const int count = across * (bottom - top + 1) - 1;
-    const auto own = static_cast<double>(ValueAt(x, y));
+    const auto own = static_cast<double>(ValueAt(channel, x, y));
     if (count == 0) return own;
     double sum = -own;
     for (int j = top; j <= bottom; ++j)
-      sum += static_cast<double>(rows_[At(x, j)]);
+      sum += static_cast<double>(sums_[channel][At(x, j - first_)]);
     return std::max(sum, 0.0) / count;
   }
 
@@ -111,33 +126,39 @@ class MeanAround {
            static_cast<std::size_t>(x);
   }
 
-  [[nodiscard]] float ValueAt(int x, int y) const {
-    return static_cast<float>(static_cast<double>(image_.pixels[At(x, y)].all[channel_]) /
+  [[nodiscard]] float ValueAt(std::size_t channel, int x, int y) const {
+    return static_cast<float>(static_cast<double>(image_.all[channel][At(x, y)]) /
                               static_cast<double>(image_.passes));
   }
 
   const ImageStatistics& image_;
-  std::size_t channel_;
   int width_, height_;
-  std::vector<float> rows_;  // sums over x
+  int first_;                               // row
+  std::array<std::vector<float>, 3> sums_;  // over x, of the rows from there on
 };
 
-// The mean bias of a pixel in even passes and in odd ones [luminance].
-struct HalfBiases {
-  float even = 0, odd = 0;
-};
+double LuminanceOfMean(const ImageStatistics& image, std::size_t pixel) {
+  return LuminanceOf({static_cast<double>(image.all[0][pixel]),
+                      static_cast<double>(image.all[1][pixel]),
+                      static_cast<double>(image.all[2][pixel])}) /
+         static_cast<double>(image.passes);
+}
 
 // The share of the estimated bias that is taken off single pixels to guess their values without
 // blur: near 1 unless the estimate is mostly noise.
-double BelievedShare(int width, int height, const std::vector<HalfBiases>& biases,
-                     const std::vector<double>& luminances, double floor, ThreadTeam& team) {
-  const auto w = static_cast<std::size_t>(width);
-  const auto sums = SumOfRows<2>(team, height, [&](std::size_t row) {
+double BelievedShare(const ImageStatistics& image, double even_passes, double odd_passes,
+                     double floor, ThreadTeam& team) {
+  const auto w = static_cast<std::size_t>(image.width);
+  const auto sums = SumOfRows<2>(team, image.height, [&](std::size_t row) {
     std::array<double, 2> of_row{};
     for (std::size_t i = row * w; i < (row + 1) * w; ++i) {
-      const auto even = static_cast<double>(biases[i].even);
-      const auto odd = static_cast<double>(biases[i].odd);
-      const double weight = 1 / (luminances[i] * luminances[i] + floor);
+      const auto mean = [](float sum, double passes) {
+        return static_cast<double>(static_cast<float>(static_cast<double>(sum) / passes));
+      };
+      const double even = mean(image.even_bias[i], even_passes);
+      const double odd = mean(image.odd_bias[i], odd_passes);
+      const double luminance = LuminanceOfMean(image, i);
+      const double weight = 1 / (luminance * luminance + floor);
       of_row[0] += even * odd * weight;
       of_row[1] += 0.25 * (even - odd) * (even - odd) * weight;
     }
@@ -161,11 +182,11 @@ struct PixelError {
 
 // Sums over a window that moves along a line: from `back` places before to `ahead` behind, ends
 // repeated. Lines lie side by side, `lines` of them, and all move at once; the next place of a line
-// is `step` further on.
-void MoveBox(const float* in, float* out, std::size_t lines, std::size_t step, int length, int back,
-             int ahead) {
+// is `in_step` further on, or `out_step`.
+void MoveBox(const float* in, std::size_t in_step, float* out, std::size_t out_step,
+             std::size_t lines, int length, int back, int ahead) {
   const auto at = [&](int place) {
-    return in + static_cast<std::size_t>(std::clamp(place, 0, length - 1)) * step;
+    return in + static_cast<std::size_t>(std::clamp(place, 0, length - 1)) * in_step;
   };
   std::vector<double> sums(lines, 0);
   for (int place = -back; place <= ahead; ++place) {
@@ -173,7 +194,7 @@ void MoveBox(const float* in, float* out, std::size_t lines, std::size_t step, i
       sums[line] += static_cast<double>(at(place)[line]);
   }
   for (int place = 0; place < length; ++place) {
-    float* const here = out + static_cast<std::size_t>(place) * step;
+    float* const here = out + static_cast<std::size_t>(place) * out_step;
     const float* const comes = at(place + ahead + 1);
     const float* const goes = at(place - back);
     for (std::size_t line = 0; line < lines; ++line) {
@@ -198,7 +219,6 @@ std::vector<float> Smoothed(int width, int height, int reach, const std::vector<
   if (reach <= 1) return values;
   const auto w = static_cast<std::size_t>(width);
   std::vector<float> smooth(values.size());
-  std::vector<float> half(values.size());
   // A triangle is a box over a box: one looks back, the other ahead.
   team.For(static_cast<std::size_t>(height), kLinesAtOnce, [&](std::size_t begin, std::size_t end) {
     // As columns, so that the rows move at once.
@@ -209,16 +229,18 @@ std::vector<float> Smoothed(int width, int height, int reach, const std::vector<
       for (std::size_t x = 0; x < w; ++x)
         block[x * rows + row] = values[(begin + row) * w + x];
     }
-    MoveBox(block.data(), back.data(), rows, rows, width, reach - 1, 0);
-    MoveBox(back.data(), block.data(), rows, rows, width, 0, reach - 1);
+    MoveBox(block.data(), rows, back.data(), rows, rows, width, reach - 1, 0);
+    MoveBox(back.data(), rows, block.data(), rows, rows, width, 0, reach - 1);
     for (std::size_t row = 0; row < rows; ++row) {
       for (std::size_t x = 0; x < w; ++x)
         smooth[(begin + row) * w + x] = block[x * rows + row];
     }
   });
   ForColumns(team, width, [&](std::size_t first, std::size_t lines) {
-    MoveBox(smooth.data() + first, half.data() + first, lines, w, height, reach - 1, 0);
-    MoveBox(half.data() + first, smooth.data() + first, lines, w, height, 0, reach - 1);
+    const auto rows = static_cast<std::size_t>(height);
+    std::vector<float> block(lines * rows);
+    MoveBox(smooth.data() + first, w, block.data(), lines, lines, height, reach - 1, 0);
+    MoveBox(block.data(), lines, smooth.data() + first, w, lines, height, 0, reach - 1);
   });
   return smooth;
 }
@@ -262,8 +284,6 @@ std::vector<float> LeastLuminance(int width, int height, std::vector<float> lumi
 // What the kernel changed in each pixel, as the two halves have it.
 struct BiasHalves {
   std::vector<float> even, odd;
-
-  explicit BiasHalves(std::size_t pixels) : even(pixels), odd(pixels) {}
 
   // Squared bias, without the halves' noise: the product of one half with the other, smoothed.
   [[nodiscard]] std::vector<float> Squares(int width, int height, int reach,
@@ -354,20 +374,18 @@ struct SmoothedBias {
 struct PixelBiases {
   BiasHalves absolute, to_even, to_odd;
 
-  explicit PixelBiases(std::size_t pixels) : absolute(pixels), to_even(pixels), to_odd(pixels) {}
-
   [[nodiscard]] SmoothedBias Smooth(int width, int height, int reach, ThreadTeam& team) const {
     const auto w = static_cast<std::size_t>(width);
     SmoothedBias smooth;
     smooth.absolute = absolute.Squares(width, height, reach, team);
     smooth.relative = to_even.Squares(width, height, reach, team);
-    const std::vector<float> relative_to_odd = to_odd.Squares(width, height, reach, team);
-    std::vector<float> differences(relative_to_odd.size());
+    // First relative to the odd passes, then the difference of the halves.
+    std::vector<float> differences = to_odd.Squares(width, height, reach, team);
     const auto sums = SumOfRows<3>(team, height, [&](std::size_t row) {
       std::array<double, 3> of_row{};
       for (std::size_t i = row * w; i < (row + 1) * w; ++i) {
+        smooth.relative[i] = 0.5F * (smooth.relative[i] + differences[i]);
         differences[i] = to_even.even[i] - to_even.odd[i];
-        smooth.relative[i] = 0.5F * (smooth.relative[i] + relative_to_odd[i]);
         const auto square = static_cast<double>(smooth.relative[i]);
         of_row[0] += square;
         of_row[1] += static_cast<double>(smooth.absolute[i]);
@@ -394,8 +412,8 @@ struct ChosenBias {
   double relative_lost = 0, absolute_lost = 0;
 };
 
-ChosenBias Choose(int width, int height, const PixelBiases& biases, double noise_area,
-                  ThreadTeam& team) {
+// Uses the biases up.
+ChosenBias Choose(int width, int height, PixelBiases biases, double noise_area, ThreadTeam& team) {
   ChosenBias chosen{.bias = biases.Smooth(width, height, 1, team)};
   double most_relative = chosen.bias.relative_sum;
   double most_absolute = chosen.bias.absolute_sum;
@@ -473,6 +491,40 @@ double TwoSidedNormalQuantile(double probability) {
   return 0.5 * (low + high);
 }
 
+ImageStatistics::ImageStatistics(int image_width, int image_height, std::int64_t image_passes)
+    : width(image_width), height(image_height), passes(image_passes) {
+  const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  for (std::size_t c = 0; c < 3; ++c) {
+    all[c].resize(pixels);
+    half_difference[c].resize(pixels);
+    bias_color[c].resize(pixels);
+  }
+  squared_deviations.resize(pixels);
+  even_bias.resize(pixels);
+  odd_bias.resize(pixels);
+}
+
+PixelStatistics ImageStatistics::At(std::size_t pixel) const {
+  return {.all = {all[0][pixel], all[1][pixel], all[2][pixel]},
+          .half_difference = {half_difference[0][pixel], half_difference[1][pixel],
+                              half_difference[2][pixel]},
+          .squared_deviations = squared_deviations[pixel],
+          .even_bias = even_bias[pixel],
+          .odd_bias = odd_bias[pixel],
+          .bias_color = {bias_color[0][pixel], bias_color[1][pixel], bias_color[2][pixel]}};
+}
+
+void ImageStatistics::Set(std::size_t pixel, const PixelStatistics& statistics) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    all[c][pixel] = statistics.all[c];
+    half_difference[c][pixel] = statistics.half_difference[c];
+    bias_color[c][pixel] = statistics.bias_color[c];
+  }
+  squared_deviations[pixel] = statistics.squared_deviations;
+  even_bias[pixel] = statistics.even_bias;
+  odd_bias[pixel] = statistics.odd_bias;
+}
+
 ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
   LUCERNA_CHECK(image.passes >= 2 && look >= 1);
   const int width = image.width;
@@ -486,47 +538,50 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
 
   const auto w = static_cast<std::size_t>(width);
   const std::size_t count = w * static_cast<std::size_t>(height);
-  LUCERNA_CHECK(image.pixels.size() == count);
+  LUCERNA_CHECK(image.pixels() == count);
   const auto color_of = [](const std::array<float, 3>& sums) {
     return RgbSum{static_cast<double>(sums[0]), static_cast<double>(sums[1]),
                   static_cast<double>(sums[2])};
   };
-  std::vector<double> luminances(count);
-  std::vector<float> rounded_luminances(count);
-  std::vector<HalfBiases> half_biases(count);
-  ForRows(team, height, [&](std::size_t row) {
-    for (std::size_t i = row * w; i < (row + 1) * w; ++i) {
-      const PixelStatistics& sums = image.pixels[i];
-      const RgbSum all = color_of(sums.all);
-      luminances[i] = LuminanceOf(all) / passes;
-      rounded_luminances[i] = static_cast<float>(luminances[i]);
-      half_biases[i] = {static_cast<float>(static_cast<double>(sums.even_bias) / even_passes),
-                        static_cast<float>(static_cast<double>(sums.odd_bias) / odd_passes)};
-    }
-  });
-  const double floor = RelativeErrorFloor(luminances);
+  double floor = 0;
+  {
+    std::vector<double> luminances(count);
+    ForRows(team, height, [&](std::size_t row) {
+      for (std::size_t i = row * w; i < (row + 1) * w; ++i)
+        luminances[i] = LuminanceOfMean(image, i);
+    });
+    floor = RelativeErrorFloor(luminances);
+  }
   if (floor == 0) {
     const SquaredError unknown = {.noise = HUGE_VAL, .bias = 0, .low = 0, .high = HUGE_VAL};
     return {.relative = unknown, .absolute = {}, .untrimmed = HUGE_VAL};
   }
-  std::optional<std::array<MeanAround, 3>> around = std::array{
-      MeanAround(image, 0, team), MeanAround(image, 1, team), MeanAround(image, 2, team)};
-  std::vector<float> least_luminance =
-      LeastLuminance(width, height, std::move(rounded_luminances), team);
-  const double believed = BelievedShare(width, height, half_biases, luminances, floor, team);
-  FreeMemoryOf(half_biases);
-  FreeMemoryOf(luminances);
-  std::vector<PixelError> pixels(count);
-  std::vector<float> differences(count);
-  PixelBiases biases(count);
-  const auto do_row = [&](std::size_t row) {
+  std::vector<float> least_luminance(count);
+  ForRows(team, height, [&](std::size_t row) {
+    for (std::size_t i = row * w; i < (row + 1) * w; ++i)
+      least_luminance[i] = static_cast<float>(LuminanceOfMean(image, i));
+  });
+  least_luminance = LeastLuminance(width, height, std::move(least_luminance), team);
+  const double believed = BelievedShare(image, even_passes, odd_passes, floor, team);
+  // What a pixel's statistics give takes their place, but for `all`, which its neighbours need.
+  std::vector<float>& relative_noises = image.half_difference[0];
+  std::vector<float>& noises = image.half_difference[1];
+  std::vector<float>& more_biases = image.half_difference[2];
+  std::vector<float>& less_biases = image.bias_color[0];
+  std::vector<float>& differences = image.squared_deviations;
+  BiasHalves absolute = {.even = std::vector<float>(count), .odd = std::vector<float>(count)};
+  std::vector<float>& even_to_even = image.bias_color[1];
+  std::vector<float>& odd_to_even = image.bias_color[2];
+  std::vector<float>& even_to_odd = image.even_bias;
+  std::vector<float>& odd_to_odd = image.odd_bias;
+  const auto do_row = [&](const MeanAround& around, std::size_t row) {
     double halves = 0;
     double independent = 0;
     for (std::size_t column = 0; column < w; ++column) {
       const std::size_t pixel = row * w + column;
       const int x = static_cast<int>(column);
       const int y = static_cast<int>(row);
-      const PixelStatistics& sums = image.pixels[pixel];
+      const PixelStatistics sums = image.At(pixel);
       const RgbSum all = color_of(sums.all);
       const RgbSum half_difference = color_of(sums.half_difference);
       const RgbSum bias_color = color_of(sums.bias_color);
@@ -542,7 +597,7 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
         const double odd = odd_sum[c] / odd_passes;
         difference[c] = even - odd;
         const double own = all[c] / passes;
-        const double agreed = Middle(even, odd, (*around)[c](x, y));
+        const double agreed = Middle(even, odd, around(c, x, y));
         const double least = std::min(own, agreed);
         // One over value² + floor. The agreed value is too large where rare light fell on the
         // dark, the least one too small where lights are seen in few samples.
@@ -553,8 +608,8 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
         signed_noise += difference[c] * std::sqrt(weight);
         color_square += bias_color[c] * bias_color[c];
       }
-      pixels[pixel].noise = static_cast<float>(noise_sum / 3);
-      pixels[pixel].relative_noise = static_cast<float>(relative_noise / 3);
+      noises[pixel] = static_cast<float>(noise_sum / 3);
+      relative_noises[pixel] = static_cast<float>(relative_noise / 3);
       differences[pixel] = static_cast<float>(signed_noise);
       const double even_bias = static_cast<double>(sums.even_bias) / even_passes;
       const double odd_bias = static_cast<double>(sums.odd_bias) / odd_passes;
@@ -582,36 +637,53 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
         return 0.5 * even_bias * odd_bias * (to_even + to_odd);
       };
       const double relative_product = product(square_to_even, square_to_odd);
-      pixels[pixel].more_bias = static_cast<float>(
+      more_biases[pixel] = static_cast<float>(
           product(color_over_value(even, even_bias, 1), color_over_value(odd, odd_bias, 1)) -
           relative_product);
-      pixels[pixel].less_bias =
+      less_biases[pixel] =
           static_cast<float>(relative_product - product(color_over_value(even, even_bias, 0),
                                                         color_over_value(odd, odd_bias, 0)));
       const double of_color = std::sqrt(color_square / 3);
-      biases.absolute.even[pixel] = static_cast<float>(even_bias * of_color);
-      biases.absolute.odd[pixel] = static_cast<float>(odd_bias * of_color);
-      biases.to_even.even[pixel] = static_cast<float>(even_bias * of_even);
-      biases.to_even.odd[pixel] = static_cast<float>(odd_bias * of_even);
-      biases.to_odd.even[pixel] = static_cast<float>(even_bias * of_odd);
-      biases.to_odd.odd[pixel] = static_cast<float>(odd_bias * of_odd);
+      absolute.even[pixel] = static_cast<float>(even_bias * of_color);
+      absolute.odd[pixel] = static_cast<float>(odd_bias * of_color);
+      even_to_even[pixel] = static_cast<float>(even_bias * of_even);
+      odd_to_even[pixel] = static_cast<float>(odd_bias * of_even);
+      even_to_odd[pixel] = static_cast<float>(even_bias * of_odd);
+      odd_to_odd[pixel] = static_cast<float>(odd_bias * of_odd);
       const double luminance = LuminanceOf(difference);
       halves += luminance * luminance * to_noise;
       independent += static_cast<double>(sums.squared_deviations) / (passes * (passes - 1));
     }
     return std::array<double, 2>{halves, independent};
   };
-  const auto [halves, independent] = SumOfRows<2>(team, height, do_row);
+  const auto [halves, independent] =
+      SumOfBlocks<2>(team, height, [&](std::size_t begin, std::size_t end) {
+        return [&do_row, around = MeanAround(image, static_cast<int>(begin),
+                                             static_cast<int>(end))](std::size_t row) {
+          return do_row(around, row);
+        };
+      });
   // Before what smoothing takes.
-  around.reset();
   FreeMemoryOf(least_luminance);
-  FreeMemoryOf(image.pixels);
+  for (std::vector<float>& channel : image.all)
+    FreeMemoryOf(channel);
   Spread spread{.noise_area = CorrelatedArea(width, height, differences, differences), .z = z};
-  const ChosenBias chosen = Choose(width, height, biases, spread.noise_area, team);
+  FreeMemoryOf(differences);
+  const ChosenBias chosen =
+      Choose(width, height,
+             {.absolute = std::move(absolute),
+              .to_even = {.even = std::move(even_to_even), .odd = std::move(odd_to_even)},
+              .to_odd = {.even = std::move(even_to_odd), .odd = std::move(odd_to_odd)}},
+             spread.noise_area, team);
   spread.bias_area = chosen.bias.area;
+  std::vector<PixelError> pixels(count);
   for (std::size_t i = 0; i < count; ++i) {
-    pixels[i].bias = chosen.bias.absolute[i];
-    pixels[i].relative_bias = chosen.bias.relative[i];
+    pixels[i] = {.relative_noise = relative_noises[i],
+                 .relative_bias = chosen.bias.relative[i],
+                 .noise = noises[i],
+                 .bias = chosen.bias.absolute[i],
+                 .more_bias = more_biases[i],
+                 .less_bias = less_biases[i]};
   }
   double untrimmed = 0;
   for (const PixelError& one : pixels)

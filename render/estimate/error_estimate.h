@@ -42,6 +42,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -92,10 +93,21 @@ struct PixelStatistics {
   float even_bias = 0, odd_bias = 0;       // luminance, of even passes and of odd ones
   std::array<float, 3> bias_color{};       // of luminance 1
 };
+// Of all pixels, as columns, row-major: they are used up one by one.
 struct ImageStatistics {
+  ImageStatistics() = default;
+  // All zero.
+  ImageStatistics(int image_width, int image_height, std::int64_t image_passes);
+
+  [[nodiscard]] std::size_t pixels() const { return squared_deviations.size(); }
+  [[nodiscard]] PixelStatistics At(std::size_t pixel) const;
+  void Set(std::size_t pixel, const PixelStatistics& statistics);
+
   int width = 0, height = 0;
   std::int64_t passes = 0;
-  std::vector<PixelStatistics> pixels;  // row-major
+  // [pixels] what PixelStatistics has by these names.
+  std::array<std::vector<float>, 3> all, half_difference, bias_color;
+  std::vector<float> squared_deviations, even_bias, odd_bias;
 };
 
 // Passes before the first look at the error: halves of two passes each.

@@ -215,8 +215,13 @@ void ImageSums::AddTo(Features& sum, const SliceSums& slice, std::size_t pixel) 
   sum.normal = sum.normal + Vec3{at(kNormal), at(kNormal + 1), at(kNormal + 2)};
   sum.distance += at(kDistance);
   sum.unit_radius += at(kUnitRadius);
-  sum.hits += at(kHits);
-  sum.hitpoints += at(kHitpoints);
+  // Whatever a worker sent.
+  const auto passes = [&](std::size_t column) {
+    return std::clamp(at(column), 0.0F, static_cast<float>(kFeaturePasses));
+  };
+  sum.hits = static_cast<std::uint16_t>(static_cast<float>(sum.hits) + passes(kHits));
+  sum.hitpoints =
+      static_cast<std::uint16_t>(static_cast<float>(sum.hitpoints) + passes(kHitpoints));
 }
 
 }  // namespace lucerna

@@ -67,8 +67,9 @@ class ImageSums {
     Vec3 normal;
     float distance = 0;     // [scene units]
     float unit_radius = 0;  // [scene units] of hitpoints
-    float hits = 0;         // passes
-    float hitpoints = 0;    // passes
+    // Passes, of which the first kFeaturePasses count.
+    std::uint16_t hits = 0;
+    std::uint16_t hitpoints = 0;
   };
   [[nodiscard]] Features FeaturesAt(std::size_t pixel) const;
 

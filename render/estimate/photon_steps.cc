@@ -33,6 +33,26 @@ float Held(double value) {
       std::min(value, static_cast<double>(std::numeric_limits<float>::max())));
 }
 
+double LuminanceOfWorking(const RgbSum& color) {
+  return WorkingLuminance(color[0], color[1], color[2]);
+}
+
+// Whether so few photons were found that their variance is not seen, though they bring a good part
+// of the light.
+bool IsStarved(const ImageSums& sums) {
+  double found = 0;
+  double photons = 0;
+  double all = 0;
+  for (std::size_t i = 0; i < sums.pixels(); ++i) {
+    const ImageSums::Pixel pixel = sums.At(i);
+    found += pixel.photon_count;
+    photons += LuminanceOfWorking(pixel.photons);
+    all += LuminanceOfWorking(pixel.radiance());
+  }
+  return found < kFewestFound * static_cast<double>(sums.pixels()) &&
+         photons > kShareThatCounts * all;
+}
+
 }  // namespace
 
 std::uint64_t PhotonsOf(const PhotonSteps& steps, std::uint64_t pass) {
@@ -58,137 +78,110 @@ std::uint64_t PassesFor(const PhotonSteps& steps, std::uint64_t photons) {
   return 0;
 }
 
-void PassVariance::Add(const SliceSums& pass) {
-  LUCERNA_CHECK(pass.passes == (PassRange{sums_.passes, sums_.passes + 1}) &&
-                pass.pixels() == sums_.pixels.size());
-  const auto passes = static_cast<double>(sums_.passes);
+void PassVariance::Add(const SliceSums& pass, const ImageSums& before) {
+  LUCERNA_CHECK(pass.passes == (PassRange{before.passes(), before.passes() + 1}) &&
+                pass.pixels() == pixels_.size() && before.pixels() == pixels_.size());
+  const auto passes = static_cast<double>(before.passes());
   const auto add = [](float& sum, double value) { sum = Held(static_cast<double>(sum) + value); };
-  for (std::size_t i = 0; i < sums_.pixels.size(); ++i) {
+  for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const auto at = [&](std::size_t column) { return static_cast<double>(pass.At(column, i)); };
-    const auto luminance = [&](std::size_t column) {
-      return WorkingLuminance(at(column), at(column + 1), at(column + 2));
-    };
-    const double photons = luminance(kPhotonRadiance);
-    const double direct = luminance(kDirectRadiance);
-    Pixel& sum = sums_.pixels[i];
-    if (sums_.passes > 0) {
-      const auto before = static_cast<double>(sum.photons);
-      add(sum.photon_deviations, DeviationBetween(passes, before, 1, photons));
-      add(sum.deviations,
-          DeviationBetween(passes, before + static_cast<double>(sum.direct), 1, photons + direct));
+    const double photons = WorkingLuminance(at(kPhotonRadiance), at(kPhotonRadiance + 1),
+                                            at(kPhotonRadiance + 2));
+    if (passes > 0) {
+      add(pixels_[i].deviations,
+          DeviationBetween(passes, LuminanceOfWorking(before.At(i).photons), 1, photons));
     }
-    add(sum.photons, photons);
-    add(sum.direct, direct);
-    if (sums_.passes % 2 == 0) {
-      add(sum.even_photons, photons);
-      add(sum.even, photons + direct);
-    }
-    add(sum.count, at(kPhotonCount));
+    if (before.passes() % 2 == 0) add(pixels_[i].even, photons);
   }
-  sums_.photons += pass.tally.photons;
-  sums_.photon_rays += pass.tally.rays;
-  sums_.pairs += pass.tally.pairs;
-  sums_.eye_rays += pass.eye_rays;
-  ++sums_.passes;
 }
 
-PassVariance::Parts PassVariance::Split(double kernel_noise) const {
-  LUCERNA_CHECK(sums_.passes >= 2);
-  const auto passes = static_cast<double>(sums_.passes);
+PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noise) const {
+  LUCERNA_CHECK(sums.passes() >= 2 && sums.whole_passes() == sums.passes() &&
+                sums.pixels() == pixels_.size());
+  const auto passes = static_cast<double>(sums.passes());
   const double even_passes = std::ceil(passes / 2);
   const double odd_passes = passes - even_passes;
-  const auto sum_of = [](const Pixel& pixel) {
-    return static_cast<double>(pixel.photons) + static_cast<double>(pixel.direct);
-  };
-  std::vector<double> luminances;
-  luminances.reserve(sums_.pixels.size());
-  for (const Pixel& pixel : sums_.pixels)
-    luminances.push_back(sum_of(pixel) / passes);
-  const double floor = RelativeErrorFloor(luminances);
+  double floor = 0;
+  {
+    std::vector<double> luminances;
+    luminances.reserve(pixels_.size());
+    for (std::size_t i = 0; i < pixels_.size(); ++i)
+      luminances.push_back(LuminanceOfWorking(sums.RadianceAt(i)) / passes);
+    floor = RelativeErrorFloor(luminances);
+  }
   if (!(floor > 0)) return {};
 
   // Of one pixel, relative.
   struct Variances {
-    double all = 0;            // of passes
-    double photons = 0;        // of what photons brought
-    double photons_found = 0;  // that the number of photons found explains
-    double independent = 0;    // the same, without bias where few were found
-    double eye_paths = 0;      // of halves, beyond what photons brought to them
+    float all = 0;            // of passes
+    float photons = 0;        // of what photons brought
+    float photons_found = 0;  // that the number of photons found explains
+    float independent = 0;    // the same, without bias where few were found
+    float eye_paths = 0;      // of halves, beyond what photons brought to them
   };
   std::vector<Variances> variances;
-  variances.reserve(sums_.pixels.size());
+  variances.reserve(pixels_.size());
   const double halves = even_passes * odd_passes / passes;
-  for (std::size_t i = 0; i < sums_.pixels.size(); ++i) {
-    const Pixel& pixel = sums_.pixels[i];
-    const double weight = 1 / (luminances[i] * luminances[i] + floor);
-    const auto difference = [&](double sum, double even) {
-      return even / even_passes - (sum - even) / odd_passes;
+  for (std::size_t i = 0; i < pixels_.size(); ++i) {
+    const ImageSums::Pixel pixel = sums.At(i);
+    const double sum = LuminanceOfWorking(pixel.radiance());
+    const double photon_sum = LuminanceOfWorking(pixel.photons);
+    const double weight = 1 / (sum / passes * (sum / passes) + floor);
+    const auto difference = [&](double of_all, double even) {
+      return even / even_passes - (of_all - even) / odd_passes;
     };
-    const double all = difference(sum_of(pixel), static_cast<double>(pixel.even));
-    const double of_photons =
-        difference(static_cast<double>(pixel.photons), static_cast<double>(pixel.even_photons));
-    const double photons = static_cast<double>(pixel.photons) / passes;
-    const auto count = static_cast<double>(pixel.count);
+    const double all = difference(sum, 0.5 * (sum + LuminanceOfWorking(pixel.half_difference)));
+    const double of_photons = difference(photon_sum, static_cast<double>(pixels_[i].even));
+    const double photons = photon_sum / passes;
+    const double count = pixel.photon_count;
     variances.push_back(
-        {.all = weight * static_cast<double>(pixel.deviations) / (passes - 1),
-         .photons = weight * static_cast<double>(pixel.photon_deviations) / (passes - 1),
+        {.all = Held(weight * pixel.squared_deviations / (passes - 1)),
+         .photons = Held(weight * static_cast<double>(pixels_[i].deviations) / (passes - 1)),
          .photons_found =
-             count > 0 ? weight * photons * photons * kernel_noise * passes / count : 0,
+             count > 0 ? Held(weight * photons * photons * kernel_noise * passes / count) : 0,
          // N equals whose squares are expected to be k times that of their mean: of the square of
          // their sum N k of N k + N (N - 1).
-         .independent = count > 0 ? weight * photons * photons * kernel_noise * passes /
-                                        (count + kernel_noise - 1)
+         .independent = count > 0 ? Held(weight * photons * photons * kernel_noise * passes /
+                                         (count + kernel_noise - 1))
                                   : 0,
-         .eye_paths = weight * (all * all - of_photons * of_photons) * halves});
+         .eye_paths = Held(weight * (all * all - of_photons * of_photons) * halves)});
   }
   const std::size_t kept = KeptPixels(variances.size());
   std::ranges::nth_element(variances, variances.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
                            &Variances::all);
-  Variances mean;
-  for (std::size_t i = 0; i < kept; ++i) {
-    mean.photons += variances[i].photons / static_cast<double>(kept);
-    mean.photons_found += variances[i].photons_found / static_cast<double>(kept);
-    mean.independent += variances[i].independent / static_cast<double>(kept);
-    mean.eye_paths += variances[i].eye_paths / static_cast<double>(kept);
-  }
+  const auto mean = [&](float Variances::*of) {
+    double sum = 0;
+    for (std::size_t i = 0; i < kept; ++i)
+      sum += static_cast<double>(variances[i].*of);
+    return sum / static_cast<double>(kept);
+  };
   // What photons brought varies by their number, and by where eye paths end. Photons that arrive
   // one by one as equals explain the first part; more than there is where many pixels have found
   // hardly any, or where low discrepancy spaces them evenly.
-  const double photons = std::min(mean.photons_found, mean.photons);
+  const double all_photons = mean(&Variances::photons);
+  const double photons = std::min(mean(&Variances::photons_found), all_photons);
   return {.photons = photons,
-          .eye_paths = std::max(0.0, mean.eye_paths) + mean.photons - photons,
-          .is_evenly_spaced = mean.independent > kEvenlySpaced * mean.photons};
+          .eye_paths = std::max(0.0, mean(&Variances::eye_paths)) + all_photons - photons,
+          .is_evenly_spaced = mean(&Variances::independent) > kEvenlySpaced * all_photons};
 }
 
-PassVariance::Costs PassVariance::CostsSoFar() const {
-  return {.photons =
-              static_cast<double>(sums_.photon_rays) + kPairCost * static_cast<double>(sums_.pairs),
-          .eye_paths = kEyePathCost * static_cast<double>(sums_.passes) *
-                           static_cast<double>(sums_.pixels.size()) +
-                       kEyeRayCost * static_cast<double>(sums_.eye_rays)};
+PassVariance::Costs PassVariance::CostsOf(const ImageSums& sums) {
+  const BatchTally tally = sums.tally();
+  return {.photons = static_cast<double>(tally.rays) + kPairCost * static_cast<double>(tally.pairs),
+          .eye_paths = kEyePathCost * static_cast<double>(sums.passes()) *
+                           static_cast<double>(sums.pixels()) +
+                       kEyeRayCost * static_cast<double>(sums.eye_rays())};
 }
 
-bool PassVariance::IsStarved() const {
-  double found = 0;
-  double photons = 0;
-  double all = 0;
-  for (const Pixel& pixel : sums_.pixels) {
-    found += static_cast<double>(pixel.count);
-    photons += static_cast<double>(pixel.photons);
-    all += static_cast<double>(pixel.photons) + static_cast<double>(pixel.direct);
-  }
-  return found < kFewestFound * static_cast<double>(sums_.pixels.size()) &&
-         photons > kShareThatCounts * all;
-}
-
-double PassVariance::BestPhotons(double kernel_noise) const {
-  if (IsStarved()) return std::numeric_limits<double>::infinity();
-  const Parts variance = Split(kernel_noise);
+double PassVariance::BestPhotons(const ImageSums& sums, double kernel_noise) const {
+  if (IsStarved(sums)) return std::numeric_limits<double>::infinity();
+  const Parts variance = Split(sums, kernel_noise);
   if (!(variance.photons > 0)) return 0;
-  const double present = static_cast<double>(sums_.photons) / static_cast<double>(sums_.passes);
+  const double present =
+      static_cast<double>(sums.tally().photons) / static_cast<double>(sums.passes());
   if (variance.is_evenly_spaced) return present;
   if (!(variance.eye_paths > 0)) return std::numeric_limits<double>::infinity();
-  const Costs costs = CostsSoFar();
+  const Costs costs = CostsOf(sums);
   return present *
          std::sqrt(variance.photons * costs.eye_paths / (variance.eye_paths * costs.photons));
 }

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/estimate/image_sums.h"
 #include "render/estimate/slice_sums.h"
 
 namespace lucerna {
@@ -31,14 +32,14 @@ using PhotonSteps = std::vector<PhotonStep>;
 
 // Where the variance of a job's first passes comes from, and what they cost.
 //
-// Sums over passes that come one by one. The photons of a pass may change on the way.
+// What it needs beside the sums of an image, of passes that come one by one. The photons of a pass
+// may change on the way.
 class PassVariance {
  public:
-  explicit PassVariance(std::size_t pixels) { sums_.pixels.resize(pixels); }
+  explicit PassVariance(std::size_t pixels) : pixels_(pixels) {}
 
-  // Requires a slice of one pass, that of passes().
-  void Add(const SliceSums& pass);
-  [[nodiscard]] std::uint64_t passes() const { return sums_.passes; }
+  // Requires a slice of one pass, which is added to the sums `before` later.
+  void Add(const SliceSums& pass, const ImageSums& before);
 
   // Parts of the variance of a pass, as means over the pixels, relative to the squared value (with
   // the floor of relative errors). The pixels that vary most are left out, as in relative errors.
@@ -55,15 +56,15 @@ class PassVariance {
   };
   // `kernel_noise` is the variance that one photon brings, over the squared flux expected of it:
   // the kernel's integral of K² times the area within which photons are counted.
-  // Requires passes() >= 2.
-  [[nodiscard]] Parts Split(double kernel_noise) const;
+  // Requires the sums, without a tail, of the passes added, of which there are two or more.
+  [[nodiscard]] Parts Split(const ImageSums& sums, double kernel_noise) const;
 
-  // What has been spent so far, in units of the time that tracing one ray of a photon takes. It
+  // What has been spent for them, in units of the time that tracing one ray of a photon takes. It
   // follows from counts: measured times would make images depend on machines.
   struct Costs {
     double photons = 0, eye_paths = 0;
   };
-  [[nodiscard]] Costs CostsSoFar() const;
+  [[nodiscard]] static Costs CostsOf(const ImageSums& sums);
 
   // The number of photons a pass that has the least variance for the time: with variances v and
   // costs c of photons and eye paths, sqrt(v_photons c_eye / (v_eye c_photons)) times the mean
@@ -72,31 +73,21 @@ class PassVariance {
   // another place of their sequence, and lose more than they gain.
   // Infinite too where most pixels have found no photon yet, though those that were found bring a
   // good part of the light: the variance of photons is not seen then.
-  // Requires passes() >= 2.
-  [[nodiscard]] double BestPhotons(double kernel_noise) const;
+  // Requires sums as Split does.
+  [[nodiscard]] double BestPhotons(const ImageSums& sums, double kernel_noise) const;
 
+  // Of what photons brought to a pixel.
   struct Pixel {
-    float photons = 0, direct = 0;  // luminances
-    float even_photons = 0;         // luminance of the even passes
-    float even = 0;                 // the same with direct light
-    float deviations = 0;           // squared, of passes from their mean
-    float photon_deviations = 0;    // the same of what photons brought
-    float count = 0;                // photons found
+    float even = 0;        // luminance of the even passes
+    float deviations = 0;  // squared, of passes' luminances from their mean
   };
   // All that is kept, for checkpoints.
-  struct Numbers {
-    std::vector<Pixel> pixels;
-    std::uint64_t passes = 0;
-    std::uint64_t photons = 0, photon_rays = 0, pairs = 0, eye_rays = 0;
-  };
-  [[nodiscard]] const Numbers& numbers() const { return sums_; }
+  [[nodiscard]] const std::vector<Pixel>& pixels() const { return pixels_; }
   // Goes on from there.
-  explicit PassVariance(Numbers numbers) : sums_(std::move(numbers)) {}
+  explicit PassVariance(std::vector<Pixel> pixels) : pixels_(std::move(pixels)) {}
 
  private:
-  [[nodiscard]] bool IsStarved() const;
-
-  Numbers sums_;
+  std::vector<Pixel> pixels_;
 };
 
 // `present` times the power of two that comes closest to `best`; not less than `present`, and not

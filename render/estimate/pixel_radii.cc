@@ -8,6 +8,18 @@
 
 namespace lucerna {
 
+namespace {
+
+// From the first pass to `last`, where one ends.
+std::uint64_t RoundsUntil(std::uint64_t last) {
+  std::uint64_t rounds = 0;
+  for (std::uint64_t pass = 0; pass < last; pass = RoundOf(pass).last)
+    ++rounds;
+  return rounds;
+}
+
+}  // namespace
+
 PixelRadii::PixelRadii(std::size_t pixels, float initial_radius, const RadiusController& controller)
     : controller_(controller),
       memory_per_pixel_(controller.MemoryPerPixel()),
@@ -23,6 +35,7 @@ void PixelRadii::Restore(Numbers numbers) {
 void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, ThreadTeam& team) {
   LUCERNA_CHECK(round.pixels() == numbers_.radius.size() && used.size() == numbers_.radius.size() &&
                 round.evidence <= kMostControllerColumns);
+  const std::uint64_t rounds = RoundsUntil(round.passes.last);
   constexpr std::size_t kPixelsAtOnce = 1024;
   team.For(numbers_.radius.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
     std::array<double, kMostControllerColumns> columns{};
@@ -34,7 +47,8 @@ void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, ThreadTe
           {.photons = static_cast<double>(round.At(kPhotonCount, pixel)),
            .radius = static_cast<double>(used[pixel]),
            .columns = std::span<const double>(columns).first(round.evidence),
-           .blur = static_cast<double>(round.At(kBlur, pixel))},
+           .blur = static_cast<double>(round.At(kBlur, pixel)),
+           .rounds = rounds},
           round.passes,
           std::span<double>(numbers_.memory).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
     }

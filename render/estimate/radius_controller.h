@@ -34,6 +34,7 @@ struct RoundEvidence {
   // What the kernel makes of light that is not even, as kBlurColumn measures it: estimate less
   // truth [luminance flux relative to the scene's power, per squared unit radius].
   double blur = 0;
+  std::uint64_t rounds = 1;  // so far, with this one
 };
 
 // What a frequency controller predicts for a pixel.
@@ -54,7 +55,8 @@ class RadiusController {
   virtual ~RadiusController() = default;
   // Numbers of memory a pixel, zero before the first pass.
   [[nodiscard]] virtual std::size_t MemoryPerPixel() const { return 0; }
-  // The state after the round `passes` brought `evidence`. A radius never grows.
+  // The state after the round `passes` brought `evidence`, which follows all passes before it. A
+  // radius never grows.
   [[nodiscard]] virtual PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence,
                                          const PassRange& passes,
                                          std::span<double> memory) const = 0;

@@ -11,13 +11,13 @@
 
 namespace lucerna {
 
-Image MakeFilmImage(const FilmFormat& format, const ImageSums& sums, const RadiusColumn& last_radii,
-                    const PixelRadii& radii, const RadiusController& controller,
-                    const Kernel& kernel) {
-  LUCERNA_CHECK(sums.passes() > 0);
-  Image image;
-  image.width = format.width;
-  image.height = format.height;
+std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t first,
+                                         std::size_t last, const ImageSums& sums,
+                                         const RadiusColumn& last_radii, const PixelRadii& radii,
+                                         const RadiusController& controller, const Kernel& kernel,
+                                         ThreadTeam& team) {
+  LUCERNA_CHECK(sums.passes() > 0 && first <= last && last <= sums.pixels());
+  std::vector<ImageChannel> channels;
   const double to_pixel = format.exposure / static_cast<double>(sums.passes());
   // Of the pixel's hitpoints [scene units]; 0 where there was none.
   const auto unit_radius = [&](std::size_t pixel) {
@@ -28,7 +28,8 @@ Image MakeFilmImage(const FilmFormat& format, const ImageSums& sums, const Radiu
   };
   // Only these tell what surfaces look like.
   const auto feature_passes = static_cast<double>(std::min(sums.passes(), kFeaturePasses));
-  const auto values_of = [&](std::size_t pixel) {
+  const auto values_of = [&](std::size_t offset_in_band) {
+    const std::size_t pixel = first + offset_in_band;
     const ImageSums::Pixel of_pixel = sums.At(pixel);
     PixelValues values;
     values.direct = ToRec709(of_pixel.direct);
@@ -57,10 +58,12 @@ Image MakeFilmImage(const FilmFormat& format, const ImageSums& sums, const Radiu
     values.photon_count = of_pixel.photon_count;
     return values;
   };
-  AddLayers(LayerSource::kEveryImage, values_of, image);
-  if (format.has_coverage) AddLayers(LayerSource::kCoverage, values_of, image);
-  if (!controller.Predicts()) return image;
-  const auto predictions_of = [&](std::size_t pixel) {
+  AddLayers(LayerSource::kEveryImage, values_of, last - first, team, channels);
+  if (format.has_coverage)
+    AddLayers(LayerSource::kCoverage, values_of, last - first, team, channels);
+  if (!controller.Predicts()) return channels;
+  const auto predictions_of = [&](std::size_t offset_in_band) {
+    const std::size_t pixel = first + offset_in_band;
     PixelValues values;
     const auto prediction = controller.Predict(radii.memory(pixel));
     const double unit = unit_radius(pixel);
@@ -71,8 +74,8 @@ Image MakeFilmImage(const FilmFormat& format, const ImageSums& sums, const Radiu
         prediction->trace, static_cast<double>(last_radii[pixel]), kernel.Moments());
     return values;
   };
-  AddLayers(LayerSource::kPredictions, predictions_of, image);
-  return image;
+  AddLayers(LayerSource::kPredictions, predictions_of, last - first, team, channels);
+  return channels;
 }
 
 void SetImageWindow(const RenderSettings& settings, Image& image) {

@@ -1,6 +1,11 @@
 // How do sums over passes become an image?
 #pragma once
 
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "render/base/parallel.h"
 #include "render/estimate/image_sums.h"
 #include "render/estimate/pixel_radii.h"
 #include "render/estimate/radius_controller.h"
@@ -11,19 +16,19 @@
 namespace lucerna {
 
 struct FilmFormat {
-  int width = 0, height = 0;
   double exposure = 1;  // factor from radiance to pixel values
   // Pixel values are scaled down until no channel is larger.
   double max_component = HUGE_VAL;
   bool has_coverage = false;  // the layer of kCoverage
 };
 
-// The image of all passes of `sums`, Rec. 709. `last_radii` are those of the last round [unit
-// radii]. The layers of kEveryImage, of kCoverage on request, and of kPredictions if the controller
-// makes any (film/layers.h). Requires sums.passes() > 0.
-[[nodiscard]] Image MakeFilmImage(const FilmFormat& format, const ImageSums& sums,
-                                  const RadiusColumn& last_radii, const PixelRadii& radii,
-                                  const RadiusController& controller, const Kernel& kernel);
+// The pixels [first, last) of the image of all passes of `sums`, Rec. 709. `last_radii` are those
+// of the last round [unit radii]. The layers of kEveryImage, of kCoverage on request, and of
+// kPredictions if the controller makes any (film/layers.h). Requires sums.passes() > 0.
+[[nodiscard]] std::vector<ImageChannel> MakeFilmPixels(
+    const FilmFormat& format, std::size_t first, std::size_t last, const ImageSums& sums,
+    const RadiusColumn& last_radii, const PixelRadii& radii, const RadiusController& controller,
+    const Kernel& kernel, ThreadTeam& team);
 
 // Says of an image that it is a part of a whole, where the settings crop it.
 void SetImageWindow(const RenderSettings& settings, Image& image);

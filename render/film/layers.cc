@@ -1,7 +1,5 @@
 #include "render/film/layers.h"
 
-#include <vector>
-
 namespace lucerna {
 namespace {
 
@@ -60,29 +58,30 @@ const Layer* LayerOfChannel(std::string_view channel) {
 }
 
 void AddLayers(LayerSource source, const std::function<PixelValues(std::size_t)>& values_of,
-               Image& image) {
-  const std::size_t pixels =
-      static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
-  const std::size_t first = image.channels.size();
+               std::size_t pixels, ThreadTeam& team, std::vector<ImageChannel>& channels) {
+  const std::size_t first = channels.size();
   for (const Layer& layer : kLayers) {
     if (layer.source != source) continue;
     for (std::size_t c = 0; c < layer.channel_count(); ++c)
-      image.channels.push_back({layer.ChannelName(c), std::vector<float>(pixels)});
+      channels.push_back({layer.ChannelName(c), std::vector<float>(pixels)});
   }
-  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
-    const PixelValues values = values_of(pixel);
-    std::size_t number = first;
-    for (const Layer& layer : kLayers) {
-      if (layer.source != source) continue;
-      for (std::size_t c = 0; c < layer.channel_count(); ++c)
-        image.channels[number++].pixels[pixel] = static_cast<float>(layer.value(values, c));
+  constexpr std::size_t kPixelsAtOnce = 4096;
+  team.For(pixels, kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t pixel = begin; pixel < end; ++pixel) {
+      const PixelValues values = values_of(pixel);
+      std::size_t number = first;
+      for (const Layer& layer : kLayers) {
+        if (layer.source != source) continue;
+        for (std::size_t c = 0; c < layer.channel_count(); ++c)
+          channels[number++].pixels[pixel] = static_cast<float>(layer.value(values, c));
+      }
     }
-  }
+  });
 }
 
-void ToFileUnit(Image& image, double unit) {
+void ToFileUnit(std::vector<ImageChannel>& channels, double unit) {
   if (unit == 1) return;
-  for (ImageChannel& channel : image.channels) {
+  for (ImageChannel& channel : channels) {
     const Layer* layer = LayerOfChannel(channel.name);
     if (layer == nullptr) continue;
     if (layer->unit != LayerUnit::kLength && layer->unit != LayerUnit::kPerLength) continue;

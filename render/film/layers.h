@@ -6,7 +6,9 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "render/base/parallel.h"
 #include "render/image/image.h"
 
 namespace lucerna {
@@ -47,12 +49,13 @@ struct Layer {
 // The layer of a channel, or nullptr. All layers: one row each in layers.cc.
 [[nodiscard]] const Layer* LayerOfChannel(std::string_view channel);
 
-// Adds the layers of `source`; `values_of` gives the values of a pixel [row-major].
+// Adds the layers of `source`, of so many pixels, by the threads of `team`; `values_of` gives the
+// values of a pixel and may run beside itself.
 void AddLayers(LayerSource source, const std::function<PixelValues(std::size_t)>& values_of,
-               Image& image);
+               std::size_t pixels, ThreadTeam& team, std::vector<ImageChannel>& channels);
 
 // Turns lengths from the unit that the scene is rendered in to that of the scene's file, which are
 // `unit` of it.
-void ToFileUnit(Image& image, double unit);
+void ToFileUnit(std::vector<ImageChannel>& channels, double unit);
 
 }  // namespace lucerna

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <utility>
 
 namespace lucerna {
 namespace {
@@ -59,6 +62,52 @@ Digest Image::PixelDigest() const {
     AddText(stream, value);
   }
   return stream.Finish();
+}
+
+Image BandedImage::Whole() const {
+  Image whole = head;
+  const std::size_t pixels =
+      static_cast<std::size_t>(whole.width) * static_cast<std::size_t>(whole.height);
+  ForBands(whole.width, whole.height, [&](int first, int last) {
+    std::vector<ImageChannel> band = rows(first, last);
+    if (whole.channels.empty()) {
+      for (const ImageChannel& channel : band) {
+        whole.channels.push_back({channel.name, {}});
+        whole.channels.back().pixels.reserve(pixels);
+      }
+    }
+    LUCERNA_CHECK(band.size() == whole.channels.size());
+    for (std::size_t c = 0; c < band.size(); ++c) {
+      std::vector<float>& all = whole.channels[c].pixels;
+      all.insert(all.end(), band[c].pixels.begin(), band[c].pixels.end());
+    }
+  });
+  return whole;
+}
+
+BandedImage InBands(Image whole) {
+  BandedImage banded;
+  std::vector<ImageChannel> channels = std::exchange(whole.channels, {});
+  banded.head = std::move(whole);
+  // Functions can be copied; the pixels are not.
+  const auto shared = std::make_shared<const std::vector<ImageChannel>>(std::move(channels));
+  banded.rows = [shared, width = banded.head.width](int first, int last) {
+    const std::ptrdiff_t begin = std::ptrdiff_t{first} * width;
+    const std::ptrdiff_t end = std::ptrdiff_t{last} * width;
+    std::vector<ImageChannel> band;
+    band.reserve(shared->size());
+    for (const ImageChannel& channel : *shared)
+      band.push_back({channel.name, {channel.pixels.begin() + begin, channel.pixels.begin() + end}});
+    return band;
+  };
+  return banded;
+}
+
+void ForBands(int width, int height, const std::function<void(int first, int last)>& body) {
+  constexpr int kPixelsPerBand = 1 << 16;
+  const int rows = std::max(1, kPixelsPerBand / std::max(1, width));
+  for (int first = 0; first < height; first += rows)
+    body(first, std::min(height, first + rows));
 }
 
 }  // namespace lucerna

@@ -1,6 +1,7 @@
 // What comes out of a render: named layers of pixels and what is known about them.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>
@@ -35,5 +36,21 @@ struct Image {
   // renders gave the same bits. Does not depend on the order of the channels.
   [[nodiscard]] Digest PixelDigest() const;
 };
+
+// An image that is made a band of rows at a time, so that it need not be in memory as a whole.
+struct BandedImage {
+  Image head;  // all but its channels
+  // The rows [first, last) of all channels, by the same names each time.
+  std::function<std::vector<ImageChannel>(int first, int last)> rows;
+
+  // As one; its rows are made from the top.
+  [[nodiscard]] Image Whole() const;
+};
+// Bands of an image that is there.
+[[nodiscard]] BandedImage InBands(Image whole);
+
+// Calls body(first, last) for bands of whole rows that hold some ten thousand pixels each, from the
+// top.
+void ForBands(int width, int height, const std::function<void(int first, int last)>& body);
 
 }  // namespace lucerna

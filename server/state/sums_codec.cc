@@ -58,7 +58,7 @@ void ForEachFeature(Features& features, const Number& number) {
   number(features.hits);
   number(features.hitpoints);
 }
-constexpr std::size_t kFeatureBytes = 10 * sizeof(float);
+constexpr std::size_t kFeatureBytes = 8 * sizeof(float) + 2 * sizeof(std::uint16_t);
 static_assert(sizeof(ImageSums::Features) == kFeatureBytes);
 
 // Whether so many rows can be there.
@@ -113,24 +113,17 @@ StatusOr<PixelRadii::Numbers> ReadNumbers(ByteReader& reader, const PixelRadii::
   return result;
 }
 
-void WriteVariance(ByteWriter& writer, const PassVariance::Numbers& numbers) {
-  for (const std::uint64_t count :
-       {numbers.passes, numbers.photons, numbers.photon_rays, numbers.pairs, numbers.eye_rays})
-    writer.Varint(count);
-  for (const PassVariance::Pixel& pixel : numbers.pixels)
+void WriteVariance(ByteWriter& writer, const PassVariance& variance) {
+  for (const PassVariance::Pixel& pixel : variance.pixels())
     Write(writer, pixel);
 }
 
-StatusOr<PassVariance::Numbers> ReadVariance(ByteReader& reader, std::size_t pixels) {
-  PassVariance::Numbers numbers;
-  for (std::uint64_t* const count :
-       {&numbers.passes, &numbers.photons, &numbers.photon_rays, &numbers.pairs, &numbers.eye_rays})
-    *count = reader.Varint();
+StatusOr<PassVariance> ReadVariance(ByteReader& reader, std::size_t pixels) {
   if (!HasRows(reader, pixels, sizeof(PassVariance::Pixel))) return Malformed("sums are missing");
-  numbers.pixels.resize(pixels);
-  for (PassVariance::Pixel& pixel : numbers.pixels)
+  std::vector<PassVariance::Pixel> read(pixels);
+  for (PassVariance::Pixel& pixel : read)
     pixel = Read<PassVariance::Pixel>(reader);
-  return numbers;
+  return PassVariance(std::move(read));
 }
 
 void WriteGuide(ByteWriter& writer, const PhotonGuide& guide) {

@@ -21,7 +21,7 @@ void WriteDouble(ByteWriter& writer, double value);
 
 void WriteRadii(ByteWriter& writer, const RadiusColumn& radii);
 void WriteNumbers(ByteWriter& writer, const PixelRadii::Numbers& numbers);
-void WriteVariance(ByteWriter& writer, const PassVariance::Numbers& numbers);
+void WriteVariance(ByteWriter& writer, const PassVariance& variance);
 void WriteSums(ByteWriter& writer, const ImageSums::Whole& sums);
 void WriteGuide(ByteWriter& writer, const PhotonGuide& guide);
 void WriteLearned(ByteWriter& writer, const GuideLearner::Numbers& numbers);
@@ -31,7 +31,7 @@ void WriteLearned(ByteWriter& writer, const GuideLearner::Numbers& numbers);
 [[nodiscard]] StatusOr<RadiusColumn> ReadRadii(ByteReader& reader, std::size_t pixels);
 [[nodiscard]] StatusOr<PixelRadii::Numbers> ReadNumbers(ByteReader& reader,
                                                         const PixelRadii::Numbers& shape);
-[[nodiscard]] StatusOr<PassVariance::Numbers> ReadVariance(ByteReader& reader, std::size_t pixels);
+[[nodiscard]] StatusOr<PassVariance> ReadVariance(ByteReader& reader, std::size_t pixels);
 [[nodiscard]] StatusOr<PhotonGuide> ReadGuide(ByteReader& reader);
 [[nodiscard]] StatusOr<GuideLearner::Numbers> ReadLearned(ByteReader& reader, std::size_t pixels);
 [[nodiscard]] StatusOr<ImageSums::Whole> ReadSums(ByteReader& reader, std::size_t pixels);

@@ -59,7 +59,8 @@ class TimedRender {
     const Duration traced = ProcessCpuTime();
     trace_s_ += Seconds(traced - start);
     if (pass_ < kFirstLongRound) {
-      variance_.Add(slice);
+      variance_.Add(slice, sums_);
+      sums_.Add(slice, estimator_->team());
       if (pass_ > 0 && std::has_single_bit(pass_ + 1)) PrintSplit();
     }
     eye_rays_ += slice.eye_rays;
@@ -82,11 +83,11 @@ class TimedRender {
     const float reach = ReachOf(EvidenceOf(settings_.radius_controller));
     const double kernel_noise = std::numbers::pi * Kernel{settings_.kernel}.Moments().roughness *
                                 static_cast<double>(reach * reach);
-    const PassVariance::Parts parts = variance_.Split(kernel_noise);
+    const PassVariance::Parts parts = variance_.Split(sums_, kernel_noise);
     std::printf("  split %s passes %llu: photons %.5f eye paths %.5f best number %.2f\n",
-                name_.c_str(), static_cast<unsigned long long>(variance_.passes()), parts.photons,
+                name_.c_str(), static_cast<unsigned long long>(sums_.passes()), parts.photons,
                 parts.eye_paths,
-                variance_.BestPhotons(kernel_noise) / static_cast<double>(pixels_));
+                variance_.BestPhotons(sums_, kernel_noise) / static_cast<double>(pixels_));
   }
   void PrintCosts() const {
     const double paths = static_cast<double>(pixels_) * static_cast<double>(pass_);
@@ -117,6 +118,7 @@ class TimedRender {
   std::unique_ptr<JobEstimator> estimator_;
   BatchTracer tracer_;
   std::size_t pixels_;
+  ImageSums sums_{pixels_};  // of the first rounds
   PassVariance variance_{pixels_};
   std::uint64_t pass_ = 0;
   std::optional<RoundPlan> plan_;

@@ -20,11 +20,9 @@ constexpr std::size_t kPixels = static_cast<std::size_t>(kSide) * kSide;
 // Of passes whose sum is `all`.
 ImageStatistics StatisticsOf(const ErrorStatistics& statistics, const std::vector<RgbSum>& all,
                              bool has_bias) {
-  ImageStatistics image = {
-      .width = kSide, .height = kSide, .passes = statistics.passes(), .pixels = {}};
-  image.pixels.resize(kPixels);
+  ImageStatistics image(kSide, kSide, statistics.passes());
   for (std::size_t i = 0; i < kPixels; ++i) {
-    PixelStatistics& pixel = image.pixels[i];
+    PixelStatistics pixel;
     for (std::size_t c = 0; c < 3; ++c) {
       pixel.all[c] = static_cast<float>(all[i][c]);
       pixel.half_difference[c] = static_cast<float>(2 * statistics.even_sum()[i][c] - all[i][c]);
@@ -33,10 +31,12 @@ ImageStatistics StatisticsOf(const ErrorStatistics& statistics, const std::vecto
     pixel.squared_deviations =
         static_cast<float>(statistics.square_sum()[i] -
                            luminance * luminance / static_cast<double>(statistics.passes()));
-    if (!has_bias) continue;
-    pixel.even_bias = static_cast<float>(statistics.even_bias()[i]);
-    pixel.odd_bias = static_cast<float>(statistics.odd_bias()[i]);
-    pixel.bias_color = {1, 1, 1};
+    if (has_bias) {
+      pixel.even_bias = static_cast<float>(statistics.even_bias()[i]);
+      pixel.odd_bias = static_cast<float>(statistics.odd_bias()[i]);
+      pixel.bias_color = {1, 1, 1};
+    }
+    image.Set(i, pixel);
   }
   return image;
 }

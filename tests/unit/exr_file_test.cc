@@ -114,6 +114,40 @@ TEST(ExrFileTest, DigestChangesWithAnyPixelSizeNameOrSettingAndWithNothingElse) 
   EXPECT_NE(other.PixelDigest(), image.PixelDigest());
 }
 
+// 300 rows of 1000 pixels are several bands.
+TEST(ExrFileTest, BandsGiveTheSameBytesAsTheWhole) {
+  Image image;
+  image.width = 1000;
+  image.height = 300;
+  image.x0 = 7;
+  image.y0 = 9;
+  image.whole_width = 1100;
+  image.whole_height = 400;
+  image.metadata["lucerna.seed"] = "17";
+  KeyedRng rng(5);
+  for (const char* const name : {"R", "albedo.G", "Z"}) {
+    image.channels.push_back({name, std::vector<float>(300'000)});
+    for (float& value : image.channels.back().pixels)
+      value = rng.Uniform() < 0.5F ? 0 : rng.Uniform();
+  }
+  const std::string whole = Encoded(image);
+  const BandedImage bands = InBands(image);
+  EXPECT_EQ(bands.Whole().PixelDigest(), image.PixelDigest());
+  for (const int threads : {1, 3})
+    EXPECT_EQ(EncodeExr(bands, threads).value(), whole) << threads;
+
+  int asked = 0;
+  BandedImage counted = bands;
+  counted.rows = [&](int first, int last) {
+    EXPECT_EQ(first, asked);
+    EXPECT_LT(last - first, 300);
+    asked = last;
+    return bands.rows(first, last);
+  };
+  ASSERT_TRUE(EncodeExr(counted, 1).ok());
+  EXPECT_EQ(asked, 300);
+}
+
 TEST(ExrFileTest, RefusesToWriteAnImageWithoutPixelsOrWithAnImpossibleAttribute) {
   EXPECT_EQ(EncodeExr(Image{}).status().code(), absl::StatusCode::kInvalidArgument);
   Image image = Example();

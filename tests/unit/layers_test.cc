@@ -11,17 +11,16 @@ namespace {
 
 using testing::ElementsAre;
 
-std::vector<std::string> NamesOf(const Image& image) {
+std::vector<std::string> NamesOf(const std::vector<ImageChannel>& channels) {
   std::vector<std::string> names;
-  for (const ImageChannel& channel : image.channels)
+  for (const ImageChannel& channel : channels)
     names.push_back(channel.name);
   return names;
 }
 
 TEST(LayersTest, OfPassesAreNoiseAndBias) {
-  Image image;
-  image.width = 2;
-  image.height = 1;
+  std::vector<ImageChannel> channels;
+  ThreadTeam team(2);
   AddLayers(
       LayerSource::kPasses,
       [](std::size_t pixel) {
@@ -30,16 +29,15 @@ TEST(LayersTest, OfPassesAreNoiseAndBias) {
         values.bias = 5;
         return values;
       },
-      image);
-  EXPECT_THAT(NamesOf(image), ElementsAre("noise", "bias"));
-  EXPECT_THAT(image.channels[0].pixels, ElementsAre(0, 1));
-  EXPECT_THAT(image.channels[1].pixels, ElementsAre(5, 5));
+      /*pixels=*/2, team, channels);
+  EXPECT_THAT(NamesOf(channels), ElementsAre("noise", "bias"));
+  EXPECT_THAT(channels[0].pixels, ElementsAre(0, 1));
+  EXPECT_THAT(channels[1].pixels, ElementsAre(5, 5));
 }
 
 TEST(LayersTest, OfEveryImageLimitTheBeautyImage) {
   Image image;
-  image.width = 1;
-  image.height = 1;
+  ThreadTeam team(1);
   AddLayers(
       LayerSource::kEveryImage,
       [](std::size_t) {
@@ -49,7 +47,7 @@ TEST(LayersTest, OfEveryImageLimitTheBeautyImage) {
         values.limit = 0.5;
         return values;
       },
-      image);
+      /*pixels=*/1, team, image.channels);
   EXPECT_EQ(image.Find("R")->pixels[0], 1);
   EXPECT_EQ(image.Find("direct.B")->pixels[0], 1.5F);
   EXPECT_NE(image.Find("N.X"), nullptr);
@@ -62,7 +60,7 @@ TEST(LayersTest, LengthsTurnToTheUnitOfTheFile) {
   image.height = 1;
   for (const char* name : {"Z", "bandwidth", "R", "photon_count", "of.another.program"})
     image.channels.push_back({name, {2}});
-  ToFileUnit(image, 4);
+  ToFileUnit(image.channels, 4);
   EXPECT_EQ(image.Find("Z")->pixels[0], 8);
   EXPECT_EQ(image.Find("bandwidth")->pixels[0], 0.5F);
   EXPECT_EQ(image.Find("R")->pixels[0], 2);

@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "render/base/parallel.h"
 #include "render/math/rng.h"
 #include "tests/support/local_render.h"
 
@@ -24,9 +25,26 @@ struct Gathered {
 };
 using GatherRule = std::function<Gathered(KeyedRng& rng, std::uint64_t pass, std::size_t pixel)>;
 
-PassVariance VarianceOf(std::uint64_t passes, const GatherRule& gather,
-                        std::size_t pixels = kPixels) {
-  PassVariance variance(pixels);
+// Passes added one by one.
+struct AddedPasses {
+  explicit AddedPasses(std::size_t pixels) : sums(pixels), variance(pixels) {}
+
+  [[nodiscard]] PassVariance::Parts Split(double kernel_noise) const {
+    return variance.Split(sums, kernel_noise);
+  }
+  [[nodiscard]] double BestPhotons(double kernel_noise) const {
+    return variance.BestPhotons(sums, kernel_noise);
+  }
+  [[nodiscard]] PassVariance::Costs CostsSoFar() const { return PassVariance::CostsOf(sums); }
+
+  ImageSums sums;
+  PassVariance variance;
+};
+
+AddedPasses VarianceOf(std::uint64_t passes, const GatherRule& gather,
+                       std::size_t pixels = kPixels) {
+  AddedPasses added(pixels);
+  ThreadTeam team(1);
   for (std::uint64_t pass = 0; pass < passes; ++pass) {
     SliceSums slice = EmptySlice({pass, pass + 1}, pixels, 0);
     for (std::size_t i = 0; i < pixels; ++i) {
@@ -43,9 +61,10 @@ PassVariance VarianceOf(std::uint64_t passes, const GatherRule& gather,
     slice.tally.photons = pixels;
     slice.tally.rays = pixels * 3 / 2;
     slice.tally.pairs = 5 * pixels;
-    variance.Add(slice);
+    added.variance.Add(slice, added.sums);
+    added.sums.Add(slice, team);
   }
-  return variance;
+  return added;
 }
 
 double Uniform(KeyedRng& rng) {
@@ -72,7 +91,7 @@ constexpr double kRelative = 1 / 1.01;
 
 TEST(PassVarianceTest, PartsPhotonsFromDirectLight) {
   // Uniform in [0.2, 0.8]: variance 0.36 / 12.
-  const PassVariance variance = VarianceOf(8, [](KeyedRng& rng, std::uint64_t, std::size_t) {
+  const AddedPasses variance = VarianceOf(8, [](KeyedRng& rng, std::uint64_t, std::size_t) {
     const double count = Poisson(rng, 10);
     return Gathered{.photons = 0.05 * count, .direct = 0.2 + 0.6 * Uniform(rng), .count = count};
   });
@@ -90,7 +109,7 @@ TEST(PassVarianceTest, PartsPhotonsFromDirectLight) {
 // Textures and edges make the photon part vary as well, and more photons would not help.
 TEST(PassVarianceTest, LeavesToEyePathsWhatTheyMultiplyPhotonsBy) {
   // Every pass sees the photons through an albedo of 0.5 or 1.5.
-  const PassVariance variance = VarianceOf(16, [](KeyedRng& rng, std::uint64_t, std::size_t) {
+  const AddedPasses variance = VarianceOf(16, [](KeyedRng& rng, std::uint64_t, std::size_t) {
     const double count = Poisson(rng, 10);
     return Gathered{.photons = (Uniform(rng) < 0.5 ? 0.05 : 0.15) * count, .count = count};
   });
@@ -105,7 +124,7 @@ TEST(PassVarianceTest, LeavesToEyePathsWhatTheyMultiplyPhotonsBy) {
 // Kernels weigh photons, and count some beyond their disc: then one photon brings more variance.
 TEST(PassVarianceTest, ReckonsWithTheKernel) {
   // Half of the photons counted are within the disc, and count twice or not at all there.
-  const PassVariance variance = VarianceOf(16, [](KeyedRng& rng, std::uint64_t, std::size_t) {
+  const AddedPasses variance = VarianceOf(16, [](KeyedRng& rng, std::uint64_t, std::size_t) {
     const double count = Poisson(rng, 20);
     double photons = 0;
     for (double i = 0; i < count; ++i)
@@ -134,7 +153,7 @@ TEST(PassVarianceTest, WhereHardlyAnyPhotonIsFoundMoreAreNeeded) {
 
 // One photon in twenty passes, taken for the whole truth, explains more than there is.
 TEST(PassVarianceTest, NeverFindsMoreOfPhotonsThanThereIs) {
-  const PassVariance variance = VarianceOf(4, [](KeyedRng& rng, std::uint64_t, std::size_t) {
+  const AddedPasses variance = VarianceOf(4, [](KeyedRng& rng, std::uint64_t, std::size_t) {
     const double count = Poisson(rng, 0.05);
     return Gathered{.photons = count, .direct = 0.015, .count = count};
   });
@@ -178,7 +197,7 @@ TEST(PassVarianceTest, LeavesOutThePixelsThatVaryMost) {
 }
 
 TEST(PassVarianceTest, HoldsTheBrightestLight) {
-  const PassVariance variance = VarianceOf(4, [](KeyedRng& rng, std::uint64_t, std::size_t pixel) {
+  const AddedPasses variance = VarianceOf(4, [](KeyedRng& rng, std::uint64_t, std::size_t pixel) {
     const double huge = pixel % 2 == 0 ? 3e38 : 1e-38;
     return Gathered{.photons = huge * Uniform(rng), .direct = huge * Uniform(rng), .count = 1};
   });
@@ -188,7 +207,7 @@ TEST(PassVarianceTest, HoldsTheBrightestLight) {
 }
 
 TEST(PassVarianceTest, OfABlackImageIsNone) {
-  const PassVariance variance =
+  const AddedPasses variance =
       VarianceOf(2, [](KeyedRng&, std::uint64_t, std::size_t) { return Gathered(); });
   EXPECT_EQ(variance.Split(3).photons, 0);
   EXPECT_EQ(variance.Split(3).eye_paths, 0);
@@ -200,7 +219,7 @@ TEST(PassVarianceTest, TheBestNumberFollowsFromVariancesAndCosts) {
     const double count = Poisson(rng, 10);
     return Gathered{.photons = 0.05 * count, .direct = pass % 2 == 0 ? 0.45 : 0.55, .count = count};
   };
-  const PassVariance variance = VarianceOf(4, gather);
+  const AddedPasses variance = VarianceOf(4, gather);
   const PassVariance::Parts parts = variance.Split(1);
   EXPECT_DOUBLE_EQ(variance.CostsSoFar().eye_paths, 4.0 * 6 * kPixels);
   EXPECT_DOUBLE_EQ(variance.CostsSoFar().photons, 4.0 * 2 * kPixels);
@@ -214,7 +233,7 @@ TEST(PassVarianceTest, TheBestNumberFollowsFromVariancesAndCosts) {
 }
 
 TEST(PassVarianceTest, WhereAllVarianceIsOfPhotonsMoreAreAlwaysBetter) {
-  const PassVariance variance = VarianceOf(2, [](KeyedRng& rng, std::uint64_t, std::size_t) {
+  const AddedPasses variance = VarianceOf(2, [](KeyedRng& rng, std::uint64_t, std::size_t) {
     const double count = Poisson(rng, 0.1);
     return Gathered{.photons = count, .count = count};
   });
@@ -224,7 +243,7 @@ TEST(PassVarianceTest, WhereAllVarianceIsOfPhotonsMoreAreAlwaysBetter) {
 // Water under the sun: a sequence of low discrepancy is not left.
 TEST(PassVarianceTest, EvenlySpacedPhotonsKeepTheirNumber) {
   // 9, 10 or 11 photons, where 10 independent ones vary by 3.
-  const PassVariance even = VarianceOf(4, [](KeyedRng& rng, std::uint64_t, std::size_t) {
+  const AddedPasses even = VarianceOf(4, [](KeyedRng& rng, std::uint64_t, std::size_t) {
     const double count = 9 + std::floor(3 * Uniform(rng));
     return Gathered{.photons = 0.1 * count, .count = count};
   });
@@ -232,7 +251,7 @@ TEST(PassVarianceTest, EvenlySpacedPhotonsKeepTheirNumber) {
   EXPECT_EQ(even.BestPhotons(1), kPixels);
   // Independent ones, many or few, are not taken for such.
   for (const double mean : {10.0, 0.2}) {
-    const PassVariance random = VarianceOf(4, [&](KeyedRng& rng, std::uint64_t, std::size_t) {
+    const AddedPasses random = VarianceOf(4, [&](KeyedRng& rng, std::uint64_t, std::size_t) {
       const double count = Poisson(rng, mean);
       return Gathered{.photons = count / mean, .count = count};
     });

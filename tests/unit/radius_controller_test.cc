@@ -213,7 +213,7 @@ TEST(AppmTest, KeepsItsRadiusInEvenLight) {
       }
       const std::array<double, kCurvatureColumns> columns = {std::rint(laplacian / kWeightUnit),
                                                              std::rint(weight2 / kWeight2Unit)};
-      pixel = appm->Next(pixel, {weight2, pixel.radius, columns, blur}, OnePass(pass), memory);
+      pixel = appm->Next(pixel, {weight2, pixel.radius, columns, blur, pass + 1}, OnePass(pass), memory);
     }
     if (pixel.radius < 0.9F) ++shrunk;
   }
@@ -241,7 +241,7 @@ TEST(AppmTest, ShrinksOnTheRimOfASpotWhereTheLaplacianIsZero) {
                      pixel.radius);
     }
     const std::array<double, kCurvatureColumns> columns = {0, std::rint(20 / kWeight2Unit)};
-    pixel = appm->Next(pixel, {20, pixel.radius, columns, blur}, OnePass(pass), memory);
+    pixel = appm->Next(pixel, {20, pixel.radius, columns, blur, pass + 1}, OnePass(pass), memory);
   }
   EXPECT_LT(pixel.radius, 1.05 * kSpot);
 }

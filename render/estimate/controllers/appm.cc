@@ -38,14 +38,12 @@ class Appm final : public RadiusController {
     memory[kBlur] += blur;
     const auto of_round = static_cast<double>(passes.size());
     memory[kBlurSquares] += blur * blur / of_round;
-    memory[kPasses] += of_round;
-    memory[kRounds] += 1;
     PixelRadius next = {now.radius, now.photons + evidence.photons};
 
-    const double n = memory[kPasses];
+    const auto n = static_cast<double>(passes.last);
     // Of the bias over the squared radius, squared.
     const double by_laplacian = moments_.mu2 / 2 * memory[kLaplacian] / n;
-    const double square = std::max(by_laplacian * by_laplacian, SureSquareOfBlur(memory));
+    const double square = std::max(by_laplacian * by_laplacian, SureSquareOfBlur(memory, n, static_cast<double>(evidence.rounds)));
     if (square == 0) return next;
     // The least of roughness · squares / (n r²) + square r⁴.
     const double sixth = moments_.roughness * (memory[kSquares] / n) / (n * 2 * square);
@@ -67,8 +65,6 @@ class Appm final : public RadiusController {
     kSquares,
     kBlur,
     kBlurSquares,
-    kPasses,
-    kRounds,
     kNumbers
   };
   static constexpr double kSmallestShare = 0.01;
@@ -77,9 +73,7 @@ class Appm final : public RadiusController {
   static constexpr double kFirstRounds = 8;
   static constexpr double kSureDeviations = 8;
 
-  static double SureSquareOfBlur(std::span<const double> memory) {
-    const double n = memory[kPasses];
-    const double rounds = memory[kRounds];
+  static double SureSquareOfBlur(std::span<const double> memory, double n, double rounds) {
     if (rounds < kFirstRounds) return 0;
     const double mean = memory[kBlur] / n;
     // A round of k passes varies as one pass does, times k.

@@ -21,10 +21,9 @@ class Nearest final : public RadiusController {
                    std::span<double> memory) const override {
     // Photons within one unit radius, if their density is even.
     memory[kPhotons] += evidence.photons / (evidence.radius * evidence.radius);
-    memory[kPasses] += static_cast<double>(passes.size());
     PixelRadius next = {now.radius, now.photons + evidence.photons};
     if (memory[kPhotons] > 0) {
-      const double k = kPhotonsOfFirstPass * std::pow(memory[kPasses], 2.0 / 3);
+      const double k = kPhotonsOfFirstPass * std::pow(static_cast<double>(passes.last), 2.0 / 3);
       next.radius = std::min(now.radius, std::sqrt(k / memory[kPhotons]));
     }
     return next;
@@ -35,7 +34,7 @@ class Nearest final : public RadiusController {
   }
 
  private:
-  enum Memory : std::size_t { kPhotons, kPasses, kNumbers };
+  enum Memory : std::size_t { kPhotons, kNumbers };
   // k for the photons of one pass. About as many lie in a disc of three pixels with a photon for
   // each.
   static constexpr double kPhotonsOfFirstPass = 28;
