@@ -599,18 +599,14 @@ Blob Coordinator::Claimed(Blob image) {
 void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner) {
   std::optional<Job> job = jobs_.Find(job_id);
   if (!job) return;
-  CheckpointFiles::Found found;
-  if (state_) found = state_->checkpoints().Read(job_id);
   const auto note = [&](const std::string& what) {
     spdlog::warn("job {}: {}", job_id, what);
     jobs_.AddEvent(job_id, what, Now());
   };
-  for (const std::string& damaged : found.damaged)
-    note(absl::StrCat("the checkpoint ", damaged));
-  for (Checkpoint& checkpoint : found.newest_first) {
+  const auto use = [&](const Checkpoint& checkpoint) {
     if (checkpoint.numeric_profile != options_.numeric_profile) {
       note("a checkpoint of another build is not used: its bits would differ");
-      continue;
+      return false;
     }
     StatusOr<DecodedRecord> record = DecodeRecord(checkpoint.record, Now());
     const auto has_part = [&](const std::string& worker) {
@@ -618,20 +614,31 @@ void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner
     };
     if (record.ok() && std::ranges::any_of(job->distrusted, has_part)) {
       note("a checkpoint with the work of a worker whose results were wrong is not used");
-      continue;
+      return false;
     }
     const Status restored = record.ok() ? runner.Restore(checkpoint.sums) : record.status();
     if (!restored.ok()) {
       note(absl::StrCat("a checkpoint cannot be used: ", std::string(restored.message())));
-      continue;
+      return false;
     }
     const std::int64_t passes = record->job.counters.passes;
     jobs_.GoOnFrom(job_id, std::move(record->job), record->running);
     jobs_.AddEvent(job_id, absl::StrCat("goes on from its checkpoint after ", passes, " passes"),
                    Now());
     spdlog::info("job {} goes on from its checkpoint after {} passes", job_id, passes);
-    return;
+    return true;
+  };
+  bool is_restored = false;
+  if (state_) {
+    const std::vector<std::string> damaged =
+        state_->checkpoints().Read(job_id, [&](const Checkpoint& checkpoint) {
+          is_restored = use(checkpoint);
+          return is_restored;
+        });
+    for (const std::string& file : damaged)
+      note(absl::StrCat("the checkpoint ", file));
   }
+  if (is_restored) return;
   // A job that had ended and was given a new end begins anew: what it had counted comes again.
   if (job->counters.photons == 0 && job->workers.empty()) return;
   job->ClearProgress();
@@ -639,8 +646,8 @@ void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner
   note("there is no checkpoint of it that can be used: it begins anew");
 }
 
-Status Coordinator::KeepCheckpoint(const std::string& job_id, std::string sums, std::int64_t passes,
-                                   const BatchTally& tally) {
+Status Coordinator::KeepCheckpoint(const std::string& job_id, std::vector<std::string_view> sums,
+                                   std::int64_t passes, const BatchTally& tally) {
   std::optional<JobTable::ImageSource> run = jobs_.DescribeRun(job_id, Now());
   if (!run) return absl::OkStatus();
   // What came of rounds that are still open is not in the sums and will come again.
@@ -648,17 +655,17 @@ Status Coordinator::KeepCheckpoint(const std::string& job_id, std::string sums, 
   run->job.counters.photons = tally.photons;
   run->job.counters.tally = tally;
   run->job.counters.coordinator_cpu = run->cpu;
-  const std::size_t size = sums.size();
   const SteadyTime began_at = clock_.Steady();
-  const Checkpoint checkpoint = {options_.numeric_profile,
+  const CheckpointPieces checkpoint = {options_.numeric_profile,
                                  EncodeRecord(run->job, std::nullopt, run->running),
                                  std::move(sums)};
+  const std::uint64_t size = CheckpointFiles::SizeAsFile(checkpoint);
   Status written = state_->checkpoints().Write(job_id, checkpoint);
   if (IsOverDiskLimit(written)) {
     bool has_room = false;
     {
       const MutexLock lock(files_mutex_);
-      has_room = MakeDiskRoom(CheckpointFiles::SizeAsFile(checkpoint), {});
+      has_room = MakeDiskRoom(size, {});
     }
     if (has_room) written = state_->checkpoints().Write(job_id, checkpoint);
   }
@@ -739,10 +746,10 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, M
               },
           .on_checkpoint =
               state_ ? [this, id](
-                           std::string sums, std::int64_t passes,
+                           std::vector<std::string_view> sums, std::int64_t passes,
                            const BatchTally&
                                tally) { return KeepCheckpoint(id, std::move(sums), passes, tally); }
-                     : std::function<Status(std::string, std::int64_t, const BatchTally&)>(),
+                     : std::function<Status(std::vector<std::string_view>, std::int64_t, const BatchTally&)>(),
           .checkpoint_share = options_.checkpoint_share,
           .on_timed =
               [this, id](std::string_view row, SteadyTime from,

@@ -223,6 +223,21 @@ struct JobEstimator::State {
   float widest_radius = 0;  // of these hitpoints
   double hit_share = 0;     // of the pixels that have one
 
+  [[nodiscard]] std::size_t pixels() const {
+    return static_cast<std::size_t>(settings.crop_width()) *
+           static_cast<std::size_t>(settings.crop_height());
+  }
+
+  // Of no passes.
+  void BeginSums() {
+    radii = std::make_unique<PixelRadii>(pixels(), initial_radius, *controller);
+    sums = std::make_unique<ImageSums>(pixels());
+    if (settings.adaptive_photons) variance = std::make_unique<PassVariance>(pixels());
+  }
+
+  // As JobEstimator::Restore, but for sums, radii and variance: those are gone when it fails.
+  [[nodiscard]] Status RestoreSums(ByteReader& reader);
+
   [[nodiscard]] std::unique_ptr<const MutexLock> HoldColors() {
     return prepared.needs().Uses(Part::kSpectra) ? std::make_unique<const MutexLock>(colors_mutex)
                                                  : nullptr;
@@ -352,9 +367,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
                                               : settings.initial_footprints);
   state->initial_radius = initial;
   state->controller = MakeRadiusController(state->settings, initial);
-  state->radii = std::make_unique<PixelRadii>(pixels, initial, *state->controller);
-  state->sums = std::make_unique<ImageSums>(pixels);
-  if (settings.adaptive_photons) state->variance = std::make_unique<PassVariance>(pixels);
+  state->BeginSums();
   state->last_radii = std::make_shared<const RadiusColumn>(state->radii->Current());
   const auto photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass);
   state->after[0] = {.radii = state->last_radii, .photons_per_pass = photons_per_pass};
@@ -764,53 +777,61 @@ void JobEstimator::Save(ByteWriter& writer) const {
 }
 
 Status JobEstimator::Restore(ByteReader& reader) {
-  State& state = *state_;
-  const std::size_t pixels = state.sums->pixels();
-  LUCERNA_ASSIGN_OR_RETURN(ImageSums::Whole sums, ReadSums(reader, pixels));
+  Status restored = state_->RestoreSums(reader);
+  if (!restored.ok()) state_->BeginSums();
+  return restored;
+}
+
+Status JobEstimator::State::RestoreSums(ByteReader& reader) {
+  // The zeros go before as much is read.
+  sums = nullptr;
+  radii = nullptr;
+  variance = nullptr;
+  LUCERNA_ASSIGN_OR_RETURN(ImageSums::Whole read_sums, ReadSums(reader, pixels()));
   LUCERNA_ASSIGN_OR_RETURN(PixelRadii::Numbers numbers,
-                           ReadNumbers(reader, state.radii->numbers()));
+                           ReadNumbers(reader, pixels(), controller->MemoryPerPixel()));
   const auto read_radii = [&]() -> StatusOr<std::shared_ptr<const RadiusColumn>> {
-    LUCERNA_ASSIGN_OR_RETURN(RadiusColumn radii, ReadRadii(reader, pixels));
-    return std::make_shared<const RadiusColumn>(std::move(radii));
+    LUCERNA_ASSIGN_OR_RETURN(RadiusColumn column, ReadRadii(reader, pixels()));
+    return std::make_shared<const RadiusColumn>(std::move(column));
   };
-  LUCERNA_ASSIGN_OR_RETURN(std::shared_ptr<const RadiusColumn> last_radii, read_radii());
-  std::map<std::uint64_t, State::After> after;
+  LUCERNA_ASSIGN_OR_RETURN(std::shared_ptr<const RadiusColumn> read_last_radii, read_radii());
+  std::map<std::uint64_t, After> read_after;
   for (std::uint64_t left = reader.Varint(); left > 0; --left) {
     const std::uint64_t passes = reader.Varint();
-    State::After& of_passes = after[passes];
+    After& of_passes = read_after[passes];
     of_passes.photons_per_pass = reader.Varint();
     LUCERNA_ASSIGN_OR_RETURN(of_passes.radii, read_radii());
-    if (state.learner == nullptr) continue;
+    if (learner == nullptr) continue;
     LUCERNA_ASSIGN_OR_RETURN(PhotonGuide guide, ReadGuide(reader));
     of_passes.guide = std::make_shared<const PhotonGuide>(std::move(guide));
   }
   GuideLearner::Numbers learned;
-  if (state.learner != nullptr) {
-    LUCERNA_ASSIGN_OR_RETURN(learned, ReadLearned(reader, pixels));
+  if (learner != nullptr) {
+    LUCERNA_ASSIGN_OR_RETURN(learned, ReadLearned(reader, pixels()));
   }
-  const double noise_area = ReadDouble(reader);
-  const auto noise_area_after = static_cast<std::int64_t>(reader.Varint());
-  const double best_photons = ReadDouble(reader);
-  std::unique_ptr<PassVariance> variance;
+  const double read_noise_area = ReadDouble(reader);
+  const auto read_noise_area_after = static_cast<std::int64_t>(reader.Varint());
+  const double read_best_photons = ReadDouble(reader);
+  std::unique_ptr<PassVariance> read_variance;
   if (reader.Byte() != 0) {
-    LUCERNA_ASSIGN_OR_RETURN(PassVariance read, ReadVariance(reader, pixels));
-    variance = std::make_unique<PassVariance>(std::move(read));
+    LUCERNA_ASSIGN_OR_RETURN(PassVariance read, ReadVariance(reader, pixels()));
+    read_variance = std::make_unique<PassVariance>(std::move(read));
   }
-  if (!reader.finished() || !after.contains(sums.passes)) {
+  if (!reader.finished() || !read_after.contains(read_sums.passes)) {
     return absl::InvalidArgumentError("malformed checkpoint: it ends too soon or too late");
   }
-  state.sums->Restore(std::move(sums));
-  state.radii->Restore(std::move(numbers));
-  state.last_radii = std::move(last_radii);
-  state.after = std::move(after);
-  if (state.learner != nullptr) state.learner->Restore(std::move(learned));
+  sums = std::make_unique<ImageSums>(std::move(read_sums));
+  radii = std::make_unique<PixelRadii>(std::move(numbers), *controller);
+  variance = std::move(read_variance);
+  last_radii = std::move(read_last_radii);
+  after = std::move(read_after);
+  if (learner != nullptr) learner->Restore(std::move(learned));
   {
-    const MutexLock lock(state.noise_area_mutex);
-    state.noise_area = noise_area;
-    state.noise_area_after = noise_area_after;
+    const MutexLock lock(noise_area_mutex);
+    noise_area = read_noise_area;
+    noise_area_after = read_noise_area_after;
   }
-  state.best_photons = best_photons;
-  state.variance = std::move(variance);
+  best_photons = read_best_photons;
   return absl::OkStatus();
 }
 

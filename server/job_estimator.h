@@ -136,7 +136,8 @@ class JobEstimator {
   [[nodiscard]] static TrueError ErrorAgainst(const ReferenceImage& reference,
                                               const EstimatorSnapshot& snapshot);
 
-  // All that later passes and images follow from, of the rounds added without the tail.
+  // All that later passes and images follow from, of the rounds added without the tail. Its columns
+  // are borrowed: the writer is of use until the next round is added.
   void Save(ByteWriter& writer) const;
   // Goes on from what Save of an estimator of the same scene and settings wrote: all that follows
   // is to the bit what would have followed there. Requires that no round has been added.

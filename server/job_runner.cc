@@ -627,7 +627,7 @@ void JobRunner::CheckImage() {
       " between them"));
 }
 
-std::string JobRunner::Save() const {
+ByteWriter JobRunner::Save() const {
   ByteWriter writer;
   writer.Varint(static_cast<std::uint64_t>(hooks_.running().count()));
   writer.Varint(static_cast<std::uint64_t>(next_checkpoint_));
@@ -647,7 +647,7 @@ std::string JobRunner::Save() const {
   }
   const MutexLock lock(estimator_mutex_);
   estimator_->Save(writer);
-  return writer.Take();
+  return writer;
 }
 
 Status JobRunner::Restore(std::string_view sums) {
@@ -687,8 +687,10 @@ Status JobRunner::KeepCheckpoint() {
   // What is known of the error of these passes belongs to them.
   TakeInEstimate(true);
   const SteadyTime began_at = hooks_.clock.Steady();
+  const ByteWriter saved = Save();
   LUCERNA_RETURN_IF_ERROR(hooks_.on_checkpoint(
-      Save(), static_cast<std::int64_t>(estimator_->whole_passes()), estimator_->whole_tally()));
+      saved.Pieces(), static_cast<std::int64_t>(estimator_->whole_passes()),
+      estimator_->whole_tally()));
   Timed("checkpoint", began_at,
         [&] { return absl::StrCat("checkpoint of ", estimator_->whole_passes(), " passes"); });
   const SteadyTime now = hooks_.clock.Steady();

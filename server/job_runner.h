@@ -21,6 +21,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "render/base/clock.h"
 #include "render/base/mutex.h"
@@ -28,6 +29,7 @@
 #include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
+#include "render/wire/bytes.h"
 #include "server/blob_store.h"
 #include "server/emission_check.h"
 #include "server/job.h"
@@ -77,10 +79,11 @@ struct RunnerHooks {
   // At a stop: the same of the passes after the last round merged. They are part of a later round.
   std::function<void(const BatchTally& tally, std::int64_t passes)> on_tail;
   std::function<void(const ErrorCheckpoint& checkpoint)> on_error_estimate;
-  // Keeps what Save gave, so that a later process can Restore it; absent: nothing is kept.
+  // Keeps the pieces that Save gave, so that a later process can Restore it; absent: nothing is kept.
   // `tally` is of the `passes` in it. When it fails the job pauses, and it is called again every
   // second.
-  std::function<Status(std::string sums, std::int64_t passes, const BatchTally& tally)>
+  std::function<Status(std::vector<std::string_view> sums, std::int64_t passes,
+                       const BatchTally& tally)>
       on_checkpoint;
   // How much of the time checkpoints may take, in (0, 1]; 1: one after every round.
   double checkpoint_share = 0.01;
@@ -160,8 +163,9 @@ class JobRunner final : public RunningJob {
   // The beginning of a run without open rounds.
   void BeginRounds();
   StatusOr<RenderResult> RunRounds();
-  // All that a later run follows from: the whole rounds taken in.
-  std::string Save() const;
+  // All that a later run follows from: the whole rounds taken in. It borrows the sums, which stay
+  // while this thread adds no round.
+  ByteWriter Save() const;
   // Hands a checkpoint on when enough time has passed since the last. Pauses while that fails.
   void CheckpointIfDue();
   Status KeepCheckpoint();

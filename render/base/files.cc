@@ -47,6 +47,7 @@ class Descriptor {
   ~Descriptor() {
     if (number_ >= 0) ::close(number_);
   }
+  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   [[nodiscard]] int number() const { return number_; }
@@ -97,26 +98,34 @@ Status WriteAndSync(int descriptor, std::span<const std::string_view> pieces,
   return absl::OkStatus();
 }
 
-}  // namespace
+struct OpenFile {
+  Descriptor descriptor;
+  std::uint64_t size = 0;  // [bytes]
+};
 
-StatusOr<std::string> ReadFile(const std::string& path, std::uint64_t max_size_bytes) {
+// Errors: as ReadFile.
+StatusOr<OpenFile> OpenToRead(const std::string& path) {
   // Not blocking, so that a pipe in place of a file is refused below instead of waited for.
-  Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (file.number() < 0) return FromErrno(errno, path, "cannot open");
+  OpenFile file{Descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK))};
+  if (file.descriptor.number() < 0) return FromErrno(errno, path, "cannot open");
   struct stat status {};
-  if (::fstat(file.number(), &status) != 0) return FromErrno(errno, path, "cannot read");
+  if (::fstat(file.descriptor.number(), &status) != 0)
+    return FromErrno(errno, path, "cannot read");
   if (!S_ISREG(status.st_mode)) {
     return absl::InvalidArgumentError(absl::StrCat(path, ": not a regular file"));
   }
-  const auto size = static_cast<std::uint64_t>(status.st_size);
-  if (size > max_size_bytes) {
-    return absl::ResourceExhaustedError(absl::StrCat(path, ": ", size, " bytes, more than the ",
-                                                     max_size_bytes, " that are allowed"));
-  }
+  file.size = static_cast<std::uint64_t>(status.st_size);
+  return file;
+}
+
+// So many from its beginning; fewer when it has become shorter.
+StatusOr<std::string> ReadBytes(const OpenFile& file, std::uint64_t size,
+                                const std::string& path) {
   std::string bytes(size, '\0');
   std::size_t done = 0;
   while (done < bytes.size()) {
-    const ssize_t got = ::read(file.number(), bytes.data() + done, bytes.size() - done);
+    const ssize_t got =
+        ::read(file.descriptor.number(), bytes.data() + done, bytes.size() - done);
     if (got < 0) {
       if (errno == EINTR) continue;
       return FromErrno(errno, path, "cannot read");
@@ -126,6 +135,23 @@ StatusOr<std::string> ReadFile(const std::string& path, std::uint64_t max_size_b
   }
   bytes.resize(done);
   return bytes;
+}
+
+}  // namespace
+
+StatusOr<std::string> ReadFile(const std::string& path, std::uint64_t max_size_bytes) {
+  LUCERNA_ASSIGN_OR_RETURN(const OpenFile file, OpenToRead(path));
+  if (file.size > max_size_bytes) {
+    return absl::ResourceExhaustedError(absl::StrCat(path, ": ", file.size,
+                                                     " bytes, more than the ", max_size_bytes,
+                                                     " that are allowed"));
+  }
+  return ReadBytes(file, file.size, path);
+}
+
+StatusOr<std::string> ReadFileStart(const std::string& path, std::uint64_t most_bytes) {
+  LUCERNA_ASSIGN_OR_RETURN(const OpenFile file, OpenToRead(path));
+  return ReadBytes(file, std::min(file.size, most_bytes), path);
 }
 
 Status WriteFile(const std::string& path, std::string_view bytes, std::string_view step) {

@@ -18,6 +18,9 @@ namespace lucerna {
 // has more than `max_size_bytes`; each message begins with the path.
 [[nodiscard]] StatusOr<std::string> ReadFile(const std::string& path,
                                              std::uint64_t max_size_bytes = std::uint64_t{8} << 30);
+// Its first bytes, at most so many. Errors: as ReadFile.
+[[nodiscard]] StatusOr<std::string> ReadFileStart(const std::string& path,
+                                                  std::uint64_t most_bytes);
 
 // Writes `bytes` beside `path`, syncs them, and renames them over it. A link stays a link, to the
 // new bytes. A `step` that is not empty names the fail points STEP.synced, before the rename, and

@@ -116,10 +116,8 @@ void ImageSums::AddPixels(const SliceSums& slice, std::size_t begin, std::size_t
           [](float& most, float number) { most = std::max(most, number); });
 }
 
-void ImageSums::Restore(Whole whole) {
-  LUCERNA_CHECK(whole.columns.pixels() == pixels() && whole.features.size() == pixels());
-  whole_ = std::move(whole);
-  tail_.clear();
+ImageSums::ImageSums(Whole whole) : whole_(std::move(whole)) {
+  LUCERNA_CHECK(whole_.columns.pixels() == pixels());
 }
 
 void ImageSums::SetTail(Slices tail) {

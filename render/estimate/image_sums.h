@@ -25,6 +25,9 @@ class ImageSums {
     whole_.columns = Columns(pixels);
     whole_.features.resize(pixels);
   }
+  // Goes on from there, without a tail. Requires columns of one length.
+  struct Whole;
+  explicit ImageSums(Whole whole);
 
   using Slices = std::vector<std::shared_ptr<const SliceSums>>;
 
@@ -92,8 +95,6 @@ class ImageSums {
     std::vector<Features> features;  // as many
   };
   [[nodiscard]] const Whole& whole() const { return whole_; }
-  // Goes on from there, without a tail. Requires as many pixels.
-  void Restore(Whole whole);
 
  private:
   void AddDeviations(const SliceSums& slice);

@@ -26,10 +26,11 @@ PixelRadii::PixelRadii(std::size_t pixels, float initial_radius, const RadiusCon
       numbers_{std::vector<PixelRadius>(pixels, {static_cast<double>(initial_radius), 0}),
                std::vector<double>(pixels * memory_per_pixel_)} {}
 
-void PixelRadii::Restore(Numbers numbers) {
-  LUCERNA_CHECK(numbers.radius.size() == numbers_.radius.size() &&
-                numbers.memory.size() == numbers_.memory.size());
-  numbers_ = std::move(numbers);
+PixelRadii::PixelRadii(Numbers numbers, const RadiusController& controller)
+    : controller_(controller),
+      memory_per_pixel_(controller.MemoryPerPixel()),
+      numbers_(std::move(numbers)) {
+  LUCERNA_CHECK(numbers_.memory.size() == numbers_.radius.size() * memory_per_pixel_);
 }
 
 void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, ThreadTeam& team) {

@@ -20,6 +20,9 @@ class PixelRadii {
  public:
   // Keeps a reference to `controller`.
   PixelRadii(std::size_t pixels, float initial_radius, const RadiusController& controller);
+  // Goes on from there. Requires numbers of one shape, that of `controller`.
+  struct Numbers;
+  PixelRadii(Numbers numbers, const RadiusController& controller);
 
   // Takes in a round whose hitpoints gathered with `used` [pixels].
   void Step(const SliceSums& round, const RadiusColumn& used, ThreadTeam& team);
@@ -38,8 +41,6 @@ class PixelRadii {
     std::vector<double> memory;  // [pixels × MemoryPerPixel]
   };
   [[nodiscard]] const Numbers& numbers() const { return numbers_; }
-  // Goes on from there. Requires numbers of the same shape.
-  void Restore(Numbers numbers);
 
  private:
   const RadiusController& controller_;

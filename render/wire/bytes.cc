@@ -57,6 +57,30 @@ std::vector<Value> Joined(unsigned int planes, const std::uint8_t* bytes, std::s
 
 }  // namespace
 
+std::string ByteWriter::Take() {
+  if (borrowed_.empty()) return std::move(bytes_);
+  std::string all;
+  for (const std::string_view piece : Pieces())
+    all.append(piece);
+  bytes_.clear();
+  borrowed_.clear();
+  return all;
+}
+
+std::vector<std::string_view> ByteWriter::Pieces() const {
+  std::vector<std::string_view> pieces;
+  pieces.reserve(2 * borrowed_.size() + 1);
+  const std::string_view own = bytes_;
+  std::size_t done = 0;
+  for (const Loan& loan : borrowed_) {
+    pieces.push_back(own.substr(done, loan.at - done));
+    pieces.push_back(loan.bytes);
+    done = loan.at;
+  }
+  pieces.push_back(own.substr(done));
+  return pieces;
+}
+
 void ByteWriter::Varint(std::uint64_t value) {
   while (value >= 0x80) {
     Byte(static_cast<std::uint8_t>(value | 0x80));

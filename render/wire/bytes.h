@@ -8,6 +8,7 @@
 // false, so a codec reads on and checks once.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -42,20 +43,31 @@ class ByteWriter {
   void Byte(std::uint8_t value) { bytes_.push_back(static_cast<char>(value)); }
   void Varint(std::uint64_t value);
   void Bytes(std::string_view bytes) { bytes_.append(bytes); }
+  // Bytes that are not copied: they must stay where they are until the last call here.
+  void Borrowed(std::string_view bytes) { borrowed_.push_back({bytes_.size(), bytes}); }
   // `bytes` compressed, with its compressed size before it.
   void Compressed(std::string_view bytes);
   // A column as byte planes, as many as its largest value needs.
   void Planes(std::span<const std::uint32_t> column);
   void Planes(std::span<const std::uint64_t> column);
 
-  [[nodiscard]] std::string Take() { return std::move(bytes_); }
+  // All that was written, as one; nothing is left here.
+  [[nodiscard]] std::string Take();
+  // The same, without a copy; until the next call here.
+  [[nodiscard]] std::vector<std::string_view> Pieces() const;
 
  private:
+  // Behind so many bytes of bytes_.
+  struct Loan {
+    std::size_t at = 0;
+    std::string_view bytes;
+  };
   template <typename Value>
   void WritePlanes(std::span<const Value> column);
 
   ThreadTeam* team_;
   std::string bytes_;
+  std::vector<Loan> borrowed_;
 };
 
 class ByteReader {

@@ -1,10 +1,10 @@
 #include "server/state/checkpoint_files.h"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -33,9 +33,18 @@ std::uint64_t NumberOf(std::string_view bytes) {
   return number;
 }
 
-// The length and the digest of a piece.
+// The length and the digest of a piece, which lies in parts.
+std::string HeadOf(std::span<const std::string_view> parts) {
+  Sha256Stream digest;
+  std::uint64_t size = 0;
+  for (const std::string_view part : parts) {
+    digest.Add(part);
+    size += part.size();
+  }
+  return BytesOf(size) + std::string(digest.Finish().Bytes());
+}
 std::string HeadOf(std::string_view piece) {
-  return BytesOf(piece.size()) + std::string(Sha256(piece).Bytes());
+  return HeadOf(std::span(&piece, 1));
 }
 constexpr std::size_t kHeadBytes = kNumberBytes + Digest::kSize;
 
@@ -52,26 +61,34 @@ std::optional<std::string_view> TakePiece(std::string_view& rest) {
   return piece;
 }
 
-struct Numbered {
+// What a file begins with: its number and a numeric profile. Absent when it is not whole.
+struct Beginning {
   std::uint64_t number = 0;
-  Checkpoint checkpoint;
+  std::string numeric_profile;
 };
-
-// Absent when the bytes are not a whole checkpoint.
-std::optional<Numbered> Decode(std::string_view bytes) {
+std::optional<Beginning> TakeBeginning(std::string_view& bytes) {
   if (!bytes.starts_with(kMagic)) return std::nullopt;
   bytes.remove_prefix(kMagic.size());
   const auto head = TakePiece(bytes);
   if (!head || head->size() < kNumberBytes) return std::nullopt;
-  const auto record = TakePiece(bytes);
+  return Beginning{NumberOf(*head), std::string(head->substr(kNumberBytes))};
+}
+// It has no more bytes than this.
+constexpr std::size_t kMostBeginning = std::size_t{1} << 16;
+
+// Absent when the bytes are not a whole checkpoint. They become its sums.
+std::optional<Checkpoint> Decode(std::string bytes) {
+  std::string_view rest = bytes;
+  std::optional<Beginning> beginning = TakeBeginning(rest);
+  if (!beginning) return std::nullopt;
+  const auto record = TakePiece(rest);
   if (!record) return std::nullopt;
-  const auto sums = TakePiece(bytes);
-  if (!sums || !bytes.empty()) return std::nullopt;
-  Numbered result;
-  result.number = NumberOf(*head);
-  result.checkpoint = {std::string(head->substr(kNumberBytes)), std::string(*record),
-                       std::string(*sums)};
-  return result;
+  const auto sums = TakePiece(rest);
+  if (!sums || !rest.empty()) return std::nullopt;
+  Checkpoint checkpoint = {std::move(beginning->numeric_profile), std::string(*record), {}};
+  bytes.erase(0, bytes.size() - sums->size());
+  checkpoint.sums = std::move(bytes);
+  return checkpoint;
 }
 
 }  // namespace
@@ -94,7 +111,7 @@ std::string CheckpointFiles::PathOf(const std::string& job_id, int slot) const {
   return absl::StrCat(folder_, "/", job_id, ".", slot);
 }
 
-Status CheckpointFiles::Write(const std::string& job_id, const Checkpoint& checkpoint) {
+Status CheckpointFiles::Write(const std::string& job_id, const CheckpointPieces& checkpoint) {
   Newest next;
   {
     const MutexLock lock(mutex_);
@@ -102,47 +119,69 @@ Status CheckpointFiles::Write(const std::string& job_id, const Checkpoint& check
     next = {(newest.slot + 1) % kSlots, newest.number + 1};
   }
   const std::string head = BytesOf(next.number) + checkpoint.numeric_profile;
+  LUCERNA_CHECK(kMagic.size() + kHeadBytes + head.size() <= kMostBeginning);
   const std::string head_head = HeadOf(head);
   const std::string record_head = HeadOf(checkpoint.record);
   const std::string sums_head = HeadOf(checkpoint.sums);
-  const std::array<std::string_view, 7> pieces = {
-      kMagic, head_head, head, record_head, checkpoint.record, sums_head, checkpoint.sums};
+  std::vector<std::string_view> pieces = {kMagic,      head_head,         head,
+                                          record_head, checkpoint.record, sums_head};
+  pieces.insert(pieces.end(), checkpoint.sums.begin(), checkpoint.sums.end());
   LUCERNA_RETURN_IF_ERROR(budget_->Write(PathOf(job_id, next.slot), pieces, "checkpoint"));
   const MutexLock lock(mutex_);
   newest_[job_id] = next;
   return absl::OkStatus();
 }
 
-std::uint64_t CheckpointFiles::SizeAsFile(const Checkpoint& checkpoint) {
-  return kMagic.size() + 3 * kHeadBytes + kNumberBytes + checkpoint.numeric_profile.size() +
-         checkpoint.record.size() + checkpoint.sums.size();
+std::uint64_t CheckpointFiles::SizeAsFile(const CheckpointPieces& checkpoint) {
+  std::uint64_t bytes = kMagic.size() + 3 * kHeadBytes + kNumberBytes +
+                        checkpoint.numeric_profile.size() + checkpoint.record.size();
+  for (const std::string_view piece : checkpoint.sums)
+    bytes += piece.size();
+  return bytes;
 }
 
-CheckpointFiles::Found CheckpointFiles::Read(const std::string& job_id) {
-  Found found;
-  std::vector<std::pair<Newest, Checkpoint>> usable;
+std::vector<std::string> CheckpointFiles::Read(const std::string& job_id,
+                                               const std::function<bool(Checkpoint)>& use) {
+  std::vector<std::string> damaged;
+  std::vector<Newest> there;
+  const auto is_damaged = [&](const std::string& path, const Status& why) {
+    damaged.push_back(why.ok()
+                          ? absl::StrCat(path, " is damaged, or of another version of Lucerna")
+                          : std::string(why.message()));
+  };
   for (int slot = 0; slot < kSlots; ++slot) {
     const std::string path = PathOf(job_id, slot);
-    const StatusOr<std::string> bytes = ReadFile(path);
+    const StatusOr<std::string> bytes = ReadFileStart(path, kMostBeginning);
     if (absl::IsNotFound(bytes.status())) continue;
-    std::optional<Numbered> decoded = bytes.ok() ? Decode(*bytes) : std::nullopt;
-    if (decoded) {
-      usable.emplace_back(Newest{slot, decoded->number}, std::move(decoded->checkpoint));
+    std::string_view rest = bytes.ok() ? std::string_view(*bytes) : std::string_view();
+    if (const auto beginning = TakeBeginning(rest)) {
+      there.push_back({slot, beginning->number});
     } else {
-      found.damaged.push_back(
-          bytes.ok() ? absl::StrCat(path, " is damaged, or of another version of Lucerna")
-                     : std::string(bytes.status().message()));
+      is_damaged(path, bytes.status());
     }
   }
-  std::ranges::sort(usable, std::ranges::greater(),
-                    [](const auto& item) { return item.first.number; });
-  {
-    const MutexLock lock(mutex_);
-    newest_[job_id] = usable.empty() ? Newest() : usable.front().first;
+  std::ranges::sort(there, std::ranges::greater(), &Newest::number);
+  bool is_newest = true;
+  for (const Newest& file : there) {
+    const std::string path = PathOf(job_id, file.slot);
+    StatusOr<std::string> bytes = ReadFile(path);
+    std::optional<Checkpoint> checkpoint =
+        bytes.ok() ? Decode(*std::move(bytes)) : std::nullopt;
+    if (!checkpoint) {
+      is_damaged(path, bytes.status());
+      continue;
+    }
+    if (std::exchange(is_newest, false)) {
+      const MutexLock lock(mutex_);
+      newest_[job_id] = file;
+    }
+    if (use(*std::move(checkpoint))) return damaged;
   }
-  for (auto& [newest, checkpoint] : usable)
-    found.newest_first.push_back(std::move(checkpoint));
-  return found;
+  if (is_newest) {
+    const MutexLock lock(mutex_);
+    newest_[job_id] = Newest();
+  }
+  return damaged;
 }
 
 bool CheckpointFiles::Has(const std::string& job_id) const {

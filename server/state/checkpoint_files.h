@@ -9,10 +9,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "render/base/mutex.h"
@@ -27,6 +29,12 @@ struct Checkpoint {
   std::string sums;             // of its runner
   bool operator==(const Checkpoint&) const = default;
 };
+// One that is to be written: its sums lie in pieces, which are not copied.
+struct CheckpointPieces {
+  std::string numeric_profile;
+  std::string record;
+  std::vector<std::string_view> sums;
+};
 
 class CheckpointFiles {
  public:
@@ -38,16 +46,15 @@ class CheckpointFiles {
 
   // Replaces the older of the job's two. A job of an earlier process must have been Read before.
   // Errors: as DiskBudget::Write; then the two are as they were.
-  [[nodiscard]] Status Write(const std::string& job_id, const Checkpoint& checkpoint);
+  [[nodiscard]] Status Write(const std::string& job_id, const CheckpointPieces& checkpoint);
 
   // Of the file that it is written to [bytes].
-  [[nodiscard]] static std::uint64_t SizeAsFile(const Checkpoint& checkpoint);
+  [[nodiscard]] static std::uint64_t SizeAsFile(const CheckpointPieces& checkpoint);
 
-  struct Found {
-    std::vector<Checkpoint> newest_first;  // at most two
-    std::vector<std::string> damaged;      // a sentence for each file that cannot be used
-  };
-  [[nodiscard]] Found Read(const std::string& job_id);
+  // Reads the checkpoints of a job, the newer first, one at a time, until `use` says that it has
+  // used one. Returns a sentence for each file that it came upon and that is no whole checkpoint.
+  [[nodiscard]] std::vector<std::string> Read(const std::string& job_id,
+                                              const std::function<bool(Checkpoint)>& use);
   // Whether there is a file, damaged or not.
   [[nodiscard]] bool Has(const std::string& job_id) const;
 

@@ -17,6 +17,12 @@ void Write(ByteWriter& writer, Number value) {
   writer.Bytes({reinterpret_cast<const char*>(&value), sizeof(value)});
 }
 
+// Numbers as they lie, which are not copied.
+template <typename Number>
+void WriteColumn(ByteWriter& writer, const std::vector<Number>& column) {
+  writer.Borrowed({reinterpret_cast<const char*>(column.data()), column.size() * sizeof(Number)});
+}
+
 template <typename Number>
 Number Read(ByteReader& reader) {
   Number value{};
@@ -45,25 +51,21 @@ constexpr std::size_t kPixelBytes = 7 * sizeof(double) + 7 * sizeof(float);
 // A column that is not in ForEachColumn would be lost.
 static_assert(sizeof(ImageSums::Columns) == 14 * sizeof(std::vector<float>));
 
-template <typename Features, typename Number>
-void ForEachFeature(Features& features, const Number& number) {
-  number(features.albedo.r);
-  number(features.albedo.g);
-  number(features.albedo.b);
-  number(features.normal.x);
-  number(features.normal.y);
-  number(features.normal.z);
-  number(features.distance);
-  number(features.unit_radius);
-  number(features.hits);
-  number(features.hitpoints);
-}
-constexpr std::size_t kFeatureBytes = 8 * sizeof(float) + 2 * sizeof(std::uint16_t);
-static_assert(sizeof(ImageSums::Features) == kFeatureBytes);
+// Rows are written as they lie in memory, without gaps.
+static_assert(sizeof(ImageSums::Features) == 8 * sizeof(float) + 2 * sizeof(std::uint16_t));
+static_assert(sizeof(PixelRadius) == 2 * sizeof(double));
+static_assert(sizeof(PassVariance::Pixel) == 2 * sizeof(float));
 
 // Whether so many rows can be there.
 bool HasRows(const ByteReader& reader, std::size_t rows, std::size_t row_bytes) {
   return reader.ok() && rows <= reader.left() / row_bytes;
+}
+
+// What WriteColumn wrote of a column of this size. Requires that it can be there.
+template <typename Number>
+void ReadColumn(ByteReader& reader, std::vector<Number>& column) {
+  const std::string_view bytes = reader.Bytes(column.size() * sizeof(Number));
+  if (!bytes.empty()) std::memcpy(column.data(), bytes.data(), bytes.size());
 }
 
 }  // namespace
@@ -77,52 +79,41 @@ double ReadDouble(ByteReader& reader) {
 }
 
 void WriteRadii(ByteWriter& writer, const RadiusColumn& radii) {
-  for (const float radius : radii)
-    Write(writer, radius);
+  WriteColumn(writer, radii);
 }
 
 StatusOr<RadiusColumn> ReadRadii(ByteReader& reader, std::size_t pixels) {
   if (!HasRows(reader, pixels, sizeof(float))) return Malformed("radii are missing");
   RadiusColumn radii(pixels);
-  for (float& radius : radii)
-    radius = Read<float>(reader);
+  ReadColumn(reader, radii);
   return radii;
 }
 
 void WriteNumbers(ByteWriter& writer, const PixelRadii::Numbers& numbers) {
-  for (const PixelRadius& radius : numbers.radius) {
-    Write(writer, radius.radius);
-    Write(writer, radius.photons);
-  }
-  for (const double number : numbers.memory)
-    Write(writer, number);
+  WriteColumn(writer, numbers.radius);
+  WriteColumn(writer, numbers.memory);
 }
 
-StatusOr<PixelRadii::Numbers> ReadNumbers(ByteReader& reader, const PixelRadii::Numbers& shape) {
-  const std::size_t numbers = 2 * shape.radius.size() + shape.memory.size();
-  if (!HasRows(reader, numbers, sizeof(double))) return Malformed("radii are missing");
-  PixelRadii::Numbers result;
-  result.radius.resize(shape.radius.size());
-  result.memory.resize(shape.memory.size());
-  for (PixelRadius& radius : result.radius) {
-    radius.radius = Read<double>(reader);
-    radius.photons = Read<double>(reader);
+StatusOr<PixelRadii::Numbers> ReadNumbers(ByteReader& reader, std::size_t pixels,
+                                          std::size_t memory_per_pixel) {
+  if (!HasRows(reader, pixels * (2 + memory_per_pixel), sizeof(double))) {
+    return Malformed("radii are missing");
   }
-  for (double& number : result.memory)
-    number = Read<double>(reader);
+  PixelRadii::Numbers result = {.radius = std::vector<PixelRadius>(pixels),
+                                .memory = std::vector<double>(pixels * memory_per_pixel)};
+  ReadColumn(reader, result.radius);
+  ReadColumn(reader, result.memory);
   return result;
 }
 
 void WriteVariance(ByteWriter& writer, const PassVariance& variance) {
-  for (const PassVariance::Pixel& pixel : variance.pixels())
-    Write(writer, pixel);
+  WriteColumn(writer, variance.pixels());
 }
 
 StatusOr<PassVariance> ReadVariance(ByteReader& reader, std::size_t pixels) {
   if (!HasRows(reader, pixels, sizeof(PassVariance::Pixel))) return Malformed("sums are missing");
   std::vector<PassVariance::Pixel> read(pixels);
-  for (PassVariance::Pixel& pixel : read)
-    pixel = Read<PassVariance::Pixel>(reader);
+  ReadColumn(reader, read);
   return PassVariance(std::move(read));
 }
 
@@ -173,12 +164,8 @@ void WriteSums(ByteWriter& writer, const ImageSums::Whole& sums) {
   writer.Varint(sums.passes);
   writer.Varint(sums.eye_rays);
   WriteTally(writer, sums.tally);
-  const auto write = [&](const auto& number) { Write(writer, number); };
-  ForEachColumn(sums.columns, [&](const auto& column) {
-    writer.Bytes({reinterpret_cast<const char*>(column.data()), column.size() * sizeof(column[0])});
-  });
-  for (const ImageSums::Features& features : sums.features)
-    ForEachFeature(features, write);
+  ForEachColumn(sums.columns, [&](const auto& column) { WriteColumn(writer, column); });
+  WriteColumn(writer, sums.features);
 }
 
 StatusOr<ImageSums::Whole> ReadSums(ByteReader& reader, std::size_t pixels) {
@@ -186,16 +173,13 @@ StatusOr<ImageSums::Whole> ReadSums(ByteReader& reader, std::size_t pixels) {
   sums.passes = reader.Varint();
   sums.eye_rays = reader.Varint();
   LUCERNA_ASSIGN_OR_RETURN(sums.tally, ReadTally(reader));
-  if (!HasRows(reader, pixels, kPixelBytes + kFeatureBytes)) return Malformed("sums are missing");
+  if (!HasRows(reader, pixels, kPixelBytes + sizeof(ImageSums::Features))) {
+    return Malformed("sums are missing");
+  }
   sums.columns = ImageSums::Columns(pixels);
   sums.features.resize(pixels);
-  const auto read = [&]<typename Number>(Number& number) { number = Read<Number>(reader); };
-  ForEachColumn(sums.columns, [&](auto& column) {
-    const std::string_view bytes = reader.Bytes(column.size() * sizeof(column[0]));
-    if (!bytes.empty()) std::memcpy(column.data(), bytes.data(), bytes.size());
-  });
-  for (ImageSums::Features& features : sums.features)
-    ForEachFeature(features, read);
+  ForEachColumn(sums.columns, [&](auto& column) { ReadColumn(reader, column); });
+  ReadColumn(reader, sums.features);
   return sums;
 }
 

@@ -1,7 +1,7 @@
 // How are an estimator's sums laid out in a checkpoint?
 //
-// Numbers as they are in memory, little-endian, pixel by pixel: what is read is to the bit what was
-// written. Sums are of the same machine's build (the checkpoint names its numeric profile), so that
+// Numbers as they are in memory, little-endian: what is read is to the bit what was written, and
+// columns are borrowed by the writer, not copied (ByteWriter::Borrowed). Sums are of the same machine's build (the checkpoint names its numeric profile), so that
 // nothing is converted.
 #pragma once
 
@@ -29,8 +29,8 @@ void WriteLearned(ByteWriter& writer, const GuideLearner::Numbers& numbers);
 // Errors of all: INVALID_ARGUMENT for bytes that are truncated or of another shape. Nothing is
 // allocated before the bytes are there.
 [[nodiscard]] StatusOr<RadiusColumn> ReadRadii(ByteReader& reader, std::size_t pixels);
-[[nodiscard]] StatusOr<PixelRadii::Numbers> ReadNumbers(ByteReader& reader,
-                                                        const PixelRadii::Numbers& shape);
+[[nodiscard]] StatusOr<PixelRadii::Numbers> ReadNumbers(ByteReader& reader, std::size_t pixels,
+                                                        std::size_t memory_per_pixel);
 [[nodiscard]] StatusOr<PassVariance> ReadVariance(ByteReader& reader, std::size_t pixels);
 [[nodiscard]] StatusOr<PhotonGuide> ReadGuide(ByteReader& reader);
 [[nodiscard]] StatusOr<GuideLearner::Numbers> ReadLearned(ByteReader& reader, std::size_t pixels);

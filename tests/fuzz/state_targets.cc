@@ -106,19 +106,22 @@ bool FuzzCheckpoint(std::string_view bytes) {
   // Not WriteFile, which waits for the disk.
   std::ofstream(folder.file(), std::ios::binary)
       << (is_mended ? WithRightDigests(bytes) : std::string(bytes));
-  const CheckpointFiles::Found found = folder.files().Read(kJob);
-  LUCERNA_CHECK(found.newest_first.size() + found.damaged.size() == 1);
-  if (found.newest_first.empty()) return false;
-  const Checkpoint& checkpoint = found.newest_first.front();
-  LUCERNA_CHECK(checkpoint.numeric_profile.size() + checkpoint.record.size() +
-                    checkpoint.sums.size() <
-                bytes.size());
-  return true;
+  std::size_t whole = 0;
+  const std::vector<std::string> damaged =
+      folder.files().Read(kJob, [&](const Checkpoint& checkpoint) {
+        ++whole;
+        LUCERNA_CHECK(checkpoint.numeric_profile.size() + checkpoint.record.size() +
+                          checkpoint.sums.size() <
+                      bytes.size());
+        return true;
+      });
+  LUCERNA_CHECK(whole + damaged.size() == 1);
+  return whole == 1;
 }
 
 std::vector<std::string> CheckpointSeeds() {
   CheckpointFolder folder;
-  LUCERNA_CHECK(folder.files().Write(kJob, {"profile", "the record", "the sums"}).ok());
+  LUCERNA_CHECK(folder.files().Write(kJob, {"profile", "the record", {"the sums"}}).ok());
   const std::string written = ReadFile(folder.file()).value();
   return {std::string(1, '\0') + written, std::string(1, '\1') + written};
 }

@@ -2,6 +2,10 @@
 #include "server/state/checkpoint_files.h"
 
 #include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -22,13 +26,35 @@ Checkpoint NumberedCheckpoint(int number) {
           .sums = std::string(1000, static_cast<char>('0' + number))};
 }
 
+// In two pieces.
+Status Write(CheckpointFiles& files, const std::string& job_id, const Checkpoint& checkpoint) {
+  const std::string_view sums = checkpoint.sums;
+  return files.Write(job_id, {checkpoint.numeric_profile,
+                              checkpoint.record,
+                              {sums.substr(0, 400), sums.substr(400)}});
+}
+
+struct Found {
+  std::vector<Checkpoint> newest_first;
+  std::vector<std::string> damaged;
+};
+// All of a job: none is used.
+Found ReadAll(CheckpointFiles& files, const std::string& job_id) {
+  Found found;
+  found.damaged = files.Read(job_id, [&](Checkpoint checkpoint) {
+    found.newest_first.push_back(std::move(checkpoint));
+    return false;
+  });
+  return found;
+}
+
 // The two files of job `j`, the newest as `first`.
 class CheckpointFilesTest : public testing::Test {
  protected:
   void SetUp() override {
     files_ = CheckpointFiles::Open(folder_.At("checkpoints")).value();
     for (int number = 1; number <= 3; ++number)
-      ASSERT_TRUE(files_->Write("j-1", NumberedCheckpoint(number)).ok());
+      ASSERT_TRUE(Write(*files_, "j-1", NumberedCheckpoint(number)).ok());
   }
   [[nodiscard]] std::string Newest() const { return folder_.At("checkpoints/j-1.0"); }
   [[nodiscard]] std::string Older() const { return folder_.At("checkpoints/j-1.1"); }
@@ -38,12 +64,30 @@ class CheckpointFilesTest : public testing::Test {
 };
 
 TEST_F(CheckpointFilesTest, KeepsTheTwoNewest) {
-  const auto found = files_->Read("j-1");
+  const auto found = ReadAll(*files_, "j-1");
   EXPECT_THAT(found.newest_first, ElementsAre(NumberedCheckpoint(3), NumberedCheckpoint(2)));
   EXPECT_THAT(found.damaged, IsEmpty());
   EXPECT_TRUE(files_->Has("j-1"));
   EXPECT_FALSE(files_->Has("j-2"));
-  EXPECT_THAT(files_->Read("j-2").newest_first, IsEmpty());
+  EXPECT_THAT(ReadAll(*files_, "j-2").newest_first, IsEmpty());
+}
+
+TEST_F(CheckpointFilesTest, TheOlderIsNotReadOnceTheNewerIsUsed) {
+  ASSERT_TRUE(WriteFile(Older(), "damaged").ok());
+  std::vector<Checkpoint> read;
+  const auto use = [&](Checkpoint checkpoint) {
+    read.push_back(std::move(checkpoint));
+    return true;
+  };
+  EXPECT_THAT(files_->Read("j-1", use), SizeIs(1)) << "what does not begin like one is seen";
+  EXPECT_THAT(read, ElementsAre(NumberedCheckpoint(3)));
+
+  read.clear();
+  ASSERT_TRUE(Write(*files_, "j-1", NumberedCheckpoint(4)).ok()) << "in place of the older";
+  const std::string torn = ReadFile(Newest()).value();
+  ASSERT_TRUE(WriteFile(Newest(), torn.substr(0, torn.size() - 1)).ok());
+  EXPECT_THAT(files_->Read("j-1", use), IsEmpty());
+  EXPECT_THAT(read, ElementsAre(NumberedCheckpoint(4)));
 }
 
 TEST_F(CheckpointFilesTest, AFlippedBitAnywhereFallsBackToTheOneBefore) {
@@ -52,7 +96,7 @@ TEST_F(CheckpointFilesTest, AFlippedBitAnywhereFallsBackToTheOneBefore) {
     std::string flipped = whole;
     flipped[byte] = static_cast<char>(flipped[byte] ^ (1 << byte % 8));
     ASSERT_TRUE(WriteFile(Newest(), flipped).ok());
-    const auto found = files_->Read("j-1");
+    const auto found = ReadAll(*files_, "j-1");
     ASSERT_THAT(found.newest_first, ElementsAre(NumberedCheckpoint(2))) << "byte " << byte;
     ASSERT_THAT(found.damaged, SizeIs(1));
   }
@@ -62,32 +106,32 @@ TEST_F(CheckpointFilesTest, ATruncatedOneFallsBackToTheOneBefore) {
   const std::string whole = ReadFile(Newest()).value();
   for (std::size_t size = 0; size < whole.size(); ++size) {
     ASSERT_TRUE(WriteFile(Newest(), whole.substr(0, size)).ok());
-    ASSERT_THAT(files_->Read("j-1").newest_first, ElementsAre(NumberedCheckpoint(2))) << size;
+    ASSERT_THAT(ReadAll(*files_, "j-1").newest_first, ElementsAre(NumberedCheckpoint(2))) << size;
   }
   ASSERT_TRUE(WriteFile(Newest(), whole + "x").ok());
-  EXPECT_THAT(files_->Read("j-1").newest_first, ElementsAre(NumberedCheckpoint(2)));
+  EXPECT_THAT(ReadAll(*files_, "j-1").newest_first, ElementsAre(NumberedCheckpoint(2)));
 }
 
 TEST_F(CheckpointFilesTest, ADamagedOneIsReplacedBeforeTheOneThatIsWhole) {
   ASSERT_TRUE(WriteFile(Newest(), "damaged").ok());
   files_ = CheckpointFiles::Open(folder_.At("checkpoints")).value();
-  ASSERT_THAT(files_->Read("j-1").newest_first, ElementsAre(NumberedCheckpoint(2)));
-  ASSERT_TRUE(files_->Write("j-1", NumberedCheckpoint(4)).ok());
-  EXPECT_THAT(files_->Read("j-1").newest_first,
+  ASSERT_THAT(ReadAll(*files_, "j-1").newest_first, ElementsAre(NumberedCheckpoint(2)));
+  ASSERT_TRUE(Write(*files_, "j-1", NumberedCheckpoint(4)).ok());
+  EXPECT_THAT(ReadAll(*files_, "j-1").newest_first,
               ElementsAre(NumberedCheckpoint(4), NumberedCheckpoint(2)));
 }
 
 TEST_F(CheckpointFilesTest, TwoDamagedOnesAreNone) {
   ASSERT_TRUE(WriteFile(Newest(), "damaged").ok());
   ASSERT_TRUE(WriteFile(Older(), "damaged").ok());
-  const auto found = files_->Read("j-1");
+  const auto found = ReadAll(*files_, "j-1");
   EXPECT_THAT(found.newest_first, IsEmpty());
   EXPECT_THAT(found.damaged, SizeIs(2));
 }
 
 TEST_F(CheckpointFilesTest, RemovesThoseOfJobsThatAreGoneAndWhatACrashLeft) {
-  ASSERT_TRUE(files_->Write("j-2", NumberedCheckpoint(1)).ok());
-  ASSERT_TRUE(files_->Write("j-3", NumberedCheckpoint(1)).ok());
+  ASSERT_TRUE(Write(*files_, "j-2", NumberedCheckpoint(1)).ok());
+  ASSERT_TRUE(Write(*files_, "j-3", NumberedCheckpoint(1)).ok());
   files_->KeepOnly({"j-1", "j-3"});
   EXPECT_TRUE(files_->Has("j-1"));
   EXPECT_FALSE(files_->Has("j-2"));
@@ -96,7 +140,7 @@ TEST_F(CheckpointFilesTest, RemovesThoseOfJobsThatAreGoneAndWhatACrashLeft) {
   ASSERT_TRUE(WriteFile(unfinished, "half").ok());
   files_ = CheckpointFiles::Open(folder_.At("checkpoints")).value();
   EXPECT_FALSE(std::filesystem::exists(unfinished));
-  EXPECT_THAT(files_->Read("j-3").newest_first, ElementsAre(NumberedCheckpoint(1)));
+  EXPECT_THAT(ReadAll(*files_, "j-3").newest_first, ElementsAre(NumberedCheckpoint(1)));
 }
 
 }  // namespace

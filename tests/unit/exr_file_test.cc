@@ -14,6 +14,7 @@
 #include "gtest/gtest.h"
 
 #include "render/base/files.h"
+#include "render/math/rng.h"
 
 namespace lucerna {
 namespace {
