@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <utility>
 
 namespace lucerna {
 namespace {
@@ -230,6 +231,12 @@ StatusOr<Accumulation> PassSums::ToAccumulation() const {
   out.tally = tally_;
   out.found = FoundInOrder();
   return out;
+}
+
+SumColumns PassSums::TakeColumns() {
+  return {.counts = std::exchange(counts_, {}),
+          .flux = std::exchange(flux_, {}),
+          .evidence = std::exchange(evidence_, {})};
 }
 
 std::vector<FoundPhoton> PassSums::FoundInOrder() const {

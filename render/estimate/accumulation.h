@@ -142,6 +142,13 @@ struct Accumulation {
   bool operator==(const Accumulation&) const = default;
 };
 
+// What all photons of a pass brought to the hitpoints.
+struct SumColumns {
+  std::vector<std::uint64_t> counts;                // [hitpoints]
+  std::array<std::vector<std::int64_t>, 3> flux;    // [3][hitpoints] in quanta
+  std::vector<std::vector<std::int64_t>> evidence;  // [columns][hitpoints]
+};
+
 // The sum of all batches of one pass, one row per hitpoint of the block.
 class PassSums {
  public:
@@ -163,6 +170,9 @@ class PassSums {
   // All that was added, but for the names of dropped photons, as one accumulation.
   // Errors: OUT_OF_RANGE when a hitpoint found 2^32 photons or more.
   [[nodiscard]] StatusOr<Accumulation> ToAccumulation() const;
+  // Moves the columns out, for a caller that frees each of them after its last use. What is left
+  // has the tally and the photons found, but no hitpoint and no column of evidence.
+  [[nodiscard]] SumColumns TakeColumns();
 
   [[nodiscard]] std::size_t size() const { return counts_.size(); }
   [[nodiscard]] const std::vector<std::uint64_t>& counts() const { return counts_; }

@@ -49,8 +49,9 @@ RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan, ThreadTea
   return of_hitpoints;
 }
 
-// Columns are made when their turn comes, and what they follow from is freed after it: at no time
-// are there both the whole pass and the whole slice.
+// Columns are made when their turn comes, and what they follow from is freed after it: there is
+// never more than the pass, its sums and a column of the controller's evidence. Those of the sums
+// take eight bytes where columns of the slice take two or three, so they go first.
 SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
                       const RenderSettings& settings, const SceneNeeds& needs,
                       const FluxScale& scale, ThreadTeam& team) {
@@ -104,57 +105,79 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
   const std::size_t first_caustic = pass.block.first_caustic();
   const std::size_t first_segment = pass.block.first_segment();
   pass.block = {};
-  // Radiance, and the bias behind it.
-  std::array<std::vector<float>, 4> of_photons;
-  team.For(of_photons.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t column = begin; column < end; ++column)
-      of_photons[column].resize(pixels);
-  });
-  make(kEvenBias, kSliceColumns - kEvenBias + evidence);
-  static_assert(kEvenBias < kOddBias && kOddBias < kPhotonCount && kPhotonCount < kBlur);
-  if (has_features) make(first_feature + kUnitRadius, 3);
-  static_assert(kHits == kUnitRadius + 1 && kHitpoints == kHits + 1);
-  const std::size_t evidence_here = sums.evidence().size() - kCommonColumns;
-  const auto add_row = [&](std::size_t row) {
-    const std::uint32_t pixel = pass.pixels[row];
-    const bool has_common_radius = row >= first_caustic;
-    const float in_units = has_common_radius ? plan.caustic_radius : (*plan.radii)[pixel];
-    const auto radius = static_cast<double>(HitpointRadius(in_units, pass.unit_radii[row]));
-    const double to_density = per_photon / (radius * radius);
-    for (int channel = 0; channel < 3; ++channel) {
-      const double flux = static_cast<double>(sums.flux(channel)[row]) *
-                          static_cast<double>(scale.watts_per_quantum[channel]);
-      add(of_photons[static_cast<std::size_t>(channel)][pixel],
-          static_cast<double>(pass.weights[row][channel]) * flux * to_density);
-    }
-    const double blur = static_cast<double>(sums.evidence()[kBlurColumn][row]) * kToBias;
-    add(of_photons[3][pixel], blur * luminance_per_quantum * to_density *
-                                  static_cast<double>(Luminance(pass.weights[row])));
-    if (has_common_radius) return;
-    set(kPhotonCount, pixel, static_cast<double>(sums.counts()[row]));
-    const auto unit_radius = static_cast<double>(in_units);
-    set(kBlur, pixel, blur * norm / ((1 << kFluxBits) * unit_radius * unit_radius));
-    for (std::size_t column = 0; column < evidence_here; ++column) {
-      set(kSliceColumns + column, pixel,
-          static_cast<double>(sums.evidence()[kCommonColumns + column][row]));
-    }
-    if (!has_features) return;
-    set(first_feature + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
-    set(first_feature + kHitpoints, pixel, 1);
+  SumColumns columns = sums.TakeColumns();
+  constexpr std::size_t kRowsAtOnce = 4096;
+  const auto for_rows = [&](std::size_t first, std::size_t last, const auto& work) {
+    team.For(last - first, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t row = first + begin; row < first + end; ++row)
+        work(row, pass.pixels[row]);
+    });
   };
   // A pixel has at most one row of each kind, so that rows of a kind are independent of each other.
-  constexpr std::size_t kRowsAtOnce = 4096;
-  const std::array bounds = {std::size_t{0}, first_caustic, first_segment, rows};
-  for (std::size_t kind = 0; kind + 1 < bounds.size(); ++kind) {
-    team.For(bounds[kind + 1] - bounds[kind], kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t row = bounds[kind] + begin; row < bounds[kind] + end; ++row)
-        add_row(row);
+  const auto for_all_rows = [&](const auto& work) {
+    for_rows(0, first_caustic, work);
+    for_rows(first_caustic, first_segment, work);
+    for_rows(first_segment, rows, work);
+  };
+  const auto to_density = [&](std::size_t row, std::uint32_t pixel) {
+    const float in_units = row >= first_caustic ? plan.caustic_radius : (*plan.radii)[pixel];
+    const auto radius = static_cast<double>(HitpointRadius(in_units, pass.unit_radii[row]));
+    return per_photon / (radius * radius);
+  };
+
+  for (std::size_t column = 0; column < evidence; ++column) {
+    make(kSliceColumns + column, 1);
+    // Not every pass has the evidence of its controller.
+    if (kCommonColumns + column >= columns.evidence.size()) continue;
+    std::vector<std::int64_t>& of_rows = columns.evidence[kCommonColumns + column];
+    for_rows(0, first_caustic, [&](std::size_t row, std::uint32_t pixel) {
+      set(kSliceColumns + column, pixel, static_cast<double>(of_rows[row]));
     });
+    FreeMemoryOf(of_rows);
   }
 
-  sums = PassSums(0);
-  FreeMemoryOf(pass.pixels);
+  std::vector<float> of_bias(pixels);
+  make(kEvenBias, kSliceColumns - kEvenBias);
+  static_assert(kEvenBias < kOddBias && kOddBias < kPhotonCount && kPhotonCount < kBlur);
+  for_all_rows([&](std::size_t row, std::uint32_t pixel) {
+    const double blur = static_cast<double>(columns.evidence[kBlurColumn][row]) * kToBias;
+    add(of_bias[pixel], blur * luminance_per_quantum * to_density(row, pixel) *
+                            static_cast<double>(Luminance(pass.weights[row])));
+    if (row >= first_caustic) return;
+    set(kPhotonCount, pixel, static_cast<double>(columns.counts[row]));
+    const auto unit_radius = static_cast<double>((*plan.radii)[pixel]);
+    set(kBlur, pixel, blur * norm / ((1 << kFluxBits) * unit_radius * unit_radius));
+  });
+  FreeMemoryOf(columns.evidence);
+  FreeMemoryOf(columns.counts);
+
+  std::array<std::vector<float>, 3> of_photons;
+  team.For(of_photons.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t channel = begin; channel < end; ++channel)
+      of_photons[channel].resize(pixels);
+  });
+  for_all_rows([&](std::size_t row, std::uint32_t pixel) {
+    const double density = to_density(row, pixel);
+    for (int channel = 0; channel < 3; ++channel) {
+      const auto c = static_cast<std::size_t>(channel);
+      const double flux = static_cast<double>(columns.flux[c][row]) *
+                          static_cast<double>(scale.watts_per_quantum[channel]);
+      add(of_photons[c][pixel], static_cast<double>(pass.weights[row][channel]) * flux * density);
+    }
+  });
+  for (std::vector<std::int64_t>& channel : columns.flux)
+    FreeMemoryOf(channel);
   FreeMemoryOf(pass.weights);
+
+  if (has_features) {
+    make(first_feature + kUnitRadius, 3);
+    static_assert(kHits == kUnitRadius + 1 && kHitpoints == kHits + 1);
+    for_rows(0, first_caustic, [&](std::size_t row, std::uint32_t pixel) {
+      set(first_feature + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
+      set(first_feature + kHitpoints, pixel, 1);
+    });
+  }
+  FreeMemoryOf(pass.pixels);
   FreeMemoryOf(pass.unit_radii);
 
   make(kPhotonRadiance, 3);
@@ -174,7 +197,7 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
     by_photons = rounded_photons(pixel, slice.columns[kPhotonCount][pixel], by_photons);
     for (std::size_t c = 0; c < 3; ++c)
       slice.columns[kPhotonRadiance + c].Set(pixel, by_photons[c]);
-    set(bias, pixel, static_cast<double>(of_photons[3][pixel]));
+    set(bias, pixel, static_cast<double>(of_bias[pixel]));
   };
   const auto for_pixels = [&](const auto& work) {
     team.For(pixels, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
@@ -186,6 +209,7 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
   FreeMemoryOf(pass.direct);
   for (std::vector<float>& column : of_photons)
     FreeMemoryOf(column);
+  FreeMemoryOf(of_bias);
 
   if (has_features) {
     make(first_feature + kAlbedo, kUnitRadius - kAlbedo);

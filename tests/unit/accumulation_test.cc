@@ -123,6 +123,24 @@ TEST(PassSumsTest, RowsOneByOneAreThoseOfAnAccumulation) {
   EXPECT_EQ(sums.ToAccumulation().value(), whole) << "there and back";
 }
 
+TEST(PassSumsTest, KeepsTheTallyWhenItsColumnsAreTaken) {
+  Accumulation whole = Make({0, 2}, 7);
+  whole.evidence = {{5, -6}};
+  whole.found = {{.index = 3, .numbers = {}, .row = 2}};
+  PassSums sums(3, 1);
+  ASSERT_TRUE(sums.Add(whole).ok());
+  const SumColumns columns = sums.TakeColumns();
+  EXPECT_EQ(columns.counts, (std::vector<std::uint64_t>{2, 0, 2}));
+  for (const std::vector<std::int64_t>& channel : columns.flux)
+    EXPECT_EQ(channel, (std::vector<std::int64_t>{7, 0, 7}));
+  EXPECT_EQ(columns.evidence, (std::vector<std::vector<std::int64_t>>{{5, 0, -6}}));
+  EXPECT_EQ(sums.size(), 0U);
+  EXPECT_TRUE(sums.flux(0).empty());
+  EXPECT_TRUE(sums.evidence().empty());
+  EXPECT_EQ(sums.tally(), whole.tally);
+  EXPECT_EQ(sums.FoundInOrder(), whole.found);
+}
+
 TEST(PassSumsTest, ARowThatWouldWrapAddsNothing) {
   constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
   const std::array<std::int64_t, 1> one = {1};
