@@ -14,8 +14,10 @@ namespace {
 constexpr std::size_t kTracersKept = 2;
 // Two passes of a job may be open, and workers fetch one ahead; leases of two jobs may alternate.
 constexpr std::size_t kBlocksKept = 6;
-// The slices of a round share theirs.
-constexpr std::size_t kRadiiKept = 4;
+// The slices of a round share theirs, and so do the photons of a pass. While one lease is worked
+// off the next is fetched, which may be of the next round or of another job. As the one that was
+// not used the longest goes, two jobs whose leases alternate keep theirs too.
+constexpr std::size_t kRadiiKept = 2;
 // What a hitpoint and its radius may need at most before compression, which cannot double it.
 constexpr std::uint64_t kBytesPerHitpoint = 80;
 constexpr std::uint64_t kHeadBytes = 4096;

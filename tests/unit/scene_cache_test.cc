@@ -3,10 +3,13 @@
 #include "worker/scene_cache.h"
 
 #include <map>
+#include <memory>
 #include <string>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+
+#include "render/wire/block_codec.h"
 
 namespace lucerna {
 namespace {
@@ -47,6 +50,29 @@ TEST_F(SceneCacheTest, KeepsTwoScenes) {
   EXPECT_EQ(fetched_, 3) << "2 went";
   ASSERT_TRUE(cache_.TracerFor(SceneOf("2")).ok());
   EXPECT_EQ(fetched_, 4);
+}
+
+// Leases of two jobs that alternate fetch their radii once; when a job's next round begins, those
+// of its last one go.
+TEST_F(SceneCacheTest, KeepsTwoColumnsOfRadii) {
+  const auto radii = [&](float radius) {
+    const RadiusColumn column = {radius, 2 * radius};
+    const std::string bytes = EncodeRadii(column);
+    files_[Sha256(bytes)] = bytes;
+    const auto kept = cache_.RadiiFor(Sha256(bytes), column.size());
+    EXPECT_EQ(*kept.value(), column);
+    return std::weak_ptr(kept.value());
+  };
+  const auto first = radii(1);
+  radii(2);
+  radii(1);
+  radii(2);
+  EXPECT_EQ(fetched_, 2);
+  EXPECT_FALSE(first.expired());
+  radii(3);
+  EXPECT_TRUE(first.expired());
+  radii(2);
+  EXPECT_EQ(fetched_, 3);
 }
 
 TEST_F(SceneCacheTest, RefusesASceneThatDoesNotFitAndDropsOthersForIt) {
