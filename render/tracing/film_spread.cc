@@ -1,18 +1,24 @@
 #include "render/tracing/film_spread.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
 #include <span>
 #include <utility>
 
+#include "render/base/memory.h"
 #include "render/tracing/bright_outlines.h"
 
 namespace lucerna {
 namespace {
 
 constexpr int kTile = 16;
+
+int TilesOf(int pixels) {
+  return (pixels + kTile - 1) / kTile;
+}
 
 // Two pixels' filters overlap where their centres are less than two radii apart.
 int ReachOf(float radius) {
@@ -62,12 +68,21 @@ void FilmSpread::Prepare(ThreadTeam& team) {
              std::min(height_ + reach_y_ + 1, image_.y1)};
   const auto columns = static_cast<std::size_t>(around_.x1 - around_.x0);
   const auto rows = static_cast<std::size_t>(around_.y1 - around_.y0);
-  centres_.resize(columns * rows);
-  team.For(rows, 4, [&](std::size_t begin, std::size_t end) {
-    for (int y = around_.y0 + static_cast<int>(begin); y < around_.y0 + static_cast<int>(end);
-         ++y) {
-      for (int x = around_.x0; x < around_.x1; ++x)
-        centres_[IndexOf(x, y)] = tracer_.BrightAtCentre(x, y);
+  const auto tiles_x = static_cast<std::size_t>(TilesOf(around_.x1 - around_.x0));
+  const auto tiles_y = static_cast<std::size_t>(TilesOf(around_.y1 - around_.y0));
+  centres_.resize(tiles_x * tiles_y);
+  team.For(centres_.size(), 4, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t tile = begin; tile < end; ++tile) {
+      const int x0 = around_.x0 + static_cast<int>(tile % tiles_x) * kTile;
+      const int y0 = around_.y0 + static_cast<int>(tile / tiles_x) * kTile;
+      std::array<Rgb, static_cast<std::size_t>(kTile) * kTile> centres{};
+      for (int y = y0; y < std::min(y0 + kTile, around_.y1); ++y) {
+        for (int x = x0; x < std::min(x0 + kTile, around_.x1); ++x)
+          centres[static_cast<std::size_t>((y - y0) * kTile + x - x0)] =
+              tracer_.BrightAtCentre(x, y);
+      }
+      if (!std::ranges::all_of(centres, IsBlack))
+        centres_[tile].assign(centres.begin(), centres.end());
     }
   });
 
@@ -89,18 +104,17 @@ void FilmSpread::Prepare(ThreadTeam& team) {
                                          static_cast<std::size_t>(image_.x1 - image_.x0) +
                                      static_cast<std::size_t>(x - image_.x0)] != 0;
         }
-        const Rgb& centre = centres_[IndexOf(x, y)];
+        const Rgb centre = CentreAt(x, y);
         for (int ny = std::max(y - 1, around_.y0); ny < std::min(y + 2, around_.y1); ++ny) {
           for (int nx = std::max(x - 1, around_.x0); nx < std::min(x + 2, around_.x1); ++nx)
-            is_near = is_near || centres_[IndexOf(nx, ny)] != centre;
+            is_near = is_near || CentreAt(nx, ny) != centre;
         }
         is_near_outline_[IndexOf(x, y)] = is_near ? 1 : 0;
         is_any_near = is_any_near || is_near;
       }
     }
-    if (!is_any_near) is_near_outline_ = {};
+    if (!is_any_near) FreeMemoryOf(is_near_outline_);
   }
-  if (std::ranges::all_of(centres_, [](const Rgb& c) { return IsBlack(c); })) centres_ = {};
 
   if (finds_glints_) glints_ = Glints(tracer_, OnFilm({0, 0, width_, height_}), team);
   first_path_of_glint_ = {0};
@@ -139,6 +153,16 @@ std::vector<FilmSpread::GlintPath> FilmSpread::TraceGlints(std::uint64_t pass,
   return paths;
 }
 
+Rgb FilmSpread::CentreAt(int x, int y) const {
+  const int column = x - around_.x0;
+  const int row = y - around_.y0;
+  const int tiles_x = TilesOf(around_.x1 - around_.x0);
+  const std::vector<Rgb>& tile =
+      centres_[static_cast<std::size_t>(row / kTile * tiles_x + column / kTile)];
+  if (tile.empty()) return {};
+  return tile[static_cast<std::size_t>(row % kTile * kTile + column % kTile)];
+}
+
 int FilmSpread::BrightPathsOf(int x, int y) const {
   if (is_near_outline_.empty()) return 0;
   return is_near_outline_[IndexOf(x, y)] != 0 ? bright_paths_ : 0;
@@ -149,8 +173,8 @@ void FilmSpread::Add(std::uint64_t pass, const std::vector<Rgb>& bright, std::ve
   if (!is_needed() || (shall_stop && shall_stop())) return;
   Prepare(team);
   const std::vector<GlintPath> glint_paths = TraceGlints(pass, team);
-  const int tiles_x = (width_ + kTile - 1) / kTile;
-  const int tiles_y = (height_ + kTile - 1) / kTile;
+  const int tiles_x = TilesOf(width_);
+  const int tiles_y = TilesOf(height_);
   team.For(static_cast<std::size_t>(tiles_x) * static_cast<std::size_t>(tiles_y), 4,
            [&](std::size_t begin, std::size_t end) {
              for (std::size_t tile = begin; tile < end; ++tile) {
@@ -172,9 +196,6 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
   };
   const auto is_in_crop = [&](int x, int y) {
     return x >= 0 && x < width_ && y >= 0 && y < height_;
-  };
-  const auto centre_at = [&](int x, int y) {
-    return centres_.empty() ? Rgb{} : centres_[IndexOf(x, y)];
   };
   // The pixels whose paths count in the tile.
   const Window around = {
@@ -218,7 +239,7 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
   }
   for (int y = tile.y0; is_dark && y < tile.y1; ++y) {
     for (int x = tile.x0; is_dark && x < tile.x1; ++x)
-      is_dark = IsBlack(centre_at(x, y));
+      is_dark = IsBlack(CentreAt(x, y));
   }
   if (is_dark) return;
 
@@ -264,7 +285,7 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
   };
   for (int y = tile.y0; y < tile.y1; ++y) {
     for (int x = tile.x0; x < tile.x1; ++x) {
-      const Rgb centre = centre_at(x, y);
+      const Rgb centre = CentreAt(x, y);
       Rgb sum = centre;
       for (int qy = std::max(y - reach_y_, around.y0); qy < std::min(y + reach_y_ + 1, around.y1);
            ++qy) {
@@ -288,7 +309,7 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
       for (int y = std::max(path.y - filter_reach_y, tile.y0);
            y < std::min(path.y + filter_reach_y + 1, tile.y1); ++y) {
         for (int x = low_x; x < high_x; ++x) {
-          direct[pixel_at(x, y)] += (path.bright - centre_at(x, y)) *
+          direct[pixel_at(x, y)] += (path.bright - CentreAt(x, y)) *
                                     (filter_at(path.x - x, path.y - y, path.from) / density);
         }
       }

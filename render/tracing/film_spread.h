@@ -86,7 +86,9 @@ class FilmSpread {
   [[nodiscard]] std::vector<GlintPath> TraceGlints(std::uint64_t pass, ThreadTeam& team) const;
   void AddTile(std::uint64_t pass, const Window& tile, const std::vector<Rgb>& bright,
                const std::vector<GlintPath>& glint_paths, std::vector<Rgb>& direct) const;
-  // Of a pixel in `around_`, for the columns below.
+  // What lies straight ahead of a pixel in `around_`.
+  [[nodiscard]] Rgb CentreAt(int x, int y) const;
+  // Of a pixel in `around_`, for is_near_outline_.
   [[nodiscard]] std::size_t IndexOf(int x, int y) const {
     return static_cast<std::size_t>(y - around_.y0) *
                static_cast<std::size_t>(around_.x1 - around_.x0) +
@@ -102,7 +104,9 @@ class FilmSpread {
   bool is_prepared_ = false;
   // The crop window and the pixels around it whose paths count.
   Window around_;
-  std::vector<Rgb> centres_;                   // [around], or empty: all black
+  // [tiles of around][pixels of a tile], row by row; those of a tile empty: all black, as in most
+  // of an image.
+  std::vector<std::vector<Rgb>> centres_;
   std::vector<std::uint8_t> is_near_outline_;  // [around], or empty: none is
   int bright_paths_ = 0;                       // near an outline
   bool finds_glints_ = true;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -24,29 +25,36 @@ struct FilmRectangle {
   double x0, y0, x1, y1;
 };
 
-// A light that fills a rectangle of the film, in front of nothing. A wall behind the camera makes
-// the scene large, so that the light is much brighter than the image's white.
-Scene SceneWithLight(const FilmRectangle& light, const PixelFilter& filter) {
+// Lights that fill rectangles of a film of `size` pixels, in front of nothing. A wall behind the
+// camera makes the scene large, so that lights are much brighter than the image's white.
+Scene SceneWithLights(std::span<const FilmRectangle> lights, const PixelFilter& filter, int size) {
   Scene scene;
-  // A field of view of 90 degrees: the plane at a distance of 8 is a film of 16 pixels.
-  SetCamera(scene, {0, 0, 0}, {0, 0, 8}, {0, 1, 0}, 90, kSize);
+  // With a field of view of 90 degrees the plane at this distance is the film.
+  const auto distance = static_cast<float>(size) / 2;
+  SetCamera(scene, {0, 0, 0}, {0, 0, distance}, {0, 1, 0}, 90, size);
   scene.filter = filter;
   // A lens, so that no pass uses the eye paths of another: deviations are of independent passes.
   scene.camera.lens_radius = 1e-6F;
-  scene.camera.focal_distance = 8;
+  scene.camera.focal_distance = distance;
   const Scene at_camera = scene;
   const int material = AddMaterial(scene, DiffuseMaterial(0));
   // The camera's own axes say which way the film's x grows.
   const Vec3 right = at_camera.camera.camera_to_world.Vector({1, 0, 0});
-  const auto corner_x = static_cast<float>(light.x0 - kSize / 2.0);
-  const auto corner_y = static_cast<float>(kSize / 2.0 - light.y1);
-  const auto width = static_cast<float>(light.x1 - light.x0);
-  const auto height = static_cast<float>(light.y1 - light.y0);
-  const Vec3 corner = right * corner_x + Vec3{0, corner_y, 8};
-  const int emitter = AddAreaLight(scene, kRadiance, true);
-  AddQuad(scene, corner, right * width, {0, height, 0}, material, emitter);
+  for (const FilmRectangle& light : lights) {
+    const auto corner_x = static_cast<float>(light.x0 - size / 2.0);
+    const auto corner_y = static_cast<float>(size / 2.0 - light.y1);
+    const auto width = static_cast<float>(light.x1 - light.x0);
+    const auto height = static_cast<float>(light.y1 - light.y0);
+    const Vec3 corner = right * corner_x + Vec3{0, corner_y, distance};
+    const int emitter = AddAreaLight(scene, kRadiance, true);
+    AddQuad(scene, corner, right * width, {0, height, 0}, material, emitter);
+  }
   AddQuad(scene, {-100, -100, -1}, {200, 0, 0}, {0, 200, 0}, material);
   return InWorkingSpace(scene);
+}
+
+Scene SceneWithLight(const FilmRectangle& light, const PixelFilter& filter) {
+  return SceneWithLights({&light, 1}, filter, kSize);
 }
 
 PixelFilter Filter(PixelFilter::Kind kind, float radius) {
@@ -224,6 +232,51 @@ TEST(FilmSpreadTest, GivesACropWindowWhatTheWholeImageHas) {
           << x << ' ' << y;
     }
   }
+}
+
+// Between the lights there is nothing to keep. The crop window begins within one of them and ends
+// within the other.
+TEST(FilmSpreadTest, KeepsTheInsidesOfLightsThatAreFarApart) {
+  constexpr int kWide = 80;
+  // Further from a light's outline than the filter reaches.
+  constexpr double kBeyond = 2;
+  const FilmRectangle lights[] = {{3, 2, 21, 9}, {58, 43, 77, 75}};
+  const Scene scene = SceneWithLights(lights, Filter(PixelFilter::Kind::kGaussian, 1.5F), kWide);
+  const RenderSettings whole = TestSettings(scene, 1000, 0.1, 4);
+  RenderSettings crop = whole;
+  crop.crop_x0 = 7;
+  crop.crop_y0 = 4;
+  crop.crop_x1 = 75;
+  crop.crop_y1 = 71;
+  const Traced of_whole = TraceManyPasses(scene, whole, 4);
+  const Traced of_crop = TraceManyPasses(scene, crop, 4);
+  int inside = 0;
+  int outside = 0;
+  for (int y = 0; y < kWide; ++y) {
+    for (int x = 0; x < kWide; ++x) {
+      const auto i = static_cast<std::size_t>(y * kWide + x);
+      const auto is_in = [&](const FilmRectangle& light, double margin) {
+        return x + 0.5 > light.x0 + margin && x + 0.5 < light.x1 - margin &&
+               y + 0.5 > light.y0 + margin && y + 0.5 < light.y1 - margin;
+      };
+      if (is_in(lights[0], kBeyond) || is_in(lights[1], kBeyond)) {
+        ++inside;
+        EXPECT_NEAR(of_whole.mean[i], kRadiance, 1e-3 * kRadiance) << x << ' ' << y;
+        EXPECT_LT(of_whole.deviation[i], 1e-4 * kRadiance) << x << ' ' << y;
+      }
+      if (!is_in(lights[0], -kBeyond) && !is_in(lights[1], -kBeyond)) {
+        ++outside;
+        EXPECT_EQ(of_whole.mean[i], 0) << x << ' ' << y;
+      }
+      if (x < crop.crop_x0 || x >= crop.crop_x1 || y < crop.crop_y0 || y >= crop.crop_y1) continue;
+      EXPECT_EQ(of_crop.mean[static_cast<std::size_t>((y - crop.crop_y0) * crop.crop_width() + x -
+                                                      crop.crop_x0)],
+                of_whole.mean[i])
+          << x << ' ' << y;
+    }
+  }
+  EXPECT_EQ(inside, 14 * 3 + 15 * 28);
+  EXPECT_GT(outside, kWide * kWide / 2);
 }
 
 // A corner of the light covers a thousandth of a pixel: a single path a pass would meet it in one
