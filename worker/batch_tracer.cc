@@ -443,8 +443,11 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
       TraceHitpointPass(*state.eye_paths, pass, state.first_hits->Of(pass), *state.film_spread,
                         state.team, [&stop] { return stop.load(std::memory_order_relaxed); });
   if (stop || !eye.is_whole) return absl::CancelledError("the slice was given up");
+  // Before photons are gathered, for which the most memory is needed: the slice holds in fewer
+  // bytes what eye paths brought.
+  SliceSums slice = BeginSlice(eye, settings);
+  AddEyePaths(slice, eye, settings, needs, state.team);
   std::optional<PassSums> sums;
-  std::vector<PhotonKey> dropped;
   // A camera that sees nothing needs no photons, and without light there are none.
   if (eye.block.size() > 0 && needs.Uses(Part::kPhotons)) {
     std::vector<std::uint64_t> named;
@@ -454,14 +457,13 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
                              GatherPhotons(settings, needs, photons, eye.block,
                                            HitpointRadii(eye, plan, &state.team), stop, named));
     for (const std::uint64_t index : named)
-      dropped.push_back({pass, index});
+      slice.dropped_photons.push_back({pass, index});
   }
   if (!sums) {
     sums.emplace(eye.block.size(), EvidenceColumns(EvidenceOf(settings.radius_controller, pass)));
   }
-  SliceSums slice = SliceOfPass(std::move(eye), plan, *std::move(sums), settings, needs,
-                                state.prepared.flux_scale(), state.team);
-  slice.dropped_photons = std::move(dropped);
+  AddPhotons(slice, eye, plan, *std::move(sums), settings, needs, state.prepared.flux_scale(),
+             state.team);
   return slice;
 }
 

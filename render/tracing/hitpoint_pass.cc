@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "render/base/memory.h"
 #include "render/estimate/slice_sums.h"
 #include "render/math/octahedral.h"
 
@@ -136,6 +137,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
 
   if (known != nullptr && !is_stopped) known->is_known = true;
   spread.Add(pass, bright, out.direct, team, stops);
+  FreeMemoryOf(bright);
   out.is_whole = !is_stopped;
   if (!out.is_whole) return out;
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "render/base/memory.h"
 #include "render/estimate/evidence.h"
@@ -18,9 +19,61 @@ namespace {
 constexpr double kSmallestRadius = 1e-18;
 constexpr double kLargestRadius = 1e18;
 
+// Rows, or pixels, that a thread takes at once.
+constexpr std::size_t kTakenAtOnce = 4096;
+
 std::array<double, 3> ToDoubles(Rgb c) {
   return {static_cast<double>(c.r), static_cast<double>(c.g), static_cast<double>(c.b)};
 }
+
+// The columns of the slice of one pass, while they are filled in.
+class SliceFiller {
+ public:
+  SliceFiller(SliceSums& slice, std::size_t pixels, ThreadTeam& team)
+      : slice_(slice), pixels_(pixels), team_(team) {}
+
+  // The system clears memory where it is first touched, which takes as long as filling it in.
+  void Make(std::size_t first, std::size_t count) {
+    team_.For(count, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t column = first + begin; column < first + end; ++column)
+        slice_.columns[column] = PackedFloats(pixels_, BitsOf(column));
+    });
+  }
+  void Set(std::size_t column, std::size_t pixel, double value) {
+    slice_.columns[column].Set(pixel, Rounded(value, BitsOf(column)));
+  }
+  template <typename Work>
+  void ForPixels(const Work& work) {
+    team_.For(pixels_, kTakenAtOnce, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t pixel = begin; pixel < end; ++pixel)
+        work(pixel);
+    });
+  }
+
+ private:
+  [[nodiscard]] unsigned int BitsOf(std::size_t column) const {
+    return SignificantBits(1, column, slice_.evidence);
+  }
+
+  SliceSums& slice_;
+  const std::size_t pixels_;
+  ThreadTeam& team_;
+};
+
+// Some of the colours that make a mean over passes are below zero: single wavelengths are outside
+// of all three.
+class ColorOfPass {
+ public:
+  ColorOfPass(const RenderSettings& settings, const SceneNeeds& needs, std::uint64_t pass) {
+    if (needs.Uses(Part::kSpectra)) wavelengths_ = WavelengthsOfPass(settings.seed, pass);
+  }
+  [[nodiscard]] std::array<double, 3> operator()(const std::array<double, 3>& values) const {
+    return wavelengths_.has_value() ? wavelengths_->ToWorking(values) : values;
+  }
+
+ private:
+  std::optional<PassWavelengths> wavelengths_;
+};
 
 }  // namespace
 
@@ -49,53 +102,71 @@ RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan, ThreadTea
   return of_hitpoints;
 }
 
-// Columns are made when their turn comes, and what they follow from is freed after it: there is
-// never more than the pass, its sums and a column of the controller's evidence. Those of the sums
-// take eight bytes where columns of the slice take two or three, so they go first.
-SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
-                      const RenderSettings& settings, const SceneNeeds& needs,
-                      const FluxScale& scale, ThreadTeam& team) {
-  const std::size_t rows = pass.pixels.size();
-  const std::size_t pixels = pass.direct.size();
-  LUCERNA_CHECK(sums.size() == rows && plan.radii->size() == pixels &&
-                sums.evidence().size() >= kCommonColumns);
-  const std::size_t evidence = ControllerColumns(settings.radius_controller);
+SliceSums BeginSlice(const EyePass& pass, const RenderSettings& settings) {
   SliceSums slice;
   slice.passes = {pass.pass, pass.pass + 1};
-  slice.evidence = evidence;
-  slice.columns.resize(ColumnsOf(slice.passes, evidence));
-  const bool has_features = HasFeatures(slice.passes);
-  const std::size_t first_feature = slice.first_feature();
-  // The system clears memory where it is first touched, which takes as long as filling it in.
-  const auto make = [&](std::size_t first, std::size_t count) {
-    team.For(count, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t column = first + begin; column < first + end; ++column)
-        slice.columns[column] = PackedFloats(pixels, SignificantBits(1, column, evidence));
-    });
-  };
-  slice.tally = sums.tally();
+  slice.evidence = ControllerColumns(settings.radius_controller);
+  slice.columns.resize(ColumnsOf(slice.passes, slice.evidence));
   slice.eye_rays = pass.rays;
+  return slice;
+}
+
+void AddEyePaths(SliceSums& slice, EyePass& pass, const RenderSettings& settings,
+                 const SceneNeeds& needs, ThreadTeam& team) {
+  const std::size_t pixels = pass.direct.size();
+  SliceFiller filler(slice, pixels, team);
+  const ColorOfPass in_color(settings, needs, pass.pass);
+  filler.Make(kDirectRadiance, 3);
+  filler.ForPixels([&](std::size_t pixel) {
+    const std::array<double, 3> direct = in_color(ToDoubles(pass.direct[pixel]));
+    for (std::size_t c = 0; c < 3; ++c)
+      filler.Set(kDirectRadiance + c, pixel, direct[c]);
+  });
+  FreeMemoryOf(pass.direct);
+  if (!HasFeatures(slice.passes)) return;
+
+  LUCERNA_CHECK(pass.features.size() == pixels);
+  const std::size_t first_feature = slice.first_feature();
+  filler.Make(first_feature + kAlbedo, kUnitRadius - kAlbedo);
+  static_assert(kAlbedo < kNormal && kNormal < kDistance && kDistance < kUnitRadius);
+  filler.Make(first_feature + kHits, 1);
+  filler.ForPixels([&](std::size_t pixel) {
+    const EyeFeatures& features = pass.features[pixel];
+    if (!std::isfinite(features.distance)) return;
+    const std::array<double, 3> albedo = in_color(ToDoubles(features.albedo));
+    for (int c = 0; c < 3; ++c) {
+      const auto offset = static_cast<std::size_t>(c);
+      filler.Set(first_feature + kAlbedo + offset, pixel, albedo[offset]);
+      filler.Set(first_feature + kNormal + offset, pixel, static_cast<double>(features.normal[c]));
+    }
+    filler.Set(first_feature + kDistance, pixel, static_cast<double>(features.distance));
+    filler.Set(first_feature + kHits, pixel, 1);
+  });
+  FreeMemoryOf(pass.features);
+}
+
+// Columns are made when their turn comes, and what they follow from is freed after it. Beside all
+// of the sums, whose columns take eight bytes a hitpoint, there is only one column of the slice,
+// two bytes a pixel; from then on each step frees more than it takes.
+void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, PassSums sums,
+                const RenderSettings& settings, const SceneNeeds& needs, const FluxScale& scale,
+                ThreadTeam& team) {
+  const std::size_t rows = pass.pixels.size();
+  const std::size_t pixels = plan.radii->size();
+  LUCERNA_CHECK(sums.size() == rows && sums.evidence().size() >= kCommonColumns);
+  const std::size_t evidence = slice.evidence;
+  SliceFiller filler(slice, pixels, team);
+  slice.tally = sums.tally();
   for (const FoundPhoton& found : sums.FoundInOrder()) {
     if (slice.reports.size() == kMostReports) break;
     slice.reports.push_back({found.numbers, pass.pixels[found.row]});
   }
-  const auto set = [&](std::size_t column, std::size_t pixel, double value) {
-    slice.columns[column].Set(pixel, Rounded(value, SignificantBits(1, column, evidence)));
-  };
 
   const SliceColumn bias = pass.pass % 2 == 0 ? kEvenBias : kOddBias;
   // What the rows of a pixel bring together is summed first, and rounded at the end.
   const auto add = [](float& sum, double value) {
     sum =
         static_cast<float>(std::clamp(static_cast<double>(sum) + value, -kLargestSum, kLargestSum));
-  };
-
-  // Some of the colours that make a mean over passes are below zero: single wavelengths are outside
-  // of all three.
-  std::optional<PassWavelengths> wavelengths;
-  if (needs.Uses(Part::kSpectra)) wavelengths = WavelengthsOfPass(settings.seed, pass.pass);
-  const auto in_color = [&](const std::array<double, 3>& values) {
-    return wavelengths.has_value() ? wavelengths->ToWorking(values) : values;
   };
 
   const double luminance_per_quantum = static_cast<double>(Luminance(scale.watts_per_quantum));
@@ -106,9 +177,8 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
   const std::size_t first_segment = pass.block.first_segment();
   pass.block = {};
   SumColumns columns = sums.TakeColumns();
-  constexpr std::size_t kRowsAtOnce = 4096;
   const auto for_rows = [&](std::size_t first, std::size_t last, const auto& work) {
-    team.For(last - first, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
+    team.For(last - first, kTakenAtOnce, [&](std::size_t begin, std::size_t end) {
       for (std::size_t row = first + begin; row < first + end; ++row)
         work(row, pass.pixels[row]);
     });
@@ -126,27 +196,27 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
   };
 
   for (std::size_t column = 0; column < evidence; ++column) {
-    make(kSliceColumns + column, 1);
+    filler.Make(kSliceColumns + column, 1);
     // Not every pass has the evidence of its controller.
     if (kCommonColumns + column >= columns.evidence.size()) continue;
     std::vector<std::int64_t>& of_rows = columns.evidence[kCommonColumns + column];
     for_rows(0, first_caustic, [&](std::size_t row, std::uint32_t pixel) {
-      set(kSliceColumns + column, pixel, static_cast<double>(of_rows[row]));
+      filler.Set(kSliceColumns + column, pixel, static_cast<double>(of_rows[row]));
     });
     FreeMemoryOf(of_rows);
   }
 
   std::vector<float> of_bias(pixels);
-  make(kEvenBias, kSliceColumns - kEvenBias);
+  filler.Make(kEvenBias, kSliceColumns - kEvenBias);
   static_assert(kEvenBias < kOddBias && kOddBias < kPhotonCount && kPhotonCount < kBlur);
   for_all_rows([&](std::size_t row, std::uint32_t pixel) {
     const double blur = static_cast<double>(columns.evidence[kBlurColumn][row]) * kToBias;
     add(of_bias[pixel], blur * luminance_per_quantum * to_density(row, pixel) *
                             static_cast<double>(Luminance(pass.weights[row])));
     if (row >= first_caustic) return;
-    set(kPhotonCount, pixel, static_cast<double>(columns.counts[row]));
+    filler.Set(kPhotonCount, pixel, static_cast<double>(columns.counts[row]));
     const auto unit_radius = static_cast<double>((*plan.radii)[pixel]);
-    set(kBlur, pixel, blur * norm / ((1 << kFluxBits) * unit_radius * unit_radius));
+    filler.Set(kBlur, pixel, blur * norm / ((1 << kFluxBits) * unit_radius * unit_radius));
   });
   FreeMemoryOf(columns.evidence);
   FreeMemoryOf(columns.counts);
@@ -169,65 +239,44 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
     FreeMemoryOf(channel);
   FreeMemoryOf(pass.weights);
 
-  if (has_features) {
-    make(first_feature + kUnitRadius, 3);
-    static_assert(kHits == kUnitRadius + 1 && kHitpoints == kHits + 1);
+  if (HasFeatures(slice.passes)) {
+    const std::size_t first_feature = slice.first_feature();
+    filler.Make(first_feature + kUnitRadius, 1);
+    filler.Make(first_feature + kHitpoints, 1);
     for_rows(0, first_caustic, [&](std::size_t row, std::uint32_t pixel) {
-      set(first_feature + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
-      set(first_feature + kHitpoints, pixel, 1);
+      filler.Set(first_feature + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
+      filler.Set(first_feature + kHitpoints, pixel, 1);
     });
   }
   FreeMemoryOf(pass.pixels);
   FreeMemoryOf(pass.unit_radii);
 
-  make(kPhotonRadiance, 3);
-  make(kDirectRadiance, 3);
+  filler.Make(kPhotonRadiance, 3);
+  const ColorOfPass in_color(settings, needs, pass.pass);
   const PhotonRounding rounded_photons(slice.passes);
-  const auto set_radiance = [&](std::size_t pixel) {
+  filler.ForPixels([&](std::size_t pixel) {
     std::array<double, 3> photons{};
     for (std::size_t c = 0; c < 3; ++c)
       photons[c] = static_cast<double>(of_photons[c][pixel]);
     photons = in_color(photons);
-    const std::array<double, 3> direct = in_color(ToDoubles(pass.direct[pixel]));
     std::array<float, 3> by_photons{};
-    for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t c = 0; c < 3; ++c)
       by_photons[c] = static_cast<float>(std::clamp(photons[c], -kLargestSum, kLargestSum));
-      set(kDirectRadiance + c, pixel, direct[c]);
-    }
     by_photons = rounded_photons(pixel, slice.columns[kPhotonCount][pixel], by_photons);
     for (std::size_t c = 0; c < 3; ++c)
       slice.columns[kPhotonRadiance + c].Set(pixel, by_photons[c]);
-    set(bias, pixel, static_cast<double>(of_bias[pixel]));
-  };
-  const auto for_pixels = [&](const auto& work) {
-    team.For(pixels, kRowsAtOnce, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t pixel = begin; pixel < end; ++pixel)
-        work(pixel);
-    });
-  };
-  for_pixels(set_radiance);
-  FreeMemoryOf(pass.direct);
-  for (std::vector<float>& column : of_photons)
-    FreeMemoryOf(column);
-  FreeMemoryOf(of_bias);
+    filler.Set(bias, pixel, static_cast<double>(of_bias[pixel]));
+  });
+}
 
-  if (has_features) {
-    make(first_feature + kAlbedo, kUnitRadius - kAlbedo);
-    static_assert(kAlbedo < kNormal && kNormal < kDistance && kDistance < kUnitRadius);
-    for_pixels([&](std::size_t pixel) {
-      const EyeFeatures& features = pass.features[pixel];
-      if (!std::isfinite(features.distance)) return;
-      const std::array<double, 3> albedo = in_color(ToDoubles(features.albedo));
-      for (int c = 0; c < 3; ++c) {
-        const auto offset = static_cast<std::size_t>(c);
-        set(first_feature + kAlbedo + offset, pixel, albedo[offset]);
-        set(first_feature + kNormal + offset, pixel, static_cast<double>(features.normal[c]));
-      }
-      set(first_feature + kDistance, pixel, static_cast<double>(features.distance));
-      set(first_feature + kHits, pixel, 1);
-    });
-    FreeMemoryOf(pass.features);
-  }
+SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
+                      const RenderSettings& settings, const SceneNeeds& needs,
+                      const FluxScale& scale, ThreadTeam& team) {
+  LUCERNA_CHECK(plan.radii->size() == pass.direct.size());
+  SliceSums slice = BeginSlice(pass, settings);
+  // The sums go first: they take the most.
+  AddPhotons(slice, pass, plan, std::move(sums), settings, needs, scale, team);
+  AddEyePaths(slice, pass, settings, needs, team);
   return slice;
 }
 

@@ -37,9 +37,22 @@ struct RoundPlan {
 [[nodiscard]] RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan,
                                          ThreadTeam* team = nullptr);
 
-// The slice of one pass, which is used up. `sums` are those of all its photons, gathered with
-// HitpointRadii. Of a job that carries wavelengths (`needs`) it has their colour, in the working
-// space as any other.
+// The slice of one pass is made of two parts, in any order, each of which frees in `pass` what is
+// its alone, as soon as it can. Of a job that carries wavelengths (`needs`) they have their colour,
+// in the working space as any other.
+
+// The slice of a pass without either part: its columns are empty.
+[[nodiscard]] SliceSums BeginSlice(const EyePass& pass, const RenderSettings& settings);
+// Direct light, and the features of surfaces in passes that have them.
+void AddEyePaths(SliceSums& slice, EyePass& pass, const RenderSettings& settings,
+                 const SceneNeeds& needs, ThreadTeam& team);
+// What photons brought, and all else that hitpoints tell. `sums` are those of all photons of the
+// pass, gathered with HitpointRadii.
+void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, PassSums sums,
+                const RenderSettings& settings, const SceneNeeds& needs, const FluxScale& scale,
+                ThreadTeam& team);
+
+// Both parts of the slice of a pass, which is used up.
 [[nodiscard]] SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
                                     const RenderSettings& settings, const SceneNeeds& needs,
                                     const FluxScale& scale, ThreadTeam& team);

@@ -34,36 +34,71 @@ EyePass WholePass(std::uint64_t pass) {
   return eye;
 }
 
-// Where hitpoints are is of no use any more, and direct light becomes columns when what photons
-// brought has become theirs: the most is what the rows have and the columns that follow from them.
-TEST(SliceOfPassMemoryTest, NeverHoldsTheWholePassBesideTheWholeSlice) {
+// A pass, its sums and what they become, of a job whose controller has evidence.
+struct PassSlice {
   RenderSettings settings;
-  settings.radius_controller = RadiusControllerKind::kAppm;
-  const std::size_t evidence = ControllerColumns(settings.radius_controller);
-  ThreadTeam team(1);
-  const RoundPlan plan = {.photons_per_pass = 1,
-                          .radii = std::make_shared<const RadiusColumn>(kPixels, 1.0F)};
+  std::size_t columns = 0;  // of evidence
+  RoundPlan plan = {.photons_per_pass = 1,
+                    .radii = std::make_shared<const RadiusColumn>(kPixels, 1.0F)};
+  ThreadTeam team = ThreadTeam(1);
+  FluxScale scale = {Gray(1), Gray(1)};
+
+  PassSlice() {
+    settings.radius_controller = RadiusControllerKind::kAppm;
+    columns = kCommonColumns + ControllerColumns(settings.radius_controller);
+  }
+  [[nodiscard]] std::size_t OfSums() const { return sizeof(std::int64_t) * (4 + columns); }
+};
+
+// A page for each of the vectors, of which there are no more than so many: the allocator rounds.
+constexpr std::size_t kSlack = std::size_t{40} * 4096;
+
+std::size_t BytesAPixel(const SliceSums& slice) {
+  std::size_t bytes = 0;
+  for (const PackedFloats& column : slice.columns) {
+    if (!column.empty()) bytes += column.bytes();
+  }
+  return bytes;
+}
+
+// Each column of the sums goes when it has become one of the slice, and where hitpoints are is of
+// no use any more: the slice has room in what was freed for it.
+TEST(SliceOfPassMemoryTest, HoldsNoMoreThanThePassAndItsSums) {
+  PassSlice of;
   const std::size_t before = LiveBytes();
   EyePass eye = WholePass(0);
-  PassSums sums(kPixels, kCommonColumns + evidence);
-  const std::size_t of_sums = sizeof(std::int64_t) * (4 + kCommonColumns + evidence);
-  // A page for each of the vectors, of which there are no more than so many: the allocator rounds.
-  constexpr std::size_t kSlack = std::size_t{40} * 4096;
+  PassSums sums(kPixels, of.columns);
   ASSERT_NEAR(static_cast<double>(LiveBytes() - before),
-              static_cast<double>(kPixels * (kWhere + kRow + kSeen + of_sums)), kSlack);
+              static_cast<double>(kPixels * (kWhere + kRow + kSeen + of.OfSums())), kSlack);
   ForgetMostLiveBytes();
-  const SliceSums slice = SliceOfPass(std::move(eye), plan, std::move(sums), settings, SceneNeeds(),
-                                      {Gray(1), Gray(1)}, team);
-  std::size_t of_slice = 0;
-  for (const PackedFloats& column : slice.columns) {
-    if (!column.empty()) of_slice += column.bytes();
-  }
-  EXPECT_NEAR(static_cast<double>(LiveBytes() - before), static_cast<double>(kPixels * of_slice),
-              kSlack);
-  // By photons: radiance and bias as floats, and packed two columns of bias, the count, the blur,
-  // the evidence and three of the features.
-  const std::size_t from_rows = sizeof(float) * 4 + 2 * 2 + 3 + 2 + 2 * evidence + 3 * 3;
-  EXPECT_LE(MostLiveBytes() - before, kPixels * (kRow + kSeen + of_sums + from_rows) + kSlack);
+  const SliceSums slice = SliceOfPass(std::move(eye), of.plan, std::move(sums), of.settings,
+                                      SceneNeeds(), of.scale, of.team);
+  EXPECT_NEAR(static_cast<double>(LiveBytes() - before),
+              static_cast<double>(kPixels * BytesAPixel(slice)), kSlack);
+  EXPECT_LE(MostLiveBytes() - before, kPixels * (kWhere + kRow + kSeen + of.OfSums()) + kSlack);
+}
+
+// A worker has packed what eye paths brought when it gathers photons.
+TEST(SliceOfPassMemoryTest, HoldsWhatEyePathsBroughtInFewerBytes) {
+  PassSlice of;
+  const std::size_t before = LiveBytes();
+  EyePass eye = WholePass(0);
+  SliceSums slice = BeginSlice(eye, of.settings);
+  ForgetMostLiveBytes();
+  AddEyePaths(slice, eye, of.settings, SceneNeeds(), of.team);
+  // Direct light, albedo and normal in three columns each, distance and hits, of three bytes each.
+  constexpr std::size_t kPacked = std::size_t{11} * 3;
+  EXPECT_EQ(BytesAPixel(slice), kPacked);
+  EXPECT_NEAR(static_cast<double>(LiveBytes() - before),
+              static_cast<double>(kPixels * (kWhere + kRow + kPacked)), kSlack);
+  EXPECT_LE(MostLiveBytes() - before,
+            kPixels * (kWhere + kRow + sizeof(EyeFeatures) + kPacked) + kSlack);
+  PassSums sums(kPixels, of.columns);
+  ForgetMostLiveBytes();
+  AddPhotons(slice, eye, of.plan, std::move(sums), of.settings, SceneNeeds(), of.scale, of.team);
+  EXPECT_LE(MostLiveBytes() - before, kPixels * (kWhere + kRow + kPacked + of.OfSums()) + kSlack);
+  EXPECT_NEAR(static_cast<double>(LiveBytes() - before),
+              static_cast<double>(kPixels * BytesAPixel(slice)), kSlack);
 }
 
 }  // namespace

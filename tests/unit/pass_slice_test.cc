@@ -262,6 +262,36 @@ TEST(SliceOfPassTest, PassesWithoutEvidenceBringColumnsOfZeros) {
   }
 }
 
+// A worker adds what eye paths brought before it gathers photons, the coordinator after.
+TEST(SliceOfPassTest, HasTheSameBitsInEitherOrderOfItsParts) {
+  const RenderSettings settings = Settings(RadiusControllerKind::kAppm, KernelKind::kEpanechnikov);
+  const std::size_t columns = kCommonColumns + ControllerColumns(settings.radius_controller);
+  EyePass eye = PassOfOneHitpoint(3, 2, 1, {2, 0.3F, 1}, 0.7F);
+  eye.direct = {{0.1F, 0.2F, 0.3F}, {4, 5, 6}};
+  eye.features[1] = {.albedo = {0.3F, 0.4F, 0.5F}, .normal = {0, 0.6F, 0.8F}, .distance = 7};
+  eye.rays = 5;
+  PassSums sums(1, columns);
+  Accumulation accumulation;
+  accumulation.hitpoints = {0};
+  accumulation.counts = {3};
+  accumulation.flux = {{{8}, {9}, {10}}};
+  for (std::size_t column = 0; column < columns; ++column)
+    accumulation.evidence.push_back({static_cast<std::int64_t>(column) + 5});
+  accumulation.tally.photons = 4;
+  ASSERT_TRUE(sums.Add(accumulation).ok());
+  const RoundPlan plan = Plan(4, {1, 2});
+  const FluxScale scale = {Gray(1), Gray(1)};
+  const SliceSums expected = SliceOfPass(eye, plan, sums, settings, scale);
+  ThreadTeam team(2);
+  SliceSums slice = BeginSlice(eye, settings);
+  AddEyePaths(slice, eye, settings, SceneNeeds(), team);
+  EXPECT_EQ(slice.columns[kDirectRadiance + 1][1], 5);
+  EXPECT_EQ(slice.columns[slice.first_feature() + kHits][1], 1);
+  AddPhotons(slice, eye, plan, sums, settings, SceneNeeds(), scale, team);
+  EXPECT_EQ(slice, expected);
+  EXPECT_GT(slice.columns[kPhotonRadiance][1], 0);
+}
+
 // Only the first passes carry features: sums over those of them that met a surface.
 TEST(SliceOfPassTest, FeaturesAreOfTheFirstPassesThatMetASurface) {
   const RenderSettings settings = Settings(RadiusControllerKind::kPpm, KernelKind::kEpanechnikov);
