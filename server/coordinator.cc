@@ -190,7 +190,7 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
   // Its files stay beside it.
   const std::uint64_t files = SceneBytes(submission.manifest);
-  if (MemoryNeedOf(job.needs, job.settings, HeldOfScene(job.scene_memory), state_ != nullptr) +
+  if (MemoryNeedOf(job.needs, job.settings, HeldOfScene(job.scene_memory)) +
           files >
       budget_.max_bytes()) {
     return absl::ResourceExhaustedError(
@@ -563,8 +563,7 @@ StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
 StatusOr<std::optional<MemoryClaim>> Coordinator::WaitForMemory(const JobTable::Turn& turn) {
   const std::uint64_t scene_memory =
       turn.scene_memory > 0 ? turn.scene_memory : GuessSceneMemory(SceneBytes(turn.manifest));
-  const std::uint64_t bytes = MemoryNeedOf(turn.needs, turn.settings, scene_memory,
-                                           /*keeps_checkpoints=*/state_ != nullptr);
+  const std::uint64_t bytes = MemoryNeedOf(turn.needs, turn.settings, scene_memory);
   bool has_waited = false;
   while (true) {
     StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kJobs, bytes);

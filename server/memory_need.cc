@@ -7,12 +7,12 @@
 namespace lucerna {
 namespace {
 
-// Bytes a pixel, beside what ExpectedCostOf counts: of a checkpoint on its way to the disk (220 of
-// sums, and of the photons that were reported), of the
-// copy that an error is estimated from and its work, and of the sums of squared deviations.
-constexpr std::uint64_t kCheckpoint = 220 + 2 * 14;
-constexpr std::uint64_t kEstimate = 48 + 72;
-constexpr std::uint64_t kPassVariance = 28;
+// Bytes a pixel: of a checkpoint as a file (sums, and the photons that were reported), and, beside
+// what ExpectedCostOf counts, of an error estimate at its highest and of the first passes' squared
+// deviations.
+constexpr std::uint64_t kCheckpoint = 190 + 2 * 14;
+constexpr std::uint64_t kEstimate = 64;
+constexpr std::uint64_t kPassVariance = 8;
 // Memory for a byte of a file: binary meshes become as much again with the tree over their
 // triangles three times; text becomes less.
 constexpr std::uint64_t kPerSceneByte = 4;
@@ -29,12 +29,11 @@ std::uint64_t CheckpointBytes(std::uint64_t pixels) {
 }
 
 std::uint64_t MemoryNeedOf(const SceneNeeds& needs, const RenderSettings& settings,
-                           std::uint64_t scene_memory, bool keeps_checkpoints) {
+                           std::uint64_t scene_memory) {
   const auto pixels = static_cast<std::uint64_t>(settings.crop_width()) *
                       static_cast<std::uint64_t>(settings.crop_height());
-  const std::uint64_t each = kEstimate + kPassVariance + (keeps_checkpoints ? kCheckpoint : 0);
-  return static_cast<std::uint64_t>(ExpectedCostOf(needs, settings).coordinator) + pixels * each +
-         scene_memory;
+  return static_cast<std::uint64_t>(ExpectedCostOf(needs, settings).coordinator) +
+         pixels * (kEstimate + kPassVariance) + scene_memory;
 }
 
 Status CheckSceneMemory(const SceneMemory& scene, std::uint64_t available_bytes) {

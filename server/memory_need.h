@@ -13,10 +13,11 @@
 
 namespace lucerna {
 
-// What a job holds of the coordinator's memory while it can go on [bytes]: its image's sums, the
-// copies that error estimates and checkpoints are made from, and `scene_memory` of the scene.
+// What a job holds of the coordinator's memory while it can go on [bytes]: its image's sums, what
+// error estimates are made from, and `scene_memory` of the scene. A checkpoint is written from
+// where the sums lie; reading one takes less than the rounds that are open later.
 [[nodiscard]] std::uint64_t MemoryNeedOf(const SceneNeeds& needs, const RenderSettings& settings,
-                                         std::uint64_t scene_memory, bool keeps_checkpoints);
+                                         std::uint64_t scene_memory);
 // What a job holds of its scene, with what building it takes for a while [bytes].
 [[nodiscard]] inline std::uint64_t HeldOfScene(const SceneMemory& memory) {
   return static_cast<std::uint64_t>(memory.KeptByCoordinator() + memory.building_trees);

@@ -7,6 +7,7 @@
 #include "absl/strings/str_join.h"
 
 #include "render/base/escape.h"
+#include "render/estimate/slice_sums.h"
 
 namespace lucerna {
 namespace {
@@ -826,8 +827,13 @@ std::uint64_t Scheduler::SliceSize(const Work& work, std::optional<double> pass_
   std::uint64_t size = std::min(
       {round_passes_ / (options_.slices_per_worker * std::max<std::uint64_t>(live_workers_, 1)),
        options_.max_slice, work.rest.size()});
+  // Their sums are twice as large, and a worker holds some while it traces others.
+  if (HasFeatures({work.rest.first, work.rest.first + 1})) size = 1;
+  const std::optional<double> time = pass_time ? pass_time : UsualTime(WorkKind::kPasses);
+  if (time && *time * static_cast<double>(size) > Seconds(options_.longest_slice)) {
+    size = static_cast<std::uint64_t>(Seconds(options_.longest_slice) / *time);
+  }
   if (work.due) {
-    const std::optional<double> time = pass_time ? pass_time : UsualTime(WorkKind::kPasses);
     const double left = Seconds(*work.due - now);
     if (!time || left <= 0) {
       size = 1;

@@ -74,6 +74,9 @@ struct SchedulerOptions {
   std::uint64_t max_split_ways = 6;
   std::uint64_t fixed_batch = 0;  // all batches of this size; 0: as above
   std::uint64_t max_slice = 16;   // [passes]
+  // By the time that the worker's passes take: what is lost with it, and the sums of halves that it
+  // holds, stay few where passes take long.
+  Duration longest_slice = std::chrono::seconds(30);
   // Slices are cut so that open rounds have so many for every worker.
   std::uint64_t slices_per_worker = 2;
   // A lease this many times older than the median batch may be doubled.

@@ -10,7 +10,7 @@ namespace {
 
 // Bytes a pixel, measured (docs/numerics.md, docs/measurements.md): of the coordinator for a job
 // without evidence, and of a worker.
-constexpr double kCoordinator = 450;
+constexpr double kCoordinator = 380;
 constexpr double kWorker = 320;
 // Of both, for each column of evidence of the slices that they hold.
 constexpr double kEvidenceColumn = 16;

@@ -470,6 +470,39 @@ TEST(SchedulerRoundTest, SlicesAreShorterTheMoreWorkersThereAre) {
   EXPECT_EQ(first_slice(1000), 1U);
 }
 
+// Each pass of them brings the looks of surfaces too.
+TEST(SchedulerRoundTest, SlicesOfTheFirstPassesAreOfOnePass) {
+  for (const std::uint64_t first : {14U, 16U}) {
+    Scheduler scheduler({});
+    const auto worker = scheduler.AddWorker("w", At(0)).value();
+    const PassRange round = RoundOf(first);
+    scheduler.OpenRound({"job", round.first}, {round.first, round.last}, {});
+    EXPECT_EQ(Ask(scheduler, worker, 0)->range.size(), first < 16 ? 1U : round.size() / 2);
+  }
+}
+
+// A worker takes at most 30 s for one, if its passes take less than that.
+TEST(SchedulerRoundTest, SlicesAreShorterTheLongerPassesTake) {
+  const PassKey key = {"job", 512};  // of 64 passes
+  const auto second_slice = [&](double pass_s) {
+    Scheduler scheduler({});
+    const auto worker = scheduler.AddWorker("w", At(0)).value();
+    scheduler.OpenRound(key, {512, 576}, {});
+    const auto lease = Ask(scheduler, worker, 0);
+    EXPECT_EQ(lease->range.size(), 16U) << "nothing is known of how long a pass takes";
+    const double took = pass_s * static_cast<double>(lease->range.size());
+    // Heard of now and then.
+    for (double now = 5; now < took; now += 5)
+      EXPECT_TRUE(Revoked(scheduler, worker, {lease->id}, now).empty());
+    scheduler.Commit(key, lease->range, At(took));
+    return Ask(scheduler, worker, took)->range.size();
+  };
+  EXPECT_EQ(second_slice(1), 16U);
+  EXPECT_EQ(second_slice(3.7), 8U);
+  EXPECT_EQ(second_slice(10), 2U);
+  EXPECT_EQ(second_slice(40), 1U);
+}
+
 TEST(SchedulerRoundTest, AllRoundsThatAreOpenAreShared) {
   Scheduler scheduler({});
   const auto worker = scheduler.AddWorker("w", At(0)).value();
