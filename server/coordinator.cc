@@ -190,8 +190,7 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
   // Its files stay beside it.
   const std::uint64_t files = SceneBytes(submission.manifest);
-  if (MemoryNeedOf(job.needs, job.settings, HeldOfScene(job.scene_memory)) +
-          files >
+  if (MemoryNeedOf(job.needs, job.settings, HeldOfScene(job.scene_memory)) + files >
       budget_.max_bytes()) {
     return absl::ResourceExhaustedError(
         "the job needs more memory than the coordinator has for all jobs; make the image or the "
@@ -656,8 +655,8 @@ Status Coordinator::KeepCheckpoint(const std::string& job_id, std::vector<std::s
   run->job.counters.coordinator_cpu = run->cpu;
   const SteadyTime began_at = clock_.Steady();
   const CheckpointPieces checkpoint = {options_.numeric_profile,
-                                 EncodeRecord(run->job, std::nullopt, run->running),
-                                 std::move(sums)};
+                                       EncodeRecord(run->job, std::nullopt, run->running),
+                                       std::move(sums)};
   const std::uint64_t size = CheckpointFiles::SizeAsFile(checkpoint);
   Status written = state_->checkpoints().Write(job_id, checkpoint);
   if (IsOverDiskLimit(written)) {
@@ -748,7 +747,8 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, M
                            std::vector<std::string_view> sums, std::int64_t passes,
                            const BatchTally&
                                tally) { return KeepCheckpoint(id, std::move(sums), passes, tally); }
-                     : std::function<Status(std::vector<std::string_view>, std::int64_t, const BatchTally&)>(),
+                     : std::function<Status(std::vector<std::string_view>, std::int64_t,
+                                            const BatchTally&)>(),
           .checkpoint_share = options_.checkpoint_share,
           .on_timed =
               [this, id](std::string_view row, SteadyTime from,

@@ -214,8 +214,8 @@ class Coordinator {
   Blob Claimed(Blob image);
   // Hands the job's newest checkpoint that can be used to its runner, if there is one.
   void RestoreCheckpoint(const std::string& job_id, JobRunner& runner);
-  Status KeepCheckpoint(const std::string& job_id, std::vector<std::string_view> sums, std::int64_t passes,
-                        const BatchTally& tally);
+  Status KeepCheckpoint(const std::string& job_id, std::vector<std::string_view> sums,
+                        std::int64_t passes, const BatchTally& tally);
   // The job succeeds when its image is on the disk, however long there is no room.
   // Errors: CANCELLED when the job, or the process, has ended meanwhile.
   Status EndWell(const std::string& job_id, StopReason reason, const Blob& image);

@@ -101,8 +101,9 @@ double FactorAt(const ImageSums& sums, const RadiusColumn& radii, std::size_t pi
   const ImageSums::Features features = sums.FeaturesAt(pixel);
   if (!(features.hitpoints > 0 && features.hits > 0)) return 0;
   const Rgb albedo = features.albedo / static_cast<float>(features.hits);
-  const double radius = static_cast<double>(radii[pixel]) *
-                        static_cast<double>(features.unit_radius / static_cast<float>(features.hitpoints));
+  const double radius =
+      static_cast<double>(radii[pixel]) *
+      static_cast<double>(features.unit_radius / static_cast<float>(features.hitpoints));
   return WorkingLuminance(static_cast<double>(albedo.r), static_cast<double>(albedo.g),
                           static_cast<double>(albedo.b)) /
          std::max(radius * radius, 1e-36);
@@ -243,16 +244,16 @@ struct JobEstimator::State {
                                                  : nullptr;
   }
 
-  // How many photons later passes have once `round` has been added, given how many they would have by
-  // what was known before.
+  // How many photons later passes have once `round` has been added, given how many they would have
+  // by what was known before.
   [[nodiscard]] std::uint64_t ChoosePhotons(const PassRange& round, std::uint64_t before) {
     if (!settings.adaptive_photons) return before;
     const auto choice = std::ranges::find(kPhotonChoices, round.last, &PhotonChoice::passes);
     if (choice == kPhotonChoices.end()) return before;
     if (variance != nullptr) {
       const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
-      best_photons = variance->BestPhotons(*sums, kPi64 * Kernel{settings.kernel}.Moments().roughness *
-                                           reach * reach);
+      best_photons = variance->BestPhotons(
+          *sums, kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach);
       if (round.last == kFirstLongRound) variance.reset();
     }
     const auto first = static_cast<std::uint64_t>(settings.photons_per_pass);
@@ -513,12 +514,12 @@ BandedImage JobEstimator::MakeBands() const {
     const auto width = static_cast<std::size_t>(state.settings.crop_width());
     const std::size_t first = static_cast<std::size_t>(first_row) * width;
     const std::size_t last = static_cast<std::size_t>(last_row) * width;
-    std::vector<ImageChannel> band = MakeFilmPixels(
-        {.exposure = scene.film.exposure,
-         .max_component = scene.film.max_component,
-         .has_coverage = state.settings.coverage},
-        first, last, sums, *state.last_radii, *state.radii, *state.controller,
-        Kernel{state.settings.kernel}, state_->team);
+    std::vector<ImageChannel> band =
+        MakeFilmPixels({.exposure = scene.film.exposure,
+                        .max_component = scene.film.max_component,
+                        .has_coverage = state.settings.coverage},
+                       first, last, sums, *state.last_radii, *state.radii, *state.controller,
+                       Kernel{state.settings.kernel}, state_->team);
     ToFileUnit(band, scene.unit);
     if (!has_noise) return band;
     const auto errors_of = [&](std::size_t offset) {
@@ -555,8 +556,8 @@ std::vector<float> JobEstimator::NoiseLayer() const {
       const double difference = even_sum / even_passes - (sum - even_sum) / odd_passes;
       const double largest = exposure * static_cast<double>(of_pixel.largest) - sum / passes_so_far;
       noise[pixel] = {
-          .of_halves = difference * difference * even_passes * odd_passes /
-                       (passes_so_far * passes_so_far),
+          .of_halves =
+              difference * difference * even_passes * odd_passes / (passes_so_far * passes_so_far),
           .of_passes = variance / (passes_so_far - 1),
           .largest_share = std::min(1.0, largest * largest / (passes_so_far * variance))};
     }
@@ -729,8 +730,7 @@ TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference,
   for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
     for (std::size_t c = 0; c < 3; ++c) {
       const auto right = static_cast<double>(reference[pixel][static_cast<int>(c)]);
-      const double off =
-          static_cast<double>(snapshot.image.all[c][pixel]) * to_pixel - right;
+      const double off = static_cast<double>(snapshot.image.all[c][pixel]) * to_pixel - right;
       pixels[pixel].absolute += off * off;
       pixels[pixel].relative += RelativeSquare(off * off, right, floor);
     }

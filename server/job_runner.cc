@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 
+#include "render/base/memory.h"
 #include "render/estimate/evidence.h"
 #include "render/wire/block_codec.h"
 #include "render/wire/bytes.h"
@@ -566,6 +567,8 @@ void JobRunner::BeginEstimateIfDue(bool is_last) {
   }
   // One at a time, so that which passes are estimated does not depend on how long that takes.
   TakeInEstimate(true);
+  // It holds the most that a job holds, and what is free is seldom in pieces of its size.
+  ReleaseFreedMemory();
   EstimatorSnapshot snapshot;
   {
     const MutexLock lock(estimator_mutex_);
@@ -688,9 +691,9 @@ Status JobRunner::KeepCheckpoint() {
   TakeInEstimate(true);
   const SteadyTime began_at = hooks_.clock.Steady();
   const ByteWriter saved = Save();
-  LUCERNA_RETURN_IF_ERROR(hooks_.on_checkpoint(
-      saved.Pieces(), static_cast<std::int64_t>(estimator_->whole_passes()),
-      estimator_->whole_tally()));
+  LUCERNA_RETURN_IF_ERROR(
+      hooks_.on_checkpoint(saved.Pieces(), static_cast<std::int64_t>(estimator_->whole_passes()),
+                           estimator_->whole_tally()));
   Timed("checkpoint", began_at,
         [&] { return absl::StrCat("checkpoint of ", estimator_->whole_passes(), " passes"); });
   const SteadyTime now = hooks_.clock.Steady();

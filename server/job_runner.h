@@ -79,9 +79,9 @@ struct RunnerHooks {
   // At a stop: the same of the passes after the last round merged. They are part of a later round.
   std::function<void(const BatchTally& tally, std::int64_t passes)> on_tail;
   std::function<void(const ErrorCheckpoint& checkpoint)> on_error_estimate;
-  // Keeps the pieces that Save gave, so that a later process can Restore it; absent: nothing is kept.
-  // `tally` is of the `passes` in it. When it fails the job pauses, and it is called again every
-  // second.
+  // Keeps the pieces that Save gave, so that a later process can Restore it; absent: nothing is
+  // kept. `tally` is of the `passes` in it. When it fails the job pauses, and it is called again
+  // every second.
   std::function<Status(std::vector<std::string_view> sums, std::int64_t passes,
                        const BatchTally& tally)>
       on_checkpoint;

@@ -109,8 +109,7 @@ StatusOr<OpenFile> OpenToRead(const std::string& path) {
   OpenFile file{Descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK))};
   if (file.descriptor.number() < 0) return FromErrno(errno, path, "cannot open");
   struct stat status {};
-  if (::fstat(file.descriptor.number(), &status) != 0)
-    return FromErrno(errno, path, "cannot read");
+  if (::fstat(file.descriptor.number(), &status) != 0) return FromErrno(errno, path, "cannot read");
   if (!S_ISREG(status.st_mode)) {
     return absl::InvalidArgumentError(absl::StrCat(path, ": not a regular file"));
   }
@@ -119,13 +118,11 @@ StatusOr<OpenFile> OpenToRead(const std::string& path) {
 }
 
 // So many from its beginning; fewer when it has become shorter.
-StatusOr<std::string> ReadBytes(const OpenFile& file, std::uint64_t size,
-                                const std::string& path) {
+StatusOr<std::string> ReadBytes(const OpenFile& file, std::uint64_t size, const std::string& path) {
   std::string bytes(size, '\0');
   std::size_t done = 0;
   while (done < bytes.size()) {
-    const ssize_t got =
-        ::read(file.descriptor.number(), bytes.data() + done, bytes.size() - done);
+    const ssize_t got = ::read(file.descriptor.number(), bytes.data() + done, bytes.size() - done);
     if (got < 0) {
       if (errno == EINTR) continue;
       return FromErrno(errno, path, "cannot read");
@@ -142,9 +139,8 @@ StatusOr<std::string> ReadBytes(const OpenFile& file, std::uint64_t size,
 StatusOr<std::string> ReadFile(const std::string& path, std::uint64_t max_size_bytes) {
   LUCERNA_ASSIGN_OR_RETURN(const OpenFile file, OpenToRead(path));
   if (file.size > max_size_bytes) {
-    return absl::ResourceExhaustedError(absl::StrCat(path, ": ", file.size,
-                                                     " bytes, more than the ", max_size_bytes,
-                                                     " that are allowed"));
+    return absl::ResourceExhaustedError(absl::StrCat(
+        path, ": ", file.size, " bytes, more than the ", max_size_bytes, " that are allowed"));
   }
   return ReadBytes(file, file.size, path);
 }

@@ -656,13 +656,11 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
     }
     return std::array<double, 2>{halves, independent};
   };
-  const auto [halves, independent] =
-      SumOfBlocks<2>(team, height, [&](std::size_t begin, std::size_t end) {
-        return [&do_row, around = MeanAround(image, static_cast<int>(begin),
-                                             static_cast<int>(end))](std::size_t row) {
-          return do_row(around, row);
-        };
-      });
+  const auto [halves,
+              independent] = SumOfBlocks<2>(team, height, [&](std::size_t begin, std::size_t end) {
+    return [&do_row, around = MeanAround(image, static_cast<int>(begin), static_cast<int>(end))](
+               std::size_t row) { return do_row(around, row); };
+  });
   // Before what smoothing takes.
   FreeMemoryOf(least_luminance);
   for (std::vector<float>& channel : image.all)

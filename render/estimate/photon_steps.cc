@@ -85,8 +85,8 @@ void PassVariance::Add(const SliceSums& pass, const ImageSums& before) {
   const auto add = [](float& sum, double value) { sum = Held(static_cast<double>(sum) + value); };
   for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const auto at = [&](std::size_t column) { return static_cast<double>(pass.At(column, i)); };
-    const double photons = WorkingLuminance(at(kPhotonRadiance), at(kPhotonRadiance + 1),
-                                            at(kPhotonRadiance + 2));
+    const double photons =
+        WorkingLuminance(at(kPhotonRadiance), at(kPhotonRadiance + 1), at(kPhotonRadiance + 2));
     if (passes > 0) {
       add(pixels_[i].deviations,
           DeviationBetween(passes, LuminanceOfWorking(before.At(i).photons), 1, photons));

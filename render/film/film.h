@@ -25,10 +25,12 @@ struct FilmFormat {
 // The pixels [first, last) of the image of all passes of `sums`, Rec. 709. `last_radii` are those
 // of the last round [unit radii]. The layers of kEveryImage, of kCoverage on request, and of
 // kPredictions if the controller makes any (film/layers.h). Requires sums.passes() > 0.
-[[nodiscard]] std::vector<ImageChannel> MakeFilmPixels(
-    const FilmFormat& format, std::size_t first, std::size_t last, const ImageSums& sums,
-    const RadiusColumn& last_radii, const PixelRadii& radii, const RadiusController& controller,
-    const Kernel& kernel, ThreadTeam& team);
+[[nodiscard]] std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t first,
+                                                       std::size_t last, const ImageSums& sums,
+                                                       const RadiusColumn& last_radii,
+                                                       const PixelRadii& radii,
+                                                       const RadiusController& controller,
+                                                       const Kernel& kernel, ThreadTeam& team);
 
 // Says of an image that it is a part of a whole, where the settings crop it.
 void SetImageWindow(const RenderSettings& settings, Image& image);

@@ -97,7 +97,8 @@ BandedImage InBands(Image whole) {
     std::vector<ImageChannel> band;
     band.reserve(shared->size());
     for (const ImageChannel& channel : *shared)
-      band.push_back({channel.name, {channel.pixels.begin() + begin, channel.pixels.begin() + end}});
+      band.push_back(
+          {channel.name, {channel.pixels.begin() + begin, channel.pixels.begin() + end}});
     return band;
   };
   return banded;

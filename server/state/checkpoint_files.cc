@@ -145,9 +145,8 @@ std::vector<std::string> CheckpointFiles::Read(const std::string& job_id,
   std::vector<std::string> damaged;
   std::vector<Newest> there;
   const auto is_damaged = [&](const std::string& path, const Status& why) {
-    damaged.push_back(why.ok()
-                          ? absl::StrCat(path, " is damaged, or of another version of Lucerna")
-                          : std::string(why.message()));
+    damaged.push_back(why.ok() ? absl::StrCat(path, " is damaged, or of another version of Lucerna")
+                               : std::string(why.message()));
   };
   for (int slot = 0; slot < kSlots; ++slot) {
     const std::string path = PathOf(job_id, slot);
@@ -165,8 +164,7 @@ std::vector<std::string> CheckpointFiles::Read(const std::string& job_id,
   for (const Newest& file : there) {
     const std::string path = PathOf(job_id, file.slot);
     StatusOr<std::string> bytes = ReadFile(path);
-    std::optional<Checkpoint> checkpoint =
-        bytes.ok() ? Decode(*std::move(bytes)) : std::nullopt;
+    std::optional<Checkpoint> checkpoint = bytes.ok() ? Decode(*std::move(bytes)) : std::nullopt;
     if (!checkpoint) {
       is_damaged(path, bytes.status());
       continue;

@@ -1,8 +1,8 @@
 // How are an estimator's sums laid out in a checkpoint?
 //
 // Numbers as they are in memory, little-endian: what is read is to the bit what was written, and
-// columns are borrowed by the writer, not copied (ByteWriter::Borrowed). Sums are of the same machine's build (the checkpoint names its numeric profile), so that
-// nothing is converted.
+// columns are borrowed by the writer, not copied (ByteWriter::Borrowed). Sums are of the same
+// machine's build (the checkpoint names its numeric profile), so that nothing is converted.
 #pragma once
 
 #include "render/base/status.h"

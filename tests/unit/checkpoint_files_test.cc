@@ -29,9 +29,9 @@ Checkpoint NumberedCheckpoint(int number) {
 // In two pieces.
 Status Write(CheckpointFiles& files, const std::string& job_id, const Checkpoint& checkpoint) {
   const std::string_view sums = checkpoint.sums;
-  return files.Write(job_id, {checkpoint.numeric_profile,
-                              checkpoint.record,
-                              {sums.substr(0, 400), sums.substr(400)}});
+  return files.Write(
+      job_id,
+      {checkpoint.numeric_profile, checkpoint.record, {sums.substr(0, 400), sums.substr(400)}});
 }
 
 struct Found {

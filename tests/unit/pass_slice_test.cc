@@ -315,8 +315,10 @@ TEST(SliceOfPassTest, FeaturesAreOfTheFirstPassesThatMetASurface) {
   EXPECT_EQ(features.hitpoints, 0);
   // A rounding of each pass, and one of a float for each addition.
   const double rounding = kRadianceRounding + kFeaturePasses * 0x1p-24;
-  EXPECT_NEAR(static_cast<double>(features.albedo.g / static_cast<float>(features.hits)), 0.3, 0.3 * rounding);
-  EXPECT_NEAR(static_cast<double>(features.distance / static_cast<float>(features.hits)), 0.7, 0.7 * rounding);
+  EXPECT_NEAR(static_cast<double>(features.albedo.g / static_cast<float>(features.hits)), 0.3,
+              0.3 * rounding);
+  EXPECT_NEAR(static_cast<double>(features.distance / static_cast<float>(features.hits)), 0.7,
+              0.7 * rounding);
   EXPECT_EQ(features.normal.z, static_cast<float>(features.hits));
 }
 

@@ -213,7 +213,8 @@ TEST(AppmTest, KeepsItsRadiusInEvenLight) {
       }
       const std::array<double, kCurvatureColumns> columns = {std::rint(laplacian / kWeightUnit),
                                                              std::rint(weight2 / kWeight2Unit)};
-      pixel = appm->Next(pixel, {weight2, pixel.radius, columns, blur, pass + 1}, OnePass(pass), memory);
+      pixel = appm->Next(pixel, {weight2, pixel.radius, columns, blur, pass + 1}, OnePass(pass),
+                         memory);
     }
     if (pixel.radius < 0.9F) ++shrunk;
   }

@@ -43,7 +43,9 @@ class Appm final : public RadiusController {
     const auto n = static_cast<double>(passes.last);
     // Of the bias over the squared radius, squared.
     const double by_laplacian = moments_.mu2 / 2 * memory[kLaplacian] / n;
-    const double square = std::max(by_laplacian * by_laplacian, SureSquareOfBlur(memory, n, static_cast<double>(evidence.rounds)));
+    const double square =
+        std::max(by_laplacian * by_laplacian,
+                 SureSquareOfBlur(memory, n, static_cast<double>(evidence.rounds)));
     if (square == 0) return next;
     // The least of roughness · squares / (n r²) + square r⁴.
     const double sixth = moments_.roughness * (memory[kSquares] / n) / (n * 2 * square);
@@ -60,13 +62,7 @@ class Appm final : public RadiusController {
   }
 
  private:
-  enum Memory : std::size_t {
-    kLaplacian,
-    kSquares,
-    kBlur,
-    kBlurSquares,
-    kNumbers
-  };
+  enum Memory : std::size_t { kLaplacian, kSquares, kBlur, kBlurSquares, kNumbers };
   static constexpr double kSmallestShare = 0.01;
   // Blur counts from so many rounds on, and so many times its standard deviation is taken from it:
   // less than this is shown by noise in one of thousands of pixels.
