@@ -10,6 +10,7 @@
 #include <new>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -303,12 +304,17 @@ class ExrWriter {
       header_.insert(key, Imf::StringAttribute(value));
       attribute_bytes_ += key.size() + value.size() + kBytesPerAttribute;
     }
-    // Of the threads that the library has for all files at once this one uses so many.
+    // Of the threads that the library has for all files at once this one uses so many. Where the
+    // system gives none, the caller's does it all.
     threads_ = ThreadsOrAll(threads);
-    if (threads_ == 1) threads_ = 0;  // the caller's
+    if (threads_ == 1) threads_ = 0;
     static Mutex mutex;
     const MutexLock lock(mutex);
-    if (Imf::globalThreadCount() < threads_) Imf::setGlobalThreadCount(threads_);
+    try {
+      if (Imf::globalThreadCount() < threads_) Imf::setGlobalThreadCount(threads_);
+    } catch (const std::system_error&) {
+      threads_ = 0;
+    }
   }
 
   // The rows [first, last), behind those added so far.
