@@ -161,6 +161,7 @@ std::vector<std::string> CheckpointFiles::Read(const std::string& job_id,
   }
   std::ranges::sort(there, std::ranges::greater(), &Newest::number);
   bool is_newest = true;
+  bool is_used = false;
   for (const Newest& file : there) {
     const std::string path = PathOf(job_id, file.slot);
     StatusOr<std::string> bytes = ReadFile(path);
@@ -173,7 +174,9 @@ std::vector<std::string> CheckpointFiles::Read(const std::string& job_id,
       const MutexLock lock(mutex_);
       newest_[job_id] = file;
     }
-    if (use(*std::move(checkpoint))) return damaged;
+    // Others are read all the same: whether a disk damages files is to be said before they are
+    // needed.
+    is_used = is_used || use(*std::move(checkpoint));
   }
   if (is_newest) {
     const MutexLock lock(mutex_);

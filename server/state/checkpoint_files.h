@@ -51,8 +51,8 @@ class CheckpointFiles {
   // Of the file that it is written to [bytes].
   [[nodiscard]] static std::uint64_t SizeAsFile(const CheckpointPieces& checkpoint);
 
-  // Reads the checkpoints of a job, the newer first, one at a time, until `use` says that it has
-  // used one. Returns a sentence for each file that it came upon and that is no whole checkpoint.
+  // Reads the checkpoints of a job, the newer first, one at a time, and hands them to `use` until
+  // it says that it has used one. Returns a sentence for each file that is no whole checkpoint.
   [[nodiscard]] std::vector<std::string> Read(const std::string& job_id,
                                               const std::function<bool(Checkpoint)>& use);
   // Whether there is a file, damaged or not.

@@ -690,27 +690,30 @@ TEST(SchedulerRoundTest, AClosedRoundRevokesItsSlices) {
 // Slices of eight passes take eight times as long as those of one: a straggler is measured by the
 // passes it has.
 TEST(SchedulerRoundTest, ALongSliceIsNoStraggler) {
+  constexpr double kPass = 3;  // usual time [s]
+  constexpr double kBegin = 3 * kPass;
   Scheduler scheduler({});
   const auto quick = scheduler.AddWorker("quick", At(0)).value();
   for (std::uint64_t first = 0; first < 3; ++first) {
     const PassKey key = {"job", first};
     scheduler.OpenRound(key, {first, first + 1}, {});
-    const double now = 10.0 * static_cast<double>(first);
-    scheduler.Commit(key, Ask(scheduler, quick, now)->range, At(now + 10));
+    const double now = kPass * static_cast<double>(first);
+    scheduler.Commit(key, Ask(scheduler, quick, now)->range, At(now + kPass));
     scheduler.Close(key);
   }
   scheduler.OpenRound(kRound64, {64, 72}, {});
   scheduler.OpenRound(kRound72, {72, 80}, {});
-  const auto slow = scheduler.AddWorker("slow", At(30)).value();
+  const auto slow = scheduler.AddWorker("slow", At(kBegin)).value();
   scheduler.RemoveWorker(quick);
-  ASSERT_EQ(Ask(scheduler, slow, 30)->range, (WorkRange{64, 72}));
-  const auto idle = scheduler.AddWorker("idle", At(30)).value();
-  while (const auto lease = Ask(scheduler, idle, 30))
+  ASSERT_EQ(Ask(scheduler, slow, kBegin)->range, (WorkRange{64, 72}));
+  const auto idle = scheduler.AddWorker("idle", At(kBegin)).value();
+  while (const auto lease = Ask(scheduler, idle, kBegin))
     scheduler.Commit(lease->pass, lease->range,
-                     At(30.0 + 10.0 * static_cast<double>(lease->range.size())));
-  EXPECT_FALSE(Ask(scheduler, idle, 30 + 3 * 10 + 1)) << "three times the usual time of one pass";
-  EXPECT_FALSE(Ask(scheduler, idle, 30 + 3 * 80 - 1));
-  const auto doubled = Ask(scheduler, idle, 30 + 3 * 80 + 1);
+                     At(kBegin + kPass * static_cast<double>(lease->range.size())));
+  EXPECT_FALSE(Ask(scheduler, idle, kBegin + 3 * kPass + 1))
+      << "three times the usual time of one pass";
+  EXPECT_FALSE(Ask(scheduler, idle, kBegin + 3 * 8 * kPass - 1));
+  const auto doubled = Ask(scheduler, idle, kBegin + 3 * 8 * kPass + 1);
   ASSERT_TRUE(doubled);
   EXPECT_EQ(doubled->range, (WorkRange{64, 72}));
 }
