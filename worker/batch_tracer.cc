@@ -447,23 +447,23 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
   // bytes what eye paths brought.
   SliceSums slice = BeginSlice(eye, settings);
   AddEyePaths(slice, eye, settings, needs, state.team);
+  RadiusColumn radii = TakeHitpointRadii(eye, plan, &state.team);
   std::optional<PassSums> sums;
   // A camera that sees nothing needs no photons, and without light there are none.
   if (eye.block.size() > 0 && needs.Uses(Part::kPhotons)) {
     std::vector<std::uint64_t> named;
     const PhotonRange photons = {pass, 0, plan.photons_per_pass, plan.photons_per_pass,
                                  plan.guide.get()};
-    LUCERNA_ASSIGN_OR_RETURN(sums,
-                             GatherPhotons(settings, needs, photons, eye.block,
-                                           HitpointRadii(eye, plan, &state.team), stop, named));
+    LUCERNA_ASSIGN_OR_RETURN(
+        sums, GatherPhotons(settings, needs, photons, eye.block, radii, stop, named));
     for (const std::uint64_t index : named)
       slice.dropped_photons.push_back({pass, index});
   }
   if (!sums) {
     sums.emplace(eye.block.size(), EvidenceColumns(EvidenceOf(settings.radius_controller, pass)));
   }
-  AddPhotons(slice, eye, plan, *std::move(sums), settings, needs, state.prepared.flux_scale(),
-             state.team);
+  AddPhotons(slice, eye, plan, std::move(radii), *std::move(sums), settings, needs,
+             state.prepared.flux_scale(), state.team);
   return slice;
 }
 

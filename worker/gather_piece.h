@@ -5,9 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "render/math/packed_integers.h"
+
 namespace lucerna {
 
-inline constexpr std::size_t kRowsPerPiece = 2048;
+// By one thread: so many share memory where they are summed.
+inline constexpr std::size_t kRowsPerPiece = PackedIntegers::kTileSize;
 
 struct GatherPiece {
   std::uint64_t pairs = 0;

@@ -43,7 +43,10 @@ std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const Radius
                                         PassSums& sums) {
   const std::size_t first_row = block.first_segment();
   const std::size_t count = block.segments.size();
-  std::vector<GatherPiece> pieces((count + kRowsPerPiece - 1) / kRowsPerPiece);
+  // Pieces of rows as in Gather, of which the first may be shared with surfaces.
+  const std::size_t first_piece = first_row / kRowsPerPiece;
+  const std::size_t end_row = first_row + count;
+  std::vector<GatherPiece> pieces((end_row + kRowsPerPiece - 1) / kRowsPerPiece - first_piece);
   const float quanta_per_luminance = 1 / Luminance(scale.watts_per_quantum);
   constexpr float kInnerArea = kInnerShare * kInnerShare;
 
@@ -94,10 +97,11 @@ std::vector<GatherPiece> GatherSegments(const HitpointBlock& block, const Radius
 
   team.For(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p) {
-      const std::size_t first = p * kRowsPerPiece;
-      const std::size_t last = std::min(count, first + kRowsPerPiece);
-      for (std::size_t i = first; i < last && !stop.load(std::memory_order_relaxed); ++i)
-        gather_row(i, pieces[p]);
+      const std::size_t begin_of_piece = (first_piece + p) * kRowsPerPiece;
+      const std::size_t first = std::max(first_row, begin_of_piece);
+      const std::size_t last = std::min(end_row, begin_of_piece + kRowsPerPiece);
+      for (std::size_t row = first; row < last && !stop.load(std::memory_order_relaxed); ++row)
+        gather_row(row - first_row, pieces[p]);
     }
   });
   return pieces;

@@ -28,6 +28,10 @@ std::int64_t SaturatingSum(std::int64_t a, std::int64_t b) {
   return a < 0 ? Limits::min() : Limits::max();
 }
 
+void AddTo(PackedIntegers& sums, std::size_t i, std::int64_t value) {
+  sums.Set(i, sums[i] + value);
+}
+
 // Calls visit(ours, theirs) for every sum of two tallies, of which ours has as many lights as
 // theirs.
 template <typename Ours, typename Visit>
@@ -87,11 +91,11 @@ PassSums::PassSums(std::size_t hitpoints, std::size_t evidence_columns, ThreadTe
   const auto make = [&](std::size_t begin, std::size_t end) {
     for (std::size_t column = begin; column < end; ++column) {
       if (column < evidence_.size()) {
-        evidence_[column].resize(hitpoints);
+        evidence_[column] = PackedIntegers(hitpoints);
       } else if (column < evidence_.size() + flux_.size()) {
-        flux_[column - evidence_.size()].resize(hitpoints);
+        flux_[column - evidence_.size()] = PackedIntegers(hitpoints);
       } else {
-        counts_.resize(hitpoints);
+        counts_ = PackedIntegers(hitpoints);
       }
     }
   };
@@ -154,7 +158,7 @@ Status PassSums::Check(const Accumulation& accumulation) const {
     if (accumulation.counts[i] == 0) {
       return absl::InvalidArgumentError("an accumulation lists a hitpoint without photons");
     }
-    bool fits = SumFits(counts_[row], std::uint64_t{accumulation.counts[i]});
+    bool fits = SumFits(counts_[row], std::int64_t{accumulation.counts[i]});
     for (std::size_t channel = 0; channel < 3; ++channel) {
       fits = fits && SumFits(flux_[channel][row], accumulation.flux[channel][i]);
     }
@@ -171,19 +175,15 @@ Status PassSums::Check(const Accumulation& accumulation) const {
 
 Status PassSums::Add(const Accumulation& accumulation) {
   LUCERNA_RETURN_IF_ERROR(Check(accumulation));
-  for (std::size_t i = 0; i < accumulation.size(); ++i) {
-    counts_[accumulation.hitpoints[i]] += accumulation.counts[i];
-  }
-  for (std::size_t channel = 0; channel < 3; ++channel) {
-    for (std::size_t i = 0; i < accumulation.size(); ++i) {
-      flux_[channel][accumulation.hitpoints[i]] += accumulation.flux[channel][i];
-    }
-  }
-  for (std::size_t column = 0; column < evidence_.size(); ++column) {
-    for (std::size_t i = 0; i < accumulation.size(); ++i) {
-      evidence_[column][accumulation.hitpoints[i]] += accumulation.evidence[column][i];
-    }
-  }
+  const auto add = [&](const auto& values, PackedIntegers& sums) {
+    for (std::size_t i = 0; i < accumulation.size(); ++i)
+      AddTo(sums, accumulation.hitpoints[i], values[i]);
+  };
+  add(accumulation.counts, counts_);
+  for (std::size_t channel = 0; channel < 3; ++channel)
+    add(accumulation.flux[channel], flux_[channel]);
+  for (std::size_t column = 0; column < evidence_.size(); ++column)
+    add(accumulation.evidence[column], evidence_[column]);
   tally_ += accumulation.tally;
   found_.insert(found_.end(), accumulation.found.begin(), accumulation.found.end());
   return absl::OkStatus();
@@ -192,17 +192,18 @@ Status PassSums::Add(const Accumulation& accumulation) {
 bool PassSums::AddRow(std::size_t hitpoint, std::uint64_t count,
                       const std::array<std::int64_t, 3>& flux,
                       std::span<const std::int64_t> evidence) {
-  bool fits = SumFits(counts_[hitpoint], count);
+  bool fits = std::in_range<std::int64_t>(count) &&
+              SumFits(counts_[hitpoint], static_cast<std::int64_t>(count));
   for (std::size_t channel = 0; channel < 3; ++channel)
     fits = fits && SumFits(flux_[channel][hitpoint], flux[channel]);
   for (std::size_t column = 0; column < evidence_.size(); ++column)
     fits = fits && SumFits(evidence_[column][hitpoint], evidence[column]);
   if (!fits) return false;
-  counts_[hitpoint] += count;
+  AddTo(counts_, hitpoint, static_cast<std::int64_t>(count));
   for (std::size_t channel = 0; channel < 3; ++channel)
-    flux_[channel][hitpoint] += flux[channel];
+    AddTo(flux_[channel], hitpoint, flux[channel]);
   for (std::size_t column = 0; column < evidence_.size(); ++column)
-    evidence_[column][hitpoint] += evidence[column];
+    AddTo(evidence_[column], hitpoint, evidence[column]);
   return true;
 }
 
@@ -218,7 +219,7 @@ StatusOr<Accumulation> PassSums::ToAccumulation() const {
     out.hitpoints.push_back(static_cast<std::uint32_t>(row));
     out.counts.push_back(static_cast<std::uint32_t>(counts_[row]));
   }
-  const auto copy = [&](const std::vector<std::int64_t>& from, std::vector<std::int64_t>& to) {
+  const auto copy = [&](const PackedIntegers& from, std::vector<std::int64_t>& to) {
     to.reserve(out.size());
     for (const std::uint32_t row : out.hitpoints)
       to.push_back(from[row]);

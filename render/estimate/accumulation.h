@@ -17,6 +17,7 @@
 #include "render/base/parallel.h"
 #include "render/base/status.h"
 #include "render/estimate/emission_report.h"
+#include "render/math/packed_integers.h"
 
 namespace lucerna {
 
@@ -144,9 +145,9 @@ struct Accumulation {
 
 // What all photons of a pass brought to the hitpoints.
 struct SumColumns {
-  std::vector<std::uint64_t> counts;                // [hitpoints]
-  std::array<std::vector<std::int64_t>, 3> flux;    // [3][hitpoints] in quanta
-  std::vector<std::vector<std::int64_t>> evidence;  // [columns][hitpoints]
+  PackedIntegers counts;                 // [hitpoints]
+  std::array<PackedIntegers, 3> flux;    // [3][hitpoints] in quanta
+  std::vector<PackedIntegers> evidence;  // [columns][hitpoints]
 };
 
 // The sum of all batches of one pass, one row per hitpoint of the block.
@@ -163,7 +164,7 @@ class PassSums {
   [[nodiscard]] Status Add(const Accumulation& accumulation);
   // Adds what photons brought to one hitpoint, `evidence` a number for each column; no tally.
   // Returns false, and adds nothing, when a sum would not fit in 64 bits. May run beside itself for
-  // different hitpoints.
+  // hitpoints of different tiles (PackedIntegers::kTileSize).
   [[nodiscard]] bool AddRow(std::size_t hitpoint, std::uint64_t count,
                             const std::array<std::int64_t, 3>& flux,
                             std::span<const std::int64_t> evidence);
@@ -175,12 +176,12 @@ class PassSums {
   [[nodiscard]] SumColumns TakeColumns();
 
   [[nodiscard]] std::size_t size() const { return counts_.size(); }
-  [[nodiscard]] const std::vector<std::uint64_t>& counts() const { return counts_; }
+  [[nodiscard]] const PackedIntegers& counts() const { return counts_; }
   // [hitpoints] in quanta.
-  [[nodiscard]] const std::vector<std::int64_t>& flux(int channel) const {
+  [[nodiscard]] const PackedIntegers& flux(int channel) const {
     return flux_[static_cast<std::size_t>(channel)];
   }
-  [[nodiscard]] const std::vector<std::vector<std::int64_t>>& evidence() const { return evidence_; }
+  [[nodiscard]] const std::vector<PackedIntegers>& evidence() const { return evidence_; }
   [[nodiscard]] const BatchTally& tally() const { return tally_; }
   // Of all batches, in order of their indices.
   [[nodiscard]] std::vector<FoundPhoton> FoundInOrder() const;
@@ -188,9 +189,9 @@ class PassSums {
  private:
   [[nodiscard]] Status Check(const Accumulation& accumulation) const;
 
-  std::vector<std::uint64_t> counts_;
-  std::array<std::vector<std::int64_t>, 3> flux_;
-  std::vector<std::vector<std::int64_t>> evidence_;
+  PackedIntegers counts_;
+  std::array<PackedIntegers, 3> flux_;
+  std::vector<PackedIntegers> evidence_;
   BatchTally tally_;
   std::vector<FoundPhoton> found_;
 };

@@ -75,6 +75,26 @@ class ColorOfPass {
   std::optional<PassWavelengths> wavelengths_;
 };
 
+// Of unit radii makes radii.
+void ScaleRadii(const EyePass& pass, const RoundPlan& plan, ThreadTeam* team,
+                std::vector<float>& radii) {
+  LUCERNA_CHECK(radii.size() == pass.pixels.size());
+  const std::size_t first_caustic = pass.block.first_caustic();
+  const auto set = [&](std::size_t begin, std::size_t end) {
+    for (std::size_t row = begin; row < end; ++row) {
+      const float radius =
+          row < first_caustic ? (*plan.radii)[pass.pixels[row]] : plan.caustic_radius;
+      radii[row] = HitpointRadius(radius, radii[row]);
+    }
+  };
+  constexpr std::size_t kRowsAtOnce = std::size_t{1} << 14;
+  if (team != nullptr) {
+    team->For(radii.size(), kRowsAtOnce, set);
+  } else {
+    set(0, radii.size());
+  }
+}
+
 }  // namespace
 
 float HitpointRadius(float radius, float unit_radius) {
@@ -84,22 +104,15 @@ float HitpointRadius(float radius, float unit_radius) {
 }
 
 RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan, ThreadTeam* team) {
-  RadiusColumn of_hitpoints(pass.pixels.size());
-  const std::size_t first_caustic = pass.block.first_caustic();
-  const auto set = [&](std::size_t begin, std::size_t end) {
-    for (std::size_t row = begin; row < end; ++row) {
-      const float radius =
-          row < first_caustic ? (*plan.radii)[pass.pixels[row]] : plan.caustic_radius;
-      of_hitpoints[row] = HitpointRadius(radius, pass.unit_radii[row]);
-    }
-  };
-  constexpr std::size_t kRowsAtOnce = std::size_t{1} << 14;
-  if (team != nullptr) {
-    team->For(of_hitpoints.size(), kRowsAtOnce, set);
-  } else {
-    set(0, of_hitpoints.size());
-  }
-  return of_hitpoints;
+  RadiusColumn radii = pass.unit_radii;
+  ScaleRadii(pass, plan, team, radii);
+  return radii;
+}
+
+RadiusColumn TakeHitpointRadii(EyePass& pass, const RoundPlan& plan, ThreadTeam* team) {
+  RadiusColumn radii = std::exchange(pass.unit_radii, {});
+  ScaleRadii(pass, plan, team, radii);
+  return radii;
 }
 
 SliceSums BeginSlice(const EyePass& pass, const RenderSettings& settings) {
@@ -127,9 +140,7 @@ void AddEyePaths(SliceSums& slice, EyePass& pass, const RenderSettings& settings
 
   LUCERNA_CHECK(pass.features.size() == pixels);
   const std::size_t first_feature = slice.first_feature();
-  filler.Make(first_feature + kAlbedo, kUnitRadius - kAlbedo);
-  static_assert(kAlbedo < kNormal && kNormal < kDistance && kDistance < kUnitRadius);
-  filler.Make(first_feature + kHits, 1);
+  filler.Make(first_feature, kFeatureColumns);
   filler.ForPixels([&](std::size_t pixel) {
     const EyeFeatures& features = pass.features[pixel];
     if (!std::isfinite(features.distance)) return;
@@ -143,17 +154,27 @@ void AddEyePaths(SliceSums& slice, EyePass& pass, const RenderSettings& settings
     filler.Set(first_feature + kHits, pixel, 1);
   });
   FreeMemoryOf(pass.features);
+  // A pixel has at most one of these rows.
+  LUCERNA_CHECK(pass.unit_radii.size() == pass.pixels.size());
+  team.For(pass.block.first_caustic(), kTakenAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t row = begin; row < end; ++row) {
+      const std::uint32_t pixel = pass.pixels[row];
+      filler.Set(first_feature + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
+      filler.Set(first_feature + kHitpoints, pixel, 1);
+    }
+  });
 }
 
 // Columns are made when their turn comes, and what they follow from is freed after it. Beside all
 // of the sums, whose columns take eight bytes a hitpoint, there is only one column of the slice,
 // two bytes a pixel; from then on each step frees more than it takes.
-void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, PassSums sums,
-                const RenderSettings& settings, const SceneNeeds& needs, const FluxScale& scale,
-                ThreadTeam& team) {
+void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, RadiusColumn radii,
+                PassSums sums, const RenderSettings& settings, const SceneNeeds& needs,
+                const FluxScale& scale, ThreadTeam& team) {
   const std::size_t rows = pass.pixels.size();
   const std::size_t pixels = plan.radii->size();
-  LUCERNA_CHECK(sums.size() == rows && sums.evidence().size() >= kCommonColumns);
+  LUCERNA_CHECK(radii.size() == rows && sums.size() == rows &&
+                sums.evidence().size() >= kCommonColumns);
   const std::size_t evidence = slice.evidence;
   SliceFiller filler(slice, pixels, team);
   slice.tally = sums.tally();
@@ -189,9 +210,8 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, PassSums
     for_rows(first_caustic, first_segment, work);
     for_rows(first_segment, rows, work);
   };
-  const auto to_density = [&](std::size_t row, std::uint32_t pixel) {
-    const float in_units = row >= first_caustic ? plan.caustic_radius : (*plan.radii)[pixel];
-    const auto radius = static_cast<double>(HitpointRadius(in_units, pass.unit_radii[row]));
+  const auto to_density = [&](std::size_t row) {
+    const auto radius = static_cast<double>(radii[row]);
     return per_photon / (radius * radius);
   };
 
@@ -199,11 +219,11 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, PassSums
     filler.Make(kSliceColumns + column, 1);
     // Not every pass has the evidence of its controller.
     if (kCommonColumns + column >= columns.evidence.size()) continue;
-    std::vector<std::int64_t>& of_rows = columns.evidence[kCommonColumns + column];
+    PackedIntegers& of_rows = columns.evidence[kCommonColumns + column];
     for_rows(0, first_caustic, [&](std::size_t row, std::uint32_t pixel) {
       filler.Set(kSliceColumns + column, pixel, static_cast<double>(of_rows[row]));
     });
-    FreeMemoryOf(of_rows);
+    of_rows = PackedIntegers();
   }
 
   std::vector<float> of_bias(pixels);
@@ -211,7 +231,7 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, PassSums
   static_assert(kEvenBias < kOddBias && kOddBias < kPhotonCount && kPhotonCount < kBlur);
   for_all_rows([&](std::size_t row, std::uint32_t pixel) {
     const double blur = static_cast<double>(columns.evidence[kBlurColumn][row]) * kToBias;
-    add(of_bias[pixel], blur * luminance_per_quantum * to_density(row, pixel) *
+    add(of_bias[pixel], blur * luminance_per_quantum * to_density(row) *
                             static_cast<double>(Luminance(pass.weights[row])));
     if (row >= first_caustic) return;
     filler.Set(kPhotonCount, pixel, static_cast<double>(columns.counts[row]));
@@ -219,7 +239,7 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, PassSums
     filler.Set(kBlur, pixel, blur * norm / ((1 << kFluxBits) * unit_radius * unit_radius));
   });
   FreeMemoryOf(columns.evidence);
-  FreeMemoryOf(columns.counts);
+  columns.counts = PackedIntegers();
 
   std::array<std::vector<float>, 3> of_photons;
   team.For(of_photons.size(), 1, [&](std::size_t begin, std::size_t end) {
@@ -227,7 +247,7 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, PassSums
       of_photons[channel].resize(pixels);
   });
   for_all_rows([&](std::size_t row, std::uint32_t pixel) {
-    const double density = to_density(row, pixel);
+    const double density = to_density(row);
     for (int channel = 0; channel < 3; ++channel) {
       const auto c = static_cast<std::size_t>(channel);
       const double flux = static_cast<double>(columns.flux[c][row]) *
@@ -235,21 +255,11 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, PassSums
       add(of_photons[c][pixel], static_cast<double>(pass.weights[row][channel]) * flux * density);
     }
   });
-  for (std::vector<std::int64_t>& channel : columns.flux)
-    FreeMemoryOf(channel);
+  columns.flux = {};
   FreeMemoryOf(pass.weights);
 
-  if (HasFeatures(slice.passes)) {
-    const std::size_t first_feature = slice.first_feature();
-    filler.Make(first_feature + kUnitRadius, 1);
-    filler.Make(first_feature + kHitpoints, 1);
-    for_rows(0, first_caustic, [&](std::size_t row, std::uint32_t pixel) {
-      filler.Set(first_feature + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
-      filler.Set(first_feature + kHitpoints, pixel, 1);
-    });
-  }
   FreeMemoryOf(pass.pixels);
-  FreeMemoryOf(pass.unit_radii);
+  FreeMemoryOf(radii);
 
   filler.Make(kPhotonRadiance, 3);
   const ColorOfPass in_color(settings, needs, pass.pass);
@@ -274,9 +284,9 @@ SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,
                       const FluxScale& scale, ThreadTeam& team) {
   LUCERNA_CHECK(plan.radii->size() == pass.direct.size());
   SliceSums slice = BeginSlice(pass, settings);
-  // The sums go first: they take the most.
-  AddPhotons(slice, pass, plan, std::move(sums), settings, needs, scale, team);
   AddEyePaths(slice, pass, settings, needs, team);
+  RadiusColumn radii = TakeHitpointRadii(pass, plan, &team);
+  AddPhotons(slice, pass, plan, std::move(radii), std::move(sums), settings, needs, scale, team);
   return slice;
 }
 

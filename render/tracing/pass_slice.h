@@ -36,21 +36,24 @@ struct RoundPlan {
 // caller's alone.
 [[nodiscard]] RadiusColumn HitpointRadii(const EyePass& pass, const RoundPlan& plan,
                                          ThreadTeam* team = nullptr);
+// The same in the memory of the pass's unit radii, which it has no more.
+[[nodiscard]] RadiusColumn TakeHitpointRadii(EyePass& pass, const RoundPlan& plan,
+                                             ThreadTeam* team = nullptr);
 
-// The slice of one pass is made of two parts, in any order, each of which frees in `pass` what is
-// its alone, as soon as it can. Of a job that carries wavelengths (`needs`) they have their colour,
-// in the working space as any other.
+// The slice of one pass is made of two parts, one after the other, each of which frees in `pass`
+// what is its alone, as soon as it can. Of a job that carries wavelengths (`needs`) they have their
+// colour, in the working space as any other.
 
 // The slice of a pass without either part: its columns are empty.
 [[nodiscard]] SliceSums BeginSlice(const EyePass& pass, const RenderSettings& settings);
-// Direct light, and the features of surfaces in passes that have them.
+// Direct light, and the features of surfaces in passes that have them. Needs the unit radii.
 void AddEyePaths(SliceSums& slice, EyePass& pass, const RenderSettings& settings,
                  const SceneNeeds& needs, ThreadTeam& team);
-// What photons brought, and all else that hitpoints tell. `sums` are those of all photons of the
-// pass, gathered with HitpointRadii.
-void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, PassSums sums,
-                const RenderSettings& settings, const SceneNeeds& needs, const FluxScale& scale,
-                ThreadTeam& team);
+// What photons brought. `sums` are those of all photons of the pass, gathered with these radii of
+// hitpoints.
+void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, RadiusColumn radii,
+                PassSums sums, const RenderSettings& settings, const SceneNeeds& needs,
+                const FluxScale& scale, ThreadTeam& team);
 
 // Both parts of the slice of a pass, which is used up.
 [[nodiscard]] SliceSums SliceOfPass(EyePass pass, const RoundPlan& plan, PassSums sums,

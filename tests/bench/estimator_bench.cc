@@ -12,6 +12,8 @@
 // * block_on_the_wire, accumulation_on_the_wire: bytes a hitpoint sent and a touched hitpoint
 //   returned, and speed of their codecs
 // * merge: touched hitpoints merged per second
+// * slice: pixels of a slice of one and of four passes encoded, decoded and added to its sibling
+//   per second, and bytes a pixel sent
 //
 // Run: build/release/bin/lucerna-bench --benchmark_repetitions=10
 //      --benchmark_report_aggregates_only=true
@@ -29,6 +31,7 @@
 #include "render/tracing/hitpoint_pass.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/block_codec.h"
+#include "render/wire/slice_codec.h"
 #include "server/job_estimator.h"
 #include "tests/support/gather_sums.h"
 #include "tests/support/local_render.h"
@@ -275,6 +278,63 @@ void Merge(benchmark::State& state, const Bench& bench) {
               Counter::kIsRate);
 }
 
+// The slice of the job's passes from `first` on, and of as many behind it.
+struct Siblings {
+  Siblings(const Bench& bench, std::uint64_t passes) {
+    BatchTracer tracer(bench.scene, 2);
+    const std::atomic<bool> stop = false;
+    RoundPlan plan = bench.estimator->PlanFor({0, 1}).value();
+    plan.photons_per_pass = bench.eye.direct.size();
+    const std::uint64_t first = kFeaturePasses;
+    const auto trace = [&](const PassRange& range) {
+      return tracer.RunSlice(bench.settings, bench.needs, range, plan, stop).value();
+    };
+    one = trace({first, first + passes});
+    other = trace({first + passes, first + 2 * passes});
+    shape = {.passes = one.passes,
+             .pixels = one.pixels(),
+             .evidence = one.evidence,
+             .photons_per_pass = plan.photons_per_pass};
+  }
+  SliceSums one, other;
+  SliceShape shape;
+};
+
+void CountPixels(benchmark::State& state, const Siblings& slices) {
+  state.counters["pixels/s"] = Counter(
+      static_cast<double>(slices.one.pixels()) * static_cast<double>(state.iterations()),
+      Counter::kIsRate);
+}
+
+void EncodeOfSlice(benchmark::State& state, const Bench& bench) {
+  const Siblings slices(bench, static_cast<std::uint64_t>(state.range(0)));
+  std::size_t size_bytes = 0;
+  for (auto _ : state)
+    size_bytes = EncodeSlice(slices.one).size();
+  CountPixels(state, slices);
+  state.counters["bytes/pixel"] =
+      static_cast<double>(size_bytes) / static_cast<double>(slices.one.pixels());
+}
+
+void DecodeOfSlice(benchmark::State& state, const Bench& bench) {
+  const Siblings slices(bench, static_cast<std::uint64_t>(state.range(0)));
+  const std::string bytes = EncodeSlice(slices.one);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(DecodeSlice(bytes, slices.shape));
+  CountPixels(state, slices);
+}
+
+void MergeOfSlices(benchmark::State& state, const Bench& bench) {
+  const Siblings slices(bench, static_cast<std::uint64_t>(state.range(0)));
+  for (auto _ : state) {
+    state.PauseTiming();
+    SliceSums sum = slices.one;
+    state.ResumeTiming();
+    if (!MergeSibling(sum, slices.other).ok()) state.SkipWithError("no siblings");
+  }
+  CountPixels(state, slices);
+}
+
 void Register(const std::string& name, const std::string& path) {
   // Lives as long as the benchmarks that refer to it.
   const auto* bench = new Bench(path);
@@ -308,6 +368,9 @@ void Register(const std::string& name, const std::string& path) {
       ->Arg(1 << 20)
       ->Unit(benchmark::kMillisecond);
   add("merge", Merge)->Unit(benchmark::kMillisecond);
+  add("slice/encode", EncodeOfSlice)->Arg(1)->Arg(4)->Unit(benchmark::kMillisecond);
+  add("slice/decode", DecodeOfSlice)->Arg(1)->Arg(4)->Unit(benchmark::kMillisecond);
+  add("slice/merge", MergeOfSlices)->Arg(1)->Arg(4)->Unit(benchmark::kMillisecond);
 }
 
 }  // namespace

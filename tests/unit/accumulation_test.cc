@@ -38,8 +38,8 @@ TEST(PassSumsTest, DoesNotCareForTheOrder) {
     ASSERT_TRUE(backward.Add(*part).ok());
   }
   EXPECT_TRUE(AreEqual(forward, backward));
-  EXPECT_EQ(forward.counts(), (std::vector<std::uint64_t>{2, 2, 6, 2}));
-  EXPECT_EQ(forward.flux(1), (std::vector<std::int64_t>{7, -5, 1002, -5}));
+  EXPECT_EQ(forward.counts().ToVector(), (std::vector<std::int64_t>{2, 2, 6, 2}));
+  EXPECT_EQ(forward.flux(1).ToVector(), (std::vector<std::int64_t>{7, -5, 1002, -5}));
   EXPECT_EQ(forward.tally().rays, 90U);
 }
 
@@ -92,8 +92,8 @@ TEST(PassSumsTest, RefusesASumThatWouldWrap) {
   PassSums sums(2);
   ASSERT_TRUE(sums.Add(Make({1}, kMost)).ok());
   EXPECT_TRUE(absl::IsOutOfRange(sums.Add(Make({0, 1}, 1))));
-  EXPECT_EQ(sums.flux(0), (std::vector<std::int64_t>{0, kMost}));
-  EXPECT_EQ(sums.counts(), (std::vector<std::uint64_t>{0, 2}));
+  EXPECT_EQ(sums.flux(0).ToVector(), (std::vector<std::int64_t>{0, kMost}));
+  EXPECT_EQ(sums.counts().ToVector(), (std::vector<std::int64_t>{0, 2}));
   EXPECT_TRUE(sums.Add(Make({0, 1}, -1)).ok());
 
   PassSums with_evidence(2, 1);
@@ -130,10 +130,11 @@ TEST(PassSumsTest, KeepsTheTallyWhenItsColumnsAreTaken) {
   PassSums sums(3, 1);
   ASSERT_TRUE(sums.Add(whole).ok());
   const SumColumns columns = sums.TakeColumns();
-  EXPECT_EQ(columns.counts, (std::vector<std::uint64_t>{2, 0, 2}));
-  for (const std::vector<std::int64_t>& channel : columns.flux)
-    EXPECT_EQ(channel, (std::vector<std::int64_t>{7, 0, 7}));
-  EXPECT_EQ(columns.evidence, (std::vector<std::vector<std::int64_t>>{{5, 0, -6}}));
+  EXPECT_EQ(columns.counts.ToVector(), (std::vector<std::int64_t>{2, 0, 2}));
+  for (const PackedIntegers& channel : columns.flux)
+    EXPECT_EQ(channel.ToVector(), (std::vector<std::int64_t>{7, 0, 7}));
+  ASSERT_EQ(columns.evidence.size(), 1U);
+  EXPECT_EQ(columns.evidence[0].ToVector(), (std::vector<std::int64_t>{5, 0, -6}));
   EXPECT_EQ(sums.size(), 0U);
   EXPECT_TRUE(sums.flux(0).empty());
   EXPECT_TRUE(sums.evidence().empty());
@@ -238,7 +239,7 @@ TEST(PassSumsTest, AddsUpAndRefusesWhatBreaksItsPromises) {
   PassSums sums(3);
   ASSERT_TRUE(sums.Add(a).ok());
   ASSERT_TRUE(sums.Add(a).ok());
-  EXPECT_EQ(sums.flux(1), (std::vector<std::int64_t>{10, 0, -14}));
+  EXPECT_EQ(sums.flux(1).ToVector(), (std::vector<std::int64_t>{10, 0, -14}));
 
   sums = PassSums(3);
   Accumulation bad = a;
@@ -257,7 +258,7 @@ TEST(PassSumsTest, AddsUpAndRefusesWhatBreaksItsPromises) {
   large.flux[0] = {1, INT64_MAX};
   ASSERT_TRUE(sums.Add(large).ok());
   EXPECT_EQ(sums.Add(large).code(), absl::StatusCode::kOutOfRange);
-  EXPECT_EQ(sums.flux(0), (std::vector<std::int64_t>{1, 0, INT64_MAX}));
+  EXPECT_EQ(sums.flux(0).ToVector(), (std::vector<std::int64_t>{1, 0, INT64_MAX}));
 }
 
 }  // namespace

@@ -78,7 +78,7 @@ TEST(ExtremeCountsTest, APassOfATrillionPhotonsIsLentAndMergedWhole) {
   EXPECT_EQ(sums.tally().photons, kTrillion);
   EXPECT_EQ(sums.tally().rays, 3 * kTrillion);
   // More than a hitpoint's 32 bits of one batch.
-  EXPECT_EQ(sums.counts()[0], std::uint64_t{UINT32_MAX} * 1000);
+  EXPECT_EQ(sums.counts()[0], std::int64_t{UINT32_MAX} * 1000);
 }
 
 // N and r go on after N has passed 2^24, and after passes by the million. In float both stand

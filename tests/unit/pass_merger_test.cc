@@ -34,7 +34,7 @@ TEST(PassMergerTest, MergesEachRangeOnceInAnyOrder) {
   EXPECT_EQ(*Merge(merger, {30, 60}), Outcome::kAccepted);
   EXPECT_TRUE(merger.IsComplete(kPass));
   const PassSums sums = merger.Take(kPass);
-  EXPECT_EQ(sums.flux(0), (std::vector<std::int64_t>{0, 15}));
+  EXPECT_EQ(sums.flux(0).ToVector(), (std::vector<std::int64_t>{0, 15}));
   EXPECT_EQ(sums.tally().photons, 100U);
   EXPECT_EQ(*Merge(merger, {30, 60}), Outcome::kSuperseded);
 }

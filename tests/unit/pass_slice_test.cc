@@ -262,8 +262,8 @@ TEST(SliceOfPassTest, PassesWithoutEvidenceBringColumnsOfZeros) {
   }
 }
 
-// A worker adds what eye paths brought before it gathers photons, the coordinator after.
-TEST(SliceOfPassTest, HasTheSameBitsInEitherOrderOfItsParts) {
+// A worker adds what eye paths brought before it has gathered photons.
+TEST(SliceOfPassTest, IsMadeOfItsParts) {
   const RenderSettings settings = Settings(RadiusControllerKind::kAppm, KernelKind::kEpanechnikov);
   const std::size_t columns = kCommonColumns + ControllerColumns(settings.radius_controller);
   EyePass eye = PassOfOneHitpoint(3, 2, 1, {2, 0.3F, 1}, 0.7F);
@@ -287,7 +287,13 @@ TEST(SliceOfPassTest, HasTheSameBitsInEitherOrderOfItsParts) {
   AddEyePaths(slice, eye, settings, SceneNeeds(), team);
   EXPECT_EQ(slice.columns[kDirectRadiance + 1][1], 5);
   EXPECT_EQ(slice.columns[slice.first_feature() + kHits][1], 1);
-  AddPhotons(slice, eye, plan, sums, settings, SceneNeeds(), scale, team);
+  EXPECT_EQ(slice.columns[slice.first_feature() + kUnitRadius][1], Rounded(0.7, 16));
+  const RadiusColumn expected_radii = HitpointRadii(eye, plan);
+  const RadiusColumn radii = TakeHitpointRadii(eye, plan);
+  EXPECT_EQ(radii, expected_radii);
+  EXPECT_EQ(radii, RadiusColumn{HitpointRadius(2, 0.7F)});
+  EXPECT_TRUE(eye.unit_radii.empty());
+  AddPhotons(slice, eye, plan, radii, sums, settings, SceneNeeds(), scale, team);
   EXPECT_EQ(slice, expected);
   EXPECT_GT(slice.columns[kPhotonRadiance][1], 0);
 }
