@@ -60,7 +60,8 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   if (has_features) out.features.resize(pixels);
   std::vector<Rgb> bright(spread.is_needed() ? pixels : 0);
 
-  // A hitpoint as a row, until all tiles are known.
+  // Each pixel has at most one ordinary row, so that a tile's rows have room where its pixels are;
+  // they move together when all tiles are known. Other rows wait beside them.
   struct Row {
     std::uint32_t pixel;
     Vec3 position;
@@ -69,11 +70,13 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     float unit_radius;
   };
   struct Rows {
-    std::vector<Row> rows;
+    std::vector<Row> rows;  // none of ordinary ones
+    std::size_t count = 0;
     std::vector<GlossyHitpoint> glossy;  // by row of the tile
     std::vector<GlossyPlace> places;     // [glossy]
   };
   struct Tile {
+    std::size_t first_pixel = 0;  // tile after tile
     Rows rows;
     Rows caustic_rows;
     Rows segment_rows;
@@ -81,6 +84,39 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   };
   const bool automatic = tracer.settings().initial_radius == 0;
   std::vector<Tile> per_tile(tiles);
+  const auto for_pixels_of = [&](std::size_t tile, const auto& work) {
+    const int x0 = static_cast<int>(tile % static_cast<std::size_t>(tiles_x)) * kTile;
+    const int y0 = static_cast<int>(tile / static_cast<std::size_t>(tiles_x)) * kTile;
+    for (int y = y0; y < std::min(y0 + kTile, height); ++y) {
+      for (int x = x0; x < std::min(x0 + kTile, width); ++x)
+        work(x, y);
+    }
+  };
+  for (std::size_t tile = 1; tile < tiles; ++tile) {
+    std::size_t& first = per_tile[tile].first_pixel;
+    first = per_tile[tile - 1].first_pixel;
+    for_pixels_of(tile - 1, [&](int, int) { ++first; });
+  }
+  // Clearing memory takes as long as filling it in.
+  const auto for_columns = [&](const auto& work) {
+    const std::array<std::function<void()>, 5> works = {
+        [&] { work(out.block.positions); }, [&] { work(out.weights); },
+        [&] { work(out.block.normals_oct); }, [&] { work(out.pixels); },
+        [&] { work(out.unit_radii); }};
+    team.For(works.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t column = begin; column < end; ++column)
+        works[column]();
+    });
+  };
+  const auto put = [&](std::size_t to, const Row& row) {
+    out.block.positions[to] = row.position;
+    out.block.normals_oct[to] = row.normal_oct;
+    out.pixels[to] = row.pixel;
+    out.weights[to] = row.weight;
+    out.unit_radii[to] = row.unit_radius;
+  };
+  for_columns([&](auto& column) { column.resize(pixels); });
+
   std::vector<std::uint64_t> rays(tiles);
   // Once true, it stays so, whatever the caller would say later.
   std::atomic<bool> is_stopped = false;
@@ -90,48 +126,51 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     return is_stopped.load(std::memory_order_relaxed);
   };
   team.For(tiles, 4, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t tile = begin; tile < end; ++tile) {
+    for (std::size_t number = begin; number < end; ++number) {
       if (stops()) return;
-      const int x0 = static_cast<int>(tile % static_cast<std::size_t>(tiles_x)) * kTile;
-      const int y0 = static_cast<int>(tile / static_cast<std::size_t>(tiles_x)) * kTile;
-      for (int y = y0; y < std::min(y0 + kTile, height); ++y) {
-        for (int x = x0; x < std::min(x0 + kTile, width); ++x) {
-          const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(width) +
-                             static_cast<std::uint32_t>(x);
-          const EyePathTracer::First first =
-              known == nullptr ? EyePathTracer::First{}
-                               : EyePathTracer::First{.shape = &known->shapes[pixel],
-                                                      .is_known = known->is_known};
-          const EyePath path = tracer.Trace(x, y, pass, first);
-          out.direct[pixel] = path.direct;
-          if (!bright.empty()) bright[pixel] = path.bright;
-          if (has_features) out.features[pixel] = path.features;
-          rays[tile] += static_cast<std::uint64_t>(path.rays);
-          const auto keep = [&](const EyeHitpoint& hitpoint, Rows& rows) {
-            if (IsBlack(hitpoint.weight)) return;
-            if (hitpoint.is_glossy) {
-              rows.glossy.push_back({static_cast<std::uint32_t>(rows.rows.size()),
-                                     hitpoint.material, EncodeOctahedral(hitpoint.to_eye),
-                                     EncodeOctahedral(hitpoint.shading_normal)});
-              rows.places.push_back(hitpoint.place);
-            }
-            rows.rows.push_back({pixel, hitpoint.position, EncodeOctahedral(hitpoint.normal),
-                                 hitpoint.weight, UnitRadiusOf(tracer, hitpoint)});
-          };
-          keep(path.hitpoint, per_tile[tile].rows);
-          keep(path.caustic, per_tile[tile].caustic_rows);
-          if (const EyeSegment& segment = path.segment; !IsBlack(segment.weight)) {
-            Tile& of = per_tile[tile];
-            of.segment_rows.rows.push_back({pixel, segment.from, EncodeOctahedral({0, 0, 1}),
-                                            segment.weight, UnitRadiusOf(tracer, segment)});
-            of.segments.push_back({segment.to, static_cast<std::uint32_t>(segment.medium),
-                                   automatic
-                                       ? std::clamp(segment.from_footprint / segment.to_footprint,
-                                                    kLeastNarrowing, 1.0F)
-                                       : 1.0F});
+      Tile& tile = per_tile[number];
+      for_pixels_of(number, [&](int x, int y) {
+        const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(width) +
+                           static_cast<std::uint32_t>(x);
+        const EyePathTracer::First first =
+            known == nullptr ? EyePathTracer::First{}
+                             : EyePathTracer::First{.shape = &known->shapes[pixel],
+                                                    .is_known = known->is_known};
+        const EyePath path = tracer.Trace(x, y, pass, first);
+        out.direct[pixel] = path.direct;
+        if (!bright.empty()) bright[pixel] = path.bright;
+        if (has_features) out.features[pixel] = path.features;
+        rays[number] += static_cast<std::uint64_t>(path.rays);
+        const auto keep = [&](const EyeHitpoint& hitpoint, Rows& rows) {
+          if (IsBlack(hitpoint.weight)) return;
+          if (hitpoint.is_glossy) {
+            rows.glossy.push_back({static_cast<std::uint32_t>(rows.count), hitpoint.material,
+                                   EncodeOctahedral(hitpoint.to_eye),
+                                   EncodeOctahedral(hitpoint.shading_normal)});
+            rows.places.push_back(hitpoint.place);
           }
+          const Row row = {pixel, hitpoint.position, EncodeOctahedral(hitpoint.normal),
+                           hitpoint.weight, UnitRadiusOf(tracer, hitpoint)};
+          if (&rows == &tile.rows) {
+            put(tile.first_pixel + rows.count, row);
+          } else {
+            rows.rows.push_back(row);
+          }
+          ++rows.count;
+        };
+        keep(path.hitpoint, tile.rows);
+        keep(path.caustic, tile.caustic_rows);
+        if (const EyeSegment& segment = path.segment; !IsBlack(segment.weight)) {
+          tile.segment_rows.rows.push_back({pixel, segment.from, EncodeOctahedral({0, 0, 1}),
+                                            segment.weight, UnitRadiusOf(tracer, segment)});
+          ++tile.segment_rows.count;
+          tile.segments.push_back(
+              {segment.to, static_cast<std::uint32_t>(segment.medium),
+               automatic ? std::clamp(segment.from_footprint / segment.to_footprint,
+                                      kLeastNarrowing, 1.0F)
+                         : 1.0F});
         }
-      }
+      });
     }
   });
 
@@ -153,7 +192,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     for (std::size_t tile = 0; tile < tiles; ++tile) {
       const Rows& rows = per_tile[tile].*kind;
       first[tile] = next;
-      next.row += rows.rows.size();
+      next.row += rows.count;
       next.glossy += rows.glossy.size();
       has_places = has_places || std::ranges::any_of(rows.places, [](const GlossyPlace& place) {
                      return place != GlossyPlace();
@@ -169,26 +208,17 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   out.block.glossy.resize(next.glossy);
   if (has_places) out.block.places.resize(next.glossy);
   out.block.segments.resize(next.row - segments_begin);
-  // Clearing memory takes as long as filling it in.
-  const auto resize = [&](auto&... columns) {
-    const std::array<std::function<void()>, sizeof...(columns)> resizes = {
-        [&] { columns.resize(next.row); }...};
-    team.For(resizes.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t column = begin; column < end; ++column)
-        resizes[column]();
-    });
-  };
-  resize(out.block.positions, out.weights, out.block.normals_oct, out.pixels, out.unit_radii);
-  const auto place_rows = [&](Rows& rows, const FirstRows& first) {
-    for (std::size_t i = 0; i < rows.rows.size(); ++i) {
-      const Row& row = rows.rows[i];
-      const std::size_t to = first.row + i;
-      out.block.positions[to] = row.position;
-      out.block.normals_oct[to] = row.normal_oct;
-      out.pixels[to] = row.pixel;
-      out.weights[to] = row.weight;
-      out.unit_radii[to] = row.unit_radius;
+  for_columns([&](auto& column) {
+    for (std::size_t tile = 0; tile < tiles && ordinary < pixels; ++tile) {
+      const auto from = column.begin() + static_cast<std::ptrdiff_t>(per_tile[tile].first_pixel);
+      const auto to = column.begin() + static_cast<std::ptrdiff_t>(first_ordinary[tile].row);
+      std::copy_n(from, per_tile[tile].rows.count, to);
     }
+    column.resize(next.row);
+  });
+  const auto place_rows = [&](Rows& rows, const FirstRows& first) {
+    for (std::size_t i = 0; i < rows.rows.size(); ++i)
+      put(first.row + i, rows.rows[i]);
     for (std::size_t i = 0; i < rows.glossy.size(); ++i) {
       GlossyHitpoint& glossy = out.block.glossy[first.glossy + i];
       glossy = rows.glossy[i];
