@@ -911,7 +911,7 @@ std::optional<std::size_t> Coordinator::RowsOf(const Delivery& delivery) const {
 }
 
 StatusOr<std::optional<Coordinator::DecodedResult>> Coordinator::Decode(
-    const Delivery& delivery, std::string_view bytes) const {
+    const Delivery& delivery, std::string bytes) const {
   DecodedResult decoded;
   if (delivery.kind == WorkKind::kPhotons) {
     const std::optional<std::size_t> hitpoints = passes_.Hitpoints(delivery.pass);
@@ -930,6 +930,7 @@ StatusOr<std::optional<Coordinator::DecodedResult>> Coordinator::Decode(
   decoded.counts.tally = decoded.slice->tally;
   decoded.counts.rows = decoded.slice->pixels();
   decoded.counts.dropped_photons = decoded.slice->dropped_photons;
+  if (HasFeatures(shape->passes)) decoded.bytes = std::move(bytes);
   return decoded;
 }
 
@@ -943,7 +944,8 @@ StatusOr<MergeOutcome> Coordinator::Merge(const Delivery& delivery, DecodedResul
   LUCERNA_ASSIGN_OR_RETURN(const MergeOutcome outcome,
                            decoded.photons
                                ? passes_.Merge(delivery.pass, delivery.range, *decoded.photons)
-                               : rounds_.Merge(delivery.pass, *std::move(decoded.slice)));
+                               : rounds_.Merge(delivery.pass, *std::move(decoded.slice),
+                                               std::move(decoded.bytes)));
   if (outcome == MergeOutcome::kSuperseded) return outcome;
   const SteadyTime now = clock_.Steady();
   // Also of a duplicate: nobody need trace it any more.
@@ -971,8 +973,9 @@ StatusOr<std::optional<MergeOutcome>> Coordinator::OutcomeOf(const Delivery& del
   return std::nullopt;
 }
 
-StatusOr<MergeOutcome> Coordinator::TakeIn(const Delivery& delivery, std::string_view bytes) {
-  LUCERNA_ASSIGN_OR_RETURN(std::optional<DecodedResult> decoded, Decode(delivery, bytes));
+StatusOr<MergeOutcome> Coordinator::TakeIn(const Delivery& delivery, std::string bytes) {
+  LUCERNA_ASSIGN_OR_RETURN(std::optional<DecodedResult> decoded,
+                           Decode(delivery, std::move(bytes)));
   if (!decoded) return MergeOutcome::kSuperseded;
   LUCERNA_RETURN_IF_ERROR(jobs_.CheckEmission(delivery.pass.job_id, decoded->counts.tally));
   Scheduler::Taken taken;
@@ -996,11 +999,12 @@ StatusOr<MergeOutcome> Coordinator::TakeIn(const Delivery& delivery, std::string
   return outcome;
 }
 
-StatusOr<MergeOutcome> Coordinator::Commit(const Delivery& delivery, std::string_view bytes) {
+StatusOr<MergeOutcome> Coordinator::Commit(const Delivery& delivery, std::string bytes) {
   LUCERNA_ASSIGN_OR_RETURN(const std::optional<MergeOutcome> known, OutcomeOf(delivery));
   if (known) return *known;
   const SteadyTime began_at = clock_.Steady();
-  StatusOr<MergeOutcome> outcome = TakeIn(delivery, bytes);
+  const std::size_t size_bytes = bytes.size();
+  StatusOr<MergeOutcome> outcome = TakeIn(delivery, std::move(bytes));
   const SteadyTime ended_at = clock_.Steady();
   TraceEndedLeases();
   results_.taking_in.Count(ended_at - began_at);
@@ -1009,7 +1013,7 @@ StatusOr<MergeOutcome> Coordinator::Commit(const Delivery& delivery, std::string
                    .what = absl::StrCat("result of ", ShownWorker(delivery.worker)),
                    .from = began_at,
                    .to = ended_at,
-                   .details = {{"bytes", absl::StrCat(bytes.size())},
+                   .details = {{"bytes", absl::StrCat(size_bytes)},
                                {"taken in", outcome.ok() ? "yes" : "refused"}}});
   }
   if (outcome.ok()) {

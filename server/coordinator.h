@@ -154,7 +154,7 @@ class Coordinator {
   // Errors: as Scheduler::StandingOf; INVALID_ARGUMENT for bytes that are not that result; as
   // EmissionCheck::Check, PassMerger::Merge and RoundMerger::Merge. But for the first, the lease
   // has ended as a failure of the worker.
-  [[nodiscard]] StatusOr<MergeOutcome> Commit(const Delivery& delivery, std::string_view bytes);
+  [[nodiscard]] StatusOr<MergeOutcome> Commit(const Delivery& delivery, std::string bytes);
   // The result of a lease is not what it should be.
   void Refuse(const Delivery& delivery, const Status& why);
 
@@ -244,12 +244,13 @@ class Coordinator {
   struct DecodedResult {
     std::optional<Accumulation> photons;
     std::optional<SliceSums> slice;
+    std::string bytes;  // of the slice, while it may wait as these
     DeliveredCounts counts;
   };
   // Absent when the pass or round has ended.
   StatusOr<std::optional<DecodedResult>> Decode(const Delivery& delivery,
-                                                std::string_view bytes) const;
-  StatusOr<MergeOutcome> TakeIn(const Delivery& delivery, std::string_view bytes);
+                                                std::string bytes) const;
+  StatusOr<MergeOutcome> TakeIn(const Delivery& delivery, std::string bytes);
   // Of a result that counts.
   StatusOr<MergeOutcome> Merge(const Delivery& delivery, DecodedResult decoded);
   // Takes all work of workers whose results were wrong out of the jobs.

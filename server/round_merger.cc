@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "render/wire/slice_codec.h"
+
 namespace lucerna {
 
 void RoundMerger::Open(const PassKey& key, const SliceShape& shape) {
@@ -22,13 +24,20 @@ std::optional<SliceShape> RoundMerger::ShapeOf(const PassKey& key) const {
   return round->shape;
 }
 
-StatusOr<MergeOutcome> RoundMerger::Merge(const PassKey& key, SliceSums slice) {
+StatusOr<MergeOutcome> RoundMerger::Merge(const PassKey& key, SliceSums slice,
+                                          std::string bytes) {
   const std::shared_ptr<OpenRound> round = Find(key);
   if (round == nullptr) return MergeOutcome::kSuperseded;
   const MutexLock lock(round->mutex);
   LUCERNA_ASSIGN_OR_RETURN(const SliceTree::Outcome outcome, round->tree.Check(slice.passes));
   if (outcome == SliceTree::Outcome::kDuplicate) return MergeOutcome::kDuplicate;
-  LUCERNA_RETURN_IF_ERROR(round->tree.Add(std::move(slice)));
+  std::unique_ptr<const PackedSlice> packed;
+  if (!bytes.empty() && HasFeatures(slice.passes)) {
+    SliceShape shape = round->shape;
+    shape.passes = slice.passes;
+    packed = std::make_unique<EncodedSlice>(std::move(bytes), shape);
+  }
+  LUCERNA_RETURN_IF_ERROR(round->tree.Add(std::move(slice), std::move(packed)));
   return MergeOutcome::kAccepted;
 }
 

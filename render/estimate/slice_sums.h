@@ -207,6 +207,27 @@ class PhotonRounding {
 [[nodiscard]] Status MergeSibling(SliceSums& sum, const SliceSums& sibling,
                                   ThreadTeam* team = nullptr);
 
+// MergeSibling for a sibling whose columns come one after the other, so that few of them are there
+// at a time. By the caller's thread.
+class SiblingMerge {
+ public:
+  // `sibling` has no columns yet. Keeps a reference to `sum`, which has no meaning until Finish.
+  SiblingMerge(SliceSums& sum, SliceSums sibling) : sum_(sum), sibling_(std::move(sibling)) {}
+
+  // Errors: as MergeSibling, for siblings of `pixels` pixels and `columns` columns.
+  [[nodiscard]] Status Begin(std::size_t pixels, std::size_t columns);
+  // Each column that the sibling keeps, once, in any order.
+  void Add(std::size_t column, PackedFloats values);
+  void Finish();
+
+  // With the columns of it that are still there: those of light and the number of photons.
+  [[nodiscard]] const SliceSums& sibling() const { return sibling_; }
+
+ private:
+  SliceSums& sum_;
+  SliceSums sibling_;
+};
+
 // Chan, Golub & LeVeque 1983, "Algorithms for Computing the Sample Variance": what the squared
 // deviations of two groups together are more than their sum, of `n` and `m` values with these sums.
 [[nodiscard]] constexpr double DeviationBetween(double n, double sum_n, double m, double sum_m) {

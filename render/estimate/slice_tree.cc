@@ -33,42 +33,57 @@ SliceTree::Slices::iterator SliceTree::FindSibling(const PassRange& passes) {
   if (passes == round_) return slices_.end();
   const PassRange sibling = SiblingOf(passes);
   const auto found = slices_.find(sibling.first);
-  return found != slices_.end() && found->second->passes == sibling ? found : slices_.end();
+  return found != slices_.end() && found->second.passes == sibling ? found : slices_.end();
 }
 
-Status SliceTree::Add(SliceSums slice) {
+Status SliceTree::Add(SliceSums slice, std::unique_ptr<const PackedSlice> packed) {
   // Before anything is changed: do the counters of all that will be put together fit?
   BatchTally tally = slice.tally;
   PassRange passes = slice.passes;
   for (auto found = FindSibling(passes); found != slices_.end(); found = FindSibling(passes)) {
-    if (!tally.Fits(found->second->tally)) {
+    if (!tally.Fits(found->second.tally)) {
       return absl::OutOfRangeError("the counters of a round would not fit in 64 bits");
     }
-    tally += found->second->tally;
-    passes = {std::min(passes.first, found->second->passes.first),
-              std::max(passes.last, found->second->passes.last)};
+    tally += found->second.tally;
+    passes = {std::min(passes.first, found->second.passes.first),
+              std::max(passes.last, found->second.passes.last)};
   }
   // All that may run out of memory comes before the first change.
   std::set<PassRange> added = {slice.passes};
-  const auto sum = std::make_shared<SliceSums>(std::move(slice));
+  const bool waits = passes == slice.passes && passes != round_;
+  if (!waits) packed = nullptr;
+  Part part = {.passes = passes, .tally = std::move(tally), .slice = nullptr, .packed = nullptr};
   std::vector<Slices::iterator> merged;
-  for (auto found = FindSibling(sum->passes); found != slices_.end();
-       found = FindSibling(sum->passes)) {
-    LUCERNA_RETURN_IF_ERROR(MergeSibling(*sum, *found->second));
-    merged.push_back(found);
+  if (packed != nullptr) {
+    part.packed = std::move(packed);
+  } else {
+    const auto sum = std::make_shared<SliceSums>(std::move(slice));
+    for (auto found = FindSibling(sum->passes); found != slices_.end();
+         found = FindSibling(sum->passes)) {
+      const Part& sibling = found->second;
+      LUCERNA_RETURN_IF_ERROR(sibling.packed != nullptr ? sibling.packed->AddTo(*sum)
+                                                        : MergeSibling(*sum, *sibling.slice));
+      merged.push_back(found);
+    }
+    part.slice = sum;
   }
-  Slices larger = {{sum->passes.first, sum}};
-  for (const Slices::iterator& part : merged)
-    slices_.erase(part);
+  Slices larger;
+  larger.emplace(passes.first, std::move(part));
+  for (const Slices::iterator& of_sum : merged)
+    slices_.erase(of_sum);
   added_.merge(added);
   slices_.merge(larger);
   return absl::OkStatus();
 }
 
+std::shared_ptr<const SliceSums> SliceTree::Part::Unpacked() const {
+  return packed == nullptr ? slice : std::make_shared<const SliceSums>(packed->Unpacked());
+}
+
 std::uint64_t SliceTree::PrefixEnd() const {
   std::uint64_t end = round_.first;
   for (auto found = slices_.find(end); found != slices_.end(); found = slices_.find(end))
-    end = found->second->passes.last;
+    end = found->second.passes.last;
   return end;
 }
 
@@ -76,15 +91,15 @@ std::vector<std::shared_ptr<const SliceSums>> SliceTree::Prefix() const {
   std::vector<std::shared_ptr<const SliceSums>> prefix;
   std::uint64_t end = round_.first;
   for (auto found = slices_.find(end); found != slices_.end(); found = slices_.find(end)) {
-    prefix.push_back(found->second);
-    end = found->second->passes.last;
+    prefix.push_back(found->second.Unpacked());
+    end = found->second.passes.last;
   }
   return prefix;
 }
 
 std::shared_ptr<const SliceSums> SliceTree::Whole() const {
   LUCERNA_CHECK(IsWhole());
-  return slices_.at(round_.first);
+  return slices_.at(round_.first).Unpacked();
 }
 
 }  // namespace lucerna

@@ -2,7 +2,7 @@
 //
 // Slices are put together to larger ones as soon as both halves are there. Each pass counts once: a
 // slice that comes again changes nothing, and one that overlaps another without being equal to it
-// was never lent.
+// was never lent. A slice that waits for its other half may do so packed.
 #pragma once
 
 #include <cstddef>
@@ -17,6 +17,15 @@
 
 namespace lucerna {
 
+// A slice in fewer bytes than its columns take.
+class PackedSlice {
+ public:
+  virtual ~PackedSlice() = default;
+  [[nodiscard]] virtual SliceSums Unpacked() const = 0;
+  // MergeSibling with this slice. `sum` is of no use after an error.
+  [[nodiscard]] virtual Status AddTo(SliceSums& sum) const = 0;
+};
+
 class SliceTree {
  public:
   explicit SliceTree(const PassRange& round) : round_(round) {}
@@ -25,10 +34,11 @@ class SliceTree {
   // Whether a slice of these passes is new; kDuplicate also when a longer one has brought them.
   // Errors: INVALID_ARGUMENT when it is no slice of the round or overlaps a shorter one.
   [[nodiscard]] StatusOr<Outcome> Check(const PassRange& passes) const;
-  // Adds a slice that Check called new, of the shape of the others.
+  // Adds a slice that Check called new, of the shape of the others. If it must wait, it waits as
+  // `packed`, the same slice, or as it is where there is none.
   // Errors: OUT_OF_RANGE when counters would not fit. Then nothing has changed, nor when it throws
   // std::bad_alloc.
-  [[nodiscard]] Status Add(SliceSums slice);
+  [[nodiscard]] Status Add(SliceSums slice, std::unique_ptr<const PackedSlice> packed = nullptr);
 
   // Passes from the beginning of the round on without a gap.
   [[nodiscard]] std::uint64_t PrefixEnd() const;
@@ -39,7 +49,16 @@ class SliceTree {
   [[nodiscard]] std::shared_ptr<const SliceSums> Whole() const;
 
  private:
-  using Slices = std::map<std::uint64_t, std::shared_ptr<SliceSums>>;  // by first pass
+  struct Part {
+    PassRange passes;
+    BatchTally tally;
+    // One of them.
+    std::shared_ptr<const SliceSums> slice;
+    std::shared_ptr<const PackedSlice> packed;
+
+    [[nodiscard]] std::shared_ptr<const SliceSums> Unpacked() const;
+  };
+  using Slices = std::map<std::uint64_t, Part>;  // by first pass
 
   // The sibling of a slice, if it is there.
   Slices::iterator FindSibling(const PassRange& passes);

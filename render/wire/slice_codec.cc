@@ -74,6 +74,78 @@ Status CheckDropped(const SliceSums& slice, std::uint64_t photons_per_pass) {
   return absl::OkStatus();
 }
 
+// All of a slice but its columns.
+StatusOr<SliceSums> ReadHead(ByteReader& reader, const SliceShape& shape) {
+  if (reader.Bytes(kMagic.size()) != kMagic) return Malformed("wrong magic or version");
+  if (reader.Varint() != shape.passes.first || reader.Varint() != shape.passes.size()) {
+    return Malformed("it is of other passes");
+  }
+  const std::size_t columns = ColumnsOf(shape.passes, shape.evidence);
+  if (reader.Varint() != shape.pixels || reader.Varint() != columns) {
+    return Malformed("it has another shape");
+  }
+  SliceSums slice;
+  slice.passes = shape.passes;
+  slice.evidence = shape.evidence;
+  slice.eye_rays = reader.Varint();
+  StatusOr<BatchTally> tally = ReadTally(reader);
+  if (!reader.ok()) return Malformed("truncated");
+  if (!tally.ok()) return Malformed(std::string(tally.status().message()));
+  slice.tally = *std::move(tally);
+  // Passes that see nothing, and all of a job without light, have no photons.
+  if (shape.photons_per_pass == 0 || slice.tally.photons % shape.photons_per_pass != 0 ||
+      slice.tally.photons / shape.photons_per_pass > shape.passes.size()) {
+    return Malformed("its counters are of another number of photons");
+  }
+  const std::uint64_t named = reader.Varint();
+  if (named > kDroppedNamed) return Malformed("it names too many dropped photons");
+  for (std::uint64_t i = 0; i < named; ++i) {
+    const std::uint64_t pass = reader.Varint();
+    slice.dropped_photons.push_back({shape.passes.first + pass, reader.Varint()});
+  }
+  if (!reader.ok()) return Malformed("truncated");
+  LUCERNA_RETURN_IF_ERROR(CheckDropped(slice, shape.photons_per_pass));
+  const std::uint64_t reports = reader.Varint();
+  if (reports > kMostReports || reports > slice.tally.photons) {
+    return Malformed("it reports too many photons");
+  }
+  for (std::uint64_t i = 0; i < reports && reader.ok(); ++i) {
+    EmissionReport report;
+    report.numbers = ReadEmission(reader);
+    const std::uint64_t pixel = reader.Varint();
+    if (pixel >= shape.pixels) return Malformed("it reports a photon of no pixel");
+    report.pixel = static_cast<std::uint32_t>(pixel);
+    slice.reports.push_back(report);
+  }
+  if (!reader.ok()) return Malformed("truncated");
+  return slice;
+}
+
+// Calls add(column, values) for every column that a slice keeps. Those that others are predicted
+// from are in `slice` when add returns.
+template <typename Add>
+Status ReadColumns(ByteReader& reader, const SliceShape& shape, const SliceSums& slice,
+                   const Add& add) {
+  for (const std::size_t column : SentColumns(shape.passes, slice.columns.size())) {
+    PackedFloats values(shape.pixels,
+                        SignificantBits(shape.passes.size(), column, shape.evidence));
+    bool is_of_column = true;
+    if (BaseOf(column) == column) {
+      reader.Floats(values);
+    } else {
+      const std::vector<std::uint32_t> codes = reader.Planes32(shape.pixels);
+      is_of_column = reader.ok() && ChannelFromCodes(Beside(slice, column), codes, values);
+    }
+    if (!is_of_column || !reader.ok()) {
+      return Malformed(
+          "its columns are truncated or damaged, or a value is not finite or too long");
+    }
+    add(column, std::move(values));
+  }
+  if (!reader.finished()) return Malformed("bytes are left over");
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 std::string EncodeSlice(const SliceSums& slice, ThreadTeam* team) {
@@ -123,67 +195,33 @@ std::string EncodeSlice(const SliceSums& slice, ThreadTeam* team) {
 
 StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape) {
   ByteReader reader(bytes);
-  if (reader.Bytes(kMagic.size()) != kMagic) return Malformed("wrong magic or version");
-  if (reader.Varint() != shape.passes.first || reader.Varint() != shape.passes.size()) {
-    return Malformed("it is of other passes");
-  }
-  const std::size_t columns = ColumnsOf(shape.passes, shape.evidence);
-  if (reader.Varint() != shape.pixels || reader.Varint() != columns) {
-    return Malformed("it has another shape");
-  }
-  SliceSums slice;
-  slice.passes = shape.passes;
-  slice.evidence = shape.evidence;
-  slice.eye_rays = reader.Varint();
-  StatusOr<BatchTally> tally = ReadTally(reader);
-  if (!reader.ok()) return Malformed("truncated");
-  if (!tally.ok()) return Malformed(std::string(tally.status().message()));
-  slice.tally = *std::move(tally);
-  // Passes that see nothing, and all of a job without light, have no photons.
-  if (shape.photons_per_pass == 0 || slice.tally.photons % shape.photons_per_pass != 0 ||
-      slice.tally.photons / shape.photons_per_pass > shape.passes.size()) {
-    return Malformed("its counters are of another number of photons");
-  }
-  const std::uint64_t named = reader.Varint();
-  if (named > kDroppedNamed) return Malformed("it names too many dropped photons");
-  for (std::uint64_t i = 0; i < named; ++i) {
-    const std::uint64_t pass = reader.Varint();
-    slice.dropped_photons.push_back({shape.passes.first + pass, reader.Varint()});
-  }
-  if (!reader.ok()) return Malformed("truncated");
-  LUCERNA_RETURN_IF_ERROR(CheckDropped(slice, shape.photons_per_pass));
-  const std::uint64_t reports = reader.Varint();
-  if (reports > kMostReports || reports > slice.tally.photons) {
-    return Malformed("it reports too many photons");
-  }
-  for (std::uint64_t i = 0; i < reports && reader.ok(); ++i) {
-    EmissionReport report;
-    report.numbers = ReadEmission(reader);
-    const std::uint64_t pixel = reader.Varint();
-    if (pixel >= shape.pixels) return Malformed("it reports a photon of no pixel");
-    report.pixel = static_cast<std::uint32_t>(pixel);
-    slice.reports.push_back(report);
-  }
-  if (!reader.ok()) return Malformed("truncated");
-  slice.columns.resize(columns);
-  for (const std::size_t column : SentColumns(shape.passes, columns)) {
-    PackedFloats& values = slice.columns[column];
-    values =
-        PackedFloats(shape.pixels, SignificantBits(shape.passes.size(), column, shape.evidence));
-    bool is_of_column = true;
-    if (BaseOf(column) == column) {
-      reader.Floats(values);
-    } else {
-      const std::vector<std::uint32_t> codes = reader.Planes32(shape.pixels);
-      is_of_column = reader.ok() && ChannelFromCodes(Beside(slice, column), codes, values);
-    }
-    if (!is_of_column || !reader.ok()) {
-      return Malformed(
-          "its columns are truncated or damaged, or a value is not finite or too long");
-    }
-  }
-  if (!reader.finished()) return Malformed("bytes are left over");
+  LUCERNA_ASSIGN_OR_RETURN(SliceSums slice, ReadHead(reader, shape));
+  slice.columns.resize(ColumnsOf(shape.passes, shape.evidence));
+  LUCERNA_RETURN_IF_ERROR(
+      ReadColumns(reader, shape, slice, [&](std::size_t column, PackedFloats values) {
+        slice.columns[column] = std::move(values);
+      }));
   return slice;
+}
+
+SliceSums EncodedSlice::Unpacked() const {
+  StatusOr<SliceSums> slice = DecodeSlice(bytes_, shape_);
+  LUCERNA_CHECK(slice.ok());
+  return *std::move(slice);
+}
+
+Status EncodedSlice::AddTo(SliceSums& sum) const {
+  ByteReader reader(bytes_);
+  LUCERNA_ASSIGN_OR_RETURN(SliceSums head, ReadHead(reader, shape_));
+  SiblingMerge merge(sum, std::move(head));
+  LUCERNA_RETURN_IF_ERROR(
+      merge.Begin(shape_.pixels, ColumnsOf(shape_.passes, shape_.evidence)));
+  LUCERNA_RETURN_IF_ERROR(
+      ReadColumns(reader, shape_, merge.sibling(), [&](std::size_t column, PackedFloats values) {
+        merge.Add(column, std::move(values));
+      }));
+  merge.Finish();
+  return absl::OkStatus();
 }
 
 }  // namespace lucerna

@@ -11,10 +11,12 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "render/base/parallel.h"
 #include "render/base/status.h"
 #include "render/estimate/slice_sums.h"
+#include "render/estimate/slice_tree.h"
 
 namespace lucerna {
 
@@ -23,5 +25,19 @@ namespace lucerna {
 
 // Errors: INVALID_ARGUMENT when `bytes` is not a slice of this shape.
 [[nodiscard]] StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape);
+
+// A slice as its bytes. It is added to its sibling column by column.
+class EncodedSlice final : public PackedSlice {
+ public:
+  // Requires bytes that DecodeSlice reads with this shape.
+  EncodedSlice(std::string bytes, const SliceShape& shape)
+      : bytes_(std::move(bytes)), shape_(shape) {}
+  [[nodiscard]] SliceSums Unpacked() const override;
+  [[nodiscard]] Status AddTo(SliceSums& sum) const override;
+
+ private:
+  const std::string bytes_;
+  const SliceShape shape_;
+};
 
 }  // namespace lucerna
