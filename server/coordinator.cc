@@ -467,6 +467,8 @@ StatusOr<Coordinator::Description> Coordinator::Describe(const std::string& job_
 }
 
 StatusOr<Blob> Coordinator::Encode(const JobTable::ImageSource& source, RenderResult result) const {
+  // A file is one large block, for which what is free lies in too small pieces.
+  ReleaseFreedMemory();
   return EncodeJobImage(source.job, std::move(result),
                         {.running = source.running,
                          .coordinator_cpu = source.cpu,

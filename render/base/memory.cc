@@ -52,7 +52,7 @@ void ReleaseFreedMemory() {
 void KeepFreedMemory() {
   constexpr int kLargestBlock = 32 << 20;  // the largest that the C library allows
   constexpr int kLargestRest = 256 << 20;
-  constexpr int kArenas = 2;
+  constexpr int kArenas = 1;
   mallopt(M_MMAP_THRESHOLD, kLargestBlock);
   mallopt(M_TRIM_THRESHOLD, kLargestRest);
   mallopt(M_ARENA_MAX, kArenas);

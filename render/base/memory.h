@@ -22,8 +22,9 @@ void FreeMemoryOf(std::vector<Value>& values) {
 
 // Keeps freed blocks of up to 32 MiB for the next ones instead of giving each back to the system:
 // columns of an image come and go with every pass, and a page that the system gives is cleared and
-// mapped anew. All threads share two heaps: with one for each, what one thread freed would lie idle
-// while another asks for as much. At the beginning of a program.
+// mapped anew. All threads share one heap: with several, what one thread freed would lie idle while
+// another asks for as much. (Small blocks do not come to it: each thread keeps some.) At the
+// beginning of a program.
 void KeepFreedMemory();
 
 }  // namespace lucerna
