@@ -932,7 +932,10 @@ StatusOr<std::optional<Coordinator::DecodedResult>> Coordinator::Decode(
   decoded.counts.tally = decoded.slice->tally;
   decoded.counts.rows = decoded.slice->pixels();
   decoded.counts.dropped_photons = decoded.slice->dropped_photons;
-  if (HasFeatures(shape->passes)) decoded.bytes = std::move(bytes);
+  // The columns of the first passes are the most; later on, to decode a slice twice would take
+  // more than it is worth.
+  if (HasFeatures(shape->passes))
+    decoded.packed = std::make_unique<EncodedSlice>(std::move(bytes), *shape);
   return decoded;
 }
 
@@ -947,7 +950,7 @@ StatusOr<MergeOutcome> Coordinator::Merge(const Delivery& delivery, DecodedResul
                            decoded.photons
                                ? passes_.Merge(delivery.pass, delivery.range, *decoded.photons)
                                : rounds_.Merge(delivery.pass, *std::move(decoded.slice),
-                                               std::move(decoded.bytes)));
+                                               std::move(decoded.packed)));
   if (outcome == MergeOutcome::kSuperseded) return outcome;
   const SteadyTime now = clock_.Steady();
   // Also of a duplicate: nobody need trace it any more.

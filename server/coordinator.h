@@ -244,7 +244,7 @@ class Coordinator {
   struct DecodedResult {
     std::optional<Accumulation> photons;
     std::optional<SliceSums> slice;
-    std::string bytes;  // of the slice, while it may wait as these
+    std::unique_ptr<const PackedSlice> packed;  // the slice again, where it shall wait so
     DeliveredCounts counts;
   };
   // Absent when the pass or round has ended.

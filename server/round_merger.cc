@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "render/wire/slice_codec.h"
-
 namespace lucerna {
 
 void RoundMerger::Open(const PassKey& key, const SliceShape& shape) {
@@ -25,18 +23,12 @@ std::optional<SliceShape> RoundMerger::ShapeOf(const PassKey& key) const {
 }
 
 StatusOr<MergeOutcome> RoundMerger::Merge(const PassKey& key, SliceSums slice,
-                                          std::string bytes) {
+                                          std::unique_ptr<const PackedSlice> packed) {
   const std::shared_ptr<OpenRound> round = Find(key);
   if (round == nullptr) return MergeOutcome::kSuperseded;
   const MutexLock lock(round->mutex);
   LUCERNA_ASSIGN_OR_RETURN(const SliceTree::Outcome outcome, round->tree.Check(slice.passes));
   if (outcome == SliceTree::Outcome::kDuplicate) return MergeOutcome::kDuplicate;
-  std::unique_ptr<const PackedSlice> packed;
-  if (!bytes.empty() && HasFeatures(slice.passes)) {
-    SliceShape shape = round->shape;
-    shape.passes = slice.passes;
-    packed = std::make_unique<EncodedSlice>(std::move(bytes), shape);
-  }
   LUCERNA_RETURN_IF_ERROR(round->tree.Add(std::move(slice), std::move(packed)));
   return MergeOutcome::kAccepted;
 }

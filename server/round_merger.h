@@ -11,7 +11,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <string>
 
 #include "render/base/mutex.h"
 #include "render/base/status.h"
@@ -33,12 +32,12 @@ class RoundMerger {
 
   // Whether a slice of these passes has been merged; false when the round is not open.
   [[nodiscard]] bool Has(const PassKey& key, const PassRange& passes) const;
-  // kSuperseded when the round is not open (any more). A slice of the first passes, which has the
-  // most columns, waits for its sibling as the bytes that it was read from, where they are given.
+  // kSuperseded when the round is not open (any more). A slice that must wait for its sibling does
+  // so as `packed` (SliceTree::Add).
   // Errors: INVALID_ARGUMENT when the slice was never lent, OUT_OF_RANGE when counters would not
   // fit.
   [[nodiscard]] StatusOr<MergeOutcome> Merge(const PassKey& key, SliceSums slice,
-                                             std::string bytes = {});
+                                             std::unique_ptr<const PackedSlice> packed = nullptr);
 
   // One past the last pass that has come without a gap; absent when the round is not open.
   [[nodiscard]] std::optional<std::uint64_t> PrefixEnd(const PassKey& key) const;
