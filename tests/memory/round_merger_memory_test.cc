@@ -28,27 +28,47 @@ SliceSums Slice(std::uint64_t pass) {
   return sum;
 }
 
-std::unique_ptr<RoundMerger> RoundWith(const std::vector<std::uint64_t>& passes) {
+// A slice as it is.
+class SameSlice final : public PackedSlice {
+ public:
+  explicit SameSlice(SliceSums slice) : slice_(std::move(slice)) {}
+  SliceSums Unpacked() const override { return slice_; }
+  Status AddTo(SliceSums& sum) const override {
+    const SliceSums copy = slice_;  // as what is unpacked needs memory
+    return MergeSibling(sum, copy);
+  }
+
+ private:
+  SliceSums slice_;
+};
+
+std::unique_ptr<RoundMerger> RoundWith(const std::vector<std::uint64_t>& passes, bool are_packed) {
   auto merger = std::make_unique<RoundMerger>();
   merger->Open(kRound,
                {.passes = RoundOf(16), .pixels = kPixels, .evidence = 1, .photons_per_pass = 100});
-  for (const std::uint64_t pass : passes)
-    EXPECT_TRUE(merger->Merge(kRound, Slice(pass)).ok());
+  for (const std::uint64_t pass : passes) {
+    std::unique_ptr<const PackedSlice> packed;
+    if (are_packed) packed = std::make_unique<SameSlice>(Slice(pass));
+    EXPECT_TRUE(merger->Merge(kRound, Slice(pass), std::move(packed)).ok());
+  }
   return merger;
 }
 
-TEST(RoundMergerMemoryTest, AMergeThatRunsOutOfMemoryChangesNothingAndCanBeMadeAgain) {
-  const std::shared_ptr<const SliceSums> whole = RoundWith({16, 18, 19, 17})->Take(kRound);
+class RoundMergerMemoryTest : public testing::TestWithParam<bool> {};
+
+TEST_P(RoundMergerMemoryTest, AMergeThatRunsOutOfMemoryChangesNothingAndCanBeMadeAgain) {
+  const std::shared_ptr<const SliceSums> whole = RoundWith({16, 18, 19, 17}, false)->Take(kRound);
   int failures = 0;
   for (bool has_failed = true; has_failed; ++failures) {
     SCOPED_TRACE(failures);
-    const auto merger = RoundWith({16, 18, 19});
+    const auto merger = RoundWith({16, 18, 19}, GetParam());
     const std::size_t before = merger->Prefix(kRound).size();
     SliceSums last = Slice(17);
+    std::unique_ptr<const PackedSlice> packed = std::make_unique<SameSlice>(last);
     has_failed = false;
     allocations_left = failures;
     try {
-      EXPECT_TRUE(merger->Merge(kRound, std::move(last)).ok());
+      EXPECT_TRUE(merger->Merge(kRound, std::move(last), std::move(packed)).ok());
     } catch (const std::bad_alloc&) {
       has_failed = true;
     }
@@ -66,6 +86,9 @@ TEST(RoundMergerMemoryTest, AMergeThatRunsOutOfMemoryChangesNothingAndCanBeMadeA
   }
   EXPECT_GT(failures, 5) << "a merge of three slices allocates";
 }
+INSTANTIATE_TEST_SUITE_P(Waiting, RoundMergerMemoryTest, testing::Bool(), [](const auto& test) {
+  return test.param ? "Packed" : "AsTheyAre";
+});
 
 }  // namespace
 }  // namespace lucerna

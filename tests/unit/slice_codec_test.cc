@@ -76,6 +76,36 @@ TEST(SliceCodecTest, BringsSlicesOfAllShapesBack) {
   }
 }
 
+// The bytes of a slice make the same sum as the slice itself, as either half, column by column.
+TEST(EncodedSliceTest, AddsToItsSiblingWhatTheSliceWould) {
+  for (const PassRange& passes :
+       {PassRange{14, 15}, PassRange{15, 16}, PassRange{64, 65}, PassRange{64, 68}}) {
+    for (const std::size_t evidence : {std::size_t{0}, std::size_t{kCurvatureColumns}}) {
+      SCOPED_TRACE(passes.first);
+      const SliceShape shape = Shape(passes, 777, evidence);
+      const SliceSums slice = RandomSlice(shape);
+      const EncodedSlice encoded(EncodeSlice(slice), shape);
+      EXPECT_EQ(encoded.Unpacked(), slice);
+      const SliceSums sibling = RandomSlice(Shape(SiblingOf(passes), 777, evidence));
+      SliceSums expected = sibling;
+      ASSERT_TRUE(MergeSibling(expected, slice).ok());
+      SliceSums sum = sibling;
+      ASSERT_TRUE(encoded.AddTo(sum).ok());
+      EXPECT_EQ(sum, expected);
+    }
+  }
+}
+
+TEST(EncodedSliceTest, IsAddedToNothingButItsSibling) {
+  const SliceShape shape = Shape({14, 15}, 5, 2);
+  const EncodedSlice encoded(EncodeSlice(RandomSlice(shape)), shape);
+  for (const SliceShape& other : {Shape({12, 13}, 5, 2), Shape({15, 16}, 6, 2),
+                                  Shape({15, 16}, 5, 0)}) {
+    SliceSums sum = RandomSlice(other);
+    EXPECT_TRUE(absl::IsInvalidArgument(encoded.AddTo(sum)));
+  }
+}
+
 // Each column keeps its largest, its smallest and its negative zero.
 TEST(SliceCodecTest, BringsTheEndsOfEveryColumnBack) {
   const SliceShape shape = Shape({3, 4}, 6, kSectors);

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -240,6 +242,80 @@ TEST(SliceTreeTest, TheOrderOfSlicesIsNotSeen) {
   ASSERT_TRUE(forward.IsWhole());
   ASSERT_TRUE(shuffled.IsWhole());
   EXPECT_EQ(*forward.Whole(), *shuffled.Whole());
+}
+
+// What a merge holds of the other half beside the column that it adds.
+TEST(SiblingMergeTest, KeepsLightAlone) {
+  SliceSums sum = RandomPass(2);
+  const SliceSums other = RandomPass(3);
+  SliceSums expected = sum;
+  ASSERT_TRUE(MergeSibling(expected, other).ok());
+  SliceSums head = other;
+  head.columns.clear();
+  SiblingMerge merge(sum, head);
+  ASSERT_TRUE(merge.Begin(kPixels, other.columns.size()).ok());
+  for (std::size_t column = other.columns.size(); column-- > 0;) {
+    if (!FollowsFromRadiance(other.passes, column)) merge.Add(column, other.columns[column]);
+  }
+  for (std::size_t column = 0; column < other.columns.size(); ++column) {
+    const bool is_kept = column < kHalfDifference || column == kPhotonCount;
+    EXPECT_EQ(merge.sibling().columns[column].empty(), !is_kept) << column;
+  }
+  merge.Finish();
+  EXPECT_EQ(sum, expected);
+}
+
+// Holds a slice, and counts what is asked of it.
+class CountedSlice final : public PackedSlice {
+ public:
+  CountedSlice(SliceSums slice, int& added) : slice_(std::move(slice)), added_(added) {}
+  SliceSums Unpacked() const override { return slice_; }
+  Status AddTo(SliceSums& sum) const override {
+    ++added_;
+    return MergeSibling(sum, slice_);
+  }
+
+ private:
+  SliceSums slice_;
+  int& added_;
+};
+
+TEST(SliceTreeTest, ASliceThatWaitsMayBePacked) {
+  SliceTree plain({64, 72});
+  SliceTree packed({64, 72});
+  int added = 0;
+  for (const std::uint64_t pass : {65U, 64U, 66U, 71U, 69U, 67U, 68U, 70U}) {
+    ASSERT_TRUE(plain.Add(RandomPass(pass)).ok());
+    ASSERT_TRUE(
+        packed.Add(RandomPass(pass), std::make_unique<CountedSlice>(RandomPass(pass), added)).ok());
+    EXPECT_EQ(packed.Check({pass, pass + 1}).value(), SliceTree::Outcome::kDuplicate);
+    EXPECT_EQ(packed.PrefixEnd(), plain.PrefixEnd());
+    const auto prefix = plain.Prefix();
+    const auto unpacked = packed.Prefix();
+    ASSERT_EQ(unpacked.size(), prefix.size());
+    for (std::size_t i = 0; i < prefix.size(); ++i)
+      EXPECT_EQ(*unpacked[i], *prefix[i]);
+  }
+  EXPECT_EQ(added, 4) << "one of each pair has waited, and sums wait as they are";
+  EXPECT_EQ(*packed.Whole(), *plain.Whole());
+
+  // A round of one pass waits for nothing.
+  SliceTree single({5, 6});
+  ASSERT_TRUE(
+      single.Add(RandomPass(5), std::make_unique<CountedSlice>(RandomPass(6), added)).ok());
+  EXPECT_EQ(*single.Whole(), RandomPass(5));
+}
+
+TEST(SliceTreeTest, ACounterThatDoesNotFitIsRefusedWhereTheOtherHalfIsPacked) {
+  SliceTree tree({64, 72});
+  int added = 0;
+  SliceSums full = RandomPass(64);
+  full.tally.photons = UINT64_MAX;
+  ASSERT_TRUE(tree.Add(full, std::make_unique<CountedSlice>(full, added)).ok());
+  EXPECT_TRUE(absl::IsOutOfRange(tree.Add(RandomPass(65))));
+  EXPECT_EQ(tree.PrefixEnd(), 65U);
+  EXPECT_EQ(*tree.Prefix()[0], full);
+  EXPECT_EQ(added, 0);
 }
 
 TEST(SliceTreeTest, EachPassCountsOnce) {
