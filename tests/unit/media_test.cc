@@ -12,7 +12,9 @@
 #include "render/base/parallel.h"
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
+#include "tests/support/gather_sums.h"
 #include "tests/support/test_scenes.h"
+#include "worker/photon_grid.h"
 #include "worker/photon_tree.h"
 
 namespace lucerna {
@@ -150,6 +152,58 @@ TEST(PhotonTreeTest, FindsThePhotonsThatASearchOfAllFinds) {
         cone, [&](std::size_t /*number*/, const ScatteredPhoton& photon, float /*t*/, float /*t2*/,
                   float /*radius*/) { EXPECT_TRUE(found.insert(photon.key).second); });
     EXPECT_EQ(found, expected) << trial;
+  }
+}
+
+// Segments come behind any number of surfaces, and each gathers once.
+TEST(GatherTest, EachSegmentGathersOnceWhereverItsRowIs) {
+  KeyedRng rng(5);
+  const auto random_point = [&] {
+    const float x = rng.Uniform();
+    const float y = rng.Uniform();
+    return Vec3{x, y, rng.Uniform()};
+  };
+  std::vector<Deposits> scattered(1);
+  for (std::uint32_t i = 0; i < 200; ++i) {
+    scattered[0].rows.push_back({random_point(), Gray(1), i, 0});
+    scattered[0].arrivals_oct.push_back(EncodeOctahedral({0, 0, 1}));
+  }
+  ThreadTeam team(2);
+  const PhotonTree tree(scattered, team);
+  Bounds region;
+  region.Add(Vec3{0, 0, 0});
+  region.Add(Vec3{1, 1, 1});
+  const PhotonGrid grid({}, region, 0.1F, team);
+  const std::vector<Medium> media(1);
+  constexpr std::size_t kSegments = 5000;
+  for (const std::size_t surfaces : {0U, 5U, 2047U, 2048U, 3000U}) {
+    SCOPED_TRACE(surfaces);
+    HitpointBlock block;
+    block.positions.assign(surfaces, {9, 9, 9});
+    std::vector<std::uint32_t> expected(surfaces);
+    for (std::size_t i = 0; i < kSegments; ++i) {
+      const Vec3 from = random_point();
+      const Vec3 end = random_point();
+      block.positions.push_back(from);
+      block.segments.push_back({end, 0, 1});
+      std::uint32_t count = 0;
+      tree.ForEachWithin({from, Normalize(end - from), Length(end - from), 0.1F, 0.1F},
+                         [&](auto&&...) { ++count; });
+      expected.push_back(count);
+    }
+    block.normals_oct.resize(block.size());
+    std::vector<std::uint32_t> found_by(tree.size(), kNotFound);
+    const GatheredPhotons photons = {.grid = grid,
+                                     .scattered = &tree,
+                                     .media = &media,
+                                     .scattered_found_by = found_by};
+    const Accumulation sums =
+        GatherSums(block, RadiusColumn(block.size(), 0.1F), photons, {},
+                   Kernel{KernelKind::kConstant}, FluxScale::ForPower(Gray(1)), team);
+    std::vector<std::uint32_t> counts(block.size());
+    for (std::size_t i = 0; i < sums.size(); ++i)
+      counts[sums.hitpoints[i]] = sums.counts[i];
+    EXPECT_EQ(counts, expected);
   }
 }
 
