@@ -121,11 +121,11 @@ TEST_P(HitpointPassTest, RowsAreWhatEyePathsBrought) {
   if (GetParam() == "hair") {
     EXPECT_LT(expected.block.first_caustic(), pixels) << "pixels without a hitpoint";
   }
-  EXPECT_EQ(expected.block.caustic_rows > 0, GetParam() == "lacquer");
+  EXPECT_EQ(expected.block.caustic_rows > 0, GetParam() == "screen");
   EXPECT_EQ(!expected.block.segments.empty(), GetParam() == "fog");
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, HitpointPassTest,
-                         testing::Values("hard-shadow", "hair", "glass-sphere", "lacquer",
+                         testing::Values("hard-shadow", "hair", "glass-sphere", "screen",
                                          "fog"),
                          [](const auto& test) {
                            std::string name = test.param;
