@@ -10,9 +10,9 @@
 
 #include "gtest/gtest.h"
 
-#include "render/geometry/intersector.h"
+#include "render/analysis/needs.h"
+#include "render/analysis/prepared_scene.h"
 #include "render/math/octahedral.h"
-#include "render/transport/light.h"
 #include "tests/support/local_render.h"
 
 namespace lucerna {
@@ -31,17 +31,16 @@ class HitpointPassTest : public testing::TestWithParam<std::string> {
     overrides.height = kHeight;
     overrides.initial_radius = 0;
     settings = SettingsFor(scene, overrides);
-    needs = NeedsOf(scene, settings);
-    intersector = Intersector::Create(scene, needs.rays()).value();
-    lights = std::make_unique<LightSet>(scene, *intersector, needs.lights());
-    tracer = std::make_unique<EyePathTracer>(scene, settings, needs, *intersector, *lights);
+    const SceneNeeds needs = NeedsOf(scene, settings);
+    EXPECT_TRUE(prepared.PrepareFor(needs).ok());
+    tracer = std::make_unique<EyePathTracer>(prepared.scene(), settings, prepared.needs(),
+                                             prepared.intersector(), prepared.lights());
   }
 
+  static constexpr std::uint64_t kPass = 3;
   Scene scene = LoadScene(GetParam() + ".pbrt");
+  PreparedScene prepared = PreparedScene(scene);
   RenderSettings settings;
-  SceneNeeds needs;
-  std::unique_ptr<Intersector> intersector;
-  std::unique_ptr<LightSet> lights;
   std::unique_ptr<EyePathTracer> tracer;
 };
 
@@ -96,7 +95,6 @@ EyePass ExpectedPass(const EyePathTracer& tracer, std::uint64_t pass) {
 }
 
 TEST_P(HitpointPassTest, RowsAreWhatEyePathsBrought) {
-  constexpr std::uint64_t kPass = 3;
   const EyePass expected = ExpectedPass(*tracer, kPass);
   for (const int threads : {1, 3}) {
     SCOPED_TRACE(threads);
