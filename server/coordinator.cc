@@ -912,8 +912,8 @@ std::optional<std::size_t> Coordinator::RowsOf(const Delivery& delivery) const {
   return shape->pixels;
 }
 
-StatusOr<std::optional<Coordinator::DecodedResult>> Coordinator::Decode(
-    const Delivery& delivery, std::string bytes) const {
+StatusOr<std::optional<Coordinator::DecodedResult>> Coordinator::Decode(const Delivery& delivery,
+                                                                        std::string bytes) const {
   DecodedResult decoded;
   if (delivery.kind == WorkKind::kPhotons) {
     const std::optional<std::size_t> hitpoints = passes_.Hitpoints(delivery.pass);
@@ -946,11 +946,11 @@ StatusOr<MergeOutcome> Coordinator::Merge(const Delivery& delivery, DecodedResul
   Delivery of_record = delivery;
   of_record.record = worker->id;
   jobs_.NoteContributor(delivery.pass.job_id, worker->id, worker->name);
-  LUCERNA_ASSIGN_OR_RETURN(const MergeOutcome outcome,
-                           decoded.photons
-                               ? passes_.Merge(delivery.pass, delivery.range, *decoded.photons)
-                               : rounds_.Merge(delivery.pass, *std::move(decoded.slice),
-                                               std::move(decoded.packed)));
+  LUCERNA_ASSIGN_OR_RETURN(
+      const MergeOutcome outcome,
+      decoded.photons
+          ? passes_.Merge(delivery.pass, delivery.range, *decoded.photons)
+          : rounds_.Merge(delivery.pass, *std::move(decoded.slice), std::move(decoded.packed)));
   if (outcome == MergeOutcome::kSuperseded) return outcome;
   const SteadyTime now = clock_.Steady();
   // Also of a duplicate: nobody need trace it any more.

@@ -248,8 +248,7 @@ class Coordinator {
     DeliveredCounts counts;
   };
   // Absent when the pass or round has ended.
-  StatusOr<std::optional<DecodedResult>> Decode(const Delivery& delivery,
-                                                std::string bytes) const;
+  StatusOr<std::optional<DecodedResult>> Decode(const Delivery& delivery, std::string bytes) const;
   StatusOr<MergeOutcome> TakeIn(const Delivery& delivery, std::string bytes);
   // Of a result that counts.
   StatusOr<MergeOutcome> Merge(const Delivery& delivery, DecodedResult decoded);

@@ -163,9 +163,9 @@ class CommitReactor final : public grpc::ServerReadReactor<v1::CommitBatchReques
   Status Merge() {
     if (!collector_) return absl::InvalidArgumentError("a commit begins with a header");
     LUCERNA_ASSIGN_OR_RETURN(std::string bytes, collector_->Finish());
-    LUCERNA_ASSIGN_OR_RETURN(
-        const MergeOutcome outcome,
-        WithinMemory([&] { return coordinator_.Commit(delivery_, std::move(bytes)); }));
+    LUCERNA_ASSIGN_OR_RETURN(const MergeOutcome outcome, WithinMemory([&] {
+                               return coordinator_.Commit(delivery_, std::move(bytes));
+                             }));
     response_->set_outcome(OutcomeToProto(outcome));
     return absl::OkStatus();
   }

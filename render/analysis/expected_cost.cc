@@ -9,8 +9,8 @@ namespace lucerna {
 namespace {
 
 // Bytes a pixel, measured (docs/numerics.md, docs/measurements.md): of the coordinator for a job
-// without evidence, and of a worker.
-constexpr double kCoordinator = 380;
+// without evidence whose first passes are split between several workers, and of a worker.
+constexpr double kCoordinator = 480;
 constexpr double kWorker = 320;
 // Of both, for each column of evidence of the slices that they hold.
 constexpr double kEvidenceColumn = 16;
@@ -18,8 +18,9 @@ constexpr double kEvidenceColumn = 16;
 constexpr double kBlock = 6.5;
 constexpr double kGlossyBlock = 14;
 constexpr double kRadius = 2.5;
-// Of hitpoints for caustic photons and of segments in media, wherever a pass is traced.
-constexpr double kCausticHitpoint = 150;
+// Of hitpoints for caustic photons and of segments in media, wherever a pass is traced, and of what
+// several workers return of them.
+constexpr double kCausticHitpoint = 420;
 
 }  // namespace
 

@@ -225,8 +225,7 @@ Status SiblingMerge::Begin(std::size_t pixels, std::size_t columns) {
 }
 
 void SiblingMerge::Add(std::size_t column, PackedFloats values) {
-  const unsigned int bits =
-      SignificantBits(Together(sum_, sibling_).size(), column, sum_.evidence);
+  const unsigned int bits = SignificantBits(Together(sum_, sibling_).size(), column, sum_.evidence);
   if (column >= kLightColumns) {
     ForEachFew(0, sum_.pixels(), [&](std::size_t first, std::size_t count) {
       AddFew(sum_.columns[column], values, bits, first, count);

@@ -133,9 +133,9 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
         const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(width) +
                            static_cast<std::uint32_t>(x);
         const EyePathTracer::First first =
-            known == nullptr ? EyePathTracer::First{}
-                             : EyePathTracer::First{.shape = &known->shapes[pixel],
-                                                    .is_known = known->is_known};
+            known == nullptr
+                ? EyePathTracer::First{}
+                : EyePathTracer::First{.shape = &known->shapes[pixel], .is_known = known->is_known};
         const EyePath path = tracer.Trace(x, y, pass, first);
         out.direct[pixel] = path.direct;
         if (!bright.empty()) bright[pixel] = path.bright;
@@ -164,11 +164,11 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
           tile.segment_rows.rows.push_back({pixel, segment.from, EncodeOctahedral({0, 0, 1}),
                                             segment.weight, UnitRadiusOf(tracer, segment)});
           ++tile.segment_rows.count;
-          tile.segments.push_back(
-              {segment.to, static_cast<std::uint32_t>(segment.medium),
-               automatic ? std::clamp(segment.from_footprint / segment.to_footprint,
-                                      kLeastNarrowing, 1.0F)
-                         : 1.0F});
+          tile.segments.push_back({segment.to, static_cast<std::uint32_t>(segment.medium),
+                                   automatic
+                                       ? std::clamp(segment.from_footprint / segment.to_footprint,
+                                                    kLeastNarrowing, 1.0F)
+                                       : 1.0F});
         }
       });
     }

@@ -127,8 +127,7 @@ template <typename Add>
 Status ReadColumns(ByteReader& reader, const SliceShape& shape, const SliceSums& slice,
                    const Add& add) {
   for (const std::size_t column : SentColumns(shape.passes, slice.columns.size())) {
-    PackedFloats values(shape.pixels,
-                        SignificantBits(shape.passes.size(), column, shape.evidence));
+    PackedFloats values(shape.pixels, SignificantBits(shape.passes.size(), column, shape.evidence));
     bool is_of_column = true;
     if (BaseOf(column) == column) {
       reader.Floats(values);
@@ -197,10 +196,9 @@ StatusOr<SliceSums> DecodeSlice(std::string_view bytes, const SliceShape& shape)
   ByteReader reader(bytes);
   LUCERNA_ASSIGN_OR_RETURN(SliceSums slice, ReadHead(reader, shape));
   slice.columns.resize(ColumnsOf(shape.passes, shape.evidence));
-  LUCERNA_RETURN_IF_ERROR(
-      ReadColumns(reader, shape, slice, [&](std::size_t column, PackedFloats values) {
-        slice.columns[column] = std::move(values);
-      }));
+  LUCERNA_RETURN_IF_ERROR(ReadColumns(
+      reader, shape, slice,
+      [&](std::size_t column, PackedFloats values) { slice.columns[column] = std::move(values); }));
   return slice;
 }
 
@@ -214,12 +212,10 @@ Status EncodedSlice::AddTo(SliceSums& sum) const {
   ByteReader reader(bytes_);
   LUCERNA_ASSIGN_OR_RETURN(SliceSums head, ReadHead(reader, shape_));
   SiblingMerge merge(sum, std::move(head));
-  LUCERNA_RETURN_IF_ERROR(
-      merge.Begin(shape_.pixels, ColumnsOf(shape_.passes, shape_.evidence)));
-  LUCERNA_RETURN_IF_ERROR(
-      ReadColumns(reader, shape_, merge.sibling(), [&](std::size_t column, PackedFloats values) {
-        merge.Add(column, std::move(values));
-      }));
+  LUCERNA_RETURN_IF_ERROR(merge.Begin(shape_.pixels, ColumnsOf(shape_.passes, shape_.evidence)));
+  LUCERNA_RETURN_IF_ERROR(ReadColumns(
+      reader, shape_, merge.sibling(),
+      [&](std::size_t column, PackedFloats values) { merge.Add(column, std::move(values)); }));
   merge.Finish();
   return absl::OkStatus();
 }

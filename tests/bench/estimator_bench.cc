@@ -301,9 +301,9 @@ struct Siblings {
 };
 
 void CountPixels(benchmark::State& state, const Siblings& slices) {
-  state.counters["pixels/s"] = Counter(
-      static_cast<double>(slices.one.pixels()) * static_cast<double>(state.iterations()),
-      Counter::kIsRate);
+  state.counters["pixels/s"] =
+      Counter(static_cast<double>(slices.one.pixels()) * static_cast<double>(state.iterations()),
+              Counter::kIsRate);
 }
 
 void EncodeOfSlice(benchmark::State& state, const Bench& bench) {

@@ -86,9 +86,8 @@ TEST_P(RoundMergerMemoryTest, AMergeThatRunsOutOfMemoryChangesNothingAndCanBeMad
   }
   EXPECT_GT(failures, 5) << "a merge of three slices allocates";
 }
-INSTANTIATE_TEST_SUITE_P(Waiting, RoundMergerMemoryTest, testing::Bool(), [](const auto& test) {
-  return test.param ? "Packed" : "AsTheyAre";
-});
+INSTANTIATE_TEST_SUITE_P(Waiting, RoundMergerMemoryTest, testing::Bool(),
+                         [](const auto& test) { return test.param ? "Packed" : "AsTheyAre"; });
 
 }  // namespace
 }  // namespace lucerna

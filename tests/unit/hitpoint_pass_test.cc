@@ -123,8 +123,7 @@ TEST_P(HitpointPassTest, RowsAreWhatEyePathsBrought) {
   EXPECT_EQ(!expected.block.segments.empty(), GetParam() == "fog");
 }
 INSTANTIATE_TEST_SUITE_P(Scenes, HitpointPassTest,
-                         testing::Values("hard-shadow", "hair", "glass-sphere", "screen",
-                                         "fog"),
+                         testing::Values("hard-shadow", "hair", "glass-sphere", "screen", "fog"),
                          [](const auto& test) {
                            std::string name = test.param;
                            std::ranges::replace(name, '-', '_');

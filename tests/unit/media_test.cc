@@ -193,10 +193,8 @@ TEST(GatherTest, EachSegmentGathersOnceWhereverItsRowIs) {
     }
     block.normals_oct.resize(block.size());
     std::vector<std::uint32_t> found_by(tree.size(), kNotFound);
-    const GatheredPhotons photons = {.grid = grid,
-                                     .scattered = &tree,
-                                     .media = &media,
-                                     .scattered_found_by = found_by};
+    const GatheredPhotons photons = {
+        .grid = grid, .scattered = &tree, .media = &media, .scattered_found_by = found_by};
     const Accumulation sums =
         GatherSums(block, RadiusColumn(block.size(), 0.1F), photons, {},
                    Kernel{KernelKind::kConstant}, FluxScale::ForPower(Gray(1)), team);

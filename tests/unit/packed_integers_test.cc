@@ -16,9 +16,8 @@ constexpr std::size_t kTile = PackedIntegers::kTileSize;
 
 TEST(PackedIntegersTest, AreTheNumbersThatWereSet) {
   constexpr std::int64_t kNarrow = std::numeric_limits<std::int32_t>::max();
-  constexpr std::array<std::int64_t, 9> kNumbers = {0,           -1,           kNarrow,
-                                                    -kNarrow - 1, kNarrow + 1, -kNarrow - 2,
-                                                    INT64_MAX,   INT64_MIN,    7};
+  constexpr std::array<std::int64_t, 9> kNumbers = {
+      0, -1, kNarrow, -kNarrow - 1, kNarrow + 1, -kNarrow - 2, INT64_MAX, INT64_MIN, 7};
   for (const std::size_t size :
        {std::size_t{1}, kTile - 1, kTile, kTile + 1, 3 * kTile, 3 * kTile + 5}) {
     PackedIntegers packed(size);

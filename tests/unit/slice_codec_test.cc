@@ -99,8 +99,8 @@ TEST(EncodedSliceTest, AddsToItsSiblingWhatTheSliceWould) {
 TEST(EncodedSliceTest, IsAddedToNothingButItsSibling) {
   const SliceShape shape = Shape({14, 15}, 5, 2);
   const EncodedSlice encoded(EncodeSlice(RandomSlice(shape)), shape);
-  for (const SliceShape& other : {Shape({12, 13}, 5, 2), Shape({15, 16}, 6, 2),
-                                  Shape({15, 16}, 5, 0)}) {
+  for (const SliceShape& other :
+       {Shape({12, 13}, 5, 2), Shape({15, 16}, 6, 2), Shape({15, 16}, 5, 0)}) {
     SliceSums sum = RandomSlice(other);
     EXPECT_TRUE(absl::IsInvalidArgument(encoded.AddTo(sum)));
   }

@@ -301,8 +301,7 @@ TEST(SliceTreeTest, ASliceThatWaitsMayBePacked) {
 
   // A round of one pass waits for nothing.
   SliceTree single({5, 6});
-  ASSERT_TRUE(
-      single.Add(RandomPass(5), std::make_unique<CountedSlice>(RandomPass(6), added)).ok());
+  ASSERT_TRUE(single.Add(RandomPass(5), std::make_unique<CountedSlice>(RandomPass(6), added)).ok());
   EXPECT_EQ(*single.Whole(), RandomPass(5));
 }
 
