@@ -814,7 +814,7 @@ StatusOr<std::string> Coordinator::Register(const std::string& name, int threads
         options_.numeric_profile, "\"; their bits would differ, run the same build on both"));
   }
   LUCERNA_ASSIGN_OR_RETURN(std::string id,
-                           scheduler_.AddWorker(name, clock_.Steady(), identity, peer));
+                           scheduler_.AddWorker(name, clock_.Steady(), identity, peer, threads));
   CountWorkers();
   spdlog::info("worker {} joined with {} threads", ShownWorker(id), threads);
   return id;
@@ -956,7 +956,8 @@ StatusOr<MergeOutcome> Coordinator::Merge(const Delivery& delivery, DecodedResul
   // Also of a duplicate: nobody need trace it any more.
   scheduler_.Commit(delivery.pass, delivery.range, now);
   if (outcome == MergeOutcome::kDuplicate) return outcome;
-  scheduler_.CountWork(delivery.pass.job_id, delivery.kind, delivery.range.size(), delivery.cpu);
+  scheduler_.CountWork(delivery.worker, delivery.pass.job_id, delivery.kind, delivery.range.size(),
+                       delivery.cpu);
   jobs_.CountMerged(of_record, decoded.counts, worker->name, now);
   const BatchTally& tally = decoded.counts.tally;
   results_.photons += tally.photons;

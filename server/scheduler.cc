@@ -111,7 +111,8 @@ void Scheduler::EraseLendable(const PassKey& key) {
 // ---------------------------------------------------------------------------------------------
 
 StatusOr<std::string> Scheduler::AddWorker(std::string_view name, SteadyTime now,
-                                           std::string_view identity, std::string_view peer) {
+                                           std::string_view identity, std::string_view peer,
+                                           int threads) {
   const MutexLock lock(mutex_);
   std::string id = options_.new_id();
   const std::string record = WorkerIdOf(identity.empty() ? RandomId() : std::string(identity));
@@ -141,6 +142,7 @@ StatusOr<std::string> Scheduler::AddWorker(std::string_view name, SteadyTime now
   Worker& worker = workers_[id];
   worker.record = record;
   worker.peer = peer;
+  worker.threads = std::max(1, threads);
   ++peers_[worker.peer];
   worker.heard_at = now;
   worker.may_be_lent = records_.Find(record)->may_be_lent();
@@ -525,10 +527,14 @@ void Scheduler::SetHeld(const std::string& job_id, bool is_held) {
   if (!is_held) LendPoisonedAgain(job_id);
 }
 
-void Scheduler::CountWork(const std::string& job_id, WorkKind kind, std::uint64_t size,
-                          Duration worker_cpu) {
+void Scheduler::CountWork(const std::string& worker, const std::string& job_id, WorkKind kind,
+                          std::uint64_t size, Duration worker_cpu) {
   const MutexLock lock(mutex_);
   shares_.CountWork(job_id, kind, size, worker_cpu);
+  const auto found = workers_.find(worker);
+  if (found == workers_.end() || kind != WorkKind::kPasses || size == 0) return;
+  found->second.pace.tracing =
+      std::max(0.0, Seconds(worker_cpu)) / found->second.threads / static_cast<double>(size);
 }
 
 void Scheduler::ForgetJob(const std::string& job_id) {
@@ -697,7 +703,7 @@ void Scheduler::RefuseResult(const BatchClaim& claim, std::string_view reason) {
 void Scheduler::NoteTime(const Lease& lease, SteadyTime now) {
   const auto of_kind = static_cast<std::size_t>(lease.kind);
   const double time = Seconds(now - lease.lent_at) / static_cast<double>(lease.range.size());
-  if (lease.kind == WorkKind::kPasses) workers_.at(lease.worker).pass_time = time;
+  if (lease.kind == WorkKind::kPasses) workers_.at(lease.worker).pace.until_merged = time;
   times_[of_kind].push_back(time);
   if (times_[of_kind].size() > kTimesKept) times_[of_kind].pop_front();
   usual_times_[of_kind] = MedianOf(times_[of_kind]);
@@ -811,9 +817,8 @@ int Scheduler::LiveWorkers() const {
 // Leases
 // ---------------------------------------------------------------------------------------------
 
-std::uint64_t Scheduler::BatchSize(const Work& work, std::optional<double> pass_time,
-                                   SteadyTime now) const {
-  if (work.kind == WorkKind::kPasses) return SliceSize(work, pass_time, now);
+std::uint64_t Scheduler::BatchSize(const Work& work, const Pace& pace, SteadyTime now) const {
+  if (work.kind == WorkKind::kPasses) return SliceSize(work, pace, now);
   if (options_.fixed_batch > 0) return std::min(options_.fixed_batch, work.rest.size());
   const std::uint64_t ways = std::clamp<std::uint64_t>(live_workers_, 1, options_.max_split_ways);
   const std::uint64_t share = CeilDivide(work.total, ways);
@@ -822,18 +827,18 @@ std::uint64_t Scheduler::BatchSize(const Work& work, std::optional<double> pass_
 
 // Long slices cost the coordinator and the network least; but every worker shall have one and find
 // a second one waiting, and what is not done when time is up is lost.
-std::uint64_t Scheduler::SliceSize(const Work& work, std::optional<double> pass_time,
-                                   SteadyTime now) const {
+std::uint64_t Scheduler::SliceSize(const Work& work, const Pace& pace, SteadyTime now) const {
   std::uint64_t size = std::min(
       {round_passes_ / (options_.slices_per_worker * std::max<std::uint64_t>(live_workers_, 1)),
        options_.max_slice, work.rest.size()});
   // Their sums are twice as large, and a worker holds some while it traces others.
   if (HasFeatures({work.rest.first, work.rest.first + 1})) size = 1;
-  const std::optional<double> time = pass_time ? pass_time : UsualTime(WorkKind::kPasses);
-  if (time && *time * static_cast<double>(size) > Seconds(options_.longest_slice)) {
-    size = static_cast<std::uint64_t>(Seconds(options_.longest_slice) / *time);
+  if (pace.tracing && *pace.tracing * static_cast<double>(size) > Seconds(options_.longest_slice)) {
+    size = static_cast<std::uint64_t>(Seconds(options_.longest_slice) / *pace.tracing);
   }
   if (work.due) {
+    const std::optional<double> time =
+        pace.until_merged ? pace.until_merged : UsualTime(WorkKind::kPasses);
     const double left = Seconds(*work.due - now);
     if (!time || left <= 0) {
       size = 1;
@@ -855,8 +860,7 @@ bool Scheduler::HasBatchesToSpare(SteadyTime now) const {
     if (shares_.IsHeld(key.job_id)) continue;
     const Work& work = open_.at(key);
     batches += work.returned.size();
-    if (work.rest.size() > 0)
-      batches += CeilDivide(work.rest.size(), BatchSize(work, std::nullopt, now));
+    if (work.rest.size() > 0) batches += CeilDivide(work.rest.size(), BatchSize(work, Pace(), now));
     if (batches > idle_workers_) return true;
   }
   return false;
@@ -894,7 +898,7 @@ std::optional<BatchLease> Scheduler::Lend(const std::string& worker_id, SteadyTi
     range = *choice;
     work.returned.erase(choice);
   } else {
-    range = {work.rest.first, work.rest.first + BatchSize(work, worker.pass_time, now)};
+    range = {work.rest.first, work.rest.first + BatchSize(work, worker.pace, now)};
     work.rest.first = range.last;
     ++lent_anew_;
   }

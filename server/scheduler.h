@@ -74,8 +74,9 @@ struct SchedulerOptions {
   std::uint64_t max_split_ways = 6;
   std::uint64_t fixed_batch = 0;  // all batches of this size; 0: as above
   std::uint64_t max_slice = 16;   // [passes]
-  // By the time that the worker's passes take: what is lost with it, and the sums of halves that it
-  // holds, stay few where passes take long.
+  // By the time in which the worker traces a pass: what is lost with it, and the sums of halves
+  // that it holds, stay few where passes take long. (Not by the time until they are merged: where
+  // the link is full slices must be long.)
   Duration longest_slice = std::chrono::seconds(30);
   // Slices are cut so that open rounds have so many for every worker.
   std::uint64_t slices_per_worker = 2;
@@ -121,11 +122,11 @@ class Scheduler {
 
   // The id of a new registration. `identity` is what the worker keeps through all its
   // registrations; what an earlier one held goes back, because it was dropped. Empty: a new one.
-  // `peer` is whose limits the registration counts for.
+  // `peer` is whose limits the registration counts for; the worker traces with so many threads.
   // Errors: RESOURCE_EXHAUSTED when the peer has max_registrations; then nothing has changed.
   [[nodiscard]] StatusOr<std::string> AddWorker(std::string_view name, SteadyTime now,
                                                 std::string_view identity = {},
-                                                std::string_view peer = {});
+                                                std::string_view peer = {}, int threads = 1);
 
   // What a worker says of itself.
   struct Report {
@@ -201,8 +202,10 @@ class Scheduler {
   // A held job is lent nothing, also not a second time; what is lent may come back. When it goes
   // on, failures of its batches are forgotten.
   void SetHeld(const std::string& job_id, bool is_held);
-  // A result of so many photons or passes came back, and took so long, as the worker says.
-  void CountWork(const std::string& job_id, WorkKind kind, std::uint64_t size, Duration worker_cpu);
+  // A result of so many photons or passes came back, and took so much processor time, as the worker
+  // says.
+  void CountWork(const std::string& worker, const std::string& job_id, WorkKind kind,
+                 std::uint64_t size, Duration worker_cpu);
   // The job has no open work, and will have none.
   void ForgetJob(const std::string& job_id);
 
@@ -288,6 +291,11 @@ class Scheduler {
     std::uint64_t opening = 0;  // of its work
   };
   // A registration.
+  // How long a pass of a worker's last slice took [s].
+  struct Pace {
+    std::optional<double> until_merged;  // since it was lent
+    std::optional<double> tracing;       // by all of its threads, as it says
+  };
   struct Worker {
     std::string record;  // its id
     std::string peer;
@@ -296,8 +304,8 @@ class Scheduler {
     bool may_be_lent = true;
     std::set<std::string> leases;
     std::uint64_t place = 0;  // in the queue for leases; 0: does not wait
-    // How long a pass of its last slice took, from lending to merging [s].
-    std::optional<double> pass_time;
+    int threads = 1;
+    Pace pace;
     // What it held when it was last heard of.
     std::vector<std::pair<PassKey, WorkRange>> interrupted;
     std::deque<PastLease> past;  // the newest
@@ -363,10 +371,10 @@ class Scheduler {
   void AddWork(const PassKey& key, Work work) LUCERNA_REQUIRES(mutex_);
 
   // Of the next batch. Requires work.rest.size() > 0.
-  // `pass_time`: of the worker that it is for, or of none.
-  std::uint64_t BatchSize(const Work& work, std::optional<double> pass_time, SteadyTime now) const
+  // `pace`: of the worker that it is for, or of none.
+  std::uint64_t BatchSize(const Work& work, const Pace& pace, SteadyTime now) const
       LUCERNA_REQUIRES(mutex_);
-  std::uint64_t SliceSize(const Work& work, std::optional<double> pass_time, SteadyTime now) const
+  std::uint64_t SliceSize(const Work& work, const Pace& pace, SteadyTime now) const
       LUCERNA_REQUIRES(mutex_);
   // Whether there are more batches to hand out than idle workers.
   bool HasBatchesToSpare(SteadyTime now) const LUCERNA_REQUIRES(mutex_);

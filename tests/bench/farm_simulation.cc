@@ -347,7 +347,10 @@ class Farm {
     worker = std::move(fresh);
     worker.is_here = true;
     worker.arrived_at = now_;
-    worker.id = scheduler_->AddWorker(absl::StrCat("host", index), At(now_)).value();
+    worker.id = scheduler_
+                    ->AddWorker(absl::StrCat("host", index), At(now_), {}, {},
+                                static_cast<int>(worker.cores))
+                    .value();
     CountCall();
     AfterFor(index, 0, [this, index] { Fetch(index); });
     AfterFor(index, 0, [this, index] { Heartbeat(index); });
@@ -673,6 +676,8 @@ class Farm {
     if (*outcome == MergeOutcome::kAccepted) {
       times_.Time([&] {
         scheduler_->Commit(lease.pass, lease.range, At(now_));
+        scheduler_->CountWork(workers_[commit.worker].id, lease.pass.job_id, lease.kind,
+                              lease.range.size(), At(PathWorkOf(lease)) - At(0));
         return 0;
       });
       const double work = PathWorkOf(lease);

@@ -481,23 +481,30 @@ TEST(SchedulerRoundTest, SlicesOfTheFirstPassesAreOfOnePass) {
   }
 }
 
-// A worker takes at most 30 s for one, if its passes take less than that.
+// A worker traces 30 s for one at most, if its passes take less than that, however long they wait
+// for others and for the network.
 TEST(SchedulerRoundTest, SlicesAreShorterTheLongerPassesTake) {
   const PassKey key = {"job", 512};  // of 64 passes
-  const auto second_slice = [&](double pass_s) {
+  const auto second_slice = [&](double pass_s, double waiting_s = 0) {
+    constexpr int kThreads = 4;
     Scheduler scheduler({});
-    const auto worker = scheduler.AddWorker("w", At(0)).value();
+    const auto worker = scheduler.AddWorker("w", At(0), {}, {}, kThreads).value();
     scheduler.OpenRound(key, {512, 576}, {});
     const auto lease = Ask(scheduler, worker, 0);
     EXPECT_EQ(lease->range.size(), 16U) << "nothing is known of how long a pass takes";
-    const double took = pass_s * static_cast<double>(lease->range.size());
+    const double tracing = pass_s * static_cast<double>(lease->range.size());
+    const double took = tracing + waiting_s;
     // Heard of now and then.
     for (double now = 5; now < took; now += 5)
       EXPECT_TRUE(Revoked(scheduler, worker, {lease->id}, now).empty());
     scheduler.Commit(key, lease->range, At(took));
+    scheduler.CountWork(
+        worker, key.job_id, WorkKind::kPasses, lease->range.size(),
+        std::chrono::duration_cast<Duration>(std::chrono::duration<double>(kThreads * tracing)));
     return Ask(scheduler, worker, took)->range.size();
   };
   EXPECT_EQ(second_slice(1), 16U);
+  EXPECT_EQ(second_slice(1, 100), 16U);
   EXPECT_EQ(second_slice(3.7), 8U);
   EXPECT_EQ(second_slice(10), 2U);
   EXPECT_EQ(second_slice(40), 1U);
