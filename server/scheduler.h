@@ -290,12 +290,14 @@ class Scheduler {
     Ending ending = Ending::kDelivered;
     std::uint64_t opening = 0;  // of its work
   };
-  // A registration.
   // How long a pass of a worker's last slice took [s].
   struct Pace {
     std::optional<double> until_merged;  // since it was lent
-    std::optional<double> tracing;       // by all of its threads, as it says
+    // Processor time over its threads, as it says: less than it takes where it has fewer
+    // processors.
+    std::optional<double> tracing;
   };
+  // A registration.
   struct Worker {
     std::string record;  // its id
     std::string peer;

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <utility>
 
 #include "render/base/memory.h"
 #include "render/estimate/slice_sums.h"
@@ -76,7 +77,6 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     std::vector<GlossyPlace> places;     // [glossy]
   };
   struct Tile {
-    std::size_t first_pixel = 0;  // tile after tile
     Rows rows;
     Rows caustic_rows;
     Rows segment_rows;
@@ -84,19 +84,16 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   };
   const bool automatic = tracer.settings().initial_radius == 0;
   std::vector<Tile> per_tile(tiles);
-  const auto for_pixels_of = [&](std::size_t tile, const auto& work) {
-    const int x0 = static_cast<int>(tile % static_cast<std::size_t>(tiles_x)) * kTile;
-    const int y0 = static_cast<int>(tile / static_cast<std::size_t>(tiles_x)) * kTile;
-    for (int y = y0; y < std::min(y0 + kTile, height); ++y) {
-      for (int x = x0; x < std::min(x0 + kTile, width); ++x)
-        work(x, y);
-    }
+  const auto corner_of = [&](std::size_t tile) {
+    return std::pair(static_cast<int>(tile % static_cast<std::size_t>(tiles_x)) * kTile,
+                     static_cast<int>(tile / static_cast<std::size_t>(tiles_x)) * kTile);
   };
-  for (std::size_t tile = 1; tile < tiles; ++tile) {
-    std::size_t& first = per_tile[tile].first_pixel;
-    first = per_tile[tile - 1].first_pixel;
-    for_pixels_of(tile - 1, [&](int, int) { ++first; });
-  }
+  // How many pixels the tiles before this one have.
+  const auto first_pixel_of = [&](std::size_t tile) {
+    const auto [x0, y0] = corner_of(tile);
+    return static_cast<std::size_t>(y0) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x0) * static_cast<std::size_t>(std::min(kTile, height - y0));
+  };
   // Clearing memory takes as long as filling it in.
   const auto for_columns = [&](const auto& work) {
     const std::array<std::function<void()>, 5> works = {
@@ -129,48 +126,52 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     for (std::size_t number = begin; number < end; ++number) {
       if (stops()) return;
       Tile& tile = per_tile[number];
-      for_pixels_of(number, [&](int x, int y) {
-        const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(width) +
-                           static_cast<std::uint32_t>(x);
-        const EyePathTracer::First first =
-            known == nullptr
-                ? EyePathTracer::First{}
-                : EyePathTracer::First{.shape = &known->shapes[pixel], .is_known = known->is_known};
-        const EyePath path = tracer.Trace(x, y, pass, first);
-        out.direct[pixel] = path.direct;
-        if (!bright.empty()) bright[pixel] = path.bright;
-        if (has_features) out.features[pixel] = path.features;
-        rays[number] += static_cast<std::uint64_t>(path.rays);
-        const auto keep = [&](const EyeHitpoint& hitpoint, Rows& rows) {
-          if (IsBlack(hitpoint.weight)) return;
-          if (hitpoint.is_glossy) {
-            rows.glossy.push_back({static_cast<std::uint32_t>(rows.count), hitpoint.material,
-                                   EncodeOctahedral(hitpoint.to_eye),
-                                   EncodeOctahedral(hitpoint.shading_normal)});
-            rows.places.push_back(hitpoint.place);
+      const auto [x0, y0] = corner_of(number);
+      const std::size_t first_pixel = first_pixel_of(number);
+      for (int y = y0; y < std::min(y0 + kTile, height); ++y) {
+        for (int x = x0; x < std::min(x0 + kTile, width); ++x) {
+          const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(width) +
+                             static_cast<std::uint32_t>(x);
+          const EyePathTracer::First first =
+              known == nullptr ? EyePathTracer::First{}
+                               : EyePathTracer::First{.shape = &known->shapes[pixel],
+                                                      .is_known = known->is_known};
+          const EyePath path = tracer.Trace(x, y, pass, first);
+          out.direct[pixel] = path.direct;
+          if (!bright.empty()) bright[pixel] = path.bright;
+          if (has_features) out.features[pixel] = path.features;
+          rays[number] += static_cast<std::uint64_t>(path.rays);
+          const auto keep = [&](const EyeHitpoint& hitpoint, Rows& rows) {
+            if (IsBlack(hitpoint.weight)) return;
+            if (hitpoint.is_glossy) {
+              rows.glossy.push_back({static_cast<std::uint32_t>(rows.count), hitpoint.material,
+                                     EncodeOctahedral(hitpoint.to_eye),
+                                     EncodeOctahedral(hitpoint.shading_normal)});
+              rows.places.push_back(hitpoint.place);
+            }
+            const Row row = {pixel, hitpoint.position, EncodeOctahedral(hitpoint.normal),
+                             hitpoint.weight, UnitRadiusOf(tracer, hitpoint)};
+            if (&rows == &tile.rows) {
+              put(first_pixel + rows.count, row);
+            } else {
+              rows.rows.push_back(row);
+            }
+            ++rows.count;
+          };
+          keep(path.hitpoint, tile.rows);
+          keep(path.caustic, tile.caustic_rows);
+          if (const EyeSegment& segment = path.segment; !IsBlack(segment.weight)) {
+            tile.segment_rows.rows.push_back({pixel, segment.from, EncodeOctahedral({0, 0, 1}),
+                                              segment.weight, UnitRadiusOf(tracer, segment)});
+            ++tile.segment_rows.count;
+            tile.segments.push_back({segment.to, static_cast<std::uint32_t>(segment.medium),
+                                     automatic
+                                         ? std::clamp(segment.from_footprint / segment.to_footprint,
+                                                      kLeastNarrowing, 1.0F)
+                                         : 1.0F});
           }
-          const Row row = {pixel, hitpoint.position, EncodeOctahedral(hitpoint.normal),
-                           hitpoint.weight, UnitRadiusOf(tracer, hitpoint)};
-          if (&rows == &tile.rows) {
-            put(tile.first_pixel + rows.count, row);
-          } else {
-            rows.rows.push_back(row);
-          }
-          ++rows.count;
-        };
-        keep(path.hitpoint, tile.rows);
-        keep(path.caustic, tile.caustic_rows);
-        if (const EyeSegment& segment = path.segment; !IsBlack(segment.weight)) {
-          tile.segment_rows.rows.push_back({pixel, segment.from, EncodeOctahedral({0, 0, 1}),
-                                            segment.weight, UnitRadiusOf(tracer, segment)});
-          ++tile.segment_rows.count;
-          tile.segments.push_back({segment.to, static_cast<std::uint32_t>(segment.medium),
-                                   automatic
-                                       ? std::clamp(segment.from_footprint / segment.to_footprint,
-                                                    kLeastNarrowing, 1.0F)
-                                       : 1.0F});
         }
-      });
+      }
     }
   });
 
@@ -210,9 +211,9 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   out.block.segments.resize(next.row - segments_begin);
   for_columns([&](auto& column) {
     for (std::size_t tile = 0; tile < tiles && ordinary < pixels; ++tile) {
-      const auto from = column.begin() + static_cast<std::ptrdiff_t>(per_tile[tile].first_pixel);
+      const auto from = column.begin() + static_cast<std::ptrdiff_t>(first_pixel_of(tile));
       const auto to = column.begin() + static_cast<std::ptrdiff_t>(first_ordinary[tile].row);
-      std::copy_n(from, per_tile[tile].rows.count, to);
+      if (from != to) std::copy_n(from, per_tile[tile].rows.count, to);
     }
     column.resize(next.row);
   });
