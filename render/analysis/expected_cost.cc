@@ -10,7 +10,7 @@ namespace {
 
 // Bytes a pixel, measured (docs/numerics.md, docs/measurements.md): of the coordinator for a job
 // without evidence whose first passes are split between several workers, and of a worker.
-constexpr double kCoordinator = 480;
+constexpr double kCoordinator = 560;
 constexpr double kWorker = 320;
 // Of both, for each column of evidence of the slices that they hold.
 constexpr double kEvidenceColumn = 16;
