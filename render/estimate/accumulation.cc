@@ -28,10 +28,6 @@ std::int64_t SaturatingSum(std::int64_t a, std::int64_t b) {
   return a < 0 ? Limits::min() : Limits::max();
 }
 
-void AddTo(PackedIntegers& sums, std::size_t i, std::int64_t value) {
-  sums.Set(i, sums[i] + value);
-}
-
 // Calls visit(ours, theirs) for every sum of two tallies, of which ours has as many lights as
 // theirs.
 template <typename Ours, typename Visit>
@@ -177,7 +173,7 @@ Status PassSums::Add(const Accumulation& accumulation) {
   LUCERNA_RETURN_IF_ERROR(Check(accumulation));
   const auto add = [&](const auto& values, PackedIntegers& sums) {
     for (std::size_t i = 0; i < accumulation.size(); ++i)
-      AddTo(sums, accumulation.hitpoints[i], values[i]);
+      sums.Add(accumulation.hitpoints[i], values[i]);
   };
   add(accumulation.counts, counts_);
   for (std::size_t channel = 0; channel < 3; ++channel)
@@ -199,11 +195,11 @@ bool PassSums::AddRow(std::size_t hitpoint, std::uint64_t count,
   for (std::size_t column = 0; column < evidence_.size(); ++column)
     fits = fits && SumFits(evidence_[column][hitpoint], evidence[column]);
   if (!fits) return false;
-  AddTo(counts_, hitpoint, static_cast<std::int64_t>(count));
+  counts_.Add(hitpoint, static_cast<std::int64_t>(count));
   for (std::size_t channel = 0; channel < 3; ++channel)
-    AddTo(flux_[channel], hitpoint, flux[channel]);
+    flux_[channel].Add(hitpoint, flux[channel]);
   for (std::size_t column = 0; column < evidence_.size(); ++column)
-    AddTo(evidence_[column], hitpoint, evidence[column]);
+    evidence_[column].Add(hitpoint, evidence[column]);
   return true;
 }
 

@@ -42,6 +42,15 @@ class PackedIntegers {
     }
     wide[i % kTileSize] = value;
   }
+  // Set of the sum, which fits in 64 bits. Most are small before and after.
+  void Add(std::size_t i, std::int64_t value) {
+    const std::int64_t sum = (*this)[i] + value;
+    if (wide_[i / kTileSize].empty() && std::in_range<std::int32_t>(sum)) {
+      narrow_[i] = static_cast<std::int32_t>(sum);
+    } else {
+      Set(i, sum);
+    }
+  }
   // Whether the numbers are equal, in whatever tiles.
   bool operator==(const PackedIntegers& other) const { return ToVector() == other.ToVector(); }
   [[nodiscard]] std::vector<std::int64_t> ToVector() const {
