@@ -433,6 +433,16 @@ StatusOr<std::string> ClientConnection::GetImage(const std::string& job_id,
       [&](grpc::ClientContext* context) { return images_->GetImage(context, request); }, gives_up);
 }
 
+StatusOr<std::string> ClientConnection::GetUvMesh(const std::string& job_id) {
+  v1::GetImageRequest request;
+  request.set_job_id(job_id);
+  request.set_uv_mesh(true);
+  return ReadChunks(
+      "the mesh",
+      [&](grpc::ClientContext* context) { return images_->GetImage(context, request); },
+      [] { return false; });
+}
+
 StatusOr<std::string> ClientConnection::GetTrace(const std::string& job_id) {
   v1::GetTraceRequest request;
   request.set_job_id(job_id);

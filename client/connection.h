@@ -67,11 +67,13 @@ class ClientConnection {
   // thread; before the first news it is called with an empty Job, state UNSPECIFIED.
   [[nodiscard]] StatusOr<v1::Job> Watch(const std::string& job_id, const OnJob& on_job);
 
-  // The bytes of the job's EXR file. Whoever may lose interest says so by `gives_up`, which is
+  // The bytes of the job's EXR file, or of what a bake made. Whoever may lose interest says so by `gives_up`, which is
   // called several times a second, also from another thread; then ABORTED. Threads: any, beside
   // other calls.
   [[nodiscard]] StatusOr<std::string> GetImage(
       const std::string& job_id, const std::function<bool()>& gives_up = [] { return false; });
+  // The mesh of a job that made a light map, as glTF.
+  [[nodiscard]] StatusOr<std::string> GetUvMesh(const std::string& job_id);
   // The timeline of a job that was submitted to be traced, in Chrome's trace format.
   [[nodiscard]] StatusOr<std::string> GetTrace(const std::string& job_id);
 

@@ -25,23 +25,57 @@
 namespace lucerna {
 namespace {
 
-// Whether a job is of this scene, and of all settings that are given and decide its pixels.
-Status CheckSameRender(const v1::Job& job, const RenderSettings& settings,
-                       const SceneManifest& manifest, const RenderOverrides& overrides) {
-  constexpr const char* kAnew = "; leave --resume away to render it anew";
-  if (job.scene_digest() != manifest.SceneDigest().Bytes()) {
+constexpr const char* kAnew = "; leave --resume away to begin anew";
+
+Status OtherValue(const Setting& setting) {
+  return absl::FailedPreconditionError(absl::StrCat(
+      "the job that was interrupted has another value of ", NameInMessage(setting), kAnew));
+}
+
+// Whether a bake was asked for with these settings.
+Status CheckSameBake(const v1::Job& job, const JobToSend& wanted) {
+  LUCERNA_ASSIGN_OR_RETURN(const BakeSettings settings, FromProto(job.bake().settings()));
+  if (settings != *wanted.bake) {
     return absl::FailedPreconditionError(
-        absl::StrCat("the scene is not the one whose render was interrupted", kAnew));
+        absl::StrCat("the bake that was interrupted was asked for in another way", kAnew));
   }
+  LUCERNA_ASSIGN_OR_RETURN(const RenderOverrides overrides, FromProto(job.bake().overrides()));
   for (const Setting& setting : AllSettings()) {
-    if (setting.role == SettingRole::kStopsJob || !IsGiven(setting, overrides)) continue;
-    RenderSettings given = settings;
-    ResolveSetting(setting, overrides, nullptr, given);
-    if (given == settings) continue;
-    return absl::FailedPreconditionError(absl::StrCat(
-        "the render that was interrupted has another value of ", NameInMessage(setting), kAnew));
+    if (setting.role == SettingRole::kStopsJob) continue;
+    if (SettingText(setting, overrides) != SettingText(setting, wanted.overrides)) {
+      return OtherValue(setting);
+    }
   }
   return absl::OkStatus();
+}
+
+// Whether a job is of this scene, and of all settings that are given and decide its pixels.
+Status CheckSameJob(const v1::Job& job, const JobToSend& wanted) {
+  if (job.scene_digest() != wanted.manifest.SceneDigest().Bytes()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("the scene is not the one of the job that was interrupted", kAnew));
+  }
+  if (job.has_bake() != wanted.bake.has_value()) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("what was interrupted is ", job.has_bake() ? "a bake" : "no bake", kAnew));
+  }
+  if (wanted.bake) return CheckSameBake(job, wanted);
+  const RenderSettings settings = SettingsOf(job);
+  for (const Setting& setting : AllSettings()) {
+    if (setting.role == SettingRole::kStopsJob || !IsGiven(setting, wanted.overrides)) continue;
+    RenderSettings given = settings;
+    ResolveSetting(setting, wanted.overrides, nullptr, given);
+    if (given != settings) return OtherValue(setting);
+  }
+  return absl::OkStatus();
+}
+
+// Whether `overrides` end as `until` does.
+bool HasEnd(const v1::RenderOverrides& message, const RenderOverrides& until) {
+  const StatusOr<RenderOverrides> overrides = FromProto(message);
+  return overrides.ok() && overrides->passes == until.passes &&
+         overrides->photons == until.photons && overrides->time_s == until.time_s &&
+         overrides->error == until.error;
 }
 
 // Shows a job as it moves on: redrawn in place on a terminal, else as plain lines, on stderr.
@@ -121,23 +155,21 @@ class ViewerFeed {
 }  // namespace
 
 StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& files,
-                                     const SceneManifest& manifest,
-                                     const RenderOverrides& overrides,
-                                     const std::string& reference_path, int priority,
-                                     bool is_traced) {
-  LUCERNA_RETURN_IF_ERROR(connection.Upload(manifest, files));
+                                     const JobToSend& job) {
+  LUCERNA_RETURN_IF_ERROR(connection.Upload(job.manifest, files));
   v1::SubmitRequest request;
-  if (!reference_path.empty()) {
-    LUCERNA_ASSIGN_OR_RETURN(const std::string reference, ReadFile(reference_path));
+  if (!job.reference_path.empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(const std::string reference, ReadFile(job.reference_path));
     LUCERNA_ASSIGN_OR_RETURN(const Digest digest, connection.UploadBytes(reference));
     request.set_reference_digest(std::string(digest.Bytes()));
   }
   // Only a retry of this submission has it, and finds its job.
   request.set_request_id(RandomId());
-  *request.mutable_scene() = ToProto(manifest);
-  *request.mutable_overrides() = ToProto(overrides);
-  request.set_priority(priority);
-  request.set_is_traced(is_traced);
+  *request.mutable_scene() = ToProto(job.manifest);
+  *request.mutable_overrides() = ToProto(job.overrides);
+  request.set_priority(job.priority);
+  request.set_is_traced(job.is_traced);
+  if (job.bake) *request.mutable_bake() = ToProto(*job.bake);
   return connection.Submit(request);
 }
 
@@ -196,13 +228,10 @@ StatusOr<std::unique_ptr<LocalRuns>> LocalRuns::Start(const ClusterOptions& opti
   return runs;
 }
 
-StatusOr<v1::Job> LocalRuns::Run(SceneFiles& files, const SceneManifest& manifest,
-                                 const RenderOverrides& overrides,
-                                 const std::string& reference_path,
+StatusOr<v1::Job> LocalRuns::Run(SceneFiles& files, JobToSend job,
                                  const OutputOptions& output_options) {
-  LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
-                           SendJob(*connection_, files, manifest, overrides, reference_path,
-                                   /*priority=*/0, is_tracing_));
+  job.is_traced = is_tracing_;
+  LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted, SendJob(*connection_, files, job));
   job_id_ = submitted.job_id();
   return FollowOwn(output_options);
 }
@@ -230,22 +259,23 @@ StatusOr<v1::Job> LocalRuns::FollowOwn(const OutputOptions& output_options) {
   return job;
 }
 
-StatusOr<v1::Job> LocalRuns::Resume(const SceneManifest& manifest, const RenderOverrides& overrides,
-                                    const OutputOptions& output_options) {
+StatusOr<v1::Job> LocalRuns::Resume(const JobToSend& wanted, const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, connection_->List());
   if (jobs.empty()) return absl::FailedPreconditionError("there is no render to go on with");
   const v1::Job& job = jobs.front();
-  const RenderSettings settings = SettingsOf(job);
-  LUCERNA_RETURN_IF_ERROR(CheckSameRender(job, settings, manifest, overrides));
+  LUCERNA_RETURN_IF_ERROR(CheckSameJob(job, wanted));
   job_id_ = job.job_id();
   RenderOverrides until;
   bool has_end = false;
   for (const Setting& setting : AllSettings()) {
-    if (setting.role != SettingRole::kStopsJob || !IsGiven(setting, overrides)) continue;
-    LUCERNA_RETURN_IF_ERROR(ParseSetting(setting, *SettingText(setting, overrides), until));
+    if (setting.role != SettingRole::kStopsJob || !IsGiven(setting, wanted.overrides)) continue;
+    LUCERNA_RETURN_IF_ERROR(ParseSetting(setting, *SettingText(setting, wanted.overrides), until));
     has_end = true;
   }
-  if (has_end) LUCERNA_RETURN_IF_ERROR(connection_->Extend(job_id_, until).status());
+  // A bake with another end begins anew.
+  if (has_end && !(job.has_bake() && HasEnd(job.bake().overrides(), until))) {
+    LUCERNA_RETURN_IF_ERROR(connection_->Extend(job_id_, until).status());
+  }
   if (job.state() == v1::JOB_STATE_PAUSED) {
     LUCERNA_RETURN_IF_ERROR(connection_->Resume(job_id_).status());
   }
@@ -257,7 +287,7 @@ StatusOr<v1::Job> LocalRuns::Run(const std::string& scene_path, const SceneManif
                                  const std::string& reference_path,
                                  const OutputOptions& output_options) {
   DirectoryFiles files(SplitScenePath(scene_path).folder);
-  return Run(files, manifest, overrides, reference_path, output_options);
+  return Run(files, {manifest, overrides, reference_path}, output_options);
 }
 
 StatusOr<Image> LocalRuns::ImageOf(const v1::Job& job) {

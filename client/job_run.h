@@ -6,12 +6,14 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "client/connection.h"
 #include "client/local_cluster.h"
 #include "client/output_options.h"
+#include "render/bake/bake_settings.h"
 #include "render/base/status.h"
 #include "render/image/image.h"
 #include "render/scene/render_settings.h"
@@ -19,14 +21,19 @@
 
 namespace lucerna {
 
+// What is asked of a coordinator.
+struct JobToSend {
+  const SceneManifest& manifest;
+  const RenderOverrides& overrides;
+  std::string reference_path = {};        // empty: none
+  int priority = 0;                       // that of Job
+  bool is_traced = false;                 // the coordinator keeps a timeline
+  std::optional<BakeSettings> bake = {};  // what is measured in place of an image
+};
+
 // Uploads what the coordinator does not have and submits. `files` reads those of the manifest.
-// `reference_path` may be empty. `priority` is that of Job. Of a job that is traced the coordinator
-// keeps a timeline.
 [[nodiscard]] StatusOr<v1::SubmitResponse> SendJob(ClientConnection& connection, SceneFiles& files,
-                                                   const SceneManifest& manifest,
-                                                   const RenderOverrides& overrides,
-                                                   const std::string& reference_path,
-                                                   int priority = 0, bool is_traced = false);
+                                                   const JobToSend& job);
 
 // Follows the job to its end, and shows its progress unless that is off. `check` is asked several
 // times a second; before the first news, of an empty job.
@@ -50,20 +57,17 @@ class LocalRuns {
 
   // Renders to the end. An interruption cancels the job, unless the cluster has a state, in which
   // it stays. Returns a job that succeeded.
-  [[nodiscard]] StatusOr<v1::Job> Run(SceneFiles& files, const SceneManifest& manifest,
-                                      const RenderOverrides& overrides,
-                                      const std::string& reference_path,
+  [[nodiscard]] StatusOr<v1::Job> Run(SceneFiles& files, JobToSend job,
                                       const OutputOptions& output_options);
   // The same for the scene of a file on this machine.
   [[nodiscard]] StatusOr<v1::Job> Run(const std::string& scene_path, const SceneManifest& manifest,
                                       const RenderOverrides& overrides,
                                       const std::string& reference_path,
                                       const OutputOptions& output_options);
-  // Goes on, to the end that `overrides` give if they give one, with the job that is in the
+  // Goes on, to the end that the overrides give if they give one, with the job that is in the
   // cluster's state. Errors: also FAILED_PRECONDITION when there is none, or its scene or settings
   // are others.
-  [[nodiscard]] StatusOr<v1::Job> Resume(const SceneManifest& manifest,
-                                         const RenderOverrides& overrides,
+  [[nodiscard]] StatusOr<v1::Job> Resume(const JobToSend& wanted,
                                          const OutputOptions& output_options);
   // The image of a job that succeeded.
   [[nodiscard]] StatusOr<Image> ImageOf(const v1::Job& job);

@@ -127,6 +127,7 @@ int Run(int argc, char** argv) {
   std::string frames;
   ClusterOptions cluster;
   OutputPaths fetched;
+  BakeOutputs fetched_bake;
   ReportPaths report_paths;
   RenderOverrides until;
   PhotonRequest photon;
@@ -219,6 +220,15 @@ int Run(int argc, char** argv) {
     to->add_option("--png", outputs.png, "PNG file to write beside it");
     to->add_flag("--force", outputs.replaces, "replace files that lucerna has not written");
     add_display(to);
+  };
+  const auto add_bake_outputs = [](CLI::App* to, BakeOutputs& outputs) {
+    to->add_option("--uv-mesh", outputs.uv_mesh,
+                    ".glb file to write beside a light map: the surfaces with their places in it");
+    to->add_flag("--ascii", outputs.is_ascii, "write a PLY file as text");
+    to->add_option("--plan", outputs.plan,
+                    "SVG file to write: the largest surface, and what faces the same way, in false "
+                    "colours");
+    to->add_flag("--lux", outputs.in_lux, "print illuminance: 683 lm/W times the luminance");
   };
   const auto add_tev = [&](CLI::App* to) {
     to->add_option("--tev", tev, "show the image so far in the viewer tev, at host:port");
@@ -330,9 +340,10 @@ int Run(int argc, char** argv) {
                             [&] { return Follow(job_id, true, server, output_options); });
   CLI::App* wait = command("wait", "wait until a job has ended",
                            [&] { return Follow(job_id, false, server, output_options); });
-  CLI::App* fetch = command("fetch", "fetch a job's image, also of one that still runs",
-                            [&] { return Fetch(job_id, fetched, server, output_options); });
+  CLI::App* fetch = command("fetch", "fetch a job's image, also of one that still runs, or what a bake made",
+                            [&] { return Fetch(job_id, fetched, fetched_bake, server, output_options); });
   add_outputs(fetch, fetched);
+  add_bake_outputs(fetch, fetched_bake);
   const auto for_each_job = [&](auto change) {
     return [&, change] {
       Status status;
@@ -514,37 +525,37 @@ int Run(int argc, char** argv) {
                     output_options);
       });
   add_scene(bake, baked.scene);
-  bake->add_option("-o,--output", baked.output_path,
-                   "file to write: .ply or .glb for a mesh, .exr for a light map")
-      ->required();
-  bake->add_option("--uv-mesh", baked.uv_mesh_path,
-                   ".glb file to write beside a light map: the surfaces with their places in it");
-  bake->add_flag("--ascii", baked.is_ascii, "write a PLY file as text");
-  bake->add_option("--spacing", baked.spacing,
+  bake->add_option("-o,--output", baked.outputs.path,
+                   "file to write: .ply or .glb for a mesh, .exr for a light map; with --on-server "
+                   "the job is submitted alone when it is not given (lucerna fetch)");
+  add_bake_outputs(bake, baked.outputs);
+  bake->add_flag("--light-map", baked.settings.is_light_map,
+                 "make a light map; not needed where -o names an .exr file");
+  bake->add_option("--spacing", baked.settings.spacing,
                    "distance of neighbouring points where the mesh is finest, in scene units "
                    "(default: a 512th of the scene's diagonal)")
       ->check(CLI::PositiveNumber);
-  bake->add_option("--tolerance", baked.tolerance,
+  bake->add_option("--tolerance", baked.settings.tolerance,
                    "refine where linear interpolation is wrong by more than this share; 0: "
                    "everywhere")
       ->check(CLI::Range(0.0, 10.0))
       ->capture_default_str();
   const std::map<std::string, MeshElements> elements = {{"linear", MeshElements::kLinear},
                                                         {"quadratic", MeshElements::kQuadratic}};
-  bake->add_option("--elements", baked.elements,
+  bake->add_option("--elements", baked.settings.elements,
                    "linear or quadratic: how irradiance is interpolated on a triangle")
       ->transform(OneOf(elements))
       ->default_str("linear");
-  bake->add_flag("!--no-decimation", baked.decimates,
+  bake->add_flag("!--no-decimation", baked.settings.decimates,
                  "keep vertices where the mesh is right without them");
-  bake->add_option("--material", baked.materials,
+  bake->add_option("--material", baked.settings.materials,
                    "measure surfaces of this material alone; may be repeated")
       ->allow_extra_args(false);
   const std::map<std::string, BakeEstimator> estimators = {
       {"kernel", BakeEstimator::kKernel},
       {"nearest", BakeEstimator::kNearest},
       {"histogram", BakeEstimator::kHistogram}};
-  bake->add_option("--estimator", baked.estimator,
+  bake->add_option("--estimator", baked.settings.estimator,
                    "kernel, nearest (about the k nearest photons of each vertex) or histogram (the "
                    "photons on each triangle of an even mesh)")
       ->transform(OneOf(estimators))
@@ -553,22 +564,17 @@ int Run(int argc, char** argv) {
                                                       {"front", MeasuredSides::kFront},
                                                       {"back", MeasuredSides::kBack},
                                                       {"both", MeasuredSides::kBoth}};
-  bake->add_option("--sides", baked.sides, "brighter, front, back or both sides of each shape")
+  bake->add_option("--sides", baked.settings.sides, "brighter, front, back or both sides of each shape")
       ->transform(OneOf(sides))
       ->default_str("brighter");
-  bake->add_flag("--indirect-only", baked.indirect_only,
+  bake->add_flag("--indirect-only", baked.settings.indirect_only,
                  "leave out light that comes straight from lights");
-  bake->add_option("--plan", baked.plan_path,
-                   "SVG file to write: the largest surface, and what faces the same way, in false "
-                   "colours");
-  bake->add_flag("--lux", baked.in_lux, "print illuminance: 683 lm/W times the luminance");
   add_image_flags(bake, baked.overrides);
   AddSettingFlags(*bake, SettingRole::kStopsJob, baked.overrides);
   add_workers(bake);
   bake->add_flag("--resume", baked.resumes,
-                 "take the rounds that were finished before an interruption from the folder beside "
-                 "the output");
-  bake->add_flag("--on-server", bakes_on_server, "run the jobs on the coordinator of --server");
+                 "go on with a bake on this machine that was interrupted");
+  bake->add_flag("--on-server", bakes_on_server, "run it as a job of the coordinator of --server");
   add_server(bake);
   add_no_preview(bake);
   add_json(bake);
@@ -668,7 +674,8 @@ int Run(int argc, char** argv) {
     return End(is_done ? ExitCode::kDone : ExitCode::kUsage);
   }
   if (*fetch && fetched.empty()) {
-    PrintError("lucerna: say where the image goes, with -o FILE.exr or --png FILE.png\n");
+    PrintError("lucerna: say where the image goes, with -o FILE.exr or --png FILE.png, or with "
+               "-o FILE.glb what a bake made\n");
     return End(ExitCode::kUsage);
   }
 

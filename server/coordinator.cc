@@ -187,7 +187,18 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
   LUCERNA_ASSIGN_OR_RETURN(
       const MemoryClaim for_reading,
       budget_.Claim(MemoryUse::kScenes, GuessSceneMemory(SceneBytes(submission.manifest))));
+  if (submission.bake) {
+    LUCERNA_RETURN_IF_ERROR(CheckBake(*submission.bake, submission.overrides));
+    if (submission.reference) {
+      return absl::InvalidArgumentError("a bake has no reference image");
+    }
+  }
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
+  if (submission.bake) {
+    // What the names of materials and the spacing come to.
+    LUCERNA_RETURN_IF_ERROR(
+        BakeRounds::Begin(job.scene, *submission.bake, submission.overrides).status());
+  }
   // Its files stay beside it.
   const std::uint64_t files = SceneBytes(submission.manifest);
   if (MemoryNeedOf(job.needs, job.settings, HeldOfScene(job.scene_memory)) + files >
@@ -383,8 +394,8 @@ void Coordinator::UpdateClaim(const std::string& job_id) {
   const MutexLock lock(claims_mutex_);
   const std::optional<JobTable::Share> share = jobs_.ShareOf(job_id);
   if (!share) return;
-  scheduler_.SetClaim(job_id, {.priority = share->priority, .owner = share->owner});
-  scheduler_.SetHeld(job_id, share->is_held);
+  scheduler_.SetClaim(share->run_id, {.priority = share->priority, .owner = share->owner});
+  scheduler_.SetHeld(share->run_id, share->is_held);
 }
 
 StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) {
@@ -399,6 +410,19 @@ StatusOr<Blob> Coordinator::ImageOf(const std::string& job_id) {
   StatusOr<Blob> image = Encode(source, std::move(result));
   TraceOwn(job_id, "image", began_at, [] { return "image so far"; });
   return image;
+}
+
+StatusOr<Blob> Coordinator::UvMeshOf(const std::string& job_id) {
+  LUCERNA_ASSIGN_OR_RETURN(const JobTable::ImageSource source, jobs_.FindImage(job_id, Now()));
+  if (source.uv_mesh) return source.uv_mesh;
+  const std::optional<Digest> digest =
+      source.job.bake ? source.job.bake->uv_mesh : std::optional<Digest>();
+  if (digest && state_) {
+    LUCERNA_ASSIGN_OR_RETURN(std::string bytes, state_->blobs().Get(*digest));
+    return std::make_shared<const std::string>(std::move(bytes));
+  }
+  return absl::FailedPreconditionError(
+      absl::StrCat("job ", job_id, " made no light map, so there is no mesh of one"));
 }
 
 void Coordinator::TraceOwn(const std::string& job_id, std::string_view row, SteadyTime from,
@@ -441,7 +465,8 @@ void Coordinator::EndTrace(const std::string& job_id) {
 std::shared_ptr<JobTrace> Coordinator::FindTrace(const std::string& job_id) {
   if (!is_tracing_) return nullptr;
   const MutexLock lock(traces_mutex_);
-  const auto found = traces_.find(job_id);
+  // Of a round of a bake, by the job's own id.
+  const auto found = traces_.find(job_id.substr(0, job_id.find('.')));
   return found == traces_.end() ? nullptr : found->second;
 }
 
@@ -462,7 +487,7 @@ void Coordinator::TraceEndedLeases() {
 StatusOr<Coordinator::Description> Coordinator::Describe(const std::string& job_id) const {
   const std::optional<Job> job = jobs_.Find(job_id);
   if (!job) return absl::NotFoundError(absl::StrCat("there is no job ", job_id));
-  return Description{job->manifest,     job->settings, job->needs,
+  return Description{ManifestOf(*job),  job->settings, job->needs,
                      job->photon_steps, job->guides,   options_.numeric_profile};
 }
 
@@ -507,7 +532,21 @@ void Coordinator::RunTurn(JobTable::Turn turn) {
         jobs_.GiveUpTurn(job_id, Now());
         return;
       }
-      Conclude(job_id, std::move(result));
+      if (result.ok() && turn.is_bake) {
+        const StopReason reason = result->reason;
+        StatusOr<bool> goes_on = EndRound(turn, *std::move(result));
+        if (goes_on.ok() && *goes_on) {
+          result = BeginRun(turn);
+          continue;
+        }
+        if (goes_on.ok()) {
+          ConcludeBake(turn, reason);
+        } else {
+          ConcludeFailed(job_id, goes_on.status());
+        }
+      } else {
+        Conclude(job_id, std::move(result));
+      }
       release_at_ = clock_.Steady() + kReleaseAfter;
       ++ended_since_release_;
       // Without the work of a worker whose results were wrong.
@@ -516,7 +555,8 @@ void Coordinator::RunTurn(JobTable::Turn turn) {
       WaitForMerges();
       turn.runner = nullptr;
       turn.scene.reset();
-      result = BeginRun(turn);
+      turn.bake = nullptr;
+      result = Render(turn);
     }
   } catch (const std::bad_alloc&) {
     // The job alone: what it had is freed with its runner.
@@ -531,7 +571,8 @@ void Coordinator::RunTurn(JobTable::Turn turn) {
 }
 
 StatusOr<RenderResult> Coordinator::Render(JobTable::Turn& turn) {
-  return turn.runner ? turn.runner->Resume() : BeginRun(turn);
+  if (turn.runner) return turn.runner->Resume();
+  return turn.is_bake ? BeginBake(turn) : BeginRun(turn);
 }
 
 StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
@@ -609,6 +650,8 @@ void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner
       return false;
     }
     StatusOr<DecodedRecord> record = DecodeRecord(checkpoint.record, Now());
+    // Of an earlier round of a bake.
+    if (record.ok() && ManifestOf(record->job) != ManifestOf(*job)) return false;
     const auto has_part = [&](const std::string& worker) {
       return record->job.workers.contains(worker);
     };
@@ -640,7 +683,7 @@ void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner
   }
   if (is_restored) return;
   // A job that had ended and was given a new end begins anew: what it had counted comes again.
-  if (job->counters.photons == 0 && job->workers.empty()) return;
+  if (job->counters.photons == 0 && (job->bake || job->workers.empty())) return;
   job->ClearProgress();
   jobs_.GoOnFrom(job_id, *std::move(job), Duration::zero());
   note("there is no checkpoint of it that can be used: it begins anew");
@@ -660,14 +703,15 @@ Status Coordinator::KeepCheckpoint(const std::string& job_id, std::vector<std::s
                                        EncodeRecord(run->job, std::nullopt, run->running),
                                        std::move(sums)};
   const std::uint64_t size = CheckpointFiles::SizeAsFile(checkpoint);
-  Status written = state_->checkpoints().Write(job_id, checkpoint);
+  const std::string& id = run->job.id;
+  Status written = state_->checkpoints().Write(id, checkpoint);
   if (IsOverDiskLimit(written)) {
     bool has_room = false;
     {
       const MutexLock lock(files_mutex_);
       has_room = MakeDiskRoom(size, {});
     }
-    if (has_room) written = state_->checkpoints().Write(job_id, checkpoint);
+    if (has_room) written = state_->checkpoints().Write(id, checkpoint);
   }
   LUCERNA_RETURN_IF_ERROR(written);
   jobs_.OnCheckpoint(job_id);
@@ -676,20 +720,21 @@ Status Coordinator::KeepCheckpoint(const std::string& job_id, std::vector<std::s
   return absl::OkStatus();
 }
 
-Status Coordinator::EndWell(const std::string& job_id, StopReason reason, const Blob& image) {
+Status Coordinator::KeepForJob(const std::string& job_id, std::vector<Blob> files,
+                               const std::function<bool(const std::vector<Digest>&)>& note) {
   while (true) {
     Status kept;
     {
-      // Until the job's row names it, nothing says that the image is needed.
+      // Until the job's row names them, nothing says that the files are needed.
       const MutexLock lock(files_mutex_);
-      std::optional<Digest> digest;
-      if (state_) {
-        digest = Sha256(*image);
-        kept = PutFile(*digest, *image);
+      std::vector<Digest> digests;
+      for (const Blob& file : files) {
+        if (!state_ || !kept.ok()) break;
+        digests.push_back(Sha256(*file));
+        kept = PutFile(digests.back(), *file);
       }
       if (kept.ok()) {
-        if (jobs_.Succeed(job_id, reason, image, Now(), digest)) return absl::OkStatus();
-        return absl::CancelledError("the job has ended");
+        return note(digests) ? absl::OkStatus() : absl::CancelledError("the job has ended");
       }
     }
     const std::string condition = state_->PauseCondition(kept);
@@ -702,8 +747,15 @@ Status Coordinator::EndWell(const std::string& job_id, StopReason reason, const 
   }
 }
 
+Status Coordinator::EndWell(const std::string& job_id, StopReason reason, const Blob& image) {
+  return KeepForJob(job_id, {image}, [&](const std::vector<Digest>& digests) {
+    return jobs_.Succeed(job_id, reason, image, Now(),
+                         digests.empty() ? std::nullopt : std::optional(digests.front()));
+  });
+}
+
 std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, MemoryClaim memory) {
-  const std::string id = turn.job_id;
+  const std::string id = turn.run_id;
   return std::make_shared<JobRunner>(
       id, turn.settings, options_.threads,
       RunnerHooks{
@@ -788,6 +840,10 @@ void Coordinator::Conclude(const std::string& job_id, StatusOr<RenderResult> res
       return;
     }
   }
+  ConcludeFailed(job_id, failure);
+}
+
+void Coordinator::ConcludeFailed(const std::string& job_id, const Status& failure) {
   if (jobs_.BeginsAgain(job_id)) return;
   if (state_ && is_closing_) {
     spdlog::info("job {} goes on when the coordinator is started again", job_id);

@@ -104,8 +104,12 @@ class Coordinator {
   [[nodiscard]] StatusOr<JobReport> SetPriority(const std::string& job_id, int priority);
   // Also removes what no other job needs from the disk: may take long.
   [[nodiscard]] Status Delete(const std::string& job_id);
-  // EXR bytes. Errors: NOT_FOUND, FAILED_PRECONDITION when there is no image (yet).
+  // EXR bytes; of a bake, its mesh (glTF) or light map (EXR).
+  // Errors: NOT_FOUND, FAILED_PRECONDITION when there is no image (yet).
   [[nodiscard]] StatusOr<Blob> ImageOf(const std::string& job_id);
+  // The mesh of a light map (glTF). Errors: as ImageOf, and FAILED_PRECONDITION when the job made
+  // none.
+  [[nodiscard]] StatusOr<Blob> UvMeshOf(const std::string& job_id);
 
   // What was done for it so far, as a file of Chrome's trace format. Errors: NOT_FOUND,
   // FAILED_PRECONDITION for a job that is not traced (Submission::is_traced).
@@ -216,8 +220,13 @@ class Coordinator {
   void RestoreCheckpoint(const std::string& job_id, JobRunner& runner);
   Status KeepCheckpoint(const std::string& job_id, std::vector<std::string_view> sums,
                         std::int64_t passes, const BatchTally& tally);
-  // The job succeeds when its image is on the disk, however long there is no room.
+  // Writes files for a job, if there is a state, however long there is no room, and in the same step
+  // notes in the table that it needs them: `note` is given their digests, none where there is no
+  // state, and says whether the job has not ended meanwhile.
   // Errors: CANCELLED when the job, or the process, has ended meanwhile.
+  Status KeepForJob(const std::string& job_id, std::vector<Blob> files,
+                    const std::function<bool(const std::vector<Digest>&)>& note);
+  // The job succeeds when its image is on the disk. Errors: as KeepForJob.
   Status EndWell(const std::string& job_id, StopReason reason, const Blob& image);
   // Files of the scene, and of the reference, onto the disk.
   Status KeepFiles(const CheckedJob& job) LUCERNA_REQUIRES(files_mutex_);
@@ -237,8 +246,22 @@ class Coordinator {
                   const JobTable::NeededFiles& beside) const;
   // Errors: RESOURCE_EXHAUSTED when the job would not fit into --max-disk with all others gone.
   Status CheckDiskNeed(const CheckedJob& job) const;
+  // Bakes (server/bake_turn.cc). Begins the round of a bake that is to be measured now, or goes on
+  // with it.
+  StatusOr<RenderResult> BeginBake(JobTable::Turn& turn);
+  // The mesh of the bake as far as its finished rounds go.
+  StatusOr<std::shared_ptr<BakeWork>> ReadBake(const JobTable::Turn& turn);
+  // Makes the files and settings of its next round those of the turn.
+  Status BeginRound(JobTable::Turn& turn);
+  // Takes in what its round has measured. Whether there is another round.
+  StatusOr<bool> EndRound(JobTable::Turn& turn, RenderResult result);
+  // What becomes of a bake whose last round has ended, for this reason.
+  void ConcludeBake(const JobTable::Turn& turn, StopReason reason);
+
   // What becomes of a job whose runner has come back.
   void Conclude(const std::string& job_id, StatusOr<RenderResult> result);
+  // Of a job that did not come to a good end.
+  void ConcludeFailed(const std::string& job_id, const Status& failure);
   StatusOr<Blob> Encode(const JobTable::ImageSource& source, RenderResult result) const;
   // A result whose bytes have been read.
   struct DecodedResult {

@@ -25,7 +25,9 @@ class ImageService final : public v1::ImageService::CallbackService {
   grpc::ServerWriteReactor<v1::Chunk>* GetImage(grpc::CallbackServerContext* context,
                                                 const v1::GetImageRequest* request) override {
     return SendOf(context, request->job_id(),
-                  [this, job_id = request->job_id()] { return coordinator_.ImageOf(job_id); });
+                  [this, job_id = request->job_id(), uv_mesh = request->uv_mesh()] {
+                    return uv_mesh ? coordinator_.UvMeshOf(job_id) : coordinator_.ImageOf(job_id);
+                  });
   }
 
   grpc::ServerWriteReactor<v1::Chunk>* GetTrace(grpc::CallbackServerContext* context,

@@ -135,7 +135,33 @@ Job SummaryOf(const Job& job) {
   summary.priority = job.priority;
   summary.pause_cause = job.pause_cause;
   summary.condition = job.condition;
+  if (job.bake) {
+    // What it is and how far it has come.
+    summary.bake = BakeRecord();
+    summary.bake->settings = job.bake->settings;
+    summary.bake->overrides = job.bake->overrides;
+    summary.bake->rounds = job.bake->rounds;
+  }
   return summary;
+}
+
+std::string RunIdOf(const Job& job) {
+  if (!job.bake || job.bake->rounds.empty()) return job.id;
+  return absl::StrCat(job.id, ".", job.bake->rounds.size());
+}
+
+SceneManifest ManifestOf(const Job& job) {
+  SceneManifest manifest = job.manifest;
+  if (!job.bake || job.bake->rounds.empty()) return manifest;
+  manifest.entries[kSensorsPath] = job.bake->rounds.back().sensors;
+  manifest.main_path = kSensorsPath;
+  return manifest;
+}
+
+const BakeRoundRecord* EvenRoundOf(const BakeRecord& bake) {
+  const auto found = std::ranges::find_if(
+      bake.rounds, [](const BakeRoundRecord& round) { return round.name != kSurveyName; });
+  return found == bake.rounds.end() ? nullptr : &*found;
 }
 
 void Job::AddEvent(WallTime at, std::string what) {

@@ -24,6 +24,9 @@
 #include <vector>
 
 #include "render/analysis/needs.h"
+#include "render/bake/bake_rounds.h"
+#include "render/bake/bake_settings.h"
+#include "render/bake/surface_figures.h"
 #include "render/base/clock.h"
 #include "render/base/digest.h"
 #include "render/estimate/accumulation.h"
@@ -220,6 +223,35 @@ struct WorkerShare {
   Duration cpu{};
 };
 
+// A round of a bake (render/bake/bake_rounds.h).
+struct BakeRoundRecord {
+  std::string name;  // "survey", "round 1"
+  std::uint64_t points = 0;
+  SceneManifest::Entry sensors;
+  Duration ran_before{};  // of the job, when the round began
+  bool has_ended = false;
+  // Of a round that has ended:
+  std::optional<Digest> image;  // on the disk, if there is one
+  std::int64_t passes = 0;
+  std::uint64_t photons = 0;
+  Duration cpu{};
+  std::optional<ErrorSample> error;  // the newest sample
+  std::vector<LightFinding> lights;  // of it
+};
+
+// A job that measures the irradiance of its scene's surfaces, in rounds.
+struct BakeRecord {
+  BakeSettings settings;
+  RenderOverrides overrides;
+  std::vector<BakeRoundRecord> rounds;  // the last one is under way, unless it has ended
+  // Of what came of it, once the job has succeeded:
+  std::vector<SurfaceFigures> figures;
+  std::optional<double> interpolation_error;
+  std::optional<Digest> uv_mesh;
+};
+
+// Of a bake settings, needs, counters and all that was found are those of the newest round; when it
+// has ended well, what was found of the error is that of EvenRoundOf.
 struct Job {
   std::string id;
   std::string name;
@@ -250,11 +282,20 @@ struct Job {
   PauseCause pause_cause = PauseCause::kNone;
   std::string condition;  // why it does not go on; empty: it does, or waits for its turn
   std::vector<JobEvent> events;
+  std::optional<BakeRecord> bake;  // absent: an image is rendered
 
   void AddEvent(WallTime at, std::string what);
   // All that rendering has counted and found.
   void ClearProgress();
 };
+
+// The name of what is lent of the job now: of a bake, one for each round.
+[[nodiscard]] std::string RunIdOf(const Job& job);
+// The files of what is lent of the job now: of a bake, with the sensors of its round.
+[[nodiscard]] SceneManifest ManifestOf(const Job& job);
+// The first round after the survey, whose points are spread evenly over the surfaces; nullptr before
+// it.
+[[nodiscard]] const BakeRoundRecord* EvenRoundOf(const BakeRecord& bake);
 
 // What a list of jobs shows: without the parts that grow with the length of a job.
 [[nodiscard]] Job SummaryOf(const Job& job);

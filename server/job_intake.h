@@ -13,6 +13,7 @@
 
 #include "render/analysis/needs.h"
 #include "render/analysis/scene_memory.h"
+#include "render/bake/bake_settings.h"
 #include "render/base/digest.h"
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
@@ -34,6 +35,7 @@ struct Submission {
   std::optional<Digest> reference;  // of an EXR image among the blobs
   std::string owner = {};           // who submits it; empty: unknown
   bool is_traced = false;           // its timeline is kept (server/job_trace.h)
+  std::optional<BakeSettings> bake = {};  // what is measured in place of an image
 };
 
 // A submission that was found good.
@@ -57,7 +59,7 @@ class JobIntake {
 
   // Errors: INVALID_ARGUMENT with all errors of scene and settings, FAILED_PRECONDITION when blobs
   // are missing, RESOURCE_EXHAUSTED when image or scene do not fit into memory, or what
-  // `still_needed` says, which is asked between two files.
+  // `still_needed` says, which is asked between two files. Of a bake all but its rounds is checked.
   [[nodiscard]] StatusOr<CheckedJob> Check(const Submission& submission,
                                            const StillNeeded& still_needed) const;
 

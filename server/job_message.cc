@@ -136,6 +136,51 @@ void AddShares(const std::map<std::string, WorkerShare>& workers, v1::Job& messa
   }
 }
 
+v1::LightFinding LightToProto(const LightFinding& light) {
+  v1::LightFinding message;
+  message.set_name(light.name);
+  message.set_power_share(light.power_share);
+  message.set_photons_sent(light.photons.sent);
+  message.set_in_view_caustic(light.photons.InView(PathClass::kCaustic));
+  message.set_in_view_other(light.photons.InView(PathClass::kOther));
+  message.set_missing_share(light.missing_share);
+  return message;
+}
+
+v1::Bake BakeToProto(const BakeRecord& bake) {
+  v1::Bake message;
+  *message.mutable_settings() = ToProto(bake.settings);
+  *message.mutable_overrides() = ToProto(bake.overrides);
+  for (const BakeRoundRecord& round : bake.rounds) {
+    v1::BakeRound& item = *message.add_rounds();
+    item.set_name(round.name);
+    item.set_points(static_cast<std::int64_t>(round.points));
+    item.set_passes(round.passes);
+    item.set_photons(round.photons);
+    *item.mutable_cpu() = ToProto(round.cpu);
+    if (round.error) *item.mutable_error() = SampleToProto(*round.error);
+  }
+  for (const SurfaceFigures& figures : bake.figures)
+    *message.add_surfaces() = ToProto(figures);
+  if (bake.interpolation_error) message.set_interpolation_error(*bake.interpolation_error);
+  return message;
+}
+
+// What clients are not told of its rounds.
+void AddRoundsOf(const BakeRecord& bake, v1::JobRecord& record) {
+  for (const BakeRoundRecord& round : bake.rounds) {
+    v1::BakeRoundRecord& item = *record.add_bake_rounds();
+    item.set_sensors_digest(std::string(round.sensors.digest.Bytes()));
+    item.set_sensors_bytes(round.sensors.size_bytes);
+    if (round.image) item.set_image_digest(std::string(round.image->Bytes()));
+    item.set_has_ended(round.has_ended);
+    *item.mutable_ran_before() = ToProto(round.ran_before);
+    for (const LightFinding& light : round.lights)
+      *item.add_lights() = LightToProto(light);
+  }
+  if (bake.uv_mesh) record.set_uv_mesh_digest(std::string(bake.uv_mesh->Bytes()));
+}
+
 }  // namespace
 
 std::optional<JobState> FromProto(v1::JobState state) {
@@ -169,6 +214,7 @@ v1::Job SummaryToProto(const JobReport& report) {
   message.set_pause_cause(CauseToProto(job.pause_cause));
   for (const PhotonStep& step : job.photon_steps)
     *message.add_photon_steps() = ToProto(step);
+  if (job.bake) *message.mutable_bake() = BakeToProto(*job.bake);
   return message;
 }
 
@@ -186,15 +232,8 @@ v1::Job ToProto(const JobReport& report) {
   }
   for (const ErrorSample& sample : job.convergence)
     *message.add_convergence() = SampleToProto(sample);
-  for (const LightFinding& light : job.lights) {
-    v1::LightFinding& item = *message.add_lights();
-    item.set_name(light.name);
-    item.set_power_share(light.power_share);
-    item.set_photons_sent(light.photons.sent);
-    item.set_in_view_caustic(light.photons.InView(PathClass::kCaustic));
-    item.set_in_view_other(light.photons.InView(PathClass::kOther));
-    item.set_missing_share(light.missing_share);
-  }
+  for (const LightFinding& light : job.lights)
+    *message.add_lights() = LightToProto(light);
   AddShares(job.workers, message);
   std::vector<PassTally> parts = job.pass_record.tallies();
   if (job.tail.passes > 0) parts.push_back(job.tail);
@@ -333,6 +372,43 @@ JobCounters CountersOf(const v1::Job& message) {
   return counters;
 }
 
+StatusOr<BakeRecord> BakeOf(const v1::JobRecord& record) {
+  const v1::Bake& message = record.job().bake();
+  BakeRecord bake;
+  LUCERNA_ASSIGN_OR_RETURN(bake.settings, FromProto(message.settings()));
+  LUCERNA_ASSIGN_OR_RETURN(bake.overrides, FromProto(message.overrides()));
+  if (message.rounds_size() != record.bake_rounds_size()) {
+    return absl::InvalidArgumentError("malformed record of a bake");
+  }
+  for (int i = 0; i < message.rounds_size(); ++i) {
+    const v1::BakeRound& shown = message.rounds(i);
+    const v1::BakeRoundRecord& kept = record.bake_rounds(i);
+    BakeRoundRecord& round = bake.rounds.emplace_back();
+    round.name = shown.name();
+    round.points = static_cast<std::uint64_t>(shown.points());
+    LUCERNA_ASSIGN_OR_RETURN(round.sensors.digest, Digest::FromBytes(kept.sensors_digest()));
+    round.sensors.size_bytes = kept.sensors_bytes();
+    round.ran_before = FromProto(kept.ran_before());
+    round.has_ended = kept.has_ended();
+    if (!kept.image_digest().empty()) {
+      LUCERNA_ASSIGN_OR_RETURN(round.image, Digest::FromBytes(kept.image_digest()));
+    }
+    round.passes = shown.passes();
+    round.photons = shown.photons();
+    round.cpu = FromProto(shown.cpu());
+    if (shown.has_error()) round.error = SampleOf(shown.error());
+    for (const v1::LightFinding& light : kept.lights())
+      round.lights.push_back(LightOf(light));
+  }
+  for (const v1::SurfaceFigures& figures : message.surfaces())
+    bake.figures.push_back(FromProto(figures));
+  if (message.has_interpolation_error()) bake.interpolation_error = message.interpolation_error();
+  if (!record.uv_mesh_digest().empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(bake.uv_mesh, Digest::FromBytes(record.uv_mesh_digest()));
+  }
+  return bake;
+}
+
 }  // namespace
 
 std::string EncodeRecord(const Job& job, const std::optional<Digest>& image, Duration running) {
@@ -342,6 +418,7 @@ std::string EncodeRecord(const Job& job, const std::optional<Digest>& image, Dur
   v1::JobRecord record;
   *record.mutable_job() = ToProto(report);
   *record.mutable_scene() = ToProto(job.manifest);
+  if (job.bake) AddRoundsOf(*job.bake, record);
   *record.mutable_needs() = ToProto(job.needs);
   record.set_scene_memory_bytes(job.scene_memory);
   if (job.reference) record.set_reference_digest(std::string(job.reference->Bytes()));
@@ -422,6 +499,9 @@ StatusOr<DecodedRecord> DecodeRecord(const std::string& bytes, const Moment& mom
                                       .cpu = FromProto(share.cpu())};
   }
   LUCERNA_ASSIGN_OR_RETURN(job.guides, FromProto(record.guides()));
+  if (message.has_bake()) {
+    LUCERNA_ASSIGN_OR_RETURN(job.bake, BakeOf(record));
+  }
   job.distrusted.insert(record.distrusted_worker_ids().begin(),
                         record.distrusted_worker_ids().end());
   if (message.has_ended_at()) job.ended_at = TimeOf(message.ended_at());

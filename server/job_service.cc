@@ -29,6 +29,9 @@ StatusOr<Submission> ReadSubmission(const v1::SubmitRequest& request) {
   LUCERNA_ASSIGN_OR_RETURN(submission.overrides, FromProto(request.overrides()));
   submission.validate_only = request.validate_only();
   submission.is_traced = request.is_traced();
+  if (request.has_bake()) {
+    LUCERNA_ASSIGN_OR_RETURN(submission.bake, FromProto(request.bake()));
+  }
   submission.priority = request.priority();
   if (submission.priority < kLowestPriority || submission.priority > kHighestPriority) {
     return absl::InvalidArgumentError(

@@ -16,6 +16,37 @@ Status UnknownJob(const std::string& job_id) {
   return absl::NotFoundError(absl::StrCat("there is no job ", job_id));
 }
 
+bool IsNamed(const Job& job, const std::string& id) {
+  return job.id == id || (job.bake && RunIdOf(job) == id);
+}
+
+// The record of a round that has ended with what the job has.
+void EndRecord(const Job& job, BakeRoundRecord& round, const std::vector<BakeRoundRecord>& before,
+               Duration cpu) {
+  round.has_ended = true;
+  round.passes = job.counters.passes;
+  round.photons = job.counters.photons;
+  round.cpu = cpu;
+  for (const BakeRoundRecord& earlier : before) {
+    if (&earlier != &round) round.cpu -= earlier.cpu;
+  }
+  if (!job.convergence.empty()) round.error = job.convergence.back();
+  round.lights = job.lights;
+}
+
+// How long the job had run when what is measured now began.
+Duration RanBefore(const Job& job) {
+  return job.bake && !job.bake->rounds.empty() ? job.bake->rounds.back().ran_before
+                                               : Duration::zero();
+}
+
+void SetEnd(const RenderOverrides& until, RenderOverrides& overrides) {
+  overrides.passes = until.passes;
+  overrides.photons = until.photons;
+  overrides.time_s = until.time_s;
+  overrides.error = until.error;
+}
+
 // Owners choose their request ids without knowing of each other.
 std::string RequestKey(const std::string& request_id, const std::string& owner) {
   if (owner.empty()) return request_id;
@@ -40,12 +71,12 @@ std::uint64_t JobTable::SerialOf(std::string_view job_id) const {
 
 JobTable::Entries::iterator JobTable::FindLocked(const std::string& job_id) {
   const auto found = entries_.find(SerialOf(job_id));
-  return found != entries_.end() && found->second.job.id == job_id ? found : entries_.end();
+  return found != entries_.end() && IsNamed(found->second.job, job_id) ? found : entries_.end();
 }
 
 JobTable::Entries::const_iterator JobTable::FindLocked(const std::string& job_id) const {
   const auto found = entries_.find(SerialOf(job_id));
-  return found != entries_.end() && found->second.job.id == job_id ? found : entries_.end();
+  return found != entries_.end() && IsNamed(found->second.job, job_id) ? found : entries_.end();
 }
 
 std::optional<JobTable::Submitted> JobTable::FindRequestLocked(const std::string& request_id,
@@ -146,6 +177,9 @@ JobTable::Entry JobTable::MakeEntry(CheckedJob checked, WallTime submitted_at,
   job.life.SetHasWorkers(has_workers_, moment.now);
   job.priority = checked.submission.priority;
   job.reference = checked.submission.reference;
+  if (checked.submission.bake) {
+    job.bake = BakeRecord{*checked.submission.bake, checked.submission.overrides, {}, {}, {}, {}};
+  }
   // A job that must wait is read again later, so that waiting jobs cost no memory.
   if (queue_.has_room()) entry.scene = std::move(checked.scene);
   return entry;
@@ -224,6 +258,14 @@ void JobTable::AddNeeded(const Entry& entry, NeededFiles& needed) {
     needed.blobs.insert(file.digest);
   if (entry.job.reference) needed.blobs.insert(*entry.job.reference);
   if (entry.image_digest) needed.blobs.insert(*entry.image_digest);
+  if (entry.job.bake) {
+    if (entry.job.bake->uv_mesh) needed.blobs.insert(*entry.job.bake->uv_mesh);
+    for (const BakeRoundRecord& round : entry.job.bake->rounds) {
+      if (entry.job.life.has_ended()) break;
+      if (!round.has_ended) needed.blobs.insert(round.sensors.digest);
+      if (round.image) needed.blobs.insert(*round.image);
+    }
+  }
   if (entry.has_checkpoint || !entry.job.life.has_ended()) {
     needed.checkpoints.insert(entry.job.id);
   }
@@ -291,7 +333,8 @@ JobReport JobTable::MakeReport(const Entry& entry, const Moment& moment, bool is
   report.running = life.Running(moment.now);
   if (life.state() == JobState::kRunning) {
     report.photons_per_second =
-        entry.job.counters.rate.PerSecond(moment.now - report.running, moment.now);
+        entry.job.counters.rate.PerSecond(
+            moment.now - (report.running - RanBefore(entry.job)), moment.now);
     report.job.counters.coordinator_cpu = CpuOf(entry, moment);
   } else if (life.has_ended() && report.running > Duration::zero()) {
     report.photons_per_second =
@@ -355,6 +398,7 @@ void JobTable::End(std::uint64_t serial, Entry& entry, const Status& why, const 
   entry.has_checkpoint = false;
   Save(entry, moment.now, dropped.writes);
   dropped.scenes.push_back(std::exchange(entry.scene, std::nullopt));
+  dropped.bakes.push_back(std::exchange(entry.bake_work, nullptr));
   if (entry.runner) {
     entry.runner->Stop(why);
     dropped.runners.push_back(std::exchange(entry.runner, nullptr));
@@ -423,30 +467,70 @@ StatusOr<JobReport> JobTable::Extend(const std::string& job_id, const RenderOver
       return absl::FailedPreconditionError(
           absl::StrCat("job ", job_id, " was cancelled or failed; submit it again"));
     }
-    if ((!entry.runner && !entry.has_checkpoint) || is_closed_) {
+    const bool can_go_on = job.bake ? options_.journal != nullptr || !entry.pinned.empty()
+                                    : entry.runner || entry.has_checkpoint;
+    if (!can_go_on || is_closed_) {
       return absl::FailedPreconditionError(absl::StrCat(
           "job ", job_id,
-          " ended so long ago that its photons are not kept any more; submit it again"));
+          job.bake ? " ended so long ago that its files are not kept any more; submit it again"
+                   : " ended so long ago that its photons are not kept any more; submit it again"));
     }
     job.life.Extend();
-    if (entry.runner) entry.runner->Reopen(settings);
+    if (job.bake) {
+      ForgetRoundsLocked(entry, dropped);
+    } else if (entry.runner) {
+      entry.runner->Reopen(settings);
+    }
     // The image grows from now on.
     dropped.images.push_back(std::exchange(entry.image, nullptr));
+    dropped.images.push_back(std::exchange(entry.uv_mesh, nullptr));
     entry.image_digest.reset();
     job.ended_at.reset();
     entry.turn = next_turn_++;
     PushLocked(found->first, entry);
+  } else if (job.bake) {
+    BeginBakeAgain(found->first, entry, dropped);
   } else if (entry.runner) {
     entry.runner->SetEnd(settings);
   }
-  job.settings = std::move(settings);
+  if (job.bake) {
+    SetEnd(until, job.bake->overrides);
+  } else {
+    job.settings = std::move(settings);
+  }
   ++entry.version;
   Save(entry, moment.now, dropped.writes);
   return MakeReport(entry, moment);
 }
 
+void JobTable::BeginBakeAgain(std::uint64_t serial, Entry& entry, Dropped& dropped) {
+  if (!queue_.HasTurn(serial)) {
+    ForgetRoundsLocked(entry, dropped);
+    return;
+  }
+  // The thread of its turn does it.
+  entry.begins_again = true;
+  if (entry.runner) entry.runner->Stop(absl::AbortedError("the bake begins again"));
+}
+
+void JobTable::ForgetRoundsLocked(Entry& entry, Dropped& dropped) {
+  dropped.runners.push_back(std::exchange(entry.runner, nullptr));
+  dropped.bakes.push_back(std::exchange(entry.bake_work, nullptr));
+  entry.job.bake->rounds.clear();
+  entry.job.bake->figures.clear();
+  entry.job.bake->interpolation_error.reset();
+  entry.job.bake->uv_mesh.reset();
+  entry.job.ClearProgress();
+  ++entry.version;
+}
+
+bool JobTable::HoldsFilesOfBake(const Entry& entry) {
+  return entry.job.bake && entry.job.life.has_ended() && !entry.pinned.empty();
+}
+
 JobTable::ImageSource JobTable::MakeImageSource(const Entry& entry, const Moment& moment) const {
   return {entry.image,
+          entry.uv_mesh,
           entry.image_digest,
           entry.runner,
           entry.job,
@@ -467,6 +551,10 @@ StatusOr<JobTable::ImageSource> JobTable::FindImage(const std::string& job_id,
                      entry.job.life.state() == JobState::kSucceeded
                          ? " ended so long ago that its image is not kept any more; submit it again"
                          : " was cancelled or failed and has no image"));
+  }
+  if (!has_image && entry.job.bake) {
+    return absl::FailedPreconditionError(
+        absl::StrCat("job ", job_id, " has not ended, and a bake has nothing to show before"));
   }
   // Of one that begins again, the image so far has the work of a wrong worker.
   if (!has_image && (!entry.runner || entry.begins_again)) {
@@ -547,7 +635,9 @@ void JobTable::TakeOut(const std::string& record, const Moment& moment) {
     job.distrusted.insert(record);
     if (!job.life.has_ended()) {
       job.AddEvent(moment.wall, absl::StrCat("goes on without the work of ", worker));
-      if (entry.runner) {
+      if (job.bake) {
+        BeginBakeAgain(serial, entry, dropped);
+      } else if (entry.runner) {
         entry.begins_again = true;
         entry.runner->Stop(absl::AbortedError("the work of a worker is taken out"));
       }
@@ -574,6 +664,8 @@ bool JobTable::TakeBeginsAgain(const std::string& job_id) {
   const auto found = FindLocked(job_id);
   if (found == entries_.end() || !std::exchange(found->second.begins_again, false)) return false;
   dropped.runners.push_back(std::exchange(found->second.runner, nullptr));
+  // What a round measured decides what the next ones do.
+  if (found->second.job.bake) ForgetRoundsLocked(found->second, dropped);
   return !is_closed_ && !found->second.job.life.has_ended();
 }
 
@@ -773,13 +865,16 @@ std::optional<JobTable::Turn> JobTable::WaitForTurn() {
   LUCERNA_CHECK(entry.job.life.Prepare());
   ++entry.version;
   return Turn{entry.job.id,
-              entry.job.manifest,
+              RunIdOf(entry.job),
+              ManifestOf(entry.job),
               entry.job.settings,
               entry.job.needs,
               entry.job.scene_memory,
               entry.job.reference,
               std::exchange(entry.scene, std::nullopt),
               entry.runner,
+              entry.job.bake.has_value(),
+              entry.bake_work,
               TurnEnd(*this, *next)};
 }
 
@@ -791,7 +886,10 @@ void JobTable::EndTurn(std::uint64_t serial) {
   const auto found = entries_.find(serial);
   if (found == entries_.end()) return;
   Entry& entry = found->second;
-  if (entry.job.life.has_ended() && !entry.runner) {
+  // A bake may be given another end.
+  const bool needs_files =
+      entry.runner || (entry.job.bake && entry.job.life.state() == JobState::kSucceeded);
+  if (entry.job.life.has_ended() && !needs_files) {
     dropped.pinned.push_back(std::exchange(entry.pinned, {}));
   }
 }
@@ -837,7 +935,7 @@ std::optional<JobTable::Share> JobTable::ShareOf(const std::string& job_id) cons
   if (found == entries_.end() || !found->second.runner) return std::nullopt;
   const Job& job = found->second.job;
   if (job.life.has_ended()) return std::nullopt;
-  return Share{job.priority, job.owner, found->second.gives_up_turn};
+  return Share{job.priority, job.owner, found->second.gives_up_turn, RunIdOf(job)};
 }
 
 bool JobTable::GivesUpTurn(const std::string& job_id) const {
@@ -852,8 +950,8 @@ bool JobTable::DropOldestPhotons() {
   for (auto& [serial, entry] : entries_) {
     if (!entry.job.life.has_ended() || queue_.HasTurn(serial)) continue;
     const bool has_spare_image = entry.image && entry.image_digest;
-    if (!entry.runner && !has_spare_image) continue;
-    if (entry.runner) {
+    if (!entry.runner && !has_spare_image && !HoldsFilesOfBake(entry)) continue;
+    if (entry.runner || HoldsFilesOfBake(entry)) {
       dropped.runners.push_back(std::exchange(entry.runner, nullptr));
       dropped.pinned.push_back(std::exchange(entry.pinned, {}));
     }
@@ -878,14 +976,15 @@ std::optional<std::string> JobTable::DropOldestEnded() {
 Duration JobTable::RunningOf(const std::string& job_id, SteadyTime now) const {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
-  return found == entries_.end() ? Duration::zero() : found->second.job.life.Running(now);
+  if (found == entries_.end()) return Duration::zero();
+  return found->second.job.life.Running(now) - RanBefore(found->second.job);
 }
 
 std::optional<SteadyTime> JobTable::WhenItHasRun(const std::string& job_id, Duration time) const {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return std::nullopt;
-  return found->second.job.life.WhenItHasRun(time);
+  return found->second.job.life.WhenItHasRun(RanBefore(found->second.job) + time);
 }
 
 bool JobTable::HasEnded(const std::string& job_id) const {
@@ -932,6 +1031,101 @@ std::optional<JobTable::ImageSource> JobTable::DescribeRun(const std::string& jo
   return MakeImageSource(found->second, moment);
 }
 
+void JobTable::SetBakeWork(const std::string& job_id, std::shared_ptr<BakeWork> work) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end() || found->second.job.life.has_ended()) return;
+  dropped.bakes.push_back(std::exchange(found->second.bake_work, std::move(work)));
+}
+
+bool JobTable::EndRound(const std::string& job_id, std::optional<Digest> image,
+                        const Moment& moment) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return false;
+  Entry& entry = found->second;
+  if (entry.job.life.has_ended() || entry.begins_again) return false;
+  std::vector<BakeRoundRecord>& rounds = entry.job.bake->rounds;
+  if (!rounds.back().has_ended) {
+    const Duration cpu = CpuOf(entry, moment) + entry.job.counters.worker_cpu;
+    EndRecord(entry.job, rounds.back(), rounds, cpu);
+  }
+  rounds.back().image = image;
+  ++entry.version;
+  Save(entry, moment.now, dropped.writes);
+  return true;
+}
+
+bool JobTable::BeginRound(const std::string& job_id, BakeRoundRecord round,
+                          const CheckedJob& checked, const Moment& moment) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end()) return false;
+  Entry& entry = found->second;
+  Job& job = entry.job;
+  if (job.life.has_ended() || entry.begins_again) return false;
+  dropped.runners.push_back(std::exchange(entry.runner, nullptr));
+  std::vector<BakeRoundRecord>& rounds = job.bake->rounds;
+  const bool goes_on =
+      !rounds.empty() && !rounds.back().has_ended && rounds.back().sensors == round.sensors;
+  if (!goes_on) {
+    if (!rounds.empty() && !rounds.back().has_ended) rounds.pop_back();
+    round.ran_before = job.life.Running(moment.now);
+    rounds.push_back(std::move(round));
+    // Who had a part in it, and what it took, is of the whole job.
+    const JobCounters counters = std::move(job.counters);
+    std::map<std::string, WorkerShare> workers = std::move(job.workers);
+    job.ClearProgress();
+    job.counters.coordinator_cpu = counters.coordinator_cpu;
+    job.counters.worker_cpu = counters.worker_cpu;
+    job.counters.to_first_photons = counters.to_first_photons;
+    job.counters.audits = counters.audits;
+    job.workers = std::move(workers);
+  }
+  job.settings = checked.settings;
+  job.needs = checked.needs;
+  job.scene_memory = HeldOfScene(checked.scene_memory);
+  ++entry.version;
+  if (!goes_on) Save(entry, moment.now, dropped.writes);
+  return true;
+}
+
+void JobTable::ForgetRounds(const std::string& job_id, const Moment& moment) {
+  Dropped dropped;
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end() || !found->second.job.bake) return;
+  ForgetRoundsLocked(found->second, dropped);
+  Save(found->second, moment.now, dropped.writes);
+}
+
+void JobTable::SetBakeResult(const std::string& job_id, const BakeResult& result, Blob uv_mesh,
+                             std::optional<Digest> uv_mesh_digest) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end() || found->second.job.life.has_ended()) return;
+  BakeRecord& bake = *found->second.job.bake;
+  // What is known of the error is what the points know that are spread evenly.
+  if (const BakeRoundRecord* const round = EvenRoundOf(bake)) {
+    found->second.job.convergence.clear();
+    if (round->error) found->second.job.convergence.push_back(*round->error);
+    found->second.job.lights = round->lights;
+  }
+  bake.figures = result.figures;
+  bake.interpolation_error = result.interpolation_error;
+  bake.uv_mesh = uv_mesh_digest;
+  found->second.uv_mesh = std::move(uv_mesh);
+}
+
+bool JobTable::IsFinishing(const std::string& job_id) const {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  return found != entries_.end() && found->second.is_finishing;
+}
+
 bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,
                        const Moment& moment, std::optional<Digest> image_digest) {
   Dropped dropped;
@@ -951,6 +1145,12 @@ bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,
   entry.job.condition.clear();
   entry.image = std::move(image);
   entry.image_digest = image_digest;
+  if (entry.job.bake) {
+    // Another end begins anew: the photons of its last round are of no use.
+    dropped.bakes.push_back(std::exchange(entry.bake_work, nullptr));
+    dropped.runners.push_back(std::exchange(entry.runner, nullptr));
+    entry.has_checkpoint = false;
+  }
   ++entry.version;
   Save(entry, moment.now, dropped.writes);
   Retain(dropped, moment);
@@ -973,6 +1173,7 @@ void JobTable::GoOnFrom(const std::string& job_id, Job record, Duration ran) {
   record.events = job.events;
   record.distrusted = job.distrusted;
   record.condition = job.condition;
+  record.bake = job.bake;
   record.ended_at.reset();
   job = std::move(record);
   ++found->second.version;
@@ -1111,8 +1312,9 @@ void JobTable::Retain(Dropped& dropped, const Moment& moment) {
     const RenderSettings& settings = entry.job.settings;
     serials.push_back(item->first);
     ended.push_back(
-        {.has_photons = entry.runner != nullptr || entry.has_checkpoint,
-         .is_in_memory = entry.runner != nullptr,
+        {.has_photons =
+             entry.runner != nullptr || entry.has_checkpoint || HoldsFilesOfBake(entry),
+         .is_in_memory = entry.runner != nullptr || HoldsFilesOfBake(entry),
          .pixels = std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()},
          .has_image = entry.image != nullptr,
          .image_bytes = entry.image ? entry.image->size() : 0,
@@ -1130,7 +1332,10 @@ void JobTable::Retain(Dropped& dropped, const Moment& moment) {
         dropped.pinned.push_back(std::exchange(entry.pinned, {}));
       }
     }
-    if (!kept[i].image) dropped.images.push_back(std::exchange(entry.image, nullptr));
+    if (!kept[i].image) {
+      dropped.images.push_back(std::exchange(entry.image, nullptr));
+      dropped.images.push_back(std::exchange(entry.uv_mesh, nullptr));
+    }
     if (!kept[i].record) DropLocked(found, dropped);
   }
 }

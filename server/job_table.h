@@ -12,6 +12,9 @@
 // Ended jobs are remembered, with the images of the newest; the very newest also with all their
 // photons, so that they can go on (server/job_retention.h).
 //
+// What is lent of a job, and comes back, has the name RunIdOf. Every call takes that in place of the
+// job's id, and finds no job when the round of a bake that it names is not the newest.
+//
 // With a journal, what a request changes is on the disk before it returns, and no client sees a new
 // job before that. Where that fails, a new job is refused; any other change holds in memory and is
 // written by SaveUnsaved as soon as it can be.
@@ -36,6 +39,7 @@
 #include "render/base/status.h"
 #include "render/scene/scene.h"
 #include "server/audit.h"
+#include "server/bake_work.h"
 #include "server/blob_store.h"
 #include "server/commit_accounting.h"
 #include "server/job.h"
@@ -160,6 +164,7 @@ class JobTable {
   // The image of a job, or what it can be made from.
   struct ImageSource {
     Blob image;                          // when the job has ended and it is in memory
+    Blob uv_mesh;                        // the same, of a light map
     std::optional<Digest> image_digest;  // when it has ended and it is on the disk; else:
     std::shared_ptr<RunningJob> runner;
     Job job;
@@ -223,13 +228,16 @@ class JobTable {
   // A job whose turn it is.
   struct Turn {
     std::string job_id;
-    SceneManifest manifest;
+    std::string run_id;      // RunIdOf
+    SceneManifest manifest;  // ManifestOf
     RenderSettings settings;
     SceneNeeds needs;
     std::uint64_t scene_memory = 0;  // see Job
     std::optional<Digest> reference;
     std::optional<Scene> scene;          // absent: to be read again
     std::shared_ptr<RunningJob> runner;  // of a job that goes on
+    bool is_bake = false;
+    std::shared_ptr<BakeWork> bake;  // of a bake that has work in memory
     TurnEnd end;
   };
   // Waits for a job and begins its turn. Absent after Close. The table outlives the turn.
@@ -252,6 +260,7 @@ class JobTable {
     int priority = 0;
     std::string owner;
     bool is_held = false;  // nothing is lent
+    std::string run_id;    // RunIdOf
   };
   [[nodiscard]] std::optional<Share> ShareOf(const std::string& job_id) const;
   // Whether the turn of the job is to be given up.
@@ -262,13 +271,30 @@ class JobTable {
   bool DropOldestPhotons();
   // Forgets the oldest job that has ended, with all there is of it; absent when there is none.
   [[nodiscard]] std::optional<std::string> DropOldestEnded();
-  // How long the job has run, and JobLife::WhenItHasRun.
+  // How long the job, of a bake its newest round, has run, and JobLife::WhenItHasRun of that.
   [[nodiscard]] Duration RunningOf(const std::string& job_id, SteadyTime now) const;
   [[nodiscard]] std::optional<SteadyTime> WhenItHasRun(const std::string& job_id,
                                                        Duration time) const;
   // The job as it is now with what it has cost; absent when it has been dropped.
   [[nodiscard]] std::optional<ImageSource> DescribeRun(const std::string& job_id,
                                                        const Moment& moment) const;
+  // Of a bake whose turn it is: what it holds in memory from now on.
+  void SetBakeWork(const std::string& job_id, std::shared_ptr<BakeWork> work);
+  // The newest round of a bake has ended. `image` is its digest when it is on the disk. False when
+  // the job has ended meanwhile, or begins again.
+  [[nodiscard]] bool EndRound(const std::string& job_id, std::optional<Digest> image,
+                              const Moment& moment);
+  // The next round of a bake, or again the one that is under way: what a round's files were found
+  // to be. False as EndRound.
+  [[nodiscard]] bool BeginRound(const std::string& job_id, BakeRoundRecord round,
+                                const CheckedJob& checked, const Moment& moment);
+  // Forgets the rounds of a bake, which begins anew.
+  void ForgetRounds(const std::string& job_id, const Moment& moment);
+  // What came of a bake; `uv_mesh` is empty when there is none, its digest when it is on the disk.
+  void SetBakeResult(const std::string& job_id, const BakeResult& result, Blob uv_mesh,
+                     std::optional<Digest> uv_mesh_digest);
+  // Whether the user has stopped the job.
+  [[nodiscard]] bool IsFinishing(const std::string& job_id) const;
   // `image_digest` when the image is on the disk. False when the job has ended meanwhile.
   bool Succeed(const std::string& job_id, StopReason reason, Blob image, const Moment& moment,
                std::optional<Digest> image_digest = std::nullopt);
@@ -307,7 +333,8 @@ class JobTable {
   struct Entry : JournalEntry {
     std::optional<Scene> scene;  // kept from Add when it will be rendered at once
     std::shared_ptr<RunningJob> runner;
-    Blob image;
+    std::shared_ptr<BakeWork> bake_work;
+    Blob image, uv_mesh;
     std::uint64_t version = 0;
     PinnedBlobs pinned;       // while the job may need its files
     bool is_unsaved = false;  // the journal has it as it was before
@@ -345,6 +372,7 @@ class JobTable {
   struct Dropped {
     Writes writes;
     std::vector<std::shared_ptr<RunningJob>> runners;
+    std::vector<std::shared_ptr<BakeWork>> bakes;
     std::vector<Blob> images;
     std::vector<PinnedBlobs> pinned;
     std::vector<std::optional<Scene>> scenes;
@@ -384,6 +412,13 @@ class JobTable {
   // After a change of who waits, who has a place, or of priorities.
   void UpdateTurns() LUCERNA_REQUIRES(mutex_);
   bool ResumeLocked(std::uint64_t serial, Entry& entry) LUCERNA_REQUIRES(mutex_);
+  // A bake begins anew when it runs next.
+  static void ForgetRoundsLocked(Entry& entry, Dropped& dropped);
+  // Of a bake that has not ended: what it has measured does not count any more.
+  void BeginBakeAgain(std::uint64_t serial, Entry& entry, Dropped& dropped)
+      LUCERNA_REQUIRES(mutex_);
+  // Whether a bake that has ended has its files in memory, to begin anew with another end.
+  static bool HoldsFilesOfBake(const Entry& entry);
   // Before a job begins or ceases to run: gives each running job its part of the processor time
   // that the process took since the last call. The time of a process cannot be told apart by jobs.
   void ShareCpu(const Moment& moment) LUCERNA_REQUIRES(mutex_);

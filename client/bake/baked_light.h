@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "client/bake/mesh_file.h"
+#include "render/bake/mesh_file.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"
 

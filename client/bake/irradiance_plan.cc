@@ -10,7 +10,7 @@
 
 #include "absl/strings/str_format.h"
 
-#include "client/bake/surface_figures.h"
+#include "render/bake/surface_figures.h"
 #include "render/film/false_color.h"
 #include "render/math/double3.h"
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "client/bake/mesh_file.h"
+#include "render/bake/mesh_file.h"
 
 namespace lucerna {
 

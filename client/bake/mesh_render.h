@@ -9,7 +9,7 @@
 
 #include <cstdint>
 
-#include "client/bake/mesh_file.h"
+#include "render/bake/mesh_file.h"
 #include "render/base/status.h"
 #include "render/image/image.h"
 #include "render/scene/render_settings.h"

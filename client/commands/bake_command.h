@@ -1,60 +1,52 @@
 // How is the irradiance of a scene's surfaces measured?
 //
-// By jobs like any other, on scenes whose camera is a set of sensors
-// (render/formats/sensors/sensors_reader.h): a survey measures means over the faces of a coarse
-// mesh, the first round at its vertices and in the middle of its edges, each further one where the
-// mesh was refined (client/bake/surface_mesh.h). A light map is one round at its texels
-// (client/bake/chart_atlas.h).
+// As a job like any other (render/bake/bake_rounds.h), whose end is a mesh or a light map in place of
+// an image.
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <string>
-#include <vector>
 
-#include "client/bake/surface_mesh.h"
+#include "client/connection.h"
 #include "client/local_cluster.h"
 #include "client/output_options.h"
 #include "client/scene_reading.h"
+#include "render/bake/bake_settings.h"
 #include "render/base/status.h"
 #include "render/scene/render_settings.h"
 #include "render/wire/channel.h"
 
 namespace lucerna {
 
-// How irradiance is estimated from the photons.
-enum class BakeEstimator : std::uint8_t {
-  kKernel,     // a kernel at each vertex, whose width a radius controller chooses
-  kNearest,    // about the k nearest photons of each vertex
-  kHistogram,  // the photons on each triangle, over its area; the mesh is even
+// What is written of a bake.
+struct BakeOutputs {
+  std::string path;       // .ply or .glb; of a light map .exr
+  std::string plan = {};     // .svg; empty: none
+  std::string uv_mesh = {};  // of a light map: .glb; empty: none
+  bool is_ascii = false;     // of a PLY file
+  bool in_lux = false;       // the table
 };
 
 struct BakeRequest {
   SceneSource scene;
-  RenderOverrides overrides;  // of each job
-  std::string output_path;    // .ply, .glb or, for a light map, .exr
-  std::string plan_path;      // .svg; empty: none
-  std::string uv_mesh_path;   // of a light map: .glb; empty: none
-  bool is_ascii = false;      // of a PLY file
-  MeasuredSides sides = MeasuredSides::kBrighter;
-  std::vector<std::string> materials;  // whose surfaces are measured; empty: all
-  // Between neighbouring vertices where the mesh is finest [scene units]; absent: a 512th of the
-  // scene's diagonal.
-  std::optional<double> spacing;
-  BakeEstimator estimator = BakeEstimator::kKernel;
-  MeshElements elements = MeshElements::kLinear;
-  double tolerance = 0.05;     // see SurfaceMesh::Refine; not of histograms and light maps
-  bool decimates = true;       // see SurfaceMesh::Decimate
-  bool indirect_only = false;  // without light that comes straight from lights
-  bool in_lux = false;         // the table
-  bool resumes = false;        // takes rounds that were finished before an interruption
+  RenderOverrides overrides;  // of each round
+  BakeSettings settings;
+  BakeOutputs outputs;   // without a path: the job is submitted alone
+  int priority = 0;      // that of Job
+  bool resumes = false;  // goes on with a bake of its own that was interrupted
 };
 
-// Writes the mesh whole or not at all, and prints figures of its surfaces. Until then rounds that
-// are finished are kept in a folder beside it, for a bake that resumes. The jobs run on `server`
-// when it is there, else on a coordinator and workers of their own.
-[[nodiscard]] Status Bake(const BakeRequest& request, const ClusterOptions& cluster,
+// Writes the mesh whole or not at all, and prints figures of its surfaces. The job runs on `server`
+// when it is there, and goes on there when this process is interrupted; else on a coordinator and
+// workers of its own, whose state is in a folder beside the output until it has been written.
+[[nodiscard]] Status Bake(BakeRequest request, const ClusterOptions& cluster,
                           const std::optional<Endpoint>& server,
                           const OutputOptions& output_options);
+
+// Whether the files to write go together. Errors: Failure(kUsage).
+[[nodiscard]] Status CheckBakeOutputs(const BakeOutputs& outputs);
+
+// Writes what a bake made. Errors: also FAILED_PRECONDITION when it made something else.
+[[nodiscard]] Status SaveBake(ClientConnection& connection, const v1::Job& job,
+                              const BakeOutputs& outputs, const OutputOptions& output_options);
 
 }  // namespace lucerna

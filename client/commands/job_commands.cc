@@ -14,7 +14,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 
-#include "client/bake/mesh_file.h"
+#include "render/bake/mesh_file.h"
 #include "client/bake/mesh_render.h"
 #include "client/connection.h"
 #include "client/exit_code.h"
@@ -261,8 +261,8 @@ Status RenderOne(const RenderRequest& request, const ClusterOptions& cluster_opt
     runs->WhileItRuns(
         [&](const v1::Job& newest) { periodic.Consider(runs->connection(), newest); });
     job = request.resumes
-              ? runs->Resume(manifest, request.overrides, output_options)
-              : runs->Run(files, manifest, request.overrides, request.reference, output_options);
+              ? runs->Resume({manifest, request.overrides}, output_options)
+              : runs->Run(files, {manifest, request.overrides, request.reference}, output_options);
     if (ExitCodeOf(job.status()) == ExitCode::kInterrupted) {
       return EndInterrupted(*runs, request, !folder.empty(), output_options.display);
     }
@@ -326,8 +326,9 @@ Status Submit(const RenderRequest& request, const Endpoint& server,
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   DirectoryFiles files = FilesOf(request.scene);
   LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted,
-                           SendJob(*connection, files, manifest, request.overrides,
-                                   request.reference, request.priority, !request.trace.empty()));
+                           SendJob(*connection, files,
+                                   {manifest, request.overrides, request.reference,
+                                    request.priority, !request.trace.empty()}));
   if (request.outputs.empty()) {
     PrintData(output_options.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
     return absl::OkStatus();
@@ -400,10 +401,26 @@ Status Follow(const std::string& job_id, bool shows_progress, const Endpoint& se
   return CheckSucceeded(job);
 }
 
-Status Fetch(const std::string& job_id, const OutputPaths& outputs, const Endpoint& server,
-             const OutputOptions& output_options) {
-  LUCERNA_RETURN_IF_ERROR(CheckOutputs(outputs));
+Status Fetch(const std::string& job_id, const OutputPaths& outputs, BakeOutputs of_bake,
+             const Endpoint& server, const OutputOptions& output_options) {
+  of_bake.path = outputs.image;
+  const bool names_mesh = of_bake.path.ends_with(".glb") || of_bake.path.ends_with(".ply");
+  if (!names_mesh) LUCERNA_RETURN_IF_ERROR(CheckOutputs(outputs));
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, connection->Get(job_id));
+  if (job.has_bake()) {
+    if (!outputs.png.empty()) {
+      return Failure(ExitCode::kUsage, "--png is of images, and a bake has none; leave it away");
+    }
+    LUCERNA_RETURN_IF_ERROR(CheckBakeOutputs(of_bake));
+    return SaveBake(*connection, job, of_bake, output_options);
+  }
+  if (names_mesh || of_bake.is_ascii || !of_bake.plan.empty() || !of_bake.uv_mesh.empty()) {
+    return Failure(ExitCode::kUsage,
+                   absl::StrCat("job ", job_id,
+                                " renders an image and no mesh; give -o an image's name, and leave "
+                                "--ascii, --plan and --uv-mesh away"));
+  }
   LUCERNA_ASSIGN_OR_RETURN(const SavedImage saved,
                            Save(*connection, job_id, outputs, output_options.display));
   if (output_options.json) {
@@ -444,8 +461,10 @@ Status Report(const std::string& job_id, const ReportPaths& paths, const Endpoin
   LUCERNA_ASSIGN_OR_RETURN(const v1::Job job, connection->Get(job_id));
   std::vector<std::string> written;
   if (!paths.html.empty()) {
-    LUCERNA_ASSIGN_OR_RETURN(const auto image,
-                             ImageOf(*connection, job_id, output_options.display));
+    std::optional<PageImage> image;
+    if (!job.has_bake()) {
+      LUCERNA_ASSIGN_OR_RETURN(image, ImageOf(*connection, job_id, output_options.display));
+    }
     LUCERNA_RETURN_IF_ERROR(WriteFile(paths.html, ReportPage(job, image)));
     written.push_back(paths.html);
   }

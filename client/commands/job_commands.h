@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "client/commands/bake_command.h"
 #include "client/image_output.h"
 #include "client/local_cluster.h"
 #include "client/output_options.h"
@@ -72,8 +73,10 @@ struct JobsRequest {
 [[nodiscard]] Status Follow(const std::string& job_id, bool shows_progress, const Endpoint& server,
                             const OutputOptions& output_options);
 
+// Writes the image of a job, or what a bake made to `outputs.image`, as `of_bake` says.
 [[nodiscard]] Status Fetch(const std::string& job_id, const OutputPaths& outputs,
-                           const Endpoint& server, const OutputOptions& output_options);
+                           BakeOutputs of_bake, const Endpoint& server,
+                           const OutputOptions& output_options);
 
 // Where a report goes; empty: not there. As JSON it goes to stdout when the output_options says so.
 struct ReportPaths {

@@ -18,7 +18,7 @@ StatusOr<SelfcheckRender> RenderWith(LocalRuns& runs, const std::string& scene_t
   ManifestFiles files(manifest, [&](const Digest&) { return scene_text; });
   const OutputOptions silent = {.quiet = true};
   SelfcheckRender render;
-  LUCERNA_ASSIGN_OR_RETURN(render.job, runs.Run(files, manifest, overrides, "", silent));
+  LUCERNA_ASSIGN_OR_RETURN(render.job, runs.Run(files, {manifest, overrides}, silent));
   LUCERNA_ASSIGN_OR_RETURN(render.image, runs.ImageOf(render.job));
   render.warnings.assign(render.job.warnings().begin(), render.job.warnings().end());
   return render;

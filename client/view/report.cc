@@ -530,26 +530,33 @@ std::string ReferenceReport(const Image& reference, const std::string& path) {
                  {"metadata", reference.metadata}});
 }
 
-std::string BakeReport(const std::vector<BakeRound>& rounds,
-                       const std::vector<SurfaceFigures>& figures,
-                       const std::optional<double>& interpolation_error, const std::string& path) {
+namespace {
+
+Json IntervalOf(const RelativeError& error) {
+  return {{"estimate", error.value}, {"low", error.low}, {"high", error.high}};
+}
+
+}  // namespace
+
+std::string BakeReport(const v1::Job& job, const std::string& path) {
+  const v1::Bake& bake = job.bake();
   Json json;
+  json["job_id"] = job.job_id();
   json["rounds"] = Json::array();
-  for (const BakeRound& round : rounds) {
-    Json item = {{"points", round.points},
-                 {"job_id", round.job.job_id()},
-                 {"passes", round.job.progress().passes()},
-                 {"photons", round.job.progress().photons()},
-                 {"cpu_s", Seconds(FromProto(round.job.progress().coordinator_cpu())) +
-                               Seconds(FromProto(round.job.progress().worker_cpu()))}};
-    if (const auto error = NewestError(round.job)) {
-      item["relative_error"] = {
-          {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
+  for (const v1::BakeRound& round : bake.rounds()) {
+    Json item = {{"name", round.name()},
+                 {"points", round.points()},
+                 {"passes", round.passes()},
+                 {"photons", round.photons()},
+                 {"cpu_s", Seconds(FromProto(round.cpu()))}};
+    if (round.has_error() && !round.error().nothing_found()) {
+      item["relative_error"] = IntervalOf(ErrorOf(round.error()));
     }
     json["rounds"].push_back(std::move(item));
   }
   json["surfaces"] = Json::array();
-  for (const SurfaceFigures& of : figures) {
+  for (const v1::SurfaceFigures& message : bake.surfaces()) {
+    const SurfaceFigures of = FromProto(message);
     json["surfaces"].push_back({{"name", of.name},
                                 {"triangles", of.triangles},
                                 {"area_m2", of.area},
@@ -562,9 +569,8 @@ std::string BakeReport(const std::vector<BakeRound>& rounds,
                                 {"uniformity", of.uniformity()},
                                 {"min_over_max", of.diversity()}});
   }
-  if (json["rounds"].front().contains("relative_error"))
-    json["relative_error"] = json["rounds"].front()["relative_error"];
-  if (interpolation_error) json["interpolation_error"] = *interpolation_error;
+  if (const auto error = NewestError(job)) json["relative_error"] = IntervalOf(*error);
+  if (bake.has_interpolation_error()) json["interpolation_error"] = bake.interpolation_error();
   json["path"] = path;
   return ToText(json);
 }

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "client/bake/surface_figures.h"
+#include "render/bake/surface_figures.h"
 #include "client/compare/comparison.h"
 #include "client/output_options.h"
 #include "client/selfcheck/selfcheck.h"
@@ -59,17 +59,9 @@ struct SavedImage {
 // Of an image that MakeReference made.
 [[nodiscard]] std::string ReferenceReport(const Image& reference, const std::string& path);
 // One job of a bake.
-struct BakeRound {
-  std::size_t points = 0;
-  v1::Job job;
-};
-// What was measured, and of the mesh: figures of its surfaces, SurfaceMesh::InterpolationError
-// where there is one, and the error that the first round estimated at its points, which are spread
-// evenly. Requires a round.
-[[nodiscard]] std::string BakeReport(const std::vector<BakeRound>& rounds,
-                                     const std::vector<SurfaceFigures>& figures,
-                                     const std::optional<double>& interpolation_error,
-                                     const std::string& path);
+// What a bake measured in its rounds, the figures of its surfaces, and the error that the first round
+// after the survey estimated at its points, which are spread evenly. `path` is where it was written.
+[[nodiscard]] std::string BakeReport(const v1::Job& job, const std::string& path);
 [[nodiscard]] std::string PhotonReport(const v1::PhotonPath& path);
 [[nodiscard]] std::string DigestReport(const Image& image);
 [[nodiscard]] std::string PlanReport(const SceneNeeds& needs, const ExpectedCost& cost,

@@ -54,7 +54,13 @@ std::string Bar(double share) {
 std::string Passes(const v1::Job& job) {
   const std::int64_t passes = job.progress().passes();
   const std::int64_t wanted = SettingsOf(job).passes;
-  return wanted > 0 ? absl::StrCat("pass ", passes, "/", wanted) : absl::StrCat("pass ", passes);
+  // Of a bake, of the round that is measured now.
+  const int rounds = job.bake().rounds_size();
+  const std::string round =
+      rounds == 0 ? "" : absl::StrCat(job.bake().rounds(rounds - 1).name(), " (",
+                                      job.bake().rounds(rounds - 1).points(), " points), ");
+  return wanted > 0 ? absl::StrCat(round, "pass ", passes, "/", wanted)
+                    : absl::StrCat(round, "pass ", passes);
 }
 
 std::string WithoutPrefix(const std::string& name, const std::string& prefix) {
@@ -193,9 +199,16 @@ std::string ProgressLine(const v1::Job& job) {
 std::string SummaryLine(const v1::Job& job) {
   const v1::Progress& progress = job.progress();
   const Duration running = FromProto(progress.running());
-  std::string line = absl::StrFormat(
-      "%d %s, %s photons in %s", progress.passes(), progress.passes() == 1 ? "pass" : "passes",
-      ShortCount(static_cast<double>(progress.photons())), ShortTime(running));
+  const int rounds = job.bake().rounds_size();
+  auto photons = static_cast<double>(progress.photons());
+  // The rounds before the newest, whose photons those are.
+  for (int i = 0; i + 1 < rounds; ++i)
+    photons += static_cast<double>(job.bake().rounds(i).photons());
+  std::string line = absl::StrFormat("%d %s, %s photons in %s",
+                                     job.has_bake() ? rounds : progress.passes(),
+                                     job.has_bake() ? (rounds == 1 ? "round" : "rounds")
+                                                    : (progress.passes() == 1 ? "pass" : "passes"),
+                                     ShortCount(photons), ShortTime(running));
   switch (job.state()) {
     case v1::JOB_STATE_SUCCEEDED:
       absl::StrAppend(&line, ", ", StopInWords(job.stop_reason()));

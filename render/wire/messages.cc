@@ -245,6 +245,59 @@ StatusOr<GuideSteps> FromProto(const google::protobuf::RepeatedPtrField<v1::Guid
   return steps;
 }
 
+v1::BakeSettings ToProto(const BakeSettings& settings) {
+  v1::BakeSettings message;
+  message.set_estimator(static_cast<v1::BakeEstimator>(settings.estimator));
+  message.set_sides(static_cast<v1::MeasuredSides>(settings.sides));
+  message.mutable_materials()->Assign(settings.materials.begin(), settings.materials.end());
+  if (settings.spacing) message.set_spacing(*settings.spacing);
+  message.set_is_quadratic(settings.elements == MeshElements::kQuadratic);
+  message.set_tolerance(settings.tolerance);
+  message.set_keeps_vertices(!settings.decimates);
+  message.set_indirect_only(settings.indirect_only);
+  message.set_is_light_map(settings.is_light_map);
+  return message;
+}
+
+StatusOr<BakeSettings> FromProto(const v1::BakeSettings& message) {
+  LUCERNA_RETURN_IF_ERROR(CheckHasNoOtherFields(message));
+  if (!v1::BakeEstimator_IsValid(message.estimator()) ||
+      !v1::MeasuredSides_IsValid(message.sides())) {
+    return OtherVersion("an estimator or sides of a bake are not known");
+  }
+  BakeSettings settings;
+  settings.estimator = static_cast<BakeEstimator>(message.estimator());
+  settings.sides = static_cast<MeasuredSides>(message.sides());
+  settings.materials.assign(message.materials().begin(), message.materials().end());
+  if (message.has_spacing()) settings.spacing = message.spacing();
+  settings.elements = message.is_quadratic() ? MeshElements::kQuadratic : MeshElements::kLinear;
+  settings.tolerance = message.tolerance();
+  settings.decimates = !message.keeps_vertices();
+  settings.indirect_only = message.indirect_only();
+  settings.is_light_map = message.is_light_map();
+  return settings;
+}
+
+v1::SurfaceFigures ToProto(const SurfaceFigures& figures) {
+  v1::SurfaceFigures message;
+  message.set_name(figures.name);
+  message.set_triangles(figures.triangles);
+  message.set_area(figures.area);
+  message.set_lowest(figures.lowest);
+  message.set_highest(figures.highest);
+  message.set_mean(figures.mean);
+  return message;
+}
+
+SurfaceFigures FromProto(const v1::SurfaceFigures& message) {
+  return {.name = message.name(),
+          .triangles = message.triangles(),
+          .area = message.area(),
+          .lowest = message.lowest(),
+          .highest = message.highest(),
+          .mean = message.mean()};
+}
+
 v1::SceneNeeds ToProto(const SceneNeeds& needs) {
   v1::SceneNeeds message;
   message.set_parts(needs.parts());

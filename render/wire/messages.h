@@ -7,6 +7,8 @@
 #include "proto/lucerna/v1/jobs.pb.h"
 #include "proto/lucerna/v1/values.pb.h"
 #include "render/analysis/needs.h"
+#include "render/bake/bake_settings.h"
+#include "render/bake/surface_figures.h"
 #include "render/base/clock.h"
 #include "render/base/status.h"
 #include "render/estimate/accumulation.h"
@@ -41,6 +43,12 @@ void AddLaterSettings(v1::RenderSettings& message);
 // The job's settings to show to a user: what cannot be read has its default, and a stop criterion
 // that cannot be read is none.
 [[nodiscard]] RenderSettings SettingsOf(const v1::Job& job);
+
+[[nodiscard]] v1::BakeSettings ToProto(const BakeSettings& settings);
+// Errors: INVALID_ARGUMENT for an estimator or sides of another version.
+[[nodiscard]] StatusOr<BakeSettings> FromProto(const v1::BakeSettings& message);
+[[nodiscard]] v1::SurfaceFigures ToProto(const SurfaceFigures& figures);
+[[nodiscard]] SurfaceFigures FromProto(const v1::SurfaceFigures& message);
 
 [[nodiscard]] v1::SceneNeeds ToProto(const SceneNeeds& needs);
 // Without reasons. Numbers of lights that the scene does not have say nothing.

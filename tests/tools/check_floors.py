@@ -20,6 +20,7 @@ BELOW = {
     "render/scene": ["render/base", "render/math"],
     "render/formats": ["render/base", "render/math", "render/image", "render/scene"],
     "render/frequency": ["render/base", "render/math"],
+    "render/bake": ["render/base", "render/math", "render/image", "render/scene", "render/formats"],
 }
 LINE = [
     "render/geometry",
@@ -39,8 +40,8 @@ for number, floor in enumerate(LINE):
 for program in ("server", "worker", "client"):
     BELOW[program] = list(BELOW) + ["proto"]
     BELOW[program] = [floor for floor in BELOW[program] if floor.startswith(("render", "proto"))]
-BELOW["render/wire"].append("proto")
-BELOW["render/report"].append("proto")
+for floor in ("render/wire", "render/report"):
+    BELOW[floor] += ["proto", "render/bake"]
 
 # Libraries that one place owns: header pattern -> path prefixes that may include it.
 OWNERS = {

@@ -1,6 +1,6 @@
 // A mesh of surfaces stays whole however it is refined: no cracks, no area lost, no thin faces, and
 // sensors on the faces that they measure.
-#include "client/bake/surface_mesh.h"
+#include "render/bake/surface_mesh.h"
 
 #include <algorithm>
 #include <array>
@@ -18,10 +18,10 @@
 #include <nlohmann/json.hpp>
 
 #include "client/bake/baked_light.h"
-#include "client/bake/chart_atlas.h"
+#include "render/bake/chart_atlas.h"
 #include "client/bake/irradiance_plan.h"
-#include "client/bake/mesh_file.h"
-#include "client/bake/surface_figures.h"
+#include "render/bake/mesh_file.h"
+#include "render/bake/surface_figures.h"
 #include "render/formats/ply_file.h"
 #include "render/math/double3.h"
 #include "tests/support/test_scenes.h"

@@ -67,6 +67,7 @@ struct UseRule {
 UseRule RuleOf(GltfUse use) {
   switch (use) {
     case GltfUse::kIndices:
+    case GltfUse::kScalar:
       return {"SCALAR", 1, "must be of type SCALAR here"};
     case GltfUse::kVec2:
       return {"VEC2", 2, "must be of type VEC2 here"};

@@ -50,7 +50,7 @@ class GltfAccessor {
 };
 
 // What an accessor has to be for its use.
-enum class GltfUse : std::uint8_t { kIndices, kVec2, kVec3, kVec4 };
+enum class GltfUse : std::uint8_t { kIndices, kScalar, kVec2, kVec3, kVec4 };
 
 class GltfBuffers {
  public:

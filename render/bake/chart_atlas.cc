@@ -1,4 +1,4 @@
-#include "client/bake/chart_atlas.h"
+#include "render/bake/chart_atlas.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "client/bake/surface_mesh.h"
+#include "render/bake/surface_mesh.h"
 #include "render/base/status.h"
 #include "render/math/rgb.h"
 #include "render/math/vector.h"

@@ -1,4 +1,4 @@
-#include "client/bake/decimation.h"
+#include "render/bake/decimation.h"
 
 #include <algorithm>
 #include <array>

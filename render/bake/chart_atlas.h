@@ -11,9 +11,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "client/bake/mesh_file.h"
-#include "client/bake/surface_figures.h"
-#include "client/bake/surface_mesh.h"
+#include "render/bake/mesh_file.h"
+#include "render/bake/surface_figures.h"
+#include "render/bake/surface_mesh.h"
 #include "render/base/status.h"
 #include "render/image/image.h"
 #include "render/math/vector.h"

@@ -1,10 +1,10 @@
-#include "client/bake/surface_mesh.h"
+#include "render/bake/surface_mesh.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "client/bake/decimation.h"
+#include "render/bake/decimation.h"
 #include "render/base/text.h"
 #include "render/math/double3.h"
 #include "render/math/union_find.h"

@@ -1,4 +1,4 @@
-#include "client/bake/mesh_file.h"
+#include "render/bake/mesh_file.h"
 
 #include <algorithm>
 #include <array>
@@ -135,9 +135,11 @@ bool ReadSurface(const GltfObject& primitive, GltfBuffers& buffers, BakedMesh::S
   const GltfAccessor* const normals = open(attributes, "NORMAL", GltfUse::kVec3);
   const GltfAccessor* const irradiance = open(attributes, "_IRRADIANCE", GltfUse::kVec3);
   const GltfAccessor* const indices = open(primitive, "indices", GltfUse::kIndices);
-  if (!positions || !normals || !irradiance || !indices) return false;
+  const GltfAccessor* const noise = open(attributes, "_NOISE", GltfUse::kScalar);
+  if (!positions || !normals || !irradiance || !noise || !indices) return false;
   const std::size_t count = positions->count();
-  if (normals->count() != count || irradiance->count() != count || indices->count() % 3 != 0) {
+  if (normals->count() != count || irradiance->count() != count || noise->count() != count ||
+      indices->count() % 3 != 0) {
     primitive.Error("has columns of different lengths");
     return false;
   }
@@ -149,8 +151,9 @@ bool ReadSurface(const GltfObject& primitive, GltfBuffers& buffers, BakedMesh::S
     surface.normals.push_back(vector_of(normals->At(i)));
     const Vec3 e = vector_of(irradiance->At(i));
     surface.irradiance.push_back({e.x, e.y, e.z});
-    surface.noise.push_back(0);
-    if (!IsFinite(surface.positions.back()) || !IsFinite(surface.normals.back()) || !IsFinite(e)) {
+    surface.noise.push_back(static_cast<float>(noise->At(i)[0]));
+    if (!IsFinite(surface.positions.back()) || !IsFinite(surface.normals.back()) || !IsFinite(e) ||
+        !std::isfinite(surface.noise.back())) {
       primitive.Error(Concat("vertex ", i, " is not finite"));
       return false;
     }

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "client/bake/surface_mesh.h"
+#include "render/bake/surface_mesh.h"
 
 namespace lucerna {
 

@@ -1,4 +1,4 @@
-#include "client/bake/surface_figures.h"
+#include "render/bake/surface_figures.h"
 
 #include <algorithm>
 #include <cmath>

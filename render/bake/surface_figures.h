@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "client/bake/mesh_file.h"
+#include "render/bake/mesh_file.h"
 
 namespace lucerna {
 
