@@ -60,7 +60,7 @@ StatusOr<std::shared_ptr<BakeWork>> Coordinator::ReadBake(const JobTable::Turn& 
     }
     LUCERNA_ASSIGN_OR_RETURN(const std::string image, state_->blobs().Get(*round.image));
     LUCERNA_ASSIGN_OR_RETURN(const Image decoded, DecodeExr(image));
-    return work->rounds.TakeIn(decoded);
+    return work->rounds.TakeIn(decoded, round.passes);
   };
   for (const BakeRoundRecord& round : job->bake->rounds) {
     if (!round.has_ended) break;
@@ -136,6 +136,7 @@ StatusOr<bool> Coordinator::EndRound(JobTable::Turn& turn, RenderResult result) 
   const std::optional<JobTable::ImageSource> source = jobs_.DescribeRun(turn.job_id, Now());
   if (!source) return absl::CancelledError("the job has ended");
   scheduler_.SetTraced(turn.run_id, false);
+  const std::int64_t passes = result.passes;
   LUCERNA_ASSIGN_OR_RETURN(const Blob image, Encode(*source, std::move(result)));
   // As it will be read after a restart.
   LUCERNA_ASSIGN_OR_RETURN(const Image decoded, DecodeExr(*image));
@@ -147,7 +148,7 @@ StatusOr<bool> Coordinator::EndRound(JobTable::Turn& turn, RenderResult result) 
       }));
   FailPoint("bake.round_ended");
   if (jobs_.IsFinishing(turn.job_id)) turn.bake->rounds.StopRefining();
-  LUCERNA_RETURN_IF_ERROR(turn.bake->rounds.TakeIn(decoded));
+  LUCERNA_RETURN_IF_ERROR(turn.bake->rounds.TakeIn(decoded, passes));
   if (!turn.bake->rounds.round()) return false;
   LUCERNA_RETURN_IF_ERROR(BeginRound(turn));
   return true;

@@ -147,7 +147,7 @@ Job SummaryOf(const Job& job) {
 
 std::string RunIdOf(const Job& job) {
   if (!job.bake || job.bake->rounds.empty()) return job.id;
-  return absl::StrCat(job.id, ".", job.bake->rounds.size());
+  return absl::StrCat(job.id, ".", job.bake->rounds.back().run);
 }
 
 SceneManifest ManifestOf(const Job& job) {

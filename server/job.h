@@ -226,6 +226,7 @@ struct WorkerShare {
 // A round of a bake (render/bake/bake_rounds.h).
 struct BakeRoundRecord {
   std::string name;  // "survey", "round 1"
+  std::int64_t run = 0;  // a number that no other round of the job has or had
   std::uint64_t points = 0;
   SceneManifest::Entry sensors;
   Duration ran_before{};  // of the job, when the round began
@@ -244,6 +245,7 @@ struct BakeRecord {
   BakeSettings settings;
   RenderOverrides overrides;
   std::vector<BakeRoundRecord> rounds;  // the last one is under way, unless it has ended
+  std::int64_t runs = 0;                // rounds that have begun, forgotten ones too
   // Of what came of it, once the job has succeeded:
   std::vector<SurfaceFigures> figures;
   std::optional<double> interpolation_error;

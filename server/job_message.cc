@@ -174,10 +174,12 @@ void AddRoundsOf(const BakeRecord& bake, v1::JobRecord& record) {
     item.set_sensors_bytes(round.sensors.size_bytes);
     if (round.image) item.set_image_digest(std::string(round.image->Bytes()));
     item.set_has_ended(round.has_ended);
+    item.set_run(round.run);
     *item.mutable_ran_before() = ToProto(round.ran_before);
     for (const LightFinding& light : round.lights)
       *item.add_lights() = LightToProto(light);
   }
+  record.set_bake_runs(bake.runs);
   if (bake.uv_mesh) record.set_uv_mesh_digest(std::string(bake.uv_mesh->Bytes()));
 }
 
@@ -390,6 +392,7 @@ StatusOr<BakeRecord> BakeOf(const v1::JobRecord& record) {
     round.sensors.size_bytes = kept.sensors_bytes();
     round.ran_before = FromProto(kept.ran_before());
     round.has_ended = kept.has_ended();
+    round.run = kept.run();
     if (!kept.image_digest().empty()) {
       LUCERNA_ASSIGN_OR_RETURN(round.image, Digest::FromBytes(kept.image_digest()));
     }
@@ -400,6 +403,7 @@ StatusOr<BakeRecord> BakeOf(const v1::JobRecord& record) {
     for (const v1::LightFinding& light : kept.lights())
       round.lights.push_back(LightOf(light));
   }
+  bake.runs = record.bake_runs();
   for (const v1::SurfaceFigures& figures : message.surfaces())
     bake.figures.push_back(FromProto(figures));
   if (message.has_interpolation_error()) bake.interpolation_error = message.interpolation_error();

@@ -178,7 +178,9 @@ JobTable::Entry JobTable::MakeEntry(CheckedJob checked, WallTime submitted_at,
   job.priority = checked.submission.priority;
   job.reference = checked.submission.reference;
   if (checked.submission.bake) {
-    job.bake = BakeRecord{*checked.submission.bake, checked.submission.overrides, {}, {}, {}, {}};
+    job.bake = BakeRecord();
+    job.bake->settings = *checked.submission.bake;
+    job.bake->overrides = checked.submission.overrides;
   }
   // A job that must wait is read again later, so that waiting jobs cost no memory.
   if (queue_.has_room()) entry.scene = std::move(checked.scene);
@@ -1073,6 +1075,7 @@ bool JobTable::BeginRound(const std::string& job_id, BakeRoundRecord round,
       !rounds.empty() && !rounds.back().has_ended && rounds.back().sensors == round.sensors;
   if (!goes_on) {
     if (!rounds.empty() && !rounds.back().has_ended) rounds.pop_back();
+    round.run = ++job.bake->runs;
     round.ran_before = job.life.Running(moment.now);
     rounds.push_back(std::move(round));
     // Who had a part in it, and what it took, is of the whole job.

@@ -93,7 +93,8 @@ class RoundLines {
     for (; shown_ < job.bake().rounds_size(); ++shown_) {
       const v1::BakeRound& round = job.bake().rounds(shown_);
       if (!is_quiet_) {
-        PrintError(absl::StrCat(round.name(), ": ", round.points(), " points\n"));
+        PrintError(absl::StrCat(round.name(), ": ", round.points(),
+                                round.points() == 1 ? " point\n" : " points\n"));
       }
     }
   }
@@ -196,6 +197,10 @@ Status CheckBakeOutputs(const BakeOutputs& outputs) {
 
 Status SaveBake(ClientConnection& connection, const v1::Job& job, const BakeOutputs& outputs,
                 const OutputOptions& output_options) {
+  if (!HasEnded(job.state())) {
+    return absl::FailedPreconditionError(absl::StrCat(
+        "job ", job.job_id(), " has not ended, and a bake has nothing to show before"));
+  }
   LUCERNA_RETURN_IF_ERROR(CheckSucceeded(job));
   if (job.bake().settings().is_light_map() != IsLightMap(outputs.path)) {
     return absl::FailedPreconditionError(absl::StrCat(

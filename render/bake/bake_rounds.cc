@@ -33,6 +33,13 @@ RenderOverrides OfHistogram(RenderOverrides overrides) {
   return overrides;
 }
 
+void SetEnd(std::int64_t passes, RenderOverrides& overrides) {
+  overrides.passes = passes;
+  overrides.time_s.reset();
+  overrides.error.reset();
+  overrides.photons.reset();
+}
+
 RenderOverrides OfEstimator(BakeEstimator estimator, RenderOverrides overrides) {
   const bool has_end = overrides.passes || overrides.time_s || overrides.error || overrides.photons;
   if (!has_end) overrides.passes = kPasses;
@@ -121,10 +128,7 @@ Status BakeRounds::Prepare(Next next) {
   switch (next) {
     case Next::kSurvey: {
       RenderOverrides few_passes = OfHistogram(overrides_);
-      few_passes.passes = kPassesOfSurvey;
-      few_passes.time_s.reset();
-      few_passes.error.reset();
-      few_passes.photons.reset();
+      SetEnd(kPassesOfSurvey, few_passes);
       Ask(kSurveyName, mesh_.Buckets(), std::move(few_passes));
       return absl::OkStatus();
     }
@@ -153,10 +157,11 @@ Status BakeRounds::Prepare(Next next) {
   return absl::OkStatus();
 }
 
-Status BakeRounds::TakeIn(const Image& image) {
+Status BakeRounds::TakeIn(const Image& image, std::int64_t passes) {
   LUCERNA_ASSIGN_OR_RETURN(
       std::vector<Irradiance> measured,
       MeasuredIn(image, round_->set.sensors.size(), settings_.indirect_only));
+  if (asked_ != Next::kSurvey) SetEnd(passes, overrides_);
   switch (asked_) {
     case Next::kSurvey:
       mesh_.SetBuckets(measured);

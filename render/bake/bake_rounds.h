@@ -51,18 +51,19 @@ struct BakeResult {
 
 class BakeRounds {
  public:
-  // `overrides` are those of the rounds that decide what is written; without an end they have 64
-  // passes. Requires CheckBake.
+  // The end that `overrides` have is that of the first round after the survey, whose points are
+  // spread evenly, without one 64 passes; all later rounds have as many passes as it had, so that
+  // what is measured is equally good everywhere. Requires CheckBake.
   // Errors: as SurfaceMesh::FromScene and SplitLongEdges, and ChartAtlasOf.
   [[nodiscard]] static StatusOr<BakeRounds> Begin(const Scene& scene, const BakeSettings& settings,
                                                   const RenderOverrides& overrides);
 
   // What is to be measured now; absent when all is.
   [[nodiscard]] const std::optional<BakeRound>& round() const { return round_; }
-  // The image of the round's job. Requires a round.
+  // The image of the round's run, and how many passes it has. Requires a round.
   // Errors: DATA_LOSS when it has not what was asked for, RESOURCE_EXHAUSTED when the mesh has grown
   // too large; then nothing more can be asked.
-  [[nodiscard]] Status TakeIn(const Image& image);
+  [[nodiscard]] Status TakeIn(const Image& image, std::int64_t passes);
   // From now on only what the mesh cannot be written without is measured.
   void StopRefining() { is_refined_ = false; }
 
