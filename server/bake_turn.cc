@@ -15,6 +15,9 @@
 namespace lucerna {
 namespace {
 
+// Of the memory that a job may have; the rest is for its scene and its rounds.
+constexpr std::uint64_t kShareOfMesh = 4;
+
 // The error of the first round after the survey, whose points are spread evenly over the surfaces;
 // 0: none.
 double EstimateOf(const BakeRecord& bake) {
@@ -25,6 +28,14 @@ double EstimateOf(const BakeRecord& bake) {
 }
 
 }  // namespace
+
+Status Coordinator::CheckBegins(const CheckedJob& job) {
+  // One at a time: the first mesh may be large.
+  const MutexLock lock(bake_check_mutex_);
+  return BakeRounds::Begin(job.scene, *job.submission.bake, job.submission.overrides,
+                           options_.max_job_bytes / kShareOfMesh)
+      .status();
+}
 
 StatusOr<RenderResult> Coordinator::BeginBake(JobTable::Turn& turn) {
   if (!turn.bake) {
@@ -48,7 +59,8 @@ StatusOr<std::shared_ptr<BakeWork>> Coordinator::ReadBake(const JobTable::Turn& 
   }));
   const auto begin = [&]() -> StatusOr<std::shared_ptr<BakeWork>> {
     LUCERNA_ASSIGN_OR_RETURN(
-        BakeRounds rounds, BakeRounds::Begin(read.scene, job->bake->settings, job->bake->overrides));
+        BakeRounds rounds, BakeRounds::Begin(read.scene, job->bake->settings, job->bake->overrides,
+                                             options_.max_job_bytes / kShareOfMesh));
     return std::make_shared<BakeWork>(std::move(rounds));
   };
   LUCERNA_ASSIGN_OR_RETURN(std::shared_ptr<BakeWork> work, begin());

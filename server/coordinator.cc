@@ -195,9 +195,7 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
   }
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
   if (submission.bake) {
-    // What the names of materials and the spacing come to.
-    LUCERNA_RETURN_IF_ERROR(
-        BakeRounds::Begin(job.scene, *submission.bake, submission.overrides).status());
+    LUCERNA_RETURN_IF_ERROR(CheckBegins(job));
   }
   // Its files stay beside it.
   const std::uint64_t files = SceneBytes(submission.manifest);

@@ -246,7 +246,10 @@ class Coordinator {
                   const JobTable::NeededFiles& beside) const;
   // Errors: RESOURCE_EXHAUSTED when the job would not fit into --max-disk with all others gone.
   Status CheckDiskNeed(const CheckedJob& job) const;
-  // Bakes (server/bake_turn.cc). Begins the round of a bake that is to be measured now, or goes on
+  // Bakes (server/bake_turn.cc). Whether one can begin: what its names of materials and its spacing
+  // come to. Errors: as BakeRounds::Begin.
+  Status CheckBegins(const CheckedJob& job);
+  // Begins the round of a bake that is to be measured now, or goes on
   // with it.
   StatusOr<RenderResult> BeginBake(JobTable::Turn& turn);
   // The mesh of the bake as far as its finished rounds go.
@@ -314,6 +317,7 @@ class Coordinator {
   const std::string instance_;  // of this process
   const std::unique_ptr<DurableState> state_;
   ResultCounts results_;
+  Mutex bake_check_mutex_;
   // Held while files are added for a job, and while those without one are removed.
   Mutex files_mutex_;
   OpenTransfers transfers_;

@@ -23,6 +23,12 @@ constexpr double kSpacingsOfDiagonal = 512;
 // is seen as far as it changes the mean of a face.
 constexpr double kCoarsest = 16;
 
+// A vertex and what names it, and the three edges and two faces that come with it in a closed mesh;
+// an edge that is refined has its middle, of quadratic elements two points more.
+constexpr std::uint64_t kBytesOfVertex = 4 * sizeof(MeshVertex) + 2 * sizeof(MeshFace) + 4 * 96;
+// A sensor, its line in a file, and what is measured at it.
+constexpr std::uint64_t kBytesOfSensor = sizeof(Sensor) + sizeof(ChartAtlas::Texel) + 128;
+
 // Photons are counted in buckets.
 RenderOverrides OfHistogram(RenderOverrides overrides) {
   overrides.kernel = KernelKind::kConstant;
@@ -86,13 +92,15 @@ StatusOr<std::vector<Irradiance>> MeasuredIn(const Image& image, std::size_t cou
 }  // namespace
 
 StatusOr<BakeRounds> BakeRounds::Begin(const Scene& scene, const BakeSettings& settings,
-                                       const RenderOverrides& overrides) {
+                                       const RenderOverrides& overrides, std::uint64_t max_bytes) {
   const double diagonal = ExtentOf(scene).size * scene.unit;
   SurfaceMesh::Options options;
   options.sides = settings.sides;
   options.names = settings.materials;
   options.spacing = settings.spacing.value_or(diagonal / kSpacingsOfDiagonal);
   options.elements = settings.elements;
+  options.max_faces =
+      std::min<std::uint64_t>(SurfaceMesh::kMostFaces, max_bytes / (kBytesOfVertex / 2));
   LUCERNA_ASSIGN_OR_RETURN(SurfaceMesh mesh, SurfaceMesh::FromScene(scene, options));
   // A light map's charts are of the scene's own triangles.
   if (!settings.is_light_map) {
@@ -100,6 +108,7 @@ StatusOr<BakeRounds> BakeRounds::Begin(const Scene& scene, const BakeSettings& s
   }
   BakeRounds rounds(settings, OfEstimator(settings.estimator, overrides), std::move(mesh));
   rounds.spacing_ = options.spacing;
+  rounds.max_texels_ = std::min<std::uint64_t>(kMostTexels, max_bytes / kBytesOfSensor);
   rounds.chooses_photons_ = !overrides.photons_per_pass && !scene.integrator.photons_per_pass;
   const bool is_refined = settings.estimator != BakeEstimator::kHistogram &&
                           !settings.is_light_map && settings.tolerance > 0;
@@ -133,7 +142,7 @@ Status BakeRounds::Prepare(Next next) {
       return absl::OkStatus();
     }
     case Next::kTexels: {
-      LUCERNA_ASSIGN_OR_RETURN(atlas_, ChartAtlasOf(mesh_, spacing_));
+      LUCERNA_ASSIGN_OR_RETURN(atlas_, ChartAtlasOf(mesh_, spacing_, max_texels_));
       for (const ChartAtlas::Texel& texel : atlas_->texels)
         set.sensors.push_back(texel.sensor);
       break;
@@ -227,12 +236,8 @@ StatusOr<BakeResult> BakeRounds::Finish(
 }
 
 std::uint64_t BakeRounds::MemoryBytes() const {
-  // A vertex and what names it, and the three edges and two faces that come with it in a closed
-  // mesh, of which each edge may have three points more.
-  constexpr std::uint64_t kOfVertex = sizeof(MeshVertex) + 96 + 3 * (3 * sizeof(MeshVertex) + 96);
   const std::uint64_t sensors = round_ ? round_->set.sensors.size() : texels_.size();
-  return mesh_.vertices().size() * kOfVertex + mesh_.faces().size() * sizeof(MeshFace) +
-         sensors * (sizeof(Sensor) + 64);
+  return mesh_.vertices().size() * kBytesOfVertex + sensors * kBytesOfSensor;
 }
 
 }  // namespace lucerna

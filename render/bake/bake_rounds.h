@@ -12,6 +12,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -54,9 +55,11 @@ class BakeRounds {
   // The end that `overrides` have is that of the first round after the survey, whose points are
   // spread evenly, without one 64 passes; all later rounds have as many passes as it had, so that
   // what is measured is equally good everywhere. Requires CheckBake.
+  // What it holds stays below `max_bytes` or so, and the same in the rounds.
   // Errors: as SurfaceMesh::FromScene and SplitLongEdges, and ChartAtlasOf.
-  [[nodiscard]] static StatusOr<BakeRounds> Begin(const Scene& scene, const BakeSettings& settings,
-                                                  const RenderOverrides& overrides);
+  [[nodiscard]] static StatusOr<BakeRounds> Begin(
+      const Scene& scene, const BakeSettings& settings, const RenderOverrides& overrides,
+      std::uint64_t max_bytes = std::numeric_limits<std::uint64_t>::max());
 
   // What is to be measured now; absent when all is.
   [[nodiscard]] const std::optional<BakeRound>& round() const { return round_; }
@@ -91,6 +94,7 @@ class BakeRounds {
   RenderOverrides overrides_;
   SurfaceMesh mesh_;
   double spacing_ = 0;                // [scene units]
+  std::size_t max_texels_ = kMostTexels;
   bool chooses_photons_ = true;       // neither the job nor the scene does
   bool is_refined_ = true;
   Next asked_ = Next::kNothing;       // what round_ is

@@ -86,7 +86,8 @@ struct Chart {
 
 class Charting {
  public:
-  Charting(const SurfaceMesh& mesh, double texel) : mesh_(mesh), texel_(texel) {}
+  Charting(const SurfaceMesh& mesh, double texel, std::size_t max_texels)
+      : mesh_(mesh), texel_(texel), max_texels_(max_texels) {}
 
   StatusOr<ChartAtlas> Run() {
     FindCharts();
@@ -96,7 +97,7 @@ class Charting {
     atlas.charts = charts_.size();
     if (!Pack(atlas)) {
       return absl::ResourceExhaustedError(
-          Concat("the light map has more than ", kMostTexels, " texels; give a larger spacing"));
+          Concat("the light map has more than ", max_texels_, " texels; give a larger spacing"));
     }
     atlas.chart_of.resize(mesh_.faces().size());
     atlas.places.resize(mesh_.faces().size());
@@ -236,7 +237,7 @@ class Charting {
       area += static_cast<double>(chart.width) * chart.height;
       widest = std::max(widest, chart.width);
     }
-    if (!(area <= static_cast<double>(kMostTexels))) return false;
+    if (!(area <= static_cast<double>(max_texels_))) return false;
     std::vector<std::uint32_t> order(charts_.size());
     for (std::uint32_t i = 0; i < order.size(); ++i)
       order[i] = i;
@@ -261,7 +262,7 @@ class Charting {
     }
     atlas.height = y + shelf;
     return static_cast<std::size_t>(atlas.width) * static_cast<std::size_t>(atlas.height) <=
-           kMostTexels;
+           max_texels_;
   }
 
   void AddTexels(std::uint32_t number, ChartAtlas& atlas) const {
@@ -315,21 +316,22 @@ class Charting {
 
   const SurfaceMesh& mesh_;
   const double texel_;
+  const std::size_t max_texels_;
   std::vector<Chart> charts_;
 };
 
 }  // namespace
 
-StatusOr<ChartAtlas> ChartAtlasOf(const SurfaceMesh& mesh, double texel) {
+StatusOr<ChartAtlas> ChartAtlasOf(const SurfaceMesh& mesh, double texel, std::size_t max_texels) {
   // More texels than that are not even to be listed.
   double area = 0;
   for (const MeshFace& face : mesh.faces())
     area += mesh.AreaOf(face);
-  if (!(area * kSameChart <= static_cast<double>(kMostTexels) * texel * texel)) {
+  if (!(area * kSameChart <= static_cast<double>(max_texels) * texel * texel)) {
     return absl::ResourceExhaustedError(
-        Concat("the light map has more than ", kMostTexels, " texels; give a larger spacing"));
+        Concat("the light map has more than ", max_texels, " texels; give a larger spacing"));
   }
-  return Charting(mesh, texel).Run();
+  return Charting(mesh, texel, max_texels).Run();
 }
 
 Image AtlasImage(const ChartAtlas& atlas, const std::vector<Irradiance>& measured) {

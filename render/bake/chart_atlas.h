@@ -35,10 +35,11 @@ struct ChartAtlas {
   std::vector<std::array<Vec2, 3>> places;  // [faces] of corners [texels], y down
 };
 
-// Of the faces of a mesh; texels have edges of `texel`.
-// Errors: RESOURCE_EXHAUSTED beyond kMostTexels in the image.
-[[nodiscard]] StatusOr<ChartAtlas> ChartAtlasOf(const SurfaceMesh& mesh, double texel);
 inline constexpr std::size_t kMostTexels = std::size_t{1} << 26;
+// Of the faces of a mesh; texels have edges of `texel`.
+// Errors: RESOURCE_EXHAUSTED beyond `max_texels` in the image.
+[[nodiscard]] StatusOr<ChartAtlas> ChartAtlasOf(const SurfaceMesh& mesh, double texel,
+                                                std::size_t max_texels = kMostTexels);
 
 // The image of a light map: R, G and B and `noise` [W·m⁻²], the point `P` and normal `N` of each
 // texel, its `chart` from 1 (0: none), and `inside`, 1 where the texel's middle is on the chart.

@@ -145,9 +145,9 @@ Triangulated Triangulate(const CurvePiece& /*curve*/, double /*unit*/) {
   return {};
 }
 
-Status TooManyFaces() {
-  return absl::ResourceExhaustedError(Concat("the mesh has more than ", SurfaceMesh::kMostFaces,
-                                             " triangles; give a larger spacing"));
+Status TooManyFaces(std::size_t max_faces) {
+  return absl::ResourceExhaustedError(
+      Concat("the mesh has more than ", max_faces, " triangles; give a larger spacing"));
 }
 
 double LuminanceOf(const Irradiance& irradiance) {
@@ -164,6 +164,7 @@ std::string NameOf(const MeshSurface& surface) {
 StatusOr<SurfaceMesh> SurfaceMesh::FromScene(const Scene& scene, const Options& options) {
   SurfaceMesh mesh;
   mesh.spacing_ = options.spacing;
+  mesh.max_faces_ = options.max_faces;
   mesh.elements_ = options.elements;
   std::set<std::string> names;
   std::uint32_t shape = 0;
@@ -466,7 +467,7 @@ Status SurfaceMesh::Split(std::set<Pair> places) {
     }
   }
   faces_ = std::move(finer);
-  return faces_.size() <= kMostFaces ? absl::OkStatus() : TooManyFaces();
+  return faces_.size() <= max_faces_ ? absl::OkStatus() : TooManyFaces(max_faces_);
 }
 
 Status SurfaceMesh::SplitLongEdges(double longest) {
@@ -474,7 +475,9 @@ Status SurfaceMesh::SplitLongEdges(double longest) {
   double area = 0;
   for (const MeshFace& face : faces_)
     area += AreaOf(face);
-  if (!(area < kMostFaces * std::sqrt(3.0) / 4 * longest * longest)) return TooManyFaces();
+  if (!(area < static_cast<double>(max_faces_) * std::sqrt(3.0) / 4 * longest * longest)) {
+    return TooManyFaces(max_faces_);
+  }
   for (;;) {
     std::set<Pair> places;
     for (const MeshFace& face : faces_) {

@@ -85,20 +85,21 @@ enum class MeasuredSides : std::uint8_t { kBrighter, kFront, kBack, kBoth };
 
 class SurfaceMesh {
  public:
+  static constexpr std::size_t kMostFaces = std::size_t{1} << 24;
   struct Options {
     MeasuredSides sides = MeasuredSides::kBrighter;
     std::vector<std::string> names;  // of materials; empty: all
     double spacing = 0;              // of neighbouring points where the mesh is finest, > 0
     MeshElements elements = MeshElements::kLinear;
+    std::size_t max_faces = kMostFaces;
   };
   // Shapes of other materials than those that keep photons, and curves, have no part in it.
   // Errors: NOT_FOUND when nothing is left, with the names that there are.
   [[nodiscard]] static StatusOr<SurfaceMesh> FromScene(const Scene& scene, const Options& options);
 
   // Splits edges until none is longer.
-  // Errors: RESOURCE_EXHAUSTED once there are more than kMostFaces.
+  // Errors: RESOURCE_EXHAUSTED once there are more than max_faces.
   [[nodiscard]] Status SplitLongEdges(double longest);
-  static constexpr std::size_t kMostFaces = std::size_t{1} << 24;
 
   // Where irradiance is to be measured next: at vertices that have none, then, with `with_edges`,
   // in the middle of all edges that are longer than the spacing and were not measured before, and
@@ -201,6 +202,7 @@ class SurfaceMesh {
   [[nodiscard]] Status Split(std::set<Pair> places);
 
   double spacing_ = 0;
+  std::size_t max_faces_ = kMostFaces;
   MeshElements elements_ = MeshElements::kLinear;
   std::vector<MeshVertex> vertices_;
   std::vector<MeshFace> faces_;

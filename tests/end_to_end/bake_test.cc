@@ -7,6 +7,7 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "gmock/gmock.h"
@@ -26,7 +27,6 @@ namespace {
 using nlohmann::json;
 using std::chrono::seconds;
 using testing::HasSubstr;
-using testing::Not;
 
 const std::string kBin = LUCERNA_BIN_DIR;
 
@@ -104,18 +104,129 @@ TEST_F(BakeTest, GoesOnAfterItWasKilled) {
   killed.Signal(SIGKILL);
   killed.WaitForExit(seconds(60));
   EXPECT_FALSE(ReadFile(Path("out.ply")).ok());
-  std::string jobs;
-  for (const auto& entry : std::filesystem::directory_iterator(Path("out.ply.rounds"))) {
-    if (entry.path().extension() == ".job") jobs += ReadFile(entry.path().string()).value_or("");
-  }
+  ASSERT_TRUE(std::filesystem::exists(Path("out.ply.checkpoints")));
+  // Of other settings there is none to go on with.
+  EXPECT_EQ(RunProgram(Command("out.ply", {"--resume", "--seed", "8"}), seconds(60)).exit_code, 1);
+  EXPECT_EQ(RunProgram(Command("out.ply", {"--resume", "--indirect-only"}), seconds(60)).exit_code,
+            1);
   const Finished run = RunProgram(Command("out.ply", {"--resume", "--json"}), seconds(300));
   ASSERT_EQ(run.exit_code, 0) << run.errors;
   EXPECT_TRUE(ReadFile(Path("out.ply")).value_or("") == alone);
-  // The first round was not measured again, the last one was.
-  const json rounds = json::parse(run.output)["rounds"];
-  EXPECT_THAT(jobs, HasSubstr(rounds.front()["job_id"].get<std::string>()));
-  EXPECT_THAT(jobs, Not(HasSubstr(rounds.back()["job_id"].get<std::string>())));
-  EXPECT_FALSE(std::filesystem::exists(Path("out.ply.rounds")));
+  EXPECT_FALSE(std::filesystem::exists(Path("out.ply.checkpoints")));
+  EXPECT_EQ(RunProgram(Command("out.ply", {"--resume"}), seconds(60)).exit_code, 1);
+}
+
+// A coordinator with a state, and a worker, and commands for them.
+class BakeOnServerTest : public BakeTest {
+ protected:
+  BakeOnServerTest() {
+    StartServer("127.0.0.1:0");
+    const std::string said = server_->Output() + server_->Errors();
+    const std::size_t at = said.find("127.0.0.1:");
+    address_ = said.substr(at, said.find_first_not_of("0123456789.:", at) - at);
+    worker_ = std::make_unique<ChildProcess>(
+        std::vector<std::string>{kBin + "/lucerna-worker", "--server", address_});
+  }
+  void StartServer(const std::string& address) {
+    server_ = std::make_unique<ChildProcess>(std::vector<std::string>{
+        kBin + "/lucerna-server", "--listen", address, "--state", Path("state")});
+    ASSERT_TRUE(server_->WaitForText("listening on 127.0.0.1:", seconds(60)));
+  }
+  [[nodiscard]] Finished Run(std::vector<std::string> words) const {
+    words.insert(words.begin(), kBin + "/lucerna");
+    words.insert(words.end(), {"--server", address_});
+    return RunProgram(words, seconds(120));
+  }
+  // The id of a new job.
+  [[nodiscard]] std::string Submit(std::vector<std::string> more) const {
+    std::vector<std::string> words = {"bake", Path("scene.pbrt"), "--on-server", "--seed", "7"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Finished run = Run(words);
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    return run.output.substr(0, run.output.find('\n'));
+  }
+  // What it made, once it has ended.
+  [[nodiscard]] std::string Made(const std::string& job, const std::string& name) const {
+    const Finished waited = Run({"wait", job});
+    EXPECT_EQ(waited.exit_code, 0) << waited.errors;
+    const Finished fetched = Run({"fetch", job, "-o", Path(name)});
+    EXPECT_EQ(fetched.exit_code, 0) << fetched.errors;
+    return ReadFile(Path(name)).value_or("");
+  }
+
+  std::string address_;
+  std::unique_ptr<ChildProcess> server_, worker_;
+};
+
+TEST_F(BakeOnServerTest, IsAJobLikeAnyOther) {
+  const std::string eight = Bake("8.ply", {"--passes", "8"});
+  const std::string job = Submit({"--passes", "4", "--spacing", "0.02"});
+  EXPECT_TRUE(Made(job, "4.ply") == Bake("alone.ply"));
+  // With another end it is what it would have been with that from the start.
+  EXPECT_EQ(Run({"extend", job, "--passes", "8"}).exit_code, 0);
+  EXPECT_TRUE(Made(job, "longer.ply") == eight);
+  EXPECT_THAT(Run({"jobs"}).output, HasSubstr(job));
+  // The last bits of the estimate are in a .glb, and that of a job that was extended while it ran.
+  const std::string running = Submit({"--passes", "100000", "--spacing", "0.02"});
+  EXPECT_EQ(Run({"fetch", running, "-o", Path("early.glb")}).exit_code, 1);
+  EXPECT_EQ(Run({"pause", running}).exit_code, 0);
+  EXPECT_EQ(Run({"extend", running, "--passes", "8"}).exit_code, 0);
+  EXPECT_EQ(Run({"resume", running}).exit_code, 0);
+  EXPECT_TRUE(Made(running, "running.glb") == Bake("8.glb", {"--passes", "8"}));
+}
+
+TEST_F(BakeOnServerTest, GoesOnAfterTheCoordinatorWasKilled) {
+  const std::string alone = Bake("alone.glb", {"--passes", "48"});
+  const std::string job = Submit({"--passes", "48", "--spacing", "0.02"});
+  ChildProcess watch({kBin + "/lucerna", "watch", job, "--server", address_});
+  // In the middle of a round after some that have ended.
+  ASSERT_TRUE(server_->WaitForText("round 2 at", seconds(120)));
+  server_->Signal(SIGKILL);
+  server_->WaitForExit(seconds(60));
+  StartServer(address_);
+  EXPECT_TRUE(server_->WaitForText("goes on after round 1 of its bake", seconds(60)));
+  EXPECT_TRUE(Made(job, "killed.glb") == alone);
+  EXPECT_EQ(watch.WaitForExit(seconds(60)), 0);
+}
+
+TEST_F(BakeOnServerTest, StopsWithTheMeshThatThereIs) {
+  const std::string job = Submit({"--passes", "1000000", "--spacing", "0.02"});
+  ASSERT_TRUE(server_->WaitForText("round 1 at", seconds(120)));
+  Finished stopped = Run({"stop", job});
+  for (int i = 0; i < 100 && stopped.exit_code != 0; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    stopped = Run({"stop", job});
+  }
+  EXPECT_EQ(stopped.exit_code, 0) << stopped.errors;
+  EXPECT_TRUE(ParsePly(Made(job, "stopped.ply")).ok());
+  const Finished page = Run({"report", job, "-o", Path("page.html")});
+  EXPECT_EQ(page.exit_code, 0) << page.errors;
+}
+
+TEST_F(BakeOnServerTest, FetchesLightMapsWithTheirMesh) {
+  const std::string map = Bake("map.exr", {"--uv-mesh", Path("uv.glb"), "--spacing", "0.05"});
+  const std::string job = Submit({"--passes", "4", "--spacing", "0.05", "--light-map"});
+  EXPECT_TRUE(Made(job, "map2.exr") == map);
+  EXPECT_EQ(Run({"fetch", job, "-o", Path("map3.exr"), "--uv-mesh", Path("uv3.glb")}).exit_code, 0);
+  EXPECT_TRUE(ReadFile(Path("uv3.glb")).value_or("1") == ReadFile(Path("uv.glb")).value_or("2"));
+  EXPECT_THAT(Run({"fetch", job, "-o", Path("mesh.glb")}).errors, HasSubstr("made a light map"));
+  EXPECT_EQ(Run({"fetch", job, "-o", Path("map4.exr"), "--png", Path("map.png")}).exit_code, 2);
+}
+
+TEST_F(BakeOnServerTest, SaysWhatToMend) {
+  std::vector<std::string> words = {"bake", Path("scene.pbrt"), "--on-server"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), words.begin(), words.end());
+    return Run(more);
+  };
+  EXPECT_EQ(with({"--plan", Path("plan.svg")}).exit_code, 2);
+  EXPECT_EQ(with({"--resume"}).exit_code, 2);
+  EXPECT_THAT(with({"--material", "glass"}).errors, HasSubstr("there are floor"));
+  // Of an image there is no mesh.
+  const Finished image = Run({"submit", Path("scene.pbrt"), "--size", "8x8", "--passes", "1"});
+  const std::string job = image.output.substr(0, image.output.find('\n'));
+  EXPECT_EQ(Run({"wait", job}).exit_code, 0);
+  EXPECT_THAT(Run({"fetch", job, "-o", Path("mesh.glb")}).errors, HasSubstr("no mesh"));
 }
 
 TEST_F(BakeTest, PrintsTheFiguresOfSurfaces) {
@@ -300,6 +411,7 @@ TEST_F(BakeTest, SaysWhatToMend) {
     return RunProgram(Command(out, more), seconds(60));
   };
   EXPECT_EQ(run("out.obj", {}).exit_code, 2);
+  EXPECT_EQ(run("out.glb", {"--light-map"}).exit_code, 2);
   EXPECT_THAT(run("out.obj", {}).errors, HasSubstr(".ply or .glb"));
   EXPECT_EQ(run("out.glb", {"--elements", "cubic"}).exit_code, 2);
   EXPECT_EQ(run("out.glb", {"--elements", "quadratic", "--estimator", "histogram"}).exit_code, 2);

@@ -749,5 +749,163 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
   }
 }
 
+// Bakes ------------------------------------------------------------------------------------------
+
+BakeRoundRecord RoundOf(const std::string& name) {
+  BakeRoundRecord round;
+  round.name = name;
+  round.sensors = {Sha256(name), 1};
+  return round;
+}
+
+// A bake with a turn and a runner in its first round.
+class BakeTableTest : public testing::Test {
+ protected:
+  BakeTableTest() {
+    CheckedJob job = JobOf("bake");
+    job.submission.bake = BakeSettings();
+    EXPECT_EQ(table_.Add(std::move(job), WallTime(), At(0))->job_id, kJob);
+    turn_ = table_.WaitForTurn();
+    EXPECT_TRUE(turn_->is_bake);
+    Begin("survey");
+    table_.OnRunning(kJob, At(1));
+  }
+  void Begin(const std::string& name, int seconds = 1) {
+    ASSERT_TRUE(table_.BeginRound(kJob, RoundOf(name), JobOf("", 16), At(seconds)));
+    runner_ = std::make_shared<FakeRunner>();
+    ASSERT_TRUE(table_.Attach(kJob, runner_));
+  }
+  void CountPhotons(const std::string& run_id, std::uint64_t photons) {
+    DeliveredCounts counts;
+    counts.tally.photons = photons;
+    Delivery delivery;
+    delivery.worker = "w";
+    delivery.pass = {run_id, 0};
+    table_.CountMerged(delivery, counts, "host", At(2).now);
+  }
+  [[nodiscard]] const Job Now() const { return *table_.Find(kJob); }
+
+  static constexpr const char* kJob = "t-1";
+  JobTable table_{SmallTable()};
+  std::optional<JobTable::Turn> turn_;
+  std::shared_ptr<FakeRunner> runner_;
+};
+
+TEST_F(BakeTableTest, WhatComesOfAnEarlierRoundFindsNoJob) {
+  const std::string survey = RunIdOf(Now());
+  EXPECT_NE(survey, kJob);
+  EXPECT_TRUE(table_.Find(survey));
+  EXPECT_EQ(table_.ShareOf(kJob)->run_id, survey);
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, At(3)));
+  Begin("round 1");
+  EXPECT_FALSE(table_.Find(survey));
+  EXPECT_TRUE(table_.HasEnded(survey));
+  const std::string round = RunIdOf(Now());
+  EXPECT_NE(round, survey);
+  CountPhotons(survey, 5);
+  EXPECT_EQ(Now().counters.photons, 0U);
+  CountPhotons(round, 7);
+  EXPECT_EQ(Now().counters.photons, 7U);
+}
+
+TEST_F(BakeTableTest, ARoundKeepsWhatItCounted) {
+  CountPhotons(kJob, 7);
+  table_.OnProgress(kJob, 3);
+  ASSERT_TRUE(table_.EndRound(kJob, Sha256("image"), At(3)));
+  Begin("round 1", 3);
+  ASSERT_EQ(Now().bake->rounds.size(), 2U);
+  const BakeRoundRecord& survey = Now().bake->rounds[0];
+  EXPECT_TRUE(survey.has_ended);
+  EXPECT_EQ(survey.passes, 3);
+  EXPECT_EQ(survey.photons, 7U);
+  EXPECT_EQ(survey.image, Sha256("image"));
+  EXPECT_EQ(Now().counters.passes, 0);
+  EXPECT_EQ(Now().workers.size(), 1U) << "who had a part in it has one in the mesh";
+  // A round's time is its own.
+  EXPECT_EQ(table_.RunningOf(kJob, At(7).now), std::chrono::seconds(4));
+  EXPECT_EQ(table_.WhenItHasRun(kJob, std::chrono::seconds(10)), At(13).now);
+  // The files of a round are those of the scene, and its sensors.
+  EXPECT_EQ(ManifestOf(Now()).main_path, kSensorsPath);
+  EXPECT_EQ(ManifestOf(Now()).entries.at(kSensorsPath).digest, Sha256("round 1"));
+  EXPECT_EQ(Now().manifest.main_path, "scene.pbrt");
+}
+
+TEST_F(BakeTableTest, ARoundThatIsBegunAgainGoesOn) {
+  const std::string run = RunIdOf(Now());
+  CountPhotons(kJob, 7);
+  Begin("survey");
+  EXPECT_EQ(RunIdOf(Now()), run);
+  EXPECT_EQ(Now().counters.photons, 7U);
+  // Other sensors take its place.
+  Begin("other");
+  EXPECT_EQ(Now().bake->rounds.size(), 1U);
+  EXPECT_NE(RunIdOf(Now()), run);
+  EXPECT_EQ(Now().counters.photons, 0U);
+}
+
+TEST_F(BakeTableTest, AnotherEndBeginsAnewUnderAnotherName) {
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, At(2)));
+  Begin("round 1");
+  const std::string run = RunIdOf(Now());
+  RenderOverrides until;
+  until.passes = 2000;
+  ASSERT_TRUE(table_.Extend(kJob, until, At(3)).ok());
+  EXPECT_TRUE(runner_->is_stopped());
+  EXPECT_EQ(Now().bake->overrides.passes, 2000);
+  EXPECT_EQ(Now().settings.passes, 16) << "those of the round, until there is another";
+  EXPECT_FALSE(table_.EndRound(kJob, std::nullopt, At(3)));
+  EXPECT_FALSE(table_.BeginRound(kJob, RoundOf("round 2"), JobOf(""), At(3)));
+  EXPECT_TRUE(table_.TakeBeginsAgain(kJob));
+  EXPECT_TRUE(Now().bake->rounds.empty());
+  Begin("survey");
+  Begin("round 1");
+  EXPECT_NE(RunIdOf(Now()), run) << "workers know the old name with its files";
+}
+
+TEST_F(BakeTableTest, TheWorkOfAWrongWorkerGoesWithAllRounds) {
+  table_.NoteContributor(kJob, "record", "host");
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, At(2)));
+  Begin("round 1");
+  table_.TakeOut("record", At(3));
+  EXPECT_TRUE(runner_->is_stopped());
+  EXPECT_FALSE(table_.Succeed(kJob, StopReason::kPasses, nullptr, At(3)));
+  EXPECT_TRUE(table_.TakeBeginsAgain(kJob));
+  EXPECT_TRUE(Now().bake->rounds.empty());
+  // One that waits for its turn has no thread that does it.
+  Begin("survey");
+  table_.NoteContributor(kJob, "record", "host");
+  ASSERT_TRUE(table_.Pause(kJob, PauseCause::kUser, "paused", At(4)).ok());
+  turn_.reset();
+  table_.TakeOut("record", At(5));
+  EXPECT_TRUE(Now().bake->rounds.empty());
+  EXPECT_FALSE(table_.BeginsAgain(kJob));
+}
+
+TEST_F(BakeTableTest, OneThatHasEndedCanBeGivenAnotherEnd) {
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, At(2)));
+  BakeResult result;
+  result.figures = {{.name = "floor"}};
+  table_.SetBakeResult(kJob, result, std::make_shared<const std::string>("uv"), std::nullopt);
+  ASSERT_TRUE(table_.Succeed(kJob, StopReason::kPasses, std::make_shared<const std::string>("glb"),
+                             At(3)));
+  turn_.reset();
+  EXPECT_EQ(*table_.FindImage(kJob, At(3))->image, "glb");
+  EXPECT_EQ(*table_.FindImage(kJob, At(3))->uv_mesh, "uv");
+  EXPECT_EQ(Now().bake->figures.size(), 1U);
+  RenderOverrides until;
+  until.passes = 2000;
+  // Its files are nowhere, since it has no pins here.
+  EXPECT_TRUE(absl::IsFailedPrecondition(table_.Extend(kJob, until, At(4)).status()));
+}
+
+TEST_F(BakeTableTest, HasNothingToShowBeforeItsEnd) {
+  EXPECT_TRUE(absl::IsFailedPrecondition(table_.FindImage(kJob, At(1)).status()));
+  ASSERT_TRUE(table_.Stop(kJob, At(2)).ok());
+  EXPECT_TRUE(table_.IsFinishing(kJob));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, At(2)));
+  Begin("round 1");
+  EXPECT_TRUE(runner_->Run().ok()) << "it ends at once, as the one before";
+}
+
 }  // namespace
 }  // namespace lucerna

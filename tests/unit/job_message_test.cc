@@ -171,6 +171,84 @@ TEST(JobMessageTest, ARecordHoldsAllThatClientsSee) {
       << "time stands still when a job has ended";
 }
 
+Job FullBake() {
+  Job job = FullJob();
+  BakeRecord bake;
+  bake.settings = {.estimator = BakeEstimator::kNearest,
+                   .sides = MeasuredSides::kBack,
+                   .materials = {"floor", "wall"},
+                   .spacing = 0.1,
+                   .elements = MeshElements::kQuadratic,
+                   .tolerance = 0.3,
+                   .decimates = false,
+                   .indirect_only = true,
+                   .is_light_map = true};
+  bake.overrides.error = 0.25;
+  BakeRoundRecord survey;
+  survey.name = "survey";
+  survey.run = 3;
+  survey.points = 5;
+  survey.sensors = {Sha256("sensors"), 17};
+  survey.ran_before = std::chrono::milliseconds(1);
+  survey.has_ended = true;
+  survey.image = Sha256("survey's image");
+  survey.passes = 16;
+  survey.photons = 99;
+  survey.cpu = std::chrono::milliseconds(2);
+  survey.error = job.convergence[0];
+  survey.lights = job.lights;
+  BakeRoundRecord round;
+  round.name = "round 1";
+  round.run = 4;
+  round.sensors = {Sha256("other sensors"), 18};
+  bake.rounds = {survey, round};
+  bake.runs = 4;
+  bake.figures = {
+      {.name = "0 floor", .triangles = 2, .area = 3, .lowest = 4, .highest = 5, .mean = 6}};
+  bake.interpolation_error = 0.125;
+  bake.uv_mesh = Sha256("mesh");
+  job.bake = bake;
+  return job;
+}
+
+TEST(JobMessageTest, ARecordHoldsAllOfABake) {
+  const Job job = FullBake();
+  const auto read = DecodeRecord(EncodeRecord(job, std::nullopt, Duration::zero()), kNow);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_EQ(Seen(read->job, Duration::zero()), Seen(job, Duration::zero()));
+  ASSERT_TRUE(read->job.bake);
+  const BakeRecord& bake = *read->job.bake;
+  EXPECT_EQ(bake.settings, job.bake->settings);
+  EXPECT_EQ(bake.overrides, job.bake->overrides);
+  EXPECT_EQ(bake.runs, 4);
+  EXPECT_EQ(bake.uv_mesh, job.bake->uv_mesh);
+  EXPECT_EQ(bake.interpolation_error, 0.125);
+  ASSERT_EQ(bake.figures.size(), 1U);
+  EXPECT_EQ(bake.figures[0].highest, 5);
+  ASSERT_EQ(bake.rounds.size(), 2U);
+  const BakeRoundRecord& survey = bake.rounds[0];
+  EXPECT_EQ(survey.run, 3);
+  EXPECT_EQ(survey.points, 5U);
+  EXPECT_EQ(survey.sensors, job.bake->rounds[0].sensors);
+  EXPECT_EQ(survey.image, job.bake->rounds[0].image);
+  EXPECT_EQ(survey.ran_before, std::chrono::milliseconds(1));
+  EXPECT_EQ(survey.cpu, std::chrono::milliseconds(2));
+  EXPECT_TRUE(survey.has_ended);
+  EXPECT_EQ(survey.lights.size(), 1U);
+  EXPECT_FALSE(bake.rounds[1].has_ended);
+  EXPECT_FALSE(bake.rounds[1].image);
+  EXPECT_FALSE(bake.rounds[1].error);
+  EXPECT_EQ(RunIdOf(read->job), "i-7.4");
+  EXPECT_EQ(ManifestOf(read->job), ManifestOf(job));
+}
+
+TEST(JobMessageTest, ARecordWhoseRoundsDoNotAgreeIsMalformed) {
+  v1::JobRecord record;
+  ASSERT_TRUE(record.ParseFromString(EncodeRecord(FullBake(), std::nullopt, Duration::zero())));
+  record.mutable_bake_rounds()->RemoveLast();
+  EXPECT_FALSE(DecodeRecord(record.SerializeAsString(), kNow).ok());
+}
+
 TEST(JobMessageTest, AJobThatHasNotEndedWaitsAgain) {
   Job job = FullJob();
   job.life = JobLife(kNow.now);

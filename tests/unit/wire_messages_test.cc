@@ -272,5 +272,17 @@ TEST(WireMessagesTest, ATallyKeepsItsLights) {
   EXPECT_EQ(FromProto(message).lights.size(), kMaxLightTallies);
 }
 
+TEST(WireMessagesTest, RefusesABakeOfAnotherVersion) {
+  const BakeSettings settings = {.materials = {"floor"}, .tolerance = 0.125};
+  const v1::BakeSettings message = ToProto(settings);
+  EXPECT_EQ(FromProto(message).value(), settings);
+  v1::BakeSettings other = message;
+  other.set_estimator(static_cast<v1::BakeEstimator>(99));
+  EXPECT_FALSE(FromProto(other).ok());
+  other = message;
+  other.set_sides(static_cast<v1::MeasuredSides>(99));
+  EXPECT_FALSE(FromProto(other).ok());
+}
+
 }  // namespace
 }  // namespace lucerna
