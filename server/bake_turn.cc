@@ -101,9 +101,6 @@ Status Coordinator::BeginRound(JobTable::Turn& turn) {
   BakeWork& work = *turn.bake;
   if (!work.rounds.round()) return absl::InternalError("a bake has no round to begin");
   const BakeRound& round = *work.rounds.round();
-  work.memory = MemoryClaim();
-  LUCERNA_ASSIGN_OR_RETURN(work.memory,
-                           budget_.Claim(MemoryUse::kJobs, work.rounds.MemoryBytes()));
   auto sensors =
       std::make_shared<const std::string>(SensorsFile(job->manifest.main_path, round.set));
   BakeRoundRecord record;

@@ -1,11 +1,10 @@
-// What a bake holds while it is in progress: its mesh so far, and what that takes.
+// What a bake holds while it is in progress.
 #pragma once
 
 #include <utility>
 
 #include "render/bake/bake_rounds.h"
 #include "server/blob_store.h"
-#include "server/memory_budget.h"
 
 namespace lucerna {
 
@@ -14,7 +13,6 @@ struct BakeWork {
   explicit BakeWork(BakeRounds begun) : rounds(std::move(begun)) {}
 
   BakeRounds rounds;
-  MemoryClaim memory;
   PinnedBlobs pinned;  // of the round that is measured now
 };
 

@@ -603,7 +603,8 @@ StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
 StatusOr<std::optional<MemoryClaim>> Coordinator::WaitForMemory(const JobTable::Turn& turn) {
   const std::uint64_t scene_memory =
       turn.scene_memory > 0 ? turn.scene_memory : GuessSceneMemory(SceneBytes(turn.manifest));
-  const std::uint64_t bytes = MemoryNeedOf(turn.needs, turn.settings, scene_memory);
+  const std::uint64_t bytes = MemoryNeedOf(turn.needs, turn.settings, scene_memory) +
+                              (turn.bake ? turn.bake->rounds.MemoryBytes() : 0);
   bool has_waited = false;
   while (true) {
     StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kJobs, bytes);
@@ -720,6 +721,7 @@ Status Coordinator::KeepCheckpoint(const std::string& job_id, std::vector<std::s
 
 Status Coordinator::KeepForJob(const std::string& job_id, std::vector<Blob> files,
                                const std::function<bool(const std::vector<Digest>&)>& note) {
+  bool has_waited = false;
   while (true) {
     Status kept;
     {
@@ -732,9 +734,12 @@ Status Coordinator::KeepForJob(const std::string& job_id, std::vector<Blob> file
         kept = PutFile(digests.back(), *file);
       }
       if (kept.ok()) {
-        return note(digests) ? absl::OkStatus() : absl::CancelledError("the job has ended");
+        if (!note(digests)) return absl::CancelledError("the job has ended");
+        if (has_waited) jobs_.SetCondition(job_id, PauseCause::kDisk, "", Now());
+        return absl::OkStatus();
       }
     }
+    has_waited = true;
     const std::string condition = state_->PauseCondition(kept);
     spdlog::warn("job {} {}", job_id, condition);
     jobs_.SetCondition(job_id, PauseCause::kDisk, condition, Now());

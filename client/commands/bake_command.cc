@@ -108,6 +108,12 @@ Status BakeOnServer(const BakeRequest& request, SceneFiles& files, const JobToSe
                     const Endpoint& server, const OutputOptions& output_options) {
   LUCERNA_ASSIGN_OR_RETURN(const auto connection, ClientConnection::Open(server));
   LUCERNA_ASSIGN_OR_RETURN(const v1::SubmitResponse submitted, SendJob(*connection, files, job));
+  LUCERNA_ASSIGN_OR_RETURN(const v1::Job begun, connection->Get(submitted.job_id()));
+  if (!begun.has_bake()) {
+    connection->Cancel(submitted.job_id()).IgnoreError();
+    return absl::FailedPreconditionError(
+        "the coordinator is of an earlier version of Lucerna, whose jobs are images alone");
+  }
   if (request.outputs.path.empty()) {
     PrintData(output_options.json ? SubmittedReport(submitted) : submitted.job_id() + "\n");
     return absl::OkStatus();
