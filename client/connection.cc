@@ -438,8 +438,7 @@ StatusOr<std::string> ClientConnection::GetUvMesh(const std::string& job_id) {
   request.set_job_id(job_id);
   request.set_uv_mesh(true);
   return ReadChunks(
-      "the mesh",
-      [&](grpc::ClientContext* context) { return images_->GetImage(context, request); },
+      "the mesh", [&](grpc::ClientContext* context) { return images_->GetImage(context, request); },
       [] { return false; });
 }
 

@@ -67,9 +67,9 @@ class ClientConnection {
   // thread; before the first news it is called with an empty Job, state UNSPECIFIED.
   [[nodiscard]] StatusOr<v1::Job> Watch(const std::string& job_id, const OnJob& on_job);
 
-  // The bytes of the job's EXR file, or of what a bake made. Whoever may lose interest says so by `gives_up`, which is
-  // called several times a second, also from another thread; then ABORTED. Threads: any, beside
-  // other calls.
+  // The bytes of the job's EXR file, or of what a bake made. Whoever may lose interest says so by
+  // `gives_up`, which is called several times a second, also from another thread; then ABORTED.
+  // Threads: any, beside other calls.
   [[nodiscard]] StatusOr<std::string> GetImage(
       const std::string& job_id, const std::function<bool()>& gives_up = [] { return false; });
   // The mesh of a job that made a light map, as glTF.

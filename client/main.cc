@@ -223,11 +223,11 @@ int Run(int argc, char** argv) {
   };
   const auto add_bake_outputs = [](CLI::App* to, BakeOutputs& outputs) {
     to->add_option("--uv-mesh", outputs.uv_mesh,
-                    ".glb file to write beside a light map: the surfaces with their places in it");
+                   ".glb file to write beside a light map: the surfaces with their places in it");
     to->add_flag("--ascii", outputs.is_ascii, "write a PLY file as text");
     to->add_option("--plan", outputs.plan,
-                    "SVG file to write: the largest surface, and what faces the same way, in false "
-                    "colours");
+                   "SVG file to write: the largest surface, and what faces the same way, in false "
+                   "colours");
     to->add_flag("--lux", outputs.in_lux, "print illuminance: 683 lm/W times the luminance");
   };
   const auto add_tev = [&](CLI::App* to) {
@@ -340,8 +340,9 @@ int Run(int argc, char** argv) {
                             [&] { return Follow(job_id, true, server, output_options); });
   CLI::App* wait = command("wait", "wait until a job has ended",
                            [&] { return Follow(job_id, false, server, output_options); });
-  CLI::App* fetch = command("fetch", "fetch a job's image, also of one that still runs, or what a bake made",
-                            [&] { return Fetch(job_id, fetched, fetched_bake, server, output_options); });
+  CLI::App* fetch =
+      command("fetch", "fetch a job's image, also of one that still runs, or what a bake made",
+              [&] { return Fetch(job_id, fetched, fetched_bake, server, output_options); });
   add_outputs(fetch, fetched);
   add_bake_outputs(fetch, fetched_bake);
   const auto for_each_job = [&](auto change) {
@@ -564,7 +565,8 @@ int Run(int argc, char** argv) {
                                                       {"front", MeasuredSides::kFront},
                                                       {"back", MeasuredSides::kBack},
                                                       {"both", MeasuredSides::kBoth}};
-  bake->add_option("--sides", baked.settings.sides, "brighter, front, back or both sides of each shape")
+  bake->add_option("--sides", baked.settings.sides,
+                   "brighter, front, back or both sides of each shape")
       ->transform(OneOf(sides))
       ->default_str("brighter");
   bake->add_flag("--indirect-only", baked.settings.indirect_only,
@@ -674,8 +676,9 @@ int Run(int argc, char** argv) {
     return End(is_done ? ExitCode::kDone : ExitCode::kUsage);
   }
   if (*fetch && fetched.empty()) {
-    PrintError("lucerna: say where the image goes, with -o FILE.exr or --png FILE.png, or with "
-               "-o FILE.glb what a bake made\n");
+    PrintError(
+        "lucerna: say where the image goes, with -o FILE.exr or --png FILE.png, or with "
+        "-o FILE.glb what a bake made\n");
     return End(ExitCode::kUsage);
   }
 

@@ -1,5 +1,5 @@
-// How the coordinator measures a bake: the rounds of render/bake/bake_rounds.h, each as a run of the
-// job, whose turn lasts from the first to the last.
+// How the coordinator measures a bake: the rounds of render/bake/bake_rounds.h, each as a run of
+// the job, whose turn lasts from the first to the last.
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -109,8 +109,8 @@ Status Coordinator::BeginRound(JobTable::Turn& turn) {
   record.sensors = {Sha256(*sensors), sensors->size()};
   // The pins of the round before go once these are there.
   PinnedBlobs pinned;
-  LUCERNA_ASSIGN_OR_RETURN(
-      BlobPin pin, blobs_.PutPinned(record.sensors.digest, *sensors, AfterLastPin::kDrop));
+  LUCERNA_ASSIGN_OR_RETURN(BlobPin pin,
+                           blobs_.PutPinned(record.sensors.digest, *sensors, AfterLastPin::kDrop));
   pinned.push_back(std::move(pin));
   Submission submission;
   submission.manifest = job->manifest;
@@ -149,12 +149,10 @@ StatusOr<bool> Coordinator::EndRound(JobTable::Turn& turn, RenderResult result) 
   LUCERNA_ASSIGN_OR_RETURN(const Blob image, Encode(*source, std::move(result)));
   // As it will be read after a restart.
   LUCERNA_ASSIGN_OR_RETURN(const Image decoded, DecodeExr(*image));
-  LUCERNA_RETURN_IF_ERROR(
-      KeepForJob(turn.job_id, {image}, [&](const std::vector<Digest>& digests) {
-        return jobs_.EndRound(turn.job_id,
-                              digests.empty() ? std::nullopt : std::optional(digests.front()),
-                              Now());
-      }));
+  LUCERNA_RETURN_IF_ERROR(KeepForJob(turn.job_id, {image}, [&](const std::vector<Digest>& digests) {
+    return jobs_.EndRound(turn.job_id,
+                          digests.empty() ? std::nullopt : std::optional(digests.front()), Now());
+  }));
   FailPoint("bake.round_ended");
   if (jobs_.IsFinishing(turn.job_id)) turn.bake->rounds.StopRefining();
   LUCERNA_RETURN_IF_ERROR(turn.bake->rounds.TakeIn(decoded, passes));
@@ -167,10 +165,10 @@ void Coordinator::ConcludeBake(const JobTable::Turn& turn, StopReason reason) {
   const std::optional<JobTable::ImageSource> source = jobs_.DescribeRun(turn.job_id, Now());
   if (!source) return;
   const Job& job = source->job;
-  StatusOr<BakeResult> result = turn.bake->rounds.Finish(
-      job.manifest.main_path, EstimateOf(*job.bake),
-      {{"lucerna.scene_digest", job.scene_digest.Hex()},
-       {"lucerna.settings", SettingsText(job.settings)}});
+  StatusOr<BakeResult> result =
+      turn.bake->rounds.Finish(job.manifest.main_path, EstimateOf(*job.bake),
+                               {{"lucerna.scene_digest", job.scene_digest.Hex()},
+                                {"lucerna.settings", SettingsText(job.settings)}});
   Status failure = result.status();
   if (result.ok()) {
     const Blob file = std::make_shared<const std::string>(std::move(result->file));

@@ -220,10 +220,10 @@ class Coordinator {
   void RestoreCheckpoint(const std::string& job_id, JobRunner& runner);
   Status KeepCheckpoint(const std::string& job_id, std::vector<std::string_view> sums,
                         std::int64_t passes, const BatchTally& tally);
-  // Writes files for a job, if there is a state, however long there is no room, and in the same step
-  // notes in the table that it needs them: `note` is given their digests, none where there is no
-  // state, and says whether the job has not ended meanwhile.
-  // Errors: CANCELLED when the job, or the process, has ended meanwhile.
+  // Writes files for a job, if there is a state, however long there is no room, and in the same
+  // step notes in the table that it needs them: `note` is given their digests, none where there is
+  // no state, and says whether the job has not ended meanwhile. Errors: CANCELLED when the job, or
+  // the process, has ended meanwhile.
   Status KeepForJob(const std::string& job_id, std::vector<Blob> files,
                     const std::function<bool(const std::vector<Digest>&)>& note);
   // The job succeeds when its image is on the disk. Errors: as KeepForJob.

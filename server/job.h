@@ -225,7 +225,7 @@ struct WorkerShare {
 
 // A round of a bake (render/bake/bake_rounds.h).
 struct BakeRoundRecord {
-  std::string name;  // "survey", "round 1"
+  std::string name;      // "survey", "round 1"
   std::int64_t run = 0;  // a number that no other round of the job has or had
   std::uint64_t points = 0;
   SceneManifest::Entry sensors;
@@ -295,8 +295,8 @@ struct Job {
 [[nodiscard]] std::string RunIdOf(const Job& job);
 // The files of what is lent of the job now: of a bake, with the sensors of its round.
 [[nodiscard]] SceneManifest ManifestOf(const Job& job);
-// The first round after the survey, whose points are spread evenly over the surfaces; nullptr before
-// it.
+// The first round after the survey, whose points are spread evenly over the surfaces; nullptr
+// before it.
 [[nodiscard]] const BakeRoundRecord* EvenRoundOf(const BakeRecord& bake);
 
 // What a list of jobs shows: without the parts that grow with the length of a job.

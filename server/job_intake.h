@@ -32,9 +32,9 @@ struct Submission {
   RenderOverrides overrides;
   bool validate_only = false;
   int priority = 0;
-  std::optional<Digest> reference;  // of an EXR image among the blobs
-  std::string owner = {};           // who submits it; empty: unknown
-  bool is_traced = false;           // its timeline is kept (server/job_trace.h)
+  std::optional<Digest> reference;        // of an EXR image among the blobs
+  std::string owner = {};                 // who submits it; empty: unknown
+  bool is_traced = false;                 // its timeline is kept (server/job_trace.h)
   std::optional<BakeSettings> bake = {};  // what is measured in place of an image
 };
 

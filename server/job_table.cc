@@ -334,9 +334,8 @@ JobReport JobTable::MakeReport(const Entry& entry, const Moment& moment, bool is
   const JobLife& life = entry.job.life;
   report.running = life.Running(moment.now);
   if (life.state() == JobState::kRunning) {
-    report.photons_per_second =
-        entry.job.counters.rate.PerSecond(
-            moment.now - (report.running - RanBefore(entry.job)), moment.now);
+    report.photons_per_second = entry.job.counters.rate.PerSecond(
+        moment.now - (report.running - RanBefore(entry.job)), moment.now);
     report.job.counters.coordinator_cpu = CpuOf(entry, moment);
   } else if (life.has_ended() && report.running > Duration::zero()) {
     report.photons_per_second =
@@ -531,12 +530,8 @@ bool JobTable::HoldsFilesOfBake(const Entry& entry) {
 }
 
 JobTable::ImageSource JobTable::MakeImageSource(const Entry& entry, const Moment& moment) const {
-  return {entry.image,
-          entry.uv_mesh,
-          entry.image_digest,
-          entry.runner,
-          entry.job,
-          entry.job.life.Running(moment.now),
+  return {entry.image,         entry.uv_mesh, entry.image_digest,
+          entry.runner,        entry.job,     entry.job.life.Running(moment.now),
           CpuOf(entry, moment)};
 }
 
@@ -866,18 +861,12 @@ std::optional<JobTable::Turn> JobTable::WaitForTurn() {
   // A job that ends while it waits leaves the queue in the same step.
   LUCERNA_CHECK(entry.job.life.Prepare());
   ++entry.version;
-  return Turn{entry.job.id,
-              RunIdOf(entry.job),
-              ManifestOf(entry.job),
-              entry.job.settings,
-              entry.job.needs,
-              entry.job.scene_memory,
-              entry.job.reference,
-              std::exchange(entry.scene, std::nullopt),
-              entry.runner,
-              entry.job.bake.has_value(),
-              entry.bake_work,
-              TurnEnd(*this, *next)};
+  return Turn{entry.job.id,          RunIdOf(entry.job),
+              ManifestOf(entry.job), entry.job.settings,
+              entry.job.needs,       entry.job.scene_memory,
+              entry.job.reference,   std::exchange(entry.scene, std::nullopt),
+              entry.runner,          entry.job.bake.has_value(),
+              entry.bake_work,       TurnEnd(*this, *next)};
 }
 
 void JobTable::EndTurn(std::uint64_t serial) {
@@ -1315,8 +1304,7 @@ void JobTable::Retain(Dropped& dropped, const Moment& moment) {
     const RenderSettings& settings = entry.job.settings;
     serials.push_back(item->first);
     ended.push_back(
-        {.has_photons =
-             entry.runner != nullptr || entry.has_checkpoint || HoldsFilesOfBake(entry),
+        {.has_photons = entry.runner != nullptr || entry.has_checkpoint || HoldsFilesOfBake(entry),
          .is_in_memory = entry.runner != nullptr || HoldsFilesOfBake(entry),
          .pixels = std::int64_t{settings.crop_width()} * std::int64_t{settings.crop_height()},
          .has_image = entry.image != nullptr,

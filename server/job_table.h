@@ -12,8 +12,8 @@
 // Ended jobs are remembered, with the images of the newest; the very newest also with all their
 // photons, so that they can go on (server/job_retention.h).
 //
-// What is lent of a job, and comes back, has the name RunIdOf. Every call takes that in place of the
-// job's id, and finds no job when the round of a bake that it names is not the newest.
+// What is lent of a job, and comes back, has the name RunIdOf. Every call takes that in place of
+// the job's id, and finds no job when the round of a bake that it names is not the newest.
 //
 // With a journal, what a request changes is on the disk before it returns, and no client sees a new
 // job before that. Where that fails, a new job is refused; any other change holds in memory and is

@@ -119,12 +119,11 @@ Status BakeOnServer(const BakeRequest& request, SceneFiles& files, const JobToSe
     return absl::OkStatus();
   }
   RoundLines lines(output_options.quiet);
-  const StatusOr<v1::Job> ended =
-      FollowToEnd(*connection, submitted.job_id(), true, output_options,
-                  [&](const v1::Job& newest) {
-                    lines.Show(newest);
-                    return absl::OkStatus();
-                  });
+  const StatusOr<v1::Job> ended = FollowToEnd(*connection, submitted.job_id(), true, output_options,
+                                              [&](const v1::Job& newest) {
+                                                lines.Show(newest);
+                                                return absl::OkStatus();
+                                              });
   if (ExitCodeOf(ended.status()) == ExitCode::kInterrupted) {
     return Failure(ExitCode::kInterrupted,
                    absl::StrCat("interrupted; job ", submitted.job_id(),
@@ -142,8 +141,8 @@ Status BakeHere(const BakeRequest& request, SceneFiles& files, const JobToSend& 
   if (!request.resumes) {
     std::filesystem::remove_all(folder, ignored);
   } else if (!std::filesystem::exists(folder, ignored)) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        folder, ": there is no interrupted bake to go on with; leave --resume away"));
+    return absl::FailedPreconditionError(
+        absl::StrCat(folder, ": there is no interrupted bake to go on with; leave --resume away"));
   }
   Status status;
   {
@@ -153,8 +152,7 @@ Status BakeHere(const BakeRequest& request, SceneFiles& files, const JobToSend& 
     const StatusOr<v1::Job> ended =
         request.resumes ? runs->Resume(job, output_options) : runs->Run(files, job, output_options);
     if (ExitCodeOf(ended.status()) == ExitCode::kInterrupted) {
-      return Failure(ExitCode::kInterrupted,
-                     "interrupted; the same command with --resume goes on");
+      return Failure(ExitCode::kInterrupted, "interrupted; the same command with --resume goes on");
     }
     status = ended.ok() ? SaveBake(runs->connection(), *ended, request.outputs, output_options)
                         : ended.status();
@@ -180,8 +178,8 @@ Status CheckBakeOutputs(const BakeOutputs& outputs) {
       return Failure(ExitCode::kUsage, "--uv-mesh is for light maps; give -o an .exr file");
     }
     if (!outputs.uv_mesh.ends_with(".glb")) {
-      return Failure(ExitCode::kUsage, absl::StrCat("--uv-mesh ", outputs.uv_mesh,
-                                                    ": the name must end with .glb"));
+      return Failure(ExitCode::kUsage,
+                     absl::StrCat("--uv-mesh ", outputs.uv_mesh, ": the name must end with .glb"));
     }
     LUCERNA_RETURN_IF_ERROR(CheckWritable(outputs.uv_mesh));
   }
@@ -209,10 +207,10 @@ Status SaveBake(ClientConnection& connection, const v1::Job& job, const BakeOutp
   }
   LUCERNA_RETURN_IF_ERROR(CheckSucceeded(job));
   if (job.bake().settings().is_light_map() != IsLightMap(outputs.path)) {
-    return absl::FailedPreconditionError(absl::StrCat(
-        "job ", job.job_id(), " made a ",
-        job.bake().settings().is_light_map() ? "light map; give -o an .exr file"
-                                             : "mesh; give -o a .glb or .ply file"));
+    return absl::FailedPreconditionError(absl::StrCat("job ", job.job_id(), " made a ",
+                                                      job.bake().settings().is_light_map()
+                                                          ? "light map; give -o an .exr file"
+                                                          : "mesh; give -o a .glb or .ply file"));
   }
   LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, connection.GetImage(job.job_id()));
   if (!outputs.uv_mesh.empty()) {

@@ -1,7 +1,7 @@
 // How is the irradiance of a scene's surfaces measured?
 //
-// As a job like any other (render/bake/bake_rounds.h), whose end is a mesh or a light map in place of
-// an image.
+// As a job like any other (render/bake/bake_rounds.h), whose end is a mesh or a light map in place
+// of an image.
 #pragma once
 
 #include <string>
@@ -19,7 +19,7 @@ namespace lucerna {
 
 // What is written of a bake.
 struct BakeOutputs {
-  std::string path;       // .ply or .glb; of a light map .exr
+  std::string path;          // .ply or .glb; of a light map .exr
   std::string plan = {};     // .svg; empty: none
   std::string uv_mesh = {};  // of a light map: .glb; empty: none
   bool is_ascii = false;     // of a PLY file

@@ -14,7 +14,6 @@
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
 
-#include "render/bake/mesh_file.h"
 #include "client/bake/mesh_render.h"
 #include "client/connection.h"
 #include "client/exit_code.h"
@@ -26,6 +25,7 @@
 #include "client/scene_reading.h"
 #include "client/usage.h"
 #include "client/view/report.h"
+#include "render/bake/mesh_file.h"
 #include "render/base/clock.h"
 #include "render/base/console.h"
 #include "render/base/escape.h"

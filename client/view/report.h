@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "render/bake/surface_figures.h"
 #include "client/compare/comparison.h"
 #include "client/output_options.h"
 #include "client/selfcheck/selfcheck.h"
@@ -19,6 +18,7 @@
 #include "render/analysis/expected_cost.h"
 #include "render/analysis/needs.h"
 #include "render/analysis/scene_memory.h"
+#include "render/bake/surface_figures.h"
 #include "render/base/digest.h"
 #include "render/film/image_metrics.h"
 #include "render/formats/diagnostic.h"
@@ -59,8 +59,9 @@ struct SavedImage {
 // Of an image that MakeReference made.
 [[nodiscard]] std::string ReferenceReport(const Image& reference, const std::string& path);
 // One job of a bake.
-// What a bake measured in its rounds, the figures of its surfaces, and the error that the first round
-// after the survey estimated at its points, which are spread evenly. `path` is where it was written.
+// What a bake measured in its rounds, the figures of its surfaces, and the error that the first
+// round after the survey estimated at its points, which are spread evenly. `path` is where it was
+// written.
 [[nodiscard]] std::string BakeReport(const v1::Job& job, const std::string& path);
 [[nodiscard]] std::string PhotonReport(const v1::PhotonPath& path);
 [[nodiscard]] std::string DigestReport(const Image& image);

@@ -167,9 +167,8 @@ Status BakeRounds::Prepare(Next next) {
 }
 
 Status BakeRounds::TakeIn(const Image& image, std::int64_t passes) {
-  LUCERNA_ASSIGN_OR_RETURN(
-      std::vector<Irradiance> measured,
-      MeasuredIn(image, round_->set.sensors.size(), settings_.indirect_only));
+  LUCERNA_ASSIGN_OR_RETURN(std::vector<Irradiance> measured,
+                           MeasuredIn(image, round_->set.sensors.size(), settings_.indirect_only));
   if (asked_ != Next::kSurvey) SetEnd(passes, overrides_);
   switch (asked_) {
     case Next::kSurvey:

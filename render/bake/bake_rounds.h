@@ -1,13 +1,13 @@
 // Which points of a scene's surfaces are measured next, and what comes of it in the end?
 //
-// A bake is a row of rounds. Each measures irradiance at a set of sensors, as a job does whose camera
-// they are (render/formats/sensors/sensors_reader.h): a survey measures means over the faces of a
-// coarse mesh; the first round measures at its vertices and in the middle of its edges, each further
-// one where the mesh was refined (render/bake/surface_mesh.h). A histogram is one round over its
-// triangles, a light map one round at its texels (render/bake/chart_atlas.h).
+// A bake is a row of rounds. Each measures irradiance at a set of sensors, as a job does whose
+// camera they are (render/formats/sensors/sensors_reader.h): a survey measures means over the faces
+// of a coarse mesh; the first round measures at its vertices and in the middle of its edges, each
+// further one where the mesh was refined (render/bake/surface_mesh.h). A histogram is one round
+// over its triangles, a light map one round at its texels (render/bake/chart_atlas.h).
 //
-// A function of the scene, the settings and what was measured alone: whoever takes in the same images
-// again asks for the same rounds. Threads: one at a time.
+// A function of the scene, the settings and what was measured alone: whoever takes in the same
+// images again asks for the same rounds. Threads: one at a time.
 #pragma once
 
 #include <cstddef>
@@ -30,8 +30,8 @@
 
 namespace lucerna {
 
-// The main file of a round, beside the scene's own in its manifest. A file of the scene that has this
-// name is not seen.
+// The main file of a round, beside the scene's own in its manifest. A file of the scene that has
+// this name is not seen.
 inline constexpr const char* kSensorsPath = "lucerna-sensors.ply";
 
 inline constexpr const char* kSurveyName = "survey";
@@ -64,17 +64,17 @@ class BakeRounds {
   // What is to be measured now; absent when all is.
   [[nodiscard]] const std::optional<BakeRound>& round() const { return round_; }
   // The image of the round's run, and how many passes it has. Requires a round.
-  // Errors: DATA_LOSS when it has not what was asked for, RESOURCE_EXHAUSTED when the mesh has grown
-  // too large; then nothing more can be asked.
+  // Errors: DATA_LOSS when it has not what was asked for, RESOURCE_EXHAUSTED when the mesh has
+  // grown too large; then nothing more can be asked.
   [[nodiscard]] Status TakeIn(const Image& image, std::int64_t passes);
   // From now on only what the mesh cannot be written without is measured.
   void StopRefining() { is_refined_ = false; }
 
   // Requires that no round is left. `scene_path` is the main file; `estimate` is the relative error
   // of the first round, 0: none. `metadata` is what a light map says beside its spacing and unit.
-  [[nodiscard]] StatusOr<BakeResult> Finish(const std::string& scene_path, double estimate,
-                                            const std::vector<std::pair<std::string, std::string>>&
-                                                metadata);
+  [[nodiscard]] StatusOr<BakeResult> Finish(
+      const std::string& scene_path, double estimate,
+      const std::vector<std::pair<std::string, std::string>>& metadata);
 
   // About what it holds [bytes].
   [[nodiscard]] std::uint64_t MemoryBytes() const;
@@ -93,15 +93,15 @@ class BakeRounds {
   BakeSettings settings_;
   RenderOverrides overrides_;
   SurfaceMesh mesh_;
-  double spacing_ = 0;                // [scene units]
+  double spacing_ = 0;  // [scene units]
   std::size_t max_texels_ = kMostTexels;
-  bool chooses_photons_ = true;       // neither the job nor the scene does
+  bool chooses_photons_ = true;  // neither the job nor the scene does
   bool is_refined_ = true;
-  Next asked_ = Next::kNothing;       // what round_ is
-  int measured_rounds_ = 0;           // the survey apart
+  Next asked_ = Next::kNothing;  // what round_ is
+  int measured_rounds_ = 0;      // the survey apart
   std::optional<BakeRound> round_;
-  std::optional<ChartAtlas> atlas_;   // of a light map
-  std::vector<Irradiance> texels_;    // of its texels, once they are measured
+  std::optional<ChartAtlas> atlas_;  // of a light map
+  std::vector<Irradiance> texels_;   // of its texels, once they are measured
 };
 
 }  // namespace lucerna

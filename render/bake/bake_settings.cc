@@ -29,8 +29,7 @@ Status CheckBake(const BakeSettings& settings, const RenderOverrides& overrides)
         "a histogram has no kernel and no radius: its triangles are its buckets");
   }
   if (overrides.width) {
-    return absl::InvalidArgumentError(
-        "--size has no meaning here: --spacing says how fine to be");
+    return absl::InvalidArgumentError("--size has no meaning here: --spacing says how fine to be");
   }
   if (overrides.crop || overrides.coverage) {
     return absl::InvalidArgumentError(

@@ -57,8 +57,9 @@ std::string Passes(const v1::Job& job) {
   // Of a bake, of the round that is measured now.
   const int rounds = job.bake().rounds_size();
   const std::string round =
-      rounds == 0 ? "" : absl::StrCat(job.bake().rounds(rounds - 1).name(), " (",
-                                      job.bake().rounds(rounds - 1).points(), " points), ");
+      rounds == 0 ? ""
+                  : absl::StrCat(job.bake().rounds(rounds - 1).name(), " (",
+                                 job.bake().rounds(rounds - 1).points(), " points), ");
   return wanted > 0 ? absl::StrCat(round, "pass ", passes, "/", wanted)
                     : absl::StrCat(round, "pass ", passes);
 }
@@ -204,11 +205,11 @@ std::string SummaryLine(const v1::Job& job) {
   // The rounds before the newest, whose photons those are.
   for (int i = 0; i + 1 < rounds; ++i)
     photons += static_cast<double>(job.bake().rounds(i).photons());
-  std::string line = absl::StrFormat("%d %s, %s photons in %s",
-                                     job.has_bake() ? rounds : progress.passes(),
-                                     job.has_bake() ? (rounds == 1 ? "round" : "rounds")
-                                                    : (progress.passes() == 1 ? "pass" : "passes"),
-                                     ShortCount(photons), ShortTime(running));
+  std::string line =
+      absl::StrFormat("%d %s, %s photons in %s", job.has_bake() ? rounds : progress.passes(),
+                      job.has_bake() ? (rounds == 1 ? "round" : "rounds")
+                                     : (progress.passes() == 1 ? "pass" : "passes"),
+                      ShortCount(photons), ShortTime(running));
   switch (job.state()) {
     case v1::JOB_STATE_SUCCEEDED:
       absl::StrAppend(&line, ", ", StopInWords(job.stop_reason()));

@@ -106,8 +106,8 @@ TEST_F(BakeTest, GoesOnAfterItWasKilled) {
   EXPECT_FALSE(ReadFile(Path("out.ply")).ok());
   ASSERT_TRUE(std::filesystem::exists(Path("out.ply.checkpoints")));
   // Of other settings there is none to go on with.
-  EXPECT_EQ(
-      RunProgram(Command("out.ply", {"--resume", "--max-depth", "3"}), seconds(60)).exit_code, 1);
+  EXPECT_EQ(RunProgram(Command("out.ply", {"--resume", "--max-depth", "3"}), seconds(60)).exit_code,
+            1);
   EXPECT_EQ(RunProgram(Command("out.ply", {"--resume", "--indirect-only"}), seconds(60)).exit_code,
             1);
   const Finished run = RunProgram(Command("out.ply", {"--resume", "--json"}), seconds(300));

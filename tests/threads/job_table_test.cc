@@ -886,8 +886,8 @@ TEST_F(BakeTableTest, OneThatHasEndedCanBeGivenAnotherEnd) {
   BakeResult result;
   result.figures = {{.name = "floor"}};
   table_.SetBakeResult(kJob, result, std::make_shared<const std::string>("uv"), std::nullopt);
-  ASSERT_TRUE(table_.Succeed(kJob, StopReason::kPasses, std::make_shared<const std::string>("glb"),
-                             At(3)));
+  ASSERT_TRUE(
+      table_.Succeed(kJob, StopReason::kPasses, std::make_shared<const std::string>("glb"), At(3)));
   turn_.reset();
   EXPECT_EQ(*table_.FindImage(kJob, At(3))->image, "glb");
   EXPECT_EQ(*table_.FindImage(kJob, At(3))->uv_mesh, "uv");

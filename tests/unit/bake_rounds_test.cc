@@ -159,27 +159,27 @@ TEST(BakeSettingsTest, SaysWhatDoesNotGoTogether) {
   };
   EXPECT_TRUE(check([](BakeSettings&, RenderOverrides&) {}).ok());
   for (const Status& status :
-       {check([](BakeSettings& s, RenderOverrides&) { s.spacing = 0; }),
-        check([](BakeSettings& s, RenderOverrides&) { s.spacing = std::nan(""); }),
-        check([](BakeSettings& s, RenderOverrides&) { s.tolerance = -1; }),
-        check([](BakeSettings& s, RenderOverrides&) {
+       {check([](BakeSettings&s, RenderOverrides&) { s.spacing = 0; }),
+        check([](BakeSettings&s, RenderOverrides&) { s.spacing = std::nan(""); }),
+        check([](BakeSettings&s, RenderOverrides&) { s.tolerance = -1; }),
+        check([](BakeSettings&s, RenderOverrides&) {
           s.is_light_map = true;
           s.estimator = BakeEstimator::kHistogram;
         }),
-        check([](BakeSettings& s, RenderOverrides&) {
+        check([](BakeSettings&s, RenderOverrides&) {
           s.is_light_map = true;
           s.elements = MeshElements::kQuadratic;
         }),
-        check([](BakeSettings& s, RenderOverrides&) {
+        check([](BakeSettings&s, RenderOverrides&) {
           s.estimator = BakeEstimator::kHistogram;
           s.elements = MeshElements::kQuadratic;
         }),
-        check([](BakeSettings& s, RenderOverrides& o) {
+        check([](BakeSettings&s, RenderOverrides&o) {
           s.estimator = BakeEstimator::kHistogram;
           o.kernel = KernelKind::kConstant;
         }),
-        check([](BakeSettings&, RenderOverrides& o) { o.width = 8; }),
-        check([](BakeSettings&, RenderOverrides& o) { o.crop = CropWindow(); })}) {
+        check([](BakeSettings&, RenderOverrides&o) { o.width = 8; }),
+        check([](BakeSettings&, RenderOverrides&o) { o.crop = CropWindow(); })}) {
     EXPECT_TRUE(absl::IsInvalidArgument(status)) << status;
   }
 }

@@ -18,8 +18,8 @@
 #include <nlohmann/json.hpp>
 
 #include "client/bake/baked_light.h"
-#include "render/bake/chart_atlas.h"
 #include "client/bake/irradiance_plan.h"
+#include "render/bake/chart_atlas.h"
 #include "render/bake/mesh_file.h"
 #include "render/bake/surface_figures.h"
 #include "render/formats/ply_file.h"
