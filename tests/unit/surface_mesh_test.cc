@@ -586,6 +586,7 @@ TEST(MeshFileTest, GlbIsReadBack) {
   BakedMesh baked = SmallBake();
   baked.scene = "box.pbrt";
   baked.is_indirect = true;
+  baked.surfaces[0].noise[1] = 0.25F;
   const std::string bytes = MeshGlb(baked);
   const StatusOr<BakedMesh> read = ReadMeshGlb("box.glb", bytes);
   ASSERT_TRUE(read.ok()) << read.status();
@@ -598,6 +599,7 @@ TEST(MeshFileTest, GlbIsReadBack) {
   EXPECT_EQ(read->surfaces[0].positions, baked.surfaces[0].positions);
   EXPECT_EQ(read->surfaces[0].normals, baked.surfaces[0].normals);
   EXPECT_EQ(read->surfaces[0].irradiance, baked.surfaces[0].irradiance);
+  EXPECT_EQ(read->surfaces[0].noise, baked.surfaces[0].noise);
   EXPECT_EQ(read->surfaces[0].faces, baked.surfaces[0].faces);
   // Shortened anywhere, it is refused or is the same.
   for (std::size_t size = 0; size < bytes.size(); size += 97) {
