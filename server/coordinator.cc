@@ -193,7 +193,11 @@ StatusOr<JobTable::Submitted> Coordinator::Submit(const Submission& submission,
       return absl::InvalidArgumentError("a bake has no reference image");
     }
   }
-  LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(submission, still_needed));
+  Submission checked = submission;
+  // The film of a bake does not count, and each round is checked with its own.
+  if (submission.bake) checked.overrides.width = checked.overrides.height = 1;
+  LUCERNA_ASSIGN_OR_RETURN(CheckedJob job, intake_.Check(checked, still_needed));
+  job.submission.overrides = submission.overrides;
   if (submission.bake) {
     LUCERNA_RETURN_IF_ERROR(CheckBegins(job));
   }
@@ -283,8 +287,9 @@ bool Coordinator::MakeDiskRoom(std::uint64_t bytes, const std::set<Digest>& also
   return true;
 }
 
-Status Coordinator::PutFile(const Digest& digest, const std::string& bytes) {
-  if (!state_->blobs().Has(digest)) MakeDiskRoom(bytes.size(), {digest});
+Status Coordinator::PutFile(const Digest& digest, const std::string& bytes,
+                            const std::set<Digest>& also_needed) {
+  if (!state_->blobs().Has(digest)) MakeDiskRoom(bytes.size(), also_needed);
   return state_->blobs().Put(digest, bytes);
 }
 
@@ -721,18 +726,19 @@ Status Coordinator::KeepCheckpoint(const std::string& job_id, std::vector<std::s
 
 Status Coordinator::KeepForJob(const std::string& job_id, std::vector<Blob> files,
                                const std::function<bool(const std::vector<Digest>&)>& note) {
+  std::vector<Digest> digests;
+  for (const Blob& file : files) {
+    if (state_) digests.push_back(Sha256(*file));
+  }
+  const std::set<Digest> needed(digests.begin(), digests.end());
   bool has_waited = false;
   while (true) {
     Status kept;
     {
       // Until the job's row names them, nothing says that the files are needed.
       const MutexLock lock(files_mutex_);
-      std::vector<Digest> digests;
-      for (const Blob& file : files) {
-        if (!state_ || !kept.ok()) break;
-        digests.push_back(Sha256(*file));
-        kept = PutFile(digests.back(), *file);
-      }
+      for (std::size_t i = 0; i < digests.size() && kept.ok(); ++i)
+        kept = PutFile(digests[i], *files[i], needed);
       if (kept.ok()) {
         if (!note(digests)) return absl::CancelledError("the job has ended");
         if (has_waited) jobs_.SetCondition(job_id, PauseCause::kDisk, "", Now());

@@ -234,8 +234,9 @@ class Coordinator {
   // unless even all of them would not be enough. Keeps `also_needed`. Whether there is room.
   bool MakeDiskRoom(std::uint64_t bytes, const std::set<Digest>& also_needed)
       LUCERNA_REQUIRES(files_mutex_);
-  // A blob onto the disk, with room made for it. Errors: as BlobFiles::Put.
-  Status PutFile(const Digest& digest, const std::string& bytes) LUCERNA_REQUIRES(files_mutex_);
+  // A blob onto the disk, with room made for it beside `also_needed`. Errors: as BlobFiles::Put.
+  Status PutFile(const Digest& digest, const std::string& bytes,
+                 const std::set<Digest>& also_needed) LUCERNA_REQUIRES(files_mutex_);
   // Removes the files that no job needs.
   void RemoveUnneeded();
   void RemoveUnneededLocked(const std::set<Digest>& also_needed) LUCERNA_REQUIRES(files_mutex_);

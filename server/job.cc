@@ -160,7 +160,7 @@ SceneManifest ManifestOf(const Job& job) {
 
 const BakeRoundRecord* EvenRoundOf(const BakeRecord& bake) {
   const auto found = std::ranges::find_if(
-      bake.rounds, [](const BakeRoundRecord& round) { return round.name != kSurveyName; });
+      bake.rounds, [](const BakeRoundRecord& round) { return round.name == kEvenRoundName; });
   return found == bake.rounds.end() ? nullptr : &*found;
 }
 

@@ -295,8 +295,7 @@ struct Job {
 [[nodiscard]] std::string RunIdOf(const Job& job);
 // The files of what is lent of the job now: of a bake, with the sensors of its round.
 [[nodiscard]] SceneManifest ManifestOf(const Job& job);
-// The first round after the survey, whose points are spread evenly over the surfaces; nullptr
-// before it.
+// The round of kEvenRoundName; nullptr before it.
 [[nodiscard]] const BakeRoundRecord* EvenRoundOf(const BakeRecord& bake);
 
 // What a list of jobs shows: without the parts that grow with the length of a job.

@@ -337,9 +337,9 @@ JobReport JobTable::MakeReport(const Entry& entry, const Moment& moment, bool is
     report.photons_per_second = entry.job.counters.rate.PerSecond(
         moment.now - (report.running - RanBefore(entry.job)), moment.now);
     report.job.counters.coordinator_cpu = CpuOf(entry, moment);
-  } else if (life.has_ended() && report.running > Duration::zero()) {
-    report.photons_per_second =
-        static_cast<double>(entry.job.counters.photons) / Seconds(report.running);
+  } else if (life.has_ended() && report.running > RanBefore(entry.job)) {
+    report.photons_per_second = static_cast<double>(entry.job.counters.photons) /
+                                Seconds(report.running - RanBefore(entry.job));
   }
   return report;
 }

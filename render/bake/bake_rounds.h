@@ -35,6 +35,8 @@ namespace lucerna {
 inline constexpr const char* kSensorsPath = "lucerna-sensors.ply";
 
 inline constexpr const char* kSurveyName = "survey";
+// The first round after the survey, whose points are spread evenly over the surfaces.
+inline constexpr const char* kEvenRoundName = "round 1";
 
 // What is measured at once.
 struct BakeRound {

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_format.h"
 
+#include "render/bake/bake_rounds.h"
 #include "render/base/text.h"
 #include "render/estimate/missing_light.h"
 #include "render/wire/messages.h"
@@ -65,6 +66,13 @@ bool FoundNothing(const v1::Job& job) {
 
 std::string MissingLightSentence(const v1::Job& job) {
   if (job.convergence().empty()) return {};
+  // The points of other rounds of a bake are few, or on dark sides too: what they lack says nothing
+  // of the mesh. Once there is one, the sample is that of this round.
+  const int rounds = job.bake().rounds_size();
+  if (rounds > 0 && job.bake().surfaces().empty() &&
+      job.bake().rounds(rounds - 1).name() != kEvenRoundName) {
+    return {};
+  }
   const v1::ErrorSample& newest = *job.convergence().rbegin();
   const double target = SettingsOf(job).error;
   const bool matters = FoundNothing(job) ||
