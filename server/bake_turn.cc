@@ -17,6 +17,7 @@ namespace {
 
 // Of the memory that a job may have; the rest is for its scene and its rounds.
 constexpr std::uint64_t kShareOfMesh = 4;
+constexpr std::chrono::milliseconds kRetryPause{100};
 
 // The error of the first round after the survey, whose points are spread evenly over the surfaces;
 // 0: none.
@@ -52,8 +53,14 @@ StatusOr<std::shared_ptr<BakeWork>> Coordinator::ReadBake(const JobTable::Turn& 
   std::uint64_t bytes = 0;
   for (const auto& [path, file] : job->manifest.entries)
     bytes += file.size_bytes;
-  LUCERNA_ASSIGN_OR_RETURN(const MemoryClaim for_reading,
-                           budget_.Claim(MemoryUse::kScenes, GuessSceneMemory(bytes)));
+  const std::uint64_t for_reading = GuessSceneMemory(bytes);
+  StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kScenes, for_reading);
+  while (!claim.ok() && for_reading <= budget_.max_bytes()) {
+    LUCERNA_RETURN_IF_ERROR(jobs_.CheckStillNeeded(turn.job_id));
+    budget_.WaitForRelease(kRetryPause);
+    claim = budget_.Claim(MemoryUse::kScenes, for_reading);
+  }
+  LUCERNA_RETURN_IF_ERROR(claim.status());
   LUCERNA_ASSIGN_OR_RETURN(const JobIntake::ReadResult read, intake_.ReadScene(job->manifest, [&] {
     return jobs_.CheckStillNeeded(turn.job_id);
   }));
