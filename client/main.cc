@@ -576,6 +576,10 @@ int Run(int argc, char** argv) {
   add_workers(bake);
   bake->add_flag("--resume", baked.resumes,
                  "go on with a bake on this machine that was interrupted");
+  bake->add_option("--priority", baked.priority,
+                   "with --on-server: jobs of higher priority come first; -100 to 100")
+      ->check(CLI::Range(-100, 100))
+      ->capture_default_str();
   bake->add_flag("--on-server", bakes_on_server, "run it as a job of the coordinator of --server");
   add_server(bake);
   add_no_preview(bake);

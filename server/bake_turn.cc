@@ -10,6 +10,7 @@
 #include "render/image/exr_file.h"
 #include "render/scene/setting_table.h"
 #include "server/coordinator.h"
+#include "server/job_image.h"
 #include "server/memory_need.h"
 
 namespace lucerna {
@@ -38,29 +39,55 @@ Status Coordinator::CheckBegins(const CheckedJob& job) {
       .status();
 }
 
-StatusOr<RenderResult> Coordinator::BeginBake(JobTable::Turn& turn) {
+StatusOr<RenderResult> Coordinator::MeasureBake(JobTable::Turn& turn) {
   if (!turn.bake) {
     LUCERNA_ASSIGN_OR_RETURN(turn.bake, ReadBake(turn));
     jobs_.SetBakeWork(turn.job_id, turn.bake);
   }
-  LUCERNA_RETURN_IF_ERROR(BeginRound(turn));
-  return BeginRun(turn);
+  while (turn.runner || turn.bake->rounds.round()) {
+    const std::shared_ptr<RunningJob> runner = std::exchange(turn.runner, nullptr);
+    if (!runner) LUCERNA_RETURN_IF_ERROR(BeginRound(turn));
+    StatusOr<RenderResult> result = runner ? runner->Resume() : BeginRun(turn);
+    if (!result.ok() || result->gave_up_turn) return result;
+    LUCERNA_RETURN_IF_ERROR(EndRound(turn, *std::move(result)));
+  }
+  // After a restart with nothing left to measure it has not run.
+  jobs_.OnRunning(turn.job_id, Now());
+  RenderResult end;
+  const std::optional<Job> job = jobs_.Find(turn.job_id);
+  if (!job) return absl::CancelledError("the job has ended");
+  // The later rounds go by the passes of this one.
+  if (const BakeRoundRecord* const round = EvenRoundOf(*job->bake)) end.reason = round->reason;
+  if (jobs_.IsFinishing(turn.job_id)) end.reason = StopReason::kUser;
+  return end;
+}
+
+StatusOr<MemoryClaim> Coordinator::ClaimForReading(const JobTable::Turn& turn) {
+  const std::optional<Job> job = jobs_.Find(turn.job_id);
+  if (!job) return absl::CancelledError("the job has ended");
+  std::uint64_t files = 0;
+  for (const auto& [path, file] : job->manifest.entries)
+    files += file.size_bytes;
+  const std::uint64_t bytes = GuessSceneMemory(files);
+  bool has_waited = false;
+  while (true) {
+    StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kScenes, bytes);
+    if (claim.ok() || bytes > budget_.max_bytes()) {
+      if (has_waited) jobs_.SetWaitsForMemory(turn.job_id, "", Now());
+      return claim;
+    }
+    LUCERNA_RETURN_IF_ERROR(jobs_.CheckStillNeeded(turn.job_id));
+    if (!std::exchange(has_waited, true)) {
+      jobs_.SetWaitsForMemory(turn.job_id, "waits for memory that other jobs hold", Now());
+    }
+    budget_.WaitForRelease(kRetryPause);
+  }
 }
 
 StatusOr<std::shared_ptr<BakeWork>> Coordinator::ReadBake(const JobTable::Turn& turn) {
   const std::optional<Job> job = jobs_.Find(turn.job_id);
   if (!job) return absl::CancelledError("the job has ended");
-  std::uint64_t bytes = 0;
-  for (const auto& [path, file] : job->manifest.entries)
-    bytes += file.size_bytes;
-  const std::uint64_t for_reading = GuessSceneMemory(bytes);
-  StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kScenes, for_reading);
-  while (!claim.ok() && for_reading <= budget_.max_bytes()) {
-    LUCERNA_RETURN_IF_ERROR(jobs_.CheckStillNeeded(turn.job_id));
-    budget_.WaitForRelease(kRetryPause);
-    claim = budget_.Claim(MemoryUse::kScenes, for_reading);
-  }
-  LUCERNA_RETURN_IF_ERROR(claim.status());
+  LUCERNA_ASSIGN_OR_RETURN(const MemoryClaim for_reading, ClaimForReading(turn));
   LUCERNA_ASSIGN_OR_RETURN(const JobIntake::ReadResult read, intake_.ReadScene(job->manifest, [&] {
     return jobs_.CheckStillNeeded(turn.job_id);
   }));
@@ -77,8 +104,17 @@ StatusOr<std::shared_ptr<BakeWork>> Coordinator::ReadBake(const JobTable::Turn& 
     if (!state_ || !round.image || !work->rounds.round()) {
       return absl::DataLossError("what it measured is not on the disk");
     }
+    const std::string sensors = SensorsFile(job->manifest.main_path, work->rounds.round()->set);
+    if (Sha256(sensors) != round.sensors.digest) {
+      return absl::DataLossError("its points are others than this build would measure");
+    }
     LUCERNA_ASSIGN_OR_RETURN(const std::string image, state_->blobs().Get(*round.image));
     LUCERNA_ASSIGN_OR_RETURN(const Image decoded, DecodeExr(image));
+    const auto profile = decoded.metadata.find(kProfileName);
+    if (profile == decoded.metadata.end() || profile->second != options_.numeric_profile) {
+      return absl::DataLossError("it was measured by another build, whose bits may differ");
+    }
+    if (job->bake->is_stopped && &round == &job->bake->rounds.back()) work->rounds.StopRefining();
     return work->rounds.TakeIn(decoded, round.passes);
   };
   for (const BakeRoundRecord& round : job->bake->rounds) {
@@ -105,8 +141,8 @@ StatusOr<std::shared_ptr<BakeWork>> Coordinator::ReadBake(const JobTable::Turn& 
 Status Coordinator::BeginRound(JobTable::Turn& turn) {
   const std::optional<Job> job = jobs_.Find(turn.job_id);
   if (!job) return absl::CancelledError("the job has ended");
+  LUCERNA_ASSIGN_OR_RETURN(const MemoryClaim for_reading, ClaimForReading(turn));
   BakeWork& work = *turn.bake;
-  if (!work.rounds.round()) return absl::InternalError("a bake has no round to begin");
   const BakeRound& round = *work.rounds.round();
   auto sensors =
       std::make_shared<const std::string>(SensorsFile(job->manifest.main_path, round.set));
@@ -127,6 +163,7 @@ Status Coordinator::BeginRound(JobTable::Turn& turn) {
   LUCERNA_ASSIGN_OR_RETURN(CheckedJob checked, intake_.Check(submission, [&] {
     return jobs_.CheckStillNeeded(turn.job_id);
   }));
+  LUCERNA_RETURN_IF_ERROR(CheckDiskNeed(checked));
   for (BlobPin& file : checked.pinned)
     pinned.push_back(std::move(file));
   work.pinned = std::move(pinned);
@@ -142,30 +179,30 @@ Status Coordinator::BeginRound(JobTable::Turn& turn) {
   turn.needs = std::move(checked.needs);
   turn.scene_memory = HeldOfScene(checked.scene_memory);
   turn.scene = std::move(checked.scene);
-  turn.runner = nullptr;
+  turn.warns = round.name == kEvenRoundName;
+  RemoveUnneeded();
   if (FindTrace(turn.job_id)) scheduler_.SetTraced(turn.run_id, true);
   spdlog::info("job {}: {} at {} points", turn.job_id, round.name, round.set.sensors.size());
   return absl::OkStatus();
 }
 
-StatusOr<bool> Coordinator::EndRound(JobTable::Turn& turn, RenderResult result) {
+Status Coordinator::EndRound(JobTable::Turn& turn, RenderResult result) {
   const std::optional<JobTable::ImageSource> source = jobs_.DescribeRun(turn.job_id, Now());
   if (!source) return absl::CancelledError("the job has ended");
   scheduler_.SetTraced(turn.run_id, false);
   const std::int64_t passes = result.passes;
+  const StopReason reason = result.reason;
   LUCERNA_ASSIGN_OR_RETURN(const Blob image, Encode(*source, std::move(result)));
   // As it will be read after a restart.
   LUCERNA_ASSIGN_OR_RETURN(const Image decoded, DecodeExr(*image));
   LUCERNA_RETURN_IF_ERROR(KeepForJob(turn.job_id, {image}, [&](const std::vector<Digest>& digests) {
     return jobs_.EndRound(turn.job_id,
-                          digests.empty() ? std::nullopt : std::optional(digests.front()), Now());
+                          digests.empty() ? std::nullopt : std::optional(digests.front()), passes,
+                          reason, Now());
   }));
   FailPoint("bake.round_ended");
   if (jobs_.IsFinishing(turn.job_id)) turn.bake->rounds.StopRefining();
-  LUCERNA_RETURN_IF_ERROR(turn.bake->rounds.TakeIn(decoded, passes));
-  if (!turn.bake->rounds.round()) return false;
-  LUCERNA_RETURN_IF_ERROR(BeginRound(turn));
-  return true;
+  return turn.bake->rounds.TakeIn(decoded, passes);
 }
 
 void Coordinator::ConcludeBake(const JobTable::Turn& turn, StopReason reason) {
@@ -186,7 +223,7 @@ void Coordinator::ConcludeBake(const JobTable::Turn& turn, StopReason reason) {
       files.push_back(uv_mesh);
     }
     failure = KeepForJob(turn.job_id, files, [&](const std::vector<Digest>& digests) {
-      jobs_.SetBakeResult(turn.job_id, *result, uv_mesh,
+      jobs_.SetBakeResult(turn.job_id, *result, uv_mesh ? Claimed(uv_mesh) : nullptr,
                           digests.size() > 1 ? std::optional(digests[1]) : std::nullopt);
       return jobs_.Succeed(turn.job_id, reason, Claimed(file), Now(),
                            digests.empty() ? std::nullopt : std::optional(digests.front()));

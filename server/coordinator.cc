@@ -278,6 +278,8 @@ bool Coordinator::MakeDiskRoom(std::uint64_t bytes, const std::set<Digest>& also
   JobTable::NeededFiles lasting = jobs_.NeededByOpenJobs();
   lasting.blobs.insert(also_needed.begin(), also_needed.end());
   if (!state_->MayHaveRoom(bytes, lasting)) return false;
+  // Such as files of rounds of bakes that have ended.
+  RemoveUnneededLocked(also_needed);
   while (!budget.HasRoom(bytes)) {
     const std::optional<std::string> dropped = jobs_.DropOldestEnded();
     if (!dropped) return false;
@@ -536,17 +538,7 @@ void Coordinator::RunTurn(JobTable::Turn turn) {
         return;
       }
       if (result.ok() && turn.is_bake) {
-        const StopReason reason = result->reason;
-        StatusOr<bool> goes_on = EndRound(turn, *std::move(result));
-        if (goes_on.ok() && *goes_on) {
-          result = BeginRun(turn);
-          continue;
-        }
-        if (goes_on.ok()) {
-          ConcludeBake(turn, reason);
-        } else {
-          ConcludeFailed(job_id, goes_on.status());
-        }
+        ConcludeBake(turn, result->reason);
       } else {
         Conclude(job_id, std::move(result));
       }
@@ -574,8 +566,8 @@ void Coordinator::RunTurn(JobTable::Turn turn) {
 }
 
 StatusOr<RenderResult> Coordinator::Render(JobTable::Turn& turn) {
-  if (turn.runner) return turn.runner->Resume();
-  return turn.is_bake ? BeginBake(turn) : BeginRun(turn);
+  if (turn.is_bake) return MeasureBake(turn);
+  return turn.runner ? turn.runner->Resume() : BeginRun(turn);
 }
 
 StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
@@ -688,8 +680,14 @@ void Coordinator::RestoreCheckpoint(const std::string& job_id, JobRunner& runner
   if (is_restored) return;
   // A job that had ended and was given a new end begins anew: what it had counted comes again.
   if (job->counters.photons == 0 && (job->bake || job->workers.empty())) return;
-  job->ClearProgress();
-  jobs_.GoOnFrom(job_id, *std::move(job), Duration::zero());
+  Duration ran{};
+  if (job->bake) {
+    ran = job->bake->rounds.back().ran_before;
+    job->ClearRound();
+  } else {
+    job->ClearProgress();
+  }
+  jobs_.GoOnFrom(job_id, *std::move(job), ran);
   note("there is no checkpoint of it that can be used: it begins anew");
 }
 
@@ -782,8 +780,10 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, M
                 jobs_.OnRunning(id, Now());
                 UpdateClaim(id);
               },
-          .on_warning = [this,
-                         id](std::string warning) { jobs_.OnWarning(id, std::move(warning)); },
+          .on_warning =
+              [this, id, warns = turn.warns](std::string warning) {
+                if (warns) jobs_.OnWarning(id, std::move(warning));
+              },
           .on_photon_steps = [this,
                               id](PhotonSteps steps) { jobs_.OnPhotonSteps(id, std::move(steps)); },
           .on_guides = [this, id](GuideSteps guides) { jobs_.OnGuides(id, std::move(guides)); },

@@ -250,15 +250,17 @@ class Coordinator {
   // Bakes (server/bake_turn.cc). Whether one can begin: what its names of materials and its spacing
   // come to. Errors: as BakeRounds::Begin.
   Status CheckBegins(const CheckedJob& job);
-  // Begins the round of a bake that is to be measured now, or goes on
-  // with it.
-  StatusOr<RenderResult> BeginBake(JobTable::Turn& turn);
+  // Measures the rounds of a bake that are left, to the last one, whose reason is returned without
+  // an image, or until it gives up its turn.
+  StatusOr<RenderResult> MeasureBake(JobTable::Turn& turn);
   // The mesh of the bake as far as its finished rounds go.
   StatusOr<std::shared_ptr<BakeWork>> ReadBake(const JobTable::Turn& turn);
+  // Waits for the memory in which the scene of the job is read. Requires that it has no runner.
+  StatusOr<MemoryClaim> ClaimForReading(const JobTable::Turn& turn);
   // Makes the files and settings of its next round those of the turn.
   Status BeginRound(JobTable::Turn& turn);
-  // Takes in what its round has measured. Whether there is another round.
-  StatusOr<bool> EndRound(JobTable::Turn& turn, RenderResult result);
+  // Takes in what its round has measured.
+  Status EndRound(JobTable::Turn& turn, RenderResult result);
   // What becomes of a bake whose last round has ended, for this reason.
   void ConcludeBake(const JobTable::Turn& turn, StopReason reason);
 

@@ -180,6 +180,17 @@ void Job::ClearProgress() {
   workers.clear();
 }
 
+void Job::ClearRound() {
+  const JobCounters before = std::move(counters);
+  std::map<std::string, WorkerShare> shares = std::move(workers);
+  ClearProgress();
+  counters.coordinator_cpu = before.coordinator_cpu;
+  counters.worker_cpu = before.worker_cpu;
+  counters.to_first_photons = before.to_first_photons;
+  counters.audits = before.audits;
+  workers = std::move(shares);
+}
+
 PassRecord::PassRecord(std::vector<PassTally> tallies) : tallies_(std::move(tallies)) {
   // The first ones are of the passes before rounds were longer than one.
   if (!tallies_.empty()) passes_each_ = std::max<std::int64_t>(1, tallies_.front().passes);

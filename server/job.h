@@ -236,6 +236,7 @@ struct BakeRoundRecord {
   std::int64_t passes = 0;
   std::uint64_t photons = 0;
   Duration cpu{};
+  StopReason reason = StopReason::kNone;
   std::optional<ErrorSample> error;  // the newest sample
   std::vector<LightFinding> lights;  // of it
 };
@@ -246,6 +247,8 @@ struct BakeRecord {
   RenderOverrides overrides;
   std::vector<BakeRoundRecord> rounds;  // the last one is under way, unless it has ended
   std::int64_t runs = 0;                // rounds that have begun, forgotten ones too
+  bool begins_again = false;            // what it has measured does not count any more
+  bool is_stopped = false;              // by its user: it measures what its mesh needs, and ends
   // Of what came of it, once the job has succeeded:
   std::vector<SurfaceFigures> figures;
   std::optional<double> interpolation_error;
@@ -289,6 +292,8 @@ struct Job {
   void AddEvent(WallTime at, std::string what);
   // All that rendering has counted and found.
   void ClearProgress();
+  // The same of a round of a bake: who had a part in the job, and what it has cost, stays.
+  void ClearRound();
 };
 
 // The name of what is lent of the job now: of a bake, one for each round.

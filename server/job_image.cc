@@ -33,7 +33,7 @@ StatusOr<Blob> EncodeJobImage(const Job& job, RenderResult result, const RunReco
   metadata["lucerna.seed"] = absl::StrCat(job.settings.seed);
   metadata["lucerna.passes"] = absl::StrCat(result.passes);
   metadata["lucerna.photons"] = absl::StrCat(result.photons);
-  metadata["lucerna.numeric_profile"] = run.numeric_profile;
+  metadata[kProfileName] = run.numeric_profile;
   metadata["lucerna.run.seconds"] = absl::StrFormat("%.3f", Seconds(run.running));
   metadata["lucerna.run.cpu_seconds"] =
       absl::StrFormat("%.3f", Seconds(run.coordinator_cpu + job.counters.worker_cpu));

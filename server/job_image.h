@@ -11,6 +11,9 @@
 
 namespace lucerna {
 
+// The numeric profile of its build, in an image's metadata.
+inline constexpr const char* kProfileName = "lucerna.numeric_profile";
+
 // What is known of the run at the moment of the image.
 struct RunRecord {
   Duration running{};

@@ -175,11 +175,14 @@ void AddRoundsOf(const BakeRecord& bake, v1::JobRecord& record) {
     if (round.image) item.set_image_digest(std::string(round.image->Bytes()));
     item.set_has_ended(round.has_ended);
     item.set_run(round.run);
+    item.set_stop_reason(ReasonToProto(round.reason));
     *item.mutable_ran_before() = ToProto(round.ran_before);
     for (const LightFinding& light : round.lights)
       *item.add_lights() = LightToProto(light);
   }
   record.set_bake_runs(bake.runs);
+  record.set_bake_begins_again(bake.begins_again);
+  record.set_bake_is_stopped(bake.is_stopped);
   if (bake.uv_mesh) record.set_uv_mesh_digest(std::string(bake.uv_mesh->Bytes()));
 }
 
@@ -382,7 +385,9 @@ StatusOr<BakeRecord> BakeOf(const v1::JobRecord& record) {
   if (message.rounds_size() != record.bake_rounds_size()) {
     return absl::InvalidArgumentError("malformed record of a bake");
   }
-  for (int i = 0; i < message.rounds_size(); ++i) {
+  bake.is_stopped = record.bake_is_stopped();
+  const int rounds = record.bake_begins_again() ? 0 : message.rounds_size();
+  for (int i = 0; i < rounds; ++i) {
     const v1::BakeRound& shown = message.rounds(i);
     const v1::BakeRoundRecord& kept = record.bake_rounds(i);
     BakeRoundRecord& round = bake.rounds.emplace_back();
@@ -393,6 +398,7 @@ StatusOr<BakeRecord> BakeOf(const v1::JobRecord& record) {
     round.ran_before = FromProto(kept.ran_before());
     round.has_ended = kept.has_ended();
     round.run = kept.run();
+    round.reason = ReasonOf(kept.stop_reason());
     if (!kept.image_digest().empty()) {
       LUCERNA_ASSIGN_OR_RETURN(round.image, Digest::FromBytes(kept.image_digest()));
     }

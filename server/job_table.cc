@@ -24,12 +24,12 @@ bool IsNamed(const Job& job, const std::string& id) {
 void EndRecord(const Job& job, BakeRoundRecord& round, const std::vector<BakeRoundRecord>& before,
                Duration cpu) {
   round.has_ended = true;
-  round.passes = job.counters.passes;
   round.photons = job.counters.photons;
   round.cpu = cpu;
   for (const BakeRoundRecord& earlier : before) {
     if (&earlier != &round) round.cpu -= earlier.cpu;
   }
+  round.cpu = std::max(round.cpu, Duration::zero());
   if (!job.convergence.empty()) round.error = job.convergence.back();
   round.lights = job.lights;
 }
@@ -432,19 +432,26 @@ void JobTable::Fail(const std::string& job_id, const Status& why, const Moment& 
 }
 
 StatusOr<JobReport> JobTable::Stop(const std::string& job_id, const Moment& moment) {
+  Writes writes;
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return UnknownJob(job_id);
   Entry& entry = found->second;
   if (!entry.job.life.has_ended()) {
-    if (!entry.runner) {
+    // Between two rounds of a bake there is none.
+    const bool is_measured = entry.job.bake && !entry.job.bake->rounds.empty();
+    if (!entry.runner && !is_measured) {
       return absl::FailedPreconditionError(absl::StrCat(
           "job ", job_id, " has not begun to run",
           entry.has_checkpoint ? " again; resume it, or wait for its turn, and stop it then"
                                : " and has no image; cancel it instead"));
     }
-    entry.runner->Finish();
+    if (entry.runner) entry.runner->Finish();
     entry.is_finishing = true;
+    if (entry.job.bake) {
+      entry.job.bake->is_stopped = true;
+      Save(entry, moment.now, writes);
+    }
     queue_.SetPriority(found->first, ClaimOf(entry).priority);
     UpdateTurns();
     ResumeLocked(found->first, entry);
@@ -496,6 +503,8 @@ StatusOr<JobReport> JobTable::Extend(const std::string& job_id, const RenderOver
   }
   if (job.bake) {
     SetEnd(until, job.bake->overrides);
+    job.bake->is_stopped = false;
+    entry.is_finishing = false;
   } else {
     job.settings = std::move(settings);
   }
@@ -509,8 +518,9 @@ void JobTable::BeginBakeAgain(std::uint64_t serial, Entry& entry, Dropped& dropp
     ForgetRoundsLocked(entry, dropped);
     return;
   }
-  // The thread of its turn does it.
+  // The thread of its turn does it, or a later process.
   entry.begins_again = true;
+  entry.job.bake->begins_again = true;
   if (entry.runner) entry.runner->Stop(absl::AbortedError("the bake begins again"));
 }
 
@@ -518,6 +528,7 @@ void JobTable::ForgetRoundsLocked(Entry& entry, Dropped& dropped) {
   dropped.runners.push_back(std::exchange(entry.runner, nullptr));
   dropped.bakes.push_back(std::exchange(entry.bake_work, nullptr));
   entry.job.bake->rounds.clear();
+  entry.job.bake->begins_again = false;
   entry.job.bake->figures.clear();
   entry.job.bake->interpolation_error.reset();
   entry.job.bake->uv_mesh.reset();
@@ -866,7 +877,8 @@ std::optional<JobTable::Turn> JobTable::WaitForTurn() {
               entry.job.needs,       entry.job.scene_memory,
               entry.job.reference,   std::exchange(entry.scene, std::nullopt),
               entry.runner,          entry.job.bake.has_value(),
-              entry.bake_work,       TurnEnd(*this, *next)};
+              entry.bake_work,       /*warns=*/true,
+              TurnEnd(*this, *next)};
 }
 
 void JobTable::EndTurn(std::uint64_t serial) {
@@ -1009,7 +1021,7 @@ bool JobTable::Attach(const std::string& job_id, std::shared_ptr<RunningJob> run
   runner->SetEnd(found->second.job.settings);
   runner->SetGivesUpTurn(found->second.gives_up_turn);
   // One that was stopped, and begins again, ends all the same.
-  if (found->second.is_finishing) runner->Finish();
+  if (IsFinishingLocked(found->second)) runner->Finish();
   found->second.runner = std::move(runner);
   return true;
 }
@@ -1030,20 +1042,21 @@ void JobTable::SetBakeWork(const std::string& job_id, std::shared_ptr<BakeWork> 
   dropped.bakes.push_back(std::exchange(found->second.bake_work, std::move(work)));
 }
 
-bool JobTable::EndRound(const std::string& job_id, std::optional<Digest> image,
-                        const Moment& moment) {
+bool JobTable::EndRound(const std::string& job_id, std::optional<Digest> image, std::int64_t passes,
+                        StopReason reason, const Moment& moment) {
   Dropped dropped;
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (found == entries_.end()) return false;
   Entry& entry = found->second;
   if (entry.job.life.has_ended() || entry.begins_again) return false;
-  std::vector<BakeRoundRecord>& rounds = entry.job.bake->rounds;
-  if (!rounds.back().has_ended) {
-    const Duration cpu = CpuOf(entry, moment) + entry.job.counters.worker_cpu;
-    EndRecord(entry.job, rounds.back(), rounds, cpu);
-  }
-  rounds.back().image = image;
+  dropped.runners.push_back(std::exchange(entry.runner, nullptr));
+  BakeRoundRecord& round = entry.job.bake->rounds.back();
+  EndRecord(entry.job, round, entry.job.bake->rounds,
+            CpuOf(entry, moment) + entry.job.counters.worker_cpu);
+  round.image = image;
+  round.passes = passes;
+  round.reason = reason;
   ++entry.version;
   Save(entry, moment.now, dropped.writes);
   return true;
@@ -1067,15 +1080,16 @@ bool JobTable::BeginRound(const std::string& job_id, BakeRoundRecord round,
     round.run = ++job.bake->runs;
     round.ran_before = job.life.Running(moment.now);
     rounds.push_back(std::move(round));
-    // Who had a part in it, and what it took, is of the whole job.
-    const JobCounters counters = std::move(job.counters);
-    std::map<std::string, WorkerShare> workers = std::move(job.workers);
-    job.ClearProgress();
-    job.counters.coordinator_cpu = counters.coordinator_cpu;
-    job.counters.worker_cpu = counters.worker_cpu;
-    job.counters.to_first_photons = counters.to_first_photons;
-    job.counters.audits = counters.audits;
-    job.workers = std::move(workers);
+    job.ClearRound();
+  }
+  // What it waited for was of the round before.
+  if (GoesOnByItself(job.pause_cause) &&
+      ChangeLife(found->first, entry, moment,
+                 [&](JobLife& life) { return life.Run(moment.now); })) {
+    job.pause_cause = PauseCause::kNone;
+    job.condition.clear();
+    queue_.SetHasPlace(found->first, !entry.gives_up_turn);
+    UpdateTurns();
   }
   job.settings = checked.settings;
   job.needs = checked.needs;
@@ -1112,10 +1126,14 @@ void JobTable::SetBakeResult(const std::string& job_id, const BakeResult& result
   found->second.uv_mesh = std::move(uv_mesh);
 }
 
+bool JobTable::IsFinishingLocked(const Entry& entry) {
+  return entry.is_finishing || (entry.job.bake && entry.job.bake->is_stopped);
+}
+
 bool JobTable::IsFinishing(const std::string& job_id) const {
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
-  return found != entries_.end() && found->second.is_finishing;
+  return found != entries_.end() && IsFinishingLocked(found->second);
 }
 
 bool JobTable::Succeed(const std::string& job_id, StopReason reason, Blob image,

@@ -238,6 +238,7 @@ class JobTable {
     std::shared_ptr<RunningJob> runner;  // of a job that goes on
     bool is_bake = false;
     std::shared_ptr<BakeWork> bake;  // of a bake that has work in memory
+    bool warns = true;               // what its run warns of is true of the job
     TurnEnd end;
   };
   // Waits for a job and begins its turn. Absent after Close. The table outlives the turn.
@@ -280,10 +281,11 @@ class JobTable {
                                                        const Moment& moment) const;
   // Of a bake whose turn it is: what it holds in memory from now on.
   void SetBakeWork(const std::string& job_id, std::shared_ptr<BakeWork> work);
-  // The newest round of a bake has ended. `image` is its digest when it is on the disk. False when
-  // the job has ended meanwhile, or begins again.
+  // The newest round of a bake has ended, and its runner goes. `image` is its digest when it is on
+  // the disk; `passes` and `reason` are those of its run. False when the job has ended meanwhile,
+  // or begins again.
   [[nodiscard]] bool EndRound(const std::string& job_id, std::optional<Digest> image,
-                              const Moment& moment);
+                              std::int64_t passes, StopReason reason, const Moment& moment);
   // The next round of a bake, or again the one that is under way: what a round's files were found
   // to be. False as EndRound.
   [[nodiscard]] bool BeginRound(const std::string& job_id, BakeRoundRecord round,
@@ -419,6 +421,7 @@ class JobTable {
       LUCERNA_REQUIRES(mutex_);
   // Whether a bake that has ended has its files in memory, to begin anew with another end.
   static bool HoldsFilesOfBake(const Entry& entry);
+  static bool IsFinishingLocked(const Entry& entry);
   // Before a job begins or ceases to run: gives each running job its part of the processor time
   // that the process took since the last call. The time of a process cannot be told apart by jobs.
   void ShareCpu(const Moment& moment) LUCERNA_REQUIRES(mutex_);

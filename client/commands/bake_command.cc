@@ -159,7 +159,10 @@ Status BakeHere(const BakeRequest& request, SceneFiles& files, const JobToSend& 
     // What was measured is still there.
     if (ended.ok() && !status.ok()) return status;
   }
-  if (absl::IsInternal(status) || (request.resumes && !status.ok())) return status;
+  // A process that died, or is silent, says nothing about the job.
+  const bool can_go_on = absl::IsInternal(status) || ExitCodeOf(status) == ExitCode::kUnreachable ||
+                         (request.resumes && !status.ok());
+  if (can_go_on) return status;
   std::filesystem::remove_all(folder, ignored);
   return status;
 }
@@ -247,8 +250,10 @@ Status Bake(BakeRequest request, const ClusterOptions& cluster,
   LUCERNA_ASSIGN_OR_RETURN(const SceneManifest manifest,
                            ReadScene(request.scene, request.overrides, output_options.quiet));
   DirectoryFiles files = FilesOf(request.scene);
-  const JobToSend job = {
-      .manifest = manifest, .overrides = request.overrides, .bake = request.settings};
+  const JobToSend job = {.manifest = manifest,
+                         .overrides = request.overrides,
+                         .priority = request.priority,
+                         .bake = request.settings};
   OutputOptions shown = output_options;
   shown.previews = false;  // there is no image
   return server ? BakeOnServer(request, files, job, *server, shown)

@@ -128,9 +128,10 @@ class BakeOnServerTest : public BakeTest {
     worker_ = std::make_unique<ChildProcess>(
         std::vector<std::string>{kBin + "/lucerna-worker", "--server", address_});
   }
-  void StartServer(const std::string& address) {
+  void StartServer(const std::string& address, const std::string& fail_point = "") {
     server_ = std::make_unique<ChildProcess>(std::vector<std::string>{
-        kBin + "/lucerna-server", "--listen", address, "--state", Path("state")});
+        "/usr/bin/env", "LUCERNA_FAIL_POINT=" + fail_point, kBin + "/lucerna-server", "--listen",
+        address, "--state", Path("state")});
     ASSERT_TRUE(server_->WaitForText("listening on 127.0.0.1:", seconds(60)));
   }
   [[nodiscard]] Finished Run(std::vector<std::string> words) const {
@@ -188,6 +189,20 @@ TEST_F(BakeOnServerTest, GoesOnAfterTheCoordinatorWasKilled) {
   EXPECT_TRUE(server_->WaitForText("goes on after round 1 of its bake", seconds(60)));
   EXPECT_TRUE(Made(job, "killed.glb") == alone);
   EXPECT_EQ(watch.WaitForExit(seconds(60)), 0);
+}
+
+// It is killed when all is measured, and nothing written yet.
+TEST_F(BakeOnServerTest, GoesOnAfterItsLastRound) {
+  const std::vector<std::string> flags = {"--passes",    "4",         "--spacing", "0.05",
+                                          "--estimator", "histogram", "--sides",   "front"};
+  const std::string alone = Bake("alone.glb", flags);
+  server_->Signal(SIGTERM);
+  server_->WaitForExit(seconds(60));
+  StartServer(address_, "bake.round_ended");
+  const std::string job = Submit(flags);
+  EXPECT_NE(server_->WaitForExit(seconds(120)), 0);
+  StartServer(address_);
+  EXPECT_TRUE(Made(job, "killed.glb") == alone);
 }
 
 TEST_F(BakeOnServerTest, StopsWithTheMeshThatThereIs) {

@@ -796,7 +796,7 @@ TEST_F(BakeTableTest, WhatComesOfAnEarlierRoundFindsNoJob) {
   EXPECT_NE(survey, kJob);
   EXPECT_TRUE(table_.Find(survey));
   EXPECT_EQ(table_.ShareOf(kJob)->run_id, survey);
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, At(3)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(3)));
   Begin("round 1");
   EXPECT_FALSE(table_.Find(survey));
   EXPECT_TRUE(table_.HasEnded(survey));
@@ -810,13 +810,15 @@ TEST_F(BakeTableTest, WhatComesOfAnEarlierRoundFindsNoJob) {
 
 TEST_F(BakeTableTest, ARoundKeepsWhatItCounted) {
   CountPhotons(kJob, 7);
-  table_.OnProgress(kJob, 3);
-  ASSERT_TRUE(table_.EndRound(kJob, Sha256("image"), At(3)));
+  // What is merged of an open round besides is not in the image.
+  table_.OnProgress(kJob, 5);
+  ASSERT_TRUE(table_.EndRound(kJob, Sha256("image"), 3, StopReason::kError, At(3)));
   Begin("round 1", 3);
   ASSERT_EQ(Now().bake->rounds.size(), 2U);
   const BakeRoundRecord& survey = Now().bake->rounds[0];
   EXPECT_TRUE(survey.has_ended);
   EXPECT_EQ(survey.passes, 3);
+  EXPECT_EQ(survey.reason, StopReason::kError);
   EXPECT_EQ(survey.photons, 7U);
   EXPECT_EQ(survey.image, Sha256("image"));
   EXPECT_EQ(Now().counters.passes, 0);
@@ -844,7 +846,7 @@ TEST_F(BakeTableTest, ARoundThatIsBegunAgainGoesOn) {
 }
 
 TEST_F(BakeTableTest, AnotherEndBeginsAnewUnderAnotherName) {
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, At(2)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(2)));
   Begin("round 1");
   const std::string run = RunIdOf(Now());
   RenderOverrides until;
@@ -853,10 +855,13 @@ TEST_F(BakeTableTest, AnotherEndBeginsAnewUnderAnotherName) {
   EXPECT_TRUE(runner_->is_stopped());
   EXPECT_EQ(Now().bake->overrides.passes, 2000);
   EXPECT_EQ(Now().settings.passes, 16) << "those of the round, until there is another";
-  EXPECT_FALSE(table_.EndRound(kJob, std::nullopt, At(3)));
+  // Whoever reads its row now knows that its rounds do not count.
+  EXPECT_TRUE(Now().bake->begins_again);
+  EXPECT_FALSE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(3)));
   EXPECT_FALSE(table_.BeginRound(kJob, RoundOf("round 2"), JobOf(""), At(3)));
   EXPECT_TRUE(table_.TakeBeginsAgain(kJob));
   EXPECT_TRUE(Now().bake->rounds.empty());
+  EXPECT_FALSE(Now().bake->begins_again);
   Begin("survey");
   Begin("round 1");
   EXPECT_NE(RunIdOf(Now()), run) << "workers know the old name with its files";
@@ -864,7 +869,7 @@ TEST_F(BakeTableTest, AnotherEndBeginsAnewUnderAnotherName) {
 
 TEST_F(BakeTableTest, TheWorkOfAWrongWorkerGoesWithAllRounds) {
   table_.NoteContributor(kJob, "record", "host");
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, At(2)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(2)));
   Begin("round 1");
   table_.TakeOut("record", At(3));
   EXPECT_TRUE(runner_->is_stopped());
@@ -882,7 +887,7 @@ TEST_F(BakeTableTest, TheWorkOfAWrongWorkerGoesWithAllRounds) {
 }
 
 TEST_F(BakeTableTest, OneThatHasEndedCanBeGivenAnotherEnd) {
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, At(2)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(2)));
   BakeResult result;
   result.figures = {{.name = "floor"}};
   table_.SetBakeResult(kJob, result, std::make_shared<const std::string>("uv"), std::nullopt);
@@ -898,11 +903,38 @@ TEST_F(BakeTableTest, OneThatHasEndedCanBeGivenAnotherEnd) {
   EXPECT_TRUE(absl::IsFailedPrecondition(table_.Extend(kJob, until, At(4)).status()));
 }
 
+TEST_F(BakeTableTest, AStopBetweenTwoRoundsCountsForAllThatFollow) {
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kPasses, At(2)));
+  ASSERT_TRUE(table_.Stop(kJob, At(2)).ok()) << "though nothing runs at the moment";
+  Begin("round 1");
+  EXPECT_TRUE(runner_->Run().ok()) << "it ends at once";
+  EXPECT_TRUE(table_.IsFinishing(kJob));
+  // Also in a later process.
+  EXPECT_TRUE(Now().bake->is_stopped);
+  // Another end is one.
+  RenderOverrides until;
+  until.passes = 2000;
+  ASSERT_TRUE(table_.Extend(kJob, until, At(3)).ok());
+  EXPECT_FALSE(table_.IsFinishing(kJob));
+}
+
+TEST_F(BakeTableTest, WhatARoundWaitedForEndsWithIt) {
+  table_.SetCondition(kJob, PauseCause::kDispute, "workers disagree", At(2));
+  EXPECT_EQ(StateOf(table_, kJob), JobState::kPaused);
+  RenderOverrides until;
+  until.passes = 2000;
+  ASSERT_TRUE(table_.Extend(kJob, until, At(3)).ok());
+  EXPECT_TRUE(table_.TakeBeginsAgain(kJob));
+  Begin("survey", 3);
+  EXPECT_EQ(StateOf(table_, kJob), JobState::kRunning);
+  EXPECT_EQ(Now().condition, "");
+}
+
 TEST_F(BakeTableTest, HasNothingToShowBeforeItsEnd) {
   EXPECT_TRUE(absl::IsFailedPrecondition(table_.FindImage(kJob, At(1)).status()));
   ASSERT_TRUE(table_.Stop(kJob, At(2)).ok());
   EXPECT_TRUE(table_.IsFinishing(kJob));
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, At(2)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(2)));
   Begin("round 1");
   EXPECT_TRUE(runner_->Run().ok()) << "it ends at once, as the one before";
 }

@@ -191,6 +191,7 @@ Job FullBake() {
   survey.sensors = {Sha256("sensors"), 17};
   survey.ran_before = std::chrono::milliseconds(1);
   survey.has_ended = true;
+  survey.reason = StopReason::kTime;
   survey.image = Sha256("survey's image");
   survey.passes = 16;
   survey.photons = 99;
@@ -234,12 +235,24 @@ TEST(JobMessageTest, ARecordHoldsAllOfABake) {
   EXPECT_EQ(survey.ran_before, std::chrono::milliseconds(1));
   EXPECT_EQ(survey.cpu, std::chrono::milliseconds(2));
   EXPECT_TRUE(survey.has_ended);
+  EXPECT_EQ(survey.reason, StopReason::kTime);
   EXPECT_EQ(survey.lights.size(), 1U);
   EXPECT_FALSE(bake.rounds[1].has_ended);
   EXPECT_FALSE(bake.rounds[1].image);
   EXPECT_FALSE(bake.rounds[1].error);
   EXPECT_EQ(RunIdOf(read->job), "i-7.4");
   EXPECT_EQ(ManifestOf(read->job), ManifestOf(job));
+}
+
+TEST(JobMessageTest, ABakeThatBeginsAgainHasNoRoundsInALaterProcess) {
+  Job job = FullBake();
+  job.bake->begins_again = true;
+  job.bake->is_stopped = true;
+  const auto read = DecodeRecord(EncodeRecord(job, std::nullopt, Duration::zero()), kNow);
+  ASSERT_TRUE(read.ok()) << read.status();
+  EXPECT_TRUE(read->job.bake->rounds.empty());
+  EXPECT_TRUE(read->job.bake->is_stopped);
+  EXPECT_EQ(read->job.bake->runs, 4) << "no name is used again";
 }
 
 TEST(JobMessageTest, ARecordWhoseRoundsDoNotAgreeIsMalformed) {
