@@ -222,10 +222,12 @@ void Coordinator::ConcludeBake(const JobTable::Turn& turn, StopReason reason) {
       uv_mesh = std::make_shared<const std::string>(std::move(result->uv_mesh));
       files.push_back(uv_mesh);
     }
+    const Blob held_file = Claimed(file);
+    const Blob held_mesh = uv_mesh ? Claimed(uv_mesh) : nullptr;
     failure = KeepForJob(turn.job_id, files, [&](const std::vector<Digest>& digests) {
-      jobs_.SetBakeResult(turn.job_id, *result, uv_mesh ? Claimed(uv_mesh) : nullptr,
+      jobs_.SetBakeResult(turn.job_id, *result, held_mesh,
                           digests.size() > 1 ? std::optional(digests[1]) : std::nullopt);
-      return jobs_.Succeed(turn.job_id, reason, Claimed(file), Now(),
+      return jobs_.Succeed(turn.job_id, reason, held_file, Now(),
                            digests.empty() ? std::nullopt : std::optional(digests.front()));
     });
     if (failure.ok()) {

@@ -1017,6 +1017,8 @@ bool JobTable::Attach(const std::string& job_id, std::shared_ptr<RunningJob> run
   const MutexLock lock(mutex_);
   const auto found = FindLocked(job_id);
   if (is_closed_ || found == entries_.end() || found->second.job.life.has_ended()) return false;
+  // A bake that is to begin again while its round was read.
+  if (found->second.begins_again) return false;
   // Either may have been changed since the turn began.
   runner->SetEnd(found->second.job.settings);
   runner->SetGivesUpTurn(found->second.gives_up_turn);

@@ -249,7 +249,8 @@ class JobTable {
   [[nodiscard]] bool HasEnded(const std::string& job_id) const;
   // States that no job is in are left out.
   [[nodiscard]] std::map<JobState, std::size_t> CountByState() const;
-  // Gives a job its runner. False when it has ended meanwhile, or after Close: it must not run.
+  // Gives a job its runner. False when it has ended meanwhile or begins again, or after Close: it
+  // must not run.
   [[nodiscard]] bool Attach(const std::string& job_id, std::shared_ptr<RunningJob> runner);
   // The runner has given up its turn: unless it is paused or has ended, the job waits for its next.
   void GiveUpTurn(const std::string& job_id, const Moment& moment);

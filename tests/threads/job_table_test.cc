@@ -918,6 +918,17 @@ TEST_F(BakeTableTest, AStopBetweenTwoRoundsCountsForAllThatFollow) {
   EXPECT_FALSE(table_.IsFinishing(kJob));
 }
 
+TEST_F(BakeTableTest, AnotherEndBetweenTwoRoundsIsHeardBeforeTheNextRuns) {
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kPasses, At(2)));
+  ASSERT_TRUE(table_.BeginRound(kJob, RoundOf("round 1"), JobOf("", 16), At(2)));
+  RenderOverrides until;
+  until.passes = 2000;
+  ASSERT_TRUE(table_.Extend(kJob, until, At(3)).ok());
+  EXPECT_FALSE(table_.Attach(kJob, std::make_shared<FakeRunner>()));
+  EXPECT_TRUE(table_.TakeBeginsAgain(kJob));
+  Begin("survey");
+}
+
 TEST_F(BakeTableTest, WhatARoundWaitedForEndsWithIt) {
   table_.SetCondition(kJob, PauseCause::kDispute, "workers disagree", At(2));
   EXPECT_EQ(StateOf(table_, kJob), JobState::kPaused);
