@@ -18,7 +18,6 @@ namespace {
 
 // Of the memory that a job may have; the rest is for its scene and its rounds.
 constexpr std::uint64_t kShareOfMesh = 4;
-constexpr std::chrono::milliseconds kRetryPause{100};
 
 // The error of the first round after the survey, whose points are spread evenly over the surfaces;
 // 0: none.
@@ -29,24 +28,31 @@ double EstimateOf(const BakeRecord& bake) {
   return std::sqrt(std::max(squared.noise + squared.bias, 0.0));
 }
 
+RenderResult LaterTurn() {
+  RenderResult later;
+  later.gave_up_turn = true;
+  return later;
+}
+
 }  // namespace
 
 Status Coordinator::CheckBegins(const CheckedJob& job) {
-  // One at a time: the first mesh may be large.
-  const MutexLock lock(bake_check_mutex_);
-  return BakeRounds::Begin(job.scene, *job.submission.bake, job.submission.overrides,
-                           options_.max_job_bytes / kShareOfMesh)
-      .status();
+  return BakeRounds::Check(job.scene, *job.submission.bake, options_.max_job_bytes / kShareOfMesh);
 }
 
 StatusOr<RenderResult> Coordinator::MeasureBake(JobTable::Turn& turn) {
-  if (!turn.bake) {
-    LUCERNA_ASSIGN_OR_RETURN(turn.bake, ReadBake(turn));
-    jobs_.SetBakeWork(turn.job_id, turn.bake);
-  }
-  while (turn.runner || turn.bake->rounds.round()) {
+  while (!turn.bake || turn.runner || turn.bake->rounds.round()) {
     const std::shared_ptr<RunningJob> runner = std::exchange(turn.runner, nullptr);
-    if (!runner) LUCERNA_RETURN_IF_ERROR(BeginRound(turn));
+    if (!runner) {
+      LUCERNA_ASSIGN_OR_RETURN(const std::optional<MemoryClaim> for_reading, WaitForReading(turn));
+      if (!for_reading) return LaterTurn();
+      if (!turn.bake) {
+        LUCERNA_ASSIGN_OR_RETURN(turn.bake, ReadBake(turn));
+        jobs_.SetBakeWork(turn.job_id, turn.bake);
+        continue;
+      }
+      LUCERNA_RETURN_IF_ERROR(BeginRound(turn));
+    }
     StatusOr<RenderResult> result = runner ? runner->Resume() : BeginRun(turn);
     if (!result.ok() || result->gave_up_turn) return result;
     LUCERNA_RETURN_IF_ERROR(EndRound(turn, *std::move(result)));
@@ -62,32 +68,9 @@ StatusOr<RenderResult> Coordinator::MeasureBake(JobTable::Turn& turn) {
   return end;
 }
 
-StatusOr<MemoryClaim> Coordinator::ClaimForReading(const JobTable::Turn& turn) {
-  const std::optional<Job> job = jobs_.Find(turn.job_id);
-  if (!job) return absl::CancelledError("the job has ended");
-  std::uint64_t files = 0;
-  for (const auto& [path, file] : job->manifest.entries)
-    files += file.size_bytes;
-  const std::uint64_t bytes = GuessSceneMemory(files);
-  bool has_waited = false;
-  while (true) {
-    StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kScenes, bytes);
-    if (claim.ok() || bytes > budget_.max_bytes()) {
-      if (has_waited) jobs_.SetWaitsForMemory(turn.job_id, "", Now());
-      return claim;
-    }
-    LUCERNA_RETURN_IF_ERROR(jobs_.CheckStillNeeded(turn.job_id));
-    if (!std::exchange(has_waited, true)) {
-      jobs_.SetWaitsForMemory(turn.job_id, "waits for memory that other jobs hold", Now());
-    }
-    budget_.WaitForRelease(kRetryPause);
-  }
-}
-
 StatusOr<std::shared_ptr<BakeWork>> Coordinator::ReadBake(const JobTable::Turn& turn) {
   const std::optional<Job> job = jobs_.Find(turn.job_id);
   if (!job) return absl::CancelledError("the job has ended");
-  LUCERNA_ASSIGN_OR_RETURN(const MemoryClaim for_reading, ClaimForReading(turn));
   LUCERNA_ASSIGN_OR_RETURN(const JobIntake::ReadResult read, intake_.ReadScene(job->manifest, [&] {
     return jobs_.CheckStillNeeded(turn.job_id);
   }));
@@ -141,7 +124,6 @@ StatusOr<std::shared_ptr<BakeWork>> Coordinator::ReadBake(const JobTable::Turn& 
 Status Coordinator::BeginRound(JobTable::Turn& turn) {
   const std::optional<Job> job = jobs_.Find(turn.job_id);
   if (!job) return absl::CancelledError("the job has ended");
-  LUCERNA_ASSIGN_OR_RETURN(const MemoryClaim for_reading, ClaimForReading(turn));
   BakeWork& work = *turn.bake;
   const BakeRound& round = *work.rounds.round();
   auto sensors =

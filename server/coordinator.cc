@@ -600,11 +600,20 @@ StatusOr<RenderResult> Coordinator::BeginRun(JobTable::Turn& turn) {
 StatusOr<std::optional<MemoryClaim>> Coordinator::WaitForMemory(const JobTable::Turn& turn) {
   const std::uint64_t scene_memory =
       turn.scene_memory > 0 ? turn.scene_memory : GuessSceneMemory(SceneBytes(turn.manifest));
-  const std::uint64_t bytes = MemoryNeedOf(turn.needs, turn.settings, scene_memory) +
-                              (turn.bake ? turn.bake->rounds.MemoryBytes() : 0);
+  return WaitForClaim(turn, MemoryUse::kJobs,
+                      MemoryNeedOf(turn.needs, turn.settings, scene_memory) +
+                          (turn.bake ? turn.bake->rounds.MemoryBytes() : 0));
+}
+
+StatusOr<std::optional<MemoryClaim>> Coordinator::WaitForReading(const JobTable::Turn& turn) {
+  return WaitForClaim(turn, MemoryUse::kScenes, GuessSceneMemory(SceneBytes(turn.manifest)));
+}
+
+StatusOr<std::optional<MemoryClaim>> Coordinator::WaitForClaim(const JobTable::Turn& turn,
+                                                               MemoryUse use, std::uint64_t bytes) {
   bool has_waited = false;
   while (true) {
-    StatusOr<MemoryClaim> claim = budget_.Claim(MemoryUse::kJobs, bytes);
+    StatusOr<MemoryClaim> claim = budget_.Claim(use, bytes);
     if (!claim.ok() && bytes + SceneBytes(turn.manifest) > budget_.max_bytes()) {
       return claim.status();
     }

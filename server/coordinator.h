@@ -214,6 +214,10 @@ class Coordinator {
   // to others. Absent when the turn is to be given up.
   // Errors: RESOURCE_EXHAUSTED when it will never fit, CANCELLED.
   StatusOr<std::optional<MemoryClaim>> WaitForMemory(const JobTable::Turn& turn);
+  // The same for the memory in which its scene is read. Requires that it has no runner.
+  StatusOr<std::optional<MemoryClaim>> WaitForReading(const JobTable::Turn& turn);
+  StatusOr<std::optional<MemoryClaim>> WaitForClaim(const JobTable::Turn& turn, MemoryUse use,
+                                                    std::uint64_t bytes);
   // The image as one that is claimed, if that is possible; it is kept in any case.
   Blob Claimed(Blob image);
   // Hands the job's newest checkpoint that can be used to its runner, if there is one.
@@ -248,15 +252,13 @@ class Coordinator {
   // Errors: RESOURCE_EXHAUSTED when the job would not fit into --max-disk with all others gone.
   Status CheckDiskNeed(const CheckedJob& job) const;
   // Bakes (server/bake_turn.cc). Whether one can begin: what its names of materials and its spacing
-  // come to. Errors: as BakeRounds::Begin.
+  // come to. Errors: as BakeRounds::Check.
   Status CheckBegins(const CheckedJob& job);
   // Measures the rounds of a bake that are left, to the last one, whose reason is returned without
   // an image, or until it gives up its turn.
   StatusOr<RenderResult> MeasureBake(JobTable::Turn& turn);
   // The mesh of the bake as far as its finished rounds go.
   StatusOr<std::shared_ptr<BakeWork>> ReadBake(const JobTable::Turn& turn);
-  // Waits for the memory in which the scene of the job is read. Requires that it has no runner.
-  StatusOr<MemoryClaim> ClaimForReading(const JobTable::Turn& turn);
   // Makes the files and settings of its next round those of the turn.
   Status BeginRound(JobTable::Turn& turn);
   // Takes in what its round has measured.
@@ -320,7 +322,6 @@ class Coordinator {
   const std::string instance_;  // of this process
   const std::unique_ptr<DurableState> state_;
   ResultCounts results_;
-  Mutex bake_check_mutex_;
   // Held while files are added for a job, and while those without one are removed.
   Mutex files_mutex_;
   OpenTransfers transfers_;

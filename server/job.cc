@@ -141,6 +141,10 @@ Job SummaryOf(const Job& job) {
     summary.bake->settings = job.bake->settings;
     summary.bake->overrides = job.bake->overrides;
     summary.bake->rounds = job.bake->rounds;
+    for (BakeRoundRecord& round : summary.bake->rounds) {
+      round.error.reset();
+      round.lights.clear();
+    }
   }
   return summary;
 }

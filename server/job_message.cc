@@ -166,7 +166,7 @@ v1::Bake BakeToProto(const BakeRecord& bake) {
   return message;
 }
 
-// What clients are not told of its rounds.
+// What only the coordinator keeps of its rounds.
 void AddRoundsOf(const BakeRecord& bake, v1::JobRecord& record) {
   for (const BakeRoundRecord& round : bake.rounds) {
     v1::BakeRoundRecord& item = *record.add_bake_rounds();

@@ -23,8 +23,9 @@ constexpr double kSpacingsOfDiagonal = 512;
 // is seen as far as it changes the mean of a face.
 constexpr double kCoarsest = 16;
 
-// A vertex and what names it, and the three edges and two faces that come with it in a closed mesh;
-// an edge that is refined has its middle, of quadratic elements two points more.
+// For each face at most, while a mesh is made; for each vertex after that: it and what names it,
+// and the three edges and two faces that come with it in a closed mesh; an edge that is refined has
+// its middle, of quadratic elements two points more.
 constexpr std::uint64_t kBytesOfVertex = 4 * sizeof(MeshVertex) + 2 * sizeof(MeshFace) + 4 * 96;
 // A sensor, its line in a file, and what is measured at it.
 constexpr std::uint64_t kBytesOfSensor = sizeof(Sensor) + sizeof(ChartAtlas::Texel) + 128;
@@ -89,18 +90,31 @@ StatusOr<std::vector<Irradiance>> MeasuredIn(const Image& image, std::size_t cou
   return measured;
 }
 
-}  // namespace
-
-StatusOr<BakeRounds> BakeRounds::Begin(const Scene& scene, const BakeSettings& settings,
-                                       const RenderOverrides& overrides, std::uint64_t max_bytes) {
+SurfaceMesh::Options OptionsFor(const Scene& scene, const BakeSettings& settings,
+                                std::uint64_t max_bytes) {
   const double diagonal = ExtentOf(scene).size * scene.unit;
   SurfaceMesh::Options options;
   options.sides = settings.sides;
   options.names = settings.materials;
   options.spacing = settings.spacing.value_or(diagonal / kSpacingsOfDiagonal);
   options.elements = settings.elements;
-  options.max_faces =
-      std::min<std::uint64_t>(SurfaceMesh::kMostFaces, max_bytes / (kBytesOfVertex / 2));
+  options.max_faces = std::min<std::uint64_t>(SurfaceMesh::kMostFaces, max_bytes / kBytesOfVertex);
+  return options;
+}
+
+}  // namespace
+
+Status BakeRounds::Check(const Scene& scene, const BakeSettings& settings,
+                         std::uint64_t max_bytes) {
+  const SurfaceMesh::Options options = OptionsFor(scene, settings, max_bytes);
+  LUCERNA_ASSIGN_OR_RETURN(const SurfaceMesh mesh, SurfaceMesh::FromScene(scene, options));
+  return settings.is_light_map ? absl::OkStatus()
+                               : mesh.CheckLongEdges(kCoarsest * options.spacing);
+}
+
+StatusOr<BakeRounds> BakeRounds::Begin(const Scene& scene, const BakeSettings& settings,
+                                       const RenderOverrides& overrides, std::uint64_t max_bytes) {
+  const SurfaceMesh::Options options = OptionsFor(scene, settings, max_bytes);
   LUCERNA_ASSIGN_OR_RETURN(SurfaceMesh mesh, SurfaceMesh::FromScene(scene, options));
   // A light map's charts are of the scene's own triangles.
   if (!settings.is_light_map) {

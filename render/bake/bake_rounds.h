@@ -54,6 +54,10 @@ struct BakeResult {
 
 class BakeRounds {
  public:
+  // Whether one can begin, as far as that is known without a mesh: materials of these names, and no
+  // more faces than there may be. Errors: as Begin.
+  [[nodiscard]] static Status Check(const Scene& scene, const BakeSettings& settings,
+                                    std::uint64_t max_bytes);
   // The end that `overrides` have is that of the first round after the survey, whose points are
   // spread evenly, without one 64 passes; all later rounds have as many passes as it had, so that
   // what is measured is equally good everywhere. Requires CheckBake.

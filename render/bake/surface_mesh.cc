@@ -470,7 +470,7 @@ Status SurfaceMesh::Split(std::set<Pair> places) {
   return faces_.size() <= max_faces_ ? absl::OkStatus() : TooManyFaces(max_faces_);
 }
 
-Status SurfaceMesh::SplitLongEdges(double longest) {
+Status SurfaceMesh::CheckLongEdges(double longest) const {
   // A triangle with such an edge has at most an area of sqrt(3)/4 of its square.
   double area = 0;
   for (const MeshFace& face : faces_)
@@ -478,6 +478,11 @@ Status SurfaceMesh::SplitLongEdges(double longest) {
   if (!(area < static_cast<double>(max_faces_) * std::sqrt(3.0) / 4 * longest * longest)) {
     return TooManyFaces(max_faces_);
   }
+  return absl::OkStatus();
+}
+
+Status SurfaceMesh::SplitLongEdges(double longest) {
+  LUCERNA_RETURN_IF_ERROR(CheckLongEdges(longest));
   for (;;) {
     std::set<Pair> places;
     for (const MeshFace& face : faces_) {

@@ -100,6 +100,8 @@ class SurfaceMesh {
   // Splits edges until none is longer.
   // Errors: RESOURCE_EXHAUSTED once there are more than max_faces.
   [[nodiscard]] Status SplitLongEdges(double longest);
+  // Whether so many are enough by the area alone, which takes no time. Errors: the same.
+  [[nodiscard]] Status CheckLongEdges(double longest) const;
 
   // Where irradiance is to be measured next: at vertices that have none, then, with `with_edges`,
   // in the middle of all edges that are longer than the spacing and were not measured before, and

@@ -73,6 +73,18 @@ TEST(BakeRoundsTest, LaterRoundsHaveAsManyPassesAsTheFirst) {
   EXPECT_FALSE(rounds.round()->overrides.error);
 }
 
+TEST(BakeRoundsTest, AMeshThatIsTooLargeIsRefusedBeforeItIsMade) {
+  BakeSettings settings = Fine();
+  EXPECT_TRUE(BakeRounds::Check(Box(), settings, std::uint64_t{1} << 30).ok());
+  settings.spacing = 1e-6;
+  EXPECT_TRUE(
+      absl::IsResourceExhausted(BakeRounds::Check(Box(), settings, std::uint64_t{1} << 30)));
+  EXPECT_TRUE(absl::IsResourceExhausted(
+      BakeRounds::Begin(Box(), settings, {}, std::uint64_t{1} << 30).status()));
+  settings.materials = {"none"};
+  EXPECT_TRUE(absl::IsNotFound(BakeRounds::Check(Box(), settings, std::uint64_t{1} << 30)));
+}
+
 TEST(BakeRoundsTest, WithoutAnEndRoundsHave64Passes) {
   BakeSettings settings = Fine();
   settings.sides = MeasuredSides::kFront;

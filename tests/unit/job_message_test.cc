@@ -92,6 +92,47 @@ Job FullJob() {
   return job;
 }
 
+Job FullBake() {
+  Job job = FullJob();
+  BakeRecord bake;
+  bake.settings = {.estimator = BakeEstimator::kNearest,
+                   .sides = MeasuredSides::kBack,
+                   .materials = {"floor", "wall"},
+                   .spacing = 0.1,
+                   .elements = MeshElements::kQuadratic,
+                   .tolerance = 0.3,
+                   .decimates = false,
+                   .indirect_only = true,
+                   .is_light_map = true};
+  bake.overrides.error = 0.25;
+  BakeRoundRecord survey;
+  survey.name = "survey";
+  survey.run = 3;
+  survey.points = 5;
+  survey.sensors = {Sha256("sensors"), 17};
+  survey.ran_before = std::chrono::milliseconds(1);
+  survey.has_ended = true;
+  survey.reason = StopReason::kTime;
+  survey.image = Sha256("survey's image");
+  survey.passes = 16;
+  survey.photons = 99;
+  survey.cpu = std::chrono::milliseconds(2);
+  survey.error = job.convergence[0];
+  survey.lights = job.lights;
+  BakeRoundRecord round;
+  round.name = "round 1";
+  round.run = 4;
+  round.sensors = {Sha256("other sensors"), 18};
+  bake.rounds = {survey, round};
+  bake.runs = 4;
+  bake.figures = {
+      {.name = "0 floor", .triangles = 2, .area = 3, .lowest = 4, .highest = 5, .mean = 6}};
+  bake.interpolation_error = 0.125;
+  bake.uv_mesh = Sha256("mesh");
+  job.bake = bake;
+  return job;
+}
+
 std::string Seen(const Job& job, Duration running) {
   JobReport report;
   report.job = job;
@@ -133,6 +174,15 @@ TEST(JobMessageTest, ASummaryLacksOnlyWhatGrowsWithTheJob) {
   EXPECT_EQ(SummaryToProto(report).DebugString(), whole.DebugString());
 }
 
+TEST(JobMessageTest, ASummaryOfABakeSaysHowFarItHasCome) {
+  const Job summary = SummaryOf(FullBake());
+  ASSERT_EQ(summary.bake->rounds.size(), 2U);
+  EXPECT_EQ(summary.bake->rounds[0].passes, 16);
+  EXPECT_FALSE(summary.bake->rounds[0].error);
+  EXPECT_TRUE(summary.bake->rounds[0].lights.empty());
+  EXPECT_TRUE(summary.bake->figures.empty());
+}
+
 // Later passes may have more photons: without their numbers a list would show more than is done.
 TEST(JobMessageTest, ASummarySaysHowMuchIsDone) {
   JobReport report;
@@ -169,47 +219,6 @@ TEST(JobMessageTest, ARecordHoldsAllThatClientsSee) {
   EXPECT_EQ(read->job.life.failure(), "");
   EXPECT_EQ(read->job.life.Running(kNow.now + std::chrono::hours(1)), running)
       << "time stands still when a job has ended";
-}
-
-Job FullBake() {
-  Job job = FullJob();
-  BakeRecord bake;
-  bake.settings = {.estimator = BakeEstimator::kNearest,
-                   .sides = MeasuredSides::kBack,
-                   .materials = {"floor", "wall"},
-                   .spacing = 0.1,
-                   .elements = MeshElements::kQuadratic,
-                   .tolerance = 0.3,
-                   .decimates = false,
-                   .indirect_only = true,
-                   .is_light_map = true};
-  bake.overrides.error = 0.25;
-  BakeRoundRecord survey;
-  survey.name = "survey";
-  survey.run = 3;
-  survey.points = 5;
-  survey.sensors = {Sha256("sensors"), 17};
-  survey.ran_before = std::chrono::milliseconds(1);
-  survey.has_ended = true;
-  survey.reason = StopReason::kTime;
-  survey.image = Sha256("survey's image");
-  survey.passes = 16;
-  survey.photons = 99;
-  survey.cpu = std::chrono::milliseconds(2);
-  survey.error = job.convergence[0];
-  survey.lights = job.lights;
-  BakeRoundRecord round;
-  round.name = "round 1";
-  round.run = 4;
-  round.sensors = {Sha256("other sensors"), 18};
-  bake.rounds = {survey, round};
-  bake.runs = 4;
-  bake.figures = {
-      {.name = "0 floor", .triangles = 2, .area = 3, .lowest = 4, .highest = 5, .mean = 6}};
-  bake.interpolation_error = 0.125;
-  bake.uv_mesh = Sha256("mesh");
-  job.bake = bake;
-  return job;
 }
 
 TEST(JobMessageTest, ARecordHoldsAllOfABake) {
