@@ -1,6 +1,7 @@
 #include "client/commands/reference_command.h"
 
 #include <array>
+#include <cstdint>
 
 #include "absl/strings/str_format.h"
 
@@ -59,10 +60,10 @@ Status RenderReference(const ReferenceRequest& request, const ClusterOptions& cl
   }
 
   LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster));
+  const std::array<std::uint64_t, 2> seeds = SeedsOfHalves(settings.seed);
   std::array<Image, 2> halves;
   for (std::size_t half = 0; half < halves.size(); ++half) {
-    // Unsigned: after the largest seed comes 0.
-    overrides.seed = settings.seed + half;
+    overrides.seed = seeds[half];
     if (!output_options.quiet) {
       PrintError(absl::StrCat("half ", half + 1, " of 2, seed ", *overrides.seed, "\n"));
     }

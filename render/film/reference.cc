@@ -9,6 +9,7 @@
 
 #include "render/estimate/error_estimate.h"
 #include "render/estimate/relative_error.h"
+#include "render/math/rng.h"
 
 namespace lucerna {
 namespace {
@@ -34,6 +35,12 @@ std::vector<double> LuminancesOf(const Image& image) {
 }
 
 }  // namespace
+
+std::array<std::uint64_t, 2> SeedsOfHalves(std::uint64_t seed) {
+  constexpr std::uint64_t kKey = 0x5245464552454E43ULL;
+  const std::uint64_t both = CombineKeys(kKey, seed);
+  return {CombineKeys(both, 0), CombineKeys(both, 1)};
+}
 
 StatusOr<Image> MakeReference(const Image& a, const Image& b) {
   if (a.width != b.width || a.height != b.height) {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 
 #include "render/base/status.h"
 #include "render/image/image.h"
@@ -16,6 +17,10 @@ namespace lucerna {
 // Standard error of R, G, B in each pixel, from two values: right on average over many pixels, and
 // no more than a hint in one.
 inline constexpr std::array<const char*, 3> kNoiseLayer = {"noise.R", "noise.G", "noise.B"};
+
+// The seeds of the halves of a reference with that seed. They are hashed, so that no half has the
+// photons of another reference, nor of an image that is measured by it: those seeds are small.
+[[nodiscard]] std::array<std::uint64_t, 2> SeedsOfHalves(std::uint64_t seed);
 
 // The average, with the noise layer and in its metadata
 //   lucerna.reference.rel_mse   the mean over pixels and channels of (a - b)²/4 / (value² +

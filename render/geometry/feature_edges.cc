@@ -9,6 +9,7 @@
 
 #include <immintrin.h>
 
+#include "render/geometry/rounded_borders.h"
 #include "render/math/double3.h"
 #include "render/math/float_lanes.h"
 #include "render/scene/mesh_edges.h"
@@ -86,8 +87,11 @@ void FeatureEdges::AddMeshEdges(const Scene& scene) {
     for (std::uint32_t& corner : corners)
       corner = welded[corner];
   }
+  const std::vector<TriangleSide> all_sides = SidesByEdge(corners, positions.size());
+  for (const auto& [low, high] : CrestsOfRoundedBorders(positions, corners, all_sides))
+    segments_.push_back({{positions[low], positions[high]}});
   std::vector<Double3> wings;
-  ForEachEdge(SidesByEdge(corners, positions.size()), [&](std::span<const TriangleSide> sides) {
+  ForEachEdge(all_sides, [&](std::span<const TriangleSide> sides) {
     const FeatureSegment segment = {{positions[sides[0].low], positions[sides[0].high]}};
     const Double3 end(segment.ends[0]);
     const Double3 along = Double3(segment.ends[1]) - end;

@@ -5,6 +5,8 @@
 //   * open edges of meshes, and edges at which the faces turn by about 45 degrees or more
 //     (kSameSurfaceCosine) or at which more than two faces meet. Corners in the same place to the
 //     bit are the same corner, whatever mesh they belong to;
+//   * where a rounded border has turned by as much from a face that is much wider
+//     (rounded_borders.h);
 //   * edges between a surface on which photons are kept and one on which none are;
 //   * rims of open analytic shapes (AddRim in geometry/shape_NAME.cc);
 //   * where surfaces pass through each other (surface_crossings.h);
@@ -45,7 +47,7 @@ struct DiscSlab {
   float height = 0;
 };
 
-// Memory: 24 bytes a segment and about 28 in the tree; while it is built 24 per vertex and 40 per
+// Memory: 24 bytes a segment and about 28 in the tree; while it is built 24 per vertex and 76 per
 // triangle of the scene.
 class FeatureEdges {
  public:

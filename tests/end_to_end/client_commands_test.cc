@@ -10,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "gtest/gtest.h"
 #include <nlohmann/json.hpp>
 #include <signal.h>
@@ -19,6 +20,7 @@
 #include "client/local_cluster.h"
 #include "client/render_flags.h"
 #include "render/base/files.h"
+#include "render/film/reference.h"
 #include "render/image/exr_file.h"
 
 namespace lucerna {
@@ -729,7 +731,8 @@ TEST_F(ClientCommandsTest, AReferenceTellsItsNoiseAndDiffTakesItOff) {
   ASSERT_EQ(ran.code, 0) << ran.err;
   const json report = json::parse(ran.out);
   const json& metadata = report["metadata"];
-  EXPECT_EQ(metadata["lucerna.reference.seeds"], "7 8");
+  const auto [first, second] = SeedsOfHalves(7);
+  EXPECT_EQ(metadata["lucerna.reference.seeds"], absl::StrCat(first, " ", second));
   EXPECT_EQ(metadata["lucerna.reference.passes"], "5 5");
   const std::string settings = metadata["lucerna.settings"];
   EXPECT_NE(settings.find("initial-radius=0.5px"), std::string::npos) << settings;

@@ -23,7 +23,7 @@ namespace lucerna {
 namespace {
 
 constexpr int kParts = 32;
-constexpr int kComparisons = 10;
+constexpr int kComparisons = 11;
 constexpr double kPi = 3.14159265358979;
 
 // A room whose walls, numbered 0, shine inwards; light 0 shines from one side, light 1 from both.
@@ -86,6 +86,43 @@ void AddColumns(Scene& scene, std::uint32_t sides, bool is_round) {
     AddColumn(scene, x, y, 0.05F, sides, is_round);
 }
 
+// A board whose sides are rounded by three strips to a quarter of a circle, of a radius of half a
+// pixel: no edge of it turns by as much as 45 degrees but at its two ends.
+void AddRoundedBoard(Scene& scene, double middle) {
+  constexpr double kLow = -0.85;
+  constexpr double kHigh = -0.7;
+  constexpr double kHalfWidth = 0.06;
+  constexpr double kRounding = 0.015;
+  constexpr std::uint32_t kStrips = 3;
+  std::vector<Vec3> profile;  // of its end, around
+  for (std::uint32_t corner = 0; corner < 4; ++corner) {
+    const double x = middle + (corner == 1 || corner == 2 ? -1 : 1) * (kHalfWidth - kRounding);
+    const double z = corner < 2 ? kHigh - kRounding : kLow + kRounding;
+    for (std::uint32_t i = 0; i <= kStrips; ++i) {
+      const double angle = kPi / 2 * (corner + static_cast<double>(i) / kStrips);
+      profile.push_back({static_cast<float>(x + kRounding * std::cos(angle)), 0,
+                         static_cast<float>(z + kRounding * std::sin(angle))});
+    }
+  }
+  TriangleMesh mesh;
+  mesh.traits.material = 0;
+  mesh.traits.area_light = 0;
+  const auto count = static_cast<std::uint32_t>(profile.size());
+  for (const float y : {-0.5F, 0.6F}) {
+    for (const Vec3 place : profile)
+      mesh.positions.push_back({place.x, y, place.z});
+  }
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const std::uint32_t next = (i + 1) % count;
+    for (const std::uint32_t corner : {i, count + next, next, i, count + i, count + next})
+      mesh.indices.push_back(corner);
+    if (i == 0 || next == 0) continue;
+    for (const std::uint32_t corner : {0U, i, next, count, count + next, count + i})
+      mesh.indices.push_back(corner);
+  }
+  scene.meshes.push_back(std::move(mesh));
+}
+
 struct Furniture {
   std::string name;
   std::function<void(Scene&)> add;
@@ -121,6 +158,11 @@ std::vector<Furniture> AllFurniture() {
       {"round columns", [](Scene& scene) { AddColumns(scene, 32, true); }},
       {"columns of twelve flat sides", [](Scene& scene) { AddColumns(scene, 12, false); }},
       {"octagonal columns", [](Scene& scene) { AddColumns(scene, 8, false); }},
+      {"boards with rounded sides",
+       [](Scene& scene) {
+         for (const double middle : {-0.4, -0.1, 0.2, 0.5})
+           AddRoundedBoard(scene, middle);
+       }},
   };
 }
 

@@ -3,8 +3,10 @@
 #include "render/film/reference.h"
 
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
+#include <set>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -31,6 +33,17 @@ Image Noisy(double deviation, unsigned seed) {
   for (float& pixel : pixels)
     pixel = static_cast<float>(normal(random));
   return Gray(pixels, std::to_string(seed));
+}
+
+// References of neighbouring seeds can be averaged, and measure images of any seed one types.
+TEST(ReferenceTest, HalvesShareNoSeedWithAnyOther) {
+  std::set<std::uint64_t> seeds;
+  for (std::uint64_t seed = 0; seed < 1000; ++seed) {
+    for (const std::uint64_t of_half : SeedsOfHalves(seed)) {
+      EXPECT_TRUE(seeds.insert(of_half).second) << seed;
+      EXPECT_GT(of_half, 1U << 30) << seed;
+    }
+  }
 }
 
 TEST(ReferenceTest, WorkedByHand) {
