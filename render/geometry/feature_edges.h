@@ -47,7 +47,7 @@ struct DiscSlab {
   float height = 0;
 };
 
-// Memory: 24 bytes a segment and about 28 in the tree; while it is built 24 per vertex and 76 per
+// Memory: 24 bytes a segment and about 28 in the tree; while it is built 24 per vertex and 80 per
 // triangle of the scene.
 class FeatureEdges {
  public:

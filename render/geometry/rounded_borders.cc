@@ -33,7 +33,9 @@ class Search {
       : positions_(positions),
         corners_(corners),
         across_(corners.size()),
-        normals_(corners.size() / 3) {
+        normals_(corners.size() / 3),
+        is_crest_(corners.size()),
+        reached_in_(corners.size() / 3) {
     for (std::uint32_t i = 0; i < normals_.size(); ++i) {
       const Double3 cross = Cross(At(3 * i + 1) - At(3 * i), At(3 * i + 2) - At(3 * i));
       const double twice_area = Length(cross);
@@ -55,9 +57,13 @@ class Search {
       if (across_[corner].corner != kNone && across_[corner].cosine <= kPlaneCosine)
         FindBeside(corner);
     }
-    std::ranges::sort(crests_);
-    crests_.erase(std::unique(crests_.begin(), crests_.end()), crests_.end());
-    return std::move(crests_);
+    std::vector<std::array<std::uint32_t, 2>> crests;
+    for (std::uint32_t side = 0; side < corners_.size(); ++side) {
+      if (!is_crest_[side]) continue;
+      const auto [low, high] = std::minmax(corners_[Next(side)], corners_[Next(Next(side))]);
+      crests.push_back({low, high});
+    }
+    return crests;
   }
 
  private:
@@ -97,7 +103,7 @@ class Search {
       return Length(to - along * (Dot(to, along) / squared));
     };
     double width = height_of(corner);
-    reached_.assign({{corner, false}});
+    BeginAt({corner, false});
     for (std::size_t i = 0; i < reached_.size(); ++i) {
       const Reached here = reached_[i];
       for (const std::uint32_t side : OtherSides(here.corner)) {
@@ -125,7 +131,7 @@ class Search {
     const double limit = kWidestBorder * WidthFrom(corner);
     // Each side of the first triangle ends there.
     if (!(distance_of(first) <= limit)) return;
-    reached_.assign({{first, IsTurnedOver(corner, first)}});
+    BeginAt({first, IsTurnedOver(corner, first)});
     for (std::size_t i = 0; i < reached_.size(); ++i) {
       const Reached here = reached_[i];
       for (const std::uint32_t side : OtherSides(here.corner)) {
@@ -134,9 +140,7 @@ class Search {
         if (distance_of(Next(side)) > limit || distance_of(Next(Next(side))) > limit) continue;
         const bool is_turned_over = here.is_turned_over != IsTurnedOver(side, other);
         if (Cosine(corner, other, is_turned_over) < kSameSurfaceCosine) {
-          const std::uint32_t a = corners_[Next(side)];
-          const std::uint32_t b = corners_[Next(Next(side))];
-          crests_.push_back({std::min(a, b), std::max(a, b)});
+          is_crest_[std::min(side, other)] = true;
         } else if (!WasReached(other)) {
           Reach({other, is_turned_over});
         }
@@ -144,20 +148,28 @@ class Search {
     }
   }
 
+  void BeginAt(Reached triangle) {
+    ++search_;
+    reached_.clear();
+    Reach(triangle);
+  }
   [[nodiscard]] bool WasReached(std::uint32_t corner) const {
-    return std::ranges::any_of(
-        reached_, [&](const Reached& reached) { return reached.corner / 3 == corner / 3; });
+    return reached_in_[corner / 3] == search_;
   }
   void Reach(Reached triangle) {
-    if (reached_.size() < kMostTriangles) reached_.push_back(triangle);
+    if (reached_.size() == kMostTriangles) return;
+    reached_.push_back(triangle);
+    reached_in_[triangle.corner / 3] = search_;
   }
 
   std::span<const Vec3> positions_;
   std::span<const std::uint32_t> corners_;
   std::vector<Across> across_;  // [corners]
   std::vector<Vec3> normals_;   // [triangles] unit, or 0 of one without area
+  std::vector<bool> is_crest_;  // [corners] the edge across, at one of its two corners
   std::vector<Reached> reached_;
-  std::vector<std::array<std::uint32_t, 2>> crests_;
+  std::vector<std::uint32_t> reached_in_;  // [triangles] the last search that did
+  std::uint32_t search_ = 0;
 };
 
 }  // namespace
