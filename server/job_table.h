@@ -34,6 +34,8 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
+
 #include "render/base/clock.h"
 #include "render/base/mutex.h"
 #include "render/base/status.h"
@@ -427,9 +429,8 @@ class JobTable {
   // that the process took since the last call. The time of a process cannot be told apart by jobs.
   void ShareCpu(const Moment& moment) LUCERNA_REQUIRES(mutex_);
   // Makes `change`, a function of JobLife that says whether the life has changed; returns that.
-  template <typename Change>
-  bool ChangeLife(std::uint64_t serial, Entry& entry, const Moment& moment, const Change& change)
-      LUCERNA_REQUIRES(mutex_);
+  bool ChangeLife(std::uint64_t serial, Entry& entry, const Moment& moment,
+                  absl::FunctionRef<bool(JobLife&)> change) LUCERNA_REQUIRES(mutex_);
   Duration CpuOf(const Entry& entry, const Moment& moment) const LUCERNA_REQUIRES(mutex_);
   // Of an entry that has changed.
   void Save(Entry& entry, SteadyTime now, Writes& writes) LUCERNA_REQUIRES(mutex_);
