@@ -18,7 +18,7 @@ constexpr float kPlaneCosine = 0.99985F;
 // A crest as far away as the face is wide is the next side of a prism, not a rounded border.
 constexpr double kWidestBorder = 0.25;  // of the width of the face
 // Of the triangles that are looked at around one border. A border of more is not found whole.
-constexpr std::size_t kMostTriangles = 64;
+constexpr std::size_t kMaxTriangles = 64;
 
 // A triangle that was reached through the edge across from `corner`.
 struct Reached {
@@ -26,10 +26,10 @@ struct Reached {
   bool is_turned_over = false;  // winds the other way round
 };
 
-class Search {
+class CrestSearch {
  public:
-  Search(std::span<const Vec3> positions, std::span<const std::uint32_t> corners,
-         std::span<const TriangleSide> sides)
+  CrestSearch(std::span<const Vec3> positions, std::span<const std::uint32_t> corners,
+              std::span<const TriangleSide> sides)
       : positions_(positions),
         corners_(corners),
         across_(corners.size()),
@@ -157,7 +157,7 @@ class Search {
     return reached_in_[corner / 3] == search_;
   }
   void Reach(Reached triangle) {
-    if (reached_.size() == kMostTriangles) return;
+    if (reached_.size() == kMaxTriangles) return;
     reached_.push_back(triangle);
     reached_in_[triangle.corner / 3] = search_;
   }
@@ -177,7 +177,7 @@ class Search {
 std::vector<std::array<std::uint32_t, 2>> CrestsOfRoundedBorders(
     std::span<const Vec3> positions, std::span<const std::uint32_t> corners,
     std::span<const TriangleSide> sides) {
-  return Search(positions, corners, sides).Crests();
+  return CrestSearch(positions, corners, sides).Crests();
 }
 
 }  // namespace lucerna
