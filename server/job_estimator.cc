@@ -123,7 +123,9 @@ struct PixelMeans {
   double photons = 0;  // what of `value` they brought
 };
 
-PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, ThreadTeam& team) {
+// `photons` of the means only where it `has_pilots` to compare them with.
+PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, bool has_pilots,
+                   ThreadTeam& team) {
   // Of pieces, added up in their order.
   constexpr std::size_t kPixelsAtOnce = 4096;
   struct Piece {
@@ -139,7 +141,7 @@ PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, ThreadTeam&
         means.values[pixel] = ValueAt(sums, pixel);
         pieces[piece].value += means.values[pixel];
         pieces[piece].factor += FactorAt(sums, radii, pixel);
-        pieces[piece].photons += PhotonValueAt(sums, pixel);
+        if (has_pilots) pieces[piece].photons += PhotonValueAt(sums, pixel);
       }
     }
   });
@@ -280,7 +282,7 @@ struct JobEstimator::State {
     learner->Add(reports, plan.guide, photons);
     // A guide that asks for no reports was learned from enough of them.
     if (!IsGuidePass(round.last) || before->reported() == 0) return before;
-    const PixelMeans means = MeansOf(*sums, *plan.radii, team);
+    const PixelMeans means = MeansOf(*sums, *plan.radii, AsksPilots(), team);
     const auto lock = HoldColors();
     return std::make_shared<const PhotonGuide>(learner->Next(
         round.last, photons_per_pass,
@@ -303,14 +305,19 @@ struct JobEstimator::State {
     return sent > 0 ? found / sent : 0;
   }
 
+  // Whether photons tell too little.
+  [[nodiscard]] bool AsksPilots() const {
+    constexpr double kEnoughFound = 0.125;
+    return EvenFoundShare() < kEnoughFound;
+  }
+
   // What pilot paths say of the emissions that the image needs, given what is known of its pixels.
   // None where photons tell enough.
   [[nodiscard]] PilotEmissions FindPilotEmissions(const RadiusColumn& in_use,
                                                   const PixelMeans& means) {
-    constexpr double kEnoughFound = 0.125;
     // A path's value over that of the pixel where it began. What few paths find is rare, not large.
     constexpr double kLargestValue = 64;
-    if (EvenFoundShare() >= kEnoughFound) return {};
+    if (!AsksPilots()) return {};
     if (!pilots) pilots = TracePilotPaths(*tracer, prepared.needs(), team);
     const auto power = static_cast<double>(Luminance(prepared.lights().TotalPower()));
     PilotEmissions found;
