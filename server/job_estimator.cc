@@ -95,13 +95,6 @@ double ValueAt(const ImageSums& sums, std::size_t pixel) {
          static_cast<double>(sums.passes());
 }
 
-// The same of what photons bring to it.
-double PhotonValueAt(const ImageSums& sums, std::size_t pixel) {
-  const RgbSum radiance = sums.At(pixel).photons;
-  return std::max(0.0, WorkingLuminance(radiance[0], radiance[1], radiance[2])) /
-         static_cast<double>(sums.passes());
-}
-
 // What a photon found by a pixel adds to its radiance, over its flux, but for a common factor:
 // albedo over the disc's area; 0 where no surface was met in the first passes (media).
 double FactorAt(const ImageSums& sums, const RadiusColumn& radii, std::size_t pixel) {
@@ -120,16 +113,13 @@ double FactorAt(const ImageSums& sums, const RadiusColumn& radii, std::size_t pi
 struct PixelMeans {
   std::vector<double> values;
   double value = 0, factor = 0;
-  double photons = 0;  // what of `value` they brought
 };
 
-// `photons` of the means only where it `has_pilots` to compare them with.
-PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, bool has_pilots,
-                   ThreadTeam& team) {
+PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, ThreadTeam& team) {
   // Of pieces, added up in their order.
   constexpr std::size_t kPixelsAtOnce = 4096;
   struct Piece {
-    double value = 0, factor = 0, photons = 0;
+    double value = 0, factor = 0;
   };
   std::vector<Piece> pieces((sums.pixels() + kPixelsAtOnce - 1) / kPixelsAtOnce);
   PixelMeans means;
@@ -141,14 +131,12 @@ PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, bool has_pi
         means.values[pixel] = ValueAt(sums, pixel);
         pieces[piece].value += means.values[pixel];
         pieces[piece].factor += FactorAt(sums, radii, pixel);
-        if (has_pilots) pieces[piece].photons += PhotonValueAt(sums, pixel);
       }
     }
   });
   for (const Piece& piece : pieces) {
     means.value += piece.value / static_cast<double>(sums.pixels());
     means.factor += piece.factor / static_cast<double>(sums.pixels());
-    means.photons += piece.photons / static_cast<double>(sums.pixels());
   }
   return means;
 }
@@ -282,7 +270,7 @@ struct JobEstimator::State {
     learner->Add(reports, plan.guide, photons);
     // A guide that asks for no reports was learned from enough of them.
     if (!IsGuidePass(round.last) || before->reported() == 0) return before;
-    const PixelMeans means = MeansOf(*sums, *plan.radii, AsksPilots(), team);
+    const PixelMeans means = MeansOf(*sums, *plan.radii, team);
     const auto lock = HoldColors();
     return std::make_shared<const PhotonGuide>(learner->Next(
         round.last, photons_per_pass,
@@ -290,7 +278,7 @@ struct JobEstimator::State {
           return PhotonScore(*sums, *plan.radii, settings.crop_width(), means, pixel);
         },
         [this](const PrimaryNumbers& numbers) { return EvenFlux(prepared.lights(), numbers); },
-        FindPilotEmissions(*plan.radii, means)));
+        PilotEmissions(*plan.radii, means)));
   }
 
   // The share of the photons drawn without a guide that hitpoints have found so far.
@@ -305,23 +293,18 @@ struct JobEstimator::State {
     return sent > 0 ? found / sent : 0;
   }
 
-  // Whether photons tell too little.
-  [[nodiscard]] bool AsksPilots() const {
-    constexpr double kEnoughFound = 0.125;
-    return EvenFoundShare() < kEnoughFound;
-  }
-
   // What pilot paths say of the emissions that the image needs, given what is known of its pixels.
   // None where photons tell enough.
-  [[nodiscard]] PilotEmissions FindPilotEmissions(const RadiusColumn& in_use,
-                                                  const PixelMeans& means) {
+  [[nodiscard]] std::vector<PilotEmission> PilotEmissions(const RadiusColumn& in_use,
+                                                          const PixelMeans& means) {
+    constexpr double kEnoughFound = 0.125;
     // A path's value over that of the pixel where it began. What few paths find is rare, not large.
     constexpr double kLargestValue = 64;
-    if (!AsksPilots()) return {};
+    if (EvenFoundShare() >= kEnoughFound) return {};
     if (!pilots) pilots = TracePilotPaths(*tracer, prepared.needs(), team);
     const auto power = static_cast<double>(Luminance(prepared.lights().TotalPower()));
-    PilotEmissions found;
-    found.emissions.reserve(pilots->reports.size());
+    std::vector<PilotEmission> emissions;
+    emissions.reserve(pilots->reports.size());
     const double paths_per_pixel =
         static_cast<double>(pilots->paths) / static_cast<double>(sums->pixels());
     for (const PilotReport& report : pilots->reports) {
@@ -338,13 +321,11 @@ struct JobEstimator::State {
       const double per_value =
           kPi64 * kPi64 / (factor * power * flux * FoundBy(in_use, report.pixel));
       if (!std::isfinite(brought * per_value)) continue;
-      found.emissions.push_back({.numbers = report.numbers,
-                                 .pixel = report.pixel,
-                                 .found = brought / paths_per_pixel * per_value});
-      found.brought += brought / static_cast<double>(pilots->paths);
+      emissions.push_back({.numbers = report.numbers,
+                           .pixel = report.pixel,
+                           .found = brought / paths_per_pixel * per_value});
     }
-    found.brought = means.photons > 0 ? found.brought / means.photons : HUGE_VAL;
-    return found;
+    return emissions;
   }
 
   // How many pixels find a photon that this pixel finds: as many as its disc covers.

@@ -17,7 +17,7 @@ namespace {
 // Paths are traced so many at a time, until there are enough reports of them.
 constexpr std::uint64_t kPathsAtOnce = 1024;
 constexpr std::uint64_t kMostPaths = 16384;
-constexpr std::size_t kEnoughReports = 4096;
+constexpr std::size_t kEnoughReports = 2048;
 // Weaker paths, over their weight at first, end by roulette, and all after so many vertices: what
 // is scattered more often adds little that others have not found.
 constexpr float kRouletteShare = 0.5F;
