@@ -37,17 +37,14 @@ namespace {
 
 constexpr double kPi64 = std::numbers::pi;
 // The number of photons of later passes is chosen after so many passes. What variance the choice
-// follows from is seen in rounds of one pass alone; the last choice follows from what was known
-// then.
+// follows from is seen in rounds of one pass alone.
 struct PhotonChoice {
   std::uint64_t passes;
-  // Over the photons of the first passes, at most. An image is the mean of its passes, so those
-  // that came before with fewer photons must be few among all; and two passes have seldom met rare
-  // light.
+  // Over the photons of the first passes, at most. A number never falls again, and few passes have
+  // seldom met rare light.
   std::uint64_t most;
 };
-constexpr std::array kPhotonChoices = {PhotonChoice{2, 2}, PhotonChoice{4, 4}, PhotonChoice{8, 4},
-                                       PhotonChoice{16, 4}, PhotonChoice{64, 8}};
+constexpr std::array kPhotonChoices = {PhotonChoice{4, 4}, PhotonChoice{8, 8}};
 
 // Whether a path may be bent by a smooth surface.
 bool HasSmoothSurfaces(const Scene& scene) {
@@ -92,7 +89,7 @@ std::string NameOf(const LightGroup& light, std::size_t number, double unit) {
 double ValueAt(const ImageSums& sums, std::size_t pixel) {
   const RgbSum radiance = sums.RadianceAt(pixel);
   return std::max(0.0, WorkingLuminance(radiance[0], radiance[1], radiance[2])) /
-         static_cast<double>(sums.passes());
+         sums.weights().all();
 }
 
 // What a photon found by a pixel adds to its radiance, over its flux, but for a common factor:
@@ -203,7 +200,6 @@ struct JobEstimator::State {
   std::unique_ptr<PixelRadii> radii;
   std::unique_ptr<ImageSums> sums;
   std::unique_ptr<PassVariance> variance;  // of the rounds of one pass, while they come
-  double best_photons = 0;                 // as it was known after the last of kPhotonChoices
   // What rounds follow from that are planned by the state after so many passes.
   struct After {
     std::shared_ptr<const RadiusColumn> radii;
@@ -244,20 +240,24 @@ struct JobEstimator::State {
                                                  : nullptr;
   }
 
+  // Passes of `plan` come next; takes the tail away.
+  void Weigh(const RoundPlan& plan) {
+    const double factor = sums->WeighBy(plan.photons_per_pass);
+    if (variance != nullptr) variance->Discount(factor);
+  }
+
   // How many photons later passes have once `round` has been added, given how many they would have
   // by what was known before.
   [[nodiscard]] std::uint64_t ChoosePhotons(const PassRange& round, std::uint64_t before) {
-    if (!settings.adaptive_photons) return before;
+    if (variance == nullptr) return before;
     const auto choice = std::ranges::find(kPhotonChoices, round.last, &PhotonChoice::passes);
     if (choice == kPhotonChoices.end()) return before;
-    if (variance != nullptr) {
-      const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
-      best_photons = variance->BestPhotons(
-          *sums, kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach);
-      if (round.last == kFirstLongRound) variance.reset();
-    }
+    const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
+    const double best = variance->BestPhotons(
+        *sums, kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach);
+    if (round.last == kPhotonChoices.back().passes) variance.reset();
     const auto first = static_cast<std::uint64_t>(settings.photons_per_pass);
-    return NextPhotons(before, choice->most * first, best_photons);
+    return NextPhotons(before, choice->most * first, best);
   }
 
   // By what later passes draw their photons once `round` is added, which brought `reports` of so
@@ -438,7 +438,7 @@ SliceSums JobEstimator::SliceOf(EyePass pass, const RoundPlan& plan, PassSums su
 void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundPlan& plan) {
   LUCERNA_CHECK(round->passes == RoundOf(whole_passes()));
   State& state = *state_;
-  state.sums->SetTail({});
+  state.Weigh(plan);
   if (state.variance != nullptr) state.variance->Add(*round, *state.sums);
   state.sums->Add(*round, state.team);
   state.radii->Step(*round, *plan.radii, state.team);
@@ -463,7 +463,10 @@ void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundP
 }
 
 void JobEstimator::SetTail(ImageSums::Slices tail, const RoundPlan& plan) {
-  if (!tail.empty()) state_->last_radii = plan.radii;
+  if (!tail.empty()) {
+    state_->Weigh(plan);
+    state_->last_radii = plan.radii;
+  }
   state_->sums->SetTail(std::move(tail));
 }
 
@@ -522,12 +525,12 @@ BandedImage JobEstimator::MakeBands() const {
                        Kernel{state.settings.kernel}, state_->team);
     ToFileUnit(band, scene.unit);
     if (!has_noise) return band;
+    const double weight = sums.weights().all();
     const auto errors_of = [&](std::size_t offset) {
       const ImageSums::Pixel of_pixel = sums.At(first + offset);
       PixelValues values;
       values.noise = static_cast<double>((*noise)[first + offset]);
-      values.bias = scene.film.exposure * (of_pixel.even_bias + of_pixel.odd_bias) /
-                    static_cast<double>(passes());
+      values.bias = scene.film.exposure * (of_pixel.even_bias + of_pixel.odd_bias) / weight;
       return values;
     };
     AddLayers(LayerSource::kPasses, errors_of, last - first, state_->team, band);
@@ -538,10 +541,9 @@ BandedImage JobEstimator::MakeBands() const {
 
 std::vector<float> JobEstimator::NoiseLayer() const {
   const ImageSums& sums = *state_->sums;
-  const auto passes_so_far = static_cast<double>(passes());
+  const PassWeights weights = sums.weights();
+  const double weight = weights.all();
   const double exposure = state_->prepared.scene().film.exposure;
-  const double even_passes = std::ceil(passes_so_far / 2);
-  const double odd_passes = passes_so_far - even_passes;
   const double noise_area = NoiseArea();
   std::vector<PixelNoise> noise(sums.pixels());
   constexpr std::size_t kPixelsAtOnce = 4096;
@@ -551,15 +553,14 @@ std::vector<float> JobEstimator::NoiseLayer() const {
       const double sum = exposure * LuminanceOf(ToRec709(of_pixel.radiance()));
       const double even_sum =
           0.5 * (sum + exposure * LuminanceOf(ToRec709(of_pixel.half_difference)));
-      const double variance = exposure * exposure * of_pixel.squared_deviations / passes_so_far;
+      const double variance = exposure * exposure * of_pixel.squared_deviations / weight;
       if (!(variance > 0)) continue;
-      const double difference = even_sum / even_passes - (sum - even_sum) / odd_passes;
-      const double largest = exposure * static_cast<double>(of_pixel.largest) - sum / passes_so_far;
+      const double difference = even_sum / weights.even - (sum - even_sum) / weights.odd;
+      const double largest = exposure * static_cast<double>(of_pixel.largest) - sum / weight;
       noise[pixel] = {
-          .of_halves =
-              difference * difference * even_passes * odd_passes / (passes_so_far * passes_so_far),
-          .of_passes = variance / (passes_so_far - 1),
-          .largest_share = std::min(1.0, largest * largest / (passes_so_far * variance))};
+          .of_halves = difference * difference * weights.even * weights.odd / (weight * weight),
+          .of_passes = variance / static_cast<double>(passes() - 1),
+          .largest_share = std::min(1.0, largest * largest / (weight * variance))};
     }
   });
   return NoiseOfPixels(state_->settings.crop_width(), state_->settings.crop_height(), noise_area,
@@ -583,6 +584,7 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
   snapshot.lights = state.sums->tally().lights;
   snapshot.image =
       ImageStatistics(state.settings.crop_width(), state.settings.crop_height(), passes());
+  snapshot.image.weights = state.sums->weights();
   const auto scaled = [](const RgbSum& color, double factor) {
     return std::array<float, 3>{static_cast<float>(factor * color[0]),
                                 static_cast<float>(factor * color[1]),
@@ -618,7 +620,7 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
     snapshot.luminance += of_piece[0];
     snapshot.photon_luminance += of_piece[1];
   }
-  const double per_pixel = 1 / (static_cast<double>(pixels) * static_cast<double>(passes()));
+  const double per_pixel = 1 / (static_cast<double>(pixels) * snapshot.image.weights.all());
   snapshot.luminance *= per_pixel;
   snapshot.photon_luminance *= per_pixel;
   return snapshot;
@@ -664,7 +666,7 @@ MissingLight JobEstimator::FindMissingLight(const EstimatorSnapshot& snapshot) c
   // down to a tenth of the mean.
   const double mean = snapshot.luminance;
   if (mean > 0) {
-    const double to_mean = 1 / (mean * exposure * static_cast<double>(snapshot.image.passes));
+    const double to_mean = 1 / (mean * exposure * snapshot.image.weights.all());
     double inverse = 0;
     const std::array<std::vector<float>, 3>& all = snapshot.image.all;
     for (std::size_t pixel = 0; pixel < snapshot.image.pixels(); ++pixel) {
@@ -718,7 +720,7 @@ MissingLight JobEstimator::FindMissingLight(const EstimatorSnapshot& snapshot) c
 
 TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference,
                                      const EstimatorSnapshot& snapshot) {
-  const double to_pixel = 1 / static_cast<double>(snapshot.image.passes);
+  const double to_pixel = 1 / snapshot.image.weights.all();
   std::vector<double> luminances(reference.size());
   for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
     const Rgb right = reference[pixel];
@@ -771,7 +773,6 @@ void JobEstimator::Save(ByteWriter& writer) const {
     WriteDouble(writer, state_->noise_area);
     writer.Varint(static_cast<std::uint64_t>(state_->noise_area_after));
   }
-  WriteDouble(writer, state.best_photons);
   writer.Byte(state.variance != nullptr ? 1 : 0);
   if (state.variance != nullptr) WriteVariance(writer, *state.variance);
 }
@@ -811,7 +812,6 @@ Status JobEstimator::State::RestoreSums(ByteReader& reader) {
   }
   const double read_noise_area = ReadDouble(reader);
   const auto read_noise_area_after = static_cast<std::int64_t>(reader.Varint());
-  const double read_best_photons = ReadDouble(reader);
   std::unique_ptr<PassVariance> read_variance;
   if (reader.Byte() != 0) {
     LUCERNA_ASSIGN_OR_RETURN(PassVariance read, ReadVariance(reader, pixels()));
@@ -831,7 +831,6 @@ Status JobEstimator::State::RestoreSums(ByteReader& reader) {
     noise_area = read_noise_area;
     noise_area_after = read_noise_area_after;
   }
-  best_photons = read_best_photons;
   return absl::OkStatus();
 }
 

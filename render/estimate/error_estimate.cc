@@ -128,7 +128,7 @@ class MeanAround {
 
   [[nodiscard]] float ValueAt(std::size_t channel, int x, int y) const {
     return static_cast<float>(static_cast<double>(image_.all[channel][At(x, y)]) /
-                              static_cast<double>(image_.passes));
+                              image_.weights.all());
   }
 
   const ImageStatistics& image_;
@@ -141,22 +141,21 @@ double LuminanceOfMean(const ImageStatistics& image, std::size_t pixel) {
   return LuminanceOf({static_cast<double>(image.all[0][pixel]),
                       static_cast<double>(image.all[1][pixel]),
                       static_cast<double>(image.all[2][pixel])}) /
-         static_cast<double>(image.passes);
+         image.weights.all();
 }
 
 // The share of the estimated bias that is taken off single pixels to guess their values without
 // blur: near 1 unless the estimate is mostly noise.
-double BelievedShare(const ImageStatistics& image, double even_passes, double odd_passes,
-                     double floor, ThreadTeam& team) {
+double BelievedShare(const ImageStatistics& image, double floor, ThreadTeam& team) {
   const auto w = static_cast<std::size_t>(image.width);
   const auto sums = SumOfRows<2>(team, image.height, [&](std::size_t row) {
     std::array<double, 2> of_row{};
     for (std::size_t i = row * w; i < (row + 1) * w; ++i) {
-      const auto mean = [](float sum, double passes) {
-        return static_cast<double>(static_cast<float>(static_cast<double>(sum) / passes));
+      const auto mean = [](float sum, double weight) {
+        return static_cast<double>(static_cast<float>(static_cast<double>(sum) / weight));
       };
-      const double even = mean(image.even_bias[i], even_passes);
-      const double odd = mean(image.odd_bias[i], odd_passes);
+      const double even = mean(image.even_bias[i], image.weights.even);
+      const double odd = mean(image.odd_bias[i], image.weights.odd);
       const double luminance = LuminanceOfMean(image, i);
       const double weight = 1 / (luminance * luminance + floor);
       of_row[0] += even * odd * weight;
@@ -492,7 +491,10 @@ double TwoSidedNormalQuantile(double probability) {
 }
 
 ImageStatistics::ImageStatistics(int image_width, int image_height, std::int64_t image_passes)
-    : width(image_width), height(image_height), passes(image_passes) {
+    : width(image_width),
+      height(image_height),
+      passes(image_passes),
+      weights(WeightsOf({0, static_cast<std::uint64_t>(image_passes)})) {
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   for (std::size_t c = 0; c < 3; ++c) {
     all[c].resize(pixels);
@@ -530,10 +532,10 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
   const int width = image.width;
   const int height = image.height;
   const auto passes = static_cast<double>(image.passes);
-  const auto even_passes = static_cast<double>((image.passes + 1) / 2);
-  const auto odd_passes = static_cast<double>(image.passes / 2);
+  const PassWeights& weights = image.weights;
+  const double weight_of_all = weights.all();
   // From the squared difference of the halves' means to the squared noise of the whole mean.
-  const double to_noise = even_passes * odd_passes / (passes * passes);
+  const double to_noise = weights.even * weights.odd / (weight_of_all * weight_of_all);
   const double z = TwoSidedNormalQuantile((1 - kConfidence) * SpentAt(look));
 
   const auto w = static_cast<std::size_t>(width);
@@ -562,7 +564,7 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
       least_luminance[i] = static_cast<float>(LuminanceOfMean(image, i));
   });
   least_luminance = LeastLuminance(width, height, std::move(least_luminance), team);
-  const double believed = BelievedShare(image, even_passes, odd_passes, floor, team);
+  const double believed = BelievedShare(image, floor, team);
   // What a pixel's statistics give takes their place, but for `all`, which its neighbours need.
   std::vector<float>& relative_noises = image.half_difference[0];
   std::vector<float>& noises = image.half_difference[1];
@@ -593,10 +595,10 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
       for (std::size_t c = 0; c < 3; ++c) {
         even_sum[c] = 0.5 * (all[c] + half_difference[c]);
         odd_sum[c] = 0.5 * (all[c] - half_difference[c]);
-        const double even = even_sum[c] / even_passes;
-        const double odd = odd_sum[c] / odd_passes;
+        const double even = even_sum[c] / weights.even;
+        const double odd = odd_sum[c] / weights.odd;
         difference[c] = even - odd;
-        const double own = all[c] / passes;
+        const double own = all[c] / weight_of_all;
         const double agreed = Middle(even, odd, around(c, x, y));
         const double least = std::min(own, agreed);
         // One over value² + floor. The agreed value is too large where rare light fell on the
@@ -611,24 +613,24 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
       noises[pixel] = static_cast<float>(noise_sum / 3);
       relative_noises[pixel] = static_cast<float>(relative_noise / 3);
       differences[pixel] = static_cast<float>(signed_noise);
-      const double even_bias = static_cast<double>(sums.even_bias) / even_passes;
-      const double odd_bias = static_cast<double>(sums.odd_bias) / odd_passes;
+      const double even_bias = static_cast<double>(sums.even_bias) / weights.even;
+      const double odd_bias = static_cast<double>(sums.odd_bias) / weights.odd;
       // One over value² + floor as a half has it without `share` of the bias, times the squared
       // colour of the bias.
-      const double mean = LuminanceOf(all) / passes;
+      const double mean = LuminanceOf(all) / weight_of_all;
       const auto color_over_value = [&](double half, double bias, double share) {
         const double unblurred =
             std::max({static_cast<double>(least_luminance[pixel]), half - share * bias, 0.0});
         const double of_mean = mean > 0 ? unblurred / mean : 0;
         double sum = 0;
         for (std::size_t c = 0; c < 3; ++c) {
-          const double value = of_mean * all[c] / passes;
+          const double value = of_mean * all[c] / weight_of_all;
           sum += bias_color[c] * bias_color[c] / (value * value + floor);
         }
         return sum / 3;
       };
-      const double even = LuminanceOf(even_sum) / even_passes;
-      const double odd = LuminanceOf(odd_sum) / odd_passes;
+      const double even = LuminanceOf(even_sum) / weights.even;
+      const double odd = LuminanceOf(odd_sum) / weights.odd;
       const double square_to_even = color_over_value(even, even_bias, believed);
       const double square_to_odd = color_over_value(odd, odd_bias, believed);
       const double of_even = std::sqrt(square_to_even);
@@ -652,7 +654,7 @@ ErrorEstimate EstimateError(ImageStatistics image, int look, ThreadTeam& team) {
       odd_to_odd[pixel] = static_cast<float>(odd_bias * of_odd);
       const double luminance = LuminanceOf(difference);
       halves += luminance * luminance * to_noise;
-      independent += static_cast<double>(sums.squared_deviations) / (passes * (passes - 1));
+      independent += static_cast<double>(sums.squared_deviations) / (weight_of_all * (passes - 1));
     }
     return std::array<double, 2>{halves, independent};
   };

@@ -48,6 +48,7 @@
 #include <vector>
 
 #include "render/base/parallel.h"
+#include "render/estimate/pass_weights.h"
 #include "render/estimate/relative_error.h"
 
 namespace lucerna {
@@ -85,7 +86,8 @@ struct ErrorEstimate {
   double noise_area = 1;
 };
 
-// What passes brought to one pixel, in the colours and the exposure of the image: sums over passes.
+// What passes brought to one pixel, in the colours and the exposure of the image: weighted sums
+// over passes.
 struct PixelStatistics {
   std::array<float, 3> all{};
   std::array<float, 3> half_difference{};  // even passes less odd ones
@@ -96,7 +98,7 @@ struct PixelStatistics {
 // Of all pixels, as columns, row-major: they are used up one by one.
 struct ImageStatistics {
   ImageStatistics() = default;
-  // All zero.
+  // All zero; passes weigh 1 each.
   ImageStatistics(int image_width, int image_height, std::int64_t image_passes);
 
   [[nodiscard]] std::size_t pixels() const { return squared_deviations.size(); }
@@ -105,6 +107,7 @@ struct ImageStatistics {
 
   int width = 0, height = 0;
   std::int64_t passes = 0;
+  PassWeights weights;
   // [pixels] what PixelStatistics has by these names.
   std::array<std::vector<float>, 3> all, half_difference, bias_color;
   std::vector<float> squared_deviations, even_bias, odd_bias;

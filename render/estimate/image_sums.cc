@@ -1,6 +1,7 @@
 #include "render/estimate/image_sums.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "render/base/status.h"
@@ -8,17 +9,26 @@
 namespace lucerna {
 namespace {
 
-double LuminanceOfSum(const ImageSums::Pixel& sum) {
-  const RgbSum radiance = sum.radiance();
-  return WorkingLuminance(radiance[0], radiance[1], radiance[2]);
+double LuminanceOfWorking(const RgbSum& color) {
+  return WorkingLuminance(color[0], color[1], color[2]);
+}
+
+// By what sums of direct light become sums with the weight of the photons.
+double DirectFactor(double passes, const PassWeights& weights) {
+  return passes > 0 ? weights.all() / passes : 1;
+}
+
+// A difference of direct light, of which the luminance is known, has the colour of direct light.
+double ColoredDifference(double difference, double direct, double direct_luminance) {
+  return direct_luminance > 0 ? difference * direct / direct_luminance : 0;
 }
 
 // The squared deviations of two groups of passes together.
-double TogetherDeviating(double one, double other, double passes, double luminance,
+double TogetherDeviating(double one, double other, double weight, double luminance,
                          double slice_passes, double slice_luminance) {
   const double of_both = one + other;
-  if (!(passes > 0)) return of_both;
-  return of_both + DeviationBetween(passes, luminance, slice_passes, slice_luminance);
+  if (!(weight > 0)) return of_both;
+  return of_both + DeviationBetween(weight, luminance, slice_passes, slice_luminance);
 }
 
 // A float that grows by another, as columns of floats do.
@@ -29,7 +39,8 @@ void Grow(double& sum, float by) {
 }  // namespace
 
 ImageSums::Columns::Columns(std::size_t pixels)
-    : squared_deviations(pixels),
+    : direct_difference(pixels),
+      squared_deviations(pixels),
       even_bias(pixels),
       odd_bias(pixels),
       photon_count(pixels),
@@ -54,12 +65,55 @@ void ImageSums::Add(const SliceSums& slice, ThreadTeam& team) {
       AddTo(whole_.features[pixel], slice, pixel);
   });
   whole_.passes = slice.passes.last;
+  whole_.weights += WeightsOf(slice.passes);
   whole_.eye_rays += slice.eye_rays;
   whole_.tally += slice.tally;
 }
 
+// By this thread, for the same reason as AddDeviations.
+double ImageSums::WeighBy(std::uint64_t photons_per_pass) {
+  LUCERNA_CHECK(photons_per_pass > 0);
+  tail_.clear();
+  const double factor =
+      static_cast<double>(whole_.photons_per_pass) / static_cast<double>(photons_per_pass);
+  whole_.photons_per_pass = photons_per_pass;
+  if (whole_.passes == 0 || factor == 1) return 1;
+  const auto scale = [](auto& column, auto by) {
+    for (auto& sum : column)
+      sum *= by;
+  };
+  for (std::size_t pixel = 0; pixel < pixels(); ++pixel) {
+    const auto direct = [&](std::size_t c) { return whole_.columns.radiance[3 + c][pixel]; };
+    const double luminance = WorkingLuminance(direct(0), direct(1), direct(2));
+    const auto difference = static_cast<double>(whole_.columns.direct_difference[pixel]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      float& of_both = whole_.columns.half_difference[c][pixel];
+      of_both =
+          static_cast<float>(factor * static_cast<double>(of_both) +
+                             (1 - factor) * ColoredDifference(difference, direct(c), luminance));
+    }
+  }
+  for (std::size_t c = 0; c < 3; ++c)
+    scale(whole_.columns.radiance[c], factor);
+  scale(whole_.columns.squared_deviations, factor);
+  scale(whole_.columns.even_bias, static_cast<float>(factor));
+  scale(whole_.columns.odd_bias, static_cast<float>(factor));
+  scale(whole_.columns.largest, static_cast<float>(std::sqrt(factor)));
+  whole_.weights.even *= factor;
+  whole_.weights.odd *= factor;
+  whole_.weights.squares *= factor * factor;
+  return factor;
+}
+
+PassWeights ImageSums::weights() const {
+  PassWeights weights = whole_.weights;
+  weights += WeightsOf({whole_.passes, passes()});
+  return weights;
+}
+
 void ImageSums::AddDeviations(const SliceSums& slice) {
-  const auto passes = static_cast<double>(whole_.passes);
+  const double weight = whole_.weights.all();
+  const double of_direct = DirectFactor(static_cast<double>(whole_.passes), whole_.weights);
   const auto slice_passes = static_cast<double>(slice.passes.size());
   std::array<const double*, 6> radiance{};
   std::array<std::array<float, kPixelsUnpacked>, 6> added;
@@ -76,13 +130,13 @@ void ImageSums::AddDeviations(const SliceSums& slice) {
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t pixel = first + i;
       const auto before = [&](std::size_t c) {
-        return radiance[c][pixel] + radiance[c + 3][pixel];
+        return radiance[c][pixel] + of_direct * radiance[c + 3][pixel];
       };
       const auto of_slice = [&](std::size_t c) {
         return static_cast<double>(added[c][i]) + static_cast<double>(added[c + 3][i]);
       };
       deviations[pixel] =
-          TogetherDeviating(deviations[pixel], static_cast<double>(slice_deviations[i]), passes,
+          TogetherDeviating(deviations[pixel], static_cast<double>(slice_deviations[i]), weight,
                             WorkingLuminance(before(0), before(1), before(2)), slice_passes,
                             WorkingLuminance(of_slice(0), of_slice(1), of_slice(2)));
     }
@@ -109,6 +163,7 @@ void ImageSums::AddPixels(const SliceSums& slice, std::size_t begin, std::size_t
   }
   for (std::size_t c = 0; c < 3; ++c)
     to_each(whole_.columns.half_difference[c], kHalfDifference + c, add);
+  to_each(whole_.columns.direct_difference, kDirectDifference, add);
   to_each(whole_.columns.even_bias, kEvenBias, add);
   to_each(whole_.columns.odd_bias, kOddBias, add);
   to_each(whole_.columns.photon_count, kPhotonCount, add);
@@ -144,26 +199,55 @@ BatchTally ImageSums::tally() const {
 }
 
 ImageSums::Pixel ImageSums::At(std::size_t pixel) const {
-  Pixel sum;
+  RawPixel raw;
+  Pixel& sum = raw.sum;
   for (std::size_t c = 0; c < 3; ++c) {
     sum.photons[c] = whole_.columns.radiance[c][pixel];
     sum.direct[c] = whole_.columns.radiance[3 + c][pixel];
     sum.half_difference[c] = static_cast<double>(whole_.columns.half_difference[c][pixel]);
   }
+  raw.direct_difference = static_cast<double>(whole_.columns.direct_difference[pixel]);
   sum.squared_deviations = whole_.columns.squared_deviations[pixel];
   sum.even_bias = static_cast<double>(whole_.columns.even_bias[pixel]);
   sum.odd_bias = static_cast<double>(whole_.columns.odd_bias[pixel]);
   sum.photon_count = static_cast<double>(whole_.columns.photon_count[pixel]);
   sum.largest = whole_.columns.largest[pixel];
-  std::uint64_t passes = whole_.passes;
+  PassRange before = {0, whole_.passes};
+  PassWeights weights = whole_.weights;
   for (const auto& slice : tail_) {
-    AddTo(sum, passes, *slice, pixel);
-    passes = slice->passes.last;
+    AddTo(raw, before, weights, *slice, pixel);
+    before.last = slice->passes.last;
+    weights += WeightsOf(slice->passes);
   }
+  Reweigh(raw, before.last, weights);
   return sum;
 }
 
+// What photons brought is a mean times a weight already; direct light and the difference of halves
+// become such.
+void ImageSums::Reweigh(RawPixel& raw, std::uint64_t passes, const PassWeights& weights) {
+  const PassWeights counts = WeightsOf({0, passes});
+  if (weights == counts || !(weights.even > 0 && weights.odd > 0)) return;
+  Pixel& sum = raw.sum;
+  const double weight = weights.all();
+  const double luminance = LuminanceOfWorking(sum.direct);
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto difference_of_means = [](double of_all, double difference, const PassWeights& by) {
+      return (of_all + difference) / (2 * by.even) - (of_all - difference) / (2 * by.odd);
+    };
+    const double of_direct = ColoredDifference(raw.direct_difference, sum.direct[c], luminance);
+    const double of_photons = sum.half_difference[c] - of_direct;
+    const double difference = difference_of_means(sum.photons[c], of_photons, weights) +
+                              difference_of_means(sum.direct[c], of_direct, counts);
+    sum.direct[c] *= weight / counts.all();
+    // Such that difference_of_means of the whole radiance is that difference again.
+    const double without = difference_of_means(sum.photons[c] + sum.direct[c], 0, weights);
+    sum.half_difference[c] = 2 * (difference - without) * weights.even * weights.odd / weight;
+  }
+}
+
 RgbSum ImageSums::RadianceAt(std::size_t pixel) const {
+  const double of_direct = DirectFactor(static_cast<double>(passes()), weights());
   RgbSum radiance{};
   for (std::size_t c = 0; c < 3; ++c) {
     double photons = whole_.columns.radiance[c][pixel];
@@ -172,7 +256,7 @@ RgbSum ImageSums::RadianceAt(std::size_t pixel) const {
       photons += static_cast<double>(slice->At(kPhotonRadiance + c, pixel));
       direct += static_cast<double>(slice->At(kDirectRadiance + c, pixel));
     }
-    radiance[c] = photons + direct;
+    radiance[c] = photons + of_direct * direct;
   }
   return radiance;
 }
@@ -184,21 +268,27 @@ ImageSums::Features ImageSums::FeaturesAt(std::size_t pixel) const {
   return sum;
 }
 
-void ImageSums::AddTo(Pixel& sum, std::uint64_t passes, const SliceSums& slice, std::size_t pixel) {
+void ImageSums::AddTo(RawPixel& raw, const PassRange& before, const PassWeights& weights,
+                      const SliceSums& slice, std::size_t pixel) {
   const auto at = [&](std::size_t column) { return slice.At(column, pixel); };
-  const double before = LuminanceOfSum(sum);
-  Pixel alone;
+  Pixel& sum = raw.sum;
+  const double of_direct = DirectFactor(static_cast<double>(before.size()), weights);
+  RgbSum radiance_before{};
+  RgbSum alone{};
   for (std::size_t c = 0; c < 3; ++c) {
-    alone.photons[c] = static_cast<double>(at(kPhotonRadiance + c));
-    alone.direct[c] = static_cast<double>(at(kDirectRadiance + c));
-    sum.photons[c] += alone.photons[c];
-    sum.direct[c] += alone.direct[c];
+    radiance_before[c] = sum.photons[c] + of_direct * sum.direct[c];
+    const auto photons = static_cast<double>(at(kPhotonRadiance + c));
+    const auto direct = static_cast<double>(at(kDirectRadiance + c));
+    alone[c] = photons + direct;
+    sum.photons[c] += photons;
+    sum.direct[c] += direct;
     Grow(sum.half_difference[c], at(kHalfDifference + c));
   }
+  Grow(raw.direct_difference, at(kDirectDifference));
   sum.squared_deviations =
       TogetherDeviating(sum.squared_deviations, static_cast<double>(at(kSquaredDeviations)),
-                        static_cast<double>(passes), before,
-                        static_cast<double>(slice.passes.size()), LuminanceOfSum(alone));
+                        weights.all(), LuminanceOfWorking(radiance_before),
+                        static_cast<double>(slice.passes.size()), LuminanceOfWorking(alone));
   sum.largest = std::max(sum.largest, at(kLargestLuminance));
   Grow(sum.even_bias, at(kEvenBias));
   Grow(sum.odd_bias, at(kOddBias));

@@ -81,17 +81,25 @@ std::uint64_t PassesFor(const PhotonSteps& steps, std::uint64_t photons) {
 void PassVariance::Add(const SliceSums& pass, const ImageSums& before) {
   LUCERNA_CHECK(pass.passes == (PassRange{before.passes(), before.passes() + 1}) &&
                 pass.pixels() == pixels_.size() && before.pixels() == pixels_.size());
-  const auto passes = static_cast<double>(before.passes());
+  const double weight = before.weights().all();
   const auto add = [](float& sum, double value) { sum = Held(static_cast<double>(sum) + value); };
   for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const auto at = [&](std::size_t column) { return static_cast<double>(pass.At(column, i)); };
     const double photons =
         WorkingLuminance(at(kPhotonRadiance), at(kPhotonRadiance + 1), at(kPhotonRadiance + 2));
-    if (passes > 0) {
+    if (weight > 0) {
       add(pixels_[i].deviations,
-          DeviationBetween(passes, LuminanceOfWorking(before.At(i).photons), 1, photons));
+          DeviationBetween(weight, LuminanceOfWorking(before.At(i).photons), 1, photons));
     }
     if (before.passes() % 2 == 0) add(pixels_[i].even, photons);
+  }
+}
+
+void PassVariance::Discount(double factor) {
+  if (factor == 1) return;
+  for (Pixel& pixel : pixels_) {
+    pixel.even = Held(factor * static_cast<double>(pixel.even));
+    pixel.deviations = Held(factor * static_cast<double>(pixel.deviations));
   }
 }
 
@@ -99,14 +107,14 @@ PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noi
   LUCERNA_CHECK(sums.passes() >= 2 && sums.whole_passes() == sums.passes() &&
                 sums.pixels() == pixels_.size());
   const auto passes = static_cast<double>(sums.passes());
-  const double even_passes = std::ceil(passes / 2);
-  const double odd_passes = passes - even_passes;
+  const PassWeights weights = sums.weights();
+  const double weight_of_all = weights.all();
   double floor = 0;
   {
     std::vector<double> luminances;
     luminances.reserve(pixels_.size());
     for (std::size_t i = 0; i < pixels_.size(); ++i)
-      luminances.push_back(LuminanceOfWorking(sums.RadianceAt(i)) / passes);
+      luminances.push_back(LuminanceOfWorking(sums.RadianceAt(i)) / weight_of_all);
     floor = RelativeErrorFloor(luminances);
   }
   if (!(floor > 0)) return {};
@@ -121,27 +129,31 @@ PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noi
   };
   std::vector<Variances> variances;
   variances.reserve(pixels_.size());
-  const double halves = even_passes * odd_passes / passes;
+  // From the squared difference of the halves' means to the variance of a pass. Of direct light all
+  // passes weigh the same.
+  const PassWeights counts = WeightsOf({0, sums.passes()});
+  const double halves = counts.even * counts.odd / passes;
   for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const ImageSums::Pixel pixel = sums.At(i);
     const double sum = LuminanceOfWorking(pixel.radiance());
     const double photon_sum = LuminanceOfWorking(pixel.photons);
-    const double weight = 1 / (sum / passes * (sum / passes) + floor);
+    const double weight = 1 / (sum / weight_of_all * (sum / weight_of_all) + floor);
     const auto difference = [&](double of_all, double even) {
-      return even / even_passes - (of_all - even) / odd_passes;
+      return even / weights.even - (of_all - even) / weights.odd;
     };
     const double all = difference(sum, 0.5 * (sum + LuminanceOfWorking(pixel.half_difference)));
     const double of_photons = difference(photon_sum, static_cast<double>(pixels_[i].even));
-    const double photons = photon_sum / passes;
+    const double photons = photon_sum / weight_of_all;
     const double count = pixel.photon_count;
     variances.push_back(
         {.all = Held(weight * pixel.squared_deviations / (passes - 1)),
          .photons = Held(weight * static_cast<double>(pixels_[i].deviations) / (passes - 1)),
          .photons_found =
-             count > 0 ? Held(weight * photons * photons * kernel_noise * passes / count) : 0,
+             count > 0 ? Held(weight * photons * photons * kernel_noise * weight_of_all / count)
+                       : 0,
          // N equals whose squares are expected to be k times that of their mean: of the square of
          // their sum N k of N k + N (N - 1).
-         .independent = count > 0 ? Held(weight * photons * photons * kernel_noise * passes /
+         .independent = count > 0 ? Held(weight * photons * photons * kernel_noise * weight_of_all /
                                          (count + kernel_noise - 1))
                                   : 0,
          .eye_paths = Held(weight * (all * all - of_photons * of_photons) * halves)});
@@ -160,9 +172,13 @@ PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noi
   // hardly any, or where low discrepancy spaces them evenly.
   const double all_photons = mean(&Variances::photons);
   const double photons = std::min(mean(&Variances::photons_found), all_photons);
-  return {.photons = photons,
-          .eye_paths = std::max(0.0, mean(&Variances::eye_paths)) + all_photons - photons,
-          .is_evenly_spaced = mean(&Variances::independent) > kEvenlySpaced * all_photons};
+  // Weights follow from photons, whose variance per weight they make even. Eye paths scatter alike
+  // in every pass, so that of passes that weigh little they say too little.
+  const double of_passes = (passes - 1) / (weight_of_all - weights.squares / weight_of_all);
+  return {
+      .photons = photons,
+      .eye_paths = std::max(0.0, mean(&Variances::eye_paths)) + of_passes * (all_photons - photons),
+      .is_evenly_spaced = mean(&Variances::independent) > kEvenlySpaced * all_photons};
 }
 
 PassVariance::Costs PassVariance::CostsOf(const ImageSums& sums) {
@@ -177,13 +193,14 @@ double PassVariance::BestPhotons(const ImageSums& sums, double kernel_noise) con
   if (IsStarved(sums)) return std::numeric_limits<double>::infinity();
   const Parts variance = Split(sums, kernel_noise);
   if (!(variance.photons > 0)) return 0;
-  const double present =
-      static_cast<double>(sums.tally().photons) / static_cast<double>(sums.passes());
+  const double weight = sums.weights().all();
+  const double present = static_cast<double>(sums.tally().photons) / weight;
   if (variance.is_evenly_spaced) return present;
   if (!(variance.eye_paths > 0)) return std::numeric_limits<double>::infinity();
   const Costs costs = CostsOf(sums);
-  return present *
-         std::sqrt(variance.photons * costs.eye_paths / (variance.eye_paths * costs.photons));
+  const double eye_paths = costs.eye_paths / static_cast<double>(sums.passes());
+  const double photons = costs.photons / weight;
+  return present * std::sqrt(variance.photons * eye_paths / (variance.eye_paths * photons));
 }
 
 std::uint64_t NextPhotons(std::uint64_t present, std::uint64_t most, double best) {

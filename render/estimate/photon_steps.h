@@ -40,9 +40,12 @@ class PassVariance {
 
   // Requires a slice of one pass, which is added to the sums `before` later.
   void Add(const SliceSums& pass, const ImageSums& before);
+  // As ImageSums::WeighBy returns it.
+  void Discount(double factor);
 
-  // Parts of the variance of a pass, as means over the pixels, relative to the squared value (with
-  // the floor of relative errors). The pixels that vary most are left out, as in relative errors.
+  // Parts of the variance of a pass of weight 1, as means over the pixels, relative to the squared
+  // value (with the floor of relative errors). The pixels that vary most are left out, as in
+  // relative errors.
   struct Parts {
     // Of photons: falls as one over their number.
     double photons = 0;
@@ -67,16 +70,16 @@ class PassVariance {
   [[nodiscard]] static Costs CostsOf(const ImageSums& sums);
 
   // The number of photons a pass that has the least variance for the time: with variances v and
-  // costs c of photons and eye paths, sqrt(v_photons c_eye / (v_eye c_photons)) times the mean
-  // number so far. 0 where photons bring nothing, and infinite where all variance is theirs. That
-  // mean number itself where photons are evenly spaced: with another number, later passes take up
+  // costs c of photons and eye paths, sqrt(v_photons c_eye / (v_eye c_photons)) times that of
+  // a pass of weight 1. 0 where photons bring nothing, and infinite where all variance is theirs.
+  // That number itself where photons are evenly spaced: with another number, later passes take up
   // another place of their sequence, and lose more than they gain.
   // Infinite too where most pixels have found no photon yet, though those that were found bring a
   // good part of the light: the variance of photons is not seen then.
   // Requires sums as Split does.
   [[nodiscard]] double BestPhotons(const ImageSums& sums, double kernel_noise) const;
 
-  // Of what photons brought to a pixel.
+  // Of what photons brought to a pixel, weighted.
   struct Pixel {
     float even = 0;        // luminance of the even passes
     float deviations = 0;  // squared, of passes' luminances from their mean

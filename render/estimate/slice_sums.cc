@@ -25,6 +25,10 @@ class Radiance {
   [[nodiscard]] double luminance(std::size_t i) const {
     return WorkingLuminance(channel(0, i), channel(1, i), channel(2, i));
   }
+  [[nodiscard]] double direct_luminance(std::size_t i) const {
+    const auto direct = [&](std::size_t c) { return static_cast<double>(columns_[c + 3][i]); };
+    return WorkingLuminance(direct(0), direct(1), direct(2));
+  }
   [[nodiscard]] float by_photons(std::size_t c, std::size_t i) const { return columns_[c][i]; }
 
  private:
@@ -188,6 +192,9 @@ void SliceSums::Read(std::size_t column, std::size_t begin, std::span<float> val
     if (column == kLargestLuminance) {
       for (std::size_t i = 0; i < count; ++i)
         here[i] = Rounded(std::max(0.0, radiance.luminance(i)), bits);
+    } else if (column == kDirectDifference) {
+      for (std::size_t i = 0; i < count; ++i)
+        here[i] = Rounded(half * radiance.direct_luminance(i), bits);
     } else {
       for (std::size_t i = 0; i < count; ++i)
         here[i] = Rounded(half * radiance.channel(column - kHalfDifference, i), bits);

@@ -44,6 +44,7 @@ enum SliceColumn : std::size_t {
   kDirectRadiance = kPhotonRadiance + 3,     // 3: without photons
   kHalfDifference = kDirectRadiance + 3,     // 3: of even passes less that of odd ones
   kSquaredDeviations = kHalfDifference + 3,  // of passes' luminances from their mean
+  kDirectDifference,                         // luminance: of kHalfDifference without photons
   kLargestLuminance,                         // of a pass
   kEvenBias,                                 // luminance by which kernels changed even passes
   kOddBias,                                  // and odd ones
@@ -124,8 +125,9 @@ struct SliceShape {
                                                      std::size_t evidence) {
   const std::size_t first_statistic =
       passes == 1 ? std::size_t{kSquaredDeviations} : std::size_t{kHalfDifference};
-  const bool is_statistic =
-      column >= first_statistic && column < kSliceColumns + evidence && column != kPhotonCount;
+  const bool is_radiance = passes == 1 && column == kDirectDifference;
+  const bool is_statistic = column >= first_statistic && column < kSliceColumns + evidence &&
+                            column != kPhotonCount && !is_radiance;
   return is_statistic ? 8 : 16;
 }
 

@@ -18,7 +18,7 @@ std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t f
                                          ThreadTeam& team) {
   LUCERNA_CHECK(sums.passes() > 0 && first <= last && last <= sums.pixels());
   std::vector<ImageChannel> channels;
-  const double to_pixel = format.exposure / static_cast<double>(sums.passes());
+  const double to_pixel = format.exposure / sums.weights().all();
   // Of the pixel's hitpoints [scene units]; 0 where there was none.
   const auto unit_radius = [&](std::size_t pixel) {
     const ImageSums::Features features = sums.FeaturesAt(pixel);

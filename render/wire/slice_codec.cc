@@ -13,7 +13,7 @@
 namespace lucerna {
 namespace {
 
-constexpr std::string_view kMagic = "LSL4";
+constexpr std::string_view kMagic = "LSL5";
 
 // The column that a column is predicted from: green, of radiance. Itself: from none.
 std::size_t BaseOf(std::size_t column) {

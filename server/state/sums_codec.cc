@@ -42,14 +42,15 @@ void ForEachColumn(Columns& columns, const Visitor& column) {
     column(sums);
   for (auto& sums : columns.half_difference)
     column(sums);
+  column(columns.direct_difference);
   column(columns.squared_deviations);
   for (auto* sums :
        {&columns.even_bias, &columns.odd_bias, &columns.photon_count, &columns.largest})
     column(*sums);
 }
-constexpr std::size_t kPixelBytes = 7 * sizeof(double) + 7 * sizeof(float);
+constexpr std::size_t kPixelBytes = 7 * sizeof(double) + 8 * sizeof(float);
 // A column that is not in ForEachColumn would be lost.
-static_assert(sizeof(ImageSums::Columns) == 14 * sizeof(std::vector<float>));
+static_assert(sizeof(ImageSums::Columns) == 15 * sizeof(std::vector<float>));
 
 // Rows are written as they lie in memory, without gaps.
 static_assert(sizeof(ImageSums::Features) == 8 * sizeof(float) + 2 * sizeof(std::uint16_t));
@@ -162,6 +163,10 @@ StatusOr<GuideLearner::Numbers> ReadLearned(ByteReader& reader, std::size_t pixe
 
 void WriteSums(ByteWriter& writer, const ImageSums::Whole& sums) {
   writer.Varint(sums.passes);
+  WriteDouble(writer, sums.weights.even);
+  WriteDouble(writer, sums.weights.odd);
+  WriteDouble(writer, sums.weights.squares);
+  writer.Varint(sums.photons_per_pass);
   writer.Varint(sums.eye_rays);
   WriteTally(writer, sums.tally);
   ForEachColumn(sums.columns, [&](const auto& column) { WriteColumn(writer, column); });
@@ -171,7 +176,16 @@ void WriteSums(ByteWriter& writer, const ImageSums::Whole& sums) {
 StatusOr<ImageSums::Whole> ReadSums(ByteReader& reader, std::size_t pixels) {
   ImageSums::Whole sums;
   sums.passes = reader.Varint();
+  sums.weights.even = ReadDouble(reader);
+  sums.weights.odd = ReadDouble(reader);
+  sums.weights.squares = ReadDouble(reader);
+  sums.photons_per_pass = reader.Varint();
   sums.eye_rays = reader.Varint();
+  if (const double weight = sums.weights.all(); !std::isfinite(weight) ||
+                                                (weight > 0) != (sums.passes > 0) ||
+                                                (sums.passes > 0 && sums.photons_per_pass == 0)) {
+    return Malformed("passes have no weight");
+  }
   LUCERNA_ASSIGN_OR_RETURN(sums.tally, ReadTally(reader));
   if (!HasRows(reader, pixels, kPixelBytes + sizeof(ImageSums::Features))) {
     return Malformed("sums are missing");

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """How does the error fall with time, and how true is what the program says of it?
 
-  tests/bench/convergence.py [--times 1,5] [--reference-s 300] [--size 128x128]
-                             [--settings default,pppm,frequency-mse] [--scenes NAME,...]
+  tests/bench/convergence.py [--times 1,5] [--settings default,pppm,frequency-mse]
+                             [--scenes NAME,...] [--references-only]
 
 Renders the twelve scenes of half B of make_study_scenes.py (no constant of the error estimate has
 seen them) and twelve others through a coordinator and a worker of its own. For every scene, setting
@@ -13,13 +13,15 @@ Times are processor time of coordinator and worker over two, seconds of a machin
 what else runs on the machine does not matter. One job of each scene goes on from one time to the
 next.
 
-The squared error falls about as time to the power of -2/3 to -1, so a reference should have many times
-the longest time; its noise is taken off. Its first radius is smaller than that of a job, or bias that
-falls slowly would be hidden in it. All 24 scenes take about three hours of two cores.
+References are in --references. One that is missing is made: some twelve hours of two cores for all,
+--references-only for nothing else. Each has so many passes that its squared noise is about a tenth
+of what is judged after 60 s, and that is taken off. Its first radius is smaller than that of a job,
+or bias that falls slowly would be hidden in it (docs/measurements/references.md). The judged renders
+take half an hour.
 
 Results are kept in docs/convergence/results.csv: what is there is not rendered again, so that the
-program can be stopped and started. References are kept in --work. At the end, and after every
-scene, the page docs/convergence.md and a plot for each scene are written from the table.
+program can be stopped and started. At the end, and after every scene, the page docs/convergence.md
+and a plot for each scene are written from the table.
 """
 import argparse
 import csv
@@ -37,6 +39,36 @@ DOCS = ROOT / "docs"
 BIN = ROOT / "build/release/bin"
 OWN = ["hard-shadow", "penumbra", "water-sun", "water-lamp", "caustic", "cardioid", "corner",
        "glass-box", "glass-sphere", "lamp-in-glass", "rough-metal", "textured"]
+# First radius, photons a pixel and pass, and passes of both halves. One pixel where much of the
+# light has edges. The numbers follow from the noise of a few seconds: of photons a pass the best of
+# 1, 4 and 16, and as many passes as should bring the squared noise to 0.08 of what was judged.
+REFERENCES = {
+    "b-bars-1": ("2px", 16, 9500),
+    "b-beads-1": ("2px", 4, 11000),
+    "b-checkers-1": ("2px", 4, 28100),
+    "b-emitters-1": ("2px", 4, 28300),
+    "b-emitters-2": ("2px", 1, 149800),
+    "b-enclosed-1": ("2px", 16, 4800),
+    "b-glossy-1": ("2px", 1, 64600),
+    "b-glossy-2": ("2px", 4, 24300),
+    "b-holes-1": ("2px", 16, 17300),
+    "b-holes-2": ("2px", 4, 71900),
+    "b-waves-1": ("1px", 4, 6000),
+    "b-waves-2": ("1px", 4, 6000),
+    "cardioid": ("1px", 4, 6000),
+    "caustic": ("1px", 4, 86700),
+    "corner": ("2px", 16, 27600),
+    "glass-box": ("2px", 4, 21400),
+    "glass-sphere": ("2px", 1, 57700),
+    "hard-shadow": ("1px", 4, 6000),
+    "lamp-in-glass": ("2px", 16, 6400),
+    "penumbra": ("2px", 16, 14300),
+    "rough-metal": ("2px", 4, 19900),
+    "textured": ("2px", 1, 16700),
+    "water-lamp": ("1px", 4, 358500),
+    "water-sun": ("1px", 16, 700),
+}
+SIZE = "128x128"
 FLAGS = {"default": [], "pppm": ["--radius-controller", "pppm"],
          "frequency-mse": ["--radius-controller", "frequency-mse"]}
 COLUMNS = ["scene", "setting", "time_s", "passes", "photons", "estimated", "low", "high",
@@ -136,24 +168,28 @@ def row_of(name, setting, seconds, report, image, reference):
             "true_trimmed": trimmed, "true_untrimmed": untrimmed, "reference_noise": noise}
 
 
-def measure(cluster, name, path, wanted, arguments, folder):
+def reference_of(name, path, folder):
+    """The reference of a scene; it is made where it is missing."""
+    reference = folder / f"{name}.exr"
+    if not reference.exists():
+        radius, photons, passes = REFERENCES[name]
+        pixels = math.prod(map(int, SIZE.split("x")))
+        run([BIN / "lucerna", "reference", path, "--size", SIZE, "--quiet", "--seed", "1000003",
+             "--radius-controller", "appm", "--initial-radius", radius,
+             "--photons-per-pass", photons * pixels, "--passes", passes, "-o", reference])
+    return reference
+
+
+def measure(cluster, name, path, wanted, reference, folder):
     """Rows of `wanted` [(setting, seconds)], in order of time for each setting."""
-    radius = "" if arguments.reference_radius == "3px" else f"-{arguments.reference_radius}"
-    reference = arguments.work / f"{name}-{arguments.size}-{arguments.reference_s:g}{radius}.exr"
     reports = []
     job = None
     for setting, seconds in wanted:
         if job is None or setting != reports[-1][0]:
-            job = Job(cluster, path, ["--size", arguments.size, *FLAGS[setting]])
+            job = Job(cluster, path, ["--size", SIZE, *FLAGS[setting]])
         job.go_on_to(seconds)
         image = folder / f"{setting}-{seconds:g}.exr"
         reports.append((setting, seconds, job.fetch(image), image))
-        passes_per_s = job.passes / job.seconds
-    if not reference.exists():
-        run([BIN / "lucerna", "reference", path, "--size", arguments.size, "--quiet",
-             "--seed", "1000003", "--radius-controller", "appm", "--initial-radius",
-             arguments.reference_radius,
-             "--passes", math.ceil(passes_per_s * arguments.reference_s), "-o", reference])
     return [row_of(name, *report, reference) for report in reports]
 
 
@@ -258,48 +294,52 @@ def plot_overview(path, rows):
     path.write_text("\n".join(out + ["</svg>"]) + "\n", encoding="utf-8")
 
 
-def write_page(rows, arguments):
+def write_page(rows, docs):
     page = ["# How the error falls\n",
-            f"Made by `tests/bench/convergence.py` ({arguments.size} pixels). The error is the root of relMSE; its floor follows the image. "
+            f"Made by `tests/bench/convergence.py` ({SIZE} pixels). The error is the root of relMSE; its floor follows the image. "
             "\"True\" is against the reference with the reference's own noise taken off, \"all\" "
             "with the worst 0.1 % of pixels. Scenes b-* are half B of "
             "`tests/tools/make_study_scenes.py`, which no constant of the estimate has seen. All figures "
-            "are in [results.csv](convergence/results.csv). References have 300 s and a first radius of "
-            "1 px: they show bias that falls slowly, and have more noise, after 60 s up to as much as "
-            "what is judged. Columns: errors as fractions, `low` and `high` of the "
+            "are in [results.csv](convergence/results.csv). References "
+            "begin with a radius of 1 or 2 px: they show bias that falls slowly. Columns: errors as fractions, `low` and `high` of the "
             "95 % interval, `true_trimmed` without the worst 0.1 % of pixels.\n",
             "![Estimated over true error](convergence/overview.svg)\n"]
     judged = [row for row in rows if row["setting"] == "default"]
     half_b = [row for row in judged if row["scene"].startswith("b-")]
     page.append(share_line("Half B", half_b) +
                 share_line("Other scenes", [row for row in judged if row not in half_b]))
-    plot_overview(arguments.docs / "convergence/overview.svg", judged)
+    plot_overview(docs / "convergence/overview.svg", judged)
     page.append("Plots: " + ", ".join(
         f"[{name}](convergence/{name}.svg)" for name in sorted({row["scene"] for row in judged})))
-    (arguments.docs / "convergence.md").write_text("\n".join(page) + "\n", encoding="utf-8")
+    (docs / "convergence.md").write_text("\n".join(page) + "\n", encoding="utf-8")
     for name in {row["scene"] for row in judged}:
-        plot(arguments.docs / "convergence" / f"{name}.svg", name,
+        plot(docs / "convergence" / f"{name}.svg", name,
              [row for row in judged if row["scene"] == name])
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--times", default="1,2,5,10,20,60")
-    parser.add_argument("--reference-s", type=float, default=300)
-    parser.add_argument("--reference-radius", default="1px", help="first radius of references")
-    parser.add_argument("--size", default="128x128")
     parser.add_argument("--settings", default="default")
     parser.add_argument("--scenes", default="", help="names, by commas; empty: all 24")
+    parser.add_argument("--references", type=pathlib.Path,
+                        default=ROOT / "tests/bench/references")
+    parser.add_argument("--references-only", action="store_true")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "build/convergence")
     parser.add_argument("--docs", type=pathlib.Path, default=DOCS)
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
+    arguments.references.mkdir(parents=True, exist_ok=True)
     (arguments.docs / "convergence").mkdir(parents=True, exist_ok=True)
     run([ROOT / "tests/tools/make_study_scenes.py", arguments.work / "scenes", "--half", "b"])
     scenes = {path.stem: path for path in sorted((arguments.work / "scenes").glob("b-*.pbrt"))}
     scenes |= {name: ROOT / "tests/scenes" / f"{name}.pbrt" for name in OWN}
     if arguments.scenes:
         scenes = {name: scenes[name] for name in arguments.scenes.split(",")}
+    if arguments.references_only:
+        for name, path in scenes.items():
+            reference_of(name, path, arguments.references)
+        return
     table = arguments.docs / "convergence" / "results.csv"
     done = {(row["scene"], row["setting"], float(row["time_s"])) for row in read_rows(table)}
     times = sorted(float(word) for word in arguments.times.split(","))
@@ -313,15 +353,16 @@ def main():
                 if not wanted:
                     continue
                 print(f"{index} of {len(scenes)}: {name}", flush=True)
-                for row in measure(cluster, name, path, wanted, arguments, pathlib.Path(folder)):
+                reference = reference_of(name, path, arguments.references)
+                for row in measure(cluster, name, path, wanted, reference, pathlib.Path(folder)):
                     append_row(table, row)
                     print(f"  {row['setting']} {row['time_s']} s: true "
                           f"{100 * row['true_trimmed']:.2f} %, estimated "
                           f"{100 * row['estimated']:.2f} %", flush=True)
-                write_page(read_rows(table), arguments)
+                write_page(read_rows(table), arguments.docs)
         finally:
             cluster.close()
-    write_page(read_rows(table), arguments)
+    write_page(read_rows(table), arguments.docs)
 
 
 if __name__ == "__main__":

@@ -59,6 +59,7 @@ class TimedRender {
     const Duration traced = ProcessCpuTime();
     trace_s_ += Seconds(traced - start);
     if (pass_ < kFirstLongRound) {
+      variance_.Discount(sums_.WeighBy(plan_->photons_per_pass));
       variance_.Add(slice, sums_);
       sums_.Add(slice, estimator_->team());
       if (pass_ > 0 && std::has_single_bit(pass_ + 1)) PrintSplit();

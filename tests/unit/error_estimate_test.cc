@@ -103,6 +103,60 @@ TEST(ErrorEstimateTest, FindsNoiseAndBias) {
   }
 }
 
+// Passes of fewer photons scatter more and weigh less, and the weights of even and odd ones differ.
+TEST(ErrorEstimateTest, FindsNoiseAndBiasOfPassesThatWeighUnalike) {
+  constexpr std::array<double, 7> kWeights = {0.125, 0.125, 0.125, 0.5, 0.5, 1, 1};
+  constexpr double kBias = 0.1;
+  // Of a pass of weight 1, in value and in what is known of the bias.
+  constexpr double kVariance = 0.25;
+  ImageStatistics image(kSide, kSide, kWeights.size());
+  image.weights = {};
+  for (std::size_t pass = 0; pass < kWeights.size(); ++pass)
+    (pass % 2 == 0 ? image.weights.even : image.weights.odd) += kWeights[pass];
+  const double weight = image.weights.all();
+  KeyedRng rng(12);
+  const auto scattered = [&](double w) {
+    return (2 * static_cast<double>(rng.Uniform()) - 1) * std::sqrt(3 * kVariance / w);
+  };
+  double true_square = 0;
+  for (std::size_t i = 0; i < kPixels; ++i) {
+    std::array<double, 2> halves{};
+    std::array<double, 2> biases{};
+    double squares = 0;
+    for (std::size_t pass = 0; pass < kWeights.size(); ++pass) {
+      const double w = kWeights[pass];
+      const double value = 2 + kBias + scattered(w);
+      halves[pass % 2] += w * value;
+      biases[pass % 2] += w * (kBias + scattered(w));
+      squares += w * value * value;
+    }
+    const double all = halves[0] + halves[1];
+    const auto gray = [](double value) {
+      const auto v = static_cast<float>(value);
+      return std::array<float, 3>{v, v, v};
+    };
+    image.Set(i, {.all = gray(all),
+                  .half_difference = gray(halves[0] - halves[1]),
+                  .squared_deviations = static_cast<float>(squares - all * all / weight),
+                  .even_bias = static_cast<float>(biases[0]),
+                  .odd_bias = static_cast<float>(biases[1]),
+                  .bias_color = {1, 1, 1}});
+    const double off = all / weight - 2;
+    true_square += off * off / static_cast<double>(kPixels);
+  }
+  ThreadTeam team(1);
+  const ErrorEstimate estimate = EstimateError(image, 1, team);
+  EXPECT_NEAR(estimate.absolute.noise / (kVariance / weight), 1, 0.06) << "as in the test above";
+  EXPECT_NEAR(estimate.noise_factor, 1, 0.06);
+  // The product of two halves, known up to its deviation over the root of the pixels; smoothing
+  // may lose half a deviation more.
+  const double of_halves =
+      kVariance / std::sqrt(image.weights.even * image.weights.odd) / std::sqrt(1.0 * kPixels);
+  EXPECT_NEAR(estimate.absolute.bias, kBias * kBias, 4.5 * (of_halves + 0.05 * kBias * kBias));
+  EXPECT_LE(estimate.absolute.low, true_square);
+  EXPECT_GE(estimate.absolute.high, true_square);
+}
+
 struct ValueAndBias {
   double value = 0, bias = 0;
 };

@@ -439,6 +439,45 @@ TEST(RoundsOfAJobTest, GoingOnAfterAnEndWithinARoundLeavesNoTrace) {
   }
 }
 
+// Where later passes have more photons, every photon counts alike, in jobs that end on the way and
+// go on too.
+TEST(RoundsOfAJobTest, EveryPhotonCountsAlikeWhereTheirNumberRises) {
+  const Scene scene = LoadScene("water-lamp.pbrt");
+  RenderOverrides overrides;
+  overrides.width = overrides.height = 32;
+  overrides.photons_per_pass = 32 * 32;
+  overrides.adaptive_photons = true;
+  const RenderSettings settings = SettingsFor(scene, overrides);
+  BatchTracer tracer(scene, 1);
+  const std::atomic<bool> stop = false;
+  constexpr std::uint64_t kPasses = 13;
+  RoundJob job(scene, settings);
+  RgbSum weighted{};  // over the pixels
+  double photons = 0;
+  for (std::uint64_t pass = 0; pass < kPasses; ++pass) {
+    const RoundPlan plan = job.PlanOf(RoundOf(pass));
+    const SliceSums slice =
+        tracer.RunSlice(settings, NeedsOf(scene, settings), {pass, pass + 1}, plan, stop).value();
+    const auto count = static_cast<double>(plan.photons_per_pass);
+    photons += count;
+    for (std::size_t i = 0; i < slice.pixels(); ++i) {
+      for (std::size_t c = 0; c < 3; ++c)
+        weighted[c] += count * static_cast<double>(slice.At(kPhotonRadiance + c, i));
+    }
+    job.RenderTo(pass + 1);
+  }
+  ASSERT_GT(photons, 2.0 * kPasses * 32 * 32) << "their number rises";
+  const Image image = job.estimator().MakeImage();
+  double green = 0;
+  for (const float pixel : image.Find("photons.G")->pixels)
+    green += static_cast<double>(pixel);
+  const double expected = scene.film.exposure * ToRec709(weighted)[1] / photons;
+  EXPECT_NEAR(green, expected, 1e-6 * expected);
+  RoundJob in_one_go(scene, settings);
+  in_one_go.RenderTo(kPasses);
+  EXPECT_EQ(image.PixelDigest(), in_one_go.estimator().MakeImage().PixelDigest());
+}
+
 // The passes of a tail count as those of a whole round do: the image of 20 passes is the same
 // whether the last four came as a round or as a tail of the round that ends there.
 TEST(RoundsOfAJobTest, ATailCountsAsItsRoundWould) {

@@ -268,13 +268,13 @@ TEST(SliceCodecTest, RefusesAValueWithTooManyBits) {
     const std::string of_dark = EncodeSlice(dark);
     ByteWriter writer;
     writer.Bytes(std::string_view(of_dark).substr(0, of_dark.size() - kSliceColumns));
-    const std::vector<std::size_t> sent = {13, 1, 4, 7, 9, 10, 11, 12, 14, 0, 2, 3, 5, 6, 8};
+    const std::vector<std::size_t> sent = {14, 1, 4, 7, 9, 10, 11, 12, 13, 15, 0, 2, 3, 5, 6, 8};
     for (std::size_t i = 0; i < sent.size(); ++i) {
       const unsigned int empty =
           DroppedBits(SignificantBits(shape.passes.size(), sent[i], shape.evidence));
       const std::uint32_t above = std::uint32_t{1} << (32 - empty);
       // Red and blue differ from green by nothing.
-      const bool is_beside = i >= 9;
+      const bool is_beside = i >= kSliceColumns - 6;
       const std::uint32_t one = is_beside ? 0 : std::bit_cast<std::uint32_t>(1.0F) >> empty;
       const std::vector<std::uint32_t> codes = {0, i != damaged ? one
                                                    : is_beside

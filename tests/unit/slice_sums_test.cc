@@ -143,6 +143,11 @@ TEST(SliceSumsTest, WhatFollowsFromTheRadianceOfOnePassIsRead) {
           expected = (pass % 2 == 0 ? 1 : -1) *
                      (static_cast<double>(slice.At(kPhotonRadiance + c, pixel)) +
                       static_cast<double>(slice.At(kDirectRadiance + c, pixel)));
+        } else if (column == kDirectDifference) {
+          const auto direct = [&](std::size_t c) {
+            return static_cast<double>(slice.At(kDirectRadiance + c, pixel));
+          };
+          expected = (pass % 2 == 0 ? 1 : -1) * WorkingLuminance(direct(0), direct(1), direct(2));
         } else if (column == kLargestLuminance) {
           expected = std::max(0.0, LuminanceAt(slice, pixel));
         }
