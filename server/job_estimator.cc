@@ -45,6 +45,7 @@ struct PhotonChoice {
   std::uint64_t most;
 };
 constexpr std::array kPhotonChoices = {PhotonChoice{4, 4}, PhotonChoice{8, 8}};
+static_assert(kPhotonChoices.back().passes <= kFirstLongRound);
 
 // Whether a path may be bent by a smooth surface.
 bool HasSmoothSurfaces(const Scene& scene) {

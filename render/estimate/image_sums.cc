@@ -18,9 +18,10 @@ double DirectFactor(double passes, const PassWeights& weights) {
   return passes > 0 ? weights.all() / passes : 1;
 }
 
-// A difference of direct light, of which the luminance is known, has the colour of direct light.
+// A difference of direct light, of which the luminance is known, has the colour of direct light. It
+// is no more than all of it, also where pixel filters with negative weights leave next to nothing.
 double ColoredDifference(double difference, double direct, double direct_luminance) {
-  return direct_luminance > 0 ? difference * direct / direct_luminance : 0;
+  return direct_luminance > 0 ? std::clamp(difference / direct_luminance, -1.0, 1.0) * direct : 0;
 }
 
 // The squared deviations of two groups of passes together.

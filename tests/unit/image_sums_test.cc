@@ -119,6 +119,28 @@ TEST(ImageSumsTest, SquaredDeviationsAreWeighted) {
   }
 }
 
+// Negative weights of a pixel filter may leave a colour with next to no luminance, whose difference
+// of halves is no multiple of it.
+TEST(ImageSumsTest, DirectLightThatCancelsOutHasNoLargeDifference) {
+  ThreadTeam team(1);
+  ImageSums sums(1);
+  constexpr std::array<float, 3> kEven = {1, 1, 1};
+  constexpr std::array<float, 3> kOdd = {0, -1.3F, -1};
+  for (std::uint64_t pass = 0; pass < 4; ++pass) {
+    SliceSums slice = EmptySlice({pass, pass + 1}, 1, 0);
+    for (std::size_t c = 0; c < 3; ++c)
+      slice.columns[kDirectRadiance + c].Set(0, pass == 1 ? kOdd[c] : kEven[c]);
+    sums.WeighBy(pass < 2 ? 100 : 800);
+    sums.Add(slice, team);
+  }
+  constexpr std::array<float, 3> kBoth = {kEven[0] + kOdd[0], kEven[1] + kOdd[1], 0};
+  ASSERT_GT(WorkingLuminance(kBoth[0], kBoth[1], kBoth[2]), 0);
+  ASSERT_LT(WorkingLuminance(kBoth[0], kBoth[1], kBoth[2]), 0.1);
+  // The passes' values over all four of them.
+  for (const double difference : sums.At(0).half_difference)
+    EXPECT_LE(std::abs(difference), 4 * 1.3);
+}
+
 // A job that ends within a round of more photons, and goes on, has the bits of one that did not
 // end.
 TEST(ImageSumsTest, ATailOfMorePhotonsWeighsAsWhenItIsAdded) {
