@@ -20,8 +20,8 @@ fi
 
 bash "$root/deploy/packages.sh"
 cd "$root"
-cmake --preset release -D LUCERNA_BUILD_TESTS=OFF >/dev/null
-cmake --build --preset release --target lucerna lucerna-server lucerna-worker
+cmake --preset release -D LUCERNA_BUILD_TESTS=OFF -D CMAKE_UNITY_BUILD=ON >/dev/null
+cmake --build --preset release --parallel "$(nproc)" --target lucerna lucerna-server lucerna-worker
 bin=$root/build/release/bin
 cd "$here"
 

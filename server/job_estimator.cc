@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <set>
 #include <utility>
 
@@ -27,6 +26,7 @@
 #include "render/film/film.h"
 #include "render/film/layers.h"
 #include "render/math/color_space.h"
+#include "render/math/warp.h"
 #include "render/scene/shape_lists.h"
 #include "render/tracing/eye_path.h"
 #include "render/tracing/pilot_paths.h"
@@ -35,7 +35,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kPi64 = std::numbers::pi;
 // The number of photons of later passes is chosen after so many passes. What variance the choice
 // follows from is seen in rounds of one pass alone.
 struct PhotonChoice {
@@ -89,8 +88,7 @@ std::string NameOf(const LightGroup& light, std::size_t number, double unit) {
 // Luminance of a pixel.
 double ValueAt(const ImageSums& sums, std::size_t pixel) {
   const RgbSum radiance = sums.RadianceAt(pixel);
-  return std::max(0.0, WorkingLuminance(radiance[0], radiance[1], radiance[2])) /
-         sums.weights().all();
+  return std::max(0.0, WorkingLuminance(radiance)) / sums.weights().all();
 }
 
 // What a photon found by a pixel adds to its radiance, over its flux, but for a common factor:

@@ -92,7 +92,7 @@ std::string PlainText(const std::optional<MeanOfRuns>& mean) {
 }
 
 // Text that a cell of a table can hold.
-std::string Escaped(std::string_view text) {
+std::string EscapedCell(std::string_view text) {
   std::string escaped;
   for (const char c : text) {
     if (c == '|') escaped += '\\';
@@ -219,7 +219,7 @@ std::optional<TheorySlopes> TheoryOf(const RenderSettings& settings) {
 }
 
 std::string ComparisonTable(const Comparison& comparison, const ComparisonSubject& subject) {
-  std::string text = absl::StrCat("# ", Escaped(subject.scene), "\n\n");
+  std::string text = absl::StrCat("# ", EscapedCell(subject.scene), "\n\n");
   absl::StrAppend(&text, "relMSE against ", subject.reference, subject.left_out.empty() ? "" : ", ",
                   subject.left_out, "; mean of ", subject.repetitions,
                   subject.repetitions == 1 ? " run" : " runs", " ± its standard error, seeds from ",
@@ -245,7 +245,7 @@ std::string ComparisonTable(const Comparison& comparison, const ComparisonSubjec
                   "|---|---|---|---|---|---|---|\n");
   for (std::size_t i = 0; i < comparison.times.size(); ++i) {
     for (const ComparedSetting& setting : comparison.settings) {
-      absl::StrAppendFormat(&text, "| %g | %s | ", comparison.times[i], Escaped(setting.name));
+      absl::StrAppendFormat(&text, "| %g | %s | ", comparison.times[i], EscapedCell(setting.name));
       const std::optional<ComparedCell>& cell = setting.cells[i];
       if (!cell) {
         absl::StrAppend(&text, "— | — | — | — | — |\n");
@@ -266,8 +266,8 @@ std::string ComparisonTable(const Comparison& comparison, const ComparisonSubjec
                   "|---|---|---|---|---|\n");
   for (std::size_t i = 0; i < comparison.settings.size(); ++i) {
     const ComparedSetting& setting = comparison.settings[i];
-    const std::string flags = i < subject.flags.size() ? Escaped(subject.flags[i]) : "";
-    absl::StrAppend(&text, "| ", Escaped(setting.name), " | ",
+    const std::string flags = i < subject.flags.size() ? EscapedCell(subject.flags[i]) : "";
+    absl::StrAppend(&text, "| ", EscapedCell(setting.name), " | ",
                     flags.empty() ? "" : absl::StrCat("`", flags, "`"), " | ",
                     PlainText(setting.slope_photons), " | ", PlainText(setting.slope_seconds),
                     " | ");

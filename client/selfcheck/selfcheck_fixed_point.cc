@@ -11,7 +11,7 @@
 namespace lucerna {
 namespace {
 
-constexpr int kHitpoints = 1000;
+constexpr int kTestedHitpoints = 1000;
 constexpr int kPhotons = 1000;
 constexpr std::uint32_t kDithers = 1U << 21;
 
@@ -30,7 +30,7 @@ FixedPointErrors MeasureFixedPoint(double dynamic_range, RangeLies range_lies) {
   KeyedRng rng(11);
   std::vector<double> relative;
   FixedPointErrors errors;
-  for (int hitpoint = 0; hitpoint < kHitpoints; ++hitpoint) {
+  for (int hitpoint = 0; hitpoint < kTestedHitpoints; ++hitpoint) {
     std::int64_t sum = 0;
     long double exact = 0;  // [quanta]
     double variance = 0;
@@ -38,7 +38,7 @@ FixedPointErrors MeasureFixedPoint(double dynamic_range, RangeLies range_lies) {
     for (int photon = 0; photon < kPhotons; ++photon) {
       const double place = range_lies == RangeLies::kWithinHitpoints
                                ? static_cast<double>(rng.Uniform())
-                               : static_cast<double>(hitpoint) / (kHitpoints - 1);
+                               : static_cast<double>(hitpoint) / (kTestedHitpoints - 1);
       const auto flux_w = static_cast<float>(std::pow(dynamic_range, -place) *
                                              (0.5 + 0.5 * static_cast<double>(rng.Uniform())));
       const float quanta = flux_w * scale.quanta_per_watt.r;

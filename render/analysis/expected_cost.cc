@@ -15,7 +15,7 @@ constexpr double kWorker = 320;
 // Of both, for each column of evidence of the slices that they hold.
 constexpr double kEvidenceColumn = 16;
 // Bytes a hitpoint: compressed, with and without what glossy ones need.
-constexpr double kBlock = 6.5;
+constexpr double kPlainBlock = 6.5;
 constexpr double kGlossyBlock = 14;
 constexpr double kRadius = 2.5;
 // Of hitpoints for caustic photons and of segments in media, wherever a pass is traced, and of what
@@ -29,7 +29,7 @@ ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& setti
   const auto columns =
       static_cast<double>(EvidenceColumns(EvidenceOf(settings.radius_controller, 0)));
   const auto numbers = static_cast<double>(MakeRadiusController(settings, 1)->MemoryPerPixel());
-  const double block = needs.Uses(Part::kGlossy) ? kGlossyBlock : kBlock;
+  const double block = needs.Uses(Part::kGlossy) ? kGlossyBlock : kPlainBlock;
   const auto first_hits = static_cast<double>(
       kFirstHitBytes * KeptSets(needs.eye_sample_sets(), static_cast<std::size_t>(pixels)));
   const double rows_beside =

@@ -17,7 +17,7 @@
 namespace lucerna {
 namespace {
 
-constexpr std::array<std::string_view, kParts> kNames = {
+constexpr std::array<std::string_view, kPartCount> kNames = {
     "photons",
     "specular-surfaces",
     "glossy-hitpoints",
@@ -58,7 +58,7 @@ constexpr std::int64_t kHitpointsOfSets = std::int64_t{1} << 24;
 
 // With fewer triangles rays gain nothing by a better tree. With more of them they gain up to a
 // fifteenth of all time, and building it takes some 0.15 microseconds a triangle longer.
-constexpr std::size_t kFewTriangles = 1000;
+constexpr std::size_t kFewestToSplit = 1000;
 
 std::string Quoted(const Material& material) {
   return material.name.empty() ? std::string("a material without a name")
@@ -427,8 +427,8 @@ class NeedsFinder {
     Set(Part::kRobustRays, triangles > 0,
         triangles > 0 ? "rays must not slip between the triangles of a closed shape"
                       : "there are no triangles");
-    Set(Part::kSplitTriangles, triangles >= kFewTriangles,
-        triangles >= kFewTriangles
+    Set(Part::kSplitTriangles, triangles >= kFewestToSplit,
+        triangles >= kFewestToSplit
             ? Concat("rays get through ", triangles, " triangles faster")
             : Concat("there is little to gain with so few triangles as ", triangles));
   }

@@ -55,11 +55,11 @@ enum class Part : std::uint8_t {
   kDispersion,  // a wavelength for each path
   kSpectra,     // three wavelengths for each pass
 };
-inline constexpr std::size_t kParts = static_cast<std::size_t>(Part::kSpectra) + 1;
+inline constexpr std::size_t kPartCount = static_cast<std::size_t>(Part::kSpectra) + 1;
 
-[[nodiscard]] constexpr std::array<Part, kParts> AllParts() {
-  std::array<Part, kParts> parts{};
-  for (std::size_t i = 0; i < kParts; ++i)
+[[nodiscard]] constexpr std::array<Part, kPartCount> AllParts() {
+  std::array<Part, kPartCount> parts{};
+  for (std::size_t i = 0; i < kPartCount; ++i)
     parts[i] = static_cast<Part>(i);
   return parts;
 }
@@ -73,12 +73,12 @@ class SceneNeeds {
   // As workers get them, without reasons: the parts that are used, bit by bit.
   SceneNeeds(std::uint64_t parts, int eye_sample_sets, UnreachableLights lights)
       : eye_sample_sets_(eye_sample_sets), lights_(std::move(lights)) {
-    for (std::size_t i = 0; i < kParts; ++i)
+    for (std::size_t i = 0; i < kPartCount; ++i)
       entries_[i].is_used = (parts >> i & 1) != 0;
   }
   [[nodiscard]] std::uint64_t parts() const {
     std::uint64_t parts = 0;
-    for (std::size_t i = 0; i < kParts; ++i)
+    for (std::size_t i = 0; i < kPartCount; ++i)
       parts |= static_cast<std::uint64_t>(entries_[i].is_used) << i;
     return parts;
   }
@@ -117,7 +117,7 @@ class SceneNeeds {
     entries_[Index(part)] = {is_used, std::move(reason)};
   }
 
-  std::array<Entry, kParts> entries_;
+  std::array<Entry, kPartCount> entries_;
   int eye_sample_sets_ = 0;
   UnreachableLights lights_;
 };

@@ -117,12 +117,12 @@ bool IsOpaque(const Material& material) {
 }
 
 // The shapes of the materials that some predicate accepts, as rays meet them.
-class Walls {
+class WallRays {
  public:
   // Errors: those of Intersector::Create.
-  static StatusOr<std::unique_ptr<Walls>> Create(const Scene& scene,
-                                                 const MaterialPredicate& is_wall) {
-    std::unique_ptr<Walls> walls(new Walls);
+  static StatusOr<std::unique_ptr<WallRays>> Create(const Scene& scene,
+                                                    const MaterialPredicate& is_wall) {
+    std::unique_ptr<WallRays> walls(new WallRays);
     const auto accepts = [&](const ShapeTraits& traits) {
       return IsWhole(traits) && is_wall(scene.materials[static_cast<std::size_t>(traits.material)]);
     };
@@ -163,7 +163,7 @@ class Walls {
   }
 
  private:
-  Walls() = default;
+  WallRays() = default;
 
   static Vec3 ToFloat(Double3 v) {
     return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
@@ -185,7 +185,7 @@ std::vector<std::uint32_t> FindSeparated(const Scene& scene,
       scene.camera.kind == Camera::Kind::kSensors || scene.motion.of_camera) {
     return {};
   }
-  const auto walls = Walls::Create(scene, IsOpaque);
+  const auto walls = WallRays::Create(scene, IsOpaque);
   if (!walls.ok()) return {};
   const Vec3 eye = scene.camera.camera_to_world.Point({});
   std::vector<const NumberedLight*> candidates;
@@ -271,7 +271,7 @@ bool ScattersNarrowly(const Material& material) {
 std::vector<std::uint32_t> FindWithoutLineOfSight(const Scene& scene,
                                                   const std::vector<NumberedLight>& lights,
                                                   const std::vector<std::uint32_t>& but) {
-  const auto walls = Walls::Create(scene, ScattersNarrowly);
+  const auto walls = WallRays::Create(scene, ScattersNarrowly);
   if (!walls.ok()) return {};
   // Some points where they would be sampled.
   std::vector<Vec3> lit;

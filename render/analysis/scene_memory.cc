@@ -16,7 +16,7 @@ namespace {
 // Of a process over that of its blocks.
 constexpr double kOfHeaps = 1.1;
 // Of the C library for a block, of which a mesh has three or four.
-constexpr double kBlock = 16;
+constexpr double kAllocation = 16;
 // Of Embree's tree, for a triangle or analytic shape, with copies of large ones that are split.
 constexpr double kTreePrimitive = 62;
 constexpr double kSplitTreePrimitive = 74;
@@ -45,7 +45,7 @@ double SizeOf(const Picture& picture) {
 }
 
 double SizeOf(const TriangleMesh& mesh) {
-  return sizeof(TriangleMesh) + 4 * kBlock +
+  return sizeof(TriangleMesh) + 4 * kAllocation +
          static_cast<double>(mesh.positions.size() * sizeof(Vec3) +
                              mesh.indices.size() * sizeof(std::uint32_t) +
                              mesh.normals.size() * sizeof(Vec3) + mesh.uvs.size() * sizeof(Vec2));
@@ -87,7 +87,8 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
       const auto vertices = static_cast<double>(mesh.positions.size());
       primitives += triangles;
       memory.shapes += SizeOf(mesh);
-      memory.acceleration += kTreeMesh + tree * triangles + sizeof(Vec3) * (vertices + 1) + kBlock;
+      memory.acceleration +=
+          kTreeMesh + tree * triangles + sizeof(Vec3) * (vertices + 1) + kAllocation;
       if (HasFacets(mesh)) {
         memory.bends += kBend * triangles;
         // One mesh after the other.
@@ -135,7 +136,7 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
     for (const Instance& instance : scene.instances)
       memory.moving += instance.motion != kNoMotion ? sizeof(instance) : 0;
     memory.moving += static_cast<double>(scene.motion.of_shapes.size()) *
-                     (sizeof(ShapeMotion) + sizeof(AnimatedTransform) + kBlock);
+                     (sizeof(ShapeMotion) + sizeof(AnimatedTransform) + kAllocation);
     memory.at_another_time =
         memory.shapes + memory.acceleration + memory.building_trees + memory.lights;
   }

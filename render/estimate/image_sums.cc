@@ -9,10 +9,6 @@
 namespace lucerna {
 namespace {
 
-double LuminanceOfWorking(const RgbSum& color) {
-  return WorkingLuminance(color[0], color[1], color[2]);
-}
-
 // By what sums of direct light become sums with the weight of the photons.
 double DirectFactor(double passes, const PassWeights& weights) {
   return passes > 0 ? weights.all() / passes : 1;
@@ -231,7 +227,7 @@ void ImageSums::Reweigh(RawPixel& raw, std::uint64_t passes, const PassWeights& 
   if (weights == counts || !(weights.even > 0 && weights.odd > 0)) return;
   Pixel& sum = raw.sum;
   const double weight = weights.all();
-  const double luminance = LuminanceOfWorking(sum.direct);
+  const double luminance = WorkingLuminance(sum.direct);
   for (std::size_t c = 0; c < 3; ++c) {
     const auto difference_of_means = [](double of_all, double difference, const PassWeights& by) {
       return (of_all + difference) / (2 * by.even) - (of_all - difference) / (2 * by.odd);
@@ -288,8 +284,8 @@ void ImageSums::AddTo(RawPixel& raw, const PassRange& before, const PassWeights&
   Grow(raw.direct_difference, at(kDirectDifference));
   sum.squared_deviations =
       TogetherDeviating(sum.squared_deviations, static_cast<double>(at(kSquaredDeviations)),
-                        weights.all(), LuminanceOfWorking(radiance_before),
-                        static_cast<double>(slice.passes.size()), LuminanceOfWorking(alone));
+                        weights.all(), WorkingLuminance(radiance_before),
+                        static_cast<double>(slice.passes.size()), WorkingLuminance(alone));
   sum.largest = std::max(sum.largest, at(kLargestLuminance));
   Grow(sum.even_bias, at(kEvenBias));
   Grow(sum.odd_bias, at(kOddBias));

@@ -22,6 +22,10 @@
 
 namespace lucerna {
 
+[[nodiscard]] constexpr double WorkingLuminance(const RgbSum& color) {
+  return WorkingLuminance(color[0], color[1], color[2]);
+}
+
 class ImageSums {
  public:
   explicit ImageSums(std::size_t pixels) {

@@ -33,10 +33,6 @@ float Held(double value) {
       std::min(value, static_cast<double>(std::numeric_limits<float>::max())));
 }
 
-double LuminanceOfWorking(const RgbSum& color) {
-  return WorkingLuminance(color[0], color[1], color[2]);
-}
-
 // Whether so few photons were found that their variance is not seen, though they bring a good part
 // of the light.
 bool IsStarved(const ImageSums& sums) {
@@ -46,8 +42,8 @@ bool IsStarved(const ImageSums& sums) {
   for (std::size_t i = 0; i < sums.pixels(); ++i) {
     const ImageSums::Pixel pixel = sums.At(i);
     found += pixel.photon_count;
-    photons += LuminanceOfWorking(pixel.photons);
-    all += LuminanceOfWorking(pixel.radiance());
+    photons += WorkingLuminance(pixel.photons);
+    all += WorkingLuminance(pixel.radiance());
   }
   return found < kFewestFound * static_cast<double>(sums.pixels()) &&
          photons > kShareThatCounts * all;
@@ -89,7 +85,7 @@ void PassVariance::Add(const SliceSums& pass, const ImageSums& before) {
         WorkingLuminance(at(kPhotonRadiance), at(kPhotonRadiance + 1), at(kPhotonRadiance + 2));
     if (weight > 0) {
       add(pixels_[i].deviations,
-          DeviationBetween(weight, LuminanceOfWorking(before.At(i).photons), 1, photons));
+          DeviationBetween(weight, WorkingLuminance(before.At(i).photons), 1, photons));
     }
     if (before.passes() % 2 == 0) add(pixels_[i].even, photons);
   }
@@ -114,7 +110,7 @@ PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noi
     std::vector<double> luminances;
     luminances.reserve(pixels_.size());
     for (std::size_t i = 0; i < pixels_.size(); ++i)
-      luminances.push_back(LuminanceOfWorking(sums.RadianceAt(i)) / weight_of_all);
+      luminances.push_back(WorkingLuminance(sums.RadianceAt(i)) / weight_of_all);
     floor = RelativeErrorFloor(luminances);
   }
   if (!(floor > 0)) return {};
@@ -135,13 +131,13 @@ PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noi
   const double halves = counts.even * counts.odd / passes;
   for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const ImageSums::Pixel pixel = sums.At(i);
-    const double sum = LuminanceOfWorking(pixel.radiance());
-    const double photon_sum = LuminanceOfWorking(pixel.photons);
+    const double sum = WorkingLuminance(pixel.radiance());
+    const double photon_sum = WorkingLuminance(pixel.photons);
     const double weight = 1 / (sum / weight_of_all * (sum / weight_of_all) + floor);
     const auto difference = [&](double of_all, double even) {
       return even / weights.even - (of_all - even) / weights.odd;
     };
-    const double all = difference(sum, 0.5 * (sum + LuminanceOfWorking(pixel.half_difference)));
+    const double all = difference(sum, 0.5 * (sum + WorkingLuminance(pixel.half_difference)));
     const double of_photons = difference(photon_sum, static_cast<double>(pixels_[i].even));
     const double photons = photon_sum / weight_of_all;
     const double count = pixel.photon_count;

@@ -46,18 +46,13 @@ StatusOr<std::string> EncodePfm(const Image& image) {
   return bytes;
 }
 
-void Append(void* target, void* bytes, int size_bytes) {
-  static_cast<std::string*>(target)->append(static_cast<const char*>(bytes),
-                                            static_cast<std::size_t>(size_bytes));
-}
-
 StatusOr<std::string> EncodeHdr(const Image& image) {
   LUCERNA_ASSIGN_OR_RETURN(std::vector<float> values, Interleaved(image, false));
   // The format knows nothing below 0.
   for (float& value : values)
     value = value > 0 ? value : 0;
   std::string bytes;
-  if (stbi_write_hdr_to_func(Append, &bytes, image.width, image.height, 3, values.data()) == 0)
+  if (stbi_write_hdr_to_func(AppendBytes, &bytes, image.width, image.height, 3, values.data()) == 0)
     return absl::ResourceExhaustedError("there is not enough memory to write the file");
   if (bytes.starts_with(kHdrMagic)) bytes.insert(kHdrMagic.size(), kHdrOwner);
   return bytes;

@@ -25,12 +25,12 @@ std::string TextChunk(std::string_view keyword_and_text) {
          BigEndian(static_cast<std::uint32_t>(checksum));
 }
 
-void Append(void* target, void* bytes, int size_bytes) {
+}  // namespace
+
+void AppendBytes(void* target, void* bytes, int size_bytes) {
   static_cast<std::string*>(target)->append(static_cast<const char*>(bytes),
                                             static_cast<std::size_t>(size_bytes));
 }
-
-}  // namespace
 
 std::uint8_t EncodeSrgb(double linear) {
   if (!(linear > 0)) return 0;
@@ -50,7 +50,7 @@ StatusOr<std::string> EncodePng(const Image& image, const Display& display) {
       pixels.push_back(EncodeSrgb(value));
   }
   std::string bytes;
-  if (stbi_write_png_to_func(Append, &bytes, image.width, image.height, 3, pixels.data(),
+  if (stbi_write_png_to_func(AppendBytes, &bytes, image.width, image.height, 3, pixels.data(),
                              3 * image.width) == 0) {
     return absl::ResourceExhaustedError("there is not enough memory to write the PNG");
   }

@@ -17,6 +17,9 @@ inline constexpr std::string_view kPngOwner{"Software\0Lucerna", 16};
 // `linear`, clipped to [0, 1], as sRGB has it; what is not a number is black.
 [[nodiscard]] std::uint8_t EncodeSrgb(double linear);
 
+// What the writers of stb call with their bytes; `target` is a std::string.
+void AppendBytes(void* target, void* bytes, int size_bytes);
+
 // PNG bytes of the channels R, G and B as they are displayed. Errors: INVALID_ARGUMENT without
 // them.
 [[nodiscard]] StatusOr<std::string> EncodePng(const Image& image, const Display& display = {});

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
+
+#include "render/math/warp.h"
 
 namespace lucerna {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr int kPatchSides = 16;
 
 struct GridPoint {
@@ -56,10 +56,10 @@ class Turn {
   explicit Turn(double phi_max_rad) : phi_max_rad_(phi_max_rad) {}
 
   [[nodiscard]] int sides() const {
-    return std::max(1, static_cast<int>(std::ceil(kTurnSides * phi_max_rad_ / (2 * kPi) - 1e-9)));
+    return std::max(1, static_cast<int>(std::ceil(kTurnSides * phi_max_rad_ / (2 * kPi64) - 1e-9)));
   }
   [[nodiscard]] Double3 At(int column) const {
-    const bool is_closed = phi_max_rad_ >= 2 * kPi * (1 - 1e-9);
+    const bool is_closed = phi_max_rad_ >= 2 * kPi64 * (1 - 1e-9);
     const double phi = is_closed && column == sides() ? 0 : phi_max_rad_ * Share(column);
     return {std::cos(phi), std::sin(phi), 0};
   }
@@ -84,7 +84,8 @@ TriangleMesh SphereMesh(double radius, double z_min, double z_max, double phi_ma
   const Turn turn(phi_max_rad);
   const double low = std::acos(std::clamp(z_min / radius, -1.0, 1.0));
   const double high = std::acos(std::clamp(z_max / radius, -1.0, 1.0));
-  const int rows = std::max(1, static_cast<int>(std::ceil(kTurnSides * (low - high) / (2 * kPi))));
+  const int rows =
+      std::max(1, static_cast<int>(std::ceil(kTurnSides * (low - high) / (2 * kPi64))));
   TriangleMesh mesh;
   AddGrid(
       turn.sides(), rows,
@@ -92,7 +93,7 @@ TriangleMesh SphereMesh(double radius, double z_min, double z_max, double phi_ma
         const double v = static_cast<double>(row) / rows;
         const double theta = Mix(low, high, v);
         // Poles are points, whatever the sine of pi is.
-        const bool is_pole = theta < 1e-9 || theta > kPi - 1e-9;
+        const bool is_pole = theta < 1e-9 || theta > kPi64 - 1e-9;
         const Double3 outward =
             turn.At(column) * (is_pole ? 0 : std::sin(theta)) + Double3{0, 0, 1} * std::cos(theta);
         return GridPoint{outward * radius,

@@ -20,7 +20,7 @@ constexpr double kUnknown = std::numeric_limits<double>::infinity();
 // position by its largest coordinate. The points of a regular grid share their rounding along its
 // lines, so that a fit sees few independent ones and leaves over too little: twice the deviation
 // stands for that.
-constexpr double kNormalRounding = 0x1p-25;
+constexpr double kDeviationOfNormals = 0x1p-25;
 constexpr double kPositionRounding = 0x1p-24;
 
 // A change this many times as large as its noise is one of the surface. Of noise alone the largest
@@ -433,7 +433,8 @@ class NeighborhoodFit {
     }
     const double bend = Symmetric{p[1], 0.5 * (p[2] + q[1]), q[2]}.Norm();
     const double shifted = bend * position_error;
-    const double variance = fit.Variance() + kNormalRounding * kNormalRounding + shifted * shifted;
+    const double variance =
+        fit.Variance() + kDeviationOfNormals * kDeviationOfNormals + shifted * shifted;
     std::array<double, kTerms> noise = fit.Variances();
     for (std::size_t i = 3; i < kTerms; ++i)
       noise[i] *= 2 * variance * scale[i] * scale[i];

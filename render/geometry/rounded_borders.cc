@@ -12,7 +12,7 @@
 namespace lucerna {
 namespace {
 
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+constexpr std::uint32_t kNoCorner = std::numeric_limits<std::uint32_t>::max();
 // Faces turned less from each other, by about a degree, lie in one plane.
 constexpr float kPlaneCosine = 0.99985F;
 // A crest as far away as the face is wide is the next side of a prism, not a rounded border.
@@ -54,7 +54,7 @@ class CrestSearch {
 
   std::vector<std::array<std::uint32_t, 2>> Crests() {
     for (std::uint32_t corner = 0; corner < corners_.size(); ++corner) {
-      if (across_[corner].corner != kNone && across_[corner].cosine <= kPlaneCosine)
+      if (across_[corner].corner != kNoCorner && across_[corner].cosine <= kPlaneCosine)
         FindBeside(corner);
     }
     std::vector<std::array<std::uint32_t, 2>> crests;
@@ -69,8 +69,9 @@ class CrestSearch {
  private:
   // Beyond the edge across from a corner.
   struct Across {
-    std::uint32_t corner = kNone;  // the one across from the edge; none: the surface does not go on
-    float cosine = 0;              // by which it turns
+    std::uint32_t corner =
+        kNoCorner;     // the one across from the edge; none: the surface does not go on
+    float cosine = 0;  // by which it turns
   };
 
   [[nodiscard]] Double3 At(std::uint32_t corner) const {
@@ -108,7 +109,7 @@ class CrestSearch {
       const Reached here = reached_[i];
       for (const std::uint32_t side : OtherSides(here.corner)) {
         const auto [other, cosine] = across_[side];
-        if (other == kNone || cosine <= kPlaneCosine || WasReached(other)) continue;
+        if (other == kNoCorner || cosine <= kPlaneCosine || WasReached(other)) continue;
         const bool is_turned_over = here.is_turned_over != IsTurnedOver(side, other);
         if (Cosine(corner, other, is_turned_over) <= kPlaneCosine) continue;
         width = std::max(width, height_of(other));
@@ -136,7 +137,7 @@ class CrestSearch {
       const Reached here = reached_[i];
       for (const std::uint32_t side : OtherSides(here.corner)) {
         const std::uint32_t other = across_[side].corner;
-        if (other == kNone || other / 3 == corner / 3) continue;
+        if (other == kNoCorner || other / 3 == corner / 3) continue;
         if (distance_of(Next(side)) > limit || distance_of(Next(Next(side))) > limit) continue;
         const bool is_turned_over = here.is_turned_over != IsTurnedOver(side, other);
         if (Cosine(corner, other, is_turned_over) < kSameSurfaceCosine) {

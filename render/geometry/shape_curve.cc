@@ -1,7 +1,6 @@
 // Pieces of curves: cones with round ends, solved in double.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "render/geometry/shape_geometry.h"
 #include "render/math/warp.h"
@@ -10,8 +9,6 @@ namespace lucerna {
 namespace {
 
 using Axis = CurvePiece::Axis;
-
-constexpr double kPiD = std::numbers::pi;
 
 // Where a line enters a ball; false when it misses.
 bool EnterBall(Double3 offset, Double3 direction, double radius, double& t) {
@@ -124,7 +121,7 @@ ShapeFace SampleFace(const CurvePiece& shape, float u1, float u2) {
   const double slope = length > 0 ? std::clamp(axis.growth / length, -1.0, 1.0) : 0;
   const Vec3 along = length > 0 ? ToFloat(axis.along * (1 / length)) : Vec3{0, 0, 1};
   const Frame frame(along);
-  const double angle = 2 * kPiD * static_cast<double>(u2);
+  const double angle = 2 * kPi64 * static_cast<double>(u2);
   const Double3 across = Double3(frame.s) * std::cos(angle) + Double3(frame.t) * std::sin(angle);
   const Double3 outward = across * std::sqrt(1 - slope * slope) + Double3(along) * -slope;
   return {ToFloat(axis.from + axis.along * s + outward * (axis.radius + axis.growth * s)),

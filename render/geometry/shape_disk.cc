@@ -1,7 +1,6 @@
 // Disks and rings.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "render/geometry/shape_geometry.h"
 #include "render/geometry/silhouette.h"
@@ -10,7 +9,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kPiD = std::numbers::pi;
 constexpr int kFeatureSides = 256;
 
 }  // namespace
@@ -133,9 +131,9 @@ void AddRim(const Disk& shape, std::vector<FeatureSegment>& segments) {
   for (const bool is_inner : {false, true}) {
     float radius = is_inner ? shape.inner_radius : shape.radius;
     if (!(radius > 0)) continue;
-    if (is_inner) radius /= static_cast<float>(std::cos(kPiD / kFeatureSides));
+    if (is_inner) radius /= static_cast<float>(std::cos(kPi64 / kFeatureSides));
     const auto corner = [&](int i) {
-      const double angle = 2 * kPiD * (i % kFeatureSides) / kFeatureSides;
+      const double angle = 2 * kPi64 * (i % kFeatureSides) / kFeatureSides;
       return shape.center + (frame.s * static_cast<float>(std::cos(angle)) +
                              frame.t * static_cast<float>(std::sin(angle))) *
                                 radius;
@@ -152,7 +150,7 @@ void AddRimSilhouettes(const Disk& shape, std::vector<SilhouetteEdge>& edges) {
     // The face lies inside the outer rim and outside the inner one.
     const double inwards = radius == shape.radius ? -1 : 1;
     // Corners outside the circle by as much as the middles of the sides are inside.
-    const double half_side = kPiD / kRimSides;
+    const double half_side = kPi64 / kRimSides;
     const double corner_radius = static_cast<double>(radius) * 2 / (1 + std::cos(half_side));
     const auto ray = [&](double angle) {
       return Double3(frame.s) * std::cos(angle) + Double3(frame.t) * std::sin(angle);

@@ -1,7 +1,6 @@
 // Spheres, solved in double.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "render/geometry/shape_geometry.h"
@@ -10,7 +9,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kPiD = std::numbers::pi;
 constexpr int kCircleSides = 256;
 
 // 1 - cosine of the cone in which the sphere appears from `from`, without cancellation; 0 from
@@ -118,7 +116,7 @@ UvSlopes UvSlopesOf(const Sphere& shape, Vec3 position) {
   const auto height = static_cast<double>(Dot(local, shape.axes.z));
   const double from_axis = std::sqrt(std::max(radius * radius - height * height, 0.0));
   // The pole, where the gradient has no end, is a point.
-  return {TurnSlope(std::max(from_axis, 1e-3 * radius)), 1 / (kPiD * radius * kPiD * radius)};
+  return {TurnSlope(std::max(from_axis, 1e-3 * radius)), 1 / (kPi64 * radius * kPi64 * radius)};
 }
 
 SurfaceTangents TangentsOf(const Sphere& shape, Vec3 position) {
@@ -161,13 +159,13 @@ std::vector<LinePiece> CutByPlane(const Sphere& shape, Double3 origin, Double3 n
   const double squared = radius * radius - height * height;
   // Hardly more than a point of contact.
   if (!(squared > 1e-8 * radius * radius)) return {};
-  const double around = std::sqrt(squared) / std::cos(kPiD / kCircleSides);
+  const double around = std::sqrt(squared) / std::cos(kPi64 / kCircleSides);
   const Double3 middle = center - normal * height;
   const Frame frame(ToFloat(normal));
   const Double3 s(frame.s);
   const Double3 t = Cross(normal, s);
   const auto corner = [&](int i) {
-    const double angle = 2 * kPiD * (i % kCircleSides) / kCircleSides;
+    const double angle = 2 * kPi64 * (i % kCircleSides) / kCircleSides;
     return middle + s * (around * std::cos(angle)) + t * (around * std::sin(angle));
   };
   std::vector<LinePiece> pieces;

@@ -12,6 +12,7 @@
 namespace lucerna {
 
 inline constexpr float kPi = std::numbers::pi_v<float>;
+inline constexpr double kPi64 = std::numbers::pi;
 inline constexpr float kInversePi = 1 / kPi;
 
 // Uniform on the unit disc. Source: Shirley & Chiu 1997.

@@ -14,7 +14,7 @@ namespace lucerna {
 namespace {
 
 // The picture's own units; the page scales them.
-constexpr double kWidth = 640;
+constexpr double kChartWidth = 640;
 constexpr double kPlotLeft = 62, kPlotRight = 626;
 constexpr double kPlotHeight = 300;
 constexpr double kLegendTop = 14, kLegendRow = 20;
@@ -303,12 +303,12 @@ std::string DrawChart(const Chart& chart) {
   const double top = AppendLegend(legend, chart);
   const double height = top + kPlotHeight + 44;
   std::string svg =
-      Concat("<svg class=\"chart\" viewBox=\"0 0 ", Px(kWidth), " ", Px(height),
+      Concat("<svg class=\"chart\" viewBox=\"0 0 ", Px(kChartWidth), " ", Px(height),
              "\" role=\"img\" aria-label=\"", EscapeMarkup(chart.title), ". ",
              EscapeMarkup(chart.description), "\"><title>", EscapeMarkup(chart.title), "</title>");
   if (x.empty()) {
-    absl::StrAppend(&svg, "<text class=\"middle\" x=\"", Px(kWidth / 2), "\" y=\"", Px(height / 2),
-                    "\">nothing to draw yet</text></svg>\n");
+    absl::StrAppend(&svg, "<text class=\"middle\" x=\"", Px(kChartWidth / 2), "\" y=\"",
+                    Px(height / 2), "\">nothing to draw yet</text></svg>\n");
     return svg;
   }
   const Plane plane(x, y);

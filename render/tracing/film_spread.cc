@@ -14,10 +14,10 @@
 namespace lucerna {
 namespace {
 
-constexpr int kTile = 16;
+constexpr int kSpreadTile = 16;
 
 int TilesOf(int pixels) {
-  return (pixels + kTile - 1) / kTile;
+  return (pixels + kSpreadTile - 1) / kSpreadTile;
 }
 
 // Two pixels' filters overlap where their centres are less than two radii apart.
@@ -73,12 +73,12 @@ void FilmSpread::Prepare(ThreadTeam& team) {
   centres_.resize(tiles_x * tiles_y);
   team.For(centres_.size(), 4, [&](std::size_t begin, std::size_t end) {
     for (std::size_t tile = begin; tile < end; ++tile) {
-      const int x0 = around_.x0 + static_cast<int>(tile % tiles_x) * kTile;
-      const int y0 = around_.y0 + static_cast<int>(tile / tiles_x) * kTile;
-      std::array<Rgb, static_cast<std::size_t>(kTile) * kTile> centres{};
-      for (int y = y0; y < std::min(y0 + kTile, around_.y1); ++y) {
-        for (int x = x0; x < std::min(x0 + kTile, around_.x1); ++x)
-          centres[static_cast<std::size_t>((y - y0) * kTile + x - x0)] =
+      const int x0 = around_.x0 + static_cast<int>(tile % tiles_x) * kSpreadTile;
+      const int y0 = around_.y0 + static_cast<int>(tile / tiles_x) * kSpreadTile;
+      std::array<Rgb, static_cast<std::size_t>(kSpreadTile) * kSpreadTile> centres{};
+      for (int y = y0; y < std::min(y0 + kSpreadTile, around_.y1); ++y) {
+        for (int x = x0; x < std::min(x0 + kSpreadTile, around_.x1); ++x)
+          centres[static_cast<std::size_t>((y - y0) * kSpreadTile + x - x0)] =
               tracer_.BrightAtCentre(x, y);
       }
       if (!std::ranges::all_of(centres, IsBlack))
@@ -158,9 +158,9 @@ Rgb FilmSpread::CentreAt(int x, int y) const {
   const int row = y - around_.y0;
   const int tiles_x = TilesOf(around_.x1 - around_.x0);
   const std::vector<Rgb>& tile =
-      centres_[static_cast<std::size_t>(row / kTile * tiles_x + column / kTile)];
+      centres_[static_cast<std::size_t>(row / kSpreadTile * tiles_x + column / kSpreadTile)];
   if (tile.empty()) return {};
-  return tile[static_cast<std::size_t>(row % kTile * kTile + column % kTile)];
+  return tile[static_cast<std::size_t>(row % kSpreadTile * kSpreadTile + column % kSpreadTile)];
 }
 
 int FilmSpread::BrightPathsOf(int x, int y) const {
@@ -175,16 +175,18 @@ void FilmSpread::Add(std::uint64_t pass, const std::vector<Rgb>& bright, std::ve
   const std::vector<GlintPath> glint_paths = TraceGlints(pass, team);
   const int tiles_x = TilesOf(width_);
   const int tiles_y = TilesOf(height_);
-  team.For(static_cast<std::size_t>(tiles_x) * static_cast<std::size_t>(tiles_y), 4,
-           [&](std::size_t begin, std::size_t end) {
-             for (std::size_t tile = begin; tile < end; ++tile) {
-               if (shall_stop && shall_stop()) return;
-               const int x0 = static_cast<int>(tile % static_cast<std::size_t>(tiles_x)) * kTile;
-               const int y0 = static_cast<int>(tile / static_cast<std::size_t>(tiles_x)) * kTile;
-               AddTile(pass, {x0, y0, std::min(x0 + kTile, width_), std::min(y0 + kTile, height_)},
-                       bright, glint_paths, direct);
-             }
-           });
+  team.For(
+      static_cast<std::size_t>(tiles_x) * static_cast<std::size_t>(tiles_y), 4,
+      [&](std::size_t begin, std::size_t end) {
+        for (std::size_t tile = begin; tile < end; ++tile) {
+          if (shall_stop && shall_stop()) return;
+          const int x0 = static_cast<int>(tile % static_cast<std::size_t>(tiles_x)) * kSpreadTile;
+          const int y0 = static_cast<int>(tile / static_cast<std::size_t>(tiles_x)) * kSpreadTile;
+          AddTile(pass,
+                  {x0, y0, std::min(x0 + kSpreadTile, width_), std::min(y0 + kSpreadTile, height_)},
+                  bright, glint_paths, direct);
+        }
+      });
 }
 
 void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vector<Rgb>& bright,

@@ -17,7 +17,7 @@ namespace {
 
 // Glints are searched, and paths are shared out, by squares of the film of so many pixels: a crop
 // window has the glints of the whole image.
-constexpr int kTile = 16;
+constexpr int kGlintTile = 16;
 // Reflections and refractions of a chain, at most. What light is left after more is mostly below
 // the image's white.
 constexpr int kMostHits = 8;
@@ -181,14 +181,14 @@ struct Target {
 class TileSearch {
  public:
   TileSearch(const EyePathTracer& tracer, const std::vector<Ball>& lights, int tile_x, int tile_y)
-      : tracer_(tracer), lights_(lights), x0_(tile_x * kTile), y0_(tile_y * kTile) {
+      : tracer_(tracer), lights_(lights), x0_(tile_x * kGlintTile), y0_(tile_y * kGlintTile) {
     for (const Ball& light : lights)
       brightest_ = std::max(brightest_, MaxChannel(light.radiance));
   }
 
   // Found glints, with keys that follow from `key`.
   [[nodiscard]] std::vector<Glint> Run(std::uint64_t key) {
-    constexpr std::size_t kCorners = kTile + 1;
+    constexpr std::size_t kCorners = kGlintTile + 1;
     std::vector<Chains> corners(kCorners * kCorners);
     bool is_any = false;
     for (std::size_t y = 0; y < kCorners; ++y) {
@@ -201,8 +201,8 @@ class TileSearch {
     if (!is_any) return {};
     // Whole cells first, then parts of those that are uncertain, the largest first.
     std::deque<Cell> uncertain;
-    for (std::size_t y = 0; y < kTile; ++y) {
-      for (std::size_t x = 0; x < kTile; ++x) {
+    for (std::size_t y = 0; y < kGlintTile; ++y) {
+      for (std::size_t x = 0; x < kGlintTile; ++x) {
         const Chains* first = &corners[y * kCorners + x];
         const Cell cell = {{x0_ + static_cast<double>(x), y0_ + static_cast<double>(y)},
                            1,
@@ -484,7 +484,8 @@ class TileSearch {
   void Keep(FilmPoint place, const Matrix& image, const Target& target, const Chain& chain,
             const Ball& light) {
     // What lies in another tile is found from there.
-    if (!(place.x >= x0_ && place.x < x0_ + kTile && place.y >= y0_ && place.y < y0_ + kTile))
+    if (!(place.x >= x0_ && place.x < x0_ + kGlintTile && place.y >= y0_ &&
+          place.y < y0_ + kGlintTile))
       return;
     Found found;
     found.area = std::numbers::pi * std::abs(image.Determinant());
@@ -574,7 +575,8 @@ Glints::Glints(const EyePathTracer& tracer, const FilmRegion& region, ThreadTeam
   const std::vector<Ball> lights = SearchedLights(tracer);
   if (lights.empty()) return;
   const RenderSettings& settings = tracer.settings();
-  const Tiles whole = {0, 0, (settings.width - 1) / kTile + 1, (settings.height - 1) / kTile + 1};
+  const Tiles whole = {0, 0, (settings.width - 1) / kGlintTile + 1,
+                       (settings.height - 1) / kGlintTile + 1};
   tiles_ = TilesNear(region, whole);
   const auto columns = static_cast<std::size_t>(tiles_.x1 - tiles_.x0);
   const auto rows = static_cast<std::size_t>(tiles_.y1 - tiles_.y0);
@@ -600,7 +602,7 @@ Glints::Glints(std::vector<Glint> glints)
 
 Glints::Tiles Glints::TilesNear(const FilmRegion& region, const Tiles& all) {
   const auto tile_of = [](double at, int low, int high) {
-    return std::clamp(static_cast<int>(std::floor(at / kTile)), low, high - 1);
+    return std::clamp(static_cast<int>(std::floor(at / kGlintTile)), low, high - 1);
   };
   return {tile_of(region.x0 - kFarthestReach, all.x0, all.x1),
           tile_of(region.y0 - kFarthestReach, all.y0, all.y1),

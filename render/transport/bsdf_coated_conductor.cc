@@ -26,10 +26,6 @@ bool IsMirror(const Material& material) {
   return PropertiesOf(material).is_smooth && material.parts == Parts::kAll;
 }
 
-Vec3 Up(Vec3 w) {
-  return w.z < 0 ? -w : w;
-}
-
 // What the metal reflects of light that comes to it through the coat, in the space of its indices.
 Rgb MetalInCoat(const Material& material, float cosine) {
   return FresnelConductor(cosine, material.eta * (1 / material.ior),

@@ -27,10 +27,6 @@ Rgb BaseReflectance(const Material& material) {
           channel(material.reflectance.b)};
 }
 
-Vec3 Up(Vec3 w) {
-  return w.z < 0 ? -w : w;
-}
-
 // --- the coat's surface
 
 bool SampleCoat(const Material& material, Vec3 wo, float u1, float u2, BsdfSample& sample) {

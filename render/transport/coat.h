@@ -43,6 +43,11 @@ void PrepareCoats(std::vector<Material>& materials);
 // nothing for other materials.
 void FitCoat(MaterialNumbers& material);
 
+// Both sides of a coat are alike: `w` or its opposite, with w.z >= 0.
+[[nodiscard]] inline Vec3 Up(Vec3 w) {
+  return w.z < 0 ? -w : w;
+}
+
 // E(w), in [0, 1]: of a direction on the outside, w.z > 0, in flux. Requires a prepared material.
 [[nodiscard]] float CoatEntering(const Material& material, Vec3 w);
 

@@ -9,10 +9,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 #include "render/math/equal_area_square.h"
+#include "render/math/warp.h"
 #include "render/math/windowed_constant.h"
 #include "render/transport/environment_map.h"
 #include "render/transport/infinite_emission.h"
@@ -20,7 +20,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kPiD = std::numbers::pi;
 // Cells of the map's square for photons along a side, at least: within one, cosines hardly change.
 constexpr int kFewestCells = 256;
 // Cells of the angles along a side, at least and at most, and how many cells of the square are
@@ -145,7 +144,7 @@ class PortalEmission final : public InfiniteEmission {
     const auto angle_cell = [&](float place) {
       return static_cast<std::size_t>(std::clamp(static_cast<int>(place), 0, grid - 1));
     };
-    const double solid_angle = 4 * kPiD / (static_cast<double>(side_) * side_);
+    const double solid_angle = 4 * kPi64 / (static_cast<double>(side_) * side_);
     std::array<double, 3> passing{};
     double all = 0;
     double covered = 0;
@@ -199,7 +198,7 @@ class PortalEmission final : public InfiniteEmission {
         const double b = std::tan(AngleAt(place.y));
         angles[static_cast<std::size_t>(row) * static_cast<std::size_t>(grid) +
                static_cast<std::size_t>(column)] +=
-            kEvenShare * all / (2 * kPiD) *
+            kEvenShare * all / (2 * kPi64) *
             SolidAngleOf(Normalize(Vec3{static_cast<float>(a), static_cast<float>(b), 1}));
       }
     }
@@ -207,16 +206,16 @@ class PortalEmission final : public InfiniteEmission {
   }
 
   [[nodiscard]] double AngleAt(float place) const {
-    return (static_cast<double>(place) / angles_side_ - 0.5) * kPiD;
+    return (static_cast<double>(place) / angles_side_ - 0.5) * kPi64;
   }
   [[nodiscard]] double AnglePlace(double across, double ahead) const {
-    return (std::atan2(across, ahead) / kPiD + 0.5) * angles_side_;
+    return (std::atan2(across, ahead) / kPi64 + 0.5) * angles_side_;
   }
   // [sr] of a cell of the angles at a direction in the portal's axes.
   [[nodiscard]] double SolidAngleOf(Vec3 local) const {
     const auto x = static_cast<double>(local.x);
     const auto y = static_cast<double>(local.y);
-    const double cell = kPiD / angles_side_;
+    const double cell = kPi64 / angles_side_;
     return cell * cell * (1 - x * x) * (1 - y * y) / static_cast<double>(local.z);
   }
   // Where a direction lies among the angles, and the solid angle of a cell there; false for one

@@ -33,7 +33,7 @@ bool IsAtInfinity(EmitterKind kind) {
 
 // How much of the choice of direct light is even among the lights. By power alone, a light nearby
 // that has a millionth of the power of another is found once in a million samples.
-constexpr double kEvenShare = 0.1;
+constexpr double kEvenShareOfLights = 0.1;
 
 // Cells of pictures on area lights: of a side of one emitter, and of all together.
 constexpr int kMostSpreadSide = 256;
@@ -299,7 +299,7 @@ void LightSet::ShareOut() {
     if (emitters_[i].is_sampled) {
       const double even = power / light_power[light_of[i]] / sampled_lights;
       const double by_power = power / sampled_total;
-      direct_choice = by_power + kEvenShare * (even - by_power);
+      direct_choice = by_power + kEvenShareOfLights * (even - by_power);
     }
     sum += power;
     direct_sum += direct_choice;

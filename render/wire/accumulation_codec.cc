@@ -14,7 +14,7 @@ namespace {
 
 __extension__ using Wide = __int128;
 
-constexpr std::string_view kMagic = "LAC6";
+constexpr std::string_view kAccumulationMagic = "LAC6";
 // More columns of evidence than any radius controller uses.
 constexpr std::uint64_t kMostEvidence = 32;
 constexpr std::uint8_t kIndicesAsVarints = 0;
@@ -101,7 +101,7 @@ std::vector<std::int64_t> ReadRemainders(ByteReader& reader, std::size_t rows,
   return values;
 }
 
-Status Malformed(std::string_view what) {
+Status MalformedAccumulation(std::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat("malformed accumulation: ", std::string(what)));
 }
 
@@ -110,7 +110,7 @@ Status Malformed(std::string_view what) {
 std::string EncodeAccumulation(const Accumulation& accumulation, std::size_t hitpoints) {
   LUCERNA_CHECK(accumulation.hitpoints.empty() || accumulation.hitpoints.back() < hitpoints);
   ByteWriter writer;
-  writer.Bytes(kMagic);
+  writer.Bytes(kAccumulationMagic);
   writer.Varint(hitpoints);
   writer.Varint(accumulation.size());
   WriteTally(writer, accumulation.tally);
@@ -164,55 +164,59 @@ std::string EncodeAccumulation(const Accumulation& accumulation, std::size_t hit
 
 StatusOr<Accumulation> DecodeAccumulation(std::string_view bytes, std::size_t hitpoints) {
   ByteReader reader(bytes);
-  if (reader.Bytes(kMagic.size()) != kMagic) return Malformed("wrong magic or version");
-  if (reader.Varint() != hitpoints) return Malformed("made for another block");
+  if (reader.Bytes(kAccumulationMagic.size()) != kAccumulationMagic)
+    return MalformedAccumulation("wrong magic or version");
+  if (reader.Varint() != hitpoints) return MalformedAccumulation("made for another block");
   const std::uint64_t rows = reader.Varint();
-  if (rows > hitpoints) return Malformed("more rows than the block has");
+  if (rows > hitpoints) return MalformedAccumulation("more rows than the block has");
 
   Accumulation accumulation;
   StatusOr<BatchTally> tally = ReadTally(reader);
-  if (!tally.ok()) return Malformed(std::string(tally.status().message()));
+  if (!tally.ok()) return MalformedAccumulation(std::string(tally.status().message()));
   accumulation.tally = *std::move(tally);
   const std::uint64_t named = reader.Varint();
-  if (named > kDroppedNamed) return Malformed("it names too many dropped photons");
+  if (named > kDroppedNamed) return MalformedAccumulation("it names too many dropped photons");
   for (std::uint64_t i = 0; i < named; ++i) {
     accumulation.dropped_photons.push_back(reader.Varint());
   }
   const std::uint64_t reports = reader.Varint();
   if (reports > kMostReports || reports > accumulation.tally.photons) {
-    return Malformed("it reports too many photons");
+    return MalformedAccumulation("it reports too many photons");
   }
   std::uint64_t next = 0;
   for (std::uint64_t i = 0; i < reports && reader.ok(); ++i) {
     FoundPhoton found;
     const std::uint64_t step = reader.Varint();
-    if (step >= UINT64_MAX - next) return Malformed("it reports a photon that does not exist");
+    if (step >= UINT64_MAX - next)
+      return MalformedAccumulation("it reports a photon that does not exist");
     found.index = next + step;
     next = found.index + 1;
     found.numbers = ReadEmission(reader);
     const std::uint64_t row = reader.Varint();
-    if (row >= hitpoints) return Malformed("it reports a photon of no hitpoint");
+    if (row >= hitpoints) return MalformedAccumulation("it reports a photon of no hitpoint");
     found.row = static_cast<std::uint32_t>(row);
     accumulation.found.push_back(found);
   }
 
   const std::uint8_t form = reader.Byte();
-  if (!reader.ok()) return Malformed("truncated");
+  if (!reader.ok()) return MalformedAccumulation("truncated");
   accumulation.hitpoints.reserve(rows);
   if (form == kIndicesAsVarints) {
     const std::uint64_t size = reader.Varint();
     // The encoder never writes varints that are as long as the bitmap.
-    if (size >= (hitpoints + 7) / 8) return Malformed("its index is too long");
+    if (size >= (hitpoints + 7) / 8) return MalformedAccumulation("its index is too long");
     const std::string indices = reader.Compressed(size);
     ByteReader index_reader(indices);
     std::uint64_t least = 0;
     for (std::uint64_t i = 0; i < rows && index_reader.ok(); ++i) {
       const std::uint64_t step = index_reader.Varint();
-      if (step >= hitpoints - least) return Malformed("it names a hitpoint that does not exist");
+      if (step >= hitpoints - least)
+        return MalformedAccumulation("it names a hitpoint that does not exist");
       accumulation.hitpoints.push_back(static_cast<std::uint32_t>(least + step));
       least += step + 1;
     }
-    if (!reader.ok() || !index_reader.finished()) return Malformed("its index is damaged");
+    if (!reader.ok() || !index_reader.finished())
+      return MalformedAccumulation("its index is damaged");
   } else if (form == kIndicesAsBitmap) {
     const std::string bitmap = reader.Compressed((hitpoints + 7) / 8);
     for (std::size_t byte = 0; byte < bitmap.size(); ++byte) {
@@ -220,43 +224,46 @@ StatusOr<Accumulation> DecodeAccumulation(std::string_view bytes, std::size_t hi
            bits &= bits - 1) {
         const std::size_t row = 8 * byte + static_cast<std::size_t>(std::countr_zero(bits));
         if (row >= hitpoints || accumulation.size() >= rows) {
-          return Malformed("its bitmap does not fit its counts");
+          return MalformedAccumulation("its bitmap does not fit its counts");
         }
         accumulation.hitpoints.push_back(static_cast<std::uint32_t>(row));
       }
     }
-    if (!reader.ok() || accumulation.size() != rows) return Malformed("its bitmap is damaged");
+    if (!reader.ok() || accumulation.size() != rows)
+      return MalformedAccumulation("its bitmap is damaged");
   } else {
-    return Malformed("an unknown form of index");
+    return MalformedAccumulation("an unknown form of index");
   }
 
   accumulation.counts = reader.Planes32(rows);
   for (std::uint32_t& count : accumulation.counts) {
-    if (++count == 0) return Malformed("a photon count does not fit");
+    if (++count == 0) return MalformedAccumulation("a photon count does not fit");
   }
 
   Guess guess;
   guess.green_per_photon = UnZigZag(reader.Varint());
   guess.red_over_green = UnZigZag(reader.Varint());
   guess.blue_over_green = UnZigZag(reader.Varint());
-  if (!reader.ok()) return Malformed("truncated");
+  if (!reader.ok()) return MalformedAccumulation("truncated");
   std::vector<std::int64_t>& red = accumulation.flux[0];
   std::vector<std::int64_t>& green = accumulation.flux[1];
   std::vector<std::int64_t>& blue = accumulation.flux[2];
   green = ReadRemainders(reader, rows,
                          [&](std::size_t i) { return guess.Green(accumulation.counts[i]); });
-  if (!reader.ok()) return Malformed("its flux is truncated or damaged");
+  if (!reader.ok()) return MalformedAccumulation("its flux is truncated or damaged");
   red = ReadRemainders(
       reader, rows, [&](std::size_t i) { return Guess::Scaled(green[i], guess.red_over_green); });
   blue = ReadRemainders(
       reader, rows, [&](std::size_t i) { return Guess::Scaled(green[i], guess.blue_over_green); });
   const std::uint64_t columns = reader.Varint();
-  if (!reader.ok() || columns > kMostEvidence) return Malformed("its flux or evidence is damaged");
+  if (!reader.ok() || columns > kMostEvidence)
+    return MalformedAccumulation("its flux or evidence is damaged");
   for (std::uint64_t column = 0; column < columns && reader.ok(); ++column) {
     accumulation.evidence.push_back(
         ReadRemainders(reader, rows, [](std::size_t) { return std::uint64_t{0}; }));
   }
-  if (!reader.finished()) return Malformed("its columns are damaged or bytes are left over");
+  if (!reader.finished())
+    return MalformedAccumulation("its columns are damaged or bytes are left over");
   return accumulation;
 }
 

@@ -44,7 +44,7 @@ bool IsOctahedral(std::uint32_t code) {
   return (code >> 16) <= kLargestOctahedralHalf && (code & 0xFFFFU) <= kLargestOctahedralHalf;
 }
 
-Status Malformed(std::string_view what) {
+Status MalformedBlock(std::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat("malformed hitpoint block: ", std::string(what)));
 }
 
@@ -99,7 +99,8 @@ std::string EncodeHitpointBlock(const HitpointBlock& block, ThreadTeam* team) {
 
 StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t max_hitpoints) {
   ByteReader reader(bytes);
-  if (reader.Bytes(kBlockMagic.size()) != kBlockMagic) return Malformed("wrong magic or version");
+  if (reader.Bytes(kBlockMagic.size()) != kBlockMagic)
+    return MalformedBlock("wrong magic or version");
   const std::uint64_t rows = reader.Varint();
   const std::uint64_t glossy_rows = reader.Varint();
   const std::uint64_t caustic_rows = reader.Varint();
@@ -107,10 +108,10 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
   const std::uint64_t segment_rows = reader.Varint();
   if (rows > max_hitpoints || segment_rows > rows || glossy_rows > rows - segment_rows ||
       caustic_rows > glossy_rows) {
-    return Malformed("more rows than there can be");
+    return MalformedBlock("more rows than there can be");
   }
   if (textured_rows != 0 && textured_rows != glossy_rows) {
-    return Malformed("a column of another length");
+    return MalformedBlock("a column of another length");
   }
 
   const Column x = ReadDeltas(reader, rows);
@@ -119,13 +120,13 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
   HitpointBlock block;
   block.caustic_rows = caustic_rows;
   block.normals_oct = ReadDeltas(reader, rows);
-  if (!reader.ok()) return Malformed("truncated or damaged columns");
+  if (!reader.ok()) return MalformedBlock("truncated or damaged columns");
   block.positions.resize(rows);
   for (std::size_t i = 0; i < rows; ++i) {
     block.positions[i] = {std::bit_cast<float>(x[i]), std::bit_cast<float>(y[i]),
                           std::bit_cast<float>(z[i])};
-    if (!IsFinite(block.positions[i])) return Malformed("a position is not finite");
-    if (!IsOctahedral(block.normals_oct[i])) return Malformed("a normal is not a direction");
+    if (!IsFinite(block.positions[i])) return MalformedBlock("a position is not finite");
+    if (!IsOctahedral(block.normals_oct[i])) return MalformedBlock("a normal is not a direction");
   }
 
   if (glossy_rows > 0) {
@@ -133,51 +134,51 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
     const Column materials = ReadDeltas(reader, glossy_rows);
     const Column to_eye = ReadDeltas(reader, glossy_rows);
     const Column shading_normals = ReadDeltas(reader, glossy_rows);
-    if (!reader.ok()) return Malformed("truncated or damaged glossy columns");
+    if (!reader.ok()) return MalformedBlock("truncated or damaged glossy columns");
     block.glossy.resize(glossy_rows);
     for (std::size_t i = 0; i < glossy_rows; ++i) {
       block.glossy[i] = {hitpoints[i], materials[i], to_eye[i], shading_normals[i]};
       if (hitpoints[i] >= rows - segment_rows || (i > 0 && hitpoints[i] <= hitpoints[i - 1])) {
-        return Malformed("glossy rows are out of order or out of range");
+        return MalformedBlock("glossy rows are out of order or out of range");
       }
       if (!IsOctahedral(to_eye[i]) || !IsOctahedral(shading_normals[i])) {
-        return Malformed("a glossy direction is not a direction");
+        return MalformedBlock("a glossy direction is not a direction");
       }
     }
     if (caustic_rows > 0 &&
         hitpoints[glossy_rows - caustic_rows] != rows - segment_rows - caustic_rows) {
-      return Malformed("a caustic hitpoint is not glossy");
+      return MalformedBlock("a caustic hitpoint is not glossy");
     }
   }
   if (textured_rows > 0) {
     const Column r = ReadDeltas(reader, textured_rows);
     const Column g = ReadDeltas(reader, textured_rows);
     const Column b = ReadDeltas(reader, textured_rows);
-    if (!reader.ok()) return Malformed("truncated or damaged textures");
+    if (!reader.ok()) return MalformedBlock("truncated or damaged textures");
     block.places.resize(textured_rows);
     for (std::size_t i = 0; i < textured_rows; ++i) {
       const Rgb color = {std::bit_cast<float>(r[i]), std::bit_cast<float>(g[i]),
                          std::bit_cast<float>(b[i])};
       if (!IsFinite(color) || !(color.r >= 0 && color.g >= 0 && color.b >= 0)) {
-        return Malformed("a colour is not a number");
+        return MalformedBlock("a colour is not a number");
       }
       block.places[i].color = color;
     }
     constexpr float kWidest = 1e4F;
     for (std::size_t width = 0; width < block.places[0].widths.size(); ++width) {
       const Column widths = ReadDeltas(reader, textured_rows);
-      if (!reader.ok()) return Malformed("truncated or damaged textures");
+      if (!reader.ok()) return MalformedBlock("truncated or damaged textures");
       for (std::size_t i = 0; i < textured_rows; ++i) {
         const auto value = std::bit_cast<float>(widths[i]);
-        if (!(value >= 0 && value <= kWidest)) return Malformed("a roughness is out of range");
+        if (!(value >= 0 && value <= kWidest)) return MalformedBlock("a roughness is out of range");
         block.places[i].widths[width] = value;
       }
     }
     const Column tangents = ReadDeltas(reader, textured_rows);
-    if (!reader.ok()) return Malformed("truncated or damaged textures");
+    if (!reader.ok()) return MalformedBlock("truncated or damaged textures");
     for (std::size_t i = 0; i < textured_rows; ++i) {
       if (tangents[i] != kNoTangent && !IsOctahedral(tangents[i]))
-        return Malformed("a tangent is not a direction");
+        return MalformedBlock("a tangent is not a direction");
       block.places[i].tangent_oct = tangents[i];
     }
   }
@@ -187,7 +188,7 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
     const Column end_z = ReadDeltas(reader, segment_rows);
     const Column media = ReadDeltas(reader, segment_rows);
     const Column narrowing = ReadDeltas(reader, segment_rows);
-    if (!reader.ok()) return Malformed("truncated or damaged segments");
+    if (!reader.ok()) return MalformedBlock("truncated or damaged segments");
     block.segments.resize(segment_rows);
     for (std::size_t i = 0; i < segment_rows; ++i) {
       MediumSegment& segment = block.segments[i];
@@ -195,13 +196,13 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
                      std::bit_cast<float>(end_z[i])};
       segment.medium = media[i];
       segment.narrowing = std::bit_cast<float>(narrowing[i]);
-      if (!IsFinite(segment.end)) return Malformed("the end of a segment is not finite");
+      if (!IsFinite(segment.end)) return MalformedBlock("the end of a segment is not finite");
       if (!(segment.narrowing > 0 && segment.narrowing <= 1)) {
-        return Malformed("a segment's radius does not grow");
+        return MalformedBlock("a segment's radius does not grow");
       }
     }
   }
-  if (!reader.finished()) return Malformed("bytes are left over");
+  if (!reader.finished()) return MalformedBlock("bytes are left over");
   return block;
 }
 

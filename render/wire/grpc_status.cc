@@ -7,17 +7,17 @@ namespace {
 
 // gRPC puts a message into a header; one that does not fit breaks the whole call. A scene can
 // have a hundred errors, and the first of them say most.
-constexpr std::size_t kMaxMessageBytes = 6000;
+constexpr std::size_t kMaxStatusBytes = 6000;
 
 }  // namespace
 
 grpc::Status ToGrpc(const Status& status) {
   if (status.ok()) return grpc::Status::OK;
   std::string message(status.message());
-  if (message.size() > kMaxMessageBytes) {
-    message.resize(message.rfind('\n', kMaxMessageBytes) == std::string::npos
-                       ? kMaxMessageBytes
-                       : message.rfind('\n', kMaxMessageBytes));
+  if (message.size() > kMaxStatusBytes) {
+    message.resize(message.rfind('\n', kMaxStatusBytes) == std::string::npos
+                       ? kMaxStatusBytes
+                       : message.rfind('\n', kMaxStatusBytes));
     message += "\n(and more)";
   }
   return {static_cast<grpc::StatusCode>(status.code()), std::move(message)};

@@ -311,7 +311,7 @@ v1::SceneNeeds ToProto(const SceneNeeds& needs) {
 }
 
 StatusOr<SceneNeeds> FromProto(const v1::SceneNeeds& message) {
-  if (message.parts() >> kParts != 0) {
+  if (message.parts() >> kPartCount != 0) {
     return absl::InvalidArgumentError("the job needs parts that this program does not know");
   }
   if (!IsBetween(message.eye_sample_sets(), 0, kMostEyeSets)) {

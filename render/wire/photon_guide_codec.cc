@@ -6,13 +6,13 @@
 namespace lucerna {
 namespace {
 
-constexpr std::string_view kMagic = "LPG2";
+constexpr std::string_view kGuideMagic = "LPG2";
 
 }  // namespace
 
 std::string EncodePhotonGuide(const PhotonGuide& guide) {
   ByteWriter writer;
-  writer.Bytes(kMagic);
+  writer.Bytes(kGuideMagic);
   writer.Varint(guide.reported());
   writer.Varint(guide.nodes().size());
   for (const PhotonGuide::Node& node : guide.nodes()) {
@@ -25,7 +25,7 @@ std::string EncodePhotonGuide(const PhotonGuide& guide) {
 StatusOr<PhotonGuide> DecodePhotonGuide(std::string_view bytes) {
   const auto malformed = [] { return absl::InvalidArgumentError("malformed photon guide"); };
   ByteReader reader(bytes);
-  if (reader.Bytes(kMagic.size()) != kMagic) return malformed();
+  if (reader.Bytes(kGuideMagic.size()) != kGuideMagic) return malformed();
   const std::uint64_t reported = reader.Varint();
   const std::uint64_t count = reader.Varint();
   if (reported > UINT32_MAX || count > kMostGuideNodes) return malformed();

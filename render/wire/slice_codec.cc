@@ -13,7 +13,7 @@
 namespace lucerna {
 namespace {
 
-constexpr std::string_view kMagic = "LSL5";
+constexpr std::string_view kSliceMagic = "LSL5";
 
 // The column that a column is predicted from: green, of radiance. Itself: from none.
 std::size_t BaseOf(std::size_t column) {
@@ -55,7 +55,7 @@ std::vector<std::size_t> SentColumns(const PassRange& passes, std::size_t column
   return sent;
 }
 
-Status Malformed(std::string_view what) {
+Status MalformedSlice(std::string_view what) {
   return absl::InvalidArgumentError(absl::StrCat("malformed slice: ", std::string(what)));
 }
 
@@ -65,59 +65,60 @@ Status CheckDropped(const SliceSums& slice, std::uint64_t photons_per_pass) {
   for (std::size_t i = 0; i < named.size(); ++i) {
     if (named[i].pass < slice.passes.first || named[i].pass >= slice.passes.last ||
         named[i].index >= photons_per_pass || (i > 0 && !(named[i - 1] < named[i]))) {
-      return Malformed("it names a dropped photon out of order or out of range");
+      return MalformedSlice("it names a dropped photon out of order or out of range");
     }
   }
   if (named.size() != std::min<std::uint64_t>(slice.tally.dropped, kDroppedNamed)) {
-    return Malformed("it names more or fewer dropped photons than it has");
+    return MalformedSlice("it names more or fewer dropped photons than it has");
   }
   return absl::OkStatus();
 }
 
 // All of a slice but its columns.
 StatusOr<SliceSums> ReadHead(ByteReader& reader, const SliceShape& shape) {
-  if (reader.Bytes(kMagic.size()) != kMagic) return Malformed("wrong magic or version");
+  if (reader.Bytes(kSliceMagic.size()) != kSliceMagic)
+    return MalformedSlice("wrong magic or version");
   if (reader.Varint() != shape.passes.first || reader.Varint() != shape.passes.size()) {
-    return Malformed("it is of other passes");
+    return MalformedSlice("it is of other passes");
   }
   const std::size_t columns = ColumnsOf(shape.passes, shape.evidence);
   if (reader.Varint() != shape.pixels || reader.Varint() != columns) {
-    return Malformed("it has another shape");
+    return MalformedSlice("it has another shape");
   }
   SliceSums slice;
   slice.passes = shape.passes;
   slice.evidence = shape.evidence;
   slice.eye_rays = reader.Varint();
   StatusOr<BatchTally> tally = ReadTally(reader);
-  if (!reader.ok()) return Malformed("truncated");
-  if (!tally.ok()) return Malformed(std::string(tally.status().message()));
+  if (!reader.ok()) return MalformedSlice("truncated");
+  if (!tally.ok()) return MalformedSlice(std::string(tally.status().message()));
   slice.tally = *std::move(tally);
   // Passes that see nothing, and all of a job without light, have no photons.
   if (shape.photons_per_pass == 0 || slice.tally.photons % shape.photons_per_pass != 0 ||
       slice.tally.photons / shape.photons_per_pass > shape.passes.size()) {
-    return Malformed("its counters are of another number of photons");
+    return MalformedSlice("its counters are of another number of photons");
   }
   const std::uint64_t named = reader.Varint();
-  if (named > kDroppedNamed) return Malformed("it names too many dropped photons");
+  if (named > kDroppedNamed) return MalformedSlice("it names too many dropped photons");
   for (std::uint64_t i = 0; i < named; ++i) {
     const std::uint64_t pass = reader.Varint();
     slice.dropped_photons.push_back({shape.passes.first + pass, reader.Varint()});
   }
-  if (!reader.ok()) return Malformed("truncated");
+  if (!reader.ok()) return MalformedSlice("truncated");
   LUCERNA_RETURN_IF_ERROR(CheckDropped(slice, shape.photons_per_pass));
   const std::uint64_t reports = reader.Varint();
   if (reports > kMostReports || reports > slice.tally.photons) {
-    return Malformed("it reports too many photons");
+    return MalformedSlice("it reports too many photons");
   }
   for (std::uint64_t i = 0; i < reports && reader.ok(); ++i) {
     EmissionReport report;
     report.numbers = ReadEmission(reader);
     const std::uint64_t pixel = reader.Varint();
-    if (pixel >= shape.pixels) return Malformed("it reports a photon of no pixel");
+    if (pixel >= shape.pixels) return MalformedSlice("it reports a photon of no pixel");
     report.pixel = static_cast<std::uint32_t>(pixel);
     slice.reports.push_back(report);
   }
-  if (!reader.ok()) return Malformed("truncated");
+  if (!reader.ok()) return MalformedSlice("truncated");
   return slice;
 }
 
@@ -136,12 +137,12 @@ Status ReadColumns(ByteReader& reader, const SliceShape& shape, const SliceSums&
       is_of_column = reader.ok() && ChannelFromCodes(Beside(slice, column), codes, values);
     }
     if (!is_of_column || !reader.ok()) {
-      return Malformed(
+      return MalformedSlice(
           "its columns are truncated or damaged, or a value is not finite or too long");
     }
     add(column, std::move(values));
   }
-  if (!reader.finished()) return Malformed("bytes are left over");
+  if (!reader.finished()) return MalformedSlice("bytes are left over");
   return absl::OkStatus();
 }
 
@@ -149,7 +150,7 @@ Status ReadColumns(ByteReader& reader, const SliceShape& shape, const SliceSums&
 
 std::string EncodeSlice(const SliceSums& slice, ThreadTeam* team) {
   ByteWriter writer;
-  writer.Bytes(kMagic);
+  writer.Bytes(kSliceMagic);
   writer.Varint(slice.passes.first);
   writer.Varint(slice.passes.size());
   writer.Varint(slice.pixels());

@@ -40,6 +40,7 @@
 #include "server/pass_merger.h"
 #include "server/round_merger.h"
 #include "server/scheduler.h"
+#include "tests/support/steady_time.h"
 
 namespace lucerna {
 namespace {
@@ -139,10 +140,6 @@ constexpr std::array kOptions = {
 
 constexpr double kTick = 0.05;    // [s] Coordinator::Tick
 constexpr double kSyncEvery = 3;  // [s] a heartbeat waits so long
-
-SteadyTime At(double s) {
-  return SteadyTime(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(s)));
-}
 
 // What the real parts cost, by the real clock.
 struct CallTimes {

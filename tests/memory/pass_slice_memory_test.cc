@@ -17,20 +17,20 @@ namespace {
 constexpr std::size_t kWhere = sizeof(Vec3) + sizeof(std::uint32_t);  // position and normal
 constexpr std::size_t kRow = sizeof(std::uint32_t) + sizeof(Rgb) + sizeof(float);
 constexpr std::size_t kSeen = sizeof(Rgb) + sizeof(EyeFeatures);
-constexpr std::size_t kPixels = 1U << 14U;
+constexpr std::size_t kSlicePixels = 1U << 14U;
 
 EyePass WholePass(std::uint64_t pass) {
   EyePass eye;
   eye.pass = pass;
-  eye.block.positions.resize(kPixels);
-  eye.block.normals_oct.resize(kPixels);
-  eye.pixels.resize(kPixels);
-  for (std::size_t i = 0; i < kPixels; ++i)
+  eye.block.positions.resize(kSlicePixels);
+  eye.block.normals_oct.resize(kSlicePixels);
+  eye.pixels.resize(kSlicePixels);
+  for (std::size_t i = 0; i < kSlicePixels; ++i)
     eye.pixels[i] = static_cast<std::uint32_t>(i);
-  eye.weights.resize(kPixels);
-  eye.unit_radii.assign(kPixels, 1);
-  eye.direct.resize(kPixels);
-  eye.features.resize(kPixels);
+  eye.weights.resize(kSlicePixels);
+  eye.unit_radii.assign(kSlicePixels, 1);
+  eye.direct.resize(kSlicePixels);
+  eye.features.resize(kSlicePixels);
   return eye;
 }
 
@@ -39,7 +39,7 @@ struct PassSlice {
   RenderSettings settings;
   std::size_t columns = 0;  // of evidence
   RoundPlan plan = {.photons_per_pass = 1,
-                    .radii = std::make_shared<const RadiusColumn>(kPixels, 1.0F)};
+                    .radii = std::make_shared<const RadiusColumn>(kSlicePixels, 1.0F)};
   ThreadTeam team = ThreadTeam(1);
   FluxScale scale = {Gray(1), Gray(1)};
 
@@ -68,18 +68,18 @@ TEST(SliceOfPassMemoryTest, HoldsLittleMoreThanThePassAndItsSums) {
   PassSlice of;
   const std::size_t before = LiveBytes();
   EyePass eye = WholePass(0);
-  PassSums sums(kPixels, of.columns);
+  PassSums sums(kSlicePixels, of.columns);
   ASSERT_NEAR(static_cast<double>(LiveBytes() - before),
-              static_cast<double>(kPixels * (kWhere + kRow + kSeen + of.OfSums())), kSlack);
+              static_cast<double>(kSlicePixels * (kWhere + kRow + kSeen + of.OfSums())), kSlack);
   ForgetMostLiveBytes();
   const SliceSums slice = SliceOfPass(std::move(eye), of.plan, std::move(sums), of.settings,
                                       SceneNeeds(), of.scale, of.team);
   EXPECT_NEAR(static_cast<double>(LiveBytes() - before),
-              static_cast<double>(kPixels * BytesAPixel(slice)), kSlack);
+              static_cast<double>(kSlicePixels * BytesAPixel(slice)), kSlack);
   // Features become columns of the slice before they go.
   constexpr std::size_t kFeatures = std::size_t{kFeatureColumns} * 3;
   EXPECT_LE(MostLiveBytes() - before,
-            kPixels * (kWhere + kRow + kSeen + kFeatures + of.OfSums()) + kSlack);
+            kSlicePixels * (kWhere + kRow + kSeen + kFeatures + of.OfSums()) + kSlack);
 }
 
 // A worker has packed what eye paths brought when it gathers photons.
@@ -94,17 +94,18 @@ TEST(SliceOfPassMemoryTest, HoldsWhatEyePathsBroughtInFewerBytes) {
   constexpr std::size_t kPacked = std::size_t{3 + kFeatureColumns} * 3;
   EXPECT_EQ(BytesAPixel(slice), kPacked);
   EXPECT_NEAR(static_cast<double>(LiveBytes() - before),
-              static_cast<double>(kPixels * (kWhere + kRow + kPacked)), kSlack);
+              static_cast<double>(kSlicePixels * (kWhere + kRow + kPacked)), kSlack);
   EXPECT_LE(MostLiveBytes() - before,
-            kPixels * (kWhere + kRow + sizeof(EyeFeatures) + kPacked) + kSlack);
+            kSlicePixels * (kWhere + kRow + sizeof(EyeFeatures) + kPacked) + kSlack);
   RadiusColumn radii = TakeHitpointRadii(eye, of.plan);
-  PassSums sums(kPixels, of.columns);
+  PassSums sums(kSlicePixels, of.columns);
   ForgetMostLiveBytes();
   AddPhotons(slice, eye, of.plan, std::move(radii), std::move(sums), of.settings, SceneNeeds(),
              of.scale, of.team);
-  EXPECT_LE(MostLiveBytes() - before, kPixels * (kWhere + kRow + kPacked + of.OfSums()) + kSlack);
+  EXPECT_LE(MostLiveBytes() - before,
+            kSlicePixels * (kWhere + kRow + kPacked + of.OfSums()) + kSlack);
   EXPECT_NEAR(static_cast<double>(LiveBytes() - before),
-              static_cast<double>(kPixels * BytesAPixel(slice)), kSlack);
+              static_cast<double>(kSlicePixels * BytesAPixel(slice)), kSlack);
 }
 
 }  // namespace

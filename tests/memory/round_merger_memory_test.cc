@@ -14,12 +14,12 @@
 namespace lucerna {
 namespace {
 
-constexpr std::size_t kPixels = 5;
+constexpr std::size_t kMergedPixels = 5;
 const PassKey kRound = {"job", 16};  // of 4 passes
 
 SliceSums Slice(std::uint64_t pass) {
-  SliceSums sum = EmptySlice({pass, pass + 1}, kPixels, 1);
-  const std::vector<float> numbers(kPixels, static_cast<float>(pass % 7));
+  SliceSums sum = EmptySlice({pass, pass + 1}, kMergedPixels, 1);
+  const std::vector<float> numbers(kMergedPixels, static_cast<float>(pass % 7));
   for (PackedFloats& column : sum.columns) {
     if (!column.empty()) column.Write(0, numbers);
   }
@@ -44,8 +44,9 @@ class SameSlice final : public PackedSlice {
 
 std::unique_ptr<RoundMerger> RoundWith(const std::vector<std::uint64_t>& passes, bool are_packed) {
   auto merger = std::make_unique<RoundMerger>();
-  merger->Open(kRound,
-               {.passes = RoundOf(16), .pixels = kPixels, .evidence = 1, .photons_per_pass = 100});
+  merger->Open(
+      kRound,
+      {.passes = RoundOf(16), .pixels = kMergedPixels, .evidence = 1, .photons_per_pass = 100});
   for (const std::uint64_t pass : passes) {
     std::unique_ptr<const PackedSlice> packed;
     if (are_packed) packed = std::make_unique<SameSlice>(Slice(pass));

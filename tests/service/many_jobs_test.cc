@@ -16,8 +16,6 @@
 namespace lucerna {
 namespace {
 
-constexpr std::int64_t kEndless = 1'000'000'000;
-
 class ManyJobsTest : public testing::Test {
  protected:
   ManyJobsTest()

@@ -13,8 +13,6 @@
 namespace lucerna {
 namespace {
 
-constexpr std::int64_t kEndless = 1'000'000'000;
-
 enum class Request : std::uint8_t { kSubmitAgain, kCancel, kStop, kExtend, kWatch, kImage };
 constexpr std::array<Request, 6> kRequests = {Request::kSubmitAgain, Request::kCancel,
                                               Request::kStop,        Request::kExtend,

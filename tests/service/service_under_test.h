@@ -53,6 +53,8 @@ struct Answer {
 };
 
 inline constexpr std::chrono::seconds kCallLimit{120};
+// More passes than any test waits for.
+inline constexpr std::int64_t kEndless = 1'000'000'000;
 
 struct TestScene {
   std::map<std::string, std::string> files;  // by logical path

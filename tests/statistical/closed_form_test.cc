@@ -8,7 +8,6 @@
 #include <cmath>
 #include <functional>
 #include <memory>
-#include <numbers>
 #include <string>
 
 #include "gtest/gtest.h"
@@ -23,7 +22,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kPiD = std::numbers::pi;
 constexpr int kParts = 10;
 // At least as many comparisons as this folder makes.
 constexpr int kQuestions = 70;
@@ -136,7 +134,7 @@ std::vector<Lamp> Lamps() {
     lamp.irradiance = [aside](double x, double y) {
       const double a2 = (x - static_cast<double>(aside)) * (x - static_cast<double>(aside)) + y * y;
       const double z = a2 + 1 + 0.16;
-      return 2 * kPiD * 0.5 * (1 - (a2 + 1 - 0.16) / std::sqrt(z * z - 4 * 0.16 * a2));
+      return 2 * kPi64 * 0.5 * (1 - (a2 + 1 - 0.16) / std::sqrt(z * z - 4 * 0.16 * a2));
     };
     lamps.push_back(lamp);
   }
@@ -146,7 +144,7 @@ std::vector<Lamp> Lamps() {
     AddSphere(lamp.scene, lamp.center, radius, kBlack, AddAreaLight(lamp.scene, radiance));
     lamp.irradiance = [](double x, double y) {
       const double squared = (x - 0.5) * (x - 0.5) + y * y + 1;
-      return kPiD * 2 * 0.16 / squared / std::sqrt(squared);
+      return kPi64 * 2 * 0.16 / squared / std::sqrt(squared);
     };
     lamps.push_back(lamp);
   }
@@ -191,14 +189,14 @@ TEST(IrradianceTest, OfSampledLightIsTheClosedForm) {
     SCOPED_TRACE(lamp.name);
     const RenderSettings settings = TestSettings(lamp.scene, 1, 0.01, 1);
     ExpectMean(Measure(lamp.scene, settings, 4096, kParts, "direct.G"),
-               lamp.irradiance(0, 0) * static_cast<double>(kFloorReflectance) / kPiD,
+               lamp.irradiance(0, 0) * static_cast<double>(kFloorReflectance) / kPi64,
                // The camera sees a millimetre of floor.
                1e-3 * lamp.irradiance(0, 0));
   }
 }
 
 TEST(IrradianceTest, FromInfinityIsTheClosedForm) {
-  const double albedo_over_pi = static_cast<double>(kFloorReflectance) / kPiD;
+  const double albedo_over_pi = static_cast<double>(kFloorReflectance) / kPi64;
   Scene distant = Floor();
   distant.distant_lights.push_back({Normalize({1, 2, -2}), Gray(3)});
   ExpectMean(Measure(distant, TestSettings(distant, 1, 0.01, 1), 16, kParts, "direct.G"),
@@ -206,7 +204,7 @@ TEST(IrradianceTest, FromInfinityIsTheClosedForm) {
   Scene sky = Floor();
   sky.infinite_lights.push_back({Gray(1.5F)});
   ExpectMean(Measure(sky, TestSettings(sky, 1, 0.01, 1), 4096, kParts, "direct.G"),
-             1.5 * kPiD * albedo_over_pi);
+             1.5 * kPi64 * albedo_over_pi);
 }
 
 // The same sky as a map, and one that is brighter here than there: drawn from the map and from the
@@ -228,7 +226,7 @@ TEST(IrradianceTest, FromAnEnvironmentMapIsTheSumOverItsPatches) {
                                                  (static_cast<float>(y) + 0.5F) / kLattice})
                                  .z;
         if (cosine <= 0) continue;
-        irradiance += static_cast<double>(picture.At(x / 400, y / 400).g * cosine) * 4 * kPiD /
+        irradiance += static_cast<double>(picture.At(x / 400, y / 400).g * cosine) * 4 * kPi64 /
                       (static_cast<double>(kLattice) * kLattice);
       }
     }
@@ -239,7 +237,7 @@ TEST(IrradianceTest, FromAnEnvironmentMapIsTheSumOverItsPatches) {
     light.map = std::make_shared<const Picture>(std::move(picture));
     sky.infinite_lights.push_back(light);
     ExpectMean(Measure(sky, TestSettings(sky, 1, 0.01, 1), 4096, kParts, "direct.G"),
-               irradiance * static_cast<double>(kFloorReflectance) / kPiD);
+               irradiance * static_cast<double>(kFloorReflectance) / kPi64);
   }
 }
 
@@ -251,7 +249,7 @@ double Smoothed(const Irradiance& irradiance, double radius) {
   for (int ring = 0; ring < kRings; ++ring) {
     const double t2 = (ring + 0.5) / kRings;
     for (int sector = 0; sector < kSectors; ++sector) {
-      const double angle = 2 * kPiD * (sector + 0.5) / kSectors;
+      const double angle = 2 * kPi64 * (sector + 0.5) / kSectors;
       const double r = radius * std::sqrt(t2);
       sum +=
           2 * (1 - t2) * irradiance(r * std::cos(angle), r * std::sin(angle)) / (kRings * kSectors);
@@ -275,7 +273,7 @@ TEST(IrradianceTest, OfPhotonsIsTheClosedForm) {
     AddSphere(lamp.scene, lamp.center, lamp.around, AddMaterial(lamp.scene, DielectricMaterial(1)));
     const RenderSettings settings = HeldRadius(lamp.scene, 150000, 0.3, 4);
     const double expected =
-        Smoothed(lamp.irradiance, 0.3) * static_cast<double>(kFloorReflectance) / kPiD;
+        Smoothed(lamp.irradiance, 0.3) * static_cast<double>(kFloorReflectance) / kPi64;
     ExpectMean(Measure(lamp.scene, settings, 3, kParts, "photons.G"), expected);
     EXPECT_EQ(Measure(lamp.scene, settings, 1, 2, "direct.G").mean, 0);
   }
@@ -295,9 +293,9 @@ Lamp PortalLamp() {
     const auto corner = [](double a, double b) {
       const double p = std::sqrt(1 + a * a);
       const double q = std::sqrt(1 + b * b);
-      return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * kPiD);
+      return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * kPi64);
     };
-    return 1.5 * kPiD *
+    return 1.5 * kPi64 *
            (corner(0.5 - x, 0.4 - y) - corner(-0.3 - x, 0.4 - y) - corner(0.5 - x, -0.5 - y) +
             corner(-0.3 - x, -0.5 - y));
   };
@@ -305,7 +303,7 @@ Lamp PortalLamp() {
 }
 
 TEST(IrradianceTest, ThroughAPortalIsTheClosedForm) {
-  const double albedo_over_pi = static_cast<double>(kFloorReflectance) / kPiD;
+  const double albedo_over_pi = static_cast<double>(kFloorReflectance) / kPi64;
   const Lamp lamp = PortalLamp();
   const double expected = lamp.irradiance(0, 0) * albedo_over_pi;
   ExpectMean(Measure(lamp.scene, TestSettings(lamp.scene, 1, 0.01, 1), 4096, kParts, "direct.G"),
@@ -334,9 +332,9 @@ TEST(IrradianceTest, ThroughAPortalIsTheClosedForm) {
     const auto corner = [](double a, double b) {
       const double p = std::sqrt(1 + a * a);
       const double q = std::sqrt(1 + b * b);
-      return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * kPiD);
+      return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * kPi64);
     };
-    return 1.5 * kPiD *
+    return 1.5 * kPi64 *
            (corner(0.5 - x, rim - y) - corner(-0.3 - x, rim - y) - corner(0.5 - x, -0.5 - y) +
             corner(-0.3 - x, -0.5 - y));
   };
@@ -366,7 +364,7 @@ TEST(GlassTest, LetsAllLightOutInTheEnd) {
     SetCamera(scene, {0, 0, 0.7}, {0.2, 0.1, 2}, {0, 1, 0}, 20, 2);
     // Irradiance Φ / 4πR² = I / R²; what the wall sends back is a thousandth of it.
     ExpectMean(Measure(scene, HeldRadius(scene, 50000, 0.4, 60), 4, kParts, "photons.G"),
-               5 * static_cast<double>(kWall) / kPiD, 2e-3 * 5e-3 / kPiD);
+               5 * static_cast<double>(kWall) / kPi64, 2e-3 * 5e-3 / kPi64);
   }
 }
 
@@ -380,7 +378,7 @@ double FresnelReflectance(double cosine, double ior) {
 TEST(GlassTest, PanePassesTheFresnelSeries) {
   for (const double angle_deg : {0.0, 55.0}) {
     SCOPED_TRACE(angle_deg);
-    const double cosine = std::cos(angle_deg * kPiD / 180);
+    const double cosine = std::cos(angle_deg * kPi64 / 180);
     Scene scene;
     constexpr float kDark = 1e-3F;
     AddQuad(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, AddMaterial(scene, DiffuseMaterial(kDark)));
@@ -391,8 +389,8 @@ TEST(GlassTest, PanePassesTheFresnelSeries) {
     SetCamera(scene, {0.3, 0, 0.3}, {0, 0, 0}, {0, 1, 0}, 0.5, 2);
     const double r = FresnelReflectance(cosine, 1.5);
     ExpectMean(Measure(scene, HeldRadius(scene, 400000, 0.4, 30), 2, kParts, "photons.G"),
-               2 * cosine * (1 - r) / (1 + r) * static_cast<double>(kDark) / kPiD,
-               2e-3 * 2 * 1e-3 / kPiD);
+               2 * cosine * (1 - r) / (1 + r) * static_cast<double>(kDark) / kPi64,
+               2e-3 * 2 * 1e-3 / kPi64);
   }
 }
 
@@ -476,7 +474,7 @@ TEST(MisTest, RoughMetalReflectsLampsOfAnySize) {
       for (int i = 0; i < kSide; ++i) {
         for (int j = 0; j < kSide; ++j) {
           const double r = static_cast<double>(radius) * std::sqrt((i + 0.5) / kSide);
-          const double angle = 2 * kPiD * (j + 0.5) / kSide;
+          const double angle = 2 * kPi64 * (j + 0.5) / kSide;
           const Vec3 p = center + frame.s * static_cast<float>(r * std::cos(angle)) +
                          frame.t * static_cast<float>(r * std::sin(angle));
           if (p.z <= 0) continue;
@@ -487,7 +485,7 @@ TEST(MisTest, RoughMetalReflectsLampsOfAnySize) {
                                   wi.z * std::max(0.0F, -Dot(wi, normal)) / (distance * distance));
         }
       }
-      expected *= kPiD * static_cast<double>(radius) * static_cast<double>(radius) /
+      expected *= kPi64 * static_cast<double>(radius) * static_cast<double>(radius) /
                   (static_cast<double>(kSide) * kSide);
       ExpectMean(Measure(scene, TestSettings(scene, 1, 0.01, 4), 4096, kParts, "direct.G"),
                  expected, 1e-3 * expected);
@@ -548,7 +546,7 @@ TEST_P(RoughGlassTest, BallUnderAnEvenSkyIsAsBrightAsItsWalksSay) {
   AddMaterial(scene, glass);
   AddSphere(scene, {0, 0, 0}, 1, 0);
   scene.infinite_lights.push_back({Gray(1)});
-  const double fov_deg = 2 * std::atan(static_cast<double>(kReach) / 4) * 180 / kPiD;
+  const double fov_deg = 2 * std::atan(static_cast<double>(kReach) / 4) * 180 / kPi64;
   SetCamera(scene, {0, 0, -5}, {0, 0, 0}, {0, 1, 0}, fov_deg, 24);
   constexpr int kDepth = 12;
   const double expected = RoughBallRadiance(glass, kDepth);

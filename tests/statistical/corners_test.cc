@@ -15,6 +15,7 @@
 
 #include "gtest/gtest.h"
 
+#include "render/math/warp.h"
 #include "tests/support/local_render.h"
 #include "tests/support/measure.h"
 #include "tests/support/test_scenes.h"
@@ -24,7 +25,6 @@ namespace {
 
 constexpr int kParts = 32;
 constexpr int kComparisons = 11;
-constexpr double kPi = 3.14159265358979;
 
 // A room whose walls, numbered 0, shine inwards; light 0 shines from one side, light 1 from both.
 Scene Room() {
@@ -53,7 +53,7 @@ void AddColumn(Scene& scene, float x, float y, float radius, std::uint32_t sides
   mesh.traits.material = 0;
   mesh.traits.area_light = 0;
   for (std::uint32_t i = 0; i < sides; ++i) {
-    const double angle = 2 * kPi * i / sides;
+    const double angle = 2 * kPi64 * i / sides;
     const Vec3 normal = {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)),
                          0};
     for (const float z : {-1.1F, 1.1F}) {
@@ -99,7 +99,7 @@ void AddRoundedBoard(Scene& scene, double middle) {
     const double x = middle + (corner == 1 || corner == 2 ? -1 : 1) * (kHalfWidth - kRounding);
     const double z = corner < 2 ? kHigh - kRounding : kLow + kRounding;
     for (std::uint32_t i = 0; i <= kStrips; ++i) {
-      const double angle = kPi / 2 * (corner + static_cast<double>(i) / kStrips);
+      const double angle = kPi64 / 2 * (corner + static_cast<double>(i) / kStrips);
       profile.push_back({static_cast<float>(x + kRounding * std::cos(angle)), 0,
                          static_cast<float>(z + kRounding * std::sin(angle))});
     }

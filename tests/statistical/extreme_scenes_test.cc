@@ -4,12 +4,12 @@
 // without what must not matter. docs/numerics.md lists them with the figures measured. Bounds are
 // those of closed_form_test.cc: Student's quantile of independent renders, and 2e-5 for floats.
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <string_view>
 
 #include "gtest/gtest.h"
 
+#include "render/math/warp.h"
 #include "render/transport/bsdf.h"
 #include "tests/support/local_render.h"
 #include "tests/support/measure.h"
@@ -18,7 +18,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kPiD = std::numbers::pi;
 constexpr int kParts = 8;
 // At least as many comparisons as this file makes.
 constexpr int kQuestions = 60;
@@ -59,7 +58,7 @@ RenderSettings FluxMeter(const Scene& scene, std::int64_t photons, int depth) {
 }
 // [W], from the radiance that a diffuse surface of this reflectance then has.
 double MeteredFlux(double radiance, double reflectance) {
-  return radiance * kPiD / reflectance * kPiD * kMeterRadius * kMeterRadius;
+  return radiance * kPi64 / reflectance * kPi64 * kMeterRadius * kMeterRadius;
 }
 
 // --- furnaces ----------------------------------------------------------------------------------
@@ -213,7 +212,7 @@ double TransmittedShare(int panes, float thickness, float gap) {
   spot.cos_falloff_start = spot.cos_total_width = 0.999F;
   scene.spot_lights.push_back(spot);
   SetCamera(scene, {0.3, 0, 0.3}, {0, 0, 0}, {0, 1, 0}, 0.5, 2);
-  const double power = 2 * kPiD * 0.001;
+  const double power = 2 * kPi64 * 0.001;
   return MeteredFlux(Measure(scene, FluxMeter(scene, 50000, 60), 1, kParts, "photons.G").mean,
                      static_cast<double>(kDark)) /
          power;
@@ -326,7 +325,7 @@ TEST(TotalReflectionTest, PhotonsKeepTheirFluxOverAThousandBounces) {
   LocalRender render(scene, FluxMeter(scene, 2000, 2000));
   render.AddPass();
   EXPECT_EQ(render.tally().deposits, render.tally().photons);
-  const double power = 2 * kPiD * (1 - static_cast<double>(0.999999F));
+  const double power = 2 * kPi64 * (1 - static_cast<double>(0.999999F));
   EXPECT_NEAR(MeteredFlux(ChannelMean(render.MakeImage(), "photons.G"), 0.5) / power, 1, 2e-5);
 }
 
@@ -345,13 +344,13 @@ constexpr std::int32_t kBlack = 1;
 TEST(ExtremeLightTest, AtGrazingIncidenceIsItsCosine) {
   for (const double angle_deg : {89.9, 89.999, 89.9999}) {
     SCOPED_TRACE(angle_deg);
-    const double cosine = std::cos(angle_deg * kPiD / 180);
+    const double cosine = std::cos(angle_deg * kPi64 / 180);
     Scene scene = Floor();
     scene.distant_lights.push_back(
         {{static_cast<float>(std::sqrt(1 - cosine * cosine)), 0, static_cast<float>(-cosine)},
          Gray(3)});
     ExpectMean(Measure(scene, TestSettings(scene, 1, 0.01, 1), 4, kParts, "direct.G"),
-               3 * cosine * 0.5 / kPiD);
+               3 * cosine * 0.5 / kPi64);
   }
 }
 
@@ -364,9 +363,9 @@ TEST(ExtremeLightTest, OfAreasEighteenDecadesApartAddsUp) {
   // Four times a quarter of the large square, from a corner of it.
   const double a = 0.5;
   const double side = a / std::sqrt(1 + a * a);
-  const double form = 4 / kPiD * side * std::atan(side);
+  const double form = 4 / kPi64 * side * std::atan(side);
   ExpectMean(Measure(scene, TestSettings(scene, 1, 0.01, 1), 10000, kParts, "direct.G"),
-             (1e12 * 1e-12 + kPiD * form) * 0.5 / kPiD);
+             (1e12 * 1e-12 + kPi64 * form) * 0.5 / kPi64);
 }
 
 // Two sealed rooms whose lights are 1e20 apart in power; the camera is in one of them. No photon is
@@ -433,7 +432,7 @@ TEST(FocusTest, OfAHollowMirrorKeepsItsFlux) {
   SetCamera(scene, {0.01, 0, 0.35}, {0, 0, static_cast<double>(kPlate)}, {0, 1, 0}, 2, 2);
   // The plate's own shadow is in the beam.
   const double shadow = 1 - std::cos(std::atan(0.004 / (0.95 + static_cast<double>(kPlate))));
-  const double power = 2 * kPiD * (1 - static_cast<double>(0.9999F) - shadow);
+  const double power = 2 * kPi64 * (1 - static_cast<double>(0.9999F) - shadow);
   LocalRender render(scene, FluxMeter(scene, 100000, 3));
   render.AddPass();
   EXPECT_NEAR(MeteredFlux(ChannelMean(render.MakeImage(), "photons.G"), kDark) / power, 1, 2e-3);
@@ -497,7 +496,7 @@ TEST(LargeMeshTest, OfTwoMillionTrianglesIsTheFloorItCovers) {
   scene.point_lights.push_back({{0, 0, 1}, Gray(2)});
   SetCamera(scene, {2.5, 0, 1}, {0, 0, 0}, {0, 0, 1}, 0.01, 2);
   const Image image = RenderLocally(scene, TestSettings(scene, 1000, 0.1, 3), 2);
-  EXPECT_NEAR(ChannelMean(image, "G"), 2 * 0.5 / kPiD, 1e-5);
+  EXPECT_NEAR(ChannelMean(image, "G"), 2 * 0.5 / kPi64, 1e-5);
 }
 
 // Nine pixels in the middle of 16384 x 16384 see what a camera sees whose whole film they are.

@@ -1,9 +1,9 @@
 // The light in media must be right: as strong as closed forms and quadratures say.
 #include <cmath>
-#include <numbers>
 
 #include "gtest/gtest.h"
 
+#include "render/math/warp.h"
 #include "tests/support/local_render.h"
 #include "tests/support/measure.h"
 #include "tests/support/test_scenes.h"
@@ -11,7 +11,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kPiD = std::numbers::pi;
 constexpr int kParts = 10;
 constexpr int kQuestions = 60;  // see closed_form_test.cc
 
@@ -80,7 +79,7 @@ double SingleScattering(const Medium& medium, double offset, double length) {
     const double d = std::sqrt(squared);
     // Light travels from (3, offset) to (t, 0) and on towards the camera at t = 0.
     const double cosine = -(t - 3) / d;
-    const double phase = (1 - g * g) / (4 * kPiD * std::pow(1 + g * g - 2 * g * cosine, 1.5));
+    const double phase = (1 - g * g) / (4 * kPi64 * std::pow(1 + g * g - 2 * g * cosine, 1.5));
     sum += sigma_s * phase * std::exp(-sigma_t * (t + d)) / squared * length / kSteps;
   }
   return sum;
@@ -96,7 +95,7 @@ double SmoothedSingleScattering(const Medium& medium, double offset, double leng
     const double share = (ring + 0.5) / kRings;  // of the disc's area
     const double weight = 1 - share;
     for (int sector = 0; sector < kSectors; ++sector) {
-      const double angle = 2 * kPiD * (sector + 0.5) / kSectors;
+      const double angle = 2 * kPi64 * (sector + 0.5) / kSectors;
       const double aside = radius * std::sqrt(share);
       const double there = std::hypot(offset + aside * std::cos(angle), aside * std::sin(angle));
       sum += weight * SingleScattering(medium, there, length);

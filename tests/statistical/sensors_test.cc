@@ -7,13 +7,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "gtest/gtest.h"
 
+#include "render/math/warp.h"
 #include "tests/support/chi_square.h"
 #include "tests/support/local_render.h"
 #include "tests/support/test_scenes.h"
@@ -21,7 +21,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr int kParts = 16;
 constexpr int kComparisons = 82;
 
@@ -47,7 +46,7 @@ std::vector<MeasuredMean> IrradianceOf(const Scene& scene, RenderSettings settin
     settings.seed = 100 + static_cast<std::uint64_t>(part);
     const Image image = RenderLocally(scene, settings, passes);
     for (std::size_t i = 0; i < parts.size(); ++i)
-      parts[i].push_back(kPi * static_cast<double>(image.Find("G")->pixels[i]));
+      parts[i].push_back(kPi64 * static_cast<double>(image.Find("G")->pixels[i]));
   }
   std::vector<MeasuredMean> measured;
   for (const std::vector<double>& of : parts)
@@ -128,7 +127,7 @@ TEST(SensorsTest, OfADiskOnItsAxisAndBesideIt) {
     const double h = 1.5;
     const double a = 0.8;
     const double sum = h * h + r * r + a * a;
-    expected.push_back(2 * kPi / 2 *
+    expected.push_back(2 * kPi64 / 2 *
                        (1 - (sum - 2 * a * a) / std::sqrt(sum * sum - 4 * r * r * a * a)));
   }
   // The radius is that of a float.
@@ -225,8 +224,8 @@ TEST(SensorsTest, OfAFurnaceIsTheSameInCornersAndAtEdges) {
   }
   sensors.push_back({{-1, kBeside, kBeside}, {1, 0, 0}, 0});
   SetSensors(scene, std::move(sensors), 0.15);
-  ExpectIrradiance(scene, SettingsOfSensors(scene, 60000, 40), 24, std::vector<double>(6, 2 * kPi),
-                   0.0005, 0.06);
+  ExpectIrradiance(scene, SettingsOfSensors(scene, 60000, 40), 24,
+                   std::vector<double>(6, 2 * kPi64), 0.0005, 0.06);
 }
 
 TEST(SensorsTest, DoesNotPassAThinWall) {
@@ -390,7 +389,7 @@ TEST(SensorsTest, BucketsHoldThePhotonsOfTheirTriangles) {
     const Image image = RenderLocally(scene, of_part, kPasses);
     double total = 0;
     for (std::size_t i = 0; i < expected.size(); ++i)
-      total += kPi * static_cast<double>(image.Find("G")->pixels[i]) * kWidth * kWidth / 2;
+      total += kPi64 * static_cast<double>(image.Find("G")->pixels[i]) * kWidth * kWidth / 2;
     totals.push_back(total);
   }
   const MeasuredMean total = MeanOf(totals);
@@ -423,7 +422,7 @@ TEST(SensorsTest, IsWhatACameraSeesOfADiffuseSurface) {
   for (int part = 0; part < kParts; ++part) {
     overrides.seed = 500 + static_cast<std::uint64_t>(part);
     const Image image = RenderLocally(seen, SettingsFor(seen, overrides), kPasses);
-    of_camera.push_back(static_cast<double>(image.Find("G")->pixels[0]) * kPi / 0.6);
+    of_camera.push_back(static_cast<double>(image.Find("G")->pixels[0]) * kPi64 / 0.6);
   }
   const MeasuredMean camera = MeanOf(of_camera);
   SetSensors(scene, {{{0.33F, -0.04F, 0}, {0, 0, 1}, 0}}, 0.05);

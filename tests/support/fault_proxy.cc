@@ -17,7 +17,7 @@
 namespace lucerna {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using LineClock = std::chrono::steady_clock;
 constexpr int kPollMs = 5;
 constexpr std::size_t kReadBytes = std::size_t{16} << 10;
 // What may be on the line at one time, besides what its delay keeps there.
@@ -39,7 +39,7 @@ int NewSocket() {
 
 // Bytes that have come, and when they may go on.
 struct Late {
-  Clock::time_point due;
+  LineClock::time_point due;
   std::vector<char> bytes;
 };
 
@@ -118,7 +118,7 @@ void FaultProxy::Accept() {
 void FaultProxy::Carry(int from, int to) {
   std::deque<Late> line;
   std::size_t waiting = 0;
-  Clock::time_point free_at = Clock::now();  // when the line has sent what it was given
+  LineClock::time_point free_at = LineClock::now();  // when the line has sent what it was given
   std::int64_t until_flip = flip_every_;
   bool is_open = true;
   while (!is_ending_ && (is_open || !line.empty())) {
@@ -142,7 +142,7 @@ void FaultProxy::Carry(int from, int to) {
           }
           until_flip -= static_cast<std::int64_t>(bytes.size());
         }
-        const auto now = Clock::now();
+        const auto now = LineClock::now();
         if (rate > 0) {
           free_at =
               std::max(free_at, now) +
@@ -156,7 +156,7 @@ void FaultProxy::Carry(int from, int to) {
     } else if (!has_room || !is_open) {
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
-    while (!line.empty() && line.front().due <= Clock::now()) {
+    while (!line.empty() && line.front().due <= LineClock::now()) {
       const std::vector<char> bytes = std::move(line.front().bytes);
       line.pop_front();
       waiting -= bytes.size();

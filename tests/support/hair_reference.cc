@@ -3,12 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
+
+#include "render/math/warp.h"
 
 namespace lucerna {
 namespace {
-
-constexpr double kPiD = std::numbers::pi;
 
 // Of unpolarised light that comes in at this cosine.
 double Reflectance(double cosine, double eta) {
@@ -27,10 +26,10 @@ double Longitudinal(double theta_o, double theta_i, double v) {
 }
 
 double Azimuthal(double phi, double around, double s) {
-  const double x = std::remainder(phi - around, 2 * kPiD);
+  const double x = std::remainder(phi - around, 2 * kPi64);
   const auto cdf = [&](double at) { return 1 / (1 + std::exp(-at / s)); };
   const double e = std::exp(-std::abs(x) / s);
-  return e / (s * (1 + e) * (1 + e)) / (cdf(kPiD) - cdf(-kPiD));
+  return e / (s * (1 + e) * (1 + e)) / (cdf(kPi64) - cdf(-kPi64));
 }
 
 }  // namespace
@@ -44,14 +43,14 @@ std::array<double, 3> ReferenceHairShare(const ReferenceFibre& fibre, Double3 wo
   const double m = fibre.beta_m;
   const double n = fibre.beta_n;
   const double v = std::pow(0.726 * m + 0.812 * m * m + 3.7 * std::pow(m, 20), 2);
-  const double s = std::sqrt(kPiD / 8) * (0.265 * n + 1.194 * n * n + 5.372 * std::pow(n, 22));
+  const double s = std::sqrt(kPi64 / 8) * (0.265 * n + 1.194 * n * n + 5.372 * std::pow(n, 22));
 
   const double theta_t = std::asin(std::sin(theta_o) / fibre.eta);
   const double eta_across =
       std::sqrt(fibre.eta * fibre.eta - std::pow(std::sin(theta_o), 2)) / std::cos(theta_o);
   const double gamma_t = std::asin(std::sin(gamma_o) / eta_across);
   const double f = Reflectance(std::cos(theta_o) * std::cos(gamma_o), fibre.eta);
-  const double turned_in = 2 * gamma_t + kPiD;  // by each crossing of the fibre
+  const double turned_in = 2 * gamma_t + kPi64;  // by each crossing of the fibre
 
   std::array<double, 3> sum{};
   for (std::size_t c = 0; c < 3; ++c) {
@@ -63,7 +62,7 @@ std::array<double, 3> ReferenceHairShare(const ReferenceFibre& fibre, Double3 wo
                  Azimuthal(phi, turned_in - 2 * gamma_o, s) +
              a1 * t * f * Longitudinal(theta_o + 4 * fibre.tilt_rad, theta_i, 4 * v) *
                  Azimuthal(phi, 2 * turned_in - 2 * gamma_o, s) +
-             a1 * t * f * t * f / (1 - t * f) * Longitudinal(theta_o, theta_i, 4 * v) / (2 * kPiD);
+             a1 * t * f * t * f / (1 - t * f) * Longitudinal(theta_o, theta_i, 4 * v) / (2 * kPi64);
   }
   return sum;
 }

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <utility>
 
@@ -18,6 +17,7 @@
 #include "render/math/double3.h"
 #include "render/math/equal_area_square.h"
 #include "render/math/rng.h"
+#include "render/math/warp.h"
 #include "render/scene/texture.h"
 #include "render/transport/bump.h"
 #include "tests/support/hair_reference.h"
@@ -25,7 +25,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kPiD = std::numbers::pi;
 using Color = std::array<double, 3>;
 
 constexpr Color Times(const Color& a, const Color& b) {
@@ -158,7 +157,7 @@ Double3 Unit(Double3 v) {
 // A facet with density D(m)·cosθ.
 Double3 DrawFacet(const Surface& surface, double u1, double u2) {
   const double slope = std::sqrt(u1 / (1 - u1));
-  const double phi = 2 * kPiD * u2;
+  const double phi = 2 * kPi64 * u2;
   return Unit(
       {surface.alpha_u * slope * std::cos(phi), surface.alpha_v * slope * std::sin(phi), 1});
 }
@@ -196,7 +195,7 @@ struct Scattered {
 
 Double3 CosineDirection(double u1, double u2) {
   const double sine = std::sqrt(u1);
-  const double phi = 2 * kPiD * u2;
+  const double phi = 2 * kPi64 * u2;
   return {sine * std::cos(phi), sine * std::sin(phi), std::sqrt(1 - u1)};
 }
 
@@ -260,7 +259,7 @@ bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
   out.index = 1;
   if (surface.kind == Material::Kind::kDiffuse) {
     const double sine = std::sqrt(u[1]);
-    const double phi = 2 * kPiD * u[2];
+    const double phi = 2 * kPi64 * u[2];
     out.wi = Double3{sine * std::cos(phi), sine * std::sin(phi), std::sqrt(1 - u[1])} * side;
     out.weight = surface.reflectance;
     return true;
@@ -269,9 +268,9 @@ bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
     // Evenly to all sides.
     const double cosine = 1 - 2 * u[1];
     const double sine = std::sqrt(1 - cosine * cosine);
-    const double phi = 2 * kPiD * u[2];
+    const double phi = 2 * kPi64 * u[2];
     out.wi = {sine * std::cos(phi), sine * std::sin(phi), cosine};
-    out.weight = Times(ReferenceHairShare(surface.fibre, wo, out.wi), 4 * kPiD);
+    out.weight = Times(ReferenceHairShare(surface.fibre, wo, out.wi), 4 * kPi64);
     return true;
   }
   if (surface.kind == Material::Kind::kCoatedDiffuse)
@@ -365,7 +364,7 @@ class PathTracer {
     first_stand_in_ = static_cast<std::uint32_t>(scene.spheres.size());
     scene_.materials.emplace_back();
     const auto material = static_cast<std::int32_t>(scene_.materials.size()) - 1;
-    const double area = kPiD * static_cast<double>(settings.delta_radius) *
+    const double area = kPi64 * static_cast<double>(settings.delta_radius) *
                         static_cast<double>(settings.delta_radius);
     const auto stand_in = [&](Vec3 position, Rgb intensity, const SpotLight* spot) {
       scene_.spheres.push_back(
@@ -380,7 +379,7 @@ class PathTracer {
     cos_cone_ = std::sqrt(1 - sine * sine);
     for (const DistantLight& light : scene.distant_lights) {
       suns_.push_back({Unit(Double3(-light.direction)),
-                       Times(Working(FromFloat(light.irradiance)), 1 / (kPiD * sine * sine))});
+                       Times(Working(FromFloat(light.irradiance)), 1 / (kPi64 * sine * sine))});
     }
     StatusOr<std::unique_ptr<Intersector>> intersector = Intersector::Create(scene_);
     if (!intersector.ok()) {
@@ -421,7 +420,7 @@ class PathTracer {
       shift = static_cast<double>(rng.Bits() >> 11) * 0x1p-53;
     const double share =
         static_cast<double>(settings_.width) * settings_.height / settings_.paths_per_replica;
-    const double half = std::tan(scene_.camera.fov_deg * kPiD / 360);
+    const double half = std::tan(scene_.camera.fov_deg * kPi64 / 360);
     const double shorter = std::min(settings_.width, settings_.height);
     for (int path = 0; path < settings_.paths_per_replica; ++path) {
       PathNumbers numbers(key, shifts, path);

@@ -18,7 +18,7 @@
 namespace lucerna {
 namespace {
 
-Moment At(int s) {
+Moment MomentAt(int s) {
   return {SteadyTime(std::chrono::seconds(s)), std::chrono::seconds(s)};
 }
 
@@ -101,7 +101,7 @@ JobTable::Options SmallTable() {
 }
 
 std::string Added(JobTable& table, const std::string& request_id) {
-  const auto submitted = table.Add(JobOf(request_id), WallTime(), At(0));
+  const auto submitted = table.Add(JobOf(request_id), WallTime(), MomentAt(0));
   EXPECT_TRUE(submitted.ok()) << submitted.status();
   return submitted.ok() ? submitted->job_id : std::string();
 }
@@ -115,22 +115,22 @@ void RunTurns(JobTable& table) {
   while (auto turn = table.WaitForTurn()) {
     StatusOr<RenderResult> result = absl::CancelledError("the job has ended");
     if (turn->runner) {
-      table.OnRunning(turn->job_id, At(1));
+      table.OnRunning(turn->job_id, MomentAt(1));
       result = turn->runner->Resume();
     } else {
       const auto runner = std::make_shared<FakeRunner>();
       if (table.Attach(turn->job_id, runner)) {
-        table.OnRunning(turn->job_id, At(1));
+        table.OnRunning(turn->job_id, MomentAt(1));
         result = runner->Run();
       }
     }
     if (result.ok() && result->gave_up_turn) {
-      table.GiveUpTurn(turn->job_id, At(2));
+      table.GiveUpTurn(turn->job_id, MomentAt(2));
     } else if (result.ok()) {
       const Blob image = std::make_shared<const std::string>("image");
-      table.Succeed(turn->job_id, result->reason, image, At(2));
+      table.Succeed(turn->job_id, result->reason, image, MomentAt(2));
     } else {
-      table.Fail(turn->job_id, result.status(), At(2));
+      table.Fail(turn->job_id, result.status(), MomentAt(2));
     }
   }
 }
@@ -155,7 +155,7 @@ TEST(JobTableTest, AnIdHasARandomPartAndEachOwnerHasRequestIdsOfTheirOwn) {
   const auto add = [&table](const std::string& request_id, const std::string& owner) {
     CheckedJob job = JobOf(request_id);
     job.submission.owner = owner;
-    return table.Add(std::move(job), WallTime(), At(0));
+    return table.Add(std::move(job), WallTime(), MomentAt(0));
   };
   ASSERT_EQ(add("a", "alice")->job_id, "t-1-r1");
   EXPECT_TRUE(table.Find("t-1-r1"));
@@ -172,7 +172,7 @@ TEST(JobTableTest, AnIdHasARandomPartAndEachOwnerHasRequestIdsOfTheirOwn) {
   ASSERT_TRUE(add("b", "alice").ok());
   EXPECT_TRUE(absl::IsResourceExhausted(add("c", "alice").status())) << "two have not ended";
   EXPECT_TRUE(add("c", "bob").ok()) << "others are not held up";
-  ASSERT_TRUE(table.Cancel("t-1-r1", At(1)).ok());
+  ASSERT_TRUE(table.Cancel("t-1-r1", MomentAt(1)).ok());
   EXPECT_TRUE(add("c", "alice").ok());
 }
 
@@ -180,7 +180,7 @@ TEST(JobTableTest, ACancelBeforeTheRunnerKeepsItFromRunning) {
   JobTable table(SmallTable());
   const std::string job = Added(table, "a");
   ASSERT_TRUE(table.WaitForTurn());
-  EXPECT_EQ(table.Cancel(job, At(1))->job.life.state(), JobState::kCancelled);
+  EXPECT_EQ(table.Cancel(job, MomentAt(1))->job.life.state(), JobState::kCancelled);
   EXPECT_TRUE(absl::IsCancelled(table.CheckStillNeeded(job)));
   EXPECT_FALSE(table.Attach(job, std::make_shared<FakeRunner>()));
 }
@@ -193,7 +193,7 @@ TEST(JobTableTest, ACancelAfterTheRunnerStopsItAlsoBeforeItRuns) {
   const auto runner = std::make_shared<FakeRunner>();
   ASSERT_TRUE(table.Attach(job, runner));
   EXPECT_EQ(StateOf(table, job), JobState::kPreparing);
-  EXPECT_TRUE(table.Cancel(job, At(1)).ok());
+  EXPECT_TRUE(table.Cancel(job, MomentAt(1)).ok());
   EXPECT_TRUE(runner->is_stopped());
   EXPECT_EQ(runner.use_count(), 1) << "the table lets go of it";
 }
@@ -210,16 +210,16 @@ TEST(JobTableTest, ClosingStopsTheRunnerAndGivesNoOther) {
   EXPECT_TRUE(runner->is_stopped());
   EXPECT_FALSE(table.WaitForTurn());
   EXPECT_FALSE(table.Attach(next, std::make_shared<FakeRunner>()));
-  EXPECT_TRUE(absl::IsUnavailable(table.Add(JobOf("c"), WallTime(), At(0)).status()));
+  EXPECT_TRUE(absl::IsUnavailable(table.Add(JobOf("c"), WallTime(), MomentAt(0)).status()));
 }
 
 TEST(JobTableTest, JobsTakeTurnsInOrderAndTooManyAreRefused) {
   JobTable table(SmallTable());
   const std::vector<std::string> jobs = {Added(table, "a"), Added(table, "b"), Added(table, "c"),
                                          Added(table, "d")};
-  EXPECT_TRUE(absl::IsResourceExhausted(table.Add(JobOf("e"), WallTime(), At(0)).status()));
-  EXPECT_EQ(table.Add(JobOf("b"), WallTime(), At(0))->job_id, jobs[1]) << "the same request";
-  EXPECT_TRUE(table.Cancel(jobs[1], At(0)).ok());
+  EXPECT_TRUE(absl::IsResourceExhausted(table.Add(JobOf("e"), WallTime(), MomentAt(0)).status()));
+  EXPECT_EQ(table.Add(JobOf("b"), WallTime(), MomentAt(0))->job_id, jobs[1]) << "the same request";
+  EXPECT_TRUE(table.Cancel(jobs[1], MomentAt(0)).ok());
   {
     const auto first = table.WaitForTurn();
     EXPECT_EQ(first->job_id, jobs[0]);
@@ -239,10 +239,10 @@ TEST(JobTableTest, GivesFilesBackWhenAJobCannotNeedThemAnyMore) {
     JobTable table(SmallTable());
     CheckedJob job = JobOf("a");
     job.pinned.push_back(*blobs.Pin(file));
-    const std::string id = table.Add(std::move(job), WallTime(), At(0))->job_id;
+    const std::string id = table.Add(std::move(job), WallTime(), MomentAt(0))->job_id;
     auto turn = table.WaitForTurn();
     ASSERT_TRUE(turn);
-    EXPECT_TRUE(table.Cancel(id, At(1)).ok());
+    EXPECT_TRUE(table.Cancel(id, MomentAt(1)).ok());
     EXPECT_TRUE(is_pinned()) << "its thread may still read";
     turn.reset();
     EXPECT_FALSE(is_pinned());
@@ -291,9 +291,9 @@ TEST(JobTableTest, AJobThatCannotBeWrittenDownIsRefusedAndLeavesNoTrace) {
   FakeJournal journal;
   JobTable table(TableWith(journal));
   journal.is_full = true;
-  EXPECT_TRUE(absl::IsResourceExhausted(table.Add(JobOf("a"), WallTime(), At(0)).status()));
+  EXPECT_TRUE(absl::IsResourceExhausted(table.Add(JobOf("a"), WallTime(), MomentAt(0)).status()));
   EXPECT_FALSE(table.FindRequest("a"));
-  EXPECT_TRUE(table.List({}, 10, 0, At(0)).first.empty());
+  EXPECT_TRUE(table.List({}, 10, 0, MomentAt(0)).first.empty());
   journal.is_full = false;
   EXPECT_EQ(Added(table, "a"), "t-1") << "no number is lost";
 }
@@ -307,20 +307,20 @@ TEST(JobTableTest, NobodySeesAJobBeforeItIsOnTheDiskAndNobodyWaitsForTheDiskOfAn
     ++writes;
     // These would wait for ever if the table were locked.
     EXPECT_FALSE(table.FindRequest("new"));
-    EXPECT_EQ(table.List({}, 10, 0, At(0)).first.size(), 1U);
-    EXPECT_TRUE(table.ReportOf(first, At(0)).ok());
+    EXPECT_EQ(table.List({}, 10, 0, MomentAt(0)).first.size(), 1U);
+    EXPECT_TRUE(table.ReportOf(first, MomentAt(0)).ok());
   };
   const std::string job = Added(table, "new");
   EXPECT_EQ(writes, 1);
   journal.at_write = [&] {
     ++writes;
-    EXPECT_TRUE(table.ReportOf(first, At(0)).ok());
+    EXPECT_TRUE(table.ReportOf(first, MomentAt(0)).ok());
   };
-  EXPECT_TRUE(table.SetPriority(job, 1, At(0)).ok());
-  EXPECT_TRUE(table.Pause(job, PauseCause::kUser, "paused", At(0)).ok());
-  EXPECT_TRUE(table.Resume(job, At(0)).ok());
-  EXPECT_TRUE(table.Cancel(job, At(0)).ok());
-  EXPECT_TRUE(table.Delete(job, At(0)).ok());
+  EXPECT_TRUE(table.SetPriority(job, 1, MomentAt(0)).ok());
+  EXPECT_TRUE(table.Pause(job, PauseCause::kUser, "paused", MomentAt(0)).ok());
+  EXPECT_TRUE(table.Resume(job, MomentAt(0)).ok());
+  EXPECT_TRUE(table.Cancel(job, MomentAt(0)).ok());
+  EXPECT_TRUE(table.Delete(job, MomentAt(0)).ok());
   EXPECT_EQ(writes, 6);
   EXPECT_FALSE(journal.rows.contains(2));
 }
@@ -351,18 +351,18 @@ TEST(JobTableTest, AJobThatIsBeingDeletedIsNotExtendedNorWrittenAgain) {
   JobTable table(TableWith(journal));
   const std::string job = Added(table, "a");
   table.NoteContributor(job, "w", "worker");
-  ASSERT_TRUE(table.Cancel(job, At(0)).ok());
+  ASSERT_TRUE(table.Cancel(job, MomentAt(0)).ok());
   journal.at_write = [&] {
     journal.at_write = nullptr;
     RenderOverrides until;
     until.passes = 2000;
-    EXPECT_TRUE(absl::IsNotFound(table.Extend(job, until, At(1)).status()));
-    table.TakeOut("w", At(1));
+    EXPECT_TRUE(absl::IsNotFound(table.Extend(job, until, MomentAt(1)).status()));
+    table.TakeOut("w", MomentAt(1));
     EXPECT_TRUE(table.Find(job));
   };
-  EXPECT_TRUE(table.Delete(job, At(1)).ok());
+  EXPECT_TRUE(table.Delete(job, MomentAt(1)).ok());
   EXPECT_TRUE(journal.rows.empty());
-  table.SaveUnsaved(At(1));
+  table.SaveUnsaved(MomentAt(1));
   EXPECT_TRUE(journal.rows.empty());
 }
 
@@ -376,15 +376,15 @@ TEST(JobTableTest, ALaterTableHasTheSameJobsInTheSameOrder) {
     Added(table, "cancelled");
     Added(table, "waiting");
     ASSERT_EQ(table.WaitForTurn()->job_id, "t-1");
-    table.OnRunning("t-1", At(1));
-    ASSERT_TRUE(table.Succeed("t-1", StopReason::kPasses, nullptr, At(2), image));
+    table.OnRunning("t-1", MomentAt(1));
+    ASSERT_TRUE(table.Succeed("t-1", StopReason::kPasses, nullptr, MomentAt(2), image));
     ASSERT_EQ(table.WaitForTurn()->job_id, "t-2");
-    ASSERT_TRUE(table.Cancel("t-3", At(2)).ok());
+    ASSERT_TRUE(table.Cancel("t-3", MomentAt(2)).ok());
   }
   JobTable table(TableWith(journal));
-  table.Restore(journal.AtTheNextStart(), 9, At(3));
+  table.Restore(journal.AtTheNextStart(), 9, MomentAt(3));
   EXPECT_EQ(StateOf(table, "t-1"), JobState::kSucceeded);
-  EXPECT_EQ(table.FindImage("t-1", At(3))->image_digest, image);
+  EXPECT_EQ(table.FindImage("t-1", MomentAt(3))->image_digest, image);
   EXPECT_EQ(StateOf(table, "t-2"), JobState::kQueued);
   EXPECT_EQ(StateOf(table, "t-3"), JobState::kCancelled);
   EXPECT_EQ(Added(table, "done"), "t-1") << "the same request";
@@ -403,15 +403,15 @@ TEST(JobTableTest, AJobWithANewEndWaitsBehindTheOthersAlsoInALaterTable) {
     ASSERT_TRUE(table.WaitForTurn());
     const auto runner = std::make_shared<FakeRunner>();
     ASSERT_TRUE(table.Attach("t-1", runner));
-    table.OnRunning("t-1", At(1));
-    ASSERT_TRUE(table.Succeed("t-1", StopReason::kPasses, nullptr, At(2), Sha256("image")));
+    table.OnRunning("t-1", MomentAt(1));
+    ASSERT_TRUE(table.Succeed("t-1", StopReason::kPasses, nullptr, MomentAt(2), Sha256("image")));
     RenderOverrides until;
     until.passes = 2000;
-    ASSERT_TRUE(table.Extend("t-1", until, At(3)).ok());
+    ASSERT_TRUE(table.Extend("t-1", until, MomentAt(3)).ok());
     EXPECT_FALSE(journal.rows.at(1).image_digest) << "its image grows from now on";
   }
   JobTable table(TableWith(journal));
-  table.Restore(journal.AtTheNextStart(), 3, At(3));
+  table.Restore(journal.AtTheNextStart(), 3, MomentAt(3));
   EXPECT_EQ(table.WaitForTurn()->job_id, "t-2");
   const auto turn = table.WaitForTurn();
   EXPECT_EQ(turn->job_id, "t-1");
@@ -423,12 +423,12 @@ TEST(JobTableTest, WhatCouldNotBeWrittenIsWrittenLater) {
   JobTable table(TableWith(journal));
   const std::string job = Added(table, "a");
   journal.is_full = true;
-  EXPECT_TRUE(table.Cancel(job, At(1)).ok());
+  EXPECT_TRUE(table.Cancel(job, MomentAt(1)).ok());
   EXPECT_EQ(StateOf(table, job), JobState::kCancelled);
-  table.SaveUnsaved(At(1));
+  table.SaveUnsaved(MomentAt(1));
   EXPECT_EQ(journal.rows.at(1).job.life.state(), JobState::kQueued);
   journal.is_full = false;
-  table.SaveUnsaved(At(1));
+  table.SaveUnsaved(MomentAt(1));
   EXPECT_EQ(journal.rows.at(1).job.life.state(), JobState::kCancelled);
 }
 
@@ -437,18 +437,18 @@ TEST(JobTableTest, ForgetsAJobOnRequestWhenItHasEndedAndSaysWhichFilesAreNeeded)
   JobTable table(TableWith(journal));
   CheckedJob checked = JobOf("a");
   checked.submission.manifest.entries["scene.pbrt"] = {Sha256("scene"), 5};
-  const std::string job = table.Add(std::move(checked), WallTime(), At(0))->job_id;
-  EXPECT_TRUE(absl::IsNotFound(table.Delete("t-2", At(0))));
-  EXPECT_TRUE(absl::IsFailedPrecondition(table.Delete(job, At(0))));
+  const std::string job = table.Add(std::move(checked), WallTime(), MomentAt(0))->job_id;
+  EXPECT_TRUE(absl::IsNotFound(table.Delete("t-2", MomentAt(0))));
+  EXPECT_TRUE(absl::IsFailedPrecondition(table.Delete(job, MomentAt(0))));
   EXPECT_EQ(table.Needed().blobs, std::set<Digest>{Sha256("scene")});
   EXPECT_EQ(table.Needed().checkpoints, std::set<std::string>{job});
-  EXPECT_TRUE(table.Cancel(job, At(1)).ok());
+  EXPECT_TRUE(table.Cancel(job, MomentAt(1)).ok());
   EXPECT_TRUE(table.Needed().checkpoints.empty());
   journal.is_full = true;
-  EXPECT_TRUE(absl::IsResourceExhausted(table.Delete(job, At(1))));
+  EXPECT_TRUE(absl::IsResourceExhausted(table.Delete(job, MomentAt(1))));
   EXPECT_TRUE(table.Find(job));
   journal.is_full = false;
-  EXPECT_TRUE(table.Delete(job, At(1)).ok());
+  EXPECT_TRUE(table.Delete(job, MomentAt(1)).ok());
   EXPECT_FALSE(table.Find(job));
   EXPECT_TRUE(journal.rows.empty());
   EXPECT_TRUE(table.Needed().blobs.empty());
@@ -462,14 +462,14 @@ TEST(JobTableTest, OldJobsAreDroppedFromTheJournalTooAndLaterWhenItIsFull) {
   for (const char* request : {"a", "b", "c"}) {
     const std::string job = Added(table, request);
     journal.is_full = std::string(request) == "c";
-    EXPECT_TRUE(table.Cancel(job, At(1)).ok() || journal.is_full);
+    EXPECT_TRUE(table.Cancel(job, MomentAt(1)).ok() || journal.is_full);
     if (std::string(request) == "b") {
       EXPECT_EQ(journal.rows.size(), 1U);
     }
   }
   EXPECT_EQ(journal.rows.size(), 2U);
   journal.is_full = false;
-  table.SaveUnsaved(At(1));
+  table.SaveUnsaved(MomentAt(1));
   ASSERT_EQ(journal.rows.size(), 1U);
   EXPECT_EQ(journal.rows.at(3).job.life.state(), JobState::kCancelled);
 }
@@ -479,13 +479,13 @@ TEST(JobTableTest, TimeStandsStillWhileAJobIsPausedAndItsEventsSayWhy) {
   JobTable table(SmallTable());
   const std::string job = Added(table, "a");
   ASSERT_TRUE(table.WaitForTurn());
-  table.OnRunning(job, At(10));
-  table.SetCondition(job, PauseCause::kDisk, "paused: no room", At(13));
-  table.SetCondition(job, PauseCause::kDisk, "paused: no room", At(15));
-  EXPECT_EQ(table.ReportOf(job, At(20))->running, std::chrono::seconds(3));
-  EXPECT_EQ(table.ReportOf(job, At(20))->job.condition, "paused: no room");
-  table.SetCondition(job, PauseCause::kDisk, "", At(20));
-  EXPECT_EQ(table.ReportOf(job, At(24))->running, std::chrono::seconds(7));
+  table.OnRunning(job, MomentAt(10));
+  table.SetCondition(job, PauseCause::kDisk, "paused: no room", MomentAt(13));
+  table.SetCondition(job, PauseCause::kDisk, "paused: no room", MomentAt(15));
+  EXPECT_EQ(table.ReportOf(job, MomentAt(20))->running, std::chrono::seconds(3));
+  EXPECT_EQ(table.ReportOf(job, MomentAt(20))->job.condition, "paused: no room");
+  table.SetCondition(job, PauseCause::kDisk, "", MomentAt(20));
+  EXPECT_EQ(table.ReportOf(job, MomentAt(24))->running, std::chrono::seconds(7));
   const std::vector<JobEvent> events = table.Find(job)->events;
   ASSERT_EQ(events.size(), 2U);
   EXPECT_EQ(events[0].what, "paused: no room");
@@ -497,21 +497,21 @@ TEST(JobTableTest, ADisputeAndAFullDiskDoNotEndEachOther) {
   JobTable table(SmallTable());
   const std::string job = Added(table, "a");
   ASSERT_TRUE(table.WaitForTurn());
-  table.OnRunning(job, At(0));
-  table.SetCondition(job, PauseCause::kDispute, "waits for another worker", At(1));
+  table.OnRunning(job, MomentAt(0));
+  table.SetCondition(job, PauseCause::kDispute, "waits for another worker", MomentAt(1));
   EXPECT_EQ(table.Find(job)->pause_cause, PauseCause::kDispute);
   EXPECT_EQ(table.Find(job)->life.state(), JobState::kPaused);
-  table.SetCondition(job, PauseCause::kDisk, "", At(2));
+  table.SetCondition(job, PauseCause::kDisk, "", MomentAt(2));
   EXPECT_EQ(table.Find(job)->pause_cause, PauseCause::kDispute);
-  table.SetCondition(job, PauseCause::kDisk, "paused: no room", At(3));
-  table.SetCondition(job, PauseCause::kDispute, "waits for another worker", At(4));
-  table.SetCondition(job, PauseCause::kDispute, "", At(5));
+  table.SetCondition(job, PauseCause::kDisk, "paused: no room", MomentAt(3));
+  table.SetCondition(job, PauseCause::kDispute, "waits for another worker", MomentAt(4));
+  table.SetCondition(job, PauseCause::kDispute, "", MomentAt(5));
   EXPECT_EQ(table.Find(job)->pause_cause, PauseCause::kDisk);
   EXPECT_EQ(table.Find(job)->condition, "paused: no room");
-  table.SetCondition(job, PauseCause::kDisk, "", At(6));
+  table.SetCondition(job, PauseCause::kDisk, "", MomentAt(6));
   EXPECT_EQ(table.Find(job)->pause_cause, PauseCause::kNone);
-  table.SetCondition(job, PauseCause::kDispute, "waits for another worker", At(7));
-  table.SetCondition(job, PauseCause::kDispute, "", At(8));
+  table.SetCondition(job, PauseCause::kDispute, "waits for another worker", MomentAt(7));
+  table.SetCondition(job, PauseCause::kDispute, "", MomentAt(8));
   EXPECT_EQ(table.Find(job)->life.state(), JobState::kRunning);
   EXPECT_EQ(table.Find(job)->condition, "");
 }
@@ -528,40 +528,40 @@ TEST(JobTableTest, APausedJobLetsAnotherHaveItsPlaceAndGoesOnWithItsRunner) {
   {
     const auto turn = table.WaitForTurn();
     ASSERT_TRUE(table.Attach(job, runner));
-    table.OnRunning(job, At(1));
-    const auto paused = table.Pause(job, PauseCause::kUser, "paused by its user", At(3));
+    table.OnRunning(job, MomentAt(1));
+    const auto paused = table.Pause(job, PauseCause::kUser, "paused by its user", MomentAt(3));
     EXPECT_EQ(paused->job.life.state(), JobState::kPaused);
     EXPECT_EQ(paused->job.condition, "paused by its user");
     // Before its own turn has ended.
     const auto other = table.WaitForTurn();
     EXPECT_EQ(other->job_id, next);
     EXPECT_TRUE(runner->Run()->gave_up_turn);
-    table.GiveUpTurn(job, At(4));
+    table.GiveUpTurn(job, MomentAt(4));
     EXPECT_EQ(StateOf(table, job), JobState::kPaused);
-    EXPECT_TRUE(table.Cancel(next, At(5)).ok());
+    EXPECT_TRUE(table.Cancel(next, MomentAt(5)).ok());
   }
-  EXPECT_EQ(table.ReportOf(job, At(9))->running, std::chrono::seconds(2));
-  EXPECT_EQ(table.Resume(job, At(9))->job.life.state(), JobState::kQueued);
+  EXPECT_EQ(table.ReportOf(job, MomentAt(9))->running, std::chrono::seconds(2));
+  EXPECT_EQ(table.Resume(job, MomentAt(9))->job.life.state(), JobState::kQueued);
   EXPECT_EQ(table.Find(job)->condition, "");
   const auto turn = table.WaitForTurn();
   EXPECT_EQ(turn->job_id, job);
   EXPECT_EQ(turn->runner, runner);
-  table.OnRunning(job, At(10));
-  EXPECT_EQ(table.ReportOf(job, At(13))->running, std::chrono::seconds(5));
+  table.OnRunning(job, MomentAt(10));
+  EXPECT_EQ(table.ReportOf(job, MomentAt(13))->running, std::chrono::seconds(5));
 }
 
 TEST(JobTableTest, AJobThatIsResumedBeforeItsTurnHasEndedWaitsForThat) {
   JobTable table(TwoAtOnce());
   const std::string job = Added(table, "a");
   auto turn = table.WaitForTurn();
-  ASSERT_TRUE(table.Pause(job, PauseCause::kUser, "paused", At(1)).ok());
-  ASSERT_TRUE(table.Resume(job, At(1)).ok());
+  ASSERT_TRUE(table.Pause(job, PauseCause::kUser, "paused", MomentAt(1)).ok());
+  ASSERT_TRUE(table.Resume(job, MomentAt(1)).ok());
   const auto runner = std::make_shared<FakeRunner>();
   ASSERT_TRUE(table.Attach(job, runner)) << "the turn was still preparing";
   EXPECT_TRUE(runner->Run()->gave_up_turn);
   const std::string other = Added(table, "b");
   EXPECT_EQ(table.WaitForTurn()->job_id, other);
-  table.GiveUpTurn(job, At(2));
+  table.GiveUpTurn(job, MomentAt(2));
   turn.reset();
   const auto again = table.WaitForTurn();
   EXPECT_EQ(again->job_id, job);
@@ -575,12 +575,12 @@ TEST(JobTableTest, AStopOfAPausedJobEndsItBeforeOthersRun) {
   {
     const auto turn = table.WaitForTurn();
     ASSERT_TRUE(table.Attach(job, runner));
-    table.OnRunning(job, At(1));
-    ASSERT_TRUE(table.Pause(job, PauseCause::kUser, "paused", At(2)).ok());
+    table.OnRunning(job, MomentAt(1));
+    ASSERT_TRUE(table.Pause(job, PauseCause::kUser, "paused", MomentAt(2)).ok());
   }
   Added(table, "b");
-  ASSERT_TRUE(table.SetPriority("t-2", 100, At(2)).ok());
-  EXPECT_EQ(table.Stop(job, At(3))->job.life.state(), JobState::kQueued);
+  ASSERT_TRUE(table.SetPriority("t-2", 100, MomentAt(2)).ok());
+  EXPECT_EQ(table.Stop(job, MomentAt(3))->job.life.state(), JobState::kQueued);
   const auto turn = table.WaitForTurn();
   EXPECT_EQ(turn->job_id, job);
   EXPECT_EQ(turn->runner->Resume()->reason, StopReason::kUser);
@@ -592,17 +592,17 @@ TEST(JobTableTest, PausesAndPrioritiesAreInALaterTableToo) {
     JobTable table(TableWith(journal));
     for (const char* request : {"a", "b", "c"})
       Added(table, request);
-    ASSERT_TRUE(table.Pause("t-1", PauseCause::kUser, "paused by its user", At(1)).ok());
-    ASSERT_TRUE(table.SetPriority("t-3", 5, At(1)).ok());
-    EXPECT_TRUE(absl::IsInvalidArgument(table.SetPriority("t-3", 101, At(1)).status()));
+    ASSERT_TRUE(table.Pause("t-1", PauseCause::kUser, "paused by its user", MomentAt(1)).ok());
+    ASSERT_TRUE(table.SetPriority("t-3", 5, MomentAt(1)).ok());
+    EXPECT_TRUE(absl::IsInvalidArgument(table.SetPriority("t-3", 101, MomentAt(1)).status()));
   }
   JobTable table(TableWith(journal));
-  table.Restore(journal.AtTheNextStart(), 4, At(3));
+  table.Restore(journal.AtTheNextStart(), 4, MomentAt(3));
   EXPECT_EQ(StateOf(table, "t-1"), JobState::kPaused);
   EXPECT_EQ(table.Find("t-1")->condition, "paused by its user");
   EXPECT_EQ(table.WaitForTurn()->job_id, "t-3");
   EXPECT_EQ(table.WaitForTurn()->job_id, "t-2");
-  ASSERT_TRUE(table.Resume("t-1", At(4)).ok());
+  ASSERT_TRUE(table.Resume("t-1", MomentAt(4)).ok());
   EXPECT_EQ(table.WaitForTurn()->job_id, "t-1");
 }
 
@@ -610,25 +610,26 @@ TEST(JobTableTest, PausesAndPrioritiesAreInALaterTableToo) {
 // paused.
 TEST(JobTableTest, JobsWithoutWorkersDoNotBlockOthersAndTheirTimeStandsStill) {
   JobTable table(SmallTable());
-  table.SetLiveWorkers(1, At(0));
+  table.SetLiveWorkers(1, MomentAt(0));
   const std::string job = Added(table, "a");
   const std::string next = Added(table, "b");
   const auto turn = table.WaitForTurn();
   const auto runner = std::make_shared<FakeRunner>();
   ASSERT_TRUE(table.Attach(job, runner));
-  table.OnRunning(job, At(1));
-  table.SetLiveWorkers(0, At(4));
-  EXPECT_EQ(table.ReportOf(job, At(9))->running, std::chrono::seconds(3));
+  table.OnRunning(job, MomentAt(1));
+  table.SetLiveWorkers(0, MomentAt(4));
+  EXPECT_EQ(table.ReportOf(job, MomentAt(9))->running, std::chrono::seconds(3));
   EXPECT_FALSE(table.WhenItHasRun(job, std::chrono::seconds(5)));
-  table.SetLiveWorkers(0, At(9));
+  table.SetLiveWorkers(0, MomentAt(9));
   const auto other = table.WaitForTurn();
   EXPECT_EQ(other->job_id, next);
   ASSERT_TRUE(table.Attach(next, std::make_shared<FakeRunner>()));
-  table.OnRunning(next, At(9));
-  table.SetLiveWorkers(1, At(10));
-  EXPECT_EQ(table.WhenItHasRun(job, std::chrono::seconds(5)), At(12).now);
+  table.OnRunning(next, MomentAt(9));
+  table.SetLiveWorkers(1, MomentAt(10));
+  EXPECT_EQ(table.WhenItHasRun(job, std::chrono::seconds(5)), MomentAt(12).now);
   EXPECT_FALSE(runner->gives_up_turn());
-  EXPECT_TRUE(dynamic_cast<FakeRunner&>(*table.DescribeRun(next, At(10))->runner).gives_up_turn())
+  EXPECT_TRUE(
+      dynamic_cast<FakeRunner&>(*table.DescribeRun(next, MomentAt(10))->runner).gives_up_turn())
       << "two have a turn and one may";
 }
 
@@ -639,13 +640,14 @@ TEST(JobTableTest, JobsThatRunAtTheSameTimeShareTheProcessorTime) {
   const std::string b = Added(table, "b");
   const auto turn_of_a = table.WaitForTurn();
   const auto turn_of_b = table.WaitForTurn();
-  table.OnRunning(a, At(10));
-  table.OnRunning(b, At(14));
-  EXPECT_EQ(table.ReportOf(a, At(20))->job.counters.coordinator_cpu, std::chrono::seconds(7));
-  EXPECT_EQ(table.ReportOf(b, At(20))->job.counters.coordinator_cpu, std::chrono::seconds(3));
-  ASSERT_TRUE(table.Pause(b, PauseCause::kUser, "paused", At(20)).ok());
-  EXPECT_EQ(table.ReportOf(a, At(24))->job.counters.coordinator_cpu, std::chrono::seconds(11));
-  EXPECT_EQ(table.ReportOf(b, At(24))->job.counters.coordinator_cpu, std::chrono::seconds(3));
+  table.OnRunning(a, MomentAt(10));
+  table.OnRunning(b, MomentAt(14));
+  EXPECT_EQ(table.ReportOf(a, MomentAt(20))->job.counters.coordinator_cpu, std::chrono::seconds(7));
+  EXPECT_EQ(table.ReportOf(b, MomentAt(20))->job.counters.coordinator_cpu, std::chrono::seconds(3));
+  ASSERT_TRUE(table.Pause(b, PauseCause::kUser, "paused", MomentAt(20)).ok());
+  EXPECT_EQ(table.ReportOf(a, MomentAt(24))->job.counters.coordinator_cpu,
+            std::chrono::seconds(11));
+  EXPECT_EQ(table.ReportOf(b, MomentAt(24))->job.counters.coordinator_cpu, std::chrono::seconds(3));
 }
 
 TEST(JobTableTest, ListsTheJobsThatAFilterLetsPass) {
@@ -653,12 +655,12 @@ TEST(JobTableTest, ListsTheJobsThatAFilterLetsPass) {
   for (const char* name : {"kitchen", "bath", "kitchen sink"}) {
     CheckedJob job = JobOf(name);
     job.submission.name = name;
-    ASSERT_TRUE(table.Add(std::move(job), WallTime(), At(0)).ok());
+    ASSERT_TRUE(table.Add(std::move(job), WallTime(), MomentAt(0)).ok());
   }
-  ASSERT_TRUE(table.Pause("t-1", PauseCause::kUser, "paused", At(0)).ok());
+  ASSERT_TRUE(table.Pause("t-1", PauseCause::kUser, "paused", MomentAt(0)).ok());
   const auto ids = [&](const JobFilter& filter, std::size_t count = 10) {
     std::string all;
-    for (const JobReport& report : table.List(filter, count, 0, At(1)).first)
+    for (const JobReport& report : table.List(filter, count, 0, MomentAt(1)).first)
       all += report.job.id + " ";
     return all;
   };
@@ -694,41 +696,41 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
           delivery.pass.job_id = job;
           switch (rng.Bits() % 12) {
             case 0:
-              (void)table.Add(JobOf(request, *until.passes), WallTime(), At(0));
+              (void)table.Add(JobOf(request, *until.passes), WallTime(), MomentAt(0));
               break;
             case 1:
             case 2:
-              (void)table.Cancel(job, At(1));
+              (void)table.Cancel(job, MomentAt(1));
               break;
             case 3:
-              (void)table.Stop(job, At(1));
+              (void)table.Stop(job, MomentAt(1));
               break;
             case 4:
-              (void)table.Extend(job, until, At(1));
+              (void)table.Extend(job, until, MomentAt(1));
               break;
             case 5:
-              (void)table.FindImage(job, At(1));
+              (void)table.FindImage(job, MomentAt(1));
               break;
             case 6:
-              (void)table.List({}, 10, 0, At(1));
+              (void)table.List({}, 10, 0, MomentAt(1));
               (void)table.MakeLoan({}, 1);
               break;
             case 7:
-              (void)table.Pause(job, PauseCause::kUser, "paused", At(1));
+              (void)table.Pause(job, PauseCause::kUser, "paused", MomentAt(1));
               break;
             case 8:
-              (void)table.Resume(job, At(1));
+              (void)table.Resume(job, MomentAt(1));
               break;
             case 9:
-              (void)table.SetPriority(job, static_cast<int>(rng.Bits() % 3), At(1));
+              (void)table.SetPriority(job, static_cast<int>(rng.Bits() % 3), MomentAt(1));
               break;
             case 10:
               table.SetCondition(job, PauseCause::kDisk,
-                                 rng.Bits() % 2 == 0 ? "" : "paused: no room", At(1));
-              table.SetLiveWorkers(static_cast<int>(rng.Bits() % 2), At(static_cast<int>(i)));
+                                 rng.Bits() % 2 == 0 ? "" : "paused: no room", MomentAt(1));
+              table.SetLiveWorkers(static_cast<int>(rng.Bits() % 2), MomentAt(static_cast<int>(i)));
               break;
             default:
-              table.CountMerged(delivery, DeliveredCounts(), "w", At(1).now);
+              table.CountMerged(delivery, DeliveredCounts(), "w", MomentAt(1).now);
               table.CountFetched(Digest(), 1);
           }
         }
@@ -736,11 +738,11 @@ TEST(JobTableTest, RequestsInAnyOrderLeaveNoThreadWaiting) {
     }
     for (std::thread& caller : callers)
       caller.join();
-    const auto [reports, next] = table.List({}, 1000, 0, At(3));
+    const auto [reports, next] = table.List({}, 1000, 0, MomentAt(3));
     for (const JobReport& report : reports)
-      (void)table.Cancel(report.job.id, At(3));
+      (void)table.Cancel(report.job.id, MomentAt(3));
     // Its turn comes and it runs to its end: the thread of jobs is not stuck with one before it.
-    const std::string last = table.Add(JobOf("last", 1), WallTime(), At(4))->job_id;
+    const std::string last = table.Add(JobOf("last", 1), WallTime(), MomentAt(4))->job_id;
     while (StateOf(table, last) != JobState::kSucceeded)
       std::this_thread::yield();
     table.Close(absl::UnavailableError("closing"));
@@ -764,14 +766,14 @@ class BakeTableTest : public testing::Test {
   BakeTableTest() {
     CheckedJob job = JobOf("bake");
     job.submission.bake = BakeSettings();
-    EXPECT_EQ(table_.Add(std::move(job), WallTime(), At(0))->job_id, kJob);
+    EXPECT_EQ(table_.Add(std::move(job), WallTime(), MomentAt(0))->job_id, kJob);
     turn_ = table_.WaitForTurn();
     EXPECT_TRUE(turn_->is_bake);
     Begin("survey");
-    table_.OnRunning(kJob, At(1));
+    table_.OnRunning(kJob, MomentAt(1));
   }
   void Begin(const std::string& name, int seconds = 1) {
-    ASSERT_TRUE(table_.BeginRound(kJob, RoundOf(name), JobOf("", 16), At(seconds)));
+    ASSERT_TRUE(table_.BeginRound(kJob, RoundOf(name), JobOf("", 16), MomentAt(seconds)));
     runner_ = std::make_shared<FakeRunner>();
     ASSERT_TRUE(table_.Attach(kJob, runner_));
   }
@@ -781,7 +783,7 @@ class BakeTableTest : public testing::Test {
     Delivery delivery;
     delivery.worker = "w";
     delivery.pass = {run_id, 0};
-    table_.CountMerged(delivery, counts, "host", At(2).now);
+    table_.CountMerged(delivery, counts, "host", MomentAt(2).now);
   }
   [[nodiscard]] const Job Now() const { return *table_.Find(kJob); }
 
@@ -796,7 +798,7 @@ TEST_F(BakeTableTest, WhatComesOfAnEarlierRoundFindsNoJob) {
   EXPECT_NE(survey, kJob);
   EXPECT_TRUE(table_.Find(survey));
   EXPECT_EQ(table_.ShareOf(kJob)->run_id, survey);
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(3)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, MomentAt(3)));
   Begin("round 1");
   EXPECT_FALSE(table_.Find(survey));
   EXPECT_TRUE(table_.HasEnded(survey));
@@ -812,7 +814,7 @@ TEST_F(BakeTableTest, ARoundKeepsWhatItCounted) {
   CountPhotons(kJob, 7);
   // What is merged of an open round besides is not in the image.
   table_.OnProgress(kJob, 5);
-  ASSERT_TRUE(table_.EndRound(kJob, Sha256("image"), 3, StopReason::kError, At(3)));
+  ASSERT_TRUE(table_.EndRound(kJob, Sha256("image"), 3, StopReason::kError, MomentAt(3)));
   Begin("round 1", 3);
   ASSERT_EQ(Now().bake->rounds.size(), 2U);
   const BakeRoundRecord& survey = Now().bake->rounds[0];
@@ -824,8 +826,8 @@ TEST_F(BakeTableTest, ARoundKeepsWhatItCounted) {
   EXPECT_EQ(Now().counters.passes, 0);
   EXPECT_EQ(Now().workers.size(), 1U) << "who had a part in it has one in the mesh";
   // A round's time is its own.
-  EXPECT_EQ(table_.RunningOf(kJob, At(7).now), std::chrono::seconds(4));
-  EXPECT_EQ(table_.WhenItHasRun(kJob, std::chrono::seconds(10)), At(13).now);
+  EXPECT_EQ(table_.RunningOf(kJob, MomentAt(7).now), std::chrono::seconds(4));
+  EXPECT_EQ(table_.WhenItHasRun(kJob, std::chrono::seconds(10)), MomentAt(13).now);
   // The files of a round are those of the scene, and its sensors.
   EXPECT_EQ(ManifestOf(Now()).main_path, kSensorsPath);
   EXPECT_EQ(ManifestOf(Now()).entries.at(kSensorsPath).digest, Sha256("round 1"));
@@ -846,19 +848,19 @@ TEST_F(BakeTableTest, ARoundThatIsBegunAgainGoesOn) {
 }
 
 TEST_F(BakeTableTest, AnotherEndBeginsAnewUnderAnotherName) {
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(2)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, MomentAt(2)));
   Begin("round 1");
   const std::string run = RunIdOf(Now());
   RenderOverrides until;
   until.passes = 2000;
-  ASSERT_TRUE(table_.Extend(kJob, until, At(3)).ok());
+  ASSERT_TRUE(table_.Extend(kJob, until, MomentAt(3)).ok());
   EXPECT_TRUE(runner_->is_stopped());
   EXPECT_EQ(Now().bake->overrides.passes, 2000);
   EXPECT_EQ(Now().settings.passes, 16) << "those of the round, until there is another";
   // Whoever reads its row now knows that its rounds do not count.
   EXPECT_TRUE(Now().bake->begins_again);
-  EXPECT_FALSE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(3)));
-  EXPECT_FALSE(table_.BeginRound(kJob, RoundOf("round 2"), JobOf(""), At(3)));
+  EXPECT_FALSE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, MomentAt(3)));
+  EXPECT_FALSE(table_.BeginRound(kJob, RoundOf("round 2"), JobOf(""), MomentAt(3)));
   EXPECT_TRUE(table_.TakeBeginsAgain(kJob));
   EXPECT_TRUE(Now().bake->rounds.empty());
   EXPECT_FALSE(Now().bake->begins_again);
@@ -869,43 +871,43 @@ TEST_F(BakeTableTest, AnotherEndBeginsAnewUnderAnotherName) {
 
 TEST_F(BakeTableTest, TheWorkOfAWrongWorkerGoesWithAllRounds) {
   table_.NoteContributor(kJob, "record", "host");
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(2)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, MomentAt(2)));
   Begin("round 1");
-  table_.TakeOut("record", At(3));
+  table_.TakeOut("record", MomentAt(3));
   EXPECT_TRUE(runner_->is_stopped());
-  EXPECT_FALSE(table_.Succeed(kJob, StopReason::kPasses, nullptr, At(3)));
+  EXPECT_FALSE(table_.Succeed(kJob, StopReason::kPasses, nullptr, MomentAt(3)));
   EXPECT_TRUE(table_.TakeBeginsAgain(kJob));
   EXPECT_TRUE(Now().bake->rounds.empty());
   // One that waits for its turn has no thread that does it.
   Begin("survey");
   table_.NoteContributor(kJob, "record", "host");
-  ASSERT_TRUE(table_.Pause(kJob, PauseCause::kUser, "paused", At(4)).ok());
+  ASSERT_TRUE(table_.Pause(kJob, PauseCause::kUser, "paused", MomentAt(4)).ok());
   turn_.reset();
-  table_.TakeOut("record", At(5));
+  table_.TakeOut("record", MomentAt(5));
   EXPECT_TRUE(Now().bake->rounds.empty());
   EXPECT_FALSE(table_.BeginsAgain(kJob));
 }
 
 TEST_F(BakeTableTest, OneThatHasEndedCanBeGivenAnotherEnd) {
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(2)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, MomentAt(2)));
   BakeResult result;
   result.figures = {{.name = "floor"}};
   table_.SetBakeResult(kJob, result, std::make_shared<const std::string>("uv"), std::nullopt);
-  ASSERT_TRUE(
-      table_.Succeed(kJob, StopReason::kPasses, std::make_shared<const std::string>("glb"), At(3)));
+  ASSERT_TRUE(table_.Succeed(kJob, StopReason::kPasses, std::make_shared<const std::string>("glb"),
+                             MomentAt(3)));
   turn_.reset();
-  EXPECT_EQ(*table_.FindImage(kJob, At(3))->image, "glb");
-  EXPECT_EQ(*table_.FindImage(kJob, At(3))->uv_mesh, "uv");
+  EXPECT_EQ(*table_.FindImage(kJob, MomentAt(3))->image, "glb");
+  EXPECT_EQ(*table_.FindImage(kJob, MomentAt(3))->uv_mesh, "uv");
   EXPECT_EQ(Now().bake->figures.size(), 1U);
   RenderOverrides until;
   until.passes = 2000;
   // Its files are nowhere, since it has no pins here.
-  EXPECT_TRUE(absl::IsFailedPrecondition(table_.Extend(kJob, until, At(4)).status()));
+  EXPECT_TRUE(absl::IsFailedPrecondition(table_.Extend(kJob, until, MomentAt(4)).status()));
 }
 
 TEST_F(BakeTableTest, AStopBetweenTwoRoundsCountsForAllThatFollow) {
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kPasses, At(2)));
-  ASSERT_TRUE(table_.Stop(kJob, At(2)).ok()) << "though nothing runs at the moment";
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kPasses, MomentAt(2)));
+  ASSERT_TRUE(table_.Stop(kJob, MomentAt(2)).ok()) << "though nothing runs at the moment";
   Begin("round 1");
   EXPECT_TRUE(runner_->Run().ok()) << "it ends at once";
   EXPECT_TRUE(table_.IsFinishing(kJob));
@@ -914,27 +916,27 @@ TEST_F(BakeTableTest, AStopBetweenTwoRoundsCountsForAllThatFollow) {
   // Another end is one.
   RenderOverrides until;
   until.passes = 2000;
-  ASSERT_TRUE(table_.Extend(kJob, until, At(3)).ok());
+  ASSERT_TRUE(table_.Extend(kJob, until, MomentAt(3)).ok());
   EXPECT_FALSE(table_.IsFinishing(kJob));
 }
 
 TEST_F(BakeTableTest, AnotherEndBetweenTwoRoundsIsHeardBeforeTheNextRuns) {
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kPasses, At(2)));
-  ASSERT_TRUE(table_.BeginRound(kJob, RoundOf("round 1"), JobOf("", 16), At(2)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kPasses, MomentAt(2)));
+  ASSERT_TRUE(table_.BeginRound(kJob, RoundOf("round 1"), JobOf("", 16), MomentAt(2)));
   RenderOverrides until;
   until.passes = 2000;
-  ASSERT_TRUE(table_.Extend(kJob, until, At(3)).ok());
+  ASSERT_TRUE(table_.Extend(kJob, until, MomentAt(3)).ok());
   EXPECT_FALSE(table_.Attach(kJob, std::make_shared<FakeRunner>()));
   EXPECT_TRUE(table_.TakeBeginsAgain(kJob));
   Begin("survey");
 }
 
 TEST_F(BakeTableTest, WhatARoundWaitedForEndsWithIt) {
-  table_.SetCondition(kJob, PauseCause::kDispute, "workers disagree", At(2));
+  table_.SetCondition(kJob, PauseCause::kDispute, "workers disagree", MomentAt(2));
   EXPECT_EQ(StateOf(table_, kJob), JobState::kPaused);
   RenderOverrides until;
   until.passes = 2000;
-  ASSERT_TRUE(table_.Extend(kJob, until, At(3)).ok());
+  ASSERT_TRUE(table_.Extend(kJob, until, MomentAt(3)).ok());
   EXPECT_TRUE(table_.TakeBeginsAgain(kJob));
   Begin("survey", 3);
   EXPECT_EQ(StateOf(table_, kJob), JobState::kRunning);
@@ -942,10 +944,10 @@ TEST_F(BakeTableTest, WhatARoundWaitedForEndsWithIt) {
 }
 
 TEST_F(BakeTableTest, HasNothingToShowBeforeItsEnd) {
-  EXPECT_TRUE(absl::IsFailedPrecondition(table_.FindImage(kJob, At(1)).status()));
-  ASSERT_TRUE(table_.Stop(kJob, At(2)).ok());
+  EXPECT_TRUE(absl::IsFailedPrecondition(table_.FindImage(kJob, MomentAt(1)).status()));
+  ASSERT_TRUE(table_.Stop(kJob, MomentAt(2)).ok());
   EXPECT_TRUE(table_.IsFinishing(kJob));
-  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, At(2)));
+  ASSERT_TRUE(table_.EndRound(kJob, std::nullopt, 3, StopReason::kError, MomentAt(2)));
   Begin("round 1");
   EXPECT_TRUE(runner_->Run().ok()) << "it ends at once, as the one before";
 }

@@ -9,12 +9,10 @@
 
 #include "gtest/gtest.h"
 
+#include "tests/support/steady_time.h"
+
 namespace lucerna {
 namespace {
-
-SteadyTime At(int s) {
-  return SteadyTime(std::chrono::seconds(s));
-}
 
 ParkedSyncs::TryAnswer NothingYet() {
   return [](const std::string&, const Scheduler::Report&) { return std::nullopt; };

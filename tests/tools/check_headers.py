@@ -6,18 +6,20 @@ Usage: check_headers.py BUILD_FOLDER [--all]  (the folder holds compile_commands
 A header that needs what its includer happens to have included breaks at the next reordering. Most
 headers prove it without a compiler run of their own: the first include of NAME.cc must be NAME.h, so
 the build compiles the header first. Headers without a NAME.cc are compiled one by one (syntax only), with
-the flags of a source file of their folder. Where the build includes a precompiled header before, the order of
-includes proves less: --all compiles those headers too, which takes some 150 s of processor time.
+the flags of a source file of their folder. Where the build includes a precompiled header before, or compiles
+several sources at a time (CMAKE_UNITY_BUILD), the order of includes proves less: --all compiles
+those headers too, which takes some 150 s of processor time.
 """
 
 import concurrent.futures
-import json
 import os
 import pathlib
 import re
 import shlex
 import subprocess
 import sys
+
+from compile_commands import commands_of_sources
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 FOLDERS = ("render", "server", "worker", "client", "tests")
@@ -28,7 +30,7 @@ PRECOMPILED = re.compile(r"cmake_pch\.hxx$")
 def commands_by_source(build):
     """Source file, relative to the project -> its compiler flags as words."""
     commands = {}
-    for entry in json.loads((build / "compile_commands.json").read_text()):
+    for entry in commands_of_sources(build):
         path = pathlib.Path(entry["file"])
         if path.is_relative_to(ROOT):
             commands[path.relative_to(ROOT).as_posix()] = shlex.split(entry["command"])

@@ -27,7 +27,6 @@ fi
 # clang reads neither g++'s precompiled headers nor some of its warning flags.
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
-sed -E 's/ -Winvalid-pch| -fpch-preprocess| -include [^ ]*cmake_pch\.hxx//g;
-        s/ -Wno-(restrict|stringop-overflow|stringop-overread|array-bounds)//g' \
-  "$build/compile_commands.json" > "$scratch/compile_commands.json"
+python3 tests/tools/compile_commands.py "$build" | sed -E 's/ -Winvalid-pch| -fpch-preprocess| -include [^ ]*cmake_pch\.hxx//g;
+        s/ -Wno-(restrict|stringop-overflow|stringop-overread|array-bounds|subobject-linkage)//g' > "$scratch/compile_commands.json"
 printf '%s\n' "$@" | xargs -P "$(nproc)" -n 1 clang-tidy -p "$scratch" --quiet

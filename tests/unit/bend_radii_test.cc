@@ -9,12 +9,11 @@
 
 #include "gtest/gtest.h"
 
+#include "render/math/warp.h"
 #include "tests/support/test_scenes.h"
 
 namespace lucerna {
 namespace {
-
-constexpr double kPi = 3.14159265358979;
 
 // Rows of a turned surface: at each of them its radius and height, and the slope of its normals.
 struct Ring {
@@ -31,7 +30,7 @@ TriangleMesh Turned(const std::array<Ring, kRings>& rings, std::uint32_t sides, 
     for (std::uint32_t i = 0; i < sides; ++i) {
       const auto first = static_cast<std::uint32_t>(mesh.positions.size());
       for (const auto& [ring, side] : {std::pair(r, i), {r, i + 1}, {r + 1, i + 1}, {r + 1, i}}) {
-        const double angle = 2 * kPi * (side % sides) / sides;
+        const double angle = 2 * kPi64 * (side % sides) / sides;
         const Ring& at = rings[ring];
         const auto turned = [&](double radius, double z) {
           return Vec3{static_cast<float>(radius * std::cos(angle)),
@@ -191,7 +190,7 @@ TEST(BendRadiiTest, OfBrokenMeshesAreNoSurprise) {
   constexpr std::uint32_t kFacets = 20000;
   fan.positions.push_back({0, 0, 0.2F});
   for (std::uint32_t i = 0; i < kFacets; ++i) {
-    const double angle = 2 * kPi * i / kFacets;
+    const double angle = 2 * kPi64 * i / kFacets;
     fan.positions.push_back(
         {static_cast<float>(std::cos(angle)), static_cast<float>(std::sin(angle)), 0});
     fan.indices.insert(fan.indices.end(), {0, 1 + i, 1 + (i + 1) % kFacets});

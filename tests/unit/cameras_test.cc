@@ -1,18 +1,16 @@
 // Orthographic and spherical cameras see what pbrt-v4's see.
 #include <cmath>
-#include <numbers>
 #include <string>
 
 #include "gtest/gtest.h"
 
 #include "render/formats/read_scene.h"
+#include "render/math/warp.h"
 #include "tests/support/local_render.h"
 #include "tests/support/memory_files.h"
 
 namespace lucerna {
 namespace {
-
-constexpr double kPi = std::numbers::pi;
 
 Scene SceneOf(const std::string& text) {
   MemoryFiles files({{"s.pbrt", text}});
@@ -42,12 +40,12 @@ TEST(CamerasTest, AnOrthographicCameraShowsDiscsAtAnyDistance) {
     const Scene scene =
         SceneOf(std::string("LookAt 0 0 -") + distance + " 0 0 0 0 1 0 Camera \"orthographic\"" +
                 kFilm + kBall + "\"float radius\" 0.5");
-    EXPECT_NEAR(LitShare(scene), kPi * 0.25 / 8, 0.004) << distance;
+    EXPECT_NEAR(LitShare(scene), kPi64 * 0.25 / 8, 0.004) << distance;
   }
   const Scene windowed = SceneOf(
       "LookAt 0 0 -5 0 0 0 0 1 0 Camera \"orthographic\" \"float screenwindow\" [-2 0 -1 1]" +
       kFilm + kBall + "\"float radius\" 0.5");
-  EXPECT_NEAR(LitShare(windowed), kPi * 0.25 / 2 / 4, 0.004);
+  EXPECT_NEAR(LitShare(windowed), kPi64 * 0.25 / 2 / 4, 0.004);
 }
 
 TEST(CamerasTest, AnOrthographicWindowIsOfTheFilesUnit) {
@@ -57,7 +55,7 @@ TEST(CamerasTest, AnOrthographicWindowIsOfTheFilesUnit) {
       "screenwindow\" [-2e9 2e9 -1e9 1e9]" +
       kFilm + kBall + "\"float radius\" 5e8");
   EXPECT_GT(scene.unit, 1);
-  EXPECT_NEAR(LitShare(scene), kPi * 0.25 / 8, 0.004);
+  EXPECT_NEAR(LitShare(scene), kPi64 * 0.25 / 8, 0.004);
 }
 
 TEST(CamerasTest, PixelFootprints) {
@@ -67,12 +65,12 @@ TEST(CamerasTest, PixelFootprints) {
   camera.kind = Camera::Kind::kOrthographic;
   EXPECT_NEAR(PixelFootprint(camera, 100, 100, 3), 0.02, 1e-12);
   camera.kind = Camera::Kind::kEqualArea;
-  EXPECT_NEAR(PixelFootprint(camera, 100, 100, 3), 3 * std::sqrt(4 * kPi) / 100, 1e-12);
+  EXPECT_NEAR(PixelFootprint(camera, 100, 100, 3), 3 * std::sqrt(4 * kPi64) / 100, 1e-12);
 }
 
 TEST(CamerasTest, ASphericalCameraSeesAllDirections) {
   // A ball of radius 1 at a distance of 2 fills a cone of 30 degrees: (1 - cos) / 2 of all.
-  const double share = (1 - std::cos(kPi / 6)) / 2;
+  const double share = (1 - std::cos(kPi64 / 6)) / 2;
   for (const char* place : {"0 0 2", "2 0 0", "0 2 0", "-1.2 0 -1.6"}) {
     const Scene scene = SceneOf("Camera \"spherical\"" + kFilm + "WorldBegin Translate " + place +
                                 " AreaLightSource \"diffuse\" \"rgb L\" [1 1 1] Shape \"sphere\"");

@@ -30,10 +30,10 @@ TEST(WorkerViewTest, TheTableEscapesNamesAndReasons) {
 }
 
 TEST(WorkerViewTest, TheReportIsJsonWithTheSameFigures) {
-  const std::string json = WorkersReport({Hostile()});
-  EXPECT_NE(json.find("\"failed\": 3"), std::string::npos) << json;
-  EXPECT_NE(json.find("\"silent_s\": 75"), std::string::npos) << json;
-  EXPECT_EQ(json.find('\x1b'), std::string::npos);
+  const std::string report = WorkersReport({Hostile()});
+  EXPECT_NE(report.find("\"failed\": 3"), std::string::npos) << report;
+  EXPECT_NE(report.find("\"silent_s\": 75"), std::string::npos) << report;
+  EXPECT_EQ(report.find('\x1b'), std::string::npos);
   EXPECT_EQ(WorkersReport({}), "[]\n");
 }
 

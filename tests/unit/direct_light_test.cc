@@ -6,17 +6,15 @@
 #include "render/tracing/direct_light.h"
 
 #include <cmath>
-#include <numbers>
 
 #include "gtest/gtest.h"
 
 #include "render/math/rng.h"
+#include "render/math/warp.h"
 #include "tests/support/test_scenes.h"
 
 namespace lucerna {
 namespace {
-
-constexpr double kPiD = std::numbers::pi;
 
 // The share of light samples at `from`, on a floor with normal +z, that find nothing in the way.
 double VisibleShare(const Scene& scene, Vec3 from) {
@@ -126,7 +124,7 @@ TEST(LightSampledRadianceTest, GivesTheRadianceOfAPointLightInSightAndNoneBehind
     return static_cast<double>(value.g);
   };
   const double squared = 0.5 * 0.5 + 0.25 * 0.25 + 4;
-  const double expected = 0.5 / kPiD * 3 * (2 / std::sqrt(squared)) / squared;
+  const double expected = 0.5 / kPi64 * 3 * (2 / std::sqrt(squared)) / squared;
   EXPECT_NEAR(radiance(scene), expected, 1e-5 * expected);
 
   AddDisk(scene, {0.25F, 0.125F, 1}, {0, 0, 1}, 0.1F, 0);

@@ -4,13 +4,13 @@
 
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <utility>
 
 #include "gtest/gtest.h"
 
 #include "render/math/equal_area_square.h"
 #include "render/math/rng.h"
+#include "render/math/warp.h"
 #include "render/transport/light.h"
 #include "render/transport/working_space.h"
 #include "tests/support/chi_square.h"
@@ -18,8 +18,6 @@
 
 namespace lucerna {
 namespace {
-
-constexpr double kPiD = std::numbers::pi;
 
 template <typename Pixel>
 InfiniteLight SkyOf(int size, Pixel&& pixel, Rgb scale = Gray(1)) {
@@ -75,7 +73,7 @@ TEST(EqualAreaSquareTest, IsEven) {
         direction = EqualAreaDirection({u1, u2});
         return true;
       },
-      [](Vec3) { return 1 / (4 * kPiD); }, 200000, 2);
+      [](Vec3) { return 1 / (4 * kPi64); }, 200000, 2);
   EXPECT_GT(p_value, 1e-3);
 }
 
@@ -108,7 +106,7 @@ TEST(EnvironmentMapTest, DrawsByItsDensity) {
       const ShapeAxes axes = UnevenSky().axes;
       const Vec3 d = axes.x * local.x + axes.y * local.y + axes.z * local.z;
       expected[cell(d)] +=
-          kDraws * 4 * kPiD * static_cast<double>(sky.PdfSolidAngle(d)) / (kLattice * kLattice);
+          kDraws * 4 * kPi64 * static_cast<double>(sky.PdfSolidAngle(d)) / (kLattice * kLattice);
     }
   }
   EXPECT_GT(ChiSquarePValue(observed, expected), 1e-3);
@@ -169,7 +167,7 @@ Estimate IrradianceByPhotons(const Lit& lit, std::uint64_t key) {
         emission.ray.direction.z > 0) {
       continue;
     }
-    const double irradiance = static_cast<double>(emission.flux.g) / (kPiD * 0.25);
+    const double irradiance = static_cast<double>(emission.flux.g) / (kPi64 * 0.25);
     sum += irradiance;
     squares += irradiance * irradiance;
   }
@@ -223,8 +221,8 @@ TEST(EnvironmentLightTest, AnEvenMapIsTheConstantLight) {
               1, 1e-5);
   const double radiance = static_cast<double>(plain.lights->InfiniteRadiance({}, {0, 0, 1}).g);
   // The second disk hides a little.
-  ExpectEqual(IrradianceByPhotons(even, 10), radiance * kPiD, 2e-3 * radiance);
-  ExpectEqual(IrradianceByLights(even, 11), radiance * kPiD, 2e-3 * radiance);
+  ExpectEqual(IrradianceByPhotons(even, 10), radiance * kPi64, 2e-3 * radiance);
+  ExpectEqual(IrradianceByLights(even, 11), radiance * kPi64, 2e-3 * radiance);
 }
 
 TEST(EnvironmentLightTest, OneBrightPixelGivesItsPatchsIrradiance) {
@@ -239,7 +237,7 @@ TEST(EnvironmentLightTest, OneBrightPixelGivesItsPatchsIrradiance) {
       const float z = EqualAreaDirection({(2 + (static_cast<float>(i) + 0.5F) / kLattice) / kSize,
                                           (3 + (static_cast<float>(j) + 0.5F) / kLattice) / kSize})
                           .z;
-      expected += 50 * static_cast<double>(std::max(z, 0.0F)) * 4 * kPiD / (kSize * kSize) /
+      expected += 50 * static_cast<double>(std::max(z, 0.0F)) * 4 * kPi64 / (kSize * kSize) /
                   (kLattice * kLattice);
     }
   }
@@ -266,7 +264,7 @@ TEST(EnvironmentLightTest, PhotonsAndSampledLightsAgreeForSeveralSkies) {
       total += static_cast<double>(lit.lights->PdfDirectInfinite(
                    {}, EqualAreaDirection({(static_cast<float>(i) + 0.5F) / kLattice,
                                            (static_cast<float>(j) + 0.5F) / kLattice}))) *
-               4 * kPiD / (kLattice * kLattice);
+               4 * kPi64 / (kLattice * kLattice);
     }
   }
   EXPECT_NEAR(total, 1, 2e-3);

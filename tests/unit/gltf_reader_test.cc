@@ -1,7 +1,6 @@
 // What a glTF 2.0 file says arrives in the scene: places, faces, cameras, units of light, materials
 // and textures, in closed forms; and what is wrong in a file is refused in one sentence.
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -10,6 +9,7 @@
 
 #include "render/formats/mesh_placement.h"
 #include "render/image/image.h"
+#include "render/math/warp.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/texture.h"
 #include "tests/support/gltf_builder.h"
@@ -21,8 +21,6 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using Json = nlohmann::json;
-
-constexpr double kPiD = std::numbers::pi;
 
 std::string Said(const ParsedScene& parsed) {
   std::string all;
@@ -358,7 +356,7 @@ TEST(GltfReaderTest, CamerasLookAlongMinusZWithXToTheRight) {
   ExpectNear(camera.camera_to_world.Vector({0, 0, 1}), {-1, 0, 0});
   ExpectNear(camera.camera_to_world.Vector({0, 1, 0}), {0, 1, 0});
   ExpectNear(camera.camera_to_world.Vector({1, 0, 0}), {0, 0, -1});
-  EXPECT_NEAR(camera.fov_deg, 180 / kPiD, 1e-9);
+  EXPECT_NEAR(camera.fov_deg, 180 / kPi64, 1e-9);
 }
 
 TEST(GltfReaderTest, AnglesOfViewAreThoseOfTheImagesHeight) {
@@ -657,7 +655,7 @@ TEST(GltfReaderTest, TexturesAreTransformed) {
   };
   // The first example of the extension: the lower left quadrant, turned clockwise.
   const Texture turned =
-      texture_of({{"offset", {0, 1}}, {"rotation", kPiD / 2}, {"scale", {0.5, 0.5}}});
+      texture_of({{"offset", {0, 1}}, {"rotation", kPi64 / 2}, {"scale", {0.5, 0.5}}});
   expect(mapped(turned, 0, 0), {0, 1});
   expect(mapped(turned, 1, 0), {0, 0.5F});
   expect(mapped(turned, 0, 1), {0.5F, 1});
@@ -767,7 +765,7 @@ TEST(GltfReaderTest, TheSameSceneInPbrtHasTheSameImage) {
   };
   GltfBuilder builder;
   builder.AddCamera({{"translation", {0.5, 1, 4}}});
-  builder.json["cameras"][0]["perspective"]["yfov"] = 60 * kPiD / 180;
+  builder.json["cameras"][0]["perspective"]["yfov"] = 60 * kPi64 / 180;
   // What a left-handed camera has to the right is to the left in glTF: the image is mirrored.
   std::string pbrt =
       "Film \"rgb\" \"integer xresolution\" 1280 \"integer yresolution\" 720\n"

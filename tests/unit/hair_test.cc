@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <optional>
 #include <vector>
 
@@ -22,8 +21,6 @@
 
 namespace lucerna {
 namespace {
-
-constexpr double kPiD = std::numbers::pi;
 
 // theta: from the plane across the fibre. phi: around it, from the normal.
 Vec3 Direction(double theta, double phi) {
@@ -45,11 +42,11 @@ double OverSphere(const Function& function) {
   constexpr int kPhis = 181;
   double sum = 0;
   for (int i = 0; i < kThetas; ++i) {
-    const double theta = kPiD * ((i + 0.5) / kThetas - 0.5);
+    const double theta = kPi64 * ((i + 0.5) / kThetas - 0.5);
     for (int k = 0; k < kPhis; ++k)
-      sum += std::cos(theta) * function(Direction(theta, 2 * kPiD * (k + 0.5) / kPhis));
+      sum += std::cos(theta) * function(Direction(theta, 2 * kPi64 * (k + 0.5) / kPhis));
   }
-  return sum * kPiD / kThetas * 2 * kPiD / kPhis;
+  return sum * kPi64 / kThetas * 2 * kPi64 / kPhis;
 }
 
 const std::array<std::array<double, 2>, 5> kViews = {

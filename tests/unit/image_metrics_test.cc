@@ -12,7 +12,7 @@
 namespace lucerna {
 namespace {
 
-Image Gray(int width, int height, std::vector<float> pixels) {
+Image GrayImage(int width, int height, std::vector<float> pixels) {
   Image image;
   image.width = width;
   image.height = height;
@@ -28,7 +28,7 @@ ImageMetrics Compared(const Image& a, const Image& b, const MetricsOptions& opti
 
 TEST(ImageMetricsTest, WorkedByHand) {
   // Differences 1 and -2 against a reference of 1 and 4.
-  const ImageMetrics metrics = Compared(Gray(2, 1, {2, 2}), Gray(2, 1, {1, 4}));
+  const ImageMetrics metrics = Compared(GrayImage(2, 1, {2, 2}), GrayImage(2, 1, {1, 4}));
   EXPECT_EQ(metrics.pixels, 2U);
   EXPECT_DOUBLE_EQ(metrics.rmse, std::sqrt(2.5));
   // Mean luminance 2.5, of which a hundredth of the square.
@@ -40,8 +40,8 @@ TEST(ImageMetricsTest, WorkedByHand) {
 }
 
 TEST(ImageMetricsTest, ChannelsAreToldApart) {
-  Image image = Gray(1, 1, {1});
-  Image reference = Gray(1, 1, {1});
+  Image image = GrayImage(1, 1, {1});
+  Image reference = GrayImage(1, 1, {1});
   image.channels[2].pixels = {3};      // R
   reference.channels[0].pixels = {4};  // B
   const ImageMetrics metrics = Compared(image, reference);
@@ -51,7 +51,7 @@ TEST(ImageMetricsTest, ChannelsAreToldApart) {
 }
 
 TEST(ImageMetricsTest, EqualImagesAreAtDistanceZeroAlsoWhenBlack) {
-  const ImageMetrics metrics = Compared(Gray(2, 1, {0, 0}), Gray(2, 1, {0, 0}));
+  const ImageMetrics metrics = Compared(GrayImage(2, 1, {0, 0}), GrayImage(2, 1, {0, 0}));
   EXPECT_EQ(metrics.rmse, 0);
   EXPECT_EQ(metrics.rel_mse, 0);
   EXPECT_EQ(metrics.mean_ratio, 1);
@@ -59,12 +59,12 @@ TEST(ImageMetricsTest, EqualImagesAreAtDistanceZeroAlsoWhenBlack) {
 
 // A black reference has no relative error; the limit of ever darker ones is infinite.
 TEST(ImageMetricsTest, AnyErrorIsInfiniteRelativeToABlackReference) {
-  EXPECT_EQ(Compared(Gray(2, 1, {0, 1}), Gray(2, 1, {0, 0})).rel_mse, HUGE_VAL);
+  EXPECT_EQ(Compared(GrayImage(2, 1, {0, 1}), GrayImage(2, 1, {0, 0})).rel_mse, HUGE_VAL);
 }
 
 TEST(ImageMetricsTest, AFloorCanBeGiven) {
   const MetricsOptions options = {.floor = 0.01};
-  const ImageMetrics metrics = Compared(Gray(2, 1, {2, 2}), Gray(2, 1, {1, 4}), options);
+  const ImageMetrics metrics = Compared(GrayImage(2, 1, {2, 2}), GrayImage(2, 1, {1, 4}), options);
   EXPECT_DOUBLE_EQ(metrics.rel_mse, (1 / 1.01 + 4 / 16.01) / 2);
   EXPECT_EQ(metrics.floor, 0.01);
 }
@@ -85,7 +85,7 @@ TEST(ImageMetricsTest, LightTimesAnyFactorGivesTheSameRelativeError) {
       a[i] *= factor;
       b[i] *= factor;
     }
-    return Compared(Gray(64, 64, a), Gray(64, 64, b), {.trim_share = 0.001}).rel_mse;
+    return Compared(GrayImage(64, 64, a), GrayImage(64, 64, b), {.trim_share = 0.001}).rel_mse;
   };
   const double base = compared(1);
   EXPECT_GT(base, 0.01);
@@ -97,8 +97,8 @@ TEST(ImageMetricsTest, LightTimesAnyFactorGivesTheSameRelativeError) {
 }
 
 TEST(ImageMetricsTest, SizesMustAgreeUnlessToldOtherwise) {
-  const Image large = Gray(3, 2, {1, 2, 9, 3, 4, 9});
-  const Image small = Gray(2, 2, {1, 2, 3, 4});
+  const Image large = GrayImage(3, 2, {1, 2, 9, 3, 4, 9});
+  const Image small = GrayImage(2, 2, {1, 2, 3, 4});
   EXPECT_EQ(Compare(large, small).status().code(), absl::StatusCode::kInvalidArgument);
   const ImageMetrics cropped = Compared(large, small, {.fit = MetricsOptions::Fit::kCrop});
   EXPECT_EQ(cropped.pixels, 4U);
@@ -107,28 +107,30 @@ TEST(ImageMetricsTest, SizesMustAgreeUnlessToldOtherwise) {
 
 TEST(ImageMetricsTest, ScalingAveragesBoxesAndKeepsTheMean) {
   // 4 -> 2 columns, 2 -> 1 rows.
-  const Image large = Gray(4, 2, {1, 2, 3, 4, 5, 6, 7, 8});
-  EXPECT_EQ(Compared(large, Gray(2, 1, {3.5F, 5.5F}), {.fit = MetricsOptions::Fit::kScale}).rmse,
-            0);
+  const Image large = GrayImage(4, 2, {1, 2, 3, 4, 5, 6, 7, 8});
+  EXPECT_EQ(
+      Compared(large, GrayImage(2, 1, {3.5F, 5.5F}), {.fit = MetricsOptions::Fit::kScale}).rmse, 0);
   // 3 -> 2 columns: the middle one is shared.
-  const ImageMetrics shared =
-      Compared(Gray(3, 1, {3, 6, 12}), Gray(2, 1, {4, 10}), {.fit = MetricsOptions::Fit::kScale});
+  const ImageMetrics shared = Compared(GrayImage(3, 1, {3, 6, 12}), GrayImage(2, 1, {4, 10}),
+                                       {.fit = MetricsOptions::Fit::kScale});
   EXPECT_NEAR(shared.rmse, 0, 1e-12);
   // Each axis goes to the smaller of the two.
-  EXPECT_EQ(
-      Compared(Gray(2, 1, {2, 4}), Gray(1, 2, {1, 5}), {.fit = MetricsOptions::Fit::kScale}).pixels,
-      1U);
+  EXPECT_EQ(Compared(GrayImage(2, 1, {2, 4}), GrayImage(1, 2, {1, 5}),
+                     {.fit = MetricsOptions::Fit::kScale})
+                .pixels,
+            1U);
 }
 
 TEST(ImageMetricsTest, ClipsBothImagesFirst) {
-  const ImageMetrics metrics = Compared(Gray(2, 1, {100, 1}), Gray(2, 1, {7, 1}), {.clip = 5});
+  const ImageMetrics metrics =
+      Compared(GrayImage(2, 1, {100, 1}), GrayImage(2, 1, {7, 1}), {.clip = 5});
   EXPECT_EQ(metrics.rmse, 0);
   EXPECT_DOUBLE_EQ(metrics.mean_a, 3);
 }
 
 TEST(ImageMetricsTest, TrimsTheWorstPixels) {
-  const Image image = Gray(4, 1, {1, 1, 1, 50});
-  const Image reference = Gray(4, 1, {1, 1, 2, 1});
+  const Image image = GrayImage(4, 1, {1, 1, 1, 50});
+  const Image reference = GrayImage(4, 1, {1, 1, 2, 1});
   const ImageMetrics metrics = Compared(image, reference, {.trim_share = 0.25});
   EXPECT_EQ(metrics.pixels, 3U);
   // The floor is that of the whole reference: mean 5/4.
@@ -145,7 +147,7 @@ TEST(ImageMetricsTest, TellsTheErrorWithAndWithoutTheWorstPixelsWhateverIsAskedF
   const std::vector<float> reference(2000, 1);
   pixels[3] = 1e4F;
   pixels[77] = 1e3F;
-  const ImageMetrics metrics = Compared(Gray(50, 40, pixels), Gray(50, 40, reference));
+  const ImageMetrics metrics = Compared(GrayImage(50, 40, pixels), GrayImage(50, 40, reference));
   EXPECT_EQ(metrics.pixels, 2000U);
   EXPECT_NEAR(metrics.rel_mse_trimmed, 1 / 1.01, 1e-12);
   EXPECT_EQ(metrics.rel_mse_untrimmed, metrics.rel_mse);
@@ -153,34 +155,38 @@ TEST(ImageMetricsTest, TellsTheErrorWithAndWithoutTheWorstPixelsWhateverIsAskedF
 }
 
 TEST(ImageMetricsTest, LeavesOutWhatTheMaskBlackens) {
-  const Image mask = Gray(2, 1, {0, 0.5F});
-  const ImageMetrics metrics = Compared(Gray(2, 1, {9, 2}), Gray(2, 1, {1, 2}), {.mask = &mask});
+  const Image mask = GrayImage(2, 1, {0, 0.5F});
+  const ImageMetrics metrics =
+      Compared(GrayImage(2, 1, {9, 2}), GrayImage(2, 1, {1, 2}), {.mask = &mask});
   EXPECT_EQ(metrics.pixels, 1U);
   EXPECT_EQ(metrics.rmse, 0);
-  const Image small = Gray(1, 1, {1});
-  EXPECT_EQ(Compare(Gray(2, 1, {9, 2}), Gray(2, 1, {1, 2}), {.mask = &small}).status().code(),
-            absl::StatusCode::kInvalidArgument);
-  const Image nothing = Gray(2, 1, {0, 0});
-  EXPECT_EQ(Compare(Gray(2, 1, {9, 2}), Gray(2, 1, {1, 2}), {.mask = &nothing}).status().code(),
-            absl::StatusCode::kInvalidArgument);
+  const Image small = GrayImage(1, 1, {1});
+  EXPECT_EQ(
+      Compare(GrayImage(2, 1, {9, 2}), GrayImage(2, 1, {1, 2}), {.mask = &small}).status().code(),
+      absl::StatusCode::kInvalidArgument);
+  const Image nothing = GrayImage(2, 1, {0, 0});
+  EXPECT_EQ(
+      Compare(GrayImage(2, 1, {9, 2}), GrayImage(2, 1, {1, 2}), {.mask = &nothing}).status().code(),
+      absl::StatusCode::kInvalidArgument);
 }
 
 TEST(ImageMetricsTest, RefusesWhatIsNotANumberAndSaysWhere) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  const Status status = Compare(Gray(2, 1, {1, 1}), Gray(2, 1, {1, nan})).status();
+  const Status status = Compare(GrayImage(2, 1, {1, 1}), GrayImage(2, 1, {1, nan})).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_NE(std::string(status.message()).find("reference is not finite at pixel (1, 0)"),
             std::string::npos)
       << status;
   // An infinite pixel is refused also where clipping would hide it.
   const float inf = std::numeric_limits<float>::infinity();
-  EXPECT_FALSE(Compare(Gray(1, 1, {inf}), Gray(1, 1, {1}), {.clip = 5}).ok());
+  EXPECT_FALSE(Compare(GrayImage(1, 1, {inf}), GrayImage(1, 1, {1}), {.clip = 5}).ok());
 }
 
 TEST(ImageMetricsTest, RefusesAnImageWithoutColour) {
-  Image image = Gray(1, 1, {1});
+  Image image = GrayImage(1, 1, {1});
   image.channels.erase(image.channels.begin());
-  EXPECT_EQ(Compare(image, Gray(1, 1, {1})).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(Compare(image, GrayImage(1, 1, {1})).status().code(),
+            absl::StatusCode::kInvalidArgument);
 }
 
 }  // namespace

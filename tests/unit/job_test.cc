@@ -6,13 +6,10 @@
 #include "gtest/gtest.h"
 
 #include "render/estimate/rounds.h"
+#include "tests/support/steady_time.h"
 
 namespace lucerna {
 namespace {
-
-SteadyTime At(double s) {
-  return SteadyTime(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(s)));
-}
 
 TEST(JobCountersTest, NamesTheFirstDroppedPhotonsWhateverTheOrderOfBatches) {
   JobCounters forward;

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -17,8 +16,6 @@
 
 namespace lucerna {
 namespace {
-
-constexpr double kPiD = std::numbers::pi;
 
 struct Lit {
   explicit Lit(Scene s)
@@ -522,12 +519,12 @@ TEST(SampleEmissionTest, HasThePowerOfEachLightInClosedForm) {
   const auto power = [](const Scene& scene) {
     return static_cast<double>(Lit(scene).lights.TotalPower().g);
   };
-  EXPECT_NEAR(power(SphereLight()), 3 * kPiD * 4 * kPiD * 0.49, 1e-3);
-  EXPECT_NEAR(power(RingLight()), 3 * kPiD * kPiD * 0.75, 1e-4);
-  EXPECT_NEAR(power(TwoSidedLight()), 2 * 3 * kPiD * kPiD, 1e-4);
+  EXPECT_NEAR(power(SphereLight()), 3 * kPi64 * 4 * kPi64 * 0.49, 1e-3);
+  EXPECT_NEAR(power(RingLight()), 3 * kPi64 * kPi64 * 0.75, 1e-4);
+  EXPECT_NEAR(power(TwoSidedLight()), 2 * 3 * kPi64 * kPi64, 1e-4);
   Scene scene = BlackRoom();
   scene.point_lights.push_back({{}, Gray(2)});
-  EXPECT_NEAR(power(scene), 8 * kPiD, 1e-5);
+  EXPECT_NEAR(power(scene), 8 * kPi64, 1e-5);
   scene.point_lights.clear();
   // The integral of the intensity over the sphere, by midpoints.
   const SpotLight spot = {{}, {0, 0, 1}, Gray(4), 0.95F, 0.6F};
@@ -537,7 +534,7 @@ TEST(SampleEmissionTest, HasThePowerOfEachLightInClosedForm) {
   for (int i = 0; i < kSteps; ++i) {
     const double cosine = 0.6 + 0.4 * (i + 0.5) / kSteps;
     const double x = std::min(1.0, (cosine - 0.6) / 0.35);
-    expected += 4 * 2 * kPiD * x * x * (3 - 2 * x) * 0.4 / kSteps;
+    expected += 4 * 2 * kPi64 * x * x * (3 - 2 * x) * 0.4 / kSteps;
   }
   EXPECT_NEAR(power(scene), expected, 1e-4);
   double error = 0;
@@ -562,7 +559,7 @@ TEST(SampleEmissionTest, LeavesSurfacesByTheCosine) {
         },
         [&](Vec3 d) {
           const auto cosine = static_cast<double>(d.z);
-          return two_sided ? std::abs(cosine) / (2 * kPiD) : std::max(0.0, cosine) / kPiD;
+          return two_sided ? std::abs(cosine) / (2 * kPi64) : std::max(0.0, cosine) / kPi64;
         },
         200000, 70);
     EXPECT_GT(p_value, level) << two_sided;
@@ -591,7 +588,7 @@ TEST(SampleEmissionTest, FillsTheSceneFromInfinity) {
     squares += flux * flux / kPhotons;
   }
   // Both faces of the disk of radius 0.5.
-  const double expected = 2 * kPiD * (2 * kPiD * 0.25);
+  const double expected = 2 * kPi64 * (2 * kPi64 * 0.25);
   EXPECT_NEAR(through, expected, 4 * std::sqrt(squares / kPhotons));
 }
 

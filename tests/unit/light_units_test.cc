@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstring>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <vector>
 
@@ -14,6 +13,7 @@
 #include "render/geometry/intersector.h"
 #include "render/math/color_space.h"
 #include "render/math/rng.h"
+#include "render/math/warp.h"
 #include "render/transport/light.h"
 #include "render/transport/working_space.h"
 #include "tests/support/memory_files.h"
@@ -22,8 +22,6 @@ namespace lucerna {
 namespace {
 
 using ::testing::HasSubstr;
-
-constexpr double kPiD = std::numbers::pi;
 
 // Colours, rows from the top.
 std::string Pfm(int width, int height, float factor) {
@@ -51,8 +49,8 @@ ParsedScene Parse(const std::string& world) {
   return ReadScene(files, "s.pbrt");
 }
 
-struct Lit {
-  explicit Lit(const std::string& world) {
+struct LitWorld {
+  explicit LitWorld(const std::string& world) {
     const ParsedScene parsed = Parse(world);
     EXPECT_TRUE(parsed.ok()) << world << parsed.ToStatus();
     scene = std::make_unique<Scene>(InWorkingSpace(parsed.scene));
@@ -99,16 +97,16 @@ TEST(LightUnitsTest, PowerIsThatOfTheLight) {
       {area(even + "\"float power\" 7", kShapes), 7},
       {area(picture + "\"float power\" 7", kShapes), 7},
       {area(picture + "\"float power\" 7 \"bool twosided\" true \"float scale\" 2", kShapes), 14},
-      {area(picture, kShapes), 6 * kPiD * (3.05 * (0.2126 + 0.5 * 0.7152) + 0.2 * 0.0722)},
+      {area(picture, kShapes), 6 * kPi64 * (3.05 * (0.2126 + 0.5 * 0.7152) + 0.2 * 0.0722)},
   };
   for (const Case& c : cases) {
-    EXPECT_NEAR(Lit(c.world).Power(), c.expected, 1e-3 * c.expected) << c.world;
+    EXPECT_NEAR(LitWorld(c.world).Power(), c.expected, 1e-3 * c.expected) << c.world;
   }
 }
 
 // On a plane that looks up, near the origin.
 double IlluminanceOf(const std::string& world) {
-  const Lit lit(world);
+  const LitWorld lit(world);
   KeyedRng rng(3);
   constexpr int kSamples = 200'000;
   double sum = 0;

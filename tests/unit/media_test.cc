@@ -3,7 +3,6 @@
 #include "render/transport/media.h"
 
 #include <cmath>
-#include <numbers>
 #include <set>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "render/base/parallel.h"
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
+#include "render/math/warp.h"
 #include "tests/support/gather_sums.h"
 #include "tests/support/test_scenes.h"
 #include "worker/photon_grid.h"
@@ -19,8 +19,6 @@
 
 namespace lucerna {
 namespace {
-
-constexpr double kPiD = std::numbers::pi;
 
 TEST(PhaseFunctionTest, IsADensityWithTheMeanCosineThatItNames) {
   for (const float g : {-0.7F, 0.0F, 0.3F, 0.9F}) {
@@ -30,7 +28,7 @@ TEST(PhaseFunctionTest, IsADensityWithTheMeanCosineThatItNames) {
     for (int i = 0; i < kSteps; ++i) {
       const double cosine = -1 + 2 * (i + 0.5) / kSteps;
       const double density =
-          2 * kPiD * static_cast<double>(PhaseHenyeyGreenstein(static_cast<float>(cosine), g));
+          2 * kPi64 * static_cast<double>(PhaseHenyeyGreenstein(static_cast<float>(cosine), g));
       total += density * 2 / kSteps;
       mean += density * cosine * 2 / kSteps;
     }
@@ -59,7 +57,7 @@ TEST(PhaseFunctionTest, IsSampledInProportionToItsDensity) {
       double expected = 0;
       for (int i = 0; i < kSteps; ++i) {
         const double cosine = -1 + 2.0 * (bin + (i + 0.5) / kSteps) / kBins;
-        expected += 2 * kPiD *
+        expected += 2 * kPi64 *
                     static_cast<double>(PhaseHenyeyGreenstein(static_cast<float>(cosine), g)) * 2 /
                     kBins / kSteps;
       }

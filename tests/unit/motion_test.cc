@@ -57,7 +57,7 @@ Scene At(const Scene& scene, double time) {
   return moved;
 }
 
-void ExpectNear(Vec3 a, Vec3 b) {
+void ExpectClose(Vec3 a, Vec3 b) {
   EXPECT_LT(Length(a - b), 2e-6F) << a.x << " " << a.y << " " << a.z << ", not " << b.x << " "
                                   << b.y << " " << b.z;
 }
@@ -76,9 +76,9 @@ TEST(MotionTest, StartsAndEndsWhereTheTwoTransformsSay) {
       kSphere);
   ASSERT_EQ(scene.motion.of_shapes.size(), 1U);
   EXPECT_EQ(scene.spheres.at(0).center, Vec3(1, 2, 3));
-  ExpectNear(CenterAt(scene, 0), {1, 2, 3});
-  ExpectNear(CenterAt(scene, 0.25), {2, 1.5, 3});
-  ExpectNear(CenterAt(scene, 1), {5, 0, 3});
+  ExpectClose(CenterAt(scene, 0), {1, 2, 3});
+  ExpectClose(CenterAt(scene, 0.25), {2, 1.5, 3});
+  ExpectClose(CenterAt(scene, 1), {5, 0, 3});
 }
 
 TEST(MotionTest, EndsWithItsScope) {
@@ -97,7 +97,7 @@ TEST(MotionTest, IdentityAndTransformChangeWhatIsActive) {
                           "ActiveTransform StartTime Transform [1 0 0 0 0 1 0 0 0 0 1 0 "
                           "0 6 0 1] " +
                           kSphere);
-  ExpectNear(CenterAt(one, 0.5), {2, 3, 0});
+  ExpectClose(CenterAt(one, 0.5), {2, 3, 0});
   const Scene other = World(kToRight + "ActiveTransform EndTime Identity " + kSphere);
   EXPECT_FALSE(other.motion.Moves());
 }
@@ -108,21 +108,21 @@ TEST(MotionTest, CoordinateSystemsMove) {
                             "CoordinateSystem \"c\" AttributeEnd ActiveTransform StartTime "
                             "CoordSysTransform \"c\" " +
                             kSphere);
-  ExpectNear(CenterAt(scene, 0.5), {2, 0, 0});
+  ExpectClose(CenterAt(scene, 0.5), {2, 0, 0});
 }
 
 TEST(MotionTest, WorldBeginStandsStill) {
   const Scene scene = Read("ActiveTransform EndTime Translate 0 0 -2 " + kCamera, kSphere);
   EXPECT_EQ(scene.spheres.at(0).traits.motion, kNoMotion);
   ASSERT_TRUE(scene.motion.of_camera.has_value());
-  ExpectNear(At(scene, 0.5).camera.camera_to_world.Point({}), {0, 0, 1});
+  ExpectClose(At(scene, 0.5).camera.camera_to_world.Point({}), {0, 0, 1});
   const Scene after =
       Read("ActiveTransform EndTime Translate 0 0 -2 " + kCamera, "Translate 1 0 0 " + kSphere);
   EXPECT_EQ(after.spheres.at(0).traits.motion, kNoMotion) << "both are active after WorldBegin";
   // The camera's space moves with it.
   const Scene with = Read("ActiveTransform EndTime Translate 0 0 -2 " + kCamera,
                           "CoordSysTransform \"camera\" " + kSphere);
-  ExpectNear(CenterAt(with, 0.5), {0, 0, 1});
+  ExpectClose(CenterAt(with, 0.5), {0, 0, 1});
 }
 
 TEST(MotionTest, TakesItsOwnTimes) {
@@ -130,9 +130,9 @@ TEST(MotionTest, TakesItsOwnTimes) {
       "TransformTimes 2 6 Camera \"perspective\" \"float shutteropen\" 3 \"float shutterclose\" 4";
   const Scene scene = Read(shutter, kToRight + kSphere);
   // It stands where it is when the shutter opens.
-  ExpectNear(scene.spheres.at(0).center, {1, 0, 0});
-  ExpectNear(CenterAt(scene, 3.5), {1.5, 0, 0});
-  ExpectNear(CenterAt(scene, 4), {2, 0, 0});
+  ExpectClose(scene.spheres.at(0).center, {1, 0, 0});
+  ExpectClose(CenterAt(scene, 3.5), {1.5, 0, 0});
+  ExpectClose(CenterAt(scene, 4), {2, 0, 0});
   EXPECT_EQ(scene.film.exposure, 1);
   // What moves before the shutter opens or after it closes stands still.
   for (const std::string times : {"TransformTimes 2 3 ", "TransformTimes 4 5 "}) {
@@ -140,7 +140,7 @@ TEST(MotionTest, TakesItsOwnTimes) {
         Read(times + "Camera \"perspective\" \"float shutteropen\" 3 \"float shutterclose\" 4",
              kToRight + kSphere);
     EXPECT_FALSE(still.motion.Moves()) << times;
-    ExpectNear(still.spheres.at(0).center, {times == "TransformTimes 2 3 " ? 4.0F : 0.0F, 0, 0});
+    ExpectClose(still.spheres.at(0).center, {times == "TransformTimes 2 3 " ? 4.0F : 0.0F, 0, 0});
   }
 }
 
@@ -206,9 +206,9 @@ TEST(MotionTest, InstancesMoveAndTheirPartsWithin) {
   ASSERT_EQ(scene.spheres.size(), 2U);
   const Scene half = At(scene, 0.5);
   // Scaled by 2, turned: (1, 1, 0) goes to (-2, 2, 0).
-  ExpectNear(half.spheres[0].center, {-2, 2, 0});
+  ExpectClose(half.spheres[0].center, {-2, 2, 0});
   EXPECT_NEAR(half.spheres[0].radius, 2, 1e-6);
-  ExpectNear(half.spheres[1].center, {});
+  ExpectClose(half.spheres[1].center, {});
   EXPECT_NEAR(half.spheres[1].radius, 2, 1e-6);
   // Where no instance stands, nothing moves.
   EXPECT_FALSE(World(object).motion.Moves());
@@ -458,7 +458,7 @@ TEST(MotionTest, SensorsMeasureAsTheShutterOpens) {
   const ParsedScene parsed = ReadScene(all, "p.ply");
   ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
   EXPECT_FALSE(parsed.scene.motion.Moves());
-  ExpectNear(parsed.scene.spheres.at(0).center, {2, 0, 0});
+  ExpectClose(parsed.scene.spheres.at(0).center, {2, 0, 0});
   EXPECT_EQ(parsed.scene.spheres.at(0).traits.motion, kNoMotion);
 }
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr const char* kHead =
     "Film \"rgb\" \"integer xresolution\" [64] \"integer yresolution\" [64]\n";
-constexpr const char* kCamera = "Camera \"perspective\" \"float fov\" [40]\n";
+constexpr const char* kNarrowCamera = "Camera \"perspective\" \"float fov\" [40]\n";
 constexpr const char* kFloor =
     "Shape \"trianglemesh\" \"point3 P\" [-1 -1 4  1 -1 4  1 -1 6  -1 -1 6]\n"
     "  \"integer indices\" [0 1 2  0 2 3]\n";
@@ -53,7 +53,7 @@ Names WithAlways(Names names) {
 }
 
 TEST(SceneNeedsTest, AFloorUnderAPointLightNeedsNextToNothing) {
-  const SceneNeeds needs = NeedsWith(Parsed(kCamera, ""));
+  const SceneNeeds needs = NeedsWith(Parsed(kNarrowCamera, ""));
   EXPECT_EQ(Used(needs), (WithAlways({"delta-lights"})));
   EXPECT_EQ(needs.eye_sample_sets(), 64);
 }
@@ -97,42 +97,42 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Feature{
             "glass_sphere",
-            kCamera,
+            kNarrowCamera,
             "Material \"dielectric\"\nTranslate 0 0 5\nShape \"sphere\" \"float radius\" [.3]\n",
             {"specular-surfaces", "round-shapes", "fresh-eye-paths"}},
         Feature{"diffuse_sphere",
-                kCamera,
+                kNarrowCamera,
                 "Translate 0 0 5\nShape \"sphere\" \"float radius\" [.3]\n",
                 {"round-shapes", "photon-normals"}},
         Feature{"texture",
-                kCamera,
+                kNarrowCamera,
                 "Texture \"squares\" \"spectrum\" \"checkerboard\"\n"
                 "Material \"diffuse\" \"texture reflectance\" \"squares\"\n"
                 "Shape \"trianglemesh\" \"point3 P\" [-1 0 4  1 0 4  1 0 6]\n",
                 {"textures", "photon-normals"}},
         Feature{"texture_on_nothing",
-                kCamera,
+                kNarrowCamera,
                 "Texture \"squares\" \"spectrum\" \"checkerboard\"\n"
                 "Material \"diffuse\" \"texture reflectance\" \"squares\"\n",
                 {}},
         Feature{"rough_metal",
-                kCamera,
+                kNarrowCamera,
                 "Material \"conductor\" \"float roughness\" [.4] \"bool remaproughness\" false\n"
                 "Shape \"trianglemesh\" \"point3 P\" [-1 0 4  1 0 4  1 0 6]\n",
                 {"glossy-hitpoints", "photon-directions", "photon-normals"}},
         Feature{"vertex_normals",
-                kCamera,
+                kNarrowCamera,
                 "Shape \"trianglemesh\" \"point3 P\" [-1 0 4  1 0 4  1 0 6]\n"
                 "  \"normal N\" [0 1 0  0 1 0  0 .8 .6]\n",
                 {"shading-normals", "photon-normals"}},
         Feature{"normals_of_flat_triangles",
-                kCamera,
+                kNarrowCamera,
                 "Shape \"trianglemesh\" \"point3 P\" [-1 0 4  1 0 4  1 0 6]\n"
                 "  \"normal N\" [0 1 0  0 -1 0  2e-7 1 0]\n",
                 {"photon-normals"}},
-        Feature{"sky", kCamera, "LightSource \"infinite\"\n", {"environment"}},
+        Feature{"sky", kNarrowCamera, "LightSource \"infinite\"\n", {"environment"}},
         Feature{"light",
-                kCamera,
+                kNarrowCamera,
                 "AreaLightSource \"diffuse\"\n"
                 "Shape \"trianglemesh\" \"point3 P\" [-1 3 4  1 3 4  1 3 6]\n",
                 {"area-lights", "photon-normals"}},
@@ -145,13 +145,14 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(SceneNeedsTest, FrequencyPhotonsBringOnlyTheirParts) {
   RenderOverrides overrides;
   overrides.radius_controller = RadiusControllerKind::kFrequencyMse;
-  EXPECT_EQ(Used(NeedsWith(Parsed(kCamera, ""), overrides)),
+  EXPECT_EQ(Used(NeedsWith(Parsed(kNarrowCamera, ""), overrides)),
             (WithAlways({"delta-lights", "frequency-photons", "occluder-edges"})));
-  EXPECT_EQ(Used(NeedsWith(Parsed(kCamera, "Translate 0 0 5\nShape \"sphere\"\n"), overrides)),
-            (WithAlways({"delta-lights", "frequency-photons", "occluder-edges", "curvature",
-                         "round-shapes", "photon-normals"})));
   EXPECT_EQ(
-      Used(NeedsWith(Parsed(kCamera,
+      Used(NeedsWith(Parsed(kNarrowCamera, "Translate 0 0 5\nShape \"sphere\"\n"), overrides)),
+      (WithAlways({"delta-lights", "frequency-photons", "occluder-edges", "curvature",
+                   "round-shapes", "photon-normals"})));
+  EXPECT_EQ(
+      Used(NeedsWith(Parsed(kNarrowCamera,
                             "Material \"dielectric\"\nTranslate 0 0 5\n"
                             "Shape \"sphere\" \"float radius\" [.3]\n"),
                      overrides)),
@@ -160,14 +161,14 @@ TEST(SceneNeedsTest, FrequencyPhotonsBringOnlyTheirParts) {
 }
 
 TEST(SceneNeedsTest, OnlyMirrorsNeedNoPhotons) {
-  Scene scene = Parsed(kCamera, "");
+  Scene scene = Parsed(kNarrowCamera, "");
   for (Material& material : scene.materials)
     material = ConductorMaterial({1, 1, 1}, {3, 3, 3}, 0, 0);
   EXPECT_FALSE(NeedsWith(scene).Uses(Part::kPhotons));
 }
 
 TEST(SceneNeedsTest, FacesOfLightsThatShineOnNothingAreCounted) {
-  Scene scene = Parsed(kCamera, "");
+  Scene scene = Parsed(kNarrowCamera, "");
   EXPECT_EQ(NeedsWith(scene).ReasonOf(Part::kUnreachableLights),
             "every light may reach what the camera sees");
   const std::int32_t light = AddAreaLight(scene, 1);
@@ -184,7 +185,7 @@ TEST(SceneNeedsTest, OneFloorNeedsNoNormalsOfPhotons) {
   const auto needs_normals = [](Scene scene) {
     return NeedsWith(scene).Uses(Part::kPhotonNormals);
   };
-  const Scene floor = Parsed(kCamera, "");
+  const Scene floor = Parsed(kNarrowCamera, "");
   EXPECT_FALSE(needs_normals(floor));
   Scene with_glass = floor;
   const std::int32_t glass = AddMaterial(with_glass, DielectricMaterial(1.5F));
@@ -213,7 +214,7 @@ TEST(SceneNeedsTest, OneFloorNeedsNoNormalsOfPhotons) {
 
 // A light behind closed walls sends nothing, and one inside glass is not sampled.
 TEST(SceneNeedsTest, LightsThatAreSeparatedOrEnclosedAreLeftOut) {
-  Scene scene = Parsed(kCamera, "");
+  Scene scene = Parsed(kNarrowCamera, "");
   AddBox(scene, {5, 0, 5}, {7, 2, 7}, 0);
   const std::int32_t light = AddAreaLight(scene, 1);
   AddSphere(scene, {6, 1, 6}, 0.2F, 0, light);
@@ -260,7 +261,7 @@ TEST(SceneNeedsTest, EverythingIsAllThatCanBeForced) {
   overrides.use_everything = true;
   overrides.radius_controller = RadiusControllerKind::kFrequencyMse;
   Names left_out;
-  const SceneNeeds needs = NeedsWith(Parsed(kCamera, ""), overrides);
+  const SceneNeeds needs = NeedsWith(Parsed(kNarrowCamera, ""), overrides);
   for (const Part part : AllParts()) {
     if (!needs.Uses(part)) left_out.insert(std::string(NameOf(part)));
   }
@@ -276,7 +277,7 @@ TEST(SceneNeedsTest, CausticPhotonsAreForNarrowSurfacesBehindSmoothOnes) {
       "Material \"conductor\" \"float roughness\" [.3] \"bool remaproughness\" [false]\n";
   const std::string glass = "Material \"dielectric\"\n";
   const auto uses = [&](const std::string& world) {
-    return NeedsWith(Parsed(kCamera, world)).Uses(Part::kCausticHitpoints);
+    return NeedsWith(Parsed(kNarrowCamera, world)).Uses(Part::kCausticHitpoints);
   };
   EXPECT_TRUE(uses(narrow + kFloor + glass + kFloor));
   EXPECT_FALSE(uses(wide + kFloor + glass + kFloor));
@@ -306,7 +307,7 @@ TEST(SceneNeedsTest, CausticPhotonsAreForLightsThatRaysMissOrFindByChance) {
 }
 
 TEST(SceneNeedsTest, SetsOfEyePathsMustFit) {
-  const Scene scene = Parsed(kCamera, "");
+  const Scene scene = Parsed(kNarrowCamera, "");
   RenderOverrides overrides;
   overrides.width = 1920;
   overrides.height = 1080;

@@ -6,21 +6,16 @@
 
 #include "render/formats/read_scene.h"
 #include "render/math/color_space.h"
-#include "tests/support/memory_files.h"
+#include "tests/support/pbrt_text.h"
 
 namespace lucerna {
 namespace {
 
 using ::testing::HasSubstr;
 
-ParsedScene Parse(const std::string& world) {
-  MemoryFiles files({{"s.pbrt", "Camera \"perspective\" WorldBegin\n" + world}});
-  return ReadScene(files, "s.pbrt");
-}
-
 // Of the last point light.
 Rgb IntensityOf(const std::string& world) {
-  const ParsedScene parsed = Parse(world);
+  const ParsedScene parsed = ParseWorld(world);
   EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
   EXPECT_FALSE(parsed.scene.point_lights.empty());
   return parsed.scene.point_lights.back().intensity;
@@ -54,7 +49,7 @@ TEST(PbrtColorSpaceTest, PrimariesBecomeThoseOfRec709) {
 }
 
 TEST(PbrtColorSpaceTest, ReflectancesAreNeverAboveOne) {
-  const ParsedScene parsed = Parse(
+  const ParsedScene parsed = ParseWorld(
       "ColorSpace \"rec2020\" Material \"diffuse\" \"rgb reflectance\" [1 0 0] Shape \"sphere\"");
   ASSERT_TRUE(parsed.ok()) << parsed.ToStatus();
   const Rgb color = parsed.scene.materials.back().reflectance;
@@ -72,7 +67,7 @@ TEST(PbrtColorSpaceTest, BelongsToTheGraphicsState) {
 }
 
 TEST(PbrtColorSpaceTest, AnotherOneIsAnError) {
-  const ParsedScene parsed = Parse("ColorSpace \"cmyk\"");
+  const ParsedScene parsed = ParseWorld("ColorSpace \"cmyk\"");
   EXPECT_FALSE(parsed.ok());
   EXPECT_THAT(parsed.diagnostics.front().ToString(),
               HasSubstr("there is no colour space \"cmyk\"; there are srgb, rec2020, dci-p3 and "
@@ -85,12 +80,12 @@ TEST(PbrtOptionTest, ANameAndAValueAreRead) {
         "Option \"rendercoordsys\" \"world\"", "Option \"bool disablepixeljitter\" true"}) {
     SCOPED_TRACE(option);
     const ParsedScene parsed =
-        Parse(std::string(option) + " Shape \"sphere\" LightSource \"point\"");
+        ParseWorld(std::string(option) + " Shape \"sphere\" LightSource \"point\"");
     EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
     EXPECT_EQ(parsed.scene.point_lights.size(), 1U);
     EXPECT_THAT(parsed.diagnostics.front().ToString(), HasSubstr("is ignored"));
   }
-  EXPECT_FALSE(Parse("Option \"x\"").ok());
+  EXPECT_FALSE(ParseWorld("Option \"x\"").ok());
 }
 
 }  // namespace

@@ -17,30 +17,13 @@
 #include "render/scene/render_settings.h"
 #include "render/transport/material_at.h"
 #include "render/transport/working_space.h"
-#include "tests/support/memory_files.h"
+#include "tests/support/pbrt_text.h"
 
 namespace lucerna {
 namespace {
 
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-ParsedScene Parse(const std::string& world, std::map<std::string, std::string> others) {
-  others["s.pbrt"] = "Camera \"perspective\" WorldBegin\n" + world;
-  MemoryFiles files(std::move(others));
-  return ReadScene(files, "s.pbrt");
-}
-Scene World(const std::string& world, std::map<std::string, std::string> others = {}) {
-  const ParsedScene parsed = Parse(world, std::move(others));
-  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
-  return parsed.scene;
-}
-std::string Said(const std::string& world) {
-  std::string all;
-  for (const Diagnostic& diagnostic : Parse(world, {}).diagnostics)
-    all += diagnostic.ToString() + "\n";
-  return all;
-}
 
 // Of numbers, in a row.
 std::string Pfm(const std::vector<float>& values, int channels = 1) {
@@ -72,24 +55,25 @@ constexpr const char* kPlanar =
 
 TEST(PbrtMaterialsTest, RoughnessIsLookedUpBeforeItIsRemapped) {
   const std::string dielectric = "Material \"dielectric\" \"texture roughness\" \"r\" ";
-  const Material remapped = MetOnSphere(World(kPlanar + dielectric + "Shape \"sphere\""));
+  const Material remapped = MetOnSphere(ReadWorld(kPlanar + dielectric + "Shape \"sphere\""));
   // At x = 0.3, z = 0.4: 0.3 + 0.5 * 0.4.
   EXPECT_NEAR(remapped.alpha_u, std::sqrt(0.5F), 1e-5F);
   EXPECT_EQ(remapped.alpha_u, remapped.alpha_v);
-  const Material plain =
-      MetOnSphere(World(kPlanar + dielectric + "\"bool remaproughness\" false Shape \"sphere\""));
+  const Material plain = MetOnSphere(
+      ReadWorld(kPlanar + dielectric + "\"bool remaproughness\" false Shape \"sphere\""));
   EXPECT_NEAR(plain.alpha_u, 0.5F, 1e-5F);
   const Material stretched = MetOnSphere(
-      World(std::string(kPlanar) + "Material \"conductor\" \"texture uroughness\" \"r\" "
-                                   "\"float vroughness\" 0.04 Shape \"sphere\""));
+      ReadWorld(std::string(kPlanar) + "Material \"conductor\" \"texture uroughness\" \"r\" "
+                                       "\"float vroughness\" 0.04 Shape \"sphere\""));
   EXPECT_NEAR(stretched.alpha_u, std::sqrt(0.5F), 1e-5F);
   EXPECT_NEAR(stretched.alpha_v, 0.2F, 1e-6F);
 }
 
 // A texture in space stays where it is when the scene's unit is chosen.
 TEST(PbrtMaterialsTest, TexturesInSpaceKeepTheirPlaceInAnyUnit) {
-  const Scene scene = World("Scale 1e9 1e9 1e9 " + std::string(kPlanar) +
-                            "Material \"dielectric\" \"texture roughness\" \"r\" Shape \"sphere\"");
+  const Scene scene =
+      ReadWorld("Scale 1e9 1e9 1e9 " + std::string(kPlanar) +
+                "Material \"dielectric\" \"texture roughness\" \"r\" Shape \"sphere\"");
   ASSERT_NE(scene.unit, 1);
   const auto size = static_cast<float>(1e9 / scene.unit);
   EXPECT_NEAR(MetOnSphere(scene, Vec3{0.3F, -5, 0.4F} * size).alpha_u, std::sqrt(0.5F), 1e-5F);
@@ -100,16 +84,16 @@ TEST(PbrtMaterialsTest, ATextureOfRoughnessDecidesByItsRange) {
   const std::string picture =
       "Texture \"r\" \"float\" \"imagemap\" \"string filename\" \"r.pfm\"\n"
       "Material \"conductor\" \"texture roughness\" \"r\" Shape \"sphere\"";
-  const Material patchy = World(picture, {{"r.pfm", Pfm({0, 0.25F})}}).materials[1];
+  const Material patchy = ReadWorld(picture, {{"r.pfm", Pfm({0, 0.25F})}}).materials[1];
   EXPECT_EQ(patchy.alpha_u, 0.5F);
   EXPECT_FALSE(IsSmooth(patchy));
   EXPECT_TRUE(ScattersSmoothly(patchy));
   EXPECT_TRUE(GathersCaustics(patchy));
-  const Material rough = World(picture, {{"r.pfm", Pfm({0.09F, 0.25F})}}).materials[1];
+  const Material rough = ReadWorld(picture, {{"r.pfm", Pfm({0.09F, 0.25F})}}).materials[1];
   EXPECT_FALSE(ScattersSmoothly(rough));
   EXPECT_FALSE(Gathers(rough));
   // A picture of one number is that number: nothing is looked up.
-  const Scene even = World(picture, {{"r.pfm", Pfm({0.25F, 0.25F})}});
+  const Scene even = ReadWorld(picture, {{"r.pfm", Pfm({0.25F, 0.25F})}});
   EXPECT_FALSE(even.materials[1].DependsOnPlace());
   EXPECT_EQ(even.materials[1].alpha_u, 0.5F);
   EXPECT_TRUE(Gathers(even.materials[1]));
@@ -117,9 +101,9 @@ TEST(PbrtMaterialsTest, ATextureOfRoughnessDecidesByItsRange) {
 
 TEST(PbrtMaterialsTest, ACoatIsFittedToItsRoughness) {
   const Scene textured =
-      World(std::string(kPlanar) +
-            "Texture \"small\" \"float\" \"scale\" \"texture tex\" \"r\" \"float scale\" 0.32\n"
-            "Material \"coateddiffuse\" \"texture roughness\" \"small\" Shape \"sphere\"");
+      ReadWorld(std::string(kPlanar) +
+                "Texture \"small\" \"float\" \"scale\" \"texture tex\" \"r\" \"float scale\" 0.32\n"
+                "Material \"coateddiffuse\" \"texture roughness\" \"small\" Shape \"sphere\"");
   const Material here = MetOnSphere(textured);
   EXPECT_NEAR(here.alpha_u, 0.4F, 1e-5F);
   ASSERT_NE(here.coat, nullptr);
@@ -133,9 +117,9 @@ TEST(PbrtMaterialsTest, ACoatedMetalMayHaveATextureForEachWidth) {
       "Texture \"u\" \"float\" \"scale\" \"texture tex\" \"r\" \"float scale\" 0.32\n"
       "Texture \"v\" \"float\" \"scale\" \"texture tex\" \"r\" \"float scale\" 0.08\n";
   for (const std::string part : {"conductor", "interface"}) {
-    const Material here = MetOnSphere(World(textures + "Material \"coatedconductor\" \"texture " +
-                                            part + ".uroughness\" \"u\" \"texture " + part +
-                                            ".vroughness\" \"v\" Shape \"sphere\""));
+    const Material here = MetOnSphere(ReadWorld(
+        textures + "Material \"coatedconductor\" \"texture " + part +
+        ".uroughness\" \"u\" \"texture " + part + ".vroughness\" \"v\" Shape \"sphere\""));
     const bool is_base = part == "conductor";
     // Roots of half of the scales.
     EXPECT_NEAR(is_base ? here.base_alpha_u : here.alpha_u, 0.4F, 1e-5F);
@@ -172,9 +156,9 @@ std::map<Material::Kind, double> SharesOf(const Scene& rec709) {
 
 // Five standard errors of 10,000 draws: 0.025.
 TEST(PbrtMaterialsTest, AMixIsOneOfItsMaterialsForEachRay) {
-  const Scene scene = World(std::string(kTwo) +
-                            "Material \"mix\" \"string materials\" [ \"a\" \"b\" ] "
-                            "\"float amount\" 0.3 Shape \"sphere\"");
+  const Scene scene = ReadWorld(std::string(kTwo) +
+                                "Material \"mix\" \"string materials\" [ \"a\" \"b\" ] "
+                                "\"float amount\" 0.3 Shape \"sphere\"");
   const auto shares = SharesOf(scene);
   EXPECT_NEAR(shares.at(Material::Kind::kDiffuse), 0.7, 0.025);
   EXPECT_NEAR(shares.at(Material::Kind::kConductor), 0.3, 0.025);
@@ -189,10 +173,10 @@ TEST(PbrtMaterialsTest, AMixIsOneOfItsMaterialsForEachRay) {
 // Deposits of a mix are not weighed by one of its materials: each hitpoint does that by its own.
 TEST(PbrtMaterialsTest, MaterialsOfAMixDoNotWeighPhotons) {
   const Scene scene =
-      World(std::string(kTwo) +
-            "MakeNamedMaterial \"c\" \"string type\" \"coateddiffuse\"\n"
-            "Material \"mix\" \"string materials\" [ \"a\" \"c\" ] Shape \"sphere\"\n"
-            "NamedMaterial \"c\" Shape \"sphere\"");
+      ReadWorld(std::string(kTwo) +
+                "MakeNamedMaterial \"c\" \"string type\" \"coateddiffuse\"\n"
+                "Material \"mix\" \"string materials\" [ \"a\" \"c\" ] Shape \"sphere\"\n"
+                "NamedMaterial \"c\" Shape \"sphere\"");
   const auto properties_of = [&](std::int32_t material, Parts part) {
     MaterialNumbers numbers = scene.materials[static_cast<std::size_t>(material)];
     numbers.parts = part;
@@ -212,12 +196,12 @@ TEST(PbrtMaterialsTest, MaterialsOfAMixDoNotWeighPhotons) {
 }
 
 TEST(PbrtMaterialsTest, MixesOfMixesMultiplyTheirShares) {
-  const auto shares = SharesOf(
-      World(std::string(kTwo) +
-            "MakeNamedMaterial \"c\" \"string type\" \"mix\" \"string materials\" [ \"a\" \"b\" ]\n"
-            "MakeNamedMaterial \"d\" \"string type\" \"dielectric\"\n"
-            "Material \"mix\" \"string materials\" [ \"c\" \"d\" ] \"float amount\" 0.2 "
-            "Shape \"sphere\""));
+  const auto shares = SharesOf(ReadWorld(
+      std::string(kTwo) +
+      "MakeNamedMaterial \"c\" \"string type\" \"mix\" \"string materials\" [ \"a\" \"b\" ]\n"
+      "MakeNamedMaterial \"d\" \"string type\" \"dielectric\"\n"
+      "Material \"mix\" \"string materials\" [ \"c\" \"d\" ] \"float amount\" 0.2 "
+      "Shape \"sphere\""));
   EXPECT_NEAR(shares.at(Material::Kind::kDiffuse), 0.4, 0.025);
   EXPECT_NEAR(shares.at(Material::Kind::kConductor), 0.4, 0.025);
   EXPECT_NEAR(shares.at(Material::Kind::kDielectric), 0.2, 0.025);
@@ -225,17 +209,17 @@ TEST(PbrtMaterialsTest, MixesOfMixesMultiplyTheirShares) {
 
 TEST(PbrtMaterialsTest, AMixFollowsATexture) {
   const auto shares = SharesOf(
-      World(std::string(kTwo) + kPlanar +
-            "Material \"mix\" \"string materials\" [ \"a\" \"b\" ] \"texture amount\" \"r\" "
-            "Shape \"sphere\""));
+      ReadWorld(std::string(kTwo) + kPlanar +
+                "Material \"mix\" \"string materials\" [ \"a\" \"b\" ] \"texture amount\" \"r\" "
+                "Shape \"sphere\""));
   // x + z / 2 over x from -0.5 to 0.5 at z = 0.1, held at 0.
   EXPECT_NEAR(shares.at(Material::Kind::kConductor), 0.55 * 0.55 / 2, 0.025);
 }
 
 TEST(PbrtMaterialsTest, MaterialsOfAMixAreInUse) {
-  const Scene scene = World(std::string(kTwo) +
-                            "Material \"mix\" \"string materials\" [ \"a\" \"b\" ] Shape "
-                            "\"sphere\" LightSource \"point\"");
+  const Scene scene = ReadWorld(std::string(kTwo) +
+                                "Material \"mix\" \"string materials\" [ \"a\" \"b\" ] Shape "
+                                "\"sphere\" LightSource \"point\"");
   const SceneNeeds needs = NeedsOf(scene, RenderSettings());
   EXPECT_TRUE(needs.Uses(Part::kSpecular));
   EXPECT_TRUE(needs.Uses(Part::kTextures));
@@ -245,19 +229,19 @@ TEST(PbrtMaterialsTest, MaterialsOfAMixAreInUse) {
 
 TEST(PbrtMaterialsTest, SaysWhatIsWrongWithAMix) {
   const std::string two(kTwo);
-  EXPECT_THAT(Said("Material \"mix\""), HasSubstr("needs \"string materials\""));
-  EXPECT_THAT(Said(two + "Material \"mix\" \"string materials\" [ \"a\" ]"),
+  EXPECT_THAT(SaidOfWorld("Material \"mix\""), HasSubstr("needs \"string materials\""));
+  EXPECT_THAT(SaidOfWorld(two + "Material \"mix\" \"string materials\" [ \"a\" ]"),
               HasSubstr("must be the names of two materials"));
-  EXPECT_THAT(Said(two + "MakeNamedMaterial \"c\" \"string type\" \"mix\" "
-                         "\"string materials\" [ \"a\" \"c\" ]"),
+  EXPECT_THAT(SaidOfWorld(two + "MakeNamedMaterial \"c\" \"string type\" \"mix\" "
+                                "\"string materials\" [ \"a\" \"c\" ]"),
               HasSubstr("refers to the material \"c\", which is not defined before it"));
-  EXPECT_THAT(Said(two + "MakeNamedMaterial \"i\" \"string type\" \"interface\" "
-                         "Material \"mix\" \"string materials\" [ \"a\" \"i\" ]"),
+  EXPECT_THAT(SaidOfWorld(two + "MakeNamedMaterial \"i\" \"string type\" \"interface\" "
+                                "Material \"mix\" \"string materials\" [ \"a\" \"i\" ]"),
               HasSubstr("cannot be part of a mix"));
 }
 
 TEST(PbrtMaterialsTest, BumpsAndNormalMapsAreRead) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Texture \"h\" \"float\" \"imagemap\" \"string filename\" \"h.pfm\" \"float scale\" -2\n"
       "Texture \"e\" \"float\" \"constant\" \"float value\" 3\n"
       "Material \"diffuse\" \"texture displacement\" \"h\" Shape \"sphere\"\n"
@@ -275,15 +259,15 @@ TEST(PbrtMaterialsTest, BumpsAndNormalMapsAreRead) {
   EXPECT_NE(scene.materials[3].normal_map, kNoTexture);
   const SceneNeeds needs = NeedsOf(scene, RenderSettings());
   EXPECT_TRUE(needs.Uses(Part::kShadingNormals));
-  EXPECT_THAT(Said("Material \"diffuse\" \"string normalmap\" \"none.png\""),
+  EXPECT_THAT(SaidOfWorld("Material \"diffuse\" \"string normalmap\" \"none.png\""),
               HasSubstr("\"normalmap\" of Material \"diffuse\" cannot be read"));
-  EXPECT_THAT(Said("Material \"diffuse\" \"float displacement\" 1"),
+  EXPECT_THAT(SaidOfWorld("Material \"diffuse\" \"float displacement\" 1"),
               HasSubstr("must be a texture"));
 }
 
 TEST(PbrtMaterialsTest, OpacityOfAPictureIsItsNumber) {
   // PFM has none: the mean of the channels.
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Texture \"m\" \"float\" \"imagemap\" \"string filename\" \"m.pfm\"\n"
       "Material \"conductor\" \"texture roughness\" \"m\" Shape \"sphere\"",
       {{"m.pfm", Pfm({0.3F, 0.6F, 0.9F, 0, 0, 0}, 3)}});
@@ -304,7 +288,7 @@ TEST(PbrtMaterialsTest, AlphaMayBeATextureOnAnyShape) {
        {triangles, instanced, std::string("Shape \"sphere\" \"texture alpha\" \"half\"\n"),
         std::string("Rotate 90 1 0 0 Shape \"disk\" \"texture alpha\" \"half\"\n")}) {
     SCOPED_TRACE(shape);
-    const Scene scene = World(textures + shape);
+    const Scene scene = ReadWorld(textures + shape);
     const std::unique_ptr<Intersector> intersector = Intersector::Create(scene).value();
     int met_left = 0;
     int met_right = 0;
@@ -329,15 +313,16 @@ TEST(PbrtMaterialsTest, AlphaMayBeATextureOnAnyShape) {
                                                                       : scene.spheres[0].traits
                                               : scene.meshes[0].traits));
   }
-  EXPECT_THAT(Said(textures + "AreaLightSource \"diffuse\" Shape \"sphere\" \"texture alpha\" "
-                              "\"half\""),
-              HasSubstr("must not be a texture on a shape that emits"));
+  EXPECT_THAT(
+      SaidOfWorld(textures + "AreaLightSource \"diffuse\" Shape \"sphere\" \"texture alpha\" "
+                             "\"half\""),
+      HasSubstr("must not be a texture on a shape that emits"));
 }
 
 // What a float texture that is declared by `text` as "t" is at a place.
 float NumberOf(const std::string& text, const TexturePlace& place) {
   const Scene scene =
-      World(text + "\nMaterial \"conductor\" \"texture roughness\" \"t\" Shape \"sphere\"");
+      ReadWorld(text + "\nMaterial \"conductor\" \"texture roughness\" \"t\" Shape \"sphere\"");
   const std::int32_t texture = scene.materials.at(1).roughness_textures[0];
   EXPECT_NE(texture, kNoTexture);
   return texture == kNoTexture ? 0 : TextureNumber(scene.textures, texture, place);
@@ -379,7 +364,7 @@ TEST(PbrtMaterialsTest, DotsShowWhatPbrtShowsInThem) {
 }
 
 TEST(PbrtMaterialsTest, MixesOfConstantsAreConstants) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Texture \"t\" \"float\" \"mix\" \"float tex2\" 0.5 \"float amount\" 0.5\n"
       "Material \"conductor\" \"texture roughness\" \"t\" Shape \"sphere\"");
   EXPECT_FALSE(scene.materials[1].DependsOnPlace());
@@ -387,11 +372,11 @@ TEST(PbrtMaterialsTest, MixesOfConstantsAreConstants) {
 }
 
 TEST(PbrtMaterialsTest, TexturesOfAKindThatGivesOnlyOneOfTheTwoAreRefused) {
-  EXPECT_THAT(Said("Texture \"t\" \"spectrum\" \"fbm\"\n"
-                   "Material \"diffuse\" \"texture reflectance\" \"t\""),
+  EXPECT_THAT(SaidOfWorld("Texture \"t\" \"spectrum\" \"fbm\"\n"
+                          "Material \"diffuse\" \"texture reflectance\" \"t\""),
               HasSubstr("gives numbers only"));
-  EXPECT_THAT(Said("Texture \"t\" \"float\" \"marble\"\n"
-                   "Material \"conductor\" \"texture roughness\" \"t\""),
+  EXPECT_THAT(SaidOfWorld("Texture \"t\" \"float\" \"marble\"\n"
+                          "Material \"conductor\" \"texture roughness\" \"t\""),
               HasSubstr("gives colours only"));
 }
 
@@ -403,7 +388,7 @@ TEST(PbrtMaterialsTest, TexturesThatDoubleAreRefused) {
     text += "Texture \"t" + std::to_string(i) + "\" \"float\" \"mix\" \"texture tex1\" " + before +
             " \"texture tex2\" " + before + "\n";
   }
-  EXPECT_THAT(Said(text), HasSubstr("is made of more than 1024 textures"));
+  EXPECT_THAT(SaidOfWorld(text), HasSubstr("is made of more than 1024 textures"));
 }
 
 constexpr const char* kCurve =
@@ -411,7 +396,7 @@ constexpr const char* kCurve =
 
 // The material of the first curve.
 Material OnCurve(const std::string& world, std::map<std::string, std::string> others = {}) {
-  const Scene scene = World(world + kCurve, std::move(others));
+  const Scene scene = ReadWorld(world + kCurve, std::move(others));
   EXPECT_FALSE(scene.curve_pieces.empty());
   return scene.materials[static_cast<std::size_t>(scene.curve_pieces[0].traits.material)];
 }
@@ -448,15 +433,15 @@ TEST(PbrtMaterialsTest, HairHasTheColourThatIsGivenFirst) {
   const Material by_absorption = OnCurve(all + "\"rgb sigma_a\" [1 2 3]");
   EXPECT_FALSE(by_absorption.absorbs_for_reflectance);
   EXPECT_EQ(by_absorption.absorption, (Rgb{1, 2, 3}));
-  EXPECT_THAT(Said(all + "\"rgb sigma_a\" [1 2 3]" + kCurve),
+  EXPECT_THAT(SaidOfWorld(all + "\"rgb sigma_a\" [1 2 3]" + kCurve),
               HasSubstr("because sigma_a is given"));
-  EXPECT_THAT(Said(all + kCurve), HasSubstr("because reflectance is given"));
-  EXPECT_THAT(Said(all + kCurve), Not(HasSubstr("unknown parameter")));
-  EXPECT_THAT(
-      Said("Material \"hair\" \"rgb color\" [1 1 1] \"float pheomelanin\" 1" + std::string(kCurve)),
-      HasSubstr("because color is given"));
+  EXPECT_THAT(SaidOfWorld(all + kCurve), HasSubstr("because reflectance is given"));
+  EXPECT_THAT(SaidOfWorld(all + kCurve), Not(HasSubstr("unknown parameter")));
+  EXPECT_THAT(SaidOfWorld("Material \"hair\" \"rgb color\" [1 1 1] \"float pheomelanin\" 1" +
+                          std::string(kCurve)),
+              HasSubstr("because color is given"));
   // The absorption belongs to the reflectance in the space that light is multiplied in.
-  const Scene scene = InWorkingSpace(World(all + kCurve));
+  const Scene scene = InWorkingSpace(ReadWorld(all + kCurve));
   const Material& material =
       scene.materials[static_cast<std::size_t>(scene.curve_pieces[0].traits.material)];
   const Rgb back = HairReflectance(material.absorption, material.beta_n);
@@ -470,7 +455,7 @@ TEST(PbrtMaterialsTest, HairTakesTexturesOfColour) {
       "Texture \"c\" \"spectrum\" \"checkerboard\" \"rgb tex1\" [0.2 0.4 0.8] "
       "\"rgb tex2\" [0.2 0.4 0.8]\n";
   for (const std::string name : {"sigma_a", "reflectance"}) {
-    Scene scene = World(texture + "Material \"hair\" \"texture " + name + "\" \"c\"" + kCurve);
+    Scene scene = ReadWorld(texture + "Material \"hair\" \"texture " + name + "\" \"c\"" + kCurve);
     scene = InWorkingSpace(scene);
     const std::unique_ptr<Intersector> intersector = Intersector::Create(scene).value();
     const float size = scene.unit == 1 ? 1 : static_cast<float>(1 / scene.unit);
@@ -491,7 +476,7 @@ TEST(PbrtMaterialsTest, HairTakesTexturesOfColour) {
 
 TEST(PbrtMaterialsTest, SaysWhatHairCannotBe) {
   const auto said = [](const std::string& parameters, const std::string& shape) {
-    return Said(std::string(kPlanar) + "Material \"hair\" " + parameters + shape);
+    return SaidOfWorld(std::string(kPlanar) + "Material \"hair\" " + parameters + shape);
   };
   EXPECT_THAT(said("", "Shape \"sphere\""), HasSubstr("for curves of type flat or cylinder alone"));
   EXPECT_THAT(said("",
@@ -499,8 +484,9 @@ TEST(PbrtMaterialsTest, SaysWhatHairCannotBe) {
                    "3] \"normal N\" [1 0 0 1 0 0]"),
               HasSubstr("for curves of type flat or cylinder alone"));
   EXPECT_THAT(
-      Said("MakeNamedMaterial \"h\" \"string type\" \"hair\" MakeNamedMaterial \"d\" \"string "
-           "type\" \"diffuse\" Material \"mix\" \"string materials\" [\"d\" \"h\"] Shape \"disk\""),
+      SaidOfWorld(
+          "MakeNamedMaterial \"h\" \"string type\" \"hair\" MakeNamedMaterial \"d\" \"string "
+          "type\" \"diffuse\" Material \"mix\" \"string materials\" [\"d\" \"h\"] Shape \"disk\""),
       HasSubstr("for curves of type flat or cylinder alone"));
   EXPECT_THAT(said("\"texture beta_m\" \"r\"", kCurve),
               HasSubstr("must not be a texture that varies"));
@@ -515,10 +501,11 @@ TEST(PbrtMaterialsTest, SaysWhatHairCannotBe) {
 // not.
 TEST(PbrtMaterialsTest, GlassDispersesWhereItIsSmooth) {
   const auto glass = [](const std::string& parameters) {
-    return World("Material \"dielectric\" " + parameters + " Shape \"sphere\"").materials.back();
+    return ReadWorld("Material \"dielectric\" " + parameters + " Shape \"sphere\"")
+        .materials.back();
   };
   const auto said = [](const std::string& material) {
-    return Said("Material " + material + " Shape \"sphere\"");
+    return SaidOfWorld("Material " + material + " Shape \"sphere\"");
   };
   const Material flint = glass("\"spectrum eta\" \"glass-F11\"");
   EXPECT_TRUE(flint.Disperses());
@@ -554,7 +541,7 @@ TEST(PbrtMaterialsTest, MixesThatDoubleAreReadAtOnce) {
     world += "MakeNamedMaterial \"m" + std::to_string(i) +
              "\" \"string type\" \"mix\" \"string materials\" [" + below + " " + below + "]\n";
   }
-  const Scene scene = World(world + "NamedMaterial \"m30\" Shape \"sphere\"");
+  const Scene scene = ReadWorld(world + "NamedMaterial \"m30\" Shape \"sphere\"");
   EXPECT_EQ(scene.materials[static_cast<std::size_t>(scene.spheres[0].traits.material)].kind,
             Material::Kind::kMix);
 }

@@ -7,7 +7,7 @@
 
 #include "render/formats/read_scene.h"
 #include "render/wire/block_codec.h"
-#include "tests/support/memory_files.h"
+#include "tests/support/pbrt_text.h"
 
 namespace lucerna {
 namespace {
@@ -21,26 +21,10 @@ constexpr const char* kFog =
     "MakeNamedMedium \"fog\" \"string type\" \"homogeneous\" \"rgb sigma_a\" [0.1 0.2 0.3] "
     "\"rgb sigma_s\" [1 2 3] \"float scale\" 2 \"float g\" -0.4\n";
 
-ParsedScene Parse(const std::string& text) {
-  MemoryFiles files(std::map<std::string, std::string>{{"s.pbrt", text}});
-  return ReadScene(files, "s.pbrt", {});
-}
-Scene Read(const std::string& text) {
-  ParsedScene parsed = Parse(text);
-  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
-  return parsed.scene;
-}
-std::string Said(const std::string& world) {
-  std::string all;
-  for (const Diagnostic& diagnostic :
-       Parse("Camera \"perspective\" WorldBegin\n" + world).diagnostics)
-    all += diagnostic.ToString() + "\n";
-  return all;
-}
-
 TEST(PbrtMediaTest, HaveTheirCoefficients) {
-  const Scene scene = Read(std::string("Camera \"perspective\" WorldBegin\n") + kFog +
-                           "MediumInterface \"fog\" \"\" Material \"dielectric\"\n" + kTriangle);
+  const Scene scene =
+      ReadPbrt(std::string("Camera \"perspective\" WorldBegin\n") + kFog +
+               "MediumInterface \"fog\" \"\" Material \"dielectric\"\n" + kTriangle);
   ASSERT_EQ(scene.media.size(), 1U);
   EXPECT_EQ(scene.media[0].name, "fog");
   EXPECT_FLOAT_EQ(scene.media[0].absorption.g, 0.4F);
@@ -49,11 +33,11 @@ TEST(PbrtMediaTest, HaveTheirCoefficients) {
 }
 
 TEST(PbrtMediaTest, AreAroundCameraAndLightsAndOnTheSidesOfShapes) {
-  const Scene scene = Read(std::string(kFog) +
-                           "MediumInterface \"\" \"fog\" Camera \"perspective\" WorldBegin\n"
-                           "LightSource \"point\" AttributeBegin MediumInterface \"\" \"\"\n"
-                           "LightSource \"spot\" AttributeEnd\n" +
-                           kTriangle + "MediumInterface \"fog\"\n" + kTriangle);
+  const Scene scene = ReadPbrt(std::string(kFog) +
+                               "MediumInterface \"\" \"fog\" Camera \"perspective\" WorldBegin\n"
+                               "LightSource \"point\" AttributeBegin MediumInterface \"\" \"\"\n"
+                               "LightSource \"spot\" AttributeEnd\n" +
+                               kTriangle + "MediumInterface \"fog\"\n" + kTriangle);
   EXPECT_EQ(scene.camera.medium, 0);
   EXPECT_EQ(scene.point_lights[0].medium, 0);
   EXPECT_EQ(scene.spot_lights[0].medium, kNoMedium);
@@ -64,25 +48,28 @@ TEST(PbrtMediaTest, AreAroundCameraAndLightsAndOnTheSidesOfShapes) {
 }
 
 TEST(PbrtMediaTest, AreForgottenWhereNothingIsInThem) {
-  const Scene scene = Read(std::string("Camera \"perspective\" WorldBegin\n") + kFog + kTriangle);
+  const Scene scene =
+      ReadPbrt(std::string("Camera \"perspective\" WorldBegin\n") + kFog + kTriangle);
   EXPECT_TRUE(scene.media.empty());
 }
 
 TEST(PbrtMediaTest, InterfacesThatSeparateNoneAreDropped) {
   for (const char* name : {"interface", "none", ""}) {
     const std::string interface = std::string("Material \"") + name + "\"\n";
-    const Scene scene = Read(std::string("Camera \"perspective\" WorldBegin\n") + kFog + kTriangle +
-                             interface + kTriangle + "MediumInterface \"fog\" \"\"\n" + kTriangle);
+    const Scene scene =
+        ReadPbrt(std::string("Camera \"perspective\" WorldBegin\n") + kFog + kTriangle + interface +
+                 kTriangle + "MediumInterface \"fog\" \"\"\n" + kTriangle);
     ASSERT_EQ(scene.meshes.size(), 2U) << name;
     EXPECT_TRUE(scene.meshes[1].traits.SeparatesMedia());
   }
-  EXPECT_THAT(Said(std::string("AreaLightSource \"diffuse\" Material \"interface\"\n") + kTriangle),
-              HasSubstr("warning: shapes of the material interface emit no light: 1"));
+  EXPECT_THAT(
+      SaidOfWorld(std::string("AreaLightSource \"diffuse\" Material \"interface\"\n") + kTriangle),
+      HasSubstr("warning: shapes of the material interface emit no light: 1"));
 }
 
 // The unit of a scene that is a million kilometres wide is not a metre: coefficients follow.
 TEST(PbrtMediaTest, KeepTheirOpticalThicknessInAnotherUnit) {
-  const Scene scene = Read(
+  const Scene scene = ReadPbrt(
       std::string("Camera \"perspective\" WorldBegin\n") + kFog +
       "MediumInterface \"fog\" \"\" Material \"dielectric\" Scale 1e15 1e15 1e15\n" + kTriangle);
   ASSERT_NE(scene.unit, 1);
@@ -90,24 +77,27 @@ TEST(PbrtMediaTest, KeepTheirOpticalThicknessInAnotherUnit) {
 }
 
 TEST(PbrtMediaTest, WhatIsWrongIsSaid) {
-  EXPECT_THAT(Said("MakeNamedMedium \"m\""), HasSubstr("needs \"string type\""));
+  EXPECT_THAT(SaidOfWorld("MakeNamedMedium \"m\""), HasSubstr("needs \"string type\""));
   for (const char* const grid : {"uniformgrid", "rgbgrid", "nanovdb", "cloud"}) {
     const std::string type = std::string("\"") + grid + "\"";
-    EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" " + type),
+    EXPECT_THAT(SaidOfWorld("MakeNamedMedium \"m\" \"string type\" " + type),
                 AllOf(HasSubstr(type + ", which is not supported"),
                       HasSubstr("use homogeneous with the mean density")));
   }
-  EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"smoke\""),
+  EXPECT_THAT(SaidOfWorld("MakeNamedMedium \"m\" \"string type\" \"smoke\""),
               HasSubstr("\"smoke\", which is not supported; there is homogeneous"));
-  EXPECT_THAT(Said("MediumInterface \"m\" \"\""), HasSubstr("there is no medium \"m\""));
-  EXPECT_THAT(Said(std::string(kFog) + kFog), HasSubstr("is defined twice"));
+  EXPECT_THAT(SaidOfWorld("MediumInterface \"m\" \"\""), HasSubstr("there is no medium \"m\""));
+  EXPECT_THAT(SaidOfWorld(std::string(kFog) + kFog), HasSubstr("is defined twice"));
   EXPECT_THAT(
-      Said("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"string preset\" \"Milk\""),
+      SaidOfWorld(
+          "MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"string preset\" \"Milk\""),
       HasSubstr("preset"));
-  EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"rgb Le\" [1 1 1]"),
-              HasSubstr("media do not emit light"));
-  EXPECT_THAT(Said("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"float g\" 0.995"),
-              HasSubstr("g"));
+  EXPECT_THAT(
+      SaidOfWorld("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"rgb Le\" [1 1 1]"),
+      HasSubstr("media do not emit light"));
+  EXPECT_THAT(
+      SaidOfWorld("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"float g\" 0.995"),
+      HasSubstr("g"));
 }
 
 HitpointBlock BlockWithSegments() {

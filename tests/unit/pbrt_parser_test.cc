@@ -11,7 +11,9 @@
 #include "gtest/gtest.h"
 
 #include "render/formats/read_scene.h"
+#include "render/math/warp.h"
 #include "tests/support/memory_files.h"
+#include "tests/support/pbrt_text.h"
 
 namespace lucerna {
 namespace {
@@ -20,35 +22,6 @@ using ::testing::AnyOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-constexpr float kPi = std::numbers::pi_v<float>;
-
-ParsedScene Parse(const std::string& text, std::map<std::string, std::string> others = {},
-                  const SceneLimits& limits = {}) {
-  others["s.pbrt"] = text;
-  MemoryFiles files(std::move(others));
-  return ReadScene(files, "s.pbrt", limits);
-}
-
-// A scene whose world is `world`; it must be right.
-Scene World(const std::string& world, std::map<std::string, std::string> others = {}) {
-  const ParsedScene parsed = Parse("Camera \"perspective\" WorldBegin " + world, std::move(others));
-  EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
-  return parsed.scene;
-}
-
-// All that is said, one to a line.
-std::string Said(const std::string& text, std::map<std::string, std::string> others = {},
-                 const SceneLimits& limits = {}) {
-  std::string all;
-  for (const Diagnostic& diagnostic : Parse(text, std::move(others), limits).diagnostics) {
-    all += diagnostic.ToString() + "\n";
-  }
-  return all;
-}
-std::string SaidOfWorld(const std::string& world) {
-  return Said("Camera \"perspective\" WorldBegin\n" + world);
-}
 
 void ExpectNear(Vec3 a, Vec3 b) {
   EXPECT_LT(MaxAbs(a - b), 1e-5F) << a.x << " " << a.y << " " << a.z;
@@ -62,7 +35,7 @@ void ExpectNear(Rgb a, Rgb b, float tolerance = 1e-5F) {
 // ---- camera, film, filter, integrator
 
 TEST(PbrtParserTest, DefaultsArePbrts) {
-  const Scene scene = World("");
+  const Scene scene = ReadWorld("");
   EXPECT_EQ(scene.camera.fov_deg, 90);
   EXPECT_EQ(scene.camera.lens_radius, 0);
   EXPECT_EQ(scene.camera.focal_distance, 1e6);
@@ -93,7 +66,7 @@ TEST(PbrtParserTest, TheFieldOfViewSpansTheShorterSide) {
 }
 
 TEST(PbrtParserTest, LookAtAndAMirrorPlaceTheCamera) {
-  const ParsedScene parsed = Parse(
+  const ParsedScene parsed = ParsePbrt(
       "Scale -1 1 1 LookAt 1 2 3  1 2 10  0 1 0 Camera \"perspective\" \"float fov\" 40 "
       "WorldBegin");
   const Transform& camera_to_world = parsed.scene.camera.camera_to_world;
@@ -105,7 +78,7 @@ TEST(PbrtParserTest, LookAtAndAMirrorPlaceTheCamera) {
 }
 
 TEST(PbrtParserTest, MatricesAreWrittenColumnByColumn) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Transform [1 0 0 0  0 1 0 0  0 0 1 0  5 6 7 1] ConcatTransform [2 0 0 0 0 2 0 0 0 0 2 0 0 0 "
       "0 1] Shape \"sphere\"");
   ExpectNear(scene.spheres[0].center, {5, 6, 7});
@@ -114,7 +87,7 @@ TEST(PbrtParserTest, MatricesAreWrittenColumnByColumn) {
 
 TEST(PbrtParserTest, FilmCropAndExposure) {
   const Scene scene =
-      Parse(
+      ParsePbrt(
           "Film \"rgb\" \"integer xresolution\" [100] \"integer yresolution\" 50 \"float iso\" 200 "
           "\"float cropwindow\" [0.25 0.5 0 0.1] \"string filename\" \"a b.exr\"\n"
           "Camera \"perspective\" \"float shutterclose\" 0.5 WorldBegin")
@@ -125,7 +98,7 @@ TEST(PbrtParserTest, FilmCropAndExposure) {
   EXPECT_EQ(scene.film.crop_y1, 5);
   EXPECT_DOUBLE_EQ(scene.film.exposure, 1);  // half the time at twice the speed
   EXPECT_EQ(scene.film.filename, "a b.exr");
-  const Scene bounds = Parse(
+  const Scene bounds = ParsePbrt(
                            "Film \"rgb\" \"integer pixelbounds\" [3 9 4 2000] Camera "
                            "\"perspective\" WorldBegin")
                            .scene;
@@ -137,7 +110,7 @@ TEST(PbrtParserTest, FilmCropAndExposure) {
 
 TEST(PbrtParserTest, IntegratorAndSampler) {
   const Scene scene =
-      Parse(
+      ParsePbrt(
           "Integrator \"sppm\" \"integer maxdepth\" 9 \"float radius\" 0.01 "
           "\"integer photonsperiteration\" 1000 \"integer seed\" 3\n"
           "Sampler \"halton\" \"integer pixelsamples\" 32 Camera \"perspective\" WorldBegin")
@@ -147,7 +120,7 @@ TEST(PbrtParserTest, IntegratorAndSampler) {
   EXPECT_EQ(scene.integrator.photons_per_pass, 1000);
   EXPECT_EQ(scene.integrator.seed, 3);
   EXPECT_EQ(scene.integrator.pixel_samples, 32);
-  const Scene path = Parse(
+  const Scene path = ParsePbrt(
                          "Integrator \"path\" \"integer maxdepth\" 4 \"float radius\" 1 Camera "
                          "\"perspective\" WorldBegin")
                          .scene;
@@ -157,7 +130,7 @@ TEST(PbrtParserTest, IntegratorAndSampler) {
 
 TEST(PbrtParserTest, Filters) {
   const auto filter = [](const std::string& text) {
-    return Parse("PixelFilter " + text + " Camera \"perspective\" WorldBegin").scene.filter;
+    return ParsePbrt("PixelFilter " + text + " Camera \"perspective\" WorldBegin").scene.filter;
   };
   EXPECT_EQ(filter("\"box\"").radius_x, 0.5F);
   EXPECT_EQ(filter("\"triangle\"").radius_y, 2);
@@ -167,7 +140,7 @@ TEST(PbrtParserTest, Filters) {
 
 // ---- shapes and which way they face
 
-constexpr char kTriangle[] = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] ";
+constexpr char kOneTriangle[] = "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0] ";
 
 Vec3 Outward(const Scene& scene) {
   const TriangleMesh& mesh = scene.meshes.at(0);
@@ -176,38 +149,38 @@ Vec3 Outward(const Scene& scene) {
 }
 
 TEST(PbrtParserTest, AMeshWithoutNormalsFacesByItsWinding) {
-  ExpectNear(Outward(World(kTriangle)), {0, 0, 1});
-  ExpectNear(Outward(World(std::string("ReverseOrientation ") + kTriangle)), {0, 0, -1});
+  ExpectNear(Outward(ReadWorld(kOneTriangle)), {0, 0, 1});
+  ExpectNear(Outward(ReadWorld(std::string("ReverseOrientation ") + kOneTriangle)), {0, 0, -1});
   // In world space the mirror image is wound the other way; pbrt-v4 turns it over.
-  ExpectNear(Outward(World(std::string("Scale -1 1 1 ") + kTriangle)), {0, 0, 1});
-  ExpectNear(Outward(World(std::string("Scale 1 1 -1 ") + kTriangle)), {0, 0, -1});
-  ExpectNear(Outward(World(std::string("Scale -1 1 1 ReverseOrientation ") + kTriangle)),
+  ExpectNear(Outward(ReadWorld(std::string("Scale -1 1 1 ") + kOneTriangle)), {0, 0, 1});
+  ExpectNear(Outward(ReadWorld(std::string("Scale 1 1 -1 ") + kOneTriangle)), {0, 0, -1});
+  ExpectNear(Outward(ReadWorld(std::string("Scale -1 1 1 ReverseOrientation ") + kOneTriangle)),
              {0, 0, -1});
 }
 
 TEST(PbrtParserTest, AMeshWithNormalsFacesWithThem) {
-  const std::string down = std::string(kTriangle) + "\"normal N\" [0 0 -2 0 0 -2 0 0 -2] ";
-  const Scene scene = World(down);
+  const std::string down = std::string(kOneTriangle) + "\"normal N\" [0 0 -2 0 0 -2 0 0 -2] ";
+  const Scene scene = ReadWorld(down);
   ExpectNear(Outward(scene), {0, 0, -1});
   ExpectNear(scene.meshes[0].normals[0], {0, 0, -1});
-  const Scene reversed = World("ReverseOrientation " + down);
+  const Scene reversed = ReadWorld("ReverseOrientation " + down);
   ExpectNear(Outward(reversed), {0, 0, 1});
   ExpectNear(reversed.meshes[0].normals[0], {0, 0, 1});
-  ExpectNear(Outward(World("Scale -1 1 1 " + down)), {0, 0, -1});
+  ExpectNear(Outward(ReadWorld("Scale -1 1 1 " + down)), {0, 0, -1});
   // Normals of zero leave the choice to the winding.
-  ExpectNear(Outward(World(std::string(kTriangle) + "\"normal N\" [0 0 0 0 0 0 0 0 0] ")),
+  ExpectNear(Outward(ReadWorld(std::string(kOneTriangle) + "\"normal N\" [0 0 0 0 0 0 0 0 0] ")),
              {0, 0, 1});
 }
 
 TEST(PbrtParserTest, NormalsAreMappedAsNormals) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Scale 1 2 1 Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 -1 0 0 0 1] "
       "\"normal N\" [1 1 0 1 1 0 1 1 0]");
   ExpectNear(scene.meshes[0].normals[0], Normalize({2, 1, 0}));
 }
 
 TEST(PbrtParserTest, SpheresAndDisks) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Translate 1 2 3 Scale 2 2 2 Shape \"sphere\" \"float radius\" 3 "
       "Rotate 90 1 0 0 Shape \"disk\" \"float height\" 1 \"float innerradius\" 0.5 "
       "ReverseOrientation Shape \"sphere\" Shape \"disk\"");
@@ -225,7 +198,7 @@ TEST(PbrtParserTest, DegenerateTrianglesAreDroppedAndCounted) {
   const std::string world =
       "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 2 0 0] "
       "\"integer indices\" [0 1 1  0 1 2  0 1 3]";
-  EXPECT_THAT(World(world).meshes[0].indices, ElementsAre(0, 1, 2));
+  EXPECT_THAT(ReadWorld(world).meshes[0].indices, ElementsAre(0, 1, 2));
   EXPECT_THAT(SaidOfWorld(world), HasSubstr("2 of 3 triangles have no area"));
 }
 
@@ -239,12 +212,12 @@ TEST(PbrtParserTest, LightsThatEmitNothingAreWarnedOf) {
   // In single precision: 1e-25 m² are more than kLeastArea, and next to the other triangle nothing.
   const std::string tiny =
       "Shape \"trianglemesh\" \"point3 P\" [0 0 0 1e-25 0 0 0 1e-25 0] \"integer indices\" [0 1 2]";
-  EXPECT_THAT(SaidOfWorld(std::string(kTriangle) + light + tiny),
+  EXPECT_THAT(SaidOfWorld(std::string(kOneTriangle) + light + tiny),
               HasSubstr("warning: Shape \"trianglemesh\" has no area"));
   EXPECT_THAT(SaidOfWorld(light + "Shape \"disk\" \"float radius\" 1 \"float innerradius\" 1"),
               AnyOf(HasSubstr("Shape \"disk\" has no area"), HasSubstr("error")));
   EXPECT_THAT(SaidOfWorld(light + "Shape \"sphere\" \"float radius\" 0"), HasSubstr("error"));
-  EXPECT_THAT(SaidOfWorld(light + kTriangle), Not(HasSubstr("has no area")));
+  EXPECT_THAT(SaidOfWorld(light + kOneTriangle), Not(HasSubstr("has no area")));
   EXPECT_THAT(SaidOfWorld("AreaLightSource \"diffuse\" \"rgb L\" [0 0 0]"),
               HasSubstr("warning: AreaLightSource \"diffuse\" emits nothing"));
   for (const char* type : {"point", "spot", "distant", "infinite"}) {
@@ -256,8 +229,8 @@ TEST(PbrtParserTest, LightsThatEmitNothingAreWarnedOf) {
 
 TEST(PbrtParserTest, InstancesAreLaidOut) {
   const Scene scene =
-      World(std::string("ObjectBegin \"o\" Translate 1 0 0 Shape \"sphere\" ") + kTriangle +
-            "ObjectEnd ObjectInstance \"o\" Translate 0 5 0 Scale -2 2 2 ObjectInstance \"o\"");
+      ReadWorld(std::string("ObjectBegin \"o\" Translate 1 0 0 Shape \"sphere\" ") + kOneTriangle +
+                "ObjectEnd ObjectInstance \"o\" Translate 0 5 0 Scale -2 2 2 ObjectInstance \"o\"");
   ASSERT_EQ(scene.spheres.size(), 2U);
   ExpectNear(scene.spheres[0].center, {1, 0, 0});
   ExpectNear(scene.spheres[1].center, {-2, 5, 0});
@@ -280,14 +253,15 @@ TEST(PbrtParserTest, InstancesCountAgainstTheLimit) {
       "\"disk\" ObjectEnd ";
   for (int i = 0; i < 4; ++i)
     text += "ObjectInstance \"o\" ";
-  EXPECT_TRUE(Parse(text, {}, limits).ok());  // with the object itself
-  EXPECT_THAT(Said(text + "ObjectInstance \"o\"", {}, limits), HasSubstr("more than 10 triangles"));
+  EXPECT_TRUE(ParsePbrt(text, {}, limits).ok());  // with the object itself
+  EXPECT_THAT(SaidOfPbrt(text + "ObjectInstance \"o\"", {}, limits),
+              HasSubstr("more than 10 triangles"));
 }
 
 // ---- materials
 
 Material MaterialOf(const std::string& text) {
-  const Scene scene = World("Material " + text + " Shape \"sphere\"");
+  const Scene scene = ReadWorld("Material " + text + " Shape \"sphere\"");
   return scene.materials.at(static_cast<std::size_t>(scene.spheres.at(0).traits.material));
 }
 
@@ -335,7 +309,7 @@ TEST(PbrtParserTest, ReflectanceByWavelength) {
 }
 
 TEST(PbrtParserTest, NamedMaterialsMayComeLaterAndScopesEnd) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "NamedMaterial \"late\" Shape \"sphere\" AttributeBegin Material \"dielectric\" Shape "
       "\"sphere\" AttributeEnd Shape \"sphere\" "
       "MakeNamedMaterial \"late\" \"string type\" \"conductor\"");
@@ -352,7 +326,7 @@ TEST(PbrtParserTest, NamedMaterialsMayComeLaterAndScopesEnd) {
 // ---- lights
 
 TEST(PbrtParserTest, AreaLightsBelongToTheShapesOfTheirScope) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Shape \"sphere\" AttributeBegin AreaLightSource \"diffuse\" \"rgb L\" [1 2 3] \"float "
       "scale\" "
       "2 \"bool twosided\" true Shape \"sphere\" Shape \"disk\" AttributeEnd Shape \"sphere\"");
@@ -364,7 +338,7 @@ TEST(PbrtParserTest, AreaLightsBelongToTheShapesOfTheirScope) {
 }
 
 TEST(PbrtParserTest, PowerIsWhatTheLightEmits) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "AreaLightSource \"diffuse\" \"float power\" 100 Shape \"sphere\" \"float radius\" 2 "
       "Shape \"disk\" \"float innerradius\" 0.5 Shape \"trianglemesh\" \"point3 P\" [0 0 0 2 0 0 0 "
       "2 "
@@ -392,7 +366,7 @@ TEST(PbrtParserTest, PowerIsWhatTheLightEmits) {
 }
 
 TEST(PbrtParserTest, OtherLights) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Translate 0 0 5 LightSource \"point\" \"rgb I\" [1 2 3] \"point3 from\" [1 0 0] "
       "LightSource \"spot\" \"point3 from\" [0 0 0] \"point3 to\" [0 2 0] \"float coneangle\" 60 "
       "LightSource \"distant\" \"point3 from\" [0 1 0] \"point3 to\" [0 0 0] \"float illuminance\" "
@@ -410,7 +384,7 @@ TEST(PbrtParserTest, OtherLights) {
 
 TEST(PbrtParserTest, ColoursByTemperatureAndWavelengthHaveLuminanceOne) {
   const auto intensity = [](const std::string& text) {
-    return World("LightSource \"point\" " + text).point_lights.at(0).intensity;
+    return ReadWorld("LightSource \"point\" " + text).point_lights.at(0).intensity;
   };
   const Rgb warm = intensity("\"blackbody I\" 2700");
   EXPECT_NEAR(Luminance(warm), 1, 1e-5);
@@ -425,7 +399,7 @@ TEST(PbrtParserTest, ColoursByTemperatureAndWavelengthHaveLuminanceOne) {
 // ---- scopes, files
 
 TEST(PbrtParserTest, AttributesAreDefaultsThatAShapeMayOverride) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "AttributeBegin Attribute \"shape\" \"float radius\" 3 Attribute \"light\" \"float scale\" 2 "
       "Shape \"sphere\" Shape \"sphere\" \"float radius\" 4 LightSource \"point\" AttributeEnd "
       "Shape \"sphere\"");
@@ -437,7 +411,7 @@ TEST(PbrtParserTest, AttributesAreDefaultsThatAShapeMayOverride) {
 
 TEST(PbrtParserTest, CoordinateSystems) {
   const Scene scene =
-      Parse(
+      ParsePbrt(
           "Translate 0 0 -4 Camera \"perspective\" WorldBegin Translate 1 0 0 CoordinateSystem "
           "\"there\" Identity Shape \"sphere\" CoordSysTransform \"there\" Shape \"sphere\" "
           "CoordSysTransform \"camera\" Shape \"sphere\"")
@@ -448,11 +422,11 @@ TEST(PbrtParserTest, CoordinateSystems) {
 }
 
 TEST(PbrtParserTest, IncludeAndImport) {
-  const Scene scene =
-      World("Include \"parts/a.pbrt\" Shape \"sphere\" Import \"b.pbrt\" Shape \"sphere\"",
-            {{"parts/a.pbrt", "Translate 1 0 0 Include \"parts/c.pbrt\""},  // from the main folder
-             {"parts/c.pbrt", "Translate 0 1 0"},
-             {"b.pbrt", "Translate 0 0 1 Shape \"sphere\""}});
+  const Scene scene = ReadWorld(
+      "Include \"parts/a.pbrt\" Shape \"sphere\" Import \"b.pbrt\" Shape \"sphere\"",
+      {{"parts/a.pbrt", "Translate 1 0 0 Include \"parts/c.pbrt\""},  // from the main folder
+       {"parts/c.pbrt", "Translate 0 1 0"},
+       {"b.pbrt", "Translate 0 0 1 Shape \"sphere\""}});
   ExpectNear(scene.spheres[0].center, {1, 1, 0});
   ExpectNear(scene.spheres[1].center, {1, 1, 1});
   ExpectNear(scene.spheres[2].center, {1, 1, 0});  // an import leaves no trace
@@ -461,20 +435,21 @@ TEST(PbrtParserTest, IncludeAndImport) {
 TEST(PbrtParserTest, IncludesEnd) {
   // One error, whatever else the file holds.
   const std::string cycle =
-      Said("Scale 1 1 Include \"a.pbrt\"", {{"a.pbrt", "Include \"s.pbrt\""}});
+      SaidOfPbrt("Scale 1 1 Include \"a.pbrt\"", {{"a.pbrt", "Include \"s.pbrt\""}});
   EXPECT_THAT(cycle, HasSubstr("a.pbrt:1:1: error: the file \"s.pbrt\" includes itself"));
   EXPECT_EQ(std::count(cycle.begin(), cycle.end(), '\n'), 2) << cycle;
   std::map<std::string, std::string> chain;
   for (int i = 0; i < 40; ++i)
     chain[std::to_string(i)] = "Include \"" + std::to_string(i + 1) + "\"";
-  EXPECT_THAT(Said("Include \"0\"", chain), HasSubstr("include one another more than 32 deep"));
+  EXPECT_THAT(SaidOfPbrt("Include \"0\"", chain),
+              HasSubstr("include one another more than 32 deep"));
   SceneLimits limits;
   limits.max_files = 100;
   // Every reading counts, also of a file that was read before.
   std::string many;
   for (int i = 0; i < 101; ++i)
     many += "Include \"a.pbrt\" ";
-  EXPECT_THAT(Said(many, {{"a.pbrt", ""}}, limits), HasSubstr("more than 100 files"));
+  EXPECT_THAT(SaidOfPbrt(many, {{"a.pbrt", ""}}, limits), HasSubstr("more than 100 files"));
 }
 
 TEST(PbrtParserTest, PlyMeshesAreReadAndTheirErrorsPlaced) {
@@ -483,17 +458,17 @@ TEST(PbrtParserTest, PlyMeshesAreReadAndTheirErrorsPlaced) {
       "z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 0 1 0 3 "
       "0 ";
   const std::string world = "Translate 0 0 2 Shape \"plymesh\" \"string filename\" \"m.ply\"";
-  ExpectNear(World(world, {{"m.ply", ply + "1 2\n"}}).meshes.at(0).positions[1], {1, 0, 2});
-  EXPECT_THAT(Said("WorldBegin " + world, {{"m.ply", ply + "1 3\n"}}),
+  ExpectNear(ReadWorld(world, {{"m.ply", ply + "1 2\n"}}).meshes.at(0).positions[1], {1, 0, 2});
+  EXPECT_THAT(SaidOfPbrt("WorldBegin " + world, {{"m.ply", ply + "1 3\n"}}),
               HasSubstr("s.pbrt:1:44: error: \"filename\" of Shape \"plymesh\" cannot be read: "
                         "m.ply: bad PLY file: face 0 refers to vertex 3 of 3"));
-  EXPECT_THAT(Said("WorldBegin " + world), HasSubstr("m.ply: no such file"));
+  EXPECT_THAT(SaidOfPbrt("WorldBegin " + world), HasSubstr("m.ply: no such file"));
 }
 
 // ---- what is refused
 
 TEST(PbrtParserTest, AllErrorsAreSaidAtOnceEachAtItsPlace) {
-  const std::string said = Said(
+  const std::string said = SaidOfPbrt(
       "Camera \"perspective\" \"float fov\" [ 200 ]\n"
       "WorldBegin\n"
       "Sahpe \"sphere\"\n"
@@ -530,7 +505,7 @@ TEST(PbrtParserTest, AllErrorsAreSaidAtOnceEachAtItsPlace) {
 
 // Names that are put together while a material is read, with a prefix or without.
 TEST(PbrtParserTest, MisspeltRoughnessesAreNamed) {
-  const std::string said = Said(
+  const std::string said = SaidOfPbrt(
       "WorldBegin\n"
       "Material \"conductor\" \"float rougness\" 0.1 \"float vroughnes\" 0.1\n"
       "Material \"coatedconductor\" \"float interface.uroughnes\" 0.1\n"
@@ -545,7 +520,7 @@ TEST(PbrtParserTest, OlderDialectsAreRefusedByNameAndByThatAlone) {
        {"Film \"image\" \"integer xresolution\" 9", "WorldBegin Material \"matte\"",
         "WorldBegin MakeNamedMaterial \"m\" \"string type\" \"uber\"", "WorldBegin WorldEnd",
         "SurfaceIntegrator \"path\""}) {
-    const ParsedScene parsed = Parse(std::string("Nonsense\n") + sign);
+    const ParsedScene parsed = ParsePbrt(std::string("Nonsense\n") + sign);
     ASSERT_EQ(parsed.diagnostics.size(), 1U) << sign;
     EXPECT_EQ(parsed.diagnostics[0].message,
               "this is a pbrt-v3 file; convert it with \"pbrt --upgrade\"");
@@ -575,7 +550,7 @@ std::string GreyPfm(int width, int height, float value) {
 }
 
 TEST(PbrtTextureTest, ReadsWhatItIsMadeOf) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Texture \"a\" \"spectrum\" \"imagemap\" \"string filename\" \"./m/a.pfm\" "
       "\"string wrap\" \"clamp\" \"float scale\" 2 \"bool invert\" true \"float uscale\" 3 "
       "\"float vscale\" 4 \"float udelta\" 5 \"float vdelta\" 6 \"string filter\" \"ewa\"\n"
@@ -606,7 +581,7 @@ TEST(PbrtTextureTest, ReadsWhatItIsMadeOf) {
 
 TEST(PbrtTextureTest, SaysWhereATextureIsWrong) {
   const auto said = [](const std::string& world) {
-    return Said("Camera \"perspective\" WorldBegin\n" + world, {{"a.pfm", GreyPfm(2, 1, 2)}});
+    return SaidOfPbrt("Camera \"perspective\" WorldBegin\n" + world, {{"a.pfm", GreyPfm(2, 1, 2)}});
   };
   const std::string image = "Texture \"t\" \"spectrum\" \"imagemap\" \"string filename\" ";
   EXPECT_THAT(said(image + "\"b.pfm\""),
@@ -657,8 +632,8 @@ TEST(PbrtParserTest, ShapesTakeNoMoreMemoryThanTheLimit) {
   // Of a triangle: three vertices, three indices, and what a mesh takes itself.
   limits.max_shape_bytes = 3 * (3 * 12 + 3 * 4 + sizeof(TriangleMesh));
   const auto said = [&](const std::string& text) {
-    return Said("Camera \"perspective\" WorldBegin LightSource \"infinite\"\n" + text,
-                {{"m.ply", ply}}, limits);
+    return SaidOfPbrt("Camera \"perspective\" WorldBegin LightSource \"infinite\"\n" + text,
+                      {{"m.ply", ply}}, limits);
   };
   EXPECT_EQ(said(mesh + mesh + mesh), "");
   EXPECT_THAT(
@@ -676,10 +651,10 @@ TEST(PbrtTextureTest, PicturesTakeNoMoreMemoryThanTheLimit) {
   SceneLimits limits;
   limits.max_picture_bytes = 40;
   EXPECT_THAT(
-      Said("Camera \"perspective\" WorldBegin\n"
-           "Texture \"a\" \"spectrum\" \"imagemap\" \"string filename\" \"a.pfm\"\n"
-           "Texture \"b\" \"spectrum\" \"imagemap\" \"string filename\" \"b.pfm\"\n",
-           {{"a.pfm", GreyPfm(4, 2, 1)}, {"b.pfm", GreyPfm(3, 1, 1)}}, limits),
+      SaidOfPbrt("Camera \"perspective\" WorldBegin\n"
+                 "Texture \"a\" \"spectrum\" \"imagemap\" \"string filename\" \"a.pfm\"\n"
+                 "Texture \"b\" \"spectrum\" \"imagemap\" \"string filename\" \"b.pfm\"\n",
+                 {{"a.pfm", GreyPfm(4, 2, 1)}, {"b.pfm", GreyPfm(3, 1, 1)}}, limits),
       HasSubstr("s.pbrt:3:35: error: \"filename\" of Texture \"b\" cannot be read: b.pfm: the "
                 "image would take 12 bytes of memory, and 8 are left"));
 }
@@ -687,7 +662,7 @@ TEST(PbrtTextureTest, PicturesTakeNoMoreMemoryThanTheLimit) {
 TEST(PbrtParserTest, EnvironmentMapsAreSquareAndPlaced) {
   const std::map<std::string, std::string> files = {{"sky.pfm", GreyPfm(4, 4, 3)},
                                                     {"wide.pfm", GreyPfm(4, 2, 3)}};
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Rotate 90 0 0 1 Scale 2 2 2 LightSource \"infinite\" \"string filename\" \"sky.pfm\" "
       "\"float scale\" 0.5",
       files);
@@ -697,12 +672,12 @@ TEST(PbrtParserTest, EnvironmentMapsAreSquareAndPlaced) {
   ExpectNear(scene.infinite_lights[0].axes.x, {0, 1, 0});
   ExpectNear(scene.infinite_lights[0].axes.y, {-1, 0, 0});
   // As bright as a constant light of that illuminance: 3 times the scale is 1 / pi.
-  const Scene lux = World(
+  const Scene lux = ReadWorld(
       "LightSource \"infinite\" \"string filename\" \"sky.pfm\" \"float illuminance\" 1", files);
   EXPECT_NEAR(lux.infinite_lights[0].radiance.g * 3 * kPi, 1, 1e-2);
 
   const auto said = [&](const std::string& world) {
-    return Said("Camera \"perspective\" WorldBegin\n" + world, files);
+    return SaidOfPbrt("Camera \"perspective\" WorldBegin\n" + world, files);
   };
   EXPECT_THAT(
       said("LightSource \"infinite\" \"string filename\" \"wide.pfm\""),
@@ -735,13 +710,13 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
   expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "no such file");
   expect("Camera \"perspective\"", "before WorldBegin");
   EXPECT_THAT(
-      Said("Camera \"realistic\" \"string lensfile\" \"l.dat\" WorldBegin"),
+      SaidOfPbrt("Camera \"realistic\" \"string lensfile\" \"l.dat\" WorldBegin"),
       HasSubstr("Camera \"realistic\" is not supported: no rays are traced through lenses of "
                 "a camera; use a perspective camera"));
 }
 
 TEST(PbrtParserTest, ReadsCoatedDiffuse) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Material \"coateddiffuse\" Shape \"sphere\"\n"
       "Material \"coateddiffuse\" \"rgb reflectance\" [0.1 0.2 0.3] \"float roughness\" 0.25 "
       "\"float eta\" 1.3 \"float thickness\" 0.5 \"integer maxdepth\" 7 \"integer nsamples\" 2 "
@@ -763,7 +738,7 @@ TEST(PbrtParserTest, ReadsCoatedDiffuse) {
 }
 
 TEST(PbrtParserTest, ReadsCoatedConductor) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Material \"coatedconductor\" Shape \"sphere\"\n"
       "Material \"coatedconductor\" \"rgb conductor.eta\" [1 2 3] \"rgb conductor.k\" [4 5 6] "
       "\"float conductor.roughness\" 0.25 \"float interface.uroughness\" 0.04 "
@@ -794,7 +769,7 @@ TEST(PbrtParserTest, ReadsCoatedConductor) {
 }
 
 TEST(PbrtParserTest, ReadsSheets) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Texture \"t\" \"spectrum\" \"constant\" \"rgb value\" [0.5 0.5 0.5]\n"
       "Material \"diffusetransmission\" Shape \"sphere\"\n"
       "Material \"diffusetransmission\" \"rgb reflectance\" [0.4 0.4 0.4] "
@@ -811,7 +786,7 @@ TEST(PbrtParserTest, ReadsSheets) {
 }
 
 TEST(PbrtParserTest, ReadsSpectraFromFiles) {
-  const Scene scene = World(
+  const Scene scene = ReadWorld(
       "Material \"conductor\" \"spectrum eta\" \"n.spd\" \"spectrum k\" [400 1 700 3] "
       "Shape \"sphere\"",
       {{"n.spd", "# index\n400 0\n700\t3 # of refraction\r\n"}});
@@ -820,11 +795,11 @@ TEST(PbrtParserTest, ReadsSpectraFromFiles) {
 }
 
 TEST(PbrtParserTest, NeedsAWorldAndACamera) {
-  EXPECT_EQ(Said(""),
+  EXPECT_EQ(SaidOfPbrt(""),
             "s.pbrt: error: the scene has no WorldBegin\ns.pbrt: error: the scene has no "
             "camera\ns.pbrt: warning: the scene has no shapes\ns.pbrt: warning: the scene "
             "has no light: the image will be black\n");
-  EXPECT_THAT(Said("Shape \"sphere\""), HasSubstr("Shape must come after WorldBegin"));
+  EXPECT_THAT(SaidOfPbrt("Shape \"sphere\""), HasSubstr("Shape must come after WorldBegin"));
 }
 
 TEST(PbrtParserTest, EveryUnknownDirectiveIsReported) {
@@ -836,15 +811,15 @@ TEST(PbrtParserTest, EveryUnknownDirectiveIsReported) {
 }
 
 TEST(PbrtParserTest, AByteOrderMarkIsSkipped) {
-  EXPECT_EQ(Parse("\xEF\xBB\xBF"
-                  "Camera \"perspective\" WorldBegin Include \"a.pbrt\"",
-                  {{"a.pbrt", "\xEF\xBB\xBFShape \"sphere\""}})
+  EXPECT_EQ(ParsePbrt("\xEF\xBB\xBF"
+                      "Camera \"perspective\" WorldBegin Include \"a.pbrt\"",
+                      {{"a.pbrt", "\xEF\xBB\xBFShape \"sphere\""}})
                 .scene.spheres.size(),
             1U);
 }
 
 TEST(PbrtParserTest, BinaryFilesAndMissingFiles) {
-  EXPECT_EQ(Said(std::string("PNG\0\0", 5)),
+  EXPECT_EQ(SaidOfPbrt(std::string("PNG\0\0", 5)),
             "s.pbrt: error: this is not a pbrt text file: it holds binary data\n");
   MemoryFiles none({});
   EXPECT_EQ(ReadScene(none, "s.pbrt").ToStatus().code(), absl::StatusCode::kInvalidArgument);
@@ -855,7 +830,8 @@ TEST(PbrtParserTest, BinaryFilesAndMissingFiles) {
 TEST(PbrtParserTest, TinyAndHugeTrianglesAndNeedlesAreKept) {
   for (const std::string_view points :
        {"0 0 0 1e-12 0 0 0 1e-12 0", "0 0 0 1e15 0 0 0 1e15 0", "0 0 0 1 0 0 0.5 1e-20 0"}) {
-    const Scene scene = World("Shape \"trianglemesh\" \"point3 P\" [" + std::string(points) + "]");
+    const Scene scene =
+        ReadWorld("Shape \"trianglemesh\" \"point3 P\" [" + std::string(points) + "]");
     ASSERT_EQ(scene.meshes.size(), 1U) << points;
     EXPECT_THAT(scene.meshes[0].indices, ElementsAre(0, 1, 2)) << points;
   }

@@ -2,7 +2,6 @@
 // coordinates of the surfaces that they stand for.
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <string>
 
 #include "gmock/gmock.h"
@@ -10,7 +9,9 @@
 
 #include "render/formats/read_scene.h"
 #include "render/math/double3.h"
+#include "render/math/warp.h"
 #include "tests/support/memory_files.h"
+#include "tests/support/pbrt_text.h"
 
 namespace lucerna {
 namespace {
@@ -18,25 +19,17 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr double kPi = std::numbers::pi;
-
-ParsedScene Parse(const std::string& world, std::map<std::string, std::string> files = {}) {
-  files["s.pbrt"] = "Camera \"perspective\" WorldBegin LightSource \"infinite\"\n" + world;
-  MemoryFiles all(std::move(files));
-  return ReadScene(all, "s.pbrt");
+// Under a light, without which all scenes get a warning.
+ParsedScene ParseShapes(const std::string& world, std::map<std::string, std::string> files = {}) {
+  return ParseWorld("LightSource \"infinite\"\n" + world, std::move(files));
 }
-
-Scene World(const std::string& world) {
-  ParsedScene parsed = Parse(world);
+Scene ReadShapes(const std::string& world) {
+  ParsedScene parsed = ParseShapes(world);
   EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
   return std::move(parsed.scene);
 }
-
-std::string Said(const std::string& world) {
-  std::string all;
-  for (const Diagnostic& diagnostic : Parse(world).diagnostics)
-    all += diagnostic.ToString() + "\n";
-  return all;
+std::string SaidOfShapes(const std::string& world) {
+  return SaidOf(ParseShapes(world));
 }
 
 double AreaOf(const TriangleMesh& mesh) {
@@ -63,12 +56,12 @@ void ExpectOutward(const TriangleMesh& mesh, Vec3 inside, float sign = 1) {
 
 TEST(PbrtShapesTest, APartOfASphere) {
   const TriangleMesh mesh =
-      World(
+      ReadShapes(
           "Shape \"sphere\" \"float radius\" 2 \"float zmin\" -1 \"float zmax\" 1.5 \"float "
           "phimax\" 90")
           .meshes.at(0);
   // A zone's area is that of its height on a cylinder; chords take at most 0.1 % (64 sides a turn).
-  EXPECT_NEAR(AreaOf(mesh) / (kPi / 2 * 2 * 2.5), 0.9995, 6e-4);
+  EXPECT_NEAR(AreaOf(mesh) / (kPi64 / 2 * 2 * 2.5), 0.9995, 6e-4);
   ExpectOutward(mesh, {0, 0, 0});
   for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     const Vec3 p = mesh.positions[i];
@@ -76,19 +69,19 @@ TEST(PbrtShapesTest, APartOfASphere) {
     ASSERT_LE(std::abs(Length(mesh.normals[i] - p * 0.5F)), 1e-5F);
     ASSERT_TRUE(p.x >= -1e-6F && p.y >= -1e-6F && p.z >= -1.00001F && p.z <= 1.50001F);
     // pbrt-v4: u is the share of phimax, v that of the angle from the pole between its ends.
-    const double u = std::atan2(static_cast<double>(p.y), static_cast<double>(p.x)) / (kPi / 2);
+    const double u = std::atan2(static_cast<double>(p.y), static_cast<double>(p.x)) / (kPi64 / 2);
     const double low = std::acos(-0.5);
     const double v = (std::acos(static_cast<double>(p.z) / 2) - low) / (std::acos(0.75) - low);
     ASSERT_NEAR(mesh.uvs[i].x, u, 1e-5);
     ASSERT_NEAR(mesh.uvs[i].y, v, 1e-5);
   }
   const TriangleMesh reversed =
-      World("ReverseOrientation Shape \"sphere\" \"float zmax\" 0.5").meshes.at(0);
+      ReadShapes("ReverseOrientation Shape \"sphere\" \"float zmax\" 0.5").meshes.at(0);
   ExpectOutward(reversed, {0, 0, 0}, -1);
 }
 
 TEST(PbrtShapesTest, AnEllipsoidIsClosedAndHasItsVolume) {
-  const Scene scene = World("Translate 1 2 3 Scale 1 2 -3 Shape \"sphere\"");
+  const Scene scene = ReadShapes("Translate 1 2 3 Scale 1 2 -3 Shape \"sphere\"");
   const TriangleMesh& mesh = scene.meshes.at(0);
   ExpectOutward(mesh, {1, 2, 3});
   double volume = 0;
@@ -98,7 +91,7 @@ TEST(PbrtShapesTest, AnEllipsoidIsClosedAndHasItsVolume) {
     };
     volume += Dot(at(0), Cross(at(1), at(2))) / 6;
   }
-  EXPECT_NEAR(volume / (4.0 / 3 * kPi * 6), 0.9985, 1e-3);
+  EXPECT_NEAR(volume / (4.0 / 3 * kPi64 * 6), 0.9985, 1e-3);
   std::map<std::pair<std::array<float, 3>, std::array<float, 3>>, int> sides;
   for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
     const Vec3 a = mesh.positions[mesh.indices[i]];
@@ -113,35 +106,36 @@ TEST(PbrtShapesTest, AnEllipsoidIsClosedAndHasItsVolume) {
 
 TEST(PbrtShapesTest, PartsOfDisksAndCylinders) {
   const TriangleMesh ring =
-      World(
+      ReadShapes(
           "Shape \"disk\" \"float radius\" 2 \"float innerradius\" 1 \"float height\" 3 \"float "
           "phimax\" 180")
           .meshes.at(0);
-  EXPECT_NEAR(AreaOf(ring) / (kPi / 2 * 3), 0.9993, 4e-4);
+  EXPECT_NEAR(AreaOf(ring) / (kPi64 / 2 * 3), 0.9993, 4e-4);
   for (const Vec3 normal : ring.normals)
     ASSERT_EQ(normal, Vec3(0, 0, 1));
   ExpectOutward(ring, {0, 0, 2});
   const TriangleMesh tube =
-      World("Shape \"cylinder\" \"float radius\" 2 \"float zmin\" 3 \"float zmax\" -1")
+      ReadShapes("Shape \"cylinder\" \"float radius\" 2 \"float zmin\" 3 \"float zmax\" -1")
           .meshes.at(0);
-  EXPECT_NEAR(AreaOf(tube) / (2 * kPi * 2 * 4), 0.9998, 1e-4);
+  EXPECT_NEAR(AreaOf(tube) / (2 * kPi64 * 2 * 4), 0.9998, 1e-4);
   ExpectOutward(tube, {0, 0, 0});
   for (std::size_t i = 0; i < tube.positions.size(); ++i) {
     ASSERT_EQ(tube.normals[i].z, 0);
     ASSERT_NEAR(tube.uvs[i].y, (tube.positions[i].z + 1) / 4, 1e-6);
   }
-  EXPECT_TRUE(World("Shape \"disk\"").meshes.empty());
-  EXPECT_THAT(Said("Shape \"sphere\" \"float zmin\" 1"), HasSubstr("leave nothing of the sphere"));
+  EXPECT_TRUE(ReadShapes("Shape \"disk\"").meshes.empty());
+  EXPECT_THAT(SaidOfShapes("Shape \"sphere\" \"float zmin\" 1"),
+              HasSubstr("leave nothing of the sphere"));
 }
 
 TEST(PbrtShapesTest, BilinearPatches) {
-  const Scene flat = World("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 3 0 2 3 0]");
+  const Scene flat = ReadShapes("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 2 0 0 0 3 0 2 3 0]");
   EXPECT_EQ(flat.TriangleCount(), 2U);
   EXPECT_NEAR(AreaOf(flat.meshes.at(0)), 6, 1e-5);
   EXPECT_EQ(flat.meshes[0].normals[0], Vec3(0, 0, 1));
   // z = x y: the area over the unit square is the integral of sqrt(1 + x² + y²).
   const TriangleMesh saddle =
-      World("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]").meshes.at(0);
+      ReadShapes("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 1]").meshes.at(0);
   double area = 0;
   constexpr int kSteps = 500;
   for (int i = 0; i < kSteps * kSteps; ++i) {
@@ -156,11 +150,11 @@ TEST(PbrtShapesTest, BilinearPatches) {
     ASSERT_LT(Length(saddle.normals[i] - Normalize({-p.y, -p.x, 1})), 1e-5F);
     ASSERT_NEAR(saddle.uvs[i].x, p.x, 1e-6);
   }
-  EXPECT_EQ(World("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0 2 0 0 2 1 0] "
-                  "\"integer indices\" [0 1 2 3 1 4 3 5]")
+  EXPECT_EQ(ReadShapes("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0 1 1 0 2 0 0 2 1 0] "
+                       "\"integer indices\" [0 1 2 3 1 4 3 5]")
                 .TriangleCount(),
             4U);
-  EXPECT_THAT(Said("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]"),
+  EXPECT_THAT(SaidOfShapes("Shape \"bilinearmesh\" \"point3 P\" [0 0 0 1 0 0 0 1 0]"),
               HasSubstr("four for each patch"));
 }
 
@@ -168,12 +162,12 @@ TEST(PbrtShapesTest, SubdivisionSurfaces) {
   const std::string octahedron =
       "Shape \"loopsubdiv\" \"point3 P\" [1 0 0 -1 0 0 0 1 0 0 -1 0 0 0 1 0 0 -1] \"integer "
       "indices\" [0 2 4 2 1 4 1 3 4 3 0 4 2 0 5 1 2 5 3 1 5 0 3 5]";
-  const Scene scene = World(octahedron);
+  const Scene scene = ReadShapes(octahedron);
   EXPECT_EQ(scene.TriangleCount(), 8U * 64);
   // pbrt-v4's normals are on the other side of the cross products.
   ExpectOutward(scene.meshes.at(0), {0, 0, 0}, -1);
-  EXPECT_EQ(World(octahedron + " \"integer levels\" 1").TriangleCount(), 32U);
-  EXPECT_THAT(Said(octahedron + " \"integer levels\" 14"),
+  EXPECT_EQ(ReadShapes(octahedron + " \"integer levels\" 1").TriangleCount(), 32U);
+  EXPECT_THAT(SaidOfShapes(octahedron + " \"integer levels\" 14"),
               HasSubstr("more than the memory for shapes holds"));
 }
 
@@ -195,17 +189,17 @@ TEST(PbrtShapesTest, WhatTakesTooMuchMemoryIsRefusedFirst) {
 
 // A straight curve of even width is a cylinder with round ends.
 TEST(PbrtShapesTest, StraightCurvesAreOnePiece) {
-  const Scene scene = World(
+  const Scene scene = ReadShapes(
       "Scale 2 2 2 Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0] \"float width\" 0.5 "
       "\"string type\" \"cylinder\"");
   ASSERT_EQ(scene.curve_pieces.size(), 1U);
   const CurvePiece& piece = scene.curve_pieces[0];
   EXPECT_EQ(piece.to, Vec3(6, 0, 0));
   EXPECT_FLOAT_EQ(piece.from_radius, 0.5F);
-  EXPECT_NEAR(piece.Area<double>(), 2 * kPi * 0.5 * 6, 1e-6);
+  EXPECT_NEAR(piece.Area<double>(), 2 * kPi64 * 0.5 * 6, 1e-6);
   // Nothing is gathered on it; on shapes of the same material that are not thin it is.
   const Scene both =
-      World("Shape \"sphere\" Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]");
+      ReadShapes("Shape \"sphere\" Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0]");
   EXPECT_TRUE(
       Gathers(both.materials.at(static_cast<std::size_t>(both.spheres[0].traits.material))));
   const Material& on_curve =
@@ -216,7 +210,7 @@ TEST(PbrtShapesTest, StraightCurvesAreOnePiece) {
 
 // A circle's quarter, by the usual cubic (its radius is off by 3e-4), in both degrees and bases.
 TEST(PbrtShapesTest, CurvesStayNearTheirAxis) {
-  const Scene cubic = World(
+  const Scene cubic = ReadShapes(
       "Shape \"curve\" \"point3 P\" [1 0 0 1 0.5522847 0 0.5522847 1 0 0 1 0] \"float width0\" "
       "0.02 "
       "\"float width1\" 0.04");
@@ -236,19 +230,19 @@ TEST(PbrtShapesTest, CurvesStayNearTheirAxis) {
   EXPECT_EQ(cubic.curve_pieces.back().to_u, 1);
   // A quadratic through its elevated form: its middle is a quarter of the ends and half the
   // control.
-  const Scene quadratic = World(
+  const Scene quadratic = ReadShapes(
       "Shape \"curve\" \"integer degree\" 2 \"point3 P\" [0 0 0 1 2 0 2 0 0] \"float width\" 0.01");
   double nearest = 1;
   for (const CurvePiece& piece : quadratic.curve_pieces)
     nearest = std::min(nearest, std::abs(piece.SignedDistance({1, 1, 0})));
   EXPECT_LT(nearest, 0.006);
   // A B-spline of points on a line runs between its inner points, evenly.
-  const Scene spline = World(
+  const Scene spline = ReadShapes(
       "Shape \"curve\" \"string basis\" \"bspline\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0 4 0 0] "
       "\"float width\" 0.1");
   EXPECT_NEAR(spline.curve_pieces.front().from.x, 1, 1e-6);
   EXPECT_NEAR(spline.curve_pieces.back().to.x, 3, 1e-6);
-  const Scene quadratic_spline = World(
+  const Scene quadratic_spline = ReadShapes(
       "Shape \"curve\" \"string basis\" \"bspline\" \"integer degree\" 2 \"point3 P\" [0 0 0 1 0 0 "
       "2 0 0] \"float width\" 0.1");
   EXPECT_NEAR(quadratic_spline.curve_pieces.front().from.x, 0.5, 1e-6);
@@ -256,21 +250,23 @@ TEST(PbrtShapesTest, CurvesStayNearTheirAxis) {
 }
 
 TEST(PbrtShapesTest, RibbonsAreMeshes) {
-  const Scene scene = World(
+  const Scene scene = ReadShapes(
       "Shape \"curve\" \"string type\" \"ribbon\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 0] \"float "
       "width0\" 0.5 \"float width1\" 0.1 \"normal N\" [0 0 1 0 0 1]");
   ASSERT_EQ(scene.meshes.size(), 1U);
   EXPECT_NEAR(AreaOf(scene.meshes[0]), 3 * 0.3, 1e-5);
   for (const Vec3 normal : scene.meshes[0].normals)
     EXPECT_LT(Length(normal - Vec3{0, 0, 1}), 1e-6F);
-  EXPECT_THAT(Said("Shape \"curve\" \"string type\" \"ribbon\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 "
+  EXPECT_THAT(
+      SaidOfShapes("Shape \"curve\" \"string type\" \"ribbon\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 0 "
                    "0]"),
-              HasSubstr("a normal for each end of a segment"));
-  EXPECT_THAT(Said("Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0]"),
+      HasSubstr("a normal for each end of a segment"));
+  EXPECT_THAT(SaidOfShapes("Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0]"),
               HasSubstr("must have 3 n + 1 points"));
-  EXPECT_THAT(Said("AreaLightSource \"diffuse\" Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 "
+  EXPECT_THAT(
+      SaidOfShapes("AreaLightSource \"diffuse\" Shape \"curve\" \"point3 P\" [0 0 0 1 0 0 2 0 0 3 "
                    "0 0]"),
-              HasSubstr("cannot emit light"));
+      HasSubstr("cannot emit light"));
 }
 
 TEST(PbrtShapesTest, WhatATransformFlattensIsLeftOut) {
@@ -281,21 +277,21 @@ TEST(PbrtShapesTest, WhatATransformFlattensIsLeftOut) {
   const std::string world = quad + "ObjectBegin \"o\" " + quad +
                             "ObjectEnd Scale 1 0 1 Shape \"sphere\"\n" + quad +
                             "ObjectInstance \"o\"";
-  EXPECT_EQ(World(world).TriangleCount(), 2U);
-  const std::string said = Said(world);
+  EXPECT_EQ(ReadShapes(world).TriangleCount(), 2U);
+  const std::string said = SaidOfShapes(world);
   EXPECT_THAT(said, HasSubstr("Shape \"sphere\" is flattened by its transform and left out"));
   EXPECT_THAT(said, HasSubstr("triangles have no area and are dropped"));
   EXPECT_THAT(said, HasSubstr("an instance is flattened"));
   // What lies in the plane stays.
-  EXPECT_EQ(World("Scale 1 1 0 " + quad).TriangleCount(), 2U);
+  EXPECT_EQ(ReadShapes("Scale 1 1 0 " + quad).TriangleCount(), 2U);
 }
 
 TEST(PbrtShapesTest, AlphaIsAShareOfRaysAndZeroIsNothing) {
   const Scene scene =
-      World("Shape \"sphere\" \"float alpha\" 0.25 Shape \"disk\" \"float alpha\" 0");
+      ReadShapes("Shape \"sphere\" \"float alpha\" 0.25 Shape \"disk\" \"float alpha\" 0");
   EXPECT_EQ(scene.spheres.at(0).traits.alpha, 0.25F);
   EXPECT_TRUE(scene.disks.empty());
-  const Scene light = World("AreaLightSource \"diffuse\" Shape \"disk\" \"float alpha\" 0");
+  const Scene light = ReadShapes("AreaLightSource \"diffuse\" Shape \"disk\" \"float alpha\" 0");
   EXPECT_EQ(light.disks.size(), 1U);
 }
 
@@ -310,7 +306,7 @@ TEST(PbrtShapesTest, ObjectsThatWouldTakeMuchMemoryAreShared) {
   std::string copies;
   for (int i = 0; i < 128; ++i)
     copies += "Translate 5 0 0 ObjectInstance \"o\"\n";
-  const Scene written_out = World(object + copies);
+  const Scene written_out = ReadShapes(object + copies);
   EXPECT_TRUE(written_out.instances.empty());
   EXPECT_EQ(written_out.meshes.size(), 128U);
   const std::string lights =
@@ -319,7 +315,7 @@ TEST(PbrtShapesTest, ObjectsThatWouldTakeMuchMemoryAreShared) {
       "AttributeBegin AreaLightSource \"diffuse\" Shape \"trianglemesh\" \"point3 P\" [0 0 0 1 0 0 "
       "0 1 0] AttributeEnd\n";
   const Scene shared =
-      World(object + lights + copies + mesh_light + "Scale 1 2 1 ObjectInstance \"o\"");
+      ReadShapes(object + lights + copies + mesh_light + "Scale 1 2 1 ObjectInstance \"o\"");
   ASSERT_EQ(shared.objects.size(), 1U);
   EXPECT_EQ(shared.instances.size(), 129U);
   EXPECT_EQ(shared.object_meshes.size(), 1U);

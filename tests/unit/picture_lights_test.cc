@@ -3,7 +3,6 @@
 #include <cstring>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,6 +13,7 @@
 #include "render/formats/read_scene.h"
 #include "render/geometry/intersector.h"
 #include "render/math/rng.h"
+#include "render/math/warp.h"
 #include "render/transport/light.h"
 #include "render/transport/working_space.h"
 #include "tests/support/memory_files.h"
@@ -22,8 +22,6 @@ namespace lucerna {
 namespace {
 
 using ::testing::HasSubstr;
-
-constexpr double kPiD = std::numbers::pi;
 
 // Grey, rows from the top.
 std::string Pfm(int width, const std::vector<float>& values) {
@@ -82,7 +80,7 @@ std::string Said(const std::string& light, const std::string& picture) {
 void ExpectPhotonsBringTheIntensity(const Lit& lit, const std::vector<Vec3>& directions) {
   constexpr int kPhotons = 400'000;
   const double one_minus_cos = 0.01;
-  const double solid_angle = 2 * kPiD * one_minus_cos;
+  const double solid_angle = 2 * kPi64 * one_minus_cos;
   std::vector<double> sums(directions.size());
   std::vector<double> squares(directions.size());
   double all = 0;
@@ -129,7 +127,7 @@ TEST(ProjectionLightTest, ThrowsThePictureUpright) {
 // A white square of 90 degrees has a third of a hemisphere.
 TEST(ProjectionLightTest, HasThePowerOfItsSolidAngle) {
   const Lit lit(kSlide, Pfm(1, {1}));
-  EXPECT_NEAR(static_cast<double>(Luminance(lit.lights->TotalPower())), 2 * kPiD / 3, 1e-4);
+  EXPECT_NEAR(static_cast<double>(Luminance(lit.lights->TotalPower())), 2 * kPi64 / 3, 1e-4);
   const Lit given(std::string(kSlide) + "\"float power\" 7 \"float fov\" 40", Pfm(1, {0.3F}));
   EXPECT_NEAR(static_cast<double>(Luminance(given.lights->TotalPower())), 7, 1e-3);
   ExpectPhotonsBringTheIntensity(given, {{0, 0, 1}, {0.2F, -0.2F, 1}});
@@ -151,7 +149,7 @@ TEST(GoniometricLightTest, HasThePoleOfItsPictureAlongItsY) {
 
 TEST(GoniometricLightTest, OfAnEvenPictureIsAPoint) {
   const Lit lit(kLamp, Pfm(2, {0.5F, 0.5F, 0.5F, 0.5F}));
-  EXPECT_NEAR(static_cast<double>(Luminance(lit.lights->TotalPower())), 2 * kPiD, 1e-4);
+  EXPECT_NEAR(static_cast<double>(Luminance(lit.lights->TotalPower())), 2 * kPi64, 1e-4);
   EXPECT_NEAR(lit.IntensityAt({1, 2, -3}), 0.5, 1e-5);
   const Lit given(std::string(kLamp) + "\"float power\" 9", Pfm(2, {0, 1, 0.5F, 0.5F}));
   EXPECT_NEAR(static_cast<double>(Luminance(given.lights->TotalPower())), 9, 1e-3);

@@ -5,7 +5,6 @@
 #include <cstring>
 #include <map>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +15,7 @@
 #include "render/formats/read_scene.h"
 #include "render/geometry/intersector.h"
 #include "render/math/rng.h"
+#include "render/math/warp.h"
 #include "render/math/windowed_constant.h"
 #include "render/transport/light.h"
 #include "render/transport/working_space.h"
@@ -25,8 +25,6 @@ namespace lucerna {
 namespace {
 
 using ::testing::HasSubstr;
-
-constexpr double kPiD = std::numbers::pi;
 
 // Grey, rows from the top.
 std::string Pfm(int width, const std::vector<float>& values) {
@@ -87,7 +85,7 @@ double FormFactor(double x, double y) {
   const auto corner = [](double a, double b) {
     const double p = std::sqrt(1 + a * a);
     const double q = std::sqrt(1 + b * b);
-    return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * kPiD);
+    return (a / p * std::atan(b / p) + b / q * std::atan(a / q)) / (2 * kPi64);
   };
   return corner(0.9 - x, 0.4 - y) - corner(-0.3 - x, 0.4 - y) - corner(0.9 - x, -0.2 - y) +
          corner(-0.3 - x, -0.2 - y);
@@ -116,7 +114,7 @@ TEST(PortalLightTest, LightsByTheFormFactorOfTheRectangle) {
   for (const auto& [x, y] : {std::pair{0.0, 0.0}, {0.3, 0.1}, {-2.0, 0.5}, {1.0, -3.0}}) {
     const auto [irradiance, error] =
         Irradiance(*lit.lights, {static_cast<float>(x), static_cast<float>(y), 0}, 20'000);
-    const double expected = 2 * kPiD * FormFactor(x, y);
+    const double expected = 2 * kPi64 * FormFactor(x, y);
     EXPECT_NEAR(irradiance, expected, 4.5 * error + 1e-5 * expected) << x << " " << y;
     // Drawn from the rectangle alone, by light: only the cosine is left.
     EXPECT_LT(error * std::sqrt(20'000.0), 0.6 * expected);
@@ -125,7 +123,8 @@ TEST(PortalLightTest, LightsByTheFormFactorOfTheRectangle) {
 
 TEST(PortalLightTest, HasThePowerThatPassesTheRectangle) {
   const Lit lit(kEven);
-  EXPECT_NEAR(static_cast<double>(Luminance(lit.lights->TotalPower())), 2 * kPiD * 1.2 * 0.6, 1e-3);
+  EXPECT_NEAR(static_cast<double>(Luminance(lit.lights->TotalPower())), 2 * kPi64 * 1.2 * 0.6,
+              1e-3);
   EXPECT_EQ(NameOf(lit.lights->emitter(0).kind), "environment light behind a portal");
 }
 
@@ -192,7 +191,7 @@ TEST(PortalLightTest, SendsPhotonsAsItLights) {
       constexpr int kPoints = 12;
       for (int i = 0; i < kPoints; ++i) {
         const double r = static_cast<double>(kRadius) * std::sqrt((i % 3 + 0.5) / 3);
-        const double angle = 2 * kPiD * (i / 3 + 0.3) / 4;
+        const double angle = 2 * kPi64 * (i / 3 + 0.3) / 4;
         const auto [irradiance, error] =
             Irradiance(*lit.lights,
                        places[p] + Vec3{static_cast<float>(r * std::cos(angle)),
@@ -201,7 +200,7 @@ TEST(PortalLightTest, SendsPhotonsAsItLights) {
         expected += irradiance / kPoints;
         variance += error * error / (kPoints * kPoints);
       }
-      const double area = kPiD * static_cast<double>(kRadius * kRadius);
+      const double area = kPi64 * static_cast<double>(kRadius * kRadius);
       // Of a map, the points stand for the disk within a percent.
       EXPECT_NEAR(
           sums[p] / area, expected,
@@ -225,7 +224,7 @@ TEST(PortalLightTest, IsReadAsPbrtHasIt) {
   // Illuminance and scale are those of the whole sky.
   const ParsedScene lux = Parse(kEven + "\"float illuminance\" 5");
   ASSERT_TRUE(lux.ok());
-  EXPECT_NEAR(static_cast<double>(lux.scene.infinite_lights.at(0).radiance.g), 2 * 5 / kPiD, 1e-5);
+  EXPECT_NEAR(static_cast<double>(lux.scene.infinite_lights.at(0).radiance.g), 2 * 5 / kPi64, 1e-5);
 }
 
 TEST(PortalLightTest, IsAlsoScaledWithAScene) {

@@ -16,7 +16,7 @@
 namespace lucerna {
 namespace {
 
-Image Gray(std::vector<float> pixels, const std::string& seed = "") {
+Image GrayImage(std::vector<float> pixels, const std::string& seed = "") {
   Image image;
   image.width = static_cast<int>(pixels.size());
   image.height = 1;
@@ -32,7 +32,7 @@ Image Noisy(double deviation, unsigned seed) {
   std::vector<float> pixels(20'000);
   for (float& pixel : pixels)
     pixel = static_cast<float>(normal(random));
-  return Gray(pixels, std::to_string(seed));
+  return GrayImage(pixels, std::to_string(seed));
 }
 
 // References of neighbouring seeds can be averaged, and measure images of any seed one types.
@@ -47,7 +47,7 @@ TEST(ReferenceTest, HalvesShareNoSeedWithAnyOther) {
 }
 
 TEST(ReferenceTest, WorkedByHand) {
-  const StatusOr<Image> reference = MakeReference(Gray({1, 4}, "0"), Gray({3, 4}, "1"));
+  const StatusOr<Image> reference = MakeReference(GrayImage({1, 4}, "0"), GrayImage({3, 4}, "1"));
   ASSERT_TRUE(reference.ok()) << reference.status();
   EXPECT_EQ(reference->Find("G")->pixels, (std::vector<float>{2, 4}));
   EXPECT_EQ(reference->Find("noise.G")->pixels, (std::vector<float>{1, 0}));
@@ -78,36 +78,37 @@ TEST(ReferenceTest, TakingItsNoiseAwayLeavesTheErrorOfTheImage) {
 }
 
 TEST(ReferenceTest, TheNoiseIsThatOfTheComparedPixels) {
-  const StatusOr<Image> reference = MakeReference(Gray({1, 2, 9}, "0"), Gray({3, 2, 1}, "1"));
+  const StatusOr<Image> reference =
+      MakeReference(GrayImage({1, 2, 9}, "0"), GrayImage({3, 2, 1}, "1"));
   ASSERT_TRUE(reference.ok()) << reference.status();
-  const Image mask = Gray({1, 1, 0});
-  const StatusOr<ImageMetrics> masked = Compare(Gray({2, 2, 2}), *reference, {.mask = &mask});
+  const Image mask = GrayImage({1, 1, 0});
+  const StatusOr<ImageMetrics> masked = Compare(GrayImage({2, 2, 2}), *reference, {.mask = &mask});
   ASSERT_TRUE(masked.ok()) << masked.status();
   EXPECT_DOUBLE_EQ(masked->reference_mse.value(), 0.5);
   // What clipping leaves of the noise is not known.
-  EXPECT_FALSE(Compare(Gray({2, 2, 2}), *reference, {.clip = 3})->reference_mse.has_value());
+  EXPECT_FALSE(Compare(GrayImage({2, 2, 2}), *reference, {.clip = 3})->reference_mse.has_value());
 }
 
 TEST(ReferenceTest, AnImageWithoutTheFiguresTellsNothing) {
-  Image image = Gray({1});
+  Image image = GrayImage({1});
   EXPECT_FALSE(TellsItsNoise(image));
   for (const char* name : kNoiseLayer)
     image.channels.push_back({name, {1}});
   EXPECT_FALSE(TellsItsNoise(image)) << "somebody else's layer";
-  EXPECT_FALSE(Compare(Gray({1}), image)->reference_mse.has_value());
+  EXPECT_FALSE(Compare(GrayImage({1}), image)->reference_mse.has_value());
 }
 
 TEST(ReferenceTest, RefusesHalvesThatAreNone) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_FALSE(MakeReference(Gray({1, 2}, "0"), Gray({1}, "1")).ok());
-  EXPECT_FALSE(MakeReference(Gray({1}, "0"), Gray({1}, "0")).ok()) << "the same seed";
-  EXPECT_FALSE(MakeReference(Gray({nan}, "0"), Gray({1}, "1")).ok());
-  Image other = Gray({1}, "1");
+  EXPECT_FALSE(MakeReference(GrayImage({1, 2}, "0"), GrayImage({1}, "1")).ok());
+  EXPECT_FALSE(MakeReference(GrayImage({1}, "0"), GrayImage({1}, "0")).ok()) << "the same seed";
+  EXPECT_FALSE(MakeReference(GrayImage({nan}, "0"), GrayImage({1}, "1")).ok());
+  Image other = GrayImage({1}, "1");
   other.metadata["lucerna.scene_digest"] = "another";
-  EXPECT_FALSE(MakeReference(Gray({1}, "0"), other).ok());
-  Image colourless = Gray({1}, "1");
+  EXPECT_FALSE(MakeReference(GrayImage({1}, "0"), other).ok());
+  Image colourless = GrayImage({1}, "1");
   colourless.channels.pop_back();
-  EXPECT_FALSE(MakeReference(Gray({1}, "0"), colourless).ok());
+  EXPECT_FALSE(MakeReference(GrayImage({1}, "0"), colourless).ok());
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "gtest/gtest.h"
 
 #include "render/estimate/rounds.h"
+#include "tests/support/steady_time.h"
 
 namespace lucerna {
 namespace {
@@ -20,10 +21,6 @@ using std::chrono::seconds;
 
 const PassKey kFirst = {"job", 0};
 const PassKey kSecond = {"job", 1};
-
-SteadyTime At(double s) {
-  return SteadyTime(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(s)));
-}
 
 SchedulerOptions Batches(std::uint64_t photons) {
   SchedulerOptions options;

@@ -9,6 +9,7 @@
 #include "gtest/gtest.h"
 
 #include "server/scheduler.h"
+#include "tests/support/steady_time.h"
 
 namespace lucerna {
 namespace {
@@ -17,10 +18,6 @@ using Standing = Scheduler::Standing;
 
 const PassKey kPass = {"job", 0};
 const PassKey kNext = {"job", 1};
-
-SteadyTime At(double s) {
-  return SteadyTime(std::chrono::duration_cast<Duration>(std::chrono::duration<double>(s)));
-}
 
 class SchedulerTrustTest : public testing::Test {
  protected:

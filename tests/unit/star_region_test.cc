@@ -5,18 +5,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include "gtest/gtest.h"
 
 #include "render/math/kernel.h"
 #include "render/math/rng.h"
+#include "render/math/warp.h"
 
 namespace lucerna {
 namespace {
 
-constexpr double kPiD = std::numbers::pi;
 constexpr std::array kKernels = {KernelKind::kConstant, KernelKind::kEpanechnikov,
                                  KernelKind::kBiweight, KernelKind::kGaussian};
 
@@ -44,7 +43,7 @@ TEST(StarRegionTest, OfAWholeDiscIsTheKernelsOwnIntegral) {
     EXPECT_NEAR(WeightFor(m, Whole(kernel)).constant, 1, 1e-6);
   }
   // The second moment of Epanechnikov's kernel: π/4 - π/6.
-  EXPECT_NEAR(region.MomentsOf(KernelKind::kEpanechnikov, 1).xx, kPiD / 12, 1e-12);
+  EXPECT_NEAR(region.MomentsOf(KernelKind::kEpanechnikov, 1).xx, kPi64 / 12, 1e-12);
 }
 
 // A line at distance h cuts away a segment of the disc.
@@ -61,7 +60,7 @@ TEST(StarRegionTest, OfAHalfPlaneIsTheClosedForm) {
       const double area = std::acos(h) - h * end;
       const double moment = 2.0 / 3 * end * end * end;
       const RegionMoments m = region.MomentsOf(KernelKind::kConstant, 1);
-      EXPECT_NEAR(m.zeroth, kPiD - area, 1e-9);
+      EXPECT_NEAR(m.zeroth, kPi64 - area, 1e-9);
       EXPECT_NEAR(m.x * c + m.y * s, -moment, 1e-9);
       EXPECT_NEAR(-m.x * s + m.y * c, 0, 1e-9);
       // Epanechnikov: the integral over x from -1 to h of 4/3 (1 - x²)^(3/2).
@@ -201,8 +200,8 @@ TEST(StarRegionTest, WeightsKeepTheIntegralAndTakeAwayFirstMoments) {
 TEST(StarRegionTest, HasRoomForSoManySegmentsAndNoMore) {
   StarRegion region;
   for (std::size_t i = 0; i < StarRegion::kMostSegments; ++i) {
-    const double angle = 2 * kPiD * static_cast<double>(i) / StarRegion::kMostSegments;
-    const double next = angle + 2 * kPiD / StarRegion::kMostSegments;
+    const double angle = 2 * kPi64 * static_cast<double>(i) / StarRegion::kMostSegments;
+    const double next = angle + 2 * kPi64 / StarRegion::kMostSegments;
     ASSERT_TRUE(region.Add({0.5 * std::cos(angle), 0.5 * std::sin(angle)},
                            {0.5 * std::cos(next), 0.5 * std::sin(next)}));
   }
@@ -212,7 +211,7 @@ TEST(StarRegionTest, HasRoomForSoManySegmentsAndNoMore) {
   // A polygon of n corners on a circle of radius 1/2.
   constexpr double kCorners = StarRegion::kMostSegments;
   EXPECT_NEAR(region.MomentsOf(KernelKind::kConstant, 1).zeroth,
-              kCorners / 2 * 0.25 * std::sin(2 * kPiD / kCorners), 1e-9);
+              kCorners / 2 * 0.25 * std::sin(2 * kPi64 / kCorners), 1e-9);
 }
 
 // Plates behind each other: the first hides all others, in whatever order they come, and twice

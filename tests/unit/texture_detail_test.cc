@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -12,6 +11,7 @@
 
 #include "render/analysis/needs.h"
 #include "render/math/equal_area_square.h"
+#include "render/math/warp.h"
 #include "render/transport/light.h"
 #include "render/transport/sky_detail.h"
 #include "tests/support/test_scenes.h"
@@ -19,8 +19,6 @@
 
 namespace lucerna {
 namespace {
-
-constexpr double kPiD = std::numbers::pi;
 
 template <typename Value>
 std::shared_ptr<const Picture> GreyPicture(int width, int height, Value&& value) {
@@ -47,7 +45,7 @@ double WaveDetail(double m, double k) {
   constexpr int kSteps = 100000;
   double sum = 0;
   for (int i = 0; i < kSteps; ++i) {
-    const double wave = std::cos(2 * kPiD * (i + 0.5) / kSteps);
+    const double wave = std::cos(2 * kPi64 * (i + 0.5) / kSteps);
     sum += m * std::abs(wave) / (1 + m * wave);
   }
   return k * k * sum / kSteps / 2;
@@ -56,7 +54,7 @@ double WaveDetail(double m, double k) {
 TEST(TextureDetailTest, OfAWaveIsItsSecondDerivative) {
   constexpr int kWidth = 512;
   constexpr double kWaves = 8;
-  const double k = 2 * kPiD * kWaves;
+  const double k = 2 * kPi64 * kWaves;
   for (const double m : {0.1, 0.5, 0.8}) {
     Texture texture = OfPicture(GreyPicture(
         kWidth, 3, [&](int x, int) { return 0.5 * (1 + m * std::cos(k * (x + 0.5) / kWidth)); }));
@@ -121,7 +119,7 @@ TEST(TextureDetailTest, OfACheckerboardIsThatOfItsPicture) {
 TEST(TextureDetailTest, OfAPictureOnALightIsThatOfItsLight) {
   constexpr int kWidth = 512;
   constexpr double kDepth = 0.5;
-  const double k = 2 * kPiD * 16;
+  const double k = 2 * kPi64 * 16;
   const auto curvature_of = [&](float scale, bool has_picture) {
     Scene scene;
     AddMaterial(scene, DiffuseMaterial(0.5F));
@@ -178,7 +176,7 @@ TEST(SkyDetailTest, OfASlopeIsItsLaplacian) {
     std::vector<double> around;
     constexpr int kAround = 400;
     for (int i = 0; i < kAround; ++i) {
-      const double angle = 2 * kPiD * i / kAround;
+      const double angle = 2 * kPi64 * i / kAround;
       const double r = std::sqrt(1 - z * z);
       const Vec3 d = {static_cast<float>(r * std::cos(angle)),
                       static_cast<float>(r * std::sin(angle)), static_cast<float>(z)};
@@ -205,7 +203,7 @@ TEST(SkyDetailTest, OfAnEvenSkyIsNoneAndOfASunItsSize) {
       GreyPicture(kSize, kSize, [](int x, int y) { return x == 20 && y == 30 ? 1000.0 : 0.1; });
   const EnvironmentMap sky(sun);
   const Vec3 towards = EqualAreaDirection({20.5F / kSize, 30.5F / kSize});
-  const double texel = std::sqrt(4 * kPiD) / kSize;
+  const double texel = std::sqrt(4 * kPi64) / kSize;
   const double p = SkyDetail(sky).Source(towards, limits).p;
   EXPECT_GE(p, texel * texel / 12);
   EXPECT_LE(p, texel * texel);

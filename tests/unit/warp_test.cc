@@ -1,7 +1,6 @@
 // Every map from the square has the density that its comment states.
 #include "render/math/warp.h"
 
-#include <numbers>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -12,7 +11,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kPiD = std::numbers::pi;
 constexpr int kSamples = 400000;
 constexpr int kQuestions = 8;
 const double kLevel = SidakLevel(1e-3, kQuestions);
@@ -30,7 +28,7 @@ TEST(WarpTest, DiskIsUniform) {
     ASSERT_LT(squared, 1 + 1e-6);
     ASSERT_EQ(p.z, 0);
     const double turn =
-        (std::atan2(static_cast<double>(p.y), static_cast<double>(p.x)) + kPiD) / (2 * kPiD);
+        (std::atan2(static_cast<double>(p.y), static_cast<double>(p.x)) + kPi64) / (2 * kPi64);
     const auto ring = std::min(kSide - 1, static_cast<std::size_t>(squared * kSide));
     const auto sector = std::min(kSide - 1, static_cast<std::size_t>(turn * kSide));
     observed[ring * kSide + sector] += 1;
@@ -44,13 +42,13 @@ TEST(WarpTest, CosineHemisphereFollowsTheCosine) {
     d = SquareToCosineHemisphere(u1, u2);
     return true;
   };
-  EXPECT_GT(
-      DirectionsPValue(
-          draw, [](Vec3 d) { return std::max(0.0, static_cast<double>(d.z)) / kPiD; }, kSamples, 2),
-      kLevel);
+  EXPECT_GT(DirectionsPValue(
+                draw, [](Vec3 d) { return std::max(0.0, static_cast<double>(d.z)) / kPi64; },
+                kSamples, 2),
+            kLevel);
   // A uniform hemisphere must be refused.
   EXPECT_LT(DirectionsPValue(
-                draw, [](Vec3 d) { return d.z > 0 ? 1 / (2 * kPiD) : 0; }, kSamples, 2),
+                draw, [](Vec3 d) { return d.z > 0 ? 1 / (2 * kPi64) : 0; }, kSamples, 2),
             1e-12);
 }
 
@@ -60,7 +58,7 @@ TEST(WarpTest, SphereIsUniform) {
                   d = SquareToSphere(u1, u2);
                   return true;
                 },
-                [](Vec3) { return 1 / (4 * kPiD); }, kSamples, 3),
+                [](Vec3) { return 1 / (4 * kPi64); }, kSamples, 3),
             kLevel);
 }
 
@@ -84,7 +82,7 @@ TEST_P(ConeTest, IsUniformAndUnit) {
         std::copysign(std::sqrt(std::max(0.0, 1 - sine2)), static_cast<double>(d.z));
     const double height = d.z > 0 ? sine2 / (1 + cosine) : 1 - cosine;
     const double turn =
-        (std::atan2(static_cast<double>(d.y), static_cast<double>(d.x)) + kPiD) / (2 * kPiD);
+        (std::atan2(static_cast<double>(d.y), static_cast<double>(d.x)) + kPi64) / (2 * kPi64);
     const auto ring = std::min(kSide - 1, static_cast<std::size_t>(height / GetParam() * kSide));
     const auto sector = std::min(kSide - 1, static_cast<std::size_t>(turn * kSide));
     observed[ring * kSide + sector] += 1;

@@ -116,7 +116,7 @@ TEST(MessagesTest, HostileNeedsAreRefused) {
     return absl::IsInvalidArgument(FromProto(message).status());
   };
   EXPECT_FALSE(is_refused([](auto&) {}));
-  EXPECT_TRUE(is_refused([](auto& m) { m.set_parts(std::uint64_t{1} << kParts); }));
+  EXPECT_TRUE(is_refused([](auto& m) { m.set_parts(std::uint64_t{1} << kPartCount); }));
   EXPECT_TRUE(is_refused([](auto& m) { m.set_eye_sample_sets(-1); }));
   EXPECT_TRUE(is_refused([](auto& m) { m.set_eye_sample_sets(65'537); }));
   EXPECT_TRUE(is_refused([](auto& m) { m.add_lights_without_photons(3); }));

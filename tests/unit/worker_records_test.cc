@@ -7,12 +7,10 @@
 
 #include "gtest/gtest.h"
 
+#include "tests/support/steady_time.h"
+
 namespace lucerna {
 namespace {
-
-SteadyTime At(int seconds) {
-  return SteadyTime(std::chrono::seconds(seconds));
-}
 
 TEST(WorkerRecordsTest, EachChangeOfAStandingIsReturnedOnce) {
   WorkerRecords records;

@@ -4,6 +4,7 @@
 #include "render/base/text.h"
 #include "render/formats/pbrt/light_readers.h"
 #include "render/formats/pbrt/shapes.h"
+#include "render/math/warp.h"
 
 namespace lucerna {
 
@@ -32,7 +33,7 @@ void ReadGoniometricLight(const LightInput& input) {
       map->width, map->height, [&](int x, int y) { return GoniometricLight::GrayOf(*map, x, y); });
   const double pixels = static_cast<double>(map->width) * static_cast<double>(map->height);
   const double mean = light.directions->sum() / pixels;
-  if (power_w > 0 && mean > 0) scale *= power_w / (4 * kPiD * mean);
+  if (power_w > 0 && mean > 0) scale *= power_w / (4 * kPi64 * mean);
   light.position = FinitePoint(parameters, input.to_world, {0, 0, 0});
   // The map's pole is along y of the light, as in pbrt-v4.
   light.axes = {axes->x, axes->z, axes->y};

@@ -11,6 +11,7 @@
 #include "render/formats/pbrt/shapes.h"
 #include "render/math/double3.h"
 #include "render/math/equal_area_square.h"
+#include "render/math/warp.h"
 
 namespace lucerna {
 namespace {
@@ -33,7 +34,7 @@ double IlluminanceOf(const Picture& map) {
       sum += static_cast<double>(Luminance(map.At(x / parts, y / parts)) * direction.z);
     }
   }
-  return sum * 4 * kPiD / (static_cast<double>(side) * side);
+  return sum * 4 * kPi64 / (static_cast<double>(side) * side);
 }
 
 // The rectangle that four points in a row are, in the world and not in the light's own space.
@@ -133,7 +134,7 @@ void ReadInfiniteLight(const LightInput& input) {
   GivenSpectrum spectrum;
   const Rgb color = parameters.FindEmission("L", &spectrum).value_or(Gray(1));
   // A surface that sees constant radiance L over its hemisphere receives pi L.
-  if (illuminance > 0) scale *= illuminance / kPiD;
+  if (illuminance > 0) scale *= illuminance / kPi64;
   InfiniteLight light;
   light.radiance = ScaledEmission(parameters, color, scale);
   light.portal = portal;

@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "render/formats/pbrt/light_readers.h"
+#include "render/math/warp.h"
 
 namespace lucerna {
 
@@ -12,7 +13,7 @@ void ReadPointLight(const LightInput& input) {
   double scale = parameters.Float("scale", 1, kZeroOrMore);
   const double power_w = parameters.Float("power", -1);
   const Vec3 from = parameters.Point("from", {0, 0, 0});
-  if (power_w > 0) scale *= power_w / (4 * kPiD);
+  if (power_w > 0) scale *= power_w / (4 * kPi64);
   PointLight light;
   light.position = FinitePoint(parameters, input.to_world, from);
   light.intensity = ScaledEmission(parameters, color, scale);

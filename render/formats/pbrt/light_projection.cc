@@ -4,6 +4,7 @@
 
 #include "render/formats/pbrt/light_readers.h"
 #include "render/formats/pbrt/shapes.h"
+#include "render/math/warp.h"
 
 namespace lucerna {
 namespace {
@@ -28,7 +29,7 @@ void ReadProjectionLight(const LightInput& input) {
   light.map = map;
   light.parts = std::max(1, kFewestCells / std::max(map->width, map->height));
   // The field of view is that of the shorter side.
-  const double half = std::tan(fov_deg * kPiD / 360);
+  const double half = std::tan(fov_deg * kPi64 / 360);
   const double aspect = static_cast<double>(map->width) / static_cast<double>(map->height);
   light.half_width = static_cast<float>(half * std::max(1.0, aspect));
   light.half_height = static_cast<float>(half * std::max(1.0, 1 / aspect));

@@ -5,17 +5,15 @@
 #pragma once
 
 #include <memory>
-#include <numbers>
 
 #include "render/formats/asset_reader.h"
 #include "render/formats/pbrt/parameter_list.h"
 #include "render/math/rgb.h"
 #include "render/math/transform.h"
+#include "render/math/warp.h"
 #include "render/scene/scene.h"
 
 namespace lucerna {
-
-inline constexpr double kPiD = std::numbers::pi;
 
 // What a reader is given, and where it adds the light.
 struct LightInput {

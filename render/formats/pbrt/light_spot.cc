@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "render/formats/pbrt/light_readers.h"
+#include "render/math/warp.h"
 
 namespace lucerna {
 
@@ -18,11 +19,11 @@ void ReadSpotLight(const LightInput& input) {
   const double falloff_deg = parameters.Float("conedeltaangle", 5, {0, 180});
   if (falloff_deg > width_deg) parameters.Error("conedeltaangle", "is wider than coneangle");
   SpotLight light;
-  const double cos_width = std::cos(width_deg * kPiD / 180);
-  const double cos_start = std::cos((width_deg - falloff_deg) * kPiD / 180);
+  const double cos_width = std::cos(width_deg * kPi64 / 180);
+  const double cos_start = std::cos((width_deg - falloff_deg) * kPi64 / 180);
   if (power_w > 0) {
     // The integral of the smoothstep over its part of the cone is half of the part.
-    scale *= power_w / (2 * kPiD * ((1 - cos_start) + (cos_start - cos_width) / 2));
+    scale *= power_w / (2 * kPi64 * ((1 - cos_start) + (cos_start - cos_width) / 2));
   }
   light.cos_total_width = static_cast<float>(cos_width);
   light.cos_falloff_start = static_cast<float>(cos_start);

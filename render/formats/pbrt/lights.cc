@@ -5,6 +5,7 @@
 #include "render/base/text.h"
 #include "render/formats/pbrt/kinds.h"
 #include "render/formats/pbrt/light_readers.h"
+#include "render/math/warp.h"
 
 namespace lucerna {
 namespace {
@@ -131,7 +132,7 @@ AreaLight MakeAreaLight(const AreaEmission& emission, double area_m2) {
   if (emission.power_w.has_value()) {
     const double sides = emission.two_sided ? 2 : 1;
     light.radiance *=
-        static_cast<float>(*emission.power_w / (sides * kPiD * area_m2 * emission.mean_luminance));
+        static_cast<float>(*emission.power_w / (sides * kPi64 * area_m2 * emission.mean_luminance));
   }
   return light;
 }

@@ -14,8 +14,6 @@
 namespace lucerna {
 namespace {
 
-constexpr std::array<std::string_view, 2> kPointTypes = {"point3", "point"};
-constexpr std::array<std::string_view, 2> kNormalTypes = {"normal", "normal3"};
 // Of a radius: how far the pieces may leave the curve.
 constexpr double kChordError = 0.05;
 // By which one piece may turn from the one before.

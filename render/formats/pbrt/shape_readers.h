@@ -5,6 +5,7 @@
 // Mesh  The same shape as triangles, in the same space; of shapes that are not thin.
 #pragma once
 
+#include <array>
 #include <string_view>
 #include <vector>
 
@@ -17,6 +18,10 @@
 #include "render/scene/shape_moves.h"
 
 namespace lucerna {
+
+// Types that a parameter of points, or of normals, may have.
+inline constexpr std::array<std::string_view, 2> kPointTypes = {"point3", "point"};
+inline constexpr std::array<std::string_view, 2> kNormalTypes = {"normal", "normal3"};
 
 // What the readers of all kinds of shape are given.
 struct ShapeInput {

@@ -22,8 +22,6 @@
 namespace lucerna {
 namespace {
 
-constexpr std::array<std::string_view, 2> kPointTypes = {"point3", "point"};
-constexpr std::array<std::string_view, 2> kNormalTypes = {"normal", "normal3"};
 constexpr std::array<std::string_view, 4> kPoint2Types = {"point2", "vector2", "point", "float"};
 constexpr std::array<std::string_view, 1> kIntegerType = {"integer"};
 
