@@ -91,6 +91,11 @@ double ValueAt(const ImageSums& sums, std::size_t pixel) {
   return std::max(0.0, WorkingLuminance(radiance)) / sums.weights().all();
 }
 
+// The same of what photons bring to it.
+double PhotonValueAt(const ImageSums& sums, std::size_t pixel) {
+  return std::max(0.0, WorkingLuminance(sums.At(pixel).photons)) / sums.weights().all();
+}
+
 // What a photon found by a pixel adds to its radiance, over its flux, but for a common factor:
 // albedo over the disc's area; 0 where no surface was met in the first passes (media).
 double FactorAt(const ImageSums& sums, const RadiusColumn& radii, std::size_t pixel) {
@@ -109,13 +114,16 @@ double FactorAt(const ImageSums& sums, const RadiusColumn& radii, std::size_t pi
 struct PixelMeans {
   std::vector<double> values;
   double value = 0, factor = 0;
+  double photons = 0;  // what of `value` they brought
 };
 
-PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, ThreadTeam& team) {
+// `photons` of the means only where it `has_pilots` to compare them with.
+PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, bool has_pilots,
+                   ThreadTeam& team) {
   // Of pieces, added up in their order.
   constexpr std::size_t kPixelsAtOnce = 4096;
   struct Piece {
-    double value = 0, factor = 0;
+    double value = 0, factor = 0, photons = 0;
   };
   std::vector<Piece> pieces((sums.pixels() + kPixelsAtOnce - 1) / kPixelsAtOnce);
   PixelMeans means;
@@ -127,12 +135,14 @@ PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, ThreadTeam&
         means.values[pixel] = ValueAt(sums, pixel);
         pieces[piece].value += means.values[pixel];
         pieces[piece].factor += FactorAt(sums, radii, pixel);
+        if (has_pilots) pieces[piece].photons += PhotonValueAt(sums, pixel);
       }
     }
   });
   for (const Piece& piece : pieces) {
     means.value += piece.value / static_cast<double>(sums.pixels());
     means.factor += piece.factor / static_cast<double>(sums.pixels());
+    means.photons += piece.photons / static_cast<double>(sums.pixels());
   }
   return means;
 }
@@ -269,7 +279,7 @@ struct JobEstimator::State {
     learner->Add(reports, plan.guide, photons);
     // A guide that asks for no reports was learned from enough of them.
     if (!IsGuidePass(round.last) || before->reported() == 0) return before;
-    const PixelMeans means = MeansOf(*sums, *plan.radii, team);
+    const PixelMeans means = MeansOf(*sums, *plan.radii, AsksPilots(), team);
     const auto lock = HoldColors();
     return std::make_shared<const PhotonGuide>(learner->Next(
         round.last, photons_per_pass,
@@ -277,7 +287,7 @@ struct JobEstimator::State {
           return PhotonScore(*sums, *plan.radii, settings.crop_width(), means, pixel);
         },
         [this](const PrimaryNumbers& numbers) { return EvenFlux(prepared.lights(), numbers); },
-        PilotEmissions(*plan.radii, means)));
+        FindPilotEmissions(*plan.radii, means)));
   }
 
   // The share of the photons drawn without a guide that hitpoints have found so far.
@@ -292,18 +302,23 @@ struct JobEstimator::State {
     return sent > 0 ? found / sent : 0;
   }
 
+  // Whether photons tell too little.
+  [[nodiscard]] bool AsksPilots() const {
+    constexpr double kEnoughFound = 0.125;
+    return EvenFoundShare() < kEnoughFound;
+  }
+
   // What pilot paths say of the emissions that the image needs, given what is known of its pixels.
   // None where photons tell enough.
-  [[nodiscard]] std::vector<PilotEmission> PilotEmissions(const RadiusColumn& in_use,
-                                                          const PixelMeans& means) {
-    constexpr double kEnoughFound = 0.125;
+  [[nodiscard]] PilotEmissions FindPilotEmissions(const RadiusColumn& in_use,
+                                                  const PixelMeans& means) {
     // A path's value over that of the pixel where it began. What few paths find is rare, not large.
     constexpr double kLargestValue = 64;
-    if (EvenFoundShare() >= kEnoughFound) return {};
+    if (!AsksPilots()) return {};
     if (!pilots) pilots = TracePilotPaths(*tracer, prepared.needs(), team);
     const auto power = static_cast<double>(Luminance(prepared.lights().TotalPower()));
-    std::vector<PilotEmission> emissions;
-    emissions.reserve(pilots->reports.size());
+    PilotEmissions found;
+    found.emissions.reserve(pilots->reports.size());
     const double paths_per_pixel =
         static_cast<double>(pilots->paths) / static_cast<double>(sums->pixels());
     for (const PilotReport& report : pilots->reports) {
@@ -320,11 +335,13 @@ struct JobEstimator::State {
       const double per_value =
           kPi64 * kPi64 / (factor * power * flux * FoundBy(in_use, report.pixel));
       if (!std::isfinite(brought * per_value)) continue;
-      emissions.push_back({.numbers = report.numbers,
-                           .pixel = report.pixel,
-                           .found = brought / paths_per_pixel * per_value});
+      found.emissions.push_back({.numbers = report.numbers,
+                                 .pixel = report.pixel,
+                                 .found = brought / paths_per_pixel * per_value});
+      found.brought += brought / static_cast<double>(pilots->paths);
     }
-    return emissions;
+    found.brought = means.photons > 0 ? found.brought / means.photons : HUGE_VAL;
+    return found;
   }
 
   // How many pixels find a photon that this pixel finds: as many as its disc covers.

@@ -24,8 +24,10 @@ constexpr std::size_t kFewestReports = 8;
 // Of bins of equals the sum of squared deviations has the mean 7 and the deviation sqrt(14): by
 // chance one box in a million exceeds this in one of five dimensions.
 constexpr double kSignificant = 40;
-// Over the mean score: single photons must not stand for a box.
+// Over the mean score: single photons must not stand for a box. The mean is that of limited scores,
+// or one score that is a million times the others would be the mean; so many rounds find it.
 constexpr double kLargestScore = 8;
+constexpr int kScoreRounds = 8;
 // A guide must promise so many times less variance, or passes stay as they are: photons that are
 // drawn evenly are spaced evenly over many passes, which is worth as much where a guide says
 // little.
@@ -212,17 +214,38 @@ double EqualsOf(std::span<const double> masses) {
   return squares > 0 ? sum * sum / squares : 0;
 }
 
-// Two estimates of the same masses become parts of one, each in proportion to its EqualsOf. Returns
-// the share of `a`.
-double BalanceMasses(std::span<double> a, std::span<double> b) {
-  const double of_a = EqualsOf(a);
-  const double of_b = EqualsOf(b);
-  const double share = of_b > 0 ? of_a / (of_a + of_b) : 1;
-  for (double& mass : a)
-    mass *= share;
-  for (double& mass : b)
-    mass *= 1 - share;
-  return share;
+// Returns the mean of what is left of them.
+double LimitScores(std::span<double> scores) {
+  double mean = 0;
+  for (int round = 0; round < kScoreRounds; ++round) {
+    const double largest = round == 0 ? HUGE_VAL : kLargestScore * mean;
+    mean = 0;
+    for (double& score : scores) {
+      score = std::min(score, largest);
+      mean += score / static_cast<double>(scores.size());
+    }
+  }
+  return mean;
+}
+
+double Inverse(double positive) {
+  return positive > 0 ? 1 / positive : 0;
+}
+
+// How pilot paths compare with photons.
+struct PilotWord {
+  double known = 0;   // the share of the photons' light that pilot paths find at all
+  double trials = 0;  // so many photons that are drawn evenly would say as much
+};
+// Given what both found, and what pilot paths bring to the image over what photons do.
+PilotWord WordOf(std::span<const double> photons, std::span<const double> pilots, double brought) {
+  const double of_pilots = std::accumulate(pilots.begin(), pilots.end(), 0.0);
+  if (!(of_pilots > 0)) return {};
+  // Each is known up to chance: two standard deviations are granted to both.
+  const auto granted = [](std::span<const double> found) { return 2 / std::sqrt(EqualsOf(found)); };
+  const double most = brought * (1 + granted(pilots));
+  const double least = 1 - granted(photons);
+  return {.known = least > most ? most / least : 1, .trials = EqualsOf(pilots) / of_pilots};
 }
 
 }  // namespace
@@ -252,60 +275,61 @@ void GuideLearner::Add(std::span<const EmissionReport> reports,
   numbers_.reports.insert(numbers_.reports.end(), reports.begin(), reports.end());
 }
 
-double GuideLearner::WeightAt(const PrimaryNumbers& numbers, double flux) const {
+double GuideLearner::TrialsAt(const PrimaryNumbers& numbers, double flux) const {
   double trials = 0;
-  double density = 0;
-  for (const Drawn& drawn : numbers_.drawn) {
-    trials += drawn.trials;
-    density += drawn.trials / drawn.guide->WeightAt(numbers);
-  }
-  const double factor = ReportFactor(flux);
-  return factor > 0 ? trials / (density * factor) : 0;
+  for (const Drawn& drawn : numbers_.drawn)
+    trials += drawn.trials / drawn.guide->WeightAt(numbers);
+  return trials * ReportFactor(flux);
 }
 
 PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_pass,
                                const ScoreAt& score_at, const FluxAt& flux_at,
-                               std::span<const PilotEmission> pilots) const {
+                               const PilotEmissions& pilots) const {
   // What photons reported, then what pilot paths did.
   std::vector<EmissionReport> reports = numbers_.reports;
   const std::size_t by_photons = reports.size();
-  for (const PilotEmission& pilot : pilots)
+  for (const PilotEmission& pilot : pilots.emissions)
     reports.push_back({InSteps(pilot.numbers), pilot.pixel});
-  const double count = std::max(1.0, static_cast<double>(reports.size()));
-  double trials = 0;
+  double all_trials = 0;
   for (const Drawn& drawn : numbers_.drawn)
-    trials += drawn.trials;
+    all_trials += drawn.trials;
   std::vector<double> scores;
   scores.reserve(reports.size());
   for (const EmissionReport& report : reports)
     scores.push_back(score_at(report.pixel));
-  const double largest = kLargestScore * std::accumulate(scores.begin(), scores.end(), 0.0) / count;
-  double mean_score = 0;
-  for (double& score : scores) {
-    score = std::min(score, largest);
-    mean_score += score / count;
-  }
-  // Each weight takes a walk down every guide so far.
-  std::vector<double> weights(reports.size());
+  const double mean_score = LimitScores(scores);
+  // Photons of all guides and pilot paths are so many ways to find an emission, and each finding
+  // counts by the balance heuristic of Veach & Guibas 1995: by one over the findings that were to
+  // be expected there, in all ways together.
   std::vector<double> fluxes(reports.size());
-  std::vector<double> mass(reports.size());
-  const auto mass_of = [](double weight, double flux, double score) {
-    return weight * flux * flux * score;
-  };
+  std::vector<double> trials(reports.size());
+  std::vector<double> found(reports.size());
   for (std::size_t i = 0; i < reports.size(); ++i) {
+    // Each takes a walk down every guide so far.
     const PrimaryNumbers numbers = NumbersOf(reports[i].numbers);
     fluxes[i] = flux_at(numbers);
-    weights[i] =
-        i < by_photons ? WeightAt(numbers, fluxes[i]) : trials * pilots[i - by_photons].found;
-    mass[i] = mass_of(weights[i], fluxes[i], scores[i]);
+    trials[i] = TrialsAt(numbers, fluxes[i]);
+    found[i] = i < by_photons ? Inverse(trials[i]) : pilots.emissions[i - by_photons].found;
   }
-  const std::span of_pilots = std::span(mass).subspan(by_photons);
-  const double share = BalanceMasses(std::span(mass).first(by_photons), of_pilots);
-  const double of_pilot = std::accumulate(of_pilots.begin(), of_pilots.end(), 0.0) /
-                          std::max(1.0, static_cast<double>(of_pilots.size()));
+  const std::span<double> of_photons = std::span(found).first(by_photons);
+  const std::span<double> of_pilots = std::span(found).subspan(by_photons);
+  const PilotWord word = WordOf(of_photons, of_pilots, pilots.brought);
+  const auto found_by_photon = [&word](double t) {
+    return word.known * Inverse(t + word.trials) + (1 - word.known) * Inverse(t);
+  };
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    found[i] = i < by_photons ? found_by_photon(trials[i])
+                              : found[i] * word.trials / (trials[i] + word.trials);
+  }
+  const auto mass_of = [](double of_found, double flux, double score) {
+    return of_found * flux * flux * score;
+  };
+  std::vector<double> mass(reports.size());
+  for (std::size_t i = 0; i < reports.size(); ++i)
+    mass[i] = mass_of(found[i], fluxes[i], scores[i]);
   GrownGuide grown = GrowGuide(reports, mass, [&](const PrimaryNumbers& numbers) {
     const double flux = flux_at(numbers);
-    return share * mass_of(WeightAt(numbers, flux), flux, mean_score) + of_pilot;
+    return mass_of(found_by_photon(TrialsAt(numbers, flux)), flux, mean_score);
   });
   PhotonGuide guide;
   if (grown.gain >= kLeastGain) {
@@ -314,14 +338,11 @@ PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_p
   }
   if (passes >= kLastGuidePass || static_cast<double>(by_photons) >= enough_reports_) return guide;
   // Of the photons that the guide draws; where none was found, all are reported that are.
-  double found = 1;
-  double found_by_pilots = 0;
-  for (std::size_t i = 0; i < reports.size(); ++i) {
-    (i < by_photons ? found : found_by_pilots) +=
-        weights[i] * ReportFactor(fluxes[i]) / guide.WeightAt(NumbersOf(reports[i].numbers));
-  }
-  const double found_share =
-      std::min(1.0, std::max(found, found_by_pilots) / std::max(1.0, trials));
+  double found_share = Inverse(all_trials);
+  for (std::size_t i = 0; i < reports.size(); ++i)
+    found_share +=
+        found[i] * ReportFactor(fluxes[i]) / guide.WeightAt(NumbersOf(reports[i].numbers));
+  found_share = std::min(1.0, found_share);
   const auto photons = static_cast<double>(photons_per_pass);
   const double asked = std::min(
       kSharePerGuide * enough_reports_ / (static_cast<double>(passes) * photons * found_share),

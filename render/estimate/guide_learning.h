@@ -8,9 +8,9 @@
 // of boxes is grown where that gains most, best first, as long as what photons say is significant.
 //
 // Where few photons come into view there is little to learn from. So emissions that pilot paths
-// found from the eye (tracing/pilot_paths.h) count beside those of found photons. Both estimate the
-// same masses, but pilot paths find hardly any light that smooth surfaces focus. Each counts in
-// proportion to the number of equal reports that would say as much, (sum)² / sum of squares.
+// found from the eye (tracing/pilot_paths.h) count beside those of found photons, by the balance
+// heuristic: photons where many were sent, pilot paths where few were. Pilot paths find hardly any
+// light that smooth surfaces focus; for the share of the light that they miss, photons count alone.
 //
 // All follows from sums of whole rounds in order, with correctly rounded operations: the same
 // guides on every machine.
@@ -60,6 +60,13 @@ struct PilotEmission {
   double found = 0;
 };
 
+struct PilotEmissions {
+  std::vector<PilotEmission> emissions;
+  // What pilot paths bring to the image over what photons have brought so far: where it is below 1,
+  // photons find light that they do not.
+  double brought = 0;
+};
+
 class GuideLearner {
  public:
   // Of an image of so many pixels: small ones need fewer reports.
@@ -75,7 +82,7 @@ class GuideLearner {
   // The guide after `passes`, of `photons_per_pass` from now on.
   [[nodiscard]] PhotonGuide Next(std::uint64_t passes, std::uint64_t photons_per_pass,
                                  const ScoreAt& score_at, const FluxAt& flux_at,
-                                 std::span<const PilotEmission> pilots = {}) const;
+                                 const PilotEmissions& pilots = {}) const;
 
   // Photons drawn by one guide.
   struct Drawn {
@@ -91,10 +98,9 @@ class GuideLearner {
   void Restore(Numbers numbers) { numbers_ = std::move(numbers); }
 
  private:
-  // Of a photon with these numbers and this flux: one over its density, in all that would have been
-  // reported so far, in units of the even one (the balance heuristic of Veach & Guibas 1995 over
-  // the guides).
-  [[nodiscard]] double WeightAt(const PrimaryNumbers& numbers, double flux) const;
+  // Of a photon with these numbers and this flux: how many photons that are drawn evenly, and are
+  // reported when they are found, would have had its numbers as often as all photons so far did.
+  [[nodiscard]] double TrialsAt(const PrimaryNumbers& numbers, double flux) const;
 
   double enough_reports_;
   Numbers numbers_;

@@ -109,14 +109,14 @@ TEST(GuideLearningTest, LearnsFromPilotPathsAlone) {
   GuideLearner learner(kPixels);
   learner.Add({}, std::make_shared<const PhotonGuide>(learner.First(kPhotons)), kPhotons);
   KeyedRng rng(23);
-  std::vector<PilotEmission> pilots;
-  while (pilots.size() < 1000) {
+  PilotEmissions pilots = {.emissions = {}, .brought = 1};
+  while (pilots.emissions.size() < 1000) {
     PrimaryNumbers u;
     for (double& number : u)
       number = static_cast<double>(rng.Uniform());
     u[1] = 0.4375 + 0.125 * u[1];
     u[3] = 0.875 + 0.125 * u[3];
-    pilots.push_back({.numbers = u, .pixel = 0, .found = 1.0 / 64 / 1000});
+    pilots.emissions.push_back({.numbers = u, .pixel = 0, .found = 1.0 / 64 / 1000});
   }
   const PhotonGuide guide = learner.Next(1, kPhotons, SameScore, OneFlux, pilots);
   PrimaryNumbers inside;
@@ -129,38 +129,114 @@ TEST(GuideLearningTest, LearnsFromPilotPathsAlone) {
   EXPECT_TRUE(learner.Next(1, kPhotons, SameScore, OneFlux).is_even());
 }
 
-// Found photons and pilot paths that know as much of two boxes of one size count alike.
-TEST(GuideLearningTest, WeighsPilotPathsAsFoundPhotons) {
-  constexpr std::uint64_t kPhotons = 1 << 16;
-  GuideLearner learner(kPixels);
-  const auto even = std::make_shared<const PhotonGuide>(learner.First(kPhotons));
-  // So many are reported of so many trials: one of 128.
-  const double trials = kPhotons * (even->reported() * 0x1p-32);
-  const auto count = static_cast<int>(trials / 128);
-  KeyedRng rng(29);
-  const auto within = [&](double low) {
-    PrimaryNumbers u;
-    for (double& number : u)
-      number = static_cast<double>(rng.Uniform());
-    u[0] = low + u[0] / 128;
-    return u;
-  };
-  std::vector<EmissionReport> reports;
-  std::vector<PilotEmission> pilots;
-  for (int i = 0; i < count; ++i) {
-    reports.push_back({.numbers = InSteps(within(0.25))});
-    pilots.push_back({.numbers = within(0.75), .found = 1.0 / 128 / count});
-  }
-  learner.Add(reports, even, kPhotons);
-  const PhotonGuide guide = learner.Next(1, kPhotons, SameScore, OneFlux, pilots);
+// Two boxes of 1/128 of all numbers each, along the first.
+constexpr double kBoxA = 0.25;
+constexpr double kBoxB = 0.75;
+PrimaryNumbers InBox(double low, KeyedRng& rng) {
+  PrimaryNumbers u;
+  for (double& number : u)
+    number = static_cast<double>(rng.Uniform());
+  u[0] = low + u[0] / 128;
+  return u;
+}
+double WeightIn(const PhotonGuide& guide, double low) {
   PrimaryNumbers at;
   at.fill(0.5);
-  at[0] = 0.25 + 0.5 / 128;
-  const double by_photons = guide.WeightAt(at);
-  at[0] = 0.75 + 0.5 / 128;
-  const double by_pilots = guide.WeightAt(at);
-  EXPECT_LT(by_photons, 0.1);
-  EXPECT_NEAR(by_pilots, by_photons, 0.1 * by_photons);
+  at[0] = low + 0.5 / 128;
+  return guide.WeightAt(at);
+}
+
+// Photons went to one of two boxes that are worth the same. Pilot paths, though far fewer, know
+// more of the other.
+TEST(GuideLearningTest, PilotPathsCountWherePhotonsAreRare) {
+  constexpr int kPilots = 100;  // in each box
+  KeyedRng rng(29);
+  const auto draw = [&rng](double low, int count) {
+    std::vector<EmissionReport> reports;
+    for (int i = 0; i < count; ++i)
+      reports.push_back({.numbers = InSteps(InBox(low, rng))});
+    return reports;
+  };
+  const std::vector<EmissionReport> first = draw(kBoxA, 4000);
+  const std::vector<double> masses(first.size(), 1.0);
+  const auto to_a = std::make_shared<const PhotonGuide>(
+      PhotonGuide::Create(
+          GrowGuide(first, masses, [](const PrimaryNumbers& /*numbers*/) { return 1e-9; }).nodes,
+          UINT32_MAX)
+          .value());
+  const double in_a = WeightIn(*to_a, kBoxA);
+  EXPECT_LT(in_a, 0.012);
+  EXPECT_GT(WeightIn(*to_a, kBoxB), 3.9);
+  // Of so many photons all are reported that are found: of box B ten are to be expected, and by
+  // chance there is none.
+  constexpr std::uint64_t kPhotons = 5120;
+  GuideLearner learner(kPixels);
+  learner.Add(draw(kBoxA, static_cast<int>(kPhotons / 128 / in_a)), to_a, kPhotons);
+  PilotEmissions pilots = {.emissions = {}, .brought = 1};
+  for (int i = 0; i < kPilots; ++i) {
+    for (const double low : {kBoxA, kBoxB}) {
+      pilots.emissions.push_back({.numbers = InBox(low, rng), .found = 1.0 / 128 / kPilots});
+    }
+  }
+  const PhotonGuide guide = learner.Next(1, kPhotons, SameScore, OneFlux, pilots);
+  // Pilot paths have found in B what 12,800 even photons would, and photons what 1,280 would: ten
+  // elevenths of its mass are left, and the density follows the root.
+  EXPECT_LT(WeightIn(guide, kBoxA), 0.045);
+  EXPECT_NEAR(WeightIn(guide, kBoxB) / WeightIn(guide, kBoxA), std::sqrt(11.0 / 10), 0.1);
+}
+
+// Photons find light in two boxes, pilot paths in one of them alone. Where they bring no more than
+// a half of the light, they are not believed of the other.
+TEST(GuideLearningTest, PhotonsCountForLightThatPilotPathsDoNotFind) {
+  constexpr std::uint64_t kPhotons = 1 << 16;
+  constexpr int kPilots = 2000;
+  KeyedRng rng(31);
+  GuideLearner learner(kPixels);
+  const auto even =
+      std::make_shared<const PhotonGuide>(PhotonGuide::Create({}, UINT32_MAX).value());
+  std::vector<EmissionReport> reports;
+  for (std::uint64_t i = 0; i < kPhotons / 128; ++i) {
+    for (const double low : {kBoxA, kBoxB})
+      reports.push_back({.numbers = InSteps(InBox(low, rng))});
+  }
+  learner.Add(reports, even, kPhotons);
+  PilotEmissions pilots;
+  for (int i = 0; i < kPilots; ++i)
+    pilots.emissions.push_back({.numbers = InBox(kBoxA, rng), .found = 1.0 / 128 / kPilots});
+  const auto ratio_of = [&](double brought) {
+    pilots.brought = brought;
+    const PhotonGuide guide = learner.Next(1, kPhotons, SameScore, OneFlux, pilots);
+    return WeightIn(guide, kBoxB) / WeightIn(guide, kBoxA);
+  };
+  // Pilot paths are worth p photons, and there were n. A share k of what photons say counts for
+  // n / (n + p) of itself, the rest wholly; in box A pilot paths add p / (n + p).
+  constexpr double kWorth = 128 * kPilots;
+  const auto expected = [](double known) {
+    const double of_photons = known * kPhotons / (kPhotons + kWorth) + (1 - known);
+    return std::sqrt((of_photons + kWorth / (kPhotons + kWorth)) / of_photons);
+  };
+  EXPECT_NEAR(ratio_of(1), expected(1), 0.15);
+  // With the two standard deviations that are granted to both.
+  const double known = 0.5 * (1 + 2 / std::sqrt(kPilots)) / (1 - 2 / std::sqrt(kPhotons / 64));
+  EXPECT_NEAR(ratio_of(0.5), expected(known), 0.15);
+  EXPECT_GT(ratio_of(1), ratio_of(0.5) + 0.5);
+}
+
+// A pixel with a score of a million times that of the others must not decide alone where photons
+// go.
+TEST(GuideLearningTest, ASingleHugeScoreDoesNotDecide) {
+  constexpr std::uint64_t kPhotons = 1 << 16;
+  KeyedRng rng(37);
+  GuideLearner learner(kPixels);
+  const auto even =
+      std::make_shared<const PhotonGuide>(PhotonGuide::Create({}, UINT32_MAX).value());
+  std::vector<EmissionReport> reports;
+  for (std::uint64_t i = 0; i < kPhotons / 128; ++i)
+    reports.push_back({.numbers = InSteps(InBox(kBoxA, rng)), .pixel = i == 0 ? 1U : 0U});
+  learner.Add(reports, even, kPhotons);
+  const PhotonGuide guide = learner.Next(
+      1, kPhotons, [](std::uint32_t pixel) { return pixel == 1 ? 1e6 : 1.0; }, OneFlux);
+  EXPECT_LT(WeightIn(guide, kBoxA), 0.1);
 }
 
 // A weak light in view, which gets its even share of the photons, and a strong one whose photons
