@@ -25,6 +25,9 @@ cmake --build --preset release --parallel "$(nproc)" --target lucerna lucerna-se
 bin=$root/build/release/bin
 cd "$here"
 
+# Memory in huge pages (docs/deploy.md).
+export GLIBC_TUNABLES=${GLIBC_TUNABLES:-glibc.malloc.hugetlb=1}
+
 logs=$(mktemp --directory)
 processes=()
 stop() {

@@ -329,6 +329,8 @@ def main():
     parser.add_argument("--docs", type=pathlib.Path, default=DOCS)
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
+    # As `lucerna render` and the units of systemd start them.
+    os.environ.setdefault("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1")
     arguments.references.mkdir(parents=True, exist_ok=True)
     (arguments.docs / "convergence").mkdir(parents=True, exist_ok=True)
     run([ROOT / "tests/tools/make_study_scenes.py", arguments.work / "scenes", "--half", "b"])

@@ -79,6 +79,31 @@ TEST_F(LocalClusterTest, StartsAndEndsAll) {
   EXPECT_NE(::kill(coordinator, 0), 0);
 }
 
+TEST_F(LocalClusterTest, ChildrenHaveTheVariablesOfTheUserAndHugePages) {
+  ::setenv("LUCERNA_LOCAL_CLUSTER_TEST", "here", 1);
+  const std::string script = "echo \"$LUCERNA_LOCAL_CLUSTER_TEST $GLIBC_TUNABLES\" > " + folder_ +
+                             "/variables\n" + kStays;
+  const auto variables_of_worker = [&] {
+    Write("lucerna-server", std::string(kListens) + kStays);
+    Write("lucerna-worker", script);
+    std::filesystem::remove(folder_ + "/variables");
+    auto cluster = LocalCluster::Start(Options(1));
+    EXPECT_TRUE(cluster.ok()) << cluster.status();
+    std::string lines;
+    for (int i = 0; i < 6000 && !lines.ends_with('\n'); ++i) {
+      lines = Lines("variables");
+      std::this_thread::sleep_for(milliseconds(10));
+    }
+    return lines;
+  };
+  ::unsetenv("GLIBC_TUNABLES");
+  EXPECT_EQ(variables_of_worker(), "here glibc.malloc.hugetlb=1\n");
+  ::setenv("GLIBC_TUNABLES", "glibc.malloc.arena_max=2", 1);
+  EXPECT_EQ(variables_of_worker(), "here glibc.malloc.arena_max=2\n");
+  ::unsetenv("GLIBC_TUNABLES");
+  ::unsetenv("LUCERNA_LOCAL_CLUSTER_TEST");
+}
+
 TEST_F(LocalClusterTest, KillsAChildThatDoesNotLeave) {
   Write("lucerna-server", std::string(kListens) + "trap '' TERM; while true; do sleep 0.1; done");
   Write("lucerna-worker", kStays);
