@@ -32,8 +32,8 @@ constexpr std::chrono::milliseconds kPollEvery{10};
 constexpr std::size_t kKeptLines = 10;
 constexpr std::size_t kMaxLineBytes = 1000;
 constexpr char kListening[] = "listening on ";
-// Of the GNU C library: memory comes in huge pages where the kernel has them on request, which saves
-// page faults and misses of the TLB (docs/decisions/huge-pages.md).
+// Of the GNU C library: memory comes in huge pages where the kernel has them on request, which
+// saves page faults and misses of the TLB (docs/decisions/huge-pages.md).
 constexpr char kTunables[] = "GLIBC_TUNABLES=";
 constexpr char kHugePages[] = "glibc.malloc.hugetlb=1";
 
@@ -42,9 +42,8 @@ std::vector<std::string> ChildEnvironment() {
   std::vector<std::string> variables;
   for (char** variable = ::environ; *variable != nullptr; ++variable)
     variables.emplace_back(*variable);
-  if (std::ranges::none_of(variables, [](const std::string& variable) {
-        return variable.starts_with(kTunables);
-      })) {
+  if (std::ranges::none_of(
+          variables, [](const std::string& variable) { return variable.starts_with(kTunables); })) {
     variables.push_back(absl::StrCat(kTunables, kHugePages));
   }
   return variables;

@@ -81,8 +81,8 @@ TEST_F(LocalClusterTest, StartsAndEndsAll) {
 
 TEST_F(LocalClusterTest, ChildrenHaveTheVariablesOfTheUserAndHugePages) {
   ::setenv("LUCERNA_LOCAL_CLUSTER_TEST", "here", 1);
-  const std::string script = "echo \"$LUCERNA_LOCAL_CLUSTER_TEST $GLIBC_TUNABLES\" > " + folder_ +
-                             "/variables\n" + kStays;
+  const std::string script =
+      "echo \"$LUCERNA_LOCAL_CLUSTER_TEST $GLIBC_TUNABLES\" > " + folder_ + "/variables\n" + kStays;
   const auto variables_of_worker = [&] {
     Write("lucerna-server", std::string(kListens) + kStays);
     Write("lucerna-worker", script);
