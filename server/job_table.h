@@ -384,6 +384,7 @@ class JobTable {
     std::vector<Entries::node_type> entries;
   };
 
+  [[nodiscard]] static Status UnknownJob(const std::string& job_id);
   [[nodiscard]] std::uint64_t SerialOf(std::string_view job_id) const;
   Entries::iterator FindLocked(const std::string& job_id) LUCERNA_REQUIRES(mutex_);
   Entries::const_iterator FindLocked(const std::string& job_id) const LUCERNA_REQUIRES(mutex_);

@@ -276,6 +276,13 @@ class Scheduler {
   void RestoreStanding(const WorkerStanding& standing, SteadyTime now);
 
  private:
+  // So many audits are looked at for one worker. A worker is passed over only by audits that it has
+  // a part in, and each has a few.
+  static constexpr int kMostLookedAt = 8;
+  static constexpr std::size_t kMostReason = 200;  // of what workers say, for messages
+  // Losses, and leases that ended, between two calls that take them.
+  static constexpr std::size_t kMostLosses = 1000;
+
   // How a lease ended.
   enum class Ending : std::uint8_t {
     kDelivered,    // by its result
