@@ -65,17 +65,17 @@ EmissionCheck::EmissionCheck(const LightSet& lights, double largest_power)
   }
 }
 
-Status EmissionCheck::CheckGuided(const BatchTally& tally) const {
+Status EmissionCheck::CheckGuided(const BatchTally& tally, double unguided_share) const {
   const auto photons = static_cast<double>(tally.photons);
   if (photons == 0) return absl::OkStatus();
   constexpr double kLogOfChance = 28.3;
-  // Each photon stands for one that is drawn evenly with a probability of kUnguidedShare on
+  // Each photon stands for one that is drawn evenly with a probability of unguided_share on
   // average, and only those count for their lights. Hoeffding's inequality: fewer by t with a
   // probability of at most exp(-2 t² / n).
   std::uint64_t sent = 0;
   for (const LightTally& light : tally.lights)
     sent += light.sent;
-  const double fewest = kUnguidedShare * photons - std::sqrt(kLogOfChance * photons / 2);
+  const double fewest = unguided_share * photons - std::sqrt(kLogOfChance * photons / 2);
   if (sent > tally.photons || static_cast<double>(sent) < fewest) {
     return absl::InvalidArgumentError(
         absl::StrCat("its lights sent ", sent, " of ", tally.photons, " photons"));
@@ -105,12 +105,12 @@ Status EmissionCheck::CheckGuided(const BatchTally& tally) const {
   return absl::OkStatus();
 }
 
-Status EmissionCheck::Check(const BatchTally& tally, bool is_guided) const {
+Status EmissionCheck::Check(const BatchTally& tally, double unguided_share) const {
   if (lights_.empty()) return absl::OkStatus();
   if (tally.lights.size() > lights_.size()) {
     return absl::InvalidArgumentError("its photons come from more lights than the scene has");
   }
-  if (is_guided) return CheckGuided(tally);
+  if (unguided_share < 1) return CheckGuided(tally, unguided_share);
   std::uint64_t sent = 0;
   double least = 0;
   double most = 0;

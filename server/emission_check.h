@@ -23,17 +23,18 @@ class EmissionCheck {
 
   // Errors: INVALID_ARGUMENT when photons were sent by other lights than there are, not all were
   // sent by some light, or the energy emitted is not that of so many photons; of photons that are
-  // drawn by a guide (`is_guided`), whose flux differs, not what so many could have by chance in
-  // one result of a million million. Takes a time that grows with the number of lights, of which
-  // there are at most kMaxLightTallies.
-  [[nodiscard]] Status Check(const BatchTally& tally, bool is_guided = false) const;
+  // drawn by a guide, whose flux differs and of which `unguided_share` or more count for their
+  // lights (PhotonGuide::UnguidedShare; 1: there is no guide), not what so many could have by
+  // chance in one result of a million million. Takes a time that grows with the number of lights,
+  // of which there are at most kMaxLightTallies.
+  [[nodiscard]] Status Check(const BatchTally& tally, double unguided_share = 1) const;
 
  private:
   // Of one photon [units of EnergyCounters].
   struct Range {
     double least = 0, most = 0;
   };
-  [[nodiscard]] Status CheckGuided(const BatchTally& tally) const;
+  [[nodiscard]] Status CheckGuided(const BatchTally& tally, double unguided_share) const;
 
   std::vector<Range> lights_;
   bool may_emit_less_ = false;  // spots, lights that are counted together, other colours

@@ -23,6 +23,7 @@
 #include "render/estimate/photon_steps.h"
 #include "render/estimate/pixel_radii.h"
 #include "render/estimate/relative_error.h"
+#include "render/estimate/scatter_learning.h"
 #include "render/film/film.h"
 #include "render/film/layers.h"
 #include "render/math/color_space.h"
@@ -218,6 +219,7 @@ struct JobEstimator::State {
   std::map<std::uint64_t, After> after;
   std::unique_ptr<GuideLearner> learner;           // of jobs whose photons are drawn by guides
   std::optional<PilotReports> pilots;              // traced when the first guide is learned
+  PilotReports scatter_pilots;                     // these and further ones, as passes come
   std::shared_ptr<const RadiusColumn> last_radii;  // of the last round added
   // Of the last estimate, and after how many passes that was.
   Mutex noise_area_mutex;
@@ -281,13 +283,16 @@ struct JobEstimator::State {
     if (!IsGuidePass(round.last) || before->reported() == 0) return before;
     const PixelMeans means = MeansOf(*sums, *plan.radii, AsksPilots(), team);
     const auto lock = HoldColors();
+    const auto scatterings = AsksPilots()
+                                 ? LearnScatterings(*plan.radii, means, round.last, *before)
+                                 : before->scatterings();
     return std::make_shared<const PhotonGuide>(learner->Next(
         round.last, photons_per_pass,
         [&](std::uint32_t pixel) {
           return PhotonScore(*sums, *plan.radii, settings.crop_width(), means, pixel);
         },
         [this](const PrimaryNumbers& numbers) { return EvenFlux(prepared.lights(), numbers); },
-        FindPilotEmissions(*plan.radii, means)));
+        FindPilotEmissions(*plan.radii, means, scatterings.get()), scatterings));
   }
 
   // The share of the photons drawn without a guide that hitpoints have found so far.
@@ -308,40 +313,115 @@ struct JobEstimator::State {
     return EvenFoundShare() < kEnoughFound;
   }
 
-  // What pilot paths say of the emissions that the image needs, given what is known of its pixels.
-  // None where photons tell enough.
-  [[nodiscard]] PilotEmissions FindPilotEmissions(const RadiusColumn& in_use,
-                                                  const PixelMeans& means) {
+  // What a report of a pilot path stands for, given what is known of the image's pixels.
+  struct Found {
+    double flux = 0;     // EvenFlux
+    double brought = 0;  // to the pixel, luminance
+    // So many photons of this emission are found for each unit that they bring.
+    double photons_per_value = 0;
+  };
+  [[nodiscard]] std::optional<Found> FoundOf(const PilotReport& report, const RadiusColumn& in_use,
+                                             const PixelMeans& means) const {
     // A path's value over that of the pixel where it began. What few paths find is rare, not large.
     constexpr double kLargestValue = 64;
+    const double factor = FactorAt(*sums, in_use, report.pixel);
+    Found found = {.flux = EvenFlux(prepared.lights(), report.numbers), .brought = report.brought};
+    if (!(factor > 0 && found.flux > 0)) return std::nullopt;
+    if (means.value > 0) {
+      found.brought =
+          std::min(found.brought, kLargestValue * means.value *
+                                      BrightnessAround(means, settings.crop_width(), report.pixel));
+    }
+    // A photon of flux f that a pixel finds adds f albedo / (π² radius²) to its radiance.
+    const auto power = static_cast<double>(Luminance(prepared.lights().TotalPower()));
+    found.photons_per_value =
+        kPi64 * kPi64 / (factor * power * found.flux * FoundBy(in_use, report.pixel));
+    if (!std::isfinite(found.brought * found.photons_per_value)) return std::nullopt;
+    return found;
+  }
+
+  // By what photons that first land are scattered after `passes`, where until now `before` was in
+  // use; nullptr: by BSDFs, where that lights most of the image well. Requires AsksPilots().
+  [[nodiscard]] std::shared_ptr<const ScatterGuide> LearnScatterings(const RadiusColumn& in_use,
+                                                                     const PixelMeans& means,
+                                                                     std::uint64_t passes,
+                                                                     const PhotonGuide& before) {
+    constexpr std::uint64_t kPhotonsPerPath = 32;
+    constexpr std::uint64_t kMostPaths = 65536;
+    // Of what photons bring, so much must come from where the guide has cells.
+    constexpr double kLeastLight = 0.15;
+    // Before, it is too uncertain what photons bring.
+    constexpr std::uint64_t kFirstPasses = 4;
+    if (passes < kFirstPasses) return nullptr;
+    if (!pilots) pilots = TracePilotPaths(*tracer, prepared.needs(), team);
+    if (pilots->reports.empty()) return nullptr;
+    const PilotReports* learned_from = &*pilots;
+    // More paths, as a small part of what passes cost, refine what has shown its worth.
+    if (before.scatterings() != nullptr) {
+      if (scatter_pilots.paths == 0) scatter_pilots = *pilots;
+      const std::uint64_t paths =
+          passes * static_cast<std::uint64_t>(settings.photons_per_pass) / kPhotonsPerPath;
+      AddPilotPaths(*tracer, prepared.needs(), std::min(paths, kMostPaths), team, scatter_pilots);
+      learned_from = &scatter_pilots;
+    }
+    std::vector<ScatterReport> reports;
+    std::vector<double> brought;
+    for (const PilotReport& report : learned_from->reports) {
+      if (!(report.scattering.density > 0)) continue;
+      const std::optional<Found> found = FoundOf(report, in_use, means);
+      if (!found) continue;
+      const double score = PhotonScore(*sums, in_use, settings.crop_width(), means, report.pixel);
+      reports.push_back({.position = report.scattering.position,
+                         .direction = report.scattering.direction,
+                         .density = report.scattering.density,
+                         .mass = found->brought * found->photons_per_value * found->flux *
+                                 found->flux * score * before.WeightAt(report.numbers)});
+      brought.push_back(found->brought / static_cast<double>(learned_from->paths));
+    }
+    ScatterGuide guide = LearnScatterGuide(reports);
+    double light = 0;  // that comes from where the guide has cells
+    for (std::size_t i = 0; i < reports.size(); ++i) {
+      if (guide.CellAt(reports[i].position) != ScatterGuide::kNoCell) light += brought[i];
+    }
+    // One that is in use stays: of photons that it led, emissions that need many without it are not
+    // told.
+    if (guide.empty()) return before.scatterings();
+    if (before.scatterings() == nullptr && light < kLeastLight * means.photons) return nullptr;
+    return std::make_shared<const ScatterGuide>(std::move(guide));
+  }
+
+  // What pilot paths say of the emissions that the image needs, given what is known of its pixels,
+  // where photons are scattered by `scatterings` (nullptr: by BSDFs). None where photons tell
+  // enough.
+  [[nodiscard]] PilotEmissions FindPilotEmissions(const RadiusColumn& in_use,
+                                                  const PixelMeans& means,
+                                                  const ScatterGuide* scatterings) {
     if (!AsksPilots()) return {};
     if (!pilots) pilots = TracePilotPaths(*tracer, prepared.needs(), team);
-    const auto power = static_cast<double>(Luminance(prepared.lights().TotalPower()));
-    PilotEmissions found;
-    found.emissions.reserve(pilots->reports.size());
+    PilotEmissions emissions;
+    emissions.emissions.reserve(pilots->reports.size());
     const double paths_per_pixel =
         static_cast<double>(pilots->paths) / static_cast<double>(sums->pixels());
     for (const PilotReport& report : pilots->reports) {
-      const double factor = FactorAt(*sums, in_use, report.pixel);
-      const double flux = EvenFlux(prepared.lights(), report.numbers);
-      if (!(factor > 0 && flux > 0)) continue;
-      double brought = report.brought;
-      if (means.value > 0) {
-        brought =
-            std::min(brought, kLargestValue * means.value *
-                                  BrightnessAround(means, settings.crop_width(), report.pixel));
+      const std::optional<Found> found = FoundOf(report, in_use, means);
+      if (!found) continue;
+      // Counted by what they add to the variance.
+      double flux_factor = 1;
+      if (scatterings != nullptr && report.scattering.density > 0) {
+        const ScatterGuide::Cell cell = scatterings->CellAt(report.scattering.position);
+        if (cell != ScatterGuide::kNoCell) {
+          flux_factor = scatterings->FluxFactor(cell, report.scattering.direction,
+                                                static_cast<double>(report.scattering.density));
+        }
       }
-      // A photon of flux f that a pixel finds adds f albedo / (π² radius²) to its radiance.
-      const double per_value =
-          kPi64 * kPi64 / (factor * power * flux * FoundBy(in_use, report.pixel));
-      if (!std::isfinite(brought * per_value)) continue;
-      found.emissions.push_back({.numbers = report.numbers,
-                                 .pixel = report.pixel,
-                                 .found = brought / paths_per_pixel * per_value});
-      found.brought += brought / static_cast<double>(pilots->paths);
+      emissions.emissions.push_back(
+          {.numbers = report.numbers,
+           .pixel = report.pixel,
+           .found = flux_factor * (found->brought / paths_per_pixel * found->photons_per_value)});
+      emissions.brought += found->brought / static_cast<double>(pilots->paths);
     }
-    found.brought = means.photons > 0 ? found.brought / means.photons : HUGE_VAL;
-    return found;
+    emissions.brought = means.photons > 0 ? emissions.brought / means.photons : HUGE_VAL;
+    return emissions;
   }
 
   // How many pixels find a photon that this pixel finds: as many as its disc covers.

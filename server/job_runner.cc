@@ -413,7 +413,7 @@ Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
   }
   if (open.plan.guide != nullptr &&
       (guides_.empty() || *guides_.back().guide != *open.plan.guide)) {
-    if (!open.plan.guide->is_even()) is_guided_ = true;
+    unguided_share_ = std::min(unguided_share_.load(), open.plan.guide->UnguidedShare());
     guides_.push_back({round.first, open.plan.guide});
     hooks_.on_guides(guides_);
   }
@@ -681,8 +681,9 @@ Status JobRunner::Restore(std::string_view sums) {
   error_at_most_ = error_at_most;
   photon_steps_ = std::move(steps);
   guides_ = std::move(guides);
-  is_guided_ =
-      std::ranges::any_of(guides_, [](const GuideStep& step) { return !step.guide->is_even(); });
+  unguided_share_ = 1;
+  for (const GuideStep& step : guides_)
+    unguided_share_ = std::min(unguided_share_.load(), step.guide->UnguidedShare());
   return absl::OkStatus();
 }
 
@@ -799,7 +800,7 @@ void JobRunner::Stop(Status why) {
 
 // Called for results of leases, so after Prepare.
 Status JobRunner::CheckEmission(const BatchTally& tally) const {
-  return emission_check_.Check(tally, is_guided_);
+  return emission_check_.Check(tally, unguided_share_);
 }
 
 void JobRunner::Wake() {

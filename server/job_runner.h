@@ -253,8 +253,9 @@ class JobRunner final : public RunningJob {
   mutable Mutex estimator_mutex_;
   std::shared_ptr<JobEstimator> estimator_;  // set once, before any other thread may ask
   std::atomic<bool> is_running_ = false;
-  EmissionCheck emission_check_;         // set with the estimator
-  std::atomic<bool> is_guided_ = false;  // by a guide that is not even
+  EmissionCheck emission_check_;  // set with the estimator
+  // Of the photons of all guides so far, those that count for their lights at least.
+  std::atomic<double> unguided_share_ = 1;
 
   // The runner's thread only.
   ReferenceImage reference_;

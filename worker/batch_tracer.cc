@@ -181,7 +181,9 @@ std::vector<FoundPhoton> ReportFound(const PhotonPathTracer& tracer, std::uint64
       Found of_piece;
       for (std::size_t i = begin; i < end; ++i) {
         if (found_by[i] == kNotFound) continue;
-        const std::uint64_t index = tracer.IndexOf(pass, first, grid.source(i).number);
+        const DepositSource source = grid.source(i);
+        if (!source.is_reportable) continue;
+        const std::uint64_t index = tracer.IndexOf(pass, first, source.number);
         if (const auto numbers = tracer.ReportOf(pass, index))
           of_piece.push_back({index, *numbers, found_by[i]});
       }

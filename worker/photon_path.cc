@@ -53,6 +53,20 @@ PrimaryNumbers EvenNumbers(const SobolPoint& u, KeyedRng& rng) {
           static_cast<double>(u[3]), FineChoice(u[4], rng.Uniform())};
 }
 
+// Draws the direction of a diffuse scattering by a guide, with its share of probability. Returns
+// the factor of the flux; 0 where it leads into the surface.
+float GuideScattering(const ScatterGuide& guide, ScatterGuide::Cell cell, const Frame& frame,
+                      float wo_z, float u_choice, float u1, float u2, BsdfSample& sample) {
+  Vec3 wi = frame.ToWorld(sample.wi);
+  if (static_cast<double>(u_choice) < kGuidedScatterings) {
+    wi = guide.Draw(cell, u1, u2);
+    sample.wi = frame.ToLocal(wi);
+  }
+  if (!(sample.wi.z * wo_z > 0)) return 0;
+  sample.pdf = std::abs(sample.wi.z) * kInversePi;
+  return static_cast<float>(guide.FluxFactor(cell, wi, static_cast<double>(sample.pdf)));
+}
+
 // Records nothing: for photons that are not replayed.
 struct NoWatcher {
   void Emitted(const Emission& /*emission*/) const {}
@@ -147,6 +161,7 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
       settings_(settings),
       spectra_(spectra),
       guide_(guide),
+      scatterings_(guide != nullptr ? guide->scatterings().get() : nullptr),
       region_(region),
       media_region_(media_region),
       media_(scene, intersector),
@@ -355,15 +370,23 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
   Emission emission;
   PrimaryNumbers numbers = EvenNumbers(u, rng);
   float weight = 1;
+  // The densities of guides are in part those that photons have without a guide: of the photons
+  // drawn here, those of that part have this share, and are distributed as all would be.
+  double unguided_share = 1;
   bool is_unguided = true;
-  if (guide_ != nullptr && !guide_->is_even()) {
+  bool is_reportable = true;
+  const auto mark = [&](double flux_factor) {
+    constexpr std::uint64_t kPartKey = 0x554E475549444544ULL;
+    const std::uint64_t bits = CombineKeys(key.job_key ^ kPartKey, key.number);
+    is_unguided = static_cast<double>(bits >> 32) < unguided_share * flux_factor * 0x1p32;
+    const double reportable = guide_->ReportableShare(flux_factor);
+    is_reportable = static_cast<double>(bits & UINT32_MAX) < reportable * 0x1p32;
+  };
+  if (guide_ != nullptr && (!guide_->is_even() || scatterings_ != nullptr)) {
     const double factor = guide_->Draw(numbers);
     weight = static_cast<float>(factor);
-    // The guide's density is in part even: of the photons drawn here, those of that part have this
-    // share, and are distributed as all photons would be without a guide.
-    constexpr std::uint64_t kPartKey = 0x554E475549444544ULL;
-    const std::uint64_t bits = CombineKeys(key.job_key ^ kPartKey, key.number) >> 32;
-    is_unguided = static_cast<double>(bits) < factor * kUnguidedShare * 0x1p32;
+    unguided_share = guide_->UnguidedShare(factor);
+    mark(/*flux_factor=*/1);
   }
   const auto single = [](double number) {
     return std::min(static_cast<float>(number), 0x1.fffffep-1F);
@@ -378,7 +401,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
   const auto source_of = [&](PathClass path) {
     constexpr std::uint32_t kNumbers = (1U << DepositSource::kNumberBits) - 1;
     return DepositSource{static_cast<std::uint32_t>(key.number) & kNumbers, light, path,
-                         is_unguided}
+                         is_unguided, is_reportable}
         .Packed();
   };
   watcher.Emitted(emission);
@@ -392,6 +415,12 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
   const auto book = [&](float after, std::int64_t& account) {
     const std::int64_t units = WholeUnits(after);
     account += carried - units;
+    carried = units;
+  };
+  // As with a roulette, some photons get more energy and others less.
+  const auto rebook = [&](float after) {
+    const std::int64_t units = WholeUnits(after);
+    (units > carried ? energy.roulette_gain : energy.roulette_loss) += std::abs(units - carried);
     carried = units;
   };
   const auto end = [&](PhotonEnd why, std::int64_t& account) {
@@ -488,10 +517,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
     }();
     if (parts.dispersion && wavelength.IsFirstUsedAt(material)) {
       flux *= wavelength.color();
-      // As with a roulette, some photons get more energy and others less.
-      const std::int64_t units = WholeUnits(EnergyOf(flux));
-      (units > carried ? energy.roulette_gain : energy.roulette_loss) += std::abs(units - carried);
-      carried = units;
+      rebook(EnergyOf(flux));
       watcher.TookWavelength(wavelength.nm());
     }
     watcher.Landed(hit, surface, material, flux);
@@ -579,6 +605,15 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
     }();
     if (!is_scattered) return end(PhotonEnd::kAbsorbed, energy.absorbed);
     met_smooth_only = met_smooth_only && sample.is_delta;
+    float guided = 1;
+    if (scatterings_ != nullptr && landing == 0 && material.kind == Material::Kind::kDiffuse) {
+      const ScatterGuide::Cell cell = scatterings_->CellAt(surface.position);
+      if (cell != ScatterGuide::kNoCell) {
+        guided = GuideScattering(*scatterings_, cell, frame, wo_local.z, u_lobe, u1, u2, sample);
+        if (!(guided > 0)) return end(PhotonEnd::kRoulette, energy.roulette_loss);
+        mark(static_cast<double>(guided));
+      }
+    }
     const Vec3 wi = frame.ToWorld(sample.wi);
     Rgb scattered = flux * sample.weight;
     watcher.Scattered(sample, wo_local.z, wi, scattered);
@@ -597,6 +632,11 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
                                      : MaxChannel(flux);
     if (const std::optional<PhotonEnd> over = play(before, scattered)) return *over;
     flux = scattered;
+    if (guided != 1) {
+      flux *= guided;
+      rebook(EnergyOf(flux));
+      watcher.Left(flux);
+    }
     if constexpr (kSpectrum) spectra_->Scatter(spectrum, surface, material, wo, wi, sample.part);
     if (parts.media && wo_local.z * sample.wi.z < 0) medium = media_.Beyond(surface, wi, medium);
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};

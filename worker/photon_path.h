@@ -43,15 +43,17 @@ struct DepositSource {
   PathClass path = PathClass::kOther;
   // Whether it is one of those that stand for all photons drawn without a guide.
   bool is_unguided = true;
+  bool is_reportable = true;  // where the guide asks for reports (PhotonGuide::ReportableShare)
 
   [[nodiscard]] std::uint32_t Packed() const {
-    return static_cast<std::uint32_t>(is_unguided) << 31U | number << 7U |
+    return static_cast<std::uint32_t>(is_unguided) << 31U |
+           static_cast<std::uint32_t>(is_reportable) << 30U | number << 7U |
            static_cast<std::uint32_t>(light) << 1U | static_cast<std::uint32_t>(path);
   }
   [[nodiscard]] static DepositSource Unpacked(std::uint32_t bits) {
     return {bits >> 7U & ((1U << kNumberBits) - 1),
             static_cast<std::uint8_t>(bits >> 1U & (kMaxLightGroups - 1)),
-            static_cast<PathClass>(bits & 1U), bits >> 31U != 0};
+            static_cast<PathClass>(bits & 1U), bits >> 31U != 0, (bits >> 30U & 1U) != 0};
   }
 };
 static_assert(kMaxLightGroups == 64 && kMaxLightTallies == kMaxLightGroups);
@@ -110,7 +112,7 @@ struct PhotonLanding {
   Rgb scattered;           // flux, before the roulette
   float survival = 0;      // probability; 1 and above: no roulette
   bool went_on = false;
-  Rgb leaving_flux;  // after the roulette
+  Rgb leaving_flux;  // after the roulette, and times a guide's factor
 };
 
 // All that a photon did.
@@ -211,8 +213,9 @@ class PhotonPathTracer {
   const Intersector& intersector_;
   const LightSet& lights_;
   const RenderSettings& settings_;
-  const SpectrumTracer* spectra_;  // nullptr: no frequency photons
-  const PhotonGuide* guide_;       // nullptr: an even one
+  const SpectrumTracer* spectra_;    // nullptr: no frequency photons
+  const PhotonGuide* guide_;         // nullptr: an even one
+  const ScatterGuide* scatterings_;  // nullptr: directions are drawn by BSDFs alone
   Bounds region_;
   Bounds media_region_;
   const Media media_;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "render/math/vector.h"
 #include "render/transport/photon_guide.h"
 
 namespace lucerna {
@@ -25,6 +26,14 @@ struct FoundPhoton {
   bool operator==(const FoundPhoton&) const = default;
 };
 
+// Where a photon first lands and goes on.
+struct FirstScattering {
+  Vec3 position;      // [scene units]
+  Vec3 direction;     // in which it goes on
+  float density = 0;  // of the BSDF [1/sr]; 0: the surface is not diffuse, or there is none
+  bool operator==(const FirstScattering&) const = default;
+};
+
 // An emission that a pilot path led to (tracing/pilot_paths.h).
 struct PilotReport {
   PrimaryNumbers numbers{};
@@ -32,6 +41,7 @@ struct PilotReport {
   // What the path says the light of this emission adds to the pixel, luminance: the sum over the
   // reports of a pixel, over its paths, estimates what photons bring to it.
   double brought = 0;
+  FirstScattering scattering;
 };
 struct PilotReports {
   std::vector<PilotReport> reports;

@@ -214,20 +214,6 @@ double EqualsOf(std::span<const double> masses) {
   return squares > 0 ? sum * sum / squares : 0;
 }
 
-// Returns the mean of what is left of them.
-double LimitScores(std::span<double> scores) {
-  double mean = 0;
-  for (int round = 0; round < kScoreRounds; ++round) {
-    const double largest = round == 0 ? HUGE_VAL : kLargestScore * mean;
-    mean = 0;
-    for (double& score : scores) {
-      score = std::min(score, largest);
-      mean += score / static_cast<double>(scores.size());
-    }
-  }
-  return mean;
-}
-
 double Inverse(double positive) {
   return positive > 0 ? 1 / positive : 0;
 }
@@ -250,6 +236,19 @@ PilotWord WordOf(std::span<const double> photons, std::span<const double> pilots
 
 }  // namespace
 
+double LimitScores(std::span<double> scores) {
+  double mean = 0;
+  for (int round = 0; round < kScoreRounds; ++round) {
+    const double largest = round == 0 ? HUGE_VAL : kLargestScore * mean;
+    mean = 0;
+    for (double& score : scores) {
+      score = std::min(score, largest);
+      mean += score / static_cast<double>(scores.size());
+    }
+  }
+  return mean;
+}
+
 GrownGuide GrowGuide(std::span<const EmissionReport> reports, std::span<const double> mass,
                      const MassAt& mass_at) {
   return Grower(reports, mass, mass_at).Grow();
@@ -268,7 +267,8 @@ void GuideLearner::Add(std::span<const EmissionReport> reports,
                        std::shared_ptr<const PhotonGuide> guide, std::uint64_t photons) {
   if (guide->reported() == 0 || photons == 0) return;
   std::vector<Drawn>& drawn = numbers_.drawn;
-  const double trials = static_cast<double>(photons) * ShareOf(guide->reported());
+  const double trials = static_cast<double>(photons) * ShareOf(guide->reported()) *
+                        guide->ReportableShare(/*flux_factor=*/1);
   // Rounds are added in order, and so are their guides.
   if (drawn.empty() || *drawn.back().guide != *guide) drawn.push_back({std::move(guide), 0});
   drawn.back().trials += trials;
@@ -284,7 +284,8 @@ double GuideLearner::TrialsAt(const PrimaryNumbers& numbers, double flux) const 
 
 PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_pass,
                                const ScoreAt& score_at, const FluxAt& flux_at,
-                               const PilotEmissions& pilots) const {
+                               const PilotEmissions& pilots,
+                               std::shared_ptr<const ScatterGuide> scatterings) const {
   // What photons reported, then what pilot paths did.
   std::vector<EmissionReport> reports = numbers_.reports;
   const std::size_t by_photons = reports.size();
@@ -336,6 +337,7 @@ PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_p
     StatusOr<PhotonGuide> created = PhotonGuide::Create(std::move(grown.nodes), 0);
     if (created.ok()) guide = *std::move(created);
   }
+  guide = PhotonGuide::Create(guide.nodes(), 0, scatterings).value();
   if (passes >= kLastGuidePass || static_cast<double>(by_photons) >= enough_reports_) return guide;
   // Of the photons that the guide draws; where none was found, all are reported that are.
   double found_share = Inverse(all_trials);
@@ -347,7 +349,7 @@ PhotonGuide GuideLearner::Next(std::uint64_t passes, std::uint64_t photons_per_p
   const double asked = std::min(
       kSharePerGuide * enough_reports_ / (static_cast<double>(passes) * photons * found_share),
       static_cast<double>(kMostReports) / photons);  // even if all are found
-  return PhotonGuide::Create(guide.nodes(), ReportedShare(asked)).value();
+  return PhotonGuide::Create(guide.nodes(), ReportedShare(asked), guide.scatterings()).value();
 }
 
 }  // namespace lucerna

@@ -79,10 +79,11 @@ class GuideLearner {
   void Add(std::span<const EmissionReport> reports, std::shared_ptr<const PhotonGuide> guide,
            std::uint64_t photons);
 
-  // The guide after `passes`, of `photons_per_pass` from now on.
+  // The guide after `passes`, of `photons_per_pass` from now on, which draws by `scatterings`.
   [[nodiscard]] PhotonGuide Next(std::uint64_t passes, std::uint64_t photons_per_pass,
                                  const ScoreAt& score_at, const FluxAt& flux_at,
-                                 const PilotEmissions& pilots = {}) const;
+                                 const PilotEmissions& pilots = {},
+                                 std::shared_ptr<const ScatterGuide> scatterings = nullptr) const;
 
   // Photons drawn by one guide.
   struct Drawn {
@@ -105,6 +106,9 @@ class GuideLearner {
   double enough_reports_;
   Numbers numbers_;
 };
+
+// Limits scores to a multiple of their mean, which is that of limited scores. Returns it.
+double LimitScores(std::span<double> scores);
 
 // The mass of a report of a photon with these numbers.
 using MassAt = std::function<double(const PrimaryNumbers& numbers)>;

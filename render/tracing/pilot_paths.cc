@@ -18,6 +18,8 @@ namespace {
 constexpr std::uint64_t kPathsAtOnce = 1024;
 constexpr std::uint64_t kMostPaths = 16384;
 constexpr std::size_t kEnoughReports = 2048;
+// So many take 6 MB.
+constexpr std::size_t kMostPilotReports = std::size_t{1} << 16;
 // Weaker paths, over their weight at first, end by roulette, and all after so many vertices: what
 // is scattered more often adds little that others have not found.
 constexpr float kRouletteShare = 0.5F;
@@ -79,6 +81,9 @@ class PilotPath {
       const Material& material = MaterialAt(scene_, surface, wo, storage);
       const Frame frame = ShadingFrame(surface);
       const Vec3 wo_local = frame.ToLocal(wo);
+      scattering_ = {surface.position, wo, 0};
+      if (material.kind == Material::Kind::kDiffuse)
+        scattering_.density = std::abs(wo_local.z) * kInversePi;
       AddLight(surface, material, frame, wo, weight);
       BsdfSample sample;
       const float u_lobe = rng_.Uniform();
@@ -129,7 +134,7 @@ class PilotPath {
     const auto luminance = static_cast<double>(Luminance(brought));
     if (!emitter || !(luminance > 0) || !std::isfinite(luminance)) return;
     const auto numbers = lights_.NumbersOf(*emitter, photon, rng_);
-    if (numbers) reports_->push_back({*numbers, pixel_, luminance});
+    if (numbers) reports_->push_back({*numbers, pixel_, luminance, scattering_});
   }
 
   const EyePathTracer& tracer_;
@@ -139,6 +144,7 @@ class PilotPath {
   const bool is_direct_sampled_;
   KeyedRng rng_;
   std::uint32_t pixel_ = 0;
+  FirstScattering scattering_;  // of a photon that arrives where the path is now
   std::vector<PilotReport>* reports_ = nullptr;
 };
 
@@ -148,11 +154,18 @@ PilotReports TracePilotPaths(const EyePathTracer& tracer, const SceneNeeds& need
                              ThreadTeam& team) {
   PilotReports all;
   if (needs.Uses(Part::kMedia)) return all;
+  while (all.paths < kMostPaths && all.reports.size() < kEnoughReports)
+    AddPilotPaths(tracer, needs, all.paths + 1, team, all);
+  return all;
+}
+
+void AddPilotPaths(const EyePathTracer& tracer, const SceneNeeds& needs, std::uint64_t paths,
+                   ThreadTeam& team, PilotReports& all) {
   const bool is_direct_sampled = needs.Uses(Part::kDirectSampling);
   const RenderSettings& settings = tracer.settings();
   const auto width = static_cast<std::uint64_t>(settings.crop_width());
   const std::uint64_t pixels = width * static_cast<std::uint64_t>(settings.crop_height());
-  while (all.paths < kMostPaths && all.reports.size() < kEnoughReports) {
+  while (all.paths < paths && all.reports.size() < kMostPilotReports) {
     std::vector<std::vector<PilotReport>> of_paths(kPathsAtOnce);
     team.For(kPathsAtOnce, 32, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
@@ -172,7 +185,6 @@ PilotReports TracePilotPaths(const EyePathTracer& tracer, const SceneNeeds& need
     for (const std::vector<PilotReport>& of_path : of_paths)
       all.reports.insert(all.reports.end(), of_path.begin(), of_path.end());
   }
-  return all;
 }
 
 }  // namespace lucerna

@@ -23,4 +23,9 @@ namespace lucerna {
 [[nodiscard]] PilotReports TracePilotPaths(const EyePathTracer& tracer, const SceneNeeds& needs,
                                            ThreadTeam& team);
 
+// Adds those of further paths to the reports of the first ones, until there are so many paths or a
+// few more, or 2^16 reports. The same for all numbers of threads and for any steps on the way.
+void AddPilotPaths(const EyePathTracer& tracer, const SceneNeeds& needs, std::uint64_t paths,
+                   ThreadTeam& team, PilotReports& all);
+
 }  // namespace lucerna

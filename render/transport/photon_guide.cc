@@ -10,8 +10,6 @@ namespace {
 
 // A factor of flux beyond this would come of bytes that no coordinator has made.
 constexpr double kLargestWeight = 1.01 / kUnguidedShare;
-// So far below 1 that a number stays within its box wherever that is.
-constexpr double kBelowOne = 1 - 0x1p-32;
 
 double ShareOf(std::uint32_t times_2_32) {
   return static_cast<double>(times_2_32) * 0x1p-32;
@@ -19,7 +17,8 @@ double ShareOf(std::uint32_t times_2_32) {
 
 }  // namespace
 
-StatusOr<PhotonGuide> PhotonGuide::Create(std::vector<Node> nodes, std::uint32_t reported) {
+StatusOr<PhotonGuide> PhotonGuide::Create(std::vector<Node> nodes, std::uint32_t reported,
+                                          std::shared_ptr<const ScatterGuide> scatterings) {
   const auto malformed = [](std::string_view what) {
     return absl::InvalidArgumentError(absl::StrCat("malformed photon guide: ", std::string(what)));
   };
@@ -60,6 +59,7 @@ StatusOr<PhotonGuide> PhotonGuide::Create(std::vector<Node> nodes, std::uint32_t
   }
   guide.nodes_ = std::move(nodes);
   guide.reported_ = reported;
+  if (scatterings != nullptr && !scatterings->empty()) guide.scatterings_ = std::move(scatterings);
   return guide;
 }
 
@@ -77,7 +77,7 @@ double PhotonGuide::Draw(PrimaryNumbers& numbers) const {
     const bool is_low = numbers[d] < share;
     const double part = is_low ? share : 1 - share;
     // A quotient may be rounded to 1.
-    numbers[d] = std::min((numbers[d] - (is_low ? 0 : share)) / part, kBelowOne);
+    numbers[d] = std::min((numbers[d] - (is_low ? 0 : share)) / part, kBelowOneInBox);
     low[d] += is_low ? 0 : size[d];
     weight *= 0.5 / part;
     at = is_low ? at + 1 : high_[at];

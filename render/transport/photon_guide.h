@@ -17,11 +17,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "render/base/status.h"
 #include "render/transport/primary_numbers.h"
+#include "render/transport/scatter_guide.h"
 
 namespace lucerna {
 
@@ -43,15 +45,39 @@ class PhotonGuide {
   // Even.
   PhotonGuide() = default;
   // `nodes` in preorder, the lower half first; none or a single leaf: even. `reported` times 2^-32
-  // is the share of the found photons that workers name to the coordinator.
+  // is the share of the found photons that workers name to the coordinator. `scatterings`: by which
+  // directions are drawn where photons first land; nullptr or empty: by BSDFs alone.
   // Errors: INVALID_ARGUMENT for nodes that make no tree, or too large a one, or give a half too
   // little.
-  [[nodiscard]] static StatusOr<PhotonGuide> Create(std::vector<Node> nodes,
-                                                    std::uint32_t reported);
+  [[nodiscard]] static StatusOr<PhotonGuide> Create(
+      std::vector<Node> nodes, std::uint32_t reported,
+      std::shared_ptr<const ScatterGuide> scatterings = nullptr);
 
+  // Of emissions.
   [[nodiscard]] bool is_even() const { return nodes_.size() <= 1; }
   [[nodiscard]] std::uint32_t reported() const { return reported_; }
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
+  // nullptr, or with cells.
+  [[nodiscard]] const std::shared_ptr<const ScatterGuide>& scatterings() const {
+    return scatterings_;
+  }
+  // Of the photons that are drawn with numbers of this factor (Draw), the share that stands for all
+  // photons as they would be without a guide, times the same of its scattering (ScatterGuide).
+  [[nodiscard]] double UnguidedShare(double weight) const {
+    return (is_even() ? 1 : weight * kUnguidedShare) *
+           (scatterings_ != nullptr ? 1 - kGuidedScatterings : 1);
+  }
+  // The mean of this share over all photons, at least kUnguidedShare (1 - kGuidedScatterings).
+  [[nodiscard]] double UnguidedShare() const { return UnguidedShare(/*weight=*/1); }
+  // Of found photons whose flux a guided scattering has multiplied by `flux_factor` (1: of all
+  // others), the share that may be reported: in proportion to its square, as what they add to the
+  // variance. With the strong ones left out of it, so that more of the others may be reported,
+  // guides of emissions lose the light that the scatter guide does not know.
+  [[nodiscard]] double ReportableShare(double flux_factor) const {
+    if (scatterings_ == nullptr) return 1;
+    const double of_largest = flux_factor * (1 - kGuidedScatterings);
+    return of_largest * of_largest;
+  }
 
   // Makes evenly distributed numbers those of this guide. Returns the even density over the guide's
   // there: the factor of the photon's flux, at most about 1 / kUnguidedShare.
@@ -60,13 +86,17 @@ class PhotonGuide {
   [[nodiscard]] double WeightAt(PrimaryNumbers numbers) const;
 
   bool operator==(const PhotonGuide& other) const {
-    return nodes_ == other.nodes_ && reported_ == other.reported_;
+    const bool is_equal = nodes_ == other.nodes_ && reported_ == other.reported_;
+    if (scatterings_ == nullptr || other.scatterings_ == nullptr)
+      return is_equal && scatterings_ == other.scatterings_;
+    return is_equal && *scatterings_ == *other.scatterings_;
   }
 
  private:
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> high_;  // [nodes] the upper half's
   std::uint32_t reported_ = 0;
+  std::shared_ptr<const ScatterGuide> scatterings_;
 };
 
 // Luminance of the flux of a photon that is drawn evenly with these numbers, over the power of all

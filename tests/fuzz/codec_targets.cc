@@ -173,15 +173,36 @@ bool FuzzGuide(std::string_view bytes) {
     LUCERNA_CHECK(guide->WeightAt(numbers) == weight);
     for (const double number : numbers)
       LUCERNA_CHECK(number >= 0 && number < 1);
+    if (guide->scatterings() == nullptr) continue;
+    const ScatterGuide& scatterings = *guide->scatterings();
+    const float u = (static_cast<float>(i) + 0.5F) / 64;
+    const ScatterGuide::Cell cell = scatterings.CellAt({u, -u, 2 * u - 1});
+    if (cell == ScatterGuide::kNoCell) continue;
+    const Vec3 wi = scatterings.Draw(cell, u, 1 - u);
+    const double factor = scatterings.FluxFactor(cell, wi, 0.1);
+    LUCERNA_CHECK(IsFinite(wi) && factor > 0 && factor <= 1 / (1 - kGuidedScatterings) + 1e-9);
   }
   return true;
 }
 
 std::vector<std::string> GuideSeeds() {
+  using Kind = ScatterGuide::Node::Kind;
   const std::uint32_t half = std::uint32_t{1} << 31;
   return {
       EncodePhotonGuide(PhotonGuide()),
-      EncodePhotonGuide(PhotonGuide::Create({{2, half / 2}, {4, half}, {}, {}, {}}, 77).value())};
+      EncodePhotonGuide(PhotonGuide::Create({{2, half / 2}, {4, half}, {}, {}, {}}, 77).value()),
+      EncodePhotonGuide(
+          PhotonGuide::Create({}, 77,
+                              std::make_shared<const ScatterGuide>(
+                                  ScatterGuide::Create({{.kind = Kind::kX, .place = 0.5F},
+                                                        {.kind = Kind::kU, .low_share = 200},
+                                                        {},
+                                                        {},
+                                                        {.kind = Kind::kV, .low_share = 1},
+                                                        {},
+                                                        {}})
+                                      .value()))
+              .value())};
 }
 
 }  // namespace lucerna

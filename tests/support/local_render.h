@@ -25,6 +25,7 @@ class LocalRender {
 
   // Adds one pass, its photons in `batches` ranges, or all of it as a worker traces a slice (0).
   void AddPass(int batches = 1);
+  [[nodiscard]] const JobEstimator& estimator() const { return *estimator_; }
   [[nodiscard]] Image MakeImage() const { return estimator_->MakeImage(); }
   [[nodiscard]] ErrorEstimate EstimateError(int look) const {
     const EstimatorSnapshot snapshot = estimator_->Snapshot();

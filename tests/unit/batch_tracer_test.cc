@@ -1,8 +1,11 @@
 // What a batch brings depends on its photons alone: not on threads, nor on how a range is cut.
 #include "worker/batch_tracer.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
+#include <memory>
 #include <thread>
 
 #include "gtest/gtest.h"
@@ -50,9 +53,12 @@ struct Fixture {
   RadiusColumn radii = RadiusColumn(block.size(), 0.07F);
   std::atomic<bool> stop = false;
 
-  Accumulation Run(int threads, std::uint64_t pass, std::uint64_t first, std::uint64_t last) {
+  Accumulation Run(int threads, std::uint64_t pass, std::uint64_t first, std::uint64_t last,
+                   const PhotonGuide* guide = nullptr) {
     BatchTracer tracer(scene, threads);
-    return tracer.Run(settings, NeedsOf(scene, settings), pass, first, last, block, radii, stop)
+    return tracer
+        .Run(settings, NeedsOf(scene, settings), pass, first, last, block, radii, stop,
+             /*photons_per_pass=*/0, guide)
         .value();
   }
 };
@@ -140,6 +146,27 @@ TEST(BatchTracerTest, CountsThePhotonsOfEachLightThatHitpointsFound) {
   }
   EXPECT_GT(found, 100);
   EXPECT_EQ(run(0, 400).tally.lights[0].in_view, sum.in_view);
+}
+
+// A scatter guide makes the flux of some photons up to twice as large. Here it has cells where no
+// photon comes: photons are the same, each of factor 1, and a quarter of them is reported.
+TEST(BatchTracerTest, ReportsPhotonsOfWeakFluxLessOftenWhereDirectionsAreGuided) {
+  using Kind = ScatterGuide::Node::Kind;
+  const auto elsewhere = std::make_shared<const ScatterGuide>(
+      ScatterGuide::Create(
+          {{.kind = Kind::kX, .place = 100}, {}, {.kind = Kind::kU, .low_share = 100}, {}, {}})
+          .value());
+  const PhotonGuide all = PhotonGuide::Create({}, UINT32_MAX).value();
+  const PhotonGuide fewer = PhotonGuide::Create({}, UINT32_MAX, elsewhere).value();
+  Fixture fixture;
+  const Accumulation a = fixture.Run(2, 0, 0, 20000, &all);
+  const Accumulation b = fixture.Run(2, 0, 0, 20000, &fewer);
+  EXPECT_EQ(a.flux, b.flux);
+  ASSERT_GT(a.found.size(), 1000U);
+  const auto expected = static_cast<double>(a.found.size()) / 4;
+  EXPECT_NEAR(static_cast<double>(b.found.size()), expected, 5 * std::sqrt(expected));
+  EXPECT_TRUE(
+      std::ranges::includes(a.found, b.found, {}, &FoundPhoton::index, &FoundPhoton::index));
 }
 
 TEST(BatchTracerTest, TakesEmptyRangesAndBlocks) {

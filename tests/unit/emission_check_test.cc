@@ -155,5 +155,24 @@ TEST(OneLightTest, IsCheckedToAThousandth) {
   }
 }
 
+// Of photons that guides draw, a known share counts for their lights.
+TEST_F(EmissionCheckTest, KnowsHowManyPhotonsOfAGuideCount) {
+  Scene scene;
+  AddBox(scene, {-1, -1, -1}, {1, 1, 1}, AddMaterial(scene, DiffuseMaterial(0.5F)));
+  scene.point_lights.push_back({{0, 0, 0}, Gray(1)});
+  SetCamera(scene, {0, 0, -0.9}, {0, 0, 0}, {0, 1, 0}, 60, 8);
+  LocalRender render(scene, TestSettings(scene, 10000, 0.1, 3), 1);
+  render.AddPass();
+  BatchTally tally = render.tally();
+  const EmissionCheck check = render.emission_check();
+  EXPECT_TRUE(check.Check(tally).ok());
+  tally.lights[0].sent /= 2;
+  EXPECT_FALSE(check.Check(tally).ok());
+  EXPECT_TRUE(check.Check(tally, 0.5).ok());
+  tally.lights[0].sent /= 2;
+  EXPECT_FALSE(check.Check(tally, 0.5).ok());
+  EXPECT_TRUE(check.Check(tally, 0.25).ok());
+}
+
 }  // namespace
 }  // namespace lucerna

@@ -366,5 +366,24 @@ TEST(GuideLearningTest, PhotonsOfSeveralGuidesStandForTheEvenDensity) {
   EXPECT_GT(GrowGuide(reports, std::vector<double>(reports.size(), 1), OneFlux).nodes.size(), 1U);
 }
 
+// Where directions are drawn by a guide too, flux is up to twice as large, and a photon of factor 1
+// is reported a quarter as often.
+TEST(GuideLearningTest, ReportsAreRarerWhereDirectionsAreGuided) {
+  using Node = ScatterGuide::Node;
+  const auto scatterings = std::make_shared<const ScatterGuide>(
+      ScatterGuide::Create({{.kind = Node::Kind::kU, .low_share = 128}, {}, {}}).value());
+  GuideLearner learner(kPixels);
+  learner.Add({}, std::make_shared<const PhotonGuide>(PhotonGuide::Create({}, UINT32_MAX).value()),
+              1000);
+  learner.Add(
+      {},
+      std::make_shared<const PhotonGuide>(PhotonGuide::Create({}, UINT32_MAX, scatterings).value()),
+      1000);
+  const std::vector<GuideLearner::Drawn>& drawn = learner.numbers().drawn;
+  ASSERT_EQ(drawn.size(), 2U);
+  EXPECT_NEAR(drawn[0].trials, 1000, 1e-3);
+  EXPECT_NEAR(drawn[1].trials, 250, 1e-3);
+}
+
 }  // namespace
 }  // namespace lucerna

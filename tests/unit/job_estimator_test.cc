@@ -16,6 +16,7 @@
 #include "render/estimate/slice_tree.h"
 #include "render/wire/slice_codec.h"
 #include "tests/support/local_render.h"
+#include "tests/support/measure.h"
 #include "tests/support/test_scenes.h"
 #include "worker/batch_tracer.h"
 
@@ -86,6 +87,101 @@ TEST(JobEstimatorTest, GoesOnFromACheckpointWithTheSameBits) {
       EXPECT_EQ(restored.EstimateError(2).relative.high, quiet.EstimateError(2).relative.high);
     }
   }
+}
+
+// A room with a window in its front wall, over ground that a light beyond its roof shines on: what
+// comes in has been scattered outside.
+Scene RoomOverLitGround() {
+  Scene scene;
+  const std::int32_t gray = AddMaterial(scene, DiffuseMaterial(0.6F));
+  AddQuad(scene, {-20, -20, -0.01F}, {40, 0, 0}, {0, 40, 0}, gray);
+  AddQuad(scene, {-1, 0, 0}, {2, 0, 0}, {0, 2, 0}, gray);
+  AddQuad(scene, {-1, 0, 2}, {2, 0, 0}, {0, 2, 0}, gray);
+  AddQuad(scene, {-1, 0, 0}, {0, 2, 0}, {0, 0, 2}, gray);
+  AddQuad(scene, {1, 0, 0}, {0, 2, 0}, {0, 0, 2}, gray);
+  AddQuad(scene, {-1, 2, 0}, {2, 0, 0}, {0, 0, 2}, gray);
+  AddQuad(scene, {-1, 0, 0}, {2, 0, 0}, {0, 0, 0.8F}, gray);
+  AddQuad(scene, {-1, 0, 1.2F}, {2, 0, 0}, {0, 0, 0.8F}, gray);
+  scene.distant_lights.push_back({Normalize({0, -1, -1}), Gray(10)});
+  SetCamera(scene, {0, 0.1, 1}, {0, 2, 0.9}, {0, 0, 1}, 80, 24);
+  return scene;
+}
+
+// Of the round that comes next.
+std::shared_ptr<const PhotonGuide> NextGuide(const LocalRender& render) {
+  const JobEstimator& estimator = render.estimator();
+  return estimator.PlanFor(RoundOf(static_cast<std::uint64_t>(estimator.whole_passes())))->guide;
+}
+
+TEST(JobEstimatorTest, LeadsPhotonsThroughAWindowFromWhereTheyFirstLand) {
+  const Scene scene = RoomOverLitGround();
+  RenderSettings settings = TestSettings(scene, 4000, 0.1, 8);
+  settings.adaptive_photons = false;
+  constexpr int kPasses = 13;
+  LocalRender quiet(scene, settings, 2);
+  for (int pass = 0; pass < kPasses; ++pass) {
+    // First passes tell too little of what photons bring.
+    if (pass == 3) {
+      EXPECT_EQ(NextGuide(quiet)->scatterings(), nullptr);
+    }
+    quiet.AddPass();
+  }
+  EXPECT_NE(NextGuide(quiet)->scatterings(), nullptr);
+  // The same from a checkpoint: pilot paths are traced again.
+  LocalRender killed(scene, settings, 2);
+  for (int pass = 0; pass < 5; ++pass)
+    killed.AddPass();
+  LocalRender restored(scene, settings, 1);
+  ASSERT_TRUE(restored.Restore(killed.Save()).ok());
+  for (int pass = 5; pass < kPasses; ++pass)
+    restored.AddPass();
+  EXPECT_EQ(restored.MakeImage().PixelDigest(), quiet.MakeImage().PixelDigest());
+  EXPECT_TRUE(restored.Save() == quiet.Save());
+}
+
+// A light in the room that brings most of what photons bring: the window is not worth it.
+TEST(JobEstimatorTest, LeadsNoPhotonsThroughAWindowThatHardlyMatters) {
+  Scene scene = RoomOverLitGround();
+  AddQuad(scene, {-0.2F, 1.2F, 1.99F}, {0, 0.4F, 0}, {0.4F, 0, 0}, 0, AddAreaLight(scene, 100));
+  RenderSettings settings = TestSettings(scene, 4000, 0.1, 8);
+  settings.adaptive_photons = false;
+  LocalRender render(scene, settings, 2);
+  for (int pass = 0; pass < 13; ++pass) {
+    render.AddPass();
+    EXPECT_EQ(NextGuide(render)->scatterings(), nullptr) << pass;
+  }
+}
+
+// Of as many photons without a guide and with one the mean is the same, and the error far less.
+TEST(JobEstimatorTest, PhotonsLedThroughAWindowBringTheSameLight) {
+  const Scene scene = RoomOverLitGround();
+  constexpr int kSeeds = 8;
+  struct Mean {
+    double sum = 0, squares = 0;
+    void Add(double value) {
+      sum += value / kSeeds;
+      squares += value * value / kSeeds;
+    }
+    [[nodiscard]] double Variance() const { return (squares - sum * sum) / (kSeeds - 1); }
+  };
+  const auto mean_of = [&](bool unguided) {
+    Mean mean;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      RenderSettings settings = TestSettings(scene, 4000, 0.1, 8, seed);
+      settings.adaptive_photons = false;
+      settings.unguided = unguided;
+      LocalRender render(scene, settings, 2);
+      for (int pass = 0; pass < 16; ++pass)
+        render.AddPass();
+      mean.Add(render.estimator().Snapshot().luminance);
+    }
+    return mean;
+  };
+  const Mean with = mean_of(false);
+  const Mean without = mean_of(true);
+  const double error = std::sqrt(with.Variance() + without.Variance());
+  EXPECT_NEAR(with.sum, without.sum, StudentQuantile(1e-4, kSeeds) * error);
+  EXPECT_LT(with.Variance(), without.Variance() / 2);
 }
 
 TEST(JobEstimatorTest, RefusesACheckpointOfAnotherShapeAndIsAsBefore) {

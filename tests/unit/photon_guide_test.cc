@@ -154,7 +154,19 @@ TEST(PhotonGuideTest, TravelsAsItIs) {
     EXPECT_FALSE(DecodePhotonGuide(bytes + 'x').ok());
     EXPECT_FALSE(DecodePhotonGuide(bytes.substr(0, bytes.size() - 1)).ok());
   }
-  EXPECT_FALSE(DecodePhotonGuide("LPG2").ok());
+  EXPECT_FALSE(DecodePhotonGuide("LPG3").ok());
+  using Kind = ScatterGuide::Node::Kind;
+  const auto scatterings = std::make_shared<const ScatterGuide>(
+      ScatterGuide::Create(
+          {{.kind = Kind::kY, .place = -0.1F}, {.kind = Kind::kV, .low_share = 200}, {}, {}, {}})
+          .value());
+  const PhotonGuide guide = PhotonGuide::Create(SomeNodes(), 7, scatterings).value();
+  const std::string bytes = EncodePhotonGuide(guide);
+  EXPECT_EQ(DecodePhotonGuide(bytes).value(), guide);
+  EXPECT_EQ(*DecodePhotonGuide(bytes).value().scatterings(), *scatterings);
+  EXPECT_NE(guide, PhotonGuide::Create(SomeNodes(), 7).value());
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_FALSE(DecodePhotonGuide(bytes.substr(0, size)).ok()) << size;
 }
 
 TEST(PhotonGuideTest, WeakPhotonsAreReportedInProportionToTheirFlux) {

@@ -2,6 +2,8 @@
 // is not finite must be counted and named; and a replay must take the way that the photon took.
 #include "worker/photon_path.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <utility>
@@ -22,12 +24,14 @@ constexpr Bounds kEverywhere{{-HUGE_VALF, -HUGE_VALF, -HUGE_VALF},
 
 // A tracer of a scene, with all that it refers to.
 struct Traced {
-  explicit Traced(Scene s, int max_depth = 6, const Bounds& region = kEverywhere)
+  explicit Traced(Scene s, int max_depth = 6, const Bounds& region = kEverywhere,
+                  const PhotonGuide* guide = nullptr)
       : scene(std::move(s)),
         settings(TestSettings(scene, 20000, 0.1, max_depth)),
         intersector(Intersector::Create(scene).value()),
         lights(scene, *intersector),
-        tracer(scene, *intersector, lights, settings, NeedsOf(scene, settings), nullptr, region) {}
+        tracer(scene, *intersector, lights, settings, NeedsOf(scene, settings), nullptr, region, 0,
+               Bounds(), guide) {}
 
   [[nodiscard]] PhotonPathTracer::Landed Trace(std::uint64_t photons,
                                                std::uint64_t pass = 0) const {
@@ -110,6 +114,103 @@ TEST(PhotonEnergyTest, TellsHowMuchWallsAbsorb) {
   // distribution, 1 / (1 - rho)², so what they take of one photon has one below 1.
   EXPECT_NEAR(static_cast<double>(energy.absorbed) / emitted, 1 - alive,
               5 / std::sqrt(static_cast<double>(kPhotons)));
+}
+
+// A guide that sends most first scatterings of one half of space up and to one side.
+PhotonGuide ScatteringGuide() {
+  using Kind = ScatterGuide::Node::Kind;
+  return PhotonGuide::Create({}, 0,
+                             std::make_shared<const ScatterGuide>(
+                                 ScatterGuide::Create({{.kind = Kind::kX, .place = 0},
+                                                       {.kind = Kind::kU, .low_share = 230},
+                                                       {.kind = Kind::kV, .low_share = 20},
+                                                       {},
+                                                       {},
+                                                       {},
+                                                       {}})
+                                     .value()))
+      .value();
+}
+
+// Light is where it was, energy balances, and the photons that stand for all of a job without a
+// guide are distributed as those would be.
+TEST(GuidedScatteringTest, ChangesNoMeanAndMarksWhatStandsForAll) {
+  Scene scene;
+  const std::int32_t gray = AddMaterial(scene, DiffuseMaterial(0.9F));
+  AddBox(scene, {-1, -1, -1}, {1, 1, 1}, gray);
+  scene.point_lights.push_back({{-0.4F, 0.2F, 0.3F}, Gray(1)});
+  const PhotonGuide guide = ScatteringGuide();
+  const Traced even(scene, 3);
+  const Traced guided(scene, 3, kEverywhere, &guide);
+  constexpr std::uint64_t kPhotons = 40000;
+  const PhotonPathTracer::Landed of_even = even.Trace(kPhotons);
+  const PhotonPathTracer::Landed of_guided = guided.Trace(kPhotons);
+  EXPECT_TRUE(of_guided.energy.Balance());
+  EXPECT_EQ(of_guided.energy.emitted, of_even.energy.emitted);
+  // The first two landings absorb 1 - 0.9² of what is emitted, of a photon at most twice its flux:
+  // what the guide gives and takes is booked as a roulette's.
+  EXPECT_NEAR(static_cast<double>(of_guided.energy.absorbed) /
+                  static_cast<double>(of_guided.energy.emitted),
+              0.19, 5 * 2 / std::sqrt(kPhotons));
+  // By octant of the landing: the sum of fluxes, and of their squares; marked photons and those
+  // that may be reported.
+  struct Octant {
+    double flux = 0, squares = 0, unguided = 0, reportable = 0, expected = 0;
+  };
+  const auto of_each = static_cast<double>(of_even.deposits.rows[0].flux.g);  // without a guide
+  const auto by_octant = [&guide, of_each](const PhotonPathTracer::Landed& landed) {
+    std::array<Octant, 8> octants;
+    for (const Deposit& deposit : landed.deposits.rows) {
+      const Vec3 p = deposit.position;
+      Octant& octant = octants[(p.x > 0 ? 1 : 0) + (p.y > 0 ? 2 : 0) + (p.z > 0 ? 4 : 0)];
+      const auto flux = static_cast<double>(deposit.flux.g);
+      octant.flux += flux;
+      octant.squares += flux * flux;
+      octant.expected += guide.ReportableShare(flux / of_each);
+      const DepositSource source = DepositSource::Unpacked(deposit.source);
+      octant.unguided += source.is_unguided ? 1 : 0;
+      octant.reportable += source.is_reportable ? 1 : 0;
+    }
+    return octants;
+  };
+  const std::array<Octant, 8> a = by_octant(of_even);
+  const std::array<Octant, 8> b = by_octant(of_guided);
+  double changed = 0;
+  for (std::size_t i = 0; i < 8; ++i) {
+    // A photon leaves at most two deposits.
+    const double error = 5 * std::sqrt(2 * (a[i].squares + b[i].squares));
+    EXPECT_NEAR(a[i].flux, b[i].flux, error) << i;
+    EXPECT_NEAR(b[i].unguided, (1 - kGuidedScatterings) * a[i].unguided,
+                5 * std::sqrt(2 * a[i].unguided))
+        << i;
+    EXPECT_NEAR(b[i].reportable, b[i].expected, 5 * std::sqrt(2 * b[i].expected)) << i;
+    changed = std::max(changed, b[i].squares / a[i].squares);
+  }
+  EXPECT_GT(changed, 1.2) << "the guide changes fluxes";
+  EXPECT_NEAR(static_cast<double>(of_guided.sent[0]), (1 - kGuidedScatterings) * kPhotons,
+              5 * std::sqrt(kPhotons) / 2);
+}
+
+TEST(GuidedScatteringTest, IsReplayed) {
+  const PhotonGuide guide = ScatteringGuide();
+  const Traced guided(OpenBox(), 6, kEverywhere, &guide);
+  const Traced even(OpenBox());
+  int others = 0;
+  for (std::uint64_t index = 0; index < 2000; ++index) {
+    PhotonPathTracer::Landed landed;
+    guided.tracer.Trace(7, index, landed);
+    const PhotonHistory history = guided.tracer.Replay(7, index);
+    std::size_t deposits = 0;
+    for (const PhotonLanding& landing : history.landings) {
+      if (!landing.leaves_deposit) continue;
+      ASSERT_LT(deposits, landed.deposits.size());
+      ASSERT_EQ(landing.landed, landed.deposits.rows[deposits].flux);
+      ++deposits;
+    }
+    ASSERT_EQ(deposits, landed.deposits.size());
+    others += history.landings.size() != even.tracer.Replay(7, index).landings.size() ? 1 : 0;
+  }
+  EXPECT_GT(others, 30);
 }
 
 TEST(PhotonPathTest, NamesPhotonsThatAreNotFinite) {

@@ -20,7 +20,7 @@
 namespace lucerna {
 namespace {
 
-const SpectrumLimits kLimits = SpectrumLimits::ForDiagonal(1);
+const SpectrumLimits kSpectrumLimits = SpectrumLimits::ForDiagonal(1);
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 Spectrum Of(double s, double v, double p, double g = 0, double h = 0) {
@@ -37,12 +37,12 @@ void ExpectWithin(const Spectrum& spectrum, const SpectrumLimits& limits, const 
 // The tangential axis of a reflection: a sagittal curvature of 0 leaves s, v and p of the other
 // axis as they were and its h below this one's, so that it can be taken out of the mean.
 Spectrum TangentialMirror(const Spectrum& in, double cosine, double curvature) {
-  const Spectrum both = Mirror(in, cosine, {.tangential = curvature}, kLimits);
+  const Spectrum both = Mirror(in, cosine, {.tangential = curvature}, kSpectrumLimits);
   return Of(2 * both.s - in.s, 2 * both.v - in.v, 2 * both.p - in.p, both.g, both.h);
 }
 // The same of a refraction, whose sagittal axis is that of a plane: v of n1/n2, p of its square.
 Spectrum TangentialRefract(const Spectrum& in, double ior_ratio, double cosine, double curvature) {
-  const Spectrum both = Refract(in, ior_ratio, cosine, {.tangential = curvature}, kLimits);
+  const Spectrum both = Refract(in, ior_ratio, cosine, {.tangential = curvature}, kSpectrumLimits);
   return Of(2 * both.s - in.s, 2 * both.v - ior_ratio * in.v,
             2 * both.p - ior_ratio * ior_ratio * in.p, both.g, both.h);
 }
@@ -56,24 +56,26 @@ struct Vector {
 
 TEST(SpectrumVectorsTest, AreMet) {
   const Spectrum point = Of(1e12, 0, 1.0 / 3);
-  const Spectrum lamp = AreaSource(DiscMoments({}, {0, 0, 1}, 0.2), {0, 0, 1}, kLimits);
+  const Spectrum lamp = AreaSource(DiscMoments({}, {0, 0, 1}, 0.2), {0, 0, 1}, kSpectrumLimits);
   const std::vector<Vector> vectors = {
-      {"U1", Travel(Of(4, 0, 0.25), 2, kLimits), Of(0.8, 0.4, 0.05)},
-      {"U2", Travel(point, 5, kLimits), Of(0.12, 0.2, 4e-14)},
-      {"U3", Travel(Travel(point, 2, kLimits), 3, kLimits), Of(0.12, 0.2, 4e-14)},
-      {"U4", Travel(Of(0, 0, 5.4e-6), 100, kLimits), Of(0, 0, 5.4e-6)},
-      {"U5", Travel(Narrow(Of(0, 0, 5.4e-6), 1e8, kLimits), 10, kLimits),
+      {"U1", Travel(Of(4, 0, 0.25), 2, kSpectrumLimits), Of(0.8, 0.4, 0.05)},
+      {"U2", Travel(point, 5, kSpectrumLimits), Of(0.12, 0.2, 4e-14)},
+      {"U3", Travel(Travel(point, 2, kSpectrumLimits), 3, kSpectrumLimits), Of(0.12, 0.2, 4e-14)},
+      {"U4", Travel(Of(0, 0, 5.4e-6), 100, kSpectrumLimits), Of(0, 0, 5.4e-6)},
+      {"U5", Travel(Narrow(Of(0, 0, 5.4e-6), 1e8, kSpectrumLimits), 10, kSpectrumLimits),
        Of(1851.81756, 0.0999981482, 9.99981482e-11)},
-      {"U6", Travel(Of(100, -2, 1e-4), 0.5, kLimits), Of(40000, 2, 0.04)},
-      {"U7", Travel(Of(100, -2, 1e-4), 1, kLimits), Of(99.009901, 1.99009901, 9.9009901e-5)},
-      {"U14", Blur(Of(4, 0.5, 0.04), 0.01, kLimits), Of(4, 0.5, 0.05)},
-      {"U17", Travel(Of(0, -0.5, 1e-6, 0, 2), 1, kLimits),
+      {"U6", Travel(Of(100, -2, 1e-4), 0.5, kSpectrumLimits), Of(40000, 2, 0.04)},
+      {"U7", Travel(Of(100, -2, 1e-4), 1, kSpectrumLimits),
+       Of(99.009901, 1.99009901, 9.9009901e-5)},
+      {"U14", Blur(Of(4, 0.5, 0.04), 0.01, kSpectrumLimits), Of(4, 0.5, 0.05)},
+      {"U17", Travel(Of(0, -0.5, 1e-6, 0, 2), 1, kSpectrumLimits),
        Of(15.999744, -0.999968001, 3.999936e-6, 0, 31.998976)},
       {"U19", TangentialMirror(Of(0, 0, 1e-6), std::cos(0.5), -1),
        Of(1.55006668, -2.27898785, 1e-6, 4.25606704, 25.5005777)},
       {"U20", TangentialRefract(Of(0, 0, 1e-6), 1 / 1.5, std::cos(0.4), 1),
        Of(0.131170382, -0.377087411, 4.04294802e-7, 0.200297151, 1.09974019), 1e-5},
-      {"U21", Travel(Narrow(Travel(lamp, 2, kLimits), 1e10, kLimits), 1, kLimits),
+      {"U21",
+       Travel(Narrow(Travel(lamp, 2, kSpectrumLimits), 1e10, kSpectrumLimits), 1, kSpectrumLimits),
        Of(403.999964, 0.99999994, 9.9999991e-11)},
   };
   for (const Vector& vector : vectors) {
@@ -90,43 +92,43 @@ TEST(SpectrumVectorsTest, AreMet) {
 }
 
 TEST(SpectrumVectorsTest, AnExactFocusOfAVaryingVergenceIsFinite) {  // U18
-  const Spectrum focus = Travel(Of(0, -1, 1e-4, 0.5, 2), 1, kLimits);
+  const Spectrum focus = Travel(Of(0, -1, 1e-4, 0.5, 2), 1, kSpectrumLimits);
   EXPECT_NEAR(focus.s, 10000, 1e-2);
   EXPECT_NEAR(focus.v, 1, 1e-6);
-  ExpectWithin(focus, kLimits, "U18");
+  ExpectWithin(focus, kSpectrumLimits, "U18");
 }
 
 TEST(ReceivedTraceTest, MeetsItsVectors) {
-  EXPECT_NEAR(ReceivedTrace(Of(3, 0, 0.1), 0.6, 0, 0, kLimits), 4.08, 1e-6);   // U15
-  EXPECT_NEAR(ReceivedTrace(Of(3, 1, 0.1), 0.6, 0, 0, kLimits), 11.76, 1e-6);  // U26
+  EXPECT_NEAR(ReceivedTrace(Of(3, 0, 0.1), 0.6, 0, 0, kSpectrumLimits), 4.08, 1e-6);   // U15
+  EXPECT_NEAR(ReceivedTrace(Of(3, 1, 0.1), 0.6, 0, 0, kSpectrumLimits), 11.76, 1e-6);  // U26
   // A receiver's own curvatures: E ~ cos(kx) has exactly k².
-  EXPECT_NEAR(ReceivedTrace(Of(3, 1, 0.1), 0.6, 2, -3, kLimits), 11.76 + 13, 1e-6);
+  EXPECT_NEAR(ReceivedTrace(Of(3, 1, 0.1), 0.6, 2, -3, kSpectrumLimits), 11.76 + 13, 1e-6);
 }
 
 // Under a point and under a Lambertian patch on a parallel plane, at distance r, the normalised
 // Laplacian of the irradiance is |9 sin² - 6 cos²|/r² and |16 sin² - 8 cos²|/r².
 TEST(ReceivedTraceTest, BoundsTheExactFalloffOfPointsAndPatches) {
   const double r = 2;
-  const Spectrum point = Travel(PointSource(kLimits), r, kLimits);
-  const Spectrum patch =
-      Travel(AreaSource(DiscMoments({}, {0, 0, 1}, 1e-4), {0, 0, 1}, kLimits), r, kLimits);
+  const Spectrum point = Travel(PointSource(kSpectrumLimits), r, kSpectrumLimits);
+  const Spectrum patch = Travel(
+      AreaSource(DiscMoments({}, {0, 0, 1}, 1e-4), {0, 0, 1}, kSpectrumLimits), r, kSpectrumLimits);
   for (double angle = 0; angle < 1.5; angle += 0.05) {
     const double c = std::cos(angle);
     const double s2 = 1 - c * c;
-    EXPECT_GE(ReceivedTrace(point, c, 0, 0, kLimits) * (1 + 1e-6),
+    EXPECT_GE(ReceivedTrace(point, c, 0, 0, kSpectrumLimits) * (1 + 1e-6),
               std::abs(9 * s2 - 6 * c * c) / (r * r));
-    EXPECT_GE(ReceivedTrace(patch, c, 0, 0, kLimits) * (1 + 1e-6),
+    EXPECT_GE(ReceivedTrace(patch, c, 0, 0, kSpectrumLimits) * (1 + 1e-6),
               std::abs(16 * s2 - 8 * c * c) / (r * r));
   }
-  EXPECT_NEAR(ReceivedTrace(point, 1, 0, 0, kLimits), 6 / (r * r), 1e-5);
-  EXPECT_NEAR(ReceivedTrace(patch, 1, 0, 0, kLimits), 8 / (r * r), 1e-5);
+  EXPECT_NEAR(ReceivedTrace(point, 1, 0, 0, kSpectrumLimits), 6 / (r * r), 1e-5);
+  EXPECT_NEAR(ReceivedTrace(patch, 1, 0, 0, kSpectrumLimits), 8 / (r * r), 1e-5);
 }
 
 TEST(SourceTest, HaveTheSecondMomentsOfTheirShapes) {
   const Vec3 up = {0, 0, 1};
   const double c2 = 0.36;
   // Slanted by cos 0.6 one axis is narrower.
-  EXPECT_NEAR(AreaSource(DiscMoments({5, 6, 7}, up, 0.5), {0.8F, 0, 0.6F}, kLimits).s,
+  EXPECT_NEAR(AreaSource(DiscMoments({5, 6, 7}, up, 0.5), {0.8F, 0, 0.6F}, kSpectrumLimits).s,
               4 / 0.25 * (1 + 1 / c2) / 2, 1e-4);
   // Two triangles are a rectangle, wherever it stands: 6 (1/w² + 1/h²).
   const Vec3 a = {10, -3, 2};
@@ -137,36 +139,39 @@ TEST(SourceTest, HaveTheSecondMomentsOfTheirShapes) {
   const EmitterMoments both = Merge(one, TriangleMoments(a, c, d));
   EXPECT_NEAR(both.area, 8, 1e-12);
   EXPECT_NEAR(both.x, 12, 1e-12);
-  EXPECT_NEAR(AreaSource(both, up, kLimits).s, 6 * (1.0 / 16 + 1.0 / 4), 1e-9);
+  EXPECT_NEAR(AreaSource(both, up, kSpectrumLimits).s, 6 * (1.0 / 16 + 1.0 / 4), 1e-9);
   // 1.5 (a² + b² + c²)/A².
-  EXPECT_NEAR(AreaSource(one, up, kLimits).s, 1.5 * (16 + 4 + 20) / 16, 1e-9);
-  EXPECT_EQ(AreaSource(one, up, kLimits).p, 0.25);
+  EXPECT_NEAR(AreaSource(one, up, kSpectrumLimits).s, 1.5 * (16 + 4 + 20) / 16, 1e-9);
+  EXPECT_EQ(AreaSource(one, up, kSpectrumLimits).p, 0.25);
   // The moments do not depend on how the emitter is turned.
   const EmitterMoments turned = Merge(TriangleMoments({2, 10, -3}, {2, 14, -3}, {2, 14, -1}),
                                       TriangleMoments({2, 10, -3}, {2, 14, -1}, {2, 10, -1}));
-  EXPECT_NEAR(AreaSource(turned, {1, 0, 0}, kLimits).s, AreaSource(both, up, kLimits).s, 1e-12);
+  EXPECT_NEAR(AreaSource(turned, {1, 0, 0}, kSpectrumLimits).s,
+              AreaSource(both, up, kSpectrumLimits).s, 1e-12);
   // Nothing is left of a point, a line or an edge-on sheet but the smallest source.
-  EXPECT_EQ(AreaSource(EmitterMoments{}, up, kLimits).s, kLimits.source_s);
-  EXPECT_EQ(AreaSource(TriangleMoments(a, b, b), up, kLimits).s, kLimits.source_s);
-  EXPECT_EQ(AreaSource(one, {1, 0, 0}, kLimits).s, kLimits.source_s);
+  EXPECT_EQ(AreaSource(EmitterMoments{}, up, kSpectrumLimits).s, kSpectrumLimits.source_s);
+  EXPECT_EQ(AreaSource(TriangleMoments(a, b, b), up, kSpectrumLimits).s, kSpectrumLimits.source_s);
+  EXPECT_EQ(AreaSource(one, {1, 0, 0}, kSpectrumLimits).s, kSpectrumLimits.source_s);
 }
 
 TEST(SourceTest, HaveTheSpectraOfTheirTable) {
   const double d = 3;
-  const Spectrum point = Travel(PointSource(kLimits), d, kLimits);
+  const Spectrum point = Travel(PointSource(kSpectrumLimits), d, kSpectrumLimits);
   EXPECT_NEAR(point.s, 3 / (d * d), 1e-6);
   EXPECT_NEAR(point.v, 1 / d, 1e-6);
   EXPECT_NEAR(point.p / (1e-12 / (d * d)), 1, 1e-6);
-  EXPECT_NEAR(SpotSource(1, 0, kLimits).p, 1.0 / 3, 1e-12);
-  EXPECT_NEAR(SpotSource(0.5, SmoothFalloffCurvature(0.5), kLimits).p, 1 / (3 + 48.0), 1e-12);
-  EXPECT_EQ(SpotSource(0, 2, kLimits).p, SpotSource(0.05, 2, kLimits).p);
-  EXPECT_NEAR(SphereSource(0.5, kLimits).s, 16, 1e-12);
-  EXPECT_NEAR(SphereSource(0.5, kLimits).p, 1.0 / 3, 1e-12);
-  EXPECT_EQ(DirectionalSource(kLimits), Of(0, 0, kSmallestAngularVariance));
-  EXPECT_NEAR(EnvironmentSource(-50, 2, 1, 0.01, kLimits).p, 0.04, 1e-12);
-  EXPECT_NEAR(EnvironmentSource(50, 0, 1, 0.01, kLimits).p, 0.001, 1e-12);  // 0.05 of the mean
-  EXPECT_NEAR(EnvironmentSource(1e9, 1, 1, 0.01, kLimits).p, 1e-4 / 12, 1e-15);
-  EXPECT_EQ(EnvironmentSource(0, 1, 1, 0.01, kLimits).p, kLargestAngularVariance);
+  EXPECT_NEAR(SpotSource(1, 0, kSpectrumLimits).p, 1.0 / 3, 1e-12);
+  EXPECT_NEAR(SpotSource(0.5, SmoothFalloffCurvature(0.5), kSpectrumLimits).p, 1 / (3 + 48.0),
+              1e-12);
+  EXPECT_EQ(SpotSource(0, 2, kSpectrumLimits).p, SpotSource(0.05, 2, kSpectrumLimits).p);
+  EXPECT_NEAR(SphereSource(0.5, kSpectrumLimits).s, 16, 1e-12);
+  EXPECT_NEAR(SphereSource(0.5, kSpectrumLimits).p, 1.0 / 3, 1e-12);
+  EXPECT_EQ(DirectionalSource(kSpectrumLimits), Of(0, 0, kSmallestAngularVariance));
+  EXPECT_NEAR(EnvironmentSource(-50, 2, 1, 0.01, kSpectrumLimits).p, 0.04, 1e-12);
+  EXPECT_NEAR(EnvironmentSource(50, 0, 1, 0.01, kSpectrumLimits).p, 0.001,
+              1e-12);  // 0.05 of the mean
+  EXPECT_NEAR(EnvironmentSource(1e9, 1, 1, 0.01, kSpectrumLimits).p, 1e-4 / 12, 1e-15);
+  EXPECT_EQ(EnvironmentSource(0, 1, 1, 0.01, kSpectrumLimits).p, kLargestAngularVariance);
 }
 
 // Peak of 1 + m cos kx: m k²/(1 + m) along one axis, half of it per axis.
@@ -189,9 +194,9 @@ TEST(TravelTest, LegsAddUpAndKeepEtendue) {
     const Spectrum in = Of(log_uniform(-4, 6), sign * log_uniform(-3, 2), log_uniform(-8, -1));
     const double a = log_uniform(-3, 1);
     const double b = log_uniform(-3, 1);
-    const Spectrum middle = Travel(in, a, kLimits);
-    const Spectrum cut = Travel(middle, b, kLimits);
-    const Spectrum whole = Travel(in, a + b, kLimits);
+    const Spectrum middle = Travel(in, a, kSpectrumLimits);
+    const Spectrum cut = Travel(middle, b, kSpectrumLimits);
+    const Spectrum whole = Travel(in, a + b, kSpectrumLimits);
     const auto unclamped = [](const Spectrum& x) {
       return x.p > kSmallestAngularVariance && x.p < kLargestAngularVariance;
     };
@@ -211,7 +216,7 @@ TEST(TravelTest, LegsAddUpAndKeepEtendue) {
     // Both numbers are divided by the same one.
     EXPECT_NEAR(whole.s / whole.p / (in.s / in.p), 1, 8 * 0x1p-53);
     // At normal incidence a mirror adds no detail at once.
-    const Spectrum mirrored = Mirror(in, 1, {2, 2, 1, 1}, kLimits);
+    const Spectrum mirrored = Mirror(in, 1, {2, 2, 1, 1}, kSpectrumLimits);
     EXPECT_EQ(mirrored.s, in.s);
     EXPECT_EQ(mirrored.p, in.p);
   }
@@ -235,13 +240,14 @@ TEST(FirstOrderTest, VergenceAndSizeFollowCoddington) {
   const SurfaceBend bend = {.tangential = 0.5, .sagittal = 0.5};
   const double cos30 = std::cos(std::numbers::pi / 6);
   EXPECT_NEAR(TangentialMirror(in, 0.5, 0.5).v, 2.25, 1e-12);
-  EXPECT_NEAR(Mirror(in, 0.5, bend, kLimits).v, (2.25 + 0.75) / 2, 1e-12);
-  EXPECT_NEAR(Mirror(in, 0.5, bend, kLimits).p, 0.01, 1e-12);
+  EXPECT_NEAR(Mirror(in, 0.5, bend, kSpectrumLimits).v, (2.25 + 0.75) / 2, 1e-12);
+  EXPECT_NEAR(Mirror(in, 0.5, bend, kSpectrumLimits).p, 0.01, 1e-12);
   EXPECT_NEAR(TangentialRefract(in, 1 / 1.5, cos30, 0.5).v, -0.0649455595, 1e-9);
   EXPECT_NEAR(TangentialRefract(in, 1 / 1.5, cos30, 0.5).p, 0.00375, 1e-9);
-  EXPECT_NEAR(Refract(in, 1 / 1.5, cos30, bend, kLimits).v, (-0.0649455595 - 0.0160627195) / 2,
+  EXPECT_NEAR(Refract(in, 1 / 1.5, cos30, bend, kSpectrumLimits).v,
+              (-0.0649455595 - 0.0160627195) / 2, 1e-9);
+  EXPECT_NEAR(Refract(in, 1 / 1.5, cos30, bend, kSpectrumLimits).p, (0.00375 + 0.00444444444) / 2,
               1e-9);
-  EXPECT_NEAR(Refract(in, 1 / 1.5, cos30, bend, kLimits).p, (0.00375 + 0.00444444444) / 2, 1e-9);
 }
 
 // With h alone and collimated light a leg may still be cut; g² d² is not additive, and a cut leg
@@ -250,11 +256,12 @@ TEST(TravelTest, OfSecondOrderLosesAtMostAQuarterWhenCut) {
   for (const double a : {0.1, 0.5, 1.0, 3.0}) {
     const double b = 1;
     const Spectrum bent = Of(0, 0, 0, 0, 2);
-    EXPECT_NEAR(Travel(Travel(bent, a, kLimits), b, kLimits).s / Travel(bent, a + b, kLimits).s, 1,
-                1e-9);
+    EXPECT_NEAR(Travel(Travel(bent, a, kSpectrumLimits), b, kSpectrumLimits).s /
+                    Travel(bent, a + b, kSpectrumLimits).s,
+                1, 1e-9);
     const Spectrum sheared = Of(0, 0, 0, 0.5, 0);
-    const Spectrum cut = Travel(Travel(sheared, a, kLimits), b, kLimits);
-    const Spectrum whole = Travel(sheared, a + b, kLimits);
+    const Spectrum cut = Travel(Travel(sheared, a, kSpectrumLimits), b, kSpectrumLimits);
+    const Spectrum whole = Travel(sheared, a + b, kSpectrumLimits);
     EXPECT_NEAR(cut.s / whole.s, (a * a + a * b + b * b) / ((a + b) * (a + b)), 1e-9);
     EXPECT_GE(cut.s / whole.s, 0.75 - 1e-9);
     EXPECT_NEAR(cut.g, whole.g, 1e-9);
@@ -342,7 +349,7 @@ TEST(MirrorTest, CombinesBothAxes) {
   const SurfaceBend bend = {
       .tangential = 0.7, .sagittal = -0.4, .gradient = 0.2, .second_gradient = 0.1};
   const double c = 0.8;
-  const Spectrum both = Mirror(in, c, bend, kLimits);
+  const Spectrum both = Mirror(in, c, bend, kSpectrumLimits);
   const double tilt = 2 * 0.75 * 0.7 / c;  // 2 κ tan θ / cos θ
   EXPECT_NEAR(both.s, in.s + tilt * tilt / 2, 1e-12);
   EXPECT_NEAR(both.v, in.v + 0.7 / c - 0.4 * c, 1e-12);  // 2.8, isotropic
@@ -350,17 +357,17 @@ TEST(MirrorTest, CombinesBothAxes) {
   // Only the tangential axis has a first gradient; h is the larger of both.
   const SurfaceBend tangential = {.tangential = 0.7, .gradient = 0.2, .second_gradient = 0.1};
   const SurfaceBend sagittal = {.sagittal = -0.4, .gradient = 0.2, .second_gradient = 0.1};
-  EXPECT_EQ(both.g, Mirror(in, c, tangential, kLimits).g);
-  EXPECT_EQ(both.h,
-            std::max(Mirror(in, c, tangential, kLimits).h, Mirror(in, c, sagittal, kLimits).h));
+  EXPECT_EQ(both.g, Mirror(in, c, tangential, kSpectrumLimits).g);
+  EXPECT_EQ(both.h, std::max(Mirror(in, c, tangential, kSpectrumLimits).h,
+                             Mirror(in, c, sagittal, kSpectrumLimits).h));
   // A flat mirror changes nothing, at any slant.
-  const Spectrum flat = Mirror(in, c, {}, kLimits);
+  const Spectrum flat = Mirror(in, c, {}, kSpectrumLimits);
   EXPECT_EQ(flat, in);
 }
 
 TEST(MirrorTest, AcrossThePlaneOfIncidenceHasTheCurvatureOfTheSagittalAxis) {
   const SurfaceBend bend = {.tangential = 0, .sagittal = 2};
-  const Spectrum both = Mirror(Of(0, 0, 1e-6), 0.5, bend, kLimits);
+  const Spectrum both = Mirror(Of(0, 0, 1e-6), 0.5, bend, kSpectrumLimits);
   EXPECT_NEAR(both.v, 2 * 2 * 0.5 / 2, 1e-12);
   EXPECT_EQ(both.g, 0);
   EXPECT_NEAR(both.h, 2 * 2 * 4 + 16 * 8, 1e-9);
@@ -373,19 +380,20 @@ TEST(RefractTest, CombinesBothAxesAndReflectsBeyondTheCriticalAngle) {
   const Spectrum t = TangentialRefract(in, ratio, 0.9, -0.7);
   const double power = std::sqrt(1 - ratio * ratio * (1 - 0.81)) - ratio * 0.9;
   const Spectrum s = Of(in.s, ratio * in.v + power * 0.7, ratio * ratio * in.p);
-  const Spectrum both = Refract(in, ratio, 0.9, bend, kLimits);
+  const Spectrum both = Refract(in, ratio, 0.9, bend, kSpectrumLimits);
   EXPECT_NEAR(both.s, (t.s + s.s) / 2, 1e-12);
   EXPECT_NEAR(both.v, (t.v + s.v) / 2, 1e-12);
   EXPECT_NEAR(both.p, (t.p + s.p) / 2, 1e-12);
   EXPECT_NEAR(both.g, t.g, 1e-12);
-  EXPECT_EQ(Refract(in, ratio, 0.5, bend, kLimits), Mirror(in, 0.5, bend, kLimits));
-  EXPECT_NE(Refract(in, ratio, 0.76, bend, kLimits), Mirror(in, 0.76, bend, kLimits));
+  EXPECT_EQ(Refract(in, ratio, 0.5, bend, kSpectrumLimits), Mirror(in, 0.5, bend, kSpectrumLimits));
+  EXPECT_NE(Refract(in, ratio, 0.76, bend, kSpectrumLimits),
+            Mirror(in, 0.76, bend, kSpectrumLimits));
 }
 
 // A boundary between equal media is not there.
 TEST(RefractTest, WithoutAChangeOfMediumKeepsTheFirstOrder) {
   const Spectrum in = Of(2, 0.3, 0.01);
-  const Spectrum out = Refract(in, 1, 0.7, {0.5, 0.5, 0, 0}, kLimits);
+  const Spectrum out = Refract(in, 1, 0.7, {0.5, 0.5, 0, 0}, kSpectrumLimits);
   EXPECT_NEAR(out.s, in.s, 1e-12);
   EXPECT_NEAR(out.v, in.v, 1e-12);
   EXPECT_NEAR(out.p, in.p, 1e-12);
@@ -394,19 +402,19 @@ TEST(RefractTest, WithoutAChangeOfMediumKeepsTheFirstOrder) {
 TEST(EdgeTest, IsFeltByTheInverseSquareOfItsDistance) {
   EXPECT_DOUBLE_EQ(EdgeStrength(0.02, 0.25), 0.08);
   EXPECT_EQ(EdgeStrength(0.5, 0.25), 1);
-  const Spectrum sun = DirectionalSource(kLimits);
-  EXPECT_NEAR(PassEdge(sun, 0.1, 1, 0.08, kLimits).s, 8, 1e-9);
+  const Spectrum sun = DirectionalSource(kSpectrumLimits);
+  EXPECT_NEAR(PassEdge(sun, 0.1, 1, 0.08, kSpectrumLimits).s, 8, 1e-9);
   // What is nearer than a millionth of the scene is there.
-  EXPECT_NEAR(PassEdge(sun, 0, 0, 1, kLimits).s / 1e12, 1, 1e-12);
+  EXPECT_NEAR(PassEdge(sun, 0, 0, 1, kSpectrumLimits).s / 1e12, 1, 1e-12);
 }
 
 TEST(EdgeTest, InsideThePenumbraLeavesThePenumbrasWidth) {
   const double p = 0.01;
   const double rest = 2;
   // Two standard deviations: 2 √p rest = 0.4.
-  const Spectrum inside = PassEdge(Of(0, 0, p), 0.399, rest, 0.08, kLimits);
-  EXPECT_NEAR(Travel(inside, rest, kLimits).s * p * rest * rest, 1, 0.011);
-  const Spectrum outside = PassEdge(Of(0, 0, p), 0.401, rest, 0.08, kLimits);
+  const Spectrum inside = PassEdge(Of(0, 0, p), 0.399, rest, 0.08, kSpectrumLimits);
+  EXPECT_NEAR(Travel(inside, rest, kSpectrumLimits).s * p * rest * rest, 1, 0.011);
+  const Spectrum outside = PassEdge(Of(0, 0, p), 0.401, rest, 0.08, kSpectrumLimits);
   EXPECT_NEAR(outside.s, 0.08 / (0.401 * 0.401), 1e-12);
 }
 
@@ -415,28 +423,28 @@ TEST(EdgeTest, OfManyOnlyTheTwoStrongestCount) {
   const std::array edges = {PassedEdge{0.5, 0.9}, PassedEdge{1, 0.01}, PassedEdge{1.5, 0.7},
                             PassedEdge{2.5, 0.02}, PassedEdge{2.9, 0.8}};
   const std::array strongest = {edges[1], edges[3]};
-  const Spectrum all = TravelPastEdges(in, 3, edges, 0.08, kLimits);
-  EXPECT_EQ(all, TravelPastEdges(in, 3, strongest, 0.08, kLimits));
-  Spectrum by_hand = PassEdge(Travel(in, 1, kLimits), 0.01, 2, 0.08, kLimits);
-  by_hand = PassEdge(Travel(by_hand, 1.5, kLimits), 0.02, 0.5, 0.08, kLimits);
-  EXPECT_EQ(all, Travel(by_hand, 0.5, kLimits));
+  const Spectrum all = TravelPastEdges(in, 3, edges, 0.08, kSpectrumLimits);
+  EXPECT_EQ(all, TravelPastEdges(in, 3, strongest, 0.08, kSpectrumLimits));
+  Spectrum by_hand = PassEdge(Travel(in, 1, kSpectrumLimits), 0.01, 2, 0.08, kSpectrumLimits);
+  by_hand = PassEdge(Travel(by_hand, 1.5, kSpectrumLimits), 0.02, 0.5, 0.08, kSpectrumLimits);
+  EXPECT_EQ(all, Travel(by_hand, 0.5, kSpectrumLimits));
   // Applied in the order of the path, also when the later one is the stronger.
   const std::array rising = {PassedEdge{0.5, 0.9}, PassedEdge{1, 0.05}, PassedEdge{2.5, 0.01}};
   const std::array last_two = {rising[1], rising[2]};
-  EXPECT_EQ(TravelPastEdges(in, 3, rising, 0.08, kLimits),
-            TravelPastEdges(in, 3, last_two, 0.08, kLimits));
-  EXPECT_EQ(TravelPastEdges(in, 3, {}, 0.08, kLimits), Travel(in, 3, kLimits));
+  EXPECT_EQ(TravelPastEdges(in, 3, rising, 0.08, kSpectrumLimits),
+            TravelPastEdges(in, 3, last_two, 0.08, kSpectrumLimits));
+  EXPECT_EQ(TravelPastEdges(in, 3, {}, 0.08, kSpectrumLimits), Travel(in, 3, kSpectrumLimits));
 }
 
 TEST(DiffuseTest, ForgetsDirectionsAndHopesNoFurtherThanTheNextLeg) {
-  EXPECT_EQ(ScatterDiffusely(8, 1, kLimits), Of(5, 0, 0.25));
+  EXPECT_EQ(ScatterDiffusely(8, 1, kSpectrumLimits), Of(5, 0, 0.25));
   const double d = 2;
-  const Spectrum even = LeaveDiffuse(ScatterDiffusely(0, 0, kLimits), d, kLimits);
+  const Spectrum even = LeaveDiffuse(ScatterDiffusely(0, 0, kSpectrumLimits), d, kSpectrumLimits);
   EXPECT_NEAR(even.s, 12 / (d * d), 1e-12);
-  EXPECT_NEAR(Travel(even, d, kLimits).s, 3 / (d * d), 1e-12);
-  EXPECT_NEAR(Travel(even, d, kLimits).v, 0.75 / d, 1e-12);
-  EXPECT_EQ(LeaveDiffuse(Of(5, 0, 0.25), d, kLimits).s, 5);
-  EXPECT_EQ(LeaveDiffuse(Of(5, 0, 0.25), 0, kLimits).s, kLimits.s);
+  EXPECT_NEAR(Travel(even, d, kSpectrumLimits).s, 3 / (d * d), 1e-12);
+  EXPECT_NEAR(Travel(even, d, kSpectrumLimits).v, 0.75 / d, 1e-12);
+  EXPECT_EQ(LeaveDiffuse(Of(5, 0, 0.25), d, kSpectrumLimits).s, 5);
+  EXPECT_EQ(LeaveDiffuse(Of(5, 0, 0.25), 0, kSpectrumLimits).s, kSpectrumLimits.s);
 }
 
 TEST(LobeTest, HaveTheirVariances) {
@@ -449,12 +457,13 @@ TEST(LobeTest, HaveTheirVariances) {
 TEST(LobeTest, AGlossyHitpointSeesTheVergenceOfEachAxis) {
   const Spectrum in = Of(4, 0.5, 0.04);
   // U12 and U13: s + v² q / (1 + p q) with q = 1 / 0.01.
-  EXPECT_NEAR(SeeGlossily(in, 1, {}, 0.01, kLimits).s, 9, 1e-12);
-  EXPECT_NEAR(SeeGlossily(Of(4, 0.5, 0), 1, {}, 0.01, kLimits).s, 29, 1e-9);
+  EXPECT_NEAR(SeeGlossily(in, 1, {}, 0.01, kSpectrumLimits).s, 9, 1e-12);
+  EXPECT_NEAR(SeeGlossily(Of(4, 0.5, 0), 1, {}, 0.01, kSpectrumLimits).s, 29, 1e-9);
   const SurfaceBend bend = {.tangential = 0.3, .sagittal = -0.2};
   const double t = 0.5 + 2 * 0.3 / 0.8;
   const double s = 0.5 - 2 * 0.2 * 0.8;
-  EXPECT_NEAR(SeeGlossily(in, 0.8, bend, 0.01, kLimits).s, 4 + (t * t + s * s) / 2 * 100 / 5, 1e-9);
+  EXPECT_NEAR(SeeGlossily(in, 0.8, bend, 0.01, kSpectrumLimits).s,
+              4 + (t * t + s * s) / 2 * 100 / 5, 1e-9);
 }
 
 // A scene in other units shrinks its radii alike: s by 1/L², v by 1/L, ... exactly for powers of 2.
@@ -468,7 +477,7 @@ TEST(SpectrumTest, ScalesWithTheScene) {
   const SurfaceBend bend = {0.7, -0.4, 0.2, 0.1};
   const SurfaceBend large_bend = {0.7 / kScale, -0.4 / kScale, 0.2 / (kScale * kScale),
                                   0.1 / (kScale * kScale * kScale)};
-  const Spectrum start = PointSource(kLimits);
+  const Spectrum start = PointSource(kSpectrumLimits);
   const auto chain = [](Spectrum x, const SurfaceBend& b, double size,
                         const SpectrumLimits& limits) {
     x = Travel(x, 2 * size, limits);
@@ -477,7 +486,7 @@ TEST(SpectrumTest, ScalesWithTheScene) {
     x = Mirror(Travel(x, 0.5 * size, limits), 0.6, b, limits);
     return Travel(x, 1e3 * size, limits);
   };
-  const Spectrum small = scaled(chain(start, bend, 1, kLimits));
+  const Spectrum small = scaled(chain(start, bend, 1, kSpectrumLimits));
   const Spectrum big = chain(PointSource(large), large_bend, kScale, large);
   EXPECT_NEAR(big.s / small.s, 1, 1e-9);
   EXPECT_NEAR(big.v / small.v, 1, 1e-9);
@@ -487,23 +496,26 @@ TEST(SpectrumTest, ScalesWithTheScene) {
 }
 
 TEST(SpectrumHazardTest, StaysFiniteWhereTheTableSaysItCouldNot) {
-  const Spectrum focus = Travel(Of(1, -1, 0), 1, kLimits);
+  const Spectrum focus = Travel(Of(1, -1, 0), 1, kSpectrumLimits);
   EXPECT_NEAR(focus.s / 1e12, 1, 1e-6);
-  ExpectWithin(focus, kLimits, "exact focus of a point");
-  ExpectWithin(Travel(Of(1e24, 0, 10), 1e6, kLimits), kLimits, "p s d² near the float range");
-  EXPECT_NEAR(Travel(Of(7, 2, 0.01), 1e-6, kLimits).s / 7, 1, 1e-5);
-  EXPECT_EQ(Travel(Of(0, 0, 5e-6), 1e6, kLimits).s, 0);
+  ExpectWithin(focus, kSpectrumLimits, "exact focus of a point");
+  ExpectWithin(Travel(Of(1e24, 0, 10), 1e6, kSpectrumLimits), kSpectrumLimits,
+               "p s d² near the float range");
+  EXPECT_NEAR(Travel(Of(7, 2, 0.01), 1e-6, kSpectrumLimits).s / 7, 1, 1e-5);
+  EXPECT_EQ(Travel(Of(0, 0, 5e-6), 1e6, kSpectrumLimits).s, 0);
   const double grazing = std::cos(89.9 * std::numbers::pi / 180);
   const SurfaceBend spike = {1e6, -1e6, 1e6, 1e6};
-  ExpectWithin(Refract(Of(4, 2, 0.01), 1 / 1.5, grazing, spike, kLimits), kLimits, "grazing");
-  ExpectWithin(Mirror(Of(4, 2, 0.01), 0, spike, kLimits), kLimits, "grazing mirror");
+  ExpectWithin(Refract(Of(4, 2, 0.01), 1 / 1.5, grazing, spike, kSpectrumLimits), kSpectrumLimits,
+               "grazing");
+  ExpectWithin(Mirror(Of(4, 2, 0.01), 0, spike, kSpectrumLimits), kSpectrumLimits,
+               "grazing mirror");
   const double critical = std::sqrt(1 - 1 / 2.25);
-  ExpectWithin(Refract(Of(4, 2, 0.01), 1.5, critical * (1 + 1e-12), spike, kLimits), kLimits,
-               "critical angle");
+  ExpectWithin(Refract(Of(4, 2, 0.01), 1.5, critical * (1 + 1e-12), spike, kSpectrumLimits),
+               kSpectrumLimits, "critical angle");
   Spectrum many = Of(1e4, 0, 0.25);
   for (int i = 0; i < 300; ++i)
-    many = Travel(Mirror(many, 0.7, spike, kLimits), 0.3, kLimits);
-  ExpectWithin(many, kLimits, "300 spikes");
+    many = Travel(Mirror(many, 0.7, spike, kSpectrumLimits), 0.3, kSpectrumLimits);
+  ExpectWithin(many, kSpectrumLimits, "300 spikes");
   for (const double diagonal : {0.0, -1.0, 1e-300, 1e-38, 1e38, 1e300}) {
     const SpectrumLimits limits = SpectrumLimits::ForDiagonal(diagonal);
     ExpectWithin(Travel(PointSource(limits), 1, limits), limits, "size of the scene");
@@ -563,22 +575,22 @@ TEST(SpectrumHazardTest, IsWithinItsLimitsForAnyFiniteNumbers) {
 TEST(SpectrumHazardTest, LetsANaNThrough) {
   const SurfaceBend bend = {0.5, 0.5, 0, 0};
   const auto seen = [](const Spectrum& x) {
-    return std::isnan(ReceivedTrace(Travel(x, 1, kLimits), 0.7, 0, 0, kLimits));
+    return std::isnan(ReceivedTrace(Travel(x, 1, kSpectrumLimits), 0.7, 0, 0, kSpectrumLimits));
   };
   const Spectrum fine = Of(1, 0.5, 0.1);
   for (const Spectrum& bad : {Of(kNaN, 0.5, 0.1), Of(1, kNaN, 0.1), Of(1, 0.5, kNaN),
                               Of(1, 0.5, 0.1, kNaN), Of(1, 0.5, 0.1, 0, kNaN)}) {
     EXPECT_TRUE(seen(bad));
-    EXPECT_TRUE(seen(Mirror(bad, 0.7, bend, kLimits)));
-    EXPECT_TRUE(seen(Refract(bad, 1.5, 0.9, bend, kLimits)));
-    EXPECT_TRUE(seen(Blur(bad, 0.1, kLimits)));
-    EXPECT_TRUE(seen(PassEdge(bad, 0.1, 1, 1, kLimits)));
-    EXPECT_TRUE(seen(LeaveDiffuse(bad, 1, kLimits)));
+    EXPECT_TRUE(seen(Mirror(bad, 0.7, bend, kSpectrumLimits)));
+    EXPECT_TRUE(seen(Refract(bad, 1.5, 0.9, bend, kSpectrumLimits)));
+    EXPECT_TRUE(seen(Blur(bad, 0.1, kSpectrumLimits)));
+    EXPECT_TRUE(seen(PassEdge(bad, 0.1, 1, 1, kSpectrumLimits)));
+    EXPECT_TRUE(seen(LeaveDiffuse(bad, 1, kSpectrumLimits)));
   }
-  EXPECT_TRUE(seen(Mirror(fine, kNaN, bend, kLimits)));
-  EXPECT_TRUE(seen(Mirror(fine, 0.7, {kNaN, 0.5, 0, 0}, kLimits)));
-  EXPECT_TRUE(seen(Refract(fine, 1.5, kNaN, bend, kLimits)));
-  EXPECT_TRUE(std::isnan(ReceivedTrace(fine, kNaN, 0, 0, kLimits)));
+  EXPECT_TRUE(seen(Mirror(fine, kNaN, bend, kSpectrumLimits)));
+  EXPECT_TRUE(seen(Mirror(fine, 0.7, {kNaN, 0.5, 0, 0}, kSpectrumLimits)));
+  EXPECT_TRUE(seen(Refract(fine, 1.5, kNaN, bend, kSpectrumLimits)));
+  EXPECT_TRUE(std::isnan(ReceivedTrace(fine, kNaN, 0, 0, kSpectrumLimits)));
 }
 
 // Every state at its lower clamp, in the middle or at its upper clamp, through every event with
