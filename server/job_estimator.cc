@@ -383,8 +383,8 @@ struct JobEstimator::State {
     for (std::size_t i = 0; i < reports.size(); ++i) {
       if (guide.CellAt(reports[i].position) != ScatterGuide::kNoCell) light += brought[i];
     }
-    // One that is in use stays: of photons that it led, emissions that need many without it are not
-    // told.
+    // One that is in use stays: reports of photons that it led do not show which emissions would
+    // need many photons without it.
     if (guide.empty()) return before.scatterings();
     if (before.scatterings() == nullptr && light < kLeastLight * means.photons) return nullptr;
     return std::make_shared<const ScatterGuide>(std::move(guide));

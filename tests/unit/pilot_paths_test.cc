@@ -119,7 +119,7 @@ TEST(PilotPathsTest, LeadThroughAHoleToTheSky) {
   EXPECT_LE(outside, 5);
 }
 
-// Further paths add to what there is, and where light first lands is told with where it goes on.
+// Further paths add to what there is, and reports say where light first lands and where it goes on.
 TEST(PilotPathsTest, TellOfFirstScatterings) {
   Traced traced(Furnace(), 20);
   ThreadTeam team(2);
@@ -132,18 +132,18 @@ TEST(PilotPathsTest, TellOfFirstScatterings) {
   EXPECT_EQ(in_steps.paths, traced.reports.paths);
   ASSERT_EQ(in_steps.reports.size(), traced.reports.reports.size());
   EXPECT_GT(in_steps.reports.size(), first);
-  int told = 0;
+  int diffuse = 0;
   for (std::size_t i = 0; i < in_steps.reports.size(); ++i) {
     const FirstScattering& scattering = in_steps.reports[i].scattering;
     ASSERT_EQ(scattering, traced.reports.reports[i].scattering);
     if (!(scattering.density > 0)) continue;
-    ++told;
+    ++diffuse;
     // On the ball, inward, with the density of a diffuse surface.
     ASSERT_NEAR(Length(scattering.position), 1, 1e-4F);
     const float cosine = -Dot(scattering.direction, scattering.position);
     ASSERT_NEAR(scattering.density, cosine / kPi, 1e-4F);
   }
-  EXPECT_GT(told, static_cast<int>(in_steps.reports.size() / 2));
+  EXPECT_GT(diffuse, static_cast<int>(in_steps.reports.size() / 2));
   // However many paths are asked for, there are 2^16 reports and a few more.
   AddPilotPaths(traced.tracer, traced.needs, 1000000, team, in_steps);
   EXPECT_LT(in_steps.paths, 20000U);
