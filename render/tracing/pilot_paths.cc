@@ -52,7 +52,8 @@ class PilotPath {
     Rgb weight = hitpoint.weight * (hitpoint.is_glossy ? 1.0F : kPi);
     const float first_strength = MaxChannel(weight);
     float scatter_pdf = 0;
-    const int most = std::min(kMostVertices, tracer_.settings().max_depth);
+    // The photon's last landing is at the hitpoint, where it is not scattered.
+    const int most = std::min(kMostVertices, tracer_.settings().max_depth - 1);
     for (int vertex = 0;; ++vertex) {
       const Ray ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
       const Vec3 from = surface.position;
