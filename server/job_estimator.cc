@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <map>
 #include <set>
@@ -17,20 +16,18 @@
 #include "render/base/parallel.h"
 #include "render/base/text.h"
 #include "render/estimate/evidence.h"
-#include "render/estimate/guide_learning.h"
 #include "render/estimate/missing_light.h"
 #include "render/estimate/noise_layer.h"
 #include "render/estimate/photon_steps.h"
 #include "render/estimate/pixel_radii.h"
 #include "render/estimate/relative_error.h"
-#include "render/estimate/scatter_learning.h"
 #include "render/film/film.h"
 #include "render/film/layers.h"
 #include "render/math/color_space.h"
 #include "render/math/warp.h"
 #include "render/scene/shape_lists.h"
 #include "render/tracing/eye_path.h"
-#include "render/tracing/pilot_paths.h"
+#include "server/job_guides.h"
 #include "server/state/sums_codec.h"
 
 namespace lucerna {
@@ -86,99 +83,6 @@ std::string NameOf(const LightGroup& light, std::size_t number, double unit) {
   return Concat("light ", number, " (", described(), ")");
 }
 
-// Luminance of a pixel.
-double ValueAt(const ImageSums& sums, std::size_t pixel) {
-  const RgbSum radiance = sums.RadianceAt(pixel);
-  return std::max(0.0, WorkingLuminance(radiance)) / sums.weights().all();
-}
-
-// The same of what photons bring to it.
-double PhotonValueAt(const ImageSums& sums, std::size_t pixel) {
-  return std::max(0.0, WorkingLuminance(sums.At(pixel).photons)) / sums.weights().all();
-}
-
-// What a photon found by a pixel adds to its radiance, over its flux, but for a common factor:
-// albedo over the disc's area; 0 where no surface was met in the first passes (media).
-double FactorAt(const ImageSums& sums, const RadiusColumn& radii, std::size_t pixel) {
-  const ImageSums::Features features = sums.FeaturesAt(pixel);
-  if (!(features.hitpoints > 0 && features.hits > 0)) return 0;
-  const Rgb albedo = features.albedo / static_cast<float>(features.hits);
-  const double radius =
-      static_cast<double>(radii[pixel]) *
-      static_cast<double>(features.unit_radius / static_cast<float>(features.hitpoints));
-  return WorkingLuminance(static_cast<double>(albedo.r), static_cast<double>(albedo.g),
-                          static_cast<double>(albedo.b)) /
-         std::max(radius * radius, 1e-36);
-}
-
-// The luminance of every pixel, and means over all.
-struct PixelMeans {
-  std::vector<double> values;
-  double value = 0, factor = 0;
-  double photons = 0;  // what of `value` they brought
-};
-
-// `photons` of the means only where it `has_pilots` to compare them with.
-PixelMeans MeansOf(const ImageSums& sums, const RadiusColumn& radii, bool has_pilots,
-                   ThreadTeam& team) {
-  // Of pieces, added up in their order.
-  constexpr std::size_t kPixelsAtOnce = 4096;
-  struct Piece {
-    double value = 0, factor = 0, photons = 0;
-  };
-  std::vector<Piece> pieces((sums.pixels() + kPixelsAtOnce - 1) / kPixelsAtOnce);
-  PixelMeans means;
-  means.values.resize(sums.pixels());
-  team.For(pieces.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t piece = begin; piece < end; ++piece) {
-      const std::size_t last = std::min(sums.pixels(), (piece + 1) * kPixelsAtOnce);
-      for (std::size_t pixel = piece * kPixelsAtOnce; pixel < last; ++pixel) {
-        means.values[pixel] = ValueAt(sums, pixel);
-        pieces[piece].value += means.values[pixel];
-        pieces[piece].factor += FactorAt(sums, radii, pixel);
-        if (has_pilots) pieces[piece].photons += PhotonValueAt(sums, pixel);
-      }
-    }
-  });
-  for (const Piece& piece : pieces) {
-    means.value += piece.value / static_cast<double>(sums.pixels());
-    means.factor += piece.factor / static_cast<double>(sums.pixels());
-    means.photons += piece.photons / static_cast<double>(sums.pixels());
-  }
-  return means;
-}
-
-// The value of a pixel over the mean of all: of a few pixels around it, for a photon must not make
-// its own pixel bright, and with a floor.
-double BrightnessAround(const PixelMeans& means, int width, std::size_t pixel) {
-  constexpr std::size_t kReach = 2;  // pixels
-  constexpr double kFloor = 0.1;     // of the mean value, as in relative errors
-  const auto columns = static_cast<std::size_t>(width);
-  const std::size_t rows = means.values.size() / columns;
-  const std::size_t x = pixel % columns;
-  const std::size_t y = pixel / columns;
-  double value = 0;
-  double around = 0;
-  for (std::size_t v = y - std::min(y, kReach); v <= std::min(rows - 1, y + kReach); ++v) {
-    for (std::size_t u = x - std::min(x, kReach); u <= std::min(columns - 1, x + kReach); ++u) {
-      value += means.values[v * columns + u];
-      ++around;
-    }
-  }
-  return value / around / means.value + kFloor;
-}
-
-// The square of what a photon of even flux found by a pixel adds to its value, relative to that
-// value (ScoreAt).
-double PhotonScore(const ImageSums& sums, const RadiusColumn& radii, int width,
-                   const PixelMeans& means, std::size_t pixel) {
-  if (!(means.value > 0)) return 1;
-  const double factor = FactorAt(sums, radii, pixel);
-  const double of_mean = factor > 0 && means.factor > 0 ? factor / means.factor : 1;
-  const double relative = of_mean / BrightnessAround(means, width, pixel);
-  return relative * relative;
-}
-
 Status CheckPower(Rgb power_w) {
   if (IsFinite(power_w) && std::isfinite(Luminance(power_w))) return absl::OkStatus();
   return absl::InvalidArgumentError(
@@ -217,9 +121,7 @@ struct JobEstimator::State {
     std::shared_ptr<const PhotonGuide> guide = nullptr;  // nullptr: photons are drawn evenly
   };
   std::map<std::uint64_t, After> after;
-  std::unique_ptr<GuideLearner> learner;           // of jobs whose photons are drawn by guides
-  std::optional<PilotReports> pilots;              // traced when the first guide is learned
-  PilotReports scatter_pilots;                     // these and further ones, as passes come
+  std::unique_ptr<JobGuides> guides;               // of jobs whose photons are drawn by them
   std::shared_ptr<const RadiusColumn> last_radii;  // of the last round added
   // Of the last estimate, and after how many passes that was.
   Mutex noise_area_mutex;
@@ -271,173 +173,6 @@ struct JobEstimator::State {
     return NextPhotons(before, choice->most * first, best);
   }
 
-  // By what later passes draw their photons once `round` is added, which brought `reports` of so
-  // many photons, given by what they would by what was known before.
-  [[nodiscard]] std::shared_ptr<const PhotonGuide> ChooseGuide(
-      const PassRange& round, std::span<const EmissionReport> reports, std::uint64_t photons,
-      const RoundPlan& plan, std::uint64_t photons_per_pass,
-      const std::shared_ptr<const PhotonGuide>& before) {
-    if (learner == nullptr) return nullptr;
-    learner->Add(reports, plan.guide, photons);
-    // A guide that asks for no reports was learned from enough of them.
-    if (!IsGuidePass(round.last) || before->reported() == 0) return before;
-    const PixelMeans means = MeansOf(*sums, *plan.radii, AsksPilots(), team);
-    const auto lock = HoldColors();
-    const auto scatterings = AsksPilots()
-                                 ? LearnScatterings(*plan.radii, means, round.last, *before)
-                                 : before->scatterings();
-    return std::make_shared<const PhotonGuide>(learner->Next(
-        round.last, photons_per_pass,
-        [&](std::uint32_t pixel) {
-          return PhotonScore(*sums, *plan.radii, settings.crop_width(), means, pixel);
-        },
-        [this](const PrimaryNumbers& numbers) { return EvenFlux(prepared.lights(), numbers); },
-        FindPilotEmissions(*plan.radii, means, scatterings.get()), scatterings));
-  }
-
-  // The share of the photons drawn without a guide that hitpoints have found so far.
-  [[nodiscard]] double EvenFoundShare() const {
-    double sent = 0;
-    double found = 0;
-    for (const LightTally& light : sums->tally().lights) {
-      sent += static_cast<double>(light.sent);
-      for (const std::uint64_t of_class : light.in_view)
-        found += static_cast<double>(of_class);
-    }
-    return sent > 0 ? found / sent : 0;
-  }
-
-  // Whether photons tell too little.
-  [[nodiscard]] bool AsksPilots() const {
-    constexpr double kEnoughFound = 0.125;
-    return EvenFoundShare() < kEnoughFound;
-  }
-
-  // What a report of a pilot path stands for, given what is known of the image's pixels.
-  struct Found {
-    double flux = 0;     // EvenFlux
-    double brought = 0;  // to the pixel, luminance
-    // So many photons of this emission are found for each unit that they bring.
-    double photons_per_value = 0;
-  };
-  [[nodiscard]] std::optional<Found> FoundOf(const PilotReport& report, const RadiusColumn& in_use,
-                                             const PixelMeans& means) const {
-    // A path's value over that of the pixel where it began. What few paths find is rare, not large.
-    constexpr double kLargestValue = 64;
-    const double factor = FactorAt(*sums, in_use, report.pixel);
-    Found found = {.flux = EvenFlux(prepared.lights(), report.numbers), .brought = report.brought};
-    if (!(factor > 0 && found.flux > 0)) return std::nullopt;
-    if (means.value > 0) {
-      found.brought =
-          std::min(found.brought, kLargestValue * means.value *
-                                      BrightnessAround(means, settings.crop_width(), report.pixel));
-    }
-    // A photon of flux f that a pixel finds adds f albedo / (π² radius²) to its radiance.
-    const auto power = static_cast<double>(Luminance(prepared.lights().TotalPower()));
-    found.photons_per_value =
-        kPi64 * kPi64 / (factor * power * found.flux * FoundBy(in_use, report.pixel));
-    if (!std::isfinite(found.brought * found.photons_per_value)) return std::nullopt;
-    return found;
-  }
-
-  // By what photons that first land are scattered after `passes`, where until now `before` was in
-  // use; nullptr: by BSDFs, where that lights most of the image well. Requires AsksPilots().
-  [[nodiscard]] std::shared_ptr<const ScatterGuide> LearnScatterings(const RadiusColumn& in_use,
-                                                                     const PixelMeans& means,
-                                                                     std::uint64_t passes,
-                                                                     const PhotonGuide& before) {
-    constexpr std::uint64_t kPhotonsPerPath = 32;
-    constexpr std::uint64_t kMostPaths = 65536;
-    // Of what photons bring, so much must come from where the guide has cells.
-    constexpr double kLeastLight = 0.15;
-    // Before, it is too uncertain what photons bring.
-    constexpr std::uint64_t kFirstPasses = 4;
-    if (passes < kFirstPasses) return nullptr;
-    if (!pilots) pilots = TracePilotPaths(*tracer, prepared.needs(), team);
-    if (pilots->reports.empty()) return nullptr;
-    const PilotReports* learned_from = &*pilots;
-    // More paths, as a small part of what passes cost, refine what has shown its worth.
-    if (before.scatterings() != nullptr) {
-      if (scatter_pilots.paths == 0) scatter_pilots = *pilots;
-      const std::uint64_t paths =
-          passes * static_cast<std::uint64_t>(settings.photons_per_pass) / kPhotonsPerPath;
-      AddPilotPaths(*tracer, prepared.needs(), std::min(paths, kMostPaths), team, scatter_pilots);
-      learned_from = &scatter_pilots;
-    }
-    std::vector<ScatterReport> reports;
-    std::vector<double> brought;
-    for (const PilotReport& report : learned_from->reports) {
-      if (!(report.scattering.density > 0)) continue;
-      const std::optional<Found> found = FoundOf(report, in_use, means);
-      if (!found) continue;
-      const double score = PhotonScore(*sums, in_use, settings.crop_width(), means, report.pixel);
-      reports.push_back({.position = report.scattering.position,
-                         .direction = report.scattering.direction,
-                         .density = report.scattering.density,
-                         .mass = found->brought * found->photons_per_value * found->flux *
-                                 found->flux * score * before.WeightAt(report.numbers)});
-      brought.push_back(found->brought / static_cast<double>(learned_from->paths));
-    }
-    ScatterGuide guide = LearnScatterGuide(reports);
-    double light = 0;  // that comes from where the guide has cells
-    for (std::size_t i = 0; i < reports.size(); ++i) {
-      if (guide.CellAt(reports[i].position) != ScatterGuide::kNoCell) light += brought[i];
-    }
-    // One that is in use stays: reports of photons that it led do not show which emissions would
-    // need many photons without it.
-    if (guide.empty()) return before.scatterings();
-    if (before.scatterings() == nullptr && light < kLeastLight * means.photons) return nullptr;
-    return std::make_shared<const ScatterGuide>(std::move(guide));
-  }
-
-  // What pilot paths say of the emissions that the image needs, given what is known of its pixels,
-  // where photons are scattered by `scatterings` (nullptr: by BSDFs). None where photons tell
-  // enough.
-  [[nodiscard]] PilotEmissions FindPilotEmissions(const RadiusColumn& in_use,
-                                                  const PixelMeans& means,
-                                                  const ScatterGuide* scatterings) {
-    if (!AsksPilots()) return {};
-    if (!pilots) pilots = TracePilotPaths(*tracer, prepared.needs(), team);
-    PilotEmissions emissions;
-    emissions.emissions.reserve(pilots->reports.size());
-    const double paths_per_pixel =
-        static_cast<double>(pilots->paths) / static_cast<double>(sums->pixels());
-    for (const PilotReport& report : pilots->reports) {
-      const std::optional<Found> found = FoundOf(report, in_use, means);
-      if (!found) continue;
-      // Counted by what they add to the variance.
-      double flux_factor = 1;
-      if (scatterings != nullptr && report.scattering.density > 0) {
-        const ScatterGuide::Cell cell = scatterings->CellAt(report.scattering.position);
-        if (cell != ScatterGuide::kNoCell) {
-          flux_factor = scatterings->FluxFactor(cell, report.scattering.direction,
-                                                static_cast<double>(report.scattering.density));
-        }
-      }
-      emissions.emissions.push_back(
-          {.numbers = report.numbers,
-           .pixel = report.pixel,
-           .found = flux_factor * (found->brought / paths_per_pixel * found->photons_per_value)});
-      emissions.brought += found->brought / static_cast<double>(pilots->paths);
-    }
-    emissions.brought = means.photons > 0 ? emissions.brought / means.photons : HUGE_VAL;
-    return emissions;
-  }
-
-  // How many pixels find a photon that this pixel finds: as many as its disc covers.
-  [[nodiscard]] double FoundBy(const RadiusColumn& in_use, std::size_t pixel) const {
-    const Camera& camera = prepared.scene().camera;
-    const ImageSums::Features features = sums->FeaturesAt(pixel);
-    auto radius = static_cast<double>(in_use[pixel]);  // in pixels, unless
-    if (settings.initial_radius != 0 && camera.kind != Camera::Kind::kSensors &&
-        features.hits > 0) {
-      const double distance =
-          static_cast<double>(features.distance) / static_cast<double>(features.hits);
-      radius /= std::max(PixelFootprint(camera, settings.width, settings.height, distance), 1e-18);
-    }
-    return std::max(1.0, kPi64 * radius * radius);
-  }
-
   // Radiance over all passes, Rec. 709.
   [[nodiscard]] RgbSum Sum(std::size_t pixel) const { return ToRec709(sums->At(pixel).radiance()); }
 };
@@ -456,9 +191,6 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
                                       prepared.intersector(), prepared.lights());
   state->film_spread = std::make_unique<FilmSpread>(*state->tracer);
   if (prepared.needs().Uses(Part::kSpectra)) state->film_spread->Prepare(state->team);
-  const int width = settings.crop_width();
-  const int height = settings.crop_height();
-  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   const auto initial = static_cast<float>(settings.initial_radius > 0
                                               ? settings.initial_radius / prepared.scene().unit
                                               : settings.initial_footprints);
@@ -469,9 +201,9 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   const auto photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass);
   state->after[0] = {.radii = state->last_radii, .photons_per_pass = photons_per_pass};
   if (!settings.unguided && prepared.needs().Uses(Part::kPhotons)) {
-    state->learner = std::make_unique<GuideLearner>(pixels);
-    state->after[0].guide =
-        std::make_shared<const PhotonGuide>(state->learner->First(photons_per_pass));
+    state->guides =
+        std::make_unique<JobGuides>(prepared, state->settings, *state->tracer, state->team);
+    state->after[0].guide = state->guides->First(photons_per_pass);
   }
   state->has_smooth_surfaces = HasSmoothSurfaces(prepared.scene());
   const HitpointExtent extent = SampleExtent(*state->tracer);
@@ -548,8 +280,15 @@ void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundP
   const std::uint64_t photons = round->tally.photons;
   round.reset();
   after.photons_per_pass = state.ChoosePhotons(of_round, before.photons_per_pass);
-  after.guide =
-      state.ChooseGuide(of_round, reports, photons, plan, after.photons_per_pass, before.guide);
+  after.guide = before.guide;
+  if (state.guides != nullptr) {
+    state.guides->Add(reports, plan.guide, photons);
+    if (JobGuides::IsTimeForNext(passes, *before.guide)) {
+      const auto lock = state.HoldColors();
+      after.guide = state.guides->Next({*state.sums, *plan.radii}, passes, after.photons_per_pass,
+                                       *before.guide);
+    }
+  }
   // Rounds that are still to be planned, or to be planned again by a job that goes on, need these;
   // the newest is what the next choice of photons follows from.
   std::set<std::uint64_t> needed = {passes};
@@ -861,9 +600,9 @@ void JobEstimator::Save(ByteWriter& writer) const {
     writer.Varint(passes);
     writer.Varint(after.photons_per_pass);
     WriteRadii(writer, *after.radii);
-    if (state.learner != nullptr) WriteGuide(writer, *after.guide);
+    if (state.guides != nullptr) WriteGuide(writer, *after.guide);
   }
-  if (state.learner != nullptr) WriteLearned(writer, state.learner->numbers());
+  if (state.guides != nullptr) WriteLearned(writer, state.guides->learned());
   {
     const MutexLock lock(state_->noise_area_mutex);
     WriteDouble(writer, state_->noise_area);
@@ -898,12 +637,12 @@ Status JobEstimator::State::RestoreSums(ByteReader& reader) {
     After& of_passes = read_after[passes];
     of_passes.photons_per_pass = reader.Varint();
     LUCERNA_ASSIGN_OR_RETURN(of_passes.radii, read_radii());
-    if (learner == nullptr) continue;
+    if (guides == nullptr) continue;
     LUCERNA_ASSIGN_OR_RETURN(PhotonGuide guide, ReadGuide(reader));
     of_passes.guide = std::make_shared<const PhotonGuide>(std::move(guide));
   }
   GuideLearner::Numbers learned;
-  if (learner != nullptr) {
+  if (guides != nullptr) {
     LUCERNA_ASSIGN_OR_RETURN(learned, ReadLearned(reader, pixels()));
   }
   const double read_noise_area = ReadDouble(reader);
@@ -921,7 +660,7 @@ Status JobEstimator::State::RestoreSums(ByteReader& reader) {
   variance = std::move(read_variance);
   last_radii = std::move(read_last_radii);
   after = std::move(read_after);
-  if (learner != nullptr) learner->Restore(std::move(learned));
+  if (guides != nullptr) guides->Restore(std::move(learned));
   {
     const MutexLock lock(noise_area_mutex);
     noise_area = read_noise_area;
