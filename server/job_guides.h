@@ -8,10 +8,12 @@
 // Threads: one caller at a time.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "render/analysis/prepared_scene.h"
 #include "render/base/parallel.h"
@@ -44,9 +46,8 @@ class JobGuides {
     const ImageSums& sums;
     const RadiusColumn& radii;
   };
-  // By what later passes, of so many photons, draw them once `passes` were added, given by what
-  // they would have by what was known before. Requires IsTimeForNext, and the three colours of a
-  // scene that has others in some passes.
+  // The guide of later passes, of so many photons, once `passes` were added, where `before` was in
+  // use. Requires IsTimeForNext, and the scene in its three colours.
   [[nodiscard]] std::shared_ptr<const PhotonGuide> Next(const SoFar& image, std::uint64_t passes,
                                                         std::uint64_t photons_per_pass,
                                                         const PhotonGuide& before);
