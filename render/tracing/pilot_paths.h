@@ -9,8 +9,8 @@
 // is added to the image; an error here costs noise.
 //
 // Left out: light that reaches the hitpoint itself without photons; hitpoints for caustic photons
-// alone, and media. At a glossy hitpoint directions are drawn as at a diffuse one, and at all by the
-// geometric normal.
+// alone, and media. At a glossy hitpoint directions are drawn as at a diffuse one, and at all by
+// the geometric normal.
 #pragma once
 
 #include "render/base/parallel.h"
