@@ -70,12 +70,17 @@ Status CheckSameJob(const v1::Job& job, const JobToSend& wanted) {
   return absl::OkStatus();
 }
 
-// Whether `overrides` end as `until` does.
-bool HasEnd(const v1::RenderOverrides& message, const RenderOverrides& until) {
-  const StatusOr<RenderOverrides> overrides = FromProto(message);
-  return overrides.ok() && overrides->passes == until.passes &&
-         overrides->photons == until.photons && overrides->time_s == until.time_s &&
-         overrides->error == until.error;
+// Whether the job ends as `until` says, which gives at least one stop criterion.
+StatusOr<bool> EndsAs(const v1::Job& job, const RenderOverrides& until) {
+  if (job.has_bake()) {
+    LUCERNA_ASSIGN_OR_RETURN(const RenderOverrides overrides, FromProto(job.bake().overrides()));
+    return overrides.passes == until.passes && overrides.photons == until.photons &&
+           overrides.time_s == until.time_s && overrides.error == until.error;
+  }
+  const RenderSettings settings = SettingsOf(job);
+  RenderSettings changed = settings;
+  LUCERNA_RETURN_IF_ERROR(SetStopCriteria(until, changed));
+  return changed == settings;
 }
 
 // Shows a job as it moves on: redrawn in place on a terminal, else as plain lines, on stderr.
@@ -259,10 +264,18 @@ StatusOr<v1::Job> LocalRuns::FollowOwn(const OutputOptions& output_options) {
   return job;
 }
 
-StatusOr<v1::Job> LocalRuns::Resume(const JobToSend& wanted, const OutputOptions& output_options) {
+StatusOr<std::size_t> LocalRuns::CountJobs() {
   LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, connection_->List());
-  if (jobs.empty()) return absl::FailedPreconditionError("there is no render to go on with");
-  const v1::Job& job = jobs.front();
+  return jobs.size();
+}
+
+StatusOr<v1::Job> LocalRuns::Resume(const JobToSend& wanted, const OutputOptions& output_options,
+                                    std::size_t index) {
+  // Newest first.
+  LUCERNA_ASSIGN_OR_RETURN(const std::vector<v1::Job> jobs, connection_->List());
+  if (index >= jobs.size())
+    return absl::FailedPreconditionError("there is no render to go on with");
+  const v1::Job& job = jobs[jobs.size() - 1 - index];
   LUCERNA_RETURN_IF_ERROR(CheckSameJob(job, wanted));
   job_id_ = job.job_id();
   RenderOverrides until;
@@ -272,9 +285,10 @@ StatusOr<v1::Job> LocalRuns::Resume(const JobToSend& wanted, const OutputOptions
     LUCERNA_RETURN_IF_ERROR(ParseSetting(setting, *SettingText(setting, wanted.overrides), until));
     has_end = true;
   }
-  // A bake with another end begins anew.
-  if (has_end && !(job.has_bake() && HasEnd(job.bake().overrides(), until))) {
-    LUCERNA_RETURN_IF_ERROR(connection_->Extend(job_id_, until).status());
+  if (has_end) {
+    // With another end a bake begins anew, and of a job that is over the photons may be gone.
+    LUCERNA_ASSIGN_OR_RETURN(const bool ends_so, EndsAs(job, until));
+    if (!ends_so) LUCERNA_RETURN_IF_ERROR(connection_->Extend(job_id_, until).status());
   }
   if (job.state() == v1::JOB_STATE_PAUSED) {
     LUCERNA_RETURN_IF_ERROR(connection_->Resume(job_id_).status());

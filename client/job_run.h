@@ -4,6 +4,7 @@
 // cluster.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -64,11 +65,14 @@ class LocalRuns {
                                       const RenderOverrides& overrides,
                                       const std::string& reference_path,
                                       const OutputOptions& output_options);
-  // Goes on, to the end that the overrides give if they give one, with the job that is in the
-  // cluster's state. Errors: also FAILED_PRECONDITION when there is none, or its scene or settings
-  // are others.
+  // Goes on, to the end that the overrides give if they give one, with a job that is in the
+  // cluster's state: number `index` of those, from the first one submitted.
+  // Errors: also FAILED_PRECONDITION when there is none, or its scene or settings are others.
   [[nodiscard]] StatusOr<v1::Job> Resume(const JobToSend& wanted,
-                                         const OutputOptions& output_options);
+                                         const OutputOptions& output_options,
+                                         std::size_t index = 0);
+  // How many jobs are in the cluster's state.
+  [[nodiscard]] StatusOr<std::size_t> CountJobs();
   // The image of a job that succeeded.
   [[nodiscard]] StatusOr<Image> ImageOf(const v1::Job& job);
   // Of the jobs that are run from now on timelines are kept.

@@ -265,6 +265,13 @@ int Run(int argc, char** argv) {
         ->check(CLI::Range(1, 4096));
   };
 
+  const auto add_checkpoints = [&](CLI::App* to, bool& resumes, const std::string& what) {
+    CLI::Option* none =
+        to->add_flag("--no-checkpoints", keeps_no_checkpoints,
+                     "keep nothing beside the image to go on from after an interruption");
+    to->add_flag("--resume", resumes, absl::StrCat("go on with a ", what, " that was interrupted"))
+        ->excludes(none);
+  };
   const auto find_programs = [&] {
     StatusOr<std::string> folder = ProgramFolder();
     if (folder.ok()) cluster.program_folder = *folder;
@@ -278,13 +285,9 @@ int Run(int argc, char** argv) {
     return Render(requests, cluster, output_options);
   });
   add_render_flags(render);
-  CLI::Option* no_checkpoints =
-      render->add_flag("--no-checkpoints", keeps_no_checkpoints,
-                       "keep nothing beside the image to go on from after an interruption");
   render->add_option("--from-mesh", request.mesh,
                      ".glb file of lucerna bake whose light is drawn, without photons");
-  render->add_flag("--resume", request.resumes, "go on with a render that was interrupted")
-      ->excludes(no_checkpoints);
+  add_checkpoints(render, request.resumes, "render");
   add_workers(render);
   add_json_and_full(render);
   add_quiet(render);
@@ -507,6 +510,7 @@ int Run(int argc, char** argv) {
   CLI::App* reference =
       command("reference", "render an image to measure others by", [&]() -> Status {
         LUCERNA_RETURN_IF_ERROR(find_programs());
+        to_refer.keeps_checkpoints = !keeps_no_checkpoints;
         return RenderReference(to_refer, cluster, output_options);
       });
   reference->add_option("SCENE", to_refer.scene_path, "scene file: pbrt-v4 or glTF 2.0")
@@ -515,6 +519,7 @@ int Run(int argc, char** argv) {
   AddSettingFlag(*reference, "time_s", to_refer.overrides, "seconds, of both halves together");
   AddSettingFlag(*reference, "passes", to_refer.overrides, "passes, of both halves together");
   add_image_flags(reference, to_refer.overrides);
+  add_checkpoints(reference, to_refer.resumes, "reference");
   add_no_preview(reference);
   add_json(reference);
   add_quiet(reference);

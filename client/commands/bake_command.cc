@@ -1,14 +1,13 @@
 #include "client/commands/bake_command.h"
 
-#include <filesystem>
 #include <optional>
-#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_format.h"
 
 #include "client/bake/irradiance_plan.h"
+#include "client/checkpoints.h"
 #include "client/exit_code.h"
 #include "client/job_run.h"
 #include "client/view/report.h"
@@ -28,11 +27,6 @@ bool IsPly(const std::string& path) {
 }
 bool IsLightMap(const std::string& path) {
   return path.ends_with(".exr");
-}
-
-// Where the state of a bake on this machine is kept.
-std::string FolderOf(const BakeRequest& request) {
-  return request.outputs.path + ".checkpoints";
 }
 
 // Without a path only the job is submitted.
@@ -135,15 +129,8 @@ Status BakeOnServer(const BakeRequest& request, SceneFiles& files, const JobToSe
 
 Status BakeHere(const BakeRequest& request, SceneFiles& files, const JobToSend& job,
                 ClusterOptions cluster, const OutputOptions& output_options) {
-  cluster.state_folder = FolderOf(request);
-  const std::string& folder = cluster.state_folder;
-  std::error_code ignored;
-  if (!request.resumes) {
-    std::filesystem::remove_all(folder, ignored);
-  } else if (!std::filesystem::exists(folder, ignored)) {
-    return absl::FailedPreconditionError(
-        absl::StrCat(folder, ": there is no interrupted bake to go on with; leave --resume away"));
-  }
+  cluster.state_folder = CheckpointFolderOf(request.outputs.path);
+  LUCERNA_RETURN_IF_ERROR(OpenCheckpoints(cluster.state_folder, request.resumes, "bake"));
   Status status;
   {
     LUCERNA_ASSIGN_OR_RETURN(const auto runs, LocalRuns::Start(cluster));
@@ -159,12 +146,7 @@ Status BakeHere(const BakeRequest& request, SceneFiles& files, const JobToSend& 
     // What was measured is still there.
     if (ended.ok() && !status.ok()) return status;
   }
-  // A process that died, or is silent, says nothing about the job.
-  const bool can_go_on = absl::IsInternal(status) || ExitCodeOf(status) == ExitCode::kUnreachable ||
-                         (request.resumes && !status.ok());
-  if (can_go_on) return status;
-  std::filesystem::remove_all(folder, ignored);
-  return status;
+  return CloseCheckpoints(cluster.state_folder, request.resumes, status);
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "absl/strings/str_join.h"
 
 #include "client/bake/mesh_render.h"
+#include "client/checkpoints.h"
 #include "client/connection.h"
 #include "client/exit_code.h"
 #include "client/frames.h"
@@ -106,15 +107,11 @@ Status CheckTrace(const RenderRequest& request) {
   return CheckMayWrite(request.trace, "traceEvents");
 }
 
-// Beside the image; empty when that is no file (a device, a pipe), or none are wanted.
+// Empty when none are wanted.
 std::string CheckpointFolder(const RenderRequest& request) {
-  const std::string& image =
-      request.outputs.image.empty() ? request.outputs.png : request.outputs.image;
-  std::error_code error;
-  const auto type = std::filesystem::status(image, error).type();
-  const bool is_file =
-      type == std::filesystem::file_type::regular || type == std::filesystem::file_type::not_found;
-  return request.keeps_checkpoints && is_file ? image + ".checkpoints" : "";
+  if (!request.keeps_checkpoints) return "";
+  const OutputPaths& outputs = request.outputs;
+  return CheckpointFolderOf(outputs.image.empty() ? outputs.png : outputs.image);
 }
 
 // After an interruption: the image so far, and how to go on.
@@ -241,16 +238,7 @@ Status RenderOne(const RenderRequest& request, const ClusterOptions& cluster_opt
   ClusterOptions options = cluster_options;
   options.state_folder = CheckpointFolder(request);
   const std::string& folder = options.state_folder;
-  std::error_code ignored;
-  if (request.resumes) {
-    if (folder.empty() || !std::filesystem::exists(folder, ignored)) {
-      return absl::FailedPreconditionError(absl::StrCat(
-          folder, ": there is no interrupted render to go on with; leave --resume away"));
-    }
-  } else if (!folder.empty()) {
-    // Of a render that was interrupted and is not wanted any more.
-    std::filesystem::remove_all(folder, ignored);
-  }
+  LUCERNA_RETURN_IF_ERROR(OpenCheckpoints(folder, request.resumes, "render"));
   StatusOr<v1::Job> job;
   Status traced;
   {
@@ -275,19 +263,8 @@ Status RenderOne(const RenderRequest& request, const ClusterOptions& cluster_opt
           SaveAndReport(runs->connection(), *job, request.outputs, output_options));
     }
   }
-  if (folder.empty()) return job.ok() ? traced : job.status();
-  // A process that died says nothing about the job.
-  const bool can_go_on = absl::IsInternal(job.status()) ||
-                         ExitCodeOf(job.status()) == ExitCode::kUnreachable ||
-                         (request.resumes && !job.ok());
-  if (can_go_on) {
-    Status status = job.status();
-    if (!absl::IsInternal(status)) return status;
-    return absl::InternalError(
-        absl::StrCat(std::string(status.message()), "\nthe same command with --resume goes on"));
-  }
-  std::filesystem::remove_all(folder, ignored);
-  return job.ok() ? traced : job.status();
+  const Status status = CloseCheckpoints(folder, request.resumes, job.status());
+  return status.ok() ? traced : status;
 }
 
 }  // namespace
@@ -296,8 +273,7 @@ Status Render(const std::vector<RenderRequest>& requests, const ClusterOptions& 
               const OutputOptions& output_options) {
   for (RenderRequest request : requests) {
     std::error_code ignored;
-    if (request.resumes && requests.size() > 1 &&
-        !std::filesystem::exists(CheckpointFolder(request), ignored)) {
+    if (request.resumes && requests.size() > 1 && !HasCheckpoints(CheckpointFolder(request))) {
       const OutputPaths& outputs = request.outputs;
       if (std::filesystem::exists(outputs.image.empty() ? outputs.png : outputs.image, ignored))
         continue;

@@ -30,9 +30,11 @@ struct ReferenceRequest {
   // together; one of them is needed.
   RenderOverrides overrides;
   std::string output_path;
+  bool keeps_checkpoints = true;  // beside the output, until it is written
+  bool resumes = false;           // goes on from there
 };
 
-// Writes the reference whole or not at all.
+// Writes the reference whole or not at all. An interrupted one goes on to the same bits.
 [[nodiscard]] Status RenderReference(const ReferenceRequest& request, const ClusterOptions& cluster,
                                      const OutputOptions& output_options);
 

@@ -183,9 +183,11 @@ def reference_of(name, path, folder):
     if not reference.exists():
         radius, photons, passes = REFERENCES[name]
         pixels = math.prod(map(int, SIZE.split("x")))
+        was_interrupted = reference.with_name(f"{reference.name}.checkpoints").exists()
         run([BIN / "lucerna", "reference", path, "--size", SIZE, "--quiet", "--seed", "1000003",
              "--radius-controller", "appm", "--initial-radius", radius,
-             "--photons-per-pass", photons * pixels, "--passes", passes, "-o", reference])
+             "--photons-per-pass", photons * pixels, "--passes", passes, "-o", reference,
+             *(["--resume"] if was_interrupted else [])])
     return reference
 
 

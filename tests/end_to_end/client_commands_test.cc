@@ -756,15 +756,47 @@ TEST_F(ClientCommandsTest, AReferenceTellsItsNoiseAndDiffTakesItOff) {
             std::string::npos);
 }
 
-TEST_F(ClientCommandsTest, AnInterruptedReferenceLeavesNoFile) {
+// Interrupted in its first half and in its second one.
+TEST_F(ClientCommandsTest, AnInterruptedReferenceGoesOnWithTheSameBits) {
+  const auto reference = [&](const std::string& image, const std::string& passes) {
+    return std::vector<std::string>{
+        "reference", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--passes", passes, "-o",
+        In(image)};
+  };
+  const std::string passes = "2000";
+  ASSERT_EQ(Run(reference("whole.exr", passes)).code, 0);
+  std::vector<std::string> resume = reference("a.exr", passes);
+  resume.emplace_back("--resume");
+  EXPECT_EQ(Run(resume).code, 1) << "there is nothing to go on with";
+
+  pid_t client = Start(reference("a.exr", passes));
+  for (const char* half : {"half 1 of 2", "half 2 of 2"}) {
+    for (int i = 0; i < 6000 && Contents(In("stderr.txt")).find(half) == std::string::npos; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    ::kill(client, SIGINT);
+    const Ran interrupted = Finish(client);
+    EXPECT_EQ(interrupted.code, 130) << interrupted.err;
+    EXPECT_NE(interrupted.err.find("--resume"), std::string::npos) << interrupted.err;
+    EXPECT_FALSE(std::filesystem::exists(In("a.exr"))) << "it is written whole";
+    EXPECT_TRUE(std::filesystem::exists(In("a.exr.checkpoints")));
+    client = Start(resume);
+  }
+  const Ran resumed = Finish(client);
+  ASSERT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_FALSE(std::filesystem::exists(In("a.exr.checkpoints"))) << "not needed any more";
+  EXPECT_EQ(Run({"digest", In("a.exr")}).out, Run({"digest", In("whole.exr")}).out);
+}
+
+TEST_F(ClientCommandsTest, AnInterruptedReferenceWithoutCheckpointsLeavesNothing) {
   const pid_t client = Start({"reference", SceneOfTests("caustic.pbrt"), "--size", "32x24",
-                              "--time", "1000", "-o", In("ref.exr")});
+                              "--time", "1000", "--no-checkpoints", "-o", In("ref.exr")});
   for (int i = 0; i < 6000 && Contents(In("stderr.txt")).find("pass") == std::string::npos; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   ::kill(client, SIGINT);
   EXPECT_EQ(Finish(client).code, 130);
   EXPECT_TRUE(Images().empty());
+  EXPECT_FALSE(std::filesystem::exists(In("ref.exr.checkpoints")));
 }
 
 TEST_F(ClientCommandsTest, AReferenceNeedsAnEndAndAFileOfItsOwn) {
