@@ -12,6 +12,7 @@
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "render/math/sobol.h"
+#include "render/tracing/direct_light.h"
 #include "render/transport/material_at.h"
 
 namespace lucerna {
@@ -528,7 +529,8 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       const float shading = Dot(wo, surface.shading_normal);
       const float geometric = Dot(wo, surface.geometric_normal);
       // Below the smoothed surface's horizon: that surface would not have been met here.
-      if (!(shading * geometric > 0)) return end(PhotonEnd::kSmoothing, energy.smoothing);
+      if (!(shading * geometric > 0) && !GoesOnByReflectionAlone(material))
+        return end(PhotonEnd::kSmoothing, energy.smoothing);
       flux *= CosineRatio(shading, geometric);
     }
     if (!IsFinite(flux) || !IsFinite(surface.position)) {
@@ -622,8 +624,8 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
     if (is_smoothed) {
       const float geometric = Dot(wi, surface.geometric_normal);
       const bool transmits = Dot(wo, frame.n) * sample.wi.z < 0;
-      const bool crosses = Dot(wo, surface.geometric_normal) * geometric < 0;
-      if (transmits != crosses) return end(PhotonEnd::kSmoothing, energy.smoothing);
+      if (!MayScatter(surface, material, wo, wi, transmits))
+        return end(PhotonEnd::kSmoothing, energy.smoothing);
       scattered *= 1 / std::max(CosineRatio(sample.wi.z, geometric), 1 / kMaxCosineRatio);
       book(EnergyOf(scattered), energy.smoothing);
     }
@@ -638,7 +640,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       watcher.Left(flux);
     }
     if constexpr (kSpectrum) spectra_->Scatter(spectrum, surface, material, wo, wi, sample.part);
-    if (parts.media && wo_local.z * sample.wi.z < 0) medium = media_.Beyond(surface, wi, medium);
+    if (parts.media) medium = media_.After(surface, wo, wi, medium);
     ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
   }
   return end(PhotonEnd::kDepth, energy.cut_off);

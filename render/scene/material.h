@@ -290,6 +290,11 @@ std::int32_t CopyForThinShapes(std::vector<Material>& materials, std::int32_t in
 [[nodiscard]] inline bool IsInterface(const Material& material) {
   return PropertiesOf(material).is_interface;
 }
+// Paths go on there, and on one side alone.
+[[nodiscard]] inline bool GoesOnByReflectionAlone(const Material& material) {
+  const MaterialProperties properties = PropertiesOf(material);
+  return !properties.gathers && !properties.transmits;
+}
 [[nodiscard]] inline bool Transmits(const Material& material) {
   return PropertiesOf(material).transmits;
 }

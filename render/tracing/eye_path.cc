@@ -362,9 +362,8 @@ std::array<EyePathTracer::SmoothBranch, EyePathTracer::kSmoothLobes> EyePathTrac
     const float u = lobe == 0 ? 0.0F : 0x1.fffffep-1F;
     if (!SampleBsdf(material, wo_local, u, 0, 0, Carried::kRadiance, sample)) continue;
     branch.wi = frame.ToWorld(sample.wi);
-    branch.transmits = wo_local.z * sample.wi.z < 0;
     branch.weight = sample.weight;
-    branch.exists = SidesAgree(surface, wo, branch.wi, branch.transmits);
+    branch.exists = MayScatter(surface, whole, wo, branch.wi, wo_local.z * sample.wi.z < 0);
   }
   return branches;
 }
@@ -396,7 +395,7 @@ Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int&
         next *= branch_weight_ / strength;
       }
       const std::int32_t after =
-          parts_.media && branch.transmits ? media_.Beyond(surface, branch.wi, before) : before;
+          parts_.media ? media_.After(surface, wo, branch.wi, before) : before;
       branches.push_back({{LeavingPoint(surface, branch.wi), branch.wi, HUGE_VALF},
                           after,
                           of_path,
@@ -683,9 +682,10 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     std::int32_t medium_after = medium;
     if (scattered) {
       wi = frame.ToWorld(sample.wi);
-      const bool transmits = sample.wi.z * Dot(frame.n, wo) < 0;
-      if (parts_.shading_normals) scattered = SidesAgree(surface, wo, wi, transmits);
-      if (parts_.media && transmits) medium_after = media_.Beyond(surface, wi, medium);
+      if (parts_.shading_normals) {
+        scattered = MayScatter(surface, whole, wo, wi, sample.wi.z * Dot(frame.n, wo) < 0);
+      }
+      if (parts_.media) medium_after = media_.After(surface, wo, wi, medium);
     }
 
     const auto hitpoint_here = [&](bool is_glossy, const Material& here) {

@@ -133,7 +133,6 @@ class EyePathTracer {
   struct SmoothBranch {
     bool exists = false;
     Vec3 wi;
-    bool transmits = false;
     // Of the radiance that comes from `wi`, `weight` times `share` leaves.
     Rgb weight;
     float share = 0;

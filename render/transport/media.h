@@ -39,6 +39,13 @@ class Media {
   // The medium of a path that passes through the surface in `direction`, before it in `medium`.
   [[nodiscard]] std::int32_t Beyond(const SurfacePoint& surface, Vec3 direction,
                                     std::int32_t medium) const;
+  // The medium of a path that was scattered from wo to wi, before it in `medium`: another one when
+  // the two are on different sides of the surface.
+  [[nodiscard]] std::int32_t After(const SurfacePoint& surface, Vec3 wo, Vec3 wi,
+                                   std::int32_t medium) const {
+    const bool crosses = Dot(wo, surface.geometric_normal) * Dot(wi, surface.geometric_normal) < 0;
+    return crosses ? Beyond(surface, wi, medium) : medium;
+  }
   // The medium at the camera, and where a light without extent or a shape that emits is.
   [[nodiscard]] std::int32_t AtCamera() const { return at_camera_; }
   // Of a light that names `named` where the file defines it; where that is none, the medium that
