@@ -288,7 +288,14 @@ StatusOr<v1::Job> LocalRuns::Resume(const JobToSend& wanted, const OutputOptions
   if (has_end) {
     // With another end a bake begins anew, and of a job that is over the photons may be gone.
     LUCERNA_ASSIGN_OR_RETURN(const bool ends_so, EndsAs(job, until));
-    if (!ends_so) LUCERNA_RETURN_IF_ERROR(connection_->Extend(job_id_, until).status());
+    if (!ends_so) {
+      const Status extended = connection_->Extend(job_id_, until).status();
+      if (absl::IsFailedPrecondition(extended)) {
+        return absl::FailedPreconditionError(absl::StrCat(
+            "the job that was interrupted has ended, with other stop criteria", kAnew));
+      }
+      LUCERNA_RETURN_IF_ERROR(extended);
+    }
   }
   if (job.state() == v1::JOB_STATE_PAUSED) {
     LUCERNA_RETURN_IF_ERROR(connection_->Resume(job_id_).status());

@@ -12,7 +12,7 @@
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "render/math/sobol.h"
-#include "render/tracing/direct_light.h"
+#include "render/tracing/facet_sides.h"
 #include "render/transport/material_at.h"
 
 namespace lucerna {
@@ -457,6 +457,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
         KeyedRng(CombineKeys(key.job_key ^ kWavelengthKey, key.number)).Uniform(), scene_.uplift);
   }
   std::int32_t medium = parts.media ? light_media_[emission.emitter] : kNoMedium;
+  FacetSides sides;
   for (int landing = 0; landing < settings_.max_depth; ++landing) {
     Hit hit;
     bool is_met = false;
@@ -468,6 +469,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       book(EnergyOf(flux), energy.absorbed);
       if (IsBlack(flux)) return end(PhotonEnd::kAbsorbed, energy.absorbed);
       if (flight.end == Flight::End::kScattered) {
+        if (sides.is_behind()) return end(PhotonEnd::kSmoothing, energy.smoothing);
         if (!IsFinite(flight.position)) return end(PhotonEnd::kNotFinite, energy.dropped);
         if (landing == 0 && !lights_.Lights(emission.emitter, flight.position))
           return end(PhotonEnd::kAbsorbed, energy.absorbed);
@@ -499,6 +501,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       is_met = intersector_.Intersect(ray, hit);
     }
     if (!is_met) {
+      if (sides.is_behind()) return end(PhotonEnd::kSmoothing, energy.smoothing);
       // A ray that is not a number meets nothing either.
       if (IsFinite(ray.origin) && IsFinite(ray.direction)) {
         return end(PhotonEnd::kEscaped, energy.escaped);
@@ -524,6 +527,8 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
     watcher.Landed(hit, surface, material, flux);
     if (landing == 0 && !lights_.Lights(emission.emitter, surface.position))
       return end(PhotonEnd::kAbsorbed, energy.absorbed);
+    if (parts.shading_normals && !sides.MayMeet(surface, material))
+      return end(PhotonEnd::kSmoothing, energy.smoothing);
     const bool is_smoothed = parts.shading_normals && surface.has_shading_normal;
     if (is_smoothed) {
       const float shading = Dot(wo, surface.shading_normal);
@@ -540,7 +545,8 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
     const bool gathers = landing > 0 && properties.gathers;
     bool gathers_caustic = false;
     if (parts.caustics) {
-      gathers_caustic = met_smooth_only && landing > 0 && properties.gathers_caustics();
+      gathers_caustic =
+          met_smooth_only && landing > 0 && properties.gathers_caustics() && !sides.is_behind();
     }
     const bool leaves_deposit = (gathers || gathers_caustic) && scale_.HasRoomFor(flux);
     if ((gathers || gathers_caustic) && !leaves_deposit) ++landed.excess;
@@ -624,7 +630,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
     if (is_smoothed) {
       const float geometric = Dot(wi, surface.geometric_normal);
       const bool transmits = Dot(wo, frame.n) * sample.wi.z < 0;
-      if (!MayScatter(surface, material, wo, wi, transmits))
+      if (!sides.Scatter(surface, material, wo, wi, transmits))
         return end(PhotonEnd::kSmoothing, energy.smoothing);
       scattered *= 1 / std::max(CosineRatio(sample.wi.z, geometric), 1 / kMaxCosineRatio);
       book(EnergyOf(scattered), energy.smoothing);

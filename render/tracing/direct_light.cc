@@ -26,13 +26,6 @@ float PowerHeuristic(float drawn, float other) {
   return ratio * ratio / (1 + ratio * ratio);
 }
 
-bool MayScatter(const SurfacePoint& surface, const Material& material, Vec3 wo, Vec3 wi,
-                bool transmits) {
-  if (!surface.has_shading_normal) return true;
-  const bool same_side = Dot(wo, surface.geometric_normal) * Dot(wi, surface.geometric_normal) > 0;
-  return same_side != transmits || GoesOnByReflectionAlone(material);
-}
-
 Ray ShadowRay(const SurfacePoint& surface, const LightSample& light) {
   const Vec3 origin = LeavingPoint(surface, light.wi);
   if (light.is_distant) return {origin, light.wi, HUGE_VALF};
@@ -65,7 +58,8 @@ Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
                reflected_by(PartOf(point.material, Parts::kSecond, part), 1 - point.share_of_first);
   }
   if (IsBlack(radiance)) return {};
-  if (!MayScatter(point.surface, point.material, point.wo, light.wi, wo.z * wi.z < 0)) return {};
+  if (!point.sides.MayBeLit(point.surface, point.material, point.wo, light.wi, wo.z * wi.z < 0))
+    return {};
   const Ray shadow = ShadowRay(point.surface, light);
   if (point.media != nullptr) {
     const std::int32_t medium = point.media->After(point.surface, point.wo, light.wi, point.medium);

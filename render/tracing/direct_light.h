@@ -8,6 +8,7 @@
 #include "render/geometry/intersector.h"
 #include "render/math/rgb.h"
 #include "render/math/sobol.h"
+#include "render/tracing/facet_sides.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/light.h"
 #include "render/transport/media.h"
@@ -25,6 +26,7 @@ struct ShadingPoint {
   // Of a material with two parts, which are sampled apart: the probability of the first one. Below
   // 0: of any other material.
   float share_of_first = -1;
+  FacetSides sides = {};  // of the path from the eye
 };
 
 // The weight of a sample drawn with density `drawn` beside one that could have been drawn with
@@ -40,14 +42,5 @@ struct ShadingPoint {
 // zero when something is in the way. `rays` counts what was traced.
 [[nodiscard]] Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
                                        const ShadingPoint& point, const SobolPoint& u, int& rays);
-
-// Whether light may be scattered so where shading normals bend far. It may when wi leaves on the
-// side of the surface that the BSDF means: reflection on wo's side of the geometric normal too,
-// transmission on the other. Else it would leak through thin walls. But a metal at which paths go
-// on reflects to behind a facet too: there is nothing behind it that could be lit, and most of
-// these paths come out through another facet. Cut off, they would leave coarse round metal some
-// 5 per cent too dark. pbrt-v4 makes no difference between sides.
-[[nodiscard]] bool MayScatter(const SurfacePoint& surface, const Material& material, Vec3 wo,
-                              Vec3 wi, bool transmits);
 
 }  // namespace lucerna

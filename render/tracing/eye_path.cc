@@ -360,10 +360,14 @@ std::array<EyePathTracer::SmoothBranch, EyePathTracer::kSmoothLobes> EyePathTrac
     BsdfSample sample;
     // 0 draws the reflection and 1 - ulp the refraction.
     const float u = lobe == 0 ? 0.0F : 0x1.fffffep-1F;
-    if (!SampleBsdf(material, wo_local, u, 0, 0, Carried::kRadiance, sample)) continue;
+    if (!SampleBsdf(material, wo_local, u, 0, 0, Carried::kRadiance, sample)) {
+      branch.share = 0;
+      continue;
+    }
     branch.wi = frame.ToWorld(sample.wi);
     branch.weight = sample.weight;
-    branch.exists = MayScatter(surface, whole, wo, branch.wi, wo_local.z * sample.wi.z < 0);
+    branch.transmits = wo_local.z * sample.wi.z < 0;
+    branch.exists = SidesAgree(surface, wo, branch.wi, branch.transmits);
   }
   return branches;
 }
@@ -375,6 +379,7 @@ Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int&
     PathWavelength wavelength;
     Rgb weight;
     int vertex;
+    FacetSides sides;
   };
   const auto share_of_rays = [&](float emission_density) {
     if (!chain.is_shared) return 1.0F;
@@ -384,10 +389,12 @@ Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int&
   std::vector<Branch> branches;
   const auto branch_at = [&](const SurfacePoint& surface, const Material& whole, Vec3 wo,
                              std::int32_t before, const PathWavelength& of_path, Rgb weight,
-                             int vertex) {
+                             int vertex, const FacetSides& sides_before) {
     if (vertex >= settings_.max_depth) return;
     for (const SmoothBranch& branch : SmoothBranches(surface, whole, wo)) {
-      if (!branch.exists) continue;
+      if (!(branch.share > 0)) continue;
+      FacetSides sides = sides_before;
+      if (!sides.Scatter(surface, whole, wo, branch.wi, branch.transmits)) continue;
       Rgb next = weight * branch.weight * branch.share;
       const float strength = MaxChannel(next);
       if (strength < branch_weight_) {
@@ -400,18 +407,20 @@ Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int&
                           after,
                           of_path,
                           next,
-                          vertex + 1});
+                          vertex + 1,
+                          sides});
     }
   };
   Rgb seen;
   branch_at(chain.surface, chain.material, chain.wo, chain.medium, chain.wavelength, chain.weight,
-            chain.vertex);
+            chain.vertex, chain.sides);
   while (!branches.empty()) {
     Branch branch = branches.back();
     branches.pop_back();
     Hit hit;
     const Vec3 from = branch.ray.origin;
     if (!FindThroughMedia(branch.ray, hit, branch.medium, branch.weight, rays)) {
+      if (branch.sides.is_behind()) continue;
       const Vec3 direction = branch.ray.direction;
       seen += branch.weight * lights_.InfiniteRadiance(from, direction) *
               share_of_rays(lights_.EmissionDensityInfinite(from, direction));
@@ -419,15 +428,16 @@ Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int&
     }
     SurfacePoint surface = intersector_.SurfaceAt(branch.ray, hit);
     const Vec3 wo = -branch.ray.direction;
-    const Rgb emitted = lights_.EmittedRadiance(surface, wo);
+    const Rgb emitted = branch.sides.is_behind() ? Rgb() : lights_.EmittedRadiance(surface, wo);
     if (!IsBlack(emitted))
       seen += branch.weight * emitted * share_of_rays(lights_.EmissionDensity(surface));
     if (!properties_[surface.material].scatters_smoothly) continue;
     std::optional<Material> storage;
     const Material& material = MaterialAt(scene_, surface, wo, storage, branch.wavelength);
+    if (!branch.sides.MayMeet(surface, material)) continue;
     if (branch.wavelength.IsFirstUsedAt(material)) branch.weight *= branch.wavelength.color();
-    branch_at(surface, material, wo, branch.medium, branch.wavelength, branch.weight,
-              branch.vertex);
+    branch_at(surface, material, wo, branch.medium, branch.wavelength, branch.weight, branch.vertex,
+              branch.sides);
   }
   return seen;
 }
@@ -566,6 +576,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     return path;
   };
   PathWavelength wavelength = WavelengthOf(sampler);
+  FacetSides sides;
   bool has_features = false;  // of a gathering surface
   const auto add_first_emission = [&](Rgb emitted) {
     const Rgb bright = BrightPart(emitted);
@@ -584,7 +595,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       length += hit.t;
     }
     if (!is_met) {
-      if (emission_was_collected) return finish();
+      if (emission_was_collected || sides.is_behind()) return finish();
       if (vertex == 0) {
         add_first_emission(weight * lights_.InfiniteRadiance(from, ray.direction));
         return finish();
@@ -599,7 +610,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     }
     SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
     const Vec3 wo = -ray.direction;
-    const Rgb emitted = lights_.EmittedRadiance(surface, wo);
+    const Rgb emitted = sides.is_behind() ? Rgb() : lights_.EmittedRadiance(surface, wo);
     if (vertex == 0) {
       add_first_emission(weight * emitted);
     } else if (!IsBlack(emitted) && !emission_was_collected) {
@@ -614,6 +625,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       if (parts_.textures) return MaterialAt(scene_, surface, wo, textured, wavelength);
       return scene_.materials[surface.material];
     }();
+    if (parts_.shading_normals && !sides.MayMeet(surface, whole)) return finish();
     if (parts_.dispersion && wavelength.IsFirstUsedAt(whole)) weight *= wavelength.color();
     MaterialProperties changed = textured ? PropertiesOf(*textured) : MaterialProperties();
     const MaterialProperties& whole_properties = textured ? changed : properties_[surface.material];
@@ -637,6 +649,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
                                             .wavelength = wavelength,
                                             .weight = weight,
                                             .vertex = vertex,
+                                            .sides = sides,
                                             .is_shared = parts_.caustics && receiver.is_last,
                                             .cosine = receiver.cosine,
                                             .scatter_pdf = receiver.scatter_pdf},
@@ -652,7 +665,8 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
         direct_light_ == DirectLight::kWherePathsGoOn && whole_properties.gathers;
     if (parts_.lights && !is_lit_otherwise && !(parts_.lobes && whole_properties.is_smooth)) {
       const ShadingPoint point = {
-          surface, whole, frame, wo, parts_.media ? &media_ : nullptr, medium, share_of_first};
+          surface, whole,          frame, wo, parts_.media ? &media_ : nullptr,
+          medium,  share_of_first, sides};
       path.direct += weight * LightSampledRadiance(intersector_, lights_, point, u, path.rays);
     }
 
@@ -680,10 +694,11 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     }();
     Vec3 wi;
     std::int32_t medium_after = medium;
+    const bool was_behind = sides.is_behind();
     if (scattered) {
       wi = frame.ToWorld(sample.wi);
       if (parts_.shading_normals) {
-        scattered = MayScatter(surface, whole, wo, wi, sample.wi.z * Dot(frame.n, wo) < 0);
+        scattered = sides.Scatter(surface, whole, wo, wi, sample.wi.z * Dot(frame.n, wo) < 0);
       }
       if (parts_.media) medium_after = media_.After(surface, wo, wi, medium);
     }
@@ -721,7 +736,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     if (parts_.caustics) {
       if (properties.is_smooth) {
         receiver.was_left_smoothly = receiver.is_last;
-      } else if (properties.is_thin) {
+      } else if (properties.is_thin || was_behind) {
         receiver = {};
       } else {
         receiver = {sample.pdf, sample.wi.z, true, false};

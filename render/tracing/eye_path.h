@@ -13,6 +13,7 @@
 #include "render/math/vector.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
+#include "render/tracing/facet_sides.h"
 #include "render/tracing/pixel_sampler.h"
 #include "render/transport/caustic_weight.h"
 #include "render/transport/light.h"
@@ -131,7 +132,9 @@ class EyePathTracer {
   }
   // A reflection (`lobe` 0) or refraction (1) at a smooth surface.
   struct SmoothBranch {
+    // Scatters to the side of the surface that it means.
     bool exists = false;
+    bool transmits = false;
     Vec3 wi;
     // Of the radiance that comes from `wi`, `weight` times `share` leaves.
     Rgb weight;
@@ -194,6 +197,7 @@ class EyePathTracer {
     PathWavelength wavelength;        // has met `material`
     Rgb weight;                       // of the path so far
     int vertex = 0;
+    FacetSides sides = {};
     // Whether the surface before it gathers caustic photons: which share of the light that comes
     // through the chain is theirs follows from the cosine and the density [sr⁻¹] of its scattering.
     bool is_shared = false;

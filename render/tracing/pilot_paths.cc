@@ -93,7 +93,7 @@ class PilotPath {
       if (!SampleBsdf(material, wo_local, u_lobe, v1, v2, Carried::kRadiance, sample)) return;
       wi = frame.ToWorld(sample.wi);
       const bool transmits = sample.wi.z * Dot(frame.n, wo) < 0;
-      if (!MayScatter(surface, material, wo, wi, transmits)) return;
+      if (!SidesAgree(surface, wo, wi, transmits)) return;
       weight *= sample.weight;
       scatter_pdf = sample.is_delta ? 0 : sample.pdf;
       const float strength = MaxChannel(weight) / first_strength;
@@ -123,7 +123,7 @@ class PilotPath {
     if (IsBlack(bsdf)) return;
     Rgb brought = weight * bsdf * light.radiance_over_pdf * std::abs(wi_local.z);
     if (light.pdf > 0) brought *= PowerHeuristic(light.pdf, PdfBsdf(material, wo_local, wi_local));
-    if (!MayScatter(surface, material, wo, light.wi, wo_local.z * wi_local.z < 0)) return;
+    if (!SidesAgree(surface, wo, light.wi, wo_local.z * wi_local.z < 0)) return;
     const Ray shadow = ShadowRay(surface, light);
     if (intersector_.Occluded(shadow)) return;
     Report(light.emitter, {light.is_distant ? shadow.origin : light.target, -light.wi, HUGE_VALF},

@@ -779,6 +779,13 @@ TEST_F(ClientCommandsTest, AnInterruptedReferenceGoesOnWithTheSameBits) {
     EXPECT_NE(interrupted.err.find("--resume"), std::string::npos) << interrupted.err;
     EXPECT_FALSE(std::filesystem::exists(In("a.exr"))) << "it is written whole";
     EXPECT_TRUE(std::filesystem::exists(In("a.exr.checkpoints")));
+    if (half == std::string("half 2 of 2")) {
+      std::vector<std::string> longer = reference("a.exr", "3000");
+      longer.emplace_back("--resume");
+      const Ran refused = Run(longer);
+      EXPECT_EQ(refused.code, 1);
+      EXPECT_NE(refused.err.find("other stop criteria"), std::string::npos) << refused.err;
+    }
     client = Start(resume);
   }
   const Ran resumed = Finish(client);

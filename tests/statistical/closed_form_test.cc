@@ -111,6 +111,35 @@ TEST(FurnaceTest, KeepsItsLightAroundACoarseRoundMirror) {
   ExpectMean(Measure(scene, TestSettings(scene, 100000, 0.6, 100), 10, kParts, "G"), 2, 2 * kTaken);
 }
 
+// Metal walls whose normals are bent, around a floor. The bottom is larger than the walls reach, so
+// that nothing proves that no light comes in.
+TEST(FurnaceTest, LetsNoLightThroughSmoothedMetalWalls) {
+  for (const float alpha : {0.0F, 0.1F}) {
+    Scene scene;
+    const std::int32_t metal =
+        AddMaterial(scene, ConductorMaterial(Gray(1), Gray(AbsorptionFor(1)), alpha, alpha));
+    const std::int32_t floor = AddMaterial(scene, DiffuseMaterial(0.5F));
+    AddQuad(scene, {-0.9F, -0.9F, 0}, {1.8F, 0, 0}, {0, 1.8F, 0}, floor);
+    AddQuad(scene, {-3, -3, -0.1F}, {6, 0, 0}, {0, 6, 0}, AddMaterial(scene, DiffuseMaterial(0)));
+    const auto wall = [&](Vec3 corner, Vec3 a, Vec3 b) {
+      AddQuad(scene, corner, a, b, metal);
+      const Vec3 normal = Normalize(Cross(a, b));
+      for (int i = 0; i < 4; ++i) {
+        scene.meshes.back().normals.push_back(
+            Normalize(normal + a * (i % 2 == 0 ? -0.4F : 0.4F) + b * (i < 2 ? -0.4F : 0.4F)));
+      }
+    };
+    wall({-1, -1, -0.2F}, {2, 0, 0}, {0, 0, 1.2F});
+    wall({-1, 1, -0.2F}, {2, 0, 0}, {0, 0, 1.2F});
+    wall({-1, -1, -0.2F}, {0, 2, 0}, {0, 0, 1.2F});
+    wall({1, -1, -0.2F}, {0, 2, 0}, {0, 0, 1.2F});
+    wall({-1, -1, 1}, {2, 0, 0}, {0, 2, 0});
+    scene.infinite_lights.push_back({Gray(1)});
+    SetCamera(scene, {0.5, 0.4, 0.6}, {-1, -0.8, 0.2}, {0, 0, 1}, 90, 16);
+    EXPECT_EQ(Measure(scene, TestSettings(scene, 20000, 0.1, 20), 4, 2, "G").mean, 0) << alpha;
+  }
+}
+
 TEST(FurnaceTest, RefusesASlightlyWhiterWall) {
   const MeasuredMean measured = FurnaceRadiance(0.51F, 40, KernelKind::kEpanechnikov);
   const double quantile = StudentQuantile(SidakLevel(1e-3, kQuestions), kParts);

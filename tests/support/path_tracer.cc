@@ -592,12 +592,10 @@ class PathTracer {
       const Vec3 wo_local = frame.ToLocal(wo);
       if (!Scatter(surface, Unit(Double3(wo_local)), u, scattered)) return seen;
       const Vec3 wi = frame.ToWorld(ToFloat(scattered.wi));
-      // What the shading normal calls reflection must be one for the geometry too, but at metals
-      // where paths go on.
+      // What the shading normal calls reflection must be one for the geometry too.
       const bool transmits = scattered.wi.z * static_cast<double>(wo_local.z) < 0;
       const bool crosses = Dot(wo, point.geometric_normal) * Dot(wi, point.geometric_normal) < 0;
-      const bool is_metal = surface.kind == Material::Kind::kConductor && !surface.gathers;
-      if (transmits != crosses && !is_metal) return seen;
+      if (transmits != crosses) return seen;
       weight = Times(weight, scattered.weight);
       compression *= scattered.index * scattered.index;
       only_smooth = only_smooth && scattered.is_delta;

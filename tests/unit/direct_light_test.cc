@@ -57,27 +57,6 @@ TEST(PowerHeuristicTest, WeightsOfTheTwoWaysSumToOne) {
   EXPECT_FLOAT_EQ(PowerHeuristic(3, 4), 9.0F / 25);
 }
 
-TEST(MayScatterTest, ComparesTheScatteringWithTheGeometricSides) {
-  SurfacePoint point;
-  point.geometric_normal = {0, 0, 1};
-  point.has_shading_normal = true;
-  const Vec3 above = {0, 0.6F, 0.8F};
-  const Vec3 below = {0, 0.6F, -0.8F};
-  for (const Material& material :
-       {DiffuseMaterial(0.5F), DielectricMaterial(1.5F), DielectricMaterial(1.5F, 0.6F),
-        ConductorMaterial(Gray(0.2F), Gray(3), 0.3F, 0.3F), CoatedMaterial(0.5F, 0)}) {
-    EXPECT_TRUE(MayScatter(point, material, above, {0, 0, 1}, /*transmits=*/false));
-    EXPECT_FALSE(MayScatter(point, material, above, below, /*transmits=*/false));
-    EXPECT_TRUE(MayScatter(point, material, above, below, /*transmits=*/true));
-    EXPECT_FALSE(MayScatter(point, material, above, {0, 0, 1}, /*transmits=*/true));
-  }
-  for (const float alpha : {0.0F, 0.1F}) {
-    const Material metal = ConductorMaterial(Gray(0.2F), Gray(3), alpha, alpha);
-    EXPECT_TRUE(MayScatter(point, metal, above, below, /*transmits=*/false)) << alpha;
-    EXPECT_TRUE(MayScatter(point, metal, above, {0, 0, 1}, /*transmits=*/false)) << alpha;
-  }
-}
-
 class LampOverFloor : public testing::TestWithParam<double> {};
 
 // The larger the floor, the farther from it rays start (its clearance); what they start with must
