@@ -27,7 +27,7 @@ namespace {
 using ::testing::HasSubstr;
 
 // Grey, rows from the top.
-std::string Pfm(int width, const std::vector<float>& values) {
+std::string PortalPfm(int width, const std::vector<float>& values) {
   const int height = static_cast<int>(values.size()) / width;
   std::string bytes = "Pf\n" + std::to_string(width) + " " + std::to_string(height) + "\n-1\n";
   for (int y = height - 1; y >= 0; --y) {
@@ -47,12 +47,12 @@ ParsedScene Parse(const std::string& world) {
   MemoryFiles files(
       {{"s.pbrt", "Camera \"perspective\" WorldBegin\n" + world +
                       "\nAttributeBegin Translate 0 0 -3 Shape \"disk\" AttributeEnd"},
-       {"sky.pfm", Pfm(8, pixels)}});
+       {"sky.pfm", PortalPfm(8, pixels)}});
   return ReadScene(files, "s.pbrt");
 }
 
-struct Lit {
-  explicit Lit(const std::string& world) {
+struct LitByPortal {
+  explicit LitByPortal(const std::string& world) {
     const ParsedScene parsed = Parse(world);
     EXPECT_TRUE(parsed.ok()) << parsed.ToStatus();
     scene = std::make_unique<Scene>(InWorkingSpace(parsed.scene));
@@ -110,7 +110,7 @@ std::array<double, 2> Irradiance(const LightSet& lights, Vec3 from, int samples)
 }
 
 TEST(PortalLightTest, LightsByTheFormFactorOfTheRectangle) {
-  const Lit lit(kEven);
+  const LitByPortal lit(kEven);
   for (const auto& [x, y] : {std::pair{0.0, 0.0}, {0.3, 0.1}, {-2.0, 0.5}, {1.0, -3.0}}) {
     const auto [irradiance, error] =
         Irradiance(*lit.lights, {static_cast<float>(x), static_cast<float>(y), 0}, 20'000);
@@ -122,14 +122,14 @@ TEST(PortalLightTest, LightsByTheFormFactorOfTheRectangle) {
 }
 
 TEST(PortalLightTest, HasThePowerThatPassesTheRectangle) {
-  const Lit lit(kEven);
+  const LitByPortal lit(kEven);
   EXPECT_NEAR(static_cast<double>(Luminance(lit.lights->TotalPower())), 2 * kPi64 * 1.2 * 0.6,
               1e-3);
   EXPECT_EQ(NameOf(lit.lights->emitter(0).kind), "environment light behind a portal");
 }
 
 TEST(PortalLightTest, IsSeenThroughTheRectangleAndFromBelowAlone) {
-  const Lit lit(kEven);
+  const LitByPortal lit(kEven);
   const auto seen = [&](Vec3 from, Vec3 at) {
     return lit.lights->InfiniteRadiance(from, Normalize(at - from)).g;
   };
@@ -152,7 +152,7 @@ TEST(PortalLightTest, IsSeenThroughTheRectangleAndFromBelowAlone) {
 // Photons bring to small disks below, some far aside, what sampling brings there.
 TEST(PortalLightTest, SendsPhotonsAsItLights) {
   for (const std::string& world : {kEven, kMapped, "Rotate 70 1 2 3 " + kMapped, kMapped + kEven}) {
-    const Lit lit(world);
+    const LitByPortal lit(world);
     const std::array<Vec3, 4> places = {
         Vec3{0, 0, 0}, {0.5F, 0.2F, 0}, {-1, 0.5F, 0}, {1.5F, -1, 0}};
     constexpr float kRadius = 0.1F;
