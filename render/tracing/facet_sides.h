@@ -2,11 +2,11 @@
 //
 // About a shading normal a direction may be reflected to behind the triangle that was met. In
 // general no light comes from there and the path ends, or light would leak through walls. But on
-// coarse round metal that takes some 5 % of the light, most near its outline. So at metals where
-// paths go on they do so behind the triangle too, as long as they meet the same shape from behind:
-// through the inside of a bar or ball, until another triangle sends them out. A path that meets
-// anything else while it is behind has come through a wall, and ends. Crossings are those of the
-// reversed path, so that eye paths and photons see the same light.
+// coarse round metal that costs a few percent of the light, most near its outline. So at metals
+// where paths go on they do so behind the triangle too, as long as they meet the same shape from
+// behind: through the inside of a bar or ball, until another triangle sends them out. A path that
+// meets anything else while it is behind has come through a wall, and ends. Crossings are those of
+// the reversed path, so that eye paths and photons see the same light.
 #pragma once
 
 #include <cstdint>
