@@ -58,8 +58,7 @@ Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
                reflected_by(PartOf(point.material, Parts::kSecond, part), 1 - point.share_of_first);
   }
   if (IsBlack(radiance)) return {};
-  if (!point.sides.MayBeLit(point.surface, point.material, point.wo, light.wi, wo.z * wi.z < 0))
-    return {};
+  if (!point.sides.MayBeLit(point.surface, point.wo, light.wi, wo.z * wi.z < 0)) return {};
   const Ray shadow = ShadowRay(point.surface, light);
   if (point.media != nullptr) {
     const std::int32_t medium = point.media->After(point.surface, point.wo, light.wi, point.medium);

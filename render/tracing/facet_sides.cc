@@ -23,11 +23,9 @@ bool FacetSides::Scatter(const SurfacePoint& surface, const Material& material, 
   return true;
 }
 
-bool FacetSides::MayBeLit(const SurfacePoint& surface, const Material& material, Vec3 wo, Vec3 wi,
-                          bool transmits) const {
+bool FacetSides::MayBeLit(const SurfacePoint& surface, Vec3 wo, Vec3 wi, bool transmits) const {
   // From behind it must come out; from the front, a ray to a light behind ends at a wall.
-  return SidesAgree(surface, wo, wi, transmits) != is_behind_ &&
-         (!is_behind_ || GoesOnByReflectionAlone(material));
+  return SidesAgree(surface, wo, wi, transmits) != is_behind_;
 }
 
 }  // namespace lucerna

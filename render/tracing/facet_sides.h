@@ -34,8 +34,7 @@ class FacetSides {
   [[nodiscard]] bool Scatter(const SurfacePoint& surface, const Material& material, Vec3 wo,
                              Vec3 wi, bool transmits);
   // Whether light from wi, which nothing blocks, may be scattered there to wo. Requires MayMeet.
-  [[nodiscard]] bool MayBeLit(const SurfacePoint& surface, const Material& material, Vec3 wo,
-                              Vec3 wi, bool transmits) const;
+  [[nodiscard]] bool MayBeLit(const SurfacePoint& surface, Vec3 wo, Vec3 wi, bool transmits) const;
 
  private:
   [[nodiscard]] bool IsInside(const SurfacePoint& surface, const Material& material) const;

@@ -40,8 +40,8 @@ TEST(FacetSidesTest, EndsPathsWhereSidesDisagreeButAtMetalWherePathsGoOn) {
     EXPECT_TRUE(sides.Scatter(point, material, kAbove, kBelow, /*transmits=*/true));
     EXPECT_FALSE(sides.Scatter(point, material, kAbove, kBelow, /*transmits=*/false));
     EXPECT_FALSE(sides.is_behind());
-    EXPECT_FALSE(sides.MayBeLit(point, material, kAbove, kBelow, /*transmits=*/false));
-    EXPECT_TRUE(sides.MayBeLit(point, material, kAbove, kBelow, /*transmits=*/true));
+    EXPECT_FALSE(sides.MayBeLit(point, kAbove, kBelow, /*transmits=*/false));
+    EXPECT_TRUE(sides.MayBeLit(point, kAbove, kBelow, /*transmits=*/true));
   }
   for (const float alpha : {0.0F, 0.1F}) {
     FacetSides sides;
@@ -67,10 +67,10 @@ TEST(FacetSidesTest, KeepsAPathInTheShapeThatItEnteredUntilItComesOut) {
 
   // Inside, from below.
   const Vec3 deeper = {0, -0.6F, -0.8F};
-  EXPECT_FALSE(sides.MayBeLit(point, metal, kBelow, deeper, /*transmits=*/false));
+  EXPECT_FALSE(sides.MayBeLit(point, kBelow, deeper, /*transmits=*/false));
   ASSERT_TRUE(sides.Scatter(point, metal, kBelow, deeper, /*transmits=*/false));
   EXPECT_TRUE(sides.is_behind());
-  EXPECT_TRUE(sides.MayBeLit(point, metal, kBelow, kAbove, /*transmits=*/false));
+  EXPECT_TRUE(sides.MayBeLit(point, kBelow, kAbove, /*transmits=*/false));
   ASSERT_TRUE(sides.Scatter(point, metal, kBelow, kAbove, /*transmits=*/false));
   EXPECT_FALSE(sides.is_behind());
   EXPECT_TRUE(sides.MayMeet(SmoothedPoint(8), DiffuseMaterial(0.5F)));
