@@ -6,6 +6,7 @@
 #include "absl/strings/str_format.h"
 
 #include "render/geometry/bend_radii.h"
+#include "render/scene/measured_table.h"
 #include "render/scene/shape_lists.h"
 
 namespace lucerna {
@@ -142,6 +143,11 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
   }
   memory.edges = kSegment * open_edges;
 
+  std::set<const MeasuredTable*> tables;
+  for (const Material& material : scene.materials) {
+    if (material.measured != nullptr && tables.insert(material.measured).second)
+      memory.textures += static_cast<double>(material.measured->bytes());
+  }
   // A picture is in memory once, however many refer to it.
   std::set<const Picture*> pictures;
   const auto add = [&](const std::shared_ptr<const Picture>& picture) {

@@ -131,8 +131,8 @@ class Charting {
   // `beyond` texels wider.
   template <typename Visit>
   void ForEachCell(const Triangle2& t, double beyond, const Visit& visit) const {
-    const auto [x0, x1] = std::ranges::minmax({t[0].x, t[1].x, t[2].x});
-    const auto [y0, y1] = std::ranges::minmax({t[0].y, t[1].y, t[2].y});
+    const auto [x0, x1] = std::minmax({t[0].x, t[1].x, t[2].x});
+    const auto [y0, y1] = std::minmax({t[0].y, t[1].y, t[2].y});
     const auto first = [&](double low) {
       return static_cast<std::int64_t>(std::ceil(low / texel_ - beyond - 0.5));
     };

@@ -258,7 +258,7 @@ std::string MeshPly(const BakedMesh& mesh, bool is_ascii) {
       }
       for (std::size_t column = 0; column < row.size(); ++column) {
         // Nine digits read back as the same float.
-        bytes += absl::StrFormat(column == 0 ? "%.9g" : " %.9g", row[column]);
+        absl::StrAppendFormat(&bytes, "%s%.9g", column == 0 ? "" : " ", row[column]);
       }
       bytes += '\n';
     }

@@ -74,7 +74,7 @@ Triangulated Triangulate(const Disk& disk, double unit) {
   Triangulated out;
   const auto [u, v] = AcrossOf(Double3(disk.normal));
   const Double3 center(disk.center);
-  const auto ring = [&](float radius) {
+  const auto ring = [&, u = u, v = v](float radius) {
     for (int i = 0; i < kRoundParts; ++i) {
       const double angle = 2 * std::numbers::pi * i / kRoundParts;
       const auto r = static_cast<double>(radius);

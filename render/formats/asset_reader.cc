@@ -4,6 +4,7 @@
 
 #include "render/base/text.h"
 #include "render/formats/gzip.h"
+#include "render/formats/measured_file.h"
 #include "render/formats/ply_file.h"
 
 namespace lucerna {
@@ -36,6 +37,16 @@ StatusOr<TriangleMesh> AssetReader::ReadMesh(const std::string& path) {
   StatusOr<TriangleMesh> mesh = ParsePly(bytes);
   if (mesh.ok()) return mesh;
   return absl::InvalidArgumentError(Concat(path, ": ", mesh.status().message()));
+}
+
+StatusOr<std::shared_ptr<const MeasuredTable>> AssetReader::ReadMeasured(const std::string& path) {
+  if (const auto known = measured_.find(path); known != measured_.end()) return known->second;
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes, ReadBytes(path));
+  StatusOr<MeasuredTable> table = ParseMeasured(bytes);
+  if (!table.ok()) return absl::InvalidArgumentError(Concat(path, ": ", table.status().message()));
+  auto shared = std::make_shared<const MeasuredTable>(*std::move(table));
+  measured_.emplace(path, shared);
+  return shared;
 }
 
 StatusOr<std::shared_ptr<const Picture>> AssetReader::ReadPicture(const std::string& path,

@@ -1,7 +1,7 @@
-// The files that a scene brings, read within its limits: texts, meshes, pictures.
+// The files that a scene brings, read within its limits: texts, meshes, pictures, measured BSDFs.
 //
 // Every reader of a format reads through one AssetReader, so that limits hold for the scene as a
-// whole. Every reading counts, also of a file that was read before; a picture is in memory once.
+// whole. Every reading counts, also of a file that was read before. Pictures and BSDFs are shared.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,7 @@
 
 #include "render/base/status.h"
 #include "render/formats/image_file.h"
+#include "render/scene/measured_table.h"
 #include "render/scene/scene.h"
 #include "render/scene/scene_files.h"
 
@@ -39,6 +40,10 @@ class AssetReader {
       const std::string& name, const PixelEncoding& encoding, PictureUse use,
       const std::function<StatusOr<std::string>()>& bytes);
 
+  // Of a measured BSDF, once for a path. Errors: as for meshes.
+  [[nodiscard]] StatusOr<std::shared_ptr<const MeasuredTable>> ReadMeasured(
+      const std::string& path);
+
   [[nodiscard]] const SceneLimits& limits() const { return limits_; }
   // True once the files together have more bytes than the limits allow: reading must end.
   [[nodiscard]] bool is_over_limit() const { return bytes_read_ > limits_.max_total_bytes; }
@@ -64,7 +69,8 @@ class AssetReader {
   const SceneLimits limits_;
   std::uint64_t bytes_read_ = 0;
   std::uint64_t picture_bytes_ = 0;
-  std::multimap<std::string, KnownPicture> pictures_;  // by path or name
+  std::multimap<std::string, KnownPicture> pictures_;                     // by path or name
+  std::map<std::string, std::shared_ptr<const MeasuredTable>> measured_;  // by path
 };
 
 }  // namespace lucerna

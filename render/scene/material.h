@@ -35,7 +35,8 @@
   ROW(DiffuseTransmission, "diffusetransmission") \
   ROW(CoatedConductor, "coatedconductor")         \
   ROW(Mix, "mix")                                 \
-  ROW(Hair, "hair")
+  ROW(Hair, "hair")                               \
+  ROW(Measured, "measured")
 
 namespace lucerna {
 
@@ -47,8 +48,9 @@ enum class Parts : std::uint8_t {
   kSecond  // what the base under a coat scatters; the transmission of a sheet
 };
 
-struct CoatTable;   // scene/coat_table.h
-struct CoatFamily;  // the same
+struct CoatTable;     // scene/coat_table.h
+struct CoatFamily;    // the same
+class MeasuredTable;  // scene/measured_table.h
 struct MaterialProperties;
 
 // What all kinds of material are made of. Each kind uses some of the members.
@@ -83,6 +85,10 @@ struct MaterialNumbers {
   float beta_m = 0.3F, beta_n = 0.3F, scale_tilt = 0;
   Rgb absorption;                        // of hair, per radius of the fibre
   bool absorbs_for_reflectance = false;  // the absorption follows from `reflectance`
+  // Of a measured surface; owned by Material. Which of its planes are the three colours.
+  const MeasuredTable* measured = nullptr;
+  std::array<float, 3> measured_planes = {};
+  bool is_measured_with_direction = false;  // it matters how it is turned around the normal
   // In place of `reflectance`, of a conductor's eta and k, and of `absorption`.
   std::int32_t texture = kNoTexture;
   std::int32_t second_texture = kNoTexture;  // in place of `transmittance`
@@ -135,7 +141,8 @@ struct MaterialNumbers {
   [[nodiscard]] bool IsAnisotropic() const {
     return alpha_u != alpha_v || base_alpha_u != base_alpha_v ||
            roughness_textures[0] != roughness_textures[1] ||
-           roughness_textures[2] != roughness_textures[3] || kind == Kind::kHair;
+           roughness_textures[2] != roughness_textures[3] || kind == Kind::kHair ||
+           is_measured_with_direction;
   }
   // Whether it sends each wavelength into another direction.
   [[nodiscard]] bool Disperses() const {
@@ -152,6 +159,7 @@ struct Material : MaterialNumbers {
   std::string name;  // for messages and the plan
   std::shared_ptr<const CoatTable> owned_coat;
   std::shared_ptr<const CoatFamily> owned_coats;
+  std::shared_ptr<const MeasuredTable> owned_measured;
   std::shared_ptr<const MaterialProperties> owned_mixed_properties;
   OwnedSpectra given;  // colours that the file gives by wavelength
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "render/scene/measured_table.h"
+
 namespace lucerna {
 namespace {
 
@@ -43,6 +45,8 @@ bool IsSaturated(const Material& material) {
     case Kind::kDiffuseTransmission:
       return (has_color && IsSaturated(material.reflectance)) ||
              (material.second_texture == kNoTexture && IsSaturated(material.transmittance));
+    case Kind::kMeasured:
+      return IsSaturated(material.measured->Albedo(material.measured->WorkingSpace()));
     default:
       return false;
   }

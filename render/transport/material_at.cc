@@ -102,7 +102,7 @@ const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
     here.ior = IndexAt(wavelength.nm(), material.ior, material.dispersion);
   if (material.HasRoughnessTexture()) LookUpRoughness(scene, place, material, here);
   const bool is_turned = here.alpha_u != here.alpha_v || here.base_alpha_u != here.base_alpha_v ||
-                         here.kind == Material::Kind::kHair;
+                         here.kind == Material::Kind::kHair || here.is_measured_with_direction;
   if (material.HasBumps()) {
     TurnShadingNormal(scene, material, place, point);
     if (!is_turned) point.tangent = {};

@@ -8,6 +8,7 @@
 #include "render/base/status.h"
 #include "render/math/cie_observer.h"
 #include "render/math/color_space.h"
+#include "render/scene/measured_table.h"
 
 namespace lucerna {
 namespace {
@@ -201,6 +202,7 @@ void PassColors::SetAt(const PassWavelengths& wavelengths, Scene& scene) {
     }
     m.absorption = m.absorbs_for_reflectance ? HairAbsorption(m.reflectance, m.beta_n)
                                              : of.absorption_spectrum.At(wavelengths);
+    if (m.measured != nullptr) m.measured_planes = m.measured->At(wavelengths.nm);
   }
   for (std::size_t i = 0; i < media_.size(); ++i) {
     scene.media[i].absorption = media_[i].absorption_spectrum.At(wavelengths);
@@ -223,6 +225,7 @@ void PassColors::SetThree(Scene& scene) {
     m.eta = of.eta;
     m.k = of.k;
     m.absorption = of.absorption;
+    if (m.measured != nullptr) m.measured_planes = m.measured->WorkingSpace();
   }
   for (std::size_t i = 0; i < media_.size(); ++i) {
     scene.media[i].absorption = media_[i].absorption;

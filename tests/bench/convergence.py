@@ -42,22 +42,22 @@ OWN = ["hard-shadow", "penumbra", "water-sun", "water-lamp", "caustic", "cardioi
        "glass-box", "glass-sphere", "lamp-in-glass", "rough-metal", "textured"]
 # First radius, photons a pixel and pass, and passes of both halves. One pixel where much of the
 # light has edges. The numbers follow from the noise of a few seconds: of photons a pass the best of
-# 1, 4 and 16, and as many passes as should bring the squared noise to 0.08 of what was judged.
+# 1, 4 and 16, and as many passes as should bring the squared noise to 0.08 to 0.1 of what was judged.
 REFERENCES = {
     "b-bars-1": ("2px", 16, 9500),
     "b-beads-1": ("2px", 4, 11000),
     "b-checkers-1": ("2px", 4, 28100),
     "b-emitters-1": ("2px", 4, 28300),
-    "b-emitters-2": ("2px", 1, 149800),
+    "b-emitters-2": ("2px", 1, 125000),
     "b-enclosed-1": ("2px", 16, 4800),
     "b-glossy-1": ("2px", 1, 64600),
     "b-glossy-2": ("2px", 4, 24300),
     "b-holes-1": ("2px", 16, 17300),
-    "b-holes-2": ("2px", 4, 71900),
+    "b-holes-2": ("2px", 4, 60000),
     "b-waves-1": ("1px", 4, 6000),
     "b-waves-2": ("1px", 4, 6000),
     "cardioid": ("1px", 4, 6000),
-    "caustic": ("1px", 4, 86700),
+    "caustic": ("1px", 4, 72000),
     "corner": ("2px", 16, 27600),
     "glass-box": ("2px", 4, 21400),
     "glass-sphere": ("2px", 1, 57700),

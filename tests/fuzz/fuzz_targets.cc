@@ -12,6 +12,7 @@ std::span<const FuzzTarget> AllFuzzTargets() {
       FuzzTarget{"obj", FuzzObj, ObjSeeds},
       FuzzTarget{"ply", FuzzPly, PlySeeds},
       FuzzTarget{"sensors", FuzzSensors, SensorsSeeds},
+      FuzzTarget{"measured", FuzzMeasured, MeasuredSeeds},
       FuzzTarget{"image", FuzzImage, ImageSeeds},
       FuzzTarget{"accumulation", FuzzAccumulation, AccumulationSeeds},
       FuzzTarget{"block", FuzzBlock, BlockSeeds},

@@ -36,6 +36,8 @@ bool FuzzPly(std::string_view bytes);
 std::vector<std::string> PlySeeds();
 bool FuzzSensors(std::string_view bytes);
 std::vector<std::string> SensorsSeeds();
+bool FuzzMeasured(std::string_view bytes);
+std::vector<std::string> MeasuredSeeds();
 bool FuzzImage(std::string_view bytes);
 std::vector<std::string> ImageSeeds();
 

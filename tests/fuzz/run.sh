@@ -11,7 +11,7 @@ executions=$2
 shift 2
 targets=("$@")
 if [ ${#targets[@]} -eq 0 ]; then
-  targets=(pbrt gltf mitsuba obj ply sensors image accumulation block radii guide slice checkpoint sums record manifest messages)
+  targets=(pbrt gltf mitsuba obj ply sensors measured image accumulation block radii guide slice checkpoint sums record manifest messages)
 fi
 failed=0
 for target in "${targets[@]}"; do
@@ -19,7 +19,7 @@ for target in "${targets[@]}"; do
   most_bytes=512
   case $target in
     gltf) most_bytes=8192 ;;
-    pbrt | mitsuba | obj | ply | image | sums) most_bytes=4096 ;;
+    pbrt | mitsuba | obj | ply | measured | image | sums) most_bytes=4096 ;;
   esac
   mkdir -p "$folder/$target"
   "$program" "--write-seeds=$folder/$target"

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "render/formats/image_file.h"
+#include "render/formats/measured_file.h"
 #include "render/formats/mitsuba/meshes.h"
 #include "render/formats/ply_file.h"
 #include "tests/fuzz/fuzz_targets.h"
@@ -95,6 +96,27 @@ bool FuzzSensors(std::string_view bytes) {
 
 std::vector<std::string> SensorsSeeds() {
   return SeedsOf("fuzz/seeds/sensors");
+}
+
+// What is accepted scatters finite light by a density that is none below zero.
+bool FuzzMeasured(std::string_view bytes) {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 20;
+  if (bytes.size() > kMostBytes) return false;
+  const auto table = ParseMeasured(bytes);
+  if (!table.ok()) return false;
+  LUCERNA_CHECK(IsFinite(table->Albedo(table->WorkingSpace())));
+  const Vec3 wo = Normalize({0.3F, -0.2F, 0.4F});
+  for (const float u : {0.0F, 0.4F, 0.999999F}) {
+    const MeasuredTable::Drawn drawn = table->Sample(wo, u, 1 - 0.99F * u - 0.005F);
+    LUCERNA_CHECK(IsFinite(drawn.wi) && drawn.pdf >= 0);
+    if (drawn.wi.z > 0)
+      LUCERNA_CHECK(IsFinite(table->Scattered(wo, drawn.wi, table->At({650, 550, 450}))));
+  }
+  return true;
+}
+
+std::vector<std::string> MeasuredSeeds() {
+  return SeedsOf("fuzz/seeds/measured");
 }
 
 // As a file of each format.

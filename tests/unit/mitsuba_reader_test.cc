@@ -15,6 +15,7 @@
 #include "render/formats/read_scene.h"
 #include "render/math/equal_area_square.h"
 #include "render/scene/texture.h"
+#include "tests/support/measured_file.h"
 #include "tests/support/memory_files.h"
 
 namespace lucerna {
@@ -235,6 +236,21 @@ TEST(MitsubaReaderTest, MaterialsAreThoseOfPbrt) {
   EXPECT_EQ(MaterialOf("<bsdf type='difftrans'><rgb name='transmittance' value='.4'/></bsdf>"),
             PbrtMaterialOf("\"diffusetransmission\" \"rgb transmittance\" [.4 .4 .4] "
                            "\"rgb reflectance\" [0 0 0]"));
+}
+
+TEST(MitsubaReaderTest, ReadsMeasuredSurfaces) {
+  MetalToMeasure metal;
+  metal.knots = 3;
+  metal.thetas = 2;
+  const std::string body =
+      "<shape type='sphere'><bsdf type='measured'><string name='filename' value='a.bsdf'/></bsdf>"
+      "</shape>";
+  const Scene scene = SceneOf(body, {{"a.bsdf", MeasuredFile(MeasureMetal(metal))}});
+  const Material& material = scene.materials.at(scene.spheres.at(0).traits.material);
+  ASSERT_EQ(material.kind, Material::Kind::kMeasured);
+  EXPECT_EQ(*material.measured, MeasuredTable(MeasureMetal(metal)));
+  const ParsedScene without = ReadXml(Around(body));
+  EXPECT_THAT(Said(without), HasSubstr("cannot be read: a.bsdf: no such file"));
 }
 
 TEST(MitsubaReaderTest, AConductorWithoutConstantsIsAMirrorOrInOlderFilesCopper) {

@@ -21,7 +21,7 @@ using Triple = std::array<double, 3>;
 
 // The colour of light with the spectrum f(λ)·D65(λ), white being (1, 1, 1): a sum over 0.1 nm that
 // knows nothing of passes.
-Triple ColorOf(const std::function<double(double nm)>& f) {
+Triple ColorOfSpectrum(const std::function<double(double nm)>& f) {
   constexpr double kStepNm = 0.1;
   Triple color{};
   Triple white{};
@@ -92,7 +92,7 @@ TEST(PassWavelengthsTest, TheMeanColorIsThatOfTheSpectrum) {
       for (std::size_t c = 0; c < 3; ++c)
         mean[c] += color[c] / kPlaces;
     }
-    const Triple expected = ColorOf(spectrum);
+    const Triple expected = ColorOfSpectrum(spectrum);
     // The observer's curve is a line over each nanometre there, and a cubic here.
     for (std::size_t c = 0; c < 3; ++c)
       EXPECT_NEAR(mean[c], expected[c], 1e-4 * std::max(1.0, std::abs(expected[c]))) << c;

@@ -700,11 +700,11 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
          "the layer under a coat only absorbs");
   expect("Material \"subsurface\"", "light does not travel below surfaces");
   expect("Material \"subsurface\"", "medium inside");
-  expect("Material \"measured\"", "measured BSDFs");
-  expect("Material \"measured\"", "use a conductor, coateddiffuse or coatedconductor");
+  expect("Material \"measured\"", "must name a .bsdf file");
+  expect("Material \"measured\" \"string filename\" \"none.bsdf\"", "cannot be read");
   expect("Material \"fourier\"", "Fourier BSDFs");
   expect("Material \"conductor\" \"spectrum eta\" \"none.spd\"", "\"none.spd\" cannot be read");
-  expect("MakeNamedMaterial \"m\" \"string type\" \"measured\"", "\"measured\"");
+  expect("MakeNamedMaterial \"m\" \"string type\" \"subsurface\"", "\"subsurface\"");
   expect("LightSource \"laser\"",
          "there are point, spot, goniometric, projection, distant and infinite");
   expect("LightSource \"infinite\" \"string filename\" \"sky.exr\"", "no such file");

@@ -8,6 +8,7 @@
 #include "gtest/gtest.h"
 
 #include "render/geometry/feature_edges.h"
+#include "tests/support/measured_file.h"
 #include "tests/support/test_scenes.h"
 
 namespace lucerna {
@@ -119,6 +120,16 @@ TEST(SceneMemoryTest, APictureCountsOnceHoweverManyTexturesShowIt) {
   sky.map = picture;
   scene.infinite_lights.push_back(sky);
   EXPECT_EQ(SceneMemoryOf(scene, kRays).textures, (3 << 20) + sizeof(Picture));
+}
+
+TEST(SceneMemoryTest, AMeasuredSurfaceCountsOnceHoweverManyMaterialsHaveIt) {
+  Scene scene = With(Grid(1));
+  const Material material = MeasuredMaterial(MeasureMetal({}));
+  AddMaterial(scene, material);
+  AddMaterial(scene, material);
+  const std::size_t values = 8 * 7 * 32 * 32;  // [thetas × (wavelengths + 3) × knots]
+  EXPECT_EQ(SceneMemoryOf(scene, kRays).textures, material.measured->bytes());
+  EXPECT_GT(material.measured->bytes(), values * sizeof(float));
 }
 
 TEST(SceneMemoryTest, SaysWhatIsStillToBeBuiltAndWhatToDo) {

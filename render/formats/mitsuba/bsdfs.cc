@@ -39,8 +39,8 @@ constexpr double kPlastic = 1.49;
 
 constexpr std::string_view kSupported =
     "there are diffuse, roughdiffuse, dielectric, roughdielectric, thindielectric, conductor, "
-    "roughconductor, plastic, roughplastic, difftrans, null, blendbsdf, twosided, mask, bumpmap "
-    "and normalmap";
+    "roughconductor, plastic, roughplastic, difftrans, measured, null, blendbsdf, twosided, mask, "
+    "bumpmap and normalmap";
 
 }  // namespace
 
@@ -242,6 +242,11 @@ bool MitsubaTranslator::AddMaterial(const MitsubaObject& bsdf, ParameterList& li
     is("diffusetransmission");
     color("transmittance", "transmittance", 0.5F);
     made.parameters.push_back(MakeColor("reflectance", {}, bsdf.location));
+    return true;
+  }
+  if (type == "measured") {
+    is("measured");
+    made.parameters.push_back(MakeString("filename", list.String("filename", ""), bsdf.location));
     return true;
   }
   if (type == "null") {

@@ -38,10 +38,6 @@ std::string_view WhyRefused(std::string_view type) {
     return "is not supported: light does not travel below surfaces here; use a dielectric with an "
            "absorbing and scattering medium inside, or diffusetransmission for thin shapes";
   }
-  if (type == "measured") {
-    return "is not supported: measured BSDFs (.bsdf files) are not read; use a conductor, "
-           "coateddiffuse or coatedconductor with a roughness that looks alike";
-  }
   if (type == "fourier") {
     return "is not supported, nor by pbrt-v4: Fourier BSDFs (.bsdf files) are not read";
   }

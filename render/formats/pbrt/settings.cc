@@ -11,7 +11,7 @@ namespace lucerna {
 namespace {
 
 constexpr std::array<std::string_view, 1> kFloatType = {"float"};
-constexpr std::array<std::string_view, 1> kIntegerType = {"integer"};
+constexpr std::array<std::string_view, 1> kBoundsType = {"integer"};
 
 // Four numbers, or none.
 std::span<const double> Four(ParameterList& parameters, std::string_view name,
@@ -138,7 +138,7 @@ void ReadFilm(std::string_view type, ParameterList& parameters, FilmSettings& fi
   film.crop_y1 = film.height;
 
   const std::span<const double> crop = Four(parameters, "cropwindow", kFloatType);
-  const std::span<const double> pixels = Four(parameters, "pixelbounds", kIntegerType);
+  const std::span<const double> pixels = Four(parameters, "pixelbounds", kBoundsType);
   if (!crop.empty() && !pixels.empty()) {
     parameters.Error("pixelbounds", "and cropwindow exclude each other; give one of them");
   }
