@@ -185,6 +185,10 @@ StatusOr<MeasuredTable> ParseMeasured(std::string_view bytes) {
   LUCERNA_ASSIGN_OR_RETURN(data.phi_rad, KnotsOf(fields, "phi_i", -1.01 * kTurn, 1.01 * kTurn));
   LUCERNA_ASSIGN_OR_RETURN(data.theta_rad, KnotsOf(fields, "theta_i", 0, kRightAngle));
   LUCERNA_ASSIGN_OR_RETURN(data.wavelength_nm, KnotsOf(fields, "wavelengths", 1, 1e5));
+  // What follows from a table is computed for each of them.
+  constexpr std::size_t kMostWavelengths = 4096;
+  if (data.wavelength_nm.size() > kMostWavelengths)
+    return Bad(Concat("it has more than ", kMostWavelengths, " wavelengths"));
   const std::vector<std::size_t> directions = {data.phi_rad.size(), data.theta_rad.size()};
   LUCERNA_ASSIGN_OR_RETURN(data.facets, GridsOf(fields, "ndf", {}, data.facets_size));
   LUCERNA_ASSIGN_OR_RETURN(data.projected, GridsOf(fields, "sigma", {}, data.projected_size));

@@ -230,6 +230,7 @@ void MeasuredTable::MeasureFromAbove() {
   // Directions drawn at the middles of the cells of the square.
   constexpr int kCells = 24;
   const Vec3 above = {0, 0, 1};
+  const Seen seen = SeenFrom(above);
   const std::size_t planes = wavelength_nm_.size() + 3;
   std::vector<double> sums(planes);
   struct Found {
@@ -242,17 +243,20 @@ void MeasuredTable::MeasureFromAbove() {
     const Drawn drawn = Sample(above, (static_cast<float>(i - row * kCells) + 0.5F) / kCells,
                                (static_cast<float>(row) + 0.5F) / kCells);
     if (!(drawn.wi.z > 0) || !(drawn.pdf > 0)) continue;
+    const Vec3 m = Normalize(above + drawn.wi);
+    const Vec2 place = PlaceOf(seen, m);
+    const Vec2 warped = visible_.Find(seen.mixture, place).at;
     for (std::size_t plane = 0; plane < planes; plane += 3) {
       const auto of = [&](std::size_t k) {
         return static_cast<float>(std::min(plane + k, planes - 1));
       };
-      const Rgb value = Scattered(above, drawn.wi, {of(0), of(1), of(2)}) / drawn.pdf;
+      const Rgb value = ValueAt(seen, warped, place, {of(0), of(1), of(2)}) / drawn.pdf;
       const std::array<float, 3> values = {value.r, value.g, value.b};
       for (std::size_t k = 0; k < 3 && plane + k < planes; ++k)
         sums[plane + k] += static_cast<double>(values[k]);
     }
-    const float light = Luminance(Scattered(above, drawn.wi, WorkingSpace())) / drawn.pdf;
-    found.push_back({ThetaOf(Normalize(above + drawn.wi)), light});
+    const float light = Luminance(ValueAt(seen, warped, place, WorkingSpace())) / drawn.pdf;
+    found.push_back({ThetaOf(m), light});
     all += static_cast<double>(light);
   }
   albedo_.clear();

@@ -314,6 +314,12 @@ TEST(MeasuredFileTest, SaysWhatIsWrong) {
   sizes[sizes.find("wavelengths") + 11 + 2 + 1 + 8] = 1;
   EXPECT_THAT(said(sizes),
               HasSubstr("\"spectra\" has 2 in dimension 2, where other arrays have 1"));
+  MetalToMeasure many = Tiny();
+  many.wavelength_nm.clear();
+  for (int i = 0; i < 5000; ++i)
+    many.wavelength_nm.push_back(300 + 0.1F * static_cast<float>(i));
+  many.reflectance.assign(5000, 0.5F);
+  EXPECT_THAT(said(MeasuredFile(MeasureMetal(many))), HasSubstr("more than 4096 wavelengths"));
   std::string named = MeasuredFile(MeasureMetal(Tiny()));
   named.replace(named.find("sigma"), 5, "gamma");
   EXPECT_THAT(said(named), HasSubstr("the array \"sigma\" is missing"));
