@@ -38,7 +38,7 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 BIN = ROOT / "build/release/bin"
-OWN = ["hard-shadow", "penumbra", "water-sun", "water-lamp", "caustic", "cardioid", "corner",
+OWN = ["hard-shadow", "penumbra", "water-sun", "pool", "caustic", "cardioid", "corner",
        "glass-box", "glass-sphere", "lamp-in-glass", "rough-metal", "textured"]
 # First radius, photons a pixel and pass, and passes of both halves. One pixel where much of the
 # light has edges. The numbers follow from the noise of a few seconds: of photons a pass the best of
@@ -54,7 +54,7 @@ REFERENCES = {
     "b-glossy-2": ("2px", 4, 24300),
     "b-holes-1": ("2px", 16, 17300),
     "b-holes-2": ("2px", 4, 60000),
-    "b-waves-1": ("1px", 4, 6000),
+    "b-waves-1": ("1px", 4, 9600),
     "b-waves-2": ("1px", 4, 6000),
     "cardioid": ("1px", 4, 6000),
     "caustic": ("1px", 4, 72000),
@@ -64,9 +64,9 @@ REFERENCES = {
     "hard-shadow": ("1px", 4, 6000),
     "lamp-in-glass": ("2px", 16, 6400),
     "penumbra": ("2px", 16, 14300),
-    "rough-metal": ("2px", 4, 19900),
+    "pool": ("1px", 4, 5000),
+    "rough-metal": ("2px", 4, 23000),
     "textured": ("2px", 1, 16700),
-    "water-lamp": ("1px", 4, 358500),
     "water-sun": ("1px", 16, 700),
 }
 SIZE = "128x128"
