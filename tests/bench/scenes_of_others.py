@@ -7,8 +7,8 @@ FOLDER holds a folder for each scene, with scene.pbrt or scene-v4.pbrt and the r
 renderer, reference.exr; those that are missing are named and left out. Each scene is rendered at
 the size and depth of its reference for so many seconds by both cores, whatever else runs. Written
 to docs/measurements/scenes-of-others.csv: the mean of each channel, clipped at 5, over that of the
-reference; relMSE without the worst 0.1 % of pixels, without the reference's noise; the memory of the
-largest process; and seconds of a whole command that renders one pass.
+reference; relMSE without the worst 0.1 % of pixels, with the reference's own noise beside it; the memory of
+the largest process; and seconds of a whole command that renders one pass.
 """
 import argparse
 import csv
