@@ -56,13 +56,6 @@ class BilinearGrids {
     return (1 - y.within) * ((1 - x.within) * low[0] + x.within * low[1]) +
            y.within * ((1 - x.within) * high[0] + x.within * high[1]);
   }
-  [[nodiscard]] float At(const GridMixture& mixture, Vec2 place) const {
-    float sum = 0;
-    for (std::size_t i = 0; i < mixture.grid.size(); ++i) {
-      if (mixture.share[i] > 0) sum += mixture.share[i] * At(mixture.grid[i], place);
-    }
-    return sum;
-  }
 
   [[nodiscard]] std::size_t bytes() const { return values_.size() * sizeof(float); }
   bool operator==(const BilinearGrids& o) const { return values_ == o.values_; }

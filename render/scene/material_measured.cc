@@ -6,7 +6,7 @@ namespace lucerna {
 
 MaterialProperties MeasuredKind::Properties(const MaterialNumbers& material) {
   MaterialProperties properties;
-  properties.is_black = IsBlack(material.measured->Albedo(material.measured->WorkingSpace()));
+  properties.is_black = material.measured->is_black();
   properties.lobe_width = material.measured->lobe_width();
   properties.gathers = !properties.is_black && properties.lobe_width >= kGatherAlpha;
   return properties;

@@ -12,7 +12,7 @@
 namespace lucerna {
 namespace {
 
-// D18 eq. (9): the square's x goes with the angle to the normal, finer where that is small.
+// D18: the square's x goes with the angle to the normal, finer where that is small.
 float SquareOfTheta(float theta) {
   return std::sqrt(theta * (2 / kPi));
 }
@@ -67,27 +67,26 @@ std::vector<Rgb> ColorsOf(const std::vector<float>& wavelength_nm) {
   return colors;
 }
 
-// [directions × (wavelengths + 3) × knots] of [directions × wavelengths × knots].
-std::vector<float> WithWorkingSpace(const std::vector<float>& values, std::size_t directions,
-                                    std::size_t knots, const std::vector<Rgb>& colors) {
+// [directions × 3 × knots] of [directions × wavelengths × knots].
+std::vector<float> InWorkingSpace(const std::vector<float>& values, std::size_t knots,
+                                  const std::vector<Rgb>& colors) {
   const std::size_t wavelengths = colors.size();
-  std::vector<float> all;
-  all.reserve(directions * (wavelengths + 3) * knots);
+  const std::size_t directions = values.size() / (wavelengths * knots);
+  std::vector<float> mixed;
+  mixed.reserve(directions * 3 * knots);
   for (std::size_t d = 0; d < directions; ++d) {
     const float* first = &values[d * wavelengths * knots];
-    all.insert(all.end(), first, first + wavelengths * knots);
-    for (std::size_t channel = 0; channel < 3; ++channel) {
+    for (int channel = 0; channel < 3; ++channel) {
       for (std::size_t k = 0; k < knots; ++k) {
         double sum = 0;
-        for (std::size_t w = 0; w < wavelengths; ++w) {
-          const std::array<float, 3> color = {colors[w].r, colors[w].g, colors[w].b};
-          sum += static_cast<double>(color[channel]) * static_cast<double>(first[w * knots + k]);
-        }
-        all.push_back(static_cast<float>(std::max(sum, 0.0)));
+        for (std::size_t w = 0; w < wavelengths; ++w)
+          sum +=
+              static_cast<double>(colors[w][channel]) * static_cast<double>(first[w * knots + k]);
+        mixed.push_back(static_cast<float>(std::max(sum, 0.0)));
       }
     }
   }
-  return all;
+  return mixed;
 }
 
 }  // namespace
@@ -101,9 +100,10 @@ MeasuredTable::MeasuredTable(MeasuredData data)
       projected_(data.projected_size, std::move(data.projected)),
       visible_(data.visible_size, std::move(data.visible)),
       luminance_(data.values_size, std::move(data.luminance)),
-      values_(data.values_size,
-              WithWorkingSpace(data.values, phi_rad_.size() * theta_rad_.size(),
-                               data.values_size.knots(), ColorsOf(wavelength_nm_))) {
+      colors_(data.values_size,
+              InWorkingSpace(data.values, data.values_size.knots(), ColorsOf(wavelength_nm_))),
+      is_black_(std::ranges::all_of(data.values, [](float value) { return value == 0; })),
+      values_(data.values_size, std::move(data.values)) {
   if (is_anisotropic()) {
     const float parts = 2 * kPi / (phi_rad_.back() - phi_rad_.front());
     mirrored_ = parts > 3 ? 4 : parts > 1.5F ? 2 : 1;
@@ -165,8 +165,13 @@ float MeasuredTable::Jacobian(const Seen& seen, Vec3 m, Vec2 place) {
   return std::max(2 * kPi * kPi * place.x * sine, kLeast) * std::max(4 * Dot(seen.wo, m), kLeast);
 }
 
+float MeasuredTable::PlaneAt(std::size_t direction, std::size_t plane, Vec2 warped) const {
+  const std::size_t wavelengths = wavelength_nm_.size();
+  return plane < wavelengths ? values_.At(direction * wavelengths + plane, warped)
+                             : colors_.At(direction * 3 + plane - wavelengths, warped);
+}
+
 Rgb MeasuredTable::ValueAt(const Seen& seen, Vec2 warped, Vec2 place, const Planes& planes) const {
-  const std::size_t count = wavelength_nm_.size() + 3;
   const float factor = is_over_facets_ ? seen.facets_over * facets_.At(0, place) : 1.0F;
   std::array<float, 3> values{};
   for (std::size_t i = 0; i < 3; ++i) {
@@ -174,9 +179,8 @@ Rgb MeasuredTable::ValueAt(const Seen& seen, Vec2 warped, Vec2 place, const Plan
     const float within = planes[i] - static_cast<float>(plane);
     for (std::size_t k = 0; k < seen.mixture.grid.size(); ++k) {
       if (!(seen.mixture.share[k] > 0)) continue;
-      const std::size_t grid = seen.mixture.grid[k] * count + plane;
-      float value = values_.At(grid, warped);
-      if (within > 0) value += within * (values_.At(grid + 1, warped) - value);
+      float value = PlaneAt(seen.mixture.grid[k], plane, warped);
+      if (within > 0) value += within * (PlaneAt(seen.mixture.grid[k], plane + 1, warped) - value);
       values[i] += seen.mixture.share[k] * value;
     }
     values[i] *= factor;
@@ -269,7 +273,7 @@ void MeasuredTable::MeasureFromAbove() {
   float theta = kPi / 2;
   for (const Found& f : found) {
     narrow += static_cast<double>(f.light);
-    if (narrow >= 0.25 * all) {
+    if (narrow >= 0.25 * all && narrow > 0) {
       theta = f.theta;
       break;
     }
@@ -280,7 +284,7 @@ void MeasuredTable::MeasureFromAbove() {
 
 std::size_t MeasuredTable::bytes() const {
   return sizeof(*this) + facets_.bytes() + projected_.bytes() + visible_.bytes() +
-         luminance_.bytes() + values_.bytes() +
+         luminance_.bytes() + values_.bytes() + colors_.bytes() +
          (phi_rad_.size() + theta_rad_.size() + wavelength_nm_.size() + albedo_.size()) *
              sizeof(float);
 }

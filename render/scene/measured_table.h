@@ -6,6 +6,9 @@
 // square by their angles, and that is warped by the density of visible facets, so that the table
 // of values has its knots where light is scattered.
 //
+// A value v at a half vector m means f·cosθi = v · D(m) / (4 σ(wo)), with the density of facets D
+// and their projected area σ, both of which are tables too.
+//
 // Directions are in the shading frame, as in transport/bsdf.h. Values at three planes of the tables
 // are colours: in the working space, or at the wavelengths of a pass.
 #pragma once
@@ -25,7 +28,7 @@ struct MeasuredData {
   std::vector<float> phi_rad;    // of `wo`, increasing; one or two: the surface has no direction
   std::vector<float> theta_rad;  // of `wo`, increasing
   std::vector<float> wavelength_nm;
-  // Values are over the density of facets, D18 eq. (2); else f·cosθi as it is.
+  // Values are as above; else f·cosθi itself.
   bool is_over_facets = true;
   GridSize facets_size, projected_size, visible_size, values_size;
   std::vector<float> facets;     // [facets_size] by half vectors
@@ -59,6 +62,8 @@ class MeasuredTable {
 
   // The share of light from right above that is scattered.
   [[nodiscard]] Rgb Albedo(const Planes& planes) const;
+  // Whether nothing is scattered, from any direction.
+  [[nodiscard]] bool is_black() const { return is_black_; }
   // Of facets with which light from right above would be scattered as broadly: the width whose
   // narrowest quarter of light is as narrow.
   [[nodiscard]] float lobe_width() const { return lobe_width_; }
@@ -82,6 +87,8 @@ class MeasuredTable {
   [[nodiscard]] Vec2 PlaceOf(const Seen& seen, Vec3 m) const;
   // From densities on the square to those of `wi` [sr⁻¹].
   static float Jacobian(const Seen& seen, Vec3 m, Vec2 place);
+  // Of one plane, in the direction of a grid.
+  [[nodiscard]] float PlaneAt(std::size_t direction, std::size_t plane, Vec2 warped) const;
   [[nodiscard]] Rgb ValueAt(const Seen& seen, Vec2 warped, Vec2 place, const Planes& planes) const;
   void MeasureFromAbove();
 
@@ -90,7 +97,9 @@ class MeasuredTable {
   int mirrored_ = 1;  // how many equal parts the directions around the normal have: 1, 2 or 4
   BilinearGrids facets_, projected_;
   BilinearDensities visible_, luminance_;
-  BilinearGrids values_;  // [phi × theta × (wavelengths + 3)]: the last three in the working space
+  BilinearGrids colors_;  // [phi × theta × 3] in the working space: planes after the wavelengths'
+  bool is_black_ = false;
+  BilinearGrids values_;       // [phi × theta × wavelengths]
   std::vector<float> albedo_;  // [wavelengths + 3]
   float lobe_width_ = 0;
 };

@@ -17,20 +17,16 @@ Rgb ValueOf(const Material& material, Vec3 eye, Vec3 light) {
          std::max(light.z, kLeastCosine);
 }
 
-Vec3 OnSide(Vec3 direction, float side) {
-  return {direction.x, direction.y, side * direction.z};
-}
-
 }  // namespace
 
 bool MeasuredBsdf::Sample(const Material& material, Vec3 wo, float /*u_lobe*/, float u1, float u2,
                           Carried carried, BsdfSample& sample) {
   const float side = wo.z < 0 ? -1.0F : 1.0F;
   if (wo.z == 0) return false;
-  const Vec3 up = OnSide(wo, side);
+  const Vec3 up = wo * side;
   const MeasuredTable::Drawn drawn = material.measured->Sample(up, u1, u2);
   if (!(drawn.wi.z > 0) || !(drawn.pdf > 0)) return false;
-  sample.wi = OnSide(drawn.wi, side);
+  sample.wi = drawn.wi * side;
   sample.pdf = drawn.pdf;
   const Rgb value =
       carried == Carried::kFlux ? ValueOf(material, drawn.wi, up) : ValueOf(material, up, drawn.wi);
@@ -42,16 +38,14 @@ bool MeasuredBsdf::Sample(const Material& material, Vec3 wo, float /*u_lobe*/, f
 Rgb MeasuredBsdf::Evaluate(const Material& material, Vec3 wo, Vec3 wi, Carried carried) {
   if (!(wo.z * wi.z > 0)) return {};
   const float side = wo.z < 0 ? -1.0F : 1.0F;
-  const Vec3 first = OnSide(wo, side);
-  const Vec3 second = OnSide(wi, side);
-  return carried == Carried::kFlux ? ValueOf(material, second, first)
-                                   : ValueOf(material, first, second);
+  return carried == Carried::kFlux ? ValueOf(material, wi * side, wo * side)
+                                   : ValueOf(material, wo * side, wi * side);
 }
 
 float MeasuredBsdf::Pdf(const Material& material, Vec3 wo, Vec3 wi) {
   if (!(wo.z * wi.z > 0)) return 0;
   const float side = wo.z < 0 ? -1.0F : 1.0F;
-  return material.measured->Pdf(OnSide(wo, side), OnSide(wi, side));
+  return material.measured->Pdf(wo * side, wi * side);
 }
 
 Rgb MeasuredBsdf::Albedo(const Material& material) {

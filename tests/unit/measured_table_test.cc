@@ -198,6 +198,7 @@ TEST(MeasuredTableTest, WeighsASampleByValueOverDensityAndIsTheSameBothWays) {
           const Rgb f = EvaluateBsdf(material, wo, sample.wi, carried);
           ASSERT_NEAR(f.g * std::abs(sample.wi.z) / sample.pdf, sample.weight.g,
                       0.02F * sample.weight.g + 1e-5F);
+          EXPECT_FLOAT_EQ(EvaluateBsdf(material, -wo, -sample.wi, carried).g, f.g) << "both sides";
           const Carried other = carried == Carried::kFlux ? Carried::kRadiance : Carried::kFlux;
           EXPECT_FLOAT_EQ(EvaluateBsdf(material, sample.wi, wo, other).g, f.g);
         }
@@ -225,6 +226,20 @@ TEST(MeasuredTableTest, KnowsItsAlbedoAndWidth) {
   }
   EXPECT_TRUE(PropertiesOf(MeasuredMaterial(MeasureMetal(Isotropic(0.3F)))).gathers);
   EXPECT_FALSE(PropertiesOf(MeasuredMaterial(MeasureMetal(Isotropic(0.1F)))).gathers);
+}
+
+// Light that comes from above alone does not say whether a surface is black.
+TEST(MeasuredTableTest, IsBlackOnlyWhereNothingIsScatteredFromAnywhere) {
+  MeasuredData data = MeasureMetal(Isotropic(0.3F));
+  const std::size_t of_theta = data.values.size() / data.theta_rad.size();
+  for (std::size_t i = 0; i < of_theta; ++i)
+    data.values[i] = 0;
+  const Material dark_above = MeasuredMaterial(data);
+  EXPECT_TRUE(IsBlack(AlbedoOf(dark_above)));
+  EXPECT_FALSE(PropertiesOf(dark_above).is_black);
+  EXPECT_GT(EvaluateBsdf(dark_above, Towards(50, 0), Towards(50, 180), Carried::kRadiance).g, 0);
+  data.values.assign(data.values.size(), 0.0F);
+  EXPECT_TRUE(PropertiesOf(MeasuredMaterial(data)).is_black);
 }
 
 TEST(MeasuredTableTest, HasTheColorOfItsSpectrumAndItsValuesAtWavelengths) {
