@@ -519,6 +519,10 @@ int Run(int argc, char** argv) {
   AddSettingFlag(*reference, "time_s", to_refer.overrides, "seconds, of both halves together");
   AddSettingFlag(*reference, "passes", to_refer.overrides, "passes, of both halves together");
   add_image_flags(reference, to_refer.overrides);
+  ShowDefault(*reference, "radius_controller", std::string(NameOf(kReferenceController)));
+  ShowDefault(*reference, "initial_radius", absl::StrCat(kReferenceFootprints, "px"));
+  ShowDefault(*reference, "photons_per_pass",
+              absl::StrCat(kReferencePhotonsPerPixel, " for each pixel"));
   add_checkpoints(reference, to_refer.resumes, "reference");
   add_no_preview(reference);
   add_json(reference);

@@ -52,11 +52,10 @@ void AddFlag(CLI::App& command, const Setting& setting, RenderOverrides& overrid
       ->type_name(ValuePlaceholder(setting));
 }
 
-std::string HelpOf(const Setting& setting) {
+std::string HelpOf(const Setting& setting, const std::string& fallback) {
   std::string help(setting.meaning);
   if (!setting.unit.empty()) help += Concat(" [", setting.unit, "]");
   if (!IsBool(setting)) help += Concat("; ", RangeText(setting));
-  const std::string fallback = DefaultText(setting);
   return IsBool(setting) ? help : Concat(help, " (default: ", fallback, ")");
 }
 
@@ -83,7 +82,9 @@ std::string WithFlagNames(std::string message) {
 
 void AddSettingFlags(CLI::App& command, SettingRole role, RenderOverrides& overrides) {
   for (const Setting& setting : AllSettings()) {
-    if (setting.role == role) AddFlag(command, setting, overrides, HelpOf(setting));
+    if (setting.role == role) {
+      AddFlag(command, setting, overrides, HelpOf(setting, DefaultText(setting)));
+    }
   }
 }
 
@@ -92,6 +93,12 @@ void AddSettingFlag(CLI::App& command, std::string_view name, RenderOverrides& o
   const Setting* setting = FindSetting(name);
   LUCERNA_CHECK(setting != nullptr);
   AddFlag(command, *setting, overrides, help);
+}
+
+void ShowDefault(CLI::App& command, std::string_view name, const std::string& fallback) {
+  const Setting* setting = FindSetting(name);
+  LUCERNA_CHECK(setting != nullptr);
+  command.get_option(FlagOf(*setting))->description(HelpOf(*setting, fallback));
 }
 
 StatusOr<RenderOverrides> WithImageFlags(RenderOverrides overrides, const std::string& words) {

@@ -30,6 +30,8 @@ void AddSettingFlags(CLI::App& command, SettingRole role, RenderOverrides& overr
 // One of them, with another help text.
 void AddSettingFlag(CLI::App& command, std::string_view name, RenderOverrides& overrides,
                     const std::string& help);
+// Shows `fallback` in the help of one of them, where a command has its own default.
+void ShowDefault(CLI::App& command, std::string_view name, const std::string& fallback);
 
 // `overrides` with the changes in `words`, like "--alpha 0.5 --kernel constant". Stop criteria are
 // not accepted.

@@ -18,11 +18,6 @@
 namespace lucerna {
 namespace {
 
-constexpr double kFirstFootprints = 0.5;
-// Eye paths cost about as much as one photon a pixel; with more photons less of the time goes
-// there. With too many, passes are few, and it is passes by which radii shrink.
-constexpr std::int64_t kPhotonsPerPixel = 4;
-
 std::string MetadataOf(const Image& image, const std::string& key) {
   const auto found = image.metadata.find(key);
   return found == image.metadata.end() ? std::string() : found->second;
@@ -33,17 +28,16 @@ StatusOr<SceneOfJobs> ReadHalves(const ReferenceRequest& request, RenderOverride
                                  bool is_quiet) {
   if (overrides.passes) overrides.passes = (*overrides.passes + 1) / 2;
   if (overrides.time_s) overrides.time_s = *overrides.time_s / 2;
-  if (!overrides.radius_controller) overrides.radius_controller = RadiusControllerKind::kPppm;
+  if (!overrides.radius_controller) overrides.radius_controller = kReferenceController;
   if (!overrides.initial_radius) {
-    // Also where the scene names a radius, which is one for its own time.
     overrides.initial_radius = 0;
-    overrides.initial_footprints = kFirstFootprints;
+    overrides.initial_footprints = kReferenceFootprints;
   }
   LUCERNA_ASSIGN_OR_RETURN(SceneOfJobs scene,
                            ReadSceneOfJobs({request.scene_path}, {&overrides, 1}, is_quiet));
   if (!overrides.photons_per_pass) {
     const RenderSettings& settings = scene.settings.front();
-    overrides.photons_per_pass = kPhotonsPerPixel * std::int64_t{settings.crop_width()} *
+    overrides.photons_per_pass = kReferencePhotonsPerPixel * std::int64_t{settings.crop_width()} *
                                  std::int64_t{settings.crop_height()};
   }
   return scene;

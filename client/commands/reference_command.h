@@ -14,7 +14,7 @@
 // depend on the photons that it is used with.
 #pragma once
 
-#include <optional>
+#include <cstdint>
 #include <string>
 
 #include "client/commands/job_commands.h"
@@ -23,6 +23,14 @@
 #include "render/scene/render_settings.h"
 
 namespace lucerna {
+
+// Where no others are given. Radii begin at so many widths of a pixel also where the scene names a
+// radius, which is one for its own time.
+inline constexpr RadiusControllerKind kReferenceController = RadiusControllerKind::kPppm;
+inline constexpr double kReferenceFootprints = 0.5;
+// Eye paths cost about as much as one photon a pixel; with more photons less of the time goes
+// there. With too many, passes are few, and it is passes by which radii shrink.
+inline constexpr std::int64_t kReferencePhotonsPerPixel = 4;
 
 struct ReferenceRequest {
   std::string scene_path;

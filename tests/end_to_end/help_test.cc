@@ -40,6 +40,17 @@ TEST(HelpOfCommandsTest, AValueThatAFlagDoesNotHaveIsMetWithThoseThatItHas) {
   EXPECT_THAT(wrong.errors, testing::HasSubstr("must be bash, fish or zsh, not csh"));
 }
 
+TEST(HelpOfCommandsTest, ShowsTheDefaultsThatACommandHasAlone) {
+  const std::string program = kBin + "/lucerna";
+  const std::string render = RunProgram({program, "help", "render"}).output;
+  EXPECT_THAT(render, testing::HasSubstr("(default: appm)"));
+  const std::string reference = RunProgram({program, "help", "reference"}).output;
+  for (const char* fallback : {"pppm", "0.5px", "4 for each pixel"}) {
+    EXPECT_THAT(reference, testing::HasSubstr(std::string("(default: ") + fallback + ")"));
+  }
+  EXPECT_THAT(reference, testing::Not(testing::HasSubstr("appm)")));
+}
+
 // Values of a flag are shown by their names, not by what they are inside.
 TEST(HelpOfCommandsTest, IsTextAlone) {
   for (const char* command : {"render", "bake", "completion", "settings", "man"}) {
