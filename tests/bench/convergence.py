@@ -13,8 +13,8 @@ Times are processor time of coordinator and worker over two, seconds of a machin
 what else runs on the machine does not matter. One job of each scene goes on from one time to the
 next.
 
-References are in --references. One that is missing is made: some twelve hours of two cores for all,
---references-only for nothing else. Each has so many passes that its squared noise is about a tenth
+References are in --references. One that is missing is made: some six hours of two cores for all,
+--references-only for nothing else. Each has so many passes that its squared noise is at most a tenth
 of what is judged after 60 s, and that is taken off. Its first radius is smaller than that of a job,
 or bias that falls slowly would be hidden in it (docs/measurements/references.md). The judged renders
 take half an hour.
@@ -45,16 +45,16 @@ OWN = ["hard-shadow", "penumbra", "water-sun", "pool", "caustic", "cardioid", "c
 # 1, 4 and 16, and as many passes as should bring the squared noise to 0.08 to 0.1 of what was judged.
 REFERENCES = {
     "b-bars-1": ("2px", 16, 9500),
-    "b-beads-1": ("2px", 4, 11000),
+    "b-beads-1": ("2px", 4, 12500),
     "b-checkers-1": ("2px", 4, 28100),
     "b-emitters-1": ("2px", 4, 28300),
-    "b-emitters-2": ("2px", 1, 125000),
+    "b-emitters-2": ("2px", 1, 40000),
     "b-enclosed-1": ("2px", 16, 4800),
     "b-glossy-1": ("2px", 1, 64600),
     "b-glossy-2": ("2px", 4, 24300),
     "b-holes-1": ("2px", 16, 17300),
     "b-holes-2": ("2px", 4, 60000),
-    "b-waves-1": ("1px", 4, 9600),
+    "b-waves-1": ("1px", 4, 13000),
     "b-waves-2": ("1px", 4, 6000),
     "cardioid": ("1px", 4, 6000),
     "caustic": ("1px", 4, 72000),
