@@ -25,8 +25,8 @@ constexpr double kTreeShape = 85;  // analytic
 constexpr double kTreeMesh = 520;
 constexpr double kTreeInstance = 430;
 constexpr double kBuildingPrimitive = 36;  // beside the tree
-// Of the set of lights.
-constexpr double kEmitter = 48;
+// Of the set of lights, with the tree of those that are sampled, and while that is made.
+constexpr double kEmitter = 300;
 // Of feature edges: a segment, with the tree; and while they are found.
 constexpr double kSegment = 52;
 constexpr double kEdgesPerTriangle = 77, kEdgesPerVertex = 28, kEdgesPerMesh = 24;

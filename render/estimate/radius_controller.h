@@ -28,7 +28,7 @@ struct PixelRadius {
 // What one round brought to one pixel: sums over its passes.
 struct RoundEvidence {
   double photons = 0;  // M, found with the radius below
-  double radius = 0;   // in unit radii; at least PixelRadius::radius, since radii lag
+  double radius = 0;   // in unit radii; radii lag, so that PixelRadius::radius may differ
   // One number a column, in the controller's order of columns.
   std::span<const double> columns;
   // What the kernel makes of light that is not even, as kBlurColumn measures it: estimate less
@@ -56,7 +56,7 @@ class RadiusController {
   // Numbers of memory a pixel, zero before the first pass.
   [[nodiscard]] virtual std::size_t MemoryPerPixel() const { return 0; }
   // The state after the round `passes` brought `evidence`, which follows all passes before it. A
-  // radius never grows.
+  // radius is never larger than the first one.
   [[nodiscard]] virtual PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence,
                                          const PassRange& passes,
                                          std::span<double> memory) const = 0;

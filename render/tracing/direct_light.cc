@@ -32,10 +32,16 @@ Ray ShadowRay(const SurfacePoint& surface, const LightSample& light) {
   return {origin, light.target - origin, kShadowEnd};
 }
 
+LitPoint LitPointOf(const SurfacePoint& surface, const Material& material, Vec3 wo) {
+  if (Transmits(material)) return {surface.position};
+  return {surface.position, FaceForward(surface.shading_normal, wo)};
+}
+
 Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
                          const ShadingPoint& point, const SobolPoint& u, int& rays) {
   LightSample light;
-  if (!lights.SampleDirect(point.surface.position, FineChoice(u[3], u[7]), u[4], u[5], light))
+  if (!lights.SampleDirect(LitPointOf(point.surface, point.material, point.wo),
+                           FineChoice(u[3], u[7]), u[4], u[5], light))
     return {};
   const Vec3 wo = point.frame.ToLocal(point.wo);
   const Vec3 wi = point.frame.ToLocal(light.wi);

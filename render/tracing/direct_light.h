@@ -29,6 +29,10 @@ struct ShadingPoint {
   FacetSides sides = {};  // of the path from the eye
 };
 
+// Where light arrives for which lights are drawn: of a material through which none passes, light
+// from behind does not count.
+[[nodiscard]] LitPoint LitPointOf(const SurfacePoint& surface, const Material& material, Vec3 wo);
+
 // The weight of a sample drawn with density `drawn` beside one that could have been drawn with
 // `other`. Densities are divided by the larger one first, so that squares neither overflow nor
 // vanish.

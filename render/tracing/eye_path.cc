@@ -456,18 +456,18 @@ bool EyePathTracer::FindFirst(const Ray& ray, First first, Hit& hit) const {
   return true;
 }
 
-Rgb EyePathTracer::ScatteredDirect(const SurfacePoint& surface, Vec3 wi, float pdf,
-                                   std::int32_t medium, Rgb weight, int& rays) const {
+Rgb EyePathTracer::ScatteredDirect(const SurfacePoint& surface, const LitPoint& lit, Vec3 wi,
+                                   float pdf, std::int32_t medium, Rgb weight, int& rays) const {
   Ray probe = {LeavingPoint(surface, wi), wi, HUGE_VALF};
   Hit hit;
   if (!FindThroughMedia(probe, hit, medium, weight, rays)) {
     return weight * lights_.InfiniteRadiance(surface.position, wi) *
-           PowerHeuristic(pdf, lights_.PdfDirectInfinite(surface.position, wi));
+           PowerHeuristic(pdf, lights_.PdfDirectInfinite(lit, wi));
   }
   const SurfacePoint light = intersector_.SurfaceAt(probe, hit);
   const Rgb radiance = lights_.EmittedRadiance(light, -wi);
   if (IsBlack(radiance)) return {};
-  return weight * radiance * PowerHeuristic(pdf, lights_.PdfDirect(surface.position, light));
+  return weight * radiance * PowerHeuristic(pdf, lights_.PdfDirect(lit, light));
 }
 
 EyePath EyePathTracer::AtSensor(std::size_t number, const PixelSampler& sampler) const {
@@ -497,8 +497,9 @@ EyePath EyePathTracer::AtSensor(std::size_t number, const PixelSampler& sampler)
     Rgb direct = LightSampledRadiance(intersector_, lights_, point, u, path.rays);
     BsdfSample sample;
     if (rays_find_lights_ && SampleDiffuse(white, kUp, u[1], u[2], sample)) {
-      direct += ScatteredDirect(surface, frame.ToWorld(sample.wi), sample.pdf, medium,
-                                sample.weight, path.rays);
+      direct +=
+          ScatteredDirect(surface, LitPointOf(surface, white, at.normal), frame.ToWorld(sample.wi),
+                          sample.pdf, medium, sample.weight, path.rays);
     }
     return direct;
   };
@@ -533,7 +534,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   float length = 0;
   // The density of the last scattering [sr⁻¹] when the lights were sampled there too, and where.
   float scatter_pdf = 0;
-  Vec3 scatter_position;
+  LitPoint scatter_point;
   // Emission at the end of a chain of smooth surfaces is collected from the whole tree of their
   // branches where the chain begins: a small light seen in glass would otherwise be one bright
   // speck in thousands of passes.
@@ -600,10 +601,10 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
         add_first_emission(weight * lights_.InfiniteRadiance(from, ray.direction));
         return finish();
       }
-      const float mis = scatter_pdf > 0
-                            ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(
-                                                              scatter_position, ray.direction))
-                            : 1;
+      const float mis =
+          scatter_pdf > 0
+              ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(scatter_point, ray.direction))
+              : 1;
       path.direct += weight * lights_.InfiniteRadiance(from, ray.direction) *
                      (mis * share_of_rays(lights_.EmissionDensityInfinite(from, ray.direction)));
       return finish();
@@ -614,10 +615,9 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     if (vertex == 0) {
       add_first_emission(weight * emitted);
     } else if (!IsBlack(emitted) && !emission_was_collected) {
-      const float mis =
-          scatter_pdf > 0
-              ? PowerHeuristic(scatter_pdf, lights_.PdfDirect(scatter_position, surface))
-              : 1;
+      const float mis = scatter_pdf > 0
+                            ? PowerHeuristic(scatter_pdf, lights_.PdfDirect(scatter_point, surface))
+                            : 1;
       path.direct += weight * emitted * (mis * share_of_rays(lights_.EmissionDensity(surface)));
     }
     std::optional<Material> textured;
@@ -723,8 +723,9 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     };
     if (properties.gathers) {
       if (parts_.lights && !is_lit_otherwise && scattered && rays_find_lights_) {
-        path.direct += ScatteredDirect(surface, wi, share * sample.pdf, medium_after,
-                                       weight * sample.weight, path.rays);
+        path.direct +=
+            ScatteredDirect(surface, LitPointOf(surface, whole, wo), wi, share * sample.pdf,
+                            medium_after, weight * sample.weight, path.rays);
       }
       const bool is_glossy = parts_.lobes && !properties.is_separable;
       path.hitpoint = hitpoint_here(is_glossy, material);
@@ -753,7 +754,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     if (!scattered) return finish();
     weight *= sample.weight;
     scatter_pdf = sample.is_delta || is_lit_otherwise ? 0 : share * sample.pdf;
-    scatter_position = surface.position;
+    if (scatter_pdf > 0) scatter_point = LitPointOf(surface, whole, wo);
     const float strength = MaxChannel(weight);
     if (!(strength > 0)) return finish();
     if (vertex > 3 && strength < kRouletteWeight) {

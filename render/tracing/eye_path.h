@@ -178,8 +178,8 @@ class EyePathTracer {
   [[nodiscard]] EyePath AtSensor(std::size_t number, const PixelSampler& sampler) const;
   // Radiance of the lights that a ray from a gathering surface meets: the half of direct light that
   // is not drawn from the lights. `weight` includes the sample's, `pdf` is its density [sr⁻¹].
-  [[nodiscard]] Rgb ScatteredDirect(const SurfacePoint& surface, Vec3 wi, float pdf,
-                                    std::int32_t medium, Rgb weight, int& rays) const;
+  [[nodiscard]] Rgb ScatteredDirect(const SurfacePoint& surface, const LitPoint& lit, Vec3 wi,
+                                    float pdf, std::int32_t medium, Rgb weight, int& rays) const;
   // The unit of radii at a hitpoint, from the width of the pixel there.
   [[nodiscard]] float RadiusUnit(const SurfacePoint& surface, float footprint) const;
   // What the camera's ray meets. False when that is nothing.

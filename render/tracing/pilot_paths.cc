@@ -52,11 +52,12 @@ class PilotPath {
     Rgb weight = hitpoint.weight * (hitpoint.is_glossy ? 1.0F : kPi);
     const float first_strength = MaxChannel(weight);
     float scatter_pdf = 0;
+    LitPoint scatter_point = {surface.position};
     // The photon's last landing is at the hitpoint, where it is not scattered.
     const int most = std::min(kMostVertices, tracer_.settings().max_depth - 1);
     for (int vertex = 0;; ++vertex) {
       const Ray ray = {LeavingPoint(surface, wi), wi, HUGE_VALF};
-      const Vec3 from = surface.position;
+      const LitPoint from = scatter_point;
       // Light that comes straight to the hitpoint needs no photons.
       const bool counts = vertex > 0 || !is_direct_sampled_;
       Hit hit;
@@ -64,8 +65,8 @@ class PilotPath {
         if (!counts) return;
         const float mis =
             scatter_pdf > 0 ? PowerHeuristic(scatter_pdf, lights_.PdfDirectInfinite(from, wi)) : 1;
-        Report(lights_.InfiniteEmitter(from, wi), {ray.origin, -wi, HUGE_VALF},
-               weight * lights_.InfiniteRadiance(from, wi) * mis);
+        Report(lights_.InfiniteEmitter(from.position, wi), {ray.origin, -wi, HUGE_VALF},
+               weight * lights_.InfiniteRadiance(from.position, wi) * mis);
         return;
       }
       surface = intersector_.SurfaceAt(ray, hit);
@@ -96,6 +97,7 @@ class PilotPath {
       if (!SidesAgree(surface, wo, wi, transmits)) return;
       weight *= sample.weight;
       scatter_pdf = sample.is_delta ? 0 : sample.pdf;
+      scatter_point = LitPointOf(surface, material, wo);
       const float strength = MaxChannel(weight) / first_strength;
       if (!(strength > 0)) return;
       if (strength < kRouletteShare) {
@@ -115,7 +117,8 @@ class PilotPath {
     const float u_fine = rng_.Uniform();
     const float u1 = rng_.Uniform();
     const float u2 = rng_.Uniform();
-    if (!lights_.SampleDirect(surface.position, FineChoice(u_choice, u_fine), u1, u2, light))
+    if (!lights_.SampleDirect(LitPointOf(surface, material, wo), FineChoice(u_choice, u_fine), u1,
+                              u2, light))
       return;
     const Vec3 wo_local = frame.ToLocal(wo);
     const Vec3 wi_local = frame.ToLocal(light.wi);

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <memory>
+#include <numbers>
 #include <vector>
 
 #include "render/frequency/spectrum.h"
@@ -41,6 +42,14 @@ class InfiniteEmission {
   // [W] of the light that enters the scene.
   [[nodiscard]] virtual Rgb Power(const BoundingSphere& scene) const {
     return MeanRadiance() * (4 * kPi * kPi * scene.radius * scene.radius);
+  }
+  // What a tree of lights knows of it; `power` [W, luminance] is its Power.
+  [[nodiscard]] virtual TreeLight InTree(double power, const BoundingSphere& scene) const {
+    const auto radius = static_cast<double>(scene.radius);
+    TreeLight in_tree;
+    in_tree.is_at_infinity = true;
+    in_tree.intensity = radius > 0 ? power / (std::numbers::pi * radius * radius) : 0;
+    return in_tree;
   }
   // The largest channel of any direction.
   [[nodiscard]] virtual float LargestRadiance() const = 0;

@@ -70,6 +70,16 @@ class PortalEmission final : public InfiniteEmission {
   }
   [[nodiscard]] Rgb MeanRadiance() const override { return sky_->MeanRadiance(); }
   [[nodiscard]] Rgb Power(const BoundingSphere& /*scene*/) const override { return power_; }
+  // As an area light: its light goes from the rectangle into the room.
+  [[nodiscard]] TreeLight InTree(double power, const BoundingSphere& /*scene*/) const override {
+    TreeLight in_tree;
+    in_tree.intensity = power / std::numbers::pi;
+    in_tree.center = corner_ + x_ * (width_ / 2) + y_ * (height_ / 2);
+    in_tree.radius = std::hypot(width_, height_) / 2;
+    in_tree.axis = -z_;
+    in_tree.cos_facing = 1;
+    return in_tree;
+  }
   [[nodiscard]] float LargestRadiance() const override { return sky_->LargestRadiance(); }
 
   [[nodiscard]] bool Sample(Vec3 from, float u1, float u2, Vec3& direction) const override {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <numbers>
 #include <type_traits>
 
 #include "render/geometry/shape_geometry.h"
@@ -309,6 +310,67 @@ void LightSet::ShareOut() {
     emitters_[i].direct_choice = static_cast<float>(direct_choice);
   }
   GroupLights(light_of, light_power);
+  PlantTree();
+}
+
+void LightSet::PlantTree() {
+  std::vector<TreeLight> lights;
+  for (std::uint32_t number = 0; number < emitters_.size(); ++number) {
+    if (!emitters_[number].is_sampled) continue;
+    emitters_[number].in_tree = static_cast<std::uint32_t>(of_tree_.size());
+    of_tree_.push_back(number);
+    lights.push_back(InTree(emitters_[number]));
+  }
+  if (lights.size() > 1) tree_.emplace(lights);
+}
+
+TreeLight LightSet::InTree(const Emitter& emitter) const {
+  TreeLight light;
+  const auto power = static_cast<double>(Luminance(emitter.power));
+  const auto one_sided = [&](Vec3 normal) {
+    light.intensity = power / std::numbers::pi;
+    light.axis = normal;
+    light.cos_facing = 1;
+  };
+  const auto of_shape = [&](const auto& shape) {
+    light.center = shape.center;
+    light.radius = shape.Reach();
+    if constexpr (std::decay_t<decltype(shape)>::kIsFlat) {
+      if (!emitter.two_sided) one_sided(shape.normal);
+    }
+  };
+  // Of what shines all around.
+  light.intensity = power / (4 * std::numbers::pi);
+  switch (emitter.kind) {
+    case Kind::kTriangle: {
+      const TriangleMesh& mesh = scene_.meshes[emitter.geometry];
+      const std::uint32_t* corner = &mesh.indices[std::size_t{3} * emitter.primitive];
+      const Vec3 p0 = mesh.positions[corner[0]];
+      const Vec3 p1 = mesh.positions[corner[1]];
+      const Vec3 p2 = mesh.positions[corner[2]];
+      light.center = CentreOf(emitter);
+      for (const Vec3 p : {p0, p1, p2})
+        light.radius = std::max(light.radius, Length(p - light.center));
+      if (!emitter.two_sided) one_sided(TriangleNormal(p0, p1, p2));
+      return light;
+    }
+#define LUCERNA_CASE(Name, list, name)        \
+  case Kind::k##Name:                         \
+    of_shape(scene_.list[emitter.primitive]); \
+    return light;
+      LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
+#undef LUCERNA_CASE
+#define LUCERNA_CASE(Name, list, name) \
+  case Kind::k##Name:                  \
+    return Name##Emission::InTree(scene_.list[emitter.primitive], emitter);
+      LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+#define LUCERNA_CASE(Name, name) case Kind::k##Name:
+      LUCERNA_INFINITE_LIGHTS(LUCERNA_CASE)
+#undef LUCERNA_CASE
+      return infinite_lights_[emitter.primitive]->InTree(power, sphere_);
+  }
+  return light;
 }
 
 void LightSet::GroupLights(const std::vector<std::size_t>& light_of,
@@ -605,10 +667,37 @@ std::optional<Spectrum> LightSet::DeltaSource(const Emission& emission, double e
   }
 }
 
-bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
+float LightSet::DirectChoice(const Emitter& emitter, float by_tree) {
+  return kShareAnywhere * emitter.direct_choice + (1 - kShareAnywhere) * by_tree;
+}
+
+float LightSet::DirectChoice(const Emitter& emitter, const LitPoint& from) const {
+  if (!tree_ || !emitter.is_sampled) return emitter.direct_choice;
+  return DirectChoice(emitter, tree_->Probability(from, emitter.in_tree));
+}
+
+bool LightSet::SampleDirect(const LitPoint& from, double u_choice, float u1, float u2,
                             LightSample& sample) const {
   if (emitters_.empty() || direct_cumulative_.back() == 0) return false;
-  const Emitter& emitter = Choose(direct_cumulative_, u_choice);
+  if (!tree_) {
+    const Emitter& emitter = Choose(direct_cumulative_, u_choice);
+    return SampleEmitter(emitter, from, emitter.direct_choice, u1, u2, sample);
+  }
+  constexpr auto kAnywhere = static_cast<double>(kShareAnywhere);
+  if (u_choice < kAnywhere) {
+    const Emitter& emitter = Choose(direct_cumulative_, u_choice / kAnywhere);
+    return SampleEmitter(emitter, from, DirectChoice(emitter, from), u1, u2, sample);
+  }
+  const std::optional<LightTree::Choice> drawn =
+      tree_->Draw(from, (u_choice - kAnywhere) / (1 - kAnywhere));
+  if (!drawn) return false;
+  const Emitter& emitter = emitters_[of_tree_[drawn->light]];
+  return SampleEmitter(emitter, from, DirectChoice(emitter, drawn->probability), u1, u2, sample);
+}
+
+bool LightSet::SampleEmitter(const Emitter& emitter, const LitPoint& lit, float choice, float u1,
+                             float u2, LightSample& sample) const {
+  const Vec3 from = lit.position;
   sample.emitter = static_cast<std::uint32_t>(&emitter - emitters_.data());
   switch (emitter.kind) {
 #define LUCERNA_CASE(Name, list, name)                                          \
@@ -618,7 +707,7 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
     sample.wi = seen.wi;                                                        \
     sample.is_distant = false;                                                  \
     sample.target = seen.target;                                                \
-    sample.pdf = emitter.direct_choice / seen.inverse_pdf;                      \
+    sample.pdf = choice / seen.inverse_pdf;                                     \
     sample.radiance_over_pdf = emitter.radiance / sample.pdf;                   \
     if (emitter.spread >= 0) {                                                  \
       const Vec2 uv = UvOf(scene_.list[emitter.primitive], seen.target);        \
@@ -629,9 +718,10 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
   }
     LUCERNA_ANALYTIC_SHAPES(LUCERNA_CASE)
 #undef LUCERNA_CASE
-#define LUCERNA_CASE(Name, list, name) \
-  case Kind::k##Name:                  \
-    return Name##Emission::SampleDirect(scene_.list[emitter.primitive], emitter, from, sample);
+#define LUCERNA_CASE(Name, list, name)                                                         \
+  case Kind::k##Name:                                                                          \
+    return Name##Emission::SampleDirect(scene_.list[emitter.primitive], emitter, choice, from, \
+                                        sample);
     LUCERNA_DELTA_LIGHTS(LUCERNA_CASE)
 #undef LUCERNA_CASE
 #define LUCERNA_CASE(Name, name) case Kind::k##Name:
@@ -640,7 +730,7 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
     if (!infinite_lights_[emitter.primitive]->Sample(from, u1, u2, sample.wi)) return false;
     sample.is_distant = true;
     // Whichever drew it, light from this direction is that of all infinite lights.
-    sample.pdf = PdfDirectInfinite(from, sample.wi);
+    sample.pdf = PdfDirectInfinite(lit, sample.wi);
     if (!(sample.pdf > 0)) return false;
     sample.radiance_over_pdf = InfiniteRadiance(from, sample.wi) / sample.pdf;
     return true;
@@ -670,7 +760,7 @@ bool LightSet::SampleDirect(Vec3 from, double u_choice, float u1, float u2,
   if (!(cosine > 0)) return false;
   sample.is_distant = false;
   sample.target = position + normal * clearance;
-  sample.pdf = emitter.direct_choice * distance2 / (cosine * emitter.area);
+  sample.pdf = choice * distance2 / (cosine * emitter.area);
   if (emitter.spread >= 0) sample.pdf *= density;
   sample.radiance_over_pdf =
       (emitter.spread >= 0 ? PictureRadiance(emitter, UvOn(emitter, u1, u2, position))
@@ -750,20 +840,22 @@ const Emitter* LightSet::EmitterOf(const SurfacePoint& point) const {
   return &emitters_[static_cast<std::size_t>(number)];
 }
 
-float LightSet::PdfDirect(Vec3 from, const SurfacePoint& point) const {
+float LightSet::PdfDirect(const LitPoint& lit, const SurfacePoint& point) const {
   const Emitter* emitter = EmitterOf(point);
   if (emitter == nullptr) return 0;
+  const Vec3 from = lit.position;
+  const float choice = DirectChoice(*emitter, lit);
   if (emitter->kind != Kind::kTriangle) {
     const float inverse_pdf =
         VisitShape(scene_, KindOf(scene_, point.geometry), point.primitive,
                    [&](const auto& shape) { return SeenInversePdf(shape, from); });
-    if (inverse_pdf > 0) return emitter->direct_choice / inverse_pdf;
+    if (inverse_pdf > 0) return choice / inverse_pdf;
   }
   const Vec3 to = point.position - from;
   const float distance2 = LengthSquared(to);
   const float cosine = std::abs(Dot(to, point.geometric_normal)) / std::sqrt(distance2);
   if (!(cosine > 0)) return 0;
-  const float pdf = emitter->direct_choice * distance2 / (cosine * emitter->area);
+  const float pdf = choice * distance2 / (cosine * emitter->area);
   return emitter->spread >= 0 ? pdf * SpreadAt(*emitter, point) : pdf;
 }
 
@@ -806,12 +898,13 @@ Rgb LightSet::InfiniteRadiance(Vec3 from, Vec3 direction) const {
   return radiance;
 }
 
-float LightSet::PdfDirectInfinite(Vec3 from, Vec3 direction) const {
+float LightSet::PdfDirectInfinite(const LitPoint& from, Vec3 direction) const {
   if (emitters_.empty()) return 0;
   float pdf = 0;
-  for (std::size_t i = 0; i < infinite_lights_.size(); ++i)
-    pdf +=
-        infinite_lights_[i]->Density(from, direction, emitters_[first_infinite_ + i].direct_choice);
+  for (std::size_t i = 0; i < infinite_lights_.size(); ++i) {
+    pdf += infinite_lights_[i]->Density(from.position, direction,
+                                        DirectChoice(emitters_[first_infinite_ + i], from));
+  }
   return pdf;
 }
 

@@ -23,6 +23,7 @@
 #include "render/math/vector.h"
 #include "render/scene/scene.h"
 #include "render/scene/shape_lists.h"
+#include "render/transport/light_tree.h"
 #include "render/transport/picture_spread.h"
 #include "render/transport/primary_numbers.h"
 #include "render/transport/unreachable_lights.h"
@@ -63,9 +64,10 @@ struct Emitter {
   bool is_sampled = true;     // for direct light
   std::int32_t spread = -1;   // of an area light with a picture: index of its spread
   float area = 0;
-  float choice = 0;         // probability for a photon: its share of the power
-  float direct_choice = 0;  // probability for direct light
-  Rgb radiance;             // or intensity, or irradiance, or what a picture is multiplied by
+  float choice = 0;           // probability for a photon: its share of the power
+  float direct_choice = 0;    // probability for direct light, wherever it arrives
+  std::uint32_t in_tree = 0;  // number in the tree of lights, if there is one
+  Rgb radiance;               // or intensity, or irradiance, or what a picture is multiplied by
   Rgb power;
   const Uplift* uplift = nullptr;  // of the scene
   std::uint8_t light = 0;          // index into LightSet::lights()
@@ -164,16 +166,17 @@ class LightSet {
   [[nodiscard]] std::optional<Spectrum> DeltaSource(const Emission& emission, double edge_strength,
                                                     const SpectrumLimits& limits) const;
 
-  // Draws light arriving at `from`, without a test whether anything is in the way. False when the
+  // Draws light arriving at `from`, without a test whether anything is in the way: of several
+  // emitters one by what each brings there, but for kShareAnywhere of the choice. False when the
   // drawn emitter sends nothing there.
-  [[nodiscard]] bool SampleDirect(Vec3 from, double u_choice, float u1, float u2,
+  [[nodiscard]] bool SampleDirect(const LitPoint& from, double u_choice, float u1, float u2,
                                   LightSample& sample) const;
 
   // Radiance that `point` sends towards `wo`.
   [[nodiscard]] Rgb EmittedRadiance(const SurfacePoint& point, Vec3 wo) const;
   // The density with which SampleDirect, seen from `from`, draws the emitting `point`
   // [choice × sr⁻¹].
-  [[nodiscard]] float PdfDirect(Vec3 from, const SurfacePoint& point) const;
+  [[nodiscard]] float PdfDirect(const LitPoint& from, const SurfacePoint& point) const;
 
   // The density with which photons leave `point`, in every direction into which it emits (see
   // Emission::density).
@@ -184,7 +187,7 @@ class LightSet {
   // Radiance of all infinite lights that arrives at `from` from a direction in which no shape is.
   [[nodiscard]] Rgb InfiniteRadiance(Vec3 from, Vec3 direction) const;
   // The density with which SampleDirect draws a direction by any of them [choice × sr⁻¹].
-  [[nodiscard]] float PdfDirectInfinite(Vec3 from, Vec3 direction) const;
+  [[nodiscard]] float PdfDirectInfinite(const LitPoint& from, Vec3 direction) const;
   // [those that are not black], in the order of Emitter::primitive; see
   // transport/infinite_emission.h.
   [[nodiscard]] const std::vector<std::shared_ptr<InfiniteEmission>>& infinite_lights() const {
@@ -196,6 +199,15 @@ class LightSet {
 
   // Fills in the choices of all emitters.
   void ShareOut();
+  void PlantTree();
+  [[nodiscard]] TreeLight InTree(const Emitter& emitter) const;
+  // The probability with which SampleDirect draws it.
+  [[nodiscard]] float DirectChoice(const Emitter& emitter, const LitPoint& from) const;
+  // The same for a share `by_tree` of the tree's choices.
+  [[nodiscard]] static float DirectChoice(const Emitter& emitter, float by_tree);
+  // Light from one emitter over `choice`; see SampleDirect.
+  [[nodiscard]] bool SampleEmitter(const Emitter& emitter, const LitPoint& from, float choice,
+                                   float u1, float u2, LightSample& sample) const;
   // Fills in lights(), given for each emitter the light it belongs to and the power of each light.
   void GroupLights(const std::vector<std::size_t>& light_of,
                    const std::vector<double>& light_power);
@@ -226,6 +238,9 @@ class LightSet {
   BoundingSphere sphere_;
   std::vector<Emitter> emitters_;
   std::vector<double> cumulative_, direct_cumulative_;  // [emitters] of the choices
+  // Of the emitters that are sampled, where there are several.
+  std::optional<LightTree> tree_;
+  std::vector<std::uint32_t> of_tree_;  // [lights of the tree] emitters
   // [meshes]: number of the first emitter, or -1.
   std::vector<std::int64_t> first_emitter_;
   // [shapes of a kind]: number of its emitter, or -1.
@@ -239,6 +254,9 @@ class LightSet {
   float largest_of_areas_ = 0;
 };
 
+// The share of direct light for which emitters are chosen by power, and evenly among lights,
+// wherever it arrives: what the tree takes for the strongest light may be behind a wall.
+inline constexpr float kShareAnywhere = 0.25F;
 // The share of photons that is even among the lights of a scene with several.
 inline constexpr double kEvenPhotonShare = 0.05;
 // One billionth of a quantum, for which photons of about the whole power are made.

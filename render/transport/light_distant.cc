@@ -29,13 +29,20 @@ void DistantEmission::FindNumbers(const DistantLight& light, const BoundingSpher
   u.place2 = place.y;
 }
 
-bool DistantEmission::SampleDirect(const DistantLight& light, const Emitter& emitter, Vec3 /*from*/,
-                                   LightSample& sample) {
+bool DistantEmission::SampleDirect(const DistantLight& light, const Emitter& emitter, float choice,
+                                   Vec3 /*from*/, LightSample& sample) {
   sample.wi = -light.direction;
   sample.is_distant = true;
-  sample.radiance_over_pdf = emitter.radiance / emitter.direct_choice;
+  sample.radiance_over_pdf = emitter.radiance / choice;
   sample.pdf = 0;
   return true;
+}
+
+TreeLight DistantEmission::InTree(const DistantLight& /*light*/, const Emitter& emitter) {
+  TreeLight in_tree;
+  in_tree.is_at_infinity = true;
+  in_tree.intensity = static_cast<double>(Luminance(emitter.radiance));
+  return in_tree;
 }
 
 Spectrum DistantEmission::Source(const DistantLight& /*light*/, const Emitter& /*emitter*/,

@@ -1,6 +1,7 @@
 // Light from a point whose intensity is a picture over the directions.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "render/math/equal_area_square.h"
 #include "render/math/warp.h"
@@ -61,7 +62,7 @@ void GoniometricEmission::FindNumbers(const GoniometricLight& light,
 }
 
 bool GoniometricEmission::SampleDirect(const GoniometricLight& light, const Emitter& emitter,
-                                       Vec3 from, LightSample& sample) {
+                                       float choice, Vec3 from, LightSample& sample) {
   const Vec3 to = light.position - from;
   const float distance2 = LengthSquared(to);
   if (!(distance2 > 0)) return false;
@@ -69,9 +70,16 @@ bool GoniometricEmission::SampleDirect(const GoniometricLight& light, const Emit
   sample.target = light.position;
   sample.wi = to / std::sqrt(distance2);
   const float factor = FactorAt(light, -sample.wi);
-  sample.radiance_over_pdf = emitter.radiance * (factor / (distance2 * emitter.direct_choice));
+  sample.radiance_over_pdf = emitter.radiance * (factor / (distance2 * choice));
   sample.pdf = 0;
   return factor > 0;
+}
+
+TreeLight GoniometricEmission::InTree(const GoniometricLight& light, const Emitter& emitter) {
+  TreeLight in_tree;
+  in_tree.intensity = static_cast<double>(Luminance(emitter.power)) / (4 * std::numbers::pi);
+  in_tree.center = light.position;
+  return in_tree;
 }
 
 // The picture's own detail is not looked at.

@@ -7,7 +7,8 @@
 //   FindNumbers     Sets those of the numbers that matter to what SampleEmission draws the photon
 //                   with that leaves along `ray`, about. At infinity the ray may begin anywhere on
 //                   its line.
-//   SampleDirect    Light that arrives at `from`; see LightSet::SampleDirect.
+//   SampleDirect    Light that arrives at `from`, over `choice`; see LightSet::SampleDirect.
+//   InTree          What a tree of lights knows of it (transport/light_tree.h).
 //   Source          The spectrum of a photon that `emission` has drawn. `edge_strength`: see
 //                   frequency/bandwidth.h.
 #pragma once
@@ -31,8 +32,9 @@ struct EmissionNumbers {  // in [0, 1)
                                Emission& emission);                                                \
     static void FindNumbers(const Name##Light& light, const BoundingSphere& scene, const Ray& ray, \
                             EmissionNumbers& u);                                                   \
-    static bool SampleDirect(const Name##Light& light, const Emitter& emitter, Vec3 from,          \
-                             LightSample& sample);                                                 \
+    static bool SampleDirect(const Name##Light& light, const Emitter& emitter, float choice,       \
+                             Vec3 from, LightSample& sample);                                      \
+    static TreeLight InTree(const Name##Light& light, const Emitter& emitter);                     \
     static Spectrum Source(const Name##Light& light, const Emitter& emitter,                       \
                            const Emission& emission, double edge_strength,                         \
                            const SpectrumLimits& limits);                                          \

@@ -25,16 +25,23 @@ void PointEmission::FindNumbers(const PointLight& /*light*/, const BoundingSpher
   u.direction2 = direction.y;
 }
 
-bool PointEmission::SampleDirect(const PointLight& light, const Emitter& emitter, Vec3 from,
-                                 LightSample& sample) {
+bool PointEmission::SampleDirect(const PointLight& light, const Emitter& emitter, float choice,
+                                 Vec3 from, LightSample& sample) {
   const Vec3 to = light.position - from;
   const float distance2 = LengthSquared(to);
   sample.is_distant = false;
   sample.target = light.position;
   sample.wi = to / std::sqrt(distance2);
-  sample.radiance_over_pdf = emitter.radiance / (distance2 * emitter.direct_choice);
+  sample.radiance_over_pdf = emitter.radiance / (distance2 * choice);
   sample.pdf = 0;
   return distance2 > 0;
+}
+
+TreeLight PointEmission::InTree(const PointLight& light, const Emitter& emitter) {
+  TreeLight in_tree;
+  in_tree.intensity = static_cast<double>(Luminance(emitter.radiance));
+  in_tree.center = light.position;
+  return in_tree;
 }
 
 Spectrum PointEmission::Source(const PointLight& /*light*/, const Emitter& /*emitter*/,

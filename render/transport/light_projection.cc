@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "render/math/warp.h"
 #include "render/transport/light_kinds.h"
@@ -61,7 +62,7 @@ void ProjectionEmission::FindNumbers(const ProjectionLight& light, const Boundin
 }
 
 bool ProjectionEmission::SampleDirect(const ProjectionLight& light, const Emitter& emitter,
-                                      Vec3 from, LightSample& sample) {
+                                      float choice, Vec3 from, LightSample& sample) {
   const Vec3 to = light.position - from;
   const float distance2 = LengthSquared(to);
   if (!(distance2 > 0)) return false;
@@ -69,9 +70,25 @@ bool ProjectionEmission::SampleDirect(const ProjectionLight& light, const Emitte
   sample.target = light.position;
   sample.wi = to / std::sqrt(distance2);
   const Rgb factor = light.FactorAt(-sample.wi, emitter.uplift);
-  sample.radiance_over_pdf = emitter.radiance * factor * (1 / (distance2 * emitter.direct_choice));
+  sample.radiance_over_pdf = emitter.radiance * factor * (1 / (distance2 * choice));
   sample.pdf = 0;
   return !IsBlack(factor);
+}
+
+TreeLight ProjectionEmission::InTree(const ProjectionLight& light, const Emitter& emitter) {
+  // As bright as if all its power went evenly into the cone around its picture.
+  const double corner2 =
+      static_cast<double>(light.half_width) * static_cast<double>(light.half_width) +
+      static_cast<double>(light.half_height) * static_cast<double>(light.half_height);
+  const double cos_corner = 1 / std::sqrt(1 + corner2);
+  TreeLight in_tree;
+  in_tree.intensity =
+      static_cast<double>(Luminance(emitter.power)) / (2 * std::numbers::pi * (1 - cos_corner));
+  in_tree.center = light.position;
+  in_tree.axis = light.axes.z;
+  in_tree.cos_facing = static_cast<float>(cos_corner);
+  in_tree.cos_reach = 1 - 1e-4F;
+  return in_tree;
 }
 
 // The picture's own detail is not looked at.

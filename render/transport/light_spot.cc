@@ -46,17 +46,28 @@ void SpotEmission::FindNumbers(const SpotLight& spot, const BoundingSphere& /*sc
   u.direction2 = direction.y;
 }
 
-bool SpotEmission::SampleDirect(const SpotLight& spot, const Emitter& emitter, Vec3 from,
-                                LightSample& sample) {
+bool SpotEmission::SampleDirect(const SpotLight& spot, const Emitter& emitter, float choice,
+                                Vec3 from, LightSample& sample) {
   const Vec3 to = spot.position - from;
   const float distance2 = LengthSquared(to);
   sample.is_distant = false;
   sample.target = spot.position;
   sample.wi = to / std::sqrt(distance2);
   const float falloff = SpotFalloff(spot, -Dot(sample.wi, spot.direction));
-  sample.radiance_over_pdf = emitter.radiance * (falloff / (distance2 * emitter.direct_choice));
+  sample.radiance_over_pdf = emitter.radiance * (falloff / (distance2 * choice));
   sample.pdf = 0;
   return distance2 > 0 && falloff > 0;
+}
+
+TreeLight SpotEmission::InTree(const SpotLight& spot, const Emitter& emitter) {
+  TreeLight in_tree;
+  in_tree.intensity = static_cast<double>(Luminance(emitter.radiance));
+  in_tree.center = spot.position;
+  in_tree.axis = spot.direction;
+  in_tree.cos_facing = spot.cos_total_width;
+  // It ends at its cone.
+  in_tree.cos_reach = 1 - 1e-4F;
+  return in_tree;
 }
 
 Spectrum SpotEmission::Source(const SpotLight& spot, const Emitter& emitter,

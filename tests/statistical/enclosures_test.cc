@@ -176,7 +176,7 @@ TEST(LeftOutTest, NoLightThatIsNotSampledIsInSight) {
           continue;
         }
         LightSample light;
-        if (!set.SampleDirect(surface.position, 0.5, random.rng.Uniform(), random.rng.Uniform(),
+        if (!set.SampleDirect({surface.position}, 0.5, random.rng.Uniform(), random.rng.Uniform(),
                               light)) {
           continue;
         }

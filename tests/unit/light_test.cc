@@ -110,6 +110,13 @@ Scene PortalSky() {
   scene.infinite_lights.push_back(light);
   return scene;
 }
+// Among other lights, a wall of both sides among them.
+Scene PortalAmongLights() {
+  Scene scene = PortalSky();
+  AddSphere(scene, {-2, 0, 1}, 0.3F, 0, AddAreaLight(scene, 20));
+  AddQuad(scene, {1, -2, -2}, {0, 0.5F, 0.5F}, {1, 0, 0}, 0, AddAreaLight(scene, 2, true));
+  return scene;
+}
 Scene Mixed() {
   Scene scene = QuadLight();
   AddSphere(scene, {-2, 0, 1}, 0.3F, 0, AddAreaLight(scene, 20));
@@ -128,6 +135,7 @@ const std::vector<std::pair<const char*, Scene (*)()>> kLights = {
     {"sphere with a picture", &PictureSphere},
     {"two-sided ring with a picture", &PictureRing},
     {"portal", &PortalSky},
+    {"portal among lights", &PortalAmongLights},
     {"several", &Mixed}};
 
 // The density of drawing `wi` from the origin, by asking what lies there.
@@ -592,8 +600,8 @@ TEST(SampleEmissionTest, FillsTheSceneFromInfinity) {
   EXPECT_NEAR(through, expected, 4 * std::sqrt(squares / kPhotons));
 }
 
-// Of two lights as bright at the origin, one has 1e-12 of the power: a twentieth of the samples go
-// to it, where its power would send none.
+// Of two lights as bright at the origin, one has 1e-12 of the power: half of what is not drawn
+// anywhere alike goes to it, and of the rest a twentieth, where its power would send none.
 TEST(SampleDirectTest, FindsANearLightBesideAFarOneOfAllThePower) {
   Scene scene = BlackRoom();
   scene.point_lights.push_back({{0, 0, 1}, Gray(1)});
@@ -602,16 +610,55 @@ TEST(SampleDirectTest, FindsANearLightBesideAFarOneOfAllThePower) {
   KeyedRng rng(3);
   int near = 0;
   constexpr int kSamples = 10000;
+  constexpr double kShare =
+      static_cast<double>(kShareAnywhere) / 20 + (1 - static_cast<double>(kShareAnywhere)) / 2;
   for (int i = 0; i < kSamples; ++i) {
     LightSample sample;
     const float u = rng.Uniform();
     ASSERT_TRUE(lit.lights.SampleDirect({0, 0, 0}, static_cast<double>(u), 0, 0, sample));
     if (sample.wi.z < 0.5F) continue;
     ++near;
-    EXPECT_NEAR(sample.radiance_over_pdf.g, 20, 1e-3);
+    EXPECT_NEAR(sample.radiance_over_pdf.g, 1 / kShare, 1e-3);
   }
   // Five standard deviations.
-  EXPECT_NEAR(near, kSamples / 20, 5 * std::sqrt(kSamples / 20.0));
+  EXPECT_NEAR(near, kSamples * kShare, 5 * std::sqrt(kSamples * kShare));
+}
+
+// Many lights, each of which brings about the same to a point near it and little elsewhere: one
+// sample is close to the sum, whatever is drawn.
+TEST(SampleDirectTest, DrawsAmongManyLightsByWhatTheyBring) {
+  Scene scene = BlackRoom();
+  KeyedRng places(7);
+  for (int i = 0; i < 400; ++i) {
+    const float x = 20 * places.Uniform() - 10;
+    const float y = 20 * places.Uniform() - 10;
+    scene.point_lights.push_back({{x, y, 1}, Gray(1 + 9 * places.Uniform())});
+  }
+  const Lit lit(std::move(scene));
+  const LitPoint floor = {{1, -2, 0}, {0, 0, 1}};
+  double sum = 0;
+  double by_power = 0;
+  for (std::uint32_t i = 0; i < lit.lights.size(); ++i) {
+    const PointLight& light = lit.scene->point_lights[i];
+    const Vec3 to = light.position - floor.position;
+    const auto brings =
+        static_cast<double>(light.intensity.g * to.z / (LengthSquared(to) * Length(to)));
+    sum += brings;
+    by_power += brings * brings / static_cast<double>(lit.lights.emitter(i).direct_choice);
+  }
+  by_power /= sum * sum;
+  double mean = 0;
+  double squares = 0;
+  constexpr int kSamples = 100000;
+  for (int i = 0; i < kSamples; ++i) {
+    LightSample sample;
+    ASSERT_TRUE(lit.lights.SampleDirect(floor, (i + 0.5) / kSamples, 0, 0, sample));
+    const double value = static_cast<double>(sample.radiance_over_pdf.g * sample.wi.z) / sum;
+    mean += value / kSamples;
+    squares += value * value / kSamples;
+  }
+  EXPECT_NEAR(mean, 1, 1e-3);
+  EXPECT_LT(squares - 1, (by_power - 1) / 8);
 }
 
 // What a job leaves out gets nothing, and the rest shares what there is.

@@ -100,7 +100,7 @@ std::array<double, 2> Irradiance(const LightSet& lights, Vec3 from, int samples)
     LightSample sample;
     const auto choice = static_cast<double>(rng.Uniform());
     const float u1 = rng.Uniform();
-    if (!lights.SampleDirect(from, choice, u1, rng.Uniform(), sample)) continue;
+    if (!lights.SampleDirect({from}, choice, u1, rng.Uniform(), sample)) continue;
     const auto value =
         static_cast<double>(Luminance(sample.radiance_over_pdf) * std::max(sample.wi.z, 0.0F));
     sum += value / samples;

@@ -12,11 +12,10 @@
 
 #include "render/geometry/feature_edges.h"
 #include "render/math/rng.h"
+#include "render/math/warp.h"
 
 namespace lucerna {
 namespace {
-
-constexpr double kPi = 3.14159265358979;
 
 struct Mesh {
   std::vector<Vec3> positions;
@@ -48,7 +47,7 @@ struct Mesh {
 std::vector<Vec3> BoardProfile(double width, double radius, std::uint32_t strips, double depth) {
   std::vector<Vec3> profile = {{static_cast<float>(-width), 0, 0}};
   for (std::uint32_t i = 0; i <= strips; ++i) {
-    const double angle = kPi / 2 * i / strips;
+    const double angle = kPi64 / 2 * i / strips;
     profile.push_back({static_cast<float>(radius * std::sin(angle)), 0,
                        static_cast<float>(radius * (std::cos(angle) - 1))});
   }
@@ -92,10 +91,10 @@ TEST(RoundedBordersTest, HaveACrestWhereTheyHaveTurnedByHalfARightAngle) {
       const double limit = std::acos(static_cast<double>(kSameSurfaceCosine));
       for (std::uint32_t strip = 0; strip <= strips; ++strip) {
         // The edge above this strip, or above the side.
-        const double above = strip == 0 ? 0 : kPi / 2 * (strip - 0.5) / strips;
-        const double below = strip == strips ? kPi / 2 : kPi / 2 * (strip + 0.5) / strips;
+        const double above = strip == 0 ? 0 : kPi64 / 2 * (strip - 0.5) / strips;
+        const double below = strip == strips ? kPi64 / 2 : kPi64 / 2 * (strip + 0.5) / strips;
         if ((above < limit && below > limit) ||
-            (kPi / 2 - below < limit && kPi / 2 - above > limit))
+            (kPi64 / 2 - below < limit && kPi64 / 2 - above > limit))
           expected.push_back(strip + 1);
       }
       EXPECT_EQ(RowsOf(mesh.Crests(), rows, kColumns), expected);
@@ -139,7 +138,7 @@ TEST(RoundedBordersTest, AreNotWhereAllIsBentAlike) {
   for (const std::uint32_t sides : {9U, 12U, 32U, 200U}) {
     std::vector<Vec3> profile;
     for (std::uint32_t i = 0; i <= sides; ++i) {
-      const double angle = 2 * kPi * i / sides;
+      const double angle = 2 * kPi64 * i / sides;
       profile.push_back(
           {static_cast<float>(std::cos(angle)), 0, static_cast<float>(std::sin(angle))});
     }
