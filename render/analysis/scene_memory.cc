@@ -26,7 +26,7 @@ constexpr double kTreeMesh = 520;
 constexpr double kTreeInstance = 430;
 constexpr double kBuildingPrimitive = 36;  // beside the tree
 // Of the set of lights, with the tree of those that are sampled, and while that is made.
-constexpr double kEmitter = 300;
+constexpr double kEmitter = 320;
 // Of feature edges: a segment, with the tree; and while they are found.
 constexpr double kSegment = 52;
 constexpr double kEdgesPerTriangle = 77, kEdgesPerVertex = 28, kEdgesPerMesh = 24;

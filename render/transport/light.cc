@@ -5,6 +5,7 @@
 #include <iterator>
 #include <numbers>
 #include <type_traits>
+#include <utility>
 
 #include "render/geometry/shape_geometry.h"
 #include "render/geometry/surface_uv.h"
@@ -321,7 +322,7 @@ void LightSet::PlantTree() {
     of_tree_.push_back(number);
     lights.push_back(InTree(emitters_[number]));
   }
-  if (lights.size() > 1) tree_.emplace(lights);
+  if (lights.size() > 1) tree_.emplace(std::move(lights));
 }
 
 TreeLight LightSet::InTree(const Emitter& emitter) const {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cfloat>
 #include <cmath>
-#include <numeric>
+#include <numbers>
 
 #include "render/base/status.h"
 
@@ -89,17 +89,16 @@ std::size_t Cut(std::span<const TreeLight> lights, std::span<std::uint32_t> numb
 
 }  // namespace
 
-LightTree::LightTree(std::span<const TreeLight> lights)
+LightTree::LightTree(std::vector<TreeLight> lights)
     : paths_(lights.size()), weight_of_distant_(lights.size()) {
   LUCERNA_CHECK(!lights.empty() && lights.size() < kLight);
   // In a unit of their own, so that no scene is too bright or too dark for a float.
   double largest = 0;
   for (const TreeLight& light : lights)
     largest = std::max(largest, light.intensity);
-  std::vector<TreeLight> relative(lights.begin(), lights.end());
   std::vector<std::uint32_t> placed;
-  for (std::uint32_t number = 0; number < relative.size(); ++number) {
-    TreeLight& light = relative[number];
+  for (std::uint32_t number = 0; number < lights.size(); ++number) {
+    TreeLight& light = lights[number];
     if (largest > 0) light.intensity /= largest;
     if (!light.is_at_infinity) {
       placed.push_back(number);
@@ -113,7 +112,7 @@ LightTree::LightTree(std::span<const TreeLight> lights)
   if (placed.empty()) {
     nodes_.emplace_back();
   } else {
-    Build(relative, placed, 0, 0);
+    Build(lights, placed, 0, 0);
   }
 }
 

@@ -49,7 +49,7 @@ struct TreeLight {
 class LightTree {
  public:
   // Lights are numbered as they stand in `lights`. Requires that there are some.
-  explicit LightTree(std::span<const TreeLight> lights);
+  explicit LightTree(std::vector<TreeLight> lights);
 
   struct Choice {
     std::uint32_t light = 0;

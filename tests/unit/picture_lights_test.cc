@@ -60,7 +60,8 @@ struct Lit {
   [[nodiscard]] double IntensityAt(Vec3 direction) const {
     LightSample sample;
     constexpr float kDistance = 2;
-    if (!lights->SampleDirect({Normalize(direction) * kDistance}, 0.5, 0.5F, 0.5F, sample)) return 0;
+    if (!lights->SampleDirect({Normalize(direction) * kDistance}, 0.5, 0.5F, 0.5F, sample))
+      return 0;
     return static_cast<double>(Luminance(sample.radiance_over_pdf)) * 4;
   }
 
