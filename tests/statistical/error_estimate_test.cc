@@ -17,12 +17,13 @@ struct EstimatedScene {
   const char* file;
   // The most by which the estimate may be too large.
   double most;
+  int renders = 200;
 };
 
 class ErrorEstimateTest : public testing::TestWithParam<EstimatedScene> {};
 
 TEST_P(ErrorEstimateTest, IsTrueAndItsIntervalsHoldTheTruthAtAllLooks) {
-  const StudySize size;
+  const StudySize size = {.renders = GetParam().renders};
   const Scene scene = LoadScene(GetParam().file);
   const ErrorStudy study = StudyErrors(scene, HalvedReference(scene, size.side, 200, 10), size);
   RecordProperty("covered", study.Covered());
@@ -37,9 +38,12 @@ TEST_P(ErrorEstimateTest, IsTrueAndItsIntervalsHoldTheTruthAtAllLooks) {
 // safe side: bias is relative to values that are guessed from few photons, and the mean of 1/x²
 // over noisy x is too large. Giving noise more weight in the guess mends that and makes the
 // estimate too small at hard shadows (0.7), which is worse.
+//
+// Rare bright paths decide whether the interval of a caustic holds: of four sets of 200 renders 188
+// to 197 did, 773 of all 800, so that 200 are too few to tell.
 INSTANTIATE_TEST_SUITE_P(Scenes, ErrorEstimateTest,
                          testing::Values(EstimatedScene{"penumbra.pbrt", 1.25},
-                                         EstimatedScene{"caustic.pbrt", 1.25},
+                                         EstimatedScene{"caustic.pbrt", 1.25, 400},
                                          EstimatedScene{"glass-box.pbrt", 1.25},
                                          EstimatedScene{"water-sun.pbrt", 1.35}),
                          [](const auto& scene) {
