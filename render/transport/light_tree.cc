@@ -63,6 +63,13 @@ TreeLight Together(std::span<const TreeLight> lights, std::span<const std::uint3
   return all;
 }
 
+// With `beside`, of what has no child.
+float SumOf(std::span<const float> weights, float beside) {
+  for (const float weight : weights)
+    beside += weight;
+  return beside;
+}
+
 float Along(Vec3 p, int axis) {
   return axis == 0 ? p.x : axis == 1 ? p.y : p.z;
 }
@@ -219,9 +226,7 @@ std::optional<LightTree::Choice> LightTree::Draw(const LitPoint& from, double u)
   for (bool is_root = true;; is_root = false) {
     const Node& node = nodes_[number];
     const Lanes weights = Weights(node, from);
-    float sum = is_root ? distant_sum_ : 0;
-    for (const float weight : weights)
-      sum += weight;
+    const float sum = SumOf(weights, is_root ? distant_sum_ : 0);
     if (!(sum > 0)) return std::nullopt;
     double rest = u * static_cast<double>(sum);
     // Rounding may leave the end to none: the last one that may be drawn has it.
@@ -254,9 +259,7 @@ float LightTree::Probability(const LitPoint& from, std::uint32_t light) const {
   for (bool is_root = true;; is_root = false) {
     const Node& node = nodes_[number];
     const Lanes weights = Weights(node, from);
-    float sum = is_root ? distant_sum_ : 0;
-    for (const float weight : weights)
-      sum += weight;
+    const float sum = SumOf(weights, is_root ? distant_sum_ : 0);
     if (!(sum > 0)) return 0;
     if (weight_of_distant_[light] > 0) return weight_of_distant_[light] / sum;
     const std::size_t slot = path & (kWidth - 1);

@@ -8,7 +8,7 @@ Writes four scenes as pbrt files without other files; the same call writes the s
   many     300 small balls in a room, of radiances that differ by a hundred
   strips   twelve tubes, six spots, sun and sky
   rooms    25 rooms with a ball each and gaps between them, seen from the middle one
-  hidden   a lamp in the room and two just behind its wall, one of them twice as strong: what a
+  hidden   a light in the room and two just behind its wall, one of them twice as strong: what a
            choice that knows of no walls does worst
 """
 import argparse

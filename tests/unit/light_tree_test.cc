@@ -44,7 +44,7 @@ Vec3 Direction(KeyedRng& rng) {
   return SquareToSphere(u, rng.Uniform());
 }
 
-// Lamps, panels, spots and two lights at infinity, of powers that differ by 10^4.
+// Points, balls, panels, spots and two lights at infinity, of powers that differ by 10^4.
 std::vector<TreeLight> MixedLights(std::size_t count, KeyedRng& rng) {
   std::vector<TreeLight> lights;
   for (std::size_t i = 0; i < count; ++i) {
