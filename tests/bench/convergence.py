@@ -48,7 +48,7 @@ REFERENCES = {
     "b-beads-1": ("2px", 4, 12500),
     "b-checkers-1": ("2px", 4, 28100),
     "b-emitters-1": ("2px", 4, 28300),
-    "b-emitters-2": ("2px", 1, 40000),
+    "b-emitters-2": ("2px", 1, 64000),
     "b-enclosed-1": ("2px", 16, 4800),
     "b-glossy-1": ("2px", 1, 64600),
     "b-glossy-2": ("2px", 4, 24300),
