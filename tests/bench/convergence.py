@@ -41,7 +41,9 @@ BIN = ROOT / "build/release/bin"
 OWN = ["hard-shadow", "penumbra", "water-sun", "pool", "caustic", "cardioid", "corner",
        "glass-box", "glass-sphere", "lamp-in-glass", "rough-metal", "textured"]
 # First radius, photons a pixel and pass, and passes of both halves. One pixel where much of the
-# light has edges. The numbers follow from the noise of a few seconds: of photons a pass the best of
+# light has edges. Those of cardioid and hard-shadow that are kept were made by a build whose early
+# passes count less on edges (docs/measurements/references.md): made again, they have more bias. The
+# numbers follow from the noise of a few seconds: of photons a pass the best of
 # 1, 4 and 16, and as many passes as should bring the squared noise to 0.08 to 0.1 of what was judged.
 REFERENCES = {
     "b-bars-1": ("2px", 16, 9500),
