@@ -40,11 +40,12 @@ DOCS = ROOT / "docs"
 BIN = ROOT / "build/release/bin"
 OWN = ["hard-shadow", "penumbra", "water-sun", "pool", "caustic", "cardioid", "corner",
        "glass-box", "glass-sphere", "lamp-in-glass", "rough-metal", "textured"]
-# First radius, photons a pixel and pass, and passes of both halves. One pixel where much of the
-# light has edges. Those of cardioid and hard-shadow that are kept were made by a build whose early
-# passes count less on edges (docs/measurements/references.md): made again, they have more bias. The
-# numbers follow from the noise of a few seconds: of photons a pass the best of
-# 1, 4 and 16, and as many passes as should bring the squared noise to 0.08 to 0.1 of what was judged.
+# First radius, photons a pixel and pass, and passes of both halves. One pixel where much of the light
+# has edges; none where those are seen directly and photons find them: lucerna-light-reference makes
+# images without the kernel's blur (docs/measurements/references.md). The numbers follow from the
+# noise of a few seeds: of photons a pass the best of 1, 4 and 16, and as many passes as should bring
+# the squared noise to 0.08 to 0.1 of what was judged.
+LIGHT_TRACED = None
 REFERENCES = {
     "b-bars-1": ("2px", 16, 9500),
     "b-beads-1": ("2px", 4, 12500),
@@ -58,18 +59,18 @@ REFERENCES = {
     "b-holes-2": ("2px", 4, 60000),
     "b-waves-1": ("1px", 4, 13000),
     "b-waves-2": ("1px", 4, 6000),
-    "cardioid": ("0.5px", 4, 6000),
+    "cardioid": (LIGHT_TRACED, 4, 1000),
     "caustic": ("1px", 4, 72000),
     "corner": ("2px", 16, 27600),
     "glass-box": ("2px", 4, 21400),
     "glass-sphere": ("2px", 1, 57700),
-    "hard-shadow": ("1px", 4, 12000),
+    "hard-shadow": (LIGHT_TRACED, 4, 700),
     "lamp-in-glass": ("2px", 16, 6400),
     "penumbra": ("2px", 16, 14300),
     "pool": ("1px", 4, 5000),
     "rough-metal": ("2px", 4, 23000),
     "textured": ("2px", 1, 16700),
-    "water-sun": ("1px", 16, 700),
+    "water-sun": (LIGHT_TRACED, 4, 1000),
 }
 SIZE = "128x128"
 FLAGS = {"default": [], "pppm": ["--radius-controller", "pppm"],
@@ -184,6 +185,9 @@ def reference_of(name, path, folder):
     reference = folder / f"{name}.exr"
     if not reference.exists():
         radius, photons, passes = REFERENCES[name]
+        if radius is LIGHT_TRACED:
+            run([BIN / "lucerna-light-reference", path, SIZE, photons, passes, reference])
+            return reference
         pixels = math.prod(map(int, SIZE.split("x")))
         was_interrupted = reference.with_name(f"{reference.name}.checkpoints").exists()
         run([BIN / "lucerna", "reference", path, "--size", SIZE, "--quiet", "--seed", "1000003",
