@@ -318,7 +318,8 @@ def write_page(rows, docs):
             "with the worst 0.1 % of pixels. Scenes b-* are half B of "
             "`tests/tools/make_study_scenes.py`, which no constant of the estimate has seen. All figures "
             "are in [results.csv](convergence/results.csv). References "
-            "begin with a radius of 1 or 2 px: they show bias that falls slowly. Columns: errors as fractions, `low` and `high` of the "
+            "begin with a radius of 1 or 2 px or, where edges are seen directly, have none: they show bias "
+            "that falls slowly. Columns: errors as fractions, `low` and `high` of the "
             "95 % interval, `true_trimmed` without the worst 0.1 % of pixels.\n",
             "![Estimated over true error](convergence/overview.svg)\n"]
     judged = [row for row in rows if row["setting"] == "default"]
