@@ -1,7 +1,8 @@
 // A reference image without the kernel's blur (tests/support/light_tracer.h), with its noise.
 //
-// Run: build/release/bin/lucerna-light-reference SCENE WIDTHxHEIGHT PHOTONS_PER_PIXEL PASSES
-// OUT.exr PASSES are those of either half.
+// Run: build/release/bin/lucerna-light-reference SCENE WIDTHxHEIGHT PHOTONS_PER_PIXEL PASSES OUT
+//
+// OUT is an EXR file; PASSES are those of either half.
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -62,8 +63,7 @@ int main(int argc, char** argv) {
   int width = 0;
   int height = 0;
   if (argc != 6 || std::sscanf(argv[2], "%dx%d", &width, &height) != 2) {
-    std::fprintf(stderr, "usage: %s SCENE WIDTHxHEIGHT PHOTONS_PER_PIXEL PASSES OUT.exr\n",
-                 argv[0]);
+    std::fprintf(stderr, "usage: %s SCENE WIDTHxHEIGHT PHOTONS_PER_PIXEL PASSES OUT\n", argv[0]);
     return 2;
   }
   lucerna::Main(argv[1], width, height, std::atoi(argv[3]), std::atoi(argv[4]), argv[5]);

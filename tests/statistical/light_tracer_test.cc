@@ -1,4 +1,4 @@
-// Does light tracing know an edge exactly? Other images are measured by it.
+// Is a light-traced image exact at an edge? Other images are measured by it.
 #include "tests/support/light_tracer.h"
 
 #include <algorithm>
@@ -48,7 +48,7 @@ std::vector<double> ColumnsOf(const Image& image) {
   return columns;
 }
 
-TEST(LightTracerTest, KnowsAnEdgeWithoutBlur) {
+TEST(LightTracerTest, RendersAnEdgeWithoutBlur) {
   const Scene scene = HalfShadedFloor();
   constexpr int kRenders = 8;
   std::array<std::vector<double>, kSize> of_renders;

@@ -162,7 +162,7 @@ LightTracedImage TraceLight(const Scene& scene, const RenderSettings& settings, 
       scene.camera.kind == Camera::Kind::kPerspective && !(scene.camera.lens_radius > 0);
   const PixelFilter& filter = scene.filter;
   const bool has_box =
-      filter.kind == PixelFilter::Kind::kBox && std::max(filter.radius_x, filter.radius_y) <= 0.5F;
+      filter.kind == PixelFilter::Kind::kBox && filter.radius_x == 0.5F && filter.radius_y == 0.5F;
   const bool is_whole =
       settings.crop_width() == settings.width && settings.crop_height() == settings.height;
   const SceneNeeds needs = NeedsOf(scene, settings);

@@ -4,7 +4,8 @@
 // from the camera adds its light to the pixel in which it is seen (light tracing: Dutre, Lafortune
 // & Willems 1993, "Monte Carlo Light Tracing with Direct Computation of Pixel Intensities"): no
 // radius, so no bias, however sharp an edge is. What is not by photons, and pixels that show
-// something else as well, are those of an ordinary render.
+// something else as well, are those of an ordinary render. What else a pixel shows is missed where
+// it is thinner than a quarter of the pixel: light by photons on such glass or metal is left out.
 //
 // Photons are those of the renderer itself, drawn by the guides that the render has learned, so
 // that what both have wrong does not show: for that there are closed forms and path_tracer.h.
