@@ -18,6 +18,7 @@
 #include "render/estimate/evidence.h"
 #include "render/estimate/missing_light.h"
 #include "render/estimate/noise_layer.h"
+#include "render/estimate/photon_noise.h"
 #include "render/estimate/photon_steps.h"
 #include "render/estimate/pixel_radii.h"
 #include "render/estimate/relative_error.h"
@@ -269,7 +270,7 @@ void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundP
   state.Weigh(plan);
   if (state.variance != nullptr) state.variance->Add(*round, *state.sums);
   state.sums->Add(*round, state.team);
-  state.radii->Step(*round, *plan.radii, state.team);
+  state.radii->Step(*round, *plan.radii, PhotonNoiseShare(*state.sums), state.team);
   state.last_radii = plan.radii;
   const std::uint64_t passes = whole_passes();
   const State::After before = state.after.rbegin()->second;

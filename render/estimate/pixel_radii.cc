@@ -33,7 +33,8 @@ PixelRadii::PixelRadii(Numbers numbers, const RadiusController& controller)
   LUCERNA_CHECK(numbers_.memory.size() == numbers_.radius.size() * memory_per_pixel_);
 }
 
-void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, ThreadTeam& team) {
+void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, double noise_share,
+                      ThreadTeam& team) {
   LUCERNA_CHECK(round.pixels() == numbers_.radius.size() && used.size() == numbers_.radius.size() &&
                 round.evidence <= kMostControllerColumns);
   const std::uint64_t rounds = RoundsUntil(round.passes.last);
@@ -49,7 +50,8 @@ void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, ThreadTe
            .radius = static_cast<double>(used[pixel]),
            .columns = std::span<const double>(columns).first(round.evidence),
            .blur = static_cast<double>(round.At(kBlur, pixel)),
-           .rounds = rounds},
+           .rounds = rounds,
+           .noise_share = noise_share},
           round.passes,
           std::span<double>(numbers_.memory).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
     }

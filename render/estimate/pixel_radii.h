@@ -24,8 +24,9 @@ class PixelRadii {
   struct Numbers;
   PixelRadii(Numbers numbers, const RadiusController& controller);
 
-  // Takes in a round whose hitpoints gathered with `used` [pixels].
-  void Step(const SliceSums& round, const RadiusColumn& used, ThreadTeam& team);
+  // Takes in a round whose hitpoints gathered with `used` [pixels]. noise_share: as RoundEvidence
+  // has it.
+  void Step(const SliceSums& round, const RadiusColumn& used, double noise_share, ThreadTeam& team);
 
   // The radii after the rounds so far [pixels].
   [[nodiscard]] RadiusColumn Current() const;

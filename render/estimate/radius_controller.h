@@ -35,6 +35,7 @@ struct RoundEvidence {
   // truth [luminance flux relative to the scene's power, per squared unit radius].
   double blur = 0;
   std::uint64_t rounds = 1;  // so far, with this one
+  double noise_share = 1;    // of the image so far (estimate/photon_noise.h)
 };
 
 // What a frequency controller predicts for a pixel.
@@ -50,13 +51,15 @@ struct TheorySlopes {
   double squared_bias = 0;
 };
 
+inline constexpr double kMostOfFirst = 2;
+
 class RadiusController {
  public:
   virtual ~RadiusController() = default;
   // Numbers of memory a pixel, zero before the first pass.
   [[nodiscard]] virtual std::size_t MemoryPerPixel() const { return 0; }
   // The state after the round `passes` brought `evidence`, which follows all passes before it. A
-  // radius is never larger than the first one.
+  // radius is at most kMostOfFirst times the first one.
   [[nodiscard]] virtual PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence,
                                          const PassRange& passes,
                                          std::span<double> memory) const = 0;

@@ -14,8 +14,8 @@
 namespace lucerna {
 namespace {
 
-struct Traced {
-  Traced(Scene s, int max_depth, int threads = 2, std::uint64_t seed = 1)
+struct TracedPilots {
+  TracedPilots(Scene s, int max_depth, int threads = 2, std::uint64_t seed = 1)
       : scene(std::move(s)),
         settings(TestSettings(scene, 1000, 0.05, max_depth, seed)),
         needs(NeedsOf(scene, settings)),
@@ -53,7 +53,7 @@ void ExpectBrought(int max_depth, double expected) {
   double sum = 0;
   double squares = 0;
   for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
-    const Traced traced(Furnace(), max_depth, 2, seed);
+    const TracedPilots traced(Furnace(), max_depth, 2, seed);
     ASSERT_GE(traced.reports.paths, 1024U);
     double brought = 0;
     for (const PilotReport& report : traced.reports.reports)
@@ -75,8 +75,8 @@ TEST(PilotPathsTest, BringWhatPhotonsBring) {
 }
 
 TEST(PilotPathsTest, DoNotDependOnThreads) {
-  const Traced one(Furnace(), 20, 1);
-  const Traced two(Furnace(), 20, 2);
+  const TracedPilots one(Furnace(), 20, 1);
+  const TracedPilots two(Furnace(), 20, 2);
   ASSERT_EQ(one.reports.reports.size(), two.reports.reports.size());
   for (std::size_t i = 0; i < one.reports.reports.size(); ++i) {
     EXPECT_EQ(one.reports.reports[i].numbers, two.reports.reports[i].numbers);
@@ -102,7 +102,7 @@ TEST(PilotPathsTest, LeadThroughAHoleToTheSky) {
   scene.distant_lights.push_back({Normalize({0.1F, 0.2F, -1}), Gray(5)});
   scene.infinite_lights.push_back({Gray(1)});
   SetCamera(scene, {0, -0.8, 0}, {0, 1, 0}, {0, 0, 1}, 60, 16);
-  const Traced traced(std::move(scene), 20);
+  const TracedPilots traced(std::move(scene), 20);
   ASSERT_GT(traced.reports.reports.size(), 300U);
   int by_sun = 0;
   int by_sky = 0;
@@ -132,7 +132,7 @@ TEST(PilotPathsTest, LeadThroughAHoleToTheSky) {
 
 // Further paths add to what there is, and reports say where light first lands and where it goes on.
 TEST(PilotPathsTest, TellOfFirstScatterings) {
-  Traced traced(Furnace(), 20);
+  TracedPilots traced(Furnace(), 20);
   ThreadTeam team(2);
   const std::size_t first = traced.reports.reports.size();
   PilotReports in_steps = traced.reports;
@@ -166,7 +166,7 @@ TEST(PilotPathsTest, AreNotTracedInMedia) {
   Scene scene = Furnace();
   scene.media.emplace_back();
   scene.camera.medium = 0;
-  const Traced traced(std::move(scene), 20);
+  const TracedPilots traced(std::move(scene), 20);
   EXPECT_TRUE(traced.needs.Uses(Part::kMedia));
   EXPECT_TRUE(traced.reports.reports.empty());
 }

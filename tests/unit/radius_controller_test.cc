@@ -199,12 +199,12 @@ TEST(AppmTest, KeepsItsRadiusInEvenLight) {
     std::vector<double> memory(appm->MemoryPerPixel());
     PixelRadius pixel = {1, 0};
     for (std::uint64_t pass = 0; pass < 200; ++pass) {
-      // 20 photons in the disc of the reach at radius 1.
+      // 20 photons in the disc of the reach at radius 1, and as densely in that at radius 2.
       double laplacian = 0;
       double weight2 = 0;
       double blur = 0;
-      for (int photon = 0; photon < 20; ++photon) {
-        const double u = static_cast<double>(rng.Uniform()) /
+      for (int photon = 0; photon < 80; ++photon) {
+        const double u = 4 * static_cast<double>(rng.Uniform()) /
                          (static_cast<double>(pixel.radius) * static_cast<double>(pixel.radius));
         if (u >= 1) continue;
         laplacian += 2 * u - 1;
@@ -277,6 +277,63 @@ TEST(AppmTest, ShrinksWhereSomeHitpointsMeetAnEdgeAndComesBackWhereTheyDoNot) {
     ASSERT_LE(pixel.radius, 1.15 * r * (1 + 1e-12)) << pass;
   }
   EXPECT_EQ(pixel.radius, 1);
+}
+
+// Light of so many photons in the first disc a pass, with a bend as in ExpectedCurvature and blur
+// of so large a share of it.
+struct Growth {
+  double largest = 0, last = 0;
+  double photons = 0;  // in a pass, in the mean of all
+};
+Growth Grow(double photons, double bend, double noise_share, double blur_share, int passes = 200) {
+  RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kAppm;
+  const auto appm = MakeRadiusController(settings, 1);
+  std::vector<double> memory(appm->MemoryPerPixel());
+  PixelRadius pixel = {1, 0};
+  Growth growth;
+  for (std::uint64_t pass = 0; pass < static_cast<std::uint64_t>(passes); ++pass) {
+    const double r = pixel.radius;
+    const auto columns = ExpectedCurvature(photons / std::numbers::pi, bend, r);
+    // Of one sign, so that no chance hides it.
+    const double blur = blur_share * photons * r * r;
+    const RoundEvidence evidence = {.photons = photons * r * r,
+                                    .radius = r,
+                                    .columns = columns,
+                                    .blur = blur,
+                                    .rounds = pass + 1,
+                                    .noise_share = noise_share};
+    pixel = appm->Next(pixel, evidence, OnePass(pass), memory);
+    EXPECT_TRUE(pass >= 8 || pixel.radius <= 1) << pass;
+    EXPECT_LE(pixel.radius, 1.15 * r * (1 + 1e-12)) << pass;
+    growth.largest = std::max(growth.largest, pixel.radius);
+    growth.photons += photons * r * r / passes;
+  }
+  growth.last = pixel.radius;
+  return growth;
+}
+
+TEST(AppmTest, GrowsInEvenLightToTwiceTheFirstRadiusAtMost) {
+  EXPECT_DOUBLE_EQ(Grow(10, 0, 1, 0).last, 2);
+}
+
+TEST(AppmTest, GrowsToSixtyPhotonsInTheMeanOfThePasses) {
+  EXPECT_NEAR(Grow(40, 0, 1, 0).photons, 60, 2);
+  EXPECT_EQ(Grow(80, 0, 1, 0).largest, 1);
+}
+
+// Noise that the halves do not show is no reason to grow.
+TEST(AppmTest, DoesNotGrowAgainstNoiseThatIsNotThere) {
+  EXPECT_LT(Grow(10, 0, 0.15, 0).largest, 1.01);
+  EXPECT_GT(Grow(10, 0, 0.5, 0).largest, 1.2);
+}
+
+// As sure blur shows up and noise falls, the radius comes back.
+TEST(AppmTest, ComesBackToTheFirstRadiusWhereLightIsBent) {
+  const Growth growth = Grow(10, 0.05, 1, 0, 2000);
+  EXPECT_GT(growth.largest, 1.1);
+  EXPECT_LT(growth.last, 1);
+  EXPECT_EQ(Grow(10, 0, 1, 0.2).largest, 1);
 }
 
 // One frequency photon of weight 1 in every ten, all of one trace: the radius goes where that trace

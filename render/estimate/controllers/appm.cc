@@ -18,11 +18,15 @@ namespace {
 // counts too, as far as it is more than noise. What is surely more shrinks the radius for good. On
 // an edge that takes hundreds of passes, for a hitpoint here and there is near it: what is likely
 // more shrinks it too, until that is likely no longer.
+// A radius that is not shrunk grows beyond the first one, and comes back as evidence comes in: to
+// that of least error where what noise may hide of the Laplacian is added to it, and where noise is
+// what the halves of the image show, which may be far less than that of independent photons.
 class Appm final : public RadiusController {
  public:
   Appm(const RenderSettings& settings, float initial_radius)
       : moments_(Kernel{settings.kernel}.Moments()),
-        smallest_(kSmallestShare * static_cast<double>(initial_radius)) {}
+        first_(static_cast<double>(initial_radius)),
+        smallest_(kSmallestShare * first_) {}
 
   std::size_t MemoryPerPixel() const override { return kNumbers; }
 
@@ -40,28 +44,42 @@ class Appm final : public RadiusController {
     memory[kBlur] += blur;
     const auto of_round = static_cast<double>(passes.size());
     memory[kBlurSquares] += blur * blur / of_round;
+    memory[kInverseSixths] += of_round / Sixth(evidence.radius / first_);
     PixelRadius next = {now.radius, now.photons + evidence.photons};
 
     const auto n = static_cast<double>(passes.last);
     // Of the bias over the squared radius, squared.
     const double by_laplacian = moments_.mu2 / 2 * memory[kLaplacian] / n;
     const Blur by_blur = BlurOf(memory, n, static_cast<double>(evidence.rounds));
-    // The radius of least error, if that is below `radius`.
-    const auto least = [&](double radius, double square) {
+    // The radius of least error where noise is that of independent photons times `noise`, if that
+    // is below `radius`.
+    const auto least = [&](double radius, double square, double noise = 1) {
       if (!(square > 0)) return radius;
-      // The least of roughness · squares / (n r²) + square r⁴.
-      const double sixth = moments_.roughness * (memory[kSquares] / n) / (n * 2 * square);
-      const double r2 = radius * radius;
+      // The least of noise · roughness · squares / (n r²) + square r⁴.
+      const double sixth = noise * moments_.roughness * (memory[kSquares] / n) / (n * 2 * square);
       // Mostly it is not: a root less for every pixel.
-      if (!(sixth < r2 * r2 * r2)) return radius;
+      if (!(sixth < Sixth(radius))) return radius;
       return std::min(radius, std::max(std::cbrt(std::sqrt(sixth)), smallest_));
     };
     double& largest = memory[kLargest];
-    if (largest == 0) largest = now.radius;
+    if (largest == 0) largest = first_;
     largest = least(largest, std::max(by_laplacian * by_laplacian, by_blur.sure));
     const double likely = std::clamp(least(largest, by_blur.likely), kMostShrink * evidence.radius,
                                      kMostGrowth * evidence.radius);
     next.radius = std::min(likely, largest);
+    if (next.radius < first_ || passes.last <= kPassesBeforeGrowth || !(memory[kSquares] > 0)) {
+      return next;
+    }
+    // Of the Laplacian of a biweight kernel.
+    const double laplacian_noise = 192 / std::numbers::pi * (memory[kSquares] / n) *
+                                   memory[kInverseSixths] /
+                                   (n * n * Sixth(static_cast<double>(kCurvatureReach) * first_));
+    const double square =
+        std::max(by_laplacian * by_laplacian + moments_.mu2 * moments_.mu2 / 4 * laplacian_noise,
+                 by_blur.more);
+    const double crowded = now.radius * std::sqrt(kMostPhotons * n / next.photons);
+    const double most = std::min({kMostOfFirst * first_, kMostGrowth * now.radius, crowded});
+    next.radius = std::max(first_, least(std::max(first_, most), square, evidence.noise_share));
     return next;
   }
 
@@ -70,7 +88,15 @@ class Appm final : public RadiusController {
   }
 
  private:
-  enum Memory : std::size_t { kLaplacian, kSquares, kBlur, kBlurSquares, kLargest, kNumbers };
+  enum Memory : std::size_t {
+    kLaplacian,
+    kSquares,
+    kBlur,
+    kBlurSquares,
+    kInverseSixths,  // of radii over the first one
+    kLargest,        // that sure evidence leaves, at most the first one
+    kNumbers
+  };
   static constexpr double kSmallestShare = 0.01;
   // Blur counts from so many rounds on, and so many times its standard deviation is taken from it:
   // less than this is shown by noise in one of thousands of pixels.
@@ -82,10 +108,19 @@ class Appm final : public RadiusController {
   // In one round, of the radius in use.
   static constexpr double kMostShrink = 0.6;
   static constexpr double kMostGrowth = 1.15;
+  // Photons a pass are chosen before radii grow, by what the first passes show. Blur less so many
+  // times its deviation holds growth back: with more, radii grow on edges, with less, noise alone
+  // holds them. More photons in a disc, in the mean of the passes, take time for little less noise.
+  static constexpr std::uint64_t kPassesBeforeGrowth = 8;
+  static constexpr double kDeviationsInGrowth = 1.4;
+  static constexpr double kMostPhotons = 60;
 
-  // Of the mean blur over the squared radius, squared: what is surely and what is likely there.
+  static double Sixth(double x) { return x * x * x * x * x * x; }
+
+  // Of the mean blur over the squared radius, squared: what is surely there, what is likely there,
+  // and what is there rather than not.
   struct Blur {
-    double sure = 0, likely = 0;
+    double sure = 0, likely = 0, more = 0;
   };
   static Blur BlurOf(std::span<const double> memory, double n, double rounds) {
     if (rounds < kFirstRounds) return {};
@@ -95,6 +130,7 @@ class Appm final : public RadiusController {
     const double variance = (memory[kBlurSquares] / n - square) / (rounds - 1);
     Blur blur;
     blur.sure = std::max(0.0, square - kSureDeviations * kSureDeviations * variance);
+    blur.more = std::max(0.0, square - kDeviationsInGrowth * kDeviationsInGrowth * variance);
     // Few rounds do not know their variance: about Student's quantile for theirs.
     const double freedom = rounds - 1;
     const double quantile2 = freedom * std::expm1(kLikelyDeviations * kLikelyDeviations / freedom);
@@ -105,7 +141,7 @@ class Appm final : public RadiusController {
   }
 
   KernelMoments moments_;
-  double smallest_;
+  double first_, smallest_;
 };
 
 }  // namespace

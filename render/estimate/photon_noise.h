@@ -1,0 +1,18 @@
+// How much less do photons scatter over many passes than independent ones would?
+//
+// Photons are spaced evenly over the passes, so that light which they reach by few bounces has far
+// less noise in the mean of all passes than the passes' differences suggest. Radii must not grow
+// against noise that is not there (estimate/controllers/appm.cc).
+#pragma once
+
+#include "render/estimate/image_sums.h"
+
+namespace lucerna {
+
+// Of the whole passes, two squared relative noises (estimate/relative_error.h), one over the other:
+// what the halves' difference shows of the light by photons, over what all light would have if
+// passes were independent. At most 1, and 1 where nothing is known: before the second pass, and
+// in the dark. Of 2^17 pixels, where there are more.
+[[nodiscard]] double PhotonNoiseShare(const ImageSums& sums);
+
+}  // namespace lucerna
