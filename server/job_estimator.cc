@@ -270,7 +270,10 @@ void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundP
   state.Weigh(plan);
   if (state.variance != nullptr) state.variance->Add(*round, *state.sums);
   state.sums->Add(*round, state.team);
-  state.radii->Step(*round, *plan.radii, PhotonNoiseShare(*state.sums), state.team);
+  // Without a guide nothing of a pixel follows from others, so that tiles match the whole image.
+  const double noise_share =
+      state.settings.unguided ? kUnguidedNoiseShare : PhotonNoiseShare(*state.sums);
+  state.radii->Step(*round, *plan.radii, noise_share, state.team);
   state.last_radii = plan.radii;
   const std::uint64_t passes = whole_passes();
   const State::After before = state.after.rbegin()->second;

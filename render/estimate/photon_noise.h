@@ -15,4 +15,7 @@ namespace lucerna {
 // in the dark. Of 2^17 pixels, where there are more.
 [[nodiscard]] double PhotonNoiseShare(const ImageSums& sums);
 
+// What is assumed where the image must not be looked at: pool has 0.25, corner 0.8 (256 passes).
+inline constexpr double kUnguidedNoiseShare = 0.5;
+
 }  // namespace lucerna

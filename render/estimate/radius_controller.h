@@ -35,7 +35,7 @@ struct RoundEvidence {
   // truth [luminance flux relative to the scene's power, per squared unit radius].
   double blur = 0;
   std::uint64_t rounds = 1;  // so far, with this one
-  double noise_share = 1;    // of the image so far (estimate/photon_noise.h)
+  double noise_share = 1;    // as PhotonNoiseShare has it, or what is assumed
 };
 
 // What a frequency controller predicts for a pixel.

@@ -138,7 +138,7 @@ constexpr auto kSettings = std::to_array<Setting>({
                return static_cast<std::uint64_t>(*scene.integrator.seed);
              }}},
     {.name = "radius_controller",
-     .meaning = "the rule by which radii shrink",
+     .meaning = "the rule by which radii change",
      .type = SettingField<RadiusControllerKind>{.given = &Overrides::radius_controller,
                                                 .value = &Settings::radius_controller,
                                                 .fallback = RadiusControllerKind::kAppm}},
