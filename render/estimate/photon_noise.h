@@ -12,7 +12,7 @@ namespace lucerna {
 // Of the whole passes, two squared relative noises (estimate/relative_error.h), one over the other:
 // what the halves' difference shows of the light by photons, over what all light would have if
 // passes were independent. At most 1, and 1 where nothing is known: before the second pass, and
-// in the dark. Of 2^17 pixels, where there are more.
+// in the dark. Larger images are sampled at fewer than 2^18 pixels.
 [[nodiscard]] double PhotonNoiseShare(const ImageSums& sums);
 
 // What is assumed where the image must not be looked at: pool has 0.25, corner 0.8 (256 passes).
