@@ -22,6 +22,7 @@
 #include "render/estimate/photon_steps.h"
 #include "render/estimate/pixel_radii.h"
 #include "render/estimate/relative_error.h"
+#include "render/estimate/without_blur.h"
 #include "render/film/film.h"
 #include "render/film/layers.h"
 #include "render/math/color_space.h"
@@ -365,8 +366,9 @@ BandedImage JobEstimator::MakeBands() const {
     ToFileUnit(band, scene.unit);
     if (!has_noise) return band;
     const double weight = sums.weights().all();
+    const WithoutBlur shown(sums, *state.controller);
     const auto errors_of = [&](std::size_t offset) {
-      const ImageSums::Pixel of_pixel = sums.At(first + offset);
+      const ImageSums::Pixel of_pixel = shown.At(first + offset);
       PixelValues values;
       values.noise = static_cast<double>((*noise)[first + offset]);
       values.bias = scene.film.exposure * (of_pixel.even_bias + of_pixel.odd_bias) / weight;
@@ -384,11 +386,12 @@ std::vector<float> JobEstimator::NoiseLayer() const {
   const double weight = weights.all();
   const double exposure = state_->prepared.scene().film.exposure;
   const double noise_area = NoiseArea();
+  const WithoutBlur shown(sums, *state_->controller);
   std::vector<PixelNoise> noise(sums.pixels());
   constexpr std::size_t kPixelsAtOnce = 4096;
   state_->team.For(noise.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
     for (std::size_t pixel = begin; pixel < end; ++pixel) {
-      const ImageSums::Pixel of_pixel = sums.At(pixel);
+      const ImageSums::Pixel of_pixel = shown.At(pixel);
       const double sum = exposure * LuminanceOf(ToRec709(of_pixel.radiance()));
       const double even_sum =
           0.5 * (sum + exposure * LuminanceOf(ToRec709(of_pixel.half_difference)));
@@ -419,6 +422,7 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
   const double exposure = state.prepared.scene().film.exposure;
   const std::size_t pixels = state.sums->pixels();
   EstimatorSnapshot snapshot;
+  const WithoutBlur shown(*state.sums, *state.controller);
   snapshot.photons = photons();
   snapshot.lights = state.sums->tally().lights;
   snapshot.image =
@@ -436,7 +440,7 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
     for (std::size_t piece = begin; piece < end; ++piece) {
       const std::size_t last = std::min(pixels, (piece + 1) * kPixelsAtOnce);
       for (std::size_t pixel = piece * kPixelsAtOnce; pixel < last; ++pixel) {
-        const ImageSums::Pixel of_pixel = state.sums->At(pixel);
+        const ImageSums::Pixel of_pixel = shown.At(pixel);
         const RgbSum all = ToRec709(of_pixel.radiance());
         const RgbSum photons = ToRec709(of_pixel.photons);
         const double photon_luminance = LuminanceOf(photons);

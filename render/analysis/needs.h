@@ -128,11 +128,17 @@ class SceneNeeds {
 // worth keeping; without new ones the edges of shapes would never get smoother.
 inline constexpr std::uint64_t kRoundsOfSets = 16;
 
-// Which set of eye paths a pass uses, of all there will ever be.
+// Which set of eye paths a pass uses, of all there will ever be; even where the pass is. Each time
+// around the sets take turns in another order: the photons of passes are parts of a low-discrepancy
+// sequence, of which every 64th would bring photons of the same parts of a light to a set.
+// Requires 0 or a power of two.
 [[nodiscard]] constexpr std::uint64_t EyeSetOf(std::uint64_t pass, int sets) {
   if (sets == 0) return pass;
   const auto n = static_cast<std::uint64_t>(sets);
-  return pass / (n * kRoundsOfSets) * n + pass % n;
+  const std::uint64_t round = pass / n;
+  // Pairs change places with those that differ from them in the digits of the round.
+  const std::uint64_t turn = (pass % n) ^ (2 * (round % kRoundsOfSets) % n);
+  return round / kRoundsOfSets * n + turn;
 }
 
 // Of how many of the sets what the camera's rays meet first is kept, kFirstHitBytes for each ray

@@ -28,6 +28,12 @@ double TogetherDeviating(double one, double other, double weight, double luminan
   return of_both + DeviationBetween(weight, luminance, slice_passes, slice_luminance);
 }
 
+// Of both halves together, over the weight of the part.
+float BiasSquare(float even, float odd, const PassRange& part) {
+  const float both = even + odd;
+  return both * both / static_cast<float>(part.size());
+}
+
 // A float that grows by another, as columns of floats do.
 void Grow(double& sum, float by) {
   sum = static_cast<double>(static_cast<float>(sum) + by);
@@ -40,6 +46,7 @@ ImageSums::Columns::Columns(std::size_t pixels)
       squared_deviations(pixels),
       even_bias(pixels),
       odd_bias(pixels),
+      bias_squares(pixels),
       photon_count(pixels),
       largest(pixels) {
   for (std::vector<double>& column : radiance)
@@ -95,6 +102,7 @@ double ImageSums::WeighBy(std::uint64_t photons_per_pass) {
   scale(whole_.columns.squared_deviations, factor);
   scale(whole_.columns.even_bias, static_cast<float>(factor));
   scale(whole_.columns.odd_bias, static_cast<float>(factor));
+  scale(whole_.columns.bias_squares, static_cast<float>(factor));
   scale(whole_.columns.largest, static_cast<float>(std::sqrt(factor)));
   whole_.weights.even *= factor;
   whole_.weights.odd *= factor;
@@ -163,6 +171,14 @@ void ImageSums::AddPixels(const SliceSums& slice, std::size_t begin, std::size_t
   to_each(whole_.columns.direct_difference, kDirectDifference, add);
   to_each(whole_.columns.even_bias, kEvenBias, add);
   to_each(whole_.columns.odd_bias, kOddBias, add);
+  std::array<float, kPixelsUnpacked> other;
+  for (std::size_t first = begin; first < end; first += kPixelsUnpacked) {
+    const std::size_t count = std::min(kPixelsUnpacked, end - first);
+    slice.Read(kEvenBias, first, std::span(unpacked).first(count));
+    slice.Read(kOddBias, first, std::span(other).first(count));
+    for (std::size_t i = 0; i < count; ++i)
+      whole_.columns.bias_squares[first + i] += BiasSquare(unpacked[i], other[i], slice.passes);
+  }
   to_each(whole_.columns.photon_count, kPhotonCount, add);
   to_each(whole_.columns.largest, kLargestLuminance,
           [](float& most, float number) { most = std::max(most, number); });
@@ -207,6 +223,7 @@ ImageSums::Pixel ImageSums::At(std::size_t pixel) const {
   sum.squared_deviations = whole_.columns.squared_deviations[pixel];
   sum.even_bias = static_cast<double>(whole_.columns.even_bias[pixel]);
   sum.odd_bias = static_cast<double>(whole_.columns.odd_bias[pixel]);
+  sum.bias_squares = static_cast<double>(whole_.columns.bias_squares[pixel]);
   sum.photon_count = static_cast<double>(whole_.columns.photon_count[pixel]);
   sum.largest = whole_.columns.largest[pixel];
   PassRange before = {0, whole_.passes};
@@ -289,6 +306,7 @@ void ImageSums::AddTo(RawPixel& raw, const PassRange& before, const PassWeights&
   sum.largest = std::max(sum.largest, at(kLargestLuminance));
   Grow(sum.even_bias, at(kEvenBias));
   Grow(sum.odd_bias, at(kOddBias));
+  Grow(sum.bias_squares, BiasSquare(at(kEvenBias), at(kOddBias), slice.passes));
   Grow(sum.photon_count, at(kPhotonCount));
 }
 

@@ -54,6 +54,8 @@ class ImageSums {
     return tail_.empty() ? whole_.passes : tail_.back()->passes.last;
   }
   [[nodiscard]] std::size_t pixels() const { return whole_.features.size(); }
+  // The parts that were added: whole rounds, then the slices of the tail.
+  [[nodiscard]] std::uint64_t parts() const { return RoundsUntil(whole_.passes) + tail_.size(); }
   // Of passes().
   [[nodiscard]] PassWeights weights() const;
   // Of all passes.
@@ -69,6 +71,9 @@ class ImageSums {
     RgbSum half_difference{};
     double squared_deviations = 0;  // of passes' luminances from their mean
     double even_bias = 0, odd_bias = 0;
+    // Sum over the parts that were added (whole rounds, then the slices of the tail): the square of
+    // both biases over the weight of the part's passes.
+    double bias_squares = 0;
     double photon_count = 0;  // each counts 1
     float largest = 0;        // luminance of a pass, times the root of its weight
 
@@ -101,7 +106,7 @@ class ImageSums {
     std::array<std::vector<float>, 3> half_difference;  // of photons weighted, of direct light not
     std::vector<float> direct_difference;               // of direct light alone, not weighted
     std::vector<double> squared_deviations;
-    std::vector<float> even_bias, odd_bias, photon_count, largest;
+    std::vector<float> even_bias, odd_bias, bias_squares, photon_count, largest;
   };
   // All that is kept of the passes added, without the tail: for checkpoints.
   struct Whole {

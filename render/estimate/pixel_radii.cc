@@ -8,18 +8,6 @@
 
 namespace lucerna {
 
-namespace {
-
-// From the first pass to `last`, where one ends.
-std::uint64_t RoundsUntil(std::uint64_t last) {
-  std::uint64_t rounds = 0;
-  for (std::uint64_t pass = 0; pass < last; pass = RoundOf(pass).last)
-    ++rounds;
-  return rounds;
-}
-
-}  // namespace
-
 PixelRadii::PixelRadii(std::size_t pixels, float initial_radius, const RadiusController& controller)
     : controller_(controller),
       memory_per_pixel_(controller.MemoryPerPixel()),

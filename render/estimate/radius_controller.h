@@ -63,6 +63,8 @@ class RadiusController {
   [[nodiscard]] virtual PixelRadius Next(const PixelRadius& now, const RoundEvidence& evidence,
                                          const PassRange& passes,
                                          std::span<double> memory) const = 0;
+  // Whether blur that photons surely show is taken off the image (estimate/without_blur.h).
+  [[nodiscard]] virtual bool RemovesBlur() const { return false; }
   // Whether Predict ever says anything.
   [[nodiscard]] virtual bool Predicts() const { return false; }
   // Absent when the controller makes none, or has too little evidence for the pixel yet.

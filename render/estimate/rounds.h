@@ -43,6 +43,14 @@ inline constexpr std::uint64_t kFirstLongLag = 128;
   return {first, first + length};
 }
 
+// How many rounds there are before this pass, the first of a round.
+[[nodiscard]] constexpr std::uint64_t RoundsUntil(std::uint64_t last) {
+  std::uint64_t rounds = 0;
+  for (std::uint64_t pass = 0; pass < last; pass = RoundOf(pass).last)
+    ++rounds;
+  return rounds;
+}
+
 // The radii of a round follow from the passes before this one, which is the first of a round. In
 // the long run there are some eight such states of the radii between a round and what its own
 // follow from, however many rounds there are.

@@ -5,6 +5,7 @@
 
 #include "render/base/status.h"
 #include "render/estimate/slice_sums.h"
+#include "render/estimate/without_blur.h"
 #include "render/film/layers.h"
 #include "render/frequency/bandwidth.h"
 #include "render/math/color_space.h"
@@ -19,6 +20,7 @@ std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t f
   LUCERNA_CHECK(sums.passes() > 0 && first <= last && last <= sums.pixels());
   std::vector<ImageChannel> channels;
   const double to_pixel = format.exposure / sums.weights().all();
+  const WithoutBlur shown(sums, controller);
   // Of the pixel's hitpoints [scene units]; 0 where there was none.
   const auto unit_radius = [&](std::size_t pixel) {
     const ImageSums::Features features = sums.FeaturesAt(pixel);
@@ -30,7 +32,7 @@ std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t f
   const auto feature_passes = static_cast<double>(std::min(sums.passes(), kFeaturePasses));
   const auto values_of = [&](std::size_t offset_in_band) {
     const std::size_t pixel = first + offset_in_band;
-    const ImageSums::Pixel of_pixel = sums.At(pixel);
+    const ImageSums::Pixel of_pixel = shown.At(pixel);
     PixelValues values;
     values.direct = ToRec709(of_pixel.direct);
     values.photons = ToRec709(of_pixel.photons);

@@ -42,6 +42,14 @@ double WhiteRadiance(const Intersector& intersector, const LightSet& lights) {
   return kWhite * mean;
 }
 
+// Direct light at the end of a weaker branch is sampled in some of the passes alone.
+constexpr float kSurelyLit = 0.1F;
+
+// Whether all eye paths end there.
+bool EndsPaths(const MaterialProperties& properties) {
+  return properties.gathers && !properties.has_parts;
+}
+
 float BranchWeight(const Intersector& intersector, const LightSet& lights) {
   const auto brightest = static_cast<double>(lights.LargestRadiance());
   if (!(brightest > 0) || intersector.bounds().empty()) return kLargestBranchWeight;
@@ -132,6 +140,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       properties_(PropertiesOf(scene.materials)),
       has_lens_(needs.Uses(Part::kLens)),
       rays_find_lights_(needs.Uses(Part::kAreaLights) || needs.Uses(Part::kEnvironment)),
+      lights_ends_of_chains_(parts_.lights && direct_light == DirectLight::kEverywhere),
       caustic_weight_(scene, settings, intersector.bounds()),
       branch_weight_(BranchWeight(intersector, lights)),
       white_(SpreadAbove(scene, rays_find_lights_, intersector, lights)),
@@ -228,12 +237,13 @@ Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, PathWavelength wavelen
   std::optional<Material> storage;
   const Material& material = MaterialAt(scene_, surface, wo, storage, wavelength);
   const Rgb color = wavelength.IsFirstUsedAt(material) ? wavelength.color() : Gray(1);
-  return bright + BrightPart(EmissionThrough({.surface = surface,
-                                              .material = material,
-                                              .wo = wo,
-                                              .wavelength = wavelength,
-                                              .weight = color},
-                                             rng, rays));
+  const ChainLight light = LightThrough({.surface = surface,
+                                         .material = material,
+                                         .wo = wo,
+                                         .wavelength = wavelength,
+                                         .weight = color},
+                                        nullptr, rng, rays);
+  return bright + BrightPart(light.emitted);
 }
 
 Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
@@ -372,13 +382,16 @@ std::array<EyePathTracer::SmoothBranch, EyePathTracer::kSmoothLobes> EyePathTrac
   return branches;
 }
 
-Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int& rays) const {
+EyePathTracer::ChainLight EyePathTracer::LightThrough(const SmoothChain& chain,
+                                                      const PixelSampler* sampler, KeyedRng& rng,
+                                                      int& rays) const {
   struct Branch {
     Ray ray;
     std::int32_t medium;
     PathWavelength wavelength;
     Rgb weight;
     int vertex;
+    std::uint64_t number;  // in the tree: twice that of the vertex before, plus one if refracted
     FacetSides sides;
   };
   const auto share_of_rays = [&](float emission_density) {
@@ -389,9 +402,11 @@ Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int&
   std::vector<Branch> branches;
   const auto branch_at = [&](const SurfacePoint& surface, const Material& whole, Vec3 wo,
                              std::int32_t before, const PathWavelength& of_path, Rgb weight,
-                             int vertex, const FacetSides& sides_before) {
+                             int vertex, std::uint64_t number, const FacetSides& sides_before) {
     if (vertex >= settings_.max_depth) return;
-    for (const SmoothBranch& branch : SmoothBranches(surface, whole, wo)) {
+    const auto smooth = SmoothBranches(surface, whole, wo);
+    for (std::size_t lobe = 0; lobe < smooth.size(); ++lobe) {
+      const SmoothBranch& branch = smooth[lobe];
       if (!(branch.share > 0)) continue;
       FacetSides sides = sides_before;
       if (!sides.Scatter(surface, whole, wo, branch.wi, branch.transmits)) continue;
@@ -408,12 +423,13 @@ Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int&
                           of_path,
                           next,
                           vertex + 1,
+                          2 * number + lobe,
                           sides});
     }
   };
-  Rgb seen;
+  ChainLight light;
   branch_at(chain.surface, chain.material, chain.wo, chain.medium, chain.wavelength, chain.weight,
-            chain.vertex, chain.sides);
+            chain.vertex, /*number=*/1, chain.sides);
   while (!branches.empty()) {
     Branch branch = branches.back();
     branches.pop_back();
@@ -422,24 +438,63 @@ Rgb EyePathTracer::EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int&
     if (!FindThroughMedia(branch.ray, hit, branch.medium, branch.weight, rays)) {
       if (branch.sides.is_behind()) continue;
       const Vec3 direction = branch.ray.direction;
-      seen += branch.weight * lights_.InfiniteRadiance(from, direction) *
-              share_of_rays(lights_.EmissionDensityInfinite(from, direction));
+      light.emitted += branch.weight * lights_.InfiniteRadiance(from, direction) *
+                       share_of_rays(lights_.EmissionDensityInfinite(from, direction));
       continue;
     }
     SurfacePoint surface = intersector_.SurfaceAt(branch.ray, hit);
     const Vec3 wo = -branch.ray.direction;
     const Rgb emitted = branch.sides.is_behind() ? Rgb() : lights_.EmittedRadiance(surface, wo);
     if (!IsBlack(emitted))
-      seen += branch.weight * emitted * share_of_rays(lights_.EmissionDensity(surface));
-    if (!properties_[surface.material].scatters_smoothly) continue;
+      light.emitted += branch.weight * emitted * share_of_rays(lights_.EmissionDensity(surface));
+    const bool may_end = sampler != nullptr && properties_[surface.material].gathers;
+    if (!may_end && !properties_[surface.material].scatters_smoothly) continue;
     std::optional<Material> storage;
     const Material& material = MaterialAt(scene_, surface, wo, storage, branch.wavelength);
     if (!branch.sides.MayMeet(surface, material)) continue;
     if (branch.wavelength.IsFirstUsedAt(material)) branch.weight *= branch.wavelength.color();
+    if (may_end && branch.vertex < settings_.max_depth &&
+        EndsPaths(storage ? PropertiesOf(*storage) : properties_[surface.material])) {
+      const SobolPoint u = sampler->ForBranchEnd(chain.vertex, branch.number);
+      const float strength = MaxChannel(branch.weight);
+      if (!(u[6] * kSurelyLit < strength)) continue;
+      const Frame frame = ShadingFrame(surface);
+      AddDirect({.surface = surface,
+                 .material = material,
+                 .frame = frame,
+                 .wo = wo,
+                 .media = parts_.media ? &media_ : nullptr,
+                 .medium = branch.medium,
+                 .sides = branch.sides},
+                branch.weight * std::max(1.0F, kSurelyLit / strength), u, light.scattered, rays);
+      continue;
+    }
     branch_at(surface, material, wo, branch.medium, branch.wavelength, branch.weight, branch.vertex,
-              branch.sides);
+              branch.number, branch.sides);
   }
-  return seen;
+  return light;
+}
+
+void EyePathTracer::AddDirect(const ShadingPoint& point, Rgb weight, const SobolPoint& u,
+                              Rgb& direct, int& rays) const {
+  direct += weight * LightSampledRadiance(intersector_, lights_, point, u, rays);
+  if (!rays_find_lights_) return;
+  const Vec3 wo = point.frame.ToLocal(point.wo);
+  BsdfSample sample;
+  const bool scattered =
+      parts_.lobes ? SampleBsdf(point.material, wo, u[0], u[1], u[2], Carried::kRadiance, sample)
+                   : SampleDiffuse(point.material, wo, u[1], u[2], sample);
+  if (!scattered) return;
+  const Vec3 wi = point.frame.ToWorld(sample.wi);
+  FacetSides sides = point.sides;
+  if (parts_.shading_normals && !sides.Scatter(point.surface, point.material, point.wo, wi,
+                                               sample.wi.z * Dot(point.frame.n, point.wo) < 0)) {
+    return;
+  }
+  const std::int32_t medium =
+      parts_.media ? media_.After(point.surface, point.wo, wi, point.medium) : point.medium;
+  direct += ScatteredDirect(point.surface, LitPointOf(point.surface, point.material, point.wo), wi,
+                            sample.pdf, medium, weight * sample.weight, rays);
 }
 
 bool EyePathTracer::FindFirst(const Ray& ray, First first, Hit& hit) const {
@@ -535,10 +590,10 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   // The density of the last scattering [sr⁻¹] when the lights were sampled there too, and where.
   float scatter_pdf = 0;
   LitPoint scatter_point;
-  // Emission at the end of a chain of smooth surfaces is collected from the whole tree of their
-  // branches where the chain begins: a small light seen in glass would otherwise be one bright
-  // speck in thousands of passes.
-  bool emission_was_collected = false;
+  // Emission and direct light at the end of a chain of smooth surfaces are collected from the whole
+  // tree of their branches where the chain begins: a small light seen in glass would otherwise be
+  // one bright speck in thousands of passes.
+  bool was_collected = false;
   KeyedRng branch_rng = sampler.ForBranches();
   // The last surface that gathers caustic photons, as long as only smooth ones have come since.
   struct Receiver {
@@ -596,7 +651,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       length += hit.t;
     }
     if (!is_met) {
-      if (emission_was_collected || sides.is_behind()) return finish();
+      if (was_collected || sides.is_behind()) return finish();
       if (vertex == 0) {
         add_first_emission(weight * lights_.InfiniteRadiance(from, ray.direction));
         return finish();
@@ -614,7 +669,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     const Rgb emitted = sides.is_behind() ? Rgb() : lights_.EmittedRadiance(surface, wo);
     if (vertex == 0) {
       add_first_emission(weight * emitted);
-    } else if (!IsBlack(emitted) && !emission_was_collected) {
+    } else if (!IsBlack(emitted) && !was_collected) {
       const float mis = scatter_pdf > 0
                             ? PowerHeuristic(scatter_pdf, lights_.PdfDirect(scatter_point, surface))
                             : 1;
@@ -640,29 +695,33 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     const Vec3 wo_local = frame.ToLocal(wo);
     const bool has_parts = parts_.lobes && whole_properties.has_parts;
     const float share_of_first = has_parts ? ShareOfFirst(whole, wo_local) : -1;
-    if (parts_.lobes && whole_properties.scatters_smoothly && rays_find_lights_ &&
-        !emission_was_collected) {
-      const Rgb emission = EmissionThrough({.surface = surface,
-                                            .material = whole,
-                                            .wo = wo,
-                                            .medium = medium,
-                                            .wavelength = wavelength,
-                                            .weight = weight,
-                                            .vertex = vertex,
-                                            .sides = sides,
-                                            .is_shared = parts_.caustics && receiver.is_last,
-                                            .cosine = receiver.cosine,
-                                            .scatter_pdf = receiver.scatter_pdf},
-                                           branch_rng, path.rays);
+    const bool was_lit_before = was_collected && lights_ends_of_chains_;
+    if (parts_.lobes && whole_properties.scatters_smoothly &&
+        (rays_find_lights_ || lights_ends_of_chains_) && !was_collected) {
+      const ChainLight light =
+          LightThrough({.surface = surface,
+                        .material = whole,
+                        .wo = wo,
+                        .medium = medium,
+                        .wavelength = wavelength,
+                        .weight = weight,
+                        .vertex = vertex,
+                        .sides = sides,
+                        .is_shared = parts_.caustics && receiver.is_last,
+                        .cosine = receiver.cosine,
+                        .scatter_pdf = receiver.scatter_pdf},
+                       lights_ends_of_chains_ ? &sampler : nullptr, branch_rng, path.rays);
       if (vertex == 0) {
-        add_first_emission(emission);
+        add_first_emission(light.emitted);
       } else {
-        path.direct += emission;
+        path.direct += light.emitted;
       }
-      emission_was_collected = true;
+      path.direct += light.scattered;
+      was_collected = true;
     }
     const bool is_lit_otherwise =
-        direct_light_ == DirectLight::kWherePathsGoOn && whole_properties.gathers;
+        (direct_light_ == DirectLight::kWherePathsGoOn && whole_properties.gathers) ||
+        (was_lit_before && EndsPaths(whole_properties));
     if (parts_.lights && !is_lit_otherwise && !(parts_.lobes && whole_properties.is_smooth)) {
       const ShadingPoint point = {
           surface, whole,          frame, wo, parts_.media ? &media_ : nullptr,
@@ -683,7 +742,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     }
     const Material& material = part ? *part : whole;
     const MaterialProperties& properties = part ? changed : whole_properties;
-    if (!(parts_.lobes && properties.is_smooth)) emission_was_collected = false;
+    if (!(parts_.lobes && properties.is_smooth)) was_collected = false;
 
     BsdfSample sample;
     bool scattered = [&] {

@@ -13,6 +13,7 @@
 #include "render/math/vector.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
+#include "render/tracing/direct_light.h"
 #include "render/tracing/facet_sides.h"
 #include "render/tracing/pixel_sampler.h"
 #include "render/transport/caustic_weight.h"
@@ -203,9 +204,19 @@ class EyePathTracer {
     bool is_shared = false;
     float cosine = 0, scatter_pdf = 0;
   };
-  // Radiance, times the weight of the path, that was emitted where the chain ends: reflections and
-  // refractions are all followed, not drawn.
-  [[nodiscard]] Rgb EmissionThrough(const SmoothChain& chain, KeyedRng& rng, int& rays) const;
+  // Radiance, times the weight of the path, that a chain of smooth surfaces brings from where its
+  // branches end: reflections and refractions are all followed, not drawn.
+  struct ChainLight {
+    Rgb emitted;    // by lights that branches meet
+    Rgb scattered;  // direct light at surfaces where each eye path ends
+  };
+  // Direct light is left out where `sampler` is nullptr.
+  [[nodiscard]] ChainLight LightThrough(const SmoothChain& chain, const PixelSampler* sampler,
+                                        KeyedRng& rng, int& rays) const;
+  // Adds direct light at a point where an eye path of `weight` ends: a sample of the lights, and
+  // one of the BSDF.
+  void AddDirect(const ShadingPoint& point, Rgb weight, const SobolPoint& u, Rgb& direct,
+                 int& rays) const;
   [[nodiscard]] PathWavelength WavelengthOf(const PixelSampler& sampler) const {
     return WavelengthOf(sampler.ForWavelength());
   }
@@ -224,6 +235,8 @@ class EyePathTracer {
   const std::vector<MaterialProperties> properties_;  // [materials]
   const bool has_lens_;
   const bool rays_find_lights_;  // some have an extent
+  // Direct light where a chain of smooth surfaces ends is sampled for all its branches.
+  const bool lights_ends_of_chains_;
   const CausticWeight caustic_weight_;
   const float branch_weight_;  // see BranchWeight
   // Radiance above which emission is spread over the film; infinite where none is.

@@ -32,10 +32,10 @@ class FirstHits {
   // Of the set that `pass` uses: known, or to be filled and called known. nullptr when its eye
   // paths are never used again or not kept.
   [[nodiscard]] FirstHitsOfSet* Of(std::uint64_t pass) {
-    const std::uint64_t turn = sets_ > 0 ? pass % static_cast<std::uint64_t>(sets_) : 0;
-    if (turn >= kept_.size()) return nullptr;
-    Kept& kept = kept_[turn];
     const std::uint64_t set = EyeSetOf(pass, sets_);
+    const std::uint64_t place = sets_ > 0 ? set % static_cast<std::uint64_t>(sets_) : 0;
+    if (place >= kept_.size()) return nullptr;
+    Kept& kept = kept_[place];
     if (kept.set != set || kept.hits.shapes.empty()) {
       kept.set = set;
       kept.hits.is_known = false;
@@ -51,7 +51,7 @@ class FirstHits {
   };
   std::size_t pixels_;
   int sets_;
-  std::vector<Kept> kept_;  // by turn
+  std::vector<Kept> kept_;  // by the place of the set among those that take turns
 };
 
 }  // namespace lucerna

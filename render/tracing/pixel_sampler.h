@@ -33,8 +33,11 @@ class PixelSampler {
         pass_(pass / 2),
         eye_set_(eye_set / 2) {}
 
-  // Film position (0, 1) and lens position (2, 3).
-  [[nodiscard]] SobolPoint ForCamera() const { return OwenSobol(eye_set_, key_); }
+  // Film position (0, 1) and lens position (2, 3). In an order of the pixel's own: the photons of
+  // the passes are parts of a Sobol' sequence in order, so that with the same order here each part
+  // of a pixel would meet the photons of certain parts of the light alone, however many passes
+  // come.
+  [[nodiscard]] SobolPoint ForCamera() const { return ShuffledOwenSobol(eye_set_, key_); }
 
   // Of path `number` of `count` in this pass. Stratified over all passes: no two of them share a
   // place on the film, as sets of eye paths do.
@@ -56,6 +59,13 @@ class PixelSampler {
     for (float& u : point)
       u = rng.Uniform();
     return point;
+  }
+
+  // As ForVertex, where a branch of the tree of smooth surfaces ends that begins at `vertex`.
+  [[nodiscard]] SobolPoint ForBranchEnd(int vertex, std::uint64_t branch) const {
+    const std::uint64_t key = CombineKeys(
+        CombineKeys(key_ ^ 0x4252414E43484553ULL, static_cast<std::uint64_t>(vertex)), branch);
+    return ShuffledOwenSobol(pass_, key);
   }
 
   // For the path's wavelength, in [0, 1).

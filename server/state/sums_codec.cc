@@ -45,12 +45,13 @@ void ForEachColumn(Columns& columns, const Visitor& column) {
   column(columns.direct_difference);
   column(columns.squared_deviations);
   for (auto* sums :
-       {&columns.even_bias, &columns.odd_bias, &columns.photon_count, &columns.largest})
+       {&columns.even_bias, &columns.odd_bias, &columns.bias_squares, &columns.photon_count,
+        &columns.largest})
     column(*sums);
 }
-constexpr std::size_t kPixelBytes = 7 * sizeof(double) + 8 * sizeof(float);
+constexpr std::size_t kPixelBytes = 7 * sizeof(double) + 9 * sizeof(float);
 // A column that is not in ForEachColumn would be lost.
-static_assert(sizeof(ImageSums::Columns) == 15 * sizeof(std::vector<float>));
+static_assert(sizeof(ImageSums::Columns) == 16 * sizeof(std::vector<float>));
 
 // Rows are written as they lie in memory, without gaps.
 static_assert(sizeof(ImageSums::Features) == 8 * sizeof(float) + 2 * sizeof(std::uint16_t));

@@ -48,6 +48,44 @@ TEST(EyePathTest, FollowsAllBranchesOfGlassSeenInRoughMetal) {
   EXPECT_NEAR(mean, static_cast<double>(kRadiance) * metal * 2 * r / (1 + r), 0.1 * mean);
 }
 
+// A pane in which a floor is seen that a light shines on; nothing is behind the pane. A path that
+// chose between reflection and refraction would see the floor one time in three.
+TEST(EyePathTest, SamplesDirectLightAtTheEndsOfAllBranchesOfGlass) {
+  constexpr float kAlbedo = 0.6F;
+  constexpr float kIntensity = 100;
+  constexpr float kHeight = 20;
+  Scene scene;
+  AddBox(scene, {2, -5, 0.1F}, {2.2F, 5, 9}, AddMaterial(scene, DielectricMaterial(2.5F)));
+  AddQuad(scene, {-9, -9, 0}, {10.5F, 0, 0}, {0, 18, 0},
+          AddMaterial(scene, DiffuseMaterial(kAlbedo)));
+  scene.point_lights.push_back({{0, 0, kHeight}, Gray(kIntensity)});
+  SetCamera(scene, {0, 0, 4}, {2, 0, 2}, {0, 0, 1}, 0.5, 1);
+  const RenderSettings settings = TestSettings(scene, 1000, 0.01, 40);
+  const SceneNeeds needs = NeedsOf(scene, settings);
+  const auto intersector = Intersector::Create(scene).value();
+  const LightSet lights(scene, *intersector);
+  const EyePathTracer tracer(scene, settings, needs, *intersector, lights);
+
+  constexpr int kPaths = 512;
+  double sum = 0;
+  double squares = 0;
+  for (std::uint64_t pass = 0; pass < kPaths; ++pass) {
+    const double seen = static_cast<double>(tracer.Trace(0, 0, pass, {}).direct.g);
+    sum += seen;
+    squares += seen * seen;
+  }
+  const double mean = sum / kPaths;
+  const double deviation = std::sqrt(squares / kPaths - mean * mean);
+  // Weak branches, of three reflections and more, are sampled now and then.
+  EXPECT_LT(deviation, 0.2 * mean);
+  // What both faces reflect, and the inner ones again: 2 r / (1 + r).
+  float cos_t = 0;
+  const auto r = static_cast<double>(FresnelDielectric(std::sqrt(0.5F), 2.5F, cos_t));
+  const double lit =
+      static_cast<double>(kAlbedo * kIntensity) / (3.14159265358979 * kHeight * kHeight);
+  EXPECT_NEAR(mean, lit * 2 * r / (1 + r), 0.05 * mean);
+}
+
 // The first disc, of three widths of a pixel, is no wider than what turns by 45 degrees, and no
 // narrower than a pixel; on what is flat or bent less it is as wide as it was.
 TEST(EyePathTest, DiscsOnBentSurfacesAreNarrower) {

@@ -1,8 +1,10 @@
 // A scene's plan: what one more feature turns on, and nothing else.
 #include "render/analysis/needs.h"
 
+#include <cstdint>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "gtest/gtest.h"
 
@@ -320,12 +322,23 @@ TEST(SceneNeedsTest, SetsOfEyePathsMustFit) {
 TEST(EyeSetOfTest, SetsTakeTurnsAndAreRenewed) {
   EXPECT_EQ(EyeSetOf(123, 0), 123U);
   EXPECT_EQ(EyeSetOf(3, 64), 3U);
-  EXPECT_EQ(EyeSetOf(64 + 3, 64), 3U);
-  EXPECT_EQ(EyeSetOf(64 * kRoundsOfSets - 1, 64), 63U);
+  EXPECT_EQ(EyeSetOf(64 + 3, 64), 1U);
+  EXPECT_EQ(EyeSetOf(64 * kRoundsOfSets - 1, 64), 33U);
   EXPECT_EQ(EyeSetOf(64 * kRoundsOfSets, 64), 64U);
   // Even passes use even sets: the halves of a render stay independent.
   for (std::uint64_t pass = 0; pass < 5000; ++pass)
     EXPECT_EQ(EyeSetOf(pass, 64) % 2, pass % 2);
+}
+
+// The photons of a pass are a part of a sequence in which every 64th part is alike in its first
+// digits: a set must not meet those alone.
+TEST(EyeSetOfTest, ASetMeetsOtherPartsOfTheLightEachTime) {
+  std::set<std::pair<std::uint64_t, std::uint64_t>> met;  // sets and passes within 64
+  for (std::uint64_t pass = 0; pass < 64 * kRoundsOfSets; ++pass) {
+    EXPECT_LT(EyeSetOf(pass, 64), 64U);
+    met.emplace(EyeSetOf(pass, 64), pass % 64);
+  }
+  EXPECT_EQ(met.size(), 64 * kRoundsOfSets);
 }
 
 }  // namespace

@@ -63,7 +63,8 @@ void ExpectBrought(int max_depth, double expected) {
   }
   const double mean = sum / kSeeds;
   const double error = std::sqrt(std::max(0.0, squares / kSeeds - mean * mean) / (kSeeds - 1));
-  EXPECT_NEAR(mean, expected, StudentQuantile(1e-3, kSeeds) * error);
+  // Where nothing varies there are the roundings of floats, some ten along a path.
+  EXPECT_NEAR(mean, expected, StudentQuantile(1e-3, kSeeds) * error + 10 * 0x1p-24 * expected);
   EXPECT_LT(StudentQuantile(1e-3, kSeeds) * error, 0.05);
 }
 

@@ -2,6 +2,7 @@
 #include "render/tracing/pixel_sampler.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
@@ -119,6 +120,24 @@ TEST(PixelSamplerTest, StratifiesThePassesOfAPixel) {
   }
   EXPECT_EQ(*std::ranges::max_element(film), 1);
   EXPECT_EQ(*std::ranges::max_element(light), 1);
+}
+
+// Photons of every 16th pass are alike in the first digits of their sequence (every 8th of the even
+// passes). With them a pixel must not meet the same part of itself each time.
+TEST(PixelSamplerTest, MeetsThePhotonsOfEachPassEverywhere) {
+  constexpr std::uint64_t kSampled = 20;
+  constexpr std::size_t kParts = 8;
+  std::size_t met = 0;
+  for (std::uint64_t pixel = 0; pixel < kSampled; ++pixel) {
+    std::array<bool, kParts> parts{};
+    for (std::uint64_t pass = 6; pass < 16 * 64; pass += 16) {
+      const float x = PixelSampler(1, pixel, pass, pass).ForCamera()[0];
+      parts[static_cast<std::size_t>(x * kParts)] = true;
+    }
+    met += static_cast<std::size_t>(std::ranges::count(parts, true));
+  }
+  // Of 64 independent places, each part is missed by one pixel in 5,000.
+  EXPECT_GE(met, kSampled * kParts - 2);
 }
 
 // The numbers of one vertex against the same ones of another, and of the camera.

@@ -83,6 +83,9 @@ class Appm final : public RadiusController {
     return next;
   }
 
+  // The published controllers show what their radii alone do.
+  bool RemovesBlur() const override { return true; }
+
   std::optional<TheorySlopes> Slopes() const override {
     return TheorySlopes{.noise = -2.0 / 3, .squared_bias = -2.0 / 3};
   }
