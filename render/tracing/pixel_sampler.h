@@ -33,11 +33,8 @@ class PixelSampler {
         pass_(pass / 2),
         eye_set_(eye_set / 2) {}
 
-  // Film position (0, 1) and lens position (2, 3). In an order of the pixel's own: the photons of
-  // the passes are parts of a Sobol' sequence in order, so that with the same order here each part
-  // of a pixel would meet the photons of certain parts of the light alone, however many passes
-  // come.
-  [[nodiscard]] SobolPoint ForCamera() const { return ShuffledOwenSobol(eye_set_, key_); }
+  // Film position (0, 1) and lens position (2, 3).
+  [[nodiscard]] SobolPoint ForCamera() const { return OwenSobol(PlaceInOrder(), key_); }
 
   // Of path `number` of `count` in this pass. Stratified over all passes: no two of them share a
   // place on the film, as sets of eye paths do.
@@ -86,6 +83,19 @@ class PixelSampler {
   }
 
  private:
+  // Which point of the camera's sequence is this pass's. The photons of passes are parts of a
+  // Sobol' sequence in their order, and the points of every 8th part are alike in three digits.
+  // With places on the film in the same order, an eighth of a pixel would meet those parts of the
+  // light alone, however many passes come. So an octal digit of the place is turned by chance for
+  // all places that have the same higher digits, which are a stratified set as they were.
+  [[nodiscard]] constexpr std::uint64_t PlaceInOrder() const {
+    std::uint64_t place = eye_set_;
+    std::uint64_t higher = eye_set_ >> 3;
+    for (unsigned int shift = 0; higher != 0; shift += 3, higher >>= 3)
+      place ^= (CombineKeys(key_ + shift, higher) & 7U) << shift;
+    return place;
+  }
+
   std::uint64_t key_;
   std::uint64_t pass_;
   std::uint64_t eye_set_;

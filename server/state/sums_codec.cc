@@ -44,9 +44,8 @@ void ForEachColumn(Columns& columns, const Visitor& column) {
     column(sums);
   column(columns.direct_difference);
   column(columns.squared_deviations);
-  for (auto* sums :
-       {&columns.even_bias, &columns.odd_bias, &columns.bias_squares, &columns.photon_count,
-        &columns.largest})
+  for (auto* sums : {&columns.even_bias, &columns.odd_bias, &columns.bias_squares,
+                     &columns.photon_count, &columns.largest})
     column(*sums);
 }
 constexpr std::size_t kPixelBytes = 7 * sizeof(double) + 9 * sizeof(float);

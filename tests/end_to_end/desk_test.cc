@@ -100,11 +100,15 @@ TEST_P(TilesTest, StitchToTheWholeImage) {
     const std::string& name = whole.channels[c].name;
     if (name.size() == 1 && name != "Z" && name != "A") continue;
     if (name.starts_with("photons") || name == "noise") continue;
+    // What is left of blur follows from what photons brought, which differs by their rounding.
+    const float tolerance = name == "bias" ? 1e-3F : 0;
     std::size_t different = 0;
     for (std::size_t i = 0; i < whole.channels[c].pixels.size(); ++i) {
       const float a = stitched.channels[c].pixels[i];
       const float b = whole.channels[c].pixels[i];
-      different += a == b || (std::isnan(a) && std::isnan(b)) ? 0 : 1;
+      const bool is_same =
+          a == b || (std::isnan(a) && std::isnan(b)) || std::abs(a - b) <= tolerance * std::abs(b);
+      different += is_same ? 0 : 1;
     }
     EXPECT_EQ(different, 0U) << "channel " << name;
   }

@@ -108,7 +108,7 @@ TEST(FurnaceTest, KeepsItsLightAroundACoarseRoundMirror) {
   // The mirror's own, and more where the bound on the ratio of cosines (worker/photon_path.cc)
   // acts, without which a third of this is lost.
   constexpr double kTaken = 0.01;
-  ExpectMean(Measure(scene, TestSettings(scene, 100000, 0.6, 100), 10, kParts, "G"), 2, 2 * kTaken);
+  ExpectMean(Measure(scene, TestSettings(scene, 100000, 0.6, 100), 24, kParts, "G"), 2, 2 * kTaken);
 }
 
 // Metal walls whose normals are bent, around a floor. The bottom is larger than the walls reach, so
