@@ -18,6 +18,7 @@ struct EstimatedScene {
   // The most by which the estimate may be too large.
   double most;
   int renders = 200;
+  int least_covered = 190;  // of them
 };
 
 class ErrorEstimateTest : public testing::TestWithParam<EstimatedScene> {};
@@ -27,7 +28,7 @@ TEST_P(ErrorEstimateTest, IsTrueAndItsIntervalsHoldTheTruthAtAllLooks) {
   const Scene scene = LoadScene(GetParam().file);
   const ErrorStudy study = StudyErrors(scene, HalvedReference(scene, size.side, 200, 10), size);
   RecordProperty("covered", study.Covered());
-  EXPECT_GE(study.Covered(), size.renders * 95 / 100);
+  EXPECT_GE(study.Covered(), GetParam().least_covered);
   for (const double ratio : study.Ratios()) {
     EXPECT_GT(ratio, 0.8);
     EXPECT_LT(ratio, GetParam().most);
@@ -39,11 +40,12 @@ TEST_P(ErrorEstimateTest, IsTrueAndItsIntervalsHoldTheTruthAtAllLooks) {
 // over noisy x is too large. Giving noise more weight in the guess mends that and makes the
 // estimate too small at hard shadows (0.7), which is worse.
 //
-// Rare bright paths decide whether the interval of a caustic holds: of four sets of 200 renders 188
-// to 197 did, 773 of all 800, so that 200 are too few to tell.
+// Rare bright paths decide whether the interval of a caustic holds: 1,513 of 1,600 did, 94.6 % with
+// a deviation of 0.6, and 375 of the first 400. Of 400, nineteen of twenty are 366 but for one set
+// in a thousand. (With the noise of random branches on glass, which is gone, it was 773 of 800.)
 INSTANTIATE_TEST_SUITE_P(Scenes, ErrorEstimateTest,
                          testing::Values(EstimatedScene{"penumbra.pbrt", 1.25},
-                                         EstimatedScene{"caustic.pbrt", 1.25, 400},
+                                         EstimatedScene{"caustic.pbrt", 1.25, 400, 366},
                                          EstimatedScene{"glass-box.pbrt", 1.25},
                                          EstimatedScene{"water-sun.pbrt", 1.35}),
                          [](const auto& scene) {
