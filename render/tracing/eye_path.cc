@@ -140,8 +140,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       properties_(PropertiesOf(scene.materials)),
       has_lens_(needs.Uses(Part::kLens)),
       rays_find_lights_(needs.Uses(Part::kAreaLights) || needs.Uses(Part::kEnvironment)),
-      lights_ends_of_chains_(parts_.lights && rays_find_lights_ &&
-                             direct_light == DirectLight::kEverywhere),
+      lights_ends_of_chains_(parts_.lights && direct_light == DirectLight::kEverywhere),
       caustic_weight_(scene, settings, intersector.bounds()),
       branch_weight_(BranchWeight(intersector, lights)),
       white_(SpreadAbove(scene, rays_find_lights_, intersector, lights)),
@@ -697,7 +696,8 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     const bool has_parts = parts_.lobes && whole_properties.has_parts;
     const float share_of_first = has_parts ? ShareOfFirst(whole, wo_local) : -1;
     const bool was_lit_before = was_collected && lights_ends_of_chains_;
-    if (parts_.lobes && whole_properties.scatters_smoothly && rays_find_lights_ && !was_collected) {
+    if (parts_.lobes && whole_properties.scatters_smoothly &&
+        (rays_find_lights_ || lights_ends_of_chains_) && !was_collected) {
       const ChainLight light =
           LightThrough({.surface = surface,
                         .material = whole,

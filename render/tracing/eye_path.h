@@ -235,8 +235,7 @@ class EyePathTracer {
   const std::vector<MaterialProperties> properties_;  // [materials]
   const bool has_lens_;
   const bool rays_find_lights_;  // some have an extent
-  // Direct light where a chain of smooth surfaces ends is sampled for all its branches, where they
-  // are followed anyway.
+  // Direct light where a chain of smooth surfaces ends is sampled for all its branches.
   const bool lights_ends_of_chains_;
   const CausticWeight caustic_weight_;
   const float branch_weight_;  // see BranchWeight

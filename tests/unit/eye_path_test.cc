@@ -52,14 +52,13 @@ TEST(EyePathTest, FollowsAllBranchesOfGlassSeenInRoughMetal) {
 // chose between reflection and refraction would see the floor one time in three.
 TEST(EyePathTest, SamplesDirectLightAtTheEndsOfAllBranchesOfGlass) {
   constexpr float kAlbedo = 0.6F;
-  constexpr float kRadiance = 100;
-  constexpr float kLightRadius = 0.5F;
+  constexpr float kIntensity = 100;
   constexpr float kHeight = 20;
   Scene scene;
   AddBox(scene, {2, -5, 0.1F}, {2.2F, 5, 9}, AddMaterial(scene, DielectricMaterial(2.5F)));
   AddQuad(scene, {-9, -9, 0}, {10.5F, 0, 0}, {0, 18, 0},
           AddMaterial(scene, DiffuseMaterial(kAlbedo)));
-  AddDisk(scene, {0, 0, kHeight}, {0, 0, -1}, kLightRadius, 0, AddAreaLight(scene, kRadiance));
+  scene.point_lights.push_back({{0, 0, kHeight}, Gray(kIntensity)});
   SetCamera(scene, {0, 0, 4}, {2, 0, 2}, {0, 0, 1}, 0.5, 1);
   const RenderSettings settings = TestSettings(scene, 1000, 0.01, 40);
   const SceneNeeds needs = NeedsOf(scene, settings);
@@ -83,7 +82,7 @@ TEST(EyePathTest, SamplesDirectLightAtTheEndsOfAllBranchesOfGlass) {
   float cos_t = 0;
   const auto r = static_cast<double>(FresnelDielectric(std::sqrt(0.5F), 2.5F, cos_t));
   const double lit =
-      static_cast<double>(kAlbedo * kRadiance * kLightRadius * kLightRadius / (kHeight * kHeight));
+      static_cast<double>(kAlbedo * kIntensity) / (3.14159265358979 * kHeight * kHeight);
   EXPECT_NEAR(mean, lit * 2 * r / (1 + r), 0.05 * mean);
 }
 
