@@ -11,18 +11,12 @@
 namespace lucerna {
 namespace {
 
-// Brushed metal, in which a pane of glass is seen that reflects a light, which is nowhere else. A
-// path that chose between reflection and refraction would find it one time in ten, ten times as
-// bright.
-TEST(EyePathTest, FollowsAllBranchesOfGlassSeenInRoughMetal) {
-  constexpr float kRadiance = 2;
-  Scene scene;
-  AddQuad(scene, {-5, -5, 0}, {10, 0, 0}, {0, 10, 0},
-          AddMaterial(scene, ConductorMaterial({0.2F, 0.2F, 0.2F}, {3, 3, 3}, 0.02F, 0.02F)));
-  AddBox(scene, {2, -5, 0.1F}, {2.2F, 5, 5}, AddMaterial(scene, DielectricMaterial(1.5F)));
-  AddQuad(scene, {-9, -9, 6}, {0, 18, 0}, {10.5F, 0, 0}, AddMaterial(scene, DiffuseMaterial(0)),
-          AddAreaLight(scene, kRadiance));
-  SetCamera(scene, {-2, 0, 2}, {0, 0, 0}, {0, 0, 1}, 0.5, 1);
+struct Measured {
+  double mean = 0, deviation = 0;
+};
+
+// Of the direct light of a scene's first pixel over many passes.
+Measured DirectLightOf(const Scene& scene) {
   const RenderSettings settings = TestSettings(scene, 1000, 0.01, 40);
   const SceneNeeds needs = NeedsOf(scene, settings);
   const auto intersector = Intersector::Create(scene).value();
@@ -38,7 +32,23 @@ TEST(EyePathTest, FollowsAllBranchesOfGlassSeenInRoughMetal) {
     squares += seen * seen;
   }
   const double mean = sum / kPaths;
-  const double deviation = std::sqrt(squares / kPaths - mean * mean);
+  return {mean, std::sqrt(squares / kPaths - mean * mean)};
+}
+
+// Brushed metal, in which a pane of glass is seen that reflects a light, which is nowhere else. A
+// path that chose between reflection and refraction would find it one time in ten, ten times as
+// bright.
+TEST(EyePathTest, FollowsAllBranchesOfGlassSeenInRoughMetal) {
+  constexpr float kRadiance = 2;
+  Scene scene;
+  AddQuad(scene, {-5, -5, 0}, {10, 0, 0}, {0, 10, 0},
+          AddMaterial(scene, ConductorMaterial({0.2F, 0.2F, 0.2F}, {3, 3, 3}, 0.02F, 0.02F)));
+  AddBox(scene, {2, -5, 0.1F}, {2.2F, 5, 5}, AddMaterial(scene, DielectricMaterial(1.5F)));
+  AddQuad(scene, {-9, -9, 6}, {0, 18, 0}, {10.5F, 0, 0}, AddMaterial(scene, DiffuseMaterial(0)),
+          AddAreaLight(scene, kRadiance));
+  SetCamera(scene, {-2, 0, 2}, {0, 0, 0}, {0, 0, 1}, 0.5, 1);
+
+  const auto [mean, deviation] = DirectLightOf(scene);
   EXPECT_LT(deviation, 0.5 * mean);
   // What both faces reflect, and the inner ones again: 2 r / (1 + r).
   const float cosine = std::sqrt(0.5F);
@@ -60,22 +70,8 @@ TEST(EyePathTest, SamplesDirectLightAtTheEndsOfAllBranchesOfGlass) {
           AddMaterial(scene, DiffuseMaterial(kAlbedo)));
   scene.point_lights.push_back({{0, 0, kHeight}, Gray(kIntensity)});
   SetCamera(scene, {0, 0, 4}, {2, 0, 2}, {0, 0, 1}, 0.5, 1);
-  const RenderSettings settings = TestSettings(scene, 1000, 0.01, 40);
-  const SceneNeeds needs = NeedsOf(scene, settings);
-  const auto intersector = Intersector::Create(scene).value();
-  const LightSet lights(scene, *intersector);
-  const EyePathTracer tracer(scene, settings, needs, *intersector, lights);
 
-  constexpr int kPaths = 512;
-  double sum = 0;
-  double squares = 0;
-  for (std::uint64_t pass = 0; pass < kPaths; ++pass) {
-    const double seen = static_cast<double>(tracer.Trace(0, 0, pass, {}).direct.g);
-    sum += seen;
-    squares += seen * seen;
-  }
-  const double mean = sum / kPaths;
-  const double deviation = std::sqrt(squares / kPaths - mean * mean);
+  const auto [mean, deviation] = DirectLightOf(scene);
   // Weak branches, of three reflections and more, are sampled now and then.
   EXPECT_LT(deviation, 0.2 * mean);
   // What both faces reflect, and the inner ones again: 2 r / (1 + r).
