@@ -29,9 +29,9 @@ double TogetherDeviating(double one, double other, double weight, double luminan
 }
 
 // Of both halves together, over the weight of the part.
-float BiasSquare(float even, float odd, const PassRange& part) {
-  const float both = even + odd;
-  return both * both / static_cast<float>(part.size());
+double BiasSquare(float even, float odd, const PassRange& part) {
+  const double both = static_cast<double>(even) + static_cast<double>(odd);
+  return both * both / static_cast<double>(part.size());
 }
 
 // A float that grows by another, as columns of floats do.
@@ -44,9 +44,9 @@ void Grow(double& sum, float by) {
 ImageSums::Columns::Columns(std::size_t pixels)
     : direct_difference(pixels),
       squared_deviations(pixels),
+      bias_squares(pixels),
       even_bias(pixels),
       odd_bias(pixels),
-      bias_squares(pixels),
       photon_count(pixels),
       largest(pixels) {
   for (std::vector<double>& column : radiance)
@@ -102,7 +102,7 @@ double ImageSums::WeighBy(std::uint64_t photons_per_pass) {
   scale(whole_.columns.squared_deviations, factor);
   scale(whole_.columns.even_bias, static_cast<float>(factor));
   scale(whole_.columns.odd_bias, static_cast<float>(factor));
-  scale(whole_.columns.bias_squares, static_cast<float>(factor));
+  scale(whole_.columns.bias_squares, factor);
   scale(whole_.columns.largest, static_cast<float>(std::sqrt(factor)));
   whole_.weights.even *= factor;
   whole_.weights.odd *= factor;
@@ -223,7 +223,7 @@ ImageSums::Pixel ImageSums::At(std::size_t pixel) const {
   sum.squared_deviations = whole_.columns.squared_deviations[pixel];
   sum.even_bias = static_cast<double>(whole_.columns.even_bias[pixel]);
   sum.odd_bias = static_cast<double>(whole_.columns.odd_bias[pixel]);
-  sum.bias_squares = static_cast<double>(whole_.columns.bias_squares[pixel]);
+  sum.bias_squares = whole_.columns.bias_squares[pixel];
   sum.photon_count = static_cast<double>(whole_.columns.photon_count[pixel]);
   sum.largest = whole_.columns.largest[pixel];
   PassRange before = {0, whole_.passes};
@@ -306,7 +306,7 @@ void ImageSums::AddTo(RawPixel& raw, const PassRange& before, const PassWeights&
   sum.largest = std::max(sum.largest, at(kLargestLuminance));
   Grow(sum.even_bias, at(kEvenBias));
   Grow(sum.odd_bias, at(kOddBias));
-  Grow(sum.bias_squares, BiasSquare(at(kEvenBias), at(kOddBias), slice.passes));
+  sum.bias_squares += BiasSquare(at(kEvenBias), at(kOddBias), slice.passes);
   Grow(sum.photon_count, at(kPhotonCount));
 }
 

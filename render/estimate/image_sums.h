@@ -105,8 +105,8 @@ class ImageSums {
     std::array<std::vector<double>, 6> radiance;        // photons, direct
     std::array<std::vector<float>, 3> half_difference;  // of photons weighted, of direct light not
     std::vector<float> direct_difference;               // of direct light alone, not weighted
-    std::vector<double> squared_deviations;
-    std::vector<float> even_bias, odd_bias, bias_squares, photon_count, largest;
+    std::vector<double> squared_deviations, bias_squares;
+    std::vector<float> even_bias, odd_bias, photon_count, largest;
   };
   // All that is kept of the passes added, without the tail: for checkpoints.
   struct Whole {

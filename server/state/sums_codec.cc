@@ -44,11 +44,12 @@ void ForEachColumn(Columns& columns, const Visitor& column) {
     column(sums);
   column(columns.direct_difference);
   column(columns.squared_deviations);
-  for (auto* sums : {&columns.even_bias, &columns.odd_bias, &columns.bias_squares,
-                     &columns.photon_count, &columns.largest})
+  column(columns.bias_squares);
+  for (auto* sums :
+       {&columns.even_bias, &columns.odd_bias, &columns.photon_count, &columns.largest})
     column(*sums);
 }
-constexpr std::size_t kPixelBytes = 7 * sizeof(double) + 9 * sizeof(float);
+constexpr std::size_t kPixelBytes = 8 * sizeof(double) + 8 * sizeof(float);
 // A column that is not in ForEachColumn would be lost.
 static_assert(sizeof(ImageSums::Columns) == 16 * sizeof(std::vector<float>));
 
