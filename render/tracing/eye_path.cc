@@ -45,6 +45,11 @@ double WhiteRadiance(const Intersector& intersector, const LightSet& lights) {
 // Direct light at the end of a weaker branch is sampled in some of the passes alone.
 constexpr float kSurelyLit = 0.1F;
 
+// Camera rays that look for direct light at the ends of chains before the first pass, and how many
+// must meet a chain for them to say that there is none.
+constexpr std::uint64_t kPilotRays = 1024;
+constexpr int kFewestChains = 64;
+
 // Whether all eye paths end there.
 bool EndsPaths(const MaterialProperties& properties) {
   return properties.gathers && !properties.has_parts;
@@ -162,6 +167,45 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
   footprint_slope_ =
       static_cast<float>(PixelFootprint(scene.camera, settings.width, settings.height, 1) -
                          PixelFootprint(scene.camera, settings.width, settings.height, 0));
+  // Under water a sun lights nothing but by caustics, and following all branches of what the camera
+  // sees through the waves costs a tenth of a pass. Where lights have an extent branches are
+  // followed for their emission anyway.
+  if (lights_ends_of_chains_ && !rays_find_lights_ && !parts_.media &&
+      scene.camera.kind != Camera::Kind::kSensors) {
+    lights_ends_of_chains_ = FindsLightThroughChains();
+  }
+}
+
+bool EyePathTracer::FindsLightThroughChains() const {
+  constexpr std::uint64_t kPilotKey = 0x50494C4F54524159ULL;
+  int chains = 0;
+  for (std::uint64_t i = 0; i < kPilotRays; ++i) {
+    const SobolPoint u = OwenSobol(i, kPilotKey);
+    const Ray ray =
+        CameraRayThrough(static_cast<double>(u[0]) * settings_.width,
+                         static_cast<double>(u[1]) * settings_.height, OnLens(u[2], u[3]));
+    Hit hit;
+    if (!FindFirst(ray, {}, hit)) continue;
+    SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+    if (!properties_[surface.material].scatters_smoothly) continue;
+    ++chains;
+    const Vec3 wo = -ray.direction;
+    const PixelSampler sampler(kPilotKey, i, 0, 0);
+    const PathWavelength wavelength = WavelengthOf(u[4]);
+    std::optional<Material> storage;
+    const Material& material = MaterialAt(scene_, surface, wo, storage, wavelength);
+    KeyedRng rng = sampler.ForBranches();
+    TracedRays traced;
+    int rays = 0;
+    const ChainLight light = LightThrough({.surface = surface,
+                                           .material = material,
+                                           .wo = wo,
+                                           .wavelength = wavelength,
+                                           .weight = Gray(1)},
+                                          &sampler, rng, traced, rays);
+    if (!IsBlack(light.scattered)) return true;
+  }
+  return chains < kFewestChains;
 }
 
 Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const {
@@ -234,6 +278,7 @@ Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, PathWavelength wavelen
   const Rgb bright = BrightPart(lights_.EmittedRadiance(surface, wo));
   if (!properties_[surface.material].scatters_smoothly) return bright;
   int rays = 0;
+  TracedRays traced;
   std::optional<Material> storage;
   const Material& material = MaterialAt(scene_, surface, wo, storage, wavelength);
   const Rgb color = wavelength.IsFirstUsedAt(material) ? wavelength.color() : Gray(1);
@@ -242,7 +287,7 @@ Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, PathWavelength wavelen
                                          .wo = wo,
                                          .wavelength = wavelength,
                                          .weight = color},
-                                        nullptr, rng, rays);
+                                        nullptr, rng, traced, rays);
   return bright + BrightPart(light.emitted);
 }
 
@@ -384,7 +429,7 @@ std::array<EyePathTracer::SmoothBranch, EyePathTracer::kSmoothLobes> EyePathTrac
 
 EyePathTracer::ChainLight EyePathTracer::LightThrough(const SmoothChain& chain,
                                                       const PixelSampler* sampler, KeyedRng& rng,
-                                                      int& rays) const {
+                                                      TracedRays& traced, int& rays) const {
   struct Branch {
     Ray ray;
     std::int32_t medium;
@@ -399,7 +444,7 @@ EyePathTracer::ChainLight EyePathTracer::LightThrough(const SmoothChain& chain,
     return caustic_weight_.OfRays(emission_density, chain.cosine, chain.scatter_pdf);
   };
   // A pair at each vertex, of which one is followed at once: the stack grows by one a vertex.
-  std::vector<Branch> branches;
+  absl::InlinedVector<Branch, 8> branches;
   const auto branch_at = [&](const SurfacePoint& surface, const Material& whole, Vec3 wo,
                              std::int32_t before, const PathWavelength& of_path, Rgb weight,
                              int vertex, std::uint64_t number, const FacetSides& sides_before) {
@@ -434,15 +479,20 @@ EyePathTracer::ChainLight EyePathTracer::LightThrough(const SmoothChain& chain,
     Branch branch = branches.back();
     branches.pop_back();
     Hit hit;
-    const Vec3 from = branch.ray.origin;
-    if (!FindThroughMedia(branch.ray, hit, branch.medium, branch.weight, rays)) {
+    const Ray ray = branch.ray;
+    const Vec3 from = ray.origin;
+    const bool is_met = FindThroughMedia(branch.ray, hit, branch.medium, branch.weight, rays);
+    SurfacePoint surface;
+    if (is_met) surface = intersector_.SurfaceAt(branch.ray, hit);
+    if (!parts_.media && traced.size() < traced.capacity())
+      traced.push_back({ray, is_met, hit.t, surface});
+    if (!is_met) {
       if (branch.sides.is_behind()) continue;
       const Vec3 direction = branch.ray.direction;
       light.emitted += branch.weight * lights_.InfiniteRadiance(from, direction) *
                        share_of_rays(lights_.EmissionDensityInfinite(from, direction));
       continue;
     }
-    SurfacePoint surface = intersector_.SurfaceAt(branch.ray, hit);
     const Vec3 wo = -branch.ray.direction;
     const Rgb emitted = branch.sides.is_behind() ? Rgb() : lights_.EmittedRadiance(surface, wo);
     if (!IsBlack(emitted))
@@ -595,6 +645,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
   // one bright speck in thousands of passes.
   bool was_collected = false;
   KeyedRng branch_rng = sampler.ForBranches();
+  TracedRays traced;
   // The last surface that gathers caustic photons, as long as only smooth ones have come since.
   struct Receiver {
     float scatter_pdf = 0, cosine = 0;
@@ -642,9 +693,19 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
 
   for (int vertex = 0;; ++vertex) {
     Hit hit;
-    ++path.rays;
     const Vec3 from = ray.origin;
-    bool is_met = vertex == 0 ? FindFirst(ray, first, hit) : intersector_.Intersect(ray, hit);
+    const auto known = std::ranges::find_if(traced, [&](const TracedRay& other) {
+      return other.ray.origin == ray.origin && other.ray.direction == ray.direction;
+    });
+    const bool is_known = known != traced.end();
+    bool is_met = false;
+    if (is_known) {
+      is_met = known->is_met;
+      hit.t = known->t;
+    } else {
+      ++path.rays;
+      is_met = vertex == 0 ? FindFirst(ray, first, hit) : intersector_.Intersect(ray, hit);
+    }
     if (parts_.media) {
       is_met = media_.Follow(ray, is_met, hit, medium, path.rays, pass_leg);
     } else if (is_met) {
@@ -664,7 +725,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
                      (mis * share_of_rays(lights_.EmissionDensityInfinite(from, ray.direction)));
       return finish();
     }
-    SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
+    SurfacePoint surface = is_known ? known->surface : intersector_.SurfaceAt(ray, hit);
     const Vec3 wo = -ray.direction;
     const Rgb emitted = sides.is_behind() ? Rgb() : lights_.EmittedRadiance(surface, wo);
     if (vertex == 0) {
@@ -698,6 +759,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     const bool was_lit_before = was_collected && lights_ends_of_chains_;
     if (parts_.lobes && whole_properties.scatters_smoothly &&
         (rays_find_lights_ || lights_ends_of_chains_) && !was_collected) {
+      traced.clear();
       const ChainLight light =
           LightThrough({.surface = surface,
                         .material = whole,
@@ -710,7 +772,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
                         .is_shared = parts_.caustics && receiver.is_last,
                         .cosine = receiver.cosine,
                         .scatter_pdf = receiver.scatter_pdf},
-                       lights_ends_of_chains_ ? &sampler : nullptr, branch_rng, path.rays);
+                       lights_ends_of_chains_ ? &sampler : nullptr, branch_rng, traced, path.rays);
       if (vertex == 0) {
         add_first_emission(light.emitted);
       } else {

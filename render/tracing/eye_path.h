@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "absl/container/inlined_vector.h"
+
 #include "render/analysis/needs.h"
 #include "render/estimate/hitpoint_block.h"
 #include "render/geometry/bend_radii.h"
@@ -174,6 +176,9 @@ class EyePathTracer {
     bool dispersion = false;
   };
   [[nodiscard]] static WalkParts WalkPartsFor(const SceneNeeds& needs);
+  // Whether direct light was found where chains of smooth surfaces end that the camera sees, or too
+  // few chains were seen to say so. Always the same for a scene and an image size.
+  [[nodiscard]] bool FindsLightThroughChains() const;
   [[nodiscard]] EyePath Walk(Ray ray, const PixelSampler& sampler, First first) const;
   // The path of a pixel that is no more than a sensor.
   [[nodiscard]] EyePath AtSensor(std::size_t number, const PixelSampler& sampler) const;
@@ -210,9 +215,18 @@ class EyePathTracer {
     Rgb emitted;    // by lights that branches meet
     Rgb scattered;  // direct light at surfaces where each eye path ends
   };
-  // Direct light is left out where `sampler` is nullptr.
+  // What rays of the first branches met, outside of media: the path itself takes one of them.
+  struct TracedRay {
+    Ray ray;
+    bool is_met = false;
+    float t = 0;
+    SurfacePoint surface;
+  };
+  using TracedRays = absl::InlinedVector<TracedRay, 6>;
+  // Direct light is left out where `sampler` is nullptr. `traced` is added to up to its inlined
+  // size.
   [[nodiscard]] ChainLight LightThrough(const SmoothChain& chain, const PixelSampler* sampler,
-                                        KeyedRng& rng, int& rays) const;
+                                        KeyedRng& rng, TracedRays& traced, int& rays) const;
   // Adds direct light at a point where an eye path of `weight` ends: a sample of the lights, and
   // one of the BSDF.
   void AddDirect(const ShadingPoint& point, Rgb weight, const SobolPoint& u, Rgb& direct,
@@ -236,7 +250,7 @@ class EyePathTracer {
   const bool has_lens_;
   const bool rays_find_lights_;  // some have an extent
   // Direct light where a chain of smooth surfaces ends is sampled for all its branches.
-  const bool lights_ends_of_chains_;
+  bool lights_ends_of_chains_;
   const CausticWeight caustic_weight_;
   const float branch_weight_;  // see BranchWeight
   // Radiance above which emission is spread over the film; infinite where none is.

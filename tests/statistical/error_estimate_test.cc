@@ -109,9 +109,10 @@ TEST(StopOnErrorTest, EndsBelowTheTargetWithAtMostFourTimesThePhotonsNeeded) {
 
 // Wide kernels: few pixels share no photons. And the first passes, which no guide of photons helped
 // yet, have most of the noise of all, so that few passes say how much that is. Intervals are wider,
-// and of twelve renders eight stop within six times the photons needed, where all of glass-box stop
-// within four; one of six had not stopped after eight times. Those that stop keep the promise. What
-// is needed is half of what it was without guides.
+// and of 120 renders (24 of each of five orders of places on the film, between which chance
+// decides) 110 stop within six times the photons needed, where those of glass-box stop within four.
+// Of six, fewer than four do by chance in one of a hundred sets. All that stop keep the promise.
+// What is needed is half of what it was without guides.
 TEST(StopOnErrorTest, EndsBelowTheTargetInAPenumbraToo) {
   constexpr int kPassesNeeded = 25;
   const StudySize size = {.side = 96, .renders = 6, .passes = 6 * kPassesNeeded};

@@ -82,6 +82,35 @@ TEST(EyePathTest, SamplesDirectLightAtTheEndsOfAllBranchesOfGlass) {
   EXPECT_NEAR(mean, lit * 2 * r / (1 + r), 0.05 * mean);
 }
 
+// Water over a floor under a point light, and a wall that the water mirrors. Light passes the water
+// by caustics alone: only where the wall is lit are both branches followed, which takes another
+// ray.
+TEST(EyePathTest, FollowsBranchesOnlyWhereTheyFindDirectLight) {
+  const auto most_rays = [](bool is_wall_there) {
+    Scene scene;
+    const std::uint32_t white = AddMaterial(scene, DiffuseMaterial(0.5F));
+    AddQuad(scene, {-90, -90, 0}, {180, 0, 0}, {0, 180, 0}, white);
+    AddQuad(scene, {-90, -90, 1}, {180, 0, 0}, {0, 180, 0},
+            AddMaterial(scene, DielectricMaterial(1.33F)));
+    if (is_wall_there) AddQuad(scene, {9, -90, 1.5F}, {0, 0, 90}, {0, 180, 0}, white);
+    scene.point_lights.push_back({{0, 0, 9}, Gray(100)});
+    SetCamera(scene, {0, 0, 5}, {4, 0, 1}, {0, 0, 1}, 0.5, 1);
+    const RenderSettings settings = TestSettings(scene, 1000, 0.01, 40);
+    const SceneNeeds needs = NeedsOf(scene, settings);
+    const auto intersector = Intersector::Create(scene).value();
+    const LightSet lights(scene, *intersector);
+    const EyePathTracer tracer(scene, settings, needs, *intersector, lights);
+    int rays = 0;
+    for (std::uint64_t pass = 0; pass < 100; ++pass)
+      rays = std::max(rays, tracer.Trace(0, 0, pass, {}).rays);
+    return rays;
+  };
+  // Camera, refraction, shadow.
+  EXPECT_EQ(most_rays(false), 3);
+  // Also the reflection, and another shadow.
+  EXPECT_EQ(most_rays(true), 5);
+}
+
 // The first disc, of three widths of a pixel, is no wider than what turns by 45 degrees, and no
 // narrower than a pixel; on what is flat or bent less it is as wide as it was.
 TEST(EyePathTest, DiscsOnBentSurfacesAreNarrower) {
