@@ -25,8 +25,10 @@ double Normal(KeyedRng& rng) {
   return std::sqrt(-2 * std::log(u)) * std::cos(angle);
 }
 
-// Passes in which kernels changed each pixel by `bias`, with this deviation.
-ImageSums SumsOf(std::size_t pixels, double bias, double deviation, double photons_in_pass) {
+// Passes in which kernels changed each pixel by `bias`, with this deviation; all light times
+// `scale`.
+ImageSums SumsOf(std::size_t pixels, double bias, double deviation, double photons_in_pass,
+                 double scale = 1) {
   ImageSums sums(pixels);
   ThreadTeam team(1);
   KeyedRng rng(5);
@@ -35,10 +37,11 @@ ImageSums SumsOf(std::size_t pixels, double bias, double deviation, double photo
     const auto size = static_cast<double>(round.size());
     for (std::size_t i = 0; i < pixels; ++i) {
       for (std::size_t c = 0; c < 3; ++c)
-        slice.columns[kPhotonRadiance + c].Set(i, static_cast<float>(kLight * size));
+        slice.columns[kPhotonRadiance + c].Set(i, static_cast<float>(scale * kLight * size));
       const PassWeights weights = WeightsOf(round);
       const auto half = [&](double passes) {
-        return static_cast<float>(passes * bias + std::sqrt(passes) * deviation * Normal(rng));
+        return static_cast<float>(scale *
+                                  (passes * bias + std::sqrt(passes) * deviation * Normal(rng)));
       };
       slice.columns[kEvenBias].Set(i, half(weights.even));
       slice.columns[kOddBias].Set(i, half(weights.odd));
@@ -88,6 +91,23 @@ TEST(WithoutBlurTest, NoLightIsLessThanNone) {
   const ImageSums sums = SumsOf(1, 1.1 * kLight, 0, kPhotonsInPass);
   const auto appm = Controller(RadiusControllerKind::kAppm);
   EXPECT_NEAR(WithoutBlur(sums, *appm).At(0).photons[1], 0, 1e-9);
+}
+
+// Squares of biases as faint as this are 0 as floats, and blur that varies would be sure.
+TEST(WithoutBlurTest, IsTheSameWhateverFactorScalesAllLight) {
+  constexpr std::size_t kSomePixels = 100;
+  constexpr double kDeviation = 0.3;
+  constexpr double kBias = 3.5 * kDeviation / 8;  // 3.5 deviations of the mean of 64 passes
+  const auto appm = Controller(RadiusControllerKind::kAppm);
+  const ImageSums sums = SumsOf(kSomePixels, kBias, kDeviation, kPhotonsInPass);
+  for (const double scale : {0x1p-80, 0x1p60}) {
+    const ImageSums scaled = SumsOf(kSomePixels, kBias, kDeviation, kPhotonsInPass, scale);
+    for (std::size_t i = 0; i < kSomePixels; ++i) {
+      EXPECT_EQ(WithoutBlur(scaled, *appm).At(i).photons[1],
+                scale * WithoutBlur(sums, *appm).At(i).photons[1])
+          << scale;
+    }
+  }
 }
 
 // Of pixels without blur at most about one in 170 is changed.
