@@ -195,14 +195,13 @@ bool EyePathTracer::FindsLightThroughChains() const {
     std::optional<Material> storage;
     const Material& material = MaterialAt(scene_, surface, wo, storage, wavelength);
     KeyedRng rng = sampler.ForBranches();
-    TracedRays traced;
     int rays = 0;
     const ChainLight light = LightThrough({.surface = surface,
                                            .material = material,
                                            .wo = wo,
                                            .wavelength = wavelength,
                                            .weight = Gray(1)},
-                                          &sampler, rng, traced, rays);
+                                          &sampler, rng, nullptr, rays);
     if (!IsBlack(light.scattered)) return true;
   }
   return chains < kFewestChains;
@@ -278,7 +277,6 @@ Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, PathWavelength wavelen
   const Rgb bright = BrightPart(lights_.EmittedRadiance(surface, wo));
   if (!properties_[surface.material].scatters_smoothly) return bright;
   int rays = 0;
-  TracedRays traced;
   std::optional<Material> storage;
   const Material& material = MaterialAt(scene_, surface, wo, storage, wavelength);
   const Rgb color = wavelength.IsFirstUsedAt(material) ? wavelength.color() : Gray(1);
@@ -287,7 +285,7 @@ Rgb EyePathTracer::BrightOf(const Ray& ray, KeyedRng rng, PathWavelength wavelen
                                          .wo = wo,
                                          .wavelength = wavelength,
                                          .weight = color},
-                                        nullptr, rng, traced, rays);
+                                        nullptr, rng, nullptr, rays);
   return bright + BrightPart(light.emitted);
 }
 
@@ -429,7 +427,7 @@ std::array<EyePathTracer::SmoothBranch, EyePathTracer::kSmoothLobes> EyePathTrac
 
 EyePathTracer::ChainLight EyePathTracer::LightThrough(const SmoothChain& chain,
                                                       const PixelSampler* sampler, KeyedRng& rng,
-                                                      TracedRays& traced, int& rays) const {
+                                                      TracedRays* traced, int& rays) const {
   struct Branch {
     Ray ray;
     std::int32_t medium;
@@ -484,8 +482,8 @@ EyePathTracer::ChainLight EyePathTracer::LightThrough(const SmoothChain& chain,
     const bool is_met = FindThroughMedia(branch.ray, hit, branch.medium, branch.weight, rays);
     SurfacePoint surface;
     if (is_met) surface = intersector_.SurfaceAt(branch.ray, hit);
-    if (!parts_.media && traced.size() < traced.capacity())
-      traced.push_back({ray, is_met, hit.t, surface});
+    if (traced != nullptr && !parts_.media && traced->size() < traced->capacity())
+      traced->push_back({ray, is_met, hit.t, surface});
     if (!is_met) {
       if (branch.sides.is_behind()) continue;
       const Vec3 direction = branch.ray.direction;
@@ -772,7 +770,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
                         .is_shared = parts_.caustics && receiver.is_last,
                         .cosine = receiver.cosine,
                         .scatter_pdf = receiver.scatter_pdf},
-                       lights_ends_of_chains_ ? &sampler : nullptr, branch_rng, traced, path.rays);
+                       lights_ends_of_chains_ ? &sampler : nullptr, branch_rng, &traced, path.rays);
       if (vertex == 0) {
         add_first_emission(light.emitted);
       } else {

@@ -215,7 +215,7 @@ class EyePathTracer {
     Rgb emitted;    // by lights that branches meet
     Rgb scattered;  // direct light at surfaces where each eye path ends
   };
-  // What rays of the first branches met, outside of media: the path itself takes one of them.
+  // What rays of the first branches met: the path itself takes one of them.
   struct TracedRay {
     Ray ray;
     bool is_met = false;
@@ -223,10 +223,10 @@ class EyePathTracer {
     SurfacePoint surface;
   };
   using TracedRays = absl::InlinedVector<TracedRay, 6>;
-  // Direct light is left out where `sampler` is nullptr. `traced` is added to up to its inlined
-  // size.
+  // Direct light is left out where `sampler` is nullptr. Outside of media `traced`, where there is
+  // one, is filled up to its inlined size.
   [[nodiscard]] ChainLight LightThrough(const SmoothChain& chain, const PixelSampler* sampler,
-                                        KeyedRng& rng, TracedRays& traced, int& rays) const;
+                                        KeyedRng& rng, TracedRays* traced, int& rays) const;
   // Adds direct light at a point where an eye path of `weight` ends: a sample of the lights, and
   // one of the BSDF.
   void AddDirect(const ShadingPoint& point, Rgb weight, const SobolPoint& u, Rgb& direct,
