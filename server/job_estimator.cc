@@ -21,6 +21,7 @@
 #include "render/estimate/photon_noise.h"
 #include "render/estimate/photon_steps.h"
 #include "render/estimate/pixel_radii.h"
+#include "render/estimate/radius_scale.h"
 #include "render/estimate/relative_error.h"
 #include "render/estimate/without_blur.h"
 #include "render/film/film.h"
@@ -115,6 +116,7 @@ struct JobEstimator::State {
   std::unique_ptr<RadiusController> controller;
   std::unique_ptr<PixelRadii> radii;
   std::unique_ptr<ImageSums> sums;
+  double blur_noise_share = 1;             // of the whole passes
   std::unique_ptr<PassVariance> variance;  // of the rounds of one pass, while they come
   // What rounds follow from that are planned by the state after so many passes.
   struct After {
@@ -135,6 +137,8 @@ struct JobEstimator::State {
   float widest_radius = 0;  // of these hitpoints
   double hit_share = 0;     // of the pixels that have one
 
+  // The image as it is shown.
+  [[nodiscard]] WithoutBlur Shown() const { return {*sums, *controller, blur_noise_share}; }
   [[nodiscard]] std::size_t pixels() const {
     return static_cast<std::size_t>(settings.crop_width()) *
            static_cast<std::size_t>(settings.crop_height());
@@ -144,6 +148,7 @@ struct JobEstimator::State {
   void BeginSums() {
     radii = std::make_unique<PixelRadii>(pixels(), initial_radius, *controller);
     sums = std::make_unique<ImageSums>(pixels());
+    blur_noise_share = 1;
     if (settings.adaptive_photons) variance = std::make_unique<PassVariance>(pixels());
   }
 
@@ -272,9 +277,15 @@ void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundP
   if (state.variance != nullptr) state.variance->Add(*round, *state.sums);
   state.sums->Add(*round, state.team);
   // Without a guide nothing of a pixel follows from others, so that tiles match the whole image.
-  const double noise_share =
-      state.settings.unguided ? kUnguidedNoiseShare : PhotonNoiseShare(*state.sums);
-  state.radii->Step(*round, *plan.radii, noise_share, state.team);
+  PixelRadii::OfImage image = {.noise_share = kUnguidedNoiseShare};
+  if (!state.settings.unguided) {
+    const NoiseSample sample = SampleNoise(*state.sums);
+    state.blur_noise_share = BlurNoiseShare(*state.sums, sample);
+    image = {.noise_share = PhotonNoiseShare(*state.sums, sample),
+             .scale = RadiusScale(*state.sums, *state.radii, sample,
+                                  static_cast<std::size_t>(state.settings.crop_width()))};
+  }
+  state.radii->Step(*round, *plan.radii, image, state.team);
   state.last_radii = plan.radii;
   const std::uint64_t passes = whole_passes();
   const State::After before = state.after.rbegin()->second;
@@ -354,6 +365,7 @@ BandedImage JobEstimator::MakeBands() const {
     const State& state = *state_;
     const Scene& scene = state.prepared.scene();
     const ImageSums& sums = *state.sums;
+    const WithoutBlur shown = state.Shown();
     const auto width = static_cast<std::size_t>(state.settings.crop_width());
     const std::size_t first = static_cast<std::size_t>(first_row) * width;
     const std::size_t last = static_cast<std::size_t>(last_row) * width;
@@ -361,12 +373,11 @@ BandedImage JobEstimator::MakeBands() const {
         MakeFilmPixels({.exposure = scene.film.exposure,
                         .max_component = scene.film.max_component,
                         .has_coverage = state.settings.coverage},
-                       first, last, sums, *state.last_radii, *state.radii, *state.controller,
+                       first, last, sums, shown, *state.last_radii, *state.radii, *state.controller,
                        Kernel{state.settings.kernel}, state_->team);
     ToFileUnit(band, scene.unit);
     if (!has_noise) return band;
     const double weight = sums.weights().all();
-    const WithoutBlur shown(sums, *state.controller);
     const auto errors_of = [&](std::size_t offset) {
       const ImageSums::Pixel of_pixel = shown.At(first + offset);
       PixelValues values;
@@ -386,7 +397,7 @@ std::vector<float> JobEstimator::NoiseLayer() const {
   const double weight = weights.all();
   const double exposure = state_->prepared.scene().film.exposure;
   const double noise_area = NoiseArea();
-  const WithoutBlur shown(sums, *state_->controller);
+  const WithoutBlur shown = state_->Shown();
   std::vector<PixelNoise> noise(sums.pixels());
   constexpr std::size_t kPixelsAtOnce = 4096;
   state_->team.For(noise.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
@@ -422,7 +433,7 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
   const double exposure = state.prepared.scene().film.exposure;
   const std::size_t pixels = state.sums->pixels();
   EstimatorSnapshot snapshot;
-  const WithoutBlur shown(*state.sums, *state.controller);
+  const WithoutBlur shown = state.Shown();
   snapshot.photons = photons();
   snapshot.lights = state.sums->tally().lights;
   snapshot.image =
@@ -664,6 +675,7 @@ Status JobEstimator::State::RestoreSums(ByteReader& reader) {
     return absl::InvalidArgumentError("malformed checkpoint: it ends too soon or too late");
   }
   sums = std::make_unique<ImageSums>(std::move(read_sums));
+  blur_noise_share = settings.unguided ? 1 : BlurNoiseShare(*sums, SampleNoise(*sums));
   radii = std::make_unique<PixelRadii>(std::move(numbers), *controller);
   variance = std::move(read_variance);
   last_radii = std::move(read_last_radii);

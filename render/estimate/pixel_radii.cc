@@ -21,7 +21,7 @@ PixelRadii::PixelRadii(Numbers numbers, const RadiusController& controller)
   LUCERNA_CHECK(numbers_.memory.size() == numbers_.radius.size() * memory_per_pixel_);
 }
 
-void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, double noise_share,
+void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, const OfImage& image,
                       ThreadTeam& team) {
   LUCERNA_CHECK(round.pixels() == numbers_.radius.size() && used.size() == numbers_.radius.size() &&
                 round.evidence <= kMostControllerColumns);
@@ -39,7 +39,8 @@ void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, double n
            .columns = std::span<const double>(columns).first(round.evidence),
            .blur = static_cast<double>(round.At(kBlur, pixel)),
            .rounds = rounds,
-           .noise_share = noise_share},
+           .noise_share = image.noise_share,
+           .scale = image.scale},
           round.passes,
           std::span<double>(numbers_.memory).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
     }

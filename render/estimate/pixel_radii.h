@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,9 +25,13 @@ class PixelRadii {
   struct Numbers;
   PixelRadii(Numbers numbers, const RadiusController& controller);
 
-  // Takes in a round whose hitpoints gathered with `used` [pixels]. noise_share: as RoundEvidence
-  // has it.
-  void Step(const SliceSums& round, const RadiusColumn& used, double noise_share, ThreadTeam& team);
+  // What the whole image says of the radii of its pixels, as RoundEvidence has it.
+  struct OfImage {
+    double noise_share = 1, scale = 1;
+  };
+  // Takes in a round whose hitpoints gathered with `used` [pixels].
+  void Step(const SliceSums& round, const RadiusColumn& used, const OfImage& image,
+            ThreadTeam& team);
 
   // The radii after the rounds so far [pixels].
   [[nodiscard]] RadiusColumn Current() const;
@@ -34,6 +39,12 @@ class PixelRadii {
   [[nodiscard]] std::span<const double> memory(std::size_t pixel) const {
     return std::span<const double>(numbers_.memory)
         .subspan(pixel * memory_per_pixel_, memory_per_pixel_);
+  }
+
+  // RadiusController::Scaled of a pixel, after `passes` in so many rounds.
+  [[nodiscard]] std::optional<ScaledRadius> ScaledAt(std::size_t pixel, std::uint64_t passes,
+                                                     std::uint64_t rounds) const {
+    return controller_.Scaled(memory(pixel), passes, rounds);
   }
 
   // All that is kept of the rounds taken in: for checkpoints.

@@ -36,12 +36,20 @@ struct RoundEvidence {
   double blur = 0;
   std::uint64_t rounds = 1;  // so far, with this one
   double noise_share = 1;    // as PhotonNoiseShare has it, or what is assumed
+  double scale = 1;          // as RadiusScale has it, or 1
 };
 
 // What a frequency controller predicts for a pixel.
 struct BandwidthPrediction {
   double trace = 0;       // of the spatial spectral covariance [1/unit radius²]
   double min_radius = 0;  // that keeps the bias within the tolerance [unit radii]
+};
+
+// What a factor for the radii of the whole image (estimate/radius_scale.h) does to a pixel's. Both
+// relative to the radius that it would have without a factor.
+struct ScaledRadius {
+  double most = 1;  // that the pixel's own evidence allows, at most 1
+  double use = 1;   // in the mean of the passes so far
 };
 
 // The powers of the photon count with which two parts of the mean squared error of converging
@@ -65,6 +73,12 @@ class RadiusController {
                                          std::span<double> memory) const = 0;
   // Whether blur that photons surely show is taken off the image (estimate/without_blur.h).
   [[nodiscard]] virtual bool RemovesBlur() const { return false; }
+  // After `passes` in so many rounds; absent when the controller scales no radii, or not yet.
+  [[nodiscard]] virtual std::optional<ScaledRadius> Scaled(std::span<const double> /*memory*/,
+                                                           std::uint64_t /*passes*/,
+                                                           std::uint64_t /*rounds*/) const {
+    return std::nullopt;
+  }
   // Whether Predict ever says anything.
   [[nodiscard]] virtual bool Predicts() const { return false; }
   // Absent when the controller makes none, or has too little evidence for the pixel yet.

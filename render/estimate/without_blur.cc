@@ -26,11 +26,13 @@ constexpr double kLeft = 0.05;
 
 }  // namespace
 
-WithoutBlur::WithoutBlur(const ImageSums& sums, const RadiusController& controller)
+WithoutBlur::WithoutBlur(const ImageSums& sums, const RadiusController& controller,
+                         double noise_share)
     : sums_(sums),
       weight_(sums.weights().all()),
       passes_(static_cast<double>(sums.passes())),
-      parts_(static_cast<double>(sums.parts())) {
+      parts_(static_cast<double>(sums.parts())),
+      noise_share_(noise_share) {
   if (!controller.RemovesBlur() || parts_ < kFewestParts) return;
   // About Student's quantile.
   const double freedom = parts_ - 1;
@@ -45,7 +47,8 @@ ImageSums::Pixel WithoutBlur::At(std::size_t pixel) const {
   const double bias = both / weight_;
   const double square = bias * bias;
   const double light = luminance / weight_;
-  const double of_parts = std::max((sum.bias_squares / weight_ - square) / (parts_ - 1), 0.0);
+  const double of_parts =
+      noise_share_ * std::max((sum.bias_squares / weight_ - square) / (parts_ - 1), 0.0);
   const double of_photons =
       kBiasNoise * light * light / std::max(kEffectiveShare * sum.photon_count, 1.0);
   const double variance = std::max(of_parts, of_photons);

@@ -24,9 +24,9 @@ namespace lucerna {
 
 class WithoutBlur {
  public:
-  // Takes nothing where `controller` does not say so. Keeps a reference to `sums`, which must not
-  // change.
-  WithoutBlur(const ImageSums& sums, const RadiusController& controller);
+  // Takes nothing where `controller` does not say so. noise_share: as BlurNoiseShare has it, or 1.
+  // Keeps a reference to `sums`, which must not change.
+  WithoutBlur(const ImageSums& sums, const RadiusController& controller, double noise_share);
 
   // sums.At(pixel), with blur taken off what photons brought, off the difference of the halves and
   // off both biases; squared deviations are those of passes that scatter like the result.
@@ -35,6 +35,7 @@ class WithoutBlur {
  private:
   const ImageSums& sums_;
   double weight_ = 0, passes_ = 0, parts_ = 0;
+  double noise_share_ = 1;
   double least_ = 0;  // deviations of which nothing is taken; 0: nothing is taken of any
 };
 

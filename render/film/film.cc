@@ -5,7 +5,6 @@
 
 #include "render/base/status.h"
 #include "render/estimate/slice_sums.h"
-#include "render/estimate/without_blur.h"
 #include "render/film/layers.h"
 #include "render/frequency/bandwidth.h"
 #include "render/math/color_space.h"
@@ -14,13 +13,13 @@ namespace lucerna {
 
 std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t first,
                                          std::size_t last, const ImageSums& sums,
-                                         const RadiusColumn& last_radii, const PixelRadii& radii,
+                                         const WithoutBlur& shown, const RadiusColumn& last_radii,
+                                         const PixelRadii& radii,
                                          const RadiusController& controller, const Kernel& kernel,
                                          ThreadTeam& team) {
   LUCERNA_CHECK(sums.passes() > 0 && first <= last && last <= sums.pixels());
   std::vector<ImageChannel> channels;
   const double to_pixel = format.exposure / sums.weights().all();
-  const WithoutBlur shown(sums, controller);
   // Of the pixel's hitpoints [scene units]; 0 where there was none.
   const auto unit_radius = [&](std::size_t pixel) {
     const ImageSums::Features features = sums.FeaturesAt(pixel);

@@ -9,6 +9,7 @@
 #include "render/estimate/image_sums.h"
 #include "render/estimate/pixel_radii.h"
 #include "render/estimate/radius_controller.h"
+#include "render/estimate/without_blur.h"
 #include "render/image/image.h"
 #include "render/math/kernel.h"
 #include "render/scene/render_settings.h"
@@ -22,15 +23,14 @@ struct FilmFormat {
   bool has_coverage = false;  // the layer of kCoverage
 };
 
-// The pixels [first, last) of the image of all passes of `sums`, Rec. 709. `last_radii` are those
-// of the last round [unit radii]. The layers of kEveryImage, of kCoverage on request, and of
-// kPredictions if the controller makes any (film/layers.h). Requires sums.passes() > 0.
-[[nodiscard]] std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t first,
-                                                       std::size_t last, const ImageSums& sums,
-                                                       const RadiusColumn& last_radii,
-                                                       const PixelRadii& radii,
-                                                       const RadiusController& controller,
-                                                       const Kernel& kernel, ThreadTeam& team);
+// The pixels [first, last) of the image of all passes of `sums`, Rec. 709, as `shown` has them.
+// `last_radii` are those of the last round [unit radii]. The layers of kEveryImage, of kCoverage on
+// request, and of kPredictions if the controller makes any (film/layers.h). Requires sums.passes()
+// > 0.
+[[nodiscard]] std::vector<ImageChannel> MakeFilmPixels(
+    const FilmFormat& format, std::size_t first, std::size_t last, const ImageSums& sums,
+    const WithoutBlur& shown, const RadiusColumn& last_radii, const PixelRadii& radii,
+    const RadiusController& controller, const Kernel& kernel, ThreadTeam& team);
 
 // Says of an image that it is a part of a whole, where the settings crop it.
 void SetImageWindow(const RenderSettings& settings, Image& image);

@@ -30,7 +30,12 @@ double ShareOf(const Light& photons, const Light& direct, std::size_t pixels = k
     sums.WeighBy(100);
     sums.Add(slice, team);
   }
-  return PhotonNoiseShare(sums);
+  return PhotonNoiseShare(sums, SampleNoise(sums));
+}
+
+// The share where no noise is left: as if a thousand pixels with all of it were added.
+double ShareOfDoubt(std::size_t pixels) {
+  return 1000 / (1000 + static_cast<double>(pixels));
 }
 
 double Nothing(std::size_t /*pixel*/, std::uint64_t /*pass*/) {
@@ -66,7 +71,53 @@ TEST(PhotonNoiseTest, CountsDirectLightAmongTheNoiseOfPassesOnly) {
 
 TEST(PhotonNoiseTest, IsOneWhereNothingIsKnown) {
   EXPECT_EQ(ShareOf(Nothing, Nothing, 10), 1);
-  EXPECT_EQ(PhotonNoiseShare(ImageSums(10)), 1);
+  EXPECT_EQ(PhotonNoiseShare(ImageSums(10), {}), 1);
+}
+
+// Of 16 passes whose kernels changed pixels by `blur(pixel, pass)`.
+double BlurShareOf(const std::function<double(std::size_t pixel, std::uint64_t pass)>& blur,
+                   std::size_t pixels = kPixels) {
+  ThreadTeam team(1);
+  ImageSums sums(pixels);
+  for (PassRange round = RoundOf(0); round.first < 16; round = RoundOf(round.last)) {
+    SliceSums slice = EmptySlice(round, pixels, 0);
+    for (std::size_t i = 0; i < pixels; ++i) {
+      for (std::size_t c = 0; c < 3; ++c)
+        slice.columns[kPhotonRadiance + c].Set(i, static_cast<float>(round.size()));
+      double halves[2] = {0, 0};
+      for (std::uint64_t pass = round.first; pass < round.last; ++pass)
+        halves[pass % 2] += blur(i, pass);
+      slice.columns[kEvenBias].Set(i, static_cast<float>(halves[0]));
+      slice.columns[kOddBias].Set(i, static_cast<float>(halves[1]));
+    }
+    sums.Add(slice, team);
+  }
+  return BlurNoiseShare(sums, SampleNoise(sums));
+}
+
+// 40,000 pixels with the thousand that are added: the ratio is known to 0.7 %, what rounds vary by
+// to as much.
+TEST(BlurNoiseShareTest, IsOneForIndependentPasses) {
+  EXPECT_GT(BlurShareOf(Independent), 0.97);
+}
+
+// Blur that always is the same does not count as noise; what differs from pass to pass by turns
+// cancels in the mean of all, and in each half.
+TEST(BlurNoiseShareTest, IsThatOfTheHalves) {
+  const auto by_turns = [](std::size_t pixel, std::uint64_t pass) {
+    const double chance = Independent(pixel, pass / 4);
+    return 1 + (pass % 4 < 2 ? chance : -chance);
+  };
+  EXPECT_NEAR(BlurShareOf(by_turns), ShareOfDoubt(kPixels), 0.01);
+}
+
+TEST(BlurNoiseShareTest, FewPixelsHardlyKnowIt) {
+  const auto by_turns = [](std::size_t pixel, std::uint64_t pass) {
+    const double chance = Independent(pixel, pass / 4);
+    return 1 + (pass % 4 < 2 ? chance : -chance);
+  };
+  EXPECT_NEAR(BlurShareOf(by_turns, 250), ShareOfDoubt(250), 0.01);
+  EXPECT_EQ(BlurNoiseShare(ImageSums(10), {}), 1);
 }
 
 // More pixels than are looked at: the same share, for all parts of the image are among them.

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -334,6 +336,62 @@ TEST(AppmTest, ComesBackToTheFirstRadiusWhereLightIsBent) {
   EXPECT_GT(growth.largest, 1.1);
   EXPECT_LT(growth.last, 1);
   EXPECT_EQ(Grow(10, 0, 1, 0.2).largest, 1);
+}
+
+// Even light of 10 photons a pass, with blur of `blur_share` of it in every fifth pass and a factor
+// for the whole image from the first pass on.
+struct ScaledRun {
+  PixelRadius pixel;
+  std::optional<ScaledRadius> scaled;
+};
+ScaledRun RunScaled(double scale, double blur_share, double then = 1, std::uint64_t until = 200) {
+  RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kAppm;
+  const auto appm = MakeRadiusController(settings, 1);
+  std::vector<double> memory(appm->MemoryPerPixel());
+  ScaledRun run = {.pixel = {1, 0}, .scaled = std::nullopt};
+  for (std::uint64_t pass = 0; pass < 400; ++pass) {
+    const double r = run.pixel.radius;
+    const double photons = 10 * r * r;
+    const auto columns = ExpectedCurvature(10 / std::numbers::pi, 0, r);
+    run.pixel = appm->Next(run.pixel,
+                           {.photons = photons,
+                            .radius = r,
+                            .columns = columns,
+                            .blur = pass % 5 == 0 ? blur_share * 10 * r * r : 0,
+                            .rounds = pass + 1,
+                            .noise_share = 0.1,
+                            .scale = pass < until ? scale : then},
+                           OnePass(pass), memory);
+    EXPECT_GE(run.pixel.radius, 0.6 * r * (1 - 1e-12)) << pass;
+    EXPECT_LE(run.pixel.radius, 1.15 * r * (1 + 1e-12)) << pass;
+    run.scaled = appm->Scaled(memory, pass + 1, pass + 1);
+    EXPECT_EQ(run.scaled.has_value(), pass >= 7) << pass;
+  }
+  return run;
+}
+
+TEST(AppmTest, FollowsTheFactorOfTheImageThereAndBack) {
+  EXPECT_DOUBLE_EQ(RunScaled(0.4, 0, 0.4).pixel.radius, 0.4);
+  EXPECT_DOUBLE_EQ(RunScaled(0.4, 0).pixel.radius, 1);
+}
+
+// Radii were 1 until the ninth pass and 0.4 nearly always since: the mean of their inverse sixth
+// powers is that of 0.4 to a fiftieth.
+TEST(AppmTest, SaysWhichFactorPassesHad) {
+  const ScaledRun run = RunScaled(0.4, 0, 0.4);
+  EXPECT_EQ(run.scaled->most, 1);
+  EXPECT_NEAR(run.scaled->use, 0.4, 0.004);
+}
+
+// Blur that is likely in this pixel holds its radius below the factor of the image, and the
+// factor holds it below what its blur asks for.
+TEST(AppmTest, TakesTheSmallerOfItsEvidenceAndTheFactorOfTheImage) {
+  const ScaledRun alone = RunScaled(1, 0.5);
+  ASSERT_LT(alone.pixel.radius, 0.8);
+  EXPECT_NEAR(alone.scaled->most, alone.pixel.radius, 0.15);
+  EXPECT_LT(RunScaled(0.95, 0.5, 0.95).pixel.radius, 0.8);
+  EXPECT_DOUBLE_EQ(RunScaled(0.2, 0.5, 0.2).pixel.radius, 0.2);
 }
 
 // One frequency photon of weight 1 in every ten, all of one trace: the radius goes where that trace

@@ -64,7 +64,7 @@ TEST(WithoutBlurTest, TakesSureBlurOff) {
   const ImageSums sums = SumsOf(1, kBias, 0, kPhotons);
   const auto appm = Controller(RadiusControllerKind::kAppm);
   const ImageSums::Pixel before = sums.At(0);
-  const ImageSums::Pixel after = WithoutBlur(sums, *appm).At(0);
+  const ImageSums::Pixel after = WithoutBlur(sums, *appm, 1).At(0);
   // Nothing varies, so that the variance is that of even light by a third of the photons.
   const double variance = 12 * kLight * kLight / (kPhotons * kPasses / 3);
   // Firm shrinkage between 2.75 and 4.5 deviations, about Student's quantiles of 20 rounds.
@@ -84,13 +84,13 @@ TEST(WithoutBlurTest, TakesSureBlurOff) {
 TEST(WithoutBlurTest, LeavesOtherControllersAlone) {
   const ImageSums sums = SumsOf(1, 0.5, 0, 300);
   const auto ppm = Controller(RadiusControllerKind::kPpm);
-  EXPECT_EQ(WithoutBlur(sums, *ppm).At(0).photons, sums.At(0).photons);
+  EXPECT_EQ(WithoutBlur(sums, *ppm, 1).At(0).photons, sums.At(0).photons);
 }
 
 TEST(WithoutBlurTest, NoLightIsLessThanNone) {
   const ImageSums sums = SumsOf(1, 1.1 * kLight, 0, kPhotonsInPass);
   const auto appm = Controller(RadiusControllerKind::kAppm);
-  EXPECT_NEAR(WithoutBlur(sums, *appm).At(0).photons[1], 0, 1e-9);
+  EXPECT_NEAR(WithoutBlur(sums, *appm, 1).At(0).photons[1], 0, 1e-9);
 }
 
 // Squares of biases as faint as this are 0 as floats, and blur that varies would be sure.
@@ -103,8 +103,8 @@ TEST(WithoutBlurTest, IsTheSameWhateverFactorScalesAllLight) {
   for (const double scale : {0x1p-80, 0x1p60}) {
     const ImageSums scaled = SumsOf(kSomePixels, kBias, kDeviation, kPhotonsInPass, scale);
     for (std::size_t i = 0; i < kSomePixels; ++i) {
-      EXPECT_EQ(WithoutBlur(scaled, *appm).At(i).photons[1],
-                scale * WithoutBlur(sums, *appm).At(i).photons[1])
+      EXPECT_EQ(WithoutBlur(scaled, *appm, 1).At(i).photons[1],
+                scale * WithoutBlur(sums, *appm, 1).At(i).photons[1])
           << scale;
     }
   }
@@ -115,7 +115,7 @@ TEST(WithoutBlurTest, LeavesChanceAlone) {
   constexpr std::size_t kManyPixels = 20000;
   const ImageSums sums = SumsOf(kManyPixels, 0, 0.3, kPhotonsInPass);
   const auto appm = Controller(RadiusControllerKind::kAppm);
-  const WithoutBlur removal(sums, *appm);
+  const WithoutBlur removal(sums, *appm, 1);
   std::size_t changed = 0;
   for (std::size_t i = 0; i < kManyPixels; ++i)
     changed += removal.At(i).photons != sums.At(i).photons ? 1 : 0;
@@ -133,7 +133,7 @@ TEST(WithoutBlurTest, KnowsWhatIsLeft) {
   for (const double deviations : {2.0, 4.0, 5.0, 6.0, 8.0}) {
     const double bias = deviations * kDeviation / std::sqrt(static_cast<double>(kPasses));
     const ImageSums sums = SumsOf(kManyPixels, bias, kDeviation, kPhotonsInPass);
-    const WithoutBlur removal(sums, *appm);
+    const WithoutBlur removal(sums, *appm, 1);
     double truth = 0;
     double estimated = 0;
     double noise = 0;  // of a pass, as the squared deviations have it

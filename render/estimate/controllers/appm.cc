@@ -20,7 +20,9 @@ namespace {
 // more shrinks it too, until that is likely no longer.
 // A radius that is not shrunk grows beyond the first one, and comes back as evidence comes in: to
 // that of least error where what noise may hide of the Laplacian is added to it, and where noise is
-// what the halves of the image show, which may be far less than that of independent photons.
+// what the halves of the image show, which may be far less than that of independent photons. It is
+// used times a factor for the whole image, which knows bias that no pixel is sure of
+// (estimate/radius_scale.h).
 class Appm final : public RadiusController {
  public:
   Appm(const RenderSettings& settings, float initial_radius)
@@ -51,23 +53,16 @@ class Appm final : public RadiusController {
     // Of the bias over the squared radius, squared.
     const double by_laplacian = moments_.mu2 / 2 * memory[kLaplacian] / n;
     const Blur by_blur = BlurOf(memory, n, static_cast<double>(evidence.rounds));
-    // The radius of least error where noise is that of independent photons times `noise`, if that
-    // is below `radius`.
-    const auto least = [&](double radius, double square, double noise = 1) {
-      if (!(square > 0)) return radius;
-      // The least of noise · roughness · squares / (n r²) + square r⁴.
-      const double sixth = noise * moments_.roughness * (memory[kSquares] / n) / (n * 2 * square);
-      // Mostly it is not: a root less for every pixel.
-      if (!(sixth < Sixth(radius))) return radius;
-      return std::min(radius, std::max(std::cbrt(std::sqrt(sixth)), smallest_));
-    };
     double& largest = memory[kLargest];
-    if (largest == 0) largest = first_;
-    largest = least(largest, std::max(by_laplacian * by_laplacian, by_blur.sure));
-    const double likely = std::clamp(least(largest, by_blur.likely), kMostShrink * evidence.radius,
-                                     kMostGrowth * evidence.radius);
+    double& free = memory[kFree];
+    if (largest == 0) largest = free = first_;
+    largest = Least(memory, n, largest, std::max(by_laplacian * by_laplacian, by_blur.sure));
+    const double most_shrunk = kMostShrink * evidence.radius;
+    const double shrunk = Least(memory, n, largest, by_blur.likely);
+    const double likely = std::clamp(shrunk, most_shrunk, kMostGrowth * evidence.radius);
     next.radius = std::min(likely, largest);
-    if (next.radius < first_ || passes.last <= kPassesBeforeGrowth || !(memory[kSquares] > 0)) {
+    if (shrunk < evidence.scale * first_ || passes.last <= kPassesBeforeGrowth ||
+        !(memory[kSquares] > 0)) {
       return next;
     }
     // Of the Laplacian of a biweight kernel.
@@ -78,9 +73,23 @@ class Appm final : public RadiusController {
         std::max(by_laplacian * by_laplacian + moments_.mu2 * moments_.mu2 / 4 * laplacian_noise,
                  by_blur.more);
     const double crowded = now.radius * std::sqrt(kMostPhotons * n / next.photons);
-    const double most = std::min({kMostOfFirst * first_, kMostGrowth * now.radius, crowded});
-    next.radius = std::max(first_, least(std::max(first_, most), square, evidence.noise_share));
+    const double most = std::max(
+        first_, std::min({kMostOfFirst * first_, kMostGrowth * free, crowded / evidence.scale}));
+    free = std::max(first_, Least(memory, n, most, square, evidence.noise_share));
+    const double grown = kMostGrowth * (now.radius < first_ ? evidence.radius : now.radius);
+    next.radius = std::clamp(evidence.scale * free, most_shrunk, std::max(most_shrunk, grown));
     return next;
+  }
+
+  std::optional<ScaledRadius> Scaled(std::span<const double> memory, std::uint64_t passes,
+                                     std::uint64_t rounds) const override {
+    if (passes < kPassesBeforeGrowth) return std::nullopt;
+    const auto n = static_cast<double>(passes);
+    const double shrunk =
+        Least(memory, n, memory[kLargest], BlurOf(memory, n, static_cast<double>(rounds)).likely);
+    return ScaledRadius{
+        .most = shrunk < first_ ? shrunk / memory[kFree] : 1,
+        .use = first_ / (memory[kFree] * std::cbrt(std::sqrt(memory[kInverseSixths] / n)))};
   }
 
   // The published controllers show what their radii alone do.
@@ -98,6 +107,7 @@ class Appm final : public RadiusController {
     kBlurSquares,
     kInverseSixths,  // of radii over the first one
     kLargest,        // that sure evidence leaves, at most the first one
+    kFree,           // without a factor for the image, at least the first one
     kNumbers
   };
   static constexpr double kSmallestShare = 0.01;
@@ -117,6 +127,18 @@ class Appm final : public RadiusController {
   static constexpr std::uint64_t kPassesBeforeGrowth = 8;
   static constexpr double kDeviationsInGrowth = 1.4;
   static constexpr double kMostPhotons = 60;
+
+  // The radius of least error where noise is that of independent photons times `noise`, if that is
+  // below `radius`.
+  double Least(std::span<const double> memory, double n, double radius, double square,
+               double noise = 1) const {
+    if (!(square > 0)) return radius;
+    // The least of noise · roughness · squares / (n r²) + square r⁴.
+    const double sixth = noise * moments_.roughness * (memory[kSquares] / n) / (n * 2 * square);
+    // Mostly it is not: a root less for every pixel.
+    if (!(sixth < Sixth(radius))) return radius;
+    return std::min(radius, std::max(std::cbrt(std::sqrt(sixth)), smallest_));
+  }
 
   static double Sixth(double x) { return x * x * x * x * x * x; }
 
