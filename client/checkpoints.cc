@@ -3,9 +3,27 @@
 #include <filesystem>
 #include <system_error>
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include "client/exit_code.h"
 
 namespace lucerna {
+namespace {
+
+// Whether a coordinator that lives has the folder: the database in it is locked then.
+bool IsInUse(const std::string& folder) {
+  const int file = open(absl::StrCat(folder, "/lucerna.db").c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  struct flock lock = {};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  const bool is_locked = fcntl(file, F_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
+  close(file);
+  return is_locked;
+}
+
+}  // namespace
 
 std::string CheckpointFolderOf(const std::string& output) {
   std::error_code error;
@@ -21,6 +39,12 @@ bool HasCheckpoints(const std::string& folder) {
 }
 
 Status OpenCheckpoints(const std::string& folder, bool resumes, const std::string& what) {
+  if (!folder.empty() && IsInUse(folder)) {
+    return absl::FailedPreconditionError(
+        absl::StrCat(folder,
+                     ": a command that runs keeps its photons there for the same output; "
+                     "wait for its end, or name another file with -o"));
+  }
   if (resumes && !HasCheckpoints(folder)) {
     return absl::FailedPreconditionError(absl::StrCat(folder, ": there is no interrupted ", what,
                                                       " to go on with; leave --resume away"));

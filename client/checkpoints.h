@@ -16,7 +16,8 @@ namespace lucerna {
 [[nodiscard]] bool HasCheckpoints(const std::string& folder);
 
 // Before the cluster starts: removes what an interruption left, unless it is to be gone on with.
-// `what` was interrupted: "render". Errors: FAILED_PRECONDITION when there is nothing to resume.
+// `what` was interrupted: "render". Errors: FAILED_PRECONDITION when there is nothing to resume,
+// and when another command that runs has the folder.
 [[nodiscard]] Status OpenCheckpoints(const std::string& folder, bool resumes,
                                      const std::string& what);
 

@@ -65,8 +65,9 @@ double RadiusScale(const ImageSums& sums, const PixelRadii& radii, const NoiseSa
     const double squared_use = Square(scaled->use);
     const double even = static_cast<double>(columns.even_bias[pixel.index]) / whole.weights.even;
     const double odd = static_cast<double>(columns.odd_bias[pixel.index]) / whole.weights.odd;
-    const auto step = static_cast<std::size_t>(
-        std::min(std::log(scaled->most) / std::log(kStep), static_cast<double>(kSteps - 1)));
+    const double steps = std::log(scaled->most) / std::log(kStep);
+    const auto step =
+        steps > 0 ? static_cast<std::size_t>(std::min(steps, static_cast<double>(kSteps - 1))) : 0;
     const std::size_t tile = tiles.Of(pixel.index);
     lit[tile] = true;
     noises[step] += RelativeSquare(pixel.noise * squared_use, pixel.luminance, sample.floor);

@@ -96,6 +96,21 @@ class ClientCommandsTest : public testing::Test {
     return Finish(Start(words));
   }
 
+  // Until the program that was started last says that a pass is done: "pass 0" is said before there
+  // is an image.
+  void WaitForAPass() const {
+    const auto has_passes = [&] {
+      const std::string lines = Contents(In("stderr.txt"));
+      for (std::size_t at = lines.find("pass "); at != std::string::npos;
+           at = lines.find("pass ", at + 1)) {
+        if (at + 5 < lines.size() && lines[at + 5] >= '1' && lines[at + 5] <= '9') return true;
+      }
+      return false;
+    };
+    for (int i = 0; i < 6000 && !has_passes(); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+
   // A render of a second or less.
   [[nodiscard]] std::vector<std::string> SmallRender(const std::vector<std::string>& more) const {
     std::vector<std::string> words = {
@@ -558,17 +573,7 @@ TEST_F(ClientCommandsTest, AnInterruptedRenderWritesTheImageSoFarAndGoesOnWithTh
         "render", SceneOfTests("caustic.pbrt"), "--size", "32x24", end, value, "-o", In(image)};
   };
   const pid_t client = Start(render("a.exr", "--time", "1000"));
-  // "pass 0" is said before there is an image.
-  const auto has_passes = [&] {
-    const std::string lines = Contents(In("stderr.txt"));
-    for (std::size_t at = lines.find("pass "); at != std::string::npos;
-         at = lines.find("pass ", at + 1)) {
-      if (at + 5 < lines.size() && lines[at + 5] >= '1' && lines[at + 5] <= '9') return true;
-    }
-    return false;
-  };
-  for (int i = 0; i < 6000 && !has_passes(); ++i)
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  WaitForAPass();
   const std::vector<pid_t> children = ChildrenOf(client);
   ::kill(client, SIGINT);
   const Ran interrupted = Finish(client);
@@ -600,6 +605,23 @@ TEST_F(ClientCommandsTest, AnInterruptedRenderWritesTheImageSoFarAndGoesOnWithTh
   const Ran nothing = Run(resume);
   EXPECT_EQ(nothing.code, 1);
   EXPECT_NE(nothing.err.find("no interrupted render"), std::string::npos) << nothing.err;
+}
+
+// The second one must not take the photons of the first from under it.
+TEST_F(ClientCommandsTest, OfTwoRendersWithOneOutputTheSecondIsRefused) {
+  const pid_t client = Start({"render", SceneOfTests("caustic.pbrt"), "--size", "32x24", "--time",
+                              "1000", "-o", In("a.exr")});
+  WaitForAPass();
+  for (const char* const command : {"render", "reference"}) {
+    const Ran second = Run({command, SceneOfTests("caustic.pbrt"), "--size", "32x24", "--passes",
+                            "2", "-o", In("a.exr")});
+    EXPECT_EQ(second.code, 1) << command;
+    EXPECT_NE(second.err.find("a.exr.checkpoints"), std::string::npos) << second.err;
+    EXPECT_NE(second.err.find("another file with -o"), std::string::npos) << second.err;
+  }
+  ::kill(client, SIGINT);
+  EXPECT_EQ(Finish(client).code, 130);
+  EXPECT_TRUE(std::filesystem::exists(In("a.exr.checkpoints")));
 }
 
 TEST_F(ClientCommandsTest, ADeadCoordinatorEndsTheRenderWithASentence) {

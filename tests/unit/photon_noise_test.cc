@@ -101,22 +101,20 @@ TEST(BlurNoiseShareTest, IsOneForIndependentPasses) {
   EXPECT_GT(BlurShareOf(Independent), 0.97);
 }
 
+// Two passes up, two down: in the mean of all, and of each half, nothing is left but 1.
+double ByTurns(std::size_t pixel, std::uint64_t pass) {
+  const double chance = Independent(pixel, pass / 4);
+  return 1 + (pass % 4 < 2 ? chance : -chance);
+}
+
 // Blur that always is the same does not count as noise; what differs from pass to pass by turns
 // cancels in the mean of all, and in each half.
 TEST(BlurNoiseShareTest, IsThatOfTheHalves) {
-  const auto by_turns = [](std::size_t pixel, std::uint64_t pass) {
-    const double chance = Independent(pixel, pass / 4);
-    return 1 + (pass % 4 < 2 ? chance : -chance);
-  };
-  EXPECT_NEAR(BlurShareOf(by_turns), ShareOfDoubt(kPixels), 0.01);
+  EXPECT_NEAR(BlurShareOf(ByTurns), ShareOfDoubt(kPixels), 0.01);
 }
 
 TEST(BlurNoiseShareTest, FewPixelsHardlyKnowIt) {
-  const auto by_turns = [](std::size_t pixel, std::uint64_t pass) {
-    const double chance = Independent(pixel, pass / 4);
-    return 1 + (pass % 4 < 2 ? chance : -chance);
-  };
-  EXPECT_NEAR(BlurShareOf(by_turns, 250), ShareOfDoubt(250), 0.01);
+  EXPECT_NEAR(BlurShareOf(ByTurns, 250), ShareOfDoubt(250), 0.01);
   EXPECT_EQ(BlurNoiseShare(ImageSums(10), {}), 1);
 }
 

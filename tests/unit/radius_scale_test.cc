@@ -21,7 +21,7 @@ constexpr std::size_t kWidth = 128;
 constexpr std::size_t kPixels = kWidth * kWidth;
 constexpr std::uint64_t kPasses = 16;
 
-// Says what a pixel allows by the last column of evidence that it was shown: its memory.
+// Says of a pixel what its memory holds: the most that it allows, and what its passes had.
 class Asked final : public RadiusController {
  public:
   [[nodiscard]] std::size_t MemoryPerPixel() const override { return 2; }
