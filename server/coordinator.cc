@@ -788,6 +788,8 @@ std::shared_ptr<JobRunner> Coordinator::MakeRunner(const JobTable::Turn& turn, M
                 sample.nothing_found = checkpoint.missing.nothing_found;
                 jobs_.OnErrorEstimate(id, std::move(sample), checkpoint.missing.lights, Now());
               },
+          .on_denoised = [this,
+                          id](const DenoisedSample& denoised) { jobs_.OnDenoised(id, denoised); },
           .on_checkpoint =
               state_ ? [this, id](
                            std::vector<std::string_view> sums, std::int64_t passes,

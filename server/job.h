@@ -195,6 +195,12 @@ class PassRecord {
   std::int64_t passes_each_ = 1;
 };
 
+// What is known of the error of a denoised image.
+struct DenoisedSample {
+  DenoisedError estimate;
+  std::optional<TrueError> truth;  // when the job has a reference
+};
+
 // What was known of a job's error at one moment.
 struct ErrorSample {
   std::int64_t passes = 0;
@@ -206,6 +212,8 @@ struct ErrorSample {
   // What light that may not have been found adds to the upper end of the relative interval.
   double missing_relative = 0;
   bool nothing_found = false;  // the image was black
+  // Of the denoised image, where the job has one, in the sample of its end.
+  std::optional<DenoisedSample> denoised;
 };
 
 // What happened to a job beside its progress.

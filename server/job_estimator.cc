@@ -93,6 +93,43 @@ Status CheckPower(Rgb power_w) {
       "dimmer by the same factor, and the image brighter by it with the film's iso");
 }
 
+// Of pixels that are `to_pixel` times `values`.
+TrueError TrueErrorOf(const ReferenceImage& reference,
+                      const std::array<std::vector<float>, 3>& values, double to_pixel) {
+  std::vector<double> luminances(reference.size());
+  for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
+    const Rgb right = reference[pixel];
+    luminances[pixel] = LuminanceOf(
+        {static_cast<double>(right.r), static_cast<double>(right.g), static_cast<double>(right.b)});
+  }
+  const double floor = RelativeErrorFloor(luminances);
+  std::vector<TrueError> pixels(reference.size());
+  for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto right = static_cast<double>(reference[pixel][static_cast<int>(c)]);
+      const double off = static_cast<double>(values[c][pixel]) * to_pixel - right;
+      pixels[pixel].absolute += off * off;
+      pixels[pixel].relative += RelativeSquare(off * off, right, floor);
+    }
+  }
+  double untrimmed = 0;
+  for (const TrueError& pixel : pixels)
+    untrimmed += pixel.relative;
+  const std::size_t kept = KeptPixels(pixels.size());
+  std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
+                           &TrueError::relative);
+  pixels.resize(kept);
+  TrueError error = {.untrimmed = untrimmed / (3 * static_cast<double>(reference.size()))};
+  for (const TrueError& pixel : pixels) {
+    error.absolute += pixel.absolute;
+    error.relative += pixel.relative;
+  }
+  const double terms = 3 * static_cast<double>(kept);
+  error.relative /= terms;
+  error.absolute /= terms;
+  return error;
+}
+
 }  // namespace
 
 struct JobEstimator::State {
@@ -353,7 +390,7 @@ std::uint64_t JobEstimator::eye_rays() const {
   return state_->sums->eye_rays();
 }
 
-BandedImage JobEstimator::MakeBands() const {
+BandedImage JobEstimator::MakeBands(std::shared_ptr<const DenoisedImage> denoised) const {
   BandedImage image;
   image.head.width = state_->settings.crop_width();
   image.head.height = state_->settings.crop_height();
@@ -361,7 +398,8 @@ BandedImage JobEstimator::MakeBands() const {
   // Of all pixels, since those around count.
   const auto noise =
       std::make_shared<const std::vector<float>>(has_noise ? NoiseLayer() : std::vector<float>());
-  image.rows = [this, noise, has_noise](int first_row, int last_row) {
+  image.rows = [this, noise, has_noise, denoised = std::move(denoised)](int first_row,
+                                                                        int last_row) {
     const State& state = *state_;
     const Scene& scene = state.prepared.scene();
     const ImageSums& sums = *state.sums;
@@ -386,9 +424,65 @@ BandedImage JobEstimator::MakeBands() const {
       return values;
     };
     AddLayers(LayerSource::kPasses, errors_of, last - first, state_->team, band);
+    if (denoised == nullptr) return band;
+    const auto denoised_of = [&](std::size_t offset) {
+      PixelValues values;
+      double largest = 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        values.denoised[c] = static_cast<double>(denoised->pixels[c][first + offset]);
+        largest = std::max(largest, values.denoised[c]);
+      }
+      values.limit = LimitOf(largest, scene.film.max_component);
+      return values;
+    };
+    AddLayers(LayerSource::kDenoised, denoised_of, last - first, state_->team, band);
     return band;
   };
   return image;
+}
+
+DenoisedImage JobEstimator::Denoise() const {
+  const State& state = *state_;
+  const ImageSums& sums = *state.sums;
+  const PassWeights weights = sums.weights();
+  const double exposure = state.prepared.scene().film.exposure;
+  const WithoutBlur shown = state.Shown();
+  NoisyImage image;
+  image.width = state.settings.crop_width();
+  image.height = state.settings.crop_height();
+  image.even_share = weights.even / weights.all();
+  image.noise = NoiseLayer();
+  image.feature_share =
+      static_cast<double>(std::min(sums.passes(), kFeaturePasses)) / static_cast<double>(passes());
+  const auto resize = [&](ColorColumns& columns) {
+    for (std::vector<float>& column : columns)
+      column.resize(sums.pixels());
+  };
+  for (ColorColumns& half : image.halves)
+    resize(half);
+  resize(image.features.albedo);
+  resize(image.features.normal);
+  image.features.normal_variance.resize(sums.pixels());
+  image.features.distance.resize(sums.pixels());
+  constexpr std::size_t kPixelsAtOnce = 4096;
+  state_->team.For(sums.pixels(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t pixel = begin; pixel < end; ++pixel) {
+      const ImageSums::Pixel of_pixel = shown.At(pixel);
+      const std::array<double, 3> all = ToRec709(of_pixel.radiance());
+      const std::array<double, 3> difference = ToRec709(of_pixel.half_difference);
+      const FilmFeatures features = FeaturesOf(sums.FeaturesAt(pixel));
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double even = 0.5 * (all[c] + difference[c]);
+        image.halves[0][c][pixel] = static_cast<float>(exposure * even / weights.even);
+        image.halves[1][c][pixel] = static_cast<float>(exposure * (all[c] - even) / weights.odd);
+        image.features.albedo[c][pixel] = static_cast<float>(features.albedo[c]);
+        image.features.normal[c][pixel] = static_cast<float>(features.normal[c]);
+      }
+      image.features.normal_variance[pixel] = static_cast<float>(features.normal_variance);
+      image.features.distance[pixel] = static_cast<float>(features.distance);
+    }
+  });
+  return lucerna::Denoise(std::move(image), state_->team);
 }
 
 std::vector<float> JobEstimator::NoiseLayer() const {
@@ -574,39 +668,12 @@ MissingLight JobEstimator::FindMissingLight(const EstimatorSnapshot& snapshot) c
 
 TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference,
                                      const EstimatorSnapshot& snapshot) {
-  const double to_pixel = 1 / snapshot.image.weights.all();
-  std::vector<double> luminances(reference.size());
-  for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
-    const Rgb right = reference[pixel];
-    luminances[pixel] = LuminanceOf(
-        {static_cast<double>(right.r), static_cast<double>(right.g), static_cast<double>(right.b)});
-  }
-  const double floor = RelativeErrorFloor(luminances);
-  std::vector<TrueError> pixels(reference.size());
-  for (std::size_t pixel = 0; pixel < reference.size(); ++pixel) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      const auto right = static_cast<double>(reference[pixel][static_cast<int>(c)]);
-      const double off = static_cast<double>(snapshot.image.all[c][pixel]) * to_pixel - right;
-      pixels[pixel].absolute += off * off;
-      pixels[pixel].relative += RelativeSquare(off * off, right, floor);
-    }
-  }
-  double untrimmed = 0;
-  for (const TrueError& pixel : pixels)
-    untrimmed += pixel.relative;
-  const std::size_t kept = KeptPixels(pixels.size());
-  std::ranges::nth_element(pixels, pixels.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
-                           &TrueError::relative);
-  pixels.resize(kept);
-  TrueError error = {.untrimmed = untrimmed / (3 * static_cast<double>(reference.size()))};
-  for (const TrueError& pixel : pixels) {
-    error.absolute += pixel.absolute;
-    error.relative += pixel.relative;
-  }
-  const double terms = 3 * static_cast<double>(kept);
-  error.relative /= terms;
-  error.absolute /= terms;
-  return error;
+  return TrueErrorOf(reference, snapshot.image.all, 1 / snapshot.image.weights.all());
+}
+
+TrueError JobEstimator::ErrorAgainst(const ReferenceImage& reference,
+                                     const DenoisedImage& denoised) {
+  return TrueErrorOf(reference, denoised.pixels, 1);
 }
 
 void JobEstimator::Save(ByteWriter& writer) const {

@@ -33,6 +33,7 @@
 #include "render/estimate/image_sums.h"
 #include "render/estimate/rounds.h"
 #include "render/estimate/slice_sums.h"
+#include "render/film/denoise.h"
 #include "render/image/image.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"
@@ -115,7 +116,11 @@ class JobEstimator {
   // `noise` (standard deviation of each pixel's luminance) and `bias` from the second pass on.
   [[nodiscard]] Image MakeImage() const { return MakeBands().Whole(); }
   // The same, to be made while nothing is added here; this estimator must live as long.
-  [[nodiscard]] BandedImage MakeBands() const;
+  // `denoised` is of the same passes, or nullptr.
+  [[nodiscard]] BandedImage MakeBands(
+      std::shared_ptr<const DenoisedImage> denoised = nullptr) const;
+  // Takes far longer than an estimate of the error. Requires two passes or more.
+  [[nodiscard]] DenoisedImage Denoise() const;
   // Requires passes() > 0.
   [[nodiscard]] EstimatorSnapshot Snapshot() const;
   // May run beside all others. Requires a snapshot of this estimator.
@@ -135,6 +140,8 @@ class JobEstimator {
   // Requires a reference as large as the image.
   [[nodiscard]] static TrueError ErrorAgainst(const ReferenceImage& reference,
                                               const EstimatorSnapshot& snapshot);
+  [[nodiscard]] static TrueError ErrorAgainst(const ReferenceImage& reference,
+                                              const DenoisedImage& denoised);
 
   // All that later passes and images follow from, of the rounds added without the tail. Its columns
   // are borrowed: the writer is of use until the next round is added.

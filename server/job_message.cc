@@ -116,6 +116,15 @@ v1::ErrorSample SampleToProto(const ErrorSample& sample) {
   }
   message.set_missing_relative(sample.missing_relative);
   message.set_nothing_found(sample.nothing_found);
+  if (sample.denoised) {
+    v1::DenoisedError& denoised = *message.mutable_denoised();
+    *denoised.mutable_relative() = ErrorToProto(sample.denoised->estimate.relative);
+    denoised.set_relative_untrimmed(sample.denoised->estimate.untrimmed);
+    if (const std::optional<TrueError>& truth = sample.denoised->truth) {
+      denoised.set_true_relative(truth->relative);
+      denoised.set_true_relative_untrimmed(truth->untrimmed);
+    }
+  }
   return message;
 }
 
@@ -341,6 +350,16 @@ ErrorSample SampleOf(const v1::ErrorSample& message) {
   }
   sample.missing_relative = message.missing_relative();
   sample.nothing_found = message.nothing_found();
+  if (message.has_denoised()) {
+    const v1::DenoisedError& denoised = message.denoised();
+    sample.denoised.emplace();
+    sample.denoised->estimate = {.relative = ErrorOf(denoised.relative()),
+                                 .untrimmed = denoised.relative_untrimmed()};
+    if (denoised.has_true_relative()) {
+      sample.denoised->truth = {.relative = denoised.true_relative(),
+                                .untrimmed = denoised.true_relative_untrimmed()};
+    }
+  }
   return sample;
 }
 

@@ -271,9 +271,10 @@ StatusOr<RenderResult> JobRunner::RunRounds() {
       BeginEstimateIfDue(true);
       TakeInEstimate(true);
       CheckImage();
+      std::shared_ptr<const DenoisedImage> denoised = DenoiseIfAsked();
       const MutexLock lock(estimator_mutex_);
       RenderResult result = MakeResult(reason);
-      result.image = estimator_->MakeBands();
+      result.image = estimator_->MakeBands(std::move(denoised));
       // What has ended may be let go of before its image has been made.
       result.image.rows = [estimator = estimator_, rows = std::move(result.image.rows)](
                               int first, int last) { return rows(first, last); };
@@ -823,6 +824,30 @@ std::optional<std::size_t> JobRunner::HitpointsIn(const Digest& digest) const {
     if (blobs.radii == digest) return std::size_t{0};
   }
   return std::nullopt;
+}
+
+std::shared_ptr<const DenoisedImage> JobRunner::DenoiseIfAsked() {
+  if (!settings_.denoise) return nullptr;
+  ReleaseFreedMemory();
+  const SteadyTime began_at = hooks_.clock.Steady();
+  DenoisedSample sample;
+  std::shared_ptr<const DenoisedImage> denoised;
+  {
+    const MutexLock lock(estimator_mutex_);
+    if (estimator_->passes() < 2) return nullptr;
+    denoised = std::make_shared<const DenoisedImage>(estimator_->Denoise());
+    EstimatorSnapshot snapshot = estimator_->Snapshot();
+    // What may be missing is missing in both.
+    const double missing = estimator_->FindMissingLight(snapshot).relative;
+    if (!reference_.empty()) sample.truth = JobEstimator::ErrorAgainst(reference_, *denoised);
+    sample.estimate = ErrorOfDenoised(
+        *denoised,
+        estimator_->EstimateError(std::move(snapshot), MissingLight(), std::max(checkpoints_, 1)));
+    sample.estimate.relative.high += missing;
+  }
+  Timed("estimate", began_at, [] { return std::string("denoised image"); });
+  hooks_.on_denoised(sample);
+  return denoised;
 }
 
 RenderResult JobRunner::MakeResult(StopReason reason) const {

@@ -79,6 +79,8 @@ struct RunnerHooks {
   // At a stop: the same of the passes after the last round merged. They are part of a later round.
   std::function<void(const BatchTally& tally, std::int64_t passes)> on_tail;
   std::function<void(const ErrorCheckpoint& checkpoint)> on_error_estimate;
+  // At the end, after the last estimate.
+  std::function<void(const DenoisedSample& denoised)> on_denoised;
   // Keeps the pieces that Save gave, so that a later process can Restore it; absent: nothing is
   // kept. `tally` is of the `passes` in it. When it fails the job pauses, and it is called again
   // every second.
@@ -243,6 +245,8 @@ class JobRunner final : public RunningJob {
   PassKey KeyOf(std::uint64_t pass) const { return {job_id_, pass}; }
   // Of all but the image.
   RenderResult MakeResult(StopReason reason) const LUCERNA_REQUIRES(estimator_mutex_);
+  // nullptr where the job asks for no denoised image, or has too few passes for one.
+  std::shared_ptr<const DenoisedImage> DenoiseIfAsked();
 
   const std::string job_id_;
   const RenderSettings settings_;

@@ -922,6 +922,14 @@ void JobTable::OnErrorEstimate(const std::string& job_id, ErrorSample sample,
   ++entry.version;
 }
 
+void JobTable::OnDenoised(const std::string& job_id, const DenoisedSample& denoised) {
+  const MutexLock lock(mutex_);
+  const auto found = FindLocked(job_id);
+  if (found == entries_.end() || found->second.job.convergence.empty()) return;
+  found->second.job.convergence.back().denoised = denoised;
+  ++found->second.version;
+}
+
 void JobTable::Close(const Status& why) {
   const MutexLock lock(mutex_);
   is_closed_ = true;

@@ -330,6 +330,8 @@ class JobTable {
   void OnRoundMerged(const std::string& job_id, const BatchTally& tally, std::int64_t passes);
   void OnErrorEstimate(const std::string& job_id, ErrorSample sample,
                        std::vector<LightFinding> lights, const Moment& moment);
+  // Of the newest estimate's image.
+  void OnDenoised(const std::string& job_id, const DenoisedSample& denoised);
 
   // Stops the jobs that have turns, with `why`, and begins no other.
   void Close(const Status& why);

@@ -33,6 +33,14 @@ std::string HexOf(const std::string& bytes) {
   return digest.ok() ? digest->Hex() : std::string();
 }
 
+Json RelativeErrorJson(const RelativeError& error) {
+  Json json = {{"estimate", error.value}, {"low", error.low}, {"high", error.high}};
+  if (error.truth) json["true"] = *error.truth;
+  json["untrimmed"] = error.untrimmed;
+  if (error.true_untrimmed) json["true_untrimmed"] = *error.true_untrimmed;
+  return json;
+}
+
 // Names as in the table of settings; two values that are given as one keep a name each.
 Json SettingsJson(const RenderSettings& settings) {
   Json json;
@@ -84,9 +92,10 @@ Json TallyOf(const v1::Tally& message) {
 // What a script needs to go on: whose job it is, whether it goes on and if not why, how far it is,
 // how good the image is, and what is wrong. In this order.
 constexpr std::array kShortJob = {
-    "job_id",     "name",           "state",         "stop_reason",   "failure",        "owner",
-    "no_workers", "condition",      "pause_cause",   "passes",        "photons",        "running_s",
-    "warnings",   "relative_error", "nothing_found", "missing_light", "dropped_photons"};
+    "job_id",        "name",          "state",          "stop_reason",    "failure",
+    "owner",         "no_workers",    "condition",      "pause_cause",    "passes",
+    "photons",       "running_s",     "warnings",       "relative_error", "denoised_error",
+    "nothing_found", "missing_light", "dropped_photons"};
 
 Json FullJobOf(const v1::Job& job) {
   const v1::Progress& progress = job.progress();
@@ -147,13 +156,11 @@ Json FullJobOf(const v1::Job& job) {
         {{"part", use.part()}, {"is_used", use.is_used()}, {"reason", use.reason()}});
   }
   if (const auto error = NewestError(job)) {
-    json["relative_error"] = {
-        {"estimate", error->value}, {"low", error->low}, {"high", error->high}};
-    if (error->truth) json["relative_error"]["true"] = *error->truth;
-    json["relative_error"]["untrimmed"] = error->untrimmed;
-    if (error->true_untrimmed) json["relative_error"]["true_untrimmed"] = *error->true_untrimmed;
+    json["relative_error"] = RelativeErrorJson(*error);
     json["relative_error"]["left_out_pixels"] = job.convergence().rbegin()->left_out_pixels();
   }
+  if (const auto denoised = DenoisedErrorOf(job))
+    json["denoised_error"] = RelativeErrorJson(*denoised);
   if (FoundNothing(job)) json["nothing_found"] = true;
   if (const auto far = FindFarTarget(job)) {
     json["far_target"] = {{"in_sight", far->left.has_value()}, {"message", far->sentence}};

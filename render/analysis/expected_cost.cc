@@ -12,6 +12,8 @@ namespace {
 // without evidence whose first passes are split between several workers, and of a worker.
 constexpr double kCoordinator = 560;
 constexpr double kWorker = 320;
+// Of a coordinator, while it makes a denoised image, beyond what it has let go of by then.
+constexpr double kDenoising = 120;
 // Of both, for each column of evidence of the slices that they hold.
 constexpr double kEvidenceColumn = 16;
 // Bytes a hitpoint: compressed, with and without what glossy ones need.
@@ -35,8 +37,9 @@ ExpectedCost ExpectedCostOf(const SceneNeeds& needs, const RenderSettings& setti
   const double rows_beside =
       (needs.Uses(Part::kCausticHitpoints) ? 1 : 0) + (needs.Uses(Part::kMedia) ? 1 : 0);
   ExpectedCost cost;
-  cost.coordinator = pixels * (kCoordinator + rows_beside * kCausticHitpoint +
-                               kEvidenceColumn * columns + sizeof(double) * numbers);
+  cost.coordinator = pixels * (kCoordinator + (settings.denoise ? kDenoising : 0) +
+                               rows_beside * kCausticHitpoint + kEvidenceColumn * columns +
+                               sizeof(double) * numbers);
   cost.worker =
       pixels * (kWorker + rows_beside * kCausticHitpoint + kEvidenceColumn * columns + first_hits);
   cost.first_pass_sent = pixels * (block + kRadius + rows_beside * (kGlossyBlock + kRadius));

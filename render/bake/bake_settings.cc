@@ -31,9 +31,11 @@ Status CheckBake(const BakeSettings& settings, const RenderOverrides& overrides)
   if (overrides.width) {
     return absl::InvalidArgumentError("--size has no meaning here: --spacing says how fine to be");
   }
-  if (overrides.crop || overrides.coverage) {
+  if (overrides.crop || overrides.coverage || overrides.denoise) {
     return absl::InvalidArgumentError(
-        absl::StrCat(overrides.crop ? "--crop" : "--coverage",
+        absl::StrCat(overrides.crop       ? "--crop"
+                     : overrides.coverage ? "--coverage"
+                                          : "--denoise",
                      " has no meaning here: what is measured is no image; leave it away"));
   }
   return absl::OkStatus();

@@ -13,12 +13,9 @@
 namespace lucerna {
 namespace {
 
-// What the models of noise may be off by, in the logarithm of the squared error: a seventh of the
-// error. Most of it is light so rare that the halves have hardly seen it.
-constexpr double kModelError = 0.3;
 // What squared bias is at least and at most, of what is estimated. It is too large where values
 // without blur are guessed from few photons, too small where lines thinner than the inner kernel
-// are. Chosen, with kModelError, on half A of tests/tools/make_study_scenes.py and on scenes of the
+// are. Chosen, with kModelError (in the header), on half A of tests/tools/make_study_scenes.py and on scenes of the
 // project.
 constexpr double kLeastBias = 0.35;
 constexpr double kMostBias = 2.5;

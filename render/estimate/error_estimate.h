@@ -86,6 +86,10 @@ struct ErrorEstimate {
   double noise_area = 1;
 };
 
+// What the models of noise may be off by, in the logarithm of the squared error: a seventh of the
+// error. Most of it is light so rare that the halves have hardly seen it.
+inline constexpr double kModelError = 0.3;
+
 // What passes brought to one pixel, in the colours and the exposure of the image: weighted sums
 // over passes.
 struct PixelStatistics {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "render/estimate/error_estimate.h"
+
 namespace lucerna {
 namespace {
 
@@ -19,10 +21,6 @@ constexpr std::array<std::pair<std::string_view, ToneCurve>, 4> kCurves = {
      {"aces", ToneCurve::kAces}}};
 
 using Color = std::array<double, 3>;
-
-double LuminanceOf(const Color& color) {
-  return 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2];
-}
 
 double Positive(float value) {
   return value > 0 ? static_cast<double>(value) : 0;  // also of what is not a number

@@ -11,6 +11,29 @@
 
 namespace lucerna {
 
+FilmFeatures FeaturesOf(const ImageSums::Features& sums) {
+  FilmFeatures features;
+  if (sums.hits == 0) return features;
+  const double per_hit = 1 / static_cast<double>(sums.hits);
+  features.albedo =
+      ToRec709({static_cast<double>(sums.albedo.r), static_cast<double>(sums.albedo.g),
+                static_cast<double>(sums.albedo.b)});
+  for (int c = 0; c < 3; ++c) {
+    const auto offset = static_cast<std::size_t>(c);
+    features.albedo[offset] *= per_hit;
+    features.normal[offset] = static_cast<double>(sums.normal[c]) * per_hit;
+  }
+  if (sums.hits > 1) {
+    double square = 0;
+    for (const double component : features.normal)
+      square += component * component;
+    // Each normal has the length 1.
+    features.normal_variance = std::max(0.0, 1 - square) / (static_cast<double>(sums.hits) - 1);
+  }
+  features.distance = static_cast<double>(sums.distance) * per_hit;
+  return features;
+}
+
 std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t first,
                                          std::size_t last, const ImageSums& sums,
                                          const WithoutBlur& shown, const RadiusColumn& last_radii,
@@ -41,20 +64,13 @@ std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t f
       values.photons[c] *= to_pixel;
       largest = std::max(largest, values.direct[c] + values.photons[c]);
     }
-    values.limit = largest > format.max_component ? format.max_component / largest : 1;
-    const ImageSums::Features features = sums.FeaturesAt(pixel);
-    const double per_hit = features.hits > 0 ? 1 / static_cast<double>(features.hits) : 0;
-    values.albedo =
-        ToRec709({static_cast<double>(features.albedo.r), static_cast<double>(features.albedo.g),
-                  static_cast<double>(features.albedo.b)});
-    for (int c = 0; c < 3; ++c) {
-      const auto offset = static_cast<std::size_t>(c);
-      values.albedo[offset] *= per_hit;
-      values.normal[offset] = static_cast<double>(features.normal[c]) * per_hit;
-    }
-    values.distance =
-        features.hits > 0 ? static_cast<double>(features.distance) * per_hit : HUGE_VAL;
-    values.coverage = static_cast<double>(features.hits) / feature_passes;
+    values.limit = LimitOf(largest, format.max_component);
+    const ImageSums::Features sums_of_features = sums.FeaturesAt(pixel);
+    const FilmFeatures features = FeaturesOf(sums_of_features);
+    values.albedo = features.albedo;
+    values.normal = features.normal;
+    values.distance = features.distance;
+    values.coverage = static_cast<double>(sums_of_features.hits) / feature_passes;
     values.radius = static_cast<double>(last_radii[pixel]) * unit_radius(pixel);
     values.photon_count = of_pixel.photon_count;
     return values;

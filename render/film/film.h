@@ -1,6 +1,7 @@
 // How do sums over passes become an image?
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <vector>
@@ -22,6 +23,19 @@ struct FilmFormat {
   double max_component = HUGE_VAL;
   bool has_coverage = false;  // the layer of kCoverage
 };
+
+// What a pixel's eye paths saw first: means over those that met a surface.
+struct FilmFeatures {
+  std::array<double, 3> albedo{}, normal{};  // albedo: Rec. 709
+  double normal_variance = 0;                // of the mean normal, from its length
+  double distance = HUGE_VAL;                // [scene units]
+};
+[[nodiscard]] FilmFeatures FeaturesOf(const ImageSums::Features& sums);
+
+// The factor that keeps a pixel below the film's maximum, whose largest channel is `largest`.
+[[nodiscard]] constexpr double LimitOf(double largest, double max_component) {
+  return largest > max_component ? max_component / largest : 1;
+}
 
 // The pixels [first, last) of the image of all passes of `sums`, Rec. 709, as `shown` has them.
 // `last_radii` are those of the last round [unit radii]. The layers of kEveryImage, of kCoverage on

@@ -39,6 +39,8 @@ constexpr std::array kLayers = {
           [](Pixel p, std::size_t) { return p.noise; }},
     Layer{"bias", "", Unit::kRadiance, Source::kPasses,
           [](Pixel p, std::size_t) { return p.bias; }},
+    Layer{"denoised", "RGB", Unit::kRadiance, Source::kDenoised,
+          [](Pixel p, std::size_t c) { return p.denoised[c] * p.limit; }},
 };
 
 }  // namespace

@@ -26,13 +26,14 @@ struct PixelValues {
   double bandwidth = 0, min_radius = 0, relative_bias = 0;
   // From the differences between passes.
   double noise = 0, bias = 0;
+  std::array<double, 3> denoised{};
 };
 
 // How values change with the unit of length and with the power of the lights.
 enum class LayerUnit : std::uint8_t { kNone, kRadiance, kLength, kPerLength };
 // Which images have the layer: all; those that were asked for it; those of controllers that predict
-// bandwidths; those of two passes or more.
-enum class LayerSource : std::uint8_t { kEveryImage, kCoverage, kPredictions, kPasses };
+// bandwidths; those of two passes or more; of these, those that were asked for it, at their end.
+enum class LayerSource : std::uint8_t { kEveryImage, kCoverage, kPredictions, kPasses, kDenoised };
 
 struct Layer {
   std::string_view name;      // of the EXR layer; the beauty image has none

@@ -28,6 +28,23 @@ double Root(double squared) {
   return std::sqrt(std::max(0.0, squared));
 }
 
+// Of an ErrorSample or a DenoisedError.
+template <typename Message>
+RelativeError RootsOf(const Message& message) {
+  const v1::SquaredError& squared = message.relative();
+  RelativeError error = {.value = Root(squared.noise() + squared.bias()),
+                         .low = Root(squared.low()),
+                         .high = Root(squared.high()),
+                         .noise = Root(squared.noise()),
+                         .bias = Root(squared.bias()),
+                         .untrimmed = Root(message.relative_untrimmed())};
+  if (message.has_true_relative()) error.truth = Root(message.true_relative());
+  if (message.has_true_relative_untrimmed()) {
+    error.true_untrimmed = Root(message.true_relative_untrimmed());
+  }
+  return error;
+}
+
 std::vector<ChartPoint> LaterHalf(const v1::Job& job, ErrorAgainst against,
                                   double (*value)(const v1::SquaredError&)) {
   std::vector<ChartPoint> points;
@@ -41,23 +58,19 @@ std::vector<ChartPoint> LaterHalf(const v1::Job& job, ErrorAgainst against,
 }  // namespace
 
 RelativeError ErrorOf(const v1::ErrorSample& sample) {
-  const v1::SquaredError& squared = sample.relative();
-  RelativeError error = {.value = Root(squared.noise() + squared.bias()),
-                         .low = Root(squared.low()),
-                         .high = Root(squared.high()),
-                         .noise = Root(squared.noise()),
-                         .bias = Root(squared.bias()),
-                         .untrimmed = Root(sample.relative_untrimmed())};
-  if (sample.has_true_relative()) error.truth = Root(sample.true_relative());
-  if (sample.has_true_relative_untrimmed()) {
-    error.true_untrimmed = Root(sample.true_relative_untrimmed());
-  }
-  return error;
+  return RootsOf(sample);
 }
 
 std::optional<RelativeError> NewestError(const v1::Job& job) {
   if (job.convergence().empty() || FoundNothing(job)) return std::nullopt;
   return ErrorOf(*job.convergence().rbegin());
+}
+
+std::optional<RelativeError> DenoisedErrorOf(const v1::Job& job) {
+  if (job.convergence().empty() || FoundNothing(job)) return std::nullopt;
+  const v1::ErrorSample& newest = *job.convergence().rbegin();
+  if (!newest.has_denoised()) return std::nullopt;
+  return RootsOf(newest.denoised());
 }
 
 bool FoundNothing(const v1::Job& job) {

@@ -31,6 +31,8 @@ struct RelativeError {
 
 // Of the newest sample; absent before the first and while nothing has been found.
 [[nodiscard]] std::optional<RelativeError> NewestError(const v1::Job& job);
+// The same of the denoised image; absent where the newest sample has none.
+[[nodiscard]] std::optional<RelativeError> DenoisedErrorOf(const v1::Job& job);
 
 // Whether the scene has lights and the image was still black at the newest sample: then nothing is
 // known of its error.

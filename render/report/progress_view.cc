@@ -229,6 +229,10 @@ std::string SummaryLine(const v1::Job& job) {
       absl::StrAppend(&line, "; the target leaves out the worst ", pixels,
                       pixels == 1 ? " pixel" : " pixels");
     }
+    if (const auto denoised = DenoisedErrorOf(job)) {
+      absl::StrAppend(&line, "; denoised, ", ErrorWithInterval(*denoised), ", untrimmed ",
+                      ShortPercent(denoised->untrimmed));
+    }
   } else if (FoundNothing(job)) {
     line += ", no light was found: the image is black";
   }

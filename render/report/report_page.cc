@@ -200,6 +200,14 @@ std::string Headline(const v1::Job& job) {
   if (error->true_untrimmed) {
     absl::StrAppend(&html, ", untrimmed ", ShortPercent(*error->true_untrimmed));
   }
+  if (const auto denoised = DenoisedErrorOf(job)) {
+    absl::StrAppend(&html, ". Denoised ", ErrorWithInterval(*denoised), "; untrimmed ",
+                    ShortPercent(denoised->untrimmed));
+    if (denoised->truth) {
+      absl::StrAppend(&html, "; true error ", ShortPercent(*denoised->truth), ", untrimmed ",
+                      ShortPercent(denoised->true_untrimmed.value_or(0)));
+    }
+  }
   return html + "</p>\n";
 }
 

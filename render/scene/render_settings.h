@@ -67,6 +67,8 @@ struct SettingFields {
   Field<bool> use_everything{};
   // The image has the channel A.
   Field<bool> coverage{};
+  // The finished image has the layer `denoised`.
+  Field<bool> denoise{};
 
   bool operator==(const SettingFields&) const = default;
 };

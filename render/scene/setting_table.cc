@@ -213,6 +213,10 @@ constexpr auto kSettings = std::to_array<Setting>({
      .meaning = "write the channel A: which share of a pixel meets a surface",
      .in_older_jobs = "false",
      .type = SettingField<bool>{.given = &Overrides::coverage, .value = &Settings::coverage}},
+    {.name = "denoise",
+     .meaning = "write the layer `denoised` at the end: the image filtered, and how wrong that is",
+     .in_older_jobs = "false",
+     .type = SettingField<bool>{.given = &Overrides::denoise, .value = &Settings::denoise}},
 });
 
 template <typename... Functions>

@@ -228,6 +228,46 @@ TEST(CoverageTest, IsTheShareOfAPixelThatMeetsASurface) {
     EXPECT_EQ(with.Find(channel.name)->pixels, channel.pixels) << channel.name;
 }
 
+// The job says how wrong both images are; all else is as without.
+TEST(DenoiseTest, TheLayerIsNearerToTheReferenceAndSaysHowNear) {
+  const TemporaryFolder folder;
+  const std::string scene = SceneOfTests("glass-box.pbrt");
+  const std::vector<std::string> size = {"--size", "64x64", "--photons-per-pass", "4096"};
+  const auto with_size = [&](std::vector<std::string> flags) {
+    flags.insert(flags.end(), size.begin(), size.end());
+    return flags;
+  };
+  const Image plain = Render(folder, scene, with_size({"--passes", "32"}));
+  EXPECT_EQ(plain.Find("denoised.G"), nullptr) << "unless it is asked for";
+  ASSERT_EQ(Lucerna(with_size({"render", scene, "--passes", "2048", "--seed", "9", "-o",
+                               folder.At("reference.exr"), "--quiet"}))
+                .exit_code,
+            0);
+  std::string digest;
+  for (const char* workers : {"1", "2"}) {
+    const Finished ran = Lucerna(with_size(
+        {"render", scene, "--passes", "32", "--denoise", "--workers", workers, "--reference",
+         folder.At("reference.exr"), "-o", folder.At("denoised.exr"), "--json", "--quiet"}));
+    ASSERT_EQ(ran.exit_code, 0) << ran.errors;
+    const json image = json::parse(ran.output)["relative_error"];
+    const json denoised = json::parse(ran.output)["denoised_error"];
+    EXPECT_LT(denoised["estimate"].get<double>(), 0.9 * image["estimate"].get<double>());
+    EXPECT_LT(denoised["true"].get<double>(), 0.9 * image["true"].get<double>());
+    EXPECT_GT(denoised["true"].get<double>(), denoised["low"].get<double>());
+    EXPECT_LT(denoised["true"].get<double>(), denoised["high"].get<double>());
+    const std::string of_workers = json::parse(ran.output)["image_digest"];
+    EXPECT_EQ(digest.empty() ? of_workers : digest, of_workers) << "the same bits";
+    digest = of_workers;
+  }
+  const Image with = DecodeExr(*ReadFile(folder.At("denoised.exr"))).value();
+  ASSERT_NE(with.Find("denoised.G"), nullptr);
+  for (const ImageChannel& channel : plain.channels)
+    EXPECT_EQ(with.Find(channel.name)->pixels, channel.pixels) << channel.name;
+  // Nothing is known of the noise of one pass.
+  const Image single = Render(folder, scene, with_size({"--passes", "1", "--denoise"}));
+  EXPECT_EQ(single.Find("denoised.G"), nullptr);
+}
+
 TEST(TraceFlagTest, TheTimelineHasLeasesOfEachWorkerMergesEstimatesAndImages) {
   const TemporaryFolder folder;
   const Finished ran = Lucerna({"render", SceneOfTests("caustic.pbrt"), "--size", "64x48",

@@ -160,6 +160,16 @@ TEST(ProgressViewTest, TheErrorIsSaidWithItsIntervalAndTarget) {
                 "untrimmed 3.28 %; the target leaves out the worst 65 pixels"),
             std::string::npos)
       << SummaryLine(job);
+  EXPECT_EQ(SummaryLine(job).find("denoised"), std::string::npos);
+  v1::DenoisedError& denoised =
+      *job.mutable_convergence(job.convergence_size() - 1)->mutable_denoised();
+  denoised.mutable_relative()->set_noise(0.0001);
+  denoised.mutable_relative()->set_low(0.000081);
+  denoised.mutable_relative()->set_high(0.000144);
+  denoised.set_relative_untrimmed(0.000121);
+  EXPECT_NE(SummaryLine(job).find("; denoised, 1.00 % (95 %: 0.900 % to 1.20 %), untrimmed 1.10 %"),
+            std::string::npos)
+      << SummaryLine(job);
   SetSetting(job, &RenderSettings::error, 0.03);
   EXPECT_NE(ErrorLine(job).find("  target 3.00 % in about 1:"), std::string::npos)
       << ErrorLine(job);

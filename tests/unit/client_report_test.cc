@@ -102,6 +102,27 @@ TEST(ReportTest, TheShortValueIsAPartOfTheFullOne) {
   EXPECT_FALSE(listed.contains("energy"));
 }
 
+TEST(ReportTest, TheDenoisedImageHasAnErrorOfItsOwn) {
+  v1::Job job = ConvergingJob(12);
+  EXPECT_FALSE(json::parse(JobReport(job, JsonDetail::kShort)).contains("denoised_error"));
+  v1::DenoisedError& denoised = *job.mutable_convergence(11)->mutable_denoised();
+  denoised.mutable_relative()->set_noise(0.0003);
+  denoised.mutable_relative()->set_bias(0.0001);
+  denoised.mutable_relative()->set_low(0.0001);
+  denoised.mutable_relative()->set_high(0.0009);
+  denoised.set_relative_untrimmed(0.0016);
+  denoised.set_true_relative(0.0025);
+  denoised.set_true_relative_untrimmed(0.0036);
+  const json error = json::parse(JobReport(job, JsonDetail::kShort))["denoised_error"];
+  EXPECT_EQ(error.size(), 6U);
+  EXPECT_DOUBLE_EQ(error["estimate"].get<double>(), 0.02);
+  EXPECT_DOUBLE_EQ(error["low"].get<double>(), 0.01);
+  EXPECT_DOUBLE_EQ(error["high"].get<double>(), 0.03);
+  EXPECT_DOUBLE_EQ(error["untrimmed"].get<double>(), 0.04);
+  EXPECT_DOUBLE_EQ(error["true"].get<double>(), 0.05);
+  EXPECT_DOUBLE_EQ(error["true_untrimmed"].get<double>(), 0.06);
+}
+
 TEST(ReportTest, TheConvergenceRecordKeepsItsDigits) {
   const v1::Job job = ConvergingJob(12);
   const json report = json::parse(ConvergenceReport(job));

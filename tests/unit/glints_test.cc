@@ -21,8 +21,8 @@
 namespace lucerna {
 namespace {
 
-constexpr int kSize = 16;
-constexpr float kRadiance = 1e6F;
+constexpr int kImageSide = 16;
+constexpr float kLightRadiance = 1e6F;
 constexpr float kIndex = 1.5F;  // of glass
 constexpr double kFocus = 3;    // distance
 constexpr int kDepth = 12;      // reflections and refractions
@@ -38,13 +38,13 @@ struct BallAndLight {
   Ball ball = {{0.3F, 0.2F, 8}, 4};
   Ball light = {{5, 4, 2}, 0.02F};
   bool is_glass = false;
-  float radiance = kRadiance;
+  float radiance = kLightRadiance;
   double lens_radius = 0;
 };
 
 Scene SceneOf(const BallAndLight& parts) {
   Scene scene;
-  SetCamera(scene, {0, 0, 0}, {0, 0, 8}, {0, 1, 0}, 90, kSize);
+  SetCamera(scene, {0, 0, 0}, {0, 0, 8}, {0, 1, 0}, 90, kImageSide);
   scene.camera.lens_radius = parts.lens_radius;
   scene.camera.focal_distance = kFocus;
   const int smooth =
@@ -145,9 +145,9 @@ std::vector<double> ImageOf(const BallAndLight& parts, double lens_x, double len
   constexpr int kCells = 32;  // along the side of a pixel
   constexpr int kFine = 48;   // along the side of a cell
   const auto radius = static_cast<double>(parts.light.radius);
-  std::vector<double> image(kSize * kSize);
-  for (int cell_y = 0; cell_y < kSize * kCells; ++cell_y) {
-    for (int cell_x = 0; cell_x < kSize * kCells; ++cell_x) {
+  std::vector<double> image(kImageSide * kImageSide);
+  for (int cell_y = 0; cell_y < kImageSide * kCells; ++cell_y) {
+    for (int cell_x = 0; cell_x < kImageSide * kCells; ++cell_x) {
       const double x = static_cast<double>(cell_x) / kCells;
       const double y = static_cast<double>(cell_y) / kCells;
       // A light so large that no cell misses it that the small one is in.
@@ -159,7 +159,7 @@ std::vector<double> ImageOf(const BallAndLight& parts, double lens_x, double len
                               y + (i / kFine + 0.5) / (kFine * kCells)),
                       radius);
       }
-      image[static_cast<std::size_t>(cell_y / kCells * kSize + cell_x / kCells)] +=
+      image[static_cast<std::size_t>(cell_y / kCells * kImageSide + cell_x / kCells)] +=
           static_cast<double>(parts.radiance) * sum / (kFine * kFine * kCells * kCells);
     }
   }
@@ -185,19 +185,19 @@ struct Job {
 
 Glints GlintsOf(const Job& job) {
   ThreadTeam team(1);
-  return Glints(job.tracer, FilmRegion{0, 0, kSize, kSize}, team);
+  return Glints(job.tracer, FilmRegion{0, 0, kImageSide, kImageSide}, team);
 }
 
-struct Traced {
+struct PixelStudy {
   std::vector<double> mean, deviation;           // [pixels] over passes
   double mean_of_all = 0, deviation_of_all = 0;  // of the sum over pixels
 };
 
-Traced TraceManyPasses(const Job& job, FilmSpread& spread, int passes) {
+PixelStudy TraceManyPasses(const Job& job, FilmSpread& spread, int passes) {
   ThreadTeam team(1);
-  constexpr std::size_t kPixels = kSize * kSize;
+  constexpr std::size_t kPixels = kImageSide * kImageSide;
   std::vector<double> squares(kPixels);
-  Traced result = {std::vector<double>(kPixels), std::vector<double>(kPixels)};
+  PixelStudy result = {std::vector<double>(kPixels), std::vector<double>(kPixels)};
   const auto deviation = [&](double mean, double square) {
     return std::sqrt(std::max(0.0, square - mean * mean));
   };
@@ -228,7 +228,7 @@ void ExpectImage(const BallAndLight& parts, int least_pixels) {
   constexpr int kPasses = 256;
   const Job job(SceneOf(parts));
   FilmSpread spread(job.tracer);
-  const Traced traced = TraceManyPasses(job, spread, kPasses);
+  const PixelStudy traced = TraceManyPasses(job, spread, kPasses);
   const std::vector<double> expected = ImageOf(parts, 0, 0);
   int pixels = 0;
   double all = 0;
@@ -238,8 +238,8 @@ void ExpectImage(const BallAndLight& parts, int least_pixels) {
     // and chains of more than eight hits carry a billionth of the light.
     ASSERT_NEAR(traced.mean[i], expected[i],
                 5 * traced.deviation[i] / std::sqrt(kPasses) + 0.01 * expected[i] +
-                    1e-9 * static_cast<double>(kRadiance))
-        << i % kSize << ' ' << i / kSize;
+                    1e-9 * static_cast<double>(kLightRadiance))
+        << i % kImageSide << ' ' << i / kImageSide;
     if (expected[i] > 0) ++pixels;
   }
   EXPECT_GE(pixels, least_pixels);
@@ -262,7 +262,7 @@ TEST(GlintsTest, ALensBlursTheImageWithoutNoise) {
   const BallAndLight parts = {.lens_radius = 0.6};
   const Job job(SceneOf(parts));
   FilmSpread spread(job.tracer);
-  const Traced traced = TraceManyPasses(job, spread, kPasses);
+  const PixelStudy traced = TraceManyPasses(job, spread, kPasses);
   double expected = 0;
   constexpr int kRings = 3;
   constexpr int kSectors = 6;
@@ -295,7 +295,8 @@ TEST(GlintsTest, AreWhereTheLightIsSmallAndBrightAndSeen) {
   EXPECT_TRUE(GlintsOf(Job(rough)).all().empty());
   // Where another light has so much power it is no brighter than the image's white.
   Scene dim = SceneOf({});
-  AddQuad(dim, {-100, -100, -2}, {200, 0, 0}, {0, 200, 0}, 1, AddAreaLight(dim, 10 * kRadiance));
+  AddQuad(dim, {-100, -100, -2}, {200, 0, 0}, {0, 200, 0}, 1,
+          AddAreaLight(dim, 10 * kLightRadiance));
   EXPECT_TRUE(GlintsOf(Job(dim)).all().empty());
   // The reflection, and what needs more than one hit.
   EXPECT_EQ(GlintsOf(Job(SceneOf({.is_glass = true}), 1)).all().size(), 1U);

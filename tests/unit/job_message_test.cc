@@ -73,6 +73,9 @@ Job FullJob() {
   sample.missing_relative = 0.25;
   sample.nothing_found = true;
   job.convergence = {sample, sample};
+  job.convergence.back().denoised =
+      DenoisedSample{.estimate = {.relative = {0.01, 0.02, 0.015, 0.05}, .untrimmed = 0.04},
+                     .truth = TrueError{.relative = 0.03, .untrimmed = 0.06}};
   job.lights = {{.name = "light 1",
                  .power_share = 0.5,
                  .photons = {.sent = 3, .in_view = {1, 1}},
@@ -335,6 +338,7 @@ TEST(JobMessageTest, AJobOfTheOldestRecordsGoesOnAsItWas) {
   job.settings.unguided = true;
   job.settings.spectral = false;
   job.settings.coverage = false;
+  job.settings.denoise = false;
   v1::JobRecord record;
   ASSERT_TRUE(record.ParseFromString(EncodeRecord(job, std::nullopt, Duration::zero())));
   const auto read = DecodeRecord(WithoutSettings(record, later), kNow);

@@ -16,7 +16,7 @@
 namespace lucerna {
 namespace {
 
-constexpr std::size_t kPixels = 10'000;
+constexpr std::size_t kManyPixels = 10'000;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // What a pass brings to a pixel, as luminances.
@@ -43,7 +43,7 @@ struct AddedPasses {
 
 // A pass has `photons_of` photons a pixel.
 AddedPasses VarianceOf(
-    std::uint64_t passes, const GatherRule& gather, std::size_t pixels = kPixels,
+    std::uint64_t passes, const GatherRule& gather, std::size_t pixels = kManyPixels,
     const std::function<std::uint64_t(std::uint64_t pass)>& photons_of = [](auto) { return 1; }) {
   AddedPasses added(pixels);
   ThreadTeam team(1);
@@ -87,7 +87,7 @@ double Poisson(KeyedRng& rng, double mean) {
 // Relative standard deviation of a mean over pixels of their sample variances, for numbers whose
 // fourth moment is at most twice that of a normal distribution.
 double DeviationOfVariance(std::uint64_t passes) {
-  return std::sqrt(4.0 / (static_cast<double>(passes) - 1) / static_cast<double>(kPixels));
+  return std::sqrt(4.0 / (static_cast<double>(passes) - 1) / static_cast<double>(kManyPixels));
 }
 
 // Ten photons of 0.05 and direct light of 0.5 give a mean of 1; the floor is a hundredth of that.
@@ -107,7 +107,7 @@ TEST(PassVarianceTest, PartsPhotonsFromDirectLight) {
   // Of halves there is one deviation a pixel, and twice the product of the two parts varies too.
   EXPECT_NEAR(parts.eye_paths, 0.03 * kRelative,
               0.03 * (weights + 5 * DeviationOfVariance(2)) +
-                  5 * 2 * std::sqrt(0.025 * 0.03 / static_cast<double>(kPixels)));
+                  5 * 2 * std::sqrt(0.025 * 0.03 / static_cast<double>(kManyPixels)));
 }
 
 // Passes of fewer photons vary more, and weigh less; eye paths vary alike in all.
@@ -124,7 +124,7 @@ TEST(PassVarianceTest, PartsPassesOfUnlikeNumbersOfPhotons) {
         return Gathered{
             .photons = 0.2 / photons * count, .direct = 0.2 + 0.6 * Uniform(rng), .count = count};
       },
-      kPixels, photons_of);
+      kManyPixels, photons_of);
   EXPECT_EQ(variance.sums.weights().all(), kWeight);
   const PassVariance::Parts parts = variance.Split(1);
   // Of a pass of four photons a pixel: ten are found, which bring 0.05 each.
@@ -132,10 +132,10 @@ TEST(PassVarianceTest, PartsPassesOfUnlikeNumbersOfPhotons) {
   EXPECT_NEAR(parts.photons, 0.025 * kRelative, 0.025 * (weights + 5 * DeviationOfVariance(8)));
   EXPECT_NEAR(parts.eye_paths, 0.03 * kRelative,
               0.03 * (weights + 5 * DeviationOfVariance(2)) +
-                  5 * 2 * std::sqrt(0.025 * 0.03 / static_cast<double>(kPixels)));
+                  5 * 2 * std::sqrt(0.025 * 0.03 / static_cast<double>(kManyPixels)));
   EXPECT_FALSE(parts.is_evenly_spaced);
   // Eight passes of eye paths cost 6 a pixel each, a photon 2.
-  const double best = variance.BestPhotons(1) / static_cast<double>(kPixels);
+  const double best = variance.BestPhotons(1) / static_cast<double>(kManyPixels);
   EXPECT_NEAR(best, 4 * std::sqrt(parts.photons * 6 / (parts.eye_paths * 4 * 2)), 1e-9 * best);
 }
 
@@ -150,7 +150,7 @@ TEST(PassVarianceTest, TexturesVaryAlikeInPassesOfFewPhotons) {
         return Gathered{.photons = (Uniform(rng) < 0.5 ? 0.025 : 0.075) / photons * count,
                         .count = count};
       },
-      kPixels, [&](std::uint64_t pass) { return kNumbers[pass]; });
+      kManyPixels, [&](std::uint64_t pass) { return kNumbers[pass]; });
   const PassVariance::Parts parts = variance.Split(1);
   // Of a pass of eight photons a pixel E[a²] - 1 = 0.25 are of textures, and a 160th of photons; a
   // quarter of that more is where both are multiplied, in passes of a 20th and of a 160th.
@@ -198,9 +198,9 @@ TEST(PassVarianceTest, WhereHardlyAnyPhotonIsFoundMoreAreNeeded) {
     });
   };
   EXPECT_EQ(with(0.05, 0.4).BestPhotons(3), kInfinity);
-  EXPECT_LT(with(0.05, 4).BestPhotons(3), kPixels) << "a fortieth of the light";
-  EXPECT_LT(with(0, 0.4).BestPhotons(3), kPixels) << "none at all";
-  EXPECT_LE(with(2, 40).BestPhotons(3), kPixels) << "many";
+  EXPECT_LT(with(0.05, 4).BestPhotons(3), kManyPixels) << "a fortieth of the light";
+  EXPECT_LT(with(0, 0.4).BestPhotons(3), kManyPixels) << "none at all";
+  EXPECT_LE(with(2, 40).BestPhotons(3), kManyPixels) << "many";
 }
 
 // One photon in twenty passes, taken for the whole truth, explains more than there is.
@@ -273,11 +273,11 @@ TEST(PassVarianceTest, TheBestNumberFollowsFromVariancesAndCosts) {
   };
   const AddedPasses variance = VarianceOf(4, gather);
   const PassVariance::Parts parts = variance.Split(1);
-  EXPECT_DOUBLE_EQ(variance.CostsSoFar().eye_paths, 4.0 * 6 * kPixels);
-  EXPECT_DOUBLE_EQ(variance.CostsSoFar().photons, 4.0 * 2 * kPixels);
+  EXPECT_DOUBLE_EQ(variance.CostsSoFar().eye_paths, 4.0 * 6 * kManyPixels);
+  EXPECT_DOUBLE_EQ(variance.CostsSoFar().photons, 4.0 * 2 * kManyPixels);
   // Such passes have a photon a pixel. With n times as many, variance times time is
   // (eye + photons / n) (6 + 2 n).
-  const double best = variance.BestPhotons(1) / static_cast<double>(kPixels);
+  const double best = variance.BestPhotons(1) / static_cast<double>(kManyPixels);
   const auto spent = [&](double n) { return (parts.eye_paths + parts.photons / n) * (6 + 2 * n); };
   EXPECT_GT(best, 1);
   EXPECT_LT(spent(best), spent(0.98 * best));
@@ -300,7 +300,7 @@ TEST(PassVarianceTest, EvenlySpacedPhotonsKeepTheirNumber) {
     return Gathered{.photons = 0.1 * count, .count = count};
   });
   EXPECT_TRUE(even.Split(1).is_evenly_spaced);
-  EXPECT_EQ(even.BestPhotons(1), kPixels);
+  EXPECT_EQ(even.BestPhotons(1), kManyPixels);
   // Independent ones, many or few, are not taken for such.
   for (const double mean : {10.0, 0.2}) {
     const AddedPasses random = VarianceOf(4, [&](KeyedRng& rng, std::uint64_t, std::size_t) {
@@ -308,7 +308,7 @@ TEST(PassVarianceTest, EvenlySpacedPhotonsKeepTheirNumber) {
       return Gathered{.photons = count / mean, .count = count};
     });
     EXPECT_FALSE(random.Split(1).is_evenly_spaced) << mean;
-    EXPECT_GT(random.BestPhotons(1), 2.0 * kPixels) << mean;
+    EXPECT_GT(random.BestPhotons(1), 2.0 * kManyPixels) << mean;
   }
 }
 

@@ -9,8 +9,8 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include <zlib.h>
 
+#include "tests/support/gzip_text.h"
 #include "tests/support/memory_files.h"
 
 namespace lucerna {
@@ -109,20 +109,6 @@ TEST(ReadSceneTest, AFileThatIsNotThereIsMissing) {
   const ParsedScene parsed = ReadScene(none, "scene.xml");
   EXPECT_FALSE(parsed.ok());
   EXPECT_THAT(parsed.diagnostics.at(0).message, ::testing::Not(::testing::HasSubstr("format")));
-}
-
-std::string Gzip(const std::string& bytes) {
-  z_stream stream{};
-  EXPECT_EQ(deflateInit2(&stream, 9, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY), Z_OK);
-  std::string out(deflateBound(&stream, bytes.size()) + 64, '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-  stream.avail_in = static_cast<uInt>(bytes.size());
-  stream.next_out = reinterpret_cast<Bytef*>(out.data());
-  stream.avail_out = static_cast<uInt>(out.size());
-  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
-  out.resize(stream.total_out);
-  deflateEnd(&stream);
-  return out;
 }
 
 TEST(ReadSceneTest, AsManyErrorsAreKeptAsTheCallerTakes) {

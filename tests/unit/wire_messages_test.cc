@@ -84,7 +84,7 @@ TEST(MessagesTest, AMissingSettingIsNamed) {
   v1::RenderSettings message = ToProto(SomeSettings());
   message.mutable_settings()->RemoveLast();
   const Status status = FromProto(message).status();
-  EXPECT_NE(status.message().find("setting \"coverage\" is missing"), std::string::npos) << status;
+  EXPECT_NE(status.message().find("setting \"denoise\" is missing"), std::string::npos) << status;
 }
 
 TEST(MessagesTest, SettingsToShowAreThoseThatCanBeRead) {
