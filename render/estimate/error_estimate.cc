@@ -15,8 +15,8 @@ namespace {
 
 // What squared bias is at least and at most, of what is estimated. It is too large where values
 // without blur are guessed from few photons, too small where lines thinner than the inner kernel
-// are. Chosen, with kModelError (in the header), on half A of tests/tools/make_study_scenes.py and on scenes of the
-// project.
+// are. Chosen, with kModelError (in the header), on half A of tests/tools/make_study_scenes.py and
+// on scenes of the project.
 constexpr double kLeastBias = 0.35;
 constexpr double kMostBias = 2.5;
 

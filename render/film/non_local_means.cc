@@ -19,7 +19,7 @@ constexpr std::size_t kPatched = static_cast<std::size_t>(kStride) * kRows;
 using TileColumn = std::array<float, kPatched>;
 using TileValues = std::array<float, static_cast<std::size_t>(kTileWidth) * kTileHeight>;
 
-// Differences between features at which a pixel weighs a ninth of what it would.
+// Differences between features at which a pixel weighs four ninths of what it would.
 constexpr float kNormalScale = 0.15F;
 constexpr float kAlbedoScale = 0.1F;
 // Of depth, over what the slope of the surface lets expect, and a share of the depth itself.
