@@ -44,8 +44,8 @@ struct DenoisedImage {
   double noise_left = 1;  // what is left of noise
   // Squared bias that was added; by chance below 0 where there is little.
   double blur = 0;
-  double deviation = 0;   // standard deviation of the sum
-  double all_left = 1;    // the sum, of all pixels
+  double deviation = 0;  // standard deviation of the sum
+  double all_left = 1;   // the sum, of all pixels
   // As NoisyImage has it.
   double feature_share = 0;
 };
