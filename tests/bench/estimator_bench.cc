@@ -44,6 +44,9 @@
 namespace lucerna {
 namespace {
 
+// Of an iteration of photon_paths; tests/bench/roofline.py reads it.
+constexpr int kPathsAtOnce = 4096;
+
 // Everything that the benchmarks of one scene share: one pass at 256 × 256 pixels.
 struct Bench {
   explicit Bench(const std::string& path) : scene(LoadScene(path)) {
@@ -93,7 +96,7 @@ void PhotonPaths(benchmark::State& state, const Bench& bench) {
   PhotonPathTracer::Landed landed;
   for (auto _ : state) {
     landed.deposits = {};
-    for (int i = 0; i < 4096; ++i)
+    for (int i = 0; i < kPathsAtOnce; ++i)
       bench.photons->Trace(0, index++, landed);
     deposits += landed.deposits.size();
   }
