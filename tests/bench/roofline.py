@@ -5,7 +5,7 @@ Usage: tests/bench/roofline.py SCENE... [--bin DIR] [--repeat 100] [-o TABLE.csv
 
 For each scene, on one thread: photon paths a second, as a share of what tracing the same rays alone
 allows (medians of 7, interleaved); instructions, data references and cache misses a ray, as
-`valgrind --tool=cachegrind` simulates them with the caches of this machine; and which part of the
+`valgrind --tool=cachegrind` (package valgrind) simulates them with the caches of this machine; and which part of the
 program the instructions belong to. Of two runs that differ by --repeat repetitions the difference
 counts, so that reading the scene and building its tree do not. Where `perf stat` has counters (`perf
 stat -e cycles true`), cycles are the better measure; virtual machines seldom have them.
