@@ -441,7 +441,7 @@ BandedImage JobEstimator::MakeBands(std::shared_ptr<const DenoisedImage> denoise
   return image;
 }
 
-DenoisedImage JobEstimator::Denoise() const {
+NoisyImage JobEstimator::MakeNoisyImage() const {
   const State& state = *state_;
   const ImageSums& sums = *state.sums;
   const PassWeights weights = sums.weights();
@@ -482,6 +482,10 @@ DenoisedImage JobEstimator::Denoise() const {
       image.features.distance[pixel] = static_cast<float>(features.distance);
     }
   });
+  return image;
+}
+
+DenoisedImage JobEstimator::Denoise(NoisyImage image) const {
   return lucerna::Denoise(std::move(image), state_->team);
 }
 

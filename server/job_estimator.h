@@ -119,8 +119,10 @@ class JobEstimator {
   // `denoised` is of the same passes, or nullptr.
   [[nodiscard]] BandedImage MakeBands(
       std::shared_ptr<const DenoisedImage> denoised = nullptr) const;
-  // Takes far longer than an estimate of the error. Requires two passes or more.
-  [[nodiscard]] DenoisedImage Denoise() const;
+  // What is filtered to denoise the image so far. Requires two passes or more.
+  [[nodiscard]] NoisyImage MakeNoisyImage() const;
+  // Of what MakeNoisyImage gave; takes far longer. May run beside all others.
+  [[nodiscard]] DenoisedImage Denoise(NoisyImage image) const;
   // Requires passes() > 0.
   [[nodiscard]] EstimatorSnapshot Snapshot() const;
   // May run beside all others. Requires a snapshot of this estimator.

@@ -830,21 +830,25 @@ std::shared_ptr<const DenoisedImage> JobRunner::DenoiseIfAsked() {
   if (!settings_.denoise) return nullptr;
   ReleaseFreedMemory();
   const SteadyTime began_at = hooks_.clock.Steady();
-  DenoisedSample sample;
-  std::shared_ptr<const DenoisedImage> denoised;
+  NoisyImage noisy;
+  ErrorEstimate estimate;
+  double missing = 0;  // in both
   {
     const MutexLock lock(estimator_mutex_);
     if (estimator_->passes() < 2) return nullptr;
-    denoised = std::make_shared<const DenoisedImage>(estimator_->Denoise());
+    noisy = estimator_->MakeNoisyImage();
     EstimatorSnapshot snapshot = estimator_->Snapshot();
-    // What may be missing is missing in both.
-    const double missing = estimator_->FindMissingLight(snapshot).relative;
-    if (!reference_.empty()) sample.truth = JobEstimator::ErrorAgainst(reference_, *denoised);
-    sample.estimate = ErrorOfDenoised(
-        *denoised,
-        estimator_->EstimateError(std::move(snapshot), MissingLight(), std::max(checkpoints_, 1)));
-    sample.estimate.relative.high += missing;
+    missing = estimator_->FindMissingLight(snapshot).relative;
+    estimate =
+        estimator_->EstimateError(std::move(snapshot), MissingLight(), std::max(checkpoints_, 1));
   }
+  // Without the lock, for which those wait who fetch the image meanwhile.
+  const auto denoised =
+      std::make_shared<const DenoisedImage>(estimator_->Denoise(std::move(noisy)));
+  DenoisedSample sample;
+  sample.estimate = ErrorOfDenoised(*denoised, estimate);
+  sample.estimate.relative.high += missing;
+  if (!reference_.empty()) sample.truth = JobEstimator::ErrorAgainst(reference_, *denoised);
   Timed("estimate", began_at, [] { return std::string("denoised image"); });
   hooks_.on_denoised(sample);
   return denoised;

@@ -254,13 +254,18 @@ class Denoiser {
       expected[pixel] =
           static_cast<float>(deviation * deviation / (luminance * luminance + floor_));
     });
+    // The worst ones are left out.
+    const std::size_t kept_pixels = KeptPixels(pixels());
     std::vector<std::size_t> order(pixels());
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::ranges::nth_element(
-        order, order.begin() + static_cast<std::ptrdiff_t>(KeptPixels(pixels())) - 1,
-        [&](std::size_t a, std::size_t b) {
-          return expected[a] != expected[b] ? expected[a] < expected[b] : a < b;
-        });
+    std::ranges::nth_element(order, order.begin() + static_cast<std::ptrdiff_t>(kept_pixels) - 1,
+                             [&](std::size_t a, std::size_t b) {
+                               return expected[a] != expected[b] ? expected[a] < expected[b]
+                                                                 : a < b;
+                             });
+    std::vector<bool> is_left_out(pixels());
+    for (std::size_t i = kept_pixels; i < pixels(); ++i)
+      is_left_out[order[i]] = true;
     Errors all;
     std::array<Errors, static_cast<std::size_t>(kErrorCells) * kErrorCells> cells;
     const auto add = [](const Errors& one, Errors& sum) {
@@ -268,16 +273,14 @@ class Denoiser {
       sum.left += one.left;
       sum.total += one.total;
     };
-    std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(KeptPixels(pixels())));
     const auto width = static_cast<std::size_t>(image_.width);
     const auto height = static_cast<std::size_t>(image_.height);
-    for (std::size_t i = 0; i < KeptPixels(pixels()); ++i) {
-      const std::size_t x = order[i] % width, y = order[i] / width;
-      add(errors[order[i]],
-          cells[y * kErrorCells / height * kErrorCells + x * kErrorCells / width]);
+    for (std::size_t pixel = 0; pixel < pixels(); ++pixel) {
+      add(errors[pixel], all);
+      if (is_left_out[pixel]) continue;
+      const std::size_t x = pixel % width, y = pixel / width;
+      add(errors[pixel], cells[y * kErrorCells / height * kErrorCells + x * kErrorCells / width]);
     }
-    for (const Errors& one : errors)
-      add(one, all);
     Errors kept;
     for (const Errors& cell : cells)
       add(cell, kept);

@@ -32,7 +32,7 @@ struct PixelValues {
 // How values change with the unit of length and with the power of the lights.
 enum class LayerUnit : std::uint8_t { kNone, kRadiance, kLength, kPerLength };
 // Which images have the layer: all; those that were asked for it; those of controllers that predict
-// bandwidths; those of two passes or more; of these, those that were asked for it, at their end.
+// bandwidths; those of two passes or more; finished ones of jobs that asked for it.
 enum class LayerSource : std::uint8_t { kEveryImage, kCoverage, kPredictions, kPasses, kDenoised };
 
 struct Layer {
