@@ -16,6 +16,7 @@
 #include "render/base/parallel.h"
 #include "render/base/text.h"
 #include "render/estimate/evidence.h"
+#include "render/estimate/eye_path_counts.h"
 #include "render/estimate/missing_light.h"
 #include "render/estimate/noise_layer.h"
 #include "render/estimate/photon_noise.h"
@@ -46,6 +47,7 @@ struct PhotonChoice {
 };
 constexpr std::array kPhotonChoices = {PhotonChoice{4, 4}, PhotonChoice{8, 8}};
 static_assert(kPhotonChoices.back().passes <= kFirstLongRound);
+static_assert(kPhotonChoices.back().passes == kEyePathsCompared);
 
 // Whether a path may be bent by a smooth surface.
 bool HasSmoothSurfaces(const Scene& scene) {
@@ -159,7 +161,8 @@ struct JobEstimator::State {
   struct After {
     std::shared_ptr<const RadiusColumn> radii;
     std::uint64_t photons_per_pass = 0;
-    std::shared_ptr<const PhotonGuide> guide = nullptr;  // nullptr: photons are drawn evenly
+    std::shared_ptr<const PhotonGuide> guide = nullptr;        // nullptr: photons are drawn evenly
+    std::shared_ptr<const EyePathCounts> eye_paths = nullptr;  // nullptr: one for each pixel
   };
   std::map<std::uint64_t, After> after;
   std::unique_ptr<JobGuides> guides;               // of jobs whose photons are drawn by them
@@ -181,12 +184,27 @@ struct JobEstimator::State {
            static_cast<std::size_t>(settings.crop_height());
   }
 
+  // Not where pixels follow from no others, so that tiles match the whole image, not of sensors, of
+  // which each is a point, and not of images so large that memory would be short.
+  [[nodiscard]] bool chooses_eye_paths() const {
+    return !settings.unguided && pixels() <= kMostPixelsWithMore &&
+           prepared.scene().camera.kind != Camera::Kind::kSensors;
+  }
+
+  [[nodiscard]] std::shared_ptr<const EyePathCounts> EyePathsOf(const PassRange& round,
+                                                                const After& known) const {
+    if (!chooses_eye_paths() || !ComparesEyePaths(round.first)) return known.eye_paths;
+    return std::make_shared<const EyePathCounts>(
+        ComparedEyePaths(pixels(), static_cast<std::size_t>(settings.crop_width()), round.first));
+  }
+
   // Of no passes.
   void BeginSums() {
     radii = std::make_unique<PixelRadii>(pixels(), initial_radius, *controller);
     sums = std::make_unique<ImageSums>(pixels());
     blur_noise_share = 1;
-    if (settings.adaptive_photons) variance = std::make_unique<PassVariance>(pixels());
+    if (settings.adaptive_photons || chooses_eye_paths())
+      variance = std::make_unique<PassVariance>(pixels());
   }
 
   // As JobEstimator::Restore, but for sums, radii and variance: those are gone when it fails.
@@ -203,18 +221,28 @@ struct JobEstimator::State {
     if (variance != nullptr) variance->Discount(factor);
   }
 
-  // How many photons later passes have once `round` has been added, given how many they would have
-  // by what was known before.
-  [[nodiscard]] std::uint64_t ChoosePhotons(const PassRange& round, std::uint64_t before) {
-    if (variance == nullptr) return before;
+  // How many photons and eye paths later passes have once `round` has been added: into `next`,
+  // which has those by what was known before.
+  void ChooseSamples(const PassRange& round, After& next) {
+    if (variance == nullptr) return;
     const auto choice = std::ranges::find(kPhotonChoices, round.last, &PhotonChoice::passes);
-    if (choice == kPhotonChoices.end()) return before;
+    if (choice == kPhotonChoices.end()) return;
     const auto reach = static_cast<double>(ReachOf(EvidenceOf(settings.radius_controller)));
-    const double best = variance->BestPhotons(
-        *sums, kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach);
-    if (round.last == kPhotonChoices.back().passes) variance.reset();
-    const auto first = static_cast<std::uint64_t>(settings.photons_per_pass);
-    return NextPhotons(before, choice->most * first, best);
+    const double kernel_noise = kPi64 * Kernel{settings.kernel}.Moments().roughness * reach * reach;
+    const std::uint64_t most = choice->most * static_cast<std::uint64_t>(settings.photons_per_pass);
+    const bool is_last = round.last == kPhotonChoices.back().passes;
+    if (is_last && chooses_eye_paths()) {
+      const Samples samples =
+          lucerna::ChooseSamples(*variance, *sums, kernel_noise, next.photons_per_pass,
+                                 settings.adaptive_photons ? most : next.photons_per_pass,
+                                 static_cast<std::size_t>(settings.crop_width()));
+      next.photons_per_pass = samples.photons_per_pass;
+      next.eye_paths = samples.eye_paths;
+    } else if (settings.adaptive_photons) {
+      next.photons_per_pass =
+          NextPhotons(next.photons_per_pass, most, variance->BestPhotons(*sums, kernel_noise));
+    }
+    if (is_last) variance.reset();
   }
 
   // Radiance over all passes, Rec. 709.
@@ -257,7 +285,7 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
   return std::unique_ptr<JobEstimator>(new JobEstimator(std::move(state)));
 }
 
-StatusOr<EyePass> JobEstimator::TraceEyePaths(std::uint64_t pass,
+StatusOr<EyePass> JobEstimator::TraceEyePaths(std::uint64_t pass, const EyePathCounts* counts,
                                               const std::function<bool()>& shall_stop) const {
   const auto lock = state_->HoldColors();
   const SceneMotion& motion = state_->prepared.scene().motion;
@@ -270,11 +298,11 @@ StatusOr<EyePass> JobEstimator::TraceEyePaths(std::uint64_t pass,
     FilmSpread spread(tracer);
     if (needs().Uses(Part::kSpectra)) spread.Prepare(state_->team);
     const PreparedScene::AtPass at_pass(*then, state_->settings.seed, pass);
-    return TraceHitpointPass(tracer, pass, nullptr, spread, state_->team, shall_stop);
+    return TraceHitpointPass(tracer, pass, nullptr, spread, state_->team, shall_stop, counts);
   }
   const PreparedScene::AtPass at_pass(state_->prepared, state_->settings.seed, pass);
   return TraceHitpointPass(*state_->tracer, pass, state_->first_hits.Of(pass), *state_->film_spread,
-                           state_->team, shall_stop);
+                           state_->team, shall_stop, counts);
 }
 
 std::optional<RoundPlan> JobEstimator::PlanFor(const PassRange& round) const {
@@ -288,7 +316,8 @@ std::optional<RoundPlan> JobEstimator::PlanFor(const PassRange& round) const {
                    .caustic_radius = static_cast<float>(
                        static_cast<double>(state_->initial_radius) *
                        ScheduledShrink(state_->settings.alpha, {0, round.first})),
-                   .guide = after->second.guide};
+                   .guide = after->second.guide,
+                   .eye_paths = state_->EyePathsOf(round, after->second)};
 }
 
 SliceShape JobEstimator::ShapeOf(const PassRange& round, const RoundPlan& plan) const {
@@ -332,8 +361,10 @@ void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundP
   const std::vector<EmissionReport> reports = round->reports;
   const std::uint64_t photons = round->tally.photons;
   round.reset();
-  after.photons_per_pass = state.ChoosePhotons(of_round, before.photons_per_pass);
+  after.photons_per_pass = before.photons_per_pass;
   after.guide = before.guide;
+  after.eye_paths = before.eye_paths;
+  state.ChooseSamples(of_round, after);
   if (state.guides != nullptr) {
     state.guides->Add(reports, plan.guide, photons);
     if (JobGuides::IsTimeForNext(passes, *before.guide)) {
@@ -691,7 +722,11 @@ void JobEstimator::Save(ByteWriter& writer) const {
     writer.Varint(after.photons_per_pass);
     WriteRadii(writer, *after.radii);
     if (state.guides != nullptr) WriteGuide(writer, *after.guide);
+    // They are chosen once, so that all which have some have the same.
+    writer.Byte(after.eye_paths != nullptr ? 1 : 0);
   }
+  if (const auto& newest = state.after.rbegin()->second; newest.eye_paths != nullptr)
+    WriteEyePaths(writer, *newest.eye_paths);
   if (state.guides != nullptr) WriteLearned(writer, state.guides->learned());
   {
     const MutexLock lock(state_->noise_area_mutex);
@@ -722,14 +757,23 @@ Status JobEstimator::State::RestoreSums(ByteReader& reader) {
   };
   LUCERNA_ASSIGN_OR_RETURN(std::shared_ptr<const RadiusColumn> read_last_radii, read_radii());
   std::map<std::uint64_t, After> read_after;
+  std::set<std::uint64_t> with_eye_paths;
   for (std::uint64_t left = reader.Varint(); left > 0; --left) {
     const std::uint64_t passes = reader.Varint();
     After& of_passes = read_after[passes];
     of_passes.photons_per_pass = reader.Varint();
     LUCERNA_ASSIGN_OR_RETURN(of_passes.radii, read_radii());
-    if (guides == nullptr) continue;
-    LUCERNA_ASSIGN_OR_RETURN(PhotonGuide guide, ReadGuide(reader));
-    of_passes.guide = std::make_shared<const PhotonGuide>(std::move(guide));
+    if (guides != nullptr) {
+      LUCERNA_ASSIGN_OR_RETURN(PhotonGuide guide, ReadGuide(reader));
+      of_passes.guide = std::make_shared<const PhotonGuide>(std::move(guide));
+    }
+    if (reader.Byte() != 0) with_eye_paths.insert(passes);
+  }
+  if (!with_eye_paths.empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(EyePathCounts counts, ReadEyePaths(reader, pixels()));
+    const auto shared = std::make_shared<const EyePathCounts>(std::move(counts));
+    for (const std::uint64_t passes : with_eye_paths)
+      read_after[passes].eye_paths = shared;
   }
   GuideLearner::Numbers learned;
   if (guides != nullptr) {

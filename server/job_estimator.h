@@ -88,9 +88,10 @@ class JobEstimator {
   // That does what is spread over threads.
   [[nodiscard]] ThreadTeam& team();
 
-  // `shall_stop` as TraceHitpointPass has it.
+  // `counts` are those of the pass's plan, `shall_stop` as TraceHitpointPass has it.
   [[nodiscard]] StatusOr<EyePass> TraceEyePaths(
-      std::uint64_t pass, const std::function<bool()>& shall_stop = nullptr) const;
+      std::uint64_t pass, const EyePathCounts* counts = nullptr,
+      const std::function<bool()>& shall_stop = nullptr) const;
   // Absent while passes before RadiiFrom(round) have not been added, and for a round that has been.
   [[nodiscard]] std::optional<RoundPlan> PlanFor(const PassRange& round) const;
   [[nodiscard]] SliceShape ShapeOf(const PassRange& round, const RoundPlan& plan) const;

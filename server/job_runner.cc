@@ -435,12 +435,20 @@ Status JobRunner::OpenNextRound(const End& end, RoundPlan plan) {
     const Digest digest = Sha256(bytes);
     LUCERNA_ASSIGN_OR_RETURN(open.radii,
                              hooks_.blobs.PutPinned(digest, std::move(bytes), AfterLastPin::kDrop));
+    std::optional<Digest> eye_paths;
+    if (open.plan.eye_paths != nullptr) {
+      std::string counts = EncodeEyePathCounts(*open.plan.eye_paths);
+      eye_paths = Sha256(counts);
+      LUCERNA_ASSIGN_OR_RETURN(open.eye_paths, hooks_.blobs.PutPinned(*eye_paths, std::move(counts),
+                                                                      AfterLastPin::kDrop));
+    }
     Publish(round.first, {.block = {},
                           .radii = digest,
                           .rows = open.plan.radii->size(),
                           .photons_per_pass = open.plan.photons_per_pass,
                           .caustic_radius = open.plan.caustic_radius,
-                          .guide = open.guide});
+                          .guide = open.guide,
+                          .eye_paths = eye_paths});
     hooks_.scheduler.OpenRound(
         key, {first, std::max(first, std::min(round.last, WantedPasses(end)))}, due_);
   }
@@ -481,7 +489,8 @@ StatusOr<std::optional<JobRunner::TracedPass>> JobRunner::Trace(std::uint64_t pa
   TracedPass traced;
   const SteadyTime began_at = hooks_.clock.Steady();
   LUCERNA_ASSIGN_OR_RETURN(traced.eye,
-                           estimator_->TraceEyePaths(pass, [this] { return ShallInterrupt(); }));
+                           estimator_->TraceEyePaths(pass, OpenRoundOf(pass).plan.eye_paths.get(),
+                                                     [this] { return ShallInterrupt(); }));
   Timed("eye paths", began_at, [&] { return absl::StrCat("eye paths of pass ", pass); });
   if (!traced.eye.is_whole) return std::optional<TracedPass>();
   std::string bytes = EncodeHitpointBlock(traced.eye.block, &estimator_->team());
@@ -821,7 +830,7 @@ std::optional<std::size_t> JobRunner::HitpointsIn(const Digest& digest) const {
   const MutexLock lock(mutex_);
   for (const auto& [pass, blobs] : blobs_) {
     if (blobs.block == digest) return blobs.rows;
-    if (blobs.radii == digest) return std::size_t{0};
+    if (blobs.radii == digest || blobs.eye_paths == digest) return std::size_t{0};
   }
   return std::nullopt;
 }

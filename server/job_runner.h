@@ -137,6 +137,7 @@ class JobRunner final : public RunningJob {
     RoundPlan plan;
     std::size_t guide = 0;  // so many of guides_ with its own
     BlobPin radii;          // of pixels, encoded; of rounds that are not split
+    BlobPin eye_paths;      // of pixels, encoded, where the plan has them; of such rounds
     bool is_split = false;
     MemoryClaim sums;  // of the slices that come; the first few rounds are part of the job's need
   };

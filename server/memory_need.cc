@@ -10,9 +10,9 @@ namespace {
 // Bytes a pixel: of a checkpoint as a file (sums, and the photons that were reported), and, beside
 // what ExpectedCostOf counts, of an error estimate at its highest and of the first passes' squared
 // deviations.
-constexpr std::uint64_t kCheckpoint = 202 + 2 * 14;
+constexpr std::uint64_t kCheckpoint = 203 + 2 * 14;
 constexpr std::uint64_t kEstimate = 64;
-constexpr std::uint64_t kPassVariance = 8;
+constexpr std::uint64_t kPassVariance = 12;
 // Memory for a byte of a file: binary meshes become as much again with the tree over their
 // triangles three times; text becomes less.
 constexpr std::uint64_t kPerSceneByte = 4;

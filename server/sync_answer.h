@@ -20,6 +20,7 @@ struct WorkBlobs {
   std::uint64_t photons_per_pass = 0;
   float caustic_radius = 1;  // of passes
   std::size_t guide = 0;     // so many of the job's guides with its own; 0: none
+  std::optional<Digest> eye_paths = std::nullopt;  // of passes; absent: one for each pixel
 };
 
 // Work with all that a worker must know of it.

@@ -40,6 +40,8 @@ v1::Lease LoanToProto(const Loan& loan) {
     case WorkKind::kPasses:
       message.set_kind(v1::WORK_KIND_PASSES);
       message.set_caustic_radius(loan.blobs.caustic_radius);
+      if (loan.blobs.eye_paths.has_value())
+        message.set_eye_paths_digest(std::string(loan.blobs.eye_paths->Bytes()));
       break;
   }
   return message;

@@ -441,9 +441,9 @@ StatusOr<SliceSums> BatchTracer::RunPass(const RenderSettings& settings, const S
   State& state = *state_;
   LUCERNA_RETURN_IF_ERROR(state.PrepareSpectra(settings, pass));
   const PreparedScene::AtPass at_pass(state.prepared, settings.seed, pass);
-  EyePass eye =
-      TraceHitpointPass(*state.eye_paths, pass, state.first_hits->Of(pass), *state.film_spread,
-                        state.team, [&stop] { return stop.load(std::memory_order_relaxed); });
+  EyePass eye = TraceHitpointPass(
+      *state.eye_paths, pass, state.first_hits->Of(pass), *state.film_spread, state.team,
+      [&stop] { return stop.load(std::memory_order_relaxed); }, plan.eye_paths.get());
   if (stop || !eye.is_whole) return absl::CancelledError("the slice was given up");
   // Before photons are gathered, for which the most memory is needed: the slice holds in fewer
   // bytes what eye paths brought.
@@ -474,8 +474,9 @@ StatusOr<SliceSums> BatchTracer::RunSlice(const RenderSettings& settings, const 
                                           const std::atomic<bool>& stop) {
   const std::size_t pixels = static_cast<std::size_t>(settings.crop_width()) *
                              static_cast<std::size_t>(settings.crop_height());
-  if (!IsSlice(passes) || plan.radii == nullptr || plan.radii->size() != pixels) {
-    return absl::InvalidArgumentError("a slice's passes or radii do not fit its job");
+  if (!IsSlice(passes) || plan.radii == nullptr || plan.radii->size() != pixels ||
+      (plan.eye_paths != nullptr && plan.eye_paths->size() != pixels)) {
+    return absl::InvalidArgumentError("a slice's passes, radii or eye paths do not fit its job");
   }
   if (passes.size() == 1) {
     LUCERNA_RETURN_IF_ERROR(state_->PrepareFor(settings, needs, passes.first));

@@ -172,6 +172,9 @@ StatusOr<LentWork> ReadLease(const v1::Lease& message) {
     return absl::InvalidArgumentError("a lease of an unknown kind of work");
   }
   work.caustic_radius = message.caustic_radius();
+  if (!message.eye_paths_digest().empty()) {
+    LUCERNA_ASSIGN_OR_RETURN(work.eye_paths, Digest::FromBytes(message.eye_paths_digest()));
+  }
   if (!IsSlice({work.first, work.last}) || RoundOf(work.first).first != work.pass) {
     return absl::InvalidArgumentError("a lease's passes are not a slice of its round");
   }

@@ -47,7 +47,8 @@ struct LentWork {
   Digest radii;
   std::uint64_t photons_per_pass = 0;
   float caustic_radius = 1;
-  std::uint64_t guide = 0;  // of JobToTrace::guides the last of the first so many; 0: none
+  std::uint64_t guide = 0;          // of JobToTrace::guides the last of the first so many; 0: none
+  std::optional<Digest> eye_paths;  // of passes; absent: one for each pixel
 };
 
 class Connection {

@@ -183,10 +183,14 @@ StatusOr<LeaseRunner::Fetched> LeaseRunner::Fetch(const std::shared_ptr<Held>& h
     const SceneNeeds& needs = fetched.job->needs;
     const std::size_t per_pixel = std::size_t{1} + (needs.Uses(Part::kCausticHitpoints) ? 1 : 0) +
                                   (needs.Uses(Part::kMedia) ? 1 : 0);
-    LUCERNA_ASSIGN_OR_RETURN(fetched.block, cache_.BlockFor(work.block, pixels * per_pixel));
+    LUCERNA_ASSIGN_OR_RETURN(fetched.block,
+                             cache_.BlockFor(work.block, pixels * per_pixel * kMostEyePaths));
     rows = fetched.block->size();
   }
   LUCERNA_ASSIGN_OR_RETURN(fetched.radii, cache_.RadiiFor(work.radii, rows));
+  if (work.eye_paths.has_value()) {
+    LUCERNA_ASSIGN_OR_RETURN(fetched.eye_paths, cache_.EyePathsFor(*work.eye_paths, pixels));
+  }
   return fetched;
 }
 
@@ -230,7 +234,8 @@ StatusOr<std::string> LeaseRunner::Compute(const Fetched& fetched) {
   const RoundPlan plan = {.photons_per_pass = work.photons_per_pass,
                           .radii = fetched.radii,
                           .caustic_radius = work.caustic_radius,
-                          .guide = guide};
+                          .guide = guide,
+                          .eye_paths = fetched.eye_paths};
   LUCERNA_ASSIGN_OR_RETURN(
       SliceSums slice,
       fetched.tracer->RunSlice(job.settings, job.needs, {work.first, work.last}, plan, stop));

@@ -56,6 +56,7 @@ class LeaseRunner {
     std::shared_ptr<BatchTracer> tracer;
     std::shared_ptr<const HitpointBlock> block;  // of photons
     std::shared_ptr<const RadiusColumn> radii;
+    std::shared_ptr<const EyePathCounts> eye_paths;
   };
   struct Computed {
     std::shared_ptr<Held> held;

@@ -18,6 +18,7 @@ constexpr std::size_t kBlocksKept = 6;
 // off the next is fetched, which may be of the next round or of another job. As the one that was
 // not used the longest goes, two jobs whose leases alternate keep theirs too.
 constexpr std::size_t kRadiiKept = 2;
+constexpr std::size_t kEyePathsKept = 2;
 // What a hitpoint and its radius may need at most before compression, which cannot double it.
 constexpr std::uint64_t kBytesPerHitpoint = 80;
 constexpr std::uint64_t kHeadBytes = 4096;
@@ -102,6 +103,21 @@ StatusOr<std::shared_ptr<const RadiusColumn>> SceneCache::RadiiFor(const Digest&
   while (radii_.size() > kRadiiKept)
     radii_.pop_back();
   return radii;
+}
+
+StatusOr<std::shared_ptr<const EyePathCounts>> SceneCache::EyePathsFor(const Digest& digest,
+                                                                       std::size_t pixels) {
+  if (auto counts = Find(eye_paths_, digest); counts != nullptr && counts->size() == pixels)
+    return counts;
+  LUCERNA_ASSIGN_OR_RETURN(const std::string bytes,
+                           fetch_(digest, kHeadBytes + kBytesPerHitpoint * pixels));
+  LUCERNA_ASSIGN_OR_RETURN(EyePathCounts decoded, DecodeEyePathCounts(bytes, pixels));
+  std::shared_ptr<const EyePathCounts> counts =
+      std::make_shared<const EyePathCounts>(std::move(decoded));
+  eye_paths_.emplace_front(digest, counts);
+  while (eye_paths_.size() > kEyePathsKept)
+    eye_paths_.pop_back();
+  return counts;
 }
 
 }  // namespace lucerna

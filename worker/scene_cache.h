@@ -49,6 +49,9 @@ class SceneCache {
   // Errors: what fetching said, INVALID_ARGUMENT for bytes that are not so many radii.
   [[nodiscard]] StatusOr<std::shared_ptr<const RadiusColumn>> RadiiFor(const Digest& digest,
                                                                        std::size_t rows);
+  // Errors: what fetching said, INVALID_ARGUMENT for bytes that are no numbers of so many pixels.
+  [[nodiscard]] StatusOr<std::shared_ptr<const EyePathCounts>> EyePathsFor(const Digest& digest,
+                                                                           std::size_t pixels);
 
  private:
   template <typename Value>
@@ -60,6 +63,7 @@ class SceneCache {
   Kept<BatchTracer> tracers_;
   Kept<const HitpointBlock> blocks_;
   Kept<const RadiusColumn> radii_;
+  Kept<const EyePathCounts> eye_paths_;
 };
 
 }  // namespace lucerna

@@ -80,4 +80,12 @@ struct HitpointBlock {
 // The radius of every hitpoint of a pass [scene units]: finite and > 0. Of a segment, at its end.
 using RadiusColumn = std::vector<float>;
 
+// How many eye paths each pixel has in a pass (eye_path_counts.h): [pixels of the crop window] from
+// 1 to kMostEyePaths.
+using EyePathCounts = std::vector<std::uint8_t>;
+inline constexpr int kMostEyePaths = 9;
+// Of all pixels beside their first ones, and pixels of the images that may have more than one.
+inline constexpr std::uint64_t kMostMoreEyePaths = std::uint64_t{1} << 21;
+inline constexpr std::uint64_t kMostPixelsWithMore = 2 * kMostMoreEyePaths;
+
 }  // namespace lucerna

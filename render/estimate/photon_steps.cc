@@ -33,22 +33,6 @@ float Held(double value) {
       std::min(value, static_cast<double>(std::numeric_limits<float>::max())));
 }
 
-// Whether so few photons were found that their variance is not seen, though they bring a good part
-// of the light.
-bool IsStarved(const ImageSums& sums) {
-  double found = 0;
-  double photons = 0;
-  double all = 0;
-  for (std::size_t i = 0; i < sums.pixels(); ++i) {
-    const ImageSums::Pixel pixel = sums.At(i);
-    found += pixel.photon_count;
-    photons += WorkingLuminance(pixel.photons);
-    all += WorkingLuminance(pixel.radiance());
-  }
-  return found < kFewestFound * static_cast<double>(sums.pixels()) &&
-         photons > kShareThatCounts * all;
-}
-
 }  // namespace
 
 std::uint64_t PhotonsOf(const PhotonSteps& steps, std::uint64_t pass) {
@@ -74,6 +58,20 @@ std::uint64_t PassesFor(const PhotonSteps& steps, std::uint64_t photons) {
   return 0;
 }
 
+bool PassVariance::IsStarved(const ImageSums& sums) {
+  double found = 0;
+  double photons = 0;
+  double all = 0;
+  for (std::size_t i = 0; i < sums.pixels(); ++i) {
+    const ImageSums::Pixel pixel = sums.At(i);
+    found += pixel.photon_count;
+    photons += WorkingLuminance(pixel.photons);
+    all += WorkingLuminance(pixel.radiance());
+  }
+  return found < kFewestFound * static_cast<double>(sums.pixels()) &&
+         photons > kShareThatCounts * all;
+}
+
 void PassVariance::Add(const SliceSums& pass, const ImageSums& before) {
   LUCERNA_CHECK(pass.passes == (PassRange{before.passes(), before.passes() + 1}) &&
                 pass.pixels() == pixels_.size() && before.pixels() == pixels_.size());
@@ -88,6 +86,8 @@ void PassVariance::Add(const SliceSums& pass, const ImageSums& before) {
           DeviationBetween(weight, WorkingLuminance(before.At(i).photons), 1, photons));
     }
     if (before.passes() % 2 == 0) add(pixels_[i].even, photons);
+    if (HasFeatures(pass.passes))
+      add(pixels_[i].of_paths, at(pass.first_feature() + kPathVariance));
   }
 }
 
@@ -99,7 +99,8 @@ void PassVariance::Discount(double factor) {
   }
 }
 
-PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noise) const {
+std::vector<PassVariance::Variances> PassVariance::OfPixels(const ImageSums& sums,
+                                                            double kernel_noise) const {
   LUCERNA_CHECK(sums.passes() >= 2 && sums.whole_passes() == sums.passes() &&
                 sums.pixels() == pixels_.size());
   const auto passes = static_cast<double>(sums.passes());
@@ -115,14 +116,6 @@ PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noi
   }
   if (!(floor > 0)) return {};
 
-  // Of one pixel, relative.
-  struct Variances {
-    float all = 0;            // of passes
-    float photons = 0;        // of what photons brought
-    float photons_found = 0;  // that the number of photons found explains
-    float independent = 0;    // the same, without bias where few were found
-    float eye_paths = 0;      // of halves, beyond what photons brought to them
-  };
   std::vector<Variances> variances;
   variances.reserve(pixels_.size());
   // From the squared difference of the halves' means to the variance of a pass. Of direct light all
@@ -143,6 +136,7 @@ PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noi
     const double count = pixel.photon_count;
     variances.push_back(
         {.all = Held(weight * pixel.squared_deviations / (passes - 1)),
+         .halves = Held(weight * all * all * weights.even * weights.odd / weight_of_all),
          .photons = Held(weight * static_cast<double>(pixels_[i].deviations) / (passes - 1)),
          .photons_found =
              count > 0 ? Held(weight * photons * photons * kernel_noise * weight_of_all / count)
@@ -154,6 +148,41 @@ PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noi
                                   : 0,
          .eye_paths = Held(weight * (all * all - of_photons * of_photons) * halves)});
   }
+  return variances;
+}
+
+namespace {
+
+// Weights follow from photons, whose variance per weight they make even. Eye paths scatter alike in
+// every pass, so that of passes that weigh little they say too little.
+double EyePathsPerDeviation(const ImageSums& sums) {
+  const PassWeights weights = sums.weights();
+  return (static_cast<double>(sums.passes()) - 1) /
+         (weights.all() - weights.squares / weights.all());
+}
+
+}  // namespace
+
+std::vector<float> PassVariance::OfEyePaths(const ImageSums& sums) const {
+  const double weight = sums.weights().all();
+  std::vector<double> luminances;
+  luminances.reserve(pixels_.size());
+  for (std::size_t i = 0; i < pixels_.size(); ++i)
+    luminances.push_back(WorkingLuminance(sums.RadianceAt(i)) / weight);
+  const double floor = RelativeErrorFloor(luminances);
+  if (!(floor > 0)) return {};
+  std::vector<float> of_pixels;
+  of_pixels.reserve(pixels_.size());
+  for (std::size_t i = 0; i < pixels_.size(); ++i) {
+    of_pixels.push_back(Held(static_cast<double>(pixels_[i].of_paths) / kComparisonsOfPixel /
+                             (luminances[i] * luminances[i] + floor)));
+  }
+  return of_pixels;
+}
+
+PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noise) const {
+  std::vector<Variances> variances = OfPixels(sums, kernel_noise);
+  if (variances.empty()) return {};
   const std::size_t kept = KeptPixels(variances.size());
   std::ranges::nth_element(variances, variances.begin() + static_cast<std::ptrdiff_t>(kept) - 1, {},
                            &Variances::all);
@@ -168,13 +197,12 @@ PassVariance::Parts PassVariance::Split(const ImageSums& sums, double kernel_noi
   // hardly any, or where low discrepancy spaces them evenly.
   const double all_photons = mean(&Variances::photons);
   const double photons = std::min(mean(&Variances::photons_found), all_photons);
-  // Weights follow from photons, whose variance per weight they make even. Eye paths scatter alike
-  // in every pass, so that of passes that weigh little they say too little.
-  const double of_passes = (passes - 1) / (weight_of_all - weights.squares / weight_of_all);
-  return {
-      .photons = photons,
-      .eye_paths = std::max(0.0, mean(&Variances::eye_paths)) + of_passes * (all_photons - photons),
-      .is_evenly_spaced = mean(&Variances::independent) > kEvenlySpaced * all_photons};
+  return {.photons = photons,
+          .eye_paths = std::max(0.0, mean(&Variances::eye_paths)) +
+                       EyePathsPerDeviation(sums) * (all_photons - photons),
+          .is_evenly_spaced = mean(&Variances::independent) > kEvenlySpaced * all_photons,
+          .deviations = mean(&Variances::all),
+          .halves = mean(&Variances::halves)};
 }
 
 PassVariance::Costs PassVariance::CostsOf(const ImageSums& sums) {
@@ -182,7 +210,8 @@ PassVariance::Costs PassVariance::CostsOf(const ImageSums& sums) {
   return {.photons = static_cast<double>(tally.rays) + kPairCost * static_cast<double>(tally.pairs),
           .eye_paths = kEyePathCost * static_cast<double>(sums.passes()) *
                            static_cast<double>(sums.pixels()) +
-                       kEyeRayCost * static_cast<double>(sums.eye_rays())};
+                       kEyeRayCost * static_cast<double>(sums.eye_rays()),
+          .gathering = kPairCost * static_cast<double>(tally.pairs)};
 }
 
 double PassVariance::BestPhotons(const ImageSums& sums, double kernel_noise) const {

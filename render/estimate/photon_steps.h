@@ -56,16 +56,30 @@ class PassVariance {
     // Photons vary less than independent ones: low discrepancy spaces them evenly, over the passes
     // as well as within one. Then deviations of passes say little of the noise of their mean.
     bool is_evenly_spaced = false;
+    // Of passes as they deviate from their mean, and what is left of that in the mean of all: the
+    // even passes' difference from the odd ones.
+    double deviations = 0, halves = 0;
   };
   // `kernel_noise` is the variance that one photon brings, over the squared flux expected of it:
   // the kernel's integral of K² times the area within which photons are counted.
   // Requires the sums, without a tail, of the passes added, of which there are two or more.
   [[nodiscard]] Parts Split(const ImageSums& sums, double kernel_noise) const;
 
+  // Of each pixel the variance of single eye paths with the photons of a pass given, relative as
+  // `Parts` are. Empty for a black image. Requires sums as Split does, after the passes that
+  // compare eye paths.
+  [[nodiscard]] std::vector<float> OfEyePaths(const ImageSums& sums) const;
+
+  // Whether so few photons were found that their variance is not seen, though they bring a good
+  // part of the light.
+  [[nodiscard]] static bool IsStarved(const ImageSums& sums);
+
   // What has been spent for them, in units of the time that tracing one ray of a photon takes. It
   // follows from counts: measured times would make images depend on machines.
   struct Costs {
     double photons = 0, eye_paths = 0;
+    // Of gathering, which is a part of that of the photons.
+    double gathering = 0;
   };
   [[nodiscard]] static Costs CostsOf(const ImageSums& sums);
 
@@ -83,6 +97,7 @@ class PassVariance {
   struct Pixel {
     float even = 0;        // luminance of the even passes
     float deviations = 0;  // squared, of passes' luminances from their mean
+    float of_paths = 0;    // of single eye paths, sum over the passes that compared two
   };
   // All that is kept, for checkpoints.
   [[nodiscard]] const std::vector<Pixel>& pixels() const { return pixels_; }
@@ -90,6 +105,18 @@ class PassVariance {
   explicit PassVariance(std::vector<Pixel> pixels) : pixels_(std::move(pixels)) {}
 
  private:
+  // Of one pixel, relative.
+  struct Variances {
+    float all = 0;            // of passes
+    float halves = 0;         // the same by their halves' difference
+    float photons = 0;        // of what photons brought
+    float photons_found = 0;  // that the number of photons found explains
+    float independent = 0;    // the same, without bias where few were found
+    float eye_paths = 0;      // of halves, beyond what photons brought to them
+  };
+  // [pixels], or empty for a black image.
+  [[nodiscard]] std::vector<Variances> OfPixels(const ImageSums& sums, double kernel_noise) const;
+
   std::vector<Pixel> pixels_;
 };
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "render/estimate/image_tiles.h"
 #include "render/estimate/relative_error.h"
 
 namespace lucerna {
@@ -16,30 +17,6 @@ namespace {
 // Factors are looked at in steps, 1 to 0.97 and so on to 0.09; within each the best is exact.
 constexpr double kStep = 0.97;
 constexpr std::size_t kSteps = 80;
-// Discs reach over neighbours, so that chance is alike within a few radii: sides of tiles, in
-// pixels, and how many tiles an image has at most.
-constexpr std::size_t kLeastSide = 16;
-constexpr double kMostTiles = 1024;
-constexpr double kFewestTiles = 8;
-
-// Tiles of the image, by pixel.
-class Tiles {
- public:
-  Tiles(std::size_t pixels, std::size_t width)
-      : width_(width),
-        side_(std::max(kLeastSide, static_cast<std::size_t>(std::ceil(
-                                       std::sqrt(static_cast<double>(pixels) / kMostTiles))))),
-        across_((width + side_ - 1) / side_),
-        count_(across_ * ((pixels / width + side_ - 1) / side_)) {}
-
-  [[nodiscard]] std::size_t count() const { return count_; }
-  [[nodiscard]] std::size_t Of(std::size_t pixel) const {
-    return pixel / width_ / side_ * across_ + pixel % width_ / side_;
-  }
-
- private:
-  std::size_t width_, side_, across_, count_;
-};
 
 double Square(double x) {
   return x * x;
@@ -53,7 +30,7 @@ double RadiusScale(const ImageSums& sums, const PixelRadii& radii, const NoiseSa
   if (sample.pixels.empty()) return 1;
   const std::uint64_t rounds = RoundsUntil(whole.passes);
   const ImageSums::Columns& columns = whole.columns;
-  const Tiles tiles(columns.pixels(), width);
+  const ImageTiles tiles(columns.pixels(), width);
   // Noise, and squared bias by tiles, of the pixels whose radii a factor makes smaller from this
   // step on.
   std::array<double, kSteps> noises{};
@@ -83,14 +60,10 @@ double RadiusScale(const ImageSums& sums, const PixelRadii& radii, const NoiseSa
   double error = 0, least_error = 0, best = 1, from = 1;
   for (std::size_t step = 0; step < kSteps; ++step) {
     noise += noises[step];
-    double bias = 0, squares = 0;
-    for (std::size_t tile = 0; tile < tiles.count(); ++tile) {
+    for (std::size_t tile = 0; tile < tiles.count(); ++tile)
       of_tiles[tile] += biases[step * tiles.count() + tile];
-      bias += of_tiles[tile];
-      squares += of_tiles[tile] * of_tiles[tile];
-    }
-    const double variance = lit_tiles / (lit_tiles - 1) * (squares - bias * bias / lit_tiles);
-    bias -= std::sqrt(std::max(variance, 0.0));
+    const SumOfTiles sum = SumTiles(of_tiles, lit_tiles);
+    const double bias = sum.sum - sum.deviation;
     const auto error_at = [&](double scale) {
       return error + noise * (1 / Square(scale) - 1 / Square(from)) +
              bias * (Square(Square(scale)) - Square(Square(from)));

@@ -62,6 +62,7 @@ enum FeatureColumn : std::size_t {
   kUnitRadius,              // EyePass::unit_radii
   kHits,                    // passes that met a surface
   kHitpoints,               // passes that have a hitpoint
+  kPathVariance,            // of single eye paths: squared luminances (ComparesEyePaths)
   kFeatureColumns,
 };
 // What surfaces look like is known from so many passes.
@@ -74,6 +75,14 @@ inline constexpr std::uint64_t kFeaturePasses = 16;
 [[nodiscard]] constexpr bool FollowsFromRadiance(const PassRange& passes, std::size_t column) {
   return passes.size() == 1 && column >= kHalfDifference && column <= kLargestLuminance;
 }
+
+// In the last of so many passes half of the pixels may have two eye paths, and then the others,
+// which say how much single ones vary.
+inline constexpr std::uint64_t kEyePathsCompared = 8;
+[[nodiscard]] constexpr bool ComparesEyePaths(std::uint64_t pass) {
+  return kEyePathsCompared / 2 <= pass && pass < kEyePathsCompared;
+}
+inline constexpr int kComparisonsOfPixel = 2;
 
 // What names one photon of a job.
 struct PhotonKey {

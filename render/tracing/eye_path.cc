@@ -250,11 +250,14 @@ Ray EyePathTracer::CameraRayThrough(double film_x, double film_y, Vec3 on_lens) 
   return ray_from(origin, direction);
 }
 
+std::uint64_t EyePathTracer::PixelNumber(int x, int y) const {
+  return static_cast<std::uint64_t>(settings_.crop_y0 + y) *
+             static_cast<std::uint64_t>(settings_.width) +
+         static_cast<std::uint64_t>(settings_.crop_x0 + x);
+}
+
 PixelSampler EyePathTracer::SamplerOf(int x, int y, std::uint64_t pass) const {
-  const auto pixel = static_cast<std::uint64_t>(settings_.crop_y0 + y) *
-                         static_cast<std::uint64_t>(settings_.width) +
-                     static_cast<std::uint64_t>(settings_.crop_x0 + x);
-  return {settings_.seed, pixel, pass, EyeSetOf(pass, eye_sets_)};
+  return {settings_.seed, PixelNumber(x, y), pass, EyeSetOf(pass, eye_sets_)};
 }
 
 EyePathTracer::FilmOffset EyePathTracer::FilmOffsetOf(int x, int y, std::uint64_t pass) const {
@@ -339,12 +342,17 @@ Rgb EyePathTracer::BrightAtCentre(int x, int y) const {
 }
 
 EyePath EyePathTracer::Trace(int x, int y, std::uint64_t pass, First first) const {
-  const PixelSampler sampler = SamplerOf(x, y, pass);
+  return PathOf(x, y, SamplerOf(x, y, pass), first);
+}
+
+EyePath EyePathTracer::TraceMore(int x, int y, std::uint64_t pass, int number, int count) const {
+  return PathOf(x, y, PixelSampler::ForMore(settings_.seed, PixelNumber(x, y), pass, number, count),
+                {});
+}
+
+EyePath EyePathTracer::PathOf(int x, int y, const PixelSampler& sampler, First first) const {
   if (scene_.camera.kind == Camera::Kind::kSensors) {
-    return AtSensor(static_cast<std::size_t>(settings_.crop_y0 + y) *
-                            static_cast<std::size_t>(settings_.width) +
-                        static_cast<std::size_t>(settings_.crop_x0 + x),
-                    sampler);
+    return AtSensor(static_cast<std::size_t>(PixelNumber(x, y)), sampler);
   }
   // The filter's weight is kept out of the walk, because it can be negative.
   float filter_weight = 1;

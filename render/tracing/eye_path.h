@@ -91,6 +91,8 @@ class EyePathTracer {
   };
   // The eye path of a pixel of the crop window in one pass. Threads: any.
   [[nodiscard]] EyePath Trace(int x, int y, std::uint64_t pass, First first) const;
+  // Path `number` of the `count` that the pixel has in the pass beside that one.
+  [[nodiscard]] EyePath TraceMore(int x, int y, std::uint64_t pass, int number, int count) const;
 
   // EyePath::bright alone, also of pixels outside the crop window.
   [[nodiscard]] Rgb TraceBright(int x, int y, std::uint64_t pass) const;
@@ -160,7 +162,10 @@ class EyePathTracer {
   [[nodiscard]] const RenderSettings& settings() const { return settings_; }
 
  private:
+  // Row-major in the whole image.
+  [[nodiscard]] std::uint64_t PixelNumber(int x, int y) const;
   [[nodiscard]] PixelSampler SamplerOf(int x, int y, std::uint64_t pass) const;
+  [[nodiscard]] EyePath PathOf(int x, int y, const PixelSampler& sampler, First first) const;
   [[nodiscard]] Ray CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const;
   // The part of emitted radiance that is brighter than the image's white.
   [[nodiscard]] Rgb BrightPart(Rgb emitted) const;

@@ -46,7 +46,7 @@ float UnitRadiusOf(const EyePathTracer& tracer, const EyeSegment& segment) {
 
 EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, FirstHitsOfSet* known,
                           FilmSpread& spread, ThreadTeam& team,
-                          const std::function<bool()>& shall_stop) {
+                          const std::function<bool()>& shall_stop, const EyePathCounts* counts) {
   const int width = tracer.settings().crop_width();
   const int height = tracer.settings().crop_height();
   const int tiles_x = (width + kTile - 1) / kTile;
@@ -59,9 +59,11 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   out.direct.resize(pixels);
   const bool has_features = HasFeatures({pass, pass + 1});
   if (has_features) out.features.resize(pixels);
+  const bool compares = counts != nullptr && ComparesEyePaths(pass);
+  if (compares) out.direct_difference.resize(pixels);
   std::vector<Rgb> bright(spread.is_needed() ? pixels : 0);
 
-  // Each pixel has at most one ordinary row, so that a tile's rows have room where its pixels are;
+  // Each path has at most one ordinary row, so that a tile's rows have room where its paths are;
   // they move together when all tiles are known. Other rows wait beside them.
   struct Row {
     std::uint32_t pixel;
@@ -69,6 +71,7 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     std::uint32_t normal_oct;
     Rgb weight;
     float unit_radius;
+    std::uint8_t path;
   };
   struct Rows {
     std::vector<Row> rows;  // none of ordinary ones
@@ -88,18 +91,37 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     return std::pair(static_cast<int>(tile % static_cast<std::size_t>(tiles_x)) * kTile,
                      static_cast<int>(tile / static_cast<std::size_t>(tiles_x)) * kTile);
   };
-  // How many pixels the tiles before this one have.
-  const auto first_pixel_of = [&](std::size_t tile) {
-    const auto [x0, y0] = corner_of(tile);
-    return static_cast<std::size_t>(y0) * static_cast<std::size_t>(width) +
-           static_cast<std::size_t>(x0) * static_cast<std::size_t>(std::min(kTile, height - y0));
+  const auto paths_of = [&](std::uint32_t pixel) {
+    return counts == nullptr ? 1 : static_cast<int>((*counts)[pixel]);
   };
+  const auto for_pixels_of = [&](std::size_t tile, const auto& work) {
+    const auto [x0, y0] = corner_of(tile);
+    for (int y = y0; y < std::min(y0 + kTile, height); ++y) {
+      for (int x = x0; x < std::min(x0 + kTile, width); ++x)
+        work(x, y,
+             static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(width) +
+                 static_cast<std::uint32_t>(x));
+    }
+  };
+  // [tiles + 1] how many paths the tiles before have.
+  std::vector<std::size_t> first_path(tiles + 1);
+  for (std::size_t tile = 0; tile < tiles; ++tile) {
+    first_path[tile + 1] = first_path[tile];
+    for_pixels_of(tile, [&](int /*x*/, int /*y*/, std::uint32_t pixel) {
+      first_path[tile + 1] += static_cast<std::size_t>(paths_of(pixel));
+    });
+  }
+  const std::size_t paths = first_path[tiles];
   // Clearing memory takes as long as filling it in.
   const auto for_columns = [&](const auto& work) {
-    const std::array<std::function<void()>, 5> works = {
-        [&] { work(out.block.positions); }, [&] { work(out.weights); },
-        [&] { work(out.block.normals_oct); }, [&] { work(out.pixels); },
-        [&] { work(out.unit_radii); }};
+    const std::array<std::function<void()>, 6> works = {[&] { work(out.block.positions); },
+                                                        [&] { work(out.weights); },
+                                                        [&] { work(out.block.normals_oct); },
+                                                        [&] { work(out.pixels); },
+                                                        [&] { work(out.unit_radii); },
+                                                        [&] {
+                                                          if (compares) work(out.paths);
+                                                        }};
     team.For(works.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t column = begin; column < end; ++column)
         works[column]();
@@ -111,8 +133,9 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     out.pixels[to] = row.pixel;
     out.weights[to] = row.weight;
     out.unit_radii[to] = row.unit_radius;
+    if (compares) out.paths[to] = row.path;
   };
-  for_columns([&](auto& column) { column.resize(pixels); });
+  for_columns([&](auto& column) { column.resize(paths); });
 
   std::vector<std::uint64_t> rays(tiles);
   // Once true, it stays so, whatever the caller would say later.
@@ -126,52 +149,70 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
     for (std::size_t number = begin; number < end; ++number) {
       if (stops()) return;
       Tile& tile = per_tile[number];
-      const auto [x0, y0] = corner_of(number);
-      const std::size_t first_pixel = first_pixel_of(number);
-      for (int y = y0; y < std::min(y0 + kTile, height); ++y) {
-        for (int x = x0; x < std::min(x0 + kTile, width); ++x) {
-          const auto pixel = static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(width) +
-                             static_cast<std::uint32_t>(x);
-          const EyePathTracer::First first =
-              known == nullptr ? EyePathTracer::First{}
-                               : EyePathTracer::First{.shape = &known->shapes[pixel],
-                                                      .is_known = known->is_known};
-          const EyePath path = tracer.Trace(x, y, pass, first);
-          out.direct[pixel] = path.direct;
-          if (!bright.empty()) bright[pixel] = path.bright;
-          if (has_features) out.features[pixel] = path.features;
-          rays[number] += static_cast<std::uint64_t>(path.rays);
-          const auto keep = [&](const EyeHitpoint& hitpoint, Rows& rows) {
-            if (IsBlack(hitpoint.weight)) return;
-            if (hitpoint.is_glossy) {
-              rows.glossy.push_back({static_cast<std::uint32_t>(rows.count), hitpoint.material,
-                                     EncodeOctahedral(hitpoint.to_eye),
-                                     EncodeOctahedral(hitpoint.shading_normal)});
-              rows.places.push_back(hitpoint.place);
-            }
-            const Row row = {pixel, hitpoint.position, EncodeOctahedral(hitpoint.normal),
-                             hitpoint.weight, UnitRadiusOf(tracer, hitpoint)};
-            if (&rows == &tile.rows) {
-              put(first_pixel + rows.count, row);
-            } else {
-              rows.rows.push_back(row);
-            }
-            ++rows.count;
-          };
-          keep(path.hitpoint, tile.rows);
-          keep(path.caustic, tile.caustic_rows);
-          if (const EyeSegment& segment = path.segment; !IsBlack(segment.weight)) {
-            tile.segment_rows.rows.push_back({pixel, segment.from, EncodeOctahedral({0, 0, 1}),
-                                              segment.weight, UnitRadiusOf(tracer, segment)});
-            ++tile.segment_rows.count;
-            tile.segments.push_back({segment.to, static_cast<std::uint32_t>(segment.medium),
-                                     automatic
-                                         ? std::clamp(segment.from_footprint / segment.to_footprint,
-                                                      kLeastNarrowing, 1.0F)
-                                         : 1.0F});
-          }
+      // Which of the paths of which pixel.
+      struct Place {
+        std::uint32_t pixel;
+        std::uint8_t path;
+        float share;
+      };
+      const auto keep = [&](const Place& place, const EyeHitpoint& hitpoint, Rows& rows) {
+        if (IsBlack(hitpoint.weight)) return;
+        if (hitpoint.is_glossy) {
+          rows.glossy.push_back({static_cast<std::uint32_t>(rows.count), hitpoint.material,
+                                 EncodeOctahedral(hitpoint.to_eye),
+                                 EncodeOctahedral(hitpoint.shading_normal)});
+          rows.places.push_back(hitpoint.place);
         }
-      }
+        const Row row = {place.pixel,
+                         hitpoint.position,
+                         EncodeOctahedral(hitpoint.normal),
+                         hitpoint.weight * place.share,
+                         UnitRadiusOf(tracer, hitpoint),
+                         place.path};
+        if (&rows == &tile.rows) {
+          put(first_path[number] + rows.count, row);
+        } else {
+          rows.rows.push_back(row);
+        }
+        ++rows.count;
+      };
+      const auto keep_all = [&](const Place& place, const EyePath& path) {
+        rays[number] += static_cast<std::uint64_t>(path.rays);
+        keep(place, path.hitpoint, tile.rows);
+        keep(place, path.caustic, tile.caustic_rows);
+        if (const EyeSegment& segment = path.segment; !IsBlack(segment.weight)) {
+          tile.segment_rows.rows.push_back({place.pixel, segment.from, EncodeOctahedral({0, 0, 1}),
+                                            segment.weight * place.share,
+                                            UnitRadiusOf(tracer, segment), place.path});
+          ++tile.segment_rows.count;
+          tile.segments.push_back({segment.to, static_cast<std::uint32_t>(segment.medium),
+                                   automatic
+                                       ? std::clamp(segment.from_footprint / segment.to_footprint,
+                                                    kLeastNarrowing, 1.0F)
+                                       : 1.0F});
+        }
+      };
+      for_pixels_of(number, [&](int x, int y, std::uint32_t pixel) {
+        const EyePathTracer::First first =
+            known == nullptr
+                ? EyePathTracer::First{}
+                : EyePathTracer::First{.shape = &known->shapes[pixel], .is_known = known->is_known};
+        const EyePath path = tracer.Trace(x, y, pass, first);
+        if (!bright.empty()) bright[pixel] = path.bright;
+        if (has_features) out.features[pixel] = path.features;
+        const int more = paths_of(pixel) - 1;
+        const float share = 1 / static_cast<float>(1 + more);
+        keep_all({pixel, 0, share}, path);
+        Rgb direct = path.direct;
+        // What is bright is left to the first path: it counts for the pixels around as well.
+        for (int i = 0; i < more; ++i) {
+          const EyePath next = tracer.TraceMore(x, y, pass, i, more);
+          keep_all({pixel, static_cast<std::uint8_t>(i + 1), share}, next);
+          direct += next.direct;
+          if (compares && more == 1) out.direct_difference[pixel] = path.direct - next.direct;
+        }
+        out.direct[pixel] = direct * share;
+      });
     }
   });
 
@@ -210,8 +251,8 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   if (has_places) out.block.places.resize(next.glossy);
   out.block.segments.resize(next.row - segments_begin);
   for_columns([&](auto& column) {
-    for (std::size_t tile = 0; tile < tiles && ordinary < pixels; ++tile) {
-      const auto from = column.begin() + static_cast<std::ptrdiff_t>(first_pixel_of(tile));
+    for (std::size_t tile = 0; tile < tiles && ordinary < paths; ++tile) {
+      const auto from = column.begin() + static_cast<std::ptrdiff_t>(first_path[tile]);
       const auto to = column.begin() + static_cast<std::ptrdiff_t>(first_ordinary[tile].row);
       if (from != to) std::copy_n(from, per_tile[tile].rows.count, to);
     }

@@ -95,6 +95,26 @@ void ScaleRadii(const EyePass& pass, const RoundPlan& plan, ThreadTeam* team,
   }
 }
 
+// Calls work(begin, end, pixel) for the rows of each pixel, which lie side by side within
+// [first, last), by several threads.
+template <typename Work>
+void ForPixelRows(ThreadTeam& team, const std::vector<std::uint32_t>& pixels, std::size_t first,
+                  std::size_t last, const Work& work) {
+  team.For(last - first, kTakenAtOnce, [&](std::size_t begin, std::size_t end) {
+    std::size_t row = first + begin;
+    // The rows of a pixel go to the thread that has the first of them.
+    while (row > first && row < last && pixels[row] == pixels[row - 1])
+      ++row;
+    while (row < first + end) {
+      const std::size_t of_pixel = row;
+      const std::uint32_t pixel = pixels[row];
+      while (row < last && pixels[row] == pixel)
+        ++row;
+      work(of_pixel, row, pixel);
+    }
+  });
+}
+
 }  // namespace
 
 float HitpointRadius(float radius, float unit_radius) {
@@ -154,15 +174,14 @@ void AddEyePaths(SliceSums& slice, EyePass& pass, const RenderSettings& settings
     filler.Set(first_feature + kHits, pixel, 1);
   });
   FreeMemoryOf(pass.features);
-  // A pixel has at most one of these rows.
+  // The first hitpoint of a pixel stands for the others of the pass.
   LUCERNA_CHECK(pass.unit_radii.size() == pass.pixels.size());
-  team.For(pass.block.first_caustic(), kTakenAtOnce, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t row = begin; row < end; ++row) {
-      const std::uint32_t pixel = pass.pixels[row];
-      filler.Set(first_feature + kUnitRadius, pixel, static_cast<double>(pass.unit_radii[row]));
-      filler.Set(first_feature + kHitpoints, pixel, 1);
-    }
-  });
+  ForPixelRows(team, pass.pixels, 0, pass.block.first_caustic(),
+               [&](std::size_t row, std::size_t /*end*/, std::uint32_t pixel) {
+                 filler.Set(first_feature + kUnitRadius, pixel,
+                            static_cast<double>(pass.unit_radii[row]));
+                 filler.Set(first_feature + kHitpoints, pixel, 1);
+               });
 }
 
 // Columns are made when their turn comes, and what they follow from is freed after it. Beside all
@@ -189,6 +208,14 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, RadiusCo
     sum =
         static_cast<float>(std::clamp(static_cast<double>(sum) + value, -kLargestSum, kLargestSum));
   };
+  // A statistic of a pixel is the mean of its paths', of which some may have no hitpoint.
+  const auto mean = [&](std::size_t begin, std::size_t end, std::uint32_t pixel,
+                        const auto& of_row) {
+    double sum = 0;
+    for (std::size_t row = begin; row < end; ++row)
+      sum += static_cast<double>(of_row[row]);
+    return sum / plan.EyePathsOf(pixel);
+  };
 
   const double luminance_per_quantum = static_cast<double>(Luminance(scale.watts_per_quantum));
   constexpr double kToBias = 1 / (1 - static_cast<double>(kInnerShare * kInnerShare));
@@ -199,12 +226,12 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, RadiusCo
   pass.block = {};
   SumColumns columns = sums.TakeColumns();
   const auto for_rows = [&](std::size_t first, std::size_t last, const auto& work) {
-    team.For(last - first, kTakenAtOnce, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t row = first + begin; row < first + end; ++row)
-        work(row, pass.pixels[row]);
-    });
+    ForPixelRows(team, pass.pixels, first, last,
+                 [&](std::size_t begin, std::size_t end, std::uint32_t pixel) {
+                   for (std::size_t row = begin; row < end; ++row)
+                     work(row, pixel);
+                 });
   };
-  // A pixel has at most one row of each kind, so that rows of a kind are independent of each other.
   const auto for_all_rows = [&](const auto& work) {
     for_rows(0, first_caustic, work);
     for_rows(first_caustic, first_segment, work);
@@ -220,24 +247,29 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, RadiusCo
     // Not every pass has the evidence of its controller.
     if (kCommonColumns + column >= columns.evidence.size()) continue;
     PackedIntegers& of_rows = columns.evidence[kCommonColumns + column];
-    for_rows(0, first_caustic, [&](std::size_t row, std::uint32_t pixel) {
-      filler.Set(kSliceColumns + column, pixel, static_cast<double>(of_rows[row]));
-    });
+    ForPixelRows(team, pass.pixels, 0, first_caustic,
+                 [&](std::size_t begin, std::size_t end, std::uint32_t pixel) {
+                   filler.Set(kSliceColumns + column, pixel, mean(begin, end, pixel, of_rows));
+                 });
     of_rows = PackedIntegers();
   }
 
   std::vector<float> of_bias(pixels);
   filler.Make(kEvenBias, kSliceColumns - kEvenBias);
   static_assert(kEvenBias < kOddBias && kOddBias < kPhotonCount && kPhotonCount < kBlur);
+  const PackedIntegers& blur = columns.evidence[kBlurColumn];
   for_all_rows([&](std::size_t row, std::uint32_t pixel) {
-    const double blur = static_cast<double>(columns.evidence[kBlurColumn][row]) * kToBias;
-    add(of_bias[pixel], blur * luminance_per_quantum * to_density(row) *
-                            static_cast<double>(Luminance(pass.weights[row])));
-    if (row >= first_caustic) return;
-    filler.Set(kPhotonCount, pixel, static_cast<double>(columns.counts[row]));
-    const auto unit_radius = static_cast<double>((*plan.radii)[pixel]);
-    filler.Set(kBlur, pixel, blur * norm / ((1 << kFluxBits) * unit_radius * unit_radius));
+    add(of_bias[pixel], static_cast<double>(blur[row]) * kToBias * luminance_per_quantum *
+                            to_density(row) * static_cast<double>(Luminance(pass.weights[row])));
   });
+  ForPixelRows(team, pass.pixels, 0, first_caustic,
+               [&](std::size_t begin, std::size_t end, std::uint32_t pixel) {
+                 filler.Set(kPhotonCount, pixel, mean(begin, end, pixel, columns.counts));
+                 const auto unit_radius = static_cast<double>((*plan.radii)[pixel]);
+                 filler.Set(kBlur, pixel,
+                            mean(begin, end, pixel, blur) * kToBias * norm /
+                                ((1 << kFluxBits) * unit_radius * unit_radius));
+               });
   FreeMemoryOf(columns.evidence);
   columns.counts = PackedIntegers();
 
@@ -255,8 +287,33 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, RadiusCo
       add(of_photons[c][pixel], static_cast<double>(pass.weights[row][channel]) * flux * density);
     }
   });
+  if (ComparesEyePaths(pass.pass)) {
+    // Of paths of two: half of the squared difference is the variance of one.
+    const ColorOfPass in_color(settings, needs, pass.pass);
+    std::vector<std::array<double, 3>> differences(pixels);
+    for (std::size_t pixel = 0; pixel < pass.direct_difference.size(); ++pixel)
+      differences[pixel] = ToDoubles(pass.direct_difference[pixel]);
+    for_all_rows([&](std::size_t row, std::uint32_t pixel) {
+      if (pass.paths.empty() || plan.EyePathsOf(pixel) != 2) return;
+      const double of_path = (pass.paths[row] == 0 ? 2 : -2) * to_density(row);
+      for (int channel = 0; channel < 3; ++channel) {
+        const auto c = static_cast<std::size_t>(channel);
+        differences[pixel][c] += static_cast<double>(pass.weights[row][channel]) *
+                                 static_cast<double>(columns.flux[c][row]) *
+                                 static_cast<double>(scale.watts_per_quantum[channel]) * of_path;
+      }
+    });
+    const std::size_t column = slice.first_feature() + kPathVariance;
+    filler.ForPixels([&](std::size_t pixel) {
+      if (pass.paths.empty() || plan.EyePathsOf(pixel) != 2) return;
+      const std::array<double, 3> difference = in_color(differences[pixel]);
+      const double luminance = WorkingLuminance(difference[0], difference[1], difference[2]);
+      filler.Set(column, pixel, luminance * luminance / 2);
+    });
+  }
   columns.flux = {};
   FreeMemoryOf(pass.weights);
+  FreeMemoryOf(pass.paths);
 
   FreeMemoryOf(pass.pixels);
   FreeMemoryOf(radii);

@@ -27,6 +27,11 @@ struct RoundPlan {
   float caustic_radius = 1;  // of all caustic hitpoints and segments, in unit radii
   // By which photons are drawn; nullptr: evenly, and none is reported.
   std::shared_ptr<const PhotonGuide> guide = nullptr;
+  std::shared_ptr<const EyePathCounts> eye_paths = nullptr;  // nullptr: one for each pixel
+
+  [[nodiscard]] int EyePathsOf(std::size_t pixel) const {
+    return eye_paths == nullptr ? 1 : static_cast<int>((*eye_paths)[pixel]);
+  }
 };
 
 // Of a radius [units of the settings] whose unit has this length there [scene units].

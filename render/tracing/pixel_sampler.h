@@ -33,6 +33,17 @@ class PixelSampler {
         pass_(pass / 2),
         eye_set_(eye_set / 2) {}
 
+  // Of path `number` of the `count` that the pixel has in this pass beside its first. All together
+  // are sequences of their own, whose points no two passes share while `count` never falls.
+  [[nodiscard]] static PixelSampler ForMore(std::uint64_t seed, std::uint64_t pixel,
+                                            std::uint64_t pass, int number, int count) {
+    constexpr std::uint64_t kMoreKey = 0x4D4F524550415448ULL;
+    const std::uint64_t place =
+        pass / 2 * static_cast<std::uint64_t>(count) + static_cast<std::uint64_t>(number);
+    const std::uint64_t of_half = 2 * place + pass % 2;
+    return {CombineKeys(seed, kMoreKey), pixel, of_half, of_half};
+  }
+
   // Film position (0, 1) and lens position (2, 3).
   [[nodiscard]] SobolPoint ForCamera() const { return OwenSobol(PlaceInOrder(), key_); }
 

@@ -13,6 +13,7 @@ namespace {
 // The last character is the version.
 constexpr std::string_view kBlockMagic = "LHB4";
 constexpr std::string_view kRadiiMagic = "LRC1";
+constexpr std::string_view kEyePathsMagic = "LEP1";
 constexpr std::uint32_t kLargestOctahedralHalf = 65534;
 
 using Column = std::vector<std::uint32_t>;
@@ -230,6 +231,29 @@ StatusOr<RadiusColumn> DecodeRadii(std::string_view bytes, std::size_t hitpoints
     }
   }
   return radii;
+}
+
+std::string EncodeEyePathCounts(const EyePathCounts& counts) {
+  ByteWriter writer;
+  writer.Bytes(kEyePathsMagic);
+  writer.Varint(counts.size());
+  writer.Planes(Column(counts.begin(), counts.end()));
+  return writer.Take();
+}
+
+StatusOr<EyePathCounts> DecodeEyePathCounts(std::string_view bytes, std::size_t pixels) {
+  ByteReader reader(bytes);
+  if (reader.Bytes(kEyePathsMagic.size()) != kEyePathsMagic || reader.Varint() != pixels) {
+    return absl::InvalidArgumentError("malformed eye paths: wrong magic, version or count");
+  }
+  const Column column = reader.Planes32(pixels);
+  if (!reader.finished()) return absl::InvalidArgumentError("malformed eye paths: damaged column");
+  for (const std::uint32_t count : column) {
+    if (count < 1 || count > kMostEyePaths) {
+      return absl::InvalidArgumentError("malformed eye paths: a pixel has none or too many");
+    }
+  }
+  return EyePathCounts(column.begin(), column.end());
 }
 
 }  // namespace lucerna

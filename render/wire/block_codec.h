@@ -31,4 +31,10 @@ namespace lucerna {
 // Errors: INVALID_ARGUMENT when `bytes` are not `hitpoints` radii, each finite and > 0.
 [[nodiscard]] StatusOr<RadiusColumn> DecodeRadii(std::string_view bytes, std::size_t hitpoints);
 
+[[nodiscard]] std::string EncodeEyePathCounts(const EyePathCounts& counts);
+
+// Errors: INVALID_ARGUMENT when `bytes` are not `pixels` numbers from 1 to kMostEyePaths.
+[[nodiscard]] StatusOr<EyePathCounts> DecodeEyePathCounts(std::string_view bytes,
+                                                          std::size_t pixels);
+
 }  // namespace lucerna

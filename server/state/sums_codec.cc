@@ -1,5 +1,6 @@
 #include "server/state/sums_codec.h"
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -56,7 +57,7 @@ static_assert(sizeof(ImageSums::Columns) == 16 * sizeof(std::vector<float>));
 // Rows are written as they lie in memory, without gaps.
 static_assert(sizeof(ImageSums::Features) == 8 * sizeof(float) + 2 * sizeof(std::uint16_t));
 static_assert(sizeof(PixelRadius) == 2 * sizeof(double));
-static_assert(sizeof(PassVariance::Pixel) == 2 * sizeof(float));
+static_assert(sizeof(PassVariance::Pixel) == 3 * sizeof(float));
 
 // Whether so many rows can be there.
 bool HasRows(const ByteReader& reader, std::size_t rows, std::size_t row_bytes) {
@@ -89,6 +90,21 @@ StatusOr<RadiusColumn> ReadRadii(ByteReader& reader, std::size_t pixels) {
   RadiusColumn radii(pixels);
   ReadColumn(reader, radii);
   return radii;
+}
+
+void WriteEyePaths(ByteWriter& writer, const EyePathCounts& counts) {
+  WriteColumn(writer, counts);
+}
+
+StatusOr<EyePathCounts> ReadEyePaths(ByteReader& reader, std::size_t pixels) {
+  if (!HasRows(reader, pixels, 1)) return Malformed("eye paths are missing");
+  EyePathCounts counts(pixels);
+  ReadColumn(reader, counts);
+  const auto is_none = [](std::uint8_t count) { return count < 1 || count > kMostEyePaths; };
+  if (std::ranges::any_of(counts, is_none)) {
+    return Malformed("a pixel has no eye path or too many");
+  }
+  return counts;
 }
 
 void WriteNumbers(ByteWriter& writer, const PixelRadii::Numbers& numbers) {

@@ -20,6 +20,7 @@ void WriteDouble(ByteWriter& writer, double value);
 [[nodiscard]] double ReadDouble(ByteReader& reader);
 
 void WriteRadii(ByteWriter& writer, const RadiusColumn& radii);
+void WriteEyePaths(ByteWriter& writer, const EyePathCounts& counts);
 void WriteNumbers(ByteWriter& writer, const PixelRadii::Numbers& numbers);
 void WriteVariance(ByteWriter& writer, const PassVariance& variance);
 void WriteSums(ByteWriter& writer, const ImageSums::Whole& sums);
@@ -29,6 +30,7 @@ void WriteLearned(ByteWriter& writer, const GuideLearner::Numbers& numbers);
 // Errors of all: INVALID_ARGUMENT for bytes that are truncated or of another shape. Nothing is
 // allocated before the bytes are there.
 [[nodiscard]] StatusOr<RadiusColumn> ReadRadii(ByteReader& reader, std::size_t pixels);
+[[nodiscard]] StatusOr<EyePathCounts> ReadEyePaths(ByteReader& reader, std::size_t pixels);
 [[nodiscard]] StatusOr<PixelRadii::Numbers> ReadNumbers(ByteReader& reader, std::size_t pixels,
                                                         std::size_t memory_per_pixel);
 [[nodiscard]] StatusOr<PassVariance> ReadVariance(ByteReader& reader, std::size_t pixels);

@@ -105,6 +105,13 @@ std::vector<std::string> BlockSeeds() {
 bool FuzzRadii(std::string_view bytes) {
   const auto [choice, encoded] = Split(bytes);
   const std::size_t rows = RowsOf(choice);
+  if (const auto counts = DecodeEyePathCounts(encoded, rows); counts.ok()) {
+    LUCERNA_CHECK(counts->size() == rows);
+    for (const std::uint8_t count : *counts)
+      LUCERNA_CHECK(count >= 1 && count <= kMostEyePaths);
+    LUCERNA_CHECK(DecodeEyePathCounts(EncodeEyePathCounts(*counts), rows).value() == *counts);
+    return true;
+  }
   const auto radii = DecodeRadii(encoded, rows);
   if (!radii.ok()) return false;
   LUCERNA_CHECK(radii->size() == rows);
@@ -119,7 +126,9 @@ std::vector<std::string> RadiiSeeds() {
   RadiusColumn radii;
   for (std::size_t i = 0; i < kRows; ++i)
     radii.push_back(0.25F + static_cast<float>(i));
-  return {Joined(kRows, EncodeRadii(radii))};
+  EyePathCounts counts(kRows, 1);
+  counts[7] = kMostEyePaths;
+  return {Joined(kRows, EncodeRadii(radii)), Joined(kRows, EncodeEyePathCounts(counts))};
 }
 
 bool FuzzSlice(std::string_view bytes) {

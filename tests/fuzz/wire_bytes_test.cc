@@ -154,6 +154,15 @@ TEST(WireBytesTest, DamagedRadiiAreRefusedOrFiniteAndPositive) {
   });
 }
 
+TEST(WireBytesTest, DamagedNumbersOfEyePathsAreRefusedOrInRange) {
+  TruncateAndFlip(EncodeEyePathCounts(EyePathCounts(kHitpoints, 3)), [](const std::string& bytes) {
+    const auto decoded = DecodeEyePathCounts(bytes, kHitpoints);
+    if (!decoded.ok()) return;
+    for (const std::uint8_t count : *decoded)
+      EXPECT_TRUE(count >= 1 && count <= kMostEyePaths);
+  });
+}
+
 TEST(WireBytesTest, DamagedSlicesAreRefusedOrHarmless) {
   TruncateAndFlip(EncodeSlice(SomeSlice(kSlice)), CheckSlice);
 }

@@ -45,7 +45,7 @@ void LocalRender::AddPass(int batches) {
   if (batches == 0 && pass_ > 0) {
     slice = OrDie(tracer_->RunSlice(settings_, needs_, {pass_, pass_ + 1}, *plan_, stop));
   } else {
-    EyePass eye = estimator_->TraceEyePaths(pass_).value();
+    EyePass eye = estimator_->TraceEyePaths(pass_, plan_->eye_paths.get()).value();
     const RadiusColumn radii = HitpointRadii(eye, *plan_);
     PassSums sums(eye.block.size(),
                   EvidenceColumns(EvidenceOf(settings_.radius_controller, pass_)));

@@ -13,7 +13,7 @@ namespace lucerna {
 namespace {
 
 // Of an image that has as many reports as any.
-constexpr std::size_t kPixels = 1 << 14;
+constexpr std::size_t kGuidedPixels = 1 << 14;
 
 double SameScore(std::uint32_t /*pixel*/) {
   return 1;
@@ -68,7 +68,7 @@ class Simulated {
   std::uint64_t photons_;
   FluxAt flux_at_;
   KeyedRng rng_{7};
-  GuideLearner learner_{kPixels};
+  GuideLearner learner_{kGuidedPixels};
   std::shared_ptr<const PhotonGuide> guide_;
   std::uint64_t passes_ = 0;
   int found_ = 0;
@@ -106,7 +106,7 @@ TEST(GuideLearningTest, FindsASmallBoxAndSendsPhotonsThere) {
 // Before any photon was found, pilot paths say where to send some.
 TEST(GuideLearningTest, LearnsFromPilotPathsAlone) {
   constexpr std::uint64_t kPhotons = 16384;
-  GuideLearner learner(kPixels);
+  GuideLearner learner(kGuidedPixels);
   learner.Add({}, std::make_shared<const PhotonGuide>(learner.First(kPhotons)), kPhotons);
   KeyedRng rng(23);
   PilotEmissions pilots = {.emissions = {}, .brought = 1};
@@ -170,7 +170,7 @@ TEST(GuideLearningTest, PilotPathsCountWherePhotonsAreRare) {
   // Of so many photons all are reported that are found: of box B ten are to be expected, and by
   // chance there is none.
   constexpr std::uint64_t kPhotons = 5120;
-  GuideLearner learner(kPixels);
+  GuideLearner learner(kGuidedPixels);
   learner.Add(draw(kBoxA, static_cast<int>(kPhotons / 128 / in_a)), to_a, kPhotons);
   PilotEmissions pilots = {.emissions = {}, .brought = 1};
   for (int i = 0; i < kPilots; ++i) {
@@ -191,7 +191,7 @@ TEST(GuideLearningTest, PhotonsCountForLightThatPilotPathsDoNotFind) {
   constexpr std::uint64_t kPhotons = 1 << 16;
   constexpr int kPilots = 2000;
   KeyedRng rng(31);
-  GuideLearner learner(kPixels);
+  GuideLearner learner(kGuidedPixels);
   const auto even =
       std::make_shared<const PhotonGuide>(PhotonGuide::Create({}, UINT32_MAX).value());
   std::vector<EmissionReport> reports;
@@ -227,7 +227,7 @@ TEST(GuideLearningTest, PhotonsCountForLightThatPilotPathsDoNotFind) {
 TEST(GuideLearningTest, ASingleHugeScoreDoesNotDecide) {
   constexpr std::uint64_t kPhotons = 1 << 16;
   KeyedRng rng(37);
-  GuideLearner learner(kPixels);
+  GuideLearner learner(kGuidedPixels);
   const auto even =
       std::make_shared<const PhotonGuide>(PhotonGuide::Create({}, UINT32_MAX).value());
   std::vector<EmissionReport> reports;
@@ -307,7 +307,7 @@ TEST(GuideLearningTest, WhereNothingIsFoundAllThatWillBeIsReported) {
 // However many photons a pass has, and however few were found so far.
 TEST(GuideLearningTest, NeverAsksForMoreThanMessagesHold) {
   for (const std::uint64_t photons : {std::uint64_t{1} << 20, std::uint64_t{1} << 40}) {
-    GuideLearner learner(kPixels);
+    GuideLearner learner(kGuidedPixels);
     learner.Add({}, std::make_shared<const PhotonGuide>(learner.First(photons)), photons);
     const PhotonGuide guide = learner.Next(1, photons, SameScore, OneFlux);
     EXPECT_LE(static_cast<double>(guide.reported()) * 0x1p-32 * static_cast<double>(photons),
@@ -344,7 +344,7 @@ TEST(GuideLearningTest, PhotonsOfSeveralGuidesStandForTheEvenDensity) {
   const auto even =
       std::make_shared<const PhotonGuide>(PhotonGuide::Create({}, UINT32_MAX / 2).value());
   constexpr std::uint64_t kPhotons = 8192;
-  GuideLearner learner(kPixels);
+  GuideLearner learner(kGuidedPixels);
   KeyedRng rng(11);
   for (const auto& guide : {even, skewed, even, skewed}) {
     std::vector<EmissionReport> reports;
@@ -372,7 +372,7 @@ TEST(GuideLearningTest, ReportsAreRarerWhereDirectionsAreGuided) {
   using Node = ScatterGuide::Node;
   const auto scatterings = std::make_shared<const ScatterGuide>(
       ScatterGuide::Create({{.kind = Node::Kind::kU, .low_share = 128}, {}, {}}).value());
-  GuideLearner learner(kPixels);
+  GuideLearner learner(kGuidedPixels);
   learner.Add({}, std::make_shared<const PhotonGuide>(PhotonGuide::Create({}, UINT32_MAX).value()),
               1000);
   learner.Add(

@@ -313,14 +313,18 @@ Scene WithNothingInView() {
   return scene;
 }
 
-// Radii between a half and three halves, another for each pixel.
+// Radii between a half and three halves, another for each pixel, and one to three eye paths.
 RoundPlan UnevenPlan(const RenderSettings& settings) {
   RadiusColumn radii(static_cast<std::size_t>(settings.crop_width() * settings.crop_height()));
-  for (std::size_t pixel = 0; pixel < radii.size(); ++pixel)
+  EyePathCounts counts(radii.size());
+  for (std::size_t pixel = 0; pixel < radii.size(); ++pixel) {
     radii[pixel] = 3 * (0.5F + static_cast<float>(pixel % 17) / 16);
+    counts[pixel] = static_cast<std::uint8_t>(1 + pixel % 3);
+  }
   return {.photons_per_pass = static_cast<std::uint64_t>(settings.photons_per_pass),
           .radii = std::make_shared<const RadiusColumn>(std::move(radii)),
-          .caustic_radius = 2.5F};
+          .caustic_radius = 2.5F,
+          .eye_paths = std::make_shared<const EyePathCounts>(std::move(counts))};
 }
 
 // What the coordinator makes of a pass whose photons came in `batches`.
@@ -328,7 +332,7 @@ SliceSums SplitSlice(const JobEstimator& estimator, BatchTracer& tracer,
                      const RenderSettings& settings, std::uint64_t pass, const RoundPlan& plan,
                      std::uint64_t batches) {
   const std::atomic<bool> stop = false;
-  EyePass eye = estimator.TraceEyePaths(pass).value();
+  EyePass eye = estimator.TraceEyePaths(pass, plan.eye_paths.get()).value();
   PassSums sums(eye.block.size(), EvidenceColumns(EvidenceOf(settings.radius_controller, pass)));
   if (eye.block.size() > 0 && estimator.needs().Uses(Part::kPhotons)) {
     for (std::uint64_t b = batches; b-- > 0;) {

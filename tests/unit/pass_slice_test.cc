@@ -234,6 +234,78 @@ TEST(SliceOfPassTest, ACausticHitpointAddsLightAndNoEvidence) {
   EXPECT_EQ(slice.At(slice.first_feature() + kHitpoints, 0), 1.0F);
 }
 
+// Of a pixel with three paths, of which one has no hitpoint: what the others bring is a sum of
+// their shares, and its statistics are means over all three.
+TEST(SliceOfPassTest, StatisticsOfSeveralPathsAreTheirMeans) {
+  const RenderSettings settings = Settings(RadiusControllerKind::kAppm, KernelKind::kConstant);
+  const std::size_t columns = kCommonColumns + ControllerColumns(settings.radius_controller);
+  EyePass eye = PassOfOneHitpoint(20, 2, 0, Gray(0.5F / 3), 0.5F);
+  for (const std::uint32_t pixel : {0U, 1U}) {
+    eye.block.positions.push_back({0, 0, 1});
+    eye.block.normals_oct.push_back(0);
+    eye.pixels.push_back(pixel);
+    eye.weights.push_back(Gray(pixel == 0 ? 0.5F / 3 : 1));
+    eye.unit_radii.push_back(0.25F);
+  }
+  PassSums sums(3, columns);
+  Accumulation accumulation;
+  accumulation.hitpoints = {0, 1, 2};
+  accumulation.counts = {30, 60, 7};
+  for (auto& channel : accumulation.flux)
+    channel = {8, 16, 5};
+  for (std::size_t column = 0; column < columns; ++column)
+    accumulation.evidence.push_back({12, 24, 5});
+  ASSERT_TRUE(sums.Add(accumulation).ok());
+  RoundPlan plan = Plan(4, {1, 1});
+  plan.eye_paths = std::make_shared<const EyePathCounts>(EyePathCounts{3, 1});
+  const SliceSums slice = SliceOfPass(eye, plan, sums, settings, {Gray(1), Gray(1)});
+  // Over radii of 0.5 and 0.25.
+  const double expected = 0.5 / 3 * (8 * 4 + 16 * 16) / std::numbers::pi / 4;
+  EXPECT_NEAR(static_cast<double>(slice.At(kPhotonRadiance, 0)), expected,
+              expected * kFewPhotonsRounding);
+  EXPECT_EQ(slice.At(kPhotonCount, 0), 30.0F);
+  EXPECT_EQ(slice.At(kPhotonCount, 1), 7.0F);
+  for (std::size_t column = 0; column < slice.evidence; ++column) {
+    EXPECT_EQ(slice.At(kSliceColumns + column, 0), 12.0F);
+    EXPECT_EQ(slice.At(kSliceColumns + column, 1), 5.0F);
+  }
+  const double blur = 12 / (1 - 1.0 / 9) / std::numbers::pi / (1 << kFluxBits);
+  EXPECT_NEAR(static_cast<double>(slice.At(kBlur, 0)), blur, blur * kStatisticRounding);
+}
+
+// Half of the squared difference of two paths is the variance of one, of their direct light and
+// what photons bring to them together.
+TEST(SliceOfPassTest, TwoPathsOfAPixelSayHowMuchOneVaries) {
+  const RenderSettings settings = Settings(RadiusControllerKind::kPpm, KernelKind::kConstant);
+  constexpr std::uint64_t kCompares = 4;
+  ASSERT_TRUE(ComparesEyePaths(kCompares));
+  EyePass eye = PassOfOneHitpoint(kCompares, 2, 0, Gray(0.5F), 0.5F);
+  eye.block.positions.push_back({0, 0, 1});
+  eye.block.normals_oct.push_back(0);
+  eye.pixels.push_back(0);
+  eye.weights.push_back(Gray(0.25F));
+  eye.unit_radii.push_back(0.5F);
+  eye.paths = {0, 1};
+  eye.direct_difference = {Gray(-3), Gray(0)};
+  PassSums sums(2, kCommonColumns);
+  Accumulation accumulation;
+  accumulation.hitpoints = {0, 1};
+  accumulation.counts = {3, 6};
+  for (auto& channel : accumulation.flux)
+    channel = {80, 16};
+  accumulation.evidence = {{4, 8}};
+  ASSERT_TRUE(sums.Add(accumulation).ok());
+  RoundPlan plan = Plan(4, {1, 1});
+  plan.eye_paths = std::make_shared<const EyePathCounts>(EyePathCounts{2, 1});
+  const SliceSums slice = SliceOfPass(eye, plan, sums, settings, {Gray(1), Gray(1)});
+  const double per_flux = 4 / std::numbers::pi / 4;
+  const double difference = -3 + 2 * (0.5 * 80 - 0.25 * 16) * per_flux;
+  const std::size_t column = slice.first_feature() + kPathVariance;
+  EXPECT_NEAR(static_cast<double>(slice.At(column, 0)), difference * difference / 2,
+              1e-4 * difference * difference);
+  EXPECT_EQ(slice.At(column, 1), 0.0F);
+}
+
 // The columns of a controller's evidence come through; in a pass without evidence they are zero.
 TEST(SliceOfPassTest, PassesWithoutEvidenceBringColumnsOfZeros) {
   const RenderSettings settings =

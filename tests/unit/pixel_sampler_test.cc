@@ -122,6 +122,37 @@ TEST(PixelSamplerTest, StratifiesThePassesOfAPixel) {
   EXPECT_EQ(*std::ranges::max_element(light), 1);
 }
 
+// Paths beside the first ones: those of each pass are spread evenly by themselves, those of all
+// passes together, and none has the numbers of another, also where their number has risen.
+TEST(PixelSamplerTest, StratifiesThePathsBesideTheFirst) {
+  constexpr int kPasses = 16;
+  constexpr int kCount = 4;
+  constexpr std::size_t kPaths = std::size_t{kPasses} * kCount;
+  std::vector<int> all(kPaths);
+  std::vector<float> met;
+  for (std::uint64_t pass = 1; pass < 2 * kPasses; pass += 2) {
+    std::vector<int> of_pass(kCount);
+    for (int i = 0; i < kCount; ++i) {
+      const PixelSampler sampler = PixelSampler::ForMore(1, 17, pass, i, kCount);
+      const float light = sampler.ForVertex(2)[4];
+      ++all[static_cast<std::size_t>(light * kPaths)];
+      const float film = sampler.ForCamera()[0];
+      ++of_pass[static_cast<std::size_t>(film * kCount)];
+      met.push_back(film);
+    }
+    EXPECT_EQ(std::ranges::max(of_pass), 1) << pass;
+  }
+  EXPECT_EQ(std::ranges::max(all), 1);
+  for (std::uint64_t pass = 0; pass < 2 * kPasses; ++pass)
+    met.push_back(PixelSampler(1, 17, pass, pass).ForCamera()[0]);
+  for (std::uint64_t pass = 2 * kPasses + 1; pass < 4 * kPasses; pass += 2) {
+    for (int i = 0; i < 2 * kCount; ++i)
+      met.push_back(PixelSampler::ForMore(1, 17, pass, i, 2 * kCount).ForCamera()[0]);
+  }
+  std::ranges::sort(met);
+  EXPECT_EQ(std::ranges::adjacent_find(met), met.end());
+}
+
 // Photons of every 16th pass are alike in the first digits of their sequence (every 8th of the even
 // passes). With them a pixel must not meet the same part of itself each time.
 TEST(PixelSamplerTest, MeetsThePhotonsOfEachPassEverywhere) {

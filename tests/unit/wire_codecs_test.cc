@@ -205,6 +205,16 @@ TEST(BlockCodecTest, RefusesWhatBreaksABlocksPromises) {
   EXPECT_FALSE(DecodeRadii(EncodeRadii({1, 1}), 3).ok());
 }
 
+TEST(BlockCodecTest, BringsNumbersOfEyePathsBack) {
+  const EyePathCounts counts = {1, 9, 2, 3, 5, 1};
+  EXPECT_EQ(DecodeEyePathCounts(EncodeEyePathCounts(counts), 6).value(), counts);
+  EXPECT_FALSE(DecodeEyePathCounts(EncodeEyePathCounts(counts), 5).ok());
+  EXPECT_FALSE(DecodeEyePathCounts(EncodeEyePathCounts(counts) + "x", 6).ok());
+  EXPECT_FALSE(DecodeEyePathCounts(EncodeRadii(RadiusColumn(6, 1.0F)), 6).ok());
+  for (const std::uint8_t count : {std::uint8_t{0}, std::uint8_t{kMostEyePaths + 1}})
+    EXPECT_FALSE(DecodeEyePathCounts(EncodeEyePathCounts({1, count}), 2).ok()) << count;
+}
+
 TEST(AccumulationCodecTest, BringsARealisticOneBackInUnder9BytesATouchedHitpoint) {
   const Accumulation accumulation = RealisticAccumulation(kPixels, 0.96);
   const std::string bytes = EncodeAccumulation(accumulation, kPixels);
