@@ -221,31 +221,55 @@ struct Retold {
   CheckRoom room;
 };
 
+// Which renders are compared: those of the room with kBaseSeeds seeds from `base_seed` on, and
+// `seeds` of each retold room, of the first one from `seed` on.
+struct Look {
+  std::uint64_t base_seed, seed;
+  std::size_t seeds;
+};
+constexpr Look kFirstLook = {.base_seed = 1, .seed = 100, .seeds = 1};
+// Noise is no normal variable where light is rare: a speck in one image, of some hundred of all
+// rooms, may be beyond the bound. What is real is so with other seeds too, and more surely with
+// more of them.
+constexpr Look kSecondLook = {.base_seed = 50, .seed = 1000, .seeds = 4};
+
+// Of the retold rooms [first, last) together.
+StatusOr<double> DeviationsOf(SelfcheckBench& bench, const CheckRoom& room,
+                              const std::vector<Retold>& retold, std::size_t first,
+                              std::size_t last, const Look& look) {
+  LUCERNA_ASSIGN_OR_RETURN(const std::vector<const Image*> base,
+                           Renders(bench, room, look.base_seed, kBaseSeeds));
+  std::vector<const Image*> all;
+  for (std::size_t i = first; i < last; ++i) {
+    LUCERNA_ASSIGN_OR_RETURN(
+        const std::vector<const Image*> images,
+        Renders(bench, retold[i].room, look.seed + i * look.seeds, look.seeds));
+    all.insert(all.end(), images.begin(), images.end());
+  }
+  return DeviationsBeyondNoise(base, all);
+}
+
 // Each retold room alone, and the mean of all of them, which hides less in its noise.
 StatusOr<CaseOutcome> AgreeWithinNoise(SelfcheckBench& bench, const CheckRoom& room,
                                        const std::vector<Retold>& retold) {
-  LUCERNA_ASSIGN_OR_RETURN(const std::vector<const Image*> base,
-                           Renders(bench, room, 1, kBaseSeeds));
   double most = -HUGE_VAL;
   std::string worst;
-  const auto judge = [&](const std::vector<const Image*>& images, const std::string& how) {
-    auto deviations = DeviationsBeyondNoise(base, images);
-    if (deviations.ok() && !(*deviations <= most)) {
-      most = *deviations;
+  const auto judge = [&](std::size_t first, std::size_t last, const std::string& how) -> Status {
+    LUCERNA_ASSIGN_OR_RETURN(double deviations,
+                             DeviationsOf(bench, room, retold, first, last, kFirstLook));
+    if (!(deviations <= kMostDeviations)) {
+      LUCERNA_ASSIGN_OR_RETURN(deviations,
+                               DeviationsOf(bench, room, retold, first, last, kSecondLook));
+    }
+    if (!(deviations <= most)) {
+      most = deviations;
       worst = how;
     }
-    return deviations.status();
+    return absl::OkStatus();
   };
-  std::vector<const Image*> all;
-  std::uint64_t seed = 100;
-  for (const Retold& one : retold) {
-    LUCERNA_ASSIGN_OR_RETURN(const std::vector<const Image*> images,
-                             Renders(bench, one.room, seed, 1));
-    ++seed;
-    LUCERNA_RETURN_IF_ERROR(judge(images, one.how));
-    all.insert(all.end(), images.begin(), images.end());
-  }
-  LUCERNA_RETURN_IF_ERROR(judge(all, "all together"));
+  for (std::size_t i = 0; i < retold.size(); ++i)
+    LUCERNA_RETURN_IF_ERROR(judge(i, i + 1, retold[i].how));
+  LUCERNA_RETURN_IF_ERROR(judge(0, retold.size(), "all together"));
   return AtMost(most, kMostDeviations,
                 absl::StrCat("standard deviations beyond noise, most in ", NameOf(room), ", ",
                              worst, ", of ", retold.size()));

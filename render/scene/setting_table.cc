@@ -112,7 +112,7 @@ constexpr auto kSettings = std::to_array<Setting>({
                                 .value = &Settings::adaptive_photons}},
     {.name = "unguided",
      .meaning = "send photons in proportion to power alone, not more where earlier ones have come "
-                "into view",
+                "into view, and trace one eye path a pixel and pass, not more where they vary",
      .in_older_jobs = "true",
      .type = SettingField<bool>{.given = &Overrides::unguided, .value = &Settings::unguided}},
     {.name = "spectral",

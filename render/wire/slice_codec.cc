@@ -13,7 +13,7 @@
 namespace lucerna {
 namespace {
 
-constexpr std::string_view kSliceMagic = "LSL5";
+constexpr std::string_view kSliceMagic = "LSL6";
 
 // The column that a column is predicted from: green, of radiance. Itself: from none.
 std::size_t BaseOf(std::size_t column) {

@@ -5,7 +5,10 @@ Renders a scene with growing time limits and compares each image with a referenc
 processor seconds of the whole render (client, coordinator and workers, start-up included) over
 two, as on a machine of two cores that does nothing else.
 
-  tests/bench/error_against_time.py SCENE REFERENCE [--mask M] [--times 1,2,5] [-- render flags]
+  tests/bench/error_against_time.py SCENE REFERENCE [--mask M] [--floor F] [--times 1,2,5]
+    [-- render flags]
+
+The floor of relMSE is that of `lucerna diff`, or F.
 
 Prints one line a time: seconds, relMSE of all pixels and without the worst 0.1 %, mean ratio,
 passes.
@@ -36,11 +39,13 @@ def main():
     parser.add_argument("scene")
     parser.add_argument("reference")
     parser.add_argument("--mask")
+    parser.add_argument("--floor")
     parser.add_argument("--times", default="1,2,5,10,20")
     parser.add_argument("--bin", default=pathlib.Path(__file__).parents[2] / "build/release/bin")
     arguments, flags = parser.parse_known_args()
     lucerna = pathlib.Path(arguments.bin) / "lucerna"
     mask = ["--mask", arguments.mask] if arguments.mask else []
+    floor = ["--floor", arguments.floor] if arguments.floor else []
     flags = [flag for flag in flags if flag != "--"]
     print(f"{'s':>6} {'relMSE':>10} {'trimmed':>10} {'ratio':>8} {'passes':>7} {'wall s':>7}")
     with tempfile.TemporaryDirectory() as folder:
@@ -56,7 +61,7 @@ def main():
                 if abs(spent - seconds) <= 0.06 * seconds:
                     break
                 limit = max(0.05, limit + (seconds - spent))
-            diff = [lucerna, "diff", image, arguments.reference, *mask, "--json"]
+            diff = [lucerna, "diff", image, arguments.reference, *mask, *floor, "--json"]
             everything = run(diff)
             trimmed = run([*diff, "--trim", "0.001"])
             print(f"{spent:6.2f} {everything['rel_mse']:10.2e} {trimmed['rel_mse']:10.2e} "

@@ -30,6 +30,7 @@
 #include "render/base/text.h"
 #include "render/estimate/evidence.h"
 #include "render/tracing/hitpoint_pass.h"
+#include "render/transport/material_at.h"
 #include "render/wire/accumulation_codec.h"
 #include "render/wire/block_codec.h"
 #include "render/wire/slice_codec.h"
@@ -123,8 +124,9 @@ void PhotonRays(benchmark::State& state, const Bench& bench) {
     for (int depth = 0; depth < 32; ++depth) {
       rays.push_back(ray);
       if (!bench.intersector->Intersect(ray, hit)) break;
-      const SurfacePoint surface = bench.intersector->SurfaceAt(ray, hit);
-      const Material& material = bench.scene.materials[surface.material];
+      SurfacePoint surface = bench.intersector->SurfaceAt(ray, hit);
+      std::optional<Material> storage;
+      const Material& material = MaterialAt(bench.scene, surface, -ray.direction, storage);
       const Frame frame(surface.shading_normal);
       BsdfSample sample;
       if (!SampleBsdf(material, frame.ToLocal(-ray.direction), rng.Uniform(), rng.Uniform(),

@@ -199,7 +199,7 @@ TEST(WireBytesTest, HugeCountsAreRefusedBeforeAnythingIsAllocated) {
     EXPECT_FALSE(DecodeAccumulation(accumulation.Take(), kHitpoints).ok());
     for (const bool is_pixels : {true, false}) {
       ByteWriter slice;
-      slice.Bytes("LSL5");
+      slice.Bytes("LSL6");
       slice.Varint(kSlice.passes.first);
       slice.Varint(kSlice.passes.size());
       slice.Varint(is_pixels ? count : kSlice.pixels);
