@@ -31,7 +31,7 @@ constexpr double kLeastGain = 0.03;
 // The passes are to be for images of several times as many: bias is counted as if it did not fall
 // until there are so many times as many, and what low discrepancy leaves of the variance of eye
 // paths, over that of independent ones, with this power (it falls as a power of the passes).
-constexpr double kLaterPasses = 4;
+constexpr double kLaterPasses = 8;
 constexpr double kSpacing = 1.5;
 // Less is not known after eight passes.
 constexpr double kLeastLeft = 0.05;
