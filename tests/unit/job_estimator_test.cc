@@ -89,6 +89,31 @@ TEST(JobEstimatorTest, GoesOnFromACheckpointWithTheSameBits) {
   }
 }
 
+// What eye paths see through a ball of glass varies more than what they see beside it.
+TEST(JobEstimatorTest, GoesOnFromACheckpointWithTheSameNumbersOfEyePaths) {
+  const Scene scene = LoadScene("glass-sphere.pbrt");
+  RenderOverrides overrides;
+  overrides.width = 64;
+  overrides.height = 48;
+  const RenderSettings settings = SettingsFor(scene, overrides);
+  const auto next_counts = [](const LocalRender& render) {
+    const JobEstimator& estimator = render.estimator();
+    return estimator.PlanFor(RoundOf(estimator.whole_passes()))->eye_paths;
+  };
+  LocalRender killed(scene, settings, 2);
+  LocalRender restored(scene, settings, 2);
+  for (int pass = 0; pass < 16; ++pass) {
+    killed.AddPass();
+    const bool has_counts = next_counts(killed) != nullptr;
+    // Of the passes that compare; what is chosen after them is for the round after the next.
+    EXPECT_EQ(has_counts, pass >= 3 && pass != 7 && pass != 8) << pass;
+  }
+  ASSERT_TRUE(restored.Restore(killed.Save()).ok());
+  ASSERT_NE(next_counts(restored), nullptr);
+  EXPECT_EQ(*next_counts(restored), *next_counts(killed));
+  EXPECT_GT(std::ranges::max(*next_counts(killed)), 1);
+}
+
 // A room with a window in its front wall, over ground that a light beyond its roof shines on: what
 // comes in has been scattered outside.
 Scene RoomOverLitGround() {
