@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <functional>
+#include <numeric>
 #include <utility>
 
 #include "render/base/memory.h"
@@ -105,12 +106,14 @@ EyePass TraceHitpointPass(const EyePathTracer& tracer, std::uint64_t pass, First
   };
   // [tiles + 1] how many paths the tiles before have.
   std::vector<std::size_t> first_path(tiles + 1);
-  for (std::size_t tile = 0; tile < tiles; ++tile) {
-    first_path[tile + 1] = first_path[tile];
-    for_pixels_of(tile, [&](int /*x*/, int /*y*/, std::uint32_t pixel) {
-      first_path[tile + 1] += static_cast<std::size_t>(paths_of(pixel));
-    });
-  }
+  team.For(tiles, kTile, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t tile = begin; tile < end; ++tile) {
+      for_pixels_of(tile, [&](int /*x*/, int /*y*/, std::uint32_t pixel) {
+        first_path[tile + 1] += static_cast<std::size_t>(paths_of(pixel));
+      });
+    }
+  });
+  std::partial_sum(first_path.begin(), first_path.end(), first_path.begin());
   const std::size_t paths = first_path[tiles];
   // Clearing memory takes as long as filling it in.
   const auto for_columns = [&](const auto& work) {

@@ -287,29 +287,34 @@ void AddPhotons(SliceSums& slice, EyePass& pass, const RoundPlan& plan, RadiusCo
       add(of_photons[c][pixel], static_cast<double>(pass.weights[row][channel]) * flux * density);
     }
   });
-  if (ComparesEyePaths(pass.pass)) {
-    // Of paths of two: half of the squared difference is the variance of one.
+  if (!pass.direct_difference.empty()) {
+    // Half of the squared difference of two is the variance of one.
     const ColorOfPass in_color(settings, needs, pass.pass);
-    std::vector<std::array<double, 3>> differences(pixels);
-    for (std::size_t pixel = 0; pixel < pass.direct_difference.size(); ++pixel)
-      differences[pixel] = ToDoubles(pass.direct_difference[pixel]);
+    const auto luminance_of = [&](const std::array<double, 3>& rgb) {
+      const std::array<double, 3> color = in_color(rgb);
+      return WorkingLuminance(color[0], color[1], color[2]);
+    };
+    std::vector<double> of_photons_apart(pixels);
     for_all_rows([&](std::size_t row, std::uint32_t pixel) {
-      if (pass.paths.empty() || plan.EyePathsOf(pixel) != 2) return;
+      if (plan.EyePathsOf(pixel) != 2) return;
       const double of_path = (pass.paths[row] == 0 ? 2 : -2) * to_density(row);
+      std::array<double, 3> rgb{};
       for (int channel = 0; channel < 3; ++channel) {
         const auto c = static_cast<std::size_t>(channel);
-        differences[pixel][c] += static_cast<double>(pass.weights[row][channel]) *
-                                 static_cast<double>(columns.flux[c][row]) *
-                                 static_cast<double>(scale.watts_per_quantum[channel]) * of_path;
+        rgb[c] = static_cast<double>(pass.weights[row][channel]) *
+                 static_cast<double>(columns.flux[c][row]) *
+                 static_cast<double>(scale.watts_per_quantum[channel]) * of_path;
       }
+      of_photons_apart[pixel] += luminance_of(rgb);
     });
     const std::size_t column = slice.first_feature() + kPathVariance;
     filler.ForPixels([&](std::size_t pixel) {
-      if (pass.paths.empty() || plan.EyePathsOf(pixel) != 2) return;
-      const std::array<double, 3> difference = in_color(differences[pixel]);
-      const double luminance = WorkingLuminance(difference[0], difference[1], difference[2]);
-      filler.Set(column, pixel, luminance * luminance / 2);
+      if (plan.EyePathsOf(pixel) != 2) return;
+      const double apart =
+          luminance_of(ToDoubles(pass.direct_difference[pixel])) + of_photons_apart[pixel];
+      filler.Set(column, pixel, apart * apart / 2);
     });
+    FreeMemoryOf(pass.direct_difference);
   }
   columns.flux = {};
   FreeMemoryOf(pass.weights);

@@ -115,6 +115,18 @@ EyePass ExpectedPass(const EyePathTracer& tracer, std::uint64_t pass, const EyeP
   return expected;
 }
 
+void ExpectTheSameRows(const EyePass& pass, const EyePass& expected) {
+  EXPECT_EQ(pass.block.positions, expected.block.positions);
+  EXPECT_EQ(pass.block.normals_oct, expected.block.normals_oct);
+  EXPECT_EQ(pass.block.glossy, expected.block.glossy);
+  EXPECT_EQ(pass.block.segments, expected.block.segments);
+  EXPECT_EQ(pass.block.caustic_rows, expected.block.caustic_rows);
+  EXPECT_EQ(pass.pixels, expected.pixels);
+  EXPECT_EQ(pass.weights, expected.weights);
+  EXPECT_EQ(pass.unit_radii, expected.unit_radii);
+  EXPECT_EQ(pass.rays, expected.rays);
+}
+
 TEST_P(HitpointPassTest, RowsAreWhatEyePathsBrought) {
   const EyePass expected =
       ExpectedPass(*tracer, kPass, EyePathCounts(std::size_t{kWidth} * kHeight, 1));
@@ -124,15 +136,7 @@ TEST_P(HitpointPassTest, RowsAreWhatEyePathsBrought) {
     FilmSpread spread(*tracer);
     const EyePass pass = TraceHitpointPass(*tracer, kPass, nullptr, spread, team);
     ASSERT_TRUE(pass.is_whole);
-    EXPECT_EQ(pass.block.positions, expected.block.positions);
-    EXPECT_EQ(pass.block.normals_oct, expected.block.normals_oct);
-    EXPECT_EQ(pass.block.glossy, expected.block.glossy);
-    EXPECT_EQ(pass.block.segments, expected.block.segments);
-    EXPECT_EQ(pass.block.caustic_rows, expected.block.caustic_rows);
-    EXPECT_EQ(pass.pixels, expected.pixels);
-    EXPECT_EQ(pass.weights, expected.weights);
-    EXPECT_EQ(pass.unit_radii, expected.unit_radii);
-    EXPECT_EQ(pass.rays, expected.rays);
+    ExpectTheSameRows(pass, expected);
   }
   const std::size_t pixels = std::size_t{kWidth} * kHeight;
   if (GetParam() == "hard-shadow") {
@@ -153,14 +157,7 @@ TEST_P(HitpointPassTest, APixelOfSeveralPathsIsTheirMean) {
     ThreadTeam team(threads);
     FilmSpread spread(*tracer);
     const EyePass pass = TraceHitpointPass(*tracer, kPass, nullptr, spread, team, nullptr, &counts);
-    EXPECT_EQ(pass.block.positions, expected.block.positions);
-    EXPECT_EQ(pass.block.glossy, expected.block.glossy);
-    EXPECT_EQ(pass.block.segments, expected.block.segments);
-    EXPECT_EQ(pass.block.caustic_rows, expected.block.caustic_rows);
-    EXPECT_EQ(pass.pixels, expected.pixels);
-    EXPECT_EQ(pass.weights, expected.weights);
-    EXPECT_EQ(pass.unit_radii, expected.unit_radii);
-    EXPECT_EQ(pass.rays, expected.rays);
+    ExpectTheSameRows(pass, expected);
     EXPECT_TRUE(pass.paths.empty());
     if (!spread.is_needed()) {
       EXPECT_EQ(pass.direct, expected.direct);
