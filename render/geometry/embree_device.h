@@ -13,16 +13,13 @@
 
 namespace lucerna {
 
-// Errors: INTERNAL without AVX2. The caller releases the device.
-[[nodiscard]] inline StatusOr<RTCDevice> NewEmbreeDevice() {
-  RTCDevice device = rtcNewDevice("isa=avx2");
-  if (device == nullptr) {
-    return absl::InternalError("Embree cannot start: this processor has no AVX2");
-  }
-  return device;
-}
+// The device of all scenes of this process; it is never released. A device takes one of the 1,024
+// keys for values of threads that a process has, so that with one for each scene a coordinator with
+// a thousand jobs had none left. What went wrong in this thread before is forgotten.
+// Errors: INTERNAL without AVX2. Threads: any.
+[[nodiscard]] StatusOr<RTCDevice> SharedEmbreeDevice();
 
-// What went wrong since the last call. Errors: RESOURCE_EXHAUSTED, INTERNAL.
+// What went wrong in this thread since the last call. Errors: RESOURCE_EXHAUSTED, INTERNAL.
 [[nodiscard]] inline Status EmbreeStatus(RTCDevice device) {
   switch (rtcGetDeviceError(device)) {
     case RTC_ERROR_NONE:

@@ -256,7 +256,6 @@ struct Intersector::EmbreeScene {
       if (object != nullptr) rtcReleaseScene(object);
     }
     if (scene != nullptr) rtcReleaseScene(scene);
-    if (device != nullptr) rtcReleaseDevice(device);
   }
 };
 
@@ -281,7 +280,7 @@ Intersector::~Intersector() = default;
 StatusOr<std::unique_ptr<Intersector>> Intersector::Create(const Scene& scene, RayNeeds needs) {
   auto intersector = std::unique_ptr<Intersector>(new Intersector(scene, needs.shading_normals));
   EmbreeScene& embree = *intersector->embree_;
-  LUCERNA_ASSIGN_OR_RETURN(embree.device, NewEmbreeDevice());
+  LUCERNA_ASSIGN_OR_RETURN(embree.device, SharedEmbreeDevice());
   const auto new_scene = [&] {
     RTCScene made = rtcNewScene(embree.device);
     rtcSetSceneFlags(made, needs.robust_rays ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);

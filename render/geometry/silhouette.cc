@@ -208,7 +208,6 @@ struct SilhouetteEdges::EmbreeScene {
 
   ~EmbreeScene() {
     if (scene != nullptr) rtcReleaseScene(scene);
-    if (device != nullptr) rtcReleaseDevice(device);
   }
 
   static void EdgeBounds(const RTCBoundsFunctionArguments* arguments) {
@@ -309,7 +308,7 @@ StatusOr<std::unique_ptr<SilhouetteEdges>> SilhouetteEdges::Create(const Scene& 
   silhouettes->edges_.shrink_to_fit();
 
   EmbreeScene& embree = *silhouettes->embree_;
-  LUCERNA_ASSIGN_OR_RETURN(embree.device, NewEmbreeDevice());
+  LUCERNA_ASSIGN_OR_RETURN(embree.device, SharedEmbreeDevice());
   embree.scene = rtcNewScene(embree.device);
   rtcSetSceneFlags(embree.scene, RTC_SCENE_FLAG_ROBUST);
   const auto attach = [&](std::size_t count, RTCBoundsFunction bounds_of,

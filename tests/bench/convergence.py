@@ -15,9 +15,9 @@ next.
 
 References are in --references. One that is missing is made: some six hours of two cores for all,
 --references-only for nothing else. Each has so many passes that its squared noise is at most a tenth
-of what is judged after 60 s, and that is taken off. Its first radius is smaller than that of a job,
-or bias that falls slowly would be hidden in it (docs/measurements/references.md). The judged renders
-take half an hour.
+of what is judged after 60 s, and that is taken off. It has less blur than a job's image, or none, or bias
+that falls slowly would be hidden in it (docs/measurements/references.md). The judged renders take
+half an hour.
 
 Results are kept in docs/convergence/results.csv: what is there is not rendered again, so that the
 program can be stopped and started. At the end, and after every scene, the page docs/convergence.md
@@ -40,14 +40,14 @@ DOCS = ROOT / "docs"
 BIN = ROOT / "build/release/bin"
 OWN = ["hard-shadow", "penumbra", "water-sun", "pool", "caustic", "cardioid", "corner",
        "glass-box", "glass-sphere", "lamp-in-glass", "rough-metal", "textured"]
-# First radius, photons a pixel and pass, and passes of both halves. One pixel where much of the light
-# has edges; none where those are seen directly and photons find them: lucerna-light-reference makes
-# images without the kernel's blur (docs/measurements/references.md). The numbers follow from the
+# Where light has edges, how lucerna-unblurred-reference makes an image without the kernel's blur
+# (docs/measurements/references.md), with photons a pixel and pass and passes of either half. Else the
+# first radius, photons a pixel and pass, and passes of both halves. These numbers follow from the
 # noise of a few seeds: of photons a pass the best of 1, 4 and 16, and as many passes as should bring
 # the squared noise to 0.08 to 0.1 of what was judged.
-LIGHT_TRACED = None
+UNBLURRED = {"closed-form", "light", "fine"}
 REFERENCES = {
-    "b-bars-1": ("2px", 16, 9500),
+    "b-bars-1": ("closed-form",),
     "b-beads-1": ("2px", 4, 12500),
     "b-checkers-1": ("2px", 4, 28100),
     "b-emitters-1": ("2px", 4, 28300),
@@ -57,20 +57,20 @@ REFERENCES = {
     "b-glossy-2": ("2px", 4, 24300),
     "b-holes-1": ("2px", 16, 17300),
     "b-holes-2": ("2px", 4, 60000),
-    "b-waves-1": ("0.5px", 4, 5000),
-    "b-waves-2": ("0.5px", 4, 4000),
-    "cardioid": (LIGHT_TRACED, 4, 1000),
+    "b-waves-1": ("fine", 256, 75),
+    "b-waves-2": ("fine", 256, 50),
+    "cardioid": ("light", 4, 3500),
     "caustic": ("1px", 4, 72000),
     "corner": ("2px", 16, 27600),
     "glass-box": ("2px", 4, 21400),
     "glass-sphere": ("2px", 1, 57700),
-    "hard-shadow": (LIGHT_TRACED, 4, 700),
+    "hard-shadow": ("light", 4, 1500),
     "lamp-in-glass": ("2px", 16, 6400),
-    "penumbra": ("2px", 16, 14300),
-    "pool": ("0.5px", 4, 1500),
+    "penumbra": ("closed-form",),
+    "pool": ("fine", 256, 20),
     "rough-metal": ("2px", 4, 23000),
     "textured": ("2px", 1, 16700),
-    "water-sun": (LIGHT_TRACED, 4, 1000),
+    "water-sun": ("light", 4, 1000),
 }
 SIZE = "128x128"
 FLAGS = {"default": [], "pppm": ["--radius-controller", "pppm"],
@@ -184,14 +184,15 @@ def reference_of(name, path, folder):
     """The reference of a scene; it is made where it is missing."""
     reference = folder / f"{name}.exr"
     if not reference.exists():
-        radius, photons, passes = REFERENCES[name]
-        if radius is LIGHT_TRACED:
-            run([BIN / "lucerna-light-reference", path, SIZE, photons, passes, reference])
+        how, *counts = REFERENCES[name]
+        if how in UNBLURRED:
+            run([BIN / "lucerna-unblurred-reference", path, SIZE, reference, how, *counts])
             return reference
+        photons, passes = counts
         pixels = math.prod(map(int, SIZE.split("x")))
         was_interrupted = reference.with_name(f"{reference.name}.checkpoints").exists()
         run([BIN / "lucerna", "reference", path, "--size", SIZE, "--quiet", "--seed", "1000003",
-             "--radius-controller", "appm", "--initial-radius", radius,
+             "--radius-controller", "appm", "--initial-radius", how,
              "--photons-per-pass", photons * pixels, "--passes", passes, "-o", reference,
              *(["--resume"] if was_interrupted else [])])
     return reference
@@ -318,8 +319,8 @@ def write_page(rows, docs):
             "with the worst 0.1 % of pixels. Scenes b-* are half B of "
             "`tests/tools/make_study_scenes.py`, which no constant of the estimate has seen. All figures "
             "are in [results.csv](convergence/results.csv). References "
-            "begin with a radius of 1 or 2 px or, where edges are seen directly, have none: they show bias "
-            "that falls slowly. Columns: errors as fractions, `low` and `high` of the "
+            "begin with a radius of 1 or 2 px or, of eight scenes whose light has edges, have none or one of "
+            "an eighth of a pixel: they show bias that falls slowly. Columns: errors as fractions, `low` and `high` of the "
             "95 % interval, `true_trimmed` without the worst 0.1 % of pixels.\n",
             "![Estimated over true error](convergence/overview.svg)\n"]
     judged = [row for row in rows if row["setting"] == "default"]

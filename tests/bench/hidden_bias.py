@@ -3,8 +3,8 @@
 
   tests/bench/hidden_bias.py BIN SCENE REFERENCE LIGHT_TRACED [--seeds N] [-- render flags]
 
-LIGHT_TRACED is a second reference without blur (lucerna-light-reference), however noisy. Renders the
-scene with N seeds (default: 6). E is what an image is off by, B its layer `bias`, both as luminance
+LIGHT_TRACED is a second reference without blur (lucerna-unblurred-reference), however noisy. Renders
+the scene with N seeds (default: 6). E is what an image is off by, B its layer `bias`, both as luminance
 relative to the reference; products are of two different seeds, so that they have no noise of images
 in the mean, and leave out 0.1 % of the pixels. By the light-traced reference E has its noise too,
 which is independent of B.

@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -417,6 +419,20 @@ TEST(IntersectorTest, RaysThatAreNoNumbersOrBeyondAllRangeMeetNothing) {
       EXPECT_FALSE(intersector->Occluded(ray)) << odd;
     }
   }
+}
+
+// As many as a coordinator has whose jobs wait for workers.
+TEST(IntersectorTest, ThousandsOfScenesMayBeThereAtOnce) {
+  Scene scene;
+  AddQuad(scene, {-1, -1, 0}, {2, 0, 0}, {0, 2, 0}, AddMaterial(scene, DiffuseMaterial(0.5F)));
+  std::vector<std::unique_ptr<Intersector>> intersectors;
+  for (int i = 0; i < 3000; ++i) {
+    StatusOr<std::unique_ptr<Intersector>> made = Intersector::Create(scene);
+    ASSERT_TRUE(made.ok()) << i << ": " << made.status();
+    intersectors.push_back(std::move(*made));
+  }
+  Hit hit;
+  EXPECT_TRUE(intersectors.back()->Intersect({{0, 0, 1}, {0, 0, -1}}, hit));
 }
 
 }  // namespace
