@@ -81,7 +81,8 @@ def main():
                 spent, job = program.render(arguments.scene, image, seconds, flags)
                 errors = [run(diff), run([*diff, "--trim", "0.001"])]
                 everything, trimmed = (
-                    error["rel_mse"] - (arguments.noise or error.get("reference_rel_mse") or 0)
+                    error["rel_mse"] - (arguments.noise if arguments.noise is not None
+                                        else error.get("reference_rel_mse") or 0)
                     for error in errors)
                 print(f"{spent:6.2f} {everything:10.2e} {trimmed:10.2e} "
                       f"{errors[0]['mean_ratio']:8.4f} {job['passes']:7d} "
