@@ -351,7 +351,7 @@ void JobEstimator::AddRound(std::shared_ptr<const SliceSums> round, const RoundP
              .scale = RadiusScale(*state.sums, *state.radii, sample,
                                   static_cast<std::size_t>(state.settings.crop_width()))};
   }
-  state.radii->Step(*round, *plan.radii, image, state.team);
+  state.radii->Step({*round, *plan.radii, plan.photons_per_pass}, image, state.team);
   state.last_radii = plan.radii;
   const std::uint64_t passes = whole_passes();
   const State::After before = state.after.rbegin()->second;

@@ -10,7 +10,7 @@ namespace {
 // Bytes a pixel: of a checkpoint as a file (sums, and the photons that were reported), and, beside
 // what ExpectedCostOf counts, of an error estimate at its highest and of the first passes' squared
 // deviations.
-constexpr std::uint64_t kCheckpoint = 203 + 2 * 14;
+constexpr std::uint64_t kCheckpoint = 227 + 2 * 14;
 constexpr std::uint64_t kEstimate = 64;
 constexpr std::uint64_t kPassVariance = 12;
 // Memory for a byte of a file: binary meshes become as much again with the tree over their

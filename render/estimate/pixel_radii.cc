@@ -21,8 +21,8 @@ PixelRadii::PixelRadii(Numbers numbers, const RadiusController& controller)
   LUCERNA_CHECK(numbers_.memory.size() == numbers_.radius.size() * memory_per_pixel_);
 }
 
-void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, const OfImage& image,
-                      ThreadTeam& team) {
+void PixelRadii::Step(const Round& of_round, const OfImage& image, ThreadTeam& team) {
+  const auto& [round, used, photons_per_pass] = of_round;
   LUCERNA_CHECK(round.pixels() == numbers_.radius.size() && used.size() == numbers_.radius.size() &&
                 round.evidence <= kMostControllerColumns);
   const std::uint64_t rounds = RoundsUntil(round.passes.last);
@@ -40,7 +40,10 @@ void PixelRadii::Step(const SliceSums& round, const RadiusColumn& used, const Of
            .blur = static_cast<double>(round.At(kBlur, pixel)),
            .rounds = rounds,
            .noise_share = image.noise_share,
-           .scale = image.scale},
+           .scale = image.scale,
+           .even_bias = static_cast<double>(round.At(kEvenBias, pixel)),
+           .odd_bias = static_cast<double>(round.At(kOddBias, pixel)),
+           .photons_per_pass = static_cast<double>(photons_per_pass)},
           round.passes,
           std::span<double>(numbers_.memory).subspan(pixel * memory_per_pixel_, memory_per_pixel_));
     }

@@ -29,9 +29,13 @@ class PixelRadii {
   struct OfImage {
     double noise_share = 1, scale = 1;
   };
-  // Takes in a round whose hitpoints gathered with `used` [pixels].
-  void Step(const SliceSums& round, const RadiusColumn& used, const OfImage& image,
-            ThreadTeam& team);
+  // A round whose hitpoints gathered with `radii` [pixels].
+  struct Round {
+    const SliceSums& sums;
+    const RadiusColumn& radii;
+    std::uint64_t photons_per_pass = 1;
+  };
+  void Step(const Round& round, const OfImage& image, ThreadTeam& team);
 
   // The radii after the rounds so far [pixels].
   [[nodiscard]] RadiusColumn Current() const;
@@ -41,10 +45,10 @@ class PixelRadii {
         .subspan(pixel * memory_per_pixel_, memory_per_pixel_);
   }
 
-  // RadiusController::Scaled of a pixel, after `passes` in so many rounds.
-  [[nodiscard]] std::optional<ScaledRadius> ScaledAt(std::size_t pixel, std::uint64_t passes,
-                                                     std::uint64_t rounds) const {
-    return controller_.Scaled(memory(pixel), passes, rounds);
+  // RadiusController::Scaled of a pixel.
+  [[nodiscard]] std::optional<ScaledRadius> ScaledAt(std::size_t pixel,
+                                                     const PassesTaken& taken) const {
+    return controller_.Scaled(memory(pixel), taken);
   }
 
   // All that is kept of the rounds taken in: for checkpoints.

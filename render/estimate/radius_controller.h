@@ -37,6 +37,10 @@ struct RoundEvidence {
   std::uint64_t rounds = 1;  // so far, with this one
   double noise_share = 1;    // as PhotonNoiseShare has it, or what is assumed
   double scale = 1;          // as RadiusScale has it, or 1
+  // What kernels changed in the pixel, summed over the even passes and over the odd ones
+  // [luminance].
+  double even_bias = 0, odd_bias = 0;
+  double photons_per_pass = 1;
 };
 
 // What a frequency controller predicts for a pixel.
@@ -45,11 +49,22 @@ struct BandwidthPrediction {
   double min_radius = 0;  // that keeps the bias within the tolerance [unit radii]
 };
 
-// What a factor for the radii of the whole image (estimate/radius_scale.h) does to a pixel's. Both
-// relative to the radius that it would have without a factor.
+// What a factor for the radii of the whole image (estimate/radius_scale.h) does to a pixel's. Radii
+// are relative to the one that it would have without a factor.
 struct ScaledRadius {
   double most = 1;  // that the pixel's own evidence allows, at most 1
-  double use = 1;   // in the mean of the passes so far
+  double use = 1;   // that the passes so far had, as their noise shows it
+  // That by whose square bias has grown in the image so far.
+  double blurred = 1;
+  // What the kernel changes at a radius without a factor, as the even passes and the odd ones have
+  // it [luminance of a pass].
+  double even_bias = 0, odd_bias = 0;
+};
+
+// The passes whose evidence a controller has taken in.
+struct PassesTaken {
+  std::uint64_t passes = 0, rounds = 0;
+  double photons = 0;  // of all of them
 };
 
 // The powers of the photon count with which two parts of the mean squared error of converging
@@ -73,10 +88,9 @@ class RadiusController {
                                          std::span<double> memory) const = 0;
   // Whether blur that photons surely show is taken off the image (estimate/without_blur.h).
   [[nodiscard]] virtual bool RemovesBlur() const { return false; }
-  // After `passes` in so many rounds; absent when the controller scales no radii, or not yet.
+  // Absent when the controller scales no radii, or not yet.
   [[nodiscard]] virtual std::optional<ScaledRadius> Scaled(std::span<const double> /*memory*/,
-                                                           std::uint64_t /*passes*/,
-                                                           std::uint64_t /*rounds*/) const {
+                                                           const PassesTaken& /*taken*/) const {
     return std::nullopt;
   }
   // Whether Predict ever says anything.

@@ -19,7 +19,7 @@ namespace {
 
 // With the version of the format, and of what the sums mean: a checkpoint of another version is not
 // used.
-constexpr std::string_view kMagic = "Lucerna checkpoint 13\n";
+constexpr std::string_view kMagic = "Lucerna checkpoint 14\n";
 constexpr std::size_t kNumberBytes = sizeof(std::uint64_t);
 constexpr int kSlots = 2;
 

@@ -97,7 +97,7 @@ TEST(SliceOfPassTest, EqualsTheRescaledFluxOfProgressivePhotonMapping) {
     const SliceSums slice =
         SliceOfPass(PassOfOneHitpoint(pass, 1, 0, {1, 1, 1}, 1), plan, sums, settings, scale);
     image.Add(slice, team);
-    radii.Step(slice, *plan.radii, {}, team);
+    radii.Step({slice, *plan.radii}, {}, team);
     if (m == 0) continue;
     tau += static_cast<double>(quanta) * static_cast<double>(scale.watts_per_quantum.g);
     const double ratio = (n + settings.alpha * m) / (n + m);
@@ -139,7 +139,7 @@ TEST(SliceOfPassTest, KeepsItsDigitsWithATrillionPhotonsAPass) {
     const SliceSums slice =
         SliceOfPass(PassOfOneHitpoint(pass, 1, 0, {1, 1, 1}, 1), plan, sums, settings, scale);
     image.Add(slice, team);
-    radii.Step(slice, *plan.radii, {}, team);
+    radii.Step({slice, *plan.radii}, {}, team);
   }
   // Every term is rounded to 16 bits, and a few roundings of 2^-53 are nothing beside that.
   EXPECT_NEAR(image.At(0).photon_count / (kPasses * kPhotons), 1, kRadianceRounding);

@@ -361,11 +361,14 @@ ScaledRun RunScaled(double scale, double blur_share, double then = 1, std::uint6
                             .blur = pass % 5 == 0 ? blur_share * 10 * r * r : 0,
                             .rounds = pass + 1,
                             .noise_share = 0.1,
-                            .scale = pass < until ? scale : then},
+                            .scale = pass < until ? scale : then,
+                            .even_bias = pass % 2 == 0 ? 0.02 * r * r : 0,
+                            .odd_bias = pass % 2 == 0 ? 0 : 0.02 * r * r},
                            OnePass(pass), memory);
     EXPECT_GE(run.pixel.radius, 0.6 * r * (1 - 1e-12)) << pass;
     EXPECT_LE(run.pixel.radius, 1.15 * r * (1 + 1e-12)) << pass;
-    run.scaled = appm->Scaled(memory, pass + 1, pass + 1);
+    run.scaled = appm->Scaled(
+        memory, {.passes = pass + 1, .rounds = pass + 1, .photons = static_cast<double>(pass + 1)});
     EXPECT_EQ(run.scaled.has_value(), pass >= 7) << pass;
   }
   return run;
@@ -382,6 +385,43 @@ TEST(AppmTest, SaysWhichFactorPassesHad) {
   const ScaledRun run = RunScaled(0.4, 0, 0.4);
   EXPECT_EQ(run.scaled->most, 1);
   EXPECT_NEAR(run.scaled->use, 0.4, 0.004);
+}
+
+// Radii as above, and bias that goes as their squares, of 0.02 at whole ones: each pass shows the
+// same of it. The mean of fourth powers is that of radii near 0.42: 0.0256 and eight passes of 1.
+TEST(AppmTest, KnowsTheBiasOfWholeRadiiByAllItHad) {
+  const ScaledRun run = RunScaled(0.4, 0, 0.4);
+  // Five of the nine passes with whole radii are even.
+  EXPECT_NEAR(0.5 * (run.scaled->even_bias + run.scaled->odd_bias), 0.02, 1e-12);
+  EXPECT_NEAR(run.scaled->even_bias / run.scaled->odd_bias, 1, 0.1);
+  EXPECT_NEAR(run.scaled->blurred, std::pow(std::pow(0.4, 4) + 10.0 / 400, 0.25), 0.02);
+}
+
+// Ten passes with the first radius, of which the last two have four times the photons and twice the
+// bias: (8 · 0.02 + 8 · 0.04) / 16.
+TEST(AppmTest, WeighsBiasByPhotons) {
+  RenderSettings settings;
+  settings.radius_controller = RadiusControllerKind::kAppm;
+  const auto appm = MakeRadiusController(settings, 1);
+  std::vector<double> memory(appm->MemoryPerPixel());
+  const auto columns = ExpectedCurvature(100, 0, 1);
+  for (std::uint64_t pass = 0; pass < 10; ++pass) {
+    const double bias = pass < 8 ? 0.02 : 0.04;
+    const RoundEvidence evidence = {.photons = 100,
+                                    .radius = 1,
+                                    .columns = columns,
+                                    .rounds = pass + 1,
+                                    .noise_share = 0.1,
+                                    .even_bias = pass % 2 == 0 ? bias : 0,
+                                    .odd_bias = pass % 2 == 0 ? 0 : bias,
+                                    .photons_per_pass = pass < 8 ? 100.0 : 400.0};
+    (void)appm->Next({1, 0}, evidence, OnePass(pass), memory);
+  }
+  const auto scaled = appm->Scaled(memory, {.passes = 10, .rounds = 10, .photons = 1600});
+  ASSERT_TRUE(scaled.has_value());
+  EXPECT_NEAR(scaled->even_bias, 0.03, 1e-12);
+  EXPECT_NEAR(scaled->odd_bias, 0.03, 1e-12);
+  EXPECT_NEAR(scaled->blurred, 1, 1e-12);
 }
 
 // Blur that is likely in this pixel holds its radius below the factor of the image, and the

@@ -46,7 +46,13 @@ class Appm final : public RadiusController {
     memory[kBlur] += blur;
     const auto of_round = static_cast<double>(passes.size());
     memory[kBlurSquares] += blur * blur / of_round;
-    memory[kInverseSixths] += of_round / Sixth(evidence.radius / first_);
+    const double radius2 = Square(evidence.radius / first_);
+    memory[kInverseSixths] += of_round / (radius2 * radius2 * radius2);
+    // Rounds weigh by their photons and by what their radii show of the bias of wider ones.
+    const double weight = evidence.photons_per_pass * radius2;
+    memory[kEvenBias] += weight * evidence.even_bias;
+    memory[kOddBias] += weight * evidence.odd_bias;
+    memory[kFourths] += weight * of_round * radius2;
     PixelRadius next = {now.radius, now.photons + evidence.photons};
 
     const auto n = static_cast<double>(passes.last);
@@ -81,15 +87,20 @@ class Appm final : public RadiusController {
     return next;
   }
 
-  std::optional<ScaledRadius> Scaled(std::span<const double> memory, std::uint64_t passes,
-                                     std::uint64_t rounds) const override {
-    if (passes < kPassesBeforeGrowth) return std::nullopt;
-    const auto n = static_cast<double>(passes);
-    const double shrunk =
-        Least(memory, n, memory[kLargest], BlurOf(memory, n, static_cast<double>(rounds)).likely);
-    return ScaledRadius{
-        .most = shrunk < first_ ? shrunk / memory[kFree] : 1,
-        .use = first_ / (memory[kFree] * std::cbrt(std::sqrt(memory[kInverseSixths] / n)))};
+  std::optional<ScaledRadius> Scaled(std::span<const double> memory,
+                                     const PassesTaken& taken) const override {
+    if (taken.passes < kPassesBeforeGrowth) return std::nullopt;
+    const auto n = static_cast<double>(taken.passes);
+    const double shrunk = Least(memory, n, memory[kLargest],
+                                BlurOf(memory, n, static_cast<double>(taken.rounds)).likely);
+    const double free = memory[kFree] / first_;
+    // Half of the passes are even.
+    const double bias = 2 * free * free / memory[kFourths];
+    return ScaledRadius{.most = shrunk < first_ ? shrunk / memory[kFree] : 1,
+                        .use = 1 / (free * std::cbrt(std::sqrt(memory[kInverseSixths] / n))),
+                        .blurred = std::sqrt(std::sqrt(memory[kFourths] / taken.photons)) / free,
+                        .even_bias = bias * memory[kEvenBias],
+                        .odd_bias = bias * memory[kOddBias]};
   }
 
   // The published controllers show what their radii alone do.
@@ -106,8 +117,13 @@ class Appm final : public RadiusController {
     kBlur,
     kBlurSquares,
     kInverseSixths,  // of radii over the first one
-    kLargest,        // that sure evidence leaves, at most the first one
-    kFree,           // without a factor for the image, at least the first one
+    // Over passes, that each weigh their photons: biases times squared radii, fourth powers of
+    // radii, over the first one.
+    kEvenBias,
+    kOddBias,
+    kFourths,
+    kLargest,  // that sure evidence leaves, at most the first one
+    kFree,     // without a factor for the image, at least the first one
     kNumbers
   };
   static constexpr double kSmallestShare = 0.01;
@@ -140,6 +156,7 @@ class Appm final : public RadiusController {
     return std::min(radius, std::max(std::cbrt(std::sqrt(sixth)), smallest_));
   }
 
+  static double Square(double x) { return x * x; }
   static double Sixth(double x) { return x * x * x * x * x * x; }
 
   // Of the mean blur over the squared radius, squared: what is surely there, what is likely there,
