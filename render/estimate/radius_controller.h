@@ -53,9 +53,9 @@ struct BandwidthPrediction {
 // are relative to the one that it would have without a factor.
 struct ScaledRadius {
   double most = 1;  // that the pixel's own evidence allows, at most 1
-  double use = 1;   // that the passes so far had, as their noise shows it
-  // That by whose square bias has grown in the image so far.
-  double blurred = 1;
+  // Two means of those that the passes so far had: of inverse sixth powers, as noise counts them,
+  // and of fourth powers, each pass by its photons, as squared bias does.
+  double use = 1, blurred = 1;
   // What the kernel changes at a radius without a factor, as the even passes and the odd ones have
   // it [luminance of a pass].
   double even_bias = 0, odd_bias = 0;

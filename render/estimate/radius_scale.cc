@@ -66,11 +66,10 @@ double RadiusScale(const ImageSums& sums, const PixelRadii& radii, const NoiseSa
         RelativeSquare(pixel.noise * Square(scaled->use), pixel.luminance, sample.floor);
     const double even = scaled->even_bias;
     const double odd = scaled->odd_bias;
-    const double weight = std::min(scaled->most, 1.0);
-    const double square = RelativeSquare(weight * even * odd, pixel.luminance, sample.floor);
+    const double square = RelativeSquare(scaled->most * even * odd, pixel.luminance, sample.floor);
     // It scatters as the product does, whatever the bias, and has none in the mean.
-    const double chance =
-        RelativeSquare(weight * 0.5 * (Square(even) - Square(odd)), pixel.luminance, sample.floor);
+    const double chance = RelativeSquare(scaled->most * 0.5 * (Square(even) - Square(odd)),
+                                         pixel.luminance, sample.floor);
     const double past = Square(scaled->blurred);
     TileBias& of_tile = biases[step * tiles.count() + tile];
     of_tile.bias.Add(square, chance);

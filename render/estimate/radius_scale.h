@@ -20,13 +20,13 @@ namespace lucerna {
 //   V / m² + B (p² + m²)²
 //
 // over the pixels, where V is the squared noise of light by photons and B the squared bias, both
-// relative (estimate/relative_error.h) and at radii without a factor, p the factor whose bias the
-// image has so far, and m is no larger than the pixel's own evidence allows (ScaledRadius). For
-// pixels that all had p = m that is (V / 4B)^(1/6). A pixel that its own evidence holds counts with
-// B times the factor that it is held at: mostly it lies at an edge, of which wide discs see more
-// than there is within narrow ones. Two deviations are taken from the sums of B. 1 where the
-// controller scales no radii, or not yet, and where light covers too few tiles to know what chance
-// does. `sample` is SampleNoise(sums), `width` that of the image.
+// relative (estimate/relative_error.h) and at radii without a factor, p the factor that the passes
+// so far had (ScaledRadius::blurred), and m is no larger than the pixel's own evidence allows
+// (ScaledRadius::most). For pixels that all had p = m that is (V / 4B)^(1/6). A pixel that its own
+// evidence holds counts with B times the factor that it is held at: mostly it lies at an edge, of
+// which wide discs see more than there is within narrow ones. Two deviations are taken from the
+// sums of B. 1 where the controller scales no radii, or not yet, and where light covers too few
+// tiles to know what chance does. `sample` is SampleNoise(sums), `width` that of the image.
 [[nodiscard]] double RadiusScale(const ImageSums& sums, const PixelRadii& radii,
                                  const NoiseSample& sample, std::size_t width);
 

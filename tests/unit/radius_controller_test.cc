@@ -388,13 +388,14 @@ TEST(AppmTest, SaysWhichFactorPassesHad) {
 }
 
 // Radii as above, and bias that goes as their squares, of 0.02 at whole ones: each pass shows the
-// same of it. The mean of fourth powers is that of radii near 0.42: 0.0256 and eight passes of 1.
+// same of it. Nine passes have whole radii, one 0.6 and the others 0.4.
 TEST(AppmTest, KnowsTheBiasOfWholeRadiiByAllItHad) {
   const ScaledRun run = RunScaled(0.4, 0, 0.4);
   // Five of the nine passes with whole radii are even.
   EXPECT_NEAR(0.5 * (run.scaled->even_bias + run.scaled->odd_bias), 0.02, 1e-12);
   EXPECT_NEAR(run.scaled->even_bias / run.scaled->odd_bias, 1, 0.1);
-  EXPECT_NEAR(run.scaled->blurred, std::pow(std::pow(0.4, 4) + 10.0 / 400, 0.25), 0.02);
+  const double fourths = 9 + std::pow(0.6, 4) + 390 * std::pow(0.4, 4);
+  EXPECT_NEAR(run.scaled->blurred, std::pow(fourths / 400, 0.25), 1e-9);
 }
 
 // Ten passes with the first radius, of which the last two have four times the photons and twice the
