@@ -231,18 +231,27 @@ void JobCounters::NameDropped(const std::vector<PhotonKey>& named) {
 }
 
 void SlidingRate::Add(std::uint64_t events, SteadyTime now) {
-  events_.emplace_back(now, events);
-  while (events_.front().first + window_ < now)
-    events_.pop_front();
+  arrivals_.emplace_back(now, events);
+  while (FirstCounted(now) > 1)
+    arrivals_.pop_front();
+}
+
+std::size_t SlidingRate::FirstCounted(SteadyTime now) const {
+  const auto is_before = [&](const auto& arrival) { return arrival.first + window_ < now; };
+  const auto before_window = static_cast<std::size_t>(
+      std::ranges::partition_point(arrivals_, is_before) - arrivals_.begin());
+  return std::min(before_window, arrivals_.size() - std::min(arrivals_.size(), kFewestArrivals));
 }
 
 double SlidingRate::PerSecond(SteadyTime since, SteadyTime now) const {
-  const Duration span = std::min(window_, now - since);
+  const std::size_t first = FirstCounted(now);
+  // From one arrival to the next: what the first brings came about before it.
+  const SteadyTime begin = first == 0 ? since : std::max(since, arrivals_[first - 1].first);
+  const Duration span = now - begin;
   if (span <= Duration::zero()) return 0;
   std::uint64_t sum = 0;
-  for (const auto& [when, events] : events_) {
-    if (when + span >= now) sum += events;
-  }
+  for (std::size_t i = first; i < arrivals_.size(); ++i)
+    sum += arrivals_[i].second;
   return static_cast<double>(sum) / Seconds(span);
 }
 

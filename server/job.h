@@ -130,7 +130,8 @@ class JobLife {
   std::optional<SteadyTime> started_at_;  // counting; absent: time stands still
 };
 
-// Events per second over the last few seconds.
+// Events per second over the last few seconds, or over the last few arrivals where these take
+// longer: a pass of a large image arrives as a whole, a minute after the one before.
 class SlidingRate {
  public:
   explicit SlidingRate(Duration window) : window_(window) {}
@@ -140,8 +141,14 @@ class SlidingRate {
   [[nodiscard]] double PerSecond(SteadyTime since, SteadyTime now) const;
 
  private:
+  // So many are counted, however old.
+  static constexpr std::size_t kFewestArrivals = 4;
+
+  // The index of the first arrival that is counted. The one before it, if any, is when they began.
+  [[nodiscard]] std::size_t FirstCounted(SteadyTime now) const;
+
   Duration window_;
-  std::deque<std::pair<SteadyTime, std::uint64_t>> events_;
+  std::deque<std::pair<SteadyTime, std::uint64_t>> arrivals_;
 };
 
 // Of the batches that two workers were to compute (server/audit.h).

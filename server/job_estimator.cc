@@ -45,7 +45,7 @@ struct PhotonChoice {
   // seldom met rare light.
   std::uint64_t most;
 };
-constexpr std::array kPhotonChoices = {PhotonChoice{4, 4}, PhotonChoice{8, 8}};
+constexpr std::array kPhotonChoices = {PhotonChoice{2, 2}, PhotonChoice{4, 4}, PhotonChoice{8, 8}};
 static_assert(kPhotonChoices.back().passes <= kFirstLongRound);
 static_assert(kPhotonChoices.back().passes == kEyePathsCompared);
 
@@ -262,7 +262,6 @@ StatusOr<std::unique_ptr<JobEstimator>> JobEstimator::Create(Scene scene, Render
       std::make_unique<EyePathTracer>(prepared.scene(), state->settings, prepared.needs(),
                                       prepared.intersector(), prepared.lights());
   state->film_spread = std::make_unique<FilmSpread>(*state->tracer);
-  if (prepared.needs().Uses(Part::kSpectra)) state->film_spread->Prepare(state->team);
   const auto initial = static_cast<float>(settings.initial_radius > 0
                                               ? settings.initial_radius / prepared.scene().unit
                                               : settings.initial_footprints);
@@ -300,6 +299,7 @@ StatusOr<EyePass> JobEstimator::TraceEyePaths(std::uint64_t pass, const EyePathC
     const PreparedScene::AtPass at_pass(*then, state_->settings.seed, pass);
     return TraceHitpointPass(tracer, pass, nullptr, spread, state_->team, shall_stop, counts);
   }
+  if (needs().Uses(Part::kSpectra)) state_->film_spread->Prepare(state_->team);
   const PreparedScene::AtPass at_pass(state_->prepared, state_->settings.seed, pass);
   return TraceHitpointPass(*state_->tracer, pass, state_->first_hits.Of(pass), *state_->film_spread,
                            state_->team, shall_stop, counts);

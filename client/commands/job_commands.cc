@@ -121,6 +121,8 @@ Status EndInterrupted(LocalRuns& runs, const RenderRequest& request, bool has_ch
   ClearInterruption();
   std::string message = "interrupted before the first image";
   if (!runs.job_id().empty()) {
+    // A large one takes a minute.
+    PrintError("lucerna: interrupted; saving the image so far (interrupt again to leave it)\n");
     if (const auto saved = Save(runs.connection(), runs.job_id(), request.outputs, display);
         saved.ok()) {
       message = absl::StrCat("interrupted; the image so far is in ",

@@ -578,6 +578,7 @@ TEST_F(ClientCommandsTest, AnInterruptedRenderWritesTheImageSoFarAndGoesOnWithTh
   ::kill(client, SIGINT);
   const Ran interrupted = Finish(client);
   EXPECT_EQ(interrupted.code, 130) << interrupted.err;
+  EXPECT_NE(interrupted.err.find("saving the image so far"), std::string::npos) << interrupted.err;
   EXPECT_NE(interrupted.err.find("the image so far is in " + In("a.exr")), std::string::npos)
       << interrupted.err;
   EXPECT_NE(interrupted.err.find("--resume"), std::string::npos) << interrupted.err;

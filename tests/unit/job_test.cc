@@ -155,10 +155,38 @@ TEST(JobLifeTest, CanBeCancelledOrFailAnywhereBeforeTheEndAndNeverAfter) {
 TEST(SlidingRateTest, ForgetsWhatIsOlderThanTheWindow) {
   SlidingRate rate(std::chrono::seconds(5));
   for (int s = 1; s <= 10; ++s)
+    rate.Add(700, At(s));
+  for (int s = 11; s <= 20; ++s)
     rate.Add(100, At(s));
-  EXPECT_NEAR(rate.PerSecond(At(0), At(10)), 120, 1e-9);  // at 5, 6, 7, 8, 9 and 10
-  EXPECT_NEAR(rate.PerSecond(At(0), At(14.5)), 20, 1e-9);
-  EXPECT_EQ(rate.PerSecond(At(0), At(16)), 0);
+  EXPECT_NEAR(rate.PerSecond(At(0), At(20)), 100, 1e-9);
+}
+
+TEST(SlidingRateTest, KnowsTheRateOfRareArrivals) {
+  SlidingRate rate(std::chrono::seconds(5));
+  for (int s = 40; s <= 400; s += 40)
+    rate.Add(800, At(s));
+  // The same before an arrival as after it, but for the arrival.
+  EXPECT_NEAR(rate.PerSecond(At(0), At(400)), 20, 1e-9);
+  EXPECT_NEAR(rate.PerSecond(At(0), At(439)), 800 * 4 / 199.0, 1e-9);
+  rate.Add(800, At(440));
+  rate.Add(800, At(441));
+  EXPECT_NEAR(rate.PerSecond(At(0), At(441)), 800 * 4 / 121.0, 1e-9);
+}
+
+TEST(SlidingRateTest, FallsWhenNothingArrivesAnyMore) {
+  SlidingRate rate(std::chrono::seconds(5));
+  for (int s = 1; s <= 10; ++s)
+    rate.Add(100, At(s));
+  EXPECT_NEAR(rate.PerSecond(At(0), At(46)), 10, 1e-9);  // those at 7, 8, 9 and 10, since 6
+}
+
+TEST(SlidingRateTest, CountsNoTimeInWhichNothingRan) {
+  SlidingRate rate(std::chrono::seconds(5));
+  for (int s = 1; s <= 10; ++s)
+    rate.Add(100, At(s));
+  // It stood still from 10 to 1000, so that what ran 12 seconds began at 990.
+  rate.Add(100, At(1001));
+  EXPECT_NEAR(rate.PerSecond(At(990), At(1002)), 400 / 12.0, 1e-9);
 }
 
 TEST(SlidingRateTest, DividesByTheTimeThereWas) {
