@@ -31,7 +31,7 @@ namespace lucerna {
 // expected to take, whichever stops it first; absent before the job runs.
 [[nodiscard]] std::optional<double> ShareDone(const v1::Job& job);
 
-// How long until it stops at the rate of the last seconds; absent when it is unknown.
+// How long until it stops at its present rate; absent when it is unknown.
 [[nodiscard]] std::optional<Duration> TimeLeft(const v1::Job& job);
 
 // One line without its end: "[#####-----]  50 %  pass 8/16  4.2 M photons  1.1 M/s  4.1 s  ETA 4
