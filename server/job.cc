@@ -231,7 +231,15 @@ void JobCounters::NameDropped(const std::vector<PhotonKey>& named) {
 }
 
 void SlidingRate::Add(std::uint64_t events, SteadyTime now) {
-  arrivals_.emplace_back(now, events);
+  const auto second_of = [](SteadyTime when) {
+    return std::chrono::floor<std::chrono::seconds>(when.time_since_epoch());
+  };
+  if (!arrivals_.empty() && second_of(arrivals_.back().first) == second_of(now)) {
+    arrivals_.back().first = now;
+    arrivals_.back().second += events;
+  } else {
+    arrivals_.emplace_back(now, events);
+  }
   while (FirstCounted(now) > 1)
     arrivals_.pop_front();
 }

@@ -131,7 +131,8 @@ class JobLife {
 };
 
 // Events per second over the last few seconds, or over the last few arrivals where these take
-// longer: a pass of a large image arrives as a whole, a minute after the one before.
+// longer: a pass of a large image arrives as a whole, a minute after the one before. What arrives
+// within one second of the clock is one arrival, however many workers send it.
 class SlidingRate {
  public:
   explicit SlidingRate(Duration window) : window_(window) {}

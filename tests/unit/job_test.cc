@@ -173,6 +173,16 @@ TEST(SlidingRateTest, KnowsTheRateOfRareArrivals) {
   EXPECT_NEAR(rate.PerSecond(At(0), At(441)), 800 * 4 / 121.0, 1e-9);
 }
 
+// A thousand workers that began together, and need 40 seconds for a pass.
+TEST(SlidingRateTest, KnowsTheRateOfManyThatArriveTogether) {
+  SlidingRate rate(std::chrono::seconds(5));
+  for (int s = 40; s <= 400; s += 40)
+    for (int worker = 0; worker < 1000; ++worker)
+      rate.Add(800, At(s + 0.0005 * worker));
+  EXPECT_NEAR(rate.PerSecond(At(0), At(401)) / 20000, 1, 0.01);
+  EXPECT_NEAR(rate.PerSecond(At(0), At(420)) / 20000, 160.0 / 180, 0.01);
+}
+
 TEST(SlidingRateTest, FallsWhenNothingArrivesAnyMore) {
   SlidingRate rate(std::chrono::seconds(5));
   for (int s = 1; s <= 10; ++s)

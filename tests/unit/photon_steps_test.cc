@@ -355,8 +355,8 @@ std::vector<double> NumbersIn(const char* file, int passes) {
   return numbers;
 }
 
-// No direct light, and a smooth image: all noise is of photons. What four passes show, pass 5
-// follows.
+// No direct light, and a smooth image: all noise is of photons. What two and four passes show,
+// passes 3 and 5 follow.
 TEST(PhotonsOfAJobTest, RiseWhereTheNoiseIsOfPhotons) {
   EXPECT_EQ(NumbersIn("water-lamp.pbrt", 7), (std::vector<double>{1, 1, 1, 2, 2, 4, 4}));
 }
