@@ -14,6 +14,7 @@
 #include "render/math/sobol.h"
 #include "render/tracing/facet_sides.h"
 #include "render/transport/material_at.h"
+#include "render/transport/subsurface.h"
 
 namespace lucerna {
 namespace {
@@ -448,7 +449,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
   };
   [[maybe_unused]] SpectrumTracer::Carried spectrum;
   if constexpr (kSpectrum) spectrum = spectra_->Leave(emission);
-  // A photon that a medium has scattered has no spectrum any more.
+  // A photon that a medium has scattered, or that went below a surface, has no spectrum any more.
   [[maybe_unused]] bool has_spectrum = true;
   PathWavelength wavelength;
   if (parts.dispersion) {
@@ -510,7 +511,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
     }
     [[maybe_unused]] const float after_flight = parts.media ? MaxChannel(flux) : 1;
     SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
-    const Vec3 wo = -ray.direction;
+    Vec3 wo = -ray.direction;
     // Of a mix those of all its materials: which one this photon meets says nothing of the
     // hitpoints nearby.
     const MaterialProperties& properties = properties_[surface.material];
@@ -529,7 +530,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       return end(PhotonEnd::kAbsorbed, energy.absorbed);
     if (parts.shading_normals && !sides.MayMeet(surface, material))
       return end(PhotonEnd::kSmoothing, energy.smoothing);
-    const bool is_smoothed = parts.shading_normals && surface.has_shading_normal;
+    bool is_smoothed = parts.shading_normals && surface.has_shading_normal;
     if (is_smoothed) {
       const float shading = Dot(wo, surface.shading_normal);
       const float geometric = Dot(wo, surface.geometric_normal);
@@ -602,7 +603,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       u1 = rng.Uniform();
       u2 = rng.Uniform();
     }
-    const Frame frame = ShadingFrame(surface);
+    Frame frame = ShadingFrame(surface);
     BsdfSample sample;
     const Vec3 wo_local = frame.ToLocal(wo);
     const bool is_scattered = [&] {
@@ -622,8 +623,26 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
         mark(static_cast<double>(guided));
       }
     }
-    const Vec3 wi = frame.ToWorld(sample.wi);
     Rgb scattered = flux * sample.weight;
+    if (sample.part == Parts::kSecond && material.ScattersBelow()) {
+      const float u_axis = rng.Uniform();
+      const float u_radius = rng.Uniform();
+      const float u_turn = rng.Uniform();
+      LeftBelow left;
+      int rays = 0;
+      const bool has_left = SampleBelow(scene_, intersector_, material, surface, wo, u_axis,
+                                        u_radius, u_turn, rng.Uniform(), left, rays);
+      landed.rays += static_cast<std::uint64_t>(rays);
+      if (!has_left) return end(PhotonEnd::kAbsorbed, energy.absorbed);
+      scattered *= left.weight;
+      surface = left.surface;
+      wo = left.up;
+      frame = ShadingFrame(surface);
+      is_smoothed = parts.shading_normals && surface.has_shading_normal;
+      // Light from far around it comes out at a point.
+      has_spectrum = false;
+    }
+    const Vec3 wi = frame.ToWorld(sample.wi);
     watcher.Scattered(sample, wo_local.z, wi, scattered);
     if (!IsFinite(scattered)) return end(PhotonEnd::kNotFinite, energy.dropped);
     book(EnergyOf(scattered), energy.absorbed);

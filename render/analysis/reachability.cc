@@ -112,8 +112,10 @@ std::vector<NumberedLight> LightsOf(const Scene& scene) {
   return lights;
 }
 
+// Light that goes below the one side of a shell may come out on the other.
 bool IsOpaque(const Material& material) {
-  return !Transmits(material);
+  const MaterialProperties properties = PropertiesOf(material);
+  return !properties.transmits && !properties.scatters_below;
 }
 
 // The shapes of the materials that some predicate accepts, as rays meet them.

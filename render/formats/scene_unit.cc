@@ -89,6 +89,12 @@ Status ChooseUnit(Scene& scene) {
   for (Texture& texture : scene.textures)
     texture.mapping.from_world = texture.mapping.from_world * to_file;
   // Coefficients are per length.
+  for (Material& material : scene.materials) {
+    if (material.kind != Material::Kind::kSubsurface) continue;
+    for (Rgb* const coefficient :
+         {&material.absorption, &material.scattering, &material.extinction})
+      *coefficient *= static_cast<float>(scene.unit);
+  }
   for (Medium& medium : scene.media) {
     medium.absorption *= static_cast<float>(scene.unit);
     medium.scattering *= static_cast<float>(scene.unit);

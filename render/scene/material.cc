@@ -25,6 +25,8 @@ MaterialProperties PropertiesOf(const MaterialNumbers& material) {
   if (material.is_on_thin_shapes) {
     properties.is_thin = true;
     properties.gathers = false;
+    // A hair is thinner than what light travels below its surface.
+    properties.scatters_below = false;
   }
   if (material.is_in_mix && properties.weighs_photons) {
     // Photons that another material of the mix met are not weighed: hitpoints do all.

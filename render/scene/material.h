@@ -36,7 +36,8 @@
   ROW(CoatedConductor, "coatedconductor")         \
   ROW(Mix, "mix")                                 \
   ROW(Hair, "hair")                               \
-  ROW(Measured, "measured")
+  ROW(Measured, "measured")                       \
+  ROW(Subsurface, "subsurface")
 
 namespace lucerna {
 
@@ -45,12 +46,13 @@ namespace lucerna {
 enum class Parts : std::uint8_t {
   kAll,
   kFirst,  // what a coat reflects; the reflection of a sheet
-  kSecond  // what the base under a coat scatters; the transmission of a sheet
+  kSecond  // what the base under a coat scatters; the transmission of a sheet; what goes below
 };
 
-struct CoatTable;     // scene/coat_table.h
-struct CoatFamily;    // the same
-class MeasuredTable;  // scene/measured_table.h
+struct CoatTable;        // scene/coat_table.h
+struct CoatFamily;       // the same
+struct SubsurfaceTable;  // scene/subsurface_table.h
+class MeasuredTable;     // scene/measured_table.h
 struct MaterialProperties;
 
 // What all kinds of material are made of. Each kind uses some of the members.
@@ -60,17 +62,18 @@ struct MaterialNumbers {
 #undef LUCERNA_KIND
 
   Kind kind = Kind::kDiffuse;
-  Parts parts = Parts::kAll;             // of a material that has two
-  Rgb reflectance = {0.5F, 0.5F, 0.5F};  // diffuse, coated diffuse, diffuse transmission, hair
-  Rgb transmittance;                     // diffuse transmission
-  Rgb eta = {1, 1, 1};                   // conductor, under a coat too: index of refraction
-  Rgb k = {0, 0, 0};                     // the same: absorption
-  bool is_at_wavelengths = false;        // eta and k are those of a pass's wavelengths
-  float ior = 1.5F;                      // dielectric, coat, hair: inside over outside
-  Dispersion dispersion;                 // dielectric; `ior` is that at the d line
-  float alpha_u = 0;                     // of metals, dielectrics and coats: GGX widths; 0 and 0:
-  float alpha_v = 0;                     // smooth
-  float base_alpha_u = 0;                // of the metal under a coat: GGX widths; 0 and 0: smooth
+  Parts parts = Parts::kAll;  // of a material that has two
+  // Diffuse, coated diffuse, diffuse transmission, hair; subsurface: of light that has entered.
+  Rgb reflectance = {0.5F, 0.5F, 0.5F};
+  Rgb transmittance;               // diffuse transmission
+  Rgb eta = {1, 1, 1};             // conductor, under a coat too: index of refraction
+  Rgb k = {0, 0, 0};               // the same: absorption
+  bool is_at_wavelengths = false;  // eta and k are those of a pass's wavelengths
+  float ior = 1.5F;                // dielectric, coat, hair, subsurface: inside over outside
+  Dispersion dispersion;           // dielectric; `ior` is that at the d line
+  float alpha_u = 0;               // of metals, dielectrics and coats: GGX widths; 0 and 0:
+  float alpha_v = 0;               // smooth
+  float base_alpha_u = 0;          // of the metal under a coat: GGX widths; 0 and 0: smooth
   float base_alpha_v = 0;
   float thickness = 0;         // of a coat [mean free paths], at right angles
   std::int32_t base_hits = 5;  // how often light in a coat meets the base, at most
@@ -83,8 +86,15 @@ struct MaterialNumbers {
   // Of hair: roughness along the fibre and around it, in [0.01, 1], and the angle by which its
   // scales are tilted [rad].
   float beta_m = 0.3F, beta_n = 0.3F, scale_tilt = 0;
-  Rgb absorption;                        // of hair, per radius of the fibre
+  Rgb absorption;  // of hair, per radius of the fibre; subsurface: [1/scene unit]
   bool absorbs_for_reflectance = false;  // the absorption follows from `reflectance`
+  // Subsurface [1/scene unit]: `extinction` and `reflectance` are given, or follow from absorption
+  // and scattering (transport/subsurface.h). The phase function's mean cosine. The table is owned
+  // by Material.
+  Rgb scattering, extinction;
+  bool scatters_for_reflectance = false;
+  float phase_g = 0;
+  const SubsurfaceTable* below = nullptr;
   // Of a measured surface; owned by Material. Which of its planes are the three colours.
   const MeasuredTable* measured = nullptr;
   std::array<float, 3> measured_planes = {};
@@ -144,6 +154,10 @@ struct MaterialNumbers {
            roughness_textures[2] != roughness_textures[3] || kind == Kind::kHair ||
            is_measured_with_direction;
   }
+  // Whether what its second part scatters leaves at another point.
+  [[nodiscard]] bool ScattersBelow() const {
+    return kind == Kind::kSubsurface && !is_on_thin_shapes;
+  }
   // Whether it sends each wavelength into another direction.
   [[nodiscard]] bool Disperses() const {
     return kind == Kind::kDielectric && !dispersion.is_none() && alpha_u == 0 && alpha_v == 0 &&
@@ -160,6 +174,7 @@ struct Material : MaterialNumbers {
   std::shared_ptr<const CoatTable> owned_coat;
   std::shared_ptr<const CoatFamily> owned_coats;
   std::shared_ptr<const MeasuredTable> owned_measured;
+  std::shared_ptr<const SubsurfaceTable> owned_below;
   std::shared_ptr<const MaterialProperties> owned_mixed_properties;
   OwnedSpectra given;  // colours that the file gives by wavelength
 
@@ -187,6 +202,8 @@ struct MaterialProperties {
   bool transmits = false;
   // Where eye paths stop and photons are kept; with two parts, those that choose one of them.
   bool gathers = false;
+  // What is not reflected, the second part, leaves at another point (transport/subsurface.h).
+  bool scatters_below = false;
   // Of a thin shape: eye paths go on, and no photons are kept.
   bool is_thin = false;
   // With two parts: where eye paths go on at the first.

@@ -19,6 +19,7 @@ MaterialProperties Joined(const MaterialProperties& a, const MaterialProperties&
   joined.scatters_smoothly = a.scatters_smoothly || b.scatters_smoothly;
   joined.transmits = a.transmits || b.transmits;
   joined.gathers = a.gathers || b.gathers;
+  joined.scatters_below = a.scatters_below || b.scatters_below;
   joined.is_thin = a.is_thin || b.is_thin;
   joined.has_rough_coat = a.gathers_caustics() || b.gathers_caustics();
   joined.lobe_width = std::min(a.lobe_width, b.lobe_width);

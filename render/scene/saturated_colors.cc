@@ -41,6 +41,7 @@ bool IsSaturated(const Material& material) {
       return has_color && IsSaturated(MetalColor(material));
     case Kind::kDiffuse:
     case Kind::kCoatedDiffuse:
+    case Kind::kSubsurface:
       return has_color && IsSaturated(material.reflectance);
     case Kind::kDiffuseTransmission:
       return (has_color && IsSaturated(material.reflectance)) ||

@@ -60,8 +60,12 @@ Rgb LightSampledRadiance(const Intersector& intersector, const LightSet& lights,
     radiance = reflected_by(point.material, 1);
   } else {
     Material part;
-    radiance = reflected_by(PartOf(point.material, Parts::kFirst, part), point.share_of_first) +
-               reflected_by(PartOf(point.material, Parts::kSecond, part), 1 - point.share_of_first);
+    radiance = reflected_by(PartOf(point.material, Parts::kFirst, part), point.share_of_first);
+    // What goes below is lit where it comes out.
+    if (!point.material.ScattersBelow()) {
+      radiance +=
+          reflected_by(PartOf(point.material, Parts::kSecond, part), 1 - point.share_of_first);
+    }
   }
   if (IsBlack(radiance)) return {};
   if (!point.sides.MayBeLit(point.surface, point.wo, light.wi, wo.z * wi.z < 0)) return {};

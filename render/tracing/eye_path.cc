@@ -10,7 +10,9 @@
 #include "render/math/warp.h"
 #include "render/tracing/direct_light.h"
 #include "render/transport/bsdf.h"
+#include "render/transport/coat.h"
 #include "render/transport/material_at.h"
+#include "render/transport/subsurface.h"
 
 namespace lucerna {
 namespace {
@@ -639,6 +641,49 @@ float EyePathTracer::RadiusUnit(const SurfacePoint& surface, float footprint) co
   return std::min(footprint, widest / static_cast<float>(settings_.initial_footprints));
 }
 
+EyeHitpoint EyePathTracer::HitpointAt(const SurfacePoint& surface, const Material& here, Vec3 wo,
+                                      Rgb weight, float length, bool is_glossy) const {
+  EyeHitpoint hitpoint;
+  hitpoint.position = surface.position;
+  hitpoint.normal = FaceForward(surface.geometric_normal, wo);
+  hitpoint.is_glossy = is_glossy;
+  hitpoint.material = surface.material;
+  hitpoint.to_eye = wo;
+  hitpoint.shading_normal = surface.shading_normal;
+  if (is_glossy && here.DependsOnPlace()) {
+    hitpoint.place = {TexturedParameter(here),
+                      {here.alpha_u, here.alpha_v, here.base_alpha_u, here.base_alpha_v},
+                      surface.tangent == Vec3() ? kNoTangent : EncodeOctahedral(surface.tangent)};
+  }
+  hitpoint.weight = weight;
+  hitpoint.footprint = RadiusUnit(surface, footprint_ + footprint_slope_ * length);
+  return hitpoint;
+}
+
+void EyePathTracer::EndBelow(const ShadingPoint& entered, Rgb weight, float length,
+                             const SobolPoint& below, const SobolPoint& u, bool is_lit_here,
+                             EyePath& path) const {
+  LeftBelow left;
+  if (!SampleBelow(scene_, intersector_, entered.material, entered.surface, entered.wo, below[0],
+                   below[1], below[2], below[3], left, path.rays)) {
+    return;
+  }
+  // Seen from here, light leaves along the normal; what the surface lets through towards the eye is
+  // known where the path went below.
+  constexpr Vec3 kUp = {0, 0, 1};
+  weight *= left.weight * (CoatEntering(entered.material, Up(entered.frame.ToLocal(entered.wo))) /
+                           CoatEntering(entered.material, kUp));
+  if (parts_.lights && is_lit_here) {
+    const Frame frame = ShadingFrame(left.surface);
+    AddDirect({left.surface, entered.material, frame, left.up, entered.media, entered.medium, -1,
+               entered.sides},
+              weight, u, path.direct, path.rays);
+  }
+  const bool is_glossy = !PropertiesOf(entered.material).is_separable;
+  path.hitpoint = HitpointAt(left.surface, entered.material, left.up, weight, length, is_glossy);
+  if (!is_glossy) path.hitpoint.weight *= EyeFactor(entered.material, kUp);
+}
+
 EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) const {
   EyePath path;
   Rgb weight = Gray(1);
@@ -812,6 +857,12 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
     const MaterialProperties& properties = part ? changed : whole_properties;
     if (!(parts_.lobes && properties.is_smooth)) was_collected = false;
 
+    if (properties.scatters_below) {
+      EndBelow({surface, material, frame, wo, parts_.media ? &media_ : nullptr, medium, -1, sides},
+               weight, length, sampler.ForBelow(vertex), u, !is_lit_otherwise, path);
+      return finish();
+    }
+
     BsdfSample sample;
     bool scattered = [&] {
       if (parts_.lobes) {
@@ -830,23 +881,8 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
       if (parts_.media) medium_after = media_.After(surface, wo, wi, medium);
     }
 
-    const auto hitpoint_here = [&](bool is_glossy, const Material& here) {
-      EyeHitpoint hitpoint;
-      hitpoint.position = surface.position;
-      hitpoint.normal = FaceForward(surface.geometric_normal, wo);
-      hitpoint.is_glossy = is_glossy;
-      hitpoint.material = surface.material;
-      hitpoint.to_eye = wo;
-      hitpoint.shading_normal = surface.shading_normal;
-      if (is_glossy && here.DependsOnPlace()) {
-        hitpoint.place = {
-            TexturedParameter(here),
-            {here.alpha_u, here.alpha_v, here.base_alpha_u, here.base_alpha_v},
-            surface.tangent == Vec3() ? kNoTangent : EncodeOctahedral(surface.tangent)};
-      }
-      hitpoint.weight = weight;
-      hitpoint.footprint = RadiusUnit(surface, footprint_ + footprint_slope_ * length);
-      return hitpoint;
+    const auto hitpoint_here = [&](bool is_glossy) {
+      return HitpointAt(surface, material, wo, weight, length, is_glossy);
     };
     if (properties.gathers) {
       if (parts_.lights && !is_lit_otherwise && scattered && rays_find_lights_) {
@@ -855,7 +891,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
                             medium_after, weight * sample.weight, path.rays);
       }
       const bool is_glossy = parts_.lobes && !properties.is_separable;
-      path.hitpoint = hitpoint_here(is_glossy, material);
+      path.hitpoint = hitpoint_here(is_glossy);
       if (!is_glossy) path.hitpoint.weight *= EyeFactor(material, wo_local);
       // Light comes from the other side.
       if (!is_glossy && properties.transmits) path.hitpoint.normal = -path.hitpoint.normal;
@@ -872,7 +908,7 @@ EyePath EyePathTracer::Walk(Ray ray, const PixelSampler& sampler, First first) c
         const float strength = MaxChannel(weight);
         path.caustic_strength += strength;
         if (caustic_rng.Uniform() * path.caustic_strength < strength) {
-          path.caustic = hitpoint_here(true, material);
+          path.caustic = hitpoint_here(true);
           path.caustic.weight *= 1 / strength;
         }
       }

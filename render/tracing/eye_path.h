@@ -242,6 +242,13 @@ class EyePathTracer {
   // What a ray in `medium` meets, behind interfaces; with media, what is left of light on the way.
   [[nodiscard]] bool FindThroughMedia(Ray& ray, Hit& hit, std::int32_t& medium, Rgb& transmittance,
                                       int& rays) const;
+  // A path of `weight` and `length` ends at this point, whose material is `here`.
+  [[nodiscard]] EyeHitpoint HitpointAt(const SurfacePoint& surface, const Material& here, Vec3 wo,
+                                       Rgb weight, float length, bool is_glossy) const;
+  // A path of `weight` and `length` goes below the surface of `entered`, which has that part alone,
+  // and ends where it comes out, with a hitpoint and, where `is_lit_here`, direct light.
+  void EndBelow(const ShadingPoint& entered, Rgb weight, float length, const SobolPoint& below,
+                const SobolPoint& u, bool is_lit_here, EyePath& path) const;
   // A part of an eye path that ends after `t`.
   [[nodiscard]] EyeSegment SegmentOf(const Ray& ray, float t, std::int32_t medium, Rgb weight,
                                      float length_before) const;

@@ -76,6 +76,13 @@ class PixelSampler {
     return ShuffledOwenSobol(pass_, key);
   }
 
+  // Where light leaves that goes below a surface at `vertex`: axis and channel (0), radius (1),
+  // turn (2), choice of one of several points (3).
+  [[nodiscard]] SobolPoint ForBelow(int vertex) const {
+    return ShuffledOwenSobol(
+        pass_, CombineKeys(key_ ^ 0x42454C4F57535552ULL, static_cast<std::uint64_t>(vertex)));
+  }
+
   // For the path's wavelength, in [0, 1).
   [[nodiscard]] float ForWavelength() const {
     return ShuffledOwenSobol(pass_, CombineKeys(key_, 0x574156454C454E47ULL))[0];

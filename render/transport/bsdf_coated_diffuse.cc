@@ -6,6 +6,7 @@
 #include "render/transport/bsdf_kinds.h"
 #include "render/transport/bsdf_parts.h"
 #include "render/transport/coat.h"
+#include "render/transport/dielectric_reflection.h"
 #include "render/transport/microfacet.h"
 
 namespace lucerna {
@@ -27,54 +28,6 @@ Rgb BaseReflectance(const Material& material) {
           channel(material.reflectance.b)};
 }
 
-// --- the coat's surface
-
-bool SampleCoat(const Material& material, Vec3 wo, float u1, float u2, BsdfSample& sample) {
-  const float side = wo.z < 0 ? -1.0F : 1.0F;
-  const Vec3 up = wo * side;
-  float cos_t = 0;
-  if (HasNoFacets(material)) {
-    const float reflected = FresnelDielectric(up.z, material.ior, cos_t);
-    sample = {{-wo.x, -wo.y, wo.z}, Gray(reflected), 0, true};
-    return reflected > 0;
-  }
-  const Ggx ggx(material);
-  const Vec3 m = ggx.SampleVisible(up, u1, u2);
-  const Vec3 wi = ReflectAt(up, m);
-  if (!(wi.z > 0)) return false;
-  const float cos_m = Dot(up, m);
-  const float reflected = FresnelDielectric(cos_m, material.ior, cos_t);
-  sample.wi = wi * side;
-  sample.pdf = ggx.PdfVisible(up, m) / (4 * cos_m);
-  sample.weight = Gray(reflected * ggx.G2(up, wi) / ggx.G1(up));
-  sample.is_delta = false;
-  return sample.pdf > 0;
-}
-
-bool CoatHalf(const Material& material, Vec3 wo, Vec3 wi, Vec3& m) {
-  if (HasNoFacets(material) || !(wo.z * wi.z > 0)) return false;
-  m = Up(wo) + Up(wi);
-  const float squared = LengthSquared(m);
-  if (squared == 0) return false;
-  m = m / std::sqrt(squared);
-  return true;
-}
-
-float EvaluateCoat(const Material& material, Vec3 wo, Vec3 wi) {
-  Vec3 m;
-  if (!CoatHalf(material, wo, wi, m)) return 0;
-  const Ggx ggx(material);
-  float cos_t = 0;
-  return FresnelDielectric(Dot(Up(wo), m), material.ior, cos_t) * ggx.D(m) *
-         ggx.G2(Up(wo), Up(wi)) / (4 * std::abs(wo.z * wi.z));
-}
-
-float PdfCoat(const Material& material, Vec3 wo, Vec3 wi) {
-  Vec3 m;
-  if (!CoatHalf(material, wo, wi, m)) return 0;
-  return Ggx(material).PdfVisible(Up(wo), m) / (4 * std::max(1e-12F, Dot(Up(wo), m)));
-}
-
 // --- the base, as seen through it
 
 Rgb EvaluateBase(const Material& material, Vec3 wo, Vec3 wi) {
@@ -93,7 +46,7 @@ bool CoatedDiffuseBsdf::Sample(const Material& material, Vec3 wo, float u_lobe, 
   if (wo.z == 0) return false;
   switch (material.parts) {
     case Parts::kFirst:
-      return SampleCoat(material, wo, u1, u2, sample);
+      return SampleDielectricReflection(material, wo, u1, u2, sample);
     case Parts::kSecond:
       if (!SampleDiffuse(material, wo, u1, u2, sample)) return false;
       sample.weight = EvaluateBase(material, wo, sample.wi) * kPi;
@@ -107,16 +60,16 @@ bool CoatedDiffuseBsdf::Sample(const Material& material, Vec3 wo, float u_lobe, 
 
 Rgb CoatedDiffuseBsdf::Evaluate(const Material& material, Vec3 wo, Vec3 wi, Carried /*carried*/) {
   Rgb f;
-  if (material.parts != Parts::kSecond) f += Gray(EvaluateCoat(material, wo, wi));
+  if (material.parts != Parts::kSecond) f += Gray(EvaluateDielectricReflection(material, wo, wi));
   if (material.parts != Parts::kFirst) f += EvaluateBase(material, wo, wi);
   return f;
 }
 
 float CoatedDiffuseBsdf::Pdf(const Material& material, Vec3 wo, Vec3 wi) {
-  if (material.parts == Parts::kFirst) return PdfCoat(material, wo, wi);
+  if (material.parts == Parts::kFirst) return PdfDielectricReflection(material, wo, wi);
   if (material.parts == Parts::kSecond) return PdfBase(wo, wi);
   const float share = ShareOfFirst(material, wo);
-  return share * PdfCoat(material, wo, wi) + (1 - share) * PdfBase(wo, wi);
+  return share * PdfDielectricReflection(material, wo, wi) + (1 - share) * PdfBase(wo, wi);
 }
 
 Rgb CoatedDiffuseBsdf::Albedo(const Material& material) {

@@ -344,7 +344,8 @@ std::shared_ptr<CoatTable> MakeCoat(const Material& original) {
 
 bool HasCoat(const Material& material) {
   return material.kind == Material::Kind::kCoatedDiffuse ||
-         material.kind == Material::Kind::kCoatedConductor;
+         material.kind == Material::Kind::kCoatedConductor ||
+         material.kind == Material::Kind::kSubsurface;
 }
 
 // The tables of a coat whose roughness is a texture, or of one over a metal whose roughness is.

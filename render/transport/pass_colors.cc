@@ -137,11 +137,13 @@ PassColors::PassColors(const Scene& working) {
     of.eta = m.eta;
     of.k = m.k;
     of.absorption = m.absorption;
+    of.extinction = m.extinction;
     of.reflectance_spectrum =
         ColorSpectrum::OfReflectance(FromWorking(m.reflectance), given.reflectance);
     of.transmittance_spectrum =
         ColorSpectrum::OfReflectance(FromWorking(m.transmittance), given.transmittance);
     of.absorption_spectrum = ColorSpectrum::OfConstant(FromWorking(m.absorption), given.absorption);
+    of.extinction_spectrum = ColorSpectrum::OfUnbounded(FromWorking(m.extinction));
     const bool is_metal =
         m.kind == Material::Kind::kConductor || m.kind == Material::Kind::kCoatedConductor;
     of.is_metal_of_reflectance =
@@ -202,6 +204,7 @@ void PassColors::SetAt(const PassWavelengths& wavelengths, Scene& scene) {
     }
     m.absorption = m.absorbs_for_reflectance ? HairAbsorption(m.reflectance, m.beta_n)
                                              : of.absorption_spectrum.At(wavelengths);
+    m.extinction = of.extinction_spectrum.At(wavelengths);
     if (m.measured != nullptr) m.measured_planes = m.measured->At(wavelengths.nm);
   }
   for (std::size_t i = 0; i < media_.size(); ++i) {
@@ -225,6 +228,7 @@ void PassColors::SetThree(Scene& scene) {
     m.eta = of.eta;
     m.k = of.k;
     m.absorption = of.absorption;
+    m.extinction = of.extinction;
     if (m.measured != nullptr) m.measured_planes = m.measured->WorkingSpace();
   }
   for (std::size_t i = 0; i < media_.size(); ++i) {

@@ -4,6 +4,7 @@
 
 #include "render/math/color_space.h"
 #include "render/transport/coat.h"
+#include "render/transport/subsurface.h"
 
 namespace lucerna {
 
@@ -18,12 +19,15 @@ Scene InWorkingSpace(Scene scene) {
     material.absorption = material.absorbs_for_reflectance
                               ? HairAbsorption(material.reflectance, material.beta_n)
                               : coefficients(material.absorption);
+    material.scattering = coefficients(material.scattering);
+    material.extinction = coefficients(material.extinction);
   }
   for (Medium& medium : scene.media) {
     medium.absorption = coefficients(medium.absorption);
     medium.scattering = coefficients(medium.scattering);
   }
   PrepareCoats(scene.materials);
+  PrepareSubsurface(scene.materials);
   for (AreaLight& light : scene.area_lights)
     light.radiance = ToWorking(light.radiance);
   ForEachDeltaList(scene, [](auto& lights) {

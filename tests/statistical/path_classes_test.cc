@@ -48,6 +48,7 @@ enum class Chain {
   kMirror,
   kNarrowWall,
   kCoatedWall,
+  kSubsurfaceWall,
   kDiffuseWall,
   kHairs,
   kPaneAndNarrowWall,
@@ -69,7 +70,9 @@ enum class Floor {
   kPatchyMetal,
   kPatchyCoat,
   kBumpy,
-  kHairs
+  kHairs,
+  kSubsurface,
+  kRoughSubsurface
 };
 enum class View { kPlain, kThroughGlass, kInMirror };
 
@@ -84,17 +87,24 @@ std::string NameOf(const PathClass& cell) {
   constexpr std::array<std::string_view, 10> kLights = {"Triangles", "Sphere",  "Disk",     "Point",
                                                         "Spot",      "Distant", "Constant", "Map",
                                                         "Picture",   "Portal"};
-  constexpr std::array<std::string_view, 13> kChains = {"Directly",        "ByPane",
-                                                        "ByThinPane",      "ByRoughPane",
-                                                        "ByMirror",        "ByNarrowMetal",
-                                                        "ByCoat",          "ByDiffuseWall",
-                                                        "ByHair",          "ByPaneAndNarrowMetal",
-                                                        "InGlassBall",     "InNarrowGlassBall",
+  constexpr std::array<std::string_view, 14> kChains = {"Directly",
+                                                        "ByPane",
+                                                        "ByThinPane",
+                                                        "ByRoughPane",
+                                                        "ByMirror",
+                                                        "ByNarrowMetal",
+                                                        "ByCoat",
+                                                        "BySubsurfaceWall",
+                                                        "ByDiffuseWall",
+                                                        "ByHair",
+                                                        "ByPaneAndNarrowMetal",
+                                                        "InGlassBall",
+                                                        "InNarrowGlassBall",
                                                         "InRoughGlassBall"};
-  constexpr std::array<std::string_view, 14> kFloors = {
-      "Diffuse",     "RoughMetal", "NarrowMetal", "TexturedMetal", "NarrowGlass",
-      "RoughGlass",  "Coated",     "RoughCoated", "Sheet",         "Mixed",
-      "PatchyMetal", "PatchyCoat", "Bumpy",       "Hair"};
+  constexpr std::array<std::string_view, 16> kFloors = {
+      "Diffuse", "RoughMetal",  "NarrowMetal", "TexturedMetal",  "NarrowGlass", "RoughGlass",
+      "Coated",  "RoughCoated", "Sheet",       "Mixed",          "PatchyMetal", "PatchyCoat",
+      "Bumpy",   "Hair",        "Subsurface",  "RoughSubsurface"};
   constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
   std::string name(kLights[static_cast<std::size_t>(cell.light)]);
   name += kChains[static_cast<std::size_t>(cell.chain)];
@@ -107,15 +117,20 @@ std::string NameOf(const PathClass& cell) {
 bool GathersCaustics(Floor floor) {
   return floor == Floor::kNarrowMetal || floor == Floor::kTexturedMetal ||
          floor == Floor::kNarrowGlass || floor == Floor::kRoughCoated || floor == Floor::kMixed ||
-         floor == Floor::kPatchyMetal || floor == Floor::kPatchyCoat;
+         floor == Floor::kPatchyMetal || floor == Floor::kPatchyCoat ||
+         floor == Floor::kRoughSubsurface;
 }
 bool IsWall(Chain chain) {
   return chain == Chain::kMirror || chain == Chain::kNarrowWall || chain == Chain::kDiffuseWall ||
-         chain == Chain::kPaneAndNarrowWall || chain == Chain::kCoatedWall;
+         chain == Chain::kPaneAndNarrowWall || chain == Chain::kCoatedWall ||
+         chain == Chain::kSubsurfaceWall;
 }
 
 // Of lights that come straight to the floor.
 constexpr Vec3 kPlace = {0.05F, 1.2F, 1.6F};
+
+// Below surfaces: much less than from what the camera sees to an edge.
+constexpr float kFreePath = 0.01F;
 
 Material Metal(float alpha) {
   return ConductorMaterial(Gray(0.2F), Gray(3), alpha, alpha);
@@ -233,6 +248,12 @@ Scene SceneOf(const PathClass& cell) {
     case Floor::kRoughCoated:
       floor(AddMaterial(scene, CoatedMaterial(0.8F, 0.2F, 0.5F)));
       break;
+    case Floor::kSubsurface:
+      floor(AddMaterial(scene, SubsurfaceMaterial(0.8F, kFreePath)));
+      break;
+    case Floor::kRoughSubsurface:
+      floor(AddMaterial(scene, SubsurfaceMaterial(0.7F, kFreePath, 0.2F)));
+      break;
     case Floor::kSheet:
       // What it transmits comes back from below.
       floor(AddMaterial(scene, SheetMaterial(0.2F, 0.6F)));
@@ -313,6 +334,9 @@ Scene SceneOf(const PathClass& cell) {
       break;
     case Chain::kCoatedWall:
       wall(CoatedMaterial(0.3F, 0));
+      break;
+    case Chain::kSubsurfaceWall:
+      wall(SubsurfaceMaterial(0.8F, kFreePath));
       break;
     case Chain::kDiffuseWall:
       wall(DiffuseMaterial(0.8F));
@@ -570,6 +594,14 @@ std::vector<PathClass> Cells() {
       {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
   add({kMap}, {kNone, kPane}, {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
   add({kTriangles, kPoint}, {kCoatedWall}, {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kCoated});
+  // Light that comes out elsewhere than where it entered.
+  add({kTriangles, kPoint}, {kNone, kPane}, {Floor::kSubsurface});
+  add({kTriangles}, {kNone}, {Floor::kRoughSubsurface});
+  add({kTriangles, kPoint}, {kPane}, {Floor::kRoughSubsurface});
+  add({kMap}, {kNone}, {Floor::kSubsurface});
+  add({kTriangles}, {kDiffuseWall}, {Floor::kSubsurface});
+  add({kTriangles}, {kSubsurfaceWall}, {Floor::kDiffuse, Floor::kSubsurface});
+  add({kPoint}, {kSubsurfaceWall}, {Floor::kNarrowMetal});
   // Surfaces that are another one at each place.
   add({kTriangles, kPoint}, {kNone, kPane},
       {Floor::kMixed, Floor::kPatchyMetal, Floor::kPatchyCoat, Floor::kBumpy});

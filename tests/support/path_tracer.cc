@@ -6,6 +6,7 @@
 #include <complex>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <memory>
 #include <string>
 #include <utility>
@@ -18,6 +19,7 @@
 #include "render/math/equal_area_square.h"
 #include "render/math/rng.h"
 #include "render/math/warp.h"
+#include "render/scene/subsurface_table.h"
 #include "render/scene/texture.h"
 #include "render/transport/bump.h"
 #include "tests/support/hair_reference.h"
@@ -90,6 +92,9 @@ struct Surface {
   double thickness = 0;   // of a coat
   int base_hits = 0;
   ReferenceFibre fibre;  // hair
+  // Below a surface.
+  const SubsurfaceTable* below = nullptr;
+  Color extinction{};
 };
 
 // With what a texture of roughness says in place of the widths.
@@ -123,6 +128,8 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   surface.fibre = {static_cast<double>(material.ior), static_cast<double>(material.beta_m),
                    static_cast<double>(material.beta_n), static_cast<double>(material.scale_tilt),
                    Working(FromFloat(material.absorption))};
+  surface.below = material.below;
+  surface.extinction = Working(FromFloat(material.extinction));
   if (material.texture != kNoTexture) {
     const Color color = FromFloat(TextureColor(scene.textures, material.texture, place));
     surface.reflectance = Working(color);
@@ -248,6 +255,33 @@ bool ScatterInCoat(const Surface& surface, Double3 up, double side, const std::a
     return true;
   }
   return false;
+}
+
+// The share of what falls in from `up` that a facet drawn for it lets through.
+double DrawnEntering(const Surface& surface, Double3 up, double u1, double u2) {
+  Facet facet;
+  if (!MeetFacet(surface, up, surface.ior, u1, u2, facet)) return 0;
+  const Double3 down = facet.m * (facet.cos_m / surface.ior - facet.cos_t) - up * (1 / surface.ior);
+  if (!(facet.share < 1) || !(down.z < 0)) return 0;
+  return (1 - facet.share) * FacetWeight(surface, facet, up, down);
+}
+
+// The mean of that over directions with density cosine / pi.
+double MeanEntering(const Surface& surface) {
+  constexpr int kSteps = 40;
+  const auto middle = [](int i) { return (i + 0.5) / kSteps; };
+  double sum = 0;
+  for (int i = 0; i < kSteps * kSteps; ++i) {
+    const double cosine = std::sqrt((i + 0.5) / (kSteps * kSteps));
+    const Double3 up = {std::sqrt(1 - cosine * cosine), 0, cosine};
+    if (surface.is_coat_smooth) {
+      sum += DrawnEntering(surface, up, 0, 0) * kSteps * kSteps;
+      continue;
+    }
+    for (int j = 0; j < kSteps * kSteps; ++j)
+      sum += DrawnEntering(surface, up, middle(j / kSteps), middle(j % kSteps));
+  }
+  return sum / (static_cast<double>(kSteps) * kSteps * kSteps * kSteps);
 }
 
 // In the shading frame. False: absorbed.
@@ -387,6 +421,12 @@ class PathTracer {
       std::abort();
     }
     intersector_ = std::move(intersector).value();
+    for (std::size_t i = 0; i < scene_.materials.size(); ++i) {
+      if (scene_.materials[i].kind != Material::Kind::kSubsurface) continue;
+      SurfacePoint point;
+      point.material = static_cast<std::uint32_t>(i);
+      mean_entering_[point.material] = MeanEntering(SurfaceOf(scene_, point));
+    }
   }
 
   [[nodiscard]] TracedImage Trace() const {
@@ -551,6 +591,63 @@ class PathTracer {
     }
   }
 
+  // Below a plane surface of one material: light leaves at a point that is drawn on the plane by an
+  // exponential of the distance, if there is a surface, to which `point` moves. In the shading
+  // frame. False: absorbed.
+  bool ScatterBelow(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
+                    PathNumbers& numbers, const Frame& frame, SurfacePoint& point,
+                    Scattered& out) const {
+    if (wo.z == 0) return false;
+    const double side = wo.z < 0 ? -1 : 1;
+    const Double3 up = wo * side;
+    Facet facet;
+    if (!MeetFacet(surface, up, surface.ior, u[1], u[2], facet)) return false;
+    if (u[0] < facet.share) {
+      const Double3 reflected = facet.m * (2 * facet.cos_m) - up;
+      if (!(reflected.z > 0)) return false;
+      const double weight = FacetWeight(surface, facet, up, reflected);
+      out.wi = reflected * side;
+      out.weight = {weight, weight, weight};
+      out.is_delta = surface.is_coat_smooth;
+      return true;
+    }
+    const double entering =
+        DrawnEntering(surface, up, u[1], u[2]) / std::max(1 - facet.share, 1e-12);
+    constexpr double kFreePaths = 3;
+    const double mean_distance = kFreePaths / surface.extinction[1];
+    const double distance = -mean_distance * std::log(1 - numbers.Next());
+    const double turn = 2 * kPi64 * numbers.Next();
+    const Vec3 moved = point.position + frame.s * static_cast<float>(distance * std::cos(turn)) +
+                       frame.t * static_cast<float>(distance * std::sin(turn));
+    constexpr float kAbove = 1e-3F;
+    Hit hit;
+    const Ray probe = {moved + frame.n * kAbove, -frame.n, 2 * kAbove};
+    if (!intersector_->Intersect(probe, hit)) return false;
+    const SurfacePoint there = intersector_->SurfaceAt(probe, hit);
+    if (there.material != point.material) return false;
+    point = there;
+    const double density = std::exp(-distance / mean_distance) / mean_distance;
+    const double u1 = numbers.Next();
+    const double u2 = numbers.Next();
+    out.wi = CosineDirection(u1, u2);
+    const double u3 = numbers.Next();
+    const double u4 = numbers.Next();
+    const double leaving =
+        DrawnEntering(surface, out.wi, u3, u4) / mean_entering_.at(point.material);
+    out.wi = out.wi * side;
+    out.is_delta = false;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double optical = distance * surface.extinction[c];
+      const SubsurfaceTable::Mix mix =
+          surface.below->MixOf(static_cast<float>(surface.reflectance[c]));
+      const double per_distance =
+          static_cast<double>(surface.below->Density(mix, static_cast<float>(optical))) *
+          surface.extinction[c];
+      out.weight[c] = entering * leaving * per_distance / density;
+    }
+    return true;
+  }
+
   Color Radiance(Ray ray, PathNumbers& numbers) const {
     Color seen{};
     Color weight = {1, 1, 1};
@@ -590,7 +687,12 @@ class PathTracer {
       Scattered scattered;
       const std::array<double, 3> u = {numbers.Next(), numbers.Next(), numbers.Next()};
       const Vec3 wo_local = frame.ToLocal(wo);
-      if (!Scatter(surface, Unit(Double3(wo_local)), u, scattered)) return seen;
+      if (surface.kind == Material::Kind::kSubsurface) {
+        if (!ScatterBelow(surface, Unit(Double3(wo_local)), u, numbers, frame, point, scattered))
+          return seen;
+      } else if (!Scatter(surface, Unit(Double3(wo_local)), u, scattered)) {
+        return seen;
+      }
       const Vec3 wi = frame.ToWorld(ToFloat(scattered.wi));
       // What the shading normal calls reflection must be one for the geometry too.
       const bool transmits = scattered.wi.z * static_cast<double>(wo_local.z) < 0;
@@ -616,6 +718,7 @@ class PathTracer {
   std::vector<StandIn> stand_ins_;
   std::vector<Sun> suns_;
   double cos_cone_ = 1;
+  std::map<std::uint32_t, double> mean_entering_;  // by material
 };
 
 TracedImage::TracedImage(int width, int height, int replicas)

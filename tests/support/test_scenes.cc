@@ -4,6 +4,7 @@
 
 #include "render/math/warp.h"
 #include "render/transport/coat.h"
+#include "render/transport/subsurface.h"
 #include "tests/support/local_render.h"
 
 namespace lucerna {
@@ -51,6 +52,19 @@ Material SheetMaterial(float reflectance, float transmittance) {
   material.kind = Material::Kind::kDiffuseTransmission;
   material.transmittance = Gray(transmittance);
   return material;
+}
+
+Material SubsurfaceMaterial(float reflectance, float free_path, float alpha) {
+  Material material = DiffuseMaterial(reflectance);
+  material.kind = Material::Kind::kSubsurface;
+  material.scatters_for_reflectance = true;
+  material.extinction = Gray(1 / free_path);
+  material.alpha_u = alpha;
+  material.alpha_v = alpha;
+  std::vector<Material> one = {material};
+  PrepareCoats(one);
+  PrepareSubsurface(one);
+  return one[0];
 }
 
 Material HairMaterial(float absorption, float beta_m, float beta_n) {

@@ -24,6 +24,9 @@ namespace lucerna {
                                    float thickness = 0);
 // A thin sheet that scatters diffusely to both sides.
 [[nodiscard]] Material SheetMaterial(float reflectance, float transmittance);
+// Grey, over a medium of that mean free path [scene units] and index 1.5, ready to be evaluated.
+// alpha = 0: smooth.
+[[nodiscard]] Material SubsurfaceMaterial(float reflectance, float free_path, float alpha = 0);
 // Of grey absorption per radius, with pbrt's index and tilt of the scales.
 [[nodiscard]] Material HairMaterial(float absorption, float beta_m, float beta_n);
 [[nodiscard]] Material ConductorMaterial(Rgb eta, Rgb k, float alpha_u, float alpha_v);

@@ -15,6 +15,7 @@
 #include "render/math/color_space.h"
 #include "render/scene/noise.h"
 #include "render/scene/render_settings.h"
+#include "render/scene/subsurface_table.h"
 #include "render/transport/material_at.h"
 #include "render/transport/working_space.h"
 #include "tests/support/pbrt_text.h"
@@ -499,6 +500,61 @@ TEST(PbrtMaterialsTest, SaysWhatHairCannotBe) {
 
 // Named glasses and curves disperse where they are smooth dielectrics; else it is said that they do
 // not.
+TEST(PbrtMaterialsTest, ReadsSubsurface) {
+  const auto read = [](const std::string& parameters) {
+    const Scene scene =
+        InWorkingSpace(ReadWorld("Material \"subsurface\" " + parameters + " Shape \"sphere\""));
+    return scene.materials[static_cast<std::size_t>(scene.spheres[0].traits.material)];
+  };
+  const Material of_colour = read(
+      "\"rgb reflectance\" [0.5 0.5 0.5] \"float mfp\" 0.25 \"float scale\" 2 \"float g\" 0.3");
+  EXPECT_EQ(of_colour.kind, Material::Kind::kSubsurface);
+  EXPECT_NEAR(of_colour.reflectance.g, 0.5F, 1e-6F);
+  EXPECT_NEAR(of_colour.extinction.r, 2.0F, 1e-5F);
+  EXPECT_EQ(of_colour.ior, 1.33F);
+  EXPECT_EQ(of_colour.phase_g, 0.3F);
+  EXPECT_TRUE(PropertiesOf(of_colour).gathers);
+  // The reflectance follows from the coefficients, and gives them back.
+  const Material of_coefficients = read(
+      "\"float sigma_a\" 0.1 \"float sigma_s\" 1.9 \"float eta\" 1.5 \"float roughness\" 0.04");
+  EXPECT_NEAR(of_coefficients.extinction.g, 2, 1e-5F);
+  EXPECT_NEAR(of_coefficients.reflectance.g, of_coefficients.below->ReflectanceOf(0.95F), 1e-6F);
+  EXPECT_NEAR(of_coefficients.alpha_u, 0.2F, 1e-6F);
+  // By default, and by name: whole milk.
+  const Material milk = read("");
+  EXPECT_GT(milk.reflectance.r, milk.reflectance.b);
+  EXPECT_EQ(read("\"string name\" \"Wholemilk\"").reflectance, milk.reflectance);
+  EXPECT_NE(read("\"string name\" \"Ketchup\"").reflectance, milk.reflectance);
+  EXPECT_NEAR(read("\"float scale\" 3").extinction.g, 3 * milk.extinction.g, 1e-4F);
+}
+
+// Lengths below surfaces are lengths as others are.
+TEST(PbrtMaterialsTest, SubsurfaceIsTheSameInAnyUnit) {
+  const Scene scene = ReadWorld(
+      "Scale 1e9 1e9 1e9 Material \"subsurface\" \"rgb reflectance\" [0.5 0.5 0.5] "
+      "\"float mfp\" 1e8 Shape \"sphere\"");
+  ASSERT_NE(scene.unit, 1);
+  const auto& sphere = scene.spheres[0];
+  const Material& material = scene.materials[static_cast<std::size_t>(sphere.traits.material)];
+  EXPECT_NEAR(material.extinction.g * sphere.radius, 10, 1e-4F);
+}
+
+TEST(PbrtMaterialsTest, SaysWhatIsWrongWithSubsurface) {
+  const auto said = [](const std::string& parameters) {
+    return SaidOfWorld("Material \"subsurface\" " + parameters + " Shape \"sphere\"");
+  };
+  EXPECT_THAT(said("\"string name\" \"Honey\""), HasSubstr("not known; there are Apple, "));
+  EXPECT_THAT(said("\"float sigma_a\" 1"), HasSubstr("must be given together"));
+  EXPECT_THAT(said("\"string name\" \"Marble\" \"float sigma_a\" 1"),
+              HasSubstr("must not be given beside name"));
+  EXPECT_THAT(said("\"float eta\" 0.8"), HasSubstr("eta"));
+  EXPECT_THAT(said("\"float g\" 1"), HasSubstr("g"));
+  EXPECT_THAT(said("\"rgb reflectance\" [1 1 1] \"float mfp\" 0"), HasSubstr("mfp"));
+  EXPECT_THAT(said("\"rgb reflectance\" [1 1 1] \"float mfp\" 1e-39"), HasSubstr("mfp"));
+  EXPECT_THAT(said("\"rgb sigma_a\" [1 1 1] \"rgb sigma_s\" [1 1 1] \"rgb reflectance\" [1 1 1]"),
+              HasSubstr("is ignored, as by pbrt-v4, because coefficients are given"));
+}
+
 TEST(PbrtMaterialsTest, GlassDispersesWhereItIsSmooth) {
   const auto glass = [](const std::string& parameters) {
     return ReadWorld("Material \"dielectric\" " + parameters + " Shape \"sphere\"")

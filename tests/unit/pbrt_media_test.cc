@@ -91,7 +91,13 @@ TEST(PbrtMediaTest, WhatIsWrongIsSaid) {
   EXPECT_THAT(
       SaidOfWorld(
           "MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"string preset\" \"Milk\""),
-      HasSubstr("preset"));
+      HasSubstr("\"Milk\", which is not known; there are Apple"));
+  const Scene milk = ReadWorld(
+      "MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"string preset\" \"Wholemilk\" "
+      "\"float scale\" 2 MediumInterface \"m\" \"\" Material \"interface\" Shape \"sphere\"");
+  ASSERT_EQ(milk.media.size(), 1U);
+  EXPECT_NEAR(milk.media[0].scattering.r, 2 * 2.55F, 1e-5F);
+  EXPECT_NEAR(milk.media[0].absorption.b, 2 * 0.014F, 1e-6F);
   EXPECT_THAT(
       SaidOfWorld("MakeNamedMedium \"m\" \"string type\" \"homogeneous\" \"rgb Le\" [1 1 1]"),
       HasSubstr("media do not emit light"));

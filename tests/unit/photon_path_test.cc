@@ -258,6 +258,24 @@ TEST(PhotonPathTest, DropsAPhotonThatIsBornInfinite) {
   EXPECT_EQ(traced.Trace(10).dropped, 0U);
 }
 
+// Straight down on a plane: what the surface reflects and, of the rest, the reflectance leave it,
+// however far from where they entered.
+TEST(PhotonPathTest, LeavesASubsurfacePlaneByItsReflectance) {
+  constexpr float kReflectance = 0.8F;
+  Scene scene;
+  AddQuad(scene, {-9, -9, 0}, {18, 0, 0}, {0, 18, 0},
+          AddMaterial(scene, SubsurfaceMaterial(kReflectance, 0.01F)));
+  scene.spot_lights.push_back({{0, 0, 2}, {0, 0, -1}, Gray(1), 0.9999F, 0.999F});
+  const Traced traced(scene);
+  const EnergyCounters energy = traced.Trace(40000).energy;
+  EXPECT_TRUE(energy.Balance());
+  float cos_t = 0;
+  const float reflected = FresnelDielectric(1, 1.5F, cos_t);
+  // A standard deviation of a photon of about 0.9; six of them of the mean.
+  EXPECT_NEAR(static_cast<double>(energy.escaped) / static_cast<double>(energy.emitted),
+              static_cast<double>(reflected + (1 - reflected) * kReflectance), 6 * 0.9 / 200);
+}
+
 TEST(PhotonReplayTest, LeavesTheDepositsThatTheTraceLeft) {
   const Traced traced(OpenBox());
   for (std::uint64_t index = 0; index < 2000; ++index) {

@@ -34,10 +34,6 @@ std::string_view InOneWord(std::string_view type) {
 
 // Materials of pbrt that are refused by name, and why.
 std::string_view WhyRefused(std::string_view type) {
-  if (type == "subsurface") {
-    return "is not supported: light does not travel below surfaces here; use a dielectric with an "
-           "absorbing and scattering medium inside, or diffusetransmission for thin shapes";
-  }
   if (type == "fourier") {
     return "is not supported, nor by pbrt-v4: Fourier BSDFs (.bsdf files) are not read";
   }

@@ -1,8 +1,10 @@
 #include "render/formats/pbrt/media.h"
 
 #include <optional>
+#include <string>
 
 #include "render/base/text.h"
+#include "render/formats/pbrt/measured_media.h"
 
 namespace lucerna {
 namespace {
@@ -32,11 +34,6 @@ Medium ReadMedium(ParameterList& parameters) {
         "type", Concat("is ", Quoted(*type), ", which is not supported; there is homogeneous"));
     return medium;
   }
-  if (parameters.Has("preset")) {
-    parameters.Error("preset",
-                     "is not supported; give sigma_a and sigma_s, measured per scene unit");
-    parameters.Ignore("preset");
-  }
   // As pbrt-v4: each 1 where it is not given.
   medium.absorption =
       parameters.FindOpticalConstant("sigma_a", kZeroOrMore, &medium.absorption_spectrum)
@@ -44,6 +41,21 @@ Medium ReadMedium(ParameterList& parameters) {
   medium.scattering =
       parameters.FindOpticalConstant("sigma_s", kZeroOrMore, &medium.scattering_spectrum)
           .value_or(Gray(1));
+  if (const std::string preset = parameters.String("preset", ""); !preset.empty()) {
+    const MeasuredMedium* measured = FindMeasuredMedium(preset);
+    if (measured == nullptr) {
+      parameters.Error("preset", Concat("is ", Quoted(preset), ", which is not known; ",
+                                        MeasuredMediaThereAre()));
+      return medium;
+    }
+    for (const std::string_view other : {"sigma_a", "sigma_s"}) {
+      if (parameters.Has(other)) parameters.Warning(other, "is ignored because preset is given");
+    }
+    medium.absorption = measured->absorption;
+    medium.scattering = measured->scattering;
+    medium.absorption_spectrum = {};
+    medium.scattering_spectrum = {};
+  }
   const auto scale = static_cast<float>(parameters.Float("scale", 1, kZeroOrMore));
   medium.absorption *= scale;
   medium.scattering *= scale;
