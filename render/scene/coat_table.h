@@ -21,13 +21,32 @@ struct CoatTable {
   float inner = 0;    // share of what the base scatters that comes back to it
   float leaving = 0;  // share of what the base scatters that leaves the coat
 
+  // Of a layer that scatters: what light that it scattered adds to these, for some albedos of one
+  // scattering, and what leaves the coat again without having met the base.
+  static constexpr int kAlbedos = 9;
+  // The albedo of a row, denser next to 1, where light is scattered most often.
+  [[nodiscard]] static float AlbedoOf(int row) {
+    const float rest = 1 - static_cast<float>(row) / (kAlbedos - 1);
+    return 1 - rest * rest;
+  }
+  struct Scattering {
+    std::vector<float> entering, back;  // [kAlbedos × kCosines] averaged over azimuths
+    std::array<float, kAlbedos> inner = {};
+    std::array<float, kAlbedos> mean_back = {};  // over directions, with density cosine / pi
+  };
+  Scattering scattering;  // without rows where the layer does not scatter
+
   // Over a metal: what the closed form of light that meets the metal once leaves out, that is
   // almost all of it light that meets the metal more often. Shares of the flux that falls in, as
   // if the metal reflected everything.
+  // Of a layer that scatters also light that never met the metal.
   static constexpr int kHits = 24;
-  std::vector<float> residual;            // [kCosines], averaged over azimuths
-  float mean_residual = 0;                // over directions, with density cosine / pi
-  std::array<float, kHits> by_hits = {};  // its shares after 1, 2, ... meetings; the last: or more
+  // Its shares after 0, 1, 2, ... meetings; the last: or more.
+  using ByHits = std::array<float, kHits + 1>;
+  // For one albedo, 0, or for kAlbedos of them.
+  std::vector<float> residual;       // [albedos × kCosines], averaged over azimuths
+  std::vector<float> mean_residual;  // [albedos] over directions, with density cosine / pi
+  std::vector<ByHits> by_hits;       // [albedos]
 };
 
 // The tables of a coated material with a texture of its roughness, of widths of facets between two:

@@ -76,6 +76,7 @@ struct MaterialNumbers {
   float base_alpha_u = 0;          // of the metal under a coat: GGX widths; 0 and 0: smooth
   float base_alpha_v = 0;
   float thickness = 0;         // of a coat [mean free paths], at right angles
+  Rgb coat_albedo;             // of one scattering in it; black: it only absorbs
   std::int32_t base_hits = 5;  // how often light in a coat meets the base, at most
   // Of a coated material, once it is prepared (transport/coat.h); owned by Material. `coat_above`
   // and its share are those of a coat between two tables.
@@ -88,12 +89,11 @@ struct MaterialNumbers {
   float beta_m = 0.3F, beta_n = 0.3F, scale_tilt = 0;
   Rgb absorption;  // of hair, per radius of the fibre; subsurface: [1/scene unit]
   bool absorbs_for_reflectance = false;  // the absorption follows from `reflectance`
+  float phase_g = 0;  // the mean cosine of scattering in a coat, and below a surface
   // Subsurface [1/scene unit]: `extinction` and `reflectance` are given, or follow from absorption
-  // and scattering (transport/subsurface.h). The phase function's mean cosine. The table is owned
-  // by Material.
+  // and scattering (transport/subsurface.h). The table is owned by Material.
   Rgb scattering, extinction;
   bool scatters_for_reflectance = false;
-  float phase_g = 0;
   const SubsurfaceTable* below = nullptr;
   // Of a measured surface; owned by Material. Which of its planes are the three colours.
   const MeasuredTable* measured = nullptr;
@@ -132,6 +132,8 @@ struct MaterialNumbers {
   void ForEachColor(const Visit& visit) {
     visit(reflectance);
     visit(transmittance);
+    // Over a metal it is multiplied by what follows from indices, in their space.
+    if (kind != Kind::kCoatedConductor) visit(coat_albedo);
   }
   [[nodiscard]] bool HasTexture() const {
     const auto& rough = roughness_textures;
@@ -153,6 +155,10 @@ struct MaterialNumbers {
            roughness_textures[0] != roughness_textures[1] ||
            roughness_textures[2] != roughness_textures[3] || kind == Kind::kHair ||
            is_measured_with_direction;
+  }
+  // Of a coated material: whether the layer under the coat's surface scatters light.
+  [[nodiscard]] bool HasHaze() const {
+    return coat_albedo.r > 0 || coat_albedo.g > 0 || coat_albedo.b > 0;
   }
   // Whether what its second part scatters leaves at another point.
   [[nodiscard]] bool ScattersBelow() const {

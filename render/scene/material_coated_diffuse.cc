@@ -9,13 +9,16 @@ namespace lucerna {
 
 MaterialProperties CoatedDiffuseKind::Properties(const MaterialNumbers& material) {
   const bool is_smooth = material.alpha_u == 0 && material.alpha_v == 0;
-  const bool is_base_black = material.texture == kNoTexture && IsBlack(material.reflectance);
+  const bool has_haze = material.HasHaze();
+  const bool is_base_black =
+      material.texture == kNoTexture && IsBlack(material.reflectance) && !has_haze;
   MaterialProperties properties;
   if (material.parts == Parts::kSecond) {
     properties.is_black = is_base_black;
     properties.gathers = !is_base_black;
-    properties.is_separable = true;
-    properties.weighs_photons = true;
+    // What a layer scatters before it meets the base has another form than what the base does.
+    properties.is_separable = !has_haze;
+    properties.weighs_photons = !has_haze;
     return properties;
   }
   properties.lobe_width = std::max(material.alpha_u, material.alpha_v);
@@ -28,7 +31,7 @@ MaterialProperties CoatedDiffuseKind::Properties(const MaterialNumbers& material
   properties.has_parts = true;
   properties.is_smooth = is_smooth && is_base_black;
   properties.gathers = !is_base_black;
-  properties.weighs_photons = true;
+  properties.weighs_photons = !has_haze;
   return properties;
 }
 

@@ -38,13 +38,10 @@ Rgb ResidualColor(const Material& material) {
   // Light that meets the metal again comes more slanted than what comes first.
   constexpr float kMeanCosine = 0.6F;
   const Rgb metal = MetalInCoat(material, kMeanCosine);
-  const auto channel = [&](float reflectance) {
-    float sum = 0;
-    for (int i = CoatTable::kHits - 1; i >= 0; --i)
-      sum = reflectance * (sum + CoatShareOfHits(material, static_cast<std::size_t>(i)));
-    return sum;
-  };
-  return {channel(metal.r), channel(metal.g), channel(metal.b)};
+  Rgb sum;
+  for (int i = CoatTable::kHits; i > 0; --i)
+    sum = metal * (sum + CoatShareOfHits(material, static_cast<std::size_t>(i)));
+  return sum + CoatShareOfHits(material, 0);
 }
 
 // A smooth coat over a smooth metal: the sum over all orders, all in one direction.
@@ -82,7 +79,7 @@ Lobes LobesOf(const Material& material, Vec3 up) {
     lobes.coat = std::max(kLeastShare, FresnelDielectric(up.z, material.ior, cos_t));
   }
   lobes.base = std::max(kLeastShare, metal * CoatEntering(material, up));
-  lobes.residual = CoatResidual(material, up.z) * MaxChannel(ResidualColor(material));
+  lobes.residual = MaxChannel(CoatResidual(material, up.z) * ResidualColor(material));
   const float sum = lobes.coat + lobes.base + lobes.residual;
   return {lobes.coat / sum, lobes.base / sum, lobes.residual / sum};
 }
@@ -135,10 +132,11 @@ Rgb EvaluateUp(const Material& material, Vec3 up, Vec3 wi) {
             (ggx.D(m) * ggx.G2(up_in, wi_in) / (4 * up_in.z * wi_in.z) *
              CoatEntering(material, up) * CoatEntering(material, wi) / Square(material.ior));
   }
-  if (const float mean = CoatMeanResidual(material); mean > 0) {
-    below += ResidualColor(material) *
-             (CoatResidual(material, up.z) * CoatResidual(material, wi.z) * kInversePi / mean);
-  }
+  const Rgb mean = CoatMeanResidual(material);
+  const Rgb residual = CoatResidual(material, up.z) * CoatResidual(material, wi.z) * kInversePi;
+  const auto of_mean = [](float product, float of) { return of > 0 ? product / of : 0.0F; };
+  below += ResidualColor(material) * Rgb{of_mean(residual.r, mean.r), of_mean(residual.g, mean.g),
+                                         of_mean(residual.b, mean.b)};
   return Gray(coat) + InScene(material, below);
 }
 

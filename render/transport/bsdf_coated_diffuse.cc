@@ -14,25 +14,35 @@ namespace {
 
 // ρ · (1 + ρK + ... ), as many terms as light may meet the base.
 Rgb BaseReflectance(const Material& material) {
-  const float inner = CoatInner(material);
-  const auto channel = [&](float reflectance) {
+  const Rgb inner = material.HasHaze() ? HazeInner(material) : Gray(CoatInner(material));
+  const auto channel = [&](float reflectance, float returned) {
     float sum = 0;
     for (int i = 0; i < material.base_hits; ++i) {
       const float before = sum;
-      sum = reflectance * (1 + inner * sum);
+      sum = reflectance * (1 + returned * sum);
       if (sum == before) break;
     }
     return sum;
   };
-  return {channel(material.reflectance.r), channel(material.reflectance.g),
-          channel(material.reflectance.b)};
+  return {channel(material.reflectance.r, inner.r), channel(material.reflectance.g, inner.g),
+          channel(material.reflectance.b, inner.b)};
 }
 
 // --- the base, as seen through it
 
 Rgb EvaluateBase(const Material& material, Vec3 wo, Vec3 wi) {
   if (!(wo.z * wi.z > 0)) return {};
-  return CoatedDiffuseBsdf::EyeFactor(material, wo) * CoatedDiffuseBsdf::PhotonFactor(material, wi);
+  if (!material.HasHaze()) {
+    return CoatedDiffuseBsdf::EyeFactor(material, wo) *
+           CoatedDiffuseBsdf::PhotonFactor(material, wi);
+  }
+  const Rgb base = BaseReflectance(material) * HazeEntering(material, Up(wo)) *
+                   HazeEntering(material, Up(wi)) * (kInversePi / Square(material.ior));
+  const Rgb mean = HazeMeanBack(material);
+  const Rgb back = HazeBack(material, std::abs(wo.z)) * HazeBack(material, std::abs(wi.z));
+  const auto of_mean = [](float product, float of) { return of > 0 ? product / of : 0.0F; };
+  return base + Rgb{of_mean(back.r, mean.r), of_mean(back.g, mean.g), of_mean(back.b, mean.b)} *
+                    kInversePi;
 }
 
 float PdfBase(Vec3 wo, Vec3 wi) {
@@ -85,8 +95,9 @@ float CoatedDiffuseBsdf::ReflectedShare(const Material& /*material*/, float /*co
 float CoatedDiffuseBsdf::ShareOfFirst(const Material& material, Vec3 wo) {
   // Facets that are turned away may reflect far more than the surface as a whole.
   constexpr float kLeastShare = 0.02F;
-  const float base = CoatEntering(material, Up(wo)) * CoatLeaving(material) *
-                     MaxChannel(BaseReflectance(material));
+  float base = CoatEntering(material, Up(wo)) * CoatLeaving(material) *
+               MaxChannel(BaseReflectance(material));
+  if (material.HasHaze()) base += MaxChannel(HazeBack(material, std::abs(wo.z)));
   float cos_t = 0;
   const float coat = FresnelDielectric(std::abs(wo.z), material.ior, cos_t);
   if (!(base > 0)) return 1;

@@ -9,7 +9,9 @@
 
 #include "render/base/status.h"
 #include "render/math/rng.h"
+#include "render/math/warp.h"
 #include "render/transport/bsdf.h"
+#include "render/transport/media.h"
 #include "render/transport/microfacet.h"
 
 namespace lucerna {
@@ -174,31 +176,203 @@ Crossed CrossSurface(const MaterialNumbers& material, Vec3 w, float index, Keyed
   return crossed;
 }
 
-// Adds to `by_hits` the shares of flux from `w` that leave coat and metal after 1, 2, ... meetings
-// with a metal that reflects all.
-void WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng,
-                   std::array<double, CoatTable::kHits>& by_hits) {
+float CosineOf(int node) {
+  return Square(static_cast<float>(node) / (CoatTable::kCosines - 1));
+}
+
+// Powers of the albedos of a table's rows: of one more scattering at each step.
+class AlbedoWeights {
+ public:
+  AlbedoWeights() { weights_.fill(1); }
+  void Scatter() {
+    for (int row = 0; row < CoatTable::kAlbedos; ++row)
+      weights_[static_cast<std::size_t>(row)] *= static_cast<double>(CoatTable::AlbedoOf(row));
+  }
+  [[nodiscard]] double operator[](std::size_t row) const { return weights_[row]; }
+
+ private:
+  std::array<double, CoatTable::kAlbedos> weights_{};
+};
+
+// A walk in the layer under a coat's surface, which scatters or absorbs, until it comes to the
+// base. z is up.
+class LayerWalk {
+ public:
+  // Below the surface, or above the base.
+  LayerWalk(const MaterialNumbers& material, Vec3 direction, double weight, KeyedRng& rng)
+      : material_(material), rng_(rng), direction_(direction), weight_(weight) {
+    depth_ = direction.z < 0 ? 0.0F : material.thickness;
+  }
+
+  // Light that leaves the coat: visit(share of flux, weights).
+  template <typename Visit>
+  bool ToBase(const Visit& visit) {
+    constexpr double kLeastWeight = 1e-4;
+    while (weight_ > kLeastWeight && events_ < MostEvents()) {
+      const float cosine = std::max(std::abs(direction_.z), 1e-6F);
+      const float way = direction_.z < 0 ? material_.thickness - depth_ : depth_;
+      const float free = -std::log1p(-rng_.Uniform()) * cosine;
+      if (free < way) {
+        Scatter(free);
+        continue;
+      }
+      if (direction_.z < 0) return true;
+      // Seen from below, where light comes from is (-x, -y, z) of where it goes.
+      const Crossed crossed = CrossSurface(material_, {-direction_.x, -direction_.y, direction_.z},
+                                           1 / material_.ior, rng_);
+      visit(weight_ * static_cast<double>(crossed.transmitted), albedos_);
+      weight_ *= static_cast<double>(crossed.reflected);
+      direction_ = {crossed.back.x, crossed.back.y, -crossed.back.z};
+      depth_ = 0;
+      ++events_;
+    }
+    return false;
+  }
+  // Requires a walk that has just begun: it is scattered before it has crossed the layer, its
+  // weight is the share that is.
+  void ScatterFirst() {
+    const float cosine = std::max(std::abs(direction_.z), 1e-6F);
+    const float share = -std::expm1(-material_.thickness / cosine);
+    weight_ *= static_cast<double>(share);
+    Scatter(std::min(-std::log1p(-rng_.Uniform() * share) * cosine, material_.thickness));
+  }
+  // From the base.
+  void GoUp(Vec3 direction, float factor) {
+    direction_ = direction;
+    weight_ *= static_cast<double>(factor);
+    depth_ = material_.thickness;
+    ++events_;
+  }
+  [[nodiscard]] Vec3 direction() const { return direction_; }
+  [[nodiscard]] double weight() const { return weight_; }
+  [[nodiscard]] const AlbedoWeights& albedos() const { return albedos_; }
+  [[nodiscard]] bool is_scattered() const { return is_scattered_; }
+
+ private:
+  // As pbrt's maxdepth.
+  [[nodiscard]] int MostEvents() const { return 2 * material_.base_hits; }
+  void Scatter(float along) {
+    depth_ += direction_.z < 0 ? along : -along;
+    const float u1 = rng_.Uniform();
+    direction_ = SamplePhase(direction_, material_.phase_g, u1, rng_.Uniform());
+    albedos_.Scatter();
+    is_scattered_ = true;
+    ++events_;
+  }
+
+  const MaterialNumbers& material_;
+  KeyedRng& rng_;
+  Vec3 direction_;
+  double weight_;
+  float depth_ = 0;
+  int events_ = 0;
+  bool is_scattered_ = false;
+  AlbedoWeights albedos_;
+};
+
+// Nodes of cosines for sums of 2 cosine d cosine, where cosine is (i / last)².
+double WeightOfNode(int node) {
+  const auto cosine = static_cast<double>(CosineOf(node));
+  return (node == CoatTable::kCosines - 1 ? 0.5 : 1.0) * 4 * cosine * std::sqrt(cosine) /
+         (CoatTable::kCosines - 1);
+}
+
+// To a table of what is not scattered.
+void AddScattering(const MaterialNumbers& material, CoatTable& table) {
+  constexpr std::size_t kAlbedos = CoatTable::kAlbedos;
+  constexpr std::size_t kCosines = CoatTable::kCosines;
+  CoatTable::Scattering& scattering = table.scattering;
+  scattering.entering.assign(kAlbedos * kCosines, 0.0F);
+  scattering.back.assign(kAlbedos * kCosines, 0.0F);
+  KeyedRng rng(0x48415a45ULL);
+  for (int node = 1; node < CoatTable::kCosines; ++node) {
+    std::array<double, kAlbedos> entering{};
+    std::array<double, kAlbedos> back{};
+    for (int walk = 0; walk < kWalks; ++walk) {
+      const float azimuth = 2 * kPi * (static_cast<float>(walk) + 0.5F) / kWalks;
+      const Crossed crossed =
+          CrossSurface(material, DirectionAt(CosineOf(node), azimuth), material.ior, rng);
+      if (!(crossed.transmitted > 0)) continue;
+      LayerWalk in_layer(material, {crossed.beyond.x, crossed.beyond.y, -crossed.beyond.z},
+                         static_cast<double>(crossed.transmitted), rng);
+      in_layer.ScatterFirst();
+      const bool is_at_base = in_layer.ToBase([&](double left, const AlbedoWeights& albedos) {
+        for (std::size_t row = 0; row < kAlbedos; ++row)
+          back[row] += left * albedos[row] / kWalks;
+      });
+      if (!is_at_base) continue;
+      for (std::size_t row = 0; row < kAlbedos; ++row)
+        entering[row] += in_layer.weight() * in_layer.albedos()[row] / kWalks;
+    }
+    for (std::size_t row = 0; row < kAlbedos; ++row) {
+      const std::size_t at = row * kCosines + static_cast<std::size_t>(node);
+      scattering.entering[at] = static_cast<float>(entering[row]);
+      scattering.back[at] = static_cast<float>(back[row]);
+      scattering.mean_back[row] += static_cast<float>(WeightOfNode(node) * back[row]);
+    }
+  }
+  constexpr int kFromBase = 16 * kWalks;
+  std::array<double, kAlbedos> inner{};
+  for (int walk = 0; walk < kFromBase; ++walk) {
+    const float u = (static_cast<float>(walk) + 0.5F) / kFromBase;
+    LayerWalk in_layer(material, SquareToCosineHemisphere(u, rng.Uniform()), 1, rng);
+    if (!in_layer.ToBase([](double, const AlbedoWeights&) {}) || !in_layer.is_scattered()) continue;
+    for (std::size_t row = 0; row < kAlbedos; ++row)
+      inner[row] += in_layer.weight() * in_layer.albedos()[row] / kFromBase;
+  }
+  for (std::size_t row = 0; row < kAlbedos; ++row)
+    scattering.inner[row] = static_cast<float>(inner[row]);
+}
+
+// [albedos] of shares by meetings with the metal.
+using WalkedShares = std::vector<std::array<double, CoatTable::kHits + 1>>;
+
+// Adds the shares of flux from `w` that leave coat and metal after 0, 1, 2, ... meetings with a
+// metal that reflects all.
+void WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, WalkedShares& shares) {
   constexpr float kLeastWeight = 1e-4F;
   const bool is_base_smooth = material.base_alpha_u == 0 && material.base_alpha_v == 0;
   const Ggx metal(material.base_alpha_u, material.base_alpha_v);
   Crossed crossed = CrossSurface(material, w, material.ior, rng);
+  // `from`: where light comes from at the metal. False: nothing is reflected.
+  const auto reflect = [&](Vec3 from, Vec3& up, float& factor) {
+    factor = 1;
+    up = {-from.x, -from.y, from.z};
+    if (is_base_smooth) return true;
+    const float u1 = rng.Uniform();
+    const float u2 = rng.Uniform();
+    up = ReflectAt(from, metal.SampleVisible(from, u1, u2));
+    if (!(up.z > 0)) return false;
+    factor = metal.G2(from, up) / metal.G1(from);
+    return true;
+  };
+  Vec3 up;
+  float factor = 0;
+  if (material.HasHaze()) {
+    LayerWalk in_layer(material, {crossed.beyond.x, crossed.beyond.y, -crossed.beyond.z},
+                       static_cast<double>(crossed.transmitted), rng);
+    for (int hit = 0;; ++hit) {
+      const auto at = static_cast<std::size_t>(std::min(hit, CoatTable::kHits));
+      const bool is_at_base = in_layer.ToBase([&](double left, const AlbedoWeights& albedos) {
+        for (std::size_t row = 0; row < shares.size(); ++row)
+          shares[row][at] += left * albedos[row];
+      });
+      if (!is_at_base || hit >= material.base_hits) return;
+      if (!reflect(-in_layer.direction(), up, factor)) return;
+      in_layer.GoUp(up, factor);
+    }
+  }
   float weight = crossed.transmitted;
   Vec3 down = crossed.beyond;  // as seen from above: where light comes from is (-x, -y, z)
   for (int hit = 0; hit < material.base_hits && weight > kLeastWeight; ++hit) {
     const Vec3 from = {-down.x, -down.y, down.z};
     weight *= Crossing(material.thickness, from.z);
-    Vec3 up = {-from.x, -from.y, from.z};
-    if (!is_base_smooth) {
-      const float u1 = rng.Uniform();
-      const float u2 = rng.Uniform();
-      up = ReflectAt(from, metal.SampleVisible(from, u1, u2));
-      if (!(up.z > 0)) return;
-      weight *= metal.G2(from, up) / metal.G1(from);
-    }
+    if (!reflect(from, up, factor)) return;
+    weight *= factor;
     weight *= Crossing(material.thickness, up.z);
     // Seen from below, where light comes from is (-x, -y, z) of where it goes.
     crossed = CrossSurface(material, {-up.x, -up.y, up.z}, 1 / material.ior, rng);
-    by_hits[static_cast<std::size_t>(std::min(hit, CoatTable::kHits - 1))] +=
+    shares[0][static_cast<std::size_t>(std::min(hit + 1, CoatTable::kHits))] +=
         static_cast<double>(weight * crossed.transmitted);
     weight *= crossed.reflected;
     down = crossed.back;
@@ -224,10 +398,6 @@ float MetOnce(const Material& material, Vec3 w) {
          });
 }
 
-float CosineOf(int node) {
-  return Square(static_cast<float>(node) / (CoatTable::kCosines - 1));
-}
-
 // MetOnce over azimuths.
 double MeanMetOnce(const Material& material, float cosine) {
   const int turns =
@@ -244,16 +414,19 @@ double MeanMetOnce(const Material& material, float cosine) {
 // Requires a material with a table for its coat alone, to which the rest is added.
 void AddResidual(const Material& material, CoatTable& table) {
   KeyedRng rng(0x434f4154ULL);
-  table.residual.assign(CoatTable::kCosines, 0.0F);
-  std::vector<std::array<double, CoatTable::kHits>> walked(CoatTable::kCosines);
+  constexpr std::size_t kCosines = CoatTable::kCosines;
+  const std::size_t albedos = material.HasHaze() ? CoatTable::kAlbedos : 1;
+  std::vector<WalkedShares> walked(kCosines, WalkedShares(albedos));
   for (int i = 1; i < CoatTable::kCosines; ++i) {
-    auto& here = walked[static_cast<std::size_t>(i)];
+    WalkedShares& here = walked[static_cast<std::size_t>(i)];
     for (int walk = 0; walk < kWalks; ++walk) {
       const float azimuth = 2 * kPi * (static_cast<float>(walk) + 0.5F) / kWalks;
       WalkOverMetal(material, DirectionAt(CosineOf(i), azimuth), rng, here);
     }
-    for (double& share : here)
-      share /= kWalks;
+    for (auto& row : here) {
+      for (double& share : row)
+        share /= kWalks;
+    }
   }
   // Facets of the coat throw some of the light back that comes near the critical angle, which the
   // share that enters does not contain: the factor is scaled until the flux after one meeting is
@@ -264,36 +437,33 @@ void AddResidual(const Material& material, CoatTable& table) {
       const double once = MeanMetOnce(material, CosineOf(i));
       if (!(once > 0)) continue;
       const auto scale =
-          static_cast<float>(std::sqrt(walked[static_cast<std::size_t>(i)][0] / once));
-      for (std::size_t at = static_cast<std::size_t>(i); at < scaled.size();
-           at += CoatTable::kCosines) {
+          static_cast<float>(std::sqrt(walked[static_cast<std::size_t>(i)][0][1] / once));
+      for (std::size_t at = static_cast<std::size_t>(i); at < scaled.size(); at += kCosines)
         scaled[at] *= scale;
-      }
     }
     table.entering = std::move(scaled);
   }
-  std::array<double, CoatTable::kHits> by_hits = {};
-  double sum = 0;
-  for (int i = 1; i < CoatTable::kCosines; ++i) {
-    const float cosine = CosineOf(i);
-    std::array<double, CoatTable::kHits>& here = walked[static_cast<std::size_t>(i)];
-    // Only what it brings too little can be made up for.
-    here[0] = std::max(0.0, here[0] - MeanMetOnce(material, cosine));
-    double residual = 0;
-    // Of 2 cosine d cosine, where cosine is (i / last)².
-    const double weight = (i == CoatTable::kCosines - 1 ? 0.5 : 1.0) * 4 *
-                          static_cast<double>(cosine) * std::sqrt(static_cast<double>(cosine)) /
-                          (CoatTable::kCosines - 1);
-    for (std::size_t hit = 0; hit < here.size(); ++hit) {
-      residual += here[hit];
-      by_hits[hit] += weight * here[hit];
+  table.residual.assign(albedos * kCosines, 0.0F);
+  for (std::size_t row = 0; row < albedos; ++row) {
+    std::array<double, CoatTable::kHits + 1> by_hits = {};
+    double sum = 0;
+    for (int i = 1; i < CoatTable::kCosines; ++i) {
+      auto& here = walked[static_cast<std::size_t>(i)][row];
+      // Only what it brings too little can be made up for.
+      here[1] = std::max(0.0, here[1] - MeanMetOnce(material, CosineOf(i)));
+      double residual = 0;
+      for (std::size_t hit = 0; hit < here.size(); ++hit) {
+        residual += here[hit];
+        by_hits[hit] += WeightOfNode(i) * here[hit];
+      }
+      table.residual[row * kCosines + static_cast<std::size_t>(i)] = static_cast<float>(residual);
+      sum += WeightOfNode(i) * residual;
     }
-    table.residual[static_cast<std::size_t>(i)] = static_cast<float>(residual);
-    sum += weight * residual;
+    table.mean_residual.push_back(static_cast<float>(sum));
+    CoatTable::ByHits& shares = table.by_hits.emplace_back();
+    for (std::size_t hit = 0; hit < by_hits.size(); ++hit)
+      shares[hit] = sum > 0 ? static_cast<float>(by_hits[hit] / sum) : 0.0F;
   }
-  table.mean_residual = static_cast<float>(sum);
-  for (std::size_t hit = 0; hit < by_hits.size(); ++hit)
-    table.by_hits[hit] = sum > 0 ? static_cast<float>(by_hits[hit] / sum) : 0.0F;
 }
 
 // The node of a table of cosines below `cosine`, and the share of the next one.
@@ -318,6 +488,32 @@ float ReadTable(const Material& material, const Read& read) {
          read(*material.coat_above) * material.coat_above_share;
 }
 
+// The same for each channel, of rows for albedos: read(table, row).
+template <typename Read>
+Rgb ReadRows(const Material& material, const Read& read) {
+  const auto channel = [&](float albedo) {
+    return ReadTable(material, [&](const CoatTable& table) {
+      if (!material.HasHaze()) return read(table, 0);
+      constexpr int kLast = CoatTable::kAlbedos - 1;
+      const float place = (1 - std::sqrt(1 - std::clamp(albedo, 0.0F, 1.0F))) * kLast;
+      const int below = std::min(static_cast<int>(place), kLast - 1);
+      const float share = place - static_cast<float>(below);
+      const auto row = static_cast<std::size_t>(below);
+      return read(table, row) * (1 - share) + read(table, row + 1) * share;
+    });
+  };
+  const Rgb& albedo = material.coat_albedo;
+  const float first = channel(albedo.r);
+  if (albedo.g == albedo.r && albedo.b == albedo.r) return Gray(first);
+  return {first, channel(albedo.g), channel(albedo.b)};
+}
+
+float AtCosine(const std::vector<float>& table, std::size_t row, float cosine) {
+  const auto [below, share] = NodeAt(cosine);
+  const float* node = &table[row * CoatTable::kCosines + below];
+  return node[0] * (1 - share) + node[1] * share;
+}
+
 float EnteringIn(const CoatTable& table, Vec3 w) {
   const auto [below, share] = NodeAt(w.z);
   const auto at = [&, below = below, share = share](int row) {
@@ -334,6 +530,8 @@ float EnteringIn(const CoatTable& table, Vec3 w) {
 
 std::shared_ptr<CoatTable> MakeCoat(const Material& original) {
   const std::shared_ptr<CoatTable> made = MakeTable(original);
+  if (original.HasHaze() && original.kind == Material::Kind::kCoatedDiffuse)
+    AddScattering(original, *made);
   if (original.kind == Material::Kind::kCoatedConductor) {
     Material material = original;
     material.coat = made.get();
@@ -373,7 +571,8 @@ std::shared_ptr<const CoatFamily> MakeFamily(const Material& material) {
 }  // namespace
 
 void PrepareCoats(std::vector<Material>& materials) {
-  using Key = std::tuple<Material::Kind, float, float, float, float, float, float, std::int32_t>;
+  using Key = std::tuple<Material::Kind, float, float, float, float, float, float, std::int32_t,
+                         bool, float>;
   const auto key_of = [](const Material& material) {
     const bool has_metal = material.kind == Material::Kind::kCoatedConductor;
     return Key{material.kind,
@@ -383,7 +582,9 @@ void PrepareCoats(std::vector<Material>& materials) {
                material.alpha_v,
                has_metal ? material.base_alpha_u : 0,
                has_metal ? material.base_alpha_v : 0,
-               has_metal ? material.base_hits : 0};
+               has_metal || material.HasHaze() ? material.base_hits : 0,
+               material.HasHaze(),
+               material.HasHaze() ? material.phase_g : 0};
   };
   std::map<Key, std::shared_ptr<const CoatTable>> tables;
   // A texture of the coat's roughness, or of the metal's.
@@ -435,19 +636,46 @@ float CoatLeaving(const Material& material) {
   return ReadTable(material, [](const CoatTable& table) { return table.leaving; });
 }
 
-float CoatResidual(const Material& material, float cosine) {
-  const auto [below, share] = NodeAt(cosine);
-  return ReadTable(material, [&, below = below, share = share](const CoatTable& table) {
-    return table.residual[below] * (1 - share) + table.residual[below + 1] * share;
+Rgb CoatResidual(const Material& material, float cosine) {
+  return ReadRows(material, [&](const CoatTable& table, std::size_t row) {
+    return AtCosine(table.residual, row, cosine);
   });
 }
 
-float CoatMeanResidual(const Material& material) {
-  return ReadTable(material, [](const CoatTable& table) { return table.mean_residual; });
+Rgb CoatMeanResidual(const Material& material) {
+  return ReadRows(material,
+                  [](const CoatTable& table, std::size_t row) { return table.mean_residual[row]; });
 }
 
-float CoatShareOfHits(const Material& material, std::size_t hits) {
-  return ReadTable(material, [&](const CoatTable& table) { return table.by_hits[hits]; });
+Rgb CoatShareOfHits(const Material& material, std::size_t hits) {
+  return ReadRows(
+      material, [&](const CoatTable& table, std::size_t row) { return table.by_hits[row][hits]; });
+}
+
+Rgb HazeEntering(const Material& material, Vec3 w) {
+  return Gray(CoatEntering(material, w)) +
+         ReadRows(material, [&](const CoatTable& table, std::size_t row) {
+           return AtCosine(table.scattering.entering, row, w.z);
+         });
+}
+
+Rgb HazeInner(const Material& material) {
+  return Gray(CoatInner(material)) +
+         ReadRows(material, [](const CoatTable& table, std::size_t row) {
+           return table.scattering.inner[row];
+         });
+}
+
+Rgb HazeBack(const Material& material, float cosine) {
+  return ReadRows(material, [&](const CoatTable& table, std::size_t row) {
+    return AtCosine(table.scattering.back, row, cosine);
+  });
+}
+
+Rgb HazeMeanBack(const Material& material) {
+  return ReadRows(material, [](const CoatTable& table, std::size_t row) {
+    return table.scattering.mean_back[row];
+  });
 }
 
 float CoatCrossing(const Material& material, float cosine) {

@@ -1,8 +1,8 @@
 // What passes a dielectric coat over a base, and what the base gets back from it.
 //
 // The coat is a surface, smooth or of GGX facets, of index `ior`, over a layer that absorbs
-// exp(-thickness / cos) of what crosses it once at that angle, as pbrt-v4's LayeredBxDF with
-// default albedo. A diffuse base forgets directions, so that what it scatters
+// exp(-thickness / cos) of what crosses it once at that angle, or scatters a part of it, as
+// pbrt-v4's LayeredBxDF. A diffuse base forgets directions, so that what it scatters
 // out of the coat is a product:
 //
 //     f(wo, wi) = E(wo) · E(wi) / ior² · ρ/π · (1 + ρK + (ρK)² + ...)
@@ -21,6 +21,11 @@
 // brings, for a metal that reflects all, M̄ its mean, and C a sum of powers of the metal's
 // reflectance: the flux is that of the walk, the directions are only about those of light that
 // meets the metal more than once.
+//
+// Where the layer scatters (haze), E and K contain what was scattered and came to the base, and a
+// third term B(wo) · B(wi) / (π · B̄) is what leaves without having met it; over a metal M contains
+// all that. These are of random walks too: the flux is right, the directions are those of even
+// scattering.
 //
 // Sources: Walter et al. 2007 (as in transport/microfacet.h); Weidlich & Wilkie 2007, "Arbitrarily
 // Layered Micro-Facet Surfaces"; Saunderson 1942, "Calculation of the Color of Pigmented Plastics"
@@ -51,17 +56,23 @@ void FitCoat(MaterialNumbers& material);
 // E(w), in [0, 1]: of a direction on the outside, w.z > 0, in flux. Requires a prepared material.
 [[nodiscard]] float CoatEntering(const Material& material, Vec3 w);
 
+// Of a layer that scatters, per channel of its albedo: E with what was scattered, B and B̄.
+[[nodiscard]] Rgb HazeEntering(const Material& material, Vec3 w);
+[[nodiscard]] Rgb HazeInner(const Material& material);
+[[nodiscard]] Rgb HazeBack(const Material& material, float cosine);
+[[nodiscard]] Rgb HazeMeanBack(const Material& material);
+
 // K and the flux that leaves the coat of what the base scatters, both in [0, 1], of a prepared
 // material.
 [[nodiscard]] float CoatInner(const Material& material);
 [[nodiscard]] float CoatLeaving(const Material& material);
 
 // Over a metal, of a prepared material: M for a direction at `cosine` outside, in [0, 1].
-[[nodiscard]] float CoatResidual(const Material& material, float cosine);
-// The mean of M over directions with density cosine / π, and the shares of M after 1, 2, ...
-// meetings with the metal, hits in [0, CoatTable::kHits).
-[[nodiscard]] float CoatMeanResidual(const Material& material);
-[[nodiscard]] float CoatShareOfHits(const Material& material, std::size_t hits);
+[[nodiscard]] Rgb CoatResidual(const Material& material, float cosine);
+// The mean of M over directions with density cosine / π, and the shares of M after 0, 1, 2, ...
+// meetings with the metal, hits in [0, CoatTable::kHits].
+[[nodiscard]] Rgb CoatMeanResidual(const Material& material);
+[[nodiscard]] Rgb CoatShareOfHits(const Material& material, std::size_t hits);
 // The share of light that is left after crossing the layer once at `cosine` inside.
 [[nodiscard]] float CoatCrossing(const Material& material, float cosine);
 // w, w.z > 0, as refracted at the mean surface, again away from it: away from the metal. False with

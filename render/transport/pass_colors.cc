@@ -138,12 +138,15 @@ PassColors::PassColors(const Scene& working) {
     of.k = m.k;
     of.absorption = m.absorption;
     of.extinction = m.extinction;
+    of.coat_albedo = m.coat_albedo;
     of.reflectance_spectrum =
         ColorSpectrum::OfReflectance(FromWorking(m.reflectance), given.reflectance);
     of.transmittance_spectrum =
         ColorSpectrum::OfReflectance(FromWorking(m.transmittance), given.transmittance);
     of.absorption_spectrum = ColorSpectrum::OfConstant(FromWorking(m.absorption), given.absorption);
     of.extinction_spectrum = ColorSpectrum::OfUnbounded(FromWorking(m.extinction));
+    of.coat_albedo_spectrum = ColorSpectrum::OfReflectance(
+        m.kind == Material::Kind::kCoatedConductor ? m.coat_albedo : FromWorking(m.coat_albedo));
     const bool is_metal =
         m.kind == Material::Kind::kConductor || m.kind == Material::Kind::kCoatedConductor;
     of.is_metal_of_reflectance =
@@ -205,6 +208,7 @@ void PassColors::SetAt(const PassWavelengths& wavelengths, Scene& scene) {
     m.absorption = m.absorbs_for_reflectance ? HairAbsorption(m.reflectance, m.beta_n)
                                              : of.absorption_spectrum.At(wavelengths);
     m.extinction = of.extinction_spectrum.At(wavelengths);
+    m.coat_albedo = of.coat_albedo_spectrum.At(wavelengths);
     if (m.measured != nullptr) m.measured_planes = m.measured->At(wavelengths.nm);
   }
   for (std::size_t i = 0; i < media_.size(); ++i) {
@@ -229,6 +233,7 @@ void PassColors::SetThree(Scene& scene) {
     m.k = of.k;
     m.absorption = of.absorption;
     m.extinction = of.extinction;
+    m.coat_albedo = of.coat_albedo;
     if (m.measured != nullptr) m.measured_planes = m.measured->WorkingSpace();
   }
   for (std::size_t i = 0; i < media_.size(); ++i) {

@@ -72,7 +72,8 @@ enum class Floor {
   kBumpy,
   kHairs,
   kSubsurface,
-  kRoughSubsurface
+  kRoughSubsurface,
+  kHazyCoat
 };
 enum class View { kPlain, kThroughGlass, kInMirror };
 
@@ -101,10 +102,10 @@ std::string NameOf(const PathClass& cell) {
                                                         "InGlassBall",
                                                         "InNarrowGlassBall",
                                                         "InRoughGlassBall"};
-  constexpr std::array<std::string_view, 16> kFloors = {
-      "Diffuse", "RoughMetal",  "NarrowMetal", "TexturedMetal",  "NarrowGlass", "RoughGlass",
-      "Coated",  "RoughCoated", "Sheet",       "Mixed",          "PatchyMetal", "PatchyCoat",
-      "Bumpy",   "Hair",        "Subsurface",  "RoughSubsurface"};
+  constexpr std::array<std::string_view, 17> kFloors = {
+      "Diffuse", "RoughMetal",  "NarrowMetal", "TexturedMetal",   "NarrowGlass", "RoughGlass",
+      "Coated",  "RoughCoated", "Sheet",       "Mixed",           "PatchyMetal", "PatchyCoat",
+      "Bumpy",   "Hair",        "Subsurface",  "RoughSubsurface", "HazyCoat"};
   constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
   std::string name(kLights[static_cast<std::size_t>(cell.light)]);
   name += kChains[static_cast<std::size_t>(cell.chain)];
@@ -250,6 +251,9 @@ Scene SceneOf(const PathClass& cell) {
       break;
     case Floor::kSubsurface:
       floor(AddMaterial(scene, SubsurfaceMaterial(0.8F, kFreePath)));
+      break;
+    case Floor::kHazyCoat:
+      floor(AddMaterial(scene, WithHaze(CoatedMaterial(0.5F, 0, 0.7F), 0.9F, 0)));
       break;
     case Floor::kRoughSubsurface:
       floor(AddMaterial(scene, SubsurfaceMaterial(0.7F, kFreePath, 0.2F)));
@@ -594,6 +598,7 @@ std::vector<PathClass> Cells() {
       {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
   add({kMap}, {kNone, kPane}, {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
   add({kTriangles, kPoint}, {kCoatedWall}, {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kCoated});
+  add({kTriangles}, {kNone, kPane}, {Floor::kHazyCoat});
   // Light that comes out elsewhere than where it entered.
   add({kTriangles, kPoint}, {kNone, kPane}, {Floor::kSubsurface});
   add({kTriangles}, {kNone}, {Floor::kRoughSubsurface});

@@ -91,6 +91,7 @@ struct Surface {
   Color transmittance{};  // of a sheet, working space
   double thickness = 0;   // of a coat
   int base_hits = 0;
+  Color coat_albedo{};   // of one scattering in it, evenly to all sides
   ReferenceFibre fibre;  // hair
   // Below a surface.
   const SubsurfaceTable* below = nullptr;
@@ -125,6 +126,7 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   surface.transmittance = Working(FromFloat(material.transmittance));
   surface.thickness = static_cast<double>(material.thickness);
   surface.base_hits = material.base_hits;
+  surface.coat_albedo = Working(FromFloat(material.coat_albedo));
   surface.fibre = {static_cast<double>(material.ior), static_cast<double>(material.beta_m),
                    static_cast<double>(material.beta_n), static_cast<double>(material.scale_tilt),
                    Working(FromFloat(material.absorption))};
@@ -225,36 +227,56 @@ bool ScatterInCoat(const Surface& surface, Double3 up, double side, const std::a
   KeyedRng rng(CombineKeys(static_cast<std::uint64_t>(u[0] * 0x1p52),
                            static_cast<std::uint64_t>(u[1] * 0x1p52)));
   const auto next = [&] { return static_cast<double>(rng.Bits() >> 11) * 0x1p-53; };
-  Double3 down = facet.m * (facet.cos_m / eta - facet.cos_t) - up * (1 / eta);
+  const Double3 down = facet.m * (facet.cos_m / eta - facet.cos_t) - up * (1 / eta);
   if (!(down.z < 0)) return false;
   const double entering = FacetWeight(surface, facet, up, down);
   out.weight = {entering, entering, entering};
   out.is_delta = false;
-  for (int hit = 0; hit < surface.base_hits; ++hit) {
-    out.weight = Times(out.weight, surface.reflectance);
-    const double u1 = next();
-    const double u2 = next();
-    const Double3 rising = CosineDirection(u1, u2);
-    out.weight =
-        Times(out.weight, std::exp(-surface.thickness * (1 / std::abs(down.z) + 1 / rising.z)));
-    const double u3 = next();
-    const double u4 = next();
-    if (!MeetFacet(surface, rising, 1 / eta, u3, u4, facet)) return false;
-    // Seen from below: what is reflected goes down.
-    if (next() < facet.share) {
-      const Double3 reflected = facet.m * (2 * facet.cos_m) - rising;
-      if (!(reflected.z > 0)) return false;
-      out.weight = Times(out.weight, FacetWeight(surface, facet, rising, reflected));
-      down = reflected * -1;
+  // On the way from the surface or the base to one of them. True at the base.
+  const auto cross_layer = [&](Double3& direction) {
+    if (!(Largest(surface.coat_albedo) > 0)) {
+      out.weight = Times(out.weight, std::exp(-surface.thickness / std::abs(direction.z)));
+      return direction.z < 0;
+    }
+    double height = direction.z < 0 ? surface.thickness : 0;
+    while (true) {
+      height -= direction.z * std::log(1 - next());
+      if (height <= 0) return true;
+      if (height >= surface.thickness) return false;
+      out.weight = Times(out.weight, surface.coat_albedo);
+      const double cosine = 1 - 2 * next();
+      const double sine = std::sqrt(1 - cosine * cosine);
+      const double phi = 2 * kPi64 * next();
+      direction = {sine * std::cos(phi), sine * std::sin(phi), cosine};
+    }
+  };
+  Double3 direction = down;
+  for (int hit = 0;;) {
+    if (cross_layer(direction)) {
+      if (hit++ == surface.base_hits) return false;
+      out.weight = Times(out.weight, surface.reflectance);
+      const double u1 = next();
+      const double u2 = next();
+      direction = CosineDirection(u1, u2);
       continue;
     }
-    const Double3 leaving = facet.m * (facet.cos_m * eta - facet.cos_t) - rising * eta;
+    const double u3 = next();
+    const double u4 = next();
+    if (!MeetFacet(surface, direction, 1 / eta, u3, u4, facet)) return false;
+    // Seen from below: what is reflected goes down.
+    if (next() < facet.share) {
+      const Double3 reflected = facet.m * (2 * facet.cos_m) - direction;
+      if (!(reflected.z > 0)) return false;
+      out.weight = Times(out.weight, FacetWeight(surface, facet, direction, reflected));
+      direction = reflected * -1;
+      continue;
+    }
+    const Double3 leaving = facet.m * (facet.cos_m * eta - facet.cos_t) - direction * eta;
     if (!(leaving.z < 0)) return false;
-    out.weight = Times(out.weight, FacetWeight(surface, facet, rising, leaving));
+    out.weight = Times(out.weight, FacetWeight(surface, facet, direction, leaving));
     out.wi = leaving * -side;
     return true;
   }
-  return false;
 }
 
 // The share of what falls in from `up` that a facet drawn for it lets through.

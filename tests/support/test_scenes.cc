@@ -47,6 +47,15 @@ Material CoatedMetal(Rgb eta, Rgb k, float alpha, float base_alpha, float thickn
   return one[0];
 }
 
+Material WithHaze(Material coated, float albedo, float g) {
+  coated.coat_albedo = Gray(albedo);
+  coated.phase_g = g;
+  coated.base_hits = 1000;
+  std::vector<Material> one = {coated};
+  PrepareCoats(one);
+  return one[0];
+}
+
 Material SheetMaterial(float reflectance, float transmittance) {
   Material material = DiffuseMaterial(reflectance);
   material.kind = Material::Kind::kDiffuseTransmission;

@@ -22,6 +22,8 @@ namespace lucerna {
 // The same over a metal of width base_alpha.
 [[nodiscard]] Material CoatedMetal(Rgb eta, Rgb k, float alpha, float base_alpha,
                                    float thickness = 0);
+// A coated material whose layer scatters light, up to 2000 times.
+[[nodiscard]] Material WithHaze(Material coated, float albedo, float g);
 // A thin sheet that scatters diffusely to both sides.
 [[nodiscard]] Material SheetMaterial(float reflectance, float transmittance);
 // Grey, over a medium of that mean free path [scene units] and index 1.5, ready to be evaluated.

@@ -703,8 +703,8 @@ TEST(PbrtParserTest, WhatIsNotSupportedIsAnErrorThatSaysSo) {
   };
   expect("Material \"dielectric\" \"texture eta\" \"t\"", "is a texture");
   expect("Material \"jelly\"", "there are diffuse, conductor, dielectric, interface");
-  expect("Material \"coateddiffuse\" \"rgb albedo\" [0.1 0 0]",
-         "the layer under a coat only absorbs");
+  expect("Material \"coateddiffuse\" \"texture albedo\" \"t\"", "must not be a texture");
+  expect("Material \"coateddiffuse\" \"float g\" 1", "g");
   expect("Material \"measured\"", "must name a .bsdf file");
   expect("Material \"measured\" \"string filename\" \"none.bsdf\"", "cannot be read");
   expect("Material \"fourier\"", "Fourier BSDFs");
@@ -725,10 +725,11 @@ TEST(PbrtParserTest, ReadsCoatedDiffuse) {
       "Material \"coateddiffuse\" Shape \"sphere\"\n"
       "Material \"coateddiffuse\" \"rgb reflectance\" [0.1 0.2 0.3] \"float roughness\" 0.25 "
       "\"float eta\" 1.3 \"float thickness\" 0.5 \"integer maxdepth\" 7 \"integer nsamples\" 2 "
-      "\"float g\" 0.5 Shape \"sphere\"");
+      "\"float g\" 0.5 \"rgb albedo\" [0.2 0.4 0.6] Shape \"sphere\"");
   ASSERT_EQ(scene.materials.size(), 3U);
   const Material& plain = scene.materials[1];
   EXPECT_EQ(plain.kind, Material::Kind::kCoatedDiffuse);
+  EXPECT_FALSE(plain.HasHaze());
   EXPECT_EQ(plain.reflectance, Gray(0.5F));
   EXPECT_EQ(plain.alpha_u, 0);
   EXPECT_EQ(plain.ior, 1.5F);
@@ -740,6 +741,8 @@ TEST(PbrtParserTest, ReadsCoatedDiffuse) {
   EXPECT_EQ(other.ior, 1.3F);
   EXPECT_EQ(other.thickness, 0.5F);
   EXPECT_EQ(other.base_hits, 4);
+  EXPECT_EQ(other.coat_albedo, (Rgb{0.2F, 0.4F, 0.6F}));
+  EXPECT_EQ(other.phase_g, 0.5F);
 }
 
 TEST(PbrtParserTest, ReadsCoatedConductor) {

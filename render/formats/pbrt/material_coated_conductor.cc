@@ -13,6 +13,11 @@ void ReadCoatedConductor(const MaterialInput& input, Material& material) {
                            "and interface.roughness cannot both be textures; give one a number");
   }
   ReadCoat("interface.eta", input.parameters, material);
+  const bool is_mirror = material.base_alpha_u == 0 && material.base_alpha_v == 0 &&
+                         material.alpha_u == 0 && material.alpha_v == 0 &&
+                         !material.HasRoughnessTexture();
+  // A mirror with haze: as the narrowest rough metal, of which haze is a part.
+  if (is_mirror && material.HasHaze()) material.base_alpha_u = material.base_alpha_v = kSmoothAlpha;
 }
 
 }  // namespace lucerna

@@ -24,6 +24,9 @@ LUCERNA_MATERIALS(LUCERNA_DECLARE)
 #undef LUCERNA_DECLARE
 
 inline constexpr Range kIndexRange = {0.01, 100};  // of refraction
+// Of phase functions in layers and below surfaces. Nearer to 1 nearly all light would go straight
+// on, for which diffusion and few scatterings are no models.
+inline constexpr Range kPhaseCosine = {-0.99, 0.99};
 
 // Widths of facets: of a surface, or of the metal under a coat.
 enum class Facets : std::uint8_t { kSurface, kBase };

@@ -13,8 +13,6 @@
 namespace lucerna {
 namespace {
 
-// Nearer to 1 nearly all light would go straight on, for which diffusion is no model.
-constexpr Range kMeanCosineBelow = {-0.99, 0.99};
 // The model is one of light that is reflected back from inside.
 constexpr Range kDenserThanAir = {1, 100};
 
@@ -80,7 +78,7 @@ void ReadSubsurface(const MaterialInput& input, Material& material) {
   material.ior = index.at_d;
   if (!index.dispersion.is_none()) parameters.WarnOfOneIndex("eta");
   const auto scale = static_cast<float>(parameters.Float("scale", 1, kAboveZero));
-  const double g = parameters.Float("g", 0, kMeanCosineBelow);
+  const double g = parameters.Float("g", 0, kPhaseCosine);
   // Those that were measured have been reduced by it.
   material.phase_g = parameters.Has("name") ? 0.0F : static_cast<float>(g);
   const bool has_coefficients =

@@ -144,13 +144,13 @@ void ReadCoat(std::string_view eta, ParameterList& parameters, Material& materia
   const std::int64_t depth = parameters.FindInteger("maxdepth", {1, 1'000'000}).value_or(10);
   // Every second event is at the base.
   material.base_hits = static_cast<std::int32_t>(depth / 2 + depth % 2);
-  const bool scatters = parameters.IsTexture("albedo") ||
-                        !IsBlack(parameters.FindReflectance("albedo").value_or(Rgb{}));
-  if (scatters) {
-    parameters.Error("albedo", "above 0 is not supported: the layer under a coat only absorbs");
+  if (parameters.IsTexture("albedo")) {
+    parameters.Error("albedo", "must not be a texture; give a colour or a number");
+  } else {
+    material.coat_albedo = parameters.FindReflectance("albedo").value_or(Rgb{});
   }
-  // Of what scatters in the layer, and of a random walk in it: neither is there.
-  parameters.Ignore("g");
+  material.phase_g = static_cast<float>(parameters.Float("g", 0, kPhaseCosine));
+  // Of a random walk for each evaluation: here there are tables of walks.
   parameters.Ignore("nsamples");
 }
 
