@@ -101,7 +101,9 @@ TEST_F(JobIntakeTest, RefusesASceneThatDoesNotFitOnceItsTreeIsBuilt) {
     scene += "Include \"more.pbrt\"\n";
   Add("scene.pbrt", scene);
   Add("more.pbrt", more);
-  Add("floor.pbrt", kFloor);
+  // Shapes take the memory here, and their tree; materials are refused as they are read.
+  Add("floor.pbrt",
+      "Shape \"trianglemesh\" \"point3 P\" [-2 -2 0  2 -2 0  2 2 0] \"integer indices\" [0 1 2]\n");
   const StatusOr<CheckedJob> job = Check();
   ASSERT_TRUE(job.ok()) << job.status();
   const double peak = job->scene_memory.PeakOfCoordinator();
