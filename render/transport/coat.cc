@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -27,6 +28,12 @@ constexpr int kAzimuths = 9;
 // Random walks for each cosine outside, of tables over metals.
 constexpr int kWalks = 4096;
 constexpr int kScalings = 8;
+// Of walks through a layer that scatters: events of one walk at most, and events after which no
+// more walks begin, for each cosine and from the base. A thick layer that absorbs nothing would
+// hold a process for minutes.
+constexpr int kMostEvents = 1024;
+constexpr std::int64_t kEventsOfNode = std::int64_t{1} << 18;
+constexpr std::int64_t kEventsFromBase = std::int64_t{1} << 22;
 // Tables of a family, and the narrowest width. A coat that is smoother passes as much.
 constexpr int kFamily = 9;
 constexpr float kNarrowestOfFamily = 0.02F;
@@ -247,10 +254,13 @@ class LayerWalk {
   [[nodiscard]] double weight() const { return weight_; }
   [[nodiscard]] const AlbedoWeights& albedos() const { return albedos_; }
   [[nodiscard]] bool is_scattered() const { return is_scattered_; }
+  [[nodiscard]] int events() const { return events_; }
 
  private:
   // As pbrt's maxdepth.
-  [[nodiscard]] int MostEvents() const { return 2 * material_.base_hits; }
+  [[nodiscard]] int MostEvents() const {
+    return std::min(material_.base_hits, kMostEvents / 2) * 2;
+  }
   void Scatter(float along) {
     depth_ += direction_.z < 0 ? along : -along;
     const float u1 = rng_.Uniform();
@@ -288,23 +298,27 @@ void AddScattering(const MaterialNumbers& material, CoatTable& table) {
   for (int node = 1; node < CoatTable::kCosines; ++node) {
     std::array<double, kAlbedos> entering{};
     std::array<double, kAlbedos> back{};
-    for (int walk = 0; walk < kWalks; ++walk) {
-      const float azimuth = 2 * kPi * (static_cast<float>(walk) + 0.5F) / kWalks;
-      const Crossed crossed =
-          CrossSurface(material, DirectionAt(CosineOf(node), azimuth), material.ior, rng);
+    int walks = 0;
+    std::int64_t events = 0;
+    for (; walks < kWalks && events < kEventsOfNode; ++walks) {
+      const Crossed crossed = CrossSurface(
+          material, DirectionAt(CosineOf(node), 2 * kPi * rng.Uniform()), material.ior, rng);
       if (!(crossed.transmitted > 0)) continue;
       LayerWalk in_layer(material, {crossed.beyond.x, crossed.beyond.y, -crossed.beyond.z},
                          static_cast<double>(crossed.transmitted), rng);
       in_layer.ScatterFirst();
       const bool is_at_base = in_layer.ToBase([&](double left, const AlbedoWeights& albedos) {
         for (std::size_t row = 0; row < kAlbedos; ++row)
-          back[row] += left * albedos[row] / kWalks;
+          back[row] += left * albedos[row];
       });
+      events += in_layer.events();
       if (!is_at_base) continue;
       for (std::size_t row = 0; row < kAlbedos; ++row)
-        entering[row] += in_layer.weight() * in_layer.albedos()[row] / kWalks;
+        entering[row] += in_layer.weight() * in_layer.albedos()[row];
     }
     for (std::size_t row = 0; row < kAlbedos; ++row) {
+      entering[row] /= walks;
+      back[row] /= walks;
       const std::size_t at = row * kCosines + static_cast<std::size_t>(node);
       scattering.entering[at] = static_cast<float>(entering[row]);
       scattering.back[at] = static_cast<float>(back[row]);
@@ -313,23 +327,26 @@ void AddScattering(const MaterialNumbers& material, CoatTable& table) {
   }
   constexpr int kFromBase = 16 * kWalks;
   std::array<double, kAlbedos> inner{};
-  for (int walk = 0; walk < kFromBase; ++walk) {
-    const float u = (static_cast<float>(walk) + 0.5F) / kFromBase;
-    LayerWalk in_layer(material, SquareToCosineHemisphere(u, rng.Uniform()), 1, rng);
-    if (!in_layer.ToBase([](double, const AlbedoWeights&) {}) || !in_layer.is_scattered()) continue;
+  int walks = 0;
+  for (std::int64_t events = 0; walks < kFromBase && events < kEventsFromBase; ++walks) {
+    const float u1 = rng.Uniform();
+    LayerWalk in_layer(material, SquareToCosineHemisphere(u1, rng.Uniform()), 1, rng);
+    const bool is_at_base = in_layer.ToBase([](double, const AlbedoWeights&) {});
+    events += in_layer.events();
+    if (!is_at_base || !in_layer.is_scattered()) continue;
     for (std::size_t row = 0; row < kAlbedos; ++row)
-      inner[row] += in_layer.weight() * in_layer.albedos()[row] / kFromBase;
+      inner[row] += in_layer.weight() * in_layer.albedos()[row];
   }
   for (std::size_t row = 0; row < kAlbedos; ++row)
-    scattering.inner[row] = static_cast<float>(inner[row]);
+    scattering.inner[row] = static_cast<float>(inner[row] / walks);
 }
 
 // [albedos] of shares by meetings with the metal.
 using WalkedShares = std::vector<std::array<double, CoatTable::kHits + 1>>;
 
 // Adds the shares of flux from `w` that leave coat and metal after 0, 1, 2, ... meetings with a
-// metal that reflects all.
-void WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, WalkedShares& shares) {
+// metal that reflects all. Returns the events in a layer that scatters.
+int WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, WalkedShares& shares) {
   constexpr float kLeastWeight = 1e-4F;
   const bool is_base_smooth = material.base_alpha_u == 0 && material.base_alpha_v == 0;
   const Ggx metal(material.base_alpha_u, material.base_alpha_v);
@@ -357,8 +374,8 @@ void WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, Walke
         for (std::size_t row = 0; row < shares.size(); ++row)
           shares[row][at] += left * albedos[row];
       });
-      if (!is_at_base || hit >= material.base_hits) return;
-      if (!reflect(-in_layer.direction(), up, factor)) return;
+      if (!is_at_base || hit >= material.base_hits) return in_layer.events();
+      if (!reflect(-in_layer.direction(), up, factor)) return in_layer.events();
       in_layer.GoUp(up, factor);
     }
   }
@@ -367,7 +384,7 @@ void WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, Walke
   for (int hit = 0; hit < material.base_hits && weight > kLeastWeight; ++hit) {
     const Vec3 from = {-down.x, -down.y, down.z};
     weight *= Crossing(material.thickness, from.z);
-    if (!reflect(from, up, factor)) return;
+    if (!reflect(from, up, factor)) return 0;
     weight *= factor;
     weight *= Crossing(material.thickness, up.z);
     // Seen from below, where light comes from is (-x, -y, z) of where it goes.
@@ -377,6 +394,7 @@ void WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, Walke
     weight *= crossed.reflected;
     down = crossed.back;
   }
+  return 0;
 }
 
 // What the first term of transport/coat.h brings of the flux from `w`, of a metal that reflects
@@ -419,13 +437,17 @@ void AddResidual(const Material& material, CoatTable& table) {
   std::vector<WalkedShares> walked(kCosines, WalkedShares(albedos));
   for (int i = 1; i < CoatTable::kCosines; ++i) {
     WalkedShares& here = walked[static_cast<std::size_t>(i)];
-    for (int walk = 0; walk < kWalks; ++walk) {
-      const float azimuth = 2 * kPi * (static_cast<float>(walk) + 0.5F) / kWalks;
-      WalkOverMetal(material, DirectionAt(CosineOf(i), azimuth), rng, here);
+    int walks = 0;
+    std::int64_t events = 0;
+    for (; walks < kWalks && events < kEventsOfNode; ++walks) {
+      // Few walks may be all there are in a layer that scatters: their azimuths are drawn.
+      const float turn =
+          material.HasHaze() ? rng.Uniform() : (static_cast<float>(walks) + 0.5F) / kWalks;
+      events += WalkOverMetal(material, DirectionAt(CosineOf(i), 2 * kPi * turn), rng, here);
     }
     for (auto& row : here) {
       for (double& share : row)
-        share /= kWalks;
+        share /= walks;
     }
   }
   // Facets of the coat throw some of the light back that comes near the critical angle, which the
