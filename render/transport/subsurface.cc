@@ -140,7 +140,7 @@ struct Profile {
   // R over the reflectance [1/area], at the distance or at the projection of a point that is at
   // `distance`.
   [[nodiscard]] float At(float r, float distance) const {
-    if (!(distance <= widest)) return 0;
+    if (!(distance <= widest) || widest == 0) return 0;
     const float least = 0.1F * SubsurfaceTable::kFirstNode;
     const float optical = std::max(r * extinction, least);
     return table->Density(mix, optical) * extinction * extinction /
@@ -222,6 +222,10 @@ bool SampleBelow(const Scene& scene, const Intersector& intersector, const Mater
   std::array<Profile, 3> profiles;
   std::size_t count = 0;
   std::array<std::size_t, 3> with_light{};
+  // Channels that leave nearer than rounding, where they entered: they have no width.
+  constexpr float kClearances = 8;
+  std::size_t count_at_point = 0;
+  Rgb at_point;
   for (std::size_t channel = 0; channel < 3; ++channel) {
     Profile& profile = profiles[channel];
     profile.table = material.below;
@@ -232,6 +236,11 @@ bool SampleBelow(const Scene& scene, const Intersector& intersector, const Mater
     profile.widest = material.below->RadiusWithin(profile.mix, kProbed * profile.reflectance) /
                      profile.extinction;
     with_light[count++] = channel;
+    if (profile.widest > kClearances * surface.clearance) continue;
+    profile.widest = 0;
+    ++count_at_point;
+    at_point +=
+        {channel == 0 ? 1.0F : 0.0F, channel == 1 ? 1.0F : 0.0F, channel == 2 ? 1.0F : 0.0F};
   }
   if (count == 0) return false;
   const float side = Dot(wo, surface.geometric_normal) < 0 ? -1.0F : 1.0F;
@@ -251,6 +260,12 @@ bool SampleBelow(const Scene& scene, const Intersector& intersector, const Mater
   const auto drawn =
       std::min(static_cast<std::size_t>(rest * static_cast<float>(count)), count - 1);
   const Profile& of_channel = profiles[with_light[drawn]];
+  if (of_channel.widest == 0) {
+    left.surface = surface;
+    left.up = surface.shading_normal * side;
+    left.weight = at_point * (static_cast<float>(count) / static_cast<float>(count_at_point));
+    return true;
+  }
   const float radius =
       of_channel.table->RadiusWithin(of_channel.mix, u_radius * kProbed * of_channel.reflectance) /
       of_channel.extinction;
@@ -258,16 +273,7 @@ bool SampleBelow(const Scene& scene, const Intersector& intersector, const Mater
   const float turn = 2 * kPi * u_turn;
   const Vec3 across = axes[(axis + 1) % 3] * (radius * std::cos(turn)) +
                       axes[(axis + 2) % 3] * (radius * std::sin(turn));
-  // What leaves nearer than rounding leaves where it entered.
-  constexpr float kClearances = 8;
-  bool is_found = false;
   int met = 0;
-  if (of_channel.widest <= kClearances * surface.clearance) {
-    left.surface = surface;
-    left.up = surface.shading_normal * side;
-    left.weight = Gray(1);
-    return true;
-  }
   const Vec3 direction = -axes[axis];
   Ray ray = {surface.position + across + axes[axis] * half, direction, 2 * half};
   for (int i = 0; i < kMostAlongProbe; ++i) {
@@ -281,7 +287,6 @@ bool SampleBelow(const Scene& scene, const Intersector& intersector, const Mater
       const float chance = 1 / static_cast<float>(met);
       if (u_choice < chance) {
         left.surface = found;
-        is_found = true;
         u_choice /= chance;
       } else {
         u_choice = (u_choice - chance) / (1 - chance);
@@ -293,7 +298,7 @@ bool SampleBelow(const Scene& scene, const Intersector& intersector, const Mater
     if (!(passed < ray.t_max)) break;
     ray = {next, direction, ray.t_max - passed};
   }
-  if (!is_found) return false;
+  if (met == 0) return false;
 
   // The density of the point, over all axes and channels that might have been drawn.
   const Vec3 way = left.surface.position - surface.position;

@@ -208,21 +208,25 @@ Double3 CosineDirection(double u1, double u2) {
   return {sine * std::cos(phi), sine * std::sin(phi), std::sqrt(1 - u1)};
 }
 
+// What the facet reflects. False: nothing.
+bool ReflectAtFacet(const Surface& surface, const Facet& facet, Double3 up, double side,
+                    Scattered& out) {
+  const Double3 reflected = facet.m * (2 * facet.cos_m) - up;
+  if (!(reflected.z > 0)) return false;
+  const double weight = FacetWeight(surface, facet, up, reflected);
+  out.wi = reflected * side;
+  out.weight = {weight, weight, weight};
+  out.is_delta = surface.is_coat_smooth;
+  return true;
+}
+
 // A walk through a coat: down through its surface, to the base and up again, as often as it takes.
 bool ScatterInCoat(const Surface& surface, Double3 up, double side, const std::array<double, 3>& u,
                    Scattered& out) {
   const double eta = surface.ior;
   Facet facet;
   if (!MeetFacet(surface, up, eta, u[1], u[2], facet)) return false;
-  if (u[0] < facet.share) {
-    const Double3 reflected = facet.m * (2 * facet.cos_m) - up;
-    if (!(reflected.z > 0)) return false;
-    const double weight = FacetWeight(surface, facet, up, reflected);
-    out.wi = reflected * side;
-    out.weight = {weight, weight, weight};
-    out.is_delta = surface.is_coat_smooth;
-    return true;
-  }
+  if (u[0] < facet.share) return ReflectAtFacet(surface, facet, up, side, out);
   // More numbers than the caller has.
   KeyedRng rng(CombineKeys(static_cast<std::uint64_t>(u[0] * 0x1p52),
                            static_cast<std::uint64_t>(u[1] * 0x1p52)));
@@ -624,15 +628,7 @@ class PathTracer {
     const Double3 up = wo * side;
     Facet facet;
     if (!MeetFacet(surface, up, surface.ior, u[1], u[2], facet)) return false;
-    if (u[0] < facet.share) {
-      const Double3 reflected = facet.m * (2 * facet.cos_m) - up;
-      if (!(reflected.z > 0)) return false;
-      const double weight = FacetWeight(surface, facet, up, reflected);
-      out.wi = reflected * side;
-      out.weight = {weight, weight, weight};
-      out.is_delta = surface.is_coat_smooth;
-      return true;
-    }
+    if (u[0] < facet.share) return ReflectAtFacet(surface, facet, up, side, out);
     const double entering =
         DrawnEntering(surface, up, u[1], u[2]) / std::max(1 - facet.share, 1e-12);
     constexpr double kFreePaths = 3;
