@@ -1,8 +1,8 @@
 // A dielectric surface over a medium that scatters light so densely that it comes out near where it
 // entered: `reflectance`, or a texture in its place, and `extinction`; or `absorption` and
-// `scattering`, from which they follow; `ior`, `alpha_u` and `alpha_v` of the surface, and
-// `phase_g` of the medium. The first part is what the surface reflects, the second what comes out
-// of it.
+// `scattering`, from which they follow; `ior`, `alpha_u` and `alpha_v` of the surface, or textures
+// of roughness in their places; `phase_g` of the medium. The first part is what the surface
+// reflects, the second what comes out of it.
 #include <algorithm>
 
 #include "render/math/color_space.h"
@@ -23,7 +23,7 @@ MaterialProperties SubsurfaceKind::Properties(const MaterialNumbers& material) {
     return properties;
   }
   properties.lobe_width = std::max(material.alpha_u, material.alpha_v);
-  properties.scatters_smoothly = is_smooth;
+  properties.scatters_smoothly = is_smooth || material.may_be_smooth;
   properties.has_rough_coat = !is_smooth;
   if (material.parts == Parts::kFirst) {
     properties.is_smooth = is_smooth;

@@ -18,6 +18,7 @@
 #include "render/formats/ply_file.h"
 #include "render/image/exr_file.h"
 #include "render/image/image.h"
+#include "tests/end_to_end/programs.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 
@@ -27,8 +28,6 @@ namespace {
 using nlohmann::json;
 using std::chrono::seconds;
 using testing::HasSubstr;
-
-const std::string kBin = LUCERNA_BIN_DIR;
 
 // A point light over a grey floor and a glass ball.
 constexpr const char* kScene = R"(

@@ -22,6 +22,7 @@
 #include "render/base/files.h"
 #include "render/film/reference.h"
 #include "render/image/exr_file.h"
+#include "tests/end_to_end/programs.h"
 
 namespace lucerna {
 namespace {
@@ -43,9 +44,6 @@ class ClientCommandsTest : public testing::Test {
   ~ClientCommandsTest() override { std::filesystem::remove_all(folder_); }
 
   [[nodiscard]] std::string In(const std::string& name) const { return folder_ + "/" + name; }
-  static std::string SceneOfTests(const std::string& name) {
-    return std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/" + name;
-  }
   static std::string Contents(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
     return {std::istreambuf_iterator<char>(file), {}};

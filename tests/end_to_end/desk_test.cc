@@ -16,6 +16,7 @@
 
 #include "render/base/files.h"
 #include "render/image/exr_file.h"
+#include "tests/end_to_end/programs.h"
 #include "tests/support/process.h"
 #include "tests/support/small_tev.h"
 #include "tests/support/temporary_folder.h"
@@ -25,13 +26,6 @@ namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
-
-const std::string kBin = LUCERNA_BIN_DIR;
-constexpr std::chrono::seconds kPatience{120};
-
-std::string SceneOfTests(const std::string& name) {
-  return std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/" + name;
-}
 
 Finished Lucerna(std::vector<std::string> words) {
   words.insert(words.begin(), kBin + "/lucerna");

@@ -5,12 +5,11 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
+#include "tests/end_to_end/programs.h"
 #include "tests/support/process.h"
 
 namespace lucerna {
 namespace {
-
-const std::string kBin = LUCERNA_BIN_DIR;
 
 class HelpTest : public testing::TestWithParam<const char*> {};
 

@@ -8,15 +8,13 @@
 #include "gtest/gtest.h"
 #include <nlohmann/json.hpp>
 
+#include "tests/end_to_end/programs.h"
 #include "tests/support/process.h"
 
 namespace lucerna {
 namespace {
 
 using nlohmann::json;
-
-const std::string kBin = LUCERNA_BIN_DIR;
-constexpr std::chrono::seconds kPatience{30};
 
 std::vector<json> LinesOf(const std::string& log) {
   std::vector<json> lines;

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "render/base/files.h"
+#include "tests/end_to_end/programs.h"
 #include "tests/support/on_terminal.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
@@ -18,15 +19,9 @@ namespace {
 
 using testing::HasSubstr;
 
-const std::string kBin = LUCERNA_BIN_DIR;
-constexpr std::chrono::seconds kPatience{60};
-constexpr const char* kScene =
+constexpr const char* kTinyScene =
     "LookAt 0 0 9  0 0 0  0 1 0\nCamera \"perspective\"\nWorldBegin\n"
     "LightSource \"point\" \"point3 from\" [0 5 5]\nShape \"sphere\"\n";
-
-std::string SceneOfTests(const std::string& name) {
-  return std::string(LUCERNA_SOURCE_DIR) + "/tests/scenes/" + name;
-}
 
 bool IsAscii(const std::string& text) {
   return std::ranges::all_of(text, [](char c) { return static_cast<unsigned char>(c) < 0x80; });
@@ -87,7 +82,7 @@ TEST(LocaleTest, TheEnvironmentIsReadInTheOrderOfPosix) {
 TEST(LocaleTest, TextIsAsciiAndDataIsUtf8) {
   const TemporaryFolder folder;
   const std::string scene = folder.At("küche.pbrt");
-  ASSERT_TRUE(WriteFile(scene, kScene).ok());
+  ASSERT_TRUE(WriteFile(scene, kTinyScene).ok());
   const std::vector<std::string> words = {"validate", scene};
   const Finished in_utf8 = Lucerna({"LC_ALL=C.UTF-8"}, words);
   const Finished in_ascii = Lucerna({"LC_ALL=C"}, words);
@@ -109,9 +104,9 @@ TEST(LocaleTest, TextIsAsciiAndDataIsUtf8) {
     now.back() = folder.At("größe.exr");
     const Finished ran = Lucerna({variable}, now);
     EXPECT_EQ(ran.exit_code, 0) << ran.errors;
-    const auto json = nlohmann::json::parse(ran.output);
+    const auto printed = nlohmann::json::parse(ran.output);
     EXPECT_THAT(ran.output, HasSubstr("größe.exr"));
-    return json.at("name").get<std::string>();
+    return printed.at("name").get<std::string>();
   };
   EXPECT_EQ(json_of("LC_ALL=C"), "küche.pbrt");
   EXPECT_EQ(json_of("LC_ALL=C.UTF-8"), "küche.pbrt");
@@ -120,7 +115,7 @@ TEST(LocaleTest, TextIsAsciiAndDataIsUtf8) {
 TEST(LocaleTest, TheLogOfAServiceIsInTheCharactersOfTheLocaleAndItsJsonInUtf8) {
   const TemporaryFolder folder;
   const std::string scene = folder.At("küche.pbrt");
-  ASSERT_TRUE(WriteFile(scene, kScene).ok());
+  ASSERT_TRUE(WriteFile(scene, kTinyScene).ok());
   const auto log = [&](const std::string& variable, const std::string& format) {
     ChildProcess server({"/usr/bin/env", variable, kBin + "/lucerna-server", "--listen",
                          "127.0.0.1:0", "--log-format", format});

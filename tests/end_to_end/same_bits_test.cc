@@ -16,13 +16,12 @@
 #include "gtest/gtest.h"
 #include <signal.h>
 
+#include "tests/end_to_end/programs.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 
 namespace lucerna {
 namespace {
-
-const std::string kBin = LUCERNA_BIN_DIR;
 
 struct Fleet {
   int workers;

@@ -10,14 +10,12 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "tests/end_to_end/programs.h"
 #include "tests/support/process.h"
 #include "tests/support/temporary_folder.h"
 
 namespace lucerna {
 namespace {
-
-const std::string kBin = LUCERNA_BIN_DIR;
-constexpr std::chrono::seconds kPatience{60};
 
 class Manager {
  public:

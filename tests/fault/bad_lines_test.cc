@@ -21,9 +21,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr const char* kScene = "glass-box.pbrt";
-constexpr int kPasses = 6;
-constexpr std::int64_t kPhotons = 100'000;
+// A pass.
+constexpr std::int64_t kFewPhotons = 100'000;
 
 std::unique_ptr<ChildProcess> WorkerOver(const FaultProxy& line,
                                          const std::vector<std::string>& more = {}) {
@@ -37,7 +36,7 @@ const std::string& QuietDigest() {
   static const std::string digest = [] {
     CoordinatorProcess coordinator;
     const auto worker = coordinator.StartWorker();
-    const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+    const std::string job = coordinator.Submit(kScene, kPasses, kFewPhotons);
     EXPECT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
     return coordinator.ImageDigest(job).Hex();
   }();
@@ -50,16 +49,6 @@ void ExpectQuietDigest(CoordinatorProcess& coordinator, const std::string& job) 
   EXPECT_EQ(coordinator.ImageDigest(job).Hex(), QuietDigest());
 }
 
-bool WaitForPasses(CoordinatorProcess& coordinator, const std::string& job, std::int64_t passes) {
-  for (int i = 0; i < 12000; ++i) {
-    const v1::Job now = coordinator.Get(job);
-    if (now.progress().passes() >= passes) return true;
-    if (now.state() > v1::JOB_STATE_RUNNING) return false;
-    std::this_thread::sleep_for(milliseconds(5));
-  }
-  return false;
-}
-
 TEST(BadLinesTest, ASecondOfDelayEachWayAnd100KilobytesASecond) {
   CoordinatorProcess coordinator;
   FaultProxy line(coordinator.address());
@@ -67,7 +56,7 @@ TEST(BadLinesTest, ASecondOfDelayEachWayAnd100KilobytesASecond) {
   line.SetRate(100'000);
   const auto worker = WorkerOver(line);
   ASSERT_TRUE(worker->WaitForText("joined", kPatience)) << worker->Errors();
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  const std::string job = coordinator.Submit(kScene, kPasses, kFewPhotons);
   ExpectQuietDigest(coordinator, job);
   // A connection for messages and one for bytes in bulk, and no attempt that was given up.
   EXPECT_EQ(line.connections(), 2) << worker->Errors();
@@ -95,9 +84,9 @@ TEST(BadLinesTest, ConnectionsThatAreCutAgainAndAgain) {
   CoordinatorProcess coordinator;
   FaultProxy line(coordinator.address());
   const auto worker = WorkerOver(line);
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  const std::string job = coordinator.Submit(kScene, kPasses, kFewPhotons);
   for (const int passes : {1, 2, 4}) {
-    ASSERT_TRUE(WaitForPasses(coordinator, job, passes));
+    ASSERT_TRUE(coordinator.WaitForPasses(job, passes));
     const int before = line.connections();
     line.Cut();
     for (int i = 0; i < 6000 && line.connections() == before; ++i)
@@ -110,8 +99,8 @@ TEST(BadLinesTest, AHalfOpenConnectionCostsTimeOnly) {
   CoordinatorProcess coordinator;
   FaultProxy line(coordinator.address());
   const auto lost = WorkerOver(line);
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
-  ASSERT_TRUE(WaitForPasses(coordinator, job, 1));
+  const std::string job = coordinator.Submit(kScene, kPasses, kFewPhotons);
+  ASSERT_TRUE(coordinator.WaitForPasses(job, 1));
   // From now on nothing comes through, and neither side is told.
   line.SetSwallow(true);
   const auto worker = coordinator.StartWorker();
@@ -135,7 +124,7 @@ TEST(BadLinesTest, FlippedBitsNeverReachTheImage) {
   FaultProxy line(coordinator.address());
   line.SetFlipEvery(30'000);
   const auto worker = WorkerOver(line);
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  const std::string job = coordinator.Submit(kScene, kPasses, kFewPhotons);
   for (int i = 0; i < 12000 && line.flips() < 3; ++i)
     std::this_thread::sleep_for(milliseconds(10));
   ASSERT_GE(line.flips(), 3);

@@ -66,13 +66,6 @@ void ExpectQuietEnd(CoordinatorProcess& coordinator, const v1::Job& job,
   EXPECT_EQ(coordinator.ImageDigest(job.job_id()).Hex(), QuietDigest(small_job).Hex());
 }
 
-// Waits until the job has merged so many passes.
-void WaitForPasses(CoordinatorProcess& coordinator, const std::string& job, std::int64_t passes) {
-  for (int i = 0; i < 6000 && coordinator.Get(job).progress().passes() < passes; ++i)
-    std::this_thread::sleep_for(milliseconds(10));
-  ASSERT_LT(coordinator.Get(job).state(), v1::JOB_STATE_SUCCEEDED) << "the job is too short";
-}
-
 // Every step at which something becomes durable, and some of them later in a job's life. The second
 // blob is the image, the first is the scene; the second row is that of the end.
 class KilledCoordinatorTest : public testing::TestWithParam<const char*> {};
@@ -254,7 +247,7 @@ TEST(TerminatedCoordinatorTest, KeepsACheckpointAndLeavesWellAndTheNextOneGoesOn
   auto coordinator = std::make_unique<CoordinatorProcess>(flags, address);
   const auto worker = coordinator->StartWorker();
   const std::string job = coordinator->TrySubmit(kLongJob).value();
-  WaitForPasses(*coordinator, job, 6);
+  ASSERT_TRUE(coordinator->WaitForPasses(job, 6)) << "the job is too short";
   coordinator->process().Signal(SIGTERM);
   EXPECT_EQ(coordinator->process().WaitForExit(kPatience), 0) << coordinator->process().Errors();
   EXPECT_THAT(coordinator->process().Errors(), HasSubstr("goes on when"));
@@ -271,7 +264,7 @@ TEST(RestartedCoordinatorTest, WorkersAndWatchersComeBackByThemselves) {
   const auto worker = coordinator->StartWorker();
   const std::string job = coordinator->TrySubmit(kLongJob).value();
   ChildProcess client({kBin + "/lucerna", "watch", job, "--server", address});
-  WaitForPasses(*coordinator, job, 4);
+  ASSERT_TRUE(coordinator->WaitForPasses(job, 4)) << "the job is too short";
   coordinator->process().Signal(SIGKILL);
   ASSERT_TRUE(coordinator->process().WaitForExit(kPatience));
   std::this_thread::sleep_for(seconds(10));
@@ -358,7 +351,7 @@ TEST(FullDiskTest, TheJobPausesAndSaysSoAndGoesOnWhenThereIsRoom) {
   CoordinatorProcess coordinator(KeptIn(disk.state()));
   const auto worker = coordinator.StartWorker();
   const std::string job = coordinator.TrySubmit(kLongJob).value();
-  WaitForPasses(coordinator, job, 3);
+  ASSERT_TRUE(coordinator.WaitForPasses(job, 3)) << "the job is too short";
   disk.Fill();
   for (int i = 0; i < 6000 && coordinator.Get(job).condition().empty(); ++i)
     std::this_thread::sleep_for(milliseconds(10));
@@ -391,7 +384,7 @@ TEST(FullDiskTest, AnImageThatDoesNotFitIsKeptWhenThereIsRoom) {
   CoordinatorProcess coordinator({"--state", disk.state(), "--checkpoint-share", "1e-9"});
   const auto worker = coordinator.StartWorker();
   const std::string job = coordinator.TrySubmit(kLongJob).value();
-  WaitForPasses(coordinator, job, 3);
+  ASSERT_TRUE(coordinator.WaitForPasses(job, 3)) << "the job is too short";
   disk.Fill();
   for (int i = 0; i < 6000 && coordinator.Get(job).condition().empty(); ++i)
     std::this_thread::sleep_for(milliseconds(10));
@@ -406,7 +399,7 @@ TEST(FullDiskTest, AReadOnlyDiskPausesTheJobToo) {
   CoordinatorProcess coordinator(KeptIn(disk.state()));
   const auto worker = coordinator.StartWorker();
   const std::string job = coordinator.TrySubmit(kLongJob).value();
-  WaitForPasses(coordinator, job, 3);
+  ASSERT_TRUE(coordinator.WaitForPasses(job, 3)) << "the job is too short";
   const std::string checkpoints = disk.state() + "/checkpoints";
   ASSERT_EQ(::mount(checkpoints.c_str(), checkpoints.c_str(), nullptr, MS_BIND, nullptr), 0);
   ASSERT_EQ(

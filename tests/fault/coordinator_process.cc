@@ -187,6 +187,28 @@ v1::Job CoordinatorProcess::Wait(const std::string& job_id) {
   return TryWait(job_id).value_or(v1::Job());
 }
 
+bool CoordinatorProcess::WaitForProgress(const std::string& job_id,
+                                         const std::function<bool(const v1::Progress&)>& is_there) {
+  const auto give_up_at = std::chrono::steady_clock::now() + kPatience;
+  while (std::chrono::steady_clock::now() < give_up_at) {
+    const v1::Job now = Get(job_id);
+    if (now.state() > v1::JOB_STATE_RUNNING) return false;
+    if (is_there(now.progress())) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return false;
+}
+
+bool CoordinatorProcess::WaitForPasses(const std::string& job_id, std::int64_t passes) {
+  return WaitForProgress(job_id,
+                         [&](const v1::Progress& progress) { return progress.passes() >= passes; });
+}
+
+bool CoordinatorProcess::WaitForPhotons(const std::string& job_id, std::uint64_t photons) {
+  return WaitForProgress(
+      job_id, [&](const v1::Progress& progress) { return progress.photons() >= photons; });
+}
+
 Digest CoordinatorProcess::ImageDigest(const std::string& job_id) {
   v1::GetImageRequest request;
   request.set_job_id(job_id);

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -27,11 +28,16 @@ inline const std::string kTestScenes = LUCERNA_SOURCE_DIR "/tests/scenes";
 // it.
 [[nodiscard]] std::string FreeAddress();
 
+// The job of most of these tests.
+inline constexpr const char* kScene = "glass-box.pbrt";
+inline constexpr int kPasses = 6;
+inline constexpr std::int64_t kPhotonsAPass = 400'000;
+
 // What a job of these tests is: a scene of ours in 64×64 pixels.
 struct SmallJob {
-  std::string scene = "glass-box.pbrt";
-  int passes = 6;
-  std::int64_t photons = 400'000;  // a pass
+  std::string scene = kScene;
+  int passes = kPasses;
+  std::int64_t photons = kPhotonsAPass;  // a pass
   std::string request_id = "the only one";
   std::string name = {};  // empty: the scene's
   double time_s = 0;      // above 0: ends after so long, and not by passes
@@ -78,6 +84,9 @@ class CoordinatorProcess {
   std::vector<v1::Job> List();
   // The job when it has ended, or as it is after some minutes.
   v1::Job Wait(const std::string& job_id);
+  // Until the job has merged so much; false when it ended before, or kPatience passed.
+  [[nodiscard]] bool WaitForPasses(const std::string& job_id, std::int64_t passes);
+  [[nodiscard]] bool WaitForPhotons(const std::string& job_id, std::uint64_t photons);
   Digest ImageDigest(const std::string& job_id);
 
  private:
@@ -85,6 +94,9 @@ class CoordinatorProcess {
   explicit CoordinatorProcess(NotStarted /*tag*/) {}
   void Start(std::vector<std::string> command, std::vector<std::string> flags,
              const std::string& address);
+
+  bool WaitForProgress(const std::string& job_id,
+                       const std::function<bool(const v1::Progress&)>& is_there);
 
   std::unique_ptr<ChildProcess> process_;
   std::string address_;

@@ -21,7 +21,7 @@ using testing::HasSubstr;
 
 // Ended jobs of it have two checkpoints of some 0.9 MB each, and such a job needs three and its
 // files to be accepted.
-constexpr SmallJob kJob = {.passes = 8, .photons = 5'000};
+constexpr SmallJob kShortJob = {.passes = 8, .photons = 5'000};
 constexpr std::uint64_t kLimit = 5'000'000;
 
 std::vector<std::string> KeptIn(const std::string& folder, std::uint64_t max_disk) {
@@ -41,7 +41,7 @@ std::uint64_t SizeOfAll(const std::string& folder) {
 TEST(DiskLimitTest, AJobThatCannotFitIsRefusedInOneSentence) {
   const TemporaryFolder folder;
   CoordinatorProcess coordinator(KeptIn(folder.path(), 1'000'000));
-  const auto refused = coordinator.TrySubmit(kJob);
+  const auto refused = coordinator.TrySubmit(kShortJob);
   EXPECT_TRUE(absl::IsResourceExhausted(refused.status())) << refused.status();
   EXPECT_THAT(std::string(refused.status().message()), HasSubstr("--max-disk"));
   EXPECT_TRUE(coordinator.List().empty());
@@ -54,7 +54,7 @@ TEST(DiskLimitTest, ThoseThatEndedFirstMakeRoomForNewOnes) {
   const auto worker = coordinator.StartWorker();
   std::vector<std::string> jobs;
   for (int i = 0; i < 5; ++i) {
-    SmallJob job = kJob;
+    SmallJob job = kShortJob;
     job.request_id = std::to_string(i);
     const auto submitted = coordinator.TrySubmit(job);
     ASSERT_TRUE(submitted.ok()) << submitted.status();
@@ -71,7 +71,7 @@ TEST(DiskLimitTest, ThoseThatEndedFirstMakeRoomForNewOnes) {
   std::ranges::reverse(jobs);
   jobs.resize(kept.size());
   EXPECT_EQ(kept, jobs);
-  const Digest quiet = UnfaultedDigest(kJob.scene, kJob.passes, kJob.photons);
+  const Digest quiet = UnfaultedDigest(kShortJob.scene, kShortJob.passes, kShortJob.photons);
   EXPECT_EQ(coordinator.ImageDigest(kept.back()).Hex(), quiet.Hex());
 }
 
@@ -79,8 +79,8 @@ TEST(DiskLimitTest, JobsThatHaveNotEndedKeepTheirRoom) {
   const TemporaryFolder folder;
   // No worker, so that the first one waits.
   CoordinatorProcess coordinator(KeptIn(folder.path(), kLimit));
-  const std::string first = coordinator.TrySubmit(kJob).value();
-  SmallJob other = kJob;
+  const std::string first = coordinator.TrySubmit(kShortJob).value();
+  SmallJob other = kShortJob;
   other.request_id = "other";
   const auto refused = coordinator.TrySubmit(other);
   EXPECT_TRUE(absl::IsResourceExhausted(refused.status())) << refused.status();

@@ -24,7 +24,7 @@ SmallJob JobNamed(const std::string& request_id, int passes) {
   return {.passes = passes, .photons = 20'000, .request_id = request_id};
 }
 
-const std::vector<int> kPasses = {24, 40, 31};
+const std::vector<int> kPassesOfJobs = {24, 40, 31};
 
 // Alone on a coordinator, one after the other.
 const std::vector<std::string>& QuietDigests() {
@@ -32,7 +32,7 @@ const std::vector<std::string>& QuietDigests() {
     CoordinatorProcess coordinator({"--jobs-at-once", "1"});
     const auto worker = coordinator.StartWorker();
     std::vector<std::string> found;
-    for (const int passes : kPasses) {
+    for (const int passes : kPassesOfJobs) {
       const std::string job = coordinator.TrySubmit(JobNamed(absl::StrCat(passes), passes)).value();
       EXPECT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
       found.push_back(coordinator.ImageDigest(job).Hex());
@@ -44,7 +44,7 @@ const std::vector<std::string>& QuietDigests() {
 
 std::vector<std::string> SubmitAll(CoordinatorProcess& coordinator) {
   std::vector<std::string> jobs;
-  for (const int passes : kPasses)
+  for (const int passes : kPassesOfJobs)
     jobs.push_back(coordinator.TrySubmit(JobNamed(absl::StrCat(passes), passes)).value());
   return jobs;
 }
@@ -53,8 +53,8 @@ void ExpectQuietEnds(CoordinatorProcess& coordinator, const std::vector<std::str
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const v1::Job ended = coordinator.Wait(jobs[i]);
     ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
-    EXPECT_EQ(ended.progress().passes(), kPasses[i]);
-    EXPECT_EQ(ended.progress().photons(), static_cast<std::uint64_t>(kPasses[i]) * 20'000);
+    EXPECT_EQ(ended.progress().passes(), kPassesOfJobs[i]);
+    EXPECT_EQ(ended.progress().photons(), static_cast<std::uint64_t>(kPassesOfJobs[i]) * 20'000);
     EXPECT_EQ(coordinator.ImageDigest(jobs[i]).Hex(), QuietDigests()[i]);
   }
 }
@@ -136,7 +136,7 @@ TEST(ManyJobsFaultTest, StormsOfPauseResumePriorityAndExtendEndInTheQuietBits) {
         (void)SetPriority(coordinator, job, static_cast<int>(rng.Bits() % 5));
         break;
       default:
-        (void)Extend(coordinator, job, kPasses[which]);
+        (void)Extend(coordinator, job, kPassesOfJobs[which]);
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(rng.Bits() % 8));
   }
@@ -193,29 +193,29 @@ TEST_F(RestartTest, ANewEndOfAPausedJobSurvivesACrash) {
   WaitFor(*coordinator_, job, [](const v1::Job& now) { return now.progress().passes() >= 3; });
   ASSERT_TRUE(Pause(*coordinator_, job).ok());
   // Else the quiet run would have fewer passes.
-  ASSERT_LT(coordinator_->Get(job).progress().passes(), kPasses[1]);
-  ASSERT_TRUE(Extend(*coordinator_, job, kPasses[1]).ok());
+  ASSERT_LT(coordinator_->Get(job).progress().passes(), kPassesOfJobs[1]);
+  ASSERT_TRUE(Extend(*coordinator_, job, kPassesOfJobs[1]).ok());
   End(SIGKILL);
   Start();
   ASSERT_TRUE(Resume(*coordinator_, job).ok());
   const v1::Job ended = coordinator_->Wait(job);
   ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
-  EXPECT_EQ(ended.progress().passes(), kPasses[1]);
+  EXPECT_EQ(ended.progress().passes(), kPassesOfJobs[1]);
   EXPECT_EQ(coordinator_->ImageDigest(job).Hex(), QuietDigests()[1]);
 }
 
 TEST_F(RestartTest, AnEndedJobGoesOnAfterACrashWhenItIsExtended) {
   Start();
   const auto worker = coordinator_->StartWorker();
-  const std::string job = coordinator_->TrySubmit(JobNamed("one", kPasses[0])).value();
+  const std::string job = coordinator_->TrySubmit(JobNamed("one", kPassesOfJobs[0])).value();
   ASSERT_EQ(coordinator_->Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
   End(SIGKILL);
   Start();
-  ASSERT_TRUE(Extend(*coordinator_, job, kPasses[1]).ok());
+  ASSERT_TRUE(Extend(*coordinator_, job, kPassesOfJobs[1]).ok());
   const v1::Job ended = coordinator_->Wait(job);
   ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
-  EXPECT_EQ(ended.progress().passes(), kPasses[1]);
-  EXPECT_EQ(ended.progress().photons(), static_cast<std::uint64_t>(kPasses[1]) * 20'000);
+  EXPECT_EQ(ended.progress().passes(), kPassesOfJobs[1]);
+  EXPECT_EQ(ended.progress().photons(), static_cast<std::uint64_t>(kPassesOfJobs[1]) * 20'000);
   EXPECT_EQ(coordinator_->ImageDigest(job).Hex(), QuietDigests()[1]);
 }
 
@@ -225,12 +225,12 @@ double RunningSeconds(const v1::Job& job) {
 }
 
 TEST_F(RestartTest, TimeBeforeARestartCountsAndTimeWithoutAWorkerDoesNot) {
-  constexpr double kLimit = 4;
+  constexpr double kTimeLimit = 4;
   Start();
   std::string job;
   {
     const auto worker = coordinator_->StartWorker();
-    job = coordinator_->TrySubmit({.photons = 20'000, .time_s = kLimit}).value();
+    job = coordinator_->TrySubmit({.photons = 20'000, .time_s = kTimeLimit}).value();
     WaitFor(*coordinator_, job, [](const v1::Job& now) { return RunningSeconds(now) >= 1; });
     ASSERT_EQ(coordinator_->Get(job).state(), v1::JOB_STATE_RUNNING);
     End(SIGKILL);
@@ -248,7 +248,7 @@ TEST_F(RestartTest, TimeBeforeARestartCountsAndTimeWithoutAWorkerDoesNot) {
   const auto worker = coordinator_->StartWorker();
   const v1::Job ended = coordinator_->Wait(job);
   ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
-  EXPECT_GE(RunningSeconds(ended), kLimit);
+  EXPECT_GE(RunningSeconds(ended), kTimeLimit);
   EXPECT_GT(ended.progress().passes(), after.progress().passes());
 }
 

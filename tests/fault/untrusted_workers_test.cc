@@ -21,10 +21,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr int kPasses = 6;
-constexpr std::int64_t kPhotons = 400'000;
-constexpr std::uint64_t kAllPhotons = kPasses * static_cast<std::uint64_t>(kPhotons);
-const char* const kScene = "glass-box.pbrt";
+constexpr std::uint64_t kAllPhotons = kPasses * static_cast<std::uint64_t>(kPhotonsAPass);
 
 std::vector<v1::Worker> WorkersOf(CoordinatorProcess& coordinator) {
   grpc::ClientContext context;
@@ -46,21 +43,12 @@ bool WaitForWorkers(CoordinatorProcess& coordinator, const Condition& is_so) {
   return true;
 }
 
-bool WaitForPhotons(CoordinatorProcess& coordinator, const std::string& job,
-                    std::uint64_t photons) {
-  const auto give_up_at = std::chrono::steady_clock::now() + kPatience;
-  while (coordinator.Get(job).progress().photons() < photons) {
-    if (std::chrono::steady_clock::now() > give_up_at) return false;
-    std::this_thread::sleep_for(milliseconds(5));
-  }
-  return true;
-}
-
 void ExpectUnfaulted(CoordinatorProcess& coordinator, const std::string& job) {
   const v1::Job ended = coordinator.Wait(job);
   ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
   EXPECT_EQ(ended.progress().tally().photons(), kAllPhotons) << "each photon once";
-  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest(kScene, kPasses, kPhotons).Hex());
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(),
+            UnfaultedDigest(kScene, kPasses, kPhotonsAPass).Hex());
 }
 
 class KilledAtCommitTest : public testing::TestWithParam<const char*> {};
@@ -68,7 +56,7 @@ class KilledAtCommitTest : public testing::TestWithParam<const char*> {};
 TEST_P(KilledAtCommitTest, AnotherWorkerBringsTheSameBits) {
   CoordinatorProcess coordinator({"--batch-photons", "100000"});
   const auto doomed = coordinator.StartFaultyWorker(GetParam());
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotonsAPass);
   ASSERT_EQ(doomed->WaitForExit(kPatience), 128 + SIGKILL) << doomed->Errors();
   const auto replacement = coordinator.StartWorker();
   ExpectUnfaulted(coordinator, job);
@@ -84,7 +72,7 @@ class KilledAtSliceTest : public testing::TestWithParam<const char*> {};
 TEST_P(KilledAtSliceTest, AnotherWorkerBringsTheSameBits) {
   CoordinatorProcess coordinator;
   const auto doomed = coordinator.StartFaultyWorker(GetParam());
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotonsAPass);
   ASSERT_EQ(doomed->WaitForExit(kPatience), 128 + SIGKILL) << doomed->Errors();
   const auto replacement = coordinator.StartWorker();
   ExpectUnfaulted(coordinator, job);
@@ -104,7 +92,7 @@ class FaultyCommitTest : public testing::TestWithParam<CommitFault> {
   void ExpectUnfaultedWith(const std::vector<std::string>& flags) {
     CoordinatorProcess coordinator(flags);
     const auto faulty = coordinator.StartFaultyWorker(GetParam().name);
-    const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+    const std::string job = coordinator.Submit(kScene, kPasses, kPhotonsAPass);
     ASSERT_TRUE(faulty->WaitForText(GetParam().answer, kPatience)) << faulty->Errors();
     const auto sound = coordinator.StartWorker();
     ASSERT_TRUE(sound->WaitForText("joined", kPatience));
@@ -145,8 +133,8 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(StoppedWorkerTest, IsReplacedWhileItStandsStillAndIsHarmlessAfterwards) {
   CoordinatorProcess coordinator({"--batch-photons", "100000"});
   const auto stopped = coordinator.StartWorker();
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
-  ASSERT_TRUE(WaitForPhotons(coordinator, job, 1));
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotonsAPass);
+  ASSERT_TRUE(coordinator.WaitForPhotons(job, 1));
   ASSERT_TRUE(WaitForWorkers(coordinator, [](const std::vector<v1::Worker>& workers) {
     return workers.size() == 1 && workers[0].leases_held() > 0;
   }));
@@ -173,8 +161,8 @@ TEST(ManyWorkersTest, OneThenEightThenTwoBringTheSameBits) {
   CoordinatorProcess coordinator({"--batch-photons", "20000"});
   std::vector<std::unique_ptr<ChildProcess>> workers;
   workers.push_back(coordinator.StartWorker());
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
-  ASSERT_TRUE(WaitForPhotons(coordinator, job, 1));
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotonsAPass);
+  ASSERT_TRUE(coordinator.WaitForPhotons(job, 1));
   while (workers.size() < 8)
     workers.push_back(coordinator.StartWorker());
   ASSERT_TRUE(WaitForWorkers(coordinator,
@@ -228,7 +216,7 @@ TEST(LiarTest, ThatReturnsZerosIsFoundAtOnce) {
   ASSERT_TRUE(liar->WaitForText("joined", kPatience));
   const auto honest = coordinator.StartWorker();
   ASSERT_TRUE(honest->WaitForText("joined", kPatience));
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotonsAPass);
   ExpectUnfaulted(coordinator, job);
   EXPECT_TRUE(WaitForWorkers(coordinator, HasOneInQuarantine));
   EXPECT_NE(coordinator.process().Errors().find("is refused"), std::string::npos);
@@ -239,9 +227,9 @@ TEST(LiarTest, ThatReturnsZerosIsFoundAtOnce) {
 TEST(LiarTest, ThatChangesOneBitIsFoundByAuditsAndItsWorkIsTakenOut) {
   CoordinatorProcess coordinator({"--batch-photons", "20000", "--audit-share", "0.3"});
   const auto liar = coordinator.StartFaultyWorker("result.flipped");
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotonsAPass);
   // While it is alone its work is believed.
-  ASSERT_TRUE(WaitForPhotons(coordinator, job, 1));
+  ASSERT_TRUE(coordinator.WaitForPhotons(job, 1));
   const auto first = coordinator.StartWorker();
   const auto second = coordinator.StartWorker();
   ExpectUnfaulted(coordinator, job);
@@ -260,7 +248,7 @@ TEST(LiarTest, IsTakenOutOfCheckpointsToo) {
     const auto liar = coordinator.StartFaultyWorker("result.flipped");
     const SmallJob small = {.scene = kScene, .passes = 60, .photons = 20'000};
     const std::string job = coordinator.TrySubmit(small).value();
-    ASSERT_TRUE(WaitForPhotons(coordinator, job, 5 * 20'000));
+    ASSERT_TRUE(coordinator.WaitForPhotons(job, 5 * 20'000));
     const auto first = coordinator.StartWorker();
     const auto second = coordinator.StartWorker();
     const v1::Job ended = coordinator.Wait(job);

@@ -24,39 +24,25 @@ using std::chrono::seconds;
 // For what must come before the lease of 10 s, renewed every few seconds, can end by itself.
 constexpr seconds kBeforeLeasesEnd{5};
 
-constexpr int kPasses = 6;
-constexpr std::int64_t kPhotons = 400'000;
-const char* const kScene = "glass-box.pbrt";
 const std::vector<std::string> kSmallBatches = {"--batch-photons", "50000"};
-
-// Waits until the job has merged so many photons; false when it ended or a minute passed.
-bool WaitForPhotons(CoordinatorProcess& coordinator, const std::string& job,
-                    std::uint64_t photons) {
-  for (int i = 0; i < 6000; ++i) {
-    const v1::Job now = coordinator.Get(job);
-    if (now.state() > v1::JOB_STATE_RUNNING) return false;
-    if (now.progress().photons() >= photons) return true;
-    std::this_thread::sleep_for(milliseconds(10));
-  }
-  return false;
-}
 
 class KilledWorkerTest : public testing::TestWithParam<int> {};
 
 TEST_P(KilledWorkerTest, IsReplacedAndTheImageIsTheSame) {
   CoordinatorProcess coordinator(kSmallBatches);
   auto worker = coordinator.StartWorker();
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
-  ASSERT_TRUE(
-      WaitForPhotons(coordinator, job, static_cast<std::uint64_t>(GetParam() * kPhotons / 2 + 1)));
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotonsAPass);
+  ASSERT_TRUE(coordinator.WaitForPhotons(
+      job, static_cast<std::uint64_t>(GetParam() * kPhotonsAPass / 2 + 1)));
   worker->Signal(SIGKILL);
   ASSERT_EQ(worker->WaitForExit(kPatience), 128 + SIGKILL);
   const auto replacement = coordinator.StartWorker();
   const v1::Job ended = coordinator.Wait(job);
   ASSERT_EQ(ended.state(), v1::JOB_STATE_SUCCEEDED) << ended.failure();
-  EXPECT_EQ(ended.progress().tally().photons(), static_cast<std::uint64_t>(kPasses * kPhotons))
+  EXPECT_EQ(ended.progress().tally().photons(), static_cast<std::uint64_t>(kPasses * kPhotonsAPass))
       << "each photon once";
-  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest(kScene, kPasses, kPhotons).Hex());
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(),
+            UnfaultedDigest(kScene, kPasses, kPhotonsAPass).Hex());
 }
 
 INSTANTIATE_TEST_SUITE_P(AtSeveralMoments, KilledWorkerTest, testing::Values(0, 3, 7));
@@ -77,8 +63,8 @@ TEST(WorkerFaultsTest, ABatchOfAKilledWorkerGoesBackAtOnceAndNotAfterTenSeconds)
 TEST(WorkerFaultsTest, AWorkerThatIsTerminatedLeavesBeforeItsLeaseEndsAndItsBatchIsDoneByAnother) {
   CoordinatorProcess coordinator;
   auto worker = coordinator.StartWorker();
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
-  ASSERT_TRUE(WaitForPhotons(coordinator, job, 1));
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotonsAPass);
+  ASSERT_TRUE(coordinator.WaitForPhotons(job, 1));
   const auto begin = std::chrono::steady_clock::now();
   worker->Signal(SIGTERM);
   EXPECT_EQ(worker->WaitForExit(kPatience), 0) << worker->Errors();
@@ -86,7 +72,8 @@ TEST(WorkerFaultsTest, AWorkerThatIsTerminatedLeavesBeforeItsLeaseEndsAndItsBatc
   EXPECT_TRUE(coordinator.process().WaitForText("left", kPatience));
   const auto other = coordinator.StartWorker();
   ASSERT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest(kScene, kPasses, kPhotons).Hex());
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(),
+            UnfaultedDigest(kScene, kPasses, kPhotonsAPass).Hex());
 }
 
 TEST(WorkerFaultsTest, AnIdleWorkerLeavesSoon) {
@@ -143,7 +130,7 @@ TEST(WorkerFaultsTest, AnUnencryptedListenerBeyondThisMachineMustBeAskedFor) {
 
 TEST(WorkerFaultsTest, ACommitWithoutALeaseIsRefusedAndChangesNothing) {
   CoordinatorProcess coordinator;
-  const std::string job = coordinator.Submit(kScene, kPasses, kPhotons);
+  const std::string job = coordinator.Submit(kScene, kPasses, kPhotonsAPass);
   for (int i = 0; i < 12000 && coordinator.Get(job).state() != v1::JOB_STATE_RUNNING; ++i) {
     std::this_thread::sleep_for(milliseconds(5));
   }
@@ -151,7 +138,7 @@ TEST(WorkerFaultsTest, ACommitWithoutALeaseIsRefusedAndChangesNothing) {
   v1::CommitBatchRequest header;
   header.mutable_header()->set_job_id(job);
   header.mutable_header()->set_kind(v1::WORK_KIND_PHOTONS);
-  header.mutable_header()->set_last(kPhotons);
+  header.mutable_header()->set_last(kPhotonsAPass);
   header.mutable_header()->set_digest(std::string(Sha256(garbage).Bytes()));
   header.mutable_header()->set_size_bytes(garbage.size());
   v1::CommitBatchRequest bytes;
@@ -172,7 +159,8 @@ TEST(WorkerFaultsTest, ACommitWithoutALeaseIsRefusedAndChangesNothing) {
 
   const auto worker = coordinator.StartWorker();
   ASSERT_EQ(coordinator.Wait(job).state(), v1::JOB_STATE_SUCCEEDED);
-  EXPECT_EQ(coordinator.ImageDigest(job).Hex(), UnfaultedDigest(kScene, kPasses, kPhotons).Hex());
+  EXPECT_EQ(coordinator.ImageDigest(job).Hex(),
+            UnfaultedDigest(kScene, kPasses, kPhotonsAPass).Hex());
 }
 
 }  // namespace

@@ -38,7 +38,10 @@ class DispersionTest : public testing::TestWithParam<View> {
     const bool needs_photons = GetParam() == View::kFocus;
     RenderSettings settings = TestSettings(scene, needs_photons ? 10000 : 2000, 0.05, 6, seed);
     settings.spectral = false;
-    return HalvesOf(RenderLocally(scene, settings, needs_photons ? 8 : 48));
+    // Of the plain glasses there are so many that a few passes of each are enough. Radii shrink
+    // from pass to pass, so that where photons count all have as many.
+    const int passes = needs_photons ? 8 : glass.Disperses() ? 48 : 12;
+    return HalvesOf(RenderLocally(scene, settings, passes));
   }
 };
 

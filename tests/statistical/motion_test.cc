@@ -205,8 +205,8 @@ void ExpectEqual(const MeasuredMean& a, const MeasuredMean& b, double rounding) 
 TEST(MotionBlurTest, PhotonsPassForTheSameShare) {
   const Scene scene = SceneOf(Floor(kStrip + kSheet));
   const Scene open = SceneOf(Floor(kSheet));
-  const MeasuredMean blurred = Measure(scene, TestSettings(scene, 60000, .15, 4), 64, kParts, "R");
-  MeasuredMean all = Measure(open, TestSettings(open, 60000, .15, 4), 64, kParts, "R");
+  const MeasuredMean blurred = Measure(scene, TestSettings(scene, 20000, .15, 4), 64, kParts, "R");
+  MeasuredMean all = Measure(open, TestSettings(open, 20000, .15, 4), 64, kParts, "R");
   EXPECT_NEAR(all.mean / kLit, 1, 0.02) << "the light is not that of photons through the sheet";
   all.mean *= 1 - kDarkShare;
   all.standard_error *= 1 - kDarkShare;
@@ -262,7 +262,7 @@ TEST(MotionBlurTest, AWholeSceneIsTheMeanOfItsMoments) {
     }
     return blocks;
   };
-  constexpr int kRepeats = 16;
+  constexpr int kRepeats = 12;
   std::array<std::vector<double>, kBlocks> moving;
   std::array<std::vector<double>, kBlocks> still;
   for (int repeat = 0; repeat < kRepeats; ++repeat) {

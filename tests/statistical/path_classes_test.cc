@@ -73,6 +73,7 @@ enum class Floor {
   kHairs,
   kSubsurface,
   kRoughSubsurface,
+  kPatchySubsurface,
   kHazyCoat
 };
 enum class View { kPlain, kThroughGlass, kInMirror };
@@ -102,10 +103,10 @@ std::string NameOf(const PathClass& cell) {
                                                         "InGlassBall",
                                                         "InNarrowGlassBall",
                                                         "InRoughGlassBall"};
-  constexpr std::array<std::string_view, 17> kFloors = {
-      "Diffuse", "RoughMetal",  "NarrowMetal", "TexturedMetal",   "NarrowGlass", "RoughGlass",
-      "Coated",  "RoughCoated", "Sheet",       "Mixed",           "PatchyMetal", "PatchyCoat",
-      "Bumpy",   "Hair",        "Subsurface",  "RoughSubsurface", "HazyCoat"};
+  constexpr std::array<std::string_view, 18> kFloors = {
+      "Diffuse", "RoughMetal",  "NarrowMetal", "TexturedMetal",   "NarrowGlass",      "RoughGlass",
+      "Coated",  "RoughCoated", "Sheet",       "Mixed",           "PatchyMetal",      "PatchyCoat",
+      "Bumpy",   "Hair",        "Subsurface",  "RoughSubsurface", "PatchySubsurface", "HazyCoat"};
   constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
   std::string name(kLights[static_cast<std::size_t>(cell.light)]);
   name += kChains[static_cast<std::size_t>(cell.chain)];
@@ -119,7 +120,7 @@ bool GathersCaustics(Floor floor) {
   return floor == Floor::kNarrowMetal || floor == Floor::kTexturedMetal ||
          floor == Floor::kNarrowGlass || floor == Floor::kRoughCoated || floor == Floor::kMixed ||
          floor == Floor::kPatchyMetal || floor == Floor::kPatchyCoat ||
-         floor == Floor::kRoughSubsurface;
+         floor == Floor::kRoughSubsurface || floor == Floor::kPatchySubsurface;
 }
 bool IsWall(Chain chain) {
   return chain == Chain::kMirror || chain == Chain::kNarrowWall || chain == Chain::kDiffuseWall ||
@@ -289,6 +290,10 @@ Scene SceneOf(const PathClass& cell) {
     case Floor::kPatchyCoat:
       AddPatches(scene, 0.04F);
       floor_with_uv(AddMaterial(scene, Patchy(CoatedMaterial(0.8F, 0.2F, 0.5F))));
+      break;
+    case Floor::kPatchySubsurface:
+      AddPatches(scene, 0.04F);
+      floor_with_uv(AddMaterial(scene, Patchy(SubsurfaceMaterial(0.7F, kFreePath, 0.2F))));
       break;
     case Floor::kBumpy: {
       AddHeights(scene);
@@ -602,7 +607,7 @@ std::vector<PathClass> Cells() {
   // Light that comes out elsewhere than where it entered.
   add({kTriangles, kPoint}, {kNone, kPane}, {Floor::kSubsurface});
   add({kTriangles}, {kNone}, {Floor::kRoughSubsurface});
-  add({kTriangles, kPoint}, {kPane}, {Floor::kRoughSubsurface});
+  add({kTriangles, kPoint}, {kPane}, {Floor::kRoughSubsurface, Floor::kPatchySubsurface});
   add({kMap}, {kNone}, {Floor::kSubsurface});
   add({kTriangles}, {kDiffuseWall}, {Floor::kSubsurface});
   add({kTriangles}, {kSubsurfaceWall}, {Floor::kDiffuse, Floor::kSubsurface});

@@ -93,13 +93,13 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(  // Saturated walls, and wavelengths as the reference has them: 0.3 %, and
                       // three standard errors of the mean of 64 passes.
         Case{"cornell-box", "scene-v4.pbrt", 256, 256, 100, 64, false, 5, 1e-4, 0.005},
-        Case{"veach-bidir", "scene-v4.pbrt", 256, 256, 20, 64, false},
-        Case{"veach-mis", "scene-v4.pbrt", 256, 144, 100, 64, false},
+        Case{"veach-bidir", "scene-v4.pbrt", 256, 256, 20, 32, false},
+        Case{"veach-mis", "scene-v4.pbrt", 256, 144, 100, 32, false},
         // Its reference, of 300 eye paths a pixel, lacks most of the 14 pixels where
         // the light is seen by reflection in the water, once in some thousand paths.
-        Case{"water-caustic", "scene-v4.pbrt", 256, 256, 100, 64, false, 1, 3e-4},
-        Case{"sphere-box", "scene.pbrt", 256, 256, 100, 48, true},
-        Case{"sphere-caustic", "scene.pbrt", 256, 256, 100, 48, true}),
+        Case{"water-caustic", "scene-v4.pbrt", 256, 256, 100, 32, false, 1, 3e-4},
+        Case{"sphere-box", "scene.pbrt", 256, 256, 100, 32, true},
+        Case{"sphere-caustic", "scene.pbrt", 256, 256, 100, 32, true}),
     [](const testing::TestParamInfo<Case>& scene) {
       std::string name = scene.param.folder;
       for (char& letter : name) {

@@ -526,6 +526,26 @@ TEST(PbrtMaterialsTest, ReadsSubsurface) {
   EXPECT_EQ(read("\"string name\" \"Wholemilk\"").reflectance, milk.reflectance);
   EXPECT_NE(read("\"string name\" \"Ketchup\"").reflectance, milk.reflectance);
   EXPECT_NEAR(read("\"float scale\" 3").extinction.g, 3 * milk.extinction.g, 1e-4F);
+  // More of the sun's light is absorbed by espresso than by milk.
+  EXPECT_LT(read("\"string name\" \"Espresso\"").reflectance.g,
+            0.1F * read("\"string name\" \"Regular Milk\"").reflectance.g);
+}
+
+// A surface that is smooth at some places and rough at others, with what each lets through.
+TEST(PbrtMaterialsTest, RoughnessOfSubsurfaceMayBeATexture) {
+  const Scene scene = InWorkingSpace(ReadWorld(
+      "Texture \"r\" \"float\" \"checkerboard\" \"float tex1\" 0 \"float tex2\" 0.25 \"float "
+      "uscale\" 2 Material \"subsurface\" \"texture roughness\" \"r\" Shape \"sphere\""));
+  const Material& material =
+      scene.materials[static_cast<std::size_t>(scene.spheres[0].traits.material)];
+  EXPECT_TRUE(material.may_be_smooth);
+  EXPECT_TRUE(PropertiesOf(material).scatters_smoothly);
+  EXPECT_TRUE(PropertiesOf(material).has_rough_coat);
+  ASSERT_NE(material.coats, nullptr);
+  const Material rough =
+      ReadWorld("Material \"subsurface\" \"float roughness\" 0.25 Shape \"sphere\"")
+          .materials.back();
+  EXPECT_EQ(material.alpha_u, rough.alpha_u);
 }
 
 // Lengths below surfaces are lengths as others are.

@@ -95,10 +95,6 @@ void ReadSubsurface(const MaterialInput& input, Material& material) {
     ReadCoefficients(scale, input, material);
   }
   ReadRoughness("", Facets::kSurface, input, material);
-  if (material.HasRoughnessTexture()) {
-    parameters.Error(parameters.IsTexture("roughness") ? "roughness" : "uroughness",
-                     "must not be a texture that varies; give a number");
-  }
   const Rgb extinction = material.extinction + material.absorption + material.scattering;
   if (!IsFinite(extinction)) parameters.Error("mfp", "is too short for single precision");
 }
