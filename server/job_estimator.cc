@@ -136,7 +136,7 @@ TrueError TrueErrorOf(const ReferenceImage& reference,
 
 struct JobEstimator::State {
   State(Scene s, RenderSettings r, const SceneNeeds& needs, int threads)
-      : prepared(std::move(s)),
+      : prepared(std::move(s), threads),
         settings(r),
         team(threads),
         first_hits(needs.eye_sample_sets(), static_cast<std::size_t>(r.crop_width()) *

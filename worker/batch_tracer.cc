@@ -217,7 +217,7 @@ Status CheckDeposits(const std::vector<BatchTally>& tallies) {
 
 struct BatchTracer::State {
   State(Scene s, int threads)
-      : prepared(std::move(s)),
+      : prepared(std::move(s), threads),
         features(std::in_place, prepared.scene()),
         time_of_features(prepared.time()),
         team(threads) {}

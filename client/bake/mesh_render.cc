@@ -60,7 +60,7 @@ Rgb RadianceFactor(const Scene& scene, const EyeHitpoint& hitpoint) {
 StatusOr<MeshRender> RenderFromMesh(const Scene& scene, const RenderSettings& settings,
                                     const BakedMesh& mesh, int threads) {
   const SceneNeeds needs = NeedsOf(scene, settings);
-  PreparedScene prepared(scene);
+  PreparedScene prepared(scene, threads);
   LUCERNA_RETURN_IF_ERROR(prepared.PrepareFor(needs));
   const EyePathTracer tracer(prepared.scene(), settings, prepared.needs(), prepared.intersector(),
                              prepared.lights(),

@@ -6,8 +6,8 @@
 
 namespace lucerna {
 
-PreparedScene::PreparedScene(Scene rec709)
-    : scene_(InWorkingSpace(std::move(rec709))),
+PreparedScene::PreparedScene(Scene rec709, int threads)
+    : scene_(InWorkingSpace(std::move(rec709), threads)),
       time_(scene_.motion.shutter_open),
       mover_(scene_.motion.Moves() ? std::make_shared<const SceneMover>(scene_) : nullptr) {}
 

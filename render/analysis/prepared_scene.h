@@ -23,8 +23,8 @@ namespace lucerna {
 
 class PreparedScene {
  public:
-  // Takes a scene as readers return it, in Rec. 709.
-  explicit PreparedScene(Scene rec709);
+  // Takes a scene as readers return it, in Rec. 709. Threads as in InWorkingSpace.
+  explicit PreparedScene(Scene rec709, int threads = 1);
   PreparedScene(const PreparedScene&) = delete;
   PreparedScene& operator=(const PreparedScene&) = delete;
 

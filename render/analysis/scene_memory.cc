@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <set>
+#include <utility>
 
 #include "absl/strings/str_format.h"
 
 #include "render/geometry/bend_radii.h"
 #include "render/scene/measured_table.h"
 #include "render/scene/shape_lists.h"
+#include "render/scene/subsurface_table.h"
 
 namespace lucerna {
 namespace {
@@ -65,14 +67,14 @@ double OpenEdges(const TriangleMesh& mesh) {
 }  // namespace
 
 double SceneMemory::PeakOfCoordinator() const {
-  return files + kOfHeaps * (shapes + textures + moving +
+  return files + kOfHeaps * (shapes + textures + tables + moving +
                              std::max(analysing, acceleration + lights + at_another_time + bends +
                                                      std::max(building_trees, building_bends)));
 }
 
 double SceneMemory::PeakOfWorker() const {
   return kOfHeaps *
-         (shapes + textures + moving +
+         (shapes + textures + tables + moving +
           std::max(std::max(edges, building_edges), edges + acceleration + lights + bends +
                                                         std::max(building_trees, building_bends)));
 }
@@ -144,9 +146,14 @@ SceneMemory SceneMemoryOf(const Scene& scene, const RayNeeds& rays) {
   memory.edges = kSegment * open_edges;
 
   std::set<const MeasuredTable*> tables;
+  // Made from a material's numbers when the scene is prepared (transport/subsurface.h).
+  std::set<std::pair<float, float>> of_subsurface;
   for (const Material& material : scene.materials) {
     if (material.measured != nullptr && tables.insert(material.measured).second)
       memory.textures += static_cast<double>(material.measured->bytes());
+    if (material.kind == Material::Kind::kSubsurface &&
+        of_subsurface.emplace(material.ior, material.phase_g).second)
+      memory.tables += SubsurfaceTable::kBytes;
   }
   // A picture is in memory once, however many refer to it.
   std::set<const Picture*> pictures;

@@ -19,6 +19,7 @@ struct SceneMemory {
   double files = 0;         // as they were uploaded, which a coordinator keeps; 0: not counted
   double shapes = 0;        // meshes, analytic shapes, instances, materials, lights
   double textures = 0;      // pixels, also of environment maps
+  double tables = 0;        // of materials below whose surfaces light is scattered
   double acceleration = 0;  // Embree's trees, with the copies of positions that they refer to
   double instances = 0;     // of that, what stands for instances in the tree above
   double lights = 0;        // of emitting triangles
@@ -33,7 +34,7 @@ struct SceneMemory {
 
   // What a coordinator keeps of a job beside the image.
   [[nodiscard]] double KeptByCoordinator() const {
-    return shapes + textures + acceleration + lights + moving + bends;
+    return shapes + textures + tables + acceleration + lights + moving + bends;
   }
   // The greatest at one time, beside the image, of a coordinator that reads, analyses and renders
   // it, and of a worker. With what the heaps keep of memory that was freed.

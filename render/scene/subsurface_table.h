@@ -20,6 +20,9 @@ struct SubsurfaceTable {
   static constexpr float kFirstNode = 1e-3F;
   static constexpr float kGrowth = 1.1F;
 
+  // Of all that is below, about.
+  static constexpr double kBytes = sizeof(float) * (2.0 * kRows * kNodes + kNodes + 2 * kRows);
+
   std::vector<float> nodes;         // [kNodes]
   std::vector<float> densities;     // [kRows × kNodes]
   std::vector<float> cumulatives;   // the same, integrals from 0

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "render/base/parallel.h"
 #include "render/base/status.h"
 #include "render/math/rng.h"
 #include "render/math/warp.h"
@@ -103,48 +104,48 @@ float MeanOverBase(int angles, const Function& of) {
   return static_cast<float>(sum / angles);
 }
 
-std::shared_ptr<CoatTable> MakeTable(const MaterialNumbers& material) {
-  const auto table = std::make_shared<CoatTable>();
+CoatTable MakeTable(const MaterialNumbers& material) {
+  CoatTable table;
   const float ior = material.ior;
   const float thickness = material.thickness;
   if (HasNoFacets(material)) {
-    table->inner = MeanOverBase(kSmoothAngles, [&](float cosine) {
+    table.inner = MeanOverBase(kSmoothAngles, [&](float cosine) {
       float cos_t = 0;
       return FresnelDielectric(cosine, 1 / ior, cos_t) * Square(Crossing(thickness, cosine));
     });
     // By reciprocity, what leaves is what enters over the square of the index.
-    table->leaving =
+    table.leaving =
         MeanOverBase(kSmoothAngles,
                      [&](float cosine) { return SmoothEntering(cosine, ior, thickness); }) /
         Square(ior);
     return table;
   }
   const Ggx ggx(material);
-  table->rows = material.alpha_u == material.alpha_v ? 1 : kAzimuths;
+  table.rows = material.alpha_u == material.alpha_v ? 1 : kAzimuths;
   float sum_of_weights = 0;
-  for (int row = 0; row < table->rows; ++row) {
+  for (int row = 0; row < table.rows; ++row) {
     const float azimuth =
-        table->rows == 1 ? 0
-                         : 0.5F * kPi * static_cast<float>(row) / static_cast<float>(kAzimuths - 1);
+        table.rows == 1 ? 0
+                        : 0.5F * kPi * static_cast<float>(row) / static_cast<float>(kAzimuths - 1);
     for (int i = 0; i < CoatTable::kCosines; ++i) {
       const float cosine = Square(static_cast<float>(i) / (CoatTable::kCosines - 1));
       const Vec3 w = DirectionAt(cosine, azimuth);
-      table->entering.push_back(i == 0 ? 0.0F
-                                       : std::min(1.0F, RoughEntering(ggx, w, ior, thickness)));
+      table.entering.push_back(i == 0 ? 0.0F
+                                      : std::min(1.0F, RoughEntering(ggx, w, ior, thickness)));
     }
     // The trapezoidal rule, exact for the first harmonics.
-    const bool is_end = table->rows > 1 && (row == 0 || row == table->rows - 1);
+    const bool is_end = table.rows > 1 && (row == 0 || row == table.rows - 1);
     const float weight = is_end ? 0.5F : 1.0F;
     sum_of_weights += weight;
-    table->inner += weight * MeanOverBase(kAngles, [&](float cosine) {
-                      return RoughReturned(ggx, DirectionAt(cosine, azimuth), ior, thickness);
-                    });
-    table->leaving += weight * MeanOverBase(kAngles, [&](float cosine) {
-                        return RoughEntering(ggx, DirectionAt(cosine, azimuth), ior, thickness);
-                      });
+    table.inner += weight * MeanOverBase(kAngles, [&](float cosine) {
+                     return RoughReturned(ggx, DirectionAt(cosine, azimuth), ior, thickness);
+                   });
+    table.leaving += weight * MeanOverBase(kAngles, [&](float cosine) {
+                       return RoughEntering(ggx, DirectionAt(cosine, azimuth), ior, thickness);
+                     });
   }
-  table->inner /= sum_of_weights;
-  table->leaving /= sum_of_weights * Square(ior);
+  table.inner /= sum_of_weights;
+  table.leaving /= sum_of_weights * Square(ior);
   return table;
 }
 
@@ -550,16 +551,16 @@ float EnteringIn(const CoatTable& table, Vec3 w) {
   return at(row) * (1 - next) + at(row + 1) * next;
 }
 
-std::shared_ptr<CoatTable> MakeCoat(const Material& original) {
-  const std::shared_ptr<CoatTable> made = MakeTable(original);
+CoatTable MakeCoat(const Material& original) {
+  CoatTable table = MakeTable(original);
   if (original.HasHaze() && original.kind == Material::Kind::kCoatedDiffuse)
-    AddScattering(original, *made);
+    AddScattering(original, table);
   if (original.kind == Material::Kind::kCoatedConductor) {
     Material material = original;
-    material.coat = made.get();
-    AddResidual(material, *made);
+    material.coat = &table;
+    AddResidual(material, table);
   }
-  return made;
+  return table;
 }
 
 bool HasCoat(const Material& material) {
@@ -568,8 +569,16 @@ bool HasCoat(const Material& material) {
          material.kind == Material::Kind::kSubsurface;
 }
 
-// The tables of a coat whose roughness is a texture, or of one over a metal whose roughness is.
-std::shared_ptr<const CoatFamily> MakeFamily(const Material& material) {
+// A table that is to be made, of `material`.
+struct WantedCoat {
+  Material material;
+  CoatTable* table;
+};
+
+// The tables of a coat whose roughness is a texture, or of one over a metal whose roughness is, and
+// appends them to those that are to be made.
+std::shared_ptr<const CoatFamily> FamilyOf(const Material& material,
+                                           std::vector<WantedCoat>& wanted) {
   const auto family = std::make_shared<CoatFamily>();
   family->is_of_base =
       (material.roughness_textures[0] & material.roughness_textures[1]) == kNoTexture;
@@ -578,6 +587,7 @@ std::shared_ptr<const CoatFamily> MakeFamily(const Material& material) {
       std::max(family->is_of_base ? std::max(material.base_alpha_u, material.base_alpha_v)
                                   : std::max(material.alpha_u, material.alpha_v),
                2 * kNarrowestOfFamily);
+  family->tables.resize(kFamily);
   for (int i = 0; i < kFamily; ++i) {
     Material one = material;
     const float width = family->narrowest + (family->widest - family->narrowest) *
@@ -585,14 +595,14 @@ std::shared_ptr<const CoatFamily> MakeFamily(const Material& material) {
                                                 static_cast<float>(kFamily - 1);
     (family->is_of_base ? one.base_alpha_u : one.alpha_u) = width;
     (family->is_of_base ? one.base_alpha_v : one.alpha_v) = width;
-    family->tables.push_back(*MakeCoat(one));
+    wanted.push_back({std::move(one), &family->tables[static_cast<std::size_t>(i)]});
   }
   return family;
 }
 
 }  // namespace
 
-void PrepareCoats(std::vector<Material>& materials) {
+void PrepareCoats(std::vector<Material>& materials, int threads) {
   using Key = std::tuple<Material::Kind, float, float, float, float, float, float, std::int32_t,
                          bool, float>;
   const auto key_of = [](const Material& material) {
@@ -611,13 +621,14 @@ void PrepareCoats(std::vector<Material>& materials) {
   std::map<Key, std::shared_ptr<const CoatTable>> tables;
   // A texture of the coat's roughness, or of the metal's.
   std::map<std::pair<Key, bool>, std::shared_ptr<const CoatFamily>> families;
+  std::vector<WantedCoat> wanted;
   for (Material& material : materials) {
     if (!HasCoat(material)) continue;
     if (material.HasRoughnessTexture()) {
       const bool is_of_coat =
           (material.roughness_textures[0] & material.roughness_textures[1]) != kNoTexture;
       auto& family = families[{key_of(material), is_of_coat}];
-      if (family == nullptr) family = MakeFamily(material);
+      if (family == nullptr) family = FamilyOf(material, wanted);
       material.owned_coats = family;
       material.coats = family.get();
       FitCoat(material);
@@ -627,10 +638,19 @@ void PrepareCoats(std::vector<Material>& materials) {
     if (material.kind == Material::Kind::kCoatedConductor && PropertiesOf(material).is_smooth)
       continue;
     auto& table = tables[key_of(material)];
-    if (table == nullptr) table = MakeCoat(material);
+    if (table == nullptr) {
+      const auto made = std::make_shared<CoatTable>();
+      wanted.push_back({material, made.get()});
+      table = made;
+    }
     material.owned_coat = table;
     material.coat = table.get();
   }
+  if (wanted.empty()) return;
+  ThreadTeam(threads).For(wanted.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      *wanted[i].table = MakeCoat(wanted[i].material);
+  });
 }
 
 void FitCoat(MaterialNumbers& material) {

@@ -42,8 +42,9 @@
 namespace lucerna {
 
 // Gives coated materials their tables. Materials with equal coats share one. With a texture of
-// roughness, tables of several widths, between which FitCoat interpolates.
-void PrepareCoats(std::vector<Material>& materials);
+// roughness, tables of several widths, between which FitCoat interpolates. Tables take up to 0.2 s
+// of processor time each; threads as in ThreadTeam, with the same tables for any number.
+void PrepareCoats(std::vector<Material>& materials, int threads = 1);
 // Of a prepared material whose widths a texture has changed: the tables that suit them. Does
 // nothing for other materials.
 void FitCoat(MaterialNumbers& material);

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "render/base/parallel.h"
 #include "render/math/warp.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/material_at.h"
@@ -191,15 +192,26 @@ SubsurfaceTable MakeSubsurfaceTable(float ior, float g) {
   return table;
 }
 
-void PrepareSubsurface(std::vector<Material>& materials) {
-  std::map<std::pair<float, float>, std::shared_ptr<const SubsurfaceTable>> tables;
+void PrepareSubsurface(std::vector<Material>& materials, int threads) {
+  using Key = std::pair<float, float>;
+  const auto key_of = [](const Material& material) { return Key(material.ior, material.phase_g); };
+  std::map<Key, std::shared_ptr<SubsurfaceTable>> tables;
+  std::vector<std::pair<Key, SubsurfaceTable*>> wanted;
+  for (const Material& material : materials) {
+    if (material.kind != Material::Kind::kSubsurface) continue;
+    auto& table = tables[key_of(material)];
+    if (table != nullptr) continue;
+    table = std::make_shared<SubsurfaceTable>();
+    wanted.emplace_back(key_of(material), table.get());
+  }
+  if (wanted.empty()) return;
+  ThreadTeam(threads).For(wanted.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      *wanted[i].second = MakeSubsurfaceTable(wanted[i].first.first, wanted[i].first.second);
+  });
   for (Material& material : materials) {
     if (material.kind != Material::Kind::kSubsurface) continue;
-    auto& table = tables[{material.ior, material.phase_g}];
-    if (table == nullptr) {
-      table = std::make_shared<const SubsurfaceTable>(
-          MakeSubsurfaceTable(material.ior, material.phase_g));
-    }
+    const std::shared_ptr<SubsurfaceTable>& table = tables[key_of(material)];
     material.owned_below = table;
     material.below = table.get();
     if (material.scatters_for_reflectance) continue;

@@ -28,8 +28,9 @@ namespace lucerna {
 
 // Gives materials that scatter below their surface their tables, and those that are given by
 // coefficients the reflectance that follows. Materials of equal index and phase function share a
-// table. Requires a scene in the working space.
-void PrepareSubsurface(std::vector<Material>& materials);
+// table, which takes some 0.04 s; threads as in ThreadTeam, with the same tables for any number.
+// Requires a scene in the working space.
+void PrepareSubsurface(std::vector<Material>& materials, int threads = 1);
 
 // The table of R for an index of refraction >= 1 and a phase function of mean cosine g (Henyey &
 // Greenstein 1941).

@@ -8,7 +8,7 @@
 
 namespace lucerna {
 
-Scene InWorkingSpace(Scene scene) {
+Scene InWorkingSpace(Scene scene, int threads) {
   // Coefficients are no colours, but mix as those of a thin layer do.
   const auto coefficients = [](Rgb rec709) {
     const Rgb mixed = ToWorking(rec709);
@@ -26,8 +26,8 @@ Scene InWorkingSpace(Scene scene) {
     medium.absorption = coefficients(medium.absorption);
     medium.scattering = coefficients(medium.scattering);
   }
-  PrepareCoats(scene.materials);
-  PrepareSubsurface(scene.materials);
+  PrepareCoats(scene.materials, threads);
+  PrepareSubsurface(scene.materials, threads);
   for (AreaLight& light : scene.area_lights)
     light.radiance = ToWorking(light.radiance);
   ForEachDeltaList(scene, [](auto& lights) {

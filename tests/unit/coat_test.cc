@@ -236,6 +236,36 @@ TEST(CoatTest, EqualCoatsShareATable) {
   EXPECT_EQ(materials[3].coat, nullptr);
 }
 
+TEST(CoatTest, ManyThreadsMakeTheSameTables) {
+  const auto prepared = [](int threads) {
+    std::vector<Material> materials = {CoatedMaterial(0.2F, 0.3F), CoatedMaterial(0.7F, 0),
+                                       WithHaze(CoatedMaterial(0.5F, 0.1F), 0.9F, 0.2F),
+                                       CoatedMetal(Gray(0.2F), Gray(3), 0.1F, 0.3F, 0.1F)};
+    Material textured = CoatedMaterial(0.5F, 0.4F);
+    textured.roughness_textures[0] = textured.roughness_textures[1] = 0;
+    materials.push_back(textured);
+    PrepareCoats(materials, threads);
+    return materials;
+  };
+  const std::vector<Material> one = prepared(1);
+  const std::vector<Material> four = prepared(4);
+  const auto same = [](const CoatTable& a, const CoatTable& b) {
+    EXPECT_EQ(a.entering, b.entering);
+    EXPECT_EQ(a.inner, b.inner);
+    EXPECT_EQ(a.leaving, b.leaving);
+    EXPECT_EQ(a.residual, b.residual);
+    EXPECT_EQ(a.scattering.entering, b.scattering.entering);
+    EXPECT_EQ(a.scattering.inner, b.scattering.inner);
+  };
+  for (std::size_t i = 0; i + 1 < one.size(); ++i) {
+    EXPECT_GT(one[i].coat->inner, 0);
+    same(*one[i].coat, *four[i].coat);
+  }
+  ASSERT_GT(one.back().coats->tables.size(), 1U);
+  for (std::size_t i = 0; i < one.back().coats->tables.size(); ++i)
+    same(one.back().coats->tables[i], four.back().coats->tables[i]);
+}
+
 // Two mirrors: the closed sum of all orders in one direction.
 TEST(CoatedMetalTest, SmoothOnSmoothIsAMirrorOfAllOrders) {
   const Rgb eta = {0.2F, 0.5F, 1.2F};

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -51,6 +52,29 @@ Scene With(TriangleMesh mesh) {
   AddMaterial(scene, DiffuseMaterial(0.5F));
   scene.meshes.push_back(std::move(mesh));
   return scene;
+}
+
+// One for each index and phase function.
+TEST(SceneMemoryTest, CountsTablesOfSubsurface) {
+  const auto tables = [](const std::vector<float>& indices) {
+    Scene scene = With(Grid(2));
+    for (const float ior : indices) {
+      Material material = DiffuseMaterial(0.5F);
+      material.kind = Material::Kind::kSubsurface;
+      material.ior = ior;
+      AddMaterial(scene, material);
+    }
+    const SceneMemory memory = SceneMemoryOf(scene, kRays);
+    SceneMemory without = memory;
+    without.tables = 0;
+    EXPECT_NEAR(memory.PeakOfWorker() - without.PeakOfWorker(), 1.1 * memory.tables, 1);
+    EXPECT_NEAR(memory.PeakOfCoordinator() - without.PeakOfCoordinator(), 1.1 * memory.tables, 1);
+    EXPECT_NEAR(memory.KeptByCoordinator() - without.KeptByCoordinator(), memory.tables, 1);
+    return memory.tables;
+  };
+  EXPECT_EQ(tables({}), 0);
+  EXPECT_NEAR(tables({1.3F}), 110e3, 2e3);
+  EXPECT_EQ(tables({1.3F, 1.4F, 1.3F}), 2 * tables({1.3F}));
 }
 
 TEST(SceneMemoryTest, CountsTheEdgesThatAreFound) {
