@@ -26,6 +26,7 @@
 #include "render/estimate/relative_error.h"
 #include "render/estimate/without_blur.h"
 #include "render/film/film.h"
+#include "render/film/image_color.h"
 #include "render/film/layers.h"
 #include "render/math/color_space.h"
 #include "render/math/warp.h"
@@ -440,6 +441,7 @@ BandedImage JobEstimator::MakeBands(std::shared_ptr<const DenoisedImage> denoise
     const std::size_t last = static_cast<std::size_t>(last_row) * width;
     std::vector<ImageChannel> band =
         MakeFilmPixels({.exposure = scene.film.exposure,
+                        .white_balance = scene.film.white_balance,
                         .max_component = scene.film.max_component,
                         .has_coverage = state.settings.coverage},
                        first, last, sums, shown, *state.last_radii, *state.radii, *state.controller,
@@ -477,6 +479,7 @@ NoisyImage JobEstimator::MakeNoisyImage() const {
   const ImageSums& sums = *state.sums;
   const PassWeights weights = sums.weights();
   const double exposure = state.prepared.scene().film.exposure;
+  const ImageColor color(state.prepared.scene().film.white_balance);
   const WithoutBlur shown = state.Shown();
   NoisyImage image;
   image.width = state.settings.crop_width();
@@ -499,8 +502,8 @@ NoisyImage JobEstimator::MakeNoisyImage() const {
   state_->team.For(sums.pixels(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
     for (std::size_t pixel = begin; pixel < end; ++pixel) {
       const ImageSums::Pixel of_pixel = shown.At(pixel);
-      const std::array<double, 3> all = ToRec709(of_pixel.radiance());
-      const std::array<double, 3> difference = ToRec709(of_pixel.half_difference);
+      const std::array<double, 3> all = color(of_pixel.radiance());
+      const std::array<double, 3> difference = color(of_pixel.half_difference);
       const FilmFeatures features = FeaturesOf(sums.FeaturesAt(pixel));
       for (std::size_t c = 0; c < 3; ++c) {
         const double even = 0.5 * (all[c] + difference[c]);
@@ -525,6 +528,7 @@ std::vector<float> JobEstimator::NoiseLayer() const {
   const PassWeights weights = sums.weights();
   const double weight = weights.all();
   const double exposure = state_->prepared.scene().film.exposure;
+  const ImageColor color(state_->prepared.scene().film.white_balance);
   const double noise_area = NoiseArea();
   const WithoutBlur shown = state_->Shown();
   std::vector<PixelNoise> noise(sums.pixels());
@@ -532,9 +536,8 @@ std::vector<float> JobEstimator::NoiseLayer() const {
   state_->team.For(noise.size(), kPixelsAtOnce, [&](std::size_t begin, std::size_t end) {
     for (std::size_t pixel = begin; pixel < end; ++pixel) {
       const ImageSums::Pixel of_pixel = shown.At(pixel);
-      const double sum = exposure * LuminanceOf(ToRec709(of_pixel.radiance()));
-      const double even_sum =
-          0.5 * (sum + exposure * LuminanceOf(ToRec709(of_pixel.half_difference)));
+      const double sum = exposure * LuminanceOf(color(of_pixel.radiance()));
+      const double even_sum = 0.5 * (sum + exposure * LuminanceOf(color(of_pixel.half_difference)));
       const double variance = exposure * exposure * of_pixel.squared_deviations / weight;
       if (!(variance > 0)) continue;
       const double difference = even_sum / weights.even - (sum - even_sum) / weights.odd;
@@ -560,6 +563,7 @@ double JobEstimator::NoiseArea() const {
 EstimatorSnapshot JobEstimator::Snapshot() const {
   const State& state = *state_;
   const double exposure = state.prepared.scene().film.exposure;
+  const ImageColor color(state.prepared.scene().film.white_balance);
   const std::size_t pixels = state.sums->pixels();
   EstimatorSnapshot snapshot;
   const WithoutBlur shown = state.Shown();
@@ -568,10 +572,10 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
   snapshot.image =
       ImageStatistics(state.settings.crop_width(), state.settings.crop_height(), passes());
   snapshot.image.weights = state.sums->weights();
-  const auto scaled = [](const RgbSum& color, double factor) {
-    return std::array<float, 3>{static_cast<float>(factor * color[0]),
-                                static_cast<float>(factor * color[1]),
-                                static_cast<float>(factor * color[2])};
+  const auto scaled = [](const RgbSum& c, double factor) {
+    return std::array<float, 3>{static_cast<float>(factor * c[0]),
+                                static_cast<float>(factor * c[1]),
+                                static_cast<float>(factor * c[2])};
   };
   // Luminances and those by photons, of pieces of the image: added up in their order.
   constexpr std::size_t kPixelsAtOnce = 4096;
@@ -581,12 +585,12 @@ EstimatorSnapshot JobEstimator::Snapshot() const {
       const std::size_t last = std::min(pixels, (piece + 1) * kPixelsAtOnce);
       for (std::size_t pixel = piece * kPixelsAtOnce; pixel < last; ++pixel) {
         const ImageSums::Pixel of_pixel = shown.At(pixel);
-        const RgbSum all = ToRec709(of_pixel.radiance());
-        const RgbSum photons = ToRec709(of_pixel.photons);
+        const RgbSum all = color(of_pixel.radiance());
+        const RgbSum photons = color(of_pixel.photons);
         const double photon_luminance = LuminanceOf(photons);
         PixelStatistics statistics;
         statistics.all = scaled(all, exposure);
-        statistics.half_difference = scaled(ToRec709(of_pixel.half_difference), exposure);
+        statistics.half_difference = scaled(color(of_pixel.half_difference), exposure);
         statistics.squared_deviations =
             static_cast<float>(exposure * exposure * of_pixel.squared_deviations);
         statistics.even_bias = static_cast<float>(exposure * of_pixel.even_bias);

@@ -13,6 +13,7 @@
 #include "render/analysis/prepared_scene.h"
 #include "render/base/parallel.h"
 #include "render/film/film.h"
+#include "render/film/image_color.h"
 #include "render/film/layers.h"
 #include "render/math/color_space.h"
 #include "render/math/double3.h"
@@ -124,11 +125,12 @@ StatusOr<MeshRender> RenderFromMesh(const Scene& scene, const RenderSettings& se
   image.height = height;
   SetImageWindow(settings, image);
   const double to_pixel = scene.film.exposure / static_cast<double>(settings.passes);
+  const ImageColor color(scene.film.white_balance);
   const auto values_of = [&](std::size_t pixel) {
     const PixelSums& of = sums[pixel];
     PixelValues values;
-    values.direct = ToRec709(of.direct);
-    values.photons = ToRec709(of.of_mesh);
+    values.direct = color(of.direct);
+    values.photons = color(of.of_mesh);
     values.albedo = ToRec709(of.albedo);
     const double per_hit = of.hits > 0 ? 1 / static_cast<double>(of.hits) : 0;
     double largest = 0;

@@ -5,6 +5,7 @@
 
 #include "render/base/status.h"
 #include "render/estimate/slice_sums.h"
+#include "render/film/image_color.h"
 #include "render/film/layers.h"
 #include "render/frequency/bandwidth.h"
 #include "render/math/color_space.h"
@@ -43,6 +44,7 @@ std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t f
   LUCERNA_CHECK(sums.passes() > 0 && first <= last && last <= sums.pixels());
   std::vector<ImageChannel> channels;
   const double to_pixel = format.exposure / sums.weights().all();
+  const ImageColor color(format.white_balance);
   // Of the pixel's hitpoints [scene units]; 0 where there was none.
   const auto unit_radius = [&](std::size_t pixel) {
     const ImageSums::Features features = sums.FeaturesAt(pixel);
@@ -56,8 +58,8 @@ std::vector<ImageChannel> MakeFilmPixels(const FilmFormat& format, std::size_t f
     const std::size_t pixel = first + offset_in_band;
     const ImageSums::Pixel of_pixel = shown.At(pixel);
     PixelValues values;
-    values.direct = ToRec709(of_pixel.direct);
-    values.photons = ToRec709(of_pixel.photons);
+    values.direct = color(of_pixel.direct);
+    values.photons = color(of_pixel.photons);
     double largest = 0;
     for (std::size_t c = 0; c < 3; ++c) {
       values.direct[c] *= to_pixel;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "render/base/parallel.h"
@@ -14,11 +15,13 @@
 #include "render/image/image.h"
 #include "render/math/kernel.h"
 #include "render/scene/render_settings.h"
+#include "render/scene/scene.h"
 
 namespace lucerna {
 
 struct FilmFormat {
   double exposure = 1;  // factor from radiance to pixel values
+  std::optional<ColorMatrix> white_balance;
   // Pixel values are scaled down until no channel is larger.
   double max_component = HUGE_VAL;
   bool has_coverage = false;  // the layer of kCoverage

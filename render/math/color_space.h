@@ -37,14 +37,19 @@ inline constexpr std::array<std::array<double, 3>, 3> kRec709FromWorking = {{
   return {row(0), row(1), row(2)};
 }
 
-// Back to Rec. 709, for images.
-[[nodiscard]] constexpr std::array<double, 3> ToRec709(const std::array<double, 3>& c) {
+[[nodiscard]] constexpr std::array<double, 3> Transformed(
+    const std::array<std::array<double, 3>, 3>& matrix, const std::array<double, 3>& c) {
   std::array<double, 3> out{};
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t k = 0; k < 3; ++k)
-      out[i] += kRec709FromWorking[i][k] * c[k];
+      out[i] += matrix[i][k] * c[k];
   }
   return out;
+}
+
+// Back to Rec. 709.
+[[nodiscard]] constexpr std::array<double, 3> ToRec709(const std::array<double, 3>& c) {
+  return Transformed(kRec709FromWorking, c);
 }
 
 }  // namespace lucerna

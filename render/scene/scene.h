@@ -152,19 +152,25 @@ struct Instance {
 
 // The reconstruction filter of the film, separable, in pixels.
 struct PixelFilter {
-  enum class Kind : std::uint8_t { kBox, kTriangle, kGaussian, kMitchell };
+  enum class Kind : std::uint8_t { kBox, kTriangle, kGaussian, kMitchell, kSinc };
 
   Kind kind = Kind::kGaussian;
   float radius_x = 1.5F, radius_y = 1.5F;
   float sigma = 0.5F;                // gaussian
   float b = 1.0F / 3, c = 1.0F / 3;  // mitchell
+  float window = 3;                  // sinc: half of its window's width, in its zeros
 };
+
+// Of linear Rec. 709 to linear Rec. 709, [row][column].
+using ColorMatrix = std::array<std::array<double, 3>, 3>;
 
 struct FilmSettings {
   int width = 1280, height = 720;  // [pixels] of the whole image
   // The part that is rendered, [x0, x1) × [y0, y1), from cropwindow or pixelbounds.
   int crop_x0 = 0, crop_y0 = 0, crop_x1 = 1280, crop_y1 = 720;
   double exposure = 1;  // (shutterclose - shutteropen) · iso / 100 when the file sets them
+  // What pixels are multiplied by, so that the white of some light is grey; absent: none.
+  std::optional<ColorMatrix> white_balance;
   double max_component = HUGE_VAL;
   std::string filename;
 };

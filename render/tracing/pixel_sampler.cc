@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 
 namespace lucerna {
 namespace {
@@ -25,6 +26,12 @@ double MitchellAt(double x, double b, double c) {
   return 0;
 }
 
+// sin(πx) / (πx).
+double SincAt(double x) {
+  const double angle = std::numbers::pi * std::abs(x);
+  return angle < 1e-5 ? 1 : std::sin(angle) / angle;
+}
+
 // The filter along one axis, not normalised.
 double FilterAt(const PixelFilter& filter, double radius, double x) {
   switch (filter.kind) {
@@ -37,6 +44,9 @@ double FilterAt(const PixelFilter& filter, double radius, double x) {
                                GaussianAt(radius, static_cast<double>(filter.sigma)));
     case PixelFilter::Kind::kMitchell:
       return MitchellAt(x / radius, static_cast<double>(filter.b), static_cast<double>(filter.c));
+    case PixelFilter::Kind::kSinc:
+      // Duchon 1979, "Lanczos Filtering in One and Two Dimensions".
+      return SincAt(x) * SincAt(x / static_cast<double>(filter.window));
   }
   return 0;
 }

@@ -116,7 +116,8 @@ Traced TraceManyPasses(const Scene& scene, const RenderSettings& settings, int p
 
 const PixelFilter kFilters[] = {
     Filter(PixelFilter::Kind::kBox, 0.5F), Filter(PixelFilter::Kind::kTriangle, 1),
-    Filter(PixelFilter::Kind::kGaussian, 1.5F), Filter(PixelFilter::Kind::kMitchell, 2)};
+    Filter(PixelFilter::Kind::kGaussian, 1.5F), Filter(PixelFilter::Kind::kMitchell, 2),
+    Filter(PixelFilter::Kind::kSinc, 4)};
 
 // Each pixel's mean over many passes is the integral of its filter over the light. Passes are
 // stratified, so that the deviation of a mean is at most that of independent ones.

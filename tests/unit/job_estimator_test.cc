@@ -14,6 +14,7 @@
 
 #include "render/estimate/evidence.h"
 #include "render/estimate/slice_tree.h"
+#include "render/math/color_space.h"
 #include "render/wire/slice_codec.h"
 #include "tests/support/local_render.h"
 #include "tests/support/measure.h"
@@ -46,6 +47,40 @@ Digest Render(const Scene& scene, const RenderSettings& settings, int threads, i
   for (int pass = 0; pass < 4; ++pass)
     render.AddPass(batches);
   return render.MakeImage().PixelDigest();
+}
+
+// The film's white balance multiplies the image, and no figure of errors by more than what it does
+// to luminances.
+TEST(JobEstimatorTest, BalancesTheWhiteOfTheImage) {
+  Scene scene = Room();
+  scene.area_lights[0].radiance = {10, 8, 4};
+  const RenderSettings settings = TestSettings(scene, 5000, 0.1, 8);
+  const auto render = [&] {
+    LocalRender local(scene, settings, 2);
+    for (int pass = 0; pass < 4; ++pass)
+      local.AddPass();
+    return local.MakeImage();
+  };
+  const Image plain = render();
+  const ColorMatrix matrix = {{{0.9, 0.05, 0}, {0.02, 1, 0.01}, {-0.01, 0.1, 1.3}}};
+  scene.film.white_balance = matrix;
+  const Image balanced = render();
+  constexpr std::array<const char*, 3> kChannels = {"R", "G", "B"};
+  double noise = 0;
+  double plain_noise = 0;
+  for (std::size_t i = 0; i < plain.Find("R")->pixels.size(); ++i) {
+    std::array<double, 3> before{};
+    for (std::size_t c = 0; c < 3; ++c)
+      before[c] = static_cast<double>(plain.Find(kChannels[c])->pixels[i]);
+    const auto expected = Transformed(matrix, before);
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_NEAR(static_cast<double>(balanced.Find(kChannels[c])->pixels[i]), expected[c],
+                  1e-5 * (before[0] + before[1] + before[2]));
+    }
+    noise += static_cast<double>(balanced.Find("noise")->pixels[i]);
+    plain_noise += static_cast<double>(plain.Find("noise")->pixels[i]);
+  }
+  EXPECT_NEAR(noise / plain_noise, 1, 0.1);
 }
 
 TEST(JobEstimatorTest, GivesTheSameBitsForAnyThreadsAndBatches) {

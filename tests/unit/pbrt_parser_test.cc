@@ -5,12 +5,15 @@
 #include <cstring>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 
 #include "render/formats/read_scene.h"
+#include "render/math/color_matching.h"
+#include "render/math/color_space.h"
 #include "render/math/warp.h"
 #include "tests/support/memory_files.h"
 #include "tests/support/pbrt_text.h"
@@ -136,6 +139,39 @@ TEST(PbrtParserTest, Filters) {
   EXPECT_EQ(filter("\"triangle\"").radius_y, 2);
   EXPECT_EQ(filter("\"mitchell\"").b, 1.0F / 3);
   EXPECT_EQ(filter("\"gaussian\" \"float sigma\" 0.3").sigma, 0.3F);
+  EXPECT_EQ(filter("\"sinc\"").radius_x, 4);
+  EXPECT_EQ(filter("\"sinc\" \"float tau\" 2").window, 2);
+}
+
+// Light of the chromaticity that CIE 15 gives for an illuminant becomes grey of the same luminance.
+TEST(PbrtParserTest, WhiteBalanceMakesAnIlluminantGrey) {
+  const auto balance = [](const std::string& kelvin) {
+    return ParsePbrt("Film \"rgb\" \"float whitebalance\" " + kelvin +
+                     " Camera \"perspective\" WorldBegin")
+        .scene.film.white_balance;
+  };
+  struct Illuminant {
+    const char* kelvin;
+    double x, y;
+  };
+  for (const Illuminant& light : {Illuminant{"5000", 0.34567, 0.35850},
+                                  {"5500", 0.33242, 0.34743},
+                                  {"7500", 0.29902, 0.31485},
+                                  {"2856", 0.44758, 0.40745}}) {
+    const std::optional<ColorMatrix> matrix = balance(light.kelvin);
+    ASSERT_TRUE(matrix.has_value());
+    const auto color =
+        Transformed(*matrix, Rec709({light.x / light.y, 1, (1 - light.x - light.y) / light.y}));
+    for (const double channel : color)
+      EXPECT_NEAR(channel, 1, 2e-3) << light.kelvin;
+  }
+  EXPECT_FALSE(balance("0").has_value());
+  const auto said = [](const std::string& film) {
+    return SaidOfPbrt("Film \"rgb\" " + film + " Camera \"perspective\" WorldBegin");
+  };
+  EXPECT_THAT(said("\"float whitebalance\" 500"), HasSubstr("must be 0, or from 1000 to 25000"));
+  EXPECT_THAT(said("\"float whitebalance\" 30000"), HasSubstr("whitebalance"));
+  EXPECT_THAT(said("\"string sensor\" \"nikon_d850\""), HasSubstr("is read as cie1931"));
 }
 
 // ---- shapes and which way they face

@@ -62,13 +62,23 @@ TEST(FilterSamplerTest, HasTheMomentsOfItsFilter) {
                        : -7.0 / 3 * x * x * x + 12 * x * x - 20 * x + 32.0 / 3;
         },
         g);
+    // sin(πx) sin(πx/3) / x².
+    ExpectFilteredMean(
+        Filter(PixelFilter::Kind::kSinc, 4), 4,
+        [](double x) {
+          return x == 0 ? std::numbers::pi * std::numbers::pi / 3
+                        : std::sin(std::numbers::pi * x) * std::sin(std::numbers::pi * x / 3) /
+                              (x * x);
+        },
+        g);
   }
 }
 
 // The density of the draws, by counting them, and the filter as density times weight.
 TEST(FilterSamplerTest, KnowsItsDensityAndItsFilter) {
   for (const PixelFilter& filter :
-       {Filter(PixelFilter::Kind::kGaussian, 1.5F), Filter(PixelFilter::Kind::kMitchell, 2)}) {
+       {Filter(PixelFilter::Kind::kGaussian, 1.5F), Filter(PixelFilter::Kind::kMitchell, 2),
+        Filter(PixelFilter::Kind::kSinc, 4)}) {
     const FilterSampler sampler(filter, filter.radius_x);
     constexpr int kDraws = 1 << 18;
     constexpr int kBins = 32;

@@ -69,16 +69,20 @@ void MitsubaTranslator::TranslateFilter(const MitsubaObject& film) {
   } else if (type == "catmullrom") {
     add("B", 0);
     add("C", 0.5);
+  } else if (type == "lanczos") {
+    radius = static_cast<double>(list.FindInteger("lobes", {1, 32}).value_or(3));
+    add("tau", radius);
   } else {
     list.Warning("",
-                 "is rendered as \"gaussian\"; there are box, tent, gaussian, mitchell and "
-                 "catmullrom");
+                 "is rendered as \"gaussian\"; there are box, tent, gaussian, mitchell, "
+                 "catmullrom and lanczos");
   }
   add("xradius", radius);
   add("yradius", radius);
   made.strings = {type == "box"                                ? "box"
                   : type == "tent"                             ? "triangle"
                   : type == "mitchell" || type == "catmullrom" ? "mitchell"
+                  : type == "lanczos"                          ? "sinc"
                                                                : "gaussian"};
   list.WarnOfUnread();
   reader_.CarryOut(std::move(made));

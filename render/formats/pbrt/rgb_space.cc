@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "render/base/text.h"
+#include "render/math/cie_observer.h"
 
 namespace lucerna {
 
@@ -19,7 +21,7 @@ struct RgbSpace {
 namespace {
 
 using Column = std::array<double, 3>;
-using Matrix = std::array<Column, 3>;  // [row][column]
+using Matrix = ColorMatrix;
 
 // ITU-R BT.709 and BT.2020, SMPTE EG 432-1, and SMPTE ST 2065-1.
 constexpr std::array<RgbSpace, 4> kSpaces = {{
@@ -103,6 +105,28 @@ Matrix Adapted(Chromaticity from, Chromaticity to) {
   return Times(Inverse(kCones), scaled);
 }
 
+// Of daylight: CIE 15:2018, section 4.1.2.
+Chromaticity WhiteAt(double temperature_k) {
+  // Since the series was measured, the constant of Planck's law has changed.
+  const double t = temperature_k * 1.4388 / 1.4380;
+  if (t < 4000) {
+    Column sum{};
+    for (double nm = kFirstObservedNm; nm <= kLastObservedNm; ++nm) {
+      const Xyz seen = CieObserver(nm);
+      // Planck's law, up to a factor.
+      const double power = 1 / (std::pow(nm * 1e-3, 5) * std::expm1(1.4388e7 / (nm * t)));
+      for (std::size_t c = 0; c < 3; ++c)
+        sum[c] += power * seen[c];
+    }
+    const double all = sum[0] + sum[1] + sum[2];
+    return {sum[0] / all, sum[1] / all};
+  }
+  const double x = t <= 7000
+                       ? -4.6070e9 / (t * t * t) + 2.9678e6 / (t * t) + 0.09911e3 / t + 0.244063
+                       : -2.0064e9 / (t * t * t) + 1.9018e6 / (t * t) + 0.24748e3 / t + 0.237040;
+  return {x, -3 * x * x + 2.870 * x - 0.275};
+}
+
 }  // namespace
 
 const RgbSpace* FindRgbSpace(std::string_view name) {
@@ -132,6 +156,12 @@ void ToRec709(std::vector<Parameter>& parameters, const RgbSpace* space) {
         parameter.numbers[i + c] = std::max(0.0, color[c]);
     }
   }
+}
+
+ColorMatrix WhiteBalance(double temperature_k) {
+  const RgbSpace& rec709 = kSpaces[0];
+  const Matrix from = XyzFrom(rec709);
+  return Times(Inverse(from), Times(Adapted(WhiteAt(temperature_k), rec709.white), from));
 }
 
 }  // namespace lucerna

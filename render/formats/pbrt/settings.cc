@@ -6,6 +6,7 @@
 
 #include "render/base/text.h"
 #include "render/formats/pbrt/kinds.h"
+#include "render/formats/pbrt/rgb_space.h"
 
 namespace lucerna {
 namespace {
@@ -98,12 +99,16 @@ double ReadMitchell(ParameterList& parameters, PixelFilter& filter) {
   return 2;
 }
 
+double ReadSinc(ParameterList& parameters, PixelFilter& filter) {
+  filter.kind = PixelFilter::Kind::kSinc;
+  filter.window = static_cast<float>(parameters.Float("tau", 3, {1e-3, 1e3}));
+  return 4;
+}
+
 using FilterReader = double (*)(ParameterList&, PixelFilter&);
 constexpr Kind<FilterReader> kFilters[] = {
-    {"box", &ReadBox},
-    {"triangle", &ReadTriangle},
-    {"gaussian", &ReadGaussian},
-    {"mitchell", &ReadMitchell},
+    {"box", &ReadBox},           {"triangle", &ReadTriangle}, {"gaussian", &ReadGaussian},
+    {"mitchell", &ReadMitchell}, {"sinc", &ReadSinc},
 };
 
 }  // namespace
@@ -168,8 +173,16 @@ void ReadFilm(std::string_view type, ParameterList& parameters, FilmSettings& fi
   film.exposure = parameters.Float("iso", 100, kAboveZero) / 100;
   film.max_component = parameters.Float("maxcomponentvalue", HUGE_VAL, kAboveZero);
   film.filename = parameters.String("filename", "");
+  // Of a camera's sensor pbrt-v4 makes what the observer sees, balanced to 6500 K.
   if (parameters.String("sensor", "cie1931") != "cie1931") {
-    parameters.Warning("sensor", "is read as cie1931");
+    parameters.Warning("sensor", "is read as cie1931: saturated colours are a little different");
+  }
+  const double white_k = parameters.Float("whitebalance", 0, {0, kMaxWhiteK});
+  if (white_k > 0 && white_k < kMinWhiteK) {
+    parameters.Error("whitebalance",
+                     Concat("must be 0, or from ", kMinWhiteK, " to ", kMaxWhiteK, " [K]"));
+  } else if (white_k > 0) {
+    film.white_balance = WhiteBalance(white_k);
   }
   for (const std::string_view name : {"diagonal", "savefp16"})
     parameters.Ignore(name);
