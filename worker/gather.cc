@@ -12,7 +12,7 @@
 #include "render/math/octahedral.h"
 #include "render/math/rng.h"
 #include "render/transport/bsdf.h"
-#include "render/transport/coat.h"
+#include "render/transport/material_at.h"
 #include "worker/cut_disc.h"
 #include "worker/gather_piece.h"
 #include "worker/gather_segments.h"
@@ -155,17 +155,6 @@ struct EvidenceSums<Evidence::kFrequency> {
   std::array<std::int64_t, kFrequencyColumns> sums{};
 };
 
-// Makes the widths of facets what a texture made them at a hitpoint.
-void SetWidths(MaterialNumbers& material, const std::array<float, 4>& widths) {
-  material.alpha_u = widths[0];
-  material.alpha_v = widths[1];
-  material.base_alpha_u = widths[2];
-  material.base_alpha_v = widths[3];
-  material.may_be_smooth = false;
-  material.base_may_be_smooth = false;
-  FitCoat(material);
-}
-
 // Around the shading normal of a hitpoint, turned as its surface is where that matters.
 Frame FrameOf(const GlossyHitpoint& glossy, const GlossyPlace* place) {
   const Vec3 normal = DecodeOctahedral(glossy.shading_normal_oct);
@@ -287,7 +276,7 @@ void GatherRow(const HitpointBlock& block, std::size_t row, float radius,
       place_of = &block.places[static_cast<std::size_t>(glossy - block.glossy.data())];
       static_cast<MaterialNumbers&>(textured.emplace()) = numbers;
       if (untextured.texture != kNoTexture) SetTexturedParameter(*textured, place_of->color);
-      if (untextured.HasRoughnessTexture()) SetWidths(*textured, place_of->widths);
+      SetNumbers(*textured, place_of->numbers);
     }
     // Where a surface has two parts, caustic photons are gathered on the one at which eye paths go
     // on without being smooth: a rough coat, or what lies under a smooth one.

@@ -42,8 +42,8 @@ inline constexpr std::uint32_t kNoTangent = UINT32_MAX;
 // What depends on the place of a glossy hitpoint, where its material does
 // (transport/material_at.h).
 struct GlossyPlace {
-  Rgb color;                         // what SetTexturedParameter sets: >= 0
-  std::array<float, 4> widths = {};  // alpha_u, alpha_v, base_alpha_u, base_alpha_v: in [0, 1e4]
+  Rgb color;                               // what SetTexturedParameter sets: >= 0
+  std::array<float, 4> numbers = {};       // what SetNumbers sets: in [0, 1e4]
   std::uint32_t tangent_oct = kNoTangent;  // octahedral
 
   bool operator==(const GlossyPlace&) const = default;

@@ -40,8 +40,9 @@ bool HasUvTexture(const Scene& scene, const Material& material) {
   if (!material.HasTexture()) return false;
   const auto by_uv = [&](std::int32_t texture) { return IsPlacedByUv(scene, texture); };
   return std::ranges::any_of(material.roughness_textures, by_uv) || by_uv(material.texture) ||
-         by_uv(material.second_texture) || by_uv(material.displacement) ||
-         by_uv(material.normal_map) || by_uv(material.amount_texture);
+         by_uv(material.thickness_texture) || by_uv(material.second_texture) ||
+         by_uv(material.displacement) || by_uv(material.normal_map) ||
+         by_uv(material.amount_texture);
 }
 
 void BeginMotion(Scene& scene, const SourceLocation& whole, Diagnostics& diagnostics) {

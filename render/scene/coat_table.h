@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace lucerna {
@@ -49,22 +50,23 @@ struct CoatTable {
   std::vector<ByHits> by_hits;       // [albedos]
 };
 
-// The tables of a coated material with a texture of its roughness, of widths of facets between two:
-// those of the coat's surface, or of the metal under it.
+// The tables of a coated material with a texture of its roughness or thickness. They differ in one
+// number: the width of the facets of the coat's surface, or of the metal under it, or the share of
+// light that one crossing of the layer at right angles takes, 1 - exp(-thickness).
 struct CoatFamily {
-  bool is_of_base = false;
-  float narrowest = 0, widest = 0;
-  std::vector<CoatTable> tables;  // at least 2, evenly spaced from the narrowest width
+  enum class Differing : std::uint8_t { kSurface, kBase, kThickness };
+  Differing differing = Differing::kSurface;
+  float least = 0, largest = 0;
+  std::vector<CoatTable> tables;  // at least 2, evenly spaced from the least number
 
-  // The tables below and above a width, and the share of the second.
+  // The tables below and above a number, and the share of the second.
   struct Place {
     std::size_t below;
     float share;
   };
-  [[nodiscard]] Place PlaceOf(float width) const {
+  [[nodiscard]] Place PlaceOf(float number) const {
     const auto last = static_cast<float>(tables.size() - 1);
-    const float place =
-        std::min(std::max((width - narrowest) / (widest - narrowest) * last, 0.0F), last);
+    const float place = std::min(std::max((number - least) / (largest - least) * last, 0.0F), last);
     const auto below = std::min(static_cast<std::size_t>(place), tables.size() - 2);
     return {below, place - static_cast<float>(below)};
   }

@@ -83,7 +83,7 @@ struct MaterialNumbers {
   const CoatTable* coat = nullptr;
   const CoatTable* coat_above = nullptr;
   float coat_above_share = 0;
-  const CoatFamily* coats = nullptr;  // of a coated material with a texture of its roughness
+  const CoatFamily* coats = nullptr;  // of a coated material with a HasCoatTexture
   // Of hair: roughness along the fibre and around it, in [0.01, 1], and the angle by which its
   // scales are tilted [rad].
   float beta_m = 0.3F, beta_n = 0.3F, scale_tilt = 0;
@@ -107,6 +107,8 @@ struct MaterialNumbers {
   // is one, the number in the material is the largest that it gives anywhere.
   std::array<std::int32_t, 4> roughness_textures = {kNoTexture, kNoTexture, kNoTexture, kNoTexture};
   bool remaps_roughness = true;  // a width is the root of the roughness
+  // Of the thickness of a coat; `thickness` is then the largest that it gives anywhere.
+  std::int32_t thickness_texture = kNoTexture;
   // With textures of roughness: the surface, or the metal under a coat, is smooth at some places.
   bool may_be_smooth = false, base_may_be_smooth = false;
   // What turns shading normals: heights [scene units], or a picture of normals (as a texture).
@@ -138,12 +140,16 @@ struct MaterialNumbers {
   [[nodiscard]] bool HasTexture() const {
     const auto& rough = roughness_textures;
     // kNoTexture has all bits.
-    return (texture & second_texture & rough[0] & rough[1] & rough[2] & rough[3] & displacement &
-            normal_map & amount_texture) != kNoTexture;
+    return (texture & second_texture & rough[0] & rough[1] & rough[2] & rough[3] &
+            thickness_texture & displacement & normal_map & amount_texture) != kNoTexture;
   }
   [[nodiscard]] bool HasRoughnessTexture() const {
     const auto& rough = roughness_textures;
     return (rough[0] & rough[1] & rough[2] & rough[3]) != kNoTexture;
+  }
+  // Whether a coat, or the metal under it, is another one at each place.
+  [[nodiscard]] bool HasCoatTexture() const {
+    return HasRoughnessTexture() || thickness_texture != kNoTexture;
   }
   // Whether it turns shading normals.
   [[nodiscard]] bool HasBumps() const {

@@ -651,8 +651,7 @@ EyeHitpoint EyePathTracer::HitpointAt(const SurfacePoint& surface, const Materia
   hitpoint.to_eye = wo;
   hitpoint.shading_normal = surface.shading_normal;
   if (is_glossy && here.DependsOnPlace()) {
-    hitpoint.place = {TexturedParameter(here),
-                      {here.alpha_u, here.alpha_v, here.base_alpha_u, here.base_alpha_v},
+    hitpoint.place = {TexturedParameter(here), NumbersOf(here),
                       surface.tangent == Vec3() ? kNoTangent : EncodeOctahedral(surface.tangent)};
   }
   hitpoint.weight = weight;

@@ -575,26 +575,46 @@ struct WantedCoat {
   CoatTable* table;
 };
 
-// The tables of a coat whose roughness is a texture, or of one over a metal whose roughness is, and
-// appends them to those that are to be made.
+CoatFamily::Differing DifferingOf(const MaterialNumbers& material) {
+  using enum CoatFamily::Differing;
+  if (material.thickness_texture != kNoTexture) return kThickness;
+  return (material.roughness_textures[0] & material.roughness_textures[1]) != kNoTexture ? kSurface
+                                                                                         : kBase;
+}
+
+// The tables of a coat that is another one at each place, or of one over such a metal, and appends
+// them to those that are to be made.
 std::shared_ptr<const CoatFamily> FamilyOf(const Material& material,
                                            std::vector<WantedCoat>& wanted) {
   const auto family = std::make_shared<CoatFamily>();
-  family->is_of_base =
-      (material.roughness_textures[0] & material.roughness_textures[1]) == kNoTexture;
-  family->narrowest = kNarrowestOfFamily;
-  family->widest =
-      std::max(family->is_of_base ? std::max(material.base_alpha_u, material.base_alpha_v)
-                                  : std::max(material.alpha_u, material.alpha_v),
-               2 * kNarrowestOfFamily);
+  using enum CoatFamily::Differing;
+  family->differing = DifferingOf(material);
+  if (family->differing == kThickness) {
+    family->largest = -std::expm1(-material.thickness);
+  } else {
+    family->least = kNarrowestOfFamily;
+    family->largest =
+        std::max(family->differing == kBase ? std::max(material.base_alpha_u, material.base_alpha_v)
+                                            : std::max(material.alpha_u, material.alpha_v),
+                 2 * kNarrowestOfFamily);
+  }
   family->tables.resize(kFamily);
   for (int i = 0; i < kFamily; ++i) {
     Material one = material;
-    const float width = family->narrowest + (family->widest - family->narrowest) *
-                                                static_cast<float>(i) /
-                                                static_cast<float>(kFamily - 1);
-    (family->is_of_base ? one.base_alpha_u : one.alpha_u) = width;
-    (family->is_of_base ? one.base_alpha_v : one.alpha_v) = width;
+    const float number = family->least + (family->largest - family->least) * static_cast<float>(i) /
+                                             static_cast<float>(kFamily - 1);
+    switch (family->differing) {
+      case kSurface:
+        one.alpha_u = one.alpha_v = number;
+        break;
+      case kBase:
+        one.base_alpha_u = one.base_alpha_v = number;
+        break;
+      case kThickness:
+        // Of a thick layer the number is 1.
+        if (i < kFamily - 1) one.thickness = -std::log1p(-number);
+        break;
+    }
     wanted.push_back({std::move(one), &family->tables[static_cast<std::size_t>(i)]});
   }
   return family;
@@ -619,24 +639,21 @@ void PrepareCoats(std::vector<Material>& materials, int threads) {
                material.HasHaze() ? material.phase_g : 0};
   };
   std::map<Key, std::shared_ptr<const CoatTable>> tables;
-  // A texture of the coat's roughness, or of the metal's.
-  std::map<std::pair<Key, bool>, std::shared_ptr<const CoatFamily>> families;
+  std::map<std::pair<Key, CoatFamily::Differing>, std::shared_ptr<const CoatFamily>> families;
   std::vector<WantedCoat> wanted;
   for (Material& material : materials) {
     if (!HasCoat(material)) continue;
-    if (material.HasRoughnessTexture()) {
-      const bool is_of_coat =
-          (material.roughness_textures[0] & material.roughness_textures[1]) != kNoTexture;
-      auto& family = families[{key_of(material), is_of_coat}];
+    // Smooth on smooth there is a closed form for all.
+    if (material.kind == Material::Kind::kCoatedConductor && PropertiesOf(material).is_smooth)
+      continue;
+    if (material.HasCoatTexture()) {
+      auto& family = families[{key_of(material), DifferingOf(material)}];
       if (family == nullptr) family = FamilyOf(material, wanted);
       material.owned_coats = family;
       material.coats = family.get();
       FitCoat(material);
       continue;
     }
-    // Smooth on smooth there is a closed form for all.
-    if (material.kind == Material::Kind::kCoatedConductor && PropertiesOf(material).is_smooth)
-      continue;
     auto& table = tables[key_of(material)];
     if (table == nullptr) {
       const auto made = std::make_shared<CoatTable>();
@@ -656,10 +673,19 @@ void PrepareCoats(std::vector<Material>& materials, int threads) {
 void FitCoat(MaterialNumbers& material) {
   if (material.coats == nullptr) return;
   const CoatFamily& family = *material.coats;
-  // Of a surface that is stretched one way, as of a round one with facets as steep on average.
-  const float width = family.is_of_base ? std::sqrt(material.base_alpha_u * material.base_alpha_v)
-                                        : std::sqrt(material.alpha_u * material.alpha_v);
-  const CoatFamily::Place place = family.PlaceOf(width);
+  const auto number = [&] {
+    switch (family.differing) {
+      // Of a surface that is stretched one way, as of a round one with facets as steep on average.
+      case CoatFamily::Differing::kSurface:
+        return std::sqrt(material.alpha_u * material.alpha_v);
+      case CoatFamily::Differing::kBase:
+        return std::sqrt(material.base_alpha_u * material.base_alpha_v);
+      case CoatFamily::Differing::kThickness:
+        return -std::expm1(-material.thickness);
+    }
+    return 0.0F;
+  };
+  const CoatFamily::Place place = family.PlaceOf(number());
   material.coat = &family.tables[place.below];
   material.coat_above = &family.tables[place.below + 1];
   material.coat_above_share = place.share;

@@ -1,5 +1,6 @@
 #include "render/transport/material_at.h"
 
+#include <algorithm>
 #include <bit>
 
 #include "render/geometry/surface_uv.h"
@@ -81,6 +82,26 @@ TexturePlace PlaceOf(const Scene& scene, const SurfacePoint& point) {
   return {UvAt(scene, point), point.position, point.geometric_normal};
 }
 
+std::array<float, 4> NumbersOf(const MaterialNumbers& here) {
+  if (here.thickness_texture != kNoTexture) return {here.thickness, 0, 0, 0};
+  return {here.alpha_u, here.alpha_v, here.base_alpha_u, here.base_alpha_v};
+}
+
+void SetNumbers(MaterialNumbers& material, const std::array<float, 4>& numbers) {
+  if (!material.HasCoatTexture()) return;
+  if (material.thickness_texture != kNoTexture) {
+    material.thickness = numbers[0];
+  } else {
+    material.alpha_u = numbers[0];
+    material.alpha_v = numbers[1];
+    material.base_alpha_u = numbers[2];
+    material.base_alpha_v = numbers[3];
+    material.may_be_smooth = false;
+    material.base_may_be_smooth = false;
+  }
+  FitCoat(material);
+}
+
 namespace material_at_internal {
 
 const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
@@ -101,6 +122,11 @@ const Material& AtPlace(const Scene& scene, SurfacePoint& point, Vec3 wo,
   if (material.Disperses() && wavelength.is_drawn())
     here.ior = IndexAt(wavelength.nm(), material.ior, material.dispersion);
   if (material.HasRoughnessTexture()) LookUpRoughness(scene, place, material, here);
+  if (material.thickness_texture != kNoTexture) {
+    here.thickness = std::clamp(TextureNumber(scene.textures, material.thickness_texture, place),
+                                0.0F, material.thickness);
+    FitCoat(here);
+  }
   const bool is_turned = here.alpha_u != here.alpha_v || here.base_alpha_u != here.base_alpha_v ||
                          here.kind == Material::Kind::kHair || here.is_measured_with_direction;
   if (material.HasBumps()) {

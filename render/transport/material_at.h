@@ -1,6 +1,7 @@
 // Of what is a surface made at one of its points?
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
@@ -32,6 +33,12 @@ namespace material_at_internal {
     return material;
   return material_at_internal::AtPlace(scene, point, wo, storage, wavelength);
 }
+
+// What textures of roughness or thickness have made of a material at a place, to be set again where
+// the place is not known: alpha_u, alpha_v, base_alpha_u and base_alpha_v, or the thickness of the
+// coat and zeros.
+[[nodiscard]] std::array<float, 4> NumbersOf(const MaterialNumbers& here);
+void SetNumbers(MaterialNumbers& material, const std::array<float, 4>& numbers);
 
 // Where textures are looked up for a point.
 [[nodiscard]] TexturePlace PlaceOf(const Scene& scene, const SurfacePoint& point);

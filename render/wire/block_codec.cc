@@ -78,9 +78,9 @@ std::string EncodeHitpointBlock(const HitpointBlock& block, ThreadTeam* team) {
         return std::bit_cast<std::uint32_t>(places[i].color[channel]);
       });
     }
-    for (std::size_t width = 0; width < places[0].widths.size(); ++width) {
+    for (std::size_t number = 0; number < places[0].numbers.size(); ++number) {
       WriteDeltas(writer, places.size(), [&](std::size_t i) {
-        return std::bit_cast<std::uint32_t>(places[i].widths[width]);
+        return std::bit_cast<std::uint32_t>(places[i].numbers[number]);
       });
     }
     WriteDeltas(writer, places.size(), [&](std::size_t i) { return places[i].tangent_oct; });
@@ -165,14 +165,15 @@ StatusOr<HitpointBlock> DecodeHitpointBlock(std::string_view bytes, std::size_t 
       }
       block.places[i].color = color;
     }
-    constexpr float kWidest = 1e4F;
-    for (std::size_t width = 0; width < block.places[0].widths.size(); ++width) {
-      const Column widths = ReadDeltas(reader, textured_rows);
+    constexpr float kLargest = 1e4F;
+    for (std::size_t number = 0; number < block.places[0].numbers.size(); ++number) {
+      const Column values = ReadDeltas(reader, textured_rows);
       if (!reader.ok()) return MalformedBlock("truncated or damaged textures");
       for (std::size_t i = 0; i < textured_rows; ++i) {
-        const auto value = std::bit_cast<float>(widths[i]);
-        if (!(value >= 0 && value <= kWidest)) return MalformedBlock("a roughness is out of range");
-        block.places[i].widths[width] = value;
+        const auto value = std::bit_cast<float>(values[i]);
+        if (!(value >= 0 && value <= kLargest))
+          return MalformedBlock("a roughness or thickness is out of range");
+        block.places[i].numbers[number] = value;
       }
     }
     const Column tangents = ReadDeltas(reader, textured_rows);

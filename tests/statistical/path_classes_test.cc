@@ -21,6 +21,7 @@
 #include "gtest/gtest.h"
 
 #include "render/math/rng.h"
+#include "render/transport/coat.h"
 #include "tests/support/path_comparison.h"
 #include "tests/support/path_tracer.h"
 #include "tests/support/test_scenes.h"
@@ -74,7 +75,8 @@ enum class Floor {
   kSubsurface,
   kRoughSubsurface,
   kPatchySubsurface,
-  kHazyCoat
+  kHazyCoat,
+  kPatchyHaze
 };
 enum class View { kPlain, kThroughGlass, kInMirror };
 
@@ -103,10 +105,11 @@ std::string NameOf(const PathClass& cell) {
                                                         "InGlassBall",
                                                         "InNarrowGlassBall",
                                                         "InRoughGlassBall"};
-  constexpr std::array<std::string_view, 18> kFloors = {
-      "Diffuse", "RoughMetal",  "NarrowMetal", "TexturedMetal",   "NarrowGlass",      "RoughGlass",
-      "Coated",  "RoughCoated", "Sheet",       "Mixed",           "PatchyMetal",      "PatchyCoat",
-      "Bumpy",   "Hair",        "Subsurface",  "RoughSubsurface", "PatchySubsurface", "HazyCoat"};
+  constexpr std::array<std::string_view, 19> kFloors = {
+      "Diffuse",         "RoughMetal",       "NarrowMetal", "TexturedMetal", "NarrowGlass",
+      "RoughGlass",      "Coated",           "RoughCoated", "Sheet",         "Mixed",
+      "PatchyMetal",     "PatchyCoat",       "Bumpy",       "Hair",          "Subsurface",
+      "RoughSubsurface", "PatchySubsurface", "HazyCoat",    "PatchyHaze"};
   constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
   std::string name(kLights[static_cast<std::size_t>(cell.light)]);
   name += kChains[static_cast<std::size_t>(cell.chain)];
@@ -256,6 +259,14 @@ Scene SceneOf(const PathClass& cell) {
     case Floor::kHazyCoat:
       floor(AddMaterial(scene, WithHaze(CoatedMaterial(0.5F, 0, 0.7F), 0.9F, 0)));
       break;
+    case Floor::kPatchyHaze: {
+      AddPatches(scene, 0.7F);
+      std::vector<Material> one = {WithHaze(CoatedMaterial(0.5F, 0, 0.7F), 0.9F, 0)};
+      one[0].thickness_texture = 2;
+      PrepareCoats(one);
+      floor_with_uv(AddMaterial(scene, one[0]));
+      break;
+    }
     case Floor::kRoughSubsurface:
       floor(AddMaterial(scene, SubsurfaceMaterial(0.7F, kFreePath, 0.2F)));
       break;
@@ -603,7 +614,7 @@ std::vector<PathClass> Cells() {
       {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
   add({kMap}, {kNone, kPane}, {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
   add({kTriangles, kPoint}, {kCoatedWall}, {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kCoated});
-  add({kTriangles}, {kNone, kPane}, {Floor::kHazyCoat});
+  add({kTriangles}, {kNone, kPane}, {Floor::kHazyCoat, Floor::kPatchyHaze});
   // Light that comes out elsewhere than where it entered.
   add({kTriangles, kPoint}, {kNone, kPane}, {Floor::kSubsurface});
   add({kTriangles}, {kNone}, {Floor::kRoughSubsurface});

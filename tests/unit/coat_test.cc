@@ -99,6 +99,33 @@ TEST(CoatTest, ATextureOfRoughnessIsAsGoodAsATableForEach) {
   }
 }
 
+// Between tables of several thicknesses a layer scatters and absorbs as one with a table of its
+// own.
+TEST(CoatTest, ThicknessesBetweenTablesAreFitted) {
+  constexpr float kMost = 3;
+  const auto material = [](int kind, float thickness) {
+    Material coated = kind < 2 ? CoatedMaterial(0.7F, kind == 0 ? 0 : 0.3F, thickness)
+                               : CoatedMetal(Gray(0.2F), Gray(3), 0.2F, 0.3F, thickness);
+    return kind == 1 ? coated : WithHaze(coated, 0.8F, 0.2F);
+  };
+  for (int kind = 0; kind < 3; ++kind) {
+    std::vector<Material> one = {material(kind, kMost)};
+    one[0].thickness_texture = 0;
+    PrepareCoats(one);
+    ASSERT_NE(one[0].coats, nullptr);
+    for (const float thickness : {0.0F, 0.05F, 0.3F, 1.0F, 2.5F, 3.0F}) {
+      Material fitted = one[0];
+      fitted.thickness = thickness;
+      FitCoat(fitted);
+      const Material own = material(kind, thickness);
+      for (const double angle : {10.0, 45.0, 75.0}) {
+        EXPECT_NEAR(BaseAlbedo(fitted, AtAngle(angle)), BaseAlbedo(own, AtAngle(angle)), 0.01)
+            << kind << " " << thickness << " " << angle;
+      }
+    }
+  }
+}
+
 // Without a coat's surface there is a diffuse one, seen through what absorbs.
 TEST(CoatTest, CoatOfIndexOneIsALayerThatAbsorbs) {
   Material material = CoatedMaterial(0.5F, 0, 0.3F);

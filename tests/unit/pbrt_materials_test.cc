@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "gmock/gmock.h"
@@ -23,6 +24,7 @@
 namespace lucerna {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -557,6 +559,43 @@ TEST(PbrtMaterialsTest, SubsurfaceIsTheSameInAnyUnit) {
   const auto& sphere = scene.spheres[0];
   const Material& material = scene.materials[static_cast<std::size_t>(sphere.traits.material)];
   EXPECT_NEAR(material.extinction.g * sphere.radius, 10, 1e-4F);
+}
+
+// The number in the material is the largest that the texture gives, and a place has its own.
+TEST(PbrtMaterialsTest, ThicknessOfCoatsMayBeATexture) {
+  const std::string texture =
+      "Texture \"t\" \"float\" \"checkerboard\" \"float tex1\" 0.5 \"float tex2\" -1 \"float "
+      "uscale\" "
+      "2 ";
+  for (const std::string kind : {"coateddiffuse", "coatedconductor"}) {
+    const std::string rough = kind == "coateddiffuse" ? "\"texture roughness\" \"t\""
+                                                      : "\"texture conductor.roughness\" \"t\"";
+    const std::string world = texture + "Material \"" + kind + "\" \"texture thickness\" \"t\" ";
+    const Scene scene = InWorkingSpace(ReadWorld(world + "Shape \"sphere\""));
+    const Material& material =
+        scene.materials[static_cast<std::size_t>(scene.spheres[0].traits.material)];
+    EXPECT_EQ(material.thickness, 0.5F);
+    EXPECT_TRUE(material.DependsOnPlace());
+    SurfacePoint point;
+    point.material = static_cast<std::uint32_t>(scene.spheres[0].traits.material);
+    point.geometry = GeometryOf(scene, ShapeKind::kSphere);
+    std::set<float> found;
+    for (int i = 0; i < 32; ++i) {
+      point.position = Vec3{std::cos(0.2F * static_cast<float>(i)),
+                            std::sin(0.2F * static_cast<float>(i)), 0.1F};
+      point.geometric_normal = point.shading_normal = Normalize(point.position);
+      std::optional<Material> storage;
+      found.insert(MaterialAt(scene, point, {0, 0, 1}, storage).thickness);
+    }
+    EXPECT_THAT(found, ElementsAre(0, 0.5F));
+    EXPECT_THAT(SaidOfWorld(world + rough + " Shape \"sphere\""),
+                HasSubstr("cannot both be textures"));
+  }
+  EXPECT_EQ(ReadWorld("Texture \"c\" \"float\" \"constant\" \"float value\" 0.25 Material "
+                      "\"coateddiffuse\" \"texture thickness\" \"c\" Shape \"sphere\"")
+                .materials.back()
+                .thickness,
+            0.25F);
 }
 
 TEST(PbrtMaterialsTest, SaysWhatIsWrongWithSubsurface) {

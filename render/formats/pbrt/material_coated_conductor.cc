@@ -12,7 +12,7 @@ void ReadCoatedConductor(const MaterialInput& input, Material& material) {
     input.parameters.Error("conductor.roughness",
                            "and interface.roughness cannot both be textures; give one a number");
   }
-  ReadCoat("interface.eta", input.parameters, material);
+  ReadCoat("interface.eta", input, material);
   const bool is_mirror = material.base_alpha_u == 0 && material.base_alpha_v == 0 &&
                          material.alpha_u == 0 && material.alpha_v == 0 &&
                          !material.HasRoughnessTexture();

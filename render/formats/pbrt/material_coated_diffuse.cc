@@ -15,7 +15,7 @@ void ReadCoatedDiffuse(const MaterialInput& input, Material& material) {
     material.given = OwnedSpectra(std::move(given));
   }
   ReadRoughness("", Facets::kSurface, input, material);
-  ReadCoat("eta", input.parameters, material);
+  ReadCoat("eta", input, material);
 }
 
 }  // namespace lucerna

@@ -35,9 +35,9 @@ enum class Facets : std::uint8_t { kSurface, kBase };
 void ReadRoughness(std::string_view prefix, Facets facets, const MaterialInput& input,
                    Material& material);
 
-// `ior` of a coat, from the parameter named `eta`; `thickness` and what else the parameters of
-// pbrt's layered materials set.
-void ReadCoat(std::string_view eta, ParameterList& parameters, Material& material);
+// `ior` of a coat, from the parameter named `eta`; `thickness`, or the texture in its place, and
+// what else the parameters of pbrt's layered materials set. Requires that roughness has been read.
+void ReadCoat(std::string_view eta, const MaterialInput& input, Material& material);
 
 // `eta` and `k` of a metal, from the parameters of these names or from reflectance, or its texture.
 struct MetalParameters {

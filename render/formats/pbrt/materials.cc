@@ -83,6 +83,20 @@ void ReadBumps(const MaterialInput& input, Material& material) {
   input.from.textures.push_back(std::move(normals));
 }
 
+// From a texture: what is below 0 is 0.
+void ReadThickness(const MaterialInput& input, Material& material) {
+  ParameterList& parameters = input.parameters;
+  const NamedTexture* texture = FindNumbers("thickness", parameters, input.from.declared.numbers);
+  if (texture == nullptr) return;
+  // Beyond, nothing comes through.
+  constexpr float kMostThickness = 1e4F;
+  material.thickness = std::clamp(texture->largest, 0.0F, kMostThickness);
+  if (material.thickness == 0 || !(texture->largest > texture->least)) return;
+  material.thickness_texture = texture->number;
+  if (material.HasRoughnessTexture())
+    parameters.Error("thickness", "and a roughness cannot both be textures; give one a number");
+}
+
 }  // namespace
 
 void ReadRoughness(std::string_view prefix, Facets facets, const MaterialInput& input,
@@ -138,9 +152,14 @@ void ReadRoughness(std::string_view prefix, Facets facets, const MaterialInput& 
   if (v.texture != nullptr) material.roughness_textures[first + 1] = v.texture->number;
 }
 
-void ReadCoat(std::string_view eta, ParameterList& parameters, Material& material) {
+void ReadCoat(std::string_view eta, const MaterialInput& input, Material& material) {
+  ParameterList& parameters = input.parameters;
   material.ior = parameters.OneRefractiveIndex(eta, kIndexRange);
-  material.thickness = static_cast<float>(parameters.Float("thickness", 0.01, {0, 1e6}));
+  if (parameters.IsTexture("thickness")) {
+    ReadThickness(input, material);
+  } else {
+    material.thickness = static_cast<float>(parameters.Float("thickness", 0.01, {0, 1e6}));
+  }
   const std::int64_t depth = parameters.FindInteger("maxdepth", {1, 1'000'000}).value_or(10);
   // Every second event is at the base.
   material.base_hits = static_cast<std::int32_t>(depth / 2 + depth % 2);
