@@ -1,7 +1,7 @@
 // A diffuse base under a dielectric coat: `reflectance`, or a texture in its place; `ior`,
 // `alpha_u` and `alpha_v` of the coat's surface, or textures of roughness in their places;
-// `thickness` of what lies between, or a texture in its place. The first part is what the coat's surface reflects, the second
-// what comes out of the coat.
+// `thickness` of what lies between, or a texture in its place. The first part is what the coat's
+// surface reflects, the second what comes out of the coat.
 #include "render/math/color_space.h"
 #include "render/scene/material.h"
 

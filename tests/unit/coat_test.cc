@@ -100,7 +100,8 @@ TEST(CoatTest, ATextureOfRoughnessIsAsGoodAsATableForEach) {
 }
 
 // Between tables of several thicknesses a layer scatters and absorbs as one with a table of its
-// own.
+// own. Over metals both are of 4096 random walks for each angle, with deviations of some 0.3: three
+// standard errors of the difference are 0.02.
 TEST(CoatTest, ThicknessesBetweenTablesAreFitted) {
   constexpr float kMost = 3;
   const auto material = [](int kind, float thickness) {
@@ -119,7 +120,8 @@ TEST(CoatTest, ThicknessesBetweenTablesAreFitted) {
       FitCoat(fitted);
       const Material own = material(kind, thickness);
       for (const double angle : {10.0, 45.0, 75.0}) {
-        EXPECT_NEAR(BaseAlbedo(fitted, AtAngle(angle)), BaseAlbedo(own, AtAngle(angle)), 0.01)
+        EXPECT_NEAR(BaseAlbedo(fitted, AtAngle(angle)), BaseAlbedo(own, AtAngle(angle)),
+                    kind < 2 ? 0.01 : 0.02)
             << kind << " " << thickness << " " << angle;
       }
     }
