@@ -10,7 +10,7 @@ namespace {
 
 // Sources: Jensen et al. 2001, "A Practical Model for Subsurface Light Transport", figure 5 (the
 // first twelve); Narasimhan et al. 2006, "Acquiring Scattering Properties of Participating Media by
-// Dilution", table 4 (the others).
+// Dilution" (the others).
 constexpr std::array<MeasuredMedium, 47> kMedia = {{
     {"Apple", {0.0030F, 0.0034F, 0.046F}, {2.29F, 2.39F, 1.97F}},
     {"Chicken1", {0.015F, 0.077F, 0.19F}, {0.15F, 0.21F, 0.38F}},
