@@ -585,7 +585,14 @@ TEST(PbrtMaterialsTest, ThicknessOfCoatsMayBeATexture) {
                             std::sin(0.2F * static_cast<float>(i)), 0.1F};
       point.geometric_normal = point.shading_normal = Normalize(point.position);
       std::optional<Material> storage;
-      found.insert(MaterialAt(scene, point, {0, 0, 1}, storage).thickness);
+      const Material& here = MaterialAt(scene, point, {0, 0, 1}, storage);
+      found.insert(here.thickness);
+      // What a hitpoint carries makes the same of the material.
+      Material again = material;
+      SetNumbers(again, NumbersOf(here));
+      EXPECT_EQ(again.thickness, here.thickness);
+      EXPECT_EQ(again.coat, here.coat);
+      EXPECT_EQ(again.coat_above_share, here.coat_above_share);
     }
     EXPECT_THAT(found, ElementsAre(0, 0.5F));
     EXPECT_THAT(SaidOfWorld(world + rough + " Shape \"sphere\""),
