@@ -83,7 +83,7 @@ struct MaterialNumbers {
   const CoatTable* coat = nullptr;
   const CoatTable* coat_above = nullptr;
   float coat_above_share = 0;
-  const CoatFamily* coats = nullptr;  // of a coated material with a HasCoatTexture
+  const CoatFamily* coats = nullptr;  // of a coated one with HasCoatTexture()
   // Of hair: roughness along the fibre and around it, in [0.01, 1], and the angle by which its
   // scales are tilted [rad].
   float beta_m = 0.3F, beta_n = 0.3F, scale_tilt = 0;

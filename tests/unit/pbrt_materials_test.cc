@@ -598,6 +598,13 @@ TEST(PbrtMaterialsTest, ThicknessOfCoatsMayBeATexture) {
     EXPECT_THAT(SaidOfWorld(world + rough + " Shape \"sphere\""),
                 HasSubstr("cannot both be textures"));
   }
+  // In rendering threads the largest would be 0.
+  EXPECT_EQ(ReadWorld("Texture \"c\" \"float\" \"checkerboard\" \"float tex1\" 0 \"float tex2\" "
+                      "1e-40 Material \"coateddiffuse\" \"texture thickness\" \"c\" Shape "
+                      "\"sphere\"")
+                .materials.back()
+                .thickness_texture,
+            kNoTexture);
   EXPECT_EQ(ReadWorld("Texture \"c\" \"float\" \"constant\" \"float value\" 0.25 Material "
                       "\"coateddiffuse\" \"texture thickness\" \"c\" Shape \"sphere\"")
                 .materials.back()

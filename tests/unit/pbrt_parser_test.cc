@@ -141,6 +141,9 @@ TEST(PbrtParserTest, Filters) {
   EXPECT_EQ(filter("\"gaussian\" \"float sigma\" 0.3").sigma, 0.3F);
   EXPECT_EQ(filter("\"sinc\"").radius_x, 4);
   EXPECT_EQ(filter("\"sinc\" \"float tau\" 2").window, 2);
+  EXPECT_THAT(
+      SaidOfPbrt("PixelFilter \"sinc\" \"float tau\" 0.01 Camera \"perspective\" WorldBegin"),
+      HasSubstr("tau"));
 }
 
 // Light of the chromaticity that CIE 15 gives for an illuminant becomes grey of the same luminance.

@@ -83,7 +83,8 @@ void ReadBumps(const MaterialInput& input, Material& material) {
   input.from.textures.push_back(std::move(normals));
 }
 
-// From a texture: what is below 0 is 0.
+// From a texture: what is below 0 is 0. Where it is nearly 0 everywhere it is the same everywhere,
+// for tables between 0 and a number that rounding takes for 0 cannot be told apart.
 void ReadThickness(const MaterialInput& input, Material& material) {
   ParameterList& parameters = input.parameters;
   const NamedTexture* texture = FindNumbers("thickness", parameters, input.from.declared.numbers);
@@ -91,7 +92,8 @@ void ReadThickness(const MaterialInput& input, Material& material) {
   // Beyond, nothing comes through.
   constexpr float kMostThickness = 1e4F;
   material.thickness = std::clamp(texture->largest, 0.0F, kMostThickness);
-  if (material.thickness == 0 || !(texture->largest > texture->least)) return;
+  constexpr float kLeastThickness = 1e-6F;
+  if (material.thickness < kLeastThickness || !(texture->largest > texture->least)) return;
   material.thickness_texture = texture->number;
   if (material.HasRoughnessTexture())
     parameters.Error("thickness", "and a roughness cannot both be textures; give one a number");

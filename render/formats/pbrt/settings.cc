@@ -101,7 +101,8 @@ double ReadMitchell(ParameterList& parameters, PixelFilter& filter) {
 
 double ReadSinc(ParameterList& parameters, PixelFilter& filter) {
   filter.kind = PixelFilter::Kind::kSinc;
-  filter.window = static_cast<float>(parameters.Float("tau", 3, {1e-3, 1e3}));
+  // Of much narrower windows the integral is near 0, or below: all would be divided by it.
+  filter.window = static_cast<float>(parameters.Float("tau", 3, {0.25, 1e3}));
   return 4;
 }
 
