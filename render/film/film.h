@@ -13,6 +13,7 @@
 #include "render/estimate/radius_controller.h"
 #include "render/estimate/without_blur.h"
 #include "render/image/image.h"
+#include "render/math/color_space.h"
 #include "render/math/kernel.h"
 #include "render/scene/render_settings.h"
 #include "render/scene/scene.h"

@@ -14,17 +14,8 @@ namespace lucerna {
 class ImageColor {
  public:
   explicit ImageColor(const std::optional<ColorMatrix>& white_balance)
-      : from_working_(kRec709FromWorking) {
-    if (!white_balance.has_value()) return;
-    for (std::size_t row = 0; row < 3; ++row) {
-      for (std::size_t column = 0; column < 3; ++column) {
-        double sum = 0;
-        for (std::size_t k = 0; k < 3; ++k)
-          sum += (*white_balance)[row][k] * kRec709FromWorking[k][column];
-        from_working_[row][column] = sum;
-      }
-    }
-  }
+      : from_working_(white_balance.has_value() ? Product(*white_balance, kRec709FromWorking)
+                                                : kRec709FromWorking) {}
 
   [[nodiscard]] std::array<double, 3> operator()(const std::array<double, 3>& working) const {
     return Transformed(from_working_, working);

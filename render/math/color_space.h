@@ -9,19 +9,23 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 #include "render/math/rgb.h"
 
 namespace lucerna {
 
+// For linear colours, [row][column].
+using ColorMatrix = std::array<std::array<double, 3>, 3>;
+
 // Rows sum to 1, so that grey is exact up to rounding. From the chromaticities of ITU-R BT.709 and
 // SMPTE EG 432-1, both with white D65.
-inline constexpr std::array<std::array<double, 3>, 3> kWorkingFrom709 = {{
+inline constexpr ColorMatrix kWorkingFrom709 = {{
     {0.8224619687, 0.1775380313, 0.0},
     {0.0331941989, 0.9668058011, 0.0},
     {0.0170826307, 0.0723974407, 0.9105199286},
 }};
-inline constexpr std::array<std::array<double, 3>, 3> kRec709FromWorking = {{
+inline constexpr ColorMatrix kRec709FromWorking = {{
     {1.2249401763, -0.2249401763, 0.0},
     {-0.0420569547, 1.0420569547, 0.0},
     {-0.0196375546, -0.0786360456, 1.0982736001},
@@ -37,12 +41,23 @@ inline constexpr std::array<std::array<double, 3>, 3> kRec709FromWorking = {{
   return {row(0), row(1), row(2)};
 }
 
-[[nodiscard]] constexpr std::array<double, 3> Transformed(
-    const std::array<std::array<double, 3>, 3>& matrix, const std::array<double, 3>& c) {
+[[nodiscard]] constexpr std::array<double, 3> Transformed(const ColorMatrix& matrix,
+                                                          const std::array<double, 3>& c) {
   std::array<double, 3> out{};
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t k = 0; k < 3; ++k)
       out[i] += matrix[i][k] * c[k];
+  }
+  return out;
+}
+
+[[nodiscard]] constexpr ColorMatrix Product(const ColorMatrix& a, const ColorMatrix& b) {
+  ColorMatrix out{};
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 3; ++column) {
+      for (std::size_t k = 0; k < 3; ++k)
+        out[row][column] += a[row][k] * b[k][column];
+    }
   }
   return out;
 }

@@ -30,6 +30,7 @@
 #include <string>
 #include <vector>
 
+#include "render/math/color_space.h"
 #include "render/math/rgb.h"
 #include "render/math/transform.h"
 #include "render/math/vector.h"
@@ -161,15 +162,13 @@ struct PixelFilter {
   float window = 3;                  // sinc: half of its window's width, in its zeros
 };
 
-// Of linear Rec. 709 to linear Rec. 709, [row][column].
-using ColorMatrix = std::array<std::array<double, 3>, 3>;
-
 struct FilmSettings {
   int width = 1280, height = 720;  // [pixels] of the whole image
   // The part that is rendered, [x0, x1) × [y0, y1), from cropwindow or pixelbounds.
   int crop_x0 = 0, crop_y0 = 0, crop_x1 = 1280, crop_y1 = 720;
   double exposure = 1;  // (shutterclose - shutteropen) · iso / 100 when the file sets them
-  // What pixels are multiplied by, so that the white of some light is grey; absent: none.
+  // What pixels, in linear Rec. 709, are multiplied by, so that the white of some light is grey;
+  // absent: none.
   std::optional<ColorMatrix> white_balance;
   double max_component = HUGE_VAL;
   std::string filename;

@@ -6,6 +6,7 @@
 
 #include "render/base/text.h"
 #include "render/math/cie_observer.h"
+#include "render/math/color_space.h"
 
 namespace lucerna {
 
@@ -21,7 +22,6 @@ struct RgbSpace {
 namespace {
 
 using Column = std::array<double, 3>;
-using Matrix = ColorMatrix;
 
 // ITU-R BT.709 and BT.2020, SMPTE EG 432-1, and SMPTE ST 2065-1.
 constexpr std::array<RgbSpace, 4> kSpaces = {{
@@ -31,28 +31,8 @@ constexpr std::array<RgbSpace, 4> kSpaces = {{
     {"aces2065-1", {0.7347, 0.2653}, {0.0, 1.0}, {0.0001, -0.0770}, {0.32168, 0.33767}},
 }};
 
-Column Times(const Matrix& m, const Column& v) {
-  Column out{};
-  for (std::size_t row = 0; row < 3; ++row) {
-    for (std::size_t k = 0; k < 3; ++k)
-      out[row] += m[row][k] * v[k];
-  }
-  return out;
-}
-
-Matrix Times(const Matrix& a, const Matrix& b) {
-  Matrix out{};
-  for (std::size_t row = 0; row < 3; ++row) {
-    for (std::size_t column = 0; column < 3; ++column) {
-      for (std::size_t k = 0; k < 3; ++k)
-        out[row][column] += a[row][k] * b[k][column];
-    }
-  }
-  return out;
-}
-
 // Requires a determinant other than 0. By cofactors, whose indices go round.
-Matrix Inverse(const Matrix& m) {
+ColorMatrix Inverse(const ColorMatrix& m) {
   const auto cofactor = [&](std::size_t row, std::size_t column) {
     const auto at = [&](std::size_t r, std::size_t c) {
       return m[(row + r) % 3][(column + c) % 3];
@@ -62,7 +42,7 @@ Matrix Inverse(const Matrix& m) {
   double determinant = 0;
   for (std::size_t column = 0; column < 3; ++column)
     determinant += m[0][column] * cofactor(0, column);
-  Matrix out{};
+  ColorMatrix out{};
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 3; ++column)
       out[column][row] = cofactor(row, column) / determinant;
@@ -75,15 +55,15 @@ Column XyzOf(Chromaticity place) {
 }
 
 // To CIE XYZ, the white at luminance 1.
-Matrix XyzFrom(const RgbSpace& space) {
-  Matrix primaries{};
+ColorMatrix XyzFrom(const RgbSpace& space) {
+  ColorMatrix primaries{};
   const std::array places = {space.red, space.green, space.blue};
   for (std::size_t c = 0; c < 3; ++c) {
     primaries[0][c] = places[c].x;
     primaries[1][c] = places[c].y;
     primaries[2][c] = 1 - places[c].x - places[c].y;
   }
-  const Column strengths = Times(Inverse(primaries), XyzOf(space.white));
+  const Column strengths = Transformed(Inverse(primaries), XyzOf(space.white));
   for (Column& row : primaries) {
     for (std::size_t c = 0; c < 3; ++c)
       row[c] *= strengths[c];
@@ -92,17 +72,17 @@ Matrix XyzFrom(const RgbSpace& space) {
 }
 
 // Between whites, by the cone responses of Lam 1985 ("Bradford").
-Matrix Adapted(Chromaticity from, Chromaticity to) {
-  constexpr Matrix kCones = {
+ColorMatrix Adapted(Chromaticity from, Chromaticity to) {
+  constexpr ColorMatrix kCones = {
       {{0.8951, 0.2664, -0.1614}, {-0.7502, 1.7135, 0.0367}, {0.0389, -0.0685, 1.0296}}};
-  const Column before = Times(kCones, XyzOf(from));
-  const Column after = Times(kCones, XyzOf(to));
-  Matrix scaled = kCones;
+  const Column before = Transformed(kCones, XyzOf(from));
+  const Column after = Transformed(kCones, XyzOf(to));
+  ColorMatrix scaled = kCones;
   for (std::size_t row = 0; row < 3; ++row) {
     for (double& value : scaled[row])
       value *= after[row] / before[row];
   }
-  return Times(Inverse(kCones), scaled);
+  return Product(Inverse(kCones), scaled);
 }
 
 // Of daylight: CIE 15:2018, section 4.1.2.
@@ -143,15 +123,16 @@ std::string RgbSpaceNames() {
 
 void ToRec709(std::vector<Parameter>& parameters, const RgbSpace* space) {
   if (space == nullptr || space == &kSpaces[0]) return;
-  const Matrix convert = Times(Inverse(XyzFrom(kSpaces[0])),
-                               Times(Adapted(space->white, kSpaces[0].white), XyzFrom(*space)));
+  const ColorMatrix convert =
+      Product(Inverse(XyzFrom(kSpaces[0])),
+              Product(Adapted(space->white, kSpaces[0].white), XyzFrom(*space)));
   for (Parameter& parameter : parameters) {
     if (parameter.type != "rgb") continue;
     parameter.is_converted = true;
     for (std::size_t i = 0; i + 3 <= parameter.numbers.size(); i += 3) {
       const Column given = {parameter.numbers[i], parameter.numbers[i + 1],
                             parameter.numbers[i + 2]};
-      const Column color = Times(convert, given);
+      const Column color = Transformed(convert, given);
       for (std::size_t c = 0; c < 3; ++c)
         parameter.numbers[i + c] = std::max(0.0, color[c]);
     }
@@ -160,8 +141,8 @@ void ToRec709(std::vector<Parameter>& parameters, const RgbSpace* space) {
 
 ColorMatrix WhiteBalance(double temperature_k) {
   const RgbSpace& rec709 = kSpaces[0];
-  const Matrix from = XyzFrom(rec709);
-  return Times(Inverse(from), Times(Adapted(WhiteAt(temperature_k), rec709.white), from));
+  const ColorMatrix from = XyzFrom(rec709);
+  return Product(Inverse(from), Product(Adapted(WhiteAt(temperature_k), rec709.white), from));
 }
 
 }  // namespace lucerna

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "render/formats/pbrt/parameter_list.h"
-#include "render/scene/scene.h"
+#include "render/math/color_space.h"
 
 namespace lucerna {
 
