@@ -101,7 +101,7 @@ TEST(MeasuredSurfaceTest, ScattersPhotonsAsTheMetalDoes) {
       AddQuad(scene, {-3, -3, 2}, {0, 6, 0}, {6, 0, 0}, AddMaterial(scene, DiffuseMaterial(0.5F)));
       scene.point_lights.push_back({{-0.9F, 0.2F, 1}, Gray(3)});
       SetCamera(scene, {0, 0, 0.3}, {0.3, 0, 2}, {0, 1, 0}, 60, 8);
-      return Measure(scene, TestSettings(scene, 200000, 0.4, 4), 6, kSeeds, "photons.G");
+      return Measure(scene, TestSettings(scene, 100000, 0.4, 4), 6, kSeeds, "photons.G");
     };
     MetalToMeasure metal;
     metal.alpha_u = metal.alpha_v = alpha;

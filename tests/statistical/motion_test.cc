@@ -229,8 +229,8 @@ TEST(MotionBlurTest, PhotonsLandOnWhatMoves) {
   const Scene rising =
       SceneOf(around + "ActiveTransform EndTime Translate 0 0 .4 ActiveTransform All " + floor);
   const Scene still = SceneOf(around + floor);
-  const MeasuredMean a = Measure(rising, TestSettings(rising, 60000, .05, 4), 32, kParts, "R");
-  const MeasuredMean b = Measure(still, TestSettings(still, 60000, .05, 4), 32, kParts, "R");
+  const MeasuredMean a = Measure(rising, TestSettings(rising, 60000, .05, 4), 16, kParts, "R");
+  const MeasuredMean b = Measure(still, TestSettings(still, 60000, .05, 4), 16, kParts, "R");
   const double lit = 0.5 / std::numbers::pi;
   EXPECT_NEAR(b.mean / lit, 1, 0.1) << "the light is not that of photons through the sheet";
   const double quantile = StudentQuantile(SidakLevel(1e-3, kComparisons), kParts);

@@ -1,515 +1,39 @@
-// No light is lost: one tiny scene for each class of paths, by kind of light, what the light meets
-// on its way, and the surface that the camera sees.
+// No light is lost: one tiny scene for each class of paths (tests/support/path_classes.h).
 //
 // Each scene is rendered by the estimator and by the path tracer of tests/support, which shares
 // nothing with it but geometry. Means over the image and over its quarters are compared; the
 // standard errors of both come from independent repetitions, and Student's quantile bounds their
 // difference. docs/path-classes.md has the table of classes, and names these tests.
 //
-// Kernel bias is kept below what the bounds allow by geometry: floors and panes are flat, radii are
-// 4 % of the floor, and the camera sees no edge within a radius of a gathering surface.
-#include <array>
+// What the path tracer sees does not depend on the estimator, and takes longer than all renders: it
+// is kept in tests/statistical/traced_light.csv, traced with four times the paths by
+// lucerna-trace-path-classes, and some of it is traced again here. A class whose scene changes, and
+// a new one, need that file made again.
+#include "tests/support/path_classes.h"
+
 #include <cmath>
-#include <cstdint>
-#include <memory>
+#include <cstddef>
+#include <map>
 #include <numbers>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "gtest/gtest.h"
 
-#include "render/math/rng.h"
-#include "render/transport/coat.h"
+#include "render/scene/render_settings.h"
 #include "tests/support/path_comparison.h"
 #include "tests/support/path_tracer.h"
 #include "tests/support/test_scenes.h"
+#include "tests/support/traced_light.h"
 
 namespace lucerna {
 namespace {
 
-enum class LightKind {
-  kTriangles,
-  kSphere,
-  kDisk,
-  kPoint,
-  kSpot,
-  kDistant,
-  kConstant,
-  kMap,
-  kPicture,
-  kPortal
-};
-enum class Chain {
-  kNone,
-  kPane,
-  kThinPane,
-  kRoughPane,
-  kMirror,
-  kNarrowWall,
-  kCoatedWall,
-  kSubsurfaceWall,
-  kDiffuseWall,
-  kHairs,
-  kPaneAndNarrowWall,
-  kInBall,
-  kInNarrowBall,
-  kInRoughBall
-};
-enum class Floor {
-  kDiffuse,
-  kRoughMetal,
-  kNarrowMetal,
-  kTexturedMetal,
-  kNarrowGlass,
-  kRoughGlass,
-  kCoated,
-  kRoughCoated,
-  kSheet,
-  kMixed,
-  kPatchyMetal,
-  kPatchyCoat,
-  kBumpy,
-  kHairs,
-  kSubsurface,
-  kRoughSubsurface,
-  kPatchySubsurface,
-  kHazyCoat,
-  kPatchyHaze
-};
-enum class View { kPlain, kThroughGlass, kInMirror };
-
-struct PathClass {
-  LightKind light;
-  Chain chain;
-  Floor floor;
-  View view = View::kPlain;
-};
-
-std::string NameOf(const PathClass& cell) {
-  constexpr std::array<std::string_view, 10> kLights = {"Triangles", "Sphere",  "Disk",     "Point",
-                                                        "Spot",      "Distant", "Constant", "Map",
-                                                        "Picture",   "Portal"};
-  constexpr std::array<std::string_view, 14> kChains = {"Directly",
-                                                        "ByPane",
-                                                        "ByThinPane",
-                                                        "ByRoughPane",
-                                                        "ByMirror",
-                                                        "ByNarrowMetal",
-                                                        "ByCoat",
-                                                        "BySubsurfaceWall",
-                                                        "ByDiffuseWall",
-                                                        "ByHair",
-                                                        "ByPaneAndNarrowMetal",
-                                                        "InGlassBall",
-                                                        "InNarrowGlassBall",
-                                                        "InRoughGlassBall"};
-  constexpr std::array<std::string_view, 19> kFloors = {
-      "Diffuse",         "RoughMetal",       "NarrowMetal", "TexturedMetal", "NarrowGlass",
-      "RoughGlass",      "Coated",           "RoughCoated", "Sheet",         "Mixed",
-      "PatchyMetal",     "PatchyCoat",       "Bumpy",       "Hair",          "Subsurface",
-      "RoughSubsurface", "PatchySubsurface", "HazyCoat",    "PatchyHaze"};
-  constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
-  std::string name(kLights[static_cast<std::size_t>(cell.light)]);
-  name += kChains[static_cast<std::size_t>(cell.chain)];
-  name += "On";
-  name += kFloors[static_cast<std::size_t>(cell.floor)];
-  name += kViews[static_cast<std::size_t>(cell.view)];
-  return name;
-}
-
-bool GathersCaustics(Floor floor) {
-  return floor == Floor::kNarrowMetal || floor == Floor::kTexturedMetal ||
-         floor == Floor::kNarrowGlass || floor == Floor::kRoughCoated || floor == Floor::kMixed ||
-         floor == Floor::kPatchyMetal || floor == Floor::kPatchyCoat ||
-         floor == Floor::kRoughSubsurface || floor == Floor::kPatchySubsurface;
-}
-bool IsWall(Chain chain) {
-  return chain == Chain::kMirror || chain == Chain::kNarrowWall || chain == Chain::kDiffuseWall ||
-         chain == Chain::kPaneAndNarrowWall || chain == Chain::kCoatedWall ||
-         chain == Chain::kSubsurfaceWall;
-}
-
-// Of lights that come straight to the floor.
-constexpr Vec3 kPlace = {0.05F, 1.2F, 1.6F};
-
-// Below surfaces: much less than from what the camera sees to an edge.
-constexpr float kFreePath = 0.01F;
-
-Material Metal(float alpha) {
-  return ConductorMaterial(Gray(0.2F), Gray(3), alpha, alpha);
-}
-
-TextureMapping ByUv(float scale_u, float scale_v, float delta_u, float delta_v) {
-  TextureMapping mapping;
-  mapping.scale_u = scale_u;
-  mapping.scale_v = scale_v;
-  mapping.delta_u = delta_u;
-  mapping.delta_v = delta_v;
-  return mapping;
-}
-
-// Squares of two roughnesses, of which the first is smooth, as the scene's textures.
-void AddPatches(Scene& scene, float roughness) {
-  Texture smooth;
-  smooth.color = Gray(0);
-  Texture rough;
-  rough.color = Gray(roughness);
-  Texture board;
-  board.kind = Texture::Kind::kCheckerboard;
-  board.parts = {0, 1, -1, -1};
-  board.mapping = ByUv(5, 5, 0, 0);
-  scene.textures = {smooth, rough, board};
-}
-
-Material Patchy(Material material) {
-  material.roughness_textures[0] = material.roughness_textures[1] = 2;
-  material.may_be_smooth = true;
-  return material;
-}
-
-// Heights as a picture of 16 by 16 pixels, drawn.
-void AddHeights(Scene& scene) {
-  Picture picture;
-  picture.width = picture.height = 16;
-  picture.channels = 1;
-  KeyedRng rng(3);
-  for (int i = 0; i < picture.width * picture.height; ++i)
-    picture.linear.push_back(rng.Uniform());
-  Texture heights;
-  heights.kind = Texture::Kind::kPicture;
-  heights.is_number = true;
-  heights.scale = 0.05F;
-  heights.picture = std::make_shared<const Picture>(picture);
-  scene.textures = {heights};
-}
-
-// Straight hairs side by side over the whole floor, at a height above it.
-void AddHairs(Scene& scene, float height, float radius, float distance, float inclination) {
-  const std::int32_t hair = AddMaterial(scene, HairMaterial(0.15F, 0.5F, 0.5F));
-  const auto count = static_cast<int>(2.4F / distance);
-  for (int i = 0; i < count; ++i) {
-    const float x = (static_cast<float>(i) + 0.5F) * distance - 1.2F;
-    CurvePiece piece;
-    piece.from = {x, -1, height - inclination};
-    piece.to = {x, 1, height + inclination};
-    piece.center = {x, 0, height};
-    piece.from_radius = piece.to_radius = radius;
-    piece.traits.material = hair;
-    scene.curve_pieces.push_back(piece);
-  }
-}
-
-// A floor z = 0. Light comes from above its far side (y > 0), or, with a wall there, from behind
-// the camera by way of the wall while a black shield shades the floor itself.
-Scene SceneOf(const PathClass& cell) {
-  Scene scene;
-  const std::int32_t black = AddMaterial(scene, DiffuseMaterial(0));
-
-  const auto floor = [&](std::int32_t material) {
-    AddQuad(scene, {-0.7F, -0.8F, 0}, {1.4F, 0, 0}, {0, 1.6F, 0}, material);
-  };
-  const auto floor_with_uv = [&](std::int32_t material) {
-    floor(material);
-    scene.meshes.back().uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-  };
-  switch (cell.floor) {
-    case Floor::kDiffuse:
-      floor(AddMaterial(scene, DiffuseMaterial(0.6F)));
-      break;
-    case Floor::kRoughMetal:
-      floor(AddMaterial(scene, Metal(0.3F)));
-      break;
-    case Floor::kNarrowMetal:
-      floor(AddMaterial(scene, Metal(0.1F)));
-      break;
-    case Floor::kTexturedMetal: {
-      Texture dark;
-      dark.color = Gray(0.3F);
-      Texture bright;
-      bright.color = Gray(0.9F);
-      Texture board;
-      board.kind = Texture::Kind::kCheckerboard;
-      board.parts = {0, 1, -1, -1};
-      board.mapping = ByUv(6, 6, 0, 0);
-      scene.textures = {dark, bright, board};
-      Material metal = Metal(0.3F);
-      metal.texture = 2;
-      floor(AddMaterial(scene, metal));
-      break;
-    }
-    case Floor::kNarrowGlass:
-    case Floor::kRoughGlass:
-      // With a diffuse bottom inside the glass.
-      floor(AddMaterial(scene,
-                        DielectricMaterial(1.5F, cell.floor == Floor::kNarrowGlass ? 0.2F : 0.6F)));
-      AddQuad(scene, {-0.9F, -1, -0.1F}, {1.8F, 0, 0}, {0, 2, 0},
-              AddMaterial(scene, DiffuseMaterial(0.6F)));
-      break;
-    case Floor::kCoated:
-      floor(AddMaterial(scene, CoatedMaterial(0.9F, 0, 0.5F)));
-      break;
-    case Floor::kRoughCoated:
-      floor(AddMaterial(scene, CoatedMaterial(0.8F, 0.2F, 0.5F)));
-      break;
-    case Floor::kSubsurface:
-      floor(AddMaterial(scene, SubsurfaceMaterial(0.8F, kFreePath)));
-      break;
-    case Floor::kHazyCoat:
-      floor(AddMaterial(scene, WithHaze(CoatedMaterial(0.5F, 0, 0.7F), 0.9F, 0)));
-      break;
-    case Floor::kPatchyHaze: {
-      AddPatches(scene, 0.7F);
-      std::vector<Material> one = {WithHaze(CoatedMaterial(0.5F, 0, 0.7F), 0.9F, 0)};
-      one[0].thickness_texture = 2;
-      PrepareCoats(one);
-      floor_with_uv(AddMaterial(scene, one[0]));
-      break;
-    }
-    case Floor::kRoughSubsurface:
-      floor(AddMaterial(scene, SubsurfaceMaterial(0.7F, kFreePath, 0.2F)));
-      break;
-    case Floor::kSheet:
-      // What it transmits comes back from below.
-      floor(AddMaterial(scene, SheetMaterial(0.2F, 0.6F)));
-      AddQuad(scene, {-0.9F, -1, -0.3F}, {1.8F, 0, 0}, {0, 2, 0},
-              AddMaterial(scene, DiffuseMaterial(0.8F)));
-      break;
-    default:
-      break;
-  }
-
-  switch (cell.floor) {
-    case Floor::kMixed: {
-      // Diffuse under lacquer, and narrow metal.
-      const std::int32_t coat = AddMaterial(scene, CoatedMaterial(0.7F, 0, 0.2F));
-      const std::int32_t metal = AddMaterial(scene, Metal(0.1F));
-      Material mix;
-      mix.kind = Material::Kind::kMix;
-      mix.mixed = {coat, metal};
-      mix.mix_depth = 1;
-      mix.amount = 0.4F;
-      floor(AddMaterial(scene, mix));
-      JoinMixes(scene.materials);
-      break;
-    }
-    case Floor::kPatchyMetal:
-      AddPatches(scene, 0.02F);
-      floor_with_uv(AddMaterial(scene, Patchy(Metal(std::sqrt(0.02F)))));
-      break;
-    case Floor::kPatchyCoat:
-      AddPatches(scene, 0.04F);
-      floor_with_uv(AddMaterial(scene, Patchy(CoatedMaterial(0.8F, 0.2F, 0.5F))));
-      break;
-    case Floor::kPatchySubsurface:
-      AddPatches(scene, 0.04F);
-      floor_with_uv(AddMaterial(scene, Patchy(SubsurfaceMaterial(0.7F, kFreePath, 0.2F))));
-      break;
-    case Floor::kBumpy: {
-      AddHeights(scene);
-      Material material = DiffuseMaterial(0.6F);
-      material.displacement = 0;
-      material.slope_step = SlopeStep(scene.textures, 0);
-      floor_with_uv(AddMaterial(scene, material));
-      break;
-    }
-    case Floor::kHairs:
-      // Two layers, and what comes through them.
-      AddHairs(scene, 0.05F, 0.004F, 0.013F, 0);
-      AddHairs(scene, 0.1F, 0.004F, 0.017F, 0.03F);
-      floor(AddMaterial(scene, DiffuseMaterial(0.6F)));
-      break;
-    default:
-      break;
-  }
-
-  const auto pane = [&](const Material& material) {
-    AddBox(scene, {-1, -1, 0.9F}, {1, 1, 1}, AddMaterial(scene, material));
-  };
-  const auto wall = [&](const Material& material) {
-    AddQuad(scene, {-1, 0.85F, 0.02F}, {2, 0, 0}, {0, 0, 1.4F}, AddMaterial(scene, material));
-    // The sun's shadow of its edge would be blurred where a cone stands for the sun.
-    if (cell.light != LightKind::kDistant) {
-      AddQuad(scene, {-0.8F, -1.7F, 1.1F}, {1.6F, 0, 0}, {0, 1.35F, 0}, black);
-    }
-  };
-  switch (cell.chain) {
-    case Chain::kNone:
-      break;
-    case Chain::kPane:
-      pane(DielectricMaterial(1.5F));
-      break;
-    case Chain::kThinPane:
-      pane(DielectricMaterial(1.0001F));
-      break;
-    case Chain::kRoughPane:
-      pane(DielectricMaterial(1.5F, 0.2F));
-      break;
-    case Chain::kMirror:
-      wall(Metal(0));
-      break;
-    case Chain::kNarrowWall:
-      wall(Metal(0.1F));
-      break;
-    case Chain::kCoatedWall:
-      wall(CoatedMaterial(0.3F, 0));
-      break;
-    case Chain::kSubsurfaceWall:
-      wall(SubsurfaceMaterial(0.8F, kFreePath));
-      break;
-    case Chain::kDiffuseWall:
-      wall(DiffuseMaterial(0.8F));
-      break;
-    case Chain::kHairs:
-      // Closed enough that most light is scattered by them; the camera is below.
-      AddHairs(scene, 1, 0.004F, 0.01F, 0.1F);
-      break;
-    case Chain::kPaneAndNarrowWall:
-      wall(Metal(0.1F));
-      AddBox(scene, {-0.9F, -1.2F, 1.5F}, {0.9F, 0.5F, 1.6F},
-             AddMaterial(scene, DielectricMaterial(1.5F)));
-      break;
-    case Chain::kInBall:
-    case Chain::kInNarrowBall:
-    case Chain::kInRoughBall:
-      AddSphere(scene, kPlace, 0.35F,
-                AddMaterial(scene,
-                            DielectricMaterial(1.5F, cell.chain == Chain::kInBall         ? 0
-                                                     : cell.chain == Chain::kInNarrowBall ? 0.2F
-                                                                                          : 0.6F)));
-      break;
-  }
-
-  const bool by_wall = IsWall(cell.chain);
-  const Vec3 place = by_wall ? Vec3{0.05F, -1, 2.2F} : kPlace;
-  const Vec3 lit = by_wall ? Vec3{0, 0.85F, 0.8F} : Vec3{0, 0, 0};
-  const Vec3 along = Normalize(lit - place);
-  const auto area_light = [&] { return AddAreaLight(scene, 15, cell.light == LightKind::kDisk); };
-  const auto picture = [] {
-    Picture made;
-    made.width = made.height = 6;
-    made.channels = 1;
-    for (int i = 0; i < 36; ++i)
-      made.linear.push_back(0.1F + 0.4F * static_cast<float>(i * 7 % 5));
-    return std::make_shared<const Picture>(std::move(made));
-  };
-  switch (cell.light) {
-    case LightKind::kTriangles: {
-      const Frame frame(along);
-      AddQuad(scene, place - (frame.s + frame.t) * 0.2F, frame.s * 0.4F, frame.t * 0.4F, black,
-              area_light());
-      break;
-    }
-    case LightKind::kSphere:
-      AddSphere(scene, place, 0.2F, black, area_light());
-      break;
-    case LightKind::kDisk:
-      AddDisk(scene, place, along, 0.22F, black, area_light());
-      break;
-    case LightKind::kPoint:
-      scene.point_lights.push_back({place, Gray(3)});
-      break;
-    case LightKind::kSpot:
-      scene.spot_lights.push_back({place, along, Gray(3), std::cos(0.25F), std::cos(0.7F)});
-      break;
-    case LightKind::kDistant:
-      scene.distant_lights.push_back({along, Gray(1)});
-      break;
-    case LightKind::kConstant:
-      scene.infinite_lights.push_back({Gray(0.7F)});
-      break;
-    case LightKind::kMap: {
-      InfiniteLight light;
-      light.radiance = Gray(1);
-      light.kind = InfiniteLight::Kind::kEnvironment;
-      light.map = picture();
-      scene.infinite_lights.push_back(light);
-      break;
-    }
-    case LightKind::kPicture: {
-      AreaLight light = {Gray(18), false, picture()};
-      light.largest_pixel = light.picture->Largest();
-      scene.area_lights.push_back(light);
-      const Frame frame(along);
-      AddQuad(scene, place - (frame.s + frame.t) * 0.2F, frame.s * 0.4F, frame.t * 0.4F, black, 0);
-      scene.meshes.back().uvs = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-      break;
-    }
-    case LightKind::kPortal: {
-      InfiniteLight light;
-      light.radiance = Gray(15);
-      light.kind = InfiniteLight::Kind::kPortal;
-      light.map = picture();
-      const Frame frame(along);
-      light.portal = Portal{place - (frame.s + frame.t) * 0.2F, frame.t * 0.4F, frame.s * 0.4F};
-      scene.infinite_lights.push_back(light);
-      break;
-    }
-  }
-
-  constexpr double kFovDeg = 28;
-  constexpr int kSize = 8;
-  switch (cell.view) {
-    case View::kPlain:
-      SetCamera(scene, {0, -0.8, 0.8}, {0, 0, 0}, {0, 0, 1}, kFovDeg, kSize);
-      break;
-    case View::kThroughGlass:
-      // Through the pane that the light passes, or one of the camera's own.
-      SetCamera(scene, {0, -0.75, 1.25}, {0, 0, 0}, {0, 0, 1}, 21, kSize);
-      if (cell.chain == Chain::kNone) {
-        AddBox(scene, {-0.3F, -0.9F, 0.9F}, {0.3F, -0.35F, 0.96F},
-               AddMaterial(scene, DielectricMaterial(1.5F)));
-      }
-      break;
-    case View::kInMirror:
-      SetCamera(scene, {0, -0.1, 0.85}, {0, -1.8, 0}, {0, 0, 1}, 14, kSize);
-      AddQuad(scene, {-0.7F, -0.9F, 0.1F}, {1.4F, 0, 0}, {0, 0, 0.75F},
-              AddMaterial(scene, Metal(0)));
-      break;
-  }
-  return scene;
-}
-
 constexpr int kParts = 16;
-constexpr int kDepth = 24;
 // At least as many comparisons as this file makes: cells times blocks.
 constexpr int kQuestions = 1500;
 constexpr double kLevel = 1e-2;
-
-struct Effort {
-  int passes = 12;
-  int photons = 2000;
-  int paths = 16000;  // of each replica of the path tracer
-  float delta_radius = 0.08F;
-};
-
-std::uint64_t KeyOf(std::string_view name) {
-  std::uint64_t key = 0;
-  for (const char c : name)
-    key = CombineKeys(key, static_cast<unsigned char>(c));
-  return key;
-}
-
-void ExpectSameLight(const Scene& scene, const Effort& effort, std::string_view name) {
-  constexpr double kRadius = 0.04;
-  RenderSettings settings = TestSettings(scene, effort.photons, kRadius, kDepth, KeyOf(name));
-  settings.alpha = 1 - 1e-7;  // the radius is held
-  PathTracerSettings tracer;
-  tracer.key = Mix64(KeyOf(name));
-  tracer.paths_per_replica = effort.paths;
-  tracer.delta_radius = effort.delta_radius;
-  tracer.delta_angle_rad = tracer.delta_radius / 2;
-  static const double quantile = StudentQuantile(SidakLevel(kLevel, kQuestions), kParts);
-  for (const PathComparison& c :
-       CompareWithPaths(scene, settings, tracer, effort.passes, kParts, 2, "G")) {
-    EXPECT_GT(c.traced.mean, 0);
-    EXPECT_LT(std::abs(c.Deviation()), quantile)
-        << "pixels from (" << c.block.x0 << ", " << c.block.y0 << "): " << c.estimated.mean
-        << " +- " << c.estimated.standard_error << " estimated, " << c.traced.mean << " +- "
-        << c.traced.standard_error << " traced";
-  }
-}
 
 // --- the path tracer itself ----------------------------------------------------------------------
 
@@ -568,119 +92,70 @@ TEST(PathTracerTest, StandInsOfTwoSizesGiveTheSameLight) {
   }
 }
 
-// --- cells
-// -----------------------------------------------------------------------------------------
+// --- cells ---------------------------------------------------------------------------------------
+
+const std::map<std::string, TracedLight>& Traced() {
+  static const auto kTraced =
+      ReadTracedLight(LUCERNA_SOURCE_DIR "/tests/statistical/traced_light.csv");
+  return kTraced;
+}
 
 class PathClassTest : public testing::TestWithParam<PathClass> {};
-
-std::vector<PathClass> Cells() {
-  using enum LightKind;
-  using enum Chain;
-  const std::vector<Floor> narrow = {Floor::kNarrowMetal, Floor::kTexturedMetal,
-                                     Floor::kNarrowGlass};
-  const std::vector<Floor> two = {Floor::kDiffuse, Floor::kNarrowMetal};
-  std::vector<PathClass> cells;
-  const auto add = [&](const std::vector<LightKind>& lights, const std::vector<Chain>& chains,
-                       const std::vector<Floor>& floors, View view = View::kPlain) {
-    for (const LightKind light : lights) {
-      for (const Chain chain : chains) {
-        for (const Floor floor : floors)
-          cells.push_back({light, chain, floor, view});
-      }
-    }
-  };
-  add({kTriangles, kPoint}, {kNone, kPane, kRoughPane, kMirror, kNarrowWall, kDiffuseWall},
-      {Floor::kDiffuse, Floor::kRoughMetal, Floor::kNarrowMetal, Floor::kTexturedMetal,
-       Floor::kNarrowGlass, Floor::kRoughGlass});
-  // What differs from those in the light alone.
-  add({kDistant}, {kNone, kPane, kRoughPane, kMirror, kNarrowWall, kDiffuseWall},
-      {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kTexturedMetal, Floor::kNarrowGlass});
-  add({kMap}, {kNone, kPane, kRoughPane, kMirror, kNarrowWall, kDiffuseWall},
-      {Floor::kDiffuse, Floor::kRoughMetal, Floor::kNarrowMetal});
-  add({kSphere, kDisk, kConstant}, {kNone, kPane}, two);
-  add({kPicture, kPortal}, {kNone, kPane, kMirror, kDiffuseWall}, two);
-  add({kPicture, kPortal}, {kPane}, {Floor::kDiffuse}, View::kThroughGlass);
-  add({kSpot}, {kNone, kPane, kMirror}, two);
-  add({kSpot}, {kPane}, {Floor::kTexturedMetal, Floor::kNarrowGlass});
-  // As bright as without the pane.
-  add({kPoint, kSpot, kDistant}, {kThinPane}, narrow);
-  add({kTriangles, kPoint, kDistant}, {kPaneAndNarrowWall}, two);
-  add({kSphere, kPoint}, {kInBall, kInNarrowBall, kInRoughBall}, two);
-  add({kTriangles, kPoint}, {kNone, kPane},
-      {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kNarrowGlass}, View::kThroughGlass);
-  add({kTriangles, kPoint}, {kNone, kPane}, two, View::kInMirror);
-  // Surfaces in two parts.
-  add({kTriangles, kPoint}, {kNone, kPane, kDiffuseWall},
-      {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
-  add({kMap}, {kNone, kPane}, {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
-  add({kTriangles, kPoint}, {kCoatedWall}, {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kCoated});
-  add({kTriangles}, {kNone, kPane}, {Floor::kHazyCoat, Floor::kPatchyHaze});
-  // Light that comes out elsewhere than where it entered.
-  add({kTriangles, kPoint}, {kNone, kPane}, {Floor::kSubsurface});
-  add({kTriangles}, {kNone}, {Floor::kRoughSubsurface});
-  add({kTriangles, kPoint}, {kPane}, {Floor::kRoughSubsurface, Floor::kPatchySubsurface});
-  add({kMap}, {kNone}, {Floor::kSubsurface});
-  add({kTriangles}, {kDiffuseWall}, {Floor::kSubsurface});
-  add({kTriangles}, {kSubsurfaceWall}, {Floor::kDiffuse, Floor::kSubsurface});
-  add({kPoint}, {kSubsurfaceWall}, {Floor::kNarrowMetal});
-  // Surfaces that are another one at each place.
-  add({kTriangles, kPoint}, {kNone, kPane},
-      {Floor::kMixed, Floor::kPatchyMetal, Floor::kPatchyCoat, Floor::kBumpy});
-  add({kMap}, {kPane}, {Floor::kMixed, Floor::kPatchyMetal, Floor::kBumpy});
-  // Thin, and to be scattered by.
-  add({kTriangles, kPoint, kMap}, {kNone, kDiffuseWall}, {Floor::kHairs});
-  add({kTriangles, kMap}, {kPane}, {Floor::kHairs});
-  add({kTriangles, kPoint, kDistant, kMap}, {kHairs}, two);
-  add({kTriangles}, {kHairs}, {Floor::kHairs});
-  add({kTriangles}, {kNone}, {Floor::kCoated, Floor::kRoughCoated}, View::kThroughGlass);
-  add({kTriangles}, {kPane}, {Floor::kCoated, Floor::kRoughCoated}, View::kInMirror);
-  return cells;
-}
 
 std::string CellName(const testing::TestParamInfo<PathClass>& info) {
   return NameOf(info.param);
 }
 
-INSTANTIATE_TEST_SUITE_P(Cells, PathClassTest, testing::ValuesIn(Cells()), CellName);
-
-// Narrow lobes want small emitters in place of delta lights; below broad ones, large ones are found
-// more often.
-Effort EffortFor(const PathClass& cell) {
-  Effort effort;
-  switch (cell.floor) {
-    case Floor::kRoughMetal:
-    case Floor::kTexturedMetal:
-      effort.delta_radius = 0.12F;
-      break;
-    case Floor::kNarrowMetal:
-    case Floor::kPatchyMetal:
-    case Floor::kMixed:
-      effort.delta_radius = 0.08F;
-      break;
-    default:
-      effort.delta_radius = 0.2F;
-      break;
-  }
-  if (cell.light == LightKind::kSpot) effort.delta_radius = 0.08F;
-  // Found by few of the photons or scattered rays.
-  if (cell.floor == Floor::kRoughGlass || cell.floor == Floor::kRoughMetal) effort.photons = 6000;
-  if (GathersCaustics(cell.floor) && cell.chain != Chain::kNone) effort.passes = 22;
-  if (effort.delta_radius < 0.1F) effort.paths = 28000;
-  if (cell.chain == Chain::kInBall || cell.chain == Chain::kInNarrowBall ||
-      cell.chain == Chain::kInRoughBall) {
-    effort.delta_radius = 0.06F;
-  }
-  // Most of the light is that of very few paths: with 16,000 of them the path tracer's mean is
-  // mostly half of what it is with 640,000, and its standard error as far off.
-  if (cell.floor == Floor::kHairs && cell.light == LightKind::kPoint &&
-      cell.chain == Chain::kDiffuseWall) {
-    effort.paths = 160000;
-  }
-  return effort;
-}
+INSTANTIATE_TEST_SUITE_P(Cells, PathClassTest, testing::ValuesIn(AllPathClasses()), CellName);
 
 TEST_P(PathClassTest, IsSampled) {
-  ExpectSameLight(SceneOf(GetParam()), EffortFor(GetParam()), NameOf(GetParam()));
+  const PathClass& cell = GetParam();
+  const std::string name = NameOf(cell);
+  const auto traced = Traced().find(name);
+  ASSERT_NE(traced, Traced().end()) << "run lucerna-trace-path-classes";
+  const Scene scene = SceneOf(cell);
+  const Effort effort = EffortFor(cell);
+  constexpr double kRadius = 0.04;
+  RenderSettings settings =
+      TestSettings(scene, effort.photons, kRadius, kDepthOfPathClasses, KeyOf(name));
+  settings.alpha = 1 - 1e-7;  // the radius is held
+  std::vector<PathComparison> blocks =
+      EstimateBlocks(scene, settings, effort.passes, kParts, 2, "G");
+  static const double quantile = StudentQuantile(SidakLevel(kLevel, kQuestions), kParts);
+  ASSERT_EQ(blocks.size(), traced->second.size());
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    PathComparison& c = blocks[i];
+    c.traced = traced->second[i];
+    EXPECT_GT(c.traced.mean, 0);
+    EXPECT_LT(std::abs(c.Deviation()), quantile)
+        << "pixels from (" << c.block.x0 << ", " << c.block.y0 << "): " << c.estimated.mean
+        << " +- " << c.estimated.standard_error << " estimated, " << c.traced.mean << " +- "
+        << c.traced.standard_error << " traced";
+  }
+}
+
+// The file is what the path tracer sees of these scenes: of one class in twelve it is traced again,
+// with other random numbers.
+TEST(PathTracerTest, SeesWhatIsWrittenDown) {
+  const std::vector<PathClass> cells = AllPathClasses();
+  EXPECT_EQ(Traced().size(), cells.size());
+  constexpr std::size_t kOneIn = 12;
+  constexpr int kReplicas = 24;
+  const double quantile =
+      StudentQuantile(SidakLevel(1e-3, static_cast<int>(cells.size() / kOneIn + 1) * 5), kReplicas);
+  for (std::size_t i = 0; i < cells.size(); i += kOneIn) {
+    const std::string name = NameOf(cells[i]);
+    SCOPED_TRACE(name);
+    const auto written = Traced().find(name);
+    ASSERT_NE(written, Traced().end());
+    const TracedLight again = TraceClass(cells[i], 1, 1);
+    for (std::size_t block = 0; block < again.size(); ++block) {
+      const MeasuredMean& before = written->second[block];
+      EXPECT_LT(std::abs(again[block].mean - before.mean),
+                quantile * std::hypot(again[block].standard_error, before.standard_error))
+          << "block " << block << ": " << again[block].mean << ", written " << before.mean;
+    }
+  }
 }
 
 }  // namespace

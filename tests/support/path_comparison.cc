@@ -29,42 +29,50 @@ double PathComparison::Deviation() const {
   return difference == 0 ? 0 : difference / StandardError();
 }
 
-std::vector<PathComparison> CompareWithPaths(const Scene& scene, RenderSettings settings,
-                                             PathTracerSettings tracer, int passes, int parts,
-                                             int side, std::string_view channel) {
+std::vector<PathComparison> EstimateBlocks(const Scene& scene, RenderSettings settings, int passes,
+                                           int parts, int side, std::string_view channel,
+                                           int threads) {
   const int width = settings.width;
   const int height = settings.height;
   LUCERNA_CHECK(width % side == 0 && height % side == 0 && settings.crop_width() == width &&
                 settings.crop_height() == height);
   // As the path tracer has them.
   settings.spectral = false;
-  std::vector<PathComparison> comparisons;
-  comparisons.push_back({{0, 0, width, height}, {}, {}});
+  std::vector<PathComparison> blocks;
+  blocks.push_back({{0, 0, width, height}, {}, {}});
   for (int i = 0; side > 1 && i < side * side; ++i) {
     const int x = i % side * (width / side);
     const int y = i / side * (height / side);
-    comparisons.push_back({{x, y, x + width / side, y + height / side}, {}, {}});
+    blocks.push_back({{x, y, x + width / side, y + height / side}, {}, {}});
   }
 
-  std::vector<std::vector<double>> means(comparisons.size());
+  std::vector<std::vector<double>> means(blocks.size());
   const std::uint64_t first_seed = settings.seed;
   for (int part = 0; part < parts; ++part) {
     settings.seed = first_seed + static_cast<std::uint64_t>(part);
-    const Image image = RenderLocally(scene, settings, passes, tracer.threads);
+    const Image image = RenderLocally(scene, settings, passes, threads);
     const ImageChannel* found = image.Find(channel);
     LUCERNA_CHECK(found != nullptr);
-    for (std::size_t i = 0; i < comparisons.size(); ++i)
-      means[i].push_back(MeanOver(*found, width, comparisons[i].block));
+    for (std::size_t i = 0; i < blocks.size(); ++i)
+      means[i].push_back(MeanOver(*found, width, blocks[i].block));
   }
-  tracer.width = width;
-  tracer.height = height;
+  for (std::size_t i = 0; i < blocks.size(); ++i)
+    blocks[i].estimated = MeanOf(means[i]);
+  return blocks;
+}
+
+std::vector<PathComparison> CompareWithPaths(const Scene& scene, const RenderSettings& settings,
+                                             PathTracerSettings tracer, int passes, int parts,
+                                             int side, std::string_view channel) {
+  std::vector<PathComparison> comparisons =
+      EstimateBlocks(scene, settings, passes, parts, side, channel, tracer.threads);
+  tracer.width = settings.width;
+  tracer.height = settings.height;
   tracer.max_depth = settings.max_depth;
   const TracedImage traced = TracePaths(scene, tracer);
   const int number = channel == "R" ? 0 : channel == "G" ? 1 : 2;
-  for (std::size_t i = 0; i < comparisons.size(); ++i) {
-    comparisons[i].estimated = MeanOf(means[i]);
-    comparisons[i].traced = traced.MeanOver(comparisons[i].block, number);
-  }
+  for (PathComparison& comparison : comparisons)
+    comparison.traced = traced.MeanOver(comparison.block, number);
   return comparisons;
 }
 

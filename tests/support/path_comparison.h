@@ -24,11 +24,16 @@ struct PathComparison {
 };
 
 // Means of a channel ("R", "G" or "B") over the whole image first, then over side × side blocks of
-// it, row by row. Renders `parts` times `passes` passes with seeds of their own, at `settings`,
-// whose width and height are the tracer's too. `tracer` says the rest. Requires that `side` divides
-// width and height.
+// it, row by row, without what is traced. Renders `parts` times `passes` passes with seeds of their
+// own, at `settings`. Requires that `side` divides width and height.
+[[nodiscard]] std::vector<PathComparison> EstimateBlocks(const Scene& scene,
+                                                         RenderSettings settings, int passes,
+                                                         int parts, int side,
+                                                         std::string_view channel, int threads = 0);
+
+// The same beside what is traced of an image of that size. `tracer` says the rest.
 [[nodiscard]] std::vector<PathComparison> CompareWithPaths(const Scene& scene,
-                                                           RenderSettings settings,
+                                                           const RenderSettings& settings,
                                                            PathTracerSettings tracer, int passes,
                                                            int parts, int side,
                                                            std::string_view channel);
