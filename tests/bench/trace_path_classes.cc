@@ -28,8 +28,15 @@ int main(int argc, char** argv) {
   const std::vector<std::string_view> names(argv + 2, argv + argc);
   std::map<std::string, TracedLight> before;
   if (std::filesystem::exists(path)) before = ReadTracedLight(path);
+  const std::vector<PathClass> cells = AllPathClasses();
+  for (const std::string_view name : names) {
+    if (std::ranges::none_of(cells, [&](const PathClass& cell) { return NameOf(cell) == name; })) {
+      std::fprintf(stderr, "there is no class %s\n", std::string(name).c_str());
+      return 2;
+    }
+  }
   std::map<std::string, TracedLight> classes;
-  for (const PathClass& cell : AllPathClasses()) {
+  for (const PathClass& cell : cells) {
     const std::string name = NameOf(cell);
     const auto known = before.find(name);
     if (!names.empty() && known != before.end() && std::ranges::find(names, name) == names.end()) {

@@ -177,7 +177,7 @@ TEST(CornersTest, AreAsBrightAsTheRestOfAFurnace) {
     overrides.max_depth = 40;
     overrides.photons_per_pass = 20000;
     const MeasuredMean photons =
-        Measure(scene, SettingsFor(scene, overrides), 4, kParts, "photons.G");
+        Measure(scene, SettingsFor(scene, overrides), 6, kParts, "photons.G");
     const double bound = quantile * photons.standard_error;
     // Of the whole radiance, 2: 0.05 %, and what chance may do.
     EXPECT_NEAR(photons.mean, 0.5, 0.0005 * 2 + bound) << "bound " << bound;

@@ -5,9 +5,9 @@
 // standard errors of both come from independent repetitions, and Student's quantile bounds their
 // difference. docs/path-classes.md has the table of classes, and names these tests.
 //
-// What the path tracer sees does not depend on the estimator, and takes longer than all renders: it
-// is kept in tests/statistical/traced_light.csv, traced with four times the paths by
-// lucerna-trace-path-classes, and some of it is traced again here. A class whose scene changes, and
+// What the path tracer sees does not depend on the estimator: it is kept in
+// tests/statistical/traced_light.csv, made by lucerna-trace-path-classes with more paths than a run
+// of the tests has time for, and some of it is traced again here. A class whose scene changes, and
 // a new one, need that file made again.
 #include "tests/support/path_classes.h"
 

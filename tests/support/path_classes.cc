@@ -35,15 +35,6 @@ Material Metal(float alpha) {
   return ConductorMaterial(Gray(0.2F), Gray(3), alpha, alpha);
 }
 
-TextureMapping ByUv(float scale_u, float scale_v, float delta_u, float delta_v) {
-  TextureMapping mapping;
-  mapping.scale_u = scale_u;
-  mapping.scale_v = scale_v;
-  mapping.delta_u = delta_u;
-  mapping.delta_v = delta_v;
-  return mapping;
-}
-
 // Squares of two roughnesses, of which the first is smooth, as the scene's textures.
 void AddPatches(Scene& scene, float roughness) {
   Texture smooth;
@@ -489,7 +480,7 @@ Effort EffortFor(const PathClass& cell) {
   if (cell.light == LightKind::kSpot) effort.delta_radius = 0.08F;
   // Found by few of the photons or scattered rays.
   if (cell.floor == Floor::kRoughGlass || cell.floor == Floor::kRoughMetal) effort.photons = 6000;
-  if (GathersCaustics(cell.floor) && cell.chain != Chain::kNone) effort.passes = 18;
+  if (GathersCaustics(cell.floor) && cell.chain != Chain::kNone) effort.passes = 22;
   if (effort.delta_radius < 0.1F) effort.paths = 28000;
   if (cell.chain == Chain::kInBall || cell.chain == Chain::kInNarrowBall ||
       cell.chain == Chain::kInRoughBall) {
@@ -502,17 +493,6 @@ Effort EffortFor(const PathClass& cell) {
     effort.paths = 160000;
   }
   return effort;
-}
-
-PathTracerSettings TracerSettingsFor(const PathClass& cell, int times) {
-  const Effort effort = EffortFor(cell);
-  PathTracerSettings tracer;
-  tracer.key = Mix64(KeyOf(NameOf(cell)));
-  tracer.max_depth = kDepthOfPathClasses;
-  tracer.paths_per_replica = effort.paths * times;
-  tracer.delta_radius = effort.delta_radius;
-  tracer.delta_angle_rad = tracer.delta_radius / 2;
-  return tracer;
 }
 
 }  // namespace lucerna

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "render/scene/scene.h"
-#include "tests/support/path_tracer.h"
 
 namespace lucerna {
 
@@ -86,7 +85,7 @@ struct PathClass {
 
 // What a class is rendered and traced with.
 struct Effort {
-  int passes = 9;
+  int passes = 12;
   int photons = 2000;
   int paths = 16000;  // of each replica of the path tracer
   float delta_radius = 0.08F;
@@ -96,8 +95,5 @@ struct Effort {
 
 // Greatest depth of estimator and path tracer.
 inline constexpr int kDepthOfPathClasses = 24;
-
-// For the path tracer, `times` times as many paths as its effort says.
-[[nodiscard]] PathTracerSettings TracerSettingsFor(const PathClass& cell, int times = 1);
 
 }  // namespace lucerna

@@ -108,6 +108,15 @@ std::int32_t AddAreaLight(Scene& scene, float radiance, bool two_sided) {
   return static_cast<std::int32_t>(scene.area_lights.size()) - 1;
 }
 
+TextureMapping ByUv(float scale_u, float scale_v, float delta_u, float delta_v) {
+  TextureMapping mapping;
+  mapping.scale_u = scale_u;
+  mapping.scale_v = scale_v;
+  mapping.delta_u = delta_u;
+  mapping.delta_v = delta_v;
+  return mapping;
+}
+
 void AddQuad(Scene& scene, Vec3 corner, Vec3 edge1, Vec3 edge2, std::int32_t material,
              std::int32_t area_light) {
   TriangleMesh mesh;

@@ -37,6 +37,8 @@ namespace lucerna {
 std::int32_t AddMaterial(Scene& scene, const Material& material);
 std::int32_t AddAreaLight(Scene& scene, float radiance, bool two_sided = false);
 
+[[nodiscard]] TextureMapping ByUv(float scale_u, float scale_v, float delta_u, float delta_v);
+
 // A parallelogram of two triangles; the outward normal is along edge1 × edge2.
 void AddQuad(Scene& scene, Vec3 corner, Vec3 edge1, Vec3 edge2, std::int32_t material,
              std::int32_t area_light = kNoAreaLight);

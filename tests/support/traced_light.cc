@@ -9,14 +9,20 @@
 #include "render/base/files.h"
 #include "render/base/status.h"
 #include "render/math/rng.h"
+#include "tests/support/path_tracer.h"
 
 namespace lucerna {
 
 TracedLight TraceClass(const PathClass& cell, int times, std::uint64_t key) {
-  const Scene scene = SceneOf(cell);
-  PathTracerSettings settings = TracerSettingsFor(cell, times);
+  const Effort effort = EffortFor(cell);
+  PathTracerSettings settings;
+  settings.key = Mix64(KeyOf(NameOf(cell)));
   if (key != 0) settings.key = CombineKeys(settings.key, key);
-  const TracedImage image = TracePaths(scene, settings);
+  settings.max_depth = kDepthOfPathClasses;
+  settings.paths_per_replica = effort.paths * times;
+  settings.delta_radius = effort.delta_radius;
+  settings.delta_angle_rad = effort.delta_radius / 2;
+  const TracedImage image = TracePaths(SceneOf(cell), settings);
   const int half = settings.width / 2;
   TracedLight light;
   light[0] = image.MeanOver({0, 0, 2 * half, 2 * half}, 1);

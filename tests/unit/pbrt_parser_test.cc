@@ -17,6 +17,7 @@
 #include "render/math/warp.h"
 #include "tests/support/memory_files.h"
 #include "tests/support/pbrt_text.h"
+#include "tests/support/test_scenes.h"
 
 namespace lucerna {
 namespace {
@@ -568,15 +569,6 @@ TEST(PbrtParserTest, OlderDialectsAreRefusedByNameAndByThatAlone) {
 }
 
 // ---- textures and environment maps
-
-TextureMapping ByUv(float scale_u, float scale_v, float delta_u, float delta_v) {
-  TextureMapping mapping;
-  mapping.scale_u = scale_u;
-  mapping.scale_v = scale_v;
-  mapping.delta_u = delta_u;
-  mapping.delta_v = delta_v;
-  return mapping;
-}
 
 // A PFM of grey `value`s, row by row from the bottom.
 std::string GreyPfm(int width, int height, float value) {

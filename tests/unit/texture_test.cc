@@ -7,19 +7,12 @@
 
 #include "gtest/gtest.h"
 
+#include "tests/support/test_scenes.h"
+
 namespace lucerna {
 namespace {
 
 using Wrap = Texture::Wrap;
-
-TextureMapping ByUv(float scale_u, float scale_v, float delta_u, float delta_v) {
-  TextureMapping mapping;
-  mapping.scale_u = scale_u;
-  mapping.scale_v = scale_v;
-  mapping.delta_u = delta_u;
-  mapping.delta_v = delta_v;
-  return mapping;
-}
 
 // Two by two pixels, bytes: black and red above, green and white below.
 std::shared_ptr<const Picture> FourPixels() {

@@ -84,7 +84,7 @@ void ReadBumps(const MaterialInput& input, Material& material) {
 }
 
 // From a texture: what is below 0 is 0. Where it is nearly 0 everywhere it is the same everywhere,
-// for tables between 0 and a number that rounding takes for 0 cannot be told apart.
+// for tables between 0 and a number that rounding takes for 0 are all alike.
 void ReadThickness(const MaterialInput& input, Material& material) {
   ParameterList& parameters = input.parameters;
   const NamedTexture* texture = FindNumbers("thickness", parameters, input.from.declared.numbers);
