@@ -22,8 +22,8 @@ class Marker {
       : tracer_(tracer),
         width_(tracer.settings().width),
         height_(tracer.settings().height),
-        reach_x_(static_cast<double>(tracer.filter_x().radius())),
-        reach_y_(static_cast<double>(tracer.filter_y().radius())) {}
+        reach_x_(static_cast<double>(tracer.filter().radius_x())),
+        reach_y_(static_cast<double>(tracer.filter().radius_y())) {}
 
   void AddTriangle(const std::array<Vec3, 3>& corners) {
     for (std::size_t i = 0; i < 3; ++i)

@@ -154,8 +154,7 @@ EyePathTracer::EyePathTracer(const Scene& scene, const RenderSettings& settings,
       intersector_(intersector),
       lights_(lights),
       media_(scene, intersector),
-      filter_x_(scene.filter, scene.filter.radius_x),
-      filter_y_(scene.filter, scene.filter.radius_y) {
+      filter_(scene.filter) {
   // Other radii do not ask.
   if (settings.initial_radius == 0 && needs.Uses(Part::kPhotons)) bends_.emplace(scene);
   // Readers let only invertible transforms pass.
@@ -211,11 +210,11 @@ bool EyePathTracer::FindsLightThroughChains() const {
 
 Ray EyePathTracer::CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const {
   const SobolPoint u = sampler.ForCamera();
-  const double film_x =
-      settings_.crop_x0 + x + 0.5 + static_cast<double>(filter_x_.Sample(u[0], weight));
-  const double film_y =
-      settings_.crop_y0 + y + 0.5 + static_cast<double>(filter_y_.Sample(u[1], weight));
-  return CameraRayThrough(film_x, film_y, OnLens(u[2], u[3]));
+  const FilterSampler::Draw drawn = filter_.Sample(u[0], u[1]);
+  weight *= drawn.weight;
+  return CameraRayThrough(settings_.crop_x0 + x + 0.5 + static_cast<double>(drawn.x),
+                          settings_.crop_y0 + y + 0.5 + static_cast<double>(drawn.y),
+                          OnLens(u[2], u[3]));
 }
 
 Vec3 EyePathTracer::OnLens(float u, float v) const {
@@ -263,9 +262,12 @@ PixelSampler EyePathTracer::SamplerOf(int x, int y, std::uint64_t pass) const {
 }
 
 EyePathTracer::FilmOffset EyePathTracer::FilmOffsetOf(int x, int y, std::uint64_t pass) const {
-  const SobolPoint u = SamplerOf(x, y, pass).ForCamera();
-  float weight = 1;
-  return {filter_x_.Sample(u[0], weight), filter_y_.Sample(u[1], weight), OnLens(u[2], u[3])};
+  return FilmOffsetOf(SamplerOf(x, y, pass).ForCamera());
+}
+
+EyePathTracer::FilmOffset EyePathTracer::FilmOffsetOf(const SobolPoint& u) const {
+  const FilterSampler::Draw drawn = filter_.Sample(u[0], u[1]);
+  return {drawn.x, drawn.y, OnLens(u[2], u[3])};
 }
 
 Rgb EyePathTracer::BrightPart(Rgb emitted) const {
@@ -304,11 +306,8 @@ Rgb EyePathTracer::TraceBright(int x, int y, std::uint64_t pass) const {
 EyePathTracer::BrightPath EyePathTracer::TraceBrightPath(int x, int y, std::uint64_t pass,
                                                          int number, int count) const {
   const BrightSample sample = SamplerOf(x, y, pass).ForBright(number, count);
-  float filter_weight = 1;
   BrightPath path;
-  path.from = {filter_x_.Sample(sample.camera[0], filter_weight),
-               filter_y_.Sample(sample.camera[1], filter_weight),
-               OnLens(sample.camera[2], sample.camera[3])};
+  path.from = FilmOffsetOf(sample.camera);
   const Ray ray = CameraRayThrough(settings_.crop_x0 + x + 0.5 + static_cast<double>(path.from.x),
                                    settings_.crop_y0 + y + 0.5 + static_cast<double>(path.from.y),
                                    path.from.on_lens);

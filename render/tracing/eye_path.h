@@ -17,6 +17,7 @@
 #include "render/scene/scene.h"
 #include "render/tracing/direct_light.h"
 #include "render/tracing/facet_sides.h"
+#include "render/tracing/filter_sampler.h"
 #include "render/tracing/pixel_sampler.h"
 #include "render/transport/caustic_weight.h"
 #include "render/transport/light.h"
@@ -156,9 +157,7 @@ class EyePathTracer {
   [[nodiscard]] const Intersector& intersector() const { return intersector_; }
   [[nodiscard]] const LightSet& lights() const { return lights_; }
   [[nodiscard]] bool has_lens() const { return has_lens_; }
-  [[nodiscard]] const FilterSampler& filter_x() const { return filter_x_; }
-  [[nodiscard]] const FilterSampler& filter_y() const { return filter_y_; }
-
+  [[nodiscard]] const FilterSampler& filter() const { return filter_; }
   [[nodiscard]] const RenderSettings& settings() const { return settings_; }
 
  private:
@@ -166,6 +165,7 @@ class EyePathTracer {
   [[nodiscard]] std::uint64_t PixelNumber(int x, int y) const;
   [[nodiscard]] PixelSampler SamplerOf(int x, int y, std::uint64_t pass) const;
   [[nodiscard]] EyePath PathOf(int x, int y, const PixelSampler& sampler, First first) const;
+  [[nodiscard]] FilmOffset FilmOffsetOf(const SobolPoint& u) const;
   [[nodiscard]] Ray CameraRay(const PixelSampler& sampler, int x, int y, float& weight) const;
   // The part of emitted radiance that is brighter than the image's white.
   [[nodiscard]] Rgb BrightPart(Rgb emitted) const;
@@ -271,7 +271,7 @@ class EyePathTracer {
   const LightSet& lights_;
   const Media media_;
   std::optional<BendRadii> bends_;  // of automatic radii
-  FilterSampler filter_x_, filter_y_;
+  FilterSampler filter_;
   Transform world_to_camera_;
   double window_low_x_, window_high_y_;  // of the whole image on the plane z = 1
   double pixel_width_, pixel_height_;    // on that plane

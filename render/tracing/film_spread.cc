@@ -25,13 +25,18 @@ int ReachOf(float radius) {
   return std::max(static_cast<int>(std::ceil(2 * radius)) - 1, 0);
 }
 
-// Σ_q p_q along one axis, at `offset` from the centre of pixel `pixel`, over the pixels
-// [begin, end) of the image.
-float DensityOfAll(const FilterSampler& filter, float offset, int pixel, int begin, int end) {
-  const int radius = static_cast<int>(std::ceil(filter.radius() + std::abs(offset)));
-  float sum = 0;
-  for (int q = std::max(pixel - radius, begin); q < std::min(pixel + radius + 1, end); ++q)
-    sum += filter.At(offset + static_cast<float>(pixel - q)).density;
+// Σ_q f_q along one axis, the filter's parts at `offset` from the centre of pixel `pixel`, over the
+// pixels [begin, end) of the image. `parts_at`: of an offset from a pixel's own centre.
+template <typename PartsAt>
+FilterSampler::Parts PartsOfAll(const PartsAt& parts_at, float filter_radius, float offset,
+                                int pixel, int begin, int end) {
+  const int radius = static_cast<int>(std::ceil(filter_radius + std::abs(offset)));
+  FilterSampler::Parts sum;
+  for (int q = std::max(pixel - radius, begin); q < std::min(pixel + radius + 1, end); ++q) {
+    const FilterSampler::Parts parts = parts_at(offset + static_cast<float>(pixel - q));
+    sum.positive += parts.positive;
+    sum.negative += parts.negative;
+  }
   return sum;
 }
 
@@ -41,8 +46,8 @@ FilmSpread::FilmSpread(const EyePathTracer& tracer)
     : tracer_(tracer),
       width_(tracer.settings().crop_width()),
       height_(tracer.settings().crop_height()),
-      reach_x_(ReachOf(tracer.filter_x().radius())),
-      reach_y_(ReachOf(tracer.filter_y().radius())),
+      reach_x_(ReachOf(tracer.filter().radius_x())),
+      reach_y_(ReachOf(tracer.filter().radius_y())),
       image_({-tracer.settings().crop_x0, -tracer.settings().crop_y0,
               tracer.settings().width - tracer.settings().crop_x0,
               tracer.settings().height - tracer.settings().crop_y0}) {}
@@ -53,8 +58,8 @@ FilmSpread::FilmSpread(const EyePathTracer& tracer, Glints glints) : FilmSpread(
 }
 
 FilmRegion FilmSpread::OnFilm(const Window& pixels) const {
-  const auto reach_x = static_cast<double>(tracer_.filter_x().radius());
-  const auto reach_y = static_cast<double>(tracer_.filter_y().radius());
+  const auto reach_x = static_cast<double>(tracer_.filter().radius_x());
+  const auto reach_y = static_cast<double>(tracer_.filter().radius_y());
   return {pixels.x0 - image_.x0 + 0.5 - reach_x, pixels.y0 - image_.y0 + 0.5 - reach_y,
           pixels.x1 - image_.x0 - 0.5 + reach_x, pixels.y1 - image_.y0 - 0.5 + reach_y};
 }
@@ -251,11 +256,15 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
         static_cast<std::size_t>(x - around.x0);
     return std::span(paths).subspan(first_path[pixel], first_path[pixel + 1] - first_path[pixel]);
   };
+  const FilterSampler& filter = tracer_.filter();
   // Σ_s p_s(f) + Σ_g n_g p_g(f); `drawn_by`: the glint that a path was drawn for, if any.
   const auto density_at = [&](int x, int y, const EyePathTracer::FilmOffset& from,
                               std::optional<std::size_t> drawn_by) {
-    const float of_pixels = DensityOfAll(tracer_.filter_x(), from.x, x, image_.x0, image_.x1) *
-                            DensityOfAll(tracer_.filter_y(), from.y, y, image_.y0, image_.y1);
+    const float of_pixels =
+        filter.Density(PartsOfAll([&](float at) { return filter.AlongX(at); }, filter.radius_x(),
+                                  from.x, x, image_.x0, image_.x1),
+                       PartsOfAll([&](float at) { return filter.AlongY(at); }, filter.radius_y(),
+                                  from.y, y, image_.y0, image_.y1));
     const Glint::FilmPoint place = {x - image_.x0 + 0.5 + static_cast<double>(from.x),
                                     y - image_.y0 + 0.5 + static_cast<double>(from.y)};
     double of_glints = 0;
@@ -278,12 +287,12 @@ void FilmSpread::AddTile(std::uint64_t pass, const Window& tile, const std::vect
       }
     }
   }
-  const int filter_reach_x = static_cast<int>(std::ceil(tracer_.filter_x().radius() + 0.5F));
-  const int filter_reach_y = static_cast<int>(std::ceil(tracer_.filter_y().radius() + 0.5F));
+  const int filter_reach_x = static_cast<int>(std::ceil(filter.radius_x() + 0.5F));
+  const int filter_reach_y = static_cast<int>(std::ceil(filter.radius_y() + 0.5F));
   // Of a pixel whose neighbour (dx, dy) the path belongs to.
   const auto filter_at = [&](int dx, int dy, const EyePathTracer::FilmOffset& from) {
-    return tracer_.filter_x().At(from.x + static_cast<float>(dx)).filter *
-           tracer_.filter_y().At(from.y + static_cast<float>(dy)).filter;
+    return FilterSampler::Value(filter.AlongX(from.x + static_cast<float>(dx)),
+                                filter.AlongY(from.y + static_cast<float>(dy)));
   };
   for (int y = tile.y0; y < tile.y1; ++y) {
     for (int x = tile.x0; x < tile.x1; ++x) {

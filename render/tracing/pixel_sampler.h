@@ -6,12 +6,10 @@
 // noise.
 #pragma once
 
-#include <array>
 #include <cstdint>
 
 #include "render/math/rng.h"
 #include "render/math/sobol.h"
-#include "render/scene/scene.h"
 
 namespace lucerna {
 
@@ -117,36 +115,6 @@ class PixelSampler {
   std::uint64_t key_;
   std::uint64_t pass_;
   std::uint64_t eye_set_;
-};
-
-// Draws offsets along one axis in proportion to the absolute value of a pixel filter.
-class FilterSampler {
- public:
-  FilterSampler(const PixelFilter& filter, float radius);
-
-  // The offset from the pixel's centre [pixels], in [-radius, radius], and the factor that makes
-  // the mean of weighted samples the filtered value (1 for filters that are nowhere negative, up
-  // to the fit of the table).
-  [[nodiscard]] float Sample(float u, float& weight) const;
-
-  // Of an offset [pixels]: the density with which Sample draws it [1/pixel], and the filter, of
-  // which the integral is 1 [1/pixel]; both 0 beyond the radius. The filter is the density times
-  // the factor that Sample gives.
-  struct Values {
-    float density = 0, filter = 0;
-  };
-  [[nodiscard]] Values At(float offset) const;
-
-  [[nodiscard]] float radius() const { return radius_; }
-
- private:
-  static constexpr std::size_t kCells = 128;
-  float radius_;
-  std::array<float, kCells + 1> cumulative_{};
-  // [i] of the numbers from i / kCells on: the cell of the smallest. (Chen & Asau 1974, "On
-  // Generating Random Variates from an Empirical Distribution".)
-  std::array<std::uint8_t, kCells> first_cell_{};
-  std::array<float, kCells> weight_{};
 };
 
 }  // namespace lucerna

@@ -65,17 +65,18 @@ PixelFilter Filter(PixelFilter::Kind kind, float radius) {
   return filter;
 }
 
-// The integral of the filter of a pixel over [low, high] of the film.
+// The integral of the filter of a pixel, alike along both axes, over [low, high] of the film.
 double FilterOver(const FilterSampler& filter, int pixel, double low, double high) {
   constexpr int kSteps = 20000;
-  const auto radius = static_cast<double>(filter.radius());
+  const auto radius = static_cast<double>(filter.radius_x());
   low = std::max(low, pixel + 0.5 - radius);
   high = std::min(high, pixel + 0.5 + radius);
   if (!(high > low)) return 0;
   double sum = 0;
   for (int i = 0; i < kSteps; ++i) {
     const double x = low + (high - low) * (i + 0.5) / kSteps;
-    sum += static_cast<double>(filter.At(static_cast<float>(x - pixel - 0.5)).filter);
+    const FilterSampler::Parts parts = filter.AlongX(static_cast<float>(x - pixel - 0.5));
+    sum += static_cast<double>(parts.positive - parts.negative);
   }
   return sum * (high - low) / kSteps;
 }
@@ -126,7 +127,7 @@ void ExpectIntegrals(const PixelFilter& filter, const FilmRectangle& light, cons
   const Scene scene = SceneWithLight(light, filter);
   const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
   const Traced traced = TraceManyPasses(scene, settings, kPasses, glints);
-  const FilterSampler sampler(filter, filter.radius_x);
+  const FilterSampler sampler(filter);
   for (int y = 0; y < kSize; ++y) {
     for (int x = 0; x < kSize; ++x) {
       const auto i = static_cast<std::size_t>(y * kSize + x);
@@ -205,7 +206,7 @@ TEST(FilmSpreadTest, SeesALightInTheTailOfAFilterInMostPasses) {
   const PixelFilter filter = Filter(PixelFilter::Kind::kGaussian, 1.5F);
   const Scene scene = SceneWithLight(light, filter);
   const RenderSettings settings = TestSettings(scene, 1000, 0.1, 4);
-  const FilterSampler sampler(filter, filter.radius_x);
+  const FilterSampler sampler(filter);
   const double mass =
       FilterOver(sampler, 8, light.x0, light.x1) * FilterOver(sampler, 8, light.y0, light.y1);
   const Traced traced = TraceManyPasses(scene, settings, 4096);

@@ -1,4 +1,4 @@
-// A pixel draws its positions from its filter, and its numbers from sequences of its own.
+// A pixel draws its numbers from sequences of its own.
 #include "render/tracing/pixel_sampler.h"
 
 #include <algorithm>
@@ -12,111 +12,6 @@
 
 namespace lucerna {
 namespace {
-
-PixelFilter Filter(PixelFilter::Kind kind, float radius) {
-  PixelFilter filter;
-  filter.kind = kind;
-  filter.radius_x = radius;
-  filter.radius_y = radius;
-  return filter;
-}
-
-// The weighted mean of g over the samples, and over the filter itself by midpoints.
-template <typename Shape, typename Test>
-void ExpectFilteredMean(const PixelFilter& filter, double radius, const Shape& shape,
-                        const Test& g) {
-  const FilterSampler sampler(filter, filter.radius_x);
-  constexpr int kSteps = 1 << 18;
-  double sampled = 0;
-  double expected = 0;
-  double norm = 0;
-  for (int i = 0; i < kSteps; ++i) {
-    float weight = 1;
-    const float offset = sampler.Sample((static_cast<float>(i) + 0.5F) / kSteps, weight);
-    ASSERT_LE(std::abs(offset), filter.radius_x);
-    sampled += static_cast<double>(weight) * g(static_cast<double>(offset)) / kSteps;
-    const double x = radius * (2 * (i + 0.5) / kSteps - 1);
-    expected += shape(x) * g(x);
-    norm += shape(x);
-  }
-  EXPECT_NEAR(sampled, expected / norm, 2e-3);
-}
-
-TEST(FilterSamplerTest, HasTheMomentsOfItsFilter) {
-  const auto tests = {+[](double) { return 1.0; }, +[](double x) { return x; },
-                      +[](double x) { return x * x; }, +[](double x) { return std::exp(x); }};
-  for (const auto& g : tests) {
-    ExpectFilteredMean(
-        Filter(PixelFilter::Kind::kBox, 0.5F), 0.5, [](double) { return 1.0; }, g);
-    ExpectFilteredMean(
-        Filter(PixelFilter::Kind::kTriangle, 2), 2, [](double x) { return 2 - std::abs(x); }, g);
-    ExpectFilteredMean(
-        Filter(PixelFilter::Kind::kGaussian, 1.5F), 1.5,
-        [](double x) { return std::exp(-2 * x * x) - std::exp(-4.5); }, g);
-    // B = C = 1/3 over a radius of 2.
-    ExpectFilteredMean(
-        Filter(PixelFilter::Kind::kMitchell, 2), 2,
-        [](double x) {
-          x = std::abs(x);
-          return x < 1 ? 7 * x * x * x - 12 * x * x + 16.0 / 3
-                       : -7.0 / 3 * x * x * x + 12 * x * x - 20 * x + 32.0 / 3;
-        },
-        g);
-    // sin(πx) sin(πx/3) / x².
-    ExpectFilteredMean(
-        Filter(PixelFilter::Kind::kSinc, 4), 4,
-        [](double x) {
-          return x == 0 ? std::numbers::pi * std::numbers::pi / 3
-                        : std::sin(std::numbers::pi * x) * std::sin(std::numbers::pi * x / 3) /
-                              (x * x);
-        },
-        g);
-  }
-}
-
-// The density of the draws, by counting them, and the filter as density times weight.
-TEST(FilterSamplerTest, KnowsItsDensityAndItsFilter) {
-  for (const PixelFilter& filter :
-       {Filter(PixelFilter::Kind::kGaussian, 1.5F), Filter(PixelFilter::Kind::kMitchell, 2),
-        Filter(PixelFilter::Kind::kSinc, 4)}) {
-    const FilterSampler sampler(filter, filter.radius_x);
-    constexpr int kDraws = 1 << 18;
-    constexpr int kBins = 32;
-    std::vector<double> drawn(kBins);
-    for (int i = 0; i < kDraws; ++i) {
-      float weight = 1;
-      const float offset = sampler.Sample((static_cast<float>(i) + 0.5F) / kDraws, weight);
-      const FilterSampler::Values values = sampler.At(offset);
-      ASSERT_NEAR(values.filter, values.density * weight, 1e-5F) << offset;
-      const float place = (offset / filter.radius_x + 1) / 2 * kBins;
-      drawn[std::min(static_cast<std::size_t>(place), drawn.size() - 1)] += 1.0 / kDraws;
-    }
-    double whole = 0;
-    for (int bin = 0; bin < kBins; ++bin) {
-      constexpr int kSteps = 64;
-      const double width = 2 * static_cast<double>(filter.radius_x) / (kBins * kSteps);
-      double density = 0;
-      for (int k = 0; k < kSteps; ++k) {
-        const auto x = static_cast<float>((bin * kSteps + k + 0.5) * width -
-                                          static_cast<double>(filter.radius_x));
-        density += static_cast<double>(sampler.At(x).density) * width;
-        whole += static_cast<double>(sampler.At(x).filter) * width;
-      }
-      EXPECT_NEAR(drawn[static_cast<std::size_t>(bin)], density, 1e-4) << bin;
-    }
-    EXPECT_NEAR(whole, 1, 1e-5);
-    EXPECT_EQ(sampler.At(filter.radius_x * 1.001F).density, 0);
-    EXPECT_EQ(sampler.At(-filter.radius_x * 1.001F).filter, 0);
-  }
-}
-
-TEST(FilterSamplerTest, TakesTheEndsOfItsRange) {
-  const FilterSampler sampler(Filter(PixelFilter::Kind::kGaussian, 1.5F), 1.5F);
-  float weight = 1;
-  EXPECT_GE(sampler.Sample(0, weight), -1.5F);
-  EXPECT_LE(sampler.Sample(std::nextafter(1.0F, 0.0F), weight), 1.5F);
-  EXPECT_TRUE(std::isfinite(weight));
-}
 
 TEST(PixelSamplerTest, StratifiesThePassesOfAPixel) {
   constexpr int kPasses = 64;
