@@ -51,8 +51,8 @@ struct CoatTable {
 };
 
 // The tables of a coated material with a texture of its roughness or thickness. They differ in one
-// number: the width of the facets of the coat's surface, or of the metal under it, or the share of
-// light that one crossing of the layer at right angles takes, 1 - exp(-thickness).
+// number: width / (1 + width), of the facets of the coat's surface or of the metal under it, or the
+// share of light that one crossing of the layer at right angles takes, 1 - exp(-thickness).
 struct CoatFamily {
   enum class Differing : std::uint8_t { kSurface, kBase, kThickness };
   Differing differing = Differing::kSurface;

@@ -582,6 +582,16 @@ CoatFamily::Differing DifferingOf(const MaterialNumbers& material) {
                                                                                          : kBase;
 }
 
+// The number by which tables of a width are spaced. Nearly the width where facets are flat, and
+// below 1 for all: a texture that is very rough in one place leaves the tables of others dense.
+float SpacingOf(float width) {
+  return width / (1 + width);
+}
+
+float WidthAt(float spacing) {
+  return spacing / (1 - spacing);
+}
+
 // The tables of a coat that is another one at each place, or of one over such a metal, and appends
 // them to those that are to be made.
 std::shared_ptr<const CoatFamily> FamilyOf(const Material& material,
@@ -592,11 +602,11 @@ std::shared_ptr<const CoatFamily> FamilyOf(const Material& material,
   if (family->differing == kThickness) {
     family->largest = -std::expm1(-material.thickness);
   } else {
-    family->least = kNarrowestOfFamily;
-    family->largest =
-        std::max(family->differing == kBase ? std::max(material.base_alpha_u, material.base_alpha_v)
-                                            : std::max(material.alpha_u, material.alpha_v),
-                 2 * kNarrowestOfFamily);
+    const float widest = family->differing == kBase
+                             ? std::max(material.base_alpha_u, material.base_alpha_v)
+                             : std::max(material.alpha_u, material.alpha_v);
+    family->least = SpacingOf(kNarrowestOfFamily);
+    family->largest = SpacingOf(std::max(widest, 2 * kNarrowestOfFamily));
   }
   family->tables.resize(kFamily);
   for (int i = 0; i < kFamily; ++i) {
@@ -605,10 +615,10 @@ std::shared_ptr<const CoatFamily> FamilyOf(const Material& material,
                                              static_cast<float>(kFamily - 1);
     switch (family->differing) {
       case kSurface:
-        one.alpha_u = one.alpha_v = number;
+        one.alpha_u = one.alpha_v = WidthAt(number);
         break;
       case kBase:
-        one.base_alpha_u = one.base_alpha_v = number;
+        one.base_alpha_u = one.base_alpha_v = WidthAt(number);
         break;
       case kThickness:
         // Of a thick layer the number is 1.
@@ -677,9 +687,9 @@ void FitCoat(MaterialNumbers& material) {
     switch (family.differing) {
       // Of a surface that is stretched one way, as of a round one with facets as steep on average.
       case CoatFamily::Differing::kSurface:
-        return std::sqrt(material.alpha_u * material.alpha_v);
+        return SpacingOf(std::sqrt(material.alpha_u * material.alpha_v));
       case CoatFamily::Differing::kBase:
-        return std::sqrt(material.base_alpha_u * material.base_alpha_v);
+        return SpacingOf(std::sqrt(material.base_alpha_u * material.base_alpha_v));
       case CoatFamily::Differing::kThickness:
         return -std::expm1(-material.thickness);
     }

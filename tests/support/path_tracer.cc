@@ -91,27 +91,44 @@ struct Surface {
   Color transmittance{};  // of a sheet, working space
   double thickness = 0;   // of a coat
   int base_hits = 0;
-  Color coat_albedo{};   // of one scattering in it, evenly to all sides
-  ReferenceFibre fibre;  // hair
+  Color coat_albedo{};  // of one scattering in it; over a metal Rec. 709
+  double phase_g = 0;   // its mean cosine
+  bool is_base_smooth = false;
+  double base_alpha_u = 0, base_alpha_v = 0;  // of the metal under a coat
+  ReferenceFibre fibre;                       // hair
   // Below a surface.
   const SubsurfaceTable* below = nullptr;
   Color extinction{};
 };
 
-// With what a texture of roughness says in place of the widths.
-Material RoughenedAt(const Scene& scene, const Material& material, const TexturePlace& place) {
+// With what textures of roughness and thickness say in place of the numbers.
+Material CompletedAt(const Scene& scene, const Material& material, const TexturePlace& place) {
   Material here = material;
-  if (material.roughness_textures[0] == kNoTexture) return here;
-  const float roughness = TextureNumber(scene.textures, material.roughness_textures[0], place);
-  const float alpha = std::sqrt(roughness);
-  here.alpha_u = here.alpha_v = alpha < 1e-3F ? 0 : alpha;
-  here.may_be_smooth = false;
+  const auto set_widths = [&](std::size_t first, float& alpha_u, float& alpha_v) {
+    const std::array<float*, 2> widths = {&alpha_u, &alpha_v};
+    for (std::size_t i = 0; i < 2; ++i) {
+      const std::int32_t texture = material.roughness_textures[first + i];
+      if (texture == kNoTexture) continue;
+      const float roughness = std::clamp(TextureNumber(scene.textures, texture, place), 0.0F, 1.0F);
+      *widths[i] = material.remaps_roughness ? std::sqrt(roughness) : roughness;
+    }
+    if (std::max(alpha_u, alpha_v) < 1e-3F) alpha_u = alpha_v = 0;
+  };
+  if (material.HasRoughnessTexture()) {
+    set_widths(0, here.alpha_u, here.alpha_v);
+    set_widths(2, here.base_alpha_u, here.base_alpha_v);
+    here.may_be_smooth = here.base_may_be_smooth = false;
+  }
+  if (material.thickness_texture != kNoTexture) {
+    here.thickness =
+        std::max(TextureNumber(scene.textures, material.thickness_texture, place), 0.0F);
+  }
   return here;
 }
 
 Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   const TexturePlace place = {UvAt(scene, point), point.position, point.geometric_normal};
-  const Material material = RoughenedAt(scene, scene.materials[point.material], place);
+  const Material material = CompletedAt(scene, scene.materials[point.material], place);
   Surface surface;
   surface.kind = material.kind;
   surface.is_smooth = IsSmooth(material);
@@ -126,7 +143,13 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   surface.transmittance = Working(FromFloat(material.transmittance));
   surface.thickness = static_cast<double>(material.thickness);
   surface.base_hits = material.base_hits;
-  surface.coat_albedo = Working(FromFloat(material.coat_albedo));
+  surface.coat_albedo = FromFloat(material.coat_albedo);
+  if (material.kind != Material::Kind::kCoatedConductor)
+    surface.coat_albedo = Working(surface.coat_albedo);
+  surface.phase_g = static_cast<double>(material.phase_g);
+  surface.is_base_smooth = material.base_alpha_u == 0 && material.base_alpha_v == 0;
+  surface.base_alpha_u = static_cast<double>(std::max(material.base_alpha_u, 1e-4F));
+  surface.base_alpha_v = static_cast<double>(std::max(material.base_alpha_v, 1e-4F));
   surface.fibre = {static_cast<double>(material.ior), static_cast<double>(material.beta_m),
                    static_cast<double>(material.beta_n), static_cast<double>(material.scale_tilt),
                    Working(FromFloat(material.absorption))};
@@ -134,7 +157,7 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
   surface.extinction = Working(FromFloat(material.extinction));
   if (material.texture != kNoTexture) {
     const Color color = FromFloat(TextureColor(scene.textures, material.texture, place));
-    surface.reflectance = Working(color);
+    surface.reflectance = Working(Times(color, static_cast<double>(material.texture_scale)));
     surface.eta = {1, 1, 1};
     for (std::size_t c = 0; c < 3; ++c) {
       // (k² / (4 + k²)) is the reflectance at right angles for n = 1.
@@ -142,15 +165,21 @@ Surface SurfaceOf(const Scene& scene, const SurfacePoint& point) {
       surface.k[c] = 2 * std::sqrt(r / (1 - r));
     }
   }
+  if (material.second_texture != kNoTexture) {
+    const Color color = FromFloat(TextureColor(scene.textures, material.second_texture, place));
+    surface.transmittance = Working(Times(color, static_cast<double>(material.texture_scale)));
+  }
   return surface;
 }
 
-Color MetalColor(const Surface& surface, double cos_i) {
+// Rec. 709. `outside`: the index of what the metal is in.
+Color MetalColor(const Surface& surface, double cos_i, double outside = 1) {
   Color reflected{};
   for (std::size_t c = 0; c < 3; ++c) {
-    reflected[c] = ConductorReflectance(std::min(1.0, cos_i), surface.eta[c], surface.k[c]);
+    reflected[c] = ConductorReflectance(std::min(1.0, cos_i), surface.eta[c] / outside,
+                                        surface.k[c] / outside);
   }
-  return Working(reflected);
+  return reflected;
 }
 
 double SmithLambda(const Surface& surface, Double3 w) {
@@ -220,6 +249,40 @@ bool ReflectAtFacet(const Surface& surface, const Facet& facet, Double3 up, doub
   return true;
 }
 
+// Henyey & Greenstein 1941: where light that goes in `direction` is scattered.
+Double3 ScatteredByPhase(Double3 direction, double g, double u1, double u2) {
+  const double s = (1 - g * g) / (1 - g + 2 * g * u1);
+  const double cosine = std::abs(g) < 1e-3 ? 2 * u1 - 1 : (1 + g * g - s * s) / (2 * g);
+  const double sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+  const double phi = 2 * kPi64 * u2;
+  // Two axes across.
+  const Double3 a = std::abs(direction.x) < 0.7 ? Double3{1, 0, 0} : Double3{0, 1, 0};
+  const Double3 x = Unit(a - direction * Dot(a, direction));
+  const Double3 y = {direction.y * x.z - direction.z * x.y, direction.z * x.x - direction.x * x.z,
+                     direction.x * x.y - direction.y * x.x};
+  return Unit(x * (sine * std::cos(phi)) + y * (sine * std::sin(phi)) + direction * cosine);
+}
+
+// The metal under a coat, which light meets on its way in `direction`, and the one that it goes on
+// in. False: it is absorbed.
+bool ReflectAtMetal(const Surface& surface, double u1, double u2, Double3& direction,
+                    Color& weight) {
+  Surface metal = surface;
+  metal.alpha_u = surface.base_alpha_u;
+  metal.alpha_v = surface.base_alpha_v;
+  metal.is_coat_smooth = surface.is_base_smooth;
+  const Double3 up = direction * -1;
+  Facet facet;
+  facet.m = metal.is_coat_smooth ? Double3{0, 0, 1} : DrawFacet(metal, u1, u2);
+  facet.cos_m = Dot(up, facet.m);
+  if (!(facet.cos_m > 0)) return false;
+  direction = facet.m * (2 * facet.cos_m) - up;
+  if (!(direction.z > 0)) return false;
+  weight = Times(Times(weight, MetalColor(surface, facet.cos_m, surface.ior)),
+                 FacetWeight(metal, facet, up, direction));
+  return true;
+}
+
 // A walk through a coat: down through its surface, to the base and up again, as often as it takes.
 bool ScatterInCoat(const Surface& surface, Double3 up, double side, const std::array<double, 3>& u,
                    Scattered& out) {
@@ -235,7 +298,7 @@ bool ScatterInCoat(const Surface& surface, Double3 up, double side, const std::a
   if (!(down.z < 0)) return false;
   const double entering = FacetWeight(surface, facet, up, down);
   out.weight = {entering, entering, entering};
-  out.is_delta = false;
+  out.is_delta = surface.is_smooth;
   // On the way from the surface or the base to one of them. True at the base.
   const auto cross_layer = [&](Double3& direction) {
     if (!(Largest(surface.coat_albedo) > 0)) {
@@ -248,20 +311,23 @@ bool ScatterInCoat(const Surface& surface, Double3 up, double side, const std::a
       if (height <= 0) return true;
       if (height >= surface.thickness) return false;
       out.weight = Times(out.weight, surface.coat_albedo);
-      const double cosine = 1 - 2 * next();
-      const double sine = std::sqrt(1 - cosine * cosine);
-      const double phi = 2 * kPi64 * next();
-      direction = {sine * std::cos(phi), sine * std::sin(phi), cosine};
+      const double u1 = next();
+      const double u2 = next();
+      direction = ScatteredByPhase(direction, surface.phase_g, u1, u2);
     }
   };
   Double3 direction = down;
   for (int hit = 0;;) {
     if (cross_layer(direction)) {
       if (hit++ == surface.base_hits) return false;
-      out.weight = Times(out.weight, surface.reflectance);
       const double u1 = next();
       const double u2 = next();
-      direction = CosineDirection(u1, u2);
+      if (surface.kind == Material::Kind::kCoatedConductor) {
+        if (!ReflectAtMetal(surface, u1, u2, direction, out.weight)) return false;
+      } else {
+        out.weight = Times(out.weight, surface.reflectance);
+        direction = CosineDirection(u1, u2);
+      }
       continue;
     }
     const double u3 = next();
@@ -335,6 +401,21 @@ bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
   }
   if (surface.kind == Material::Kind::kCoatedDiffuse)
     return ScatterInCoat(surface, up, side, u, out);
+  if (surface.kind == Material::Kind::kCoatedConductor) {
+    if (!ScatterInCoat(surface, up, side, u, out)) return false;
+    // Of products of what indices reflect, as for a bare metal.
+    out.weight = Working(out.weight);
+    return true;
+  }
+  if (surface.kind == Material::Kind::kThinDielectric) {
+    // Reflected at either face, any number of times.
+    double cos_t = 0;
+    const double once = DielectricReflectance(std::min(1.0, up.z), surface.ior, cos_t);
+    const double reflected = once + (1 - once) * (1 - once) * once / (1 - once * once);
+    out.wi = u[0] < reflected ? Double3{-wo.x, -wo.y, wo.z} : wo * -1;
+    out.weight = {1, 1, 1};
+    return true;
+  }
   if (surface.kind == Material::Kind::kDiffuseTransmission) {
     const bool reflects = u[0] < 0.5;
     out.wi = CosineDirection(u[1], u[2]) * (reflects ? side : -side);
@@ -354,7 +435,7 @@ bool Scatter(const Surface& surface, Double3 wo, const std::array<double, 3>& u,
   if (surface.kind == Material::Kind::kConductor) {
     if (!(reflected.z > 0)) return false;
     out.wi = reflected * side;
-    out.weight = Times(MetalColor(surface, cos_m), weight_of(reflected));
+    out.weight = Times(Working(MetalColor(surface, cos_m)), weight_of(reflected));
     return true;
   }
   const double eta = wo.z > 0 ? surface.ior : 1 / surface.ior;

@@ -161,7 +161,8 @@ NamedTexture ReadNumberPart(std::string_view name, float otherwise, const Textur
 }
 
 void WarnOfBright(float largest, ParameterList& parameters) {
-  if (!(largest > 1)) return;
+  // Of one without a bound nothing is known of what surfaces see of it.
+  if (!(largest > 1) || std::isinf(largest)) return;
   parameters.Warning("", Concat("is up to ", largest, " and is held at 1: no surface reflects ",
                                 "more light than it gets"));
 }
