@@ -48,6 +48,11 @@ struct CoatTable {
   std::vector<float> residual;       // [albedos × kCosines], averaged over azimuths
   std::vector<float> mean_residual;  // [albedos] over directions, with density cosine / pi
   std::vector<ByHits> by_hits;       // [albedos]
+  // Of a layer that does not scatter: the factor of each direction with which a lobe of wider
+  // facets has the flux of `residual`, [kCosines], and how often light in it has met the metal
+  // again on average.
+  std::vector<float> again;
+  float meetings_again = 0;
 };
 
 // The tables of a coated material with a texture of its roughness or thickness. They differ in one

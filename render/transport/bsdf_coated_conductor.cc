@@ -17,11 +17,6 @@ Rgb InScene(const Material& material, Rgb of_indices) {
   return material.is_at_wavelengths ? of_indices : ToWorking(of_indices);
 }
 
-Ggx BaseFacets(const Material& material) {
-  return {BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior),
-          BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior)};
-}
-
 bool IsMirror(const Material& material) {
   return PropertiesOf(material).is_smooth && material.parts == Parts::kAll;
 }
@@ -66,7 +61,7 @@ Rgb MirrorReflectance(const Material& material, float cosine) {
 struct Lobes {
   float coat = 0;      // what facets of the coat reflect
   float base = 0;      // what meets the metal once
-  float residual = 0;  // the rest
+  float residual = 0;  // the rest: by facets that are wider, or, with haze, diffuse
 };
 
 Lobes LobesOf(const Material& material, Vec3 up) {
@@ -96,7 +91,7 @@ bool Half(Vec3 a, Vec3 b, Vec3& m) {
 // Of both, on the upper side.
 float PdfUp(const Material& material, Vec3 up, Vec3 wi) {
   const Lobes lobes = LobesOf(material, up);
-  float pdf = lobes.residual * wi.z * kInversePi;
+  float pdf = material.HasHaze() ? lobes.residual * wi.z * kInversePi : 0;
   Vec3 m;
   if (lobes.coat > 0 && Half(up, wi, m)) {
     pdf += lobes.coat * Ggx(material).PdfVisible(up, m) / (4 * std::max(1e-12F, Dot(up, m)));
@@ -105,10 +100,11 @@ float PdfUp(const Material& material, Vec3 up, Vec3 wi) {
   Vec3 wi_in;
   if (CoatRefracted(material, up, up_in) && CoatRefracted(material, wi, wi_in) &&
       Half(up_in, wi_in, m)) {
-    const float inside =
-        BaseFacets(material).PdfVisible(up_in, m) / (4 * std::max(1e-12F, Dot(up_in, m)));
+    float visible = lobes.base * BaseFacets(material).PdfVisible(up_in, m);
+    if (!material.HasHaze()) visible += lobes.residual * AgainFacets(material).PdfVisible(up_in, m);
+    const float inside = visible / (4 * std::max(1e-12F, Dot(up_in, m)));
     // Snell's law, of solid angles.
-    pdf += lobes.base * inside * wi.z / (Square(material.ior) * wi_in.z);
+    pdf += inside * wi.z / (Square(material.ior) * wi_in.z);
   }
   return pdf;
 }
@@ -128,10 +124,17 @@ Rgb EvaluateUp(const Material& material, Vec3 up, Vec3 wi) {
   if (CoatRefracted(material, up, up_in) && CoatRefracted(material, wi, wi_in) &&
       Half(up_in, wi_in, m)) {
     const Ggx ggx = BaseFacets(material);
+    const float jacobian = 1 / (4 * up_in.z * wi_in.z * Square(material.ior));
     below = MetalInCoat(material, Dot(up_in, m)) *
-            (ggx.D(m) * ggx.G2(up_in, wi_in) / (4 * up_in.z * wi_in.z) *
-             CoatEntering(material, up) * CoatEntering(material, wi) / Square(material.ior));
+            (ggx.D(m) * ggx.G2(up_in, wi_in) * jacobian * CoatEntering(material, up) *
+             CoatEntering(material, wi));
+    if (!material.HasHaze()) {
+      const Ggx again = AgainFacets(material);
+      below += ResidualColor(material) * (again.D(m) * again.G2(up_in, wi_in) * jacobian *
+                                          CoatAgain(material, up.z) * CoatAgain(material, wi.z));
+    }
   }
+  if (!material.HasHaze()) return Gray(coat) + InScene(material, below);
   const Rgb mean = CoatMeanResidual(material);
   const Rgb residual = CoatResidual(material, up.z) * CoatResidual(material, wi.z) * kInversePi;
   const auto of_mean = [](float product, float of) { return of > 0 ? product / of : 0.0F; };
@@ -148,10 +151,13 @@ bool SampleUp(const Material& material, Vec3 up, float u1, float u2, Vec3& wi) {
   };
   if (u1 < lobes.coat) {
     wi = ReflectAt(up, Ggx(material).SampleVisible(up, rest(u1, 0, lobes.coat), u2));
-  } else if (u1 < lobes.coat + lobes.base) {
+  } else if (const bool is_base = u1 < lobes.coat + lobes.base; is_base || !material.HasHaze()) {
     Vec3 up_in;
     if (!CoatRefracted(material, up, up_in)) return false;
-    const Vec3 m = BaseFacets(material).SampleVisible(up_in, rest(u1, lobes.coat, lobes.base), u2);
+    const Vec3 m =
+        is_base ? BaseFacets(material).SampleVisible(up_in, rest(u1, lobes.coat, lobes.base), u2)
+                : AgainFacets(material).SampleVisible(
+                      up_in, rest(u1, lobes.coat + lobes.base, lobes.residual), u2);
     const Vec3 wi_in = ReflectAt(up_in, m);
     // Beyond the critical angle nothing leaves at once.
     const float x = wi_in.x * material.ior;

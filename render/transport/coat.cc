@@ -14,7 +14,6 @@
 #include "render/math/warp.h"
 #include "render/transport/bsdf.h"
 #include "render/transport/media.h"
-#include "render/transport/microfacet.h"
 
 namespace lucerna {
 namespace {
@@ -29,6 +28,8 @@ constexpr int kAzimuths = 9;
 // Random walks for each cosine outside, of tables over metals.
 constexpr int kWalks = 4096;
 constexpr int kScalings = 8;
+// Of facets by which light is thrown about as by a diffuse surface.
+constexpr float kWidestAgain = 2;
 // Of walks through a layer that scatters: events of one walk at most, and events after which no
 // more walks begin, for each cosine and from the base. A thick layer that absorbs nothing would
 // hold a process for minutes.
@@ -398,36 +399,42 @@ int WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, Walked
   return 0;
 }
 
-// What the first term of transport/coat.h brings of the flux from `w`, of a metal that reflects
-// all.
-float MetOnce(const Material& material, Vec3 w) {
+// What a term of transport/coat.h brings of the flux from `w`, of a metal that reflects all and has
+// these facets: factor(direction outside), E or A.
+template <typename Factor>
+float BroughtFrom(const Material& material, Vec3 w, const Ggx& facets, const Factor& factor) {
   Vec3 inside;
   if (!CoatRefracted(material, w, inside)) return 0;
-  const Ggx facets(BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior),
-                   BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior));
   const float visible = facets.G1(inside);
-  return CoatEntering(material, w) * MeanOverFacets(facets, inside, [&](Vec3 m) {
+  return factor(w) * MeanOverFacets(facets, inside, [&](Vec3 m) {
            const Vec3 up = ReflectAt(inside, m);
            const float x = up.x * material.ior;
            const float y = up.y * material.ior;
            const float squared = 1 - x * x - y * y;
            if (!(up.z > 0) || !(squared > 0)) return 0.0F;
-           return CoatEntering(material, {x, y, std::sqrt(squared)}) * facets.G2(inside, up) /
-                  visible;
+           return factor(Vec3{x, y, std::sqrt(squared)}) * facets.G2(inside, up) / visible;
          });
 }
 
-// MetOnce over azimuths.
-double MeanMetOnce(const Material& material, float cosine) {
+// BroughtFrom over azimuths.
+template <typename Factor>
+double MeanBroughtFrom(const Material& material, float cosine, const Ggx& facets,
+                       const Factor& factor) {
   const int turns =
       material.alpha_u == material.alpha_v && material.base_alpha_u == material.base_alpha_v ? 1
                                                                                              : 8;
   double sum = 0;
   for (int turn = 0; turn < turns; ++turn) {
     const float azimuth = 2 * kPi * (static_cast<float>(turn) + 0.5F) / static_cast<float>(turns);
-    sum += static_cast<double>(MetOnce(material, DirectionAt(cosine, azimuth)));
+    sum += static_cast<double>(BroughtFrom(material, DirectionAt(cosine, azimuth), facets, factor));
   }
   return sum / turns;
+}
+
+// Of light that has met the metal once.
+double MeanMetOnce(const Material& material, float cosine) {
+  return MeanBroughtFrom(material, cosine, BaseFacets(material),
+                         [&](Vec3 w) { return CoatEntering(material, w); });
 }
 
 // Requires a material with a table for its coat alone, to which the rest is added.
@@ -486,6 +493,28 @@ void AddResidual(const Material& material, CoatTable& table) {
     CoatTable::ByHits& shares = table.by_hits.emplace_back();
     for (std::size_t hit = 0; hit < by_hits.size(); ++hit)
       shares[hit] = sum > 0 ? static_cast<float>(by_hits[hit] / sum) : 0.0F;
+  }
+}
+
+// Requires a table with the residual, to which the lobe is added that has its flux.
+void AddAgain(const Material& material, CoatTable& table) {
+  const CoatTable::ByHits& shares = table.by_hits[0];
+  for (std::size_t hit = 2; hit < shares.size(); ++hit)
+    table.meetings_again += static_cast<float>(hit - 1) * shares[hit];
+  table.again.resize(CoatTable::kCosines);
+  for (std::size_t i = 0; i < table.again.size(); ++i)
+    table.again[i] = std::sqrt(table.residual[i]);
+  const Ggx facets = AgainFacets(material);
+  for (int round = 0; round < kScalings; ++round) {
+    std::vector<float> scaled = table.again;
+    for (std::size_t i = 1; i < scaled.size(); ++i) {
+      const double brought = MeanBroughtFrom(material, CosineOf(static_cast<int>(i)), facets,
+                                             [&](Vec3 w) { return CoatAgain(material, w.z); });
+      scaled[i] = brought > 0 ? scaled[i] * static_cast<float>(std::sqrt(
+                                                static_cast<double>(table.residual[i]) / brought))
+                              : 0.0F;
+    }
+    table.again = std::move(scaled);
   }
 }
 
@@ -559,6 +588,7 @@ CoatTable MakeCoat(const Material& original) {
     Material material = original;
     material.coat = &table;
     AddResidual(material, table);
+    if (!material.HasHaze()) AddAgain(material, table);
   }
   return table;
 }
@@ -718,6 +748,31 @@ Rgb CoatResidual(const Material& material, float cosine) {
   return ReadRows(material, [&](const CoatTable& table, std::size_t row) {
     return AtCosine(table.residual, row, cosine);
   });
+}
+
+float CoatAgain(const Material& material, float cosine) {
+  return ReadTable(material,
+                   [&](const CoatTable& table) { return AtCosine(table.again, 0, cosine); });
+}
+
+float CoatMeetingsAgain(const Material& material) {
+  return ReadTable(material, [](const CoatTable& table) { return table.meetings_again; });
+}
+
+Ggx BaseFacets(const Material& material) {
+  return {BaseWidthSeen(material.base_alpha_u, material.alpha_u, material.ior),
+          BaseWidthSeen(material.base_alpha_v, material.alpha_v, material.ior)};
+}
+
+Ggx AgainFacets(const Material& material) {
+  // A meeting of the coat's surface from below turns light as one of a metal of its facets does.
+  const float meetings = CoatMeetingsAgain(material);
+  const auto width = [&](float base, float coat) {
+    const float once = BaseWidthSeen(base, coat, material.ior);
+    return std::min(std::sqrt(once * once + meetings * (base * base + coat * coat)), kWidestAgain);
+  };
+  return {width(material.base_alpha_u, material.alpha_u),
+          width(material.base_alpha_v, material.alpha_v)};
 }
 
 Rgb CoatMeanResidual(const Material& material) {

@@ -14,18 +14,19 @@
 // A metal remembers directions. Of light that meets it once the same product is taken with the
 // metal's own BSDF f_m in place of ρ/π, of the directions wo', wi' refracted at the mean surface:
 //
-//     f(wo, wi) = E(wo) · E(wi) / ior² · f_m(wo', wi') + C · M(wo) · M(wi) / (π · M̄)
+//     f(wo, wi) = E(wo) · E(wi) / ior² · f_m(wo', wi') + C · A(wo) · A(wi) / ior² · f_a(wo', wi')
 //
 // Under a smooth coat the first term is exact, and under a rough one its facets widen f_m
-// (BaseWidthSeen). M is what it leaves out of the flux that a random walk through coat and metal
-// brings, for a metal that reflects all, M̄ its mean, and C a sum of powers of the metal's
-// reflectance: the flux is that of the walk, the directions are only about those of light that
-// meets the metal more than once.
+// (BaseWidthSeen). The second is light that meets the metal more than once: f_a is of facets that
+// are wider by as many more meetings of metal and coat, squares of widths added up. C is a sum of
+// powers of the metal's reflectance, and A makes the flux M, which is what the first term leaves
+// out of that of a random walk through coat and metal, for a metal that reflects all: the flux is
+// that of the walk, the directions are about those.
 //
 // Where the layer scatters (haze), E and K contain what was scattered and came to the base, and a
 // third term B(wo) · B(wi) / (π · B̄) is what leaves without having met it; over a metal M contains
-// all that. These are of random walks too: the flux is right, the directions are those of even
-// scattering.
+// all that, and the second term is C · M(wo) · M(wi) / (π · M̄). These are of random walks too: the
+// flux is right, the directions are those of even scattering.
 //
 // Sources: Walter et al. 2007 (as in transport/microfacet.h); Weidlich & Wilkie 2007, "Arbitrarily
 // Layered Micro-Facet Surfaces"; Saunderson 1942, "Calculation of the Color of Pigmented Plastics"
@@ -38,6 +39,7 @@
 #include "render/math/vector.h"
 #include "render/scene/coat_table.h"
 #include "render/scene/scene.h"
+#include "render/transport/microfacet.h"
 
 namespace lucerna {
 
@@ -70,6 +72,13 @@ void FitCoat(MaterialNumbers& material);
 
 // Over a metal, of a prepared material: M for a direction at `cosine` outside, in [0, 1].
 [[nodiscard]] Rgb CoatResidual(const Material& material, float cosine);
+// A for a direction at `cosine` outside, and how often light of that term has met metal and coat
+// again on average, of a layer that does not scatter.
+[[nodiscard]] float CoatAgain(const Material& material, float cosine);
+[[nodiscard]] float CoatMeetingsAgain(const Material& material);
+// Facets of f_m, and of f_a.
+[[nodiscard]] Ggx BaseFacets(const Material& material);
+[[nodiscard]] Ggx AgainFacets(const Material& material);
 // The mean of M over directions with density cosine / π, and the shares of M after 0, 1, 2, ...
 // meetings with the metal, hits in [0, CoatTable::kHits].
 [[nodiscard]] Rgb CoatMeanResidual(const Material& material);

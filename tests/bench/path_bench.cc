@@ -11,6 +11,7 @@
 //   first radius [widths of a pixel] (3)
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <string>
 
 #include "render/scene/scene_at_time.h"
@@ -30,7 +31,7 @@ int main(int argc, char** argv) {
     return argc > index ? std::atof(argv[index]) : otherwise;
   };
   const int side = static_cast<int>(number(2, 32));
-  Scene scene = LoadScene(argv[1]);
+  Scene scene = LoadScene(std::filesystem::absolute(argv[1]).string());
   // The path tracer knows no motion: both see the scene as the shutter opens.
   ForgetMotion(scene);
   scene.filter = {PixelFilter::Kind::kBox, 0.5F, 0.5F};
