@@ -185,6 +185,8 @@ PhotonPathTracer::PhotonPathTracer(const Scene& scene, const Intersector& inters
         static_cast<float>(std::clamp((1 << kEnergyBits) / power, 0x1p-126, 0x1p126));
   }
   if (parts_.media) FindLightMedia();
+  ForEachShapeTraits(
+      scene, [&](const ShapeTraits& traits) { parts_.alpha = parts_.alpha || !IsWhole(traits); });
 }
 
 void PhotonPathTracer::FindLightMedia() {
@@ -549,7 +551,11 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       gathers_caustic =
           met_smooth_only && landing > 0 && properties.gathers_caustics() && !sides.is_behind();
     }
-    const bool leaves_deposit = (gathers || gathers_caustic) && scale_.HasRoomFor(flux);
+    // Of what falls on a surface that lets rays through, deposits are what did not pass; eye paths
+    // that find it lack their share already.
+    Rgb received = flux;
+    if (parts.alpha && (gathers || gathers_caustic)) received *= 1 / AlphaAt(scene_, surface);
+    const bool leaves_deposit = (gathers || gathers_caustic) && scale_.HasRoomFor(received);
     if ((gathers || gathers_caustic) && !leaves_deposit) ++landed.excess;
     const bool is_kept = leaves_deposit && Inside(region_, surface.position);
     const bool is_found = is_kept && gathers;
@@ -561,7 +567,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
         const auto caustic_key =
             static_cast<std::uint32_t>(CombineKeys(key.job_key ^ kCausticKey, key.number) >> 32);
         landed.caustics.rows.push_back(
-            {surface.position, flux, caustic_key, source_of(PathClass::kCaustic)});
+            {surface.position, received, caustic_key, source_of(PathClass::kCaustic)});
         KeepColumns<true, true>(landed.caustics, surface, wo);
         landed.caustics.emission_densities.push_back(emission.density);
       }
@@ -579,7 +585,7 @@ PhotonEnd PhotonPathTracer::Walk(const Key& key, const WalkParts parts, Landed& 
       // replay it without them.
       const auto deposit_key = static_cast<std::uint32_t>(rng.Bits() >> 32);
       if (is_found) {
-        Rgb deposited = flux;
+        Rgb deposited = received;
         if (properties.weighs_photons) {
           deposited *= PhotonFactor(material, ShadingFrame(surface).ToLocal(wo));
         }

@@ -184,6 +184,7 @@ class PhotonPathTracer {
     bool caustics = false;  // deposits for hitpoints of caustic photons
     bool media = false;
     bool dispersion = false;
+    bool alpha = false;  // some shapes let rays through
   };
   // What becomes of a photon on its way to the next surface that is no interface.
   struct Flight {

@@ -144,6 +144,12 @@ class Intersector {
 [[nodiscard]] inline ShapeKind KindOf(const Scene& scene, std::uint32_t geometry) {
   return static_cast<ShapeKind>(geometry - scene.meshes.size());
 }
+// What holds for the shape that was hit as a whole.
+[[nodiscard]] inline const ShapeTraits& TraitsOf(const Scene& scene, const SurfacePoint& surface) {
+  if (const TriangleMesh* mesh = MeshOf(scene, surface.geometry)) return mesh->traits;
+  return VisitShape(scene, KindOf(scene, surface.geometry), surface.primitive,
+                    [](const auto& shape) -> const ShapeTraits& { return shape.traits; });
+}
 [[nodiscard]] inline std::uint32_t GeometryOf(const Scene& scene, ShapeKind kind) {
   return static_cast<std::uint32_t>(scene.meshes.size()) + static_cast<std::uint32_t>(kind);
 }

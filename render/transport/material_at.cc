@@ -82,6 +82,15 @@ TexturePlace PlaceOf(const Scene& scene, const SurfacePoint& point) {
   return {UvAt(scene, point), point.position, point.geometric_normal};
 }
 
+float AlphaAt(const Scene& scene, const SurfacePoint& point) {
+  const ShapeTraits& traits = TraitsOf(scene, point);
+  const float alpha =
+      traits.alpha_texture == kNoTexture
+          ? traits.alpha
+          : TextureNumber(scene.textures, traits.alpha_texture, PlaceOf(scene, point));
+  return alpha > kLeastAlpha ? std::min(alpha, 1.0F) : kLeastAlpha;
+}
+
 std::array<float, 4> NumbersOf(const MaterialNumbers& here) {
   if (here.thickness_texture != kNoTexture) return {here.thickness, 0, 0, 0};
   return {here.alpha_u, here.alpha_v, here.base_alpha_u, here.base_alpha_v};

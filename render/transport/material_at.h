@@ -34,6 +34,11 @@ namespace material_at_internal {
   return material_at_internal::AtPlace(scene, point, wo, storage, wavelength);
 }
 
+// The share of rays to a point of a surface that meet it and do not pass through, in
+// [kLeastAlpha, 1]. What is left of a surface that lets more through counts for too little.
+inline constexpr float kLeastAlpha = 1.0F / 256;
+[[nodiscard]] float AlphaAt(const Scene& scene, const SurfacePoint& point);
+
 // What textures of roughness or thickness have made of a material at a place, to be set again where
 // the place is not known: alpha_u, alpha_v, base_alpha_u and base_alpha_v, or the thickness of the
 // coat and zeros.

@@ -39,14 +39,8 @@ Media::Media(const Scene& scene, const Intersector& intersector)
   at_camera_ = AtLight(scene.camera.camera_to_world.Point({}), scene.camera.medium);
 }
 
-const ShapeTraits& Media::TraitsOf(const SurfacePoint& surface) const {
-  if (const TriangleMesh* mesh = MeshOf(scene_, surface.geometry)) return mesh->traits;
-  return VisitShape(scene_, KindOf(scene_, surface.geometry), surface.primitive,
-                    [](const auto& shape) -> const ShapeTraits& { return shape.traits; });
-}
-
 std::int32_t Media::Beyond(const SurfacePoint& surface, Vec3 direction, std::int32_t medium) const {
-  const ShapeTraits& traits = TraitsOf(surface);
+  const ShapeTraits& traits = TraitsOf(scene_, surface);
   if (!traits.SeparatesMedia()) return medium;
   return Dot(direction, surface.geometric_normal) > 0 ? traits.medium_outside
                                                       : traits.medium_inside;
@@ -57,7 +51,7 @@ bool Media::FindAlong(Ray ray, std::int32_t& medium) const {
     Hit hit;
     if (!intersector_.Intersect(ray, hit)) return false;
     const SurfacePoint surface = intersector_.SurfaceAt(ray, hit);
-    const ShapeTraits& traits = TraitsOf(surface);
+    const ShapeTraits& traits = TraitsOf(scene_, surface);
     if (traits.SeparatesMedia() && transmits_[surface.material] != 0) {
       medium = Dot(ray.direction, surface.geometric_normal) > 0 ? traits.medium_inside
                                                                 : traits.medium_outside;

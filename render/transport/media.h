@@ -51,8 +51,6 @@ class Media {
   // Of a light that names `named` where the file defines it; where that is none, the medium that
   // surfaces around the point show.
   [[nodiscard]] std::int32_t AtLight(Vec3 position, std::int32_t named) const;
-  // The traits of the shape that was hit.
-  [[nodiscard]] const ShapeTraits& TraitsOf(const SurfacePoint& surface) const;
 
   // Follows a ray through interfaces to the first surface that is none; false when there is none.
   // `is_met`, `hit`: what the ray meets first, found already; `hit` and `ray` become those of that

@@ -17,7 +17,8 @@ bool GathersCaustics(Floor floor) {
   return floor == Floor::kNarrowMetal || floor == Floor::kTexturedMetal ||
          floor == Floor::kNarrowGlass || floor == Floor::kRoughCoated || floor == Floor::kMixed ||
          floor == Floor::kPatchyMetal || floor == Floor::kPatchyCoat ||
-         floor == Floor::kRoughSubsurface || floor == Floor::kPatchySubsurface;
+         floor == Floor::kRoughSubsurface || floor == Floor::kPatchySubsurface ||
+         floor == Floor::kPatchySheer;
 }
 bool IsWall(Chain chain) {
   return chain == Chain::kMirror || chain == Chain::kNarrowWall || chain == Chain::kDiffuseWall ||
@@ -130,6 +131,7 @@ std::vector<PathClass> AllPathClasses() {
   add({kMap}, {kNone, kPane}, {Floor::kCoated, Floor::kRoughCoated, Floor::kSheet});
   add({kTriangles, kPoint}, {kCoatedWall}, {Floor::kDiffuse, Floor::kNarrowMetal, Floor::kCoated});
   add({kTriangles}, {kNone, kPane}, {Floor::kHazyCoat, Floor::kPatchyHaze});
+  add({kTriangles, kPoint}, {kPane}, {Floor::kSheer, Floor::kPatchySheer});
   // Light that comes out elsewhere than where it entered.
   add({kTriangles, kPoint}, {kNone, kPane}, {Floor::kSubsurface});
   add({kTriangles}, {kNone}, {Floor::kRoughSubsurface});
@@ -170,11 +172,12 @@ std::string NameOf(const PathClass& cell) {
                                                         "InGlassBall",
                                                         "InNarrowGlassBall",
                                                         "InRoughGlassBall"};
-  constexpr std::array<std::string_view, 19> kFloors = {
+  constexpr std::array<std::string_view, 21> kFloors = {
       "Diffuse",         "RoughMetal",       "NarrowMetal", "TexturedMetal", "NarrowGlass",
       "RoughGlass",      "Coated",           "RoughCoated", "Sheet",         "Mixed",
       "PatchyMetal",     "PatchyCoat",       "Bumpy",       "Hair",          "Subsurface",
-      "RoughSubsurface", "PatchySubsurface", "HazyCoat",    "PatchyHaze"};
+      "RoughSubsurface", "PatchySubsurface", "HazyCoat",    "PatchyHaze",    "Sheer",
+      "PatchySheer"};
   constexpr std::array<std::string_view, 3> kViews = {"", "SeenThroughGlass", "SeenInMirror"};
   std::string name(kLights[static_cast<std::size_t>(cell.light)]);
   name += kChains[static_cast<std::size_t>(cell.chain)];
@@ -255,6 +258,16 @@ Scene SceneOf(const PathClass& cell) {
       floor_with_uv(AddMaterial(scene, one[0]));
       break;
     }
+    case Floor::kSheer:
+      floor(AddMaterial(scene, DiffuseMaterial(0.6F)));
+      scene.meshes.back().traits.alpha = 0.4F;
+      break;
+    case Floor::kPatchySheer:
+      AddPatches(scene, 0.7F);
+      floor_with_uv(AddMaterial(scene, Metal(0.1F)));
+      scene.meshes.back().traits.alpha = 0.7F;
+      scene.meshes.back().traits.alpha_texture = 2;
+      break;
     case Floor::kRoughSubsurface:
       floor(AddMaterial(scene, SubsurfaceMaterial(0.7F, kFreePath, 0.2F)));
       break;
@@ -470,6 +483,7 @@ Effort EffortFor(const PathClass& cell) {
       break;
     case Floor::kNarrowMetal:
     case Floor::kPatchyMetal:
+    case Floor::kPatchySheer:
     case Floor::kMixed:
       effort.delta_radius = 0.08F;
       break;

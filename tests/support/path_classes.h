@@ -61,7 +61,9 @@ enum class Floor {
   kRoughSubsurface,
   kPatchySubsurface,
   kHazyCoat,
-  kPatchyHaze
+  kPatchyHaze,
+  kSheer,
+  kPatchySheer
 };
 enum class View { kPlain, kThroughGlass, kInMirror };
 
