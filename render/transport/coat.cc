@@ -399,42 +399,50 @@ int WalkOverMetal(const MaterialNumbers& material, Vec3 w, KeyedRng& rng, Walked
   return 0;
 }
 
-// What a term of transport/coat.h brings of the flux from `w`, of a metal that reflects all and has
-// these facets: factor(direction outside), E or A.
-template <typename Factor>
-float BroughtFrom(const Material& material, Vec3 w, const Ggx& facets, const Factor& factor) {
+// The mean of visit(direction outside, share of flux) over the directions in which light from `w`
+// leaves that has met a metal of these facets once, 0 where none does. The metal reflects all, and
+// so lets the coat's surface through.
+template <typename Visit>
+float MeanOverReflected(const Material& material, Vec3 w, const Ggx& facets, const Visit& visit) {
   Vec3 inside;
   if (!CoatRefracted(material, w, inside)) return 0;
   const float visible = facets.G1(inside);
-  return factor(w) * MeanOverFacets(facets, inside, [&](Vec3 m) {
-           const Vec3 up = ReflectAt(inside, m);
-           const float x = up.x * material.ior;
-           const float y = up.y * material.ior;
-           const float squared = 1 - x * x - y * y;
-           if (!(up.z > 0) || !(squared > 0)) return 0.0F;
-           return factor(Vec3{x, y, std::sqrt(squared)}) * facets.G2(inside, up) / visible;
-         });
+  return MeanOverFacets(facets, inside, [&](Vec3 m) {
+    const Vec3 up = ReflectAt(inside, m);
+    const float x = up.x * material.ior;
+    const float y = up.y * material.ior;
+    const float squared = 1 - x * x - y * y;
+    if (!(up.z > 0) || !(squared > 0)) return 0.0F;
+    return visit(Vec3{x, y, std::sqrt(squared)}, facets.G2(inside, up) / visible);
+  });
 }
 
-// BroughtFrom over azimuths.
-template <typename Factor>
-double MeanBroughtFrom(const Material& material, float cosine, const Ggx& facets,
-                       const Factor& factor) {
-  const int turns =
-      material.alpha_u == material.alpha_v && material.base_alpha_u == material.base_alpha_v ? 1
-                                                                                             : 8;
-  double sum = 0;
-  for (int turn = 0; turn < turns; ++turn) {
-    const float azimuth = 2 * kPi * (static_cast<float>(turn) + 0.5F) / static_cast<float>(turns);
-    sum += static_cast<double>(BroughtFrom(material, DirectionAt(cosine, azimuth), facets, factor));
-  }
-  return sum / turns;
+// Azimuths over which directions at one cosine are averaged.
+int TurnsOf(const Material& material) {
+  return material.alpha_u == material.alpha_v && material.base_alpha_u == material.base_alpha_v ? 1
+                                                                                                : 8;
 }
 
-// Of light that has met the metal once.
+template <typename Visit>
+void ForEachTurn(const Material& material, float cosine, const Visit& visit) {
+  const int turns = TurnsOf(material);
+  for (int turn = 0; turn < turns; ++turn)
+    visit(DirectionAt(cosine,
+                      2 * kPi * (static_cast<float>(turn) + 0.5F) / static_cast<float>(turns)));
+}
+
+// What the first term of transport/coat.h brings of the flux at `cosine`, of a metal that reflects
+// all.
 double MeanMetOnce(const Material& material, float cosine) {
-  return MeanBroughtFrom(material, cosine, BaseFacets(material),
-                         [&](Vec3 w) { return CoatEntering(material, w); });
+  const Ggx facets = BaseFacets(material);
+  double sum = 0;
+  ForEachTurn(material, cosine, [&](Vec3 w) {
+    sum += static_cast<double>(CoatEntering(material, w) *
+                               MeanOverReflected(material, w, facets, [&](Vec3 out, float share) {
+                                 return CoatEntering(material, out) * share;
+                               }));
+  });
+  return sum / TurnsOf(material);
 }
 
 // Requires a material with a table for its coat alone, to which the rest is added.
@@ -499,28 +507,6 @@ void AddResidual(const Material& material, CoatTable& table) {
   }
 }
 
-// Requires a table with the residual, to which the lobe is added that has its flux.
-void AddAgain(const Material& material, CoatTable& table) {
-  const CoatTable::ByHits& shares = table.by_hits[0];
-  for (std::size_t hit = 2; hit < shares.size(); ++hit)
-    table.meetings_again += static_cast<float>(hit - 1) * shares[hit];
-  table.again.resize(CoatTable::kCosines);
-  for (std::size_t i = 0; i < table.again.size(); ++i)
-    table.again[i] = std::sqrt(table.residual[i]);
-  const Ggx facets = AgainFacets(material);
-  for (int round = 0; round < kScalings; ++round) {
-    std::vector<float> scaled = table.again;
-    for (std::size_t i = 1; i < scaled.size(); ++i) {
-      const double brought = MeanBroughtFrom(material, CosineOf(static_cast<int>(i)), facets,
-                                             [&](Vec3 w) { return CoatAgain(material, w.z); });
-      scaled[i] = brought > 0 ? scaled[i] * static_cast<float>(std::sqrt(
-                                                static_cast<double>(table.residual[i]) / brought))
-                              : 0.0F;
-    }
-    table.again = std::move(scaled);
-  }
-}
-
 // The node of a table of cosines below `cosine`, and the share of the next one.
 struct Node {
   std::size_t below;
@@ -581,6 +567,45 @@ float EnteringIn(const CoatTable& table, Vec3 w) {
   const int row = std::min(static_cast<int>(place), table.rows - 2);
   const float next = place - static_cast<float>(row);
   return at(row) * (1 - next) + at(row + 1) * next;
+}
+
+// Requires a table with the residual, to which the lobe is added that has its flux.
+void AddAgain(const Material& material, CoatTable& table) {
+  constexpr std::size_t kCosines = CoatTable::kCosines;
+  const CoatTable::ByHits& shares = table.by_hits[0];
+  for (std::size_t hit = 2; hit < shares.size(); ++hit)
+    table.meetings_again += static_cast<float>(hit - 1) * shares[hit];
+  // [kCosines × kCosines] of the flux from one node, what leaves at each, but for the factors.
+  std::vector<double> reflected(kCosines * kCosines);
+  const Ggx facets = AgainFacets(material);
+  const double each = 1.0 / (kFacets * kFacets * TurnsOf(material));
+  for (std::size_t i = 1; i < kCosines; ++i) {
+    double* to = &reflected[i * kCosines];
+    ForEachTurn(material, CosineOf(static_cast<int>(i)), [&](Vec3 w) {
+      MeanOverReflected(material, w, facets, [&](Vec3 out, float share) {
+        const Node node = NodeAt(out.z);
+        to[node.below] += each * static_cast<double>(share * (1 - node.share));
+        to[node.below + 1] += each * static_cast<double>(share * node.share);
+        return share;
+      });
+    });
+  }
+  // Half of each error goes to each of the two occurrences of a factor.
+  constexpr int kRounds = 64;
+  std::vector<double> again(kCosines);
+  for (std::size_t i = 1; i < kCosines; ++i)
+    again[i] = std::sqrt(static_cast<double>(table.residual[i]));
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<double> scaled = again;
+    for (std::size_t i = 1; i < kCosines; ++i) {
+      double brought = 0;
+      for (std::size_t j = 0; j < kCosines; ++j)
+        brought += again[i] * reflected[i * kCosines + j] * again[j];
+      scaled[i] *= brought > 0 ? std::sqrt(static_cast<double>(table.residual[i]) / brought) : 0;
+    }
+    again = std::move(scaled);
+  }
+  table.again.assign(again.begin(), again.end());
 }
 
 CoatTable MakeCoat(const Material& original) {
